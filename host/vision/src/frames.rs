@@ -1,0 +1,166 @@
+//! Points, rays and rigid transforms that know their coordinate frame.
+
+use std::fmt::Debug;
+use std::marker::PhantomData;
+use std::ops::Mul;
+
+use nalgebra::{Isometry3, Point3, Translation3, Unit, UnitQuaternion, Vector3};
+
+/// A coordinate frame, as a type. Right-handed; cameras have x right, y down, z along the optical axis.
+pub trait Frame: Copy + Debug + PartialEq {}
+
+macro_rules! frames {
+    ($($(#[$doc:meta])* $name:ident),+ $(,)?) => {$(
+        $(#[$doc])*
+        #[derive(Clone, Copy, Debug, PartialEq)]
+        pub struct $name;
+        impl Frame for $name {}
+    )+};
+}
+frames!(
+    /// The left camera: the reference frame of every pair and cloud.
+    Left,
+    /// The right camera.
+    Right,
+    /// Any one camera, where it does not matter which.
+    Camera,
+    /// The rig's fixed part.
+    Base,
+    /// The surroundings.
+    World,
+);
+
+/// A point in frame `F`, in millimetres.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Point<F: Frame> {
+    mm: Vector3<f64>,
+    frame: PhantomData<F>,
+}
+
+/// A direction in frame `F`: a unit vector with any sign of z.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct UnitRay<F: Frame> {
+    direction: Unit<Vector3<f64>>,
+    frame: PhantomData<F>,
+}
+
+/// A rigid transform: maps coordinates in `From` to coordinates in `To`. Name values `to_from_from`, as in
+/// `left_from_right`, so that `left_from_right * right_from_base` reads as what it is.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Transform<To: Frame, From: Frame> {
+    isometry: Isometry3<f64>,
+    frames: PhantomData<(To, From)>,
+}
+
+impl<F: Frame> Point<F> {
+    /// The point at `mm` millimetres.
+    #[must_use]
+    pub const fn from_mm(mm: Vector3<f64>) -> Self {
+        Self { mm, frame: PhantomData }
+    }
+
+    /// Coordinates in millimetres.
+    #[must_use]
+    pub const fn mm(&self) -> Vector3<f64> {
+        self.mm
+    }
+
+    /// The direction from the frame's origin; `None` at the origin itself.
+    #[must_use]
+    pub fn direction(&self) -> Option<UnitRay<F>> {
+        UnitRay::new(self.mm)
+    }
+}
+
+impl<F: Frame> UnitRay<F> {
+    /// The direction of `vector`, of any length; `None` where it has none (zero or not finite).
+    #[must_use]
+    pub fn new(vector: Vector3<f64>) -> Option<Self> {
+        Unit::try_new(vector, 0.0)
+            .filter(|unit| unit.iter().all(|c| c.is_finite()))
+            .map(|direction| Self { direction, frame: PhantomData })
+    }
+
+    /// The unit vector.
+    #[must_use]
+    pub fn vector(&self) -> Vector3<f64> {
+        self.direction.into_inner()
+    }
+
+    /// The point at `range_mm` along the ray.
+    #[must_use]
+    pub fn at(&self, range_mm: f64) -> Point<F> {
+        Point::from_mm(self.vector() * range_mm)
+    }
+
+    /// The same direction in a frame of another name with the same axes, such as `Camera` to `Left`.
+    #[must_use]
+    pub fn renamed<G: Frame>(&self) -> UnitRay<G> {
+        UnitRay { direction: self.direction, frame: PhantomData }
+    }
+}
+
+impl<To: Frame, From: Frame> Transform<To, From> {
+    /// From rotation and the origin of `From` seen in `To`, in millimetres.
+    #[must_use]
+    pub fn new(rotation: UnitQuaternion<f64>, origin_mm: Vector3<f64>) -> Self {
+        Self::from_isometry(Isometry3::from_parts(Translation3::from(origin_mm), rotation))
+    }
+
+    /// From an isometry whose translation is in millimetres.
+    #[must_use]
+    pub const fn from_isometry(isometry: Isometry3<f64>) -> Self {
+        Self { isometry, frames: PhantomData }
+    }
+
+    /// The isometry, translation in millimetres.
+    #[must_use]
+    pub const fn isometry(&self) -> &Isometry3<f64> {
+        &self.isometry
+    }
+
+    /// Where the origin of `From` lies in `To`.
+    #[must_use]
+    pub fn origin(&self) -> Point<To> {
+        Point::from_mm(self.isometry.translation.vector)
+    }
+
+    /// The rotation part.
+    #[must_use]
+    pub const fn rotation(&self) -> UnitQuaternion<f64> {
+        self.isometry.rotation
+    }
+
+    /// The way back: `left_from_right.inverse()` is `right_from_left`.
+    #[must_use]
+    pub fn inverse(&self) -> Transform<From, To> {
+        Transform::from_isometry(self.isometry.inverse())
+    }
+
+    /// The same transform with its frames named anew.
+    #[must_use]
+    pub fn renamed<A: Frame, B: Frame>(&self) -> Transform<A, B> {
+        Transform::from_isometry(self.isometry)
+    }
+}
+
+impl<A: Frame, B: Frame, C: Frame> Mul<Transform<B, C>> for Transform<A, B> {
+    type Output = Transform<A, C>;
+    fn mul(self, right: Transform<B, C>) -> Self::Output {
+        Transform::from_isometry(self.isometry * right.isometry)
+    }
+}
+
+impl<To: Frame, From: Frame> Mul<Point<From>> for Transform<To, From> {
+    type Output = Point<To>;
+    fn mul(self, point: Point<From>) -> Point<To> {
+        Point::from_mm((self.isometry * Point3::from(point.mm)).coords)
+    }
+}
+
+impl<To: Frame, From: Frame> Mul<UnitRay<From>> for Transform<To, From> {
+    type Output = UnitRay<To>;
+    fn mul(self, ray: UnitRay<From>) -> UnitRay<To> {
+        UnitRay { direction: self.isometry.rotation * ray.direction, frame: PhantomData }
+    }
+}

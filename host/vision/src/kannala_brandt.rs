@@ -1,0 +1,224 @@
+//! The Kannala-Brandt fisheye model, valid past 90°.
+//!
+//! J. Kannala and S. Brandt, "A generic camera model and calibration method for conventional, wide-angle, and
+//! fish-eye lenses", PAMI 28(8), 2006, eq. 6 with five coefficients:
+//!
+//! ```text
+//! r(θ) = k1 θ + k2 θ³ + k3 θ⁵ + k4 θ⁷ + k5 θ⁹        u = cx + r cos φ        v = cy + aspect · r sin φ
+//! ```
+//!
+//! θ is the angle to the optical axis, from 0 to beyond 90°; φ runs from x (right) to y (down). `k` is in pixels.
+
+use nalgebra::Vector3;
+
+use crate::{Angle, Frame, Point, UnitRay};
+
+/// An image position in pixels. (0, 0) is the centre of the top-left pixel, u to the right, v down.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Pixel {
+    /// Column.
+    pub u: f64,
+    /// Row.
+    pub v: f64,
+}
+
+/// Width and height of an image in pixels.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct ImageSize {
+    /// Columns.
+    pub width: u32,
+    /// Rows.
+    pub height: u32,
+}
+
+/// A lens and sensor: projects rays to pixels and pixels to rays.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct KannalaBrandt {
+    k: [f64; 5],
+    aspect: f64,
+    centre: Pixel,
+    theta_max: f64,
+    r_max: f64,
+    size: ImageSize,
+}
+
+/// Why a set of parameters is not a lens.
+#[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+pub enum InvalidLens {
+    /// A parameter is infinite or not a number.
+    #[error("a camera parameter is not a finite number")]
+    NotFinite,
+    /// k1 (the focal length in pixels) or the aspect ratio is not positive.
+    #[error("focal lengths must be positive")]
+    FocalLength,
+    /// theta_max is not in (0°, 180°).
+    #[error("theta_max is {0:.2}, it must lie between 0° and 180°")]
+    ThetaMax(Angle),
+    /// The radius stops growing inside the stated field, so that a pixel there would have two rays.
+    #[error(
+        "the lens polynomial turns over at {turn:.2}, inside theta_max = {stated:.2}: reduce theta_max or recalibrate"
+    )]
+    TurnsOver {
+        /// Where dr/dθ first reaches zero.
+        turn: Angle,
+        /// The stated limit of the field.
+        stated: Angle,
+    },
+}
+
+/// A ray or pixel outside the lens's valid cone.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
+#[error("outside the lens's valid cone")]
+pub struct OutsideField;
+
+impl KannalaBrandt {
+    /// From the five coefficients in pixels, `aspect` = fy / fx, the principal point, the half field `theta_max` and the image size.
+    ///
+    /// # Errors
+    /// [`InvalidLens`] where the parameters are not finite, not positive, or r(θ) does not grow up to `theta_max`.
+    pub fn new(
+        k: [f64; 5],
+        aspect: f64,
+        centre: Pixel,
+        theta_max: Angle,
+        size: ImageSize,
+    ) -> Result<Self, InvalidLens> {
+        let stated = theta_max.rad();
+        if !k.iter().chain(&[aspect, centre.u, centre.v, stated]).all(|x| x.is_finite()) {
+            return Err(InvalidLens::NotFinite);
+        }
+        if k[0] <= 0.0 || aspect <= 0.0 {
+            return Err(InvalidLens::FocalLength);
+        }
+        if stated <= 0.0 || stated >= std::f64::consts::PI {
+            return Err(InvalidLens::ThetaMax(theta_max));
+        }
+        if let Some(turn) = first_turn(&k, stated) {
+            return Err(InvalidLens::TurnsOver { turn: Angle::from_rad(turn), stated: theta_max });
+        }
+        Ok(Self { k, aspect, centre, theta_max: stated, r_max: radius(&k, stated), size })
+    }
+
+    /// The pixel where `ray` is seen.
+    ///
+    /// # Errors
+    /// [`OutsideField`] beyond `theta_max`. The pixel may still lie outside the sensor: see [`Self::on_sensor`].
+    pub fn project<F: Frame>(&self, ray: &UnitRay<F>) -> Result<Pixel, OutsideField> {
+        let d = ray.vector();
+        let rho = d.x.hypot(d.y);
+        let theta = rho.atan2(d.z);
+        if theta > self.theta_max {
+            return Err(OutsideField);
+        }
+        // At the axis r/rho tends to k1.
+        let scale = if rho > 0.0 { radius(&self.k, theta) / rho } else { self.k[0] };
+        Ok(Pixel { u: self.centre.u + scale * d.x, v: self.centre.v + self.aspect * scale * d.y })
+    }
+
+    /// The pixel where `point` is seen.
+    ///
+    /// # Errors
+    /// [`OutsideField`] beyond `theta_max` and for a point at the optical centre.
+    pub fn project_point<F: Frame>(&self, point: &Point<F>) -> Result<Pixel, OutsideField> {
+        self.project(&point.direction().ok_or(OutsideField)?)
+    }
+
+    /// The ray seen at `pixel`, in the camera frame the caller names.
+    ///
+    /// # Errors
+    /// [`OutsideField`] beyond `theta_max`: never a clamped ray.
+    pub fn unproject<F: Frame>(&self, pixel: Pixel) -> Result<UnitRay<F>, OutsideField> {
+        let (x, y) = (pixel.u - self.centre.u, (pixel.v - self.centre.v) / self.aspect);
+        let r = x.hypot(y);
+        if r.is_nan() || r > self.r_max {
+            return Err(OutsideField);
+        }
+        let theta = self.angle_at_radius(r);
+        let scale = if r > 0.0 { theta.sin() / r } else { 1.0 / self.k[0] };
+        UnitRay::new(Vector3::new(x * scale, y * scale, theta.cos())).ok_or(OutsideField)
+    }
+
+    /// θ with r(θ) = `r`, by Newton's method kept inside a shrinking bracket.
+    fn angle_at_radius(&self, r: f64) -> f64 {
+        let (mut low, mut high) = (0.0, self.theta_max);
+        let mut theta = (r / self.k[0]).clamp(low, high);
+        for _ in 0..60 {
+            let error = radius(&self.k, theta) - r;
+            if error > 0.0 {
+                high = theta;
+            } else {
+                low = theta;
+            }
+            let newton = theta - error / slope(&self.k, theta);
+            let next = if newton >= low && newton <= high { newton } else { 0.5 * (low + high) };
+            let step = (next - theta).abs();
+            theta = next;
+            if step <= 4.0 * f64::EPSILON {
+                break;
+            }
+        }
+        theta
+    }
+
+    /// Whether `pixel` lies on the sensor (half a pixel of border belongs to the outermost pixels).
+    #[must_use]
+    pub fn on_sensor(&self, pixel: Pixel) -> bool {
+        let inside = |x: f64, n: u32| x >= -0.5 && x <= f64::from(n) - 0.5;
+        inside(pixel.u, self.size.width) && inside(pixel.v, self.size.height)
+    }
+
+    /// The five coefficients in pixels.
+    #[must_use]
+    pub const fn k(&self) -> [f64; 5] {
+        self.k
+    }
+
+    /// fy / fx.
+    #[must_use]
+    pub const fn aspect(&self) -> f64 {
+        self.aspect
+    }
+
+    /// The principal point.
+    #[must_use]
+    pub const fn centre(&self) -> Pixel {
+        self.centre
+    }
+
+    /// Half the field: the largest valid angle to the optical axis.
+    #[must_use]
+    pub const fn theta_max(&self) -> Angle {
+        Angle::from_rad(self.theta_max)
+    }
+
+    /// The image size.
+    #[must_use]
+    pub const fn size(&self) -> ImageSize {
+        self.size
+    }
+
+    /// Pixels per radian at the angle `theta` from the axis, along the radius: dr/dθ.
+    #[must_use]
+    pub fn pixels_per_radian(&self, theta: Angle) -> f64 {
+        slope(&self.k, theta.rad())
+    }
+}
+
+/// r(θ) in pixels.
+fn radius(k: &[f64; 5], theta: f64) -> f64 {
+    let s = theta * theta;
+    theta * (k[0] + s * (k[1] + s * (k[2] + s * (k[3] + s * k[4]))))
+}
+
+/// dr/dθ in pixels per radian.
+fn slope(k: &[f64; 5], theta: f64) -> f64 {
+    let s = theta * theta;
+    k[0] + s * (3.0 * k[1] + s * (5.0 * k[2] + s * (7.0 * k[3] + s * 9.0 * k[4])))
+}
+
+/// The first θ up to `limit` where dr/dθ ≤ 0, to the width of the scan (a thousandth of the field).
+fn first_turn(k: &[f64; 5], limit: f64) -> Option<f64> {
+    const STEPS: u32 = 1000;
+    (0..=STEPS).map(|i| limit * f64::from(i) / f64::from(STEPS)).find(|&theta| slope(k, theta) <= 0.0)
+}
