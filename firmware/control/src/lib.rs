@@ -1,1 +1,32 @@
-//! (in progress)
+//! The controller of the rig: planner, homing, limits and safety states (`no_std`, no async, no I/O).
+//!
+//! [`Controller`] is the heart. It has two entry points: `handle` takes a request, `poll` runs one control tick against
+//! the board behind [`RigIo`]. Time is an argument. [`Node`] adds the serial session, so that a firmware shell, a native
+//! simulation and an emulated board all run the same code.
+//!
+//! Terms: *command* is where the planner wants an axis, *encoder* is where it is; *following error* is their difference;
+//! an axis is *referenced* once homing has tied its encoder to the axis zero; *settled* means that the encoder has
+//! stayed inside the tolerance for a dwell; the *lease* is how long a silent host is trusted; a fault is *latched* until cleared.
+
+#![no_std]
+
+mod axis;
+mod controller;
+mod homing;
+mod io;
+mod latch;
+mod lease;
+mod node;
+mod profile;
+mod settings;
+mod trajectory;
+
+pub use controller::{Controller, Event};
+pub use io::RigIo;
+pub use node::{Node, NodeIdentity};
+
+pub use profile::{Limits, MotionState, Profile};
+pub use settings::{AxisSettings, HomingSettings, Scale, SettingsError};
+
+/// The control tick: how often `poll` wants to run while the drivers are on, in microseconds.
+pub const TICK_US: u64 = 1_000;

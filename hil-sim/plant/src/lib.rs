@@ -1,1 +1,14 @@
-//! (in progress)
+//! The simulated mechanics of the rig, and the native board: the controller core run in virtual time against them.
+//!
+//! Simulated here: stepper motors, the compliance and backlash of screw and rack, load-side encoders, home and limit
+//! switches, mechanical end stops. Everything is deterministic in its seed and its inputs.
+
+mod axis;
+mod bench;
+mod board;
+mod plant;
+
+pub use axis::{AxisMechanics, AxisPlant};
+pub use bench::{bench_mechanics, bench_settings};
+pub use board::NativeBoard;
+pub use plant::Plant;

@@ -1,1 +1,26 @@
-//! (in progress)
+//! The rig: its description, its kinematics, and where its cameras were at an exposure.
+//!
+//! A [`Rig`] is read from TOML. Its axes turn encoder counts into positions, a screw chain per camera turns positions into
+//! `base_from_left` and `base_from_right`, a [`ClockMap`] brings the host's instants onto the board's clock, and a
+//! [`JointTrack`] tells the counts at that instant. Together they give a [`RigPose`].
+//!
+//! Everything is a pure function of its arguments: no file is read here.
+
+mod axis;
+mod chain;
+mod clock;
+mod file;
+mod pose;
+mod rig;
+mod track;
+
+pub use axis::{AxisPosition, RigAxis};
+pub use chain::{Chain, Screw};
+pub use clock::{BoardInstant, ClockMap, Exchange};
+pub use file::RigError;
+pub use pose::RigPose;
+pub use rig::{Mode, Rig};
+pub use track::{JointSample, JointTrack, JointsAt, TrackGap};
+
+/// The built-in bench, as the TOML file a user would write.
+pub const BENCH_TOML: &str = include_str!("bench.toml");

@@ -1,0 +1,137 @@
+//! One axis: command, encoder, reference and the trajectory it runs.
+
+use vergence_protocol::{Counts, Micro, Microseconds};
+
+use crate::TICK_US;
+use crate::io::RigIo;
+use crate::profile::{Limits, Profile};
+use crate::settings::AxisSettings;
+use crate::trajectory::Trajectory;
+
+#[derive(Clone, Debug)]
+pub struct Axis {
+    pub settings: AxisSettings,
+    index: usize,
+    /// Where the axis was told to be now, and at the end of the running tick; 1/256 micro-units.
+    command_now: i64,
+    command_next: i64,
+    /// When the axis will be at `command_next`: a new trajectory begins there and then, so that the command never jumps.
+    next_at: Microseconds,
+    trajectory: Option<Trajectory>,
+    /// Raw steps and counts at the axis zero.
+    zero_steps: i32,
+    zero_counts: i32,
+    referenced: bool,
+}
+
+impl Axis {
+    pub fn new(index: usize, settings: AxisSettings) -> Self {
+        Self {
+            settings,
+            index,
+            command_now: 0,
+            command_next: 0,
+            next_at: Microseconds(0),
+            trajectory: None,
+            zero_steps: 0,
+            zero_counts: 0,
+            referenced: false,
+        }
+    }
+
+    pub fn is_referenced(&self) -> bool {
+        self.referenced
+    }
+
+    pub fn forget_reference(&mut self) {
+        self.referenced = false;
+    }
+
+    pub fn counts(&self, io: &impl RigIo) -> Counts {
+        Counts(io.encoder(self.index).wrapping_sub(self.zero_counts))
+    }
+
+    pub fn position(&self, io: &impl RigIo) -> Micro {
+        self.settings.encoder().position_at(self.counts(io).0)
+    }
+
+    /// Declares that the encoder count `edge` is at `position`.
+    pub fn reference(&mut self, io: &impl RigIo, edge: Counts, position: Micro) {
+        let raw_edge = edge.0.wrapping_add(self.zero_counts);
+        self.zero_counts = raw_edge.wrapping_sub(self.settings.encoder().counts_at(position));
+        self.referenced = true;
+        self.adopt_encoder(io);
+    }
+
+    /// Takes the encoder's word for where the axis is: after power-on, after the drivers were off, after homing.
+    pub fn adopt_encoder(&mut self, io: &impl RigIo) {
+        let position = self.position(io);
+        self.trajectory = None;
+        self.command_now = i64::from(position.0) << 8;
+        self.command_next = self.command_now;
+        self.zero_steps = io.steps(self.index).wrapping_sub(self.settings.motor().counts_at(position));
+    }
+
+    /// Starts a profile from the present command.
+    pub fn run(&mut self, now: Microseconds, profile: Profile) {
+        self.trajectory = Some(Trajectory::new(self.command_next, now.max(self.next_at), profile));
+    }
+
+    /// Starts a motion by `distance` from rest.
+    pub fn travel(&mut self, now: Microseconds, distance: Micro, limits: Limits) {
+        self.run(now, Profile::rest_to_rest(distance.0 as f32, limits));
+    }
+
+    /// The profile from rest at the present command to `target`.
+    pub fn profile_to(&self, target: Micro, limits: Limits) -> Profile {
+        let distance = (i64::from(target.0) << 8) - self.command_next;
+        Profile::rest_to_rest(distance as f32 / 256.0, limits)
+    }
+
+    /// Begins the quickest stop; at rest it does nothing.
+    pub fn stop(&mut self, now: Microseconds) {
+        if let Some(trajectory) = self.trajectory {
+            let state = trajectory.state(now.max(self.next_at));
+            self.run(now, Profile::stop(state.velocity, state.acceleration, self.settings.limits()));
+        }
+    }
+
+    /// Drops the trajectory where it is: for drivers that have been switched off.
+    pub fn abandon(&mut self) {
+        self.trajectory = None;
+    }
+
+    pub fn is_moving(&self) -> bool {
+        self.trajectory.is_some()
+    }
+
+    /// Commands the next tick.
+    pub fn advance(&mut self, now: Microseconds, io: &mut impl RigIo) {
+        let end_of_tick = Microseconds(now.0 + TICK_US);
+        self.command_now = self.command_next;
+        self.next_at = end_of_tick;
+        if let Some(trajectory) = self.trajectory {
+            self.command_next = trajectory.position(end_of_tick);
+            if trajectory.is_over(end_of_tick) {
+                self.trajectory = None;
+            }
+        }
+        let steps = self.settings.motor().counts_at_q8(self.command_next).wrapping_add(self.zero_steps);
+        io.step_to(self.index, steps, end_of_tick);
+    }
+
+    /// Command less encoder.
+    pub fn following_error(&self, io: &impl RigIo) -> i32 {
+        let command = i32::try_from(self.command_now >> 8).unwrap_or(i32::MAX);
+        command.saturating_sub(self.position(io).0)
+    }
+
+    /// Whether the encoder reads `target` within the tolerance.
+    pub fn is_at(&self, target: Micro, io: &impl RigIo) -> bool {
+        self.position(io).0.abs_diff(target.0) <= self.settings.tolerance.0.unsigned_abs()
+    }
+
+    pub fn home_switch(&self, io: &impl RigIo) -> bool {
+        io.home_switch(self.index)
+    }
+}

@@ -1,0 +1,223 @@
+//! The state machine: what may move, when, and what stops it.
+//!
+//! ```text
+//! Idle --Arm--> Ready --Home--> Homing --> Ready        Ready --Disarm--> Idle (reference kept)
+//! Ready --MoveTo--> Moving --settled--> Ready           Moving, Homing --Stop--> Stopping --> Ready
+//! armed --lease expired--> LinkLost (brakes, latched)   any --fault--> Fault (latched)
+//! LinkLost, Fault --ClearFault--> Idle
+//! ```
+
+mod requests;
+mod tick;
+
+use heapless::Deque;
+use vergence_protocol::{
+    AxisInfo, AxisList, AxisMask, ControllerState, FaultCode, FaultRecord, Micro, Microseconds, Mode, MoveId,
+    MovePhase, PoseReport, SessionId,
+};
+
+use crate::axis::Axis;
+use crate::homing::Homing;
+use crate::io::RigIo;
+use crate::latch::FaultLatch;
+use crate::lease::Lease;
+use crate::settings::{AxisSettings, SettingsError};
+
+/// What the host should hear of at once.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Event {
+    /// A move changed its phase.
+    MoveState {
+        /// Which move.
+        id: MoveId,
+        /// Where it is.
+        phase: MovePhase,
+    },
+    /// A fault was latched.
+    Fault(FaultRecord),
+}
+
+/// The latest move.
+#[derive(Clone, Debug)]
+struct ActiveMove {
+    id: MoveId,
+    mode: Mode,
+    targets: AxisList<Micro>,
+    phase: MovePhase,
+    /// Since when all encoders are inside the tolerance.
+    inside_since: Option<Microseconds>,
+    settle_by: Microseconds,
+}
+
+/// The controller of N axes.
+#[derive(Debug)]
+pub struct Controller {
+    axes: AxisList<Axis>,
+    state: ControllerState,
+    drivers_on: bool,
+    lease: Lease,
+    /// Who armed the board.
+    holder: Option<SessionId>,
+    latch: FaultLatch,
+    homing: AxisList<Option<Homing>>,
+    active: ActiveMove,
+    disarm_at_rest: bool,
+    events: Deque<Event, 8>,
+}
+
+impl Controller {
+    /// A disarmed controller without reference.
+    ///
+    /// # Errors
+    /// [`SettingsError`] where an axis cannot work with its settings.
+    pub fn new(settings: &[AxisSettings]) -> Result<Self, SettingsError> {
+        let mut axes = AxisList::new();
+        let mut homing = AxisList::new();
+        for (index, &axis) in settings.iter().enumerate() {
+            axis.validate(index)?;
+            axes.push(Axis::new(index, axis)).map_err(|_| SettingsError::AxisCount)?;
+            homing.push(None).map_err(|_| SettingsError::AxisCount)?;
+        }
+        if axes.is_empty() {
+            return Err(SettingsError::AxisCount);
+        }
+        let active = ActiveMove {
+            id: MoveId(0),
+            mode: Mode(0),
+            targets: AxisList::new(),
+            phase: MovePhase::None,
+            inside_since: None,
+            settle_by: Microseconds(0),
+        };
+        Ok(Self {
+            axes,
+            state: ControllerState::Idle,
+            drivers_on: false,
+            lease: Lease::default(),
+            holder: None,
+            latch: FaultLatch::default(),
+            homing,
+            active,
+            disarm_at_rest: false,
+            events: Deque::new(),
+        })
+    }
+
+    /// How many axes there are.
+    #[must_use]
+    pub fn axis_count(&self) -> usize {
+        self.axes.len()
+    }
+
+    /// What the host is told of an axis.
+    #[must_use]
+    pub fn axis_info(&self, axis: usize) -> Option<AxisInfo> {
+        self.axes.get(axis).map(|axis| axis.settings.info())
+    }
+
+    /// What the controller is doing.
+    #[must_use]
+    pub fn state(&self) -> ControllerState {
+        self.state
+    }
+
+    /// The oldest event not yet taken.
+    pub fn take_event(&mut self) -> Option<Event> {
+        self.events.pop_front()
+    }
+
+    /// Telemetry at `now`.
+    #[must_use]
+    pub fn pose(&self, now: Microseconds, seq: u16, io: &impl RigIo) -> PoseReport {
+        let mut referenced = AxisMask::default();
+        for (index, _) in self.axes.iter().enumerate().filter(|(_, axis)| axis.is_referenced()) {
+            referenced = referenced.with(index);
+        }
+        PoseReport {
+            at: now,
+            seq,
+            counts: self.axes.iter().map(|axis| axis.counts(io)).collect(),
+            referenced,
+            state: self.state,
+            mode: self.mode_reached(io),
+            move_id: self.active.id,
+            phase: self.active.phase,
+            fault: self.latch.record(),
+        }
+    }
+
+    /// The mode of the latest move, claimed only while the encoders confirm it.
+    fn mode_reached(&self, io: &impl RigIo) -> Mode {
+        let there = self.active.phase == MovePhase::Settled && self.inside_tolerance(io);
+        if there { self.active.mode } else { Mode(0) }
+    }
+
+    fn inside_tolerance(&self, io: &impl RigIo) -> bool {
+        self.axes.iter().zip(&self.active.targets).all(|(axis, &target)| axis.is_referenced() && axis.is_at(target, io))
+    }
+
+    fn any_moving(&self) -> bool {
+        self.axes.iter().any(Axis::is_moving)
+    }
+
+    fn is_latched(&self) -> bool {
+        matches!(self.state, ControllerState::LinkLost | ControllerState::Fault)
+    }
+
+    /// Takes a heartbeat of `session`.
+    pub fn heartbeat(&mut self, now: Microseconds, session: SessionId, lease_ms: u16) {
+        self.lease.renew(now, session, lease_ms, self.holder);
+    }
+
+    fn go_idle(&mut self, io: &mut impl RigIo) {
+        self.cut_drivers(io);
+        self.holder = None;
+        self.disarm_at_rest = false;
+        self.state = ControllerState::Idle;
+    }
+
+    fn cut_drivers(&mut self, io: &mut impl RigIo) {
+        self.drivers_on = false;
+        io.set_drivers(false);
+        for axis in &mut self.axes {
+            axis.abandon();
+        }
+    }
+
+    /// Brings every axis to rest within its limits.
+    fn brake(&mut self, now: Microseconds) {
+        self.abort_motion();
+        for axis in &mut self.axes {
+            axis.stop(now);
+        }
+    }
+
+    /// Gives up homing and the running move.
+    fn abort_motion(&mut self) {
+        self.homing.iter_mut().for_each(|homing| *homing = None);
+        if matches!(self.active.phase, MovePhase::Running | MovePhase::Settling) {
+            self.active.phase = MovePhase::Stopped;
+            self.tell_phase();
+        }
+    }
+
+    fn raise(&mut self, now: Microseconds, code: FaultCode, axis: Option<usize>, detail: i32) {
+        if self.latch.raise(code, now, axis, detail)
+            && let Some(record) = self.latch.record()
+        {
+            self.tell(Event::Fault(record));
+        }
+    }
+
+    fn tell_phase(&mut self) {
+        self.tell(Event::MoveState { id: self.active.id, phase: self.active.phase });
+    }
+
+    /// Events are a convenience: every Pose repeats what they say, so the oldest may be dropped.
+    fn tell(&mut self, event: Event) {
+        if self.events.is_full() {
+            self.events.pop_front();
+        }
+        let _ = self.events.push_back(event);
+    }
+}

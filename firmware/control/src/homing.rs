@@ -1,0 +1,131 @@
+//! Homing of one axis: seek the switch, retract, approach it again slowly, verify, go to the low end of the range.
+//!
+//! The slow edge is the reference; the fast one only checks it (as Klipper and GRBL do).
+
+use vergence_protocol::{Counts, FaultCode, Micro, Microseconds};
+
+use crate::axis::Axis;
+use crate::io::RigIo;
+
+/// What homing is doing.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Phase {
+    /// The switch was closed at the start: leave it.
+    BackOff,
+    /// Look for the switch.
+    Seek,
+    /// Found; come to rest.
+    Brake {
+        edge: Counts,
+    },
+    /// Leave the switch again.
+    Retract {
+        edge: Counts,
+    },
+    /// Approach it slowly.
+    Approach {
+        edge: Counts,
+    },
+    /// Found again; come to rest.
+    Rest {
+        edge: Counts,
+    },
+    /// Go to the low end of the range.
+    Enter,
+    Done,
+}
+
+/// What one tick of homing came to.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Progress {
+    Running,
+    Done,
+    Failed { code: FaultCode, detail: i32 },
+}
+
+/// Homing of one axis.
+#[derive(Clone, Copy, Debug)]
+pub struct Homing {
+    phase: Phase,
+}
+
+impl Homing {
+    /// Starts: the old reference is no longer claimed.
+    pub fn start(now: Microseconds, axis: &mut Axis, io: &impl RigIo) -> Self {
+        axis.forget_reference();
+        let homing = axis.settings.homing;
+        let limits = axis.settings.limits_at(homing.seek_speed);
+        let phase = if axis.home_switch(io) {
+            axis.travel(now, Micro(homing.retract.0.saturating_mul(2)), limits);
+            Phase::BackOff
+        } else {
+            axis.travel(now, Micro(-homing.travel.0), limits);
+            Phase::Seek
+        };
+        Self { phase }
+    }
+
+    /// One tick.
+    pub fn poll(&mut self, now: Microseconds, axis: &mut Axis, io: &impl RigIo) -> Progress {
+        let homing = axis.settings.homing;
+        let limits = axis.settings.limits_at(homing.seek_speed);
+        let closed = axis.home_switch(io);
+        let moving = axis.is_moving();
+        let counts = axis.counts(io);
+        self.phase = match self.phase {
+            Phase::BackOff if moving => Phase::BackOff,
+            Phase::BackOff if closed => return stuck(homing.retract.0.saturating_mul(2)),
+            Phase::BackOff => {
+                axis.travel(now, Micro(-homing.travel.0), limits);
+                Phase::Seek
+            }
+            Phase::Seek if closed => {
+                axis.stop(now);
+                Phase::Brake { edge: counts }
+            }
+            Phase::Seek if moving => Phase::Seek,
+            Phase::Seek => return not_found(homing.travel.0),
+            Phase::Brake { edge } if moving => Phase::Brake { edge },
+            Phase::Brake { edge } => {
+                let overshoot = axis.settings.encoder().position_at(edge.0.wrapping_sub(counts.0));
+                axis.travel(now, Micro(homing.retract.0.saturating_add(overshoot.0)), limits);
+                Phase::Retract { edge }
+            }
+            Phase::Retract { edge } if moving => Phase::Retract { edge },
+            Phase::Retract { .. } if closed => return stuck(homing.retract.0),
+            Phase::Retract { edge } => {
+                let slow = axis.settings.limits_at(homing.approach_speed);
+                axis.travel(now, Micro(homing.retract.0.saturating_mul(-2)), slow);
+                Phase::Approach { edge }
+            }
+            Phase::Approach { edge } if closed => {
+                let apart = axis.settings.encoder().position_at(counts.0.wrapping_sub(edge.0)).0;
+                if apart.abs() > homing.repeatability.0 {
+                    return Progress::Failed { code: FaultCode::HomeNotRepeatable, detail: apart };
+                }
+                axis.stop(now);
+                Phase::Rest { edge: counts }
+            }
+            Phase::Approach { edge } if moving => Phase::Approach { edge },
+            Phase::Approach { .. } => return not_found(homing.retract.0.saturating_mul(2)),
+            Phase::Rest { edge } if moving => Phase::Rest { edge },
+            Phase::Rest { edge } => {
+                axis.reference(io, edge, homing.switch_at);
+                let profile = axis.profile_to(axis.settings.min, limits);
+                axis.run(now, profile);
+                Phase::Enter
+            }
+            Phase::Enter if moving => Phase::Enter,
+            Phase::Enter | Phase::Done => Phase::Done,
+        };
+        if self.phase == Phase::Done { Progress::Done } else { Progress::Running }
+    }
+}
+
+fn stuck(distance: i32) -> Progress {
+    Progress::Failed { code: FaultCode::HomeSwitchStuck, detail: distance }
+}
+
+fn not_found(distance: i32) -> Progress {
+    Progress::Failed { code: FaultCode::HomeSwitchNotFound, detail: distance }
+}

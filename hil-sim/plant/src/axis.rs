@@ -1,0 +1,142 @@
+//! One axis of the mechanics: motor, transmission, encoder and switches.
+
+use vergence_control::Scale;
+use vergence_protocol::{AxisKind, Microseconds};
+
+/// What an axis is made of. Positions are axis coordinates in micro-units (µm or µrad).
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct AxisMechanics {
+    /// Motor steps along the axis.
+    pub motor: Scale,
+    /// Encoder counts along the axis; the encoder is on the load.
+    pub encoder: Scale,
+    /// Play between motor and load.
+    pub backlash: f64,
+    /// How fast the load follows the motor: time constant in seconds.
+    pub compliance: f64,
+    /// Where the home switch closes (at and below).
+    pub home_switch: f64,
+    /// Where the hard limit switches close (at and outside of).
+    pub hard_limits: [f64; 2],
+    /// Where the load strikes the frame; the motor loses steps there.
+    pub end_stops: [f64; 2],
+}
+
+/// The state of one axis.
+#[derive(Clone, Debug)]
+pub struct AxisPlant {
+    mechanics: AxisMechanics,
+    /// Steps made by the end of the running order, and when that is.
+    ordered: (i32, Microseconds),
+    /// Steps made so far; fractional between two pulses.
+    steps: f64,
+    /// Axis position of motor step zero; changes when steps are lost.
+    motor_zero: f64,
+    load: f64,
+    /// The encoder counts from wherever it was switched on.
+    raw_zero: i32,
+}
+
+impl AxisPlant {
+    /// An axis standing at `position`, whose encoder starts at count zero there.
+    #[must_use]
+    pub fn new(mechanics: AxisMechanics, position: f64) -> Self {
+        let mut axis = Self {
+            mechanics,
+            ordered: (0, Microseconds(0)),
+            steps: 0.0,
+            motor_zero: position,
+            load: position,
+            raw_zero: 0,
+        };
+        axis.raw_zero = axis.counts_from_zero();
+        axis
+    }
+
+    /// Where the load truly is.
+    #[must_use]
+    pub fn load(&self) -> f64 {
+        self.load
+    }
+
+    /// The raw encoder count.
+    #[must_use]
+    pub fn encoder(&self) -> i32 {
+        self.counts_from_zero().wrapping_sub(self.raw_zero)
+    }
+
+    fn counts_from_zero(&self) -> i32 {
+        (self.load * counts_per_micro(self.mechanics.encoder)).floor() as i32
+    }
+
+    /// Steps made so far.
+    #[must_use]
+    pub fn steps(&self) -> i32 {
+        self.steps.round() as i32
+    }
+
+    /// Orders steps, made evenly until `by`.
+    pub fn step_to(&mut self, steps: i32, by: Microseconds) {
+        self.ordered = (steps, by);
+    }
+
+    /// Whether the home switch is closed.
+    #[must_use]
+    pub fn home_switch(&self) -> bool {
+        self.load <= self.mechanics.home_switch
+    }
+
+    /// Whether a hard limit switch is closed.
+    #[must_use]
+    pub fn hard_limit(&self) -> bool {
+        let [low, high] = self.mechanics.hard_limits;
+        self.load <= low || self.load >= high
+    }
+
+    /// Lets time pass from `from` to `to`; without drivers the motor stands.
+    pub fn advance(&mut self, from: Microseconds, to: Microseconds, drivers_on: bool) {
+        if drivers_on {
+            self.turn_motor(from, to);
+        }
+        let motor = self.motor_zero + self.steps / counts_per_micro(self.mechanics.motor);
+        let play = self.mechanics.backlash / 2.0;
+        // Inside the play the load stands; outside, the transmission pulls it after the motor.
+        let pulled = self.load.clamp(motor - play, motor + play);
+        let dt = (to.0 - from.0) as f64 * 1e-6;
+        let share = 1.0 - (-dt / self.mechanics.compliance).exp();
+        self.load += (pulled - self.load) * share;
+        self.strike_end_stops(motor);
+    }
+
+    fn turn_motor(&mut self, from: Microseconds, to: Microseconds) {
+        let (target, by) = self.ordered;
+        let target = f64::from(target);
+        self.steps = if to >= by {
+            target
+        } else {
+            let share = (to.0 - from.0) as f64 / (by.0 - from.0) as f64;
+            self.steps + (target - self.steps) * share
+        };
+    }
+
+    /// A load at the frame stays there, and a motor that pulls further loses steps.
+    fn strike_end_stops(&mut self, motor: f64) {
+        let [low, high] = self.mechanics.end_stops;
+        if self.load < low || self.load > high {
+            let held = self.load.clamp(low, high);
+            self.load = held;
+            let slack = self.mechanics.backlash / 2.0;
+            let reachable = motor.clamp(held - slack, held + slack);
+            self.motor_zero += reachable - motor;
+        }
+    }
+}
+
+/// Counts (or steps) for each micro-unit of the axis.
+fn counts_per_micro(scale: Scale) -> f64 {
+    let micro_units = match scale.kind {
+        AxisKind::Linear => 1e6,
+        AxisKind::Rotary => std::f64::consts::TAU * 1e6,
+    };
+    f64::from(scale.per_unit) / micro_units
+}

@@ -1,0 +1,107 @@
+//! The native board: the controller core, its serial node and the mechanics, run in virtual time.
+
+use rand::{RngExt, SeedableRng};
+use rand_pcg::Pcg64Mcg;
+use vergence_control::{AxisSettings, Controller, Node, NodeIdentity, SettingsError};
+use vergence_protocol::{ControllerState, MAX_FRAME, Microseconds, ResetCause};
+
+use crate::axis::AxisMechanics;
+use crate::plant::Plant;
+
+/// A board without hardware. It lives in its own time: nothing happens between two calls of [`Self::advance`].
+#[derive(Debug)]
+pub struct NativeBoard {
+    node: Node,
+    plant: Plant,
+    now: Microseconds,
+    next_tick: Microseconds,
+}
+
+impl NativeBoard {
+    /// A board that has just been switched on; `seed` decides where the stages stand.
+    ///
+    /// # Errors
+    /// [`SettingsError`] where an axis cannot work with its settings.
+    pub fn new(settings: &[AxisSettings], mechanics: &[AxisMechanics], seed: u64) -> Result<Self, SettingsError> {
+        let controller = Controller::new(settings)?;
+        let mut random = Pcg64Mcg::seed_from_u64(seed);
+        let positions: Vec<f64> = settings
+            .iter()
+            .map(|axis| f64::from(axis.min.0) + random.random::<f64>() * f64::from(axis.max.0 - axis.min.0))
+            .collect();
+        let identity = NodeIdentity {
+            board: "native-sim".try_into().unwrap_or_default(),
+            firmware: firmware_version(),
+            build: 0,
+            uid: *b"vergence-sim",
+            reset: ResetCause::PowerOn,
+        };
+        Ok(Self {
+            node: Node::new(controller, identity, random.random()),
+            plant: Plant::new(mechanics, &positions),
+            now: Microseconds(0),
+            next_tick: Microseconds(0),
+        })
+    }
+
+    /// The board's clock.
+    #[must_use]
+    pub fn now(&self) -> Microseconds {
+        self.now
+    }
+
+    /// Lets time pass until `to`, running every control tick on its instant.
+    pub fn advance(&mut self, to: Microseconds) {
+        while self.next_tick <= to {
+            self.plant.advance(self.next_tick);
+            self.now = self.next_tick;
+            self.next_tick = self.node.poll(self.now, &mut self.plant);
+        }
+        if to > self.now {
+            self.plant.advance(to);
+            self.now = to;
+        }
+    }
+
+    /// Takes bytes that arrive now.
+    pub fn receive(&mut self, bytes: &[u8]) {
+        self.node.receive(self.now, bytes, &mut self.plant);
+    }
+
+    /// All frames that leave now, one after the other.
+    pub fn transmit(&mut self) -> Vec<u8> {
+        let mut buffer = [0; MAX_FRAME];
+        let mut out = Vec::new();
+        while let Some(length) = self.node.transmit(self.now, &mut buffer) {
+            out.extend(buffer.iter().take(length));
+        }
+        out
+    }
+
+    /// What the controller is doing.
+    #[must_use]
+    pub fn state(&self) -> ControllerState {
+        self.node.controller().state()
+    }
+
+    /// The mechanics: the truth.
+    #[must_use]
+    pub fn plant(&self) -> &Plant {
+        &self.plant
+    }
+
+    /// The mechanics, for doing something to them.
+    pub fn plant_mut(&mut self) -> &mut Plant {
+        &mut self.plant
+    }
+}
+
+/// The workspace's version: the native board runs its own sources.
+fn firmware_version() -> [u8; 3] {
+    let part = |text: &str| text.parse().unwrap_or(0);
+    [
+        part(env!("CARGO_PKG_VERSION_MAJOR")),
+        part(env!("CARGO_PKG_VERSION_MINOR")),
+        part(env!("CARGO_PKG_VERSION_PATCH")),
+    ]
+}

@@ -1,0 +1,82 @@
+//! The whole mechanics behind the controller's seam.
+
+use vergence_control::RigIo;
+use vergence_protocol::Microseconds;
+
+use crate::axis::{AxisMechanics, AxisPlant};
+
+/// All axes, the driver enable and the emergency stop.
+#[derive(Clone, Debug)]
+pub struct Plant {
+    axes: Vec<AxisPlant>,
+    now: Microseconds,
+    drivers_on: bool,
+    emergency_stop: bool,
+}
+
+impl Plant {
+    /// Axes standing at `positions` (micro-units), drivers off.
+    #[must_use]
+    pub fn new(mechanics: &[AxisMechanics], positions: &[f64]) -> Self {
+        let axes = mechanics.iter().zip(positions).map(|(&axis, &position)| AxisPlant::new(axis, position)).collect();
+        Self { axes, now: Microseconds(0), drivers_on: false, emergency_stop: false }
+    }
+
+    /// Where every load truly is, in micro-units.
+    #[must_use]
+    pub fn loads(&self) -> Vec<f64> {
+        self.axes.iter().map(AxisPlant::load).collect()
+    }
+
+    /// Whether the motors are held.
+    #[must_use]
+    pub fn drivers_on(&self) -> bool {
+        self.drivers_on
+    }
+
+    /// Presses or releases the emergency stop, which cuts the drivers in hardware.
+    pub fn press_emergency_stop(&mut self, pressed: bool) {
+        self.emergency_stop = pressed;
+    }
+
+    /// Lets time pass until `to`.
+    pub fn advance(&mut self, to: Microseconds) {
+        let powered = self.drivers_on && !self.emergency_stop;
+        for axis in &mut self.axes {
+            axis.advance(self.now, to, powered);
+        }
+        self.now = to;
+    }
+}
+
+impl RigIo for Plant {
+    fn set_drivers(&mut self, on: bool) {
+        self.drivers_on = on;
+    }
+
+    fn step_to(&mut self, axis: usize, steps: i32, by: Microseconds) {
+        if let Some(axis) = self.axes.get_mut(axis) {
+            axis.step_to(steps, by);
+        }
+    }
+
+    fn steps(&self, axis: usize) -> i32 {
+        self.axes.get(axis).map_or(0, AxisPlant::steps)
+    }
+
+    fn encoder(&self, axis: usize) -> i32 {
+        self.axes.get(axis).map_or(0, AxisPlant::encoder)
+    }
+
+    fn home_switch(&self, axis: usize) -> bool {
+        self.axes.get(axis).is_some_and(AxisPlant::home_switch)
+    }
+
+    fn hard_limit(&self, axis: usize) -> bool {
+        self.axes.get(axis).is_some_and(AxisPlant::hard_limit)
+    }
+
+    fn emergency_stop(&self) -> bool {
+        self.emergency_stop
+    }
+}

@@ -1,0 +1,124 @@
+//! One axis as the host sees it: name, range and encoder scale.
+
+use vergence_protocol::{AxisInfo, AxisKind, Counts, Micro};
+use vergence_vision::{Angle, Length};
+
+/// Where an axis is: millimetres or radians, by its kind.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum AxisPosition {
+    /// Of a linear axis.
+    Linear(Length),
+    /// Of a rotary axis.
+    Rotary(Angle),
+}
+
+impl AxisPosition {
+    /// In millimetres or radians, the units of the screw chain.
+    #[must_use]
+    pub fn value(self) -> f64 {
+        match self {
+            Self::Linear(length) => length.mm(),
+            Self::Rotary(angle) => angle.rad(),
+        }
+    }
+
+    /// In whole micrometres or microradians, the units of the wire.
+    #[must_use]
+    pub fn micro(self) -> Micro {
+        let micro = match self {
+            Self::Linear(length) => length.mm() * 1e3,
+            Self::Rotary(angle) => angle.rad() * 1e6,
+        };
+        // The cast saturates: far outside any axis's range, and refused there.
+        Micro(micro.round() as i32)
+    }
+
+    /// From `value` in millimetres or radians.
+    #[must_use]
+    pub fn from_value(kind: AxisKind, value: f64) -> Self {
+        match kind {
+            AxisKind::Linear => Self::Linear(Length::from_mm(value)),
+            AxisKind::Rotary => Self::Rotary(Angle::from_rad(value)),
+        }
+    }
+
+    /// The difference to `other` of the same kind.
+    #[must_use]
+    pub fn minus(self, other: Self) -> Self {
+        match self {
+            Self::Linear(length) => Self::Linear(Length::from_mm(length.mm() - other.value())),
+            Self::Rotary(angle) => Self::Rotary(Angle::from_rad(angle.rad() - other.value())),
+        }
+    }
+}
+
+impl std::fmt::Display for AxisPosition {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        match self {
+            Self::Linear(length) => write!(f, "{length:.3}"),
+            Self::Rotary(angle) => write!(f, "{angle:.3}"),
+        }
+    }
+}
+
+/// One axis of the rig.
+#[derive(Clone, Debug, PartialEq)]
+pub struct RigAxis {
+    /// As the modes and the command line call it.
+    pub name: String,
+    /// Linear or rotary.
+    pub kind: AxisKind,
+    /// Lowest and highest position.
+    pub range: [AxisPosition; 2],
+    /// Encoder counts per metre or revolution.
+    pub counts_per_unit: u32,
+}
+
+impl RigAxis {
+    /// Millimetres or radians per count.
+    #[must_use]
+    pub fn value_per_count(&self) -> f64 {
+        let unit = match self.kind {
+            AxisKind::Linear => 1000.0,
+            AxisKind::Rotary => std::f64::consts::TAU,
+        };
+        unit / f64::from(self.counts_per_unit)
+    }
+
+    /// Millimetres or radians at `counts`, which may be interpolated. The encoder changes to n when n is reached from
+    /// below, so the middle of a count is half a count further.
+    #[must_use]
+    pub fn value_at(&self, counts: f64) -> f64 {
+        (counts + 0.5) * self.value_per_count()
+    }
+
+    /// The position at `counts`.
+    #[must_use]
+    pub fn position_at(&self, counts: Counts) -> AxisPosition {
+        AxisPosition::from_value(self.kind, self.value_at(f64::from(counts.0)))
+    }
+
+    /// Whether `position` is of this kind of axis and within its range.
+    #[must_use]
+    pub fn contains(&self, position: AxisPosition) -> bool {
+        let [low, high] = self.range;
+        position.value() >= low.value() && position.value() <= high.value()
+    }
+
+    /// What of the board's axis contradicts this one: kind or encoder scale.
+    #[must_use]
+    pub fn contradiction(&self, board: &AxisInfo) -> Option<String> {
+        if board.kind != self.kind {
+            return Some(format!(
+                "axis '{}' is {:?} in the rig file and {:?} on the board",
+                self.name, self.kind, board.kind
+            ));
+        }
+        (board.counts_per_unit != self.counts_per_unit).then(|| {
+            format!(
+                "axis '{}' has {} encoder counts per unit in the rig file and {} on the board",
+                self.name, self.counts_per_unit, board.counts_per_unit
+            )
+        })
+    }
+}

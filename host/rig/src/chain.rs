@@ -1,0 +1,64 @@
+//! Screw chains: where the axes take a camera.
+//!
+//! Product of exponentials, R. Brockett 1984; K. Lynch and F. Park, *Modern Robotics*, 2017, §4.1.1:
+//! `base_from_camera(q) = exp(ξ₁ s₁ q₁) exp(ξ₂ s₂ q₂) ... M`, the screws ξ given in the base frame with all axes at zero.
+
+use nalgebra::{Isometry3, Translation3, Unit, UnitQuaternion, Vector3};
+use vergence_vision::{Base, Frame, Point, Transform};
+
+/// One screw of unit pitch-free motion.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Screw {
+    /// Slides along a direction, by millimetres.
+    Slide {
+        /// Which way.
+        along: Unit<Vector3<f64>>,
+    },
+    /// Turns about a line, by radians.
+    Turn {
+        /// Direction of the line; right-handed.
+        about: Unit<Vector3<f64>>,
+        /// A point on the line.
+        through: Point<Base>,
+    },
+}
+
+/// A screw, which axis drives it, and what share of the axis position acts.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Link {
+    pub axis: usize,
+    pub share: f64,
+    pub screw: Screw,
+}
+
+/// The way from the base to a camera.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Chain<C: Frame> {
+    pub(crate) links: Vec<Link>,
+    pub(crate) at_zero: Transform<Base, C>,
+}
+
+impl Screw {
+    /// The motion by `amount` millimetres or radians.
+    fn displacement(&self, amount: f64) -> Isometry3<f64> {
+        match self {
+            Self::Slide { along } => Translation3::from(along.into_inner() * amount).into(),
+            Self::Turn { about, through } => {
+                let rotation = UnitQuaternion::from_axis_angle(about, amount);
+                let pivot = through.mm();
+                Isometry3::from_parts(Translation3::from(pivot - rotation * pivot), rotation)
+            }
+        }
+    }
+}
+
+impl<C: Frame> Chain<C> {
+    /// The camera's pose with the axes at `values` (millimetres or radians each). An axis that has no value is at zero.
+    #[must_use]
+    pub fn base_from_camera(&self, values: &[f64]) -> Transform<Base, C> {
+        let moved = self.links.iter().fold(Isometry3::identity(), |pose, link| {
+            pose * link.screw.displacement(link.share * values.get(link.axis).copied().unwrap_or(0.0))
+        });
+        Transform::from_isometry(moved * self.at_zero.isometry())
+    }
+}

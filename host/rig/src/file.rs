@@ -1,0 +1,288 @@
+//! The rig file: TOML with units in the values; an unknown key is an error.
+
+use std::collections::BTreeMap;
+use std::str::FromStr;
+
+use nalgebra::{Unit, UnitQuaternion, Vector3};
+use serde::{Deserialize, Deserializer};
+use vergence_protocol::{AxisKind, MAX_AXES};
+use vergence_vision::{Angle, Frame, ImageSize, InvalidLens, KannalaBrandt, Length, OpenCvFisheye, Point, Transform};
+
+use crate::axis::{AxisPosition, RigAxis};
+use crate::chain::{Chain, Link, Screw};
+use crate::rig::{Mode, Rig};
+
+/// What is wrong with a rig file.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+pub enum RigError {
+    /// Not TOML, a missing or unknown key, or a value of the wrong form. Says the line.
+    #[error("{0}")]
+    Syntax(String),
+    /// A camera that cannot be.
+    #[error("[{camera}.camera]: {lens}")]
+    Camera {
+        /// `left` or `right`.
+        camera: &'static str,
+        /// Why not.
+        lens: InvalidLens,
+    },
+    /// A value contradicts another.
+    #[error("{0}")]
+    Contradiction(String),
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct RigFile {
+    name: String,
+    #[serde(default)]
+    axis: Vec<AxisFile>,
+    #[serde(default)]
+    modes: BTreeMap<String, BTreeMap<String, String>>,
+    left: SideFile,
+    right: SideFile,
+    #[serde(default)]
+    calibration_sigma: SigmaFile,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct AxisFile {
+    name: String,
+    kind: KindFile,
+    range: [String; 2],
+    counts_per_metre: Option<u32>,
+    counts_per_revolution: Option<u32>,
+}
+
+#[derive(Clone, Copy, Deserialize)]
+#[serde(rename_all = "lowercase")]
+enum KindFile {
+    Linear,
+    Rotary,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct SideFile {
+    camera: CameraFile,
+    #[serde(default)]
+    at_zero: PoseFile,
+    #[serde(default)]
+    screw: Vec<ScrewFile>,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct CameraFile {
+    size: [u32; 2],
+    /// Absent: as far as the polynomial is valid and the image reaches.
+    #[serde(default, deserialize_with = "optional_quantity")]
+    theta_max: Option<Angle>,
+    fx: f64,
+    fy: f64,
+    cx: f64,
+    cy: f64,
+    opencv_k1: f64,
+    opencv_k2: f64,
+    opencv_k3: f64,
+    opencv_k4: f64,
+}
+
+#[derive(Default, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+struct PoseFile {
+    #[serde(deserialize_with = "quantities")]
+    origin: [Length; 3],
+    #[serde(deserialize_with = "quantities")]
+    rotation_vector: [Angle; 3],
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct ScrewFile {
+    axis: String,
+    share: f64,
+    slide_along: Option<[f64; 3]>,
+    turn_about: Option<[f64; 3]>,
+    #[serde(default, deserialize_with = "quantities")]
+    through: [Length; 3],
+}
+
+/// Without a word in the file: the bench's calibration goal.
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields, default)]
+struct SigmaFile {
+    #[serde(deserialize_with = "quantity")]
+    rotation: Angle,
+    #[serde(deserialize_with = "quantity")]
+    translation: Length,
+}
+
+impl Default for SigmaFile {
+    fn default() -> Self {
+        Self { rotation: Angle::from_deg(0.02), translation: Length::from_mm(0.1) }
+    }
+}
+
+fn quantity<'de, D: Deserializer<'de>, Q: FromStr<Err: std::fmt::Display>>(source: D) -> Result<Q, D::Error> {
+    String::deserialize(source)?.parse().map_err(serde::de::Error::custom)
+}
+
+fn optional_quantity<'de, D: Deserializer<'de>>(source: D) -> Result<Option<Angle>, D::Error> {
+    quantity(source).map(Some)
+}
+
+fn quantities<'de, D, Q>(source: D) -> Result<[Q; 3], D::Error>
+where
+    D: Deserializer<'de>,
+    Q: FromStr<Err: std::fmt::Display>,
+{
+    let [x, y, z] = <[String; 3]>::deserialize(source)?;
+    let parse = |text: String| text.parse().map_err(serde::de::Error::custom);
+    Ok([parse(x)?, parse(y)?, parse(z)?])
+}
+
+impl Rig {
+    /// Reads and checks a rig file.
+    ///
+    /// # Errors
+    /// [`RigError`] says which key or value and why.
+    pub fn from_toml(text: &str) -> Result<Self, RigError> {
+        let file: RigFile = toml::from_str(text).map_err(|error| RigError::Syntax(error.to_string()))?;
+        if file.axis.len() > MAX_AXES {
+            return Err(contradiction(format!("{} axes; a controller has at most {MAX_AXES}", file.axis.len())));
+        }
+        let axes = file.axis.iter().map(axis).collect::<Result<Vec<_>, _>>()?;
+        for (index, axis) in axes.iter().enumerate() {
+            if axes.iter().take(index).any(|other| other.name == axis.name) {
+                return Err(contradiction(format!("two axes are called '{}'", axis.name)));
+            }
+        }
+        let modes = (1u8..)
+            .zip(&file.modes)
+            .map(|(number, (name, positions))| mode(number, name, positions, &axes))
+            .collect::<Result<_, _>>()?;
+        Ok(Self {
+            name: file.name,
+            modes,
+            left_camera: camera("left", &file.left.camera)?,
+            right_camera: camera("right", &file.right.camera)?,
+            left_chain: chain("left", &file.left, &axes)?,
+            right_chain: chain("right", &file.right, &axes)?,
+            calibration_sigma: (file.calibration_sigma.rotation, file.calibration_sigma.translation),
+            axes,
+        })
+    }
+}
+
+fn contradiction(text: String) -> RigError {
+    RigError::Contradiction(text)
+}
+
+fn position(kind: AxisKind, text: &str, place: &str) -> Result<AxisPosition, RigError> {
+    let parsed = match kind {
+        AxisKind::Linear => text.parse().map(AxisPosition::Linear),
+        AxisKind::Rotary => text.parse().map(AxisPosition::Rotary),
+    };
+    parsed.map_err(|error| contradiction(format!("{place}: {error}")))
+}
+
+fn axis(file: &AxisFile) -> Result<RigAxis, RigError> {
+    let name = &file.name;
+    let (kind, counts, key) = match file.kind {
+        KindFile::Linear => (AxisKind::Linear, file.counts_per_metre, "counts_per_metre"),
+        KindFile::Rotary => (AxisKind::Rotary, file.counts_per_revolution, "counts_per_revolution"),
+    };
+    let other = if kind == AxisKind::Linear { file.counts_per_revolution } else { file.counts_per_metre };
+    let counts_per_unit = match (counts, other) {
+        (Some(counts), None) if counts > 0 => counts,
+        _ => return Err(contradiction(format!("axis '{name}' needs {key}, positive, and no other scale"))),
+    };
+    let place = format!("range of axis '{name}'");
+    let [low, high] = &file.range;
+    let range = [position(kind, low, &place)?, position(kind, high, &place)?];
+    if range[0].value() >= range[1].value() {
+        return Err(contradiction(format!("{place}: {low} is not below {high}")));
+    }
+    Ok(RigAxis { name: name.clone(), kind, range, counts_per_unit })
+}
+
+fn mode(number: u8, name: &str, positions: &BTreeMap<String, String>, axes: &[RigAxis]) -> Result<Mode, RigError> {
+    if let Some(stranger) = positions.keys().find(|key| axes.iter().all(|axis| axis.name != **key)) {
+        return Err(contradiction(format!("mode '{name}' names an axis '{stranger}' that the rig does not have")));
+    }
+    let targets = axes
+        .iter()
+        .map(|axis| {
+            let text = positions
+                .get(&axis.name)
+                .ok_or_else(|| contradiction(format!("mode '{name}' says nothing of axis '{}'", axis.name)))?;
+            let target = position(axis.kind, text, &format!("mode '{name}', axis '{}'", axis.name))?;
+            if !axis.contains(target) {
+                let [low, high] = axis.range;
+                return Err(contradiction(format!(
+                    "mode '{name}' puts axis '{}' at {target}, outside {low} to {high}",
+                    axis.name
+                )));
+            }
+            Ok(target)
+        })
+        .collect::<Result<_, _>>()?;
+    Ok(Mode { name: name.to_owned(), number: vergence_protocol::Mode(number), targets })
+}
+
+fn camera(side: &'static str, file: &CameraFile) -> Result<KannalaBrandt, RigError> {
+    let invalid = |lens| RigError::Camera { camera: side, lens };
+    let [width, height] = file.size;
+    let size = ImageSize { width, height };
+    let lens = OpenCvFisheye {
+        fx: file.fx,
+        fy: file.fy,
+        cx: file.cx,
+        cy: file.cy,
+        k: [file.opencv_k1, file.opencv_k2, file.opencv_k3, file.opencv_k4],
+    };
+    let theta_max = match file.theta_max {
+        Some(stated) => stated,
+        None => lens.largest_theta(size).map_err(invalid)?,
+    };
+    KannalaBrandt::from_opencv(lens, theta_max, size).map_err(invalid)
+}
+
+fn chain<C: Frame>(side: &str, file: &SideFile, axes: &[RigAxis]) -> Result<Chain<C>, RigError> {
+    let links = file.screw.iter().map(|screw| link(side, screw, axes)).collect::<Result<_, _>>()?;
+    let rotation = UnitQuaternion::from_scaled_axis(Vector3::from(file.at_zero.rotation_vector.map(Angle::rad)));
+    let at_zero = Transform::new(rotation, Vector3::from(file.at_zero.origin.map(Length::mm)));
+    Ok(Chain { links, at_zero })
+}
+
+fn link(side: &str, file: &ScrewFile, axes: &[RigAxis]) -> Result<Link, RigError> {
+    let place = format!("[[{side}.screw]] of axis '{}'", file.axis);
+    let axis = axes
+        .iter()
+        .position(|axis| axis.name == file.axis)
+        .ok_or_else(|| contradiction(format!("{place}: the rig has no such axis")))?;
+    let direction = |xyz: [f64; 3]| {
+        Unit::try_new(Vector3::from(xyz), 1e-9)
+            .filter(|unit| unit.iter().all(|c| c.is_finite()))
+            .ok_or_else(|| contradiction(format!("{place}: the direction has no length")))
+    };
+    let kind = axes.get(axis).map(|axis| axis.kind);
+    let screw = match (file.slide_along, file.turn_about, kind) {
+        (Some(along), None, Some(AxisKind::Linear)) => Screw::Slide { along: direction(along)? },
+        (None, Some(about), Some(AxisKind::Rotary)) => {
+            let through = Point::from_mm(Vector3::from(file.through.map(Length::mm)));
+            Screw::Turn { about: direction(about)?, through }
+        }
+        _ => {
+            let rule = "a linear axis needs slide_along, a rotary one turn_about, and not both";
+            return Err(contradiction(format!("{place}: {rule}")));
+        }
+    };
+    if !file.share.is_finite() {
+        return Err(contradiction(format!("{place}: share must be a finite number")));
+    }
+    Ok(Link { axis, share: file.share, screw })
+}

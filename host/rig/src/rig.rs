@@ -1,0 +1,65 @@
+//! A rig whose description has been checked.
+
+use vergence_protocol::{AxisList, Micro};
+use vergence_vision::{Angle, KannalaBrandt, Left, Length, Right};
+
+use crate::axis::{AxisPosition, RigAxis};
+use crate::chain::Chain;
+
+/// The rig: axes, modes, cameras and how the axes carry the cameras.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Rig {
+    /// What it is called.
+    pub name: String,
+    /// In the order of the controller's axes; none for a pair whose pose is fixed.
+    pub axes: Vec<RigAxis>,
+    /// By name.
+    pub modes: Vec<Mode>,
+    /// The left camera.
+    pub left_camera: KannalaBrandt,
+    /// The right camera.
+    pub right_camera: KannalaBrandt,
+    /// From the base to the left camera.
+    pub left_chain: Chain<Left>,
+    /// From the base to the right camera.
+    pub right_chain: Chain<Right>,
+    /// How far the calibrated relative pose may be off: one standard deviation of rotation and translation.
+    pub calibration_sigma: (Angle, Length),
+}
+
+/// A named pose.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Mode {
+    /// Such as `herbivore`.
+    pub name: String,
+    /// Its number on the wire, from 1.
+    pub number: vergence_protocol::Mode,
+    /// Where each axis goes.
+    pub targets: Vec<AxisPosition>,
+}
+
+impl Rig {
+    /// The mode called `name`.
+    #[must_use]
+    pub fn mode(&self, name: &str) -> Option<&Mode> {
+        self.modes.iter().find(|mode| mode.name == name)
+    }
+
+    /// The name of a mode number of the wire; `None` for zero and for numbers the rig does not name.
+    #[must_use]
+    pub fn mode_name(&self, number: vergence_protocol::Mode) -> Option<&str> {
+        self.modes.iter().find(|mode| mode.number == number).map(|mode| mode.name.as_str())
+    }
+
+    /// The index of the axis called `name`.
+    #[must_use]
+    pub fn axis_index(&self, name: &str) -> Option<usize> {
+        self.axes.iter().position(|axis| axis.name == name)
+    }
+
+    /// Positions as they go over the wire.
+    #[must_use]
+    pub fn wire_targets(&self, positions: &[AxisPosition]) -> AxisList<Micro> {
+        positions.iter().take(vergence_protocol::MAX_AXES).map(|position| position.micro()).collect()
+    }
+}

@@ -1,0 +1,106 @@
+//! The encoder stream, and the joints at an instant between two of its samples.
+
+use std::collections::VecDeque;
+
+use vergence_protocol::{AxisList, Counts, Microseconds};
+
+use crate::clock::BoardInstant;
+
+/// Two samples further apart than this say nothing of the time between them.
+const LONGEST_GAP_US: f64 = 100_000.0;
+
+/// One reading of all encoders.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct JointSample {
+    /// When they were latched, board clock.
+    pub at: Microseconds,
+    /// Counts from the axis zero.
+    pub counts: AxisList<Counts>,
+}
+
+/// The joints at one instant, in counts.
+#[derive(Clone, Debug, PartialEq)]
+pub struct JointsAt {
+    /// Interpolated counts of each axis.
+    pub counts: Vec<f64>,
+    /// Standard deviation of each, in counts: the encoder's step and the uncertainty of the instant times the rate.
+    pub sigma: Vec<f64>,
+}
+
+/// Why the track does not know the joints at an instant.
+#[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+pub enum TrackGap {
+    /// The encoder stream has not reached the instant yet.
+    #[error("no encoder reading after the exposure has arrived yet")]
+    NotYet,
+    /// The instant is older than everything remembered.
+    #[error("the exposure is older than the remembered encoder readings")]
+    TooOld,
+    /// The readings around the instant are too far apart.
+    #[error("encoder readings are missing around the exposure ({0:.0} ms gap)")]
+    Gap(f64),
+}
+
+/// The latest readings of the encoders, in order of time.
+#[derive(Clone, Debug)]
+pub struct JointTrack {
+    samples: VecDeque<JointSample>,
+    capacity: usize,
+}
+
+impl JointTrack {
+    /// Remembers `capacity` samples, at least two.
+    #[must_use]
+    pub fn new(capacity: usize) -> Self {
+        Self { samples: VecDeque::new(), capacity: capacity.max(2) }
+    }
+
+    /// Takes a reading. One that is not later than the last, or has another number of axes, begins a new track: the
+    /// board has started anew.
+    pub fn push(&mut self, sample: JointSample) {
+        let follows = |last: &JointSample| sample.at > last.at && sample.counts.len() == last.counts.len();
+        if !self.samples.back().is_none_or(follows) {
+            self.samples.clear();
+        }
+        if self.samples.len() == self.capacity {
+            self.samples.pop_front();
+        }
+        self.samples.push_back(sample);
+    }
+
+    /// The joints at `instant`, by linear interpolation between the two readings around it.
+    ///
+    /// # Errors
+    /// [`TrackGap`] where the readings do not cover the instant.
+    pub fn at(&self, instant: BoardInstant) -> Result<JointsAt, TrackGap> {
+        let after = self.samples.iter().position(|s| s.at.0 as f64 >= instant.us).ok_or(TrackGap::NotYet)?;
+        let next = self.samples.get(after).ok_or(TrackGap::NotYet)?;
+        let previous = match after.checked_sub(1).and_then(|before| self.samples.get(before)) {
+            Some(previous) => previous,
+            None if (next.at.0 as f64) - instant.us < 0.5 => next,
+            None => return Err(TrackGap::TooOld),
+        };
+        let span = (next.at.0 - previous.at.0) as f64;
+        if span > LONGEST_GAP_US {
+            return Err(TrackGap::Gap(span / 1000.0));
+        }
+        let share = if span > 0.0 { (instant.us - previous.at.0 as f64) / span } else { 0.0 };
+        Ok(interpolate(previous, next, share, instant.error_us / span.max(1.0)))
+    }
+}
+
+/// `instant_error` is the bound of the instant's error as a share of the span between the readings.
+fn interpolate(previous: &JointSample, next: &JointSample, share: f64, instant_error: f64) -> JointsAt {
+    // A uniform error of one count, and of plus or minus the bound, each have a standard deviation of 1/√12 of their width.
+    const UNIFORM: f64 = 0.288_675_134_594_812_9;
+    let pairs = previous.counts.iter().zip(&next.counts);
+    let (counts, sigma) = pairs
+        .map(|(before, after)| {
+            let step = f64::from(after.0) - f64::from(before.0);
+            let timing = 2.0 * instant_error * step;
+            (f64::from(before.0) + share * step, UNIFORM * timing.hypot(1.0))
+        })
+        .unzip();
+    JointsAt { counts, sigma }
+}
