@@ -6,6 +6,8 @@ use std::ops::Mul;
 
 use nalgebra::{Isometry3, Point3, Translation3, Unit, UnitQuaternion, Vector3};
 
+use crate::Angle;
+
 /// A coordinate frame, as a type. Right-handed; cameras have x right, y down, z along the optical axis.
 pub trait Frame: Copy + Debug + PartialEq {}
 
@@ -76,7 +78,8 @@ impl<F: Frame> UnitRay<F> {
     /// The direction of `vector`, of any length; `None` where it has none (zero or not finite).
     #[must_use]
     pub fn new(vector: Vector3<f64>) -> Option<Self> {
-        Unit::try_new(vector, 0.0)
+        // Dividing by the largest component first keeps the squares of very long and very short vectors in range.
+        Unit::try_new(vector / vector.amax(), 0.0)
             .filter(|unit| unit.iter().all(|c| c.is_finite()))
             .map(|direction| Self { direction, frame: PhantomData })
     }
@@ -85,6 +88,12 @@ impl<F: Frame> UnitRay<F> {
     #[must_use]
     pub fn vector(&self) -> Vector3<f64> {
         self.direction.into_inner()
+    }
+
+    /// The angle to the optical axis (z), from 0° to 180°.
+    #[must_use]
+    pub fn angle_to_axis(&self) -> Angle {
+        Angle::from_rad(self.direction.x.hypot(self.direction.y).atan2(self.direction.z))
     }
 
     /// The point at `range_mm` along the ray.

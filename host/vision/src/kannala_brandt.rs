@@ -73,7 +73,8 @@ pub enum InvalidLens {
 pub struct OutsideField;
 
 impl KannalaBrandt {
-    /// From the five coefficients in pixels, `aspect` = fy / fx, the principal point, the half field `theta_max` and the image size.
+    /// From the five coefficients in pixels, `aspect` = fy / fx, the principal point, the half field `theta_max` and
+    /// the image size.
     ///
     /// # Errors
     /// [`InvalidLens`] where the parameters are not finite, not positive, or r(θ) does not grow up to `theta_max`.
@@ -217,8 +218,19 @@ fn slope(k: &[f64; 5], theta: f64) -> f64 {
     k[0] + s * (3.0 * k[1] + s * (5.0 * k[2] + s * (7.0 * k[3] + s * 9.0 * k[4])))
 }
 
-/// The first θ up to `limit` where dr/dθ ≤ 0, to the width of the scan (a thousandth of the field).
-fn first_turn(k: &[f64; 5], limit: f64) -> Option<f64> {
+/// The first θ up to `limit` where dr/dθ ≤ 0: a scan in thousandths of `limit`, then bisection.
+pub(crate) fn first_turn(k: &[f64; 5], limit: f64) -> Option<f64> {
     const STEPS: u32 = 1000;
-    (0..=STEPS).map(|i| limit * f64::from(i) / f64::from(STEPS)).find(|&theta| slope(k, theta) <= 0.0)
+    let at = |i: u32| limit * f64::from(i) / f64::from(STEPS);
+    let beyond = (0..=STEPS).find(|&i| slope(k, at(i)) <= 0.0)?;
+    let (mut growing, mut turned) = (at(beyond.saturating_sub(1)), at(beyond));
+    while turned - growing > 4.0 * f64::EPSILON {
+        let middle = 0.5 * (growing + turned);
+        if slope(k, middle) > 0.0 {
+            growing = middle;
+        } else {
+            turned = middle;
+        }
+    }
+    Some(turned)
 }

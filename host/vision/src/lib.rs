@@ -1,5 +1,14 @@
 //! Rays, camera models, triangulation and field-of-view zones.
 //!
+//! From pixels to points:
+//!
+//! - [`KannalaBrandt`] turns pixels into rays and back, past 90°; [`OpenCvFisheye`] reads other programs' parameters;
+//! - [`ray_to_plane`] and [`dihedral`] say how well two rays agree with the cameras' relative pose;
+//! - [`pseudo_intersection`] makes a point of two rays and [`covariance()`] says how uncertain it is;
+//! - [`cloud()`] does all of this for many pairs of pixels and counts why pairs were dropped.
+//!
+//! [`zones_exact`] tells how much of the surroundings both cameras, one, or none see.
+//!
 //! Conventions: millimetres and radians inside, units named at every boundary; camera frame x right, y down,
 //! z forward along the optical axis; pixel (0, 0) is the centre of the top-left pixel; a ray is a unit vector with any
 //! sign of z, because the lenses see past 90°, and nothing here divides by z. `left_from_right` maps coordinates in
@@ -7,10 +16,24 @@
 //!
 //! Everything is a pure function of its arguments.
 
+mod cloud;
+mod covariance;
+mod epipolar;
 mod frames;
+mod import;
 mod kannala_brandt;
+mod triangulation;
 mod units;
+mod zones;
 
+pub use cloud::{Cloud, CloudPoint, Drop, Gates, PixelPair, StereoPair, cloud};
+pub use covariance::{covariance, range_sigma};
+pub use epipolar::{dihedral, ray_to_plane};
 pub use frames::{Base, Camera, Frame, Left, Point, Right, Transform, UnitRay, World};
+pub use import::{OpenCvFisheye, largest_theta};
 pub use kannala_brandt::{ImageSize, InvalidLens, KannalaBrandt, OutsideField, Pixel};
+pub use triangulation::{Feet, Rejection, Triangulated, closest_approach, midpoint, pseudo_intersection};
 pub use units::{Angle, InvalidQuantity, Length};
+pub use zones::{
+    Arc, Coverage, PlanarCamera, ZoneMap, Zones, ZonesError, symmetric_pair, zones_exact, zones_paper_eq3,
+};

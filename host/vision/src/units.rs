@@ -54,6 +54,12 @@ impl Angle {
     pub const fn deg(self) -> f64 {
         self.rad.to_degrees()
     }
+
+    /// The angle without its sign.
+    #[must_use]
+    pub const fn abs(self) -> Self {
+        Self { rad: self.rad.abs() }
+    }
 }
 
 /// A text that is not a number followed by a known unit.

@@ -1,0 +1,201 @@
+//! Pixel pairs to points: every pair is accounted for, exact pairs return their points, and each gate has its reason.
+
+#![allow(clippy::unwrap_used, reason = "helpers of tests may panic as tests do")]
+
+use nalgebra::{UnitQuaternion, Vector3};
+use proptest::prelude::*;
+use vergence_vision::{
+    Angle, Cloud, Drop, Gates, ImageSize, KannalaBrandt, Left, Length, Pixel, PixelPair, Point, Right, StereoPair,
+    Transform, cloud,
+};
+
+const SIZE: ImageSize = ImageSize { width: 2080, height: 2080 };
+
+const GATES: Gates = Gates {
+    epipolar: Angle::from_rad(5e-3),
+    min_parallax: Angle::from_rad(5e-3),
+    max_range: None,
+    pixel_sigma: 0.5,
+    max_relative_sigma: 0.2,
+};
+
+fn lens(k1: f64) -> KannalaBrandt {
+    let k = [560.0, 560.0 * k1, 0.0, 0.0, 0.0];
+    KannalaBrandt::new(k, 1.0, Pixel { u: 1039.5, v: 1039.5 }, Angle::from_deg(98.0), SIZE).unwrap()
+}
+
+/// A baseline of 145 mm with the axes `separation` degrees apart.
+fn left_from_right(separation: f64) -> Transform<Left, Right> {
+    let half = separation.to_radians() / 2.0;
+    let turned = UnitQuaternion::from_axis_angle(&Vector3::y_axis(), 2.0 * half);
+    Transform::new(turned, Vector3::new(145.0 * half.cos(), 0.0, -145.0 * half.sin()))
+}
+
+fn see(rig: &StereoPair<'_>, point: &Point<Left>) -> Option<PixelPair> {
+    let left = rig.left.project_point(point).ok()?;
+    let right = rig.right.project_point(&(rig.left_from_right.inverse() * *point)).ok()?;
+    Some(PixelPair { left, right })
+}
+
+fn at(x: f64, y: f64, z: f64) -> Point<Left> {
+    Point::from_mm(Vector3::new(x, y, z))
+}
+
+fn accounted(cloud: &Cloud) -> usize {
+    cloud.points.len() + cloud.dropped.values().sum::<usize>()
+}
+
+/// What becomes of one pair seen by parallel cameras.
+fn fate(pair: PixelPair, gates: &Gates) -> Option<Drop> {
+    let (left, right) = (lens(0.0), lens(0.01));
+    let rig = StereoPair { left: &left, right: &right, left_from_right: left_from_right(0.0) };
+    let cloud = cloud(&[pair], &rig, gates);
+    assert_eq!(accounted(&cloud), 1);
+    cloud.dropped.keys().next().copied()
+}
+
+fn fate_of(point: Point<Left>, gates: &Gates) -> Option<Drop> {
+    let (left, right) = (lens(0.0), lens(0.01));
+    let rig = StereoPair { left: &left, right: &right, left_from_right: left_from_right(0.0) };
+    fate(see(&rig, &point).unwrap(), gates)
+}
+
+#[test]
+fn each_gate_drops_for_its_own_reason() {
+    let good = at(72.5, 10.0, 350.0);
+    let outside = Pixel { u: 1e5, v: 0.0 };
+    let (left, right) = (lens(0.0), lens(0.01));
+    let rig = StereoPair { left: &left, right: &right, left_from_right: left_from_right(0.0) };
+    let seen = see(&rig, &good).unwrap();
+    assert_eq!(fate(seen, &GATES), None);
+    assert_eq!(fate(PixelPair { left: outside, ..seen }, &GATES), Some(Drop::OutsideLeftField));
+    assert_eq!(fate(PixelPair { right: outside, ..seen }, &GATES), Some(Drop::OutsideRightField));
+    let raised = Pixel { v: seen.right.v + 10.0, ..seen.right };
+    assert_eq!(fate(PixelPair { right: raised, ..seen }, &GATES), Some(Drop::Epipolar));
+    let crossed = PixelPair { left: Pixel { u: 900.0, v: 1039.5 }, right: Pixel { u: 1200.0, v: 1039.5 } };
+    assert_eq!(fate(crossed, &GATES), Some(Drop::Diverging));
+    assert_eq!(fate_of(at(0.0, 0.0, 1e5), &GATES), Some(Drop::Parallax));
+    let near = Gates { max_range: Some(Length::from_mm(300.0)), ..GATES };
+    assert_eq!(fate_of(good, &near), Some(Drop::TooFar));
+    let strict = Gates { max_relative_sigma: 1e-3, ..GATES };
+    assert_eq!(fate_of(good, &strict), Some(Drop::Uncertain));
+    assert_eq!(fate_of(at(300.0, 0.0, 0.0), &GATES), Some(Drop::OnBaseline));
+}
+
+#[test]
+fn limits_that_are_not_numbers_let_nothing_pass() {
+    let good = at(72.5, 10.0, 350.0);
+    let nan = Angle::from_rad(f64::NAN);
+    for (gates, reason) in [
+        (Gates { epipolar: nan, ..GATES }, Drop::Epipolar),
+        (Gates { min_parallax: nan, ..GATES }, Drop::Parallax),
+        (Gates { max_range: Some(Length::from_mm(f64::NAN)), ..GATES }, Drop::TooFar),
+        (Gates { pixel_sigma: f64::NAN, ..GATES }, Drop::Uncertain),
+        (Gates { max_relative_sigma: f64::NAN, ..GATES }, Drop::Uncertain),
+    ] {
+        assert_eq!(fate_of(good, &gates), Some(reason));
+    }
+}
+
+#[test]
+fn reasons_have_stable_names() {
+    let names = [
+        (Drop::OutsideLeftField, "outside_left_field"),
+        (Drop::OutsideRightField, "outside_right_field"),
+        (Drop::Epipolar, "epipolar"),
+        (Drop::OnBaseline, "on_baseline"),
+        (Drop::Diverging, "diverging"),
+        (Drop::Parallax, "parallax"),
+        (Drop::TooFar, "too_far"),
+        (Drop::Uncertain, "uncertain"),
+    ];
+    assert!(names.is_sorted());
+    for (reason, name) in names {
+        assert_eq!(reason.to_string(), name);
+    }
+}
+
+/// σ = 0.56 px at 560 px/rad is 1 mrad, which on the midline 350 mm ahead makes 1.246 mm across the baseline, and with
+/// C diagonal there, the range variance is (0.2581² · 72.5² + 1.2460² · 350²) / (72.5² + 350²).
+#[test]
+fn the_range_sigma_follows_from_the_pixel_sigma() {
+    let lens = lens(0.0);
+    let rig = StereoPair { left: &lens, right: &lens, left_from_right: left_from_right(0.0) };
+    let gates = Gates { pixel_sigma: 0.56, ..GATES };
+    let cloud = cloud(&[see(&rig, &at(72.5, 0.0, 350.0)).unwrap()], &rig, &gates);
+    assert!((cloud.points[0].sigma_range.mm() - 1.2212).abs() < 2e-4, "{:?}", cloud.points);
+}
+
+/// At 90° of the axis the bent lens has dr/dθ = 560 (1 - 0.15 θ²), the coarser of the two.
+#[test]
+fn the_coarser_camera_decides_the_sigma() {
+    let (fine, coarse) = (lens(0.0), lens(-0.05));
+    let sigma = |left: &KannalaBrandt, right: &KannalaBrandt| {
+        let rig = StereoPair { left, right, left_from_right: left_from_right(0.0) };
+        cloud(&[see(&rig, &at(72.5, 350.0, 0.0)).unwrap()], &rig, &GATES).points[0].sigma_range.mm()
+    };
+    let quarter = std::f64::consts::FRAC_PI_2;
+    let expected = sigma(&fine, &fine) / (1.0 - 0.15 * quarter * quarter);
+    assert!((sigma(&fine, &coarse) - expected).abs() < 1e-9 * expected);
+    assert!((sigma(&coarse, &fine) - expected).abs() < 1e-9 * expected);
+}
+
+fn pixel() -> impl Strategy<Value = Pixel> {
+    let coordinate = prop_oneof![9 => -200.0..2300.0f64, 1 => any::<f64>()];
+    [coordinate.clone(), coordinate].prop_map(|[u, v]| Pixel { u, v })
+}
+
+fn wide_open() -> Gates {
+    let half_turn = Angle::from_deg(180.0);
+    Gates { epipolar: half_turn, min_parallax: Angle::default(), max_relative_sigma: f64::INFINITY, ..GATES }
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(300))]
+
+    #[test]
+    fn every_pair_becomes_a_point_or_has_a_reason(
+        pixels in prop::collection::vec([pixel(), pixel()], 0..60),
+        separation in -60.0..160.0f64,
+        open in any::<bool>(),
+    ) {
+        let (left, right) = (lens(0.01), lens(-0.03));
+        let rig = StereoPair { left: &left, right: &right, left_from_right: left_from_right(separation) };
+        let pairs: Vec<_> = pixels.into_iter().map(|[left, right]| PixelPair { left, right }).collect();
+        let gates = if open { wide_open() } else { GATES };
+        let made = cloud(&pairs, &rig, &gates);
+        prop_assert_eq!(accounted(&made), pairs.len());
+        prop_assert!(made.points.iter().all(|point| point.pixels == pairs[point.pair_index]));
+        prop_assert!(made.points.is_sorted_by(|a, b| a.pair_index < b.pair_index));
+        prop_assert!(made.dropped.values().all(|&count| count > 0));
+        for point in &made.points {
+            prop_assert!(point.residual.abs() <= gates.epipolar);
+            prop_assert!(point.sigma_range.mm() <= gates.max_relative_sigma * point.point.mm().norm());
+        }
+        prop_assert_eq!(cloud(&pairs, &rig, &gates), made);
+    }
+
+    #[test]
+    fn exact_pairs_return_their_points(
+        places in prop::collection::vec([-400.0..400.0f64, -400.0..400.0, -200.0..900.0], 1..40),
+        separation in -60.0..120.0f64,
+    ) {
+        let (left, right) = (lens(0.01), lens(-0.03));
+        let rig = StereoPair { left: &left, right: &right, left_from_right: left_from_right(separation) };
+        let (points, pairs): (Vec<_>, Vec<_>) = places
+            .into_iter()
+            .map(|[x, y, z]| at(x, y, z))
+            .filter_map(|point| see(&rig, &point).map(|pair| (point, pair)))
+            .unzip();
+        let made = cloud(&pairs, &rig, &GATES);
+        prop_assert_eq!(accounted(&made), pairs.len());
+        for found in &made.points {
+            let expected = points[found.pair_index].mm();
+            prop_assert!((found.point.mm() - expected).norm() < 1e-8 * expected.norm());
+            prop_assert!(found.residual.abs().rad() < 1e-11);
+        }
+        // Nothing exact is dropped but for being near the baseline or far.
+        let explained = [Drop::OnBaseline, Drop::Parallax, Drop::Uncertain];
+        prop_assert!(made.dropped.keys().all(|reason| explained.contains(reason)), "{:?}", made.dropped);
+    }
+}
