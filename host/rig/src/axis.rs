@@ -42,6 +42,12 @@ impl AxisPosition {
         }
     }
 
+    /// Whether this is a position on an axis of `kind`.
+    #[must_use]
+    pub fn is_of(self, kind: AxisKind) -> bool {
+        matches!((self, kind), (Self::Linear(_), AxisKind::Linear) | (Self::Rotary(_), AxisKind::Rotary))
+    }
+
     /// The difference to `other` of the same kind.
     #[must_use]
     pub fn minus(self, other: Self) -> Self {
@@ -92,6 +98,15 @@ impl RigAxis {
         (counts + 0.5) * self.value_per_count()
     }
 
+    /// Millimetres or radians at `micro` micrometres or microradians, which may be a fraction.
+    #[must_use]
+    pub fn value_from_micro(&self, micro: f64) -> f64 {
+        match self.kind {
+            AxisKind::Linear => micro * 1e-3,
+            AxisKind::Rotary => micro * 1e-6,
+        }
+    }
+
     /// The position at `counts`.
     #[must_use]
     pub fn position_at(&self, counts: Counts) -> AxisPosition {
@@ -102,7 +117,7 @@ impl RigAxis {
     #[must_use]
     pub fn contains(&self, position: AxisPosition) -> bool {
         let [low, high] = self.range;
-        position.value() >= low.value() && position.value() <= high.value()
+        position.is_of(self.kind) && position.value() >= low.value() && position.value() <= high.value()
     }
 
     /// What of the board's axis contradicts this one: kind or encoder scale.

@@ -1,0 +1,126 @@
+//! Corners at several resolutions, spread over the view.
+//!
+//! M. Brown, R. Szeliski and S. Winder, "Multi-image matching using multi-scale oriented patches", CVPR 2005, §2:
+//! maxima of the harmonic mean of the structure tensor's eigenvalues in each level of a pyramid, placed by a quadratic
+//! fit. For spreading, each cell of the view offers its strongest corner first, then its second, and so on.
+
+use rayon::prelude::*;
+
+use crate::ViewPixel;
+use crate::plane::{Plane, Pyramid};
+
+/// A position worth comparing.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Keypoint {
+    /// In pixels of the view.
+    pub at: ViewPixel,
+    /// The pyramid level it was found in.
+    pub level: usize,
+}
+
+/// A local maximum of the corner response.
+#[derive(Clone, Copy)]
+struct Corner {
+    keypoint: Keypoint,
+    strength: f32,
+}
+
+/// Smoothing of the structure tensor, in pixels of its level (Brown et al.: σ_i = 1.5).
+const INTEGRATION_SIGMA: f32 = 1.5;
+/// Least harmonic mean, in squared grey levels per pixel: noise of 2 grey levels stays below it.
+const LEAST_STRENGTH: f32 = 1.5;
+/// Corners nearer than this to a stronger one of their level are not corners of their own.
+const SUPPRESSION_RADIUS: usize = 2;
+/// Side of the cells corners are spread over, in pixels of the view.
+const CELL: f64 = 48.0;
+
+/// At most `budget` corners that `compared` accepts, by rows. Half of the budget is for the finest level, a quarter for
+/// the next, and so on.
+pub(crate) fn detect(pyramid: &Pyramid, budget: usize, compared: impl Fn(&Keypoint) -> bool + Sync) -> Vec<Keypoint> {
+    let levels = pyramid.levels();
+    let mut keypoints = Vec::with_capacity(budget);
+    for (level, plane) in levels.iter().enumerate() {
+        let share = budget / (1 << (level + 1).min(levels.len() - 1).max(1));
+        let found: Vec<Corner> =
+            maxima(&response(plane), level).into_par_iter().filter(|corner| compared(&corner.keypoint)).collect();
+        keypoints.extend(spread(found, share).iter().map(|corner| corner.keypoint));
+    }
+    keypoints.sort_by(|p, q| p.at.y.total_cmp(&q.at.y).then(p.at.x.total_cmp(&q.at.x)).then(p.level.cmp(&q.level)));
+    keypoints
+}
+
+/// The harmonic mean det/trace of the structure tensor at each pixel.
+fn response(plane: &Plane) -> Plane {
+    let (width, height) = (plane.width(), plane.height());
+    let product = |of: fn(f32, f32) -> f32| {
+        plane
+            .like(|y, out| {
+                if y == 0 || y + 1 == height {
+                    return;
+                }
+                let (above, row, below) = (plane.row(y - 1), plane.row(y), plane.row(y + 1));
+                for x in 1..width - 1 {
+                    out[x] = of(0.5 * (row[x + 1] - row[x - 1]), 0.5 * (below[x] - above[x]));
+                }
+            })
+            .blurred(INTEGRATION_SIGMA)
+    };
+    let (xx, xy, yy) = (product(|gx, _| gx * gx), product(|gx, gy| gx * gy), product(|_, gy| gy * gy));
+    plane.like(|y, out| {
+        for (x, o) in out.iter_mut().enumerate() {
+            let (a, b, c) = (xx.at(x, y), xy.at(x, y), yy.at(x, y));
+            *o = (a * c - b * b) / (a + c).max(f32::MIN_POSITIVE);
+        }
+    })
+}
+
+/// The maxima of a response within [`SUPPRESSION_RADIUS`], by rows.
+fn maxima(response: &Plane, level: usize) -> Vec<Corner> {
+    const R: usize = SUPPRESSION_RADIUS;
+    let rows = R..response.height().saturating_sub(R);
+    rows.into_par_iter()
+        .flat_map_iter(|y| (R..response.width() - R).filter_map(move |x| maximum_at(response, x, y, level)))
+        .collect()
+}
+
+/// The corner at (x, y) where the response is largest around and the quadratic through its neighbours peaks nearby.
+fn maximum_at(response: &Plane, x: usize, y: usize, level: usize) -> Option<Corner> {
+    const R: usize = SUPPRESSION_RADIUS;
+    let centre = response.at(x, y);
+    if centre < LEAST_STRENGTH {
+        return None;
+    }
+    // Of equal neighbours the first by rows is the maximum.
+    let beaten = (y - R..=y + R).flat_map(|j| (x - R..=x + R).map(move |i| (i, j))).any(|(i, j)| {
+        let other = response.at(i, j);
+        other > centre || (other >= centre && (j, i) < (y, x))
+    });
+    if beaten {
+        return None;
+    }
+    let at = |i: isize, j: isize| f64::from(response.at(x.wrapping_add_signed(i), y.wrapping_add_signed(j)));
+    let (gx, gy) = (0.5 * (at(1, 0) - at(-1, 0)), 0.5 * (at(0, 1) - at(0, -1)));
+    let (hxx, hyy) = (at(1, 0) + at(-1, 0) - 2.0 * at(0, 0), at(0, 1) + at(0, -1) - 2.0 * at(0, 0));
+    let hxy = 0.25 * (at(1, 1) + at(-1, -1) - at(1, -1) - at(-1, 1));
+    let det = hxx * hyy - hxy * hxy;
+    let (dx, dy) = ((hxy * gy - hyy * gx) / det, (hxy * gx - hxx * gy) / det);
+    let scale = (1_usize << level) as f64;
+    (det > 0.0 && dx.abs() <= 1.0 && dy.abs() <= 1.0).then_some(Corner {
+        keypoint: Keypoint { at: ViewPixel { x: (x as f64 + dx) * scale, y: (y as f64 + dy) * scale }, level },
+        strength: centre,
+    })
+}
+
+/// The first `budget` corners when every cell offers its strongest in turn.
+fn spread(mut corners: Vec<Corner>, budget: usize) -> Vec<Corner> {
+    let cell = |corner: &Corner| {
+        let at = corner.keypoint.at;
+        ((at.y / CELL) as usize, (at.x / CELL) as usize)
+    };
+    // The sort is stable, so that equal strengths stay in the order of rows.
+    corners.sort_by(|p, q| cell(p).cmp(&cell(q)).then(q.strength.total_cmp(&p.strength)));
+    let mut ranked: Vec<(usize, Corner)> =
+        corners.chunk_by(|p, q| cell(p) == cell(q)).flat_map(|in_cell| in_cell.iter().copied().enumerate()).collect();
+    ranked.sort_by(|(i, p), (j, q)| i.cmp(j).then(q.strength.total_cmp(&p.strength)));
+    ranked.into_iter().take(budget).map(|(_, corner)| corner).collect()
+}

@@ -1,0 +1,59 @@
+//! Agreement of a match with the matches around it.
+//!
+//! Two points of one opaque surface differ in disparity by less than they are apart: the disparity gradient limit
+//! (S. Pollard, J. Mayhew and J. Frisby, "PMF: a stereo correspondence algorithm using a disparity gradient limit",
+//! Perception 14, 1985). A wrong match rarely finds neighbours within it, a point of a thin object finds some.
+
+use rayon::prelude::*;
+
+use crate::ViewPixel;
+
+/// How many of the nearest matches are asked.
+const NEAREST: usize = 8;
+/// How many of them must agree.
+const SUPPORT: usize = 2;
+/// Largest change of disparity per distance.
+const GRADIENT_LIMIT: f64 = 0.3;
+/// Disparities differing by no more than this agree at any distance, in pixels.
+const ALWAYS_AGREE: f64 = 0.7;
+/// Two matches within this distance show one point, in pixels.
+const SAME_POINT: f64 = 2.0;
+
+/// A match as its neighbours see it.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Placed {
+    pub left: ViewPixel,
+    pub disparity: f64,
+    pub score: f64,
+}
+
+/// Whether enough of the nearest other points agree with each match.
+pub(crate) fn supported(matches: &[Placed]) -> Vec<bool> {
+    matches.par_iter().map(|one| support(one, matches) >= SUPPORT).collect()
+}
+
+/// Whether each match has the same place as a better one (of equals, the earlier).
+pub(crate) fn duplicated(matches: &[Placed]) -> Vec<bool> {
+    let better = |i: usize, j: usize| {
+        let (p, q) = (&matches[i], &matches[j]);
+        distance(p, q) < SAME_POINT && q.score.total_cmp(&p.score).then(i.cmp(&j)).is_gt()
+    };
+    (0..matches.len()).into_par_iter().map(|i| (0..matches.len()).any(|j| better(i, j))).collect()
+}
+
+fn support(one: &Placed, matches: &[Placed]) -> usize {
+    let mut nearest: Vec<(f64, f64)> = matches
+        .iter()
+        .map(|other| (distance(one, other), (other.disparity - one.disparity).abs()))
+        .filter(|(distance, _)| *distance >= SAME_POINT)
+        .collect();
+    if nearest.len() > NEAREST {
+        nearest.select_nth_unstable_by(NEAREST, |p, q| p.0.total_cmp(&q.0).then(p.1.total_cmp(&q.1)));
+        nearest.truncate(NEAREST);
+    }
+    nearest.iter().filter(|(distance, change)| *change <= ALWAYS_AGREE.max(GRADIENT_LIMIT * distance)).count()
+}
+
+fn distance(p: &Placed, q: &Placed) -> f64 {
+    (p.left.x - q.left.x).hypot(p.left.y - q.left.y)
+}

@@ -1,0 +1,220 @@
+//! Least-squares registration of the surroundings of a match, to a few hundredths of a pixel.
+//!
+//! Inverse compositional Gauss-Newton (S. Baker and I. Matthews, "Lucas-Kanade 20 years on", IJCV 56(3), 2004) with
+//! gain and bias as linear unknowns. Between two views with epipolar rows a plane maps by x' = x + t_x + s_x x + s_y y,
+//! y' = y: rows stay rows. t_y takes up the error of the pose and tells how far off the epipolar curve a match is.
+
+use nalgebra::{SMatrix, SVector};
+
+use crate::plane::{Plane, Pyramid};
+use crate::{Drop, ViewPixel};
+
+/// A match after registration.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Registered {
+    /// Where the right view shows what the left view shows at the keypoint.
+    pub right: ViewPixel,
+    /// Correlation of the two patches.
+    pub correlation: f64,
+}
+
+/// Half the window's side, in pixels of the level.
+const HALF: usize = 6;
+const SIDE: usize = 2 * HALF + 1;
+/// Width of the Gaussian that weighs the window.
+const WEIGHT_SIGMA: f64 = 3.5;
+const ITERATIONS: usize = 20;
+/// A step this small, in pixels, ends the iteration.
+const CONVERGED: f64 = 0.01;
+/// Farthest a registration may move in one level, in its pixels.
+const FARTHEST: f64 = 3.0;
+/// Most stretch or shear along the row.
+const STEEPEST: f64 = 0.6;
+const LEAST_CORRELATION: f64 = 0.9;
+/// Largest standard deviation of t_x in pixels.
+const LARGEST_SIGMA: f64 = 0.15;
+/// Largest distance between a keypoint and where the way there and back ends, in pixels.
+const LARGEST_LOOP: f64 = 0.15;
+
+/// Registers the surroundings of `right` to those of the keypoint `left`, from `level` down to the finest.
+///
+/// # Errors
+/// The reason why the match is not to be trusted.
+pub(crate) fn register(
+    [left_levels, right_levels]: [&Pyramid; 2],
+    left: ViewPixel,
+    right: ViewPixel,
+    level: usize,
+) -> Result<Registered, Drop> {
+    let mut warp = Warp { tx: right.x - left.x, ty: right.y - left.y, ..Warp::default() };
+    let mut fit = Fit { warp, correlation: 0.0, sigma: f64::INFINITY };
+    for level in (0..=level).rev() {
+        let (Some(from), Some(to)) = (left_levels.levels().get(level), right_levels.levels().get(level)) else {
+            return Err(Drop::NotRefined);
+        };
+        let scale = (1_usize << level) as f64;
+        let at = ViewPixel { x: left.x / scale, y: left.y / scale };
+        fit = align(from, to, at, warp.scaled(1.0 / scale))?;
+        warp = fit.warp.scaled(scale);
+    }
+    if fit.correlation < LEAST_CORRELATION {
+        return Err(Drop::LowCorrelation);
+    }
+    if fit.sigma > LARGEST_SIGMA {
+        return Err(Drop::Uncertain);
+    }
+    let right = ViewPixel { x: left.x + warp.tx, y: left.y + warp.ty };
+    let (Some(from), Some(to)) = (right_levels.levels().first(), left_levels.levels().first()) else {
+        return Err(Drop::NotRefined);
+    };
+    let back = align(from, to, right, warp.inverse()).map_err(|_| Drop::NotReversible)?.warp;
+    if (back.tx + warp.tx).hypot(back.ty + warp.ty) > LARGEST_LOOP {
+        return Err(Drop::NotReversible);
+    }
+    Ok(Registered { right, correlation: fit.correlation })
+}
+
+/// x' = x + tx + sx x + sy y, y' = y + ty, about the centre of the window.
+#[derive(Clone, Copy, Debug, Default)]
+struct Warp {
+    tx: f64,
+    ty: f64,
+    sx: f64,
+    sy: f64,
+}
+
+impl Warp {
+    fn apply(&self, x: f64, y: f64) -> (f64, f64) {
+        (x + self.tx + self.sx * x + self.sy * y, y + self.ty)
+    }
+
+    /// The same warp in pixels `factor` times as many.
+    fn scaled(&self, factor: f64) -> Self {
+        Self { tx: self.tx * factor, ty: self.ty * factor, ..*self }
+    }
+
+    /// The way back as seen from the warped centre.
+    fn inverse(&self) -> Self {
+        let stretch = 1.0 + self.sx;
+        Self { tx: -self.tx, ty: -self.ty, sx: 1.0 / stretch - 1.0, sy: -self.sy / stretch }
+    }
+
+    /// This warp after undoing `step`.
+    fn after_undoing(&self, step: &Self) -> Self {
+        let stretch = 1.0 + step.sx;
+        // The undone step maps x to (x − tx − sy (y − ty)) / stretch and y to y − ty.
+        let (x0, xx, xy) = ((step.sy * step.ty - step.tx) / stretch, 1.0 / stretch, -step.sy / stretch);
+        let (sx, sy) = (1.0 + self.sx, self.sy);
+        Self { tx: self.tx + sx * x0 - sy * step.ty, ty: self.ty - step.ty, sx: sx * xx - 1.0, sy: sx * xy + sy }
+    }
+}
+
+/// The result of a registration in one level.
+struct Fit {
+    warp: Warp,
+    correlation: f64,
+    /// Standard deviation of tx from the residuals.
+    sigma: f64,
+}
+
+/// Number of unknowns: four of the warp, gain and bias.
+const UNKNOWNS: usize = 6;
+
+/// Registers `image` to the window of `template` around `at`, from the warp `start`.
+fn align(template: &Plane, image: &Plane, at: ViewPixel, start: Warp) -> Result<Fit, Drop> {
+    let window = Window::new(template, at).ok_or(Drop::NotRefined)?;
+    let inverse = window.normal_matrix().cholesky().ok_or(Drop::Uncertain)?.inverse();
+    let mut warp = start;
+    for _ in 0..ITERATIONS {
+        let values = window.warped(image, at, &warp).ok_or(Drop::NotRefined)?;
+        let solution = inverse * window.project(&values);
+        let gain = solution[4];
+        if gain <= 0.0 {
+            return Err(Drop::LowCorrelation);
+        }
+        let [tx, ty, sx, sy] = [0, 1, 2, 3].map(|i| solution[i] / gain);
+        warp = warp.after_undoing(&Warp { tx, ty, sx: sx / HALF as f64, sy: sy / HALF as f64 });
+        let moved = (warp.tx - start.tx).hypot(warp.ty - start.ty);
+        let steep = warp.sx.abs().max(warp.sy.abs());
+        if !(moved <= FARTHEST && steep <= STEEPEST) {
+            return Err(Drop::NotRefined);
+        }
+        if tx.hypot(ty) < CONVERGED {
+            let (correlation, variance) = window.quality(&values, &solution);
+            let sigma = (variance * inverse[(0, 0)]).sqrt() / gain;
+            return Ok(Fit { warp, correlation, sigma });
+        }
+    }
+    Err(Drop::NotRefined)
+}
+
+/// The template's window as the columns of a linear model of the other image's window:
+/// I ≈ gain (T + ∇T · step) + bias.
+struct Window {
+    basis: Vec<SVector<f64, UNKNOWNS>>,
+    weights: Vec<f64>,
+}
+
+impl Window {
+    /// `None` where the window is not all inside.
+    fn new(template: &Plane, at: ViewPixel) -> Option<Self> {
+        const PADDED: usize = SIDE + 2;
+        let mut values = [[0.0; PADDED]; PADDED];
+        for (j, row) in values.iter_mut().enumerate() {
+            for (i, value) in row.iter_mut().enumerate() {
+                let offset = |k: usize| k as f64 - (HALF + 1) as f64;
+                *value = f64::from(template.sample(at.x + offset(i), at.y + offset(j))?);
+            }
+        }
+        let mean = values[HALF + 1][HALF + 1];
+        let mut basis = Vec::with_capacity(SIDE * SIDE);
+        let mut weights = Vec::with_capacity(SIDE * SIDE);
+        for (x, y) in offsets() {
+            let (i, j) = ((x + HALF as f64) as usize + 1, (y + HALF as f64) as usize + 1);
+            let gx = 0.5 * (values[j][i + 1] - values[j][i - 1]);
+            let gy = 0.5 * (values[j + 1][i] - values[j - 1][i]);
+            let (u, v) = (x / HALF as f64, y / HALF as f64);
+            basis.push(SVector::from([gx, gy, u * gx, v * gx, values[j][i] - mean, 1.0]));
+            weights.push((-0.5 * (x * x + y * y) / (WEIGHT_SIGMA * WEIGHT_SIGMA)).exp());
+        }
+        Some(Self { basis, weights })
+    }
+
+    fn normal_matrix(&self) -> SMatrix<f64, UNKNOWNS, UNKNOWNS> {
+        self.basis.iter().zip(&self.weights).fold(SMatrix::zeros(), |sum, (b, w)| sum + (b * *w) * b.transpose())
+    }
+
+    fn project(&self, values: &[f64]) -> SVector<f64, UNKNOWNS> {
+        let terms = self.basis.iter().zip(&self.weights).zip(values);
+        terms.fold(SVector::zeros(), |sum, ((b, w), value)| sum + b * (w * value))
+    }
+
+    /// The other image under the warped window; `None` where it is not all inside.
+    fn warped(&self, image: &Plane, at: ViewPixel, warp: &Warp) -> Option<Vec<f64>> {
+        offsets()
+            .map(|(x, y)| {
+                let (dx, dy) = warp.apply(x, y);
+                image.sample(at.x + dx, at.y + dy).map(f64::from)
+            })
+            .collect()
+    }
+
+    /// Correlation of the model with `values`, and the variance of the residuals.
+    fn quality(&self, values: &[f64], solution: &SVector<f64, UNKNOWNS>) -> (f64, f64) {
+        let total: f64 = self.weights.iter().sum();
+        let mean = values.iter().zip(&self.weights).map(|(value, w)| value * w).sum::<f64>() / total;
+        let (mut left_over, mut spread) = (0.0, 0.0);
+        for ((b, w), value) in self.basis.iter().zip(&self.weights).zip(values) {
+            left_over += w * (value - b.dot(solution)).powi(2);
+            spread += w * (value - mean).powi(2);
+        }
+        let correlation = (1.0 - left_over / spread.max(f64::MIN_POSITIVE)).max(0.0).sqrt();
+        (correlation, left_over / total)
+    }
+}
+
+/// Offsets of the window's pixels from its centre, by rows.
+fn offsets() -> impl Iterator<Item = (f64, f64)> {
+    let side = |k: usize| k as f64 - HALF as f64;
+    (0..SIDE).flat_map(move |j| (0..SIDE).map(move |i| (side(i), side(j))))
+}

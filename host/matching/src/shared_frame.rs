@@ -1,0 +1,67 @@
+//! The direction both cameras are turned to before their images are compared.
+
+use nalgebra::{Matrix3, Rotation3, UnitQuaternion, Vector3};
+use vergence_vision::{Frame, Left, Length, Right, Transform};
+
+/// The shared axes of a pair: x along the baseline from the left to the right camera, z along the mean of the optical
+/// axes as far as it is orthogonal to x, y = z × x. Each camera is its own origin.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Shared;
+impl Frame for Shared {}
+
+/// How both cameras are turned into the [`Shared`] axes, and how far apart they are.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct SharedFrame {
+    shared_from_left: Transform<Shared, Left>,
+    shared_from_right: Transform<Shared, Right>,
+    baseline: Length,
+}
+
+impl SharedFrame {
+    /// The shared axes of two cameras; `None` without a baseline (coinciding cameras or a pose that is not finite).
+    ///
+    /// Where the optical axes cancel or run along the baseline, z is taken orthogonal to the cameras' down axes
+    /// instead: any direction orthogonal to the baseline keeps rows epipolar.
+    #[must_use]
+    pub fn new(left_from_right: &Transform<Left, Right>) -> Option<Self> {
+        let x = left_from_right.origin().direction()?.vector();
+        let right = left_from_right.rotation();
+        let mean = |axis: Vector3<f64>| axis + right * axis;
+        let candidates = [mean(Vector3::z()), x.cross(&mean(Vector3::y())), Vector3::z(), Vector3::y()];
+        let z = candidates.iter().find_map(|axis| orthogonal_to(&x, axis))?;
+        let y = z.cross(&x);
+        let rows = Matrix3::from_rows(&[x.transpose(), y.transpose(), z.transpose()]);
+        let turn = UnitQuaternion::from_rotation_matrix(&Rotation3::from_matrix_unchecked(rows));
+        turn.coords.iter().all(|c| c.is_finite()).then(|| Self {
+            shared_from_left: Transform::new(turn, Vector3::zeros()),
+            shared_from_right: Transform::new(turn * right, Vector3::zeros()),
+            baseline: Length::from_mm(left_from_right.origin().mm().norm()),
+        })
+    }
+
+    /// The left camera's turn. Its translation is zero.
+    #[must_use]
+    pub const fn shared_from_left(&self) -> Transform<Shared, Left> {
+        self.shared_from_left
+    }
+
+    /// The right camera's turn. Its translation is zero: the right camera lies at (baseline, 0, 0) of the left one's
+    /// shared axes.
+    #[must_use]
+    pub const fn shared_from_right(&self) -> Transform<Shared, Right> {
+        self.shared_from_right
+    }
+
+    /// The distance between the cameras.
+    #[must_use]
+    pub const fn baseline(&self) -> Length {
+        self.baseline
+    }
+}
+
+/// The part of `axis` orthogonal to the unit vector `x`, normalised; `None` where little of it remains.
+fn orthogonal_to(x: &Vector3<f64>, axis: &Vector3<f64>) -> Option<Vector3<f64>> {
+    /// About 3° between axis and baseline: closer than that, z would follow the noise of the pose.
+    const LEAST: f64 = 0.05;
+    (axis - x * axis.dot(x)).try_normalize(LEAST)
+}

@@ -1,0 +1,332 @@
+//! A connected board and what can be asked of it: arm under a lease, home, move, stop.
+
+use std::time::Duration;
+
+use indicatif::ProgressBar;
+use tokio::time::timeout;
+use vergence_protocol::{
+    AxisInfo, AxisMask, BoardInfo, Compatibility, ControllerState, FaultRecord, Mode, Move, MoveId, MovePhase,
+    Permille, PoseReport, Refusal, Report, Request, SessionId, Status, StopKind,
+};
+use vergence_rig::{AxisPosition, Rig};
+
+use crate::failure::Failure;
+use crate::link::{Client, LinkError, STREAM_PERIOD_US};
+
+/// Homing and moves of a bench take seconds; a board that needs longer than this is not doing what it says.
+const MOTION_TIMEOUT: Duration = Duration::from_secs(120);
+
+/// A board in a session, and the rig that it drives.
+pub struct Board {
+    client: Client,
+    rig: Rig,
+    info: BoardInfo,
+    pose: PoseReport,
+    lease_ms: u16,
+    moves: u16,
+    progress: ProgressBar,
+}
+
+impl From<LinkError> for Failure {
+    fn from(error: LinkError) -> Self {
+        Self::device(error.to_string())
+    }
+}
+
+impl Board {
+    /// Takes over a fresh client: checks versions and axes, starts the pose stream.
+    ///
+    /// # Errors
+    /// Another protocol, another rig, or a link that ended.
+    pub async fn new(client: Client, rig: Rig, lease_ms: u16, progress: ProgressBar) -> Result<Self, Failure> {
+        if let Compatibility::Incompatible { board } = client.compatibility() {
+            let ours = vergence_protocol::PROTOCOL;
+            return Err(Failure::protocol(format!(
+                "the board speaks protocol {}.{} and this program {}.{}: update the firmware or use the matching vergence",
+                board.major, board.minor, ours.major, ours.minor
+            )));
+        }
+        let Report::Info { info, .. } = client.ask(Request::GetInfo).await? else {
+            return Err(Failure::protocol("the board answered a question about itself with something else"));
+        };
+        let mut board = Self { client, rig, info, pose: empty_pose(), lease_ms, moves: 0, progress };
+        board.check_axes().await?;
+        board.ask(Request::SetStream { period_us: STREAM_PERIOD_US }).await?;
+        board.next_pose().await?;
+        Ok(board)
+    }
+
+    async fn check_axes(&self) -> Result<(), Failure> {
+        let (ours, theirs) = (self.rig.axes.len(), usize::from(self.info.axes));
+        if ours != theirs {
+            return Err(Failure::usage(format!(
+                "rig '{}' has {ours} axes and the board {theirs}: name the right rig file with --rig",
+                self.rig.name
+            )));
+        }
+        for (axis, index) in self.rig.axes.iter().zip(0u8..) {
+            if let Some(contradiction) = axis.contradiction(&self.axis_info(index).await?) {
+                return Err(Failure::usage(format!("{contradiction}: name the right rig file with --rig")));
+            }
+        }
+        Ok(())
+    }
+
+    async fn axis_info(&self, axis: u8) -> Result<AxisInfo, Failure> {
+        match self.client.ask(Request::GetAxis { axis }).await? {
+            Report::Axis { info, .. } => Ok(info),
+            _ => Err(Failure::protocol(format!("the board does not describe its axis {axis}"))),
+        }
+    }
+
+    /// The board.
+    #[must_use]
+    pub fn info(&self) -> &BoardInfo {
+        &self.info
+    }
+
+    /// The rig.
+    #[must_use]
+    pub fn rig(&self) -> &Rig {
+        &self.rig
+    }
+
+    /// The link.
+    #[must_use]
+    pub fn client(&self) -> &Client {
+        &self.client
+    }
+
+    /// The latest pose.
+    #[must_use]
+    pub fn pose(&self) -> &PoseReport {
+        &self.pose
+    }
+
+    /// Where the axes are by the latest pose.
+    #[must_use]
+    pub fn positions(&self) -> Vec<AxisPosition> {
+        positions(&self.rig, &self.pose)
+    }
+
+    /// Waits for a pose.
+    ///
+    /// # Errors
+    /// Where the link ended.
+    pub async fn next_pose(&mut self) -> Result<&PoseReport, Failure> {
+        self.pose = self.client.next_pose().await?;
+        self.progress.set_message(describe_pose(&self.rig, &self.pose));
+        self.progress.tick();
+        Ok(&self.pose)
+    }
+
+    /// Asks for something that is done or refused.
+    ///
+    /// # Errors
+    /// A refusal in words, or a link that ended.
+    pub async fn ask(&self, request: Request) -> Result<(), Failure> {
+        match self.client.ask(request).await? {
+            Report::Ack { status: Status::Accepted, .. } => Ok(()),
+            Report::Ack { status: Status::Refused(refusal), .. } => Err(self.refused(refusal)),
+            _ => Err(Failure::protocol("the board answered a command with something else")),
+        }
+    }
+
+    fn refused(&self, refusal: Refusal) -> Failure {
+        let latched = match (refusal, self.pose.fault) {
+            (Refusal::Latched, Some(fault)) => format!(" ({})", describe_fault(&self.rig, &fault)),
+            _ => String::new(),
+        };
+        let message = format!("the board refuses: {refusal}{latched}");
+        match refusal {
+            Refusal::ReadOnly => Failure::protocol(message),
+            Refusal::OutsideLimits { .. } | Refusal::Invalid => Failure::usage(message),
+            _ => Failure::device(message),
+        }
+    }
+
+    /// Arms, does `work` under a live lease, and disarms whatever became of it. Ctrl-C stops the stages first.
+    ///
+    /// # Errors
+    /// Those of `work`; a refusal to arm; an interruption.
+    pub async fn armed<T>(&mut self, work: impl AsyncFnOnce(&mut Self) -> Result<T, Failure>) -> Result<T, Failure> {
+        self.client.hold_lease(self.lease_ms).await?;
+        self.ask(Request::Arm { session: self.client.session() }).await?;
+        let outcome = tokio::select! {
+            outcome = work(self) => outcome,
+            _ = tokio::signal::ctrl_c() => Err(Failure::device("interrupted: the stages were told to stop")),
+        };
+        let disarmed = self.disarm().await;
+        self.client.hold_lease(0).await?;
+        // A latched fault cannot be disarmed; the first failure is the one to tell.
+        let value = outcome?;
+        disarmed.map(|()| value)
+    }
+
+    /// Disarms and waits until the board is idle; in motion it brakes first.
+    ///
+    /// # Errors
+    /// A refusal, or a link that ended.
+    pub async fn disarm(&mut self) -> Result<(), Failure> {
+        self.ask(Request::Disarm).await?;
+        self.wait_until(|pose| pose.state == ControllerState::Idle).await
+    }
+
+    /// Finds the reference of all axes. The board must be armed.
+    ///
+    /// # Errors
+    /// The fault that ended it, or a refusal.
+    pub async fn home(&mut self) -> Result<(), Failure> {
+        let axes = AxisMask::first(self.rig.axes.len());
+        self.ask(Request::Home { axes }).await?;
+        // A pose that was already on its way still shows the old reference.
+        self.wait_until(|pose| pose.state == ControllerState::Homing).await?;
+        self.wait_until(|pose| pose.state != ControllerState::Homing && pose.referenced == axes).await
+    }
+
+    /// Moves all axes and waits until the encoders confirm it. The board must be armed.
+    ///
+    /// # Errors
+    /// A target out of range, the fault that ended the move, a refusal, or a stop.
+    pub async fn move_to(&mut self, mode: Mode, targets: &[AxisPosition]) -> Result<(), Failure> {
+        check_range(&self.rig, targets)?;
+        // Random sessions make these unique; zero means "no move yet".
+        self.moves = self.moves.wrapping_add(1).max(1);
+        let id = MoveId(self.moves);
+        let targets = self.rig.wire_targets(targets);
+        self.ask(Request::MoveTo(Move { id, mode, targets, speed: Permille::FULL })).await?;
+        self.wait_until(|pose| pose.move_id == id && matches!(pose.phase, MovePhase::Settled | MovePhase::Stopped))
+            .await?;
+        if self.pose.phase == MovePhase::Stopped {
+            return Err(Failure::device("the move was stopped by another command: the stages stand where they are"));
+        }
+        Ok(())
+    }
+
+    /// Stops every motion and waits until all is at rest.
+    ///
+    /// # Errors
+    /// Where the link ended.
+    pub async fn stop(&mut self) -> Result<(), Failure> {
+        self.ask(Request::Stop { kind: StopKind::Decelerate }).await?;
+        let moving = [ControllerState::Moving, ControllerState::Homing, ControllerState::Stopping];
+        self.wait_until(|pose| !moving.contains(&pose.state)).await
+    }
+
+    /// Stays armed for `duration`, or for ever, as long as nothing goes wrong.
+    ///
+    /// # Errors
+    /// The fault that ended it, or a link that ended.
+    pub async fn hold(&mut self, duration: Option<Duration>) -> Result<(), Failure> {
+        let watched = self.wait_for(duration, |_| false).await;
+        watched.unwrap_or(Ok(()))
+    }
+
+    /// Clears the latched fault and returns it; `None` where nothing is latched.
+    ///
+    /// # Errors
+    /// A refusal, such as a cause that persists, or a link that ended.
+    pub async fn clear(&mut self) -> Result<Option<FaultRecord>, Failure> {
+        let Some(fault) = self.pose.fault else { return Ok(None) };
+        self.ask(Request::ClearFault { seen: fault.seq }).await?;
+        self.wait_until(|pose| pose.fault.is_none()).await?;
+        Ok(Some(fault))
+    }
+
+    /// Waits for poses until one satisfies `done`; a fault that was not latched before ends the wait.
+    async fn wait_until(&mut self, done: impl Fn(&PoseReport) -> bool) -> Result<(), Failure> {
+        self.wait_for(Some(MOTION_TIMEOUT), done).await.unwrap_or_else(|| {
+            Err(Failure::device(format!("the board was still not done after {} s", MOTION_TIMEOUT.as_secs())))
+        })
+    }
+
+    /// The same for at most `patience`, then `None`.
+    async fn wait_for(
+        &mut self,
+        patience: Option<Duration>,
+        done: impl Fn(&PoseReport) -> bool,
+    ) -> Option<Result<(), Failure>> {
+        let latched_before = self.pose.fault;
+        let waited = async {
+            loop {
+                self.next_pose().await?;
+                match self.pose.fault {
+                    Some(fault) if latched_before.is_none() => {
+                        return Err(Failure::device(describe_fault(&self.rig, &fault)));
+                    }
+                    _ if done(&self.pose) => return Ok(()),
+                    _ => {}
+                }
+            }
+        };
+        match patience {
+            Some(patience) => timeout(patience, waited).await.ok(),
+            None => Some(waited.await),
+        }
+    }
+}
+
+/// Where the axes are by `pose`.
+#[must_use]
+pub fn positions(rig: &Rig, pose: &PoseReport) -> Vec<AxisPosition> {
+    rig.axes.iter().zip(&pose.counts).map(|(axis, &counts)| axis.position_at(counts)).collect()
+}
+
+/// Refuses targets outside the rig's range, before anything is sent.
+///
+/// # Errors
+/// Names axis, target and range.
+pub fn check_range(rig: &Rig, targets: &[AxisPosition]) -> Result<(), Failure> {
+    for (axis, &target) in rig.axes.iter().zip(targets) {
+        if !axis.contains(target) {
+            let [low, high] = axis.range;
+            return Err(Failure::usage(format!("{} {target} is out of range: choose {low} to {high}", axis.name)));
+        }
+    }
+    Ok(())
+}
+
+/// A pose in one line.
+#[must_use]
+pub fn describe_pose(rig: &Rig, pose: &PoseReport) -> String {
+    let axes = rig.axes.iter().zip(positions(rig, pose)).enumerate().map(|(index, (axis, position))| {
+        let reference = if pose.referenced.contains(index) { "" } else { " (no reference)" };
+        format!("{} {position}{reference}", axis.name)
+    });
+    let mode = rig.mode_name(pose.mode).map(|name| format!(" [{name}]")).unwrap_or_default();
+    format!("{}{mode}  {}", pose.state, axes.collect::<Vec<_>>().join("  "))
+}
+
+/// A fault in a sentence with its remedy.
+#[must_use]
+pub fn describe_fault(rig: &Rig, fault: &FaultRecord) -> String {
+    let axis = fault.axis.and_then(|index| rig.axes.get(usize::from(index)));
+    let axis = axis.map(|axis| format!(" on axis '{}'", axis.name)).unwrap_or_default();
+    format!("{}{axis}; {}", fault.code, fault.code.remedy())
+}
+
+fn empty_pose() -> PoseReport {
+    PoseReport {
+        at: vergence_protocol::Microseconds(0),
+        seq: 0,
+        counts: vergence_protocol::AxisList::new(),
+        referenced: AxisMask::default(),
+        state: ControllerState::Idle,
+        mode: Mode(0),
+        move_id: MoveId(0),
+        phase: MovePhase::None,
+        fault: None,
+    }
+}
+
+/// A session id that no other connection has: never zero.
+///
+/// # Errors
+/// Where the operating system has no randomness to give.
+pub fn fresh_session() -> Result<SessionId, Failure> {
+    use rand::TryRng;
+    let random = rand::rngs::SysRng
+        .try_next_u32()
+        .map_err(|error| Failure::device(format!("the operating system gives no random numbers: {error}")))?;
+    Ok(SessionId(random.max(1)))
+}

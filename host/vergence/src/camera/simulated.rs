@@ -1,0 +1,82 @@
+//! A simulated camera: photographs the simulated room from where the mechanics truly are.
+
+use std::sync::Arc;
+
+use vergence_scene::{Optics, Scene, View, render};
+use vergence_vision::{Base, Camera as CameraFrame, KannalaBrandt, Left, Transform, World};
+
+use super::{Camera, Frame};
+use crate::failure::Failure;
+use crate::link::HostClock;
+use crate::sim::SharedRig;
+
+/// Which eye.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Eye {
+    /// The left camera.
+    Left,
+    /// The right camera.
+    Right,
+}
+
+/// The room, and where the rig stands in it.
+#[derive(Clone, Debug)]
+pub struct Stage {
+    /// What there is to see.
+    pub scene: Scene,
+    /// Where the rig's base stands.
+    pub world_from_base: Transform<World, Base>,
+}
+
+/// One simulated camera.
+pub struct SimulatedCamera {
+    /// Which eye it is.
+    pub eye: Eye,
+    /// Lens and sensor geometry.
+    pub lens: KannalaBrandt,
+    /// Lens and sensor quality.
+    pub optics: Optics,
+    /// The room.
+    pub stage: Arc<Stage>,
+    /// The mechanics that carry it.
+    pub rig: SharedRig,
+    /// Stamps the exposure.
+    pub clock: HostClock,
+    /// Drives the noise; each frame has its own.
+    pub seed: u64,
+    /// Frames so far.
+    pub frames: u64,
+}
+
+impl Stage {
+    /// Where the left camera of a rig pose is.
+    #[must_use]
+    pub fn world_from_left(&self, base_from_left: Transform<Base, Left>) -> Transform<World, Left> {
+        self.world_from_base * base_from_left
+    }
+}
+
+impl Camera for SimulatedCamera {
+    fn grab(&mut self) -> Result<Option<Frame>, Failure> {
+        let pose = {
+            let mut rig = self.rig.lock();
+            rig.run_to_now();
+            rig.true_pose()
+        };
+        let world_from_left = self.stage.world_from_left(pose.base_from_left);
+        let world_from_camera: Transform<World, CameraFrame> = match self.eye {
+            Eye::Left => world_from_left.renamed(),
+            Eye::Right => (world_from_left * pose.left_from_right).renamed(),
+        };
+        let view = View { scene: &self.stage.scene, camera: &self.lens, world_from_camera, optics: &self.optics };
+        // A seed of its own for each eye and frame.
+        let seed = self.seed.wrapping_mul(2).wrapping_add(u64::from(self.eye == Eye::Right));
+        let photograph = render(&view, seed.wrapping_add(self.frames << 32));
+        self.frames += 1;
+        Ok(Some(Frame {
+            image: photograph.image,
+            name: format!("{:?}{}", self.eye, self.frames).to_lowercase(),
+            exposed_at: Some(self.clock.now()),
+        }))
+    }
+}

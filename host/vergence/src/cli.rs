@@ -1,0 +1,137 @@
+//! The command line.
+
+use std::path::PathBuf;
+use std::process::ExitCode;
+
+use clap::{Parser, Subcommand};
+
+use crate::cmd;
+use crate::console::Console;
+use crate::failure::{Failure, FailureKind};
+
+/// Moves a stereo rig of two fisheye cameras between its vision modes, and measures what it sees.
+#[derive(Debug, Parser)]
+#[command(
+    name = "vergence",
+    version,
+    after_help = "Exit codes: 0 ok, 1 check failed, 2 usage or bad input, 3 device, 4 protocol mismatch."
+)]
+struct Cli {
+    #[command(flatten)]
+    globals: Globals,
+    #[command(subcommand)]
+    verb: Verb,
+}
+
+/// Options of every verb.
+#[derive(Clone, Debug, clap::Args)]
+pub struct Globals {
+    /// The board: a serial device, tcp:HOST:PORT, or sim for a simulated one in this process. Without it, the only
+    /// serial device there is.
+    #[arg(long, global = true, env = "VERGENCE_PORT", value_name = "PORT")]
+    pub port: Option<String>,
+    /// Speed of a serial port.
+    #[arg(long, global = true, default_value_t = 921_600)]
+    pub baud: u32,
+    /// The rig file. Without it, the built-in bench.
+    #[arg(long, global = true, env = "VERGENCE_RIG", value_name = "FILE")]
+    pub rig: Option<PathBuf>,
+    /// How long the board may go without hearing from this program before it brakes, 20ms to 1s.
+    #[arg(long, global = true, default_value = "100ms", value_parser = parse_lease, value_name = "TIME")]
+    pub lease: u16,
+    /// Results as JSON.
+    #[arg(long, global = true)]
+    pub json: bool,
+}
+
+#[derive(Debug, Subcommand)]
+enum Verb {
+    /// List the serial ports.
+    Devices(cmd::devices::Args),
+    /// Tell what the board is doing, and why it stopped.
+    Status(cmd::status::Args),
+    /// Arm the board and keep it armed until Ctrl-C.
+    Arm(cmd::arm::Args),
+    /// Disarm the board; in motion it brakes first.
+    Disarm(cmd::disarm::Args),
+    /// Clear a latched fault or lost link.
+    Clear(cmd::clear::Args),
+    /// Find the reference of all axes.
+    Home(cmd::home::Args),
+    /// Go to a vision mode of the rig.
+    Mode(cmd::mode::Args),
+    /// Go to any pose.
+    Move(cmd::move_to::Args),
+    /// Brake now, even while another vergence holds the port.
+    Stop(cmd::stop::Args),
+    /// Show poses as they come.
+    Monitor(cmd::monitor::Args),
+    /// Run a simulated board that other programs can talk to.
+    Sim(cmd::sim::Args),
+    /// Run the whole rig in simulation: home, herbivore, human, look, measure.
+    Demo(cmd::demo::Args),
+    /// Turn a pair of photographs into a cloud of points.
+    Depth(cmd::depth::Args),
+    /// Tell how much of the surroundings both cameras, one, or none see.
+    Zones(cmd::zones::Args),
+}
+
+/// Runs the command line and returns the exit code.
+#[must_use]
+pub fn run() -> ExitCode {
+    // Usage errors leave with code 2 and help with 0, by clap itself.
+    let cli = Cli::parse();
+    match execute(cli) {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(failure) => {
+            tell(&failure);
+            ExitCode::from(failure.kind().exit_code())
+        }
+    }
+}
+
+#[allow(clippy::print_stderr, reason = "the one place where failures are told")]
+fn tell(failure: &Failure) {
+    if failure.kind() != FailureKind::OutputClosed {
+        eprintln!("vergence: {failure}");
+    }
+}
+
+fn execute(cli: Cli) -> Result<(), Failure> {
+    let Cli { globals, verb } = cli;
+    let console = Console::new(globals.json);
+    // With the board in this process nothing outside sets the pace: time can be virtual, and motion costs none.
+    let virtual_time = matches!(verb, Verb::Demo(_)) || globals.port.as_deref() == Some("sim");
+    let runtime = tokio::runtime::Builder::new_current_thread()
+        .enable_all()
+        .start_paused(virtual_time)
+        .build()
+        .map_err(|error| Failure::device(format!("the asynchronous runtime does not start: {error}")))?;
+    runtime.block_on(async {
+        match verb {
+            Verb::Devices(args) => cmd::devices::run(&args, console),
+            Verb::Status(args) => cmd::status::run(&args, &globals, console).await,
+            Verb::Arm(args) => cmd::arm::run(&args, &globals, console).await,
+            Verb::Disarm(args) => cmd::disarm::run(&args, &globals, console).await,
+            Verb::Clear(args) => cmd::clear::run(&args, &globals, console).await,
+            Verb::Home(args) => cmd::home::run(&args, &globals, console).await,
+            Verb::Mode(args) => cmd::mode::run(&args, &globals, console).await,
+            Verb::Move(args) => cmd::move_to::run(&args, &globals, console).await,
+            Verb::Stop(args) => cmd::stop::run(&args, &globals, console).await,
+            Verb::Monitor(args) => cmd::monitor::run(&args, &globals, console).await,
+            Verb::Sim(args) => cmd::sim::run(&args, &globals, console).await,
+            Verb::Demo(args) => cmd::demo::run(&args, &globals, console).await,
+            Verb::Depth(args) => cmd::depth::run(&args, &globals, console),
+            Verb::Zones(args) => cmd::zones::run(&args, console),
+        }
+    })
+}
+
+/// A duration that the board accepts as a lease, in milliseconds.
+fn parse_lease(text: &str) -> Result<u16, String> {
+    let duration: std::time::Duration = humantime::parse_duration(text).map_err(|error| error.to_string())?;
+    match u16::try_from(duration.as_millis()) {
+        Ok(ms @ 20..=1000) => Ok(ms),
+        _ => Err("a lease is 20ms to 1s".into()),
+    }
+}

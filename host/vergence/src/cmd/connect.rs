@@ -1,0 +1,53 @@
+//! From the command line's options to a connected board.
+
+use vergence_rig::Rig;
+
+use crate::board::{Board, fresh_session};
+use crate::cli::Globals;
+use crate::console::Console;
+use crate::failure::Failure;
+use crate::link::{Client, HostClock, OpenWire, Port, open};
+use crate::rig_file;
+use crate::sim::{SharedRig, SimulatedRig, spawn_in_process};
+
+/// Where the stages of an in-process board stand.
+const SIM_SEED: u64 = 1;
+
+/// Connects to the board that the options name.
+///
+/// # Errors
+/// No board, a board of another protocol or rig, a bad rig file.
+pub async fn connect(globals: &Globals, console: Console, what: &str) -> Result<Board, Failure> {
+    let rig = rig_file::load(globals.rig.as_deref())?;
+    let port = port(globals)?;
+    let wire = wire(&port, globals.baud, &rig).await?;
+    let client = Client::connect(wire, fresh_session()?, HostClock::start())
+        .await
+        .map_err(|error| Failure::device(format!("{port}: {error}")))?;
+    Board::new(client, rig, globals.lease, console.progress(what)).await
+}
+
+/// The port that the options name, or the only one there is.
+///
+/// # Errors
+/// None, or several.
+pub fn port(globals: &Globals) -> Result<Port, Failure> {
+    if let Some(Ok(port)) = globals.port.as_deref().map(str::parse) {
+        return Ok(port);
+    }
+    let hint = "name one with --port, or run a simulated board with 'vergence sim --pty'";
+    let found = super::devices::boards()?;
+    match found.as_slice() {
+        [] => Err(Failure::device(format!("no serial device found: connect the board, or {hint}"))),
+        [only] => Ok(Port::Serial(only.into())),
+        several => Err(Failure::usage(format!("several serial devices found ({}): {hint}", several.join(", ")))),
+    }
+}
+
+async fn wire(port: &Port, baud: u32, rig: &Rig) -> Result<OpenWire, Failure> {
+    if *port == Port::Simulated {
+        let simulated = SharedRig::new(SimulatedRig::new(rig, SIM_SEED)?);
+        return Ok(OpenWire { stream: Box::new(spawn_in_process(simulated)), lock: None });
+    }
+    open(port, baud, false).await
+}

@@ -1,0 +1,155 @@
+//! `vergence depth`: a cloud from photographs.
+
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+
+use serde_json::{Value, json};
+use vergence_matching::GuidedMatcher;
+use vergence_rig::{Rig, RigPose};
+use vergence_vision::{ImageSize, Pixel, PixelPair};
+
+use super::move_to::StagePose;
+use crate::board::check_range;
+use crate::camera::{Camera, FileCamera, Frame};
+use crate::cli::Globals;
+use crate::console::Console;
+use crate::failure::Failure;
+use crate::look::{Eyes, Look, look, triangulate};
+use crate::output::{make_folder, ply, write_whole};
+use crate::rig_file;
+
+/// Matches two photographs (or two folders of them, paired in the order of their names) taken by the cameras of the rig
+/// file, and writes the points as PLY in millimetres in the left camera's frame.
+#[derive(Debug, clap::Args)]
+pub struct Args {
+    /// The left image, or a folder.
+    #[arg(long, value_name = "IMAGE")]
+    left: PathBuf,
+    /// The right image, or a folder.
+    #[arg(long, value_name = "IMAGE")]
+    right: PathBuf,
+    /// The cloud to write; for folders, the folder for one cloud per pair.
+    #[arg(long, value_name = "FILE")]
+    out: PathBuf,
+    /// Triangulate these correspondences instead of matching: CSV with columns u_left,v_left,u_right,v_right in pixels.
+    #[arg(long, value_name = "CSV")]
+    points: Option<PathBuf>,
+    /// The vision mode in which the photographs were taken, for a rig with axes.
+    #[arg(long, conflicts_with_all = ["baseline", "separation"])]
+    mode: Option<String>,
+    #[command(flatten)]
+    stage: StagePose,
+}
+
+pub fn run(args: &Args, globals: &Globals, console: Console) -> Result<(), Failure> {
+    let rig = rig_file::load(globals.rig.as_deref())?;
+    let pose = pose(args, &rig)?;
+    let pairs = args.points.as_deref().map(read_pairs).transpose()?;
+    let (mut left, mut right) = (FileCamera::open(&args.left)?, FileCamera::open(&args.right)?);
+    if left.remaining() != right.remaining() {
+        return Err(Failure::usage(format!(
+            "{} has {} images and {} has {}: they must pair up",
+            args.left.display(),
+            left.remaining(),
+            args.right.display(),
+            right.remaining()
+        )));
+    }
+    let several = args.left.is_dir();
+    let mut results = Vec::new();
+    while let (Some(left), Some(right)) = (left.grab()?, right.grab()?) {
+        let work = console.progress(&format!("{} and {}", left.name, right.name));
+        let look = one_pair(&left, &right, &rig, &pose, pairs.as_deref())?;
+        work.finish_and_clear();
+        let out = if several { args.out.join(format!("{}.ply", left.name)) } else { args.out.clone() };
+        if several {
+            make_folder(&args.out)?;
+        }
+        write_whole(&out, ply(&look.points).as_bytes())?;
+        console.say(format!("{} points in {}{}", look.points.len(), out.display(), in_words(&look.dropped)))?;
+        results.push(result(&look, &out));
+    }
+    console.result(&match (several, results.pop()) {
+        (false, Some(only)) => only,
+        (_, last) => json!({ "pairs": results.into_iter().chain(last).collect::<Vec<_>>() }),
+    })
+}
+
+/// Where the cameras were: fixed by the rig file, or said on the command line.
+fn pose(args: &Args, rig: &Rig) -> Result<RigPose, Failure> {
+    let positions = match &args.mode {
+        Some(name) => {
+            let mode =
+                rig.mode(name).ok_or_else(|| Failure::usage(format!("rig '{}' has no mode '{name}'", rig.name)))?;
+            mode.targets.iter().copied().map(Some).collect()
+        }
+        None => args.stage.of_axes(rig)?,
+    };
+    let positions: Option<Vec<_>> = positions.into_iter().collect();
+    let positions = positions.ok_or_else(|| {
+        Failure::usage(format!("rig '{}' moves: say its pose with --mode, or --baseline and --separation", rig.name))
+    })?;
+    check_range(rig, &positions)?;
+    let values: Vec<f64> = positions.iter().map(|position| position.value()).collect();
+    Ok(rig.pose_at_values(&values))
+}
+
+fn one_pair(
+    left: &Frame,
+    right: &Frame,
+    rig: &Rig,
+    pose: &RigPose,
+    pairs: Option<&[PixelPair]>,
+) -> Result<Look, Failure> {
+    check_size(left, rig.left_camera.size(), "left")?;
+    check_size(right, rig.right_camera.size(), "right")?;
+    let eyes = Eyes { left: &left.image, right: &right.image };
+    match pairs {
+        Some(pairs) => Ok(triangulate(pairs, eyes, rig, pose)),
+        None => look(eyes, rig, pose, &GuidedMatcher::default())
+            .map_err(|error| Failure::usage(format!("{} and {}: {error}", left.name, right.name))),
+    }
+}
+
+fn check_size(frame: &Frame, size: ImageSize, side: &str) -> Result<(), Failure> {
+    let (width, height) = frame.image.dimensions();
+    if (width, height) == (size.width, size.height) {
+        return Ok(());
+    }
+    Err(Failure::usage(format!(
+        "{side} image '{}' is {width} x {height}, but the {side} camera of the rig file is {} x {}: use the images the \
+         camera was calibrated with, or its rig file",
+        frame.name, size.width, size.height
+    )))
+}
+
+/// Reads correspondences from a CSV file with a header.
+fn read_pairs(path: &Path) -> Result<Vec<PixelPair>, Failure> {
+    #[derive(serde::Deserialize)]
+    struct Row {
+        u_left: f64,
+        v_left: f64,
+        u_right: f64,
+        v_right: f64,
+    }
+    let mut reader = csv::Reader::from_path(path).map_err(|error| Failure::input(path, error))?;
+    reader
+        .deserialize()
+        .map(|row| {
+            let Row { u_left, v_left, u_right, v_right } = row.map_err(|error| Failure::input(path, error))?;
+            Ok(PixelPair { left: Pixel { u: u_left, v: v_left }, right: Pixel { u: u_right, v: v_right } })
+        })
+        .collect()
+}
+
+fn in_words(dropped: &BTreeMap<&'static str, usize>) -> String {
+    if dropped.is_empty() {
+        return String::new();
+    }
+    let reasons: Vec<_> = dropped.iter().map(|(reason, count)| format!("{reason} {count}")).collect();
+    format!("; dropped: {}", reasons.join(", "))
+}
+
+fn result(look: &Look, out: &Path) -> Value {
+    json!({ "points": look.points.len(), "dropped": look.dropped, "out": out })
+}

@@ -1,0 +1,19 @@
+//! One module per verb.
+
+mod connect;
+mod report;
+
+pub mod arm;
+pub mod clear;
+pub mod demo;
+pub mod depth;
+pub mod devices;
+pub mod disarm;
+pub mod home;
+pub mod mode;
+pub mod monitor;
+pub mod move_to;
+pub mod sim;
+pub mod status;
+pub mod stop;
+pub mod zones;

@@ -1,0 +1,62 @@
+//! What several verbs say of a board.
+
+use serde_json::{Map, Value, json};
+use vergence_protocol::PoseReport;
+use vergence_rig::{AxisPosition, Rig};
+
+use crate::board::{describe_fault, describe_pose, positions};
+use crate::console::Console;
+use crate::failure::Failure;
+
+/// Rounded for people and programs alike: a tenth of a micrometre or of a thousandth degree is below every encoder.
+#[must_use]
+pub fn rounded(value: f64) -> f64 {
+    (value * 1e4).round() / 1e4
+}
+
+/// Axis positions as `{"baseline_mm": ..., "separation_deg": ...}`.
+#[must_use]
+pub fn axes_json(rig: &Rig, positions: &[AxisPosition]) -> Value {
+    let entries = rig.axes.iter().zip(positions).map(|(axis, position)| match position {
+        AxisPosition::Linear(length) => (format!("{}_mm", axis.name), json!(rounded(length.mm()))),
+        AxisPosition::Rotary(angle) => (format!("{}_deg", axis.name), json!(rounded(angle.deg()))),
+    });
+    Value::Object(entries.collect::<Map<_, _>>())
+}
+
+/// A pose for programs.
+#[must_use]
+pub fn pose_json(rig: &Rig, pose: &PoseReport) -> Value {
+    let referenced: Vec<bool> = (0..rig.axes.len()).map(|axis| pose.referenced.contains(axis)).collect();
+    let fault = pose.fault.map(|fault| {
+        json!({
+            "code": format!("{:?}", fault.code),
+            "text": describe_fault(rig, &fault),
+            "seq": fault.seq,
+            "board_us": fault.at.0,
+            "axis": fault.axis.and_then(|axis| rig.axes.get(usize::from(axis))).map(|axis| &axis.name),
+            "detail": fault.detail,
+            "later": fault.later,
+        })
+    });
+    json!({
+        "board_us": pose.at.0,
+        "state": pose.state.to_string(),
+        "mode": rig.mode_name(pose.mode),
+        "axes": axes_json(rig, &positions(rig, pose)),
+        "referenced": referenced,
+        "fault": fault,
+    })
+}
+
+/// Says where the board is now.
+///
+/// # Errors
+/// Where standard output cannot be written.
+pub fn say_pose(console: Console, rig: &Rig, pose: &PoseReport) -> Result<(), Failure> {
+    console.say(describe_pose(rig, pose))?;
+    if let Some(fault) = pose.fault {
+        console.say(format!("  {}", describe_fault(rig, &fault)))?;
+    }
+    console.result(&pose_json(rig, pose))
+}

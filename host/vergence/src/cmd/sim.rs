@@ -1,0 +1,40 @@
+//! `vergence sim`: a simulated board for other programs.
+
+use serde_json::json;
+
+use crate::cli::Globals;
+use crate::console::Console;
+use crate::failure::Failure;
+use crate::rig_file;
+use crate::sim::{Listener, SharedRig, SimulatedRig, serve};
+
+/// Runs the controller core against simulated mechanics in real time and prints the port to give to other verbs.
+/// The motors, screws, encoders and switches are simulated; controller and protocol are the real ones.
+#[derive(Debug, clap::Args)]
+pub struct Args {
+    /// Serve on a pseudo-terminal (the default).
+    #[arg(long, conflicts_with = "tcp")]
+    pty: bool,
+    /// Serve on a TCP address instead, such as 127.0.0.1:4545; port 0 takes a free one.
+    #[arg(long, value_name = "ADDRESS")]
+    tcp: Option<String>,
+    /// Decides where the stages stand at the start.
+    #[arg(long, default_value_t = 1)]
+    seed: u64,
+}
+
+pub async fn run(args: &Args, globals: &Globals, console: Console) -> Result<(), Failure> {
+    let rig = rig_file::load(globals.rig.as_deref())?;
+    let simulated = SharedRig::new(SimulatedRig::new(&rig, args.seed)?);
+    let listener = match &args.tcp {
+        Some(address) => Listener::tcp(address).await?,
+        None => Listener::pty()?,
+    };
+    let port = listener.port().map_err(|error| Failure::device(format!("the simulated port has no name: {error}")))?;
+    console.say(format!("simulated board at {port}\ntry: vergence --port {port} home"))?;
+    console.result(&json!({ "port": port }))?;
+    tokio::select! {
+        outcome = serve(simulated, listener) => outcome,
+        _ = tokio::signal::ctrl_c() => Ok(()),
+    }
+}

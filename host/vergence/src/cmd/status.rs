@@ -1,0 +1,28 @@
+//! `vergence status`: what the board is doing, and why it stopped.
+
+use serde_json::json;
+
+use super::connect::connect;
+use super::report::{pose_json, say_pose};
+use crate::cli::Globals;
+use crate::console::Console;
+use crate::failure::Failure;
+
+/// Reads the board without touching anything.
+#[derive(Debug, clap::Args)]
+pub struct Args {}
+
+pub async fn run(_: &Args, globals: &Globals, console: Console) -> Result<(), Failure> {
+    let board = connect(globals, console, "status").await?;
+    let info = board.info();
+    let [major, minor, patch] = info.firmware;
+    if console.is_json() {
+        let mut status = pose_json(board.rig(), board.pose());
+        status["board"] = json!(info.board.as_str());
+        status["firmware"] = json!(format!("{major}.{minor}.{patch}"));
+        status["reset"] = json!(format!("{:?}", info.reset));
+        return console.result(&status);
+    }
+    console.say(format!("{} firmware {major}.{minor}.{patch}, rig '{}'", info.board, board.rig().name))?;
+    say_pose(console, board.rig(), board.pose())
+}

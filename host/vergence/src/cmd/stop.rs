@@ -1,0 +1,59 @@
+//! `vergence stop`: brakes now.
+
+use std::time::Duration;
+
+use serde_json::json;
+use tokio::io::AsyncWriteExt;
+use vergence_protocol::{HostSession, MAX_FRAME, Request, StopKind};
+
+use super::connect::{connect, port};
+use super::report::say_pose;
+use crate::board::fresh_session;
+use crate::cli::Globals;
+use crate::console::Console;
+use crate::failure::Failure;
+use crate::link::{HostClock, Port, open};
+
+/// Decelerates every axis within its limits and keeps the reference. Needs no arming. It is software: the emergency stop
+/// is the switch that cuts the drivers.
+#[derive(Debug, clap::Args)]
+pub struct Args {}
+
+pub async fn run(_: &Args, globals: &Globals, console: Console) -> Result<(), Failure> {
+    match port(globals)? {
+        port @ Port::Serial(_) if is_shared(&port, globals.baud).await? => {
+            send_unheard(&port, globals.baud, console).await
+        }
+        _ => {
+            let mut board = connect(globals, console, "stopping").await?;
+            board.stop().await?;
+            say_pose(console, board.rig(), board.pose())
+        }
+    }
+}
+
+/// Whether another vergence holds the port.
+async fn is_shared(port: &Port, baud: u32) -> Result<bool, Failure> {
+    Ok(open(port, baud, true).await?.lock.is_none())
+}
+
+/// Another vergence reads this port: send the stop a few times and leave the answers to it.
+async fn send_unheard(port: &Port, baud: u32, console: Console) -> Result<(), Failure> {
+    const REPEATS: u32 = 3;
+    const APART: Duration = Duration::from_millis(20);
+    let mut wire = open(port, baud, true).await?;
+    let clock = HostClock::start();
+    for _ in 0..REPEATS {
+        let mut session = HostSession::new(fresh_session()?);
+        let sent = session.send_now(Request::Stop { kind: StopKind::Decelerate });
+        sent.map_err(|error| Failure::device(format!("the stop cannot be sent: {error}")))?;
+        let mut frame = [0; MAX_FRAME];
+        while let Some(length) = session.transmit(clock.now(), &mut frame) {
+            let bytes = frame.get(..length).unwrap_or_default();
+            wire.stream.write_all(bytes).await.map_err(|error| Failure::device(format!("{port}: {error}")))?;
+        }
+        tokio::time::sleep(APART).await;
+    }
+    console.say("stop sent; the vergence that holds the port tells what became of it")?;
+    console.result(&json!({"stop": "sent", "confirmed": false}))
+}

@@ -1,0 +1,64 @@
+//! What a command says: results on standard output, progress on standard error when that is a terminal.
+
+use std::fmt::Display;
+use std::io::{IsTerminal, Write, stdout};
+
+use indicatif::{ProgressBar, ProgressStyle};
+use serde_json::Value;
+
+use crate::failure::Failure;
+
+/// Results as text or as JSON.
+#[derive(Clone, Copy, Debug)]
+pub struct Console {
+    json: bool,
+}
+
+impl Console {
+    /// With `json`, results are JSON and text is left out.
+    #[must_use]
+    pub fn new(json: bool) -> Self {
+        Self { json }
+    }
+
+    /// Whether results are JSON.
+    #[must_use]
+    pub fn is_json(self) -> bool {
+        self.json
+    }
+
+    /// A line for people; nothing in JSON.
+    ///
+    /// # Errors
+    /// Where standard output cannot be written.
+    pub fn say(self, line: impl Display) -> Result<(), Failure> {
+        if self.json { Ok(()) } else { print_line(&line) }
+    }
+
+    /// The result for programs; nothing in text.
+    ///
+    /// # Errors
+    /// Where standard output cannot be written.
+    pub fn result(self, value: &Value) -> Result<(), Failure> {
+        if self.json { print_line(value) } else { Ok(()) }
+    }
+
+    /// A spinner on a terminal, silent elsewhere.
+    #[must_use]
+    pub fn progress(self, what: &str) -> ProgressBar {
+        if self.json || !std::io::stderr().is_terminal() {
+            return ProgressBar::hidden();
+        }
+        let bar = ProgressBar::new_spinner().with_message(what.to_owned());
+        if let Ok(style) = ProgressStyle::with_template("{spinner} {msg}") {
+            bar.set_style(style);
+        }
+        bar.tick();
+        bar
+    }
+}
+
+fn print_line(line: &dyn Display) -> Result<(), Failure> {
+    let mut out = stdout().lock();
+    writeln!(out, "{line}").and_then(|()| out.flush()).map_err(|error| Failure::stdout(&error))
+}

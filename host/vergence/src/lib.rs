@@ -1,0 +1,22 @@
+//! The vergence command: moves the rig, sees, and measures.
+//!
+//! Only this crate touches devices, files, sockets, clocks and the terminal. `cmd` holds one module per verb; `link`
+//! speaks to a board; `sim` is a board without hardware; `camera` gives images; `look` turns a pair of images and a pose
+//! into a cloud; `output` writes files, whole or not at all.
+//!
+//! Exit codes: 0 ok, 1 check failed, 2 usage or bad input, 3 device, 4 protocol mismatch.
+
+pub mod board;
+pub mod camera;
+pub mod cli;
+mod cmd;
+mod console;
+pub mod failure;
+pub mod link;
+pub mod look;
+mod output;
+mod rig_file;
+pub mod sim;
+mod stopwatch;
+
+pub use cli::run;

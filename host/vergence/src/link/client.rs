@@ -1,0 +1,368 @@
+//! The client: a task that owns the wire and the protocol session, and a handle that asks it for things.
+
+use std::collections::BTreeMap;
+use std::sync::{Arc, Mutex, MutexGuard};
+use std::time::Duration;
+
+use tokio::io::{AsyncReadExt, AsyncWriteExt};
+use tokio::sync::{mpsc, oneshot, watch};
+use tokio::time::{sleep_until, timeout};
+use vergence_protocol::{
+    Compatibility, HostEvent, HostSession, MAX_FRAME, Microseconds, PoseReport, Report, Request, SessionId, Ticket,
+};
+use vergence_rig::{ClockMap, Exchange, JointSample, JointTrack};
+
+use super::clock::HostClock;
+use super::open::OpenWire;
+
+/// How often the board is asked to send its pose.
+pub const STREAM_PERIOD_US: u32 = 10_000;
+/// How long the board may take to answer the first Hello.
+const HELLO_TIMEOUT: Duration = Duration::from_secs(2);
+/// How long a request may take, retransmissions included.
+const REPLY_TIMEOUT: Duration = Duration::from_secs(2);
+/// Clock exchanges: quickly at first, then slowly.
+const PROBE_FAST_US: u64 = 100_000;
+const PROBE_SLOW_US: u64 = 1_000_000;
+const FAST_PROBES: u32 = 10;
+/// Half a minute of poses.
+const TRACK_LENGTH: usize = 3_000;
+
+/// Why the link is of no use any more.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[non_exhaustive]
+pub enum LinkError {
+    /// The other end closed it, or the cable was pulled.
+    #[error(
+        "the link closed ({0}): check the cable or the simulator, then try again; nothing moves until you ask again"
+    )]
+    Closed(String),
+    /// Nothing was heard.
+    #[error("no answer within {0:?}: is this the port of a vergence board, and is the board powered?")]
+    Silent(Duration),
+    /// Something was heard, but nothing that makes sense.
+    #[error("{0} bytes arrived but no valid message: another device, or another baud rate, is on this port")]
+    Noise(u32),
+    /// The board restarted, or another host took the session.
+    #[error("the board began anew or another host took it over: run 'vergence status'")]
+    SessionLost,
+    /// A request that cannot be sent now.
+    #[error("the request cannot be sent: {0}")]
+    Unsendable(String),
+}
+
+enum Command {
+    /// Sent reliably; the reply comes back.
+    Ask { request: Request, reply: oneshot::Sender<Result<Report, LinkError>> },
+    /// Sent once.
+    Send(Request),
+    /// Heartbeats from now on, with this lease; zero ends them.
+    Hold { lease_ms: u16 },
+}
+
+/// What the task learns and the handle reads.
+#[derive(Debug)]
+struct Learned {
+    clock_map: ClockMap,
+    track: JointTrack,
+}
+
+/// A handle to an open session. Dropping it closes the link.
+pub struct Client {
+    commands: mpsc::Sender<Command>,
+    poses: watch::Receiver<Option<PoseReport>>,
+    end: watch::Receiver<Option<LinkError>>,
+    learned: Arc<Mutex<Learned>>,
+    clock: HostClock,
+    session: SessionId,
+    compatibility: Compatibility,
+}
+
+impl Client {
+    /// Opens session `session` over `wire`.
+    ///
+    /// # Errors
+    /// [`LinkError`] where the board does not answer.
+    pub async fn connect(wire: OpenWire, session: SessionId, clock: HostClock) -> Result<Self, LinkError> {
+        let (commands, inbox) = mpsc::channel(16);
+        let (pose_sender, poses) = watch::channel(None);
+        let (end_sender, end) = watch::channel(None);
+        let (opened_sender, opened) = oneshot::channel();
+        let learned =
+            Arc::new(Mutex::new(Learned { clock_map: ClockMap::default(), track: JointTrack::new(TRACK_LENGTH) }));
+        let task = LinkTask {
+            session: HostSession::new(session),
+            clock,
+            inbox,
+            poses: pose_sender,
+            opened: Some(opened_sender),
+            waiting: BTreeMap::new(),
+            learned: Arc::clone(&learned),
+            heartbeat: None,
+            next_probe: Microseconds(0),
+            probes: 0,
+            received: 0,
+        };
+        tokio::spawn(async move {
+            let error = task.run(wire).await;
+            end_sender.send_replace(Some(error));
+        });
+        let compatibility = opened.await.unwrap_or(Err(LinkError::SessionLost))?;
+        Ok(Self { commands, poses, end, learned, clock, session, compatibility })
+    }
+
+    /// Whether both ends mean the same messages.
+    #[must_use]
+    pub fn compatibility(&self) -> Compatibility {
+        self.compatibility
+    }
+
+    /// The session's id.
+    #[must_use]
+    pub fn session(&self) -> SessionId {
+        self.session
+    }
+
+    /// The host clock of this link.
+    #[must_use]
+    pub fn clock(&self) -> HostClock {
+        self.clock
+    }
+
+    /// Asks the board and waits for its reply.
+    ///
+    /// # Errors
+    /// [`LinkError`] where the link ended or the board stayed silent.
+    pub async fn ask(&self, request: Request) -> Result<Report, LinkError> {
+        let (reply, answer) = oneshot::channel();
+        self.commands.send(Command::Ask { request, reply }).await.map_err(|_| self.why_ended())?;
+        match timeout(REPLY_TIMEOUT, answer).await {
+            Ok(Ok(result)) => result,
+            Ok(Err(_)) => Err(self.why_ended()),
+            Err(_) => Err(LinkError::Silent(REPLY_TIMEOUT)),
+        }
+    }
+
+    /// Sends a request that needs no reply.
+    ///
+    /// # Errors
+    /// [`LinkError`] where the link ended.
+    pub async fn send(&self, request: Request) -> Result<(), LinkError> {
+        self.commands.send(Command::Send(request)).await.map_err(|_| self.why_ended())
+    }
+
+    /// Keeps a lease of `lease_ms` alive from now on; zero lets it run out.
+    ///
+    /// # Errors
+    /// [`LinkError`] where the link ended.
+    pub async fn hold_lease(&self, lease_ms: u16) -> Result<(), LinkError> {
+        self.commands.send(Command::Hold { lease_ms }).await.map_err(|_| self.why_ended())
+    }
+
+    /// The next pose from the board.
+    ///
+    /// # Errors
+    /// [`LinkError`] where the link ended, or no pose came for a while.
+    pub async fn next_pose(&mut self) -> Result<PoseReport, LinkError> {
+        const PATIENCE: Duration = Duration::from_secs(1);
+        match timeout(PATIENCE, self.poses.changed()).await {
+            Ok(Ok(())) => self.poses.borrow_and_update().clone().ok_or(LinkError::Silent(PATIENCE)),
+            Ok(Err(_)) => Err(self.why_ended()),
+            Err(_) => Err(LinkError::Silent(PATIENCE)),
+        }
+    }
+
+    /// The latest clock map.
+    #[must_use]
+    pub fn clock_map(&self) -> ClockMap {
+        lock(&self.learned).clock_map.clone()
+    }
+
+    /// The encoder stream so far.
+    #[must_use]
+    pub fn track(&self) -> JointTrack {
+        lock(&self.learned).track.clone()
+    }
+
+    fn why_ended(&self) -> LinkError {
+        self.end.borrow().clone().unwrap_or(LinkError::SessionLost)
+    }
+}
+
+/// A poisoned lock only means that another thread panicked; the data is whole.
+fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
+    mutex.lock().unwrap_or_else(std::sync::PoisonError::into_inner)
+}
+
+struct LinkTask {
+    session: HostSession,
+    clock: HostClock,
+    inbox: mpsc::Receiver<Command>,
+    poses: watch::Sender<Option<PoseReport>>,
+    opened: Option<oneshot::Sender<Result<Compatibility, LinkError>>>,
+    waiting: BTreeMap<Ticket, oneshot::Sender<Result<Report, LinkError>>>,
+    learned: Arc<Mutex<Learned>>,
+    /// The lease, and when the next heartbeat is due.
+    heartbeat: Option<(u16, Microseconds)>,
+    next_probe: Microseconds,
+    probes: u32,
+    received: u32,
+}
+
+impl LinkTask {
+    /// Runs until the link ends or the client is dropped.
+    async fn run(mut self, mut wire: OpenWire) -> LinkError {
+        self.session.hello();
+        let hello_deadline = Microseconds(self.clock.now().0 + HELLO_TIMEOUT.as_micros() as u64);
+        let mut input = [0; 1024];
+        loop {
+            if let Err(error) = self.flush(&mut wire).await {
+                return self.finish(LinkError::Closed(error.to_string()));
+            }
+            let wake = self.next_wake(hello_deadline);
+            tokio::select! {
+                read = wire.stream.read(&mut input) => {
+                    let bytes = match read {
+                        Ok(0) => return self.finish(LinkError::Closed("end of stream".into())),
+                        Ok(length) => input.get(..length).unwrap_or_default(),
+                        Err(error) => return self.finish(LinkError::Closed(error.to_string())),
+                    };
+                    if let Err(error) = self.hear(bytes) {
+                        return self.finish(error);
+                    }
+                }
+                command = self.inbox.recv() => match command {
+                    Some(command) => self.obey(command),
+                    None => {
+                        let _ = self.flush(&mut wire).await;
+                        return self.finish(LinkError::Closed("by this program".into()));
+                    }
+                },
+                () = sleep_until(self.clock.instant(wake)) => {}
+            }
+            if self.opened.is_some() && self.clock.now() >= hello_deadline {
+                let error =
+                    if self.received > 0 { LinkError::Noise(self.received) } else { LinkError::Silent(HELLO_TIMEOUT) };
+                return self.finish(error);
+            }
+        }
+    }
+
+    /// Tells everybody who waits why nothing more will come.
+    fn finish(mut self, error: LinkError) -> LinkError {
+        if let Some(opened) = self.opened.take() {
+            let _ = opened.send(Err(error.clone()));
+        }
+        for reply in std::mem::take(&mut self.waiting).into_values() {
+            let _ = reply.send(Err(error.clone()));
+        }
+        error
+    }
+
+    fn next_wake(&self, hello_deadline: Microseconds) -> Microseconds {
+        let opening = self.opened.is_some();
+        let deadlines = [
+            self.session.next_wake(),
+            opening.then_some(hello_deadline),
+            (!opening).then_some(self.next_probe),
+            self.heartbeat.map(|(_, due)| due),
+        ];
+        deadlines.into_iter().flatten().min().unwrap_or(hello_deadline)
+    }
+
+    /// Writes everything that is due now.
+    async fn flush(&mut self, wire: &mut OpenWire) -> std::io::Result<()> {
+        let now = self.clock.now();
+        self.queue_heartbeat(now);
+        self.queue_probe(now);
+        let mut frame = [0; MAX_FRAME];
+        while let Some(length) = self.session.transmit(self.clock.now(), &mut frame) {
+            wire.stream.write_all(frame.get(..length).unwrap_or_default()).await?;
+        }
+        wire.stream.flush().await
+    }
+
+    fn queue_heartbeat(&mut self, now: Microseconds) {
+        if let Some((lease_ms, due)) = self.heartbeat
+            && now >= due
+        {
+            // Five beats to a lease: four may be lost. A full queue holds a beat already.
+            self.heartbeat = Some((lease_ms, Microseconds(now.0 + u64::from(lease_ms) * 1000 / 5)));
+            let _ = self.session.send_now(Request::Heartbeat { session: self.session.id(), lease_ms });
+        }
+    }
+
+    fn queue_probe(&mut self, now: Microseconds) {
+        if self.session.is_open() && now >= self.next_probe {
+            let period = if self.probes < FAST_PROBES { PROBE_FAST_US } else { PROBE_SLOW_US };
+            self.probes = self.probes.saturating_add(1);
+            self.next_probe = Microseconds(now.0 + period);
+            let _ = self.session.send_now(Request::TimeProbe { t0: now });
+        }
+    }
+
+    fn obey(&mut self, command: Command) {
+        let now = self.clock.now();
+        match command {
+            Command::Hold { lease_ms: 0 } => self.heartbeat = None,
+            Command::Hold { lease_ms } => self.heartbeat = Some((lease_ms, now)),
+            Command::Send(request) => {
+                // Only unsequenced requests come this way; a full queue means the wire is dead, which reading will tell.
+                let _ = self.session.send_now(request);
+            }
+            Command::Ask { request, reply } => {
+                // A stop does not wait behind what is still unacknowledged.
+                let sent = match request {
+                    Request::Stop { .. } => self.session.send_now(request),
+                    _ => self.session.submit(now, request),
+                };
+                match sent {
+                    Ok(ticket) => {
+                        self.waiting.insert(ticket, reply);
+                    }
+                    Err(error) => {
+                        let _ = reply.send(Err(LinkError::Unsendable(error.to_string())));
+                    }
+                }
+            }
+        }
+    }
+
+    fn hear(&mut self, bytes: &[u8]) -> Result<(), LinkError> {
+        self.received = self.received.saturating_add(u32::try_from(bytes.len()).unwrap_or(u32::MAX));
+        let now = self.clock.now();
+        let mut events = Vec::new();
+        self.session.receive(now, bytes, |event| events.push(event));
+        for event in events {
+            match event {
+                HostEvent::Opened { compatibility, .. } => {
+                    if let Some(opened) = self.opened.take() {
+                        let _ = opened.send(Ok(compatibility));
+                    }
+                }
+                HostEvent::Lost { .. } => return Err(LinkError::SessionLost),
+                HostEvent::Reply { ticket, report } => {
+                    if let Some(reply) = self.waiting.remove(&ticket) {
+                        let _ = reply.send(Ok(report));
+                    }
+                }
+                HostEvent::Report(report) => self.note(now, report),
+            }
+        }
+        Ok(())
+    }
+
+    fn note(&mut self, now: Microseconds, report: Report) {
+        match report {
+            Report::Pose(pose) => {
+                lock(&self.learned).track.push(JointSample { at: pose.at, counts: pose.counts.clone() });
+                self.poses.send_replace(Some(pose));
+            }
+            Report::TimeReply { t0, t1, t2 } => {
+                lock(&self.learned).clock_map.observe(Exchange { t0, t1, t2, t3: now });
+            }
+            // MoveState and Fault are repeated in every pose.
+            _ => {}
+        }
+    }
+}

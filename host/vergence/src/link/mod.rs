@@ -1,0 +1,10 @@
+//! The link to a controller board: how it is opened, and the client that speaks over it.
+
+mod client;
+mod clock;
+mod open;
+mod port_lock;
+
+pub use client::{Client, LinkError, STREAM_PERIOD_US};
+pub use clock::HostClock;
+pub use open::{OpenWire, Port, Wire, open};

@@ -1,0 +1,58 @@
+//! Files that commands write: whole, or not at all.
+
+mod colour_map;
+mod picture;
+mod ply;
+mod text;
+mod zones_svg;
+
+use std::io::Write;
+use std::path::Path;
+
+use image::{ImageFormat, RgbImage};
+
+pub use picture::{DepthPicture, depth_picture, match_picture};
+pub use ply::ply;
+pub use zones_svg::zones_svg;
+
+use crate::failure::Failure;
+
+/// Writes `bytes` to `path` through a temporary file beside it: whoever reads `path` sees the old file or the whole new one.
+///
+/// # Errors
+/// Says which file and why.
+pub fn write_whole(path: &Path, bytes: &[u8]) -> Result<(), Failure> {
+    let fail = |error: &dyn std::fmt::Display| Failure::output(path, error);
+    let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
+    let mut file = tempfile::Builder::new()
+        .prefix(".vergence-")
+        .permissions(readable_by_all())
+        .tempfile_in(folder)
+        .map_err(|error| fail(&error))?;
+    file.write_all(bytes).map_err(|error| fail(&error))?;
+    file.persist(path).map_err(|error| fail(&error.error))?;
+    Ok(())
+}
+
+/// A temporary file would be private; the umask takes away what it must.
+fn readable_by_all() -> std::fs::Permissions {
+    std::os::unix::fs::PermissionsExt::from_mode(0o666)
+}
+
+/// Writes an image as PNG.
+///
+/// # Errors
+/// Says which file and why.
+pub fn write_png(path: &Path, image: &RgbImage) -> Result<(), Failure> {
+    let mut bytes = std::io::Cursor::new(Vec::new());
+    image.write_to(&mut bytes, ImageFormat::Png).map_err(|error| Failure::output(path, error))?;
+    write_whole(path, bytes.get_ref())
+}
+
+/// Makes the folder at `path`, and those above it, where they are missing.
+///
+/// # Errors
+/// Says which folder and why.
+pub fn make_folder(path: &Path) -> Result<(), Failure> {
+    std::fs::create_dir_all(path).map_err(|error| Failure::output(path, error))
+}

@@ -1,0 +1,7 @@
+//! The simulated rig: the native board, its own clock, and the ways to reach it (pipe, pty, TCP).
+
+mod rig;
+mod serve;
+
+pub use rig::{SharedRig, SimulatedRig};
+pub use serve::{Listener, serve, spawn_in_process};

@@ -1,0 +1,89 @@
+//! A board and its mechanics that know which rig they are.
+
+use std::sync::{Arc, Mutex, MutexGuard};
+
+use tokio::time::Instant;
+use vergence_plant::{NativeBoard, bench_mechanics, bench_settings};
+use vergence_protocol::Microseconds;
+use vergence_rig::{Rig, RigPose};
+
+use crate::failure::Failure;
+
+/// The board's clock when the simulation starts, and how fast it runs against the host's: a quartz is never exact.
+const BOARD_START_US: u64 = 3_000_000;
+const BOARD_DRIFT: f64 = 40e-6;
+/// When this process was kept from running for longer, simulated time slips instead of leaping over heartbeats that wait to be read.
+const LONGEST_STEP_US: u64 = 20_000;
+
+/// A simulated rig: what the host sees through the wire, and the truth beside it.
+#[derive(Debug)]
+pub struct SimulatedRig {
+    board: NativeBoard,
+    rig: Rig,
+    /// The clock when the rig last ran, and how much time had passed for it by then.
+    last_run: Instant,
+    elapsed_us: u64,
+}
+
+/// The board is driven by its link and looked at by the simulated cameras.
+#[derive(Clone, Debug)]
+pub struct SharedRig(Arc<Mutex<SimulatedRig>>);
+
+impl SimulatedRig {
+    /// Switches on a simulated rig; `seed` decides where its stages stand.
+    ///
+    /// # Errors
+    /// Where the rig's axes are not the bench's.
+    pub fn new(rig: &Rig, seed: u64) -> Result<Self, Failure> {
+        let settings = bench_settings();
+        let fits = settings.len() == rig.axes.len()
+            && rig.axes.iter().zip(&settings).all(|(axis, board)| axis.contradiction(&board.info()).is_none());
+        if !fits {
+            return Err(Failure::usage(format!(
+                "the simulator has the bench's two axes (baseline, separation) and rig '{}' has others: leave out --rig, or copy its axes",
+                rig.name
+            )));
+        }
+        let board = NativeBoard::new(&settings, &bench_mechanics(), seed)
+            .map_err(|error| Failure::usage(format!("the simulated board refuses its settings: {error:?}")))?;
+        Ok(Self { board, rig: rig.clone(), last_run: Instant::now(), elapsed_us: 0 })
+    }
+
+    /// Lets the rig run until now: simulated time follows the clock, but never leaps.
+    pub fn run_to_now(&mut self) {
+        let now = Instant::now();
+        let passed = u64::try_from((now - self.last_run).as_micros()).unwrap_or(u64::MAX);
+        self.last_run = now;
+        self.elapsed_us += passed.min(LONGEST_STEP_US);
+        let drifted = self.elapsed_us as f64 * (1.0 + BOARD_DRIFT);
+        self.board.advance(Microseconds(BOARD_START_US + drifted as u64));
+    }
+
+    /// The board.
+    pub fn board(&mut self) -> &mut NativeBoard {
+        &mut self.board
+    }
+
+    /// Where the cameras truly are: from the mechanics, not from the encoders.
+    #[must_use]
+    pub fn true_pose(&self) -> RigPose {
+        let loads = self.board.plant().loads();
+        let values: Vec<f64> =
+            self.rig.axes.iter().zip(loads).map(|(axis, load)| axis.value_from_micro(load)).collect();
+        self.rig.pose_at_values(&values)
+    }
+}
+
+impl SharedRig {
+    /// Shares a rig between its link and its cameras.
+    #[must_use]
+    pub fn new(rig: SimulatedRig) -> Self {
+        Self(Arc::new(Mutex::new(rig)))
+    }
+
+    /// The rig, for a moment. Nothing waits while it is held.
+    pub fn lock(&self) -> MutexGuard<'_, SimulatedRig> {
+        // A poisoned lock only means that another thread panicked; the rig is whole.
+        self.0.lock().unwrap_or_else(std::sync::PoisonError::into_inner)
+    }
+}

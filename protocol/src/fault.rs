@@ -1,0 +1,87 @@
+//! Why a controller stopped by itself. Defined once, for board and host.
+
+use core::fmt;
+
+use postcard_schema::Schema;
+use serde::{Deserialize, Serialize};
+
+use crate::Microseconds;
+
+/// What went wrong. Append only: the order is the wire format.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize, Schema)]
+#[non_exhaustive]
+pub enum FaultCode {
+    /// The host fell silent for longer than its lease while the board was armed.
+    LeaseExpired,
+    /// The encoder and the commanded position disagree by more than the following-error limit.
+    FollowingError,
+    /// The encoder did not come to rest inside the tolerance after a move.
+    NotSettled,
+    /// Homing went through its whole travel without finding the switch.
+    HomeSwitchNotFound,
+    /// The home switch stayed closed after backing off.
+    HomeSwitchStuck,
+    /// Homing found the switch at two different places.
+    HomeNotRepeatable,
+    /// A hard limit switch closed.
+    HardLimit,
+    /// The emergency stop is pressed.
+    EmergencyStop,
+    /// The settings contradict themselves.
+    BadSettings,
+}
+
+impl FaultCode {
+    /// What a person can do about it.
+    #[must_use]
+    pub const fn remedy(self) -> &'static str {
+        match self {
+            Self::LeaseExpired => "check the cable and that the host is running, then 'vergence clear'",
+            Self::FollowingError => {
+                "look for an obstacle or a slipping coupling, then 'vergence clear' and 'vergence home'"
+            }
+            Self::NotSettled => "look for backlash or vibration at the stage, then 'vergence clear'",
+            Self::HomeSwitchNotFound => {
+                "check the home switch and its wiring, then 'vergence clear' and 'vergence home'"
+            }
+            Self::HomeSwitchStuck => "free or replace the home switch, then 'vergence clear' and 'vergence home'",
+            Self::HomeNotRepeatable => "tighten the home switch, then 'vergence clear' and 'vergence home'",
+            Self::HardLimit => "move the stage off the limit by hand, then 'vergence clear' and 'vergence home'",
+            Self::EmergencyStop => "release the emergency stop, then 'vergence clear' and 'vergence home'",
+            Self::BadSettings => "restore the board's settings",
+        }
+    }
+}
+
+impl fmt::Display for FaultCode {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            Self::LeaseExpired => "the host fell silent for longer than its lease",
+            Self::FollowingError => "the stage did not follow its command",
+            Self::NotSettled => "the stage did not come to rest at its target",
+            Self::HomeSwitchNotFound => "homing did not find the switch",
+            Self::HomeSwitchStuck => "the home switch stayed closed",
+            Self::HomeNotRepeatable => "homing found the switch at two different places",
+            Self::HardLimit => "a hard limit switch closed",
+            Self::EmergencyStop => "the emergency stop is pressed",
+            Self::BadSettings => "the board's settings contradict themselves",
+        })
+    }
+}
+
+/// The first fault since the last clear; later ones are only counted.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, Schema)]
+pub struct FaultRecord {
+    /// What went wrong.
+    pub code: FaultCode,
+    /// Counts faults since start; `ClearFault` must name it, so that a fault nobody saw cannot be cleared.
+    pub seq: u16,
+    /// When, on the board's clock.
+    pub at: Microseconds,
+    /// On which axis, where it concerns one.
+    pub axis: Option<u8>,
+    /// A number that belongs to the code: the following error or the distance searched in micro-units, the silence in microseconds.
+    pub detail: i32,
+    /// How many more faults came after it.
+    pub later: u16,
+}

@@ -1,0 +1,385 @@
+//! The host's end.
+
+use heapless::Deque;
+
+use super::line::Line;
+use super::round_trip::Repeat;
+use super::window::{Window, sequence};
+use crate::frame::{Header, Kind, MAX_FRAME};
+use crate::receiver::{LinkCounters, Receiver};
+use crate::{Microseconds, PROTOCOL, ProtocolVersion, Report, Request, SessionId, schema_hash};
+
+/// How many immediate requests may wait for the line.
+const IMMEDIATE: usize = 4;
+
+/// Names one request of one session, so that its answer can be told from another's.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub struct Ticket {
+    immediate: bool,
+    number: u32,
+}
+
+/// What host and board can do together.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Compatibility {
+    /// Everything: both mean the same bytes.
+    Full,
+    /// The schemas differ: the board may be read and stopped but not moved.
+    ReadOnly,
+    /// The majors differ: nothing but `GetInfo` by [`HostSession::send_now`].
+    Incompatible {
+        /// What the board speaks.
+        board: ProtocolVersion,
+    },
+}
+
+/// What the host hears.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum HostEvent {
+    /// The board answered [`HostSession::hello`].
+    Opened {
+        /// What can be done now.
+        compatibility: Compatibility,
+        /// Changes with every start of the board.
+        boot: u32,
+    },
+    /// The board no longer knows this session: it restarted, or another host opened one. Nothing that awaited an answer
+    /// will get one. Make a new `HostSession` with a new id.
+    Lost {
+        /// Changes with every start of the board.
+        boot: u32,
+    },
+    /// The answer to a request: `Ack`, `Info` or `Axis`.
+    Reply {
+        /// Which request.
+        ticket: Ticket,
+        /// The answer.
+        report: Report,
+    },
+    /// All else: `Pose`, `MoveState`, `Fault`, `TimeReply`.
+    Report(Report),
+}
+
+/// Why a request was not taken.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
+#[non_exhaustive]
+pub enum SubmitError {
+    /// The board has not answered `Hello`, is incompatible, or has lost the session.
+    #[error("there is no open session with the board")]
+    NotOpen,
+    /// As many requests await an answer as may: try again after the next reply.
+    #[error("too many requests await an answer")]
+    WindowFull,
+    /// More immediate requests than the line takes: call `transmit`.
+    #[error("too many immediate requests wait for the line")]
+    QueueFull,
+    /// The request goes another way: `hello`, `submit` or `send_now`.
+    #[error("this request is sent another way")]
+    WrongWay,
+}
+
+/// Figures of one session.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct HostStatistics {
+    /// Frames sent.
+    pub sent: u32,
+    /// Requests sent again.
+    pub retransmitted: u32,
+    /// Smoothed round trip, microseconds; `None` before the first acknowledgement.
+    pub round_trip: Option<Microseconds>,
+    /// How long an unanswered request waits before it is sent again, microseconds.
+    pub timeout: Microseconds,
+    /// Poses received.
+    pub poses: u32,
+    /// Poses that the board numbered but that did not arrive.
+    pub poses_lost: u32,
+    /// What came in.
+    pub link: LinkCounters,
+}
+
+#[derive(Clone, Copy, Debug)]
+enum Phase {
+    Closed,
+    Opening(Repeat),
+    Open { boot: u32 },
+    Incompatible,
+}
+
+/// The host's end of one session. Loop: [`receive`](Self::receive) what arrived, [`transmit`](Self::transmit) until it
+/// gives nothing, wait for bytes or until [`next_wake`](Self::next_wake).
+#[derive(Debug)]
+pub struct HostSession {
+    id: SessionId,
+    phase: Phase,
+    receiver: Receiver,
+    line: Line,
+    window: Window,
+    immediate: Deque<(u32, Request), IMMEDIATE>,
+    immediate_next: u32,
+    heard_seq: u8,
+    heard_at: Option<Microseconds>,
+    pose_seq: Option<u16>,
+    poses: u32,
+    poses_lost: u32,
+}
+
+impl HostSession {
+    /// A closed session. `id` must be random and not zero: the board takes the same id for the same conversation.
+    #[must_use]
+    pub fn new(id: SessionId) -> Self {
+        Self {
+            id,
+            phase: Phase::Closed,
+            receiver: Receiver::new(),
+            line: Line::default(),
+            window: Window::new(),
+            immediate: Deque::new(),
+            immediate_next: 0,
+            heard_seq: 0,
+            heard_at: None,
+            pose_seq: None,
+            poses: 0,
+            poses_lost: 0,
+        }
+    }
+
+    /// Sends `Hello`, again and again until the board answers with [`HostEvent::Opened`]. Nothing on a session that was
+    /// opened before.
+    pub fn hello(&mut self) {
+        if matches!(self.phase, Phase::Closed) && self.heard_at.is_none() {
+            self.phase = Phase::Opening(Repeat::new());
+        }
+    }
+
+    /// Takes a request that the board will carry out once and in order; its answer comes as [`HostEvent::Reply`].
+    ///
+    /// # Errors
+    /// [`SubmitError`]; the request was not taken.
+    pub fn submit(&mut self, now: Microseconds, request: Request) -> Result<Ticket, SubmitError> {
+        match request {
+            Request::Hello { .. } | Request::Heartbeat { .. } | Request::TimeProbe { .. } | Request::Stop { .. } => {
+                return Err(SubmitError::WrongWay);
+            }
+            _ if !self.is_open() => return Err(SubmitError::NotOpen),
+            _ => {}
+        }
+        let number = self.window.submit(now, request).ok_or(SubmitError::WindowFull)?;
+        Ok(Ticket { immediate: false, number })
+    }
+
+    /// Sends `Heartbeat`, `TimeProbe`, `Stop` or `GetInfo` once, before everything else: the caller repeats it if need
+    /// be. `Stop` overtakes all and needs no open session, though its answer is heard only on one. The `t0` of a
+    /// `TimeProbe` is set when it leaves.
+    ///
+    /// # Errors
+    /// [`SubmitError`]; the request was not taken. A `Stop` is always taken.
+    pub fn send_now(&mut self, request: Request) -> Result<Ticket, SubmitError> {
+        let number = self.immediate_next;
+        let ticket = Ticket { immediate: true, number };
+        match (&request, self.phase) {
+            (request, _) if !super::may_pass_by(request) => return Err(SubmitError::WrongWay),
+            (Request::Stop { .. }, _) => {
+                if self.immediate.is_full() {
+                    self.immediate.pop_back();
+                }
+                self.immediate.push_front((number, request)).map_err(|_| SubmitError::QueueFull)?;
+            }
+            (_, Phase::Open { .. }) | (Request::GetInfo, Phase::Incompatible) => {
+                self.immediate.push_back((number, request)).map_err(|_| SubmitError::QueueFull)?;
+            }
+            _ => return Err(SubmitError::NotOpen),
+        }
+        self.immediate_next = number.wrapping_add(1);
+        Ok(ticket)
+    }
+
+    /// Takes bytes from the board, any bytes, that arrived `now`.
+    pub fn receive(&mut self, now: Microseconds, bytes: &[u8], mut hear: impl FnMut(HostEvent)) {
+        for &byte in bytes {
+            if let Some(event) = self.receive_byte(now, byte) {
+                hear(event);
+            }
+        }
+    }
+
+    /// Writes the next frame to send `now`, or `None` when there is none. Call until then.
+    pub fn transmit(&mut self, now: Microseconds, buffer: &mut [u8; MAX_FRAME]) -> Option<usize> {
+        let (kind, seq, request) = self.next_request(now)?;
+        let header = Header { major: PROTOCOL.major, kind, seq, ack: self.heard_seq };
+        self.line.write(now, header, &request, buffer)
+    }
+
+    /// When [`transmit`](Self::transmit) next has something to send if nothing arrives before; zero is at once.
+    #[must_use]
+    pub fn next_wake(&self) -> Option<Microseconds> {
+        match self.phase {
+            _ if !self.immediate.is_empty() => Some(Microseconds(0)),
+            Phase::Opening(repeat) => Some(repeat.due()),
+            Phase::Closed | Phase::Open { .. } | Phase::Incompatible => self.window.wake(),
+        }
+    }
+
+    /// Whether requests may be submitted.
+    #[must_use]
+    pub const fn is_open(&self) -> bool {
+        matches!(self.phase, Phase::Open { .. })
+    }
+
+    /// The session's id.
+    #[must_use]
+    pub const fn id(&self) -> SessionId {
+        self.id
+    }
+
+    /// Submitted requests without an answer.
+    #[must_use]
+    pub fn unanswered(&self) -> usize {
+        self.window.len()
+    }
+
+    /// When the board was last heard since the session opened, by the `now` of [`receive`](Self::receive).
+    #[must_use]
+    pub const fn heard_at(&self) -> Option<Microseconds> {
+        self.heard_at
+    }
+
+    /// Figures so far.
+    #[must_use]
+    pub fn statistics(&self) -> HostStatistics {
+        HostStatistics {
+            sent: self.line.sent(),
+            retransmitted: self.window.retransmitted(),
+            round_trip: self.window.round_trip().smoothed(),
+            timeout: Microseconds(self.window.round_trip().timeout()),
+            poses: self.poses,
+            poses_lost: self.poses_lost,
+            link: self.receiver.counters(),
+        }
+    }
+
+    fn next_request(&mut self, now: Microseconds) -> Option<(Kind, u8, Request)> {
+        if let Some((number, mut request)) = self.immediate.pop_front() {
+            if let Request::TimeProbe { t0 } = &mut request {
+                *t0 = now;
+            }
+            return Some((Kind::Immediate, sequence(number), request));
+        }
+        if let Phase::Opening(repeat) = &mut self.phase {
+            if repeat.due() > now {
+                return None;
+            }
+            repeat.sent(now);
+            let hello = Request::Hello { protocol: PROTOCOL, schema: schema_hash(), session: self.id };
+            return Some((Kind::Immediate, 0, hello));
+        }
+        let (seq, request) = self.window.transmit(now)?;
+        Some((Kind::Control, seq, request))
+    }
+
+    fn receive_byte(&mut self, now: Microseconds, byte: u8) -> Option<HostEvent> {
+        let frame = self.receiver.push(byte)?;
+        let header = frame.header;
+        match header.kind {
+            Kind::Control | Kind::Telemetry | Kind::Immediate => match frame.body() {
+                Ok(report) => self.receive_report(now, header, report),
+                Err(error) => {
+                    self.receiver.reject(error);
+                    None
+                }
+            },
+            Kind::AckOnly | Kind::Nak => {
+                self.receive_header(now, header);
+                None
+            }
+            Kind::Log | Kind::Firmware => None,
+        }
+    }
+
+    fn receive_report(&mut self, now: Microseconds, header: Header, report: Report) -> Option<HostEvent> {
+        if let Report::Hello { protocol, schema, session, boot } = report {
+            return self.receive_hello(now, (protocol, schema), session, boot);
+        }
+        self.receive_header(now, header);
+        match (self.phase, header.major == PROTOCOL.major, &report) {
+            (Phase::Open { .. }, true, _) | (Phase::Incompatible, _, Report::Info { .. }) => {}
+            _ => return None,
+        }
+        match report {
+            Report::Ack { to, .. } | Report::Info { to, .. } | Report::Axis { to, .. } => {
+                let ticket = self.answered(header.kind, to)?;
+                Some(HostEvent::Reply { ticket, report })
+            }
+            Report::Pose(ref pose) => {
+                self.count_pose(pose.seq);
+                Some(HostEvent::Report(report))
+            }
+            _ => Some(HostEvent::Report(report)),
+        }
+    }
+
+    /// Acknowledgements mean something between two ends of one major with an open session.
+    fn receive_header(&mut self, now: Microseconds, header: Header) {
+        if header.major != PROTOCOL.major || !self.is_open() {
+            return;
+        }
+        self.heard_seq = header.seq;
+        self.heard_at = Some(now);
+        self.window.acknowledge(now, header.ack);
+        if header.kind == Kind::Nak {
+            self.window.not_acknowledged(now, header.ack);
+        }
+    }
+
+    fn receive_hello(
+        &mut self,
+        now: Microseconds,
+        (protocol, schema): (ProtocolVersion, u64),
+        session: SessionId,
+        boot: u32,
+    ) -> Option<HostEvent> {
+        match self.phase {
+            Phase::Opening(_) if session == self.id => {
+                let compatibility = if protocol.major != PROTOCOL.major {
+                    Compatibility::Incompatible { board: protocol }
+                } else if schema != schema_hash() {
+                    Compatibility::ReadOnly
+                } else {
+                    Compatibility::Full
+                };
+                self.heard_at = Some(now);
+                self.phase = match compatibility {
+                    Compatibility::Incompatible { .. } => Phase::Incompatible,
+                    Compatibility::Full | Compatibility::ReadOnly => Phase::Open { boot },
+                };
+                Some(HostEvent::Opened { compatibility, boot })
+            }
+            Phase::Open { boot: opened } if session != self.id || boot != opened => {
+                self.phase = Phase::Closed;
+                self.window.clear();
+                Some(HostEvent::Lost { boot })
+            }
+            _ => None,
+        }
+    }
+
+    fn answered(&mut self, kind: Kind, to: u8) -> Option<Ticket> {
+        if kind == Kind::Immediate {
+            let latest = self.immediate_next.checked_sub(1)?;
+            let number = latest.checked_sub(u32::from(sequence(latest).wrapping_sub(to)))?;
+            return Some(Ticket { immediate: true, number });
+        }
+        Some(Ticket { immediate: false, number: self.window.answer(to)? })
+    }
+
+    fn count_pose(&mut self, seq: u16) {
+        if let Some(last) = self.pose_seq {
+            let lost = seq.wrapping_sub(last).wrapping_sub(1);
+            // More than half the range is a pose out of order or a stream that began again, not a loss.
+            if lost < 1 << 15 {
+                self.poses_lost = self.poses_lost.saturating_add(u32::from(lost));
+            }
+        }
+        self.pose_seq = Some(seq);
+        self.poses = self.poses.saturating_add(1);
+    }
+}
