@@ -40,7 +40,7 @@ pub(crate) fn detect(pyramid: &Pyramid, budget: usize, compared: impl Fn(&Keypoi
     let levels = pyramid.levels();
     let mut keypoints = Vec::with_capacity(budget);
     for (level, plane) in levels.iter().enumerate() {
-        let share = budget / (1 << (level + 1).min(levels.len() - 1).max(1));
+        let share = budget >> (level + 1).min(levels.len() - 1);
         let found: Vec<Corner> =
             maxima(&response(plane), level).into_par_iter().filter(|corner| compared(&corner.keypoint)).collect();
         keypoints.extend(spread(found, share).iter().map(|corner| corner.keypoint));

@@ -12,7 +12,7 @@ use crate::matcher::{Drop, ImagePair, Match, MatchError, Matcher, Matches};
 use crate::neighbours::{self, Placed};
 use crate::plane::Pyramid;
 use crate::refine;
-use crate::view::SharedField;
+use crate::shared_field::SharedField;
 use crate::{Grid, Shared, SharedFrame, View, ViewPixel};
 
 /// Matches corners by their gradient histograms, guided by the known pose.
@@ -20,7 +20,8 @@ use crate::{Grid, Shared, SharedFrame, View, ViewPixel};
 pub struct GuidedMatcher {
     /// Most keypoints per view.
     pub keypoints: usize,
-    /// Pixels of the view per pixel at the centre of the denser fisheye image; `None` lets the images decide.
+    /// Pixels of the view per pixel at the centre of the denser fisheye image, from 1 to 2. `None` takes what makes
+    /// 450 pixels per radian, so that small images are enlarged.
     pub oversampling: Option<f64>,
 }
 
@@ -56,7 +57,7 @@ impl Matcher for GuidedMatcher {
         pair.check()?;
         let frame = SharedFrame::new(&pair.left_from_right).ok_or(MatchError::NoBaseline)?;
         let density = pair.left_camera.k()[0].max(pair.right_camera.k()[0]);
-        let oversampling = self.oversampling.unwrap_or(DENSITY / density).clamp(1.0, 2.0);
+        let oversampling = self.oversampling.filter(|o| o.is_finite()).unwrap_or(DENSITY / density).clamp(1.0, 2.0);
         let grid = Grid::covering(&frame, pair.left_camera, pair.right_camera, oversampling)
             .ok_or(MatchError::NoSharedField)?;
         let field = SharedField::new(&frame, pair.left_camera, pair.right_camera);

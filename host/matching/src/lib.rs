@@ -23,6 +23,7 @@ mod matcher;
 mod neighbours;
 mod plane;
 mod refine;
+mod shared_field;
 mod shared_frame;
 mod view;
 

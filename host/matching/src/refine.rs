@@ -19,10 +19,10 @@ pub(crate) struct Registered {
 }
 
 /// Half the window's side, in pixels of the level.
-const HALF: usize = 6;
+const HALF: usize = 8;
 const SIDE: usize = 2 * HALF + 1;
 /// Width of the Gaussian that weighs the window.
-const WEIGHT_SIGMA: f64 = 3.5;
+const WEIGHT_SIGMA: f64 = 4.5;
 const ITERATIONS: usize = 20;
 /// A step this small, in pixels, ends the iteration.
 const CONVERGED: f64 = 0.01;
@@ -217,4 +217,58 @@ impl Window {
 fn offsets() -> impl Iterator<Item = (f64, f64)> {
     let side = |k: usize| k as f64 - HALF as f64;
     (0..SIDE).flat_map(move |j| (0..SIDE).map(move |i| (side(i), side(j))))
+}
+
+#[cfg(test)]
+mod tests {
+    use proptest::prelude::*;
+
+    use super::*;
+
+    const SIZE: usize = 64;
+
+    /// Smooth texture without symmetry, seen under a warp about the middle of the plane.
+    fn textured(warp: &Warp, gain: f64, bias: f64) -> Plane {
+        let middle = (SIZE / 2) as f64;
+        let undo = warp.inverse();
+        let value = |x: f64, y: f64| {
+            let (x, y) = (x - middle - warp.tx, y - middle - warp.ty);
+            let (x, y) = (x + undo.sx * x + undo.sy * y, y);
+            let waves = (0.45 * x + 0.2 * y).sin() + (0.3 * y - 0.25 * x + 1.0).cos() + (0.5 * y + 0.1 * x).sin();
+            (128.0 + 30.0 * waves) * gain + bias
+        };
+        let values = (0..SIZE * SIZE).map(|i| value((i % SIZE) as f64, (i / SIZE) as f64) as f32).collect();
+        Plane::new(SIZE, SIZE, values)
+    }
+
+    proptest! {
+        #[test]
+        fn undoing_a_warp_after_itself_leaves_nothing(
+            tx in -3.0..3.0, ty in -3.0..3.0, sx in -0.5..0.5, sy in -0.5..0.5, x in -8.0..8.0, y in -8.0..8.0,
+        ) {
+            let warp = Warp { tx, ty, sx, sy };
+            let (u, v) = warp.after_undoing(&warp).apply(x, y);
+            prop_assert!((u - x).abs() < 1e-9 && (v - y).abs() < 1e-9);
+        }
+
+        #[test]
+        fn a_known_warp_is_recovered_under_gain_and_bias(
+            tx in -1.0..1.0, ty in -1.0..1.0, sx in -0.15..0.15, sy in -0.15..0.15, gain in 0.6..1.3, bias in -20.0..20.0,
+        ) {
+            let truth = Warp { tx, ty, sx, sy };
+            let (template, image) = (textured(&Warp::default(), 1.0, 0.0), textured(&truth, gain, bias));
+            let middle = ViewPixel { x: (SIZE / 2) as f64, y: (SIZE / 2) as f64 };
+            let fit = align(&template, &image, middle, Warp::default()).unwrap();
+            prop_assert!((fit.warp.tx - tx).abs() < 0.02 && (fit.warp.ty - ty).abs() < 0.02, "{:?}", fit.warp);
+            prop_assert!((fit.warp.sx - sx).abs() < 0.01 && (fit.warp.sy - sy).abs() < 0.01, "{:?}", fit.warp);
+            prop_assert!(fit.correlation > 0.99);
+        }
+    }
+
+    #[test]
+    fn a_flat_window_is_refused() {
+        let flat = Plane::new(SIZE, SIZE, vec![90.0; SIZE * SIZE]);
+        let middle = ViewPixel { x: 32.0, y: 32.0 };
+        assert_eq!(align(&flat, &flat, middle, Warp::default()).err(), Some(Drop::Uncertain));
+    }
 }

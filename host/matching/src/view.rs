@@ -6,9 +6,10 @@
 use image::GrayImage;
 use nalgebra::Vector3;
 use rayon::prelude::*;
-use vergence_vision::{Angle, Frame, KannalaBrandt, Length, OutsideField, Pixel, Transform, UnitRay};
+use vergence_vision::{Frame, KannalaBrandt, OutsideField, Pixel, Transform, UnitRay};
 
 use crate::plane::{Plane, cubic_weights};
+use crate::shared_field::{Extent, seen_at};
 use crate::{Shared, SharedFrame};
 
 /// A position in a [`View`], in its pixels. (0, 0) is the centre of the top-left one.
@@ -30,19 +31,11 @@ pub struct Grid {
     height: usize,
 }
 
-/// Largest |a|: nearer the baseline than 15° disparity says little about range.
-const A_LIMIT: Angle = Angle::from_deg(75.0);
-/// Largest |b|: a field of 196° ends there for parallel axes.
-const B_LIMIT: Angle = Angle::from_deg(105.0);
-/// The outermost ring of the lens, vignetted and least well calibrated.
-const RIM: Angle = Angle::from_deg(1.5);
-/// Besides infinity, the range at which the other camera must see a direction for it to be compared.
-const NEAR: Length = Length::from_mm(1000.0);
-
 impl Grid {
-    /// The grid over all that both cameras see (at infinity or 1 m), within ±75° of a and ±105° of b; `None` where
-    /// that is nothing. Its density is that of the denser lens at its axis times `oversampling`, or less where a side
-    /// would exceed 4096 pixels.
+    /// The grid over all that both cameras see (at infinity or 1 m), within ±75° of a and ±105° of b. Its density is
+    /// that of the denser lens at its axis times `oversampling`, or less where a side would exceed 4096 pixels.
+    ///
+    /// `None` where the cameras share nothing or `oversampling` is not positive.
     #[must_use]
     pub fn covering(
         frame: &SharedFrame,
@@ -54,9 +47,9 @@ impl Grid {
         let extent = Extent::of_shared_field(frame, left, right)?;
         let (wide, tall) = (extent.a_max - extent.a_min, extent.b_max - extent.b_min);
         let wanted = left.k()[0].max(right.k()[0]) * oversampling;
-        let pixels_per_radian = wanted.min((LARGEST - 1.0) / wide.max(tall));
+        let pixels_per_radian = if wanted > 0.0 { wanted.min((LARGEST - 1.0) / wide.max(tall)) } else { return None };
         let count = |angle: f64| (angle * pixels_per_radian) as usize + 1;
-        (pixels_per_radian > 0.0).then(|| Self {
+        Some(Self {
             a_min: extent.a_min,
             b_min: extent.b_min,
             pixels_per_radian,
@@ -179,16 +172,6 @@ impl<F: Frame + Sync> View<F> {
     }
 }
 
-/// Where the lens shows `ray`, unless that is in the rim or so near the sensor's border that interpolation would read
-/// beyond it.
-fn seen_at<F: Frame>(camera: &KannalaBrandt, ray: &UnitRay<F>) -> Option<Pixel> {
-    const BORDER: f64 = 1.0;
-    let pixel = camera.project(ray).ok()?;
-    let inside = |x: f64, n: u32| x >= BORDER && x < f64::from(n) - 1.0 - BORDER;
-    let in_cone = ray.vector().z >= (camera.theta_max() - RIM).rad().cos();
-    (in_cone && inside(pixel.u, camera.size().width) && inside(pixel.v, camera.size().height)).then_some(pixel)
-}
-
 /// The brightness of an 8-bit image between its pixels; `None` where the 4 × 4 pixels around are not all there.
 fn sample_image(image: &GrayImage, at: Pixel) -> Option<f32> {
     let (width, height) = (image.width() as usize, image.height() as usize);
@@ -205,74 +188,6 @@ fn sample_image(image: &GrayImage, at: Pixel) -> Option<f32> {
 }
 
 /// d = (sin a, cos a sin b, cos a cos b).
-fn direction(a: f64, b: f64) -> Vector3<f64> {
+pub(crate) fn direction(a: f64, b: f64) -> Vector3<f64> {
     Vector3::new(a.sin(), a.cos() * b.sin(), a.cos() * b.cos())
-}
-
-/// Which directions of each view are worth comparing.
-#[derive(Clone, Copy, Debug)]
-pub(crate) struct SharedField<'a> {
-    frame: &'a SharedFrame,
-    left: &'a KannalaBrandt,
-    right: &'a KannalaBrandt,
-}
-
-impl<'a> SharedField<'a> {
-    pub(crate) const fn new(frame: &'a SharedFrame, left: &'a KannalaBrandt, right: &'a KannalaBrandt) -> Self {
-        Self { frame, left, right }
-    }
-
-    /// Whether the left camera sees a bearing and the right camera sees it too, at infinity or at 1 m.
-    pub(crate) fn seen_from_left(&self, bearing: &UnitRay<Shared>) -> bool {
-        let (left_from, right_from) =
-            (self.frame.shared_from_left().inverse(), self.frame.shared_from_right().inverse());
-        seen_at(self.left, &(left_from * *bearing)).is_some()
-            && self.parallax_ends(bearing, -1.0).any(|other| seen_at(self.right, &(right_from * other)).is_some())
-    }
-
-    /// The same for a bearing of the right camera.
-    pub(crate) fn seen_from_right(&self, bearing: &UnitRay<Shared>) -> bool {
-        let (left_from, right_from) =
-            (self.frame.shared_from_left().inverse(), self.frame.shared_from_right().inverse());
-        seen_at(self.right, &(right_from * *bearing)).is_some()
-            && self.parallax_ends(bearing, 1.0).any(|other| seen_at(self.left, &(left_from * other)).is_some())
-    }
-
-    /// The bearings, from a camera displaced by `side` baselines along x, of the point at infinity and the one at 1 m.
-    fn parallax_ends(&self, bearing: &UnitRay<Shared>, side: f64) -> impl Iterator<Item = UnitRay<Shared>> {
-        let offset = Vector3::x() * (side * self.frame.baseline().mm());
-        [Some(*bearing), UnitRay::new(bearing.at(NEAR.mm()).mm() + offset)].into_iter().flatten()
-    }
-}
-
-/// Ranges of a and b in radians.
-struct Extent {
-    a_min: f64,
-    a_max: f64,
-    b_min: f64,
-    b_max: f64,
-}
-
-impl Extent {
-    /// The bounds of what the cameras share, found on a grid of one degree and widened by that degree.
-    fn of_shared_field(frame: &SharedFrame, left: &KannalaBrandt, right: &KannalaBrandt) -> Option<Self> {
-        let field = SharedField::new(frame, left, right);
-        let (a_limit, b_limit) = (A_LIMIT.deg() as i32, B_LIMIT.deg() as i32);
-        let compared = |&(a, b): &(i32, i32)| {
-            let d = direction(f64::from(a).to_radians(), f64::from(b).to_radians());
-            UnitRay::new(d).is_some_and(|bearing| field.seen_from_left(&bearing) || field.seen_from_right(&bearing))
-        };
-        let bounds = (-a_limit..=a_limit)
-            .flat_map(|a| (-b_limit..=b_limit).map(move |b| (a, b)))
-            .filter(compared)
-            .map(|(a, b)| [a, a, b, b])
-            .reduce(|m, n| [m[0].min(n[0]), m[1].max(n[1]), m[2].min(n[2]), m[3].max(n[3])])?;
-        let within = |degrees: i32, limit: i32| f64::from(degrees.clamp(-limit, limit)).to_radians();
-        Some(Self {
-            a_min: within(bounds[0] - 1, a_limit),
-            a_max: within(bounds[1] + 1, a_limit),
-            b_min: within(bounds[2] - 1, b_limit),
-            b_max: within(bounds[3] + 1, b_limit),
-        })
-    }
 }

@@ -1,4 +1,5 @@
 //! A textured room seen by two fisheye cameras, with the truth for every pixel.
+#![allow(clippy::unwrap_used, reason = "a test that cannot be set up fails")]
 #![allow(dead_code, reason = "each test binary uses its part")]
 
 use image::GrayImage;
@@ -85,7 +86,11 @@ impl Pair {
 }
 
 /// Range along the left ray where it is closest to the right ray.
-fn triangulated_range(left: &UnitRay<Left>, right: &UnitRay<Left>, right_from_left: &Transform<Right, Left>) -> f64 {
+pub fn triangulated_range(
+    left: &UnitRay<Left>,
+    right: &UnitRay<Left>,
+    right_from_left: &Transform<Right, Left>,
+) -> f64 {
     let baseline = right_from_left.inverse().origin().mm();
     let (l, r) = (left.vector(), right.vector());
     let cross = l.cross(&r);

@@ -88,9 +88,9 @@ fn open_serial(path: &Path, baud: u32, share: bool) -> Result<OpenWire, Failure>
         return Err(Failure::device(format!("{} is in use by another vergence: let it finish first", path.display())));
     }
     let name = path.to_string_lossy();
-    let mut serial = tokio_serial::new(name, baud).open_native_async().map_err(|error| fail(&error))?;
-    // The advisory lock does this job; the kernel's exclusive mode would keep 'vergence stop' out.
-    serial.set_exclusive(false).map_err(|error| fail(&error))?;
+    // Our lock does this job; the kernel's exclusive mode would keep 'vergence stop' out.
+    let port = tokio_serial::new(name, baud).exclusive(false);
+    let serial = port.open_native_async().map_err(|error| fail(&error))?;
     // What an earlier session left unread is not ours.
     serial.clear(serialport::ClearBuffer::Input).map_err(|error| fail(&error))?;
     Ok(OpenWire { stream: Box::new(serial), lock })

@@ -41,7 +41,9 @@ impl Listener {
     /// Where the system has none to give.
     pub fn pty() -> Result<Self, Failure> {
         let fail = |error: &dyn std::fmt::Display| Failure::device(format!("cannot open a pseudo-terminal: {error}"));
-        let (ours, theirs) = SerialStream::pair().map_err(|error| fail(&error))?;
+        let (ours, mut theirs) = SerialStream::pair().map_err(|error| fail(&error))?;
+        // We only keep it open; hosts shall use it.
+        theirs.set_exclusive(false).map_err(|error| fail(&error))?;
         let path = theirs.name().ok_or_else(|| fail(&"it has no name"))?.into();
         Ok(Self::Pty { ours, theirs, path })
     }

@@ -1,0 +1,90 @@
+//! Clocks and the encoder stream.
+#![allow(clippy::expect_used, clippy::panic, reason = "a test fails loudly")]
+
+use proptest::prelude::*;
+use vergence_protocol::{AxisList, Counts, Microseconds};
+use vergence_rig::{BoardInstant, ClockMap, Exchange, JointSample, JointTrack, TrackGap};
+
+fn sample(at: u64, counts: &[i32]) -> JointSample {
+    JointSample { at: Microseconds(at), counts: counts.iter().map(|&c| Counts(c)).collect::<AxisList<_>>() }
+}
+
+fn instant(us: f64) -> BoardInstant {
+    BoardInstant { us, error_us: 0.0 }
+}
+
+proptest! {
+    /// A board clock that starts anywhere, up to 150 ppm off, behind a link with any delays: the error never exceeds
+    /// the bound that is stated.
+    #[test]
+    fn the_clock_map_keeps_its_bound(
+        offset in 0u64..10_000_000_000,
+        drift in -150e-6..150e-6f64,
+        delays in prop::collection::vec((1u64..20_000, 1u64..20_000), 1..50),
+        ask in 0u64..60_000_000,
+    ) {
+        let board = |host: u64| offset as f64 + host as f64 * (1.0 + drift);
+        let mut map = ClockMap::default();
+        let mut t0 = 0;
+        for (up, down) in delays {
+            let arrival = board(t0 + up);
+            let t1 = Microseconds(arrival as u64);
+            map.observe(Exchange { t0: Microseconds(t0), t1, t2: t1, t3: Microseconds(t0 + up + down) });
+            t0 += 1_000_000;
+        }
+        let got = map.board_at(Microseconds(ask)).expect("there were exchanges");
+        // Whole microseconds on the wire cost one at most.
+        prop_assert!((got.us - board(ask)).abs() <= got.error_us + 1.0, "{:?} {}", got, board(ask));
+    }
+
+    /// Between two readings of a steady motion the track is exact.
+    #[test]
+    fn steady_motion_is_interpolated(rate in -50..50i32, at in 0.0..90_000.0f64) {
+        let mut track = JointTrack::new(100);
+        for n in 0..10 {
+            track.push(sample(n * 10_000, &[rate * n as i32, 7]));
+        }
+        let joints = track.at(instant(at)).expect("covered");
+        prop_assert!((joints.counts[0] - f64::from(rate) * at / 10_000.0).abs() < 1e-9);
+        prop_assert!((joints.counts[1] - 7.0).abs() < 1e-12);
+    }
+}
+
+#[test]
+fn no_clock_before_the_first_exchange() {
+    assert_eq!(ClockMap::default().board_at(Microseconds(5)), None);
+}
+
+#[test]
+fn the_track_says_what_it_does_not_know() {
+    let mut track = JointTrack::new(3);
+    assert_eq!(track.at(instant(0.0)), Err(TrackGap::NotYet));
+    for at in [10_000, 20_000, 30_000, 40_000] {
+        track.push(sample(at, &[0]));
+    }
+    assert_eq!(track.at(instant(40_001.0)), Err(TrackGap::NotYet));
+    assert_eq!(track.at(instant(15_000.0)), Err(TrackGap::TooOld));
+    assert!(track.at(instant(20_000.0)).is_ok());
+    track.push(sample(200_000, &[0]));
+    assert_eq!(track.at(instant(100_000.0)), Err(TrackGap::Gap(160.0)));
+}
+
+#[test]
+fn a_board_that_begins_anew_begins_a_new_track() {
+    let mut track = JointTrack::new(10);
+    track.push(sample(1_000_000, &[5]));
+    track.push(sample(1_010_000, &[5]));
+    track.push(sample(3_000, &[0]));
+    assert_eq!(track.at(instant(1_005_000.0)), Err(TrackGap::NotYet));
+}
+
+#[test]
+fn an_uncertain_instant_costs_the_distance_moved_in_it() {
+    let mut track = JointTrack::new(10);
+    track.push(sample(0, &[0]));
+    track.push(sample(10_000, &[1000]));
+    let at = |error_us| track.at(BoardInstant { us: 5_000.0, error_us }).expect("covered").sigma[0];
+    // One count, uniform: 1/√12. Plus or minus 100 us at 0.1 counts/us: 20 counts, uniform.
+    assert!((at(0.0) - 1.0 / 12f64.sqrt()).abs() < 1e-12);
+    assert!((at(100.0) - (1.0f64 + 400.0).sqrt() / 12f64.sqrt()).abs() < 1e-9);
+}

@@ -1,0 +1,88 @@
+//! Running the binary and reading what it says.
+#![allow(dead_code, reason = "each test file uses its own part")]
+
+use std::io::{BufRead, BufReader};
+use std::process::{Child, Command, Output, Stdio};
+
+use serde_json::Value;
+
+/// The binary with `arguments`, and none of the caller's own settings.
+pub fn vergence(arguments: &[&str]) -> Command {
+    let mut command = Command::new(env!("CARGO_BIN_EXE_vergence"));
+    command.args(arguments).env_remove("VERGENCE_PORT").env_remove("VERGENCE_RIG").stdin(Stdio::null());
+    command
+}
+
+/// Runs it to its end.
+pub fn run(arguments: &[&str]) -> Output {
+    vergence(arguments).output().expect("the binary runs")
+}
+
+/// Runs it and reads its JSON.
+pub fn run_json(arguments: &[&str]) -> Value {
+    let output = run(arguments);
+    assert!(output.status.success(), "{arguments:?} failed: {}", text(&output.stderr));
+    serde_json::from_slice(&output.stdout).expect("standard output is JSON")
+}
+
+/// Runs it, expects exit code `code` and an error sentence that contains every one of `words`.
+pub fn fails_with(arguments: &[&str], code: i32, words: &[&str]) {
+    let output = run(arguments);
+    let said = text(&output.stderr);
+    assert_eq!(output.status.code(), Some(code), "{arguments:?} said: {said}");
+    for word in words {
+        assert!(said.contains(word), "{arguments:?} should mention '{word}', said: {said}");
+    }
+    assert!(!said.contains("panicked"), "{said}");
+}
+
+pub fn text(bytes: &[u8]) -> String {
+    String::from_utf8_lossy(bytes).into_owned()
+}
+
+/// A `vergence sim` in its own process; ends with the value.
+pub struct Simulator {
+    process: Child,
+    pub port: String,
+}
+
+impl Simulator {
+    pub fn start(arguments: &[&str]) -> Self {
+        let mut process =
+            vergence(&["sim", "--json"]).args(arguments).stdout(Stdio::piped()).spawn().expect("the simulator starts");
+        let mut line = String::new();
+        BufReader::new(process.stdout.take().expect("piped")).read_line(&mut line).expect("it says its port");
+        let said: Value = serde_json::from_str(&line).expect("JSON");
+        let port = said["port"].as_str().expect("a port").to_owned();
+        Self { process, port }
+    }
+
+    /// The verb over this simulator's port. The lease is long: the machine that runs the tests may be busy.
+    pub fn command(&self, arguments: &[&str]) -> Command {
+        let mut command = vergence(&["--port", &self.port, "--lease", "1s"]);
+        command.args(arguments);
+        command
+    }
+
+    pub fn run(&self, arguments: &[&str]) -> Output {
+        self.command(arguments).output().expect("the binary runs")
+    }
+
+    pub fn json(&self, arguments: &[&str]) -> Value {
+        let output = self.command(arguments).arg("--json").output().expect("the binary runs");
+        assert!(output.status.success(), "{arguments:?} failed: {}", text(&output.stderr));
+        serde_json::from_slice(&output.stdout).expect("JSON")
+    }
+
+    pub fn kill(&mut self) {
+        // A process that has ended already is what we want.
+        let _ = self.process.kill();
+        let _ = self.process.wait();
+    }
+}
+
+impl Drop for Simulator {
+    fn drop(&mut self) {
+        self.kill();
+    }
+}

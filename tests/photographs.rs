@@ -1,0 +1,113 @@
+//! Real photographs: used where they are (`VERGENCE_SHARED`, or `../shared` beside the checkout), never copied.
+#![allow(
+    clippy::expect_used,
+    clippy::panic,
+    clippy::print_stdout,
+    reason = "a test fails loudly and shows its figures"
+)]
+
+mod common;
+
+use std::path::{Path, PathBuf};
+
+use common::run_json;
+use nalgebra::{Matrix3, Rotation3, Vector3};
+use serde_json::Value;
+
+fn shared(inside: &str) -> Option<PathBuf> {
+    let root = std::env::var_os("VERGENCE_SHARED")
+        .map_or_else(|| Path::new(env!("CARGO_MANIFEST_DIR")).join("../../../shared"), PathBuf::from);
+    let found = root.join(inside);
+    if found.exists() {
+        return Some(found);
+    }
+    println!("SKIPPED: {} is not there; set VERGENCE_SHARED to the folder that has it", found.display());
+    None
+}
+
+fn numbers(value: &Value) -> Vec<f64> {
+    value.as_array().expect("a list").iter().map(|x| x.as_f64().expect("a number")).collect()
+}
+
+fn camera(side: &str, parameters: &Value) -> String {
+    let names = ["fx", "fy", "cx", "cy", "opencv_k1", "opencv_k2", "opencv_k3", "opencv_k4"];
+    let lines = names.iter().zip(numbers(parameters)).map(|(name, value)| format!("{name} = {value:?}\n"));
+    format!("[{side}.camera]\nsize = [960, 600]\n{}", lines.collect::<String>())
+}
+
+/// The reference calibration (another program's) as a rig file. It holds right_from_left; the rig wants the way back.
+fn rig_file(reference: &Value) -> String {
+    let rows: Vec<Vec<f64>> = reference["R"].as_array().expect("rows").iter().map(numbers).collect();
+    let rotation = Rotation3::from_matrix_unchecked(Matrix3::from_fn(|row, column| rows[row][column])).inverse();
+    let origin = rotation * -Vector3::from_vec(numbers(&reference["T_mm"]));
+    let vector = rotation.scaled_axis();
+    format!(
+        "name = \"reference\"\n[calibration_sigma]\nrotation = \"0.3deg\"\ntranslation = \"3mm\"\n{}{}[right.at_zero]\n\
+         origin = [\"{:?}mm\", \"{:?}mm\", \"{:?}mm\"]\nrotation_vector = [\"{:?}rad\", \"{:?}rad\", \"{:?}rad\"]\n",
+        camera("left", &reference["k_left"]),
+        camera("right", &reference["k_right"]),
+        origin.x,
+        origin.y,
+        origin.z,
+        vector.x,
+        vector.y,
+        vector.z
+    )
+}
+
+/// The board corners of pair 10 in both images.
+fn correspondences(corners: &Path) -> String {
+    let mut reader = csv::Reader::from_path(corners).expect("corners");
+    let mut sides = [const { Vec::new() }; 2];
+    for row in reader.records() {
+        let row = row.expect("a row");
+        if &row[2] == "10" {
+            sides[usize::from(&row[0] == "right")].push(format!("{},{}", &row[4], &row[5]));
+        }
+    }
+    let [left, right] = &sides;
+    assert_eq!((left.len(), right.len()), (54, 54));
+    let rows = left.iter().zip(right).map(|(left, right)| format!("{left},{right}\n"));
+    format!("u_left,v_left,u_right,v_right\n{}", rows.collect::<String>())
+}
+
+fn points(ply: &Path) -> Vec<Vector3<f64>> {
+    let text = std::fs::read_to_string(ply).expect("a cloud");
+    let (_, body) = text.split_once("end_header\n").expect("a header");
+    body.lines().map(|line| Vector3::from_iterator(line.split(' ').take(3).map(|x| x.parse().expect("mm")))).collect()
+}
+
+/// Distance from the best plane, rms.
+fn flatness(points: &[Vector3<f64>]) -> f64 {
+    let count = points.len() as f64;
+    let mean = points.iter().sum::<Vector3<f64>>() / count;
+    let scatter: Matrix3<f64> = points.iter().map(|p| (p - mean) * (p - mean).transpose()).sum();
+    (scatter.symmetric_eigenvalues().min() / count).sqrt()
+}
+
+#[test]
+fn a_cloud_and_a_flat_board_from_a_real_pair() {
+    let Some(set) = shared("data/sourishg_stereo") else { return };
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    let file = |name: &str| folder.path().join(name).to_string_lossy().into_owned();
+    let text = std::fs::read_to_string(set.join("reference_opencv_classic_cv5.json")).expect("a reference");
+    let reference: Value = serde_json::from_str(&text).expect("JSON");
+    std::fs::write(file("rig.toml"), rig_file(&reference["stereo"]["kb4_scipy_ba_trimmed"])).expect("written");
+    std::fs::write(file("pairs.csv"), correspondences(&set.join("corners_opencv_classic.csv"))).expect("written");
+    let image = |name: &str| set.join("images").join(name).to_string_lossy().into_owned();
+    let (rig, left, right) = (file("rig.toml"), image("left10.jpg"), image("right10.jpg"));
+    let (cloud, board, pairs) = (file("cloud.ply"), file("board.ply"), file("pairs.csv"));
+    let depth = ["depth", "--json", "--rig", &rig, "--left", &left, "--right", &right, "--out"];
+
+    let result = run_json(&[&depth[..], &[&cloud]].concat());
+    let count = result["points"].as_u64().expect("a count");
+    assert!(count >= 200, "{result}");
+    assert_eq!(points(Path::new(&cloud)).len() as u64, count);
+
+    let result = run_json(&[&depth[..], &[&board, "--points", &pairs]].concat());
+    let corners = points(Path::new(&board));
+    assert!(corners.len() >= 50, "{result}");
+    let rms = flatness(&corners);
+    println!("{count} points; board of {} corners flat to {rms:.3} mm rms", corners.len());
+    assert!(rms < 1.0, "{rms} mm");
+}

@@ -1,0 +1,185 @@
+//! Stories in two terminals: a simulated board in one process, verbs in others, and what can go wrong between them.
+#![allow(
+    clippy::expect_used,
+    clippy::panic,
+    clippy::print_stdout,
+    reason = "a test fails loudly and shows its figures"
+)]
+
+mod common;
+
+use std::io::{Read, Write};
+use std::net::{TcpListener, TcpStream};
+use std::thread::{JoinHandle, spawn};
+use std::time::Duration;
+
+use common::{Simulator, fails_with, text};
+use vergence_protocol::frame::{Header, Kind, encode};
+use vergence_protocol::{MAX_FRAME, ProtocolVersion, Receiver, Report, Request, schema_hash};
+
+#[allow(clippy::disallowed_methods, reason = "the stories run against a simulator in real time")]
+fn wait(seconds: f64) {
+    std::thread::sleep(Duration::from_secs_f64(seconds));
+}
+
+fn near(value: &serde_json::Value, target: f64) {
+    let value = value.as_f64().expect("a number");
+    assert!((value - target).abs() < 0.03, "{value} is not {target}");
+}
+
+#[test]
+fn verbs_follow_each_other_over_a_pty() {
+    let simulator = Simulator::start(&["--pty"]);
+    let before = simulator.json(&["status"]);
+    assert_eq!(before["state"], "idle");
+    assert_eq!(before["referenced"], serde_json::json!([false, false]));
+
+    let refused = simulator.run(&["mode", "herbivore"]);
+    assert_eq!(refused.status.code(), Some(3));
+    assert!(text(&refused.stderr).contains("vergence home"));
+
+    simulator.json(&["home"]);
+    let herbivore = simulator.json(&["mode", "herbivore"]);
+    near(&herbivore["achieved"]["baseline_mm"], 145.0);
+    near(&herbivore["achieved"]["separation_deg"], 120.0);
+
+    // One axis named: the other stays.
+    let moved = simulator.json(&["move", "--baseline", "120mm"]);
+    near(&moved["achieved"]["baseline_mm"], 120.0);
+    near(&moved["achieved"]["separation_deg"], 120.0);
+
+    // Disarmed, referenced and where it was: the next verb starts from there.
+    let after = simulator.json(&["status"]);
+    assert_eq!((after["state"].as_str(), after["fault"].is_null()), (Some("idle"), true));
+    assert_eq!(after["referenced"], serde_json::json!([true, true]));
+    let lines = simulator.run(&["monitor", "--count", "5"]);
+    assert_eq!(text(&lines.stdout).lines().count(), 5);
+    assert!(simulator.run(&["arm", "--for", "200ms"]).status.success());
+    assert!(simulator.run(&["disarm"]).status.success());
+}
+
+#[test]
+fn a_host_killed_in_mid_move_is_a_lost_link_and_never_resumes() {
+    let simulator = Simulator::start(&["--tcp", "127.0.0.1:0"]);
+    simulator.json(&["home"]);
+    let mut host = simulator.command(&["mode", "herbivore"]).spawn().expect("the binary runs");
+    wait(0.8);
+    host.kill().expect("killed");
+    host.wait().expect("gone");
+    // The lease of a second, then v/a + a/j: 0.25 s + 0.06 s for the separation.
+    wait(1.6);
+    let lost = simulator.json(&["status"]);
+    assert_eq!((lost["state"].as_str(), lost["fault"]["code"].as_str()), (Some("link lost"), Some("LeaseExpired")));
+    let silence = lost["fault"]["detail"].as_f64().expect("microseconds");
+    assert!((1e6..1.05e6).contains(&silence), "it braked {silence} us after the last heartbeat");
+    let separation = |status: &serde_json::Value| status["axes"]["separation_deg"].as_f64().expect("an angle");
+    let there = separation(&lost);
+    assert!(there > 1.0 && there < 119.0, "it was not in mid-move: {there}");
+    wait(0.3);
+    assert!((separation(&simulator.json(&["status"])) - there).abs() < 0.01, "it still moves");
+
+    let refused = simulator.run(&["home"]);
+    assert_eq!(refused.status.code(), Some(3));
+    assert!(text(&refused.stderr).contains("vergence clear"));
+    let cleared = simulator.json(&["clear"]);
+    assert_eq!(cleared["state"], "idle");
+    assert!((separation(&cleared) - there).abs() < 0.01, "clearing moved it");
+    simulator.json(&["home"]);
+    simulator.json(&["mode", "human"]);
+}
+
+#[test]
+fn stop_works_while_another_vergence_holds_the_port() {
+    let simulator = Simulator::start(&["--pty"]);
+    simulator.json(&["home"]);
+    let mover = simulator.command(&["mode", "herbivore"]).stderr(std::process::Stdio::piped()).spawn().expect("runs");
+    wait(0.8);
+    let second = simulator.run(&["status"]);
+    assert_eq!(second.status.code(), Some(3));
+    assert!(text(&second.stderr).contains("in use"));
+    assert!(simulator.run(&["stop"]).status.success());
+    let moved = mover.wait_with_output().expect("it ends");
+    assert_eq!(moved.status.code(), Some(3), "{}", text(&moved.stderr));
+    assert!(text(&moved.stderr).contains("stopped by another"), "{}", text(&moved.stderr));
+    let status = simulator.json(&["status"]);
+    assert_eq!((status["state"].as_str(), status["fault"].is_null()), (Some("idle"), true));
+}
+
+#[test]
+fn a_board_that_vanishes_is_told_clearly() {
+    for kind in [&["--pty"][..], &["--tcp", "127.0.0.1:0"]] {
+        let mut simulator = Simulator::start(kind);
+        let mut watcher = simulator.command(&["monitor"]);
+        let watcher = watcher.stdout(std::process::Stdio::null()).stderr(std::process::Stdio::piped());
+        let watcher = watcher.spawn().expect("the binary runs");
+        wait(0.5);
+        simulator.kill();
+        let ended = watcher.wait_with_output().expect("it ends");
+        assert_eq!(ended.status.code(), Some(3));
+        assert!(text(&ended.stderr).contains("the link closed"), "{}", text(&ended.stderr));
+        let port = simulator.port.clone();
+        fails_with(&["--port", &port, "status"], 3, &[&port]);
+    }
+}
+
+/// Something on a TCP port that is no board; serves one host.
+fn impostor(behave: impl FnOnce(TcpStream) + Send + 'static) -> (String, JoinHandle<()>) {
+    let listener = TcpListener::bind("127.0.0.1:0").expect("a port");
+    let port = format!("tcp:{}", listener.local_addr().expect("an address"));
+    (port, spawn(move || behave(listener.accept().expect("a host").0)))
+}
+
+#[test]
+fn random_bytes_on_the_port_are_noise() {
+    let (port, server) = impostor(|mut stream| {
+        let mut state = 1u64;
+        loop {
+            let noise: Vec<u8> = std::iter::repeat_with(|| {
+                state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+                (state >> 56) as u8
+            })
+            .take(4096)
+            .collect();
+            if stream.write_all(&noise).is_err() {
+                return;
+            }
+            wait(0.01);
+        }
+    });
+    fails_with(&["--port", &port, "status"], 3, &[&port, "no valid message"]);
+    server.join().expect("the host closed the link");
+}
+
+#[test]
+fn silence_on_the_port_is_told() {
+    let (port, server) = impostor(|mut stream| {
+        let mut sink = Vec::new();
+        let _ = stream.read_to_end(&mut sink);
+    });
+    fails_with(&["--port", &port, "status"], 3, &[&port, "no answer"]);
+    server.join().expect("the host closed the link");
+}
+
+#[test]
+fn a_board_of_another_protocol_version_is_refused_with_4() {
+    let (port, server) = impostor(|mut stream| {
+        let mut receiver = Receiver::new();
+        let mut bytes = [0; 256];
+        while let Ok(length @ 1..) = stream.read(&mut bytes) {
+            for &byte in &bytes[..length] {
+                let Some(frame) = receiver.push(byte) else { continue };
+                let Ok(Request::Hello { session, .. }) = frame.body::<Request>() else { continue };
+                let protocol = ProtocolVersion { major: 9, minor: 1 };
+                let hello = Report::Hello { protocol, schema: schema_hash() ^ 1, session, boot: 7 };
+                let header = Header { major: 9, kind: Kind::Immediate, seq: 0, ack: 0 };
+                let mut buffer = [0; MAX_FRAME];
+                let length = encode(header, &hello, &mut buffer).expect("it fits");
+                if stream.write_all(&buffer[..length]).is_err() {
+                    return;
+                }
+            }
+        }
+    });
+    fails_with(&["--port", &port, "home"], 4, &["9.1", "1.0", "update"]);
+    server.join().expect("the host closed the link");
+}

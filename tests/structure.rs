@@ -1,0 +1,129 @@
+//! The house: who may depend on whom, which licences may come in, and that the core needs no operating system.
+#![allow(
+    clippy::expect_used,
+    clippy::panic,
+    clippy::print_stdout,
+    reason = "a test fails loudly and shows its figures"
+)]
+
+use std::collections::{BTreeMap, BTreeSet};
+use std::path::Path;
+use std::process::Command;
+
+use serde_json::Value;
+
+/// An arrow points to what is used. Tests may use more (dev-dependencies are not looked at).
+const ALLOWED: &[(&str, &[&str])] = &[
+    ("vergence-protocol", &[]),
+    ("vergence-control", &["vergence-protocol"]),
+    ("vergence-vision", &[]),
+    ("vergence-rig", &["vergence-protocol", "vergence-vision"]),
+    ("vergence-matching", &["vergence-vision"]),
+    ("vergence-scene", &["vergence-vision"]),
+    ("vergence-plant", &["vergence-protocol", "vergence-control"]),
+    (
+        "vergence",
+        &[
+            "vergence-protocol",
+            "vergence-control",
+            "vergence-vision",
+            "vergence-rig",
+            "vergence-matching",
+            "vergence-scene",
+            "vergence-plant",
+        ],
+    ),
+];
+
+/// Only host/vergence touches devices, files, sockets, clocks, threads and the terminal.
+const ONLY_FOR_THE_BINARY: &[&str] = &["tokio", "tokio-serial", "serialport", "clap", "indicatif", "tempfile"];
+
+/// Permissive licences.
+const LICENCES: &[&str] = &[
+    "MIT",
+    "MIT-0",
+    "Apache-2.0",
+    "Apache-2.0 WITH LLVM-exception",
+    "BSD-2-Clause",
+    "BSD-3-Clause",
+    "0BSD",
+    "ISC",
+    "Zlib",
+    "BSL-1.0",
+    "Unicode-3.0",
+    "Unlicense",
+    "CC0-1.0",
+];
+
+/// Exceptions, each with its reason.
+const EXCEPTIONS: &[(&str, &str, &str)] = &[
+    ("serialport", "MPL-2.0", "copyleft by file, used unchanged; the serial port library of the Rust world"),
+    ("mio-serial", "MPL-2.0", "the same"),
+];
+
+fn metadata() -> Value {
+    let manifest = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../Cargo.toml");
+    let output = Command::new(env!("CARGO"))
+        .args(["metadata", "--format-version", "1", "--locked", "--manifest-path"])
+        .arg(manifest)
+        .output()
+        .expect("cargo runs");
+    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+    serde_json::from_slice(&output.stdout).expect("JSON")
+}
+
+fn list(value: &Value) -> &[Value] {
+    value.as_array().map(Vec::as_slice).unwrap_or_default()
+}
+
+#[test]
+fn dependencies_point_the_right_way() {
+    let metadata = metadata();
+    let members: BTreeSet<&str> = list(&metadata["workspace_members"]).iter().filter_map(Value::as_str).collect();
+    let allowed: BTreeMap<_, _> = ALLOWED.iter().copied().collect();
+    let mut seen = 0;
+    for package in list(&metadata["packages"]) {
+        if !members.contains(package["id"].as_str().unwrap_or_default()) {
+            continue;
+        }
+        let name = package["name"].as_str().expect("a name");
+        let may = allowed.get(name).unwrap_or_else(|| panic!("{name} has no place in the house: add it to ALLOWED"));
+        seen += 1;
+        for dependency in list(&package["dependencies"]).iter().filter(|d| d["kind"] != "dev") {
+            let used = dependency["name"].as_str().expect("a name");
+            assert!(!used.starts_with("vergence") || may.contains(&used), "{name} must not use {used}");
+            assert!(name == "vergence" || !ONLY_FOR_THE_BINARY.contains(&used), "{name} must not use {used}");
+        }
+    }
+    assert_eq!(seen, ALLOWED.len(), "a crate of the house is missing from the workspace");
+}
+
+#[test]
+fn licences_are_permissive() {
+    let mut strangers = Vec::new();
+    for package in list(&metadata()["packages"]) {
+        let name = package["name"].as_str().expect("a name");
+        let licence = package["license"].as_str().unwrap_or_default();
+        if EXCEPTIONS.iter().any(|(exempt, what, _)| *exempt == name && *what == licence) {
+            continue;
+        }
+        let permitted = spdx::Expression::parse_mode(licence, spdx::ParseMode::LAX)
+            .is_ok_and(|expression| expression.evaluate(|needed| LICENCES.contains(&needed.to_string().as_str())));
+        if !permitted {
+            strangers.push(format!("{name}: '{licence}'"));
+        }
+    }
+    assert!(strangers.is_empty(), "licences outside the list: {strangers:?}");
+}
+
+#[test]
+fn protocol_and_control_need_no_operating_system() {
+    let output = Command::new(env!("CARGO"))
+        .args(["build", "--locked", "-p", "vergence-protocol", "-p", "vergence-control"])
+        .args(["--target", "thumbv7em-none-eabihf", "--target-dir"])
+        .arg(Path::new(env!("CARGO_TARGET_TMPDIR")).join("thumb"))
+        .current_dir(Path::new(env!("CARGO_MANIFEST_DIR")).join("../.."))
+        .output()
+        .expect("cargo runs");
+    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+}
