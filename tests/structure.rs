@@ -18,6 +18,7 @@ const ALLOWED: &[(&str, &[&str])] = &[
     ("vergence-control", &["vergence-protocol"]),
     ("vergence-vision", &[]),
     ("vergence-rig", &["vergence-protocol", "vergence-vision"]),
+    ("vergence-calibration", &["vergence-vision", "vergence-rig"]),
     ("vergence-matching", &["vergence-vision"]),
     ("vergence-scene", &["vergence-vision"]),
     ("vergence-plant", &["vergence-protocol", "vergence-control"]),
