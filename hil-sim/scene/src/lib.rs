@@ -1,1 +1,31 @@
-//! (in progress)
+//! Simulated fisheye photographs with exact ground truth.
+//!
+//! A [`Scene`] is a closed room of analytic shapes with procedural textures. [`render`] photographs it through a
+//! Kannala-Brandt lens by casting rays: each pixel is the mean of rays spread over its square, then blurred by the
+//! lens, exposed, made noisy and quantised as a sensor does. The range stored with each pixel is that of the ray
+//! through its centre, solved in closed form.
+//!
+//! The world frame has x to the right, y down and z forward, in millimetres, so that a camera with the identity pose
+//! looks forward and level. Colours are linear RGB from 0 to 1. The same arguments give the same bytes on any number of
+//! threads: all randomness is a hash of the seed and of the pixel.
+
+mod blur;
+mod board;
+mod furnish;
+mod hierarchy;
+mod light;
+mod noise;
+mod optics;
+mod range_map;
+mod rays;
+mod render;
+mod room;
+mod scene;
+mod shape;
+mod texture;
+
+pub use board::Board;
+pub use optics::Optics;
+pub use range_map::RangeMap;
+pub use render::{Photograph, View, render};
+pub use scene::{Hit, Scene, SurfaceId};

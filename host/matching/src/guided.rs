@@ -98,7 +98,7 @@ struct Features {
 }
 
 impl Features {
-    fn of<F: Frame + Sync>(view: &View<F>, budget: usize, shared: impl Fn(&UnitRay<Shared>) -> bool + Sync) -> Self {
+    fn of<F: Frame>(view: &View<F>, budget: usize, shared: impl Fn(&UnitRay<Shared>) -> bool + Sync) -> Self {
         let pyramid = Pyramid::new(view.plane(), LEVELS);
         let compared = |keypoint: &Keypoint| {
             surrounded(view, keypoint) && view.grid().bearing(keypoint.at).is_some_and(|bearing| shared(&bearing))
@@ -121,7 +121,7 @@ impl Features {
 }
 
 /// Whether the camera sees all around a keypoint: its rim would look like an edge of the scene.
-fn surrounded<F: Frame + Sync>(view: &View<F>, keypoint: &Keypoint) -> bool {
+fn surrounded<F: Frame>(view: &View<F>, keypoint: &Keypoint) -> bool {
     const MARGIN: f64 = 6.0; // of the level
     let reach = MARGIN * (1_usize << keypoint.level) as f64;
     let ViewPixel { x, y } = keypoint.at;

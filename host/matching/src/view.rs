@@ -105,7 +105,7 @@ pub struct View<F: Frame> {
     seen: Vec<bool>,
 }
 
-impl<F: Frame + Sync> View<F> {
+impl<F: Frame> View<F> {
     /// Samples `image` on `grid` by cubic convolution (Keys, "Cubic convolution interpolation for digital image
     /// processing", ASSP 29(6), 1981). Directions the camera does not see are black.
     #[must_use]

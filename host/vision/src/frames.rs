@@ -9,7 +9,7 @@ use nalgebra::{Isometry3, Point3, Translation3, Unit, UnitQuaternion, Vector3};
 use crate::Angle;
 
 /// A coordinate frame, as a type. Right-handed; cameras have x right, y down, z along the optical axis.
-pub trait Frame: Copy + Debug + PartialEq {}
+pub trait Frame: Copy + Debug + PartialEq + Send + Sync {}
 
 macro_rules! frames {
     ($($(#[$doc:meta])* $name:ident),+ $(,)?) => {$(

@@ -1,0 +1,94 @@
+//! The lens's point spread, applied to the linear image.
+
+use rayon::prelude::*;
+
+use crate::texture::Rgb;
+
+/// Wider spreads than this are no lens's.
+const MAX_SIGMA_PX: f64 = 5.0;
+
+/// Convolves an image of rows of `width` pixels with the discrete Gaussian of deviation `sigma` px. Beyond the image
+/// there is no light.
+pub fn blurred(image: &[Rgb], width: usize, sigma: f64) -> Vec<Rgb> {
+    let weights = discrete_gaussian(sigma);
+    let (width, height) = (width.max(1), image.len() / width.max(1));
+    let mut across = vec![[0.0; 3]; image.len()];
+    across.par_chunks_exact_mut(width).zip(image.par_chunks_exact(width)).for_each(|(out, row)| {
+        for (x, pixel) in out.iter_mut().enumerate() {
+            *pixel = weighted(&weights, x, width, |x| row[x]);
+        }
+    });
+    let mut both = vec![[0.0; 3]; image.len()];
+    both.par_chunks_exact_mut(width).enumerate().for_each(|(y, out)| {
+        for (x, pixel) in out.iter_mut().enumerate() {
+            *pixel = weighted(&weights, y, height, |y| across[y * width + x]);
+        }
+    });
+    both
+}
+
+/// The sum of `value` about `middle`, within 0 to `count`, with symmetric weights, outermost last.
+fn weighted(weights: &[f32], middle: usize, count: usize, value: impl Fn(usize) -> Rgb) -> Rgb {
+    let mut sum = value(middle).map(|c| c * weights[0]);
+    for (distance, weight) in weights.iter().enumerate().skip(1) {
+        let sides = [middle.checked_sub(distance), Some(middle + distance).filter(|&i| i < count)];
+        for side in sides.into_iter().flatten() {
+            let colour = value(side);
+            sum = std::array::from_fn(|i| sum[i] + weight * colour[i]);
+        }
+    }
+    sum
+}
+
+/// Weights at the distances 0, 1, 2, … of the discrete Gaussian exp(-t) In(t), t = sigma², whose variance is exactly
+/// sigma² on the pixel grid (T. Lindeberg, "Scale-space for discrete signals", PAMI 12(3), 1990, eq. 19).
+fn discrete_gaussian(sigma: f64) -> Vec<f32> {
+    const NEGLIGIBLE: f64 = 1e-6;
+    const TERMS: u32 = 80;
+    let t = sigma.clamp(0.0, MAX_SIGMA_PX).powi(2);
+    let t = if t.is_nan() { 0.0 } else { t };
+    // In(t) = sum over k of (t/2)^(2k+n) / (k! (k+n)!).
+    let weight = |n: u32| {
+        let mut term = (1..=n).fold((-t).exp(), |product, i| product * 0.5 * t / f64::from(i));
+        let mut sum = term;
+        for k in 1..TERMS {
+            term *= 0.25 * t * t / (f64::from(k) * f64::from(k + n));
+            sum += term;
+        }
+        sum
+    };
+    let weights: Vec<f64> = (0..).map(weight).take_while(|&w| w > NEGLIGIBLE).collect();
+    let total = weights[0] + 2.0 * weights[1..].iter().sum::<f64>();
+    weights.into_iter().map(|w| (w / total) as f32).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_spread_has_the_stated_variance() {
+        for sigma in [0.0, 0.2, 0.5, 1.0, 2.5, 5.0] {
+            let weights = discrete_gaussian(sigma);
+            let moment = |power: i32| {
+                let side = |(i, w): (usize, &f32)| 2.0 * (i as f64).powi(power) * f64::from(*w);
+                weights.iter().enumerate().skip(1).map(side).sum::<f64>()
+            };
+            assert!((f64::from(weights[0]) + moment(0) - 1.0).abs() < 1e-6);
+            assert!((moment(2) - sigma * sigma).abs() < 2e-3 * sigma * sigma + 1e-9, "{} at {sigma}", moment(2));
+        }
+    }
+
+    #[test]
+    fn a_point_is_spread_evenly_to_all_sides() {
+        let mut image = vec![[0.0; 3]; 11 * 9];
+        image[4 * 11 + 5] = [1.0, 2.0, 0.5];
+        let soft = blurred(&image, 11, 0.7);
+        for (i, pixel) in soft.iter().enumerate() {
+            let (x, y) = (i % 11, i / 11);
+            let same = |other: Rgb| pixel.iter().zip(other).all(|(a, b)| (a - b).abs() < 1e-6);
+            assert!(same(soft[y * 11 + (10 - x)]) && same(soft[(8 - y) * 11 + x]), "({x}, {y})");
+        }
+        assert!((soft.iter().map(|pixel| pixel[1]).sum::<f32>() - 2.0).abs() < 1e-4);
+    }
+}

@@ -1,0 +1,93 @@
+//! A checkerboard target for calibration, and the plain studio it is photographed in.
+
+use nalgebra::Vector3;
+use vergence_vision::{Frame, Length, Point, Transform, World};
+
+use crate::Scene;
+use crate::scene::{Material, Solid};
+use crate::shape::{Shape, SurfacePoint};
+use crate::texture::{Pattern, Rgb};
+
+/// Reflectances of matte print: paper, toner, and the unprinted back.
+const WHITE: Rgb = [0.82, 0.82, 0.80];
+const BLACK: Rgb = [0.04, 0.04, 0.04];
+const BACK: Rgb = [0.30, 0.28, 0.26];
+
+/// White border around the squares, as a part of a square's side.
+const BORDER: f64 = 0.5;
+
+/// A flat checkerboard of no thickness with a white border of half a square.
+///
+/// As a type it also names the board's own frame: the origin at inner corner (0, 0), x along the rows, y down the
+/// columns, z into the board, so that the printed side is seen from negative z.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Board {
+    /// Inner corners along x.
+    pub columns: u32,
+    /// Inner corners along y.
+    pub rows: u32,
+    /// Side of a square.
+    pub square: Length,
+}
+
+impl Frame for Board {}
+
+impl Board {
+    /// The inner corner in `column` and `row`, both counted from 0.
+    #[must_use]
+    pub fn corner(&self, column: u32, row: u32) -> Point<Self> {
+        Point::from_mm(Vector3::new(f64::from(column), f64::from(row), 0.0) * self.square.mm())
+    }
+
+    /// The middle of the board.
+    #[must_use]
+    pub fn centre(&self) -> Point<Self> {
+        let middle = Vector3::new(f64::from(self.columns) - 1.0, f64::from(self.rows) - 1.0, 0.0);
+        Point::from_mm(middle * (0.5 * self.square.mm()))
+    }
+
+    /// Width and height including the border.
+    #[must_use]
+    pub fn size(&self) -> [Length; 2] {
+        [self.columns, self.rows].map(|corners| self.square * (f64::from(corners) + 1.0 + 2.0 * BORDER))
+    }
+
+    /// The ink at `at`, a point on the sheet about its middle. Edges are sharp: the lens alone blurs them.
+    pub(crate) fn ink(&self, at: &SurfacePoint) -> Rgb {
+        if at.face == 1 {
+            return BACK;
+        }
+        let [x, y] = at.uv;
+        let (columns, rows) = (f64::from(self.columns) + 1.0, f64::from(self.rows) + 1.0);
+        let (column, row) = (x / self.square.mm() + 0.5 * columns, y / self.square.mm() + 0.5 * rows);
+        let printed = (0.0..columns).contains(&column) && (0.0..rows).contains(&row);
+        // The square up and left of corner (0, 0) is black.
+        let black = (column.floor() + row.floor()).rem_euclid(2.0) < 0.5;
+        if printed && black { BLACK } else { WHITE }
+    }
+}
+
+impl Scene {
+    /// A closed, evenly lit cube of 6 m side with mottled grey walls about the world's origin.
+    #[must_use]
+    pub fn studio() -> Self {
+        const HALF_MM: f64 = 3000.0;
+        let wall = Pattern::Mottled { light: [0.45, 0.45, 0.45], dark: [0.25, 0.25, 0.26], cell: 300.0 };
+        Self::closed(Vector3::repeat(-HALF_MM), Vector3::repeat(HALF_MM), [wall; 6])
+    }
+
+    /// A `board` alone in the [studio](Self::studio).
+    #[must_use]
+    pub fn checkerboard(board: Board, world_from_board: Transform<World, Board>) -> Self {
+        Self::studio().with_board(board, world_from_board)
+    }
+
+    /// The scene with a `board` added. Nothing stops it from cutting through what is there.
+    #[must_use]
+    pub fn with_board(self, board: Board, world_from_board: Transform<World, Board>) -> Self {
+        let half = board.size().map(|side| 0.5 * side.mm());
+        let middle = world_from_board * board.centre();
+        let material = Material { pattern: Pattern::Print(board), seed: 0, glow: None };
+        self.with(vec![Solid::new(Shape::Rectangle { half }, middle.mm(), world_from_board.rotation(), material)])
+    }
+}

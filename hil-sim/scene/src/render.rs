@@ -1,0 +1,203 @@
+//! Photographs of a scene, with the range of each pixel.
+
+use image::RgbImage;
+use nalgebra::Vector3;
+use rayon::prelude::*;
+use vergence_vision::{Angle, Camera, KannalaBrandt, Transform, World};
+
+use crate::blur::blurred;
+use crate::noise::mix64;
+use crate::optics::unit_pair;
+use crate::rays::{Around, RayGrid};
+use crate::texture::Rgb;
+use crate::{Optics, RangeMap, Scene};
+
+/// Rows rendered by one task.
+const BAND: usize = 16;
+
+/// Contrast between the first rays of a pixel that calls for more of them.
+const EDGE: f32 = 0.14;
+
+/// The same between a pixel and its neighbours, for edges that cut off a part of it which its first rays missed.
+const STRONG_EDGE: f32 = 0.3;
+
+/// A camera in front of a scene.
+#[derive(Clone, Copy, Debug)]
+pub struct View<'a> {
+    /// What is photographed.
+    pub scene: &'a Scene,
+    /// The lens, and the size of the image.
+    pub camera: &'a KannalaBrandt,
+    /// Where the camera is.
+    pub world_from_camera: Transform<World, Camera>,
+    /// How good its lens and sensor are.
+    pub optics: &'a Optics,
+}
+
+/// An image and its ground truth.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Photograph {
+    /// 8-bit sRGB. Black outside the lens's field.
+    pub image: RgbImage,
+    /// Exact range of each pixel.
+    pub range: RangeMap,
+}
+
+/// Photographs a view. `seed` drives the noise and the choice of rays: the same seed gives the same bytes, on any
+/// number of threads; other seeds give other noise on the same picture.
+///
+/// A pixel is the mean of the light on its square, which is then spread by the lens. Both are symmetric about the
+/// pixel's centre and the same everywhere, so that nothing is seen beside where it is projected.
+#[must_use]
+pub fn render(view: &View<'_>, seed: u64) -> Photograph {
+    let size = view.camera.size();
+    let width = (size.width as usize).max(1);
+    let seed_of = |x: usize, y: usize| mix64(mix64(seed) ^ (y * width + x) as u64);
+    let pixels = size.width as usize * size.height as usize;
+
+    let mut looks = vec![(Look::default(), f32::NAN); pixels];
+    for_each_in_field(view, &mut looks, |(look, range), around, x, y| {
+        *range = view.range_mm(around);
+        *look = view.look(around, view.optics.samples.max(1), seed_of(x, y));
+    });
+
+    let mut light = vec![[0.0; 3]; pixels];
+    for_each_in_field(view, &mut light, |light, around, x, y| {
+        let first = looks[y * width + x].0;
+        let rows = y.saturating_sub(1)..(y + 2).min(size.height as usize);
+        let columns = x.saturating_sub(1)..(x + 2).min(width);
+        let near = rows.flat_map(|y| &looks[y * width..][columns.clone()]).map(|(look, _)| *look);
+        let edge = first.contrast() > EDGE || near.fold(first, Look::joined_contrast).contrast() > STRONG_EDGE;
+        let whole =
+            if edge { first.joined(view.look(around, view.optics.edge_samples, mix64(seed_of(x, y)))) } else { first };
+        let exposure = view.optics.falloff(view.theta(around), view.camera.theta_max()) as f32 / whole.count as f32;
+        *light = whole.sum.map(|c| c * exposure);
+    });
+
+    let light = blurred(&light, width, view.optics.blur_px);
+    let mm: Vec<f32> = looks.into_iter().map(|(_, range)| range).collect();
+    let mut image = RgbImage::new(size.width, size.height);
+    image.par_chunks_exact_mut(3).zip(&light).zip(&mm).enumerate().for_each(|(i, ((pixel, light), range))| {
+        if range.is_finite() {
+            pixel.copy_from_slice(&view.optics.expose(*light, !seed_of(i % width, i / width)));
+        }
+    });
+    Photograph { image, range: RangeMap::new(size, mm) }
+}
+
+/// What some rays of a pixel bring.
+#[derive(Clone, Copy, Debug)]
+struct Look {
+    sum: Rgb,
+    count: u32,
+    /// The least and the most light, as the mean of red, green and blue.
+    low: f32,
+    high: f32,
+}
+
+impl Default for Look {
+    fn default() -> Self {
+        Self { sum: [0.0; 3], count: 0, low: f32::INFINITY, high: 0.0 }
+    }
+}
+
+impl Look {
+    fn add(&mut self, colour: Rgb) {
+        let level = colour.iter().sum::<f32>() / 3.0;
+        (self.low, self.high) = (self.low.min(level), self.high.max(level));
+        self.sum = std::array::from_fn(|i| self.sum[i] + colour[i]);
+        self.count += 1;
+    }
+
+    fn joined(self, other: Self) -> Self {
+        let sum = std::array::from_fn(|i| self.sum[i] + other.sum[i]);
+        Self { sum, count: self.count.saturating_add(other.count), ..self.joined_contrast(other) }
+    }
+
+    /// With the contrast of both.
+    fn joined_contrast(self, other: Self) -> Self {
+        Self { low: self.low.min(other.low), high: self.high.max(other.high), ..self }
+    }
+
+    /// Difference of the square roots of the light, which is about that of the grey levels / 255.
+    fn contrast(&self) -> f32 {
+        self.high.sqrt() - self.low.sqrt()
+    }
+}
+
+/// Calls `visit(item, rays, x, y)` for the pixels of the view inside the lens's field, in parallel.
+fn for_each_in_field<T: Send>(
+    view: &View<'_>,
+    items: &mut [T],
+    visit: impl Fn(&mut T, &Around<'_>, usize, usize) + Sync,
+) {
+    let width = (view.camera.size().width as usize).max(1);
+    items.par_chunks_mut(width * BAND).enumerate().for_each(|(number, items)| {
+        let top = number * BAND;
+        let rays = RayGrid::new(view.camera, &view.world_from_camera, top as u32, (items.len() / width) as u32);
+        for (i, item) in items.iter_mut().enumerate() {
+            let (x, y) = (i % width, top + i / width);
+            if let Some(around) = rays.around(x as u32, y as u32) {
+                visit(item, &around, x, y);
+            }
+        }
+    });
+}
+
+impl View<'_> {
+    /// The range of a pixel's centre; not a number if its ray leaves the scene.
+    fn range_mm(&self, around: &Around<'_>) -> f32 {
+        let met = self.scene.encounter(self.world_from_camera.origin().mm(), around.centre());
+        met.map_or(f32::NAN, |met| met.range() as f32)
+    }
+
+    /// The light that `count` rays through a pixel's square bring.
+    fn look(&self, around: &Around<'_>, count: u32, hash: u64) -> Look {
+        let origin = self.world_from_camera.origin().mm();
+        let finest = 1.0 / self.camera.pixels_per_radian(self.theta(around));
+        let mut look = Look::default();
+        for offset in lattice(count, hash) {
+            let colour = around.at(offset).and_then(|direction| {
+                let met = self.scene.encounter(origin, direction)?;
+                Some(self.scene.radiance(origin, direction, &met, finest))
+            });
+            // A ray outside the field brings no light.
+            look.add(colour.unwrap_or([0.0; 3]));
+        }
+        look
+    }
+
+    /// The angle of a pixel's centre to the optical axis.
+    fn theta(&self, around: &Around<'_>) -> Angle {
+        let axis = self.world_from_camera.rotation() * Vector3::z();
+        Angle::from_rad(axis.dot(&around.centre()).clamp(-1.0, 1.0).acos())
+    }
+}
+
+/// `count` places on a pixel's square, in pixels from its centre, as a golden-ratio lattice turned about the square by
+/// a random offset (R. Cranley and T. Patterson, SIAM J. Numer. Anal. 13, 1976): unbiased, and far less grainy than
+/// independent places.
+fn lattice(count: u32, hash: u64) -> impl Iterator<Item = [f64; 2]> {
+    const GOLDEN: f64 = 0.618_033_988_749_894_9;
+    let (a, b) = unit_pair(hash);
+    (0..count).map(move |i| {
+        let i = f64::from(i);
+        [(a + i / f64::from(count)).fract() - 0.5, (b + i * GOLDEN).fract() - 0.5]
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_lattice_is_uniform_on_the_square() {
+        let places: Vec<[f64; 2]> = (0..20_000).flat_map(|pixel| lattice(7, mix64(pixel))).collect();
+        for axis in 0..2 {
+            let n = places.len() as f64;
+            let mean = places.iter().map(|p| p[axis]).sum::<f64>() / n;
+            let variance = places.iter().map(|p| p[axis] * p[axis]).sum::<f64>() / n;
+            assert!(mean.abs() < 1e-3 && (variance * 12.0 - 1.0).abs() < 0.01, "mean {mean}, variance {variance}");
+        }
+    }
+}

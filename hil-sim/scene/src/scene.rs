@@ -1,0 +1,212 @@
+//! A scene: solids with materials, lit; and what a ray meets in it.
+
+use nalgebra::{Matrix3, UnitQuaternion, Vector3};
+use vergence_vision::{Length, Point, UnitRay, World};
+
+use crate::hierarchy::{Bounds, Hierarchy};
+use crate::light::Lighting;
+use crate::shape::{Contact, Shape};
+use crate::texture::{Pattern, Rgb};
+
+/// What a surface is made of.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Material {
+    /// The kind of surface.
+    pub pattern: Pattern,
+    /// Which of its variants.
+    pub seed: u32,
+    /// Radiance instead of reflectance: the surface shines by itself, and casts no shadow.
+    pub glow: Option<f32>,
+}
+
+/// A shape at its place.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Solid {
+    shape: Shape,
+    centre: Vector3<f64>,
+    world_from_shape: Matrix3<f64>,
+    shape_from_world: Matrix3<f64>,
+    material: Material,
+}
+
+/// Solids, and the light they are seen in.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Scene {
+    solids: Vec<Solid>,
+    hierarchy: Hierarchy,
+    lighting: Lighting,
+}
+
+/// Tells the surfaces of a scene apart. The same scene gives the same numbers.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
+pub struct SurfaceId(usize);
+
+/// What a ray meets first.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Hit {
+    /// Distance along the ray, to rounding error.
+    pub range: Length,
+    /// Linear red, green and blue radiance at unit exposure, seen from close by.
+    pub colour: [f32; 3],
+    /// The surface met.
+    pub surface: SurfaceId,
+}
+
+/// The first contact of a ray, before it is given a colour.
+#[derive(Clone, Copy, Debug)]
+pub struct Encounter {
+    surface: usize,
+    contact: Contact,
+}
+
+impl Scene {
+    /// Casts a ray from `origin`. `None` if it meets nothing, which inside a closed room does not happen.
+    ///
+    /// The colour of a place does not depend on the direction from which it is seen, except that a flat sheet has two
+    /// sides.
+    #[must_use]
+    pub fn cast(&self, origin: &Point<World>, direction: &UnitRay<World>) -> Option<Hit> {
+        let (origin, direction) = (origin.mm(), direction.vector());
+        let encounter = self.encounter(origin, direction)?;
+        Some(Hit {
+            range: Length::from_mm(encounter.range()),
+            colour: self.radiance(origin, direction, &encounter, 0.0),
+            surface: SurfaceId(encounter.surface),
+        })
+    }
+
+    /// The first surface on the ray from `origin` along the unit vector `direction`, both in the world.
+    pub(crate) fn encounter(&self, origin: Vector3<f64>, direction: Vector3<f64>) -> Option<Encounter> {
+        let mut first: Option<Encounter> = None;
+        self.hierarchy.visit(origin, direction, f64::INFINITY, |surface, limit| {
+            let contact = self.solids[surface].meet(origin, direction, limit)?;
+            first = Some(Encounter { surface, contact });
+            Some(contact.range)
+        });
+        first
+    }
+
+    /// The linear colour of an encounter, of detail no finer than `spread` (radians between neighbouring rays) shows.
+    pub(crate) fn radiance(
+        &self,
+        origin: Vector3<f64>,
+        direction: Vector3<f64>,
+        encounter: &Encounter,
+        spread: f64,
+    ) -> Rgb {
+        // Texture seen at a slant is compressed; more than this factor would blur it across as well.
+        const MOST_SLANTED: f64 = 0.4;
+        let solid = &self.solids[encounter.surface];
+        let point = origin + direction * encounter.range();
+        let normal = solid.world_from_shape * encounter.contact.normal;
+        let slant = normal.dot(&direction).abs().max(MOST_SLANTED);
+        let position = solid.shape_from_world * (point - solid.centre);
+        let at = solid.shape.surface_point(position, encounter.contact.normal, encounter.range() * spread / slant);
+        let reflectance = solid.material.pattern.reflectance(&at, solid.material.seed);
+        if let Some(glow) = solid.material.glow {
+            return reflectance.map(|c| c * glow);
+        }
+        let light = self.lighting.irradiance(point, normal, |lamp| self.sees(point, normal, lamp));
+        std::array::from_fn(|i| reflectance[i] * light[i])
+    }
+
+    /// Whether nothing stands between `point`, on a surface with `normal`, and `lamp`.
+    fn sees(&self, point: Vector3<f64>, normal: Vector3<f64>, lamp: Vector3<f64>) -> bool {
+        const CLEARANCE_MM: f64 = 1e-3;
+        let start = point + normal * CLEARANCE_MM;
+        let to_lamp = lamp - start;
+        let mut clear = true;
+        self.hierarchy.visit(start, to_lamp, 1.0, |surface, limit| {
+            let solid = &self.solids[surface];
+            let blocked = solid.material.glow.is_none() && solid.meet(start, to_lamp, limit).is_some();
+            clear &= !blocked;
+            // A limit before the start ends the search.
+            blocked.then_some(f64::NEG_INFINITY)
+        });
+        clear
+    }
+
+    /// A room from corner `low` to corner `high` with walls, in order: left, right, ceiling, floor, back, front. The
+    /// light is even: each surface is as bright as its reflectance.
+    pub(crate) fn closed(low: Vector3<f64>, high: Vector3<f64>, walls: [Pattern; 6]) -> Self {
+        // The walls overlap at the edges, so that no ray slips out between them.
+        const OVERLAP_MM: f64 = 10.0;
+        let (middle, half) = (0.5 * (low + high), 0.5 * (high - low));
+        let reach = half.add_scalar(OVERLAP_MM);
+        let quarter = std::f64::consts::FRAC_PI_2;
+        let wall = |side: usize, pattern: Pattern| {
+            let axis = side / 2;
+            let mut centre = middle;
+            centre[axis] = if side.is_multiple_of(2) { low[axis] } else { high[axis] };
+            let (half, rotation) = match axis {
+                0 => ([reach.z, reach.y], UnitQuaternion::from_axis_angle(&Vector3::y_axis(), quarter)),
+                1 => ([reach.x, reach.z], UnitQuaternion::from_axis_angle(&Vector3::x_axis(), quarter)),
+                _ => ([reach.x, reach.y], UnitQuaternion::identity()),
+            };
+            Solid::new(Shape::Rectangle { half }, centre, rotation, Material { pattern, seed: side as u32, glow: None })
+        };
+        let lighting =
+            Lighting { ambient: [1.0; 3], from_above: 0.0, occlusion: 0.0, room: [low, high], lamps: Vec::new() };
+        let solids = walls.into_iter().enumerate().map(|(side, pattern)| wall(side, pattern)).collect();
+        Self { solids: Vec::new(), hierarchy: Hierarchy::default(), lighting }.with(solids)
+    }
+
+    /// The scene with more solids.
+    pub(crate) fn with(mut self, solids: Vec<Solid>) -> Self {
+        self.solids.extend(solids);
+        let bounds: Vec<Bounds> = self.solids.iter().map(Solid::bounds).collect();
+        self.hierarchy = Hierarchy::new(&bounds);
+        self
+    }
+
+    /// The scene in another light.
+    pub(crate) fn lit(mut self, relight: impl FnOnce(&mut Lighting)) -> Self {
+        relight(&mut self.lighting);
+        self
+    }
+}
+
+impl Solid {
+    /// `shape` turned by `rotation` with its origin at `centre`, both in the world, mm.
+    pub fn new(shape: Shape, centre: Vector3<f64>, rotation: UnitQuaternion<f64>, material: Material) -> Self {
+        let world_from_shape = rotation.to_rotation_matrix().into_inner();
+        Self { shape, centre, world_from_shape, shape_from_world: world_from_shape.transpose(), material }
+    }
+
+    fn bounds(&self) -> Bounds {
+        Bounds::new(self.centre, self.shape.half_extent(&self.world_from_shape))
+    }
+
+    fn meet(&self, origin: Vector3<f64>, direction: Vector3<f64>, limit: f64) -> Option<Contact> {
+        self.shape.meet(self.shape_from_world * (origin - self.centre), self.shape_from_world * direction, limit)
+    }
+}
+
+impl Encounter {
+    /// Distance along the ray, mm.
+    pub fn range(&self) -> f64 {
+        self.contact.range
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use rand::{RngExt, SeedableRng};
+    use rand_pcg::Pcg64Mcg;
+
+    use super::*;
+
+    #[test]
+    fn the_hierarchy_finds_what_trying_every_solid_finds() {
+        let room = Scene::room();
+        let mut random = Pcg64Mcg::seed_from_u64(3);
+        let mut vector = |reach: f64| Vector3::from_fn(|_, _| random.random_range(-reach..reach));
+        for _ in 0..20_000 {
+            let (origin, direction) = (vector(450.0), vector(1.0).normalize());
+            let meetings = room.solids.iter().filter_map(|solid| solid.meet(origin, direction, f64::INFINITY));
+            let nearest = meetings.map(|contact| contact.range).fold(f64::INFINITY, f64::min);
+            let found = room.encounter(origin, direction).map_or(f64::INFINITY, |met| met.range());
+            assert_eq!(found.to_bits(), nearest.to_bits(), "{origin} {direction}: {found} is not {nearest}");
+        }
+    }
+}
