@@ -26,8 +26,11 @@ pub enum Screw {
 /// A screw, which axis drives it, and what share of the axis position acts.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Link {
+    /// Index of the axis in the rig.
     pub axis: usize,
+    /// Times the axis position is the amount of motion.
     pub share: f64,
+    /// What moves, with all axes at zero.
     pub screw: Screw,
 }
 
@@ -40,7 +43,8 @@ pub struct Chain<C: Frame> {
 
 impl Screw {
     /// The motion by `amount` millimetres or radians.
-    fn displacement(&self, amount: f64) -> Isometry3<f64> {
+    #[must_use]
+    pub fn displacement(&self, amount: f64) -> Isometry3<f64> {
         match self {
             Self::Slide { along } => Translation3::from(along.into_inner() * amount).into(),
             Self::Turn { about, through } => {
@@ -53,6 +57,24 @@ impl Screw {
 }
 
 impl<C: Frame> Chain<C> {
+    /// From its links, in the order base to camera, and the camera's pose with all axes at zero.
+    #[must_use]
+    pub const fn new(links: Vec<Link>, at_zero: Transform<Base, C>) -> Self {
+        Self { links, at_zero }
+    }
+
+    /// In the order base to camera.
+    #[must_use]
+    pub fn links(&self) -> &[Link] {
+        &self.links
+    }
+
+    /// The camera's pose with all axes at zero.
+    #[must_use]
+    pub const fn at_zero(&self) -> Transform<Base, C> {
+        self.at_zero
+    }
+
     /// The camera's pose with the axes at `values` (millimetres or radians each). An axis that has no value is at zero.
     #[must_use]
     pub fn base_from_camera(&self, values: &[f64]) -> Transform<Base, C> {

@@ -1,16 +1,17 @@
 //! The rig file: TOML with units in the values; an unknown key is an error.
 
 use std::collections::BTreeMap;
-use std::str::FromStr;
 
 use nalgebra::{Unit, UnitQuaternion, Vector3};
-use serde::{Deserialize, Deserializer};
+use serde::Deserialize;
 use vergence_protocol::{AxisKind, MAX_AXES};
-use vergence_vision::{Angle, Frame, ImageSize, InvalidLens, KannalaBrandt, Length, OpenCvFisheye, Point, Transform};
+use vergence_vision::{Angle, Frame, InvalidLens, KannalaBrandt, Length, Point, Transform};
 
 use crate::axis::{AxisPosition, RigAxis};
+use crate::camera_file::CameraTable;
 use crate::chain::{Chain, Link, Screw};
 use crate::rig::{Mode, Rig};
+use crate::text::{quantities, quantity};
 
 /// What is wrong with a rig file.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
@@ -66,28 +67,11 @@ enum KindFile {
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 struct SideFile {
-    camera: CameraFile,
+    camera: CameraTable,
     #[serde(default)]
     at_zero: PoseFile,
     #[serde(default)]
     screw: Vec<ScrewFile>,
-}
-
-#[derive(Deserialize)]
-#[serde(deny_unknown_fields)]
-struct CameraFile {
-    size: [u32; 2],
-    /// Absent: as far as the polynomial is valid and the image reaches.
-    #[serde(default, deserialize_with = "optional_quantity")]
-    theta_max: Option<Angle>,
-    fx: f64,
-    fy: f64,
-    cx: f64,
-    cy: f64,
-    opencv_k1: f64,
-    opencv_k2: f64,
-    opencv_k3: f64,
-    opencv_k4: f64,
 }
 
 #[derive(Default, Deserialize)]
@@ -124,24 +108,6 @@ impl Default for SigmaFile {
     fn default() -> Self {
         Self { rotation: Angle::from_deg(0.02), translation: Length::from_mm(0.1) }
     }
-}
-
-fn quantity<'de, D: Deserializer<'de>, Q: FromStr<Err: std::fmt::Display>>(source: D) -> Result<Q, D::Error> {
-    String::deserialize(source)?.parse().map_err(serde::de::Error::custom)
-}
-
-fn optional_quantity<'de, D: Deserializer<'de>>(source: D) -> Result<Option<Angle>, D::Error> {
-    quantity(source).map(Some)
-}
-
-fn quantities<'de, D, Q>(source: D) -> Result<[Q; 3], D::Error>
-where
-    D: Deserializer<'de>,
-    Q: FromStr<Err: std::fmt::Display>,
-{
-    let [x, y, z] = <[String; 3]>::deserialize(source)?;
-    let parse = |text: String| text.parse().map_err(serde::de::Error::custom);
-    Ok([parse(x)?, parse(y)?, parse(z)?])
 }
 
 impl Rig {
@@ -233,22 +199,8 @@ fn mode(number: u8, name: &str, positions: &BTreeMap<String, String>, axes: &[Ri
     Ok(Mode { name: name.to_owned(), number: vergence_protocol::Mode(number), targets })
 }
 
-fn camera(side: &'static str, file: &CameraFile) -> Result<KannalaBrandt, RigError> {
-    let invalid = |lens| RigError::Camera { camera: side, lens };
-    let [width, height] = file.size;
-    let size = ImageSize { width, height };
-    let lens = OpenCvFisheye {
-        fx: file.fx,
-        fy: file.fy,
-        cx: file.cx,
-        cy: file.cy,
-        k: [file.opencv_k1, file.opencv_k2, file.opencv_k3, file.opencv_k4],
-    };
-    let theta_max = match file.theta_max {
-        Some(stated) => stated,
-        None => lens.largest_theta(size).map_err(invalid)?,
-    };
-    KannalaBrandt::from_opencv(lens, theta_max, size).map_err(invalid)
+fn camera(side: &'static str, table: &CameraTable) -> Result<KannalaBrandt, RigError> {
+    table.camera().map_err(|lens| RigError::Camera { camera: side, lens })
 }
 
 fn chain<C: Frame>(side: &str, file: &SideFile, axes: &[RigAxis]) -> Result<Chain<C>, RigError> {

@@ -7,17 +7,22 @@
 //! Everything is a pure function of its arguments: no file is read here.
 
 mod axis;
+mod camera_file;
 mod chain;
 mod clock;
 mod file;
+mod interchange;
 mod pose;
 mod rig;
+mod text;
 mod track;
 
 pub use axis::{AxisPosition, RigAxis};
-pub use chain::{Chain, Screw};
+pub use camera_file::CameraTable;
+pub use chain::{Chain, Link, Screw};
 pub use clock::{BoardInstant, ClockMap, Exchange};
 pub use file::RigError;
+pub use interchange::{Camchain, CameraFormat, InterchangeError, kalibr, opencv};
 pub use pose::RigPose;
 pub use rig::{Mode, Rig};
 pub use track::{JointSample, JointTrack, JointsAt, TrackGap};
