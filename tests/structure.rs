@@ -29,6 +29,7 @@ const ALLOWED: &[(&str, &[&str])] = &[
             "vergence-control",
             "vergence-vision",
             "vergence-rig",
+            "vergence-calibration",
             "vergence-matching",
             "vergence-scene",
             "vergence-plant",
@@ -37,7 +38,8 @@ const ALLOWED: &[(&str, &[&str])] = &[
 ];
 
 /// Only host/vergence touches devices, files, sockets, clocks, threads and the terminal.
-const ONLY_FOR_THE_BINARY: &[&str] = &["tokio", "tokio-serial", "serialport", "clap", "indicatif", "tempfile"];
+const ONLY_FOR_THE_BINARY: &[&str] =
+    &["tokio", "tokio-serial", "serialport", "clap", "indicatif", "tempfile", "moq-v4l"];
 
 /// Permissive licences.
 const LICENCES: &[&str] = &[

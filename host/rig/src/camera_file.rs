@@ -63,3 +63,44 @@ impl CameraTable {
         KannalaBrandt::from_opencv(lens, theta_max, size)
     }
 }
+
+/// A calibrated camera: the table, how sure it is, and where it comes from.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct CameraDocument {
+    /// The camera.
+    pub camera: CameraTable,
+    /// How sure it is; absent in files written by hand.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub calibration: Option<CalibrationTable>,
+    /// Where it comes from.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub provenance: Option<Provenance>,
+}
+
+/// How sure a camera is.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct CalibrationTable {
+    /// Point RMS of the corners that the fit kept, in pixels.
+    pub rms_inlier_px: f64,
+    /// How many it kept.
+    pub corners: usize,
+    /// From how many views.
+    pub views: usize,
+    /// Covariance of fx, fy, cx, cy, opencv_k1 to opencv_k4, row by row.
+    pub covariance: [[f64; 8]; 8],
+}
+
+/// Where a calibration comes from.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Provenance {
+    /// The program and its version.
+    pub program: String,
+    /// SHA-256 over all inputs, in hexadecimal.
+    pub inputs_sha256: String,
+    /// When, as the caller said it.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub date: Option<String>,
+}

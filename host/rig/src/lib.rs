@@ -18,7 +18,7 @@ mod text;
 mod track;
 
 pub use axis::{AxisPosition, RigAxis};
-pub use camera_file::CameraTable;
+pub use camera_file::{CalibrationTable, CameraDocument, CameraTable, Provenance};
 pub use chain::{Chain, Link, Screw};
 pub use clock::{BoardInstant, ClockMap, Exchange};
 pub use file::RigError;

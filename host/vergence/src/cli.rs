@@ -74,6 +74,10 @@ enum Verb {
     Depth(cmd::depth::Args),
     /// Tell how much of the surroundings both cameras, one, or none see.
     Zones(cmd::zones::Args),
+    /// Show and convert camera files, and use them for single points.
+    Camera(cmd::camera::Args),
+    /// Draw a chessboard to print.
+    Target(cmd::target::Args),
 }
 
 /// Runs the command line and returns the exit code.
@@ -123,6 +127,8 @@ fn execute(cli: Cli) -> Result<(), Failure> {
             Verb::Demo(args) => cmd::demo::run(&args, &globals, console).await,
             Verb::Depth(args) => cmd::depth::run(&args, &globals, console),
             Verb::Zones(args) => cmd::zones::run(&args, console),
+            Verb::Camera(args) => cmd::camera::run(&args, console),
+            Verb::Target(args) => cmd::target::run(&args, console),
         }
     })
 }

@@ -8,6 +8,7 @@
 
 pub mod board;
 pub mod camera;
+mod camera_files;
 pub mod cli;
 mod cmd;
 mod console;

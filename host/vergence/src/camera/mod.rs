@@ -1,13 +1,17 @@
 //! Cameras: one trait for simulated ones, image files and folders.
 
+mod exposure;
 mod files;
+mod pixel_format;
 mod simulated;
+mod v4l;
 
 use image::RgbImage;
 use vergence_protocol::Microseconds;
 
 pub use files::{FileCamera, read_image};
 pub use simulated::{Eye, SimulatedCamera, Stage};
+pub use v4l::{Settings as V4lSettings, V4lCamera};
 
 use crate::failure::Failure;
 

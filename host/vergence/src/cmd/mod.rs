@@ -1,9 +1,11 @@
 //! One module per verb.
 
+mod board_options;
 mod connect;
 mod report;
 
 pub mod arm;
+pub mod camera;
 pub mod clear;
 pub mod demo;
 pub mod depth;
@@ -16,4 +18,5 @@ pub mod move_to;
 pub mod sim;
 pub mod status;
 pub mod stop;
+pub mod target;
 pub mod zones;

@@ -1,0 +1,145 @@
+//! `vergence camera`: camera files shown, converted, and used for single points.
+
+use std::path::PathBuf;
+
+use nalgebra::Vector3;
+use serde_json::{Value, json};
+use vergence_rig::CameraFormat;
+use vergence_vision::{Camera, KannalaBrandt, OpenCvFisheye, Pixel, UnitRay};
+
+use crate::camera_files::{read, read_camera, text_of};
+use crate::console::Console;
+use crate::failure::Failure;
+use crate::output::write_whole;
+
+/// Works on camera files: this program's TOML, OpenCV's YAML (fisheye), Kalibr's camchain (pinhole-equidistant).
+#[derive(Debug, clap::Args)]
+pub struct Args {
+    #[command(subcommand)]
+    task: Task,
+}
+
+#[derive(Debug, clap::Subcommand)]
+enum Task {
+    /// Show the parameters and the valid field.
+    Show {
+        /// The camera file.
+        file: PathBuf,
+    },
+    /// Write the camera in another format.
+    Convert {
+        /// The camera file.
+        file: PathBuf,
+        /// The format to write.
+        #[arg(long)]
+        to: Format,
+        /// The file to write.
+        #[arg(long, short, value_name = "FILE")]
+        out: PathBuf,
+    },
+    /// The pixels of directions: x right, y down, z forward, of any length and any sign.
+    Project {
+        /// The camera file.
+        file: PathBuf,
+        /// A direction such as 0.1,-0.2,-0.05.
+        #[arg(required = true, allow_hyphen_values = true, value_parser = parse_numbers::<3>)]
+        rays: Vec<[f64; 3]>,
+    },
+    /// The directions of pixels.
+    Unproject {
+        /// The camera file.
+        file: PathBuf,
+        /// A pixel such as 480,299.5.
+        #[arg(required = true, allow_hyphen_values = true, value_parser = parse_numbers::<2>)]
+        pixels: Vec<[f64; 2]>,
+    },
+}
+
+#[derive(Clone, Copy, Debug, clap::ValueEnum)]
+enum Format {
+    Toml,
+    Opencv,
+    Kalibr,
+}
+
+pub fn run(args: &Args, console: Console) -> Result<(), Failure> {
+    match &args.task {
+        Task::Show { file } => {
+            let file = read(file)?;
+            let right = file.cameras.right.map(|(camera, _)| camera);
+            for camera in [Some(file.cameras.left), right].into_iter().flatten() {
+                show(&camera, console)?;
+            }
+            let cameras: Vec<_> = [Some(file.cameras.left), right].into_iter().flatten().map(|c| in_json(&c)).collect();
+            console.result(&json!({"format": format!("{:?}", file.format).to_lowercase(), "cameras": cameras}))
+        }
+        Task::Convert { file, to, out } => {
+            let file = read(file)?;
+            let format = match to {
+                Format::Toml => CameraFormat::Toml,
+                Format::Opencv => CameraFormat::OpenCv,
+                Format::Kalibr => CameraFormat::Kalibr,
+            };
+            if file.cameras.right.is_some() && format != CameraFormat::Kalibr {
+                return Err(Failure::usage("the camchain holds a pair; only --to kalibr can hold one"));
+            }
+            write_whole(out, text_of(&file.cameras, format)?.as_bytes())?;
+            console.say(format!("wrote {}", out.display()))?;
+            console.result(&json!({ "out": out }))
+        }
+        Task::Project { file, rays } => project(&read_camera(file)?, rays, console),
+        Task::Unproject { file, pixels } => unproject(&read_camera(file)?, pixels, console),
+    }
+}
+
+fn show(camera: &KannalaBrandt, console: Console) -> Result<(), Failure> {
+    let OpenCvFisheye { fx, fy, cx, cy, k: [k1, k2, k3, k4] } = camera.to_opencv();
+    let size = camera.size();
+    console.say(format!(
+        "{} x {} px, valid to {:.2} from the axis\nfx {fx:.4}  fy {fy:.4}  cx {cx:.4}  cy {cy:.4}\n\
+         opencv_k1 {k1:.6}  opencv_k2 {k2:.6}  opencv_k3 {k3:.6}  opencv_k4 {k4:.6}",
+        size.width,
+        size.height,
+        camera.theta_max()
+    ))
+}
+
+fn in_json(camera: &KannalaBrandt) -> Value {
+    let OpenCvFisheye { fx, fy, cx, cy, k: [k1, k2, k3, k4] } = camera.to_opencv();
+    let size = camera.size();
+    json!({
+        "size": [size.width, size.height],
+        "theta_max_deg": camera.theta_max().deg(),
+        "opencv": {"fx": fx, "fy": fy, "cx": cx, "cy": cy, "k1": k1, "k2": k2, "k3": k3, "k4": k4},
+    })
+}
+
+fn project(camera: &KannalaBrandt, rays: &[[f64; 3]], console: Console) -> Result<(), Failure> {
+    let mut pixels = Vec::new();
+    for &ray in rays {
+        let ray = UnitRay::<Camera>::new(Vector3::from(ray))
+            .ok_or_else(|| Failure::usage(format!("{ray:?} is no direction")))?;
+        let pixel = camera.project(&ray).ok();
+        console.say(pixel.map_or("outside the lens's valid cone".into(), |p| format!("{:.6} {:.6}", p.u, p.v)))?;
+        pixels.push(pixel.map(|p| [p.u, p.v]));
+    }
+    console.result(&json!({ "pixels": pixels }))
+}
+
+fn unproject(camera: &KannalaBrandt, pixels: &[[f64; 2]], console: Console) -> Result<(), Failure> {
+    let mut rays = Vec::new();
+    for &[u, v] in pixels {
+        let ray = camera.unproject::<Camera>(Pixel { u, v }).ok().map(|ray| ray.vector());
+        console
+            .say(ray.map_or("outside the lens's valid cone".into(), |d| format!("{:.9} {:.9} {:.9}", d.x, d.y, d.z)))?;
+        rays.push(ray.map(|d| [d.x, d.y, d.z]));
+    }
+    console.result(&json!({ "rays": rays }))
+}
+
+/// `N` numbers between commas.
+fn parse_numbers<const N: usize>(text: &str) -> Result<[f64; N], String> {
+    let numbers: Result<Vec<f64>, _> = text.split(',').map(|part| part.trim().parse::<f64>()).collect();
+    let numbers = numbers.map_err(|error| format!("{error}: write {N} numbers between commas"))?;
+    numbers.try_into().map_err(|numbers: Vec<f64>| format!("{} numbers where {N} are needed", numbers.len()))
+}
