@@ -64,7 +64,11 @@ impl Axis {
     }
 
     /// Takes the encoder's word for where the axis is: after power-on, after the drivers were off, after homing.
+    /// Without reference that is zero: raw counts may be anywhere, beyond what a position can say.
     pub fn adopt_encoder(&mut self, io: &impl RigIo) {
+        if !self.referenced {
+            self.zero_counts = io.encoder(self.index);
+        }
         let position = self.position(io);
         self.trajectory = None;
         self.command_now = i64::from(position.0) << 8;

@@ -164,9 +164,10 @@ impl Controller {
         matches!(self.state, ControllerState::LinkLost | ControllerState::Fault)
     }
 
-    /// Takes a heartbeat of `session`.
+    /// Takes a heartbeat of `session`. Once latched nobody holds the board: who clears the fault can arm at once.
     pub fn heartbeat(&mut self, now: Microseconds, session: SessionId, lease_ms: u16) {
-        self.lease.renew(now, session, lease_ms, self.holder);
+        let holder = self.holder.filter(|_| !self.is_latched());
+        self.lease.renew(now, session, lease_ms, holder);
     }
 
     fn go_idle(&mut self, io: &mut impl RigIo) {

@@ -6,6 +6,7 @@ use vergence_protocol::{Counts, FaultCode, Micro, Microseconds};
 
 use crate::axis::Axis;
 use crate::io::RigIo;
+use crate::profile::Profile;
 
 /// What homing is doing.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -56,7 +57,7 @@ impl Homing {
         let homing = axis.settings.homing;
         let limits = axis.settings.limits_at(homing.seek_speed);
         let phase = if axis.home_switch(io) {
-            axis.travel(now, Micro(homing.retract.0.saturating_mul(2)), limits);
+            axis.travel(now, back_off(axis), limits);
             Phase::BackOff
         } else {
             axis.travel(now, Micro(-homing.travel.0), limits);
@@ -74,7 +75,7 @@ impl Homing {
         let counts = axis.counts(io);
         self.phase = match self.phase {
             Phase::BackOff if moving => Phase::BackOff,
-            Phase::BackOff if closed => return stuck(homing.retract.0.saturating_mul(2)),
+            Phase::BackOff if closed => return stuck(back_off(axis).0),
             Phase::BackOff => {
                 axis.travel(now, Micro(-homing.travel.0), limits);
                 Phase::Seek
@@ -120,6 +121,15 @@ impl Homing {
         };
         if self.phase == Phase::Done { Progress::Done } else { Progress::Running }
     }
+}
+
+/// Off the switch from wherever a search can have come to rest beyond it. It may still have been speeding up when it
+/// was stopped: taking that back lasts a/j, at no more than the speed of the search.
+fn back_off(axis: &Axis) -> Micro {
+    let homing = axis.settings.homing;
+    let limits = axis.settings.limits_at(homing.seek_speed);
+    let braking = Profile::stop(limits.speed, 0.0, limits).end() + limits.speed * limits.acceleration / limits.jerk;
+    Micro(homing.retract.0.saturating_add(braking as i32))
 }
 
 fn stuck(distance: i32) -> Progress {

@@ -50,6 +50,7 @@ struct Segment {
 pub struct Profile {
     start: MotionState,
     segments: [Segment; 7],
+    duration: f32,
     /// The exact end: rounding in the segments never decides where an axis stops.
     end: f32,
 }
@@ -73,7 +74,7 @@ impl Profile {
             Segment { duration: hold, jerk: 0.0 },
             Segment { duration: ramp, jerk },
         ];
-        Self { start: MotionState::default(), segments, end: distance }
+        Self { start: MotionState::default(), segments, duration: total(&segments), end: distance }
     }
 
     /// The quickest way to rest from `velocity` and `acceleration`.
@@ -94,7 +95,7 @@ impl Profile {
         segments[2] = Segment { duration: peak / j, jerk: -sign * j };
         let start = MotionState { offset: 0.0, velocity, acceleration };
         let end = run(start, &segments, f32::INFINITY).offset;
-        Self { start, segments, end }
+        Self { start, segments, duration: total(&segments), end }
     }
 
     /// The same path run `factor` times as slowly. For profiles from rest.
@@ -104,13 +105,21 @@ impl Profile {
             segment.duration *= factor;
             segment.jerk /= factor * factor * factor;
         }
+        self.duration *= factor;
         self
+    }
+
+    /// The same path run in exactly `duration` seconds, so that axes finish in the same tick. For profiles from rest;
+    /// one that goes nowhere stays as it is.
+    #[must_use]
+    pub fn lasting(self, duration: f32) -> Self {
+        if self.duration > 0.0 { Self { duration, ..self.stretched(duration / self.duration) } } else { self }
     }
 
     /// How long it takes, in seconds.
     #[must_use]
     pub fn duration(&self) -> f32 {
-        self.segments.iter().map(|segment| segment.duration).sum()
+        self.duration
     }
 
     /// Where it ends, as an offset from its start.
@@ -122,14 +131,25 @@ impl Profile {
     /// The state `time` seconds after the start; at rest at the exact end from the duration on.
     #[must_use]
     pub fn at(&self, time: f32) -> MotionState {
-        if time >= self.duration() {
+        let left = self.duration - time;
+        if left <= 0.0 {
             return MotionState { offset: self.end, ..MotionState::default() };
         }
-        run(self.start, &self.segments, time)
+        if time <= left {
+            return run(self.start, &self.segments, time);
+        }
+        // The second half is run backwards from rest at the end: rounding gathers in the middle, where the axis is quick,
+        // and can neither overshoot the end nor jump to it. Backwards only the acceleration changes its sign.
+        let back = run(MotionState::default(), self.segments.iter().rev(), left);
+        MotionState { offset: self.end - back.offset, velocity: back.velocity, acceleration: -back.acceleration }
     }
 }
 
-fn run(start: MotionState, segments: &[Segment], time: f32) -> MotionState {
+fn total(segments: &[Segment]) -> f32 {
+    segments.iter().map(|segment| segment.duration).sum()
+}
+
+fn run<'a>(start: MotionState, segments: impl IntoIterator<Item = &'a Segment>, time: f32) -> MotionState {
     let mut state = start;
     let mut left = time.max(0.0);
     for segment in segments {
@@ -164,5 +184,5 @@ fn peak_speed(length: f32, limits: Limits) -> f32 {
 /// Durations of the jerk ramp and of constant acceleration that change the speed by `change`.
 fn speed_change(change: f32, limits: Limits) -> (f32, f32) {
     let Limits { acceleration: a, jerk: j, .. } = limits;
-    if change * j >= a * a { (a / j, change / a - a / j) } else { (sqrtf(change / j), 0.0) }
+    if change * j >= a * a { (a / j, (change / a - a / j).max(0.0)) } else { (sqrtf(change / j), 0.0) }
 }

@@ -12,7 +12,7 @@ pub struct AxisMechanics {
     pub encoder: Scale,
     /// Play between motor and load.
     pub backlash: f64,
-    /// How fast the load follows the motor: time constant in seconds.
+    /// How fast the load follows the motor: time constant in seconds, above zero.
     pub compliance: f64,
     /// Where the home switch closes (at and below).
     pub home_switch: f64,
@@ -35,6 +35,7 @@ pub struct AxisPlant {
     load: f64,
     /// The encoder counts from wherever it was switched on.
     raw_zero: i32,
+    blocked: bool,
 }
 
 impl AxisPlant {
@@ -48,6 +49,7 @@ impl AxisPlant {
             motor_zero: position,
             load: position,
             raw_zero: 0,
+            blocked: false,
         };
         axis.raw_zero = axis.counts_from_zero();
         axis
@@ -80,6 +82,17 @@ impl AxisPlant {
         self.ordered = (steps, by);
     }
 
+    /// Forgets the steps not made yet, for when the power goes or comes: the rotor stands at a whole step.
+    pub fn drop_order(&mut self) {
+        self.steps = self.steps.round();
+        self.ordered.0 = self.steps();
+    }
+
+    /// Wedges the load where it is, or frees it: a motor that pulls on a wedged load loses steps.
+    pub fn block(&mut self, blocked: bool) {
+        self.blocked = blocked;
+    }
+
     /// Whether the home switch is closed.
     #[must_use]
     pub fn home_switch(&self) -> bool {
@@ -104,8 +117,9 @@ impl AxisPlant {
         let pulled = self.load.clamp(motor - play, motor + play);
         let dt = (to.0 - from.0) as f64 * 1e-6;
         let share = 1.0 - (-dt / self.mechanics.compliance).exp();
+        let held_by = if self.blocked { [self.load; 2] } else { self.mechanics.end_stops };
         self.load += (pulled - self.load) * share;
-        self.strike_end_stops(motor);
+        self.strike(held_by, motor);
     }
 
     fn turn_motor(&mut self, from: Microseconds, to: Microseconds) {
@@ -119,9 +133,8 @@ impl AxisPlant {
         };
     }
 
-    /// A load at the frame stays there, and a motor that pulls further loses steps.
-    fn strike_end_stops(&mut self, motor: f64) {
-        let [low, high] = self.mechanics.end_stops;
+    /// A load at an obstacle stays there, and a motor that pulls further loses steps.
+    fn strike(&mut self, [low, high]: [f64; 2], motor: f64) {
         if self.load < low || self.load > high {
             let held = self.load.clamp(low, high);
             self.load = held;

@@ -89,7 +89,8 @@ fn separation() -> AxisSettings {
         tolerance: Micro(degrees(0.02)),
         homing: HomingSettings {
             switch_at: Micro(degrees(-1.5)),
-            seek_speed: degrees(30.0).unsigned_abs(),
+            // A search stopped while it speeds up needs 2.5° more, and the hard limit is 3.5° beyond the switch.
+            seek_speed: degrees(20.0).unsigned_abs(),
             approach_speed: degrees(2.0).unsigned_abs(),
             retract: Micro(degrees(2.0)),
             travel: Micro(degrees(160.0)),

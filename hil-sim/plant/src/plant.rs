@@ -37,25 +37,41 @@ impl Plant {
     /// Presses or releases the emergency stop, which cuts the drivers in hardware.
     pub fn press_emergency_stop(&mut self, pressed: bool) {
         self.emergency_stop = pressed;
+        self.axes.iter_mut().for_each(AxisPlant::drop_order);
+    }
+
+    /// Wedges the load of `axis` where it is, or frees it. A motor that pulls on a wedged load loses steps, so that the
+    /// encoder stands while the command goes on. There is no effect where there is no such axis.
+    pub fn block(&mut self, axis: usize, blocked: bool) {
+        if let Some(axis) = self.axes.get_mut(axis) {
+            axis.block(blocked);
+        }
     }
 
     /// Lets time pass until `to`.
     pub fn advance(&mut self, to: Microseconds) {
-        let powered = self.drivers_on && !self.emergency_stop;
+        let powered = self.is_powered();
         for axis in &mut self.axes {
             axis.advance(self.now, to, powered);
         }
         self.now = to;
+    }
+
+    fn is_powered(&self) -> bool {
+        self.drivers_on && !self.emergency_stop
     }
 }
 
 impl RigIo for Plant {
     fn set_drivers(&mut self, on: bool) {
         self.drivers_on = on;
+        self.axes.iter_mut().for_each(AxisPlant::drop_order);
     }
 
     fn step_to(&mut self, axis: usize, steps: i32, by: Microseconds) {
-        if let Some(axis) = self.axes.get_mut(axis) {
+        if self.is_powered()
+            && let Some(axis) = self.axes.get_mut(axis)
+        {
             axis.step_to(steps, by);
         }
     }

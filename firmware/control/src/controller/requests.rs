@@ -33,11 +33,14 @@ impl Controller {
         if self.is_latched() {
             return Err(Refusal::Latched);
         }
-        if let Some(holder) = self.holder {
-            return if holder == session { Ok(()) } else { Err(Refusal::WrongSession) };
+        if self.holder.is_some_and(|holder| holder != session) {
+            return Err(Refusal::WrongSession);
         }
         if !self.lease.is_live(now, session) {
             return Err(Refusal::NoLease);
+        }
+        if self.holder.is_some() {
+            return Ok(());
         }
         if io.emergency_stop() {
             return Err(Refusal::CausePersists);
@@ -129,9 +132,8 @@ impl Controller {
             .collect();
         let slowest = planned.iter().map(|profile| profile.duration()).fold(0.0, f32::max);
         for (axis, profile) in self.axes.iter_mut().zip(planned) {
-            let own = profile.duration();
-            if own > 0.0 {
-                axis.run(now, profile.stretched(slowest / own));
+            if profile.duration() > 0.0 {
+                axis.run(now, profile.lasting(slowest));
             }
         }
     }

@@ -1,0 +1,213 @@
+//! Homing: what it finds, how exactly, and how it gives up.
+
+mod support;
+
+use proptest::prelude::*;
+use proptest::test_runner::RngSeed;
+use support::{HOST, HomeSwitch, TICK_US, World, linear, rotary};
+use vergence_control::AxisSettings;
+use vergence_protocol::{AxisMask, ControllerState, FaultCode, FaultRecord, Refusal, Request, Status, StopKind};
+
+const BOTH: AxisMask = AxisMask::first(2);
+const FIRST: AxisMask = AxisMask::first(1);
+
+/// A controller that has just begun homing `axes`.
+fn begun(loads: [f64; 2], axes: AxisMask) -> World {
+    let mut world = World::new(loads);
+    assert_eq!(world.arm(), Status::Accepted);
+    assert_eq!(world.home(axes), Status::Accepted);
+    world
+}
+
+fn fault_of(world: &mut World) -> FaultRecord {
+    world.wait_for(ControllerState::Fault);
+    world.wait(300_000);
+    assert!(!world.watch.moves());
+    let pose = world.pose();
+    assert_eq!(pose.referenced.0 & 1, 0, "a reference is claimed: {pose:?}");
+    world.fault()
+}
+
+/// The reference is the edge seen at a tick: late by the way of one tick at most, and one count.
+fn reference_error(axis: &AxisSettings) -> f64 {
+    let way = f64::from(axis.homing.approach_speed) * TICK_US as f64 * 1e-6;
+    way + 2.0 * f64::from(axis.encoder().position_at(1).0.max(1))
+}
+
+/// Seek over `way`, two reversals and the slow approach; every leg takes d/v + v/a + a/j at most.
+fn longest_homing_us(axis: &AxisSettings, way: f64) -> u64 {
+    let [a, j, seek, slow] =
+        [axis.acceleration, axis.jerk, axis.homing.seek_speed, axis.homing.approach_speed].map(f64::from);
+    let retract = f64::from(axis.homing.retract.0);
+    let change = |v: f64| v / a + a / j;
+    let brake = seek * change(seek);
+    let enter = f64::from(axis.min.0 - axis.homing.switch_at.0) + brake;
+    let legs = [way + 2.0 * retract, brake, 2.0 * retract + brake, enter].map(|d| d / seek + change(seek));
+    let slowly = retract / slow + 2.0 * change(slow);
+    ((legs.iter().sum::<f64>() + slowly) * 1e6) as u64 + 10 * TICK_US
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig {
+        cases: 100, rng_seed: RngSeed::Fixed(0x5eed), failure_persistence: None, ..ProptestConfig::default()
+    })]
+
+    #[test]
+    fn homing_from_anywhere_ends_at_the_low_end(baseline in 54_000.0..220_000.0, separation in -60_000.0..2_268_928.0) {
+        let mut world = begun([baseline, separation], BOTH);
+        prop_assert_eq!(world.pose().referenced, AxisMask(0));
+        let start = world.now.0;
+        world.wait_for(ControllerState::Ready);
+        prop_assert_eq!(world.pose().referenced, BOTH);
+        for (axis, settings) in [linear(), rotary()].iter().enumerate() {
+            let off = world.rig.axes[axis].load - f64::from(settings.min.0);
+            prop_assert!(off.abs() <= reference_error(settings), "axis {axis} is off by {off}");
+            let counts = settings.encoder().counts_at(settings.min);
+            prop_assert!((world.pose().counts[axis].0 - counts).abs() <= 1);
+        }
+        let ways = [baseline - 58_000.0, separation + 26_180.0].map(f64::abs);
+        let bound = longest_homing_us(&linear(), ways[0]).max(longest_homing_us(&rotary(), ways[1]));
+        prop_assert!(world.now.0 - start <= bound, "{} of {bound} us", world.now.0 - start);
+    }
+
+    #[test]
+    fn homing_again_finds_the_same_place(baseline in 60_000.0..220_000.0, offset in 0.0..1.0) {
+        let mut world = begun([baseline, 100_000.0 + offset * 63.0], BOTH);
+        world.wait_for(ControllerState::Ready);
+        let first = world.rig.axes[0].load;
+        prop_assert_eq!(world.home(BOTH), Status::Accepted);
+        prop_assert_eq!(world.pose().referenced, AxisMask(0), "a reference is claimed while it is sought");
+        world.wait_for(ControllerState::Ready);
+        prop_assert!((world.rig.axes[0].load - first).abs() <= reference_error(&linear()));
+    }
+
+    #[test]
+    fn a_stop_ends_homing_without_reference(wait in 0u64..1_200_000) {
+        let mut world = begun([150_000.0, 1_000_000.0], BOTH);
+        world.wait(wait);
+        prop_assert_eq!(world.ask(HOST, &Request::Stop { kind: StopKind::Decelerate }), Status::Accepted);
+        world.wait_for(ControllerState::Ready);
+        prop_assert_ne!(world.pose().referenced, BOTH);
+        let refused = matches!(world.move_to([100_000, 0]), Status::Refused(Refusal::NotReferenced { .. }));
+        prop_assert!(refused);
+        prop_assert_eq!(world.home(BOTH), Status::Accepted);
+        world.wait_for(ControllerState::Ready);
+        prop_assert_eq!(world.pose().referenced, BOTH);
+    }
+}
+
+#[test]
+fn only_the_named_axes_are_homed() {
+    let mut world = begun([100_000.0, 500_000.0], FIRST);
+    world.wait_for(ControllerState::Ready);
+    assert_eq!(world.pose().referenced, FIRST);
+    assert!((world.rig.axes[1].load - 500_000.0).abs() < 1e-6);
+    assert_eq!(world.move_to([100_000, 0]), Status::Refused(Refusal::NotReferenced { axis: 1 }));
+}
+
+#[test]
+fn masks_of_nothing_or_of_no_axis_are_refused() {
+    let mut world = World::new([100_000.0, 500_000.0]);
+    world.arm();
+    for mask in [0, 4, 7, 128] {
+        assert_eq!(world.home(AxisMask(mask)), Status::Refused(Refusal::Invalid), "{mask}");
+    }
+    assert_eq!(world.controller.state(), ControllerState::Ready);
+}
+
+#[test]
+fn a_switch_that_never_closes_is_not_found() {
+    let mut world = World::new([219_000.0, 500_000.0]);
+    world.rig.axes[0].switch = HomeSwitch::NeverCloses;
+    world.arm();
+    world.home(FIRST);
+    let fault = fault_of(&mut world);
+    assert_eq!((fault.code, fault.axis, fault.detail), (FaultCode::HomeSwitchNotFound, Some(0), 200_000));
+    assert!((world.rig.axes[0].load - 19_000.0).abs() < 1.0, "searched the whole travel and no more");
+    assert!(world.rig.drivers, "the stage is held");
+}
+
+#[test]
+fn a_switch_stuck_closed_is_told_from_a_stage_on_it() {
+    let mut world = World::new([100_000.0, 500_000.0]);
+    world.rig.axes[0].switch = HomeSwitch::StuckClosed;
+    world.arm();
+    world.home(FIRST);
+    let fault = fault_of(&mut world);
+    // The retract, and the way in which a search brakes: v/2 (v/a + a/j) = 5208 µm, and v a/j = 3750 µm.
+    assert_eq!((fault.code, fault.axis, fault.detail), (FaultCode::HomeSwitchStuck, Some(0), 11_958));
+    assert!((world.rig.axes[0].load - 111_958.0).abs() < 1.0);
+}
+
+/// Begins homing and waits until the first edge has been seen.
+fn at_first_edge() -> World {
+    let mut world = begun([70_000.0, 500_000.0], FIRST);
+    while !world.rig.axes[0].closed() {
+        world.wait(TICK_US);
+    }
+    world.wait(TICK_US);
+    world
+}
+
+fn retracted() -> World {
+    let mut world = at_first_edge();
+    while world.rig.axes[0].closed() {
+        world.wait(TICK_US);
+    }
+    world
+}
+
+#[test]
+fn a_switch_that_sticks_after_the_first_edge_is_noticed() {
+    let mut world = at_first_edge();
+    world.rig.axes[0].switch = HomeSwitch::StuckClosed;
+    let fault = fault_of(&mut world);
+    assert_eq!((fault.code, fault.detail), (FaultCode::HomeSwitchStuck, 3_000));
+}
+
+#[test]
+fn a_switch_that_dies_after_the_first_edge_is_noticed() {
+    let mut world = retracted();
+    world.rig.axes[0].switch = HomeSwitch::NeverCloses;
+    let fault = fault_of(&mut world);
+    assert_eq!((fault.code, fault.detail), (FaultCode::HomeSwitchNotFound, 6_000));
+}
+
+#[test]
+fn two_edges_apart_are_no_reference() {
+    for slip in [-500.0, 500.0] {
+        let mut world = retracted();
+        world.rig.axes[0].switch_at += slip;
+        let fault = fault_of(&mut world);
+        assert_eq!((fault.code, fault.axis), (FaultCode::HomeNotRepeatable, Some(0)));
+        // The first edge was seen up to one tick late at 100 mm/s, hence lower.
+        assert!((slip - 6.0..=slip + 101.0).contains(&f64::from(fault.detail)), "{} for {slip}", fault.detail);
+    }
+}
+
+#[test]
+fn a_failed_axis_brakes_the_other() {
+    let mut world = begun([215_000.0, 2_200_000.0], BOTH);
+    world.rig.axes[1].switch = HomeSwitch::StuckClosed;
+    world.wait_for(ControllerState::Fault);
+    assert!(world.watch.moves(), "the fault came before rest");
+    assert_eq!(world.clear(), Status::Refused(Refusal::Busy));
+    world.wait(400_000);
+    assert!(!world.watch.moves());
+}
+
+#[test]
+fn homing_works_again_after_a_failure() {
+    let mut world = World::new([100_000.0, 500_000.0]);
+    world.rig.axes[0].switch = HomeSwitch::NeverCloses;
+    world.arm();
+    world.home(BOTH);
+    fault_of(&mut world);
+    world.rig.axes[0].switch = HomeSwitch::Good;
+    assert_eq!(world.clear(), Status::Accepted);
+    world.rig.push(0, 200_000.0);
+    assert_eq!(world.arm(), Status::Accepted);
+    assert_eq!(world.home(BOTH), Status::Accepted);
+    world.wait_for(ControllerState::Ready);
+    assert_eq!(world.pose().referenced, BOTH);
+}
