@@ -1,4 +1,5 @@
-//! The bench: a linear stage for the baseline and a pinion stage for the separation.
+//! Stages of a bench for any range and encoder, and the bench itself: a linear stage for the baseline and a pinion stage
+//! for the separation.
 
 use std::f64::consts::PI;
 
@@ -7,96 +8,103 @@ use vergence_protocol::{AxisKind, Micro};
 
 use crate::axis::AxisMechanics;
 
-/// The bench's controller settings: baseline 60..220 mm, separation 0..130°.
-///
-/// The separation axis counts the angle between the two optical axes; each camera turns by half of it.
-#[must_use]
-pub fn bench_settings() -> [AxisSettings; 2] {
-    [baseline(), separation()]
+/// A stage: what the controller believes of it, and what it is.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Stage {
+    /// What the controller believes.
+    pub settings: AxisSettings,
+    /// What it is.
+    pub mechanics: AxisMechanics,
 }
 
-/// The mechanics that fit [`bench_settings`].
-#[must_use]
-pub fn bench_mechanics() -> [AxisMechanics; 2] {
-    let [baseline, separation] = bench_settings();
-    [
-        AxisMechanics {
-            backlash: 8.0,
-            compliance: 2e-3,
-            hard_limits: [52_000.0, 226_000.0],
-            end_stops: [50_000.0, 228_000.0],
-            ..fitting(&baseline)
-        },
-        AxisMechanics {
-            backlash: 120.0,
-            compliance: 2e-3,
-            hard_limits: [-5.0 * PI / 180.0 * 1e6, 135.0 * PI / 180.0 * 1e6],
-            end_stops: [-6.0 * PI / 180.0 * 1e6, 136.0 * PI / 180.0 * 1e6],
-            ..fitting(&separation)
-        },
-    ]
+impl Stage {
+    /// A 2 mm screw driven by a 200-step motor in 1/16 steps, with a linear encoder; home switch 2 mm below `min`.
+    #[must_use]
+    pub fn linear(min: Micro, max: Micro, counts_per_metre: u32) -> Self {
+        let settings = AxisSettings {
+            kind: AxisKind::Linear,
+            min,
+            max,
+            speed: 80_000,
+            acceleration: 400_000,
+            jerk: 8_000_000,
+            steps_per_unit: 1_600_000,
+            counts_per_unit: counts_per_metre,
+            following_error: Micro(1_000),
+            tolerance: Micro(20),
+            homing: HomingSettings {
+                switch_at: Micro(min.0 - 2_000),
+                seek_speed: 40_000,
+                approach_speed: 2_000,
+                retract: Micro(3_000),
+                travel: Micro(max.0 - min.0 + 40_000),
+                repeatability: Micro(200),
+            },
+        };
+        Self { settings, mechanics: mechanics(&settings, 8.0, [8_000.0, 6_000.0], 2_000.0) }
+    }
+
+    /// A pinion whose turn is the axis position; 64 000 steps for each revolution. Home switch 1.5° below `min`.
+    #[must_use]
+    pub fn rotary(min: Micro, max: Micro, counts_per_revolution: u32) -> Self {
+        let settings = AxisSettings {
+            kind: AxisKind::Rotary,
+            min,
+            max,
+            speed: degrees(60.0).unsigned_abs(),
+            acceleration: degrees(240.0).unsigned_abs(),
+            jerk: degrees(4_000.0).unsigned_abs(),
+            steps_per_unit: 64_000,
+            counts_per_unit: counts_per_revolution,
+            following_error: Micro(degrees(1.0)),
+            tolerance: Micro(degrees(0.02)),
+            homing: HomingSettings {
+                switch_at: Micro(min.0 - degrees(1.5)),
+                // A search stopped while it speeds up needs 2.5° more, and the hard limit is 3.5° beyond the switch.
+                seek_speed: degrees(20.0).unsigned_abs(),
+                approach_speed: degrees(2.0).unsigned_abs(),
+                retract: Micro(degrees(2.0)),
+                travel: Micro(max.0 - min.0 + degrees(30.0)),
+                repeatability: Micro(degrees(0.1)),
+            },
+        };
+        let limit = f64::from(degrees(5.0));
+        Self { settings, mechanics: mechanics(&settings, 120.0, [limit, limit], f64::from(degrees(1.0))) }
+    }
 }
 
-/// Scales and home switch as the controller believes them to be, nothing else filled in.
-fn fitting(settings: &AxisSettings) -> AxisMechanics {
+/// Mechanics with the scales that the controller believes in; the hard limits lie `beyond` the range, the end stops
+/// `further` out.
+fn mechanics(settings: &AxisSettings, backlash: f64, beyond: [f64; 2], further: f64) -> AxisMechanics {
+    let hard_limits = [f64::from(settings.min.0) - beyond[0], f64::from(settings.max.0) + beyond[1]];
     AxisMechanics {
         motor: settings.motor(),
         encoder: settings.encoder(),
+        backlash,
+        compliance: 2e-3,
         home_switch: f64::from(settings.homing.switch_at.0),
-        backlash: 0.0,
-        compliance: 1e-3,
-        hard_limits: [f64::NEG_INFINITY, f64::INFINITY],
-        end_stops: [f64::NEG_INFINITY, f64::INFINITY],
+        hard_limits,
+        end_stops: [hard_limits[0] - further, hard_limits[1] + further],
     }
 }
 
-/// A 2 mm screw driven by a 200-step motor in 1/16 steps; a linear encoder of 0.5 µm.
-fn baseline() -> AxisSettings {
-    AxisSettings {
-        kind: AxisKind::Linear,
-        min: Micro(60_000),
-        max: Micro(220_000),
-        speed: 80_000,
-        acceleration: 400_000,
-        jerk: 8_000_000,
-        steps_per_unit: 1_600_000,
-        counts_per_unit: 2_000_000,
-        following_error: Micro(1_000),
-        tolerance: Micro(20),
-        homing: HomingSettings {
-            switch_at: Micro(58_000),
-            seek_speed: 40_000,
-            approach_speed: 2_000,
-            retract: Micro(3_000),
-            travel: Micro(200_000),
-            repeatability: Micro(200),
-        },
-    }
+/// Baseline 60..220 mm with a linear encoder of 0.5 µm; separation 0..130°, counted between the two optical axes (each
+/// camera turns by half of it), with 100 000 counts for each revolution of the separation.
+fn bench() -> [Stage; 2] {
+    let baseline = Stage::linear(Micro(60_000), Micro(220_000), 2_000_000);
+    [baseline, Stage::rotary(Micro(0), Micro(degrees(130.0)), 100_000)]
 }
 
-/// Two pinions on one rack; 100 000 counts and 64 000 steps for each revolution of the separation.
-fn separation() -> AxisSettings {
-    AxisSettings {
-        kind: AxisKind::Rotary,
-        min: Micro(0),
-        max: Micro(degrees(130.0)),
-        speed: degrees(60.0).unsigned_abs(),
-        acceleration: degrees(240.0).unsigned_abs(),
-        jerk: degrees(4_000.0).unsigned_abs(),
-        steps_per_unit: 64_000,
-        counts_per_unit: 100_000,
-        following_error: Micro(degrees(1.0)),
-        tolerance: Micro(degrees(0.02)),
-        homing: HomingSettings {
-            switch_at: Micro(degrees(-1.5)),
-            // A search stopped while it speeds up needs 2.5° more, and the hard limit is 3.5° beyond the switch.
-            seek_speed: degrees(20.0).unsigned_abs(),
-            approach_speed: degrees(2.0).unsigned_abs(),
-            retract: Micro(degrees(2.0)),
-            travel: Micro(degrees(160.0)),
-            repeatability: Micro(degrees(0.1)),
-        },
-    }
+/// The bench's controller settings.
+#[must_use]
+pub fn bench_settings() -> [AxisSettings; 2] {
+    bench().map(|stage| stage.settings)
+}
+
+/// The bench's mechanics.
+#[must_use]
+pub fn bench_mechanics() -> [AxisMechanics; 2] {
+    bench().map(|stage| stage.mechanics)
 }
 
 /// Degrees as whole microradians.

@@ -9,6 +9,6 @@ mod board;
 mod plant;
 
 pub use axis::{AxisMechanics, AxisPlant};
-pub use bench::{bench_mechanics, bench_settings};
+pub use bench::{Stage, bench_mechanics, bench_settings};
 pub use board::NativeBoard;
 pub use plant::Plant;

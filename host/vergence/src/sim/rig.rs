@@ -3,9 +3,9 @@
 use std::sync::{Arc, Mutex, MutexGuard};
 
 use tokio::time::Instant;
-use vergence_plant::{NativeBoard, bench_mechanics, bench_settings};
-use vergence_protocol::Microseconds;
-use vergence_rig::{Rig, RigPose};
+use vergence_plant::{NativeBoard, Stage};
+use vergence_protocol::{AxisKind, Microseconds};
+use vergence_rig::{Rig, RigAxis, RigPose};
 
 use crate::failure::Failure;
 
@@ -30,22 +30,20 @@ pub struct SimulatedRig {
 pub struct SharedRig(Arc<Mutex<SimulatedRig>>);
 
 impl SimulatedRig {
-    /// Switches on a simulated rig; `seed` decides where its stages stand.
+    /// Switches on a simulated rig: a stage of the bench's kind for every axis; `seed` decides where they stand.
     ///
     /// # Errors
-    /// Where the rig's axes are not the bench's.
+    /// Where the rig has no axes, or a range that no stage has.
     pub fn new(rig: &Rig, seed: u64) -> Result<Self, Failure> {
-        let settings = bench_settings();
-        let fits = settings.len() == rig.axes.len()
-            && rig.axes.iter().zip(&settings).all(|(axis, board)| axis.contradiction(&board.info()).is_none());
-        if !fits {
-            return Err(Failure::usage(format!(
-                "the simulator has the bench's two axes (baseline, separation) and rig '{}' has others: leave out --rig, or copy its axes",
+        let stages: Vec<Stage> = rig.axes.iter().map(stage).collect();
+        let settings: Vec<_> = stages.iter().map(|stage| stage.settings).collect();
+        let mechanics: Vec<_> = stages.iter().map(|stage| stage.mechanics).collect();
+        let board = NativeBoard::new(&settings, &mechanics, seed).map_err(|error| {
+            Failure::usage(format!(
+                "rig '{}' cannot be simulated: its controller refuses the axes ({error:?})",
                 rig.name
-            )));
-        }
-        let board = NativeBoard::new(&settings, &bench_mechanics(), seed)
-            .map_err(|error| Failure::usage(format!("the simulated board refuses its settings: {error:?}")))?;
+            ))
+        })?;
         Ok(Self { board, rig: rig.clone(), last_run: Instant::now(), elapsed_us: 0 })
     }
 
@@ -85,5 +83,14 @@ impl SharedRig {
     pub fn lock(&self) -> MutexGuard<'_, SimulatedRig> {
         // A poisoned lock only means that another thread panicked; the rig is whole.
         self.0.lock().unwrap_or_else(std::sync::PoisonError::into_inner)
+    }
+}
+
+/// A stage that fits an axis of the rig file.
+fn stage(axis: &RigAxis) -> Stage {
+    let [min, max] = axis.range.map(|position| position.micro());
+    match axis.kind {
+        AxisKind::Linear => Stage::linear(min, max, axis.counts_per_unit),
+        AxisKind::Rotary => Stage::rotary(min, max, axis.counts_per_unit),
     }
 }
