@@ -8,7 +8,7 @@ use vergence_protocol::{AxisKind, MAX_AXES};
 use vergence_vision::{Angle, Frame, InvalidLens, KannalaBrandt, Length, Point, Transform};
 
 use crate::axis::{AxisPosition, RigAxis};
-use crate::camera_file::CameraTable;
+use crate::camera_file::{CameraTable, Provenance};
 use crate::chain::{Chain, Link, Screw};
 use crate::rig::{Mode, Rig};
 use crate::text::{quantities, quantity};
@@ -33,6 +33,9 @@ pub enum RigError {
     Contradiction(String),
 }
 
+/// No stage is longer, in micro-units: positions, and what lies beyond them, fit the wire with room to spare.
+const LONGEST: i32 = 100_000_000;
+
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 struct RigFile {
@@ -45,6 +48,10 @@ struct RigFile {
     right: SideFile,
     #[serde(default)]
     calibration_sigma: SigmaFile,
+    /// For people; nothing depends on it.
+    #[serde(default)]
+    #[allow(dead_code, reason = "checked for its form only")]
+    provenance: Option<Provenance>,
 }
 
 #[derive(Deserialize)]
@@ -171,6 +178,9 @@ fn axis(file: &AxisFile) -> Result<RigAxis, RigError> {
     let range = [position(kind, low, &place)?, position(kind, high, &place)?];
     if range[0].value() >= range[1].value() {
         return Err(contradiction(format!("{place}: {low} is not below {high}")));
+    }
+    if range.iter().any(|position| position.micro().0.abs() > LONGEST) {
+        return Err(contradiction(format!("{place}: {low} to {high} is more than 100 m or 100 rad from zero")));
     }
     Ok(RigAxis { name: name.clone(), kind, range, counts_per_unit })
 }
