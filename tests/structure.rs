@@ -22,6 +22,7 @@ const ALLOWED: &[(&str, &[&str])] = &[
     ("vergence-matching", &["vergence-vision"]),
     ("vergence-scene", &["vergence-vision"]),
     ("vergence-plant", &["vergence-protocol", "vergence-control"]),
+    ("vergence-soak", &["vergence-protocol", "vergence-control", "vergence-plant"]),
     (
         "vergence",
         &[
@@ -33,6 +34,7 @@ const ALLOWED: &[(&str, &[&str])] = &[
             "vergence-matching",
             "vergence-scene",
             "vergence-plant",
+            "vergence-soak",
         ],
     ),
 ];

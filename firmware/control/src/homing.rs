@@ -4,13 +4,22 @@
 
 use vergence_protocol::{Counts, FaultCode, Micro, Microseconds};
 
+use crate::TICK_US;
 use crate::axis::Axis;
+use crate::contact::{Contact, DEBOUNCE_TICKS};
 use crate::io::RigIo;
 use crate::profile::Profile;
+
+/// A switch that is neither open nor closed for so long at rest will never be.
+const LONGEST_LOOK_TICKS: u8 = 200;
 
 /// What homing is doing.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Phase {
+    /// At rest: look whether the switch is closed, for so many ticks at most.
+    Look {
+        left: u8,
+    },
     /// The switch was closed at the start: leave it.
     BackOff,
     /// Look for the switch.
@@ -48,44 +57,48 @@ pub enum Progress {
 #[derive(Clone, Copy, Debug)]
 pub struct Homing {
     phase: Phase,
+    contact: Contact,
 }
 
 impl Homing {
     /// Starts: the old reference is no longer claimed.
-    pub fn start(now: Microseconds, axis: &mut Axis, io: &impl RigIo) -> Self {
+    pub fn start(axis: &mut Axis) -> Self {
         axis.forget_reference();
-        let homing = axis.settings.homing;
-        let limits = axis.settings.limits_at(homing.seek_speed);
-        let phase = if axis.home_switch(io) {
-            axis.travel(now, back_off(axis), limits);
-            Phase::BackOff
-        } else {
-            axis.travel(now, Micro(-homing.travel.0), limits);
-            Phase::Seek
-        };
-        Self { phase }
+        Self { phase: Phase::Look { left: LONGEST_LOOK_TICKS }, contact: Contact::default() }
     }
 
     /// One tick.
     pub fn poll(&mut self, now: Microseconds, axis: &mut Axis, io: &impl RigIo) -> Progress {
         let homing = axis.settings.homing;
         let limits = axis.settings.limits_at(homing.seek_speed);
-        let closed = axis.home_switch(io);
         let moving = axis.is_moving();
         let counts = axis.counts(io);
+        self.contact.read(axis.home_switch(io), counts);
+        let closed = self.contact.is_closed() == Some(true);
+        let edge_now = self.contact.edge();
         self.phase = match self.phase {
+            Phase::Look { left } if self.contact.is_closed().is_none() => match left.checked_sub(1) {
+                Some(left) => Phase::Look { left },
+                None => return stuck(0),
+            },
+            Phase::Look { .. } if closed => {
+                axis.travel(now, back_off(axis), limits);
+                Phase::BackOff
+            }
             Phase::BackOff if moving => Phase::BackOff,
             Phase::BackOff if closed => return stuck(back_off(axis).0),
-            Phase::BackOff => {
+            Phase::Look { .. } | Phase::BackOff => {
                 axis.travel(now, Micro(-homing.travel.0), limits);
                 Phase::Seek
             }
-            Phase::Seek if closed => {
-                axis.stop(now);
-                Phase::Brake { edge: counts }
-            }
-            Phase::Seek if moving => Phase::Seek,
-            Phase::Seek => return not_found(homing.travel.0),
+            Phase::Seek => match edge_now {
+                Some(edge) => {
+                    axis.stop(now);
+                    Phase::Brake { edge }
+                }
+                None if moving => Phase::Seek,
+                None => return not_found(homing.travel.0),
+            },
             Phase::Brake { edge } if moving => Phase::Brake { edge },
             Phase::Brake { edge } => {
                 let overshoot = axis.settings.encoder().position_at(edge.0.wrapping_sub(counts.0));
@@ -99,16 +112,18 @@ impl Homing {
                 axis.travel(now, Micro(homing.retract.0.saturating_mul(-2)), slow);
                 Phase::Approach { edge }
             }
-            Phase::Approach { edge } if closed => {
-                let apart = axis.settings.encoder().position_at(counts.0.wrapping_sub(edge.0)).0;
-                if apart.abs() > homing.repeatability.0 {
-                    return Progress::Failed { code: FaultCode::HomeNotRepeatable, detail: apart };
+            Phase::Approach { edge } => match edge_now {
+                Some(slow_edge) => {
+                    let apart = axis.settings.encoder().position_at(slow_edge.0.wrapping_sub(edge.0)).0;
+                    if apart.abs() > homing.repeatability.0 {
+                        return Progress::Failed { code: FaultCode::HomeNotRepeatable, detail: apart };
+                    }
+                    axis.stop(now);
+                    Phase::Rest { edge: slow_edge }
                 }
-                axis.stop(now);
-                Phase::Rest { edge: counts }
-            }
-            Phase::Approach { edge } if moving => Phase::Approach { edge },
-            Phase::Approach { .. } => return not_found(homing.retract.0.saturating_mul(2)),
+                None if moving => Phase::Approach { edge },
+                None => return not_found(homing.retract.0.saturating_mul(2)),
+            },
             Phase::Rest { edge } if moving => Phase::Rest { edge },
             Phase::Rest { edge } => {
                 axis.reference(io, edge, homing.switch_at);
@@ -124,12 +139,14 @@ impl Homing {
 }
 
 /// Off the switch from wherever a search can have come to rest beyond it. It may still have been speeding up when it
-/// was stopped: taking that back lasts a/j, at no more than the speed of the search.
+/// was stopped: taking that back lasts a/j, at no more than the speed of the search. It was stopped when the contact was
+/// sure.
 fn back_off(axis: &Axis) -> Micro {
     let homing = axis.settings.homing;
     let limits = axis.settings.limits_at(homing.seek_speed);
     let braking = Profile::stop(limits.speed, 0.0, limits).end() + limits.speed * limits.acceleration / limits.jerk;
-    Micro(homing.retract.0.saturating_add(braking as i32))
+    let unsure = limits.speed * f32::from(DEBOUNCE_TICKS) * TICK_US as f32 * 1e-6;
+    Micro(homing.retract.0.saturating_add((braking + unsure) as i32))
 }
 
 fn stuck(distance: i32) -> Progress {

@@ -11,6 +11,7 @@
 #![no_std]
 
 mod axis;
+mod contact;
 mod controller;
 mod homing;
 mod io;

@@ -3,6 +3,9 @@
 use vergence_control::Scale;
 use vergence_protocol::{AxisKind, Microseconds};
 
+use crate::encoder::{Encoder, EncoderFault};
+use crate::switch::{Switch, SwitchNoise};
+
 /// What an axis is made of. Positions are axis coordinates in micro-units (µm or µrad).
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct AxisMechanics {
@@ -33,26 +36,30 @@ pub struct AxisPlant {
     /// Axis position of motor step zero; changes when steps are lost.
     motor_zero: f64,
     load: f64,
-    /// The encoder counts from wherever it was switched on.
-    raw_zero: i32,
+    encoder: Encoder,
+    home: Switch,
     blocked: bool,
+    stalled: bool,
+    /// Steps that the rotor will miss.
+    to_lose: f64,
 }
 
 impl AxisPlant {
     /// An axis standing at `position`, whose encoder starts at count zero there.
     #[must_use]
     pub fn new(mechanics: AxisMechanics, position: f64) -> Self {
-        let mut axis = Self {
+        Self {
             mechanics,
             ordered: (0, Microseconds(0)),
             steps: 0.0,
             motor_zero: position,
             load: position,
-            raw_zero: 0,
+            encoder: Encoder::new(scale_reading(mechanics.encoder, position)),
+            home: Switch::new(position <= mechanics.home_switch),
             blocked: false,
-        };
-        axis.raw_zero = axis.counts_from_zero();
-        axis
+            stalled: false,
+            to_lose: 0.0,
+        }
     }
 
     /// Where the load truly is.
@@ -64,11 +71,11 @@ impl AxisPlant {
     /// The raw encoder count.
     #[must_use]
     pub fn encoder(&self) -> i32 {
-        self.counts_from_zero().wrapping_sub(self.raw_zero)
+        self.encoder.raw(self.scale_reading())
     }
 
-    fn counts_from_zero(&self) -> i32 {
-        (self.load * counts_per_micro(self.mechanics.encoder)).floor() as i32
+    fn scale_reading(&self) -> i32 {
+        scale_reading(self.mechanics.encoder, self.load)
     }
 
     /// Steps made so far.
@@ -93,10 +100,30 @@ impl AxisPlant {
         self.blocked = blocked;
     }
 
-    /// Whether the home switch is closed.
+    /// Lets the rotor stand while steps are made, or turn again where it stands.
+    pub fn stall(&mut self, stalled: bool) {
+        self.stalled = stalled;
+    }
+
+    /// The rotor misses the next `steps` steps; a motor at rest loses none.
+    pub fn lose_steps(&mut self, steps: u32) {
+        self.to_lose += f64::from(steps);
+    }
+
+    /// Makes the encoder fail from here on, or whole again.
+    pub fn fail_encoder(&mut self, fault: Option<EncoderFault>) {
+        self.encoder.fail(fault, self.scale_reading());
+    }
+
+    /// Makes the home switch behave badly from now on, or well again.
+    pub fn disturb_home_switch(&mut self, noise: Option<SwitchNoise>) {
+        self.home.disturb(noise);
+    }
+
+    /// Whether the home switch reads closed.
     #[must_use]
     pub fn home_switch(&self) -> bool {
-        self.load <= self.mechanics.home_switch
+        self.home.reads_closed()
     }
 
     /// Whether a hard limit switch is closed.
@@ -120,17 +147,24 @@ impl AxisPlant {
         let held_by = if self.blocked { [self.load; 2] } else { self.mechanics.end_stops };
         self.load += (pulled - self.load) * share;
         self.strike(held_by, motor);
+        self.encoder.advance();
+        self.home.advance(self.load <= self.mechanics.home_switch, to.0 - from.0);
     }
 
     fn turn_motor(&mut self, from: Microseconds, to: Microseconds) {
         let (target, by) = self.ordered;
         let target = f64::from(target);
+        let before = self.steps;
         self.steps = if to >= by {
             target
         } else {
             let share = (to.0 - from.0) as f64 / (by.0 - from.0) as f64;
             self.steps + (target - self.steps) * share
         };
+        let made = self.steps - before;
+        let lost = if self.stalled { made } else { made.clamp(-self.to_lose, self.to_lose) };
+        self.to_lose = (self.to_lose - lost.abs()).max(0.0);
+        self.motor_zero -= lost / counts_per_micro(self.mechanics.motor);
     }
 
     /// A load at an obstacle stays there, and a motor that pulls further loses steps.
@@ -143,6 +177,11 @@ impl AxisPlant {
             self.motor_zero += reachable - motor;
         }
     }
+}
+
+/// The mark of an encoder's scale at a position.
+fn scale_reading(encoder: Scale, position: f64) -> i32 {
+    (position * counts_per_micro(encoder)).floor() as i32
 }
 
 /// Counts (or steps) for each micro-unit of the axis.

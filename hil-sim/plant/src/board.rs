@@ -12,6 +12,7 @@ use crate::plant::Plant;
 #[derive(Debug)]
 pub struct NativeBoard {
     node: Node,
+    settings: Vec<AxisSettings>,
     plant: Plant,
     now: Microseconds,
     next_tick: Microseconds,
@@ -23,25 +24,44 @@ impl NativeBoard {
     /// # Errors
     /// [`SettingsError`] where an axis cannot work with its settings.
     pub fn new(settings: &[AxisSettings], mechanics: &[AxisMechanics], seed: u64) -> Result<Self, SettingsError> {
-        let controller = Controller::new(settings)?;
         let mut random = Pcg64Mcg::seed_from_u64(seed);
         let positions: Vec<f64> = settings
             .iter()
             .map(|axis| f64::from(axis.min.0) + random.random::<f64>() * f64::from(axis.max.0 - axis.min.0))
             .collect();
-        let identity = NodeIdentity {
-            board: "native-sim".try_into().unwrap_or_default(),
-            firmware: firmware_version(),
-            build: 0,
-            uid: *b"vergence-sim",
-            reset: ResetCause::PowerOn,
-        };
+        Self::standing_at(settings, mechanics, &positions, random.random())
+    }
+
+    /// A board that has just been switched on, whose stages stand at `positions` (micro-units). `boot` names this start.
+    ///
+    /// # Errors
+    /// [`SettingsError`] where an axis cannot work with its settings.
+    pub fn standing_at(
+        settings: &[AxisSettings],
+        mechanics: &[AxisMechanics],
+        positions: &[f64],
+        boot: u32,
+    ) -> Result<Self, SettingsError> {
         Ok(Self {
-            node: Node::new(controller, identity, random.random()),
-            plant: Plant::new(mechanics, &positions),
+            node: start(settings, ResetCause::PowerOn, boot)?,
+            settings: settings.to_vec(),
+            plant: Plant::new(mechanics, positions),
             now: Microseconds(0),
             next_tick: Microseconds(0),
         })
+    }
+
+    /// Restarts the board in whatever it is doing: memory is lost, drivers go off, its clock begins again at zero and
+    /// the mechanics keep their place. `boot` names this start.
+    ///
+    /// # Errors
+    /// [`SettingsError`], which cannot be where the settings were taken before.
+    pub fn restart(&mut self, cause: ResetCause, boot: u32) -> Result<(), SettingsError> {
+        self.node = start(&self.settings, cause, boot)?;
+        self.plant.restart_clock();
+        self.now = Microseconds(0);
+        self.next_tick = Microseconds(0);
+        Ok(())
     }
 
     /// The board's clock.
@@ -94,6 +114,18 @@ impl NativeBoard {
     pub fn plant_mut(&mut self) -> &mut Plant {
         &mut self.plant
     }
+}
+
+/// The software as it starts.
+fn start(settings: &[AxisSettings], reset: ResetCause, boot: u32) -> Result<Node, SettingsError> {
+    let identity = NodeIdentity {
+        board: "native-sim".try_into().unwrap_or_default(),
+        firmware: firmware_version(),
+        build: 0,
+        uid: *b"vergence-sim",
+        reset,
+    };
+    Ok(Node::new(Controller::new(settings)?, identity, boot))
 }
 
 /// The workspace's version: the native board runs its own sources.

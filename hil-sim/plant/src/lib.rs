@@ -1,14 +1,18 @@
 //! The simulated mechanics of the rig, and the native board: the controller core run in virtual time against them.
 //!
 //! Simulated here: stepper motors, the compliance and backlash of screw and rack, load-side encoders, home and limit
-//! switches, mechanical end stops. Everything is deterministic in its seed and its inputs.
+//! switches, mechanical end stops, and how each of them fails. Everything is deterministic in its seed and its inputs.
 
 mod axis;
 mod bench;
 mod board;
+mod encoder;
 mod plant;
+mod switch;
 
 pub use axis::{AxisMechanics, AxisPlant};
 pub use bench::{Stage, bench_mechanics, bench_settings};
 pub use board::NativeBoard;
+pub use encoder::EncoderFault;
 pub use plant::Plant;
+pub use switch::SwitchNoise;

@@ -28,6 +28,23 @@ impl Plant {
         self.axes.iter().map(AxisPlant::load).collect()
     }
 
+    /// Where the load of `axis` truly is, in micro-units.
+    #[must_use]
+    pub fn load(&self, axis: usize) -> Option<f64> {
+        self.axes.get(axis).map(AxisPlant::load)
+    }
+
+    /// One axis, for doing something to it; `None` where there is no such axis.
+    pub fn axis_mut(&mut self, axis: usize) -> Option<&mut AxisPlant> {
+        self.axes.get_mut(axis)
+    }
+
+    /// The clock of the board begins again at zero, its outputs fall back to off; the mechanics keep their place.
+    pub fn restart_clock(&mut self) {
+        self.set_drivers(false);
+        self.now = Microseconds(0);
+    }
+
     /// Whether the motors are held.
     #[must_use]
     pub fn drivers_on(&self) -> bool {

@@ -17,7 +17,7 @@ impl Controller {
             Request::Arm { session: named } if *named == session => self.arm(now, session, io),
             Request::Arm { .. } => Err(Refusal::WrongSession),
             Request::Disarm => self.disarm(now, io),
-            Request::Home { axes } => self.home(now, session, *axes, io),
+            Request::Home { axes } => self.home(now, session, *axes),
             Request::MoveTo(target) => self.move_to(now, session, target),
             Request::Stop { kind } => {
                 self.stop(now, *kind, io);
@@ -81,13 +81,13 @@ impl Controller {
         }
     }
 
-    fn home(&mut self, now: Microseconds, session: SessionId, axes: AxisMask, io: &impl RigIo) -> Result<(), Refusal> {
+    fn home(&mut self, now: Microseconds, session: SessionId, axes: AxisMask) -> Result<(), Refusal> {
         self.may_start(now, session)?;
         if axes == AxisMask::default() || axes.0 & !AxisMask::first(self.axes.len()).0 != 0 {
             return Err(Refusal::Invalid);
         }
         for (index, (axis, homing)) in self.axes.iter_mut().zip(&mut self.homing).enumerate() {
-            *homing = axes.contains(index).then(|| Homing::start(now, axis, io));
+            *homing = axes.contains(index).then(|| Homing::start(axis));
         }
         self.active.phase = MovePhase::None;
         self.state = ControllerState::Homing;

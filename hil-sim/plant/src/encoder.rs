@@ -1,0 +1,79 @@
+//! A load-side incremental encoder, and the ways in which one fails.
+
+use rand::{RngExt, SeedableRng};
+use rand_pcg::Pcg64Mcg;
+
+/// How an encoder fails.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum EncoderFault {
+    /// The count stands where it is.
+    Stuck,
+    /// The count runs the wrong way from here on: two phases changed places.
+    Reversed,
+    /// Every reading is off by up to `amplitude` counts to either side.
+    Noisy {
+        /// Largest error in counts, not negative.
+        amplitude: i32,
+        /// Decides the errors.
+        seed: u64,
+    },
+    /// It reads the count at which it was switched on.
+    Dead,
+}
+
+/// What an encoder does to the true count.
+#[derive(Clone, Debug)]
+enum Reading {
+    True,
+    Stuck(i32),
+    Mirrored(i32),
+    Noisy { amplitude: i32, random: Pcg64Mcg, error: i32 },
+    Dead,
+}
+
+/// An encoder that counts from wherever it was switched on.
+#[derive(Clone, Debug)]
+pub struct Encoder {
+    zero: i32,
+    reading: Reading,
+}
+
+impl Encoder {
+    /// Switched on where the scale reads `zero`.
+    pub fn new(zero: i32) -> Self {
+        Self { zero, reading: Reading::True }
+    }
+
+    /// The raw count where the scale reads `scale`.
+    pub fn raw(&self, scale: i32) -> i32 {
+        let count = scale.wrapping_sub(self.zero);
+        match self.reading {
+            Reading::True => count,
+            Reading::Stuck(at) => at,
+            Reading::Mirrored(pivot) => pivot.wrapping_sub(count.wrapping_sub(pivot)),
+            Reading::Noisy { error, .. } => count.wrapping_add(error),
+            Reading::Dead => 0,
+        }
+    }
+
+    /// Fails where the scale reads `scale`, or is whole again.
+    pub fn fail(&mut self, fault: Option<EncoderFault>, scale: i32) {
+        let here = self.raw(scale);
+        self.reading = match fault {
+            None => Reading::True,
+            Some(EncoderFault::Stuck) => Reading::Stuck(here),
+            Some(EncoderFault::Reversed) => Reading::Mirrored(here),
+            Some(EncoderFault::Noisy { amplitude, seed }) => {
+                Reading::Noisy { amplitude: amplitude.max(0), random: Pcg64Mcg::seed_from_u64(seed), error: 0 }
+            }
+            Some(EncoderFault::Dead) => Reading::Dead,
+        };
+    }
+
+    /// Time passes: noise is another one.
+    pub fn advance(&mut self) {
+        if let Reading::Noisy { amplitude, random, error } = &mut self.reading {
+            *error = random.random_range(-*amplitude..=*amplitude);
+        }
+    }
+}

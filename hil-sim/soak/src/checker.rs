@@ -1,0 +1,400 @@
+//! Looks on: the truth of the mechanics, the bytes that reach the board, the bytes that leave it.
+
+use std::fmt;
+
+use vergence_control::RigIo;
+use vergence_plant::{Plant, Stage};
+use vergence_protocol::{
+    AxisMask, ControllerState, FaultRecord, Micro, Microseconds, Mode, MoveId, MovePhase, PoseReport, Receiver, Report,
+    Request, SessionId,
+};
+
+use crate::faults::Fault;
+use crate::journal::Journal;
+
+/// The control tick, and how finely truth is looked at.
+const TICK_S: f64 = 1e-3;
+/// From the end of the lease to the tick that notices it, and from there to the look at its last step.
+const NOTICE_US: u64 = 3_000;
+/// A contact that closes for good is told from a spike within this time; a spike shortly before may pass for its edge.
+const DEBOUNCE_S: f64 = 10e-3;
+
+/// What is promised.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Promise {
+    /// The load stays inside the hard limit switches.
+    HardLimit,
+    /// Drivers go on only where a session with a live lease arms; motors step only with drivers on.
+    Armed,
+    /// Motors stop in time after the lease.
+    Lease,
+    /// Moves that must not be are refused.
+    Refuses,
+    /// A mode is reported only at its place.
+    Mode,
+    /// An axis whose encoder is lost stops.
+    Follows,
+    /// The first fault is kept until it is cleared.
+    FirstFault,
+    /// What a pose says of the board is true.
+    State,
+    /// Every motion and every request ends, and in the end everything stands still.
+    Ends,
+}
+
+/// A broken promise.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Violation {
+    /// When, true time.
+    pub at: Microseconds,
+    /// Which.
+    pub promise: Promise,
+    /// What was seen.
+    pub what: String,
+}
+
+impl fmt::Display for Violation {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{:?}: {}", self.promise, self.what)
+    }
+}
+
+/// What an encoder shows of its load.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Sight {
+    /// The truth.
+    Clear,
+    /// The truth with noise.
+    Blurred,
+    /// Nothing.
+    Lost,
+}
+
+#[derive(Debug)]
+struct WatchedAxis {
+    stage: Stage,
+    sight: Sight,
+    /// Whether its encoder has ever lied.
+    lied: bool,
+    /// How far the reference may be off.
+    reference_error: f64,
+    steps: i32,
+    load: f64,
+    /// Where the load was when it was lost from sight with drivers on.
+    lost_at: Option<f64>,
+}
+
+#[derive(Debug)]
+pub struct Checker {
+    axes: Vec<WatchedAxis>,
+    from_host: Receiver,
+    from_board: Receiver,
+    /// The latest heartbeat of each session, and until when it counts.
+    leases: Vec<(SessionId, u64)>,
+    moves: Vec<(MoveId, Mode, Vec<Micro>)>,
+    /// Who has asked to arm with the bytes that just arrived.
+    arm_asked: Option<SessionId>,
+    holder: Option<SessionId>,
+    drivers_on: bool,
+    clear_asked: Option<u16>,
+    fault: Option<FaultRecord>,
+    /// No pose since the restart.
+    restarted: bool,
+    state: Option<ControllerState>,
+    busy_since: Option<u64>,
+    stepped_at: u64,
+    violations: Vec<Violation>,
+}
+
+impl Checker {
+    pub fn new(stages: impl IntoIterator<Item = Stage>, faults: &[Fault], plant: &Plant) -> Self {
+        let axes = stages.into_iter().enumerate().map(|(index, stage)| WatchedAxis::new(index, stage, faults, plant));
+        Self {
+            axes: axes.collect(),
+            from_host: Receiver::new(),
+            from_board: Receiver::new(),
+            leases: Vec::new(),
+            moves: Vec::new(),
+            arm_asked: None,
+            holder: None,
+            drivers_on: false,
+            clear_asked: None,
+            fault: None,
+            restarted: true,
+            state: None,
+            busy_since: None,
+            stepped_at: 0,
+            violations: Vec::new(),
+        }
+    }
+
+    pub fn into_violations(self) -> Vec<Violation> {
+        self.violations
+    }
+
+    /// Each promise is reported broken once.
+    pub fn accuse(&mut self, at: Microseconds, promise: Promise, what: String) {
+        if self.violations.iter().all(|violation| violation.promise != promise) {
+            self.violations.push(Violation { at, promise, what });
+        }
+    }
+
+    /// An encoder fails, or is whole again.
+    pub fn encoder_shows(&mut self, axis: usize, sight: Sight) {
+        if let Some(axis) = self.axes.get_mut(axis) {
+            axis.sight = sight;
+            axis.lied |= sight != Sight::Clear;
+            axis.lost_at = None;
+        }
+    }
+
+    /// The board restarted: nobody has armed it and it remembers nothing.
+    pub fn restarted(&mut self, plant: &Plant) {
+        (self.holder, self.fault, self.clear_asked, self.busy_since) = (None, None, None, None);
+        self.drivers_on = plant.drivers_on();
+        self.restarted = true;
+        self.state = None;
+        for (index, axis) in self.axes.iter_mut().enumerate() {
+            axis.steps = plant.steps(index);
+        }
+    }
+
+    /// A millisecond has passed.
+    pub fn watch(&mut self, now: Microseconds, plant: &Plant) {
+        let before = self.holder;
+        self.watch_drivers(now, plant);
+        // Until the tick that cut the drivers the motors may have stepped.
+        let holder = self.holder.or(before);
+        for index in 0..self.axes.len() {
+            let (steps, load) = (plant.steps(index), plant.load(index).unwrap_or_default());
+            let axis = &mut self.axes[index];
+            let stepped = steps != axis.steps;
+            (axis.steps, axis.load) = (steps, load);
+            axis.lost_at = (axis.sight == Sight::Lost && plant.drivers_on()).then(|| axis.lost_at.unwrap_or(load));
+            if let Some(what) = axis.check_hard_limit() {
+                self.accuse(now, Promise::HardLimit, format!("axis {index}: {what}"));
+            }
+            if let Some(what) = self.axes[index].check_following() {
+                self.accuse(now, Promise::Follows, format!("axis {index}: {what}"));
+            }
+            if stepped {
+                self.check_step(now, index, holder);
+            }
+        }
+        if let Some(since) = self.busy_since
+            && now.0 - since > self.longest_motion_us()
+        {
+            self.accuse(now, Promise::Ends, format!("{:?} does not end", self.state));
+        }
+    }
+
+    fn watch_drivers(&mut self, now: Microseconds, plant: &Plant) {
+        let was_on = std::mem::replace(&mut self.drivers_on, plant.drivers_on());
+        let asked = self.arm_asked.take();
+        match (was_on, self.drivers_on) {
+            (false, true) => {
+                self.holder = asked.filter(|&session| self.lease_end(session) > now.0);
+                if self.holder.is_none() {
+                    self.accuse(now, Promise::Armed, format!("drivers go on though armed by {asked:?}"));
+                }
+            }
+            (_, false) => self.holder = None,
+            (true, true) => {}
+        }
+    }
+
+    fn check_step(&mut self, now: Microseconds, axis: usize, holder: Option<SessionId>) {
+        self.stepped_at = now.0;
+        let Some(holder) = holder else {
+            return self.accuse(now, Promise::Armed, format!("axis {axis} steps though nobody has armed"));
+        };
+        let lease_end = self.lease_end(holder);
+        if now.0 > lease_end + self.longest_stop_us() + NOTICE_US {
+            let late = now.0 - lease_end;
+            self.accuse(now, Promise::Lease, format!("axis {axis} steps {late} us after the lease"));
+        }
+    }
+
+    fn lease_end(&self, session: SessionId) -> u64 {
+        self.leases.iter().find(|(named, _)| *named == session).map_or(0, |(_, end)| *end)
+    }
+
+    /// v/a + 2a/j, the slowest axis.
+    fn longest_stop_us(&self) -> u64 {
+        let stop = |axis: &WatchedAxis| {
+            let settings = &axis.stage.settings;
+            let [v, a, j] = [settings.speed, settings.acceleration, settings.jerk].map(f64::from);
+            ((v / a + 2.0 * a / j) * 1e6).ceil() as u64
+        };
+        self.axes.iter().map(stop).max().unwrap_or(0)
+    }
+
+    /// Twice the whole search, the slow approach, and some.
+    fn longest_motion_us(&self) -> u64 {
+        let motion = |axis: &WatchedAxis| {
+            let homing = &axis.stage.settings.homing;
+            let [travel, retract] = [homing.travel, homing.retract].map(|way| f64::from(way.0));
+            let [seek, slow] = [homing.seek_speed, homing.approach_speed].map(f64::from);
+            ((2.0 * travel / seek + 4.0 * retract / slow + 5.0) * 1e6) as u64
+        };
+        self.axes.iter().map(motion).max().unwrap_or(0)
+    }
+
+    /// Bytes reach the board.
+    pub fn heard_from_host(&mut self, now: Microseconds, bytes: &[u8]) {
+        for &byte in bytes {
+            let Some(frame) = self.from_host.push(byte) else { continue };
+            let Ok(request) = frame.body::<Request>() else { continue };
+            match request {
+                Request::Heartbeat { session, lease_ms } => {
+                    let end = now.0 + u64::from(lease_ms) * 1000;
+                    self.leases.retain(|(named, _)| *named != session);
+                    self.leases.push((session, end));
+                }
+                Request::Arm { session } => self.arm_asked = Some(session),
+                Request::ClearFault { seen } => self.clear_asked = Some(seen),
+                Request::MoveTo(order) => {
+                    self.moves.retain(|(id, ..)| *id != order.id);
+                    self.moves.push((order.id, order.mode, order.targets.to_vec()));
+                }
+                _ => {}
+            }
+        }
+    }
+
+    /// The board has dealt with them.
+    pub fn received(&mut self, now: Microseconds, plant: &Plant) {
+        self.watch_drivers(now, plant);
+    }
+
+    /// A frame leaves the board.
+    pub fn heard_from_board(&mut self, now: Microseconds, bytes: &[u8], plant: &Plant, journal: &mut Journal) {
+        for &byte in bytes {
+            let Some(frame) = self.from_board.push(byte) else { continue };
+            match frame.body::<Report>() {
+                Ok(Report::Pose(pose)) => self.check_pose(now, &pose, plant, journal),
+                Ok(Report::Fault(record)) => {
+                    journal.note(now, format!("board: {}: {record:?}", record.code));
+                    self.check_fault(now, Some(record));
+                }
+                _ => {}
+            }
+        }
+    }
+
+    fn check_pose(&mut self, now: Microseconds, pose: &PoseReport, plant: &Plant, journal: &mut Journal) {
+        if self.state.replace(pose.state) != Some(pose.state) {
+            journal.note(now, format!("board: {}, loads {:.1?}", pose.state, plant.loads()));
+        }
+        let busy = matches!(pose.state, ControllerState::Homing | ControllerState::Moving | ControllerState::Stopping);
+        self.busy_since = if busy { self.busy_since.or(Some(now.0)) } else { None };
+        self.check_fault(now, pose.fault);
+        self.check_state(now, pose, plant);
+        if pose.mode != Mode(0)
+            && let Some(what) = self.wrong_mode(pose)
+        {
+            self.accuse(now, Promise::Mode, what);
+        }
+        if std::mem::take(&mut self.restarted) {
+            let fresh = pose.referenced == AxisMask(0) && pose.phase == MovePhase::None && pose.fault.is_none();
+            if !fresh {
+                self.accuse(now, Promise::State, format!("remembers what was before its start: {pose:?}"));
+            }
+        }
+    }
+
+    /// The first fault stays as it is until it is cleared by its number.
+    fn check_fault(&mut self, now: Microseconds, told: Option<FaultRecord>) {
+        if let Some(first) = self.fault {
+            let kept = told
+                .is_some_and(|told| told.later >= first.later && FaultRecord { later: first.later, ..told } == first);
+            if !kept && self.clear_asked != Some(first.seq) {
+                self.accuse(now, Promise::FirstFault, format!("{first:?} became {told:?}"));
+            }
+        }
+        self.fault = told;
+    }
+
+    fn check_state(&mut self, now: Microseconds, pose: &PoseReport, plant: &Plant) {
+        let latched = matches!(pose.state, ControllerState::LinkLost | ControllerState::Fault);
+        if latched != pose.fault.is_some() {
+            self.accuse(now, Promise::FirstFault, format!("state {} with fault {:?}", pose.state, pose.fault));
+        }
+        // Latched, the drivers may hold the stages or not.
+        let off = pose.state == ControllerState::Idle;
+        if !latched && off == plant.drivers_on() {
+            let on = plant.drivers_on();
+            self.accuse(now, Promise::State, format!("{} while drivers on is {on}", pose.state));
+        }
+    }
+
+    /// What is wrong about a reported mode.
+    fn wrong_mode(&self, pose: &PoseReport) -> Option<String> {
+        let Some((_, mode, targets)) = self.moves.iter().find(|(id, ..)| *id == pose.move_id) else {
+            return Some(format!("mode {:?} of a move that nobody asked for", pose.mode));
+        };
+        if *mode != pose.mode {
+            return Some(format!("mode {:?} of a move to {mode:?}", pose.mode));
+        }
+        let mut pairs = self.axes.iter().zip(targets).enumerate();
+        pairs.find_map(|(index, (axis, target))| {
+            let (off, allowed) = (axis.load - f64::from(target.0), axis.mode_tolerance());
+            (off.abs() > allowed).then(|| format!("{mode:?} but axis {index} is off by {off:.1} of {allowed:.1}"))
+        })
+    }
+
+    /// At the end, long after the host has fallen silent.
+    pub fn check_rest(&mut self, now: Microseconds) {
+        if now.0.saturating_sub(self.stepped_at) < 100_000 {
+            self.accuse(now, Promise::Ends, "still stepping at the end".into());
+        }
+    }
+}
+
+impl WatchedAxis {
+    fn new(index: usize, stage: Stage, faults: &[Fault], plant: &Plant) -> Self {
+        // The reference is the edge seen at a tick.
+        let chatter = faults.iter().find_map(|fault| match *fault {
+            Fault::SwitchBounce { axis, chatter_us, .. } if axis == index => {
+                Some(chatter_us as f64 * 1e-6 + DEBOUNCE_S)
+            }
+            _ => None,
+        });
+        let late = TICK_S + chatter.unwrap_or(0.0);
+        Self {
+            stage,
+            sight: Sight::Clear,
+            lied: false,
+            reference_error: f64::from(stage.settings.homing.approach_speed) * late,
+            steps: plant.steps(index),
+            load: plant.load(index).unwrap_or_default(),
+            lost_at: None,
+        }
+    }
+
+    /// What no controller can take back: the way of a tick at full speed, and the load's lag behind its motor.
+    fn overshoot(&self) -> f64 {
+        let mechanics = &self.stage.mechanics;
+        f64::from(self.stage.settings.speed) * (TICK_S + mechanics.compliance) + mechanics.backlash
+    }
+
+    fn check_hard_limit(&self) -> Option<String> {
+        let [low, high] = self.stage.mechanics.hard_limits;
+        let beyond = (low - self.load).max(self.load - high);
+        (beyond > self.overshoot()).then(|| format!("{beyond:.1} beyond its hard limit, at {:.1}", self.load))
+    }
+
+    fn check_following(&self) -> Option<String> {
+        let settings = &self.stage.settings;
+        let allowed = f64::from(settings.following_error.0 + settings.homing.repeatability.0) + self.overshoot();
+        let way = (self.load - self.lost_at?).abs();
+        (way > allowed).then(|| format!("went {way:.1} of {allowed:.1} without encoder"))
+    }
+
+    fn mode_tolerance(&self) -> f64 {
+        let settings = &self.stage.settings;
+        let count = f64::from(settings.encoder().position_at(1_000_000).0) * 1e-6;
+        let blind = if self.lied { f64::from(settings.following_error.0) } else { 0.0 };
+        f64::from(settings.tolerance.0) + self.reference_error + 2.0 * count + blind
+    }
+}

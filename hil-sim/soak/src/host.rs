@@ -1,0 +1,352 @@
+//! A scripted host: it wants things done, keeps the board alive, asks again, clears faults, and in the end gives up.
+//! It never takes up motion again by itself: every arm, home and move is asked for anew.
+
+use vergence_protocol::{
+    AxisMask, ControllerState, FaultRecord, HostEvent, HostSession, MAX_FRAME, Microseconds, Move, MoveId, MovePhase,
+    Report, Request, SessionId, Status, StopKind, Ticket,
+};
+
+use crate::scenario::{Destination, Step};
+use crate::stages::stages;
+
+/// How long the board may go without hearing from the host.
+const LEASE_MS: u16 = 100;
+const BEAT_US: u64 = 20_000;
+const POSE_PERIOD_US: u32 = 10_000;
+/// A board that was silent for so long is called anew.
+const SILENCE_US: u64 = 300_000;
+/// Before what was refused is asked again.
+const PAUSE_US: u64 = 100_000;
+/// A person needs longer than this to see what went wrong and mend it.
+const MEND_US: u64 = 300_000;
+/// A request that a talking board has not answered after so many turns (milliseconds) never will be.
+const PATIENCE: u32 = 6_000;
+/// When to give up: faults cleared, sessions opened, requests for one step of the script.
+const MOST_FAULTS: u32 = 4;
+const MOST_SESSIONS: u32 = 30;
+const MOST_REQUESTS: u32 = 60;
+
+/// What the latest pose said.
+#[derive(Clone, Copy, Debug)]
+struct Seen {
+    state: ControllerState,
+    referenced: bool,
+    settled: Option<MoveId>,
+    fault: Option<FaultRecord>,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Purpose {
+    Stream,
+    Arm,
+    Home,
+    Move(MoveId),
+    Forbidden,
+    Clear,
+    Disarm,
+}
+
+#[derive(Clone, Copy, Debug)]
+struct Asked {
+    ticket: Ticket,
+    purpose: Purpose,
+    turns: u32,
+}
+
+/// How the script ended for the host.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum HostEnd {
+    /// Everything was done.
+    Done,
+    /// Too many faults.
+    GaveUp,
+    /// The board talks but does not answer.
+    Unanswered,
+    /// The board did what it had to refuse.
+    ForbiddenAccepted,
+}
+
+#[derive(Debug)]
+pub struct Host {
+    session: HostSession,
+    script: Vec<Step>,
+    step: usize,
+    beat_due: Microseconds,
+    /// When the session was called or last heard.
+    heard: Microseconds,
+    streaming: bool,
+    asked: Option<Asked>,
+    seen: Option<Seen>,
+    wait_until: Microseconds,
+    /// What the running step has asked for and got.
+    homed: bool,
+    going: Option<MoveId>,
+    stop_due: Option<Microseconds>,
+    next_move: u16,
+    requests: u32,
+    /// The fault that was looked at last.
+    mending: Option<u16>,
+    faults: u32,
+    sessions: u32,
+    end: Option<HostEnd>,
+    /// What it did, since the last look.
+    pub notes: Vec<String>,
+}
+
+impl Host {
+    pub fn new(script: Vec<Step>, now: Microseconds) -> Self {
+        let mut host = Self {
+            session: HostSession::new(SessionId(1)),
+            script,
+            step: 0,
+            beat_due: Microseconds(0),
+            heard: now,
+            streaming: false,
+            asked: None,
+            seen: None,
+            wait_until: Microseconds(0),
+            homed: false,
+            going: None,
+            stop_due: None,
+            next_move: 0,
+            requests: 0,
+            mending: None,
+            faults: 0,
+            sessions: 0,
+            end: None,
+            notes: Vec::new(),
+        };
+        host.connect(now);
+        host
+    }
+
+    /// Which step of the script it is at.
+    pub fn step(&self) -> usize {
+        self.step
+    }
+
+    /// Whether and how it has ended: it says nothing any more.
+    pub fn end(&self) -> Option<HostEnd> {
+        self.end
+    }
+
+    /// Takes bytes from the board.
+    pub fn receive(&mut self, now: Microseconds, bytes: &[u8]) {
+        // One byte at a time: a byte ends one frame at most.
+        for byte in bytes {
+            let mut heard = None;
+            self.session.receive(now, std::slice::from_ref(byte), |event| heard = Some(event));
+            if let Some(event) = heard {
+                self.hear(now, event);
+            }
+        }
+    }
+
+    /// One turn, each millisecond: decides what to do and sends.
+    pub fn turn(&mut self, now: Microseconds, mut send: impl FnMut(&[u8])) {
+        if self.end.is_none() {
+            self.keep_alive(now);
+            self.decide(now);
+        }
+        let mut frame = [0; MAX_FRAME];
+        while self.end.is_none_or(|end| end == HostEnd::GaveUp)
+            && let Some(length) = self.session.transmit(now, &mut frame)
+        {
+            send(&frame[..length]);
+        }
+    }
+
+    fn connect(&mut self, now: Microseconds) {
+        self.sessions += 1;
+        if self.sessions > MOST_SESSIONS {
+            return self.give_up("no lasting session");
+        }
+        self.session = HostSession::new(SessionId(0x5e55_0000 + self.sessions));
+        self.session.hello();
+        self.heard = now;
+        self.streaming = false;
+        self.asked = None;
+        self.seen = None;
+        // What was asked for belonged to the session that is gone.
+        self.homed = false;
+    }
+
+    fn keep_alive(&mut self, now: Microseconds) {
+        if now.0.saturating_sub(self.heard.0) > SILENCE_US {
+            self.notes.push("host: the board is silent, calling again".into());
+            self.connect(now);
+        }
+        if self.session.is_open() && now >= self.beat_due {
+            let beat = Request::Heartbeat { session: self.session.id(), lease_ms: LEASE_MS };
+            // Where the queue is full another one is on its way.
+            let _ = self.session.send_now(beat);
+            self.beat_due = Microseconds(now.0 + BEAT_US);
+        }
+        if let Some(asked) = &mut self.asked {
+            asked.turns += 1;
+            if asked.turns > PATIENCE {
+                self.notes.push(format!("host: no answer to {:?}", asked.purpose));
+                self.end = Some(HostEnd::Unanswered);
+            }
+        }
+    }
+
+    fn decide(&mut self, now: Microseconds) {
+        if !self.session.is_open() || self.asked.is_some() || self.end.is_some() {
+            return;
+        }
+        if let Some(due) = self.stop_due
+            && now >= due
+        {
+            self.notes.push("host: Stop".into());
+            let _ = self.session.send_now(Request::Stop { kind: StopKind::Decelerate });
+            // Nobody repeats it but the host; a second one is as good as the first.
+            self.stop_due = Some(Microseconds(now.0 + PAUSE_US));
+        }
+        if !self.streaming {
+            return self.ask(now, Purpose::Stream, Request::SetStream { period_us: POSE_PERIOD_US });
+        }
+        if now < self.wait_until {
+            return;
+        }
+        let Some(seen) = self.seen.take() else { return };
+        if let Some(fault) = seen.fault {
+            return self.clear(now, fault);
+        }
+        match self.script.get(self.step).copied() {
+            None => self.finish(HostEnd::Done),
+            Some(step) => self.pursue(now, step, seen),
+        }
+    }
+
+    fn clear(&mut self, now: Microseconds, fault: FaultRecord) {
+        (self.homed, self.stop_due) = (false, None);
+        if self.mending.replace(fault.seq) != Some(fault.seq) {
+            self.wait_until = Microseconds(now.0 + MEND_US);
+            return;
+        }
+        self.ask(now, Purpose::Clear, Request::ClearFault { seen: fault.seq });
+    }
+
+    /// Goes on with a step, given what the board does.
+    fn pursue(&mut self, now: Microseconds, step: Step, seen: Seen) {
+        if matches!(seen.state, ControllerState::Homing | ControllerState::Moving | ControllerState::Stopping) {
+            return;
+        }
+        let idle = seen.state == ControllerState::Idle;
+        let session = self.session.id();
+        match step {
+            Step::MoveTooEarly(to) if idle || !seen.referenced => self.ask_move(now, Purpose::Forbidden, to),
+            Step::MoveTooEarly(_) => self.next_step(),
+            Step::Disarm if idle => self.next_step(),
+            Step::Disarm => self.ask(now, Purpose::Disarm, Request::Disarm),
+            Step::Pause(us) if self.going.is_none() => {
+                self.going = Some(MoveId(0));
+                self.wait_until = Microseconds(now.0 + us);
+            }
+            Step::Pause(_) => self.next_step(),
+            _ if idle => self.ask(now, Purpose::Arm, Request::Arm { session }),
+            Step::Arm => self.next_step(),
+            Step::Home if self.homed && seen.referenced => self.next_step(),
+            Step::MoveAndStop(..) if self.going.is_some() => self.next_step(),
+            Step::Move(_) if self.going.is_some() && seen.settled == self.going => self.next_step(),
+            Step::Move(to) | Step::MoveAndStop(to, _) if seen.referenced => {
+                self.next_move += 1;
+                self.ask_move(now, Purpose::Move(MoveId(self.next_move)), to);
+            }
+            Step::MoveTooFar(to) if seen.referenced => self.ask_move(now, Purpose::Forbidden, to),
+            _ => self.ask(now, Purpose::Home, Request::Home { axes: AxisMask::first(stages().len()) }),
+        }
+    }
+
+    fn ask_move(&mut self, now: Microseconds, purpose: Purpose, to: Destination) {
+        let id = if let Purpose::Move(id) = purpose { id } else { MoveId(u16::MAX) };
+        let targets = to.targets.into_iter().collect();
+        self.ask(now, purpose, Request::MoveTo(Move { id, mode: to.mode, targets, speed: to.speed }));
+    }
+
+    fn ask(&mut self, now: Microseconds, purpose: Purpose, request: Request) {
+        self.requests += 1;
+        if self.requests > MOST_REQUESTS {
+            return self.give_up("no progress");
+        }
+        self.notes.push(format!("host: {request:?}"));
+        match self.session.submit(now, request) {
+            Ok(ticket) => self.asked = Some(Asked { ticket, purpose, turns: 0 }),
+            Err(error) => self.notes.push(format!("host: {error}")),
+        }
+    }
+
+    fn hear(&mut self, now: Microseconds, event: HostEvent) {
+        if self.end.is_some() {
+            return;
+        }
+        self.heard = now;
+        match event {
+            HostEvent::Lost { boot } => {
+                self.notes.push(format!("host: the session is lost, boot {boot}"));
+                self.connect(now);
+            }
+            HostEvent::Reply { ticket, report: Report::Ack { status, .. } } => self.answered(now, ticket, status),
+            HostEvent::Report(Report::Pose(pose)) => {
+                self.seen = Some(Seen {
+                    state: pose.state,
+                    referenced: pose.referenced == AxisMask::first(stages().len()),
+                    settled: (pose.phase == MovePhase::Settled).then_some(pose.move_id),
+                    fault: pose.fault,
+                });
+            }
+            HostEvent::Opened { .. } | HostEvent::Reply { .. } | HostEvent::Report(_) => {}
+        }
+    }
+
+    fn answered(&mut self, now: Microseconds, ticket: Ticket, status: Status) {
+        let Some(asked) = self.asked.take_if(|asked| asked.ticket == ticket) else { return };
+        // The next pose is younger than the answer.
+        self.seen = None;
+        if let Status::Refused(why) = status {
+            self.notes.push(format!("host: refused: {why}"));
+            self.wait_until = Microseconds(now.0 + PAUSE_US);
+        }
+        match (asked.purpose, status) {
+            (Purpose::Stream, _) => self.streaming = status == Status::Accepted,
+            (Purpose::Home, _) => self.homed = status == Status::Accepted,
+            (Purpose::Move(id), Status::Accepted) => {
+                self.going = Some(id);
+                if let Some(Step::MoveAndStop(_, after_us)) = self.script.get(self.step) {
+                    self.stop_due = Some(Microseconds(now.0 + after_us));
+                }
+            }
+            (Purpose::Forbidden, Status::Accepted) => self.finish(HostEnd::ForbiddenAccepted),
+            (Purpose::Forbidden, Status::Refused(_)) => self.next_step(),
+            (Purpose::Clear, Status::Accepted) => {
+                self.mending = None;
+                self.faults += 1;
+                if self.faults > MOST_FAULTS {
+                    self.give_up("too many faults");
+                }
+            }
+            _ => {}
+        }
+    }
+
+    fn next_step(&mut self) {
+        self.step += 1;
+        (self.homed, self.going, self.stop_due, self.requests) = (false, None, None, 0);
+        self.notes.push(match self.script.get(self.step) {
+            Some(step) => format!("host: next is {step:?}"),
+            None => "host: all done".into(),
+        });
+    }
+
+    /// With a last word: off.
+    fn give_up(&mut self, why: &str) {
+        self.notes.push(format!("host: gives up, {why}"));
+        let _ = self.session.send_now(Request::Stop { kind: StopKind::TorqueOff });
+        self.finish(HostEnd::GaveUp);
+    }
+
+    fn finish(&mut self, end: HostEnd) {
+        self.end = Some(end);
+    }
+}

@@ -1,0 +1,162 @@
+//! Makes faults happen at their instants.
+
+use vergence_plant::{AxisPlant, EncoderFault, Plant, SwitchNoise};
+use vergence_protocol::Microseconds;
+
+use crate::checker::{Checker, Sight};
+use crate::faults::{Fault, Onset};
+use crate::journal::Journal;
+use crate::line::Line;
+use crate::scenario::Scenario;
+
+/// Everything that can be harmed.
+pub struct World<'a> {
+    pub now: Microseconds,
+    /// Where the host's script is, and for how long.
+    pub step: usize,
+    pub in_step_us: u64,
+    pub plant: &'a mut Plant,
+    pub lines: [&'a mut Line; 2],
+    pub host_offset: &'a mut i64,
+    pub checker: &'a mut Checker,
+    pub journal: &'a mut Journal,
+}
+
+#[derive(Clone, Copy, Debug)]
+enum Progress {
+    Pending,
+    Lasting { until: u64 },
+    Over,
+}
+
+/// The timed faults of a scenario.
+#[derive(Debug)]
+pub struct Injector {
+    faults: Vec<(Fault, Progress)>,
+    seed: u64,
+}
+
+impl Injector {
+    pub fn new(scenario: &Scenario) -> Self {
+        let faults = scenario.faults.iter().map(|&fault| (fault, Progress::Pending)).collect();
+        Self { faults, seed: scenario.seed }
+    }
+
+    /// Begins and ends what is due; true where the board restarts now.
+    pub fn inject(&mut self, world: &mut World<'_>) -> bool {
+        let mut restart = false;
+        for (fault, progress) in &mut self.faults {
+            *progress = match *progress {
+                Progress::Pending if is_due(fault, world) => {
+                    world.journal.note(world.now, format!("fault: {fault:?}"));
+                    restart |= matches!(fault, Fault::Reset(_));
+                    match begin(fault, self.seed, world) {
+                        Some(lasts_us) => Progress::Lasting { until: world.now.0 + lasts_us },
+                        None => Progress::Over,
+                    }
+                }
+                Progress::Lasting { until } if world.now.0 >= until => {
+                    world.journal.note(world.now, format!("over: {fault:?}"));
+                    end(fault, world);
+                    Progress::Over
+                }
+                same => same,
+            };
+        }
+        restart
+    }
+}
+
+fn is_due(fault: &Fault, world: &World<'_>) -> bool {
+    let onset = match *fault {
+        Fault::ByteErrors(_) | Fault::Drops(_) | Fault::Duplicates(_) => return false,
+        Fault::SwitchBounce { .. } => return true,
+        Fault::Stall(onset, _)
+        | Fault::Disconnect(onset, _)
+        | Fault::Reset(onset)
+        | Fault::EmergencyStop(onset, _)
+        | Fault::ClockJump(onset, _)
+        | Fault::Encoder { onset, .. }
+        | Fault::MotorStall { onset, .. }
+        | Fault::LostSteps { onset, .. }
+        | Fault::BlockedLoad { onset, .. } => onset,
+    };
+    let Onset { step, after_us } = onset;
+    world.step > step || world.step == step && world.in_step_us >= after_us
+}
+
+/// Begins a fault; gives how long until something is to be done about it again.
+fn begin(fault: &Fault, seed: u64, world: &mut World<'_>) -> Option<u64> {
+    match *fault {
+        Fault::Stall(_, us) => {
+            let until = Microseconds(world.now.0 + us);
+            world.lines.iter_mut().for_each(|line| line.hold(until));
+            None
+        }
+        Fault::Disconnect(_, us) => {
+            let until = Microseconds(world.now.0 + us);
+            world.lines.iter_mut().for_each(|line| line.cut(until));
+            None
+        }
+        Fault::ClockJump(_, us) => {
+            *world.host_offset += us;
+            None
+        }
+        Fault::EmergencyStop(_, us) => {
+            world.plant.press_emergency_stop(true);
+            Some(us)
+        }
+        Fault::Encoder { axis, how, lasts_us, .. } => {
+            fail_encoder(world, axis, Some(how));
+            lasts_us
+        }
+        Fault::SwitchBounce { axis, chatter_us, spikes } => {
+            let noise = SwitchNoise { chatter_us, spikes, seed };
+            on_axis(world, axis, |axis| axis.disturb_home_switch(Some(noise)));
+            None
+        }
+        Fault::MotorStall { axis, lasts_us, .. } => {
+            on_axis(world, axis, |axis| axis.stall(true));
+            Some(lasts_us)
+        }
+        Fault::LostSteps { axis, steps, again_us, .. } => {
+            on_axis(world, axis, |axis| axis.lose_steps(steps));
+            Some(again_us)
+        }
+        Fault::BlockedLoad { axis, lasts_us, .. } => {
+            on_axis(world, axis, |axis| axis.block(true));
+            Some(lasts_us)
+        }
+        Fault::Reset(_) | Fault::ByteErrors(_) | Fault::Drops(_) | Fault::Duplicates(_) => None,
+    }
+}
+
+fn end(fault: &Fault, world: &mut World<'_>) {
+    match *fault {
+        Fault::EmergencyStop(..) => world.plant.press_emergency_stop(false),
+        Fault::Encoder { axis, how: EncoderFault::Noisy { .. }, .. } => {
+            fail_encoder(world, axis, Some(EncoderFault::Dead));
+        }
+        Fault::Encoder { axis, .. } => fail_encoder(world, axis, None),
+        Fault::MotorStall { axis, .. } => on_axis(world, axis, |axis| axis.stall(false)),
+        Fault::LostSteps { axis, steps, .. } => on_axis(world, axis, |axis| axis.lose_steps(steps)),
+        Fault::BlockedLoad { axis, .. } => on_axis(world, axis, |axis| axis.block(false)),
+        _ => {}
+    }
+}
+
+fn fail_encoder(world: &mut World<'_>, axis: usize, how: Option<EncoderFault>) {
+    on_axis(world, axis, |axis| axis.fail_encoder(how));
+    let sight = match how {
+        None => Sight::Clear,
+        Some(EncoderFault::Noisy { .. }) => Sight::Blurred,
+        Some(EncoderFault::Stuck | EncoderFault::Reversed | EncoderFault::Dead) => Sight::Lost,
+    };
+    world.checker.encoder_shows(axis, sight);
+}
+
+fn on_axis(world: &mut World<'_>, axis: usize, act: impl FnOnce(&mut AxisPlant)) {
+    if let Some(axis) = world.plant.axis_mut(axis) {
+        act(axis);
+    }
+}

@@ -1,0 +1,33 @@
+//! What happened in a scenario, for people.
+
+use std::fmt;
+
+use vergence_protocol::Microseconds;
+
+/// Events in order of time.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct Journal {
+    events: Vec<(Microseconds, String)>,
+}
+
+impl Journal {
+    /// Writes down what happens at `at`, true time.
+    pub fn note(&mut self, at: Microseconds, what: impl Into<String>) {
+        self.events.push((at, what.into()));
+    }
+
+    /// All events.
+    #[must_use]
+    pub fn events(&self) -> &[(Microseconds, String)] {
+        &self.events
+    }
+}
+
+impl fmt::Display for Journal {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        for (at, what) in &self.events {
+            writeln!(f, "{:>12.6} s  {what}", at.0 as f64 * 1e-6)?;
+        }
+        Ok(())
+    }
+}

@@ -1,0 +1,38 @@
+//! Fault injection over the whole stack in virtual time, seeded: a scripted host, a line in both directions, the real
+//! controller and simulated mechanics; one fault, or several, in each scenario; and a checker that looks on.
+//!
+//! [`Scenario::of`] draws a scenario from its seed, [`run`] plays it. The checker shares no code with the
+//! controller. It knows the truth of the mechanics and the bytes on the line, and holds the board to these promises:
+//!
+//! - The load stays inside the hard limit switches, but for what no controller can take back: the way of one control
+//!   tick at full speed, and the lag of the load behind its motor.
+//! - Drivers go on only where a session with a live lease asks for it. Motors step only while they are on, and no longer
+//!   after the end of the lease than braking takes in the worst case, v/a + 2a/j: an acceleration that is still growing
+//!   must be taken back first. A move that is asked for before arming, before homing or beyond the range is refused.
+//! - A mode is reported only while the true load is at its target: within the tolerance of the axis, the error of its
+//!   reference, and one encoder count. An encoder that lies cannot be seen through at once: from its failure on the
+//!   largest following error is granted on top.
+//! - An encoder that stands still, runs backwards or is dead stops its axis: with drivers on, the load goes no further
+//!   than the largest following error and the repeatability of homing.
+//! - The first fault is repeated in every pose until it is cleared by its number.
+//! - What a pose says of the drivers is true; after a restart nothing is armed, referenced or remembered.
+//! - Every motion and every request ends; in the end everything stands still.
+
+mod checker;
+mod faults;
+mod host;
+mod injector;
+mod journal;
+mod line;
+mod scenario;
+mod simulation;
+mod stages;
+mod tally;
+
+pub use checker::{Promise, Violation};
+pub use faults::{Fault, FaultKind, Onset};
+pub use journal::Journal;
+pub use scenario::{Destination, Scenario, Step};
+pub use simulation::{Board, Ending, Outcome, native_board, run};
+pub use stages::stages;
+pub use tally::{KindTally, Tally, soak};

@@ -1,0 +1,141 @@
+//! A scenario: what the host wants, what goes wrong, and where the stages stand.
+
+use rand::{RngExt, SeedableRng};
+use rand_pcg::Pcg64Mcg;
+use vergence_protocol::{Micro, Mode, Permille};
+
+use crate::faults::{Fault, FaultKind};
+use crate::stages::stages;
+
+/// Baseline in micrometres, separation in microradians.
+const HERBIVORE: Destination =
+    Destination { mode: Mode(1), targets: [Micro(145_000), Micro(2_094_395)], speed: Permille::FULL };
+const HUMAN: Destination = Destination { mode: Mode(2), targets: [Micro(63_000), Micro(0)], speed: Permille::FULL };
+/// Modes of random places.
+const ANYWHERE: Mode = Mode(3);
+
+/// Where a move goes.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Destination {
+    /// The mode that it is.
+    pub mode: Mode,
+    /// Target of each axis.
+    pub targets: [Micro; 2],
+    /// Share of full speed.
+    pub speed: Permille,
+}
+
+/// What the host does next. It does what must come before by itself: arms, homes, clears faults.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Step {
+    /// Ask for a move while disarmed or without reference: it must be refused. Passed over where both are there.
+    MoveTooEarly(Destination),
+    /// Arm.
+    Arm,
+    /// Find the reference of all axes.
+    Home,
+    /// Go there and wait for the mode.
+    Move(Destination),
+    /// Ask for a target beyond the range: it must be refused.
+    MoveTooFar(Destination),
+    /// Go there but stop after so many microseconds.
+    MoveAndStop(Destination, u64),
+    /// Do nothing for so many microseconds.
+    Pause(u64),
+    /// Disarm.
+    Disarm,
+}
+
+/// One scenario.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Scenario {
+    /// What it was drawn from.
+    pub seed: u64,
+    /// What it is counted as.
+    pub kind: FaultKind,
+    /// What goes wrong.
+    pub faults: Vec<Fault>,
+    /// What the host wants.
+    pub script: Vec<Step>,
+    /// Where the stages stand at the start, micro-units.
+    pub positions: [f64; 2],
+    /// How long bytes take through adapter and driver at least, microseconds; their time on the wire is added.
+    pub latency_us: u64,
+    /// Between the board's ticks and the instants at which the host runs, microseconds.
+    pub phase_us: u64,
+}
+
+impl Scenario {
+    /// The scenario of this seed.
+    #[must_use]
+    pub fn of(seed: u64) -> Self {
+        let random = &mut Pcg64Mcg::seed_from_u64(seed);
+        let kind = FaultKind::ALL[random.random_range(0..FaultKind::ALL.len())];
+        let script = script(random);
+        Self {
+            seed,
+            kind,
+            faults: Fault::draw(kind, script.len(), random),
+            script,
+            positions: positions(random),
+            latency_us: random.random_range(100..3_000),
+            phase_us: random.random_range(1..1_000),
+        }
+    }
+}
+
+fn script(random: &mut Pcg64Mcg) -> Vec<Step> {
+    let mut script = Vec::new();
+    if random.random_bool(0.3) {
+        script.push(Step::MoveTooEarly(HERBIVORE));
+    }
+    script.push(Step::Arm);
+    if random.random_bool(0.3) {
+        script.push(Step::MoveTooEarly(HUMAN));
+    }
+    script.push(Step::Home);
+    let tour = [Step::Move(HERBIVORE), Step::Move(HUMAN)];
+    script.extend(if random.random_bool(0.5) { &tour[..] } else { &tour[..1] });
+    for _ in 0..random.random_range(1..=3) {
+        script.push(excursion(random));
+    }
+    if random.random_bool(0.5) {
+        script.push(Step::Disarm);
+    }
+    script
+}
+
+fn excursion(random: &mut Pcg64Mcg) -> Step {
+    match random.random_range(0..10) {
+        0..5 => Step::Move(anywhere(random)),
+        5..7 => Step::MoveAndStop(anywhere(random), random.random_range(1_000..800_000)),
+        7 => Step::MoveTooFar(too_far(random)),
+        8 => Step::Pause(random.random_range(10_000..500_000)),
+        _ => Step::Disarm,
+    }
+}
+
+fn anywhere(random: &mut Pcg64Mcg) -> Destination {
+    let targets = stages().map(|stage| Micro(random.random_range(stage.settings.min.0..=stage.settings.max.0)));
+    Destination { mode: ANYWHERE, targets, speed: Permille(random.random_range(400..=1000)) }
+}
+
+/// Beyond the range of one axis, by up to a quarter of it.
+fn too_far(random: &mut Pcg64Mcg) -> Destination {
+    let mut destination = anywhere(random);
+    let axis = random.random_range(0..destination.targets.len());
+    let settings = stages()[axis].settings;
+    let beyond = random.random_range(1..(settings.max.0 - settings.min.0) / 4);
+    let target = if random.random_bool(0.5) { settings.min.0 - beyond } else { settings.max.0 + beyond };
+    destination.targets[axis] = Micro(target);
+    destination
+}
+
+/// From just off the frame to the end of the range; mostly low, where homing is quick.
+fn positions(random: &mut Pcg64Mcg) -> [f64; 2] {
+    stages().map(|stage| {
+        let low = f64::midpoint(stage.mechanics.home_switch, stage.mechanics.hard_limits[0]);
+        let share: f64 = random.random::<f64>().powi(3);
+        low + share * (f64::from(stage.settings.max.0) - low)
+    })
+}

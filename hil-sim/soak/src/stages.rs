@@ -1,0 +1,11 @@
+//! The stages that are soaked: the bench's kind.
+
+use vergence_plant::{Stage, bench_mechanics, bench_settings};
+
+/// Baseline and separation, as the bench has them.
+#[must_use]
+pub fn stages() -> [Stage; 2] {
+    let [first, second] = bench_settings();
+    let [baseline, separation] = bench_mechanics();
+    [Stage { settings: first, mechanics: baseline }, Stage { settings: second, mechanics: separation }]
+}

@@ -1,0 +1,67 @@
+//! Many scenarios, counted by kind.
+
+use rayon::prelude::*;
+use vergence_control::SettingsError;
+
+use crate::checker::Violation;
+use crate::faults::FaultKind;
+use crate::scenario::Scenario;
+use crate::simulation::{Ending, native_board, run};
+
+/// The scenarios of one kind.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct KindTally {
+    /// Which kind.
+    pub kind: FaultKind,
+    /// How many there were.
+    pub scenarios: u64,
+    /// How many ended with everything at rest after the host gave up.
+    pub safe_stops: u64,
+    /// In how many the host has done all that it wanted.
+    pub completed: u64,
+    /// In how many a promise was broken.
+    pub violated: u64,
+}
+
+/// What became of many scenarios.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Tally {
+    /// Each kind, in the order of [`FaultKind::ALL`].
+    pub by_kind: Vec<KindTally>,
+    /// Broken promises and the seeds of their scenarios, in the order of the seeds.
+    pub violations: Vec<(u64, Violation)>,
+    /// Virtual time of all scenarios together, seconds.
+    pub virtual_seconds: f64,
+}
+
+/// Plays the scenarios of `count` seeds from `first` on with the board as it should be, on all cores; `progress` is
+/// called after each, on any of them. The result does not depend on how many there are.
+///
+/// # Errors
+/// [`SettingsError`] where the stages cannot be controlled.
+pub fn soak(first: u64, count: u64, progress: impl Fn() + Sync) -> Result<Tally, SettingsError> {
+    let results: Vec<_> = (0..count)
+        .into_par_iter()
+        .map(|index| {
+            let scenario = Scenario::of(first.wrapping_add(index));
+            let outcome = run(&scenario, &mut native_board(&scenario)?);
+            progress();
+            Ok((scenario.seed, scenario.kind, outcome.ending, outcome.violations, outcome.virtual_time))
+        })
+        .collect::<Result<_, SettingsError>>()?;
+    let empty = |kind| KindTally { kind, scenarios: 0, safe_stops: 0, completed: 0, violated: 0 };
+    let mut tally = Tally { by_kind: FaultKind::ALL.map(empty).to_vec(), violations: Vec::new(), virtual_seconds: 0.0 };
+    for (seed, kind, ending, violations, time) in results {
+        tally.virtual_seconds += time.0 as f64 * 1e-6;
+        if let Some(row) = tally.by_kind.iter_mut().find(|row| row.kind == kind) {
+            row.scenarios += 1;
+            match ending {
+                _ if !violations.is_empty() => row.violated += 1,
+                Ending::SafeStop => row.safe_stops += 1,
+                Ending::Completed => row.completed += 1,
+            }
+        }
+        tally.violations.extend(violations.into_iter().map(|violation| (seed, violation)));
+    }
+    Ok(tally)
+}
