@@ -13,8 +13,25 @@ use std::path::Path;
 use common::{fails_with, run, run_json, text};
 
 const VERBS: &[&str] = &[
-    "devices", "status", "arm", "disarm", "clear", "home", "mode", "move", "stop", "monitor", "sim", "demo", "depth",
+    "devices",
+    "status",
+    "arm",
+    "disarm",
+    "clear",
+    "home",
+    "mode",
+    "move",
+    "stop",
+    "monitor",
+    "sim",
+    "demo",
+    "depth",
     "zones",
+    "capture",
+    "calibrate",
+    "camera",
+    "target",
+    "soak",
 ];
 
 fn temporary() -> tempfile::TempDir {
@@ -128,6 +145,7 @@ fn a_rig_file_is_checked_to_the_key() {
     let cases = [
         (bench.replace("[\"60mm\", \"220mm\"]", "[60, 220]"), "range"),
         (bench.replace("\"60mm\"", "\"60deg\""), "60deg"),
+        (bench.replace("\"60mm\"", "\"-3000m\""), "100 m"),
         (bench.replace("name = \"bench\"", "name = \"bench\"\ncolour = \"red\""), "colour"),
         (bench.replace("separation = \"120deg\"", "separation = \"170deg\""), "170"),
         (bench.replace("separation = \"120deg\"", "twist = \"120deg\""), "twist"),

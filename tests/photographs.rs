@@ -8,22 +8,11 @@
 
 mod common;
 
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
-use common::run_json;
+use common::{run_json, shared};
 use nalgebra::{Matrix3, Rotation3, Vector3};
 use serde_json::Value;
-
-fn shared(inside: &str) -> Option<PathBuf> {
-    let root = std::env::var_os("VERGENCE_SHARED")
-        .map_or_else(|| Path::new(env!("CARGO_MANIFEST_DIR")).join("../../../shared"), PathBuf::from);
-    let found = root.join(inside);
-    if found.exists() {
-        return Some(found);
-    }
-    println!("SKIPPED: {} is not there; set VERGENCE_SHARED to the folder that has it", found.display());
-    None
-}
 
 fn numbers(value: &Value) -> Vec<f64> {
     value.as_array().expect("a list").iter().map(|x| x.as_f64().expect("a number")).collect()

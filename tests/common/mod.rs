@@ -2,6 +2,7 @@
 #![allow(dead_code, reason = "each test file uses its own part")]
 
 use std::io::{BufRead, BufReader};
+use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Output, Stdio};
 
 use serde_json::Value;
@@ -11,6 +12,22 @@ pub fn vergence(arguments: &[&str]) -> Command {
     let mut command = Command::new(env!("CARGO_BIN_EXE_vergence"));
     command.args(arguments).env_remove("VERGENCE_PORT").env_remove("VERGENCE_RIG").stdin(Stdio::null());
     command
+}
+
+/// The folder with real data, which is not part of the repository.
+pub fn shared_root() -> PathBuf {
+    std::env::var_os("VERGENCE_SHARED")
+        .map_or_else(|| Path::new(env!("CARGO_MANIFEST_DIR")).join("../../../shared"), PathBuf::from)
+}
+
+/// Such a file or folder; where it is missing, says what is skipped.
+pub fn shared(inside: &str) -> Option<PathBuf> {
+    let found = shared_root().join(inside);
+    if found.exists() {
+        return Some(found);
+    }
+    println!("SKIPPED: {} is not there; set VERGENCE_SHARED to the folder that has it", found.display());
+    None
 }
 
 /// Runs it to its end.

@@ -1,6 +1,12 @@
 //! Boards and what was seen of them.
 
-use vergence_vision::{Length, Pixel};
+use vergence_vision::{Frame, Length, Pixel};
+
+/// The frame of a board: x along its rows of corners, y along its columns, the board is the plane z = 0.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Board;
+
+impl Frame for Board {}
 
 /// A chessboard, counted by its inner corners.
 #[derive(Clone, Copy, Debug, PartialEq)]

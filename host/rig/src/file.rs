@@ -34,7 +34,7 @@ pub enum RigError {
 }
 
 /// No stage is longer, in micro-units: positions, and what lies beyond them, fit the wire with room to spare.
-const LONGEST: i32 = 100_000_000;
+const LONGEST: u32 = 100_000_000;
 
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -179,7 +179,7 @@ fn axis(file: &AxisFile) -> Result<RigAxis, RigError> {
     if range[0].value() >= range[1].value() {
         return Err(contradiction(format!("{place}: {low} is not below {high}")));
     }
-    if range.iter().any(|position| position.micro().0.abs() > LONGEST) {
+    if range.iter().any(|position| position.micro().0.unsigned_abs() > LONGEST) {
         return Err(contradiction(format!("{place}: {low} to {high} is more than 100 m or 100 rad from zero")));
     }
     Ok(RigAxis { name: name.clone(), kind, range, counts_per_unit })

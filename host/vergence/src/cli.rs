@@ -68,12 +68,18 @@ enum Verb {
     Monitor(cmd::monitor::Args),
     /// Run a simulated board that other programs can talk to.
     Sim(cmd::sim::Args),
+    /// Let everything go wrong, ten thousand times, and check that the rig stays safe.
+    Soak(cmd::soak::Args),
     /// Run the whole rig in simulation: home, herbivore, human, look, measure.
     Demo(cmd::demo::Args),
     /// Turn a pair of photographs into a cloud of points.
     Depth(cmd::depth::Args),
     /// Tell how much of the surroundings both cameras, one, or none see.
     Zones(cmd::zones::Args),
+    /// Take a set of board views for calibration, with advice on what to show.
+    Capture(cmd::capture::Args),
+    /// Calibrate cameras and pairs from boards, and compare calibrations.
+    Calibrate(cmd::calibrate::Args),
     /// Show and convert camera files, and use them for single points.
     Camera(cmd::camera::Args),
     /// Draw a chessboard to print.
@@ -124,9 +130,12 @@ fn execute(cli: Cli) -> Result<(), Failure> {
             Verb::Stop(args) => cmd::stop::run(&args, &globals, console).await,
             Verb::Monitor(args) => cmd::monitor::run(&args, &globals, console).await,
             Verb::Sim(args) => cmd::sim::run(&args, &globals, console).await,
+            Verb::Soak(args) => cmd::soak::run(&args, console),
             Verb::Demo(args) => cmd::demo::run(&args, &globals, console).await,
             Verb::Depth(args) => cmd::depth::run(&args, &globals, console),
             Verb::Zones(args) => cmd::zones::run(&args, console),
+            Verb::Capture(args) => cmd::capture::run(&args, &globals, console),
+            Verb::Calibrate(args) => cmd::calibrate::run(&args, console),
             Verb::Camera(args) => cmd::camera::run(&args, console),
             Verb::Target(args) => cmd::target::run(&args, console),
         }

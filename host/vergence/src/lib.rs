@@ -7,15 +7,18 @@
 //! Exit codes: 0 ok, 1 check failed, 2 usage or bad input, 3 device, 4 protocol mismatch.
 
 pub mod board;
+mod boards;
 pub mod camera;
 mod camera_files;
 pub mod cli;
 mod cmd;
 mod console;
+mod corners;
 pub mod failure;
 pub mod link;
 pub mod look;
 mod output;
+mod provenance;
 mod rig_file;
 pub mod sim;
 mod stopwatch;

@@ -4,6 +4,7 @@ mod exposure;
 mod files;
 mod pixel_format;
 mod simulated;
+mod simulated_board;
 mod v4l;
 
 use image::RgbImage;
@@ -11,6 +12,7 @@ use vergence_protocol::Microseconds;
 
 pub use files::{FileCamera, read_image};
 pub use simulated::{Eye, SimulatedCamera, Stage};
+pub use simulated_board::{BoardStage, SimulatedBoardCamera};
 pub use v4l::{Settings as V4lSettings, V4lCamera};
 
 use crate::failure::Failure;

@@ -47,7 +47,7 @@ pub fn port(globals: &Globals) -> Result<Port, Failure> {
 async fn wire(port: &Port, baud: u32, rig: &Rig) -> Result<OpenWire, Failure> {
     if *port == Port::Simulated {
         let simulated = SharedRig::new(SimulatedRig::new(rig, SIM_SEED)?);
-        return Ok(OpenWire { stream: Box::new(spawn_in_process(simulated)), lock: None });
+        return Ok(OpenWire::in_process(spawn_in_process(simulated)));
     }
     open(port, baud, false).await
 }

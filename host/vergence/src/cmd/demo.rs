@@ -39,7 +39,7 @@ pub async fn run(args: &Args, globals: &Globals, console: Console) -> Result<(),
     let rig = rig_file::load(globals.rig.as_deref())?;
     make_folder(&args.out)?;
     let simulated = SharedRig::new(SimulatedRig::new(&rig, args.seed)?);
-    let wire = OpenWire { stream: Box::new(spawn_in_process(simulated.clone())), lock: None };
+    let wire = OpenWire::in_process(spawn_in_process(simulated.clone()));
     let clock = HostClock::start();
     // Seeded, so that not even the session differs between two runs.
     let client = Client::connect(wire, SessionId((args.seed as u32).max(1)), clock).await?;

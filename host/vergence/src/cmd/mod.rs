@@ -5,7 +5,9 @@ mod connect;
 mod report;
 
 pub mod arm;
+pub mod calibrate;
 pub mod camera;
+pub mod capture;
 pub mod clear;
 pub mod demo;
 pub mod depth;
@@ -16,6 +18,7 @@ pub mod mode;
 pub mod monitor;
 pub mod move_to;
 pub mod sim;
+pub mod soak;
 pub mod status;
 pub mod stop;
 pub mod target;

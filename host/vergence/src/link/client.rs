@@ -22,8 +22,9 @@ const HELLO_TIMEOUT: Duration = Duration::from_secs(2);
 /// How long a request may take, retransmissions included.
 const REPLY_TIMEOUT: Duration = Duration::from_secs(2);
 /// Clock exchanges: quickly at first, then slowly.
-const PROBE_FAST_US: u64 = 100_000;
-const PROBE_SLOW_US: u64 = 1_000_000;
+/// Odd periods, so that they do not keep step with the latency timer of a USB bridge.
+const PROBE_FAST_US: u64 = 98_390;
+const PROBE_SLOW_US: u64 = 983_900;
 const FAST_PROBES: u32 = 10;
 /// Half a minute of poses.
 const TRACK_LENGTH: usize = 3_000;
@@ -88,8 +89,10 @@ impl Client {
         let (pose_sender, poses) = watch::channel(None);
         let (end_sender, end) = watch::channel(None);
         let (opened_sender, opened) = oneshot::channel();
-        let learned =
-            Arc::new(Mutex::new(Learned { clock_map: ClockMap::default(), track: JointTrack::new(TRACK_LENGTH) }));
+        let learned = Arc::new(Mutex::new(Learned {
+            clock_map: wire.baud.map_or_else(ClockMap::default, ClockMap::at_baud),
+            track: JointTrack::new(TRACK_LENGTH),
+        }));
         let task = LinkTask {
             session: HostSession::new(session),
             clock,
@@ -297,7 +300,9 @@ impl LinkTask {
             let period = if self.probes < FAST_PROBES { PROBE_FAST_US } else { PROBE_SLOW_US };
             self.probes = self.probes.saturating_add(1);
             self.next_probe = Microseconds(now.0 + period);
-            let _ = self.session.send_now(Request::TimeProbe { t0: now });
+            if self.session.send_now(Request::TimeProbe { t0: now }).is_ok() {
+                lock(&self.learned).clock_map.probe_sent();
+            }
         }
     }
 

@@ -53,6 +53,16 @@ pub struct OpenWire {
     pub stream: Box<dyn Wire>,
     /// Kept while the stream is used; a port taken without it is shared with another vergence.
     pub lock: Option<PortLock>,
+    /// Bits per second of a serial line; bytes take no time on other wires.
+    pub baud: Option<u32>,
+}
+
+impl OpenWire {
+    /// A wire inside this process.
+    #[must_use]
+    pub fn in_process(stream: impl Wire + 'static) -> Self {
+        Self { stream: Box::new(stream), lock: None, baud: None }
+    }
 }
 
 /// Opens a serial device or TCP address. With `share`, a port that another vergence holds is opened all the same.
@@ -70,7 +80,7 @@ pub async fn open(port: &Port, baud: u32, share: bool) -> Result<OpenWire, Failu
             })?;
             // Twelve-byte heartbeats must not wait for company.
             stream.set_nodelay(true).map_err(|error| Failure::device(format!("tcp:{address}: {error}")))?;
-            Ok(OpenWire { stream: Box::new(stream), lock: None })
+            Ok(OpenWire { stream: Box::new(stream), lock: None, baud: None })
         }
         Port::Simulated => Err(Failure::usage("a simulated board is not opened but started")),
     }
@@ -93,5 +103,5 @@ fn open_serial(path: &Path, baud: u32, share: bool) -> Result<OpenWire, Failure>
     let serial = port.open_native_async().map_err(|error| fail(&error))?;
     // What an earlier session left unread is not ours.
     serial.clear(serialport::ClearBuffer::Input).map_err(|error| fail(&error))?;
-    Ok(OpenWire { stream: Box::new(serial), lock })
+    Ok(OpenWire { stream: Box::new(serial), lock, baud: Some(baud) })
 }

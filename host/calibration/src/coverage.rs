@@ -1,0 +1,126 @@
+//! What a set of board views covers, and what it still needs: advice for the person who holds the board.
+
+use std::fmt;
+
+use vergence_vision::ImageSize;
+
+use crate::board::BoardView;
+
+/// The image is divided into so many columns and rows.
+const CELLS: usize = 3;
+/// Each cell wants so many views with a fair part of the board in it.
+const VIEWS_PER_CELL: usize = 2;
+/// So many of all views must show the board tilted, or focal length and distance cannot be told apart.
+const TILTED_SHARE: f64 = 0.5;
+/// A cell counts for a view that has this share of its corners there.
+const FAIR_PART: f64 = 0.15;
+/// Opposite sides of the outline differ by this factor where the board is tilted.
+const TILT_RATIO: f64 = 1.12;
+
+/// What the views so far cover.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Coverage {
+    size: ImageSize,
+    cells: [[usize; CELLS]; CELLS],
+    tilted: usize,
+    views: usize,
+}
+
+/// What to show next.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Advice {
+    column: usize,
+    row: usize,
+    tilted: bool,
+}
+
+impl Coverage {
+    /// Nothing yet, of images of `size`.
+    #[must_use]
+    pub fn new(size: ImageSize) -> Self {
+        Self { size, cells: [[0; CELLS]; CELLS], tilted: 0, views: 0 }
+    }
+
+    /// How many views were taken.
+    #[must_use]
+    pub fn views(&self) -> usize {
+        self.views
+    }
+
+    /// Whether `view` shows the board where, or as, it has not been shown enough.
+    #[must_use]
+    pub fn is_news(&self, view: &BoardView) -> bool {
+        let somewhere_new = self.touched(view).any(|(row, column)| self.cells[row][column] < VIEWS_PER_CELL);
+        somewhere_new || (self.wants_tilt() && is_tilted(view))
+    }
+
+    /// Takes a view.
+    pub fn add(&mut self, view: &BoardView) {
+        let touched: Vec<_> = self.touched(view).collect();
+        for (row, column) in touched {
+            self.cells[row][column] += 1;
+        }
+        self.views += 1;
+        self.tilted += usize::from(is_tilted(view));
+    }
+
+    /// What to show next; `None` where the set is complete.
+    #[must_use]
+    pub fn advice(&self) -> Option<Advice> {
+        let places = (0..CELLS).flat_map(|row| (0..CELLS).map(move |column| (row, column)));
+        let (row, column) = places.min_by_key(|&(row, column)| self.cells[row][column])?;
+        let complete = self.cells[row][column] >= VIEWS_PER_CELL;
+        (!complete || self.wants_tilt()).then(|| Advice { column, row, tilted: self.wants_tilt() })
+    }
+
+    fn wants_tilt(&self) -> bool {
+        (self.tilted as f64) < TILTED_SHARE * (self.views.max(1) as f64)
+    }
+
+    /// The cells that hold a fair part of the view's corners.
+    fn touched<'a>(&self, view: &'a BoardView) -> impl Iterator<Item = (usize, usize)> + use<'a> {
+        let (width, height) = (f64::from(self.size.width), f64::from(self.size.height));
+        let cell =
+            move |position: f64, extent: f64| ((position + 0.5) / extent * CELLS as f64).clamp(0.0, 2.0) as usize;
+        let mut counts = [[0usize; CELLS]; CELLS];
+        for corner in &view.corners {
+            counts[cell(corner.pixel.v, height)][cell(corner.pixel.u, width)] += 1;
+        }
+        let fair = (FAIR_PART * view.corners.len() as f64).max(1.0);
+        let places = (0..CELLS).flat_map(|row| (0..CELLS).map(move |column| (row, column)));
+        places.filter(move |&(row, column)| counts[row][column] as f64 >= fair)
+    }
+}
+
+/// Whether opposite sides of the board's outline differ in length by more than a lens would make them.
+fn is_tilted(view: &BoardView) -> bool {
+    let along = |axis: usize| {
+        let values = || view.corners.iter().map(|corner| corner.board_mm[axis]);
+        let (low, high) = values().fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), x| (low.min(x), high.max(x)));
+        let [first, last] = [low, high].map(|edge| edge_length(view, axis, edge));
+        (first > 0.0 && last > 0.0).then(|| (first / last).max(last / first))
+    };
+    [0, 1].into_iter().filter_map(along).any(|ratio| ratio > TILT_RATIO)
+}
+
+/// Length in the image of the row or column of corners at `edge`, per millimetre of board.
+fn edge_length(view: &BoardView, axis: usize, edge: f64) -> f64 {
+    let mut line: Vec<_> = view.corners.iter().filter(|corner| (corner.board_mm[axis] - edge).abs() < 1e-6).collect();
+    line.sort_by(|a, b| a.board_mm[1 - axis].total_cmp(&b.board_mm[1 - axis]));
+    let (Some(first), Some(last)) = (line.first(), line.last()) else { return 0.0 };
+    let mm = last.board_mm[1 - axis] - first.board_mm[1 - axis];
+    let px = (last.pixel.u - first.pixel.u).hypot(last.pixel.v - first.pixel.v);
+    if mm > 0.0 { px / mm } else { 0.0 }
+}
+
+impl fmt::Display for Advice {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        const PLACES: [[&str; CELLS]; CELLS] = [
+            ["upper left", "at the top", "upper right"],
+            ["on the left", "in the middle", "on the right"],
+            ["lower left", "at the bottom", "lower right"],
+        ];
+        let place = PLACES.get(self.row).and_then(|row| row.get(self.column)).unwrap_or(&"");
+        write!(f, "show the board {place}{}", if self.tilted { ", tilted" } else { "" })
+    }
+}

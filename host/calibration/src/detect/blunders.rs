@@ -1,0 +1,75 @@
+//! Corners that do not look like the others, or are not where a smooth image of a board has them.
+
+use vergence_vision::KannalaBrandt;
+
+use super::CornerQuality;
+use super::lattice::{Lattice, Node};
+use super::predict::Predictor;
+use crate::median;
+
+/// Marks corners that are no good, by their grey levels and by their place.
+pub fn flag(lattice: &mut Lattice, hint: Option<&KannalaBrandt>) {
+    flag_unclear(lattice);
+    flag_misplaced(lattice, hint);
+}
+
+/// Marks corners whose standard deviation is far above that of the corners about them; further off the lens may be less
+/// sharp.
+fn flag_unclear(lattice: &mut Lattice) {
+    // On 79 real photographs the greatest is 1.6 times the image's median.
+    const MEDIANS: f64 = 1.8;
+    const REACH: i32 = 2;
+    let usual = |node: Node| median(lattice.around(node, REACH).map(|(_, found)| found.sigma_px).collect());
+    let unclear: Vec<Node> = lattice
+        .iter()
+        .filter(|(_, found)| found.quality == CornerQuality::Good)
+        .filter(|(node, found)| usual(**node).is_some_and(|usual| found.sigma_px > MEDIANS * usual))
+        .map(|(&node, _)| node)
+        .collect();
+    for node in unclear {
+        if let Some(found) = lattice.get_mut(node) {
+            found.quality = CornerQuality::Blunder;
+        }
+    }
+}
+
+/// Marks corners that are much further from their prediction than the others, the worst first: one wrong corner
+/// spoils the predictions about it, and they are made again without it.
+fn flag_misplaced(lattice: &mut Lattice, hint: Option<&KannalaBrandt>) {
+    // In multiples of the median error. The worst good corner of 79 real photographs, near and strongly curved boards
+    // among them, is 7.9 off where the image curves most, 4 elsewhere.
+    const MEDIANS: f64 = 10.0;
+    const LEAST_PART_OF_CELL: f64 = 0.03;
+    for _ in 0..lattice.len() {
+        let errors = errors(lattice, &Predictor::new(lattice, hint));
+        let scale = MEDIANS * median(errors.iter().map(|error| error.normalised).collect()).unwrap_or(0.0);
+        let worst = errors
+            .iter()
+            .filter(|error| error.normalised > scale && error.part_of_cell > LEAST_PART_OF_CELL)
+            .max_by(|a, b| a.normalised.total_cmp(&b.normalised));
+        let Some(found) = worst.and_then(|error| lattice.get_mut(error.node)) else { return };
+        found.quality = CornerQuality::Blunder;
+    }
+}
+
+struct Error {
+    node: Node,
+    /// Distance to the prediction in its standard deviations, up to a common factor.
+    normalised: f64,
+    /// The same in parts of a cell.
+    part_of_cell: f64,
+}
+
+fn errors(lattice: &Lattice, predictor: &Predictor<'_>) -> Vec<Error> {
+    let good = lattice.iter().filter(|(_, found)| found.quality != CornerQuality::Blunder);
+    good.filter_map(|(&node, found)| {
+        let expected = predictor.predict(lattice, node)?;
+        let distance = (found.position - expected.position).norm();
+        Some(Error {
+            node,
+            normalised: distance / (1.0 + expected.variance).sqrt(),
+            part_of_cell: distance / expected.spacing(),
+        })
+    })
+    .collect()
+}

@@ -1,0 +1,116 @@
+//! Finds the corners that the search missed, most of them along the border of the board.
+
+use std::collections::BTreeSet;
+
+use nalgebra::Vector2;
+use vergence_vision::KannalaBrandt;
+
+use super::CornerQuality;
+use super::intensity::Intensity;
+use super::lattice::{Found, Lattice, Node, SIDES};
+use super::predict::{Prediction, Predictor};
+use super::refine::{bound, refine, window};
+use super::saddle::{Quadrants, contrast_near, parity, polarity};
+
+/// Adds corners next to those known until no more are found. `size` is the board's, in corners: one row and column
+/// more are looked for, so that a larger board is noticed.
+pub fn grow(lattice: &mut Lattice, image: &Intensity<'_>, hint: Option<&KannalaBrandt>, size: [u32; 2]) {
+    let longest = size[0].max(size[1]).cast_signed() + 1;
+    lattice.drop_loose();
+    loop {
+        let predictor = Predictor::new(lattice, hint);
+        let polarity = polarity(lattice, image, &predictor).signum();
+        let Some([low, high]) = lattice.bounds() else { return };
+        let within = |node: Node| (0..2).all(|a| high[a].max(node[a]) - low[a].min(node[a]) < longest);
+        let candidates: BTreeSet<Node> = lattice
+            .iter()
+            .flat_map(|(&[i, j], _)| [[i - 1, j], [i + 1, j], [i, j - 1], [i, j + 1]])
+            .filter(|&node| lattice.get(node).is_none() && within(node))
+            .collect();
+        // All candidates of a round are judged by the same lattice: their order does not matter.
+        let found: Vec<(Node, Found)> = candidates
+            .into_iter()
+            .filter_map(|node| {
+                let expected = predictor.predict(lattice, node)?;
+                let contrast = contrast_near(lattice, image, node, &expected.steps);
+                let colour = polarity * parity(node);
+                let corner = find(image, &expected, colour, contrast)?;
+                edges_reach(lattice, image, node, corner.position, &expected.steps, colour * contrast)
+                    .then_some((node, corner))
+            })
+            .collect();
+        let before = lattice.len();
+        for (node, corner) in found {
+            lattice.insert(node, corner);
+        }
+        lattice.drop_loose();
+        if lattice.len() <= before {
+            return;
+        }
+    }
+}
+
+/// The corner near a prediction whose saddle has the sign `colour`, if there is one as clear as its neighbours, whose
+/// contrast is given.
+fn find(image: &Intensity<'_>, expected: &Prediction, colour: f64, contrast: f64) -> Option<Found> {
+    // A neighbour's corner is a cell away; what is further off than this is something else.
+    const FARTHEST_PART: f64 = 0.35;
+    const LEAST_PART_OF_CONTRAST: f64 = 0.4;
+    const SMALLEST_CELL_PX: f64 = 4.0;
+    let spacing = expected.spacing();
+    if spacing.is_nan() || spacing < SMALLEST_CELL_PX || image.margin(expected.position) < 0.0 {
+        return None;
+    }
+    let start = strongest_saddle(image, expected, colour, FARTHEST_PART * spacing)?;
+    let refined = refine(image, start, window(spacing), bound(spacing))?;
+    let quadrants = Quadrants::read(image, refined.position, &expected.steps)?;
+    let near = (refined.position - expected.position).norm() <= FARTHEST_PART * spacing;
+    let clear = quadrants.is_corner(LEAST_PART_OF_CONTRAST * contrast) && quadrants.saddle() * colour > 0.0;
+    (near && clear).then_some(Found {
+        position: refined.position,
+        sigma_px: refined.sigma_px,
+        filled: true,
+        quality: CornerQuality::Good,
+    })
+}
+
+/// Whether black meets white all along the edges between a corner at `node` and its neighbours in the lattice.
+/// `saddle` is the corner's, with its sign: at the end of a sheet cut through its squares the edges stop halfway.
+fn edges_reach(
+    lattice: &Lattice,
+    image: &Intensity<'_>,
+    node: Node,
+    corner: Vector2<f64>,
+    steps: &[Vector2<f64>; 2],
+    saddle: f64,
+) -> bool {
+    const ALONG: [f64; 4] = [0.15, 0.35, 0.55, 0.75];
+    const ASIDE: f64 = 0.2;
+    const LEAST_PART: f64 = 0.3;
+    SIDES.iter().all(|&[di, dj]| {
+        let Some(neighbour) = lattice.get([node[0] + di, node[1] + dj]) else { return true };
+        let aside = ASIDE * if di == 0 { steps[0] } else { steps[1] };
+        let expected = LEAST_PART * saddle * f64::from(di + dj);
+        ALONG.iter().all(|part| {
+            let place = corner + *part * (neighbour.position - corner);
+            let step = image.between(place + aside).zip(image.between(place - aside));
+            step.is_some_and(|(ahead, behind)| (ahead - behind) * expected.signum() > expected.abs())
+        })
+    })
+}
+
+/// The place up to `radius` from the prediction, in whole pixels, with the strongest saddle.
+fn strongest_saddle(image: &Intensity<'_>, expected: &Prediction, colour: f64, radius: f64) -> Option<Vector2<f64>> {
+    let reach = radius.floor() as i32;
+    let offsets =
+        (-reach..=reach).flat_map(|y| (-reach..=reach).map(move |x| Vector2::new(f64::from(x), f64::from(y))));
+    let mut best: Option<(f64, Vector2<f64>)> = None;
+    for place in offsets.filter(|offset| offset.norm() <= radius).map(|offset| expected.position + offset) {
+        let Some(quadrants) = Quadrants::read_close(image, place, &expected.steps) else { continue };
+        let saddle = colour * quadrants.saddle();
+        if best.is_none_or(|(strongest, _)| saddle > strongest) {
+            best = Some((saddle, place));
+        }
+    }
+    best.map(|(_, place)| place)
+}

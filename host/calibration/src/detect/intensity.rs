@@ -1,0 +1,50 @@
+//! Grey levels between pixels.
+
+use image::GrayImage;
+use nalgebra::Vector2;
+
+/// Reads an image at whole and fractional positions.
+#[derive(Clone, Copy, Debug)]
+pub struct Intensity<'a> {
+    levels: &'a [u8],
+    width: usize,
+    height: usize,
+}
+
+impl<'a> Intensity<'a> {
+    pub fn new(image: &'a GrayImage) -> Self {
+        Self { levels: image.as_raw(), width: image.width() as usize, height: image.height() as usize }
+    }
+
+    /// The grey level of a pixel, 0 to 255.
+    pub fn at(&self, x: i64, y: i64) -> Option<f64> {
+        let (x, y) = (usize::try_from(x).ok()?, usize::try_from(y).ok()?);
+        if x >= self.width {
+            return None;
+        }
+        self.levels.get(y * self.width + x).copied().map(f64::from)
+    }
+
+    /// The grey level at `position`, bilinear between the four pixels about it.
+    pub fn between(&self, position: Vector2<f64>) -> Option<f64> {
+        let (left, top) = (position.x.floor(), position.y.floor());
+        let (right, below) = (position.x - left, position.y - top);
+        let (x, y) = (left as i64, top as i64);
+        let upper = self.at(x, y)? * (1.0 - right) + self.at(x + 1, y)? * right;
+        let lower = self.at(x, y + 1)? * (1.0 - right) + self.at(x + 1, y + 1)? * right;
+        Some(upper * (1.0 - below) + lower * below)
+    }
+
+    /// Central differences, in grey levels per pixel.
+    pub fn gradient(&self, x: i64, y: i64) -> Option<Vector2<f64>> {
+        let across = self.at(x + 1, y)? - self.at(x - 1, y)?;
+        let down = self.at(x, y + 1)? - self.at(x, y - 1)?;
+        Some(0.5 * Vector2::new(across, down))
+    }
+
+    /// Distance in pixels from `position` to the image's outermost pixel centres; negative outside.
+    pub fn margin(&self, position: Vector2<f64>) -> f64 {
+        let (right, bottom) = (self.width as f64 - 1.0 - position.x, self.height as f64 - 1.0 - position.y);
+        position.x.min(position.y).min(right).min(bottom)
+    }
+}

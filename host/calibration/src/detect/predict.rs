@@ -1,0 +1,206 @@
+//! Where a corner should be, told by the others.
+
+use nalgebra::{Matrix2, Matrix3, OMatrix, OVector, SMatrix, SVector, U6, Vector2, Vector3};
+use vergence_vision::{Camera, KannalaBrandt, Pixel, UnitRay};
+
+use super::CornerQuality;
+use super::lattice::{Found, Lattice, Node};
+
+/// A predicted corner and the board about it.
+#[derive(Clone, Copy, Debug)]
+pub struct Prediction {
+    /// u and v.
+    pub position: Vector2<f64>,
+    /// Pixels per step along the lattice's two axes.
+    pub steps: [Vector2<f64>; 2],
+    /// Variance of the prediction in units of one corner's variance.
+    pub variance: f64,
+}
+
+impl Prediction {
+    /// The distance of the neighbouring edges in pixels: the lesser height of the cell's parallelogram.
+    pub fn spacing(&self) -> f64 {
+        let [along, across] = self.steps;
+        along.perp(&across).abs() / along.norm().max(across.norm())
+    }
+}
+
+/// Predicts corners of a lattice from the corners about them, never from the corner itself.
+#[derive(Clone, Copy, Debug)]
+pub struct Predictor<'a> {
+    plane: Option<BoardPlane<'a>>,
+}
+
+impl<'a> Predictor<'a> {
+    /// With `hint`, through that camera if it sees the corners as a plane to a tenth of a cell.
+    pub fn new(lattice: &Lattice, hint: Option<&'a KannalaBrandt>) -> Self {
+        Self { plane: hint.and_then(|camera| BoardPlane::fit(camera, lattice)) }
+    }
+
+    /// The corner at `node`; none where too few corners are near.
+    pub fn predict(&self, lattice: &Lattice, node: Node) -> Option<Prediction> {
+        let smooth = smooth_continuation(lattice, node)?;
+        let Some(plane) = self.plane else { return Some(smooth) };
+        plane.predict(lattice, node).or(Some(smooth))
+    }
+}
+
+/// Reach of the corners that a prediction uses.
+const REACH: i32 = 3;
+
+/// A polynomial of second order in the lattice's coordinates about `node`, or of first order where rows are few.
+fn smooth_continuation(lattice: &Lattice, node: Node) -> Option<Prediction> {
+    // Near corners count more: a fisheye image of a plane is smooth but no polynomial.
+    const WEIGHT_RADIUS: f64 = 1.0;
+    let mut normal = OMatrix::<f64, U6, U6>::zeros();
+    let mut moments = SMatrix::<f64, 6, 2>::zeros();
+    let (mut columns, mut rows, mut count) = (0_u32, 0_u32, 0);
+    for (at, found) in usable(lattice, node, REACH) {
+        let (di, dj) = (at[0] - node[0], at[1] - node[1]);
+        columns |= 1 << (di + REACH);
+        rows |= 1 << (dj + REACH);
+        count += 1;
+        let (x, y) = (f64::from(di), f64::from(dj));
+        let weight = (-(x * x + y * y) / (2.0 * WEIGHT_RADIUS * WEIGHT_RADIUS)).exp();
+        let terms = SVector::<f64, 6>::from([1.0, x, y, x * x, x * y, y * y]);
+        normal += weight * terms * terms.transpose();
+        moments += weight * terms * found.position.transpose();
+    }
+    let [columns, rows] = [columns, rows].map(u32::count_ones);
+    if columns >= 3 && rows >= 3 && count >= 8 {
+        solved(normal, moments).or_else(|| linear(&normal, &moments))
+    } else if columns >= 2 && rows >= 2 && count >= 4 {
+        linear(&normal, &moments)
+    } else {
+        None
+    }
+}
+
+/// The solution with all six terms.
+fn solved(normal: OMatrix<f64, U6, U6>, moments: SMatrix<f64, 6, 2>) -> Option<Prediction> {
+    let inverse = normal.cholesky()?.inverse();
+    // A set of corners that leaves a term open (all on one conic) shows as a huge variance.
+    const LARGEST_VARIANCE: f64 = 1e3;
+    let variance = *inverse.get((0, 0))?;
+    (variance < LARGEST_VARIANCE).then(|| prediction(&(inverse * moments).fixed_rows::<3>(0).into_owned(), variance))
+}
+
+/// The solution with constant and linear terms only.
+fn linear(normal: &OMatrix<f64, U6, U6>, moments: &SMatrix<f64, 6, 2>) -> Option<Prediction> {
+    let inverse = normal.fixed_view::<3, 3>(0, 0).into_owned().cholesky()?.inverse();
+    Some(prediction(&(inverse * moments.fixed_rows::<3>(0)), *inverse.get((0, 0))?))
+}
+
+fn prediction(terms: &SMatrix<f64, 3, 2>, variance: f64) -> Prediction {
+    let [position, along, across] = [0, 1, 2].map(|i| terms.row(i).transpose());
+    Prediction { position, steps: [along, across], variance }
+}
+
+/// Corners near `node` that are not known to be wrong.
+fn usable(lattice: &Lattice, node: Node, reach: i32) -> impl Iterator<Item = (Node, &Found)> {
+    lattice.around(node, reach).filter(|(_, found)| found.quality != CornerQuality::Blunder)
+}
+
+/// A plane seen through a camera: rays are homogeneous coordinates of lattice nodes.
+#[derive(Clone, Copy, Debug)]
+struct BoardPlane<'a> {
+    camera: &'a KannalaBrandt,
+    ray_from_node: Matrix3<f64>,
+}
+
+impl<'a> BoardPlane<'a> {
+    /// The direct linear transformation on rays (R. Hartley and A. Zisserman, "Multiple View Geometry", 2nd ed.,
+    /// alg. 4.1): ray × (H node) = 0, which holds at any angle to the axis. Weights make the error an angle.
+    fn fit(camera: &'a KannalaBrandt, lattice: &Lattice) -> Option<Self> {
+        const FEWEST: usize = 8;
+        let usable = lattice.iter().filter(|(_, found)| found.quality != CornerQuality::Blunder);
+        let sightings: Vec<(Node, Vector3<f64>)> =
+            usable.filter_map(|(&node, found)| Some((node, ray(camera, found.position)?))).collect();
+        if sightings.len() < FEWEST {
+            return None;
+        }
+        let mut plane = Self { camera, ray_from_node: Matrix3::zeros() };
+        for _ in 0..3 {
+            plane.ray_from_node = plane.reweighted(&sightings)?;
+        }
+        plane.explains(lattice).then_some(plane)
+    }
+
+    fn reweighted(&self, sightings: &[(Node, Vector3<f64>)]) -> Option<Matrix3<f64>> {
+        let mut normal = SMatrix::<f64, 9, 9>::zeros();
+        for (node, ray) in sightings {
+            let node = homogeneous(*node);
+            let depth = (self.ray_from_node * node).norm();
+            let weight = if depth > 0.0 { depth.recip() } else { 1.0 };
+            // Rows of [ray]× (H node), with H row by row in a vector of nine.
+            let rows = ray.cross_matrix().kronecker(&node.transpose()) * weight;
+            normal += rows.transpose() * rows;
+        }
+        let eigen = normal.symmetric_eigen();
+        let least = eigen.eigenvalues.imin();
+        let h: OVector<f64, _> = eigen.eigenvectors.column(least).into_owned();
+        let matrix = Matrix3::from_row_iterator(h.iter().copied());
+        let towards: f64 = sightings.iter().map(|(node, ray)| ray.dot(&(matrix * homogeneous(*node))).signum()).sum();
+        towards.is_finite().then(|| matrix * towards.signum())
+    }
+
+    /// Whether the root mean square of the distances is below a tenth of the mean cell's side.
+    fn explains(&self, lattice: &Lattice) -> bool {
+        const PART_OF_CELL: f64 = 0.1;
+        let (mut squares, mut areas) = (0.0, 0.0);
+        for (&node, found) in lattice.iter().filter(|(_, found)| found.quality != CornerQuality::Blunder) {
+            let Some((position, steps)) = self.project(node) else { return false };
+            squares += (position - found.position).norm_squared();
+            areas += steps[0].perp(&steps[1]).abs();
+        }
+        squares < PART_OF_CELL * PART_OF_CELL * areas
+    }
+
+    /// The node's projection and steps, both without regard to what was seen near it.
+    fn project(&self, node: Node) -> Option<(Vector2<f64>, [Vector2<f64>; 2])> {
+        const HALF: f64 = 0.5;
+        let at = |di: f64, dj: f64| {
+            let ray = UnitRay::<Camera>::new(self.ray_from_node * (homogeneous(node) + Vector3::new(di, dj, 0.0)))?;
+            let pixel = self.camera.project(&ray).ok()?;
+            Some(Vector2::new(pixel.u, pixel.v))
+        };
+        // One-sided where the field ends within half a cell.
+        let step = |di: f64, dj: f64| match (at(di, dj), at(-di, -dj), at(0.0, 0.0)) {
+            (Some(ahead), Some(behind), _) => Some(ahead - behind),
+            (Some(ahead), None, Some(here)) => Some((ahead - here) * 2.0),
+            (None, Some(behind), Some(here)) => Some((here - behind) * 2.0),
+            _ => None,
+        };
+        Some((at(0.0, 0.0)?, [step(HALF, 0.0)?, step(0.0, HALF)?]))
+    }
+
+    /// The projection, shifted by what the nearest corners show the camera to be wrong there.
+    fn predict(&self, lattice: &Lattice, node: Node) -> Option<Prediction> {
+        const NEAR: i32 = 2;
+        let (position, steps) = self.project(node)?;
+        let (mut shift, mut sum) = (Vector2::zeros(), 0.0);
+        for (at, found) in usable(lattice, node, NEAR) {
+            if let Some((expected, _)) = self.project(at) {
+                let (di, dj) = (f64::from(at[0] - node[0]), f64::from(at[1] - node[1]));
+                let weight = 1.0 / (di * di + dj * dj);
+                shift += (found.position - expected) * weight;
+                sum += weight;
+            }
+        }
+        (sum > 0.0).then(|| Prediction { position: position + shift / sum, steps, variance: 1.0 / sum })
+    }
+}
+
+fn homogeneous(node: Node) -> Vector3<f64> {
+    Vector3::new(f64::from(node[0]), f64::from(node[1]), 1.0)
+}
+
+fn ray(camera: &KannalaBrandt, position: Vector2<f64>) -> Option<Vector3<f64>> {
+    let ray = camera.unproject::<Camera>(Pixel { u: position.x, v: position.y }).ok()?;
+    Some(ray.vector())
+}
+
+/// Turns offsets in cells into offsets in pixels.
+pub fn cell(steps: &[Vector2<f64>; 2]) -> Matrix2<f64> {
+    Matrix2::from_columns(steps)
+}

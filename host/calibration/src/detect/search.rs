@@ -1,0 +1,45 @@
+//! The first patch of corners: ChESS features labelled by topology.
+//!
+//! S. Bennett and J. Lasenby, "ChESS: quick and robust detection of chess-board features", CVIU 118, 2014.
+
+use calib_targets_chessboard::{
+    ChessboardDetector, ChessboardParams, GrayImageView, default_chess_config, detect_corners,
+};
+use image::GrayImage;
+use nalgebra::Vector2;
+
+use super::CornerQuality;
+use super::lattice::{Found, Lattice};
+
+/// How well the search alone knows a corner.
+const SEARCH_SIGMA_PX: f64 = 1.0;
+
+/// The largest labelled patch in the image; empty where there is none. The first axis turns clockwise into the second
+/// as they are seen, as x into y on the printed side of a board.
+pub fn labelled_patch(image: &GrayImage) -> Lattice {
+    // The search itself panics on an empty image; nothing this small holds a dozen corners.
+    const SMALLEST_PX: u32 = 16;
+    if image.width().min(image.height()) < SMALLEST_PX {
+        return Lattice::default();
+    }
+    let view = GrayImageView { width: image.width() as usize, height: image.height() as usize, data: image.as_raw() };
+    let features = detect_corners(&view, &default_chess_config());
+    let patch = ChessboardDetector::new(ChessboardParams::default()).ok().and_then(|d| d.detect(&features));
+    let mut lattice = Lattice::default();
+    for corner in patch.iter().flat_map(|patch| &patch.corners) {
+        let position = Vector2::new(f64::from(corner.position.x), f64::from(corner.position.y));
+        let found = Found { position, sigma_px: SEARCH_SIGMA_PX, filled: false, quality: CornerQuality::Unrefined };
+        lattice.insert([corner.grid.u, corner.grid.v], found);
+    }
+    if winding(&lattice) < 0.0 { lattice.relabelled(|[i, j]| [j, i]) } else { lattice }
+}
+
+/// Sum of the signed areas of the cells.
+fn winding(lattice: &Lattice) -> f64 {
+    let area = |&[i, j]: &[i32; 2], found: &Found| {
+        let right = lattice.get([i + 1, j])?.position - found.position;
+        let down = lattice.get([i, j + 1])?.position - found.position;
+        Some(right.perp(&down))
+    };
+    lattice.iter().filter_map(|(node, found)| area(node, found)).sum()
+}

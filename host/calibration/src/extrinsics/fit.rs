@@ -1,0 +1,152 @@
+//! The joint fit: a robust loss brings it near, gross corners are found, and plain least squares on the others has the
+//! covariance.
+
+use nalgebra::{DMatrix, Isometry3};
+
+use crate::Loss;
+use crate::arrow::{self, ArrowOptions};
+use crate::extrinsics::StereoView;
+use crate::extrinsics::gross::{OwnPoses, inliers, median_px};
+use crate::extrinsics::joint::{Joint, Kinematics, Shared};
+use crate::extrinsics::stereo::{LensKnowledge, LensPrior, Lenses, Pair};
+
+/// The median length of a two-dimensional Gaussian error of unit standard deviation per coordinate: √(2 ln 2).
+const RAYLEIGH_MEDIAN: f64 = 1.177_410_022_515_474_7;
+/// No corner is known better than this, however well a few of them fit; simulated ones may fit perfectly.
+const FINEST_PX: f64 = 1e-3;
+/// Inliers and standard deviation settle in two or three rounds.
+const MOST_ROUNDS: usize = 10;
+
+/// Where the fit starts.
+pub(crate) struct Start<S> {
+    pub shared: Shared<S>,
+    /// `left_from_board` of every view.
+    pub boards: Vec<Isometry3<f64>>,
+    /// Whether each corner may be used, in the order of [`StereoView::corners`].
+    pub usable: Vec<Vec<bool>>,
+}
+
+/// The result of a fit.
+pub(crate) struct Fit<S> {
+    pub shared: Shared<S>,
+    /// `left_from_board` of every view; of one without inliers, where it was last.
+    pub boards: Vec<Isometry3<f64>>,
+    /// Whether each corner is an inlier.
+    pub inliers: Vec<Vec<bool>>,
+    /// Each corner's distance from where it should be.
+    pub errors_px: Vec<Vec<f64>>,
+    /// Standard deviation of a pixel coordinate.
+    pub sigma_px: f64,
+    /// Of a step of the shared unknowns; `None` where the corners leave one open.
+    pub covariance: Option<DMatrix<f64>>,
+    /// Information of the shared unknowns, in units of a pixel coordinate's variance.
+    pub information: DMatrix<f64>,
+}
+
+/// Why there is no fit.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum NoFit {
+    /// The corners leave an unknown open.
+    NotDetermined,
+    /// The iteration ended at no optimum.
+    Diverged,
+    /// A lens's covariance is not positive definite.
+    NotACovariance,
+}
+
+/// What is fitted to what.
+pub(crate) struct Task<'a, K: Kinematics> {
+    pub kinematics: &'a K,
+    pub views: &'a [StereoView],
+    /// Of every view.
+    pub own_poses: &'a [OwnPoses],
+    /// As their own calibration found them.
+    pub lenses: Lenses,
+    pub knowledge: &'a LensKnowledge,
+    /// Whether gross corners are left out.
+    pub robust: bool,
+}
+
+impl<K: Kinematics> Task<'_, K> {
+    /// The optimum near `start`.
+    pub fn fit(&self, start: Start<K::State>) -> Result<Fit<K::State>, NoFit> {
+        let Start { mut shared, mut boards, usable } = start;
+        let mut sigma_px = self.settle(&mut shared, &mut boards, &usable)?;
+        let mut inliers = self.inliers(&shared, &self.errors_px(&shared, &boards), &usable);
+        let mut round = 0;
+        loop {
+            round += 1;
+            let kept: Vec<usize> = (0..inliers.len()).filter(|&view| inliers[view].contains(&true)).collect();
+            let problem = self.problem(self.knowledge, sigma_px, &kept, &inliers)?;
+            let kept_boards = kept.iter().map(|&view| boards[view]).collect();
+            let solution = arrow::solve(&problem, shared, kept_boards, &ArrowOptions::default());
+            if !solution.cost.is_finite() {
+                return Err(NoFit::Diverged);
+            }
+            shared = solution.shared;
+            kept.iter().zip(&solution.blocks).for_each(|(&view, board)| boards[view] = *board);
+            let variance = solution.normal.variance().ok_or(NoFit::NotDetermined)?;
+            let errors_px = self.errors_px(&shared, &boards);
+            let next = self.inliers(&shared, &errors_px, &usable);
+            // Priors are weighed by the pixels' standard deviation, so it must have settled too.
+            let next_sigma = variance.sqrt().max(FINEST_PX);
+            let settled = next == inliers && (next_sigma - sigma_px).abs() <= 1e-3 * sigma_px;
+            sigma_px = next_sigma;
+            if settled || round == MOST_ROUNDS {
+                let information = solution.normal.shared_information().ok_or(NoFit::NotDetermined)?;
+                let covariance =
+                    solution.normal.shared_covariance().map(|covariance| covariance * (sigma_px * sigma_px));
+                return Ok(Fit { shared, boards, inliers, errors_px, sigma_px, covariance, information });
+            }
+            inliers = next;
+        }
+    }
+
+    /// Brings the unknowns near the optimum, first with the lenses held, and returns the standard deviation of a pixel
+    /// coordinate by the median.
+    fn settle(
+        &self,
+        shared: &mut Shared<K::State>,
+        boards: &mut Vec<Isometry3<f64>>,
+        usable: &[Vec<bool>],
+    ) -> Result<f64, NoFit> {
+        let every: Vec<usize> = (0..self.views.len()).collect();
+        let mut scale = median_px(&self.errors_px(shared, boards), usable);
+        for knowledge in [&LensKnowledge::Exact, self.knowledge, self.knowledge] {
+            let problem = self.problem(knowledge, scale / RAYLEIGH_MEDIAN, &every, usable)?;
+            let loss = if self.robust { Loss::Huber(2.0 * scale) } else { Loss::Squares };
+            let options = ArrowOptions { loss, relative_cost: 1e-5, ..ArrowOptions::default() };
+            let solution = arrow::solve(&problem, shared.clone(), std::mem::take(boards), &options);
+            (*shared, *boards) = (solution.shared, solution.blocks);
+            scale = median_px(&self.errors_px(shared, boards), usable);
+        }
+        Ok((scale / RAYLEIGH_MEDIAN).max(FINEST_PX))
+    }
+
+    fn problem<'a>(
+        &'a self,
+        knowledge: &LensKnowledge,
+        sigma_px: f64,
+        kept: &'a [usize],
+        used: &'a [Vec<bool>],
+    ) -> Result<Joint<'a, K>, NoFit> {
+        let lens_prior = LensPrior::new(self.lenses, knowledge, sigma_px).ok_or(NoFit::NotACovariance)?;
+        Ok(Joint { kinematics: self.kinematics, lens_prior, sigma_px, views: self.views, kept, used })
+    }
+
+    pub fn errors_px(&self, shared: &Shared<K::State>, boards: &[Isometry3<f64>]) -> Vec<Vec<f64>> {
+        let view_errors = |(index, (view, board)): (usize, (&StereoView, &Isometry3<f64>))| {
+            let left_from_right = self.kinematics.left_from_right(&shared.state, index);
+            Pair { left_from_right, lenses: shared.lenses }.errors_px(view, board)
+        };
+        self.views.iter().zip(boards).enumerate().map(view_errors).collect()
+    }
+
+    fn inliers(&self, shared: &Shared<K::State>, errors_px: &[Vec<f64>], usable: &[Vec<bool>]) -> Vec<Vec<bool>> {
+        if self.robust {
+            inliers(&shared.lenses, self.views, self.own_poses, errors_px, usable)
+        } else {
+            usable.to_vec()
+        }
+    }
+}

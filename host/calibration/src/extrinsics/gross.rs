@@ -1,0 +1,73 @@
+//! Which corners and views are gross.
+//!
+//! A gross corner contradicts the other corners of its own image: each image is given its own board pose, so that a pair
+//! whose images were not taken at the same instant does not make its corners gross. A gross view is one on which the two
+//! cameras disagree altogether, such as a board counted from another end.
+
+use nalgebra::Isometry3;
+
+use crate::extrinsics::StereoView;
+use crate::extrinsics::stereo::Lenses;
+use crate::planar_pose::{errors_px, refined};
+use crate::{Corner, Loss, median};
+
+/// A corner further off than this many medians is gross: 7 standard deviations of a Gaussian error.
+const GROSS_CORNER: f64 = 6.0;
+/// A view whose median error is this many medians is gross. A hand-held pair taken a moment apart stays far below.
+const GROSS_VIEW: f64 = 30.0;
+/// Nearer than this nothing is gross, however exact the rest is.
+const NEVER_GROSS_PX: f64 = 0.01;
+/// A view needs this many corners to carry its own board pose.
+const FEWEST_CORNERS: usize = 4;
+
+/// The board as each camera alone places it: in the left and in the right frame.
+pub(crate) type OwnPoses = [Isometry3<f64>; 2];
+
+/// The median of the errors that `counted` allows; never zero, so that it can be the scale of a loss.
+pub(crate) fn median_px(errors_px: &[Vec<f64>], counted: &[Vec<bool>]) -> f64 {
+    const SMALLEST_PX: f64 = 1e-6;
+    let pairs = errors_px.iter().flatten().zip(counted.iter().flatten());
+    let errors = pairs.filter(|(_, counted)| **counted).map(|(error, _)| *error).collect();
+    median(errors).unwrap_or(0.0).max(SMALLEST_PX)
+}
+
+/// The usable corners that are not gross. `joint_errors_px` are those of the joint fit.
+pub(crate) fn inliers(
+    lenses: &Lenses,
+    views: &[StereoView],
+    own_poses: &[OwnPoses],
+    joint_errors_px: &[Vec<f64>],
+    usable: &[Vec<bool>],
+) -> Vec<Vec<bool>> {
+    let own: Vec<Vec<f64>> = views
+        .iter()
+        .zip(own_poses)
+        .zip(usable)
+        .map(|((view, poses), usable)| own_errors_px(lenses, view, poses, usable))
+        .collect();
+    let corner_limit = (GROSS_CORNER * median_px(&own, usable)).max(NEVER_GROSS_PX);
+    let view_limit = (GROSS_VIEW * median_px(joint_errors_px, usable)).max(NEVER_GROSS_PX);
+    let judge = |((own, joint), usable): ((&Vec<f64>, &Vec<f64>), &Vec<bool>)| {
+        let fine: Vec<bool> = own.iter().zip(usable).map(|(&error, &usable)| usable && error <= corner_limit).collect();
+        let enough = fine.iter().filter(|&&fine| fine).count() >= FEWEST_CORNERS;
+        let agrees = median(joint.clone()).is_some_and(|error| error <= view_limit);
+        if enough && agrees { fine } else { vec![false; fine.len()] }
+    };
+    own.iter().zip(joint_errors_px).zip(usable).map(judge).collect()
+}
+
+/// Each corner's distance from where the rest of its own image puts it.
+fn own_errors_px(lenses: &Lenses, view: &StereoView, poses: &OwnPoses, usable: &[bool]) -> Vec<f64> {
+    let (left_usable, right_usable) = usable.split_at(view.left.corners.len().min(usable.len()));
+    let sides = [
+        (&lenses.left, &view.left.corners, &poses[0], left_usable),
+        (&lenses.right, &view.right.corners, &poses[1], right_usable),
+    ];
+    let errors = sides.into_iter().flat_map(|(lens, corners, start, usable)| {
+        let kept: Vec<Corner> = corners.iter().zip(usable).filter(|(_, usable)| **usable).map(|(c, _)| *c).collect();
+        let scale = median(errors_px(lens, &kept, start)).unwrap_or(0.0).max(NEVER_GROSS_PX);
+        let pose = refined(lens, &kept, *start, Loss::Cauchy(scale)).map_or(*start, |(pose, _)| pose);
+        errors_px(lens, corners, &pose)
+    });
+    errors.collect()
+}

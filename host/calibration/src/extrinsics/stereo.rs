@@ -1,0 +1,227 @@
+//! Residuals of one board seen by two cameras, with derivatives.
+
+use nalgebra::{Isometry3, Matrix3x6, SMatrix, SVector, Vector2};
+use vergence_vision::KannalaBrandt;
+
+use crate::arrow::Equations;
+use crate::board::Corner;
+use crate::extrinsics::StereoView;
+use crate::reprojection::{LENS, Lens, POSE, point_by_move};
+
+/// Which camera of the pair.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Side {
+    /// The left one.
+    Left,
+    /// The right one.
+    Right,
+}
+
+impl std::fmt::Display for Side {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.write_str(match self {
+            Self::Left => "left",
+            Self::Right => "right",
+        })
+    }
+}
+
+/// What is known of the two lenses before the views are looked at.
+///
+/// A lens's parameters are fx, fy, cx, cy and k1 to k4 of [`OpenCvFisheye`](vergence_vision::OpenCvFisheye), in this
+/// order, as in [`IntrinsicsCalibration::covariance`](crate::IntrinsicsCalibration::covariance).
+#[derive(Clone, Debug, PartialEq)]
+pub enum LensKnowledge {
+    /// They are as given.
+    Exact,
+    /// They are as given up to the covariance of their own calibration, from other photographs than these views.
+    Within {
+        /// Of the left lens's parameters.
+        left: Box<SMatrix<f64, LENS, LENS>>,
+        /// Of the right lens's parameters.
+        right: Box<SMatrix<f64, LENS, LENS>>,
+    },
+    /// Nothing: the parameters given are only where to start.
+    Free,
+}
+
+impl LensKnowledge {
+    /// As given up to these covariances of the left and the right lens.
+    #[must_use]
+    pub fn within(left: SMatrix<f64, LENS, LENS>, right: SMatrix<f64, LENS, LENS>) -> Self {
+        Self::Within { left: Box::new(left), right: Box::new(right) }
+    }
+}
+
+/// The two lenses as unknowns.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Lenses {
+    pub left: Lens,
+    pub right: Lens,
+}
+
+/// How the lenses enter a problem: whether they move, and what pulls them back.
+pub(crate) struct LensPrior {
+    pub start: Lenses,
+    /// Square roots of the information, times the standard deviation of a pixel coordinate; `None` for free lenses.
+    pull: Option<[SMatrix<f64, LENS, LENS>; 2]>,
+    pub dimension: usize,
+}
+
+/// The relative pose and the lenses: all that the residuals of a view depend on but for the board.
+#[derive(Clone, Copy)]
+pub(crate) struct Pair {
+    pub left_from_right: Isometry3<f64>,
+    pub lenses: Lenses,
+}
+
+/// One corner's distance from where it should be, and its derivatives.
+pub(crate) struct StereoResidual {
+    pub error: Vector2<f64>,
+    pub by_relative_pose: SMatrix<f64, 2, POSE>,
+    pub by_lens: SMatrix<f64, 2, LENS>,
+    pub by_board: SMatrix<f64, 2, POSE>,
+}
+
+impl Lenses {
+    pub fn of(left: &KannalaBrandt, right: &KannalaBrandt) -> Self {
+        Self { left: Lens::of(left), right: Lens::of(right) }
+    }
+
+    /// Moved by a step of no components, or of the left lens's and then the right lens's.
+    pub fn moved(&self, step: &[f64]) -> Self {
+        let part = |from: usize| {
+            let part = step.get(from..from + LENS)?;
+            Some(SVector::<f64, LENS>::from_column_slice(part))
+        };
+        match (part(0), part(LENS)) {
+            (Some(left), Some(right)) => Self { left: self.left.moved(&left), right: self.right.moved(&right) },
+            _ => *self,
+        }
+    }
+}
+
+impl LensPrior {
+    /// `sigma_px` is the standard deviation of a pixel coordinate. `None` for a covariance that is not one.
+    pub fn new(start: Lenses, knowledge: &LensKnowledge, sigma_px: f64) -> Option<Self> {
+        let root = |covariance: &SMatrix<f64, LENS, LENS>| {
+            // Scaled to unit diagonal first: the parameters differ by many orders of magnitude.
+            let scale = covariance.diagonal().map(|variance| 1.0 / variance.sqrt());
+            let scaled = SMatrix::from_diagonal(&scale);
+            let factor = (scaled * covariance * scaled).cholesky()?;
+            Some(factor.l().try_inverse()? * scaled * sigma_px)
+        };
+        let (pull, dimension) = match knowledge {
+            LensKnowledge::Exact => (None, 0),
+            LensKnowledge::Free => (None, 2 * LENS),
+            LensKnowledge::Within { left, right } => (Some([root(left)?, root(right)?]), 2 * LENS),
+        };
+        Some(Self { start, pull, dimension })
+    }
+
+    /// Adds the pull of the lenses' own calibration; their columns begin at `column` of the shared block.
+    pub fn add_to(&self, lenses: &Lenses, column: usize, equations: &mut Equations<POSE>) {
+        let Some(pull) = &self.pull else { return };
+        let moves = [
+            lenses.left.parameters() - self.start.left.parameters(),
+            lenses.right.parameters() - self.start.right.parameters(),
+        ];
+        for (side, (pull, lens_move)) in pull.iter().zip(&moves).enumerate() {
+            let residual = pull * lens_move;
+            for row in 0..LENS {
+                let mut shared = vec![[0.0]; column + (side + 1) * LENS];
+                for (slot, derivative) in shared.iter_mut().skip(column + side * LENS).zip(pull.row(row).iter()) {
+                    *slot = [*derivative];
+                }
+                equations.add_plain(&[residual[row]], &shared, &[[0.0]; POSE]);
+            }
+        }
+    }
+}
+
+impl Pair {
+    /// The residual of `corner`, seen by the camera on `side`, of the board at `left_from_board`. `None` where the
+    /// corner cannot be projected.
+    pub fn residual(&self, side: Side, corner: &Corner, left_from_board: &Isometry3<f64>) -> Option<StereoResidual> {
+        let turned = left_from_board.rotation * Vector2::from(corner.board_mm).push(0.0);
+        let in_left = turned + left_from_board.translation.vector;
+        let by_board = point_by_move(&turned);
+        let (projection, by_relative_pose, by_board) = match side {
+            Side::Left => (self.lenses.left.project(&in_left)?, Matrix3x6::zeros(), by_board),
+            Side::Right => {
+                // Rᵀ(p - t) with R ← exp(ω) R, t ← t + δ.
+                let right_from_left = self.left_from_right.rotation.inverse().to_rotation_matrix();
+                let arm = in_left - self.left_from_right.translation.vector;
+                let in_right = right_from_left * arm;
+                let by_move = -(right_from_left.matrix() * point_by_move(&arm));
+                (self.lenses.right.project(&in_right)?, by_move, right_from_left.matrix() * by_board)
+            }
+        };
+        Some(StereoResidual {
+            error: projection.pixel - Vector2::new(corner.pixel.u, corner.pixel.v),
+            by_relative_pose: projection.by_point * by_relative_pose,
+            by_lens: projection.by_lens,
+            by_board: projection.by_point * by_board,
+        })
+    }
+
+    /// Length of each residual of `view` in the order of [`StereoView::corners`]; infinite where a corner cannot be
+    /// projected.
+    pub fn errors_px(&self, view: &StereoView, left_from_board: &Isometry3<f64>) -> Vec<f64> {
+        view.corners()
+            .map(|(side, corner)| {
+                self.residual(side, corner, left_from_board).map_or(f64::INFINITY, |residual| residual.error.norm())
+            })
+            .collect()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use nalgebra::{UnitQuaternion, Vector3};
+    use vergence_vision::{Angle, ImageSize, Pixel};
+
+    use super::*;
+    use crate::reprojection::moved;
+
+    fn pair() -> Pair {
+        let size = ImageSize { width: 2048, height: 2048 };
+        let centre = Pixel { u: 1020.0, v: 1030.0 };
+        let camera = KannalaBrandt::new([600.0, 5.0, -2.0, 0.5, -0.1], 1.01, centre, Angle::from_deg(98.0), size);
+        let lens = Lens::of(&camera.unwrap());
+        let rotation = UnitQuaternion::from_scaled_axis(Vector3::new(0.1, 1.9, -0.2));
+        let left_from_right = Isometry3::from_parts(Vector3::new(90.0, 4.0, -110.0).into(), rotation);
+        Pair { left_from_right, lenses: Lenses { left: lens, right: lens } }
+    }
+
+    /// By central differences, of a board from in front to beyond 90°.
+    #[test]
+    fn derivatives_are_those_of_the_residual() {
+        let pair = pair();
+        let corner = Corner { board_mm: [125.0, -40.0], pixel: Pixel { u: 0.0, v: 0.0 } };
+        for turn in [0.0, 0.5, 1.0, 1.4] {
+            let rotation = UnitQuaternion::from_scaled_axis(Vector3::new(0.2, turn, 0.3));
+            let board = Isometry3::from_parts((rotation * Vector3::new(20.0, -30.0, 400.0)).into(), rotation);
+            for side in [Side::Left, Side::Right] {
+                let derivative = pair.residual(side, &corner, &board).unwrap();
+                let difference =
+                    |changed: &dyn Fn(f64) -> Vector2<f64>, step: f64| (changed(step) - changed(-step)) / (2.0 * step);
+                for component in 0..POSE {
+                    let by = |step: f64| SVector::<f64, POSE>::from_fn(|i, _| if i == component { step } else { 0.0 });
+                    let step = if component < 3 { 1e-5 } else { 1e-3 };
+                    let by_board = |s: f64| pair.residual(side, &corner, &moved(&board, &by(s))).unwrap().error;
+                    let by_relative_pose = |s: f64| {
+                        let left_from_right = moved(&pair.left_from_right, &by(s));
+                        Pair { left_from_right, ..pair }.residual(side, &corner, &board).unwrap().error
+                    };
+                    let tolerance = if component < 3 { 1e-5 } else { 1e-8 };
+                    let board_error = difference(&by_board, step) - derivative.by_board.column(component);
+                    let pose_error =
+                        difference(&by_relative_pose, step) - derivative.by_relative_pose.column(component);
+                    assert!(board_error.norm() < tolerance, "board {component}: {board_error}");
+                    assert!(pose_error.norm() < tolerance, "relative pose {component}: {pose_error}");
+                }
+            }
+        }
+    }
+}

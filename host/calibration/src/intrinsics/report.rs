@@ -1,0 +1,188 @@
+//! From the optimum to the result: checks of what the views determine, covariance, figures.
+
+use nalgebra::{DMatrix, SMatrix, Vector3};
+use vergence_vision::{Angle, Camera, ImageSize, Point, Transform};
+
+use super::adjust::Adjusted;
+use super::cone::with_valid_cone;
+use super::lens::LENS;
+use super::sights::{Sight, Sighting};
+use super::{
+    BoardWarp, IntrinsicsCalibration, IntrinsicsError, Outlier, OutlierReason, Parameter, ViewFigures, ViewPose,
+};
+use crate::BoardView;
+
+/// The result; `left_out` are the corners of views too poor to use.
+pub(super) fn report(
+    given: &[BoardView],
+    size: ImageSize,
+    adjusted: &Adjusted,
+    mut outliers: Vec<Outlier>,
+) -> Result<IntrinsicsCalibration, IntrinsicsError> {
+    let tilt_spread = check_tilts(adjusted)?;
+    let covariances = Covariances::of(adjusted)?;
+    covariances.check(adjusted, size)?;
+    let outermost = outermost(adjusted);
+    let lens = adjusted.shared.lens;
+    let camera = with_valid_cone(lens, outermost, size).map_err(IntrinsicsError::NotALens)?;
+
+    outliers.extend(&adjusted.outliers);
+    outliers.extend(adjusted.views.iter().zip(&adjusted.poses).flat_map(|(view, pose)| {
+        let too_far = |sight: &Sight| Outlier {
+            view: view.index,
+            corner: sight.index,
+            residual_px: Some(adjusted.shared.residual_px(pose, sight)).filter(|r| r.is_finite()),
+            reason: OutlierReason::TooFar,
+        };
+        view.sights.iter().filter(|sight| !sight.used).map(too_far)
+    }));
+    outliers.sort_by_key(|outlier| (outlier.view, outlier.corner));
+
+    let squares =
+        |used_only| adjusted.views.iter().enumerate().map(|(i, _)| view_squares(adjusted, i, used_only)).sum();
+    let (all, inlier): (Squares, Squares) = (squares(false), squares(true));
+    Ok(IntrinsicsCalibration {
+        camera,
+        opencv: lens,
+        covariance: covariances.lens(),
+        warp: covariances.warp(adjusted),
+        rms_px: all.rms(),
+        rms_inlier_px: inlier.rms(),
+        sigma0_px: covariances.variance.sqrt(),
+        corners_total: given.iter().map(|view| view.corners.len()).sum(),
+        corners_inlier: inlier.count,
+        views_used: adjusted.views.len(),
+        tilt_spread,
+        outermost,
+        views: view_figures(given, adjusted, &covariances),
+        outliers,
+    })
+}
+
+/// Focal length and distance are exchangeable where all boards are parallel; this far apart they are told apart.
+fn check_tilts(adjusted: &Adjusted) -> Result<Angle, IntrinsicsError> {
+    const LEAST_SPREAD: Angle = Angle::from_deg(3.0);
+    let normals: Vec<Vector3<f64>> = adjusted.poses.iter().map(|pose| pose.rotation * Vector3::z()).collect();
+    let angles = normals.iter().enumerate().flat_map(|(i, a)| normals.iter().skip(i + 1).map(move |b| between(a, b)));
+    let spread = Angle::from_rad(angles.fold(0.0, f64::max));
+    if spread < LEAST_SPREAD { Err(IntrinsicsError::ParallelViews { spread }) } else { Ok(spread) }
+}
+
+/// The angle between two planes' normals, whichever side they point to.
+fn between(a: &Vector3<f64>, b: &Vector3<f64>) -> f64 {
+    a.cross(b).norm().atan2(a.dot(b).abs())
+}
+
+fn outermost(adjusted: &Adjusted) -> Angle {
+    let angle = |pose: &nalgebra::Isometry3<f64>, sight: &Sight| {
+        let point: Point<Camera> = Point::from_mm((pose * adjusted.shared.on_board(sight)).coords);
+        point.direction().map_or(0.0, |ray| ray.angle_to_axis().rad())
+    };
+    let angles =
+        adjusted.views.iter().zip(&adjusted.poses).flat_map(|(view, pose)| view.used().map(move |s| angle(pose, s)));
+    Angle::from_rad(angles.fold(0.0, f64::max))
+}
+
+/// Covariances in pixels, radians and millimetres.
+struct Covariances {
+    /// Of one component of a residual.
+    variance: f64,
+    /// Of lens and warp, for unit variance.
+    shared: DMatrix<f64>,
+}
+
+impl Covariances {
+    fn of(adjusted: &Adjusted) -> Result<Self, IntrinsicsError> {
+        let variance = adjusted.normal.variance().ok_or(IntrinsicsError::Singular)?;
+        let shared = adjusted.normal.shared_covariance().ok_or(IntrinsicsError::Singular)?;
+        Ok(Self { variance, shared })
+    }
+
+    /// Refuses what no one could use.
+    fn check(&self, adjusted: &Adjusted, size: ImageSize) -> Result<(), IntrinsicsError> {
+        /// Of the focal length: a metre would be measured as less than 0.9 or more than 1.1.
+        const FOCAL_SHARE: f64 = 0.1;
+        /// Of the image's longer side.
+        const CENTRE_SHARE: f64 = 0.1;
+        let sigma = |i: usize| (self.variance * self.shared[(i, i)]).sqrt();
+        let lens = &adjusted.shared.lens;
+        let longer = f64::from(size.width.max(size.height));
+        let limits = [
+            (Parameter::FocalLength, sigma(0), FOCAL_SHARE * lens.fx.abs()),
+            (Parameter::FocalLength, sigma(1), FOCAL_SHARE * lens.fy.abs()),
+            (Parameter::PrincipalPoint, sigma(2), CENTRE_SHARE * longer),
+            (Parameter::PrincipalPoint, sigma(3), CENTRE_SHARE * longer),
+        ];
+        match limits.into_iter().find(|(_, sigma, limit)| sigma > limit) {
+            Some((parameter, sigma_px, _)) => Err(IntrinsicsError::Undetermined { parameter, sigma_px }),
+            None => Ok(()),
+        }
+    }
+
+    fn lens(&self) -> SMatrix<f64, LENS, LENS> {
+        self.shared.fixed_view::<LENS, LENS>(0, 0) * self.variance
+    }
+
+    fn warp(&self, adjusted: &Adjusted) -> Option<BoardWarp> {
+        let sigma = |i: usize| (self.variance * self.shared[(i, i)]).sqrt();
+        let [along_x_mm, along_y_mm] = adjusted.shared.warp_mm;
+        (self.shared.nrows() > LENS).then(|| BoardWarp {
+            along_x_mm,
+            along_y_mm,
+            sigma_mm: [sigma(LENS), sigma(LENS + 1)],
+        })
+    }
+}
+
+fn view_figures(given: &[BoardView], adjusted: &Adjusted, covariances: &Covariances) -> Vec<ViewFigures> {
+    let mut figures: Vec<_> = given
+        .iter()
+        .map(|view| ViewFigures {
+            name: view.name.clone(),
+            corners: view.corners.len(),
+            corners_inlier: 0,
+            rms_px: None,
+            rms_inlier_px: None,
+            pose: None,
+        })
+        .collect();
+    for (block, (view, pose)) in adjusted.views.iter().zip(&adjusted.poses).enumerate() {
+        let Some(entry) = figures.get_mut(view.index) else { continue };
+        let inlier = view_squares(adjusted, block, true);
+        entry.corners_inlier = inlier.count;
+        entry.rms_inlier_px = Some(inlier.rms());
+        entry.rms_px = Some(view_squares(adjusted, block, false).rms());
+        entry.pose = adjusted.normal.block_covariance(block, &covariances.shared).map(|covariance| ViewPose {
+            camera_from_board: Transform::from_isometry(*pose),
+            covariance: covariance * covariances.variance,
+        });
+    }
+    figures
+}
+
+/// A sum of squared distances.
+#[derive(Clone, Copy, Default)]
+struct Squares {
+    sum: f64,
+    count: usize,
+}
+
+impl Squares {
+    fn rms(self) -> f64 {
+        (self.sum / self.count as f64).sqrt()
+    }
+}
+
+impl std::iter::Sum for Squares {
+    fn sum<I: Iterator<Item = Self>>(parts: I) -> Self {
+        parts.fold(Self::default(), |a, b| Self { sum: a.sum + b.sum, count: a.count + b.count })
+    }
+}
+
+fn view_squares(adjusted: &Adjusted, block: usize, used_only: bool) -> Squares {
+    let of_view = |(view, pose): (&Sighting, &nalgebra::Isometry3<f64>)| {
+        let counted = view.sights.iter().filter(|sight| sight.used || !used_only);
+        counted.map(|s| Squares { sum: adjusted.shared.residual_px(pose, s).powi(2), count: 1 }).sum()
+    };
+    adjusted.views.get(block).zip(adjusted.poses.get(block)).map_or_else(Squares::default, of_view)
+}

@@ -1,0 +1,213 @@
+//! What a calibration tells: the lens, how sure it is, and what was left out and why.
+
+use std::fmt;
+
+use nalgebra::SMatrix;
+use vergence_vision::{Camera, InvalidLens, KannalaBrandt, OpenCvFisheye, Transform};
+
+use super::lens::LENS;
+use crate::Board;
+
+/// A calibrated lens.
+#[derive(Clone, Debug, PartialEq)]
+pub struct IntrinsicsCalibration {
+    /// The lens with its valid cone: the angle to the axis of the outermost corner used and 5 % more, but less than the
+    /// angle where r(θ) stops growing.
+    pub camera: KannalaBrandt,
+    /// The same lens in the parameters that were estimated. [`KannalaBrandt`] holds them rescaled: its five
+    /// coefficients are fx (1, k1, k2, k3, k4) in pixels, its aspect is fy / fx.
+    pub opencv: OpenCvFisheye,
+    /// Covariance of fx, fy, cx, cy (pixels) and k1 to k4 from the noise of the corners, board poses marginalised.
+    pub covariance: SMatrix<f64, LENS, LENS>,
+    /// How the board bows, where [`crate::IntrinsicsOptions::warp`] asked for it.
+    pub warp: Option<BoardWarp>,
+    /// Distance between corners and reprojections, √(mean(dx² + dy²)) over all corners of the views used, in pixels.
+    pub rms_px: f64,
+    /// The same over the corners used.
+    pub rms_inlier_px: f64,
+    /// Estimated noise of a corner's u or v in pixels: the residuals' standard deviation after the degrees of freedom.
+    pub sigma0_px: f64,
+    /// Corners given.
+    pub corners_total: usize,
+    /// Corners used.
+    pub corners_inlier: usize,
+    /// Views used.
+    pub views_used: usize,
+    /// Largest angle between the planes of two boards: what determines the focal length.
+    pub tilt_spread: vergence_vision::Angle,
+    /// The angle to the axis of the outermost corner used.
+    pub outermost: vergence_vision::Angle,
+    /// One for each view given, in their order.
+    pub views: Vec<ViewFigures>,
+    /// Every corner left out, by view and corner.
+    pub outliers: Vec<Outlier>,
+}
+
+/// The board's height over its plane, towards +z of its frame: along_x (1 − x̂²) + along_y (1 − ŷ²) millimetres, with x̂ and
+/// ŷ from −1 to 1 over the corners.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct BoardWarp {
+    /// Height of the middle over the left and right edges, in millimetres.
+    pub along_x_mm: f64,
+    /// Height of the middle over the upper and lower edges, in millimetres.
+    pub along_y_mm: f64,
+    /// Standard deviations of both, in millimetres.
+    pub sigma_mm: [f64; 2],
+}
+
+/// How one view fits.
+#[derive(Clone, Debug, PartialEq)]
+pub struct ViewFigures {
+    /// The view's name.
+    pub name: String,
+    /// Corners given.
+    pub corners: usize,
+    /// Corners used; none of a view left out.
+    pub corners_inlier: usize,
+    /// Root mean square distance of all its corners, in pixels; `None` of a view left out.
+    pub rms_px: Option<f64>,
+    /// The same over the corners used.
+    pub rms_inlier_px: Option<f64>,
+    /// Where the board was; `None` of a view left out.
+    pub pose: Option<ViewPose>,
+}
+
+/// Where the board was in one view.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct ViewPose {
+    /// The board in the camera's frame.
+    pub camera_from_board: Transform<Camera, Board>,
+    /// Covariance of a small turn ω (radians) and shift δ (millimetres) in the camera's axes, R ← exp(ω) R, t ← t + δ,
+    /// with the lens's uncertainty included.
+    pub covariance: SMatrix<f64, 6, 6>,
+}
+
+/// A corner that was left out.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Outlier {
+    /// Index of the view in the list given.
+    pub view: usize,
+    /// Index of the corner in the view.
+    pub corner: usize,
+    /// Its distance from the reprojection in pixels, where there is one.
+    pub residual_px: Option<f64>,
+    /// Why.
+    pub reason: OutlierReason,
+}
+
+/// Why a corner was left out.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[non_exhaustive]
+pub enum OutlierReason {
+    /// It is too far from its reprojection: see [`crate::IntrinsicsOptions::outlier_factor`].
+    TooFar,
+    /// Its view has too few corners to say where the board was.
+    ViewTooSmall,
+    /// The corners of its view lie on a line.
+    ViewOnALine,
+    /// Most corners of its view are too far from their reprojections.
+    ViewDisagrees,
+}
+
+impl fmt::Display for OutlierReason {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            Self::TooFar => "too far from its reprojection",
+            Self::ViewTooSmall => "too few corners in the view",
+            Self::ViewOnALine => "the view's corners lie on a line",
+            Self::ViewDisagrees => "most corners of the view are too far from their reprojections",
+        })
+    }
+}
+
+/// A parameter of the lens.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Parameter {
+    /// fx and fy.
+    FocalLength,
+    /// cx and cy.
+    PrincipalPoint,
+}
+
+impl fmt::Display for Parameter {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            Self::FocalLength => "focal length",
+            Self::PrincipalPoint => "principal point",
+        })
+    }
+}
+
+/// Why views do not give a calibration.
+#[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+pub enum IntrinsicsError {
+    /// One view or none.
+    #[error("{views} views given, at least {needed} with different tilts are needed")]
+    TooFewViews {
+        /// Views given.
+        views: usize,
+        /// Views needed.
+        needed: usize,
+    },
+    /// A coordinate is infinite or not a number.
+    #[error("corner {corner} of view {view} is not a finite number")]
+    NotFinite {
+        /// Index of the view.
+        view: usize,
+        /// Index of the corner in it.
+        corner: usize,
+    },
+    /// A place on the board or in the image is listed twice in one view.
+    #[error("corner {corner} of view {view} is at the same place as an earlier one, on the board or in the image")]
+    DuplicateCorner {
+        /// Index of the view.
+        view: usize,
+        /// Index of the later corner in it.
+        corner: usize,
+    },
+    /// Too few views have enough corners, not all on a line.
+    #[error("{usable_views} views have {corners} corners or more that are not on one line, {needed_views} are needed")]
+    TooFewCorners {
+        /// Views with enough corners.
+        usable_views: usize,
+        /// Such views needed.
+        needed_views: usize,
+        /// Corners a view needs.
+        corners: usize,
+    },
+    /// No lens explains any view.
+    #[error("no lens explains the views: are the corners and the board what they are said to be?")]
+    NoStart,
+    /// Most views contradict the lens that fits the others.
+    #[error("only {views} views agree on one lens, {needed} are needed: were corners or images mixed up?")]
+    ViewsDisagree {
+        /// Views that agree.
+        views: usize,
+        /// Views needed.
+        needed: usize,
+    },
+    /// All boards have nearly the same orientation, which leaves focal length and distance exchangeable.
+    #[error("all boards are parallel within {spread:.2}: tilt the board between the views")]
+    ParallelViews {
+        /// Largest angle between two boards.
+        spread: vergence_vision::Angle,
+    },
+    /// The views fit many lenses nearly as well.
+    #[error("the views do not determine the {parameter}: its standard deviation would be {sigma_px:.1} px")]
+    Undetermined {
+        /// What is not determined.
+        parameter: Parameter,
+        /// Its standard deviation in pixels.
+        sigma_px: f64,
+    },
+    /// As [`Self::Undetermined`], to the last digit: two unknowns act alike, or there are more of them than corners.
+    #[error("the views do not determine the lens: some of its parameters are exchangeable")]
+    Singular,
+    /// The adjustment did not come to rest.
+    #[error("the adjustment found no minimum: the views do not determine the lens")]
+    NotConverged,
+    /// The best fit is not a lens.
+    #[error("the best fit is not a lens: {0}")]
+    NotALens(InvalidLens),
+}

@@ -1,0 +1,236 @@
+//! The pose of a board from one bundle of rays.
+//!
+//! Each corner's bearing f and board position X satisfy a·HX = b·HX = 0 for two tangents a, b of f and the matrix
+//! H ~ `[r1 r2 t]` (the direct linear transform of R. Hartley and A. Zisserman, *Multiple View Geometry*, 2004, §4.1, on
+//! bearings). H's sign follows from f·HX > 0, not from depths, and nothing is divided by z: a board beyond 90° is like any
+//! other. A plane seen from afar has a second, mirrored pose that fits nearly as well (D. Oberkampf, D. DeMenthon and
+//! L. Davis, "Iterative pose estimation using coplanar feature points", CVIU 63(3), 1996), so both are refined on the
+//! reprojection and compared.
+
+use std::cmp::Ordering;
+
+use nalgebra::{
+    Isometry3, Matrix3, Point3, Rotation3, SMatrix, SVector, Translation3, UnitQuaternion, Vector2, Vector3,
+};
+use vergence_vision::{Camera, KannalaBrandt, Transform};
+
+use crate::Loss;
+use crate::arrow::{self, ArrowOptions, ArrowProblem, Equations};
+use crate::arun::nearest_rotation;
+use crate::board::{Board, BoardView, Corner};
+use crate::reprojection::{Lens, POSE, moved, point_by_move};
+
+/// Four points in general position determine the pose.
+const FEWEST_CORNERS: usize = 4;
+/// The solution of the DLT must stand out from the next by this share of the largest singular value.
+const SEPARATION: f64 = 1e-7;
+
+/// Where a board is, from one image of it.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct BoardPose {
+    /// The board in the camera frame.
+    pub camera_from_board: Transform<Camera, Board>,
+    /// Distance between corners and reprojection, root mean square per corner.
+    pub rms_px: f64,
+    /// The same for the other tilt, where it is another local optimum: close to `rms_px` means that the image alone
+    /// does not tell which way the board is tilted.
+    pub other_tilt_rms_px: Option<f64>,
+    /// Corners used.
+    pub corners: usize,
+    /// Corners left out, outside the lens's valid cone.
+    pub outside: usize,
+}
+
+/// Why an image does not determine a board's pose.
+#[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+pub enum PoseError {
+    /// Fewer corners than four inside the lens's valid cone.
+    #[error("{0} usable corners; the pose of a board needs at least 4")]
+    TooFewCorners(usize),
+    /// A corner or pixel is infinite or not a number.
+    #[error("a corner is not a finite number")]
+    NotFinite,
+    /// One board corner is listed twice.
+    #[error("the corner at ({x}, {y}) mm of the board is listed twice", x = .0[0], y = .0[1])]
+    Duplicate([f64; 2]),
+    /// All corners, but for at most one, on a line of the board or of the image.
+    #[error("the corners leave the pose open: they lie on one line")]
+    Degenerate,
+}
+
+/// A board corner and its bearing.
+struct Sight {
+    board: Vector2<f64>,
+    bearing: Vector3<f64>,
+}
+
+/// The pose of the board from the corners of one image, refined on the reprojection.
+///
+/// # Errors
+/// [`PoseError`] where corners are too few, listed twice, not finite or on a line.
+pub fn board_pose(camera: &KannalaBrandt, view: &BoardView) -> Result<BoardPose, PoseError> {
+    check(&view.corners)?;
+    let (inside, sights): (Vec<Corner>, Vec<Sight>) =
+        view.corners.iter().filter_map(|corner| Some((*corner, Sight::through(camera, corner)?))).unzip();
+    if sights.len() < FEWEST_CORNERS {
+        return Err(PoseError::TooFewCorners(sights.len()));
+    }
+    let start = linear_pose(&sights).ok_or(PoseError::Degenerate)?;
+    let lens = Lens::of(camera);
+    let first = refined(&lens, &inside, start, Loss::Squares).ok_or(PoseError::Degenerate)?;
+    let second = refined(&lens, &inside, other_tilt(&first.0, &sights), Loss::Squares);
+    let ((pose, cost), other) = match second {
+        Some(second) if second.1 < first.1 => (second, Some(first)),
+        second => (first, second),
+    };
+    let rms = |cost: f64| (cost / inside.len() as f64).sqrt();
+    // Where both starts end at the same optimum there is no other tilt.
+    let distinct = other.filter(|(other, _)| pose.rotation.angle_to(&other.rotation) > 1e-4);
+    Ok(BoardPose {
+        camera_from_board: Transform::from_isometry(pose),
+        rms_px: rms(cost),
+        other_tilt_rms_px: distinct.map(|(_, cost)| rms(cost)),
+        corners: inside.len(),
+        outside: view.corners.len() - inside.len(),
+    })
+}
+
+/// Refuses corners that are not finite or listed twice.
+pub(crate) fn check(corners: &[Corner]) -> Result<(), PoseError> {
+    let finite = |c: &Corner| c.board_mm.iter().chain(&[c.pixel.u, c.pixel.v]).all(|x| x.is_finite());
+    if !corners.iter().all(finite) {
+        return Err(PoseError::NotFinite);
+    }
+    let order = |a: &[f64; 2], b: &[f64; 2]| a.partial_cmp(b).unwrap_or(Ordering::Equal);
+    let mut places: Vec<[f64; 2]> = corners.iter().map(|c| c.board_mm).collect();
+    places.sort_by(order);
+    match places.windows(2).find(|pair| order(&pair[0], &pair[1]).is_eq()) {
+        Some(pair) => Err(PoseError::Duplicate(pair[0])),
+        None => Ok(()),
+    }
+}
+
+impl Sight {
+    fn through(camera: &KannalaBrandt, corner: &Corner) -> Option<Self> {
+        let bearing = camera.unproject::<Camera>(corner.pixel).ok()?.vector();
+        Some(Self { board: Vector2::from(corner.board_mm), bearing })
+    }
+}
+
+/// The DLT. `None` where the corners do not determine it.
+fn linear_pose(sights: &[Sight]) -> Option<Isometry3<f64>> {
+    let (centre, scale) = normalisation(sights)?;
+    let normalised = |sight: &Sight| ((sight.board - centre) / scale).push(1.0);
+    let mut normal = SMatrix::<f64, 9, 9>::zeros();
+    for sight in sights {
+        let board = normalised(sight);
+        for tangent in tangents(&sight.bearing) {
+            let row = SVector::<f64, 9>::from_fn(|i, _| tangent[i % 3] * board[i / 3]);
+            normal += row * row.transpose();
+        }
+    }
+    let eigen = normal.symmetric_eigen();
+    let mut order: Vec<usize> = (0..9).collect();
+    order.sort_by(|&a, &b| eigen.eigenvalues[a].total_cmp(&eigen.eigenvalues[b]));
+    // Eigenvalues of the normal matrix are squares of singular values.
+    if eigen.eigenvalues[order[1]] <= SEPARATION * SEPARATION * eigen.eigenvalues[order[8]] {
+        return None;
+    }
+    let solution = eigen.eigenvectors.column(order[0]);
+    let homography = Matrix3::from_iterator(solution.iter().copied());
+
+    let facing: f64 = sights.iter().map(|sight| sight.bearing.dot(&(homography * normalised(sight)))).sum();
+    let [h1, h2, h3] = [0, 1, 2].map(|column| homography.column(column) * facing.signum());
+    let length = 0.5 * (h1.norm() + h2.norm());
+    let rotation =
+        nearest_rotation(&Matrix3::from_columns(&[h1 / length, h2 / length, h1.cross(&h2) / (length * length)]))?;
+    // h3 is the image of the board's centre, in units of `scale / length`.
+    let origin = h3 * (scale / length) - rotation * centre.push(0.0);
+    origin.iter().all(|x| x.is_finite()).then(|| Isometry3::from_parts(Translation3::from(origin), rotation))
+}
+
+/// Centre and root-mean-square radius of the board points.
+fn normalisation(sights: &[Sight]) -> Option<(Vector2<f64>, f64)> {
+    let count = sights.len() as f64;
+    let centre = sights.iter().map(|s| s.board).sum::<Vector2<f64>>() / count;
+    let square = sights.iter().map(|s| (s.board - centre).norm_squared()).sum::<f64>() / count;
+    (square > 0.0).then(|| (centre, square.sqrt()))
+}
+
+/// Two unit vectors orthogonal to `bearing` and to each other.
+fn tangents(bearing: &Vector3<f64>) -> [Vector3<f64>; 2] {
+    let first = bearing.cross(&Vector3::ith(bearing.iamin(), 1.0)).normalize();
+    [first, bearing.cross(&first)]
+}
+
+/// The pose with the tilt turned over: the board reflected in the plane through its centre orthogonal to the line of
+/// sight, and its normal reversed to make a rotation of the reflection.
+fn other_tilt(pose: &Isometry3<f64>, sights: &[Sight]) -> Isometry3<f64> {
+    let Some((centre, _)) = normalisation(sights) else { return *pose };
+    let middle = (pose * Point3::from(centre.push(0.0))).coords;
+    let Some(sight) = middle.try_normalize(0.0) else { return *pose };
+    let reflection = Matrix3::identity() - 2.0 * sight * sight.transpose();
+    let turned = reflection
+        * pose.rotation.to_rotation_matrix().into_inner()
+        * Matrix3::from_diagonal(&Vector3::new(1.0, 1.0, -1.0));
+    let rotation = UnitQuaternion::from_rotation_matrix(&Rotation3::from_matrix_unchecked(turned));
+    Isometry3::from_parts(Translation3::from(middle - rotation * centre.push(0.0)), rotation)
+}
+
+/// The pose that fits the reprojection best, and ρ summed there. `None` where a corner cannot be projected at the start.
+pub(crate) fn refined(
+    lens: &Lens,
+    corners: &[Corner],
+    start: Isometry3<f64>,
+    loss: Loss,
+) -> Option<(Isometry3<f64>, f64)> {
+    let options = ArrowOptions { loss, ..ArrowOptions::default() };
+    let solution = arrow::solve(&OneBoard { lens, corners }, (), vec![start], &options);
+    let pose = solution.blocks.into_iter().next()?;
+    solution.cost.is_finite().then_some((pose, 2.0 * solution.cost))
+}
+
+/// How far each corner is from where the board at `camera_from_board` puts it; infinite where it cannot be projected.
+pub(crate) fn errors_px(lens: &Lens, corners: &[Corner], camera_from_board: &Isometry3<f64>) -> Vec<f64> {
+    let error = |corner: &Corner| {
+        let point = camera_from_board * Point3::from(Vector2::from(corner.board_mm).push(0.0));
+        let projection = lens.project(&point.coords)?;
+        Some((projection.pixel - Vector2::new(corner.pixel.u, corner.pixel.v)).norm())
+    };
+    corners.iter().map(|corner| error(corner).unwrap_or(f64::INFINITY)).collect()
+}
+
+/// One board seen by one lens that is known.
+struct OneBoard<'a> {
+    lens: &'a Lens,
+    corners: &'a [Corner],
+}
+
+impl ArrowProblem<POSE> for OneBoard<'_> {
+    type Shared = ();
+    type Block = Isometry3<f64>;
+
+    fn shared_dimension(&self) -> usize {
+        0
+    }
+
+    fn block_residuals(&self, (): &(), _: usize, pose: &Isometry3<f64>, equations: &mut Equations<POSE>) {
+        for corner in self.corners {
+            let turned = pose.rotation * Vector2::from(corner.board_mm).push(0.0);
+            let Some(projection) = self.lens.project(&(turned + pose.translation.vector)) else {
+                // An infinite cost refuses the step that led here.
+                equations.add(&[f64::INFINITY; 2], &[], &[[0.0; 2]; POSE]);
+                continue;
+            };
+            let error = projection.pixel - Vector2::new(corner.pixel.u, corner.pixel.v);
+            equations.add(&error.into(), &[], &(projection.by_point * point_by_move(&turned)).into());
+        }
+    }
+
+    fn shared_plus(&self, (): &(), _: &[f64]) {}
+
+    fn block_plus(&self, pose: &Isometry3<f64>, step: &SVector<f64, POSE>) -> Isometry3<f64> {
+        moved(pose, step)
+    }
+}

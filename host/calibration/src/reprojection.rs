@@ -1,0 +1,81 @@
+//! Small moves of lenses and poses.
+//!
+//! Poses are moved in local coordinates `[ω, δ]`: `R ← exp(ω) R`, `t ← t + δ`, in radians and millimetres of the target
+//! frame. Their standard deviations are those of a rotation vector about the target's axes and of the origin's position.
+
+use nalgebra::{Isometry3, Matrix2x3, Matrix3, SMatrix, SVector, Translation3, UnitQuaternion, Vector2, Vector3};
+use vergence_vision::{InvalidLens, KannalaBrandt, OpenCvFisheye, Point};
+
+pub(crate) use crate::intrinsics::LENS;
+use crate::intrinsics::reproject;
+
+/// Local coordinates of a pose.
+pub(crate) const POSE: usize = 6;
+
+/// A lens as a point of the parameter space: fx, fy, cx, cy, k1 to k4.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Lens(OpenCvFisheye);
+
+/// A pixel and its derivatives by the point (in the camera frame) and by the lens.
+pub(crate) struct Projection {
+    pub pixel: Vector2<f64>,
+    pub by_point: Matrix2x3<f64>,
+    pub by_lens: SMatrix<f64, 2, LENS>,
+}
+
+impl Lens {
+    pub fn of(camera: &KannalaBrandt) -> Self {
+        Self(camera.to_opencv())
+    }
+
+    pub fn parameters(&self) -> SVector<f64, LENS> {
+        let OpenCvFisheye { fx, fy, cx, cy, k: [k1, k2, k3, k4] } = self.0;
+        SVector::from([fx, fy, cx, cy, k1, k2, k3, k4])
+    }
+
+    pub fn moved(&self, delta: &SVector<f64, LENS>) -> Self {
+        let [fx, fy, cx, cy, k1, k2, k3, k4] = (self.parameters() + delta).into();
+        Self(OpenCvFisheye { fx, fy, cx, cy, k: [k1, k2, k3, k4] })
+    }
+
+    /// The camera with these parameters, its field cut to where they are still a lens.
+    pub fn camera(&self, like: &KannalaBrandt) -> Result<KannalaBrandt, InvalidLens> {
+        match KannalaBrandt::from_opencv(self.0, like.theta_max(), like.size()) {
+            Err(InvalidLens::TurnsOver { .. }) => {
+                KannalaBrandt::from_opencv(self.0, self.0.largest_theta(like.size())?, like.size())
+            }
+            made => made,
+        }
+    }
+
+    /// Where `point` is shown, also beyond the field, so that an iteration which strays there finds its way back. `None`
+    /// at the optical centre and straight behind it.
+    pub fn project(&self, point: &Vector3<f64>) -> Option<Projection> {
+        let seen = reproject(&self.0, &Point::from_mm(*point))?;
+        Some(Projection { pixel: seen.pixel.into(), by_point: seen.by_point.into(), by_lens: seen.by_lens.into() })
+    }
+}
+
+/// `pose` moved by `[ω, δ]`.
+pub(crate) fn moved(pose: &Isometry3<f64>, delta: &SVector<f64, POSE>) -> Isometry3<f64> {
+    let rotation = UnitQuaternion::from_scaled_axis(delta.fixed_rows::<3>(0).into_owned()) * pose.rotation;
+    let translation = pose.translation.vector + delta.fixed_rows::<3>(3);
+    // Without this the rounding of many moves would pile up.
+    let rotation = UnitQuaternion::new_normalize(rotation.into_inner());
+    Isometry3::from_parts(Translation3::from(translation), rotation)
+}
+
+/// The move from `origin` to `pose`.
+pub(crate) fn difference(pose: &Isometry3<f64>, origin: &Isometry3<f64>) -> SVector<f64, POSE> {
+    let turn = (pose.rotation * origin.rotation.inverse()).scaled_axis();
+    let shift = pose.translation.vector - origin.translation.vector;
+    SVector::from([turn.x, turn.y, turn.z, shift.x, shift.y, shift.z])
+}
+
+/// The derivative of `pose * point` by the move of `pose`; `turned` is the rotated point without the translation.
+pub(crate) fn point_by_move(turned: &Vector3<f64>) -> SMatrix<f64, 3, POSE> {
+    let mut derivative = SMatrix::<f64, 3, POSE>::zeros();
+    derivative.fixed_view_mut::<3, 3>(0, 0).copy_from(&-turned.cross_matrix());
+    derivative.fixed_view_mut::<3, 3>(0, 3).copy_from(&Matrix3::identity());
+    derivative
+}

@@ -1,0 +1,153 @@
+//! The moving stage: screw axes, encoder scales and the cameras' pose at zero, from boards seen at several stage poses.
+//!
+//! The model is the rig's own screw chain. Each stage pose is calibrated by itself first; then everything is refined
+//! jointly on all corners. Afterwards the relative pose is known wherever the axes stand, with its covariance.
+//!
+//! The base frame is held by the left camera with all axes at zero, which stays where the drawing has it; the encoders'
+//! zeros are part of the right camera's pose there.
+
+mod figures;
+mod mechanism;
+mod model;
+mod observability;
+mod result;
+mod start;
+mod twist;
+mod unknowns;
+
+use vergence_rig::{AxisPosition, Rig};
+use vergence_vision::{Angle, Length};
+
+use crate::extrinsics::{ExtrinsicsError, LensKnowledge, Start, StereoView, Task};
+use crate::stage::model::Model;
+
+pub use observability::{Observability, WeakDirection};
+pub use result::{EncoderScale, FittedScrew, PredictedPose, StageCalibration, StagePoseFigures, ZeroOffset};
+
+/// Fewer stage poses cannot tell a slide, a turn and the pose at zero apart.
+pub const FEWEST_STAGE_POSES: usize = 3;
+
+/// Boards seen while the stage stood still.
+#[derive(Clone, Debug, PartialEq)]
+pub struct StagePose {
+    /// What the encoders read, in the order of the rig's axes.
+    pub readings: Vec<AxisPosition>,
+    /// A dozen or more.
+    pub views: Vec<StereoView>,
+}
+
+/// How far a mechanism may be from its drawing: one standard deviation.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Tolerance {
+    /// Of a screw's direction, about each of two axes.
+    pub direction: Angle,
+    /// Of the line of a turn, along each of two axes.
+    pub position: Length,
+    /// Of an encoder's scale, as a ratio.
+    pub scale: f64,
+}
+
+impl Default for Tolerance {
+    /// A hand-built mechanism.
+    fn default() -> Self {
+        Self { direction: Angle::from_deg(3.0), position: Length::from_mm(10.0), scale: 0.01 }
+    }
+}
+
+/// How to calibrate a stage.
+#[derive(Clone, Debug, PartialEq)]
+pub struct StageOptions {
+    /// What is known of the lenses.
+    pub lenses: LensKnowledge,
+    /// Whether gross corners are left out.
+    pub robust: bool,
+    /// Whether the encoders' scales are unknown.
+    pub free_scales: bool,
+    /// How far the mechanism may be from the rig's chains; `None`: they are only where to start.
+    pub tolerance: Option<Tolerance>,
+    /// Standard deviation of a reading of each axis. Empty: that of a step of its encoder.
+    pub reading_sigma: Vec<AxisPosition>,
+}
+
+impl Default for StageOptions {
+    fn default() -> Self {
+        Self {
+            lenses: LensKnowledge::Exact,
+            robust: true,
+            free_scales: true,
+            tolerance: Some(Tolerance::default()),
+            reading_sigma: Vec::new(),
+        }
+    }
+}
+
+/// Why there is no calibration of the stage.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+pub enum StageError {
+    /// Fewer stage poses than three.
+    #[error("{0} stage poses; at least {FEWEST_STAGE_POSES} are needed, and 6 are better")]
+    TooFewPoses(usize),
+    /// A stage pose whose readings do not belong to the rig's axes, or a standard deviation that is none.
+    #[error("stage pose {pose}: the readings do not belong to the rig's axes")]
+    Readings {
+        /// Counted from 1.
+        pose: usize,
+    },
+    /// The standard deviations of the readings do not belong to the rig's axes or are not positive.
+    #[error("the standard deviations of the readings must be one per axis, of its kind and positive")]
+    ReadingSigma,
+    /// A stage pose that cannot be calibrated by itself.
+    #[error("stage pose {pose}: {reason}")]
+    Pose {
+        /// Counted from 1.
+        pose: usize,
+        /// Why not.
+        reason: ExtrinsicsError,
+    },
+    /// No mechanism near the rig's chains has these poses.
+    #[error("the stage poses do not fit the rig's chains: check the order of the axes and the signs of their shares")]
+    Diverged,
+    /// The joint fit failed.
+    #[error(transparent)]
+    Joint(ExtrinsicsError),
+    /// The stage poses leave an unknown open.
+    #[error("the stage poses leave the mechanism open: {0}")]
+    Unobservable(Observability),
+}
+
+/// Calibrates the chains of `rig` on boards seen at `poses`. The rig's cameras and chains are where it starts.
+///
+/// # Errors
+/// [`StageError`] where stage poses are too few, cannot be calibrated, do not fit the chains or leave them open.
+pub fn calibrate_stage(rig: &Rig, poses: &[StagePose], options: &StageOptions) -> Result<StageCalibration, StageError> {
+    if poses.len() < FEWEST_STAGE_POSES {
+        return Err(StageError::TooFewPoses(poses.len()));
+    }
+    let model = start::model(rig, poses, options)?;
+    let alone = start::poses_alone(rig, poses, options.robust)?;
+    let state = start::fitted_to_poses(&model, &alone).ok_or(StageError::Diverged)?;
+    let prepared = start::prepare(rig, &model, &state, poses, &alone)?;
+    let model = Model { pose_of_view: prepared.pose_of_view, ..model };
+    let task = Task {
+        kinematics: &model,
+        views: &prepared.views,
+        own_poses: &prepared.own_poses,
+        lenses: prepared.shared.lenses,
+        knowledge: &options.lenses,
+        robust: options.robust,
+    };
+    let fit = task
+        .fit(Start { shared: prepared.shared, boards: prepared.boards, usable: prepared.usable.clone() })
+        .map_err(|reason| StageError::Joint(reason.into()))?;
+    let observability = observability::observability(rig, &model, &fit, &alone);
+    result::calibration(result::Material {
+        rig,
+        model,
+        fit,
+        observability,
+        alone: &alone,
+        views: &prepared.views,
+        usable: &prepared.usable,
+    })
+}

@@ -1,0 +1,253 @@
+//! The calibrated stage, and the relative pose it predicts.
+
+use nalgebra::{DMatrix, Matrix6, SMatrix};
+use vergence_rig::{AxisPosition, Chain, Link, Rig, RigAxis, Screw};
+use vergence_vision::{Angle, KannalaBrandt, Left, Length, Right, Transform};
+
+use crate::extrinsics::{
+    ExtrinsicsCalibration, Fit, Side, SkippedView, StereoOutlier, StereoView, outliers, refined, rms,
+};
+use crate::stage::figures::{pose_figures, screws, zero_offsets};
+use crate::stage::mechanism::State;
+use crate::stage::model::Model;
+use crate::stage::start::named;
+use crate::stage::twist::Twist;
+use crate::stage::unknowns::Unknown;
+use crate::stage::{Observability, StageError};
+
+/// A calibrated stage.
+#[derive(Clone, Debug)]
+pub struct StageCalibration {
+    /// Every screw of the left chain and then of the right, in their order.
+    pub screws: Vec<FittedScrew>,
+    /// Of each axis that drives a screw.
+    pub zero_offsets: Vec<ZeroOffset>,
+    /// Of each axis whose scale was unknown.
+    pub scales: Vec<EncoderScale>,
+    /// The base extrinsics: the relative pose where all encoders read zero.
+    pub at_zero: PredictedPose,
+    /// Each stage pose.
+    pub poses: Vec<StagePoseFigures>,
+    /// What the stage poses tell and what they do not.
+    pub observability: Observability,
+    /// Distance between corners and reprojection, root mean square per corner, gross ones included.
+    pub rms_px: f64,
+    /// Over the corners that are not gross.
+    pub rms_inlier_px: f64,
+    /// Standard deviation of one pixel coordinate.
+    pub sigma_px: f64,
+    /// Corners of all views that took part, both cameras.
+    pub corners_total: usize,
+    /// Those of them that are not gross.
+    pub corners_inlier: usize,
+    /// Each corner left out.
+    pub outliers: Vec<StereoOutlier>,
+    /// Each view that did not take part.
+    pub skipped: Vec<SkippedView>,
+    /// The left lens, refined unless it was exact.
+    pub left: KannalaBrandt,
+    /// The right lens, refined unless it was exact.
+    pub right: KannalaBrandt,
+    axes: Vec<RigAxis>,
+    state: State,
+    mechanism: Vec<Unknown>,
+    covariance: DMatrix<f64>,
+    reading_sigma: Vec<f64>,
+}
+
+/// A screw as calibrated.
+#[derive(Clone, Debug, PartialEq)]
+pub struct FittedScrew {
+    /// The camera whose chain it is in.
+    pub side: Side,
+    /// The axis that drives it.
+    pub axis: String,
+    /// Its direction and place in the base frame, with all encoders reading zero.
+    pub screw: Screw,
+    /// Standard deviation of the direction, about the worse of two axes.
+    pub direction_sigma: Angle,
+    /// Standard deviation of the line's place, along the worse of two axes; `None` for a slide.
+    pub position_sigma: Option<Length>,
+}
+
+/// Where an axis really is, against the drawing, when its encoder reads zero: the part of the right camera's displacement
+/// at zero that moving this axis would make. A mount that is off by as much looks the same.
+#[derive(Clone, Debug, PartialEq)]
+pub struct ZeroOffset {
+    /// The axis.
+    pub axis: String,
+    /// To add to a reading.
+    pub offset: AxisPosition,
+    /// Its standard deviation.
+    pub sigma: AxisPosition,
+}
+
+/// What an encoder's reading is to be multiplied with.
+#[derive(Clone, Debug, PartialEq)]
+pub struct EncoderScale {
+    /// The axis.
+    pub axis: String,
+    /// 1 where the encoder is as stated.
+    pub scale: f64,
+    /// Its standard deviation.
+    pub sigma: f64,
+}
+
+/// A relative pose that the stage predicts.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct PredictedPose {
+    /// The right camera in the left frame.
+    pub left_from_right: Transform<Left, Right>,
+    /// In local coordinates `[ω, δ]`: rotation vector about the left axes in radians, then the position of the right
+    /// camera in the left frame in millimetres.
+    pub covariance: Matrix6<f64>,
+}
+
+/// How one stage pose fits.
+#[derive(Clone, Debug, PartialEq)]
+pub struct StagePoseFigures {
+    /// What the encoders read.
+    pub readings: Vec<AxisPosition>,
+    /// The relative pose calibrated from this stage pose alone.
+    pub alone: Transform<Left, Right>,
+    /// The rotation between that and the stage's.
+    pub rotation_difference: Angle,
+    /// The distance between the right camera's positions of both.
+    pub translation_difference: Length,
+    /// Over the corners of this stage pose that are not gross.
+    pub rms_inlier_px: f64,
+}
+
+impl StageCalibration {
+    /// The relative pose where the encoders read `readings` (in the order of the rig's axes; a missing one reads zero),
+    /// with the covariance of the calibration and of the readings.
+    #[must_use]
+    pub fn predict(&self, readings: &[AxisPosition]) -> PredictedPose {
+        let values: Vec<f64> = readings.iter().map(|reading| reading.value()).collect();
+        predict(&self.state, &self.mechanism, &self.covariance, &self.reading_sigma, &values)
+    }
+
+    /// The left camera's chain: the scales of the encoders are in the shares.
+    #[must_use]
+    pub fn left_chain(&self) -> Chain<Left> {
+        Chain::new(self.scaled(&self.state.left), named(&self.state.left_at_zero))
+    }
+
+    /// The right camera's chain: the scales of the encoders are in the shares, their zeros in the pose at zero.
+    #[must_use]
+    pub fn right_chain(&self) -> Chain<Right> {
+        Chain::new(self.scaled(&self.state.right), named(&self.state.right_at_zero))
+    }
+
+    /// `drawn` with the chains and lenses calibrated. Its `calibration_sigma` is the largest over the corners and the
+    /// middle of the axes' ranges.
+    #[must_use]
+    pub fn rig(&self, drawn: &Rig) -> Rig {
+        Rig {
+            left_camera: self.left,
+            right_camera: self.right,
+            left_chain: self.left_chain(),
+            right_chain: self.right_chain(),
+            calibration_sigma: self.largest_sigma(),
+            ..drawn.clone()
+        }
+    }
+
+    /// The largest standard deviations of rotation and translation, along the worst direction, over [`grid`].
+    fn largest_sigma(&self) -> (Angle, Length) {
+        let worst = |matrix: SMatrix<f64, 3, 3>| matrix.symmetric_eigenvalues().max().max(0.0).sqrt();
+        let (mut rotation, mut translation) = (0.0f64, 0.0f64);
+        for values in grid(&self.axes) {
+            let exact = vec![0.0; values.len()];
+            let pose = predict(&self.state, &self.mechanism, &self.covariance, &exact, &values);
+            rotation = rotation.max(worst(pose.covariance.fixed_view::<3, 3>(0, 0).into_owned()));
+            translation = translation.max(worst(pose.covariance.fixed_view::<3, 3>(3, 3).into_owned()));
+        }
+        (Angle::from_rad(rotation), Length::from_mm(translation))
+    }
+
+    fn scaled(&self, links: &[Link]) -> Vec<Link> {
+        let scale = |axis: usize| self.state.scales.get(axis).copied().unwrap_or(1.0);
+        links.iter().map(|link| Link { share: link.share * scale(link.axis), ..*link }).collect()
+    }
+}
+
+/// The lowest, middle and highest positions of all axes, each with each; of many axes only the first few vary.
+pub(crate) fn grid(axes: &[RigAxis]) -> Vec<Vec<f64>> {
+    const MOST_AXES: usize = 4;
+    let mut grid: Vec<Vec<f64>> = vec![Vec::new()];
+    for (index, axis) in axes.iter().enumerate() {
+        let [low, high] = axis.range.map(AxisPosition::value);
+        let middle = 0.5 * (low + high);
+        let levels = if index < MOST_AXES { vec![low, middle, high] } else { vec![middle] };
+        grid =
+            grid.iter().flat_map(|start| levels.iter().map(|&level| [start.as_slice(), &[level]].concat())).collect();
+    }
+    grid
+}
+
+fn predict(
+    state: &State,
+    mechanism: &[Unknown],
+    covariance: &DMatrix<f64>,
+    reading_sigma: &[f64],
+    readings: &[f64],
+) -> PredictedPose {
+    let derivative = state.derivative(readings, mechanism, None);
+    let mut total: Matrix6<f64> = &derivative * covariance * derivative.transpose();
+    for (axis, sigma) in reading_sigma.iter().enumerate() {
+        let by: Twist = state.by_reading(readings, axis) * *sigma;
+        total += by * by.transpose();
+    }
+    PredictedPose { left_from_right: named(&state.left_from_right(readings)), covariance: total }
+}
+
+/// All that the calibration is made of.
+pub(crate) struct Material<'a> {
+    pub rig: &'a Rig,
+    pub model: Model,
+    pub fit: Fit<State>,
+    pub observability: Observability,
+    pub alone: &'a [ExtrinsicsCalibration],
+    pub views: &'a [StereoView],
+    pub usable: &'a [Vec<bool>],
+}
+
+pub(crate) fn calibration(material: Material<'_>) -> Result<StageCalibration, StageError> {
+    let Material { rig, model, fit, observability, alone, views, usable } = material;
+    let covariance = fit.covariance.as_ref().ok_or_else(|| StageError::Unobservable(observability.clone()))?;
+    // The mechanism's unknowns come first.
+    let mechanism: Vec<Unknown> = model.unknowns.iter().copied().filter(|unknown| unknown.is_mechanical()).collect();
+    let covariance = covariance.view((0, 0), (mechanism.len(), mechanism.len())).into_owned();
+    let state = &fit.shared.state;
+    let names: Vec<String> = rig.axes.iter().map(|axis| axis.name.clone()).collect();
+    let sigma = |index: usize| covariance[(index, index)].max(0.0).sqrt();
+    let scales = mechanism.iter().enumerate().filter_map(|(index, unknown)| match unknown {
+        Unknown::Scale { axis } => {
+            Some(EncoderScale { axis: names[*axis].clone(), scale: state.scales[*axis], sigma: sigma(index) })
+        }
+        _ => None,
+    });
+    Ok(StageCalibration {
+        screws: screws(state, &mechanism, &sigma, &names),
+        zero_offsets: zero_offsets(rig, &model.nominal, state, &mechanism, &covariance),
+        scales: scales.collect(),
+        at_zero: predict(state, &mechanism, &covariance, &model.reading_sigma, &vec![0.0; rig.axes.len()]),
+        poses: pose_figures(rig, &model, &fit, alone),
+        observability,
+        rms_px: rms(&fit.errors_px, usable).unwrap_or_default(),
+        rms_inlier_px: rms(&fit.errors_px, &fit.inliers).unwrap_or_default(),
+        sigma_px: fit.sigma_px,
+        corners_total: usable.iter().map(Vec::len).sum(),
+        corners_inlier: fit.inliers.iter().flatten().filter(|&&inlier| inlier).count(),
+        outliers: outliers(views, usable, &fit),
+        skipped: alone.iter().flat_map(|pose| pose.skipped.iter().cloned()).collect(),
+        left: refined(&fit.shared.lenses.left, &rig.left_camera, Side::Left).map_err(StageError::Joint)?,
+        right: refined(&fit.shared.lenses.right, &rig.right_camera, Side::Right).map_err(StageError::Joint)?,
+        axes: rig.axes.clone(),
+        state: state.clone(),
+        mechanism,
+        covariance,
+        reading_sigma: model.reading_sigma,
+    })
+}

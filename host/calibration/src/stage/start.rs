@@ -1,0 +1,195 @@
+//! Where the joint fit of a stage starts: every stage pose calibrated by itself, and the chains fitted to those.
+
+use nalgebra::{Isometry3, Matrix6, SVector};
+use vergence_rig::{AxisPosition, Link, Rig, Screw};
+use vergence_vision::{Frame, Transform};
+
+use crate::arrow::{self, ArrowOptions, ArrowProblem, Equations};
+use crate::extrinsics::{
+    ExtrinsicsCalibration, ExtrinsicsOptions, Kinematics, LensKnowledge, Lenses, OwnPoses, PlacedView, Shared, Side,
+    StereoView, calibrate_extrinsics, inside, nearer_boards, place,
+};
+use crate::reprojection::{POSE, difference};
+use crate::stage::mechanism::State;
+use crate::stage::model::Model;
+use crate::stage::unknowns::Unknown;
+use crate::stage::{StageError, StageOptions, StagePose};
+
+/// The model of `rig`, its views still unknown.
+pub(crate) fn model(rig: &Rig, poses: &[StagePose], options: &StageOptions) -> Result<Model, StageError> {
+    let axes = &rig.axes;
+    let belong = |positions: &[AxisPosition]| {
+        positions.len() == axes.len()
+            && positions
+                .iter()
+                .zip(axes)
+                .all(|(position, axis)| position.is_of(axis.kind) && position.value().is_finite())
+    };
+    if let Some(pose) = poses.iter().position(|pose| !belong(&pose.readings)) {
+        return Err(StageError::Readings { pose: pose + 1 });
+    }
+    let reading_sigma: Vec<f64> = if options.reading_sigma.is_empty() {
+        // A uniform error of one step.
+        axes.iter().map(|axis| axis.value_per_count() / 12f64.sqrt()).collect()
+    } else if belong(&options.reading_sigma) {
+        options.reading_sigma.iter().map(|sigma| sigma.value()).collect()
+    } else {
+        return Err(StageError::ReadingSigma);
+    };
+    if !reading_sigma.iter().all(|&sigma| sigma > 0.0) {
+        return Err(StageError::ReadingSigma);
+    }
+    let nominal = State {
+        left: rig.left_chain.links().to_vec(),
+        left_at_zero: *rig.left_chain.at_zero().isometry(),
+        right: rig.right_chain.links().to_vec(),
+        right_at_zero: *rig.right_chain.at_zero().isometry(),
+        scales: vec![1.0; axes.len()],
+        reading_errors: vec![vec![0.0; axes.len()]; poses.len()],
+    };
+    Ok(Model {
+        unknowns: unknowns(&nominal, axes.len(), poses.len(), options.free_scales),
+        nominal,
+        readings: poses.iter().map(|pose| pose.readings.iter().map(|reading| reading.value()).collect()).collect(),
+        reading_sigma,
+        pose_of_view: Vec::new(),
+        tolerance: options.tolerance,
+    })
+}
+
+fn unknowns(state: &State, axes: usize, poses: usize, free_scales: bool) -> Vec<Unknown> {
+    let mut unknowns = Vec::new();
+    for (side, links) in [(Side::Left, &state.left), (Side::Right, &state.right)] {
+        for (link, Link { axis, screw, .. }) in links.iter().enumerate() {
+            unknowns.extend([Unknown::Direction { side, link, axis: *axis }; 2]);
+            if matches!(screw, Screw::Turn { .. }) {
+                unknowns.extend([Unknown::Line { side, link, axis: *axis }; 2]);
+            }
+        }
+    }
+    unknowns.extend([Unknown::Rotation; 3]);
+    unknowns.extend([Unknown::Position; 3]);
+    let driven = |axis: &usize| state.left.iter().chain(&state.right).any(|link| link.axis == *axis);
+    if free_scales {
+        unknowns.extend((0..axes).filter(driven).map(|axis| Unknown::Scale { axis }));
+    }
+    unknowns.extend((0..poses).flat_map(|pose| {
+        (0..axes).filter(driven).map(move |axis| Unknown::Reading { pose, axis }).collect::<Vec<_>>()
+    }));
+    unknowns
+}
+
+/// Each stage pose calibrated by itself, the lenses held.
+pub(crate) fn poses_alone(
+    rig: &Rig,
+    poses: &[StagePose],
+    robust: bool,
+) -> Result<Vec<ExtrinsicsCalibration>, StageError> {
+    let options = ExtrinsicsOptions { lenses: LensKnowledge::Exact, robust };
+    let calibrate = |(index, pose): (usize, &StagePose)| {
+        calibrate_extrinsics(&rig.left_camera, &rig.right_camera, &pose.views, &options)
+            .map_err(|reason| StageError::Pose { pose: index + 1, reason })
+    };
+    poses.iter().enumerate().map(calibrate).collect()
+}
+
+/// The chains that fit the stage poses best. `None` where the iteration finds none.
+pub(crate) fn fitted_to_poses(model: &Model, alone: &[ExtrinsicsCalibration]) -> Option<State> {
+    let measured: Vec<(Isometry3<f64>, Matrix6<f64>)> = alone
+        .iter()
+        .map(|pose| {
+            let whitening = pose.covariance.cholesky()?.l().try_inverse()?;
+            Some((*pose.joint.left_from_right.isometry(), whitening))
+        })
+        .collect::<Option<_>>()?;
+    // The right camera at zero that makes the first stage pose right, the rest as drawn.
+    let first = model.readings.first()?;
+    let drawn = model.nominal.left_from_right(first);
+    let at_zero = model.nominal.right_at_zero * (drawn.inverse() * measured.first()?.0);
+    let start = State { right_at_zero: at_zero, ..model.nominal.clone() };
+    let problem = ToPoses { model, measured: &measured };
+    let solution = arrow::solve(&problem, start, Vec::new(), &ArrowOptions::default());
+    solution.cost.is_finite().then_some(solution.shared)
+}
+
+/// The chains against the stage poses as each was calibrated by itself.
+struct ToPoses<'a> {
+    model: &'a Model,
+    /// `left_from_right`, and what makes the errors of its local coordinates independent and of unit variance.
+    measured: &'a [(Isometry3<f64>, Matrix6<f64>)],
+}
+
+impl ArrowProblem<POSE> for ToPoses<'_> {
+    type Shared = State;
+    type Block = ();
+
+    fn shared_dimension(&self) -> usize {
+        self.model.unknowns.len()
+    }
+
+    fn block_residuals(&self, _: &State, _: usize, (): &(), _: &mut Equations<POSE>) {}
+
+    fn shared_residuals(&self, state: &State, equations: &mut Equations<POSE>) {
+        for (pose, (measured, whitening)) in self.measured.iter().enumerate() {
+            let readings = self.model.corrected(state, pose);
+            let residual = whitening * difference(&state.left_from_right(&readings), measured);
+            let derivative = whitening * state.derivative(&readings, &self.model.unknowns, Some(pose));
+            let columns: Vec<[f64; POSE]> = derivative.column_iter().map(|c| c.into_owned().into()).collect();
+            equations.add_plain(&residual.into(), &columns, &[[0.0; POSE]; POSE]);
+        }
+        self.model.add_prior(state, 1.0, equations);
+    }
+
+    fn shared_plus(&self, state: &State, step: &[f64]) -> State {
+        self.model.plus(state, step)
+    }
+
+    fn block_plus(&self, (): &(), _: &SVector<f64, POSE>) {}
+}
+
+/// All views in one list, placed.
+pub(crate) struct Prepared {
+    pub views: Vec<StereoView>,
+    pub pose_of_view: Vec<usize>,
+    pub own_poses: Vec<OwnPoses>,
+    pub usable: Vec<Vec<bool>>,
+    pub boards: Vec<Isometry3<f64>>,
+    pub shared: Shared<State>,
+}
+
+pub(crate) fn prepare(
+    rig: &Rig,
+    model: &Model,
+    state: &State,
+    poses: &[StagePose],
+    alone: &[ExtrinsicsCalibration],
+) -> Result<Prepared, StageError> {
+    let (left, right) = (&rig.left_camera, &rig.right_camera);
+    let lenses = Lenses::of(left, right);
+    let mut all = Prepared {
+        views: Vec::new(),
+        pose_of_view: Vec::new(),
+        own_poses: Vec::new(),
+        usable: Vec::new(),
+        boards: Vec::new(),
+        shared: Shared { state: state.clone(), lenses },
+    };
+    for (index, (pose, _)) in poses.iter().zip(alone).enumerate() {
+        let (placed, _) =
+            place(left, right, &pose.views).map_err(|reason| StageError::Pose { pose: index + 1, reason })?;
+        let left_from_right = state.left_from_right(&model.corrected(state, index));
+        all.boards.extend(nearer_boards(lenses, &left_from_right, &pose.views, &placed));
+        all.own_poses.extend(placed.iter().map(PlacedView::own_poses));
+        for view in placed.iter().filter_map(|place| pose.views.get(place.view)) {
+            all.usable.push(inside(left, right, view));
+            all.views.push(view.clone());
+            all.pose_of_view.push(index);
+        }
+    }
+    Ok(all)
+}
+
+/// A pose with its frames named.
+pub(crate) fn named<To: Frame, From: Frame>(pose: &Isometry3<f64>) -> Transform<To, From> {
+    Transform::from_isometry(*pose)
+}

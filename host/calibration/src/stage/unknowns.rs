@@ -1,0 +1,56 @@
+//! The unknowns of a stage: what each component of a step means.
+
+use crate::extrinsics::Side;
+
+/// One component of the stage's step.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Unknown {
+    /// A tilt of the direction of a link's screw.
+    Direction { side: Side, link: usize, axis: usize },
+    /// A shift of the line that a link turns about.
+    Line { side: Side, link: usize, axis: usize },
+    /// A component of the right camera's rotation with all axes at zero.
+    Rotation,
+    /// A component of the right camera's position with all axes at zero.
+    Position,
+    /// What an encoder's reading is multiplied with.
+    Scale { axis: usize },
+    /// What is added to an encoder's reading at one stage pose.
+    Reading { pose: usize, axis: usize },
+}
+
+impl Unknown {
+    /// Whether it is one of the mechanism, not of one reading.
+    pub fn is_mechanical(self) -> bool {
+        !matches!(self, Self::Reading { .. })
+    }
+
+    /// In words, the axes called `names`.
+    pub fn words(self, names: &[String]) -> String {
+        let name = |axis: usize| names.get(axis).map_or("?", String::as_str);
+        match self {
+            Self::Direction { side, axis, .. } => format!("direction of the {side} camera's '{}' screw", name(axis)),
+            Self::Line { side, axis, .. } => format!("position of the {side} camera's '{}' axis", name(axis)),
+            Self::Rotation => "rotation of the right camera at zero".to_owned(),
+            Self::Position => "position of the right camera at zero".to_owned(),
+            Self::Scale { axis } => format!("encoder scale of '{}'", name(axis)),
+            Self::Reading { axis, .. } => format!("reading of '{}'", name(axis)),
+        }
+    }
+}
+
+/// Counts the components of one and the same unknown, which follow each other.
+#[derive(Default)]
+pub(crate) struct Ordinal {
+    last: Option<Unknown>,
+    count: usize,
+}
+
+impl Ordinal {
+    /// How many components of the same unknown came directly before.
+    pub fn next(&mut self, unknown: Unknown) -> usize {
+        self.count = if self.last == Some(unknown) { self.count + 1 } else { 0 };
+        self.last = Some(unknown);
+        self.count
+    }
+}

@@ -1,0 +1,148 @@
+//! How sure the ray behind a pixel is, from the covariance of the lens.
+
+use std::f64::consts::PI;
+
+use nalgebra::{Matrix2, Matrix2x3, Matrix3, Matrix3x2, SMatrix, Vector3};
+use vergence_vision::{Angle, Camera, KannalaBrandt, OpenCvFisheye, OutsideField, Pixel, Point, UnitRay};
+
+use crate::IntrinsicsCalibration;
+use crate::intrinsics::{LENS, reproject};
+
+/// The uncertainty of rays over a lens's field.
+///
+/// Two parts of a lens's error act differently. A rotation of all rays together is taken up by the poses of whatever is
+/// measured with the lens: it shows in the principal point's σ, but does no harm. What remains does. A. Dima Kogan,
+/// mrcal, "projection uncertainty", removes the rotation for the same reason. Here it is the one that best aligns the
+/// rays, all directions of the valid cone weighted alike. Board distances do not enter: the mean of the other rays is the
+/// reference, not the boards.
+#[derive(Clone, Debug, PartialEq)]
+pub struct RayUncertainty {
+    camera: KannalaBrandt,
+    lens: OpenCvFisheye,
+    covariance: SMatrix<f64, LENS, LENS>,
+    /// The common rotation (radians about the camera's axes) for a change of the lens.
+    rotation_by_lens: SMatrix<f64, 3, LENS>,
+}
+
+/// The uncertainty of one ray.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct RayCovariance {
+    /// The ray.
+    pub ray: UnitRay<Camera>,
+    /// Unit vectors orthogonal to the ray: away from the optical axis, and around it (in the direction from x to y). On
+    /// the axis x and y.
+    pub tangents: [Vector3<f64>; 2],
+    /// Covariance along the tangents, in rad².
+    pub covariance: Matrix2<f64>,
+}
+
+impl RayCovariance {
+    /// The standard deviation along the worst direction.
+    #[must_use]
+    pub fn sigma(&self) -> Angle {
+        Angle::from_rad(self.covariance.symmetric_eigenvalues().max().max(0.0).sqrt())
+    }
+}
+
+/// One point of a map.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct MapPoint {
+    /// Where in the image.
+    pub pixel: Pixel,
+    /// The ray there; `None` outside the valid cone.
+    pub ray: Option<RayCovariance>,
+}
+
+impl RayUncertainty {
+    /// Of a calibration.
+    #[must_use]
+    pub fn of(calibration: &IntrinsicsCalibration) -> Self {
+        let mut uncertainty = Self {
+            camera: calibration.camera,
+            lens: calibration.opencv,
+            covariance: calibration.covariance,
+            rotation_by_lens: SMatrix::zeros(),
+        };
+        uncertainty.rotation_by_lens = uncertainty.common_rotation();
+        uncertainty
+    }
+
+    /// At `pixel`, without the rotation that all rays have in common.
+    ///
+    /// # Errors
+    /// [`OutsideField`] outside the valid cone.
+    pub fn at(&self, pixel: Pixel) -> Result<RayCovariance, OutsideField> {
+        self.with(pixel, &self.rotation_by_lens)
+    }
+
+    /// At `pixel`, in the camera's own axes: with the rotation that all rays have in common, as a user sees it who fixed
+    /// the camera's pose before and will not estimate it again.
+    ///
+    /// # Errors
+    /// [`OutsideField`] outside the valid cone.
+    pub fn at_with_rotation(&self, pixel: Pixel) -> Result<RayCovariance, OutsideField> {
+        self.with(pixel, &SMatrix::zeros())
+    }
+
+    /// [`Self::at`] on a grid of `columns` × `rows` points over the image, borders included, row by row.
+    #[must_use]
+    pub fn map(&self, columns: u32, rows: u32) -> Vec<MapPoint> {
+        let size = self.camera.size();
+        let at = |i: u32, n: u32, length: u32| f64::from(i) / f64::from(n.max(2) - 1) * (f64::from(length) - 1.0);
+        let pixels = (0..rows).flat_map(|row| (0..columns).map(move |column| (column, row)));
+        pixels
+            .map(|(column, row)| {
+                let pixel = Pixel { u: at(column, columns, size.width), v: at(row, rows, size.height) };
+                MapPoint { pixel, ray: self.at(pixel).ok() }
+            })
+            .collect()
+    }
+
+    fn with(&self, pixel: Pixel, rotation: &SMatrix<f64, 3, LENS>) -> Result<RayCovariance, OutsideField> {
+        let ray = self.camera.unproject::<Camera>(pixel)?;
+        let basis = tangents(&ray.vector());
+        let by_lens = self.ray_by_lens(&ray).ok_or(OutsideField)?;
+        let left = basis.transpose() * (by_lens - ray.vector().cross_matrix() * rotation);
+        let tangents = [basis.column(0).into_owned(), basis.column(1).into_owned()];
+        Ok(RayCovariance { ray, tangents, covariance: left * self.covariance * left.transpose() })
+    }
+
+    /// How the ray behind a pixel that stays where it is moves with the lens: the pixel of the moved ray in the moved
+    /// lens is the same, ∂u/∂d δd + ∂u/∂lens δlens = 0.
+    fn ray_by_lens(&self, ray: &UnitRay<Camera>) -> Option<SMatrix<f64, 3, LENS>> {
+        let seen = reproject(&self.lens, &Point::from_mm(ray.vector()))?;
+        let basis = tangents(&ray.vector());
+        let by_point = Matrix2x3::from_fn(|row, axis| seen.by_point[axis][row]);
+        let by_lens = SMatrix::<f64, 2, LENS>::from_fn(|row, parameter| seen.by_lens[parameter][row]);
+        Some(-(basis * (by_point * basis).try_inverse()? * by_lens))
+    }
+
+    /// The ω that minimises Σ ‖δd + ω × d‖² over directions d that fill the valid cone evenly (a Fibonacci lattice; R.
+    /// Swinbank and R. Purser, 2006), as a linear function of δlens.
+    fn common_rotation(&self) -> SMatrix<f64, 3, LENS> {
+        const DIRECTIONS: u32 = 500;
+        const GOLDEN: f64 = 2.399_963_229_728_653;
+        let lowest = self.camera.theta_max().rad().min(PI).cos();
+        let (mut normal, mut right) = (Matrix3::<f64>::zeros(), SMatrix::<f64, 3, LENS>::zeros());
+        for i in 0..DIRECTIONS {
+            let z = 1.0 - (1.0 - lowest) * (f64::from(i) + 0.5) / f64::from(DIRECTIONS);
+            let (sin, cos) = (GOLDEN * f64::from(i)).sin_cos();
+            let across = (1.0 - z * z).sqrt();
+            let ray = UnitRay::new(Vector3::new(across * cos, across * sin, z));
+            let Some((ray, by_lens)) = ray.and_then(|ray| self.ray_by_lens(&ray).map(|by_lens| (ray, by_lens))) else {
+                continue;
+            };
+            let cross = ray.vector().cross_matrix();
+            normal += cross.transpose() * cross;
+            right += cross.transpose() * by_lens;
+        }
+        normal.try_inverse().map_or_else(SMatrix::zeros, |inverse| inverse * right)
+    }
+}
+
+/// Columns: away from the optical axis, and around it.
+fn tangents(ray: &Vector3<f64>) -> Matrix3x2<f64> {
+    let rho = ray.x.hypot(ray.y);
+    let (cos, sin) = if rho > 0.0 { (ray.x / rho, ray.y / rho) } else { (1.0, 0.0) };
+    Matrix3x2::from_columns(&[Vector3::new(ray.z * cos, ray.z * sin, -rho), Vector3::new(-sin, cos, 0.0)])
+}

@@ -1,0 +1,164 @@
+//! Real photographs of chessboards against OpenCV's classic detector.
+//!
+//! The data live outside the repository, in the folder that `VERGENCE_SHARED` names or in `shared` beside the checkout;
+//! without them the tests say SKIPPED. `corners_opencv_classic.csv` holds the corners of OpenCV 5.0.0,
+//! findChessboardCorners + cornerSubPix with a window of 0.4 of the smallest spacing, 5 px at most.
+
+#![allow(clippy::unwrap_used, clippy::panic, reason = "a test fails by panicking")]
+#![allow(clippy::print_stdout, reason = "measured figures are printed")]
+#![allow(clippy::disallowed_methods, reason = "the time that detection takes is printed")]
+
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+use std::time::Instant;
+
+use vergence_calibration::detect::{Detection, detect};
+use vergence_calibration::{BoardSpec, BoardView, Corner, IntrinsicsOptions, calibrate_intrinsics};
+use vergence_vision::{ImageSize, Length, Pixel};
+
+/// Furthest that two detectors' corners may lie apart to count as the same.
+const SAME_PX: f64 = 1.5;
+
+fn shared(set: &str) -> Option<PathBuf> {
+    let beside = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../../shared");
+    let folder = std::env::var_os("VERGENCE_SHARED").map_or(beside, PathBuf::from).join("data").join(set);
+    let there = folder.join("corners_opencv_classic.csv").exists();
+    if !there {
+        println!("SKIPPED: no {}", folder.display());
+    }
+    there.then_some(folder)
+}
+
+/// Both detectors' corners of one camera.
+#[derive(Default)]
+struct Camera {
+    size: Option<ImageSize>,
+    ours: Vec<BoardView>,
+    opencv: Vec<BoardView>,
+}
+
+/// Detects the set's boards, asserts that 99 % of OpenCV's corners are among ours and that both label them alike, and
+/// returns the corners by camera.
+fn compare(folder: &Path, board: BoardSpec) -> BTreeMap<String, Camera> {
+    let mut reference: BTreeMap<(String, String), BTreeMap<u32, Pixel>> = BTreeMap::new();
+    for row in csv::Reader::from_path(folder.join("corners_opencv_classic.csv")).unwrap().records() {
+        let row = row.unwrap();
+        let pixel = Pixel { u: row[4].parse().unwrap(), v: row[5].parse().unwrap() };
+        let image = reference.entry((row[0].to_owned(), row[1].to_owned())).or_default();
+        image.insert(row[3].parse().unwrap(), pixel);
+    }
+    let mut cameras: BTreeMap<String, Camera> = BTreeMap::new();
+    let (mut distances, mut milliseconds, mut total, mut complete) = (Vec::new(), Vec::new(), 0, 0);
+    for ((name, file), opencv) in &reference {
+        let image = image::open(folder.join("images").join(file)).unwrap().to_luma8();
+        let start = Instant::now();
+        let detection = detect(&image, &board, None).unwrap_or_else(|error| panic!("{file}: {error}"));
+        milliseconds.push(start.elapsed().as_secs_f64() * 1e3);
+        total += opencv.len();
+        complete += usize::from(detection.complete);
+        distances.extend(distances_of_same_corners(&detection, opencv, &board, file));
+        let camera = cameras.entry(name.clone()).or_default();
+        camera.size = Some(ImageSize { width: image.width(), height: image.height() });
+        camera.ours.push(detection.view(file, &board));
+        let corner = |(&index, &pixel): (&u32, &Pixel)| Corner { board_mm: board.corner_mm(index), pixel };
+        camera.opencv.push(BoardView { name: file.clone(), corners: opencv.iter().map(corner).collect() });
+    }
+    distances.sort_by(f64::total_cmp);
+    milliseconds.sort_by(f64::total_cmp);
+    let recall = distances.len() as f64 / f64::from(u32::try_from(total).unwrap());
+    println!(
+        "{}: {complete}/{} complete, {}/{total} corners = {recall:.4}, mean {:.4} px, p95 {:.4} px, median {:.1} ms",
+        folder.display(),
+        reference.len(),
+        distances.len(),
+        distances.iter().sum::<f64>() / distances.len() as f64,
+        distances[distances.len() * 95 / 100],
+        milliseconds[milliseconds.len() / 2],
+    );
+    assert!(recall >= 0.99);
+    cameras
+}
+
+/// Distances of the corners that both found, which must be numbered alike, or one backwards.
+fn distances_of_same_corners(
+    detection: &Detection,
+    opencv: &BTreeMap<u32, Pixel>,
+    board: &BoardSpec,
+    file: &str,
+) -> Vec<f64> {
+    let last = board.columns * board.rows - 1;
+    let (mut forwards, mut backwards) = (Vec::new(), Vec::new());
+    for corner in &detection.corners {
+        let distance = |index: u32| {
+            let at = opencv.get(&index)?;
+            Some((at.u - corner.pixel.u).hypot(at.v - corner.pixel.v)).filter(|&distance| distance < SAME_PX)
+        };
+        forwards.extend(distance(corner.index));
+        backwards.extend(distance(last - corner.index));
+    }
+    assert!(forwards.is_empty() || backwards.is_empty(), "{file}: labels disagree");
+    forwards.append(&mut backwards);
+    forwards
+}
+
+/// Calibrates from both detectors' corners: ours must leave no larger residuals.
+fn assert_residuals(cameras: &BTreeMap<String, Camera>) {
+    for (name, camera) in cameras {
+        let calibrate =
+            |views: &[BoardView]| calibrate_intrinsics(views, camera.size.unwrap(), &IntrinsicsOptions::default());
+        let (ours, opencv) = (calibrate(&camera.ours).unwrap(), calibrate(&camera.opencv).unwrap());
+        println!(
+            "{name}: inlier RMS {:.4} px of {}/{} corners, with OpenCV's {:.4} px of {}/{}",
+            ours.rms_inlier_px,
+            ours.corners_inlier,
+            ours.corners_total,
+            opencv.rms_inlier_px,
+            opencv.corners_inlier,
+            opencv.corners_total,
+        );
+        assert!(ours.rms_inlier_px <= opencv.rms_inlier_px);
+        assert!(ours.corners_inlier >= opencv.corners_inlier);
+    }
+}
+
+#[test]
+fn moderate_fisheye_stereo() {
+    let board = BoardSpec { columns: 9, rows: 6, square: Length::from_mm(24.23) };
+    if let Some(folder) = shared("sourishg_stereo") {
+        assert_residuals(&compare(&folder, board));
+    }
+}
+
+#[test]
+fn strong_fisheye_close_up() {
+    let board = BoardSpec { columns: 6, rows: 8, square: Length::from_mm(32.5) };
+    if let Some(folder) = shared("ocam_fisheye1") {
+        assert_residuals(&compare(&folder, board));
+    }
+}
+
+#[test]
+fn perspective_stereo() {
+    let board = BoardSpec { columns: 9, rows: 6, square: Length::from_mm(25.0) };
+    if let Some(folder) = shared("opencv_pinhole_stereo") {
+        assert_residuals(&compare(&folder, board));
+    }
+}
+
+#[test]
+fn both_cameras_of_a_pair_number_the_corners_alike() {
+    let Some(folder) = shared("sourishg_stereo") else { return };
+    let board = BoardSpec { columns: 9, rows: 6, square: Length::from_mm(24.23) };
+    for number in 1..=19 {
+        let [left, right] = ["left", "right"].map(|side| {
+            let image = image::open(folder.join("images").join(format!("{side}{number}.jpg"))).unwrap().to_luma8();
+            detect(&image, &board, None).unwrap()
+        });
+        // The cameras are parallel: first and last corner lie the same way round in both images.
+        let [a, b] = [&left, &right].map(|detection| {
+            let [first, last] = [0, 53].map(|i| detection.corners[i].pixel);
+            [last.u - first.u, last.v - first.v]
+        });
+        assert!(a[0] * b[0] + a[1] * b[1] > 0.0, "pair {number}");
+    }
+}
