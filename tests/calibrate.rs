@@ -99,7 +99,10 @@ fn a_real_pair_comes_to_the_reference_optimum() {
     let stereo = &reference(&folder, "reference_opencv_classic_cv5.json")["stereo"];
     let all = run_json(&[&pair[..], &["--no-loss"]].concat());
     assert!(number(&all["joint"]["rms_px"]) <= 1.001 * number(&stereo["kb4_scipy_ba"]["rms_px"]), "{all}");
-    let robust = run_json(&[&pair[..], &["--out", &rig]].concat());
+    let page = file("report.html");
+    let robust = run_json(&[&pair[..], &["--out", &rig, "--report", &page]].concat());
+    let html = std::fs::read_to_string(&page).expect("a report");
+    assert!(html.contains("<svg") && html.trim_end().ends_with("</html>") && !html.contains("NaN"));
     println!("{robust}");
     let trimmed = &stereo["kb4_scipy_ba_trimmed"];
     assert!(number(&robust["joint"]["rms_inlier_px"]) <= 1.01 * number(&trimmed["rms_px"]), "{robust}");

@@ -6,11 +6,12 @@ use nalgebra::SMatrix;
 use serde_json::{Value, json};
 use vergence_calibration::{
     BoardView, ExtrinsicsCalibration, ExtrinsicsOptions, LensKnowledge, RelativePose, StereoView, calibrate_extrinsics,
+    extrinsics_report,
 };
 use vergence_rig::CalibratedPair;
 use vergence_vision::{Angle, KannalaBrandt, Length};
 
-use super::views::from_images;
+use super::views::{about, from_images};
 use crate::camera_files::{self, CameraFile};
 use crate::cmd::board_options::BoardOptions;
 use crate::console::Console;
@@ -53,6 +54,9 @@ pub struct Args {
     /// The rig file to write.
     #[arg(long, value_name = "FILE")]
     out: Option<PathBuf>,
+    /// The report to write: one HTML page.
+    #[arg(long, value_name = "FILE")]
+    report: Option<PathBuf>,
     /// The date to keep with the calibration.
     #[arg(long)]
     date: Option<String>,
@@ -79,8 +83,12 @@ pub fn run(args: &Args, console: Console) -> Result<(), Failure> {
     let calibration = calibrate_extrinsics(&left.cameras.left, &right.cameras.left, &views, &options)
         .map_err(|error| Failure::usage(format!("no calibration: {error}")))?;
     let seconds = solving.seconds();
+    let provenance = hash.provenance(args.date.as_deref());
+    if let Some(path) = &args.report {
+        let page = extrinsics_report(&calibration, &views, &about("Pair".into(), &args.board, &provenance));
+        write_whole(path, page.as_bytes())?;
+    }
     if let Some(path) = &args.out {
-        let provenance = hash.provenance(args.date.as_deref());
         let sigma = sigma(&calibration);
         let norm = |part: &[f64]| part.iter().map(|x| x * x).sum::<f64>().sqrt();
         let pair = CalibratedPair {

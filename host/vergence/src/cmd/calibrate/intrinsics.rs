@@ -3,11 +3,13 @@
 use std::path::PathBuf;
 
 use serde_json::{Value, json};
-use vergence_calibration::{BoardView, IntrinsicsCalibration, IntrinsicsOptions, calibrate_intrinsics};
+use vergence_calibration::{
+    BoardView, IntrinsicsCalibration, IntrinsicsOptions, calibrate_intrinsics, intrinsics_report,
+};
 use vergence_rig::{CalibrationTable, CameraDocument, CameraTable};
 use vergence_vision::{ImageSize, OpenCvFisheye};
 
-use super::views::{from_corners, from_images, parse_size};
+use super::views::{about, from_corners, from_images, parse_size};
 use crate::camera_files::toml_of;
 use crate::cmd::board_options::BoardOptions;
 use crate::console::Console;
@@ -58,6 +60,11 @@ pub fn run(args: &Args, console: Console) -> Result<(), Failure> {
         .map_err(|error| Failure::usage(format!("no calibration: {error}")))?;
     let seconds = solving.seconds();
     let provenance = hash.provenance(args.date.as_deref());
+    if let Some(path) = &args.report {
+        let title = args.camera.clone().unwrap_or_else(|| "Camera".into());
+        let page = intrinsics_report(&calibration, &views, &about(title, &args.board, &provenance));
+        write_whole(path, page.as_bytes())?;
+    }
     let document = CameraDocument {
         camera: CameraTable::of(&calibration.camera),
         calibration: Some(CalibrationTable {

@@ -2,7 +2,8 @@
 
 use std::path::Path;
 
-use vergence_calibration::BoardView;
+use vergence_calibration::{BoardView, ReportAbout};
+use vergence_rig::Provenance;
 use vergence_vision::{ImageSize, KannalaBrandt};
 
 use crate::boards::{Boards, detect_in, files};
@@ -58,4 +59,21 @@ pub fn parse_size(text: &str) -> Result<ImageSize, String> {
     let (width, height) = text.split_once(['x', 'X', '×']).ok_or(HINT)?;
     let count = |part: &str| part.trim().parse().ok().filter(|n| (1..=100_000).contains(n)).ok_or(HINT);
     Ok(ImageSize { width: count(width)?, height: count(height)? })
+}
+
+/// What a report says of its origin.
+#[must_use]
+pub fn about(title: String, board: &BoardOptions, provenance: &Provenance) -> ReportAbout {
+    let board = board.spec().map_or_else(
+        |_| "as in the corner file".into(),
+        |spec| format!("{} × {} inner corners, {}", spec.columns, spec.rows, spec.square),
+    );
+    ReportAbout {
+        title,
+        program_version: provenance.program.clone(),
+        inputs_sha256: provenance.inputs_sha256.clone(),
+        date: provenance.date.clone().unwrap_or_default(),
+        board,
+        half_field: None,
+    }
 }

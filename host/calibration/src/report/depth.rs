@@ -1,0 +1,106 @@
+//! What the uncertainty of the relative pose does to measured distances.
+//!
+//! A point P = λ f is seen by the left ray f and the right ray d from the right centre t, P = t + μ d. When the right
+//! camera turns by ω and shifts by δ, the point moves along the left ray by
+//!
+//! ```text
+//! dλ = q · (δ + μ ω × d) / (q · f)        q in the epipolar plane and orthogonal to d
+//! ```
+
+use nalgebra::{SMatrix, Vector3, Vector6};
+use vergence_vision::{Left, UnitRay};
+
+use super::image_frame::WIDTH;
+use super::plot::Axes;
+use super::svg::{Anchor, Drawing, Path};
+use crate::ExtrinsicsCalibration;
+
+/// The depth error over the directions in the plane of the baseline and of the direction straight ahead.
+pub(super) struct DepthError {
+    /// Directions in degrees from straight ahead, positive to the right camera's side, and standard deviations in
+    /// millimetres. Only those that both cameras see.
+    curve: Vec<(f64, f64)>,
+    /// The range they hold for.
+    range_mm: f64,
+}
+
+impl DepthError {
+    pub fn of(calibration: &ExtrinsicsCalibration, range_mm: f64) -> Self {
+        const WIDEST_DEG: i32 = 85;
+        let right_centre = calibration.joint.left_from_right.origin().mm();
+        let along = right_centre.try_normalize(0.0);
+        let ahead = along.and_then(|along| straight_ahead(calibration, &along));
+        let error = |degrees: i32| {
+            let (ahead, along) = (ahead?, along?);
+            let (sin, cos) = f64::from(degrees).to_radians().sin_cos();
+            let point = 0.5 * right_centre + range_mm * (cos * ahead + sin * along);
+            Some((f64::from(degrees), sigma_mm(calibration, &point)?))
+        };
+        Self { curve: (-WIDEST_DEG..=WIDEST_DEG).filter_map(error).collect(), range_mm }
+    }
+
+    /// The direction nearest to straight ahead, and its error.
+    pub fn ahead(&self) -> Option<(f64, f64)> {
+        self.curve.iter().copied().min_by(|a, b| a.0.abs().total_cmp(&b.0.abs()))
+    }
+
+    /// The largest error within `half_angle_deg` of straight ahead, and where.
+    pub fn worst_within(&self, half_angle_deg: f64) -> Option<(f64, f64)> {
+        let within = self.curve.iter().copied().filter(|(degrees, _)| degrees.abs() <= half_angle_deg);
+        within.max_by(|a, b| a.1.total_cmp(&b.1))
+    }
+
+    pub fn draw(&self) -> Drawing {
+        const HEIGHT: f64 = 360.0;
+        /// The error grows without bound towards the baseline; the figure shows so many times the least.
+        const HIGHEST: f64 = 12.0;
+        let mut drawing = Drawing::new(WIDTH, HEIGHT);
+        let least = self.curve.iter().map(|(_, sigma)| *sigma).fold(f64::INFINITY, f64::min);
+        let most = self.curve.iter().map(|(_, sigma)| *sigma).fold(0.0, f64::max);
+        let high = if least.is_finite() { (1.1 * most).min(HIGHEST * least).max(1e-9) } else { 1.0 };
+        let axes = Axes::filling(&drawing, [-90.0, 90.0], [0.0, high]);
+        drawing.rect(axes.corner(), axes.extent(), "sensor", "");
+        let range = super::html::significant(self.range_mm, 3);
+        axes.draw(&mut drawing, "direction from straight ahead (°)", &format!("± of the distance at {range} mm (mm)"));
+        let points: Vec<_> = self.curve.iter().map(|(degrees, sigma)| axes.at(*degrees, *sigma)).collect();
+        drawing.clipped(axes.corner(), axes.extent(), |drawing| {
+            // Directions that one camera does not see interrupt the line.
+            let step = axes.extent()[0] / 180.0;
+            for part in points.chunk_by(|a, b| b[0] - a[0] < 1.5 * step) {
+                drawing.path(&Path::through(part), "run", "");
+            }
+        });
+        let [x, y] = axes.corner();
+        drawing.text([x + 8.0, y + 16.0], Anchor::Start, "halo", "left");
+        drawing.text([x + axes.extent()[0] - 8.0, y + 16.0], Anchor::End, "halo", "right");
+        drawing
+    }
+}
+
+/// The direction between the optical axes, made orthogonal to the baseline; in the left frame.
+fn straight_ahead(calibration: &ExtrinsicsCalibration, along: &Vector3<f64>) -> Option<Vector3<f64>> {
+    let right_axis = calibration.joint.left_from_right.rotation() * Vector3::z();
+    let between = Vector3::z() + right_axis;
+    (between - along * along.dot(&between)).try_normalize(1e-6)
+}
+
+/// `None` where a camera does not see the point, or sees it along the baseline.
+fn sigma_mm(calibration: &ExtrinsicsCalibration, point: &Vector3<f64>) -> Option<f64> {
+    let pose = calibration.joint.left_from_right;
+    let left = UnitRay::<Left>::new(*point)?;
+    let arm = point - pose.origin().mm();
+    let right = UnitRay::<Left>::new(arm)?;
+    calibration.left.project(&left).ok().filter(|pixel| calibration.left.on_sensor(*pixel))?;
+    let seen = calibration.right.project(&(pose.inverse() * right)).ok();
+    seen.filter(|pixel| calibration.right.on_sensor(*pixel))?;
+
+    let (f, d) = (left.vector(), right.vector());
+    let across = d.cross(&f.cross(&d).try_normalize(1e-9)?);
+    let gain = across.dot(&f);
+    let by_turn = d.cross(&across) * (arm.norm() / gain);
+    let by_shift = across / gain;
+    let by_move = Vector6::new(by_turn.x, by_turn.y, by_turn.z, by_shift.x, by_shift.y, by_shift.z);
+    let covariance: &SMatrix<f64, 6, 6> = &calibration.covariance;
+    let variance = by_move.dot(&(covariance * by_move));
+    variance.is_finite().then(|| variance.max(0.0).sqrt())
+}
