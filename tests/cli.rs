@@ -172,6 +172,9 @@ fn depth_refuses_bad_images_and_leaves_no_file() {
     picture(&file("wide.png"), 65, 48);
     let whole = std::fs::read(file("good.png")).expect("just written");
     std::fs::write(file("cut.png"), &whole[..whole.len() / 2]).expect("half a picture is written");
+    picture(&file("good.jpg"), 64, 48);
+    let whole = std::fs::read(file("good.jpg")).expect("just written");
+    std::fs::write(file("cut.jpg"), &whole[..whole.len() - 20]).expect("most of a picture is written");
     std::fs::write(file("bad.csv"), "u_left,v_left,u_right\n1,2,3\n").expect("written");
     let good = file("good.png");
     let depth = |left: &str, right: &str, more: &[&str], words: &[&str]| {
@@ -181,11 +184,13 @@ fn depth_refuses_bad_images_and_leaves_no_file() {
     };
     depth(&file("missing.png"), &good, &[], &["missing.png"]);
     depth(&good, &file("cut.png"), &[], &["cut.png", "not a readable image"]);
+    // Decoders fill what a JPEG lacks with grey.
+    depth(&good, &file("cut.jpg"), &[], &["cut.jpg", "ends before"]);
     depth(&good, &file("wide.png"), &[], &["wide", "65 x 48", "64 x 48"]);
     depth(&good, &good, &["--points", &file("bad.csv")], &["bad.csv", "v_right"]);
     depth(&good, &good, &["--separation", "10deg"], &["separation"]);
     depth(&good, folder.path().to_str().expect("a name"), &[], &["must pair up"]);
-    assert_eq!(std::fs::read_dir(folder.path()).expect("a folder").count(), 5, "only the inputs are there");
+    assert_eq!(std::fs::read_dir(folder.path()).expect("a folder").count(), 7, "only the inputs are there");
 }
 
 #[test]

@@ -3,9 +3,9 @@
 use std::collections::VecDeque;
 use std::path::{Path, PathBuf};
 
-use image::{ImageReader, RgbImage};
+use image::RgbImage;
 
-use super::{Camera, Frame};
+use super::{Camera, Frame, jpeg};
 use crate::failure::Failure;
 
 /// Image files, one after the other.
@@ -60,7 +60,9 @@ impl Camera for FileCamera {
 /// Says which file and why.
 pub fn read_image(path: &Path) -> Result<RgbImage, Failure> {
     let fail = |error: &dyn std::fmt::Display| Failure::input(path, format!("not a readable image: {error}"));
-    let reader = ImageReader::open(path).map_err(|error| Failure::input(path, error))?;
-    let image = reader.with_guessed_format().map_err(|error| fail(&error))?.decode().map_err(|error| fail(&error))?;
-    Ok(image.into_rgb8())
+    let bytes = std::fs::read(path).map_err(|error| Failure::input(path, error))?;
+    if !jpeg::is_whole(&bytes) {
+        return Err(fail(&"the file ends before the picture does; copy it again"));
+    }
+    Ok(image::load_from_memory(&bytes).map_err(|error| fail(&error))?.into_rgb8())
 }

@@ -2,6 +2,7 @@
 
 mod exposure;
 mod files;
+mod jpeg;
 mod pixel_format;
 mod simulated;
 mod simulated_board;

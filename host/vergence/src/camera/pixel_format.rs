@@ -2,6 +2,8 @@
 
 use image::{ImageFormat, RgbImage};
 
+use super::jpeg;
+
 /// A format that is understood, in order of preference: what is least processed comes first.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum PixelFormat {
@@ -47,6 +49,8 @@ impl PixelFormat {
                 RgbImage::from_raw(width, height, rgb)
             }
             Self::Mjpeg => {
+                // What a cable lost the decoder would fill with grey.
+                let bytes = Some(bytes).filter(|bytes| jpeg::is_whole(bytes))?;
                 let image = image::load_from_memory_with_format(bytes, ImageFormat::Jpeg).ok()?.into_rgb8();
                 (image.dimensions() == (width, height)).then_some(image)
             }
