@@ -131,6 +131,7 @@ fn usage_errors_leave_with_2() {
     fails_with(&["--port", "sim", "move", "--baseline", "120"], 2, &["120", "unit"]);
     fails_with(&["--port", "sim", "move", "--baseline", "500mm"], 2, &["500", "60", "220"]);
     fails_with(&["--port", "sim", "move", "--separation", "200deg"], 2, &["200", "130"]);
+    fails_with(&["--port", "sim", "move", "--separation", "-5deg"], 2, &["-5", "130"]);
     fails_with(&["--port", "sim", "mode", "gecko"], 2, &["gecko", "herbivore", "human"]);
     fails_with(&["--lease", "1h", "--port", "sim", "home"], 2, &["20ms to 1s"]);
     fails_with(&["zones", "--baseline", "0mm", "--separation", "10deg"], 2, &["baseline"]);

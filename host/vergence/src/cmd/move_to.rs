@@ -24,10 +24,10 @@ pub struct Args {
 #[derive(Clone, Copy, Debug, clap::Args)]
 pub struct StagePose {
     /// Distance of the cameras, such as 120mm.
-    #[arg(long, value_name = "LENGTH")]
+    #[arg(long, value_name = "LENGTH", allow_hyphen_values = true)]
     pub baseline: Option<Length>,
     /// Angle between the optical axes, such as 45deg.
-    #[arg(long, value_name = "ANGLE")]
+    #[arg(long, value_name = "ANGLE", allow_hyphen_values = true)]
     pub separation: Option<Angle>,
 }
 
