@@ -2,6 +2,7 @@
 
 use std::fmt::Display;
 use std::io::{IsTerminal, Write, stdout};
+use std::time::Duration;
 
 use indicatif::{ProgressBar, ProgressStyle};
 use serde_json::Value;
@@ -53,7 +54,8 @@ impl Console {
         if let Ok(style) = ProgressStyle::with_template("{spinner} {msg}") {
             bar.set_style(style);
         }
-        bar.tick();
+        // Long computations do not come round to draw.
+        bar.enable_steady_tick(Duration::from_millis(100));
         bar
     }
 }
