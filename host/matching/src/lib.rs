@@ -28,6 +28,7 @@ mod shared_frame;
 mod view;
 
 pub use guided::GuidedMatcher;
-pub use matcher::{Drop, ImagePair, Match, MatchError, Matcher, Matches, Side};
+pub use matcher::{Drop, ImagePair, Match, MatchError, Matcher, Matches};
 pub use shared_frame::{Shared, SharedFrame};
+pub use vergence_vision::Side;
 pub use view::{Grid, View, ViewPixel};

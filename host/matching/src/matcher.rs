@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 
 use image::GrayImage;
-use vergence_vision::{Angle, ImageSize, KannalaBrandt, Left, Length, Pixel, Right, Transform};
+use vergence_vision::{Angle, ImageSize, KannalaBrandt, Left, Length, Pixel, Right, Side, Transform};
 
 /// Finds the points of the scene seen in both images of a pair.
 pub trait Matcher {
@@ -106,24 +106,6 @@ impl Drop {
             Self::Isolated => "isolated",
             Self::Duplicate => "duplicate",
         }
-    }
-}
-
-/// One camera of a pair.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Side {
-    /// The left camera.
-    Left,
-    /// The right camera.
-    Right,
-}
-
-impl std::fmt::Display for Side {
-    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        f.write_str(match self {
-            Self::Left => "left",
-            Self::Right => "right",
-        })
     }
 }
 

@@ -173,3 +173,21 @@ impl<To: Frame, From: Frame> Mul<UnitRay<From>> for Transform<To, From> {
         UnitRay { direction: self.isometry.rotation * ray.direction, frame: PhantomData }
     }
 }
+
+/// One camera of a pair, where it is a value and not a frame.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Side {
+    /// The left camera.
+    Left,
+    /// The right camera.
+    Right,
+}
+
+impl std::fmt::Display for Side {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.write_str(match self {
+            Self::Left => "left",
+            Self::Right => "right",
+        })
+    }
+}

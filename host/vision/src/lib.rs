@@ -29,7 +29,7 @@ mod zones;
 pub use cloud::{Cloud, CloudPoint, Drop, Gates, PixelPair, StereoPair, cloud};
 pub use covariance::{covariance, range_sigma};
 pub use epipolar::{dihedral, ray_to_plane};
-pub use frames::{Base, Camera, Frame, Left, Point, Right, Transform, UnitRay, World};
+pub use frames::{Base, Camera, Frame, Left, Point, Right, Side, Transform, UnitRay, World};
 pub use import::{OpenCvFisheye, largest_theta};
 pub use kannala_brandt::{ImageSize, InvalidLens, KannalaBrandt, OutsideField, Pixel};
 pub use triangulation::{Feet, Rejection, Triangulated, closest_approach, midpoint, pseudo_intersection};

@@ -5,8 +5,9 @@ use vergence_vision::{Camera, KannalaBrandt, Left, Point, Right};
 
 use crate::arun::fit_rotation_translation;
 use crate::board::BoardView;
+use crate::extrinsics::Side;
 use crate::extrinsics::gross::OwnPoses;
-use crate::extrinsics::stereo::{Lenses, Pair, Side};
+use crate::extrinsics::stereo::{Lenses, Pair};
 use crate::extrinsics::{ExtrinsicsError, SkippedView, StereoView};
 use crate::planar_pose::{PoseError, board_pose};
 

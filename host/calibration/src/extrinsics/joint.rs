@@ -3,8 +3,9 @@
 use nalgebra::{Isometry3, Matrix6xX, SVector};
 
 use crate::arrow::{ArrowProblem, Equations};
+use crate::extrinsics::Side;
 use crate::extrinsics::StereoView;
-use crate::extrinsics::stereo::{LensPrior, Lenses, Pair, Side};
+use crate::extrinsics::stereo::{LensPrior, Lenses, Pair};
 use crate::reprojection::{LENS, POSE, moved};
 
 /// What the relative pose of the cameras depends on: one pose for all views, or the axes of a stage.

@@ -23,8 +23,9 @@ pub(crate) use gross::OwnPoses;
 pub(crate) use initial::{PlacedView, inside, nearer_boards, place};
 pub(crate) use joint::{FixedPose, Kinematics, Shared};
 pub(crate) use report::{outliers, refined, rms, view_figures};
+pub use stereo::LensKnowledge;
 pub(crate) use stereo::Lenses;
-pub use stereo::{LensKnowledge, Side};
+pub use vergence_vision::Side;
 
 /// Fewer views cannot contradict each other.
 pub const FEWEST_VIEWS: usize = 3;

@@ -1,30 +1,12 @@
 //! Residuals of one board seen by two cameras, with derivatives.
 
 use nalgebra::{Isometry3, Matrix3x6, SMatrix, SVector, Vector2};
-use vergence_vision::KannalaBrandt;
+use vergence_vision::{KannalaBrandt, Side};
 
 use crate::arrow::Equations;
 use crate::board::Corner;
 use crate::extrinsics::StereoView;
 use crate::reprojection::{LENS, Lens, POSE, point_by_move};
-
-/// Which camera of the pair.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Side {
-    /// The left one.
-    Left,
-    /// The right one.
-    Right,
-}
-
-impl std::fmt::Display for Side {
-    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        f.write_str(match self {
-            Self::Left => "left",
-            Self::Right => "right",
-        })
-    }
-}
 
 /// What is known of the two lenses before the views are looked at.
 ///

@@ -12,7 +12,7 @@ use crate::board::fresh_session;
 use crate::cli::Globals;
 use crate::console::Console;
 use crate::failure::Failure;
-use crate::link::{HostClock, Port, open};
+use crate::link::{HostClock, OpenWire, Port, open};
 
 /// Decelerates every axis within its limits and keeps the reference. Needs no arming. It is software: the emergency stop
 /// is the switch that cuts the drivers.
@@ -20,28 +20,21 @@ use crate::link::{HostClock, Port, open};
 pub struct Args {}
 
 pub async fn run(_: &Args, globals: &Globals, console: Console) -> Result<(), Failure> {
-    match port(globals)? {
-        port @ Port::Serial(_) if is_shared(&port, globals.baud).await? => {
-            send_unheard(&port, globals.baud, console).await
-        }
-        _ => {
-            let mut board = connect(globals, console, "stopping").await?;
-            board.stop().await?;
-            say_pose(console, board.rig(), board.pose())
+    if let port @ Port::Serial(_) = port(globals)? {
+        let wire = open(&port, globals.baud, true).await?;
+        if wire.lock.is_none() {
+            return send_unheard(&port, wire, console).await;
         }
     }
-}
-
-/// Whether another vergence holds the port.
-async fn is_shared(port: &Port, baud: u32) -> Result<bool, Failure> {
-    Ok(open(port, baud, true).await?.lock.is_none())
+    let mut board = connect(globals, console, "stopping").await?;
+    board.stop().await?;
+    say_pose(console, board.rig(), board.pose())
 }
 
 /// Another vergence reads this port: send the stop a few times and leave the answers to it.
-async fn send_unheard(port: &Port, baud: u32, console: Console) -> Result<(), Failure> {
+async fn send_unheard(port: &Port, mut wire: OpenWire, console: Console) -> Result<(), Failure> {
     const REPEATS: u32 = 3;
     const APART: Duration = Duration::from_millis(20);
-    let mut wire = open(port, baud, true).await?;
     let clock = HostClock::start();
     for _ in 0..REPEATS {
         let mut session = HostSession::new(fresh_session()?);

@@ -55,8 +55,6 @@ pub enum LinkError {
 enum Command {
     /// Sent reliably; the reply comes back.
     Ask { request: Request, reply: oneshot::Sender<Result<Report, LinkError>> },
-    /// Sent once.
-    Send(Request),
     /// Heartbeats from now on, with this lease; zero ends them.
     Hold { lease_ms: u16 },
 }
@@ -144,14 +142,6 @@ impl Client {
             Ok(Err(_)) => Err(self.why_ended()),
             Err(_) => Err(LinkError::Silent(REPLY_TIMEOUT)),
         }
-    }
-
-    /// Sends a request that needs no reply.
-    ///
-    /// # Errors
-    /// [`LinkError`] where the link ended.
-    pub async fn send(&self, request: Request) -> Result<(), LinkError> {
-        self.commands.send(Command::Send(request)).await.map_err(|_| self.why_ended())
     }
 
     /// Keeps a lease of `lease_ms` alive from now on; zero lets it run out.
@@ -311,10 +301,6 @@ impl LinkTask {
         match command {
             Command::Hold { lease_ms: 0 } => self.heartbeat = None,
             Command::Hold { lease_ms } => self.heartbeat = Some((lease_ms, now)),
-            Command::Send(request) => {
-                // Only unsequenced requests come this way; a full queue means the wire is dead, which reading will tell.
-                let _ = self.session.send_now(request);
-            }
             Command::Ask { request, reply } => {
                 // A stop does not wait behind what is still unacknowledged.
                 let sent = match request {
