@@ -21,6 +21,8 @@ const ALLOWED: &[(&str, &[&str])] = &[
     ("vergence-calibration", &["vergence-vision", "vergence-rig"]),
     ("vergence-matching", &["vergence-vision"]),
     ("vergence-scene", &["vergence-vision"]),
+    ("vergence-cpu", &[]),
+    ("vergence-mcu", &["vergence-cpu", "vergence-protocol", "vergence-control", "vergence-plant"]),
     ("vergence-plant", &["vergence-protocol", "vergence-control"]),
     ("vergence-soak", &["vergence-protocol", "vergence-control", "vergence-plant"]),
     (

@@ -1,0 +1,1 @@
+//! The STM32G474RE on its NUCLEO board: memories, clocks, timers, serial ports, DMA, flash.
