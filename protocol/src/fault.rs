@@ -29,6 +29,18 @@ pub enum FaultCode {
     EmergencyStop,
     /// The settings contradict themselves.
     BadSettings,
+    /// The motor was driven but the encoder hardly moved.
+    Stall,
+    /// The encoder moved, but less far or further than the motor.
+    Slip,
+    /// The encoder counts against the motor.
+    WrongDirection,
+    /// The encoder does not answer, or jumps further than the axis can move.
+    EncoderLost,
+    /// The switch of another axis closed during homing.
+    HomeSwitchWrong,
+    /// The control tick came too late to keep the trajectory.
+    TickMissed,
 }
 
 impl FaultCode {
@@ -49,6 +61,18 @@ impl FaultCode {
             Self::HardLimit => "move the stage off the limit by hand, then 'vergence clear' and 'vergence home'",
             Self::EmergencyStop => "release the emergency stop, then 'vergence clear' and 'vergence home'",
             Self::BadSettings => "restore the board's settings",
+            Self::Stall => {
+                "look for an obstacle, or lower speed and acceleration, then 'vergence clear' and 'vergence home'"
+            }
+            Self::Slip => "tighten the coupling between motor and stage, then 'vergence clear' and 'vergence home'",
+            Self::WrongDirection => {
+                "swap the encoder's channels or set 'counts_reversed', then 'vergence clear' and 'vergence home'"
+            }
+            Self::EncoderLost => "check the encoder's cable and supply, then 'vergence clear' and 'vergence home'",
+            Self::HomeSwitchWrong => {
+                "check that each home switch is wired to its own axis, then 'vergence clear' and 'vergence home'"
+            }
+            Self::TickMissed => "lower the rate of steps and poses, then 'vergence clear' and 'vergence home'",
         }
     }
 }
@@ -65,6 +89,12 @@ impl fmt::Display for FaultCode {
             Self::HardLimit => "a hard limit switch closed",
             Self::EmergencyStop => "the emergency stop is pressed",
             Self::BadSettings => "the board's settings contradict themselves",
+            Self::Stall => "the motor was driven but the stage hardly moved",
+            Self::Slip => "the stage moved less far or further than its motor",
+            Self::WrongDirection => "the encoder counts against the motor",
+            Self::EncoderLost => "the encoder does not answer",
+            Self::HomeSwitchWrong => "homing closed the switch of another axis",
+            Self::TickMissed => "the control tick came too late",
         })
     }
 }

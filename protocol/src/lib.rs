@@ -12,10 +12,13 @@
 mod axis;
 mod fault;
 pub mod frame;
+pub mod management;
 mod receiver;
+mod recorder;
 mod report;
 mod request;
 mod session;
+mod setting;
 mod units;
 mod version;
 
@@ -23,11 +26,13 @@ pub use axis::{AxisInfo, AxisKind, AxisList, AxisMask, MAX_AXES};
 pub use fault::{FaultCode, FaultRecord};
 pub use frame::MAX_FRAME;
 pub use receiver::{LinkCounters, Receiver};
-pub use report::{BoardInfo, ControllerState, MovePhase, PoseReport, Refusal, Report, ResetCause, Status};
-pub use request::{Move, Request, StopKind};
+pub use recorder::{EVENTS_PER_ANSWER, Happening, RecordedEvent, RecordedEvents};
+pub use report::{BoardInfo, ControllerState, FrameMark, MovePhase, PoseReport, Refusal, Report, ResetCause, Status};
+pub use request::{Jog, Move, Request, StopKind, Trigger};
 pub use session::{
     BoardEvent, BoardSession, BoardStatistics, Compatibility, HostEvent, HostSession, HostStatistics, ReplyTo,
     SubmitError, Ticket, WINDOW,
 };
+pub use setting::{SettingItem, SettingKey};
 pub use units::{Counts, Micro, Microseconds, Mode, MoveId, Permille, SessionId};
 pub use version::{PROTOCOL, ProtocolVersion, schema_hash};

@@ -2,11 +2,13 @@
 
 use cobs::{DecodeResult, DecoderState};
 use heapless::Vec;
+use postcard_schema::Schema;
+use serde::{Deserialize, Serialize};
 
 use crate::frame::{Frame, FrameError, MAX_PACKET};
 
 /// What came in. Each stays at its largest value rather than wrap.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, Schema)]
 pub struct LinkCounters {
     /// Frames whose CRC held.
     pub frames: u32,

@@ -6,8 +6,8 @@ use postcard_schema::Schema;
 use serde::{Deserialize, Serialize};
 
 use crate::{
-    AxisInfo, AxisList, AxisMask, Counts, FaultCode, FaultRecord, Microseconds, Mode, MoveId, ProtocolVersion,
-    SessionId,
+    AxisInfo, AxisList, AxisMask, BoardStatistics, Counts, FaultCode, FaultRecord, Microseconds, Mode, MoveId,
+    ProtocolVersion, RecordedEvents, SessionId, SettingKey,
 };
 
 /// One report. Append only: the order is the wire format. `Hello` and `Info` are frozen for ever.
@@ -67,6 +67,42 @@ pub enum Report {
     },
     /// A fault was latched.
     Fault(FaultRecord),
+    /// Answers `Request::GetSetting`.
+    Setting {
+        /// Sequence number of the request.
+        to: u8,
+        /// What.
+        key: SettingKey,
+        /// Its value.
+        value: i64,
+    },
+    /// Answers `Request::GetEvents`.
+    Events {
+        /// Sequence number of the request.
+        to: u8,
+        /// The events from the asked one on.
+        events: RecordedEvents,
+    },
+    /// Answers `Request::GetStatistics`.
+    Statistics {
+        /// Sequence number of the request.
+        to: u8,
+        /// Since the board started.
+        statistics: BoardStatistics,
+    },
+    /// The cameras were fired.
+    FrameMark(FrameMark),
+}
+
+/// A camera trigger pulse.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize, Schema)]
+pub struct FrameMark {
+    /// Counts pulses since the trigger was set.
+    pub seq: u32,
+    /// Its edge, board clock.
+    pub at: Microseconds,
+    /// Every encoder at the edge, as in a Pose.
+    pub counts: AxisList<Counts>,
 }
 
 /// Telemetry. State, fault and move are repeated in each, so that one lost message never matters.
@@ -110,6 +146,14 @@ pub enum ControllerState {
     LinkLost,
     /// Latched until cleared.
     Fault,
+    /// Starting.
+    Boot,
+    /// Checking encoders, switches and settings before anything may move.
+    SelfTest,
+    /// Taking a firmware image; nothing may move.
+    Updating,
+    /// A new firmware runs on trial; nothing may move until it is confirmed.
+    Trial,
 }
 
 impl fmt::Display for ControllerState {
@@ -122,6 +166,10 @@ impl fmt::Display for ControllerState {
             Self::Stopping => "stopping",
             Self::LinkLost => "link lost",
             Self::Fault => "fault",
+            Self::Boot => "starting",
+            Self::SelfTest => "self-test",
+            Self::Updating => "taking firmware",
+            Self::Trial => "firmware on trial",
         })
     }
 }
@@ -182,6 +230,16 @@ pub enum Refusal {
     Invalid,
     /// The host speaks another schema of this protocol: reading only.
     ReadOnly,
+    /// Only while disarmed.
+    NotIdle,
+    /// A new firmware is being taken or is on trial.
+    Updating,
+    /// The setting cannot have this value together with the others.
+    BadSetting,
+    /// There is no such setting on this board.
+    NoSetting,
+    /// The settings could not be written to flash; the old ones are still there.
+    StorageFailed,
 }
 
 impl fmt::Display for Refusal {
@@ -198,6 +256,11 @@ impl fmt::Display for Refusal {
             Self::CausePersists => f.write_str("the cause of the fault is still there"),
             Self::Invalid => f.write_str("the request makes no sense to this board"),
             Self::ReadOnly => f.write_str("the board runs another protocol schema: it can be read but not moved"),
+            Self::NotIdle => f.write_str("only while disarmed: run 'vergence disarm' first"),
+            Self::Updating => f.write_str("a new firmware is being taken or is on trial"),
+            Self::BadSetting => f.write_str("the setting cannot have this value beside the others"),
+            Self::NoSetting => f.write_str("this board has no such setting"),
+            Self::StorageFailed => f.write_str("the board could not write its flash: the old settings are still there"),
         }
     }
 }
@@ -231,6 +294,34 @@ pub enum ResetCause {
     Software,
     /// The watchdog bit.
     Watchdog,
+}
+
+impl Report {
+    /// The sequence number of the request that this answers, where it answers one.
+    #[must_use]
+    pub fn to(&self) -> Option<u8> {
+        match self {
+            Self::Info { to, .. }
+            | Self::Ack { to, .. }
+            | Self::Axis { to, .. }
+            | Self::Setting { to, .. }
+            | Self::Events { to, .. }
+            | Self::Statistics { to, .. } => Some(*to),
+            _ => None,
+        }
+    }
+
+    pub(crate) fn to_mut(&mut self) -> Option<&mut u8> {
+        match self {
+            Self::Info { to, .. }
+            | Self::Ack { to, .. }
+            | Self::Axis { to, .. }
+            | Self::Setting { to, .. }
+            | Self::Events { to, .. }
+            | Self::Statistics { to, .. } => Some(to),
+            _ => None,
+        }
+    }
 }
 
 impl PoseReport {

@@ -3,7 +3,7 @@
 use postcard_schema::Schema;
 use serde::{Deserialize, Serialize};
 
-use crate::{AxisList, AxisMask, Micro, Microseconds, Mode, MoveId, Permille, ProtocolVersion, SessionId};
+use crate::{AxisList, AxisMask, Micro, Microseconds, Mode, MoveId, Permille, ProtocolVersion, SessionId, SettingKey};
 
 /// One request. Append only: the order is the wire format. `Hello` and `GetInfo` are frozen for ever.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize, Schema)]
@@ -63,6 +63,56 @@ pub enum Request {
     /// Send a Pose every `period_us`; 0 stops.
     SetStream {
         /// Microseconds between two poses.
+        period_us: u32,
+    },
+    /// Go by a distance from here; without reference at homing speed, and then not further than the search for the
+    /// home switch may go. For setting up by hand.
+    Jog(Jog),
+    /// What is this set to? Answered by `Report::Setting`.
+    GetSetting(SettingKey),
+    /// Set it; only while disarmed. Works at once and is forgotten at the next start unless saved.
+    SetSetting {
+        /// What.
+        key: SettingKey,
+        /// To what.
+        value: i64,
+    },
+    /// Keep all settings through the next start; only while disarmed.
+    SaveSettings,
+    /// Back to the settings the firmware came with, not yet saved; only while disarmed.
+    RestoreSettings,
+    /// Fire the cameras.
+    SetTrigger(Trigger),
+    /// What did the flight recorder keep? Answered by `Report::Events`.
+    GetEvents {
+        /// Number of the first event wanted.
+        first: u32,
+    },
+    /// How has the link been? Answered by `Report::Statistics`.
+    GetStatistics,
+}
+
+/// A relative move, all axes together.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize, Schema)]
+pub struct Jog {
+    /// Chosen by the host; repeated in every Pose.
+    pub id: MoveId,
+    /// How far, for every axis.
+    pub by: AxisList<Micro>,
+    /// Share of the largest speed, as in [`Move`].
+    pub speed: Permille,
+}
+
+/// What the camera trigger does. Each pulse latches the encoders and sends a `Report::FrameMark`.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, Schema)]
+pub enum Trigger {
+    /// Nothing.
+    Off,
+    /// One pulse, now.
+    Once,
+    /// A pulse every so many microseconds, the first one now.
+    Every {
+        /// Microseconds between two pulses.
         period_us: u32,
     },
 }

@@ -96,6 +96,6 @@ fn the_checksum_is_castagnoli() {
 
 /// A change here is a change of the messages: raise `PROTOCOL` and check that the old enum variants kept their places.
 #[test]
-fn the_messages_are_those_of_protocol_1_0() {
-    assert_eq!(schema_hash(), 0x1f22_e82c_cd2c_5b35, "{:#x}", schema_hash());
+fn the_messages_are_those_of_protocol_1_1() {
+    assert_eq!(schema_hash(), 0x5033_dab2_6a54_66b8, "{:#x}", schema_hash());
 }

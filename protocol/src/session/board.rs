@@ -1,6 +1,8 @@
 //! The board's end.
 
 use heapless::Deque;
+use postcard_schema::Schema;
+use serde::{Deserialize, Serialize};
 
 use super::line::Line;
 use super::results::Results;
@@ -41,7 +43,7 @@ pub enum BoardEvent {
 }
 
 /// Figures since the board started.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, Schema)]
 pub struct BoardStatistics {
     /// Frames sent.
     pub sent: u32,
@@ -130,7 +132,7 @@ impl BoardSession {
         if reply_to.session != self.session() {
             return;
         }
-        if let Report::Info { to, .. } | Report::Ack { to, .. } | Report::Axis { to, .. } = &mut report {
+        if let Some(to) = report.to_mut() {
             *to = reply_to.seq;
         }
         if reply_to.immediate {
@@ -319,7 +321,18 @@ impl BoardSession {
 
 /// What a host of another schema may not ask.
 const fn moves(request: &Request) -> bool {
-    matches!(request, Request::Arm { .. } | Request::Home { .. } | Request::MoveTo(_) | Request::ClearFault { .. })
+    matches!(
+        request,
+        Request::Arm { .. }
+            | Request::Home { .. }
+            | Request::MoveTo(_)
+            | Request::Jog(_)
+            | Request::ClearFault { .. }
+            | Request::SetSetting { .. }
+            | Request::SaveSettings
+            | Request::RestoreSettings
+            | Request::SetTrigger(_)
+    )
 }
 
 /// Puts `report` last; where the queue is full the first goes and is counted.

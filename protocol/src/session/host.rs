@@ -49,7 +49,7 @@ pub enum HostEvent {
         /// Changes with every start of the board.
         boot: u32,
     },
-    /// The answer to a request: `Ack`, `Info` or `Axis`.
+    /// The answer to a request: a report that names one ([`Report::to`]).
     Reply {
         /// Which request.
         ticket: Ticket,
@@ -304,11 +304,11 @@ impl HostSession {
             (Phase::Open { .. }, true, _) | (Phase::Incompatible, _, Report::Info { .. }) => {}
             _ => return None,
         }
+        if let Some(to) = report.to() {
+            let ticket = self.answered(header.kind, to)?;
+            return Some(HostEvent::Reply { ticket, report });
+        }
         match report {
-            Report::Ack { to, .. } | Report::Info { to, .. } | Report::Axis { to, .. } => {
-                let ticket = self.answered(header.kind, to)?;
-                Some(HostEvent::Reply { ticket, report })
-            }
             Report::Pose(ref pose) => {
                 self.count_pose(pose.seq);
                 Some(HostEvent::Report(report))
