@@ -47,12 +47,20 @@ impl Axis {
 
     /// The encoder's count, rising along the axis.
     fn raw_counts(&self, io: &impl RigIo) -> i32 {
-        let raw = io.encoder(self.index);
+        self.rising(io.encoder(self.index))
+    }
+
+    fn rising(&self, raw: i32) -> i32 {
         if self.settings.counts_reversed { raw.wrapping_neg() } else { raw }
     }
 
     pub fn counts(&self, io: &impl RigIo) -> Counts {
-        Counts(self.raw_counts(io).wrapping_sub(self.zero_counts))
+        self.counts_from(io.encoder(self.index))
+    }
+
+    /// What the encoder's raw count means from the axis zero.
+    pub fn counts_from(&self, raw: i32) -> Counts {
+        Counts(self.rising(raw).wrapping_sub(self.zero_counts))
     }
 
     pub fn position(&self, io: &impl RigIo) -> Micro {

@@ -11,22 +11,31 @@
 #![no_std]
 
 mod axis;
+mod board_settings;
 mod contact;
 mod controller;
+mod flash;
 mod homing;
 mod io;
 mod latch;
 mod lease;
 mod node;
 mod profile;
+mod recorder;
+mod services;
 mod settings;
+pub mod settings_store;
 mod trajectory;
+mod trigger;
 
+pub use board_settings::{BoardSettings, SettingError};
 pub use controller::{Controller, Event};
+pub use flash::{Flash, FlashError, PAGE, UNIT};
 pub use io::{MAX_STEPS_PER_TICK, RigIo, StepSchedule, TriggerEdge};
 pub use node::{Node, NodeIdentity};
 
 pub use profile::{Limits, MotionState, Profile};
+pub use services::BoardServices;
 pub use settings::{AxisSettings, HomingSettings, Scale, SettingsError};
 
 /// The control tick: how often `poll` wants to run while the drivers are on, in microseconds.

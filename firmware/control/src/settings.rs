@@ -120,6 +120,8 @@ pub enum SettingsError {
         /// Which axis.
         axis: usize,
     },
+    /// The serial line or the pose stream cannot be that fast or slow.
+    Link,
 }
 
 impl AxisSettings {
