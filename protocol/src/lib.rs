@@ -20,6 +20,7 @@ mod request;
 mod session;
 mod setting;
 mod units;
+pub mod update;
 mod version;
 
 pub use axis::{AxisInfo, AxisKind, AxisList, AxisMask, MAX_AXES};

@@ -9,6 +9,7 @@
 
 mod requests;
 mod tick;
+mod update;
 
 use heapless::Deque;
 use vergence_protocol::{
@@ -144,6 +145,12 @@ impl Controller {
     #[must_use]
     pub fn state(&self) -> ControllerState {
         self.state
+    }
+
+    /// Whether the motors are held or driven.
+    #[must_use]
+    pub fn drivers_on(&self) -> bool {
+        self.drivers_on
     }
 
     /// The oldest event not yet taken.

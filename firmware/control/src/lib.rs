@@ -27,6 +27,7 @@ mod settings;
 pub mod settings_store;
 mod trajectory;
 mod trigger;
+mod updater;
 
 pub use board_settings::{BoardSettings, SettingError};
 pub use controller::{Controller, Event};

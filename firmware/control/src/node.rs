@@ -1,7 +1,9 @@
 //! The controller at the end of its serial link: the same code in the firmware, the native board and the tests.
 
+mod management;
 mod requests;
 
+use vergence_protocol::management::{BootState, RebootTo};
 use vergence_protocol::{
     BoardEvent, BoardSession, ControllerState, Happening, MAX_FRAME, Microseconds, ResetCause, Trigger,
 };
@@ -14,14 +16,19 @@ use crate::services::BoardServices;
 use crate::settings::SettingsError;
 use crate::settings_store;
 use crate::trigger::CameraTrigger;
+use crate::updater::Updater;
 
 /// What a board says of itself.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct NodeIdentity {
     /// What kind of board, at most 16 bytes.
     pub board: heapless::String<16>,
+    /// The hardware that firmware images must name.
+    pub hardware: u32,
     /// Firmware version.
     pub firmware: [u8; 3],
+    /// The oldest firmware version that the board accepts.
+    pub oldest: [u8; 3],
     /// Which build.
     pub build: u64,
     /// Unique id of the chip.
@@ -41,6 +48,10 @@ pub struct Node {
     defaults: BoardSettings,
     recorder: Recorder,
     trigger: CameraTrigger,
+    updater: Updater,
+    /// When the last management request came.
+    managed_at: Microseconds,
+    reboot: Option<RebootTo>,
     /// As last recorded.
     state: ControllerState,
     stream_period: u64,
@@ -61,7 +72,10 @@ impl Node {
         services: &mut impl BoardServices,
     ) -> Result<Self, SettingsError> {
         let settings = settings_store::load(services.settings_flash(), defaults).unwrap_or_else(|| defaults.clone());
-        let controller = Controller::new(&settings.axes)?;
+        let mut controller = Controller::new(&settings.axes)?;
+        if services.boot_state() == BootState::Trial {
+            controller.set_trial();
+        }
         let mut recorder = Recorder::default();
         recorder.record(Microseconds(0), Happening::Started);
         Ok(Self {
@@ -73,6 +87,9 @@ impl Node {
             defaults: defaults.clone(),
             recorder,
             trigger: CameraTrigger::default(),
+            updater: Updater::default(),
+            managed_at: Microseconds(0),
+            reboot: None,
             stream_period: 0,
             next_pose: Microseconds(0),
             pose_seq: 0,
@@ -108,7 +125,12 @@ impl Node {
                         self.session.reply(reply_to, reply);
                     }
                 }
-                Some(BoardEvent::Management { .. }) | None => {}
+                Some(BoardEvent::Management { seq, request }) => {
+                    let report = self.manage(now, &request, services);
+                    self.observe(now, io);
+                    self.session.reply_management(seq, report);
+                }
+                None => {}
             }
         }
     }
@@ -116,6 +138,7 @@ impl Node {
     /// Runs the control tick and, where due, trigger and telemetry. Returns when it wants to run again.
     pub fn poll(&mut self, now: Microseconds, io: &mut impl RigIo) -> Microseconds {
         let next_tick = self.controller.poll(now, io);
+        self.watch_update(now);
         self.trigger.poll(now, io);
         while let Some(edge) = io.take_trigger_edge() {
             let counts = self.controller.counts_from(&edge.counts);
@@ -173,6 +196,12 @@ impl Node {
     /// Sends log text to the host when there is nothing better to send; dropped where too much waits.
     pub fn log(&mut self, bytes: &[u8]) {
         self.session.log(bytes);
+    }
+
+    /// What the host wants started again. To be asked when [`Self::transmit`] gives nothing more, so that the answer is
+    /// out before.
+    pub fn take_reboot(&mut self) -> Option<RebootTo> {
+        self.reboot.take()
     }
 
     /// The next frame for the link; call until `None`.

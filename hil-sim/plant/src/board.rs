@@ -3,11 +3,15 @@
 use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64Mcg;
 use vergence_control::{AxisSettings, BoardSettings, Node, NodeIdentity, SettingsError};
+use vergence_protocol::management::RebootTo;
 use vergence_protocol::{ControllerState, MAX_FRAME, Microseconds, ResetCause};
 
 use crate::axis::AxisMechanics;
 use crate::plant::Plant;
 use crate::services::NativeServices;
+
+/// What firmware images for the native board would name as their hardware.
+pub const NATIVE_HARDWARE: u32 = 0x5353_4756; // "VGSS", little-endian
 
 /// A board without hardware. It lives in its own time: nothing happens between two calls of [`Self::advance`].
 #[derive(Debug)]
@@ -104,6 +108,11 @@ impl NativeBoard {
         out
     }
 
+    /// What the host wants started again, once all frames have left; the caller does it by [`Self::restart`].
+    pub fn take_reboot(&mut self) -> Option<RebootTo> {
+        self.node.take_reboot()
+    }
+
     /// Logs as the firmware would.
     pub fn log(&mut self, entry: &[u8]) {
         self.node.log(entry);
@@ -141,20 +150,12 @@ fn start(
 ) -> Result<Node, SettingsError> {
     let identity = NodeIdentity {
         board: "native-sim".try_into().unwrap_or_default(),
-        firmware: firmware_version(),
-        build: 0,
+        hardware: NATIVE_HARDWARE,
+        firmware: services.running.version,
+        oldest: services.oldest,
+        build: services.running.build,
         uid: *b"vergence-sim",
         reset,
     };
     Node::new(settings, identity, boot, services)
-}
-
-/// The workspace's version: the native board runs its own sources.
-fn firmware_version() -> [u8; 3] {
-    let part = |text: &str| text.parse().unwrap_or(0);
-    [
-        part(env!("CARGO_PKG_VERSION_MAJOR")),
-        part(env!("CARGO_PKG_VERSION_MINOR")),
-        part(env!("CARGO_PKG_VERSION_PATCH")),
-    ]
 }

@@ -13,6 +13,15 @@ const IMAGE_PAGES: usize = 48;
 /// Whether a signature over the bytes is of a trusted key.
 pub type Verifier = fn(&[u8; ImageHeader::SIGNED], &Signature) -> bool;
 
+/// An image, as far as a simulation needs to know it.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Firmware {
+    /// Its version.
+    pub version: [u8; 3],
+    /// Which build.
+    pub build: u64,
+}
+
 /// Flash and boot loader in RAM. They outlive a restart of the board.
 #[derive(Clone, Debug)]
 pub struct NativeServices {
@@ -20,14 +29,17 @@ pub struct NativeServices {
     pub settings: RamFlash,
     /// Where a new image is stored.
     pub image: RamFlash,
-    /// What runs.
+    /// What runs: the name only, for the code is always this.
+    pub running: Firmware,
+    /// How it came to.
     pub boot_state: BootState,
-    /// What the boot loader was told to start next, where it was told.
-    pub next_boot: Option<BootState>,
-    /// Whether there is an image before the running one.
-    pub has_earlier: bool,
+    /// The oldest version accepted.
+    pub oldest: [u8; 3],
     /// Which signatures are trusted.
     pub verifier: Verifier,
+    earlier: Option<Firmware>,
+    scheduled: Option<Firmware>,
+    goes_back: bool,
 }
 
 impl Default for NativeServices {
@@ -36,10 +48,13 @@ impl Default for NativeServices {
         Self {
             settings: RamFlash::new(SETTINGS_PAGES),
             image: RamFlash::new(IMAGE_PAGES),
+            running: Firmware { version: workspace_version(), build: 0 },
             boot_state: BootState::Confirmed,
-            next_boot: None,
-            has_earlier: false,
+            oldest: [0, 0, 0],
             verifier: |_, _| false,
+            earlier: None,
+            scheduled: None,
+            goes_back: false,
         }
     }
 }
@@ -47,12 +62,14 @@ impl Default for NativeServices {
 impl NativeServices {
     /// What the boot loader does at a start: a scheduled image goes on trial, one that was not confirmed goes back.
     pub fn boot(&mut self) {
-        self.boot_state = match (self.next_boot.take(), self.boot_state) {
-            (Some(next), _) => next,
-            (None, BootState::Trial) => BootState::Reverted,
-            (None, running) => running,
-        };
-        self.has_earlier |= self.boot_state == BootState::Trial;
+        let goes_back = std::mem::take(&mut self.goes_back) || self.boot_state == BootState::Trial;
+        if let Some(new) = self.scheduled.take() {
+            self.earlier = Some(std::mem::replace(&mut self.running, new));
+            self.boot_state = BootState::Trial;
+        } else if let Some(earlier) = self.earlier.take_if(|_| goes_back) {
+            self.running = earlier;
+            self.boot_state = BootState::Reverted;
+        }
     }
 }
 
@@ -73,21 +90,28 @@ impl BoardServices for NativeServices {
         (self.verifier)(signed, signature)
     }
 
-    fn schedule_trial(&mut self) -> Result<(), FlashError> {
-        self.next_boot = Some(BootState::Trial);
+    fn schedule_trial(&mut self, image: &ImageHeader) -> Result<(), FlashError> {
+        self.scheduled = Some(Firmware { version: image.version, build: image.build });
         Ok(())
     }
 
     fn confirm(&mut self) -> Result<(), FlashError> {
         self.boot_state = BootState::Confirmed;
-        self.has_earlier = true;
         Ok(())
     }
 
     fn roll_back(&mut self) -> Result<bool, FlashError> {
-        if self.has_earlier {
-            self.next_boot = Some(BootState::Reverted);
-        }
-        Ok(self.has_earlier)
+        self.goes_back = self.earlier.is_some();
+        Ok(self.goes_back)
     }
+}
+
+/// The native board runs its own sources.
+fn workspace_version() -> [u8; 3] {
+    let part = |text: &str| text.parse().unwrap_or(0);
+    [
+        part(env!("CARGO_PKG_VERSION_MAJOR")),
+        part(env!("CARGO_PKG_VERSION_MINOR")),
+        part(env!("CARGO_PKG_VERSION_PATCH")),
+    ]
 }

@@ -33,6 +33,9 @@ impl Controller {
         if self.is_latched() {
             return Err(Refusal::Latched);
         }
+        if matches!(self.state, ControllerState::Updating | ControllerState::Trial) {
+            return Err(Refusal::Updating);
+        }
         if self.holder.is_some_and(|holder| holder != session) {
             return Err(Refusal::WrongSession);
         }
@@ -74,6 +77,7 @@ impl Controller {
         match self.state {
             ControllerState::Idle => Err(Refusal::NotArmed),
             ControllerState::LinkLost | ControllerState::Fault => Err(Refusal::Latched),
+            ControllerState::Updating | ControllerState::Trial => Err(Refusal::Updating),
             _ if self.holder != Some(session) => Err(Refusal::WrongSession),
             _ if !self.lease.is_live(now, session) => Err(Refusal::NoLease),
             ControllerState::Ready => Ok(()),

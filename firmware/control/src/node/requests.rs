@@ -111,7 +111,7 @@ impl Node {
     }
 
     fn info(&self) -> BoardInfo {
-        let super::NodeIdentity { board, firmware, build, uid, reset } = self.identity.clone();
+        let super::NodeIdentity { board, firmware, build, uid, reset, .. } = self.identity.clone();
         let axes = u8::try_from(self.controller.axis_count()).unwrap_or(u8::MAX);
         BoardInfo { board, firmware, build, uid, reset, axes }
     }
