@@ -6,9 +6,9 @@ mod common;
 
 use vergence_protocol::frame::{Header, Kind, encode};
 use vergence_protocol::{
-    AxisMask, BoardEvent, BoardSession, Compatibility, FaultCode, FaultRecord, HostEvent, HostSession, MAX_FRAME,
-    Microseconds, MoveId, MovePhase, PROTOCOL, ProtocolVersion, Receiver, Refusal, ReplyTo, Report, Request, SessionId,
-    Status, StopKind, SubmitError, schema_hash,
+    AxisMask, BoardEvent, BoardSession, Compatibility, FaultCode, FaultRecord, HostEvent, HostSession, LOG_CHUNK,
+    MAX_FRAME, Microseconds, MoveId, MovePhase, PROTOCOL, ProtocolVersion, Receiver, Refusal, ReplyTo, Report, Request,
+    SessionId, Status, StopKind, SubmitError, schema_hash,
 };
 
 use common::{SESSION, answer, board_info, hello, move_to, pose};
@@ -263,4 +263,69 @@ fn motion_does_not_pass_by_the_window() {
     let mut board = open_board();
     assert_eq!(tell(&mut board, &host_frame(header(Kind::Immediate, 0), &move_to(1))), []);
     assert_eq!(board.statistics().link.body, 1);
+}
+
+/// The log bytes of all frames that the board sends now, after the kinds of what goes before.
+fn sent_log(board: &mut BoardSession) -> (Vec<Kind>, Vec<u8>) {
+    let (mut receiver, mut buffer) = (Receiver::new(), [0; MAX_FRAME]);
+    let (mut kinds, mut log) = (Vec::new(), Vec::new());
+    while let Some(length) = board.transmit(Microseconds(2000), &mut buffer) {
+        assert!(length < 64, "an answer waits no longer than for a short frame");
+        for &byte in &buffer[..length] {
+            let Some(frame) = receiver.push(byte) else { continue };
+            match frame.header.kind {
+                Kind::Log => log.extend(frame.body::<heapless::Vec<u8, LOG_CHUNK>>().unwrap()),
+                kind => kinds.push(kind),
+            }
+            assert!(log.is_empty() || frame.header.kind == Kind::Log, "the log goes last");
+        }
+    }
+    (kinds, log)
+}
+
+#[test]
+fn the_log_goes_last_and_waits_for_a_session() {
+    let mut board = BoardSession::new(1);
+    let entry: Vec<u8> = (0..100).collect();
+    board.log(&entry);
+    assert_eq!(sent_log(&mut board), (vec![], vec![]));
+    tell(&mut board, &host_frame(header(Kind::Immediate, 0), &hello(SESSION)));
+    board.telemetry(pose(1));
+    let control = ask(&mut board, header(Kind::Control, 0), &Request::Disarm);
+    board.reply(control, answer(&Request::Disarm));
+    assert_eq!(sent_log(&mut board), (vec![Kind::Immediate, Kind::Control, Kind::Telemetry], entry));
+}
+
+#[test]
+fn a_log_entry_that_does_not_fit_is_dropped_whole_and_counted() {
+    let mut board = open_board();
+    board.log(&[1; 500]);
+    board.log(&[2; 13]);
+    board.log(&[3; 12]);
+    board.log(&[4; 1]);
+    let (_, log) = sent_log(&mut board);
+    assert_eq!(log, [vec![1; 500], vec![3; 12]].concat());
+    assert_eq!(board.statistics().logs_dropped, 2);
+    board.log(&[5; 512]);
+    assert_eq!(sent_log(&mut board).1, [5; 512]);
+}
+
+#[test]
+fn a_host_hears_the_log_of_its_session() {
+    let mut host = HostSession::new(SESSION);
+    let mut board = open_board();
+    board.log(b"hello");
+    let mut buffer = [0; MAX_FRAME];
+    let length = board.transmit(Microseconds(2000), &mut buffer).unwrap();
+    let mut heard = Vec::new();
+    host.receive(Microseconds(1), &buffer[..length], |event| heard.push(event));
+    assert_eq!(heard, [], "no session yet");
+    host.hello();
+    let report = Report::Hello { protocol: PROTOCOL, schema: schema_hash(), session: SESSION, boot: 9 };
+    let mut opening = [0; MAX_FRAME];
+    let opened = encode(header(Kind::Immediate, 0), &report, &mut opening).unwrap();
+    host.receive(Microseconds(2), &opening[..opened], |_| {});
+    host.receive(Microseconds(3), &buffer[..length], |event| heard.push(event));
+    assert_eq!(heard, [HostEvent::Log(heapless::Vec::from_slice(b"hello").unwrap())]);
+    assert_eq!(host.heard_at(), Some(Microseconds(3)));
 }

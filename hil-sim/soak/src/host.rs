@@ -297,6 +297,7 @@ impl Host {
                 });
             }
             HostEvent::Opened { .. } | HostEvent::Reply { .. } | HostEvent::Report(_) => {}
+            HostEvent::Log(_) | HostEvent::Management(_) => {}
         }
     }
 

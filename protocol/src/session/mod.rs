@@ -12,7 +12,7 @@ mod results;
 mod round_trip;
 mod window;
 
-pub use board::{BoardEvent, BoardSession, BoardStatistics, ReplyTo};
+pub use board::{BoardEvent, BoardSession, BoardStatistics, LOG_CHUNK, ReplyTo};
 pub use host::{Compatibility, HostEvent, HostSession, HostStatistics, SubmitError, Ticket};
 pub use window::WINDOW;
 
