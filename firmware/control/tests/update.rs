@@ -4,16 +4,19 @@
 use ed25519_dalek::{Signer, SigningKey, VerifyingKey};
 use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64Mcg;
+use serde::Serialize;
+use serde::de::DeserializeOwned;
 use sha2::{Digest, Sha256};
 use vergence_control::{Flash, PAGE};
 use vergence_plant::{Cut, NATIVE_HARDWARE, NativeBoard, bench_mechanics, bench_settings};
+use vergence_protocol::frame::{Header, encode};
 use vergence_protocol::management::{
-    BootState, CHUNK, ImageHeader, Management, ManagementReport, Outcome, RebootTo, Signature,
+    BootState, CHUNK, Identity, ImageHeader, Management, ManagementReport, Outcome, RebootTo, Signature,
 };
 use vergence_protocol::update::{Upload, UploadState};
 use vergence_protocol::{
-    ControllerState, HostEvent, HostSession, MAX_FRAME, Microseconds, Refusal, Report, Request, ResetCause, SessionId,
-    Status,
+    ControllerState, HostEvent, HostSession, MAX_FRAME, Microseconds, PROTOCOL, Receiver, Refusal, Report, Request,
+    ResetCause, SessionId, Status,
 };
 
 /// A key for tests, and nothing else.
@@ -56,6 +59,8 @@ struct Bench {
     /// Share of frames lost, in each direction.
     loss: f64,
     random: Pcg64Mcg,
+    /// The protocol major of the host, where it is another than the board's.
+    foreign: Option<u8>,
     answers: Vec<ManagementReport>,
     replies: Vec<Report>,
 }
@@ -71,6 +76,7 @@ impl Bench {
             behind: 0,
             loss,
             random: Pcg64Mcg::seed_from_u64(seed),
+            foreign: None,
             answers: Vec::new(),
             replies: Vec::new(),
         };
@@ -92,14 +98,16 @@ impl Bench {
         let mut buffer = [0; MAX_FRAME];
         while let Some(length) = self.host.transmit(Microseconds(self.now), &mut buffer) {
             if !self.random.random_bool(self.loss) {
-                self.board.receive(&buffer[..length]);
+                let frame = foreign::<Management>(&buffer[..length], self.foreign);
+                self.board.receive(&frame);
             }
         }
         for frame in self.board.transmit().split_inclusive(|&byte| byte == 0) {
             if self.random.random_bool(self.loss) {
                 continue;
             }
-            self.host.receive(Microseconds(self.now), frame, |event| match event {
+            let frame = foreign::<ManagementReport>(frame, self.foreign);
+            self.host.receive(Microseconds(self.now), &frame, |event| match event {
                 HostEvent::Management(report) => self.answers.push(report),
                 HostEvent::Reply { report, .. } => self.replies.push(report),
                 _ => {}
@@ -165,6 +173,45 @@ impl Bench {
     }
 }
 
+/// The frame with another major in its header: from a host of another age, or as that one would hear it.
+fn foreign<M: Serialize + DeserializeOwned>(frame: &[u8], major: Option<u8>) -> Vec<u8> {
+    let Some(major) = major else { return frame.to_vec() };
+    let (mut receiver, mut buffer) = (Receiver::new(), [0; MAX_FRAME]);
+    let mut out = Vec::new();
+    for &byte in frame {
+        if let Some(frame) = receiver.push(byte) {
+            let body: M = frame.body().unwrap();
+            let length = encode(Header { major, ..frame.header }, &body, &mut buffer).unwrap();
+            out.extend(&buffer[..length]);
+        }
+    }
+    out
+}
+
+#[test]
+fn a_host_of_another_major_can_ask_who_it_is_and_update_it() {
+    let (bytes, header, signature) = image(10_000, 30);
+    let mut bench = Bench::new(0.05, 30);
+    bench.foreign = Some(PROTOCOL.major + 3);
+    let mut upload = Upload::new(&bytes, header, signature).unwrap();
+    assert_eq!(bench.run(&mut upload, 60_000_000), UploadState::Done);
+    assert_eq!(bench.manage(Management::Reboot(RebootTo::Application)).1, Outcome::Done);
+    bench.restart();
+    assert_eq!(bench.manage(Management::Confirm).1, Outcome::Done);
+    bench.loss = 0.0;
+    bench.host.manage(Management::Identify).unwrap();
+    bench.wait(10_000);
+    let identity = Identity {
+        hardware: NATIVE_HARDWARE,
+        version: header.version,
+        oldest: [0, 0, 0],
+        build: 30,
+        boot: BootState::Confirmed,
+        capacity: 48 * PAGE as u32,
+    };
+    assert_eq!(bench.answers, [ManagementReport::Identity(identity)]);
+}
+
 #[test]
 fn an_update_needs_no_session_and_starts_on_trial() {
     let (bytes, header, signature) = image(20_001, 1);
@@ -223,7 +270,7 @@ fn through_losses_of_a_third_the_image_arrives_whole() {
 fn on_a_clean_line_every_byte_goes_once() {
     let (bytes, header, signature) = image(40_000, 4);
     let mut bench = Bench::new(0.0, 4);
-    // The flash is erased page by page, not before: an old image is in it.
+    // The flash holds an old image and is erased page by page.
     bench.board.services_mut().image.overwrite(0, &[0x55; 41_000]);
     bench.run(&mut Upload::new(&bytes, header, signature).unwrap(), 60_000_000);
     let chunks = bytes.len().div_ceil(CHUNK) as u32;
@@ -262,6 +309,8 @@ fn an_update_cut_anywhere_goes_on_at_the_first_page_that_differs() {
 fn a_host_that_comes_back_goes_on_where_the_board_is() {
     let (bytes, header, signature) = image(40_000, 6);
     let mut bench = Bench::new(0.0, 6);
+    // An old image: no page is taken for erased that is not.
+    bench.board.services_mut().image.overwrite(0, &[0x55; 41_000]);
     let mut upload = Upload::new(&bytes, header, signature).unwrap();
     bench.run(&mut upload, 10_000);
     let (stored, _) = upload.progress();
