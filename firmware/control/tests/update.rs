@@ -1,168 +1,43 @@
 //! Firmware updates over the link: a native board, a host and a line that loses what it likes.
 #![allow(clippy::unwrap_used, clippy::panic, reason = "a test fails by panic")]
 
-use ed25519_dalek::{Signer, SigningKey, VerifyingKey};
+mod update_bench;
+
 use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64Mcg;
-use sha2::{Digest, Sha256};
+use sha2::Digest;
 use vergence_control::{Flash, PAGE};
-use vergence_plant::{Cut, NATIVE_HARDWARE, NativeBoard, bench_mechanics, bench_settings};
+use vergence_plant::{Cut, NATIVE_HARDWARE};
 use vergence_protocol::management::{
-    BootState, CHUNK, ImageHeader, Management, ManagementReport, Outcome, RebootTo, Signature,
+    BootState, CHUNK, Identity, ImageHeader, Management, ManagementReport, Outcome, RebootTo, Signature,
 };
 use vergence_protocol::update::{Upload, UploadState};
-use vergence_protocol::{
-    ControllerState, HostEvent, HostSession, MAX_FRAME, Microseconds, Refusal, Report, Request, ResetCause, SessionId,
-    Status,
-};
+use vergence_protocol::{ControllerState, HostSession, PROTOCOL, Refusal, Request, SessionId, Status};
 
-/// A key for tests, and nothing else.
-const SEED: [u8; 32] = [7; 32];
-const STEP_US: u64 = 500;
+use update_bench::{Bench, SEED, image, sign};
 
-fn verify(signed: &[u8; ImageHeader::SIGNED], signature: &Signature) -> bool {
-    let key = VerifyingKey::from(&SigningKey::from_bytes(&SEED));
-    let signature = ed25519_dalek::Signature::from_components(signature.r, signature.s);
-    key.verify_strict(signed, &signature).is_ok()
-}
-
-/// An image with stretches of erased flash in it, its header and its signature.
-fn image(length: usize, seed: u64) -> (Vec<u8>, ImageHeader, Signature) {
-    let mut random = Pcg64Mcg::seed_from_u64(seed);
-    let mut bytes: Vec<u8> = (0..length).map(|_| random.random()).collect();
-    bytes.chunks_mut(500).step_by(7).for_each(|part| part.fill(0xFF));
-    let header = ImageHeader {
+#[test]
+fn a_host_of_another_major_can_ask_who_it_is_and_update_it() {
+    let (bytes, header, signature) = image(10_000, 30);
+    let mut bench = Bench::new(0.05, 30);
+    bench.foreign = Some(PROTOCOL.major + 3);
+    let mut upload = Upload::new(&bytes, header, signature).unwrap();
+    assert_eq!(bench.run(&mut upload, 60_000_000), UploadState::Done);
+    assert_eq!(bench.manage(Management::Reboot(RebootTo::Application)).1, Outcome::Done);
+    bench.restart();
+    assert_eq!(bench.manage(Management::Confirm).1, Outcome::Done);
+    bench.loss = 0.0;
+    bench.host.manage(Management::Identify).unwrap();
+    bench.wait(10_000);
+    let identity = Identity {
         hardware: NATIVE_HARDWARE,
-        version: [1, 2, 3],
-        length: length as u32,
-        build: seed,
-        sha256: Sha256::digest(&bytes).into(),
+        version: header.version,
+        oldest: [0, 0, 0],
+        build: 30,
+        boot: BootState::Confirmed,
+        capacity: 48 * PAGE as u32,
     };
-    let signature = sign(&header, &SEED);
-    (bytes, header, signature)
-}
-
-fn sign(header: &ImageHeader, seed: &[u8; 32]) -> Signature {
-    let signature = SigningKey::from_bytes(seed).sign(&header.signed_bytes());
-    Signature { r: *signature.r_bytes(), s: *signature.s_bytes() }
-}
-
-struct Bench {
-    board: NativeBoard,
-    host: HostSession,
-    now: u64,
-    /// What the board's clock is behind the host's.
-    behind: u64,
-    /// Share of frames lost, in each direction.
-    loss: f64,
-    random: Pcg64Mcg,
-    answers: Vec<ManagementReport>,
-    replies: Vec<Report>,
-}
-
-impl Bench {
-    fn new(loss: f64, seed: u64) -> Self {
-        let mut board = NativeBoard::new(&bench_settings(), &bench_mechanics(), seed).unwrap();
-        board.services_mut().verifier = verify;
-        let mut bench = Self {
-            board,
-            host: HostSession::new(SessionId(1)),
-            now: 0,
-            behind: 0,
-            loss,
-            random: Pcg64Mcg::seed_from_u64(seed),
-            answers: Vec::new(),
-            replies: Vec::new(),
-        };
-        // Whatever the board does first.
-        bench.wait(1_000_000);
-        bench
-    }
-
-    fn wait(&mut self, us: u64) {
-        let until = self.now + us;
-        while self.now < until {
-            self.step();
-        }
-    }
-
-    fn step(&mut self) {
-        self.now += STEP_US;
-        self.board.advance(Microseconds(self.now - self.behind));
-        let mut buffer = [0; MAX_FRAME];
-        while let Some(length) = self.host.transmit(Microseconds(self.now), &mut buffer) {
-            if !self.random.random_bool(self.loss) {
-                self.board.receive(&buffer[..length]);
-            }
-        }
-        for frame in self.board.transmit().split_inclusive(|&byte| byte == 0) {
-            if self.random.random_bool(self.loss) {
-                continue;
-            }
-            self.host.receive(Microseconds(self.now), frame, |event| match event {
-                HostEvent::Management(report) => self.answers.push(report),
-                HostEvent::Reply { report, .. } => self.replies.push(report),
-                _ => {}
-            });
-        }
-    }
-
-    /// Carries an update on until it ends or for `limit` microseconds.
-    fn run(&mut self, upload: &mut Upload<'_>, limit: u64) -> UploadState {
-        let until = self.now + limit;
-        while self.now < until && !matches!(upload.state(), UploadState::Done | UploadState::Failed(_)) {
-            upload.transmit(Microseconds(self.now), &mut self.host);
-            self.step();
-            for answer in std::mem::take(&mut self.answers) {
-                upload.hear(Microseconds(self.now), &answer);
-            }
-        }
-        upload.state()
-    }
-
-    /// Asks without losses and waits for the answer.
-    fn manage(&mut self, request: Management) -> (u32, Outcome) {
-        let loss = std::mem::take(&mut self.loss);
-        self.answers.clear();
-        self.host.manage(request).unwrap();
-        self.wait(10_000);
-        self.loss = loss;
-        match self.answers.pop() {
-            Some(ManagementReport::Progress { next, outcome, .. }) => (next, outcome),
-            other => panic!("{other:?}"),
-        }
-    }
-
-    fn ask(&mut self, request: Request) -> Status {
-        self.host.submit(Microseconds(self.now), request).unwrap();
-        self.wait(50_000);
-        match self.replies.pop() {
-            Some(Report::Ack { status, .. }) => status,
-            other => panic!("{other:?}"),
-        }
-    }
-
-    fn open(&mut self, session: u32) {
-        self.host = HostSession::new(SessionId(session));
-        self.host.hello();
-        self.wait(200_000);
-        assert!(self.host.is_open());
-    }
-
-    fn restart(&mut self) {
-        self.board.restart(ResetCause::Software, self.now as u32).unwrap();
-        self.behind = self.now;
-        self.wait(1_000_000);
-    }
-
-    fn holds(&mut self, image: &[u8]) -> bool {
-        self.board.services_mut().image.bytes().starts_with(image)
-    }
-
-    /// Erase and program operations on the image so far.
-    fn written(&mut self) -> usize {
-        self.board.services_mut().image.operations()
-    }
+    assert_eq!(bench.answers, [ManagementReport::Identity(identity)]);
 }
 
 #[test]
@@ -223,7 +98,7 @@ fn through_losses_of_a_third_the_image_arrives_whole() {
 fn on_a_clean_line_every_byte_goes_once() {
     let (bytes, header, signature) = image(40_000, 4);
     let mut bench = Bench::new(0.0, 4);
-    // The flash is erased page by page, not before: an old image is in it.
+    // The flash holds an old image and is erased page by page.
     bench.board.services_mut().image.overwrite(0, &[0x55; 41_000]);
     bench.run(&mut Upload::new(&bytes, header, signature).unwrap(), 60_000_000);
     let chunks = bytes.len().div_ceil(CHUNK) as u32;
@@ -262,6 +137,8 @@ fn an_update_cut_anywhere_goes_on_at_the_first_page_that_differs() {
 fn a_host_that_comes_back_goes_on_where_the_board_is() {
     let (bytes, header, signature) = image(40_000, 6);
     let mut bench = Bench::new(0.0, 6);
+    // An old image: no page is taken for erased that is not.
+    bench.board.services_mut().image.overwrite(0, &[0x55; 41_000]);
     let mut upload = Upload::new(&bytes, header, signature).unwrap();
     bench.run(&mut upload, 10_000);
     let (stored, _) = upload.progress();

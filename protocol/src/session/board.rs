@@ -1,14 +1,13 @@
 //! The board's end.
 
 use heapless::{Deque, Vec};
-use postcard_schema::Schema;
-use serde::{Deserialize, Serialize};
 
 use super::line::Line;
 use super::results::Results;
+use super::statistics::BoardStatistics;
 use crate::frame::{FrameError, Header, Kind, MAX_FRAME};
 use crate::management::{Management, ManagementReport};
-use crate::receiver::{LinkCounters, Receiver, increment};
+use crate::receiver::{Receiver, increment};
 use crate::{Microseconds, PROTOCOL, PoseReport, Refusal, Report, Request, SessionId, Status, schema_hash};
 
 /// How many answers to immediate requests may wait for the line.
@@ -54,29 +53,6 @@ pub enum BoardEvent {
         /// What is asked.
         request: Management,
     },
-}
-
-/// Figures since the board started.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, Schema)]
-pub struct BoardStatistics {
-    /// Frames sent.
-    pub sent: u32,
-    /// Requests that came again and were only answered again.
-    pub duplicates: u32,
-    /// Requests that came too early because one before them was lost.
-    pub gaps: u32,
-    /// Requests dropped because no session was open.
-    pub without_session: u32,
-    /// Answers to immediate and management requests that were pushed out by later ones.
-    pub replies_dropped: u32,
-    /// Events that were pushed out by later ones.
-    pub events_dropped: u32,
-    /// Poses that a later one replaced before they were sent.
-    pub poses_replaced: u32,
-    /// Log entries dropped because too much waited.
-    pub logs_dropped: u32,
-    /// What came in.
-    pub link: LinkCounters,
 }
 
 #[derive(Clone, Copy, Debug)]

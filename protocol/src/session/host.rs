@@ -5,10 +5,11 @@ use heapless::{Deque, Vec};
 use super::board::LOG_CHUNK;
 use super::line::Line;
 use super::round_trip::Repeat;
+use super::statistics::HostStatistics;
 use super::window::{WINDOW, Window, sequence};
 use crate::frame::{FrameError, Header, Kind, MAX_FRAME};
 use crate::management::{Management, ManagementReport};
-use crate::receiver::{LinkCounters, Receiver};
+use crate::receiver::Receiver;
 use crate::{Microseconds, PROTOCOL, ProtocolVersion, Report, Request, SessionId, schema_hash};
 
 /// How many immediate requests may wait for the line.
@@ -84,25 +85,6 @@ pub enum SubmitError {
     /// The request goes another way: `hello`, `submit` or `send_now`.
     #[error("this request is sent another way")]
     WrongWay,
-}
-
-/// Figures of one session.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct HostStatistics {
-    /// Frames sent.
-    pub sent: u32,
-    /// Requests sent again.
-    pub retransmitted: u32,
-    /// Smoothed round trip, microseconds; `None` before the first acknowledgement.
-    pub round_trip: Option<Microseconds>,
-    /// How long an unanswered request waits before it is sent again, microseconds.
-    pub timeout: Microseconds,
-    /// Poses received.
-    pub poses: u32,
-    /// Poses that the board numbered but that did not arrive.
-    pub poses_lost: u32,
-    /// What came in.
-    pub link: LinkCounters,
 }
 
 #[derive(Clone, Copy, Debug)]
