@@ -17,6 +17,7 @@ mod corners;
 pub mod failure;
 pub mod link;
 pub mod look;
+pub mod models;
 mod output;
 mod provenance;
 mod rig_file;

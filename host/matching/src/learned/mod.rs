@@ -24,9 +24,7 @@ use crate::plane::{Plane, Pyramid};
 use crate::shared_field::SharedField;
 use crate::{Grid, SharedFrame, View, ViewPixel};
 
-pub use manifest::{
-    Coordinates, Extractor, Glue, ImageInput, Manifest, MatchForm, MatchOutput, Networks, Pipeline,
-};
+pub use manifest::{Coordinates, Extractor, Glue, ImageInput, Manifest, MatchForm, MatchOutput, Networks, Pipeline};
 pub use model::{Found, Model, Picture, Position, Worth};
 pub use network::{Elements, Network, NetworkError, Outlet, Signature, Tensor};
 

@@ -15,6 +15,7 @@ pub mod devices;
 pub mod disarm;
 pub mod home;
 pub mod mode;
+pub mod models;
 pub mod monitor;
 pub mod move_to;
 pub mod sim;
