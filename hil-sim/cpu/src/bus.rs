@@ -66,4 +66,10 @@ pub trait Bus {
 
     /// Whether the non-maskable interrupt is asserted now (level).
     fn nmi(&self) -> bool;
+
+    /// Whether the chip wants [`Cpu::run`](crate::Cpu::run) to stop at the next instruction boundary, with
+    /// [`Stop::Requested`](crate::Stop::Requested). Asked after every access to a peripheral and every event.
+    fn stop_requested(&self) -> bool {
+        false
+    }
 }
