@@ -71,6 +71,23 @@ impl Board {
         }
     }
 
+    /// Puts bytes into memory.
+    pub fn put(&mut self, address: u32, bytes: &[u8]) {
+        if let Some(place) = self.bytes_mut(address, bytes.len()) {
+            place.copy_from_slice(bytes);
+        }
+    }
+
+    /// The zero-terminated text in memory.
+    pub fn text(&self, address: u32) -> String {
+        (address..)
+            .map_while(|at| self.bytes(at, 1))
+            .map(|bytes| bytes[0])
+            .take_while(|&b| b != 0)
+            .map(char::from)
+            .collect()
+    }
+
     /// A word of memory, zero outside.
     pub fn word(&self, address: u32) -> u32 {
         self.bytes(address, 4).map_or(0, |bytes| u32::from_le_bytes([bytes[0], bytes[1], bytes[2], bytes[3]]))
