@@ -50,7 +50,7 @@ pub const NARROW: &[Form] = forms![
     "sub sp, #8\nadd sp, #8",
     "nop",
     "yield",
-    "add r0, sp, #16\nmov r1, sp\nsub r0, r0, r1",
+    "add r0, sp, #16\nmov r1, sp\nsub r0, r0, r1\nmov r1, #0",
     "mov r12, sp\nadd sp, r1\nmov r0, sp\nmov sp, r12\nsub r0, r12",
 ];
 

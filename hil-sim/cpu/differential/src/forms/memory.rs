@@ -81,7 +81,7 @@ pub const FORMS: &[Form] = forms![
     "stm.w r5!, {{r0, r2}}",
     "stmdb r5!, {{r0-r4}}",
     "stmdb r5, {{r1, r2}}",
-    "ldm r5, {{r0, r5}}\nmov r5, r1",
+    "mov r3, r5\nldm r5, {{r0, r5}}\nmov r1, r5\nmov r5, r3\nmov r3, #0",
     "push {{r0-r3}}\npop {{r1-r4}}",
     "push.w {{r0, r1, r8}}\npop.w {{r2, r3, r8}}",
     "push {{r1}}\nldr r0, [sp]\nadd sp, #4",
