@@ -69,7 +69,8 @@ fn float(form: &Form) -> u32 {
             for word in &mut context.scratch {
                 *word = operands.float();
             }
-            context.fpscr = mode << 22;
+            // Exceptions recorded before: what is set stays set.
+            context.fpscr = mode << 22 | operands.integer() & 0x9f;
             context.run();
             hash.context(&context);
         }

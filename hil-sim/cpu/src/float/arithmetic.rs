@@ -12,6 +12,9 @@ struct Term {
 
 impl Environment {
     pub fn add(&mut self, x: u32, y: u32) -> u32 {
+        if let Some(result) = self.quick(f32::from_bits(x) + f32::from_bits(y)) {
+            return result;
+        }
         // Both are unpacked before any NaN is looked at: the denormal flag comes first.
         let (a, b) = (self.unpack(x), self.unpack(y));
         if let Some(nan) = self.propagate_nan(&[x, y]) {
@@ -31,6 +34,9 @@ impl Environment {
     }
 
     pub fn multiply(&mut self, x: u32, y: u32) -> u32 {
+        if let Some(result) = self.quick(f32::from_bits(x) * f32::from_bits(y)) {
+            return result;
+        }
         let (a, b) = (self.unpack(x), self.unpack(y));
         if let Some(nan) = self.propagate_nan(&[x, y]) {
             return nan;
@@ -75,6 +81,9 @@ impl Environment {
     }
 
     pub fn divide(&mut self, x: u32, y: u32) -> u32 {
+        if let Some(result) = self.quick(f32::from_bits(x) / f32::from_bits(y)) {
+            return result;
+        }
         let (a, b) = (self.unpack(x), self.unpack(y));
         if let Some(nan) = self.propagate_nan(&[x, y]) {
             return nan;
@@ -103,6 +112,9 @@ impl Environment {
     }
 
     pub fn square_root(&mut self, x: u32) -> u32 {
+        if let Some(result) = self.quick(f32::from_bits(x).sqrt()) {
+            return result;
+        }
         let a = self.unpack(x);
         if let Some(nan) = self.propagate_nan(&[x]) {
             return nan;
