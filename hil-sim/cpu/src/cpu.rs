@@ -217,21 +217,42 @@ impl Cpu {
         self.stop.take()
     }
 
-    /// Advances the chip and SysTick to now, notes what they pend, and forgets decoded code that has changed.
+    /// Advances the chip and SysTick to now, notes what they pend, and forgets decoded code that has changed. Events
+    /// that came due meanwhile happen one by one, so that a pulse shorter than an instruction is seen.
     pub(crate) fn synchronize<B: Bus>(&mut self, bus: &mut B) {
+        let mut due = bus.next_event();
+        while due < self.now {
+            bus.advance(due);
+            self.observe(bus);
+            let next = bus.next_event();
+            if next <= due {
+                break;
+            }
+            due = next;
+        }
         bus.advance(self.now);
-        let mut fresh = self.nvic.observe(bus.lines(), bus.nmi());
+        self.observe(bus);
         if self.systick.next_event() <= self.now && self.systick.advance(self.now) {
             self.nvic.raise(crate::nvic::exception::SYSTEM_TICK);
-            fresh = true;
-        }
-        if fresh && self.system.sleep & crate::system::sleep::EVENT_ON_PENDING != 0 {
-            self.event = true;
+            self.pended();
         }
         let version = bus.code_version();
         if version != self.code_version {
             self.code_version = version;
             self.cache.clear();
+        }
+    }
+
+    fn observe<B: Bus>(&mut self, bus: &B) {
+        if self.nvic.observe(bus.lines(), bus.nmi()) {
+            self.pended();
+        }
+    }
+
+    /// A new pending exception is an event where SCR.SEVONPEND says so.
+    pub(crate) fn pended(&mut self) {
+        if self.system.sleep & crate::system::sleep::EVENT_ON_PENDING != 0 {
+            self.event = true;
         }
     }
 

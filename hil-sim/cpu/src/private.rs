@@ -177,13 +177,7 @@ impl Cpu {
         let fresh = lines & !self.nvic.pending;
         self.nvic.pending |= lines;
         if fresh != 0 {
-            self.pended_by_software();
-        }
-    }
-
-    fn pended_by_software(&mut self) {
-        if self.system.sleep & sleep::EVENT_ON_PENDING != 0 {
-            self.event = true;
+            self.pended();
         }
     }
 
@@ -217,7 +211,7 @@ impl Cpu {
                 self.nvic.clear_pending(number);
             } else if bit(set) && !self.nvic.is_pending(number) {
                 self.nvic.raise(number);
-                self.pended_by_software();
+                self.pended();
             }
         }
         if bit(31) {

@@ -1,6 +1,8 @@
 //! A board of plain RAM for the core to run on, and code given as half-words.
 #![allow(dead_code, reason = "each test file uses its part")]
 
+pub mod code;
+
 use vergence_cpu::{Access, Bus, BusFault, Cpu, Cycle, Lines, NEVER};
 
 pub const CODE_SIZE: usize = 0x10_0000;
