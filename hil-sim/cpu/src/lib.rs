@@ -16,6 +16,7 @@ mod faults;
 mod float;
 mod instruction;
 mod nvic;
+mod operation;
 mod private;
 mod registers;
 mod system;

@@ -74,6 +74,7 @@ pub const FORMS: &[Form] = forms![
     "vstmdb r5!, {{d0-d1}}",
     "vpush {{s0-s1}}\nvpop {{s2-s3}}",
     "vpush {{d0}}\nvpop {{d1}}",
+    "vldr d1, 1f\nb 2f\n.balign 4\n1: .word 0x3f9d70a4, 0x40490fdb\n2:",
     "vldr s0, 1f\nb 2f\n.balign 4\n1: .word 0x40490fdb\n2:",
     "vmov.f32 s0, s1\nvmov s2, r0\nvadd.f32 s3, s0, s2",
     "it mi\nvaddmi.f32 s0, s1, s2",

@@ -4,6 +4,8 @@ use crate::call::Form;
 use crate::forms;
 
 pub const FORMS: &[Form] = forms![
+    "push {{r1, r2}}\nldr r0, [sp, #4]\nldrb.w r3, [sp, #1]\nadd sp, #8",
+    "mov r12, sp\nldr sp, [r5]\nmov r0, sp\nmov sp, r12",
     "ldr r0, [r5, #4]",
     "str r0, [r5, #8]",
     "ldrb r0, [r5, #3]",
