@@ -6,7 +6,9 @@
 #![no_main]
 
 mod call;
+mod encodings;
 mod events;
+mod families;
 mod forms;
 mod operands;
 mod print;
@@ -14,6 +16,7 @@ mod scenarios;
 mod start;
 
 use call::{Context, Form};
+use encodings::Family;
 use operands::Operands;
 use print::Line;
 
@@ -21,6 +24,9 @@ use print::Line;
 const SETS: u32 = 256;
 /// FPSCR modes: four roundings, each with and without flush-to-zero, default NaN and alternative half precision.
 const MODES: u32 = 32;
+
+/// Draws from each family of encodings.
+const DRAWS: u32 = 4096;
 
 /// What `start` calls.
 pub fn main() {
@@ -32,6 +38,11 @@ pub fn main() {
     for form in forms::FLOAT {
         print_hash(form.text, float(form));
     }
+    for (list, float) in [(families::INTEGER, false), (families::FLOAT, true)] {
+        for family in list {
+            print_hash(family.name, drawn(family, float));
+        }
+    }
     scenarios::run();
     Line::new().text("END").print();
 }
@@ -41,13 +52,7 @@ fn integer(form: &Form) -> u32 {
     let mut hash = Hash::new();
     for _ in 0..SETS {
         let mut context = Context::new(form);
-        for register in &mut context.r[..5] {
-            *register = operands.integer();
-        }
-        context.apsr = operands.integer() & 0xf80f_0000;
-        for word in &mut context.scratch {
-            *word = operands.integer();
-        }
+        draw(&mut context, &mut operands, false);
         context.run();
         hash.context(&context);
     }
@@ -60,22 +65,35 @@ fn float(form: &Form) -> u32 {
     for mode in 0..MODES {
         for _ in 0..SETS {
             let mut context = Context::new(form);
-            for register in &mut context.s {
-                *register = operands.float();
-            }
-            for register in &mut context.r[..5] {
-                *register = operands.integer();
-            }
-            for word in &mut context.scratch {
-                *word = operands.float();
-            }
+            draw(&mut context, &mut operands, true);
             // Exceptions recorded before: what is set stays set.
-            context.fpscr = mode << 22 | operands.integer() & 0x9f;
+            context.fpscr = mode << 22 | operands.any() & 0x9f;
             context.run();
             hash.context(&context);
         }
     }
     hash.0
+}
+
+fn drawn(family: &Family, float: bool) -> u32 {
+    let mut operands = Operands::new();
+    let mut hash = Hash::new();
+    for _ in 0..DRAWS {
+        hash.context(&encodings::run(family, &mut operands, float));
+    }
+    hash.0
+}
+
+/// Operands for a form: words, flags and memory, or with `float` numbers in the S registers and in memory.
+fn draw(context: &mut Context, operands: &mut Operands, float: bool) {
+    context.r[..5].fill_with(|| operands.integer());
+    if float {
+        context.s.fill_with(|| operands.float());
+        context.scratch.fill_with(|| operands.float());
+    } else {
+        context.apsr = operands.integer() & 0xf80f_0000;
+        context.scratch.fill_with(|| operands.integer());
+    }
 }
 
 fn print_hash(text: &str, hash: u32) {

@@ -45,7 +45,8 @@ impl Operands {
         Self(0x2545_f491)
     }
 
-    fn next(&mut self) -> u32 {
+    /// Any word.
+    pub fn any(&mut self) -> u32 {
         self.0 ^= self.0 << 13;
         self.0 ^= self.0 >> 17;
         self.0 ^= self.0 << 5;
@@ -54,8 +55,8 @@ impl Operands {
 
     /// A word: one of the special values, a small number, or any.
     pub fn integer(&mut self) -> u32 {
-        let kind = self.next() >> 27 & 3;
-        let value = self.next();
+        let kind = self.any() >> 27 & 3;
+        let value = self.any();
         match kind {
             0 => INTEGERS[(value >> 8 & 7) as usize],
             1 => value & 0xff,
@@ -65,8 +66,8 @@ impl Operands {
 
     /// Bits of a single: one of the special values, a number of middling size, of any size, a denormal, or any bits.
     pub fn float(&mut self) -> u32 {
-        let kind = self.next() >> 27 & 7;
-        let value = self.next();
+        let kind = self.any() >> 27 & 7;
+        let value = self.any();
         let sign = value & 0x8000_0000;
         match kind {
             0 | 1 => FLOATS[(value >> 8 & 31) as usize],
