@@ -4,7 +4,7 @@ mod common;
 
 use common::{Board, boot};
 use proptest::prelude::*;
-use vergence_cpu::Cpu;
+use vergence_cpu::{Cpu, Cycle, Lines};
 
 /// Instruction streams in the fuzz.
 const STREAMS: u32 = 100_000;
@@ -28,16 +28,27 @@ fn state(cpu: &Cpu) -> (Vec<u32>, Vec<u32>, u32, u32, u64, u64) {
     )
 }
 
-/// Enables the FPU, gives every register something, then runs the stream.
+/// Changes of lines 0 to 7, soonest first.
+fn schedule() -> impl Strategy<Value = Vec<(Cycle, Lines)>> {
+    prop::collection::vec((0_u64..500, 0_u128..256), 0..6).prop_map(|mut changes| {
+        changes.sort_unstable();
+        changes
+    })
+}
+
+/// Enables the FPU and lines 0 to 7, gives every register something, then runs the stream. The handlers return.
 fn board(stream: &[u16]) -> Board {
     let prologue = [
+        common::code::write(common::code::ISER, 0xff),
         common::code::write(common::code::CPACR, 0xf << 20),
         (2..13)
             .flat_map(|register| common::code::constant(register, 0x2000_0100 + u32::from(register) * 0x44))
             .collect(),
     ]
     .concat();
-    Board::with_program(&[&prologue, stream].concat())
+    let mut board = Board::with_program(&[&prologue, stream].concat());
+    (16..24).for_each(|exception| board.handler(exception, &[common::code::RETURN]));
+    board
 }
 
 #[test]
@@ -71,9 +82,10 @@ fn any_code_runs_without_panic() {
 
 proptest! {
     #[test]
-    fn the_same_code_takes_the_same_cycles(stream in prop::collection::vec(half(), 1..40)) {
+    fn the_same_code_takes_the_same_cycles(stream in prop::collection::vec(half(), 1..40), lines in schedule()) {
         let run = || {
             let mut board = board(&stream);
+            board.schedule.clone_from(&lines);
             let mut cpu = boot(&mut board);
             let stop = cpu.run(&mut board, 2_000);
             (stop, state(&cpu), board.ram)
@@ -82,8 +94,13 @@ proptest! {
     }
 
     #[test]
-    fn where_a_run_is_split_does_not_matter(stream in prop::collection::vec(half(), 1..40), at in 1_u64..500) {
+    fn where_a_run_is_split_does_not_matter(
+        stream in prop::collection::vec(half(), 1..40),
+        lines in schedule(),
+        at in 1_u64..500,
+    ) {
         let mut board = board(&stream);
+        board.schedule = lines;
         let mut split = board.clone();
         let mut cpu = boot(&mut board);
         let stop = cpu.run(&mut board, 500);
