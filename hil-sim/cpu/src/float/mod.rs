@@ -114,7 +114,7 @@ impl Environment {
     }
 
     /// The host's result, where it is all there is to know. Host arithmetic on singles is IEEE 754 with rounding to
-    /// nearest; a normal result above the smallest can raise nothing but "inexact". So with that mode and that bit
+    /// nearest (Rust promises it on every host but 32-bit x86 without SSE2); a normal result above the smallest can raise nothing but "inexact". So with that mode and that bit
     /// already set (it stays set for the life of most programs) nothing is left to compute. NaNs, infinities,
     /// zeros and everything tiny take the long way.
     #[inline(always)]
