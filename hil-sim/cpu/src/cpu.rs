@@ -5,8 +5,8 @@ use crate::cache::Cache;
 use crate::decode;
 use crate::execute::Trap;
 use crate::instruction::{Instruction, Op};
-use crate::nvic::Nvic;
-use crate::system::System;
+use crate::nvic::{Nvic, exception};
+use crate::system::{System, sleep};
 use crate::systick::SysTick;
 
 /// Why [`Cpu::run`] came back.
@@ -233,7 +233,7 @@ impl Cpu {
         bus.advance(self.now);
         self.observe(bus);
         if self.systick.next_event() <= self.now && self.systick.advance(self.now) {
-            self.nvic.raise(crate::nvic::exception::SYSTEM_TICK);
+            self.nvic.raise(exception::SYSTEM_TICK);
             self.pended();
         }
         let version = bus.code_version();
@@ -251,7 +251,7 @@ impl Cpu {
 
     /// A new pending exception is an event where SCR.SEVONPEND says so.
     pub(crate) fn pended(&mut self) {
-        if self.system.sleep & crate::system::sleep::EVENT_ON_PENDING != 0 {
+        if self.system.sleep & sleep::EVENT_ON_PENDING != 0 {
             self.event = true;
         }
     }

@@ -3,7 +3,7 @@
 use super::Trap;
 use crate::bus::{Access, Bus};
 use crate::cpu::Cpu;
-use crate::float::{Environment, Integer, SIGN};
+use crate::float::{Environment, Integer, Rounding, SIGN};
 use crate::instruction::{Flags, Float, Instruction};
 
 /// Cortex-M4 TRM 3.3.3: cycles beyond the first.
@@ -198,7 +198,7 @@ fn convert(environment: &mut Environment, float: Float, i: &Instruction, d: u32,
     let fraction = i.immediate;
     let size = u32::from(i.a);
     let current = environment.rounding();
-    let rounding = if i.flags.has(Flags::VARIANT) { current } else { crate::float::Rounding::TowardZero };
+    let rounding = if i.flags.has(Flags::VARIANT) { current } else { Rounding::TowardZero };
     match float {
         Float::FromSigned => environment.integer_to_single(i64::from(m as i32), 0, current),
         Float::FromUnsigned => environment.integer_to_single(i64::from(m), 0, current),
@@ -211,7 +211,7 @@ fn convert(environment: &mut Environment, float: Float, i: &Instruction, d: u32,
                 (false, 16) => i64::from(d & 0xffff),
                 (false, _) => i64::from(d),
             };
-            environment.integer_to_single(value, fraction, crate::float::Rounding::Nearest)
+            environment.integer_to_single(value, fraction, Rounding::Nearest)
         }
         _ => {
             let signed = float == Float::ToSignedFixed;

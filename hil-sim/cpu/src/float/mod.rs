@@ -114,9 +114,9 @@ impl Environment {
     }
 
     /// The host's result, where it is all there is to know. Host arithmetic on singles is IEEE 754 with rounding to
-    /// nearest (Rust promises it on every host but 32-bit x86 without SSE2); a normal result above the smallest can raise nothing but "inexact". So with that mode and that bit
-    /// already set (it stays set for the life of most programs) nothing is left to compute. NaNs, infinities,
-    /// zeros and everything tiny take the long way.
+    /// nearest (Rust promises it on every host but 32-bit x86 without SSE2); a normal result above the smallest can
+    /// raise nothing but "inexact". So with that mode and that bit already set (it stays set for the life of most
+    /// programs) nothing is left to compute. NaNs, infinities, zeros and everything tiny take the long way.
     #[inline(always)]
     fn quick(&self, result: f32) -> Option<u32> {
         const MODES: u32 = 7 << 22;
