@@ -84,15 +84,19 @@ fn drawn(family: &Family, float: bool) -> u32 {
     hash.0
 }
 
-/// Operands for a form: words, flags and memory, or with `float` numbers in the S registers and in memory.
+/// Operands for a form: words and flags, or with `float` numbers in the S registers; any words in memory.
 fn draw(context: &mut Context, operands: &mut Operands, float: bool) {
     context.r[..5].fill_with(|| operands.integer());
     if float {
         context.s.fill_with(|| operands.float());
-        context.scratch.fill_with(|| operands.float());
     } else {
         context.apsr = operands.integer() & 0xf80f_0000;
-        context.scratch.fill_with(|| operands.integer());
+    }
+    // One draw makes them all: most forms leave memory alone.
+    let mut word = operands.any();
+    for place in &mut context.scratch {
+        word = word.wrapping_mul(0x9e37_79b1).rotate_left(7);
+        *place = word;
     }
 }
 
