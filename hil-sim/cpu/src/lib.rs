@@ -12,6 +12,7 @@ mod cpu;
 mod decode;
 mod exceptions;
 mod execute;
+mod fault_status;
 mod faults;
 mod float;
 mod instruction;
@@ -24,3 +25,4 @@ mod systick;
 
 pub use bus::{Access, Bus, BusFault, Cycle, Lines, NEVER};
 pub use cpu::{Cpu, Stop};
+pub use fault_status::FaultStatus;

@@ -97,6 +97,19 @@ fn a_stacked_handler_mode_contradicts_a_return_to_thread_mode() {
     assert_eq!(cpu.register(2), 1 << 18);
 }
 
+#[test]
+fn the_fault_status_says_what_happened() {
+    let mut board = Board::with_program(&read(0x7000_0000));
+    board.handler(HARD_FAULT, &[UNDEFINED]);
+    let mut cpu = boot(&mut board);
+    assert_eq!(cpu.fault_status().reasons().count(), 0);
+    assert_eq!(cpu.run(&mut board, NEVER), Stop::Lockup);
+    let status = cpu.fault_status();
+    let reasons: Vec<_> = status.reasons().collect();
+    let expected = ["data access that nothing answers", "undefined instruction", "fault escalated to HardFault"];
+    assert_eq!((reasons, status.bus_address), (expected.to_vec(), Some(0x7000_0000)));
+}
+
 /// `vmov s0, r5` with R5 = 77, then an interrupt of line 0, then `vmov r6, s0`.
 fn float_program(context_control: u32, handler: &[u16]) -> (Board, u32) {
     let program = [
