@@ -26,18 +26,17 @@ const FLOAT_STORE_CYCLES: u64 = 17;
 impl Cpu {
     /// The priority that a new exception has to beat (B1.5.4).
     pub(crate) fn execution_priority(&self) -> i32 {
-        let mask = if self.faultmask {
-            HARD_FAULT_PRIORITY
-        } else if self.primask {
-            0
-        } else {
-            self.base_priority()
-        };
+        let mask = if self.primask { self.mask_priority().min(0) } else { self.mask_priority() };
         mask.min(self.nvic.active_priority())
     }
 
-    fn base_priority(&self) -> i32 {
-        if self.basepri == 0 { THREAD_PRIORITY } else { self.nvic.group(self.basepri) }
+    /// The priority that FAULTMASK or BASEPRI raises to.
+    pub(crate) fn mask_priority(&self) -> i32 {
+        match (self.faultmask, self.basepri) {
+            (true, _) => HARD_FAULT_PRIORITY,
+            (false, 0) => THREAD_PRIORITY,
+            (false, priority) => self.nvic.group(priority),
+        }
     }
 
     /// Ends WFI and WFE when their condition holds; WFI wakes for what PRIMASK alone holds back (B1.5.18).
@@ -46,10 +45,12 @@ impl Cpu {
             Activity::Running | Activity::Halted => return,
             Activity::AwaitingEvent if std::mem::take(&mut self.event) => true,
             Activity::AwaitingEvent | Activity::AwaitingInterrupt => self.nvic.best_pending().is_some_and(|number| {
-                let masked = if self.faultmask { HARD_FAULT_PRIORITY } else { self.base_priority() };
-                let waits_for_event = self.activity == Activity::AwaitingEvent;
-                let floor = if waits_for_event && self.primask { masked.min(0) } else { masked };
-                self.nvic.priority(number) < floor.min(self.nvic.active_priority())
+                let floor = if self.activity == Activity::AwaitingEvent {
+                    self.execution_priority()
+                } else {
+                    self.mask_priority().min(self.nvic.active_priority())
+                };
+                self.nvic.priority(number) < floor
             }),
         };
         if awake {

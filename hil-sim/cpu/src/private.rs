@@ -191,10 +191,11 @@ impl Cpu {
         }
     }
 
-    /// ICSR (B3.2.4).
+    /// ICSR (B3.2.4). VECTPENDING leaves out what BASEPRI or FAULTMASK holds back, but not what PRIMASK does.
     fn interrupt_control(&self) -> u32 {
         let flag = |set: bool, bit: u32| u32::from(set) << bit;
-        let pending = u32::from(self.nvic.best_pending().unwrap_or(0));
+        let unmasked = |&number: &u16| self.nvic.priority(number) < self.mask_priority();
+        let pending = u32::from(self.nvic.best_pending().filter(unmasked).unwrap_or(0));
         flag(self.nvic.is_pending(exception::NMI), 31)
             | flag(self.nvic.is_pending(exception::PENDABLE), 28)
             | flag(self.nvic.is_pending(exception::SYSTEM_TICK), 26)

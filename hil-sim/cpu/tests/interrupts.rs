@@ -3,8 +3,8 @@
 mod common;
 
 use common::code::{
-    BREAKPOINT, CPSID_I, CPSIE_I, FOREVER, IPR, ISER, ISPR, NOP, RETURN, STK_CTRL, STK_LOAD, STK_VAL, WFI, constant,
-    read, trace, write,
+    BREAKPOINT, CPSID_I, CPSIE_I, FOREVER, ICSR, IPR, ISER, ISPR, NOP, RETURN, STK_CTRL, STK_LOAD, STK_VAL, WFI,
+    constant, read, trace, write,
 };
 use common::{Board, LINES_REGISTER, boot};
 use vergence_cpu::{Cpu, NEVER, Stop};
@@ -136,6 +136,25 @@ fn a_masked_line_wakes_from_wfi_without_being_taken() {
     assert_eq!(traced(&cpu), 0);
     // Sleep is one jump of the clock.
     assert!(cpu.now() >= 1_000_000 && cpu.now() < 1_000_010 && cpu.instructions() < 20);
+}
+
+#[test]
+fn basepri_hides_what_it_holds_back_and_wfi_sleeps_through_it() {
+    // msr BASEPRI, r1
+    let mask = [constant(1, 0x40), vec![0xf381, 0x8811]].concat();
+    let pend = [write(IPR, 0x8020), write(ISER, 3), mask, write(ISPR, 2)].concat();
+    let mut board = Board::with_program(&[pend.clone(), read(ICSR), vec![BREAKPOINT]].concat());
+    let mut cpu = boot(&mut board);
+    assert_eq!(cpu.run(&mut board, NEVER), Stop::Breakpoint(0));
+    assert_eq!(cpu.register(2) >> 12 & 0x1ff, 0);
+    // Line 1 (0x80) is held back and does not wake; line 0 (0x20) does.
+    let mut board = Board::with_program(&[pend, vec![WFI, BREAKPOINT]].concat());
+    board.handler(16, &trace(1));
+    board.schedule = vec![(5_000, 1), (5_001, 0)];
+    let mut cpu = boot(&mut board);
+    assert_eq!(cpu.run(&mut board, NEVER), Stop::Breakpoint(0));
+    assert!(cpu.now() > 5_000);
+    assert_eq!(traced(&cpu), 1);
 }
 
 #[test]
