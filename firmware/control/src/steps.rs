@@ -93,9 +93,9 @@ impl Rise {
         for _ in 0..MOST_ROUNDS {
             let left = height - t * (v + t * (a / 2.0 + t * j / 6.0));
             if left > 0.0 {
-                low = t
+                low = t;
             } else {
-                high = t
+                high = t;
             }
             let slope = v + t * (a + t * j / 2.0);
             let next = t + left / slope;
