@@ -10,7 +10,7 @@ use vergence_protocol::{ControllerState, Request, Status, StopKind};
 
 const FINE: f64 = (1 << FINE_BITS) as f64;
 /// What rounding of a position in single precision within a tick may hide of a mark, in steps.
-const ROUNDING: f64 = 1e-4;
+const ROUNDING: f64 = 1e-5;
 
 /// The trajectories that the first axis should run, each from its instant on.
 struct Ideal {
@@ -28,6 +28,12 @@ impl Ideal {
 
     fn position(&self, us: u64) -> f64 {
         self.state(us).position as f64 / FINE
+    }
+
+    /// The position at a nanosecond, between those at the microseconds.
+    fn between(&self, ns: u64) -> f64 {
+        let (us, rest) = (ns / 1_000, (ns % 1_000) as f64 * 1e-3);
+        self.position(us) * (1.0 - rest) + self.position(us + 1) * rest
     }
 
     /// Goes on to another trajectory from the instant at which the next order begins.
@@ -52,8 +58,7 @@ fn check(ideal: &Ideal, world: &World, axis: &AxisSettings) {
     for (index, &(ns, forward)) in world.rig.axes[0].log.iter().enumerate() {
         let (sign, middle) = if forward { (1.0, step + 0.5) } else { (-1.0, step - 0.5) };
         step += sign;
-        let (early, late) = ((ns - 1_000).div_ceil(1_000), (ns + 1_000) / 1_000);
-        let [before, after] = [early, late].map(|us| sign * (ideal.position(us) / length - middle));
+        let [before, after] = [ns - 1_000, ns + 1_000].map(|ns| sign * (ideal.between(ns) / length - middle));
         let on_time = before <= ROUNDING && after >= -ROUNDING;
         assert!(on_time || ideal.turns_round(ns / 1_000), "step {index} at {ns} ns: {before} to {after}");
         let gap = index.checked_sub(1).map_or(f64::INFINITY, |last| (ns - world.rig.axes[0].log[last].0) as f64);
