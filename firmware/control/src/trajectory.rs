@@ -161,7 +161,7 @@ impl Trajectory {
     #[must_use]
     pub fn ends(&self) -> Microseconds {
         let (whole, rest) = (self.duration >> 32, self.duration & 0xffff_ffff);
-        Microseconds((whole * 1_000_000 + (rest * 1_000_000 >> 32) + 1) as u64)
+        Microseconds((whole * 1_000_000 + ((rest * 1_000_000) >> 32) + 1) as u64)
     }
 
     /// Where it comes to rest.

@@ -14,6 +14,8 @@ pub struct Plant {
     now: Microseconds,
     drivers_on: bool,
     emergency_stop: bool,
+    /// The axis whose home switch is wired to each input.
+    home_wires: Vec<usize>,
     /// When the cameras are to be fired.
     trigger_at: Option<Microseconds>,
     trigger_edges: VecDeque<TriggerEdge>,
@@ -23,8 +25,10 @@ impl Plant {
     /// Axes standing at `positions` (micro-units), drivers off.
     #[must_use]
     pub fn new(mechanics: &[AxisMechanics], positions: &[f64]) -> Self {
-        let axes = mechanics.iter().zip(positions).map(|(&axis, &position)| AxisPlant::new(axis, position)).collect();
+        let axes: Vec<_> =
+            mechanics.iter().zip(positions).map(|(&axis, &position)| AxisPlant::new(axis, position)).collect();
         Self {
+            home_wires: (0..axes.len()).collect(),
             axes,
             now: Microseconds(0),
             drivers_on: false,
@@ -44,6 +48,19 @@ impl Plant {
     #[must_use]
     pub fn load(&self, axis: usize) -> Option<f64> {
         self.axes.get(axis).map(AxisPlant::load)
+    }
+
+    /// Where the stage of `axis` truly is, in micro-units: behind the load by the play between them.
+    #[must_use]
+    pub fn stage(&self, axis: usize) -> Option<f64> {
+        self.axes.get(axis).map(AxisPlant::stage)
+    }
+
+    /// The wires of two home switches change places. There is no effect where there is no such axis.
+    pub fn cross_home_switches(&mut self, one: usize, other: usize) {
+        if one.max(other) < self.home_wires.len() {
+            self.home_wires.swap(one, other);
+        }
     }
 
     /// One axis, for doing something to it; `None` where there is no such axis.
@@ -130,7 +147,8 @@ impl RigIo for Plant {
     }
 
     fn home_switch(&self, axis: usize) -> bool {
-        self.axes.get(axis).is_some_and(AxisPlant::home_switch)
+        let switch = self.home_wires.get(axis).and_then(|&wired| self.axes.get(wired));
+        switch.is_some_and(AxisPlant::home_switch)
     }
 
     fn hard_limit(&self, axis: usize) -> bool {
