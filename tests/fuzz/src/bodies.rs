@@ -2,13 +2,13 @@
 
 use serde::ser::{Serialize, SerializeTuple, Serializer};
 use vergence_control::{BoardSettings, settings_store};
-use vergence_plant::{NativeBoard, RamFlash, bench_mechanics, bench_settings};
+use vergence_plant::{NATIVE_HARDWARE, NativeBoard, RamFlash, bench_mechanics, bench_settings};
 use vergence_protocol::frame::{Header, Kind, MAX_BODY, checksum, encode};
 use vergence_protocol::management::{CHUNK, ImageHeader, Management, ManagementReport, Signature};
 use vergence_protocol::update::Upload;
 use vergence_protocol::{
-    HostEvent, HostSession, MAX_FRAME, Microseconds, PROTOCOL, Receiver, Report, Request, SessionId, StopKind,
-    schema_hash,
+    AxisMask, HostEvent, HostSession, MAX_FRAME, Microseconds, PROTOCOL, Receiver, Report, Request, SessionId,
+    StopKind, schema_hash,
 };
 
 /// More frames than either end can owe at any time.
@@ -30,6 +30,13 @@ impl<'a> Script<'a> {
         let (bytes, rest) = self.0.split_at(length);
         self.0 = rest;
         bytes
+    }
+
+    /// The message that the next bytes are, where they are one.
+    fn message<M: serde::Deserialize<'a>>(&mut self) -> Option<M> {
+        let (message, rest) = postcard::take_from_bytes(self.0).ok()?;
+        self.0 = rest;
+        Some(message)
     }
 
     fn is_over(&self) -> bool {
@@ -153,48 +160,82 @@ pub fn board_node(data: &[u8]) {
     let Ok(mut board) = NativeBoard::new(&bench_settings(), &bench_mechanics(), data.len() as u64) else { return };
     board.services_mut().image = RamFlash::new(2);
     board.services_mut().verifier = |_, signature| signature.r[0] == 1;
-    let (mut open, mut seq) = (0, 0_u8);
+    let mut host = BoardUser { board, open: 0, seq: 0 };
+    if script.byte() < 200 {
+        host.hello(1, schema_hash());
+    }
     while !script.is_over() {
-        match script.byte() % 12 {
-            0 => board.receive(script.bytes(255)),
-            1 => board.receive(&any_frame(&mut script)),
-            2 => {
-                let session = u32::from(script.byte() % 4);
-                if session != open && session != 0 {
-                    (open, seq) = (session, 0);
-                }
-                let schema = schema_hash() ^ u64::from(script.byte() % 16 == 15);
-                let hello = Request::Hello { protocol: PROTOCOL, schema, session: SessionId(session) };
-                board.receive(&framed(Kind::Immediate, 0, 0, PROTOCOL.major, &hello));
-            }
-            3 => {
-                let beat = Request::Heartbeat { session: SessionId(u32::from(script.byte() % 4)), lease_ms: 1_000 };
-                board.receive(&framed(Kind::Immediate, 0, 0, PROTOCOL.major, &beat));
-            }
+        match script.byte() % 16 {
+            0 => host.board.receive(script.bytes(255)),
+            1 => host.board.receive(&any_frame(&mut script)),
+            2 => host.hello(script.byte() % 4, schema_hash() ^ u64::from(script.byte() % 16 == 15)),
+            3 => host.board.log(script.bytes(255)),
             4 => {
-                let to = board.now().0 + 100 * u64::from(script.byte());
-                board.advance(Microseconds(to));
-            }
-            5 => {
                 let body = script.bytes(MAX_BODY);
-                board.receive(&framed(Kind::Firmware, script.byte(), 0, PROTOCOL.major, &Raw(body)));
+                host.ask(&Raw(body));
             }
-            6 => board.log(script.bytes(255)),
-            7 => {
-                let arm = Request::Arm { session: SessionId(u32::from(script.byte() % 4)) };
-                board.receive(&framed(Kind::Control, seq, 0, PROTOCOL.major, &arm));
-                seq = seq.wrapping_add(1);
+            5 => host.manage(&Management::Begin(ImageHeader {
+                hardware: NATIVE_HARDWARE,
+                length: u32::from(script.byte()) << (script.byte() % 6),
+                ..ImageHeader::default()
+            })),
+            6 | 7 => {
+                if let Some(request) = script.message::<Management>() {
+                    host.manage(&request);
+                }
             }
-            // Requests in order, all kinds of them.
+            8 | 9 => {
+                let to = host.board.now().0 + (u64::from(script.byte()) << (script.byte() % 12));
+                host.board.advance(Microseconds(to));
+            }
+            10 => host.beat(),
+            11 => host.ask(&Request::Arm { session: SessionId(host.open) }),
+            12 => {
+                host.beat();
+                host.ask(&Request::Arm { session: SessionId(host.open) });
+                host.ask(&Request::Home { axes: AxisMask(script.byte()) });
+            }
             _ => {
-                let body = script.bytes(MAX_BODY);
-                board.receive(&framed(Kind::Control, seq, 0, PROTOCOL.major, &Raw(body)));
-                seq = seq.wrapping_add(1);
+                if let Some(request) = script.message::<Request>() {
+                    host.ask(&request);
+                }
             }
         }
-        check_frames(&board.transmit());
+        check_frames(&host.board.transmit());
     }
-    let _ = board.take_reboot();
+    let _ = host.board.take_reboot();
+}
+
+/// A host of sorts: it keeps count, so that the board hears it.
+struct BoardUser {
+    board: NativeBoard,
+    open: u32,
+    seq: u8,
+}
+
+impl BoardUser {
+    fn hello(&mut self, session: u8, schema: u64) {
+        let session = u32::from(session);
+        if session != self.open && session != 0 {
+            (self.open, self.seq) = (session, 0);
+        }
+        let hello = Request::Hello { protocol: PROTOCOL, schema, session: SessionId(session) };
+        self.board.receive(&framed(Kind::Immediate, 0, 0, PROTOCOL.major, &hello));
+    }
+
+    fn beat(&mut self) {
+        let beat = Request::Heartbeat { session: SessionId(self.open), lease_ms: 1_000 };
+        self.board.receive(&framed(Kind::Immediate, 0, 0, PROTOCOL.major, &beat));
+    }
+
+    fn ask(&mut self, request: &impl Serialize) {
+        self.board.receive(&framed(Kind::Control, self.seq, 0, PROTOCOL.major, request));
+        self.seq = self.seq.wrapping_add(1);
+    }
+
+    fn manage(&mut self, request: &Management) {
+        self.board.receive(&framed(Kind::Firmware, 0, 0, PROTOCOL.major, request));
+    }
 }
 
 /// What a board sends is whole and has an end.
