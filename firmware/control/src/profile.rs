@@ -128,6 +128,11 @@ impl Profile {
         self.end
     }
 
+    /// The segments in order, as duration in seconds and jerk in micro-units per second cubed; empty ones are left out.
+    pub fn segments(&self) -> impl Iterator<Item = (f32, f32)> + '_ {
+        self.segments.iter().filter(|segment| segment.duration > 0.0).map(|segment| (segment.duration, segment.jerk))
+    }
+
     /// The state `time` seconds after the start; at rest at the exact end from the duration on.
     #[must_use]
     pub fn at(&self, time: f32) -> MotionState {
