@@ -21,6 +21,7 @@ const VERBS: &[&str] = &[
     "home",
     "mode",
     "move",
+    "plan",
     "stop",
     "monitor",
     "sim",
@@ -122,6 +123,29 @@ fn an_in_process_board_homes_and_moves_without_waiting() {
     let home = run_json(&["--port", "sim", "home", "--json"]);
     assert_eq!(home["referenced"], serde_json::json!([true, true]));
     fails_with(&["--port", "sim", "mode", "human"], 3, &["no reference", "vergence home"]);
+}
+
+#[test]
+fn a_plan_is_a_text_that_can_be_compared() {
+    let dump = || text(&run(&["plan", "herbivore", "--dump"]).stdout);
+    let plan = dump();
+    assert_eq!(plan, dump());
+    for line in [
+        "baseline    60.000 mm -> 145.000 mm, at most 45.455 mm/s",
+        "takes 2.310 s within the limits of native-sim",
+        "     0.00000      60.0000       0.0000        0.000       1467.4",
+        "     2.31000     145.0000       0.0000        0.000          0.0",
+        "     0.31000       9.3000      60.0000        0.000          0.0",
+    ] {
+        assert!(plan.lines().any(|it| it.ends_with(line)), "'{line}' is not in\n{plan}");
+    }
+    // An axis that stays has no segments, and the zones are those of the goal.
+    let turn = run_json(&["plan", "herbivore", "--from", "human", "--json"]);
+    assert_eq!(turn["axes"][0]["segments"], serde_json::json!([]));
+    assert_eq!(turn["zones_deg"]["stereo"].as_f64().map(f64::round), Some(57.0));
+    fails_with(&["plan"], 2, &["MODE"]);
+    fails_with(&["plan", "--baseline", "500mm"], 2, &["500", "220"]);
+    fails_with(&["plan", "human", "--from", "gecko"], 2, &["gecko", "herbivore"]);
 }
 
 #[test]

@@ -21,6 +21,7 @@ pub struct Board {
     client: Client,
     rig: Rig,
     info: BoardInfo,
+    axes: Vec<AxisInfo>,
     pose: PoseReport,
     lease_ms: u16,
     moves: u16,
@@ -49,14 +50,14 @@ impl Board {
         let Report::Info { info, .. } = client.ask(Request::GetInfo).await? else {
             return Err(Failure::protocol("the board answered a question about itself with something else"));
         };
-        let mut board = Self { client, rig, info, pose: empty_pose(), lease_ms, moves: 0, progress };
+        let mut board = Self { client, rig, info, axes: Vec::new(), pose: empty_pose(), lease_ms, moves: 0, progress };
         board.check_axes().await?;
         board.ask(Request::SetStream { period_us: STREAM_PERIOD_US }).await?;
         board.next_pose().await?;
         Ok(board)
     }
 
-    async fn check_axes(&self) -> Result<(), Failure> {
+    async fn check_axes(&mut self) -> Result<(), Failure> {
         let (ours, theirs) = (self.rig.axes.len(), usize::from(self.info.axes));
         if ours != theirs {
             return Err(Failure::usage(format!(
@@ -65,9 +66,11 @@ impl Board {
             )));
         }
         for (axis, index) in self.rig.axes.iter().zip(0u8..) {
-            if let Some(contradiction) = axis.contradiction(&self.axis_info(index).await?) {
+            let info = self.axis_info(index).await?;
+            if let Some(contradiction) = axis.contradiction(&info) {
                 return Err(Failure::usage(format!("{contradiction}: name the right rig file with --rig")));
             }
+            self.axes.push(info);
         }
         Ok(())
     }
@@ -83,6 +86,12 @@ impl Board {
     #[must_use]
     pub fn info(&self) -> &BoardInfo {
         &self.info
+    }
+
+    /// What the board said of each axis.
+    #[must_use]
+    pub fn axes(&self) -> &[AxisInfo] {
+        &self.axes
     }
 
     /// The rig.

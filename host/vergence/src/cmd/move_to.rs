@@ -62,6 +62,17 @@ impl StagePose {
     }
 }
 
+/// The mode that the rig file names `name`.
+///
+/// # Errors
+/// Names the modes there are.
+pub fn named_mode<'a>(rig: &'a Rig, name: &str) -> Result<&'a vergence_rig::Mode, Failure> {
+    rig.mode(name).ok_or_else(|| {
+        let names: Vec<_> = rig.modes.iter().map(|mode| mode.name.as_str()).collect();
+        Failure::usage(format!("rig '{}' has no mode '{name}': choose {}", rig.name, names.join(" or ")))
+    })
+}
+
 /// Where to go.
 pub struct Goal {
     /// The mode's number, or zero.

@@ -8,9 +8,7 @@ use vergence_matching::GuidedMatcher;
 use vergence_protocol::Microseconds;
 use vergence_rig::{Rig, RigPose, TrackGap};
 use vergence_scene::{Optics, Scene};
-use vergence_vision::{
-    Angle, Base, KannalaBrandt, Left, Length, Pixel, PlanarCamera, Transform, World, Zones, zones_exact,
-};
+use vergence_vision::{Base, KannalaBrandt, Left, Length, Pixel, Transform, World, Zones};
 
 use super::score::{Score, score};
 use crate::board::Board;
@@ -18,11 +16,9 @@ use crate::camera::{Camera, Eye, SimulatedCamera, Stage};
 use crate::failure::Failure;
 use crate::link::HostClock;
 use crate::look::{Eyes, Look, look};
+use crate::rig_zones::rig_zones;
 use crate::sim::SharedRig;
 use crate::stopwatch::Stopwatch;
-
-/// The zones are told on the circle of the paper's precision bench.
-pub const ZONE_RADIUS: Length = Length::from_mm(350.0);
 
 /// The two simulated cameras in their room.
 pub struct SimulatedEyes {
@@ -94,7 +90,7 @@ impl SimulatedEyes {
         let look = look(eyes, rig, &pose, &GuidedMatcher::default())
             .map_err(|error| Failure::device(format!("the simulated images cannot be matched: {error}")))?;
         let mut view = View {
-            zones: zones(rig, &pose)?,
+            zones: rig_zones(rig, &pose)?,
             pose,
             look,
             score: Score::default(),
@@ -150,24 +146,4 @@ async fn pose_at(board: &mut Board, exposed_at: Microseconds) -> Result<RigPose,
             }
         }
     }
-}
-
-/// The zones in the horizontal plane around the middle of both cameras.
-fn zones(rig: &Rig, pose: &RigPose) -> Result<Zones, Failure> {
-    let base_from_right = pose.base_from_left * pose.left_from_right;
-    let centres = [pose.base_from_left.origin().mm(), base_from_right.origin().mm()];
-    let axes = [pose.base_from_left.rotation(), base_from_right.rotation()].map(|r| r * Vector3::z());
-    let middle = (centres[0] + centres[1]) / 2.0;
-    let half_fields = [rig.left_camera.theta_max(), rig.right_camera.theta_max()];
-    let camera = |index: usize| {
-        let (centre, axis) = (centres[index] - middle, axes[index]);
-        PlanarCamera {
-            centre_mm: [centre.x, centre.z],
-            axis: Angle::from_rad(axis.x.atan2(axis.z)),
-            half_field: half_fields[index],
-        }
-    };
-    let map = zones_exact([camera(0), camera(1)], ZONE_RADIUS)
-        .map_err(|error| Failure::check(format!("the zones of this pose: {error}")))?;
-    Ok(map.zones)
 }
