@@ -15,7 +15,7 @@ use std::time::Duration;
 
 use common::{Simulator, fails_with, text};
 use vergence_protocol::frame::{Header, Kind, encode};
-use vergence_protocol::{MAX_FRAME, ProtocolVersion, Receiver, Report, Request, schema_hash};
+use vergence_protocol::{MAX_FRAME, PROTOCOL, ProtocolVersion, Receiver, Report, Request, schema_hash};
 
 #[allow(clippy::disallowed_methods, reason = "the stories run against a simulator in real time")]
 fn wait(seconds: f64) {
@@ -54,6 +54,9 @@ fn verbs_follow_each_other_over_a_pty() {
     assert_eq!(after["referenced"], serde_json::json!([true, true]));
     let lines = simulator.run(&["monitor", "--count", "5"]);
     assert_eq!(text(&lines.stdout).lines().count(), 5);
+    let clock = &after["clock"];
+    assert_eq!(clock["lost"], false);
+    assert!(clock["sigma_us"].as_f64().is_some_and(|sigma| sigma > 0.0), "{clock}");
     assert!(simulator.run(&["arm", "--for", "200ms"]).status.success());
     assert!(simulator.run(&["disarm"]).status.success());
 }
@@ -109,7 +112,7 @@ fn stop_works_while_another_vergence_holds_the_port() {
 fn a_board_that_vanishes_is_told_clearly() {
     for kind in [&["--pty"][..], &["--tcp", "127.0.0.1:0"]] {
         let mut simulator = Simulator::start(kind);
-        let mut watcher = simulator.command(&["monitor"]);
+        let mut watcher = simulator.command(&["monitor", "--no-reconnect"]);
         let watcher = watcher.stdout(std::process::Stdio::null()).stderr(std::process::Stdio::piped());
         let watcher = watcher.spawn().expect("the binary runs");
         wait(0.5);
@@ -120,6 +123,52 @@ fn a_board_that_vanishes_is_told_clearly() {
         let port = simulator.port.clone();
         fails_with(&["--port", &port, "status"], 3, &[&port]);
     }
+}
+
+/// A simulator at the port of one that has just been killed, as a board that was plugged in again.
+fn restarted(killed: &Simulator) -> Simulator {
+    let address = killed.port.strip_prefix("tcp:").expect("a TCP port");
+    Simulator::start(&["--tcp", address])
+}
+
+#[test]
+fn a_monitor_outlives_its_board() {
+    let mut simulator = Simulator::start(&["--tcp", "127.0.0.1:0"]);
+    let mut watcher = simulator.command(&["monitor", "--json", "--for", "8s"]);
+    let watcher = watcher.stdout(std::process::Stdio::piped()).stderr(std::process::Stdio::piped());
+    let watcher = watcher.spawn().expect("the binary runs");
+    wait(0.5);
+    simulator.kill();
+    wait(0.5);
+    let _again = restarted(&simulator);
+    let ended = watcher.wait_with_output().expect("it ends");
+    let said = text(&ended.stderr);
+    assert!(ended.status.success(), "{said}");
+    assert!(said.contains("the link closed") && said.contains("trying") && said.contains("connected again"), "{said}");
+    let times: Vec<u64> = text(&ended.stdout)
+        .lines()
+        .map(|line| {
+            serde_json::from_str::<serde_json::Value>(line).expect("JSON")["board_us"].as_u64().expect("a time")
+        })
+        .collect();
+    let restarts = times.windows(2).filter(|pair| pair[1] < pair[0]).count();
+    assert_eq!(restarts, 1, "poses of the first board, then poses of the second");
+}
+
+#[test]
+fn a_board_that_comes_back_is_not_armed_again() {
+    let mut simulator = Simulator::start(&["--tcp", "127.0.0.1:0"]);
+    let mut holder = simulator.command(&["arm"]);
+    let holder = holder.stdout(std::process::Stdio::piped()).stderr(std::process::Stdio::piped());
+    let holder = holder.spawn().expect("the binary runs");
+    wait(0.5);
+    simulator.kill();
+    let again = restarted(&simulator);
+    let ended = holder.wait_with_output().expect("it ends");
+    assert_eq!(ended.status.code(), Some(3));
+    assert!(text(&ended.stdout).starts_with("armed"), "{}", text(&ended.stdout));
+    assert!(text(&ended.stderr).contains("nothing was armed again"), "{}", text(&ended.stderr));
+    assert_eq!(again.json(&["status"])["state"], "idle");
 }
 
 /// Something on a TCP port that is no board; serves one host.
@@ -180,6 +229,7 @@ fn a_board_of_another_protocol_version_is_refused_with_4() {
             }
         }
     });
-    fails_with(&["--port", &port, "home"], 4, &["9.1", "1.0", "update"]);
+    let ours = format!("{}.{}", PROTOCOL.major, PROTOCOL.minor);
+    fails_with(&["--port", &port, "home"], 4, &["9.1", &ours, "update"]);
     server.join().expect("the host closed the link");
 }

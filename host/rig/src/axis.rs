@@ -48,6 +48,15 @@ impl AxisPosition {
         matches!((self, kind), (Self::Linear(_), AxisKind::Linear) | (Self::Rotary(_), AxisKind::Rotary))
     }
 
+    /// The sum with `other` of the same kind.
+    #[must_use]
+    pub fn plus(self, other: Self) -> Self {
+        match self {
+            Self::Linear(length) => Self::Linear(Length::from_mm(length.mm() + other.value())),
+            Self::Rotary(angle) => Self::Rotary(Angle::from_rad(angle.rad() + other.value())),
+        }
+    }
+
     /// The difference to `other` of the same kind.
     #[must_use]
     pub fn minus(self, other: Self) -> Self {

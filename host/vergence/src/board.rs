@@ -5,10 +5,10 @@ use std::time::Duration;
 use indicatif::ProgressBar;
 use tokio::time::timeout;
 use vergence_protocol::{
-    AxisInfo, AxisMask, BoardInfo, Compatibility, ControllerState, FaultRecord, Mode, Move, MoveId, MovePhase,
+    AxisInfo, AxisMask, BoardInfo, Compatibility, ControllerState, FaultRecord, Jog, Mode, Move, MoveId, MovePhase,
     Permille, PoseReport, Refusal, Report, Request, SessionId, Status, StopKind,
 };
-use vergence_rig::{AxisPosition, Rig};
+use vergence_rig::{AxisPosition, HostInstant, Rig};
 
 use crate::failure::Failure;
 use crate::link::{Client, LinkError, STREAM_PERIOD_US};
@@ -30,7 +30,10 @@ pub struct Board {
 
 impl From<LinkError> for Failure {
     fn from(error: LinkError) -> Self {
-        Self::device(error.to_string())
+        match error {
+            LinkError::Unsendable(_) => Self::device(error.to_string()),
+            _ => Self::link(error.to_string()),
+        }
     }
 }
 
@@ -118,6 +121,27 @@ impl Board {
         positions(&self.rig, &self.pose)
     }
 
+    /// When the latest pose was, on the host's clock; `None` before the first clock exchange.
+    #[must_use]
+    pub fn pose_on_host_clock(&self) -> Option<HostInstant> {
+        self.client.clock_map().host_at(self.pose.at)
+    }
+
+    /// Waits until the clocks have been compared.
+    ///
+    /// # Errors
+    /// Where the link ended.
+    pub async fn compare_clocks(&mut self) -> Result<(), Failure> {
+        const PATIENCE: Duration = Duration::from_secs(1);
+        let compared = async {
+            while self.pose_on_host_clock().is_none() {
+                self.next_pose().await?;
+            }
+            Ok(())
+        };
+        timeout(PATIENCE, compared).await.unwrap_or(Ok(()))
+    }
+
     /// Waits for a pose.
     ///
     /// # Errors
@@ -199,11 +223,29 @@ impl Board {
     /// A target out of range, the fault that ended the move, a refusal, or a stop.
     pub async fn move_to(&mut self, mode: Mode, targets: &[AxisPosition]) -> Result<(), Failure> {
         check_range(&self.rig, targets)?;
-        // Random sessions make these unique; zero means "no move yet".
-        self.moves = self.moves.wrapping_add(1).max(1);
-        let id = MoveId(self.moves);
-        let targets = self.rig.wire_targets(targets);
+        let (id, targets) = (self.next_move(), self.rig.wire_targets(targets));
         self.ask(Request::MoveTo(Move { id, mode, targets, speed: Permille::FULL })).await?;
+        self.wait_for_move(id).await
+    }
+
+    /// Moves all axes by a distance from where they stand, and waits until the encoders confirm it. Works without
+    /// reference, at homing speed. The board must be armed.
+    ///
+    /// # Errors
+    /// The fault that ended the move, a refusal, or a stop.
+    pub async fn move_by(&mut self, distances: &[AxisPosition]) -> Result<(), Failure> {
+        let (id, by) = (self.next_move(), self.rig.wire_targets(distances));
+        self.ask(Request::Jog(Jog { id, by, speed: Permille::FULL })).await?;
+        self.wait_for_move(id).await
+    }
+
+    /// Random sessions make these unique; zero means "no move yet".
+    fn next_move(&mut self) -> MoveId {
+        self.moves = self.moves.wrapping_add(1).max(1);
+        MoveId(self.moves)
+    }
+
+    async fn wait_for_move(&mut self, id: MoveId) -> Result<(), Failure> {
         self.wait_until(|pose| pose.move_id == id && matches!(pose.phase, MovePhase::Settled | MovePhase::Stopped))
             .await?;
         if self.pose.phase == MovePhase::Stopped {

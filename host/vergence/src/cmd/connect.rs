@@ -1,5 +1,6 @@
 //! From the command line's options to a connected board.
 
+use indicatif::ProgressBar;
 use vergence_rig::Rig;
 
 use crate::board::{Board, fresh_session};
@@ -18,13 +19,21 @@ const SIM_SEED: u64 = 1;
 /// # Errors
 /// No board, a board of another protocol or rig, a bad rig file.
 pub async fn connect(globals: &Globals, console: Console, what: &str) -> Result<Board, Failure> {
+    connect_with(globals, console.progress(what)).await
+}
+
+/// The same, with another sign of progress.
+///
+/// # Errors
+/// As of [`connect`].
+pub async fn connect_with(globals: &Globals, progress: ProgressBar) -> Result<Board, Failure> {
     let rig = rig_file::load(globals.rig.as_deref())?;
     let port = port(globals)?;
     let wire = wire(&port, globals.baud, &rig).await?;
     let client = Client::connect(wire, fresh_session()?, HostClock::start())
         .await
         .map_err(|error| Failure::device(format!("{port}: {error}")))?;
-    Board::new(client, rig, globals.lease, console.progress(what)).await
+    Board::new(client, rig, globals.lease, progress).await
 }
 
 /// The port that the options name, or the only one there is.

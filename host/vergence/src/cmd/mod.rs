@@ -2,6 +2,7 @@
 
 mod board_options;
 mod connect;
+mod reconnect;
 mod report;
 
 pub mod arm;

@@ -1,11 +1,11 @@
 //! `vergence plan`: a move before it is made.
 
 use serde_json::{Value, json};
-use vergence_protocol::{AxisKind, AxisMask};
+use vergence_protocol::AxisKind;
 use vergence_rig::{AxisPosition, Rig, RigAxis};
 
 use super::connect::connect;
-use super::move_to::{StagePose, named_mode};
+use super::move_to::{StagePose, is_referenced, named_mode};
 use super::report::{axes_json, rounded};
 use super::zones::in_degrees;
 use crate::board::{Board, check_range};
@@ -72,7 +72,7 @@ pub async fn run(args: &Args, globals: &Globals, console: Console) -> Result<(),
 
 fn standing(board: &Board) -> Vec<AxisPosition> {
     let rig = board.rig();
-    if board.pose().referenced == AxisMask::first(rig.axes.len()) {
+    if is_referenced(board) {
         return board.positions();
     }
     rig.axes.iter().map(|axis| axis.range[0]).collect()

@@ -3,7 +3,7 @@
 use serde_json::json;
 
 use super::connect::connect;
-use super::report::{pose_json, say_pose};
+use super::report::{clock_json, describe_clock, pose_json, say_pose};
 use crate::cli::Globals;
 use crate::console::Console;
 use crate::failure::Failure;
@@ -13,7 +13,8 @@ use crate::failure::Failure;
 pub struct Args {}
 
 pub async fn run(_: &Args, globals: &Globals, console: Console) -> Result<(), Failure> {
-    let board = connect(globals, console, "status").await?;
+    let mut board = connect(globals, console, "status").await?;
+    board.compare_clocks().await?;
     let info = board.info();
     let [major, minor, patch] = info.firmware;
     if console.is_json() {
@@ -21,8 +22,10 @@ pub async fn run(_: &Args, globals: &Globals, console: Console) -> Result<(), Fa
         status["board"] = json!(info.board.as_str());
         status["firmware"] = json!(format!("{major}.{minor}.{patch}"));
         status["reset"] = json!(format!("{:?}", info.reset));
+        status["clock"] = clock_json(&board);
         return console.result(&status);
     }
     console.say(format!("{} firmware {major}.{minor}.{patch}, rig '{}'", info.board, board.rig().name))?;
+    console.say(describe_clock(&board))?;
     say_pose(console, board.rig(), board.pose())
 }

@@ -8,7 +8,8 @@ use tokio::io::{AsyncReadExt, AsyncWriteExt};
 use tokio::sync::{mpsc, oneshot, watch};
 use tokio::time::{sleep_until, timeout};
 use vergence_protocol::{
-    Compatibility, HostEvent, HostSession, MAX_FRAME, Microseconds, PoseReport, Report, Request, SessionId, Ticket,
+    Compatibility, HostEvent, HostSession, HostStatistics, MAX_FRAME, Microseconds, PoseReport, Report, Request,
+    SessionId, Ticket,
 };
 use vergence_rig::{ClockMap, Exchange, JointSample, JointTrack};
 
@@ -64,6 +65,7 @@ enum Command {
 struct Learned {
     clock_map: ClockMap,
     track: JointTrack,
+    statistics: HostStatistics,
 }
 
 /// A handle to an open session. Dropping it closes the link.
@@ -90,6 +92,7 @@ impl Client {
         let learned = Arc::new(Mutex::new(Learned {
             clock_map: wire.baud.map_or_else(ClockMap::default, ClockMap::at_baud),
             track: JointTrack::new(TRACK_LENGTH),
+            statistics: HostStatistics::default(),
         }));
         let task = LinkTask {
             session: HostSession::new(session),
@@ -175,6 +178,12 @@ impl Client {
     #[must_use]
     pub fn track(&self) -> JointTrack {
         lock(&self.learned).track.clone()
+    }
+
+    /// How the link has been since it was opened.
+    #[must_use]
+    pub fn statistics(&self) -> HostStatistics {
+        lock(&self.learned).statistics
     }
 
     fn why_ended(&self) -> LinkError {
@@ -324,6 +333,7 @@ impl LinkTask {
         let now = self.clock.now();
         let mut events = Vec::new();
         self.session.receive(now, bytes, |event| events.push(event));
+        lock(&self.learned).statistics = self.session.statistics();
         for event in events {
             match event {
                 HostEvent::Opened { compatibility, .. } => {
