@@ -15,6 +15,7 @@ use common::{fails_with, run, run_json, text};
 const VERBS: &[&str] = &[
     "devices",
     "status",
+    "doctor",
     "arm",
     "disarm",
     "clear",
@@ -24,6 +25,7 @@ const VERBS: &[&str] = &[
     "plan",
     "stop",
     "monitor",
+    "link-test",
     "sim",
     "demo",
     "depth",
@@ -146,6 +148,37 @@ fn a_plan_is_a_text_that_can_be_compared() {
     fails_with(&["plan"], 2, &["MODE"]);
     fails_with(&["plan", "--baseline", "500mm"], 2, &["500", "220"]);
     fails_with(&["plan", "human", "--from", "gecko"], 2, &["gecko", "herbivore"]);
+}
+
+#[test]
+fn a_thousand_poses_each_second_for_ten_minutes_and_none_is_lost() {
+    let link = run_json(&["--port", "sim", "link-test", "--seconds", "600", "--stream", "1ms", "--json"]);
+    assert!(link["poses"].as_u64().is_some_and(|poses| poses >= 599_990), "{link}");
+    for none in ["poses_lost", "unanswered", "retransmitted"] {
+        assert_eq!(link[none], 0, "{none} in {link}");
+    }
+    assert_eq!(link["clock"]["lost"], false);
+    let drift = link["clock"]["drift_ppm"].as_f64().expect("a drift");
+    assert!((drift - 40.0).abs() < 1.0, "the simulated board runs 40 ppm fast, not {drift}");
+}
+
+#[test]
+fn the_doctor_says_what_is_wrong_and_what_to_do() {
+    let healthy = run_json(&["--port", "sim", "doctor", "--json"]);
+    assert_eq!(healthy["failed"], 0);
+    let verdict = |name: &str| {
+        let checks = healthy["checks"].as_array().expect("a list");
+        let check = checks.iter().find(|check| check["check"] == name).expect("the check was made");
+        check["verdict"].as_str().expect("a verdict").to_owned()
+    };
+    for check in ["port", "versions", "start", "link", "clock", "state", "limits"] {
+        assert_eq!(verdict(check), "pass", "{check} in {healthy}");
+    }
+    assert_eq!(verdict("reference"), "warn");
+    let sick = run(&["--port", "/dev/nothing", "doctor"]);
+    assert_eq!(sick.status.code(), Some(1));
+    let said = text(&sick.stdout);
+    assert!(said.contains("fail  port") && said.contains("-> connect and power the board"), "{said}");
 }
 
 #[test]

@@ -42,6 +42,15 @@ impl AxisPosition {
         }
     }
 
+    /// From the wire.
+    #[must_use]
+    pub fn from_micro(kind: AxisKind, micro: Micro) -> Self {
+        match kind {
+            AxisKind::Linear => Self::Linear(Length::from_mm(f64::from(micro.0) * 1e-3)),
+            AxisKind::Rotary => Self::Rotary(Angle::from_rad(f64::from(micro.0) * 1e-6)),
+        }
+    }
+
     /// Whether this is a position on an axis of `kind`.
     #[must_use]
     pub fn is_of(self, kind: AxisKind) -> bool {

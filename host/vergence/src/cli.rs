@@ -50,6 +50,8 @@ enum Verb {
     Devices(cmd::devices::Args),
     /// Tell what the board is doing, and why it stopped.
     Status(cmd::status::Args),
+    /// Check ports, permissions, link, clock and board, and say what to do.
+    Doctor(cmd::doctor::Args),
     /// Arm the board and keep it armed until Ctrl-C.
     Arm(cmd::arm::Args),
     /// Disarm the board; in motion it brakes first.
@@ -68,6 +70,8 @@ enum Verb {
     Stop(cmd::stop::Args),
     /// Show poses as they come.
     Monitor(cmd::monitor::Args),
+    /// Measure the link: round trips, losses, repeats.
+    LinkTest(cmd::link_test::Args),
     /// Run a simulated board that other programs can talk to.
     Sim(cmd::sim::Args),
     /// Let everything go wrong, ten thousand times, and check that the rig stays safe.
@@ -123,6 +127,7 @@ fn execute(cli: Cli) -> Result<(), Failure> {
         match verb {
             Verb::Devices(args) => cmd::devices::run(&args, console),
             Verb::Status(args) => cmd::status::run(&args, &globals, console).await,
+            Verb::Doctor(args) => cmd::doctor::run(&args, &globals, console).await,
             Verb::Arm(args) => cmd::arm::run(&args, &globals, console).await,
             Verb::Disarm(args) => cmd::disarm::run(&args, &globals, console).await,
             Verb::Clear(args) => cmd::clear::run(&args, &globals, console).await,
@@ -132,6 +137,7 @@ fn execute(cli: Cli) -> Result<(), Failure> {
             Verb::Plan(args) => cmd::plan::run(&args, &globals, console).await,
             Verb::Stop(args) => cmd::stop::run(&args, &globals, console).await,
             Verb::Monitor(args) => cmd::monitor::run(&args, &globals, console).await,
+            Verb::LinkTest(args) => cmd::link_test::run(&args, &globals, console).await,
             Verb::Sim(args) => cmd::sim::run(&args, &globals, console).await,
             Verb::Soak(args) => cmd::soak::run(&args, console),
             Verb::Demo(args) => cmd::demo::run(&args, &globals, console).await,

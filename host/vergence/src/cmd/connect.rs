@@ -53,6 +53,12 @@ pub fn port(globals: &Globals) -> Result<Port, Failure> {
     }
 }
 
+/// Whether bytes take time on this port: pseudo-terminals and TCP carry them at once.
+#[must_use]
+pub fn is_wire(globals: &Globals) -> bool {
+    matches!(port(globals), Ok(Port::Serial(path)) if !path.starts_with("/dev/pts"))
+}
+
 async fn wire(port: &Port, baud: u32, rig: &Rig) -> Result<OpenWire, Failure> {
     if *port == Port::Simulated {
         let simulated = SharedRig::new(SimulatedRig::new(rig, SIM_SEED)?);

@@ -2,6 +2,7 @@
 
 mod board_options;
 mod connect;
+mod link_figures;
 mod reconnect;
 mod report;
 
@@ -14,7 +15,9 @@ pub mod demo;
 pub mod depth;
 pub mod devices;
 pub mod disarm;
+pub mod doctor;
 pub mod home;
+pub mod link_test;
 pub mod mode;
 pub mod monitor;
 pub mod move_to;

@@ -53,10 +53,10 @@ pub fn pose_json(rig: &Rig, pose: &PoseReport) -> Value {
 #[must_use]
 pub fn describe_clock(board: &Board) -> String {
     let map = board.client().clock_map();
-    match (board.pose_on_host_clock(), map.drift()) {
+    match (map.board_at(board.client().clock().now()), map.drift()) {
         _ if map.is_lost() => "clock lost: the board does not answer its probes".into(),
-        (Some(at), Some(drift)) => {
-            format!("clock within {:.0} us, drift {:+.1} \u{b1} {:.1} ppm", at.error_us, drift.ppm, drift.error_ppm)
+        (Some(now), Some(drift)) => {
+            format!("clock within {:.0} us, drift {:+.1} \u{b1} {:.1} ppm", now.error_us, drift.ppm, drift.error_ppm)
         }
         _ => "clock not compared yet".into(),
     }
@@ -66,7 +66,7 @@ pub fn describe_clock(board: &Board) -> String {
 #[must_use]
 pub fn clock_json(board: &Board) -> Value {
     let map = board.client().clock_map();
-    let error = board.pose_on_host_clock().map(|at| at.error_us);
+    let error = map.board_at(board.client().clock().now()).map(|now| now.error_us);
     json!({
         "error_us": error.map(rounded),
         "sigma_us": error.map(|error| rounded(error / 3f64.sqrt())),

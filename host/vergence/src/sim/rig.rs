@@ -1,8 +1,10 @@
 //! A board and its mechanics that know which rig they are.
 
 use std::sync::{Arc, Mutex, MutexGuard};
+use std::time::Duration;
 
 use tokio::time::Instant;
+use vergence_control::TICK_US;
 use vergence_plant::{NativeBoard, Stage};
 use vergence_protocol::{AxisKind, Microseconds};
 use vergence_rig::{Rig, RigAxis, RigPose};
@@ -23,6 +25,7 @@ pub struct SimulatedRig {
     /// The clock when the rig last ran, and how much time had passed for it by then.
     last_run: Instant,
     elapsed_us: u64,
+    output: Vec<u8>,
 }
 
 /// The board is driven by its link and looked at by the simulated cameras.
@@ -44,17 +47,36 @@ impl SimulatedRig {
                 rig.name
             ))
         })?;
-        Ok(Self { board, rig: rig.clone(), last_run: Instant::now(), elapsed_us: 0 })
+        Ok(Self { board, rig: rig.clone(), last_run: Instant::now(), elapsed_us: 0, output: Vec::new() })
     }
 
-    /// Lets the rig run until now: simulated time follows the clock, but never leaps.
+    /// Lets the rig run until now: simulated time follows the clock, but never leaps. What the board sends meanwhile is
+    /// kept until [`Self::take_output`].
     pub fn run_to_now(&mut self) {
         let now = Instant::now();
         let passed = u64::try_from((now - self.last_run).as_micros()).unwrap_or(u64::MAX);
-        self.last_run = now;
+        // What is left of a microsecond counts the next time: a thousand times each second it would be half a per mille.
+        self.last_run += Duration::from_micros(passed);
         self.elapsed_us += passed.min(LONGEST_STEP_US);
         let drifted = self.elapsed_us as f64 * (1.0 + BOARD_DRIFT);
-        self.board.advance(Microseconds(BOARD_START_US + drifted as u64));
+        let until = BOARD_START_US + drifted as u64;
+        // A UART sends while the board runs, not after: a pose must not wait for the next one and be replaced by it.
+        while self.board.now().0 < until {
+            self.board.advance(Microseconds(until.min(self.board.now().0 + TICK_US)));
+            self.output.append(&mut self.board.transmit());
+        }
+    }
+
+    /// Gives bytes of the host to the board, now.
+    pub fn receive(&mut self, bytes: &[u8]) {
+        self.run_to_now();
+        self.board.receive(bytes);
+        self.output.append(&mut self.board.transmit());
+    }
+
+    /// What the board sent since this was last asked.
+    pub fn take_output(&mut self) -> Vec<u8> {
+        std::mem::take(&mut self.output)
     }
 
     /// The board.
