@@ -35,6 +35,7 @@ const VERBS: &[&str] = &[
     "camera",
     "target",
     "soak",
+    "completions",
 ];
 
 fn temporary() -> tempfile::TempDir {
@@ -179,6 +180,16 @@ fn the_doctor_says_what_is_wrong_and_what_to_do() {
     assert_eq!(sick.status.code(), Some(1));
     let said = text(&sick.stdout);
     assert!(said.contains("fail  port") && said.contains("-> connect and power the board"), "{said}");
+}
+
+#[test]
+fn shells_learn_every_verb() {
+    for shell in ["bash", "zsh", "fish"] {
+        let output = run(&["completions", shell]);
+        let script = text(&output.stdout);
+        assert!(output.status.success() && VERBS.iter().all(|verb| script.contains(verb)), "{shell}");
+    }
+    fails_with(&["completions", "abacus"], 2, &["abacus", "bash"]);
 }
 
 #[test]

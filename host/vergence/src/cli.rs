@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 use std::process::ExitCode;
 
-use clap::{Parser, Subcommand};
+use clap::{CommandFactory, Parser, Subcommand};
 
 use crate::cmd;
 use crate::console::Console;
@@ -90,6 +90,13 @@ enum Verb {
     Camera(cmd::camera::Args),
     /// Draw a chessboard to print.
     Target(cmd::target::Args),
+    /// Print a script that lets a shell complete this command.
+    Completions(cmd::completions::Args),
+}
+
+/// The whole command line, for what describes it.
+pub fn command() -> clap::Command {
+    Cli::command()
 }
 
 /// Runs the command line and returns the exit code.
@@ -147,6 +154,7 @@ fn execute(cli: Cli) -> Result<(), Failure> {
             Verb::Calibrate(args) => cmd::calibrate::run(&args, console),
             Verb::Camera(args) => cmd::camera::run(&args, console),
             Verb::Target(args) => cmd::target::run(&args, console),
+            Verb::Completions(args) => cmd::completions::run(&args, console),
         }
     })
 }

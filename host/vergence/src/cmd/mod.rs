@@ -11,6 +11,7 @@ pub mod calibrate;
 pub mod camera;
 pub mod capture;
 pub mod clear;
+pub mod completions;
 pub mod demo;
 pub mod depth;
 pub mod devices;
