@@ -26,6 +26,7 @@ const VERBS: &[&str] = &[
     "stop",
     "monitor",
     "link-test",
+    "config",
     "sim",
     "demo",
     "depth",

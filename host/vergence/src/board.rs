@@ -6,7 +6,7 @@ use indicatif::ProgressBar;
 use tokio::time::timeout;
 use vergence_protocol::{
     AxisInfo, AxisMask, BoardInfo, Compatibility, ControllerState, FaultRecord, Jog, Mode, Move, MoveId, MovePhase,
-    Permille, PoseReport, Refusal, Report, Request, SessionId, Status, StopKind,
+    Permille, PoseReport, Refusal, Report, Request, SessionId, SettingKey, Status, StopKind,
 };
 use vergence_rig::{AxisPosition, HostInstant, Rig};
 
@@ -43,6 +43,17 @@ impl Board {
     /// # Errors
     /// Another protocol, another rig, or a link that ended.
     pub async fn new(client: Client, rig: Rig, lease_ms: u16, progress: ProgressBar) -> Result<Self, Failure> {
+        let mut board = Self::open(client, rig, lease_ms, progress).await?;
+        board.check_axes().await?;
+        board.next_pose().await?;
+        Ok(board)
+    }
+
+    /// The same with a board that may not fit the rig: it can be asked and set, and must not be moved.
+    ///
+    /// # Errors
+    /// Another protocol, or a link that ended.
+    pub async fn open(client: Client, rig: Rig, lease_ms: u16, progress: ProgressBar) -> Result<Self, Failure> {
         if let Compatibility::Incompatible { board } = client.compatibility() {
             let ours = vergence_protocol::PROTOCOL;
             return Err(Failure::protocol(format!(
@@ -53,10 +64,8 @@ impl Board {
         let Report::Info { info, .. } = client.ask(Request::GetInfo).await? else {
             return Err(Failure::protocol("the board answered a question about itself with something else"));
         };
-        let mut board = Self { client, rig, info, axes: Vec::new(), pose: empty_pose(), lease_ms, moves: 0, progress };
-        board.check_axes().await?;
+        let board = Self { client, rig, info, axes: Vec::new(), pose: empty_pose(), lease_ms, moves: 0, progress };
         board.ask(Request::SetStream { period_us: STREAM_PERIOD_US }).await?;
-        board.next_pose().await?;
         Ok(board)
     }
 
@@ -158,14 +167,42 @@ impl Board {
     /// # Errors
     /// A refusal in words, or a link that ended.
     pub async fn ask(&self, request: Request) -> Result<(), Failure> {
+        self.request(request).await?.map_err(|refusal| self.refused(refusal))
+    }
+
+    /// The same, where a refusal is an answer like another.
+    async fn request(&self, request: Request) -> Result<Result<(), Refusal>, Failure> {
         match self.client.ask(request).await? {
-            Report::Ack { status: Status::Accepted, .. } => Ok(()),
-            Report::Ack { status: Status::Refused(refusal), .. } => Err(self.refused(refusal)),
+            Report::Ack { status: Status::Accepted, .. } => Ok(Ok(())),
+            Report::Ack { status: Status::Refused(refusal), .. } => Ok(Err(refusal)),
             _ => Err(Failure::protocol("the board answered a command with something else")),
         }
     }
 
-    fn refused(&self, refusal: Refusal) -> Failure {
+    /// What a setting is, in the units of the wire; `None` where the board has no such setting.
+    ///
+    /// # Errors
+    /// Where the link ended.
+    pub async fn setting(&self, key: SettingKey) -> Result<Option<i64>, Failure> {
+        match self.client.ask(Request::GetSetting(key)).await? {
+            Report::Setting { value, .. } => Ok(Some(value)),
+            Report::Ack { status: Status::Refused(Refusal::NoSetting | Refusal::Invalid), .. } => Ok(None),
+            Report::Ack { status: Status::Refused(refusal), .. } => Err(self.refused(refusal)),
+            _ => Err(Failure::protocol("the board answered a question about a setting with something else")),
+        }
+    }
+
+    /// Changes a setting, in the units of the wire, or says why the board refuses.
+    ///
+    /// # Errors
+    /// Where the link ended.
+    pub async fn set(&self, key: SettingKey, value: i64) -> Result<Result<(), Refusal>, Failure> {
+        self.request(Request::SetSetting { key, value }).await
+    }
+
+    /// A refusal in words.
+    #[must_use]
+    pub fn refused(&self, refusal: Refusal) -> Failure {
         let latched = match (refusal, self.pose.fault) {
             (Refusal::Latched, Some(fault)) => format!(" ({})", describe_fault(&self.rig, &fault)),
             _ => String::new(),
@@ -173,7 +210,9 @@ impl Board {
         let message = format!("the board refuses: {refusal}{latched}");
         match refusal {
             Refusal::ReadOnly => Failure::protocol(message),
-            Refusal::OutsideLimits { .. } | Refusal::Invalid => Failure::usage(message),
+            Refusal::OutsideLimits { .. } | Refusal::Invalid | Refusal::BadSetting | Refusal::NoSetting => {
+                Failure::usage(message)
+            }
             _ => Failure::device(message),
         }
     }

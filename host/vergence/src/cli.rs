@@ -72,6 +72,8 @@ enum Verb {
     Monitor(cmd::monitor::Args),
     /// Measure the link: round trips, losses, repeats.
     LinkTest(cmd::link_test::Args),
+    /// Show and change the board's settings.
+    Config(cmd::config::Args),
     /// Run a simulated board that other programs can talk to.
     Sim(cmd::sim::Args),
     /// Let everything go wrong, ten thousand times, and check that the rig stays safe.
@@ -145,6 +147,7 @@ fn execute(cli: Cli) -> Result<(), Failure> {
             Verb::Stop(args) => cmd::stop::run(&args, &globals, console).await,
             Verb::Monitor(args) => cmd::monitor::run(&args, &globals, console).await,
             Verb::LinkTest(args) => cmd::link_test::run(&args, &globals, console).await,
+            Verb::Config(args) => cmd::config::run(&args, &globals, console).await,
             Verb::Sim(args) => cmd::sim::run(&args, &globals, console).await,
             Verb::Soak(args) => cmd::soak::run(&args, console),
             Verb::Demo(args) => cmd::demo::run(&args, &globals, console).await,

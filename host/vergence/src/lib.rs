@@ -22,6 +22,7 @@ mod output;
 mod provenance;
 mod rig_file;
 mod rig_zones;
+pub mod setting_text;
 pub mod sim;
 mod stopwatch;
 

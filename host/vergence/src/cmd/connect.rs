@@ -27,13 +27,27 @@ pub async fn connect(globals: &Globals, console: Console, what: &str) -> Result<
 /// # Errors
 /// As of [`connect`].
 pub async fn connect_with(globals: &Globals, progress: ProgressBar) -> Result<Board, Failure> {
+    let (client, rig) = client(globals).await?;
+    Board::new(client, rig, globals.lease, progress).await
+}
+
+/// Connects to a board that may not fit the rig file.
+///
+/// # Errors
+/// No board, a board of another protocol, a bad rig file.
+pub async fn connect_any(globals: &Globals, console: Console, what: &str) -> Result<Board, Failure> {
+    let (client, rig) = client(globals).await?;
+    Board::open(client, rig, globals.lease, console.progress(what)).await
+}
+
+async fn client(globals: &Globals) -> Result<(Client, Rig), Failure> {
     let rig = rig_file::load(globals.rig.as_deref())?;
     let port = port(globals)?;
     let wire = wire(&port, globals.baud, &rig).await?;
     let client = Client::connect(wire, fresh_session()?, HostClock::start())
         .await
         .map_err(|error| Failure::device(format!("{port}: {error}")))?;
-    Board::new(client, rig, globals.lease, progress).await
+    Ok((client, rig))
 }
 
 /// The port that the options name, or the only one there is.

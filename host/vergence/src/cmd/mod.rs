@@ -12,6 +12,7 @@ pub mod camera;
 pub mod capture;
 pub mod clear;
 pub mod completions;
+pub mod config;
 pub mod demo;
 pub mod depth;
 pub mod devices;
