@@ -29,7 +29,7 @@ async fn board() -> Board {
 async fn a_plan_takes_as_long_as_the_move() {
     let mut board = board().await;
     let modes = board.rig().modes.clone();
-    let plan = MovePlan::new(&bench(), board.axes(), &modes[0].targets, &modes[1].targets);
+    let plan = MovePlan::new(&bench(), &board.limits().await.expect("limits"), &modes[0].targets, &modes[1].targets);
     board
         .armed(async |board| {
             board.home().await?;

@@ -5,13 +5,14 @@ use std::time::Duration;
 use indicatif::ProgressBar;
 use tokio::time::timeout;
 use vergence_protocol::{
-    AxisInfo, AxisMask, BoardInfo, Compatibility, ControllerState, FaultRecord, Jog, Mode, Move, MoveId, MovePhase,
-    Permille, PoseReport, Refusal, Report, Request, SessionId, SettingKey, Status, StopKind,
+    AxisInfo, AxisMask, BoardInfo, Compatibility, ControllerState, FaultRecord, Jog, Micro, Mode, Move, MoveId,
+    MovePhase, Permille, PoseReport, Refusal, Report, Request, SessionId, SettingItem, SettingKey, Status, StopKind,
 };
 use vergence_rig::{AxisPosition, HostInstant, Rig};
 
 use crate::failure::Failure;
 use crate::link::{Client, LinkError, STREAM_PERIOD_US};
+use crate::move_plan::AxisLimits;
 
 /// Homing and moves of a bench take seconds; a board that needs longer than this is not doing what it says.
 const MOTION_TIMEOUT: Duration = Duration::from_secs(120);
@@ -104,6 +105,20 @@ impl Board {
     #[must_use]
     pub fn axes(&self) -> &[AxisInfo] {
         &self.axes
+    }
+
+    /// What the board's planner works with.
+    ///
+    /// # Errors
+    /// Where the link ended.
+    pub async fn limits(&self) -> Result<Vec<AxisLimits>, Failure> {
+        let mut limits = Vec::new();
+        for (&info, axis) in self.axes.iter().zip(0u8..) {
+            let backlash = self.setting(SettingKey { item: SettingItem::Backlash, axis }).await?;
+            let backlash = Micro(backlash.and_then(|value| i32::try_from(value).ok()).unwrap_or(0));
+            limits.push(AxisLimits { info, backlash });
+        }
+        Ok(limits)
     }
 
     /// The rig.

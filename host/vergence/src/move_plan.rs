@@ -1,7 +1,7 @@
 //! A move as the board will plan it: the same profiles from the same limits, so that it can be read before it is made.
 
-use vergence_control::{Limits, Profile};
-use vergence_protocol::AxisInfo;
+use vergence_control::{FINE_BITS, Fine, Limits, MotionState, Trajectory};
+use vergence_protocol::{AxisInfo, Micro};
 use vergence_rig::{AxisPosition, Rig, RigAxis};
 
 /// A planned move of all axes, from rest to rest.
@@ -39,27 +39,41 @@ pub struct Knot {
     pub jerk: f64,
 }
 
+/// What the board's planner must know of an axis.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct AxisLimits {
+    /// As the board states it.
+    pub info: AxisInfo,
+    /// How far the last approach comes from below.
+    pub backlash: Micro,
+}
+
 impl MovePlan {
-    /// Plans the move of `rig` between two poses, within the limits that the board states for its axes.
+    /// Plans the move of `rig` between two poses within the limits of the board.
     #[must_use]
-    pub fn new(rig: &Rig, limits: &[AxisInfo], from: &[AxisPosition], to: &[AxisPosition]) -> Self {
-        let quickest: Vec<_> = from
-            .iter()
-            .zip(to)
-            .zip(limits)
-            .map(|((from, to), info)| {
-                let distance = i64::from(to.micro().0) - i64::from(from.micro().0);
-                let [speed, acceleration, jerk] = [info.speed, info.acceleration, info.jerk].map(|limit| limit as f32);
-                Profile::rest_to_rest(distance as f32, Limits { speed, acceleration, jerk })
-            })
-            .collect();
-        let slowest = quickest.iter().map(Profile::duration).fold(0.0, f32::max);
-        let ways = from.iter().zip(to).zip(quickest);
-        let axes = rig.axes.iter().zip(ways).map(|(axis, ((&from, &to), profile))| {
-            let knots = knots(axis, from, &profile.lasting(slowest));
-            AxisPlan { from, to, knots }
+    pub fn new(rig: &Rig, limits: &[AxisLimits], from: &[AxisPosition], to: &[AxisPosition]) -> Self {
+        let ways: Vec<_> = rig.axes.iter().zip(limits).zip(from.iter().zip(to)).collect();
+        let durations = ways.iter().map(|((_, limits), (from, to))| limits.plan(**from, **to, 0.0).duration());
+        let slowest = durations.fold(0.0, f32::max);
+        let axes = ways.iter().map(|((axis, limits), (from, to))| {
+            let knots = knots(axis, &limits.plan(**from, **to, slowest));
+            AxisPlan { from: **from, to: **to, knots }
         });
         Self { duration: f64::from(slowest), axes: axes.collect() }
+    }
+}
+
+impl AxisLimits {
+    fn plan(&self, from: AxisPosition, to: AxisPosition, at_least: f32) -> Trajectory {
+        let [from, to, run_up] =
+            [from.micro(), to.micro(), self.backlash].map(|micro| Fine::from(micro.0) << FINE_BITS);
+        let [speed, acceleration, jerk] = [self.info.speed, self.info.acceleration, self.info.jerk].map(|it| it as f32);
+        let limits = Limits { speed, acceleration, jerk };
+        let start = MotionState::at(from);
+        if run_up == 0 || from == to || from <= to - run_up {
+            return Trajectory::reach(start, to, limits, at_least);
+        }
+        Trajectory::reach_from_below(start, (to, run_up), [limits, limits], at_least)
     }
 }
 
@@ -71,24 +85,14 @@ impl AxisPlan {
     }
 }
 
-/// Integrated in double precision: at rest is exactly at rest.
-fn knots(axis: &RigAxis, from: AxisPosition, profile: &Profile) -> Vec<Knot> {
-    let mut knots = Vec::new();
-    let mut at = Knot { time: 0.0, position: from.value(), velocity: 0.0, acceleration: 0.0, jerk: 0.0 };
-    for (duration, jerk) in profile.segments() {
-        let (t, jerk) = (f64::from(duration), axis.value_from_micro(f64::from(jerk)));
-        knots.push(Knot { jerk, ..at });
-        at = Knot {
-            time: at.time + t,
-            position: at.position + t * (at.velocity + t * (at.acceleration / 2.0 + t * jerk / 6.0)),
-            velocity: at.velocity + t * (at.acceleration + t * jerk / 2.0),
-            acceleration: at.acceleration + t * jerk,
-            jerk: 0.0,
-        };
-    }
-    if !knots.is_empty() {
-        let (time, end) = (f64::from(profile.duration()), axis.value_from_micro(f64::from(profile.end())));
-        knots.push(Knot { time, position: from.value() + end, velocity: 0.0, acceleration: 0.0, jerk: 0.0 });
-    }
-    knots
+fn knots(axis: &RigAxis, planned: &Trajectory) -> Vec<Knot> {
+    let value = |fine: Fine| axis.value_from_micro(fine as f64 / f64::from(1 << FINE_BITS));
+    let knots = planned.knots().map(|(time, state, jerk)| Knot {
+        time,
+        position: value(state.position),
+        velocity: value(state.velocity),
+        acceleration: value(state.acceleration),
+        jerk: value(jerk),
+    });
+    knots.collect()
 }

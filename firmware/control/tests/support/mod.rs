@@ -7,12 +7,12 @@ mod watch;
 
 use vergence_control::{AxisSettings, Controller, HomingSettings};
 use vergence_protocol::{
-    AxisKind, AxisMask, ControllerState, FaultRecord, Micro, Microseconds, Mode, Move, MoveId, Permille, PoseReport,
-    Request, SessionId, Status,
+    AxisKind, AxisMask, ControllerState, FaultRecord, Jog, Micro, Microseconds, Mode, Move, MoveId, Permille,
+    PoseReport, Request, SessionId, Status,
 };
 
 pub use ideal_rig::{HomeSwitch, IdealRig};
-pub use watch::Watch;
+pub use watch::{Watch, commanded};
 
 pub const TICK_US: u64 = 1_000;
 pub const HOST: SessionId = SessionId(0x5e55_1011);
@@ -29,10 +29,13 @@ pub fn linear() -> AxisSettings {
         speed: 200_000,
         acceleration: 1_500_000,
         jerk: 40_000_000,
-        steps_per_unit: 1_000_000_000,
+        steps_per_unit: 500_000,
         counts_per_unit: 2_000_000,
+        steps_reversed: false,
+        counts_reversed: false,
         following_error: Micro(1_000),
         tolerance: Micro(20),
+        backlash: Micro(0),
         homing: HomingSettings {
             switch_at: Micro(58_000),
             seek_speed: 100_000,
@@ -53,10 +56,13 @@ pub fn rotary() -> AxisSettings {
         speed: 2_500_000,
         acceleration: 12_000_000,
         jerk: 200_000_000,
-        steps_per_unit: 800_000_000,
+        steps_per_unit: 250_000,
         counts_per_unit: 100_000,
+        steps_reversed: false,
+        counts_reversed: false,
         following_error: Micro(17_453),
         tolerance: Micro(349),
+        backlash: Micro(0),
         homing: HomingSettings {
             switch_at: Micro(-26_180),
             seek_speed: 1_000_000,
@@ -199,6 +205,13 @@ impl World {
 
     pub fn move_to(&mut self, targets: [i32; 2]) -> Status {
         self.move_by(HOST, targets, 1000)
+    }
+
+    /// Asks for a jog at full speed.
+    pub fn jog(&mut self, by: [i32; 2]) -> Status {
+        self.move_id += 1;
+        let by = by.into_iter().map(Micro).collect();
+        self.ask(HOST, &Request::Jog(Jog { id: MoveId(self.move_id), by, speed: Permille::FULL }))
     }
 
     pub fn clear(&mut self) -> Status {

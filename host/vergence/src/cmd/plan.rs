@@ -43,7 +43,7 @@ pub async fn run(args: &Args, globals: &Globals, console: Console) -> Result<(),
     };
     let to = goal(args, &rig, &from)?;
     check_range(&rig, &to)?;
-    let plan = MovePlan::new(&rig, board.axes(), &from, &to);
+    let plan = MovePlan::new(&rig, &board.limits().await?, &from, &to);
     let values: Vec<f64> = to.iter().map(|position| position.value()).collect();
     let zones = rig_zones(&rig, &rig.pose_at_values(&values))?;
     let wide = rig.axes.iter().map(|axis| axis.name.len()).max().unwrap_or(0);
