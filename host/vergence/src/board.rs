@@ -5,8 +5,9 @@ use std::time::Duration;
 use indicatif::ProgressBar;
 use tokio::time::timeout;
 use vergence_protocol::{
-    AxisInfo, AxisMask, BoardInfo, Compatibility, ControllerState, FaultRecord, Jog, Micro, Mode, Move, MoveId,
-    MovePhase, Permille, PoseReport, Refusal, Report, Request, SessionId, SettingItem, SettingKey, Status, StopKind,
+    AxisInfo, AxisMask, BoardInfo, Compatibility, ControllerState, FaultRecord, FrameMark, Jog, Micro, Mode, Move,
+    MoveId, MovePhase, Permille, PoseReport, RecordedEvent, Refusal, Report, Request, SessionId, SettingItem,
+    SettingKey, Status, StopKind,
 };
 use vergence_rig::{AxisPosition, HostInstant, Rig};
 
@@ -213,6 +214,35 @@ impl Board {
     /// Where the link ended.
     pub async fn set(&self, key: SettingKey, value: i64) -> Result<Result<(), Refusal>, Failure> {
         self.request(Request::SetSetting { key, value }).await
+    }
+
+    /// What the flight recorder kept, oldest first, and how many earlier events it has forgotten.
+    ///
+    /// # Errors
+    /// A board without recorder, or a link that ended.
+    pub async fn events(&self) -> Result<(Vec<RecordedEvent>, u32), Failure> {
+        let (mut kept, mut next, mut gone) = (Vec::new(), 0, 0);
+        loop {
+            let answer = match self.client.ask(Request::GetEvents { first: next }).await? {
+                Report::Events { events, .. } => events,
+                Report::Ack { status: Status::Refused(refusal), .. } => return Err(self.refused(refusal)),
+                _ => return Err(Failure::protocol("the board answered a question about events with something else")),
+            };
+            gone += answer.first.saturating_sub(next);
+            next = answer.first.saturating_add(answer.events.len() as u32);
+            kept.extend(answer.events.iter().copied());
+            if answer.events.is_empty() || next >= answer.total {
+                return Ok((kept, gone));
+            }
+        }
+    }
+
+    /// The next pulse of the camera trigger.
+    ///
+    /// # Errors
+    /// Where the link ended, or the board is silent.
+    pub async fn next_mark(&mut self) -> Result<FrameMark, Failure> {
+        Ok(self.client.next_mark().await?)
     }
 
     /// A refusal in words.

@@ -70,6 +70,8 @@ enum Verb {
     Stop(cmd::stop::Args),
     /// Show poses as they come.
     Monitor(cmd::monitor::Args),
+    /// Fire the cameras, and show where the axes were.
+    Trigger(cmd::trigger::Args),
     /// Measure the link: round trips, losses, repeats.
     LinkTest(cmd::link_test::Args),
     /// Show and change the board's settings.
@@ -146,6 +148,7 @@ fn execute(cli: Cli) -> Result<(), Failure> {
             Verb::Plan(args) => cmd::plan::run(&args, &globals, console).await,
             Verb::Stop(args) => cmd::stop::run(&args, &globals, console).await,
             Verb::Monitor(args) => cmd::monitor::run(&args, &globals, console).await,
+            Verb::Trigger(args) => cmd::trigger::run(&args, &globals, console).await,
             Verb::LinkTest(args) => cmd::link_test::run(&args, &globals, console).await,
             Verb::Config(args) => cmd::config::run(&args, &globals, console).await,
             Verb::Sim(args) => cmd::sim::run(&args, &globals, console).await,

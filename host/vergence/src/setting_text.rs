@@ -163,9 +163,9 @@ impl NamedSetting {
 /// `value` times `unit` with as few digits as read the value back: five are enough for whole microradians in degrees.
 fn shortest(value: i64, unit: f64) -> String {
     let number = value as f64 * unit;
-    let texts = (0..=5).map(|digits| format!("{number:.digits$}"));
     let reads_back = |text: &String| text.parse::<f64>().is_ok_and(|read| (read / unit).round() as i64 == value);
-    let text = texts.clone().find(reads_back).or_else(|| texts.last()).unwrap_or_default();
+    let text = (0..5).map(|digits| format!("{number:.digits$}")).find(reads_back);
+    let text = text.unwrap_or_else(|| format!("{number:.5}"));
     if text == "-0" { "0".into() } else { text }
 }
 

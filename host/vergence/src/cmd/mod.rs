@@ -29,4 +29,5 @@ pub mod soak;
 pub mod status;
 pub mod stop;
 pub mod target;
+pub mod trigger;
 pub mod zones;
