@@ -10,7 +10,7 @@ use vergence::board::Board;
 use vergence::link::{Client, HostClock, OpenWire};
 use vergence::move_plan::MovePlan;
 use vergence::sim::{SharedRig, SimulatedRig, spawn_in_process};
-use vergence_protocol::SessionId;
+use vergence_protocol::{SessionId, SettingItem, SettingKey};
 use vergence_rig::{BENCH_TOML, Rig};
 
 fn bench() -> Rig {
@@ -44,4 +44,23 @@ async fn a_plan_takes_as_long_as_the_move() {
         })
         .await
         .expect("it moves");
+}
+
+#[tokio::test(start_paused = true)]
+async fn settings_are_refused_while_armed() {
+    let mut board = board().await;
+    let key = SettingKey { item: SettingItem::Speed, axis: 0 };
+    let refusal = board
+        .armed(async |board| {
+            assert_eq!(board.setting(key).await?, Some(80_000));
+            board.set(key, 40_000).await
+        })
+        .await
+        .expect("the link holds")
+        .expect_err("it is armed");
+    let said = board.refused(refusal).to_string();
+    assert!(said.contains("only while disarmed") && said.contains("vergence disarm"), "{said}");
+    assert_eq!(board.setting(key).await, Ok(Some(80_000)));
+    board.set(key, 40_000).await.expect("the link holds").expect("it is disarmed");
+    assert_eq!(board.setting(key).await, Ok(Some(40_000)));
 }

@@ -92,6 +92,91 @@ fn a_host_killed_in_mid_move_is_a_lost_link_and_never_resumes() {
 }
 
 #[test]
+fn saved_settings_outlive_the_board_and_others_do_not() {
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    let file = |name: &str| folder.path().join(name).to_string_lossy().into_owned();
+    let (flash, backup) = (file("flash"), file("settings.toml"));
+    let switched_on = || Simulator::start(&["--pty", "--flash", &flash]);
+    let get = |simulator: &Simulator, key: &str| simulator.json(&["config", "get", key])[key].clone();
+
+    let mut simulator = switched_on();
+    simulator.json(&["config", "get", "--out", &backup]);
+    assert_eq!(get(&simulator, "baseline.speed"), "80mm/s");
+    assert_eq!(simulator.json(&["config", "set", "baseline.speed", "40mm/s"])["before"], "80mm/s");
+    simulator.json(&["config", "save"]);
+    simulator.json(&["config", "set", "baseline.speed", "20mm/s"]);
+    let bad = simulator.run(&["config", "set", "baseline.min", "230mm"]);
+    assert_eq!(bad.status.code(), Some(2));
+    assert!(text(&bad.stderr).contains("baseline.min cannot be 230mm"), "{}", text(&bad.stderr));
+    assert_eq!(get(&simulator, "baseline.speed"), "20mm/s");
+
+    simulator.kill();
+    let mut simulator = switched_on();
+    assert_eq!(get(&simulator, "baseline.speed"), "40mm/s");
+    // The planner of the board, and with it the plan of the host, obeys.
+    let plan = simulator.json(&["plan", "--baseline", "220mm"]);
+    assert!(plan["duration_s"].as_f64().is_some_and(|seconds| seconds > 4.0), "{plan}");
+
+    // A range that moves past itself fits only in one order; the file finds it, and is taken whole or not at all.
+    let moved = file("moved.toml");
+    std::fs::write(&moved, "[separation]\nmin = \"140deg\"\nmax = \"150deg\"\nhome_switch_at = \"138deg\"\n")
+        .expect("written");
+    assert_eq!(simulator.json(&["config", "set", "--file", &moved])["changed"].as_array().map(Vec::len), Some(3));
+    simulator.json(&["config", "set", "--file", &backup]);
+    std::fs::write(&moved, "[baseline]\nspeed = \"30mm/s\"\nmin = \"230mm\"\n").expect("written");
+    let refused = simulator.run(&["config", "set", "--file", &moved]);
+    assert_eq!(refused.status.code(), Some(2));
+    assert!(text(&refused.stderr).contains("baseline.min = 230mm"), "{}", text(&refused.stderr));
+    assert_eq!(get(&simulator, "baseline.speed"), "80mm/s");
+    simulator.json(&["config", "restore"]);
+    simulator.json(&["config", "save"]);
+    simulator.kill();
+    assert_eq!(get(&switched_on(), "baseline.speed"), "80mm/s");
+}
+
+#[test]
+fn the_recorder_tells_what_led_to_a_fault() {
+    let simulator = Simulator::start(&["--tcp", "127.0.0.1:0"]);
+    simulator.json(&["home"]);
+    let mut host = simulator.command(&["mode", "herbivore"]).spawn().expect("the binary runs");
+    wait(0.8);
+    host.kill().expect("killed");
+    host.wait().expect("gone");
+    wait(1.6);
+    let why = simulator.json(&["status", "--why"])["why"].clone();
+    assert_eq!(why["times_from"], "the fault");
+    let events = why["events"].as_array().expect("a list");
+    let position = |part: &str| {
+        let found = events.iter().position(|event| event["text"].as_str().is_some_and(|text| text.contains(part)));
+        found.unwrap_or_else(|| panic!("'{part}' is not in {why}"))
+    };
+    let fault = position("the host fell silent");
+    assert_eq!(events[fault]["fault"], "LeaseExpired");
+    assert_eq!(events[fault]["from_fault_us"], 0);
+    assert!(position("state: moving") < fault && fault < position("by its encoder"), "{why}");
+    let times: Vec<_> = events.iter().map(|event| event["from_fault_us"].as_i64().expect("a time")).collect();
+    assert!(times.is_sorted(), "{times:?}");
+    let told = text(&simulator.run(&["status", "--why"]).stdout);
+    assert!(told.contains("FAULT: the host fell silent"), "{told}");
+}
+
+#[test]
+fn a_jog_needs_no_reference_and_the_trigger_no_arming() {
+    let simulator = Simulator::start(&["--pty"]);
+    let jogged = simulator.json(&["move", "--by", "--baseline", "5mm", "--separation", "-2deg"]);
+    assert_eq!(jogged["referenced"], serde_json::json!([false, false]));
+    near(&jogged["moved_by"]["baseline_mm"], 5.0);
+    near(&jogged["moved_by"]["separation_deg"], -2.0);
+    let lines = simulator.run(&["trigger", "--rate", "50", "--count", "10", "--json"]);
+    let marks: Vec<serde_json::Value> =
+        text(&lines.stdout).lines().map(|line| serde_json::from_str(line).expect("JSON")).collect();
+    let times: Vec<_> = marks.iter().map(|mark| mark["board_us"].as_u64().expect("a time")).collect();
+    assert_eq!(times.len(), 10);
+    assert!(times.windows(2).all(|pair| pair[1] - pair[0] == 20_000), "{times:?}");
+    assert_eq!(marks[9]["seq"], 9);
+}
+
+#[test]
 fn stop_works_while_another_vergence_holds_the_port() {
     let simulator = Simulator::start(&["--pty"]);
     simulator.json(&["home"]);

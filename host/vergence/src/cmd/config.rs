@@ -5,7 +5,7 @@ mod file;
 use std::path::PathBuf;
 
 use serde_json::{Map, Value, json};
-use vergence_protocol::Request;
+use vergence_protocol::{Refusal, Request};
 
 use super::connect::connect_any;
 use crate::board::Board;
@@ -127,7 +127,12 @@ async fn set_one(board: &Board, name: &str, text: &str, console: Console) -> Res
     let setting = find(board, name)?;
     let value = setting.read(text).map_err(Failure::usage)?;
     let before = board.setting(setting.key).await?;
-    board.set(setting.key, value).await?.map_err(|refusal| board.refused(refusal))?;
+    board.set(setting.key, value).await?.map_err(|refusal| match refusal {
+        Refusal::BadSetting => {
+            Failure::usage(format!("{name} cannot be {text} beside the other settings of the board"))
+        }
+        _ => board.refused(refusal),
+    })?;
     let (now, before) = (setting.write(value), before.map(|before| setting.write(before)));
     console.say(format!("{name} is {now}, it was {}", before.as_deref().unwrap_or("unknown")))?;
     say_unsaved(console, before.as_ref() != Some(&now))?;

@@ -1,19 +1,24 @@
 //! A board and its mechanics that know which rig they are.
 
+use std::io::ErrorKind;
+use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex, MutexGuard};
 use std::time::Duration;
 
 use tokio::time::Instant;
-use vergence_control::TICK_US;
+use vergence_control::{TICK_US, UNIT};
 use vergence_plant::{NativeBoard, Stage};
-use vergence_protocol::{AxisKind, Microseconds};
+use vergence_protocol::{AxisKind, Microseconds, ResetCause};
 use vergence_rig::{Rig, RigAxis, RigPose};
 
 use crate::failure::Failure;
+use crate::output::write_whole;
 
 /// The board's clock when the simulation starts, and how fast it runs against the host's: a quartz is never exact.
 const BOARD_START_US: u64 = 3_000_000;
 const BOARD_DRIFT: f64 = 40e-6;
+/// Names the start with settings from a file.
+const SECOND_BOOT: u32 = 2;
 /// When this process was kept from running for longer, simulated time slips instead of leaping over heartbeats that wait to be read.
 const LONGEST_STEP_US: u64 = 20_000;
 
@@ -26,6 +31,15 @@ pub struct SimulatedRig {
     last_run: Instant,
     elapsed_us: u64,
     output: Vec<u8>,
+    flash: Option<FlashFile>,
+}
+
+/// Where the settings outlive the simulator, as flash outlives the power.
+#[derive(Debug)]
+struct FlashFile {
+    path: PathBuf,
+    /// Operations of the flash that the file knows of.
+    written: usize,
 }
 
 /// The board is driven by its link and looked at by the simulated cameras.
@@ -47,7 +61,47 @@ impl SimulatedRig {
                 rig.name
             ))
         })?;
-        Ok(Self { board, rig: rig.clone(), last_run: Instant::now(), elapsed_us: 0, output: Vec::new() })
+        Ok(Self { board, rig: rig.clone(), last_run: Instant::now(), elapsed_us: 0, output: Vec::new(), flash: None })
+    }
+
+    /// Switches the board on with the settings that `path` holds, and keeps later ones there. A file that is not there
+    /// yet is empty flash.
+    ///
+    /// # Errors
+    /// A file that is no such flash.
+    pub fn keep_flash_in(&mut self, path: &Path) -> Result<(), Failure> {
+        let flash = &mut self.board.services_mut().settings;
+        match std::fs::read(path) {
+            Ok(bytes) if bytes.len() == flash.bytes().len() => {
+                // What is erased may still be programmed.
+                let units = bytes.chunks(UNIT).zip((0..).step_by(UNIT));
+                units
+                    .filter(|(unit, _)| unit.iter().any(|&b| b != 0xFF))
+                    .for_each(|(unit, at)| flash.overwrite(at, unit));
+            }
+            Ok(_) => return Err(Failure::input(path, "this is not the flash of a simulated board")),
+            Err(error) if error.kind() == ErrorKind::NotFound => {}
+            Err(error) => return Err(Failure::input(path, error)),
+        }
+        self.flash = Some(FlashFile { path: path.to_owned(), written: flash.operations() });
+        self.board
+            .restart(ResetCause::PowerOn, SECOND_BOOT)
+            .map_err(|error| Failure::input(path, format!("the board does not start with these settings ({error:?})")))
+    }
+
+    /// Writes the flash to its file where it has changed.
+    ///
+    /// # Errors
+    /// Where the file cannot be written.
+    pub fn save_flash(&mut self) -> Result<(), Failure> {
+        let flash = &self.board.services_mut().settings;
+        match &mut self.flash {
+            Some(file) if file.written != flash.operations() => {
+                file.written = flash.operations();
+                write_whole(&file.path, flash.bytes())
+            }
+            _ => Ok(()),
+        }
     }
 
     /// Lets the rig run until now: simulated time follows the clock, but never leaps. What the board sends meanwhile is

@@ -128,6 +128,7 @@ async fn run_board<W: AsyncRead + AsyncWrite + Unpin>(rig: &SharedRig, wire: &mu
             _ = pace.tick() => rig.lock().run_to_now(),
         }
         let output = rig.lock().take_output();
+        rig.lock().save_flash().map_err(io::Error::other)?;
         write_or_drop(wire, &output).await?;
     }
 }
