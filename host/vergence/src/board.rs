@@ -7,7 +7,7 @@ use tokio::time::timeout;
 use vergence_protocol::{
     AxisInfo, AxisMask, BoardInfo, Compatibility, ControllerState, FaultRecord, FrameMark, Jog, Micro, Mode, Move,
     MoveId, MovePhase, Permille, PoseReport, RecordedEvent, Refusal, Report, Request, SessionId, SettingItem,
-    SettingKey, Status, StopKind,
+    SettingKey, Status, StopKind, Trigger,
 };
 use vergence_rig::{AxisPosition, HostInstant, Rig};
 
@@ -235,6 +235,18 @@ impl Board {
                 return Ok((kept, gone));
             }
         }
+    }
+
+    /// Fires the cameras once, and waits for the mark of that pulse.
+    ///
+    /// # Errors
+    /// A refusal, a link that ended, or a mark that was lost.
+    pub async fn fire_cameras(&mut self) -> Result<FrameMark, Failure> {
+        const PATIENCE: Duration = Duration::from_secs(1);
+        self.client.forget_marks();
+        self.ask(Request::SetTrigger(Trigger::Once)).await?;
+        let mark = timeout(PATIENCE, self.next_mark()).await;
+        mark.unwrap_or_else(|_| Err(Failure::device("the board fired the cameras but did not say where the axes were")))
     }
 
     /// The next pulse of the camera trigger.

@@ -184,6 +184,11 @@ impl Client {
         }
     }
 
+    /// Drops the pulses that wait to be taken.
+    pub fn forget_marks(&mut self) {
+        while self.marks.try_recv().is_ok() {}
+    }
+
     /// The latest clock map.
     #[must_use]
     pub fn clock_map(&self) -> ClockMap {

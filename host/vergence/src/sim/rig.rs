@@ -141,9 +141,18 @@ impl SimulatedRig {
     /// Where the cameras truly are: from the mechanics, not from the encoders.
     #[must_use]
     pub fn true_pose(&self) -> RigPose {
-        let loads = self.board.plant().loads();
+        self.pose_of(&self.board.plant().loads())
+    }
+
+    /// Where the cameras truly were when they were last fired; `None` before the first pulse.
+    #[must_use]
+    pub fn exposed_pose(&self) -> Option<RigPose> {
+        self.board.plant().exposed().map(|(_, loads)| self.pose_of(loads))
+    }
+
+    fn pose_of(&self, loads: &[f64]) -> RigPose {
         let values: Vec<f64> =
-            self.rig.axes.iter().zip(loads).map(|(axis, load)| axis.value_from_micro(load)).collect();
+            self.rig.axes.iter().zip(loads).map(|(axis, &load)| axis.value_from_micro(load)).collect();
         self.rig.pose_at_values(&values)
     }
 }
