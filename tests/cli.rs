@@ -174,7 +174,7 @@ fn the_doctor_says_what_is_wrong_and_what_to_do() {
         let check = checks.iter().find(|check| check["check"] == name).expect("the check was made");
         check["verdict"].as_str().expect("a verdict").to_owned()
     };
-    for check in ["port", "versions", "start", "link", "clock", "state", "limits"] {
+    for check in ["port", "versions", "start", "link", "clock", "state", "limits", "settings"] {
         assert_eq!(verdict(check), "pass", "{check} in {healthy}");
     }
     assert_eq!(verdict("reference"), "warn");
@@ -182,6 +182,21 @@ fn the_doctor_says_what_is_wrong_and_what_to_do() {
     assert_eq!(sick.status.code(), Some(1));
     let said = text(&sick.stdout);
     assert!(said.contains("fail  port") && said.contains("-> connect and power the board"), "{said}");
+}
+
+#[test]
+fn settings_are_shown_by_name_and_bad_ones_refused() {
+    let axis = run_json(&["--port", "sim", "config", "get", "separation", "--json"]);
+    assert_eq!(axis["separation.max"], "130deg");
+    assert_eq!(axis["separation.counts_per_revolution"], 100_000);
+    assert!(axis.get("baseline.max").is_none() && axis.get("baud").is_none());
+    fails_with(&["--port", "sim", "config", "set", "baseline.speed", "40"], 2, &["baseline.speed", "40mm/s"]);
+    fails_with(&["--port", "sim", "config", "set", "baseline.speed", "5m/s"], 2, &["cannot be 5m/s"]);
+    fails_with(&["--port", "sim", "config", "set", "speed", "40mm/s"], 2, &["baseline.speed, separation.speed"]);
+    fails_with(&["--port", "sim", "config", "set", "baseline.speed"], 2, &["VALUE"]);
+    fails_with(&["--port", "sim", "config", "set", "--file", "/nowhere.toml"], 2, &["/nowhere.toml"]);
+    fails_with(&["--port", "sim", "trigger", "--rate", "0"], 2, &["0.1 to 500"]);
+    fails_with(&["--port", "sim", "trigger"], 2, &["--once"]);
 }
 
 #[test]

@@ -13,7 +13,7 @@ use std::net::{TcpListener, TcpStream};
 use std::thread::{JoinHandle, spawn};
 use std::time::Duration;
 
-use common::{Simulator, fails_with, text};
+use common::{Simulator, fails_with, text, vergence};
 use vergence_protocol::frame::{Header, Kind, encode};
 use vergence_protocol::{MAX_FRAME, PROTOCOL, ProtocolVersion, Receiver, Report, Request, schema_hash};
 
@@ -136,7 +136,7 @@ fn saved_settings_outlive_the_board_and_others_do_not() {
 
 #[test]
 fn the_recorder_tells_what_led_to_a_fault() {
-    let simulator = Simulator::start(&["--tcp", "127.0.0.1:0"]);
+    let simulator = Simulator::start(&["--pty"]);
     simulator.json(&["home"]);
     let mut host = simulator.command(&["mode", "herbivore"]).spawn().expect("the binary runs");
     wait(0.8);
@@ -158,6 +158,10 @@ fn the_recorder_tells_what_led_to_a_fault() {
     assert!(times.is_sorted(), "{times:?}");
     let told = text(&simulator.run(&["status", "--why"]).stdout);
     assert!(told.contains("FAULT: the host fell silent"), "{told}");
+    let doctor = simulator.run(&["doctor"]);
+    assert_eq!(doctor.status.code(), Some(1));
+    let told = text(&doctor.stdout);
+    assert!(told.contains("fail  state") && told.contains("vergence clear"), "{told}");
 }
 
 #[test]
@@ -218,14 +222,24 @@ fn restarted(killed: &Simulator) -> Simulator {
 
 #[test]
 fn a_monitor_outlives_its_board() {
-    let mut simulator = Simulator::start(&["--tcp", "127.0.0.1:0"]);
-    let mut watcher = simulator.command(&["monitor", "--json", "--for", "8s"]);
+    // A name that follows the device, as a udev rule gives it.
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    let name = folder.path().join("board");
+    let plugged_in = || {
+        let simulator = Simulator::start(&["--pty"]);
+        // There is none yet the first time.
+        let _ = std::fs::remove_file(&name);
+        std::os::unix::fs::symlink(&simulator.port, &name).expect("a link");
+        simulator
+    };
+    let mut simulator = plugged_in();
+    let mut watcher = vergence(&["--port", name.to_str().expect("a name"), "monitor", "--json", "--for", "8s"]);
     let watcher = watcher.stdout(std::process::Stdio::piped()).stderr(std::process::Stdio::piped());
     let watcher = watcher.spawn().expect("the binary runs");
     wait(0.5);
     simulator.kill();
     wait(0.5);
-    let _again = restarted(&simulator);
+    let _again = plugged_in();
     let ended = watcher.wait_with_output().expect("it ends");
     let said = text(&ended.stderr);
     assert!(ended.status.success(), "{said}");

@@ -1,19 +1,22 @@
 //! A connected board and what can be asked of it: arm under a lease, home, move, stop.
 
+mod questions;
+mod words;
+
 use std::time::Duration;
 
 use indicatif::ProgressBar;
 use tokio::time::timeout;
 use vergence_protocol::{
-    AxisInfo, AxisMask, BoardInfo, Compatibility, ControllerState, FaultRecord, FrameMark, Jog, Micro, Mode, Move,
-    MoveId, MovePhase, Permille, PoseReport, RecordedEvent, Refusal, Report, Request, SessionId, SettingItem,
-    SettingKey, Status, StopKind, Trigger,
+    AxisInfo, AxisMask, BoardInfo, Compatibility, ControllerState, FaultRecord, Jog, Mode, Move, MoveId, MovePhase,
+    Permille, PoseReport, Refusal, Report, Request, SessionId, Status, StopKind,
 };
 use vergence_rig::{AxisPosition, HostInstant, Rig};
 
+pub use self::words::{check_range, describe_fault, describe_pose, positions};
+
 use crate::failure::Failure;
 use crate::link::{Client, LinkError, STREAM_PERIOD_US};
-use crate::move_plan::AxisLimits;
 
 /// Homing and moves of a bench take seconds; a board that needs longer than this is not doing what it says.
 const MOTION_TIMEOUT: Duration = Duration::from_secs(120);
@@ -108,20 +111,6 @@ impl Board {
         &self.axes
     }
 
-    /// What the board's planner works with.
-    ///
-    /// # Errors
-    /// Where the link ended.
-    pub async fn limits(&self) -> Result<Vec<AxisLimits>, Failure> {
-        let mut limits = Vec::new();
-        for (&info, axis) in self.axes.iter().zip(0u8..) {
-            let backlash = self.setting(SettingKey { item: SettingItem::Backlash, axis }).await?;
-            let backlash = Micro(backlash.and_then(|value| i32::try_from(value).ok()).unwrap_or(0));
-            limits.push(AxisLimits { info, backlash });
-        }
-        Ok(limits)
-    }
-
     /// The rig.
     #[must_use]
     pub fn rig(&self) -> &Rig {
@@ -193,68 +182,6 @@ impl Board {
             Report::Ack { status: Status::Refused(refusal), .. } => Ok(Err(refusal)),
             _ => Err(Failure::protocol("the board answered a command with something else")),
         }
-    }
-
-    /// What a setting is, in the units of the wire; `None` where the board has no such setting.
-    ///
-    /// # Errors
-    /// Where the link ended.
-    pub async fn setting(&self, key: SettingKey) -> Result<Option<i64>, Failure> {
-        match self.client.ask(Request::GetSetting(key)).await? {
-            Report::Setting { value, .. } => Ok(Some(value)),
-            Report::Ack { status: Status::Refused(Refusal::NoSetting | Refusal::Invalid), .. } => Ok(None),
-            Report::Ack { status: Status::Refused(refusal), .. } => Err(self.refused(refusal)),
-            _ => Err(Failure::protocol("the board answered a question about a setting with something else")),
-        }
-    }
-
-    /// Changes a setting, in the units of the wire, or says why the board refuses.
-    ///
-    /// # Errors
-    /// Where the link ended.
-    pub async fn set(&self, key: SettingKey, value: i64) -> Result<Result<(), Refusal>, Failure> {
-        self.request(Request::SetSetting { key, value }).await
-    }
-
-    /// What the flight recorder kept, oldest first, and how many earlier events it has forgotten.
-    ///
-    /// # Errors
-    /// A board without recorder, or a link that ended.
-    pub async fn events(&self) -> Result<(Vec<RecordedEvent>, u32), Failure> {
-        let (mut kept, mut next, mut gone) = (Vec::new(), 0, 0);
-        loop {
-            let answer = match self.client.ask(Request::GetEvents { first: next }).await? {
-                Report::Events { events, .. } => events,
-                Report::Ack { status: Status::Refused(refusal), .. } => return Err(self.refused(refusal)),
-                _ => return Err(Failure::protocol("the board answered a question about events with something else")),
-            };
-            gone += answer.first.saturating_sub(next);
-            next = answer.first.saturating_add(answer.events.len() as u32);
-            kept.extend(answer.events.iter().copied());
-            if answer.events.is_empty() || next >= answer.total {
-                return Ok((kept, gone));
-            }
-        }
-    }
-
-    /// Fires the cameras once, and waits for the mark of that pulse.
-    ///
-    /// # Errors
-    /// A refusal, a link that ended, or a mark that was lost.
-    pub async fn fire_cameras(&mut self) -> Result<FrameMark, Failure> {
-        const PATIENCE: Duration = Duration::from_secs(1);
-        self.client.forget_marks();
-        self.ask(Request::SetTrigger(Trigger::Once)).await?;
-        let mark = timeout(PATIENCE, self.next_mark()).await;
-        mark.unwrap_or_else(|_| Err(Failure::device("the board fired the cameras but did not say where the axes were")))
-    }
-
-    /// The next pulse of the camera trigger.
-    ///
-    /// # Errors
-    /// Where the link ended, or the board is silent.
-    pub async fn next_mark(&mut self) -> Result<FrameMark, Failure> {
-        Ok(self.client.next_mark().await?)
     }
 
     /// A refusal in words.
@@ -411,45 +338,6 @@ impl Board {
             None => Some(waited.await),
         }
     }
-}
-
-/// Where the axes are by `pose`.
-#[must_use]
-pub fn positions(rig: &Rig, pose: &PoseReport) -> Vec<AxisPosition> {
-    rig.axes.iter().zip(&pose.counts).map(|(axis, &counts)| axis.position_at(counts)).collect()
-}
-
-/// Refuses targets outside the rig's range, before anything is sent.
-///
-/// # Errors
-/// Names axis, target and range.
-pub fn check_range(rig: &Rig, targets: &[AxisPosition]) -> Result<(), Failure> {
-    for (axis, &target) in rig.axes.iter().zip(targets) {
-        if !axis.contains(target) {
-            let [low, high] = axis.range;
-            return Err(Failure::usage(format!("{} {target} is out of range: choose {low} to {high}", axis.name)));
-        }
-    }
-    Ok(())
-}
-
-/// A pose in one line.
-#[must_use]
-pub fn describe_pose(rig: &Rig, pose: &PoseReport) -> String {
-    let axes = rig.axes.iter().zip(positions(rig, pose)).enumerate().map(|(index, (axis, position))| {
-        let reference = if pose.referenced.contains(index) { "" } else { " (no reference)" };
-        format!("{} {position}{reference}", axis.name)
-    });
-    let mode = rig.mode_name(pose.mode).map(|name| format!(" [{name}]")).unwrap_or_default();
-    format!("{}{mode}  {}", pose.state, axes.collect::<Vec<_>>().join("  "))
-}
-
-/// A fault in a sentence with its remedy.
-#[must_use]
-pub fn describe_fault(rig: &Rig, fault: &FaultRecord) -> String {
-    let axis = fault.axis.and_then(|index| rig.axes.get(usize::from(index)));
-    let axis = axis.map(|axis| format!(" on axis '{}'", axis.name)).unwrap_or_default();
-    format!("{}{axis}; {}", fault.code, fault.code.remedy())
 }
 
 fn empty_pose() -> PoseReport {

@@ -27,7 +27,7 @@ pub struct Args {
 enum What {
     /// Show one setting, or all.
     Get {
-        /// Such as baseline.speed.
+        /// Such as baseline.speed, or baseline for all of that axis.
         key: Option<String>,
         /// Write all to a file that `set --file` reads.
         #[arg(long, value_name = "FILE", conflicts_with = "key")]
@@ -58,8 +58,10 @@ pub async fn run(args: &Args, globals: &Globals, console: Console) -> Result<(),
     // Settings must stay reachable when they contradict the rig file: they may be what has to be mended.
     let mut board = connect_any(globals, console, "settings").await?;
     match &args.what {
-        What::Get { key: Some(key), .. } => get_one(&board, key, console).await,
-        What::Get { key: None, out } => get_all(&board, out.as_ref(), console).await,
+        What::Get { key: Some(key), .. } if board.rig().axis_index(key).is_none() => {
+            get_one(&board, key, console).await
+        }
+        What::Get { key: axis, out } => get_all(&board, axis.as_deref(), out.as_ref(), console).await,
         What::Set { file: Some(path), .. } => {
             let changed = file::apply(&mut board, path).await?;
             let list = changed.iter().map(|change| format!("\n  {change}")).collect::<String>();
@@ -92,8 +94,7 @@ fn say_unsaved(console: Console, changed: bool) -> Result<(), Failure> {
 /// The setting called `name`.
 fn find(board: &Board, name: &str) -> Result<NamedSetting, Failure> {
     let all = settings(board.rig());
-    let like = |setting: &&NamedSetting| setting.item == name || setting.axis.as_deref() == Some(name);
-    let near: Vec<_> = all.iter().filter(like).map(NamedSetting::name).collect();
+    let near: Vec<_> = all.iter().filter(|setting| setting.item == name).map(NamedSetting::name).collect();
     let hint = if near.is_empty() { "'vergence config get' lists all".into() } else { near.join(", ") };
     let found = all.into_iter().find(|setting| setting.name() == name);
     found.ok_or_else(|| Failure::usage(format!("there is no setting '{name}': {hint}")))
@@ -108,8 +109,10 @@ async fn get_one(board: &Board, name: &str, console: Console) -> Result<(), Fail
     console.result(&json!({ name: json_value(&setting, value) }))
 }
 
-async fn get_all(board: &Board, out: Option<&PathBuf>, console: Console) -> Result<(), Failure> {
-    let present = read_all(board).await?;
+/// All settings, or those of one axis.
+async fn get_all(board: &Board, axis: Option<&str>, out: Option<&PathBuf>, console: Console) -> Result<(), Failure> {
+    let mut present = read_all(board).await?;
+    present.retain(|(setting, _)| axis.is_none() || setting.axis.as_deref() == axis);
     if let Some(path) = out {
         write_whole(path, file::text(board, &present).as_bytes())?;
         console.say(format!("{} settings written to {}", present.len(), path.display()))?;

@@ -70,7 +70,11 @@ pub fn port(globals: &Globals) -> Result<Port, Failure> {
 /// Whether bytes take time on this port: pseudo-terminals and TCP carry them at once.
 #[must_use]
 pub fn is_wire(globals: &Globals) -> bool {
-    matches!(port(globals), Ok(Port::Serial(path)) if !path.starts_with("/dev/pts"))
+    match port(globals) {
+        // A name that a rule or a person gave to the device is still that device.
+        Ok(Port::Serial(path)) => !path.canonicalize().unwrap_or(path).starts_with("/dev/pts"),
+        _ => false,
+    }
 }
 
 async fn wire(port: &Port, baud: u32, rig: &Rig) -> Result<OpenWire, Failure> {

@@ -49,7 +49,11 @@ pub async fn run(args: &Args, globals: &Globals, console: Console) -> Result<(),
     let wide = rig.axes.iter().map(|axis| axis.name.len()).max().unwrap_or(0);
     for (axis, planned) in rig.axes.iter().zip(&plan.axes) {
         let peak = AxisPosition::from_value(axis.kind, planned.peak_speed());
-        console.say(format!("{:wide$}  {} -> {}, at most {peak}/s", axis.name, planned.from, planned.to))?;
+        let way = match planned.knots.is_empty() {
+            true => format!("stays at {}", planned.to),
+            false => format!("{} -> {}, at most {peak}/s", planned.from, planned.to),
+        };
+        console.say(format!("{:wide$}  {way}", axis.name))?;
     }
     console.say(format!("takes {:.3} s within the limits of {}", plan.duration, board.info().board))?;
     console.say(format!(

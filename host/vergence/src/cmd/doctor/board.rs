@@ -2,13 +2,13 @@
 
 use std::time::Duration;
 
-use vergence_protocol::{Compatibility, ControllerState, ResetCause};
+use vergence_protocol::{Compatibility, ControllerState, ResetCause, SettingItem, SettingKey};
 use vergence_rig::AxisPosition;
 
 use super::Finding;
 use crate::board::{Board, describe_fault};
 use crate::cli::Globals;
-use crate::cmd::connect::connect;
+use crate::cmd::connect::{connect, is_wire};
 use crate::cmd::link_figures::LinkFigures;
 use crate::cmd::move_to::is_referenced;
 use crate::cmd::report::describe_clock;
@@ -34,6 +34,7 @@ pub async fn examine(globals: &Globals, console: Console) -> Vec<Finding> {
     }
     findings.extend([clock(&board), state(&board), reference(&board)]);
     findings.extend(limits(&board));
+    findings.push(settings(&board, globals).await);
     findings
 }
 
@@ -162,4 +163,21 @@ fn limits(board: &Board) -> Vec<Finding> {
         Finding::pass("limits", format!("{name} goes from {low} to {high}, which the board grants"))
     })
     .collect()
+}
+
+/// Settings must be readable, and the line speed the one in use: a changed one works from the next start on.
+async fn settings(board: &Board, globals: &Globals) -> Finding {
+    let read = async |item| board.setting(SettingKey { item, axis: 0 }).await;
+    match (read(SettingItem::Baud).await, read(SettingItem::StreamPeriod).await) {
+        (Ok(Some(baud)), Ok(Some(_))) if is_wire(globals) && baud != i64::from(globals.baud) => Finding::warn(
+            "settings",
+            format!("the board will speak {baud} baud from its next start on, and this is {}", globals.baud),
+            format!("use --baud {baud} from then on, or 'vergence config set baud {}'", globals.baud),
+        ),
+        (Ok(Some(baud)), Ok(Some(_))) => Finding::pass("settings", format!("can be read; {baud} baud")),
+        (Err(failure), _) | (_, Err(failure)) => {
+            Finding::fail("settings", failure.to_string(), "check the link, or 'vergence config restore'")
+        }
+        _ => Finding::warn("settings", "this firmware keeps no settings", "update the firmware"),
+    }
 }
