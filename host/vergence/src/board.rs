@@ -141,14 +141,15 @@ impl Board {
         self.client.clock_map().host_at(self.pose.at)
     }
 
-    /// Waits until the clocks have been compared.
+    /// Waits until the board's clock is known well, or as well as half a second on this link allows.
     ///
     /// # Errors
     /// Where the link ended.
     pub async fn compare_clocks(&mut self) -> Result<(), Failure> {
-        const PATIENCE: Duration = Duration::from_secs(1);
+        const PATIENCE: Duration = Duration::from_millis(500);
+        const WELL_US: f64 = 200.0;
         let compared = async {
-            while self.pose_on_host_clock().is_none() {
+            while self.pose_on_host_clock().is_none_or(|at| at.error_us > WELL_US) {
                 self.next_pose().await?;
             }
             Ok(())
