@@ -13,7 +13,7 @@ use vergence_protocol::{
 };
 use vergence_rig::{AxisPosition, HostInstant, Rig};
 
-pub use self::words::{check_range, describe_fault, describe_pose, positions};
+pub use self::words::{check_range, describe_fault, describe_pose, positions, staying};
 
 use crate::failure::Failure;
 use crate::link::{Client, LinkError, STREAM_PERIOD_US};
@@ -139,6 +139,12 @@ impl Board {
     #[must_use]
     pub fn pose_on_host_clock(&self) -> Option<HostInstant> {
         self.client.clock_map().host_at(self.pose.at)
+    }
+
+    /// Where the axes stay that are not to move.
+    #[must_use]
+    pub fn standing(&self) -> Vec<AxisPosition> {
+        self.rig.axes.iter().zip(self.positions()).map(|(axis, present)| staying(axis, present)).collect()
     }
 
     /// Waits until the board's clock is known well, or as well as half a second on this link allows.

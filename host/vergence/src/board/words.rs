@@ -1,7 +1,8 @@
 //! Poses and faults in words, and positions against the rig's ranges.
 
-use vergence_protocol::{FaultRecord, PoseReport};
-use vergence_rig::{AxisPosition, Rig};
+use vergence_protocol::{AxisKind, FaultRecord, PoseReport};
+use vergence_rig::{AxisPosition, Rig, RigAxis};
+use vergence_vision::{Angle, Length};
 
 use crate::failure::Failure;
 
@@ -9,6 +10,21 @@ use crate::failure::Failure;
 #[must_use]
 pub fn positions(rig: &Rig, pose: &PoseReport) -> Vec<AxisPosition> {
     rig.axes.iter().zip(&pose.counts).map(|(axis, &counts)| axis.position_at(counts)).collect()
+}
+
+/// Where an axis stays that is not to move: where it is, and at the end of its range where it came to rest a hair beyond.
+/// The board knows where it was sent; encoder and play show it a little off.
+#[must_use]
+pub fn staying(axis: &RigAxis, present: AxisPosition) -> AxisPosition {
+    let hair = match axis.kind {
+        AxisKind::Linear => AxisPosition::Linear(Length::from_mm(0.05)),
+        AxisKind::Rotary => AxisPosition::Rotary(Angle::from_deg(0.05)),
+    };
+    let nearest = |end: &AxisPosition| (present.value() - end.value()).abs() < hair.value();
+    match axis.range.into_iter().find(nearest) {
+        Some(end) if !axis.contains(present) => end,
+        _ => present,
+    }
 }
 
 /// Refuses targets outside the rig's range, before anything is sent.

@@ -98,7 +98,7 @@ pub async fn run(args: &Args, globals: &Globals, console: Console) -> Result<(),
         named.iter().zip(&rig.axes).map(|(position, axis)| position.unwrap_or(axis.range[0])).collect();
     check_range(&rig, &certain)?;
     let mut board = connect(globals, console, "moving").await?;
-    let targets = named.iter().zip(board.positions()).map(|(named, present)| named.unwrap_or(present)).collect();
+    let targets = named.iter().zip(board.standing()).map(|(named, present)| named.unwrap_or(present)).collect();
     go(&mut board, &Goal { mode: Mode(0), targets }, console).await
 }
 
@@ -108,7 +108,7 @@ async fn go_by(rig: &Rig, named: &[Option<AxisPosition>], globals: &Globals, con
     let mut board = connect(globals, console, "moving").await?;
     let before = board.positions();
     if is_referenced(&board) {
-        let targets = before.iter().zip(&by).map(|(before, &by)| before.plus(by)).collect::<Vec<_>>();
+        let targets = board.standing().iter().zip(&by).map(|(before, &by)| before.plus(by)).collect::<Vec<_>>();
         check_range(rig, &targets)?;
     }
     board.armed(async |board| board.move_by(&by).await).await?;

@@ -77,7 +77,7 @@ pub async fn run(args: &Args, globals: &Globals, console: Console) -> Result<(),
 fn standing(board: &Board) -> Vec<AxisPosition> {
     let rig = board.rig();
     if is_referenced(board) {
-        return board.positions();
+        return board.standing();
     }
     rig.axes.iter().map(|axis| axis.range[0]).collect()
 }
