@@ -170,6 +170,18 @@ impl Trajectory {
         self.target
     }
 
+    /// Where each piece begins: seconds since the start, the state, and the jerk from there on; then the end, at rest.
+    pub fn knots(&self) -> impl Iterator<Item = (f64, MotionState, Fine)> + '_ {
+        let mut begins = 0;
+        let pieces = self.segments.iter().map(move |segment| {
+            let start = begins;
+            begins += segment.duration;
+            (start as f64 / f64::from(TICKS_PER_SECOND), segment.start, segment.jerk)
+        });
+        let end = (self.duration as f64 / f64::from(TICKS_PER_SECOND), MotionState::at(self.target), 0);
+        pieces.chain((self.duration > 0).then_some(end))
+    }
+
     /// The state `elapsed` after the start.
     #[must_use]
     pub fn state(&self, elapsed: Microseconds) -> MotionState {

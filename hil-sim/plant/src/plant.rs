@@ -19,6 +19,7 @@ pub struct Plant {
     /// When the cameras are to be fired.
     trigger_at: Option<Microseconds>,
     trigger_edges: VecDeque<TriggerEdge>,
+    exposed: Option<(Microseconds, Vec<f64>)>,
 }
 
 impl Plant {
@@ -35,6 +36,7 @@ impl Plant {
             emergency_stop: false,
             trigger_at: None,
             trigger_edges: VecDeque::new(),
+            exposed: None,
         }
     }
 
@@ -63,6 +65,12 @@ impl Plant {
         }
     }
 
+    /// When the cameras were last fired, and where every load truly was then, in micro-units.
+    #[must_use]
+    pub fn exposed(&self) -> Option<(Microseconds, &[f64])> {
+        self.exposed.as_ref().map(|(at, loads)| (*at, loads.as_slice()))
+    }
+
     /// One axis, for doing something to it; `None` where there is no such axis.
     pub fn axis_mut(&mut self, axis: usize) -> Option<&mut AxisPlant> {
         self.axes.get_mut(axis)
@@ -73,6 +81,7 @@ impl Plant {
         self.set_drivers(false);
         self.trigger_at = None;
         self.trigger_edges.clear();
+        self.exposed = None;
         self.now = Microseconds(0);
     }
 
@@ -109,6 +118,7 @@ impl Plant {
     fn latch(&mut self) {
         let counts = self.axes.iter().map(AxisPlant::encoder).collect();
         self.trigger_edges.push_back(TriggerEdge { at: self.now, counts });
+        self.exposed = Some((self.now, self.loads()));
     }
 
     fn run_to(&mut self, to: Microseconds) {

@@ -11,6 +11,7 @@ mod camera_file;
 mod chain;
 mod clock;
 mod file;
+mod frame_pair;
 mod interchange;
 mod pair_file;
 mod pose;
@@ -23,6 +24,7 @@ pub use camera_file::{CalibrationTable, CameraDocument, CameraTable, Provenance}
 pub use chain::{Chain, Link, Screw};
 pub use clock::{BoardInstant, ClockDrift, ClockMap, Exchange, HostInstant};
 pub use file::RigError;
+pub use frame_pair::{FramePair, Pairing, PairingError, StampedFrame, TriggerDelay, pair_frames};
 pub use interchange::{Camchain, CameraFormat, InterchangeError, kalibr, opencv};
 pub use pair_file::CalibratedPair;
 pub use pose::RigPose;

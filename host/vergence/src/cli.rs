@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 use std::process::ExitCode;
 
-use clap::{Parser, Subcommand};
+use clap::{CommandFactory, Parser, Subcommand};
 
 use crate::cmd;
 use crate::console::Console;
@@ -50,6 +50,8 @@ enum Verb {
     Devices(cmd::devices::Args),
     /// Tell what the board is doing, and why it stopped.
     Status(cmd::status::Args),
+    /// Check ports, permissions, link, clock and board, and say what to do.
+    Doctor(cmd::doctor::Args),
     /// Arm the board and keep it armed until Ctrl-C.
     Arm(cmd::arm::Args),
     /// Disarm the board; in motion it brakes first.
@@ -62,10 +64,18 @@ enum Verb {
     Mode(cmd::mode::Args),
     /// Go to any pose.
     Move(cmd::move_to::Args),
+    /// Show a move before it is made: time, segments, zones.
+    Plan(cmd::plan::Args),
     /// Brake now, even while another vergence holds the port.
     Stop(cmd::stop::Args),
     /// Show poses as they come.
     Monitor(cmd::monitor::Args),
+    /// Fire the cameras, and show where the axes were.
+    Trigger(cmd::trigger::Args),
+    /// Measure the link: round trips, losses, repeats.
+    LinkTest(cmd::link_test::Args),
+    /// Show and change the board's settings.
+    Config(cmd::config::Args),
     /// Run a simulated board that other programs can talk to.
     Sim(cmd::sim::Args),
     /// Let everything go wrong, ten thousand times, and check that the rig stays safe.
@@ -84,6 +94,13 @@ enum Verb {
     Camera(cmd::camera::Args),
     /// Draw a chessboard to print.
     Target(cmd::target::Args),
+    /// Print a script that lets a shell complete this command.
+    Completions(cmd::completions::Args),
+}
+
+/// The whole command line, for what describes it.
+pub fn command() -> clap::Command {
+    Cli::command()
 }
 
 /// Runs the command line and returns the exit code.
@@ -121,14 +138,19 @@ fn execute(cli: Cli) -> Result<(), Failure> {
         match verb {
             Verb::Devices(args) => cmd::devices::run(&args, console),
             Verb::Status(args) => cmd::status::run(&args, &globals, console).await,
+            Verb::Doctor(args) => cmd::doctor::run(&args, &globals, console).await,
             Verb::Arm(args) => cmd::arm::run(&args, &globals, console).await,
             Verb::Disarm(args) => cmd::disarm::run(&args, &globals, console).await,
             Verb::Clear(args) => cmd::clear::run(&args, &globals, console).await,
             Verb::Home(args) => cmd::home::run(&args, &globals, console).await,
             Verb::Mode(args) => cmd::mode::run(&args, &globals, console).await,
             Verb::Move(args) => cmd::move_to::run(&args, &globals, console).await,
+            Verb::Plan(args) => cmd::plan::run(&args, &globals, console).await,
             Verb::Stop(args) => cmd::stop::run(&args, &globals, console).await,
             Verb::Monitor(args) => cmd::monitor::run(&args, &globals, console).await,
+            Verb::Trigger(args) => cmd::trigger::run(&args, &globals, console).await,
+            Verb::LinkTest(args) => cmd::link_test::run(&args, &globals, console).await,
+            Verb::Config(args) => cmd::config::run(&args, &globals, console).await,
             Verb::Sim(args) => cmd::sim::run(&args, &globals, console).await,
             Verb::Soak(args) => cmd::soak::run(&args, console),
             Verb::Demo(args) => cmd::demo::run(&args, &globals, console).await,
@@ -138,6 +160,7 @@ fn execute(cli: Cli) -> Result<(), Failure> {
             Verb::Calibrate(args) => cmd::calibrate::run(&args, console),
             Verb::Camera(args) => cmd::camera::run(&args, console),
             Verb::Target(args) => cmd::target::run(&args, console),
+            Verb::Completions(args) => cmd::completions::run(&args, console),
         }
     })
 }

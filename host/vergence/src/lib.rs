@@ -17,9 +17,12 @@ mod corners;
 pub mod failure;
 pub mod link;
 pub mod look;
+pub mod move_plan;
 mod output;
 mod provenance;
 mod rig_file;
+mod rig_zones;
+pub mod setting_text;
 pub mod sim;
 mod stopwatch;
 

@@ -2,6 +2,8 @@
 
 mod board_options;
 mod connect;
+mod link_figures;
+mod reconnect;
 mod report;
 
 pub mod arm;
@@ -9,17 +11,23 @@ pub mod calibrate;
 pub mod camera;
 pub mod capture;
 pub mod clear;
+pub mod completions;
+pub mod config;
 pub mod demo;
 pub mod depth;
 pub mod devices;
 pub mod disarm;
+pub mod doctor;
 pub mod home;
+pub mod link_test;
 pub mod mode;
 pub mod monitor;
 pub mod move_to;
+pub mod plan;
 pub mod sim;
 pub mod soak;
 pub mod status;
 pub mod stop;
 pub mod target;
+pub mod trigger;
 pub mod zones;
