@@ -8,7 +8,7 @@ use vergence_calibration::{
     BoardView, ExtrinsicsCalibration, ExtrinsicsOptions, LensKnowledge, RelativePose, StereoView, calibrate_extrinsics,
     extrinsics_report,
 };
-use vergence_rig::CalibratedPair;
+use vergence_rig::Rig;
 use vergence_vision::{Angle, KannalaBrandt, Length};
 
 use super::views::{about, from_images};
@@ -91,15 +91,13 @@ pub fn run(args: &Args, console: Console) -> Result<(), Failure> {
     if let Some(path) = &args.out {
         let sigma = sigma(&calibration);
         let norm = |part: &[f64]| part.iter().map(|x| x * x).sum::<f64>().sqrt();
-        let pair = CalibratedPair {
-            name: &path.file_stem().unwrap_or_default().to_string_lossy(),
-            left: &calibration.left,
-            right: &calibration.right,
-            left_from_right: calibration.joint.left_from_right,
-            sigma: (Angle::from_rad(norm(&sigma[..3])), Length::from_mm(norm(&sigma[3..]))),
-            provenance: &provenance,
-        };
-        let text = pair.to_toml().map_err(|error| Failure::output(path, error))?;
+        let pair = Rig::fixed_pair(
+            &path.file_stem().unwrap_or_default().to_string_lossy(),
+            (calibration.left, calibration.right),
+            calibration.joint.left_from_right,
+            (Angle::from_rad(norm(&sigma[..3])), Length::from_mm(norm(&sigma[3..]))),
+        );
+        let text = pair.to_toml(&provenance).map_err(|error| Failure::output(path, error))?;
         write_whole(path, text.as_bytes())?;
     }
     tell(&calibration, console)?;
