@@ -8,6 +8,7 @@ use clap::{Parser, Subcommand};
 use crate::cmd;
 use crate::console::Console;
 use crate::failure::{Failure, FailureKind};
+use crate::slots;
 
 /// Moves a stereo rig of two fisheye cameras between its vision modes, and measures what it sees.
 #[derive(Debug, Parser)]
@@ -33,7 +34,8 @@ pub struct Globals {
     /// Speed of a serial port.
     #[arg(long, global = true, default_value_t = 921_600)]
     pub baud: u32,
-    /// The rig file. Without it, the built-in bench.
+    /// The rig file. Without it, the active calibration (see `calibrate use`), or else the built-in bench; demo and soak
+    /// always take the bench.
     #[arg(long, global = true, env = "VERGENCE_RIG", value_name = "FILE")]
     pub rig: Option<PathBuf>,
     /// How long the board may go without hearing from this program before it brakes, 20ms to 1s.
@@ -108,7 +110,10 @@ fn tell(failure: &Failure) {
 }
 
 fn execute(cli: Cli) -> Result<(), Failure> {
-    let Cli { globals, verb } = cli;
+    let Cli { mut globals, verb } = cli;
+    if globals.rig.is_none() && !matches!(verb, Verb::Demo(_) | Verb::Soak(_)) {
+        globals.rig = slots::active_rig()?;
+    }
     let console = Console::new(globals.json);
     // With the board in this process nothing outside sets the pace: time can be virtual, and motion costs none.
     let virtual_time = matches!(verb, Verb::Demo(_)) || globals.port.as_deref() == Some("sim");
@@ -135,7 +140,7 @@ fn execute(cli: Cli) -> Result<(), Failure> {
             Verb::Depth(args) => cmd::depth::run(&args, &globals, console),
             Verb::Zones(args) => cmd::zones::run(&args, console),
             Verb::Capture(args) => cmd::capture::run(&args, &globals, console),
-            Verb::Calibrate(args) => cmd::calibrate::run(&args, console),
+            Verb::Calibrate(args) => cmd::calibrate::run(&args, &globals, console).await,
             Verb::Camera(args) => cmd::camera::run(&args, console),
             Verb::Target(args) => cmd::target::run(&args, console),
         }

@@ -1,6 +1,7 @@
 //! One module per verb.
 
 mod board_options;
+mod camera_options;
 mod connect;
 mod report;
 
