@@ -31,6 +31,7 @@ const VERBS: &[&str] = &[
     "calibrate",
     "camera",
     "target",
+    "bench",
     "soak",
 ];
 

@@ -70,6 +70,8 @@ enum Verb {
     Monitor(cmd::monitor::Args),
     /// Run a simulated board that other programs can talk to.
     Sim(cmd::sim::Args),
+    /// Measure how fast this program is, beside others on the same work.
+    Bench(cmd::bench::Args),
     /// Let everything go wrong, ten thousand times, and check that the rig stays safe.
     Soak(cmd::soak::Args),
     /// Run the whole rig in simulation: home, herbivore, human, look, measure.
@@ -80,7 +82,7 @@ enum Verb {
     Zones(cmd::zones::Args),
     /// Take a set of board views for calibration, with advice on what to show.
     Capture(cmd::capture::Args),
-    /// Calibrate cameras and pairs from boards, and compare calibrations.
+    /// Calibrate cameras, pairs and moving stages from boards; compare and keep calibrations.
     Calibrate(cmd::calibrate::Args),
     /// Show and convert camera files, and use them for single points.
     Camera(cmd::camera::Args),
@@ -135,6 +137,7 @@ fn execute(cli: Cli) -> Result<(), Failure> {
             Verb::Stop(args) => cmd::stop::run(&args, &globals, console).await,
             Verb::Monitor(args) => cmd::monitor::run(&args, &globals, console).await,
             Verb::Sim(args) => cmd::sim::run(&args, &globals, console).await,
+            Verb::Bench(args) => cmd::bench::run(&args, console),
             Verb::Soak(args) => cmd::soak::run(&args, console),
             Verb::Demo(args) => cmd::demo::run(&args, &globals, console).await,
             Verb::Depth(args) => cmd::depth::run(&args, &globals, console),

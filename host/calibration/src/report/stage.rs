@@ -25,7 +25,6 @@ pub fn stage_report(stage: &StageCalibration, rig: &Rig, held_out: &[HeldOutPose
         depth_figures(stage, rig),
         section("Stage poses", &pose_table(&stage.poses)),
         section("Stage poses held out", &held_out_table(held_out)),
-        section("What the stage poses tell", &note(&stage.observability.to_string())),
     ];
     page("Stage calibration", about, &body.concat())
 }
