@@ -25,7 +25,7 @@ pub struct Validation {
     /// The views were divided into so many parts; each was predicted by a calibration of the others.
     pub folds: usize,
     /// Distance between corners and reprojection, root mean square per corner over all held-out views. Corners that the
-    /// calibration of all views left out do not count.
+    /// calibration of all views left out do not count, nor do those outside the valid cone of one that did not see them.
     pub rms_px: f64,
     /// Each view that could be predicted.
     pub views: Vec<HeldOutView>,
