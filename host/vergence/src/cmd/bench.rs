@@ -17,6 +17,9 @@ pub struct Args {
 #[derive(Debug, clap::Subcommand)]
 enum Task {
     /// Calibration and detection of boards, beside OpenCV and SciPy.
+    ///
+    /// Solves every fisheye set and detects every chessboard, then lets OpenCV (cv2.fisheye.calibrate with its crude
+    /// guess, the SB detector) and SciPy's bundle adjustment do the same. Everything runs on one thread.
     Calibrate(calibrate::Args),
 }
 

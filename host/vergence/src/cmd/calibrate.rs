@@ -28,12 +28,17 @@ enum Task {
     /// A pair: where the right camera is, and how sure that is.
     Extrinsics(extrinsics::Args),
     /// A moving stage: its screws and encoders, for every pose that it can take.
+    ///
+    /// From a board seen at several stage poses: three suffice, six are recommended, each with a dozen views or more.
+    /// --rig names the drawing: axes, modes and screws as they were meant.
     Stage(Box<stage::Args>),
     /// How far two calibrations of a camera differ over the field.
     Diff(diff::Args),
     /// The calibrations that are kept.
     List(slots::List),
     /// Make a kept calibration the active one.
+    ///
+    /// It is then the rig of every verb that is given no --rig. It is swapped whole or not at all.
     Use(slots::Use),
     /// Make the calibration active again that was so before.
     Rollback(slots::Rollback),

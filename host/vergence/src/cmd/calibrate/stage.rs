@@ -23,20 +23,8 @@ use crate::provenance::InputHash;
 use crate::rig_file;
 use crate::stopwatch::Stopwatch;
 
-/// Calibrates how the axes carry the cameras, from a board seen at several stage poses: three suffice, six are
-/// recommended, each with a dozen views or more. Afterwards the cameras' relative pose is known wherever the stage stands.
-/// --rig names the drawing: axes, modes and screws as they were meant.
-///
-/// --set DIR holds poses.csv and one folder of images for each stage pose, left000.png, right000.png and so on, as
-/// `vergence capture --out DIR/pose1` takes them. The columns of poses.csv are `folder` and the encoder reading of every
-/// axis of the rig, called after it: baseline_mm, separation_deg.
-///
-/// --corners CSV has the columns camera,file,frame,idx,x,y,bx_mm,by_mm and the same columns of readings in every row.
-/// Frames, numbered through the whole file, pair the views; frames with the same readings make a stage pose.
-///
-/// --live fills the set itself: it homes the rig, drives it to one pose after the other and says where to show the board.
+/// Calibrates how the axes carry the cameras; --rig names the drawing.
 #[derive(Debug, clap::Args)]
-#[command(verbatim_doc_comment)]
 #[group(id = "source", required = true, multiple = false, args = ["set", "corners"])]
 pub struct Args {
     #[command(flatten)]
@@ -44,9 +32,17 @@ pub struct Args {
     #[command(flatten)]
     board: BoardOptions,
     /// The folder with poses.csv and the images; with --live it is made.
+    ///
+    /// It has one folder of images for each stage pose, left000.png, right000.png and so on, as `vergence capture --out
+    /// DIR/pose01` takes them. The columns of poses.csv are `folder` and the encoder reading of every axis of the rig,
+    /// called after it: baseline_mm, separation_deg.
     #[arg(long, value_name = "DIR")]
     set: Option<PathBuf>,
     /// Corners and encoder readings instead of images.
+    ///
+    /// The columns are camera,file,frame,idx,x,y,bx_mm,by_mm and, in every row, the encoder reading of every axis of the
+    /// rig, called after it: baseline_mm, separation_deg. Frames are numbered through the whole file and pair the views;
+    /// frames with the same readings make a stage pose.
     #[arg(long, value_name = "CSV")]
     corners: Option<PathBuf>,
     /// The left and the right camera: as the CSV file calls them (left right), or with --live their devices, or sim.

@@ -28,6 +28,9 @@ use crate::sim::{SharedRig, SimulatedRig, built, spawn_in_process};
 #[derive(Debug, clap::Args)]
 pub struct Options {
     /// Drive the rig itself through the stage poses and take the views.
+    ///
+    /// It homes the rig, moves it to poses far apart, and says at each where to show the board. A view counts where both
+    /// cameras see the board held still, somewhere new. What was taken is kept in the set, whatever ends it.
     #[arg(long, requires = "set")]
     pub live: bool,
     /// With --live: how many stage poses.
