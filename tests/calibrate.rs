@@ -326,7 +326,7 @@ fn images_without_a_board_or_of_two_sizes_are_told() {
 
 /// A chessboard of `columns` x `rows` inner corners, seen from straight ahead.
 fn chessboard(path: &str, columns: u32, rows: u32) {
-    let square = |x: u32, y: u32| (x / 30 + y / 30) % 2 == 0;
+    let square = |x: u32, y: u32| (x / 30 + y / 30).is_multiple_of(2);
     let picture = image::RgbImage::from_fn(30 * (columns + 5), 30 * (rows + 5), |x, y| {
         let inside = (60..60 + 30 * (columns + 1)).contains(&x) && (60..60 + 30 * (rows + 1)).contains(&y);
         image::Rgb([if inside && square(x, y) { 20 } else { 230 }; 3])
