@@ -36,6 +36,7 @@ const VERBS: &[&str] = &[
     "calibrate",
     "camera",
     "target",
+    "bench",
     "soak",
     "completions",
 ];
@@ -304,4 +305,15 @@ fn depth_of_given_correspondences() {
     for (got, expected) in numbers.iter().zip([100.0, 0.0, 100.0]) {
         assert!((got - expected).abs() < 0.01, "{numbers:?}");
     }
+}
+
+#[test]
+fn a_bench_without_its_data_or_peers_says_so() {
+    let folder = temporary();
+    let bench = ["bench", "calibrate", "--shared", folder.path().to_str().expect("a name")];
+    fails_with(&bench, 2, &["no calibration data", "VERGENCE_SHARED"]);
+    let Some(shared) = common::shared("data") else { return };
+    let shared = shared.parent().expect("above it").to_string_lossy().into_owned();
+    let bench = ["bench", "calibrate", "--shared", &shared, "--python", "/nowhere/python"];
+    fails_with(&bench, 2, &["/nowhere/python", "--no-peer"]);
 }

@@ -8,6 +8,7 @@ use clap::{CommandFactory, Parser, Subcommand};
 use crate::cmd;
 use crate::console::Console;
 use crate::failure::{Failure, FailureKind};
+use crate::slots;
 
 /// Moves a stereo rig of two fisheye cameras between its vision modes, and measures what it sees.
 #[derive(Debug, Parser)]
@@ -33,7 +34,8 @@ pub struct Globals {
     /// Speed of a serial port.
     #[arg(long, global = true, default_value_t = 921_600)]
     pub baud: u32,
-    /// The rig file. Without it, the built-in bench.
+    /// The rig file. Without it, the active calibration (see `calibrate use`), or else the built-in bench; demo and soak
+    /// always take the bench.
     #[arg(long, global = true, env = "VERGENCE_RIG", value_name = "FILE")]
     pub rig: Option<PathBuf>,
     /// How long the board may go without hearing from this program before it brakes, 20ms to 1s.
@@ -78,6 +80,8 @@ enum Verb {
     Config(cmd::config::Args),
     /// Run a simulated board that other programs can talk to.
     Sim(cmd::sim::Args),
+    /// Measure how fast this program is, beside others on the same work.
+    Bench(cmd::bench::Args),
     /// Let everything go wrong, ten thousand times, and check that the rig stays safe.
     Soak(cmd::soak::Args),
     /// Run the whole rig in simulation: home, herbivore, human, look, measure.
@@ -88,7 +92,7 @@ enum Verb {
     Zones(cmd::zones::Args),
     /// Take a set of board views for calibration, with advice on what to show.
     Capture(cmd::capture::Args),
-    /// Calibrate cameras and pairs from boards, and compare calibrations.
+    /// Calibrate cameras, pairs and moving stages from boards; compare and keep calibrations.
     Calibrate(cmd::calibrate::Args),
     /// Show and convert camera files, and use them for single points.
     Camera(cmd::camera::Args),
@@ -125,7 +129,10 @@ fn tell(failure: &Failure) {
 }
 
 fn execute(cli: Cli) -> Result<(), Failure> {
-    let Cli { globals, verb } = cli;
+    let Cli { mut globals, verb } = cli;
+    if globals.rig.is_none() && !matches!(verb, Verb::Demo(_) | Verb::Soak(_)) {
+        globals.rig = slots::active_rig()?;
+    }
     let console = Console::new(globals.json);
     // With the board in this process nothing outside sets the pace: time can be virtual, and motion costs none.
     let virtual_time = matches!(verb, Verb::Demo(_)) || globals.port.as_deref() == Some("sim");
@@ -152,12 +159,13 @@ fn execute(cli: Cli) -> Result<(), Failure> {
             Verb::LinkTest(args) => cmd::link_test::run(&args, &globals, console).await,
             Verb::Config(args) => cmd::config::run(&args, &globals, console).await,
             Verb::Sim(args) => cmd::sim::run(&args, &globals, console).await,
+            Verb::Bench(args) => cmd::bench::run(&args, console),
             Verb::Soak(args) => cmd::soak::run(&args, console),
             Verb::Demo(args) => cmd::demo::run(&args, &globals, console).await,
             Verb::Depth(args) => cmd::depth::run(&args, &globals, console),
             Verb::Zones(args) => cmd::zones::run(&args, console),
             Verb::Capture(args) => cmd::capture::run(&args, &globals, console),
-            Verb::Calibrate(args) => cmd::calibrate::run(&args, console),
+            Verb::Calibrate(args) => cmd::calibrate::run(&args, &globals, console).await,
             Verb::Camera(args) => cmd::camera::run(&args, console),
             Verb::Target(args) => cmd::target::run(&args, console),
             Verb::Completions(args) => cmd::completions::run(&args, console),

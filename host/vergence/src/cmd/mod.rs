@@ -1,12 +1,14 @@
 //! One module per verb.
 
 mod board_options;
+mod camera_options;
 mod connect;
 mod link_figures;
 mod reconnect;
 mod report;
 
 pub mod arm;
+pub mod bench;
 pub mod calibrate;
 pub mod camera;
 pub mod capture;
