@@ -26,6 +26,14 @@ fn three_hundred_scenarios_break_no_promise() {
     }
 }
 
+#[test]
+fn hosts_jog_and_change_their_minds_in_mid_move() {
+    let logs: String = (1..=60).map(|seed| play(seed).journal.to_string()).collect();
+    for part in ["host: Jog(", "next is Retarget(", "next is Jog("] {
+        assert!(logs.matches(part).count() > 5, "{part}");
+    }
+}
+
 /// What leaves the mechanics and the encoders whole must not keep a host from what it wants.
 #[test]
 fn faults_of_line_and_host_delay_but_do_not_defeat() {

@@ -24,6 +24,7 @@ fn about() -> ReportAbout {
         date: "2026-11-21".into(),
         board: "9 × 6 inner corners, 25 mm <card & glue>".into(),
         half_field: Some(Angle::from_deg(100.0)),
+        held_out: None,
     }
 }
 

@@ -122,6 +122,10 @@ impl Watch {
         }
     }
 
+    pub fn settings(&self) -> Vec<AxisSettings> {
+        self.paths.iter().map(|path| path.settings).collect()
+    }
+
     /// Whether any axis was commanded to move in the latest tick.
     pub fn moves(&self) -> bool {
         self.paths.iter().any(|path| path.commanded.len() > 1 && path.moves())
@@ -258,7 +262,8 @@ impl Watch {
             }
             (Request::ClearFault { seen }, Status::Accepted) => {
                 assert_eq!(self.fault.map(|fault| fault.seq), Some(*seen));
-                assert!(pose.state == ControllerState::Idle && !rig.drivers, "{pose:?}");
+                let off = matches!(pose.state, ControllerState::Idle | ControllerState::SelfTest);
+                assert!(off && !rig.drivers, "{pose:?}");
                 self.fault = None;
             }
             _ => {}
