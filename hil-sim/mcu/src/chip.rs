@@ -5,7 +5,7 @@ use std::cell::Cell;
 use vergence_cpu::{Cycle, NEVER};
 
 use crate::census::{Census, Touched};
-use crate::clocks::{ClockTree, Clocks, check_core_clock};
+use crate::clocks::{ClockTree, Clocks, VoltageRange, check_core_clock};
 use crate::memory::Memory;
 use crate::pads::Pads;
 use crate::pin::Pin;
@@ -31,11 +31,13 @@ pub struct ChipConfig {
     pub seed: u64,
     /// Stop at whatever the model does not do. Otherwise such accesses are noted, reads give zero and writes are lost.
     pub strict: bool,
+    /// Let a core clock pass that is too fast for its supply or wait states: it is noted, and the chip goes on.
+    pub overclock: bool,
 }
 
 impl Default for ChipConfig {
     fn default() -> Self {
-        Self { uid: [0x0031_0042, 0x3238_510A, 0x2038_3753], seed: 1, strict: true }
+        Self { uid: [0x0031_0042, 0x3238_510A, 0x2038_3753], seed: 1, strict: true, overclock: false }
     }
 }
 
@@ -66,6 +68,8 @@ pub struct Chip<W> {
     troubles: Vec<Trouble>,
     sent: Vec<Vec<SentByte>>,
     power_cycles: u64,
+    /// The core clock, supply and wait states last looked at.
+    speed: Option<(u32, VoltageRange, u32)>,
 }
 
 impl<W: World> Chip<W> {
@@ -93,13 +97,14 @@ impl<W: World> Chip<W> {
             troubles: Vec::new(),
             sent: vec![Vec::new(); UartId::COUNT],
             power_cycles: 0,
+            speed: None,
         };
         chip.settle_everything();
         chip
     }
 
     /// Resets everything but the contents of memory; power-on also loses RAM.
-    pub(crate) fn reset(&mut self, now: Cycle, cause: ResetCause) {
+    pub fn reset(&mut self, now: Cycle, cause: ResetCause) {
         self.advance_to(now);
         self.demand = None;
         self.units.reset(cause);
@@ -217,9 +222,20 @@ impl<W: World> Chip<W> {
             (0..UNITS).for_each(|index| self.refresh(Unit::at(index)));
             self.refresh_world();
         }
-        let checked = check_core_clock(tree.hclk, self.units.pwr.range(), self.units.flash.wait_states());
-        if let Err(Refused(what)) = checked {
-            self.complain(Trouble::Clocks { what });
+        self.check_speed();
+    }
+
+    fn check_speed(&mut self) {
+        let speed = (self.clocks.tree.hclk, self.units.pwr.range(), self.units.flash.wait_states());
+        if self.speed == Some(speed) {
+            return;
+        }
+        self.speed = Some(speed);
+        let (hclk, range, wait_states) = speed;
+        match check_core_clock(hclk, range, wait_states) {
+            Err(Refused(what)) if self.config.overclock => self.note(Trouble::Clocks { what }),
+            Err(Refused(what)) => self.complain(Trouble::Clocks { what }),
+            Ok(()) => {}
         }
     }
 
@@ -227,7 +243,13 @@ impl<W: World> Chip<W> {
     pub(crate) fn complain(&mut self, trouble: Trouble) {
         if self.config.strict {
             self.ask(Demand::Trouble(trouble));
-        } else if self.troubles.len() < TROUBLES_KEPT && !self.troubles.contains(&trouble) {
+        } else {
+            self.note(trouble);
+        }
+    }
+
+    fn note(&mut self, trouble: Trouble) {
+        if self.troubles.len() < TROUBLES_KEPT && !self.troubles.contains(&trouble) {
             self.troubles.push(trouble);
         }
     }
@@ -240,10 +262,31 @@ impl<W: World> Chip<W> {
         self.sent[port.index()].push(byte);
     }
 
-    /// What firmware did that the model does not do, where the chip is not strict; the first 64.
+    /// What firmware did that the model does not do, where the chip goes on nevertheless; the first 64.
     #[must_use]
     pub fn troubles(&self) -> &[Trouble] {
         &self.troubles
+    }
+
+    /// What a strict chip has stopped at.
+    #[must_use]
+    pub fn complaint(&self) -> Option<&Trouble> {
+        match &self.demand {
+            Some(Demand::Trouble(trouble)) => Some(trouble),
+            _ => None,
+        }
+    }
+
+    /// Whether the watchdog has bitten, until the reset that follows.
+    #[must_use]
+    pub fn watchdog_bites(&self) -> bool {
+        self.demand == Some(Demand::Watchdog)
+    }
+
+    /// Whether a power cut was met, until power comes again.
+    #[must_use]
+    pub fn power_is_lost(&self) -> bool {
+        self.demand == Some(Demand::PowerLost)
     }
 
     /// Registers that firmware has touched.

@@ -299,8 +299,8 @@ impl Peripheral for Dmamux {
 
     fn write(&mut self, _moment: Moment, offset: u32, value: u32) -> Reply<()> {
         if let Some(register) = self.ccr.get_mut(offset as usize / 4) {
-            // Synchronization and events are missing.
-            only(value, 0x7F)?;
+            // Synchronization is missing. Events (EGE, bit 9) are, too, but only it and the missing generators hear them.
+            only(value, 0x27F)?;
             *register = value;
         }
         Ok(())
