@@ -93,7 +93,10 @@ impl Peripheral for Port {
             OTYPER => self.otyper,
             OSPEEDR => self.ospeedr,
             PUPDR => self.pupdr,
-            IDR => u32::from(self.levels),
+            // The input stage of an analog pin is off and reads low (§9.3.12).
+            IDR => (0..16).filter(|&number| self.mode(number) != Mode::Analog).fold(0, |all, number| {
+                all | u32::from(self.levels) & 1 << number
+            }),
             ODR => self.odr,
             AFRL => self.afr[0],
             AFRH => self.afr[1],

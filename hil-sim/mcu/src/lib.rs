@@ -10,6 +10,7 @@
 //! is missing is refused by the name of its register. What is simplified is in `FIDELITY.md`.
 
 mod alternate;
+mod bench;
 mod bus;
 mod census;
 mod chip;
@@ -46,12 +47,13 @@ mod vcd;
 mod wiring;
 mod world;
 
+pub use bench::{AxisWiring, Bench, BenchWiring, SwitchWiring};
 pub use census::Touched;
 pub use chip::{Chip, ChipConfig};
 pub use clocks::ClockTree;
 pub use firmware::{Firmware, FirmwareError};
 pub use flash::FlashOperation;
-pub use halt::Halt;
+pub use halt::{Halt, Place};
 pub use machine::{Machine, Stops};
 pub use memory::{FLASH_BASE, FLASH_SIZE, RAM_BASE, RAM_SIZE};
 pub use pin::{Drive, Pin};

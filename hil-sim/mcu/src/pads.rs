@@ -119,11 +119,9 @@ impl Pads {
             Drive::High => true,
         };
         let inside = match port.mode(number) {
-            Mode::Input => None,
             Mode::Output => Some(port.output(number)),
             Mode::Alternate(_) => self.signals[pin.index()].and_then(|signal| level_of(units, signal)),
-            // The input stage is off and reads low (RM0440 §9.3.12).
-            Mode::Analog => return false,
+            Mode::Input | Mode::Analog => None,
         };
         match inside {
             Some(true) if port.is_open_drain(number) => outside(),

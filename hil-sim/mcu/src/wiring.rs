@@ -1,6 +1,7 @@
 //! What one peripheral does to the others: pins to interrupts and timers, timers to timers, bytes to the world.
 
 use crate::chip::Chip;
+use crate::gpio::Mode;
 use crate::peripheral::Moment;
 use crate::pin::{Drive, Pin, PinSet, Signal};
 use crate::trouble::Demand;
@@ -142,7 +143,8 @@ impl<W: World> Chip<W> {
         let port = &mut self.units.ports[pin.port()];
         let bit = 1 << pin.number();
         port.levels = if high { port.levels | bit } else { port.levels & !bit };
-        if self.units.syscfg.exti_port(pin.number()) == pin.port() {
+        let hears = port.mode(pin.number()) != Mode::Analog;
+        if hears && self.units.syscfg.exti_port(pin.number()) == pin.port() {
             self.units.exti.edge(pin.number(), high);
             self.refresh(Unit::Exti);
         }
