@@ -1,5 +1,5 @@
-//! The mechanics of the rig on the pins of the chip: step pulses move motors, edge by edge; encoders answer on their two
-//! lines, switches on theirs.
+//! The mechanics of the rig on the pins of the chip: step pulses move motors, edge by edge; encoders answer on their
+//! two lines, switches on theirs.
 
 use vergence_control::RigIo;
 use vergence_plant::Plant;

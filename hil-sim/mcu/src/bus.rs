@@ -116,7 +116,12 @@ impl<W: World> Chip<W> {
 
     /// A read or fetch from a bank that is busy waits until it is free.
     fn note_bank(&self, offset: usize) {
-        if self.units.flash.busy().is_some_and(|(bank, _)| usize::from(bank) == offset / (crate::memory::FLASH_SIZE / 2)) {
+        if self
+            .units
+            .flash
+            .busy()
+            .is_some_and(|(bank, _)| usize::from(bank) == offset / (crate::memory::FLASH_SIZE / 2))
+        {
             self.stalls.set(true);
         }
     }

@@ -1,4 +1,4 @@
-//! Frequencies of the clock tree (RM0440 figure 17), and what the silicon demands of them.
+//! Frequencies of the clock tree (RM0440 §7.2), and what the silicon demands of them.
 
 use crate::peripheral::Reply;
 use crate::time::TimeBase;
@@ -47,7 +47,7 @@ pub(crate) enum VoltageRange {
     Low,
 }
 
-/// Refuses a core clock that the supply or the flash's wait states do not allow (RM0440 table 29).
+/// Refuses a core clock that the supply or the flash's wait states do not allow (RM0440 §3.3.3).
 pub(crate) fn check_core_clock(hclk: u32, range: VoltageRange, wait_states: u32) -> Reply<()> {
     let (range_name, each_state, highest) = match range {
         VoltageRange::Boost => ("range 1 boost", 34_000_000, 170_000_000),
@@ -59,7 +59,8 @@ pub(crate) fn check_core_clock(hclk: u32, range: VoltageRange, wait_states: u32)
     }
     let needed = hclk.div_ceil(each_state).saturating_sub(1);
     if wait_states < needed {
-        let words = format!("a core clock of {hclk} Hz in {range_name} needs {needed} flash wait states, not {wait_states}");
+        let words =
+            format!("a core clock of {hclk} Hz in {range_name} needs {needed} flash wait states, not {wait_states}");
         return Err(crate::peripheral::Refused(words));
     }
     Ok(())

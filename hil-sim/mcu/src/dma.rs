@@ -233,7 +233,7 @@ impl Peripheral for Dma {
         if offset == IFCR {
             // Clearing a channel's global flag clears all four.
             let global = value & 0x1111_1111;
-            self.flags &= !(value | global * 0xF);
+            self.flags &= !(value | (global * 0xF));
             for index in 0..CHANNELS as u32 {
                 if self.flags >> (4 * index) & 0xE == 0 {
                     self.flags &= !(1 << (4 * index));
@@ -299,7 +299,7 @@ impl Peripheral for Dmamux {
 
     fn write(&mut self, _moment: Moment, offset: u32, value: u32) -> Reply<()> {
         if let Some(register) = self.ccr.get_mut(offset as usize / 4) {
-            // Synchronization is missing. Events (EGE, bit 9) are, too, but only it and the missing generators hear them.
+            // Synchronization is missing. So are events (EGE, bit 9), but only it and the generators would hear them.
             only(value, 0x27F)?;
             *register = value;
         }

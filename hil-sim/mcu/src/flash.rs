@@ -38,7 +38,7 @@ const REGISTERS: Registers = &[
     (0x74, "SEC2R"),
 ];
 
-/// Typical times (DS12288 table 50): one page, one double word, one bank.
+/// Typical times (DS12288, flash memory characteristics): one page, one double word, one bank.
 const PAGE_ERASE: Picoseconds = Picoseconds::microseconds(22_020);
 const DOUBLE_WORD: Picoseconds = Picoseconds::nanoseconds(81_690);
 const BANK_ERASE: Picoseconds = Picoseconds::microseconds(22_130);
@@ -205,7 +205,7 @@ impl Flash {
             return self.fail(SIZERR);
         }
         match self.half.take() {
-            None if offset % 8 == 0 => self.half = Some((offset, value)),
+            None if offset.is_multiple_of(8) => self.half = Some((offset, value)),
             Some((first, low)) if offset == first + 4 => {
                 let value = u64::from(value) << 32 | u64::from(low);
                 if cells != u64::MAX && value != 0 {
@@ -296,7 +296,14 @@ impl Peripheral for Flash {
         Ok(match offset {
             ACR => self.acr,
             SR => self.sr | u32::from(self.running.is_some()) << 16,
-            CR => self.cr | if self.running.is_some_and(|(op, _)| !matches!(op, FlashOperation::Program { .. })) { STRT } else { 0 },
+            CR => {
+                self.cr
+                    | if self.running.is_some_and(|(op, _)| !matches!(op, FlashOperation::Program { .. })) {
+                        STRT
+                    } else {
+                        0
+                    }
+            }
             ECCR => self.eccr,
             OPTR => self.optr,
             // No area is protected: starts lie above ends (§3.7.10 ff.).

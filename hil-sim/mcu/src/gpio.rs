@@ -94,9 +94,9 @@ impl Peripheral for Port {
             OSPEEDR => self.ospeedr,
             PUPDR => self.pupdr,
             // The input stage of an analog pin is off and reads low (§9.3.12).
-            IDR => (0..16).filter(|&number| self.mode(number) != Mode::Analog).fold(0, |all, number| {
-                all | u32::from(self.levels) & 1 << number
-            }),
+            IDR => (0..16)
+                .filter(|&number| self.mode(number) != Mode::Analog)
+                .fold(0, |all, number| all | u32::from(self.levels) & 1 << number),
             ODR => self.odr,
             AFRL => self.afr[0],
             AFRH => self.afr[1],

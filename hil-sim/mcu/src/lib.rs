@@ -6,8 +6,9 @@
 //! - [`World`]: whatever is wired to the pins and serial ports
 //! - [`Bench`]: the mechanics of the rig as such a world
 //!
-//! Sections in comments are those of the reference manual RM0440, revision 8, unless another document is named. Whatever
-//! is missing is refused by the name of its register. What is simplified is in `FIDELITY.md`.
+//! Sections in comments are those of the reference manual RM0440 unless another document is named; its chapters kept
+//! their numbers through its revisions, sections within them moved a little. Whatever is missing is refused by the
+//! name of its register. What is simplified is in `FIDELITY.md`.
 
 mod alternate;
 mod bench;

@@ -66,7 +66,7 @@ const RESET_VALUES: &[(u32, u32)] = &[
     (0x80, 0x0437_F801),
 ];
 
-/// The clock sources; ready after the longest start-up time of the datasheet (DS12288 §5.3.8 to §5.3.10).
+/// The clock sources; ready after the longest start-up time of the datasheet (DS12288, clock source characteristics).
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Source {
     Hsi16,
@@ -218,7 +218,11 @@ impl Rcc {
     /// An output of the PLL (§7.4.4): source / M × N / (2, 4, 6, 8).
     fn pll(&self, divider: u32) -> u32 {
         let (input, multiplier) = self.pll_input();
-        if self.ready[Source::Pll as usize] { (u64::from(input) * u64::from(multiplier) / u64::from(2 * (divider + 1))) as u32 } else { 0 }
+        if self.ready[Source::Pll as usize] {
+            (u64::from(input) * u64::from(multiplier) / u64::from(2 * (divider + 1))) as u32
+        } else {
+            0
+        }
     }
 
     fn pll_input(&self) -> (u32, u32) {
@@ -313,9 +317,9 @@ impl Rcc {
 
     fn note_resets(&mut self, offset: u32, value: u32) {
         let enables = offset + 0x20;
-        let put_back = (0..crate::unit::UNITS)
-            .map(Unit::at)
-            .filter(|unit| unit.clock_enable().is_some_and(|(register, bit)| register == enables && value >> bit & 1 == 1));
+        let put_back = (0..crate::unit::UNITS).map(Unit::at).filter(|unit| {
+            unit.clock_enable().is_some_and(|(register, bit)| register == enables && value >> bit & 1 == 1)
+        });
         self.resets.extend(put_back);
     }
 }

@@ -55,7 +55,7 @@ impl Peripheral for Rng {
     fn read(&mut self, moment: Moment, offset: u32) -> Reply<u32> {
         Ok(match offset {
             CR => self.cr,
-            SR => u32::from(!self.words.is_empty()) | u32::from(self.clock_error) * (CEIS | 2),
+            SR => u32::from(!self.words.is_empty()) | if self.clock_error { CEIS | 2 } else { 0 },
             _ => {
                 let word = self.words.pop().unwrap_or(0);
                 if self.words.is_empty() && self.cr & RNGEN != 0 && self.ready_at.is_none() {

@@ -18,7 +18,7 @@ enum Source {
     Uart(UartId, usize),
 }
 
-/// Who raises which request (RM0440 table 91).
+/// Who raises which request (RM0440 §13.3.2).
 #[derive(Clone, Debug)]
 pub(crate) struct RequestSources([Option<Source>; 128]);
 
@@ -49,7 +49,9 @@ impl<W: World> Chip<W> {
                 continue;
             }
             let mut transfers = 0;
-            while let Some(transfer) = self.units.dma[dma].next_transfer(self.now, |channel| self.is_requested(dma, channel)) {
+            while let Some(transfer) =
+                self.units.dma[dma].next_transfer(self.now, |channel| self.is_requested(dma, channel))
+            {
                 transfers += 1;
                 if transfers > TRANSFERS_AT_ONCE {
                     return self.complain(Trouble::Endless { at: self.now, unit: Unit::Dma(dma as u8).to_string() });

@@ -1,6 +1,7 @@
 //! TIM: counters with compare outputs, captures and quadrature (RM0440 §28 advanced, §29 general purpose, §30 TIM15 to
-//! TIM17, §31 basic). Counting up and down, one-pulse, repetition, PWM 1 and 2, toggle, forced levels, encoder modes 1 to 3, input
-//! capture, slave modes reset, gated, trigger and external clock 1. What is missing is refused by name.
+//! TIM17, §31 basic). Counting up and down, one-pulse, repetition, PWM 1 and 2, toggle, forced levels, encoder
+//! modes 1 to 3, input capture, slave modes reset, gated, trigger and external clock 1. What is missing is refused by
+//! name.
 //!
 //! - `counter`: how the count runs, wraps and updates, and when that can be noticed
 //! - `output`: compare outputs
@@ -18,8 +19,8 @@ use crate::peripheral::{Moment, Peripheral, Registers, Reply, only};
 use crate::unit::TimerId;
 use counter::Counter;
 use input::Input;
-pub(crate) use variant::timer_of_request;
 use variant::Variant;
+pub(crate) use variant::timer_of_request;
 
 const CR1: u32 = 0x00;
 const CR2: u32 = 0x04;

@@ -63,7 +63,7 @@ impl Unit {
         }
     }
 
-    /// Where its registers begin (RM0440 table 3).
+    /// Where its registers begin (RM0440 §2.2.2).
     pub(crate) fn base(self) -> u32 {
         match self {
             Self::Rcc => 0x4002_1000,
@@ -222,7 +222,7 @@ impl UartId {
         [37, 38, 39, 52, 53, 91][self.index()]
     }
 
-    /// Numbers of its DMA requests: receive and transmit (RM0440 table 91).
+    /// Numbers of its DMA requests: receive and transmit (RM0440 §13.3.2).
     pub(crate) fn requests(self) -> [u8; 2] {
         [[24, 25], [26, 27], [28, 29], [30, 31], [32, 33], [34, 35]][self.index()]
     }

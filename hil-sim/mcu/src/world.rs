@@ -46,8 +46,8 @@ impl Terminals {
     }
 }
 
-/// Everything around the chip. Worlds are composed: a bench of mechanics, a servo bus on a serial port, a trace of pins.
-/// Clone it for a snapshot. Every method has a default that does nothing.
+/// Everything around the chip. Worlds are composed: a bench of mechanics, a servo bus on a serial port, a trace of
+/// pins. Clone it for a snapshot. Every method has a default that does nothing.
 pub trait World: Clone {
     /// Pins whose edges it wants to see; looked at again after every reset.
     fn watched(&self) -> Vec<Pin> {

@@ -1,4 +1,5 @@
 //! RCC, PWR and the time base: frequencies, start-up times, clock enables, limits.
+#![allow(clippy::unwrap_used, reason = "a test fails by panic")]
 
 mod common;
 
@@ -122,13 +123,18 @@ fn the_census_knows_what_was_touched() {
     bench.read(RCC);
     bench.write(RCC + 0x48, 0x101);
     let touched = bench.chip.touched();
-    let names: Vec<_> = touched.iter().map(|touched| (touched.register.as_str(), touched.read, touched.written)).collect();
+    let names: Vec<_> =
+        touched.iter().map(|touched| (touched.register.as_str(), touched.read, touched.written)).collect();
     assert_eq!(names, [("RCC.CR", true, false), ("RCC.AHB1ENR", false, true)]);
 }
 
 proptest! {
     #[test]
-    fn cycles_and_time_go_together(hz in 1_000_000u32..170_000_000, changed_at in 0u64..1 << 40, cycle in 0u64..1 << 40) {
+    fn cycles_and_time_go_together(
+        hz in 1_000_000u32..170_000_000,
+        changed_at in 0u64..1 << 40,
+        cycle in 0u64..1 << 40,
+    ) {
         let mut base = TimeBase::new(16_000_000);
         base.change(changed_at, hz);
         let cycle = changed_at + cycle;

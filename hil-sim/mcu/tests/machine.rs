@@ -1,4 +1,5 @@
 //! Core and chip together, with programs assembled by hand: resets, stops, snapshots, traces.
+#![allow(clippy::unwrap_used, reason = "a test fails by panic")]
 
 mod common;
 

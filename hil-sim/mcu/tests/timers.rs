@@ -1,4 +1,5 @@
 //! TIM: counts, updates, outputs, captures, quadrature, chaining (RM0440 §28 to §31). All at 16 MHz.
+#![allow(clippy::unwrap_used, reason = "a test fails by panic")]
 
 mod common;
 
@@ -147,7 +148,10 @@ fn pwm_follows_the_manuals_figure() {
         let begin = bench.now + 1;
         bench.write(TIM1 + CR1, CEN);
         bench.wait(28);
-        assert_eq!(edges(&bench, begin), [(4, !first), (9, first), (13, !first), (18, first), (22, !first), (27, first)]);
+        assert_eq!(
+            edges(&bench, begin),
+            [(4, !first), (9, first), (13, !first), (18, first), (22, !first), (27, first)]
+        );
     }
 }
 
@@ -176,7 +180,8 @@ fn one_pulse_mode_with_repetition_makes_exactly_so_many_pulses() {
     let begin = bench.now + 1;
     bench.write(TIM1 + CR1, CEN | OPM);
     bench.wait(100_000);
-    let expected: Vec<_> = (0..300).flat_map(|period| [(100 * period + 60, true), (100 * period + 100, false)]).collect();
+    let expected: Vec<_> =
+        (0..300).flat_map(|period| [(100 * period + 60, true), (100 * period + 100, false)]).collect();
     assert_eq!(edges(&bench, begin), expected);
     assert_eq!(bench.read(TIM1 + CR1), OPM, "the timer has stopped by itself");
 }
@@ -256,7 +261,7 @@ fn turn(bench: &mut Bench<Nothing>, quarters: i32) {
 
 #[test]
 fn quadrature_follows_the_manuals_table() {
-    // Table 256: all edges in mode 3, half of them in modes 1 and 2; up while TI1 leads.
+    // All edges in mode 3, half of them in modes 1 and 2; up while TI1 leads.
     for (mode, forward, backward) in [(3, 40, -40), (1, 20, -20), (2, 20, -20)] {
         let mut bench = encoder(mode);
         turn(&mut bench, 40);

@@ -85,9 +85,9 @@ impl Counter {
         if self.stopped_after.is_some() { 0 } else { now.saturating_sub(self.since) / self.step() }
     }
 
-    /// Counts from here until a new period begins, and whether that is an overflow: counting up, a count beyond the reload
-    /// value first runs through all its bits.
-    fn to_wrap(&self, highest: u32) -> (u64, bool) {
+    /// Counts from here until a new period begins, and whether that is an overflow: counting up, a count beyond the
+    /// reload value first runs through all its bits.
+    fn counts_to_wrap(&self, highest: u32) -> (u64, bool) {
         if self.counts_down {
             (u64::from(self.count) + 1, true)
         } else if self.count <= self.reload {
@@ -107,7 +107,7 @@ impl Timer {
             if counts == 0 || self.counter.reload == 0 {
                 return;
             }
-            let (to_wrap, overflows) = self.counter.to_wrap(self.variant.highest);
+            let (to_wrap, overflows) = self.counter.counts_to_wrap(self.variant.highest);
             if counts < to_wrap {
                 self.count_on(counts);
                 return;
@@ -261,7 +261,7 @@ impl Timer {
         if counter.stopped_after.is_some() || counter.reload == 0 {
             return NEVER;
         }
-        let (to_wrap, overflows) = counter.to_wrap(self.variant.highest);
+        let (to_wrap, overflows) = counter.counts_to_wrap(self.variant.highest);
         let period = u64::from(counter.reload) + 1;
         let wraps_at = counter.since + to_wrap * counter.step();
         let mut due = NEVER;
@@ -279,7 +279,7 @@ impl Timer {
         due
     }
 
-    /// When the count next reaches the channel's compare value; one beyond the reload value counts as reached at overflow.
+    /// When the count next reaches the channel's compare value; one beyond the reload value is reached at overflow.
     fn match_at(&self, channel: usize, to_wrap: u64) -> Cycle {
         let counter = &self.counter;
         let target = u64::from(self.compare[channel]);

@@ -97,7 +97,7 @@ impl Timer {
         Ok(())
     }
 
-    /// The timer whose trigger output this one listens to: internal triggers are the same for all (§28.3.30, table 258).
+    /// The timer whose trigger output this one listens to: internal triggers are the same for all (§28.3.30).
     pub fn master(&self) -> Option<TimerId> {
         const MASTERS: [u8; 10] = [1, 2, 3, 4, 5, 8, 15, 16, 17, 20];
         if self.slave_mode() < RESET {
@@ -172,7 +172,7 @@ impl Timer {
         }
     }
 
-    /// Counts an edge of the encoder (table 256): up while TI1 leads TI2.
+    /// Counts an edge of the encoder (table of counting direction versus encoder signals): up while TI1 leads TI2.
     fn quadrature(&mut self, channel: usize) {
         let counts = match self.slave_mode() {
             1 => channel == 0,
@@ -193,7 +193,7 @@ impl Timer {
         }
     }
 
-    /// An edge at the input that channel `channel` captures: rising, falling or both, each, each second, fourth or eighth.
+    /// An edge at the input that a channel captures: rising, falling or both, each, each second, fourth or eighth.
     fn capture_edge(&mut self, channel: usize, high: bool) {
         let bits = self.ccer >> (4 * channel);
         let polarity = [bits >> 1 & 1, bits >> 3 & 1];

@@ -115,7 +115,7 @@ impl Timer {
             return None;
         }
         let bits = self.ccer >> (4 * channel);
-        // With CHx disabled the complement follows OCxREF itself (table 263).
+        // With CHx disabled the complement follows OCxREF itself (table of complementary outputs).
         let inverted = bits & 1 == 1;
         let level = || (self.reference(channel) != inverted) != (bits >> 3 & 1 == 1);
         self.drives(bits >> 2 & 1 == 1, 9 + 2 * channel, level)

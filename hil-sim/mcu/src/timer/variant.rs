@@ -1,4 +1,4 @@
-//! What sets one timer apart from another (RM0440 §28.2, §29.2, §30.2, §31.2; interrupts table 101; DMA table 91).
+//! What sets one timer apart from another (RM0440 §28.2, §29.2, §30.2, §31.2; interrupts §14.3, DMA requests §13.3.2).
 
 use vergence_cpu::Lines;
 

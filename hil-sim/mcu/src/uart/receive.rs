@@ -26,7 +26,8 @@ impl Uart {
         {
             // The receiver samples the middle of the stop bit: half a bit before the end.
             let half_bits = 2 * self.frame_bits() - 1;
-            let cycles = u128::from(half_bits) * u128::from(moment.clocks.tree.hclk) / (2 * u128::from(frame.baud.max(1)));
+            let cycles =
+                u128::from(half_bits) * u128::from(moment.clocks.tree.hclk) / (2 * u128::from(frame.baud.max(1)));
             self.arriving = Some((frame, Shifting { byte: frame.byte, ends: now + cycles as Cycle }));
             self.idle_at = None;
             self.timeout_at = None;
@@ -34,7 +35,9 @@ impl Uart {
     }
 
     pub(super) fn advance_receiving(&mut self, moment: Moment) {
-        while let Some((frame, Shifting { byte, ends })) = self.arriving.filter(|(_, shifting)| shifting.ends <= moment.now) {
+        while let Some((frame, Shifting { byte, ends })) =
+            self.arriving.filter(|(_, shifting)| shifting.ends <= moment.now)
+        {
             self.arriving = None;
             if self.is_on(cr1::RE) && self.connected[1] {
                 self.sample(moment, frame, byte);

@@ -98,7 +98,7 @@ impl Peripheral for Uart {
                 self.cr2 = value;
             }
             CR3 => {
-                // Errors, half duplex, DMA, overrun, driver enable, FIFO thresholds; no flow control, no card, no infrared.
+                // Errors, half duplex, DMA, overrun, driver enable, FIFO thresholds; no flow control, card or infrared.
                 only(value, 0xFE80_F8C9)?;
                 self.cr3 = value;
             }
@@ -141,11 +141,8 @@ impl Peripheral for Uart {
             (cr1::TXFEIE, flag::TXFE),
             (cr1::RXFFIE, flag::RXFF),
         ];
-        const FROM_CR3: [(u32, u32); 3] = [
-            (cr3::EIE, flag::FE | flag::NE | flag::ORE),
-            (cr3::TXFTIE, flag::TXFT),
-            (cr3::RXFTIE, flag::RXFT),
-        ];
+        const FROM_CR3: [(u32, u32); 3] =
+            [(cr3::EIE, flag::FE | flag::NE | flag::ORE), (cr3::TXFTIE, flag::TXFT), (cr3::RXFTIE, flag::RXFT)];
         let flags = self.flags();
         let raised = |enabled: u32, table: &[(u32, u32)]| {
             table.iter().any(|(enable, flag)| enabled & enable != 0 && flags & flag != 0)

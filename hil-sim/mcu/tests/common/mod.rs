@@ -1,5 +1,6 @@
 //! A chip without a core: registers are poked directly, time passes on command.
 #![allow(dead_code, reason = "each test file uses its part")]
+#![allow(clippy::unwrap_used, reason = "a test fails by panic")]
 
 use vergence_cpu::{Access, Bus, Cycle};
 use vergence_mcu::{Chip, ChipConfig, Drive, Frame, LineFault, Nothing, Pin, PinEdge, Terminals, UartId, World};
