@@ -6,42 +6,16 @@ use crate::chip::Chip;
 use crate::memory::{Memory, Place, narrow};
 use crate::peripheral::{Moment, Refused};
 use crate::trouble::{Demand, Trouble};
-use crate::unit::{TimerId, UartId, Unit};
+use crate::unit::Unit;
 use crate::world::World;
 
 /// Peripherals are in here; what is missing is a gap in the model, not a fault of the program.
 const PERIPHERALS: std::ops::Range<u32> = 0x4000_0000..0x6000_0000;
 
-/// The peripheral whose kilobyte an address is in.
-fn unit_at(address: u32) -> Option<Unit> {
-    let base = address & !0x3FF;
-    if base & 0xFFFF_E000 == 0x4800_0000 {
-        let port = (base >> 10 & 7) as u8;
-        return (port < 7).then_some(Unit::Gpio(port));
-    }
-    let timers = TimerId::all().map(Unit::Timer);
-    let uarts = UartId::all().map(Unit::Uart);
-    match base {
-        0x4002_1000 => Some(Unit::Rcc),
-        0x4000_7000 => Some(Unit::Pwr),
-        0x4002_2000 => Some(Unit::Flash),
-        0x4001_0000 => Some(Unit::Syscfg),
-        0x4001_0400 => Some(Unit::Exti),
-        0x4000_3000 => Some(Unit::Iwdg),
-        0x5006_0800 => Some(Unit::Rng),
-        0x4002_3000 => Some(Unit::Crc),
-        0xE004_2000 => Some(Unit::Debug),
-        0x4002_0800 => Some(Unit::Dmamux),
-        0x4002_0000 => Some(Unit::Dma(0)),
-        0x4002_0400 => Some(Unit::Dma(1)),
-        base => timers.chain(uarts).find(|unit| unit.base() == base),
-    }
-}
-
 impl<W: World> Chip<W> {
     /// Reads a register of a peripheral.
     pub(crate) fn read_register(&mut self, address: u32, access: Access) -> Result<u32, BusFault> {
-        let Some((unit, offset, register)) = self.find(address)? else { return Ok(0) };
+        let Some((unit, offset)) = self.find(address)? else { return Ok(0) };
         self.census.note(unit, offset, false);
         let moment = Moment { now: self.now, clocks: &self.clocks };
         let peripheral = self.units.get(unit);
@@ -52,6 +26,7 @@ impl<W: World> Chip<W> {
                 Ok(narrow(word, address, access))
             }
             Err(Refused(what)) => {
+                let register = self.name_of(unit, offset);
                 self.complain(Trouble::Refused { unit: unit.to_string(), register, offset, value: 0, what });
                 Ok(0)
             }
@@ -60,9 +35,10 @@ impl<W: World> Chip<W> {
 
     /// Writes a register of a peripheral.
     pub(crate) fn write_register(&mut self, address: u32, access: Access, value: u32) -> Result<(), BusFault> {
-        let Some((unit, offset, register)) = self.find(address)? else { return Ok(()) };
+        let Some((unit, offset)) = self.find(address)? else { return Ok(()) };
         self.census.note(unit, offset, true);
         if address & 3 != 0 && access != Access::Word {
+            let register = self.name_of(unit, offset);
             self.complain(Trouble::Narrow { unit: unit.to_string(), register, access });
             return Ok(());
         }
@@ -82,31 +58,37 @@ impl<W: World> Chip<W> {
         }
         self.react(unit);
         if let Err(Refused(what)) = reply {
+            let register = self.name_of(unit, offset);
             self.complain(Trouble::Refused { unit: unit.to_string(), register, offset, value, what });
         }
         Ok(())
     }
 
-    /// The peripheral at an address, the offset of the register and its name; `None` where nothing answers but that was
-    /// complained about.
-    fn find(&mut self, address: u32) -> Result<Option<(Unit, u32, &'static str)>, BusFault> {
-        let Some(unit) = unit_at(address) else {
+    /// The peripheral at an address and the offset of the register; `None` where nothing answers but that was complained
+    /// about.
+    fn find(&mut self, address: u32) -> Result<Option<(Unit, u32)>, BusFault> {
+        let Some(unit) = self.directory.unit_at(address) else {
             if PERIPHERALS.contains(&address) {
                 self.complain(Trouble::Unmapped { address });
             }
             return Err(BusFault);
         };
         let offset = (address - unit.base()) & !3;
-        let registers = self.units.get(unit).registers();
-        let Some(&(_, register)) = registers.iter().find(|(known, _)| *known == offset) else {
+        if !self.directory.has_register(unit, offset) {
             self.complain(Trouble::NoRegister { unit: unit.to_string(), offset });
             return Ok(None);
-        };
+        }
         if !self.units.rcc.is_clocked(unit) {
+            let register = self.name_of(unit, offset);
             self.complain(Trouble::ClockOff { unit: unit.to_string(), register });
             return Ok(None);
         }
-        Ok(Some((unit, offset, register)))
+        Ok(Some((unit, offset)))
+    }
+
+    fn name_of(&mut self, unit: Unit, offset: u32) -> &'static str {
+        let registers = self.units.get(unit).registers();
+        registers.iter().find(|(known, _)| *known == offset).map_or("", |&(_, name)| name)
     }
 
     #[cold]

@@ -3,7 +3,7 @@
 use crate::unit::{UNITS, Unit};
 
 /// Register offsets below this are counted.
-const WORDS: usize = 256;
+const WORDS: usize = 64;
 
 /// A register and how it was touched.
 #[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord)]

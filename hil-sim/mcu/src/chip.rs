@@ -6,6 +6,7 @@ use vergence_cpu::{Cycle, NEVER};
 
 use crate::census::{Census, Touched};
 use crate::clocks::{ClockTree, Clocks, VoltageRange, check_core_clock};
+use crate::directory::Directory;
 use crate::memory::Memory;
 use crate::pads::Pads;
 use crate::peripheral::{Moment, Refused};
@@ -56,6 +57,7 @@ pub struct Chip<W> {
     pub(crate) pads: Pads,
     pub(crate) schedule: Schedule,
     pub(crate) sources: RequestSources,
+    pub(crate) directory: Directory,
     pub(crate) census: Census,
     pub(crate) world: W,
     pub(crate) terminals: Terminals,
@@ -76,7 +78,8 @@ impl<W: World> Chip<W> {
     /// A chip with erased flash that has just got power.
     #[must_use]
     pub fn new(config: ChipConfig, world: W) -> Self {
-        let units = Units::new(config.seed);
+        let mut units = Units::new(config.seed);
+        let directory = Directory::new(&mut units);
         let tree = units.rcc.tree();
         let mut chip = Self {
             config,
@@ -86,6 +89,7 @@ impl<W: World> Chip<W> {
             pads: Pads::new(),
             schedule: Schedule::new(),
             sources: RequestSources::new(),
+            directory,
             census: Census::new(),
             world,
             terminals: Terminals::default(),

@@ -178,9 +178,9 @@ impl Flash {
         self.running.map(|(operation, until)| (operation.bank(), until))
     }
 
-    /// Reading or writing flash may do something at once that the core must notice at once.
+    /// Reading or writing flash may raise NMI or begin what ends in an interrupt: the core must look after each access.
     pub fn is_touchy(&self) -> bool {
-        self.cr & PG != 0 || !self.torn.is_empty()
+        !self.torn.is_empty() || self.cr & PG != 0 && self.cr & (EOPIE | ERRIE) != 0
     }
 
     pub fn nmi(&self) -> bool {

@@ -18,6 +18,7 @@ mod chip;
 mod clocks;
 mod crc;
 mod debug;
+mod directory;
 mod dma;
 mod exti;
 mod firmware;

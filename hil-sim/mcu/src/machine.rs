@@ -1,6 +1,6 @@
 //! Core and chip together: the board as its user sees it.
 
-use vergence_cpu::{Cpu, Cycle, Stop};
+use vergence_cpu::{Cpu, Stop};
 
 use crate::chip::{Chip, ChipConfig};
 use crate::firmware::{Firmware, FirmwareError};
@@ -33,9 +33,6 @@ pub struct Machine<W> {
     /// Where the core last locked up.
     lockup: Option<Place>,
 }
-
-/// So many cycles the core runs at most between two looks at flash that has something to tell.
-const TOUCHY_CYCLES: Cycle = 32;
 
 impl<W: World> Machine<W> {
     /// A board with erased flash that has just got power.
@@ -101,8 +98,9 @@ impl<W: World> Machine<W> {
             if self.cpu.now() >= end {
                 return Halt::Reached;
             }
-            let slice = if self.chip.units.flash.is_touchy() { self.cpu.now() + TOUCHY_CYCLES } else { Cycle::MAX };
-            let stop = self.cpu.run(&mut self.chip, end.min(slice));
+            // Memory accesses do not make the core look up, peripherals do: go one instruction at a time.
+            let slice = if self.chip.units.flash.is_touchy() { self.cpu.now() + 1 } else { end };
+            let stop = self.cpu.run(&mut self.chip, slice);
             if let Some(halt) = self.handle(stop) {
                 return halt;
             }
