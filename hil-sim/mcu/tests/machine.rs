@@ -4,13 +4,17 @@
 mod common;
 
 use common::pin;
+use vergence_cpu::{Access, Bus};
 use vergence_mcu::{
-    ChipConfig, Firmware, FirmwareError, Halt, Machine, Nothing, Picoseconds, ResetCause, RttBuffer, Stops, read_rtt,
+    ChipConfig, Damage, Firmware, FirmwareError, Halt, Machine, Nothing, Picoseconds, PowerCut, ResetCause, RttBuffer,
+    Stops, read_rtt,
 };
 
 const FLASH: u32 = 0x0800_0000;
 const CODE: u32 = FLASH + 0x100;
 const POOL: u32 = FLASH + 0x200;
+/// BKPT 9 and a hang.
+const NMI: u32 = FLASH + 0x1F0;
 
 /// B to itself.
 const HANG: u16 = 0xE7FE;
@@ -45,8 +49,11 @@ impl Program {
     fn firmware(&self) -> Firmware {
         let mut words = vec![CODE | 1; 64];
         words[0] = 0x2000_8000;
+        words[2] = NMI | 1;
         let mut bytes: Vec<u8> = words.iter().flat_map(|word: &u32| word.to_le_bytes()).collect();
         bytes.extend(self.code.iter().flat_map(|half| half.to_le_bytes()));
+        bytes.resize((NMI - FLASH) as usize, 0);
+        bytes.extend([0x09, 0xBE, 0xFE, 0xE7]);
         bytes.resize((POOL - FLASH) as usize, 0);
         bytes.extend(self.pool.iter().flat_map(|word| word.to_le_bytes()));
         Firmware::from_image(FLASH, &bytes)
@@ -204,6 +211,38 @@ fn code_in_the_bank_being_erased_stands_still() {
         let page = 0x4_0000 * bank as usize + 100 * 2048;
         assert!(machine.chip().flash()[page..page + 2048].iter().all(|&byte| byte == 0xFF));
     }
+}
+
+/// Programs a double word of bank 2 from outside.
+fn program(machine: &mut Machine<Nothing>, address: u32) {
+    let now = machine.cpu().now();
+    let chip = machine.chip_mut();
+    for (register, value) in [
+        (0x4002_2008, 0x4567_0123),
+        (0x4002_2008, 0xCDEF_89AB),
+        (0x4002_2014, 1),
+        (address, 0x1234_5678),
+        (address + 4, 0x9ABC_DEF0),
+    ] {
+        chip.write(now, register, Access::Word, value).unwrap();
+    }
+}
+
+#[test]
+fn a_power_cut_restarts_the_board_with_a_torn_word_that_raises_nmi_at_its_read() {
+    let mut machine = Program::default().load(0, 0x0804_0000).emit(&[0x6801, 0xBE01, HANG]).machine();
+    machine.set_stops(Stops { breakpoints: true, lockups: false });
+    assert!(matches!(machine.run_for(Picoseconds::milliseconds(1)), Halt::Breakpoint { number: 1, .. }));
+    machine.chip_mut().set_power_cut(Some(PowerCut { operation: 1, damage: Damage::Torn { seed: 3 } }));
+    program(&mut machine, 0x0804_0000);
+    let halt = machine.run_for(Picoseconds::milliseconds(1));
+    assert!(matches!(halt, Halt::PowerLost { .. }), "{halt}");
+    assert_eq!(machine.last_reset(), ResetCause::PowerOn);
+    let halt = machine.run_for(Picoseconds::milliseconds(1));
+    assert!(
+        matches!(halt, Halt::Breakpoint { number: 9, .. }),
+        "the handler comes before the next instruction: {halt}"
+    );
 }
 
 #[test]
