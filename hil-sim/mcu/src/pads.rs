@@ -36,6 +36,10 @@ impl Pads {
         self.levels & pin.set() != 0
     }
 
+    pub fn levels_of_port(&self, port: usize) -> u16 {
+        (self.levels >> (16 * port)) as u16
+    }
+
     pub fn set_level(&mut self, pin: Pin, high: bool) {
         if high {
             self.levels |= pin.set();

@@ -76,6 +76,8 @@ impl<W: World> Chip<W> {
             // A pin newly connected to an input tells its level.
             self.tell_input(pin, self.pads.is_high(pin));
         }
+        // A port that was reset has forgotten the levels that did not change.
+        self.units.ports[port].levels = self.pads.levels_of_port(port);
     }
 
     fn react_to_timer(&mut self, timer: TimerId) {

@@ -3,7 +3,7 @@
 
 mod common;
 
-use common::{GPIOA, GPIOC, Recorder, bench, bench_with, pin};
+use common::{GPIOA, GPIOC, RCC, Recorder, bench, bench_with, pin};
 use vergence_mcu::{Drive, Pin};
 
 const SYSCFG: u32 = 0x4001_0000;
@@ -76,6 +76,16 @@ fn a_chosen_edge_raises_its_interrupt() {
     assert!(!bench.line(40), "rising edges are not chosen");
     bench.write(EXTI + 0x10, 1 << 13);
     assert!(bench.line(40), "by software");
+}
+
+#[test]
+fn a_level_from_outside_outlives_a_reset() {
+    let mut bench = bench();
+    bench.drive("PC1", true);
+    bench.chip.reset(bench.now, vergence_mcu::ResetCause::Software);
+    bench.write(RCC + 0x4C, 4);
+    bench.write(GPIOC, 0xFFFF_FFF3);
+    assert_eq!(bench.read(GPIOC + 0x10), 2);
 }
 
 #[test]
