@@ -64,8 +64,8 @@ impl<W: World> Chip<W> {
         Ok(())
     }
 
-    /// The peripheral at an address and the offset of the register; `None` where nothing answers but that was complained
-    /// about.
+    /// The peripheral at an address and the offset of the register; `None` where nothing answers and that was
+    /// complained about.
     fn find(&mut self, address: u32) -> Result<Option<(Unit, u32)>, BusFault> {
         let Some(unit) = self.directory.unit_at(address) else {
             if PERIPHERALS.contains(&address) {

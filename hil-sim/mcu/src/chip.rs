@@ -4,20 +4,18 @@ use std::cell::Cell;
 
 use vergence_cpu::{Cycle, NEVER};
 
-use crate::census::{Census, Touched};
-use crate::clocks::{ClockTree, Clocks, VoltageRange, check_core_clock};
+use crate::census::Census;
+use crate::clocks::{Clocks, VoltageRange, check_core_clock};
 use crate::directory::Directory;
 use crate::memory::Memory;
 use crate::pads::Pads;
 use crate::peripheral::{Moment, Refused};
-use crate::pin::Pin;
-use crate::power_cut::PowerCut;
 use crate::rcc::ResetCause;
 use crate::schedule::{Due, Schedule};
 use crate::service::RequestSources;
-use crate::time::{Picoseconds, TimeBase};
+use crate::time::TimeBase;
 use crate::trouble::{Demand, Trouble};
-use crate::uart::{Frame, SentByte};
+use crate::uart::SentByte;
 use crate::unit::{UNITS, UartId, Unit};
 use crate::units::Units;
 use crate::vcd::Trace;
@@ -67,8 +65,8 @@ pub struct Chip<W> {
     pub(crate) demand: Option<Demand>,
     /// Code was fetched from a bank of flash that is busy: the next branch waits for it.
     pub(crate) stalls: Cell<bool>,
-    troubles: Vec<Trouble>,
-    sent: Vec<Vec<SentByte>>,
+    pub(crate) troubles: Vec<Trouble>,
+    pub(crate) sent: Vec<Vec<SentByte>>,
     power_cycles: u64,
     /// The core clock, supply and wait states last looked at.
     speed: Option<(u32, VoltageRange, u32)>,
@@ -124,7 +122,7 @@ impl<W: World> Chip<W> {
     }
 
     /// Looks at everything anew.
-    fn settle_everything(&mut self) {
+    pub(crate) fn settle_everything(&mut self) {
         self.pads.watched = self.world.watched().iter().fold(self.trace.watched(), |all, pin| all | pin.set());
         for port in 0..self.units.ports.len() {
             self.units.ports[port].changed = true;
@@ -264,140 +262,5 @@ impl<W: World> Chip<W> {
 
     pub(crate) fn note_sent(&mut self, port: UartId, byte: SentByte) {
         self.sent[port.index()].push(byte);
-    }
-
-    /// What firmware did that the model does not do, where the chip goes on nevertheless; the first 64.
-    #[must_use]
-    pub fn troubles(&self) -> &[Trouble] {
-        &self.troubles
-    }
-
-    /// What a strict chip has stopped at.
-    #[must_use]
-    pub fn complaint(&self) -> Option<&Trouble> {
-        match &self.demand {
-            Some(Demand::Trouble(trouble)) => Some(trouble),
-            _ => None,
-        }
-    }
-
-    /// Whether the watchdog has bitten, until the reset that follows.
-    #[must_use]
-    pub fn watchdog_bites(&self) -> bool {
-        self.demand == Some(Demand::Watchdog)
-    }
-
-    /// Whether a power cut was met, until power comes again.
-    #[must_use]
-    pub fn power_is_lost(&self) -> bool {
-        self.demand == Some(Demand::PowerLost)
-    }
-
-    /// Registers that firmware has touched.
-    #[must_use]
-    pub fn touched(&mut self) -> Vec<Touched> {
-        let names: Vec<_> = (0..UNITS).map(|index| self.units.get(Unit::at(index)).registers()).collect();
-        self.census.touched(|unit, offset| {
-            names[unit.index()].iter().find(|(known, _)| *known == offset).map(|&(_, name)| name)
-        })
-    }
-
-    /// Frequencies at present.
-    #[must_use]
-    pub fn clock_tree(&self) -> ClockTree {
-        self.clocks.tree
-    }
-
-    /// Real time at the last event.
-    #[must_use]
-    pub fn time(&self) -> Picoseconds {
-        self.instant().time
-    }
-
-    /// The world around the chip.
-    #[must_use]
-    pub fn world(&self) -> &W {
-        &self.world
-    }
-
-    /// Does something to the world, which may then do something to the chip.
-    pub fn with_world<R>(&mut self, act: impl FnOnce(&mut W, &mut Terminals) -> R) -> R {
-        let result = act(&mut self.world, &mut self.terminals);
-        self.world_was_told();
-        result
-    }
-
-    /// Bytes that a serial port has sent since last taken.
-    pub fn take_sent(&mut self, port: UartId) -> Vec<SentByte> {
-        std::mem::take(&mut self.sent[port.index()])
-    }
-
-    /// The far end sends `frames` to a serial port, one after the other.
-    pub fn send(&mut self, port: UartId, frames: &[Frame]) {
-        self.terminals.frames.extend(frames.iter().map(|&frame| (port, frame)));
-        self.connect_terminals();
-        self.serve_dma();
-    }
-
-    /// Whether everything sent to a serial port has arrived.
-    #[must_use]
-    pub fn is_line_quiet(&self, port: UartId) -> bool {
-        self.units.uarts[port.index()].is_line_quiet()
-    }
-
-    /// Contents of flash, 512 KiB from `0x0800_0000`.
-    #[must_use]
-    pub fn flash(&self) -> &[u8] {
-        &self.memory.flash
-    }
-
-    /// Writes flash as a debugger does, without time or errors. Returns whether it fits.
-    pub fn load_flash(&mut self, offset: usize, bytes: &[u8]) -> bool {
-        let Some(place) = self.memory.flash.get_mut(offset..offset.saturating_add(bytes.len())) else { return false };
-        place.copy_from_slice(bytes);
-        let words = (offset / 8) as u32..=((offset + bytes.len()) / 8) as u32;
-        self.units.flash.torn.retain(|word| !words.contains(word));
-        self.code_version += 1;
-        true
-    }
-
-    /// Contents of the SRAMs, 128 KiB from `0x2000_0000`: SRAM1, SRAM2, CCM.
-    #[must_use]
-    pub fn ram(&self) -> &[u8] {
-        &self.memory.ram
-    }
-
-    /// The SRAMs, as a debugger writes them.
-    pub fn ram_mut(&mut self) -> &mut [u8] {
-        &mut self.memory.ram
-    }
-
-    /// Erasures and double words programmed since the chip was made.
-    #[must_use]
-    pub fn flash_operations(&self) -> u64 {
-        self.units.flash.operations
-    }
-
-    /// Double words of flash that ECC cannot correct, by offset.
-    pub fn torn_words(&self) -> impl Iterator<Item = usize> {
-        self.units.flash.torn.iter().map(|&word| word as usize * 8)
-    }
-
-    /// Traces pins from now on; what was traced before is forgotten.
-    pub fn trace(&mut self, pins: &[Pin]) {
-        let levels = pins.iter().map(|&pin| (pin, self.is_high(pin))).collect();
-        self.trace = Trace::new(levels);
-        self.settle_everything();
-    }
-
-    /// The traced pins as a value change dump, under the names that `name` gives them.
-    #[must_use]
-    pub fn vcd(&self, name: impl Fn(Pin) -> String) -> String {
-        self.trace.dump(name)
-    }
-
-    /// Orders a power cut, or cancels it.
-    pub fn set_power_cut(&mut self, cut: Option<PowerCut>) {
-        self.units.flash.cut = cut;
     }
 }

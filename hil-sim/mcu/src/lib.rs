@@ -28,6 +28,7 @@ mod halt;
 mod iwdg;
 mod machine;
 mod memory;
+mod outside;
 mod pads;
 mod peripheral;
 mod pin;

@@ -66,7 +66,7 @@ const RESET_VALUES: &[(u32, u32)] = &[
     (0x80, 0x0437_F801),
 ];
 
-/// The clock sources; ready after the longest start-up time of the datasheet (DS12288, clock source characteristics).
+/// Clock sources; each is ready after the longest start-up time of the datasheet (DS12288, clock source characteristics).
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Source {
     Hsi16,
