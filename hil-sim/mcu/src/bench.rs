@@ -50,6 +50,34 @@ pub struct BenchWiring {
     pub emergency_stop: SwitchWiring,
 }
 
+impl BenchWiring {
+    /// The wiring of the NUCLEO-G474RE firmware (`docs/firmware.md`): baseline on TIM1 and TIM2, separation on TIM8 and
+    /// TIM5; home switches close at home, limits and emergency stop open in trouble.
+    #[must_use]
+    pub fn nucleo_g474() -> Self {
+        const A: usize = 0;
+        const B: usize = 16;
+        const C: usize = 32;
+        let switch = |index, normally_closed| SwitchWiring { pin: Pin::at(index), normally_closed };
+        let baseline = AxisWiring {
+            step: Pin::at(A + 8),
+            direction: Pin::at(A + 9),
+            encoder: [Pin::at(A), Pin::at(A + 1)],
+            home: switch(C, false),
+            hard_limit: switch(C + 2, true),
+        };
+        let separation = AxisWiring {
+            step: Pin::at(C + 6),
+            direction: Pin::at(C + 8),
+            encoder: [Pin::at(B + 2), Pin::at(C + 12)],
+            home: switch(C + 1, false),
+            hard_limit: switch(C + 3, true),
+        };
+        let emergency_stop = switch(C + 4, true);
+        Self { axes: vec![baseline, separation], drivers_off: Pin::at(A + 10), emergency_stop }
+    }
+}
+
 /// The mechanics advance in steps of this while something moves, and of the other while nothing does.
 const MOVING_STEP: Microseconds = Microseconds(20);
 const RESTING_STEP: Microseconds = Microseconds(1_000);

@@ -126,6 +126,40 @@ fn the_emergency_stop_is_seen_and_cuts_the_drivers() {
 }
 
 #[test]
+fn the_boards_pins_can_do_what_they_are_wired_for() {
+    // Timer outputs at the step pins (AF6, AF4), timer inputs at the encoders' (AF1, AF1; AF2, AF1).
+    let wiring = BenchWiring::nucleo_g474();
+    let names = |pins: [vergence_mcu::Pin; 4]| pins.map(|pin| pin.to_string());
+    let [baseline, separation] = [wiring.axes[0], wiring.axes[1]]
+        .map(|axis| names([axis.step, axis.direction, axis.encoder[0], axis.encoder[1]]));
+    assert_eq!(baseline, ["PA8", "PA9", "PA0", "PA1"]);
+    assert_eq!(separation, ["PC6", "PC8", "PB2", "PC12"]);
+    let plant = Plant::new(&bench_mechanics(), &[100_000.0, 300_000.0]);
+    let mut bench = bench_with(Bench::new(wiring, plant));
+    bench.wait(1);
+    const TIM8: u32 = 0x4001_3400;
+    const TIM5: u32 = 0x4000_0C00;
+    for (pin, function) in [("PC6", 4), ("PB2", 2), ("PC12", 1)] {
+        bench.connect(pin, function);
+    }
+    bench.write(TIM5 + 0x18, 0x0101);
+    bench.write(TIM5 + 8, 3);
+    bench.write(TIM5, 1);
+    switch_drivers_on(&mut bench);
+    bench.modify(0x4800_0800, 3 << 16, 1 << 16);
+    bench.write(0x4800_0818, 1 << 8);
+    for (register, value) in [(0x44, 1 << 15), (0x2C, 799), (0x34, 400), (0x18, 7 << 4), (0x20, 1), (0x30, 639)] {
+        bench.write(TIM8 + register, value);
+    }
+    bench.write(TIM8 + 0x14, 1);
+    bench.write(TIM8, 1 | 8);
+    bench.wait(800 * 640 + 16_000 * 200);
+    // A hundredth of a revolution is 1000 counts, less half the backlash of 120 µrad, which is 1 count.
+    let count = bench.read(TIM5 + 0x24) as i32;
+    assert!((998..=1_000).contains(&count), "{count}");
+}
+
+#[test]
 fn a_reset_of_the_chip_lets_the_drivers_go() {
     let mut bench = rig(100_000.0);
     switch_drivers_on(&mut bench);
