@@ -3,7 +3,7 @@
 use vergence_protocol::{Counts, Micro, Microseconds};
 
 use crate::TICK_US;
-use crate::io::RigIo;
+use crate::io::{MAX_STEPS_PER_TICK, RigIo, StepSchedule};
 use crate::profile::{Limits, Profile};
 use crate::settings::AxisSettings;
 use crate::trajectory::Trajectory;
@@ -18,8 +18,7 @@ pub struct Axis {
     /// When the axis will be at `command_next`: a new trajectory begins there and then, so that the command never jumps.
     next_at: Microseconds,
     trajectory: Option<Trajectory>,
-    /// Raw steps and counts at the axis zero.
-    zero_steps: i32,
+    /// Raw counts at the axis zero.
     zero_counts: i32,
     referenced: bool,
 }
@@ -33,7 +32,6 @@ impl Axis {
             command_next: 0,
             next_at: Microseconds(0),
             trajectory: None,
-            zero_steps: 0,
             zero_counts: 0,
             referenced: false,
         }
@@ -47,8 +45,14 @@ impl Axis {
         self.referenced = false;
     }
 
+    /// The encoder's count, rising along the axis.
+    fn raw_counts(&self, io: &impl RigIo) -> i32 {
+        let raw = io.encoder(self.index);
+        if self.settings.counts_reversed { raw.wrapping_neg() } else { raw }
+    }
+
     pub fn counts(&self, io: &impl RigIo) -> Counts {
-        Counts(io.encoder(self.index).wrapping_sub(self.zero_counts))
+        Counts(self.raw_counts(io).wrapping_sub(self.zero_counts))
     }
 
     pub fn position(&self, io: &impl RigIo) -> Micro {
@@ -67,13 +71,12 @@ impl Axis {
     /// Without reference that is zero: raw counts may be anywhere, beyond what a position can say.
     pub fn adopt_encoder(&mut self, io: &impl RigIo) {
         if !self.referenced {
-            self.zero_counts = io.encoder(self.index);
+            self.zero_counts = self.raw_counts(io);
         }
         let position = self.position(io);
         self.trajectory = None;
         self.command_now = i64::from(position.0) << 8;
         self.command_next = self.command_now;
-        self.zero_steps = io.steps(self.index).wrapping_sub(self.settings.motor().counts_at(position));
     }
 
     /// Starts a profile from the present command.
@@ -120,8 +123,9 @@ impl Axis {
                 self.trajectory = None;
             }
         }
-        let steps = self.settings.motor().counts_at_q8(self.command_next).wrapping_add(self.zero_steps);
-        io.step_to(self.index, steps, end_of_tick);
+        let motor = self.settings.motor();
+        let by = motor.counts_at_q8(self.command_next).wrapping_sub(motor.counts_at_q8(self.command_now));
+        io.schedule_steps(self.index, &evenly(now, by, self.settings.steps_reversed));
     }
 
     /// Command less encoder.
@@ -138,4 +142,11 @@ impl Axis {
     pub fn home_switch(&self, io: &impl RigIo) -> bool {
         io.home_switch(self.index)
     }
+}
+
+/// So many steps, evenly over a tick.
+fn evenly(start: Microseconds, by: i32, reversed: bool) -> StepSchedule {
+    let count = by.unsigned_abs().min(MAX_STEPS_PER_TICK as u32);
+    let at_ns = (0..count).map(|step| (2 * step + 1) * TICK_US as u32 * 500 / count).collect();
+    StepSchedule { start, forward: (by > 0) != reversed, at_ns }
 }

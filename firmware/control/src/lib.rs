@@ -23,7 +23,7 @@ mod settings;
 mod trajectory;
 
 pub use controller::{Controller, Event};
-pub use io::RigIo;
+pub use io::{MAX_STEPS_PER_TICK, RigIo, StepSchedule, TriggerEdge};
 pub use node::{Node, NodeIdentity};
 
 pub use profile::{Limits, MotionState, Profile};

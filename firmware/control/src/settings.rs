@@ -89,10 +89,17 @@ pub struct AxisSettings {
     pub steps_per_unit: u32,
     /// Encoder counts per metre or revolution.
     pub counts_per_unit: u32,
+    /// Whether the motor turns the other way round.
+    pub steps_reversed: bool,
+    /// Whether the encoder counts the other way round.
+    pub counts_reversed: bool,
     /// Largest difference between command and encoder while moving.
     pub following_error: Micro,
     /// Largest difference between target and encoder at which a move counts as reached.
     pub tolerance: Micro,
+    /// How far the last approach of a move comes from below, so that play is always taken up on the same side; 0 where
+    /// there is none.
+    pub backlash: Micro,
     /// Homing.
     pub homing: HomingSettings,
 }

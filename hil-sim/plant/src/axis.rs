@@ -1,6 +1,8 @@
 //! One axis of the mechanics: motor, transmission, encoder and switches.
 
-use vergence_control::Scale;
+use std::collections::VecDeque;
+
+use vergence_control::{Scale, StepSchedule};
 use vergence_protocol::{AxisKind, Microseconds};
 
 use crate::encoder::{Encoder, EncoderFault};
@@ -29,10 +31,10 @@ pub struct AxisMechanics {
 #[derive(Clone, Debug)]
 pub struct AxisPlant {
     mechanics: AxisMechanics,
-    /// Steps made by the end of the running order, and when that is.
-    ordered: (i32, Microseconds),
-    /// Steps made so far; fractional between two pulses.
-    steps: f64,
+    /// Steps ordered and not made yet: when, in nanoseconds, and whether forward.
+    ordered: VecDeque<(u64, bool)>,
+    /// Steps made so far.
+    steps: i32,
     /// Axis position of motor step zero; changes when steps are lost.
     motor_zero: f64,
     load: f64,
@@ -41,7 +43,7 @@ pub struct AxisPlant {
     blocked: bool,
     stalled: bool,
     /// Steps that the rotor will miss.
-    to_lose: f64,
+    to_lose: u32,
 }
 
 impl AxisPlant {
@@ -50,15 +52,15 @@ impl AxisPlant {
     pub fn new(mechanics: AxisMechanics, position: f64) -> Self {
         Self {
             mechanics,
-            ordered: (0, Microseconds(0)),
-            steps: 0.0,
+            ordered: VecDeque::new(),
+            steps: 0,
             motor_zero: position,
             load: position,
             encoder: Encoder::new(scale_reading(mechanics.encoder, position)),
             home: Switch::new(position <= mechanics.home_switch),
             blocked: false,
             stalled: false,
-            to_lose: 0.0,
+            to_lose: 0,
         }
     }
 
@@ -81,18 +83,18 @@ impl AxisPlant {
     /// Steps made so far.
     #[must_use]
     pub fn steps(&self) -> i32 {
-        self.steps.round() as i32
+        self.steps
     }
 
-    /// Orders steps, made evenly until `by`.
-    pub fn step_to(&mut self, steps: i32, by: Microseconds) {
-        self.ordered = (steps, by);
+    /// Orders steps, each at its instant.
+    pub fn schedule(&mut self, steps: &StepSchedule) {
+        let due = steps.at_ns.iter().map(|&after| (steps.start.0 * 1000 + u64::from(after), steps.forward));
+        self.ordered.extend(due);
     }
 
-    /// Forgets the steps not made yet, for when the power goes or comes: the rotor stands at a whole step.
+    /// Forgets the steps not made yet, for when the power goes or comes.
     pub fn drop_order(&mut self) {
-        self.steps = self.steps.round();
-        self.ordered.0 = self.steps();
+        self.ordered.clear();
     }
 
     /// Wedges the load where it is, or frees it: a motor that pulls on a wedged load loses steps.
@@ -107,7 +109,7 @@ impl AxisPlant {
 
     /// The rotor misses the next `steps` steps; a motor at rest loses none.
     pub fn lose_steps(&mut self, steps: u32) {
-        self.to_lose += f64::from(steps);
+        self.to_lose += steps;
     }
 
     /// Makes the encoder fail from here on, or whole again.
@@ -136,9 +138,9 @@ impl AxisPlant {
     /// Lets time pass from `from` to `to`; without drivers the motor stands.
     pub fn advance(&mut self, from: Microseconds, to: Microseconds, drivers_on: bool) {
         if drivers_on {
-            self.turn_motor(from, to);
+            self.turn_motor(to);
         }
-        let motor = self.motor_zero + self.steps / counts_per_micro(self.mechanics.motor);
+        let motor = self.motor_zero + f64::from(self.steps) / counts_per_micro(self.mechanics.motor);
         let play = self.mechanics.backlash / 2.0;
         // Inside the play the load stands; outside, the transmission pulls it after the motor.
         let pulled = self.load.clamp(motor - play, motor + play);
@@ -151,20 +153,16 @@ impl AxisPlant {
         self.home.advance(self.load <= self.mechanics.home_switch, to.0 - from.0);
     }
 
-    fn turn_motor(&mut self, from: Microseconds, to: Microseconds) {
-        let (target, by) = self.ordered;
-        let target = f64::from(target);
-        let before = self.steps;
-        self.steps = if to >= by {
-            target
-        } else {
-            let share = (to.0 - from.0) as f64 / (by.0 - from.0) as f64;
-            self.steps + (target - self.steps) * share
-        };
-        let made = self.steps - before;
-        let lost = if self.stalled { made } else { made.clamp(-self.to_lose, self.to_lose) };
-        self.to_lose = (self.to_lose - lost.abs()).max(0.0);
-        self.motor_zero -= lost / counts_per_micro(self.mechanics.motor);
+    fn turn_motor(&mut self, to: Microseconds) {
+        let step = 1.0 / counts_per_micro(self.mechanics.motor);
+        while let Some((_, forward)) = self.ordered.pop_front_if(|(at, _)| *at <= to.0 * 1000) {
+            let by = if forward { 1 } else { -1 };
+            self.steps += by;
+            if self.stalled || self.to_lose > 0 {
+                self.motor_zero -= f64::from(by) * step;
+                self.to_lose = self.to_lose.saturating_sub(1);
+            }
+        }
     }
 
     /// A load at an obstacle stays there, and a motor that pulls further loses steps.

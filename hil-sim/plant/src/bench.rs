@@ -30,8 +30,11 @@ impl Stage {
             jerk: 8_000_000,
             steps_per_unit: 1_600_000,
             counts_per_unit: counts_per_metre,
+            steps_reversed: false,
+            counts_reversed: false,
             following_error: Micro(1_000),
             tolerance: Micro(20),
+            backlash: Micro(0),
             homing: HomingSettings {
                 switch_at: Micro(min.0 - 2_000),
                 seek_speed: 40_000,
@@ -56,8 +59,11 @@ impl Stage {
             jerk: degrees(4_000.0).unsigned_abs(),
             steps_per_unit: 64_000,
             counts_per_unit: counts_per_revolution,
+            steps_reversed: false,
+            counts_reversed: false,
             following_error: Micro(degrees(1.0)),
             tolerance: Micro(degrees(0.02)),
+            backlash: Micro(0),
             homing: HomingSettings {
                 switch_at: Micro(min.0 - degrees(1.5)),
                 // A search stopped while it speeds up needs 2.5° more, and the hard limit is 3.5° beyond the switch.

@@ -1,6 +1,8 @@
 //! The whole mechanics behind the controller's seam.
 
-use vergence_control::RigIo;
+use std::collections::VecDeque;
+
+use vergence_control::{RigIo, StepSchedule, TriggerEdge};
 use vergence_protocol::Microseconds;
 
 use crate::axis::{AxisMechanics, AxisPlant};
@@ -12,6 +14,9 @@ pub struct Plant {
     now: Microseconds,
     drivers_on: bool,
     emergency_stop: bool,
+    /// When the cameras are to be fired.
+    trigger_at: Option<Microseconds>,
+    trigger_edges: VecDeque<TriggerEdge>,
 }
 
 impl Plant {
@@ -19,7 +24,14 @@ impl Plant {
     #[must_use]
     pub fn new(mechanics: &[AxisMechanics], positions: &[f64]) -> Self {
         let axes = mechanics.iter().zip(positions).map(|(&axis, &position)| AxisPlant::new(axis, position)).collect();
-        Self { axes, now: Microseconds(0), drivers_on: false, emergency_stop: false }
+        Self {
+            axes,
+            now: Microseconds(0),
+            drivers_on: false,
+            emergency_stop: false,
+            trigger_at: None,
+            trigger_edges: VecDeque::new(),
+        }
     }
 
     /// Where every load truly is, in micro-units.
@@ -42,6 +54,8 @@ impl Plant {
     /// The clock of the board begins again at zero, its outputs fall back to off; the mechanics keep their place.
     pub fn restart_clock(&mut self) {
         self.set_drivers(false);
+        self.trigger_at = None;
+        self.trigger_edges.clear();
         self.now = Microseconds(0);
     }
 
@@ -67,6 +81,20 @@ impl Plant {
 
     /// Lets time pass until `to`.
     pub fn advance(&mut self, to: Microseconds) {
+        if let Some(at) = self.trigger_at.take_if(|at| *at <= to) {
+            self.run_to(at.max(self.now));
+            self.latch();
+        }
+        self.run_to(to);
+    }
+
+    /// The trigger's edge: hardware latches every encoder.
+    fn latch(&mut self) {
+        let counts = self.axes.iter().map(AxisPlant::encoder).collect();
+        self.trigger_edges.push_back(TriggerEdge { at: self.now, counts });
+    }
+
+    fn run_to(&mut self, to: Microseconds) {
         let powered = self.is_powered();
         for axis in &mut self.axes {
             axis.advance(self.now, to, powered);
@@ -85,11 +113,11 @@ impl RigIo for Plant {
         self.axes.iter_mut().for_each(AxisPlant::drop_order);
     }
 
-    fn step_to(&mut self, axis: usize, steps: i32, by: Microseconds) {
+    fn schedule_steps(&mut self, axis: usize, steps: &StepSchedule) {
         if self.is_powered()
             && let Some(axis) = self.axes.get_mut(axis)
         {
-            axis.step_to(steps, by);
+            axis.schedule(steps);
         }
     }
 
@@ -111,5 +139,13 @@ impl RigIo for Plant {
 
     fn emergency_stop(&self) -> bool {
         self.emergency_stop
+    }
+
+    fn fire_trigger(&mut self, at: Microseconds) {
+        self.trigger_at = Some(at);
+    }
+
+    fn take_trigger_edge(&mut self) -> Option<TriggerEdge> {
+        self.trigger_edges.pop_front()
     }
 }
