@@ -167,13 +167,15 @@ impl StepPulses {
         timer.egr().write(|w| w.set_ug(true));
         timer.sr().write(|_| {});
         self.dma.ndtr().write(|w| w.set_ndt(u16::try_from(count).unwrap_or(0)));
+        self.dma.par().write_value(timer.arr().as_ptr() as u32);
         self.dma.mar().write_value(self.periods.as_ptr() as u32);
         compiler_fence(Ordering::SeqCst);
         self.dma.cr().write(|w| {
             w.set_dir(Dir::FROM_MEMORY);
             w.set_minc(true);
             w.set_msize(Size::BITS16);
-            w.set_psize(Size::BITS16);
+            // The register takes a word, and DMA fills up with zeros.
+            w.set_psize(Size::BITS32);
             w.set_pl(Pl::VERY_HIGH);
             w.set_en(true);
         });

@@ -1,0 +1,82 @@
+//! What survives a reset, what the chip says of itself, and how the application dies.
+
+use core::panic::PanicInfo;
+
+use cortex_m_rt::{ExceptionFrame, exception};
+use embassy_stm32::pac;
+use vergence_image::{Death, SURVIVOR_WORDS, Survivor, layout};
+use vergence_protocol::ResetCause;
+
+#[allow(unsafe_code, reason = "a note that only the linker knows")]
+unsafe extern "C" {
+    /// The ELF note with the build id: sizes of name and id, type, name "GNU", id.
+    static __build_id: [u32; 6];
+}
+
+/// What the board remembers.
+#[allow(unsafe_code, reason = "RAM outside the program's own")]
+pub fn survivor() -> Survivor {
+    let memory = layout::SURVIVOR.start as *const [u32; SURVIVOR_WORDS];
+    // SAFETY: memory.x keeps this RAM free of variables and stack, any bits are valid words, and writers do not overlap
+    // with readers: they run in start-up, in a task of the one executor, or never return.
+    Survivor::from_words(&unsafe { memory.read_volatile() })
+}
+
+/// Makes the board remember.
+#[allow(unsafe_code, reason = "RAM outside the program's own")]
+pub fn remember(survivor: &Survivor) {
+    let memory = layout::SURVIVOR.start as *mut [u32; SURVIVOR_WORDS];
+    // SAFETY: as in `survivor`.
+    unsafe { memory.write_volatile(survivor.to_words()) };
+}
+
+/// This start was good: earlier failures no longer count.
+pub fn declare_healthy() {
+    remember(&Survivor { failed_starts: 0, ..survivor() });
+}
+
+/// Why the chip started, from the flags of its reset controller, which it clears for the next time.
+pub fn reset_cause() -> ResetCause {
+    let flags = pac::RCC.csr().read();
+    pac::RCC.csr().modify(|w| w.set_rmvf(true));
+    // Every reset pulls the pin too, so the pin comes last; a brown-out is a power-on.
+    if flags.iwdgrstf() || flags.wwdgrstf() {
+        ResetCause::Watchdog
+    } else if flags.sftrstf() {
+        ResetCause::Software
+    } else if flags.borrstf() {
+        ResetCause::PowerOn
+    } else {
+        ResetCause::Pin
+    }
+}
+
+/// The first eight bytes of the build id.
+#[allow(unsafe_code, reason = "a note that only the linker knows")]
+pub fn build_id() -> u64 {
+    // SAFETY: build-id.x puts the note there, aligned to words, and nothing writes flash at this place.
+    let note = unsafe { &__build_id };
+    // As a person reads it: the first hexadecimal digits of the id.
+    u64::from(note[4].swap_bytes()) << 32 | u64::from(note[5].swap_bytes())
+}
+
+#[panic_handler]
+fn panic(info: &PanicInfo) -> ! {
+    cortex_m::interrupt::disable();
+    let (file, line) = info.location().map_or(("", 0), |place| (place.file(), place.line()));
+    die(Death::panic(file, line))
+}
+
+#[allow(unsafe_code, reason = "what cortex-m-rt asks for")]
+// SAFETY: it never returns, and shares nothing but the survivor, which nobody else can write any more.
+#[exception]
+unsafe fn HardFault(frame: &ExceptionFrame) -> ! {
+    die(Death::hard_fault(frame.pc(), frame.lr()))
+}
+
+/// Drivers off, note the cause, start again.
+fn die(death: Death) -> ! {
+    crate::board::cut_drivers();
+    remember(&Survivor { death: Some(death), ..survivor() });
+    cortex_m::peripheral::SCB::sys_reset()
+}
