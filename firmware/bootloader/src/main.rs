@@ -1,11 +1,76 @@
-//! stub while the application comes first
+//! The boot loader: finishes a swap of images or undoes one on trial, judges the image, and starts it. What fails three
+//! times in a row is not started again: a serial recovery waits for another image.
+//!
+//! ```text
+//! power cut at any point --> the swap goes on where it was (embassy-boot)
+//! image on trial, not confirmed --> swapped back
+//! seal broken, other hardware, wrong digest, wrong signature --> swapped back if on trial, else recovery
+//! three starts that ended in a watchdog bite, a panic or a fault --> recovery
+//! ```
+
 #![no_std]
 #![no_main]
-#[cortex_m_rt::entry]
+
+mod flash;
+mod memory;
+mod start;
+
+use cortex_m_rt::entry;
+use embassy_boot_stm32::State;
+use embassy_stm32::wdg::IndependentWatchdog;
+use embassy_stm32::{Config, rcc};
+use vergence_image::{DEVELOPMENT_KEY, Seal, Survivor};
+
+use crate::flash::FedFlash;
+
+/// How long an application may take until it sets the watchdog itself, and anything here between two feedings.
+const PATIENCE_US: u32 = 2_000_000;
+/// After so many failed starts nothing is started.
+const ATTEMPTS: u32 = 3;
+
+#[entry]
 fn main() -> ! {
+    let p = embassy_stm32::init(clocks());
+    let mut watchdog = IndependentWatchdog::new(p.IWDG, PATIENCE_US);
+    watchdog.unleash();
+
+    let before = memory::survivor();
+    // A person's button is no failure; a bite of the watchdog and a reset by the program itself are.
+    let failed_starts = if memory::fell_by_itself() { before.failed_starts } else { 0 };
+    let starts = before.starts.wrapping_add(1);
+    let mut survivor = Survivor { failed_starts, starts, ..before };
+
+    let state = FedFlash::new(p.FLASH, watchdog).swap();
+    let sound = Seal::check(memory::active(), &DEVELOPMENT_KEY).is_ok();
+    if !sound && state == State::Swap {
+        // The swap was just made or just undone. In the first case the next start undoes it.
+        memory::remember(&survivor);
+        cortex_m::peripheral::SCB::sys_reset();
+    }
+    if sound && !survivor.recovery_wanted && failed_starts < ATTEMPTS {
+        survivor.failed_starts += 1;
+        memory::remember(&survivor);
+        start::application();
+    }
+    survivor.recovery_wanted = false;
+    survivor.failed_starts = 0;
+    memory::remember(&survivor);
     loop {}
 }
-#[panic_handler]
-fn panic(_: &core::panic::PanicInfo) -> ! {
-    loop {}
+
+/// 170 MHz from the oscillator inside the chip, so that a board with a dead crystal can still be reached.
+fn clocks() -> Config {
+    let mut config = Config::default();
+    config.rcc.hsi = true;
+    config.rcc.pll = Some(rcc::Pll {
+        source: rcc::PllSource::HSI,
+        prediv: rcc::PllPreDiv::DIV4,
+        mul: rcc::PllMul::MUL85,
+        divp: None,
+        divq: None,
+        divr: Some(rcc::PllRDiv::DIV2),
+    });
+    config.rcc.sys = rcc::Sysclk::PLL1_R;
+    config.rcc.boost = true;
+    config
 }
