@@ -12,11 +12,11 @@ pub const PAGE: u32 = 2 * 1024;
 pub const WORD: u32 = 8;
 
 /// The boot loader.
-pub const BOOTLOADER: Region = Region { start: 0, length: 32 * 1024 };
+pub const BOOTLOADER: Region = Region { start: 0, length: 62 * 1024 };
 /// Progress of a swap: a word for the state, one for its validity, and four for each page of [`ACTIVE`].
-pub const STATE: Region = Region { start: 0x8000, length: PAGE };
+pub const STATE: Region = Region { start: 0xF800, length: PAGE };
 /// The application that runs, its seal at the end. A swap moves all of it whatever the image needs, so it is small.
-pub const ACTIVE: Region = Region { start: 0xA000, length: 96 * 1024 };
+pub const ACTIVE: Region = Region { start: 0x1_0000, length: 96 * 1024 };
 /// Two pages of settings, written in turn.
 pub const SETTINGS: Region = Region { start: 0x3_F000, length: 2 * PAGE };
 /// The image to come, and after the swap the one before: one page more than [`ACTIVE`], as the swap needs. It lies in

@@ -50,7 +50,11 @@ async fn main(spawner: Spawner) {
 
 /// The package's version.
 const fn version() -> [u8; 3] {
-    [part(env!("CARGO_PKG_VERSION_MAJOR")), part(env!("CARGO_PKG_VERSION_MINOR")), part(env!("CARGO_PKG_VERSION_PATCH"))]
+    [
+        part(env!("CARGO_PKG_VERSION_MAJOR")),
+        part(env!("CARGO_PKG_VERSION_MINOR")),
+        part(env!("CARGO_PKG_VERSION_PATCH")),
+    ]
 }
 
 const fn part(digits: &str) -> u8 {

@@ -203,6 +203,9 @@ fn configure_timer(timer: TimAdv) {
     timer.bdtr().write(|w| w.set_moe(true));
 }
 
-fn configure_mux(channel: embassy_stm32::pac::common::Reg<dmamux::regs::Ccr, embassy_stm32::pac::common::RW>, request: u8) {
+fn configure_mux(
+    channel: embassy_stm32::pac::common::Reg<dmamux::regs::Ccr, embassy_stm32::pac::common::RW>,
+    request: u8,
+) {
     channel.write(|w| w.set_dmareq_id(request));
 }

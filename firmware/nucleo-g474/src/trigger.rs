@@ -35,7 +35,10 @@ pub struct Trigger {
 
 impl Trigger {
     /// An output at rest.
-    pub fn new(timer: Peri<'static, peripherals::TIM4>, pin: Peri<'static, impl TimerPin<peripherals::TIM4, Ch1>>) -> Self {
+    pub fn new(
+        timer: Peri<'static, peripherals::TIM4>,
+        pin: Peri<'static, impl TimerPin<peripherals::TIM4, Ch1>>,
+    ) -> Self {
         let function = pin.af_num();
         let mut pin = Flex::new(pin);
         pin.set_as_af_unchecked(function, AfType::output(OutputType::PushPull, Speed::Medium));
