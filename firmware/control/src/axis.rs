@@ -3,21 +3,35 @@
 use vergence_protocol::{Counts, Micro, Microseconds};
 
 use crate::TICK_US;
+<<<<<<< HEAD
 use crate::io::{MAX_STEPS_PER_TICK, RigIo, StepSchedule};
 use crate::profile::{Limits, Profile};
+=======
+use crate::follow::{Following, Lost};
+use crate::io::{RigIo, StepSchedule};
+use crate::profile::Limits;
+>>>>>>> main
 use crate::settings::AxisSettings;
-use crate::trajectory::Trajectory;
+use crate::steps::{Instants, StepCounter};
+use crate::trajectory::{FINE_BITS, Fine, MotionState, Trajectory};
 
 #[derive(Clone, Debug)]
 pub struct Axis {
     pub settings: AxisSettings,
     index: usize,
-    /// Where the axis was told to be now, and at the end of the running tick; 1/256 micro-units.
-    command_now: i64,
-    command_next: i64,
-    /// When the axis will be at `command_next`: a new trajectory begins there and then, so that the command never jumps.
-    next_at: Microseconds,
+    /// Where the axis was told to be: now, at the end of the running tick, and at the end of the next one. Its steps are
+    /// ordered one tick ahead, and a new trajectory begins where the last order ends: the command never jumps.
+    command: [Fine; 3],
+    motor: StepCounter,
+    following: Following,
     trajectory: Option<Trajectory>,
+<<<<<<< HEAD
+=======
+    /// How much of the trajectory has been ordered, in microseconds.
+    elapsed: u64,
+    /// Whether the axis rests at its command with its play taken up from below.
+    from_below: bool,
+>>>>>>> main
     /// Raw counts at the axis zero.
     zero_counts: i32,
     referenced: bool,
@@ -28,10 +42,15 @@ impl Axis {
         Self {
             settings,
             index,
-            command_now: 0,
-            command_next: 0,
-            next_at: Microseconds(0),
+            command: [0; 3],
+            motor: StepCounter::new(settings.motor(), 0),
+            following: Following::default(),
             trajectory: None,
+<<<<<<< HEAD
+=======
+            elapsed: 0,
+            from_below: false,
+>>>>>>> main
             zero_counts: 0,
             referenced: false,
         }
@@ -47,7 +66,14 @@ impl Axis {
 
     /// The encoder's count, rising along the axis.
     fn raw_counts(&self, io: &impl RigIo) -> i32 {
+<<<<<<< HEAD
         let raw = io.encoder(self.index);
+=======
+        self.rising(io.encoder(self.index))
+    }
+
+    fn rising(&self, raw: i32) -> i32 {
+>>>>>>> main
         if self.settings.counts_reversed { raw.wrapping_neg() } else { raw }
     }
 
@@ -57,6 +83,11 @@ impl Axis {
 
     pub fn position(&self, io: &impl RigIo) -> Micro {
         self.settings.encoder().position_at(self.counts(io).0)
+    }
+
+    /// Where the axis was last told to be, at the end of the last tick that was ordered.
+    pub fn command(&self) -> Fine {
+        self.command[2]
     }
 
     /// Declares that the encoder count `edge` is at `position`.
@@ -73,65 +104,138 @@ impl Axis {
         if !self.referenced {
             self.zero_counts = self.raw_counts(io);
         }
-        let position = self.position(io);
+        let position = fine_from(self.position(io));
         self.trajectory = None;
+<<<<<<< HEAD
         self.command_now = i64::from(position.0) << 8;
         self.command_next = self.command_now;
+=======
+        self.from_below = false;
+        self.command = [position; 3];
+        self.motor = StepCounter::new(self.settings.motor(), position);
+        self.following = Following::default();
+>>>>>>> main
     }
 
-    /// Starts a profile from the present command.
-    pub fn run(&mut self, now: Microseconds, profile: Profile) {
-        self.trajectory = Some(Trajectory::new(self.command_next, now.max(self.next_at), profile));
+    /// The state at which a new trajectory begins.
+    fn state(&self) -> MotionState {
+        match &self.trajectory {
+            Some(trajectory) => trajectory.state(Microseconds(self.elapsed)),
+            None => MotionState::at(self.command()),
+        }
+    }
+
+    /// Starts a trajectory from the present state.
+    pub fn run(&mut self, trajectory: Trajectory) {
+        self.from_below = false;
+        self.elapsed = 0;
+        self.trajectory = Some(trajectory).filter(|trajectory| trajectory.duration() > 0.0);
     }
 
     /// Starts a motion by `distance` from rest.
-    pub fn travel(&mut self, now: Microseconds, distance: Micro, limits: Limits) {
-        self.run(now, Profile::rest_to_rest(distance.0 as f32, limits));
+    pub fn travel(&mut self, distance: Micro, limits: Limits) {
+        let target = self.command() + fine_from(distance);
+        self.run(Trajectory::reach(self.state(), target, limits, 0.0));
     }
 
-    /// The profile from rest at the present command to `target`.
-    pub fn profile_to(&self, target: Micro, limits: Limits) -> Profile {
-        let distance = (i64::from(target.0) << 8) - self.command_next;
-        Profile::rest_to_rest(distance as f32 / 256.0, limits)
+    /// Starts a motion to `target` from rest.
+    pub fn go_to(&mut self, target: Micro, limits: Limits) {
+        self.run(Trajectory::reach(self.state(), fine_from(target), limits, 0.0));
+    }
+
+    /// The quickest motion to `target` that takes `at_least` so many seconds, at `share` of full speed. From rest
+    /// acceleration and jerk are scaled with it; in mid-move they must serve to brake.
+    pub fn plan(&self, target: Micro, share: f32, at_least: f32) -> Trajectory {
+        let (from, full) = (self.state(), self.speed_limits());
+        let limits = if from.is_rest() { full.scaled(share) } else { Limits { speed: full.speed * share, ..full } };
+        let target = fine_from(target);
+        let run_up = fine_from(self.settings.backlash);
+        if run_up == 0 || !self.referenced || self.takes_up_play(from, target, run_up) {
+            return Trajectory::reach(from, target, limits, at_least);
+        }
+        let last = Trajectory::reach(MotionState::at(target - run_up), target, full.scaled(share), 0.0);
+        let mut whole = Trajectory::reach(from, target - run_up, limits, at_least - last.duration());
+        whole.append(&last);
+        whole
+    }
+
+    /// Whether a straight motion ends with the play taken up from below.
+    fn takes_up_play(&self, from: MotionState, target: Fine, run_up: Fine) -> bool {
+        let already_there = from.is_rest() && from.position == target && self.from_below;
+        already_there || Trajectory::stop(from, self.settings.limits()).target() <= target - run_up
+    }
+
+    /// Starts a planned motion that rests at its target until the others have finished too.
+    pub fn run_planned(&mut self, mut trajectory: Trajectory, together: f32) {
+        let from_below = self.referenced;
+        if trajectory.duration() > 0.0 {
+            trajectory.rest_until(together);
+            self.run(trajectory);
+        }
+        self.from_below = from_below;
+    }
+
+    fn speed_limits(&self) -> Limits {
+        // Without reference nobody knows what is in the way.
+        if self.referenced { self.settings.limits() } else { self.settings.limits_at(self.settings.homing.seek_speed) }
     }
 
     /// Begins the quickest stop; at rest it does nothing.
-    pub fn stop(&mut self, now: Microseconds) {
-        if let Some(trajectory) = self.trajectory {
-            let state = trajectory.state(now.max(self.next_at));
-            self.run(now, Profile::stop(state.velocity, state.acceleration, self.settings.limits()));
+    pub fn stop(&mut self) {
+        if self.trajectory.is_some() {
+            self.run(Trajectory::stop(self.state(), self.settings.limits()));
         }
     }
 
     /// Drops the trajectory where it is: for drivers that have been switched off.
     pub fn abandon(&mut self) {
         self.trajectory = None;
+        self.command = [self.command[0]; 3];
     }
 
+    /// Whether steps are still to be made.
     pub fn is_moving(&self) -> bool {
-        self.trajectory.is_some()
+        self.trajectory.is_some() || self.command[0] != self.command[2]
     }
 
-    /// Commands the next tick.
+    /// Orders the steps of the tick after the one that begins now.
     pub fn advance(&mut self, now: Microseconds, io: &mut impl RigIo) {
-        let end_of_tick = Microseconds(now.0 + TICK_US);
-        self.command_now = self.command_next;
-        self.next_at = end_of_tick;
-        if let Some(trajectory) = self.trajectory {
-            self.command_next = trajectory.position(end_of_tick);
-            if trajectory.is_over(end_of_tick) {
-                self.trajectory = None;
-            }
+        let [_, running, ordered] = self.command;
+        self.command = [running, ordered, ordered];
+        let Some(trajectory) = &self.trajectory else { return };
+        let (from, to) = (Microseconds(self.elapsed), Microseconds(self.elapsed + TICK_US));
+        let end = trajectory.state(to).position;
+        let (forward, at_ns) = self.motor.follow(trajectory.pieces(from, to), end);
+        self.command[2] = end;
+        self.elapsed = to.0;
+        if trajectory.is_over(to) {
+            self.trajectory = None;
         }
+<<<<<<< HEAD
         let motor = self.settings.motor();
         let by = motor.counts_at_q8(self.command_next).wrapping_sub(motor.counts_at_q8(self.command_now));
         io.schedule_steps(self.index, &evenly(now, by, self.settings.steps_reversed));
+=======
+        self.order(Microseconds(now.0 + TICK_US), forward, at_ns, io);
+>>>>>>> main
     }
 
-    /// Command less encoder.
-    pub fn following_error(&self, io: &impl RigIo) -> i32 {
-        let command = i32::try_from(self.command_now >> 8).unwrap_or(i32::MAX);
-        command.saturating_sub(self.position(io).0)
+    fn order(&self, start: Microseconds, forward: bool, at_ns: Instants, io: &mut impl RigIo) {
+        if !at_ns.is_empty() {
+            let forward = forward != self.settings.steps_reversed;
+            io.schedule_steps(self.index, &StepSchedule { start, forward, at_ns });
+        }
+    }
+
+    /// Compares encoder and command; once each tick.
+    pub fn watch(&mut self, io: &impl RigIo) -> Option<Lost> {
+        let (counts, position) = (self.counts(io), self.position(io));
+        self.following.watch(&self.settings, micro_from(self.command[0]), position, counts)
+    }
+
+    /// Where the axis was last told to be, in whole micro-units.
+    pub fn commanded(&self) -> Micro {
+        micro_from(self.command())
     }
 
     /// Whether the encoder reads `target` within the tolerance.
@@ -144,9 +248,20 @@ impl Axis {
     }
 }
 
+<<<<<<< HEAD
 /// So many steps, evenly over a tick.
 fn evenly(start: Microseconds, by: i32, reversed: bool) -> StepSchedule {
     let count = by.unsigned_abs().min(MAX_STEPS_PER_TICK as u32);
     let at_ns = (0..count).map(|step| (2 * step + 1) * TICK_US as u32 * 500 / count).collect();
     StepSchedule { start, forward: (by > 0) != reversed, at_ns }
+=======
+fn fine_from(position: Micro) -> Fine {
+    Fine::from(position.0) << FINE_BITS
+}
+
+/// The nearest; saturates.
+fn micro_from(position: Fine) -> Micro {
+    let rounded = (position + (1 << (FINE_BITS - 1))) >> FINE_BITS;
+    Micro(i32::try_from(rounded).unwrap_or(if rounded < 0 { i32::MIN } else { i32::MAX }))
+>>>>>>> main
 }

@@ -1,14 +1,17 @@
 //! The state machine: what may move, when, and what stops it.
 //!
 //! ```text
+//! Boot --> SelfTest --> Idle (or Trial)                 Idle --begin_update--> Updating --end_update--> Idle
 //! Idle --Arm--> Ready --Home--> Homing --> Ready        Ready --Disarm--> Idle (reference kept)
-//! Ready --MoveTo--> Moving --settled--> Ready           Moving, Homing --Stop--> Stopping --> Ready
+//! Ready --MoveTo, Jog--> Moving --settled--> Ready      Moving --MoveTo--> Moving (another target)
+//! Moving, Homing --Stop--> Stopping --> Ready           Trial --confirm_trial--> Idle
 //! armed --lease expired--> LinkLost (brakes, latched)   any --fault--> Fault (latched)
 //! LinkLost, Fault --ClearFault--> Idle
 //! ```
 
 mod requests;
 mod tick;
+mod update;
 
 use heapless::Deque;
 use vergence_protocol::{
@@ -17,11 +20,13 @@ use vergence_protocol::{
 };
 
 use crate::axis::Axis;
-use crate::homing::Homing;
+use crate::homing_sequence::HomingSequence;
 use crate::io::RigIo;
 use crate::latch::FaultLatch;
 use crate::lease::Lease;
+use crate::self_test::SelfTest;
 use crate::settings::{AxisSettings, SettingsError};
+use crate::trajectory::Fine;
 
 /// What the host should hear of at once.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -59,24 +64,27 @@ pub struct Controller {
     /// Who armed the board.
     holder: Option<SessionId>,
     latch: FaultLatch,
-    homing: AxisList<Option<Homing>>,
+    homing: HomingSequence,
+    self_test: SelfTest,
+    /// Whether the firmware is on trial.
+    on_trial: bool,
+    /// When the next control tick is due.
+    next_tick: Microseconds,
     active: ActiveMove,
     disarm_at_rest: bool,
     events: Deque<Event, 8>,
 }
 
 impl Controller {
-    /// A disarmed controller without reference.
+    /// A controller that has just started, without reference.
     ///
     /// # Errors
     /// [`SettingsError`] where an axis cannot work with its settings.
     pub fn new(settings: &[AxisSettings]) -> Result<Self, SettingsError> {
         let mut axes = AxisList::new();
-        let mut homing = AxisList::new();
         for (index, &axis) in settings.iter().enumerate() {
             axis.validate(index)?;
             axes.push(Axis::new(index, axis)).map_err(|_| SettingsError::AxisCount)?;
-            homing.push(None).map_err(|_| SettingsError::AxisCount)?;
         }
         if axes.is_empty() {
             return Err(SettingsError::AxisCount);
@@ -91,12 +99,15 @@ impl Controller {
         };
         Ok(Self {
             axes,
-            state: ControllerState::Idle,
+            state: ControllerState::Boot,
             drivers_on: false,
             lease: Lease::default(),
             holder: None,
             latch: FaultLatch::default(),
-            homing,
+            homing: HomingSequence::default(),
+            self_test: SelfTest::default(),
+            on_trial: false,
+            next_tick: Microseconds(0),
             active,
             disarm_at_rest: false,
             events: Deque::new(),
@@ -113,6 +124,12 @@ impl Controller {
     #[must_use]
     pub fn axis_info(&self, axis: usize) -> Option<AxisInfo> {
         self.axes.get(axis).map(|axis| axis.settings.info())
+    }
+
+    /// Where an axis was last told to be: at the end of the tick after the running one, as far as is ordered.
+    #[must_use]
+    pub fn command(&self, axis: usize) -> Option<Fine> {
+        self.axes.get(axis).map(Axis::command)
     }
 
     /// What the controller is doing.
@@ -148,12 +165,13 @@ impl Controller {
 
     /// The mode of the latest move, claimed only while the encoders confirm it.
     fn mode_reached(&self, io: &impl RigIo) -> Mode {
-        let there = self.active.phase == MovePhase::Settled && self.inside_tolerance(io);
+        let referenced = self.axes.iter().all(Axis::is_referenced);
+        let there = referenced && self.active.phase == MovePhase::Settled && self.inside_tolerance(io);
         if there { self.active.mode } else { Mode(0) }
     }
 
     fn inside_tolerance(&self, io: &impl RigIo) -> bool {
-        self.axes.iter().zip(&self.active.targets).all(|(axis, &target)| axis.is_referenced() && axis.is_at(target, io))
+        self.axes.iter().zip(&self.active.targets).all(|(axis, &target)| axis.is_at(target, io))
     }
 
     fn any_moving(&self) -> bool {
@@ -174,7 +192,7 @@ impl Controller {
         self.cut_drivers(io);
         self.holder = None;
         self.disarm_at_rest = false;
-        self.state = ControllerState::Idle;
+        self.state = self.at_rest();
     }
 
     fn cut_drivers(&mut self, io: &mut impl RigIo) {
@@ -186,16 +204,13 @@ impl Controller {
     }
 
     /// Brings every axis to rest within its limits.
-    fn brake(&mut self, now: Microseconds) {
+    fn brake(&mut self) {
         self.abort_motion();
-        for axis in &mut self.axes {
-            axis.stop(now);
-        }
+        self.axes.iter_mut().for_each(Axis::stop);
     }
 
-    /// Gives up homing and the running move.
+    /// Gives up the running move.
     fn abort_motion(&mut self) {
-        self.homing.iter_mut().for_each(|homing| *homing = None);
         if matches!(self.active.phase, MovePhase::Running | MovePhase::Settling) {
             self.active.phase = MovePhase::Stopped;
             self.tell_phase();

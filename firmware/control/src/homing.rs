@@ -2,13 +2,13 @@
 //!
 //! The slow edge is the reference; the fast one only checks it (as Klipper and GRBL do).
 
-use vergence_protocol::{Counts, FaultCode, Micro, Microseconds};
+use vergence_protocol::{Counts, FaultCode, Micro};
 
 use crate::TICK_US;
 use crate::axis::Axis;
 use crate::contact::{Contact, DEBOUNCE_TICKS};
 use crate::io::RigIo;
-use crate::profile::Profile;
+use crate::trajectory::{MotionState, Trajectory, fine, micro};
 
 /// A switch that is neither open nor closed for so long at rest will never be.
 const LONGEST_LOOK_TICKS: u8 = 200;
@@ -61,14 +61,13 @@ pub struct Homing {
 }
 
 impl Homing {
-    /// Starts: the old reference is no longer claimed.
-    pub fn start(axis: &mut Axis) -> Self {
-        axis.forget_reference();
+    /// Starts with an axis at rest.
+    pub fn start() -> Self {
         Self { phase: Phase::Look { left: LONGEST_LOOK_TICKS }, contact: Contact::default() }
     }
 
     /// One tick.
-    pub fn poll(&mut self, now: Microseconds, axis: &mut Axis, io: &impl RigIo) -> Progress {
+    pub fn poll(&mut self, axis: &mut Axis, io: &impl RigIo) -> Progress {
         let homing = axis.settings.homing;
         let limits = axis.settings.limits_at(homing.seek_speed);
         let moving = axis.is_moving();
@@ -82,18 +81,18 @@ impl Homing {
                 None => return stuck(0),
             },
             Phase::Look { .. } if closed => {
-                axis.travel(now, back_off(axis), limits);
+                axis.travel(back_off(axis), limits);
                 Phase::BackOff
             }
             Phase::BackOff if moving => Phase::BackOff,
             Phase::BackOff if closed => return stuck(back_off(axis).0),
             Phase::Look { .. } | Phase::BackOff => {
-                axis.travel(now, Micro(-homing.travel.0), limits);
+                axis.travel(Micro(-homing.travel.0), limits);
                 Phase::Seek
             }
             Phase::Seek => match edge_now {
                 Some(edge) => {
-                    axis.stop(now);
+                    axis.stop();
                     Phase::Brake { edge }
                 }
                 None if moving => Phase::Seek,
@@ -102,14 +101,14 @@ impl Homing {
             Phase::Brake { edge } if moving => Phase::Brake { edge },
             Phase::Brake { edge } => {
                 let overshoot = axis.settings.encoder().position_at(edge.0.wrapping_sub(counts.0));
-                axis.travel(now, Micro(homing.retract.0.saturating_add(overshoot.0)), limits);
+                axis.travel(Micro(homing.retract.0.saturating_add(overshoot.0)), limits);
                 Phase::Retract { edge }
             }
             Phase::Retract { edge } if moving => Phase::Retract { edge },
             Phase::Retract { .. } if closed => return stuck(homing.retract.0),
             Phase::Retract { edge } => {
                 let slow = axis.settings.limits_at(homing.approach_speed);
-                axis.travel(now, Micro(homing.retract.0.saturating_mul(-2)), slow);
+                axis.travel(Micro(homing.retract.0.saturating_mul(-2)), slow);
                 Phase::Approach { edge }
             }
             Phase::Approach { edge } => match edge_now {
@@ -118,7 +117,7 @@ impl Homing {
                     if apart.abs() > homing.repeatability.0 {
                         return Progress::Failed { code: FaultCode::HomeNotRepeatable, detail: apart };
                     }
-                    axis.stop(now);
+                    axis.stop();
                     Phase::Rest { edge: slow_edge }
                 }
                 None if moving => Phase::Approach { edge },
@@ -127,8 +126,7 @@ impl Homing {
             Phase::Rest { edge } if moving => Phase::Rest { edge },
             Phase::Rest { edge } => {
                 axis.reference(io, edge, homing.switch_at);
-                let profile = axis.profile_to(axis.settings.min, limits);
-                axis.run(now, profile);
+                axis.go_to(axis.settings.min, limits);
                 Phase::Enter
             }
             Phase::Enter if moving => Phase::Enter,
@@ -144,7 +142,8 @@ impl Homing {
 fn back_off(axis: &Axis) -> Micro {
     let homing = axis.settings.homing;
     let limits = axis.settings.limits_at(homing.seek_speed);
-    let braking = Profile::stop(limits.speed, 0.0, limits).end() + limits.speed * limits.acceleration / limits.jerk;
+    let at_speed = MotionState { velocity: fine(limits.speed), ..MotionState::default() };
+    let braking = micro(Trajectory::stop(at_speed, limits).target()) + limits.speed * limits.acceleration / limits.jerk;
     let unsure = limits.speed * f32::from(DEBOUNCE_TICKS) * TICK_US as f32 * 1e-6;
     Micro(homing.retract.0.saturating_add((braking + unsure) as i32))
 }

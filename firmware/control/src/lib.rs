@@ -13,21 +13,26 @@
 mod axis;
 mod contact;
 mod controller;
+mod follow;
 mod homing;
+mod homing_sequence;
 mod io;
 mod latch;
 mod lease;
 mod node;
 mod profile;
+mod self_test;
 mod settings;
+mod steps;
 mod trajectory;
 
 pub use controller::{Controller, Event};
 pub use io::{MAX_STEPS_PER_TICK, RigIo, StepSchedule, TriggerEdge};
 pub use node::{Node, NodeIdentity};
 
-pub use profile::{Limits, MotionState, Profile};
-pub use settings::{AxisSettings, HomingSettings, Scale, SettingsError};
+pub use profile::Limits;
+pub use settings::{AxisSettings, HomingSettings, LARGEST_STEP_RATE, Scale, SettingsError};
+pub use trajectory::{FINE_BITS, Fine, MotionState, Trajectory};
 
 /// The control tick: how often `poll` wants to run while the drivers are on, in microseconds.
 pub const TICK_US: u64 = 1_000;

@@ -1,9 +1,25 @@
-//! Jerk-limited motion profiles: rest to rest in seven segments, and the quickest stop from any state.
+//! The planner: jerk-limited motions from any state to rest at a target, and the quickest stop.
 //!
-//! L. Biagiotti and C. Melchiorri, *Trajectory Planning for Automatic Machines and Robots*, 2008, §3.4 (double S).
-//! Single precision: the microcontroller has a single-precision FPU, and 2⁻²⁴ of the longest move is below an encoder count.
+//! L. Biagiotti and C. Melchiorri, *Trajectory Planning for Automatic Machines and Robots*, 2008, §3.4 (double S): change
+//! the velocity to that of the cruise, cruise, change it to rest. Planned in single precision, since the microcontroller
+//! has a single-precision FPU; the pieces are then joined in integers, and what single precision got wrong is put into
+//! the cruise.
 
 use libm::{cbrtf, fabsf, sqrtf};
+
+use crate::trajectory::{Fine, MotionState, Segment, Trajectory, fine, micro, ticks};
+
+/// Halvings of an interval of speeds: single precision has no more bits.
+const HALVINGS: u32 = 26;
+/// The cruise is left this share of all ways, and from rest is planned slower by it, so that rounding in single precision
+/// cannot make it shorter than nothing.
+const RESERVE: f32 = 2e-6;
+/// The least jerk that the pieces can hold to a ten-thousandth, per second cubed: a motion that would be slower ends early.
+const LEAST_JERK: f32 = 1e-3;
+/// The least speed of a cruise as a share of the largest: what is left of a change of speed by rounding is far less.
+const LEAST_CRUISE: f32 = 4e-6;
+/// A speed that is left over is rounding where it is less than this share of those it was computed from.
+const NOTHING: f32 = 3e-7;
 
 /// What an axis can do, in micro-units per second to the power of one, two and three. All positive.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -28,148 +44,200 @@ impl Limits {
     }
 }
 
-/// Where a profile is at one instant: offset from its start in micro-units, and the derivatives per second.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct MotionState {
-    /// Offset from the start of the profile.
-    pub offset: f32,
-    /// Velocity.
-    pub velocity: f32,
-    /// Acceleration.
-    pub acceleration: f32,
-}
-
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-struct Segment {
-    duration: f32,
-    jerk: f32,
-}
-
-/// A motion of one axis: up to seven segments of constant jerk, at rest afterwards.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Profile {
-    start: MotionState,
-    segments: [Segment; 7],
-    duration: f32,
-    /// The exact end: rounding in the segments never decides where an axis stops.
-    end: f32,
-}
-
-impl Profile {
-    /// The quickest motion over `distance` from rest to rest.
+impl Trajectory {
+    /// The quickest way to rest from `from`.
     #[must_use]
-    pub fn rest_to_rest(distance: f32, limits: Limits) -> Self {
+    pub fn stop(from: MotionState, limits: Limits) -> Self {
+        let change = Change::between(micro(from.velocity), micro(from.acceleration), 0.0, limits);
+        let mut stop = Self::resting_at(from.position);
+        let end = change.run(from, |segment| stop.push(segment));
+        stop.rest_at(end.position);
+        stop
+    }
+
+    /// The quickest motion from `from` to rest at `target` that takes `at_least` so many seconds. One that cannot take
+    /// exactly so long takes longer.
+    #[must_use]
+    pub fn reach(from: MotionState, target: Fine, limits: Limits, at_least: f32) -> Self {
+        if from.is_rest() {
+            return Self::from_rest(from.position, target, limits, at_least);
+        }
+        let mut halting = Self::stop(from, limits);
+        let rest = Self::from_rest(halting.target(), target, limits, at_least - halting.duration());
+        halting.append(&rest);
+        let way = Way::new(from, target, limits);
+        let cruising = way.cruise_lasting(at_least).map(|speed| Self::cruising(from, target, way.sign * speed, limits));
+        // Just beyond where it would stop, an axis is there sooner when it does stop than when it creeps on.
+        cruising.filter(|cruising| cruising.duration() <= halting.duration()).unwrap_or(halting)
+    }
+
+    /// From rest, a longer time is the same path run slower.
+    fn from_rest(position: Fine, target: Fine, limits: Limits, at_least: f32) -> Self {
+        let distance = micro(target - position);
         let length = fabsf(distance);
-        let jerk = if distance < 0.0 { -limits.jerk } else { limits.jerk };
         let peak = peak_speed(length, limits);
-        let (ramp, hold) = speed_change(peak, limits);
-        // Distance covered by speeding up and by slowing down: half the peak speed times the time, each.
-        let cruise = if peak > 0.0 { (length / peak - (2.0 * ramp + hold)).max(0.0) } else { 0.0 };
-        let segments = [
-            Segment { duration: ramp, jerk },
-            Segment { duration: hold, jerk: 0.0 },
-            Segment { duration: ramp, jerk: -jerk },
-            Segment { duration: cruise, jerk: 0.0 },
-            Segment { duration: ramp, jerk: -jerk },
-            Segment { duration: hold, jerk: 0.0 },
-            Segment { duration: ramp, jerk },
-        ];
-        Self { start: MotionState::default(), segments, duration: total(&segments), end: distance }
+        if peak <= 0.0 {
+            return Self::resting_at(target);
+        }
+        let quickest = length / peak + Change::between(0.0, 0.0, peak, limits).duration();
+        let slowed = if at_least > quickest { quickest / at_least } else { 1.0 };
+        let slowed = slowed.max(cbrtf(LEAST_JERK / limits.jerk)).min(1.0);
+        let cruise = if distance < 0.0 { -peak } else { peak } * slowed * (1.0 - RESERVE);
+        Self::cruising(MotionState::at(position), target, cruise, limits.scaled(slowed))
     }
 
-    /// The quickest way to rest from `velocity` and `acceleration`.
-    #[must_use]
-    pub fn stop(velocity: f32, acceleration: f32, limits: Limits) -> Self {
+    /// To the velocity `cruise`, along with it as long as it takes, and to rest.
+    fn cruising(from: MotionState, target: Fine, cruise: f32, limits: Limits) -> Self {
+        let mut whole = Self::resting_at(target);
+        let speeding = Change::between(micro(from.velocity), micro(from.acceleration), cruise, limits);
+        let top = speeding.run(from, |segment| whole.push(segment));
+        // Slowing down is speeding up, backwards from rest at the target: rounding gathers where the axis is quick.
+        let mut slowing = Self::resting_at(0);
+        let far =
+            Change::between(0.0, 0.0, micro(top.velocity), limits).run(MotionState::default(), |s| slowing.push(s));
+        let way = target - far.position - top.position;
+        if top.velocity != 0 {
+            let duration = (i128::from(way) << 32) / i128::from(top.velocity);
+            let duration = i64::try_from(duration.max(0)).unwrap_or(i64::MAX / 4);
+            whole.push(Segment { start: MotionState { acceleration: 0, ..top }, jerk: 0, duration });
+        }
+        slowing.backwards(target).for_each(|segment| whole.push(segment));
+        whole
+    }
+}
+
+/// A change of velocity to zero acceleration in the least time: jerk, hold, jerk back.
+#[derive(Clone, Copy, Debug)]
+struct Change {
+    from: [f32; 2],
+    jerk: f32,
+    durations: [f32; 3],
+}
+
+impl Change {
+    /// From velocity and acceleration to the velocity `to`.
+    fn between(velocity: f32, acceleration: f32, to: f32, limits: Limits) -> Self {
         let Limits { acceleration: a_max, jerk: j, .. } = limits;
-        // The velocity that is left once the acceleration alone has been brought to zero.
-        let remaining = velocity + acceleration * fabsf(acceleration) / (2.0 * j);
-        // Mirror so that the velocity must be raised to zero: acceleration climbs to a peak, holds, and returns.
-        let sign = if remaining > 0.0 { -1.0 } else { 1.0 };
-        let (v, a) = (sign * velocity, sign * acceleration);
-        let peak = sqrtf((-v * j + 0.5 * a * a).max(0.0)).min(a_max).max(a);
+        // What is left to do once the acceleration alone has been brought to zero. Where that is nothing but rounding,
+        // nothing else is done: half a root of it would be much.
+        let alone = acceleration * fabsf(acceleration) / (2.0 * j);
+        let remaining = to - (velocity + alone);
+        let is_rounding = fabsf(remaining) <= NOTHING * (fabsf(to) + fabsf(velocity) + fabsf(alone));
+        if is_rounding {
+            let jerk = if acceleration < 0.0 { -j } else { j };
+            let durations = [0.0, 0.0, fabsf(acceleration) / j];
+            return Self { from: [velocity, acceleration], jerk, durations };
+        }
+        // Mirrored so that the velocity must be raised: the acceleration climbs to a peak, holds, and returns.
+        let sign = if remaining < 0.0 { -1.0 } else { 1.0 };
+        let (change, a) = (sign * (to - velocity), sign * acceleration);
+        let peak = sqrtf((change * j + 0.5 * a * a).max(0.0)).min(a_max).max(a);
         let gained = (2.0 * peak * peak - a * a) / (2.0 * j);
-        let hold = if peak > 0.0 { ((-v - gained) / peak).max(0.0) } else { 0.0 };
-        let mut segments = [Segment::default(); 7];
-        segments[0] = Segment { duration: (peak - a) / j, jerk: sign * j };
-        segments[1] = Segment { duration: hold, jerk: 0.0 };
-        segments[2] = Segment { duration: peak / j, jerk: -sign * j };
-        let start = MotionState { offset: 0.0, velocity, acceleration };
-        let end = run(start, &segments, f32::INFINITY).offset;
-        Self { start, segments, duration: total(&segments), end }
+        let hold = if peak > 0.0 { ((change - gained) / peak).max(0.0) } else { 0.0 };
+        Self { from: [velocity, acceleration], jerk: sign * j, durations: [(peak - a) / j, hold, peak / j] }
     }
 
-    /// The same path run `factor` times as slowly. For profiles from rest.
-    #[must_use]
-    pub fn stretched(mut self, factor: f32) -> Self {
-        for segment in &mut self.segments {
-            segment.duration *= factor;
-            segment.jerk /= factor * factor * factor;
+    fn pieces(&self) -> [(f32, f32); 3] {
+        let [up, hold, down] = self.durations;
+        [(up, self.jerk), (hold, 0.0), (down, -self.jerk)]
+    }
+
+    fn duration(&self) -> f32 {
+        self.durations.iter().sum()
+    }
+
+    fn distance(&self) -> f32 {
+        let [mut v, mut a] = self.from;
+        let mut x = 0.0;
+        for (t, j) in self.pieces() {
+            x += t * (v + t * (a / 2.0 + t * j / 6.0));
+            v += t * (a + t * j / 2.0);
+            a += t * j;
         }
-        self.duration *= factor;
-        self
+        x
     }
 
-    /// The same path run in exactly `duration` seconds, so that axes finish in the same tick. For profiles from rest;
-    /// one that goes nowhere stays as it is.
-    #[must_use]
-    pub fn lasting(self, duration: f32) -> Self {
-        if self.duration > 0.0 { Self { duration, ..self.stretched(duration / self.duration) } } else { self }
-    }
-
-    /// How long it takes, in seconds.
-    #[must_use]
-    pub fn duration(&self) -> f32 {
-        self.duration
-    }
-
-    /// Where it ends, as an offset from its start.
-    #[must_use]
-    pub fn end(&self) -> f32 {
-        self.end
-    }
-
-    /// The state `time` seconds after the start; at rest at the exact end from the duration on.
-    #[must_use]
-    pub fn at(&self, time: f32) -> MotionState {
-        let left = self.duration - time;
-        if left <= 0.0 {
-            return MotionState { offset: self.end, ..MotionState::default() };
+    /// The pieces from `state` on; returns its end.
+    fn run(&self, mut state: MotionState, mut push: impl FnMut(Segment)) -> MotionState {
+        for (duration, jerk) in self.pieces() {
+            let segment = Segment { start: state, jerk: fine(jerk), duration: ticks(duration) };
+            push(segment);
+            state = segment.end();
         }
-        if time <= left {
-            return run(self.start, &self.segments, time);
-        }
-        // The second half is run backwards from rest at the end: rounding gathers in the middle, where the axis is quick,
-        // and can neither overshoot the end nor jump to it. Backwards only the acceleration changes its sign.
-        let back = run(MotionState::default(), self.segments.iter().rev(), left);
-        MotionState { offset: self.end - back.offset, velocity: back.velocity, acceleration: -back.acceleration }
+        state
     }
 }
 
-fn total(segments: &[Segment]) -> f32 {
-    segments.iter().map(|segment| segment.duration).sum()
+/// A way that begins in motion, mirrored so that it goes on upwards from where the quickest stop would end.
+#[derive(Clone, Copy, Debug)]
+struct Way {
+    sign: f32,
+    length: f32,
+    velocity: f32,
+    acceleration: f32,
+    limits: Limits,
 }
 
-fn run<'a>(start: MotionState, segments: impl IntoIterator<Item = &'a Segment>, time: f32) -> MotionState {
-    let mut state = start;
-    let mut left = time.max(0.0);
-    for segment in segments {
-        let t = left.min(segment.duration);
-        let MotionState { offset, velocity, acceleration } = state;
-        state = MotionState {
-            offset: offset + t * (velocity + t * (acceleration / 2.0 + t * segment.jerk / 6.0)),
-            velocity: velocity + t * (acceleration + t * segment.jerk / 2.0),
-            acceleration: acceleration + t * segment.jerk,
-        };
-        left -= t;
+impl Way {
+    fn new(from: MotionState, target: Fine, limits: Limits) -> Self {
+        let (length, velocity, acceleration) =
+            (micro(target - from.position), micro(from.velocity), micro(from.acceleration));
+        let stop = Change::between(velocity, acceleration, 0.0, limits).distance();
+        let sign = if length < stop { -1.0 } else { 1.0 };
+        Self { sign, length: sign * length, velocity: sign * velocity, acceleration: sign * acceleration, limits }
     }
-    state
+
+    /// How long a motion takes that cruises at `speed`; `None` where it would go too far.
+    fn duration(&self, speed: f32) -> Option<f32> {
+        let up = Change::between(self.velocity, self.acceleration, speed, self.limits);
+        let down = Change::between(0.0, 0.0, speed, self.limits);
+        let [above, below] = [up.distance(), down.distance()];
+        let left = self.length - above - below;
+        let rounding = RESERVE * (fabsf(self.length) + fabsf(above) + below);
+        (left >= rounding).then(|| up.duration() + down.duration() + left / speed)
+    }
+
+    fn is_possible(&self, speed: f32) -> bool {
+        self.duration(speed).is_some()
+    }
+
+    /// The quickest cruise. Above the speed that is left when the acceleration alone is brought to zero the way grows
+    /// with the speed; below it the axis brakes twice, and a feasible speed is found from below.
+    fn quickest(&self) -> Option<f32> {
+        let fastest = self.limits.speed;
+        if self.is_possible(fastest) {
+            return Some(fastest);
+        }
+        let a = self.acceleration;
+        let flat = (self.velocity + a * fabsf(a) / (2.0 * self.limits.jerk)).clamp(0.0, fastest);
+        let [low, high] = if flat > 0.0 && self.is_possible(flat) { [flat, fastest] } else { [0.0, flat] };
+        let high = if high > 0.0 { high } else { fastest };
+        let speed = halve(low, high, |speed| self.is_possible(speed));
+        (speed > 0.0).then_some(speed)
+    }
+
+    /// The quickest cruise that makes the whole last `at_least` so long.
+    fn cruise_lasting(&self, at_least: f32) -> Option<f32> {
+        let quickest = self.quickest()?;
+        let is_slow = |speed: f32| self.duration(speed).is_some_and(|duration| duration >= at_least);
+        let speed = if is_slow(quickest) { quickest } else { halve(0.0, quickest, is_slow) };
+        (speed > LEAST_CRUISE * self.limits.speed).then_some(speed)
+    }
+}
+
+/// The end of `low..high` at which `holds` ends to hold, from the side where it does.
+fn halve(mut low: f32, mut high: f32, holds: impl Fn(f32) -> bool) -> f32 {
+    for _ in 0..HALVINGS {
+        let middle = f32::midpoint(low, high);
+        if holds(middle) { low = middle } else { high = middle }
+    }
+    low
 }
 
 /// The speed reached on a way of `length` between rests: the limit, or less where the way is short.
 fn peak_speed(length: f32, limits: Limits) -> f32 {
     let Limits { speed, acceleration: a, jerk: j } = limits;
-    let (ramp, hold) = speed_change(speed, limits);
-    if length >= speed * (2.0 * ramp + hold) {
+    if length >= speed * Change::between(0.0, 0.0, speed, limits).duration() {
         return speed;
     }
     // Never at full acceleration: length = 2 v sqrt(v / j).
@@ -179,10 +247,4 @@ fn peak_speed(length: f32, limits: Limits) -> f32 {
     }
     // With a stretch of full acceleration: length = v (v / a + a / j). Written without cancellation.
     2.0 * length / (a / j + sqrtf(a * a / (j * j) + 4.0 * length / a))
-}
-
-/// Durations of the jerk ramp and of constant acceleration that change the speed by `change`.
-fn speed_change(change: f32, limits: Limits) -> (f32, f32) {
-    let Limits { acceleration: a, jerk: j, .. } = limits;
-    if change * j >= a * a { (a / j, (change / a - a / j).max(0.0)) } else { (sqrtf(change / j), 0.0) }
 }

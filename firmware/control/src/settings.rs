@@ -1,8 +1,8 @@
 //! What the controller must know of its axes.
 
-use libm::roundf;
 use vergence_protocol::{AxisInfo, AxisKind, Micro};
 
+use crate::TICK_US;
 use crate::profile::Limits;
 
 /// Encoder counts or motor steps for each metre (linear) or revolution (rotary) of an axis.
@@ -23,18 +23,17 @@ impl Scale {
         }
     }
 
-    /// The count nearest to a position in 1/256 micro-units.
-    #[must_use]
-    pub fn counts_at_q8(self, position: i64) -> i32 {
-        // 2³¹ micro-units in q8 times 1000 fits i64 by itself but not with the scale: i128 costs nothing at this rate.
-        let numerator = i128::from(position) * i128::from(self.per_unit) * 1000;
-        saturate(div_round(numerator, i128::from(self.milli_micro()) * 256))
-    }
-
     /// The count nearest to `position`.
     #[must_use]
     pub fn counts_at(self, position: Micro) -> i32 {
-        self.counts_at_q8(i64::from(position.0) << 8)
+        let numerator = i128::from(position.0) * i128::from(self.per_unit) * 1000;
+        saturate(div_round(numerator, i128::from(self.milli_micro())))
+    }
+
+    /// Half the distance between two marks, in 2⁻⁴⁰ micro-units.
+    pub(crate) fn half_mark_q40(self) -> i64 {
+        // At most half a revolution: below 2²² micro-units.
+        ((i128::from(self.milli_micro()) << 40) / (i128::from(self.per_unit.max(1)) * 2000)) as i64
     }
 
     /// The position nearest to a count.
@@ -115,12 +114,20 @@ pub enum SettingsError {
         /// Which axis.
         axis: usize,
     },
-    /// `min` is not below `max`, or the switch does not lie below `min`.
+    /// `min` is not below `max`, or the switch does not lie below all that a move may touch, or the play is negative.
     Range {
         /// Which axis.
         axis: usize,
     },
+    /// At full speed the motor would have to make more than [`LARGEST_STEP_RATE`] steps a second.
+    StepRate {
+        /// Which axis.
+        axis: usize,
+    },
 }
+
+/// The most steps a second that any axis may need.
+pub const LARGEST_STEP_RATE: u32 = 100_000;
 
 impl AxisSettings {
     /// Checks one axis.
@@ -135,10 +142,22 @@ impl AxisSettings {
         if !positive || distances.iter().any(|distance| distance.0 <= 0) {
             return Err(SettingsError::NotPositive { axis });
         }
-        if self.min >= self.max || homing.switch_at >= self.min {
+        let lowest = i64::from(self.min.0) - i64::from(self.backlash.0);
+        if self.min >= self.max || self.backlash.0 < 0 || i64::from(homing.switch_at.0) >= lowest {
             return Err(SettingsError::Range { axis });
         }
+        let fastest = u64::from(self.speed.max(homing.seek_speed).max(homing.approach_speed));
+        let steps = u128::from(fastest) * u128::from(self.steps_per_unit) * 1000;
+        if steps > u128::from(LARGEST_STEP_RATE) * self.motor().milli_micro() as u128 {
+            return Err(SettingsError::StepRate { axis });
+        }
         Ok(())
+    }
+
+    /// Whether a move may ask for `position`.
+    #[must_use]
+    pub fn allows(&self, position: Micro) -> bool {
+        (self.min..=self.max).contains(&position)
     }
 
     /// The limits of full-speed motion.
@@ -165,6 +184,13 @@ impl AxisSettings {
         Scale { kind: self.kind, per_unit: self.steps_per_unit }
     }
 
+    /// How far the encoder may go in one tick: twice as far as at full speed, and what a load that was held springs back.
+    pub(crate) fn largest_jump(&self) -> u32 {
+        let way_of_a_tick = u64::from(self.speed) * TICK_US / 1_000_000;
+        let jump = u64::from(self.following_error.0.unsigned_abs() / 2) + 2 * way_of_a_tick;
+        u32::try_from(jump).unwrap_or(u32::MAX)
+    }
+
     /// What the host is told.
     #[must_use]
     pub const fn info(&self) -> AxisInfo {
@@ -178,10 +204,4 @@ impl AxisSettings {
             counts_per_unit: self.counts_per_unit,
         }
     }
-}
-
-/// An offset in micro-units as 1/256 micro-units.
-pub(crate) fn q8(offset: f32) -> i64 {
-    // roundf saturates through the cast; offsets are far below 2³¹ micro-units.
-    roundf(offset * 256.0) as i64
 }

@@ -1,40 +1,213 @@
-//! A profile placed in space and time.
+//! A motion in space and time: pieces of constant jerk, evaluated in integers.
+//!
+//! Positions are in 2⁻²⁴ micro-units, durations in 2⁻³² seconds: rounding stays below a ten-thousandth of a step and a
+//! nanosecond over the longest move, and every machine computes the same bits.
 
+use heapless::Vec;
 use vergence_protocol::Microseconds;
 
-use crate::profile::{MotionState, Profile};
-use crate::settings::q8;
+/// A position in 2⁻²⁴ micro-units, or one of its derivatives by seconds.
+pub type Fine = i64;
 
-/// A running profile: from `origin` (1/256 micro-units) at `started`.
-#[derive(Clone, Copy, Debug)]
+/// Fraction bits of [`Fine`].
+pub const FINE_BITS: u32 = 24;
+const FINE_PER_MICRO: f32 = (1 << FINE_BITS) as f32;
+
+/// A duration in 2⁻³² seconds.
+pub(crate) type Ticks = i64;
+
+const TICKS_PER_SECOND: f32 = 4_294_967_296.0;
+
+/// A stop, a way from rest, and the last approach: three, seven and seven pieces.
+pub(crate) const MOST_SEGMENTS: usize = 17;
+
+/// Where an axis is at one instant.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct MotionState {
+    /// Position.
+    pub position: Fine,
+    /// Velocity, per second.
+    pub velocity: Fine,
+    /// Acceleration, per second squared.
+    pub acceleration: Fine,
+}
+
+impl MotionState {
+    /// At rest.
+    #[must_use]
+    pub const fn at(position: Fine) -> Self {
+        Self { position, velocity: 0, acceleration: 0 }
+    }
+
+    /// Whether it is at rest.
+    #[must_use]
+    pub const fn is_rest(&self) -> bool {
+        self.velocity == 0 && self.acceleration == 0
+    }
+
+    /// The state after `time` with constant jerk (Horner's scheme).
+    pub(crate) fn after(&self, time: Ticks, jerk: Fine) -> Self {
+        let Self { position, velocity, acceleration } = *self;
+        let gained = scale(jerk, time);
+        // Divided last: over minutes the last bit of an acceleration is a whole micro-unit.
+        let slope = velocity + scale(3 * acceleration + gained, time) / 6;
+        Self {
+            position: position + scale(slope, time),
+            velocity: velocity + scale(2 * acceleration + gained, time) / 2,
+            acceleration: acceleration + gained,
+        }
+    }
+}
+
+/// `rate` per second, for `time`.
+fn scale(rate: Fine, time: Ticks) -> Fine {
+    ((i128::from(rate) * i128::from(time) + (1 << 31)) >> 32) as Fine
+}
+
+/// Micro-units as [`Fine`]; saturates.
+pub(crate) fn fine(micro: f32) -> Fine {
+    (micro * FINE_PER_MICRO) as Fine
+}
+
+/// [`Fine`] as micro-units.
+pub(crate) fn micro(fine: Fine) -> f32 {
+    fine as f32 / FINE_PER_MICRO
+}
+
+pub(crate) fn ticks(seconds: f32) -> Ticks {
+    (seconds * TICKS_PER_SECOND) as Ticks
+}
+
+pub(crate) fn seconds(ticks: Ticks) -> f32 {
+    ticks as f32 / TICKS_PER_SECOND
+}
+
+fn ticks_of(us: u64) -> Ticks {
+    let (whole, rest) = (us / 1_000_000, us % 1_000_000);
+    ((whole << 32) + (rest << 32) / 1_000_000) as Ticks
+}
+
+/// A piece of constant jerk.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) struct Segment {
+    pub start: MotionState,
+    pub jerk: Fine,
+    pub duration: Ticks,
+}
+
+impl Segment {
+    pub fn end(&self) -> MotionState {
+        self.start.after(self.duration, self.jerk)
+    }
+
+    /// The same piece run backwards in time, moved to end where `anchor` takes it.
+    pub fn reversed(&self, anchor: Fine) -> Self {
+        let MotionState { position, velocity, acceleration } = self.end();
+        let start = MotionState { position: anchor - position, velocity, acceleration: -acceleration };
+        Self { start, ..*self }
+    }
+}
+
+/// A running motion: at rest from its end on.
+#[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Trajectory {
-    origin: i64,
-    started: Microseconds,
-    profile: Profile,
+    segments: Vec<Segment, MOST_SEGMENTS>,
+    /// How long all pieces together take, and some rest after them where others finish later.
+    duration: Ticks,
+    target: Fine,
 }
 
 impl Trajectory {
-    /// Starts `profile` at `origin` and `started`.
-    pub fn new(origin: i64, started: Microseconds, profile: Profile) -> Self {
-        Self { origin, started, profile }
+    /// No motion at all.
+    pub(crate) fn resting_at(position: Fine) -> Self {
+        Self { segments: Vec::new(), duration: 0, target: position }
     }
 
-    /// The position at `time` in 1/256 micro-units.
-    pub fn position(&self, time: Microseconds) -> i64 {
-        self.origin + q8(self.state(time).offset)
+    /// Adds a piece. Those without duration are left out; the planner never asks for more than there is room for.
+    pub(crate) fn push(&mut self, segment: Segment) {
+        if segment.duration > 0 && self.segments.push(segment).is_ok() {
+            self.duration += segment.duration;
+        }
     }
 
-    /// Velocity and acceleration at `time`; the offset is from the origin.
-    pub fn state(&self, time: Microseconds) -> MotionState {
-        self.profile.at(self.elapsed(time))
+    /// Adds a motion that begins where this one ends.
+    pub(crate) fn append(&mut self, next: &Self) {
+        next.segments.iter().for_each(|&segment| self.push(segment));
+        self.target = next.target;
     }
 
-    /// Whether it is over at `time`.
-    pub fn is_over(&self, time: Microseconds) -> bool {
-        self.elapsed(time) >= self.profile.duration()
+    /// The pieces run backwards in time, so that they end at rest at `target`.
+    pub(crate) fn backwards(&self, target: Fine) -> impl Iterator<Item = Segment> {
+        self.segments.iter().rev().map(move |segment| segment.reversed(target))
     }
 
-    fn elapsed(&self, time: Microseconds) -> f32 {
-        time.0.saturating_sub(self.started.0) as f32 * 1e-6
+    /// Declares where it comes to rest: what rounding has left over is less than a thousandth of a micro-unit.
+    pub(crate) fn rest_at(&mut self, target: Fine) {
+        self.target = target;
+    }
+
+    /// Rests at the target until `duration` seconds are over, so that axes finish in the same tick.
+    pub fn rest_until(&mut self, duration: f32) {
+        self.duration = self.duration.max(ticks(duration));
+    }
+
+    /// How long it takes, in seconds.
+    #[must_use]
+    pub fn duration(&self) -> f32 {
+        seconds(self.duration)
+    }
+
+    /// From when on it is over, rounded up to a microsecond.
+    #[must_use]
+    pub fn ends(&self) -> Microseconds {
+        let (whole, rest) = (self.duration >> 32, self.duration & 0xffff_ffff);
+        Microseconds((whole * 1_000_000 + (rest * 1_000_000 >> 32) + 1) as u64)
+    }
+
+    /// Where it comes to rest.
+    #[must_use]
+    pub fn target(&self) -> Fine {
+        self.target
+    }
+
+    /// The state `elapsed` after the start.
+    #[must_use]
+    pub fn state(&self, elapsed: Microseconds) -> MotionState {
+        self.state_at(ticks_of(elapsed.0))
+    }
+
+    fn state_at(&self, mut left: Ticks) -> MotionState {
+        for segment in &self.segments {
+            if left < segment.duration {
+                return segment.start.after(left, segment.jerk);
+            }
+            left -= segment.duration;
+        }
+        MotionState::at(self.target)
+    }
+
+    /// Whether it is over `elapsed` after the start.
+    #[must_use]
+    pub fn is_over(&self, elapsed: Microseconds) -> bool {
+        ticks_of(elapsed.0) >= self.duration
+    }
+
+    /// The pieces between two instants, each with the seconds from `from` to its start.
+    pub(crate) fn pieces(&self, from: Microseconds, to: Microseconds) -> impl Iterator<Item = (f32, Segment)> {
+        let (from, to) = (ticks_of(from.0), ticks_of(to.0));
+        let mut begins = 0;
+        self.segments.iter().filter_map(move |segment| {
+            let (start, end) = (begins, begins + segment.duration);
+            begins = end;
+            let (first, last) = (start.max(from), end.min(to));
+            (first < last).then(|| {
+                let part = Segment {
+                    start: segment.start.after(first - start, segment.jerk),
+                    duration: last - first,
+                    ..*segment
+                };
+                (seconds(first - from), part)
+            })
+        })
     }
 }

@@ -4,7 +4,7 @@ mod support;
 
 use proptest::prelude::*;
 use proptest::test_runner::RngSeed;
-use support::{HOST, LEASE_MS, OTHER, TICK_US, World, linear, longest_stop_us, rotary};
+use support::{HOST, LEASE_MS, OTHER, TICK_US, World, commanded, linear, longest_stop_us, rotary};
 use vergence_protocol::{
     AxisMask, ControllerState, FaultCode, MovePhase, Refusal, Request, SessionId, Status, StopKind,
 };
@@ -197,14 +197,14 @@ proptest! {
         let mut world = World::homed([linear(), rotary()]);
         prop_assume!(world.move_by(HOST, targets, speed) == Status::Accepted);
         let way = [f64::from(targets[0]) - 60_000.0, f64::from(targets[1])];
-        let start = [0, 1].map(|axis| world.rig.axes[axis].commanded);
+        let start = [0, 1].map(|axis| commanded(&world.controller, axis));
         let mut half_way: [Option<f64>; 2] = [None; 2];
         let mut before = start;
         while world.controller.state() == ControllerState::Moving {
             world.wait(TICK_US);
             for axis in 0..2 {
                 // In ticks, between two of which the command is taken as a line.
-                let commanded = world.rig.axes[axis].commanded;
+                let commanded = commanded(&world.controller, axis);
                 let [gone, here] = [before[axis], commanded].map(|at| (at - start[axis]) / way[axis]);
                 if half_way[axis].is_none() && here >= 0.5 {
                     half_way[axis] = Some(world.now.0 as f64 / TICK_US as f64 - (here - 0.5) / (here - gone));

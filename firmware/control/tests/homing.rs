@@ -44,7 +44,7 @@ fn longest_homing_us(axis: &AxisSettings, way: f64) -> u64 {
     let enter = f64::from(axis.min.0 - axis.homing.switch_at.0) + brake;
     let legs = [way + 2.0 * retract, brake, 2.0 * retract + brake, enter].map(|d| d / seek + change(seek));
     let slowly = retract / slow + 2.0 * change(slow);
-    ((legs.iter().sum::<f64>() + slowly) * 1e6) as u64 + 10 * TICK_US
+    ((legs.iter().sum::<f64>() + slowly) * 1e6) as u64 + 30 * TICK_US
 }
 
 proptest! {
@@ -66,7 +66,7 @@ proptest! {
             prop_assert!((world.pose().counts[axis].0 - counts).abs() <= 1);
         }
         let ways = [baseline - 58_000.0, separation + 26_180.0].map(f64::abs);
-        let bound = longest_homing_us(&linear(), ways[0]).max(longest_homing_us(&rotary(), ways[1]));
+        let bound = longest_homing_us(&linear(), ways[0]) + longest_homing_us(&rotary(), ways[1]);
         prop_assert!(world.now.0 - start <= bound, "{} of {bound} us", world.now.0 - start);
     }
 
@@ -187,14 +187,32 @@ fn two_edges_apart_are_no_reference() {
 }
 
 #[test]
-fn a_failed_axis_brakes_the_other() {
-    let mut world = begun([215_000.0, 2_200_000.0], BOTH);
-    world.rig.axes[1].switch = HomeSwitch::StuckClosed;
+fn axes_are_homed_one_after_the_other_and_a_failure_leaves_the_first_its_reference() {
+    let mut world = begun([90_000.0, 1_200_000.0], BOTH);
+    while world.pose().referenced == AxisMask(0) {
+        world.wait(TICK_US);
+        assert!((world.rig.axes[1].load - 1_200_000.0).abs() < 1e-6, "both at once");
+    }
+    world.rig.axes[1].switch = HomeSwitch::NeverCloses;
     world.wait_for(ControllerState::Fault);
-    assert!(world.watch.moves(), "the fault came before rest");
-    assert_eq!(world.clear(), Status::Refused(Refusal::Busy));
-    world.wait(400_000);
-    assert!(!world.watch.moves());
+    assert_eq!((world.fault().code, world.fault().axis), (FaultCode::HomeSwitchNotFound, Some(1)));
+    assert_eq!(world.pose().referenced, FIRST);
+}
+
+/// The switch wires of two axes have changed places: the axis that moves closes the input of the one that rests.
+#[test]
+fn the_switch_of_another_axis_is_told_from_the_own() {
+    for homed in [BOTH, FIRST] {
+        let mut world = begun([70_000.0, 1_000_000.0], homed);
+        world.rig.crossed_switches = true;
+        world.wait_for(ControllerState::Fault);
+        let fault = world.fault();
+        assert_eq!((fault.code, fault.axis, fault.detail), (FaultCode::HomeSwitchWrong, Some(0), 1));
+        // Noticed as soon as the own switch would have been.
+        world.wait(200_000);
+        assert!(!world.watch.moves() && world.rig.axes[0].load > 48_000.0, "{}", world.rig.axes[0].load);
+        assert_eq!(world.pose().referenced, AxisMask(0));
+    }
 }
 
 #[test]

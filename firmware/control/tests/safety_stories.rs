@@ -244,9 +244,9 @@ fn a_blocked_stage_cuts_the_drivers_and_loses_the_reference() {
     world.wait_for(ControllerState::Fault);
     let pose = world.pose();
     let fault = pose.fault.unwrap();
-    assert_eq!((fault.code, fault.axis), (FaultCode::FollowingError, Some(1)));
-    // Above the limit of one degree by less than the way of one tick.
-    assert!((17_454..=17_454 + 2_500).contains(&fault.detail), "{}", fault.detail);
+    assert_eq!((fault.code, fault.axis), (FaultCode::Stall, Some(1)));
+    // Above half the limit of one degree by less than the way of two ticks.
+    assert!((8_727..=8_727 + 5_000).contains(&fault.detail), "{}", fault.detail);
     assert!(!world.rig.drivers);
     assert_eq!((pose.referenced, pose.phase), (AxisMask(0), MovePhase::Stopped));
 }

@@ -1,4 +1,6 @@
 //! The layout holds together, and the linker is told the same.
+#![allow(clippy::unwrap_used, reason = "a test fails loudly")]
+
 use std::path::Path;
 
 use vergence_image::layout::{

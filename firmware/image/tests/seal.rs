@@ -1,4 +1,6 @@
 //! What a boot loader takes for an image, and what not.
+#![allow(clippy::unwrap_used, reason = "a test fails loudly")]
+
 use proptest::prelude::*;
 use vergence_image::layout::{ACTIVE, CAPACITY, HARDWARE};
 use vergence_image::{DEVELOPMENT_KEY, SEAL_LENGTH, Seal, SealError, sha256};

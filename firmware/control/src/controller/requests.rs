@@ -1,14 +1,18 @@
 //! Requests: each is executed or refused with a reason; nothing is clamped.
 
 use vergence_protocol::{
-    AxisList, AxisMask, ControllerState, Microseconds, Move, MovePhase, Permille, Refusal, Request, SessionId, Status,
-    StopKind,
+    AxisList, AxisMask, ControllerState, Jog, Micro, Microseconds, Mode, Move, MoveId, MovePhase, Permille, Refusal,
+    Request, SessionId, Status, StopKind,
 };
 
 use super::{ActiveMove, Controller};
 use crate::axis::Axis;
-use crate::homing::Homing;
+use crate::homing_sequence::HomingSequence;
 use crate::io::RigIo;
+
+/// Axes agree on a duration when they differ by less than this share; it takes two rounds from rest.
+const AGREED: f32 = 1e-5;
+const MOST_ROUNDS: u32 = 4;
 
 impl Controller {
     /// Executes a request of `session` that concerns motion, or says why not. Requests about the link are not its business.
@@ -16,11 +20,12 @@ impl Controller {
         let outcome = match request {
             Request::Arm { session: named } if *named == session => self.arm(now, session, io),
             Request::Arm { .. } => Err(Refusal::WrongSession),
-            Request::Disarm => self.disarm(now, io),
+            Request::Disarm => self.disarm(io),
             Request::Home { axes } => self.home(now, session, *axes),
             Request::MoveTo(target) => self.move_to(now, session, target),
+            Request::Jog(jog) => self.jog(now, session, jog),
             Request::Stop { kind } => {
-                self.stop(now, *kind, io);
+                self.stop(*kind, io);
                 Ok(())
             }
             Request::ClearFault { seen } => self.clear_fault(*seen, io),
@@ -30,9 +35,7 @@ impl Controller {
     }
 
     fn arm(&mut self, now: Microseconds, session: SessionId, io: &mut impl RigIo) -> Result<(), Refusal> {
-        if self.is_latched() {
-            return Err(Refusal::Latched);
-        }
+        self.may_ever_move()?;
         if self.holder.is_some_and(|holder| holder != session) {
             return Err(Refusal::WrongSession);
         }
@@ -55,30 +58,46 @@ impl Controller {
         Ok(())
     }
 
-    fn disarm(&mut self, now: Microseconds, io: &mut impl RigIo) -> Result<(), Refusal> {
+    fn disarm(&mut self, io: &mut impl RigIo) -> Result<(), Refusal> {
         match self.state {
-            ControllerState::Idle => {}
+            ControllerState::LinkLost | ControllerState::Fault => return Err(Refusal::Latched),
             ControllerState::Ready => self.go_idle(io),
             ControllerState::Homing | ControllerState::Moving | ControllerState::Stopping => {
                 self.disarm_at_rest = true;
-                self.brake(now);
+                self.brake();
                 self.state = ControllerState::Stopping;
             }
-            _ => return Err(Refusal::Latched),
+            _ => {}
         }
         Ok(())
     }
 
-    /// Checks that `session` may start a motion now.
-    fn may_start(&self, now: Microseconds, session: SessionId) -> Result<(), Refusal> {
+    /// Checks that the controller is in a state from which motion can come.
+    fn may_ever_move(&self) -> Result<(), Refusal> {
+        match self.state {
+            ControllerState::LinkLost | ControllerState::Fault => Err(Refusal::Latched),
+            ControllerState::Updating | ControllerState::Trial => Err(Refusal::Updating),
+            ControllerState::Boot | ControllerState::SelfTest => Err(Refusal::Busy),
+            _ => Ok(()),
+        }
+    }
+
+    /// Checks that `session` may start a motion now, or change the one that runs.
+    fn may_move(&self, now: Microseconds, session: SessionId) -> Result<(), Refusal> {
+        self.may_ever_move()?;
         match self.state {
             ControllerState::Idle => Err(Refusal::NotArmed),
-            ControllerState::LinkLost | ControllerState::Fault => Err(Refusal::Latched),
             _ if self.holder != Some(session) => Err(Refusal::WrongSession),
             _ if !self.lease.is_live(now, session) => Err(Refusal::NoLease),
-            ControllerState::Ready => Ok(()),
+            ControllerState::Ready | ControllerState::Moving => Ok(()),
             _ => Err(Refusal::Busy),
         }
+    }
+
+    /// Checks that `session` may start a motion from rest.
+    fn may_start(&self, now: Microseconds, session: SessionId) -> Result<(), Refusal> {
+        self.may_move(now, session)?;
+        if self.state == ControllerState::Ready { Ok(()) } else { Err(Refusal::Busy) }
     }
 
     fn home(&mut self, now: Microseconds, session: SessionId, axes: AxisMask) -> Result<(), Refusal> {
@@ -86,73 +105,96 @@ impl Controller {
         if axes == AxisMask::default() || axes.0 & !AxisMask::first(self.axes.len()).0 != 0 {
             return Err(Refusal::Invalid);
         }
-        for (index, (axis, homing)) in self.axes.iter_mut().zip(&mut self.homing).enumerate() {
-            *homing = axes.contains(index).then(|| Homing::start(axis));
-        }
+        self.homing = HomingSequence::start(axes, &mut self.axes);
         self.active.phase = MovePhase::None;
         self.state = ControllerState::Homing;
         Ok(())
     }
 
-    fn move_to(&mut self, now: Microseconds, session: SessionId, target: &Move) -> Result<(), Refusal> {
-        self.may_start(now, session)?;
-        if target.targets.len() != self.axes.len() || target.speed.0 == 0 || target.speed > Permille::FULL {
-            return Err(Refusal::Invalid);
-        }
-        for (index, (axis, &position)) in (0u8..).zip(self.axes.iter().zip(&target.targets)) {
+    /// To another target, also in mid-move: from where the axes are and as fast as they go.
+    fn move_to(&mut self, now: Microseconds, session: SessionId, order: &Move) -> Result<(), Refusal> {
+        self.may_move(now, session)?;
+        self.check_order(order.targets.len(), order.speed)?;
+        for (index, (axis, &position)) in (0u8..).zip(self.axes.iter().zip(&order.targets)) {
             if !axis.is_referenced() {
                 return Err(Refusal::NotReferenced { axis: index });
             }
-            if position < axis.settings.min || position > axis.settings.max {
+            if !axis.settings.allows(position) {
                 return Err(Refusal::OutsideLimits { axis: index });
             }
         }
-        self.start_together(now, target);
-        self.active = ActiveMove {
-            id: target.id,
-            mode: target.mode,
-            targets: target.targets.clone(),
-            phase: MovePhase::Running,
-            inside_since: None,
-            settle_by: Microseconds(0),
-        };
-        self.state = ControllerState::Moving;
-        self.tell_phase();
+        self.begin(order.id, order.mode, order.targets.clone(), order.speed);
         Ok(())
     }
 
-    /// Every axis gets its own quickest profile, stretched to the time of the slowest: all start and finish together.
-    fn start_together(&mut self, now: Microseconds, target: &Move) {
-        let factor = f32::from(target.speed.0) / f32::from(Permille::FULL.0);
-        let planned: AxisList<_> = self
-            .axes
-            .iter()
-            .zip(&target.targets)
-            .map(|(axis, &position)| axis.profile_to(position, axis.settings.limits().scaled(factor)))
-            .collect();
-        let slowest = planned.iter().map(|profile| profile.duration()).fold(0.0, f32::max);
-        for (axis, profile) in self.axes.iter_mut().zip(planned) {
-            if profile.duration() > 0.0 {
-                axis.run(now, profile.lasting(slowest));
+    /// By a distance from rest. An axis without reference may go as far as the search for its switch.
+    fn jog(&mut self, now: Microseconds, session: SessionId, jog: &Jog) -> Result<(), Refusal> {
+        self.may_start(now, session)?;
+        self.check_order(jog.by.len(), jog.speed)?;
+        let mut targets = AxisList::new();
+        for (index, (axis, by)) in (0u8..).zip(self.axes.iter().zip(&jog.by)) {
+            let target = Micro(axis.commanded().0.saturating_add(by.0));
+            let allowed = match axis.is_referenced() {
+                true => axis.settings.allows(target),
+                false => by.0.unsigned_abs() <= axis.settings.homing.travel.0.unsigned_abs(),
+            };
+            if by.0 != 0 && !allowed {
+                return Err(Refusal::OutsideLimits { axis: index });
             }
+            targets.push(target).map_err(|_| Refusal::Invalid)?;
+        }
+        self.begin(jog.id, Mode(0), targets, jog.speed);
+        Ok(())
+    }
+
+    fn check_order(&self, axes: usize, speed: Permille) -> Result<(), Refusal> {
+        let sound = axes == self.axes.len() && speed.0 > 0 && speed <= Permille::FULL;
+        if sound { Ok(()) } else { Err(Refusal::Invalid) }
+    }
+
+    fn begin(&mut self, id: MoveId, mode: Mode, targets: AxisList<Micro>, speed: Permille) {
+        self.abort_motion();
+        self.start_together(&targets, f32::from(speed.0) / f32::from(Permille::FULL.0));
+        let (inside_since, settle_by) = (None, Microseconds(0));
+        self.active = ActiveMove { id, mode, targets, phase: MovePhase::Running, inside_since, settle_by };
+        self.state = ControllerState::Moving;
+        self.tell_phase();
+    }
+
+    /// All axes start and finish together, in the time of the slowest. One in mid-move may not be able to take just that
+    /// long: then the others wait for it.
+    fn start_together(&mut self, targets: &AxisList<Micro>, share: f32) {
+        let mut together = 0.0;
+        for _ in 0..MOST_ROUNDS {
+            let durations = self.axes.iter().zip(targets).map(|(axis, &to)| axis.plan(to, share, together).duration());
+            let slowest = durations.fold(0.0, f32::max);
+            let agreed = slowest <= together * (1.0 + AGREED);
+            together = slowest;
+            if agreed {
+                break;
+            }
+        }
+        for (axis, &target) in self.axes.iter_mut().zip(targets) {
+            let planned = axis.plan(target, share, together);
+            axis.run_planned(planned, together);
         }
     }
 
-    fn stop(&mut self, now: Microseconds, kind: StopKind, io: &mut impl RigIo) {
+    fn stop(&mut self, kind: StopKind, io: &mut impl RigIo) {
         match kind {
             StopKind::Decelerate => {
                 if matches!(self.state, ControllerState::Homing | ControllerState::Moving) {
-                    self.brake(now);
+                    self.brake();
                     self.state = ControllerState::Stopping;
                 }
             }
             StopKind::TorqueOff => {
                 let moving = self.any_moving();
                 self.abort_motion();
-                if self.is_latched() {
-                    self.cut_drivers(io);
-                } else {
+                if self.holder.is_some() && !self.is_latched() {
                     self.go_idle(io);
+                } else {
+                    self.cut_drivers(io);
                 }
                 if moving {
                     self.axes.iter_mut().for_each(Axis::forget_reference);
@@ -173,6 +215,7 @@ impl Controller {
         }
         self.latch.clear(seen);
         self.go_idle(io);
+        self.repeat_self_test();
         Ok(())
     }
 }

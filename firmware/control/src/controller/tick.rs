@@ -5,8 +5,9 @@ use vergence_protocol::{ControllerState, FaultCode, Microseconds, MovePhase};
 use super::Controller;
 use crate::TICK_US;
 use crate::axis::Axis;
-use crate::homing::Progress;
+use crate::homing_sequence::HomingFailure;
 use crate::io::RigIo;
+use crate::self_test::Verdict;
 
 /// The encoder must stay inside the tolerance this long before a move counts as reached.
 const DWELL_US: u64 = 50_000;
@@ -14,12 +15,19 @@ const DWELL_US: u64 = 50_000;
 const SETTLE_TIMEOUT_US: u64 = 1_000_000;
 
 impl Controller {
-    /// One control tick: watches inputs and lease, runs homing, moves and stops, commands the motors.
-    /// Returns when it wants to run again.
+    /// One control tick: watches inputs and lease, runs homing, moves and stops, orders the steps of the tick after the
+    /// one that begins now. Returns when it wants to run again; earlier it does nothing.
     pub fn poll(&mut self, now: Microseconds, io: &mut impl RigIo) -> Microseconds {
+        if now < self.next_tick {
+            return self.next_tick;
+        }
+        let tick = self.keep_time(now, io);
+        self.next_tick = Microseconds(tick.0 + TICK_US);
         self.watch_inputs(now, io);
         self.watch_lease(now);
         match self.state {
+            ControllerState::Boot => self.state = ControllerState::SelfTest,
+            ControllerState::SelfTest => self.poll_self_test(now, io),
             ControllerState::Homing => self.poll_homing(now, io),
             ControllerState::Moving => self.poll_move(now, io),
             ControllerState::Stopping if !self.any_moving() => self.finish_stop(io),
@@ -27,11 +35,35 @@ impl Controller {
         }
         if self.drivers_on {
             for axis in &mut self.axes {
-                axis.advance(now, io);
+                axis.advance(tick, io);
             }
             self.watch_following(now, io);
         }
-        Microseconds(now.0 + TICK_US)
+        self.next_tick
+    }
+
+    /// The tick that `now` belongs to. Steps are ordered one tick ahead: one that comes later than that finds the motors
+    /// standing where they should have moved on.
+    fn keep_time(&mut self, now: Microseconds, io: &mut impl RigIo) -> Microseconds {
+        let late = now.0 - self.next_tick.0;
+        if late < TICK_US {
+            return self.next_tick;
+        }
+        if self.drivers_on && self.any_moving() {
+            self.cut(now, FaultCode::TickMissed, None, i32::try_from(late).unwrap_or(i32::MAX), io);
+        }
+        now
+    }
+
+    fn poll_self_test(&mut self, now: Microseconds, io: &impl RigIo) {
+        match self.self_test.poll(self.axes.iter().map(|axis| &axis.settings), io) {
+            Verdict::Running => {}
+            Verdict::Passed => self.state = self.at_rest(),
+            Verdict::Failed { code, axis, detail } => {
+                self.state = ControllerState::Fault;
+                self.raise(now, code, axis, detail);
+            }
+        }
     }
 
     fn watch_inputs(&mut self, now: Microseconds, io: &mut impl RigIo) {
@@ -51,36 +83,26 @@ impl Controller {
             return;
         }
         let silence = i32::try_from(self.lease.silence(now)).unwrap_or(i32::MAX);
-        self.brake(now);
+        self.brake();
         self.state = ControllerState::LinkLost;
         self.raise(now, FaultCode::LeaseExpired, None, silence);
     }
 
     fn watch_following(&mut self, now: Microseconds, io: &mut impl RigIo) {
-        let lost = self.axes.iter().enumerate().find_map(|(index, axis)| {
-            let error = axis.following_error(io);
-            (error.abs() > axis.settings.following_error.0).then_some((index, error))
-        });
-        if let Some((axis, error)) = lost {
-            self.cut(now, FaultCode::FollowingError, Some(axis), error, io);
+        let mut first = None;
+        for (index, axis) in self.axes.iter_mut().enumerate() {
+            first = first.or(axis.watch(io).map(|lost| (index, lost)));
+        }
+        if let Some((axis, lost)) = first {
+            self.cut(now, lost.code, Some(axis), lost.detail, io);
         }
     }
 
-    fn poll_homing(&mut self, now: Microseconds, io: &mut impl RigIo) {
-        let mut all_done = true;
-        let mut failed = None;
-        for (index, (axis, homing)) in self.axes.iter_mut().zip(&mut self.homing).enumerate() {
-            let Some(running) = homing else { continue };
-            match running.poll(now, axis, io) {
-                Progress::Done => *homing = None,
-                Progress::Running => all_done = false,
-                Progress::Failed { code, detail } => failed = failed.or(Some((index, code, detail))),
-            }
-        }
-        if let Some((axis, code, detail)) = failed {
-            self.fail_softly(now, code, axis, detail);
-        } else if all_done {
-            self.state = ControllerState::Ready;
+    fn poll_homing(&mut self, now: Microseconds, io: &impl RigIo) {
+        match self.homing.poll(&mut self.axes, io) {
+            Ok(true) => self.state = ControllerState::Ready,
+            Ok(false) => {}
+            Err(HomingFailure { code, axis, detail }) => self.fail_softly(now, code, axis, detail),
         }
     }
 
@@ -124,7 +146,7 @@ impl Controller {
 
     /// A fault after which the stages can still be braked and held: the reference survives.
     fn fail_softly(&mut self, now: Microseconds, code: FaultCode, axis: usize, detail: i32) {
-        self.brake(now);
+        self.brake();
         self.state = ControllerState::Fault;
         self.raise(now, code, Some(axis), detail);
     }

@@ -1,8 +1,9 @@
 //! Motors that lose nothing, loads that follow at once, and toggles for everything that can go wrong.
 
+use std::collections::VecDeque;
 use std::f64::consts::TAU;
 
-use vergence_control::{AxisSettings, RigIo, Scale};
+use vergence_control::{AxisSettings, RigIo, Scale, StepSchedule};
 use vergence_protocol::{AxisKind, Microseconds};
 
 /// How a home switch behaves.
@@ -14,13 +15,6 @@ pub enum HomeSwitch {
     StuckClosed,
 }
 
-/// A line of steps: from where and when, to where and when.
-#[derive(Clone, Copy, Debug)]
-struct Order {
-    from: (i32, u64),
-    to: (i32, u64),
-}
-
 #[derive(Clone, Debug)]
 pub struct IdealAxis {
     motor: f64,
@@ -29,9 +23,11 @@ pub struct IdealAxis {
     /// Raw numbers at power-on.
     raw_steps: i32,
     raw_counts: i32,
-    /// Steps since power-on.
+    /// Steps since power-on, made and ordered.
     steps: i32,
-    order: Order,
+    pub ordered: i32,
+    /// When each step is due, in nanoseconds, and whether forward.
+    queue: VecDeque<(u64, bool)>,
     /// Where the motor is at step zero: changes when it is turned without power.
     motor_zero: f64,
     pub load: f64,
@@ -41,10 +37,10 @@ pub struct IdealAxis {
     pub blocked: bool,
     /// The encoder reads wrong by this much.
     pub misread: f64,
-    /// Where the motor was last told to be at the end of its tick, in axis coordinates.
-    pub commanded: f64,
-    /// Where the motor stood when the drivers were last switched.
-    pub held: f64,
+    /// The load goes so much of the way that the motor goes.
+    pub grip: f64,
+    /// Direction of the motor and of the encoder as wired.
+    pub reversed: [bool; 2],
 }
 
 impl IdealAxis {
@@ -56,30 +52,33 @@ impl IdealAxis {
             raw_steps: raw[0],
             raw_counts: raw[1],
             steps: 0,
-            order: Order { from: (0, 0), to: (0, 0) },
+            ordered: 0,
+            queue: VecDeque::new(),
             motor_zero: load,
             load,
             switch: HomeSwitch::Good,
             hard_limit: false,
             blocked: false,
             misread: 0.0,
-            commanded: load,
-            held: load,
+            grip: 1.0,
+            reversed: [settings.steps_reversed, settings.counts_reversed],
         }
     }
 
     fn reach(&mut self, now: u64) {
-        let Order { from, to } = self.order;
-        self.steps = if now >= to.1 {
-            to.0
-        } else {
-            let share = (now - from.1) as f64 / (to.1 - from.1) as f64;
-            from.0 + (f64::from(to.0 - from.0) * share).round() as i32
-        };
-        let motor = self.motor_zero + f64::from(self.steps) / self.motor;
-        if !self.blocked {
-            self.load = motor;
+        let before = self.steps;
+        while let Some((_, forward)) = self.queue.pop_front_if(|(at, _)| *at <= now * 1000) {
+            self.steps += if forward { 1 } else { -1 };
         }
+        self.motor_zero -= (1.0 - self.grip) * f64::from(self.steps - before) / self.motor;
+        if !self.blocked {
+            self.load = self.motor_zero + f64::from(self.steps) / self.motor;
+        }
+    }
+
+    /// Length of a step.
+    pub fn step(&self) -> f64 {
+        1.0 / self.motor
     }
 
     pub fn closed(&self) -> bool {
@@ -96,6 +95,8 @@ pub struct IdealRig {
     pub axes: Vec<IdealAxis>,
     pub drivers: bool,
     pub emergency_stop: bool,
+    /// The wires of the first two home switches have changed places.
+    pub crossed_switches: bool,
     now: u64,
     /// Orders to motors without drivers: there must be none.
     pub orders_without_drivers: u32,
@@ -111,6 +112,7 @@ impl IdealRig {
             axes: settings.iter().zip(loads).map(|(axis, &load)| IdealAxis::new(axis, load, raw)).collect(),
             drivers: false,
             emergency_stop: false,
+            crossed_switches: false,
             now: 0,
             orders_without_drivers: 0,
             switched: false,
@@ -132,19 +134,16 @@ impl IdealRig {
             let axis = &mut self.axes[axis];
             axis.load += by;
             axis.motor_zero += by;
-            axis.held += by;
-            axis.commanded += by;
         }
     }
 
     /// Motors without power make no more steps.
     fn freeze(&mut self) {
         for axis in &mut self.axes {
-            axis.order = Order { from: (axis.steps, self.now), to: (axis.steps, self.now) };
+            axis.queue.clear();
+            axis.ordered = axis.steps;
             // And a blocked load turns them back.
             axis.motor_zero = axis.load - f64::from(axis.steps) / axis.motor;
-            axis.held = axis.load;
-            axis.commanded = axis.load;
         }
     }
 }
@@ -156,13 +155,15 @@ impl RigIo for IdealRig {
         self.freeze();
     }
 
-    fn step_to(&mut self, axis: usize, steps: i32, by: Microseconds) {
+    fn schedule_steps(&mut self, axis: usize, steps: &StepSchedule) {
         self.orders_without_drivers += u32::from(!self.drivers);
-        let now = self.now;
+        assert!(steps.start.0 >= self.now && steps.start.0 <= self.now + 1_000, "{steps:?} at {}", self.now);
+        assert!(steps.at_ns.is_sorted() && steps.at_ns.iter().all(|&at| at < 1_000_000), "{steps:?}");
         let axis = &mut self.axes[axis];
-        let steps = steps.wrapping_sub(axis.raw_steps);
-        axis.order = Order { from: (axis.steps, now), to: (steps, by.0) };
-        axis.commanded = axis.motor_zero + f64::from(steps) / axis.motor;
+        let forward = steps.forward != axis.reversed[0];
+        let count = steps.at_ns.len() as i32;
+        axis.ordered += if forward { count } else { -count };
+        axis.queue.extend(steps.at_ns.iter().map(|&at| (steps.start.0 * 1000 + u64::from(at), forward)));
     }
 
     fn steps(&self, axis: usize) -> i32 {
@@ -172,11 +173,13 @@ impl RigIo for IdealRig {
     fn encoder(&self, axis: usize) -> i32 {
         let axis = &self.axes[axis];
         let counts = ((axis.load + axis.misread) * axis.encoder).floor() as i32;
+        let counts = if axis.reversed[1] { -counts } else { counts };
         counts.wrapping_add(axis.raw_counts)
     }
 
     fn home_switch(&self, axis: usize) -> bool {
-        self.axes[axis].closed()
+        let wire = if self.crossed_switches { 1 - axis } else { axis };
+        self.axes[wire].closed()
     }
 
     fn hard_limit(&self, axis: usize) -> bool {

@@ -7,12 +7,12 @@ mod watch;
 
 use vergence_control::{AxisSettings, Controller, HomingSettings};
 use vergence_protocol::{
-    AxisKind, AxisMask, ControllerState, FaultRecord, Micro, Microseconds, Mode, Move, MoveId, Permille, PoseReport,
-    Request, SessionId, Status,
+    AxisKind, AxisMask, ControllerState, FaultRecord, Jog, Micro, Microseconds, Mode, Move, MoveId, Permille,
+    PoseReport, Request, SessionId, Status,
 };
 
 pub use ideal_rig::{HomeSwitch, IdealRig};
-pub use watch::Watch;
+pub use watch::{Watch, commanded};
 
 pub const TICK_US: u64 = 1_000;
 pub const HOST: SessionId = SessionId(0x5e55_1011);
@@ -205,6 +205,13 @@ impl World {
 
     pub fn move_to(&mut self, targets: [i32; 2]) -> Status {
         self.move_by(HOST, targets, 1000)
+    }
+
+    /// Asks for a jog at full speed.
+    pub fn jog(&mut self, by: [i32; 2]) -> Status {
+        self.move_id += 1;
+        let by = by.into_iter().map(Micro).collect();
+        self.ask(HOST, &Request::Jog(Jog { id: MoveId(self.move_id), by, speed: Permille::FULL }))
     }
 
     pub fn clear(&mut self) -> Status {

@@ -2,7 +2,7 @@
 
 use std::collections::VecDeque;
 
-use vergence_control::{AxisSettings, Controller};
+use vergence_control::{AxisSettings, Controller, FINE_BITS};
 use vergence_protocol::{
     ControllerState, FaultRecord, Micro, Microseconds, MovePhase, PoseReport, Refusal, Request, SessionId, Status,
 };
@@ -19,18 +19,30 @@ const DWELL_US: u64 = 50_000;
 struct Path {
     settings: AxisSettings,
     commanded: VecDeque<f64>,
+    /// A command, and the steps that had been ordered then.
+    base: (f64, i32),
     /// Where the running move may go.
     hull: Option<[f64; 2]>,
 }
 
 impl Path {
-    fn restart(&mut self, at: f64) {
+    fn restart(&mut self, at: f64, steps: i32) {
         self.commanded = std::iter::repeat_n(at, 3 * SPAN + 1).collect();
+        self.base = (at, steps);
     }
 
-    fn push(&mut self, commanded: f64) {
+    /// Takes a command and the steps ordered for it. An axis at rest may be told where it is: that is no motion.
+    fn push(&mut self, commanded: f64, steps: i32, step: f64) {
+        let rests = (self.ago(0) - self.ago(1)).abs() < 1e-9;
+        if rests && (commanded - self.ago(0)).abs() > f64::from(self.settings.speed) * 1e-6 {
+            let made = f64::from(steps - self.base.1) * step - (self.ago(0) - self.base.0);
+            assert!(made.abs() <= 1.001 * step, "a jump by {made}");
+            self.restart(commanded, steps);
+        }
         self.commanded.pop_front();
         self.commanded.push_back(commanded);
+        let apart = f64::from(steps - self.base.1) * step - (commanded - self.base.0);
+        assert!(apart.abs() <= 1.001 * step, "steps and command are {apart} apart");
     }
 
     /// Commanded position `ticks` ago.
@@ -50,7 +62,7 @@ impl Path {
 
     /// Rounding of one commanded position: 1/256, and single precision over the longest way.
     fn rounding(&self) -> f64 {
-        0.004 + 3.0 * f64::from(f32::EPSILON) * f64::from(self.settings.homing.travel.0)
+        1e-5 + f64::from(f32::EPSILON) * f64::from(self.settings.homing.travel.0)
     }
 
     fn check(&self, pose: &PoseReport) {
@@ -68,9 +80,8 @@ impl Path {
         let jerk = (now - before).abs() / span;
         assert!(jerk <= j * 1.01 + 2.0 * noise / span, "jerk {jerk} of {j}: {pose:?}");
         if let Some([low, high]) = self.hull {
-            let slack = self.reference_error();
             let at = self.ago(0);
-            assert!((low - slack..=high + slack).contains(&at), "{at} outside of {low}..{high}: {pose:?}");
+            assert!((low - 0.01..=high + 0.01).contains(&at), "{at} outside of {low}..{high}: {pose:?}");
         }
     }
 
@@ -97,7 +108,7 @@ pub struct Watch {
 
 impl Watch {
     pub fn new(settings: &[AxisSettings]) -> Self {
-        let path = |&settings: &AxisSettings| Path { settings, commanded: VecDeque::new(), hull: None };
+        let path = |&settings: &AxisSettings| Path { settings, commanded: VecDeque::new(), base: (0.0, 0), hull: None };
         Self {
             paths: settings.iter().map(path).collect(),
             holder: None,
@@ -134,14 +145,15 @@ impl Watch {
         let pose = controller.pose(now, 0, rig);
         assert_eq!(rig.orders_without_drivers, 0, "steps without drivers: {pose:?}");
         let switched = std::mem::take(&mut rig.switched);
-        for (path, axis) in self.paths.iter_mut().zip(&rig.axes) {
+        for (index, (path, axis)) in self.paths.iter_mut().zip(&rig.axes).enumerate() {
+            let command = commanded(controller, index);
             if switched || path.commanded.is_empty() || !rig.drivers {
-                path.restart(axis.held);
+                path.restart(command, axis.ordered);
             }
             if !rig.drivers {
                 path.hull = None;
             }
-            path.push(axis.commanded);
+            path.push(command, axis.ordered, axis.step());
             path.check(&pose);
         }
         self.check_motion(now, &pose, rig);
@@ -217,21 +229,27 @@ impl Watch {
                 assert!(self.lease_is_live(now, session) && !is_latched(self.state) && !foreign, "{pose:?}");
                 self.holder = Some(session);
             }
+            (Request::Jog(jog), Status::Accepted) => {
+                assert!(self.may_start(now, session), "{pose:?}");
+                let truth = rig.axes.iter().zip(&jog.by);
+                self.targets = truth.map(|(axis, by)| Micro((axis.load + f64::from(by.0)).round() as i32)).collect();
+                self.inside_since = None;
+                self.paths.iter_mut().for_each(|path| path.hull = None);
+            }
             (Request::Home { .. }, Status::Accepted) => {
                 assert!(self.may_start(now, session), "{pose:?}");
                 self.paths.iter_mut().for_each(|path| path.hull = None);
             }
             (Request::MoveTo(order), Status::Accepted) => {
-                assert!(self.may_start(now, session), "{pose:?}");
+                assert!(self.may_move(now, session), "{pose:?}");
                 assert_eq!(pose.referenced.0, 3);
                 self.targets = order.targets.to_vec();
                 self.inside_since = None;
-                for ((path, target), axis) in self.paths.iter_mut().zip(&order.targets).zip(&rig.axes) {
+                for (index, (path, target)) in self.paths.iter_mut().zip(&order.targets).enumerate() {
                     assert!((path.settings.min..=path.settings.max).contains(target), "{order:?}");
-                    path.hull = Some([
-                        axis.commanded.min(f64::from(path.settings.min.0)),
-                        axis.commanded.max(f64::from(path.settings.max.0)),
-                    ]);
+                    let (command, lowest) =
+                        (commanded(controller, index), path.settings.min.0 - path.settings.backlash.0);
+                    path.hull = Some([command.min(f64::from(lowest)), command.max(f64::from(path.settings.max.0))]);
                 }
             }
             (Request::MoveTo(order), Status::Refused(Refusal::OutsideLimits { axis })) => {
@@ -253,8 +271,20 @@ impl Watch {
     }
 
     fn may_start(&self, now: Microseconds, session: SessionId) -> bool {
-        self.state == ControllerState::Ready && self.holder == Some(session) && self.lease_is_live(now, session)
+        self.state == ControllerState::Ready && self.may_move(now, session)
     }
+
+    /// Also in mid-move.
+    fn may_move(&self, now: Microseconds, session: SessionId) -> bool {
+        matches!(self.state, ControllerState::Ready | ControllerState::Moving)
+            && self.holder == Some(session)
+            && self.lease_is_live(now, session)
+    }
+}
+
+/// Where an axis was last told to be, in micro-units.
+pub fn commanded(controller: &Controller, axis: usize) -> f64 {
+    controller.command(axis).unwrap() as f64 / f64::from(1 << FINE_BITS)
 }
 
 fn is_latched(state: ControllerState) -> bool {

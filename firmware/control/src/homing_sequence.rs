@@ -1,0 +1,76 @@
+//! Homing of several axes: one after the other, so that a switch wired to the wrong axis is told from one of its own.
+
+use vergence_protocol::{AxisList, AxisMask, Counts, FaultCode};
+
+use crate::axis::Axis;
+use crate::contact::Contact;
+use crate::homing::{Homing, Progress};
+use crate::io::RigIo;
+
+/// Which axes are still to be homed, and how far the present one is.
+#[derive(Clone, Debug, Default)]
+pub struct HomingSequence {
+    left: AxisMask,
+    present: Option<(usize, Homing)>,
+    /// The home switches of all axes.
+    contacts: AxisList<Contact>,
+}
+
+/// Why homing ended without reference.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct HomingFailure {
+    pub code: FaultCode,
+    pub axis: usize,
+    pub detail: i32,
+}
+
+impl HomingSequence {
+    /// Starts with the lowest of `which`: the old references are no longer claimed.
+    pub fn start(which: AxisMask, axes: &mut [Axis]) -> Self {
+        for (_, axis) in axes.iter_mut().enumerate().filter(|(index, _)| which.contains(*index)) {
+            axis.forget_reference();
+        }
+        Self { left: which, present: None, contacts: axes.iter().map(|_| Contact::default()).collect() }
+    }
+
+    /// One tick; true when all have their reference.
+    pub fn poll(&mut self, axes: &mut [Axis], io: &impl RigIo) -> Result<bool, HomingFailure> {
+        let Some((index, homing)) = &mut self.present else { return Ok(self.begin_next(axes)) };
+        let index = *index;
+        let Some(axis) = axes.get_mut(index) else { return Ok(true) };
+        match homing.poll(axis, io) {
+            Progress::Running => {}
+            Progress::Done => self.present = None,
+            Progress::Failed { code, detail } => return Err(HomingFailure { code, axis: index, detail }),
+        }
+        match self.stranger(index, io) {
+            Some(stranger) => {
+                let detail = i32::try_from(stranger).unwrap_or(i32::MAX);
+                Err(HomingFailure { code: FaultCode::HomeSwitchWrong, axis: index, detail })
+            }
+            None => Ok(false),
+        }
+    }
+
+    fn begin_next(&mut self, axes: &[Axis]) -> bool {
+        let next = (0..axes.len()).find(|&index| self.left.contains(index));
+        if let Some(index) = next {
+            self.left.0 &= !(1 << index);
+            self.present = Some((index, Homing::start()));
+        }
+        next.is_none()
+    }
+
+    /// An axis at rest whose switch has closed since `present` moves.
+    fn stranger(&mut self, present: usize, io: &impl RigIo) -> Option<usize> {
+        let mut stranger = None;
+        for (index, contact) in self.contacts.iter_mut().enumerate() {
+            let was_open = contact.is_closed() == Some(false);
+            contact.read(io.home_switch(index), Counts(0));
+            if was_open && contact.is_closed() == Some(true) && index != present {
+                stranger = stranger.or(Some(index));
+            }
+        }
+        stranger
+    }
+}

@@ -1,0 +1,111 @@
+//! When a motor must step: the instants at which a trajectory crosses the middle between two steps.
+
+use heapless::Vec;
+use libm::fabsf;
+
+use crate::io::MAX_STEPS_PER_TICK;
+use crate::settings::Scale;
+use crate::trajectory::{Fine, Segment, micro, seconds};
+
+/// Newton's method has converged when it moves an instant by less than this, a twentieth of what is promised.
+const CONVERGED_S: f32 = 50e-9;
+/// Newton's method doubles its digits each time; where it leaves the bracket, halving has narrowed a tick to 15 ns by then.
+const MOST_ROUNDS: u32 = 16;
+const NS_PER_S: f32 = 1e9;
+/// The last instant of a tick.
+const LAST_NS: u32 = 999_999;
+
+/// Instants of steps, nanoseconds after the start of their tick.
+pub type Instants = Vec<u32, MAX_STEPS_PER_TICK>;
+
+/// Which step a motor is at.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct StepCounter {
+    /// Half the distance between two steps, in 2⁻⁴⁰ micro-units.
+    half_step: i64,
+    step: i64,
+}
+
+impl StepCounter {
+    /// At the step nearest to `position`.
+    pub fn new(motor: Scale, position: Fine) -> Self {
+        let half_step = motor.half_mark_q40();
+        let halves = (i128::from(position) << 16).div_euclid(i128::from(half_step));
+        Self { half_step, step: (halves + 1).div_euclid(2) as i64 }
+    }
+
+    /// The middle between this step and the next one above.
+    fn middle_above(&self) -> Fine {
+        ((i128::from(2 * self.step + 1) * i128::from(self.half_step)) >> 16) as Fine
+    }
+
+    /// Goes to the step nearest to `end`, where the `pieces` of a tick lead; says whether forward, and when each step is
+    /// due. A motor that turns round within a tick makes only the steps that are left over at its end. What finds no room
+    /// waits for the next tick.
+    pub fn follow(&mut self, pieces: impl Iterator<Item = (f32, Segment)>, end: Fine) -> (bool, Instants) {
+        let (above, length) = (self.middle_above(), (self.half_step + (1 << 14)) >> 15);
+        let forward = end >= above;
+        // Mirrored, so that the position rises; a step back is made where the middle is passed, not where it is met.
+        let (sign, mut middle) = if forward { (1, above) } else { (-1, length - above + 1) };
+        let end = sign * end;
+        let mut instants = Instants::new();
+        for (begins, piece) in pieces {
+            let start = sign * piece.start.position;
+            let reached = (sign * piece.end().position).min(end);
+            let rise = Rise::new(&piece, sign as f32);
+            let mut at = 0.0;
+            while middle <= reached && !instants.is_full() {
+                at = rise.crosses(micro(middle - start), at);
+                let _ = instants.push((((begins + at) * NS_PER_S) as u32).min(LAST_NS));
+                middle += length;
+            }
+        }
+        // What rounding has hidden between two pieces is due at the end.
+        while middle <= end && instants.push(LAST_NS).is_ok() {
+            middle += length;
+        }
+        self.step += sign * instants.len() as i64;
+        (forward, instants)
+    }
+}
+
+/// A piece as a cubic in seconds, mirrored so that it rises in the whole.
+#[derive(Clone, Copy, Debug)]
+struct Rise {
+    velocity: f32,
+    acceleration: f32,
+    jerk: f32,
+    duration: f32,
+}
+
+impl Rise {
+    fn new(piece: &Segment, sign: f32) -> Self {
+        let [velocity, acceleration, jerk] =
+            [piece.start.velocity, piece.start.acceleration, piece.jerk].map(|rate| sign * micro(rate));
+        Self { velocity, acceleration, jerk, duration: seconds(piece.duration) }
+    }
+
+    /// When it has risen by `height`, which it has not `after` but by its end: Newton's method, kept inside a bracket.
+    fn crosses(&self, height: f32, after: f32) -> f32 {
+        let Self { velocity: v, acceleration: a, jerk: j, duration } = *self;
+        let (mut low, mut high) = (after, duration);
+        let mut t = low;
+        for _ in 0..MOST_ROUNDS {
+            let left = height - t * (v + t * (a / 2.0 + t * j / 6.0));
+            if left > 0.0 {
+                low = t
+            } else {
+                high = t
+            }
+            let slope = v + t * (a + t * j / 2.0);
+            let next = t + left / slope;
+            // Also where the slope is zero: then it is not a number, or infinite.
+            let next = if next >= low && next <= high { next } else { f32::midpoint(low, high) };
+            if fabsf(next - t) < CONVERGED_S {
+                return next;
+            }
+            t = next;
+        }
+        t
+    }
+}
