@@ -3,14 +3,9 @@
 use vergence_protocol::{Counts, Micro, Microseconds};
 
 use crate::TICK_US;
-<<<<<<< HEAD
-use crate::io::{MAX_STEPS_PER_TICK, RigIo, StepSchedule};
-use crate::profile::{Limits, Profile};
-=======
 use crate::follow::{Following, Lost};
 use crate::io::{RigIo, StepSchedule};
 use crate::profile::Limits;
->>>>>>> main
 use crate::settings::AxisSettings;
 use crate::steps::{Instants, StepCounter};
 use crate::trajectory::{FINE_BITS, Fine, MotionState, Trajectory};
@@ -25,13 +20,10 @@ pub struct Axis {
     motor: StepCounter,
     following: Following,
     trajectory: Option<Trajectory>,
-<<<<<<< HEAD
-=======
     /// How much of the trajectory has been ordered, in microseconds.
     elapsed: u64,
     /// Whether the axis rests at its command with its play taken up from below.
     from_below: bool,
->>>>>>> main
     /// Raw counts at the axis zero.
     zero_counts: i32,
     referenced: bool,
@@ -46,11 +38,8 @@ impl Axis {
             motor: StepCounter::new(settings.motor(), 0),
             following: Following::default(),
             trajectory: None,
-<<<<<<< HEAD
-=======
             elapsed: 0,
             from_below: false,
->>>>>>> main
             zero_counts: 0,
             referenced: false,
         }
@@ -66,14 +55,10 @@ impl Axis {
 
     /// The encoder's count, rising along the axis.
     fn raw_counts(&self, io: &impl RigIo) -> i32 {
-<<<<<<< HEAD
-        let raw = io.encoder(self.index);
-=======
         self.rising(io.encoder(self.index))
     }
 
     fn rising(&self, raw: i32) -> i32 {
->>>>>>> main
         if self.settings.counts_reversed { raw.wrapping_neg() } else { raw }
     }
 
@@ -106,15 +91,10 @@ impl Axis {
         }
         let position = fine_from(self.position(io));
         self.trajectory = None;
-<<<<<<< HEAD
-        self.command_now = i64::from(position.0) << 8;
-        self.command_next = self.command_now;
-=======
         self.from_below = false;
         self.command = [position; 3];
         self.motor = StepCounter::new(self.settings.motor(), position);
         self.following = Following::default();
->>>>>>> main
     }
 
     /// The state at which a new trajectory begins.
@@ -211,13 +191,7 @@ impl Axis {
         if trajectory.is_over(to) {
             self.trajectory = None;
         }
-<<<<<<< HEAD
-        let motor = self.settings.motor();
-        let by = motor.counts_at_q8(self.command_next).wrapping_sub(motor.counts_at_q8(self.command_now));
-        io.schedule_steps(self.index, &evenly(now, by, self.settings.steps_reversed));
-=======
         self.order(Microseconds(now.0 + TICK_US), forward, at_ns, io);
->>>>>>> main
     }
 
     fn order(&self, start: Microseconds, forward: bool, at_ns: Instants, io: &mut impl RigIo) {
@@ -248,13 +222,6 @@ impl Axis {
     }
 }
 
-<<<<<<< HEAD
-/// So many steps, evenly over a tick.
-fn evenly(start: Microseconds, by: i32, reversed: bool) -> StepSchedule {
-    let count = by.unsigned_abs().min(MAX_STEPS_PER_TICK as u32);
-    let at_ns = (0..count).map(|step| (2 * step + 1) * TICK_US as u32 * 500 / count).collect();
-    StepSchedule { start, forward: (by > 0) != reversed, at_ns }
-=======
 fn fine_from(position: Micro) -> Fine {
     Fine::from(position.0) << FINE_BITS
 }
@@ -263,5 +230,4 @@ fn fine_from(position: Micro) -> Fine {
 fn micro_from(position: Fine) -> Micro {
     let rounded = (position + (1 << (FINE_BITS - 1))) >> FINE_BITS;
     Micro(i32::try_from(rounded).unwrap_or(if rounded < 0 { i32::MIN } else { i32::MAX }))
->>>>>>> main
 }

@@ -1,5 +1,9 @@
 //! The layout holds together, and the linker is told the same.
-#![allow(clippy::unwrap_used, reason = "a test fails loudly")]
+#![allow(
+    clippy::unwrap_used,
+    clippy::assertions_on_constants,
+    reason = "a test fails loudly, and constants are what it is about"
+)]
 
 use std::path::Path;
 
