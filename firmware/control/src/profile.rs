@@ -209,7 +209,8 @@ impl Way {
             return Some(fastest);
         }
         let a = self.acceleration;
-        let flat = (self.velocity + a * fabsf(a) / (2.0 * self.limits.jerk)).clamp(0.0, fastest);
+        // Not clamp: its panic would print floats, which takes 12 KiB of a small board's flash.
+        let flat = (self.velocity + a * fabsf(a) / (2.0 * self.limits.jerk)).max(0.0).min(fastest);
         let [low, high] = if flat > 0.0 && self.is_possible(flat) { [flat, fastest] } else { [0.0, flat] };
         let high = if high > 0.0 { high } else { fastest };
         let speed = halve(low, high, |speed| self.is_possible(speed));
