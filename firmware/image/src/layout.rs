@@ -15,16 +15,16 @@ pub const WORD: u32 = 8;
 pub const BOOTLOADER: Region = Region { start: 0, length: 62 * 1024 };
 /// Progress of a swap: a word for the state, one for its validity, and four for each page of [`ACTIVE`].
 pub const STATE: Region = Region { start: 0xF800, length: PAGE };
-/// The application that runs, its seal at the end. A swap moves all of it whatever the image needs, so it is small.
-pub const ACTIVE: Region = Region { start: 0x1_0000, length: 96 * 1024 };
+/// The application that runs, and a page for its seal. A swap moves all of it whatever the image needs, so it is small.
+pub const ACTIVE: Region = Region { start: 0x1_0000, length: CAPACITY + PAGE };
 /// Two pages of settings, written in turn.
 pub const SETTINGS: Region = Region { start: 0x3_F000, length: 2 * PAGE };
 /// The image to come, and after the swap the one before: one page more than [`ACTIVE`], as the swap needs. It lies in
 /// the second bank, so that the application runs on while this is written.
 pub const DFU: Region = Region { start: 0x4_0000, length: ACTIVE.length + PAGE };
 
-/// The longest image: [`ACTIVE`] less its seal.
-pub const CAPACITY: u32 = ACTIVE.length - crate::SEAL_LENGTH as u32;
+/// The longest image. Its seal begins right behind, whatever its length.
+pub const CAPACITY: u32 = 96 * 1024;
 
 /// RAM for variables and stack: SRAM1 and SRAM2 less [`SURVIVOR`].
 pub const RAM: Region = Region { start: 0x2000_0000, length: 95 * 1024 };

@@ -8,5 +8,5 @@ pub mod layout;
 mod seal;
 mod survivor;
 
-pub use seal::{DEVELOPMENT_KEY, SEAL_LENGTH, Seal, SealError, sha256};
+pub use seal::{DEVELOPMENT_KEY, SEAL_LENGTH, Seal, SealError, is_signed_by, sha256};
 pub use survivor::{Death, DeathKind, SURVIVOR_WORDS, Survivor};

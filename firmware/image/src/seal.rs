@@ -1,5 +1,5 @@
-//! The seal of an image: its header and signature in the last bytes of the region it lies in, so that a swap carries
-//! them along and a boot loader can judge what it finds.
+//! The seal of an image: its header and signature behind it in flash, so that a swap carries them along and a boot
+//! loader can judge what it finds.
 //!
 //! ```text
 //! 0 magic | 4 signed header | 55 signature | 119 CRC-32C of all before | 123 filled up with 0xFF
@@ -84,20 +84,22 @@ impl Seal {
         Ok(Self { header, signature: Signature { r: fields.take(), s: fields.take() } })
     }
 
-    /// Judges the image in `region`, whose last [`SEAL_LENGTH`] bytes are its seal: hardware, length, digest, signature.
+    /// Judges the image at the start of `region`, whose seal is at byte [`CAPACITY`]: hardware, length, digest, signature.
     ///
     /// # Errors
     /// Says what is wrong.
     pub fn check(region: &[u8], key: &[u8; 32]) -> Result<Self, SealError> {
-        let (image, seal) = region.split_last_chunk::<SEAL_LENGTH>().ok_or(SealError::Missing)?;
-        let seal = Self::from_bytes(seal)?;
+        let (image, rest) = region.split_at_checked(CAPACITY as usize).ok_or(SealError::Missing)?;
+        let seal = Self::from_bytes(rest.first_chunk().ok_or(SealError::Missing)?)?;
         seal.header_is_for_us()?;
         let length = usize::try_from(seal.header.length).map_err(|_| SealError::WrongLength)?;
         let image = image.get(..length).ok_or(SealError::WrongLength)?;
         if sha256(image) != seal.header.sha256 {
             return Err(SealError::WrongDigest);
         }
-        seal.check_signature(key)?;
+        if !is_signed_by(key, &seal.header.signed_bytes(), &seal.signature) {
+            return Err(SealError::WrongSignature);
+        }
         Ok(seal)
     }
 
@@ -110,19 +112,15 @@ impl Seal {
         }
         Ok(())
     }
+}
 
-    /// Whether the signature is of `key`.
-    ///
-    /// # Errors
-    /// [`SealError::WrongSignature`].
-    pub fn check_signature(&self, key: &[u8; 32]) -> Result<(), SealError> {
-        let mut signature = [0; 64];
-        signature[..32].copy_from_slice(&self.signature.r);
-        signature[32..].copy_from_slice(&self.signature.s);
-        salty::PublicKey::try_from(key)
-            .and_then(|key| key.verify(&self.header.signed_bytes(), &(&signature).into()))
-            .map_err(|_| SealError::WrongSignature)
-    }
+/// Whether `signature` over `message` is of `key` (Ed25519, RFC 8032).
+#[must_use]
+pub fn is_signed_by(key: &[u8; 32], message: &[u8], signature: &Signature) -> bool {
+    let mut bytes = [0; 64];
+    bytes[..32].copy_from_slice(&signature.r);
+    bytes[32..].copy_from_slice(&signature.s);
+    salty::PublicKey::try_from(key).and_then(|key| key.verify(message, &(&bytes).into())).is_ok()
 }
 
 /// SHA-256 (FIPS 180-4).

@@ -27,7 +27,7 @@ fn header(image: &[u8]) -> ImageHeader {
 fn region(image: &[u8], seal: &Seal) -> Vec<u8> {
     let mut region = vec![0xFF; ACTIVE.length as usize];
     region[..image.len()].copy_from_slice(image);
-    region[CAPACITY as usize..].copy_from_slice(&seal.to_bytes());
+    region[CAPACITY as usize..][..SEAL_LENGTH].copy_from_slice(&seal.to_bytes());
     region
 }
 
@@ -59,7 +59,7 @@ fn each_fault_has_its_name() {
     assert_eq!(judge(ImageHeader { length: CAPACITY + 1, ..good }), Err(SealError::WrongLength));
     assert_eq!(judge(ImageHeader { length: u32::MAX, ..good }), Err(SealError::WrongLength));
     assert_eq!(judge(ImageHeader { length: 999, ..good }), Err(SealError::WrongDigest));
-    assert_eq!(Seal::check(&[0xFF; 4096], &DEVELOPMENT_KEY), Err(SealError::Missing));
+    assert_eq!(Seal::check(&[0xFF; ACTIVE.length as usize], &DEVELOPMENT_KEY), Err(SealError::Missing));
     assert_eq!(Seal::check(&[], &DEVELOPMENT_KEY), Err(SealError::Missing));
     let stranger = salty::Keypair::from(&[7; 32]).public.to_bytes();
     assert_eq!(Seal::check(&region(&image, &sign(good)), &stranger), Err(SealError::WrongSignature));
@@ -82,7 +82,7 @@ proptest! {
         let image = [0xC3; 256];
         let mut bytes = region(&image, &sign(header(&image)));
         // The image, the seal's fields and their check; what fills the rest up says nothing.
-        let judged: Vec<usize> = (0..image.len()).chain(CAPACITY as usize..ACTIVE.length as usize - 5).collect();
+        let judged: Vec<usize> = (0..image.len()).chain(CAPACITY as usize..CAPACITY as usize + SEAL_LENGTH - 5).collect();
         bytes[judged[at.index(judged.len())]] ^= 1 << bit;
         prop_assert!(Seal::check(&bytes, &DEVELOPMENT_KEY).is_err());
     }
