@@ -99,6 +99,12 @@ pub enum FrameError {
     Body,
 }
 
+/// CRC-32C of `bytes`.
+#[must_use]
+pub const fn checksum(bytes: &[u8]) -> u32 {
+    CASTAGNOLI.checksum(bytes)
+}
+
 /// Writes `body` as one frame, its 0x00 included, to the start of `buffer`; returns its length. Kinds without a body
 /// take `&()`.
 ///
@@ -110,7 +116,7 @@ pub fn encode<B: Serialize>(header: Header, body: &B, buffer: &mut [u8; MAX_FRAM
     head.copy_from_slice(&[header.major, header.kind as u8, header.seq, header.ack]);
     let body = postcard::to_slice(body, &mut rest[..MAX_BODY]).map_err(|_| FrameError::TooLong)?;
     let end = HEADER + body.len();
-    let crc = CASTAGNOLI.checksum(&packet[..end]);
+    let crc = checksum(&packet[..end]);
     packet[end..end + CRC].copy_from_slice(&crc.to_le_bytes());
     let length = cobs::try_encode(&packet[..end + CRC], buffer).map_err(|_| FrameError::TooLong)?;
     *buffer.get_mut(length).ok_or(FrameError::TooLong)? = 0;
@@ -125,7 +131,7 @@ impl<'a> Frame<'a> {
     pub fn parse(packet: &'a [u8]) -> Result<Self, FrameError> {
         let (content, crc) = packet.split_last_chunk::<CRC>().ok_or(FrameError::TooShort)?;
         let (&[major, kind, seq, ack], body) = content.split_first_chunk::<HEADER>().ok_or(FrameError::TooShort)?;
-        if CASTAGNOLI.checksum(content) != u32::from_le_bytes(*crc) {
+        if checksum(content) != u32::from_le_bytes(*crc) {
             return Err(FrameError::Checksum);
         }
         let kind = Kind::from_byte(kind).ok_or(FrameError::Kind)?;

@@ -20,6 +20,7 @@ mod request;
 mod session;
 mod setting;
 mod units;
+pub mod update;
 mod version;
 
 pub use axis::{AxisInfo, AxisKind, AxisList, AxisMask, MAX_AXES};
@@ -30,8 +31,8 @@ pub use recorder::{EVENTS_PER_ANSWER, Happening, RecordedEvent, RecordedEvents};
 pub use report::{BoardInfo, ControllerState, FrameMark, MovePhase, PoseReport, Refusal, Report, ResetCause, Status};
 pub use request::{Jog, Move, Request, StopKind, Trigger};
 pub use session::{
-    BoardEvent, BoardSession, BoardStatistics, Compatibility, HostEvent, HostSession, HostStatistics, ReplyTo,
-    SubmitError, Ticket, WINDOW,
+    BoardEvent, BoardSession, BoardStatistics, Compatibility, HostEvent, HostSession, HostStatistics, LOG_CHUNK,
+    ReplyTo, SubmitError, Ticket, WINDOW,
 };
 pub use setting::{SettingItem, SettingKey};
 pub use units::{Counts, Micro, Microseconds, Mode, MoveId, Permille, SessionId};

@@ -8,6 +8,7 @@ use core::fmt;
 
 use heapless::Vec;
 use postcard_schema::Schema;
+use postcard_schema::key::hash::fnv1a64;
 use serde::{Deserialize, Serialize};
 
 /// The most image bytes in one chunk: a multiple of the flash's eight.
@@ -35,6 +36,14 @@ pub enum Management {
     Rollback,
     /// Start again.
     Reboot(RebootTo),
+}
+
+/// A hash of the names, order and types of all management messages. It must never change.
+#[must_use]
+pub const fn schema_hash() -> u64 {
+    let requests = u64::from_le_bytes(fnv1a64::hash_ty_path::<Management>("management"));
+    let reports = u64::from_le_bytes(fnv1a64::hash_ty_path::<ManagementReport>("management_report"));
+    requests.rotate_left(1) ^ reports
 }
 
 /// What an image says of itself, and what its signature covers: these fields in this order, integers little-endian.
@@ -138,14 +147,14 @@ pub enum BootState {
 pub enum Outcome {
     /// Carried out.
     Done,
-    /// The board is armed, or an image on trial must be confirmed first.
+    /// The board is armed, an image on trial must be confirmed first, or another one waits for the reboot.
     Busy,
     /// There is no update to go on with: begin first.
     NotBegun,
     /// The image is for other hardware.
     WrongHardware,
-    /// The image is longer than the board has room for.
-    TooLong,
+    /// The image is empty or longer than the board has room for, or a chunk does not lie in it.
+    WrongLength,
     /// The image is older than the oldest version the board accepts.
     TooOld,
     /// The bytes do not have the digest that the header names.
@@ -156,6 +165,8 @@ pub enum Outcome {
     FlashFailed,
     /// There is no image before this one.
     NothingToRollBack,
+    /// Bytes before these are missing: go on from the next byte wanted.
+    Missing,
 }
 
 impl fmt::Display for Outcome {
@@ -165,12 +176,13 @@ impl fmt::Display for Outcome {
             Self::Busy => "the board is armed or has an unconfirmed image: disarm, or confirm, and try again",
             Self::NotBegun => "the board knows of no update: begin again",
             Self::WrongHardware => "the image is for other hardware",
-            Self::TooLong => "the image is longer than the board has room for",
+            Self::WrongLength => "the image is empty or longer than the board has room for",
             Self::TooOld => "the image is older than the oldest version the board accepts",
             Self::WrongDigest => "the image arrived damaged: its digest is another",
             Self::WrongSignature => "the image is not signed with a key the board trusts",
             Self::FlashFailed => "the board could not write its flash",
             Self::NothingToRollBack => "there is no earlier image to go back to",
+            Self::Missing => "bytes of the image are missing: go on from the next one wanted",
         })
     }
 }

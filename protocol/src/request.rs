@@ -8,7 +8,8 @@ use crate::{AxisList, AxisMask, Micro, Microseconds, Mode, MoveId, Permille, Pro
 /// One request. Append only: the order is the wire format. `Hello` and `GetInfo` are frozen for ever.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize, Schema)]
 pub enum Request {
-    /// Opens a session; a new session id resets sequence numbers and stops the telemetry stream. Answered by `Report::Hello`.
+    /// Opens a session; a new session id resets sequence numbers, starts the pose stream at its set period
+    /// and switches the camera trigger off. Answered by `Report::Hello`.
     Hello {
         /// What the host speaks.
         protocol: ProtocolVersion,

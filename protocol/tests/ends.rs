@@ -5,13 +5,17 @@
 mod common;
 
 use vergence_protocol::frame::{Header, Kind, encode};
+use vergence_protocol::management::{Management, ManagementReport, Outcome};
 use vergence_protocol::{
-    AxisMask, BoardEvent, BoardSession, Compatibility, FaultCode, FaultRecord, HostEvent, HostSession, MAX_FRAME,
-    Microseconds, MoveId, MovePhase, PROTOCOL, ProtocolVersion, Receiver, Refusal, ReplyTo, Report, Request, SessionId,
-    Status, StopKind, SubmitError, schema_hash,
+    AxisMask, BoardEvent, BoardSession, Compatibility, FaultCode, FaultRecord, HostEvent, HostSession, Jog, LOG_CHUNK,
+    MAX_FRAME, Micro, Microseconds, MoveId, MovePhase, PROTOCOL, Permille, ProtocolVersion, Receiver, Refusal, ReplyTo,
+    Report, Request, SessionId, SettingItem, SettingKey, Status, StopKind, SubmitError, Trigger, schema_hash,
 };
 
 use common::{SESSION, answer, board_info, hello, move_to, pose};
+
+const PROGRESS: ManagementReport = ManagementReport::Progress { to: 0, next: 0, outcome: Outcome::Done };
+const KEY: SettingKey = SettingKey { item: SettingItem::Speed, axis: 0 };
 
 fn host_frame(header: Header, request: &Request) -> Vec<u8> {
     let mut buffer = [0; MAX_FRAME];
@@ -138,6 +142,47 @@ fn to_a_host_of_another_major_the_board_tells_only_who_it_is() {
 }
 
 #[test]
+fn to_management_majors_and_sessions_do_not_matter() {
+    let mut board = BoardSession::new(1);
+    let mut buffer = [0; MAX_FRAME];
+    for (major, seq) in [(PROTOCOL.major, 3), (PROTOCOL.major + 1, 4), (0, 5), (255, 6)] {
+        let header = Header { major, kind: Kind::Firmware, seq, ack: 0 };
+        let length = encode(header, &Management::Confirm, &mut buffer).unwrap();
+        let heard = tell(&mut board, &buffer[..length]);
+        assert_eq!(heard, [BoardEvent::Management { seq, request: Management::Confirm }]);
+        board.reply_management(seq, PROGRESS);
+    }
+    assert_eq!(board.session(), None);
+    let mut host = HostSession::new(SESSION);
+    let mut heard = Vec::new();
+    while let Some(length) = board.transmit(Microseconds(0), &mut buffer) {
+        host.receive(Microseconds(1), &buffer[..length], |event| heard.push(event));
+    }
+    let expected = [3, 4, 5, 6].map(|to| ManagementReport::Progress { to, next: 0, outcome: Outcome::Done });
+    assert_eq!(heard, expected.map(HostEvent::Management));
+    assert_eq!(tell(&mut board, &host_frame(header(Kind::Firmware, 0), &move_to(1))), [], "motion is no management");
+}
+
+#[test]
+fn management_requests_are_numbered_and_wait_for_the_line() {
+    let mut host = HostSession::new(SESSION);
+    for seq in 0..4 {
+        assert_eq!(host.manage(Management::Identify), Ok(seq));
+    }
+    assert_eq!(host.manage(Management::Identify), Err(SubmitError::QueueFull));
+    assert_eq!(host.next_wake(), Some(Microseconds(0)));
+    host.send_now(Request::Stop { kind: StopKind::Decelerate }).unwrap();
+    let (mut receiver, mut buffer, mut kinds) = (Receiver::new(), [0; MAX_FRAME], Vec::new());
+    while let Some(length) = host.transmit(Microseconds(0), &mut buffer) {
+        let frames = buffer[..length].iter().filter_map(|&byte| receiver.push(byte).map(|frame| frame.header));
+        kinds.extend(frames.map(|header| (header.kind, header.seq)));
+    }
+    assert_eq!(kinds[0].0, Kind::Immediate, "a stop overtakes");
+    assert_eq!(kinds[1..], [0, 1, 2, 3].map(|seq| (Kind::Firmware, seq)));
+    assert_eq!(host.next_wake(), None);
+}
+
+#[test]
 fn a_host_of_another_schema_may_only_read() {
     let mut board = BoardSession::new(1);
     let hello = Request::Hello { protocol: PROTOCOL, schema: schema_hash() ^ 1, session: SESSION };
@@ -148,6 +193,11 @@ fn a_host_of_another_schema_may_only_read() {
         Request::Home { axes: AxisMask::first(2) },
         move_to(1),
         Request::ClearFault { seen: 1 },
+        Request::Jog(Jog { id: MoveId(1), by: [Micro(1)].into_iter().collect(), speed: Permille::FULL }),
+        Request::SetSetting { key: KEY, value: 1 },
+        Request::SaveSettings,
+        Request::RestoreSettings,
+        Request::SetTrigger(Trigger::Once),
     ];
     for (seq, request) in (0..).zip(&motion) {
         assert_eq!(tell(&mut board, &host_frame(header(Kind::Control, seq), request)), []);
@@ -155,7 +205,15 @@ fn a_host_of_another_schema_may_only_read() {
     }
     assert_eq!(tell(&mut board, &host_frame(header(Kind::Control, 2), &motion[2])), []);
     assert_eq!(sent(&mut board), [refused(2, Refusal::ReadOnly)], "refused again when asked again");
-    for (seq, request) in (4..).zip(&[Request::GetInfo, Request::Disarm, Request::SetStream { period_us: 1 }]) {
+    let reading = [
+        Request::GetInfo,
+        Request::Disarm,
+        Request::SetStream { period_us: 1 },
+        Request::GetSetting(KEY),
+        Request::GetEvents { first: 0 },
+        Request::GetStatistics,
+    ];
+    for (seq, request) in (motion.len() as u8..).zip(&reading) {
         ask(&mut board, header(Kind::Control, seq), request);
     }
     ask(&mut board, header(Kind::Immediate, 0), &Request::Stop { kind: StopKind::TorqueOff });
@@ -263,4 +321,69 @@ fn motion_does_not_pass_by_the_window() {
     let mut board = open_board();
     assert_eq!(tell(&mut board, &host_frame(header(Kind::Immediate, 0), &move_to(1))), []);
     assert_eq!(board.statistics().link.body, 1);
+}
+
+/// The log bytes of all frames that the board sends now, after the kinds of what goes before.
+fn sent_log(board: &mut BoardSession) -> (Vec<Kind>, Vec<u8>) {
+    let (mut receiver, mut buffer) = (Receiver::new(), [0; MAX_FRAME]);
+    let (mut kinds, mut log) = (Vec::new(), Vec::new());
+    while let Some(length) = board.transmit(Microseconds(2000), &mut buffer) {
+        assert!(length < 64, "an answer waits no longer than for a short frame");
+        for &byte in &buffer[..length] {
+            let Some(frame) = receiver.push(byte) else { continue };
+            match frame.header.kind {
+                Kind::Log => log.extend(frame.body::<heapless::Vec<u8, LOG_CHUNK>>().unwrap()),
+                kind => kinds.push(kind),
+            }
+            assert!(log.is_empty() || frame.header.kind == Kind::Log, "the log goes last");
+        }
+    }
+    (kinds, log)
+}
+
+#[test]
+fn the_log_goes_last_and_waits_for_a_session() {
+    let mut board = BoardSession::new(1);
+    let entry: Vec<u8> = (0..100).collect();
+    board.log(&entry);
+    assert_eq!(sent_log(&mut board), (vec![], vec![]));
+    tell(&mut board, &host_frame(header(Kind::Immediate, 0), &hello(SESSION)));
+    board.telemetry(pose(1));
+    let control = ask(&mut board, header(Kind::Control, 0), &Request::Disarm);
+    board.reply(control, answer(&Request::Disarm));
+    assert_eq!(sent_log(&mut board), (vec![Kind::Immediate, Kind::Control, Kind::Telemetry], entry));
+}
+
+#[test]
+fn a_log_entry_that_does_not_fit_is_dropped_whole_and_counted() {
+    let mut board = open_board();
+    board.log(&[1; 500]);
+    board.log(&[2; 13]);
+    board.log(&[3; 12]);
+    board.log(&[4; 1]);
+    let (_, log) = sent_log(&mut board);
+    assert_eq!(log, [vec![1; 500], vec![3; 12]].concat());
+    assert_eq!(board.statistics().logs_dropped, 2);
+    board.log(&[5; 512]);
+    assert_eq!(sent_log(&mut board).1, [5; 512]);
+}
+
+#[test]
+fn a_host_hears_the_log_of_its_session() {
+    let mut host = HostSession::new(SESSION);
+    let mut board = open_board();
+    board.log(b"hello");
+    let mut buffer = [0; MAX_FRAME];
+    let length = board.transmit(Microseconds(2000), &mut buffer).unwrap();
+    let mut heard = Vec::new();
+    host.receive(Microseconds(1), &buffer[..length], |event| heard.push(event));
+    assert_eq!(heard, [], "no session yet");
+    host.hello();
+    let report = Report::Hello { protocol: PROTOCOL, schema: schema_hash(), session: SESSION, boot: 9 };
+    let mut opening = [0; MAX_FRAME];
+    let opened = encode(header(Kind::Immediate, 0), &report, &mut opening).unwrap();
+    host.receive(Microseconds(2), &opening[..opened], |_| {});
+    host.receive(Microseconds(3), &buffer[..length], |event| heard.push(event));
+    assert_eq!(heard, [HostEvent::Log(heapless::Vec::from_slice(b"hello").unwrap())]);
+    assert_eq!(host.heard_at(), Some(Microseconds(3)));
 }

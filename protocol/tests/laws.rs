@@ -14,10 +14,11 @@ use serde::Serialize;
 use serde::de::DeserializeOwned;
 use vergence_protocol::frame::{FrameError, Header, Kind, MAX_BODY, encode};
 use vergence_protocol::{
-    AxisInfo, AxisKind, AxisMask, BoardInfo, BoardSession, ControllerState, Counts, FaultCode, FaultRecord, HostEvent,
-    HostSession, MAX_AXES, MAX_FRAME, Micro, Microseconds, Mode, Move, MoveId, MovePhase, PROTOCOL, Permille,
-    PoseReport, ProtocolVersion, Receiver, Refusal, Report, Request, ResetCause, SessionId, Status, StopKind,
-    schema_hash,
+    AxisInfo, AxisKind, AxisMask, BoardInfo, BoardSession, BoardStatistics, ControllerState, Counts, EVENTS_PER_ANSWER,
+    FaultCode, FaultRecord, FrameMark, Happening, HostEvent, HostSession, Jog, LinkCounters, MAX_AXES, MAX_FRAME,
+    Micro, Microseconds, Mode, Move, MoveId, MovePhase, PROTOCOL, Permille, PoseReport, ProtocolVersion, Receiver,
+    RecordedEvent, RecordedEvents, Refusal, Report, Request, ResetCause, SessionId, SettingItem, SettingKey, Status,
+    StopKind, Trigger, schema_hash,
 };
 
 const HEADER: Header = Header { major: PROTOCOL.major, kind: Kind::Control, seq: 7, ack: 9 };
@@ -59,7 +60,74 @@ fn request() -> impl Strategy<Value = Request> {
         stop.prop_map(|kind| Request::Stop { kind }),
         any::<u16>().prop_map(|seen| Request::ClearFault { seen }),
         any::<u32>().prop_map(|period_us| Request::SetStream { period_us }),
+        (any::<u16>(), axes(any::<i32>().prop_map(Micro)), any::<u16>())
+            .prop_map(|(id, by, speed)| { Request::Jog(Jog { id: MoveId(id), by, speed: Permille(speed) }) }),
+        key().prop_map(Request::GetSetting),
+        (key(), any::<i64>()).prop_map(|(key, value)| Request::SetSetting { key, value }),
+        Just(Request::SaveSettings),
+        Just(Request::RestoreSettings),
+        prop_oneof![
+            Just(Trigger::Off),
+            Just(Trigger::Once),
+            any::<u32>().prop_map(|period_us| Trigger::Every { period_us })
+        ]
+        .prop_map(Request::SetTrigger),
+        any::<u32>().prop_map(|first| Request::GetEvents { first }),
+        Just(Request::GetStatistics),
     ]
+}
+
+fn key() -> impl Strategy<Value = SettingKey> {
+    (prop::sample::select(SettingItem::ALL.to_vec()), any::<u8>()).prop_map(|(item, axis)| SettingKey { item, axis })
+}
+
+fn happening() -> impl Strategy<Value = Happening> {
+    let detail = (fault(), any::<i32>(), any::<u8>(), any::<bool>(), any::<bool>());
+    detail.prop_flat_map(|(fault, number, axis, home, closed)| {
+        prop::sample::select(vec![
+            Happening::Started,
+            Happening::Opened(SessionId(number.unsigned_abs())),
+            Happening::State(ControllerState::Trial),
+            Happening::Move(MoveId(number as u16)),
+            Happening::Refused(Refusal::NotReferenced { axis }),
+            Happening::Stop(StopKind::TorqueOff),
+            Happening::Fault { code: fault.code, axis: fault.axis, detail: fault.detail },
+            Happening::Switch { axis, home, closed },
+            Happening::Encoder { axis, counts: Counts(number) },
+            Happening::Settings,
+        ])
+    })
+}
+
+fn events() -> impl Strategy<Value = RecordedEvents> {
+    let event = (micros(), happening()).prop_map(|(at, what)| RecordedEvent { at, what });
+    (any::<u32>(), any::<u32>(), vec(event, 0..=EVENTS_PER_ANSWER)).prop_map(|(first, total, events)| RecordedEvents {
+        first,
+        total,
+        events: events.into_iter().collect(),
+    })
+}
+
+fn statistics() -> impl Strategy<Value = BoardStatistics> {
+    any::<[u32; 15]>().prop_map(|[a, b, c, d, e, f, g, h, i, j, k, l, m, n, o]| BoardStatistics {
+        sent: a,
+        duplicates: b,
+        gaps: c,
+        without_session: d,
+        replies_dropped: e,
+        events_dropped: f,
+        poses_replaced: g,
+        logs_dropped: h,
+        link: LinkCounters { frames: i, too_long: j, too_short: k, stuffing: l, checksum: m, kind: n, body: o },
+    })
+}
+
+fn mark() -> impl Strategy<Value = FrameMark> {
+    (any::<u32>(), micros(), axes(any::<i32>().prop_map(Counts))).prop_map(|(seq, at, counts)| FrameMark {
+        seq,
+        at,
+        counts,
+    })
 }
 
 fn fault() -> impl Strategy<Value = FaultRecord> {
@@ -173,6 +241,10 @@ fn report() -> impl Strategy<Value = Report> {
         pose().prop_map(Report::Pose),
         (any::<u16>(), phase()).prop_map(|(id, phase)| Report::MoveState { id: MoveId(id), phase }),
         fault().prop_map(Report::Fault),
+        (any::<u8>(), key(), any::<i64>()).prop_map(|(to, key, value)| Report::Setting { to, key, value }),
+        (any::<u8>(), events()).prop_map(|(to, events)| Report::Events { to, events }),
+        (any::<u8>(), statistics()).prop_map(|(to, statistics)| Report::Statistics { to, statistics }),
+        mark().prop_map(Report::FrameMark),
     ]
 }
 

@@ -63,7 +63,12 @@ impl Axis {
     }
 
     pub fn counts(&self, io: &impl RigIo) -> Counts {
-        Counts(self.raw_counts(io).wrapping_sub(self.zero_counts))
+        self.counts_from(io.encoder(self.index))
+    }
+
+    /// What the encoder's raw count means from the axis zero.
+    pub fn counts_from(&self, raw: i32) -> Counts {
+        Counts(self.rising(raw).wrapping_sub(self.zero_counts))
     }
 
     pub fn position(&self, io: &impl RigIo) -> Micro {

@@ -15,7 +15,7 @@ mod update;
 
 use heapless::Deque;
 use vergence_protocol::{
-    AxisInfo, AxisList, AxisMask, ControllerState, FaultCode, FaultRecord, Micro, Microseconds, Mode, MoveId,
+    AxisInfo, AxisList, AxisMask, ControllerState, Counts, FaultCode, FaultRecord, Micro, Microseconds, Mode, MoveId,
     MovePhase, PoseReport, SessionId,
 };
 
@@ -132,10 +132,41 @@ impl Controller {
         self.axes.get(axis).map(Axis::command)
     }
 
+    /// Replaces the settings of all axes. An axis whose zero would be elsewhere loses its reference. To be called only
+    /// while disarmed.
+    ///
+    /// # Errors
+    /// [`SettingsError`]; nothing was changed.
+    pub fn replace_settings(&mut self, settings: &[AxisSettings]) -> Result<(), SettingsError> {
+        if settings.len() != self.axes.len() {
+            return Err(SettingsError::AxisCount);
+        }
+        settings.iter().enumerate().try_for_each(|(index, axis)| axis.validate(index))?;
+        for (axis, new) in self.axes.iter_mut().zip(settings) {
+            if !axis.settings.keeps_reference(new) {
+                axis.forget_reference();
+            }
+            axis.settings = *new;
+        }
+        Ok(())
+    }
+
+    /// Raw encoder counts of all axes as in a Pose.
+    #[must_use]
+    pub fn counts_from(&self, raw: &[i32]) -> AxisList<Counts> {
+        self.axes.iter().zip(raw).map(|(axis, &raw)| axis.counts_from(raw)).collect()
+    }
+
     /// What the controller is doing.
     #[must_use]
     pub fn state(&self) -> ControllerState {
         self.state
+    }
+
+    /// Whether the motors are held or driven.
+    #[must_use]
+    pub fn drivers_on(&self) -> bool {
+        self.drivers_on
     }
 
     /// The oldest event not yet taken.

@@ -66,16 +66,16 @@ impl Following {
             (self.stretch, self.recent) = (before, [before; 2]);
         }
         if direction != 0
-            && let Some(code) = self.disagreement(now, limit)
+            && let Some(code) = self.disagreement(now, before, limit)
         {
             return lost(code);
         }
         if error.abs() > limit { lost(FaultCode::FollowingError) } else { None }
     }
 
-    fn disagreement(&mut self, now: Place, limit: i64) -> Option<FaultCode> {
+    fn disagreement(&mut self, now: Place, before: Place, limit: i64) -> Option<FaultCode> {
         let [older, newer] = self.recent;
-        if (now.command - newer.command).abs() >= limit / 4 {
+        if (now.command - newer.command).abs() >= limit / 8 {
             self.recent = [newer, now];
         }
         let travel = (now.command - self.stretch.command).abs();
@@ -85,7 +85,9 @@ impl Following {
                 ((now.command - older.command).abs(), self.direction * (now.encoder - older.encoder));
             return Some(self.blame(commanded, made));
         }
-        if travel < 2 * limit {
+        // Who stands just now is judged when that has lasted.
+        let stands = 4 * self.direction * (now.encoder - before.encoder) < (now.command - before.command).abs();
+        if travel < 2 * limit || stands {
             return None;
         }
         self.stretch = now;

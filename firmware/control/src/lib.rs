@@ -11,8 +11,10 @@
 #![no_std]
 
 mod axis;
+mod board_settings;
 mod contact;
 mod controller;
+mod flash;
 mod follow;
 mod homing;
 mod homing_sequence;
@@ -21,16 +23,24 @@ mod latch;
 mod lease;
 mod node;
 mod profile;
+mod recorder;
 mod self_test;
+mod services;
 mod settings;
+pub mod settings_store;
 mod steps;
 mod trajectory;
+mod trigger;
+mod updater;
 
+pub use board_settings::{BoardSettings, SettingError};
 pub use controller::{Controller, Event};
+pub use flash::{Flash, FlashError, PAGE, UNIT};
 pub use io::{MAX_STEPS_PER_TICK, RigIo, StepSchedule, TriggerEdge};
 pub use node::{Node, NodeIdentity};
 
 pub use profile::Limits;
+pub use services::BoardServices;
 pub use settings::{AxisSettings, HomingSettings, LARGEST_STEP_RATE, Scale, SettingsError};
 pub use trajectory::{FINE_BITS, Fine, MotionState, Trajectory};
 

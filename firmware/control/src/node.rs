@@ -1,23 +1,34 @@
 //! The controller at the end of its serial link: the same code in the firmware, the native board and the tests.
 
+mod management;
+mod requests;
+
+use vergence_protocol::management::{BootState, RebootTo};
 use vergence_protocol::{
-    BoardEvent, BoardInfo, BoardSession, MAX_FRAME, Microseconds, ReplyTo, Report, Request, ResetCause, SessionId,
-    Status,
+    BoardEvent, BoardSession, ControllerState, Happening, MAX_FRAME, Microseconds, ResetCause, Trigger,
 };
 
+use crate::board_settings::BoardSettings;
 use crate::controller::{Controller, Event};
 use crate::io::RigIo;
-
-/// Shorter periods of the pose stream would be longer on the wire than in time (45 bytes at 921 600 baud).
-const SHORTEST_STREAM_US: u64 = 1_000;
+use crate::recorder::Recorder;
+use crate::services::BoardServices;
+use crate::settings::SettingsError;
+use crate::settings_store;
+use crate::trigger::CameraTrigger;
+use crate::updater::Updater;
 
 /// What a board says of itself.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct NodeIdentity {
     /// What kind of board, at most 16 bytes.
     pub board: heapless::String<16>,
+    /// The hardware that firmware images must name.
+    pub hardware: u32,
     /// Firmware version.
     pub firmware: [u8; 3],
+    /// The oldest firmware version that the board accepts.
+    pub oldest: [u8; 3],
     /// Which build.
     pub build: u64,
     /// Unique id of the chip.
@@ -26,29 +37,63 @@ pub struct NodeIdentity {
     pub reset: ResetCause,
 }
 
-/// Session, controller and telemetry.
+/// Session, controller, telemetry, settings, recorder and trigger.
 #[derive(Debug)]
 pub struct Node {
     session: BoardSession,
     controller: Controller,
     identity: NodeIdentity,
+    settings: BoardSettings,
+    /// What the firmware came with.
+    defaults: BoardSettings,
+    recorder: Recorder,
+    trigger: CameraTrigger,
+    updater: Updater,
+    /// When the last management request came.
+    managed_at: Microseconds,
+    reboot: Option<RebootTo>,
+    /// As last recorded.
+    state: ControllerState,
     stream_period: u64,
     next_pose: Microseconds,
     pose_seq: u16,
 }
 
 impl Node {
-    /// A node whose `boot` number differs from the last start's.
-    #[must_use]
-    pub fn new(controller: Controller, identity: NodeIdentity, boot: u32) -> Self {
-        Self {
+    /// A node with the settings last saved, or else those the firmware came with; its `boot` number differs from the
+    /// last start's.
+    ///
+    /// # Errors
+    /// [`SettingsError`] where an axis cannot work with the settings that the firmware came with.
+    pub fn new(
+        defaults: &BoardSettings,
+        identity: NodeIdentity,
+        boot: u32,
+        services: &mut impl BoardServices,
+    ) -> Result<Self, SettingsError> {
+        let settings = settings_store::load(services.settings_flash(), defaults).unwrap_or_else(|| defaults.clone());
+        let mut controller = Controller::new(&settings.axes)?;
+        if services.boot_state() == BootState::Trial {
+            controller.set_trial();
+        }
+        let mut recorder = Recorder::default();
+        recorder.record(Microseconds(0), Happening::Started);
+        Ok(Self {
             session: BoardSession::new(boot),
+            state: controller.state(),
             controller,
             identity,
+            settings,
+            defaults: defaults.clone(),
+            recorder,
+            trigger: CameraTrigger::default(),
+            updater: Updater::default(),
+            managed_at: Microseconds(0),
+            reboot: None,
             stream_period: 0,
             next_pose: Microseconds(0),
             pose_seq: 0,
-        }
+        })
     }
 
     /// The controller.
@@ -57,89 +102,110 @@ impl Node {
         &self.controller
     }
 
-    /// Takes bytes from the link.
-    pub fn receive(&mut self, now: Microseconds, bytes: &[u8], io: &mut impl RigIo) {
+    /// What the board is set to.
+    #[must_use]
+    pub fn settings(&self) -> &BoardSettings {
+        &self.settings
+    }
+
+    /// Takes bytes from the link. Requests to write flash block for some tens of milliseconds; nothing moves then.
+    pub fn receive(&mut self, now: Microseconds, bytes: &[u8], io: &mut impl RigIo, services: &mut impl BoardServices) {
         for &byte in bytes {
             match self.session.receive(now, byte) {
-                Some(BoardEvent::Opened { .. }) => self.stream_period = 0,
+                Some(BoardEvent::Opened { session }) => {
+                    self.recorder.record(now, Happening::Opened(session));
+                    self.set_stream(now, self.settings.stream_period_us);
+                    // Switching it off is never refused.
+                    let _ = self.trigger.set(now, Trigger::Off, io);
+                }
                 Some(BoardEvent::Request { reply_to, request, received_at }) => {
-                    self.serve(now, reply_to, &request, received_at, io);
+                    let reply = self.serve(now, &request, received_at, io, services);
+                    self.observe(now, io);
+                    if let Some(reply) = reply {
+                        self.session.reply(reply_to, reply);
+                    }
+                }
+                Some(BoardEvent::Management { seq, request }) => {
+                    let report = self.manage(now, &request, services);
+                    self.observe(now, io);
+                    self.session.reply_management(seq, report);
                 }
                 None => {}
             }
         }
     }
 
-    fn serve(
-        &mut self,
-        now: Microseconds,
-        to: ReplyTo,
-        request: &Request,
-        received: Microseconds,
-        io: &mut impl RigIo,
-    ) {
-        let session = self.session.session().unwrap_or(SessionId(0));
-        let reply = match request {
-            Request::Heartbeat { session, lease_ms } => {
-                self.controller.heartbeat(received, *session, *lease_ms);
-                return;
-            }
-            Request::TimeProbe { t0 } => Report::TimeReply { t0: *t0, t1: received, t2: now },
-            Request::GetInfo => Report::Info { to: 0, info: self.info() },
-            Request::GetAxis { axis } => match self.controller.axis_info(usize::from(*axis)) {
-                Some(info) => Report::Axis { to: 0, axis: *axis, info },
-                None => refused(),
-            },
-            Request::SetStream { period_us } => {
-                self.set_stream(now, u64::from(*period_us));
-                Report::Ack { to: 0, status: Status::Accepted }
-            }
-            motion => Report::Ack { to: 0, status: self.controller.handle(now, session, motion, io) },
-        };
-        self.session.reply(to, reply);
-        self.forward_events();
-    }
-
-    fn info(&self) -> BoardInfo {
-        let NodeIdentity { board, firmware, build, uid, reset } = self.identity.clone();
-        let axes = u8::try_from(self.controller.axis_count()).unwrap_or(u8::MAX);
-        BoardInfo { board, firmware, build, uid, reset, axes }
-    }
-
-    fn set_stream(&mut self, now: Microseconds, period: u64) {
-        self.stream_period = if period == 0 { 0 } else { period.max(SHORTEST_STREAM_US) };
-        self.next_pose = now;
-    }
-
-    /// Runs the control tick and, where due, telemetry. Returns when it wants to run again.
+    /// Runs the control tick and, where due, trigger and telemetry. Returns when it wants to run again.
     pub fn poll(&mut self, now: Microseconds, io: &mut impl RigIo) -> Microseconds {
         let next_tick = self.controller.poll(now, io);
-        self.forward_events();
-        if self.stream_period > 0 && now >= self.next_pose {
-            self.pose_seq = self.pose_seq.wrapping_add(1);
-            self.session.telemetry(self.controller.pose(now, self.pose_seq, io));
-            // Whole periods, so that a late tick does not shift the stream.
-            let late = (now.0 - self.next_pose.0) / self.stream_period + 1;
-            self.next_pose = Microseconds(self.next_pose.0 + late * self.stream_period);
+        self.watch_update(now);
+        self.trigger.poll(now, io);
+        while let Some(edge) = io.take_trigger_edge() {
+            let counts = self.controller.counts_from(&edge.counts);
+            self.session.send(vergence_protocol::Report::FrameMark(self.trigger.mark(edge.at, counts)));
         }
+        self.recorder.watch_switches(now, self.controller.axis_count(), io);
+        self.observe(now, io);
+        self.stream_pose(now, io);
         next_tick
     }
 
-    fn forward_events(&mut self) {
+    fn set_stream(&mut self, now: Microseconds, period_us: u32) {
+        self.stream_period = period_us.into();
+        self.next_pose = now;
+    }
+
+    fn stream_pose(&mut self, now: Microseconds, io: &impl RigIo) {
+        if self.stream_period == 0 || now < self.next_pose {
+            return;
+        }
+        self.pose_seq = self.pose_seq.wrapping_add(1);
+        self.session.telemetry(self.controller.pose(now, self.pose_seq, io));
+        // Whole periods, so that a late tick does not shift the stream.
+        let late = (now.0 - self.next_pose.0) / self.stream_period + 1;
+        self.next_pose = Microseconds(self.next_pose.0 + late * self.stream_period);
+    }
+
+    /// Tells host and recorder what the controller did.
+    fn observe(&mut self, now: Microseconds, io: &impl RigIo) {
+        use vergence_protocol::{MovePhase, Report};
         while let Some(event) = self.controller.take_event() {
             self.session.send(match event {
-                Event::MoveState { id, phase } => Report::MoveState { id, phase },
-                Event::Fault(record) => Report::Fault(record),
+                Event::MoveState { id, phase } => {
+                    if phase == MovePhase::Running {
+                        self.recorder.record(now, Happening::Move(id));
+                    }
+                    Report::MoveState { id, phase }
+                }
+                Event::Fault(record) => {
+                    self.recorder.record_fault(&record, &self.controller.pose(now, 0, io).counts);
+                    Report::Fault(record)
+                }
             });
         }
+        let state = self.controller.state();
+        if state != self.state {
+            self.state = state;
+            if !matches!(state, ControllerState::LinkLost | ControllerState::Fault) {
+                self.recorder.release();
+            }
+            self.recorder.record(now, Happening::State(state));
+        }
+    }
+
+    /// Sends log text to the host when there is nothing better to send; dropped where too much waits.
+    pub fn log(&mut self, bytes: &[u8]) {
+        self.session.log(bytes);
+    }
+
+    /// What the host wants started again. To be asked when [`Self::transmit`] gives nothing more, so that the answer is
+    /// out before.
+    pub fn take_reboot(&mut self) -> Option<RebootTo> {
+        self.reboot.take()
     }
 
     /// The next frame for the link; call until `None`.
     pub fn transmit(&mut self, now: Microseconds, buffer: &mut [u8; MAX_FRAME]) -> Option<usize> {
         self.session.transmit(now, buffer)
     }
-}
-
-fn refused() -> Report {
-    Report::Ack { to: 0, status: Status::Refused(vergence_protocol::Refusal::Invalid) }
 }

@@ -124,6 +124,8 @@ pub enum SettingsError {
         /// Which axis.
         axis: usize,
     },
+    /// The serial line or the pose stream cannot be that fast or slow.
+    Link,
 }
 
 /// The most steps a second that any axis may need.

@@ -18,7 +18,7 @@ pub struct Stage {
 }
 
 impl Stage {
-    /// A 2 mm screw driven by a 200-step motor in 1/16 steps, with a linear encoder; home switch 2 mm below `min`.
+    /// A 2 mm screw driven by a 200-step motor in 1/8 steps, with a linear encoder; home switch 2 mm below `min`.
     #[must_use]
     pub fn linear(min: Micro, max: Micro, counts_per_metre: u32) -> Self {
         let settings = AxisSettings {
@@ -28,7 +28,7 @@ impl Stage {
             speed: 80_000,
             acceleration: 400_000,
             jerk: 8_000_000,
-            steps_per_unit: 1_600_000,
+            steps_per_unit: 800_000,
             counts_per_unit: counts_per_metre,
             steps_reversed: false,
             counts_reversed: false,

@@ -2,17 +2,23 @@
 
 use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64Mcg;
-use vergence_control::{AxisSettings, Controller, Node, NodeIdentity, SettingsError};
+use vergence_control::{AxisSettings, BoardSettings, Node, NodeIdentity, SettingsError};
+use vergence_protocol::management::RebootTo;
 use vergence_protocol::{ControllerState, MAX_FRAME, Microseconds, ResetCause};
 
 use crate::axis::AxisMechanics;
 use crate::plant::Plant;
+use crate::services::NativeServices;
+
+/// What firmware images for the native board would name as their hardware.
+pub const NATIVE_HARDWARE: u32 = 0x5353_4756; // "VGSS", little-endian
 
 /// A board without hardware. It lives in its own time: nothing happens between two calls of [`Self::advance`].
 #[derive(Debug)]
 pub struct NativeBoard {
     node: Node,
-    settings: Vec<AxisSettings>,
+    settings: BoardSettings,
+    services: NativeServices,
     plant: Plant,
     now: Microseconds,
     next_tick: Microseconds,
@@ -42,9 +48,12 @@ impl NativeBoard {
         positions: &[f64],
         boot: u32,
     ) -> Result<Self, SettingsError> {
+        let settings = BoardSettings::new(settings)?;
+        let mut services = NativeServices::default();
         Ok(Self {
-            node: start(settings, ResetCause::PowerOn, boot)?,
-            settings: settings.to_vec(),
+            node: start(&settings, ResetCause::PowerOn, boot, &mut services)?,
+            settings,
+            services,
             plant: Plant::new(mechanics, positions),
             now: Microseconds(0),
             next_tick: Microseconds(0),
@@ -57,7 +66,8 @@ impl NativeBoard {
     /// # Errors
     /// [`SettingsError`], which cannot be where the settings were taken before.
     pub fn restart(&mut self, cause: ResetCause, boot: u32) -> Result<(), SettingsError> {
-        self.node = start(&self.settings, cause, boot)?;
+        self.services.boot();
+        self.node = start(&self.settings, cause, boot, &mut self.services)?;
         self.plant.restart_clock();
         self.now = Microseconds(0);
         self.next_tick = Microseconds(0);
@@ -85,7 +95,7 @@ impl NativeBoard {
 
     /// Takes bytes that arrive now.
     pub fn receive(&mut self, bytes: &[u8]) {
-        self.node.receive(self.now, bytes, &mut self.plant);
+        self.node.receive(self.now, bytes, &mut self.plant, &mut self.services);
     }
 
     /// All frames that leave now, one after the other.
@@ -98,10 +108,25 @@ impl NativeBoard {
         out
     }
 
+    /// What the host wants started again, once all frames have left; the caller does it by [`Self::restart`].
+    pub fn take_reboot(&mut self) -> Option<RebootTo> {
+        self.node.take_reboot()
+    }
+
+    /// Logs as the firmware would.
+    pub fn log(&mut self, entry: &[u8]) {
+        self.node.log(entry);
+    }
+
     /// What the controller is doing.
     #[must_use]
     pub fn state(&self) -> ControllerState {
         self.node.controller().state()
+    }
+
+    /// Flash and boot loader, for doing something to them.
+    pub fn services_mut(&mut self) -> &mut NativeServices {
+        &mut self.services
     }
 
     /// The mechanics: the truth.
@@ -117,23 +142,20 @@ impl NativeBoard {
 }
 
 /// The software as it starts.
-fn start(settings: &[AxisSettings], reset: ResetCause, boot: u32) -> Result<Node, SettingsError> {
+fn start(
+    settings: &BoardSettings,
+    reset: ResetCause,
+    boot: u32,
+    services: &mut NativeServices,
+) -> Result<Node, SettingsError> {
     let identity = NodeIdentity {
         board: "native-sim".try_into().unwrap_or_default(),
-        firmware: firmware_version(),
-        build: 0,
+        hardware: NATIVE_HARDWARE,
+        firmware: services.running.version,
+        oldest: services.oldest,
+        build: services.running.build,
         uid: *b"vergence-sim",
         reset,
     };
-    Ok(Node::new(Controller::new(settings)?, identity, boot))
-}
-
-/// The workspace's version: the native board runs its own sources.
-fn firmware_version() -> [u8; 3] {
-    let part = |text: &str| text.parse().unwrap_or(0);
-    [
-        part(env!("CARGO_PKG_VERSION_MAJOR")),
-        part(env!("CARGO_PKG_VERSION_MINOR")),
-        part(env!("CARGO_PKG_VERSION_PATCH")),
-    ]
+    Node::new(settings, identity, boot, services)
 }

@@ -7,12 +7,16 @@ mod axis;
 mod bench;
 mod board;
 mod encoder;
+mod flash;
 mod plant;
+mod services;
 mod switch;
 
 pub use axis::{AxisMechanics, AxisPlant};
 pub use bench::{Stage, bench_mechanics, bench_settings};
-pub use board::NativeBoard;
+pub use board::{NATIVE_HARDWARE, NativeBoard};
 pub use encoder::EncoderFault;
+pub use flash::{Cut, RamFlash};
 pub use plant::Plant;
+pub use services::{Firmware, NativeServices, Verifier};
 pub use switch::SwitchNoise;

@@ -19,6 +19,15 @@ const NOTICE_US: u64 = 3_000;
 /// A contact that closes for good is told from a spike within this time; a spike shortly before may pass for its edge.
 const DEBOUNCE_S: f64 = 10e-3;
 
+/// States of a disarmed board.
+const OFF: [ControllerState; 5] = [
+    ControllerState::Idle,
+    ControllerState::Boot,
+    ControllerState::SelfTest,
+    ControllerState::Updating,
+    ControllerState::Trial,
+];
+
 /// What is promised.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Promise {
@@ -237,7 +246,7 @@ impl Checker {
             let [seek, slow] = [homing.seek_speed, homing.approach_speed].map(f64::from);
             ((2.0 * travel / seek + 4.0 * retract / slow + 5.0) * 1e6) as u64
         };
-        self.axes.iter().map(motion).max().unwrap_or(0)
+        self.axes.iter().map(motion).sum()
     }
 
     /// Bytes reach the board.
@@ -321,7 +330,7 @@ impl Checker {
             self.accuse(now, Promise::FirstFault, format!("state {} with fault {:?}", pose.state, pose.fault));
         }
         // Latched, the drivers may hold the stages or not.
-        let off = pose.state == ControllerState::Idle;
+        let off = OFF.contains(&pose.state);
         if !latched && off == plant.drivers_on() {
             let on = plant.drivers_on();
             self.accuse(now, Promise::State, format!("{} while drivers on is {on}", pose.state));

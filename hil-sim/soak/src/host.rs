@@ -230,7 +230,7 @@ impl Host {
 
     /// Goes on with a step, given what the board does.
     fn pursue(&mut self, now: Microseconds, step: Step, seen: Seen) {
-        if matches!(seen.state, ControllerState::Homing | ControllerState::Moving | ControllerState::Stopping) {
+        if !matches!(seen.state, ControllerState::Idle | ControllerState::Ready) {
             return;
         }
         let idle = seen.state == ControllerState::Idle;
@@ -297,6 +297,7 @@ impl Host {
                 });
             }
             HostEvent::Opened { .. } | HostEvent::Reply { .. } | HostEvent::Report(_) => {}
+            HostEvent::Log(_) | HostEvent::Management(_) => {}
         }
     }
 

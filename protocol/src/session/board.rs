@@ -1,19 +1,25 @@
 //! The board's end.
 
-use heapless::Deque;
-use postcard_schema::Schema;
-use serde::{Deserialize, Serialize};
+use heapless::{Deque, Vec};
 
 use super::line::Line;
 use super::results::Results;
+use super::statistics::BoardStatistics;
 use crate::frame::{FrameError, Header, Kind, MAX_FRAME};
-use crate::receiver::{LinkCounters, Receiver, increment};
+use crate::management::{Management, ManagementReport};
+use crate::receiver::{Receiver, increment};
 use crate::{Microseconds, PROTOCOL, PoseReport, Refusal, Report, Request, SessionId, Status, schema_hash};
 
 /// How many answers to immediate requests may wait for the line.
 const IMMEDIATE: usize = 4;
+/// How many answers to management requests may wait for the line.
+const MANAGEMENT: usize = super::WINDOW;
 /// How many events may wait for the line.
 const EVENTS: usize = 8;
+/// How many bytes of log may wait for the line.
+const LOG: usize = 512;
+/// The most bytes of log in one frame: short, because an answer may have to wait for it.
+pub const LOG_CHUNK: usize = 48;
 
 /// Which request an answer belongs to. Answers that outlive their session go nowhere.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -40,27 +46,13 @@ pub enum BoardEvent {
         /// When its last byte arrived, by the `now` of [`BoardSession::receive`].
         received_at: Microseconds,
     },
-}
-
-/// Figures since the board started.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, Schema)]
-pub struct BoardStatistics {
-    /// Frames sent.
-    pub sent: u32,
-    /// Requests that came again and were only answered again.
-    pub duplicates: u32,
-    /// Requests that came too early because one before them was lost.
-    pub gaps: u32,
-    /// Requests dropped because no session was open.
-    pub without_session: u32,
-    /// Answers to immediate requests that were pushed out by later ones.
-    pub replies_dropped: u32,
-    /// Events that were pushed out by later ones.
-    pub events_dropped: u32,
-    /// Poses that a later one replaced before they were sent.
-    pub poses_replaced: u32,
-    /// What came in.
-    pub link: LinkCounters,
+    /// A management request, from a host of any major, with or without a session. It may come twice.
+    Management {
+        /// Give this to [`BoardSession::reply_management`].
+        seq: u8,
+        /// What is asked.
+        request: Management,
+    },
 }
 
 #[derive(Clone, Copy, Debug)]
@@ -84,8 +76,10 @@ pub struct BoardSession {
     ack_due: bool,
     results: Results,
     immediate: Deque<Report, IMMEDIATE>,
+    management: Deque<ManagementReport, MANAGEMENT>,
     events: Deque<Report, EVENTS>,
     pose: Option<PoseReport>,
+    log: Deque<u8, LOG>,
     statistics: BoardStatistics,
 }
 
@@ -105,8 +99,10 @@ impl BoardSession {
             ack_due: false,
             results: Results::default(),
             immediate: Deque::new(),
+            management: Deque::new(),
             events: Deque::new(),
             pose: None,
+            log: Deque::new(),
             statistics: BoardStatistics::default(),
         }
     }
@@ -115,6 +111,10 @@ impl BoardSession {
     pub fn receive(&mut self, now: Microseconds, byte: u8) -> Option<BoardEvent> {
         let frame = self.receiver.push(byte)?;
         let header = frame.header;
+        if header.kind == Kind::Firmware {
+            let body = frame.body::<Management>();
+            return self.receive_management(header, body);
+        }
         let body = frame.body::<Request>();
         match header.kind {
             Kind::Immediate | Kind::Control if header.major != PROTOCOL.major => {
@@ -142,7 +142,15 @@ impl BoardSession {
         }
     }
 
-    /// Sends an event: `MoveState` or `Fault`. Nothing happens without a session; the oldest goes when too many wait.
+    /// Answers management request `seq`; the session fills in `to`.
+    pub fn reply_management(&mut self, seq: u8, mut report: ManagementReport) {
+        if let ManagementReport::Progress { to, .. } = &mut report {
+            *to = seq;
+        }
+        push_out(&mut self.management, report, &mut self.statistics.replies_dropped);
+    }
+
+    /// Sends an event: `MoveState`, `Fault` or `FrameMark`. Nothing happens without a session; the oldest goes when too many wait.
     pub fn send(&mut self, report: Report) {
         if self.open.is_some() {
             push_out(&mut self.events, report, &mut self.statistics.events_dropped);
@@ -156,15 +164,28 @@ impl BoardSession {
         }
     }
 
-    /// Writes the next frame to send `now`, or `None` when there is none: answers first, then events, then the pose.
+    /// Keeps one log entry, text or encoded, to be sent when there is nothing else to send; what is logged before a
+    /// session waits for it. An entry that does not fit is dropped whole.
+    pub fn log(&mut self, entry: &[u8]) {
+        if entry.len() > LOG - self.log.len() {
+            increment(&mut self.statistics.logs_dropped);
+            return;
+        }
+        self.log.extend(entry.iter().copied());
+    }
+
+    /// Writes the next frame to send `now`, or `None` when there is none: answers first, then events, then the pose,
+    /// then the log.
     pub fn transmit(&mut self, now: Microseconds, buffer: &mut [u8; MAX_FRAME]) -> Option<usize> {
-        let (kind, report) = self.next_frame(now)?;
+        let (kind, body) = self.next_frame(now)?;
         let header = Header { major: PROTOCOL.major, kind, seq: self.seq, ack: self.expected.wrapping_sub(1) };
         self.seq = self.seq.wrapping_add(1);
         self.ack_due = false;
-        match report {
-            Some(report) => self.line.write(now, header, &report, buffer),
-            None => self.line.write(now, header, &(), buffer),
+        match body {
+            Body::Report(report) => self.line.write(now, header, &report, buffer),
+            Body::Management(report) => self.line.write(now, header, &report, buffer),
+            Body::Log(bytes) => self.line.write(now, header, &bytes, buffer),
+            Body::None => self.line.write(now, header, &(), buffer),
         }
     }
 
@@ -178,6 +199,16 @@ impl BoardSession {
     #[must_use]
     pub fn statistics(&self) -> BoardStatistics {
         BoardStatistics { sent: self.line.sent(), link: self.receiver.counters(), ..self.statistics }
+    }
+
+    fn receive_management(&mut self, header: Header, body: Result<Management, FrameError>) -> Option<BoardEvent> {
+        match body {
+            Ok(request) => Some(BoardEvent::Management { seq: header.seq, request }),
+            Err(error) => {
+                self.receiver.reject(error);
+                None
+            }
+        }
     }
 
     /// Of another major only what is frozen for ever is understood, and it opens nothing.
@@ -294,29 +325,46 @@ impl BoardSession {
         BoardEvent::Request { reply_to, request, received_at }
     }
 
-    fn next_frame(&mut self, now: Microseconds) -> Option<(Kind, Option<Report>)> {
+    fn next_frame(&mut self, now: Microseconds) -> Option<(Kind, Body)> {
         if let Some(session) = self.hello_due.take() {
             let hello = Report::Hello { protocol: PROTOCOL, schema: schema_hash(), session, boot: self.boot };
-            return Some((Kind::Immediate, Some(hello)));
+            return Some((Kind::Immediate, Body::Report(hello)));
         }
         if let Some(mut report) = self.immediate.pop_front() {
             if let Report::TimeReply { t2, .. } = &mut report {
                 *t2 = now;
             }
-            return Some((Kind::Immediate, Some(report)));
+            return Some((Kind::Immediate, Body::Report(report)));
+        }
+        if let Some(report) = self.management.pop_front() {
+            return Some((Kind::Firmware, Body::Management(report)));
         }
         if core::mem::take(&mut self.nak_due) {
-            return Some((Kind::Nak, None));
+            return Some((Kind::Nak, Body::None));
         }
-        let control = self.results.transmit().or_else(|| self.events.pop_front());
-        if control.is_some() {
-            return Some((Kind::Control, control));
+        if let Some(control) = self.results.transmit().or_else(|| self.events.pop_front()) {
+            return Some((Kind::Control, Body::Report(control)));
         }
         if let Some(pose) = self.pose.take() {
-            return Some((Kind::Telemetry, Some(Report::Pose(pose))));
+            return Some((Kind::Telemetry, Body::Report(Report::Pose(pose))));
         }
-        self.ack_due.then_some((Kind::AckOnly, None))
+        if self.ack_due {
+            return Some((Kind::AckOnly, Body::None));
+        }
+        if self.open.is_none() || self.log.is_empty() {
+            return None;
+        }
+        let chunk = core::iter::from_fn(|| self.log.pop_front()).take(LOG_CHUNK).collect();
+        Some((Kind::Log, Body::Log(chunk)))
     }
+}
+
+/// What a frame carries.
+enum Body {
+    None,
+    Report(Report),
+    Management(ManagementReport),
+    Log(Vec<u8, LOG_CHUNK>),
 }
 
 /// What a host of another schema may not ask.
@@ -336,7 +384,7 @@ const fn moves(request: &Request) -> bool {
 }
 
 /// Puts `report` last; where the queue is full the first goes and is counted.
-fn push_out<const N: usize>(queue: &mut Deque<Report, N>, report: Report, dropped: &mut u32) {
+fn push_out<T, const N: usize>(queue: &mut Deque<T, N>, report: T, dropped: &mut u32) {
     if queue.is_full() {
         queue.pop_front();
         increment(dropped);

@@ -1,16 +1,21 @@
 //! The host's end.
 
-use heapless::Deque;
+use heapless::{Deque, Vec};
 
+use super::board::LOG_CHUNK;
 use super::line::Line;
 use super::round_trip::Repeat;
-use super::window::{Window, sequence};
-use crate::frame::{Header, Kind, MAX_FRAME};
-use crate::receiver::{LinkCounters, Receiver};
+use super::statistics::HostStatistics;
+use super::window::{WINDOW, Window, sequence};
+use crate::frame::{FrameError, Header, Kind, MAX_FRAME};
+use crate::management::{Management, ManagementReport};
+use crate::receiver::Receiver;
 use crate::{Microseconds, PROTOCOL, ProtocolVersion, Report, Request, SessionId, schema_hash};
 
 /// How many immediate requests may wait for the line.
 const IMMEDIATE: usize = 4;
+/// How many management requests may wait for the line.
+const MANAGEMENT: usize = WINDOW;
 
 /// Names one request of one session, so that its answer can be told from another's.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
@@ -26,7 +31,7 @@ pub enum Compatibility {
     Full,
     /// The schemas differ: the board may be read and stopped but not moved.
     ReadOnly,
-    /// The majors differ: nothing but `GetInfo` by [`HostSession::send_now`].
+    /// The majors differ: nothing but `GetInfo` by [`HostSession::send_now`], and [`HostSession::manage`].
     Incompatible {
         /// What the board speaks.
         board: ProtocolVersion,
@@ -56,8 +61,12 @@ pub enum HostEvent {
         /// The answer.
         report: Report,
     },
-    /// All else: `Pose`, `MoveState`, `Fault`, `TimeReply`.
+    /// All else: `Pose`, `MoveState`, `Fault`, `TimeReply`, `FrameMark`.
     Report(Report),
+    /// The next bytes of the board's log; an entry may be spread over several, and frames may be lost between.
+    Log(Vec<u8, LOG_CHUNK>),
+    /// The answer to a management request, whether a session is open or not. It may come twice.
+    Management(ManagementReport),
 }
 
 /// Why a request was not taken.
@@ -76,25 +85,6 @@ pub enum SubmitError {
     /// The request goes another way: `hello`, `submit` or `send_now`.
     #[error("this request is sent another way")]
     WrongWay,
-}
-
-/// Figures of one session.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct HostStatistics {
-    /// Frames sent.
-    pub sent: u32,
-    /// Requests sent again.
-    pub retransmitted: u32,
-    /// Smoothed round trip, microseconds; `None` before the first acknowledgement.
-    pub round_trip: Option<Microseconds>,
-    /// How long an unanswered request waits before it is sent again, microseconds.
-    pub timeout: Microseconds,
-    /// Poses received.
-    pub poses: u32,
-    /// Poses that the board numbered but that did not arrive.
-    pub poses_lost: u32,
-    /// What came in.
-    pub link: LinkCounters,
 }
 
 #[derive(Clone, Copy, Debug)]
@@ -116,6 +106,8 @@ pub struct HostSession {
     window: Window,
     immediate: Deque<(u32, Request), IMMEDIATE>,
     immediate_next: u32,
+    management: Deque<(u8, Management), MANAGEMENT>,
+    management_next: u8,
     heard_seq: u8,
     heard_at: Option<Microseconds>,
     pose_seq: Option<u16>,
@@ -135,6 +127,8 @@ impl HostSession {
             window: Window::new(),
             immediate: Deque::new(),
             immediate_next: 0,
+            management: Deque::new(),
+            management_next: 0,
             heard_seq: 0,
             heard_at: None,
             pose_seq: None,
@@ -193,6 +187,18 @@ impl HostSession {
         Ok(ticket)
     }
 
+    /// Sends a management request once, to a board of any major, with or without a session; the caller repeats it if
+    /// need be. Returns its sequence number, which the answer names.
+    ///
+    /// # Errors
+    /// [`SubmitError::QueueFull`]; the request was not taken.
+    pub fn manage(&mut self, request: Management) -> Result<u8, SubmitError> {
+        let seq = self.management_next;
+        self.management.push_back((seq, request)).map_err(|_| SubmitError::QueueFull)?;
+        self.management_next = seq.wrapping_add(1);
+        Ok(seq)
+    }
+
     /// Takes bytes from the board, any bytes, that arrived `now`.
     pub fn receive(&mut self, now: Microseconds, bytes: &[u8], mut hear: impl FnMut(HostEvent)) {
         for &byte in bytes {
@@ -204,16 +210,19 @@ impl HostSession {
 
     /// Writes the next frame to send `now`, or `None` when there is none. Call until then.
     pub fn transmit(&mut self, now: Microseconds, buffer: &mut [u8; MAX_FRAME]) -> Option<usize> {
-        let (kind, seq, request) = self.next_request(now)?;
-        let header = Header { major: PROTOCOL.major, kind, seq, ack: self.heard_seq };
-        self.line.write(now, header, &request, buffer)
+        let header = |kind, seq, ack| Header { major: PROTOCOL.major, kind, seq, ack };
+        if let Some((kind, seq, request)) = self.next_request(now) {
+            return self.line.write(now, header(kind, seq, self.heard_seq), &request, buffer);
+        }
+        let (seq, request) = self.management.pop_front()?;
+        self.line.write(now, header(Kind::Firmware, seq, self.heard_seq), &request, buffer)
     }
 
     /// When [`transmit`](Self::transmit) next has something to send if nothing arrives before; zero is at once.
     #[must_use]
     pub fn next_wake(&self) -> Option<Microseconds> {
         match self.phase {
-            _ if !self.immediate.is_empty() => Some(Microseconds(0)),
+            _ if !self.immediate.is_empty() || !self.management.is_empty() => Some(Microseconds(0)),
             Phase::Opening(repeat) => Some(repeat.due()),
             Phase::Closed | Phase::Open { .. } | Phase::Incompatible => self.window.wake(),
         }
@@ -282,17 +291,32 @@ impl HostSession {
         match header.kind {
             Kind::Control | Kind::Telemetry | Kind::Immediate => match frame.body() {
                 Ok(report) => self.receive_report(now, header, report),
-                Err(error) => {
-                    self.receiver.reject(error);
-                    None
-                }
+                Err(error) => self.reject(error),
             },
             Kind::AckOnly | Kind::Nak => {
                 self.receive_header(now, header);
                 None
             }
-            Kind::Log | Kind::Firmware => None,
+            Kind::Log => match frame.body() {
+                Ok(bytes) => {
+                    self.receive_header(now, header);
+                    self.is_open().then_some(HostEvent::Log(bytes))
+                }
+                Err(error) => self.reject(error),
+            },
+            Kind::Firmware => match frame.body() {
+                Ok(report) => {
+                    self.receive_header(now, header);
+                    Some(HostEvent::Management(report))
+                }
+                Err(error) => self.reject(error),
+            },
         }
+    }
+
+    fn reject(&mut self, error: FrameError) -> Option<HostEvent> {
+        self.receiver.reject(error);
+        None
     }
 
     fn receive_report(&mut self, now: Microseconds, header: Header, report: Report) -> Option<HostEvent> {

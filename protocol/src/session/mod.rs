@@ -10,10 +10,12 @@ mod host;
 mod line;
 mod results;
 mod round_trip;
+mod statistics;
 mod window;
 
-pub use board::{BoardEvent, BoardSession, BoardStatistics, ReplyTo};
-pub use host::{Compatibility, HostEvent, HostSession, HostStatistics, SubmitError, Ticket};
+pub use board::{BoardEvent, BoardSession, LOG_CHUNK, ReplyTo};
+pub use host::{Compatibility, HostEvent, HostSession, SubmitError, Ticket};
+pub use statistics::{BoardStatistics, HostStatistics};
 pub use window::WINDOW;
 
 use crate::Request;

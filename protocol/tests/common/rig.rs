@@ -148,7 +148,7 @@ impl Rig {
                         self.thinking.push_back((self.now + self.think, reply_to, answer(&request)));
                         self.executed.push(request);
                     }
-                    None => {}
+                    Some(BoardEvent::Management { .. }) | None => {}
                 }
             }
         }

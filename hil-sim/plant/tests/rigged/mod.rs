@@ -4,9 +4,11 @@
 
 use vergence_control::{AxisSettings, RigIo};
 use vergence_plant::{AxisMechanics, NativeBoard, bench_mechanics, bench_settings};
+use vergence_protocol::management::ManagementReport;
 use vergence_protocol::{
-    AxisMask, Compatibility, ControllerState, FaultRecord, HostEvent, HostSession, MAX_FRAME, Micro, Microseconds,
-    Mode, Move, MoveId, MovePhase, Permille, PoseReport, Refusal, Report, Request, SessionId, Status, Ticket,
+    AxisMask, Compatibility, ControllerState, FaultRecord, FrameMark, HostEvent, HostSession, MAX_FRAME, Micro,
+    Microseconds, Mode, Move, MoveId, MovePhase, Permille, PoseReport, Refusal, Report, Request, SessionId, Status,
+    Ticket,
 };
 
 pub const LEASE_MS: u16 = 100;
@@ -35,6 +37,9 @@ pub struct Rigged {
     pub faults: Vec<FaultRecord>,
     pub compatibility: Option<Compatibility>,
     pub lost: bool,
+    pub marks: Vec<FrameMark>,
+    pub log: Vec<u8>,
+    pub management: Vec<ManagementReport>,
     /// All bytes that the board sent.
     pub sent: Vec<u8>,
     next_move: u16,
@@ -61,6 +66,9 @@ impl Rigged {
             faults: Vec::new(),
             compatibility: None,
             lost: false,
+            marks: Vec::new(),
+            log: Vec::new(),
+            management: Vec::new(),
             sent: Vec::new(),
             next_move: 0,
         }
@@ -95,6 +103,11 @@ impl Rigged {
     pub fn restart_board(&mut self, seed: u64) {
         self.board = NativeBoard::new(&bench_settings(), &bench_mechanics(), seed).unwrap();
         self.board_start = self.now.0 - OFFSET_US;
+    }
+
+    /// The board's clock began again at zero when the host's read `now`.
+    pub fn board_starts(&mut self, now: Microseconds) {
+        self.board_start = now.0;
     }
 
     /// A new host after the old one is gone.
@@ -162,6 +175,9 @@ impl Rigged {
                 HostEvent::Report(Report::Pose(pose)) => self.pose = Some(pose),
                 HostEvent::Report(Report::MoveState { id, phase }) => self.phases.push((id, phase)),
                 HostEvent::Report(Report::Fault(fault)) => self.faults.push(fault),
+                HostEvent::Report(Report::FrameMark(mark)) => self.marks.push(mark),
+                HostEvent::Log(bytes) => self.log.extend(bytes),
+                HostEvent::Management(report) => self.management.push(report),
                 HostEvent::Report(other) => panic!("{other:?}"),
             }
         }

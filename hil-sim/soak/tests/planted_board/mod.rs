@@ -1,6 +1,6 @@
 //! The native board with one thing wrong: in its settings, its wiring, or what it says.
 
-use vergence_control::RigIo;
+use vergence_control::{RigIo, StepSchedule};
 use vergence_plant::{NativeBoard, Plant};
 use vergence_protocol::frame::{Header, Kind, encode};
 use vergence_protocol::{
@@ -79,12 +79,12 @@ impl PlantedBoard {
     }
 
     fn creep(&mut self) {
-        let by = Microseconds(self.board.now().0 + 1_000);
+        let start = self.board.now();
         let plant = self.board.plant_mut();
         if !plant.drivers_on() {
             plant.set_drivers(true);
-            let steps = plant.steps(0);
-            plant.step_to(0, steps + 1, by);
+            let at_ns = std::iter::once(500_000).collect();
+            plant.schedule_steps(0, &StepSchedule { start, forward: true, at_ns });
         }
     }
 

@@ -338,6 +338,7 @@ impl LinkTask {
                     }
                 }
                 HostEvent::Report(report) => self.note(now, report),
+                HostEvent::Log(_) | HostEvent::Management(_) => {}
             }
         }
         Ok(())

@@ -1,0 +1,188 @@
+//! All that can be set on a board, one number at a time.
+
+use vergence_protocol::{AxisList, Micro, SettingItem, SettingKey};
+
+use crate::settings::{AxisSettings, SettingsError};
+
+/// Shorter periods of the pose stream would be longer on the wire than in time (45 bytes at 921 600 baud).
+pub const SHORTEST_STREAM_US: u32 = 1_000;
+/// A stream slower than this is none.
+const LONGEST_STREAM_US: u32 = 10_000_000;
+/// Poses at half the rate of the control tick leave room for answers and logs at 921 600 baud.
+const STREAM_US: u32 = 2_000;
+/// What serial ports and bridges do.
+const BAUD: core::ops::RangeInclusive<u32> = 9_600..=12_000_000;
+/// The fastest that the bridges of most boards take.
+const USUAL_BAUD: u32 = 921_600;
+
+/// What the board is set to.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct BoardSettings {
+    /// Every axis.
+    pub axes: AxisList<AxisSettings>,
+    /// Period of the pose stream from the opening of a session on, in microseconds; 0 for none.
+    pub stream_period_us: u32,
+    /// Speed of the serial line from the next start on.
+    pub baud: u32,
+}
+
+/// Why a setting was not taken.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
+#[non_exhaustive]
+pub enum SettingError {
+    /// There is no such setting on this board.
+    #[error("there is no such setting")]
+    Unknown,
+    /// The setting cannot have this value, or not beside the others.
+    #[error("the setting cannot have this value")]
+    Value,
+}
+
+impl BoardSettings {
+    /// These axes, the usual stream and line speed.
+    ///
+    /// # Errors
+    /// [`SettingsError`] where an axis cannot work with its settings.
+    pub fn new(axes: &[AxisSettings]) -> Result<Self, SettingsError> {
+        let axes = axes.iter().copied().collect::<heapless::Vec<_, { vergence_protocol::MAX_AXES }>>();
+        let settings = Self { axes, stream_period_us: STREAM_US, baud: USUAL_BAUD };
+        settings.validate()?;
+        Ok(settings)
+    }
+
+    /// Checks the whole.
+    ///
+    /// # Errors
+    /// Says what cannot be.
+    pub fn validate(&self) -> Result<(), SettingsError> {
+        if self.axes.is_empty() {
+            return Err(SettingsError::AxisCount);
+        }
+        for (index, axis) in self.axes.iter().enumerate() {
+            axis.validate(index)?;
+        }
+        let stream =
+            self.stream_period_us == 0 || (SHORTEST_STREAM_US..=LONGEST_STREAM_US).contains(&self.stream_period_us);
+        if stream && BAUD.contains(&self.baud) { Ok(()) } else { Err(SettingsError::Link) }
+    }
+
+    /// What can be set on this board.
+    pub fn keys(&self) -> impl Iterator<Item = SettingKey> + use<> {
+        let axes = self.axes.len();
+        SettingItem::ALL.into_iter().flat_map(move |item| {
+            let count = if item.is_of_axis() { axes } else { 1 };
+            (0..=u8::MAX).take(count).map(move |axis| SettingKey { item, axis })
+        })
+    }
+
+    /// The value of a setting; `None` where there is no such setting.
+    #[must_use]
+    pub fn get(&self, key: SettingKey) -> Option<i64> {
+        match key {
+            SettingKey { item: SettingItem::StreamPeriod, axis: 0 } => Some(self.stream_period_us.into()),
+            SettingKey { item: SettingItem::Baud, axis: 0 } => Some(self.baud.into()),
+            SettingKey { item, axis } => self.axes.get(usize::from(axis))?.item(item),
+        }
+    }
+
+    /// These settings with one changed.
+    ///
+    /// # Errors
+    /// [`SettingError`]; the whole would make no sense.
+    pub fn with(&self, key: SettingKey, value: i64) -> Result<Self, SettingError> {
+        let mut changed = self.clone();
+        changed.put(key, value)?;
+        changed.validate().map_err(|_| SettingError::Value)?;
+        Ok(changed)
+    }
+
+    /// Changes one setting without looking at the others.
+    pub(crate) fn put(&mut self, key: SettingKey, value: i64) -> Result<(), SettingError> {
+        self.get(key).ok_or(SettingError::Unknown)?;
+        match key.item {
+            SettingItem::StreamPeriod => self.stream_period_us = number(value)?,
+            SettingItem::Baud => self.baud = number(value)?,
+            item => {
+                let axis = self.axes.get_mut(usize::from(key.axis)).ok_or(SettingError::Unknown)?;
+                axis.put(item, value)?;
+            }
+        }
+        Ok(())
+    }
+}
+
+impl AxisSettings {
+    /// One number of an axis; `None` for what is not of an axis.
+    fn item(&self, item: SettingItem) -> Option<i64> {
+        let homing = &self.homing;
+        Some(match item {
+            SettingItem::Min => self.min.0.into(),
+            SettingItem::Max => self.max.0.into(),
+            SettingItem::Speed => self.speed.into(),
+            SettingItem::Acceleration => self.acceleration.into(),
+            SettingItem::Jerk => self.jerk.into(),
+            SettingItem::StepsPerUnit => self.steps_per_unit.into(),
+            SettingItem::CountsPerUnit => self.counts_per_unit.into(),
+            SettingItem::StepsReversed => self.steps_reversed.into(),
+            SettingItem::CountsReversed => self.counts_reversed.into(),
+            SettingItem::FollowingError => self.following_error.0.into(),
+            SettingItem::Tolerance => self.tolerance.0.into(),
+            SettingItem::Backlash => self.backlash.0.into(),
+            SettingItem::HomeSwitchAt => homing.switch_at.0.into(),
+            SettingItem::HomeSeekSpeed => homing.seek_speed.into(),
+            SettingItem::HomeApproachSpeed => homing.approach_speed.into(),
+            SettingItem::HomeRetract => homing.retract.0.into(),
+            SettingItem::HomeTravel => homing.travel.0.into(),
+            SettingItem::HomeRepeatability => homing.repeatability.0.into(),
+            _ => return None,
+        })
+    }
+
+    fn put(&mut self, item: SettingItem, value: i64) -> Result<(), SettingError> {
+        let homing = &mut self.homing;
+        match item {
+            SettingItem::Min => self.min = micro(value)?,
+            SettingItem::Max => self.max = micro(value)?,
+            SettingItem::Speed => self.speed = number(value)?,
+            SettingItem::Acceleration => self.acceleration = number(value)?,
+            SettingItem::Jerk => self.jerk = number(value)?,
+            SettingItem::StepsPerUnit => self.steps_per_unit = number(value)?,
+            SettingItem::CountsPerUnit => self.counts_per_unit = number(value)?,
+            SettingItem::StepsReversed => self.steps_reversed = flag(value)?,
+            SettingItem::CountsReversed => self.counts_reversed = flag(value)?,
+            SettingItem::FollowingError => self.following_error = micro(value)?,
+            SettingItem::Tolerance => self.tolerance = micro(value)?,
+            SettingItem::Backlash => self.backlash = micro(value)?,
+            SettingItem::HomeSwitchAt => homing.switch_at = micro(value)?,
+            SettingItem::HomeSeekSpeed => homing.seek_speed = number(value)?,
+            SettingItem::HomeApproachSpeed => homing.approach_speed = number(value)?,
+            SettingItem::HomeRetract => homing.retract = micro(value)?,
+            SettingItem::HomeTravel => homing.travel = micro(value)?,
+            SettingItem::HomeRepeatability => homing.repeatability = micro(value)?,
+            _ => return Err(SettingError::Unknown),
+        }
+        Ok(())
+    }
+
+    /// Whether a reference found with `self` still says where the axis is under `other`.
+    pub(crate) fn keeps_reference(&self, other: &Self) -> bool {
+        let reference = |axis: &Self| (axis.kind, axis.counts_per_unit, axis.counts_reversed, axis.homing.switch_at);
+        reference(self) == reference(other)
+    }
+}
+
+fn micro(value: i64) -> Result<Micro, SettingError> {
+    i32::try_from(value).map(Micro).map_err(|_| SettingError::Value)
+}
+
+fn number(value: i64) -> Result<u32, SettingError> {
+    u32::try_from(value).map_err(|_| SettingError::Value)
+}
+
+fn flag(value: i64) -> Result<bool, SettingError> {
+    match value {
+        0 => Ok(false),
+        1 => Ok(true),
+        _ => Err(SettingError::Value),
+    }
+}

@@ -1,0 +1,117 @@
+//! What the native board has besides its mechanics: flash and a boot loader.
+
+use vergence_control::{BoardServices, Flash, FlashError};
+use vergence_protocol::management::{BootState, ImageHeader, Signature};
+
+use crate::flash::RamFlash;
+
+/// Pages of the settings.
+const SETTINGS_PAGES: usize = 2;
+/// Pages for an image: 96 KiB.
+const IMAGE_PAGES: usize = 48;
+
+/// Whether a signature over the bytes is of a trusted key.
+pub type Verifier = fn(&[u8; ImageHeader::SIGNED], &Signature) -> bool;
+
+/// An image, as far as a simulation needs to know it.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Firmware {
+    /// Its version.
+    pub version: [u8; 3],
+    /// Which build.
+    pub build: u64,
+}
+
+/// Flash and boot loader in RAM. They outlive a restart of the board.
+#[derive(Clone, Debug)]
+pub struct NativeServices {
+    /// Where the settings are kept.
+    pub settings: RamFlash,
+    /// Where a new image is stored.
+    pub image: RamFlash,
+    /// What runs: the name only, for the code is always this.
+    pub running: Firmware,
+    /// How it came to.
+    pub boot_state: BootState,
+    /// The oldest version accepted.
+    pub oldest: [u8; 3],
+    /// Which signatures are trusted.
+    pub verifier: Verifier,
+    earlier: Option<Firmware>,
+    scheduled: Option<Firmware>,
+    goes_back: bool,
+}
+
+impl Default for NativeServices {
+    /// Empty flash, a confirmed application, no trusted key.
+    fn default() -> Self {
+        Self {
+            settings: RamFlash::new(SETTINGS_PAGES),
+            image: RamFlash::new(IMAGE_PAGES),
+            running: Firmware { version: workspace_version(), build: 0 },
+            boot_state: BootState::Confirmed,
+            oldest: [0, 0, 0],
+            verifier: |_, _| false,
+            earlier: None,
+            scheduled: None,
+            goes_back: false,
+        }
+    }
+}
+
+impl NativeServices {
+    /// What the boot loader does at a start: a scheduled image goes on trial, one that was not confirmed goes back.
+    pub fn boot(&mut self) {
+        let goes_back = std::mem::take(&mut self.goes_back) || self.boot_state == BootState::Trial;
+        if let Some(new) = self.scheduled.take() {
+            self.earlier = Some(std::mem::replace(&mut self.running, new));
+            self.boot_state = BootState::Trial;
+        } else if let Some(earlier) = self.earlier.take_if(|_| goes_back) {
+            self.running = earlier;
+            self.boot_state = BootState::Reverted;
+        }
+    }
+}
+
+impl BoardServices for NativeServices {
+    fn settings_flash(&mut self) -> &mut impl Flash {
+        &mut self.settings
+    }
+
+    fn image_flash(&mut self) -> &mut impl Flash {
+        &mut self.image
+    }
+
+    fn boot_state(&self) -> BootState {
+        self.boot_state
+    }
+
+    fn trusts(&self, signed: &[u8; ImageHeader::SIGNED], signature: &Signature) -> bool {
+        (self.verifier)(signed, signature)
+    }
+
+    fn schedule_trial(&mut self, image: &ImageHeader) -> Result<(), FlashError> {
+        self.scheduled = Some(Firmware { version: image.version, build: image.build });
+        Ok(())
+    }
+
+    fn confirm(&mut self) -> Result<(), FlashError> {
+        self.boot_state = BootState::Confirmed;
+        Ok(())
+    }
+
+    fn roll_back(&mut self) -> Result<bool, FlashError> {
+        self.goes_back = self.earlier.is_some();
+        Ok(self.goes_back)
+    }
+}
+
+/// The native board runs its own sources.
+fn workspace_version() -> [u8; 3] {
+    let part = |text: &str| text.parse().unwrap_or(0);
+    [
+        part(env!("CARGO_PKG_VERSION_MAJOR")),
+        part(env!("CARGO_PKG_VERSION_MINOR")),
+        part(env!("CARGO_PKG_VERSION_PATCH")),
+    ]
+}
