@@ -11,17 +11,19 @@
 #![no_std]
 #![no_main]
 
-mod flash;
-mod memory;
+mod recovery;
+mod reset;
 mod start;
 
 use cortex_m_rt::entry;
 use embassy_boot_stm32::State;
 use embassy_stm32::wdg::IndependentWatchdog;
 use embassy_stm32::{Config, rcc};
+use vergence_image::layout::ACTIVE;
 use vergence_image::{DEVELOPMENT_KEY, Seal, Survivor};
+use vergence_nucleo_common::{FedFlash, Services, SwapState, feed_watchdog, memory};
 
-use crate::flash::FedFlash;
+use crate::recovery::Line;
 
 /// How long an application may take until it sets the watchdog itself, and anything here between two feedings.
 const PATIENCE_US: u32 = 2_000_000;
@@ -31,17 +33,18 @@ const ATTEMPTS: u32 = 3;
 #[entry]
 fn main() -> ! {
     let p = embassy_stm32::init(clocks());
-    let mut watchdog = IndependentWatchdog::new(p.IWDG, PATIENCE_US);
-    watchdog.unleash();
+    IndependentWatchdog::new(p.IWDG, PATIENCE_US).unleash();
 
     let before = memory::survivor();
     // A person's button is no failure; a bite of the watchdog and a reset by the program itself are.
-    let failed_starts = if memory::fell_by_itself() { before.failed_starts } else { 0 };
+    let failed_starts = if reset::fell_by_itself() { before.failed_starts } else { 0 };
     let starts = before.starts.wrapping_add(1);
     let mut survivor = Survivor { failed_starts, starts, ..before };
 
-    let state = FedFlash::new(p.FLASH, watchdog).swap();
-    let sound = Seal::check(memory::active(), &DEVELOPMENT_KEY).is_ok();
+    let services = Services::of_recovery(&p.FLASH);
+    let state = SwapState::new(FedFlash::new(p.FLASH)).carry_out();
+    feed_watchdog();
+    let sound = Seal::check(memory::region(ACTIVE), &DEVELOPMENT_KEY).is_ok();
     if !sound && state == State::Swap {
         // The swap was just made or just undone. In the first case the next start undoes it.
         memory::remember(&survivor);
@@ -52,10 +55,9 @@ fn main() -> ! {
         memory::remember(&survivor);
         start::application();
     }
-    survivor.recovery_wanted = false;
-    survivor.failed_starts = 0;
-    memory::remember(&survivor);
-    loop {}
+    memory::remember(&Survivor { failed_starts: 0, recovery_wanted: false, ..survivor });
+    let line = Line { port: p.LPUART1, tx: p.PA2, rx: p.PA3, tx_dma: p.DMA1_CH2, rx_dma: p.DMA1_CH1 };
+    recovery::serve(line, services)
 }
 
 /// 170 MHz from the oscillator inside the chip, so that a board with a dead crystal can still be reached.

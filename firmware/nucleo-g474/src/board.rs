@@ -20,8 +20,6 @@ use crate::watchdog::PATIENCE_US;
 
 /// What the board calls itself.
 pub const NAME: &str = "nucleo-g474";
-/// Until settings say otherwise.
-pub const BAUD: u32 = 921_600;
 
 bind_interrupts!(struct Interrupts {
     LPUART1 => usart::InterruptHandler<peripherals::LPUART1>;
@@ -123,7 +121,7 @@ fn reserve_servo_bus<T: usart::Instance>(
 }
 
 impl SerialLine {
-    /// Opens the line at `baud`, or where it cannot keep that at [`BAUD`].
+    /// Opens the line; `None` where it cannot keep that speed.
     pub fn open(self, baud: u32) -> Option<(RingBufferedUartRx<'static>, UartTx<'static, Async>)> {
         static RING: StaticCell<[u8; link::RING]> = StaticCell::new();
         let mut config = usart::Config::default();

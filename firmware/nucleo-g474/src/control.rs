@@ -15,10 +15,11 @@ use embassy_stm32::{Peri, peripherals};
 use embassy_time::Instant;
 use static_cell::StaticCell;
 use vergence_control::{Node, TICK_US};
+use vergence_nucleo_common::Services;
 use vergence_protocol::{MAX_FRAME, Microseconds};
 
-use crate::link;
 use crate::rig::Rig;
+use crate::{link, log, memory};
 
 /// Below the interrupts of time, DMA and serial line, which are short, and above the executor's thread.
 const PRIORITY: Priority = Priority::P8;
@@ -35,12 +36,13 @@ static HANDOVER: Mutex<RefCell<Option<&'static mut Control>>> = Mutex::new(RefCe
 pub struct Control {
     node: Node,
     rig: Rig,
+    services: Services,
     /// When the running tick began.
     tick: Microseconds,
 }
 
-/// Starts the tick; from now on node and rig belong to the interrupt.
-pub fn start(node: Node, rig: Rig, timer: Peri<'static, peripherals::TIM7>) {
+/// Starts the tick; from now on node, rig and services belong to the interrupt.
+pub fn start(node: Node, rig: Rig, services: Services, timer: Peri<'static, peripherals::TIM7>) {
     // Dropped, it would stop the clock of the timer.
     core::mem::forget(Timer::new(timer));
     TIM7.psc().write_value(PRESCALER);
@@ -48,7 +50,7 @@ pub fn start(node: Node, rig: Rig, timer: Peri<'static, peripherals::TIM7>) {
     TIM7.egr().write(|w| w.set_ug(true));
     TIM7.sr().write(|_| {});
     let tick = Microseconds(Instant::now().as_micros());
-    let control = CONTROL.init(Control { node, rig, tick });
+    let control = CONTROL.init(Control { node, rig, services, tick });
     critical_section::with(|cs| HANDOVER.borrow_ref_mut(cs).replace(control));
     TIM7.dier().write(|w| w.set_uie(true));
     TIM7.cr1().write(|w| w.set_cen(true));
@@ -103,18 +105,30 @@ impl Control {
         let mut bytes = [0; 64];
         while let Ok(count) = link::RECEIVED.try_read(&mut bytes) {
             let now = Microseconds(Instant::now().as_micros());
-            self.node.receive(now, &bytes[..count], &mut self.rig);
+            self.node.receive(now, &bytes[..count], &mut self.rig, &mut self.services);
         }
     }
 
     /// Keeps at most one frame waiting behind the one on the wire, so that the next is chosen as late as possible.
     fn transmit(&mut self) {
+        log::forward(|entry| self.node.log(entry));
         let mut frame = [0; MAX_FRAME];
         while link::TO_SEND.is_empty() {
             let now = Microseconds(Instant::now().as_micros());
-            let Some(length) = self.node.transmit(now, &mut frame) else { return };
+            let Some(length) = self.node.transmit(now, &mut frame) else {
+                self.reboot();
+                return;
+            };
             // It fits: the pipe is empty and holds a frame.
             let _ = link::TO_SEND.try_write(&frame[..length]);
+        }
+    }
+
+    /// Where the host wants another start, the link makes it when the last frame is out.
+    fn reboot(&mut self) {
+        if let Some(to) = self.node.take_reboot() {
+            memory::prepare_reboot(to);
+            link::REBOOT.store(true, Ordering::Relaxed);
         }
     }
 }

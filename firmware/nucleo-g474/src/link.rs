@@ -1,6 +1,6 @@
 //! The serial link: two tasks that move bytes between the wire and the node.
 
-use core::sync::atomic::{AtomicU32, Ordering};
+use core::sync::atomic::{AtomicBool, AtomicU32, Ordering};
 
 use embassy_stm32::mode::Async;
 use embassy_stm32::usart::{RingBufferedUartRx, UartTx};
@@ -22,6 +22,9 @@ pub static RECEIVED: Pipe<CriticalSectionRawMutex, 512> = Pipe::new();
 pub static TO_SEND: Pipe<CriticalSectionRawMutex, MAX_FRAME> = Pipe::new();
 /// How often the receiver has come round: the watchdog's witness.
 pub static ROUNDS: AtomicU32 = AtomicU32::new(0);
+
+/// Whether the chip is to start again once all is sent.
+pub static REBOOT: AtomicBool = AtomicBool::new(false);
 
 /// Brings bytes in. A line error loses bytes; the frame's zeros and checksum say where it goes on.
 #[embassy_executor::task]
@@ -49,5 +52,10 @@ pub async fn transmit(mut line: UartTx<'static, Async>) {
         // The next frame may be chosen now: it waits while this one is on the wire.
         control::ring();
         let _ = line.write(&bytes[..count]).await;
+        if REBOOT.load(Ordering::Relaxed) && TO_SEND.is_empty() {
+            // The last byte is still in the shift register.
+            let _ = line.flush().await;
+            cortex_m::peripheral::SCB::sys_reset();
+        }
     }
 }

@@ -9,17 +9,19 @@ use vergence_image::DeathKind;
 pub fn greet(identity: &NodeIdentity) {
     let [major, minor, patch] = identity.firmware;
     defmt::info!("vergence {=u8}.{=u8}.{=u8}, build {=u64:016x}", major, minor, patch, identity.build);
-    let Some(death) = crate::memory::survivor().death else { return };
+    let Some(death) = vergence_nucleo_common::memory::survivor().death else { return };
     match death.kind {
         DeathKind::Panic => defmt::error!("died of a panic in line {=u32} of {=str}", death.at, death.file()),
         DeathKind::HardFault => defmt::error!("died of a fault at {=u32:#x} from {=u32:#x}", death.at, death.from),
     }
 }
 
-/// Hands the oldest entry to `to`, whole. Returns false where there is none.
-#[cfg(feature = "log-link")]
-pub fn forward(to: impl FnOnce(&[u8])) -> bool {
-    link::forward(to)
+/// Hands the oldest entry to `to`, whole, where there is one.
+pub fn forward(to: impl FnOnce(&[u8])) {
+    #[cfg(feature = "log-link")]
+    link::forward(to);
+    #[cfg(not(feature = "log-link"))]
+    let _ = to;
 }
 
 #[cfg(feature = "log-link")]
@@ -68,7 +70,7 @@ mod link {
         critical_section::with(|cs| work(&mut STATE.borrow_ref_mut(cs)))
     }
 
-    pub fn forward(to: impl FnOnce(&[u8])) -> bool {
+    pub fn forward(to: impl FnOnce(&[u8])) {
         let mut entry = Vec::<u8, ENTRY>::new();
         with(|state| {
             while let Some(byte) = state.queue.pop_front() {
@@ -82,7 +84,6 @@ mod link {
         if !entry.is_empty() {
             to(&entry);
         }
-        !entry.is_empty()
     }
 
     #[defmt::global_logger]
@@ -110,8 +111,10 @@ mod link {
             let outside = with(|state| {
                 state.encode(|encoder, write| encoder.end_frame(write));
                 if !state.too_long && state.entry.len() <= state.queue.capacity() - state.queue.len() {
-                    // There is room.
-                    state.entry.iter().for_each(|&byte| drop(state.queue.push_back(byte)));
+                    for &byte in &state.entry {
+                        // There is room.
+                        let _ = state.queue.push_back(byte);
+                    }
                 }
                 state.outside.take()
             });

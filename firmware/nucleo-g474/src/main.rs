@@ -20,7 +20,12 @@ mod watchdog;
 
 use board::Board;
 use embassy_executor::Spawner;
-use vergence_control::{Controller, Node, NodeIdentity};
+use vergence_control::{BoardSettings, Node, NodeIdentity};
+use vergence_image::layout::HARDWARE;
+use vergence_nucleo_common::Services;
+
+/// The oldest version that this one may be replaced by.
+const OLDEST: [u8; 3] = [0, 1, 0];
 
 #[embassy_executor::main]
 async fn main(spawner: Spawner) {
@@ -29,16 +34,21 @@ async fn main(spawner: Spawner) {
     board.watchdog.unleash();
     let identity = NodeIdentity {
         board: board::NAME.try_into().unwrap_or_default(),
+        hardware: HARDWARE,
         firmware: version(),
+        oldest: OLDEST,
         build: memory::build_id(),
         uid: embassy_stm32::uid::uid(),
         reset,
     };
     log::greet(&identity);
-    let boot = board.random.next_u32();
-    let Ok(controller) = Controller::new(&factory::axes()) else { panic!("factory settings") };
-    control::start(Node::new(controller, identity, boot), board.rig, board.tick);
-    let Some((rx, tx)) = board.line.open(board::BAUD) else { panic!("serial line") };
+    let mut services = Services::of_application(&board.flash);
+    let Ok(defaults) = BoardSettings::new(&factory::axes()) else { panic!("factory settings") };
+    let Ok(node) = Node::new(&defaults, identity, board.random.next_u32(), &mut services) else {
+        panic!("factory settings");
+    };
+    let Some((rx, tx)) = board.line.open(node.settings().baud) else { panic!("serial line") };
+    control::start(node, board.rig, services, board.tick);
     if let (Ok(receive), Ok(transmit), Ok(watch)) =
         (link::receive(rx), link::transmit(tx), watchdog::watch(board.watchdog, board.led))
     {

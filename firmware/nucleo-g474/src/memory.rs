@@ -1,11 +1,13 @@
-//! What survives a reset, what the chip says of itself, and how the application dies.
+//! What is remembered through a reset, what the chip says of itself, and how the application dies.
 
 use core::panic::PanicInfo;
 
 use cortex_m_rt::{ExceptionFrame, exception};
 use embassy_stm32::pac;
-use vergence_image::{Death, SURVIVOR_WORDS, Survivor, layout};
+use vergence_image::{Death, Survivor};
+use vergence_nucleo_common::memory::{remember, survivor};
 use vergence_protocol::ResetCause;
+use vergence_protocol::management::RebootTo;
 
 #[allow(unsafe_code, reason = "a note that only the linker knows")]
 unsafe extern "C" {
@@ -13,26 +15,14 @@ unsafe extern "C" {
     static __build_id: [u32; 6];
 }
 
-/// What the board remembers.
-#[allow(unsafe_code, reason = "RAM outside the program's own")]
-pub fn survivor() -> Survivor {
-    let memory = layout::SURVIVOR.start as *const [u32; SURVIVOR_WORDS];
-    // SAFETY: memory.x keeps this RAM free of variables and stack, any bits are valid words, and writers do not overlap
-    // with readers: they run in start-up, in a task of the one executor, or never return.
-    Survivor::from_words(&unsafe { memory.read_volatile() })
-}
-
-/// Makes the board remember.
-#[allow(unsafe_code, reason = "RAM outside the program's own")]
-pub fn remember(survivor: &Survivor) {
-    let memory = layout::SURVIVOR.start as *mut [u32; SURVIVOR_WORDS];
-    // SAFETY: as in `survivor`.
-    unsafe { memory.write_volatile(survivor.to_words()) };
-}
-
 /// This start was good: earlier failures no longer count.
 pub fn declare_healthy() {
     remember(&Survivor { failed_starts: 0, ..survivor() });
+}
+
+/// The host wants another start: earlier failures no longer count.
+pub fn prepare_reboot(to: RebootTo) {
+    remember(&Survivor { failed_starts: 0, recovery_wanted: to == RebootTo::Recovery, ..survivor() });
 }
 
 /// Why the chip started, from the flags of its reset controller, which it clears for the next time.
