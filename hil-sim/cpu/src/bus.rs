@@ -24,8 +24,9 @@ pub struct BusFault;
 /// Interrupt lines of the NVIC, line 0 in bit 0.
 pub type Lines = u128;
 
-/// What the core needs of a chip: its memories and peripherals, everything outside the private peripheral bus
-/// (`0xE000_0000..=0xE00F_FFFF`).
+/// What the core needs of a chip: its memories and peripherals, everything outside the internal part of the private
+/// peripheral bus (`0xE000_0000..=0xE003_FFFF`, which is the core's own). The external part with the chip's debug
+/// registers, DBGMCU among them, is the chip's.
 ///
 /// The chip is event driven: [`next_event`](Self::next_event) says when something will happen by itself, and the core
 /// calls [`advance`](Self::advance) no later than that.
@@ -66,4 +67,10 @@ pub trait Bus {
 
     /// Whether the non-maskable interrupt is asserted now (level).
     fn nmi(&self) -> bool;
+
+    /// Whether the chip wants [`Cpu::run`](crate::Cpu::run) to stop at the next instruction boundary, with
+    /// [`Stop::Requested`](crate::Stop::Requested). Asked after every access to a peripheral and every event.
+    fn stop_requested(&self) -> bool {
+        false
+    }
 }

@@ -1,0 +1,347 @@
+//! The core as its user sees it: reset, run, registers, reasons to stop.
+
+use crate::bus::{Bus, Cycle, NEVER};
+use crate::cache::Cache;
+use crate::decode;
+use crate::execute::Trap;
+use crate::instruction::{Instruction, Op};
+use crate::nvic::{Nvic, exception};
+use crate::system::{System, sleep};
+use crate::systick::SysTick;
+
+/// Why [`Cpu::run`] came back.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[non_exhaustive]
+pub enum Stop {
+    /// The clock reached the cycle asked for.
+    Reached,
+    /// A BKPT instruction with this number; the PC still points to it. [`Cpu::escalate_breakpoint`] goes on as a chip
+    /// without a debugger does.
+    Breakpoint(u8),
+    /// A semihosting call (BKPT 0xAB): operation in R0, argument in R1, result expected in R0. The PC is past it.
+    Semihosting,
+    /// A fault in a handler that nothing can preempt. From here [`Cpu::run`] only lets time pass, until
+    /// [`Cpu::reset`].
+    Lockup,
+    /// The program asked for a reset (AIRCR.SYSRESETREQ). From here [`Cpu::run`] only lets time pass, until
+    /// [`Cpu::reset`].
+    ResetRequested,
+    /// The core sleeps and neither it nor the chip has anything that could ever wake it.
+    Asleep,
+    /// The chip asked to stop, see [`Bus::stop_requested`].
+    Requested,
+}
+
+/// What the core waits for.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Activity {
+    Running,
+    /// WFI, or sleep on exit.
+    AwaitingInterrupt,
+    /// WFE.
+    AwaitingEvent,
+    /// Locked up, or waiting for the reset it asked for.
+    Halted,
+}
+
+/// A Cortex-M4F. Clone it for a snapshot; the chip must be cloned at the same moment.
+#[derive(Clone)]
+pub struct Cpu {
+    /// R0 to R14; R15 holds the PC as the running instruction reads it, its address plus four.
+    pub(crate) r: [u32; 16],
+    /// Address of the next instruction.
+    pub(crate) pc: u32,
+    /// The stack pointer that is not selected.
+    pub(crate) other_stack: u32,
+    pub(crate) n: bool,
+    pub(crate) z: bool,
+    pub(crate) c: bool,
+    pub(crate) v: bool,
+    pub(crate) q: bool,
+    /// GE flags, one per byte lane.
+    pub(crate) ge: u8,
+    /// ITSTATE.
+    pub(crate) it: u8,
+    pub(crate) thumb: bool,
+    /// IPSR: the exception that runs, 0 in thread mode.
+    pub(crate) exception: u16,
+    pub(crate) primask: bool,
+    pub(crate) faultmask: bool,
+    pub(crate) basepri: u8,
+    pub(crate) unprivileged: bool,
+    /// CONTROL.SPSEL: thread mode uses the process stack.
+    pub(crate) process_stack: bool,
+    /// CONTROL.FPCA: the context has floating-point state.
+    pub(crate) float_active: bool,
+    /// Floating-point instructions may run without a further look.
+    pub(crate) float_ready: bool,
+    pub(crate) s: [u32; 32],
+    pub(crate) fpscr: u32,
+    pub(crate) exclusive: bool,
+    pub(crate) event: bool,
+    pub(crate) activity: Activity,
+    pub(crate) stop: Option<Stop>,
+    pub(crate) nvic: Nvic,
+    pub(crate) system: System,
+    pub(crate) systick: SysTick,
+    pub(crate) now: Cycle,
+    /// Instructions run freely up to here; whatever may change what comes next sets it to zero.
+    pub(crate) horizon: Cycle,
+    /// The instruction before was a load, so that the next one is pipelined with it.
+    pub(crate) loaded: bool,
+    instructions: u64,
+    cache: Cache,
+    code_version: u64,
+}
+
+impl Default for Cpu {
+    fn default() -> Self {
+        Self::new()
+    }
+}
+
+impl Cpu {
+    /// A core at power-on, cycle 0; it needs a [`reset`](Self::reset) to find its program.
+    #[must_use]
+    pub fn new() -> Self {
+        Self {
+            r: [0; 16],
+            pc: 0,
+            other_stack: 0,
+            n: false,
+            z: false,
+            c: false,
+            v: false,
+            q: false,
+            ge: 0,
+            it: 0,
+            thumb: true,
+            exception: 0,
+            primask: false,
+            faultmask: false,
+            basepri: 0,
+            unprivileged: false,
+            process_stack: false,
+            float_active: false,
+            float_ready: false,
+            s: [0; 32],
+            fpscr: 0,
+            exclusive: false,
+            event: false,
+            activity: Activity::Running,
+            stop: None,
+            nvic: Nvic::new(),
+            system: System::new(),
+            systick: SysTick::new(),
+            now: 0,
+            horizon: 0,
+            loaded: false,
+            instructions: 0,
+            cache: Cache::new(),
+            code_version: 0,
+        }
+    }
+
+    /// Resets the core: stack pointer and PC from the vector table at address 0. The clock goes on; core registers
+    /// other than SP, LR and PC, unknown after a real reset, are zero.
+    pub fn reset<B: Bus>(&mut self, bus: &mut B) {
+        let mut fresh = Self { now: self.now, instructions: self.instructions, ..Self::new() };
+        fresh.system.set_cycle_counter(fresh.now, 0);
+        fresh.systick.advance(fresh.now);
+        fresh.code_version = bus.code_version();
+        *self = fresh;
+        self.r[14] = u32::MAX;
+        let vectors = (self.load_vector(bus, 0), self.load_vector(bus, 4));
+        if let (Ok(stack), Ok(entry)) = vectors {
+            self.r[13] = stack & !3;
+            self.pc = entry & !1;
+            self.thumb = entry & 1 != 0;
+        } else {
+            self.halt(Stop::Lockup);
+        }
+    }
+
+    /// Runs to the first instruction boundary at or after `until`, or to a reason to stop before. The time of one
+    /// instruction or exception entry may go past `until`.
+    pub fn run<B: Bus>(&mut self, bus: &mut B, until: Cycle) -> Stop {
+        loop {
+            if let Some(stop) = self.settle(bus) {
+                return stop;
+            }
+            if self.now >= until {
+                return Stop::Reached;
+            }
+            if self.activity != Activity::Running {
+                if let Some(stop) = self.pass_time(bus, until) {
+                    return stop;
+                }
+                continue;
+            }
+            self.horizon = until.min(bus.next_event()).min(self.systick.next_event());
+            if self.horizon <= self.now {
+                // Something stays due: still one instruction at a time.
+                self.horizon = self.now + 1;
+            }
+            self.run_to_horizon(bus);
+        }
+    }
+
+    fn run_to_horizon<B: Bus>(&mut self, bus: &mut B) {
+        while self.now < self.horizon {
+            if let Err(trap) = self.step(bus) {
+                self.trapped(bus, trap);
+                return;
+            }
+        }
+    }
+
+    /// Brings chip and core to the same moment and takes the exception that is due.
+    fn settle<B: Bus>(&mut self, bus: &mut B) -> Option<Stop> {
+        self.synchronize(bus);
+        if bus.stop_requested() {
+            return Some(Stop::Requested);
+        }
+        if self.stop.is_some() {
+            return self.stop.take();
+        }
+        if self.activity == Activity::Halted {
+            return None;
+        }
+        self.wake();
+        self.take_pending(bus);
+        if !self.thumb && self.activity == Activity::Running {
+            self.r[15] = self.pc.wrapping_add(4);
+            self.trapped(bus, Trap::InvalidState);
+            self.take_pending(bus);
+        }
+        self.stop.take()
+    }
+
+    /// Advances the chip and SysTick to now, notes what they pend, and forgets decoded code that has changed. Events
+    /// that came due meanwhile happen one by one, so that a pulse shorter than an instruction is seen.
+    pub(crate) fn synchronize<B: Bus>(&mut self, bus: &mut B) {
+        let mut due = bus.next_event();
+        while due < self.now {
+            bus.advance(due);
+            self.observe(bus);
+            let next = bus.next_event();
+            if next <= due {
+                break;
+            }
+            due = next;
+        }
+        bus.advance(self.now);
+        self.observe(bus);
+        if self.systick.next_event() <= self.now && self.systick.advance(self.now) {
+            self.nvic.raise(exception::SYSTEM_TICK);
+            self.pended();
+        }
+        let version = bus.code_version();
+        if version != self.code_version {
+            self.code_version = version;
+            self.cache.clear();
+        }
+    }
+
+    fn observe<B: Bus>(&mut self, bus: &B) {
+        if self.nvic.observe(bus.lines(), bus.nmi()) {
+            self.pended();
+        }
+    }
+
+    /// A new pending exception is an event where SCR.SEVONPEND says so.
+    pub(crate) fn pended(&mut self) {
+        if self.system.sleep & sleep::EVENT_ON_PENDING != 0 {
+            self.event = true;
+        }
+    }
+
+    /// Sleeps to the next thing that can happen.
+    fn pass_time<B: Bus>(&mut self, bus: &mut B, until: Cycle) -> Option<Stop> {
+        let next = until.min(bus.next_event()).min(self.systick.next_event());
+        if next == NEVER {
+            return Some(Stop::Asleep);
+        }
+        self.now = next.max(self.now + 1);
+        None
+    }
+
+    pub(crate) fn halt(&mut self, stop: Stop) {
+        self.activity = Activity::Halted;
+        self.stop = Some(stop);
+        self.horizon = 0;
+    }
+
+    #[inline(always)]
+    fn step<B: Bus>(&mut self, bus: &mut B) -> Result<(), Trap> {
+        let pc = self.pc;
+        self.r[15] = pc.wrapping_add(4);
+        let instruction = match self.cache.get(pc) {
+            Some(instruction) => instruction,
+            None => self.decode(bus, pc)?,
+        };
+        self.pc = pc.wrapping_add(instruction.length());
+        self.now += 1;
+        self.instructions += 1;
+        if self.it == 0 { self.execute(bus, &instruction) } else { self.step_in_it_block(bus, instruction) }
+    }
+
+    /// An instruction whose condition fails takes its cycle and does nothing (A7.3).
+    #[inline(never)]
+    fn step_in_it_block<B: Bus>(&mut self, bus: &mut B, mut instruction: Instruction) -> Result<(), Trap> {
+        let state = self.it;
+        self.it = if state & 7 == 0 { 0 } else { state & 0xe0 | state << 1 & 0x1f };
+        // A breakpoint ignores the condition.
+        if !self.condition(state >> 4) && instruction.op != Op::Breakpoint {
+            return Ok(());
+        }
+        instruction.flags = instruction.flags.inside_it();
+        self.execute(bus, &instruction).inspect_err(|trap| {
+            if trap.repeats() {
+                self.it = state;
+            }
+        })
+    }
+
+    #[cold]
+    fn decode<B: Bus>(&mut self, bus: &B, pc: u32) -> Result<Instruction, Trap> {
+        const DEVICES: std::ops::Range<u32> = 0x4000_0000..0x6000_0000;
+        const EXTERNAL_DEVICES: u32 = 0xa000_0000;
+        if DEVICES.contains(&pc) || pc >= EXTERNAL_DEVICES {
+            return Err(Trap::ExecuteNever);
+        }
+        let first = bus.fetch(pc).map_err(|_| Trap::InstructionBus)?;
+        let instruction = if decode::is_wide(first) {
+            let second = bus.fetch(pc.wrapping_add(2)).map_err(|_| Trap::InstructionBus)?;
+            decode::wide(first, second)
+        } else {
+            decode::narrow(first)
+        };
+        self.cache.insert(pc, instruction);
+        Ok(instruction)
+    }
+
+    /// Tells the table of decoded instructions of a store.
+    #[inline(always)]
+    pub(crate) fn code_written(&mut self, address: u32) {
+        self.cache.written(address);
+    }
+
+    /// Cycles since power-on.
+    #[must_use]
+    pub fn now(&self) -> Cycle {
+        self.now
+    }
+
+    /// Instructions executed since power-on.
+    #[must_use]
+    pub fn instructions(&self) -> u64 {
+        self.instructions
+    }
+
+    /// Whether the core sleeps (WFI, WFE or sleep on exit).
+    #[must_use]
+    pub fn is_asleep(&self) -> bool {
+        matches!(self.activity, Activity::AwaitingInterrupt | Activity::AwaitingEvent)
+    }
+}
