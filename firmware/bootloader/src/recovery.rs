@@ -46,7 +46,7 @@ pub fn serve(line: Line, services: Services) -> ! {
     loop {
         feed_watchdog();
         // A line error loses bytes; the frame's zeros and checksum say where it goes on.
-        if let Ok(byte) = rx.read()
+        if let Ok(byte) = Read::<u8>::read(&mut rx)
             && let Some(frame) = receiver.push(byte)
         {
             recovery.hear(&frame);

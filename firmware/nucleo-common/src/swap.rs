@@ -35,7 +35,8 @@ impl SwapState {
     /// Begins, goes on with or undoes a swap, if one is due. Returns how the state was found.
     pub fn carry_out(&mut self) -> State {
         let flash = Shared::new(RefCell::new(&mut self.0));
-        let config = BootLoaderConfig { active: part(&flash, ACTIVE), dfu: part(&flash, DFU), state: part(&flash, STATE) };
+        let config =
+            BootLoaderConfig { active: part(&flash, ACTIVE), dfu: part(&flash, DFU), state: part(&flash, STATE) };
         // It fails only where flash does; what is there may still be sound.
         BootLoader::try_prepare::<_, _, _, { PAGE as usize }>(config).map_or(State::Boot, |loader| loader.state)
     }
