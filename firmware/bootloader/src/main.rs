@@ -18,9 +18,9 @@ mod start;
 use cortex_m_rt::entry;
 use embassy_boot_stm32::State;
 use embassy_stm32::wdg::IndependentWatchdog;
-use embassy_stm32::{Config, rcc};
 use vergence_image::layout::ACTIVE;
 use vergence_image::{DEVELOPMENT_KEY, Seal, Survivor};
+use vergence_nucleo_common::clocks::{self, Source};
 use vergence_nucleo_common::{FedFlash, Services, SwapState, feed_watchdog, memory};
 
 use crate::recovery::Line;
@@ -32,7 +32,8 @@ const ATTEMPTS: u32 = 3;
 
 #[entry]
 fn main() -> ! {
-    let p = embassy_stm32::init(clocks());
+    // So that a board with a dead crystal can still be reached.
+    let p = clocks::start(Source::Inside);
     IndependentWatchdog::new(p.IWDG, PATIENCE_US).unleash();
 
     let before = memory::survivor();
@@ -58,21 +59,4 @@ fn main() -> ! {
     memory::remember(&Survivor { failed_starts: 0, recovery_wanted: false, ..survivor });
     let line = Line { port: p.LPUART1, tx: p.PA2, rx: p.PA3, tx_dma: p.DMA1_CH2, rx_dma: p.DMA1_CH1 };
     recovery::serve(line, services)
-}
-
-/// 170 MHz from the oscillator inside the chip, so that a board with a dead crystal can still be reached.
-fn clocks() -> Config {
-    let mut config = Config::default();
-    config.rcc.hsi = true;
-    config.rcc.pll = Some(rcc::Pll {
-        source: rcc::PllSource::HSI,
-        prediv: rcc::PllPreDiv::DIV4,
-        mul: rcc::PllMul::MUL85,
-        divp: None,
-        divq: None,
-        divr: Some(rcc::PllRDiv::DIV2),
-    });
-    config.rcc.sys = rcc::Sysclk::PLL1_R;
-    config.rcc.boost = true;
-    config
 }

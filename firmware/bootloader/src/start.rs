@@ -2,11 +2,13 @@
 
 use cortex_m::Peripherals;
 use vergence_image::layout;
+use vergence_nucleo_common::clocks;
 
 /// Starts the application, as a reset would: its vector table says where.
 #[allow(unsafe_code, reason = "the jump into another program")]
 pub fn application() -> ! {
     cortex_m::interrupt::disable();
+    clocks::slow_down();
     let table = layout::FLASH_BASE + layout::ACTIVE.start;
     // SAFETY: this program ends here, and the image was judged: its first words are a stack pointer and an entry.
     unsafe {

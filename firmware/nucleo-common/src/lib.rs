@@ -1,8 +1,9 @@
-//! What boot loader and application of the NUCLEO-G474RE share: flash and what becomes of words that power-off tore,
+//! What boot loader and application of the NUCLEO-G474RE share: clocks, flash and what becomes of words that power-off tore,
 //! the swap's state, and the memory kept through resets.
 
 #![no_std]
 
+pub mod clocks;
 mod ecc;
 mod flash;
 pub mod memory;

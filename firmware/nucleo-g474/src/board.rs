@@ -4,11 +4,9 @@
 
 use embassy_stm32::gpio::{Input, Level, Output, Pull, Speed};
 use embassy_stm32::mode::Async;
-use embassy_stm32::rcc;
-use embassy_stm32::time::Hertz;
 use embassy_stm32::usart::{self, RingBufferedUartRx, Uart, UartTx};
 use embassy_stm32::wdg::IndependentWatchdog;
-use embassy_stm32::{Config, Peri, Peripherals, bind_interrupts, dma, pac, peripherals, rng};
+use embassy_stm32::{Peri, Peripherals, bind_interrupts, dma, pac, peripherals, rng};
 use static_cell::StaticCell;
 
 use crate::encoder::Encoder;
@@ -61,25 +59,6 @@ pub struct SerialLine {
     rx: Peri<'static, peripherals::PA3>,
     tx_dma: Peri<'static, peripherals::DMA1_CH2>,
     rx_dma: Peri<'static, peripherals::DMA1_CH1>,
-}
-
-/// 170 MHz from the board's 24 MHz crystal, 48 MHz for random numbers.
-pub fn clocks() -> Config {
-    let mut config = Config::default();
-    config.rcc.hse = Some(rcc::Hse { freq: Hertz(24_000_000), mode: rcc::HseMode::Oscillator });
-    config.rcc.pll = Some(rcc::Pll {
-        source: rcc::PllSource::HSE,
-        prediv: rcc::PllPreDiv::DIV6,
-        mul: rcc::PllMul::MUL85,
-        divp: None,
-        divq: None,
-        divr: Some(rcc::PllRDiv::DIV2),
-    });
-    config.rcc.sys = rcc::Sysclk::PLL1_R;
-    config.rcc.boost = true;
-    config.rcc.hsi48 = Some(rcc::Hsi48Config::new());
-    config.rcc.mux.clk48sel = rcc::mux::Clk48sel::HSI48;
-    config
 }
 
 impl Board {

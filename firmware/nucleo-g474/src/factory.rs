@@ -10,7 +10,7 @@ const fn millidegrees(angle: i32) -> i32 {
     ((angle as i64 * 174_532_925 + 5_000_000) / 10_000_000) as i32
 }
 
-/// A 2 mm screw driven by a 200-step motor in 1/16 steps, from 60 mm to 220 mm, and a separation of 0 to 130 degrees of
+/// A 2 mm screw driven by a 200-step motor in 1/8 steps, from 60 mm to 220 mm, and a separation of 0 to 130 degrees of
 /// 64 000 steps for each revolution.
 pub fn axes() -> [AxisSettings; AXES] {
     let baseline = AxisSettings {
@@ -20,7 +20,7 @@ pub fn axes() -> [AxisSettings; AXES] {
         speed: 80_000,
         acceleration: 400_000,
         jerk: 8_000_000,
-        steps_per_unit: 1_600_000,
+        steps_per_unit: 800_000,
         counts_per_unit: 2_000_000,
         steps_reversed: false,
         counts_reversed: false,

@@ -23,6 +23,7 @@ use embassy_executor::Spawner;
 use vergence_control::{BoardSettings, Node, NodeIdentity};
 use vergence_image::layout::HARDWARE;
 use vergence_nucleo_common::Services;
+use vergence_nucleo_common::clocks::{self, Source};
 
 /// The oldest version that this one may be replaced by.
 const OLDEST: [u8; 3] = [0, 1, 0];
@@ -30,7 +31,7 @@ const OLDEST: [u8; 3] = [0, 1, 0];
 #[embassy_executor::main]
 async fn main(spawner: Spawner) {
     let reset = memory::reset_cause();
-    let mut board = Board::new(embassy_stm32::init(board::clocks()));
+    let mut board = Board::new(clocks::start(Source::Crystal));
     board.watchdog.unleash();
     let identity = NodeIdentity {
         board: board::NAME.try_into().unwrap_or_default(),
