@@ -119,8 +119,7 @@ impl Control {
                 self.reboot();
                 return;
             };
-            // It fits: the pipe is empty and holds a frame.
-            let _ = link::TO_SEND.try_write(&frame[..length]);
+            link::queue(&frame[..length]);
         }
     }
 

@@ -26,6 +26,17 @@ pub static ROUNDS: AtomicU32 = AtomicU32::new(0);
 /// Whether the chip is to start again once all is sent.
 pub static REBOOT: AtomicBool = AtomicBool::new(false);
 
+/// Hands a frame to [`transmit`]. The pipe must be empty, so that it fits.
+pub fn queue(frame: &[u8]) {
+    let mut rest = frame;
+    // The pipe takes no more at once than up to its end.
+    while let Ok(taken) = TO_SEND.try_write(rest)
+        && taken > 0
+    {
+        rest = &rest[taken..];
+    }
+}
+
 /// Brings bytes in. A line error loses bytes; the frame's zeros and checksum say where it goes on.
 #[embassy_executor::task]
 pub async fn receive(mut line: RingBufferedUartRx<'static>) {
