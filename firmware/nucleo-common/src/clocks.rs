@@ -33,8 +33,7 @@ fn speed_up(clocks: &mut Peri<'static, peripherals::RCC>, source: Source) {
         }
         Source::Inside => (PllSource::HSI, PllPreDiv::DIV4),
     };
-    config.pll =
-        Some(Pll { source, prediv, mul: PllMul::MUL85, divp: None, divq: None, divr: Some(PllRDiv::DIV2) });
+    config.pll = Some(Pll { source, prediv, mul: PllMul::MUL85, divp: None, divq: None, divr: Some(PllRDiv::DIV2) });
     config.sys = Sysclk::PLL1_R;
     config.boost = true;
     // For random numbers.

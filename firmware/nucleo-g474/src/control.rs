@@ -90,13 +90,13 @@ impl Control {
 
     /// Ticks are a whole number of periods apart, whatever the interrupt's latency: both timers run on one clock.
     fn begin_tick(&mut self) {
-        let late = u32::from(TIM7.cnt().read().cnt());
-        let now = Instant::now().as_micros();
-        let since = now.saturating_sub(self.tick.0);
-        // Ticks missed while the flash was busy are gone; the controller sees the gap.
-        let ticks = ((since + TICK_US / 2) / TICK_US).max(1);
+        let since = Instant::now().as_micros().saturating_sub(self.tick.0);
+        // Ticks missed while the flash was busy are gone, and the controller sees the gap; one that is late is not.
+        let ticks = (since / TICK_US).max(1);
         self.tick = Microseconds(self.tick.0 + ticks * TICK_US);
-        self.rig.begin_tick(late);
+        if !self.rig.begin_tick() {
+            defmt::warn!("steps cut short at {=u64}", self.tick.0);
+        }
         self.node.poll(self.tick, &mut self.rig);
         TICKS.fetch_add(1, Ordering::Relaxed);
     }

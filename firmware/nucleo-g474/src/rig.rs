@@ -30,11 +30,11 @@ pub struct Rig {
 }
 
 impl Rig {
-    /// Begins what was ordered for the tick that began `late_us` ago. Returns whether the tick before was kept.
-    pub fn begin_tick(&mut self, late_us: u32) -> bool {
+    /// Begins what was ordered for the tick that has begun. Returns whether the tick before was kept.
+    pub fn begin_tick(&mut self) -> bool {
         let mut in_time = true;
         for axis in &mut self.steps {
-            in_time &= axis.begin_tick(late_us);
+            in_time &= axis.begin_tick();
         }
         self.trigger.poll();
         in_time

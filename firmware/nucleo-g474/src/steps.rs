@@ -12,7 +12,7 @@ use embassy_stm32::gpio::{AfType, Flex, Level, Output, OutputType, Pin, Speed};
 use embassy_stm32::pac::bdma::vals::{Dir, Pl, Size};
 use embassy_stm32::pac::timer::TimAdv;
 use embassy_stm32::pac::timer::vals::{self, Ocm};
-use embassy_stm32::pac::{DMA1, DMAMUX1, bdma, dmamux};
+use embassy_stm32::pac::{DMA1, DMAMUX1, TIM7, bdma, dmamux};
 use embassy_stm32::timer::low_level::Timer;
 use embassy_stm32::timer::{AdvancedInstance4Channel, Ch1, Dma, TimerPin};
 use vergence_control::{MAX_STEPS_PER_TICK, StepSchedule};
@@ -25,13 +25,25 @@ const PRESCALER: u16 = 16;
 const PULSE: u32 = 25;
 /// Counts between a change of direction and the rising edge of the first step.
 const DIRECTION_SETUP: u32 = 50;
-/// The last step rises before this count of its tick, so that its pulse is over before the next tick.
-const LAST_RISE: u32 = 9_950;
+/// Everything happens so many counts late, so that there is time to load a list after the tick has begun and the last
+/// pulse of the list before is over.
+const DELAY: u32 = 200;
+/// In a tick later than this the list before has no more time to end: microseconds.
+const PATIENCE_US: u16 = 200;
 
 /// A channel of DMA1 by its number, from 0.
 pub trait StepDma {
     /// The number.
     const CHANNEL: usize;
+}
+
+/// A list for the coming tick; its periods are in the back of the two.
+#[derive(Clone, Copy, Default)]
+struct Ordered {
+    count: usize,
+    forward: bool,
+    /// When the first step rises, in counts after the beginning of the tick.
+    first: u32,
 }
 
 /// The step output of one axis.
@@ -41,9 +53,11 @@ pub struct StepPulses {
     _step: Flex<'static>,
     direction: Output<'static>,
     forward: bool,
-    ordered: StepSchedule,
-    /// What DMA feeds to the timer: the length of each period but the first, less one.
-    periods: [u16; MAX_STEPS_PER_TICK],
+    ordered: Ordered,
+    /// What DMA feeds to the timer, length of a period less one: of the running list, and of the ordered one.
+    periods: [[u16; MAX_STEPS_PER_TICK]; 2],
+    /// Which of the two runs.
+    front: usize,
     running: usize,
     /// The raw step count before the running list.
     base: i32,
@@ -72,8 +86,9 @@ impl StepPulses {
             _step: step,
             direction: Output::new(direction, Level::Low, Speed::Medium),
             forward: false,
-            ordered: StepSchedule::default(),
-            periods: [0; MAX_STEPS_PER_TICK],
+            ordered: Ordered::default(),
+            periods: [[0; MAX_STEPS_PER_TICK]; 2],
+            front: 0,
             running: 0,
             base: 0,
         }
@@ -81,23 +96,34 @@ impl StepPulses {
 
     /// Takes the list for the coming tick.
     pub fn order(&mut self, steps: &StepSchedule) {
-        self.ordered.clone_from(steps);
+        let counts = |at_ns: &u32| at_ns * COUNTS_PER_US / 1_000;
+        let back = &mut self.periods[1 - self.front];
+        // The last step moves a word as well, for the count; nothing follows it.
+        back.fill(u16::MAX);
+        for (period, pair) in back.iter_mut().zip(steps.at_ns.windows(2)) {
+            let length = counts(&pair[1]).saturating_sub(counts(&pair[0])).max(2 * PULSE);
+            *period = u16::try_from(length - 1).unwrap_or(u16::MAX);
+        }
+        let first = steps.at_ns.first().map_or(0, counts);
+        self.ordered = Ordered { count: steps.at_ns.len(), forward: steps.forward, first };
     }
 
-    /// Begins the ordered list in a tick that began `late_us` ago. Returns whether the list before was over in time.
-    pub fn begin_tick(&mut self, late_us: u32) -> bool {
+    /// Begins the ordered list in a tick that has begun. Returns whether the list before was over in time.
+    pub fn begin_tick(&mut self) -> bool {
         let in_time = self.wait_for_the_last();
         self.settle();
-        if !self.ordered.at_ns.is_empty() {
-            let turned = self.ordered.forward != self.forward;
+        let ordered = core::mem::take(&mut self.ordered);
+        if ordered.count > 0 {
+            let turned = ordered.forward != self.forward;
             if turned {
-                self.forward = self.ordered.forward;
+                self.forward = ordered.forward;
                 self.direction.set_level(if self.forward { Level::High } else { Level::Low });
             }
-            let ready_at = late_us * COUNTS_PER_US + if turned { DIRECTION_SETUP } else { 0 };
-            let first = self.fill_periods(late_us * COUNTS_PER_US, ready_at);
-            self.start(first);
-            self.ordered.at_ns.clear();
+            self.front = 1 - self.front;
+            let now = u32::from(TIM7.cnt().read().cnt()) * COUNTS_PER_US;
+            let least = if turned { DIRECTION_SETUP } else { COUNTS_PER_US };
+            let rise = (DELAY + ordered.first).saturating_sub(now).max(least);
+            self.start(rise + PULSE, ordered.count);
         }
         in_time
     }
@@ -106,7 +132,7 @@ impl StepPulses {
     pub fn abort(&mut self) {
         self.timer.cr1().modify(|w| w.set_cen(false));
         self.settle();
-        self.ordered.at_ns.clear();
+        self.ordered = Ordered::default();
         // Down-counting, an update event puts the counter at the auto-reload value: the output falls.
         self.timer.arr().write(|w| w.set_arr(u16::MAX));
         self.timer.egr().write(|w| w.set_ug(true));
@@ -123,10 +149,14 @@ impl StepPulses {
         self.running.saturating_sub(usize::from(self.dma.ndtr().read().ndt()))
     }
 
-    /// Lists end before their tick does, unless the tick came early against its clock.
+    /// A list ends at most [`DELAY`] into the next tick.
     fn wait_for_the_last(&self) -> bool {
-        // A pulse is at most 425 cycles long.
-        (0..100).any(|_| !self.timer.cr1().read().cen())
+        while self.timer.cr1().read().cen() {
+            if TIM7.cnt().read().cnt() > PATIENCE_US {
+                return false;
+            }
+        }
+        true
     }
 
     /// Adds what the running list has made to the count, and stops it.
@@ -136,39 +166,17 @@ impl StepPulses {
         self.running = 0;
     }
 
-    /// Turns instants into periods; returns the first, in counts from now, `now` counts into the tick.
-    fn fill_periods(&mut self, now: u32, ready_at: u32) -> u32 {
-        // A period ends PULSE counts after its step has risen, and a step may rise no earlier than one count from now.
-        let mut end = now;
-        let mut earliest_rise = ready_at + COUNTS_PER_US;
-        let mut first = 0;
-        for (index, &at_ns) in self.ordered.at_ns.iter().enumerate() {
-            let rise = (at_ns * COUNTS_PER_US / 1_000).min(LAST_RISE).max(earliest_rise);
-            let length = rise + PULSE - end;
-            match index.checked_sub(1).and_then(|before| self.periods.get_mut(before)) {
-                Some(period) => *period = u16::try_from(length - 1).unwrap_or(u16::MAX),
-                None => first = length,
-            }
-            end = rise + PULSE;
-            earliest_rise = end + PULSE;
-        }
-        first
-    }
-
-    fn start(&mut self, first: u32) {
-        let count = self.ordered.at_ns.len();
-        let Some(last) = count.checked_sub(1) else { return };
-        // The last step moves a word as well, for the count; nothing follows it.
-        self.periods[last] = u16::MAX;
+    /// Runs `count` periods, the first of them of `first` counts, the others as in the front list.
+    fn start(&mut self, first: u32, count: usize) {
         let timer = self.timer;
         timer.arr().write(|w| w.set_arr(u16::try_from(first - 1).unwrap_or(u16::MAX)));
-        timer.rcr().write(|w| w.set_rep(u16::try_from(last).unwrap_or(u16::MAX)));
+        timer.rcr().write(|w| w.set_rep(u16::try_from(count - 1).unwrap_or(u16::MAX)));
         // Loads counter, prescaler and repetition counter.
         timer.egr().write(|w| w.set_ug(true));
         timer.sr().write(|_| {});
         self.dma.ndtr().write(|w| w.set_ndt(u16::try_from(count).unwrap_or(0)));
         self.dma.par().write_value(timer.arr().as_ptr() as u32);
-        self.dma.mar().write_value(self.periods.as_ptr() as u32);
+        self.dma.mar().write_value(self.periods[self.front].as_ptr() as u32);
         compiler_fence(Ordering::SeqCst);
         self.dma.cr().write(|w| {
             w.set_dir(Dir::FROM_MEMORY);
