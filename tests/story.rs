@@ -193,12 +193,15 @@ fn stop_works_while_another_vergence_holds_the_port() {
     let second = simulator.run(&["status"]);
     assert_eq!(second.status.code(), Some(3));
     assert!(text(&second.stderr).contains("in use"));
-    assert!(simulator.run(&["stop"]).status.success());
+    // Not even a rig file that is none keeps it from stopping.
+    assert!(simulator.run(&["--rig", "/nowhere/rig.toml", "stop"]).status.success());
     let moved = mover.wait_with_output().expect("it ends");
     assert_eq!(moved.status.code(), Some(3), "{}", text(&moved.stderr));
     assert!(text(&moved.stderr).contains("stopped by another"), "{}", text(&moved.stderr));
     let status = simulator.json(&["status"]);
     assert_eq!((status["state"].as_str(), status["fault"].is_null()), (Some("idle"), true));
+    // Nobody holds the port now.
+    assert_eq!(simulator.json(&["--rig", "/nowhere/rig.toml", "stop"])["state"], "idle");
 }
 
 #[test]

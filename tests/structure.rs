@@ -16,6 +16,7 @@ use serde_json::Value;
 const ALLOWED: &[(&str, &[&str])] = &[
     ("vergence-protocol", &[]),
     ("vergence-control", &["vergence-protocol"]),
+    ("vergence-image", &["vergence-protocol"]),
     ("vergence-vision", &[]),
     ("vergence-rig", &["vergence-protocol", "vergence-vision"]),
     ("vergence-calibration", &["vergence-vision", "vergence-rig"]),

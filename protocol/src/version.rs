@@ -22,7 +22,11 @@ pub const PROTOCOL: ProtocolVersion = ProtocolVersion { major: 1, minor: 1 };
 /// A hash of the names, order and types of all messages: equal on both sides exactly when both sides mean the same bytes.
 #[must_use]
 pub const fn schema_hash() -> u64 {
-    let requests = u64::from_le_bytes(fnv1a64::hash_ty_path::<Request>("request"));
-    let reports = u64::from_le_bytes(fnv1a64::hash_ty_path::<Report>("report"));
-    requests.rotate_left(1) ^ reports
+    // A constant, or a small board would carry the names of all types to hash them when it runs.
+    const HASH: u64 = {
+        let requests = u64::from_le_bytes(fnv1a64::hash_ty_path::<Request>("request"));
+        let reports = u64::from_le_bytes(fnv1a64::hash_ty_path::<Report>("report"));
+        requests.rotate_left(1) ^ reports
+    };
+    HASH
 }

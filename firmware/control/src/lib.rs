@@ -43,6 +43,7 @@ pub use profile::Limits;
 pub use services::BoardServices;
 pub use settings::{AxisSettings, HomingSettings, LARGEST_STEP_RATE, Scale, SettingsError};
 pub use trajectory::{FINE_BITS, Fine, MotionState, Trajectory};
+pub use updater::Updater;
 
 /// The control tick: how often `poll` wants to run while the drivers are on, in microseconds.
 pub const TICK_US: u64 = 1_000;

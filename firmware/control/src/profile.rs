@@ -5,7 +5,7 @@
 //! has a single-precision FPU; the pieces are then joined in integers, and what single precision got wrong is put into
 //! the cruise.
 
-use libm::{cbrtf, fabsf, sqrtf};
+use libm::{fabsf, sqrtf};
 
 use crate::trajectory::{Fine, MotionState, Segment, Trajectory, fine, micro, ticks};
 
@@ -95,7 +95,7 @@ impl Trajectory {
         }
         let quickest = length / peak + Change::between(0.0, 0.0, peak, limits).duration();
         let slowed = if at_least > quickest { quickest / at_least } else { 1.0 };
-        let slowed = slowed.max(cbrtf(LEAST_JERK / limits.jerk)).min(1.0);
+        let slowed = slowed.max(cube_root(LEAST_JERK / limits.jerk)).min(1.0);
         let cruise = if distance < 0.0 { -peak } else { peak } * slowed * (1.0 - RESERVE);
         Self::cruising(MotionState::at(position), target, cruise, limits.scaled(slowed))
     }
@@ -223,7 +223,8 @@ impl Way {
             return Some(fastest);
         }
         let a = self.acceleration;
-        let flat = (self.velocity + a * fabsf(a) / (2.0 * self.limits.jerk)).clamp(0.0, fastest);
+        // Not clamp: its panic would print floats, which takes 12 KiB of a small board's flash.
+        let flat = (self.velocity + a * fabsf(a) / (2.0 * self.limits.jerk)).max(0.0).min(fastest);
         let [low, high] = if flat > 0.0 && self.is_possible(flat) { [flat, fastest] } else { [0.0, flat] };
         let high = if high > 0.0 { high } else { fastest };
         let speed = halve(low, high, |speed| self.is_possible(speed));
@@ -255,10 +256,25 @@ fn peak_speed(length: f32, limits: Limits) -> f32 {
         return speed;
     }
     // Never at full acceleration: length = 2 v sqrt(v / j).
-    let peak = cbrtf(length * length * j / 4.0);
+    let peak = cube_root(length * length * j / 4.0);
     if peak * j <= a * a {
         return peak;
     }
     // With a stretch of full acceleration: length = v (v / a + a / j). Written without cancellation.
     2.0 * length / (a / j + sqrtf(a * a / (j * j) + 4.0 * length / a))
+}
+
+/// The cube root of a number that is not negative. `libm`'s goes through double precision, which a core without it pays
+/// for with 3 KiB of flash.
+fn cube_root(x: f32) -> f32 {
+    if x < f32::MIN_POSITIVE {
+        return 0.0;
+    }
+    // A third of the exponent is good to 5 %, and each of Halley's steps triples the digits.
+    let mut root = f32::from_bits(x.to_bits() / 3 + 0x2A51_19F2);
+    for _ in 0..3 {
+        let cube = root * root * root;
+        root -= root * (cube - x) / (2.0 * cube + x);
+    }
+    root
 }

@@ -14,11 +14,12 @@ pub trait BoardServices {
     fn boot_state(&self) -> BootState;
     /// Whether `signature` over `signed` is of a key that the board trusts (Ed25519, RFC 8032).
     fn trusts(&self, signed: &[u8; ImageHeader::SIGNED], signature: &Signature) -> bool;
-    /// Tells the boot loader to start the stored image, checked against its header, on trial at the next start.
+    /// Seals the stored image, checked against header and signature, and tells the boot loader to start it on trial at
+    /// the next start.
     ///
     /// # Errors
     /// [`FlashError`]; the old image will start.
-    fn schedule_trial(&mut self, image: &ImageHeader) -> Result<(), FlashError>;
+    fn schedule_trial(&mut self, image: &ImageHeader, signature: &Signature) -> Result<(), FlashError>;
     /// Tells the boot loader to keep the image on trial.
     ///
     /// # Errors

@@ -120,7 +120,7 @@ impl Updater {
         if !services.trusts(&header.signed_bytes(), signature) {
             return Outcome::WrongSignature;
         }
-        if services.schedule_trial(&header).is_err() {
+        if services.schedule_trial(&header, signature).is_err() {
             return Outcome::FlashFailed;
         }
         self.committed = true;

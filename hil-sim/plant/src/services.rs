@@ -90,7 +90,7 @@ impl BoardServices for NativeServices {
         (self.verifier)(signed, signature)
     }
 
-    fn schedule_trial(&mut self, image: &ImageHeader) -> Result<(), FlashError> {
+    fn schedule_trial(&mut self, image: &ImageHeader, _signature: &Signature) -> Result<(), FlashError> {
         self.scheduled = Some(Firmware { version: image.version, build: image.build });
         Ok(())
     }

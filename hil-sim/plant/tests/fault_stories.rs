@@ -7,6 +7,9 @@ use rigged::{BOTH, Rigged};
 use vergence_plant::{AxisPlant, EncoderFault, bench_mechanics, bench_settings};
 use vergence_protocol::{AxisMask, ControllerState, FaultCode, FaultRecord, Micro, MovePhase, Status};
 
+/// Something done to a rig.
+type Harm = fn(&mut Rigged);
+
 const HERBIVORE: [i32; 2] = [145_000, 2_094_395];
 const HUMAN: [i32; 2] = [63_000, 0];
 
@@ -102,7 +105,7 @@ fn an_encoder_that_has_never_counted_is_lost_one_that_stops_is_a_stall() {
 
 #[test]
 fn crossed_stuck_and_dead_home_switches_each_have_their_own_fault() {
-    let cases: [(fn(&mut Rigged), FaultCode); 3] = [
+    let cases: [(Harm, FaultCode); 3] = [
         (|rigged| rigged.board.plant_mut().cross_home_switches(0, 1), FaultCode::HomeSwitchWrong),
         (|rigged| harm(rigged, 0, |axis| axis.fix_home_switch(Some(true))), FaultCode::HomeSwitchStuck),
         // A dead one may be beyond the hard limit, which is another's business: here the search ends before it.

@@ -245,7 +245,9 @@ impl Checker {
             self.accuse(now, Promise::Mode, what);
         }
         if std::mem::take(&mut self.restarted) {
-            let fresh = pose.referenced == AxisMask(0) && pose.phase == MovePhase::None && pose.fault.is_none();
+            // The self-test may have found something since.
+            let new_fault = pose.fault.is_none_or(|fault| fault.seq == 1 && fault.at <= pose.at);
+            let fresh = pose.referenced == AxisMask(0) && pose.phase == MovePhase::None && new_fault;
             if !fresh {
                 self.accuse(now, Promise::State, format!("remembers what was before its start: {pose:?}"));
             }

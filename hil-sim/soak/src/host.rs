@@ -261,7 +261,8 @@ impl Host {
             _ if idle => self.ask(now, Purpose::Arm, Request::Arm { session }),
             Step::Arm => self.next_step(),
             Step::Home if self.homed && seen.referenced => self.next_step(),
-            Step::Jog(_) if self.going.is_some() && seen.settled == self.going => self.next_step(),
+            // Once only: one after the other may end at a hard limit.
+            Step::Jog(_) if self.going.is_some() => self.next_step(),
             Step::Jog(by) => {
                 let id = self.name_move();
                 let jog = Jog { id, by: by.into_iter().collect(), speed: Permille::FULL };

@@ -78,6 +78,14 @@ fn seed_435_spikes_on_the_home_switch() {
     assert_eq!(outcome.ending, Ending::Completed);
 }
 
+/// Regression: an encoder that died at a restart failed the self-test before the first pose; the checker took that for a
+/// memory of what was before.
+#[test]
+fn seed_6601_a_self_test_fails_after_a_restart() {
+    let outcome = play(6601);
+    assert!(outcome.violations.is_empty(), "{}", outcome.journal);
+}
+
 #[test]
 fn a_replay_tells_the_whole_story() {
     let seed = (1..).find(|&seed| Scenario::of(seed).kind == FaultKind::Reset).unwrap();

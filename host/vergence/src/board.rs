@@ -74,7 +74,11 @@ impl Board {
         Ok(board)
     }
 
-    async fn check_axes(&mut self) -> Result<(), Failure> {
+    /// Checks that the rig describes this board.
+    ///
+    /// # Errors
+    /// Another number of axes, or other axes; a link that ended.
+    pub async fn check_axes(&mut self) -> Result<(), Failure> {
         let (ours, theirs) = (self.rig.axes.len(), usize::from(self.info.axes));
         if ours != theirs {
             return Err(Failure::usage(format!(

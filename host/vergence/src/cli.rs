@@ -132,7 +132,8 @@ fn tell(failure: &Failure) {
 
 fn execute(cli: Cli) -> Result<(), Failure> {
     let Cli { mut globals, verb } = cli;
-    if globals.rig.is_none() && !matches!(verb, Verb::Demo(_) | Verb::Soak(_)) {
+    // A stop must not fail, nor the doctor end, because a calibration cannot be read: they look for themselves.
+    if globals.rig.is_none() && !matches!(verb, Verb::Demo(_) | Verb::Soak(_) | Verb::Stop(_) | Verb::Doctor(_)) {
         globals.rig = slots::active_rig()?;
     }
     let console = Console::new(globals.json);

@@ -64,7 +64,9 @@ impl Finding {
 }
 
 pub async fn run(_: &Args, globals: &Globals, console: Console) -> Result<(), Failure> {
-    let mut findings = vec![machine::rig(globals)];
+    let (rig, rig_finding) = machine::rig(globals);
+    let globals = &Globals { rig, ..globals.clone() };
+    let mut findings = vec![rig_finding];
     findings.extend(machine::cameras());
     let port = machine::port(globals);
     let reachable = port.verdict != Verdict::Fail;

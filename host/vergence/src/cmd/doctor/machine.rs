@@ -10,19 +10,29 @@ use super::Finding;
 use crate::cli::Globals;
 use crate::cmd::connect::port as chosen_port;
 use crate::link::Port;
-use crate::rig_file;
+use crate::{rig_file, slots};
 
-/// The rig file, or the built-in bench.
-pub fn rig(globals: &Globals) -> Finding {
-    match (rig_file::load(globals.rig.as_deref()), &globals.rig) {
-        (Err(failure), _) => Finding::fail("rig", failure.to_string(), "mend the file: docs/rig-file.md describes it"),
-        (Ok(rig), Some(path)) => Finding::pass("rig", format!("'{}' from {}", rig.name, path.display())),
+/// The rig that verbs would use: the file named, the active calibration, or the built-in bench.
+pub fn rig(globals: &Globals) -> (Option<PathBuf>, Finding) {
+    const MEND: &str = "mend the file, which docs/rig-file.md describes, or 'vergence calibrate rollback'";
+    let (path, is_active) = match (&globals.rig, slots::active_rig()) {
+        (Some(path), _) => (Some(path.clone()), false),
+        (None, Ok(active)) => (active, true),
+        (None, Err(failure)) => return (None, Finding::fail("rig", failure.to_string(), MEND)),
+    };
+    let finding = match (rig_file::load(path.as_deref()), &path) {
+        (Err(failure), _) => Finding::fail("rig", failure.to_string(), MEND),
+        (Ok(rig), Some(path)) => {
+            let active = if is_active { "the active calibration, " } else { "" };
+            Finding::pass("rig", format!("'{}' from {active}{}", rig.name, path.display()))
+        }
         (Ok(rig), None) => Finding::warn(
             "rig",
-            format!("the built-in '{}', which is nobody's real rig", rig.name),
+            format!("the built-in '{}', which is nobody's real rig; no calibration is active", rig.name),
             "calibrate, or name your rig file with --rig or VERGENCE_RIG",
         ),
-    }
+    };
+    (path, finding)
 }
 
 /// The port and whether this user may use it.

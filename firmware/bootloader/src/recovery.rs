@@ -1,0 +1,135 @@
+//! Serial recovery: waits on the same line, with the same frames, for another image. It knows management messages only,
+//! which are frozen for ever, so that a host of any age can help.
+
+use embassy_stm32::usart::{self, RingBufferedUartRx, Uart, UartTx};
+use embassy_stm32::{Peri, bind_interrupts, dma, mode, peripherals};
+use embedded_hal_nb::serial::Read;
+use static_cell::StaticCell;
+use vergence_control::{BoardServices, Flash, PAGE, Updater};
+use vergence_image::Survivor;
+use vergence_image::layout::HARDWARE;
+use vergence_nucleo_common::{Services, feed_watchdog, memory};
+use vergence_protocol::frame::{self, Frame, Header, Kind};
+use vergence_protocol::management::{Identity, Management, ManagementReport, Outcome, RebootTo};
+use vergence_protocol::{MAX_FRAME, PROTOCOL, Receiver};
+
+/// The usual speed: a setting of another is not looked at here.
+const BAUD: u32 = 921_600;
+/// What the line hears while a page is erased must fit.
+const RING: usize = 4096;
+
+bind_interrupts!(struct Interrupts {
+    LPUART1 => usart::InterruptHandler<peripherals::LPUART1>;
+    DMA1_CHANNEL1 => dma::InterruptHandler<peripherals::DMA1_CH1>;
+    DMA1_CHANNEL2 => dma::InterruptHandler<peripherals::DMA1_CH2>;
+});
+
+/// The virtual COM port.
+pub struct Line {
+    /// The port.
+    pub port: Peri<'static, peripherals::LPUART1>,
+    /// Its output.
+    pub tx: Peri<'static, peripherals::PA2>,
+    /// Its input.
+    pub rx: Peri<'static, peripherals::PA3>,
+    /// For the output.
+    pub tx_dma: Peri<'static, peripherals::DMA1_CH2>,
+    /// For the input.
+    pub rx_dma: Peri<'static, peripherals::DMA1_CH1>,
+}
+
+/// Serves until the host asks for another start.
+pub fn serve(line: Line, services: Services) -> ! {
+    let Some((mut rx, tx)) = open(line) else { panic!("serial line") };
+    let mut recovery = Recovery { tx, services, updater: Updater::default(), seq: 0 };
+    let mut receiver = Receiver::new();
+    loop {
+        feed_watchdog();
+        // A line error loses bytes; the frame's zeros and checksum say where it goes on.
+        if let Ok(byte) = Read::<u8>::read(&mut rx)
+            && let Some(frame) = receiver.push(byte)
+        {
+            recovery.hear(&frame);
+        }
+    }
+}
+
+fn open(line: Line) -> Option<(RingBufferedUartRx<'static>, UartTx<'static, mode::Async>)> {
+    static MEMORY: StaticCell<[u8; RING]> = StaticCell::new();
+    let mut config = usart::Config::default();
+    config.baudrate = BAUD;
+    let uart = Uart::new(line.port, line.rx, line.tx, line.tx_dma, line.rx_dma, Interrupts, config).ok()?;
+    let (tx, rx) = uart.split();
+    let mut rx = rx.into_ring_buffered(MEMORY.init_with(|| [0; RING]));
+    rx.start_uart();
+    Some((rx, tx))
+}
+
+struct Recovery {
+    tx: UartTx<'static, mode::Async>,
+    services: Services,
+    updater: Updater,
+    seq: u8,
+}
+
+impl Recovery {
+    fn hear(&mut self, frame: &Frame<'_>) {
+        if frame.header.kind != Kind::Firmware {
+            return;
+        }
+        let Ok(request) = frame.body::<Management>() else { return };
+        let seq = frame.header.seq;
+        let report = self.carry_out(seq, &request);
+        self.answer(seq, &report);
+        if let Management::Reboot(to) = request {
+            reboot(to);
+        }
+    }
+
+    fn carry_out(&mut self, seq: u8, request: &Management) -> ManagementReport {
+        let services = &mut self.services;
+        let outcome = match request {
+            Management::Identify => return ManagementReport::Identity(identify(services)),
+            Management::Begin(header) if header.hardware != HARDWARE => Outcome::WrongHardware,
+            Management::Begin(header) => self.updater.begin(header, services),
+            Management::Chunk { offset, data } => self.updater.chunk(*offset, data, services),
+            Management::Commit(signature) => self.updater.commit(signature, services),
+            // What waits for a reboot is confirmed when it runs.
+            Management::Confirm => Outcome::NotBegun,
+            Management::Rollback => match services.roll_back() {
+                Ok(true) => Outcome::Done,
+                Ok(false) => Outcome::NothingToRollBack,
+                Err(_) => Outcome::FlashFailed,
+            },
+            Management::Reboot(_) => Outcome::Done,
+        };
+        ManagementReport::Progress { to: seq, next: self.updater.next(), outcome }
+    }
+
+    fn answer(&mut self, ack: u8, report: &ManagementReport) {
+        let header = Header { major: PROTOCOL.major, kind: Kind::Firmware, seq: self.seq, ack };
+        self.seq = self.seq.wrapping_add(1);
+        let mut buffer = [0; MAX_FRAME];
+        if let Ok(length) = frame::encode(header, report, &mut buffer) {
+            // A zero before the frame ends whatever noise came before it.
+            let _ = self.tx.blocking_write(&[0]).and_then(|()| self.tx.blocking_write(&buffer[..length]));
+            let _ = self.tx.blocking_flush();
+        }
+    }
+}
+
+fn identify(services: &mut Services) -> Identity {
+    Identity {
+        hardware: HARDWARE,
+        version: [0; 3],
+        oldest: [0; 3],
+        build: 0,
+        boot: services.boot_state(),
+        capacity: u32::try_from(services.image_flash().pages() * PAGE).unwrap_or(u32::MAX),
+    }
+}
+
+fn reboot(to: RebootTo) -> ! {
+    memory::remember(&Survivor { failed_starts: 0, recovery_wanted: to == RebootTo::Recovery, ..memory::survivor() });
+    cortex_m::peripheral::SCB::sys_reset()
+}

@@ -1,0 +1,51 @@
+//! 170 MHz, which needs the supply's boost mode.
+
+use embassy_stm32::pac::{PWR, RCC, pwr, rcc::vals::Sw};
+use embassy_stm32::rcc::{self, Pll, PllMul, PllPreDiv, PllRDiv, PllSource, Sysclk};
+use embassy_stm32::{Config, Peri, Peripherals, peripherals, time::Hertz};
+
+/// What the clocks count on.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Source {
+    /// The board's crystal of 24 MHz.
+    Crystal,
+    /// The oscillator inside the chip: a hundredth less exact, and always there.
+    Inside,
+}
+
+/// Starts the chip and brings its core to 170 MHz.
+///
+/// First at 16 MHz: the driver's own start resets the supply to its normal mode, good for 150 MHz, and then looks for
+/// the bit that leaves it at the wrong place (bit 0 of `PWR_CR5` in stm32-metapac 21; it is bit 8, RM0440, 6.4.22).
+pub fn start(source: Source) -> Peripherals {
+    let mut p = embassy_stm32::init(Config::default());
+    PWR.cr5().write_value(pwr::regs::Cr5(0));
+    speed_up(&mut p.RCC, source);
+    p
+}
+
+fn speed_up(clocks: &mut Peri<'static, peripherals::RCC>, source: Source) {
+    let mut config = Config::default().rcc;
+    let (source, prediv) = match source {
+        Source::Crystal => {
+            config.hse = Some(rcc::Hse { freq: Hertz(24_000_000), mode: rcc::HseMode::Oscillator });
+            (PllSource::HSE, PllPreDiv::DIV6)
+        }
+        Source::Inside => (PllSource::HSI, PllPreDiv::DIV4),
+    };
+    config.pll = Some(Pll { source, prediv, mul: PllMul::MUL85, divp: None, divq: None, divr: Some(PllRDiv::DIV2) });
+    config.sys = Sysclk::PLL1_R;
+    config.boost = true;
+    // For random numbers.
+    config.hsi48 = Some(rcc::Hsi48Config::new());
+    config.mux.clk48sel = rcc::mux::Clk48sel::HSI48;
+    rcc::reinit(config, clocks);
+}
+
+/// Back to the 16 MHz that a reset leaves, for a program that starts the chip anew.
+pub fn slow_down() {
+    RCC.cr().modify(|w| w.set_hsion(true));
+    while !RCC.cr().read().hsirdy() {}
+    RCC.cfgr().modify(|w| w.set_sw(Sw::HSI));
+    while RCC.cfgr().read().sws() != Sw::HSI {}
+}

@@ -1,0 +1,100 @@
+//! Flash, boot loader and trusted key as the node sees them.
+
+use embassy_boot_stm32::State;
+use embassy_stm32::{Peri, peripherals};
+use vergence_control::{BoardServices, Flash, FlashError, UNIT};
+use vergence_image::layout::{ACTIVE, CAPACITY, DFU, PAGE, Region, SETTINGS};
+use vergence_image::{DEVELOPMENT_KEY, Seal, is_signed_by};
+use vergence_protocol::management::{BootState, ImageHeader, Signature};
+
+use crate::flash::{Area, FedFlash, feed_watchdog};
+use crate::memory;
+use crate::swap::SwapState;
+
+/// Where an image on its way is stored, and where its seal.
+const IMAGE: Region = Region { start: DFU.start, length: CAPACITY };
+const SEAL: Region = Region { start: IMAGE.end(), length: PAGE };
+/// Where a swap leaves the image before: one page up.
+const EARLIER: Region = Region { start: DFU.start + PAGE, length: ACTIVE.length };
+
+/// What the node needs besides the mechanics.
+pub struct Services {
+    settings: Area,
+    image: Area,
+    seal: Area,
+    swap: SwapState,
+    boot: BootState,
+}
+
+impl Services {
+    /// Of an application: what runs is what the boot loader left in the state page.
+    pub fn of_application(flash: &Peri<'static, peripherals::FLASH>) -> Self {
+        let mut services = Self::new(flash, BootState::Confirmed);
+        services.boot = match services.swap.read() {
+            State::Swap => BootState::Trial,
+            State::Revert => BootState::Reverted,
+            State::Boot | State::DfuDetach => BootState::Confirmed,
+        };
+        services
+    }
+
+    /// Of the boot loader, when nothing starts.
+    pub fn of_recovery(flash: &Peri<'static, peripherals::FLASH>) -> Self {
+        Self::new(flash, BootState::Recovery)
+    }
+
+    #[allow(unsafe_code, reason = "several handles of one flash")]
+    fn new(flash: &Peri<'static, peripherals::FLASH>, boot: BootState) -> Self {
+        // SAFETY: as for areas.
+        let whole = FedFlash::new(unsafe { flash.clone_unchecked() });
+        let [settings, image, seal] = [SETTINGS, IMAGE, SEAL].map(|region| Area::new(flash, region));
+        Self { settings, image, seal, swap: SwapState::new(whole), boot }
+    }
+}
+
+impl BoardServices for Services {
+    fn settings_flash(&mut self) -> &mut impl Flash {
+        &mut self.settings
+    }
+
+    fn image_flash(&mut self) -> &mut impl Flash {
+        &mut self.image
+    }
+
+    fn boot_state(&self) -> BootState {
+        self.boot
+    }
+
+    fn trusts(&self, signed: &[u8; ImageHeader::SIGNED], signature: &Signature) -> bool {
+        feed_watchdog();
+        is_signed_by(&DEVELOPMENT_KEY, signed, signature)
+    }
+
+    fn schedule_trial(&mut self, image: &ImageHeader, signature: &Signature) -> Result<(), FlashError> {
+        let seal = Seal { header: *image, signature: *signature }.to_bytes();
+        self.seal.erase(0)?;
+        for (index, unit) in seal.as_chunks::<UNIT>().0.iter().enumerate() {
+            self.seal.program(index * UNIT, *unit)?;
+        }
+        self.swap.mark_updated()
+    }
+
+    fn confirm(&mut self) -> Result<(), FlashError> {
+        self.swap.mark_booted()?;
+        self.boot = BootState::Confirmed;
+        Ok(())
+    }
+
+    fn roll_back(&mut self) -> Result<bool, FlashError> {
+        if self.boot == BootState::Trial {
+            // Any start that comes before a confirmation goes back.
+            return Ok(true);
+        }
+        feed_watchdog();
+        if Seal::check(memory::region(EARLIER), &DEVELOPMENT_KEY).is_err() {
+            return Ok(false);
+        }
+        self.swap.mark_undone()?;
+        Ok(true)
+    }
+}

@@ -1,0 +1,118 @@
+//! The NUCLEO-G474RE: which pin and which timer does what. The one place to change for another wiring; docs/firmware.md
+//! has the same as a table. That a pin can do its job is checked by the compiler: `TimerPin<TIM8, Ch1>` and its like
+//! are implemented from the chip's alternate-function data, and each pin can be given away only once.
+
+use embassy_stm32::gpio::{Input, Level, Output, Pull, Speed};
+use embassy_stm32::mode::Async;
+use embassy_stm32::usart::{self, RingBufferedUartRx, Uart, UartTx};
+use embassy_stm32::wdg::IndependentWatchdog;
+use embassy_stm32::{Peri, Peripherals, bind_interrupts, dma, pac, peripherals, rng};
+use static_cell::StaticCell;
+
+use crate::encoder::Encoder;
+use crate::link;
+use crate::rig::Rig;
+use crate::steps::{StepDma, StepPulses};
+use crate::trigger::Trigger;
+use crate::watchdog::PATIENCE_US;
+
+/// What the board calls itself.
+pub const NAME: &str = "nucleo-g474";
+
+bind_interrupts!(struct Interrupts {
+    LPUART1 => usart::InterruptHandler<peripherals::LPUART1>;
+    DMA1_CHANNEL1 => dma::InterruptHandler<peripherals::DMA1_CH1>;
+    DMA1_CHANNEL2 => dma::InterruptHandler<peripherals::DMA1_CH2>;
+    RNG => rng::InterruptHandler<peripherals::RNG>;
+});
+
+impl StepDma for peripherals::DMA1_CH3 {
+    const CHANNEL: usize = 2;
+}
+
+impl StepDma for peripherals::DMA1_CH4 {
+    const CHANNEL: usize = 3;
+}
+
+/// The board, ready to be given to its users.
+pub struct Board {
+    /// What moves.
+    pub rig: Rig,
+    /// Timer of the control tick.
+    pub tick: Peri<'static, peripherals::TIM7>,
+    /// Not yet started.
+    pub watchdog: IndependentWatchdog<'static, peripherals::IWDG>,
+    /// LD2.
+    pub led: Output<'static>,
+    /// Not yet opened.
+    pub line: SerialLine,
+    /// Random numbers.
+    pub random: rng::Rng<'static, peripherals::RNG>,
+    /// Flash.
+    pub flash: Peri<'static, peripherals::FLASH>,
+}
+
+/// The serial line through the ST-LINK's virtual COM port.
+pub struct SerialLine {
+    port: Peri<'static, peripherals::LPUART1>,
+    tx: Peri<'static, peripherals::PA2>,
+    rx: Peri<'static, peripherals::PA3>,
+    tx_dma: Peri<'static, peripherals::DMA1_CH2>,
+    rx_dma: Peri<'static, peripherals::DMA1_CH1>,
+}
+
+impl Board {
+    /// Gives every pin its job. The drivers are off.
+    pub fn new(p: Peripherals) -> Self {
+        // First of all, so that nothing can move: high is off.
+        let drivers_off = Output::new(p.PA10, Level::High, Speed::Low);
+        let rig = Rig {
+            steps: [
+                StepPulses::new(p.TIM1, p.PA8, p.PA9, p.DMA1_CH3),
+                StepPulses::new(p.TIM8, p.PC6, p.PC8, p.DMA1_CH4),
+            ],
+            encoders: [Encoder::new(p.TIM2, p.PA0, p.PA1), Encoder::new(p.TIM5, p.PB2, p.PC12)],
+            home_switches: [Input::new(p.PC0, Pull::Up), Input::new(p.PC1, Pull::Up)],
+            hard_limits: [Input::new(p.PC2, Pull::Up), Input::new(p.PC3, Pull::Up)],
+            emergency_stop: Input::new(p.PC4, Pull::Up),
+            drivers_off,
+            trigger: Trigger::new(p.TIM4, p.PB6),
+        };
+        reserve_servo_bus(&p.USART3, &p.PB10, &p.PB14);
+        Self {
+            rig,
+            tick: p.TIM7,
+            watchdog: IndependentWatchdog::new(p.IWDG, PATIENCE_US),
+            led: Output::new(p.PA5, Level::High, Speed::Low),
+            line: SerialLine { port: p.LPUART1, tx: p.PA2, rx: p.PA3, tx_dma: p.DMA1_CH2, rx_dma: p.DMA1_CH1 },
+            random: rng::Rng::new(p.RNG, Interrupts),
+            flash: p.FLASH,
+        }
+    }
+}
+
+/// The robot's servo bus will be here, one wire in both directions; nothing else may take these.
+fn reserve_servo_bus<T: usart::Instance>(
+    _port: &Peri<'static, T>,
+    _data: &Peri<'static, impl usart::TxPin<T>>,
+    _drive: &Peri<'static, impl usart::DePin<T>>,
+) {
+}
+
+impl SerialLine {
+    /// Opens the line; `None` where it cannot keep that speed.
+    pub fn open(self, baud: u32) -> Option<(RingBufferedUartRx<'static>, UartTx<'static, Async>)> {
+        static RING: StaticCell<[u8; link::RING]> = StaticCell::new();
+        let mut config = usart::Config::default();
+        config.baudrate = baud;
+        let Self { port, tx, rx, tx_dma, rx_dma } = self;
+        let uart = Uart::new(port, rx, tx, tx_dma, rx_dma, Interrupts, config).ok()?;
+        let (tx, rx) = uart.split();
+        Some((rx.into_ring_buffered(RING.init_with(|| [0; link::RING])), tx))
+    }
+}
+
+/// Switches the drivers off from wherever the program died: the pin of [`Rig::drivers_off`], without its owner.
+pub fn cut_drivers() {
+    pac::GPIOA.bsrr().write(|w| w.set_bs(10, true));
+}

@@ -1,0 +1,133 @@
+//! The node in its interrupt: one kilohertz tick and one doorbell, above the executor and below the drivers' interrupts.
+//!
+//! Everything that decides anything runs here, in one place at one priority, so nothing has to be locked: the link's
+//! tasks hand bytes over through [`link::RECEIVED`] and [`link::TO_SEND`] and ring the doorbell.
+
+use core::cell::RefCell;
+use core::sync::atomic::{AtomicU32, Ordering};
+
+use critical_section::Mutex;
+use embassy_stm32::interrupt;
+use embassy_stm32::interrupt::{InterruptExt, Priority};
+use embassy_stm32::pac::TIM7;
+use embassy_stm32::timer::low_level::Timer;
+use embassy_stm32::{Peri, peripherals};
+use embassy_time::Instant;
+use static_cell::StaticCell;
+use vergence_control::{Node, TICK_US};
+use vergence_nucleo_common::Services;
+use vergence_protocol::{MAX_FRAME, Microseconds};
+
+use crate::rig::Rig;
+use crate::{link, log, memory};
+
+/// Below the interrupts of time, DMA and serial line, which are short, and above the executor's thread.
+const PRIORITY: Priority = Priority::P8;
+/// The tick timer counts microseconds.
+const PRESCALER: u16 = 169;
+
+/// How many ticks there have been: the watchdog's witness.
+pub static TICKS: AtomicU32 = AtomicU32::new(0);
+
+static CONTROL: StaticCell<Control> = StaticCell::new();
+static HANDOVER: Mutex<RefCell<Option<&'static mut Control>>> = Mutex::new(RefCell::new(None));
+
+/// The node and the mechanics it drives.
+pub struct Control {
+    node: Node,
+    rig: Rig,
+    services: Services,
+    /// When the running tick began.
+    tick: Microseconds,
+}
+
+/// Starts the tick; from now on node, rig and services belong to the interrupt.
+pub fn start(node: Node, rig: Rig, services: Services, timer: Peri<'static, peripherals::TIM7>) {
+    // Dropped, it would stop the clock of the timer.
+    core::mem::forget(Timer::new(timer));
+    TIM7.psc().write_value(PRESCALER);
+    TIM7.arr().write(|w| w.set_arr((TICK_US - 1) as u16));
+    TIM7.egr().write(|w| w.set_ug(true));
+    TIM7.sr().write(|_| {});
+    let tick = Microseconds(Instant::now().as_micros());
+    let control = CONTROL.init(Control { node, rig, services, tick });
+    critical_section::with(|cs| HANDOVER.borrow_ref_mut(cs).replace(control));
+    TIM7.dier().write(|w| w.set_uie(true));
+    TIM7.cr1().write(|w| w.set_cen(true));
+    interrupt::TIM7_DAC.set_priority(PRIORITY);
+    // SAFETY: the handler has what it needs; nothing relies on this interrupt being masked.
+    #[allow(unsafe_code, reason = "unmasking an interrupt")]
+    unsafe {
+        interrupt::TIM7_DAC.enable();
+    }
+}
+
+/// Makes the node look at the link.
+pub fn ring() {
+    interrupt::TIM7_DAC.pend();
+}
+
+#[interrupt]
+fn TIM7_DAC() {
+    static mut MINE: Option<&'static mut Control> = None;
+    if MINE.is_none() {
+        *MINE = critical_section::with(|cs| HANDOVER.borrow_ref_mut(cs).take());
+    }
+    if let Some(control) = MINE {
+        control.run();
+    }
+}
+
+impl Control {
+    fn run(&mut self) {
+        if TIM7.sr().read().uif() {
+            TIM7.sr().write(|w| w.set_uif(false));
+            self.begin_tick();
+        }
+        self.receive();
+        self.transmit();
+    }
+
+    /// Ticks are a whole number of periods apart, whatever the interrupt's latency: both timers run on one clock.
+    fn begin_tick(&mut self) {
+        let since = Instant::now().as_micros().saturating_sub(self.tick.0);
+        // Ticks missed while the flash was busy are gone, and the controller sees the gap; one that is late is not.
+        let ticks = (since / TICK_US).max(1);
+        self.tick = Microseconds(self.tick.0 + ticks * TICK_US);
+        if !self.rig.begin_tick() {
+            defmt::warn!("steps cut short at {=u64}", self.tick.0);
+        }
+        self.node.poll(self.tick, &mut self.rig);
+        TICKS.fetch_add(1, Ordering::Relaxed);
+    }
+
+    fn receive(&mut self) {
+        let mut bytes = [0; 64];
+        while let Ok(count) = link::RECEIVED.try_read(&mut bytes) {
+            let now = Microseconds(Instant::now().as_micros());
+            self.node.receive(now, &bytes[..count], &mut self.rig, &mut self.services);
+        }
+    }
+
+    /// Keeps at most one frame waiting behind the one on the wire, so that the next is chosen as late as possible.
+    fn transmit(&mut self) {
+        log::forward(|entry| self.node.log(entry));
+        let mut frame = [0; MAX_FRAME];
+        while link::TO_SEND.is_empty() {
+            let now = Microseconds(Instant::now().as_micros());
+            let Some(length) = self.node.transmit(now, &mut frame) else {
+                self.reboot();
+                return;
+            };
+            link::queue(&frame[..length]);
+        }
+    }
+
+    /// Where the host wants another start, the link makes it when the last frame is out.
+    fn reboot(&mut self) {
+        if let Some(to) = self.node.take_reboot() {
+            memory::prepare_reboot(to);
+            link::REBOOT.store(true, Ordering::Relaxed);
+        }
+    }
+}

@@ -1,0 +1,63 @@
+//! The settings a board comes with: the bench, a linear stage for the baseline and a pinion stage for the separation.
+
+use vergence_control::{AxisSettings, HomingSettings};
+use vergence_protocol::{AxisKind, Micro};
+
+use crate::rig::AXES;
+
+/// A positive angle of so many thousandths of a degree in microradians, to the nearest.
+const fn millidegrees(angle: i32) -> i32 {
+    ((angle as i64 * 174_532_925 + 5_000_000) / 10_000_000) as i32
+}
+
+/// A 2 mm screw driven by a 200-step motor in 1/8 steps, from 60 mm to 220 mm, and a separation of 0 to 130 degrees of
+/// 64 000 steps for each revolution.
+pub fn axes() -> [AxisSettings; AXES] {
+    let baseline = AxisSettings {
+        kind: AxisKind::Linear,
+        min: Micro(60_000),
+        max: Micro(220_000),
+        speed: 80_000,
+        acceleration: 400_000,
+        jerk: 8_000_000,
+        steps_per_unit: 800_000,
+        counts_per_unit: 2_000_000,
+        steps_reversed: false,
+        counts_reversed: false,
+        following_error: Micro(1_000),
+        tolerance: Micro(20),
+        backlash: Micro(0),
+        homing: HomingSettings {
+            switch_at: Micro(58_000),
+            seek_speed: 40_000,
+            approach_speed: 2_000,
+            retract: Micro(3_000),
+            travel: Micro(200_000),
+            repeatability: Micro(200),
+        },
+    };
+    let separation = AxisSettings {
+        kind: AxisKind::Rotary,
+        min: Micro(0),
+        max: Micro(millidegrees(130_000)),
+        speed: millidegrees(60_000).unsigned_abs(),
+        acceleration: millidegrees(240_000).unsigned_abs(),
+        jerk: millidegrees(4_000_000).unsigned_abs(),
+        steps_per_unit: 64_000,
+        counts_per_unit: 100_000,
+        steps_reversed: false,
+        counts_reversed: false,
+        following_error: Micro(millidegrees(1_000)),
+        tolerance: Micro(millidegrees(20)),
+        backlash: Micro(0),
+        homing: HomingSettings {
+            switch_at: Micro(-millidegrees(1_500)),
+            seek_speed: millidegrees(20_000).unsigned_abs(),
+            approach_speed: millidegrees(2_000).unsigned_abs(),
+            retract: Micro(millidegrees(2_000)),
+            travel: Micro(millidegrees(160_000)),
+            repeatability: Micro(millidegrees(100)),
+        },
+    };
+    [baseline, separation]
+}

@@ -1,0 +1,129 @@
+//! The log: defmt frames on the serial link, or with feature `log-rtt` to a debug probe.
+
+#[cfg(feature = "log-rtt")]
+use defmt_rtt as _;
+use vergence_control::NodeIdentity;
+use vergence_image::DeathKind;
+
+/// Says who starts, and how the last start ended.
+pub fn greet(identity: &NodeIdentity) {
+    let [major, minor, patch] = identity.firmware;
+    defmt::info!("vergence {=u8}.{=u8}.{=u8}, build {=u64:016x}", major, minor, patch, identity.build);
+    let Some(death) = vergence_nucleo_common::memory::survivor().death else { return };
+    match death.kind {
+        DeathKind::Panic => defmt::error!("died of a panic in line {=u32} of {=str}", death.at, death.file()),
+        DeathKind::HardFault => defmt::error!("died of a fault at {=u32:#x} from {=u32:#x}", death.at, death.from),
+    }
+}
+
+/// Hands the oldest entry to `to`, whole, where there is one.
+pub fn forward(to: impl FnOnce(&[u8])) {
+    #[cfg(feature = "log-link")]
+    link::forward(to);
+    #[cfg(not(feature = "log-link"))]
+    let _ = to;
+}
+
+#[cfg(feature = "log-link")]
+mod link {
+    //! Entries on their way to the node. What does not fit is lost, a whole entry at a time; nothing ever waits.
+
+    use core::cell::RefCell;
+
+    use critical_section::{Mutex, RestoreState};
+    use heapless::{Deque, Vec};
+
+    /// The longest entry.
+    const ENTRY: usize = 128;
+
+    static STATE: Mutex<RefCell<State>> = Mutex::new(RefCell::new(State::new()));
+
+    struct State {
+        encoder: defmt::Encoder,
+        /// To leave the critical section that spans one entry.
+        outside: Option<RestoreState>,
+        entry: Vec<u8, ENTRY>,
+        too_long: bool,
+        /// Entries end with a zero, which is nowhere else in them (rzCOBS).
+        queue: Deque<u8, 512>,
+    }
+
+    impl State {
+        const fn new() -> Self {
+            Self {
+                encoder: defmt::Encoder::new(),
+                outside: None,
+                entry: Vec::new(),
+                too_long: false,
+                queue: Deque::new(),
+            }
+        }
+
+        /// Runs `step` of the encoder, collecting what it writes.
+        fn encode(&mut self, step: impl FnOnce(&mut defmt::Encoder, &mut dyn FnMut(&[u8]))) {
+            let Self { encoder, entry, too_long, .. } = self;
+            step(encoder, &mut |bytes| *too_long |= entry.extend_from_slice(bytes).is_err());
+        }
+    }
+
+    fn with<R>(work: impl FnOnce(&mut State) -> R) -> R {
+        critical_section::with(|cs| work(&mut STATE.borrow_ref_mut(cs)))
+    }
+
+    pub fn forward(to: impl FnOnce(&[u8])) {
+        let mut entry = Vec::<u8, ENTRY>::new();
+        with(|state| {
+            while let Some(byte) = state.queue.pop_front() {
+                // Longer ones were never queued.
+                let _ = entry.push(byte);
+                if byte == 0 {
+                    break;
+                }
+            }
+        });
+        if !entry.is_empty() {
+            to(&entry);
+        }
+    }
+
+    #[defmt::global_logger]
+    struct Logger;
+
+    // SAFETY: from `acquire` to `release` runs one critical section, so that nobody else can acquire.
+    #[allow(unsafe_code, reason = "what defmt asks for")]
+    unsafe impl defmt::Logger for Logger {
+        fn acquire() {
+            // SAFETY: `release` leaves this section, as defmt calls both in pairs.
+            let outside = unsafe { critical_section::acquire() };
+            with(|state| {
+                state.outside = Some(outside);
+                state.entry.clear();
+                state.too_long = false;
+                state.encode(|encoder, write| encoder.start_frame(write));
+            });
+        }
+
+        unsafe fn write(bytes: &[u8]) {
+            with(|state| state.encode(|encoder, write| encoder.write(bytes, write)));
+        }
+
+        unsafe fn release() {
+            let outside = with(|state| {
+                state.encode(|encoder, write| encoder.end_frame(write));
+                if !state.too_long && state.entry.len() <= state.queue.capacity() - state.queue.len() {
+                    for &byte in &state.entry {
+                        // There is room.
+                        let _ = state.queue.push_back(byte);
+                    }
+                }
+                state.outside.take()
+            });
+            if let Some(outside) = outside {
+                // SAFETY: it is what `acquire` got.
+                unsafe { critical_section::release(outside) };
+            }
+        }
+
+        unsafe fn flush() {}
+    }
+}

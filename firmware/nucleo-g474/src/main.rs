@@ -1,0 +1,78 @@
+//! The controller on a NUCLEO-G474RE: pins, timers, interrupts, link, flash and log around [`vergence_control::Node`].
+//!
+//! Three levels of urgency: the interrupts of drivers (trigger edge, time, DMA, serial line), which are short; below
+//! them the node with its one kilohertz tick ([`control`]); below that the executor's tasks ([`link`], [`watchdog`]).
+
+#![no_std]
+#![no_main]
+
+mod board;
+mod control;
+mod encoder;
+mod factory;
+mod link;
+mod log;
+mod memory;
+mod rig;
+mod steps;
+mod trigger;
+mod watchdog;
+
+use board::Board;
+use embassy_executor::Spawner;
+use vergence_control::{BoardSettings, Node, NodeIdentity};
+use vergence_image::layout::HARDWARE;
+use vergence_nucleo_common::Services;
+use vergence_nucleo_common::clocks::{self, Source};
+
+/// The oldest version that this one may be replaced by.
+const OLDEST: [u8; 3] = [0, 1, 0];
+
+#[embassy_executor::main]
+async fn main(spawner: Spawner) {
+    let reset = memory::reset_cause();
+    let mut board = Board::new(clocks::start(Source::Crystal));
+    board.watchdog.unleash();
+    let identity = NodeIdentity {
+        board: board::NAME.try_into().unwrap_or_default(),
+        hardware: HARDWARE,
+        firmware: version(),
+        oldest: OLDEST,
+        build: memory::build_id(),
+        uid: embassy_stm32::uid::uid(),
+        reset,
+    };
+    log::greet(&identity);
+    let mut services = Services::of_application(&board.flash);
+    let Ok(defaults) = BoardSettings::new(&factory::axes()) else { panic!("factory settings") };
+    let Ok(node) = Node::new(&defaults, identity, board.random.next_u32(), &mut services) else {
+        panic!("factory settings");
+    };
+    let Some((rx, tx)) = board.line.open(node.settings().baud) else { panic!("serial line") };
+    control::start(node, board.rig, services, board.tick);
+    if let (Ok(receive), Ok(transmit), Ok(watch)) =
+        (link::receive(rx), link::transmit(tx), watchdog::watch(board.watchdog, board.led))
+    {
+        spawner.spawn(receive);
+        spawner.spawn(transmit);
+        spawner.spawn(watch);
+    }
+}
+
+/// The package's version.
+const fn version() -> [u8; 3] {
+    [
+        part(env!("CARGO_PKG_VERSION_MAJOR")),
+        part(env!("CARGO_PKG_VERSION_MINOR")),
+        part(env!("CARGO_PKG_VERSION_PATCH")),
+    ]
+}
+
+const fn part(digits: &str) -> u8 {
+    let (mut value, mut rest) = (0, digits.as_bytes());
+    while let [digit, after @ ..] = rest {
+        value = value * 10 + (*digit - b'0');
+        rest = after;
+    }
+    value
+}

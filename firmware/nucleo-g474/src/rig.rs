@@ -1,0 +1,88 @@
+//! The mechanics as the controller sees them.
+
+use embassy_stm32::gpio::{Input, Output};
+use vergence_control::{RigIo, StepSchedule, TriggerEdge};
+use vergence_protocol::Microseconds;
+
+use crate::encoder::Encoder;
+use crate::steps::StepPulses;
+use crate::trigger::Trigger;
+
+/// How many axes the board drives.
+pub const AXES: usize = 2;
+
+/// Everything that moves or tells where it is.
+pub struct Rig {
+    /// Step and direction outputs.
+    pub steps: [StepPulses; AXES],
+    /// Encoders.
+    pub encoders: [Encoder; AXES],
+    /// Closed (low) at home.
+    pub home_switches: [Input<'static>; AXES],
+    /// Open (high) beyond the range, or where the wire is broken.
+    pub hard_limits: [Input<'static>; AXES],
+    /// Open (high) while pressed, or where the wire is broken.
+    pub emergency_stop: Input<'static>,
+    /// Low switches the drivers on; the pull-up on the drivers' side keeps them off while the chip starts.
+    pub drivers_off: Output<'static>,
+    /// Camera trigger.
+    pub trigger: Trigger,
+}
+
+impl Rig {
+    /// Begins what was ordered for the tick that has begun. Returns whether the tick before was kept.
+    pub fn begin_tick(&mut self) -> bool {
+        let mut in_time = true;
+        for axis in &mut self.steps {
+            in_time &= axis.begin_tick();
+        }
+        self.trigger.poll();
+        in_time
+    }
+}
+
+impl RigIo for Rig {
+    fn set_drivers(&mut self, on: bool) {
+        if on {
+            self.drivers_off.set_low();
+        } else {
+            self.drivers_off.set_high();
+        }
+        self.steps.iter_mut().for_each(StepPulses::abort);
+    }
+
+    fn schedule_steps(&mut self, axis: usize, steps: &StepSchedule) {
+        if let Some(axis) = self.steps.get_mut(axis) {
+            axis.order(steps);
+        }
+    }
+
+    fn steps(&self, axis: usize) -> i32 {
+        self.steps.get(axis).map_or(0, StepPulses::count)
+    }
+
+    fn encoder(&self, axis: usize) -> i32 {
+        self.encoders.get(axis).map_or(0, Encoder::count)
+    }
+
+    fn home_switch(&self, axis: usize) -> bool {
+        self.home_switches.get(axis).is_some_and(Input::is_low)
+    }
+
+    fn hard_limit(&self, axis: usize) -> bool {
+        self.hard_limits.get(axis).is_some_and(Input::is_high)
+    }
+
+    fn emergency_stop(&self) -> bool {
+        self.emergency_stop.is_high()
+    }
+
+    fn fire_trigger(&mut self, at: Microseconds) {
+        self.trigger.fire(at);
+        self.trigger.poll();
+    }
+
+    fn take_trigger_edge(&mut self) -> Option<TriggerEdge> {
+        self.trigger.take_edge()
+    }
+}

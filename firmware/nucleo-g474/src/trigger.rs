@@ -1,0 +1,100 @@
+//! The camera trigger: one pulse of TIM4, one-pulse mode, its rising edge timed by the compare register. The edge's
+//! interrupt is the most urgent of all and latches the encoders.
+
+use core::cell::RefCell;
+
+use critical_section::Mutex;
+use embassy_stm32::gpio::{AfType, Flex, OutputType, Speed};
+use embassy_stm32::interrupt;
+use embassy_stm32::interrupt::{InterruptExt, Priority};
+use embassy_stm32::pac::TIM4;
+use embassy_stm32::pac::timer::vals::Ocm;
+use embassy_stm32::peripherals;
+use embassy_stm32::timer::low_level::Timer;
+use embassy_stm32::timer::{Ch1, TimerPin};
+use embassy_stm32::{Peri, pac};
+use embassy_time::Instant;
+use heapless::Deque;
+use vergence_control::TriggerEdge;
+use vergence_protocol::{AxisList, Microseconds};
+
+/// The timer counts microseconds.
+const PRESCALER: u16 = 169;
+/// How long the pulse is.
+const PULSE_US: u16 = 100;
+/// Pulses further ahead than this wait in software: the counter has 16 bits.
+const HORIZON_US: u64 = 10_000;
+
+static EDGES: Mutex<RefCell<Deque<(u64, [i32; 2]), 4>>> = Mutex::new(RefCell::new(Deque::new()));
+
+/// The trigger output.
+pub struct Trigger {
+    _pin: Flex<'static>,
+    due: Option<Microseconds>,
+}
+
+impl Trigger {
+    /// An output at rest.
+    pub fn new(
+        timer: Peri<'static, peripherals::TIM4>,
+        pin: Peri<'static, impl TimerPin<peripherals::TIM4, Ch1>>,
+    ) -> Self {
+        let function = pin.af_num();
+        let mut pin = Flex::new(pin);
+        pin.set_as_af_unchecked(function, AfType::output(OutputType::PushPull, Speed::Medium));
+        // Dropped, it would stop the clock of the timer.
+        core::mem::forget(Timer::new(timer));
+        TIM4.psc().write_value(PRESCALER);
+        TIM4.egr().write(|w| w.set_ug(true));
+        TIM4.sr().write(|_| {});
+        TIM4.ccmr_output(0).write(|w| w.set_ocm(0, Ocm::PWM_MODE2));
+        TIM4.ccer().write(|w| w.set_cce(0, true));
+        TIM4.dier().write(|w| w.set_ccie(0, true));
+        interrupt::TIM4.set_priority(Priority::P0);
+        // SAFETY: the handler is complete; nothing relies on this interrupt being masked.
+        #[allow(unsafe_code, reason = "unmasking an interrupt")]
+        unsafe {
+            interrupt::TIM4.enable();
+        }
+        Self { _pin: pin, due: None }
+    }
+
+    /// Asks for a pulse at `at`; one that has not begun is replaced.
+    pub fn fire(&mut self, at: Microseconds) {
+        self.due = Some(at);
+    }
+
+    /// Starts the timer where a pulse comes due soon. Call in every tick and after [`Self::fire`].
+    pub fn poll(&mut self) {
+        let Some(at) = self.due else { return };
+        let ahead = at.0.saturating_sub(Instant::now().as_micros());
+        if ahead > HORIZON_US || TIM4.cr1().read().cen() {
+            return;
+        }
+        self.due = None;
+        let delay = u16::try_from(ahead).unwrap_or(u16::MAX).max(1);
+        TIM4.ccr(0).write(|w| w.set_ccr(delay));
+        TIM4.arr().write(|w| w.set_arr(delay.saturating_add(PULSE_US - 1)));
+        TIM4.cr1().write(|w| {
+            w.set_opm(true);
+            w.set_cen(true);
+        });
+    }
+
+    /// The oldest edge not yet taken.
+    pub fn take_edge(&mut self) -> Option<TriggerEdge> {
+        let (at, counts) = critical_section::with(|cs| EDGES.borrow_ref_mut(cs).pop_front())?;
+        Some(TriggerEdge { at: Microseconds(at), counts: AxisList::from_iter(counts) })
+    }
+}
+
+#[interrupt]
+fn TIM4() {
+    let counts = [pac::TIM2.cnt().read().cast_signed(), pac::TIM5.cnt().read().cast_signed()];
+    let at = Instant::now().as_micros();
+    TIM4.sr().write(|_| {});
+    critical_section::with(|cs| {
+        // Nobody takes more than one in each tick; what does not fit is as lost as a pose.
+        let _ = EDGES.borrow_ref_mut(cs).push_back((at, counts));
+    });
+}
