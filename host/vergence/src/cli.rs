@@ -88,6 +88,8 @@ enum Verb {
     Demo(cmd::demo::Args),
     /// Turn a pair of photographs into a cloud of points.
     Depth(cmd::depth::Args),
+    /// Keep pre-trained networks for matching.
+    Models(cmd::models::Args),
     /// Tell how much of the surroundings both cameras, one, or none see.
     Zones(cmd::zones::Args),
     /// Take a set of board views for calibration, with advice on what to show.
@@ -164,6 +166,7 @@ fn execute(cli: Cli) -> Result<(), Failure> {
             Verb::Soak(args) => cmd::soak::run(&args, console),
             Verb::Demo(args) => cmd::demo::run(&args, &globals, console).await,
             Verb::Depth(args) => cmd::depth::run(&args, &globals, console),
+            Verb::Models(args) => cmd::models::run(&args, console),
             Verb::Zones(args) => cmd::zones::run(&args, console),
             Verb::Capture(args) => cmd::capture::run(&args, &globals, console),
             Verb::Calibrate(args) => cmd::calibrate::run(&args, &globals, console).await,
