@@ -1,7 +1,7 @@
 //! The mechanics of the rig on the pins of the chip: step pulses move motors, edge by edge; encoders answer on their
 //! two lines, switches on theirs.
 
-use vergence_control::RigIo;
+use vergence_control::{RigIo, StepSchedule};
 use vergence_plant::Plant;
 use vergence_protocol::Microseconds;
 
@@ -99,8 +99,6 @@ struct Lines {
 #[derive(Clone, Copy, Debug, Default)]
 struct AxisState {
     forward: bool,
-    /// Raw steps ordered so far.
-    steps: i32,
     lines: Lines,
     home: Option<bool>,
     hard_limit: Option<bool>,
@@ -126,7 +124,7 @@ impl Bench {
             .map(|axis| {
                 let count = plant.encoder(axis);
                 let lines = Lines { shown: count, wanted: count, ..Lines::default() };
-                AxisState { steps: plant.steps(axis), lines, ..AxisState::default() }
+                AxisState { lines, ..AxisState::default() }
             })
             .collect();
         let pulses = vec![0; axes.len()];
@@ -172,8 +170,8 @@ impl Bench {
         let pressed = self.plant.emergency_stop();
         match self.emergency_stop.replace(pressed) {
             None => self.connect(terminals),
-            Some(before) if before != pressed => self.count_anew(),
-            Some(_) => return,
+            Some(before) if before == pressed => return,
+            Some(_) => {}
         }
         let wiring = self.wiring.emergency_stop;
         terminals.drive(wiring.pin, wiring.drive(pressed));
@@ -189,23 +187,13 @@ impl Bench {
         }
     }
 
-    /// Drivers that were off have missed steps.
-    fn count_anew(&mut self) {
-        for (axis, state) in self.axes.iter_mut().enumerate() {
-            state.steps = self.plant.steps(axis);
-        }
-    }
-
     fn step(&mut self, axis: usize, now: Microseconds) {
-        let Some(state) = self.axes.get_mut(axis) else { return };
         if let Some(pulses) = self.pulses.get_mut(axis) {
             *pulses += 1;
         }
-        if !self.plant.drivers_on() || self.plant.emergency_stop() {
-            return;
-        }
-        state.steps += if state.forward { 1 } else { -1 };
-        self.plant.step_to(axis, state.steps, now);
+        let forward = self.axes.get(axis).is_some_and(|state| state.forward);
+        let at_ns = [0].into_iter().collect();
+        self.plant.schedule_steps(axis, &StepSchedule { start: now, forward, at_ns });
         self.wake(now);
     }
 
@@ -273,7 +261,6 @@ impl World for Bench {
         if edge.pin == self.wiring.drivers_off {
             self.plant.advance(now);
             self.plant.set_drivers(!edge.high);
-            self.count_anew();
             self.wake(now);
         }
         for axis in 0..self.wiring.axes.len() {
