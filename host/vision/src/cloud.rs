@@ -65,6 +65,8 @@ pub enum Drop {
     TooFar,
     /// The range is too uncertain.
     Uncertain,
+    /// The method of triangulation finds no point here: the rectified view does not hold it, or no minimum is near.
+    NoPoint,
 }
 
 /// A point, where it came from and how good it is.
@@ -145,6 +147,7 @@ impl From<Rejection> for Drop {
             Rejection::Parallel => Self::Parallax,
             Rejection::OnBaseline => Self::OnBaseline,
             Rejection::Diverging => Self::Diverging,
+            Rejection::OutsideView | Rejection::NotConverged => Self::NoPoint,
         }
     }
 }
@@ -162,6 +165,7 @@ impl Drop {
             Self::Parallax => "parallax",
             Self::TooFar => "too_far",
             Self::Uncertain => "uncertain",
+            Self::NoPoint => "no_point",
         }
     }
 }

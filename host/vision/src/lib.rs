@@ -16,23 +16,32 @@
 //!
 //! Everything is a pure function of its arguments.
 
+mod batch;
 mod cloud;
 mod covariance;
 mod epipolar;
 mod frames;
 mod import;
 mod kannala_brandt;
+mod lens_derivatives;
 mod triangulation;
+mod uncertainty;
 mod units;
 mod zones;
 
+pub use batch::{BatchLens, BatchTriangulation, Instructions, triangulate_batch};
 pub use cloud::{Cloud, CloudPoint, Drop, Gates, PixelPair, StereoPair, cloud};
 pub use covariance::{covariance, range_sigma};
 pub use epipolar::{dihedral, ray_to_plane};
 pub use frames::{Base, Camera, Frame, Left, Point, Right, Side, Transform, UnitRay, World};
 pub use import::{OpenCvFisheye, largest_theta};
 pub use kannala_brandt::{ImageSize, InvalidLens, KannalaBrandt, OutsideField, Pixel};
-pub use triangulation::{Feet, Rejection, Triangulated, closest_approach, midpoint, pseudo_intersection};
+pub use lens_derivatives::LENS_PARAMETERS;
+pub use triangulation::{
+    AngularNorm, Feet, Kernel, Rejection, Triangulated, UnknownKernel, angular, closest_approach, edge_plane, mid2,
+    midpoint, pseudo_intersection, rectified, reprojection,
+};
+pub use uncertainty::{PointUncertainty, SHARED_PARAMETERS, SharedCovariance};
 pub use units::{Angle, InvalidQuantity, Length};
 pub use zones::{
     Arc, Coverage, PlanarCamera, ZoneMap, Zones, ZonesError, symmetric_pair, zones_exact, zones_paper_eq3,
