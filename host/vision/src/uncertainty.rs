@@ -10,10 +10,10 @@
 //! in the plane along the other ray, across it by the mean of both. The right ray turns with the relative pose, both turn
 //! with their lenses; a shift of the right centre by δ acts as a turn of its ray by δ / μ.
 
-use nalgebra::{Matrix3, Matrix6, SMatrix, Vector3};
+use nalgebra::{Matrix3, Matrix6, RowSVector, SMatrix, Vector3, Vector6};
 
 use crate::lens_derivatives::LENS_PARAMETERS;
-use crate::{Left, Point, StereoPair};
+use crate::{Angle, Left, Point, Right, StereoPair, UnitRay};
 
 /// Both lenses and the pose.
 pub const SHARED_PARAMETERS: usize = 2 * LENS_PARAMETERS + 6;
@@ -113,6 +113,60 @@ impl PointUncertainty {
     #[must_use]
     pub fn covariance_with(&self, other: &Self, shared: &SharedCovariance) -> Matrix3<f64> {
         self.by_shared * shared.0 * other.by_shared.transpose()
+    }
+}
+
+/// How the angle between two rays and one epipolar plane, see [`crate::ray_to_plane`], depends on their pixels and on what
+/// is shared.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct ResidualUncertainty {
+    /// Variance from the noise of the two pixels alone, rad².
+    pub from_pixels: f64,
+    /// Derivative of the angle by the shared parameters, in the order of [`SharedCovariance`], radians per unit of each.
+    pub by_shared: RowSVector<f64, SHARED_PARAMETERS>,
+}
+
+impl ResidualUncertainty {
+    /// For two rays that are near one epipolar plane, `right` in the right camera's own frame. `None` where both lie along
+    /// the baseline.
+    ///
+    /// The angle is [t, u, v] over the larger of |t × u| and |t × v|, t of unit length, and changes with each of the three.
+    #[must_use]
+    pub fn of(left: &UnitRay<Left>, right: &UnitRay<Right>, pair: &StereoPair<'_>, pixel_sigma: f64) -> Option<Self> {
+        let turn = pair.left_from_right.rotation().to_rotation_matrix().into_inner();
+        let centre = pair.left_from_right.origin();
+        let (u, v, t) = (left.vector(), turn * right.vector(), centre.direction()?.vector());
+        let (from_u, from_v) = (t.cross(&u), t.cross(&v));
+        let sine = from_u.norm().max(from_v.norm());
+        let by_left = v.cross(&t).transpose() / sine * pair.left.ray_by_pixel(left);
+        let by_right = from_u.transpose() / sine * turn * pair.right.ray_by_pixel(right);
+        // The shift along the baseline changes nothing.
+        let across = u.cross(&v) / (sine * centre.mm().norm());
+        let by_shift = (across - t * t.dot(&across)).transpose();
+        let by_turn = v.cross(&(from_u / sine)).transpose();
+
+        let mut by_shared = RowSVector::<f64, SHARED_PARAMETERS>::zeros();
+        by_shared.fixed_columns_mut::<LENS_PARAMETERS>(0).copy_from(&(-by_left * pair.left.pixel_by_lens(left)));
+        by_shared
+            .fixed_columns_mut::<LENS_PARAMETERS>(LENS_PARAMETERS)
+            .copy_from(&(-by_right * pair.right.pixel_by_lens(right)));
+        by_shared.fixed_columns_mut::<3>(2 * LENS_PARAMETERS).copy_from(&by_turn);
+        by_shared.fixed_columns_mut::<3>(2 * LENS_PARAMETERS + 3).copy_from(&by_shift);
+        let from_pixels = (by_left.norm_squared() + by_right.norm_squared()) * pixel_sigma * pixel_sigma;
+        let finite = from_pixels.is_finite() && by_shared.iter().all(|value| value.is_finite());
+        finite.then_some(Self { from_pixels, by_shared })
+    }
+
+    /// The standard deviation of the angle.
+    #[must_use]
+    pub fn sigma(&self, shared: &SharedCovariance) -> Angle {
+        let from_shared = (self.by_shared * shared.0 * self.by_shared.transpose()).x.max(0.0);
+        Angle::from_rad((self.from_pixels + from_shared).sqrt())
+    }
+
+    /// The derivative by the pose alone: ω in radians, δ in millimetres.
+    pub(crate) fn by_pose(&self) -> Vector6<f64> {
+        self.by_shared.fixed_columns::<6>(2 * LENS_PARAMETERS).transpose()
     }
 }
 

@@ -101,8 +101,12 @@ pub(super) fn rows_of<const C: usize>(columns: &[[f64; BLOCK]; C]) -> [[f64; C];
     rows
 }
 
-/// What the kernels are compiled for on this machine.
-#[multiversion(targets("x86_64+avx2+fma"))]
+/// What the kernels use on this machine.
+#[multiversion(targets("x86_64+avx512f+avx512dq+avx512vl+avx2+fma", "x86_64+avx2+fma"))]
 pub(super) fn best_name() -> &'static str {
-    if target_cfg_f!(target_feature = "avx2") { "avx2+fma" } else { std::env::consts::ARCH }
+    match (target_cfg_f!(target_feature = "avx512f"), target_cfg_f!(target_feature = "avx2")) {
+        (true, _) => "avx512",
+        (_, true) => "avx2+fma",
+        _ => std::env::consts::ARCH,
+    }
 }

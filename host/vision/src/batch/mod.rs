@@ -1,7 +1,7 @@
 //! Many points at once, on one thread, in plain arrays.
 //!
 //! The kernels are branch-free functions on arrays of lanes that the compiler turns into vector instructions: those of
-//! the machine at hand (AVX2 and FMA, found at run time), or those every processor of its kind has. The two differ in
+//! the machine at hand (AVX-512, or AVX2 and FMA, found at run time), or those every processor of its kind has. The two differ in
 //! the last bits, so results that must repeat to the bit on any machine come from the single-point functions.
 //!
 //! Arrays hold one point, ray or pixel per row: N × 3 or N × 2. What has no result (outside the field, behind a camera,

@@ -56,7 +56,7 @@ pub(super) fn project_baseline(lens: &Project, points: &[[f64; 3]], pixels: &mut
     for_rows::<ALWAYS_FUSED, LANES, 3, 2>(lens, points, pixels);
 }
 
-#[multiversion(targets("x86_64+avx2+fma"))]
+#[multiversion(targets("x86_64+avx512f+avx512dq+avx512vl+avx2+fma", "x86_64+avx2+fma"))]
 pub(super) fn project_best(lens: &Project, points: &[[f64; 3]], pixels: &mut Vec<[f64; 2]>) {
     if target_cfg_f!(target_feature = "fma") {
         for_rows::<true, LANES, 3, 2>(lens, points, pixels);

@@ -8,8 +8,8 @@ use super::Instructions;
 use super::lanes::{ALWAYS_FUSED, BLOCK, Kernel, column_results, columns_of, rows_of};
 use crate::{Angle, Left, Point};
 
-/// More would not fit the registers: the kernel holds some thirty values per row.
-const LANES: usize = 4;
+/// One vector of eight, or two of four: the kernel holds some thirty values per row.
+const LANES: usize = 8;
 /// Squared sine below which rays are parallel, or a point lies on the baseline.
 const VANISHING_SQUARED: f64 = 1e-18;
 
@@ -33,32 +33,50 @@ pub fn triangulate_batch(
     sigma: Angle,
     instructions: Instructions,
 ) -> BatchTriangulation {
-    let count = left.len().min(right.len());
-    let (left, right) = (&left[..count], &right[..count]);
-    let kernel = Triangulate { t: right_centre.mm(), variance: sigma.rad() * sigma.rad() };
-    match instructions {
-        Instructions::Best => triangulate_best(&kernel, left, right),
-        Instructions::Baseline => triangulate_all::<ALWAYS_FUSED>(&kernel, left, right),
+    let mut out = BatchTriangulation::default();
+    out.extend([left, right], right_centre, sigma, instructions);
+    out
+}
+
+impl BatchTriangulation {
+    /// Appends what [`triangulate_batch`] returns for the left and right `rays`.
+    pub fn extend(
+        &mut self,
+        rays: [&[[f64; 3]]; 2],
+        right_centre: &Point<Left>,
+        sigma: Angle,
+        instructions: Instructions,
+    ) {
+        let count = rays[0].len().min(rays[1].len());
+        let rays = rays.map(|rays| &rays[..count]);
+        let kernel = Triangulate { t: right_centre.mm(), variance: sigma.rad() * sigma.rad() };
+        match instructions {
+            Instructions::Best => triangulate_best(&kernel, rays, self),
+            Instructions::Baseline => triangulate_all::<ALWAYS_FUSED>(&kernel, rays, self),
+        }
+    }
+
+    /// Forgets the rows and keeps their memory.
+    pub fn clear(&mut self) {
+        self.points.clear();
+        self.covariances.clear();
     }
 }
 
-#[multiversion(targets("x86_64+avx2+fma"))]
-fn triangulate_best(kernel: &Triangulate, left: &[[f64; 3]], right: &[[f64; 3]]) -> BatchTriangulation {
+#[multiversion(targets("x86_64+avx512f+avx512dq+avx512vl+avx2+fma", "x86_64+avx2+fma"))]
+fn triangulate_best(kernel: &Triangulate, rays: [&[[f64; 3]]; 2], out: &mut BatchTriangulation) {
     if target_cfg_f!(target_feature = "fma") {
-        triangulate_all::<true>(kernel, left, right)
+        triangulate_all::<true>(kernel, rays, out);
     } else {
-        triangulate_all::<ALWAYS_FUSED>(kernel, left, right)
+        triangulate_all::<ALWAYS_FUSED>(kernel, rays, out);
     }
 }
 
 #[inline(always)]
-fn triangulate_all<const FUSED: bool>(
-    kernel: &Triangulate,
-    left: &[[f64; 3]],
-    right: &[[f64; 3]],
-) -> BatchTriangulation {
-    let mut out =
-        BatchTriangulation { points: Vec::with_capacity(left.len()), covariances: Vec::with_capacity(left.len()) };
+fn triangulate_all<const FUSED: bool>(kernel: &Triangulate, rays: [&[[f64; 3]]; 2], out: &mut BatchTriangulation) {
+    let [left, right] = rays;
+    out.points.reserve(left.len());
+    out.covariances.reserve(left.len());
     let ((left_blocks, left_rest), (right_blocks, right_rest)) = (left.as_chunks(), right.as_chunks());
     for (left, right) in left_blocks.iter().zip(right_blocks) {
         let (points, covariances) = block::<FUSED>(kernel, left, right);
@@ -74,7 +92,6 @@ fn triangulate_all<const FUSED: bool>(
         out.points.extend_from_slice(&points[..count]);
         out.covariances.extend_from_slice(&covariances[..count]);
     }
-    out
 }
 
 #[inline(always)]
