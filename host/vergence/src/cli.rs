@@ -68,6 +68,8 @@ enum Verb {
     Monitor(cmd::monitor::Args),
     /// Run a simulated board that other programs can talk to.
     Sim(cmd::sim::Args),
+    /// Measure how fast this program is, beside others on the same work.
+    Bench(cmd::bench::Args),
     /// Let everything go wrong, ten thousand times, and check that the rig stays safe.
     Soak(cmd::soak::Args),
     /// Run the whole rig in simulation: home, herbivore, human, look, measure.
@@ -130,10 +132,11 @@ fn execute(cli: Cli) -> Result<(), Failure> {
             Verb::Stop(args) => cmd::stop::run(&args, &globals, console).await,
             Verb::Monitor(args) => cmd::monitor::run(&args, &globals, console).await,
             Verb::Sim(args) => cmd::sim::run(&args, &globals, console).await,
+            Verb::Bench(args) => cmd::bench::run(&args, console),
             Verb::Soak(args) => cmd::soak::run(&args, console),
             Verb::Demo(args) => cmd::demo::run(&args, &globals, console).await,
             Verb::Depth(args) => cmd::depth::run(&args, &globals, console),
-            Verb::Zones(args) => cmd::zones::run(&args, console),
+            Verb::Zones(args) => cmd::zones::run(&args, &globals, console),
             Verb::Capture(args) => cmd::capture::run(&args, &globals, console),
             Verb::Calibrate(args) => cmd::calibrate::run(&args, console),
             Verb::Camera(args) => cmd::camera::run(&args, console),

@@ -5,6 +5,7 @@ mod connect;
 mod report;
 
 pub mod arm;
+pub mod bench;
 pub mod calibrate;
 pub mod camera;
 pub mod capture;

@@ -4,6 +4,7 @@ mod colour_map;
 mod picture;
 mod ply;
 mod text;
+mod zones_plot;
 mod zones_svg;
 
 use std::io::Write;
@@ -13,6 +14,7 @@ use image::{ImageFormat, RgbImage};
 
 pub use picture::{DepthPicture, depth_picture, match_picture};
 pub use ply::ply;
+pub use zones_plot::{ZonesOf, zones_plot};
 pub use zones_svg::zones_svg;
 
 use crate::failure::Failure;
