@@ -21,6 +21,7 @@ const VERBS: &[&str] = &[
     "home",
     "mode",
     "move",
+    "plan",
     "stop",
     "monitor",
     "sim",
@@ -31,6 +32,7 @@ const VERBS: &[&str] = &[
     "calibrate",
     "camera",
     "target",
+    "bench",
     "soak",
 ];
 

@@ -31,6 +31,21 @@ pub struct JointsAt {
     pub timing: Vec<f64>,
 }
 
+/// The standard deviation of an error anywhere within a width of one: 1/√12.
+pub(crate) const UNIFORM: f64 = 0.288_675_134_594_812_9;
+
+impl JointsAt {
+    /// Counts that the board latched at the very instant, as at the edge of a trigger pulse.
+    #[must_use]
+    pub fn latched(counts: &[Counts]) -> Self {
+        Self {
+            counts: counts.iter().map(|counts| f64::from(counts.0)).collect(),
+            sigma: vec![UNIFORM; counts.len()],
+            timing: vec![0.0; counts.len()],
+        }
+    }
+}
+
 /// Why the track does not know the joints at an instant.
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]
@@ -111,9 +126,6 @@ impl JointTrack {
         (0..axes).map(|axis| of_axis(axis).unwrap_or(0.0)).collect()
     }
 }
-
-/// A uniform error of one count, and of plus or minus a bound, each have a standard deviation of 1/√12 of their width.
-pub(crate) const UNIFORM: f64 = 0.288_675_134_594_812_9;
 
 /// `instant_error` is the bound of the instant's error as a share of the span between the readings.
 fn interpolate(previous: &JointSample, next: &JointSample, share: f64, bend: &[f64], instant_error: f64) -> JointsAt {

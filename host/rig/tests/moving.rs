@@ -49,7 +49,7 @@ fn run(from: [f64; 2], to: [f64; 2]) -> Run {
     for tick in 0..25_000 {
         let now = Microseconds(tick * TICK_US);
         run.loads.push([axes[0].load(), axes[1].load()]);
-        if now.0 % READING_US == 0 {
+        if now.0.is_multiple_of(READING_US) {
             let counts = [0, 1].map(|i| Counts(axes[i].encoder() + first[i]));
             run.track.push(JointSample { at: now, counts: counts.into_iter().collect::<AxisList<_>>() });
         }

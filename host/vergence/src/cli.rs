@@ -62,6 +62,8 @@ enum Verb {
     Mode(cmd::mode::Args),
     /// Go to any pose.
     Move(cmd::move_to::Args),
+    /// Show a pose before it is taken.
+    Plan(cmd::plan::Args),
     /// Brake now, even while another vergence holds the port.
     Stop(cmd::stop::Args),
     /// Show poses as they come.
@@ -129,6 +131,7 @@ fn execute(cli: Cli) -> Result<(), Failure> {
             Verb::Home(args) => cmd::home::run(&args, &globals, console).await,
             Verb::Mode(args) => cmd::mode::run(&args, &globals, console).await,
             Verb::Move(args) => cmd::move_to::run(&args, &globals, console).await,
+            Verb::Plan(args) => cmd::plan::run(&args, &globals, console),
             Verb::Stop(args) => cmd::stop::run(&args, &globals, console).await,
             Verb::Monitor(args) => cmd::monitor::run(&args, &globals, console).await,
             Verb::Sim(args) => cmd::sim::run(&args, &globals, console).await,

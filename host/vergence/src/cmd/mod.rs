@@ -18,6 +18,7 @@ pub mod home;
 pub mod mode;
 pub mod monitor;
 pub mod move_to;
+pub mod plan;
 pub mod sim;
 pub mod soak;
 pub mod status;

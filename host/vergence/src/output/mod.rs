@@ -1,6 +1,7 @@
 //! Files that commands write: whole, or not at all.
 
 mod colour_map;
+mod depth_field_svg;
 mod picture;
 mod ply;
 mod text;
@@ -12,6 +13,7 @@ use std::path::Path;
 
 use image::{ImageFormat, RgbImage};
 
+pub use depth_field_svg::depth_field_svg;
 pub use picture::{DepthPicture, depth_picture, match_picture};
 pub use ply::ply;
 pub use zones_plot::{ZonesOf, zones_plot};

@@ -13,8 +13,9 @@ pub struct ZonesOf {
     pub radius: Length,
 }
 
-/// What is drawn, and in which colour.
-const CURVES: [(&str, &str, fn(&Zones) -> Angle); 3] = [
+/// A zone's name, its colour, and which it is.
+type Curve = (&'static str, &'static str, fn(&Zones) -> Angle);
+const CURVES: [Curve; 3] = [
     ("stereo", "#1d7a6f", |zones| zones.stereo),
     ("mono", "#c98a16", |zones| zones.mono),
     ("blind", "#495057", |zones| zones.blind),

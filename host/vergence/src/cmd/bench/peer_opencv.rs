@@ -18,7 +18,7 @@ pub struct PeerTimes {
 
 impl PeerTimes {
     /// The better of two measurements.
-    pub fn least(self, other: Self) -> Self {
+    pub fn least(self, other: &Self) -> Self {
         Self {
             project_ns: self.project_ns.min(other.project_ns),
             unproject_ns: self.unproject_ns.min(other.unproject_ns),

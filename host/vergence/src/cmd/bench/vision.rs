@@ -46,7 +46,7 @@ pub fn run(args: &Args, console: Console) -> Result<(), Failure> {
     let ours = measure(&lens, args.points, args.repeats, Instructions::Best);
     let baseline = measure(&lens, args.points, args.repeats, Instructions::Baseline);
     let after = opencv(&args.python, args.points, args.repeats, &LENS, FIELD);
-    let peer = before.and_then(|before| Ok(before.least(after?)));
+    let peer = before.and_then(|before| Ok(before.least(&after?)));
     let error = [Instructions::Best, Instructions::Baseline].map(|which| max_ray_error(&lens, which));
     let error = error[0].max(error[1]);
 
@@ -187,8 +187,11 @@ fn spread(points: u32) -> Vec<[f64; 3]> {
     (0..points).map(ray).collect()
 }
 
+/// Left rays, right rays, and the pose that both are of.
+type Sights = (Vec<[f64; 3]>, Vec<[f64; 3]>, Transform<Left, Right>);
+
 /// Rays of both cameras, in the left frame, to points 0.3 to 2 m ahead of a rig in herbivore pose.
-fn sights(points: u32) -> (Vec<[f64; 3]>, Vec<[f64; 3]>, Transform<Left, Right>) {
+fn sights(points: u32) -> Sights {
     let turn = UnitQuaternion::from_axis_angle(&Vector3::y_axis(), 120f64.to_radians());
     let middle = UnitQuaternion::from_axis_angle(&Vector3::y_axis(), 60f64.to_radians());
     let left_from_right = Transform::new(turn, middle * Vector3::new(145.0, 0.0, 0.0));
