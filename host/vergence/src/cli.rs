@@ -66,7 +66,7 @@ enum Verb {
     Mode(cmd::mode::Args),
     /// Go to any pose.
     Move(cmd::move_to::Args),
-    /// Show a move before it is made: time, segments, zones.
+    /// Show a move before it is made, or find the pose that measures as asked.
     Plan(cmd::plan::Args),
     /// Brake now, even while another vergence holds the port.
     Stop(cmd::stop::Args),
@@ -167,7 +167,7 @@ fn execute(cli: Cli) -> Result<(), Failure> {
             Verb::Demo(args) => cmd::demo::run(&args, &globals, console).await,
             Verb::Depth(args) => cmd::depth::run(&args, &globals, console),
             Verb::Models(args) => cmd::models::run(&args, console),
-            Verb::Zones(args) => cmd::zones::run(&args, console),
+            Verb::Zones(args) => cmd::zones::run(&args, &globals, console),
             Verb::Capture(args) => cmd::capture::run(&args, &globals, console),
             Verb::Calibrate(args) => cmd::calibrate::run(&args, &globals, console).await,
             Verb::Camera(args) => cmd::camera::run(&args, console),

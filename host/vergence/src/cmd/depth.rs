@@ -9,6 +9,7 @@ use vergence_rig::{Rig, RigPose};
 use vergence_vision::{ImageSize, Pixel, PixelPair};
 
 use super::move_to::StagePose;
+use super::report::rounded;
 use crate::board::check_range;
 use crate::camera::{Camera, FileCamera, Frame};
 use crate::cli::Globals;
@@ -71,6 +72,9 @@ pub fn run(args: &Args, globals: &Globals, console: Console) -> Result<(), Failu
         }
         write_whole(&out, ply(&look.points).as_bytes())?;
         console.say(format!("{} points in {}{}", look.points.len(), out.display(), in_words(&look.dropped)))?;
+        if let Some(warning) = look.warning() {
+            console.say(format!("warning: {warning}"))?;
+        }
         results.push(result(&look, &out));
     }
     console.result(&match (several, results.pop()) {
@@ -156,5 +160,12 @@ fn in_words(dropped: &BTreeMap<&'static str, usize>) -> String {
 }
 
 fn result(look: &Look, out: &Path) -> Value {
-    json!({ "points": look.points.len(), "dropped": look.dropped, "out": out })
+    let drift = look.pose_drift.as_ref().map(|drift| {
+        json!({
+            "deg": rounded(drift.angle.deg()),
+            "chi_squared": rounded(drift.chi_squared),
+            "significant": drift.is_significant(),
+        })
+    });
+    json!({ "points": look.points.len(), "dropped": look.dropped, "pose_drift": drift, "out": out })
 }
