@@ -45,12 +45,12 @@ async fn main(spawner: Spawner) {
     };
     log::greet(&identity);
     let mut services = Services::of_application(&board.flash);
-    let Ok(defaults) = BoardSettings::new(&factory::axes()) else { panic!("factory settings") };
+    let Ok(defaults) = BoardSettings::new(&factory::axes()) else { memory::give_up("factory settings") };
     let boot = board::random(board.random).unwrap_or_else(|| survivor().starts);
     let Ok(node) = Node::new(&defaults, identity, boot, &mut services) else {
-        panic!("factory settings");
+        memory::give_up("factory settings");
     };
-    let Some((rx, tx)) = board.line.open(node.settings().baud) else { panic!("serial line") };
+    let Some((rx, tx)) = board.line.open(node.settings().baud) else { memory::give_up("serial line") };
     control::start(node, board.rig, services, board.tick);
     if let (Ok(receive), Ok(transmit), Ok(watch)) =
         (link::receive(rx), link::transmit(tx), watchdog::watch(board.watchdog, board.led))
