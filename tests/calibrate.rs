@@ -113,6 +113,110 @@ fn a_real_pair_comes_to_the_reference_optimum() {
     assert!(number(&depth["points"]) >= 200.0, "{depth}");
 }
 
+/// The camera files of both cameras of the stereo set, from its corners.
+fn camera_files(folder: &Path, work: &Path) -> [String; 2] {
+    let csv = folder.join("corners_opencv_classic.csv").to_string_lossy().into_owned();
+    ["left", "right"].map(|side| {
+        let out = work.join(format!("{side}.toml")).to_string_lossy().into_owned();
+        let from = ["--corners", &csv, "--camera", side, "--size", "960x600"];
+        run_json(&[&["calibrate", "intrinsics", "--json", "--out", &out], &from[..]].concat());
+        out
+    })
+}
+
+/// Lenses held, known up to their covariance, and free: the more is open, the less sure is the pose.
+#[test]
+fn lenses_known_up_to_their_covariance_lie_between_exact_and_free() {
+    let Some(folder) = shared("data/sourishg_stereo") else { return };
+    let work = tempfile::tempdir().expect("a temporary folder");
+    let [left, right] = camera_files(&folder, work.path());
+    let csv = folder.join("corners_opencv_classic.csv").to_string_lossy().into_owned();
+    let pair = ["calibrate", "extrinsics", "--json", "--left", &left, "--right", &right, "--corners", &csv, "--lenses"];
+    let [exact, known, free] = ["exact", "known", "free"].map(|lenses| run_json(&[&pair[..], &[lenses]].concat()));
+    let sigma = |result: &Value| (0..6).map(|i| number(&result["joint"]["sigma"][i]).powi(2)).sum::<f64>();
+    println!("{}, {}, {}", exact["joint"], known["joint"], free["joint"]);
+    assert!(sigma(&exact) < sigma(&known) && sigma(&known) < sigma(&free));
+    // The set's cameras were not triggered together, so that the results differ by more than their sigma.
+    for other in [&exact, &known] {
+        assert!((number(&other["joint"]["baseline_mm"]) - number(&free["joint"]["baseline_mm"])).abs() < 2.0);
+    }
+    let rms = |result: &Value| number(&result["joint"]["rms_inlier_px"]);
+    assert!(rms(&free) <= rms(&known) * 1.001 && rms(&known) <= rms(&exact) * 1.001);
+    // Held-out views are predicted nearly as well.
+    let held_out = run_json(&[&pair[..], &["known", "--holdout", "4"]].concat());
+    assert!(number(&held_out["held_out"]["rms_px"]) < 1.3 * rms(&known), "{}", held_out["held_out"]["rms_px"]);
+    // A camera file that does not say how sure it is.
+    let text = std::fs::read_to_string(&left).expect("a camera file");
+    let bare = work.path().join("bare.toml").to_string_lossy().into_owned();
+    std::fs::write(&bare, text.split("[calibration]").next().expect("a camera")).expect("written");
+    let out = work.path().join("rig.toml").to_string_lossy().into_owned();
+    let mut arguments = pair.to_vec();
+    arguments[4] = &bare;
+    fails_with(&[&arguments[..], &["known", "--out", &out]].concat(), 2, &["bare.toml", "covariance"]);
+    assert!(!Path::new(&out).exists());
+}
+
+/// What a pair is told of cameras and corners that cannot be used.
+#[test]
+fn bad_pairs_are_refused_and_leave_no_file() {
+    let Some(folder) = shared("data/sourishg_stereo") else { return };
+    let work = tempfile::tempdir().expect("a temporary folder");
+    let file = |name: &str| work.path().join(name).to_string_lossy().into_owned();
+    let [left, right] = camera_files(&folder, work.path());
+    let csv = folder.join("corners_opencv_classic.csv").to_string_lossy().into_owned();
+    let (out, page, bad) = (file("rig.toml"), file("report.html"), file("bad.toml"));
+    let refused = |cameras: [&str; 2], csv: &str, more: &[&str], code: i32, words: &[&str]| {
+        let pair = ["calibrate", "extrinsics", "--left", cameras[0], "--right", cameras[1], "--corners", csv];
+        fails_with(&[&pair[..], &["--out", &out, "--report", &page], more].concat(), code, words);
+        assert!(!Path::new(&out).exists() && !Path::new(&page).exists());
+    };
+    let text = std::fs::read_to_string(&left).expect("a camera file");
+    let line = |key: &str| text.lines().find(|line| line.starts_with(key)).expect("a key").to_owned();
+    std::fs::write(&bad, text.replace(&line("opencv_k1"), "opencv_k1 = -0.9")).expect("written");
+    refused([&bad, &right], &csv, &[], 2, &["bad.toml", "turns over"]);
+    std::fs::write(&bad, text.replace(&line("fx"), "fx = nan")).expect("written");
+    refused([&bad, &right], &csv, &[], 2, &["bad.toml"]);
+    refused([&left, &file("none.toml")], &csv, &[], 2, &["none.toml"]);
+    refused([&left, &right], &csv, &["--cameras", "left", "top"], 2, &["top", "left, right"]);
+    let rows = std::fs::read_to_string(&csv).expect("corners");
+    let (few, wild) = (file("few.csv"), file("wild.csv"));
+    let header = rows.lines().next().expect("a header");
+    let of_frame = |frame: &str| rows.lines().filter(|row| row.split(',').nth(2) == Some(frame)).collect::<Vec<_>>();
+    std::fs::write(&few, [&[header], &of_frame("1")[..]].concat().join("\n")).expect("written");
+    refused([&left, &right], &few, &[], 2, &["1 views", "3"]);
+    // The right camera's corners in another order: good data that nothing fits.
+    let shuffled: Vec<String> = rows
+        .lines()
+        .map(|row| match row.strip_prefix("right,") {
+            Some(rest) => {
+                let cells: Vec<&str> = rest.split(',').collect();
+                let index: usize = cells[2].parse().expect("an index");
+                let other = (index * 7 + 3) % 54;
+                let (x, y) = (24.23 * (other % 9) as f64, 24.23 * (other / 9) as f64);
+                format!("right,{},{},{index},{},{},{x},{y}", cells[0], cells[1], cells[3], cells[4])
+            }
+            None => row.to_owned(),
+        })
+        .collect();
+    std::fs::write(&wild, shuffled.join("\n")).expect("written");
+    let output = common::run(&[
+        "calibrate",
+        "extrinsics",
+        "--left",
+        &left,
+        "--right",
+        &right,
+        "--corners",
+        &wild,
+        "--out",
+        &out,
+    ]);
+    let said = common::text(&output.stderr);
+    println!("{said}");
+    assert!(matches!(output.status.code(), Some(1 | 2)) && said.lines().count() == 1, "{said}");
+    assert!(!Path::new(&out).exists());
+}
+
 /// A small lens past 90°, so that rendering is quick.
 fn small_rig() -> String {
     vergence_rig::BENCH_TOML.replace("[1280, 1280]", "[640, 640]").replace("366.0", "183.0").replace("639.5", "319.5")
@@ -218,6 +322,82 @@ fn images_without_a_board_or_of_two_sizes_are_told() {
     fails_with(&arguments, 2, &["no board", "2 images"]);
     grey("a2.png", 310);
     fails_with(&arguments, 2, &["a2.png", "310 x 200"]);
+}
+
+/// A chessboard of `columns` x `rows` inner corners, seen from straight ahead.
+fn chessboard(path: &str, columns: u32, rows: u32) {
+    let square = |x: u32, y: u32| (x / 30 + y / 30).is_multiple_of(2);
+    let picture = image::RgbImage::from_fn(30 * (columns + 5), 30 * (rows + 5), |x, y| {
+        let inside = (60..60 + 30 * (columns + 1)).contains(&x) && (60..60 + 30 * (rows + 1)).contains(&y);
+        image::Rgb([if inside && square(x, y) { 20 } else { 230 }; 3])
+    });
+    image::imageops::blur(&picture, 0.8).save(path).expect("a picture");
+}
+
+#[test]
+fn a_board_of_another_size_is_told() {
+    let work = tempfile::tempdir().expect("a temporary folder");
+    let file = |name: &str| work.path().join(name).to_string_lossy().into_owned();
+    for name in ["a0.png", "a1.png"] {
+        chessboard(&file(name), 11, 8);
+    }
+    let (pattern, out) = (file("a*.png"), file("cam.toml"));
+    let arguments = ["calibrate", "intrinsics", "--images", &pattern, "--square", "20mm", "--out", &out, "--board"];
+    fails_with(&[&arguments[..], &["7x5"]].concat(), 2, &["11 × 8", "7 × 5"]);
+    // The right size, but the same frontal view twice.
+    fails_with(&[&arguments[..], &["11x8"]].concat(), 2, &["no calibration"]);
+    assert!(!Path::new(&out).exists());
+}
+
+/// Corners that are there, but nowhere near a board: the data can be read and the result is no good.
+#[test]
+fn a_fit_that_fails_its_own_check_is_exit_code_1() {
+    let Some(folder) = shared("data/sourishg_stereo") else { return };
+    let work = tempfile::tempdir().expect("a temporary folder");
+    let file = |name: &str| work.path().join(name).to_string_lossy().into_owned();
+    let rows = std::fs::read_to_string(folder.join("corners_opencv_classic.csv")).expect("corners");
+    let shaken: Vec<String> = rows
+        .lines()
+        .enumerate()
+        .map(|(line, row)| {
+            let mut cells: Vec<String> = row.split(',').map(str::to_owned).collect();
+            if line > 0 {
+                for (cell, stride) in [(4, 37), (5, 61)] {
+                    let shift = (line * stride % 41) as f64 - 20.0;
+                    cells[cell] = format!("{}", cells[cell].parse::<f64>().expect("a number") + shift * 0.6);
+                }
+            }
+            cells.join(",")
+        })
+        .collect();
+    let (csv, out, page) = (file("shaken.csv"), file("cam.toml"), file("report.html"));
+    std::fs::write(&csv, shaken.join("\n")).expect("written");
+    let arguments = ["calibrate", "intrinsics", "--corners", &csv, "--camera", "left", "--size", "960x600"];
+    fails_with(&[&arguments[..], &["--out", &out, "--report", &page]].concat(), 1, &["px off"]);
+    assert!(!Path::new(&out).exists() && !Path::new(&page).exists());
+}
+
+#[test]
+fn held_out_views_and_the_verdict_are_told() {
+    let Some(folder) = shared("data/ocam_fisheye1") else { return };
+    let work = tempfile::tempdir().expect("a temporary folder");
+    let file = |name: &str| work.path().join(name).to_string_lossy().into_owned();
+    let csv = folder.join("corners_opencv_classic.csv").to_string_lossy().into_owned();
+    let (page, store) = (file("report.html"), file("kept"));
+    let arguments = ["calibrate", "intrinsics", "--json", "--corners", &csv, "--size", "1032x778", "--holdout", "5"];
+    let more = ["--report", &page, "--fov", "190deg", "--store", &store, "--slot", "front", "--date", "2026-11-21"];
+    let result = run_json(&[&arguments[..], &more].concat());
+    let (held_out, used) = (number(&result["held_out"]["rms_px"]), number(&result["rms_inlier_px"]));
+    println!("{used} px used, {held_out} px held out; {}", result["verdict"]["text"]);
+    assert!(held_out > used && held_out < 1.5 * used);
+    assert_eq!(result["held_out"]["views"].as_array().map(Vec::len), Some(15));
+    let verdict = result["verdict"]["text"].as_str().expect("a sentence");
+    assert!(verdict.starts_with("Good to ") && number(&result["verdict"]["depth_sigma_mm"]) > 0.0);
+    let html = std::fs::read_to_string(&page).expect("a report");
+    assert!(html.contains(verdict) && html.contains("did not see") && html.contains("2026-11-21"));
+    let kept = run_json(&["calibrate", "list", "--json", "--store", &store]);
+    assert_eq!(kept["calibrations"][0]["name"], "front");
+    assert_eq!(kept["calibrations"][0]["kind"], "camera");
 }
 
 #[test]

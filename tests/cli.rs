@@ -15,23 +15,31 @@ use common::{fails_with, run, run_json, text};
 const VERBS: &[&str] = &[
     "devices",
     "status",
+    "doctor",
     "arm",
     "disarm",
     "clear",
     "home",
     "mode",
     "move",
+    "plan",
     "stop",
     "monitor",
+    "trigger",
+    "link-test",
+    "config",
     "sim",
     "demo",
     "depth",
+    "models",
     "zones",
     "capture",
     "calibrate",
     "camera",
     "target",
+    "bench",
     "soak",
+    "completions",
 ];
 
 fn temporary() -> tempfile::TempDir {
@@ -122,6 +130,85 @@ fn an_in_process_board_homes_and_moves_without_waiting() {
     let home = run_json(&["--port", "sim", "home", "--json"]);
     assert_eq!(home["referenced"], serde_json::json!([true, true]));
     fails_with(&["--port", "sim", "mode", "human"], 3, &["no reference", "vergence home"]);
+}
+
+#[test]
+fn a_plan_is_a_text_that_can_be_compared() {
+    let dump = || text(&run(&["plan", "herbivore", "--dump"]).stdout);
+    let plan = dump();
+    assert_eq!(plan, dump());
+    for line in [
+        "baseline    60.000 mm -> 145.000 mm, at most 45.454 mm/s",
+        "takes 2.310 s within the limits of native-sim",
+        "     0.00000      60.0000       0.0000        0.000       1467.4",
+        "     2.31001     145.0000       0.0000        0.000          0.0",
+        "     0.31000       9.3000      59.9998        0.000          0.0",
+    ] {
+        assert!(plan.lines().any(|it| it.ends_with(line)), "'{line}' is not in\n{plan}");
+    }
+    // An axis that stays has no segments, and the zones are those of the goal.
+    let turn = run_json(&["plan", "herbivore", "--from", "human", "--json"]);
+    assert_eq!(turn["axes"][0]["segments"], serde_json::json!([]));
+    assert_eq!(turn["zones_deg"]["stereo"].as_f64().map(f64::round), Some(57.0));
+    fails_with(&["plan"], 2, &["MODE"]);
+    fails_with(&["plan", "--baseline", "500mm"], 2, &["500", "220"]);
+    fails_with(&["plan", "human", "--from", "gecko"], 2, &["gecko", "herbivore"]);
+}
+
+#[test]
+fn a_thousand_poses_each_second_for_ten_minutes_and_none_is_lost() {
+    let link = run_json(&["--port", "sim", "link-test", "--seconds", "600", "--stream", "1ms", "--json"]);
+    assert!(link["poses"].as_u64().is_some_and(|poses| poses >= 599_990), "{link}");
+    for none in ["poses_lost", "unanswered", "retransmitted"] {
+        assert_eq!(link[none], 0, "{none} in {link}");
+    }
+    assert_eq!(link["clock"]["lost"], false);
+    let drift = link["clock"]["drift_ppm"].as_f64().expect("a drift");
+    assert!((drift - 40.0).abs() < 1.0, "the simulated board runs 40 ppm fast, not {drift}");
+}
+
+#[test]
+fn the_doctor_says_what_is_wrong_and_what_to_do() {
+    let healthy = run_json(&["--port", "sim", "doctor", "--json"]);
+    assert_eq!(healthy["failed"], 0);
+    let verdict = |name: &str| {
+        let checks = healthy["checks"].as_array().expect("a list");
+        let check = checks.iter().find(|check| check["check"] == name).expect("the check was made");
+        check["verdict"].as_str().expect("a verdict").to_owned()
+    };
+    for check in ["port", "versions", "start", "link", "clock", "state", "limits", "settings"] {
+        assert_eq!(verdict(check), "pass", "{check} in {healthy}");
+    }
+    assert_eq!(verdict("reference"), "warn");
+    let sick = run(&["--port", "/dev/nothing", "doctor"]);
+    assert_eq!(sick.status.code(), Some(1));
+    let said = text(&sick.stdout);
+    assert!(said.contains("fail  port") && said.contains("-> connect and power the board"), "{said}");
+}
+
+#[test]
+fn settings_are_shown_by_name_and_bad_ones_refused() {
+    let axis = run_json(&["--port", "sim", "config", "get", "separation", "--json"]);
+    assert_eq!(axis["separation.max"], "130deg");
+    assert_eq!(axis["separation.counts_per_revolution"], 100_000);
+    assert!(axis.get("baseline.max").is_none() && axis.get("baud").is_none());
+    fails_with(&["--port", "sim", "config", "set", "baseline.speed", "40"], 2, &["baseline.speed", "40mm/s"]);
+    fails_with(&["--port", "sim", "config", "set", "baseline.speed", "5m/s"], 2, &["cannot be 5m/s"]);
+    fails_with(&["--port", "sim", "config", "set", "speed", "40mm/s"], 2, &["baseline.speed, separation.speed"]);
+    fails_with(&["--port", "sim", "config", "set", "baseline.speed"], 2, &["VALUE"]);
+    fails_with(&["--port", "sim", "config", "set", "--file", "/nowhere.toml"], 2, &["/nowhere.toml"]);
+    fails_with(&["--port", "sim", "trigger", "--rate", "0"], 2, &["0.1 to 500"]);
+    fails_with(&["--port", "sim", "trigger"], 2, &["--once"]);
+}
+
+#[test]
+fn shells_learn_every_verb() {
+    for shell in ["bash", "zsh", "fish"] {
+        let output = run(&["completions", shell]);
+        let script = text(&output.stdout);
+        assert!(output.status.success() && VERBS.iter().all(|verb| script.contains(verb)), "{shell}");
+    }
+    fails_with(&["completions", "abacus"], 2, &["abacus", "bash"]);
 }
 
 #[test]
@@ -219,4 +306,15 @@ fn depth_of_given_correspondences() {
     for (got, expected) in numbers.iter().zip([100.0, 0.0, 100.0]) {
         assert!((got - expected).abs() < 0.01, "{numbers:?}");
     }
+}
+
+#[test]
+fn a_bench_without_its_data_or_peers_says_so() {
+    let folder = temporary();
+    let bench = ["bench", "calibrate", "--shared", folder.path().to_str().expect("a name")];
+    fails_with(&bench, 2, &["no calibration data", "VERGENCE_SHARED"]);
+    let Some(shared) = common::shared("data") else { return };
+    let shared = shared.parent().expect("above it").to_string_lossy().into_owned();
+    let bench = ["bench", "calibrate", "--shared", &shared, "--python", "/nowhere/python"];
+    fails_with(&bench, 2, &["/nowhere/python", "--no-peer"]);
 }

@@ -138,10 +138,7 @@ impl Axis {
         if run_up == 0 || !self.referenced || self.takes_up_play(from, target, run_up) {
             return Trajectory::reach(from, target, limits, at_least);
         }
-        let last = Trajectory::reach(MotionState::at(target - run_up), target, full.scaled(share), 0.0);
-        let mut whole = Trajectory::reach(from, target - run_up, limits, at_least - last.duration());
-        whole.append(&last);
-        whole
+        Trajectory::reach_from_below(from, (target, run_up), [limits, full.scaled(share)], at_least)
     }
 
     /// Whether a straight motion ends with the play taken up from below.

@@ -71,6 +71,20 @@ impl Trajectory {
         cruising.filter(|cruising| cruising.duration() <= halting.duration()).unwrap_or(halting)
     }
 
+    /// The same, with the last `run_up` of the way from below and within `last`: play is taken up on the same side.
+    #[must_use]
+    pub fn reach_from_below(
+        from: MotionState,
+        (target, run_up): (Fine, Fine),
+        [limits, last]: [Limits; 2],
+        at_least: f32,
+    ) -> Self {
+        let last = Self::reach(MotionState::at(target - run_up), target, last, 0.0);
+        let mut whole = Self::reach(from, target - run_up, limits, at_least - last.duration());
+        whole.append(&last);
+        whole
+    }
+
     /// From rest, a longer time is the same path run slower.
     fn from_rest(position: Fine, target: Fine, limits: Limits, at_least: f32) -> Self {
         let distance = micro(target - position);

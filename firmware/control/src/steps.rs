@@ -7,7 +7,7 @@ use crate::io::MAX_STEPS_PER_TICK;
 use crate::settings::Scale;
 use crate::trajectory::{Fine, Segment, micro, seconds};
 
-/// Newton's method has converged when it moves an instant by less than this, a twentieth of what is promised.
+/// Newton's method has converged when an instant is known to this, a twentieth of what is promised.
 const CONVERGED_S: f32 = 50e-9;
 /// Newton's method doubles its digits each time; where it leaves the bracket, halving has narrowed a tick to 15 ns by then.
 const MOST_ROUNDS: u32 = 16;
@@ -88,19 +88,28 @@ impl Rise {
     /// When it has risen by `height`, which it has not `after` but by its end: Newton's method, kept inside a bracket.
     fn crosses(&self, height: f32, after: f32) -> f32 {
         let Self { velocity: v, acceleration: a, jerk: j, duration } = *self;
+        let (half_a, half_j, sixth_j) = (a / 2.0, j / 2.0, j / 6.0);
         let (mut low, mut high) = (after, duration);
         let mut t = low;
         for _ in 0..MOST_ROUNDS {
-            let left = height - t * (v + t * (a / 2.0 + t * j / 6.0));
+            let left = height - t * (v + t * (half_a + t * sixth_j));
             if left > 0.0 {
-                low = t
+                low = t;
             } else {
-                high = t
+                high = t;
             }
-            let slope = v + t * (a + t * j / 2.0);
-            let next = t + left / slope;
+            let slope = v + t * (a + t * half_j);
+            let by = left / slope;
+            let newton = t + by;
             // Also where the slope is zero: then it is not a number, or infinite.
-            let next = if next >= low && next <= high { next } else { f32::midpoint(low, high) };
+            let inside = newton >= low && newton <= high;
+            // What Newton's method leaves over is what the bend makes of the square of its move.
+            let bend = fabsf(a + t * j) + fabsf(j * by);
+            let slope_there = v + newton * (a + newton * half_j);
+            if inside && bend * by * by < CONVERGED_S * slope.min(slope_there) {
+                return newton;
+            }
+            let next = if inside { newton } else { f32::midpoint(low, high) };
             if fabsf(next - t) < CONVERGED_S {
                 return next;
             }

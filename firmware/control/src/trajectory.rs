@@ -161,13 +161,25 @@ impl Trajectory {
     #[must_use]
     pub fn ends(&self) -> Microseconds {
         let (whole, rest) = (self.duration >> 32, self.duration & 0xffff_ffff);
-        Microseconds((whole * 1_000_000 + (rest * 1_000_000 >> 32) + 1) as u64)
+        Microseconds((whole * 1_000_000 + ((rest * 1_000_000) >> 32) + 1) as u64)
     }
 
     /// Where it comes to rest.
     #[must_use]
     pub fn target(&self) -> Fine {
         self.target
+    }
+
+    /// Where each piece begins: seconds since the start, the state, and the jerk from there on; then the end, at rest.
+    pub fn knots(&self) -> impl Iterator<Item = (f64, MotionState, Fine)> + '_ {
+        let mut begins = 0;
+        let pieces = self.segments.iter().map(move |segment| {
+            let start = begins;
+            begins += segment.duration;
+            (start as f64 / f64::from(TICKS_PER_SECOND), segment.start, segment.jerk)
+        });
+        let end = (self.duration as f64 / f64::from(TICKS_PER_SECOND), MotionState::at(self.target), 0);
+        pieces.chain((self.duration > 0).then_some(end))
     }
 
     /// The state `elapsed` after the start.

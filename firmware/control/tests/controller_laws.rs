@@ -21,6 +21,7 @@ enum Act {
         targets: [i32; 2],
         speed: u16,
     },
+    Jog([i32; 2]),
     Stop(StopKind),
     Clear {
         right: bool,
@@ -60,6 +61,7 @@ fn any_act() -> impl Strategy<Value = Act> {
         2 => (0u8..=7).prop_map(Act::Home),
         8 => (any_session(), any_targets(), speed)
             .prop_map(|(session, targets, speed)| Act::MoveTo { session, targets, speed }),
+        1 => (-30_000..30_000, -300_000..300_000).prop_map(|(first, second)| Act::Jog([first, second])),
         3 => stop.prop_map(Act::Stop),
         2 => any::<bool>().prop_map(|right| Act::Clear { right }),
         1 => Just(Act::OtherBeats),
@@ -78,6 +80,7 @@ impl Act {
             Self::Disarm => drop(world.ask(HOST, &Request::Disarm)),
             Self::Home(mask) => drop(world.home(AxisMask(mask))),
             Self::MoveTo { session, targets, speed } => drop(world.move_by(session, targets, speed)),
+            Self::Jog(by) => drop(world.jog(by)),
             Self::Stop(kind) => drop(world.ask(HOST, &Request::Stop { kind })),
             Self::Clear { right: true } => drop(world.clear()),
             Self::Clear { right: false } => {
@@ -123,7 +126,7 @@ fn any_wait(longest_us: u64) -> impl Strategy<Value = u64> {
 }
 
 proptest! {
-    #![proptest_config(seeded(1000))]
+    #![proptest_config(seeded(600))]
 
     #[test]
     fn no_script_breaks_a_promise(script in prop::collection::vec((any_wait(400_000), any_act()), 1..40)) {

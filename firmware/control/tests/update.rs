@@ -5,7 +5,6 @@ mod update_bench;
 
 use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64Mcg;
-use sha2::Digest;
 use vergence_control::{Flash, PAGE};
 use vergence_plant::{Cut, NATIVE_HARDWARE};
 use vergence_protocol::management::{

@@ -17,6 +17,8 @@ pub struct AxisMechanics {
     pub encoder: Scale,
     /// Play between motor and load.
     pub backlash: f64,
+    /// Play between the encoder and the stage that it stands for, such as of a rack behind its pinion.
+    pub encoder_play: f64,
     /// How fast the load follows the motor: time constant in seconds, above zero.
     pub compliance: f64,
     /// Where the home switch closes (at and below).
@@ -37,13 +39,17 @@ pub struct AxisPlant {
     steps: i32,
     /// Axis position of motor step zero; changes when steps are lost.
     motor_zero: f64,
+    /// Where the encoder's scale is, and where the stage is.
     load: f64,
+    stage: f64,
     encoder: Encoder,
     home: Switch,
     blocked: bool,
     stalled: bool,
     /// Steps that the rotor will miss.
     to_lose: u32,
+    /// Share of every step that the coupling slips by.
+    slips: f64,
 }
 
 impl AxisPlant {
@@ -56,11 +62,13 @@ impl AxisPlant {
             steps: 0,
             motor_zero: position,
             load: position,
+            stage: position,
             encoder: Encoder::new(scale_reading(mechanics.encoder, position)),
             home: Switch::new(position <= mechanics.home_switch),
             blocked: false,
             stalled: false,
             to_lose: 0,
+            slips: 0.0,
         }
     }
 
@@ -68,6 +76,12 @@ impl AxisPlant {
     #[must_use]
     pub fn load(&self) -> f64 {
         self.load
+    }
+
+    /// Where the stage truly is: behind the load by the play between them.
+    #[must_use]
+    pub fn stage(&self) -> f64 {
+        self.stage
     }
 
     /// The raw encoder count.
@@ -112,6 +126,11 @@ impl AxisPlant {
         self.to_lose += steps;
     }
 
+    /// The coupling slips by `share` of every step, or holds again with 0.
+    pub fn slip(&mut self, share: f64) {
+        self.slips = share;
+    }
+
     /// Makes the encoder fail from here on, or whole again.
     pub fn fail_encoder(&mut self, fault: Option<EncoderFault>) {
         self.encoder.fail(fault, self.scale_reading());
@@ -120,6 +139,11 @@ impl AxisPlant {
     /// Makes the home switch behave badly from now on, or well again.
     pub fn disturb_home_switch(&mut self, noise: Option<SwitchNoise>) {
         self.home.disturb(noise);
+    }
+
+    /// The home switch reads this from now on, whatever it touches, or the truth again.
+    pub fn fix_home_switch(&mut self, reading: Option<bool>) {
+        self.home.fix(reading);
     }
 
     /// Whether the home switch reads closed.
@@ -149,6 +173,8 @@ impl AxisPlant {
         let held_by = if self.blocked { [self.load; 2] } else { self.mechanics.end_stops };
         self.load += (pulled - self.load) * share;
         self.strike(held_by, motor);
+        let play = self.mechanics.encoder_play / 2.0;
+        self.stage = self.stage.clamp(self.load - play, self.load + play);
         self.encoder.advance();
         self.home.advance(self.load <= self.mechanics.home_switch, to.0 - from.0);
     }
@@ -158,10 +184,9 @@ impl AxisPlant {
         while let Some((_, forward)) = self.ordered.pop_front_if(|(at, _)| *at <= to.0 * 1000) {
             let by = if forward { 1 } else { -1 };
             self.steps += by;
-            if self.stalled || self.to_lose > 0 {
-                self.motor_zero -= f64::from(by) * step;
-                self.to_lose = self.to_lose.saturating_sub(1);
-            }
+            let lost = if self.stalled || self.to_lose > 0 { 1.0 } else { self.slips };
+            self.to_lose = self.to_lose.saturating_sub(1);
+            self.motor_zero -= f64::from(by) * step * lost;
         }
     }
 

@@ -87,6 +87,7 @@ fn mechanics(settings: &AxisSettings, backlash: f64, beyond: [f64; 2], further: 
         motor: settings.motor(),
         encoder: settings.encoder(),
         backlash,
+        encoder_play: 0.0,
         compliance: 2e-3,
         home_switch: f64::from(settings.homing.switch_at.0),
         hard_limits,

@@ -93,6 +93,11 @@ impl NativeBoard {
         }
     }
 
+    /// Keeps the processor from its next control tick for `us` microseconds.
+    pub fn delay_tick(&mut self, us: u64) {
+        self.next_tick.0 += us;
+    }
+
     /// Takes bytes that arrive now.
     pub fn receive(&mut self, bytes: &[u8]) {
         self.node.receive(self.now, bytes, &mut self.plant, &mut self.services);

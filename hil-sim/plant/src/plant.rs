@@ -14,23 +14,29 @@ pub struct Plant {
     now: Microseconds,
     drivers_on: bool,
     emergency_stop: bool,
+    /// The axis whose home switch is wired to each input.
+    home_wires: Vec<usize>,
     /// When the cameras are to be fired.
     trigger_at: Option<Microseconds>,
     trigger_edges: VecDeque<TriggerEdge>,
+    exposed: Option<(Microseconds, Vec<f64>)>,
 }
 
 impl Plant {
     /// Axes standing at `positions` (micro-units), drivers off.
     #[must_use]
     pub fn new(mechanics: &[AxisMechanics], positions: &[f64]) -> Self {
-        let axes = mechanics.iter().zip(positions).map(|(&axis, &position)| AxisPlant::new(axis, position)).collect();
+        let axes: Vec<_> =
+            mechanics.iter().zip(positions).map(|(&axis, &position)| AxisPlant::new(axis, position)).collect();
         Self {
+            home_wires: (0..axes.len()).collect(),
             axes,
             now: Microseconds(0),
             drivers_on: false,
             emergency_stop: false,
             trigger_at: None,
             trigger_edges: VecDeque::new(),
+            exposed: None,
         }
     }
 
@@ -46,6 +52,25 @@ impl Plant {
         self.axes.get(axis).map(AxisPlant::load)
     }
 
+    /// Where the stage of `axis` truly is, in micro-units: behind the load by the play between them.
+    #[must_use]
+    pub fn stage(&self, axis: usize) -> Option<f64> {
+        self.axes.get(axis).map(AxisPlant::stage)
+    }
+
+    /// The wires of two home switches change places. There is no effect where there is no such axis.
+    pub fn cross_home_switches(&mut self, one: usize, other: usize) {
+        if one.max(other) < self.home_wires.len() {
+            self.home_wires.swap(one, other);
+        }
+    }
+
+    /// When the cameras were last fired, and where every load truly was then, in micro-units.
+    #[must_use]
+    pub fn exposed(&self) -> Option<(Microseconds, &[f64])> {
+        self.exposed.as_ref().map(|(at, loads)| (*at, loads.as_slice()))
+    }
+
     /// One axis, for doing something to it; `None` where there is no such axis.
     pub fn axis_mut(&mut self, axis: usize) -> Option<&mut AxisPlant> {
         self.axes.get_mut(axis)
@@ -56,6 +81,7 @@ impl Plant {
         self.set_drivers(false);
         self.trigger_at = None;
         self.trigger_edges.clear();
+        self.exposed = None;
         self.now = Microseconds(0);
     }
 
@@ -92,6 +118,7 @@ impl Plant {
     fn latch(&mut self) {
         let counts = self.axes.iter().map(AxisPlant::encoder).collect();
         self.trigger_edges.push_back(TriggerEdge { at: self.now, counts });
+        self.exposed = Some((self.now, self.loads()));
     }
 
     fn run_to(&mut self, to: Microseconds) {
@@ -130,7 +157,8 @@ impl RigIo for Plant {
     }
 
     fn home_switch(&self, axis: usize) -> bool {
-        self.axes.get(axis).is_some_and(AxisPlant::home_switch)
+        let switch = self.home_wires.get(axis).and_then(|&wired| self.axes.get(wired));
+        switch.is_some_and(AxisPlant::home_switch)
     }
 
     fn hard_limit(&self, axis: usize) -> bool {

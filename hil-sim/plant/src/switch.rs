@@ -19,6 +19,7 @@ pub struct SwitchNoise {
 pub struct Switch {
     closed: bool,
     reading: bool,
+    fixed: Option<bool>,
     chatter_left_us: u64,
     noise: Option<(SwitchNoise, Pcg64Mcg)>,
 }
@@ -26,7 +27,7 @@ pub struct Switch {
 impl Switch {
     /// A good switch.
     pub fn new(closed: bool) -> Self {
-        Self { closed, reading: closed, chatter_left_us: 0, noise: None }
+        Self { closed, reading: closed, fixed: None, chatter_left_us: 0, noise: None }
     }
 
     /// A switch that behaves badly from now on, or well again.
@@ -36,9 +37,14 @@ impl Switch {
         self.reading = self.closed;
     }
 
+    /// A switch that reads this whatever happens to it, or is whole again.
+    pub fn fix(&mut self, reading: Option<bool>) {
+        self.fixed = reading;
+    }
+
     /// What the wire reads.
     pub fn reads_closed(&self) -> bool {
-        self.reading
+        self.fixed.unwrap_or(self.reading)
     }
 
     /// The contact is `closed` after `us` have passed.

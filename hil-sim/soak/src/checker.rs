@@ -1,7 +1,5 @@
 //! Looks on: the truth of the mechanics, the bytes that reach the board, the bytes that leave it.
 
-use std::fmt;
-
 use vergence_control::RigIo;
 use vergence_plant::{Plant, Stage};
 use vergence_protocol::{
@@ -11,13 +9,11 @@ use vergence_protocol::{
 
 use crate::faults::Fault;
 use crate::journal::Journal;
+use crate::promise::{Promise, Sight, Violation};
+use crate::watched_axis::WatchedAxis;
 
-/// The control tick, and how finely truth is looked at.
-const TICK_S: f64 = 1e-3;
 /// From the end of the lease to the tick that notices it, and from there to the look at its last step.
 const NOTICE_US: u64 = 3_000;
-/// A contact that closes for good is told from a spike within this time; a spike shortly before may pass for its edge.
-const DEBOUNCE_S: f64 = 10e-3;
 
 /// States of a disarmed board.
 const OFF: [ControllerState; 5] = [
@@ -27,71 +23,6 @@ const OFF: [ControllerState; 5] = [
     ControllerState::Updating,
     ControllerState::Trial,
 ];
-
-/// What is promised.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Promise {
-    /// The load stays inside the hard limit switches.
-    HardLimit,
-    /// Drivers go on only where a session with a live lease arms; motors step only with drivers on.
-    Armed,
-    /// Motors stop in time after the lease.
-    Lease,
-    /// Moves that must not be are refused.
-    Refuses,
-    /// A mode is reported only at its place.
-    Mode,
-    /// An axis whose encoder is lost stops.
-    Follows,
-    /// The first fault is kept until it is cleared.
-    FirstFault,
-    /// What a pose says of the board is true.
-    State,
-    /// Every motion and every request ends, and in the end everything stands still.
-    Ends,
-}
-
-/// A broken promise.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Violation {
-    /// When, true time.
-    pub at: Microseconds,
-    /// Which.
-    pub promise: Promise,
-    /// What was seen.
-    pub what: String,
-}
-
-impl fmt::Display for Violation {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "{:?}: {}", self.promise, self.what)
-    }
-}
-
-/// What an encoder shows of its load.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Sight {
-    /// The truth.
-    Clear,
-    /// The truth with noise.
-    Blurred,
-    /// Nothing.
-    Lost,
-}
-
-#[derive(Debug)]
-struct WatchedAxis {
-    stage: Stage,
-    sight: Sight,
-    /// Whether its encoder has ever lied.
-    lied: bool,
-    /// How far the reference may be off.
-    reference_error: f64,
-    steps: i32,
-    load: f64,
-    /// Where the load was when it was lost from sight with drivers on.
-    lost_at: Option<f64>,
-}
 
 #[derive(Debug)]
 pub struct Checker {
@@ -107,6 +38,8 @@ pub struct Checker {
     drivers_on: bool,
     clear_asked: Option<u16>,
     fault: Option<FaultRecord>,
+    /// Which axes claim their reference.
+    referenced: AxisMask,
     /// No pose since the restart.
     restarted: bool,
     state: Option<ControllerState>,
@@ -129,6 +62,7 @@ impl Checker {
             drivers_on: false,
             clear_asked: None,
             fault: None,
+            referenced: AxisMask(0),
             restarted: true,
             state: None,
             busy_since: None,
@@ -177,7 +111,7 @@ impl Checker {
         for index in 0..self.axes.len() {
             let (steps, load) = (plant.steps(index), plant.load(index).unwrap_or_default());
             let axis = &mut self.axes[index];
-            let stepped = steps != axis.steps;
+            let made = steps.wrapping_sub(axis.steps);
             (axis.steps, axis.load) = (steps, load);
             axis.lost_at = (axis.sight == Sight::Lost && plant.drivers_on()).then(|| axis.lost_at.unwrap_or(load));
             if let Some(what) = axis.check_hard_limit() {
@@ -186,8 +120,13 @@ impl Checker {
             if let Some(what) = self.axes[index].check_following() {
                 self.accuse(now, Promise::Follows, format!("axis {index}: {what}"));
             }
-            if stepped {
+            if made != 0 {
                 self.check_step(now, index, holder);
+                if !self.referenced.contains(index)
+                    && let Some(what) = self.axes[index].check_gentle(made)
+                {
+                    self.accuse(now, Promise::Gentle, format!("axis {index}: {what}"));
+                }
             }
         }
         if let Some(since) = self.busy_since
@@ -297,6 +236,7 @@ impl Checker {
         }
         let busy = matches!(pose.state, ControllerState::Homing | ControllerState::Moving | ControllerState::Stopping);
         self.busy_since = if busy { self.busy_since.or(Some(now.0)) } else { None };
+        self.referenced = pose.referenced;
         self.check_fault(now, pose.fault);
         self.check_state(now, pose, plant);
         if pose.mode != Mode(0)
@@ -305,7 +245,9 @@ impl Checker {
             self.accuse(now, Promise::Mode, what);
         }
         if std::mem::take(&mut self.restarted) {
-            let fresh = pose.referenced == AxisMask(0) && pose.phase == MovePhase::None && pose.fault.is_none();
+            // The self-test may have found something since.
+            let new_fault = pose.fault.is_none_or(|fault| fault.seq == 1 && fault.at <= pose.at);
+            let fresh = pose.referenced == AxisMask(0) && pose.phase == MovePhase::None && new_fault;
             if !fresh {
                 self.accuse(now, Promise::State, format!("remembers what was before its start: {pose:?}"));
             }
@@ -357,53 +299,5 @@ impl Checker {
         if now.0.saturating_sub(self.stepped_at) < 100_000 {
             self.accuse(now, Promise::Ends, "still stepping at the end".into());
         }
-    }
-}
-
-impl WatchedAxis {
-    fn new(index: usize, stage: Stage, faults: &[Fault], plant: &Plant) -> Self {
-        // The reference is the edge seen at a tick.
-        let chatter = faults.iter().find_map(|fault| match *fault {
-            Fault::SwitchBounce { axis, chatter_us, .. } if axis == index => {
-                Some(chatter_us as f64 * 1e-6 + DEBOUNCE_S)
-            }
-            _ => None,
-        });
-        let late = TICK_S + chatter.unwrap_or(0.0);
-        Self {
-            stage,
-            sight: Sight::Clear,
-            lied: false,
-            reference_error: f64::from(stage.settings.homing.approach_speed) * late,
-            steps: plant.steps(index),
-            load: plant.load(index).unwrap_or_default(),
-            lost_at: None,
-        }
-    }
-
-    /// What no controller can take back: the way of a tick at full speed, and the load's lag behind its motor.
-    fn overshoot(&self) -> f64 {
-        let mechanics = &self.stage.mechanics;
-        f64::from(self.stage.settings.speed) * (TICK_S + mechanics.compliance) + mechanics.backlash
-    }
-
-    fn check_hard_limit(&self) -> Option<String> {
-        let [low, high] = self.stage.mechanics.hard_limits;
-        let beyond = (low - self.load).max(self.load - high);
-        (beyond > self.overshoot()).then(|| format!("{beyond:.1} beyond its hard limit, at {:.1}", self.load))
-    }
-
-    fn check_following(&self) -> Option<String> {
-        let settings = &self.stage.settings;
-        let allowed = f64::from(settings.following_error.0 + settings.homing.repeatability.0) + self.overshoot();
-        let way = (self.load - self.lost_at?).abs();
-        (way > allowed).then(|| format!("went {way:.1} of {allowed:.1} without encoder"))
-    }
-
-    fn mode_tolerance(&self) -> f64 {
-        let settings = &self.stage.settings;
-        let count = f64::from(settings.encoder().position_at(1_000_000).0) * 1e-6;
-        let blind = if self.lied { f64::from(settings.following_error.0) } else { 0.0 };
-        f64::from(settings.tolerance.0) + self.reference_error + 2.0 * count + blind
     }
 }

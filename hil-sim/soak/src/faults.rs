@@ -37,8 +37,14 @@ pub enum FaultKind {
     MotorStall,
     /// A motor loses steps in bursts.
     LostSteps,
+    /// A coupling slips.
+    Slip,
     /// A load is wedged.
     BlockedLoad,
+    /// The wires of the home switches have changed places.
+    CrossedSwitches,
+    /// The processor is kept from its control tick.
+    LateTick,
     /// The emergency stop is pressed.
     EmergencyStop,
     /// The host's clock jumps.
@@ -49,7 +55,7 @@ pub enum FaultKind {
 
 impl FaultKind {
     /// All kinds.
-    pub const ALL: [Self; 17] = [
+    pub const ALL: [Self; 20] = [
         Self::None,
         Self::ByteErrors,
         Self::Drops,
@@ -63,7 +69,10 @@ impl FaultKind {
         Self::SwitchBounce,
         Self::MotorStall,
         Self::LostSteps,
+        Self::Slip,
         Self::BlockedLoad,
+        Self::CrossedSwitches,
+        Self::LateTick,
         Self::EmergencyStop,
         Self::ClockJump,
         Self::Several,
@@ -86,7 +95,10 @@ impl FaultKind {
             Self::SwitchBounce => "switch_bounce",
             Self::MotorStall => "motor_stall",
             Self::LostSteps => "lost_steps",
+            Self::Slip => "slip",
             Self::BlockedLoad => "blocked_load",
+            Self::CrossedSwitches => "crossed_switches",
+            Self::LateTick => "late_tick",
             Self::EmergencyStop => "emergency_stop",
             Self::ClockJump => "clock_jump",
             Self::Several => "several",
@@ -164,6 +176,21 @@ pub enum Fault {
         /// Time to the second burst.
         again_us: u64,
     },
+    /// The coupling of an axis slips by a share of every step for this many microseconds.
+    Slip {
+        /// When.
+        onset: Onset,
+        /// Whose.
+        axis: usize,
+        /// By how much of each step; below zero the load goes further than the motor.
+        share: f64,
+        /// For how long.
+        lasts_us: u64,
+    },
+    /// The wires of the home switches have changed places from the first day on.
+    CrossedSwitches,
+    /// The next control tick comes so many microseconds late.
+    LateTick(Onset, u64),
     /// The load of an axis is wedged for this many microseconds.
     BlockedLoad {
         /// When.
@@ -216,6 +243,9 @@ impl Fault {
                 let steps = random.random_range(1..3_000);
                 Self::LostSteps { onset, axis, steps, again_us: lasts_us }
             }
+            FaultKind::Slip => Self::Slip { onset, axis, share: random.random_range(-0.5..0.9), lasts_us },
+            FaultKind::CrossedSwitches => Self::CrossedSwitches,
+            FaultKind::LateTick => Self::LateTick(onset, random.random_range(100..3_000)),
             FaultKind::BlockedLoad => Self::BlockedLoad { onset, axis, lasts_us },
             FaultKind::EmergencyStop => Self::EmergencyStop(onset, lasts_us),
             FaultKind::ClockJump => Self::ClockJump(onset, random.random_range(-3_000_000..3_000_000)),

@@ -2,8 +2,8 @@
 //! It never takes up motion again by itself: every arm, home and move is asked for anew.
 
 use vergence_protocol::{
-    AxisMask, ControllerState, FaultRecord, HostEvent, HostSession, MAX_FRAME, Microseconds, Move, MoveId, MovePhase,
-    Report, Request, SessionId, Status, StopKind, Ticket,
+    AxisMask, ControllerState, FaultRecord, HostEvent, HostSession, Jog, MAX_FRAME, Microseconds, Move, MoveId,
+    MovePhase, Permille, Refusal, Report, Request, SessionId, Status, StopKind, Ticket,
 };
 
 use crate::scenario::{Destination, Step};
@@ -41,6 +41,9 @@ enum Purpose {
     Arm,
     Home,
     Move(MoveId),
+    /// Another target in mid-move.
+    Turn(MoveId),
+    Jog(MoveId),
     Forbidden,
     Clear,
     Disarm,
@@ -82,6 +85,8 @@ pub struct Host {
     homed: bool,
     going: Option<MoveId>,
     stop_due: Option<Microseconds>,
+    turn_due: Option<Microseconds>,
+    turned: bool,
     next_move: u16,
     requests: u32,
     /// The fault that was looked at last.
@@ -108,6 +113,8 @@ impl Host {
             homed: false,
             going: None,
             stop_due: None,
+            turn_due: None,
+            turned: false,
             next_move: 0,
             requests: 0,
             mending: None,
@@ -220,7 +227,7 @@ impl Host {
     }
 
     fn clear(&mut self, now: Microseconds, fault: FaultRecord) {
-        (self.homed, self.stop_due) = (false, None);
+        (self.homed, self.stop_due, self.turn_due) = (false, None, None);
         if self.mending.replace(fault.seq) != Some(fault.seq) {
             self.wait_until = Microseconds(now.0 + MEND_US);
             return;
@@ -230,6 +237,12 @@ impl Host {
 
     /// Goes on with a step, given what the board does.
     fn pursue(&mut self, now: Microseconds, step: Step, seen: Seen) {
+        if seen.state == ControllerState::Moving
+            && let Step::Retarget(_, _, to) = step
+            && self.turn_due.take_if(|due| *due <= now).is_some()
+        {
+            return self.ask_turn(now, to);
+        }
         if !matches!(seen.state, ControllerState::Idle | ControllerState::Ready) {
             return;
         }
@@ -248,19 +261,38 @@ impl Host {
             _ if idle => self.ask(now, Purpose::Arm, Request::Arm { session }),
             Step::Arm => self.next_step(),
             Step::Home if self.homed && seen.referenced => self.next_step(),
+            // Once only: one after the other may end at a hard limit.
+            Step::Jog(_) if self.going.is_some() => self.next_step(),
+            Step::Jog(by) => {
+                let id = self.name_move();
+                let jog = Jog { id, by: by.into_iter().collect(), speed: Permille::FULL };
+                self.ask(now, Purpose::Jog(id), Request::Jog(jog));
+            }
+            Step::Retarget(..) if self.turned && seen.settled == self.going => self.next_step(),
+            Step::Retarget(_, _, to) if self.going.is_some() && seen.referenced => self.ask_turn(now, to),
             Step::MoveAndStop(..) if self.going.is_some() => self.next_step(),
             Step::Move(_) if self.going.is_some() && seen.settled == self.going => self.next_step(),
-            Step::Move(to) | Step::MoveAndStop(to, _) if seen.referenced => {
-                self.next_move += 1;
-                self.ask_move(now, Purpose::Move(MoveId(self.next_move)), to);
+            Step::Move(to) | Step::MoveAndStop(to, _) | Step::Retarget(to, ..) if seen.referenced => {
+                let id = self.name_move();
+                self.ask_move(now, Purpose::Move(id), to);
             }
             Step::MoveTooFar(to) if seen.referenced => self.ask_move(now, Purpose::Forbidden, to),
             _ => self.ask(now, Purpose::Home, Request::Home { axes: AxisMask::first(stages().len()) }),
         }
     }
 
+    fn name_move(&mut self) -> MoveId {
+        self.next_move += 1;
+        MoveId(self.next_move)
+    }
+
+    fn ask_turn(&mut self, now: Microseconds, to: Destination) {
+        let id = self.name_move();
+        self.ask_move(now, Purpose::Turn(id), to);
+    }
+
     fn ask_move(&mut self, now: Microseconds, purpose: Purpose, to: Destination) {
-        let id = if let Purpose::Move(id) = purpose { id } else { MoveId(u16::MAX) };
+        let id = if let Purpose::Move(id) | Purpose::Turn(id) = purpose { id } else { MoveId(u16::MAX) };
         let targets = to.targets.into_iter().collect();
         self.ask(now, purpose, Request::MoveTo(Move { id, mode: to.mode, targets, speed: to.speed }));
     }
@@ -314,10 +346,15 @@ impl Host {
             (Purpose::Home, _) => self.homed = status == Status::Accepted,
             (Purpose::Move(id), Status::Accepted) => {
                 self.going = Some(id);
-                if let Some(Step::MoveAndStop(_, after_us)) = self.script.get(self.step) {
-                    self.stop_due = Some(Microseconds(now.0 + after_us));
+                match self.script.get(self.step) {
+                    Some(Step::MoveAndStop(_, us)) => self.stop_due = Some(Microseconds(now.0 + us)),
+                    Some(Step::Retarget(_, us, _)) => self.turn_due = Some(Microseconds(now.0 + us)),
+                    _ => {}
                 }
             }
+            (Purpose::Turn(id), Status::Accepted) => (self.going, self.turned) = (Some(id), true),
+            (Purpose::Jog(id), Status::Accepted) => self.going = Some(id),
+            (Purpose::Jog(_), Status::Refused(Refusal::OutsideLimits { .. })) => self.next_step(),
             (Purpose::Forbidden, Status::Accepted) => self.finish(HostEnd::ForbiddenAccepted),
             (Purpose::Forbidden, Status::Refused(_)) => self.next_step(),
             (Purpose::Clear, Status::Accepted) => {
@@ -334,6 +371,7 @@ impl Host {
     fn next_step(&mut self) {
         self.step += 1;
         (self.homed, self.going, self.stop_due, self.requests) = (false, None, None, 0);
+        (self.turned, self.turn_due) = (false, None);
         self.notes.push(match self.script.get(self.step) {
             Some(step) => format!("host: next is {step:?}"),
             None => "host: all done".into(),

@@ -3,10 +3,11 @@
 use vergence_plant::{AxisPlant, EncoderFault, Plant, SwitchNoise};
 use vergence_protocol::Microseconds;
 
-use crate::checker::{Checker, Sight};
+use crate::checker::Checker;
 use crate::faults::{Fault, Onset};
 use crate::journal::Journal;
 use crate::line::Line;
+use crate::promise::Sight;
 use crate::scenario::Scenario;
 
 /// Everything that can be harmed.
@@ -16,6 +17,8 @@ pub struct World<'a> {
     pub step: usize,
     pub in_step_us: u64,
     pub plant: &'a mut Plant,
+    /// How long the processor is kept from its next tick.
+    pub late_us: &'a mut u64,
     pub lines: [&'a mut Line; 2],
     pub host_offset: &'a mut i64,
     pub checker: &'a mut Checker,
@@ -70,7 +73,7 @@ impl Injector {
 fn is_due(fault: &Fault, world: &World<'_>) -> bool {
     let onset = match *fault {
         Fault::ByteErrors(_) | Fault::Drops(_) | Fault::Duplicates(_) => return false,
-        Fault::SwitchBounce { .. } => return true,
+        Fault::SwitchBounce { .. } | Fault::CrossedSwitches => return true,
         Fault::Stall(onset, _)
         | Fault::Disconnect(onset, _)
         | Fault::Reset(onset)
@@ -79,6 +82,8 @@ fn is_due(fault: &Fault, world: &World<'_>) -> bool {
         | Fault::Encoder { onset, .. }
         | Fault::MotorStall { onset, .. }
         | Fault::LostSteps { onset, .. }
+        | Fault::Slip { onset, .. }
+        | Fault::LateTick(onset, _)
         | Fault::BlockedLoad { onset, .. } => onset,
     };
     let Onset { step, after_us } = onset;
@@ -123,6 +128,18 @@ fn begin(fault: &Fault, seed: u64, world: &mut World<'_>) -> Option<u64> {
             on_axis(world, axis, |axis| axis.lose_steps(steps));
             Some(again_us)
         }
+        Fault::Slip { axis, share, lasts_us, .. } => {
+            on_axis(world, axis, |axis| axis.slip(share));
+            Some(lasts_us)
+        }
+        Fault::CrossedSwitches => {
+            world.plant.cross_home_switches(0, 1);
+            None
+        }
+        Fault::LateTick(_, us) => {
+            *world.late_us = us;
+            None
+        }
         Fault::BlockedLoad { axis, lasts_us, .. } => {
             on_axis(world, axis, |axis| axis.block(true));
             Some(lasts_us)
@@ -141,6 +158,7 @@ fn end(fault: &Fault, world: &mut World<'_>) {
         Fault::MotorStall { axis, .. } => on_axis(world, axis, |axis| axis.stall(false)),
         Fault::LostSteps { axis, steps, .. } => on_axis(world, axis, |axis| axis.lose_steps(steps)),
         Fault::BlockedLoad { axis, .. } => on_axis(world, axis, |axis| axis.block(false)),
+        Fault::Slip { axis, .. } => on_axis(world, axis, |axis| axis.slip(0.0)),
         _ => {}
     }
 }

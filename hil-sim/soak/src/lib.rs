@@ -9,6 +9,7 @@
 //! - Drivers go on only where a session with a live lease asks for it. Motors step only while they are on, and no longer
 //!   after the end of the lease than braking takes in the worst case, v/a + 2a/j: an acceleration that is still growing
 //!   must be taken back first. A move that is asked for before arming, before homing or beyond the range is refused.
+//! - An axis without reference moves no faster than homing does.
 //! - A mode is reported only while the true load is at its target: within the tolerance of the axis, the error of its
 //!   reference, and one encoder count. An encoder that lies cannot be seen through at once: from its failure on the
 //!   largest following error is granted on top.
@@ -24,14 +25,16 @@ mod host;
 mod injector;
 mod journal;
 mod line;
+mod promise;
 mod scenario;
 mod simulation;
 mod stages;
 mod tally;
+mod watched_axis;
 
-pub use checker::{Promise, Violation};
 pub use faults::{Fault, FaultKind, Onset};
 pub use journal::Journal;
+pub use promise::{Promise, Violation};
 pub use scenario::{Destination, Scenario, Step};
 pub use simulation::{Board, Ending, Outcome, native_board, run};
 pub use stages::stages;

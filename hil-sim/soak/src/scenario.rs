@@ -38,6 +38,10 @@ pub enum Step {
     Move(Destination),
     /// Ask for a target beyond the range: it must be refused.
     MoveTooFar(Destination),
+    /// Go to the first and, after so many microseconds, in mid-move to the second.
+    Retarget(Destination, u64, Destination),
+    /// Go by so much on each axis, at full speed; passed over where that would leave the range.
+    Jog([Micro; 2]),
     /// Go there but stop after so many microseconds.
     MoveAndStop(Destination, u64),
     /// Do nothing for so many microseconds.
@@ -93,6 +97,10 @@ fn script(random: &mut Pcg64Mcg) -> Vec<Step> {
     if random.random_bool(0.3) {
         script.push(Step::MoveTooEarly(HUMAN));
     }
+    if random.random_bool(0.3) {
+        // Upwards only, and less than from the highest start to the hard limit: without reference nobody looks out.
+        script.push(Step::Jog([2_000, 35_000].map(|most| Micro(random.random_range(0..most)))));
+    }
     script.push(Step::Home);
     let tour = [Step::Move(HERBIVORE), Step::Move(HUMAN)];
     script.extend(if random.random_bool(0.5) { &tour[..] } else { &tour[..1] });
@@ -106,7 +114,9 @@ fn script(random: &mut Pcg64Mcg) -> Vec<Step> {
 }
 
 fn excursion(random: &mut Pcg64Mcg) -> Step {
-    match random.random_range(0..10) {
+    match random.random_range(0..15) {
+        10..14 => Step::Retarget(anywhere(random), random.random_range(1_000..1_500_000), anywhere(random)),
+        14 => Step::Jog([30_000, 400_000].map(|most| Micro(random.random_range(-most..most)))),
         0..5 => Step::Move(anywhere(random)),
         5..7 => Step::MoveAndStop(anywhere(random), random.random_range(1_000..800_000)),
         7 => Step::MoveTooFar(too_far(random)),

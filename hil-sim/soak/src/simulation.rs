@@ -6,12 +6,13 @@ use vergence_control::SettingsError;
 use vergence_plant::{NativeBoard, Plant};
 use vergence_protocol::{Microseconds, ResetCause};
 
-use crate::checker::{Checker, Promise, Violation};
+use crate::checker::Checker;
 use crate::faults::Fault;
 use crate::host::{Host, HostEnd};
 use crate::injector::{Injector, World};
 use crate::journal::Journal;
 use crate::line::{Line, LineFaults};
+use crate::promise::{Promise, Violation};
 use crate::scenario::Scenario;
 use crate::stages::stages;
 
@@ -32,6 +33,8 @@ pub trait Board {
     fn receive(&mut self, bytes: &[u8]);
     /// All frames that leave now, one after the other.
     fn transmit(&mut self) -> Vec<u8>;
+    /// Keeps the processor from its next control tick for so many microseconds.
+    fn delay_tick(&mut self, us: u64);
     /// Restarts in whatever it is doing; its clock begins again at zero.
     fn restart(&mut self, boot: u32);
     /// The mechanics: the truth.
@@ -51,6 +54,10 @@ impl Board for NativeBoard {
 
     fn transmit(&mut self) -> Vec<u8> {
         self.transmit()
+    }
+
+    fn delay_tick(&mut self, us: u64) {
+        self.delay_tick(us);
     }
 
     fn restart(&mut self, boot: u32) {
@@ -205,17 +212,23 @@ impl<'a, B: Board> Simulation<'a, B> {
     }
 
     fn inject(&mut self) {
+        let mut late_us = 0;
         let mut world = World {
             now: self.now,
             step: self.host.step(),
             in_step_us: self.now.0 - self.step_since.0,
             plant: self.board.plant_mut(),
+            late_us: &mut late_us,
             lines: [&mut self.to_host, &mut self.to_board],
             host_offset: &mut self.host_offset,
             checker: &mut self.checker,
             journal: &mut self.journal,
         };
-        if self.injector.inject(&mut world) {
+        let restarts = self.injector.inject(&mut world);
+        if late_us > 0 {
+            self.board.delay_tick(late_us);
+        }
+        if restarts {
             self.boot = self.boot.wrapping_add(1);
             self.board.restart(self.boot);
             self.board_start = self.now.0 - self.phase_us;

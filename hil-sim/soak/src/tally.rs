@@ -3,8 +3,8 @@
 use rayon::prelude::*;
 use vergence_control::SettingsError;
 
-use crate::checker::Violation;
 use crate::faults::FaultKind;
+use crate::promise::Violation;
 use crate::scenario::Scenario;
 use crate::simulation::{Ending, native_board, run};
 

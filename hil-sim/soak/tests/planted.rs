@@ -94,3 +94,13 @@ fn requests_stay_unanswered() {
 fn a_motion_never_ends() {
     catches(Defect::MovesForEver, Promise::Ends);
 }
+
+#[test]
+fn an_axis_without_reference_moves_too_fast() {
+    catches(Defect::FastWithoutReference, Promise::Gentle);
+}
+
+#[test]
+fn a_new_target_is_accepted_and_forgotten() {
+    catches(Defect::ForgetsTheNewTarget, Promise::Mode);
+}

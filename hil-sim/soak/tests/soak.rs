@@ -26,6 +26,14 @@ fn three_hundred_scenarios_break_no_promise() {
     }
 }
 
+#[test]
+fn hosts_jog_and_change_their_minds_in_mid_move() {
+    let logs: String = (1..=60).map(|seed| play(seed).journal.to_string()).collect();
+    for part in ["host: Jog(", "next is Retarget(", "next is Jog("] {
+        assert!(logs.matches(part).count() > 5, "{part}");
+    }
+}
+
 /// What leaves the mechanics and the encoders whole must not keep a host from what it wants.
 #[test]
 fn faults_of_line_and_host_delay_but_do_not_defeat() {
@@ -68,6 +76,14 @@ fn seed_435_spikes_on_the_home_switch() {
     let outcome = play(435);
     assert!(outcome.violations.is_empty(), "{}", outcome.journal);
     assert_eq!(outcome.ending, Ending::Completed);
+}
+
+/// Regression: an encoder that died at a restart failed the self-test before the first pose; the checker took that for a
+/// memory of what was before.
+#[test]
+fn seed_6601_a_self_test_fails_after_a_restart() {
+    let outcome = play(6601);
+    assert!(outcome.violations.is_empty(), "{}", outcome.journal);
 }
 
 #[test]

@@ -2,7 +2,7 @@
 
 use std::fmt;
 
-use vergence_vision::ImageSize;
+use vergence_vision::{ImageSize, Pixel};
 
 use crate::board::BoardView;
 
@@ -22,6 +22,8 @@ const TILT_RATIO: f64 = 1.12;
 pub struct Coverage {
     size: ImageSize,
     cells: [[usize; CELLS]; CELLS],
+    /// Cells that a board can be shown in.
+    within_reach: [[bool; CELLS]; CELLS],
     tilted: usize,
     views: usize,
 }
@@ -38,7 +40,26 @@ impl Coverage {
     /// Nothing yet, of images of `size`.
     #[must_use]
     pub fn new(size: ImageSize) -> Self {
-        Self { size, cells: [[0; CELLS]; CELLS], tilted: 0, views: 0 }
+        Self { size, cells: [[0; CELLS]; CELLS], within_reach: [[true; CELLS]; CELLS], tilted: 0, views: 0 }
+    }
+
+    /// As [`Self::new`], but only parts of the image with a pixel that `reaches` are wanted, such as those that the other
+    /// camera sees too.
+    #[must_use]
+    pub fn within(size: ImageSize, reaches: impl Fn(Pixel) -> bool) -> Self {
+        /// Pixels tried along each side of a cell.
+        const TRIES: usize = 5;
+        let position = |cell: usize, part: usize, extent: u32| {
+            f64::from(extent) * (cell as f64 + (part as f64 + 0.5) / TRIES as f64) / CELLS as f64 - 0.5
+        };
+        let any = |row: usize, column: usize| {
+            (0..TRIES * TRIES).any(|i| {
+                let (u, v) = (position(column, i % TRIES, size.width), position(row, i / TRIES, size.height));
+                reaches(Pixel { u, v })
+            })
+        };
+        let within_reach = std::array::from_fn(|row| std::array::from_fn(|column| any(row, column)));
+        Self { within_reach, ..Self::new(size) }
     }
 
     /// How many views were taken.
@@ -68,6 +89,7 @@ impl Coverage {
     #[must_use]
     pub fn advice(&self) -> Option<Advice> {
         let places = (0..CELLS).flat_map(|row| (0..CELLS).map(move |column| (row, column)));
+        let places = places.filter(|&(row, column)| self.within_reach[row][column]);
         let (row, column) = places.min_by_key(|&(row, column)| self.cells[row][column])?;
         let complete = self.cells[row][column] >= VIEWS_PER_CELL;
         (!complete || self.wants_tilt()).then(|| Advice { column, row, tilted: self.wants_tilt() })

@@ -15,6 +15,7 @@ mod reprojection;
 mod robust;
 mod stage;
 mod uncertainty;
+mod validation;
 
 pub use arun::{ArunError, fit_rotation_translation};
 pub use board::{Board, BoardSpec, BoardView, Corner};
@@ -28,10 +29,14 @@ pub use intrinsics::{
     Reprojection, ViewFigures, ViewPose, calibrate_intrinsics, refine_intrinsics, reproject,
 };
 pub use planar_pose::{BoardPose, PoseError, board_pose};
-pub use report::{ReportAbout, extrinsics_report, intrinsics_report};
+pub use report::{
+    ReportAbout, Verdict, extrinsics_report, extrinsics_verdict, intrinsics_report, intrinsics_verdict, stage_report,
+    stage_verdict,
+};
 pub use robust::{Loss, median};
 pub use stage::{
     EncoderScale, FEWEST_STAGE_POSES, FittedScrew, Observability, PredictedPose, StageCalibration, StageError,
     StageOptions, StagePose, StagePoseFigures, Tolerance, WeakDirection, ZeroOffset, calibrate_stage,
 };
 pub use uncertainty::{MapPoint, RayCovariance, RayUncertainty};
+pub use validation::{HeldOutPose, HeldOutView, Validation, validate_extrinsics, validate_intrinsics, validate_stage};

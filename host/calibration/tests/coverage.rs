@@ -60,3 +60,17 @@ fn it_points_to_the_corner_that_was_left_out() {
     }
     assert_eq!(coverage.advice().expect("a corner is missing").to_string(), "show the board lower left");
 }
+
+#[test]
+fn parts_out_of_reach_are_not_asked_for() {
+    // The other camera sees the right third only.
+    let mut coverage = Coverage::within(SIZE, |pixel| pixel.u > 600.0);
+    for ratio in [1.5, 1.0] {
+        for v in [100.0, 300.0, 500.0] {
+            assert!(coverage.advice().expect("more").to_string().contains("right"), "{:?}", coverage.advice());
+            coverage.add(&board_at(750.0, v, ratio));
+        }
+    }
+    assert_eq!(coverage.advice(), None);
+    assert_eq!(Coverage::within(SIZE, |_| false).advice(), None);
+}

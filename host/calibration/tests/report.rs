@@ -6,11 +6,15 @@ mod simulated;
 use std::collections::BTreeMap;
 use std::sync::LazyLock;
 
+use simulated::stage::{Bench, SIX_POSES};
 use simulated::{Dice, Pair, lens, other_lens, own_views, pair_pose};
 use vergence_calibration::{
-    BoardView, ExtrinsicsCalibration, ExtrinsicsOptions, IntrinsicsCalibration, IntrinsicsOptions, RayUncertainty,
-    ReportAbout, StereoView, calibrate_extrinsics, calibrate_intrinsics, extrinsics_report, intrinsics_report,
+    BoardView, ExtrinsicsCalibration, ExtrinsicsOptions, HeldOutPose, IntrinsicsCalibration, IntrinsicsOptions,
+    RayUncertainty, ReportAbout, StageCalibration, StageOptions, StereoView, calibrate_extrinsics,
+    calibrate_intrinsics, calibrate_stage, extrinsics_report, extrinsics_verdict, intrinsics_report,
+    intrinsics_verdict, stage_report, stage_verdict, validate_stage,
 };
+use vergence_rig::Rig;
 use vergence_vision::Angle;
 
 /// A name that would break a page that does not escape it.
@@ -24,6 +28,7 @@ fn about() -> ReportAbout {
         date: "2026-11-21".into(),
         board: "9 × 6 inner corners, 25 mm <card & glue>".into(),
         half_field: Some(Angle::from_deg(100.0)),
+        held_out: None,
     }
 }
 
@@ -48,6 +53,51 @@ static PAIR: LazyLock<(ExtrinsicsCalibration, Vec<StereoView>)> = LazyLock::new(
     let found = calibrate_extrinsics(&pair.left, &pair.right, &views, &ExtrinsicsOptions::default()).unwrap();
     (found, views)
 });
+
+/// Four stage poses of a bench whose first axis and mode have a hostile name.
+static STAGE: LazyLock<(StageCalibration, Rig, Vec<HeldOutPose>)> = LazyLock::new(|| {
+    let mut dice = Dice::new(9);
+    let mut bench = Bench::built(&mut dice);
+    bench.drawn.axes[0].name = HOSTILE.into();
+    bench.drawn.modes[0].name = HOSTILE.into();
+    let poses: Vec<_> = SIX_POSES[..4].iter().map(|&at| bench.pose(at, 4, 0.1, &mut dice)).collect();
+    let options = StageOptions::default();
+    let stage = calibrate_stage(&bench.drawn, &poses, &options).unwrap();
+    let held_out = validate_stage(&bench.drawn, &poses, &options).unwrap();
+    (stage, bench.drawn, held_out)
+});
+
+fn stage_page() -> String {
+    stage_report(&STAGE.0, &STAGE.1, &STAGE.2, &about())
+}
+
+#[test]
+fn the_page_of_a_stage_is_sound_and_says_what_the_json_says() {
+    let page = stage_page();
+    let found = elements(&page);
+    assert_eq!((found["h1"], found["figure"]), (1, 2));
+    assert!(!found.contains_key("script"));
+    for forbidden in ["http", "url(", "src=", "href=", "@import", "NaN", "inf "] {
+        assert!(!page.contains(forbidden), "{forbidden}");
+    }
+    let verdict = stage_verdict(&STAGE.0, &STAGE.1);
+    assert!(page.contains(&verdict.sentence.split(" mm in ").next().unwrap().to_owned()), "{}", verdict.sentence);
+    assert!(verdict.depth_sigma.unwrap().mm() <= verdict.worst_sigma.unwrap().mm());
+    assert_eq!(page.matches("<td>turns about").count(), 2);
+    assert!(page == stage_page());
+}
+
+/// The sentence, the page and the figures are of one piece.
+#[test]
+fn verdicts_are_those_of_the_pages() {
+    let (lens, pair) = (intrinsics_verdict(&LENS.0, &LENS.1), extrinsics_verdict(&PAIR.0, &PAIR.1));
+    assert!(lens_page().contains(&lens.sentence) && pair_page().contains(&pair.sentence));
+    for verdict in [lens, pair] {
+        let stated = number_after(&verdict.sentence, "Good to ");
+        assert!((stated / verdict.depth_sigma.unwrap().mm() - 1.0).abs() < 0.06, "{verdict:?}");
+        assert!(verdict.worst_sigma.unwrap().mm() >= verdict.depth_sigma.unwrap().mm());
+    }
+}
 
 fn calibrate(views: &[BoardView]) -> IntrinsicsCalibration {
     calibrate_intrinsics(views, lens().size(), &IntrinsicsOptions::default()).unwrap()

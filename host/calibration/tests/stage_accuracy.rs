@@ -3,6 +3,7 @@
 
 mod simulated;
 
+use rayon::prelude::*;
 use simulated::stage::{Bench, SIX_POSES};
 use simulated::{Dice, apart, error, own_views, seeds};
 use vergence_calibration::{
@@ -34,28 +35,41 @@ impl Tally {
     }
 }
 
+/// Seeds are independent of each other and are run side by side; their tallies are summed in order.
 fn study(stage_poses: &[[f64; 2]], own_calibration: bool, first_seed: u64, seeds: u64) -> Tally {
+    let tallies: Vec<Tally> = (first_seed..first_seed + seeds)
+        .into_par_iter()
+        .map(|seed| study_of(stage_poses, own_calibration, seed))
+        .collect();
+    tallies.iter().fold(Tally::default(), |sum, tally| Tally {
+        rotation_squares: sum.rotation_squares + tally.rotation_squares,
+        translation_squares: sum.translation_squares + tally.translation_squares,
+        nees: sum.nees + tally.nees,
+        covered: sum.covered + tally.covered,
+        poses: sum.poses + tally.poses,
+    })
+}
+
+fn study_of(stage_poses: &[[f64; 2]], own_calibration: bool, seed: u64) -> Tally {
     let mut tally = Tally::default();
-    for seed in first_seed..first_seed + seeds {
-        let mut dice = Dice::new(seed);
-        let bench = Bench::built(&mut dice);
-        let poses: Vec<StagePose> = stage_poses.iter().map(|&at| bench.pose(at, 12, 0.1, &mut dice)).collect();
-        let (rig, lenses) =
-            if own_calibration { own_lenses(&bench, &mut dice) } else { (bench.drawn.clone(), LensKnowledge::Exact) };
-        let options = StageOptions { lenses, ..StageOptions::default() };
-        let stage = calibrate_stage(&rig, &poses, &options).unwrap();
-        for _ in 0..30 {
-            let at = bench.anywhere(&mut dice);
-            let (predicted, truth) = (stage.predict(&bench.read(&at)), bench.left_from_right(&at));
-            let (rotation, translation) = apart(&predicted.left_from_right, &truth);
-            let error = error(&predicted.left_from_right, &truth);
-            let square = (error.transpose() * predicted.covariance.try_inverse().unwrap() * error)[(0, 0)];
-            tally.rotation_squares += rotation * rotation;
-            tally.translation_squares += translation * translation;
-            tally.nees += square;
-            tally.covered += u32::from(square <= CHI_SQUARE_95);
-            tally.poses += 1;
-        }
+    let mut dice = Dice::new(seed);
+    let bench = Bench::built(&mut dice);
+    let poses: Vec<StagePose> = stage_poses.iter().map(|&at| bench.pose(at, 12, 0.1, &mut dice)).collect();
+    let (rig, lenses) =
+        if own_calibration { own_lenses(&bench, &mut dice) } else { (bench.drawn.clone(), LensKnowledge::Exact) };
+    let options = StageOptions { lenses, ..StageOptions::default() };
+    let stage = calibrate_stage(&rig, &poses, &options).unwrap();
+    for _ in 0..30 {
+        let at = bench.anywhere(&mut dice);
+        let (predicted, truth) = (stage.predict(&bench.read(&at)), bench.left_from_right(&at));
+        let (rotation, translation) = apart(&predicted.left_from_right, &truth);
+        let error = error(&predicted.left_from_right, &truth);
+        let square = (error.transpose() * predicted.covariance.try_inverse().unwrap() * error)[(0, 0)];
+        tally.rotation_squares += rotation * rotation;
+        tally.translation_squares += translation * translation;
+        tally.nees += square;
+        tally.covered += u32::from(square <= CHI_SQUARE_95);
+        tally.poses += 1;
     }
     tally
 }

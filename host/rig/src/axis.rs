@@ -42,10 +42,28 @@ impl AxisPosition {
         }
     }
 
+    /// From the wire.
+    #[must_use]
+    pub fn from_micro(kind: AxisKind, micro: Micro) -> Self {
+        match kind {
+            AxisKind::Linear => Self::Linear(Length::from_mm(f64::from(micro.0) * 1e-3)),
+            AxisKind::Rotary => Self::Rotary(Angle::from_rad(f64::from(micro.0) * 1e-6)),
+        }
+    }
+
     /// Whether this is a position on an axis of `kind`.
     #[must_use]
     pub fn is_of(self, kind: AxisKind) -> bool {
         matches!((self, kind), (Self::Linear(_), AxisKind::Linear) | (Self::Rotary(_), AxisKind::Rotary))
+    }
+
+    /// The sum with `other` of the same kind.
+    #[must_use]
+    pub fn plus(self, other: Self) -> Self {
+        match self {
+            Self::Linear(length) => Self::Linear(Length::from_mm(length.mm() + other.value())),
+            Self::Rotary(angle) => Self::Rotary(Angle::from_rad(angle.rad() + other.value())),
+        }
     }
 
     /// The difference to `other` of the same kind.

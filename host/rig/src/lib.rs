@@ -11,11 +11,12 @@ mod camera_file;
 mod chain;
 mod clock;
 mod file;
+mod frame_pair;
 mod interchange;
-mod pair_file;
 mod pose;
 mod rig;
 mod text;
+mod to_toml;
 mod track;
 
 pub use axis::{AxisPosition, RigAxis};
@@ -23,8 +24,8 @@ pub use camera_file::{CalibrationTable, CameraDocument, CameraTable, Provenance}
 pub use chain::{Chain, Link, Screw};
 pub use clock::{BoardInstant, ClockDrift, ClockMap, Exchange, HostInstant};
 pub use file::RigError;
+pub use frame_pair::{FramePair, Pairing, PairingError, StampedFrame, TriggerDelay, pair_frames};
 pub use interchange::{Camchain, CameraFormat, InterchangeError, kalibr, opencv};
-pub use pair_file::CalibratedPair;
 pub use pose::RigPose;
 pub use rig::{Mode, Rig};
 pub use track::{JointSample, JointTrack, JointsAt, TrackGap};

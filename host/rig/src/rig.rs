@@ -1,7 +1,8 @@
 //! A rig whose description has been checked.
 
+use nalgebra::Isometry3;
 use vergence_protocol::{AxisList, Micro};
-use vergence_vision::{Angle, KannalaBrandt, Left, Length, Right};
+use vergence_vision::{Angle, KannalaBrandt, Left, Length, Right, Transform};
 
 use crate::axis::{AxisPosition, RigAxis};
 use crate::chain::Chain;
@@ -39,6 +40,27 @@ pub struct Mode {
 }
 
 impl Rig {
+    /// Two cameras whose pose is fixed: no axes, the base is where the left camera is. `sigma` is the standard deviation
+    /// of rotation and translation of `left_from_right`.
+    #[must_use]
+    pub fn fixed_pair(
+        name: &str,
+        (left_camera, right_camera): (KannalaBrandt, KannalaBrandt),
+        left_from_right: Transform<Left, Right>,
+        sigma: (Angle, Length),
+    ) -> Self {
+        Self {
+            name: name.to_owned(),
+            axes: Vec::new(),
+            modes: Vec::new(),
+            left_camera,
+            right_camera,
+            left_chain: Chain::new(Vec::new(), Transform::from_isometry(Isometry3::identity())),
+            right_chain: Chain::new(Vec::new(), left_from_right.renamed()),
+            calibration_sigma: sigma,
+        }
+    }
+
     /// The mode called `name`.
     #[must_use]
     pub fn mode(&self, name: &str) -> Option<&Mode> {

@@ -27,6 +27,17 @@ pub struct JointsAt {
     pub sigma: Vec<f64>,
 }
 
+/// The standard deviation of an error anywhere within a width of one: 1/√12.
+const UNIFORM: f64 = 0.288_675_134_594_812_9;
+
+impl JointsAt {
+    /// Counts that the board latched at the very instant, as at the edge of a trigger pulse.
+    #[must_use]
+    pub fn latched(counts: &[Counts]) -> Self {
+        Self { counts: counts.iter().map(|counts| f64::from(counts.0)).collect(), sigma: vec![UNIFORM; counts.len()] }
+    }
+}
+
 /// Why the track does not know the joints at an instant.
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]
@@ -92,8 +103,6 @@ impl JointTrack {
 
 /// `instant_error` is the bound of the instant's error as a share of the span between the readings.
 fn interpolate(previous: &JointSample, next: &JointSample, share: f64, instant_error: f64) -> JointsAt {
-    // A uniform error of one count, and of plus or minus the bound, each have a standard deviation of 1/√12 of their width.
-    const UNIFORM: f64 = 0.288_675_134_594_812_9;
     let pairs = previous.counts.iter().zip(&next.counts);
     let (counts, sigma) = pairs
         .map(|(before, after)| {

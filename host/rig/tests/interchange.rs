@@ -93,27 +93,3 @@ fn what_cannot_be_read_is_told() {
     .replace("[1.0, 0.0, 0.0, ", "[2.0, 0.0, 0.0, ");
     assert!(matches!(kalibr::read(&not_rigid), Err(InterchangeError::Missing(_))), "{not_rigid}");
 }
-
-#[test]
-fn a_written_pair_is_a_rig() {
-    let rotation = UnitQuaternion::from_scaled_axis(Vector3::new(0.01, 2.0, -0.005));
-    let provenance = vergence_rig::Provenance {
-        program: "vergence 0.1.0".into(),
-        inputs_sha256: "00".repeat(32),
-        date: Some("2026-11-21".into()),
-    };
-    let pair = vergence_rig::CalibratedPair {
-        name: "pair",
-        left: &camera(),
-        right: &camera(),
-        left_from_right: Transform::new(rotation, Vector3::new(140.0, 3.0, -12.0)),
-        sigma: (Angle::from_deg(0.05), vergence_vision::Length::from_mm(0.2)),
-        provenance: &provenance,
-    };
-    let rig = vergence_rig::Rig::from_toml(&pair.to_toml().expect("TOML")).expect("a rig");
-    let pose = rig.pose_at_values(&[]);
-    assert!((pose.left_from_right.origin().mm() - Vector3::new(140.0, 3.0, -12.0)).norm() < 1e-12);
-    assert!(pose.left_from_right.rotation().angle_to(&rotation) < 1e-12);
-    assert!((pose.rotation_sigma.deg() - 0.05).abs() < 1e-12);
-    assert_eq!(rig.right_camera.size(), SIZE);
-}

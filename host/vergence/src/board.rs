@@ -1,14 +1,19 @@
 //! A connected board and what can be asked of it: arm under a lease, home, move, stop.
 
+mod questions;
+mod words;
+
 use std::time::Duration;
 
 use indicatif::ProgressBar;
 use tokio::time::timeout;
 use vergence_protocol::{
-    AxisInfo, AxisMask, BoardInfo, Compatibility, ControllerState, FaultRecord, Mode, Move, MoveId, MovePhase,
+    AxisInfo, AxisMask, BoardInfo, Compatibility, ControllerState, FaultRecord, Jog, Mode, Move, MoveId, MovePhase,
     Permille, PoseReport, Refusal, Report, Request, SessionId, Status, StopKind,
 };
-use vergence_rig::{AxisPosition, Rig};
+use vergence_rig::{AxisPosition, HostInstant, Rig};
+
+pub use self::words::{check_range, describe_fault, describe_pose, positions, staying};
 
 use crate::failure::Failure;
 use crate::link::{Client, LinkError, STREAM_PERIOD_US};
@@ -21,6 +26,7 @@ pub struct Board {
     client: Client,
     rig: Rig,
     info: BoardInfo,
+    axes: Vec<AxisInfo>,
     pose: PoseReport,
     lease_ms: u16,
     moves: u16,
@@ -29,7 +35,10 @@ pub struct Board {
 
 impl From<LinkError> for Failure {
     fn from(error: LinkError) -> Self {
-        Self::device(error.to_string())
+        match error {
+            LinkError::Unsendable(_) => Self::device(error.to_string()),
+            _ => Self::link(error.to_string()),
+        }
     }
 }
 
@@ -39,6 +48,17 @@ impl Board {
     /// # Errors
     /// Another protocol, another rig, or a link that ended.
     pub async fn new(client: Client, rig: Rig, lease_ms: u16, progress: ProgressBar) -> Result<Self, Failure> {
+        let mut board = Self::open(client, rig, lease_ms, progress).await?;
+        board.check_axes().await?;
+        board.next_pose().await?;
+        Ok(board)
+    }
+
+    /// The same with a board that may not fit the rig: it can be asked and set, and must not be moved.
+    ///
+    /// # Errors
+    /// Another protocol, or a link that ended.
+    pub async fn open(client: Client, rig: Rig, lease_ms: u16, progress: ProgressBar) -> Result<Self, Failure> {
         if let Compatibility::Incompatible { board } = client.compatibility() {
             let ours = vergence_protocol::PROTOCOL;
             return Err(Failure::protocol(format!(
@@ -49,14 +69,16 @@ impl Board {
         let Report::Info { info, .. } = client.ask(Request::GetInfo).await? else {
             return Err(Failure::protocol("the board answered a question about itself with something else"));
         };
-        let mut board = Self { client, rig, info, pose: empty_pose(), lease_ms, moves: 0, progress };
-        board.check_axes().await?;
+        let board = Self { client, rig, info, axes: Vec::new(), pose: empty_pose(), lease_ms, moves: 0, progress };
         board.ask(Request::SetStream { period_us: STREAM_PERIOD_US }).await?;
-        board.next_pose().await?;
         Ok(board)
     }
 
-    async fn check_axes(&self) -> Result<(), Failure> {
+    /// Checks that the rig describes this board.
+    ///
+    /// # Errors
+    /// Another number of axes, or other axes; a link that ended.
+    pub async fn check_axes(&mut self) -> Result<(), Failure> {
         let (ours, theirs) = (self.rig.axes.len(), usize::from(self.info.axes));
         if ours != theirs {
             return Err(Failure::usage(format!(
@@ -65,9 +87,11 @@ impl Board {
             )));
         }
         for (axis, index) in self.rig.axes.iter().zip(0u8..) {
-            if let Some(contradiction) = axis.contradiction(&self.axis_info(index).await?) {
+            let info = self.axis_info(index).await?;
+            if let Some(contradiction) = axis.contradiction(&info) {
                 return Err(Failure::usage(format!("{contradiction}: name the right rig file with --rig")));
             }
+            self.axes.push(info);
         }
         Ok(())
     }
@@ -83,6 +107,12 @@ impl Board {
     #[must_use]
     pub fn info(&self) -> &BoardInfo {
         &self.info
+    }
+
+    /// What the board said of each axis.
+    #[must_use]
+    pub fn axes(&self) -> &[AxisInfo] {
+        &self.axes
     }
 
     /// The rig.
@@ -109,6 +139,34 @@ impl Board {
         positions(&self.rig, &self.pose)
     }
 
+    /// When the latest pose was, on the host's clock; `None` before the first clock exchange.
+    #[must_use]
+    pub fn pose_on_host_clock(&self) -> Option<HostInstant> {
+        self.client.clock_map().host_at(self.pose.at)
+    }
+
+    /// Where the axes stay that are not to move.
+    #[must_use]
+    pub fn standing(&self) -> Vec<AxisPosition> {
+        self.rig.axes.iter().zip(self.positions()).map(|(axis, present)| staying(axis, present)).collect()
+    }
+
+    /// Waits until the board's clock is known well, or as well as half a second on this link allows.
+    ///
+    /// # Errors
+    /// Where the link ended.
+    pub async fn compare_clocks(&mut self) -> Result<(), Failure> {
+        const PATIENCE: Duration = Duration::from_millis(500);
+        const WELL_US: f64 = 200.0;
+        let compared = async {
+            while self.pose_on_host_clock().is_none_or(|at| at.error_us > WELL_US) {
+                self.next_pose().await?;
+            }
+            Ok(())
+        };
+        timeout(PATIENCE, compared).await.unwrap_or(Ok(()))
+    }
+
     /// Waits for a pose.
     ///
     /// # Errors
@@ -125,14 +183,21 @@ impl Board {
     /// # Errors
     /// A refusal in words, or a link that ended.
     pub async fn ask(&self, request: Request) -> Result<(), Failure> {
+        self.request(request).await?.map_err(|refusal| self.refused(refusal))
+    }
+
+    /// The same, where a refusal is an answer like another.
+    async fn request(&self, request: Request) -> Result<Result<(), Refusal>, Failure> {
         match self.client.ask(request).await? {
-            Report::Ack { status: Status::Accepted, .. } => Ok(()),
-            Report::Ack { status: Status::Refused(refusal), .. } => Err(self.refused(refusal)),
+            Report::Ack { status: Status::Accepted, .. } => Ok(Ok(())),
+            Report::Ack { status: Status::Refused(refusal), .. } => Ok(Err(refusal)),
             _ => Err(Failure::protocol("the board answered a command with something else")),
         }
     }
 
-    fn refused(&self, refusal: Refusal) -> Failure {
+    /// A refusal in words.
+    #[must_use]
+    pub fn refused(&self, refusal: Refusal) -> Failure {
         let latched = match (refusal, self.pose.fault) {
             (Refusal::Latched, Some(fault)) => format!(" ({})", describe_fault(&self.rig, &fault)),
             _ => String::new(),
@@ -140,7 +205,9 @@ impl Board {
         let message = format!("the board refuses: {refusal}{latched}");
         match refusal {
             Refusal::ReadOnly => Failure::protocol(message),
-            Refusal::OutsideLimits { .. } | Refusal::Invalid => Failure::usage(message),
+            Refusal::OutsideLimits { .. } | Refusal::Invalid | Refusal::BadSetting | Refusal::NoSetting => {
+                Failure::usage(message)
+            }
             _ => Failure::device(message),
         }
     }
@@ -190,11 +257,29 @@ impl Board {
     /// A target out of range, the fault that ended the move, a refusal, or a stop.
     pub async fn move_to(&mut self, mode: Mode, targets: &[AxisPosition]) -> Result<(), Failure> {
         check_range(&self.rig, targets)?;
-        // Random sessions make these unique; zero means "no move yet".
-        self.moves = self.moves.wrapping_add(1).max(1);
-        let id = MoveId(self.moves);
-        let targets = self.rig.wire_targets(targets);
+        let (id, targets) = (self.next_move(), self.rig.wire_targets(targets));
         self.ask(Request::MoveTo(Move { id, mode, targets, speed: Permille::FULL })).await?;
+        self.wait_for_move(id).await
+    }
+
+    /// Moves all axes by a distance from where they stand, and waits until the encoders confirm it. Works without
+    /// reference, at homing speed. The board must be armed.
+    ///
+    /// # Errors
+    /// The fault that ended the move, a refusal, or a stop.
+    pub async fn move_by(&mut self, distances: &[AxisPosition]) -> Result<(), Failure> {
+        let (id, by) = (self.next_move(), self.rig.wire_targets(distances));
+        self.ask(Request::Jog(Jog { id, by, speed: Permille::FULL })).await?;
+        self.wait_for_move(id).await
+    }
+
+    /// Random sessions make these unique; zero means "no move yet".
+    fn next_move(&mut self) -> MoveId {
+        self.moves = self.moves.wrapping_add(1).max(1);
+        MoveId(self.moves)
+    }
+
+    async fn wait_for_move(&mut self, id: MoveId) -> Result<(), Failure> {
         self.wait_until(|pose| pose.move_id == id && matches!(pose.phase, MovePhase::Settled | MovePhase::Stopped))
             .await?;
         if self.pose.phase == MovePhase::Stopped {
@@ -264,45 +349,6 @@ impl Board {
             None => Some(waited.await),
         }
     }
-}
-
-/// Where the axes are by `pose`.
-#[must_use]
-pub fn positions(rig: &Rig, pose: &PoseReport) -> Vec<AxisPosition> {
-    rig.axes.iter().zip(&pose.counts).map(|(axis, &counts)| axis.position_at(counts)).collect()
-}
-
-/// Refuses targets outside the rig's range, before anything is sent.
-///
-/// # Errors
-/// Names axis, target and range.
-pub fn check_range(rig: &Rig, targets: &[AxisPosition]) -> Result<(), Failure> {
-    for (axis, &target) in rig.axes.iter().zip(targets) {
-        if !axis.contains(target) {
-            let [low, high] = axis.range;
-            return Err(Failure::usage(format!("{} {target} is out of range: choose {low} to {high}", axis.name)));
-        }
-    }
-    Ok(())
-}
-
-/// A pose in one line.
-#[must_use]
-pub fn describe_pose(rig: &Rig, pose: &PoseReport) -> String {
-    let axes = rig.axes.iter().zip(positions(rig, pose)).enumerate().map(|(index, (axis, position))| {
-        let reference = if pose.referenced.contains(index) { "" } else { " (no reference)" };
-        format!("{} {position}{reference}", axis.name)
-    });
-    let mode = rig.mode_name(pose.mode).map(|name| format!(" [{name}]")).unwrap_or_default();
-    format!("{}{mode}  {}", pose.state, axes.collect::<Vec<_>>().join("  "))
-}
-
-/// A fault in a sentence with its remedy.
-#[must_use]
-pub fn describe_fault(rig: &Rig, fault: &FaultRecord) -> String {
-    let axis = fault.axis.and_then(|index| rig.axes.get(usize::from(index)));
-    let axis = axis.map(|axis| format!(" on axis '{}'", axis.name)).unwrap_or_default();
-    format!("{}{axis}; {}", fault.code, fault.code.remedy())
 }
 
 fn empty_pose() -> PoseReport {

@@ -3,11 +3,12 @@
 use std::path::PathBuf;
 use std::process::ExitCode;
 
-use clap::{Parser, Subcommand};
+use clap::{CommandFactory, Parser, Subcommand};
 
 use crate::cmd;
 use crate::console::Console;
 use crate::failure::{Failure, FailureKind};
+use crate::slots;
 
 /// Moves a stereo rig of two fisheye cameras between its vision modes, and measures what it sees.
 #[derive(Debug, Parser)]
@@ -33,7 +34,8 @@ pub struct Globals {
     /// Speed of a serial port.
     #[arg(long, global = true, default_value_t = 921_600)]
     pub baud: u32,
-    /// The rig file. Without it, the built-in bench.
+    /// The rig file. Without it, the active calibration (see `calibrate use`), or else the built-in bench; demo and soak
+    /// always take the bench.
     #[arg(long, global = true, env = "VERGENCE_RIG", value_name = "FILE")]
     pub rig: Option<PathBuf>,
     /// How long the board may go without hearing from this program before it brakes, 20ms to 1s.
@@ -50,6 +52,8 @@ enum Verb {
     Devices(cmd::devices::Args),
     /// Tell what the board is doing, and why it stopped.
     Status(cmd::status::Args),
+    /// Check ports, permissions, link, clock and board, and say what to do.
+    Doctor(cmd::doctor::Args),
     /// Arm the board and keep it armed until Ctrl-C.
     Arm(cmd::arm::Args),
     /// Disarm the board; in motion it brakes first.
@@ -62,28 +66,47 @@ enum Verb {
     Mode(cmd::mode::Args),
     /// Go to any pose.
     Move(cmd::move_to::Args),
+    /// Show a move before it is made: time, segments, zones.
+    Plan(cmd::plan::Args),
     /// Brake now, even while another vergence holds the port.
     Stop(cmd::stop::Args),
     /// Show poses as they come.
     Monitor(cmd::monitor::Args),
+    /// Fire the cameras, and show where the axes were.
+    Trigger(cmd::trigger::Args),
+    /// Measure the link: round trips, losses, repeats.
+    LinkTest(cmd::link_test::Args),
+    /// Show and change the board's settings.
+    Config(cmd::config::Args),
     /// Run a simulated board that other programs can talk to.
     Sim(cmd::sim::Args),
+    /// Measure how fast this program is, beside others on the same work.
+    Bench(cmd::bench::Args),
     /// Let everything go wrong, ten thousand times, and check that the rig stays safe.
     Soak(cmd::soak::Args),
     /// Run the whole rig in simulation: home, herbivore, human, look, measure.
     Demo(cmd::demo::Args),
     /// Turn a pair of photographs into a cloud of points.
     Depth(cmd::depth::Args),
+    /// Keep pre-trained networks for matching.
+    Models(cmd::models::Args),
     /// Tell how much of the surroundings both cameras, one, or none see.
     Zones(cmd::zones::Args),
     /// Take a set of board views for calibration, with advice on what to show.
     Capture(cmd::capture::Args),
-    /// Calibrate cameras and pairs from boards, and compare calibrations.
+    /// Calibrate cameras, pairs and moving stages from boards; compare and keep calibrations.
     Calibrate(cmd::calibrate::Args),
     /// Show and convert camera files, and use them for single points.
     Camera(cmd::camera::Args),
     /// Draw a chessboard to print.
     Target(cmd::target::Args),
+    /// Print a script that lets a shell complete this command.
+    Completions(cmd::completions::Args),
+}
+
+/// The whole command line, for what describes it.
+pub fn command() -> clap::Command {
+    Cli::command()
 }
 
 /// Runs the command line and returns the exit code.
@@ -108,7 +131,11 @@ fn tell(failure: &Failure) {
 }
 
 fn execute(cli: Cli) -> Result<(), Failure> {
-    let Cli { globals, verb } = cli;
+    let Cli { mut globals, verb } = cli;
+    // A stop must not fail, nor the doctor end, because a calibration cannot be read: they look for themselves.
+    if globals.rig.is_none() && !matches!(verb, Verb::Demo(_) | Verb::Soak(_) | Verb::Stop(_) | Verb::Doctor(_)) {
+        globals.rig = slots::active_rig()?;
+    }
     let console = Console::new(globals.json);
     // With the board in this process nothing outside sets the pace: time can be virtual, and motion costs none.
     let virtual_time = matches!(verb, Verb::Demo(_)) || globals.port.as_deref() == Some("sim");
@@ -121,23 +148,31 @@ fn execute(cli: Cli) -> Result<(), Failure> {
         match verb {
             Verb::Devices(args) => cmd::devices::run(&args, console),
             Verb::Status(args) => cmd::status::run(&args, &globals, console).await,
+            Verb::Doctor(args) => cmd::doctor::run(&args, &globals, console).await,
             Verb::Arm(args) => cmd::arm::run(&args, &globals, console).await,
             Verb::Disarm(args) => cmd::disarm::run(&args, &globals, console).await,
             Verb::Clear(args) => cmd::clear::run(&args, &globals, console).await,
             Verb::Home(args) => cmd::home::run(&args, &globals, console).await,
             Verb::Mode(args) => cmd::mode::run(&args, &globals, console).await,
             Verb::Move(args) => cmd::move_to::run(&args, &globals, console).await,
+            Verb::Plan(args) => cmd::plan::run(&args, &globals, console).await,
             Verb::Stop(args) => cmd::stop::run(&args, &globals, console).await,
             Verb::Monitor(args) => cmd::monitor::run(&args, &globals, console).await,
+            Verb::Trigger(args) => cmd::trigger::run(&args, &globals, console).await,
+            Verb::LinkTest(args) => cmd::link_test::run(&args, &globals, console).await,
+            Verb::Config(args) => cmd::config::run(&args, &globals, console).await,
             Verb::Sim(args) => cmd::sim::run(&args, &globals, console).await,
+            Verb::Bench(args) => cmd::bench::run(&args, console),
             Verb::Soak(args) => cmd::soak::run(&args, console),
             Verb::Demo(args) => cmd::demo::run(&args, &globals, console).await,
             Verb::Depth(args) => cmd::depth::run(&args, &globals, console),
+            Verb::Models(args) => cmd::models::run(&args, console),
             Verb::Zones(args) => cmd::zones::run(&args, console),
             Verb::Capture(args) => cmd::capture::run(&args, &globals, console),
-            Verb::Calibrate(args) => cmd::calibrate::run(&args, console),
+            Verb::Calibrate(args) => cmd::calibrate::run(&args, &globals, console).await,
             Verb::Camera(args) => cmd::camera::run(&args, console),
             Verb::Target(args) => cmd::target::run(&args, console),
+            Verb::Completions(args) => cmd::completions::run(&args, console),
         }
     })
 }

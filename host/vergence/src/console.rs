@@ -1,7 +1,7 @@
 //! What a command says: results on standard output, progress on standard error when that is a terminal.
 
 use std::fmt::Display;
-use std::io::{IsTerminal, Write, stdout};
+use std::io::{IsTerminal, Write, stderr, stdout};
 use std::time::Duration;
 
 use indicatif::{ProgressBar, ProgressStyle};
@@ -42,6 +42,18 @@ impl Console {
     /// Where standard output cannot be written.
     pub fn result(self, value: &Value) -> Result<(), Failure> {
         if self.json { print_line(value) } else { Ok(()) }
+    }
+
+    /// Something that people should know while a command goes on: on standard error, in JSON too.
+    pub fn warn(self, line: impl Display) {
+        // Nobody is left to hear that standard error is closed.
+        let _ = writeln!(stderr(), "vergence: {line}");
+    }
+
+    /// Whether results go to a person at a terminal.
+    #[must_use]
+    pub fn is_live(self) -> bool {
+        !self.json && stdout().is_terminal()
     }
 
     /// A spinner on a terminal, silent elsewhere.

@@ -19,6 +19,8 @@ pub enum FailureKind {
     Usage,
     /// 3: the device is missing, silent, or refused.
     Device,
+    /// 3: the link to the device ended; it may come back.
+    Link,
     /// 4: the device speaks another protocol version.
     Protocol,
     /// 0: whoever read our output has seen enough.
@@ -33,7 +35,7 @@ impl FailureKind {
             Self::OutputClosed => 0,
             Self::CheckFailed => 1,
             Self::Usage => 2,
-            Self::Device => 3,
+            Self::Device | Self::Link => 3,
             Self::Protocol => 4,
         }
     }
@@ -53,6 +55,11 @@ impl Failure {
     /// A device that cannot or will not: exit code 3.
     pub fn device(message: impl Into<String>) -> Self {
         Self { kind: FailureKind::Device, message: message.into() }
+    }
+
+    /// A link that ended: exit code 3.
+    pub fn link(message: impl Into<String>) -> Self {
+        Self { kind: FailureKind::Link, message: message.into() }
     }
 
     /// Another protocol version: exit code 4.

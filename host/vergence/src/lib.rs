@@ -7,6 +7,7 @@
 //! Exit codes: 0 ok, 1 check failed, 2 usage or bad input, 3 device, 4 protocol mismatch.
 
 pub mod board;
+mod board_watch;
 mod boards;
 pub mod camera;
 mod camera_files;
@@ -17,10 +18,15 @@ mod corners;
 pub mod failure;
 pub mod link;
 pub mod look;
+pub mod models;
+pub mod move_plan;
 mod output;
 mod provenance;
 mod rig_file;
+mod rig_zones;
+pub mod setting_text;
 pub mod sim;
+mod slots;
 mod stopwatch;
 
 pub use cli::run;

@@ -55,7 +55,7 @@ pub struct Look {
 ///
 /// # Errors
 /// Where the images do not belong to the cameras, or the cameras share no field.
-pub fn look(eyes: Eyes<'_>, rig: &Rig, pose: &RigPose, matcher: &impl Matcher) -> Result<Look, MatchError> {
+pub fn look(eyes: Eyes<'_>, rig: &Rig, pose: &RigPose, matcher: &dyn Matcher) -> Result<Look, MatchError> {
     let matching = Stopwatch::start();
     let (left, right) = (grayscale(eyes.left), grayscale(eyes.right));
     let found = matcher.find(&ImagePair {

@@ -164,18 +164,19 @@ impl Controller {
     /// All axes start and finish together, in the time of the slowest. One in mid-move may not be able to take just that
     /// long: then the others wait for it.
     fn start_together(&mut self, targets: &AxisList<Micro>, share: f32) {
-        let mut together = 0.0;
+        let (mut together, mut at_least) = (0.0, 0.0);
         for _ in 0..MOST_ROUNDS {
-            let durations = self.axes.iter().zip(targets).map(|(axis, &to)| axis.plan(to, share, together).duration());
+            let durations = self.axes.iter().zip(targets).map(|(axis, &to)| axis.plan(to, share, at_least).duration());
             let slowest = durations.fold(0.0, f32::max);
             let agreed = slowest <= together * (1.0 + AGREED);
-            together = slowest;
+            // A little less, so that rounding does not slow the slowest down once more.
+            (together, at_least) = (slowest, slowest * (1.0 - AGREED));
             if agreed {
                 break;
             }
         }
         for (axis, &target) in self.axes.iter_mut().zip(targets) {
-            let planned = axis.plan(target, share, together);
+            let planned = axis.plan(target, share, at_least);
             axis.run_planned(planned, together);
         }
     }

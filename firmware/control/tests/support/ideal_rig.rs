@@ -28,6 +28,8 @@ pub struct IdealAxis {
     pub ordered: i32,
     /// When each step is due, in nanoseconds, and whether forward.
     queue: VecDeque<(u64, bool)>,
+    /// All that was ever in the queue.
+    pub log: Vec<(u64, bool)>,
     /// Where the motor is at step zero: changes when it is turned without power.
     motor_zero: f64,
     pub load: f64,
@@ -54,6 +56,7 @@ impl IdealAxis {
             steps: 0,
             ordered: 0,
             queue: VecDeque::new(),
+            log: Vec::new(),
             motor_zero: load,
             load,
             switch: HomeSwitch::Good,
@@ -163,7 +166,9 @@ impl RigIo for IdealRig {
         let forward = steps.forward != axis.reversed[0];
         let count = steps.at_ns.len() as i32;
         axis.ordered += if forward { count } else { -count };
-        axis.queue.extend(steps.at_ns.iter().map(|&at| (steps.start.0 * 1000 + u64::from(at), forward)));
+        let due = steps.at_ns.iter().map(|&at| (steps.start.0 * 1000 + u64::from(at), forward));
+        axis.queue.extend(due.clone());
+        axis.log.extend(due);
     }
 
     fn steps(&self, axis: usize) -> i32 {

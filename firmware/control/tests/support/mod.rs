@@ -5,7 +5,7 @@
 mod ideal_rig;
 mod watch;
 
-use vergence_control::{AxisSettings, Controller, HomingSettings};
+use vergence_control::{AxisSettings, Controller, HomingSettings, RigIo};
 use vergence_protocol::{
     AxisKind, AxisMask, ControllerState, FaultRecord, Jog, Micro, Microseconds, Mode, Move, MoveId, Permille,
     PoseReport, Request, SessionId, Status,
@@ -114,6 +114,15 @@ impl World {
         };
         world.wait(2 * BEAT_US);
         world
+    }
+
+    /// The processor restarts in whatever it is doing.
+    pub fn restart(&mut self) {
+        let settings = self.watch.settings();
+        self.controller = Controller::new(&settings).unwrap();
+        self.rig.set_drivers(false);
+        self.watch = Watch::new(&settings);
+        self.next_tick = self.now.0;
     }
 
     /// Armed, homed and at the low end of both ranges.

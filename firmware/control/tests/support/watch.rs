@@ -122,6 +122,10 @@ impl Watch {
         }
     }
 
+    pub fn settings(&self) -> Vec<AxisSettings> {
+        self.paths.iter().map(|path| path.settings).collect()
+    }
+
     /// Whether any axis was commanded to move in the latest tick.
     pub fn moves(&self) -> bool {
         self.paths.iter().any(|path| path.commanded.len() > 1 && path.moves())
@@ -208,7 +212,7 @@ impl Watch {
         if pose.mode.0 != 0 {
             assert!(inside && pose.phase == MovePhase::Settled, "mode claimed elsewhere: {pose:?}");
         }
-        if pose.phase == MovePhase::Settled && self.phase != MovePhase::Settled {
+        if pose.phase == MovePhase::Settled && self.phase != MovePhase::Settled && !self.targets.is_empty() {
             let since = self.inside_since.expect("settled outside of the tolerance");
             assert!(now.0 - since >= DWELL_US, "settled after {} us", now.0 - since);
         }
@@ -231,7 +235,9 @@ impl Watch {
             }
             (Request::Jog(jog), Status::Accepted) => {
                 assert!(self.may_start(now, session), "{pose:?}");
-                let truth = rig.axes.iter().zip(&jog.by);
+                // Where a load is held back nobody can say where a motion by a distance ends.
+                let held = rig.axes.iter().any(|axis| axis.blocked);
+                let truth = rig.axes.iter().zip(&jog.by).filter(|_| !held);
                 self.targets = truth.map(|(axis, by)| Micro((axis.load + f64::from(by.0)).round() as i32)).collect();
                 self.inside_since = None;
                 self.paths.iter_mut().for_each(|path| path.hull = None);
@@ -258,7 +264,8 @@ impl Watch {
             }
             (Request::ClearFault { seen }, Status::Accepted) => {
                 assert_eq!(self.fault.map(|fault| fault.seq), Some(*seen));
-                assert!(pose.state == ControllerState::Idle && !rig.drivers, "{pose:?}");
+                let off = matches!(pose.state, ControllerState::Idle | ControllerState::SelfTest);
+                assert!(off && !rig.drivers, "{pose:?}");
                 self.fault = None;
             }
             _ => {}

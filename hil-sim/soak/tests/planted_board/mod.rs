@@ -4,8 +4,8 @@ use vergence_control::{RigIo, StepSchedule};
 use vergence_plant::{NativeBoard, Plant};
 use vergence_protocol::frame::{Header, Kind, encode};
 use vergence_protocol::{
-    ControllerState, MAX_FRAME, Micro, Microseconds, Mode, MoveId, MovePhase, PROTOCOL, PoseReport, Receiver, Report,
-    Request, ResetCause, SessionId, Status,
+    AxisList, ControllerState, MAX_FRAME, Micro, Microseconds, Mode, Move, MoveId, MovePhase, PROTOCOL, PoseReport,
+    Receiver, Report, Request, ResetCause, SessionId, Status,
 };
 use vergence_soak::{Board, Scenario, stages};
 
@@ -26,6 +26,8 @@ pub enum Defect {
     RestartsWithMemory,
     StopsAnswering,
     MovesForEver,
+    FastWithoutReference,
+    ForgetsTheNewTarget,
 }
 
 pub struct PlantedBoard {
@@ -35,6 +37,8 @@ pub struct PlantedBoard {
     said: Receiver,
     session: Option<SessionId>,
     modes: Vec<(MoveId, Mode)>,
+    /// Where the latest move from rest goes.
+    targets: AxisList<Micro>,
     /// Added to the clock since a restart that was none.
     clock_offset: u64,
 }
@@ -53,6 +57,7 @@ impl PlantedBoard {
                     stage.mechanics.home_switch = -1e9;
                     stage.mechanics.hard_limits = [-1e9, 1e9];
                 }
+                Defect::FastWithoutReference => stage.settings.homing.seek_speed = stage.settings.speed,
                 Defect::NoFollowingCheck => stage.settings.following_error = Micro(i32::MAX),
                 _ => {}
             }
@@ -65,6 +70,7 @@ impl PlantedBoard {
             said: Receiver::new(),
             session: None,
             modes: Vec::new(),
+            targets: AxisList::new(),
             clock_offset: 0,
         }
     }
@@ -88,10 +94,27 @@ impl PlantedBoard {
         }
     }
 
+    /// The same move, but to where the running one goes.
+    fn to_the_old_target(&self, header: Header, request: &Request) -> Option<Vec<u8>> {
+        let Request::MoveTo(order) = request else { return None };
+        if self.board.state() != ControllerState::Moving {
+            return None;
+        }
+        let order = Move { targets: self.targets.clone(), ..order.clone() };
+        let mut buffer = [0; MAX_FRAME];
+        let length = encode(header, &Request::MoveTo(order), &mut buffer).unwrap();
+        Some(buffer[..length].to_vec())
+    }
+
     fn listen(&mut self, request: &Request) {
         match request {
             Request::Heartbeat { session, .. } => self.session = Some(*session),
-            Request::MoveTo(order) => self.modes.push((order.id, order.mode)),
+            Request::MoveTo(order) => {
+                self.modes.push((order.id, order.mode));
+                if self.board.state() != ControllerState::Moving {
+                    self.targets = order.targets.clone();
+                }
+            }
             _ => {}
         }
     }
@@ -108,7 +131,8 @@ impl PlantedBoard {
         match self.defect {
             Defect::ModeFromSteps if pose.phase == MovePhase::Settling => {
                 let mode = self.modes.iter().rev().find(|(id, _)| *id == pose.move_id);
-                (pose.phase, pose.mode) = (MovePhase::Settled, mode.unwrap().1);
+                // A jog has none.
+                (pose.phase, pose.mode) = (MovePhase::Settled, mode.map_or(Mode(0), |(_, mode)| *mode));
             }
             Defect::LatestFault => {
                 if let Some(fault) = &mut pose.fault {
@@ -135,17 +159,20 @@ impl Board for PlantedBoard {
 
     fn receive(&mut self, bytes: &[u8]) {
         for chunk in bytes.split_inclusive(|&byte| byte == 0) {
-            let mut deaf = false;
+            let (mut deaf, mut altered) = (false, None);
             for &byte in chunk {
                 let Some(frame) = self.heard.push(byte) else { continue };
-                let (kind, request) = (frame.header.kind, frame.body::<Request>());
+                let (header, kind, request) = (frame.header, frame.header.kind, frame.body::<Request>());
                 deaf |= kind == Kind::Control && self.board.now().0 > 5_000_000;
                 if let Ok(request) = request {
+                    altered = self.to_the_old_target(header, &request);
                     self.listen(&request);
                 }
             }
-            if !(deaf && self.defect == Defect::StopsAnswering) {
-                self.board.receive(chunk);
+            match altered {
+                Some(frame) if self.defect == Defect::ForgetsTheNewTarget => self.board.receive(&frame),
+                _ if deaf && self.defect == Defect::StopsAnswering => {}
+                _ => self.board.receive(chunk),
             }
         }
     }
@@ -166,6 +193,10 @@ impl Board for PlantedBoard {
             out.extend(&buffer[..length.unwrap()]);
         }
         out
+    }
+
+    fn delay_tick(&mut self, us: u64) {
+        self.board.delay_tick(us);
     }
 
     fn restart(&mut self, boot: u32) {

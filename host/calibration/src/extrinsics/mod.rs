@@ -24,7 +24,7 @@ pub(crate) use initial::{PlacedView, inside, nearer_boards, place};
 pub(crate) use joint::{FixedPose, Kinematics, Shared};
 pub(crate) use report::{outliers, refined, rms, view_figures};
 pub use stereo::LensKnowledge;
-pub(crate) use stereo::Lenses;
+pub(crate) use stereo::{Lenses, Pair};
 pub use vergence_vision::Side;
 
 /// Fewer views cannot contradict each other.

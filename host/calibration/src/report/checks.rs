@@ -3,6 +3,7 @@
 use super::coverage::FieldCoverage;
 use super::html::{counted, escape, fixed, significant};
 use super::places::{OCTANTS, list, name};
+use crate::Validation;
 
 /// A finding.
 pub(super) struct Check {
@@ -145,6 +146,21 @@ pub(super) fn board_shift(shift_px: f64, rms_px: f64) -> Check {
         ))
     } else {
         Check::good(format!("Both cameras agree on where the boards were: whole boards are off by {size} px rms only."))
+    }
+}
+
+/// On views that the calibration did not see, against `rms_px` of those that it did.
+pub(super) fn held_out(validation: &Validation, rms_px: f64) -> Check {
+    let found = format!(
+        "Views that the calibration did not see fit to {} px rms, those that it saw to {} px ({} parts held out in turn).",
+        significant(validation.rms_px, 3),
+        significant(rms_px, 3),
+        validation.folds
+    );
+    if validation.is_sound(rms_px) {
+        Check::good(found)
+    } else {
+        Check::attention(format!("{found} The calibration fits its views better than the world: take more of them."))
     }
 }
 

@@ -7,13 +7,21 @@
 //! dλ = q · (δ + μ ω × d) / (q · f)        q in the epipolar plane and orthogonal to d
 //! ```
 
-use nalgebra::{SMatrix, Vector3, Vector6};
-use vergence_vision::{Left, UnitRay};
+use nalgebra::{Matrix6, Vector3, Vector6};
+use vergence_vision::{KannalaBrandt, Left, Right, Transform, UnitRay};
 
 use super::image_frame::WIDTH;
 use super::plot::Axes;
 use super::svg::{Anchor, Drawing, Path};
-use crate::ExtrinsicsCalibration;
+
+/// Two cameras, and how sure their relative pose is.
+pub(super) struct UncertainPair<'a> {
+    pub left: &'a KannalaBrandt,
+    pub right: &'a KannalaBrandt,
+    pub left_from_right: Transform<Left, Right>,
+    /// In local coordinates `[ω, δ]`, radians and millimetres about the left axes.
+    pub covariance: Matrix6<f64>,
+}
 
 /// The depth error over the directions in the plane of the baseline and of the direction straight ahead.
 pub(super) struct DepthError {
@@ -25,16 +33,16 @@ pub(super) struct DepthError {
 }
 
 impl DepthError {
-    pub fn of(calibration: &ExtrinsicsCalibration, range_mm: f64) -> Self {
+    pub fn of(pair: &UncertainPair<'_>, range_mm: f64) -> Self {
         const WIDEST_DEG: i32 = 85;
-        let right_centre = calibration.joint.left_from_right.origin().mm();
+        let right_centre = pair.left_from_right.origin().mm();
         let along = right_centre.try_normalize(0.0);
-        let ahead = along.and_then(|along| straight_ahead(calibration, &along));
+        let ahead = along.and_then(|along| straight_ahead(pair, &along));
         let error = |degrees: i32| {
             let (ahead, along) = (ahead?, along?);
             let (sin, cos) = f64::from(degrees).to_radians().sin_cos();
             let point = 0.5 * right_centre + range_mm * (cos * ahead + sin * along);
-            Some((f64::from(degrees), sigma_mm(calibration, &point)?))
+            Some((f64::from(degrees), sigma_mm(pair, &point)?))
         };
         Self { curve: (-WIDEST_DEG..=WIDEST_DEG).filter_map(error).collect(), range_mm }
     }
@@ -78,21 +86,21 @@ impl DepthError {
 }
 
 /// The direction between the optical axes, made orthogonal to the baseline; in the left frame.
-fn straight_ahead(calibration: &ExtrinsicsCalibration, along: &Vector3<f64>) -> Option<Vector3<f64>> {
-    let right_axis = calibration.joint.left_from_right.rotation() * Vector3::z();
+fn straight_ahead(pair: &UncertainPair<'_>, along: &Vector3<f64>) -> Option<Vector3<f64>> {
+    let right_axis = pair.left_from_right.rotation() * Vector3::z();
     let between = Vector3::z() + right_axis;
     (between - along * along.dot(&between)).try_normalize(1e-6)
 }
 
 /// `None` where a camera does not see the point, or sees it along the baseline.
-fn sigma_mm(calibration: &ExtrinsicsCalibration, point: &Vector3<f64>) -> Option<f64> {
-    let pose = calibration.joint.left_from_right;
+fn sigma_mm(pair: &UncertainPair<'_>, point: &Vector3<f64>) -> Option<f64> {
+    let pose = pair.left_from_right;
     let left = UnitRay::<Left>::new(*point)?;
     let arm = point - pose.origin().mm();
     let right = UnitRay::<Left>::new(arm)?;
-    calibration.left.project(&left).ok().filter(|pixel| calibration.left.on_sensor(*pixel))?;
-    let seen = calibration.right.project(&(pose.inverse() * right)).ok();
-    seen.filter(|pixel| calibration.right.on_sensor(*pixel))?;
+    pair.left.project(&left).ok().filter(|pixel| pair.left.on_sensor(*pixel))?;
+    let seen = pair.right.project(&(pose.inverse() * right)).ok();
+    seen.filter(|pixel| pair.right.on_sensor(*pixel))?;
 
     let (f, d) = (left.vector(), right.vector());
     let across = d.cross(&f.cross(&d).try_normalize(1e-9)?);
@@ -100,7 +108,6 @@ fn sigma_mm(calibration: &ExtrinsicsCalibration, point: &Vector3<f64>) -> Option
     let by_turn = d.cross(&across) * (arm.norm() / gain);
     let by_shift = across / gain;
     let by_move = Vector6::new(by_turn.x, by_turn.y, by_turn.z, by_shift.x, by_shift.y, by_shift.z);
-    let covariance: &SMatrix<f64, 6, 6> = &calibration.covariance;
-    let variance = by_move.dot(&(covariance * by_move));
+    let variance = by_move.dot(&(pair.covariance * by_move));
     variance.is_finite().then(|| variance.max(0.0).sqrt())
 }

@@ -6,13 +6,14 @@ use vergence_vision::{Angle, KannalaBrandt};
 use super::ReportAbout;
 use super::arrows::arrows;
 use super::checks::{self, Check};
-use super::depth::DepthError;
+use super::depth::{DepthError, UncertainPair};
 use super::field_angle::field_angle;
 use super::html::{Cell, Row, counted, figure, fixed, note, page, section, significant, table, with_sigma};
 use super::pattern::{board_shift_px, patches, pattern_px};
 use super::ray_field::RANGE_MM;
 use super::residuals::{Sight, of_extrinsics};
 use super::sections::{count, figures, number, panel, plain, text, verdict};
+use super::verdict::{Verdict, of_depth};
 use crate::{ExtrinsicsCalibration, RelativePose, Side, StereoOutlier, StereoOutlierReason, StereoView};
 
 /// Reports of outliers name so many corners one by one.
@@ -23,9 +24,9 @@ const MOST_LISTED: usize = 60;
 /// `views` are those that `calibration` was made of, in the same order; others give a page whose figures mean nothing.
 #[must_use]
 pub fn extrinsics_report(calibration: &ExtrinsicsCalibration, views: &[StereoView], about: &ReportAbout) -> String {
-    let report = Report::new(calibration, views);
+    let report = Report::new(calibration, views, about);
     let body = [
-        report.verdict(),
+        report.verdict_html(),
         report.figures(),
         section("Views", &report.view_table()),
         section("Corners left out", &report.outlier_table()),
@@ -34,44 +35,44 @@ pub fn extrinsics_report(calibration: &ExtrinsicsCalibration, views: &[StereoVie
     page("Extrinsics calibration", about, &body.concat())
 }
 
+/// What the pair of `calibration` is worth, made of `views`.
+#[must_use]
+pub fn extrinsics_verdict(calibration: &ExtrinsicsCalibration, views: &[StereoView]) -> Verdict {
+    Report::new(calibration, views, &ReportAbout::default()).verdict()
+}
+
 struct Report<'a> {
     calibration: &'a ExtrinsicsCalibration,
+    about: &'a ReportAbout,
     sights: [Vec<Sight>; 2],
     depth: DepthError,
 }
 
 impl<'a> Report<'a> {
-    fn new(calibration: &'a ExtrinsicsCalibration, views: &[StereoView]) -> Self {
+    fn new(calibration: &'a ExtrinsicsCalibration, views: &[StereoView], about: &'a ReportAbout) -> Self {
         let sights = [Side::Left, Side::Right].map(|side| of_extrinsics(calibration, views, side));
-        Self { calibration, sights, depth: DepthError::of(calibration, RANGE_MM) }
+        let pair = UncertainPair {
+            left: &calibration.left,
+            right: &calibration.right,
+            left_from_right: calibration.joint.left_from_right,
+            covariance: calibration.covariance,
+        };
+        Self { calibration, about, sights, depth: DepthError::of(&pair, RANGE_MM) }
     }
 
     fn cameras(&self) -> [&KannalaBrandt; 2] {
         [&self.calibration.left, &self.calibration.right]
     }
 
-    fn verdict(&self) -> String {
-        /// The human field of sharp stereo vision and more; errors towards the baseline are in the figure.
-        const CENTRAL_DEG: f64 = 45.0;
-        let range = fixed(RANGE_MM, 0);
-        let sentence = match self.depth.ahead().zip(self.depth.worst_within(CENTRAL_DEG)) {
-            Some(((direction, ahead), (worst_at, worst))) => {
-                let place = if direction == 0.0 {
-                    "straight ahead".to_owned()
-                } else {
-                    format!("{}° from straight ahead", fixed(direction, 0))
-                };
-                let side = if worst_at < 0.0 { "left" } else { "right" };
-                format!(
-                    "Good to {} mm at {range} mm {place}; weakest within {}°: {} mm, {}° to the {side}.",
-                    significant(ahead, 2),
-                    fixed(CENTRAL_DEG, 0),
-                    significant(worst, 2),
-                    fixed(worst_at.abs(), 0)
-                )
-            }
-            None => format!("Both cameras see nothing in common at {range} mm around straight ahead."),
-        };
+    fn verdict(&self) -> Verdict {
+        let verdict = of_depth(&self.depth);
+        let disagree =
+            self.board_shift_px().is_some_and(|shift| checks::is_shift(shift, self.calibration.rms_inlier_px));
+        let warning = if disagree { " The cameras disagree on where the boards were, so it may be worse." } else { "" };
+        Verdict { sentence: verdict.sentence + warning, ..verdict }
+    }
+
+    fn verdict_html(&self) -> String {
         let found = self.calibration;
         let [length, sigma] = baseline(found);
         let [length, sigma] = with_sigma(length, sigma);
@@ -81,9 +82,7 @@ impl<'a> Report<'a> {
              the lenses' own errors where the lenses were held.",
             fixed(axes_angle(&found.joint).deg(), 2)
         );
-        let disagree = self.board_shift_px().is_some_and(|shift| checks::is_shift(shift, found.rms_inlier_px));
-        let warning = if disagree { " The cameras disagree on where the boards were, so it may be worse." } else { "" };
-        verdict(&(sentence + warning), &explanation, &self.facts(), &self.checks())
+        verdict(&self.verdict().sentence, &explanation, &self.facts(), &self.checks())
     }
 
     /// Of the camera where it is larger.
@@ -119,6 +118,7 @@ impl<'a> Report<'a> {
             self.board_shift_px().map(|shift| checks::board_shift(shift, found.rms_inlier_px)),
             Some(checks::views(&rms)),
             Some(checks::outliers(found.corners_total.saturating_sub(found.corners_inlier), found.corners_total)),
+            self.about.held_out.as_ref().map(|validation| checks::held_out(validation, found.rms_inlier_px)),
         ];
         checks.into_iter().flatten().collect()
     }

@@ -1,7 +1,7 @@
 //! The report of one lens.
 
 use nalgebra::{Point3, Vector3};
-use vergence_vision::KannalaBrandt;
+use vergence_vision::{KannalaBrandt, Length};
 
 use super::ReportAbout;
 use super::arrows::{arrows, mean_arrows};
@@ -14,6 +14,7 @@ use super::ray_field::{BASELINE_MM, RANGE_MM, RayField, Ring, depth_mm};
 use super::ray_map::ray_map;
 use super::residuals::{Sight, of_intrinsics};
 use super::sections::{count, figures, number, panel, plain, text, verdict};
+use super::verdict::Verdict;
 use crate::{BoardView, IntrinsicsCalibration, Outlier, OutlierReason};
 
 /// Reports of outliers name so many corners one by one.
@@ -26,12 +27,18 @@ const MOST_LISTED: usize = 60;
 pub fn intrinsics_report(calibration: &IntrinsicsCalibration, views: &[BoardView], about: &ReportAbout) -> String {
     let report = Report::new(calibration, views, about);
     let body = [
-        report.verdict(),
+        report.verdict_html(),
         report.figures(),
         section("Views", &report.view_table()),
         section("Corners left out", &report.outlier_table()),
     ];
     page("Intrinsics calibration", about, &body.concat())
+}
+
+/// What the lens of `calibration` is worth, made of `views`.
+#[must_use]
+pub fn intrinsics_verdict(calibration: &IntrinsicsCalibration, views: &[BoardView]) -> Verdict {
+    Report::new(calibration, views, &ReportAbout::default()).verdict()
 }
 
 struct Report<'a> {
@@ -62,11 +69,12 @@ impl<'a> Report<'a> {
         &self.calibration.camera
     }
 
-    fn verdict(&self) -> String {
+    fn verdict(&self) -> Verdict {
         let Some((median, worst)) = self.rays.median().zip(self.rays.worst()) else {
-            return verdict("No ray of this lens reaches the sensor: it is not usable.", "", &[], &[]);
+            return Verdict::useless("No ray of this lens reaches the sensor: it is not usable.".to_owned());
         };
-        let mm = |sigma: f64| significant(depth_mm(sigma), 2);
+        let [typical, worst] = [median, worst].map(|sample| depth_mm(sample.sigma_rad));
+        let mm = |depth: f64| significant(depth, 2);
         let weakest = self.rays.weakest().map_or(String::new(), |weakest| {
             let place = weakest.place.unwrap_or("all around");
             format!("; weakest: {place}, beyond {}° from the axis", fixed(weakest.from_deg, 0))
@@ -77,9 +85,17 @@ impl<'a> Report<'a> {
         });
         let sentence = format!(
             "Good to {} mm at {range} mm over half of the field, to {} mm at worst{weakest}.{pattern}",
-            mm(median.sigma_rad),
-            mm(worst.sigma_rad)
+            mm(typical),
+            mm(worst)
         );
+        Verdict { sentence, depth_sigma: Some(Length::from_mm(typical)), worst_sigma: Some(Length::from_mm(worst)) }
+    }
+
+    fn verdict_html(&self) -> String {
+        let sentence = self.verdict().sentence;
+        let Some((median, worst)) = self.rays.median().zip(self.rays.worst()) else {
+            return verdict(&sentence, "", &[], &[]);
+        };
         let degrees = |sigma: f64| significant(sigma.to_degrees(), 2);
         let explanation = format!(
             "A ray is known to {}° ({} px) in the median over the valid cone and to {}° ({} px) at worst, one standard \
@@ -123,6 +139,7 @@ impl<'a> Report<'a> {
             checks::pattern("", pattern_px(&self.patches), found.sigma0_px),
             Some(checks::views(&rms)),
             Some(checks::outliers(found.corners_total.saturating_sub(found.corners_inlier), found.corners_total)),
+            self.about.held_out.as_ref().map(|validation| checks::held_out(validation, found.rms_inlier_px)),
         ];
         checks.into_iter().flatten().collect()
     }

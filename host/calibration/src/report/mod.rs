@@ -24,14 +24,20 @@ mod ray_field;
 mod ray_map;
 mod residuals;
 mod sections;
+mod stage;
 mod svg;
+mod verdict;
 
 use vergence_vision::Angle;
 
-pub use extrinsics::extrinsics_report;
-pub use intrinsics::intrinsics_report;
+use crate::Validation;
 
-/// What a report says of its own origin. Every text may hold any characters.
+pub use extrinsics::{extrinsics_report, extrinsics_verdict};
+pub use intrinsics::{intrinsics_report, intrinsics_verdict};
+pub use stage::stage_report;
+pub use verdict::{Verdict, stage_verdict};
+
+/// What a report says of its own origin, and of checks besides the calibration. Every text may hold any characters.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct ReportAbout {
     /// The page's title, such as the camera's name.
@@ -47,4 +53,6 @@ pub struct ReportAbout {
     /// Half the field of the lens, where it is known: what the coverage is measured against. Otherwise the border of the
     /// sensor is.
     pub half_field: Option<Angle>,
+    /// How well views are predicted that the calibration did not see, where that was tried.
+    pub held_out: Option<Validation>,
 }

@@ -127,6 +127,16 @@ impl StageCalibration {
         predict(&self.state, &self.mechanism, &self.covariance, &self.reading_sigma, &values)
     }
 
+    /// All axes in the middle of their ranges.
+    #[must_use]
+    pub fn middle(&self) -> Vec<AxisPosition> {
+        let middle = |axis: &RigAxis| {
+            let [low, high] = axis.range.map(AxisPosition::value);
+            AxisPosition::from_value(axis.kind, 0.5 * (low + high))
+        };
+        self.axes.iter().map(middle).collect()
+    }
+
     /// The left camera's chain: the scales of the encoders are in the shares.
     #[must_use]
     pub fn left_chain(&self) -> Chain<Left> {

@@ -30,7 +30,7 @@ pub struct Frame {
 }
 
 /// A source of frames.
-pub trait Camera {
+pub trait Camera: Send {
     /// The next frame; `None` after the last one.
     ///
     /// # Errors

@@ -2,6 +2,7 @@
 
 use std::sync::Arc;
 
+use vergence_rig::RigPose;
 use vergence_scene::{Optics, Scene, View, render};
 use vergence_vision::{Base, Camera as CameraFrame, KannalaBrandt, Left, Transform, World};
 
@@ -63,6 +64,19 @@ impl Camera for SimulatedCamera {
             rig.run_to_now();
             rig.true_pose()
         };
+        Ok(Some(self.photograph(&pose)))
+    }
+}
+
+impl SimulatedCamera {
+    /// The frame of the last trigger pulse, stamped now, as a driver stamps what it has received; `None` before the
+    /// first pulse.
+    pub fn grab_triggered(&mut self) -> Option<Frame> {
+        let pose = self.rig.lock().exposed_pose()?;
+        Some(self.photograph(&pose))
+    }
+
+    fn photograph(&mut self, pose: &RigPose) -> Frame {
         let world_from_left = self.stage.world_from_left(pose.base_from_left);
         let world_from_camera: Transform<World, CameraFrame> = match self.eye {
             Eye::Left => world_from_left.renamed(),
@@ -73,10 +87,10 @@ impl Camera for SimulatedCamera {
         let seed = self.seed.wrapping_mul(2).wrapping_add(u64::from(self.eye == Eye::Right));
         let photograph = render(&view, seed.wrapping_add(self.frames << 32));
         self.frames += 1;
-        Ok(Some(Frame {
+        Frame {
             image: photograph.image,
             name: format!("{:?}{}", self.eye, self.frames).to_lowercase(),
             exposed_at: Some(self.clock.now()),
-        }))
+        }
     }
 }

@@ -1,5 +1,6 @@
 //! From the command line's options to a connected board.
 
+use indicatif::ProgressBar;
 use vergence_rig::Rig;
 
 use crate::board::{Board, fresh_session};
@@ -18,13 +19,35 @@ const SIM_SEED: u64 = 1;
 /// # Errors
 /// No board, a board of another protocol or rig, a bad rig file.
 pub async fn connect(globals: &Globals, console: Console, what: &str) -> Result<Board, Failure> {
+    connect_with(globals, console.progress(what)).await
+}
+
+/// The same, with another sign of progress.
+///
+/// # Errors
+/// As of [`connect`].
+pub async fn connect_with(globals: &Globals, progress: ProgressBar) -> Result<Board, Failure> {
+    let (client, rig) = client(globals).await?;
+    Board::new(client, rig, globals.lease, progress).await
+}
+
+/// Connects to a board that may not fit the rig file.
+///
+/// # Errors
+/// No board, a board of another protocol, a bad rig file.
+pub async fn connect_any(globals: &Globals, console: Console, what: &str) -> Result<Board, Failure> {
+    let (client, rig) = client(globals).await?;
+    Board::open(client, rig, globals.lease, console.progress(what)).await
+}
+
+async fn client(globals: &Globals) -> Result<(Client, Rig), Failure> {
     let rig = rig_file::load(globals.rig.as_deref())?;
     let port = port(globals)?;
     let wire = wire(&port, globals.baud, &rig).await?;
     let client = Client::connect(wire, fresh_session()?, HostClock::start())
         .await
         .map_err(|error| Failure::device(format!("{port}: {error}")))?;
-    Board::new(client, rig, globals.lease, console.progress(what)).await
+    Ok((client, rig))
 }
 
 /// The port that the options name, or the only one there is.
@@ -41,6 +64,16 @@ pub fn port(globals: &Globals) -> Result<Port, Failure> {
         [] => Err(Failure::device(format!("no serial device found: connect the board, or {hint}"))),
         [only] => Ok(Port::Serial(only.into())),
         several => Err(Failure::usage(format!("several serial devices found ({}): {hint}", several.join(", ")))),
+    }
+}
+
+/// Whether bytes take time on this port: pseudo-terminals and TCP carry them at once.
+#[must_use]
+pub fn is_wire(globals: &Globals) -> bool {
+    match port(globals) {
+        // A name that a rule or a person gave to the device is still that device.
+        Ok(Port::Serial(path)) => !path.canonicalize().unwrap_or(path).starts_with("/dev/pts"),
+        _ => false,
     }
 }
 

@@ -18,6 +18,7 @@ use crate::failure::Failure;
 use crate::link::{Client, HostClock, OpenWire};
 use crate::output::{DepthPicture, depth_picture, make_folder, match_picture, ply, write_png, write_whole};
 use crate::rig_file;
+use crate::rig_zones::ZONE_RADIUS;
 use crate::sim::{SharedRig, SimulatedRig, spawn_in_process};
 use crate::stopwatch::Stopwatch;
 
@@ -78,7 +79,7 @@ fn tell(mode: &Mode, view: &View, board: &Board, console: Console) -> Result<(),
          within 1.5 m: {} points, median {:.2} %\n  time     expose {:.2} s (simulated), match {:.2} s, triangulate {:.4} s",
         mode.name,
         poses.join(", "),
-        see::ZONE_RADIUS,
+        ZONE_RADIUS,
         view.look.points.len(),
         view.look.matches,
         percent(score.all.median),

@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 use serde_json::{Value, json};
-use vergence_matching::GuidedMatcher;
+use vergence_matching::Matcher;
 use vergence_rig::{Rig, RigPose};
 use vergence_vision::{ImageSize, Pixel, PixelPair};
 
@@ -15,6 +15,7 @@ use crate::cli::Globals;
 use crate::console::Console;
 use crate::failure::Failure;
 use crate::look::{Eyes, Look, look, triangulate};
+use crate::models::MatcherOptions;
 use crate::output::{make_folder, ply, write_whole};
 use crate::rig_file;
 
@@ -39,6 +40,8 @@ pub struct Args {
     mode: Option<String>,
     #[command(flatten)]
     stage: StagePose,
+    #[command(flatten)]
+    matching: MatcherOptions,
 }
 
 pub fn run(args: &Args, globals: &Globals, console: Console) -> Result<(), Failure> {
@@ -55,11 +58,12 @@ pub fn run(args: &Args, globals: &Globals, console: Console) -> Result<(), Failu
             right.remaining()
         )));
     }
+    let matcher = args.matching.matcher(console)?;
     let several = args.left.is_dir();
     let mut results = Vec::new();
     while let (Some(left), Some(right)) = (left.grab()?, right.grab()?) {
         let work = console.progress(&format!("{} and {}", left.name, right.name));
-        let look = one_pair(&left, &right, &rig, &pose, pairs.as_deref())?;
+        let look = one_pair(&left, &right, &rig, &pose, How { pairs: pairs.as_deref(), matcher: matcher.as_ref() })?;
         work.finish_and_clear();
         let out = if several { args.out.join(format!("{}.ply", left.name)) } else { args.out.clone() };
         if several {
@@ -94,19 +98,20 @@ fn pose(args: &Args, rig: &Rig) -> Result<RigPose, Failure> {
     Ok(rig.pose_at_values(&values))
 }
 
-fn one_pair(
-    left: &Frame,
-    right: &Frame,
-    rig: &Rig,
-    pose: &RigPose,
-    pairs: Option<&[PixelPair]>,
-) -> Result<Look, Failure> {
+/// Where homologous points come from.
+#[derive(Clone, Copy)]
+struct How<'a> {
+    pairs: Option<&'a [PixelPair]>,
+    matcher: &'a dyn Matcher,
+}
+
+fn one_pair(left: &Frame, right: &Frame, rig: &Rig, pose: &RigPose, how: How<'_>) -> Result<Look, Failure> {
     check_size(left, rig.left_camera.size(), "left")?;
     check_size(right, rig.right_camera.size(), "right")?;
     let eyes = Eyes { left: &left.image, right: &right.image };
-    match pairs {
+    match how.pairs {
         Some(pairs) => Ok(triangulate(pairs, eyes, rig, pose)),
-        None => look(eyes, rig, pose, &GuidedMatcher::default())
+        None => look(eyes, rig, pose, how.matcher)
             .map_err(|error| Failure::usage(format!("{} and {}: {error}", left.name, right.name))),
     }
 }

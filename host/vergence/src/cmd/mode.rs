@@ -1,7 +1,7 @@
 //! `vergence mode NAME`: goes to a vision mode of the rig.
 
 use super::connect::connect;
-use super::move_to::{Goal, go};
+use super::move_to::{Goal, go, named_mode};
 use crate::cli::Globals;
 use crate::console::Console;
 use crate::failure::Failure;
@@ -16,15 +16,7 @@ pub struct Args {
 
 pub async fn run(args: &Args, globals: &Globals, console: Console) -> Result<(), Failure> {
     let rig = rig_file::load(globals.rig.as_deref())?;
-    let Some(mode) = rig.mode(&args.name) else {
-        let names: Vec<_> = rig.modes.iter().map(|mode| mode.name.as_str()).collect();
-        return Err(Failure::usage(format!(
-            "rig '{}' has no mode '{}': choose {}",
-            rig.name,
-            args.name,
-            names.join(" or ")
-        )));
-    };
+    let mode = named_mode(&rig, &args.name)?;
     let goal = Goal { mode: mode.number, targets: mode.targets.clone() };
     let mut board = connect(globals, console, &args.name).await?;
     go(&mut board, &goal, console).await

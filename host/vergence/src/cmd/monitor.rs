@@ -1,17 +1,24 @@
 //! `vergence monitor`: poses as they come.
 
+mod live;
+
 use std::time::Duration;
 
+use indicatif::ProgressBar;
+use serde_json::Value;
 use tokio::time::timeout;
 
-use super::connect::connect;
-use super::report::pose_json;
+use self::live::Live;
+use super::connect::connect_with;
+use super::reconnect::{Persistence, reconnect};
+use super::report::{clock_json, pose_json};
 use crate::board::{Board, describe_fault, describe_pose};
 use crate::cli::Globals;
 use crate::console::Console;
 use crate::failure::Failure;
 
-/// Prints a line for each pose (JSON Lines with --json) until Ctrl-C. It only reads.
+/// Shows the axes as they move until Ctrl-C: one line each on a terminal, elsewhere a line for each pose (JSON Lines with
+/// --json). It only reads. When the link ends, it waits until the board is back.
 #[derive(Debug, clap::Args)]
 pub struct Args {
     /// Stop after this many poses.
@@ -20,27 +27,60 @@ pub struct Args {
     /// Stop after this time.
     #[arg(long = "for", value_name = "TIME", value_parser = humantime::parse_duration)]
     duration: Option<Duration>,
+    #[command(flatten)]
+    persistence: Persistence,
 }
 
 pub async fn run(args: &Args, globals: &Globals, console: Console) -> Result<(), Failure> {
-    let mut board = connect(globals, console, "monitor").await?;
     let forever = Duration::from_secs(u64::from(u32::MAX));
     tokio::select! {
-        outcome = timeout(args.duration.unwrap_or(forever), show(&mut board, args.count, console)) => {
-            outcome.unwrap_or(Ok(()))
-        }
+        outcome = timeout(args.duration.unwrap_or(forever), watch(args, globals, console)) => outcome.unwrap_or(Ok(())),
         _ = tokio::signal::ctrl_c() => Ok(()),
     }
 }
 
-async fn show(board: &mut Board, count: Option<u64>, console: Console) -> Result<(), Failure> {
-    let mut shown = 0;
-    while count.is_none_or(|count| shown < count) {
-        let pose = board.next_pose().await?.clone();
-        let fault = pose.fault.map(|fault| format!("  {}", describe_fault(board.rig(), &fault))).unwrap_or_default();
-        console.say(format!("{:10.3} s  {}{fault}", pose.at.0 as f64 * 1e-6, describe_pose(board.rig(), &pose)))?;
-        console.result(&pose_json(board.rig(), &pose))?;
-        shown += 1;
+async fn watch(args: &Args, globals: &Globals, console: Console) -> Result<(), Failure> {
+    let mut board = connect_with(globals, ProgressBar::hidden()).await?;
+    let mut left = args.count.unwrap_or(u64::MAX);
+    loop {
+        match show(&mut board, &mut left, console).await {
+            Err(lost) if args.persistence.survives(&lost) => {
+                // The port is free for the next attempt only once this session has let go of it.
+                drop(board);
+                board = reconnect(globals, console, lost).await?;
+            }
+            outcome => return outcome,
+        }
+    }
+}
+
+async fn show(board: &mut Board, left: &mut u64, console: Console) -> Result<(), Failure> {
+    let mut live = console.is_live().then(|| Live::new(board.rig()));
+    while *left > 0 {
+        board.next_pose().await?;
+        match &mut live {
+            Some(live) => live.draw(board),
+            None => console.say(line(board))?,
+        }
+        if console.is_json() {
+            console.result(&json_line(board))?;
+        }
+        *left -= 1;
     }
     Ok(())
+}
+
+fn line(board: &Board) -> String {
+    let (rig, pose) = (board.rig(), board.pose());
+    let fault = pose.fault.map(|fault| format!("  {}", describe_fault(rig, &fault))).unwrap_or_default();
+    format!("{:10.3} s  {}{fault}", pose.at.0 as f64 * 1e-6, describe_pose(rig, pose))
+}
+
+/// The pose, when it was on both clocks, and what the link lost.
+fn json_line(board: &Board) -> Value {
+    let mut line = pose_json(board.rig(), board.pose());
+    line["host_us"] = board.pose_on_host_clock().map(|host| host.us.round()).into();
+    line["clock"] = clock_json(board);
+    line["poses_lost"] = board.client().statistics().poses_lost.into();
+    line
 }

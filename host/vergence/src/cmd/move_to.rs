@@ -1,7 +1,7 @@
-//! `vergence move`: goes to any pose.
+//! `vergence move`: goes to any pose, or by a distance.
 
 use serde_json::json;
-use vergence_protocol::Mode;
+use vergence_protocol::{AxisMask, Mode};
 use vergence_rig::{AxisPosition, Rig};
 use vergence_vision::{Angle, Length};
 
@@ -13,9 +13,12 @@ use crate::console::Console;
 use crate::failure::Failure;
 use crate::rig_file;
 
-/// Moves to an absolute pose; an axis that is not named stays where it is.
+/// Moves to an absolute pose, or with --by from where the stages stand; an axis that is not named stays where it is.
 #[derive(Debug, clap::Args)]
 pub struct Args {
+    /// Go by these distances instead. Works before homing too, at homing speed: no limit but the switches stops it then.
+    #[arg(long)]
+    by: bool,
     #[command(flatten)]
     stage: StagePose,
 }
@@ -62,6 +65,17 @@ impl StagePose {
     }
 }
 
+/// The mode that the rig file names `name`.
+///
+/// # Errors
+/// Names the modes there are.
+pub fn named_mode<'a>(rig: &'a Rig, name: &str) -> Result<&'a vergence_rig::Mode, Failure> {
+    rig.mode(name).ok_or_else(|| {
+        let names: Vec<_> = rig.modes.iter().map(|mode| mode.name.as_str()).collect();
+        Failure::usage(format!("rig '{}' has no mode '{name}': choose {}", rig.name, names.join(" or ")))
+    })
+}
+
 /// Where to go.
 pub struct Goal {
     /// The mode's number, or zero.
@@ -76,13 +90,41 @@ pub async fn run(args: &Args, globals: &Globals, console: Console) -> Result<(),
     }
     let rig = rig_file::load(globals.rig.as_deref())?;
     let named = args.stage.of_axes(&rig)?;
+    if args.by {
+        return go_by(&rig, &named, globals, console).await;
+    }
     // What is named is checked before the board is touched; the rest stays where it is.
     let certain: Vec<_> =
         named.iter().zip(&rig.axes).map(|(position, axis)| position.unwrap_or(axis.range[0])).collect();
     check_range(&rig, &certain)?;
     let mut board = connect(globals, console, "moving").await?;
-    let targets = named.iter().zip(board.positions()).map(|(named, present)| named.unwrap_or(present)).collect();
+    let targets = named.iter().zip(board.standing()).map(|(named, present)| named.unwrap_or(present)).collect();
     go(&mut board, &Goal { mode: Mode(0), targets }, console).await
+}
+
+async fn go_by(rig: &Rig, named: &[Option<AxisPosition>], globals: &Globals, console: Console) -> Result<(), Failure> {
+    let axes = named.iter().zip(&rig.axes);
+    let by: Vec<_> = axes.map(|(by, axis)| by.unwrap_or(AxisPosition::from_value(axis.kind, 0.0))).collect();
+    let mut board = connect(globals, console, "moving").await?;
+    let before = board.positions();
+    if is_referenced(&board) {
+        let targets = board.standing().iter().zip(&by).map(|(before, &by)| before.plus(by)).collect::<Vec<_>>();
+        check_range(rig, &targets)?;
+    }
+    board.armed(async |board| board.move_by(&by).await).await?;
+    let moved: Vec<_> = board.positions().iter().zip(&before).map(|(after, &before)| after.minus(before)).collect();
+    console.say(describe_pose(rig, board.pose()))?;
+    let ways = rig.axes.iter().zip(&moved).map(|(axis, moved)| format!("{} by {moved}", axis.name));
+    console.say(format!("moved {}", ways.collect::<Vec<_>>().join(", ")))?;
+    let mut result = pose_json(rig, board.pose());
+    result["commanded_by"] = axes_json(rig, &by);
+    result["moved_by"] = axes_json(rig, &moved);
+    console.result(&result)
+}
+
+/// Whether every axis knows where it is.
+pub fn is_referenced(board: &Board) -> bool {
+    board.pose().referenced == AxisMask::first(board.rig().axes.len())
 }
 
 /// Arms, moves, disarms, and says what was reached.

@@ -4,7 +4,7 @@ use serde_json::{Map, Value, json};
 use vergence_protocol::PoseReport;
 use vergence_rig::{AxisPosition, Rig};
 
-use crate::board::{describe_fault, describe_pose, positions};
+use crate::board::{Board, describe_fault, describe_pose, positions};
 use crate::console::Console;
 use crate::failure::Failure;
 
@@ -46,6 +46,32 @@ pub fn pose_json(rig: &Rig, pose: &PoseReport) -> Value {
         "axes": axes_json(rig, &positions(rig, pose)),
         "referenced": referenced,
         "fault": fault,
+    })
+}
+
+/// How well the board's clock is known, in words.
+#[must_use]
+pub fn describe_clock(board: &Board) -> String {
+    let map = board.client().clock_map();
+    match (map.board_at(board.client().clock().now()), map.drift()) {
+        _ if map.is_lost() => "clock lost: the board does not answer its probes".into(),
+        (Some(now), Some(drift)) => {
+            format!("clock within {:.0} us, drift {:+.1} \u{b1} {:.1} ppm", now.error_us, drift.ppm, drift.error_ppm)
+        }
+        _ => "clock not compared yet".into(),
+    }
+}
+
+/// How well the board's clock is known. The bound holds with 95 %; sigma is that of an error anywhere within it.
+#[must_use]
+pub fn clock_json(board: &Board) -> Value {
+    let map = board.client().clock_map();
+    let error = map.board_at(board.client().clock().now()).map(|now| now.error_us);
+    json!({
+        "error_us": error.map(rounded),
+        "sigma_us": error.map(|error| rounded(error / 3f64.sqrt())),
+        "drift_ppm": map.drift().map(|drift| rounded(drift.ppm)),
+        "lost": map.is_lost(),
     })
 }
 

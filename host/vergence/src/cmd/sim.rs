@@ -1,5 +1,7 @@
 //! `vergence sim`: a simulated board for other programs.
 
+use std::path::PathBuf;
+
 use serde_json::json;
 
 use crate::cli::Globals;
@@ -21,11 +23,18 @@ pub struct Args {
     /// Decides where the stages stand at the start.
     #[arg(long, default_value_t = 1)]
     seed: u64,
+    /// Keep saved settings in this file, so that they outlive the simulator.
+    #[arg(long, value_name = "FILE")]
+    flash: Option<PathBuf>,
 }
 
 pub async fn run(args: &Args, globals: &Globals, console: Console) -> Result<(), Failure> {
     let rig = rig_file::load(globals.rig.as_deref())?;
-    let simulated = SharedRig::new(SimulatedRig::new(&rig, args.seed)?);
+    let mut simulated = SimulatedRig::new(&rig, args.seed)?;
+    if let Some(path) = &args.flash {
+        simulated.keep_flash_in(path)?;
+    }
+    let simulated = SharedRig::new(simulated);
     let listener = match &args.tcp {
         Some(address) => Listener::tcp(address).await?,
         None => Listener::pty()?,

@@ -6,13 +6,15 @@ use serde_json::json;
 use tokio::io::AsyncWriteExt;
 use vergence_protocol::{HostSession, MAX_FRAME, Request, StopKind};
 
-use super::connect::{connect, port};
+use super::connect::{connect_any, port};
 use super::report::say_pose;
 use crate::board::fresh_session;
 use crate::cli::Globals;
 use crate::console::Console;
 use crate::failure::Failure;
 use crate::link::{HostClock, OpenWire, Port, open};
+use crate::rig_file;
+use crate::slots;
 
 /// Decelerates every axis within its limits and keeps the reference. Needs no arming. It is software: the emergency stop
 /// is the switch that cuts the drivers.
@@ -26,9 +28,21 @@ pub async fn run(_: &Args, globals: &Globals, console: Console) -> Result<(), Fa
             return send_unheard(&port, wire, console).await;
         }
     }
-    let mut board = connect(globals, console, "stopping").await?;
+    let mut board = connect_any(&with_readable_rig(globals), console, "stopping").await?;
     board.stop().await?;
-    say_pose(console, board.rig(), board.pose())
+    // Only now does it matter whether positions can be told.
+    if board.check_axes().await.is_ok() {
+        return say_pose(console, board.rig(), board.pose());
+    }
+    console.say(format!("{}; the rig file does not describe this board", board.pose().state))?;
+    console.result(&json!({ "state": board.pose().state.to_string() }))
+}
+
+/// A rig file that cannot be read is no reason not to stop.
+fn with_readable_rig(globals: &Globals) -> Globals {
+    let rig = globals.rig.clone().or_else(|| slots::active_rig().ok().flatten());
+    let rig = rig.filter(|path| rig_file::load(Some(path)).is_ok());
+    Globals { rig, ..globals.clone() }
 }
 
 /// Another vergence reads this port: send the stop a few times and leave the answers to it.

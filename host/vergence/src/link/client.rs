@@ -8,7 +8,8 @@ use tokio::io::{AsyncReadExt, AsyncWriteExt};
 use tokio::sync::{mpsc, oneshot, watch};
 use tokio::time::{sleep_until, timeout};
 use vergence_protocol::{
-    Compatibility, HostEvent, HostSession, MAX_FRAME, Microseconds, PoseReport, Report, Request, SessionId, Ticket,
+    Compatibility, FrameMark, HostEvent, HostSession, HostStatistics, MAX_FRAME, Microseconds, PoseReport, Report,
+    Request, SessionId, Ticket,
 };
 use vergence_rig::{ClockMap, Exchange, JointSample, JointTrack};
 
@@ -26,6 +27,8 @@ const REPLY_TIMEOUT: Duration = Duration::from_secs(2);
 const PROBE_FAST_US: u64 = 98_390;
 const PROBE_SLOW_US: u64 = 983_900;
 const FAST_PROBES: u32 = 10;
+/// Pulses that may wait to be taken: seconds at the highest rate.
+const MARKS_KEPT: usize = 2_048;
 /// Half a minute of poses.
 const TRACK_LENGTH: usize = 3_000;
 
@@ -64,12 +67,14 @@ enum Command {
 struct Learned {
     clock_map: ClockMap,
     track: JointTrack,
+    statistics: HostStatistics,
 }
 
 /// A handle to an open session. Dropping it closes the link.
 pub struct Client {
     commands: mpsc::Sender<Command>,
     poses: watch::Receiver<Option<PoseReport>>,
+    marks: mpsc::Receiver<FrameMark>,
     end: watch::Receiver<Option<LinkError>>,
     learned: Arc<Mutex<Learned>>,
     clock: HostClock,
@@ -85,17 +90,20 @@ impl Client {
     pub async fn connect(wire: OpenWire, session: SessionId, clock: HostClock) -> Result<Self, LinkError> {
         let (commands, inbox) = mpsc::channel(16);
         let (pose_sender, poses) = watch::channel(None);
+        let (mark_sender, marks) = mpsc::channel(MARKS_KEPT);
         let (end_sender, end) = watch::channel(None);
         let (opened_sender, opened) = oneshot::channel();
         let learned = Arc::new(Mutex::new(Learned {
             clock_map: wire.baud.map_or_else(ClockMap::default, ClockMap::at_baud),
             track: JointTrack::new(TRACK_LENGTH),
+            statistics: HostStatistics::default(),
         }));
         let task = LinkTask {
             session: HostSession::new(session),
             clock,
             inbox,
             poses: pose_sender,
+            marks: mark_sender,
             opened: Some(opened_sender),
             waiting: BTreeMap::new(),
             learned: Arc::clone(&learned),
@@ -109,7 +117,7 @@ impl Client {
             end_sender.send_replace(Some(error));
         });
         let compatibility = opened.await.unwrap_or(Err(LinkError::SessionLost))?;
-        Ok(Self { commands, poses, end, learned, clock, session, compatibility })
+        Ok(Self { commands, poses, marks, end, learned, clock, session, compatibility })
     }
 
     /// Whether both ends mean the same messages.
@@ -165,6 +173,22 @@ impl Client {
         }
     }
 
+    /// The next pulse of the camera trigger, however long it takes.
+    ///
+    /// # Errors
+    /// [`LinkError`] where the link ended.
+    pub async fn next_mark(&mut self) -> Result<FrameMark, LinkError> {
+        match self.marks.recv().await {
+            Some(mark) => Ok(mark),
+            None => Err(self.why_ended()),
+        }
+    }
+
+    /// Drops the pulses that wait to be taken.
+    pub fn forget_marks(&mut self) {
+        while self.marks.try_recv().is_ok() {}
+    }
+
     /// The latest clock map.
     #[must_use]
     pub fn clock_map(&self) -> ClockMap {
@@ -175,6 +199,12 @@ impl Client {
     #[must_use]
     pub fn track(&self) -> JointTrack {
         lock(&self.learned).track.clone()
+    }
+
+    /// How the link has been since it was opened.
+    #[must_use]
+    pub fn statistics(&self) -> HostStatistics {
+        lock(&self.learned).statistics
     }
 
     fn why_ended(&self) -> LinkError {
@@ -192,6 +222,7 @@ struct LinkTask {
     clock: HostClock,
     inbox: mpsc::Receiver<Command>,
     poses: watch::Sender<Option<PoseReport>>,
+    marks: mpsc::Sender<FrameMark>,
     opened: Option<oneshot::Sender<Result<Compatibility, LinkError>>>,
     waiting: BTreeMap<Ticket, oneshot::Sender<Result<Report, LinkError>>>,
     learned: Arc<Mutex<Learned>>,
@@ -324,6 +355,7 @@ impl LinkTask {
         let now = self.clock.now();
         let mut events = Vec::new();
         self.session.receive(now, bytes, |event| events.push(event));
+        lock(&self.learned).statistics = self.session.statistics();
         for event in events {
             match event {
                 HostEvent::Opened { compatibility, .. } => {
@@ -353,6 +385,8 @@ impl LinkTask {
             Report::TimeReply { t0, t1, t2 } => {
                 lock(&self.learned).clock_map.observe(Exchange { t0, t1, t2, t3: now });
             }
+            // Numbered: who does not take them in time sees which are missing.
+            Report::FrameMark(mark) => drop(self.marks.try_send(mark)),
             // MoveState and Fault are repeated in every pose.
             _ => {}
         }

@@ -1,17 +1,24 @@
 //! A board and its mechanics that know which rig they are.
 
+use std::io::ErrorKind;
+use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex, MutexGuard};
+use std::time::Duration;
 
 use tokio::time::Instant;
+use vergence_control::{TICK_US, UNIT};
 use vergence_plant::{NativeBoard, Stage};
-use vergence_protocol::{AxisKind, Microseconds};
+use vergence_protocol::{AxisKind, Microseconds, ResetCause};
 use vergence_rig::{Rig, RigAxis, RigPose};
 
 use crate::failure::Failure;
+use crate::output::write_whole;
 
 /// The board's clock when the simulation starts, and how fast it runs against the host's: a quartz is never exact.
 const BOARD_START_US: u64 = 3_000_000;
 const BOARD_DRIFT: f64 = 40e-6;
+/// Names the start with settings from a file.
+const SECOND_BOOT: u32 = 2;
 /// When this process was kept from running for longer, simulated time slips instead of leaping over heartbeats that wait to be read.
 const LONGEST_STEP_US: u64 = 20_000;
 
@@ -23,6 +30,16 @@ pub struct SimulatedRig {
     /// The clock when the rig last ran, and how much time had passed for it by then.
     last_run: Instant,
     elapsed_us: u64,
+    output: Vec<u8>,
+    flash: Option<FlashFile>,
+}
+
+/// Where the settings outlive the simulator, as flash outlives the power.
+#[derive(Debug)]
+struct FlashFile {
+    path: PathBuf,
+    /// Operations of the flash that the file knows of.
+    written: usize,
 }
 
 /// The board is driven by its link and looked at by the simulated cameras.
@@ -44,17 +61,76 @@ impl SimulatedRig {
                 rig.name
             ))
         })?;
-        Ok(Self { board, rig: rig.clone(), last_run: Instant::now(), elapsed_us: 0 })
+        Ok(Self { board, rig: rig.clone(), last_run: Instant::now(), elapsed_us: 0, output: Vec::new(), flash: None })
     }
 
-    /// Lets the rig run until now: simulated time follows the clock, but never leaps.
+    /// Switches the board on with the settings that `path` holds, and keeps later ones there. A file that is not there
+    /// yet is empty flash.
+    ///
+    /// # Errors
+    /// A file that is no such flash.
+    pub fn keep_flash_in(&mut self, path: &Path) -> Result<(), Failure> {
+        let flash = &mut self.board.services_mut().settings;
+        match std::fs::read(path) {
+            Ok(bytes) if bytes.len() == flash.bytes().len() => {
+                // What is erased may still be programmed.
+                let units = bytes.chunks(UNIT).zip((0..).step_by(UNIT));
+                units
+                    .filter(|(unit, _)| unit.iter().any(|&b| b != 0xFF))
+                    .for_each(|(unit, at)| flash.overwrite(at, unit));
+            }
+            Ok(_) => return Err(Failure::input(path, "this is not the flash of a simulated board")),
+            Err(error) if error.kind() == ErrorKind::NotFound => {}
+            Err(error) => return Err(Failure::input(path, error)),
+        }
+        self.flash = Some(FlashFile { path: path.to_owned(), written: flash.operations() });
+        self.board
+            .restart(ResetCause::PowerOn, SECOND_BOOT)
+            .map_err(|error| Failure::input(path, format!("the board does not start with these settings ({error:?})")))
+    }
+
+    /// Writes the flash to its file where it has changed.
+    ///
+    /// # Errors
+    /// Where the file cannot be written.
+    pub fn save_flash(&mut self) -> Result<(), Failure> {
+        let flash = &self.board.services_mut().settings;
+        match &mut self.flash {
+            Some(file) if file.written != flash.operations() => {
+                file.written = flash.operations();
+                write_whole(&file.path, flash.bytes())
+            }
+            _ => Ok(()),
+        }
+    }
+
+    /// Lets the rig run until now: simulated time follows the clock, but never leaps. What the board sends meanwhile is
+    /// kept until [`Self::take_output`].
     pub fn run_to_now(&mut self) {
         let now = Instant::now();
         let passed = u64::try_from((now - self.last_run).as_micros()).unwrap_or(u64::MAX);
-        self.last_run = now;
+        // What is left of a microsecond counts the next time: a thousand times each second it would be half a per mille.
+        self.last_run += Duration::from_micros(passed);
         self.elapsed_us += passed.min(LONGEST_STEP_US);
         let drifted = self.elapsed_us as f64 * (1.0 + BOARD_DRIFT);
-        self.board.advance(Microseconds(BOARD_START_US + drifted as u64));
+        let until = BOARD_START_US + drifted as u64;
+        // A UART sends while the board runs, not after: a pose must not wait for the next one and be replaced by it.
+        while self.board.now().0 < until {
+            self.board.advance(Microseconds(until.min(self.board.now().0 + TICK_US)));
+            self.output.append(&mut self.board.transmit());
+        }
+    }
+
+    /// Gives bytes of the host to the board, now.
+    pub fn receive(&mut self, bytes: &[u8]) {
+        self.run_to_now();
+        self.board.receive(bytes);
+        self.output.append(&mut self.board.transmit());
+    }
+
+    /// What the board sent since this was last asked.
+    pub fn take_output(&mut self) -> Vec<u8> {
+        std::mem::take(&mut self.output)
     }
 
     /// The board.
@@ -65,9 +141,18 @@ impl SimulatedRig {
     /// Where the cameras truly are: from the mechanics, not from the encoders.
     #[must_use]
     pub fn true_pose(&self) -> RigPose {
-        let loads = self.board.plant().loads();
+        self.pose_of(&self.board.plant().loads())
+    }
+
+    /// Where the cameras truly were when they were last fired; `None` before the first pulse.
+    #[must_use]
+    pub fn exposed_pose(&self) -> Option<RigPose> {
+        self.board.plant().exposed().map(|(_, loads)| self.pose_of(loads))
+    }
+
+    fn pose_of(&self, loads: &[f64]) -> RigPose {
         let values: Vec<f64> =
-            self.rig.axes.iter().zip(loads).map(|(axis, load)| axis.value_from_micro(load)).collect();
+            self.rig.axes.iter().zip(loads).map(|(axis, &load)| axis.value_from_micro(load)).collect();
         self.rig.pose_at_values(&values)
     }
 }

@@ -87,6 +87,8 @@ pub async fn serve(rig: SharedRig, listener: Listener) -> Result<(), Failure> {
                     accepted = listener.accept() => break accepted.map_err(fail)?.0,
                     _ = pace.tick() => rig.lock().run_to_now(),
                 }
+                // Nobody listens.
+                rig.lock().take_output();
             };
             // A host that goes away is not a failure of the simulator.
             let _ = run_board(&rig, &mut stream).await;
@@ -121,12 +123,12 @@ async fn run_board<W: AsyncRead + AsyncWrite + Unpin>(rig: &SharedRig, wire: &mu
                 if length == 0 {
                     return Ok(());
                 }
-                rig.lock().run_to_now();
-                rig.lock().board().receive(input.get(..length).unwrap_or_default());
+                rig.lock().receive(input.get(..length).unwrap_or_default());
             }
             _ = pace.tick() => rig.lock().run_to_now(),
         }
-        let output = rig.lock().board().transmit();
+        let output = rig.lock().take_output();
+        rig.lock().save_flash().map_err(io::Error::other)?;
         write_or_drop(wire, &output).await?;
     }
 }

@@ -1,23 +1,22 @@
 //! `vergence calibrate extrinsics`: a pair.
 
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
-use nalgebra::SMatrix;
 use serde_json::{Value, json};
 use vergence_calibration::{
-    BoardView, ExtrinsicsCalibration, ExtrinsicsOptions, LensKnowledge, RelativePose, StereoView, calibrate_extrinsics,
-    extrinsics_report,
+    ExtrinsicsCalibration, ExtrinsicsOptions, RelativePose, ReportAbout, StereoView, calibrate_extrinsics,
+    extrinsics_report, extrinsics_verdict, validate_extrinsics,
 };
-use vergence_rig::CalibratedPair;
+use vergence_rig::Rig;
 use vergence_vision::{Angle, KannalaBrandt, Length};
 
-use super::views::{about, from_images};
-use crate::camera_files::{self, CameraFile};
+use super::options::{
+    KnownLenses, LensOptions, ResultOptions, check_fit, check_held_out, held_out_json, tell_held_out, verdict_json,
+};
+use super::views::{PairImages, about, pairs_from_corners};
 use crate::cmd::board_options::BoardOptions;
 use crate::console::Console;
-use crate::corners;
 use crate::failure::Failure;
-use crate::output::write_whole;
 use crate::provenance::InputHash;
 use crate::stopwatch::Stopwatch;
 
@@ -25,12 +24,8 @@ use crate::stopwatch::Stopwatch;
 /// `vergence depth --rig` takes.
 #[derive(Debug, clap::Args)]
 pub struct Args {
-    /// The left camera file.
-    #[arg(long, value_name = "FILE")]
-    left: PathBuf,
-    /// The right camera file.
-    #[arg(long, value_name = "FILE")]
-    right: PathBuf,
+    #[command(flatten)]
+    lenses: LensOptions,
     #[command(flatten)]
     board: BoardOptions,
     /// Images of the left camera; they pair with the right ones in the order of their names.
@@ -45,116 +40,78 @@ pub struct Args {
     /// What the CSV file calls the left and the right camera.
     #[arg(long, num_args = 2, value_names = ["LEFT", "RIGHT"], default_values = ["left", "right"])]
     cameras: Vec<String>,
-    /// What may change of the lenses: nothing, all of it as far as the covariance in the camera files allows, or all of it.
-    #[arg(long, default_value = "exact")]
-    lenses: Lenses,
     /// Least squares over all corners, without looking for gross errors.
     #[arg(long)]
     no_loss: bool,
-    /// The rig file to write.
-    #[arg(long, value_name = "FILE")]
-    out: Option<PathBuf>,
-    /// The report to write: one HTML page.
-    #[arg(long, value_name = "FILE")]
-    report: Option<PathBuf>,
-    /// The date to keep with the calibration.
-    #[arg(long)]
-    date: Option<String>,
-}
-
-#[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
-enum Lenses {
-    Exact,
-    Known,
-    Free,
+    /// Check on views that the calibration does not see: so many parts of the views are held out in turn.
+    #[arg(long, value_name = "PARTS", value_parser = clap::value_parser!(u16).range(2..))]
+    holdout: Option<u16>,
+    #[command(flatten)]
+    result: ResultOptions,
 }
 
 pub fn run(args: &Args, console: Console) -> Result<(), Failure> {
+    args.result.check()?;
     let mut hash = InputHash::default();
-    let (left, right) = (camera(&args.left, &mut hash)?, camera(&args.right, &mut hash)?);
-    let views = views(args, (&left.cameras.left, &right.cameras.left), &mut hash, console)?;
-    let lenses = match args.lenses {
-        Lenses::Exact => LensKnowledge::Exact,
-        Lenses::Free => LensKnowledge::Free,
-        Lenses::Known => LensKnowledge::within(covariance(&args.left, &left)?, covariance(&args.right, &right)?),
-    };
-    let options = ExtrinsicsOptions { lenses, robust: !args.no_loss };
+    let KnownLenses { left, right, knowledge } = args.lenses.read(&mut hash)?.ok_or_else(|| {
+        Failure::usage("name the camera files with --left and --right: vergence calibrate intrinsics makes them")
+    })?;
+    let views = views(args, (&left, &right), &mut hash, console)?;
+    let options = ExtrinsicsOptions { lenses: knowledge, robust: !args.no_loss };
     let solving = Stopwatch::start();
-    let calibration = calibrate_extrinsics(&left.cameras.left, &right.cameras.left, &views, &options)
+    let calibration = calibrate_extrinsics(&left, &right, &views, &options)
         .map_err(|error| Failure::usage(format!("no calibration: {error}")))?;
     let seconds = solving.seconds();
-    let provenance = hash.provenance(args.date.as_deref());
-    if let Some(path) = &args.report {
-        let page = extrinsics_report(&calibration, &views, &about("Pair".into(), &args.board, &provenance));
-        write_whole(path, page.as_bytes())?;
-    }
-    if let Some(path) = &args.out {
-        let sigma = sigma(&calibration);
-        let norm = |part: &[f64]| part.iter().map(|x| x * x).sum::<f64>().sqrt();
-        let pair = CalibratedPair {
-            name: &path.file_stem().unwrap_or_default().to_string_lossy(),
-            left: &calibration.left,
-            right: &calibration.right,
-            left_from_right: calibration.joint.left_from_right,
-            sigma: (Angle::from_rad(norm(&sigma[..3])), Length::from_mm(norm(&sigma[3..]))),
-            provenance: &provenance,
-        };
-        let text = pair.to_toml().map_err(|error| Failure::output(path, error))?;
-        write_whole(path, text.as_bytes())?;
-    }
+    check_fit(calibration.rms_inlier_px, calibration.corners_inlier, calibration.corners_total)?;
+    let held_out = args
+        .holdout
+        .map(|parts| validate_extrinsics((&left, &right), &views, &options, &calibration, parts.into()))
+        .transpose()
+        .map_err(|error| Failure::check(format!("without the views held out there is no calibration: {error}")))?;
+    held_out.as_ref().map_or(Ok(()), |held_out| check_held_out(held_out, calibration.rms_inlier_px))?;
+    let verdict = extrinsics_verdict(&calibration, &views);
+    let provenance = args.result.provenance(hash);
+    let rig = rig(&calibration, &args.result.name("pair")).to_toml(&provenance).map_err(Failure::check)?;
+    args.result.write(&rig, || {
+        let about = about(args.result.name("Pair"), &args.board, &provenance, None);
+        extrinsics_report(&calibration, &views, &ReportAbout { held_out: held_out.clone(), ..about })
+    })?;
     tell(&calibration, console)?;
-    console.result(&in_json(&calibration, seconds))
-}
-
-fn camera(path: &Path, hash: &mut InputHash) -> Result<CameraFile, Failure> {
-    hash.add(path)?;
-    camera_files::read(path)
-}
-
-fn covariance(path: &Path, file: &CameraFile) -> Result<SMatrix<f64, 8, 8>, Failure> {
-    let table = file.document.as_ref().and_then(|document| document.calibration.as_ref());
-    let table =
-        table.ok_or_else(|| Failure::input(path, "it has no covariance: calibrate it here, or use --lenses exact"))?;
-    Ok(SMatrix::from_fn(|row, column| table.covariance[row][column]))
+    tell_held_out(held_out.as_ref(), console)?;
+    console.say(&verdict.sentence)?;
+    let mut result = in_json(&calibration, seconds);
+    result["held_out"] = held_out_json(held_out.as_ref());
+    result["verdict"] = verdict_json(&verdict);
+    console.result(&result)
 }
 
 fn views(
     args: &Args,
-    (left, right): (&KannalaBrandt, &KannalaBrandt),
+    cameras: (&KannalaBrandt, &KannalaBrandt),
     hash: &mut InputHash,
     console: Console,
 ) -> Result<Vec<StereoView>, Failure> {
-    if let Some(path) = &args.corners {
-        hash.add(path)?;
-        let [left, right] = args.cameras.as_slice() else { return Err(Failure::usage("--cameras needs two names")) };
-        return Ok(pair_frames(corners::read(path, Some(left))?, &corners::read(path, Some(right))?));
+    match &args.corners {
+        Some(path) => {
+            let frames = pairs_from_corners(path, &args.cameras, hash)?;
+            Ok(frames.into_iter().map(|(_, view)| view).collect())
+        }
+        None => {
+            let images = PairImages { left: &args.left_images, right: &args.right_images, board: &args.board, cameras };
+            images.views(hash, console)
+        }
     }
-    let left = from_images(&args.left_images, &args.board, Some(left), hash, console)?;
-    let right = from_images(&args.right_images, &args.board, Some(right), hash, console)?;
-    if left.views.len() != right.views.len() {
-        return Err(Failure::usage(format!(
-            "{} left images and {} right ones: they must pair up",
-            left.views.len(),
-            right.views.len()
-        )));
-    }
-    // A pair counts where both images show the board.
-    let pairs = left.views.into_iter().zip(right.views);
-    Ok(pairs.filter_map(|(left, right)| Some(stereo_view(left.ok()?, right.ok()?))).collect())
 }
 
-fn stereo_view(left: BoardView, right: BoardView) -> StereoView {
-    StereoView { name: left.name.clone(), left, right }
-}
-
-/// The frames that both cameras have.
-fn pair_frames(left: Vec<corners::FrameView>, right: &[corners::FrameView]) -> Vec<StereoView> {
-    left.into_iter()
-        .filter_map(|left| {
-            let right = right.iter().find(|right| right.frame == left.frame)?;
-            Some(stereo_view(left.view, right.view.clone()))
-        })
-        .collect()
+fn rig(calibration: &ExtrinsicsCalibration, name: &str) -> Rig {
+    let sigma = sigma(calibration);
+    let norm = |part: &[f64]| part.iter().map(|x| x * x).sum::<f64>().sqrt();
+    Rig::fixed_pair(
+        name,
+        (calibration.left, calibration.right),
+        calibration.joint.left_from_right,
+        (Angle::from_rad(norm(&sigma[..3])), Length::from_mm(norm(&sigma[3..]))),
+    )
 }
 
 /// Of the rotation in radians about the left axes, and of the position in millimetres.

@@ -4,17 +4,18 @@ use std::path::PathBuf;
 
 use serde_json::{Value, json};
 use vergence_calibration::{
-    BoardView, IntrinsicsCalibration, IntrinsicsOptions, calibrate_intrinsics, intrinsics_report,
+    BoardView, IntrinsicsCalibration, IntrinsicsOptions, ReportAbout, calibrate_intrinsics, intrinsics_report,
+    intrinsics_verdict, validate_intrinsics,
 };
 use vergence_rig::{CalibrationTable, CameraDocument, CameraTable};
-use vergence_vision::{ImageSize, OpenCvFisheye};
+use vergence_vision::{Angle, ImageSize, OpenCvFisheye};
 
+use super::options::{ResultOptions, check_fit, check_held_out, held_out_json, tell_held_out, verdict_json};
 use super::views::{about, from_corners, from_images, parse_size};
 use crate::camera_files::toml_of;
 use crate::cmd::board_options::BoardOptions;
 use crate::console::Console;
 use crate::failure::Failure;
-use crate::output::write_whole;
 use crate::provenance::InputHash;
 use crate::stopwatch::Stopwatch;
 
@@ -38,20 +39,20 @@ pub struct Args {
     /// Estimate how the board bows out of its plane, too.
     #[arg(long)]
     warp: bool,
-    /// The camera file to write.
-    #[arg(long, value_name = "FILE")]
-    out: Option<PathBuf>,
-    /// The report to write: one HTML page.
-    #[arg(long, value_name = "FILE")]
-    report: Option<PathBuf>,
-    /// The date to keep with the calibration.
-    #[arg(long)]
-    date: Option<String>,
+    /// The whole field of the lens where its maker tells, such as 195.95deg: the report then measures coverage against it.
+    #[arg(long, value_name = "ANGLE")]
+    fov: Option<Angle>,
+    /// Check on views that the calibration does not see: so many parts of the views are held out in turn.
+    #[arg(long, value_name = "PARTS", value_parser = clap::value_parser!(u16).range(2..))]
+    holdout: Option<u16>,
+    #[command(flatten)]
+    result: ResultOptions,
 }
 
 const NAMES: [&str; 8] = ["fx", "fy", "cx", "cy", "k1", "k2", "k3", "k4"];
 
 pub fn run(args: &Args, console: Console) -> Result<(), Failure> {
+    args.result.check()?;
     let mut hash = InputHash::default();
     let (views, size) = views(args, &mut hash, console)?;
     let solving = Stopwatch::start();
@@ -59,12 +60,15 @@ pub fn run(args: &Args, console: Console) -> Result<(), Failure> {
     let calibration = calibrate_intrinsics(&views, size, &options)
         .map_err(|error| Failure::usage(format!("no calibration: {error}")))?;
     let seconds = solving.seconds();
-    let provenance = hash.provenance(args.date.as_deref());
-    if let Some(path) = &args.report {
-        let title = args.camera.clone().unwrap_or_else(|| "Camera".into());
-        let page = intrinsics_report(&calibration, &views, &about(title, &args.board, &provenance));
-        write_whole(path, page.as_bytes())?;
-    }
+    check_fit(calibration.rms_inlier_px, calibration.corners_inlier, calibration.corners_total)?;
+    let held_out = args
+        .holdout
+        .map(|parts| validate_intrinsics(&views, size, &options, &calibration, parts.into()))
+        .transpose()
+        .map_err(|error| Failure::check(format!("without the views held out there is no calibration: {error}")))?;
+    held_out.as_ref().map_or(Ok(()), |held_out| check_held_out(held_out, calibration.rms_inlier_px))?;
+    let verdict = intrinsics_verdict(&calibration, &views);
+    let provenance = args.result.provenance(hash);
     let document = CameraDocument {
         camera: CameraTable::of(&calibration.camera),
         calibration: Some(CalibrationTable {
@@ -73,13 +77,21 @@ pub fn run(args: &Args, console: Console) -> Result<(), Failure> {
             views: calibration.views_used,
             covariance: std::array::from_fn(|row| std::array::from_fn(|column| calibration.covariance[(row, column)])),
         }),
-        provenance: Some(provenance),
+        provenance: Some(provenance.clone()),
     };
-    if let Some(path) = &args.out {
-        write_whole(path, toml_of(&document)?.as_bytes())?;
-    }
+    args.result.write(&toml_of(&document)?, || {
+        let title = args.result.name(args.camera.as_deref().unwrap_or("Camera"));
+        let half_field = args.fov.map(|field| Angle::from_rad(0.5 * field.rad()));
+        let about = about(title, &args.board, &provenance, half_field);
+        intrinsics_report(&calibration, &views, &ReportAbout { held_out: held_out.clone(), ..about })
+    })?;
     tell(&calibration, &views, console)?;
-    console.result(&in_json(&calibration, seconds))
+    tell_held_out(held_out.as_ref(), console)?;
+    console.say(&verdict.sentence)?;
+    let mut result = in_json(&calibration, seconds);
+    result["held_out"] = held_out_json(held_out.as_ref());
+    result["verdict"] = verdict_json(&verdict);
+    console.result(&result)
 }
 
 fn views(args: &Args, hash: &mut InputHash, console: Console) -> Result<(Vec<BoardView>, ImageSize), Failure> {

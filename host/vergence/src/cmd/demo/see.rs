@@ -5,24 +5,23 @@ use std::sync::Arc;
 use image::RgbImage;
 use nalgebra::{UnitQuaternion, Vector3};
 use vergence_matching::GuidedMatcher;
-use vergence_protocol::Microseconds;
-use vergence_rig::{Rig, RigPose, TrackGap};
+use vergence_protocol::FrameMark;
+use vergence_rig::{JointsAt, RigPose, StampedFrame, TriggerDelay, pair_frames};
 use vergence_scene::{Optics, Scene};
-use vergence_vision::{
-    Angle, Base, KannalaBrandt, Left, Length, Pixel, PlanarCamera, Transform, World, Zones, zones_exact,
-};
+use vergence_vision::{Base, KannalaBrandt, Left, Length, Pixel, Transform, World, Zones};
 
 use super::score::{Score, score};
 use crate::board::Board;
-use crate::camera::{Camera, Eye, SimulatedCamera, Stage};
+use crate::camera::{Eye, Frame, SimulatedCamera, Stage};
 use crate::failure::Failure;
 use crate::link::HostClock;
 use crate::look::{Eyes, Look, look};
+use crate::rig_zones::rig_zones;
 use crate::sim::SharedRig;
 use crate::stopwatch::Stopwatch;
 
-/// The zones are told on the circle of the paper's precision bench.
-pub const ZONE_RADIUS: Length = Length::from_mm(350.0);
+/// A simulated frame is stamped as soon as the host knows of its pulse.
+const DELAY: TriggerDelay = TriggerDelay { least_us: 0, most_us: 50_000 };
 
 /// The two simulated cameras in their room.
 pub struct SimulatedEyes {
@@ -53,7 +52,7 @@ pub struct View {
 
 impl SimulatedEyes {
     /// Two cameras that ride on `simulated`, in the fixed room.
-    pub fn new(rig: &Rig, simulated: &SharedRig, clock: HostClock, seed: u64) -> Self {
+    pub fn new(rig: &vergence_rig::Rig, simulated: &SharedRig, clock: HostClock, seed: u64) -> Self {
         // The middle of the bench at its nominal baseline of 145 mm stands in the middle of the room.
         let middle = Vector3::new(-72.5, 0.0, 0.0);
         let world_from_base = Transform::<World, Base>::new(UnitQuaternion::identity(), middle);
@@ -79,22 +78,25 @@ impl SimulatedEyes {
     /// Exposes both cameras and works through what they saw.
     ///
     /// # Errors
-    /// Where the link ended, or the encoder stream does not cover the exposure.
+    /// Where the link ended, or frame and pulse do not belong together.
     pub async fn see(&mut self, board: &mut Board) -> Result<View, Failure> {
         let exposing = Stopwatch::start();
-        let (Some(left), Some(right)) = (self.left.grab()?, self.right.grab()?) else {
-            return Err(Failure::device("a simulated camera has no more frames"));
+        let mark = board.fire_cameras().await?;
+        let exposed = self.rig.lock().exposed_pose();
+        let (Some(left), Some(right), Some(true_pose)) =
+            (self.left.grab_triggered(), self.right.grab_triggered(), exposed)
+        else {
+            return Err(Failure::device("the simulated cameras were not fired"));
         };
         let expose_seconds = exposing.seconds();
-        let world_from_left = self.stage.world_from_left(self.rig.lock().true_pose().base_from_left);
-        let exposed_at = left.exposed_at.unwrap_or_else(|| board.client().clock().now());
-        let pose = pose_at(board, exposed_at).await?;
+        let world_from_left = self.stage.world_from_left(true_pose.base_from_left);
+        let pose = pose_of(&left, &mark, board)?;
         let rig = board.rig();
         let eyes = Eyes { left: &left.image, right: &right.image };
         let look = look(eyes, rig, &pose, &GuidedMatcher::default())
             .map_err(|error| Failure::device(format!("the simulated images cannot be matched: {error}")))?;
         let mut view = View {
-            zones: zones(rig, &pose)?,
+            zones: rig_zones(rig, &pose)?,
             pose,
             look,
             score: Score::default(),
@@ -136,38 +138,14 @@ impl View {
     }
 }
 
-/// The rig's pose at an instant on the host's clock, as encoders and clock exchange tell it.
-async fn pose_at(board: &mut Board, exposed_at: Microseconds) -> Result<RigPose, Failure> {
-    let fail = |gap: TrackGap| Failure::device(format!("the pose at the exposure is unknown: {gap}"));
-    loop {
-        let instant = board.client().clock_map().board_at(exposed_at);
-        match instant.map(|instant| board.client().track().at(instant)) {
-            Some(Ok(joints)) => return Ok(board.rig().pose(&joints)),
-            Some(Err(gap)) if gap != TrackGap::NotYet => return Err(fail(gap)),
-            // The readings after the exposure, or the first clock exchange, are still on their way.
-            _ => {
-                board.next_pose().await?;
-            }
-        }
+/// The rig's pose when `frame` was exposed: where the encoders were at the edge of the pulse that fired it.
+fn pose_of(frame: &Frame, mark: &FrameMark, board: &Board) -> Result<RigPose, Failure> {
+    let unknown = |why: &dyn std::fmt::Display| Failure::device(format!("the pose at the exposure is unknown: {why}"));
+    let at = frame.exposed_at.ok_or_else(|| unknown(&"the frame has no time stamp"))?;
+    let (frames, marks) = ([StampedFrame { seq: 0, at }], std::slice::from_ref(mark));
+    let pairing = pair_frames(&frames, marks, &board.client().clock_map(), DELAY).map_err(|error| unknown(&error))?;
+    if pairing.pairs.is_empty() {
+        return Err(unknown(&"the frame belongs to no pulse"));
     }
-}
-
-/// The zones in the horizontal plane around the middle of both cameras.
-fn zones(rig: &Rig, pose: &RigPose) -> Result<Zones, Failure> {
-    let base_from_right = pose.base_from_left * pose.left_from_right;
-    let centres = [pose.base_from_left.origin().mm(), base_from_right.origin().mm()];
-    let axes = [pose.base_from_left.rotation(), base_from_right.rotation()].map(|r| r * Vector3::z());
-    let middle = (centres[0] + centres[1]) / 2.0;
-    let half_fields = [rig.left_camera.theta_max(), rig.right_camera.theta_max()];
-    let camera = |index: usize| {
-        let (centre, axis) = (centres[index] - middle, axes[index]);
-        PlanarCamera {
-            centre_mm: [centre.x, centre.z],
-            axis: Angle::from_rad(axis.x.atan2(axis.z)),
-            half_field: half_fields[index],
-        }
-    };
-    let map = zones_exact([camera(0), camera(1)], ZONE_RADIUS)
-        .map_err(|error| Failure::check(format!("the zones of this pose: {error}")))?;
-    Ok(map.zones)
+    Ok(board.rig().pose(&JointsAt::latched(&mark.counts)))
 }

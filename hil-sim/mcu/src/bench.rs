@@ -1,0 +1,292 @@
+//! The mechanics of the rig on the pins of the chip: step pulses move motors, edge by edge; encoders answer on their
+//! two lines, switches on theirs.
+
+use vergence_control::RigIo;
+use vergence_plant::Plant;
+use vergence_protocol::Microseconds;
+
+use crate::pin::{Drive, Pin};
+use crate::time::Picoseconds;
+use crate::world::{Instant, PinEdge, Terminals, World};
+
+/// A switch to ground with a pull-up on the line.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct SwitchWiring {
+    /// Its line.
+    pub pin: Pin,
+    /// The contact is closed, the line low, while nothing is wrong: a broken wire reads as trouble.
+    pub normally_closed: bool,
+}
+
+impl SwitchWiring {
+    fn drive(&self, operated: bool) -> Drive {
+        if operated == self.normally_closed { Drive::High } else { Drive::Low }
+    }
+}
+
+/// Where an axis is wired.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct AxisWiring {
+    /// A step at each rising edge.
+    pub step: Pin,
+    /// High: the raw step count rises.
+    pub direction: Pin,
+    /// The encoder's lines A and B; A leads while the count rises.
+    pub encoder: [Pin; 2],
+    /// Operated at home.
+    pub home: SwitchWiring,
+    /// Operated beyond the range.
+    pub hard_limit: SwitchWiring,
+}
+
+/// Where everything is wired.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct BenchWiring {
+    /// The axes, in the plant's order.
+    pub axes: Vec<AxisWiring>,
+    /// High switches the drivers off; the drivers' pull-up keeps it high while the chip does not drive it.
+    pub drivers_off: Pin,
+    /// Operated while pressed; also cuts the drivers by itself.
+    pub emergency_stop: SwitchWiring,
+}
+
+impl BenchWiring {
+    /// The wiring of the NUCLEO-G474RE firmware (`docs/firmware.md`): baseline on TIM1 and TIM2, separation on TIM8 and
+    /// TIM5; home switches close at home, limits and emergency stop open in trouble.
+    #[must_use]
+    pub fn nucleo_g474() -> Self {
+        const A: usize = 0;
+        const B: usize = 16;
+        const C: usize = 32;
+        let switch = |index, normally_closed| SwitchWiring { pin: Pin::at(index), normally_closed };
+        let baseline = AxisWiring {
+            step: Pin::at(A + 8),
+            direction: Pin::at(A + 9),
+            encoder: [Pin::at(A), Pin::at(A + 1)],
+            home: switch(C, false),
+            hard_limit: switch(C + 2, true),
+        };
+        let separation = AxisWiring {
+            step: Pin::at(C + 6),
+            direction: Pin::at(C + 8),
+            encoder: [Pin::at(B + 2), Pin::at(C + 12)],
+            home: switch(C + 1, false),
+            hard_limit: switch(C + 3, true),
+        };
+        let emergency_stop = switch(C + 4, true);
+        Self { axes: vec![baseline, separation], drivers_off: Pin::at(A + 10), emergency_stop }
+    }
+}
+
+/// The mechanics advance in steps of this while something moves, and of the other while nothing does.
+const MOVING_STEP: Microseconds = Microseconds(20);
+const RESTING_STEP: Microseconds = Microseconds(1_000);
+/// So long after the last step pulse the load may still creep.
+const SETTLING: Microseconds = Microseconds(100_000);
+/// An encoder's edges are at least so far apart, whatever jump it has to show.
+const EDGE_SPACING: Picoseconds = Picoseconds::nanoseconds(200);
+
+/// One encoder's lines: what they show, and what they shall show.
+#[derive(Clone, Copy, Debug, Default)]
+struct Lines {
+    shown: i32,
+    wanted: i32,
+    next: Option<Picoseconds>,
+    spacing: Picoseconds,
+}
+
+/// An axis as its wires know it.
+#[derive(Clone, Copy, Debug, Default)]
+struct AxisState {
+    forward: bool,
+    /// Raw steps ordered so far.
+    steps: i32,
+    lines: Lines,
+    home: Option<bool>,
+    hard_limit: Option<bool>,
+}
+
+/// The mechanics, wired to the chip.
+#[derive(Clone, Debug)]
+pub struct Bench {
+    wiring: BenchWiring,
+    plant: Plant,
+    axes: Vec<AxisState>,
+    emergency_stop: Option<bool>,
+    next_step: Picoseconds,
+    moving_until: Microseconds,
+    pulses: Vec<u64>,
+}
+
+impl Bench {
+    /// Mechanics at rest with their drivers off.
+    #[must_use]
+    pub fn new(wiring: BenchWiring, plant: Plant) -> Self {
+        let axes: Vec<_> = (0..wiring.axes.len())
+            .map(|axis| {
+                let count = plant.encoder(axis);
+                let lines = Lines { shown: count, wanted: count, ..Lines::default() };
+                AxisState { steps: plant.steps(axis), lines, ..AxisState::default() }
+            })
+            .collect();
+        let pulses = vec![0; axes.len()];
+        let (next_step, moving_until) = (Picoseconds(0), Microseconds(0));
+        Self { wiring, plant, axes, emergency_stop: None, next_step, moving_until, pulses }
+    }
+
+    /// The mechanics: the truth.
+    #[must_use]
+    pub fn plant(&self) -> &Plant {
+        &self.plant
+    }
+
+    /// The mechanics, for doing something to them; their lines follow at once.
+    pub fn plant_mut(&mut self) -> &mut Plant {
+        self.next_step = Picoseconds(0);
+        &mut self.plant
+    }
+
+    /// Step pulses that each axis has got.
+    #[must_use]
+    pub fn pulses(&self) -> &[u64] {
+        &self.pulses
+    }
+
+    fn advance_plant(&mut self, now: Microseconds, terminals: &mut Terminals) {
+        self.plant.advance(now);
+        let moves = now.0 < self.moving_until.0;
+        let step = if moves { MOVING_STEP } else { RESTING_STEP };
+        let begin = Picoseconds::microseconds(now.0);
+        self.next_step = begin + Picoseconds::microseconds(step.0);
+        for (axis, (state, wiring)) in self.axes.iter_mut().zip(&self.wiring.axes).enumerate() {
+            state.lines.aim(self.plant.encoder(axis), begin, Picoseconds::microseconds(MOVING_STEP.0));
+            let home = self.plant.home_switch(axis);
+            if state.home.replace(home) != Some(home) {
+                terminals.drive(wiring.home.pin, wiring.home.drive(home));
+            }
+            let limit = self.plant.hard_limit(axis);
+            if state.hard_limit.replace(limit) != Some(limit) {
+                terminals.drive(wiring.hard_limit.pin, wiring.hard_limit.drive(limit));
+            }
+        }
+        let pressed = self.plant.emergency_stop();
+        match self.emergency_stop.replace(pressed) {
+            None => self.connect(terminals),
+            Some(before) if before != pressed => self.count_anew(),
+            Some(_) => return,
+        }
+        let wiring = self.wiring.emergency_stop;
+        terminals.drive(wiring.pin, wiring.drive(pressed));
+    }
+
+    /// At the very beginning: lines that stand show their level.
+    fn connect(&mut self, terminals: &mut Terminals) {
+        terminals.drive(self.wiring.drivers_off, Drive::High);
+        for (state, wiring) in self.axes.iter().zip(&self.wiring.axes) {
+            let [a, b] = phases(state.lines.shown);
+            terminals.drive(wiring.encoder[0], Drive::level(a));
+            terminals.drive(wiring.encoder[1], Drive::level(b));
+        }
+    }
+
+    /// Drivers that were off have missed steps.
+    fn count_anew(&mut self) {
+        for (axis, state) in self.axes.iter_mut().enumerate() {
+            state.steps = self.plant.steps(axis);
+        }
+    }
+
+    fn step(&mut self, axis: usize, now: Microseconds) {
+        let Some(state) = self.axes.get_mut(axis) else { return };
+        if let Some(pulses) = self.pulses.get_mut(axis) {
+            *pulses += 1;
+        }
+        if !self.plant.drivers_on() || self.plant.emergency_stop() {
+            return;
+        }
+        state.steps += if state.forward { 1 } else { -1 };
+        self.plant.step_to(axis, state.steps, now);
+        self.wake(now);
+    }
+
+    /// Something begins to move: short steps from here on.
+    fn wake(&mut self, now: Microseconds) {
+        self.moving_until = Microseconds(now.0 + SETTLING.0);
+        self.next_step = self.next_step.min(Picoseconds::microseconds(now.0 + MOVING_STEP.0));
+    }
+}
+
+impl Lines {
+    /// The count is `count` now: its edges are spread over the coming `span`.
+    fn aim(&mut self, count: i32, now: Picoseconds, span: Picoseconds) {
+        self.wanted = count;
+        let edges = u64::from(self.wanted.wrapping_sub(self.shown).unsigned_abs());
+        if edges == 0 {
+            self.next = None;
+        } else {
+            self.spacing = Picoseconds((span.0 / (edges + 1)).max(EDGE_SPACING.0));
+            self.next = Some(now + self.spacing);
+        }
+    }
+
+    /// Shows edges that are due; returns the line that changes, A (0) or B, and its level.
+    fn edge(&mut self, now: Picoseconds) -> Option<(usize, bool)> {
+        let due = self.next.filter(|&at| at <= now)?;
+        let before = phases(self.shown);
+        self.shown = self.shown.wrapping_add(self.wanted.wrapping_sub(self.shown).signum());
+        self.next = (self.shown != self.wanted).then(|| due + self.spacing);
+        let after = phases(self.shown);
+        let line = usize::from(before[0] == after[0]);
+        Some((line, after[line]))
+    }
+}
+
+/// Levels of A and B at a count: A leads while it rises.
+fn phases(count: i32) -> [bool; 2] {
+    let quarter = count.rem_euclid(4);
+    [quarter == 1 || quarter == 2, quarter >= 2]
+}
+
+impl World for Bench {
+    fn watched(&self) -> Vec<Pin> {
+        let axes = self.wiring.axes.iter().flat_map(|axis| [axis.step, axis.direction]);
+        axes.chain([self.wiring.drivers_off]).collect()
+    }
+
+    fn next_event(&self) -> Picoseconds {
+        self.axes.iter().filter_map(|axis| axis.lines.next).fold(self.next_step, Picoseconds::min)
+    }
+
+    fn act(&mut self, now: Instant, terminals: &mut Terminals) {
+        for (state, wiring) in self.axes.iter_mut().zip(&self.wiring.axes) {
+            while let Some((line, high)) = state.lines.edge(now.time) {
+                terminals.drive(wiring.encoder[line], Drive::level(high));
+            }
+        }
+        if self.next_step <= now.time {
+            self.advance_plant(microseconds(now), terminals);
+        }
+    }
+
+    fn pin_changed(&mut self, edge: PinEdge, _terminals: &mut Terminals) {
+        let now = microseconds(edge.at);
+        if edge.pin == self.wiring.drivers_off {
+            self.plant.advance(now);
+            self.plant.set_drivers(!edge.high);
+            self.count_anew();
+            self.wake(now);
+        }
+        for axis in 0..self.wiring.axes.len() {
+            let wiring = self.wiring.axes[axis];
+            if edge.pin == wiring.direction {
+                self.axes[axis].forward = edge.high;
+            } else if edge.pin == wiring.step && edge.high {
+                self.step(axis, now);
+            }
+        }
+    }
+}
+
+fn microseconds(at: Instant) -> Microseconds {
+    Microseconds(at.time.0 / 1_000_000)
+}

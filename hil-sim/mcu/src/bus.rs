@@ -1,0 +1,215 @@
+//! The chip as the core sees it.
+
+use vergence_cpu::{Access, Bus, BusFault, Cycle, Lines};
+
+use crate::chip::Chip;
+use crate::memory::{Memory, Place, narrow};
+use crate::peripheral::{Moment, Refused};
+use crate::trouble::{Demand, Trouble};
+use crate::unit::Unit;
+use crate::world::World;
+
+/// Peripherals are in here; what is missing is a gap in the model, not a fault of the program.
+const PERIPHERALS: std::ops::Range<u32> = 0x4000_0000..0x6000_0000;
+
+impl<W: World> Chip<W> {
+    /// Reads a register of a peripheral.
+    pub(crate) fn read_register(&mut self, address: u32, access: Access) -> Result<u32, BusFault> {
+        let Some((unit, offset)) = self.find(address)? else { return Ok(0) };
+        self.census.note(unit, offset, false);
+        let moment = Moment { now: self.now, clocks: &self.clocks };
+        let peripheral = self.units.get(unit);
+        peripheral.advance(moment);
+        match peripheral.read(moment, offset) {
+            Ok(word) => {
+                self.react(unit);
+                Ok(narrow(word, address, access))
+            }
+            Err(Refused(what)) => {
+                let register = self.name_of(unit, offset);
+                self.complain(Trouble::Refused { unit: unit.to_string(), register, offset, value: 0, what });
+                Ok(0)
+            }
+        }
+    }
+
+    /// Writes a register of a peripheral.
+    pub(crate) fn write_register(&mut self, address: u32, access: Access, value: u32) -> Result<(), BusFault> {
+        let Some((unit, offset)) = self.find(address)? else { return Ok(()) };
+        self.census.note(unit, offset, true);
+        if address & 3 != 0 && access != Access::Word {
+            let register = self.name_of(unit, offset);
+            self.complain(Trouble::Narrow { unit: unit.to_string(), register, access });
+            return Ok(());
+        }
+        let moment = Moment { now: self.now, clocks: &self.clocks };
+        if unit == Unit::Crc {
+            self.units.crc.access = access;
+        }
+        let peripheral = self.units.get(unit);
+        peripheral.advance(moment);
+        let reply = peripheral.write(moment, offset, value);
+        // The slave mode decides who listens to whom.
+        if matches!(unit, Unit::Timer(_)) && offset == 8 {
+            self.watch_timers();
+        }
+        if unit == Unit::Flash && offset == 0 {
+            self.reclock();
+        }
+        self.react(unit);
+        if let Err(Refused(what)) = reply {
+            let register = self.name_of(unit, offset);
+            self.complain(Trouble::Refused { unit: unit.to_string(), register, offset, value, what });
+        }
+        Ok(())
+    }
+
+    /// The peripheral at an address and the offset of the register; `None` where nothing answers and that was
+    /// complained about.
+    fn find(&mut self, address: u32) -> Result<Option<(Unit, u32)>, BusFault> {
+        let Some(unit) = self.directory.unit_at(address) else {
+            if PERIPHERALS.contains(&address) {
+                self.complain(Trouble::Unmapped { address });
+            }
+            return Err(BusFault);
+        };
+        let offset = (address - unit.base()) & !3;
+        if !self.directory.has_register(unit, offset) {
+            self.complain(Trouble::NoRegister { unit: unit.to_string(), offset });
+            return Ok(None);
+        }
+        if !self.units.rcc.is_clocked(unit) {
+            let register = self.name_of(unit, offset);
+            self.complain(Trouble::ClockOff { unit: unit.to_string(), register });
+            return Ok(None);
+        }
+        Ok(Some((unit, offset)))
+    }
+
+    fn name_of(&mut self, unit: Unit, offset: u32) -> &'static str {
+        let registers = self.units.get(unit).registers();
+        registers.iter().find(|(known, _)| *known == offset).map_or("", |&(_, name)| name)
+    }
+
+    #[cold]
+    fn check_ecc(&mut self, offset: usize) {
+        self.units.flash.check_ecc(offset as u32 / 8);
+    }
+
+    /// A read or fetch from a bank that is busy waits until it is free.
+    fn note_bank(&self, offset: usize) {
+        if self
+            .units
+            .flash
+            .busy()
+            .is_some_and(|(bank, _)| usize::from(bank) == offset / (crate::memory::FLASH_SIZE / 2))
+        {
+            self.stalls.set(true);
+        }
+    }
+}
+
+impl<W: World> Bus for Chip<W> {
+    #[inline]
+    fn read(&mut self, now: Cycle, address: u32, access: Access) -> Result<u32, BusFault> {
+        match Memory::place(address) {
+            Some(Place::Ram(offset)) => self.memory.read_ram(offset, access).ok_or(BusFault),
+            Some(Place::Flash(offset)) => {
+                if !self.units.flash.torn.is_empty() {
+                    self.check_ecc(offset);
+                }
+                self.note_bank(offset);
+                self.memory.read_flash(offset, access).ok_or(BusFault)
+            }
+            Some(Place::System(address)) => {
+                let word = self.memory.system_word(address, self.units.flash.options());
+                Ok(narrow(word, address, access))
+            }
+            None => {
+                self.advance_to(now);
+                let value = self.read_register(address, access);
+                self.serve_dma();
+                value
+            }
+        }
+    }
+
+    #[inline]
+    fn write(&mut self, now: Cycle, address: u32, access: Access, value: u32) -> Result<(), BusFault> {
+        match Memory::place(address) {
+            Some(Place::Ram(offset)) => self.memory.write_ram(offset, access, value).ok_or(BusFault),
+            Some(Place::Flash(offset)) => {
+                self.advance_to(now);
+                // Without power nothing more is written.
+                if self.demand == Some(Demand::PowerLost) {
+                    return Ok(());
+                }
+                let cells = self.memory.flash.get(offset & !7..(offset & !7) + 8);
+                let cells = cells.and_then(|cells| cells.try_into().ok()).map_or(0, u64::from_le_bytes);
+                let moment = Moment { now: self.now, clocks: &self.clocks };
+                self.units.flash.program(moment, offset as u32, access, value, cells);
+                self.react(Unit::Flash);
+                Ok(())
+            }
+            Some(Place::System(_)) => Err(BusFault),
+            None => {
+                self.advance_to(now);
+                if self.demand == Some(Demand::PowerLost) {
+                    return Ok(());
+                }
+                let done = self.write_register(address, access, value);
+                self.serve_dma();
+                done
+            }
+        }
+    }
+
+    #[inline]
+    fn fetch(&self, address: u32) -> Result<u16, BusFault> {
+        if let Some(Place::Flash(offset)) = Memory::place(address) {
+            self.note_bank(offset);
+        }
+        self.memory.fetch(address).ok_or(BusFault)
+    }
+
+    fn code_version(&self) -> u64 {
+        self.code_version
+    }
+
+    #[inline]
+    fn wait_states(&self) -> u32 {
+        if self.stalls.take()
+            && let Some((_, until)) = self.units.flash.busy()
+        {
+            let free_at = self.clocks.base.cycle_at(until);
+            return u32::try_from(free_at.saturating_sub(self.now)).unwrap_or(u32::MAX);
+        }
+        // As if the instruction cache never hit: the worst case, see FIDELITY.
+        self.units.flash.wait_states()
+    }
+
+    #[inline]
+    fn advance(&mut self, now: Cycle) {
+        self.advance_to(now);
+    }
+
+    #[inline]
+    fn next_event(&self) -> Cycle {
+        self.schedule.next()
+    }
+
+    #[inline]
+    fn lines(&self) -> Lines {
+        self.schedule.lines()
+    }
+
+    #[inline]
+    fn nmi(&self) -> bool {
+        self.units.flash.nmi()
+    }
+
+    #[inline]
+    fn stop_requested(&self) -> bool {
+        self.demand.is_some()
+    }
+}

@@ -1,0 +1,266 @@
+//! The chip: memories and peripherals behind the core's bus, and the world around it.
+
+use std::cell::Cell;
+
+use vergence_cpu::{Cycle, NEVER};
+
+use crate::census::Census;
+use crate::clocks::{Clocks, VoltageRange, check_core_clock};
+use crate::directory::Directory;
+use crate::memory::Memory;
+use crate::pads::Pads;
+use crate::peripheral::{Moment, Refused};
+use crate::rcc::ResetCause;
+use crate::schedule::{Due, Schedule};
+use crate::service::RequestSources;
+use crate::time::TimeBase;
+use crate::trouble::{Demand, Trouble};
+use crate::uart::SentByte;
+use crate::unit::{UNITS, UartId, Unit};
+use crate::units::Units;
+use crate::vcd::Trace;
+use crate::world::{Instant, Terminals, World};
+
+/// How the chip is made.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct ChipConfig {
+    /// The unique device identifier.
+    pub uid: [u32; 3],
+    /// Decides what RAM holds at power-on, and the random number generator.
+    pub seed: u64,
+    /// Stop at whatever the model does not do. Otherwise such accesses are noted, reads give zero and writes are lost.
+    pub strict: bool,
+    /// Let a core clock pass that is too fast for its supply or wait states: it is noted, and the chip goes on.
+    pub overclock: bool,
+}
+
+impl Default for ChipConfig {
+    fn default() -> Self {
+        Self { uid: [0x0031_0042, 0x3238_510A, 0x2038_3753], seed: 1, strict: true, overclock: false }
+    }
+}
+
+/// Troubles that are kept where the chip is not strict.
+const TROUBLES_KEPT: usize = 64;
+/// So many events at one instant are taken for an endless loop.
+const EVENTS_AT_ONCE: u32 = 100_000;
+
+/// An STM32G474RE wired to a world. Clone it for a snapshot.
+#[derive(Clone, Debug)]
+pub struct Chip<W> {
+    config: ChipConfig,
+    pub(crate) memory: Memory,
+    pub(crate) units: Units,
+    pub(crate) clocks: Clocks,
+    pub(crate) pads: Pads,
+    pub(crate) schedule: Schedule,
+    pub(crate) sources: RequestSources,
+    pub(crate) directory: Directory,
+    pub(crate) census: Census,
+    pub(crate) world: W,
+    pub(crate) terminals: Terminals,
+    pub(crate) trace: Trace,
+    pub(crate) now: Cycle,
+    pub(crate) code_version: u64,
+    pub(crate) demand: Option<Demand>,
+    /// Code was fetched from a bank of flash that is busy: the next branch waits for it.
+    pub(crate) stalls: Cell<bool>,
+    pub(crate) troubles: Vec<Trouble>,
+    pub(crate) sent: Vec<Vec<SentByte>>,
+    power_cycles: u64,
+    /// The core clock, supply and wait states last looked at.
+    speed: Option<(u32, VoltageRange, u32)>,
+}
+
+impl<W: World> Chip<W> {
+    /// A chip with erased flash that has just got power.
+    #[must_use]
+    pub fn new(config: ChipConfig, world: W) -> Self {
+        let mut units = Units::new(config.seed);
+        let directory = Directory::new(&mut units);
+        let tree = units.rcc.tree();
+        let mut chip = Self {
+            config,
+            memory: Memory::new(config.uid, config.seed),
+            clocks: Clocks { base: TimeBase::new(tree.hclk), tree },
+            units,
+            pads: Pads::new(),
+            schedule: Schedule::new(),
+            sources: RequestSources::new(),
+            directory,
+            census: Census::new(),
+            world,
+            terminals: Terminals::default(),
+            trace: Trace::default(),
+            now: 0,
+            code_version: 0,
+            demand: None,
+            stalls: Cell::new(false),
+            troubles: Vec::new(),
+            sent: vec![Vec::new(); UartId::COUNT],
+            power_cycles: 0,
+            speed: None,
+        };
+        chip.settle_everything();
+        chip
+    }
+
+    /// Resets everything but the contents of memory; power-on also loses RAM.
+    pub fn reset(&mut self, now: Cycle, cause: ResetCause) {
+        self.advance_to(now);
+        self.demand = None;
+        self.units.reset(cause);
+        if cause == ResetCause::PowerOn {
+            self.power_cycles += 1;
+            self.memory.lose_power(self.config.seed ^ self.power_cycles << 32);
+        }
+        self.code_version += 1;
+        let tree = self.units.rcc.tree();
+        self.clocks.base.change(now, tree.hclk);
+        self.clocks.tree = tree;
+        self.settle_everything();
+    }
+
+    /// Looks at everything anew.
+    pub(crate) fn settle_everything(&mut self) {
+        self.pads.watched = self.world.watched().iter().fold(self.trace.watched(), |all, pin| all | pin.set());
+        for port in 0..self.units.ports.len() {
+            self.units.ports[port].changed = true;
+            self.react(Unit::Gpio(port as u8));
+        }
+        self.watch_timers();
+        for index in 0..UNITS {
+            self.refresh(Unit::at(index));
+        }
+        self.refresh_world();
+    }
+
+    pub(crate) fn instant(&self) -> Instant {
+        Instant { cycle: self.now, time: self.clocks.base.time_of(self.now) }
+    }
+
+    /// Lets everything happen that is due up to `now`, each thing at its own instant.
+    #[inline]
+    pub(crate) fn advance_to(&mut self, now: Cycle) {
+        if self.schedule.next() <= now {
+            self.run_events(now);
+        }
+        self.now = self.now.max(now);
+    }
+
+    fn run_events(&mut self, now: Cycle) {
+        let (mut last, mut at_once) = (0, 0);
+        while let Some((at, due)) = self.schedule.first_until(now) {
+            at_once = if at == last { at_once + 1 } else { 0 };
+            last = at;
+            self.now = self.now.max(at);
+            if at_once > EVENTS_AT_ONCE {
+                self.break_loop(due);
+                continue;
+            }
+            match due {
+                Due::World => self.run_world(),
+                Due::Unit(unit) => {
+                    let moment = Moment { now: self.now, clocks: &self.clocks };
+                    self.units.get(unit).advance(moment);
+                    self.react(unit);
+                    self.serve_dma();
+                }
+            }
+        }
+    }
+
+    fn break_loop(&mut self, due: Due) {
+        let unit = match due {
+            Due::World => {
+                self.schedule.set_world(NEVER);
+                "the world".to_owned()
+            }
+            Due::Unit(unit) => {
+                self.schedule.set(unit, NEVER, self.units.get(unit).lines());
+                unit.to_string()
+            }
+        };
+        self.complain(Trouble::Endless { at: self.now, unit });
+    }
+
+    /// Finds anew when a peripheral is due and what it asserts.
+    pub(crate) fn refresh(&mut self, unit: Unit) {
+        let peripheral = self.units.get(unit);
+        let (due, lines) = (peripheral.due(&self.clocks), peripheral.lines());
+        self.schedule.set(unit, due, lines);
+    }
+
+    fn refresh_world(&mut self) {
+        self.schedule.set_world(self.clocks.base.cycle_at(self.world.next_event()));
+    }
+
+    fn run_world(&mut self) {
+        let now = self.instant();
+        self.world.act(now, &mut self.terminals);
+        self.connect_terminals();
+        self.serve_dma();
+        self.refresh_world();
+    }
+
+    /// After the world was told of something.
+    pub(crate) fn world_was_told(&mut self) {
+        self.connect_terminals();
+        self.refresh_world();
+    }
+
+    /// The clock tree may have changed: brings everything to now by the old clocks, then goes on by the new ones.
+    pub(crate) fn reclock(&mut self) {
+        let tree = self.units.rcc.tree();
+        if tree != self.clocks.tree {
+            let moment = Moment { now: self.now, clocks: &self.clocks };
+            for index in 0..UNITS {
+                self.units.get(Unit::at(index)).advance(moment);
+            }
+            self.clocks.base.change(self.now, tree.hclk);
+            self.clocks.tree = tree;
+            let moment = Moment { now: self.now, clocks: &self.clocks };
+            self.units.timers.iter_mut().for_each(|timer| timer.set_divider(moment, &tree));
+            (0..UNITS).for_each(|index| self.refresh(Unit::at(index)));
+            self.refresh_world();
+        }
+        self.check_speed();
+    }
+
+    fn check_speed(&mut self) {
+        let speed = (self.clocks.tree.hclk, self.units.pwr.range(), self.units.flash.wait_states());
+        if self.speed == Some(speed) {
+            return;
+        }
+        self.speed = Some(speed);
+        let (hclk, range, wait_states) = speed;
+        match check_core_clock(hclk, range, wait_states) {
+            Err(Refused(what)) if self.config.overclock => self.note(Trouble::Clocks { what }),
+            Err(Refused(what)) => self.complain(Trouble::Clocks { what }),
+            Ok(()) => {}
+        }
+    }
+
+    /// Something is wrong: a strict chip stops, another one keeps a note.
+    pub(crate) fn complain(&mut self, trouble: Trouble) {
+        if self.config.strict {
+            self.ask(Demand::Trouble(trouble));
+        } else {
+            self.note(trouble);
+        }
+    }
+
+    fn note(&mut self, trouble: Trouble) {
+        if self.troubles.len() < TROUBLES_KEPT && !self.troubles.contains(&trouble) {
+            self.troubles.push(trouble);
+        }
+    }
+
+    pub(crate) fn ask(&mut self, demand: Demand) {
+        self.demand.get_or_insert(demand);
+    }
+
+    pub(crate) fn note_sent(&mut self, port: UartId, byte: SentByte) {
+        self.sent[port.index()].push(byte);
+    }
+}

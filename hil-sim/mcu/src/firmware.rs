@@ -1,0 +1,109 @@
+//! A firmware image as its ELF file tells it: what to load where, and what is where.
+
+use std::sync::Arc;
+
+use object::read::elf::{ElfFile32, ProgramHeader};
+use object::{Endianness, Object, ObjectSymbol, SymbolKind, elf};
+
+/// An ELF file that cannot be run.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[non_exhaustive]
+pub enum FirmwareError {
+    /// The bytes are no 32-bit ELF file.
+    #[error("this is no 32-bit ELF file: {0}")]
+    NotElf(String),
+    /// It is for another processor.
+    #[error("this ELF file is not for an Arm processor")]
+    NotArm,
+    /// A segment lies outside flash.
+    #[error("a segment of {length} bytes at {address:#010x} is not in flash")]
+    OutsideFlash {
+        /// Where it wants to be loaded.
+        address: u32,
+        /// Its length.
+        length: usize,
+    },
+}
+
+/// A function or variable.
+#[derive(Clone, Debug, PartialEq, Eq)]
+struct Symbol {
+    address: u32,
+    size: u32,
+    name: String,
+}
+
+/// A firmware image.
+#[derive(Clone, Debug, Default)]
+pub struct Firmware {
+    segments: Vec<(u32, Vec<u8>)>,
+    symbols: Arc<Vec<Symbol>>,
+}
+
+impl Firmware {
+    /// Reads an ELF file.
+    ///
+    /// # Errors
+    /// [`FirmwareError`] where it is none, or not for this chip.
+    pub fn from_elf(bytes: &[u8]) -> Result<Self, FirmwareError> {
+        let not_elf = |error: object::Error| FirmwareError::NotElf(error.to_string());
+        let file: ElfFile32<Endianness> = ElfFile32::parse(bytes).map_err(not_elf)?;
+        if file.architecture() != object::Architecture::Arm {
+            return Err(FirmwareError::NotArm);
+        }
+        let endian = file.endian();
+        let mut segments = Vec::new();
+        for header in file.elf_program_headers() {
+            let data = header.data(endian, bytes).unwrap_or_default();
+            if header.p_type(endian) == elf::PT_LOAD && !data.is_empty() {
+                segments.push((header.p_paddr(endian), data.to_vec()));
+            }
+        }
+        Ok(Self { segments, symbols: Arc::new(symbols(&file)) })
+    }
+
+    /// A raw image at an address.
+    #[must_use]
+    pub fn from_image(address: u32, bytes: &[u8]) -> Self {
+        Self { segments: vec![(address, bytes.to_vec())], symbols: Arc::default() }
+    }
+
+    /// What to load: physical addresses and bytes.
+    pub fn segments(&self) -> impl Iterator<Item = (u32, &[u8])> {
+        self.segments.iter().map(|(address, bytes)| (*address, bytes.as_slice()))
+    }
+
+    /// The function or variable that `address` is in, and how far in, such as "control::tick+0x1c".
+    #[must_use]
+    pub fn symbol_at(&self, address: u32) -> Option<String> {
+        let after = self.symbols.partition_point(|symbol| symbol.address <= address);
+        let symbol = self.symbols.get(after.checked_sub(1)?)?;
+        let offset = address - symbol.address;
+        match offset {
+            0 => Some(symbol.name.clone()),
+            _ if offset < symbol.size.max(1) => Some(format!("{}+{offset:#x}", symbol.name)),
+            _ => None,
+        }
+    }
+
+    /// Where a symbol is, by its whole name.
+    #[must_use]
+    pub fn address_of(&self, name: &str) -> Option<u32> {
+        self.symbols.iter().find(|symbol| symbol.name == name).map(|symbol| symbol.address)
+    }
+}
+
+fn symbols(file: &ElfFile32<Endianness>) -> Vec<Symbol> {
+    let named = file.symbols().filter(|symbol| matches!(symbol.kind(), SymbolKind::Text | SymbolKind::Data));
+    let mut symbols: Vec<_> = named
+        .filter_map(|symbol| {
+            let name = symbol.name().ok().filter(|name| !name.is_empty() && !name.starts_with('$'))?;
+            // Bit 0 of a function's address says Thumb.
+            let address = symbol.address() as u32 & !u32::from(symbol.kind() == SymbolKind::Text);
+            let name = format!("{:#}", rustc_demangle::demangle(name));
+            Some(Symbol { address, size: symbol.size() as u32, name })
+        })
+        .collect();
+    symbols.sort_by(|left, right| (left.address, &left.name).cmp(&(right.address, &right.name)));
+    symbols
+}

@@ -1,0 +1,203 @@
+//! Core and chip together: the board as its user sees it.
+
+use vergence_cpu::{Cpu, Stop};
+
+use crate::chip::{Chip, ChipConfig};
+use crate::firmware::{Firmware, FirmwareError};
+use crate::halt::{Halt, Place};
+use crate::memory::FLASH_BASE;
+use crate::rcc::ResetCause;
+use crate::time::Picoseconds;
+use crate::trouble::Demand;
+use crate::world::World;
+
+/// What a machine stops at. A board without debugger stops at none of these.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Stops {
+    /// Breakpoint instructions; otherwise they are faults.
+    pub breakpoints: bool,
+    /// Lockup; otherwise time goes on, and the watchdog may bite.
+    pub lockups: bool,
+}
+
+/// A board. Clone it for a snapshot.
+#[derive(Clone)]
+pub struct Machine<W> {
+    cpu: Cpu,
+    chip: Chip<W>,
+    firmware: Firmware,
+    stops: Stops,
+    /// The last reset, and how many there were after power-on.
+    reset: ResetCause,
+    resets: u64,
+    /// Where the core last locked up.
+    lockup: Option<Place>,
+}
+
+impl<W: World> Machine<W> {
+    /// A board with erased flash that has just got power.
+    #[must_use]
+    pub fn new(config: ChipConfig, world: W) -> Self {
+        let mut machine = Self {
+            cpu: Cpu::new(),
+            chip: Chip::new(config, world),
+            firmware: Firmware::default(),
+            stops: Stops::default(),
+            reset: ResetCause::PowerOn,
+            resets: 0,
+            lockup: None,
+        };
+        machine.cpu.reset(&mut machine.chip);
+        machine
+    }
+
+    /// Loads firmware into flash and starts it as after power-on. What else is in flash stays.
+    ///
+    /// # Errors
+    /// [`FirmwareError::OutsideFlash`] where some of it has no place there.
+    pub fn load(&mut self, firmware: Firmware) -> Result<(), FirmwareError> {
+        for (address, bytes) in firmware.segments() {
+            let offset = address.wrapping_sub(FLASH_BASE) as usize;
+            if !self.chip.load_flash(offset, bytes) {
+                return Err(FirmwareError::OutsideFlash { address, length: bytes.len() });
+            }
+        }
+        self.firmware = firmware;
+        self.power_on();
+        Ok(())
+    }
+
+    /// What it stops at.
+    pub fn set_stops(&mut self, stops: Stops) {
+        self.stops = stops;
+    }
+
+    /// Power goes and comes again at once.
+    pub fn power_on(&mut self) {
+        self.restart(ResetCause::PowerOn);
+        self.resets = 0;
+    }
+
+    /// The reset button.
+    pub fn press_reset(&mut self) {
+        self.restart(ResetCause::Pin);
+    }
+
+    fn restart(&mut self, cause: ResetCause) {
+        self.reset = cause;
+        self.resets += 1;
+        self.chip.reset(self.cpu.now(), cause);
+        self.cpu.reset(&mut self.chip);
+    }
+
+    /// Runs until `time` since power-on, through resets. The last instruction may go past it.
+    pub fn run_until(&mut self, time: Picoseconds) -> Halt {
+        loop {
+            // The core clock may have changed meanwhile.
+            let end = self.chip.clocks.base.cycle_at(time);
+            if self.cpu.now() >= end {
+                return Halt::Reached;
+            }
+            // Memory accesses do not make the core look up, peripherals do: go one instruction at a time.
+            let slice = if self.chip.units.flash.is_touchy() { self.cpu.now() + 1 } else { end };
+            let stop = self.cpu.run(&mut self.chip, slice);
+            if let Some(halt) = self.handle(stop) {
+                return halt;
+            }
+        }
+    }
+
+    /// Runs for a while.
+    pub fn run_for(&mut self, duration: Picoseconds) -> Halt {
+        self.run_until(self.time() + duration)
+    }
+
+    fn handle(&mut self, stop: Stop) -> Option<Halt> {
+        match stop {
+            Stop::Reached => {}
+            Stop::ResetRequested => self.restart(ResetCause::Software),
+            Stop::Requested => return self.handle_demand(),
+            Stop::Breakpoint(number) if self.stops.breakpoints => {
+                return Some(Halt::Breakpoint { number, place: self.place() });
+            }
+            Stop::Breakpoint(_) => self.cpu.escalate_breakpoint(),
+            Stop::Semihosting => return Some(Halt::Semihosting { place: self.place() }),
+            Stop::Lockup => {
+                let place = self.place();
+                self.lockup = Some(place.clone());
+                return self.stops.lockups.then_some(Halt::Lockup { place });
+            }
+            other => return Some(Halt::Other(format!("the core stopped: {other:?}"))),
+        }
+        None
+    }
+
+    fn handle_demand(&mut self) -> Option<Halt> {
+        let place = self.place();
+        match self.chip.demand.take()? {
+            Demand::Watchdog => self.restart(ResetCause::Watchdog),
+            Demand::OptionBytes => self.restart(ResetCause::OptionBytes),
+            Demand::Trouble(trouble) => return Some(Halt::Trouble { trouble, place }),
+            Demand::PowerLost => {
+                self.power_on();
+                return Some(Halt::PowerLost { place });
+            }
+        }
+        None
+    }
+
+    /// Where the core stands.
+    #[must_use]
+    pub fn place(&self) -> Place {
+        let pc = self.cpu.pc();
+        Place { pc, symbol: self.firmware.symbol_at(pc), time: self.time() }
+    }
+
+    /// Real time since power-on of the simulation; resets and power cuts do not set it back.
+    #[must_use]
+    pub fn time(&self) -> Picoseconds {
+        self.chip.clocks.base.time_of(self.cpu.now())
+    }
+
+    /// The last reset.
+    #[must_use]
+    pub fn last_reset(&self) -> ResetCause {
+        self.reset
+    }
+
+    /// Resets since power came.
+    #[must_use]
+    pub fn resets(&self) -> u64 {
+        self.resets
+    }
+
+    /// Where the core last locked up, if it ever did.
+    #[must_use]
+    pub fn last_lockup(&self) -> Option<&Place> {
+        self.lockup.as_ref()
+    }
+
+    /// The core.
+    #[must_use]
+    pub fn cpu(&self) -> &Cpu {
+        &self.cpu
+    }
+
+    /// The chip.
+    #[must_use]
+    pub fn chip(&self) -> &Chip<W> {
+        &self.chip
+    }
+
+    /// The chip, for doing something to it. Pins and serial lines change at the present instant.
+    pub fn chip_mut(&mut self) -> &mut Chip<W> {
+        self.chip.advance_to(self.cpu.now());
+        &mut self.chip
+    }
+
+    /// The firmware, for its symbols.
+    #[must_use]
+    pub fn firmware(&self) -> &Firmware {
+        &self.firmware
+    }
+}

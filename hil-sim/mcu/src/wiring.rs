@@ -1,0 +1,198 @@
+//! What one peripheral does to the others: pins to interrupts and timers, timers to timers, bytes to the world.
+
+use crate::chip::Chip;
+use crate::gpio::Mode;
+use crate::peripheral::Moment;
+use crate::pin::{Drive, Pin, PinSet, Signal};
+use crate::trouble::Demand;
+use crate::uart::SentByte;
+use crate::unit::{TimerId, UartId, Unit};
+use crate::world::{PinEdge, World};
+
+impl<W: World> Chip<W> {
+    /// After a peripheral was advanced or written: carries out what it does to others, then looks at it anew.
+    pub(crate) fn react(&mut self, unit: Unit) {
+        match unit {
+            Unit::Rcc => {
+                for reset in std::mem::take(&mut self.units.rcc.resets) {
+                    self.units.reset_one(reset);
+                    let tree = self.clocks.tree;
+                    let moment = Moment { now: self.now, clocks: &self.clocks };
+                    if let Unit::Timer(timer) = reset {
+                        self.units.timers[timer.index()].set_divider(moment, &tree);
+                    }
+                    self.react(reset);
+                }
+                self.reclock();
+            }
+            Unit::Pwr => self.reclock(),
+            Unit::Flash => self.react_to_flash(),
+            Unit::Iwdg => self.react_to_watchdog(),
+            Unit::Gpio(port) => self.react_to_port(usize::from(port)),
+            Unit::Timer(timer) => self.react_to_timer(timer),
+            Unit::Uart(uart) => self.react_to_uart(uart),
+            _ => {}
+        }
+        self.refresh(unit);
+    }
+
+    fn react_to_flash(&mut self) {
+        for change in std::mem::take(&mut self.units.flash.changes) {
+            let lost = change.apply(&mut self.memory.flash, &mut self.units.flash.torn);
+            self.code_version += 1;
+            if lost {
+                self.ask(Demand::PowerLost);
+            }
+        }
+        if std::mem::take(&mut self.units.flash.reload_options) {
+            self.ask(Demand::OptionBytes);
+        }
+    }
+
+    fn react_to_watchdog(&mut self) {
+        if std::mem::take(&mut self.units.iwdg.starts) {
+            let moment = Moment { now: self.now, clocks: &self.clocks };
+            self.units.rcc.start_lsi(moment);
+            self.refresh(Unit::Rcc);
+        }
+        if std::mem::take(&mut self.units.iwdg.bites) {
+            self.ask(Demand::Watchdog);
+        }
+    }
+
+    fn react_to_port(&mut self, port: usize) {
+        if !std::mem::take(&mut self.units.ports[port].changed) {
+            return;
+        }
+        if self.pads.connect(&self.units, port) {
+            for uart in UartId::all() {
+                self.units.uarts[uart.index()].connected = self.pads.connected(uart);
+            }
+            self.watch_timers();
+        }
+        for number in 0..16 {
+            let pin = Pin::at(port * 16 + number);
+            self.settle_pin(pin);
+            // A pin newly connected to an input tells its level.
+            self.tell_input(pin, self.pads.is_high(pin));
+        }
+        // A port that was reset has forgotten the levels that did not change.
+        self.units.ports[port].levels = self.pads.levels_of_port(port);
+    }
+
+    fn react_to_timer(&mut self, timer: TimerId) {
+        let index = timer.index();
+        if std::mem::take(&mut self.units.timers[index].outputs_changed) {
+            self.settle_pins(self.pads.pins_of_timer(timer));
+        }
+        for _ in 0..std::mem::take(&mut self.units.timers[index].triggers) {
+            self.trigger_slaves(timer);
+        }
+    }
+
+    fn trigger_slaves(&mut self, master: TimerId) {
+        for slave in TimerId::all() {
+            if self.units.timers[slave.index()].master() == Some(master) {
+                let moment = Moment { now: self.now, clocks: &self.clocks };
+                let timer = &mut self.units.timers[slave.index()];
+                crate::peripheral::Peripheral::advance(timer, moment);
+                timer.trigger(self.now);
+                self.react(Unit::Timer(slave));
+            }
+        }
+    }
+
+    fn react_to_uart(&mut self, uart: UartId) {
+        let moment = Moment { now: self.now, clocks: &self.clocks };
+        let port = &mut self.units.uarts[uart.index()];
+        let baud = port.baud(moment);
+        for (cycle, byte) in std::mem::take(&mut port.sent) {
+            self.note_sent(uart, SentByte { at: self.clocks.base.time_of(cycle), byte, baud });
+            let now = self.instant();
+            self.world.byte_sent(uart, byte, now, &mut self.terminals);
+            self.world_was_told();
+        }
+        self.settle_pins(self.pads.pins_of_enable(uart));
+    }
+
+    /// Tells timers which of their outputs somebody looks at, and which of them other timers listen to.
+    pub(crate) fn watch_timers(&mut self) {
+        let masters: Vec<_> = self.units.timers.iter().filter_map(crate::timer::Timer::master).collect();
+        for timer in TimerId::all() {
+            let watched = self.pads.watched_outputs(timer);
+            let state = &mut self.units.timers[timer.index()];
+            state.watched = watched;
+            state.heard = masters.contains(&timer);
+            self.refresh(Unit::Timer(timer));
+        }
+    }
+
+    /// Finds the levels of pins whose outputs may have changed.
+    pub(crate) fn settle_pins(&mut self, mut pins: PinSet) {
+        while pins != 0 {
+            let index = pins.trailing_zeros() as usize;
+            pins &= pins - 1;
+            self.settle_pin(Pin::at(index));
+        }
+    }
+
+    fn settle_pin(&mut self, pin: Pin) {
+        let high = self.pads.resolve(&self.units, pin);
+        if high == self.pads.is_high(pin) {
+            return;
+        }
+        self.pads.set_level(pin, high);
+        let port = &mut self.units.ports[pin.port()];
+        let bit = 1 << pin.number();
+        port.levels = if high { port.levels | bit } else { port.levels & !bit };
+        let hears = port.mode(pin.number()) != Mode::Analog;
+        if hears && self.units.syscfg.exti_port(pin.number()) == pin.port() {
+            self.units.exti.edge(pin.number(), high);
+            self.refresh(Unit::Exti);
+        }
+        self.tell_input(pin, high);
+        if self.pads.watched & pin.set() != 0 {
+            let edge = PinEdge { at: self.instant(), pin, high };
+            self.trace.note(edge);
+            self.world.pin_changed(edge, &mut self.terminals);
+            self.world_was_told();
+        }
+    }
+
+    /// A timer input follows its pin.
+    fn tell_input(&mut self, pin: Pin, high: bool) {
+        let Some(Signal::Channel(timer, channel)) = self.pads.signal(pin) else { return };
+        let moment = Moment { now: self.now, clocks: &self.clocks };
+        let state = &mut self.units.timers[timer.index()];
+        crate::peripheral::Peripheral::advance(state, moment);
+        state.set_input(self.now, usize::from(channel), high);
+        self.react(Unit::Timer(timer));
+    }
+
+    /// Carries out what the world asked for, in its order.
+    pub(crate) fn connect_terminals(&mut self) {
+        // What this causes may make the world ask for more, which nested calls then carry out.
+        for (pin, drive) in std::mem::take(&mut self.terminals.drives) {
+            self.drive(pin, drive);
+        }
+        for (uart, frame) in std::mem::take(&mut self.terminals.frames) {
+            let moment = Moment { now: self.now, clocks: &self.clocks };
+            let port = &mut self.units.uarts[uart.index()];
+            port.receive(moment, frame);
+            self.refresh(Unit::Uart(uart));
+        }
+    }
+
+    /// Drives a pin from outside.
+    pub fn drive(&mut self, pin: Pin, drive: Drive) {
+        self.pads.drives[pin.index()] = drive;
+        self.settle_pin(pin);
+    }
+
+    /// The level of a pin.
+    #[must_use]
+    pub fn is_high(&self, pin: Pin) -> bool {
+        // A free-running output that nobody watches is brought up to date only when asked.
+        self.pads.resolve(&self.units, pin)
+    }
+}

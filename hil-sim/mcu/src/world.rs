@@ -1,0 +1,108 @@
+//! What the chip is wired to: it sees pins change and bytes leave, and changes inputs and sends bytes in its own time.
+
+use vergence_cpu::Cycle;
+
+use crate::pin::{Drive, Pin};
+use crate::time::Picoseconds;
+use crate::uart::Frame;
+use crate::unit::UartId;
+
+/// Now, for the world.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Instant {
+    /// Core cycles since power-on.
+    pub cycle: Cycle,
+    /// Real time since power-on.
+    pub time: Picoseconds,
+}
+
+/// A pin that has changed its level.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct PinEdge {
+    /// When.
+    pub at: Instant,
+    /// Which.
+    pub pin: Pin,
+    /// It is high now.
+    pub high: bool,
+}
+
+/// What the world does to the chip's terminals.
+#[derive(Clone, Debug, Default)]
+pub struct Terminals {
+    pub(crate) drives: Vec<(Pin, Drive)>,
+    pub(crate) frames: Vec<(UartId, Frame)>,
+}
+
+impl Terminals {
+    /// Drives a pin from outside, from now on.
+    pub fn drive(&mut self, pin: Pin, drive: Drive) {
+        self.drives.push((pin, drive));
+    }
+
+    /// Sends a frame to a serial port, behind what is already under way.
+    pub fn send(&mut self, port: UartId, frame: Frame) {
+        self.frames.push((port, frame));
+    }
+}
+
+/// Everything around the chip. Worlds are composed: a bench of mechanics, a servo bus on a serial port, a trace of
+/// pins. Clone it for a snapshot. Every method has a default that does nothing.
+pub trait World: Clone {
+    /// Pins whose edges it wants to see; looked at again after every reset.
+    fn watched(&self) -> Vec<Pin> {
+        Vec::new()
+    }
+
+    /// When it next wants to do something by itself.
+    fn next_event(&self) -> Picoseconds {
+        Picoseconds::NEVER
+    }
+
+    /// Its time has come.
+    fn act(&mut self, _now: Instant, _terminals: &mut Terminals) {}
+
+    /// A watched pin has changed its level.
+    fn pin_changed(&mut self, _edge: PinEdge, _terminals: &mut Terminals) {}
+
+    /// A serial port has sent a byte.
+    fn byte_sent(&mut self, _port: UartId, _byte: u8, _now: Instant, _terminals: &mut Terminals) {}
+}
+
+/// Nothing around the chip.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Nothing;
+
+impl World for Nothing {}
+
+/// Two worlds side by side.
+impl<A: World, B: World> World for (A, B) {
+    fn watched(&self) -> Vec<Pin> {
+        let mut pins = self.0.watched();
+        pins.extend(self.1.watched());
+        pins
+    }
+
+    fn next_event(&self) -> Picoseconds {
+        self.0.next_event().min(self.1.next_event())
+    }
+
+    fn act(&mut self, now: Instant, terminals: &mut Terminals) {
+        if self.0.next_event() <= now.time {
+            self.0.act(now, terminals);
+        }
+        if self.1.next_event() <= now.time {
+            self.1.act(now, terminals);
+        }
+    }
+
+    fn pin_changed(&mut self, edge: PinEdge, terminals: &mut Terminals) {
+        self.0.pin_changed(edge, terminals);
+        self.1.pin_changed(edge, terminals);
+    }
+
+    fn byte_sent(&mut self, port: UartId, byte: u8, now: Instant, terminals: &mut Terminals) {
+        self.0.byte_sent(port, byte, now, terminals);
+        self.1.byte_sent(port, byte, now, terminals);
+    }
+}

@@ -1,0 +1,198 @@
+//! The relative pose of a pair in herbivore pose, from rendered photographs alone: the lenses from their own calibration on
+//! rendered boards, the corners from our detector. Nothing but the renderer knows the truth.
+//!
+//! Only the part of each 2048 x 2048 picture that shows the board is rendered, by the same lens with its centre moved.
+#![allow(clippy::unwrap_used, clippy::print_stdout, reason = "a test may fail, and tells its figures")]
+
+mod simulated;
+
+use image::{DynamicImage, GrayImage};
+use nalgebra::{Isometry3, UnitQuaternion, Vector3};
+use rayon::prelude::*;
+use simulated::{
+    COLUMNS, Dice, Pair, ROWS, SQUARE_MM, apart, error, facing_board, lens, median, other_lens, pair_pose, photograph,
+    seeds,
+};
+use vergence_calibration::detect::detect;
+use vergence_calibration::{
+    BoardSpec, BoardView, ExtrinsicsOptions, IntrinsicsOptions, LensKnowledge, StereoView, calibrate_extrinsics,
+    calibrate_intrinsics,
+};
+use vergence_scene::{Board, Optics, Scene, View, render};
+use vergence_vision::{Camera, ImageSize, KannalaBrandt, Length, Pixel, Transform, World};
+
+const SPEC: BoardSpec = BoardSpec { columns: COLUMNS, rows: ROWS, square: Length::from_mm(SQUARE_MM) };
+const SHARED_VIEWS: usize = 12;
+const OWN_VIEWS: usize = 30;
+/// Around the corners of a board: its outer squares and the paper about them.
+const MARGIN_PX: f64 = 90.0;
+
+/// A board before one camera.
+#[derive(Clone)]
+struct Shot {
+    camera: KannalaBrandt,
+    camera_from_board: Isometry3<f64>,
+    /// The corners as they truly are.
+    truth: BoardView,
+    seed: u64,
+}
+
+impl Shot {
+    fn new(camera: &KannalaBrandt, camera_from_board: Isometry3<f64>, dice: &mut Dice) -> Self {
+        let truth = photograph(camera, &camera_from_board, 0.0, dice);
+        Self { camera: *camera, camera_from_board, truth, seed: dice.between(0.0, 1e15) as u64 }
+    }
+
+    fn is_whole(&self) -> bool {
+        self.truth.corners.len() == (COLUMNS * ROWS) as usize
+    }
+
+    /// What our detector finds in the picture.
+    fn detected(&self) -> Option<BoardView> {
+        let [left, top, width, height] = self.window();
+        let found = detect(&self.picture([left, top, width, height]), &SPEC, None).ok()?;
+        let mut view = found.view("", &SPEC);
+        for corner in &mut view.corners {
+            corner.pixel = Pixel { u: corner.pixel.u + f64::from(left), v: corner.pixel.v + f64::from(top) };
+        }
+        Some(view)
+    }
+
+    /// Left, top, width and height.
+    fn window(&self) -> [u32; 4] {
+        let extent = |value: fn(Pixel) -> f64, size: u32| {
+            let values = self.truth.corners.iter().map(|corner| value(corner.pixel));
+            let (low, high) = values.fold((f64::INFINITY, 0.0f64), |(low, high), x| (low.min(x), high.max(x)));
+            let low = (low - MARGIN_PX).max(0.0) as u32;
+            (low, ((high + MARGIN_PX) as u32).min(size) - low)
+        };
+        let size = self.camera.size();
+        let ((left, width), (top, height)) = (extent(|p| p.u, size.width), extent(|p| p.v, size.height));
+        [left, top, width, height]
+    }
+
+    fn picture(&self, [left, top, width, height]: [u32; 4]) -> GrayImage {
+        let mut lens = self.camera.to_opencv();
+        (lens.cx, lens.cy) = (lens.cx - f64::from(left), lens.cy - f64::from(top));
+        let camera = KannalaBrandt::from_opencv(lens, self.camera.theta_max(), ImageSize { width, height }).unwrap();
+        let board = Board { columns: COLUMNS, rows: ROWS, square: SPEC.square };
+        let place = Transform::<World, Board>::from_isometry(self.camera_from_board);
+        let scene = Scene::checkerboard(board, place);
+        let world_from_camera = Transform::<World, Camera>::new(UnitQuaternion::identity(), Vector3::zeros());
+        // A noisy sensor: corners are then known to about 0.1 px.
+        let optics = Optics { edge_samples: 24, blur_px: 0.8, read_noise: 9.0, shot_noise: 9.0, ..Optics::default() };
+        let view = View { scene: &scene, camera: &camera, world_from_camera, optics: &optics };
+        DynamicImage::from(render(&view, self.seed).image).to_luma8()
+    }
+
+    /// Errors of the corners in u and v, in pixels.
+    fn errors(&self, found: &BoardView) -> Vec<f64> {
+        let of = |corner: &vergence_calibration::Corner| {
+            let near = |a: [f64; 2], b: [f64; 2]| (a[0] - b[0]).hypot(a[1] - b[1]) < 1e-6;
+            let truth = self.truth.corners.iter().find(|truth| near(truth.board_mm, corner.board_mm))?;
+            Some([corner.pixel.u - truth.pixel.u, corner.pixel.v - truth.pixel.v])
+        };
+        found.corners.iter().filter_map(of).flatten().collect()
+    }
+}
+
+/// Boards that both cameras see whole.
+fn shared_shots(pair: &Pair, dice: &mut Dice) -> Vec<[Shot; 2]> {
+    let forward = pair.left_from_right.rotation().powf(0.5) * Vector3::z();
+    let middle = pair.left_from_right.origin().mm() * 0.5;
+    let mut shots = Vec::new();
+    while shots.len() < SHARED_VIEWS + 4 {
+        let direction = UnitQuaternion::from_scaled_axis(dice.cube(0.6)) * forward;
+        let centre = middle + direction * dice.between(320.0, 650.0);
+        let board = facing_board(dice, centre, 40.0);
+        let left = Shot::new(&pair.left, board, dice);
+        let right = Shot::new(&pair.right, pair.left_from_right.inverse().isometry() * board, dice);
+        if left.is_whole() && right.is_whole() {
+            shots.push([left, right]);
+        }
+    }
+    shots
+}
+
+fn shared_views(pair: &Pair, dice: &mut Dice, errors: &mut Vec<f64>) -> Vec<StereoView> {
+    let shots = shared_shots(pair, dice);
+    let seen: Vec<_> = shots.par_iter().map(|[left, right]| Some([left.detected()?, right.detected()?])).collect();
+    let mut views = Vec::new();
+    for ([left_shot, right_shot], seen) in shots.iter().zip(seen) {
+        let Some([left, right]) = seen.filter(|_| views.len() < SHARED_VIEWS) else { continue };
+        errors.extend(left_shot.errors(&left));
+        errors.extend(right_shot.errors(&right));
+        views.push(StereoView { name: format!("view {}", views.len() + 1), left, right });
+    }
+    views
+}
+
+/// Boards all over the field, as for the lens's own calibration.
+fn own_renders(camera: &KannalaBrandt, dice: &mut Dice) -> Vec<BoardView> {
+    let mut shots: Vec<Shot> = Vec::new();
+    while shots.len() < OWN_VIEWS {
+        let (theta, phi) = (dice.between(0.0, 92.0).to_radians(), dice.between(0.0, std::f64::consts::TAU));
+        let direction = Vector3::new(theta.sin() * phi.cos(), theta.sin() * phi.sin(), theta.cos());
+        let range = dice.between(180.0, 400.0);
+        let board = facing_board(dice, direction * range, 45.0);
+        let shot = Shot::new(camera, board, dice);
+        if shot.truth.corners.len() >= 20 {
+            shots.push(shot);
+        }
+    }
+    shots.par_iter().filter_map(Shot::detected).collect()
+}
+
+/// Mean NEES of χ² variables with 6 degrees of freedom: the band that holds 99 % of all cases.
+fn nees_band(seeds: u64) -> std::ops::Range<f64> {
+    let half = 2.576 * (12.0 / seeds as f64).sqrt();
+    6.0 - half..6.0 + half * (1.0 + 1.0 / (seeds as f64).sqrt())
+}
+
+#[test]
+fn herbivore_pose_from_photographs_alone() {
+    let seeds = seeds(1);
+    let (mut apart_of_seeds, mut nees, mut errors) = (Vec::new(), 0.0, Vec::new());
+    for seed in 0..seeds {
+        let mut dice = Dice::new(9000 + seed);
+        let pair = Pair { left: lens(), right: other_lens(), left_from_right: pair_pose(120.0), noise_px: 0.0 };
+        let size = ImageSize { width: 2048, height: 2048 };
+        let [left, right] = [&pair.left, &pair.right].map(|camera| {
+            calibrate_intrinsics(&own_renders(camera, &mut dice), size, &IntrinsicsOptions::default()).unwrap()
+        });
+        let views = shared_views(&pair, &mut dice, &mut errors);
+        let lenses = LensKnowledge::within(left.covariance, right.covariance);
+        let options = ExtrinsicsOptions { lenses, robust: true };
+        let found = calibrate_extrinsics(&left.camera, &right.camera, &views, &options).unwrap();
+        let off = error(&found.joint.left_from_right, &pair.left_from_right);
+        let square = (off.transpose() * found.covariance.try_inverse().unwrap() * off)[(0, 0)];
+        let (turn, shift) = apart(&found.joint.left_from_right, &pair.left_from_right);
+        println!(
+            "seed {seed}: {} views, own {:.3} and {:.3} px, joint {:.3} px: {turn:.4}° {shift:.4} mm, NEES {square:.2}",
+            views.len(),
+            left.rms_inlier_px,
+            right.rms_inlier_px,
+            found.rms_inlier_px
+        );
+        apart_of_seeds.push((turn, shift));
+        nees += square / seeds as f64;
+    }
+    let corner = (errors.iter().map(|e| e * e).sum::<f64>() / errors.len() as f64).sqrt();
+    let turn = median(apart_of_seeds.iter().map(|e| e.0).collect());
+    let shift = median(apart_of_seeds.iter().map(|e| e.1).collect());
+    println!("{seeds} seeds: median {turn:.4}° {shift:.4} mm, NEES {nees:.2}, corners off by {corner:.3} px per axis");
+    assert!(turn <= 0.02 && shift <= 0.12);
+    assert!(nees < nees_band(seeds).end, "{nees}");
+}
+
+/// The part of the picture that is rendered is where it is said to be.
+#[test]
+fn renders_show_the_corners_where_the_lens_puts_them() {
+    let mut dice = Dice::new(1);
+    for centre in [Vector3::new(20.0, -30.0, 300.0), Vector3::new(-280.0, 60.0, 20.0)] {
+        let board = facing_board(&mut dice, centre, 30.0);
+        let shot = Shot::new(&lens(), board, &mut dice);
+        let errors = shot.errors(&shot.detected().unwrap());
+        assert!(errors.len() >= 60 && errors.iter().all(|error| error.abs() < 0.8), "{errors:?}");
+    }
+}

@@ -1,0 +1,146 @@
+//! Writing a rig file: what a calibration ends in.
+
+use std::collections::BTreeMap;
+
+use serde::Serialize;
+use vergence_protocol::AxisKind;
+use vergence_vision::{Angle, Frame, Length};
+
+use crate::axis::{AxisPosition, RigAxis};
+use crate::camera_file::{CameraTable, Provenance};
+use crate::chain::{Chain, Link, Screw};
+use crate::rig::Rig;
+
+#[derive(Serialize)]
+struct File<'a> {
+    name: &'a str,
+    axis: Vec<Axis<'a>>,
+    modes: BTreeMap<&'a str, BTreeMap<&'a str, String>>,
+    calibration_sigma: Sigma,
+    left: Side<'a>,
+    right: Side<'a>,
+    provenance: &'a Provenance,
+}
+
+#[derive(Serialize)]
+struct Axis<'a> {
+    name: &'a str,
+    kind: &'static str,
+    range: [String; 2],
+    #[serde(skip_serializing_if = "Option::is_none")]
+    counts_per_metre: Option<u32>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    counts_per_revolution: Option<u32>,
+}
+
+#[derive(Serialize)]
+struct Sigma {
+    rotation: String,
+    translation: String,
+}
+
+#[derive(Serialize)]
+struct Side<'a> {
+    camera: CameraTable,
+    at_zero: Pose,
+    screw: Vec<ScrewTable<'a>>,
+}
+
+#[derive(Serialize)]
+struct Pose {
+    origin: [String; 3],
+    rotation_vector: [String; 3],
+}
+
+#[derive(Serialize)]
+struct ScrewTable<'a> {
+    axis: &'a str,
+    share: f64,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    slide_along: Option<[f64; 3]>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    turn_about: Option<[f64; 3]>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    through: Option<[String; 3]>,
+}
+
+impl Rig {
+    /// The rig file that [`Rig::from_toml`] reads as this rig, with where it comes from.
+    ///
+    /// # Errors
+    /// Where TOML cannot say it, in words.
+    pub fn to_toml(&self, provenance: &Provenance) -> Result<String, String> {
+        let name = |axis: &usize| self.axes.get(*axis).map_or("", |axis| axis.name.as_str());
+        let positions = |targets: &[AxisPosition]| -> BTreeMap<&str, String> {
+            self.axes.iter().zip(targets).map(|(axis, &target)| (axis.name.as_str(), position(target))).collect()
+        };
+        let file = File {
+            name: &self.name,
+            axis: self.axes.iter().map(axis).collect(),
+            modes: self.modes.iter().map(|mode| (mode.name.as_str(), positions(&mode.targets))).collect(),
+            calibration_sigma: Sigma {
+                rotation: angle(self.calibration_sigma.0),
+                translation: length(self.calibration_sigma.1),
+            },
+            left: side(CameraTable::of(&self.left_camera), &self.left_chain, &name),
+            right: side(CameraTable::of(&self.right_camera), &self.right_chain, &name),
+            provenance,
+        };
+        toml::to_string(&file).map_err(|error| error.to_string())
+    }
+}
+
+fn axis(axis: &RigAxis) -> Axis<'_> {
+    let scale_of = |kind: AxisKind| (axis.kind == kind).then_some(axis.counts_per_unit);
+    Axis {
+        name: &axis.name,
+        kind: if axis.kind == AxisKind::Linear { "linear" } else { "rotary" },
+        range: axis.range.map(position),
+        counts_per_metre: scale_of(AxisKind::Linear),
+        counts_per_revolution: scale_of(AxisKind::Rotary),
+    }
+}
+
+fn side<'a, C: Frame>(camera: CameraTable, chain: &Chain<C>, name: &impl Fn(&usize) -> &'a str) -> Side<'a> {
+    let at_zero = chain.at_zero();
+    let (origin, turn): ([f64; 3], [f64; 3]) = (at_zero.origin().mm().into(), at_zero.rotation().scaled_axis().into());
+    let screw = |Link { axis, share, screw }: &Link| {
+        let (slide_along, turn_about, through) = match screw {
+            Screw::Slide { along } => (Some(along.into_inner().into()), None, None),
+            Screw::Turn { about, through } => {
+                let point: [f64; 3] = through.mm().into();
+                (None, Some(about.into_inner().into()), Some(point.map(|mm| length(Length::from_mm(mm)))))
+            }
+        };
+        ScrewTable { axis: name(axis), share: *share, slide_along, turn_about, through }
+    };
+    Side {
+        camera,
+        at_zero: Pose {
+            origin: origin.map(|mm| length(Length::from_mm(mm))),
+            rotation_vector: turn.map(|rad| format!("{rad:?}rad")),
+        },
+        screw: chain.links().iter().map(screw).collect(),
+    }
+}
+
+fn position(position: AxisPosition) -> String {
+    match position {
+        AxisPosition::Linear(value) => length(value),
+        AxisPosition::Rotary(value) => angle(value),
+    }
+}
+
+fn length(length: Length) -> String {
+    format!("{:?}mm", length.mm())
+}
+
+/// In degrees, as people write them, where that is the same angle to the last bit; otherwise in radians.
+fn angle(angle: Angle) -> String {
+    let degrees = (angle.deg() * 1e9).round() / 1e9;
+    if Angle::from_deg(degrees).rad().to_bits() == angle.rad().to_bits() {
+        format!("{degrees:?}deg")
+    } else {
+        format!("{:?}rad", angle.rad())
+    }
+}

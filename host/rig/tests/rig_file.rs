@@ -1,0 +1,77 @@
+//! Rig files that this program writes.
+#![allow(clippy::expect_used, clippy::unwrap_used, reason = "a test fails loudly")]
+
+use nalgebra::{Isometry3, Unit, UnitQuaternion, Vector3};
+use proptest::prelude::*;
+use vergence_rig::{AxisPosition, BENCH_TOML, Chain, Link, Provenance, Rig, Screw};
+use vergence_vision::{Angle, Length, Point, Transform};
+
+fn provenance() -> Provenance {
+    Provenance { program: "vergence 0.1.0".into(), inputs_sha256: "00".repeat(32), date: Some("2026-11-21".into()) }
+}
+
+fn read_back(rig: &Rig) -> Rig {
+    Rig::from_toml(&rig.to_toml(&provenance()).expect("TOML")).expect("a rig")
+}
+
+#[test]
+fn the_bench_comes_back_as_it_was() {
+    let bench = Rig::from_toml(BENCH_TOML).expect("the bench");
+    let read = read_back(&bench);
+    assert_eq!(read.axes, bench.axes);
+    assert_eq!(read.modes, bench.modes);
+    assert_eq!(read.calibration_sigma, bench.calibration_sigma);
+    assert!((read.left_camera.theta_max().rad() - bench.left_camera.theta_max().rad()).abs() < 1e-15);
+    // People read it too.
+    let text = bench.to_toml(&provenance()).expect("TOML");
+    assert!(text.contains("separation = \"120.0deg\"") && text.contains("date = \"2026-11-21\""), "{text}");
+}
+
+fn vector(bound: f64) -> impl Strategy<Value = Vector3<f64>> {
+    prop::array::uniform3(-bound..bound).prop_map(Vector3::from)
+}
+
+proptest! {
+    /// Whatever the calibration found, the file says it.
+    #[test]
+    fn any_mechanism_comes_back(
+        about in vector(1.0), along in vector(1.0), through in vector(300.0), shift in vector(300.0),
+        turn in vector(1.7), share in -2.0..2.0_f64, baseline in 60.0..220.0_f64, separation in 0.0..2.2_f64,
+    ) {
+        prop_assume!(about.norm() > 0.1 && along.norm() > 0.1);
+        let mut rig = Rig::from_toml(BENCH_TOML).unwrap();
+        let screws = [
+            (0, Screw::Slide { along: Unit::new_normalize(along) }),
+            (1, Screw::Turn { about: Unit::new_normalize(about), through: Point::from_mm(through) }),
+        ];
+        let links = screws.map(|(axis, screw)| Link { axis, share, screw }).to_vec();
+        let at_zero = Isometry3::from_parts(shift.into(), UnitQuaternion::from_scaled_axis(turn));
+        rig.right_chain = Chain::new(links, Transform::from_isometry(at_zero));
+        rig.calibration_sigma = (Angle::from_rad(separation * 1e-4), Length::from_mm(share.abs()));
+        rig.modes[0].targets = vec![
+            AxisPosition::Linear(Length::from_mm(baseline)),
+            AxisPosition::Rotary(Angle::from_rad(separation)),
+        ];
+        let read = read_back(&rig);
+        prop_assert_eq!(&read.modes, &rig.modes);
+        prop_assert!((read.calibration_sigma.0.rad() - rig.calibration_sigma.0.rad()).abs() < 1e-15);
+        let values = [baseline, separation];
+        let [before, after] = [&rig, &read].map(|rig| rig.pose_at_values(&values).left_from_right);
+        prop_assert!((before.origin().mm() - after.origin().mm()).norm() < 1e-9);
+        prop_assert!(before.rotation().angle_to(&after.rotation()) < 1e-9);
+    }
+}
+
+#[test]
+fn a_fixed_pair_is_a_rig_without_axes() {
+    let bench = Rig::from_toml(BENCH_TOML).expect("the bench");
+    let rotation = UnitQuaternion::from_scaled_axis(Vector3::new(0.01, 2.0, -0.005));
+    let left_from_right: Transform<vergence_vision::Left, vergence_vision::Right> =
+        Transform::new(rotation, Vector3::new(140.0, 3.0, -12.0));
+    let sigma = (Angle::from_deg(0.05), Length::from_mm(0.2));
+    let pair = Rig::fixed_pair("pair", (bench.left_camera, bench.right_camera), left_from_right, sigma);
+    let pose = read_back(&pair).pose_at_values(&[]);
+    assert!((pose.left_from_right.origin().mm() - Vector3::new(140.0, 3.0, -12.0)).norm() < 1e-12);
+    assert!(pose.left_from_right.rotation().angle_to(&rotation) < 1e-12);
+    assert!((pose.rotation_sigma.deg() - 0.05).abs() < 1e-12);
+}

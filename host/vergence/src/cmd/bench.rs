@@ -1,0 +1,30 @@
+//! `vergence bench`: how fast we are, beside others on the same work.
+
+mod calibrate;
+mod peer;
+mod sets;
+
+use crate::console::Console;
+use crate::failure::Failure;
+
+/// Measures this program and others on the same work, in one run.
+#[derive(Debug, clap::Args)]
+pub struct Args {
+    #[command(subcommand)]
+    task: Task,
+}
+
+#[derive(Debug, clap::Subcommand)]
+enum Task {
+    /// Calibration and detection of boards, beside OpenCV and SciPy.
+    ///
+    /// Solves every fisheye set and detects every chessboard, then lets OpenCV (cv2.fisheye.calibrate with its crude
+    /// guess, the SB detector) and SciPy's bundle adjustment do the same. Everything runs on one thread.
+    Calibrate(calibrate::Args),
+}
+
+pub fn run(args: &Args, console: Console) -> Result<(), Failure> {
+    match &args.task {
+        Task::Calibrate(args) => calibrate::run(args, console),
+    }
+}

@@ -1,0 +1,138 @@
+//! `vergence calibrate stage`: cameras that move.
+
+mod live;
+mod plan;
+mod recorded;
+mod tell;
+mod truth;
+
+use std::path::PathBuf;
+
+use vergence_calibration::{
+    StageError, StageOptions, StagePose, calibrate_stage, stage_report, stage_verdict, validate_stage,
+};
+use vergence_rig::Rig;
+
+use super::options::{KnownLenses, LensOptions, ResultOptions, check_fit, verdict_json};
+use super::views::about;
+use crate::cli::Globals;
+use crate::cmd::board_options::BoardOptions;
+use crate::console::Console;
+use crate::failure::Failure;
+use crate::provenance::InputHash;
+use crate::rig_file;
+use crate::stopwatch::Stopwatch;
+
+/// Calibrates how the axes carry the cameras; --rig names the drawing.
+#[derive(Debug, clap::Args)]
+#[group(id = "source", required = true, multiple = false, args = ["set", "corners"])]
+pub struct Args {
+    #[command(flatten)]
+    lenses: LensOptions,
+    #[command(flatten)]
+    board: BoardOptions,
+    /// The folder with poses.csv and the images; with --live it is made.
+    ///
+    /// It has one folder of images for each stage pose, left000.png, right000.png and so on, as `vergence capture --out
+    /// DIR/pose01` takes them. The columns of poses.csv are `folder` and the encoder reading of every axis of the rig,
+    /// called after it: baseline_mm, separation_deg.
+    #[arg(long, value_name = "DIR")]
+    set: Option<PathBuf>,
+    /// Corners and encoder readings instead of images.
+    ///
+    /// The columns are camera,file,frame,idx,x,y,bx_mm,by_mm and, in every row, the encoder reading of every axis of the
+    /// rig, called after it: baseline_mm, separation_deg. Frames are numbered through the whole file and pair the views;
+    /// frames with the same readings make a stage pose.
+    #[arg(long, value_name = "CSV")]
+    corners: Option<PathBuf>,
+    /// The left and the right camera: as the CSV file calls them (left right), or with --live their devices, or sim.
+    #[arg(long, num_args = 1..=2, value_name = "CAMERA")]
+    cameras: Vec<String>,
+    #[command(flatten)]
+    live: live::Options,
+    /// Least squares over all corners, without looking for gross errors.
+    #[arg(long)]
+    no_loss: bool,
+    /// Check by leaving out one stage pose after the other; at least four are needed.
+    #[arg(long)]
+    holdout: bool,
+    #[command(flatten)]
+    result: ResultOptions,
+}
+
+pub async fn run(args: &Args, globals: &Globals, console: Console) -> Result<(), Failure> {
+    args.result.check()?;
+    let drawn = rig_file::load(globals.rig.as_deref())?;
+    if drawn.axes.is_empty() {
+        return Err(Failure::usage(format!(
+            "rig '{}' has no axes: 'vergence calibrate extrinsics' is for pairs whose pose is fixed",
+            drawn.name
+        )));
+    }
+    let mut hash = InputHash::default();
+    if let Some(path) = &globals.rig {
+        hash.add(path)?;
+    }
+    let (drawn, knowledge) = match args.lenses.read(&mut hash)? {
+        Some(KnownLenses { left, right, knowledge }) => {
+            (Rig { left_camera: left, right_camera: right, ..drawn }, knowledge)
+        }
+        None => (drawn, args.lenses.without_files()?),
+    };
+    let built = live(args, globals, console).await?;
+    let poses = poses(args, &drawn, &mut hash, console)?;
+    let options = StageOptions { lenses: knowledge, robust: !args.no_loss, ..StageOptions::default() };
+    let solving = Stopwatch::start();
+    let stage = calibrate_stage(&drawn, &poses, &options).map_err(|error| no_calibration(&error))?;
+    let seconds = solving.seconds();
+    check_fit(stage.rms_inlier_px, stage.corners_inlier, stage.corners_total)?;
+    if !stage.observability.never_moved.is_empty() {
+        return Err(Failure::check(format!("{}", stage.observability)));
+    }
+    let held_out = match args.holdout {
+        true => validate_stage(&drawn, &poses, &options)
+            .map_err(|error| Failure::check(format!("without one stage pose there is no calibration: {error}")))?,
+        false => Vec::new(),
+    };
+    let rig = Rig { name: args.result.name(&drawn.name), ..stage.rig(&drawn) };
+    let verdict = stage_verdict(&stage, &rig);
+    let provenance = args.result.provenance(hash);
+    args.result.write(&rig.to_toml(&provenance).map_err(Failure::check)?, || {
+        stage_report(&stage, &rig, &held_out, &about(rig.name.clone(), &args.board, &provenance, None))
+    })?;
+    tell::tell(&stage, &held_out, console)?;
+    console.say(&verdict.sentence)?;
+    let mut result = tell::in_json(&rig, &stage, &held_out);
+    result["seconds"] = seconds.into();
+    result["verdict"] = verdict_json(&verdict);
+    if let Some(built) = built {
+        result["truth"] = truth::compare(&stage, &built, args.live.seed, console)?;
+    }
+    console.result(&result)
+}
+
+/// Fills the set, where that is asked for; the rig as it was really built, where it is simulated.
+async fn live(args: &Args, globals: &Globals, console: Console) -> Result<Option<Rig>, Failure> {
+    match (&args.set, args.live.live) {
+        (Some(set), true) => live::fill(set, &args.live, &args.cameras, args.board.spec()?, globals, console).await,
+        (None, true) => Err(Failure::usage("say where the images go: --live --set DIR")),
+        (_, false) => Ok(None),
+    }
+}
+
+fn poses(args: &Args, rig: &Rig, hash: &mut InputHash, console: Console) -> Result<Vec<StagePose>, Failure> {
+    match (&args.set, &args.corners) {
+        (Some(set), _) => recorded::from_set(set, rig, &args.board, hash, console),
+        (_, Some(csv)) => recorded::from_corners(csv, rig, &args.cameras, hash),
+        _ => Err(Failure::usage("name the views: --set DIR or --corners CSV")),
+    }
+}
+
+/// Views that contradict the drawing are valid data whose result fails; everything else is wrong input.
+fn no_calibration(error: &StageError) -> Failure {
+    let message = format!("no calibration: {error}");
+    match error {
+        StageError::Diverged | StageError::Joint(_) | StageError::Unobservable(_) => Failure::check(message),
+        _ => Failure::usage(message),
+    }
+}

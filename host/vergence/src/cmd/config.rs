@@ -1,0 +1,158 @@
+//! `vergence config`: the board's settings.
+
+mod file;
+
+use std::path::PathBuf;
+
+use serde_json::{Map, Value, json};
+use vergence_protocol::{Refusal, Request};
+
+use super::connect::connect_any;
+use crate::board::Board;
+use crate::cli::Globals;
+use crate::console::Console;
+use crate::failure::Failure;
+use crate::output::write_whole;
+use crate::setting_text::{NamedSetting, settings};
+
+/// Reads and changes what the board knows of its axes and its link. The board checks every value beside all others, and
+/// changes nothing while it is armed.
+#[derive(Debug, clap::Args)]
+pub struct Args {
+    #[command(subcommand)]
+    what: What,
+}
+
+#[derive(Debug, clap::Subcommand)]
+enum What {
+    /// Show one setting, or all.
+    Get {
+        /// Such as baseline.speed, or baseline for all of that axis.
+        key: Option<String>,
+        /// Write all to a file that `set --file` reads.
+        #[arg(long, value_name = "FILE", conflicts_with = "key")]
+        out: Option<PathBuf>,
+    },
+    /// Change a setting, or all that a file names. It works at once, and until the next start unless saved.
+    Set {
+        /// Such as baseline.speed.
+        #[arg(required_unless_present = "file", conflicts_with = "file", requires = "value")]
+        key: Option<String>,
+        /// With its unit, such as 40mm/s.
+        #[arg(allow_hyphen_values = true)]
+        value: Option<String>,
+        /// A file that `get --out` wrote.
+        #[arg(long, value_name = "FILE")]
+        file: Option<PathBuf>,
+    },
+    /// Keep the present settings through the next start.
+    Save,
+    /// Go back to the settings that the firmware came with, until the next start unless saved.
+    Restore,
+}
+
+/// What is forgotten at the next start is said where it is changed.
+const UNSAVED: &str = "'vergence config save' keeps it through the next start";
+
+pub async fn run(args: &Args, globals: &Globals, console: Console) -> Result<(), Failure> {
+    // Settings must stay reachable when they contradict the rig file: they may be what has to be mended.
+    let mut board = connect_any(globals, console, "settings").await?;
+    match &args.what {
+        What::Get { key: Some(key), .. } if board.rig().axis_index(key).is_none() => {
+            get_one(&board, key, console).await
+        }
+        What::Get { key: axis, out } => get_all(&board, axis.as_deref(), out.as_ref(), console).await,
+        What::Set { file: Some(path), .. } => {
+            let changed = file::apply(&mut board, path).await?;
+            let list = changed.iter().map(|change| format!("\n  {change}")).collect::<String>();
+            console.say(format!("{} settings changed{list}", changed.len()))?;
+            say_unsaved(console, !changed.is_empty())?;
+            console.result(&json!({ "changed": changed }))
+        }
+        What::Set { key, value, .. } => {
+            let (key, value) = (key.as_deref().unwrap_or_default(), value.as_deref().unwrap_or_default());
+            set_one(&board, key, value, console).await
+        }
+        What::Save => {
+            board.ask(Request::SaveSettings).await?;
+            console.say("the settings are saved")?;
+            console.result(&json!({ "saved": true }))
+        }
+        What::Restore => {
+            board.ask(Request::RestoreSettings).await?;
+            console.say("the settings are those that the firmware came with")?;
+            say_unsaved(console, true)?;
+            console.result(&json!({ "restored": true }))
+        }
+    }
+}
+
+fn say_unsaved(console: Console, changed: bool) -> Result<(), Failure> {
+    if changed { console.say(UNSAVED) } else { Ok(()) }
+}
+
+/// The setting called `name`.
+fn find(board: &Board, name: &str) -> Result<NamedSetting, Failure> {
+    let all = settings(board.rig());
+    let near: Vec<_> = all.iter().filter(|setting| setting.item == name).map(NamedSetting::name).collect();
+    let hint = if near.is_empty() { "'vergence config get' lists all".into() } else { near.join(", ") };
+    let found = all.into_iter().find(|setting| setting.name() == name);
+    found.ok_or_else(|| Failure::usage(format!("there is no setting '{name}': {hint}")))
+}
+
+async fn get_one(board: &Board, name: &str, console: Console) -> Result<(), Failure> {
+    let setting = find(board, name)?;
+    let Some(value) = board.setting(setting.key).await? else {
+        return Err(Failure::device(format!("this board has no setting '{name}'")));
+    };
+    console.say(setting.write(value))?;
+    console.result(&json!({ name: json_value(&setting, value) }))
+}
+
+/// All settings, or those of one axis.
+async fn get_all(board: &Board, axis: Option<&str>, out: Option<&PathBuf>, console: Console) -> Result<(), Failure> {
+    let mut present = read_all(board).await?;
+    present.retain(|(setting, _)| axis.is_none() || setting.axis.as_deref() == axis);
+    if let Some(path) = out {
+        write_whole(path, file::text(board, &present).as_bytes())?;
+        console.say(format!("{} settings written to {}", present.len(), path.display()))?;
+    } else {
+        let width = present.iter().map(|(setting, _)| setting.name().len()).max().unwrap_or(0);
+        for (setting, value) in &present {
+            console.say(format!("{:width$}  {}", setting.name(), setting.write(*value)))?;
+        }
+    }
+    let entries = present.iter().map(|(setting, value)| (setting.name(), json_value(setting, *value)));
+    console.result(&Value::Object(entries.collect::<Map<_, _>>()))
+}
+
+async fn set_one(board: &Board, name: &str, text: &str, console: Console) -> Result<(), Failure> {
+    let setting = find(board, name)?;
+    let value = setting.read(text).map_err(Failure::usage)?;
+    let before = board.setting(setting.key).await?;
+    board.set(setting.key, value).await?.map_err(|refusal| match refusal {
+        Refusal::BadSetting => {
+            Failure::usage(format!("{name} cannot be {text} beside the other settings of the board"))
+        }
+        _ => board.refused(refusal),
+    })?;
+    let (now, before) = (setting.write(value), before.map(|before| setting.write(before)));
+    console.say(format!("{name} is {now}, it was {}", before.as_deref().unwrap_or("unknown")))?;
+    say_unsaved(console, before.as_ref() != Some(&now))?;
+    console.result(&json!({ "setting": name, "value": now, "before": before }))
+}
+
+/// Every setting that the board has, and its value.
+async fn read_all(board: &Board) -> Result<Vec<(NamedSetting, i64)>, Failure> {
+    let mut present = Vec::new();
+    for setting in settings(board.rig()) {
+        if let Some(value) = board.setting(setting.key).await? {
+            present.push((setting, value));
+        }
+    }
+    Ok(present)
+}
+
+fn json_value(setting: &NamedSetting, value: i64) -> Value {
+    serde_json::to_value(setting.toml(value)).unwrap_or(Value::Null)
+}

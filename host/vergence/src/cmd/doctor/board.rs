@@ -1,0 +1,183 @@
+//! What the board says of itself, and how well it can be heard.
+
+use std::time::Duration;
+
+use vergence_protocol::{Compatibility, ControllerState, ResetCause, SettingItem, SettingKey};
+use vergence_rig::AxisPosition;
+
+use super::Finding;
+use crate::board::{Board, describe_fault};
+use crate::cli::Globals;
+use crate::cmd::connect::{connect, is_wire};
+use crate::cmd::link_figures::LinkFigures;
+use crate::cmd::move_to::is_referenced;
+use crate::cmd::report::describe_clock;
+use crate::console::Console;
+use crate::failure::{Failure, FailureKind};
+
+/// Long enough for the clocks to be compared ten times.
+const LISTEN: Duration = Duration::from_secs(2);
+/// A board whose clock is known worse than this pairs images with wrong poses: at 60°/s it is 0.06°.
+const CLOCK_ERROR_US: f64 = 1_000.0;
+/// No quartz is worse.
+const DRIFT_PPM: f64 = 200.0;
+
+pub async fn examine(globals: &Globals, console: Console) -> Vec<Finding> {
+    let mut board = match connect(globals, console, "examining the board").await {
+        Ok(board) => board,
+        Err(failure) => return vec![unreachable(&failure)],
+    };
+    let mut findings = vec![versions(&board), reset(&board)];
+    match LinkFigures::measure(&mut board, LISTEN).await {
+        Ok(figures) => findings.push(link(&figures, globals.lease)),
+        Err(failure) => findings.push(unreachable(&failure)),
+    }
+    findings.extend([clock(&board), state(&board), reference(&board)]);
+    findings.extend(limits(&board));
+    findings.push(settings(&board, globals).await);
+    findings
+}
+
+fn unreachable(failure: &Failure) -> Finding {
+    match failure.kind() {
+        FailureKind::Protocol => {
+            Finding::fail("versions", failure.to_string(), "use the vergence and the firmware of one release")
+        }
+        FailureKind::Usage => Finding::fail("rig", failure.to_string(), "the rig file must describe this board"),
+        _ => Finding::fail("link", failure.to_string(), "check cable, power, --baud and who else uses the port"),
+    }
+}
+
+fn versions(board: &Board) -> Finding {
+    let info = board.info();
+    let firmware = info.firmware.map(|part| part.to_string()).join(".");
+    let ours = env!("CARGO_PKG_VERSION");
+    let both = format!("{} has firmware {firmware}, this is vergence {ours}", info.board);
+    match board.client().compatibility() {
+        Compatibility::Full if firmware == ours => Finding::pass("versions", both),
+        Compatibility::Full => {
+            Finding::warn("versions", format!("{both}; they understand each other"), "update the older of the two")
+        }
+        _ => Finding::fail(
+            "versions",
+            format!("{both}, and their messages differ: the board can be read but not moved"),
+            "use the vergence and the firmware of one release",
+        ),
+    }
+}
+
+fn reset(board: &Board) -> Finding {
+    match board.info().reset {
+        ResetCause::Watchdog => Finding::warn(
+            "start",
+            "the watchdog restarted the board: its firmware hung",
+            "see 'vergence status --why', and report it with what you were doing",
+        ),
+        cause => Finding::pass("start", format!("the board was last started by {}", describe_reset(cause))),
+    }
+}
+
+/// Why the board started, in words.
+fn describe_reset(cause: ResetCause) -> &'static str {
+    match cause {
+        ResetCause::PowerOn => "switching it on",
+        ResetCause::Pin => "its reset button or pin",
+        ResetCause::Software => "its own firmware, on request",
+        ResetCause::Watchdog => "its watchdog",
+        _ => "a cause this program does not know",
+    }
+}
+
+fn link(figures: &LinkFigures, lease_ms: u16) -> Finding {
+    let milliseconds = |share| figures.percentile(share).unwrap_or(f64::INFINITY);
+    let (median, slow) = (milliseconds(0.5), milliseconds(0.99));
+    let dropped = figures.host.link.dropped() + figures.board.map_or(0, |board| board.link.dropped());
+    let summary = format!("answers take {median:.2} ms, 99 % of them {slow:.2} ms at most");
+    let remedy = "shorten the cable, try a slower --baud, and see 'vergence link-test'";
+    if figures.unanswered > 0 || figures.host.poses_lost > 0 {
+        let lost = format!("{} requests and {} poses were lost", figures.unanswered, figures.host.poses_lost);
+        return Finding::fail("link", lost, remedy);
+    }
+    if dropped > 0 {
+        return Finding::warn("link", format!("{summary}; {dropped} frames arrived damaged"), remedy);
+    }
+    // Five heartbeats to a lease.
+    if slow > f64::from(lease_ms) / 5.0 {
+        let reason = format!("{summary}: slow for a lease of {lease_ms} ms");
+        return Finding::warn(
+            "link",
+            reason,
+            "set the latency timer of the USB bridge to 1 ms, or use a longer --lease",
+        );
+    }
+    Finding::pass("link", format!("{summary}; nothing was lost"))
+}
+
+fn clock(board: &Board) -> Finding {
+    let map = board.client().clock_map();
+    let (reason, now) = (describe_clock(board), map.board_at(board.client().clock().now()));
+    match (now, map.drift()) {
+        _ if map.is_lost() => Finding::fail("clock", reason, "check the link: poses cannot be paired with images"),
+        (Some(now), Some(drift)) if now.error_us < CLOCK_ERROR_US && drift.ppm.abs() < DRIFT_PPM => {
+            Finding::pass("clock", reason)
+        }
+        _ => {
+            Finding::warn("clock", reason, "let it run for some seconds; set the latency timer of a USB bridge to 1 ms")
+        }
+    }
+}
+
+fn state(board: &Board) -> Finding {
+    let pose = board.pose();
+    match (pose.state, pose.fault) {
+        (_, Some(fault)) => Finding::fail("state", fault.code.to_string(), describe_fault(board.rig(), &fault)),
+        (ControllerState::Idle, None) => Finding::pass("state", "idle, without fault"),
+        (ControllerState::Updating | ControllerState::Trial, None) => {
+            Finding::warn("state", pose.state.to_string(), "finish the update: nothing moves until then")
+        }
+        (state, None) => Finding::pass("state", format!("{state}: another program uses the board")),
+    }
+}
+
+fn reference(board: &Board) -> Finding {
+    if is_referenced(board) {
+        return Finding::pass("reference", "all axes know where they are");
+    }
+    Finding::warn("reference", "axes do not know where they are", "vergence home")
+}
+
+/// The range of the rig file must be one that the board grants.
+fn limits(board: &Board) -> Vec<Finding> {
+    let axes = board.rig().axes.iter().zip(board.axes());
+    axes.map(|(axis, info)| {
+        let [low, high] = axis.range;
+        let [min, max] = [info.min, info.max].map(|end| AxisPosition::from_micro(axis.kind, end));
+        let name = &axis.name;
+        if low.micro() < info.min || high.micro() > info.max {
+            return Finding::fail(
+                "limits",
+                format!("the rig file lets {name} go from {low} to {high}, the board from {min} to {max}"),
+                format!("narrow the range in the rig file, or 'vergence config set {name}.min' and '{name}.max'"),
+            );
+        }
+        Finding::pass("limits", format!("{name} goes from {low} to {high}, which the board grants"))
+    })
+    .collect()
+}
+
+/// Settings must be readable, and the line speed the one in use: a changed one works from the next start on.
+async fn settings(board: &Board, globals: &Globals) -> Finding {
+    let read = async |item| board.setting(SettingKey { item, axis: 0 }).await;
+    match (read(SettingItem::Baud).await, read(SettingItem::StreamPeriod).await) {
+        (Ok(Some(baud)), Ok(Some(_))) if is_wire(globals) && baud != i64::from(globals.baud) => Finding::warn(
+            "settings",
+            format!("the board will speak {baud} baud from its next start on, and this is {}", globals.baud),
+            format!("use --baud {baud} from then on, or 'vergence config set baud {}'", globals.baud),
+        ),
+        (Ok(Some(baud)), Ok(Some(_))) => Finding::pass("settings", format!("can be read; {baud} baud")),
+        (Err(failure), _) | (_, Err(failure)) => {
+            Finding::fail("settings", failure.to_string(), "check the link, or 'vergence config restore'")
+        }
+        _ => Finding::warn("settings", "this firmware keeps no settings", "update the firmware"),
+    }
+}

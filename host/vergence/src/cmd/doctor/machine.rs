@@ -1,0 +1,103 @@
+//! What can be known without asking the board.
+
+use std::fs;
+use std::os::unix::fs::MetadataExt;
+use std::path::{Path, PathBuf};
+
+use rustix::fs::{Access, access};
+
+use super::Finding;
+use crate::cli::Globals;
+use crate::cmd::connect::port as chosen_port;
+use crate::link::Port;
+use crate::{rig_file, slots};
+
+/// The rig that verbs would use: the file named, the active calibration, or the built-in bench.
+pub fn rig(globals: &Globals) -> (Option<PathBuf>, Finding) {
+    const MEND: &str = "mend the file, which docs/rig-file.md describes, or 'vergence calibrate rollback'";
+    let (path, is_active) = match (&globals.rig, slots::active_rig()) {
+        (Some(path), _) => (Some(path.clone()), false),
+        (None, Ok(active)) => (active, true),
+        (None, Err(failure)) => return (None, Finding::fail("rig", failure.to_string(), MEND)),
+    };
+    let finding = match (rig_file::load(path.as_deref()), &path) {
+        (Err(failure), _) => Finding::fail("rig", failure.to_string(), MEND),
+        (Ok(rig), Some(path)) => {
+            let active = if is_active { "the active calibration, " } else { "" };
+            Finding::pass("rig", format!("'{}' from {active}{}", rig.name, path.display()))
+        }
+        (Ok(rig), None) => Finding::warn(
+            "rig",
+            format!("the built-in '{}', which is nobody's real rig; no calibration is active", rig.name),
+            "calibrate, or name your rig file with --rig or VERGENCE_RIG",
+        ),
+    };
+    (path, finding)
+}
+
+/// The port and whether this user may use it.
+pub fn port(globals: &Globals) -> Finding {
+    let port = match chosen_port(globals) {
+        Ok(port) => port,
+        Err(failure) => {
+            return Finding::fail("port", failure.to_string(), "see 'vergence devices' for the ports there are");
+        }
+    };
+    match &port {
+        Port::Serial(path) if !path.exists() => Finding::fail(
+            "port",
+            format!("there is no {port}"),
+            "connect and power the board, and see 'vergence devices' for the ports there are",
+        ),
+        Port::Serial(path) => match forbidden(path) {
+            Some(remedy) => Finding::fail("port", format!("you may not read and write {port}"), remedy),
+            None => Finding::pass("port", format!("{port} may be read and written")),
+        },
+        Port::Tcp(_) | Port::Simulated => Finding::pass("port", port.to_string()),
+    }
+}
+
+/// The cameras of the kernel.
+pub fn cameras() -> Vec<Finding> {
+    let cameras = video_devices();
+    if cameras.is_empty() {
+        let remedy = "connect the cameras; simulated ones need none";
+        return vec![Finding::warn("cameras", "there is no /dev/video device", remedy)];
+    }
+    let check = |path: &PathBuf| match forbidden(path) {
+        Some(remedy) => Finding::fail("cameras", format!("you may not use {}", path.display()), remedy),
+        None => Finding::pass("cameras", format!("{} may be used", path.display())),
+    };
+    cameras.iter().map(check).collect()
+}
+
+fn video_devices() -> Vec<PathBuf> {
+    let Ok(entries) = fs::read_dir("/dev") else { return Vec::new() };
+    let is_camera = |path: &PathBuf| {
+        let name = path.file_name().unwrap_or_default().to_string_lossy();
+        name.strip_prefix("video").is_some_and(|number| number.parse::<u32>().is_ok())
+    };
+    let mut cameras: Vec<_> = entries.flatten().map(|entry| entry.path()).filter(is_camera).collect();
+    cameras.sort();
+    cameras
+}
+
+/// What to do where this user may not read and write `device`; `None` where he may.
+fn forbidden(device: &Path) -> Option<String> {
+    access(device, Access::READ_OK | Access::WRITE_OK).err()?;
+    let group = fs::metadata(device).ok().and_then(|metadata| group_name(metadata.gid()));
+    Some(match group.as_deref() {
+        Some("root") | None => format!("ask for a udev rule that lets you use {}", device.display()),
+        Some(group) => format!("sudo usermod -aG {group} $USER, then log out and in again"),
+    })
+}
+
+/// The name of a group: `dialout` owns serial ports on Debian, `uucp` on Arch.
+fn group_name(id: u32) -> Option<String> {
+    let groups = fs::read_to_string("/etc/group").ok()?;
+    let mut fields = groups.lines().map(|line| line.split(':'));
+    fields.find_map(|mut line| {
+        let name = line.next()?;
+        (line.nth(1)?.parse() == Ok(id)).then(|| name.to_owned())
+    })
+}

@@ -1,0 +1,139 @@
+//! `vergence plan`: a move before it is made.
+
+use serde_json::{Value, json};
+use vergence_protocol::AxisKind;
+use vergence_rig::{AxisPosition, Rig, RigAxis};
+
+use super::connect::connect;
+use super::move_to::{StagePose, is_referenced, named_mode};
+use super::report::{axes_json, rounded};
+use super::zones::in_degrees;
+use crate::board::{Board, check_range};
+use crate::cli::Globals;
+use crate::console::Console;
+use crate::failure::Failure;
+use crate::move_plan::{AxisPlan, MovePlan};
+use crate::rig_file;
+use crate::rig_zones::{ZONE_RADIUS, rig_zones};
+
+/// Plans a move with the board's own planner and limits, and moves nothing. It begins where the stages stand, or at the
+/// low ends of their ranges, where homing leaves them. Without --port it plans for the stages of 'vergence sim'.
+#[derive(Debug, clap::Args)]
+pub struct Args {
+    /// The mode to go to, such as herbivore.
+    #[arg(required_unless_present_any = ["baseline", "separation"], conflicts_with_all = ["baseline", "separation"])]
+    mode: Option<String>,
+    #[command(flatten)]
+    stage: StagePose,
+    /// Begin at this mode.
+    #[arg(long, value_name = "MODE")]
+    from: Option<String>,
+    /// Show every segment: time, position, velocity, acceleration, jerk.
+    #[arg(long)]
+    dump: bool,
+}
+
+pub async fn run(args: &Args, globals: &Globals, console: Console) -> Result<(), Failure> {
+    let rig = rig_file::load(globals.rig.as_deref())?;
+    let globals = Globals { port: globals.port.clone().or_else(|| Some("sim".into())), ..globals.clone() };
+    let board = connect(&globals, console, "planning").await?;
+    let from = match &args.from {
+        Some(name) => named_mode(&rig, name)?.targets.clone(),
+        None => standing(&board),
+    };
+    let to = goal(args, &rig, &from)?;
+    check_range(&rig, &to)?;
+    let plan = MovePlan::new(&rig, &board.limits().await?, &from, &to);
+    let values: Vec<f64> = to.iter().map(|position| position.value()).collect();
+    let zones = rig_zones(&rig, &rig.pose_at_values(&values))?;
+    let wide = rig.axes.iter().map(|axis| axis.name.len()).max().unwrap_or(0);
+    for (axis, planned) in rig.axes.iter().zip(&plan.axes) {
+        let peak = AxisPosition::from_value(axis.kind, planned.peak_speed());
+        let way = match planned.knots.is_empty() {
+            true => format!("stays at {}", planned.to),
+            false => format!("{} -> {}, at most {peak}/s", planned.from, planned.to),
+        };
+        console.say(format!("{:wide$}  {way}", axis.name))?;
+    }
+    console.say(format!("takes {:.3} s within the limits of {}", plan.duration, board.info().board))?;
+    console.say(format!(
+        "then sees stereo {:.1}, mono {:.1}, blind {:.1} on a circle of {ZONE_RADIUS:.0}",
+        zones.stereo, zones.mono, zones.blind
+    ))?;
+    if args.dump {
+        for (axis, planned) in rig.axes.iter().zip(&plan.axes) {
+            console.say(dump(axis, planned))?;
+        }
+    }
+    console.result(&json!({
+        "duration_s": rounded(plan.duration),
+        "from": axes_json(&rig, &from),
+        "to": axes_json(&rig, &to),
+        "zones_deg": in_degrees(&zones),
+        "axes": rig.axes.iter().zip(&plan.axes).map(|(axis, planned)| axis_json(axis, planned)).collect::<Vec<_>>(),
+    }))
+}
+
+fn standing(board: &Board) -> Vec<AxisPosition> {
+    let rig = board.rig();
+    if is_referenced(board) {
+        return board.standing();
+    }
+    rig.axes.iter().map(|axis| axis.range[0]).collect()
+}
+
+fn goal(args: &Args, rig: &Rig, from: &[AxisPosition]) -> Result<Vec<AxisPosition>, Failure> {
+    if let Some(name) = &args.mode {
+        return Ok(named_mode(rig, name)?.targets.clone());
+    }
+    let named = args.stage.of_axes(rig)?;
+    Ok(named.iter().zip(from).map(|(named, &from)| named.unwrap_or(from)).collect())
+}
+
+/// Millimetres, or degrees in place of radians.
+fn unit(kind: AxisKind) -> (&'static str, f64) {
+    match kind {
+        AxisKind::Linear => ("mm", 1.0),
+        AxisKind::Rotary => ("deg", 1f64.to_degrees()),
+    }
+}
+
+/// A table that can be compared line by line.
+fn dump(axis: &RigAxis, planned: &AxisPlan) -> String {
+    let (unit, scale) = unit(axis.kind);
+    let mut text = format!("\n{}\n", axis.name);
+    let heads = ["time s".into(), unit.into(), format!("{unit}/s"), format!("{unit}/s2"), format!("{unit}/s3")];
+    text += &row(&heads);
+    for knot in &planned.knots {
+        let [position, velocity, acceleration, jerk] =
+            [knot.position, knot.velocity, knot.acceleration, knot.jerk].map(|value| scale * value);
+        let numbers = [(knot.time, 5), (position, 4), (velocity, 4), (acceleration, 3), (jerk, 1)];
+        text += &row(&numbers.map(|(number, digits)| plain(number, digits)));
+    }
+    text.trim_end().to_owned()
+}
+
+fn row(cells: &[String; 5]) -> String {
+    let [time, position, velocity, acceleration, jerk] = cells;
+    format!("  {time:>10} {position:>12} {velocity:>12} {acceleration:>12} {jerk:>12}\n")
+}
+
+/// A number with fixed digits; what rounds to zero has no sign.
+fn plain(number: f64, digits: usize) -> String {
+    let text = format!("{number:.digits$}");
+    if text.trim_start_matches(['-', '0', '.']).is_empty() { text.trim_start_matches('-').to_owned() } else { text }
+}
+
+fn axis_json(axis: &RigAxis, planned: &AxisPlan) -> Value {
+    let (unit, scale) = unit(axis.kind);
+    let segments = planned.knots.iter().map(|knot| {
+        json!({
+            "time_s": knot.time,
+            "position": rounded(scale * knot.position),
+            "velocity": rounded(scale * knot.velocity),
+            "acceleration": rounded(scale * knot.acceleration),
+            "jerk": rounded(scale * knot.jerk),
+        })
+    });
+    json!({ "axis": axis.name, "unit": unit, "segments": segments.collect::<Vec<_>>() })
+}

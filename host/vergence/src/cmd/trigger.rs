@@ -1,0 +1,101 @@
+//! `vergence trigger`: fires the cameras and shows where the axes were at each pulse.
+
+use std::time::Duration;
+
+use serde_json::json;
+use tokio::time::timeout;
+use vergence_protocol::{FrameMark, Request, Trigger};
+use vergence_rig::AxisPosition;
+
+use super::connect::connect;
+use super::report::{axes_json, rounded};
+use crate::board::Board;
+use crate::cli::Globals;
+use crate::console::Console;
+use crate::failure::Failure;
+
+/// Fires both cameras once or at a rate, until Ctrl-C. The board latches the encoders at the edge of each pulse and sends
+/// them with its time: this prints them. Needs no arming.
+#[derive(Debug, clap::Args)]
+#[command(group = clap::ArgGroup::new("when").required(true))]
+pub struct Args {
+    /// One pulse.
+    #[arg(long, group = "when")]
+    once: bool,
+    /// So many pulses each second, 0.1 to 500.
+    #[arg(long, group = "when", value_name = "HZ", value_parser = parse_rate)]
+    rate: Option<f64>,
+    /// Stop after this many pulses.
+    #[arg(long, requires = "rate")]
+    count: Option<u64>,
+    /// Stop after this time.
+    #[arg(long = "for", requires = "rate", value_name = "TIME", value_parser = humantime::parse_duration)]
+    duration: Option<Duration>,
+}
+
+fn parse_rate(text: &str) -> Result<f64, String> {
+    let rate = text.parse().ok().filter(|rate| (0.1..=500.0).contains(rate));
+    rate.ok_or_else(|| format!("'{text}' is no rate: choose 0.1 to 500 pulses each second"))
+}
+
+pub async fn run(args: &Args, globals: &Globals, console: Console) -> Result<(), Failure> {
+    let mut board = connect(globals, console, "trigger").await?;
+    board.compare_clocks().await?;
+    let trigger = match args.rate {
+        Some(rate) => Trigger::Every { period_us: (1e6 / rate).round() as u32 },
+        None => Trigger::Once,
+    };
+    let pulses = if args.once { Some(1) } else { args.count };
+    board.ask(Request::SetTrigger(trigger)).await?;
+    let mut heard = Heard::default();
+    let forever = Duration::from_secs(u64::from(u32::MAX));
+    let ended = tokio::select! {
+        ended = timeout(args.duration.unwrap_or(forever), listen(&mut board, pulses, &mut heard, console)) => {
+            ended.unwrap_or(Ok(()))
+        }
+        _ = tokio::signal::ctrl_c() => Ok(()),
+    };
+    ended?;
+    board.ask(Request::SetTrigger(Trigger::Off)).await?;
+    console.say(format!("{} pulses, {} of their marks were lost", heard.marks, heard.lost))
+}
+
+/// How many marks came, and how many their numbers say are missing.
+#[derive(Debug, Default)]
+struct Heard {
+    marks: u64,
+    lost: u64,
+    next: u32,
+}
+
+async fn listen(board: &mut Board, pulses: Option<u64>, heard: &mut Heard, console: Console) -> Result<(), Failure> {
+    while pulses.is_none_or(|pulses| heard.marks + heard.lost < pulses) {
+        let mark = board.next_mark().await?;
+        heard.lost += u64::from(mark.seq.wrapping_sub(heard.next));
+        heard.marks += 1;
+        heard.next = mark.seq.wrapping_add(1);
+        tell(board, &mark, console)?;
+    }
+    Ok(())
+}
+
+fn tell(board: &Board, mark: &FrameMark, console: Console) -> Result<(), Failure> {
+    let rig = board.rig();
+    let positions: Vec<AxisPosition> =
+        rig.axes.iter().zip(&mark.counts).map(|(axis, &counts)| axis.position_at(counts)).collect();
+    let axes = rig.axes.iter().zip(&positions).map(|(axis, position)| format!("{} {position}", axis.name));
+    let host = board.client().clock_map().host_at(mark.at);
+    console.say(format!(
+        "pulse {:5}  {:12.6} s  {}",
+        mark.seq,
+        mark.at.0 as f64 * 1e-6,
+        axes.collect::<Vec<_>>().join("  ")
+    ))?;
+    console.result(&json!({
+        "seq": mark.seq,
+        "board_us": mark.at.0,
+        "host_us": host.map(|host| rounded(host.us)),
+        "host_error_us": host.map(|host| rounded(host.error_us)),
+        "axes": axes_json(rig, &positions),
+    }))
+}

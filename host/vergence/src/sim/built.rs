@@ -1,0 +1,71 @@
+//! A mechanism that was not built exactly as drawn: what a calibration of a simulated rig is there to find.
+
+use nalgebra::{Isometry3, Unit, UnitQuaternion, Vector3};
+use rand::{RngExt, SeedableRng};
+use rand_pcg::Pcg64Mcg;
+use vergence_rig::{Chain, Link, Rig, Screw};
+use vergence_vision::{Frame, Point, Transform};
+
+/// How exactly a mechanism is built by hand, one standard deviation about and along each axis.
+const DIRECTION_RAD: f64 = 0.017;
+const PLACE_MM: f64 = 2.0;
+/// How exactly an encoder's scale is known.
+const SCALE: f64 = 0.003;
+
+/// `drawn` as it was built: screws and cameras are a little off, and encoders count a little more or less. The same seed
+/// gives the same mechanism.
+#[must_use]
+pub fn built(drawn: &Rig, seed: u64) -> Rig {
+    let mut off = Off(Pcg64Mcg::seed_from_u64(seed));
+    let scales: Vec<f64> = drawn.axes.iter().map(|_| 1.0 + SCALE * off.normal()).collect();
+    let mount = off.mount();
+    let right_at_zero = drawn.right_chain.at_zero();
+    Rig {
+        left_chain: off.chain(&drawn.left_chain, drawn.left_chain.at_zero(), &scales),
+        right_chain: off.chain(&drawn.right_chain, Transform::from_isometry(right_at_zero.isometry() * mount), &scales),
+        ..drawn.clone()
+    }
+}
+
+/// Departures from the drawing, one after the other.
+struct Off(Pcg64Mcg);
+
+impl Off {
+    /// Box and Muller.
+    fn normal(&mut self) -> f64 {
+        let radius = (-2.0 * (1.0 - self.0.random::<f64>()).ln()).sqrt();
+        radius * (std::f64::consts::TAU * self.0.random::<f64>()).cos()
+    }
+
+    fn vector(&mut self, sigma: f64) -> Vector3<f64> {
+        Vector3::from_fn(|_, _| sigma * self.normal())
+    }
+
+    fn mount(&mut self) -> Isometry3<f64> {
+        let turn = UnitQuaternion::from_scaled_axis(self.vector(DIRECTION_RAD));
+        Isometry3::from_parts(self.vector(PLACE_MM).into(), turn)
+    }
+
+    fn direction(&mut self, drawn: Unit<Vector3<f64>>) -> Unit<Vector3<f64>> {
+        UnitQuaternion::from_scaled_axis(self.vector(DIRECTION_RAD)) * drawn
+    }
+
+    fn chain<C: Frame>(
+        &mut self,
+        drawn: &Chain<C>,
+        at_zero: Transform<vergence_vision::Base, C>,
+        scales: &[f64],
+    ) -> Chain<C> {
+        let link = |link: &Link| {
+            let screw = match link.screw {
+                Screw::Slide { along } => Screw::Slide { along: self.direction(along) },
+                Screw::Turn { about, through } => Screw::Turn {
+                    about: self.direction(about),
+                    through: Point::from_mm(through.mm() + self.vector(PLACE_MM)),
+                },
+            };
+            Link { share: link.share * scales.get(link.axis).copied().unwrap_or(1.0), screw, axis: link.axis }
+        };
+        Chain::new(drawn.links().iter().map(link).collect(), at_zero)
+    }
+}

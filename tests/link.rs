@@ -1,0 +1,66 @@
+//! Host and simulated board in one process and virtual time.
+#![allow(
+    clippy::expect_used,
+    clippy::panic,
+    clippy::print_stdout,
+    reason = "a test fails loudly and shows its figures"
+)]
+
+use vergence::board::Board;
+use vergence::link::{Client, HostClock, OpenWire};
+use vergence::move_plan::MovePlan;
+use vergence::sim::{SharedRig, SimulatedRig, spawn_in_process};
+use vergence_protocol::{SessionId, SettingItem, SettingKey};
+use vergence_rig::{BENCH_TOML, Rig};
+
+fn bench() -> Rig {
+    Rig::from_toml(BENCH_TOML).expect("the bench")
+}
+
+async fn board() -> Board {
+    let rig = bench();
+    let simulated = SharedRig::new(SimulatedRig::new(&rig, 1).expect("a simulated rig"));
+    let wire = OpenWire::in_process(spawn_in_process(simulated));
+    let client = Client::connect(wire, SessionId(7), HostClock::start()).await.expect("a session");
+    Board::new(client, rig, 100, indicatif::ProgressBar::hidden()).await.expect("a board")
+}
+
+#[tokio::test(start_paused = true)]
+async fn a_plan_takes_as_long_as_the_move() {
+    let mut board = board().await;
+    let modes = board.rig().modes.clone();
+    let plan = MovePlan::new(&bench(), &board.limits().await.expect("limits"), &modes[0].targets, &modes[1].targets);
+    board
+        .armed(async |board| {
+            board.home().await?;
+            board.move_to(modes[0].number, &modes[0].targets).await?;
+            let start = tokio::time::Instant::now();
+            board.move_to(modes[1].number, &modes[1].targets).await?;
+            let took = start.elapsed().as_secs_f64();
+            println!("planned {:.3} s, moved and settled in {took:.3} s", plan.duration);
+            // Settling takes a dwell, and poses come each 10 ms.
+            assert!((0.0..0.2).contains(&(took - plan.duration)));
+            Ok(())
+        })
+        .await
+        .expect("it moves");
+}
+
+#[tokio::test(start_paused = true)]
+async fn settings_are_refused_while_armed() {
+    let mut board = board().await;
+    let key = SettingKey { item: SettingItem::Speed, axis: 0 };
+    let refusal = board
+        .armed(async |board| {
+            assert_eq!(board.setting(key).await?, Some(80_000));
+            board.set(key, 40_000).await
+        })
+        .await
+        .expect("the link holds")
+        .expect_err("it is armed");
+    let said = board.refused(refusal).to_string();
+    assert!(said.contains("only while disarmed") && said.contains("vergence disarm"), "{said}");
+    assert_eq!(board.setting(key).await, Ok(Some(80_000)));
+    board.set(key, 40_000).await.expect("the link holds").expect("it is disarmed");
+    assert_eq!(board.setting(key).await, Ok(Some(40_000)));
+}
