@@ -296,16 +296,22 @@ fn depth_of_given_correspondences() {
     .expect("written");
     let (rig, grey, pairs, out) = (file("rig.toml"), file("grey.png"), file("pairs.csv"), file("cloud.ply"));
     let options = ["--rig", &rig, "--left", &grey, "--right", &grey, "--points", &pairs, "--out", &out];
-    let result = run_json(&[&["depth", "--json"], &options[..]].concat());
-    assert_eq!(result["points"], 1);
-    assert_eq!(result["dropped"]["diverging"], 1);
-    let cloud = std::fs::read_to_string(out).expect("a cloud");
-    let (header, body) = cloud.split_once("end_header\n").expect("a PLY header");
-    assert!(header.contains("element vertex 1") && header.contains("property double u_left"));
-    let numbers: Vec<f64> = body.split_whitespace().map(|word| word.parse().expect("a number")).collect();
-    for (got, expected) in numbers.iter().zip([100.0, 0.0, 100.0]) {
-        assert!((got - expected).abs() < 0.01, "{numbers:?}");
+    // Exact rays meet in one point by every method.
+    for method in ["pseudo-intersection", "midpoint", "mid2", "angular-l1", "angular-linf", "reprojection", "rectified"]
+    {
+        let result = run_json(&[&["depth", "--json", "--kernel", method], &options[..]].concat());
+        assert_eq!(result["points"], 1, "{method}: {result}");
+        assert_eq!(result["dropped"]["diverging"], 1, "{method}: {result}");
+        assert!(result["pose_drift"].is_null(), "two pairs say nothing of the pose");
+        let cloud = std::fs::read_to_string(&out).expect("a cloud");
+        let (header, body) = cloud.split_once("end_header\n").expect("a PLY header");
+        assert!(header.contains("element vertex 1") && header.contains("property double u_left"));
+        let numbers: Vec<f64> = body.split_whitespace().map(|word| word.parse().expect("a number")).collect();
+        for (got, expected) in numbers.iter().zip([100.0, 0.0, 100.0]) {
+            assert!((got - expected).abs() < 0.01, "{method}: {numbers:?}");
+        }
     }
+    fails_with(&[&["depth", "--kernel", "guess"], &options[..]].concat(), 2, &["guess", "midpoint"]);
 }
 
 #[test]

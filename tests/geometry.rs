@@ -1,5 +1,10 @@
 //! Zones, poses for a goal, and the speed of the kernels, on the command line.
-#![allow(clippy::expect_used, clippy::panic, reason = "a test fails loudly")]
+#![allow(
+    clippy::expect_used,
+    clippy::panic,
+    clippy::print_stdout,
+    reason = "a test fails loudly and shows its figures"
+)]
 
 mod common;
 

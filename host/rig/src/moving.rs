@@ -1,6 +1,6 @@
 //! Measuring while the stages move: every row of both images has its own pose.
 
-use vergence_vision::{Cloud, CloudPoint, Drop, Gates, Left, PixelPair, StereoPair, Transform, cloud_point};
+use vergence_vision::{Base, Cloud, CloudPoint, Drop, Gates, Left, PixelPair, StereoPair, Transform, cloud_point};
 
 use crate::clock::BoardInstant;
 use crate::rig::Rig;
@@ -67,12 +67,12 @@ pub fn moving_cloud(
     exposure: &PairExposure,
     gates: &Gates,
 ) -> Result<Cloud, TrackGap> {
-    let reference = track.at(exposure.left.middle)?;
+    let reference_from_base = rig.pose(&track.at(exposure.left.middle)?).base_from_left.inverse();
     let mut cloud = Cloud::default();
     for (pair_index, pixels) in pairs.iter().enumerate() {
         let left = track.at(exposure.left.at_row(pixels.left.v))?;
         let right = track.at(exposure.right.at_row(pixels.right.v))?;
-        match point(pixels, rig, &reference, [&left, &right], gates) {
+        match point(pixels, rig, &reference_from_base, [&left, &right], gates) {
             Ok(point) => cloud.points.push(CloudPoint { pair_index, ..point }),
             Err(reason) => *cloud.dropped.entry(reason).or_default() += 1,
         }
@@ -83,7 +83,7 @@ pub fn moving_cloud(
 fn point(
     pixels: &PixelPair,
     rig: &Rig,
-    reference: &JointsAt,
+    reference_from_base: &Transform<Left, Base>,
     [left, right]: [&JointsAt; 2],
     gates: &Gates,
 ) -> Result<CloudPoint, Drop> {
@@ -91,7 +91,7 @@ fn point(
     let pair = StereoPair { left: &rig.left_camera, right: &rig.right_camera, left_from_right: pose.left_from_right };
     let gates = Gates { shared: gates.shared.with_pose(&pose.covariance), ..*gates };
     let point = cloud_point(pixels, &pair, &gates)?;
-    let reference_from_left: Transform<Left, Left> = rig.pose(reference).base_from_left.inverse() * pose.base_from_left;
+    let reference_from_left: Transform<Left, Left> = *reference_from_base * pose.base_from_left;
     let turn = reference_from_left.rotation().to_rotation_matrix();
     Ok(CloudPoint {
         point: reference_from_left * point.point,

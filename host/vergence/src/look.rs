@@ -6,7 +6,7 @@ use image::{RgbImage, imageops::grayscale};
 use vergence_matching::{ImagePair, MatchError, Matcher};
 use vergence_rig::{Rig, RigPose};
 use vergence_vision::{
-    Angle, CloudPoint, Gates, Length, PixelPair, PoseDrift, SharedCovariance, StereoPair, cloud, pose_drift,
+    Angle, CloudPoint, Gates, Kernel, Length, PixelPair, PoseDrift, SharedCovariance, StereoPair, cloud, pose_drift,
 };
 
 use crate::stopwatch::Stopwatch;
@@ -62,6 +62,20 @@ pub struct Look {
 /// # Errors
 /// Where the images do not belong to the cameras, or the cameras share no field.
 pub fn look(eyes: Eyes<'_>, rig: &Rig, pose: &RigPose, matcher: &dyn Matcher) -> Result<Look, MatchError> {
+    look_by(Kernel::default(), eyes, rig, pose, matcher)
+}
+
+/// The same by another method of triangulation.
+///
+/// # Errors
+/// As [`look`].
+pub fn look_by(
+    kernel: Kernel,
+    eyes: Eyes<'_>,
+    rig: &Rig,
+    pose: &RigPose,
+    matcher: &dyn Matcher,
+) -> Result<Look, MatchError> {
     let matching = Stopwatch::start();
     let (left, right) = (grayscale(eyes.left), grayscale(eyes.right));
     let found = matcher.find(&ImagePair {
@@ -75,7 +89,7 @@ pub fn look(eyes: Eyes<'_>, rig: &Rig, pose: &RigPose, matcher: &dyn Matcher) ->
     })?;
     let match_seconds = matching.seconds();
     let pairs: Vec<_> = found.pairs.iter().map(|m| PixelPair { left: m.left, right: m.right }).collect();
-    let mut look = triangulate(&pairs, eyes, rig, pose);
+    let mut look = triangulate(&pairs, eyes, rig, pose, kernel);
     look.match_seconds = match_seconds;
     for (reason, count) in found.dropped {
         *look.dropped.entry(reason.as_str()).or_default() += count;
@@ -85,10 +99,10 @@ pub fn look(eyes: Eyes<'_>, rig: &Rig, pose: &RigPose, matcher: &dyn Matcher) ->
 
 /// Triangulates given correspondences.
 #[must_use]
-pub fn triangulate(pairs: &[PixelPair], eyes: Eyes<'_>, rig: &Rig, pose: &RigPose) -> Look {
+pub fn triangulate(pairs: &[PixelPair], eyes: Eyes<'_>, rig: &Rig, pose: &RigPose, kernel: Kernel) -> Look {
     let triangulation = Stopwatch::start();
     let stereo = StereoPair { left: &rig.left_camera, right: &rig.right_camera, left_from_right: pose.left_from_right };
-    let result = cloud(pairs, &stereo, &gates(rig, pose));
+    let result = cloud(pairs, &stereo, &Gates { kernel, ..gates(rig, pose) });
     let points = result
         .points
         .into_iter()

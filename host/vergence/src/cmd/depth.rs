@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 use serde_json::{Value, json};
 use vergence_matching::Matcher;
 use vergence_rig::{Rig, RigPose};
-use vergence_vision::{ImageSize, Pixel, PixelPair};
+use vergence_vision::{ImageSize, Kernel, Pixel, PixelPair};
 
 use super::move_to::StagePose;
 use super::report::rounded;
@@ -15,7 +15,7 @@ use crate::camera::{Camera, FileCamera, Frame};
 use crate::cli::Globals;
 use crate::console::Console;
 use crate::failure::Failure;
-use crate::look::{Eyes, Look, look, triangulate};
+use crate::look::{Eyes, Look, look_by, triangulate};
 use crate::models::MatcherOptions;
 use crate::output::{make_folder, ply, write_whole};
 use crate::rig_file;
@@ -39,6 +39,10 @@ pub struct Args {
     /// The vision mode in which the photographs were taken, for a rig with axes.
     #[arg(long, conflicts_with_all = ["baseline", "separation"])]
     mode: Option<String>,
+    /// How two rays make a point: pseudo-intersection, or to compare with it midpoint, mid2, angular-l1, angular-l2,
+    /// angular-linf, reprojection or rectified.
+    #[arg(long, value_name = "METHOD", default_value_t)]
+    kernel: Kernel,
     #[command(flatten)]
     stage: StagePose,
     #[command(flatten)]
@@ -64,7 +68,8 @@ pub fn run(args: &Args, globals: &Globals, console: Console) -> Result<(), Failu
     let mut results = Vec::new();
     while let (Some(left), Some(right)) = (left.grab()?, right.grab()?) {
         let work = console.progress(&format!("{} and {}", left.name, right.name));
-        let look = one_pair(&left, &right, &rig, &pose, How { pairs: pairs.as_deref(), matcher: matcher.as_ref() })?;
+        let how = How { pairs: pairs.as_deref(), matcher: matcher.as_ref(), kernel: args.kernel };
+        let look = one_pair([&left, &right], &rig, &pose, how)?;
         work.finish_and_clear();
         let out = if several { args.out.join(format!("{}.ply", left.name)) } else { args.out.clone() };
         if several {
@@ -102,20 +107,21 @@ fn pose(args: &Args, rig: &Rig) -> Result<RigPose, Failure> {
     Ok(rig.pose_at_values(&values))
 }
 
-/// Where homologous points come from.
+/// How homologous points are found, and points made of them.
 #[derive(Clone, Copy)]
 struct How<'a> {
     pairs: Option<&'a [PixelPair]>,
     matcher: &'a dyn Matcher,
+    kernel: Kernel,
 }
 
-fn one_pair(left: &Frame, right: &Frame, rig: &Rig, pose: &RigPose, how: How<'_>) -> Result<Look, Failure> {
+fn one_pair([left, right]: [&Frame; 2], rig: &Rig, pose: &RigPose, how: How<'_>) -> Result<Look, Failure> {
     check_size(left, rig.left_camera.size(), "left")?;
     check_size(right, rig.right_camera.size(), "right")?;
     let eyes = Eyes { left: &left.image, right: &right.image };
     match how.pairs {
-        Some(pairs) => Ok(triangulate(pairs, eyes, rig, pose)),
-        None => look(eyes, rig, pose, how.matcher)
+        Some(pairs) => Ok(triangulate(pairs, eyes, rig, pose, how.kernel)),
+        None => look_by(how.kernel, eyes, rig, pose, how.matcher)
             .map_err(|error| Failure::usage(format!("{} and {}: {error}", left.name, right.name))),
     }
 }

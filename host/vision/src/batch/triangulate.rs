@@ -5,7 +5,7 @@ use multiversion::target::target_cfg_f;
 use nalgebra::Vector3;
 
 use super::Instructions;
-use super::lanes::{ALWAYS_FUSED, BLOCK, Kernel, column_results, columns_of, rows_of};
+use super::lanes::{ALWAYS_FUSED, BLOCK, Kernel, column_results, columns_of, multiply_add, rows_of};
 use crate::{Angle, Left, Point};
 
 /// One vector of eight, or two of four: the kernel holds some thirty values per row.
@@ -49,7 +49,8 @@ impl BatchTriangulation {
     ) {
         let count = rays[0].len().min(rays[1].len());
         let rays = rays.map(|rays| &rays[..count]);
-        let kernel = Triangulate { t: right_centre.mm(), variance: sigma.rad() * sigma.rad() };
+        let t = right_centre.mm();
+        let kernel = Triangulate { t, baseline_squared: t.norm_squared(), variance: sigma.rad() * sigma.rad() };
         match instructions {
             Instructions::Best => triangulate_best(&kernel, rays, self),
             Instructions::Baseline => triangulate_all::<ALWAYS_FUSED>(&kernel, rays, self),
@@ -107,6 +108,7 @@ fn block<const FUSED: bool>(
 
 struct Triangulate {
     t: Vector3<f64>,
+    baseline_squared: f64,
     variance: f64,
 }
 
@@ -117,7 +119,7 @@ impl Kernel<6, 9> for Triangulate {
         for j in 0..W {
             let at = |column: usize| columns[column][j];
             let (u, v) = (Vector3::new(at(0), at(1), at(2)), Vector3::new(at(3), at(4), at(5)));
-            for (column, value) in out.iter_mut().zip(self.row(&u, &v)) {
+            for (column, value) in out.iter_mut().zip(self.row::<FUSED>(&u, &v)) {
                 column[j] = value;
             }
         }
@@ -128,17 +130,20 @@ impl Kernel<6, 9> for Triangulate {
 impl Triangulate {
     /// The formulas of the single-point functions without a root: n enters only as w wᵀ / w·w, with w along t × S.
     #[inline(always)]
-    fn row(&self, u: &Vector3<f64>, v: &Vector3<f64>) -> [f64; 9] {
+    fn row<const FUSED: bool>(&self, u: &Vector3<f64>, v: &Vector3<f64>) -> [f64; 9] {
         let t = &self.t;
+        let (cross, dot) = (cross::<FUSED>, dot::<FUSED>);
         let (tu, tv, uv) = (cross(t, u), cross(t, v), cross(u, v));
         let (lambda, mu) = (dot(&tv, &uv), dot(&tu, &uv));
-        let w = lambda * tu + mu * tv;
+        let w = sum::<FUSED>(lambda, &tu, mu, &tv);
         let (ww, determinant) = (dot(&w, &w), dot(&uv, &w));
-        let (left_range, right_range) = (dot(&tv, &w) / determinant, dot(&tu, &w) / determinant);
-        let p = left_range * (u - (dot(u, &w) / ww) * w);
+        let per_determinant = 1.0 / determinant;
+        let (left_range, right_range) = (dot(&tv, &w) * per_determinant, dot(&tu, &w) * per_determinant);
+        let per_ww = 1.0 / ww;
+        let p = sum::<FUSED>(left_range, u, -left_range * dot(u, &w) * per_ww, &w);
         let q = p - t;
 
-        let (pp, qq, tt) = (dot(&p, &p), dot(&q, &q), dot(t, t));
+        let (pp, qq) = (dot(&p, &p), dot(&q, &q));
         let area = cross(t, &p);
         let area_squared = dot(&area, &area);
         let good = lambda > 0.0
@@ -147,23 +152,40 @@ impl Triangulate {
             && right_range > 0.0
             && dot(&uv, &uv) > VANISHING_SQUARED
             && determinant * determinant > VANISHING_SQUARED * ww
-            && area_squared > VANISHING_SQUARED * tt * pp;
+            && area_squared > VANISHING_SQUARED * self.baseline_squared * pp;
         let valid = if good { 0.0 } else { f64::NAN };
 
-        let in_plane = self.variance / area_squared;
-        let (from_left, from_right) = (in_plane * pp * pp, in_plane * qq * qq);
-        let across = self.variance * (pp + qq) / (4.0 * ww);
-        let c = |i: usize, j: usize| from_left * q[i] * q[j] + from_right * p[i] * p[j] + across * w[i] * w[j] + valid;
+        let in_plane = self.variance / area_squared + valid;
+        let from_left = scaled(in_plane * pp * pp, &q);
+        let from_right = scaled(in_plane * qq * qq, &p);
+        let across = scaled(self.variance * (pp + qq) * 0.25 * per_ww, &w);
+        let c = |i: usize, j: usize| {
+            let along = multiply_add::<FUSED>(from_left[i], q[j], from_right[i] * p[j]);
+            multiply_add::<FUSED>(across[i], w[j], along)
+        };
         [p.x + valid, p.y + valid, p.z + valid, c(0, 0), c(0, 1), c(0, 2), c(1, 1), c(1, 2), c(2, 2)]
     }
 }
 
 #[inline(always)]
-fn cross(a: &Vector3<f64>, b: &Vector3<f64>) -> Vector3<f64> {
-    Vector3::new(a.y * b.z - a.z * b.y, a.z * b.x - a.x * b.z, a.x * b.y - a.y * b.x)
+fn cross<const FUSED: bool>(a: &Vector3<f64>, b: &Vector3<f64>) -> Vector3<f64> {
+    let minor = |i: usize, j: usize| multiply_add::<FUSED>(a[i], b[j], -(a[j] * b[i]));
+    Vector3::new(minor(1, 2), minor(2, 0), minor(0, 1))
 }
 
 #[inline(always)]
-fn dot(a: &Vector3<f64>, b: &Vector3<f64>) -> f64 {
-    a.x * b.x + a.y * b.y + a.z * b.z
+fn dot<const FUSED: bool>(a: &Vector3<f64>, b: &Vector3<f64>) -> f64 {
+    multiply_add::<FUSED>(a.x, b.x, multiply_add::<FUSED>(a.y, b.y, a.z * b.z))
+}
+
+/// α a + β b
+#[inline(always)]
+fn sum<const FUSED: bool>(alpha: f64, a: &Vector3<f64>, beta: f64, b: &Vector3<f64>) -> Vector3<f64> {
+    let component = |i: usize| multiply_add::<FUSED>(alpha, a[i], beta * b[i]);
+    Vector3::new(component(0), component(1), component(2))
+}
+
+#[inline(always)]
+fn scaled(factor: f64, a: &Vector3<f64>) -> Vector3<f64> {
+    Vector3::new(factor * a.x, factor * a.y, factor * a.z)
 }

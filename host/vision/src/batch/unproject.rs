@@ -13,7 +13,7 @@ use crate::KannalaBrandt;
 /// One vector of eight for each polynomial.
 const LANES: usize = 8;
 /// Terms tried, fewest first.
-const TERMS: std::ops::RangeInclusive<usize> = 12..=32;
+const TERMS: std::ops::RangeInclusive<usize> = 12..=48;
 /// Largest error of a component of the ray that a fit may have.
 const LARGEST_ERROR: f64 = 7e-15;
 
@@ -30,7 +30,7 @@ pub(super) struct Unproject {
 }
 
 impl Unproject {
-    /// `None` for a lens so bent that no polynomial of 32 terms is near enough: dr/dθ comes close to zero.
+    /// `None` for a lens so bent that no polynomial of 48 terms is near enough: dr/dθ comes close to zero.
     pub(super) fn new(lens: &KannalaBrandt) -> Option<Self> {
         TERMS.map(|terms| Self::of_terms(lens, terms)).find(|fit| fit.error(lens) <= LARGEST_ERROR)
     }
