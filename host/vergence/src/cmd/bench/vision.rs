@@ -15,7 +15,7 @@ use crate::failure::Failure;
 use crate::stopwatch::Stopwatch;
 
 /// Measures arrays of N x 3 and N x 2 numbers, on one thread: nanoseconds per point, the least of several runs, with OpenCV
-/// before and after ours. Pixels and rays go into arrays allocated anew; points with their covariance, 72 bytes each, into
+/// before and after ours. Pixels and rays go into arrays allocated anew; points with their covariance, 56 bytes each, into
 /// arrays that are there ("anew": allocated again for every run). Without OpenCV (python3 -m pip install opencv-python-headless numpy) its
 /// figures are null.
 #[derive(Debug, clap::Args)]
@@ -135,14 +135,14 @@ fn measure(lens: &KannalaBrandt, points: u32, repeats: u32, instructions: Instru
         SharedCovariance::exact().with_pose(&Matrix6::from_diagonal(&[1e-8, 1e-8, 1e-8, 1e-4, 1e-4, 1e-4].into()));
     // The slow one is measured on fewer points.
     let few = &left[..left.len().min(20_000)];
-    let mut triangulated = BatchTriangulation::default();
+    let mut triangulated = BatchTriangulation::new(&centre);
     let per_point = |count: usize, work: &mut dyn FnMut()| least_seconds(repeats, work) * 1e9 / count as f64;
     Times {
         project_ns: per_point(rays.len(), &mut || drop(black_box(batch.project(black_box(&rays))))),
         unproject_ns: per_point(pixels.len(), &mut || drop(black_box(batch.unproject(black_box(&pixels))))),
         triangulate_ns: per_point(left.len(), &mut || {
             triangulated.clear();
-            triangulated.extend([black_box(&left), &right], &centre, RAY_SIGMA, instructions);
+            triangulated.extend([black_box(&left), &right], RAY_SIGMA, instructions);
             black_box(&triangulated);
         }),
         triangulate_anew_ns: per_point(left.len(), &mut || {
