@@ -2,7 +2,7 @@
 
 use multiversion::multiversion;
 use multiversion::target::target_cfg_f;
-use nalgebra::Vector3;
+use nalgebra::{Matrix3, Vector3};
 
 use super::Instructions;
 use super::lanes::{ALWAYS_FUSED, BLOCK, Kernel, column_results, columns_of, multiply_add, rows_of};
@@ -14,17 +14,26 @@ const LANES: usize = 8;
 const VANISHING_SQUARED: f64 = 1e-18;
 
 /// Points and covariances, in the rows of the rays they come from. NaN where the rays make no point.
-#[derive(Clone, Debug, Default, PartialEq)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct BatchTriangulation {
     /// N × 3, millimetres, left frame.
     pub points: Vec<[f64; 3]>,
-    /// N × 6, mm²: xx, xy, xz, yy, yz, zz of [`crate::covariance()`].
-    pub covariances: Vec<[f64; 6]>,
+    /// N × 4, mm²: xx, xh, hh and nn in each point's own axes, x along the baseline, h away from it through the point and n
+    /// across the epipolar plane. What is not listed is zero.
+    pub covariances: Vec<[f64; 4]>,
+    right_centre: Point<Left>,
 }
 
 /// The pseudo-intersections of N pairs of unit rays, both in the left frame, with their closed-form covariance for an
 /// angular standard deviation `sigma` of each ray. As [`crate::pseudo_intersection`] and [`crate::covariance()`]; what those
 /// refuse is NaN here. Rays beyond the shorter array are not looked at.
+///
+/// With x along the baseline B, H the distance from it, λ and μ the ranges:
+///
+/// ```text
+/// xx = σ² [λ⁴ (x - B)² + μ⁴ x²] / (B H)²        xh = σ² [λ⁴ (x - B) + μ⁴ x] / (B² H)
+/// hh = σ² (λ⁴ + μ⁴) / B²                        nn = σ² (λ² + μ²) / 4
+/// ```
 #[must_use]
 pub fn triangulate_batch(
     left: &[[f64; 3]],
@@ -33,28 +42,39 @@ pub fn triangulate_batch(
     sigma: Angle,
     instructions: Instructions,
 ) -> BatchTriangulation {
-    let mut out = BatchTriangulation::default();
-    out.extend([left, right], right_centre, sigma, instructions);
+    let mut out = BatchTriangulation::new(right_centre);
+    out.extend([left, right], sigma, instructions);
     out
 }
 
 impl BatchTriangulation {
+    /// No points yet, of a right camera at `right_centre`.
+    #[must_use]
+    pub const fn new(right_centre: &Point<Left>) -> Self {
+        Self { points: Vec::new(), covariances: Vec::new(), right_centre: *right_centre }
+    }
+
     /// Appends what [`triangulate_batch`] returns for the left and right `rays`.
-    pub fn extend(
-        &mut self,
-        rays: [&[[f64; 3]]; 2],
-        right_centre: &Point<Left>,
-        sigma: Angle,
-        instructions: Instructions,
-    ) {
+    pub fn extend(&mut self, rays: [&[[f64; 3]]; 2], sigma: Angle, instructions: Instructions) {
         let count = rays[0].len().min(rays[1].len());
         let rays = rays.map(|rays| &rays[..count]);
-        let t = right_centre.mm();
-        let kernel = Triangulate { t, baseline_squared: t.norm_squared(), variance: sigma.rad() * sigma.rad() };
+        let t = self.right_centre.mm();
+        let kernel = Triangulate { t, per_baseline: 1.0 / t.norm(), variance: sigma.rad() * sigma.rad() };
         match instructions {
             Instructions::Best => triangulate_best(&kernel, rays, self),
             Instructions::Baseline => triangulate_all::<ALWAYS_FUSED>(&kernel, rays, self),
         }
+    }
+
+    /// The covariance of one row in mm², in the left frame; `None` where there is no such row or no point.
+    #[must_use]
+    pub fn covariance(&self, row: usize) -> Option<Matrix3<f64>> {
+        let (point, [xx, xh, hh, nn]) = (Vector3::from(*self.points.get(row)?), *self.covariances.get(row)?);
+        let x = self.right_centre.direction()?.vector();
+        let n = x.cross(&point).try_normalize(0.0)?;
+        let h = n.cross(&x);
+        let mixed = x * h.transpose() + h * x.transpose();
+        Some(x * x.transpose() * xx + mixed * xh + h * h.transpose() * hh + n * n.transpose() * nn)
     }
 
     /// Forgets the rows and keeps their memory.
@@ -100,22 +120,23 @@ fn block<const FUSED: bool>(
     kernel: &Triangulate,
     left: &[[f64; 3]; BLOCK],
     right: &[[f64; 3]; BLOCK],
-) -> ([[f64; 3]; BLOCK], [[f64; 6]; BLOCK]) {
+) -> ([[f64; 3]; BLOCK], [[f64; 4]; BLOCK]) {
     let ([ux, uy, uz], [vx, vy, vz]) = (columns_of(left), columns_of(right));
-    let [px, py, pz, xx, xy, xz, yy, yz, zz] = column_results::<FUSED, LANES, 6, 9>(kernel, &[ux, uy, uz, vx, vy, vz]);
-    (rows_of(&[px, py, pz]), rows_of(&[xx, xy, xz, yy, yz, zz]))
+    let [px, py, pz, xx, xh, hh, nn] = column_results::<FUSED, LANES, 6, 7>(kernel, &[ux, uy, uz, vx, vy, vz]);
+    (rows_of(&[px, py, pz]), rows_of(&[xx, xh, hh, nn]))
 }
 
 struct Triangulate {
     t: Vector3<f64>,
-    baseline_squared: f64,
+    /// One over the length of t.
+    per_baseline: f64,
     variance: f64,
 }
 
-impl Kernel<6, 9> for Triangulate {
+impl Kernel<6, 7> for Triangulate {
     #[inline(always)]
-    fn lanes<const FUSED: bool, const W: usize>(&self, columns: [[f64; W]; 6]) -> [[f64; W]; 9] {
-        let mut out = [[0.0; W]; 9];
+    fn lanes<const FUSED: bool, const W: usize>(&self, columns: [[f64; W]; 6]) -> [[f64; W]; 7] {
+        let mut out = [[0.0; W]; 7];
         for j in 0..W {
             let at = |column: usize| columns[column][j];
             let (u, v) = (Vector3::new(at(0), at(1), at(2)), Vector3::new(at(3), at(4), at(5)));
@@ -130,7 +151,7 @@ impl Kernel<6, 9> for Triangulate {
 impl Triangulate {
     /// The formulas of the single-point functions without a root: n enters only as w wᵀ / w·w, with w along t × S.
     #[inline(always)]
-    fn row<const FUSED: bool>(&self, u: &Vector3<f64>, v: &Vector3<f64>) -> [f64; 9] {
+    fn row<const FUSED: bool>(&self, u: &Vector3<f64>, v: &Vector3<f64>) -> [f64; 7] {
         let t = &self.t;
         let (cross, dot) = (cross::<FUSED>, dot::<FUSED>);
         let (tu, tv, uv) = (cross(t, u), cross(t, v), cross(u, v));
@@ -143,27 +164,26 @@ impl Triangulate {
         let p = sum::<FUSED>(left_range, u, -left_range * dot(u, &w) * per_ww, &w);
         let q = p - t;
 
-        let (pp, qq) = (dot(&p, &p), dot(&q, &q));
+        let (pp, qq, along) = (dot(&p, &p), dot(&q, &q), dot(&p, t) * self.per_baseline);
+        let beyond = dot(&q, t) * self.per_baseline;
         let area = cross(t, &p);
-        let area_squared = dot(&area, &area);
+        let height_squared = dot(&area, &area) * (self.per_baseline * self.per_baseline);
         let good = lambda > 0.0
             && mu > 0.0
             && left_range > 0.0
             && right_range > 0.0
             && dot(&uv, &uv) > VANISHING_SQUARED
             && determinant * determinant > VANISHING_SQUARED * ww
-            && area_squared > VANISHING_SQUARED * self.baseline_squared * pp;
+            && height_squared > VANISHING_SQUARED * pp;
         let valid = if good { 0.0 } else { f64::NAN };
 
-        let in_plane = self.variance / area_squared + valid;
-        let from_left = scaled(in_plane * pp * pp, &q);
-        let from_right = scaled(in_plane * qq * qq, &p);
-        let across = scaled(self.variance * (pp + qq) * 0.25 * per_ww, &w);
-        let c = |i: usize, j: usize| {
-            let along = multiply_add::<FUSED>(from_left[i], q[j], from_right[i] * p[j]);
-            multiply_add::<FUSED>(across[i], w[j], along)
-        };
-        [p.x + valid, p.y + valid, p.z + valid, c(0, 0), c(0, 1), c(0, 2), c(1, 1), c(1, 2), c(2, 2)]
+        let scale = self.variance * (self.per_baseline * self.per_baseline) + valid;
+        let (by_left, by_right) = (scale * pp * pp, scale * qq * qq);
+        let per_height = 1.0 / height_squared.sqrt();
+        let (left_beyond, right_along) = (by_left * beyond * per_height, by_right * along * per_height);
+        let xx = multiply_add::<FUSED>(left_beyond, beyond, right_along * along) * per_height;
+        let across = self.variance * 0.25 * (pp + qq) + valid;
+        [p.x + valid, p.y + valid, p.z + valid, xx, left_beyond + right_along, by_left + by_right, across]
     }
 }
 
@@ -183,9 +203,4 @@ fn dot<const FUSED: bool>(a: &Vector3<f64>, b: &Vector3<f64>) -> f64 {
 fn sum<const FUSED: bool>(alpha: f64, a: &Vector3<f64>, beta: f64, b: &Vector3<f64>) -> Vector3<f64> {
     let component = |i: usize| multiply_add::<FUSED>(alpha, a[i], beta * b[i]);
     Vector3::new(component(0), component(1), component(2))
-}
-
-#[inline(always)]
-fn scaled(factor: f64, a: &Vector3<f64>) -> Vector3<f64> {
-    Vector3::new(factor * a.x, factor * a.y, factor * a.z)
 }
