@@ -31,6 +31,7 @@ const ALLOWED: &[(&str, &[&str])] = &[
         &[
             "vergence-protocol",
             "vergence-control",
+            "vergence-image",
             "vergence-vision",
             "vergence-rig",
             "vergence-calibration",

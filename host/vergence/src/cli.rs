@@ -80,6 +80,8 @@ enum Verb {
     Config(cmd::config::Args),
     /// Run a simulated board that other programs can talk to.
     Sim(cmd::sim::Args),
+    /// Make keys, sign firmware images, show what they are.
+    Image(cmd::image::Args),
     /// Measure how fast this program is, beside others on the same work.
     Bench(cmd::bench::Args),
     /// Let everything go wrong, ten thousand times, and check that the rig stays safe.
@@ -160,6 +162,7 @@ fn execute(cli: Cli) -> Result<(), Failure> {
             Verb::LinkTest(args) => cmd::link_test::run(&args, &globals, console).await,
             Verb::Config(args) => cmd::config::run(&args, &globals, console).await,
             Verb::Sim(args) => cmd::sim::run(&args, &globals, console).await,
+            Verb::Image(args) => cmd::image::run(&args, console),
             Verb::Bench(args) => cmd::bench::run(&args, console),
             Verb::Soak(args) => cmd::soak::run(&args, console),
             Verb::Demo(args) => cmd::demo::run(&args, &globals, console).await,

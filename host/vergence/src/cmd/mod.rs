@@ -21,6 +21,7 @@ pub mod devices;
 pub mod disarm;
 pub mod doctor;
 pub mod home;
+pub mod image;
 pub mod link_test;
 pub mod mode;
 pub mod monitor;
