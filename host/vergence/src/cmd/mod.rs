@@ -20,6 +20,7 @@ pub mod depth;
 pub mod devices;
 pub mod disarm;
 pub mod doctor;
+pub mod flash;
 pub mod home;
 pub mod image;
 pub mod link_test;
