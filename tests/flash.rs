@@ -1,5 +1,10 @@
 //! Stories of firmware updates: a simulated board in one process, `vergence flash` in others, and what can go wrong.
-#![allow(clippy::expect_used, clippy::panic, reason = "a test fails loudly")]
+#![allow(
+    clippy::expect_used,
+    clippy::panic,
+    clippy::print_stdout,
+    reason = "a test fails loudly and shows its figures"
+)]
 
 mod common;
 

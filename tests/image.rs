@@ -1,5 +1,10 @@
 //! Keys and signed firmware images.
-#![allow(clippy::expect_used, clippy::panic, reason = "a test fails loudly")]
+#![allow(
+    clippy::expect_used,
+    clippy::panic,
+    clippy::print_stdout,
+    reason = "a test fails loudly and shows its figures"
+)]
 
 mod common;
 
