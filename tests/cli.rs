@@ -28,6 +28,8 @@ const VERBS: &[&str] = &[
     "trigger",
     "link-test",
     "config",
+    "flash",
+    "image",
     "sim",
     "demo",
     "depth",

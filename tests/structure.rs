@@ -32,6 +32,7 @@ const ALLOWED: &[(&str, &[&str])] = &[
         &[
             "vergence-protocol",
             "vergence-control",
+            "vergence-image",
             "vergence-vision",
             "vergence-rig",
             "vergence-calibration",

@@ -1,6 +1,8 @@
 //! Running the binary and reading what it says.
 #![allow(dead_code, reason = "each test file uses its own part")]
 
+pub mod images;
+
 use std::io::{BufRead, BufReader};
 use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Output, Stdio};

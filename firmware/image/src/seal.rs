@@ -5,6 +5,8 @@
 //! 0 magic | 4 signed header | 55 signature | 119 CRC-32C of all before | 123 filled up with 0xFF
 //! ```
 
+use core::fmt;
+
 use crc::{CRC_32_ISCSI, Crc, NoTable};
 use sha2::{Digest, Sha256};
 use vergence_protocol::management::{ImageHeader, Signature};
@@ -111,6 +113,18 @@ impl Seal {
             return Err(SealError::WrongLength);
         }
         Ok(())
+    }
+}
+
+impl fmt::Display for SealError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            Self::Missing => "this is no signed image, or its header is damaged",
+            Self::WrongHardware => "the image is for other hardware",
+            Self::WrongLength => "the image is not as long as its header says",
+            Self::WrongDigest => "the image is damaged: its digest is not that of its header",
+            Self::WrongSignature => "the signature is not of the key",
+        })
     }
 }
 

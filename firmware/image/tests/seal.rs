@@ -3,7 +3,7 @@
 
 use proptest::prelude::*;
 use vergence_image::layout::{ACTIVE, CAPACITY, HARDWARE};
-use vergence_image::{DEVELOPMENT_KEY, SEAL_LENGTH, Seal, SealError, sha256};
+use vergence_image::{DEVELOPMENT_KEY, ImageFile, SEAL_LENGTH, Seal, SealError, sha256};
 use vergence_protocol::management::{ImageHeader, Signature};
 
 /// RFC 8032, section 7.1, test 1.
@@ -91,4 +91,24 @@ proptest! {
     fn no_bytes_make_it_panic(bytes in prop::collection::vec(any::<u8>(), 0..2 * SEAL_LENGTH)) {
         prop_assert_eq!(Seal::check(&bytes, &DEVELOPMENT_KEY).is_ok(), false);
     }
+}
+
+#[test]
+fn a_file_is_the_seal_and_the_image() {
+    let image = [0x5A; 1001];
+    let seal = sign(ImageHeader { hardware: 7, ..header(&image) });
+    let file = [&seal.to_bytes()[..], &image].concat();
+    let read = ImageFile::read(&file).unwrap();
+    assert_eq!((read.seal, read.image), (seal, &image[..]));
+    assert!(read.is_signed_by(&DEVELOPMENT_KEY));
+    assert!(!read.is_signed_by(&[7; 32]));
+
+    assert_eq!(ImageFile::read(&image), Err(SealError::Missing));
+    assert_eq!(ImageFile::read(&file[..100]), Err(SealError::Missing));
+    assert_eq!(ImageFile::read(&file[..file.len() - 1]), Err(SealError::WrongLength));
+    let empty = sign(ImageHeader { length: 0, ..header(&[]) });
+    assert_eq!(ImageFile::read(&empty.to_bytes()), Err(SealError::WrongLength));
+    let mut damaged = file;
+    damaged[500] ^= 1;
+    assert_eq!(ImageFile::read(&damaged), Err(SealError::WrongDigest));
 }

@@ -10,8 +10,8 @@ const SETTINGS_PAGES: usize = 2;
 /// Pages for an image: 96 KiB.
 const IMAGE_PAGES: usize = 48;
 
-/// Whether a signature over the bytes is of a trusted key.
-pub type Verifier = fn(&[u8; ImageHeader::SIGNED], &Signature) -> bool;
+/// Whether a signature over the bytes is of this key.
+pub type Verifier = fn(&[u8; 32], &[u8; ImageHeader::SIGNED], &Signature) -> bool;
 
 /// An image, as far as a simulation needs to know it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -35,7 +35,9 @@ pub struct NativeServices {
     pub boot_state: BootState,
     /// The oldest version accepted.
     pub oldest: [u8; 3],
-    /// Which signatures are trusted.
+    /// The key whose signatures are trusted.
+    pub key: [u8; 32],
+    /// Which signatures are of it.
     pub verifier: Verifier,
     earlier: Option<Firmware>,
     scheduled: Option<Firmware>,
@@ -51,7 +53,8 @@ impl Default for NativeServices {
             running: Firmware { version: workspace_version(), build: 0 },
             boot_state: BootState::Confirmed,
             oldest: [0, 0, 0],
-            verifier: |_, _| false,
+            key: [0; 32],
+            verifier: |_, _, _| false,
             earlier: None,
             scheduled: None,
             goes_back: false,
@@ -87,7 +90,7 @@ impl BoardServices for NativeServices {
     }
 
     fn trusts(&self, signed: &[u8; ImageHeader::SIGNED], signature: &Signature) -> bool {
-        (self.verifier)(signed, signature)
+        (self.verifier)(&self.key, signed, signature)
     }
 
     fn schedule_trial(&mut self, image: &ImageHeader, _signature: &Signature) -> Result<(), FlashError> {

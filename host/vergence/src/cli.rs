@@ -80,6 +80,10 @@ enum Verb {
     Config(cmd::config::Args),
     /// Run a simulated board that other programs can talk to.
     Sim(cmd::sim::Args),
+    /// Update the board's firmware, over the link or a debug probe, or go back.
+    Flash(cmd::flash::Args),
+    /// Make keys, sign firmware images, show what they are.
+    Image(cmd::image::Args),
     /// Measure how fast this program is, beside others on the same work.
     Bench(cmd::bench::Args),
     /// Let everything go wrong, ten thousand times, and check that the rig stays safe.
@@ -133,7 +137,9 @@ fn tell(failure: &Failure) {
 fn execute(cli: Cli) -> Result<(), Failure> {
     let Cli { mut globals, verb } = cli;
     // A stop must not fail, nor the doctor end, because a calibration cannot be read: they look for themselves.
-    if globals.rig.is_none() && !matches!(verb, Verb::Demo(_) | Verb::Soak(_) | Verb::Stop(_) | Verb::Doctor(_)) {
+    let without_rig = matches!(verb, Verb::Demo(_) | Verb::Soak(_) | Verb::Stop(_) | Verb::Doctor(_))
+        || matches!(verb, Verb::Flash(_) | Verb::Image(_));
+    if globals.rig.is_none() && !without_rig {
         globals.rig = slots::active_rig()?;
     }
     let console = Console::new(globals.json);
@@ -162,6 +168,8 @@ fn execute(cli: Cli) -> Result<(), Failure> {
             Verb::LinkTest(args) => cmd::link_test::run(&args, &globals, console).await,
             Verb::Config(args) => cmd::config::run(&args, &globals, console).await,
             Verb::Sim(args) => cmd::sim::run(&args, &globals, console).await,
+            Verb::Flash(args) => cmd::flash::run(&args, &globals, console).await,
+            Verb::Image(args) => cmd::image::run(&args, console),
             Verb::Bench(args) => cmd::bench::run(&args, console),
             Verb::Soak(args) => cmd::soak::run(&args, console),
             Verb::Demo(args) => cmd::demo::run(&args, &globals, console).await,

@@ -59,7 +59,7 @@ impl Console {
     /// A spinner on a terminal, silent elsewhere.
     #[must_use]
     pub fn progress(self, what: &str) -> ProgressBar {
-        if self.json || !std::io::stderr().is_terminal() {
+        if !self.shows_progress() {
             return ProgressBar::hidden();
         }
         let bar = ProgressBar::new_spinner().with_message(what.to_owned());
@@ -69,6 +69,23 @@ impl Console {
         // Long computations do not come round to draw.
         bar.enable_steady_tick(Duration::from_millis(100));
         bar
+    }
+
+    /// A bar of `bytes` bytes on a terminal, silent elsewhere.
+    #[must_use]
+    pub fn byte_bar(self, what: &str, bytes: u64) -> ProgressBar {
+        if !self.shows_progress() {
+            return ProgressBar::hidden();
+        }
+        let bar = ProgressBar::new(bytes).with_message(what.to_owned());
+        if let Ok(style) = ProgressStyle::with_template("{msg} {wide_bar} {bytes}/{total_bytes} {bytes_per_sec}") {
+            bar.set_style(style);
+        }
+        bar
+    }
+
+    fn shows_progress(self) -> bool {
+        !self.json && stderr().is_terminal()
     }
 }
 

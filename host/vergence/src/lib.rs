@@ -16,6 +16,7 @@ mod cmd;
 mod console;
 mod corners;
 pub mod failure;
+mod firmware;
 pub mod link;
 pub mod look;
 pub mod models;

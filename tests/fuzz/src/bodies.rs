@@ -159,7 +159,7 @@ pub fn board_node(data: &[u8]) {
     let mut script = Script(data);
     let Ok(mut board) = NativeBoard::new(&bench_settings(), &bench_mechanics(), data.len() as u64) else { return };
     board.services_mut().image = RamFlash::new(2);
-    board.services_mut().verifier = |_, signature| signature.r[0] == 1;
+    board.services_mut().verifier = |_, _, signature| signature.r[0] == 1;
     let mut host = BoardUser { board, open: 0, seq: 0 };
     if script.byte() < 200 {
         host.hello(1, schema_hash());

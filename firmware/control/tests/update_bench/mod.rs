@@ -19,8 +19,12 @@ use vergence_protocol::{
 pub const SEED: [u8; 32] = [7; 32];
 pub const STEP_US: u64 = 500;
 
-pub fn verify(signed: &[u8; ImageHeader::SIGNED], signature: &Signature) -> bool {
-    let key = VerifyingKey::from(&SigningKey::from_bytes(&SEED));
+pub fn public_key() -> [u8; 32] {
+    VerifyingKey::from(&SigningKey::from_bytes(&SEED)).to_bytes()
+}
+
+pub fn verify(key: &[u8; 32], signed: &[u8; ImageHeader::SIGNED], signature: &Signature) -> bool {
+    let key = VerifyingKey::from_bytes(key).unwrap();
     let signature = ed25519_dalek::Signature::from_components(signature.r, signature.s);
     key.verify_strict(signed, &signature).is_ok()
 }
@@ -64,6 +68,7 @@ pub struct Bench {
 impl Bench {
     pub fn new(loss: f64, seed: u64) -> Self {
         let mut board = NativeBoard::new(&bench_settings(), &bench_mechanics(), seed).unwrap();
+        board.services_mut().key = public_key();
         board.services_mut().verifier = verify;
         let mut bench = Self {
             board,

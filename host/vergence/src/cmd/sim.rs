@@ -7,6 +7,7 @@ use serde_json::json;
 use crate::cli::Globals;
 use crate::console::Console;
 use crate::failure::Failure;
+use crate::firmware::{DEVELOPMENT, PublicKey};
 use crate::rig_file;
 use crate::sim::{Listener, SharedRig, SimulatedRig, serve};
 
@@ -26,11 +27,16 @@ pub struct Args {
     /// Keep saved settings in this file, so that they outlive the simulator.
     #[arg(long, value_name = "FILE")]
     flash: Option<PathBuf>,
+    /// Take firmware that is signed by this key: a file of 'image keygen', or the key that everybody knows. The simulator
+    /// plays the board's part of an update; what runs is always itself, under the name of the image.
+    #[arg(long, value_name = "FILE.pub", default_value = DEVELOPMENT)]
+    trust: PathBuf,
 }
 
 pub async fn run(args: &Args, globals: &Globals, console: Console) -> Result<(), Failure> {
     let rig = rig_file::load(globals.rig.as_deref())?;
     let mut simulated = SimulatedRig::new(&rig, args.seed)?;
+    simulated.trust(PublicKey::named(&args.trust)?.0);
     if let Some(path) = &args.flash {
         simulated.keep_flash_in(path)?;
     }

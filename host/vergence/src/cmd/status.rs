@@ -29,6 +29,7 @@ pub async fn run(args: &Args, globals: &Globals, console: Console) -> Result<(),
         let mut status = pose_json(board.rig(), board.pose());
         status["board"] = json!(info.board.as_str());
         status["firmware"] = json!(format!("{major}.{minor}.{patch}"));
+        status["build"] = json!(format!("{:016x}", info.build));
         status["reset"] = json!(format!("{:?}", info.reset));
         status["clock"] = clock_json(&board);
         if let Some(story) = &story {

@@ -2,9 +2,11 @@
 
 mod client;
 mod clock;
+mod management;
 mod open;
 mod port_lock;
 
 pub use client::{Client, LinkError, STREAM_PERIOD_US};
 pub use clock::HostClock;
+pub use management::ManagementLink;
 pub use open::{OpenWire, Port, Wire, open};

@@ -7,6 +7,7 @@ use std::time::Duration;
 
 use tokio::time::Instant;
 use vergence_control::{TICK_US, UNIT};
+use vergence_image::is_signed_by;
 use vergence_plant::{NativeBoard, Stage};
 use vergence_protocol::{AxisKind, Microseconds, ResetCause};
 use vergence_rig::{Rig, RigAxis, RigPose};
@@ -17,8 +18,10 @@ use crate::output::write_whole;
 /// The board's clock when the simulation starts, and how fast it runs against the host's: a quartz is never exact.
 const BOARD_START_US: u64 = 3_000_000;
 const BOARD_DRIFT: f64 = 40e-6;
-/// Names the start with settings from a file.
-const SECOND_BOOT: u32 = 2;
+/// Names the first start; the next ones follow.
+const FIRST_BOOT: u32 = 1;
+/// The oldest firmware that may replace this one: that of the board.
+const OLDEST: [u8; 3] = [0, 1, 0];
 /// When this process was kept from running for longer, simulated time slips instead of leaping over heartbeats that wait to be read.
 const LONGEST_STEP_US: u64 = 20_000;
 
@@ -30,6 +33,9 @@ pub struct SimulatedRig {
     /// The clock when the rig last ran, and how much time had passed for it by then.
     last_run: Instant,
     elapsed_us: u64,
+    /// What the board's clock showed when time began to pass.
+    started_us: u64,
+    boot: u32,
     output: Vec<u8>,
     flash: Option<FlashFile>,
 }
@@ -55,13 +61,30 @@ impl SimulatedRig {
         let stages: Vec<Stage> = rig.axes.iter().map(stage).collect();
         let settings: Vec<_> = stages.iter().map(|stage| stage.settings).collect();
         let mechanics: Vec<_> = stages.iter().map(|stage| stage.mechanics).collect();
-        let board = NativeBoard::new(&settings, &mechanics, seed).map_err(|error| {
-            Failure::usage(format!(
-                "rig '{}' cannot be simulated: its controller refuses the axes ({error:?})",
-                rig.name
-            ))
-        })?;
-        Ok(Self { board, rig: rig.clone(), last_run: Instant::now(), elapsed_us: 0, output: Vec::new(), flash: None })
+        let refused = |error| {
+            let name = &rig.name;
+            Failure::usage(format!("rig '{name}' cannot be simulated: its controller refuses the axes ({error:?})"))
+        };
+        let mut board = NativeBoard::new(&settings, &mechanics, seed).map_err(refused)?;
+        board.services_mut().oldest = OLDEST;
+        board.restart(ResetCause::PowerOn, FIRST_BOOT).map_err(refused)?;
+        Ok(Self {
+            board,
+            rig: rig.clone(),
+            last_run: Instant::now(),
+            elapsed_us: 0,
+            started_us: BOARD_START_US,
+            boot: FIRST_BOOT,
+            output: Vec::new(),
+            flash: None,
+        })
+    }
+
+    /// Lets the board take firmware that is signed by `key`, an Ed25519 public key.
+    pub fn trust(&mut self, key: [u8; 32]) {
+        let services = self.board.services_mut();
+        services.key = key;
+        services.verifier = |key, signed, signature| is_signed_by(key, signed, signature);
     }
 
     /// Switches the board on with the settings that `path` holds, and keeps later ones there. A file that is not there
@@ -84,8 +107,9 @@ impl SimulatedRig {
             Err(error) => return Err(Failure::input(path, error)),
         }
         self.flash = Some(FlashFile { path: path.to_owned(), written: flash.operations() });
+        self.boot += 1;
         self.board
-            .restart(ResetCause::PowerOn, SECOND_BOOT)
+            .restart(ResetCause::PowerOn, self.boot)
             .map_err(|error| Failure::input(path, format!("the board does not start with these settings ({error:?})")))
     }
 
@@ -113,7 +137,7 @@ impl SimulatedRig {
         self.last_run += Duration::from_micros(passed);
         self.elapsed_us += passed.min(LONGEST_STEP_US);
         let drifted = self.elapsed_us as f64 * (1.0 + BOARD_DRIFT);
-        let until = BOARD_START_US + drifted as u64;
+        let until = self.started_us + drifted as u64;
         // A UART sends while the board runs, not after: a pose must not wait for the next one and be replaced by it.
         while self.board.now().0 < until {
             self.board.advance(Microseconds(until.min(self.board.now().0 + TICK_US)));
@@ -126,6 +150,18 @@ impl SimulatedRig {
         self.run_to_now();
         self.board.receive(bytes);
         self.output.append(&mut self.board.transmit());
+        if self.board.take_reboot().is_some() {
+            self.restart();
+        }
+    }
+
+    /// Starts the board's software again. There is no boot loader to stay in.
+    fn restart(&mut self) {
+        self.boot += 1;
+        // It has started with these settings before.
+        if self.board.restart(ResetCause::Software, self.boot).is_ok() {
+            (self.started_us, self.elapsed_us) = (0, 0);
+        }
     }
 
     /// What the board sent since this was last asked.

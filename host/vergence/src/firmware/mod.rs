@@ -1,0 +1,11 @@
+//! Firmware images on the host: keys, files, and what becomes of an ELF file.
+
+mod flat;
+mod hardware;
+mod image;
+mod keys;
+
+pub use flat::{build_of, elf_start, flatten, is_elf};
+pub use hardware::{Hardware, hardware_name};
+pub use image::{OwnedImage, header_json, parse_version, version_text};
+pub use keys::{DEVELOPMENT, PublicKey, SecretKey, fresh_secret, hex};
