@@ -31,6 +31,7 @@ const VERBS: &[&str] = &[
     "sim",
     "demo",
     "depth",
+    "models",
     "zones",
     "capture",
     "calibrate",

@@ -74,17 +74,52 @@ fn flatness(points: &[Vector3<f64>]) -> f64 {
     (scatter.symmetric_eigenvalues().min() / count).sqrt()
 }
 
+/// Writes the rig file of the set into `folder`.
+fn write_rig(set: &Path, folder: &Path) -> String {
+    let text = std::fs::read_to_string(set.join("reference_opencv_classic_cv5.json")).expect("a reference");
+    let reference: Value = serde_json::from_str(&text).expect("JSON");
+    let rig = folder.join("rig.toml");
+    std::fs::write(&rig, rig_file(&reference["stereo"]["kb4_scipy_ba_trimmed"])).expect("written");
+    rig.to_string_lossy().into_owned()
+}
+
+/// The published networks see the same scene, and nearly all that both matchers see lies at the same range.
+#[test]
+fn networks_and_the_classical_matcher_agree_on_a_real_pair() {
+    let (Some(set), Some(models)) = (shared("data/sourishg_stereo"), shared("models")) else { return };
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    let file = |name: &str| folder.path().join(name).to_string_lossy().into_owned();
+    let image = |name: &str| set.join("images").join(name).to_string_lossy().into_owned();
+    let (rig, left, right, store) =
+        (write_rig(&set, folder.path()), image("left10.jpg"), image("right10.jpg"), file("store"));
+    run_json(&["models", "add", &models.to_string_lossy(), "--models", &store, "--json"]);
+    let depth = ["depth", "--json", "--rig", &rig, "--left", &left, "--right", &right];
+    let (learned, classical) = (file("learned.ply"), file("classical.ply"));
+    run_json(&[&depth[..], &["--out", &learned, "--matcher", "learned", "--models", &store]].concat());
+    run_json(&[&depth[..], &["--out", &classical]].concat());
+    let [learned, classical] = [learned, classical].map(|cloud| points(Path::new(&cloud)));
+    // Points of the two clouds that lie in one direction to half a degree.
+    let (mut near, mut alike) = (0, 0);
+    for point in &learned {
+        let closest = classical.iter().min_by(|a, b| a.angle(point).total_cmp(&b.angle(point))).expect("points");
+        if closest.angle(point) < 0.5_f64.to_radians() {
+            near += 1;
+            alike += usize::from((closest.norm() / point.norm() - 1.0).abs() < 0.1);
+        }
+    }
+    println!("{} points by networks, {} classical; {alike} of {near} neighbours alike", learned.len(), classical.len());
+    assert!(learned.len() >= 100 && near >= 50);
+    assert!(alike * 10 >= near * 8, "{alike} of {near} neighbours lie at the same range");
+}
+
 #[test]
 fn a_cloud_and_a_flat_board_from_a_real_pair() {
     let Some(set) = shared("data/sourishg_stereo") else { return };
     let folder = tempfile::tempdir().expect("a temporary folder");
     let file = |name: &str| folder.path().join(name).to_string_lossy().into_owned();
-    let text = std::fs::read_to_string(set.join("reference_opencv_classic_cv5.json")).expect("a reference");
-    let reference: Value = serde_json::from_str(&text).expect("JSON");
-    std::fs::write(file("rig.toml"), rig_file(&reference["stereo"]["kb4_scipy_ba_trimmed"])).expect("written");
     std::fs::write(file("pairs.csv"), correspondences(&set.join("corners_opencv_classic.csv"))).expect("written");
     let image = |name: &str| set.join("images").join(name).to_string_lossy().into_owned();
-    let (rig, left, right) = (file("rig.toml"), image("left10.jpg"), image("right10.jpg"));
+    let (rig, left, right) = (write_rig(&set, folder.path()), image("left10.jpg"), image("right10.jpg"));
     let (cloud, board, pairs) = (file("cloud.ply"), file("board.ply"), file("pairs.csv"));
     let depth = ["depth", "--json", "--rig", &rig, "--left", &left, "--right", &right, "--out"];
 

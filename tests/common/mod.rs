@@ -10,7 +10,12 @@ use serde_json::Value;
 /// The binary with `arguments`, and none of the caller's own settings.
 pub fn vergence(arguments: &[&str]) -> Command {
     let mut command = Command::new(env!("CARGO_BIN_EXE_vergence"));
-    command.args(arguments).env_remove("VERGENCE_PORT").env_remove("VERGENCE_RIG").stdin(Stdio::null());
+    command
+        .args(arguments)
+        .env_remove("VERGENCE_PORT")
+        .env_remove("VERGENCE_RIG")
+        .env_remove("VERGENCE_MODELS")
+        .stdin(Stdio::null());
     command.env("VERGENCE_STORE", "/nowhere/calibrations");
     command
 }

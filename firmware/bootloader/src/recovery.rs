@@ -40,7 +40,7 @@ pub struct Line {
 
 /// Serves until the host asks for another start.
 pub fn serve(line: Line, services: Services) -> ! {
-    let Some((mut rx, tx)) = open(line) else { panic!("serial line") };
+    let Some((mut rx, tx)) = open(line) else { reboot(RebootTo::Application) };
     let mut recovery = Recovery { tx, services, updater: Updater::default(), seq: 0 };
     let mut receiver = Receiver::new();
     loop {

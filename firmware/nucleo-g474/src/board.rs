@@ -6,7 +6,7 @@ use embassy_stm32::gpio::{Input, Level, Output, Pull, Speed};
 use embassy_stm32::mode::Async;
 use embassy_stm32::usart::{self, RingBufferedUartRx, Uart, UartTx};
 use embassy_stm32::wdg::IndependentWatchdog;
-use embassy_stm32::{Peri, Peripherals, bind_interrupts, dma, pac, peripherals, rng};
+use embassy_stm32::{Peri, Peripherals, bind_interrupts, dma, pac, peripherals, rcc};
 use static_cell::StaticCell;
 
 use crate::encoder::Encoder;
@@ -23,7 +23,6 @@ bind_interrupts!(struct Interrupts {
     LPUART1 => usart::InterruptHandler<peripherals::LPUART1>;
     DMA1_CHANNEL1 => dma::InterruptHandler<peripherals::DMA1_CH1>;
     DMA1_CHANNEL2 => dma::InterruptHandler<peripherals::DMA1_CH2>;
-    RNG => rng::InterruptHandler<peripherals::RNG>;
 });
 
 impl StepDma for peripherals::DMA1_CH3 {
@@ -47,7 +46,7 @@ pub struct Board {
     /// Not yet opened.
     pub line: SerialLine,
     /// Random numbers.
-    pub random: rng::Rng<'static, peripherals::RNG>,
+    pub random: Peri<'static, peripherals::RNG>,
     /// Flash.
     pub flash: Peri<'static, peripherals::FLASH>,
 }
@@ -85,7 +84,7 @@ impl Board {
             watchdog: IndependentWatchdog::new(p.IWDG, PATIENCE_US),
             led: Output::new(p.PA5, Level::High, Speed::Low),
             line: SerialLine { port: p.LPUART1, tx: p.PA2, rx: p.PA3, tx_dma: p.DMA1_CH2, rx_dma: p.DMA1_CH1 },
-            random: rng::Rng::new(p.RNG, Interrupts),
+            random: p.RNG,
             flash: p.FLASH,
         }
     }
@@ -110,6 +109,14 @@ impl SerialLine {
         let (tx, rx) = uart.split();
         Some((rx.into_ring_buffered(RING.init_with(|| [0; link::RING])), tx))
     }
+}
+
+/// One random number, for which the generator takes some microseconds; `None` where it does not work.
+pub fn random(_generator: Peri<'static, peripherals::RNG>) -> Option<u32> {
+    const PATIENCE: u32 = 10_000;
+    rcc::enable_and_reset::<peripherals::RNG>();
+    pac::RNG.cr().write(|w| w.set_rngen(true));
+    (0..PATIENCE).find_map(|_| pac::RNG.sr().read().drdy().then(|| pac::RNG.dr().read()))
 }
 
 /// Switches the drivers off from wherever the program died: the pin of [`Rig::drivers_off`], without its owner.

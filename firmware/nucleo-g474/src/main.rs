@@ -24,6 +24,7 @@ use vergence_control::{BoardSettings, Node, NodeIdentity};
 use vergence_image::layout::HARDWARE;
 use vergence_nucleo_common::Services;
 use vergence_nucleo_common::clocks::{self, Source};
+use vergence_nucleo_common::memory::survivor;
 
 /// The oldest version that this one may be replaced by.
 const OLDEST: [u8; 3] = [0, 1, 0];
@@ -44,11 +45,12 @@ async fn main(spawner: Spawner) {
     };
     log::greet(&identity);
     let mut services = Services::of_application(&board.flash);
-    let Ok(defaults) = BoardSettings::new(&factory::axes()) else { panic!("factory settings") };
-    let Ok(node) = Node::new(&defaults, identity, board.random.next_u32(), &mut services) else {
-        panic!("factory settings");
+    let Ok(defaults) = BoardSettings::new(&factory::axes()) else { memory::give_up("factory settings") };
+    let boot = board::random(board.random).unwrap_or_else(|| survivor().starts);
+    let Ok(node) = Node::new(&defaults, identity, boot, &mut services) else {
+        memory::give_up("factory settings");
     };
-    let Some((rx, tx)) = board.line.open(node.settings().baud) else { panic!("serial line") };
+    let Some((rx, tx)) = board.line.open(node.settings().baud) else { memory::give_up("serial line") };
     control::start(node, board.rig, services, board.tick);
     if let (Ok(receive), Ok(transmit), Ok(watch)) =
         (link::receive(rx), link::transmit(tx), watchdog::watch(board.watchdog, board.led))

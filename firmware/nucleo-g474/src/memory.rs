@@ -64,6 +64,11 @@ unsafe fn HardFault(frame: &ExceptionFrame) -> ! {
     die(Death::hard_fault(frame.pc(), frame.lr()))
 }
 
+/// Without `what` nothing goes: after three such starts the boot loader waits for another image.
+pub fn give_up(what: &str) -> ! {
+    die(Death::panic(what, 0))
+}
+
 /// Drivers off, note the cause, start again.
 fn die(death: Death) -> ! {
     crate::board::cut_drivers();

@@ -25,7 +25,10 @@ const PULSE_US: u16 = 100;
 /// Pulses further ahead than this wait in software: the counter has 16 bits.
 const HORIZON_US: u64 = 10_000;
 
-static EDGES: Mutex<RefCell<Deque<(u64, [i32; 2]), 4>>> = Mutex::new(RefCell::new(Deque::new()));
+/// Instants in microseconds, and both counts.
+type Edges = Deque<(u64, [i32; 2]), 4>;
+
+static EDGES: Mutex<RefCell<Edges>> = Mutex::new(RefCell::new(Deque::new()));
 
 /// The trigger output.
 pub struct Trigger {

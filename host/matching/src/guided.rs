@@ -32,11 +32,11 @@ impl Default for GuidedMatcher {
 }
 
 /// Resolutions in which keypoints are sought.
-const LEVELS: usize = 3;
+pub(crate) const LEVELS: usize = 3;
 /// Density of a view in pixels per radian that small images are enlarged to and large ones need not exceed.
-const DENSITY: f64 = 450.0;
+pub(crate) const DENSITY: f64 = 450.0;
 /// How far a keypoint may be off, in pixels of its level.
-const KEYPOINT_TOLERANCE: f64 = 1.5;
+pub(crate) const KEYPOINT_TOLERANCE: f64 = 1.5;
 /// How far off the epipolar curve a registered match may be, in pixels, where the pose is exact.
 const REGISTERED_TOLERANCE: f64 = 1.2;
 /// Standard deviation of that, in pixels.
@@ -90,11 +90,11 @@ impl Matcher for GuidedMatcher {
 }
 
 /// What is compared of one view.
-struct Features {
-    pyramid: Pyramid,
+pub(crate) struct Features {
+    pub pyramid: Pyramid,
     /// By rows.
-    keypoints: Vec<Keypoint>,
-    descriptors: Vec<Descriptor>,
+    pub keypoints: Vec<Keypoint>,
+    pub descriptors: Vec<Descriptor>,
 }
 
 impl Features {
@@ -121,7 +121,7 @@ impl Features {
 }
 
 /// Whether the camera sees all around a keypoint: its rim would look like an edge of the scene.
-fn surrounded<F: Frame>(view: &View<F>, keypoint: &Keypoint) -> bool {
+pub(crate) fn surrounded<F: Frame>(view: &View<F>, keypoint: &Keypoint) -> bool {
     const MARGIN: f64 = 6.0; // of the level
     let reach = MARGIN * (1_usize << keypoint.level) as f64;
     let ViewPixel { x, y } = keypoint.at;
@@ -132,13 +132,13 @@ fn surrounded<F: Frame>(view: &View<F>, keypoint: &Keypoint) -> bool {
 
 /// A left keypoint's partner in the right view.
 #[derive(Clone, Copy)]
-struct Link {
-    right: ViewPixel,
-    score: f64,
+pub(crate) struct Link {
+    pub right: ViewPixel,
+    pub score: f64,
 }
 
 /// One entry for every left keypoint.
-type Links = Vec<Result<Link, Drop>>;
+pub(crate) type Links = Vec<Result<Link, Drop>>;
 
 /// The most alike keypoint of `to` for every keypoint of `from`.
 fn nearest(
@@ -186,7 +186,7 @@ fn compare(left: &Features, right: &Features, band: &EpipolarBand) -> Links {
 }
 
 /// Replaces every link's right position by the registered one, and drops what the pose does not allow there.
-fn register(links: &mut Links, left: &Features, right: &Features, band: &EpipolarBand) {
+pub(crate) fn register(links: &mut Links, left: &Features, right: &Features, band: &EpipolarBand) {
     let pyramids = [&left.pyramid, &right.pyramid];
     links.par_iter_mut().zip(&left.keypoints).for_each(|(link, keypoint)| {
         *link = link.and_then(|start| {
@@ -200,7 +200,7 @@ fn register(links: &mut Links, left: &Features, right: &Features, band: &Epipola
 }
 
 /// Drops what is off the epipolar planes of the pose that the links agree on.
-fn agree_on_pose(links: &mut Links, left: &Features, grid: &Grid, pose_sigma: Angle) {
+pub(crate) fn agree_on_pose(links: &mut Links, left: &Features, grid: &Grid, pose_sigma: Angle) {
     let pixel = Angle::from_rad(1.0 / grid.pixels_per_radian());
     let bearings = |keypoint: &Keypoint, link: &Link| Some([grid.bearing(keypoint.at)?, grid.bearing(link.right)?]);
     let linked = links.iter().zip(&left.keypoints);
@@ -217,7 +217,7 @@ fn agree_on_pose(links: &mut Links, left: &Features, grid: &Grid, pose_sigma: An
 }
 
 /// Drops what a view shows again where the partner might lie.
-fn drop_repeated(links: &mut Links, left: &Features, right: &Features, band: &EpipolarBand) {
+pub(crate) fn drop_repeated(links: &mut Links, left: &Features, right: &Features, band: &EpipolarBand) {
     let (Some(in_left), Some(in_right)) = (Surroundings::of(&left.pyramid), Surroundings::of(&right.pyramid)) else {
         return;
     };
@@ -232,7 +232,7 @@ fn drop_repeated(links: &mut Links, left: &Features, right: &Features, band: &Ep
 }
 
 /// Drops the links that `judge` rejects.
-fn keep(links: &mut Links, left: &Features, judge: impl Fn(&[Placed]) -> Vec<bool>, reason: Drop) {
+pub(crate) fn keep(links: &mut Links, left: &Features, judge: impl Fn(&[Placed]) -> Vec<bool>, reason: Drop) {
     let place = |(link, keypoint): (&Result<Link, Drop>, &Keypoint)| {
         let link = link.as_ref().ok()?;
         Some(Placed { left: keypoint.at, disparity: keypoint.at.x - link.right.x, score: link.score })
@@ -247,7 +247,7 @@ fn keep(links: &mut Links, left: &Features, judge: impl Fn(&[Placed]) -> Vec<boo
 }
 
 /// The match in pixels of the original images.
-fn in_originals(
+pub(crate) fn in_originals(
     left_view: &View<Left>,
     right_view: &View<Right>,
     keypoint: &Keypoint,

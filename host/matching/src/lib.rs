@@ -6,7 +6,7 @@
 //!
 //! A [`Matcher`] takes an [`ImagePair`] and returns [`Matches`], with a reason for every keypoint it gave up.
 //! [`GuidedMatcher`] is the classical one: corners, gradient histograms compared inside the epipolar band, then least
-//! squares registration.
+//! squares registration. [`learned::LearnedMatcher`] asks pre-trained networks of the LightGlue family instead.
 //!
 //! Terms: *keypoint*, a position worth comparing; *descriptor*, what its surroundings look like; *disparity*,
 //! a_L − a_R, the parallax along a row; *level*, the halvings of a view's resolution.
@@ -19,6 +19,7 @@ mod descriptor;
 mod distinct;
 mod epipolar_band;
 mod guided;
+pub mod learned;
 mod matcher;
 mod neighbours;
 mod plane;

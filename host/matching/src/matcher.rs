@@ -110,7 +110,7 @@ impl Drop {
 }
 
 /// Why a pair cannot be matched.
-#[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum MatchError {
     /// An image has no pixels.
@@ -141,6 +141,9 @@ pub enum MatchError {
     /// No direction is seen by both cameras.
     #[error("the two cameras share no field of view")]
     NoSharedField,
+    /// A network failed.
+    #[error(transparent)]
+    Network(#[from] crate::learned::NetworkError),
 }
 
 impl ImagePair<'_> {

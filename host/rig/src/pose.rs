@@ -1,10 +1,11 @@
 //! Where the cameras were at an exposure.
 
+use nalgebra::{Matrix6, Vector6};
 use vergence_vision::{Angle, Base, Left, Length, Right, Transform};
 
 use crate::axis::AxisPosition;
 use crate::rig::Rig;
-use crate::track::JointsAt;
+use crate::track::{JointsAt, UNIFORM};
 
 /// The pose of the rig at one instant, with what is uncertain about it.
 #[derive(Clone, Debug, PartialEq)]
@@ -19,6 +20,9 @@ pub struct RigPose {
     pub rotation_sigma: Angle,
     /// Standard deviation of the relative translation, from encoders and calibration.
     pub translation_sigma: Length,
+    /// Covariance of the relative pose, from encoders, their timing and calibration: a turn ω about the left axes in radians
+    /// and a shift δ of the right camera in the left frame in millimetres. The calibration's sigmas count for each component.
+    pub covariance: Matrix6<f64>,
 }
 
 impl RigPose {
@@ -33,40 +37,83 @@ impl Rig {
     /// The pose with the axes at exactly `values` (millimetres or radians), as far as the calibration knows it.
     #[must_use]
     pub fn pose_at_values(&self, values: &[f64]) -> RigPose {
-        let (base_from_left, left_from_right) = self.transforms(values);
-        let axes =
-            self.axes.iter().zip(values).map(|(axis, &value)| AxisPosition::from_value(axis.kind, value)).collect();
+        let (base_from_left, left_from_right) = self.transforms(values, values);
+        let (turn, shift) = (self.calibration_sigma.0.rad().powi(2), self.calibration_sigma.1.mm().powi(2));
         RigPose {
             base_from_left,
             left_from_right,
-            axes,
+            axes: self.positions(values),
             rotation_sigma: self.calibration_sigma.0,
             translation_sigma: self.calibration_sigma.1,
+            covariance: Matrix6::from_diagonal(&Vector6::new(turn, turn, turn, shift, shift, shift)),
         }
+    }
+
+    /// The pose with the axes standing at `values`, read by the encoders.
+    #[must_use]
+    pub fn pose_read_at(&self, values: &[f64]) -> RigPose {
+        let counts = self.axes.iter().zip(values).map(|(axis, value)| value / axis.value_per_count() - 0.5).collect();
+        self.pose(&JointsAt { counts, sigma: vec![UNIFORM; self.axes.len()], timing: vec![0.0; self.axes.len()] })
     }
 
     /// The pose at `joints`, with the encoders' share of the uncertainty to first order.
     #[must_use]
     pub fn pose(&self, joints: &JointsAt) -> RigPose {
-        let values: Vec<f64> = self.axes.iter().zip(&joints.counts).map(|(axis, &c)| axis.value_at(c)).collect();
-        let mut pose = self.pose_at_values(&values);
+        self.pose_of_each(joints, joints)
+    }
+
+    /// The pose of the left camera with the axes at `left`, and of the right camera with the axes at `right`: two instants of
+    /// one motion. The readings' errors count as common to both instants.
+    #[must_use]
+    pub fn pose_of_each(&self, left: &JointsAt, right: &JointsAt) -> RigPose {
+        let values = [left, right].map(|joints| self.values(joints));
+        let exact = self.transforms(&values[0], &values[1]);
+        let mut pose = self.pose_at_values(&values[0]);
+        (pose.base_from_left, pose.left_from_right) = exact;
+        // By each reading alone, then by the instant, which moves all axes at once.
+        let alone = (0..self.axes.len()).map(|index| {
+            [left, right].map(|joints| {
+                let sigma = |i: usize| if i == index { joints.sigma.get(i).copied().unwrap_or(0.0) } else { 0.0 };
+                (0..self.axes.len()).map(sigma).collect::<Vec<f64>>()
+            })
+        });
+        let together = [left, right].map(|joints| joints.timing.clone());
         let (mut rotation, mut translation) = (pose.rotation_sigma.rad(), pose.translation_sigma.mm());
-        for (index, (axis, sigma)) in self.axes.iter().zip(&joints.sigma).enumerate() {
-            let mut moved = values.clone();
-            if let Some(value) = moved.get_mut(index) {
-                *value += sigma * axis.value_per_count();
-            }
-            let change = pose.right_from_left() * self.transforms(&moved).1;
+        for counts in alone.chain([together]) {
+            let moved = [0, 1].map(|side| {
+                let steps = self.axes.iter().zip(&counts[side]).map(|(axis, counts)| counts * axis.value_per_count());
+                values[side].iter().zip(steps).map(|(value, step)| value + step).collect::<Vec<f64>>()
+            });
+            let after = self.transforms(&moved[0], &moved[1]).1;
+            let change = exact.1.inverse() * after;
             rotation = rotation.hypot(change.rotation().angle());
             translation = translation.hypot(change.origin().mm().norm());
+            let twist = difference(&exact.1, &after);
+            pose.covariance += twist * twist.transpose();
         }
         pose.rotation_sigma = Angle::from_rad(rotation);
         pose.translation_sigma = Length::from_mm(translation);
         pose
     }
 
-    fn transforms(&self, values: &[f64]) -> (Transform<Base, Left>, Transform<Left, Right>) {
-        let base_from_left = self.left_chain.base_from_camera(values);
-        (base_from_left, base_from_left.inverse() * self.right_chain.base_from_camera(values))
+    fn values(&self, joints: &JointsAt) -> Vec<f64> {
+        self.axes.iter().zip(&joints.counts).map(|(axis, &counts)| axis.value_at(counts)).collect()
     }
+
+    fn positions(&self, values: &[f64]) -> Vec<AxisPosition> {
+        self.axes.iter().zip(values).map(|(axis, &value)| AxisPosition::from_value(axis.kind, value)).collect()
+    }
+
+    /// The left camera with the axes at `left`, and the right camera, with the axes at `right`, in its frame.
+    fn transforms(&self, left: &[f64], right: &[f64]) -> (Transform<Base, Left>, Transform<Left, Right>) {
+        let base_from_left = self.left_chain.base_from_camera(left);
+        (base_from_left, base_from_left.inverse() * self.right_chain.base_from_camera(right))
+    }
+}
+
+/// ω and δ from one pose to another.
+fn difference(from: &Transform<Left, Right>, to: &Transform<Left, Right>) -> Vector6<f64> {
+    let turn = (to.rotation() * from.rotation().inverse()).scaled_axis();
+    let shift = to.origin().mm() - from.origin().mm();
+    Vector6::new(turn.x, turn.y, turn.z, shift.x, shift.y, shift.z)
 }

@@ -23,18 +23,26 @@ pub struct JointSample {
 pub struct JointsAt {
     /// Interpolated counts of each axis.
     pub counts: Vec<f64>,
-    /// Standard deviation of each, in counts: the encoder's step and the uncertainty of the instant times the rate.
+    /// Standard deviation of each by itself, in counts: the encoder's step, and what the motion between two readings may
+    /// have done besides going straight.
     pub sigma: Vec<f64>,
+    /// How far each moves while the instant is off by one standard deviation, in counts. The instant is the same for all
+    /// axes, so these errors go together; the sign is that of the motion.
+    pub timing: Vec<f64>,
 }
 
 /// The standard deviation of an error anywhere within a width of one: 1/√12.
-const UNIFORM: f64 = 0.288_675_134_594_812_9;
+pub(crate) const UNIFORM: f64 = 0.288_675_134_594_812_9;
 
 impl JointsAt {
     /// Counts that the board latched at the very instant, as at the edge of a trigger pulse.
     #[must_use]
     pub fn latched(counts: &[Counts]) -> Self {
-        Self { counts: counts.iter().map(|counts| f64::from(counts.0)).collect(), sigma: vec![UNIFORM; counts.len()] }
+        Self {
+            counts: counts.iter().map(|counts| f64::from(counts.0)).collect(),
+            sigma: vec![UNIFORM; counts.len()],
+            timing: vec![0.0; counts.len()],
+        }
     }
 }
 
@@ -97,19 +105,36 @@ impl JointTrack {
             return Err(TrackGap::Gap(span / 1000.0));
         }
         let share = if span > 0.0 { (instant.us - previous.at.0 as f64) / span } else { 0.0 };
-        Ok(interpolate(previous, next, share, instant.error_us / span.max(1.0)))
+        let bend = self.bend(after, share);
+        Ok(interpolate(previous, next, share, &bend, instant.error_us / span.max(1.0)))
+    }
+
+    /// How far each axis may be off the straight line between two readings: share (1 - share) / 2 of the change of its
+    /// step from this interval to those beside it, the larger of both.
+    fn bend(&self, after: usize, share: f64) -> Vec<f64> {
+        let step = |to: usize, axis: usize| {
+            let counts = |index: usize| Some(f64::from(self.samples.get(index)?.counts.get(axis)?.0));
+            Some(counts(to)? - counts(to.checked_sub(1)?)?)
+        };
+        let axes = self.samples.get(after).map_or(0, |sample| sample.counts.len());
+        let of_axis = |axis| {
+            let here = step(after, axis)?;
+            let beside = [after.checked_sub(1).and_then(|before| step(before, axis)), step(after + 1, axis)];
+            let change = beside.into_iter().flatten().map(|there| (there - here).abs()).fold(0.0, f64::max);
+            Some(0.5 * share * (1.0 - share) * change)
+        };
+        (0..axes).map(|axis| of_axis(axis).unwrap_or(0.0)).collect()
     }
 }
 
 /// `instant_error` is the bound of the instant's error as a share of the span between the readings.
-fn interpolate(previous: &JointSample, next: &JointSample, share: f64, instant_error: f64) -> JointsAt {
-    let pairs = previous.counts.iter().zip(&next.counts);
-    let (counts, sigma) = pairs
-        .map(|(before, after)| {
-            let step = f64::from(after.0) - f64::from(before.0);
-            let timing = 2.0 * instant_error * step;
-            (f64::from(before.0) + share * step, UNIFORM * timing.hypot(1.0))
-        })
-        .unzip();
-    JointsAt { counts, sigma }
+fn interpolate(previous: &JointSample, next: &JointSample, share: f64, bend: &[f64], instant_error: f64) -> JointsAt {
+    let mut joints = JointsAt { counts: Vec::new(), sigma: Vec::new(), timing: Vec::new() };
+    for ((before, after), bend) in previous.counts.iter().zip(&next.counts).zip(bend) {
+        let step = f64::from(after.0) - f64::from(before.0);
+        joints.counts.push(f64::from(before.0) + share * step);
+        joints.sigma.push(UNIFORM.hypot(*bend));
+        joints.timing.push(UNIFORM * 2.0 * instant_error * step);
+    }
+    joints
 }

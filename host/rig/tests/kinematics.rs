@@ -85,7 +85,7 @@ proptest! {
     fn joint_sigma_becomes_pose_sigma(x in 120_000.0..440_000.0f64, s in 0.0..36_000.0f64, dx in 0.0..50.0f64, ds in 0.0..50.0f64) {
         let mut rig = bench();
         rig.calibration_sigma = (Angle::from_rad(0.0), Length::from_mm(0.0));
-        let pose = rig.pose(&JointsAt { counts: vec![x, s], sigma: vec![dx, ds] });
+        let pose = rig.pose(&JointsAt { counts: vec![x, s], sigma: vec![dx, ds], timing: vec![0.0; 2] });
         // The separation turns the relative pose one to one; both cameras sit on their pinions.
         let turned = ds * std::f64::consts::TAU / 100_000.0;
         prop_assert!((pose.rotation_sigma.rad() - turned).abs() < 1e-9);

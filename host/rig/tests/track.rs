@@ -55,8 +55,24 @@ fn an_uncertain_instant_costs_the_distance_moved_in_it() {
     let mut track = JointTrack::new(10);
     track.push(sample(0, &[0]));
     track.push(sample(10_000, &[1000]));
-    let at = |error_us| track.at(BoardInstant { us: 5_000.0, error_us }).expect("covered").sigma[0];
+    let at = |error_us| track.at(BoardInstant { us: 5_000.0, error_us }).expect("covered");
     // One count, uniform: 1/√12. Plus or minus 100 us at 0.1 counts/us: 20 counts, uniform.
-    assert!((at(0.0) - 1.0 / 12f64.sqrt()).abs() < 1e-12);
-    assert!((at(100.0) - (1.0f64 + 400.0).sqrt() / 12f64.sqrt()).abs() < 1e-9);
+    assert!((at(0.0).sigma[0] - 1.0 / 12f64.sqrt()).abs() < 1e-12);
+    assert!((at(0.0).timing[0]).abs() < 1e-12);
+    assert!((at(100.0).sigma[0] - 1.0 / 12f64.sqrt()).abs() < 1e-12);
+    assert!((at(100.0).timing[0] - 20.0 / 12f64.sqrt()).abs() < 1e-9);
+}
+
+/// Under constant acceleration the truth is off the straight line by what the track says.
+#[test]
+fn a_bend_of_the_motion_is_owned_up_to() {
+    let mut track = JointTrack::new(10);
+    for n in 0..6 {
+        track.push(sample(n * 10_000, &[(50 * n * n) as i32]));
+    }
+    let joints = track.at(instant(25_000.0)).expect("covered");
+    let truth = 50.0 * 2.5 * 2.5;
+    let off = (joints.counts[0] - truth).abs();
+    assert!((off - 12.5).abs() < 1e-9);
+    assert!(joints.sigma[0] >= off && joints.sigma[0] < 1.01 * off, "{}", joints.sigma[0]);
 }

@@ -66,7 +66,7 @@ enum Verb {
     Mode(cmd::mode::Args),
     /// Go to any pose.
     Move(cmd::move_to::Args),
-    /// Show a move before it is made: time, segments, zones.
+    /// Show a move before it is made, or find the pose that measures as asked.
     Plan(cmd::plan::Args),
     /// Brake now, even while another vergence holds the port.
     Stop(cmd::stop::Args),
@@ -88,6 +88,8 @@ enum Verb {
     Demo(cmd::demo::Args),
     /// Turn a pair of photographs into a cloud of points.
     Depth(cmd::depth::Args),
+    /// Keep pre-trained networks for matching.
+    Models(cmd::models::Args),
     /// Tell how much of the surroundings both cameras, one, or none see.
     Zones(cmd::zones::Args),
     /// Take a set of board views for calibration, with advice on what to show.
@@ -164,7 +166,8 @@ fn execute(cli: Cli) -> Result<(), Failure> {
             Verb::Soak(args) => cmd::soak::run(&args, console),
             Verb::Demo(args) => cmd::demo::run(&args, &globals, console).await,
             Verb::Depth(args) => cmd::depth::run(&args, &globals, console),
-            Verb::Zones(args) => cmd::zones::run(&args, console),
+            Verb::Models(args) => cmd::models::run(&args, console),
+            Verb::Zones(args) => cmd::zones::run(&args, &globals, console),
             Verb::Capture(args) => cmd::capture::run(&args, &globals, console),
             Verb::Calibrate(args) => cmd::calibrate::run(&args, &globals, console).await,
             Verb::Camera(args) => cmd::camera::run(&args, console),

@@ -18,6 +18,7 @@ mod corners;
 pub mod failure;
 pub mod link;
 pub mod look;
+pub mod models;
 pub mod move_plan;
 mod output;
 mod provenance;

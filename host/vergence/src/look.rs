@@ -5,7 +5,9 @@ use std::collections::BTreeMap;
 use image::{RgbImage, imageops::grayscale};
 use vergence_matching::{ImagePair, MatchError, Matcher};
 use vergence_rig::{Rig, RigPose};
-use vergence_vision::{Angle, CloudPoint, Gates, Length, PixelPair, StereoPair, cloud};
+use vergence_vision::{
+    Angle, CloudPoint, Gates, Length, PixelPair, PoseDrift, SharedCovariance, StereoPair, cloud, pose_drift,
+};
 
 use crate::stopwatch::Stopwatch;
 
@@ -15,6 +17,8 @@ pub const PIXEL_SIGMA: f64 = 0.2;
 const GATE_SIGMAS: f64 = 3.0;
 /// The nearest range at which points are looked for.
 const NEAREST: Length = Length::from_mm(200.0);
+/// The matcher looks at least this far off the known pose, so that a pose which is off can be noticed.
+const LEAST_MATCHING_SIGMA: Angle = Angle::from_deg(0.15);
 /// A point whose range is less certain than this part of it is of no use.
 const MAX_RELATIVE_SIGMA: f64 = 0.05;
 
@@ -43,6 +47,8 @@ pub struct Look {
     pub points: Vec<ColouredPoint>,
     /// Candidates that made no point, by reason. Those of the matcher count left keypoints, the others matches.
     pub dropped: BTreeMap<&'static str, usize>,
+    /// What the matches say of the pose, where there are enough. Nothing was corrected by it.
+    pub pose_drift: Option<PoseDrift>,
     /// How many matches there were.
     pub matches: usize,
     /// How long matching took.
@@ -55,7 +61,7 @@ pub struct Look {
 ///
 /// # Errors
 /// Where the images do not belong to the cameras, or the cameras share no field.
-pub fn look(eyes: Eyes<'_>, rig: &Rig, pose: &RigPose, matcher: &impl Matcher) -> Result<Look, MatchError> {
+pub fn look(eyes: Eyes<'_>, rig: &Rig, pose: &RigPose, matcher: &dyn Matcher) -> Result<Look, MatchError> {
     let matching = Stopwatch::start();
     let (left, right) = (grayscale(eyes.left), grayscale(eyes.right));
     let found = matcher.find(&ImagePair {
@@ -64,7 +70,7 @@ pub fn look(eyes: Eyes<'_>, rig: &Rig, pose: &RigPose, matcher: &impl Matcher) -
         left_camera: &rig.left_camera,
         right_camera: &rig.right_camera,
         left_from_right: pose.left_from_right,
-        pose_sigma: pose.rotation_sigma,
+        pose_sigma: Angle::from_rad(pose.rotation_sigma.rad().max(LEAST_MATCHING_SIGMA.rad())),
         nearest: NEAREST,
     })?;
     let match_seconds = matching.seconds();
@@ -90,6 +96,7 @@ pub fn triangulate(pairs: &[PixelPair], eyes: Eyes<'_>, rig: &Rig, pose: &RigPos
         .collect();
     Look {
         points,
+        pose_drift: pose_drift(pairs, &stereo, PIXEL_SIGMA, &pose.covariance),
         dropped: result.dropped.into_iter().map(|(reason, count)| (reason.as_str(), count)).collect(),
         matches: pairs.len(),
         match_seconds: 0.0,
@@ -100,14 +107,26 @@ pub fn triangulate(pairs: &[PixelPair], eyes: Eyes<'_>, rig: &Rig, pose: &RigPos
 /// Gates as wide as what is uncertain: pixels and pose.
 fn gates(rig: &Rig, pose: &RigPose) -> Gates {
     let pixel = PIXEL_SIGMA / rig.left_camera.pixels_per_radian(Angle::from_rad(0.0));
-    // Two matched positions and the relative rotation.
-    let residual = (std::f64::consts::SQRT_2 * pixel).hypot(pose.rotation_sigma.rad());
     Gates {
-        epipolar: Angle::from_rad(GATE_SIGMAS * residual),
+        epipolar_sigmas: GATE_SIGMAS,
         min_parallax: Angle::from_rad(GATE_SIGMAS * std::f64::consts::SQRT_2 * pixel),
         max_range: None,
         pixel_sigma: PIXEL_SIGMA,
         max_relative_sigma: MAX_RELATIVE_SIGMA,
+        shared: SharedCovariance::exact().with_pose(&pose.covariance),
+        ..Gates::default()
+    }
+}
+
+impl Look {
+    /// A sentence where the picture disagrees with the pose by more than the pose is said to be off.
+    #[must_use]
+    pub fn warning(&self) -> Option<String> {
+        let drift = self.pose_drift.as_ref().filter(|drift| drift.is_significant())?;
+        Some(format!(
+            "the encoders and the picture disagree by {:.2}: nothing was corrected; calibrate again or check the mounts",
+            drift.angle
+        ))
     }
 }
 

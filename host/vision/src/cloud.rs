@@ -5,10 +5,11 @@ use std::fmt;
 
 use nalgebra::Matrix3;
 
-use crate::covariance::{covariance, range_sigma};
+use crate::covariance::range_sigma;
 use crate::epipolar::ray_to_plane;
-use crate::triangulation::{Rejection, Triangulated, pseudo_intersection};
-use crate::{Angle, KannalaBrandt, Left, Length, Pixel, Point, Right, Transform, UnitRay};
+use crate::triangulation::{Kernel, Rejection, Triangulated};
+use crate::uncertainty::{PointUncertainty, ResidualUncertainty, SharedCovariance};
+use crate::{Angle, KannalaBrandt, Left, Length, Pixel, Point, Right, Transform};
 
 /// The same thing seen in both images.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -30,11 +31,13 @@ pub struct StereoPair<'a> {
     pub left_from_right: Transform<Left, Right>,
 }
 
-/// What a pair must satisfy to become a point. A limit that is not a number lets nothing pass.
+/// What is uncertain about a pair, what it must satisfy to become a point, and how it becomes one. A limit that is not a
+/// number lets nothing pass.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Gates {
-    /// Largest angle of one ray to the epipolar plane of the other.
-    pub epipolar: Angle,
+    /// Largest angle of one ray to the epipolar plane of the other, in standard deviations of that angle: those of the
+    /// pixels and of what is shared.
+    pub epipolar_sigmas: f64,
     /// Smallest angle that the baseline spans as seen from the point.
     pub min_parallax: Angle,
     /// Largest distance from the left optical centre, if there is a limit.
@@ -43,6 +46,26 @@ pub struct Gates {
     pub pixel_sigma: f64,
     /// Largest standard deviation of the range, as a part of the range.
     pub max_relative_sigma: f64,
+    /// How well lenses and pose are known.
+    pub shared: SharedCovariance,
+    /// The method of triangulation.
+    pub kernel: Kernel,
+}
+
+impl Default for Gates {
+    /// Three standard deviations with lenses and pose known exactly and matches good to a fifth of a pixel; every range that
+    /// is known to a twentieth.
+    fn default() -> Self {
+        Self {
+            epipolar_sigmas: 3.0,
+            min_parallax: Angle::from_rad(0.0),
+            max_range: None,
+            pixel_sigma: 0.2,
+            max_relative_sigma: 0.05,
+            shared: SharedCovariance::exact(),
+            kernel: Kernel::PseudoIntersection,
+        }
+    }
 }
 
 /// Why a pair made no point: the first gate that it failed.
@@ -65,6 +88,8 @@ pub enum Drop {
     TooFar,
     /// The range is too uncertain.
     Uncertain,
+    /// The method of triangulation finds no point here: the rectified view does not hold it, or no minimum is near.
+    NoPoint,
 }
 
 /// A point, where it came from and how good it is.
@@ -78,10 +103,12 @@ pub struct CloudPoint {
     pub point: Point<Left>,
     /// Standard deviation of its distance from the left optical centre.
     pub sigma_range: Length,
-    /// Its covariance in mm², in the left frame.
+    /// Its covariance in mm², in the left frame: from its pixels and from what all points of the pair share.
     pub covariance: Matrix3<f64>,
     /// The angle of one ray to the epipolar plane of the other; sign as [`crate::dihedral`].
     pub residual: Angle,
+    /// Standard deviation of that angle.
+    pub residual_sigma: Angle,
 }
 
 /// The points of one stereo pair, and how many matches were dropped for which reason.
@@ -99,39 +126,38 @@ pub struct Cloud {
 pub fn cloud(pairs: &[PixelPair], rig: &StereoPair<'_>, gates: &Gates) -> Cloud {
     let mut cloud = Cloud::default();
     for (pair_index, pixels) in pairs.iter().enumerate() {
-        match cloud_point(pair_index, *pixels, rig, gates) {
-            Ok(point) => cloud.points.push(point),
+        match cloud_point(pixels, rig, gates) {
+            Ok(point) => cloud.points.push(CloudPoint { pair_index, ..point }),
             Err(reason) => *cloud.dropped.entry(reason).or_default() += 1,
         }
     }
     cloud
 }
 
-fn cloud_point(pair_index: usize, pixels: PixelPair, rig: &StereoPair<'_>, gates: &Gates) -> Result<CloudPoint, Drop> {
+/// The point of one pair, numbered 0, as far as it passes `gates`.
+///
+/// # Errors
+/// The first gate that it failed.
+pub fn cloud_point(pixels: &PixelPair, rig: &StereoPair<'_>, gates: &Gates) -> Result<CloudPoint, Drop> {
     let left = rig.left.unproject::<Left>(pixels.left).map_err(|_| Drop::OutsideLeftField)?;
     let in_right = rig.right.unproject::<Right>(pixels.right).map_err(|_| Drop::OutsideRightField)?;
     let (right, right_centre) = (rig.left_from_right * in_right, rig.left_from_right.origin());
 
     let residual = ray_to_plane(&left, &right, &right_centre).ok_or(Drop::OnBaseline)?;
-    require(residual.abs() <= gates.epipolar, Drop::Epipolar)?;
+    let residual_sigma = ResidualUncertainty::of(&left, &in_right, rig, gates.pixel_sigma)
+        .map(|uncertainty| uncertainty.sigma(&gates.shared))
+        .ok_or(Drop::Uncertain)?;
+    require(residual.abs() <= residual_sigma * gates.epipolar_sigmas, Drop::Epipolar)?;
 
-    let Triangulated { point, left_range, parallax, .. } = pseudo_intersection(&left, &right, &right_centre)?;
+    let Triangulated { point, left_range, parallax, .. } = gates.kernel.of_rays(pixels, &left, &in_right, rig)?;
     require(parallax >= gates.min_parallax, Drop::Parallax)?;
     require(gates.max_range.is_none_or(|limit| left_range <= limit), Drop::TooFar)?;
 
-    let sigma = ray_sigma(rig, &left, &in_right, gates.pixel_sigma);
-    let covariance = covariance(&point, &right_centre, sigma).ok_or(Drop::Uncertain)?;
+    let uncertainty = PointUncertainty::of(&point, rig, gates.pixel_sigma).ok_or(Drop::Uncertain)?;
+    let covariance = uncertainty.covariance(&gates.shared);
     let sigma_range = range_sigma(&covariance, &point).ok_or(Drop::Uncertain)?;
     require(sigma_range.mm() <= gates.max_relative_sigma * left_range.mm(), Drop::Uncertain)?;
-    Ok(CloudPoint { pair_index, pixels, point, sigma_range, covariance, residual })
-}
-
-/// The angular standard deviation of both rays: that of the camera with fewer pixels per radian along the radius where
-/// it sees the point. Across it most fisheyes resolve more.
-fn ray_sigma(rig: &StereoPair<'_>, left: &UnitRay<Left>, right: &UnitRay<Right>, pixel_sigma: f64) -> Angle {
-    let left = rig.left.pixels_per_radian(left.angle_to_axis());
-    let right = rig.right.pixels_per_radian(right.angle_to_axis());
-    Angle::from_rad(pixel_sigma / left.min(right))
+    Ok(CloudPoint { pair_index: 0, pixels: *pixels, point, sigma_range, covariance, residual, residual_sigma })
 }
 
 /// Stated as what must hold, so that a comparison with NaN drops the pair.
@@ -145,6 +171,7 @@ impl From<Rejection> for Drop {
             Rejection::Parallel => Self::Parallax,
             Rejection::OnBaseline => Self::OnBaseline,
             Rejection::Diverging => Self::Diverging,
+            Rejection::OutsideView | Rejection::NotConverged => Self::NoPoint,
         }
     }
 }
@@ -162,6 +189,7 @@ impl Drop {
             Self::Parallax => "parallax",
             Self::TooFar => "too_far",
             Self::Uncertain => "uncertain",
+            Self::NoPoint => "no_point",
         }
     }
 }

@@ -141,7 +141,7 @@ impl KannalaBrandt {
     }
 
     /// θ with r(θ) = `r`, by Newton's method kept inside a shrinking bracket.
-    fn angle_at_radius(&self, r: f64) -> f64 {
+    pub(crate) fn angle_at_radius(&self, r: f64) -> f64 {
         let (mut low, mut high) = (0.0, self.theta_max);
         let mut theta = (r / self.k[0]).clamp(low, high);
         for _ in 0..60 {
@@ -191,6 +191,16 @@ impl KannalaBrandt {
     #[must_use]
     pub const fn theta_max(&self) -> Angle {
         Angle::from_rad(self.theta_max)
+    }
+
+    /// r(θ) in pixels, for θ in radians.
+    pub(crate) fn radius_at(&self, theta: f64) -> f64 {
+        radius(&self.k, theta)
+    }
+
+    /// r(theta_max) in pixels.
+    pub(crate) const fn radius_max(&self) -> f64 {
+        self.r_max
     }
 
     /// The image size.

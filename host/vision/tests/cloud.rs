@@ -5,19 +5,23 @@
 use nalgebra::{UnitQuaternion, Vector3};
 use proptest::prelude::*;
 use vergence_vision::{
-    Angle, Cloud, Drop, Gates, ImageSize, KannalaBrandt, Left, Length, Pixel, PixelPair, Point, Right, StereoPair,
-    Transform, cloud,
+    Angle, Cloud, Drop, Gates, ImageSize, KannalaBrandt, Left, Length, Pixel, PixelPair, Point, Right,
+    SharedCovariance, StereoPair, Transform, cloud,
 };
 
 const SIZE: ImageSize = ImageSize { width: 2080, height: 2080 };
 
-const GATES: Gates = Gates {
-    epipolar: Angle::from_rad(5e-3),
-    min_parallax: Angle::from_rad(5e-3),
-    max_range: None,
-    pixel_sigma: 0.5,
-    max_relative_sigma: 0.2,
-};
+/// 0.5 px is 0.9 mrad for each ray.
+fn gates() -> Gates {
+    Gates {
+        epipolar_sigmas: 4.0,
+        min_parallax: Angle::from_rad(5e-3),
+        max_range: None,
+        pixel_sigma: 0.5,
+        max_relative_sigma: 0.2,
+        ..Gates::default()
+    }
+}
 
 fn lens(k1: f64) -> KannalaBrandt {
     let k = [560.0, 560.0 * k1, 0.0, 0.0, 0.0];
@@ -67,19 +71,19 @@ fn each_gate_drops_for_its_own_reason() {
     let (left, right) = (lens(0.0), lens(0.01));
     let rig = StereoPair { left: &left, right: &right, left_from_right: left_from_right(0.0) };
     let seen = see(&rig, &good).unwrap();
-    assert_eq!(fate(seen, &GATES), None);
-    assert_eq!(fate(PixelPair { left: outside, ..seen }, &GATES), Some(Drop::OutsideLeftField));
-    assert_eq!(fate(PixelPair { right: outside, ..seen }, &GATES), Some(Drop::OutsideRightField));
+    assert_eq!(fate(seen, &gates()), None);
+    assert_eq!(fate(PixelPair { left: outside, ..seen }, &gates()), Some(Drop::OutsideLeftField));
+    assert_eq!(fate(PixelPair { right: outside, ..seen }, &gates()), Some(Drop::OutsideRightField));
     let raised = Pixel { v: seen.right.v + 10.0, ..seen.right };
-    assert_eq!(fate(PixelPair { right: raised, ..seen }, &GATES), Some(Drop::Epipolar));
+    assert_eq!(fate(PixelPair { right: raised, ..seen }, &gates()), Some(Drop::Epipolar));
     let crossed = PixelPair { left: Pixel { u: 900.0, v: 1039.5 }, right: Pixel { u: 1200.0, v: 1039.5 } };
-    assert_eq!(fate(crossed, &GATES), Some(Drop::Diverging));
-    assert_eq!(fate_of(at(0.0, 0.0, 1e5), &GATES), Some(Drop::Parallax));
-    let near = Gates { max_range: Some(Length::from_mm(300.0)), ..GATES };
+    assert_eq!(fate(crossed, &gates()), Some(Drop::Diverging));
+    assert_eq!(fate_of(at(0.0, 0.0, 1e5), &gates()), Some(Drop::Parallax));
+    let near = Gates { max_range: Some(Length::from_mm(300.0)), ..gates() };
     assert_eq!(fate_of(good, &near), Some(Drop::TooFar));
-    let strict = Gates { max_relative_sigma: 1e-3, ..GATES };
+    let strict = Gates { max_relative_sigma: 1e-3, ..gates() };
     assert_eq!(fate_of(good, &strict), Some(Drop::Uncertain));
-    assert_eq!(fate_of(at(300.0, 0.0, 0.0), &GATES), Some(Drop::OnBaseline));
+    assert_eq!(fate_of(at(300.0, 0.0, 0.0), &gates()), Some(Drop::OnBaseline));
 }
 
 #[test]
@@ -87,11 +91,11 @@ fn limits_that_are_not_numbers_let_nothing_pass() {
     let good = at(72.5, 10.0, 350.0);
     let nan = Angle::from_rad(f64::NAN);
     for (gates, reason) in [
-        (Gates { epipolar: nan, ..GATES }, Drop::Epipolar),
-        (Gates { min_parallax: nan, ..GATES }, Drop::Parallax),
-        (Gates { max_range: Some(Length::from_mm(f64::NAN)), ..GATES }, Drop::TooFar),
-        (Gates { pixel_sigma: f64::NAN, ..GATES }, Drop::Uncertain),
-        (Gates { max_relative_sigma: f64::NAN, ..GATES }, Drop::Uncertain),
+        (Gates { epipolar_sigmas: f64::NAN, ..gates() }, Drop::Epipolar),
+        (Gates { min_parallax: nan, ..gates() }, Drop::Parallax),
+        (Gates { max_range: Some(Length::from_mm(f64::NAN)), ..gates() }, Drop::TooFar),
+        (Gates { pixel_sigma: f64::NAN, ..gates() }, Drop::Uncertain),
+        (Gates { max_relative_sigma: f64::NAN, ..gates() }, Drop::Uncertain),
     ] {
         assert_eq!(fate_of(good, &gates), Some(reason));
     }
@@ -108,6 +112,7 @@ fn reasons_have_stable_names() {
         (Drop::Parallax, "parallax"),
         (Drop::TooFar, "too_far"),
         (Drop::Uncertain, "uncertain"),
+        (Drop::NoPoint, "no_point"),
     ];
     assert!(names.is_sorted());
     for (reason, name) in names {
@@ -115,29 +120,34 @@ fn reasons_have_stable_names() {
     }
 }
 
-/// σ = 0.56 px at 560 px/rad is 1 mrad, which on the midline 350 mm ahead makes 1.246 mm across the baseline, and with
-/// C diagonal there, the range variance is (0.2581² · 72.5² + 1.2460² · 350²) / (72.5² + 350²).
+/// σ = 0.56 px at 560 px/rad is 1 mrad along the radius and, across it, 1 mrad times sin θ / θ: 0.99288 at the angle of
+/// 11.70°. On the midline 350 mm ahead that makes 1.246 mm across the baseline, and with C diagonal there, the range variance
+/// is (0.2581² · 72.5² + 1.2460² · 350²) / (72.5² + 350²). The point lies in the epipolar plane of both axes, so that only the
+/// radial noise counts.
 #[test]
 fn the_range_sigma_follows_from_the_pixel_sigma() {
     let lens = lens(0.0);
     let rig = StereoPair { left: &lens, right: &lens, left_from_right: left_from_right(0.0) };
-    let gates = Gates { pixel_sigma: 0.56, ..GATES };
+    let gates = Gates { pixel_sigma: 0.56, ..gates() };
     let cloud = cloud(&[see(&rig, &at(72.5, 0.0, 350.0)).unwrap()], &rig, &gates);
     assert!((cloud.points[0].sigma_range.mm() - 1.2212).abs() < 2e-4, "{:?}", cloud.points);
 }
 
-/// At 90° of the axis the bent lens has dr/dθ = 560 (1 - 0.15 θ²), the coarser of the two.
+/// What the pose does not know widens the gate and the covariance.
 #[test]
-fn the_coarser_camera_decides_the_sigma() {
-    let (fine, coarse) = (lens(0.0), lens(-0.05));
-    let sigma = |left: &KannalaBrandt, right: &KannalaBrandt| {
-        let rig = StereoPair { left, right, left_from_right: left_from_right(0.0) };
-        cloud(&[see(&rig, &at(72.5, 350.0, 0.0)).unwrap()], &rig, &GATES).points[0].sigma_range.mm()
-    };
-    let quarter = std::f64::consts::FRAC_PI_2;
-    let expected = sigma(&fine, &fine) / (1.0 - 0.15 * quarter * quarter);
-    assert!((sigma(&fine, &coarse) - expected).abs() < 1e-9 * expected);
-    assert!((sigma(&coarse, &fine) - expected).abs() < 1e-9 * expected);
+fn the_pose_s_uncertainty_widens_gate_and_covariance() {
+    let lens = lens(0.0);
+    let rig = StereoPair { left: &lens, right: &lens, left_from_right: left_from_right(0.0) };
+    let seen = see(&rig, &at(72.5, 0.0, 350.0)).unwrap();
+    let raised = PixelPair { right: Pixel { v: seen.right.v + 4.0, ..seen.right }, ..seen };
+    assert_eq!(fate(raised, &gates()), Some(Drop::Epipolar));
+    let turn = 0.005f64.powi(2);
+    let pose = nalgebra::Matrix6::from_diagonal(&[turn, turn, turn, 0.0, 0.0, 0.0].into());
+    let unsure = Gates { shared: SharedCovariance::exact().with_pose(&pose), ..gates() };
+    assert_eq!(fate(raised, &unsure), None);
+    let sigma = |gates: &Gates| cloud(&[seen], &rig, gates).points[0].sigma_range.mm();
+    // A turn of 5 mrad about y moves the point on the midline by λ² / B · 5 mrad = 4.4 mm.
+    assert!((sigma(&unsure).hypot(-sigma(&gates())) > 4.0) && sigma(&unsure) > 4.0, "{}", sigma(&unsure));
 }
 
 fn pixel() -> impl Strategy<Value = Pixel> {
@@ -146,8 +156,12 @@ fn pixel() -> impl Strategy<Value = Pixel> {
 }
 
 fn wide_open() -> Gates {
-    let half_turn = Angle::from_deg(180.0);
-    Gates { epipolar: half_turn, min_parallax: Angle::default(), max_relative_sigma: f64::INFINITY, ..GATES }
+    Gates {
+        epipolar_sigmas: f64::INFINITY,
+        min_parallax: Angle::default(),
+        max_relative_sigma: f64::INFINITY,
+        ..gates()
+    }
 }
 
 proptest! {
@@ -162,14 +176,14 @@ proptest! {
         let (left, right) = (lens(0.01), lens(-0.03));
         let rig = StereoPair { left: &left, right: &right, left_from_right: left_from_right(separation) };
         let pairs: Vec<_> = pixels.into_iter().map(|[left, right]| PixelPair { left, right }).collect();
-        let gates = if open { wide_open() } else { GATES };
+        let gates = if open { wide_open() } else { gates() };
         let made = cloud(&pairs, &rig, &gates);
         prop_assert_eq!(accounted(&made), pairs.len());
         prop_assert!(made.points.iter().all(|point| point.pixels == pairs[point.pair_index]));
         prop_assert!(made.points.is_sorted_by(|a, b| a.pair_index < b.pair_index));
         prop_assert!(made.dropped.values().all(|&count| count > 0));
         for point in &made.points {
-            prop_assert!(point.residual.abs() <= gates.epipolar);
+            prop_assert!(point.residual.abs() <= point.residual_sigma * gates.epipolar_sigmas);
             prop_assert!(point.sigma_range.mm() <= gates.max_relative_sigma * point.point.mm().norm());
         }
         prop_assert_eq!(cloud(&pairs, &rig, &gates), made);
@@ -187,7 +201,7 @@ proptest! {
             .map(|[x, y, z]| at(x, y, z))
             .filter_map(|point| see(&rig, &point).map(|pair| (point, pair)))
             .unzip();
-        let made = cloud(&pairs, &rig, &GATES);
+        let made = cloud(&pairs, &rig, &gates());
         prop_assert_eq!(accounted(&made), pairs.len());
         for found in &made.points {
             let expected = points[found.pair_index].mm();

@@ -2,7 +2,9 @@
 
 mod calibrate;
 mod peer;
+mod peer_opencv;
 mod sets;
+mod vision;
 
 use crate::console::Console;
 use crate::failure::Failure;
@@ -21,10 +23,13 @@ enum Task {
     /// Solves every fisheye set and detects every chessboard, then lets OpenCV (cv2.fisheye.calibrate with its crude
     /// guess, the SB detector) and SciPy's bundle adjustment do the same. Everything runs on one thread.
     Calibrate(calibrate::Args),
+    /// Projection, unprojection and triangulation of whole arrays, beside OpenCV.
+    Vision(vision::Args),
 }
 
 pub fn run(args: &Args, console: Console) -> Result<(), Failure> {
     match &args.task {
         Task::Calibrate(args) => calibrate::run(args, console),
+        Task::Vision(args) => vision::run(args, console),
     }
 }

@@ -4,17 +4,19 @@ use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 use serde_json::{Value, json};
-use vergence_matching::GuidedMatcher;
+use vergence_matching::Matcher;
 use vergence_rig::{Rig, RigPose};
 use vergence_vision::{ImageSize, Pixel, PixelPair};
 
 use super::move_to::StagePose;
+use super::report::rounded;
 use crate::board::check_range;
 use crate::camera::{Camera, FileCamera, Frame};
 use crate::cli::Globals;
 use crate::console::Console;
 use crate::failure::Failure;
 use crate::look::{Eyes, Look, look, triangulate};
+use crate::models::MatcherOptions;
 use crate::output::{make_folder, ply, write_whole};
 use crate::rig_file;
 
@@ -39,6 +41,8 @@ pub struct Args {
     mode: Option<String>,
     #[command(flatten)]
     stage: StagePose,
+    #[command(flatten)]
+    matching: MatcherOptions,
 }
 
 pub fn run(args: &Args, globals: &Globals, console: Console) -> Result<(), Failure> {
@@ -55,11 +59,12 @@ pub fn run(args: &Args, globals: &Globals, console: Console) -> Result<(), Failu
             right.remaining()
         )));
     }
+    let matcher = args.matching.matcher(console)?;
     let several = args.left.is_dir();
     let mut results = Vec::new();
     while let (Some(left), Some(right)) = (left.grab()?, right.grab()?) {
         let work = console.progress(&format!("{} and {}", left.name, right.name));
-        let look = one_pair(&left, &right, &rig, &pose, pairs.as_deref())?;
+        let look = one_pair(&left, &right, &rig, &pose, How { pairs: pairs.as_deref(), matcher: matcher.as_ref() })?;
         work.finish_and_clear();
         let out = if several { args.out.join(format!("{}.ply", left.name)) } else { args.out.clone() };
         if several {
@@ -67,6 +72,9 @@ pub fn run(args: &Args, globals: &Globals, console: Console) -> Result<(), Failu
         }
         write_whole(&out, ply(&look.points).as_bytes())?;
         console.say(format!("{} points in {}{}", look.points.len(), out.display(), in_words(&look.dropped)))?;
+        if let Some(warning) = look.warning() {
+            console.say(format!("warning: {warning}"))?;
+        }
         results.push(result(&look, &out));
     }
     console.result(&match (several, results.pop()) {
@@ -94,19 +102,20 @@ fn pose(args: &Args, rig: &Rig) -> Result<RigPose, Failure> {
     Ok(rig.pose_at_values(&values))
 }
 
-fn one_pair(
-    left: &Frame,
-    right: &Frame,
-    rig: &Rig,
-    pose: &RigPose,
-    pairs: Option<&[PixelPair]>,
-) -> Result<Look, Failure> {
+/// Where homologous points come from.
+#[derive(Clone, Copy)]
+struct How<'a> {
+    pairs: Option<&'a [PixelPair]>,
+    matcher: &'a dyn Matcher,
+}
+
+fn one_pair(left: &Frame, right: &Frame, rig: &Rig, pose: &RigPose, how: How<'_>) -> Result<Look, Failure> {
     check_size(left, rig.left_camera.size(), "left")?;
     check_size(right, rig.right_camera.size(), "right")?;
     let eyes = Eyes { left: &left.image, right: &right.image };
-    match pairs {
+    match how.pairs {
         Some(pairs) => Ok(triangulate(pairs, eyes, rig, pose)),
-        None => look(eyes, rig, pose, &GuidedMatcher::default())
+        None => look(eyes, rig, pose, how.matcher)
             .map_err(|error| Failure::usage(format!("{} and {}: {error}", left.name, right.name))),
     }
 }
@@ -151,5 +160,12 @@ fn in_words(dropped: &BTreeMap<&'static str, usize>) -> String {
 }
 
 fn result(look: &Look, out: &Path) -> Value {
-    json!({ "points": look.points.len(), "dropped": look.dropped, "out": out })
+    let drift = look.pose_drift.as_ref().map(|drift| {
+        json!({
+            "deg": rounded(drift.angle.deg()),
+            "chi_squared": rounded(drift.chi_squared),
+            "significant": drift.is_significant(),
+        })
+    });
+    json!({ "points": look.points.len(), "dropped": look.dropped, "pose_drift": drift, "out": out })
 }

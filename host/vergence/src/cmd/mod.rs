@@ -23,6 +23,7 @@ pub mod doctor;
 pub mod home;
 pub mod link_test;
 pub mod mode;
+pub mod models;
 pub mod monitor;
 pub mod move_to;
 pub mod plan;

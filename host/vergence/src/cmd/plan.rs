@@ -1,4 +1,6 @@
-//! `vergence plan`: a move before it is made.
+//! `vergence plan`: a move before it is made, and the pose that measures as asked.
+
+mod goal;
 
 use serde_json::{Value, json};
 use vergence_protocol::AxisKind;
@@ -21,7 +23,7 @@ use crate::rig_zones::{ZONE_RADIUS, rig_zones};
 #[derive(Debug, clap::Args)]
 pub struct Args {
     /// The mode to go to, such as herbivore.
-    #[arg(required_unless_present_any = ["baseline", "separation"], conflicts_with_all = ["baseline", "separation"])]
+    #[arg(required_unless_present_any = ["baseline", "separation", "goal"], conflicts_with_all = ["baseline", "separation"])]
     mode: Option<String>,
     #[command(flatten)]
     stage: StagePose,
@@ -31,9 +33,14 @@ pub struct Args {
     /// Show every segment: time, position, velocity, acceleration, jerk.
     #[arg(long)]
     dump: bool,
+    #[command(flatten)]
+    goal: goal::GoalOptions,
 }
 
 pub async fn run(args: &Args, globals: &Globals, console: Console) -> Result<(), Failure> {
+    if args.goal.is_given() {
+        return goal::run(&args.goal, globals, console);
+    }
     let rig = rig_file::load(globals.rig.as_deref())?;
     let globals = Globals { port: globals.port.clone().or_else(|| Some("sim".into())), ..globals.clone() };
     let board = connect(&globals, console, "planning").await?;
@@ -41,7 +48,7 @@ pub async fn run(args: &Args, globals: &Globals, console: Console) -> Result<(),
         Some(name) => named_mode(&rig, name)?.targets.clone(),
         None => standing(&board),
     };
-    let to = goal(args, &rig, &from)?;
+    let to = target(args, &rig, &from)?;
     check_range(&rig, &to)?;
     let plan = MovePlan::new(&rig, &board.limits().await?, &from, &to);
     let values: Vec<f64> = to.iter().map(|position| position.value()).collect();
@@ -82,7 +89,7 @@ fn standing(board: &Board) -> Vec<AxisPosition> {
     rig.axes.iter().map(|axis| axis.range[0]).collect()
 }
 
-fn goal(args: &Args, rig: &Rig, from: &[AxisPosition]) -> Result<Vec<AxisPosition>, Failure> {
+fn target(args: &Args, rig: &Rig, from: &[AxisPosition]) -> Result<Vec<AxisPosition>, Failure> {
     if let Some(name) = &args.mode {
         return Ok(named_mode(rig, name)?.targets.clone());
     }

@@ -1,24 +1,35 @@
 //! `vergence zones`: how much of the surroundings both cameras, one, or none see.
 
+mod rig;
+
 use std::path::PathBuf;
 
 use serde_json::{Value, json};
-use vergence_vision::{Angle, Length, Zones, symmetric_pair, zones_exact, zones_paper_eq3};
+use vergence_vision::{Angle, Length, Zones, paper_eq3, paper_eq3_applies, symmetric_pair, zones_exact};
 
+use super::report::rounded;
+use crate::cli::Globals;
 use crate::console::Console;
 use crate::failure::Failure;
-use crate::output::{write_whole, zones_svg};
+use crate::output::{ZonesOf, write_whole, zones_plot, zones_svg};
 
 /// Angles, seen from the middle of the rig, of a horizontal circle around it: exact, and by equation 3 of the paper
-/// "Bio-inspired reconfigurable stereo vision for robotics using omnidirectional cameras" as printed.
+/// "Bio-inspired reconfigurable stereo vision for robotics using omnidirectional cameras" as printed. With --mode, those of
+/// the rig file's own cameras in that mode, and solid angles.
 #[derive(Debug, clap::Args)]
 pub struct Args {
     /// Distance of the cameras.
-    #[arg(long, value_name = "LENGTH")]
-    baseline: Length,
+    #[arg(long, value_name = "LENGTH", required_unless_present = "mode", conflicts_with = "mode")]
+    baseline: Option<Length>,
     /// Angle between the optical axes; positive is outward, negative crossed.
-    #[arg(long, value_name = "ANGLE", allow_hyphen_values = true)]
-    separation: Angle,
+    #[arg(
+        long,
+        value_name = "ANGLE",
+        allow_hyphen_values = true,
+        required_unless_present = "mode",
+        conflicts_with = "mode"
+    )]
+    separation: Option<Angle>,
     /// Full horizontal field of each lens.
     #[arg(long, value_name = "ANGLE", default_value = "195.95deg")]
     fov: Angle,
@@ -28,30 +39,42 @@ pub struct Args {
     /// Draw the zones.
     #[arg(long, value_name = "FILE")]
     svg: Option<PathBuf>,
+    /// Draw curves over separation and over radius, as SVG.
+    #[arg(long, value_name = "FILE", conflicts_with = "mode")]
+    plot: Option<PathBuf>,
+    #[command(flatten)]
+    rig: rig::RigOptions,
 }
 
-pub fn run(args: &Args, console: Console) -> Result<(), Failure> {
-    let Args { baseline, separation, fov, radius, .. } = *args;
+pub fn run(args: &Args, globals: &Globals, console: Console) -> Result<(), Failure> {
+    let Args { fov, radius, .. } = *args;
+    let (Some(baseline), Some(separation)) = (args.baseline, args.separation) else {
+        return rig::run(&args.rig, radius, args.svg.as_deref(), globals, console);
+    };
     if baseline.mm() <= 0.0 {
         return Err(Failure::usage(format!("a baseline of {baseline} is none: choose a positive one")));
     }
     let cameras = symmetric_pair(baseline, separation, fov);
     let map = zones_exact(cameras, radius).map_err(|error| Failure::usage(format!("no zones: {error}")))?;
-    let published = zones_paper_eq3(fov, separation, baseline, radius);
+    let published = paper_eq3(fov, separation, baseline, radius);
+    let applies = paper_eq3_applies(fov, separation, baseline, radius);
     if let Some(path) = &args.svg {
         write_whole(path, zones_svg(&map, &cameras, radius).as_bytes())?;
     }
+    if let Some(path) = &args.plot {
+        write_whole(path, zones_plot(&ZonesOf { baseline, separation, field: fov, radius }).as_bytes())?;
+    }
     console.say(format!("exact:      {}", in_words(&map.zones)))?;
-    console.say(format!("paper Eq.3: {}{}", in_words(&published), if possible(&published) { "" } else { OUTSIDE }))?;
-    console.result(&json!({"exact": in_degrees(&map.zones), "paper_eq3": in_degrees(&published)}))
+    console.say(format!("paper Eq.3: {}{}", in_words(&published), if applies { "" } else { OUTSIDE }))?;
+    console.result(&json!({
+        "exact": in_degrees(&map.zones),
+        "rear_overlap": rounded(map.rear_overlap().deg()),
+        "paper_eq3": in_degrees(&published),
+        "paper_eq3_applies": applies,
+    }))
 }
 
 const OUTSIDE: &str = "  (outside the equation's domain)";
-
-/// Whether the published equation gives angles at all here.
-fn possible(zones: &Zones) -> bool {
-    [zones.stereo, zones.mono, zones.blind].iter().all(|angle| angle.rad() >= 0.0)
-}
 
 fn in_words(zones: &Zones) -> String {
     format!("stereo {:.2}, mono {:.2}, blind {:.2}", zones.stereo, zones.mono, zones.blind)
@@ -61,8 +84,8 @@ fn in_words(zones: &Zones) -> String {
 #[must_use]
 pub fn in_degrees(zones: &Zones) -> Value {
     json!({
-        "stereo": super::report::rounded(zones.stereo.deg()),
-        "mono": super::report::rounded(zones.mono.deg()),
-        "blind": super::report::rounded(zones.blind.deg()),
+        "stereo": rounded(zones.stereo.deg()),
+        "mono": rounded(zones.mono.deg()),
+        "blind": rounded(zones.blind.deg()),
     })
 }

@@ -1,9 +1,11 @@
 //! Files that commands write: whole, or not at all.
 
 mod colour_map;
+mod depth_field_svg;
 mod picture;
 mod ply;
 mod text;
+mod zones_plot;
 mod zones_svg;
 
 use std::io::Write;
@@ -11,8 +13,10 @@ use std::path::Path;
 
 use image::{ImageFormat, RgbImage};
 
+pub use depth_field_svg::depth_field_svg;
 pub use picture::{DepthPicture, depth_picture, match_picture};
 pub use ply::ply;
+pub use zones_plot::{ZonesOf, zones_plot};
 pub use zones_svg::zones_svg;
 
 use crate::failure::Failure;

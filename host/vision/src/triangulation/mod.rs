@@ -1,4 +1,4 @@
-//! A point from two rays: the pseudo-intersection, and the midpoint to compare with.
+//! A point from two rays: the pseudo-intersection, and others to compare with.
 //!
 //! With u, v the unit rays and t the right centre in the left frame, the feet of the common perpendicular are at
 //!
@@ -17,7 +17,21 @@
 //! To first order this plane halves the angle between the two epipolar planes, which puts S' in the family of
 //! Lee and Civera, "Closed-form optimal two-view triangulation based on angular errors", ICCV 2019.
 
+mod angular;
+mod edge_plane;
+mod kernel;
+mod mid2;
+mod rectified;
+mod reprojection;
+
 use nalgebra::Vector3;
+
+pub use angular::{AngularNorm, angular};
+pub use edge_plane::edge_plane;
+pub use kernel::{Kernel, UnknownKernel};
+pub use mid2::mid2;
+pub use rectified::rectified;
+pub use reprojection::reprojection;
 
 use crate::epipolar::dihedral;
 use crate::{Angle, Left, Length, Point, UnitRay};
@@ -54,6 +68,12 @@ pub enum Rejection {
     /// The rays meet behind a camera.
     #[error("diverging rays")]
     Diverging,
+    /// A ray does not meet the image plane of the rectified view, which holds less than 180°.
+    #[error("outside the rectified view")]
+    OutsideView,
+    /// The reprojection error has no minimum near the rays.
+    #[error("no minimum of the reprojection error")]
+    NotConverged,
 }
 
 /// The pseudo-intersection S' of two rays.
@@ -70,12 +90,19 @@ pub fn pseudo_intersection(
     let (u, v, t) = (left.vector(), right.vector(), right_centre.mm());
     let feet = closest_approach(left, right, right_centre)?;
     let n = plane_normal(&t, &feet.midpoint().mm())?;
-    let determinant = u.cross(&v).dot(&n);
+    let point = in_plane(&u, &v, &t, &n)?;
+    require(feet.in_front(), Rejection::Diverging)?;
+    Ok(triangulated(point, left, right, right_centre))
+}
+
+/// Where the rays projected onto the epipolar plane with unit normal `n` meet.
+fn in_plane(u: &Vector3<f64>, v: &Vector3<f64>, t: &Vector3<f64>, n: &Vector3<f64>) -> Result<Vector3<f64>, Rejection> {
+    let determinant = u.cross(v).dot(n);
     require(determinant.abs() > VANISHING, Rejection::Parallel)?;
-    let lambda = t.cross(&v).dot(&n) / determinant;
-    let mu = t.cross(&u).dot(&n) / determinant;
-    require(feet.in_front() && lambda > 0.0 && mu > 0.0, Rejection::Diverging)?;
-    Ok(triangulated(lambda * (u - n * u.dot(&n)), left, right, right_centre))
+    let lambda = t.cross(v).dot(n) / determinant;
+    let mu = t.cross(u).dot(n) / determinant;
+    require(lambda > 0.0 && mu > 0.0, Rejection::Diverging)?;
+    Ok(lambda * (u - n * u.dot(n)))
 }
 
 /// The midpoint S of the common perpendicular of two rays: the textbook method, biased towards the cameras where the

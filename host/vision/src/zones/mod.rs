@@ -10,8 +10,16 @@
 //!
 //! which grows with β while |c| < R. A camera with axis α and half field h therefore sees exactly the arc from ψ(α - h)
 //! to ψ(α + h), whatever the toe-in and for lenses past 180°, and the zones follow from counting two intervals.
+//!
+//! [`circle_zones`] and [`solid_zones`] do without the plane: any two poses, the real lenses, and what the robot's body hides.
+
+mod paper;
+mod spatial;
 
 use std::f64::consts::{PI, TAU};
+
+pub use paper::{paper_eq3, paper_eq3_applies};
+pub use spatial::{BodyMask, Eye, SolidZones, circle_zones, solid_zones};
 
 use crate::{Angle, Length};
 
@@ -68,6 +76,59 @@ pub struct ZoneMap {
     pub arcs: Vec<Arc>,
 }
 
+impl ZoneMap {
+    /// The part of the stereo zone in the rear half of the circle: what both cameras see past each other's back.
+    #[must_use]
+    pub fn rear_overlap(&self) -> Angle {
+        let rear = |from: f64, to: f64| (to.min(1.5 * PI) - from.max(0.5 * PI)).max(0.0);
+        let in_rear = |arc: &Arc| {
+            let (start, end) = (arc.start.rad(), arc.end.rad());
+            // The last arc may pass 360°.
+            rear(start, end) + rear(start - TAU, end - TAU)
+        };
+        let stereo = self.arcs.iter().filter(|arc| arc.coverage == Coverage::Stereo);
+        Angle::from_rad(stereo.map(in_rear).sum())
+    }
+
+    /// The map of a circle cut at `cuts` (central azimuths in radians), each part as `coverage` finds its middle.
+    fn from_cuts(cuts: &[f64], coverage: impl Fn(f64) -> Coverage) -> Self {
+        let mut starts: Vec<f64> = cuts.iter().map(|cut| cut.rem_euclid(TAU)).collect();
+        starts.sort_by(f64::total_cmp);
+        if starts.is_empty() {
+            starts.push(0.0);
+        }
+        let ends: Vec<f64> = starts.iter().copied().skip(1).chain(starts.first().map(|first| first + TAU)).collect();
+        let arcs: Vec<Arc> = starts
+            .into_iter()
+            .zip(ends)
+            .filter(|(start, end)| end - start > ROUNDING)
+            .map(|(start, end)| Arc {
+                start: Angle::from_rad(start),
+                end: Angle::from_rad(end),
+                coverage: coverage(0.5 * (start + end)),
+            })
+            .collect();
+        let total = |zone| {
+            let same = arcs.iter().filter(|arc| arc.coverage == zone);
+            same.fold(Angle::default(), |sum, arc| sum + (arc.end - arc.start))
+        };
+        let zones =
+            Zones { stereo: total(Coverage::Stereo), mono: total(Coverage::Mono), blind: total(Coverage::Blind) };
+        Self { zones, arcs }
+    }
+}
+
+impl Coverage {
+    /// By who sees it.
+    const fn of(left: bool, right: bool) -> Self {
+        match (left, right) {
+            (true, true) => Self::Stereo,
+            (false, false) => Self::Blind,
+            _ => Self::Mono,
+        }
+    }
+}
+
 /// Why a rig has no zones.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 #[non_exhaustive]
@@ -78,6 +139,9 @@ pub enum ZonesError {
     /// A camera's optical centre is not inside the circle.
     #[error("a camera lies outside the viewing circle: enlarge the radius or reduce the baseline")]
     OutsideCircle,
+    /// A sphere is not looked at in at least one direction.
+    #[error("solid angles need at least one direction")]
+    NoDirections,
     /// A half field is not in 0° to 180°.
     #[error("a half field must lie between 0° and 180°")]
     HalfField,
@@ -93,26 +157,8 @@ const ROUNDING: f64 = 1e-12;
 pub fn zones_exact(cameras: [PlanarCamera; 2], radius: Length) -> Result<ZoneMap, ZonesError> {
     let [left, right] = cameras;
     let seen = [seen_arc(&left, radius)?, seen_arc(&right, radius)?];
-    let mut cuts = [seen[0].start, seen[0].start + seen[0].width, seen[1].start, seen[1].start + seen[1].width]
-        .map(|cut| cut.rem_euclid(TAU));
-    cuts.sort_by(f64::total_cmp);
-    let ends = [cuts[1], cuts[2], cuts[3], cuts[0] + TAU];
-    let arcs: Vec<Arc> = cuts
-        .into_iter()
-        .zip(ends)
-        .filter(|(start, end)| end - start > ROUNDING)
-        .map(|(start, end)| Arc {
-            start: Angle::from_rad(start),
-            end: Angle::from_rad(end),
-            coverage: coverage(&seen, 0.5 * (start + end)),
-        })
-        .collect();
-    let total = |zone| {
-        let same = arcs.iter().filter(|arc| arc.coverage == zone);
-        same.fold(Angle::default(), |sum, arc| sum + (arc.end - arc.start))
-    };
-    let zones = Zones { stereo: total(Coverage::Stereo), mono: total(Coverage::Mono), blind: total(Coverage::Blind) };
-    Ok(ZoneMap { zones, arcs })
+    let cuts = [seen[0].start, seen[0].start + seen[0].width, seen[1].start, seen[1].start + seen[1].width];
+    Ok(ZoneMap::from_cuts(&cuts, |azimuth| coverage(&seen, azimuth)))
 }
 
 /// Two equal cameras on a common baseline: the left one at -`baseline` / 2 with its axis at -`separation` / 2, the
@@ -124,29 +170,6 @@ pub fn symmetric_pair(baseline: Length, separation: Angle, field: Angle) -> [Pla
         axis: separation * side,
         half_field: field / 2.0,
     })
-}
-
-/// The zones by Eq. 3 of "Bio-inspired reconfigurable stereo vision for robotics using omnidirectional cameras", as
-/// printed, to compare with published figures. For anything else use [`zones_exact`].
-///
-/// With u = field - separation and b = baseline / (2 radius):
-///
-/// ```text
-/// stereo = u [1 - b cot(u / 2)]        blind = u + 2 asin[b sin((π + u) / 2)]        mono = 2π - stereo - blind
-/// ```
-///
-/// Its domain is separation ≥ field - 180°, 0 < u ≤ 180° and radius ≥ (baseline / 2) cot(u / 2), where the inner edges
-/// of the fields cross (printed with tan in place of cot). Inside it, `stereo` falls short of the exact value by up to
-/// 11°, and `blind` is exact only for a field of 180°: the exact expression has 360° - field - separation for u.
-/// Outside it the angles mean nothing: they may be negative or not a number.
-#[must_use]
-pub fn zones_paper_eq3(field: Angle, separation: Angle, baseline: Length, radius: Length) -> Zones {
-    let u = (field - separation).rad();
-    let b = baseline.mm() / (2.0 * radius.mm());
-    let stereo = u * (1.0 - b / (u / 2.0).tan());
-    let blind = u + 2.0 * (b * ((PI + u) / 2.0).sin()).asin();
-    let [stereo, mono, blind] = [stereo, TAU - stereo - blind, blind].map(Angle::from_rad);
-    Zones { stereo, mono, blind }
 }
 
 /// The part of the circle that one camera sees, in radians.
@@ -175,9 +198,5 @@ fn seen_arc(camera: &PlanarCamera, radius: Length) -> Result<SeenArc, ZonesError
 /// How many cameras see the circle at the central angle `azimuth` in radians.
 fn coverage(seen: &[SeenArc; 2], azimuth: f64) -> Coverage {
     let [left, right] = seen.each_ref().map(|arc| (azimuth - arc.start).rem_euclid(TAU) < arc.width);
-    match (left, right) {
-        (true, true) => Coverage::Stereo,
-        (false, false) => Coverage::Blind,
-        _ => Coverage::Mono,
-    }
+    Coverage::of(left, right)
 }

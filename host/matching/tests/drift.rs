@@ -1,0 +1,42 @@
+//! A pose that is off: the matches say so, and are still found.
+#![allow(clippy::unwrap_used, reason = "a test that cannot be set up fails")]
+
+mod common;
+
+use common::Pair;
+use nalgebra::{Matrix6, UnitQuaternion, Vector3, Vector6};
+use vergence_matching::{GuidedMatcher, ImagePair, Matcher};
+use vergence_vision::{Angle, Left, PixelPair, PoseDrift, Right, StereoPair, Transform, pose_drift};
+
+/// Registered matches in images of 640 pixels, each coordinate.
+const PIXEL_SIGMA: f64 = 0.2;
+
+/// What the picture says with the pose turned by `off`, its sigma stated as 0.02° and 0.1 mm; and how many matches there are.
+fn drift(pair: &Pair, off: Vector3<f64>) -> (PoseDrift, usize) {
+    let images = pair.images();
+    let truth = images.left_from_right;
+    let believed: Transform<Left, Right> =
+        Transform::new(UnitQuaternion::from_scaled_axis(-off) * truth.rotation(), truth.origin().mm());
+    let images = ImagePair { left_from_right: believed, pose_sigma: Angle::from_deg(0.15), ..images };
+    let found = GuidedMatcher::default().find(&images).unwrap().pairs;
+    let pixels: Vec<_> = found.iter().map(|found| PixelPair { left: found.left, right: found.right }).collect();
+    let rig = StereoPair { left: &pair.camera, right: &pair.camera, left_from_right: believed };
+    let (turn, shift) = (0.02f64.to_radians().powi(2), 0.1f64.powi(2));
+    let stated = Matrix6::from_diagonal(&Vector6::new(turn, turn, turn, shift, shift, shift));
+    (pose_drift(&pixels, &rig, PIXEL_SIGMA, &stated).unwrap(), found.len())
+}
+
+#[test]
+fn encoders_and_picture_disagree_by_three_tenths_of_a_degree() {
+    let pair = Pair::new(640, Angle::from_deg(60.0));
+    let (right, matches) = drift(&pair, Vector3::zeros());
+    assert!(!right.is_significant(), "{} {}", right.chi_squared, right.angle);
+    for axis in [Vector3::x(), Vector3::z()] {
+        let off = axis * 0.3f64.to_radians();
+        let (found, still) = drift(&pair, off);
+        assert!(found.is_significant(), "{axis:?}: {} {}", found.chi_squared, found.angle);
+        let error = (found.correction.fixed_rows::<3>(0) - off).norm().to_degrees();
+        assert!(error < 0.06, "{axis:?}: the turn is found {error:.3}° off");
+        assert!(still * 10 > matches * 7, "{still} of {matches} matches are left");
+    }
+}

@@ -1,0 +1,69 @@
+//! The published networks on a pair of photographs, against Python's onnxruntime 1.31.1: 330 matches of 1024 keypoints.
+//! Networks and photographs may not be redistributed; without them the tests say what they skip.
+#![allow(
+    clippy::expect_used,
+    clippy::panic,
+    clippy::print_stdout,
+    clippy::disallowed_methods,
+    reason = "a test fails loudly, shows its figures and looks for its data"
+)]
+
+use std::path::{Path, PathBuf};
+
+use vergence_matching::learned::{Manifest, Model, Network, NetworkError, Picture};
+use vergence_networks::{OnnxRuntime, load_rten};
+
+const KEYPOINTS: usize = 1024;
+const FILES: [&str; 2] = ["xfeat_top4096_f32.onnx", "lighterglue_l6_f32.onnx"];
+
+fn models() -> Option<PathBuf> {
+    let shared = std::env::var_os("VERGENCE_SHARED")
+        .map_or_else(|| Path::new(env!("CARGO_MANIFEST_DIR")).join("../../../shared"), PathBuf::from);
+    let models = shared.join("models");
+    if models.join(FILES[0]).is_file() {
+        return Some(models);
+    }
+    println!("skipped: no networks in {}", models.display());
+    None
+}
+
+fn model(folder: &Path, load: impl Fn(&str, &[u8]) -> Result<Box<dyn Network>, NetworkError>) -> Model {
+    let networks = FILES.map(|file| load(file, &std::fs::read(folder.join(file)).expect("a file")).expect("a network"));
+    Model::new(Manifest::xfeat_lighterglue(FILES[0], FILES[1]), networks.into()).expect("the contract holds")
+}
+
+fn count_matches(folder: &Path, model: &Model) -> [usize; 3] {
+    let pictures = ["pair_0410_640x480.png", "pair_0411_640x480.png"].map(|name| {
+        let image = image::open(folder.join(name)).expect("a photograph").to_luma8();
+        image.iter().map(|&grey| f32::from(grey) / 255.0).collect::<Vec<f32>>()
+    });
+    let [left, right] = [0, 1].map(|i| Picture { values: &pictures[i], width: 640, height: 480 });
+    let found = model.compare([left, right], KEYPOINTS, [&|_| true, &|_| true]).expect("matches");
+    [found.keypoints[0].len(), found.keypoints[1].len(), found.matches.len()]
+}
+
+fn expect_reference(counts: [usize; 3]) {
+    assert_eq!(counts[..2], [KEYPOINTS, KEYPOINTS]);
+    assert!(counts[2].abs_diff(330) <= 5, "{} matches", counts[2]);
+}
+
+#[test]
+fn rten_finds_what_python_finds() {
+    let Some(folder) = models() else { return };
+    let counts = count_matches(&folder, &model(&folder, load_rten));
+    println!("rten: {counts:?}");
+    expect_reference(counts);
+}
+
+#[test]
+fn onnx_runtime_finds_what_python_finds() {
+    let Some(folder) = models() else { return };
+    let Some(library) = std::env::var_os("ORT_DYLIB_PATH") else {
+        println!("skipped: ORT_DYLIB_PATH names no ONNX Runtime");
+        return;
+    };
+    let runtime = OnnxRuntime::load(Path::new(&library), 2).expect("a runtime");
+    let counts = count_matches(&folder, &model(&folder, |name, bytes| runtime.network(name, bytes)));
+    println!("ONNX Runtime: {counts:?}");
+    expect_reference(counts);
+}

@@ -1,0 +1,131 @@
+//! The pose that meets a depth goal with the widest view.
+
+use vergence_vision::{Angle, Length, circle_zones};
+
+use crate::depth_field::DepthField;
+use crate::goal::{DepthGoal, DepthSigma};
+use crate::rig::Rig;
+
+/// Step of the directions that the goal is checked in.
+const DIRECTION_STEP: Angle = Angle::from_deg(1.0);
+/// Poses of the first grid, over all axes.
+const FIRST_GRID: f64 = 700.0;
+/// How many poses are kept from grid to grid, and how many finer grids follow around each.
+const KEPT: usize = 4;
+const REFINEMENTS: usize = 9;
+/// Poses of a finer grid along each axis; its step is a quarter of the one before.
+const FINER_GRID: i32 = 4;
+
+/// What a pose gives.
+#[derive(Clone, Debug, PartialEq)]
+pub struct RatedPose {
+    /// Where each axis stands, in millimetres or radians.
+    pub values: Vec<f64>,
+    /// The largest standard deviation over the goal's directions; `None` where one of them is not seen by both cameras.
+    pub worst: Option<Length>,
+    /// How much of the circle at the goal's range at least one camera sees.
+    pub seen: Angle,
+    /// How much of it both see.
+    pub stereo: Angle,
+    /// What is lacking: zero where the goal is met.
+    shortfall: f64,
+}
+
+impl RatedPose {
+    /// Whether the goal is met.
+    #[must_use]
+    pub fn meets_goal(&self) -> bool {
+        self.shortfall <= 0.0
+    }
+
+    /// Whether this pose is to be preferred: the goal met, then the wider view, then the smaller sigma.
+    #[must_use]
+    pub fn is_better_than(&self, other: &Self) -> bool {
+        let sigma = |pose: &Self| pose.worst.map_or(f64::INFINITY, Length::mm);
+        let by_goal = self.shortfall.max(0.0).total_cmp(&other.shortfall.max(0.0)).reverse();
+        let by_view = self.seen.rad().total_cmp(&other.seen.rad());
+        by_goal.then(by_view).then(sigma(self).total_cmp(&sigma(other)).reverse()).is_gt()
+    }
+}
+
+impl Rig {
+    /// What the pose with the axes at `values` gives for `goal`, for matches known to `pixel_sigma` pixels.
+    #[must_use]
+    pub fn rate_pose(&self, values: &[f64], goal: &DepthGoal, pixel_sigma: f64) -> RatedPose {
+        let field = DepthField::new(self, values, pixel_sigma);
+        let steps = (goal.half_width.rad() / DIRECTION_STEP.rad()).ceil() as i32;
+        let directions = (-steps..=steps).map(|i| goal.half_width * (f64::from(i) / f64::from(steps.max(1))));
+        let (mut worst, mut unseen, mut count) = (0.0_f64, 0, 0);
+        for azimuth in directions {
+            count += 1;
+            match field.at(azimuth, Angle::from_rad(0.0), goal.range) {
+                Some(predicted) => {
+                    let sigma = match goal.sigma {
+                        DepthSigma::Forward => predicted.sigma_forward,
+                        DepthSigma::Range => predicted.sigma_range,
+                    };
+                    worst = worst.max(sigma.mm());
+                }
+                None => unseen += 1,
+            }
+        }
+        let zones = circle_zones(&field.eyes(), &field.middle(), goal.range).map(|map| map.zones).unwrap_or_default();
+        // A direction that is not seen is worse than any sigma; the share of them leads the search to where all are.
+        let lacking = (worst / goal.limit.mm() - 1.0).max(0.0);
+        let shortfall = lacking / (1.0 + lacking) + f64::from(unseen) / f64::from(count) * 1e3;
+        RatedPose {
+            values: values.to_vec(),
+            worst: (unseen == 0).then_some(Length::from_mm(worst)),
+            seen: zones.stereo + zones.mono,
+            stereo: zones.stereo,
+            shortfall,
+        }
+    }
+
+    /// The pose that meets `goal` with the widest view, or where none does, the one that comes nearest. Found on grids over
+    /// the axes' ranges, each finer around the best of the one before.
+    #[must_use]
+    pub fn best_pose(&self, goal: &DepthGoal, pixel_sigma: f64) -> RatedPose {
+        let ranges: Vec<[f64; 2]> = self.axes.iter().map(|axis| axis.range.map(|end| end.value())).collect();
+        let per_axis = FIRST_GRID.powf(1.0 / ranges.len().max(1) as f64).floor().max(3.0);
+        let mut steps: Vec<f64> = ranges.iter().map(|[low, high]| (high - low) / (per_axis - 1.0)).collect();
+        let first = |i: usize, k: i32| ranges[i][0] + f64::from(k) * steps[i];
+        let mut best: Vec<RatedPose> = Vec::new();
+        for values in grid(ranges.len(), 0..per_axis as i32, first) {
+            keep(&mut best, self.rate_pose(&values, goal, pixel_sigma));
+        }
+        for _ in 0..REFINEMENTS {
+            steps.iter_mut().for_each(|step| *step /= f64::from(FINER_GRID));
+            for centre in best.clone() {
+                let around = |i: usize, k: i32| {
+                    let [low, high] = ranges[i];
+                    (centre.values[i] + f64::from(k) * steps[i]).clamp(low, high)
+                };
+                for values in grid(ranges.len(), -FINER_GRID..FINER_GRID + 1, around) {
+                    keep(&mut best, self.rate_pose(&values, goal, pixel_sigma));
+                }
+            }
+        }
+        best.into_iter().next().unwrap_or_else(|| self.rate_pose(&[], goal, pixel_sigma))
+    }
+}
+
+/// Every combination of `value(axis, index)` over the axes.
+fn grid(axes: usize, indices: std::ops::Range<i32>, value: impl Fn(usize, i32) -> f64) -> Vec<Vec<f64>> {
+    (0..axes).fold(vec![Vec::new()], |poses, axis| {
+        let longer = |pose: &Vec<f64>| -> Vec<Vec<f64>> {
+            indices.clone().map(|k| pose.iter().copied().chain([value(axis, k)]).collect()).collect()
+        };
+        poses.iter().flat_map(longer).collect()
+    })
+}
+
+/// Puts `pose` among the best, in order; the first found wins a tie.
+fn keep(best: &mut Vec<RatedPose>, pose: RatedPose) {
+    if best.iter().any(|other| other.values == pose.values) {
+        return;
+    }
+    let place = best.iter().position(|other| pose.is_better_than(other)).unwrap_or(best.len());
+    best.insert(place, pose);
+    best.truncate(KEPT);
+}

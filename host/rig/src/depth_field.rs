@@ -1,0 +1,90 @@
+//! How well depth will be measured, before anything moves.
+
+use nalgebra::{Matrix3, Vector3};
+use vergence_vision::{
+    Angle, Base, Eye, Left, Length, Point, PointUncertainty, SharedCovariance, StereoPair, Transform,
+};
+
+use crate::pose::RigPose;
+use crate::rig::Rig;
+
+/// The predicted uncertainty of points around a rig in one pose, from the noise of matched pixels, the calibration and the
+/// encoders.
+#[derive(Clone, Debug)]
+pub struct DepthField<'a> {
+    rig: &'a Rig,
+    pose: RigPose,
+    shared: SharedCovariance,
+    pixel_sigma: f64,
+}
+
+/// What is predicted for one point.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct PredictedDepth {
+    /// The point in the left frame.
+    pub point: Point<Left>,
+    /// Its covariance, mm², in the base's axes.
+    pub covariance: Matrix3<f64>,
+    /// Standard deviation of its forward coordinate.
+    pub sigma_forward: Length,
+    /// Standard deviation of its distance from the middle of both cameras.
+    pub sigma_range: Length,
+}
+
+impl<'a> DepthField<'a> {
+    /// With the axes standing at `values` (millimetres or radians), read by the encoders, and matches known to `pixel_sigma`
+    /// pixels in each coordinate of each image.
+    #[must_use]
+    pub fn new(rig: &'a Rig, values: &[f64], pixel_sigma: f64) -> Self {
+        let pose = rig.pose_read_at(values);
+        let shared = SharedCovariance::exact().with_pose(&pose.covariance);
+        Self { rig, pose, shared, pixel_sigma }
+    }
+
+    /// The pose predicted for.
+    #[must_use]
+    pub const fn pose(&self) -> &RigPose {
+        &self.pose
+    }
+
+    /// Both cameras in their places.
+    #[must_use]
+    pub fn eyes(&self) -> [Eye<'a>; 2] {
+        let (left, right) = (self.pose.base_from_left, self.pose.base_from_left * self.pose.left_from_right);
+        [
+            Eye { lens: &self.rig.left_camera, base_from_camera: left.renamed(), body: None },
+            Eye { lens: &self.rig.right_camera, base_from_camera: right.renamed(), body: None },
+        ]
+    }
+
+    /// Halfway between the cameras.
+    #[must_use]
+    pub fn middle(&self) -> Point<Base> {
+        let [left, right] = self.eyes().map(|eye| eye.base_from_camera.origin().mm());
+        Point::from_mm((left + right) / 2.0)
+    }
+
+    /// For the point at `range` from the middle of both cameras, at an azimuth to the right and an elevation upwards.
+    /// `None` where not both cameras see it, and on the baseline.
+    #[must_use]
+    pub fn at(&self, azimuth: Angle, elevation: Angle, range: Length) -> Option<PredictedDepth> {
+        let (az, el) = (azimuth.rad(), elevation.rad());
+        let direction = Vector3::new(az.sin() * el.cos(), -el.sin(), az.cos() * el.cos());
+        let in_base = Point::<Base>::from_mm(self.middle().mm() + direction * range.mm());
+        if !self.eyes().iter().all(|eye| eye.sees(&in_base)) {
+            return None;
+        }
+        let left_from_base: Transform<Left, Base> = self.pose.base_from_left.inverse();
+        let point = left_from_base * in_base;
+        let pair = StereoPair {
+            left: &self.rig.left_camera,
+            right: &self.rig.right_camera,
+            left_from_right: self.pose.left_from_right,
+        };
+        let in_left = PointUncertainty::of(&point, &pair, self.pixel_sigma)?.covariance(&self.shared);
+        let turn = self.pose.base_from_left.rotation().to_rotation_matrix();
+        let covariance = turn * in_left * turn.transpose();
+        let along = |axis: Vector3<f64>| Length::from_mm((axis.dot(&(covariance * axis))).max(0.0).sqrt());
+        Some(PredictedDepth { point, covariance, sigma_forward: along(Vector3::z()), sigma_range: along(direction) })
+    }
+}

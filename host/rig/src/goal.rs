@@ -1,0 +1,67 @@
+//! What depth shall be measured how well: `sigma_z <= 1mm at 350mm over +-40deg`.
+
+use std::fmt;
+use std::str::FromStr;
+
+use vergence_vision::{Angle, Length};
+
+/// Which standard deviation.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum DepthSigma {
+    /// Of the coordinate along forward: `sigma_z`.
+    Forward,
+    /// Of the distance from the middle of both cameras: `sigma_range`.
+    Range,
+}
+
+/// A standard deviation that shall not be exceeded in the horizontal plane, forward and to both sides.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct DepthGoal {
+    /// Of what.
+    pub sigma: DepthSigma,
+    /// The largest allowed.
+    pub limit: Length,
+    /// Distance from the middle of both cameras.
+    pub range: Length,
+    /// How far to each side of forward.
+    pub half_width: Angle,
+}
+
+/// A text that is no goal.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[error("'{0}' is no goal: write it as 'sigma_z <= 1mm at 350mm over +-40deg' (or sigma_range)")]
+pub struct InvalidGoal(String);
+
+impl FromStr for DepthGoal {
+    type Err = InvalidGoal;
+
+    fn from_str(text: &str) -> Result<Self, Self::Err> {
+        parse(text).ok_or_else(|| InvalidGoal(text.to_owned()))
+    }
+}
+
+fn parse(text: &str) -> Option<DepthGoal> {
+    let (sigma, rest) = text.split_once("<=")?;
+    let (limit, rest) = rest.split_once(" at ")?;
+    let (range, width) = rest.split_once(" over ")?;
+    let sigma = match sigma.trim() {
+        "sigma_z" => DepthSigma::Forward,
+        "sigma_range" => DepthSigma::Range,
+        _ => return None,
+    };
+    let width = width.trim();
+    let half_width: Angle = width.strip_prefix("+-").or_else(|| width.strip_prefix('±'))?.parse().ok()?;
+    let (limit, range): (Length, Length) = (limit.parse().ok()?, range.parse().ok()?);
+    let sensible = limit.mm() > 0.0 && range.mm() > 0.0 && (0.0..180.0).contains(&half_width.deg());
+    sensible.then_some(DepthGoal { sigma, limit, range, half_width })
+}
+
+impl fmt::Display for DepthGoal {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let name = match self.sigma {
+            DepthSigma::Forward => "sigma_z",
+            DepthSigma::Range => "sigma_range",
+        };
+        write!(f, "{name} <= {} at {} over ±{}", self.limit, self.range, self.half_width)
+    }
+}

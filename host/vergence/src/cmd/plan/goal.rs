@@ -1,0 +1,86 @@
+//! `vergence plan --goal`: the pose that measures depth as well as asked and sees the most.
+
+use std::path::PathBuf;
+
+use serde_json::{Value, json};
+use vergence_rig::{AxisPosition, DepthField, DepthGoal, RatedPose, Rig};
+use vergence_vision::Length;
+
+use crate::cli::Globals;
+use crate::cmd::report::{axes_json, rounded};
+use crate::console::Console;
+use crate::failure::Failure;
+use crate::output::{depth_field_svg, write_whole};
+use crate::rig_file;
+
+/// How well depth shall be known.
+#[derive(Debug, clap::Args)]
+pub struct GoalOptions {
+    /// The largest standard deviation of the forward coordinate (sigma_z) or the distance (sigma_range), at a distance from
+    /// the middle of the cameras, over the horizontal directions to both sides of forward:
+    /// "sigma_z <= 1mm at 350mm over +-40deg".
+    #[arg(long, value_name = "GOAL", conflicts_with_all = ["mode", "baseline", "separation", "from", "dump"])]
+    goal: Option<DepthGoal>,
+    /// How well matched positions are known, in pixels.
+    #[arg(long, value_name = "PIXELS", default_value_t = 0.1, requires = "goal", value_parser = positive)]
+    pixel_sigma: f64,
+    /// Draw the predicted standard deviation over directions and distances, as SVG.
+    #[arg(long, value_name = "FILE", requires = "goal")]
+    field: Option<PathBuf>,
+}
+
+impl GoalOptions {
+    /// Whether a goal was named.
+    pub fn is_given(&self) -> bool {
+        self.goal.is_some()
+    }
+}
+
+fn positive(text: &str) -> Result<f64, String> {
+    let value: f64 = text.parse().map_err(|_| format!("'{text}' is not a number"))?;
+    if value > 0.0 && value.is_finite() { Ok(value) } else { Err(format!("{text} is not positive")) }
+}
+
+/// Finds the pose and tells it.
+///
+/// # Errors
+/// Exit code 1 where no pose meets the goal; the nearest one is told.
+pub fn run(options: &GoalOptions, globals: &Globals, console: Console) -> Result<(), Failure> {
+    let goal = options.goal.ok_or_else(|| Failure::usage("say a --goal"))?;
+    let rig = rig_file::load(globals.rig.as_deref())?;
+    let best = rig.best_pose(&goal, options.pixel_sigma);
+    let positions = positions(&rig, &best);
+    if let Some(path) = &options.field {
+        let field = DepthField::new(&rig, &best.values, options.pixel_sigma);
+        write_whole(path, depth_field_svg(&field, goal.range * 3.0).as_bytes())?;
+    }
+    let place: Vec<_> =
+        rig.axes.iter().zip(&positions).map(|(axis, position)| format!("{} {position}", axis.name)).collect();
+    let sigma = match best.worst {
+        Some(worst) => format!("at most {worst:.4} over the asked directions"),
+        None => "but not every asked direction is seen by both cameras".to_owned(),
+    };
+    console.say(format!("{goal}, for matches good to {} px:", options.pixel_sigma))?;
+    console.say(format!("{}: {sigma}", place.join(", ")))?;
+    console
+        .say(format!("sees {:.1} of the circle of {:.0}, {:.1} of it with both", best.seen, goal.range, best.stereo))?;
+    console.result(&result(&rig, &best, &positions))?;
+    if best.meets_goal() {
+        return Ok(());
+    }
+    Err(Failure::check(format!("no pose of rig '{}' meets {goal}: this one comes nearest", rig.name)))
+}
+
+fn positions(rig: &Rig, pose: &RatedPose) -> Vec<AxisPosition> {
+    rig.axes.iter().zip(&pose.values).map(|(axis, &value)| AxisPosition::from_value(axis.kind, value)).collect()
+}
+
+fn result(rig: &Rig, best: &RatedPose, positions: &[AxisPosition]) -> Value {
+    json!({
+        "meets_goal": best.meets_goal(),
+        "pose": axes_json(rig, positions),
+        "worst_sigma_mm": best.worst.map(Length::mm).map(rounded),
+        "seen_deg": rounded(best.seen.deg()),
+        "stereo_deg": rounded(best.stereo.deg()),
+    })
+}

@@ -1,0 +1,13 @@
+//! Networks for matching: where they are kept, and how they come into a matcher.
+//!
+//! The store is a folder with one folder for each model: `model.toml`, its [`Manifest`], and the files that it names.
+
+mod choose;
+mod known;
+mod runtime;
+mod store;
+
+pub use choose::MatcherOptions;
+pub use known::{KNOWN, Known, manifest_for};
+pub use runtime::Runtime;
+pub use store::{MODEL_FILE, ModelStore, StoreOptions, digest, load, read_manifest};

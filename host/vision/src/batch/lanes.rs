@@ -1,0 +1,112 @@
+//! Rows to lanes and back, and arithmetic that is fused where the machine can.
+
+use multiversion::multiversion;
+use multiversion::target::target_cfg_f;
+
+/// Rows taken from the arrays together: their columns lie side by side on the stack.
+pub(super) const BLOCK: usize = 64;
+
+/// What every processor of this kind fuses. Where it does not, `mul_add` would call a slow library function.
+pub(super) const ALWAYS_FUSED: bool = cfg!(any(target_feature = "fma", target_arch = "aarch64"));
+
+/// A function of `IN` numbers with `OUT` results, on `W` rows at once and without branches.
+pub(super) trait Kernel<const IN: usize, const OUT: usize> {
+    fn lanes<const FUSED: bool, const W: usize>(&self, columns: [[f64; W]; IN]) -> [[f64; W]; OUT];
+}
+
+/// a b + c
+#[inline(always)]
+pub(super) fn multiply_add<const FUSED: bool>(a: f64, b: f64, c: f64) -> f64 {
+    if FUSED { a.mul_add(b, c) } else { a * b + c }
+}
+
+/// The polynomial with `coefficients`, ascending, at each of `t`.
+#[inline(always)]
+pub(super) fn polynomial<const FUSED: bool, const W: usize>(coefficients: &[f64], t: &[f64; W]) -> [f64; W] {
+    let mut sum = [0.0; W];
+    for &coefficient in coefficients.iter().rev() {
+        for j in 0..W {
+            sum[j] = multiply_add::<FUSED>(sum[j], t[j], coefficient);
+        }
+    }
+    sum
+}
+
+/// Appends the kernel's results for all `rows` to `out`, `W` at a time.
+#[inline(always)]
+pub(super) fn for_rows<const FUSED: bool, const W: usize, const IN: usize, const OUT: usize>(
+    kernel: &impl Kernel<IN, OUT>,
+    rows: &[[f64; IN]],
+    out: &mut Vec<[f64; OUT]>,
+) {
+    out.reserve(rows.len());
+    let (blocks, rest) = rows.as_chunks::<BLOCK>();
+    for block in blocks {
+        out.extend_from_slice(&block_results::<FUSED, W, IN, OUT>(kernel, block));
+    }
+    if !rest.is_empty() {
+        let mut padded = [[0.0; IN]; BLOCK];
+        padded[..rest.len()].copy_from_slice(rest);
+        out.extend_from_slice(&block_results::<FUSED, W, IN, OUT>(kernel, &padded)[..rest.len()]);
+    }
+}
+
+#[inline(always)]
+fn block_results<const FUSED: bool, const W: usize, const IN: usize, const OUT: usize>(
+    kernel: &impl Kernel<IN, OUT>,
+    rows: &[[f64; IN]; BLOCK],
+) -> [[f64; OUT]; BLOCK] {
+    rows_of(&column_results::<FUSED, W, IN, OUT>(kernel, &columns_of(rows)))
+}
+
+/// The kernel's results for a block given by columns.
+#[inline(always)]
+pub(super) fn column_results<const FUSED: bool, const W: usize, const IN: usize, const OUT: usize>(
+    kernel: &impl Kernel<IN, OUT>,
+    columns: &[[f64; BLOCK]; IN],
+) -> [[f64; BLOCK]; OUT] {
+    let mut results = [[0.0; BLOCK]; OUT];
+    for first in (0..BLOCK).step_by(W) {
+        let mut input = [[0.0; W]; IN];
+        for (lanes, column) in input.iter_mut().zip(columns) {
+            lanes.copy_from_slice(&column[first..first + W]);
+        }
+        let output = kernel.lanes::<FUSED, W>(input);
+        for (column, lanes) in results.iter_mut().zip(&output) {
+            column[first..first + W].copy_from_slice(lanes);
+        }
+    }
+    results
+}
+
+#[inline(always)]
+pub(super) fn columns_of<const C: usize>(rows: &[[f64; C]; BLOCK]) -> [[f64; BLOCK]; C] {
+    let mut columns = [[0.0; BLOCK]; C];
+    for (i, row) in rows.iter().enumerate() {
+        for (column, value) in columns.iter_mut().zip(row) {
+            column[i] = *value;
+        }
+    }
+    columns
+}
+
+#[inline(always)]
+pub(super) fn rows_of<const C: usize>(columns: &[[f64; BLOCK]; C]) -> [[f64; C]; BLOCK] {
+    let mut rows = [[0.0; C]; BLOCK];
+    for (i, row) in rows.iter_mut().enumerate() {
+        for (value, column) in row.iter_mut().zip(columns) {
+            *value = column[i];
+        }
+    }
+    rows
+}
+
+/// What the kernels use on this machine.
+#[multiversion(targets("x86_64+avx512f+avx512dq+avx512vl+avx2+fma", "x86_64+avx2+fma"))]
+pub(super) fn best_name() -> &'static str {
+    match (target_cfg_f!(target_feature = "avx512f"), target_cfg_f!(target_feature = "avx2")) {
+        (true, _) => "avx512",
+        (_, true) => "avx2+fma",
+        _ => std::env::consts::ARCH,
+    }
+}

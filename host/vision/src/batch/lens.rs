@@ -1,0 +1,81 @@
+//! A lens prepared for many pixels.
+
+use super::Instructions;
+use super::project::{Project, project_baseline, project_best};
+use super::unproject::{Unproject, unproject_baseline, unproject_best};
+use crate::{Camera, KannalaBrandt, Pixel};
+
+/// A lens prepared for whole arrays of points and pixels: [`KannalaBrandt`], about ten times faster.
+///
+/// Made once per lens, in about a millisecond. Rays agree with the single-point functions to 1e-14 rad.
+#[derive(Clone, Debug, PartialEq)]
+pub struct BatchLens {
+    lens: KannalaBrandt,
+    project: Project,
+    unproject: Option<Unproject>,
+    instructions: Instructions,
+}
+
+impl BatchLens {
+    /// Prepares `lens`.
+    #[must_use]
+    pub fn new(lens: &KannalaBrandt) -> Self {
+        Self {
+            lens: *lens,
+            project: Project::new(lens),
+            unproject: Unproject::new(lens),
+            instructions: Instructions::Best,
+        }
+    }
+
+    /// The same with other instructions.
+    #[must_use]
+    pub fn with_instructions(self, instructions: Instructions) -> Self {
+        Self { instructions, ..self }
+    }
+
+    /// Where points (N × 3, any unit, components from 1e-150 to 1e150 or zero) are seen: N × 2 in pixels. NaN beyond
+    /// `theta_max` and at the optical centre.
+    #[must_use]
+    pub fn project(&self, points: &[[f64; 3]]) -> Vec<[f64; 2]> {
+        let mut pixels = Vec::new();
+        self.project_into(points, &mut pixels);
+        pixels
+    }
+
+    /// As [`Self::project`], appending to `pixels`.
+    pub fn project_into(&self, points: &[[f64; 3]], pixels: &mut Vec<[f64; 2]>) {
+        match self.instructions {
+            Instructions::Best => project_best(&self.project, points, pixels),
+            Instructions::Baseline => project_baseline(&self.project, points, pixels),
+        }
+    }
+
+    /// The rays seen at pixels (N × 2): N × 3, unit vectors to 1e-14. NaN beyond `theta_max`.
+    #[must_use]
+    pub fn unproject(&self, pixels: &[[f64; 2]]) -> Vec<[f64; 3]> {
+        let mut rays = Vec::new();
+        self.unproject_into(pixels, &mut rays);
+        rays
+    }
+
+    /// As [`Self::unproject`], appending to `rays`.
+    pub fn unproject_into(&self, pixels: &[[f64; 2]], rays: &mut Vec<[f64; 3]>) {
+        match (&self.unproject, self.instructions) {
+            (Some(fit), Instructions::Best) => unproject_best(fit, pixels, rays),
+            (Some(fit), Instructions::Baseline) => unproject_baseline(fit, pixels, rays),
+            // A lens that nearly turns over inside its field: one by one.
+            (None, _) => rays.extend(pixels.iter().map(|&[u, v]| self.unproject_one(Pixel { u, v }))),
+        }
+    }
+
+    fn unproject_one(&self, pixel: Pixel) -> [f64; 3] {
+        self.lens.unproject::<Camera>(pixel).map_or([f64::NAN; 3], |ray| ray.vector().into())
+    }
+
+    /// Whether unprojection of this lens is fast: false where its polynomial nearly turns over inside the field.
+    #[must_use]
+    pub const fn is_fitted(&self) -> bool {
+        self.unproject.is_some()
+    }
+}

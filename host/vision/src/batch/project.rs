@@ -1,0 +1,66 @@
+//! Points to pixels.
+
+use multiversion::multiversion;
+use multiversion::target::target_cfg_f;
+
+use super::arc_tangent::angle_from_axis;
+use super::lanes::{ALWAYS_FUSED, Kernel, for_rows, polynomial};
+use crate::KannalaBrandt;
+
+/// Two vectors of eight keep the multipliers busy.
+const LANES: usize = 16;
+
+/// What projection needs of a lens.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Project {
+    k: [f64; 5],
+    aspect: f64,
+    centre: [f64; 2],
+    theta_max: f64,
+}
+
+impl Project {
+    pub(super) fn new(lens: &KannalaBrandt) -> Self {
+        let centre = lens.centre();
+        Self { k: lens.k(), aspect: lens.aspect(), centre: [centre.u, centre.v], theta_max: lens.theta_max().rad() }
+    }
+}
+
+impl Kernel<3, 2> for Project {
+    #[inline(always)]
+    fn lanes<const FUSED: bool, const W: usize>(&self, [x, y, z]: [[f64; W]; 3]) -> [[f64; W]; 2] {
+        let mut rho = [0.0; W];
+        for j in 0..W {
+            rho[j] = (x[j] * x[j] + y[j] * y[j]).sqrt();
+        }
+        let theta = angle_from_axis::<FUSED, W>(&rho, &z);
+        let mut squared = [0.0; W];
+        for j in 0..W {
+            squared[j] = theta[j] * theta[j];
+        }
+        let growth = polynomial::<FUSED, W>(&self.k, &squared);
+        let (mut u, mut v) = ([0.0; W], [0.0; W]);
+        for j in 0..W {
+            // On the axis x and y are zero, whatever the scale.
+            let scale = theta[j] * growth[j] / if rho[j] > 0.0 { rho[j] } else { 1.0 };
+            let seen = theta[j] <= self.theta_max && rho[j] < f64::INFINITY;
+            let scale = if seen { scale } else { f64::NAN };
+            u[j] = self.centre[0] + scale * x[j];
+            v[j] = self.centre[1] + self.aspect * scale * y[j];
+        }
+        [u, v]
+    }
+}
+
+pub(super) fn project_baseline(lens: &Project, points: &[[f64; 3]], pixels: &mut Vec<[f64; 2]>) {
+    for_rows::<ALWAYS_FUSED, LANES, 3, 2>(lens, points, pixels);
+}
+
+#[multiversion(targets("x86_64+avx512f+avx512dq+avx512vl+avx2+fma", "x86_64+avx2+fma"))]
+pub(super) fn project_best(lens: &Project, points: &[[f64; 3]], pixels: &mut Vec<[f64; 2]>) {
+    if target_cfg_f!(target_feature = "fma") {
+        for_rows::<true, LANES, 3, 2>(lens, points, pixels);
+    } else {
+        for_rows::<ALWAYS_FUSED, LANES, 3, 2>(lens, points, pixels);
+    }
+}

@@ -1,0 +1,103 @@
+//! Pixels to rays.
+//!
+//! With q = r², both sin θ / r and cos θ are smooth functions of q, so that a ray is (x A(q), y A(q), C(q)) with two
+//! polynomials made once per lens: no root, no iteration, no sine.
+
+use multiversion::multiversion;
+use multiversion::target::target_cfg_f;
+
+use super::chebyshev::fit;
+use super::lanes::{ALWAYS_FUSED, Kernel, for_rows, polynomial};
+use crate::KannalaBrandt;
+
+/// One vector of eight for each polynomial.
+const LANES: usize = 8;
+/// Terms tried, fewest first.
+const TERMS: std::ops::RangeInclusive<usize> = 12..=32;
+/// Largest error of a component of the ray that a fit may have.
+const LARGEST_ERROR: f64 = 7e-15;
+
+/// What unprojection needs of a lens.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) struct Unproject {
+    sine_over_radius: Vec<f64>,
+    cosine: Vec<f64>,
+    centre: [f64; 2],
+    per_aspect: f64,
+    /// r² → t in [-1, 1].
+    slope: f64,
+    largest_squared: f64,
+}
+
+impl Unproject {
+    /// `None` for a lens so bent that no polynomial of 32 terms is near enough: dr/dθ comes close to zero.
+    pub(super) fn new(lens: &KannalaBrandt) -> Option<Self> {
+        TERMS.map(|terms| Self::of_terms(lens, terms)).find(|fit| fit.error(lens) <= LARGEST_ERROR)
+    }
+
+    fn of_terms(lens: &KannalaBrandt, terms: usize) -> Self {
+        let largest = lens.radius_max();
+        let radius = |t: f64| largest * (0.5 * (t + 1.0)).sqrt();
+        let sine_over_radius = fit(terms, |t| {
+            let r = radius(t);
+            if r > 0.0 { lens.angle_at_radius(r).sin() / r } else { 1.0 / lens.k()[0] }
+        });
+        let cosine = fit(terms, |t| lens.angle_at_radius(radius(t)).cos());
+        let centre = lens.centre();
+        Self {
+            sine_over_radius,
+            cosine,
+            centre: [centre.u, centre.v],
+            per_aspect: 1.0 / lens.aspect(),
+            slope: 2.0 / (largest * largest),
+            largest_squared: largest * largest,
+        }
+    }
+
+    /// The largest error of a component, on a grid of radii.
+    fn error(&self, lens: &KannalaBrandt) -> f64 {
+        const RADII: u32 = 500;
+        let error = |i: u32| {
+            let r = lens.radius_max() * f64::from(i) / f64::from(RADII);
+            let theta = lens.angle_at_radius(r);
+            let t = [self.slope * r * r - 1.0];
+            let [sine] = polynomial::<false, 1>(&self.sine_over_radius, &t);
+            let [cosine] = polynomial::<false, 1>(&self.cosine, &t);
+            (sine * r - theta.sin()).abs().max((cosine - theta.cos()).abs())
+        };
+        (0..=RADII).map(error).fold(0.0, f64::max)
+    }
+}
+
+impl Kernel<2, 3> for Unproject {
+    #[inline(always)]
+    fn lanes<const FUSED: bool, const W: usize>(&self, [u, v]: [[f64; W]; 2]) -> [[f64; W]; 3] {
+        let (mut x, mut y, mut t) = ([0.0; W], [0.0; W], [0.0; W]);
+        for j in 0..W {
+            x[j] = u[j] - self.centre[0];
+            y[j] = (v[j] - self.centre[1]) * self.per_aspect;
+            let squared = x[j] * x[j] + y[j] * y[j];
+            t[j] = if squared <= self.largest_squared { self.slope * squared - 1.0 } else { f64::NAN };
+        }
+        let sine_over_radius = polynomial::<FUSED, W>(&self.sine_over_radius, &t);
+        let cosine = polynomial::<FUSED, W>(&self.cosine, &t);
+        for j in 0..W {
+            x[j] *= sine_over_radius[j];
+            y[j] *= sine_over_radius[j];
+        }
+        [x, y, cosine]
+    }
+}
+
+pub(super) fn unproject_baseline(lens: &Unproject, pixels: &[[f64; 2]], rays: &mut Vec<[f64; 3]>) {
+    for_rows::<ALWAYS_FUSED, LANES, 2, 3>(lens, pixels, rays);
+}
+
+#[multiversion(targets("x86_64+avx512f+avx512dq+avx512vl+avx2+fma", "x86_64+avx2+fma"))]
+pub(super) fn unproject_best(lens: &Unproject, pixels: &[[f64; 2]], rays: &mut Vec<[f64; 3]>) {
+    if target_cfg_f!(target_feature = "fma") {
+        for_rows::<true, LANES, 2, 3>(lens, pixels, rays);
+    } else {
+        for_rows::<ALWAYS_FUSED, LANES, 2, 3>(lens, pixels, rays);
+    }
+}

@@ -1,0 +1,75 @@
+//! How pixels move with rays, rays with pixels, and pixels with the lens's parameters.
+//!
+//! In the directions along and across the radius, a turn of the ray by one radian moves the pixel by dr/dθ and r / sin θ.
+
+use nalgebra::{Matrix2x3, Matrix3x2, SMatrix, Vector2, Vector3};
+
+use crate::{Frame, KannalaBrandt, UnitRay};
+
+/// Parameters of a lens in the order of calibrations: fx, fy, cx, cy in pixels, k1 to k4 as OpenCV has them.
+pub const LENS_PARAMETERS: usize = 8;
+
+/// A ray's surroundings: angle, directions in space and in the image, and how much is moved along each.
+struct Local {
+    theta: f64,
+    space: [Vector3<f64>; 2],
+    image: [Vector2<f64>; 2],
+    pixels_per_radian: [f64; 2],
+}
+
+impl KannalaBrandt {
+    /// The derivative of the pixel by the direction of `ray` in pixels per radian, for directions that stay of unit length.
+    #[must_use]
+    pub fn pixel_by_ray<F: Frame>(&self, ray: &UnitRay<F>) -> Matrix2x3<f64> {
+        let Local { space, image, pixels_per_radian, .. } = self.local(ray);
+        let along = |i: usize| image[i] * space[i].transpose() * pixels_per_radian[i];
+        let mut derivative = along(0) + along(1);
+        derivative.row_mut(1).scale_mut(self.aspect());
+        derivative
+    }
+
+    /// The derivative of the unit ray by the pixel where `ray` is seen, in radians per pixel.
+    #[must_use]
+    pub fn ray_by_pixel<F: Frame>(&self, ray: &UnitRay<F>) -> Matrix3x2<f64> {
+        let Local { space, image, pixels_per_radian, .. } = self.local(ray);
+        let along = |i: usize| space[i] * image[i].transpose() / pixels_per_radian[i];
+        let mut derivative = along(0) + along(1);
+        derivative.column_mut(1).unscale_mut(self.aspect());
+        derivative
+    }
+
+    /// The derivative of the pixel where `ray` is seen by the lens's parameters, in the order of [`LENS_PARAMETERS`].
+    #[must_use]
+    pub fn pixel_by_lens<F: Frame>(&self, ray: &UnitRay<F>) -> SMatrix<f64, 2, LENS_PARAMETERS> {
+        let Local { theta, image: [radial, _], .. } = self.local(ray);
+        let (fx, fy, squared) = (self.k()[0], self.k()[0] * self.aspect(), theta * theta);
+        let distorted = self.radius_at(theta) / fx;
+        let mut columns = SMatrix::zeros();
+        columns[(0, 0)] = distorted * radial.x;
+        columns[(1, 1)] = distorted * radial.y;
+        columns[(0, 2)] = 1.0;
+        columns[(1, 3)] = 1.0;
+        let mut power = theta;
+        for column in 4..LENS_PARAMETERS {
+            power *= squared;
+            columns[(0, column)] = fx * power * radial.x;
+            columns[(1, column)] = fy * power * radial.y;
+        }
+        columns
+    }
+
+    fn local<F: Frame>(&self, ray: &UnitRay<F>) -> Local {
+        let d = ray.vector();
+        let sine = d.x.hypot(d.y);
+        let theta = sine.atan2(d.z);
+        // On the axis any radius will do.
+        let (cos_phi, sin_phi) = if sine > 0.0 { (d.x / sine, d.y / sine) } else { (1.0, 0.0) };
+        let across = if sine > 0.0 { self.radius_at(theta) / sine } else { self.k()[0] };
+        Local {
+            theta,
+            space: [Vector3::new(d.z * cos_phi, d.z * sin_phi, -sine), Vector3::new(-sin_phi, cos_phi, 0.0)],
+            image: [Vector2::new(cos_phi, sin_phi), Vector2::new(-sin_phi, cos_phi)],
+            pixels_per_radian: [self.pixels_per_radian(crate::Angle::from_rad(theta)), across],
+        }
+    }
+}

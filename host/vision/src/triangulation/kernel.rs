@@ -1,0 +1,119 @@
+//! The methods of triangulation by name.
+
+use std::fmt;
+use std::str::FromStr;
+
+use super::{
+    AngularNorm, Triangulated, angular, edge_plane, mid2, midpoint, pseudo_intersection, rectified, reprojection,
+};
+use crate::{Drop, Left, PixelPair, Right, StereoPair, UnitRay};
+
+/// A method of triangulation. Ordinary noise makes no difference between them but for [`Kernel::Rectified`]; they differ
+/// for rays that miss each other by far, as when a match slips along an edge.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub enum Kernel {
+    /// [`pseudo_intersection`]: the default.
+    #[default]
+    PseudoIntersection,
+    /// [`midpoint`].
+    Midpoint,
+    /// [`mid2`].
+    Mid2,
+    /// [`angular`], [`AngularNorm::L1`].
+    AngularL1,
+    /// [`angular`], [`AngularNorm::L2`].
+    AngularL2,
+    /// [`angular`], [`AngularNorm::Linf`].
+    AngularLinf,
+    /// [`reprojection`].
+    Reprojection,
+    /// [`edge_plane`], with the direction of the edge that all matches lie on.
+    EdgePlane(UnitRay<Left>),
+    /// [`rectified`].
+    Rectified,
+}
+
+/// A name that is no method's.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[error(
+    "'{0}' is no method of triangulation: choose pseudo-intersection, midpoint, mid2, angular-l1, angular-l2, \
+     angular-linf, reprojection or rectified"
+)]
+pub struct UnknownKernel(String);
+
+impl Kernel {
+    /// All that need no more than the pair.
+    pub const ALL: [Self; 8] = [
+        Self::PseudoIntersection,
+        Self::Midpoint,
+        Self::Mid2,
+        Self::AngularL1,
+        Self::AngularL2,
+        Self::AngularLinf,
+        Self::Reprojection,
+        Self::Rectified,
+    ];
+
+    /// The point of two matched pixels.
+    ///
+    /// # Errors
+    /// [`Drop`] for pixels outside the lenses' fields, and for rays that make no point.
+    pub fn triangulate(&self, pixels: &PixelPair, pair: &StereoPair<'_>) -> Result<Triangulated, Drop> {
+        let left = pair.left.unproject::<Left>(pixels.left).map_err(|_| Drop::OutsideLeftField)?;
+        let right = pair.right.unproject::<Right>(pixels.right).map_err(|_| Drop::OutsideRightField)?;
+        self.of_rays(pixels, &left, &right, pair)
+    }
+
+    /// The same where the rays of `pixels` are known; `right` in the right camera's own frame.
+    pub(crate) fn of_rays(
+        &self,
+        pixels: &PixelPair,
+        left: &UnitRay<Left>,
+        right: &UnitRay<Right>,
+        pair: &StereoPair<'_>,
+    ) -> Result<Triangulated, Drop> {
+        let (turned, centre) = (pair.left_from_right * *right, pair.left_from_right.origin());
+        let made = match self {
+            Self::PseudoIntersection => pseudo_intersection(left, &turned, &centre),
+            Self::Midpoint => midpoint(left, &turned, &centre),
+            Self::Mid2 => mid2(left, &turned, &centre),
+            Self::AngularL1 => angular(AngularNorm::L1, left, &turned, &centre),
+            Self::AngularL2 => angular(AngularNorm::L2, left, &turned, &centre),
+            Self::AngularLinf => angular(AngularNorm::Linf, left, &turned, &centre),
+            Self::Reprojection => reprojection(pixels, left, right, pair),
+            Self::EdgePlane(edge) => edge_plane(edge, left, &turned, &centre),
+            Self::Rectified => rectified(left, right, &pair.left_from_right),
+        };
+        Ok(made?)
+    }
+
+    /// A stable name for the command line and for reports.
+    #[must_use]
+    pub const fn as_str(&self) -> &'static str {
+        match self {
+            Self::PseudoIntersection => "pseudo-intersection",
+            Self::Midpoint => "midpoint",
+            Self::Mid2 => "mid2",
+            Self::AngularL1 => "angular-l1",
+            Self::AngularL2 => "angular-l2",
+            Self::AngularLinf => "angular-linf",
+            Self::Reprojection => "reprojection",
+            Self::EdgePlane(_) => "edge-plane",
+            Self::Rectified => "rectified",
+        }
+    }
+}
+
+impl fmt::Display for Kernel {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(self.as_str())
+    }
+}
+
+impl FromStr for Kernel {
+    type Err = UnknownKernel;
+
+    fn from_str(name: &str) -> Result<Self, Self::Err> {
+        Self::ALL.into_iter().find(|kernel| kernel.as_str() == name).ok_or_else(|| UnknownKernel(name.to_owned()))
+    }
+}

@@ -1,0 +1,190 @@
+//! What a point's uncertainty is made of: the noise of its own two pixels, and the errors that all points of a pair share.
+//!
+//! With u, v the rays, λ and μ the ranges, n the normal of the epipolar plane and s = [u, v, n] the sine of the parallax, a
+//! pseudo-intersected point moves to first order with the rays by
+//!
+//! ```text
+//! G_u = λ [v (n × u)ᵀ / s + n nᵀ / 2]        G_v = μ [-u (n × v)ᵀ / s + n nᵀ / 2]
+//! ```
+//!
+//! in the plane along the other ray, across it by the mean of both. The right ray turns with the relative pose, both turn
+//! with their lenses; a shift of the right centre by δ acts as a turn of its ray by δ / μ.
+
+use nalgebra::{Matrix3, Matrix6, RowSVector, SMatrix, Vector3, Vector6};
+
+use crate::lens_derivatives::LENS_PARAMETERS;
+use crate::{Angle, Left, Point, Right, StereoPair, UnitRay};
+
+/// Both lenses and the pose.
+pub const SHARED_PARAMETERS: usize = 2 * LENS_PARAMETERS + 6;
+
+/// The covariance of what all points of a pair share, in this order: left lens, right lens (each fx, fy, cx, cy in pixels
+/// and k1 to k4 as OpenCV has them), then the relative pose as a turn ω about the left axes in radians and a shift δ of the
+/// right camera in the left frame in millimetres.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct SharedCovariance(SMatrix<f64, SHARED_PARAMETERS, SHARED_PARAMETERS>);
+
+impl SharedCovariance {
+    /// Lenses and pose known exactly.
+    #[must_use]
+    pub fn exact() -> Self {
+        Self(SMatrix::zeros())
+    }
+
+    /// With all correlations, of lenses and pose calibrated together.
+    #[must_use]
+    pub const fn joint(covariance: SMatrix<f64, SHARED_PARAMETERS, SHARED_PARAMETERS>) -> Self {
+        Self(covariance)
+    }
+
+    /// The same with another covariance of the pose, which then is independent of the lenses.
+    #[must_use]
+    pub fn with_pose(mut self, covariance: &Matrix6<f64>) -> Self {
+        const POSE: usize = 2 * LENS_PARAMETERS;
+        self.0.fixed_columns_mut::<6>(POSE).fill(0.0);
+        self.0.fixed_rows_mut::<6>(POSE).fill(0.0);
+        self.0.fixed_view_mut::<6, 6>(POSE, POSE).copy_from(covariance);
+        self
+    }
+
+    /// The same with lenses calibrated independently of each other and of the pose.
+    #[must_use]
+    pub fn with_lenses(mut self, lenses: [&SMatrix<f64, LENS_PARAMETERS, LENS_PARAMETERS>; 2]) -> Self {
+        for (lens, first) in lenses.into_iter().zip([0, LENS_PARAMETERS]) {
+            self.0.fixed_columns_mut::<LENS_PARAMETERS>(first).fill(0.0);
+            self.0.fixed_rows_mut::<LENS_PARAMETERS>(first).fill(0.0);
+            self.0.fixed_view_mut::<LENS_PARAMETERS, LENS_PARAMETERS>(first, first).copy_from(lens);
+        }
+        self
+    }
+
+    /// The covariance in the stated order.
+    #[must_use]
+    pub const fn matrix(&self) -> &SMatrix<f64, SHARED_PARAMETERS, SHARED_PARAMETERS> {
+        &self.0
+    }
+}
+
+/// How one point depends on its pixels and on what is shared.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct PointUncertainty {
+    /// Covariance from the noise of its two pixels alone, mm², left frame.
+    pub from_pixels: Matrix3<f64>,
+    /// Derivative of the point by the shared parameters, in the order of [`SharedCovariance`], mm per unit of each.
+    pub by_shared: SMatrix<f64, 3, SHARED_PARAMETERS>,
+}
+
+impl PointUncertainty {
+    /// Of `point` as `pair` sees it, for noise of `pixel_sigma` pixels in each coordinate of each image. `None` on the line
+    /// through both centres and where an argument is not finite.
+    #[must_use]
+    pub fn of(point: &Point<Left>, pair: &StereoPair<'_>, pixel_sigma: f64) -> Option<Self> {
+        let turn = pair.left_from_right.rotation().to_rotation_matrix().into_inner();
+        let (left, in_right) = (point.direction()?, (pair.left_from_right.inverse() * *point).direction()?);
+        let (by_left, by_right) = by_rays(&point.mm(), &pair.left_from_right.origin().mm())?;
+        let right_range = (point.mm() - pair.left_from_right.origin().mm()).norm();
+
+        let left_pixel = by_left * pair.left.ray_by_pixel(&left);
+        let right_pixel = by_right * turn * pair.right.ray_by_pixel(&in_right);
+        let from_pixels =
+            (left_pixel * left_pixel.transpose() + right_pixel * right_pixel.transpose()) * (pixel_sigma * pixel_sigma);
+
+        // At a fixed pixel the ray turns against what the lens does.
+        let mut by_shared = SMatrix::<f64, 3, SHARED_PARAMETERS>::zeros();
+        by_shared.fixed_columns_mut::<LENS_PARAMETERS>(0).copy_from(&(-left_pixel * pair.left.pixel_by_lens(&left)));
+        by_shared
+            .fixed_columns_mut::<LENS_PARAMETERS>(LENS_PARAMETERS)
+            .copy_from(&(-right_pixel * pair.right.pixel_by_lens(&in_right)));
+        let right = turn * in_right.vector();
+        by_shared.fixed_columns_mut::<3>(2 * LENS_PARAMETERS).copy_from(&(-by_right * right.cross_matrix()));
+        by_shared.fixed_columns_mut::<3>(2 * LENS_PARAMETERS + 3).copy_from(&(by_right / right_range));
+        let finite = from_pixels.iter().chain(by_shared.iter()).all(|value| value.is_finite());
+        finite.then_some(Self { from_pixels, by_shared })
+    }
+
+    /// The point's whole covariance, mm², left frame.
+    #[must_use]
+    pub fn covariance(&self, shared: &SharedCovariance) -> Matrix3<f64> {
+        self.from_pixels + self.covariance_with(self, shared)
+    }
+
+    /// The covariance of the errors of this point (rows) and `other` (columns): what they share, mm². The same pair's
+    /// points lean the same way, so differences between near points are better known than the points.
+    #[must_use]
+    pub fn covariance_with(&self, other: &Self, shared: &SharedCovariance) -> Matrix3<f64> {
+        self.by_shared * shared.0 * other.by_shared.transpose()
+    }
+}
+
+/// How the angle between two rays and one epipolar plane, see [`crate::ray_to_plane`], depends on their pixels and on what
+/// is shared.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct ResidualUncertainty {
+    /// Variance from the noise of the two pixels alone, rad².
+    pub from_pixels: f64,
+    /// Derivative of the angle by the shared parameters, in the order of [`SharedCovariance`], radians per unit of each.
+    pub by_shared: RowSVector<f64, SHARED_PARAMETERS>,
+}
+
+impl ResidualUncertainty {
+    /// For two rays that are near one epipolar plane, `right` in the right camera's own frame. `None` where both lie along
+    /// the baseline.
+    ///
+    /// The angle is [t, u, v] over the larger of |t × u| and |t × v|, t of unit length, and changes with each of the three.
+    #[must_use]
+    pub fn of(left: &UnitRay<Left>, right: &UnitRay<Right>, pair: &StereoPair<'_>, pixel_sigma: f64) -> Option<Self> {
+        let turn = pair.left_from_right.rotation().to_rotation_matrix().into_inner();
+        let centre = pair.left_from_right.origin();
+        let (u, v, t) = (left.vector(), turn * right.vector(), centre.direction()?.vector());
+        let (from_u, from_v) = (t.cross(&u), t.cross(&v));
+        let sine = from_u.norm().max(from_v.norm());
+        let by_left = v.cross(&t).transpose() / sine * pair.left.ray_by_pixel(left);
+        let by_right = from_u.transpose() / sine * turn * pair.right.ray_by_pixel(right);
+        // The shift along the baseline changes nothing.
+        let across = u.cross(&v) / (sine * centre.mm().norm());
+        let by_shift = (across - t * t.dot(&across)).transpose();
+        let by_turn = v.cross(&(from_u / sine)).transpose();
+
+        let mut by_shared = RowSVector::<f64, SHARED_PARAMETERS>::zeros();
+        by_shared.fixed_columns_mut::<LENS_PARAMETERS>(0).copy_from(&(-by_left * pair.left.pixel_by_lens(left)));
+        by_shared
+            .fixed_columns_mut::<LENS_PARAMETERS>(LENS_PARAMETERS)
+            .copy_from(&(-by_right * pair.right.pixel_by_lens(right)));
+        by_shared.fixed_columns_mut::<3>(2 * LENS_PARAMETERS).copy_from(&by_turn);
+        by_shared.fixed_columns_mut::<3>(2 * LENS_PARAMETERS + 3).copy_from(&by_shift);
+        let from_pixels = (by_left.norm_squared() + by_right.norm_squared()) * pixel_sigma * pixel_sigma;
+        let finite = from_pixels.is_finite() && by_shared.iter().all(|value| value.is_finite());
+        finite.then_some(Self { from_pixels, by_shared })
+    }
+
+    /// The standard deviation of the angle.
+    #[must_use]
+    pub fn sigma(&self, shared: &SharedCovariance) -> Angle {
+        let from_shared = (self.by_shared * shared.0 * self.by_shared.transpose()).x.max(0.0);
+        Angle::from_rad((self.from_pixels + from_shared).sqrt())
+    }
+
+    /// The derivative by the pose alone: ω in radians, δ in millimetres.
+    pub(crate) fn by_pose(&self) -> Vector6<f64> {
+        self.by_shared.fixed_columns::<6>(2 * LENS_PARAMETERS).transpose()
+    }
+}
+
+/// G_u and G_v, in millimetres per radian.
+fn by_rays(point: &Vector3<f64>, right_centre: &Vector3<f64>) -> Option<(Matrix3<f64>, Matrix3<f64>)> {
+    // The sine to the baseline below which the range is without bound for any purpose.
+    const ALONG_BASELINE: f64 = 1e-9;
+    let from_right = point - right_centre;
+    let (left_range, right_range) = (point.norm(), from_right.norm());
+    let normal = right_centre.cross(point);
+    let area = normal.norm();
+    if area.is_nan() || area <= ALONG_BASELINE * left_range * right_centre.norm() {
+        return None;
+    }
+    let (u, v, n) = (point / left_range, from_right / right_range, normal / area);
+    let parallax_sine = u.cross(&v).dot(&n);
+    let across = n * n.transpose() / 2.0;
+    let by_left = (v * n.cross(&u).transpose() / parallax_sine + across) * left_range;
+    let by_right = (u * n.cross(&v).transpose() / -parallax_sine + across) * right_range;
+    Some((by_left, by_right))
+}

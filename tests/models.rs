@@ -1,0 +1,108 @@
+//! Models in their folder: kept, listed, verified, used, and refused in sentences.
+#![allow(clippy::expect_used, clippy::panic, reason = "a test fails loudly")]
+
+mod common;
+
+use std::path::{Path, PathBuf};
+
+use common::{fails_with, run, run_json, shared, text};
+
+/// A model of tiny networks in a folder of its own, described by model.toml.
+fn tiny_model(folder: &Path) -> PathBuf {
+    let from = Path::new(env!("CARGO_MANIFEST_DIR")).join("../networks/tests/tiny");
+    let model = folder.join("tiny");
+    std::fs::create_dir(&model).expect("a folder");
+    for file in ["extractor64.onnx", "per_keypoint64.onnx"] {
+        std::fs::copy(from.join(file), model.join(file)).expect("a tiny network");
+    }
+    let manifest = r#"
+name = "tiny"
+licence = "MIT"
+image = { channels = 1, multiple_of = 32 }
+[networks.separate.extractor]
+file = "extractor64.onnx"
+image = "image"
+keypoints = "keypoints"
+descriptors = "descriptors"
+scores = "scores"
+descriptor_width = 64
+[networks.separate.matcher]
+file = "per_keypoint64.onnx"
+keypoints = ["kpts0", "kpts1"]
+descriptors = ["desc0", "desc1"]
+coordinates = "centred"
+result = { matches = "matches0", scores = "mscores0", form = "per-keypoint", threshold = 0.1 }
+"#;
+    std::fs::write(model.join("model.toml"), manifest).expect("a manifest");
+    model
+}
+
+fn path(path: &Path) -> &str {
+    path.to_str().expect("UTF-8")
+}
+
+#[test]
+fn a_model_is_kept_listed_verified_and_a_changed_file_is_noticed() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let model = tiny_model(folder.path());
+    let store = folder.path().join("store");
+    let models = |verb: &[&str]| [&["models"], verb, &["--models", path(&store), "--json"]].concat().join("\n");
+    let arguments = |verb: &[&str]| models(verb).split('\n').map(str::to_owned).collect::<Vec<_>>();
+    let json = |verb: &[&str]| {
+        let arguments = arguments(verb);
+        run_json(&arguments.iter().map(String::as_str).collect::<Vec<_>>())
+    };
+
+    assert_eq!(json(&["list"])["kept"].as_array().expect("a list").len(), 0);
+    json(&["add", path(&model)]);
+    assert_eq!(json(&["list"])["kept"][0]["name"], "tiny");
+    let verified = json(&["verify"]);
+    assert!(verified["models"].as_array().expect("a list").iter().all(|entry| entry["ok"] == true), "{verified}");
+
+    let kept = store.join("tiny").join("extractor64.onnx");
+    let mut bytes = std::fs::read(&kept).expect("the kept file");
+    bytes[20] ^= 1;
+    std::fs::write(&kept, bytes).expect("the kept file");
+    fails_with(&["models", "verify", "--models", path(&store)], 1, &["not what it should be"]);
+    let output = run(&["models", "verify", "--models", path(&store)]);
+    assert!(text(&output.stdout).contains("SHA-256"), "{}", text(&output.stdout));
+}
+
+#[test]
+fn what_cannot_be_kept_or_used_is_refused_in_a_sentence() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let model = tiny_model(folder.path());
+    let manifest = model.join("model.toml");
+    let right = std::fs::read_to_string(&manifest).expect("the manifest");
+    let store = folder.path().join("store");
+    let add = ["models", "add", path(&model), "--models", path(&store)];
+
+    std::fs::write(&manifest, right.replace("matches0", "matches")).expect("the manifest");
+    fails_with(&add, 2, &["per_keypoint64.onnx", "it has no output 'matches'"]);
+    std::fs::write(&manifest, right.replace("name = \"tiny\"", "name = \"../tiny\"")).expect("the manifest");
+    fails_with(&add, 2, &["letters, digits"]);
+    std::fs::write(&manifest, "name = 3").expect("the manifest");
+    fails_with(&add, 2, &["model.toml"]);
+    fails_with(&["models", "add", "/nonexistent", "--models", path(&store)], 2, &["/nonexistent"]);
+    assert!(!store.join("tiny").exists(), "what was refused is not kept");
+
+    fails_with(&["models", "pull", "superpoint-lightglue"], 2, &["non-commercial", "--accept-non-commercial"]);
+    fails_with(&["models", "pull", "unheard-of"], 2, &["vergence models list"]);
+    fails_with(&["models", "pull", "xfeat-lighterglue"], 2, &["PyTorch"]);
+    fails_with(
+        &["models", "verify", "--models", path(&store), "--onnxruntime", "/nonexistent/libonnxruntime.so"],
+        2,
+        &["ONNX Runtime cannot be used"],
+    );
+}
+
+#[test]
+fn published_networks_are_known_by_their_tensors() {
+    let Some(models) = shared("models") else { return };
+    let folder = tempfile::tempdir().expect("a folder");
+    let store = folder.path().join("store");
+    let added = run_json(&["models", "add", path(&models), "--models", path(&store), "--json"]);
+    assert_eq!(added["name"], "xfeat-lighterglue");
+    let verified = run_json(&["models", "verify", "--models", path(&store), "--json"]);
+    assert_eq!(verified["models"][0]["ok"], true, "{verified}");
+}
