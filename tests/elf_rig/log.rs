@@ -10,7 +10,8 @@ use vergence_mcu::Firmware;
 /// Where the bytes are not such a log.
 pub fn decode(log: &[u8], firmware: &Firmware) -> Vec<String> {
     let Some(last) = log.iter().rposition(|&byte| byte == 0) else { return Vec::new() };
-    log[..last].split(|&byte| byte == 0).map(|frame| entry(frame, firmware)).collect()
+    let frames = log[..last].split(|&byte| byte == 0).filter(|frame| !frame.is_empty());
+    frames.map(|frame| entry(frame, firmware)).collect()
 }
 
 fn entry(frame: &[u8], firmware: &Firmware) -> String {
@@ -30,7 +31,8 @@ fn entry(frame: &[u8], firmware: &Firmware) -> String {
             Fragment::Parameter(parameter) => arguments.text(&parameter.ty),
         })
         .collect();
-    assert!(arguments.0.is_empty(), "{format}: {bytes:?}");
+    // rzCOBS fills up with zeros.
+    assert!(arguments.0.iter().all(|&byte| byte == 0), "{format}: {bytes:?}");
     format!("{level}: {text}")
 }
 
