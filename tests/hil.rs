@@ -10,7 +10,7 @@ mod elf_rig;
 
 use elf_rig::{BOTH, Board, Conversation, ElfBoard, LEASE_MS, Standing, decode, programs};
 use vergence_cpu::{Access, Bus};
-use vergence_mcu::{Bench, Machine, ResetCause as Bite};
+use vergence_mcu::ResetCause as Bite;
 use vergence_plant::{EncoderFault, bench_settings};
 use vergence_protocol::{
     AxisMask, ControllerState, FaultCode, Mode, MovePhase, Refusal, Report, Request, ResetCause, SettingItem,
@@ -120,11 +120,12 @@ fn saved_settings_survive_reset_and_power_loss_and_others_do_not() {
     assert_eq!(talk.ask(set(50_000)), Status::Accepted);
     assert_eq!(talk.ask(Request::SaveSettings), Status::Accepted);
     assert_eq!(talk.ask(set(40_000)), Status::Accepted);
-    let again: [(fn(&mut Machine<Bench>), ResetCause); 2] =
-        [(Machine::press_reset, ResetCause::Pin), (Machine::power_on, ResetCause::PowerOn)];
-    for (id, (start_again, cause)) in (7..).zip(again) {
+    for (id, cause) in [(7, ResetCause::Pin), (8, ResetCause::PowerOn)] {
         let lost = talk.lost;
-        start_again(&mut talk.board.machine);
+        match cause {
+            ResetCause::Pin => talk.board.machine.press_reset(),
+            _ => talk.board.machine.power_on(),
+        }
         talk.wait_until("the restart goes unnoticed", |talk| talk.lost > lost);
         talk.reconnect(id);
         assert_eq!(talk.info().reset, cause);

@@ -38,6 +38,7 @@ const ALLOWED: &[(&str, &[&str])] = &[
             "vergence-matching",
             "vergence-networks",
             "vergence-scene",
+            "vergence-mcu",
             "vergence-plant",
             "vergence-soak",
         ],
