@@ -7,7 +7,8 @@ use vergence_mcu::{Bench, BenchWiring, ChipConfig, Firmware, Frame, Halt, LineFa
 use vergence_plant::{AxisMechanics, NativeBoard, Plant, bench_mechanics, bench_settings};
 use vergence_protocol::Microseconds;
 
-use super::program::{build, sealed};
+use super::build::build;
+use super::program::sealed;
 
 /// The speed of the line from the factory.
 const BAUD: u32 = 921_600;
@@ -48,8 +49,10 @@ pub struct ElfBoard {
 pub fn programs() -> &'static [Firmware; 2] {
     static READ: OnceLock<[Firmware; 2]> = OnceLock::new();
     READ.get_or_init(|| {
-        ["vergence-nucleo-g474", "vergence-bootloader"]
-            .map(|package| Firmware::from_elf(&build(package)).expect("the ELF is for this chip"))
+        ["vergence-nucleo-g474", "vergence-bootloader"].map(|package| {
+            let bytes = std::fs::read(build(package)).expect("cargo says where the ELF is");
+            Firmware::from_elf(&bytes).expect("the ELF is for this chip")
+        })
     })
 }
 

@@ -2,6 +2,7 @@
 
 use std::collections::HashMap;
 
+use vergence_control::RigIo;
 use vergence_protocol::{
     AxisMask, BoardInfo, ControllerState, FaultRecord, HostEvent, HostSession, MAX_FRAME, Micro, Microseconds, Mode,
     Move, MoveId, MovePhase, Permille, PoseReport, Report, Request, SessionId, Status, Ticket,
@@ -15,6 +16,8 @@ const BEAT_US: u64 = 20_000;
 /// How often the host looks at the wire.
 const STEP_US: u64 = 1_000;
 const POSE_PERIOD_US: u32 = 5_000;
+/// How often steps are looked at while they are watched.
+const SAMPLE_US: u64 = 100;
 
 pub struct Conversation<B> {
     pub board: B,
@@ -33,6 +36,8 @@ pub struct Conversation<B> {
     /// How often the board was found to have started anew.
     pub lost: u32,
     pub log: Vec<u8>,
+    /// When watched: the motors' steps, and when they were so many for the first time.
+    pub steps: Option<Vec<(Microseconds, [i32; 2])>>,
     next_move: u16,
 }
 
@@ -52,6 +57,7 @@ impl<B: Board> Conversation<B> {
             states: Vec::new(),
             lost: 0,
             log: Vec::new(),
+            steps: None,
             next_move: 0,
         }
     }
@@ -117,11 +123,24 @@ impl<B: Board> Conversation<B> {
     }
 
     fn step(&mut self) {
-        self.now.0 += STEP_US;
-        self.board.advance(self.now);
+        let end = self.now.0 + STEP_US;
+        while self.now.0 < end {
+            self.now.0 += if self.steps.is_some() { SAMPLE_US } else { STEP_US };
+            self.board.advance(self.now);
+            self.sample();
+        }
         self.hear();
         if self.alive {
             self.speak();
+        }
+    }
+
+    fn sample(&mut self) {
+        let made = [0, 1].map(|axis| self.board.plant().steps(axis));
+        if let Some(steps) = &mut self.steps
+            && steps.last().is_none_or(|(_, last)| *last != made)
+        {
+            steps.push((self.now, made));
         }
     }
 

@@ -1,7 +1,9 @@
 //! A host and a board on one wire, in virtual time. The board is the unmodified firmware on the simulated chip, boot
 //! loader and all, or the native board that runs the same controller.
+#![allow(dead_code, unused_imports, reason = "each test file uses its own part")]
 
 mod board;
+mod build;
 mod conversation;
 mod log;
 mod program;

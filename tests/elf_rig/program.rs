@@ -1,7 +1,4 @@
-//! The firmware: built once, sealed as the boot loader wants it.
-
-use std::path::Path;
-use std::process::Command;
+//! The application sealed as the boot loader wants it.
 
 use vergence_image::layout::{ACTIVE, CAPACITY, FLASH_BASE, HARDWARE};
 use vergence_image::{Seal, sha256};
@@ -13,19 +10,6 @@ const SECRET: [u8; 32] = [
     0x9d, 0x61, 0xb1, 0x9d, 0xef, 0xfd, 0x5a, 0x60, 0xba, 0x84, 0x4a, 0xf4, 0x92, 0xec, 0x2c, 0xc4, 0x44, 0x49, 0xc5,
     0x69, 0x7b, 0x32, 0x69, 0x19, 0x70, 0x3b, 0xac, 0x03, 0x1c, 0xae, 0x7f, 0x60,
 ];
-
-/// The ELF file of a package of the firmware, built as `docs/firmware.md` says.
-pub fn build(package: &str) -> Vec<u8> {
-    let target = Path::new(env!("CARGO_TARGET_TMPDIR")).join("firmware");
-    let output = Command::new(env!("CARGO"))
-        .args(["build", "--release", "--locked", "-p", package, "--target-dir"])
-        .arg(&target)
-        .current_dir(Path::new(env!("CARGO_MANIFEST_DIR")).join("../../firmware/nucleo-g474"))
-        .output()
-        .expect("cargo runs");
-    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
-    std::fs::read(target.join("thumbv7em-none-eabihf/release").join(package)).expect("cargo says where the ELF is")
-}
 
 /// The application as it lies in flash, from [`ACTIVE`] on, and its seal.
 pub fn sealed(application: &Firmware) -> (Vec<u8>, Seal) {
