@@ -39,6 +39,7 @@ const ALLOWED: &[(&str, &[&str])] = &[
             "vergence-matching",
             "vergence-networks",
             "vergence-scene",
+            "vergence-mcu",
             "vergence-plant",
             "vergence-soak",
         ],

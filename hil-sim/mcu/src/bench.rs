@@ -76,6 +76,20 @@ impl BenchWiring {
         let emergency_stop = switch(C + 4, true);
         Self { axes: vec![baseline, separation], drivers_off: Pin::at(A + 10), emergency_stop }
     }
+
+    /// Every pin under the name of its signal, for a trace.
+    #[must_use]
+    pub fn signals(&self) -> Vec<(Pin, String)> {
+        let mut signals =
+            vec![(self.drivers_off, "drivers_off".to_owned()), (self.emergency_stop.pin, "emergency_stop".to_owned())];
+        for (index, axis) in self.axes.iter().enumerate() {
+            let [a, b] = axis.encoder;
+            let names = ["step", "direction", "encoder_a", "encoder_b", "home", "hard_limit"];
+            let pins = [axis.step, axis.direction, a, b, axis.home.pin, axis.hard_limit.pin];
+            signals.extend(pins.into_iter().zip(names.map(|name| format!("{name}_{index}"))));
+        }
+        signals
+    }
 }
 
 /// The mechanics advance in steps of this while something moves, and of the other while nothing does.

@@ -3,16 +3,18 @@
 use std::path::PathBuf;
 
 use serde_json::json;
+use vergence_rig::Rig;
 
 use crate::cli::Globals;
 use crate::console::Console;
 use crate::failure::Failure;
 use crate::firmware::{DEVELOPMENT, PublicKey};
 use crate::rig_file;
-use crate::sim::{Listener, SharedRig, SimulatedRig, serve};
+use crate::sim::{Listener, Served, Shared, SharedRig, SimulatedChip, SimulatedRig, serve};
 
 /// Runs the controller core against simulated mechanics in real time and prints the port to give to other verbs.
-/// The motors, screws, encoders and switches are simulated; controller and protocol are the real ones.
+/// The motors, screws, encoders and switches are simulated; controller and protocol are the real ones. With --elf the
+/// processor is simulated too, and runs the firmware as it is flashed.
 #[derive(Debug, clap::Args)]
 pub struct Args {
     /// Serve on a pseudo-terminal (the default).
@@ -25,22 +27,48 @@ pub struct Args {
     #[arg(long, default_value_t = 1)]
     seed: u64,
     /// Keep saved settings in this file, so that they outlive the simulator.
-    #[arg(long, value_name = "FILE")]
+    #[arg(long, value_name = "FILE", conflicts_with = "elf")]
     flash: Option<PathBuf>,
     /// Take firmware that is signed by this key: a file of 'image keygen', or the key that everybody knows. The simulator
     /// plays the board's part of an update; what runs is always itself, under the name of the image.
     #[arg(long, value_name = "FILE.pub", default_value = DEVELOPMENT)]
     trust: PathBuf,
+    /// Run this program on a simulated STM32G474; give the boot loader too, before it, for a start through it.
+    #[arg(long, value_name = "FIRMWARE")]
+    elf: Vec<PathBuf>,
+    /// Write what all wired pins did to this file when the simulation ends (value change dump, some megabytes for each
+    /// second of motion).
+    #[arg(long, value_name = "FILE", requires = "elf")]
+    trace: Option<PathBuf>,
 }
 
 pub async fn run(args: &Args, globals: &Globals, console: Console) -> Result<(), Failure> {
     let rig = rig_file::load(globals.rig.as_deref())?;
+    if !args.elf.is_empty() {
+        return run_firmware(args, &rig, console).await;
+    }
     let mut simulated = SimulatedRig::new(&rig, args.seed)?;
     simulated.trust(PublicKey::named(&args.trust)?.0);
     if let Some(path) = &args.flash {
         simulated.keep_flash_in(path)?;
     }
-    let simulated = SharedRig::new(simulated);
+    serve_until_interrupted(args, SharedRig::new(simulated), console).await
+}
+
+async fn run_firmware(args: &Args, rig: &Rig, console: Console) -> Result<(), Failure> {
+    let mut chip = SimulatedChip::new(&args.elf, rig, args.seed)?;
+    if args.trace.is_some() {
+        chip.trace();
+    }
+    let chip = Shared::new(chip);
+    let outcome = serve_until_interrupted(args, chip.clone(), console).await;
+    if let Some(path) = &args.trace {
+        chip.lock().write_trace(path)?;
+    }
+    outcome
+}
+
+async fn serve_until_interrupted<B: Served>(args: &Args, board: Shared<B>, console: Console) -> Result<(), Failure> {
     let listener = match &args.tcp {
         Some(address) => Listener::tcp(address).await?,
         None => Listener::pty()?,
@@ -49,7 +77,7 @@ pub async fn run(args: &Args, globals: &Globals, console: Console) -> Result<(),
     console.say(format!("simulated board at {port}\ntry: vergence --port {port} home"))?;
     console.result(&json!({ "port": port }))?;
     tokio::select! {
-        outcome = serve(simulated, listener) => outcome,
+        outcome = serve(board, listener) => outcome,
         _ = tokio::signal::ctrl_c() => Ok(()),
     }
 }

@@ -1,9 +1,15 @@
-//! The simulated rig: the native board, its own clock, and the ways to reach it (pipe, pty, TCP).
+//! The simulated rig: the native board or the firmware on a simulated chip, its own clock, and the ways to reach it
+//! (pipe, pty, TCP).
 
 mod built;
+mod chip;
+mod pace;
 mod rig;
 mod serve;
+mod served;
 
 pub use built::built;
+pub use chip::SimulatedChip;
 pub use rig::{SharedRig, SimulatedRig};
 pub use serve::{Listener, serve, spawn_in_process};
+pub use served::{Served, Shared};

@@ -2,16 +2,15 @@
 
 use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
-use std::sync::{Arc, Mutex, MutexGuard};
-use std::time::Duration;
 
-use tokio::time::Instant;
 use vergence_control::{TICK_US, UNIT};
 use vergence_image::is_signed_by;
 use vergence_plant::{NativeBoard, Stage};
 use vergence_protocol::{AxisKind, Microseconds, ResetCause};
 use vergence_rig::{Rig, RigAxis, RigPose};
 
+use super::pace::Pace;
+use super::served::{Served, Shared};
 use crate::failure::Failure;
 use crate::output::write_whole;
 
@@ -22,17 +21,14 @@ const BOARD_DRIFT: f64 = 40e-6;
 const FIRST_BOOT: u32 = 1;
 /// The oldest firmware that may replace this one: that of the board.
 const OLDEST: [u8; 3] = [0, 1, 0];
-/// When this process was kept from running for longer, simulated time slips instead of leaping over heartbeats that wait to be read.
-const LONGEST_STEP_US: u64 = 20_000;
 
 /// A simulated rig: what the host sees through the wire, and the truth beside it.
 #[derive(Debug)]
 pub struct SimulatedRig {
     board: NativeBoard,
     rig: Rig,
-    /// The clock when the rig last ran, and how much time had passed for it by then.
-    last_run: Instant,
-    elapsed_us: u64,
+    /// How much time has passed since the board last started.
+    pace: Pace,
     /// What the board's clock showed when time began to pass.
     started_us: u64,
     boot: u32,
@@ -49,8 +45,7 @@ struct FlashFile {
 }
 
 /// The board is driven by its link and looked at by the simulated cameras.
-#[derive(Clone, Debug)]
-pub struct SharedRig(Arc<Mutex<SimulatedRig>>);
+pub type SharedRig = Shared<SimulatedRig>;
 
 impl SimulatedRig {
     /// Switches on a simulated rig: a stage of the bench's kind for every axis; `seed` decides where they stand.
@@ -71,8 +66,7 @@ impl SimulatedRig {
         Ok(Self {
             board,
             rig: rig.clone(),
-            last_run: Instant::now(),
-            elapsed_us: 0,
+            pace: Pace::begin(),
             started_us: BOARD_START_US,
             boot: FIRST_BOOT,
             output: Vec::new(),
@@ -131,12 +125,7 @@ impl SimulatedRig {
     /// Lets the rig run until now: simulated time follows the clock, but never leaps. What the board sends meanwhile is
     /// kept until [`Self::take_output`].
     pub fn run_to_now(&mut self) {
-        let now = Instant::now();
-        let passed = u64::try_from((now - self.last_run).as_micros()).unwrap_or(u64::MAX);
-        // What is left of a microsecond counts the next time: a thousand times each second it would be half a per mille.
-        self.last_run += Duration::from_micros(passed);
-        self.elapsed_us += passed.min(LONGEST_STEP_US);
-        let drifted = self.elapsed_us as f64 * (1.0 + BOARD_DRIFT);
+        let drifted = self.pace.elapsed_us() as f64 * (1.0 + BOARD_DRIFT);
         let until = self.started_us + drifted as u64;
         // A UART sends while the board runs, not after: a pose must not wait for the next one and be replaced by it.
         while self.board.now().0 < until {
@@ -160,7 +149,7 @@ impl SimulatedRig {
         self.boot += 1;
         // It has started with these settings before.
         if self.board.restart(ResetCause::Software, self.boot).is_ok() {
-            (self.started_us, self.elapsed_us) = (0, 0);
+            (self.started_us, self.pace) = (0, Pace::begin());
         }
     }
 
@@ -193,22 +182,26 @@ impl SimulatedRig {
     }
 }
 
-impl SharedRig {
-    /// Shares a rig between its link and its cameras.
-    #[must_use]
-    pub fn new(rig: SimulatedRig) -> Self {
-        Self(Arc::new(Mutex::new(rig)))
+impl Served for SimulatedRig {
+    fn run_to_now(&mut self) {
+        self.run_to_now();
     }
 
-    /// The rig, for a moment. Nothing waits while it is held.
-    pub fn lock(&self) -> MutexGuard<'_, SimulatedRig> {
-        // A poisoned lock only means that another thread panicked; the rig is whole.
-        self.0.lock().unwrap_or_else(std::sync::PoisonError::into_inner)
+    fn receive(&mut self, bytes: &[u8]) {
+        self.receive(bytes);
+    }
+
+    fn take_output(&mut self) -> Vec<u8> {
+        self.take_output()
+    }
+
+    fn settle(&mut self) -> Result<(), Failure> {
+        self.save_flash()
     }
 }
 
 /// A stage that fits an axis of the rig file.
-fn stage(axis: &RigAxis) -> Stage {
+pub(super) fn stage(axis: &RigAxis) -> Stage {
     let [min, max] = axis.range.map(|position| position.micro());
     match axis.kind {
         AxisKind::Linear => Stage::linear(min, max, axis.counts_per_unit),

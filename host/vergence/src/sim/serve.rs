@@ -14,6 +14,7 @@ use tokio::time::{MissedTickBehavior, interval};
 use tokio_serial::SerialStream;
 
 use super::rig::SharedRig;
+use super::served::{Served, Shared};
 use crate::failure::Failure;
 
 /// How often the board is run; its own control tick is exact whatever this is.
@@ -71,27 +72,33 @@ impl Listener {
     }
 }
 
-/// Serves the board until the listener fails.
+/// Serves the board until it or the listener fails.
 ///
 /// # Errors
-/// The listener's.
-pub async fn serve(rig: SharedRig, listener: Listener) -> Result<(), Failure> {
+/// The board's and the listener's.
+pub async fn serve<B: Served>(board: Shared<B>, listener: Listener) -> Result<(), Failure> {
     let fail = |error: io::Error| Failure::device(format!("the simulated link failed: {error}"));
     match listener {
-        Listener::Pty { mut ours, theirs: _kept_open, .. } => run_board(&rig, &mut ours).await.map_err(fail),
+        Listener::Pty { mut ours, theirs: _kept_open, .. } => {
+            let ended = run_board(&board, &mut ours).await;
+            board.lock().settle()?;
+            ended.map_err(fail)
+        }
         Listener::Tcp(listener) => loop {
             // Between two hosts the board goes on: a lease runs out, a move brakes.
             let mut pace = ticks();
             let mut stream = loop {
                 tokio::select! {
                     accepted = listener.accept() => break accepted.map_err(fail)?.0,
-                    _ = pace.tick() => rig.lock().run_to_now(),
+                    _ = pace.tick() => board.lock().run_to_now(),
                 }
                 // Nobody listens.
-                rig.lock().take_output();
+                board.lock().take_output();
+                board.lock().settle()?;
             };
             // A host that goes away is not a failure of the simulator.
-            let _ = run_board(&rig, &mut stream).await;
+            let _ = run_board(&board, &mut stream).await;
+            board.lock().settle()?;
         },
     }
 }
@@ -113,7 +120,7 @@ fn ticks() -> tokio::time::Interval {
     pace
 }
 
-async fn run_board<W: AsyncRead + AsyncWrite + Unpin>(rig: &SharedRig, wire: &mut W) -> io::Result<()> {
+async fn run_board<B: Served, W: AsyncRead + AsyncWrite + Unpin>(board: &Shared<B>, wire: &mut W) -> io::Result<()> {
     let mut pace = ticks();
     let mut input = [0; 1024];
     loop {
@@ -123,12 +130,12 @@ async fn run_board<W: AsyncRead + AsyncWrite + Unpin>(rig: &SharedRig, wire: &mu
                 if length == 0 {
                     return Ok(());
                 }
-                rig.lock().receive(input.get(..length).unwrap_or_default());
+                board.lock().receive(input.get(..length).unwrap_or_default());
             }
-            _ = pace.tick() => rig.lock().run_to_now(),
+            _ = pace.tick() => board.lock().run_to_now(),
         }
-        let output = rig.lock().take_output();
-        rig.lock().save_flash().map_err(io::Error::other)?;
+        let output = board.lock().take_output();
+        board.lock().settle().map_err(io::Error::other)?;
         write_or_drop(wire, &output).await?;
     }
 }

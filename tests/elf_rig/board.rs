@@ -1,0 +1,119 @@
+//! Two kinds of board, driven in the same way.
+
+use std::sync::OnceLock;
+
+use vergence_image::layout::{ACTIVE, CAPACITY};
+use vergence_mcu::{Bench, BenchWiring, ChipConfig, Firmware, Frame, Halt, LineFault, Machine, Picoseconds, UartId};
+use vergence_plant::{AxisMechanics, NativeBoard, Plant, bench_mechanics, bench_settings};
+use vergence_protocol::Microseconds;
+
+use super::build::build;
+use super::program::sealed;
+
+/// The speed of the line from the factory.
+const BAUD: u32 = 921_600;
+
+/// The mechanics, and where they stand when the board gets power, in micro-units.
+pub struct Standing {
+    pub mechanics: [AxisMechanics; 2],
+    pub at: [f64; 2],
+}
+
+impl Default for Standing {
+    /// Near home, so that homing does not take long.
+    fn default() -> Self {
+        Self { mechanics: bench_mechanics(), at: [63_000.0, 40_000.0] }
+    }
+}
+
+/// A board with its mechanics. Time counts from when it got power.
+pub trait Board {
+    /// Gets power.
+    fn switched_on(standing: &Standing) -> Self;
+    fn advance(&mut self, to: Microseconds);
+    /// Bytes begin to arrive now.
+    fn receive(&mut self, bytes: &[u8]);
+    /// Bytes that have left since this was last asked.
+    fn transmit(&mut self) -> Vec<u8>;
+    fn plant(&self) -> &Plant;
+    /// Does something to the mechanics.
+    fn with_plant(&mut self, act: impl FnOnce(&mut Plant));
+}
+
+/// Boot loader and application on the simulated chip.
+pub struct ElfBoard {
+    pub machine: Machine<Bench>,
+}
+
+/// The application and the boot loader, built once.
+pub fn programs() -> &'static [Firmware; 2] {
+    static READ: OnceLock<[Firmware; 2]> = OnceLock::new();
+    READ.get_or_init(|| {
+        ["vergence-nucleo-g474", "vergence-bootloader"].map(|package| {
+            let bytes = std::fs::read(build(package)).expect("cargo says where the ELF is");
+            Firmware::from_elf(&bytes).expect("the ELF is for this chip")
+        })
+    })
+}
+
+impl Board for ElfBoard {
+    fn switched_on(standing: &Standing) -> Self {
+        let [application, boot_loader] = programs();
+        let plant = Plant::new(&standing.mechanics, &standing.at);
+        let mut machine = Machine::new(ChipConfig::default(), Bench::new(BenchWiring::nucleo_g474(), plant));
+        machine.load(boot_loader.clone()).expect("it fits");
+        let (_, seal) = sealed(application);
+        assert!(machine.chip_mut().load_flash((ACTIVE.start + CAPACITY) as usize, &seal.to_bytes()));
+        // Last, for the symbols.
+        machine.load(application.clone()).expect("it fits");
+        Self { machine }
+    }
+
+    fn advance(&mut self, to: Microseconds) {
+        let halt = self.machine.run_until(Picoseconds::microseconds(to.0));
+        assert!(halt == Halt::Reached, "{halt}");
+    }
+
+    fn receive(&mut self, bytes: &[u8]) {
+        let frames: Vec<_> = bytes.iter().map(|&byte| Frame { byte, baud: BAUD, fault: LineFault::None }).collect();
+        self.machine.chip_mut().send(UartId::LPUART1, &frames);
+    }
+
+    fn transmit(&mut self) -> Vec<u8> {
+        self.machine.chip_mut().take_sent(UartId::LPUART1).iter().map(|sent| sent.byte).collect()
+    }
+
+    fn plant(&self) -> &Plant {
+        self.machine.chip().world().plant()
+    }
+
+    fn with_plant(&mut self, act: impl FnOnce(&mut Plant)) {
+        self.machine.chip_mut().with_world(|bench, _| act(bench.plant_mut()));
+    }
+}
+
+impl Board for NativeBoard {
+    fn switched_on(standing: &Standing) -> Self {
+        Self::standing_at(&bench_settings(), &standing.mechanics, &standing.at, 1).expect("the bench works")
+    }
+
+    fn advance(&mut self, to: Microseconds) {
+        self.advance(to);
+    }
+
+    fn receive(&mut self, bytes: &[u8]) {
+        self.receive(bytes);
+    }
+
+    fn transmit(&mut self) -> Vec<u8> {
+        self.transmit()
+    }
+
+    fn plant(&self) -> &Plant {
+        self.plant()
+    }
+
+    fn with_plant(&mut self, act: impl FnOnce(&mut Plant)) {
+        act(self.plant_mut());
+    }
+}

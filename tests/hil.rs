@@ -1,0 +1,203 @@
+//! The unmodified firmware on the simulated chip: from power-on to the modes, and through what goes wrong.
+#![allow(
+    clippy::expect_used,
+    clippy::panic,
+    clippy::print_stdout,
+    reason = "a test fails loudly and shows its figures"
+)]
+
+mod elf_rig;
+
+use elf_rig::{BOTH, Board, Conversation, ElfBoard, LEASE_MS, Standing, decode, programs};
+use vergence_cpu::{Access, Bus};
+use vergence_mcu::ResetCause as Bite;
+use vergence_plant::{EncoderFault, bench_settings};
+use vergence_protocol::{
+    AxisMask, ControllerState, FaultCode, Mode, MovePhase, Refusal, Report, Request, ResetCause, SettingItem,
+    SettingKey, Status, StopKind,
+};
+
+/// Baseline in micrometres, separation in microradians.
+const HERBIVORE: [i32; 2] = [145_000, 2_094_395];
+const HUMAN: [i32; 2] = [63_000, 0];
+
+type Talk = Conversation<ElfBoard>;
+
+#[test]
+fn from_power_on_to_herbivore_and_human() {
+    let mut talk = Talk::open(&Standing::default());
+    let info = talk.info();
+    println!("{info:?} at {:?}", talk.now);
+    assert_eq!((info.axes, info.reset, info.firmware), (2, ResetCause::PowerOn, [0, 1, 0]));
+    assert_eq!(talk.move_to(HERBIVORE, 1), Status::Refused(Refusal::NotArmed));
+    assert_eq!(talk.arm(), Status::Accepted);
+    assert_eq!(talk.move_to(HERBIVORE, 1), Status::Refused(Refusal::NotReferenced { axis: 0 }));
+    assert_eq!(talk.home(), Status::Accepted);
+    let took = talk.wait_for(ControllerState::Ready);
+    println!("homed in {took} us, loads {:?}", talk.loads());
+    assert_eq!(talk.pose().referenced, BOTH);
+    go(&mut talk, HERBIVORE, 1);
+    go(&mut talk, HUMAN, 2);
+    assert!(talk.faults.is_empty());
+    assert_eq!(talk.host.statistics().poses_lost, 0);
+    assert_eq!(talk.ask(Request::Disarm), Status::Accepted);
+    talk.wait_for(ControllerState::Idle);
+    assert!(!talk.board.plant().drivers_on());
+    assert_eq!(talk.board.machine.resets(), 0);
+}
+
+#[test]
+fn a_stop_in_mid_move_keeps_the_reference() {
+    let mut talk = under_way();
+    assert_eq!(talk.ask(Request::Stop { kind: StopKind::Decelerate }), Status::Accepted);
+    talk.wait_for(ControllerState::Ready);
+    assert_eq!((talk.pose().phase, talk.pose().referenced), (MovePhase::Stopped, BOTH));
+    assert_rest(&mut talk);
+    go(&mut talk, HUMAN, 2);
+}
+
+#[test]
+fn a_host_that_dies_in_mid_move_leaves_the_stages_at_rest() {
+    let mut talk = under_way();
+    talk.alive = false;
+    // The lease, and half a second of braking.
+    talk.wait(u64::from(LEASE_MS) * 1_000 + 500_000);
+    assert_rest(&mut talk);
+    talk.reconnect(0x0a11_7e00);
+    assert_eq!((talk.pose().state, talk.fault().code), (ControllerState::LinkLost, FaultCode::LeaseExpired));
+    assert_eq!(talk.arm(), Status::Refused(Refusal::Latched));
+    assert_eq!(talk.clear(), Status::Accepted);
+    assert_eq!(talk.arm(), Status::Accepted);
+    go(&mut talk, HUMAN, 2);
+}
+
+#[test]
+fn a_hard_limit_cuts_the_drivers() {
+    let mut standing = Standing::default();
+    standing.mechanics[0].hard_limits[1] = 80_000.0;
+    let mut talk = Talk::homed(&standing);
+    assert_eq!(talk.move_to(HERBIVORE, 1), Status::Accepted);
+    talk.wait_for(ControllerState::Fault);
+    assert_eq!((talk.fault().code, talk.fault().axis), (FaultCode::HardLimit, Some(0)));
+    assert!(!talk.board.plant().drivers_on());
+    // One tick at 80 mm/s, and what the load then still creeps.
+    assert!((80_000.0..80_200.0).contains(&talk.loads()[0]), "{:?}", talk.loads());
+    assert_eq!(talk.clear(), Status::Refused(Refusal::CausePersists));
+}
+
+#[test]
+fn an_encoder_that_stops_is_a_stall_and_one_that_turns_round_is_found_out() {
+    for (harm, code) in [(EncoderFault::Stuck, FaultCode::Stall), (EncoderFault::Reversed, FaultCode::WrongDirection)] {
+        let mut talk = under_way();
+        talk.board.with_plant(|plant| plant.axis_mut(0).expect("there is one").fail_encoder(Some(harm)));
+        talk.wait_for(ControllerState::Fault);
+        assert_eq!((talk.fault().code, talk.fault().axis), (code, Some(0)));
+        assert!(!talk.board.plant().drivers_on());
+        assert_rest(&mut talk);
+    }
+}
+
+#[test]
+fn the_emergency_stop_is_seen_and_cleared_when_released() {
+    let mut talk = under_way();
+    talk.board.with_plant(|plant| plant.press_emergency_stop(true));
+    talk.wait_for(ControllerState::Fault);
+    assert_eq!(talk.fault().code, FaultCode::EmergencyStop);
+    assert_rest(&mut talk);
+    assert_eq!(talk.clear(), Status::Refused(Refusal::CausePersists));
+    talk.board.with_plant(|plant| plant.press_emergency_stop(false));
+    talk.wait(20_000);
+    assert_eq!(talk.clear(), Status::Accepted);
+    assert_eq!(talk.arm(), Status::Accepted);
+    assert_eq!(talk.move_to(HUMAN, 2), Status::Refused(Refusal::NotReferenced { axis: 0 }));
+}
+
+#[test]
+fn saved_settings_survive_reset_and_power_loss_and_others_do_not() {
+    let speed = |axis| SettingKey { item: SettingItem::Speed, axis };
+    let mut talk = Talk::open(&Standing::default());
+    let set = |value| Request::SetSetting { key: speed(0), value };
+    assert_eq!(talk.ask(set(50_000)), Status::Accepted);
+    assert_eq!(talk.ask(Request::SaveSettings), Status::Accepted);
+    assert_eq!(talk.ask(set(40_000)), Status::Accepted);
+    for (id, cause) in [(7, ResetCause::Pin), (8, ResetCause::PowerOn)] {
+        let lost = talk.lost;
+        match cause {
+            ResetCause::Pin => talk.board.machine.press_reset(),
+            _ => talk.board.machine.power_on(),
+        }
+        talk.wait_until("the restart goes unnoticed", |talk| talk.lost > lost);
+        talk.reconnect(id);
+        assert_eq!(talk.info().reset, cause);
+        let Report::Setting { value, .. } = talk.answer(Request::GetSetting(speed(0))) else { panic!("no setting") };
+        assert_eq!(value, 50_000);
+    }
+}
+
+#[test]
+fn the_log_says_who_starts() {
+    let mut talk = Talk::open(&Standing::default());
+    talk.wait(100_000);
+    let said = decode(&talk.log, &programs()[0]);
+    let build = talk.info().build;
+    assert_eq!(said.first(), Some(&format!("info: vergence 0.1.0, build {build:016x}")), "{said:?}");
+}
+
+/// The control register of TIM7, which makes the control tick, and the interrupt enables of TIM15, which wakes tasks.
+const TIM7_CR1: u32 = 0x4000_1400;
+const TIM15_DIER: u32 = 0x4001_400C;
+
+#[test]
+fn the_watchdog_bites_where_tick_or_executor_hang_and_the_drivers_go_off() {
+    for (register, id) in [(TIM7_CR1, 8), (TIM15_DIER, 9)] {
+        let mut talk = under_way();
+        let machine = &mut talk.board.machine;
+        let now = machine.cpu().now();
+        machine.chip_mut().write(now, register, Access::Word, 0).expect("it is there");
+        talk.alive = false;
+        // Half a second of patience.
+        talk.wait(600_000);
+        assert_eq!(
+            (talk.board.machine.resets(), talk.board.machine.last_reset()),
+            (1, Bite::Watchdog),
+            "{register:#x}"
+        );
+        assert!(!talk.board.plant().drivers_on());
+        talk.reconnect(id);
+        assert_eq!(talk.info().reset, ResetCause::Watchdog);
+        assert_eq!((talk.pose().state, talk.pose().referenced), (ControllerState::Idle, AxisMask(0)));
+        assert_rest(&mut talk);
+    }
+}
+
+/// In the middle of a move to the herbivore's pose.
+fn under_way() -> Talk {
+    let mut talk = Talk::homed(&Standing::default());
+    assert_eq!(talk.move_to(HERBIVORE, 1), Status::Accepted);
+    talk.wait(400_000);
+    assert_eq!(talk.pose().state, ControllerState::Moving);
+    talk
+}
+
+/// Settles at `targets`, by its own word and in truth.
+fn go(talk: &mut Talk, targets: [i32; 2], mode: u8) {
+    assert_eq!(talk.move_to(targets, mode), Status::Accepted);
+    talk.wait_for(ControllerState::Ready);
+    assert_eq!((talk.pose().phase, talk.pose().mode), (MovePhase::Settled, Mode(mode)));
+    // Tolerance, one tick of the approach to the home switch, one count.
+    for (axis, (load, target)) in bench_settings().iter().zip(talk.loads().into_iter().zip(targets)) {
+        let allowed = f64::from(axis.tolerance.0) + f64::from(axis.homing.approach_speed) * 1e-3 + 63.0;
+        assert!((load - f64::from(target)).abs() < allowed, "{load} for {target}");
+    }
+}
+
+/// Nothing moves for 300 ms.
+fn assert_rest(talk: &mut Talk) {
+    talk.wait(20_000);
+    let (loads, pulses) = (talk.loads(), talk.board.machine.chip().world().pulses().to_vec());
+    talk.wait(300_000);
+    assert_eq!(talk.board.machine.chip().world().pulses(), pulses);
+    for (now, before) in talk.loads().into_iter().zip(loads) {
+        assert!((now - before).abs() < 1.0, "{before} to {now}");
+    }
+}
