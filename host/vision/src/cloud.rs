@@ -44,7 +44,8 @@ pub struct Gates {
     pub max_range: Option<Length>,
     /// Standard deviation of a matched position in pixels, in each direction and each image.
     pub pixel_sigma: f64,
-    /// Largest standard deviation of the range, as a part of the range.
+    /// Largest standard deviation of the range from the noise of its own two pixels, as a part of the range. What all points
+    /// share is stated and not gated: it bends the cloud as a whole.
     pub max_relative_sigma: f64,
     /// How well lenses and pose are known.
     pub shared: SharedCovariance,
@@ -86,7 +87,7 @@ pub enum Drop {
     Parallax,
     /// The point is beyond the largest range.
     TooFar,
-    /// The range is too uncertain.
+    /// The range is too uncertain already by the noise of its pixels.
     Uncertain,
     /// The method of triangulation finds no point here: the rectified view does not hold it, or no minimum is near.
     NoPoint,
@@ -154,9 +155,10 @@ pub fn cloud_point(pixels: &PixelPair, rig: &StereoPair<'_>, gates: &Gates) -> R
     require(gates.max_range.is_none_or(|limit| left_range <= limit), Drop::TooFar)?;
 
     let uncertainty = PointUncertainty::of(&point, rig, gates.pixel_sigma).ok_or(Drop::Uncertain)?;
+    let own_sigma = range_sigma(&uncertainty.from_pixels, &point).ok_or(Drop::Uncertain)?;
+    require(own_sigma.mm() <= gates.max_relative_sigma * left_range.mm(), Drop::Uncertain)?;
     let covariance = uncertainty.covariance(&gates.shared);
     let sigma_range = range_sigma(&covariance, &point).ok_or(Drop::Uncertain)?;
-    require(sigma_range.mm() <= gates.max_relative_sigma * left_range.mm(), Drop::Uncertain)?;
     Ok(CloudPoint { pair_index: 0, pixels: *pixels, point, sigma_range, covariance, residual, residual_sigma })
 }
 
