@@ -1,6 +1,7 @@
 //! `vergence bench`: how fast we are, beside others on the same work.
 
 mod calibrate;
+mod mcu;
 mod peer;
 mod peer_opencv;
 mod sets;
@@ -23,6 +24,8 @@ enum Task {
     /// Solves every fisheye set and detects every chessboard, then lets OpenCV (cv2.fisheye.calibrate with its crude
     /// guess, the SB detector) and SciPy's bundle adjustment do the same. Everything runs on one thread.
     Calibrate(calibrate::Args),
+    /// The simulated chip: busy code, and the firmware disarmed and armed, beside real time.
+    Mcu(mcu::Args),
     /// Projection, unprojection and triangulation of whole arrays, beside OpenCV.
     Vision(vision::Args),
 }
@@ -30,6 +33,7 @@ enum Task {
 pub fn run(args: &Args, console: Console) -> Result<(), Failure> {
     match &args.task {
         Task::Calibrate(args) => calibrate::run(args, console),
+        Task::Mcu(args) => mcu::run(args, console),
         Task::Vision(args) => vision::run(args, console),
     }
 }
