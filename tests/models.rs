@@ -1,5 +1,10 @@
 //! Models in their folder: kept, listed, verified, used, and refused in sentences.
-#![allow(clippy::expect_used, clippy::panic, reason = "a test fails loudly")]
+#![allow(
+    clippy::expect_used,
+    clippy::panic,
+    clippy::print_stdout,
+    reason = "a test fails loudly and says what it skips"
+)]
 
 mod common;
 

@@ -23,6 +23,7 @@ pub struct Manifest {
 /// One network for each step, or one for all.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case", deny_unknown_fields)]
+#[allow(clippy::large_enum_variant, reason = "one in a program: a box would only be in the way")]
 pub enum Networks {
     /// Keypoints first, then matches.
     Separate {

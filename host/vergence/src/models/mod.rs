@@ -1,6 +1,6 @@
 //! Networks for matching: where they are kept, and how they come into a matcher.
 //!
-//! The store is a folder with one folder for each model: `model.toml`, its [`Manifest`], and the files that it names.
+//! The store is a folder with one folder for each model: `model.toml`, its manifest, and the files that it names.
 
 mod choose;
 mod known;

@@ -23,6 +23,8 @@ pub struct Args {
 /// Side of the drawn pattern in pixels.
 const SIDE: usize = 256;
 const KEYPOINTS: usize = 512;
+/// Keypoints this near are the same, in pixels.
+const SAME_PLACE: f32 = 0.5;
 
 pub fn run(args: &Args, console: Console) -> Result<(), Failure> {
     let store = ModelStore::open(&args.store)?;
@@ -57,7 +59,11 @@ fn match_with_itself(model: &Model) -> Result<(usize, f64), Failure> {
     let found = model
         .compare([picture, picture], KEYPOINTS, [&|_| true, &|_| true])
         .map_err(|error| Failure::check(error.to_string()))?;
-    let alike = found.matches.iter().filter(|(i, j, _)| found.keypoints[0][*i] == found.keypoints[1][*j]).count();
+    let same = |&&(i, j, _): &&(usize, usize, f32)| {
+        let [[x, y], [to_x, to_y]] = [found.keypoints[0][i], found.keypoints[1][j]];
+        (to_x - x).hypot(to_y - y) < SAME_PLACE
+    };
+    let alike = found.matches.iter().filter(same).count();
     if alike * 2 < found.keypoints[0].len() || alike == 0 {
         let keypoints = found.keypoints[0].len();
         return Err(Failure::check(format!("only {alike} of {keypoints} keypoints of a pattern match themselves")));
