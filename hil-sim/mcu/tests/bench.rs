@@ -75,11 +75,11 @@ fn steps_move_the_load_and_the_encoder_answers_on_its_lines() {
     direction(&mut bench, true);
     pulse(&mut bench, 3_200);
     assert_eq!(bench.chip.world().pulses(), [3_200]);
-    // 3200 steps of 1/1600 mm are 2 mm, less half the backlash of 8 µm; the encoder counts 0.5 µm.
+    // 3200 steps of 1/800 mm are 4 mm, less half the backlash of 8 µm; the encoder counts 0.5 µm.
     let load = bench.chip.world().plant().load(0).unwrap();
-    assert!((load - 101_996.0).abs() < 0.5, "{load}");
+    assert!((load - 103_996.0).abs() < 0.5, "{load}");
     let count = bench.read(TIM2 + 0x24) as i32;
-    assert!((count - 3_992).abs() <= 1, "{count}");
+    assert!((count - 7_992).abs() <= 1, "{count}");
     direction(&mut bench, false);
     pulse(&mut bench, 3_200);
     let count = bench.read(TIM2 + 0x24) as i32;
@@ -95,7 +95,7 @@ fn without_drivers_nothing_moves() {
     assert_eq!(bench.read(TIM2 + 0x24), 0);
     switch_drivers_on(&mut bench);
     pulse(&mut bench, 160);
-    assert!((bench.chip.world().plant().load(0).unwrap() - 100_096.0).abs() < 0.5);
+    assert!((bench.chip.world().plant().load(0).unwrap() - 100_196.0).abs() < 0.5);
 }
 
 #[test]
