@@ -24,8 +24,11 @@ pub fn here(kind: DeathKind) -> Death {
 #[must_use]
 pub fn of_fault(frame: &ExceptionFrame) -> Death {
     let mut trace = [0; TRACE];
-    let (at, calls) = trace.split_at_mut(2);
-    at.copy_from_slice(&[frame.pc(), frame.lr()]);
+    let [at, rest @ ..] = &mut trace;
+    *at = frame.pc();
+    // Where a jump into nowhere came from.
+    let (link, calls) = rest.split_at_mut(usize::from(is_code(frame.lr())));
+    link.fill(frame.lr());
     if let Some([interrupted, _]) = frame_at(frame_pointer()) {
         follow(interrupted, calls);
     }
@@ -47,16 +50,17 @@ fn frame_pointer() -> u32 {
 fn follow(mut frame: u32, trace: &mut [u32]) {
     for address in trace {
         let Some([caller, back]) = frame_at(frame) else { return };
-        let is_code = [BOOTLOADER, ACTIVE].iter().any(|region| {
-            let start = FLASH_BASE + region.start;
-            (start..start + region.length).contains(&back)
-        });
-        if !is_code || caller <= frame {
+        // The frames before an interrupt's are not followed.
+        if !is_code(back) || caller <= frame {
             return;
         }
         *address = back;
         frame = caller;
     }
+}
+
+fn is_code(address: u32) -> bool {
+    [BOOTLOADER, ACTIVE].iter().any(|region| (region.start..region.end()).contains(&address.wrapping_sub(FLASH_BASE)))
 }
 
 /// The caller's frame pointer and the return address, where `frame` can be a frame.
