@@ -107,9 +107,9 @@ impl<W: World> Chip<W> {
         let port = &mut self.units.uarts[uart.index()];
         let baud = port.baud(moment);
         for (cycle, byte) in std::mem::take(&mut port.sent) {
-            self.note_sent(uart, SentByte { at: self.clocks.base.time_of(cycle), byte, baud });
-            let now = self.instant();
-            self.world.byte_sent(uart, byte, now, &mut self.terminals);
+            let sent = SentByte { at: self.clocks.base.time_of(cycle), byte, baud };
+            self.note_sent(uart, sent);
+            self.world.byte_sent(uart, sent, &mut self.terminals);
             self.world_was_told();
         }
         self.settle_pins(self.pads.pins_of_enable(uart));
