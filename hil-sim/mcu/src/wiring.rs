@@ -23,14 +23,22 @@ impl<W: World> Chip<W> {
                     }
                     self.react(reset);
                 }
+                self.find_clocked();
                 self.reclock();
             }
             Unit::Pwr => self.reclock(),
             Unit::Flash => self.react_to_flash(),
             Unit::Iwdg => self.react_to_watchdog(),
             Unit::Gpio(port) => self.react_to_port(usize::from(port)),
-            Unit::Timer(timer) => self.react_to_timer(timer),
-            Unit::Uart(uart) => self.react_to_uart(uart),
+            Unit::Timer(timer) => {
+                self.stirred = true;
+                self.react_to_timer(timer);
+            }
+            Unit::Uart(uart) => {
+                self.stirred = true;
+                self.react_to_uart(uart);
+            }
+            Unit::Dma(_) | Unit::Dmamux => self.stirred = true,
             _ => {}
         }
         self.refresh(unit);
