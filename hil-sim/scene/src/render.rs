@@ -50,27 +50,49 @@ pub struct Photograph {
 /// pixel's centre and the same everywhere, so that nothing is seen beside where it is projected.
 #[must_use]
 pub fn render(view: &View<'_>, seed: u64) -> Photograph {
+    photograph(view, seed, Rows { at_once: BAND, world_from_camera: &|_| view.world_from_camera })
+}
+
+/// The same through a rolling shutter: every row from where `world_from_camera` says the camera was when that row was
+/// exposed. Nothing moves while a row is exposed, so that motion does not blur.
+#[must_use]
+pub fn render_rolling(
+    view: &View<'_>,
+    seed: u64,
+    world_from_camera: &(dyn Fn(u32) -> Transform<World, Camera> + Sync),
+) -> Photograph {
+    photograph(view, seed, Rows { at_once: 1, world_from_camera })
+}
+
+/// How many neighbouring rows are exposed at once, and where the camera is then.
+#[derive(Clone, Copy)]
+struct Rows<'a> {
+    at_once: usize,
+    world_from_camera: &'a (dyn Fn(u32) -> Transform<World, Camera> + Sync),
+}
+
+fn photograph(view: &View<'_>, seed: u64, rows: Rows<'_>) -> Photograph {
     let size = view.camera.size();
     let width = (size.width as usize).max(1);
     let seed_of = |x: usize, y: usize| mix64(mix64(seed) ^ (y * width + x) as u64);
     let pixels = size.width as usize * size.height as usize;
 
     let mut looks = vec![(Look::default(), f32::NAN); pixels];
-    for_each_in_field(view, &mut looks, |(look, range), around, x, y| {
-        *range = view.range_mm(around);
-        *look = view.look(around, view.optics.samples.max(1), seed_of(x, y));
+    for_each_in_field(view, rows, &mut looks, |(look, range), here, around, x, y| {
+        *range = here.range_mm(around);
+        *look = here.look(around, view.optics.samples.max(1), seed_of(x, y));
     });
 
     let mut light = vec![[0.0; 3]; pixels];
-    for_each_in_field(view, &mut light, |light, around, x, y| {
+    for_each_in_field(view, rows, &mut light, |light, here, around, x, y| {
         let first = looks[y * width + x].0;
-        let rows = y.saturating_sub(1)..(y + 2).min(size.height as usize);
+        let beside = y.saturating_sub(1)..(y + 2).min(size.height as usize);
         let columns = x.saturating_sub(1)..(x + 2).min(width);
-        let near = rows.flat_map(|y| &looks[y * width..][columns.clone()]).map(|(look, _)| *look);
+        let near = beside.flat_map(|y| &looks[y * width..][columns.clone()]).map(|(look, _)| *look);
         let edge = first.contrast() > EDGE || near.fold(first, Look::joined_contrast).contrast() > STRONG_EDGE;
         let whole =
-            if edge { first.joined(view.look(around, view.optics.edge_samples, mix64(seed_of(x, y)))) } else { first };
-        let exposure = view.optics.falloff(view.theta(around), view.camera.theta_max()) as f32 / whole.count as f32;
+            if edge { first.joined(here.look(around, view.optics.edge_samples, mix64(seed_of(x, y)))) } else { first };
+        let exposure = view.optics.falloff(here.theta(around), view.camera.theta_max()) as f32 / whole.count as f32;
         *light = whole.sum.map(|c| c * exposure);
     });
 
@@ -125,20 +147,22 @@ impl Look {
     }
 }
 
-/// Calls `visit(item, rays, x, y)` for the pixels of the view inside the lens's field, in parallel.
+/// Calls `visit(item, view, rays, x, y)`, the view as at that row, for the pixels of the view inside the lens's field, in parallel.
 fn for_each_in_field<T: Send>(
     view: &View<'_>,
+    rows: Rows<'_>,
     items: &mut [T],
-    visit: impl Fn(&mut T, &Around<'_>, usize, usize) + Sync,
+    visit: impl Fn(&mut T, &View<'_>, &Around<'_>, usize, usize) + Sync,
 ) {
     let width = (view.camera.size().width as usize).max(1);
-    items.par_chunks_mut(width * BAND).enumerate().for_each(|(number, items)| {
-        let top = number * BAND;
-        let rays = RayGrid::new(view.camera, &view.world_from_camera, top as u32, (items.len() / width) as u32);
+    items.par_chunks_mut(width * rows.at_once).enumerate().for_each(|(number, items)| {
+        let top = number * rows.at_once;
+        let here = View { world_from_camera: (rows.world_from_camera)(top as u32), ..*view };
+        let rays = RayGrid::new(view.camera, &here.world_from_camera, top as u32, (items.len() / width) as u32);
         for (i, item) in items.iter_mut().enumerate() {
             let (x, y) = (i % width, top + i / width);
             if let Some(around) = rays.around(x as u32, y as u32) {
-                visit(item, &around, x, y);
+                visit(item, &here, &around, x, y);
             }
         }
     });
