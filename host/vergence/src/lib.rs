@@ -18,6 +18,7 @@ mod corners;
 pub mod failure;
 mod firmware;
 pub mod link;
+pub mod live;
 pub mod look;
 pub mod models;
 pub mod move_plan;

@@ -2,11 +2,13 @@
 
 mod client;
 mod clock;
+mod knowledge;
 mod management;
 mod open;
 mod port_lock;
 
-pub use client::{Client, LinkError, STREAM_PERIOD_US};
+pub use client::{Client, LinkError};
 pub use clock::HostClock;
+pub use knowledge::BoardKnowledge;
 pub use management::ManagementLink;
 pub use open::{OpenWire, Port, Wire, open};

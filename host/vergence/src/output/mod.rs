@@ -4,6 +4,7 @@ mod colour_map;
 mod depth_field_svg;
 mod picture;
 mod ply;
+mod table;
 mod text;
 mod zones_plot;
 mod zones_svg;
@@ -16,6 +17,7 @@ use image::{ImageFormat, RgbImage};
 pub use depth_field_svg::depth_field_svg;
 pub use picture::{DepthPicture, depth_picture, match_picture};
 pub use ply::ply;
+pub use table::{Table, TableFormat};
 pub use zones_plot::{ZonesOf, zones_plot};
 pub use zones_svg::zones_svg;
 
