@@ -32,6 +32,7 @@ const VERBS: &[&str] = &[
     "image",
     "sim",
     "demo",
+    "run",
     "depth",
     "models",
     "zones",
@@ -314,6 +315,21 @@ fn depth_of_given_correspondences() {
         }
     }
     fails_with(&[&["depth", "--kernel", "guess"], &options[..]].concat(), 2, &["guess", "midpoint"]);
+    run_json(&[&["depth", "--json", "--also", "csv,json"], &options[..]].concat());
+    let csv = std::fs::read_to_string(file("cloud.csv")).expect("a table");
+    let row: Vec<f64> =
+        csv.lines().nth(1).expect("a row").split(',').map(|number| number.parse().expect("a number")).collect();
+    let json: serde_json::Value =
+        serde_json::from_str(&std::fs::read_to_string(file("cloud.json")).expect("a table")).expect("JSON");
+    assert!(csv.starts_with("x_mm,y_mm,z_mm,red,green,blue,u_left") && csv.lines().count() == 2, "{csv}");
+    assert_eq!(
+        (json["columns"][10].as_str(), json["rows"][0].as_array().map(Vec::len)),
+        (Some("sigma_range_mm"), Some(18))
+    );
+    assert!((row[0] - 100.0).abs() < 0.01 && (row[2] - 100.0).abs() < 0.01, "{row:?}");
+    // The variance of the range, along (1, 0, 1): half of xx and zz, and xz.
+    let along = (0.5 * (row[12] + row[17]) + row[14]).sqrt();
+    assert!((along / row[10] - 1.0).abs() < 1e-3, "{along} {}", row[10]);
 }
 
 #[test]

@@ -17,12 +17,50 @@ fn bench() -> Rig {
     Rig::from_toml(BENCH_TOML).expect("the bench")
 }
 
+fn simulated() -> SharedRig {
+    SharedRig::new(SimulatedRig::new(&bench(), 1).expect("a simulated rig"))
+}
+
 async fn board() -> Board {
-    let rig = bench();
-    let simulated = SharedRig::new(SimulatedRig::new(&rig, 1).expect("a simulated rig"));
-    let wire = OpenWire::in_process(spawn_in_process(simulated));
-    let client = Client::connect(wire, SessionId(7), HostClock::start()).await.expect("a session");
-    Board::new(client, rig, 100, indicatif::ProgressBar::hidden()).await.expect("a board")
+    board_of(&simulated(), 7).await
+}
+
+/// A session with a simulated board.
+async fn board_of(simulated: &SharedRig, session: u32) -> Board {
+    let wire = OpenWire::in_process(spawn_in_process(simulated.clone()));
+    let client = Client::connect(wire, SessionId(session), HostClock::start()).await.expect("a session");
+    Board::new(client, bench(), 100, indicatif::ProgressBar::hidden()).await.expect("a board")
+}
+
+/// Microseconds from one pose to the next.
+async fn pose_period(board: &mut Board) -> u64 {
+    let first = board.next_pose().await.expect("a pose").at.0;
+    board.next_pose().await.expect("a pose").at.0 - first
+}
+
+/// What is set means something: every session takes the pose stream as the board is set to, and one that could not follow it
+/// asks for more, says so, and leaves the setting alone.
+#[tokio::test(start_paused = true)]
+async fn the_board_s_own_stream_period_is_kept_to() {
+    let (simulated, key) = (simulated(), SettingKey { item: SettingItem::StreamPeriod, axis: 0 });
+    let cases = [
+        (2_000, 2_000, None),
+        (50_000, 50_000, None),
+        (0, 10_000, Some("no poses")),
+        (2_000_000, 10_000, Some("2000 ms")),
+    ];
+    for (session, (set, period, note)) in (10..).step_by(2).zip(cases) {
+        let setter = board_of(&simulated, session).await;
+        setter.set(key, set).await.expect("the link holds").expect("a period");
+        drop(setter);
+        let mut board = board_of(&simulated, session + 1).await;
+        assert_eq!(pose_period(&mut board).await, period, "set to {set}");
+        match (board.stream_note(), note) {
+            (Some(said), Some(part)) => assert!(said.contains(part) && said.contains("stays"), "{said}"),
+            (said, part) => assert_eq!(said, part),
+        }
+        assert_eq!(board.setting(key).await, Ok(Some(set)));
+    }
 }
 
 #[tokio::test(start_paused = true)]

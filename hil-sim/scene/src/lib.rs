@@ -27,5 +27,5 @@ mod texture;
 pub use board::Board;
 pub use optics::Optics;
 pub use range_map::RangeMap;
-pub use render::{Photograph, View, render};
+pub use render::{Photograph, View, render, render_rolling};
 pub use scene::{Hit, Scene, SurfaceId};

@@ -4,14 +4,14 @@ use nalgebra::{Matrix3, Vector3};
 use vergence_vision::{BatchLens, Camera, Instructions, KannalaBrandt, Pixel, Transform, World};
 
 /// A lens at its place.
-pub struct Eye {
-    lens: BatchLens,
+pub struct Eye<'a> {
+    lens: &'a BatchLens,
     world_from_camera: Matrix3<f64>,
 }
 
 /// The rays of the pixel centres of a rectangle and of their neighbours, in the world.
 pub struct RayGrid<'a> {
-    eye: &'a Eye,
+    eye: &'a Eye<'a>,
     left: u32,
     top: u32,
     stride: usize,
@@ -30,17 +30,20 @@ pub struct Around<'a> {
 
 /// How the ray changes about a pixel.
 pub struct Nearby<'a> {
-    eye: &'a Eye,
+    eye: &'a Eye<'a>,
     pixel: Pixel,
     centre: Vector3<f64>,
     /// First and second derivatives per pixel: u, v, uu, uv, vv. `None` at the edge of the field.
     derivatives: Option<[Vector3<f64>; 5]>,
 }
 
-impl Eye {
-    pub fn new(camera: &KannalaBrandt, world_from_camera: &Transform<World, Camera>) -> Self {
-        // The same picture on every machine.
-        let lens = BatchLens::new(camera).with_instructions(Instructions::Baseline);
+/// A camera's lens for many rays; the same picture on every machine.
+pub fn lens_of(camera: &KannalaBrandt) -> BatchLens {
+    BatchLens::new(camera).with_instructions(Instructions::Baseline)
+}
+
+impl<'a> Eye<'a> {
+    pub fn new(lens: &'a BatchLens, world_from_camera: &Transform<World, Camera>) -> Self {
         Self { lens, world_from_camera: world_from_camera.rotation().to_rotation_matrix().into_inner() }
     }
 
@@ -56,7 +59,7 @@ impl Eye {
 
 impl<'a> RayGrid<'a> {
     /// For the rectangle of `columns` and `rows` whose first pixel is in column `left` and row `top`.
-    pub fn new(eye: &'a Eye, [left, top]: [u32; 2], [columns, rows]: [u32; 2]) -> Self {
+    pub fn new(eye: &'a Eye<'a>, [left, top]: [u32; 2], [columns, rows]: [u32; 2]) -> Self {
         let pixels: Vec<[f64; 2]> = (0..rows + 2)
             .flat_map(|row| (0..columns + 2).map(move |column| (column, row)))
             .map(|(column, row)| [f64::from(left) + f64::from(column) - 1.0, f64::from(top) + f64::from(row) - 1.0])
@@ -121,7 +124,8 @@ mod tests {
         let k = [187.0, -3.0, 0.4, 0.0, 0.0];
         let camera = KannalaBrandt::new(k, 1.002, centre, Angle::from_deg(98.0), size).unwrap();
         let pose = Transform::new(UnitQuaternion::from_euler_angles(0.3, -1.1, 0.2), Vector3::zeros());
-        let eye = Eye::new(&camera, &pose);
+        let lens = lens_of(&camera);
+        let eye = Eye::new(&lens, &pose);
         let grid = RayGrid::new(&eye, [0, 300], [640, 40]);
         for (x, y) in [(321, 318), (100, 320), (15, 310), (620, 339), (400, 300)] {
             let nearby = grid.around(x, y).unwrap().nearby();

@@ -3,12 +3,12 @@
 use image::RgbImage;
 use nalgebra::Vector3;
 use rayon::prelude::*;
-use vergence_vision::{Angle, Camera, KannalaBrandt, Transform, World};
+use vergence_vision::{Angle, BatchLens, Camera, KannalaBrandt, Transform, World};
 
 use crate::blur::blurred;
 use crate::noise::mix64;
 use crate::optics::unit_pair;
-use crate::rays::{Around, Eye, RayGrid};
+use crate::rays::{Around, Eye, RayGrid, lens_of};
 use crate::texture::Rgb;
 use crate::{Optics, RangeMap, Scene};
 
@@ -51,14 +51,45 @@ pub struct Photograph {
 /// seen beside where it is projected.
 #[must_use]
 pub fn render(view: &View<'_>, seed: u64) -> Photograph {
+    photograph(view, seed, Rows { at_once: BAND, world_from_camera: &|_| view.world_from_camera })
+}
+
+/// The same through a rolling shutter: every row from where `world_from_camera` says the camera was when that row was
+/// exposed. Nothing moves while a row is exposed, so that motion does not blur.
+#[must_use]
+pub fn render_rolling(
+    view: &View<'_>,
+    seed: u64,
+    world_from_camera: &(dyn Fn(u32) -> Transform<World, Camera> + Sync),
+) -> Photograph {
+    photograph(view, seed, Rows { at_once: 1, world_from_camera })
+}
+
+/// How many neighbouring rows are exposed at once, and where the camera is then.
+#[derive(Clone, Copy)]
+struct Rows<'a> {
+    at_once: usize,
+    world_from_camera: &'a (dyn Fn(u32) -> Transform<World, Camera> + Sync),
+}
+
+impl Rows<'_> {
+    /// The view as at a row.
+    fn view<'v>(&self, view: &View<'v>, row: u32) -> View<'v> {
+        View { world_from_camera: (self.world_from_camera)(row), ..*view }
+    }
+}
+
+fn photograph(view: &View<'_>, seed: u64, rows: Rows<'_>) -> Photograph {
     let size = view.camera.size();
     let width = (size.width as usize).max(1);
     let seed_of = |x: usize, y: usize| mix64(mix64(seed) ^ (y * width + x) as u64);
     let pixels = size.width as usize * size.height as usize;
 
-    let eye = Eye::new(view.camera, &view.world_from_camera);
+    let lens = lens_of(view.camera);
     let mut firsts = vec![First::default(); pixels];
-    for_each_in_field(view, &eye, &mut firsts, |first, around, x, y| *first = view.first(around, seed_of(x, y)));
+    for_each_in_field(view, rows, &lens, &mut firsts, |first, here, around, x, y| {
+        *first = here.first(around, seed_of(x, y));
+    });
 
     let mut light = vec![[0.0; 3]; pixels];
     light.par_iter_mut().enumerate().for_each(|(i, light)| {
@@ -66,8 +97,10 @@ pub fn render(view: &View<'_>, seed: u64) -> Photograph {
         let (x, y) = (i % width, i / width);
         if is_edge(&firsts, width, x, y) {
             let pixel = [x, y].map(|n| n as u32);
+            let here = rows.view(view, pixel[1]);
+            let eye = Eye::new(&lens, &here.world_from_camera);
             if let Some(around) = RayGrid::new(&eye, pixel, [1, 1]).around(pixel[0], pixel[1]) {
-                look = look.joined(view.look(&around, view.optics.edge_samples, mix64(seed_of(x, y))));
+                look = look.joined(here.look(&around, view.optics.edge_samples, mix64(seed_of(x, y))));
             }
         }
         let exposure = exposure / look.count.max(1) as f32;
@@ -149,21 +182,24 @@ impl Look {
     }
 }
 
-/// Calls `visit(item, rays, x, y)` for the pixels of the view inside the lens's field, in parallel.
+/// Calls `visit(item, view, rays, x, y)`, the view as at that row, for the pixels of the view inside the lens's field, in parallel.
 fn for_each_in_field<T: Send>(
     view: &View<'_>,
-    eye: &Eye,
+    rows: Rows<'_>,
+    lens: &BatchLens,
     items: &mut [T],
-    visit: impl Fn(&mut T, &Around<'_>, usize, usize) + Sync,
+    visit: impl Fn(&mut T, &View<'_>, &Around<'_>, usize, usize) + Sync,
 ) {
     let width = (view.camera.size().width as usize).max(1);
-    items.par_chunks_mut(width * BAND).enumerate().for_each(|(number, items)| {
-        let top = number * BAND;
-        let rays = RayGrid::new(eye, [0, top as u32], [width, items.len() / width].map(|n| n as u32));
+    items.par_chunks_mut(width * rows.at_once).enumerate().for_each(|(number, items)| {
+        let top = number * rows.at_once;
+        let here = rows.view(view, top as u32);
+        let eye = Eye::new(lens, &here.world_from_camera);
+        let rays = RayGrid::new(&eye, [0, top as u32], [width, items.len() / width].map(|n| n as u32));
         for (i, item) in items.iter_mut().enumerate() {
             let (x, y) = (i % width, top + i / width);
             if let Some(around) = rays.around(x as u32, y as u32) {
-                visit(item, &around, x, y);
+                visit(item, &here, &around, x, y);
             }
         }
     });

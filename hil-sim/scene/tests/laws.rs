@@ -11,7 +11,7 @@ use nalgebra::Vector3;
 use proptest::prelude::*;
 use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64Mcg;
-use vergence_scene::{Optics, Scene};
+use vergence_scene::{Optics, Scene, View, render, render_rolling};
 use vergence_vision::{Angle, Camera, Pixel, Point, UnitRay, World};
 
 static ROOM: LazyLock<Scene> = LazyLock::new(Scene::room);
@@ -54,6 +54,27 @@ proptest! {
         prop_assert!(falloff(a.min(b)) >= falloff(a.max(b)));
         prop_assert!((falloff(0.0) - 1.0).abs() < 1e-12 && (falloff(98.0) - (1.0 - loss)).abs() < 1e-12);
     }
+}
+
+/// Each row of a rolling shutter shows what a camera sees that stands where this one was then.
+#[test]
+fn a_rolling_shutter_sees_each_row_from_its_own_place() {
+    let camera = fisheye(48);
+    let at = |row: u32| pose([10.0 * f64::from(row), 0.0, 0.0], 0.5 * f64::from(row));
+    let optics = Optics { blur_px: 0.0, edge_samples: 6, ..Optics::default() };
+    let view = |row| View { scene: &ROOM, camera: &camera, world_from_camera: at(row), optics: &optics };
+    let moving = render_rolling(&view(0), 5, &at);
+    for row in [3, 24, 40] {
+        let standing = render(&view(row), 5);
+        let difference = |x: u32| {
+            let [a, b] = [&moving, &standing].map(|photograph| photograph.image.get_pixel(x, row).0.map(i32::from));
+            a.iter().zip(b).map(|(a, b)| (a - b).abs()).max().unwrap_or(0)
+        };
+        // More rays are cast where the rows beside show something else.
+        let same = (0..48).filter(|&x| difference(x) <= 8).count();
+        assert!(same >= 44, "row {row}: {same}");
+    }
+    assert_eq!(render_rolling(&view(7), 5, &|_| at(7)), render(&view(7), 5));
 }
 
 #[test]

@@ -7,7 +7,7 @@ use proptest::prelude::*;
 use simulated::stage::{Bench, SIX_POSES};
 use simulated::{Dice, apart};
 use vergence_calibration::{StageCalibration, StageError, StageOptions, StagePose, calibrate_stage};
-use vergence_rig::AxisPosition;
+use vergence_rig::{AxisPosition, RigAxis};
 use vergence_vision::{Angle, Length};
 
 const DEG: f64 = std::f64::consts::PI / 180.0;
@@ -65,7 +65,15 @@ fn the_rig_predicts_what_the_calibration_predicts() {
     }
     assert!(rig.calibration_sigma.0.deg() < 0.02 && rig.calibration_sigma.1.mm() < 0.2);
     assert!(rig.calibration_sigma.0.deg() > 1e-4 && rig.calibration_sigma.1.mm() > 1e-3);
-    assert_eq!((rig.name, rig.modes, rig.axes), (bench.drawn.name, bench.drawn.modes, bench.drawn.axes));
+    // The file remembers between which readings the rig was calibrated.
+    for (index, axis) in rig.axes.iter().enumerate() {
+        let at = SIX_POSES.map(|pose| pose[index]);
+        let ends = axis.calibrated.unwrap().map(|end| end.value());
+        let [low, high] = [at.into_iter().fold(f64::INFINITY, f64::min), at.into_iter().fold(0.0, f64::max)];
+        assert!((ends[0] - low).abs() < 0.05 && (ends[1] - high).abs() < 0.05, "{ends:?}");
+    }
+    let axes: Vec<_> = rig.axes.into_iter().map(|axis| RigAxis { calibrated: None, ..axis }).collect();
+    assert_eq!((rig.name, rig.modes, axes), (bench.drawn.name, bench.drawn.modes, bench.drawn.axes));
 }
 
 /// The zero offsets and scales that the bench was built with are found within their uncertainty.

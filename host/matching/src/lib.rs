@@ -29,11 +29,13 @@ mod plane;
 mod refine;
 mod shared_field;
 mod shared_frame;
+mod single;
 mod view;
 
 pub use dense::{DenseCounts, DenseDepth, DenseRange, DenseSample, DenseViews, Disparities, Gap, Swept, dense_depth};
 pub use guided::GuidedMatcher;
 pub use matcher::{Drop, ImagePair, Match, MatchError, Matcher, Matches};
 pub use shared_frame::{Shared, SharedFrame};
+pub use single::image_corners;
 pub use vergence_vision::Side;
 pub use view::{Grid, View, ViewPixel};

@@ -6,7 +6,7 @@ use image::GrayImage;
 use vergence_vision::{Angle, ImageSize, KannalaBrandt, Left, Length, Pixel, Right, Side, Transform};
 
 /// Finds the points of the scene seen in both images of a pair.
-pub trait Matcher {
+pub trait Matcher: Send + Sync {
     /// A short name for logs and reports.
     fn name(&self) -> &str;
 

@@ -77,10 +77,12 @@ impl AxisPosition {
 }
 
 impl std::fmt::Display for AxisPosition {
+    /// With three decimals, or the precision of the format (`{:.1}`).
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        let digits = f.precision().unwrap_or(3);
         match self {
-            Self::Linear(length) => write!(f, "{length:.3}"),
-            Self::Rotary(angle) => write!(f, "{angle:.3}"),
+            Self::Linear(length) => write!(f, "{length:.digits$}"),
+            Self::Rotary(angle) => write!(f, "{angle:.digits$}"),
         }
     }
 }
@@ -94,6 +96,8 @@ pub struct RigAxis {
     pub kind: AxisKind,
     /// Lowest and highest position.
     pub range: [AxisPosition; 2],
+    /// Lowest and highest position at which the cameras' pose was calibrated; `None` where nobody said.
+    pub calibrated: Option<[AxisPosition; 2]>,
     /// Encoder counts per metre or revolution.
     pub counts_per_unit: u32,
 }
@@ -116,6 +120,12 @@ impl RigAxis {
         (counts + 0.5) * self.value_per_count()
     }
 
+    /// The counts, with a fraction, at `value` millimetres or radians: the inverse of [`Self::value_at`].
+    #[must_use]
+    pub fn counts_at(&self, value: f64) -> f64 {
+        value / self.value_per_count() - 0.5
+    }
+
     /// Millimetres or radians at `micro` micrometres or microradians, which may be a fraction.
     #[must_use]
     pub fn value_from_micro(&self, micro: f64) -> f64 {
@@ -136,6 +146,23 @@ impl RigAxis {
     pub fn contains(&self, position: AxisPosition) -> bool {
         let [low, high] = self.range;
         position.is_of(self.kind) && position.value() >= low.value() && position.value() <= high.value()
+    }
+
+    /// Where `position` lies beyond what was calibrated, by more than an encoder and play explain: a sentence.
+    #[must_use]
+    pub fn extrapolation(&self, position: AxisPosition) -> Option<String> {
+        // As a part of the calibrated range.
+        const SLACK: f64 = 0.005;
+        let [low, high] = self.calibrated?;
+        let slack = SLACK * (high.value() - low.value());
+        let beyond = position.value() < low.value() - slack || position.value() > high.value() + slack;
+        beyond.then(|| {
+            format!(
+                "{} {position:.1} lies outside {low:.1} to {high:.1}, where the rig was calibrated: the pose there is \
+                 extrapolated, and less certain than stated",
+                self.name
+            )
+        })
     }
 
     /// What of the board's axis contradicts this one: kind or encoder scale.

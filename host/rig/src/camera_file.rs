@@ -1,9 +1,10 @@
 //! A camera as TOML: the table that rig files and calibrations share.
 
 use serde::{Deserialize, Serialize};
-use vergence_vision::{Angle, ImageSize, InvalidLens, KannalaBrandt, OpenCvFisheye};
+use vergence_vision::{Angle, ImageSize, InvalidLens, KannalaBrandt, OpenCvFisheye, Time};
 
-use crate::text::{angle_text, optional_quantity};
+use crate::moving::Shutter;
+use crate::text::{angle_text, optional_quantity, time_text};
 
 /// The keys of a camera table. Coefficients as in OpenCV fisheye and Kalibr equidistant files.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -19,6 +20,15 @@ pub struct CameraTable {
         skip_serializing_if = "Option::is_none"
     )]
     pub theta_max: Option<Angle>,
+    /// Of a rolling shutter: from the exposure of one row to the next one's; negative where the image is read from the
+    /// bottom. Absent: all rows are exposed at once.
+    #[serde(
+        default,
+        deserialize_with = "optional_quantity",
+        serialize_with = "time_text",
+        skip_serializing_if = "Option::is_none"
+    )]
+    pub line_time: Option<Time>,
     /// Horizontal focal length in pixels.
     pub fx: f64,
     /// Vertical focal length in pixels.
@@ -38,13 +48,30 @@ pub struct CameraTable {
 }
 
 impl CameraTable {
-    /// The table of a camera.
+    /// The table of a camera with a global shutter.
     #[must_use]
     pub fn of(camera: &KannalaBrandt) -> Self {
         let OpenCvFisheye { fx, fy, cx, cy, k: [opencv_k1, opencv_k2, opencv_k3, opencv_k4] } = camera.to_opencv();
         let ImageSize { width, height } = camera.size();
         let theta_max = Some(camera.theta_max());
-        Self { size: [width, height], theta_max, fx, fy, cx, cy, opencv_k1, opencv_k2, opencv_k3, opencv_k4 }
+        let (size, line_time) = ([width, height], None);
+        Self { size, theta_max, line_time, fx, fy, cx, cy, opencv_k1, opencv_k2, opencv_k3, opencv_k4 }
+    }
+
+    /// The same with another shutter.
+    #[must_use]
+    pub fn with_shutter(self, shutter: Shutter) -> Self {
+        let line_time = match shutter {
+            Shutter::Global => None,
+            Shutter::Rolling { line_us } => Some(Time::from_us(line_us)),
+        };
+        Self { line_time, ..self }
+    }
+
+    /// How the camera exposes its rows.
+    #[must_use]
+    pub fn shutter(&self) -> Shutter {
+        self.line_time.map_or(Shutter::Global, |time| Shutter::Rolling { line_us: time.us() })
     }
 
     /// The camera of the table.

@@ -60,6 +60,7 @@ struct AxisFile {
     name: String,
     kind: KindFile,
     range: [String; 2],
+    calibrated: Option<[String; 2]>,
     counts_per_metre: Option<u32>,
     counts_per_revolution: Option<u32>,
 }
@@ -142,6 +143,7 @@ impl Rig {
             modes,
             left_camera: camera("left", &file.left.camera)?,
             right_camera: camera("right", &file.right.camera)?,
+            shutters: [&file.left, &file.right].map(|side| side.camera.shutter()),
             left_chain: chain("left", &file.left, &axes)?,
             right_chain: chain("right", &file.right, &axes)?,
             calibration_sigma: (file.calibration_sigma.rotation, file.calibration_sigma.translation),
@@ -174,15 +176,23 @@ fn axis(file: &AxisFile) -> Result<RigAxis, RigError> {
         _ => return Err(contradiction(format!("axis '{name}' needs {key}, positive, and no other scale"))),
     };
     let place = format!("range of axis '{name}'");
+    let range = interval(kind, &file.range, &place)?;
     let [low, high] = &file.range;
-    let range = [position(kind, low, &place)?, position(kind, high, &place)?];
-    if range[0].value() >= range[1].value() {
-        return Err(contradiction(format!("{place}: {low} is not below {high}")));
-    }
     if range.iter().any(|position| position.micro().0.unsigned_abs() > LONGEST) {
         return Err(contradiction(format!("{place}: {low} to {high} is more than 100 m or 100 rad from zero")));
     }
-    Ok(RigAxis { name: name.clone(), kind, range, counts_per_unit })
+    let place = format!("calibrated range of axis '{name}'");
+    let calibrated = file.calibrated.as_ref().map(|ends| interval(kind, ends, &place)).transpose()?;
+    Ok(RigAxis { name: name.clone(), kind, range, calibrated, counts_per_unit })
+}
+
+/// From a lower to a higher position.
+fn interval(kind: AxisKind, [low, high]: &[String; 2], place: &str) -> Result<[AxisPosition; 2], RigError> {
+    let ends = [position(kind, low, place)?, position(kind, high, place)?];
+    if ends[0].value() >= ends[1].value() {
+        return Err(contradiction(format!("{place}: {low} is not below {high}")));
+    }
+    Ok(ends)
 }
 
 fn mode(number: u8, name: &str, positions: &BTreeMap<String, String>, axes: &[RigAxis]) -> Result<Mode, RigError> {

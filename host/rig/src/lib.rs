@@ -14,7 +14,7 @@ mod chain;
 mod clock;
 mod depth_field;
 mod file;
-mod frame_pair;
+mod frame_pairing;
 mod goal;
 mod interchange;
 mod moving;
@@ -31,13 +31,13 @@ pub use chain::{Chain, Link, Screw};
 pub use clock::{BoardInstant, ClockDrift, ClockMap, Exchange, HostInstant};
 pub use depth_field::{DepthField, PredictedDepth};
 pub use file::RigError;
-pub use frame_pair::{FramePair, Pairing, PairingError, StampedFrame, TriggerDelay, pair_frames};
+pub use frame_pairing::{ExposureDelay, Fate, FramePairing, StampedFrame, TimedEvent};
 pub use goal::{DepthGoal, DepthSigma, InvalidGoal};
 pub use interchange::{Camchain, CameraFormat, InterchangeError, kalibr, opencv};
-pub use moving::{Exposure, PairExposure, Shutter, moving_cloud};
+pub use moving::{Exposure, MiddlePose, PairExposure, Shutter, middle_pose, moving_cloud};
 pub use pose::RigPose;
 pub use rig::{Mode, Rig};
-pub use track::{JointSample, JointTrack, JointsAt, TrackGap};
+pub use track::{JointSample, JointTrack, Joints, JointsAt, SteadyMotion, TrackGap};
 
 /// The built-in bench, as the TOML file a user would write.
 pub const BENCH_TOML: &str = include_str!("bench.toml");

@@ -1,10 +1,15 @@
 //! Measuring while the stages move: every row of both images has its own pose.
 
-use vergence_vision::{Base, Cloud, CloudPoint, Drop, Gates, Left, PixelPair, StereoPair, Transform, cloud_point};
+use std::time::Duration;
+
+use vergence_vision::{
+    Angle, Base, Cloud, CloudPoint, Drop, Gates, Left, PixelPair, StereoPair, Transform, cloud_point,
+};
 
 use crate::clock::BoardInstant;
+use crate::pose::RigPose;
 use crate::rig::Rig;
-use crate::track::{JointTrack, JointsAt, TrackGap};
+use crate::track::{Joints, JointsAt, TrackGap};
 
 /// How a sensor exposes its rows.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -18,6 +23,24 @@ pub enum Shutter {
         /// the bottom.
         line_us: f64,
     },
+}
+
+impl Shutter {
+    /// From the middle of one row's exposure to the next one's, in microseconds; zero where all are exposed at once.
+    #[must_use]
+    pub const fn line_us(self) -> f64 {
+        match self {
+            Self::Global => 0.0,
+            Self::Rolling { line_us } => line_us,
+        }
+    }
+
+    /// From the exposure of the first of `rows` rows to that of the last, whichever end is read first.
+    #[must_use]
+    pub fn span(self, rows: u32) -> Duration {
+        let us = self.line_us().abs() * f64::from(rows.saturating_sub(1));
+        Duration::from_nanos((us * 1e3).round() as u64)
+    }
 }
 
 /// When one image was exposed.
@@ -36,10 +59,7 @@ impl Exposure {
     #[must_use]
     pub fn at_row(&self, v: f64) -> BoardInstant {
         let lines = v - 0.5 * (f64::from(self.rows) - 1.0);
-        match self.shutter {
-            Shutter::Global => self.middle,
-            Shutter::Rolling { line_us } => BoardInstant { us: self.middle.us + lines * line_us, ..self.middle },
-        }
+        BoardInstant { us: self.middle.us + lines * self.shutter.line_us(), ..self.middle }
     }
 }
 
@@ -50,6 +70,31 @@ pub struct PairExposure {
     pub left: Exposure,
     /// Of the right camera.
     pub right: Exposure,
+}
+
+/// Where the cameras were when the middle rows of a pair were exposed.
+#[derive(Clone, Debug, PartialEq)]
+pub struct MiddlePose {
+    /// Of the left camera at its middle row, and of the right camera at its own.
+    pub pose: RigPose,
+    /// How far the relative rotation turned from there to the first or the last rows, whichever is farther.
+    pub sweep: Angle,
+}
+
+/// The pose at the middle rows of a pair, and how much it changes until the others.
+///
+/// # Errors
+/// [`TrackGap`] where the encoder readings do not cover an exposure.
+pub fn middle_pose(rig: &Rig, joints: &impl Joints, exposure: &PairExposure) -> Result<MiddlePose, TrackGap> {
+    let at = |rows: [f64; 2]| {
+        let left = joints.at(exposure.left.at_row(rows[0]))?;
+        Ok(rig.pose_of_each(&left, &joints.at(exposure.right.at_row(rows[1]))?))
+    };
+    let last = [exposure.left.rows, exposure.right.rows].map(|rows| f64::from(rows) - 1.0);
+    let pose = at(last.map(|row| 0.5 * row))?;
+    let turned = |other: RigPose| pose.left_from_right.rotation().angle_to(&other.left_from_right.rotation());
+    let sweep = turned(at([0.0, 0.0])?).max(turned(at(last)?));
+    Ok(MiddlePose { pose, sweep: Angle::from_rad(sweep) })
 }
 
 /// The points of `pairs`, each triangulated with the pose of the left camera when its row was exposed and that of the right
@@ -63,15 +108,15 @@ pub struct PairExposure {
 pub fn moving_cloud(
     pairs: &[PixelPair],
     rig: &Rig,
-    track: &JointTrack,
+    joints: &impl Joints,
     exposure: &PairExposure,
     gates: &Gates,
 ) -> Result<Cloud, TrackGap> {
-    let reference_from_base = rig.pose(&track.at(exposure.left.middle)?).base_from_left.inverse();
+    let reference_from_base = rig.pose(&joints.at(exposure.left.middle)?).base_from_left.inverse();
     let mut cloud = Cloud::default();
     for (pair_index, pixels) in pairs.iter().enumerate() {
-        let left = track.at(exposure.left.at_row(pixels.left.v))?;
-        let right = track.at(exposure.right.at_row(pixels.right.v))?;
+        let left = joints.at(exposure.left.at_row(pixels.left.v))?;
+        let right = joints.at(exposure.right.at_row(pixels.right.v))?;
         match point(pixels, rig, &reference_from_base, [&left, &right], gates) {
             Ok(point) => cloud.points.push(CloudPoint { pair_index, ..point }),
             Err(reason) => *cloud.dropped.entry(reason).or_default() += 1,

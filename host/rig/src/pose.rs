@@ -52,7 +52,7 @@ impl Rig {
     /// The pose with the axes standing at `values`, read by the encoders.
     #[must_use]
     pub fn pose_read_at(&self, values: &[f64]) -> RigPose {
-        let counts = self.axes.iter().zip(values).map(|(axis, value)| value / axis.value_per_count() - 0.5).collect();
+        let counts = self.axes.iter().zip(values).map(|(axis, &value)| axis.counts_at(value)).collect();
         self.pose(&JointsAt { counts, sigma: vec![UNIFORM; self.axes.len()], timing: vec![0.0; self.axes.len()] })
     }
 

@@ -6,6 +6,7 @@ use vergence_vision::{Angle, KannalaBrandt, Left, Length, Right, Transform};
 
 use crate::axis::{AxisPosition, RigAxis};
 use crate::chain::Chain;
+use crate::moving::Shutter;
 
 /// The rig: axes, modes, cameras and how the axes carry the cameras.
 #[derive(Clone, Debug, PartialEq)]
@@ -20,6 +21,8 @@ pub struct Rig {
     pub left_camera: KannalaBrandt,
     /// The right camera.
     pub right_camera: KannalaBrandt,
+    /// How the left and the right camera expose their rows.
+    pub shutters: [Shutter; 2],
     /// From the base to the left camera.
     pub left_chain: Chain<Left>,
     /// From the base to the right camera.
@@ -55,6 +58,7 @@ impl Rig {
             modes: Vec::new(),
             left_camera,
             right_camera,
+            shutters: [Shutter::Global; 2],
             left_chain: Chain::new(Vec::new(), Transform::from_isometry(Isometry3::identity())),
             right_chain: Chain::new(Vec::new(), left_from_right.renamed()),
             calibration_sigma: sigma,
@@ -77,6 +81,12 @@ impl Rig {
     #[must_use]
     pub fn axis_index(&self, name: &str) -> Option<usize> {
         self.axes.iter().position(|axis| axis.name == name)
+    }
+
+    /// A sentence for each axis whose position lies beyond what was calibrated.
+    #[must_use]
+    pub fn extrapolations(&self, positions: &[AxisPosition]) -> Vec<String> {
+        self.axes.iter().zip(positions).filter_map(|(axis, &position)| axis.extrapolation(position)).collect()
     }
 
     /// Positions as they go over the wire.

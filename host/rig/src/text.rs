@@ -3,13 +3,15 @@
 use std::str::FromStr;
 
 use serde::{Deserialize, Deserializer, Serializer};
-use vergence_vision::Angle;
+use vergence_vision::{Angle, Time};
 
 pub fn quantity<'de, D: Deserializer<'de>, Q: FromStr<Err: std::fmt::Display>>(source: D) -> Result<Q, D::Error> {
     String::deserialize(source)?.parse().map_err(serde::de::Error::custom)
 }
 
-pub fn optional_quantity<'de, D: Deserializer<'de>>(source: D) -> Result<Option<Angle>, D::Error> {
+pub fn optional_quantity<'de, D: Deserializer<'de>, Q: FromStr<Err: std::fmt::Display>>(
+    source: D,
+) -> Result<Option<Q>, D::Error> {
     quantity(source).map(Some)
 }
 
@@ -26,6 +28,13 @@ where
 pub fn angle_text<S: Serializer>(angle: &Option<Angle>, target: S) -> Result<S::Ok, S::Error> {
     match angle {
         Some(angle) => target.serialize_str(&format!("{}deg", angle.deg())),
+        None => target.serialize_none(),
+    }
+}
+
+pub fn time_text<S: Serializer>(time: &Option<Time>, target: S) -> Result<S::Ok, S::Error> {
+    match time {
+        Some(time) => target.serialize_str(&format!("{}us", time.us())),
         None => target.serialize_none(),
     }
 }

@@ -4,11 +4,12 @@ use std::collections::BTreeMap;
 
 use serde::Serialize;
 use vergence_protocol::AxisKind;
-use vergence_vision::{Angle, Frame, Length};
+use vergence_vision::{Angle, Frame, KannalaBrandt, Length};
 
 use crate::axis::{AxisPosition, RigAxis};
 use crate::camera_file::{CameraTable, Provenance};
 use crate::chain::{Chain, Link, Screw};
+use crate::moving::Shutter;
 use crate::rig::Rig;
 
 #[derive(Serialize)]
@@ -27,6 +28,8 @@ struct Axis<'a> {
     name: &'a str,
     kind: &'static str,
     range: [String; 2],
+    #[serde(skip_serializing_if = "Option::is_none")]
+    calibrated: Option<[String; 2]>,
     #[serde(skip_serializing_if = "Option::is_none")]
     counts_per_metre: Option<u32>,
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -82,12 +85,16 @@ impl Rig {
                 rotation: angle(self.calibration_sigma.0),
                 translation: length(self.calibration_sigma.1),
             },
-            left: side(CameraTable::of(&self.left_camera), &self.left_chain, &name),
-            right: side(CameraTable::of(&self.right_camera), &self.right_chain, &name),
+            left: side(table(&self.left_camera, self.shutters[0]), &self.left_chain, &name),
+            right: side(table(&self.right_camera, self.shutters[1]), &self.right_chain, &name),
             provenance,
         };
         toml::to_string(&file).map_err(|error| error.to_string())
     }
+}
+
+fn table(camera: &KannalaBrandt, shutter: Shutter) -> CameraTable {
+    CameraTable::of(camera).with_shutter(shutter)
 }
 
 fn axis(axis: &RigAxis) -> Axis<'_> {
@@ -96,6 +103,7 @@ fn axis(axis: &RigAxis) -> Axis<'_> {
         name: &axis.name,
         kind: if axis.kind == AxisKind::Linear { "linear" } else { "rotary" },
         range: axis.range.map(position),
+        calibrated: axis.calibrated.map(|ends| ends.map(position)),
         counts_per_metre: scale_of(AxisKind::Linear),
         counts_per_revolution: scale_of(AxisKind::Rotary),
     }

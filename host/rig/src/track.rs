@@ -61,6 +61,38 @@ pub enum TrackGap {
     Gap(f64),
 }
 
+/// Who knows the joints at an instant.
+pub trait Joints {
+    /// The joints at `instant`.
+    ///
+    /// # Errors
+    /// [`TrackGap`] where they are not known then.
+    fn at(&self, instant: BoardInstant) -> Result<JointsAt, TrackGap>;
+}
+
+/// Axes that move evenly, or stand, as somebody said.
+#[derive(Clone, Debug, PartialEq)]
+pub struct SteadyMotion {
+    /// The instant from which time counts, microseconds on the board's clock.
+    pub from_us: f64,
+    /// The joints then.
+    pub joints: JointsAt,
+    /// How fast each moves, in counts per microsecond.
+    pub rates: Vec<f64>,
+}
+
+impl Joints for SteadyMotion {
+    fn at(&self, instant: BoardInstant) -> Result<JointsAt, TrackGap> {
+        let mut joints = self.joints.clone();
+        let moving = joints.counts.iter_mut().zip(&mut joints.timing).zip(&self.rates);
+        for ((counts, timing), rate) in moving {
+            *counts += rate * (instant.us - self.from_us);
+            *timing = timing.hypot(UNIFORM * 2.0 * instant.error_us * rate).copysign(*rate);
+        }
+        Ok(joints)
+    }
+}
+
 /// The latest readings of the encoders, in order of time.
 #[derive(Clone, Debug)]
 pub struct JointTrack {
@@ -88,12 +120,27 @@ impl JointTrack {
         self.samples.push_back(sample);
     }
 
-    /// The joints at `instant`, by linear interpolation between the two readings around it.
-    ///
-    /// # Errors
-    /// [`TrackGap`] where the readings do not cover the instant.
-    pub fn at(&self, instant: BoardInstant) -> Result<JointsAt, TrackGap> {
-        let after = self.samples.iter().position(|s| s.at.0 as f64 >= instant.us).ok_or(TrackGap::NotYet)?;
+    /// The part from `from_us` to `to_us` on the board's clock, with what it takes to interpolate at both.
+    #[must_use]
+    pub fn between(&self, from_us: f64, to_us: f64) -> Self {
+        // The readings around each end, and those beside them, which tell how the motion bends.
+        const BESIDE: usize = 2;
+        let first = self.reading_from(from_us).saturating_sub(BESIDE);
+        let end = (self.reading_from(to_us) + BESIDE).min(self.samples.len());
+        let samples = self.samples.range(first.min(end)..end).cloned().collect();
+        Self { samples, capacity: self.capacity }
+    }
+
+    /// The first reading at or after an instant on the board's clock.
+    fn reading_from(&self, us: f64) -> usize {
+        self.samples.partition_point(|sample| (sample.at.0 as f64) < us)
+    }
+}
+
+impl Joints for JointTrack {
+    /// By linear interpolation between the two readings around `instant`.
+    fn at(&self, instant: BoardInstant) -> Result<JointsAt, TrackGap> {
+        let after = self.reading_from(instant.us);
         let next = self.samples.get(after).ok_or(TrackGap::NotYet)?;
         let previous = match after.checked_sub(1).and_then(|before| self.samples.get(before)) {
             Some(previous) => previous,
@@ -108,7 +155,9 @@ impl JointTrack {
         let bend = self.bend(after, share);
         Ok(interpolate(previous, next, share, &bend, instant.error_us / span.max(1.0)))
     }
+}
 
+impl JointTrack {
     /// How far each axis may be off the straight line between two readings: share (1 - share) / 2 of the change of its
     /// step from this interval to those beside it, the larger of both.
     fn bend(&self, after: usize, share: f64) -> Vec<f64> {

@@ -12,7 +12,7 @@ use vergence_control::StepSchedule;
 use vergence_plant::{AxisPlant, bench_mechanics, bench_settings};
 use vergence_protocol::{AxisList, Counts, Microseconds};
 use vergence_rig::{
-    BENCH_TOML, BoardInstant, Exposure, JointSample, JointTrack, PairExposure, Rig, Shutter, moving_cloud,
+    BENCH_TOML, BoardInstant, Exposure, JointSample, JointTrack, Joints, PairExposure, Rig, Shutter, moving_cloud,
 };
 use vergence_vision::{Base, Frame, Gates, KannalaBrandt, Left, Length, Pixel, PixelPair, Point, Transform};
 

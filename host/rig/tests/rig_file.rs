@@ -3,7 +3,7 @@
 
 use nalgebra::{Isometry3, Unit, UnitQuaternion, Vector3};
 use proptest::prelude::*;
-use vergence_rig::{AxisPosition, BENCH_TOML, Chain, Link, Provenance, Rig, Screw};
+use vergence_rig::{AxisPosition, BENCH_TOML, Chain, Link, Provenance, Rig, Screw, Shutter};
 use vergence_vision::{Angle, Length, Point, Transform};
 
 fn provenance() -> Provenance {
@@ -25,6 +25,35 @@ fn the_bench_comes_back_as_it_was() {
     // People read it too.
     let text = bench.to_toml(&provenance()).expect("TOML");
     assert!(text.contains("separation = \"120.0deg\"") && text.contains("date = \"2026-11-21\""), "{text}");
+}
+
+/// The bench with `keys` in front of one of its own.
+fn with(keys: &str, before: &str) -> Result<Rig, vergence_rig::RigError> {
+    Rig::from_toml(&BENCH_TOML.replacen(before, &format!("{keys}\n{before}"), 1))
+}
+
+#[test]
+fn a_rolling_shutter_comes_back_as_it_was() {
+    let rig = with("line_time = \"-14.8us\"", "theta_max").expect("a rig");
+    let rolling = Shutter::Rolling { line_us: -14.8 };
+    assert_eq!(rig.shutters, [rolling, Shutter::Global]);
+    assert_eq!(read_back(&rig).shutters, rig.shutters);
+    assert_eq!(rolling.span(1280).as_micros(), 18_929);
+    let wrong = with("line_time = \"14.8\"", "theta_max").expect_err("it has no unit");
+    assert!(wrong.to_string().contains("15us"), "{wrong}");
+}
+
+#[test]
+fn a_pose_beyond_the_calibrated_range_is_told() {
+    let rig = with("calibrated = [\"80mm\", \"200mm\"]", "counts_per_metre").expect("a rig");
+    assert_eq!(read_back(&rig).axes, rig.axes);
+    let told = |mm: f64| rig.axes[0].extrapolation(AxisPosition::Linear(Length::from_mm(mm)));
+    assert_eq!([80.0, 140.0, 200.3].map(told), [None, None, None]);
+    let said = told(215.0).expect("it lies beyond");
+    assert!(said.starts_with("baseline 215.0 mm lies outside 80.0 mm to 200.0 mm"), "{said}");
+    // Nobody said where the other axis was calibrated.
+    assert_eq!(rig.axes[1].extrapolation(AxisPosition::Rotary(Angle::from_deg(129.0))), None);
+    assert!(with("calibrated = [\"200mm\", \"80mm\"]", "counts_per_metre").is_err());
 }
 
 fn vector(bound: f64) -> impl Strategy<Value = Vector3<f64>> {

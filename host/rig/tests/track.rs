@@ -3,7 +3,7 @@
 
 use proptest::prelude::*;
 use vergence_protocol::{AxisList, Counts, Microseconds};
-use vergence_rig::{BoardInstant, JointSample, JointTrack, TrackGap};
+use vergence_rig::{BoardInstant, JointSample, JointTrack, Joints, JointsAt, SteadyMotion, TrackGap};
 
 fn sample(at: u64, counts: &[i32]) -> JointSample {
     JointSample { at: Microseconds(at), counts: counts.iter().map(|&c| Counts(c)).collect::<AxisList<_>>() }
@@ -39,6 +39,31 @@ fn the_track_says_what_it_does_not_know() {
     assert!(track.at(instant(20_000.0)).is_ok());
     track.push(sample(200_000, &[0]));
     assert_eq!(track.at(instant(100_000.0)), Err(TrackGap::Gap(160.0)));
+}
+
+#[test]
+fn a_part_of_the_track_tells_the_same() {
+    let mut track = JointTrack::new(100);
+    for n in 0..50i32 {
+        track.push(sample(1_000_000 + 2_000 * n as u64, &[n * n, -3 * n]));
+    }
+    let part = track.between(1_020_500.0, 1_039_000.0);
+    for us in [1_020_500.0, 1_025_000.0, 1_030_001.0, 1_039_000.0] {
+        assert_eq!(part.at(instant(us)), track.at(instant(us)));
+    }
+    assert_eq!(part.at(instant(1_010_000.0)), Err(TrackGap::TooOld));
+    assert_eq!(track.between(2e6, 3e6).at(instant(2.5e6)), Err(TrackGap::NotYet));
+    assert_eq!(JointTrack::new(5).between(0.0, 1.0).at(instant(0.5)), Err(TrackGap::NotYet));
+}
+
+#[test]
+fn steady_motion_goes_on_as_said() {
+    let joints = JointsAt { counts: vec![100.0, 7.0], sigma: vec![0.5, 0.0], timing: vec![0.0, 0.0] };
+    let motion = SteadyMotion { from_us: 1e6, joints, rates: vec![-0.25, 0.0] };
+    let later = motion.at(BoardInstant { us: 1e6 + 400.0, error_us: 12f64.sqrt() }).expect("it is said");
+    assert_eq!((later.counts, later.sigma), (vec![0.0, 7.0], vec![0.5, 0.0]));
+    // Uniform over plus or minus 12^½ us: one and two of them.
+    assert!((later.timing[0] + 0.5).abs() < 1e-12 && later.timing[1].abs() < 1e-12);
 }
 
 #[test]

@@ -1,6 +1,7 @@
 //! A connected board and what can be asked of it: arm under a lease, home, move, stop.
 
 mod questions;
+mod stream;
 mod words;
 
 use std::time::Duration;
@@ -16,7 +17,7 @@ use vergence_rig::{AxisPosition, HostInstant, Rig};
 pub use self::words::{check_range, describe_fault, describe_pose, positions, staying};
 
 use crate::failure::Failure;
-use crate::link::{Client, LinkError, STREAM_PERIOD_US};
+use crate::link::{Client, LinkError};
 
 /// Homing and moves of a bench take seconds; a board that needs longer than this is not doing what it says.
 const MOTION_TIMEOUT: Duration = Duration::from_secs(120);
@@ -31,6 +32,7 @@ pub struct Board {
     lease_ms: u16,
     moves: u16,
     progress: ProgressBar,
+    stream_note: Option<String>,
 }
 
 impl From<LinkError> for Failure {
@@ -43,7 +45,7 @@ impl From<LinkError> for Failure {
 }
 
 impl Board {
-    /// Takes over a fresh client: checks versions and axes, starts the pose stream.
+    /// Takes over a fresh client: checks versions and axes, and that poses come.
     ///
     /// # Errors
     /// Another protocol, another rig, or a link that ended.
@@ -69,8 +71,10 @@ impl Board {
         let Report::Info { info, .. } = client.ask(Request::GetInfo).await? else {
             return Err(Failure::protocol("the board answered a question about itself with something else"));
         };
-        let board = Self { client, rig, info, axes: Vec::new(), pose: empty_pose(), lease_ms, moves: 0, progress };
-        board.ask(Request::SetStream { period_us: STREAM_PERIOD_US }).await?;
+        let pose = empty_pose();
+        let mut board =
+            Self { client, rig, info, axes: Vec::new(), pose, lease_ms, moves: 0, progress, stream_note: None };
+        board.follow_stream().await?;
         Ok(board)
     }
 
@@ -125,6 +129,11 @@ impl Board {
     #[must_use]
     pub fn client(&self) -> &Client {
         &self.client
+    }
+
+    /// The link, to take something from it.
+    pub fn client_mut(&mut self) -> &mut Client {
+        &mut self.client
     }
 
     /// The latest pose.
@@ -223,8 +232,7 @@ impl Board {
             outcome = work(self) => outcome,
             _ = tokio::signal::ctrl_c() => Err(Failure::device("interrupted: the stages were told to stop")),
         };
-        let disarmed = self.disarm().await;
-        self.client.hold_lease(0).await?;
+        let disarmed = self.release().await;
         // A latched fault cannot be disarmed; the first failure is the one to tell.
         let value = outcome?;
         disarmed.map(|()| value)
@@ -237,6 +245,16 @@ impl Board {
     pub async fn disarm(&mut self) -> Result<(), Failure> {
         self.ask(Request::Disarm).await?;
         self.wait_until(|pose| pose.state == ControllerState::Idle).await
+    }
+
+    /// Disarms where a motion was given up in the middle: it brakes first, and no lease is held any more.
+    ///
+    /// # Errors
+    /// A refusal, or a link that ended.
+    pub async fn release(&mut self) -> Result<(), Failure> {
+        let disarmed = self.disarm().await;
+        self.client.hold_lease(0).await?;
+        disarmed
     }
 
     /// Finds the reference of all axes. The board must be armed.

@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use vergence_rig::{Camchain, CameraDocument, CameraFormat, CameraTable, kalibr, opencv};
+use vergence_rig::{Camchain, CameraDocument, CameraFormat, CameraTable, Shutter, kalibr, opencv};
 use vergence_vision::KannalaBrandt;
 
 use crate::failure::Failure;
@@ -15,6 +15,13 @@ pub struct CameraFile {
     pub cameras: Camchain,
     /// How sure the camera is, where the file says so.
     pub document: Option<CameraDocument>,
+}
+
+impl CameraFile {
+    /// How the camera exposes its rows: only our own files say.
+    pub fn shutter(&self) -> Shutter {
+        self.document.as_ref().map_or(Shutter::Global, |document| document.camera.shutter())
+    }
 }
 
 /// Reads a camera file: ours, OpenCV's or Kalibr's, told apart by their contents.

@@ -94,6 +94,8 @@ enum Verb {
     Demo(cmd::demo::Args),
     /// Turn a pair of photographs into a cloud of points.
     Depth(cmd::depth::Args),
+    /// Measure live: a cloud of the newest pair, again and again, while the stages stand or move.
+    Run(cmd::run::Args),
     /// Keep pre-trained networks for matching.
     Models(cmd::models::Args),
     /// Tell how much of the surroundings both cameras, one, or none see.
@@ -176,6 +178,7 @@ fn execute(cli: Cli) -> Result<(), Failure> {
             Verb::Bench(args) => cmd::bench::run(&args, console),
             Verb::Soak(args) => cmd::soak::run(&args, console),
             Verb::Demo(args) => cmd::demo::run(&args, &globals, console).await,
+            Verb::Run(args) => cmd::run::run(&args, &globals, console).await,
             Verb::Depth(args) => cmd::depth::run(&args, &globals, console),
             Verb::Models(args) => cmd::models::run(&args, console),
             Verb::Zones(args) => cmd::zones::run(&args, &globals, console),

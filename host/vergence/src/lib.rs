@@ -19,6 +19,7 @@ pub mod dense;
 pub mod failure;
 mod firmware;
 pub mod link;
+pub mod live;
 pub mod look;
 pub mod models;
 pub mod move_plan;

@@ -3,10 +3,11 @@
 use std::collections::BTreeMap;
 
 use image::{RgbImage, imageops::grayscale};
-use vergence_matching::{ImagePair, MatchError, Matcher};
-use vergence_rig::{Rig, RigPose};
+use vergence_matching::{ImagePair, MatchError, Matcher, Matches, image_corners};
+use vergence_rig::{Joints, MiddlePose, PairExposure, Rig, RigPose, TrackGap, middle_pose, moving_cloud};
 use vergence_vision::{
-    Angle, CloudPoint, Gates, Kernel, Length, PixelPair, PoseDrift, SharedCovariance, StereoPair, cloud, pose_drift,
+    Angle, Camera as CameraFrame, Cloud, CloudPoint, Gates, KannalaBrandt, Kernel, Length, Pixel, PixelPair, PoseDrift,
+    SharedCovariance, StereoPair, UnitRay, cloud, pose_drift,
 };
 
 use crate::stopwatch::Stopwatch;
@@ -21,6 +22,11 @@ pub const NEAREST: Length = Length::from_mm(200.0);
 const LEAST_MATCHING_SIGMA: Angle = Angle::from_deg(0.15);
 /// A point whose range is less certain than this part of it is of no use.
 pub const MAX_RELATIVE_SIGMA: f64 = 0.05;
+
+/// How well a corner of a single image is known, in pixels: no other image has registered it.
+const CORNER_SIGMA: f64 = 0.5;
+/// One camera alone gives at most so many directions.
+const MOST_BEARINGS: usize = 2000;
 
 /// Two images of one instant.
 #[derive(Clone, Copy, Debug)]
@@ -38,6 +44,8 @@ pub struct ColouredPoint {
     pub point: CloudPoint,
     /// sRGB.
     pub colour: [u8; 3],
+    /// How alike the matcher found both sights, 0 to 1; 1 where somebody else matched them.
+    pub score: f32,
 }
 
 /// What a pair of images came to.
@@ -76,45 +84,96 @@ pub fn look_by(
     pose: &RigPose,
     matcher: &dyn Matcher,
 ) -> Result<Look, MatchError> {
+    let (found, match_seconds) = matches(eyes, rig, pose, Angle::default(), matcher)?;
+    let pairs = pixel_pairs(&found);
+    Ok(Look { match_seconds, ..triangulate(&pairs, eyes, rig, pose, kernel) }.of_matches(&found))
+}
+
+/// Why a pair that was exposed in motion makes no cloud.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+pub enum LookError {
+    /// The images cannot be matched.
+    #[error(transparent)]
+    Match(#[from] MatchError),
+    /// The joints at the exposure are not known.
+    #[error(transparent)]
+    Joints(#[from] TrackGap),
+}
+
+/// Matches two images and triangulates them with the pose that the cameras had when each row was exposed: the stages may
+/// move. Points are in the frame of the left camera at its middle row; the pose there comes with them. While the pose turns
+/// by more than it is uncertain, no word on its drift is to be had.
+///
+/// # Errors
+/// [`LookError`].
+pub fn look_exposed(
+    eyes: Eyes<'_>,
+    rig: &Rig,
+    joints: &impl Joints,
+    exposure: &PairExposure,
+    matcher: &dyn Matcher,
+) -> Result<(Look, MiddlePose), LookError> {
+    let middle = middle_pose(rig, joints, exposure)?;
+    let (found, match_seconds) = matches(eyes, rig, &middle.pose, middle.sweep, matcher)?;
+    let pairs = pixel_pairs(&found);
+    let triangulation = Stopwatch::start();
+    let cloud = moving_cloud(&pairs, rig, joints, exposure, &gates(rig, &middle.pose))?;
+    let triangulate_seconds = triangulation.seconds();
+    let stands = middle.sweep < middle.pose.rotation_sigma;
+    let drift = || pose_drift(&pairs, &stereo(rig, &middle.pose), PIXEL_SIGMA, &middle.pose.covariance);
+    let look = Look {
+        pose_drift: stands.then(drift).flatten(),
+        matches: pairs.len(),
+        match_seconds,
+        triangulate_seconds,
+        ..Look::of_cloud(cloud, eyes)
+    };
+    Ok((look.of_matches(&found), middle))
+}
+
+/// The homologous points, and how long finding them took. `sweep` is how far the pose turns while the images are exposed.
+fn matches(
+    eyes: Eyes<'_>,
+    rig: &Rig,
+    pose: &RigPose,
+    sweep: Angle,
+    matcher: &dyn Matcher,
+) -> Result<(Matches, f64), MatchError> {
     let matching = Stopwatch::start();
     let (left, right) = (grayscale(eyes.left), grayscale(eyes.right));
+    let pose_sigma = pose.rotation_sigma.rad().hypot(sweep.rad()).max(LEAST_MATCHING_SIGMA.rad());
     let found = matcher.find(&ImagePair {
         left: &left,
         right: &right,
         left_camera: &rig.left_camera,
         right_camera: &rig.right_camera,
         left_from_right: pose.left_from_right,
-        pose_sigma: Angle::from_rad(pose.rotation_sigma.rad().max(LEAST_MATCHING_SIGMA.rad())),
+        pose_sigma: Angle::from_rad(pose_sigma),
         nearest: NEAREST,
     })?;
-    let match_seconds = matching.seconds();
-    let pairs: Vec<_> = found.pairs.iter().map(|m| PixelPair { left: m.left, right: m.right }).collect();
-    let mut look = triangulate(&pairs, eyes, rig, pose, kernel);
-    look.match_seconds = match_seconds;
-    for (reason, count) in found.dropped {
-        *look.dropped.entry(reason.as_str()).or_default() += count;
-    }
-    Ok(look)
+    Ok((found, matching.seconds()))
+}
+
+fn pixel_pairs(found: &Matches) -> Vec<PixelPair> {
+    found.pairs.iter().map(|m| PixelPair { left: m.left, right: m.right }).collect()
+}
+
+fn stereo<'a>(rig: &'a Rig, pose: &RigPose) -> StereoPair<'a> {
+    StereoPair { left: &rig.left_camera, right: &rig.right_camera, left_from_right: pose.left_from_right }
 }
 
 /// Triangulates given correspondences.
 #[must_use]
 pub fn triangulate(pairs: &[PixelPair], eyes: Eyes<'_>, rig: &Rig, pose: &RigPose, kernel: Kernel) -> Look {
     let triangulation = Stopwatch::start();
-    let stereo = StereoPair { left: &rig.left_camera, right: &rig.right_camera, left_from_right: pose.left_from_right };
+    let stereo = stereo(rig, pose);
     let result = cloud(pairs, &stereo, &Gates { kernel, ..gates(rig, pose) });
-    let points = result
-        .points
-        .into_iter()
-        .map(|point| ColouredPoint { point, colour: colour_at(eyes.left, point.pixels.left) })
-        .collect();
     Look {
-        points,
         pose_drift: pose_drift(pairs, &stereo, PIXEL_SIGMA, &pose.covariance),
-        dropped: result.dropped.into_iter().map(|(reason, count)| (reason.as_str(), count)).collect(),
         matches: pairs.len(),
-        match_seconds: 0.0,
         triangulate_seconds: triangulation.seconds(),
+        ..Look::of_cloud(result, eyes)
     }
 }
 
@@ -133,6 +192,29 @@ fn gates(rig: &Rig, pose: &RigPose) -> Gates {
 }
 
 impl Look {
+    fn of_cloud(cloud: Cloud, eyes: Eyes<'_>) -> Self {
+        let coloured = |point: CloudPoint| {
+            let colour = colour_at(eyes.left, point.pixels.left);
+            ColouredPoint { point, colour, score: 1.0 }
+        };
+        Self {
+            points: cloud.points.into_iter().map(coloured).collect(),
+            dropped: cloud.dropped.into_iter().map(|(reason, count)| (reason.as_str(), count)).collect(),
+            ..Self::default()
+        }
+    }
+
+    /// With what only the matcher knows: scores, and what it dropped itself.
+    fn of_matches(mut self, found: &Matches) -> Self {
+        for point in &mut self.points {
+            point.score = found.pairs.get(point.point.pair_index).map_or(0.0, |found| found.score);
+        }
+        for (reason, count) in &found.dropped {
+            *self.dropped.entry(reason.as_str()).or_default() += count;
+        }
+        self
+    }
+
     /// A sentence where the picture disagrees with the pose by more than the pose is said to be off.
     #[must_use]
     pub fn warning(&self) -> Option<String> {
@@ -144,9 +226,36 @@ impl Look {
     }
 }
 
+/// What one camera alone sees: a direction, and no range.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Bearing {
+    /// In the camera's own frame.
+    pub direction: UnitRay<CameraFrame>,
+    /// Standard deviation of the direction, along and across.
+    pub sigma: Angle,
+    /// Where the image shows it.
+    pub pixel: Pixel,
+    /// sRGB.
+    pub colour: [u8; 3],
+}
+
+/// The corners of one image as directions: what is left where the other camera is dead.
+#[must_use]
+pub fn bearings(image: &RgbImage, lens: &KannalaBrandt) -> Vec<Bearing> {
+    let bearing = |pixel: Pixel| {
+        let direction = lens.unproject::<CameraFrame>(pixel).ok()?;
+        // The coarser of both directions of the picture.
+        let by_pixel = lens.ray_by_pixel(&direction);
+        let coarser = by_pixel.column(0).norm().max(by_pixel.column(1).norm());
+        let sigma = Angle::from_rad(CORNER_SIGMA * coarser);
+        Some(Bearing { direction, sigma, pixel, colour: colour_at(image, pixel) })
+    };
+    image_corners(&grayscale(image), lens, MOST_BEARINGS).into_iter().filter_map(bearing).collect()
+}
+
 /// The colour of the pixel nearest to a position, black outside.
 #[must_use]
-pub fn colour_at(image: &RgbImage, pixel: vergence_vision::Pixel) -> [u8; 3] {
+pub fn colour_at(image: &RgbImage, pixel: Pixel) -> [u8; 3] {
     // Positions lie on the sensor, so rounding stays inside; the cast saturates if one ever does not.
     let (x, y) = (pixel.u.round().max(0.0) as u32, pixel.v.round().max(0.0) as u32);
     image.get_pixel_checked(x, y).map_or([0; 3], |colour| colour.0)

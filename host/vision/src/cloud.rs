@@ -154,7 +154,7 @@ pub fn cloud_point(pixels: &PixelPair, rig: &StereoPair<'_>, gates: &Gates) -> R
     require(parallax >= gates.min_parallax, Drop::Parallax)?;
     require(gates.max_range.is_none_or(|limit| left_range <= limit), Drop::TooFar)?;
 
-    let uncertainty = PointUncertainty::of(&point, rig, gates.pixel_sigma).ok_or(Drop::Uncertain)?;
+    let uncertainty = PointUncertainty::by(&gates.kernel, &point, rig, gates.pixel_sigma).ok_or(Drop::Uncertain)?;
     let own_sigma = range_sigma(&uncertainty.from_pixels, &point).ok_or(Drop::Uncertain)?;
     require(own_sigma.mm() <= gates.max_relative_sigma * left_range.mm(), Drop::Uncertain)?;
     let covariance = uncertainty.covariance(&gates.shared);

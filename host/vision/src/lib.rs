@@ -47,7 +47,7 @@ pub use triangulation::{
     midpoint, pseudo_intersection, rectified, reprojection,
 };
 pub use uncertainty::{PointUncertainty, ResidualUncertainty, SHARED_PARAMETERS, SharedCovariance};
-pub use units::{Angle, InvalidQuantity, Length};
+pub use units::{Angle, InvalidQuantity, Length, Time};
 pub use zones::{
     Arc, BodyMask, Coverage, Eye, PlanarCamera, SolidZones, ZoneMap, Zones, ZonesError, circle_zones, paper_eq3,
     paper_eq3_applies, solid_zones, symmetric_pair, zones_exact,

@@ -9,11 +9,22 @@
 //!
 //! in the plane along the other ray, across it by the mean of both. The right ray turns with the relative pose, both turn
 //! with their lenses; a shift of the right centre by δ acts as a turn of its ray by δ / μ.
+//!
+//! A point triangulated in the plane of an edge e takes its place from where the rays cross as seen along e, and the mean of
+//! both along it. With λ u = t + μ v at the point, D = [u, v, e] and w = (u (v × e)ᵀ + v (e × u)ᵀ + e (u × v)ᵀ) w / D for any
+//! w, the derivatives of λ = [t, v, e] / D and μ = [t, u, e] / D in (λ u + t + μ v) / 2 come to
+//!
+//! ```text
+//! G_u = λ [v (e × u)ᵀ + e (u × v)ᵀ / 2] / D        G_v = μ [-u (e × v)ᵀ + e (u × v)ᵀ / 2] / D
+//! ```
+//!
+//! of which the first pair is the case e = n. By e itself the point does not move to first order, because the rays meet;
+//! where a match slipped by h along the edge, an edge that is wrong by an angle ε costs about h ε.
 
 use nalgebra::{Matrix3, Matrix6, RowSVector, SMatrix, Vector3, Vector6};
 
 use crate::lens_derivatives::LENS_PARAMETERS;
-use crate::{Angle, Left, Point, Right, StereoPair, UnitRay};
+use crate::{Angle, Kernel, Left, Point, Right, StereoPair, UnitRay};
 
 /// Both lenses and the pose.
 pub const SHARED_PARAMETERS: usize = 2 * LENS_PARAMETERS + 6;
@@ -79,9 +90,20 @@ impl PointUncertainty {
     /// through both centres and where an argument is not finite.
     #[must_use]
     pub fn of(point: &Point<Left>, pair: &StereoPair<'_>, pixel_sigma: f64) -> Option<Self> {
+        Self::by(&Kernel::default(), point, pair, pixel_sigma)
+    }
+
+    /// The same of a point made by `kernel`. [`Kernel::EdgePlane`] has a covariance of its own, and none for an edge in the
+    /// epipolar plane; the others have that of the pseudo-intersection to first order in the plane, where the range lies.
+    #[must_use]
+    pub fn by(kernel: &Kernel, point: &Point<Left>, pair: &StereoPair<'_>, pixel_sigma: f64) -> Option<Self> {
+        let edge = match kernel {
+            Kernel::EdgePlane(edge) => Some(edge.vector()),
+            _ => None,
+        };
         let turn = pair.left_from_right.rotation().to_rotation_matrix().into_inner();
         let (left, in_right) = (point.direction()?, (pair.left_from_right.inverse() * *point).direction()?);
-        let (by_left, by_right) = by_rays(&point.mm(), &pair.left_from_right.origin().mm())?;
+        let (by_left, by_right) = by_rays(&point.mm(), &pair.left_from_right.origin().mm(), edge)?;
         let right_range = (point.mm() - pair.left_from_right.origin().mm()).norm();
 
         let left_pixel = by_left * pair.left.ray_by_pixel(&left);
@@ -170,21 +192,30 @@ impl ResidualUncertainty {
     }
 }
 
-/// G_u and G_v, in millimetres per radian.
-fn by_rays(point: &Vector3<f64>, right_centre: &Vector3<f64>) -> Option<(Matrix3<f64>, Matrix3<f64>)> {
-    // The sine to the baseline below which the range is without bound for any purpose.
-    const ALONG_BASELINE: f64 = 1e-9;
+/// G_u and G_v, in millimetres per radian; `along` is the edge, or else the normal of the epipolar plane.
+fn by_rays(
+    point: &Vector3<f64>,
+    right_centre: &Vector3<f64>,
+    along: Option<Vector3<f64>>,
+) -> Option<(Matrix3<f64>, Matrix3<f64>)> {
+    // The sine to the baseline below which the range is without bound for any purpose, and that of an edge to the epipolar
+    // plane as a part of the parallax.
+    const VANISHING: f64 = 1e-9;
     let from_right = point - right_centre;
     let (left_range, right_range) = (point.norm(), from_right.norm());
     let normal = right_centre.cross(point);
     let area = normal.norm();
-    if area.is_nan() || area <= ALONG_BASELINE * left_range * right_centre.norm() {
+    if area.is_nan() || area <= VANISHING * left_range * right_centre.norm() {
         return None;
     }
-    let (u, v, n) = (point / left_range, from_right / right_range, normal / area);
-    let parallax_sine = u.cross(&v).dot(&n);
-    let across = n * n.transpose() / 2.0;
-    let by_left = (v * n.cross(&u).transpose() / parallax_sine + across) * left_range;
-    let by_right = (u * n.cross(&v).transpose() / -parallax_sine + across) * right_range;
+    let (u, v, e) = (point / left_range, from_right / right_range, along.unwrap_or(normal / area));
+    let across = u.cross(&v);
+    let determinant = across.dot(&e);
+    if determinant.is_nan() || determinant.abs() <= VANISHING * across.norm() {
+        return None;
+    }
+    let mean = e * across.transpose() / 2.0;
+    let by_left = (v * e.cross(&u).transpose() + mean) * (left_range / determinant);
+    let by_right = (mean - u * e.cross(&v).transpose()) * (right_range / determinant);
     Some((by_left, by_right))
 }

@@ -1,4 +1,4 @@
-//! Lengths and angles as types, read and printed with their units.
+//! Lengths, angles and times as types, read and printed with their units.
 
 use std::fmt;
 use std::ops::{Add, Div, Mul, Neg, Sub};
@@ -62,6 +62,26 @@ impl Angle {
     }
 }
 
+/// A time between two events, of either sign. Made and read in named units; held in microseconds.
+#[derive(Clone, Copy, Debug, Default, PartialEq, PartialOrd)]
+pub struct Time {
+    us: f64,
+}
+
+impl Time {
+    /// A time of `us` microseconds.
+    #[must_use]
+    pub const fn from_us(us: f64) -> Self {
+        Self { us }
+    }
+
+    /// In microseconds.
+    #[must_use]
+    pub const fn us(self) -> f64 {
+        self.us
+    }
+}
+
 /// A text that is not a number followed by a known unit.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[error("'{text}' is not {expected}: write a number and its unit, such as {example}")]
@@ -111,6 +131,20 @@ impl FromStr for Angle {
     }
 }
 
+impl FromStr for Time {
+    type Err = InvalidQuantity;
+
+    /// Reads `15us`, `14.8 µs`, `30ns`, `-2ms` or `0.1s`. A bare number is refused.
+    fn from_str(text: &str) -> Result<Self, Self::Err> {
+        const UNITS: [(&str, f64); 5] = [("us", 1.0), ("µs", 1.0), ("ns", 1e-3), ("ms", 1e3), ("s", 1e6)];
+        parse_quantity(text, &UNITS).map(Self::from_us).ok_or_else(|| InvalidQuantity {
+            text: text.to_owned(),
+            expected: "a time",
+            example: "15us",
+        })
+    }
+}
+
 impl fmt::Display for Length {
     /// In millimetres, with the precision of the format (`{:.3}`).
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
@@ -124,6 +158,14 @@ impl fmt::Display for Angle {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         fmt::Display::fmt(&self.deg(), f)?;
         f.write_str("°")
+    }
+}
+
+impl fmt::Display for Time {
+    /// In microseconds, with the precision of the format (`{:.0}`).
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        fmt::Display::fmt(&self.us(), f)?;
+        f.write_str(" us")
     }
 }
 
@@ -163,3 +205,4 @@ macro_rules! linear_arithmetic {
 }
 linear_arithmetic!(Length, mm);
 linear_arithmetic!(Angle, rad);
+linear_arithmetic!(Time, us);

@@ -159,8 +159,17 @@ impl StageCalibration {
             left_chain: self.left_chain(),
             right_chain: self.right_chain(),
             calibration_sigma: self.largest_sigma(),
+            axes: drawn.axes.iter().enumerate().map(|(index, axis)| self.calibrated(index, axis)).collect(),
             ..drawn.clone()
         }
+    }
+
+    /// The axis, calibrated between the lowest and the highest reading of all stage poses.
+    fn calibrated(&self, index: usize, axis: &RigAxis) -> RigAxis {
+        let readings = self.poses.iter().filter_map(|pose| pose.readings.get(index)).map(|reading| reading.value());
+        let (low, high) = readings.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), x| (low.min(x), high.max(x)));
+        let calibrated = (low < high).then(|| [low, high].map(|value| AxisPosition::from_value(axis.kind, value)));
+        RigAxis { calibrated, ..axis.clone() }
     }
 
     /// The largest standard deviations of rotation and translation, along the worst direction, over [`grid`].

@@ -2,6 +2,8 @@
 
 use std::time::Duration;
 
+use vergence_rig::ExposureDelay;
+
 /// What the time stamp of a driver marks.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum StampedAt {
@@ -11,28 +13,56 @@ pub enum StampedAt {
     End,
 }
 
-/// Kernel time stamp, what it marks, and how long exposure and readout took.
+/// How long after a pulse a camera begins to expose, at most: nobody says, and sensors differ.
+const REACTION: Duration = Duration::from_millis(1);
+
+/// How a camera takes its frames.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Stamp {
-    /// On the monotonic clock.
-    pub at: Duration,
-    /// What it marks.
-    pub marks: StampedAt,
-    /// How long the sensor was exposed; zero where the camera does not say.
-    pub exposure: Duration,
-    /// Readout and transfer; a frame period where the camera does not say.
+pub struct FrameTiming {
+    /// From one frame to the next at its full rate.
+    pub period: Duration,
+    /// How long a row is exposed; `None` where the camera does not say: up to a period.
+    pub exposure: Option<Duration>,
+    /// From the exposure of the first row to that of the last; zero for a global shutter.
+    pub rolling: Duration,
+    /// From the end of the last row's exposure to the frame's end stamp, at most.
     pub readout: Duration,
 }
 
-impl Stamp {
-    /// The middle of the exposure on the same clock.
+/// An instant and how far it may be off.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct MiddleOfExposure {
+    /// Of the middle row, on the clock of the stamp.
+    pub at: Duration,
+    /// At most so far off.
+    pub error: Duration,
+}
+
+impl FrameTiming {
+    /// The middle of the middle row's exposure after the first row began to be exposed: at least, and at most.
+    fn middle_after_start(self) -> [Duration; 2] {
+        let exposure = self.exposure.map_or([Duration::ZERO, self.period], |known| [known; 2]);
+        exposure.map(|exposure| (exposure + self.rolling) / 2)
+    }
+
+    /// The middle of the exposure of a frame that is stamped `at`.
     #[must_use]
-    pub fn mid_exposure(&self) -> Duration {
-        match self.marks {
-            StampedAt::Start => self.at + self.exposure / 2,
+    pub fn middle(&self, at: Duration, marks: StampedAt) -> MiddleOfExposure {
+        let [least, most] = self.middle_after_start();
+        let (early, late) = match marks {
+            StampedAt::Start => (at + least, at + most),
             // The readout may overlap the next exposure but always follows its own.
-            StampedAt::End => self.at.saturating_sub(self.readout).saturating_sub(self.exposure / 2),
-        }
+            StampedAt::End => (at.saturating_sub(most + self.readout), at.saturating_sub(least)),
+        };
+        MiddleOfExposure { at: early + (late - early) / 2, error: (late - early) / 2 }
+    }
+
+    /// How long after its trigger pulse the middle of a frame's exposure lies.
+    #[must_use]
+    pub fn after_pulse(&self) -> ExposureDelay {
+        let [least, most] = self.middle_after_start();
+        let us = |time: Duration| time.as_secs_f64() * 1e6;
+        ExposureDelay { least_us: us(least), most_us: us(most + REACTION) }
     }
 }
 
@@ -68,9 +98,21 @@ mod tests {
     #[test]
     fn the_stamp_is_moved_to_mid_exposure() {
         let ms = Duration::from_millis;
-        let stamp = Stamp { at: ms(1000), marks: StampedAt::Start, exposure: ms(10), readout: ms(20) };
-        assert_eq!(stamp.mid_exposure(), ms(1005));
-        assert_eq!(Stamp { marks: StampedAt::End, ..stamp }.mid_exposure(), ms(975));
+        let timing = FrameTiming { period: ms(30), exposure: Some(ms(10)), rolling: ms(0), readout: ms(20) };
+        let middle = |timing: FrameTiming, marks| {
+            let MiddleOfExposure { at, error } = timing.middle(ms(1000), marks);
+            [at, error].map(|time| time.as_millis())
+        };
+        assert_eq!(middle(timing, StampedAt::Start), [1005, 0]);
+        // Between 975, where reading out took all of its time, and 995.
+        assert_eq!(middle(timing, StampedAt::End), [985, 10]);
+        let rolling = FrameTiming { rolling: ms(8), ..timing };
+        assert_eq!(middle(rolling, StampedAt::Start), [1009, 0]);
+        // A camera that does not say how long it exposes may do so for a whole period.
+        let automatic = FrameTiming { exposure: None, ..rolling };
+        assert_eq!(middle(automatic, StampedAt::Start), [1011, 7]);
+        let ExposureDelay { least_us, most_us } = rolling.after_pulse();
+        assert_eq!([least_us.round(), most_us.round()], [9_000.0, 10_000.0]);
     }
 
     #[test]

@@ -50,7 +50,7 @@ impl Camera for FileCamera {
     fn grab(&mut self) -> Result<Option<Frame>, Failure> {
         let Some(path) = self.files.pop_front() else { return Ok(None) };
         let name = path.file_stem().unwrap_or_default().to_string_lossy().into_owned();
-        Ok(Some(Frame { image: read_image(&path)?, name, exposed_at: None }))
+        Ok(Some(Frame { image: read_image(&path)?, name, seq: None, exposed_at: None }))
     }
 }
 

@@ -1,4 +1,4 @@
-//! Cameras: one trait for simulated ones, image files and folders.
+//! Cameras: one trait for attached and simulated ones, image files and folders.
 
 mod exposure;
 mod files;
@@ -6,14 +6,17 @@ mod jpeg;
 mod pixel_format;
 mod simulated;
 mod simulated_board;
+mod together;
 mod v4l;
 
 use image::RgbImage;
-use vergence_protocol::Microseconds;
+use vergence_rig::HostInstant;
 
+pub use exposure::{FrameTiming, StampedAt};
 pub use files::{FileCamera, read_image};
 pub use simulated::{Eye, SimulatedCamera, Stage};
 pub use simulated_board::{BoardStage, SimulatedBoardCamera};
+pub use together::{CameraSet, as_event, as_stamped, side_by_side};
 pub use v4l::{Settings as V4lSettings, V4lCamera};
 
 use crate::failure::Failure;
@@ -25,8 +28,11 @@ pub struct Frame {
     pub image: RgbImage,
     /// What to call it in messages and file names.
     pub name: String,
-    /// Middle of the exposure on the host's clock; `None` where nobody knows, as for a file.
-    pub exposed_at: Option<Microseconds>,
+    /// The camera's own number of it, lost ones counted; `None` where it does not count.
+    pub seq: Option<u32>,
+    /// Middle of the exposure of the middle row on the host's clock, and how far that may be off; `None` where nobody knows,
+    /// as for a file.
+    pub exposed_at: Option<HostInstant>,
 }
 
 /// A source of frames.
@@ -36,4 +42,9 @@ pub trait Camera: Send {
     /// # Errors
     /// Says which camera or file, and why.
     fn grab(&mut self) -> Result<Option<Frame>, Failure>;
+
+    /// How it takes its frames; `None` where it has no time, as a folder of files.
+    fn timing(&self) -> Option<FrameTiming> {
+        None
+    }
 }

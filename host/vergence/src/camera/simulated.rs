@@ -2,7 +2,8 @@
 
 use std::sync::Arc;
 
-use vergence_rig::RigPose;
+use nalgebra::{UnitQuaternion, Vector3};
+use vergence_rig::{HostInstant, RigPose};
 use vergence_scene::{Optics, Scene, View, render};
 use vergence_vision::{Base, Camera as CameraFrame, KannalaBrandt, Left, Transform, World};
 
@@ -50,6 +51,13 @@ pub struct SimulatedCamera {
 }
 
 impl Stage {
+    /// The fixed room; the middle of the bench at its nominal baseline of 145 mm stands in the middle of it.
+    #[must_use]
+    pub fn room() -> Self {
+        let middle = Vector3::new(-72.5, 0.0, 0.0);
+        Self { scene: Scene::room(), world_from_base: Transform::new(UnitQuaternion::identity(), middle) }
+    }
+
     /// Where the left camera of a rig pose is.
     #[must_use]
     pub fn world_from_left(&self, base_from_left: Transform<Base, Left>) -> Transform<World, Left> {
@@ -90,7 +98,8 @@ impl SimulatedCamera {
         Frame {
             image: photograph.image,
             name: format!("{:?}{}", self.eye, self.frames).to_lowercase(),
-            exposed_at: Some(self.clock.now()),
+            seq: u32::try_from(self.frames).ok(),
+            exposed_at: Some(HostInstant { us: self.clock.now().0 as f64, error_us: 0.0 }),
         }
     }
 }

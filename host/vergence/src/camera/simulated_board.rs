@@ -93,6 +93,7 @@ impl Camera for SimulatedBoardCamera {
         let seed = self.stage.seed.wrapping_mul(4).wrapping_add(self.frames * 2 + u64::from(self.eye == Eye::Right));
         let photograph = render(&View { scene: &scene, camera, world_from_camera, optics: &optics }, seed);
         self.frames += 1;
-        Ok(Some(Frame { image: photograph.image, name: format!("frame{:06}", self.frames), exposed_at: None }))
+        let name = format!("frame{:06}", self.frames);
+        Ok(Some(Frame { image: photograph.image, name, seq: None, exposed_at: None }))
     }
 }

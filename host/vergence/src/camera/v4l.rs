@@ -12,9 +12,9 @@ use moq_v4l::io::traits::CaptureStream;
 use moq_v4l::video::Capture;
 use moq_v4l::{Device, Format, FourCC};
 use rustix::time::{ClockId, clock_gettime};
-use vergence_protocol::Microseconds;
+use vergence_rig::HostInstant;
 
-use super::exposure::{SequenceWatch, Stamp, StampedAt};
+use super::exposure::{FrameTiming, MiddleOfExposure, SequenceWatch, StampedAt};
 use super::pixel_format::PixelFormat;
 use super::{Camera, Frame};
 use crate::failure::Failure;
@@ -44,6 +44,10 @@ pub struct Settings {
     pub exposure: Option<Duration>,
     /// Gain in the camera's own unit.
     pub gain: Option<i64>,
+    /// From the exposure of the first row to that of the last; zero for a global shutter.
+    pub rolling: Duration,
+    /// Reading out and sending a frame takes so long at most; absent: a frame period.
+    pub readout: Option<Duration>,
 }
 
 /// One camera.
@@ -54,8 +58,7 @@ pub struct V4lCamera {
     device: Device,
     pixels: PixelFormat,
     format: Format,
-    period: Duration,
-    exposure: Duration,
+    timing: FrameTiming,
     watch: SequenceWatch,
     clock: HostClock,
 }
@@ -79,14 +82,19 @@ impl V4lCamera {
         if let Some(gain) = settings.gain {
             set(&device, CID_GAIN, gain).map_err(fail)?;
         }
-        let exposure = read_exposure(&device);
         let period = frame_period(&device);
+        let timing = FrameTiming {
+            period,
+            exposure: read_exposure(&device),
+            rolling: settings.rolling,
+            readout: settings.readout.unwrap_or(period),
+        };
         let mut stream = Stream::with_buffers(&device, Type::VideoCapture, 4).map_err(fail)?;
         stream.set_timeout(SILENCE);
         let watch = SequenceWatch::default();
         let path = path.to_owned();
         let stream = ManuallyDrop::new(stream);
-        Ok(Self { path, stream, device, pixels, format, period, exposure, watch, clock })
+        Ok(Self { path, stream, device, pixels, format, timing, watch, clock })
     }
 
     /// How many frames the driver dropped.
@@ -101,12 +109,12 @@ impl V4lCamera {
         self.device.query_caps().map(|caps| caps.card).unwrap_or_default()
     }
 
-    /// The host clock's instant of a kernel time stamp.
-    fn host_instant(&self, monotonic: Duration) -> Microseconds {
+    /// The host clock's instant of one on the kernel's monotonic clock.
+    fn host_instant(&self, middle: MiddleOfExposure) -> HostInstant {
         let now = clock_gettime(ClockId::Monotonic);
-        let now_us = now.tv_sec * 1_000_000 + now.tv_nsec / 1000;
-        let age = now_us - i64::try_from(monotonic.as_micros()).unwrap_or(now_us);
-        Microseconds(self.clock.now().0.saturating_add_signed(-age))
+        let now_us = now.tv_sec as f64 * 1e6 + now.tv_nsec as f64 * 1e-3;
+        let age_us = now_us - middle.at.as_secs_f64() * 1e6;
+        HostInstant { us: self.clock.now().0 as f64 - age_us, error_us: middle.error.as_secs_f64() * 1e6 }
     }
 }
 
@@ -118,6 +126,10 @@ impl Camera for V4lCamera {
             }
         }
         Err(Failure::device(format!("camera {} sends only damaged frames: check its cable", self.path.display())))
+    }
+
+    fn timing(&self) -> Option<FrameTiming> {
+        Some(self.timing)
     }
 }
 
@@ -134,12 +146,12 @@ impl V4lCamera {
         })?;
         self.watch.note(meta.sequence);
         let marks = if meta.flags.contains(Flags::TSTAMP_SRC_SOE) { StampedAt::Start } else { StampedAt::End };
-        let stamp = Stamp { at: meta.timestamp.into(), marks, exposure: self.exposure, readout: self.period };
         let whole = image.filter(|_| !meta.flags.contains(Flags::ERROR));
         Ok(whole.map(|image| Frame {
             image,
             name: format!("frame{:06}", meta.sequence),
-            exposed_at: Some(self.host_instant(stamp.mid_exposure())),
+            seq: Some(meta.sequence),
+            exposed_at: Some(self.host_instant(self.timing.middle(meta.timestamp.into(), marks))),
         }))
     }
 }
@@ -173,13 +185,15 @@ fn set(device: &Device, id: u32, value: i64) -> io::Result<()> {
     device.set_control(Control { id, value: Value::Integer(value) })
 }
 
-fn read_exposure(device: &Device) -> Duration {
-    match device.control(CID_EXPOSURE_ABSOLUTE) {
-        Ok(Control { value: Value::Integer(units), .. }) => {
-            Duration::from_micros(u64::try_from(units).unwrap_or(0) * EXPOSURE_UNIT_US)
-        }
-        _ => Duration::ZERO,
-    }
+/// `None` where the camera does not say, or chooses it by itself.
+fn read_exposure(device: &Device) -> Option<Duration> {
+    let number = |id| match device.control(id) {
+        Ok(Control { value: Value::Integer(value), .. }) => Some(value),
+        _ => None,
+    };
+    let manual = number(CID_EXPOSURE_AUTO).is_none_or(|mode| mode == EXPOSURE_MANUAL);
+    let units = number(CID_EXPOSURE_ABSOLUTE).filter(|&units| manual && units > 0)?;
+    Some(Duration::from_micros(u64::try_from(units).ok()? * EXPOSURE_UNIT_US))
 }
 
 fn frame_period(device: &Device) -> Duration {

@@ -10,7 +10,7 @@ use vergence_vision::ImageSize;
 use super::board_options::BoardOptions;
 use super::camera_options::CameraOptions;
 use crate::board_watch::{BoardWatch, NAMES, seen};
-use crate::camera::{BoardStage, Camera, Eye, Frame, SimulatedBoardCamera};
+use crate::camera::{BoardStage, Camera, CameraSet, Eye, Frame, SimulatedBoardCamera};
 use crate::cli::Globals;
 use crate::console::Console;
 use crate::failure::Failure;
@@ -48,17 +48,14 @@ pub struct Args {
 
 pub fn run(args: &Args, globals: &Globals, console: Console) -> Result<(), Failure> {
     let board = args.board.spec()?;
-    let mut cameras = open(args, globals, &board)?;
+    let mut cameras = CameraSet::new(open(args, globals, &board)?);
     make_folder(&args.out)?;
     let mut watch = BoardWatch::new(Vec::new());
     let progress = console.progress("show the board");
     let advice = |watch: &BoardWatch| watch.advice().unwrap_or_else(|| "the set is complete".into());
     let mut frames_seen = 0;
     while watch.taken() < args.views && frames_seen < args.frames && !watch.is_complete() {
-        let mut frames = Vec::new();
-        for camera in &mut cameras {
-            frames.push(camera.grab()?.ok_or_else(|| Failure::device("a camera ended"))?);
-        }
+        let frames = cameras.grab()?;
         if frames_seen == 0 {
             watch = BoardWatch::new(frames.iter().map(|frame| Coverage::new(size(frame))).collect());
         }
@@ -84,7 +81,16 @@ pub fn run(args: &Args, globals: &Globals, console: Console) -> Result<(), Failu
         args.out.display(),
         if complete { "; the set is complete" } else { "; the set is not complete" }
     ))?;
-    console.result(&json!({ "views": watch.taken(), "frames": frames_seen, "complete": complete, "out": args.out }))
+    if cameras.alone() > 0 {
+        console.say(format!("{} frames had no partner of the other camera taken at the same time", cameras.alone()))?;
+    }
+    console.result(&json!({
+        "views": watch.taken(),
+        "frames": frames_seen,
+        "frames_alone": cameras.alone(),
+        "complete": complete,
+        "out": args.out,
+    }))
 }
 
 fn size(frame: &Frame) -> ImageSize {

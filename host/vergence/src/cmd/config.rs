@@ -17,6 +17,9 @@ use crate::setting_text::{NamedSetting, settings};
 
 /// Reads and changes what the board knows of its axes and its link. The board checks every value beside all others, and
 /// changes nothing while it is armed.
+///
+/// `stream_period` is how often the board sends its pose, 1ms to 10s or 0s for never, from the next session on. Every verb
+/// takes it as it is; one that must follow the board more closely than every 100ms asks for more while it runs, and says so.
 #[derive(Debug, clap::Args)]
 pub struct Args {
     #[command(subcommand)]

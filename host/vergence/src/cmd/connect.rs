@@ -19,7 +19,16 @@ const SIM_SEED: u64 = 1;
 /// # Errors
 /// No board, a board of another protocol or rig, a bad rig file.
 pub async fn connect(globals: &Globals, console: Console, what: &str) -> Result<Board, Failure> {
-    connect_with(globals, console.progress(what)).await
+    let board = connect_with(globals, console.progress(what)).await?;
+    Ok(noted(board, console))
+}
+
+/// Says where the board had to be asked for more than it is set to.
+fn noted(board: Board, console: Console) -> Board {
+    if let Some(note) = board.stream_note() {
+        console.warn(note);
+    }
+    board
 }
 
 /// The same, with another sign of progress.
@@ -37,7 +46,8 @@ pub async fn connect_with(globals: &Globals, progress: ProgressBar) -> Result<Bo
 /// No board, a board of another protocol, a bad rig file.
 pub async fn connect_any(globals: &Globals, console: Console, what: &str) -> Result<Board, Failure> {
     let (client, rig) = client(globals).await?;
-    Board::open(client, rig, globals.lease, console.progress(what)).await
+    let board = Board::open(client, rig, globals.lease, console.progress(what)).await?;
+    Ok(noted(board, console))
 }
 
 async fn client(globals: &Globals) -> Result<(Client, Rig), Failure> {

@@ -1,15 +1,17 @@
 //! `vergence depth`: a cloud from photographs.
 
 mod dense;
+mod motion;
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 use serde_json::{Value, json};
 use vergence_matching::Matcher;
-use vergence_rig::{Rig, RigPose};
+use vergence_rig::{PairExposure, Rig, RigPose, SteadyMotion};
 use vergence_vision::{ImageSize, Kernel, Pixel, PixelPair};
 
+use self::motion::StageSpeed;
 use super::move_to::StagePose;
 use super::report::rounded;
 use crate::board::check_range;
@@ -17,9 +19,9 @@ use crate::camera::{Camera, FileCamera, Frame};
 use crate::cli::Globals;
 use crate::console::Console;
 use crate::failure::Failure;
-use crate::look::{Eyes, Look, look_by, triangulate};
+use crate::look::{Eyes, Look, look_by, look_exposed, triangulate};
 use crate::models::MatcherOptions;
-use crate::output::{make_folder, ply, write_whole};
+use crate::output::{Table, TableFormat, make_folder, ply, write_whole};
 use crate::rig_file;
 
 /// Matches two photographs (or two folders of them, paired in the order of their names) taken by the cameras of the rig
@@ -49,8 +51,13 @@ pub struct Args {
     /// range (mm, 16 bits; 0 none, 65535 too far), sigma (0.1 mm), confidence (of 255) and a preview.
     #[arg(long, conflicts_with_all = ["points", "kernel", "matcher"])]
     dense: bool,
+    /// Write the points as tables too, beside the cloud.
+    #[arg(long, value_delimiter = ',', value_name = "FORMAT")]
+    also: Vec<TableFormat>,
     #[command(flatten)]
     stage: StagePose,
+    #[command(flatten)]
+    speed: StageSpeed,
     #[command(flatten)]
     matching: MatcherOptions,
 }
@@ -58,6 +65,10 @@ pub struct Args {
 pub fn run(args: &Args, globals: &Globals, console: Console) -> Result<(), Failure> {
     let rig = rig_file::load(globals.rig.as_deref())?;
     let pose = pose(args, &rig)?;
+    for sentence in rig.extrapolations(&pose.axes) {
+        console.warn(sentence);
+    }
+    let motion = args.speed.motion(&rig, &pose.axes)?;
     let pairs = args.points.as_deref().map(read_pairs).transpose()?;
     let (mut left, mut right) = (FileCamera::open(&args.left)?, FileCamera::open(&args.right)?);
     if left.remaining() != right.remaining() {
@@ -83,11 +94,16 @@ pub fn run(args: &Args, globals: &Globals, console: Console) -> Result<(), Failu
             results.push(result);
             continue;
         };
-        let how = How { pairs: pairs.as_deref(), matcher: matcher.as_ref(), kernel: args.kernel };
+        let how =
+            How { pairs: pairs.as_deref(), matcher: matcher.as_ref(), kernel: args.kernel, motion: motion.as_ref() };
         let look = one_pair([&left, &right], &rig, &pose, how)?;
         work.finish_and_clear();
         let out = out_of(args, &left)?;
         write_whole(&out, ply(&look.points).as_bytes())?;
+        for format in &args.also {
+            let table = Table::of_points(&look.points).text(*format);
+            write_whole(&out.with_extension(format.extension()), table.as_bytes())?;
+        }
         console.say(format!("{} points in {}{}", look.points.len(), out.display(), in_words(&look.dropped)))?;
         if let Some(warning) = look.warning() {
             console.say(format!("warning: {warning}"))?;
@@ -135,16 +151,20 @@ struct How<'a> {
     pairs: Option<&'a [PixelPair]>,
     matcher: &'a dyn Matcher,
     kernel: Kernel,
+    motion: Option<&'a (SteadyMotion, PairExposure)>,
 }
 
 fn one_pair([left, right]: [&Frame; 2], rig: &Rig, pose: &RigPose, how: How<'_>) -> Result<Look, Failure> {
     check_size(left, rig.left_camera.size(), "left")?;
     check_size(right, rig.right_camera.size(), "right")?;
     let eyes = Eyes { left: &left.image, right: &right.image };
-    match how.pairs {
-        Some(pairs) => Ok(triangulate(pairs, eyes, rig, pose, how.kernel)),
-        None => look_by(how.kernel, eyes, rig, pose, how.matcher)
-            .map_err(|error| Failure::usage(format!("{} and {}: {error}", left.name, right.name))),
+    let fail = |error: &dyn std::fmt::Display| Failure::usage(format!("{} and {}: {error}", left.name, right.name));
+    match (how.pairs, how.motion) {
+        (Some(pairs), _) => Ok(triangulate(pairs, eyes, rig, pose, how.kernel)),
+        (None, Some((motion, exposure))) => {
+            look_exposed(eyes, rig, motion, exposure, how.matcher).map(|(look, _)| look).map_err(|error| fail(&error))
+        }
+        (None, None) => look_by(how.kernel, eyes, rig, pose, how.matcher).map_err(|error| fail(&error)),
     }
 }
 

@@ -5,7 +5,7 @@ mod camera_options;
 mod connect;
 mod link_figures;
 mod reconnect;
-mod report;
+pub mod report;
 
 pub mod arm;
 pub mod bench;
@@ -30,6 +30,7 @@ pub mod models;
 pub mod monitor;
 pub mod move_to;
 pub mod plan;
+pub mod run;
 pub mod sim;
 pub mod soak;
 pub mod status;

@@ -33,7 +33,7 @@ pub struct Args {
     duration: Option<Duration>,
 }
 
-fn parse_rate(text: &str) -> Result<f64, String> {
+pub fn parse_rate(text: &str) -> Result<f64, String> {
     let rate = text.parse().ok().filter(|rate| (0.1..=500.0).contains(rate));
     rate.ok_or_else(|| format!("'{text}' is no rate: choose 0.1 to 500 pulses each second"))
 }

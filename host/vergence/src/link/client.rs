@@ -1,7 +1,6 @@
 //! The client: a task that owns the wire and the protocol session, and a handle that asks it for things.
 
 use std::collections::BTreeMap;
-use std::sync::{Arc, Mutex, MutexGuard};
 use std::time::Duration;
 
 use tokio::io::{AsyncReadExt, AsyncWriteExt};
@@ -11,14 +10,13 @@ use vergence_protocol::{
     Compatibility, FrameMark, HostEvent, HostSession, HostStatistics, MAX_FRAME, Microseconds, PoseReport, Report,
     Request, SessionId, Ticket,
 };
-use vergence_rig::{ClockMap, Exchange, JointSample, JointTrack};
+use vergence_rig::{ClockMap, Exchange, JointSample};
 
 use super::clock::HostClock;
 use super::error::LinkError;
+use super::knowledge::BoardKnowledge;
 use super::open::OpenWire;
 
-/// How often the board is asked to send its pose.
-pub const STREAM_PERIOD_US: u32 = 10_000;
 /// How long the board may take to answer the first Hello.
 const HELLO_TIMEOUT: Duration = Duration::from_secs(2);
 /// How long a request may take, retransmissions included.
@@ -32,22 +30,12 @@ const FAST_PROBES: u32 = 10;
 const MARKS_KEPT: usize = 2_048;
 /// Pieces of log that may wait to be taken: more than the board keeps.
 const LOGS_KEPT: usize = 256;
-/// Half a minute of poses.
-const TRACK_LENGTH: usize = 3_000;
 
 enum Command {
     /// Sent reliably; the reply comes back.
     Ask { request: Request, reply: oneshot::Sender<Result<Report, LinkError>> },
     /// Heartbeats from now on, with this lease; zero ends them.
     Hold { lease_ms: u16 },
-}
-
-/// What the task learns and the handle reads.
-#[derive(Debug)]
-struct Learned {
-    clock_map: ClockMap,
-    track: JointTrack,
-    statistics: HostStatistics,
 }
 
 /// A handle to an open session. Dropping it closes the link.
@@ -57,7 +45,7 @@ pub struct Client {
     marks: mpsc::Receiver<FrameMark>,
     logs: mpsc::Receiver<Vec<u8>>,
     end: watch::Receiver<Option<LinkError>>,
-    learned: Arc<Mutex<Learned>>,
+    learned: BoardKnowledge,
     clock: HostClock,
     session: SessionId,
     compatibility: Compatibility,
@@ -75,11 +63,7 @@ impl Client {
         let (log_sender, logs) = mpsc::channel(LOGS_KEPT);
         let (end_sender, end) = watch::channel(None);
         let (opened_sender, opened) = oneshot::channel();
-        let learned = Arc::new(Mutex::new(Learned {
-            clock_map: wire.baud.map_or_else(ClockMap::default, ClockMap::at_baud),
-            track: JointTrack::new(TRACK_LENGTH),
-            statistics: HostStatistics::default(),
-        }));
+        let learned = BoardKnowledge::new(wire.baud);
         let task = LinkTask {
             session: HostSession::new(session),
             clock,
@@ -89,7 +73,7 @@ impl Client {
             logs: log_sender,
             opened: Some(opened_sender),
             waiting: BTreeMap::new(),
-            learned: Arc::clone(&learned),
+            learned: learned.clone(),
             heartbeat: None,
             next_probe: Microseconds(0),
             probes: 0,
@@ -183,32 +167,33 @@ impl Client {
         }
     }
 
+    /// The pulses of the camera trigger, for whoever listens beside the one who moves; [`Self::next_mark`] hears none from
+    /// then on.
+    pub fn take_marks(&mut self) -> mpsc::Receiver<FrameMark> {
+        std::mem::replace(&mut self.marks, mpsc::channel(1).1)
+    }
+
+    /// What the link has learned of the board's time and motion, for whoever listens beside the one who moves.
+    #[must_use]
+    pub fn knowledge(&self) -> BoardKnowledge {
+        self.learned.clone()
+    }
+
     /// The latest clock map.
     #[must_use]
     pub fn clock_map(&self) -> ClockMap {
-        lock(&self.learned).clock_map.clone()
-    }
-
-    /// The encoder stream so far.
-    #[must_use]
-    pub fn track(&self) -> JointTrack {
-        lock(&self.learned).track.clone()
+        self.learned.clock_map()
     }
 
     /// How the link has been since it was opened.
     #[must_use]
     pub fn statistics(&self) -> HostStatistics {
-        lock(&self.learned).statistics
+        self.learned.statistics()
     }
 
     fn why_ended(&self) -> LinkError {
         self.end.borrow().clone().unwrap_or(LinkError::SessionLost)
     }
-}
-
-/// A poisoned lock only means that another thread panicked; the data is whole.
-fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
-    mutex.lock().unwrap_or_else(std::sync::PoisonError::into_inner)
 }
 
 struct LinkTask {
@@ -220,7 +205,7 @@ struct LinkTask {
     logs: mpsc::Sender<Vec<u8>>,
     opened: Option<oneshot::Sender<Result<Compatibility, LinkError>>>,
     waiting: BTreeMap<Ticket, oneshot::Sender<Result<Report, LinkError>>>,
-    learned: Arc<Mutex<Learned>>,
+    learned: BoardKnowledge,
     /// The lease, and when the next heartbeat is due.
     heartbeat: Option<(u16, Microseconds)>,
     next_probe: Microseconds,
@@ -317,7 +302,7 @@ impl LinkTask {
             self.probes = self.probes.saturating_add(1);
             self.next_probe = Microseconds(now.0 + period);
             if self.session.send_now(Request::TimeProbe { t0: now }).is_ok() {
-                lock(&self.learned).clock_map.probe_sent();
+                self.learned.probe_sent();
             }
         }
     }
@@ -350,7 +335,7 @@ impl LinkTask {
         let now = self.clock.now();
         let mut events = Vec::new();
         self.session.receive(now, bytes, |event| events.push(event));
-        lock(&self.learned).statistics = self.session.statistics();
+        self.learned.note_statistics(self.session.statistics());
         for event in events {
             match event {
                 HostEvent::Opened { compatibility, .. } => {
@@ -376,11 +361,11 @@ impl LinkTask {
     fn note(&mut self, now: Microseconds, report: Report) {
         match report {
             Report::Pose(pose) => {
-                lock(&self.learned).track.push(JointSample { at: pose.at, counts: pose.counts.clone() });
+                self.learned.note_joints(JointSample { at: pose.at, counts: pose.counts.clone() });
                 self.poses.send_replace(Some(pose));
             }
             Report::TimeReply { t0, t1, t2 } => {
-                lock(&self.learned).clock_map.observe(Exchange { t0, t1, t2, t3: now });
+                self.learned.note_exchange(Exchange { t0, t1, t2, t3: now });
             }
             // Numbered: who does not take them in time sees which are missing.
             Report::FrameMark(mark) => drop(self.marks.try_send(mark)),

@@ -7,6 +7,7 @@ mod depth_field_svg;
 mod picture;
 mod ply;
 mod range_scale;
+mod table;
 mod text;
 mod zones_plot;
 mod zones_svg;
@@ -21,6 +22,7 @@ pub use dense_ply::{DenseRow, dense_ply};
 pub use depth_field_svg::depth_field_svg;
 pub use picture::{DepthPicture, depth_picture, match_picture};
 pub use ply::ply;
+pub use table::{Table, TableFormat};
 pub use zones_plot::{ZonesOf, zones_plot};
 pub use zones_svg::zones_svg;
 

@@ -7,7 +7,8 @@ use crate::look::ColouredPoint;
 /// What the columns are, a line of every header.
 pub const COLUMNS_COMMENT: &str = "comment millimetres in the left camera's frame: x right, y down, z forward\n";
 
-/// The points in the left camera's frame, in millimetres, with colour, pixels in both images and sigma of the range.
+/// The points in the left camera's frame, in millimetres, with colour, pixels in both images, sigma of the range, and the
+/// matcher's score.
 #[must_use]
 pub fn ply(points: &[ColouredPoint]) -> String {
     let mut text = format!(
@@ -16,16 +17,16 @@ pub fn ply(points: &[ColouredPoint]) -> String {
          property double x\nproperty double y\nproperty double z\n\
          property uchar red\nproperty uchar green\nproperty uchar blue\n\
          property double u_left\nproperty double v_left\nproperty double u_right\nproperty double v_right\n\
-         property double sigma_range\nend_header\n",
+         property double sigma_range\nproperty float score\nend_header\n",
         points.len()
     );
-    for ColouredPoint { point, colour: [red, green, blue] } in points {
+    for ColouredPoint { point, colour: [red, green, blue], score } in points {
         let p = point.point.mm();
         let (left, right) = (point.pixels.left, point.pixels.right);
         // Writing to a String does not fail.
         let _ = writeln!(
             text,
-            "{:.4} {:.4} {:.4} {red} {green} {blue} {:.4} {:.4} {:.4} {:.4} {:.4}",
+            "{:.4} {:.4} {:.4} {red} {green} {blue} {:.4} {:.4} {:.4} {:.4} {:.4} {score:.4}",
             p.x,
             p.y,
             p.z,

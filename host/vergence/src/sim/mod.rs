@@ -3,6 +3,7 @@
 
 mod built;
 mod chip;
+mod history;
 mod pace;
 mod rig;
 mod serve;
@@ -10,6 +11,7 @@ mod served;
 
 pub use built::built;
 pub use chip::SimulatedChip;
-pub use rig::{SharedRig, SimulatedRig};
+pub use history::LoadHistory;
+pub use rig::{Pulse, SharedRig, SimulatedRig};
 pub use serve::{Listener, serve, spawn_in_process};
 pub use served::{Served, Shared};

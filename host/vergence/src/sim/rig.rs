@@ -1,5 +1,6 @@
 //! A board and its mechanics that know which rig they are.
 
+use std::collections::VecDeque;
 use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
 
@@ -9,6 +10,7 @@ use vergence_plant::{NativeBoard, Stage};
 use vergence_protocol::{AxisKind, Microseconds, ResetCause};
 use vergence_rig::{Rig, RigAxis, RigPose};
 
+use super::history::LoadHistory;
 use super::pace::Pace;
 use super::served::{Served, Shared};
 use crate::failure::Failure;
@@ -34,7 +36,22 @@ pub struct SimulatedRig {
     boot: u32,
     output: Vec<u8>,
     flash: Option<FlashFile>,
+    history: LoadHistory,
+    /// The last pulses of the camera trigger.
+    pulses: VecDeque<Pulse>,
 }
+
+/// A pulse of the camera trigger.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Pulse {
+    /// How many there were before it, since power on.
+    pub number: u32,
+    /// Its edge, board clock.
+    pub at: Microseconds,
+}
+
+/// Pulses that are remembered.
+const PULSES_KEPT: usize = 256;
 
 /// Where the settings outlive the simulator, as flash outlives the power.
 #[derive(Debug)]
@@ -71,6 +88,8 @@ impl SimulatedRig {
             boot: FIRST_BOOT,
             output: Vec::new(),
             flash: None,
+            history: LoadHistory::default(),
+            pulses: VecDeque::new(),
         })
     }
 
@@ -131,7 +150,46 @@ impl SimulatedRig {
         while self.board.now().0 < until {
             self.board.advance(Microseconds(until.min(self.board.now().0 + TICK_US)));
             self.output.append(&mut self.board.transmit());
+            self.remember();
         }
+    }
+
+    /// Keeps what cameras on the mechanics may ask for.
+    fn remember(&mut self) {
+        let plant = self.board.plant();
+        self.history.push(self.board.now(), plant.loads());
+        let Some((at, _)) = plant.exposed() else { return };
+        if self.pulses.back().is_some_and(|last| last.at == at) {
+            return;
+        }
+        let number = self.pulses.back().map_or(0, |last| last.number.wrapping_add(1));
+        if self.pulses.len() == PULSES_KEPT {
+            self.pulses.pop_front();
+        }
+        self.pulses.push_back(Pulse { number, at });
+    }
+
+    /// The remembered pulses of the camera trigger from number `first` on.
+    pub fn pulses_from(&self, first: u32) -> impl Iterator<Item = Pulse> {
+        self.pulses.iter().copied().filter(move |pulse| pulse.number >= first)
+    }
+
+    /// Where the mechanics truly were during the last second.
+    #[must_use]
+    pub const fn history(&self) -> &LoadHistory {
+        &self.history
+    }
+
+    /// What the board's clock shows.
+    #[must_use]
+    pub fn now(&self) -> Microseconds {
+        self.board.now()
+    }
+
+    /// The rig that is simulated.
+    #[must_use]
+    pub const fn rig(&self) -> &Rig {
+        &self.rig
     }
 
     /// Gives bytes of the host to the board, now.

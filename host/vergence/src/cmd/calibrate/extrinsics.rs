@@ -53,7 +53,7 @@ pub struct Args {
 pub fn run(args: &Args, console: Console) -> Result<(), Failure> {
     args.result.check()?;
     let mut hash = InputHash::default();
-    let KnownLenses { left, right, knowledge } = args.lenses.read(&mut hash)?.ok_or_else(|| {
+    let KnownLenses { left, right, shutters, knowledge } = args.lenses.read(&mut hash)?.ok_or_else(|| {
         Failure::usage("name the camera files with --left and --right: vergence calibrate intrinsics makes them")
     })?;
     let views = views(args, (&left, &right), &mut hash, console)?;
@@ -71,7 +71,9 @@ pub fn run(args: &Args, console: Console) -> Result<(), Failure> {
     held_out.as_ref().map_or(Ok(()), |held_out| check_held_out(held_out, calibration.rms_inlier_px))?;
     let verdict = extrinsics_verdict(&calibration, &views);
     let provenance = args.result.provenance(hash);
-    let rig = rig(&calibration, &args.result.name("pair")).to_toml(&provenance).map_err(Failure::check)?;
+    let rig = Rig { shutters, ..rig(&calibration, &args.result.name("pair")) }
+        .to_toml(&provenance)
+        .map_err(Failure::check)?;
     args.result.write(&rig, || {
         let about = about(args.result.name("Pair"), &args.board, &provenance, None);
         extrinsics_report(&calibration, &views, &ReportAbout { held_out: held_out.clone(), ..about })

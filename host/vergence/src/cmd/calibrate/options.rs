@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use nalgebra::SMatrix;
 use serde_json::{Value, json};
 use vergence_calibration::{LensKnowledge, Validation, Verdict};
-use vergence_rig::Provenance;
+use vergence_rig::{Provenance, Shutter};
 use vergence_vision::KannalaBrandt;
 
 use crate::camera_files::{self, CameraFile};
@@ -40,6 +40,8 @@ enum Lenses {
 pub struct KnownLenses {
     pub left: KannalaBrandt,
     pub right: KannalaBrandt,
+    /// How they expose their rows, as far as the files say.
+    pub shutters: [Shutter; 2],
     pub knowledge: LensKnowledge,
 }
 
@@ -58,7 +60,8 @@ impl LensOptions {
             Lenses::Free => LensKnowledge::Free,
             Lenses::Known => LensKnowledge::within(covariance(left, &files.0)?, covariance(right, &files.1)?),
         };
-        Ok(Some(KnownLenses { left: files.0.cameras.left, right: files.1.cameras.left, knowledge }))
+        let shutters = [&files.0, &files.1].map(CameraFile::shutter);
+        Ok(Some(KnownLenses { left: files.0.cameras.left, right: files.1.cameras.left, shutters, knowledge }))
     }
 
     /// What is known of lenses that come from elsewhere than camera files.

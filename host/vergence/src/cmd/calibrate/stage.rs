@@ -74,8 +74,8 @@ pub async fn run(args: &Args, globals: &Globals, console: Console) -> Result<(),
         hash.add(path)?;
     }
     let (drawn, knowledge) = match args.lenses.read(&mut hash)? {
-        Some(KnownLenses { left, right, knowledge }) => {
-            (Rig { left_camera: left, right_camera: right, ..drawn }, knowledge)
+        Some(KnownLenses { left, right, shutters, knowledge }) => {
+            (Rig { left_camera: left, right_camera: right, shutters, ..drawn }, knowledge)
         }
         None => (drawn, args.lenses.without_files()?),
     };

@@ -3,12 +3,11 @@
 use std::sync::Arc;
 
 use image::RgbImage;
-use nalgebra::{UnitQuaternion, Vector3};
 use vergence_matching::GuidedMatcher;
 use vergence_protocol::FrameMark;
-use vergence_rig::{JointsAt, RigPose, StampedFrame, TriggerDelay, pair_frames};
-use vergence_scene::{Optics, Scene};
-use vergence_vision::{Base, KannalaBrandt, Left, Length, Pixel, Transform, World, Zones};
+use vergence_rig::{ExposureDelay, Fate, FramePairing, JointsAt, RigPose, StampedFrame, TimedEvent};
+use vergence_scene::Optics;
+use vergence_vision::{KannalaBrandt, Left, Length, Pixel, Transform, World, Zones};
 
 use super::score::{Score, score};
 use crate::board::Board;
@@ -21,7 +20,7 @@ use crate::sim::SharedRig;
 use crate::stopwatch::Stopwatch;
 
 /// A simulated frame is stamped as soon as the host knows of its pulse.
-const DELAY: TriggerDelay = TriggerDelay { least_us: 0, most_us: 50_000 };
+const DELAY: ExposureDelay = ExposureDelay { least_us: 0.0, most_us: 50_000.0 };
 
 /// The two simulated cameras in their room.
 pub struct SimulatedEyes {
@@ -53,10 +52,7 @@ pub struct View {
 impl SimulatedEyes {
     /// Two cameras that ride on `simulated`, in the fixed room.
     pub fn new(rig: &vergence_rig::Rig, simulated: &SharedRig, clock: HostClock, seed: u64) -> Self {
-        // The middle of the bench at its nominal baseline of 145 mm stands in the middle of the room.
-        let middle = Vector3::new(-72.5, 0.0, 0.0);
-        let world_from_base = Transform::<World, Base>::new(UnitQuaternion::identity(), middle);
-        let stage = Arc::new(Stage { scene: Scene::room(), world_from_base });
+        let stage = Arc::new(Stage::room());
         let camera = |eye, lens| SimulatedCamera {
             eye,
             lens,
@@ -141,11 +137,14 @@ impl View {
 /// The rig's pose when `frame` was exposed: where the encoders were at the edge of the pulse that fired it.
 fn pose_of(frame: &Frame, mark: &FrameMark, board: &Board) -> Result<RigPose, Failure> {
     let unknown = |why: &dyn std::fmt::Display| Failure::device(format!("the pose at the exposure is unknown: {why}"));
-    let at = frame.exposed_at.ok_or_else(|| unknown(&"the frame has no time stamp"))?;
-    let (frames, marks) = ([StampedFrame { seq: 0, at }], std::slice::from_ref(mark));
-    let pairing = pair_frames(&frames, marks, &board.client().clock_map(), DELAY).map_err(|error| unknown(&error))?;
-    if pairing.pairs.is_empty() {
-        return Err(unknown(&"the frame belongs to no pulse"));
+    let middle = frame.exposed_at.ok_or_else(|| unknown(&"the frame has no time stamp"))?;
+    let at = board.client().clock_map().host_at(mark.at).ok_or_else(|| unknown(&"the clocks were not compared"))?;
+    // Fired one by one.
+    let mut pairing = FramePairing::new(DELAY, f64::INFINITY);
+    pairing.event(TimedEvent { seq: mark.seq, at });
+    pairing.frame(StampedFrame { seq: 0, middle });
+    match pairing.take() {
+        Some(Fate::Paired { .. }) => Ok(board.rig().pose(&JointsAt::latched(&mark.counts))),
+        _ => Err(unknown(&"the frame belongs to no pulse")),
     }
-    Ok(board.rig().pose(&JointsAt::latched(&mark.counts)))
 }

@@ -1,0 +1,65 @@
+//! Photographs taken while the stages moved evenly.
+
+use vergence_rig::{AxisPosition, BoardInstant, JointsAt, PairExposure, Rig, SteadyMotion};
+use vergence_vision::{Angle, Length};
+
+use crate::failure::Failure;
+use crate::live::pair_exposure;
+
+/// How fast the stages moved while the photographs were taken. It matters where the rig file says that a camera exposes row
+/// after row (`line_time`).
+#[derive(Clone, Copy, Debug, clap::Args)]
+pub struct StageSpeed {
+    /// How fast the baseline grew, such as 80mm/s; the baseline itself is that of the middle row.
+    #[arg(long, value_name = "SPEED", value_parser = linear, allow_hyphen_values = true, conflicts_with_all = ["points", "kernel"])]
+    baseline_speed: Option<Length>,
+    /// How fast the separation grew, such as 60deg/s.
+    #[arg(long, value_name = "SPEED", value_parser = rotary, allow_hyphen_values = true, conflicts_with_all = ["points", "kernel"])]
+    separation_speed: Option<Angle>,
+}
+
+fn per_second(text: &str) -> Result<&str, String> {
+    text.trim().strip_suffix("/s").ok_or_else(|| format!("'{text}' is no speed: write it like 80mm/s or 60deg/s"))
+}
+
+fn linear(text: &str) -> Result<Length, String> {
+    per_second(text)?.parse().map_err(|error: vergence_vision::InvalidQuantity| error.to_string())
+}
+
+fn rotary(text: &str) -> Result<Angle, String> {
+    per_second(text)?.parse().map_err(|error: vergence_vision::InvalidQuantity| error.to_string())
+}
+
+impl StageSpeed {
+    /// The motion through `positions` at the middle rows, and the exposure that goes with it; `None` where nothing moved.
+    ///
+    /// # Errors
+    /// A speed of an axis that the rig does not have.
+    pub fn motion(
+        &self,
+        rig: &Rig,
+        positions: &[AxisPosition],
+    ) -> Result<Option<(SteadyMotion, PairExposure)>, Failure> {
+        if self.baseline_speed.is_none() && self.separation_speed.is_none() {
+            return Ok(None);
+        }
+        let named = [
+            ("baseline", self.baseline_speed.map(AxisPosition::Linear)),
+            ("separation", self.separation_speed.map(AxisPosition::Rotary)),
+        ];
+        let mut rates = vec![0.0; rig.axes.len()];
+        for (name, speed) in named {
+            let Some(speed) = speed else { continue };
+            let axis = rig.axes.iter().zip(&mut rates).find(|(axis, _)| axis.name == name && speed.is_of(axis.kind));
+            let Some((axis, rate)) = axis else {
+                return Err(Failure::usage(format!("rig '{}' has no axis '{name}' that moves like this", rig.name)));
+            };
+            *rate = speed.value() * 1e-6 / axis.value_per_count();
+        }
+        let counts = rig.axes.iter().zip(positions).map(|(axis, at)| axis.counts_at(at.value())).collect();
+        let known = vec![0.0; rig.axes.len()];
+        let joints = JointsAt { counts, sigma: known.clone(), timing: known };
+        let middle = BoardInstant { us: 0.0, error_us: 0.0 };
+        Ok(Some((SteadyMotion { from_us: 0.0, joints, rates }, pair_exposure(rig, [middle; 2]))))
+    }
+}

@@ -1,0 +1,371 @@
+//! The live loop on the simulated rig: it measures while the stages move, keeps to the newest pair, and lives with one camera.
+#![allow(
+    clippy::expect_used,
+    clippy::panic,
+    clippy::print_stdout,
+    reason = "a test fails loudly and shows its figures"
+)]
+
+mod common;
+
+use std::io::{BufRead, BufReader, Read};
+use std::path::Path;
+use std::process::{Command, Stdio};
+use std::sync::Arc;
+use std::time::Duration;
+
+use common::{fails_with, run, text, vergence};
+use serde_json::Value;
+use tokio::sync::mpsc;
+use vergence::board::Board;
+use vergence::camera::{FrameTiming, Stage};
+use vergence::link::{Client, HostClock, OpenWire};
+use vergence::live::{
+    Exposed, Exposures, Limits, LiveFrame, LiveLoop, Measured, News, Seen, SimulatedEye, TimeBase, Told, Totals,
+};
+use vergence::look::ColouredPoint;
+use vergence::sim::{SharedRig, SimulatedRig, spawn_in_process};
+use vergence_matching::GuidedMatcher;
+use vergence_protocol::{AxisList, FrameMark, Microseconds, Mode, Request, SessionId, Trigger};
+use vergence_rig::{AxisPosition, BENCH_TOML, ClockMap, Exchange, HostInstant, Rig, Shutter};
+use vergence_vision::{Angle, Left, Length, Side};
+
+/// The bench with small cameras whose rows are exposed one after the other, 20 ms from the first to the last.
+fn small_bench() -> String {
+    BENCH_TOML
+        .replace("[1280, 1280]", "[320, 320]")
+        .replace("366.0", "91.5")
+        .replace("639.5", "159.5")
+        .replace("theta_max", "line_time = \"62.5us\"\ntheta_max")
+}
+
+fn rig() -> Rig {
+    Rig::from_toml(&small_bench()).expect("a rig")
+}
+
+fn pose(baseline_mm: f64, separation_deg: f64) -> [AxisPosition; 2] {
+    [AxisPosition::Linear(Length::from_mm(baseline_mm)), AxisPosition::Rotary(Angle::from_deg(separation_deg))]
+}
+
+/// A homed rig with cameras whose rows are exposed as `rig` says, measured as `believed` says.
+struct Bench {
+    simulated: SharedRig,
+    stage: Arc<Stage>,
+    board: Board,
+    live: LiveLoop,
+    rig: Rig,
+}
+
+const PERIOD_US: u32 = 100_000;
+
+impl Bench {
+    async fn new(believed: [Shutter; 2]) -> Self {
+        let rig = rig();
+        let simulated = SharedRig::new(SimulatedRig::new(&rig, 1).expect("a simulated rig"));
+        let wire = OpenWire::in_process(spawn_in_process(simulated.clone()));
+        let client = Client::connect(wire, SessionId(7), HostClock::start()).await.expect("a session");
+        let hidden = indicatif::ProgressBar::hidden();
+        let mut board = Board::new(client, rig.clone(), 1000, hidden).await.expect("a board");
+        board.compare_clocks().await.expect("the link holds");
+        board.armed(async |board| board.home().await).await.expect("homed");
+        let (listener, news) = mpsc::channel(16);
+        let clock = board.client().clock();
+        let stage = Arc::new(Stage::room());
+        for (side, lens, shutter) in
+            [(Side::Left, rig.left_camera, rig.shutters[0]), (Side::Right, rig.right_camera, rig.shutters[1])]
+        {
+            let (stage, rig) = (Arc::clone(&stage), simulated.clone());
+            let eye = SimulatedEye { side, lens, shutter, stage, rig, clock, seed: 3, unplugged: Vec::new() };
+            tokio::spawn(eye.ride(listener.clone()));
+        }
+        let live = LiveLoop {
+            rig: Arc::new(Rig { shutters: believed, ..rig.clone() }),
+            matcher: Arc::new(GuidedMatcher::default()),
+            news,
+            marks: Some(board.client_mut().take_marks()),
+            board: Some(board.client().knowledge()),
+            clock,
+            exposures: Exposures::new(Some(f64::from(PERIOD_US))),
+            simulated: Some(Some(Duration::from_millis(50))),
+        };
+        Self { simulated, stage, board, live, rig }
+    }
+
+    /// Goes to `from`, and then measures `results` times on the way to `to`, when the stages have reached their speed. The
+    /// normalised errors of all ranges.
+    async fn errors_on_the_way(mut self, [from, to]: [[AxisPosition; 2]; 2], results: u64) -> Vec<f64> {
+        const TO_SPEED: Duration = Duration::from_millis(600);
+        let Self { simulated, stage, board, live, rig } = &mut self;
+        let (mut errors, mut totals) = (Vec::new(), Totals::default());
+        board
+            .armed(async |board| {
+                board.move_to(Mode(0), &from).await?;
+                let trigger = Request::SetTrigger(Trigger::Every { period_us: PERIOD_US });
+                let mut triggered = Box::pin(board.move_to(Mode(0), &to));
+                // The stages go, and nothing is exposed yet.
+                let gone = tokio::time::timeout(TO_SPEED, &mut triggered).await;
+                drop(triggered);
+                board.ask(trigger).await?;
+                let tell = |told: Told<'_>| {
+                    errors.extend(normalised(told.measured, simulated, stage, rig));
+                    Ok(())
+                };
+                let limits = Limits { results: Some(results), time: Some(Duration::from_secs(20)) };
+                live.run(limits, &mut totals, tell, |warning| println!("{warning}")).await?;
+                if gone.is_err() {
+                    board.stop().await?;
+                }
+                Ok(())
+            })
+            .await
+            .expect("it moves and measures");
+        assert_eq!(totals.clouds, results);
+        errors
+    }
+}
+
+/// How far each range is off the truth, in its stated sigma.
+fn normalised(measured: &Measured, simulated: &SharedRig, stage: &Stage, rig: &Rig) -> Vec<f64> {
+    let Seen::Points { look, moving, .. } = &measured.seen else { panic!("two cameras are there") };
+    let history = simulated.lock().history().clone();
+    // The camera reacts at once, which nobody told: the middle is stated half a millisecond late, as its bound allows.
+    let middle = measured.middle.us - measured.middle.error_us;
+    let left_at = |us: f64| stage.world_from_left(history.pose_at(rig, us).expect("remembered").base_from_left);
+    let reference = left_at(middle);
+    let error = |ColouredPoint { point, .. }: &ColouredPoint| {
+        let pixel = point.pixels.left;
+        let row = middle + (pixel.v - 159.5) * rig.shutters[0].line_us();
+        let there = left_at(row);
+        let ray = there * rig.left_camera.unproject::<Left>(pixel).ok()?;
+        let hit = stage.scene.cast(&there.origin(), &ray)?;
+        let truth = ray.at(hit.range.mm()).mm() + there.origin().mm();
+        let range = (truth - reference.origin().mm()).norm();
+        Some((point.point.mm().norm() - range) / point.sigma_range.mm())
+    };
+    let errors: Vec<f64> = look.points.iter().filter_map(error).collect();
+    println!("{} points, moving: {moving}, median |z| {:.2}", errors.len(), median(&errors));
+    errors
+}
+
+fn median(errors: &[f64]) -> f64 {
+    let mut sizes: Vec<f64> = errors.iter().map(|error| error.abs()).collect();
+    sizes.sort_by(f64::total_cmp);
+    sizes.get(sizes.len() / 2).copied().unwrap_or(f64::NAN)
+}
+
+/// Through the whole of the product: trigger, frames paired with pulses, rolling shutters, encoder stream, matching. Both stages
+/// go at full speed in the middle of this way.
+#[tokio::test(start_paused = true)]
+async fn static_and_moving_clouds_agree_within_what_they_state() {
+    let (far, near) = (pose(90.0, 17.0), pose(200.0, 103.0));
+    let standing = Bench::new(rig().shutters).await.errors_on_the_way([pose(145.0, 60.0); 2], 2).await;
+    let moving = Bench::new(rig().shutters).await.errors_on_the_way([far, near], 2).await;
+    assert!(standing.len() > 100 && moving.len() > 100, "{} {}", standing.len(), moving.len());
+    let within = |errors: &[f64]| errors.iter().filter(|z| z.abs() < 3.0).count() as f64 / errors.len() as f64;
+    println!("within 3 sigma: standing {:.3}, moving {:.3}", within(&standing), within(&moving));
+    assert!(within(&standing) > 0.95 && within(&moving) > 0.95);
+    assert!(median(&moving) < 1.0 && median(&standing) < 1.0);
+    // The check notices a shutter that the rig file does not tell.
+    let wrong = Bench::new([Shutter::Global; 2]).await.errors_on_the_way([far, near], 1).await;
+    assert!(wrong.is_empty() || median(&wrong) > 2.0 * median(&moving), "{}", median(&wrong));
+}
+
+/// What a camera tells of the frame that belongs to pulse `number`, and a pulse.
+fn frame_of(number: u32, seq: u32) -> News {
+    let middle = HostInstant { us: 1e6 + f64::from(number) * 1e5 + 2_500.0, error_us: 1_000.0 };
+    News::Frame(LiveFrame { seq, middle, picture: Box::new(|| Ok(image::RgbImage::new(1, 1))) })
+}
+
+fn mark(seq: u32) -> FrameMark {
+    FrameMark { seq, at: Microseconds(1_000_000 + 100_000 * u64::from(seq)), counts: AxisList::new() }
+}
+
+/// A camera that comes back holds nothing up, and what it missed is not waited for.
+#[test]
+fn exposures_go_on_when_a_camera_dies_and_comes_back() {
+    let mut clock = ClockMap::default();
+    let [t0, t1] = [0, 1].map(|_| Microseconds(500_000));
+    clock.observe(Exchange { t0, t1, t2: t1, t3: t0 });
+    let base = TimeBase::Board(clock);
+    let ms = Duration::from_millis;
+    let timing = FrameTiming { period: ms(33), exposure: Some(ms(4)), rolling: ms(0), readout: ms(8) };
+    let mut exposures = Exposures::new(Some(1e5));
+    exposures.hear(Side::Left, News::There(timing), &base);
+    exposures.hear(Side::Right, News::There(timing), &base);
+    exposures.pulse(&mark(0), &base);
+    exposures.hear(Side::Left, frame_of(0, 0), &base);
+    assert!(exposures.take().is_none(), "half a pair");
+    exposures.hear(Side::Right, frame_of(0, 7), &base);
+    let Some(Exposed::Pair(shots)) = exposures.take() else { panic!("a pair") };
+    // Half the exposure after the edge, and the camera's reaction of up to a millisecond.
+    assert_eq!((shots[0].middle.us, shots[0].middle.error_us), (1_002_500.0, 500.0));
+
+    exposures.pulse(&mark(1), &base);
+    exposures.hear(Side::Right, frame_of(1, 8), &base);
+    exposures.hear(Side::Left, News::Dead("the cable".into()), &base);
+    let Some(Exposed::One { side: Side::Right, why, .. }) = exposures.take() else { panic!("the right camera lives") };
+    assert_eq!(why, "the cable");
+    exposures.pulse(&mark(2), &base);
+    exposures.hear(Side::Left, News::There(timing), &base);
+    exposures.hear(Side::Right, frame_of(2, 9), &base);
+    assert!(exposures.take().is_none(), "its left frame was never taken, and both are there");
+    exposures.pulse(&mark(3), &base);
+    exposures.hear(Side::Left, frame_of(3, 0), &base);
+    exposures.hear(Side::Right, frame_of(3, 10), &base);
+    assert!(matches!(exposures.take(), Some(Exposed::Pair(_))));
+    // A frame that is lost is counted when the next one comes.
+    exposures.pulse(&mark(4), &base);
+    exposures.hear(Side::Left, frame_of(4, 1), &base);
+    exposures.pulse(&mark(5), &base);
+    exposures.hear(Side::Right, frame_of(5, 12), &base);
+    exposures.hear(Side::Left, frame_of(5, 2), &base);
+    assert!(matches!(exposures.take(), Some(Exposed::Pair(_))));
+    assert_eq!(exposures.skipped().get("right_frame_lost"), Some(&1));
+}
+
+/// At a rate at which frames cannot be told apart nothing is guessed, and it is said once.
+#[test]
+fn exposures_that_nobody_can_tell_apart_are_told() {
+    let mut clock = ClockMap::default();
+    clock.observe(Exchange { t0: Microseconds(0), t1: Microseconds(0), t2: Microseconds(0), t3: Microseconds(0) });
+    let base = TimeBase::Board(clock);
+    let ms = Duration::from_millis;
+    let timing = FrameTiming { period: ms(120), exposure: None, rolling: ms(0), readout: ms(120) };
+    let mut exposures = Exposures::new(Some(1e5));
+    for side in [Side::Left, Side::Right] {
+        exposures.hear(side, News::There(timing), &base);
+    }
+    for number in 0..3 {
+        exposures.pulse(&mark(number), &base);
+        exposures.hear(Side::Left, frame_of(number, number), &base);
+        exposures.hear(Side::Right, frame_of(number, number), &base);
+    }
+    assert!(exposures.take().is_none());
+    assert_eq!(exposures.skipped().get("frame_of_either_pulse"), Some(&6));
+    assert!(exposures.take_ambiguity().is_some_and(|said| said.contains("--readout")));
+    assert_eq!(exposures.take_ambiguity(), None);
+}
+
+fn lines(output: &[u8]) -> Vec<Value> {
+    text(output).lines().map(|line| serde_json::from_str(line).expect("JSON Lines")).collect()
+}
+
+fn live(folder: &Path, arguments: &[&str]) -> (Vec<Value>, String) {
+    let rig = folder.join("rig.toml");
+    std::fs::write(&rig, small_bench()).expect("written");
+    let all = ["--port", "sim", "--rig", rig.to_str().expect("a name"), "run", "--cameras", "sim", "--home", "--json"];
+    let output = run(&[&all, arguments].concat());
+    assert!(output.status.success(), "{}", text(&output.stderr));
+    (lines(&output.stdout), text(&output.stderr))
+}
+
+#[test]
+fn run_measures_the_newest_pair_while_the_stages_move() {
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    let out = folder.path().join("out");
+    let name = out.to_str().expect("a name");
+    let tour = ["--mode", "herbivore", "--mode", "human", "--stay", "100ms"];
+    let pace = ["--rate", "20", "--match-time", "700ms", "--frames", "6"];
+    let (lines, _) = live(folder.path(), &[&tour[..], &pace, &["--out", name, "--also", "csv,json"]].concat());
+    let (end, clouds) = lines.split_last().expect("lines");
+    assert_eq!(clouds.len(), 6);
+    let separations: Vec<f64> =
+        clouds.iter().map(|line| line["axes"]["separation_deg"].as_f64().expect("an angle")).collect();
+    println!("{separations:?} {}", end["skipped"]);
+    let apart = separations.windows(2).filter(|pair| (pair[0] - pair[1]).abs() > 1.0).count();
+    assert!(apart >= 4, "each from its own exposure: {separations:?}");
+    assert!(clouds.iter().any(|line| line["moving"] == true));
+    for line in clouds {
+        assert_eq!(line["kind"], "cloud");
+        assert!(line["points"].as_u64().is_some_and(|points| points > 20), "{}", line["points"]);
+        assert_eq!(line["cloud"]["rows"].as_array().map(Vec::len), line["points"].as_u64().map(|n| n as usize));
+        // One frame of 20 ms, its way to the host, at most one waiting for the next pulse, and matching.
+        assert!(line["latency_ms"].as_f64().is_some_and(|ms| (700.0..900.0).contains(&ms)), "{}", line["latency_ms"]);
+    }
+    // Twenty pairs each second, one of which is measured each 0.7 s: the rest is counted, not queued.
+    let newer = end["skipped"]["newer_came"].as_u64().expect("counted");
+    assert!((60..=95).contains(&newer), "{}", end["skipped"]);
+    assert_eq!(end["clouds"], 6);
+    let ply = std::fs::read_to_string(out.join("cloud.ply")).expect("a cloud");
+    assert!(ply.contains("property uchar red") && ply.contains("sigma_range") && ply.contains("score"));
+    let csv = std::fs::read_to_string(out.join("cloud.csv")).expect("a table");
+    let points = clouds[5]["points"].as_u64().expect("a number") as usize;
+    assert_eq!(csv.lines().count(), points + 1);
+    let json: Value =
+        serde_json::from_str(&std::fs::read_to_string(out.join("cloud.json")).expect("a table")).expect("JSON");
+    assert_eq!(json["rows"].as_array().map(Vec::len), Some(points));
+}
+
+/// Ctrl-C in mid-move: the stages brake, the board is disarmed, what became of everything is told, and that is no failure.
+#[test]
+fn an_interrupted_run_ends_cleanly() {
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    let rig = folder.path().join("rig.toml");
+    std::fs::write(&rig, small_bench()).expect("written");
+    let tour = ["--home", "--mode", "herbivore", "--mode", "human", "--stay", "1h", "--match-time", "100ms"];
+    let mut command = vergence(&["--port", "sim", "--rig", rig.to_str().expect("a name"), "--json", "run"]);
+    command.args(["--cameras", "sim"]).args(tour).stdout(Stdio::piped()).stderr(Stdio::piped());
+    let mut process = command.spawn().expect("the binary runs");
+    let mut said = BufReader::new(process.stdout.take().expect("piped"));
+    let mut first = String::new();
+    said.read_line(&mut first).expect("a cloud");
+    assert!(first.contains("\"cloud\""), "{first}");
+    let interrupted = Command::new("kill").args(["-INT", &process.id().to_string()]).status().expect("kill runs");
+    assert!(interrupted.success());
+    let mut rest = String::new();
+    said.read_to_string(&mut rest).expect("it ends");
+    let ended = process.wait_with_output().expect("it ends");
+    assert!(ended.status.success(), "{}", text(&ended.stderr));
+    let last: Value = serde_json::from_str(rest.lines().last().expect("a last line")).expect("JSON");
+    assert_eq!(last["kind"], "end");
+    assert!(last["clouds"].as_u64().is_some_and(|clouds| clouds > 0));
+}
+
+#[test]
+fn a_dead_camera_leaves_bearings_and_its_return_clouds() {
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    let out = folder.path().join("out");
+    let name = out.to_str().expect("a name");
+    let pace = ["--rate", "10", "--match-time", "250ms", "--seconds", "2.3", "--keep", "--out", name];
+    let (lines, said) = live(folder.path(), &[&pace[..], &["--unplug", "left@800ms..1500ms"]].concat());
+    let (end, results) = lines.split_last().expect("lines");
+    let kinds: Vec<_> = results.iter().map(|line| line["kind"].as_str().expect("a kind")).collect();
+    let first = kinds.iter().position(|kind| *kind == "bearings").expect("bearings");
+    let last = kinds.iter().rposition(|kind| *kind == "bearings").expect("bearings");
+    assert!(first > 0 && last + 1 < kinds.len(), "{kinds:?}");
+    assert!(kinds[first..=last].iter().all(|kind| *kind == "bearings"), "{kinds:?}");
+    let line = &results[first];
+    assert_eq!((line["camera"].as_str(), line["dead"]["camera"].as_str()), (Some("right"), Some("left")));
+    assert!(line["dead"]["why"].as_str().is_some_and(|why| why.contains("unplugged")));
+    let rows = line["bearings"]["rows"].as_array().expect("rows");
+    assert!(rows.len() > 50, "{}", rows.len());
+    for row in rows {
+        let number = |column: usize| row[column].as_f64().expect("a number");
+        let length = (number(0).powi(2) + number(1).powi(2) + number(2).powi(2)).sqrt();
+        assert!((length - 1.0).abs() < 1e-5 && (0.1..1.0).contains(&number(8)), "{row}");
+    }
+    assert!(said.contains("the left camera is dead") && said.contains("the left camera is there"), "{said}");
+    assert_eq!(end["bearings"], last - first + 1);
+    let files = |stem: &str| {
+        let names = std::fs::read_dir(&out).expect("a folder").map(|entry| entry.expect("an entry").file_name());
+        names.filter(|name| name.to_string_lossy().starts_with(stem)).count() as u64
+    };
+    assert_eq!((Some(files("cloud")), Some(files("bearings"))), (end["clouds"].as_u64(), end["bearings"].as_u64()));
+}
+
+#[test]
+fn without_cameras_or_reference_nothing_is_measured() {
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    let pair = folder.path().join("pair.toml");
+    let fixed = include_str!("../docs/rig-file.md").split("```").nth(1).expect("the first example");
+    let camera =
+        fixed.split("[right.camera]").next().expect("a camera").split("[left.camera]").nth(1).expect("a camera");
+    let right = fixed.replace("# the same keys", camera);
+    std::fs::write(&pair, right.trim_start_matches("toml")).expect("written");
+    let pair = pair.to_str().expect("a name");
+    let cameras = ["run", "--cameras", "/nowhere/video0", "/nowhere/video1"];
+    fails_with(&[&["--rig", pair], &cameras[..]].concat(), 3, &["there is no camera", "/nowhere/video1"]);
+    fails_with(&["--port", "sim", "run", "--cameras", "sim", "--frames", "1"], 3, &["no reference", "--home"]);
+    fails_with(&["--port", "sim", "run", "--cameras", "/dev/video0", "/dev/video1"], 2, &["--cameras sim"]);
+    fails_with(&["--port", "sim", "run", "--cameras", "sim", "--mode", "cat"], 2, &["herbivore or human"]);
+}
