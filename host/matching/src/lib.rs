@@ -20,13 +20,16 @@ mod distinct;
 mod epipolar_band;
 mod guided;
 pub mod learned;
+mod links;
 mod matcher;
 mod neighbours;
 mod plane;
 mod refine;
 mod shared_field;
 mod shared_frame;
+mod shared_views;
 mod view;
+mod wrong_pose;
 
 pub use guided::GuidedMatcher;
 pub use matcher::{Drop, ImagePair, Match, MatchError, Matcher, Matches};

@@ -3,15 +3,16 @@
 use std::collections::BTreeMap;
 
 use image::{RgbImage, imageops::grayscale};
-use vergence_matching::{ImagePair, MatchError, Matcher};
+use vergence_matching::{ImagePair, Match, MatchError, Matcher};
 use vergence_rig::{Rig, RigPose};
 use vergence_vision::{
-    Angle, CloudPoint, Gates, Kernel, Length, PixelPair, PoseDrift, SharedCovariance, StereoPair, cloud, pose_drift,
+    Angle, CloudPoint, Gates, Kernel, Length, PixelPair, PoseDrift, SharedCovariance, StereoPair, cloud_of_each,
+    pose_drift,
 };
 
 use crate::stopwatch::Stopwatch;
 
-/// How well a matched position is known, in pixels. Generous: the classical matcher reaches 0.1 on sharp images.
+/// How well a position is known of which nothing is said, in pixels.
 pub const PIXEL_SIGMA: f64 = 0.2;
 /// Gates are this many standard deviations wide.
 const GATE_SIGMAS: f64 = 3.0;
@@ -88,7 +89,8 @@ pub fn look_by(
         nearest: NEAREST,
     })?;
     let match_seconds = matching.seconds();
-    let pairs: Vec<_> = found.pairs.iter().map(|m| PixelPair { left: m.left, right: m.right }).collect();
+    let pair = |m: &Match| (PixelPair { left: m.left, right: m.right }, m.sigma);
+    let pairs: Vec<_> = found.pairs.iter().map(pair).collect();
     let mut look = triangulate(&pairs, eyes, rig, pose, kernel);
     look.match_seconds = match_seconds;
     for (reason, count) in found.dropped {
@@ -97,12 +99,12 @@ pub fn look_by(
     Ok(look)
 }
 
-/// Triangulates given correspondences.
+/// Triangulates given correspondences, each with the standard deviation of its positions in pixels.
 #[must_use]
-pub fn triangulate(pairs: &[PixelPair], eyes: Eyes<'_>, rig: &Rig, pose: &RigPose, kernel: Kernel) -> Look {
+pub fn triangulate(pairs: &[(PixelPair, f64)], eyes: Eyes<'_>, rig: &Rig, pose: &RigPose, kernel: Kernel) -> Look {
     let triangulation = Stopwatch::start();
     let stereo = StereoPair { left: &rig.left_camera, right: &rig.right_camera, left_from_right: pose.left_from_right };
-    let result = cloud(pairs, &stereo, &Gates { kernel, ..gates(rig, pose) });
+    let result = cloud_of_each(pairs, &stereo, &Gates { kernel, ..gates(rig, pose) });
     let points = result
         .points
         .into_iter()
@@ -110,7 +112,7 @@ pub fn triangulate(pairs: &[PixelPair], eyes: Eyes<'_>, rig: &Rig, pose: &RigPos
         .collect();
     Look {
         points,
-        pose_drift: pose_drift(pairs, &stereo, PIXEL_SIGMA, &pose.covariance),
+        pose_drift: pose_drift(pairs, &stereo, &pose.covariance),
         dropped: result.dropped.into_iter().map(|(reason, count)| (reason.as_str(), count)).collect(),
         matches: pairs.len(),
         match_seconds: 0.0,
