@@ -6,78 +6,104 @@
 //! ω·(r × n) + c·(l × r) / |x × l|. Its most probable value under the prior of the pose, found by iteratively
 //! reweighted least squares (P. Holland and R. Welsch, Commun. Stat. A6, 1977), leaves a much narrower band.
 
-use nalgebra::{SMatrix, SVector, Vector3};
-use vergence_vision::{Angle, UnitRay};
+use nalgebra::{SMatrix, SVector, UnitQuaternion, Vector3};
+use vergence_vision::{Angle, Left, Right, Transform, UnitRay};
 
-use crate::Shared;
+use crate::{Shared, SharedFrame};
 
 /// ω and the two components of c across the baseline.
 const UNKNOWNS: usize = 5;
-const ITERATIONS: usize = 10;
+const ITERATIONS: usize = 16;
+/// The last of them keep the scale of the measurement.
+const SETTLING: usize = 4;
+
+/// One point of the scene as both cameras see it, in the shared axes.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Sighting {
+    pub left: UnitRay<Shared>,
+    pub right: UnitRay<Shared>,
+    /// Standard deviation of the one bearing off the epipolar plane of the other.
+    pub sigma: Angle,
+}
 
 /// The error of the pose as seen by the matches.
 pub(crate) struct Consensus {
-    correction: SVector<f64, UNKNOWNS>,
+    /// Turn of the right camera.
+    turn: UnitQuaternion<f64>,
+    /// Direction of the baseline.
+    baseline: Vector3<f64>,
     covariance: SMatrix<f64, UNKNOWNS, UNKNOWNS>,
 }
 
 impl Consensus {
-    /// The most probable error of the pose given pairs of bearings (left, right), of which most are right to about
-    /// `match_sigma`. `pose_sigma` is the prior's standard deviation in each component.
+    /// The most probable error of the pose given sightings of which most are right. `pose_sigma` is the prior's standard
+    /// deviation in each component.
     ///
     /// With a pose known exactly, or if the equations cannot be solved, there is nothing to correct.
-    pub(crate) fn of(pairs: &[[UnitRay<Shared>; 2]], pose_sigma: Angle, match_sigma: Angle) -> Self {
-        let mut consensus = Self { correction: SVector::zeros(), covariance: SMatrix::zeros() };
+    pub(crate) fn of(sightings: &[Sighting], pose_sigma: Angle) -> Self {
+        let mut consensus =
+            Self { turn: UnitQuaternion::identity(), baseline: Vector3::x(), covariance: SMatrix::zeros() };
         if pose_sigma.rad() <= 0.0 {
             return consensus;
         }
-        let equations: Vec<Equation> = pairs.iter().filter_map(Equation::of).collect();
         let prior = SMatrix::identity() / pose_sigma.rad().powi(2);
         for iteration in 0..ITERATIONS {
             // The scale shrinks from the prior's to the measurement's, so that the start does not decide who is out.
-            let fade = (1.0 - iteration as f64 / (ITERATIONS - 3) as f64).max(0.0);
-            let scale = match_sigma.rad().max(pose_sigma.rad() * fade);
-            let (mut normal, mut right_side) = (prior, SVector::zeros());
-            for equation in &equations {
-                let residual = equation.residual(&consensus.correction) / scale;
-                let weight = (1.0 + residual * residual).powi(-2) / (scale * scale);
+            let fade = (1.0 - iteration as f64 / (ITERATIONS - SETTLING) as f64).max(0.0);
+            let (mut normal, mut right_side) = (prior, -prior * consensus.correction());
+            for sighting in sightings {
+                let Some(equation) = consensus.equation(sighting) else { continue };
+                let scale = sighting.sigma.rad().max(pose_sigma.rad() * fade * fade);
+                let weight = (1.0 + (equation.offset / scale).powi(2)).powi(-2) / (scale * scale);
                 normal += equation.slope * (equation.slope * weight).transpose();
                 right_side -= equation.slope * (weight * equation.offset);
             }
             let Some(factor) = normal.cholesky() else { break };
-            consensus = Self { correction: factor.solve(&right_side), covariance: factor.inverse() };
+            consensus.step(&factor.solve(&right_side));
+            consensus.covariance = factor.inverse();
         }
         consensus
     }
 
-    /// How far a pair is off the corrected epipolar plane, and the standard deviation that the correction leaves there.
+    /// How far a sighting is off the corrected epipolar plane, and the standard deviation that the correction leaves there.
     /// `None` for a left bearing along the baseline, which has no epipolar plane.
-    pub(crate) fn off_plane(&self, pair: &[UnitRay<Shared>; 2]) -> Option<(Angle, Angle)> {
-        let equation = Equation::of(pair)?;
+    pub(crate) fn off_plane(&self, sighting: &Sighting) -> Option<(Angle, Angle)> {
+        let equation = self.equation(sighting)?;
         let variance = equation.slope.dot(&(self.covariance * equation.slope));
-        Some((Angle::from_rad(equation.residual(&self.correction).abs()), Angle::from_rad(variance.max(0.0).sqrt())))
+        Some((Angle::from_rad(equation.offset.abs()), Angle::from_rad(variance.max(0.0).sqrt())))
     }
-}
 
-/// offset + slope · correction = 0 for a right match.
-struct Equation {
-    offset: f64,
-    slope: SVector<f64, UNKNOWNS>,
-}
+    /// The pose that the sightings ask for, where `pose` is the one whose shared axes they are in.
+    pub(crate) fn pose(&self, frame: &SharedFrame, pose: &Transform<Left, Right>) -> Transform<Left, Right> {
+        let (from_left, from_right) = (frame.shared_from_left().rotation(), frame.shared_from_right().rotation());
+        let rotation = from_left.inverse() * self.turn * from_right;
+        Transform::new(rotation, from_left.inverse() * self.baseline * pose.origin().mm().norm())
+    }
 
-impl Equation {
-    fn of([left, right]: &[UnitRay<Shared>; 2]) -> Option<Self> {
-        let (l, r) = (left.vector(), right.vector());
-        let across = Vector3::x().cross(&l);
+    fn correction(&self) -> SVector<f64, UNKNOWNS> {
+        let turn = self.turn.scaled_axis();
+        SVector::from([turn.x, turn.y, turn.z, self.baseline.y, self.baseline.z])
+    }
+
+    fn step(&mut self, by: &SVector<f64, UNKNOWNS>) {
+        self.turn = UnitQuaternion::from_scaled_axis(Vector3::new(by[0], by[1], by[2])) * self.turn;
+        self.baseline = (self.baseline + Vector3::new(0.0, by[3], by[4])).normalize();
+    }
+
+    fn equation(&self, sighting: &Sighting) -> Option<Equation> {
+        let (l, r) = (sighting.left.vector(), self.turn * sighting.right.vector());
+        let across = self.baseline.cross(&l);
         let normal = across.try_normalize(f64::EPSILON)?;
         let turn = r.cross(&normal);
         let shift = l.cross(&r) / across.norm();
-        Some(Self { offset: normal.dot(&r), slope: SVector::from([turn.x, turn.y, turn.z, shift.y, shift.z]) })
+        Some(Equation { offset: normal.dot(&r), slope: SVector::from([turn.x, turn.y, turn.z, shift.y, shift.z]) })
     }
+}
 
-    fn residual(&self, correction: &SVector<f64, UNKNOWNS>) -> f64 {
-        self.offset + self.slope.dot(correction)
-    }
+/// offset + slope · step = 0 for a right match.
+struct Equation {
+    offset: f64,
+    slope: SVector<f64, UNKNOWNS>,
 }
 
 #[cfg(test)]
@@ -99,37 +125,76 @@ mod tests {
             .collect()
     }
 
-    fn rays([left, right]: &[Vector3<f64>; 2], turn: &UnitQuaternion<f64>) -> [UnitRay<Shared>; 2] {
-        [UnitRay::new(*left).unwrap(), UnitRay::new(turn * right).unwrap()]
+    fn seen([left, right]: &[Vector3<f64>; 2], turn: &UnitQuaternion<f64>) -> Sighting {
+        let (left, right) = (UnitRay::new(*left).unwrap(), UnitRay::new(turn * right).unwrap());
+        Sighting { left, right, sigma: Angle::from_deg(0.03) }
+    }
+
+    /// Every seventh is off its epipolar plane by 15 mrad.
+    fn with_outliers(inliers: &[Sighting]) -> Vec<Sighting> {
+        let mut sightings = inliers.to_vec();
+        for sighting in sightings.iter_mut().step_by(7) {
+            let off_plane = Vector3::x().cross(&sighting.left.vector()).normalize() * 0.015;
+            sighting.right = UnitRay::new(sighting.right.vector() + off_plane).unwrap();
+        }
+        sightings
     }
 
     #[test]
     fn a_rotation_is_recovered_in_spite_of_outliers() {
-        let turn = UnitQuaternion::from_scaled_axis(Vector3::new(0.006, -0.004, 0.005));
-        let inliers: Vec<_> = scene().iter().map(|pair| rays(pair, &turn)).collect();
-        let mut pairs = inliers.clone();
-        for pair in pairs.iter_mut().step_by(7) {
-            let off_plane = Vector3::x().cross(&pair[0].vector()).normalize() * 0.015;
-            pair[1] = UnitRay::new(pair[1].vector() + off_plane).unwrap();
-        }
-        let consensus = Consensus::of(&pairs, Angle::from_deg(0.5), Angle::from_deg(0.03));
-        for (i, (pair, inlier)) in pairs.iter().zip(&inliers).enumerate() {
-            // To first order: the square of 9 mrad is 0.08 mrad, 0.005°.
-            let (off, sigma) = consensus.off_plane(inlier).unwrap();
-            assert!(off.deg() < 0.02, "inlier {i} is {off:.4} off");
-            assert!(sigma.deg() < 0.05, "{sigma:.4}");
-            if i % 7 == 0 {
-                let (off, _) = consensus.off_plane(pair).unwrap();
-                assert!(off.deg() > 0.5, "outlier {i} is {off:.4} off");
+        for (degrees, sigma) in [(0.5, 0.5), (5.0, 3.0)] {
+            let axis = Vector3::new(0.6, -0.4, 0.5).normalize();
+            let turn = UnitQuaternion::from_scaled_axis(axis * f64::to_radians(degrees));
+            let inliers: Vec<_> = scene().iter().map(|pair| seen(pair, &turn)).collect();
+            let sightings = with_outliers(&inliers);
+            let consensus = Consensus::of(&sightings, Angle::from_deg(sigma));
+            for (i, (sighting, inlier)) in sightings.iter().zip(&inliers).enumerate() {
+                let (off, sigma) = consensus.off_plane(inlier).unwrap();
+                assert!(off.deg() < 0.02, "{degrees}°: inlier {i} is {off:.4} off");
+                assert!(sigma.deg() < 0.05, "{sigma:.4}");
+                if i % 7 == 0 {
+                    let (off, _) = consensus.off_plane(sighting).unwrap();
+                    assert!(off.deg() > 0.5, "{degrees}°: outlier {i} is {off:.4} off");
+                }
             }
         }
     }
 
     #[test]
+    fn the_pose_asked_for_is_the_true_one() {
+        let stated = Transform::new(
+            UnitQuaternion::from_scaled_axis(Vector3::new(0.02, 0.9, 0.01)),
+            Vector3::new(130.0, 4.0, 60.0),
+        );
+        let truth = Transform::new(
+            UnitQuaternion::from_scaled_axis(Vector3::new(0.06, 0.93, 0.0)),
+            Vector3::new(132.0, 8.0, 57.0),
+        );
+        let frame = SharedFrame::new(&stated).unwrap();
+        let sightings: Vec<_> = scene()
+            .iter()
+            .filter_map(|[left, _]| {
+                let point =
+                    vergence_vision::Point::<Left>::from_mm(frame.shared_from_left().rotation().inverse() * left);
+                let right: vergence_vision::Point<Right> = truth.inverse() * point;
+                Some(Sighting {
+                    left: frame.shared_from_left() * point.direction()?,
+                    right: frame.shared_from_right() * right.direction()?,
+                    sigma: Angle::from_deg(0.03),
+                })
+            })
+            .collect();
+        let asked = Consensus::of(&sightings, Angle::from_deg(3.0)).pose(&frame, &stated);
+        let turn = (asked.rotation() * truth.rotation().inverse()).angle();
+        let direction = asked.origin().mm().angle(&truth.origin().mm());
+        assert!(turn.to_degrees() < 0.02 && direction.to_degrees() < 0.05, "{turn} {direction}");
+    }
+
+    #[test]
     fn without_matches_the_band_is_as_wide_as_the_prior() {
         let sigma = Angle::from_deg(0.5);
-        let consensus = Consensus::of(&[], sigma, Angle::from_deg(0.03));
-        let far = rays(&[Vector3::z(), Vector3::z()], &UnitQuaternion::identity());
+        let consensus = Consensus::of(&[], sigma);
+        let far = seen(&[Vector3::z(), Vector3::z()], &UnitQuaternion::identity());
         let (off, left_over) = consensus.off_plane(&far).unwrap();
         assert!(off.rad() < 1e-12);
         assert!((left_over.deg() - sigma.deg()).abs() < 1e-9);

@@ -23,14 +23,17 @@ mod distinct;
 mod epipolar_band;
 mod guided;
 pub mod learned;
+mod links;
 mod matcher;
 mod neighbours;
 mod plane;
 mod refine;
 mod shared_field;
 mod shared_frame;
+mod shared_views;
 mod single;
 mod view;
+mod wrong_pose;
 
 pub use dense::{DenseCounts, DenseDepth, DenseRange, DenseSample, DenseViews, Disparities, Gap, Swept, dense_depth};
 pub use guided::GuidedMatcher;

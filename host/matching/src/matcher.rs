@@ -44,6 +44,8 @@ pub struct Match {
     pub left: Pixel,
     /// Where the right image shows it.
     pub right: Pixel,
+    /// Standard deviation of each coordinate of both positions, in pixels of the images, as if both were equally uncertain.
+    pub sigma: f64,
     /// Likeness in [0, 1], comparable within one matcher only.
     pub score: f32,
 }

@@ -14,8 +14,8 @@ const NEAREST: usize = 8;
 const SUPPORT: usize = 2;
 /// Largest change of disparity per distance.
 const GRADIENT_LIMIT: f64 = 0.3;
-/// Disparities differing by no more than this agree at any distance, in pixels.
-const ALWAYS_AGREE: f64 = 0.7;
+/// Disparities differing by no more than this many standard deviations agree at any distance.
+const ALWAYS_AGREE_SIGMAS: f64 = 1.65;
 /// Two matches within this distance show one point, in pixels.
 const SAME_POINT: f64 = 2.0;
 
@@ -25,6 +25,7 @@ pub(crate) struct Placed {
     pub left: ViewPixel,
     pub disparity: f64,
     pub score: f64,
+    pub sigma: f64,
 }
 
 /// Whether enough of the nearest other points agree with each match.
@@ -32,26 +33,32 @@ pub(crate) fn supported(matches: &[Placed]) -> Vec<bool> {
     matches.par_iter().map(|one| support(one, matches) >= SUPPORT).collect()
 }
 
-/// Whether each match has the same place as a better one (of equals, the earlier).
+/// Whether each match has the same place as a better one: better known, or else more alike; of equals, the earlier.
 pub(crate) fn duplicated(matches: &[Placed]) -> Vec<bool> {
     let better = |i: usize, j: usize| {
         let (p, q) = (&matches[i], &matches[j]);
-        distance(p, q) < SAME_POINT && q.score.total_cmp(&p.score).then(i.cmp(&j)).is_gt()
+        distance(p, q) < SAME_POINT
+            && p.sigma.total_cmp(&q.sigma).then(q.score.total_cmp(&p.score)).then(i.cmp(&j)).is_gt()
     };
     (0..matches.len()).into_par_iter().map(|i| (0..matches.len()).any(|j| better(i, j))).collect()
 }
 
 fn support(one: &Placed, matches: &[Placed]) -> usize {
-    let mut nearest: Vec<(f64, f64)> = matches
+    let change = |other: &Placed| {
+        let noise = ALWAYS_AGREE_SIGMAS * one.sigma.hypot(other.sigma);
+        let allowed = noise.max(GRADIENT_LIMIT * distance(one, other));
+        ((other.disparity - one.disparity).abs(), allowed)
+    };
+    let mut nearest: Vec<(f64, (f64, f64))> = matches
         .iter()
-        .map(|other| (distance(one, other), (other.disparity - one.disparity).abs()))
+        .map(|other| (distance(one, other), change(other)))
         .filter(|(distance, _)| *distance >= SAME_POINT)
         .collect();
     if nearest.len() > NEAREST {
-        nearest.select_nth_unstable_by(NEAREST, |p, q| p.0.total_cmp(&q.0).then(p.1.total_cmp(&q.1)));
+        nearest.select_nth_unstable_by(NEAREST, |p, q| p.0.total_cmp(&q.0).then(p.1.0.total_cmp(&q.1.0)));
         nearest.truncate(NEAREST);
     }
-    nearest.iter().filter(|(distance, change)| *change <= ALWAYS_AGREE.max(GRADIENT_LIMIT * distance)).count()
+    nearest.iter().filter(|(_, (change, allowed))| change <= allowed).count()
 }
 
 fn distance(p: &Placed, q: &Placed) -> f64 {

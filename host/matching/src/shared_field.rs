@@ -1,10 +1,11 @@
 //! What both cameras of a pair see.
 
-use nalgebra::Vector3;
+use nalgebra::{Rotation3, Vector3};
 use vergence_vision::{Angle, Frame, KannalaBrandt, Length, Pixel, UnitRay};
 
+use crate::epipolar_band::EpipolarBand;
 use crate::view::direction;
-use crate::{Shared, SharedFrame};
+use crate::{ImagePair, Shared, SharedFrame};
 
 /// Largest |a|: nearer the baseline than 15° disparity says little about range.
 const A_LIMIT: Angle = Angle::from_deg(75.0);
@@ -14,6 +15,8 @@ const B_LIMIT: Angle = Angle::from_deg(105.0);
 const RIM: Angle = Angle::from_deg(1.5);
 /// Besides infinity, the range at which the other camera must see a direction for it to be compared.
 const NEAR: Length = Length::from_mm(1000.0);
+/// A field widened for an uncertain pose is widened by no more than this.
+const MOST_SLACK: Angle = Angle::from_deg(10.0);
 
 /// Which directions of each view are worth comparing.
 #[derive(Clone, Copy, Debug)]
@@ -21,19 +24,28 @@ pub(crate) struct SharedField<'a> {
     frame: &'a SharedFrame,
     left: &'a KannalaBrandt,
     right: &'a KannalaBrandt,
+    /// How far off the other camera's axis may be.
+    slack: Angle,
 }
 
 impl<'a> SharedField<'a> {
+    /// For a pose known exactly.
     pub(crate) const fn new(frame: &'a SharedFrame, left: &'a KannalaBrandt, right: &'a KannalaBrandt) -> Self {
-        Self { frame, left, right }
+        Self { frame, left, right, slack: Angle::from_deg(0.0) }
     }
 
-    /// Whether the left camera sees a bearing and the right camera sees it too, at infinity or at 1 m.
+    /// As far as the uncertain pose of `pair` lets one tell.
+    pub(crate) fn of(frame: &'a SharedFrame, pair: &ImagePair<'a>) -> Self {
+        let slack = Angle::from_rad((EpipolarBand::SIGMAS * pair.pose_sigma.rad()).min(MOST_SLACK.rad()));
+        Self { slack, ..Self::new(frame, pair.left_camera, pair.right_camera) }
+    }
+
+    /// Whether the left camera sees a bearing and the right camera may see it too, at infinity or at 1 m.
     pub(crate) fn seen_from_left(&self, bearing: &UnitRay<Shared>) -> bool {
         let (left_from, right_from) =
             (self.frame.shared_from_left().inverse(), self.frame.shared_from_right().inverse());
         seen_at(self.left, &(left_from * *bearing)).is_some()
-            && self.parallax_ends(bearing, -1.0).any(|other| seen_at(self.right, &(right_from * other)).is_some())
+            && self.parallax_ends(bearing, -1.0).any(|other| self.may_see(self.right, &(right_from * other)))
     }
 
     /// The same for a bearing of the right camera.
@@ -41,7 +53,17 @@ impl<'a> SharedField<'a> {
         let (left_from, right_from) =
             (self.frame.shared_from_left().inverse(), self.frame.shared_from_right().inverse());
         seen_at(self.right, &(right_from * *bearing)).is_some()
-            && self.parallax_ends(bearing, 1.0).any(|other| seen_at(self.left, &(left_from * other)).is_some())
+            && self.parallax_ends(bearing, 1.0).any(|other| self.may_see(self.left, &(left_from * other)))
+    }
+
+    /// Whether `camera` sees a ray, or would if it were turned by the slack.
+    fn may_see<F: Frame>(&self, camera: &KannalaBrandt, ray: &UnitRay<F>) -> bool {
+        let towards_axis = || {
+            let axis = ray.vector().cross(&Vector3::z()).try_normalize(f64::EPSILON)?;
+            UnitRay::new(Rotation3::new(axis * self.slack.rad()) * ray.vector())
+        };
+        seen_at(camera, ray).is_some()
+            || (self.slack.rad() > 0.0 && towards_axis().is_some_and(|ray: UnitRay<F>| seen_at(camera, &ray).is_some()))
     }
 
     /// The bearings, from a camera displaced by `side` baselines along x, of the point at infinity and the one at 1 m.
@@ -61,8 +83,7 @@ pub(crate) struct Extent {
 
 impl Extent {
     /// The bounds of what the cameras share, found on a grid of one degree and widened by that degree.
-    pub(crate) fn of_shared_field(frame: &SharedFrame, left: &KannalaBrandt, right: &KannalaBrandt) -> Option<Self> {
-        let field = SharedField::new(frame, left, right);
+    pub(crate) fn of(field: &SharedField<'_>) -> Option<Self> {
         let (a_limit, b_limit) = (A_LIMIT.deg() as i32, B_LIMIT.deg() as i32);
         let compared = |&(a, b): &(i32, i32)| {
             let d = direction(f64::from(a).to_radians(), f64::from(b).to_radians());

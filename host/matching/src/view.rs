@@ -6,10 +6,10 @@
 use image::GrayImage;
 use nalgebra::Vector3;
 use rayon::prelude::*;
-use vergence_vision::{BatchLens, Frame, KannalaBrandt, OutsideField, Pixel, Transform, UnitRay};
+use vergence_vision::{Angle, BatchLens, Frame, KannalaBrandt, OutsideField, Pixel, Transform, UnitRay};
 
 use crate::plane::{Plane, cubic_weights};
-use crate::shared_field::{Extent, well_inside};
+use crate::shared_field::{Extent, SharedField, well_inside};
 use crate::{Shared, SharedFrame};
 
 /// A position in a [`View`], in its pixels. (0, 0) is the centre of the top-left one.
@@ -43,10 +43,14 @@ impl Grid {
         right: &KannalaBrandt,
         oversampling: f64,
     ) -> Option<Self> {
+        Self::over(&SharedField::new(frame, left, right), left.k()[0].max(right.k()[0]) * oversampling)
+    }
+
+    /// The grid over a field with `wanted` pixels per radian, or fewer.
+    pub(crate) fn over(field: &SharedField<'_>, wanted: f64) -> Option<Self> {
         const LARGEST: f64 = 4096.0;
-        let extent = Extent::of_shared_field(frame, left, right)?;
+        let extent = Extent::of(field)?;
         let (wide, tall) = (extent.a_max - extent.a_min, extent.b_max - extent.b_min);
-        let wanted = left.k()[0].max(right.k()[0]) * oversampling;
         let pixels_per_radian = if wanted > 0.0 { wanted.min((LARGEST - 1.0) / wide.max(tall)) } else { return None };
         let count = |angle: f64| (angle * pixels_per_radian) as usize + 1;
         Some(Self {
@@ -178,6 +182,12 @@ impl<F: Frame> View<F> {
     /// [`OutsideField`] beyond the lens's valid cone.
     pub fn position(&self, original: Pixel) -> Result<ViewPixel, OutsideField> {
         Ok(self.grid.position(&(self.shared_from_camera * self.camera.unproject(original)?)))
+    }
+
+    /// How many pixels of the original image make one of the view at an original pixel, along the radius.
+    pub(crate) fn shrinking(&self, original: Pixel) -> f64 {
+        let theta = self.camera.unproject::<F>(original).map_or(0.0, |ray| ray.vector().z.clamp(-1.0, 1.0).acos());
+        self.camera.pixels_per_radian(Angle::from_rad(theta)) / self.grid.pixels_per_radian
     }
 
     pub(crate) const fn plane(&self) -> &Plane {

@@ -8,9 +8,6 @@ use nalgebra::{Matrix6, UnitQuaternion, Vector3, Vector6};
 use vergence_matching::{GuidedMatcher, ImagePair, Matcher};
 use vergence_vision::{Angle, Left, PixelPair, PoseDrift, Right, StereoPair, Transform, pose_drift};
 
-/// Registered matches in images of 640 pixels, each coordinate.
-const PIXEL_SIGMA: f64 = 0.2;
-
 /// What the picture says with the pose turned by `off`, its sigma stated as 0.02° and 0.1 mm; and how many matches there are.
 fn drift(pair: &Pair, off: Vector3<f64>) -> (PoseDrift, usize) {
     let images = pair.images();
@@ -19,11 +16,12 @@ fn drift(pair: &Pair, off: Vector3<f64>) -> (PoseDrift, usize) {
         Transform::new(UnitQuaternion::from_scaled_axis(-off) * truth.rotation(), truth.origin().mm());
     let images = ImagePair { left_from_right: believed, pose_sigma: Angle::from_deg(0.15), ..images };
     let found = GuidedMatcher::default().find(&images).unwrap().pairs;
-    let pixels: Vec<_> = found.iter().map(|found| PixelPair { left: found.left, right: found.right }).collect();
+    let pixels: Vec<_> =
+        found.iter().map(|found| (PixelPair { left: found.left, right: found.right }, found.sigma)).collect();
     let rig = StereoPair { left: &pair.camera, right: &pair.camera, left_from_right: believed };
     let (turn, shift) = (0.02f64.to_radians().powi(2), 0.1f64.powi(2));
     let stated = Matrix6::from_diagonal(&Vector6::new(turn, turn, turn, shift, shift, shift));
-    (pose_drift(&pixels, &rig, PIXEL_SIGMA, &stated).unwrap(), found.len())
+    (pose_drift(&pixels, &rig, &stated).unwrap(), found.len())
 }
 
 #[test]

@@ -98,7 +98,8 @@ pub fn middle_pose(rig: &Rig, joints: &impl Joints, exposure: &PairExposure) -> 
 }
 
 /// The points of `pairs`, each triangulated with the pose of the left camera when its row was exposed and that of the right
-/// camera when its own was, in the frame of the left camera at its middle row.
+/// camera when its own was, in the frame of the left camera at its middle row. With each pair stands the standard deviation
+/// of its positions in pixels.
 ///
 /// The covariance of the pose in `gates` is replaced by that of each point's own pose: it grows with the speed of the
 /// stages and the uncertainty of the exposure's instant.
@@ -106,7 +107,7 @@ pub fn middle_pose(rig: &Rig, joints: &impl Joints, exposure: &PairExposure) -> 
 /// # Errors
 /// [`TrackGap`] where the encoder readings do not cover an exposure.
 pub fn moving_cloud(
-    pairs: &[PixelPair],
+    pairs: &[(PixelPair, f64)],
     rig: &Rig,
     joints: &impl Joints,
     exposure: &PairExposure,
@@ -114,10 +115,11 @@ pub fn moving_cloud(
 ) -> Result<Cloud, TrackGap> {
     let reference_from_base = rig.pose(&joints.at(exposure.left.middle)?).base_from_left.inverse();
     let mut cloud = Cloud::default();
-    for (pair_index, pixels) in pairs.iter().enumerate() {
+    for (pair_index, (pixels, pixel_sigma)) in pairs.iter().enumerate() {
+        let gates = Gates { pixel_sigma: *pixel_sigma, ..*gates };
         let left = joints.at(exposure.left.at_row(pixels.left.v))?;
         let right = joints.at(exposure.right.at_row(pixels.right.v))?;
-        match point(pixels, rig, &reference_from_base, [&left, &right], gates) {
+        match point(pixels, rig, &reference_from_base, [&left, &right], &gates) {
             Ok(point) => cloud.points.push(CloudPoint { pair_index, ..point }),
             Err(reason) => *cloud.dropped.entry(reason).or_default() += 1,
         }

@@ -3,16 +3,16 @@
 use std::collections::BTreeMap;
 
 use image::{RgbImage, imageops::grayscale};
-use vergence_matching::{ImagePair, MatchError, Matcher, Matches, image_corners};
+use vergence_matching::{ImagePair, Match, MatchError, Matcher, Matches, image_corners};
 use vergence_rig::{Joints, MiddlePose, PairExposure, Rig, RigPose, TrackGap, middle_pose, moving_cloud};
 use vergence_vision::{
     Angle, Camera as CameraFrame, Cloud, CloudPoint, Gates, KannalaBrandt, Kernel, Length, Pixel, PixelPair, PoseDrift,
-    SharedCovariance, StereoPair, UnitRay, cloud, pose_drift,
+    SharedCovariance, StereoPair, UnitRay, cloud_of_each, pose_drift,
 };
 
 use crate::stopwatch::Stopwatch;
 
-/// How well a matched position is known, in pixels. Generous: the classical matcher reaches 0.1 on sharp images.
+/// How well a position is known of which nothing is said, in pixels.
 pub const PIXEL_SIGMA: f64 = 0.2;
 /// Gates are this many standard deviations wide.
 const GATE_SIGMAS: f64 = 3.0;
@@ -121,7 +121,7 @@ pub fn look_exposed(
     let cloud = moving_cloud(&pairs, rig, joints, exposure, &gates(rig, &middle.pose))?;
     let triangulate_seconds = triangulation.seconds();
     let stands = middle.sweep < middle.pose.rotation_sigma;
-    let drift = || pose_drift(&pairs, &stereo(rig, &middle.pose), PIXEL_SIGMA, &middle.pose.covariance);
+    let drift = || pose_drift(&pairs, &stereo(rig, &middle.pose), &middle.pose.covariance);
     let look = Look {
         pose_drift: stands.then(drift).flatten(),
         matches: pairs.len(),
@@ -155,22 +155,23 @@ fn matches(
     Ok((found, matching.seconds()))
 }
 
-fn pixel_pairs(found: &Matches) -> Vec<PixelPair> {
-    found.pairs.iter().map(|m| PixelPair { left: m.left, right: m.right }).collect()
+fn pixel_pairs(found: &Matches) -> Vec<(PixelPair, f64)> {
+    let pair = |m: &Match| (PixelPair { left: m.left, right: m.right }, m.sigma);
+    found.pairs.iter().map(pair).collect()
 }
 
 fn stereo<'a>(rig: &'a Rig, pose: &RigPose) -> StereoPair<'a> {
     StereoPair { left: &rig.left_camera, right: &rig.right_camera, left_from_right: pose.left_from_right }
 }
 
-/// Triangulates given correspondences.
+/// Triangulates given correspondences, each with the standard deviation of its positions in pixels.
 #[must_use]
-pub fn triangulate(pairs: &[PixelPair], eyes: Eyes<'_>, rig: &Rig, pose: &RigPose, kernel: Kernel) -> Look {
+pub fn triangulate(pairs: &[(PixelPair, f64)], eyes: Eyes<'_>, rig: &Rig, pose: &RigPose, kernel: Kernel) -> Look {
     let triangulation = Stopwatch::start();
     let stereo = stereo(rig, pose);
-    let result = cloud(pairs, &stereo, &Gates { kernel, ..gates(rig, pose) });
+    let result = cloud_of_each(pairs, &stereo, &Gates { kernel, ..gates(rig, pose) });
     Look {
-        pose_drift: pose_drift(pairs, &stereo, PIXEL_SIGMA, &pose.covariance),
+        pose_drift: pose_drift(pairs, &stereo, &pose.covariance),
         matches: pairs.len(),
         triangulate_seconds: triangulation.seconds(),
         ..Look::of_cloud(result, eyes)

@@ -125,9 +125,23 @@ pub struct Cloud {
 /// number of pairs.
 #[must_use]
 pub fn cloud(pairs: &[PixelPair], rig: &StereoPair<'_>, gates: &Gates) -> Cloud {
+    collect(pairs.iter().map(|pixels| cloud_point(pixels, rig, gates)))
+}
+
+/// The same where the noise of every pair is its own: its standard deviation in pixels stands with it, instead of that of
+/// `gates`.
+#[must_use]
+pub fn cloud_of_each(pairs: &[(PixelPair, f64)], rig: &StereoPair<'_>, gates: &Gates) -> Cloud {
+    let of = |(pixels, pixel_sigma): &(PixelPair, f64)| {
+        cloud_point(pixels, rig, &Gates { pixel_sigma: *pixel_sigma, ..*gates })
+    };
+    collect(pairs.iter().map(of))
+}
+
+fn collect(fates: impl Iterator<Item = Result<CloudPoint, Drop>>) -> Cloud {
     let mut cloud = Cloud::default();
-    for (pair_index, pixels) in pairs.iter().enumerate() {
-        match cloud_point(pixels, rig, gates) {
+    for (pair_index, fate) in fates.enumerate() {
+        match fate {
             Ok(point) => cloud.points.push(CloudPoint { pair_index, ..point }),
             Err(reason) => *cloud.dropped.entry(reason).or_default() += 1,
         }

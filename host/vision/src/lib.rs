@@ -34,7 +34,7 @@ mod units;
 mod zones;
 
 pub use batch::{BatchLens, BatchTriangulation, Instructions, triangulate_batch};
-pub use cloud::{Cloud, CloudPoint, Drop, Gates, PixelPair, StereoPair, cloud, cloud_point};
+pub use cloud::{Cloud, CloudPoint, Drop, Gates, PixelPair, StereoPair, cloud, cloud_of_each, cloud_point};
 pub use covariance::{covariance, range_sigma};
 pub use epipolar::{dihedral, ray_to_plane};
 pub use frames::{Base, Camera, Frame, Left, Point, Right, Side, Transform, UnitRay, World};

@@ -2,31 +2,31 @@
 //!
 //! The networks are behind [`Network`]: this crate knows tensors, not runtimes or files. Keypoints outside the field
 //! that both cameras share are left out before the best are taken, so that none of the budget is spent on what the
-//! other camera cannot see. What the networks match is then registered, checked against the pose and thinned exactly
-//! as [`crate::GuidedMatcher`] does it.
+//! other camera cannot see. What the networks match is then checked against the pose and thinned as
+//! [`crate::GuidedMatcher`] does it. What can be registered is known to a fraction of a pixel; what cannot is kept with
+//! the larger uncertainty of the networks' own places.
 
 mod contract;
 mod manifest;
 mod model;
 mod network;
 
-use vergence_vision::{Left, Right};
-
+use crate::ViewPixel;
 use crate::corners::Keypoint;
-use crate::epipolar_band::EpipolarBand;
-use crate::guided::{
-    DENSITY, Features, KEYPOINT_TOLERANCE, LEVELS, Link, Links, agree_on_pose, drop_repeated, in_originals, keep,
-    register, surrounded,
-};
-use crate::matcher::{Drop, ImagePair, MatchError, Matcher, Matches};
-use crate::neighbours;
+use crate::guided::{KEYPOINT_TOLERANCE, LEVELS};
+use crate::links::{Compared, Link, Links, agree_on_pose, drop_repeated, in_originals, register, sighting, thin};
+use crate::matcher::{Drop, ImagePair, Match, MatchError, Matcher, Matches};
 use crate::plane::{Plane, Pyramid};
-use crate::shared_field::SharedField;
-use crate::{Grid, SharedFrame, View, ViewPixel};
+use crate::shared_views::SharedViews;
+use crate::wrong_pose::pose_instead;
 
 pub use manifest::{Coordinates, Extractor, Glue, ImageInput, Manifest, MatchForm, MatchOutput, Networks, Pipeline};
 pub use model::{Found, Model, Picture, Position, Worth};
 pub use network::{Elements, Network, NetworkError, Outlet, Signature, Tensor};
+
+/// Standard deviation of a match that could not be registered, in pixels of the view and in each direction: networks place
+/// keypoints on whole pixels of both views. Measured on rendered pairs: see docs/measured.md.
+const UNREGISTERED_SIGMA: f64 = 0.8;
 
 /// Matches what pre-trained networks find alike.
 pub struct LearnedMatcher {
@@ -36,21 +36,45 @@ pub struct LearnedMatcher {
     /// Pixels of the view per pixel at the centre of the denser fisheye image, from 1 to 2. `None` takes what makes
     /// 450 pixels per radian.
     pub oversampling: Option<f64>,
-    /// Whether matches are registered to a fraction of a pixel, and those that cannot be are dropped.
-    pub registered: bool,
 }
 
 impl LearnedMatcher {
-    /// A matcher that compares at most 2048 keypoints of each view and registers what matches.
+    /// A matcher that compares at most 2048 keypoints of each view.
     #[must_use]
     pub const fn new(model: Model) -> Self {
-        Self { model, keypoints: 2048, oversampling: None, registered: true }
+        Self { model, keypoints: 2048, oversampling: None }
     }
 
     /// The networks it asks.
     #[must_use]
     pub const fn model(&self) -> &Model {
         &self.model
+    }
+
+    /// What the networks match in the views, before registration and every other test.
+    ///
+    /// # Errors
+    /// As [`Matcher::find`].
+    pub fn candidates(&self, pair: &ImagePair<'_>) -> Result<Vec<Match>, MatchError> {
+        pair.check()?;
+        let views = SharedViews::of(pair, self.oversampling)?;
+        let seen = self.compare(&views)?;
+        Ok(in_originals(&seen.links, &views, &seen.keypoints, seen.right_keypoints).pairs)
+    }
+
+    fn compare(&self, views: &SharedViews<'_>) -> Result<Seen, NetworkError> {
+        let (width, height) = views.grid.size();
+        let (left, right) = (lit(views.left.plane()), lit(views.right.plane()));
+        let pictures = [&left, &right].map(|values| Picture { values, width, height });
+        let worth: Worth<'_> =
+            [&|at| views.shared_from_left(&keypoint(at)), &|at| views.shared_from_right(&keypoint(at))];
+        let found = self.model.compare(pictures, self.keypoints, worth)?;
+        let [left, right] = found.keypoints;
+        let mut links: Links = vec![Err(Drop::NoCandidate); left.len()];
+        for (i, j, score) in found.matches {
+            links[i] = Ok(Link { right: view_pixel(right[j]), score: f64::from(score), sigma: UNREGISTERED_SIGMA });
+        }
+        Ok(Seen { keypoints: left.into_iter().map(keypoint).collect(), right_keypoints: right.len(), links })
     }
 }
 
@@ -61,71 +85,47 @@ impl Matcher for LearnedMatcher {
 
     fn find(&self, pair: &ImagePair<'_>) -> Result<Matches, MatchError> {
         pair.check()?;
-        let frame = SharedFrame::new(&pair.left_from_right).ok_or(MatchError::NoBaseline)?;
-        let density = pair.left_camera.k()[0].max(pair.right_camera.k()[0]);
-        let oversampling = self.oversampling.filter(|o| o.is_finite()).unwrap_or(DENSITY / density).clamp(1.0, 2.0);
-        let grid = Grid::covering(&frame, pair.left_camera, pair.right_camera, oversampling)
-            .ok_or(MatchError::NoSharedField)?;
-        let field = SharedField::new(&frame, pair.left_camera, pair.right_camera);
-        let left_view: View<Left> = View::new(pair.left, pair.left_camera, frame.shared_from_left(), grid);
-        let right_view: View<Right> = View::new(pair.right, pair.right_camera, frame.shared_from_right(), grid);
+        let views = SharedViews::of(pair, self.oversampling)?;
+        let seen = self.compare(&views)?;
+        let linked = seen.keypoints.iter().zip(&seen.links);
+        let candidates: Vec<_> =
+            linked.filter_map(|(keypoint, link)| sighting(&views.grid, keypoint, link.as_ref().ok()?)).collect();
+        let Some(pose) = pose_instead(&candidates, &views, pair) else { return Ok(seen.matched(&views, pair)) };
+        let turned = ImagePair { left_from_right: pose, ..*pair };
+        let views = SharedViews::of(&turned, self.oversampling)?;
+        Ok(self.compare(&views)?.matched(&views, &turned))
+    }
+}
 
-        let in_left = |at: Position| {
-            surrounded(&left_view, &keypoint(at))
-                && grid.bearing(view_pixel(at)).is_some_and(|bearing| field.seen_from_left(&bearing))
-        };
-        let in_right = |at: Position| {
-            surrounded(&right_view, &keypoint(at))
-                && grid.bearing(view_pixel(at)).is_some_and(|bearing| field.seen_from_right(&bearing))
-        };
-        let (lit_left, lit_right) = (lit(left_view.plane()), lit(right_view.plane()));
-        let (width, height) = grid.size();
-        let pictures = [&lit_left, &lit_right].map(|values| Picture { values, width, height });
-        let found = self.model.compare(pictures, self.keypoints, [&in_left, &in_right])?;
+/// What the networks made of two views.
+struct Seen {
+    keypoints: Vec<Keypoint>,
+    right_keypoints: usize,
+    links: Links,
+}
 
-        let left = features(left_view.plane(), &found.keypoints[0]);
-        let right = features(right_view.plane(), &found.keypoints[1]);
-        let band = EpipolarBand::new(grid, frame.baseline(), pair.nearest, pair.pose_sigma);
-        let mut links: Links = vec![Err(Drop::NoCandidate); left.keypoints.len()];
-        for &(i, j, score) in &found.matches {
-            let (from, to) = (left.keypoints[i].at, right.keypoints[j].at);
-            let allowed = band.allows(from, to, KEYPOINT_TOLERANCE);
-            links[i] = if allowed { Ok(Link { right: to, score: f64::from(score) }) } else { Err(Drop::Epipolar) };
+impl Seen {
+    /// The matches that the pose allows: registered where that succeeds, and as the networks placed them elsewhere.
+    fn matched(self, views: &SharedViews<'_>, pair: &ImagePair<'_>) -> Matches {
+        let Self { keypoints, right_keypoints, mut links } = self;
+        let band = views.band();
+        for (link, keypoint) in links.iter_mut().zip(&keypoints) {
+            let allowed = |link: &Link| band.allows(keypoint.at, link.right, KEYPOINT_TOLERANCE);
+            *link = link.and_then(|link| if allowed(&link) { Ok(link) } else { Err(Drop::Epipolar) });
         }
-        if self.registered {
-            register(&mut links, &left, &right, &band);
-            agree_on_pose(&mut links, &left, &grid, pair.pose_sigma);
-            drop_repeated(&mut links, &left, &right, &band);
-        }
-        keep(&mut links, &left, neighbours::supported, Drop::Isolated);
-        keep(&mut links, &left, |placed| neighbours::duplicated(placed).iter().map(|d| !d).collect(), Drop::Duplicate);
-
-        let mut matches = Matches {
-            left_keypoints: left.keypoints.len(),
-            right_keypoints: right.keypoints.len(),
-            ..Matches::default()
-        };
-        for (keypoint, link) in left.keypoints.iter().zip(&links) {
-            match link.and_then(|link| in_originals(&left_view, &right_view, keypoint, &link)) {
-                Ok(found) => matches.pairs.push(found),
-                Err(reason) => *matches.dropped.entry(reason).or_default() += 1,
-            }
-        }
-        Ok(matches)
+        let (left, right) = (Pyramid::new(views.left.plane(), LEVELS), Pyramid::new(views.right.plane(), LEVELS));
+        let compared = Compared { left: &left, right: &right, keypoints: &keypoints };
+        register(&mut links, &compared, &band, Some(UNREGISTERED_SIGMA));
+        agree_on_pose(&mut links, &keypoints, &views.grid, pair.pose_sigma);
+        drop_repeated(&mut links, &compared, &band);
+        thin(&mut links, &keypoints);
+        in_originals(&links, views, &keypoints, right_keypoints)
     }
 }
 
 /// Brightness from 0 to 1.
 fn lit(plane: &Plane) -> Vec<f32> {
     plane.values().iter().map(|value| (value / 255.0).clamp(0.0, 1.0)).collect()
-}
-
-fn features(plane: &Plane, positions: &[Position]) -> Features {
-    Features {
-        pyramid: Pyramid::new(plane, LEVELS),
-        keypoints: positions.iter().map(|&at| keypoint(at)).collect(),
-        descriptors: Vec::new(),
-    }
 }
 
 fn keypoint(at: Position) -> Keypoint {

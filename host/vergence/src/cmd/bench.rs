@@ -1,7 +1,9 @@
 //! `vergence bench`: how fast we are, beside others on the same work.
 
 mod calibrate;
+mod matching;
 mod mcu;
+mod networks;
 mod peer;
 mod peer_opencv;
 mod sets;
@@ -24,8 +26,12 @@ enum Task {
     /// Solves every fisheye set and detects every chessboard, then lets OpenCV (cv2.fisheye.calibrate with its crude
     /// guess, the SB detector) and SciPy's bundle adjustment do the same. Everything runs on one thread.
     Calibrate(calibrate::Args),
+    /// Matches that are right, over the angle between the optical axes: whole images, views, without networks.
+    Matching(matching::Args),
     /// The simulated chip: busy code, and the firmware disarmed and armed, beside real time.
     Mcu(mcu::Args),
+    /// Networks for a pair, beside Python's onnxruntime.
+    Networks(networks::Args),
     /// Projection, unprojection and triangulation of whole arrays, beside OpenCV.
     Vision(vision::Args),
 }
@@ -33,7 +39,9 @@ enum Task {
 pub fn run(args: &Args, console: Console) -> Result<(), Failure> {
     match &args.task {
         Task::Calibrate(args) => calibrate::run(args, console),
+        Task::Matching(args) => matching::run(args, console),
         Task::Mcu(args) => mcu::run(args, console),
+        Task::Networks(args) => networks::run(args, console),
         Task::Vision(args) => vision::run(args, console),
     }
 }

@@ -19,7 +19,7 @@ use crate::camera::{Camera, FileCamera, Frame};
 use crate::cli::Globals;
 use crate::console::Console;
 use crate::failure::Failure;
-use crate::look::{Eyes, Look, look_by, look_exposed, triangulate};
+use crate::look::{Eyes, Look, PIXEL_SIGMA, look_by, look_exposed, triangulate};
 use crate::models::MatcherOptions;
 use crate::output::{Table, TableFormat, make_folder, ply, write_whole};
 use crate::rig_file;
@@ -148,7 +148,7 @@ fn out_of(args: &Args, left: &Frame) -> Result<PathBuf, Failure> {
 /// How homologous points are found, and points made of them.
 #[derive(Clone, Copy)]
 struct How<'a> {
-    pairs: Option<&'a [PixelPair]>,
+    pairs: Option<&'a [(PixelPair, f64)]>,
     matcher: &'a dyn Matcher,
     kernel: Kernel,
     motion: Option<&'a (SteadyMotion, PairExposure)>,
@@ -181,7 +181,7 @@ fn check_size(frame: &Frame, size: ImageSize, side: &str) -> Result<(), Failure>
 }
 
 /// Reads correspondences from a CSV file with a header.
-fn read_pairs(path: &Path) -> Result<Vec<PixelPair>, Failure> {
+fn read_pairs(path: &Path) -> Result<Vec<(PixelPair, f64)>, Failure> {
     #[derive(serde::Deserialize)]
     struct Row {
         u_left: f64,
@@ -194,7 +194,8 @@ fn read_pairs(path: &Path) -> Result<Vec<PixelPair>, Failure> {
         .deserialize()
         .map(|row| {
             let Row { u_left, v_left, u_right, v_right } = row.map_err(|error| Failure::input(path, error))?;
-            Ok(PixelPair { left: Pixel { u: u_left, v: v_left }, right: Pixel { u: u_right, v: v_right } })
+            let pixels = PixelPair { left: Pixel { u: u_left, v: v_left }, right: Pixel { u: u_right, v: v_right } };
+            Ok((pixels, PIXEL_SIGMA))
         })
         .collect()
 }

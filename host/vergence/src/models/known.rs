@@ -1,9 +1,10 @@
 //! Models whose tensors we know: what their publishers export, and where they publish it.
 
 use vergence_matching::learned::{
-    Coordinates, Extractor, Glue, ImageInput, Manifest, MatchForm, MatchOutput, Model, NetworkError, Networks, Pipeline,
+    Coordinates, Extractor, Glue, ImageInput, Manifest, MatchForm, MatchOutput, Networks, Pipeline,
 };
-use vergence_networks::load_rten;
+
+use super::runtime::Runtime;
 
 /// A model with publicly known tensors.
 pub struct Known {
@@ -128,29 +129,23 @@ fn separate_lightglue(extractor: &str, matcher: &str) -> Manifest {
     }
 }
 
-/// The known manifest that fits the networks in these files, each with its bytes.
+/// The known manifest that fits the networks in these files, each with its bytes, on one of the runtimes.
 ///
 /// # Errors
 /// A sentence: none fits, or more than one does.
-pub fn manifest_for(files: &[(String, Vec<u8>)]) -> Result<Manifest, String> {
-    let fits = |manifest: &Manifest| -> Result<(), NetworkError> {
-        let networks: Result<Vec<_>, _> = manifest
-            .files()
-            .filter_map(|(wanted, _)| files.iter().find(|(file, _)| file == wanted))
-            .map(|(file, bytes)| load_rten(file, bytes))
-            .collect();
-        Model::new(manifest.clone(), networks?).map(|_| ())
+pub fn manifest_for(files: &[(String, Vec<u8>)], runtimes: &[Runtime]) -> Result<Manifest, String> {
+    let fits = |manifest: &Manifest| {
+        let named = |wanted: &str| files.iter().find(|(file, _)| file == wanted).cloned();
+        let named: Option<Vec<_>> = manifest.files().map(|(wanted, _)| named(wanted)).collect();
+        named.is_some_and(|files| Runtime::check(runtimes, manifest, &files).is_ok())
     };
     let singles = files.iter().map(|(file, _)| vec![file.as_str()]);
     let couples = files.iter().flat_map(|(first, _)| {
         files.iter().filter(move |(second, _)| second != first).map(move |(second, _)| vec![first.as_str(), second])
     });
     let choices: Vec<Vec<&str>> = singles.chain(couples).collect();
-    let fitting: Vec<Manifest> = KNOWN
-        .iter()
-        .flat_map(|known| choices.iter().filter_map(|files| known.manifest(files)))
-        .filter(|manifest| fits(manifest).is_ok())
-        .collect();
+    let fitting: Vec<Manifest> =
+        KNOWN.iter().flat_map(|known| choices.iter().filter_map(|files| known.manifest(files))).filter(fits).collect();
     match fitting.as_slice() {
         [only] => Ok(only.clone()),
         [] => {

@@ -4,10 +4,14 @@
 
 mod choose;
 mod known;
+mod pattern;
 mod runtime;
+mod speed;
 mod store;
 
 pub use choose::MatcherOptions;
 pub use known::{KNOWN, Known, manifest_for};
-pub use runtime::Runtime;
+pub use pattern::pattern;
+pub use runtime::{Runtime, RuntimeOptions, threads};
+pub use speed::Speed;
 pub use store::{MODEL_FILE, ModelStore, StoreOptions, digest, load, read_manifest};

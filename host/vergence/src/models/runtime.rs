@@ -1,9 +1,12 @@
 //! Which program runs the networks, and where ONNX Runtime is.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use vergence_matching::learned::{Manifest, Model, Network, NetworkError};
 use vergence_networks::{OnnxRuntime, load_rten};
+
+use super::speed::Speed;
+use crate::failure::Failure;
 
 /// What runs networks.
 pub enum Runtime {
@@ -13,25 +16,84 @@ pub enum Runtime {
     OnnxRuntime(OnnxRuntime, PathBuf),
 }
 
-impl Runtime {
-    /// The library named on the command line or by ORT_DYLIB_PATH, which must then work; else one that pip installed;
-    /// else rten.
+/// Which of them, where the user wants to say.
+#[derive(Clone, Debug, Default, clap::Args)]
+pub struct RuntimeOptions {
+    /// What runs the networks: `rten` or `onnxruntime`. Without it the one that was faster when the model was added or last
+    /// verified, see `vergence models verify`.
+    #[arg(long, value_name = "NAME")]
+    runtime: Option<Which>,
+    /// The ONNX Runtime library, such as libonnxruntime.so. Without it one that pip installed.
+    #[arg(long, env = "ORT_DYLIB_PATH", value_name = "FILE")]
+    onnxruntime: Option<PathBuf>,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
+enum Which {
+    Rten,
+    #[value(name = "onnxruntime")]
+    OnnxRuntime,
+}
+
+/// As many as the machine runs at once.
+#[must_use]
+pub fn threads() -> usize {
+    std::thread::available_parallelism().map_or(1, std::num::NonZero::get)
+}
+
+impl RuntimeOptions {
+    /// The runtime for the model in `folder`, and why it is that one: the one that was asked for, or else the faster one by
+    /// the model's record, or else ONNX Runtime where there is one.
+    ///
+    /// # Errors
+    /// Where the one that was asked for cannot be had.
+    pub fn choose(&self, folder: &Path) -> Result<(Runtime, String), Failure> {
+        if self.runtime == Some(Which::Rten) {
+            return Ok((Runtime::Rten, "as asked".into()));
+        }
+        let found = self.onnx_runtime()?;
+        match (found, Speed::read(folder)) {
+            (None, _) if self.runtime == Some(Which::OnnxRuntime) => Err(Failure::usage(
+                "there is no ONNX Runtime: name its library with --onnxruntime, or install it with pip",
+            )),
+            (None, _) => Ok((Runtime::Rten, "there is no ONNX Runtime".into())),
+            (Some(found), _) if self.runtime.is_some() => Ok((found, "as asked".into())),
+            (Some(found), Some(speed)) => Ok(faster(found, &speed)),
+            (Some(found), None) => Ok((found, "not timed yet, see 'vergence models verify'".into())),
+        }
+    }
+
+    /// Every runtime there is.
     ///
     /// # Errors
     /// Where the library that was named cannot be loaded.
-    pub fn find(named: Option<PathBuf>, threads: usize) -> Result<Self, NetworkError> {
-        if let Some(library) = named {
-            return Ok(Self::OnnxRuntime(OnnxRuntime::load(&library, threads)?, library));
-        }
-        Ok(match installed_by_pip() {
-            Some(library) => match OnnxRuntime::load(&library, threads) {
-                Ok(runtime) => Self::OnnxRuntime(runtime, library),
-                Err(_) => Self::Rten,
-            },
-            None => Self::Rten,
-        })
+    pub fn all(&self) -> Result<Vec<Runtime>, Failure> {
+        Ok(std::iter::once(Runtime::Rten).chain(self.onnx_runtime()?).collect())
     }
 
+    /// The library named on the command line or by ORT_DYLIB_PATH, which must then work; else one that pip installed.
+    fn onnx_runtime(&self) -> Result<Option<Runtime>, Failure> {
+        let load =
+            |library: PathBuf| OnnxRuntime::load(&library, threads()).map(|found| Runtime::OnnxRuntime(found, library));
+        match &self.onnxruntime {
+            Some(named) => load(named.clone()).map(Some).map_err(|error| Failure::usage(error.to_string())),
+            None => Ok(installed_by_pip().and_then(|library| load(library).ok())),
+        }
+    }
+}
+
+/// The faster of ONNX Runtime as it was found and rten.
+fn faster(found: Runtime, speed: &Speed) -> (Runtime, String) {
+    match (speed.rten_seconds, speed.onnxruntime_seconds) {
+        (Some(rten), Some(onnx)) if rten < onnx => (Runtime::Rten, format!("{rten:.2} s, ONNX Runtime {onnx:.2} s")),
+        (Some(rten), Some(onnx)) => (found, format!("{onnx:.2} s, rten {rten:.2} s")),
+        (Some(_), None) if speed.onnxruntime.is_some() => (Runtime::Rten, "ONNX Runtime does not run it".into()),
+        (None, Some(_)) => (found, "rten does not run it".into()),
+        _ => (found, "not timed yet, see 'vergence models verify'".into()),
+    }
+}
+
+impl Runtime {
     /// Its name.
     #[must_use]
     pub fn name(&self) -> &'static str {
@@ -39,6 +101,22 @@ impl Runtime {
             Self::Rten => "rten",
             Self::OnnxRuntime(..) => "ONNX Runtime",
         }
+    }
+
+    /// Whether one of the runtimes loads the networks and they fit the manifest.
+    ///
+    /// # Errors
+    /// What the first of them says, or the first that could load them.
+    pub fn check(runtimes: &[Self], manifest: &Manifest, files: &[(String, Vec<u8>)]) -> Result<(), NetworkError> {
+        let mut refusal = None;
+        for runtime in runtimes {
+            match (runtime.model(manifest.clone(), files), &refusal) {
+                (Ok(_), _) => return Ok(()),
+                (Err(error), None | Some(NetworkError::Load { .. })) => refusal = Some(error),
+                (Err(_), Some(_)) => {}
+            }
+        }
+        refusal.map_or(Ok(()), Err)
     }
 
     /// Loads a model from the bytes of its files.

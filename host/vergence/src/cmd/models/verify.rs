@@ -1,21 +1,18 @@
-//! `vergence models verify`: are they what they were, and do they run?
-
-use std::path::PathBuf;
+//! `vergence models verify`: are they what they were, do they run, and how fast?
 
 use serde_json::json;
 use vergence_matching::learned::{Model, Picture};
 
 use crate::console::Console;
 use crate::failure::Failure;
-use crate::models::{ModelStore, Runtime, StoreOptions, load};
-use crate::stopwatch::Stopwatch;
+use crate::models::{ModelStore, RuntimeOptions, Speed, StoreOptions, load, pattern, threads};
 
-/// Reads every model, checks digests and tensors, and runs it on a drawn pattern on every runtime there is.
+/// Reads every model, checks digests and tensors, and runs it on a drawn pattern on every runtime there is. Which was
+/// faster is kept beside the model: it serves from then on.
 #[derive(Debug, clap::Args)]
 pub struct Args {
-    /// The ONNX Runtime library, such as libonnxruntime.so.
-    #[arg(long, env = "ORT_DYLIB_PATH", value_name = "FILE")]
-    onnxruntime: Option<PathBuf>,
+    #[command(flatten)]
+    runtime: RuntimeOptions,
     #[command(flatten)]
     store: StoreOptions,
 }
@@ -28,33 +25,40 @@ const SAME_PLACE: f32 = 0.5;
 
 pub fn run(args: &Args, console: Console) -> Result<(), Failure> {
     let store = ModelStore::open(&args.store)?;
-    let found = Runtime::find(args.onnxruntime.clone(), 1).map_err(|error| Failure::usage(error.to_string()))?;
-    let mut runtimes = vec![Runtime::Rten];
-    if matches!(found, Runtime::OnnxRuntime(..)) {
-        runtimes.push(found);
-    }
+    let runtimes = args.runtime.all()?;
     let mut results = Vec::new();
     let mut failed = false;
     for name in store.names()? {
-        for runtime in &runtimes {
-            let outcome = load(&store.path(&name), runtime).and_then(|model| match_with_itself(&model));
-            let told = match &outcome {
-                Ok((matches, seconds)) => format!("ok: {matches} matches of a pattern with itself in {seconds:.2} s"),
-                Err(failure) => failure.to_string(),
+        let folder = store.path(&name);
+        let outcomes: Vec<_> = runtimes
+            .iter()
+            .map(|runtime| (runtime, load(&folder, runtime).and_then(|model| match_with_itself(&model))))
+            .collect();
+        let sound = outcomes.iter().all(|(_, outcome)| outcome.is_ok());
+        let speed = if sound { Speed::measure(&folder, &runtimes, threads())? } else { Speed::default() };
+        for (runtime, outcome) in outcomes {
+            let seconds = speed.of(runtime);
+            let told = match (&outcome, seconds) {
+                (Ok(matches), Some(seconds)) => {
+                    format!("ok: {matches} matches of a pattern with itself, {seconds:.2} s")
+                }
+                (Ok(matches), None) => format!("ok: {matches} matches of a pattern with itself"),
+                (Err(failure), _) => failure.to_string(),
             };
-            failed |= outcome.is_err();
             console.say(format!("{name} on {}: {told}", runtime.name()))?;
-            results.push(json!({ "name": name, "runtime": runtime.name(), "ok": outcome.is_ok(), "message": told }));
+            results.push(json!({
+                "name": name, "runtime": runtime.name(), "ok": outcome.is_ok(), "message": told, "seconds": seconds,
+            }));
         }
+        failed |= !sound;
     }
     console.result(&json!({ "models": results }))?;
     if failed { Err(Failure::check("a model is not what it should be")) } else { Ok(()) }
 }
 
 /// A picture matched with itself: as many matches as keypoints, if all is well.
-fn match_with_itself(model: &Model) -> Result<(usize, f64), Failure> {
-    let watch = Stopwatch::start();
-    let values = pattern();
+fn match_with_itself(model: &Model) -> Result<usize, Failure> {
+    let values = pattern(SIDE);
     let picture = Picture { values: &values, width: SIDE, height: SIDE };
     let found = model
         .compare([picture, picture], KEYPOINTS, [&|_| true, &|_| true])
@@ -68,23 +72,5 @@ fn match_with_itself(model: &Model) -> Result<(usize, f64), Failure> {
         let keypoints = found.keypoints[0].len();
         return Err(Failure::check(format!("only {alike} of {keypoints} keypoints of a pattern match themselves")));
     }
-    Ok((alike, watch.seconds()))
-}
-
-/// Squares of all sizes and greys, the same every time.
-fn pattern() -> Vec<f32> {
-    let mut values = vec![0.5; SIDE * SIDE];
-    let mut state: u32 = 1;
-    // A linear congruential generator (Numerical Recipes, 2nd ed., §7.1): a pattern needs no better one.
-    let mut next = |below: usize| {
-        state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
-        (state >> 8) as usize % below
-    };
-    for _ in 0..400 {
-        let (x, y, size, grey) = (next(SIDE), next(SIDE), 6 + next(24), next(256) as f32 / 255.0);
-        for row in y..(y + size).min(SIDE) {
-            values[row * SIDE + x..row * SIDE + (x + size).min(SIDE)].fill(grey);
-        }
-    }
-    values
+    Ok(alike)
 }

@@ -1,0 +1,148 @@
+//! Matches against the truth.
+
+use nalgebra::Vector3;
+use vergence_calibration::median;
+use vergence_matching::Match;
+use vergence_vision::{Angle, CloudPoint, Pixel, Right, UnitRay};
+
+use super::simulated_pair::SimulatedPair;
+
+/// A match within so many pixels of the truth is right.
+const RIGHT_PX: f64 = 2.5;
+/// At the edge of a thing a keypoint belongs to what is in front or to what is behind: the truth is the nearest of what is
+/// seen at so many pixels around.
+const AROUND_PX: f64 = 0.8;
+
+/// How many matches are right.
+#[derive(Clone, Debug, Default)]
+pub struct Tally {
+    pub count: usize,
+    pub correct: usize,
+    /// Of the right bearing, over the matches that are right.
+    pub median_bearing_error: Angle,
+    /// Those whose places are the better known half of the scale.
+    pub sharp: Class,
+    /// The others.
+    pub coarse: Class,
+}
+
+/// How honest the uncertainty of some points is.
+#[derive(Clone, Debug, Default)]
+pub struct Class {
+    pub count: usize,
+    /// Median of what is said of both places, in pixels of each.
+    pub sigma_px: f64,
+    /// What it is: 1.48 times the median error in each direction, shared by both images. A robust standard deviation.
+    pub spread_px: f64,
+    /// Mean squared error of the range in its standard deviations, over the points that are right. 1 is honest.
+    pub nees: f64,
+    /// Share of all points whose range is off by no more than two standard deviations. 0.95 is honest.
+    pub within_two_sigma: f64,
+}
+
+impl Tally {
+    /// Of bare matches.
+    pub fn of(matches: &[Match], pair: &SimulatedPair) -> Self {
+        let verdicts: Vec<Verdict> = matches.iter().map(|found| Verdict::of(found.left, found.right, pair)).collect();
+        let correct: Vec<&Verdict> = verdicts.iter().filter(|verdict| verdict.is_right()).collect();
+        let bearing = median(correct.iter().map(|verdict| verdict.bearing_rad).collect()).unwrap_or_default();
+        Self {
+            count: matches.len(),
+            correct: correct.len(),
+            median_bearing_error: Angle::from_rad(bearing),
+            ..Self::default()
+        }
+    }
+
+    /// Of the points that `matches` made.
+    pub fn of_points(points: &[CloudPoint], matches: &[Match], pair: &SimulatedPair) -> Self {
+        let kept: Vec<Match> = points.iter().filter_map(|point| matches.get(point.pair_index).copied()).collect();
+        let sigmas = || kept.iter().map(|found| found.sigma);
+        let middle = (sigmas().fold(f64::INFINITY, f64::min) + sigmas().fold(0.0, f64::max)) / 2.0;
+        let both: Vec<(&CloudPoint, &Match)> = points.iter().zip(&kept).collect();
+        let class = |sharp: bool| {
+            Class::of(
+                &both.iter().filter(|(_, found)| (found.sigma <= middle) == sharp).copied().collect::<Vec<_>>(),
+                pair,
+            )
+        };
+        Self { sharp: class(true), coarse: class(false), ..Self::of(&kept, pair) }
+    }
+
+    pub fn precision(&self) -> f64 {
+        self.correct as f64 / self.count.max(1) as f64
+    }
+}
+
+impl Class {
+    /// A point whose range is less certain than this part of it says nothing of the others.
+    const USEFUL: f64 = 0.05;
+
+    fn of(points: &[(&CloudPoint, &Match)], pair: &SimulatedPair) -> Self {
+        let mut errors_px = Vec::new();
+        let (mut squares, mut within, mut useful) = (Vec::new(), 0_usize, 0_usize);
+        for (point, found) in points {
+            let verdict = Verdict::of(found.left, found.right, pair);
+            if verdict.is_right() {
+                errors_px.extend(verdict.offset_px.map(f64::abs));
+            }
+            let range = point.point.mm().norm();
+            let (Some(truth), sigma) = (pair.range(found.left), point.sigma_range.mm()) else { continue };
+            if sigma > Self::USEFUL * range {
+                continue;
+            }
+            let off = (range - truth.mm()) / sigma;
+            useful += 1;
+            within += usize::from(off.abs() <= 2.0);
+            if verdict.is_right() {
+                squares.push(off * off);
+            }
+        }
+        let mean = squares.iter().sum::<f64>() / squares.len().max(1) as f64;
+        Self {
+            count: points.len(),
+            sigma_px: median(points.iter().map(|(_, found)| found.sigma).collect()).unwrap_or_default(),
+            spread_px: 1.483 * std::f64::consts::FRAC_1_SQRT_2 * median(errors_px).unwrap_or_default(),
+            nees: mean,
+            within_two_sigma: within as f64 / useful.max(1) as f64,
+        }
+    }
+}
+
+/// How far a match is off.
+struct Verdict {
+    offset_px: [f64; 2],
+    bearing_rad: f64,
+}
+
+impl Verdict {
+    fn of(left: Pixel, right: Pixel, pair: &SimulatedPair) -> Self {
+        let places = [(0.0, 0.0), (AROUND_PX, 0.0), (-AROUND_PX, 0.0), (0.0, AROUND_PX), (0.0, -AROUND_PX)];
+        // The direction is that of the keypoint itself; only the range is that of what is beside it.
+        let truth = |(du, dv): (f64, f64)| -> Option<Self> {
+            let beside = pair.range(Pixel { u: left.u + du, v: left.v + dv })?;
+            let ray = pair.lens.unproject::<vergence_vision::Left>(left).ok()?;
+            let there = (pair.left_from_right.inverse() * ray.at(beside.mm())).direction()?;
+            let shown = pair.lens.project(&there).ok()?;
+            let found: UnitRay<Right> = pair.lens.unproject(right).ok()?;
+            let bearing_rad = angle(&found.vector(), &there.vector());
+            Some(Self { offset_px: [right.u - shown.u, right.v - shown.v], bearing_rad })
+        };
+        let verdicts = places.into_iter().filter_map(truth);
+        verdicts
+            .min_by(|a, b| a.error_px().total_cmp(&b.error_px()))
+            .unwrap_or(Self { offset_px: [f64::INFINITY; 2], bearing_rad: f64::INFINITY })
+    }
+
+    fn error_px(&self) -> f64 {
+        self.offset_px[0].hypot(self.offset_px[1])
+    }
+
+    fn is_right(&self) -> bool {
+        self.error_px() <= RIGHT_PX
+    }
+}
+
+fn angle(a: &Vector3<f64>, b: &Vector3<f64>) -> f64 {
+    a.cross(b).norm().atan2(a.dot(b))
+}

@@ -1,0 +1,86 @@
+//! Two eyes in the simulated room, and the truth for every pixel.
+
+use std::path::Path;
+
+use image::RgbImage;
+use image::imageops::grayscale;
+use nalgebra::{UnitQuaternion, Vector3};
+use vergence_rig::BENCH_TOML;
+use vergence_scene::{Optics, Scene, View, render};
+use vergence_vision::{Angle, Camera, ImageSize, KannalaBrandt, Left, Length, Pixel, Right, Transform, World};
+
+use crate::camera::read_image;
+use crate::failure::Failure;
+use crate::output::{make_folder, write_png};
+
+const BASELINE_MM: f64 = 145.0;
+
+/// Two photographs, the lens that made both, and where they were made.
+pub struct SimulatedPair {
+    pub lens: KannalaBrandt,
+    pub left: image::GrayImage,
+    pub right: image::GrayImage,
+    pub left_from_right: Transform<Left, Right>,
+    world_from_left: Transform<World, Left>,
+    scene: Scene,
+}
+
+impl SimulatedPair {
+    /// Renders it, or reads it from the folder of `renders` where it is kept there.
+    ///
+    /// # Errors
+    /// Where the folder cannot be read or written.
+    pub fn new(side: u32, separation: Angle, renders: Option<&Path>) -> Result<Self, Failure> {
+        let (lens, scene) = (bench_lens(side)?, Scene::room());
+        let half = separation.rad() / 2.0;
+        // As such mounts stand: pitched by 1°, rolled by 2°, each its own way.
+        let world_from_left = eye(-BASELINE_MM / 2.0, [-half, 0.018, 0.036]);
+        let world_from_right = eye(BASELINE_MM / 2.0, [half, -0.016, -0.033]);
+        let photograph = |name: &str, world_from_camera, seed| {
+            let kept = renders.map(|folder| folder.join(format!("{side}-{:.0}-{name}.png", separation.deg())));
+            if let Some(path) = kept.as_deref().filter(|path| path.is_file()) {
+                return Ok(grayscale(&read_image(path)?));
+            }
+            let view = View { scene: &scene, camera: &lens, world_from_camera, optics: &Optics::default() };
+            let image: RgbImage = render(&view, seed).image;
+            if let (Some(folder), Some(path)) = (renders, kept) {
+                make_folder(folder)?;
+                write_png(&path, &image)?;
+            }
+            Ok::<_, Failure>(grayscale(&image))
+        };
+        Ok(Self {
+            left: photograph("left", world_from_left, 1)?,
+            right: photograph("right", world_from_right, 2)?,
+            left_from_right: (world_from_left.inverse() * world_from_right).renamed(),
+            world_from_left: world_from_left.renamed(),
+            lens,
+            scene,
+        })
+    }
+
+    /// Range of what the left eye sees at a pixel, from the left eye.
+    pub fn range(&self, left: Pixel) -> Option<Length> {
+        let ray = self.world_from_left * self.lens.unproject::<Left>(left).ok()?;
+        Some(self.scene.cast(&self.world_from_left.origin(), &ray)?.range)
+    }
+}
+
+fn eye(x: f64, [yaw, pitch, roll]: [f64; 3]) -> Transform<World, Camera> {
+    let turn = UnitQuaternion::from_axis_angle(&Vector3::y_axis(), yaw)
+        * UnitQuaternion::from_axis_angle(&Vector3::x_axis(), pitch)
+        * UnitQuaternion::from_axis_angle(&Vector3::z_axis(), roll);
+    Transform::new(turn, Vector3::new(x, 0.0, 0.0))
+}
+
+/// The bench's lens on a sensor of another size.
+fn bench_lens(side: u32) -> Result<KannalaBrandt, Failure> {
+    let lens = vergence_rig::Rig::from_toml(BENCH_TOML)
+        .map_err(|error| Failure::check(format!("the built-in rig: {error}")))?
+        .left_camera;
+    let scale = f64::from(side) / f64::from(lens.size().width);
+    let centre = f64::from(side) / 2.0 - 0.5;
+    let size = ImageSize { width: side, height: side };
+    KannalaBrandt::new(lens.k().map(|k| k * scale), 1.0, Pixel { u: centre, v: centre }, lens.theta_max(), size)
+        .map_err(|error| Failure::check(format!("the bench's lens: {error}")))
+}
