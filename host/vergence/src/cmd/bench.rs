@@ -1,5 +1,6 @@
 //! `vergence bench`: how fast we are, beside others on the same work.
 
+mod busy;
 mod calibrate;
 mod mcu;
 mod peer;
@@ -24,7 +25,7 @@ enum Task {
     /// Solves every fisheye set and detects every chessboard, then lets OpenCV (cv2.fisheye.calibrate with its crude
     /// guess, the SB detector) and SciPy's bundle adjustment do the same. Everything runs on one thread.
     Calibrate(calibrate::Args),
-    /// The simulated chip: busy code, and the firmware disarmed and armed, beside real time.
+    /// The simulated chip: busy code beside QEMU, and the firmware disarmed and armed beside real time.
     Mcu(mcu::Args),
     /// Projection, unprojection and triangulation of whole arrays, beside OpenCV.
     Vision(vision::Args),
