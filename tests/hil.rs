@@ -10,7 +10,7 @@ mod elf_rig;
 
 use elf_rig::{BOTH, Board, Conversation, ElfBoard, LEASE_MS, Standing, decode, programs};
 use vergence_cpu::{Access, Bus};
-use vergence_mcu::{FLASH_BASE, Halt, Picoseconds, ResetCause as Bite};
+use vergence_mcu::{FLASH_BASE, Halt, Picoseconds, RAM_BASE, ResetCause as Bite};
 use vergence_plant::{EncoderFault, bench_settings};
 use vergence_protocol::{
     AxisMask, ControllerState, FaultCode, Mode, MovePhase, Refusal, Report, Request, ResetCause, SettingItem,
@@ -243,27 +243,82 @@ fn alternate_function(talk: &mut Talk, name: &str) -> Option<u32> {
 const TIM7_CR1: u32 = 0x4000_1400;
 const TIM15_DIER: u32 = 0x4001_400C;
 
+/// Somebody who no longer goes on.
+#[derive(Clone, Copy, Debug)]
+enum Hang {
+    /// The tick's timer is stopped.
+    Tick,
+    /// No alarm wakes the tasks.
+    Executor,
+    /// The receiving task alone: its alarm is forgotten.
+    Link,
+}
+
 #[test]
-fn the_watchdog_bites_where_tick_or_executor_hang_and_the_drivers_go_off() {
-    for (register, id) in [(TIM7_CR1, 8), (TIM15_DIER, 9)] {
+fn the_watchdog_bites_where_tick_executor_or_link_hang_and_the_drivers_go_off() {
+    for (hang, id) in [(Hang::Tick, 8), (Hang::Executor, 9), (Hang::Link, 10)] {
         let mut talk = under_way();
-        let machine = &mut talk.board.machine;
-        let now = machine.cpu().now();
-        machine.chip_mut().write(now, register, Access::Word, 0).expect("it is there");
         talk.alive = false;
-        // Half a second of patience.
-        talk.wait(600_000);
-        assert_eq!(
-            (talk.board.machine.resets(), talk.board.machine.last_reset()),
-            (1, Bite::Watchdog),
-            "{register:#x}"
-        );
+        // What the host has sent is read.
+        talk.wait(6_000);
+        hang.befall(&mut talk);
+        let before = witnesses(&mut talk);
+        talk.wait(200_000);
+        let after = witnesses(&mut talk);
+        let lives = [0, 1].map(|witness| after[witness] != before[witness]);
+        let expected = match hang {
+            Hang::Tick => [false, true],
+            Hang::Executor => [true, false],
+            Hang::Link => [true, false],
+        };
+        assert_eq!(lives, expected, "{hang:?}: tick and link");
+        // Half a second of patience in all.
+        talk.wait(400_000);
+        let machine = &talk.board.machine;
+        assert_eq!((machine.resets(), machine.last_reset()), (1, Bite::Watchdog), "{hang:?}");
         assert!(!talk.board.plant().drivers_on());
         talk.reconnect(id);
         assert_eq!(talk.info().reset, ResetCause::Watchdog);
         assert_eq!((talk.pose().state, talk.pose().referenced), (ControllerState::Idle, AxisMask(0)));
         assert_rest(&mut talk);
     }
+}
+
+impl Hang {
+    fn befall(self, talk: &mut Talk) {
+        let now = talk.now.0;
+        let machine = &mut talk.board.machine;
+        let cycle = machine.cpu().now();
+        let mut stop = |register| machine.chip_mut().write(cycle, register, Access::Word, 0).expect("it is there");
+        match self {
+            Self::Tick => stop(TIM7_CR1),
+            Self::Executor => stop(TIM15_DIER),
+            Self::Link => {
+                let task = variable(talk, "link::receive::POOL");
+                // The application's clock began within the first half second.
+                let alarms = now - 500_000..now + 6_000;
+                let words = talk.board.machine.chip_mut().ram_mut()[task..task + 512].chunks_exact_mut(8);
+                let forgotten = words
+                    .filter(|word| alarms.contains(&u64::from_le_bytes((**word).try_into().expect("eight bytes"))))
+                    .map(|word| word.copy_from_slice(&u64::MAX.to_le_bytes()));
+                assert!(forgotten.count() > 0, "the task waits for an alarm");
+            }
+        }
+    }
+}
+
+/// What the watchdog's task looks at: ticks, and rounds of the link.
+fn witnesses(talk: &mut Talk) -> [u32; 2] {
+    ["control::TICKS", "link::ROUNDS"].map(|name| {
+        let at = variable(talk, name);
+        u32::from_le_bytes(talk.board.machine.chip().ram()[at..at + 4].try_into().expect("four bytes"))
+    })
+}
+
+/// Where in RAM a variable of the firmware is.
+fn variable(talk: &Talk, name: &str) -> usize {
+    let address = talk.board.machine.firmware().address_of(&format!("vergence_nucleo_g474::{name}"));
+    (address.expect("the ELF has its symbols") - RAM_BASE) as usize
 }
 
 /// In the middle of a move to the herbivore's pose.

@@ -153,3 +153,55 @@ const fn slot(address: u32) -> usize {
 const fn page(address: u32) -> usize {
     (address >> 10 ^ address >> 18) as usize % PAGES
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const AT: u32 = 0x0800_0100;
+
+    fn with_a_nop() -> Cache {
+        let mut cache = Cache::new();
+        let mut entries = cache.lend();
+        entries.insert(AT, cache.generation(), Instruction::new(Op::Nop));
+        cache.mark(AT);
+        cache.take_back(entries);
+        cache
+    }
+
+    fn knows(cache: &mut Cache) -> bool {
+        let entries = cache.lend();
+        let known = entries.get(AT, cache.generation()).is_some();
+        cache.take_back(entries);
+        known
+    }
+
+    #[test]
+    fn a_store_is_noticed_while_the_table_is_lent_too() {
+        let mut cache = with_a_nop();
+        assert!(!cache.written(AT + 0x2000) && knows(&mut cache));
+        assert!(cache.written(AT) && !knows(&mut cache));
+        let mut cache = with_a_nop();
+        let entries = cache.lend();
+        assert!(cache.written(AT));
+        cache.take_back(entries);
+        assert!(!knows(&mut cache));
+    }
+
+    #[test]
+    fn old_code_never_comes_back_when_generations_begin_anew() {
+        // Zero is left out.
+        let generations = u32::MAX / Cache::GENERATION;
+        for lent in [false, true] {
+            let mut cache = with_a_nop();
+            let first = cache.generation();
+            let entries = lent.then(|| cache.lend());
+            for _ in 0..generations {
+                cache.clear();
+            }
+            assert_eq!(cache.generation(), first);
+            entries.into_iter().for_each(|entries| cache.take_back(entries));
+            assert!(!knows(&mut cache));
+        }
+    }
+}

@@ -4,6 +4,7 @@ use crate::bus::{Bus, Cycle, NEVER};
 use crate::cache::{Cache, Entries};
 use crate::decode;
 use crate::execute::Trap;
+use crate::handlers::{HandlerTime, HandlerTimes};
 use crate::instruction::{Instruction, Op};
 use crate::nvic::{Nvic, exception};
 use crate::system::{System, sleep};
@@ -90,6 +91,8 @@ pub struct Cpu {
     /// The instruction before was a load, so that the next one is pipelined with it.
     pub(crate) loaded: bool,
     instructions: u64,
+    asleep: Cycle,
+    pub(crate) handlers: Option<Box<HandlerTimes>>,
     cache: Cache,
     pub(crate) code_version: u64,
 }
@@ -137,6 +140,8 @@ impl Cpu {
             horizon: 0,
             loaded: false,
             instructions: 0,
+            asleep: 0,
+            handlers: None,
             cache: Cache::new(),
             code_version: 0,
         }
@@ -145,7 +150,9 @@ impl Cpu {
     /// Resets the core: stack pointer and PC from the vector table at address 0. The clock goes on; core registers
     /// other than SP, LR and PC, unknown after a real reset, are zero.
     pub fn reset<B: Bus>(&mut self, bus: &mut B) {
-        let mut fresh = Self { now: self.now, instructions: self.instructions, ..Self::new() };
+        let handlers = self.handlers.take().map(|_| Box::new(HandlerTimes::new()));
+        let (now, instructions, asleep) = (self.now, self.instructions, self.asleep);
+        let mut fresh = Self { now, instructions, asleep, handlers, ..Self::new() };
         fresh.system.set_cycle_counter(fresh.now, 0);
         fresh.systick.advance(fresh.now);
         fresh.code_version = bus.code_version();
@@ -283,7 +290,9 @@ impl Cpu {
         if next == NEVER {
             return Some(Stop::Asleep);
         }
-        self.now = next.max(self.now + 1);
+        let next = next.max(self.now + 1);
+        self.asleep += next - self.now;
+        self.now = next;
         None
     }
 
@@ -346,6 +355,23 @@ impl Cpu {
     #[must_use]
     pub fn instructions(&self) -> u64 {
         self.instructions
+    }
+
+    /// Of the cycles since power-on, those in which the core slept or stood still.
+    #[must_use]
+    pub fn asleep(&self) -> Cycle {
+        self.asleep
+    }
+
+    /// Times exception handlers from now on, or from the next reset on anew.
+    pub fn time_handlers(&mut self) {
+        self.handlers = Some(Box::new(HandlerTimes::new()));
+    }
+
+    /// What the handler of an exception (16 and up: interrupt lines) took since [`Self::time_handlers`].
+    #[must_use]
+    pub fn handler_time(&self, exception: u16) -> HandlerTime {
+        self.handlers.as_ref().map_or_else(HandlerTime::default, |handlers| handlers.of(exception))
     }
 
     /// Whether the core sleeps (WFI, WFE or sleep on exit).

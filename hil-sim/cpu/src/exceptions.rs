@@ -1,6 +1,6 @@
 //! Exception entry and return, stacking, tail chaining, late arrival and sleep (B1.5.5 to B1.5.8, B1.5.18).
 
-use crate::bus::{Access, Bus};
+use crate::bus::{Access, Bus, Cycle};
 use crate::cpu::{Activity, Cpu, Stop};
 use crate::execute::Trap;
 use crate::nvic::{HARD_FAULT_PRIORITY, THREAD_PRIORITY, exception};
@@ -69,6 +69,7 @@ impl Cpu {
     /// Stacks the context; whatever is most urgent by then is taken (late arrival).
     fn enter<B: Bus>(&mut self, bus: &mut B) {
         let value = self.return_value();
+        let begun = self.now;
         let stacked = self.push_frame(bus);
         self.now += ENTRY_CYCLES;
         if stacked.is_err() {
@@ -76,7 +77,7 @@ impl Cpu {
             self.raise_now(exception::BUS);
         }
         self.synchronize(bus);
-        self.start_handler(bus, value);
+        self.start_handler(bus, value, begun);
     }
 
     /// EXC_RETURN for the present context.
@@ -87,14 +88,17 @@ impl Cpu {
         RETURN_PREFIX | frame | thread | stack
     }
 
-    /// Starts the most urgent pending exception (ExceptionTaken, B1.5.6).
-    fn start_handler<B: Bus>(&mut self, bus: &mut B, return_value: u32) {
+    /// Starts the most urgent pending exception (ExceptionTaken, B1.5.6), whose entry has begun at `begun`.
+    fn start_handler<B: Bus>(&mut self, bus: &mut B, return_value: u32, begun: Cycle) {
         let Some(number) = self.nvic.best_pending() else { return };
         if self.activity == Activity::Halted {
             return;
         }
         self.select_stack(|cpu| cpu.exception = number);
         self.nvic.activate(number);
+        if let Some(handlers) = &mut self.handlers {
+            handlers.begin(number, begun);
+        }
         self.process_stack = false;
         self.float_active = false;
         self.float_ready = false;
@@ -112,7 +116,7 @@ impl Cpu {
             Err(_) => {
                 self.system.hard_fault_status |= status::VECTOR_TABLE;
                 self.nvic.raise(exception::HARD_FAULT);
-                self.start_handler(bus, return_value);
+                self.start_handler(bus, return_value, begun);
             }
         }
     }
@@ -220,18 +224,27 @@ impl Cpu {
         }
         let next = self.nvic.best_pending();
         if next.is_some_and(|next| self.nvic.priority(next) < self.execution_priority()) {
+            self.end_handler();
+            let begun = self.now;
             self.now += TAIL_CHAIN_CYCLES;
-            return self.start_handler(bus, value);
+            return self.start_handler(bus, value, begun);
         }
         self.now += RETURN_CYCLES;
         if self.pop_frame(bus, value).is_err() {
             return self.chain_fault(bus, exception::BUS, status::UNSTACKING, value);
         }
+        self.end_handler();
         if (self.exception == 0) != (value & RETURN_THREAD != 0) {
             return self.fault_after_return();
         }
         if self.exception == 0 && self.system.sleep & sleep::ON_EXIT != 0 {
             self.activity = Activity::AwaitingInterrupt;
+        }
+    }
+
+    fn end_handler(&mut self) {
+        if let Some(handlers) = &mut self.handlers {
+            handlers.end(self.now);
         }
     }
 
@@ -249,8 +262,10 @@ impl Cpu {
     fn chain_fault<B: Bus>(&mut self, bus: &mut B, number: u16, bit: u32, return_value: u32) {
         self.system.fault_status |= bit;
         self.raise_now(number);
+        self.end_handler();
+        let begun = self.now;
         self.now += TAIL_CHAIN_CYCLES;
-        self.start_handler(bus, return_value);
+        self.start_handler(bus, return_value, begun);
     }
 
     /// The stacked IPSR contradicts the mode returned to: a fault of the context that was restored.

@@ -220,3 +220,21 @@ fn the_priority_registers_hold_four_bits() {
     cpu.run(&mut board, NEVER);
     assert_eq!(cpu.register(2), 0xf0f0_f0f0);
 }
+
+#[test]
+fn handlers_are_timed_with_entry_and_return_and_without_what_preempts_them() {
+    // Line 0 (less urgent) runs sixteen cycles of its own, in the middle of which line 1 comes.
+    let mut board = idling(0x0000_0080);
+    board.handler(16, &[[NOP; 13].as_slice(), &[RETURN]].concat());
+    board.handler(17, &[RETURN]);
+    board.schedule = vec![(100, 1), (101, 0), (120, 2), (121, 0)];
+    let mut cpu = boot(&mut board);
+    cpu.time_handlers();
+    assert_eq!(cpu.run(&mut board, 1_000), Stop::Reached);
+    let [outer, inner] = [16, 17].map(|number| cpu.handler_time(number));
+    // Entry and return take 12 and 10 cycles, the branch that returns one: it refills nothing.
+    assert_eq!((inner.runs, inner.total, inner.longest, inner.longest_span), (1, 23, 23, 23));
+    assert_eq!((outer.runs, outer.total, outer.longest, outer.longest_span), (1, 36, 36, 36 + 23));
+    assert_eq!(cpu.handler_time(18).runs, 0);
+    assert_eq!(cpu.asleep(), 0);
+}

@@ -183,6 +183,11 @@ impl<W: World> Machine<W> {
         &self.cpu
     }
 
+    /// Times exception handlers from now on; [`Cpu::handler_time`] tells.
+    pub fn time_handlers(&mut self) {
+        self.cpu.time_handlers();
+    }
+
     /// The chip.
     #[must_use]
     pub fn chip(&self) -> &Chip<W> {

@@ -1,5 +1,6 @@
 //! `vergence bench`: how fast we are, beside others on the same work.
 
+mod busy;
 mod calibrate;
 mod matching;
 mod mcu;
@@ -28,7 +29,7 @@ enum Task {
     Calibrate(calibrate::Args),
     /// Matches that are right, over the angle between the optical axes: whole images, views, without networks.
     Matching(matching::Args),
-    /// The simulated chip: busy code, and the firmware disarmed and armed, beside real time.
+    /// The simulated chip: busy code beside QEMU, and the firmware disarmed and armed beside real time.
     Mcu(mcu::Args),
     /// Networks for a pair, beside Python's onnxruntime.
     Networks(networks::Args),
