@@ -14,7 +14,7 @@ use vergence_plant::NativeBoard;
 use vergence_protocol::{ControllerState, Counts, FaultCode, Microseconds, MovePhase, Request, Status, StopKind};
 
 const HERBIVORE: [i32; 2] = [145_000, 2_094_395];
-const HUMAN: [i32; 2] = [63_000, 0];
+const HUMAN: [i32; 2] = [145_000, 0];
 
 /// What a board did.
 #[derive(Debug, Default)]

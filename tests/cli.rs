@@ -333,6 +333,34 @@ fn depth_of_given_correspondences() {
 }
 
 #[test]
+fn dense_depth_refuses_bad_input_and_says_where_nothing_is_seen() {
+    let folder = temporary();
+    let file = |name: &str| path(&folder, name);
+    let (rig, together, out) = (file("rig.toml"), file("together.toml"), file("cloud.ply"));
+    std::fs::write(&rig, SMALL_RIG).expect("a rig file is written");
+    std::fs::write(&together, SMALL_RIG.replace("\"100mm\"", "\"0mm\"")).expect("a rig file is written");
+    picture(&file("good.png"), 64, 48);
+    picture(&file("wide.png"), 65, 48);
+    image::RgbImage::new(64, 48).save(file("black.png")).expect("a picture is written");
+    let (good, wide, black) = (file("good.png"), file("wide.png"), file("black.png"));
+    let depth = |rig: &str, left: &str, right: &str, more: &[&str], code: i32, words: &[&str]| {
+        let pair = ["depth", "--dense", "--rig", rig, "--left", left, "--right", right, "--out", &out];
+        fails_with(&[&pair, more].concat(), code, words);
+    };
+    depth(&rig, &good, &wide, &[], 2, &["wide", "65 x 48", "64 x 48"]);
+    depth(&together, &good, &good, &[], 2, &["no baseline"]);
+    depth(&rig, &good, &good, &["--points", "pairs.csv"], 2, &["--dense", "--points"]);
+    depth(&rig, &good, &good, &["--matcher", "guided"], 2, &["--dense", "--matcher"]);
+    assert!(!Path::new(&out).exists(), "an output file was left behind");
+    depth(&rig, &black, &black, &[], 1, &["no pixel of black has a range", "dark"]);
+    let ranges = image::open(file("cloud-range.png")).expect("the range image is written").into_luma16();
+    assert!(ranges.dimensions() == (64, 48) && ranges.pixels().all(|range| range.0 == [0]));
+    for name in ["cloud.ply", "cloud-sigma.png", "cloud-confidence.png", "cloud-preview.png"] {
+        assert!(Path::new(&file(name)).exists(), "{name} is written");
+    }
+}
+
+#[test]
 fn a_bench_without_its_data_or_peers_says_so() {
     let folder = temporary();
     let bench = ["bench", "calibrate", "--shared", folder.path().to_str().expect("a name")];

@@ -10,7 +10,7 @@ mod elf_rig;
 
 use elf_rig::{BOTH, Board, Conversation, ElfBoard, LEASE_MS, Standing, decode, programs};
 use vergence_cpu::{Access, Bus};
-use vergence_mcu::ResetCause as Bite;
+use vergence_mcu::{FLASH_BASE, Halt, Picoseconds, ResetCause as Bite};
 use vergence_plant::{EncoderFault, bench_settings};
 use vergence_protocol::{
     AxisMask, ControllerState, FaultCode, Mode, MovePhase, Refusal, Report, Request, ResetCause, SettingItem,
@@ -19,7 +19,10 @@ use vergence_protocol::{
 
 /// Baseline in micrometres, separation in microradians.
 const HERBIVORE: [i32; 2] = [145_000, 2_094_395];
-const HUMAN: [i32; 2] = [63_000, 0];
+const HUMAN: [i32; 2] = [145_000, 0];
+
+/// With the wiring table.
+const DOCUMENTATION: &str = include_str!("../docs/firmware.md");
 
 type Talk = Conversation<ElfBoard>;
 
@@ -135,12 +138,105 @@ fn saved_settings_survive_reset_and_power_loss_and_others_do_not() {
 }
 
 #[test]
+fn two_megabaud_by_setting_after_the_next_start() {
+    const FAST: u32 = 2_000_000;
+    let mut talk = Talk::open(&Standing::default());
+    assert!(talk.board.heard_baud.abs_diff(921_600) < 921_600 / 1_000, "{}", talk.board.heard_baud);
+    let key = SettingKey { item: SettingItem::Baud, axis: 0 };
+    assert_eq!(talk.ask(Request::SetSetting { key, value: FAST.into() }), Status::Accepted);
+    assert_eq!(talk.ask(Request::SaveSettings), Status::Accepted);
+    talk.board.machine.press_reset();
+    talk.board.baud = FAST;
+    talk.reconnect(7);
+    assert_eq!(talk.board.heard_baud, FAST);
+    let Report::Setting { value, .. } = talk.answer(Request::GetSetting(key)) else { panic!("no setting") };
+    assert_eq!(value, i64::from(FAST));
+    talk.wait(500_000);
+    assert_eq!(talk.host.statistics().poses_lost, 0);
+}
+
+#[test]
 fn the_log_says_who_starts() {
     let mut talk = Talk::open(&Standing::default());
     talk.wait(100_000);
     let said = decode(&talk.log, &programs()[0]);
     let build = talk.info().build;
     assert_eq!(said.first(), Some(&format!("info: vergence 0.1.0, build {build:016x}")), "{said:?}");
+}
+
+/// A branch with link from `at` to `to` (ARM DDI 0403E, A7.7.18, encoding T1).
+fn call(at: u32, to: u32) -> [u8; 4] {
+    let offset = to.wrapping_sub(at + 4);
+    let bit = |number: u32| offset >> number & 1;
+    let flipped = |number| (bit(number) ^ bit(24)) ^ 1;
+    let first = 0xF000 | bit(24) << 10 | offset >> 12 & 0x3FF;
+    let second = 0xD000 | flipped(23) << 13 | flipped(22) << 11 | offset >> 1 & 0x7FF;
+    let [first, second] = [first, second].map(|half| (half as u16).to_le_bytes());
+    [first[0], first[1], second[0], second[1]]
+}
+
+#[test]
+fn a_panic_and_a_fault_cut_the_drivers_and_tell_where_they_came_from() {
+    let program = &programs()[0];
+    let [tick, panic] =
+        ["TIM7_DAC", "core::panicking::panic_fmt"].map(|name| program.address_of(name).expect("a function"));
+    // Undefined by definition (A7.7.193), twice.
+    let undefined = [0x00, 0xDE, 0x00, 0xDE];
+    for (code, said, from) in [(call(tick, panic), "panic", tick + 4 + 1), (undefined, "fault", tick)] {
+        let mut talk = Talk::open(&Standing::default());
+        assert_eq!(talk.arm(), Status::Accepted);
+        assert!(talk.board.plant().drivers_on());
+        let place = (tick - FLASH_BASE) as usize;
+        let machine = &mut talk.board.machine;
+        let sound = machine.chip().flash()[place..place + 4].to_vec();
+        assert!(machine.chip_mut().load_flash(place, &code));
+        while machine.resets() == 0 {
+            assert_eq!(machine.run_for(Picoseconds::microseconds(10)), Halt::Reached);
+        }
+        // Before the boot loader judges the image.
+        assert!(machine.chip_mut().load_flash(place, &sound));
+        assert!(!talk.board.plant().drivers_on());
+        talk.log.clear();
+        talk.reconnect(8);
+        talk.wait(100_000);
+        assert_eq!(talk.info().reset, ResetCause::Software);
+        let log = decode(&talk.log, program);
+        println!("{log:#?}");
+        let entry = log.iter().find(|entry| entry.starts_with("error: died of a ")).expect("it tells");
+        assert!(entry.contains(said) && entry.contains(&format!("{from:#x}")), "{entry}");
+    }
+}
+
+#[test]
+fn pins_are_set_as_the_wiring_table_says() {
+    let mut talk = Talk::open(&Standing::default());
+    let rows: Vec<_> = DOCUMENTATION.lines().filter(|line| line.contains("(AF")).collect();
+    let mut seen = 0;
+    for row in rows {
+        let cells: Vec<_> = row.split('|').map(str::trim).collect();
+        let functions = cells[3].split("(AF").skip(1).map(|rest| rest.split(')').next().expect("a number"));
+        let functions: Vec<u32> = functions.map(|number| number.parse().expect("a number")).collect();
+        for (index, name) in cells[2].split(", ").enumerate() {
+            if cells[1].contains("reserved") {
+                continue;
+            }
+            let function = functions.get(index).or(functions.first()).expect("a function for each pin");
+            assert_eq!(alternate_function(&mut talk, name), Some(*function), "{row}");
+            seen += 1;
+        }
+    }
+    assert_eq!(seen, 9, "link, steps, encoders, trigger");
+}
+
+/// The alternate function that the firmware has given to a pin such as "PA2" (RM0440, 9.4.1, 9.4.10).
+fn alternate_function(talk: &mut Talk, name: &str) -> Option<u32> {
+    let port = 0x4800_0000 + 0x400 * u32::from(name.as_bytes()[1] - b'A');
+    let number: u32 = name[2..].parse().expect("a number");
+    let machine = &mut talk.board.machine;
+    let now = machine.cpu().now();
+    let mut read = |offset| machine.chip_mut().read(now, port + offset, Access::Word).expect("it is there");
+    let is_alternate = read(0) >> (2 * number) & 3 == 2;
+    is_alternate.then(|| read(0x20 + 4 * (number / 8)) >> (4 * (number % 8)) & 0xF)
 }
 
 /// The control register of TIM7, which makes the control tick, and the interrupt enables of TIM15, which wakes tasks.

@@ -135,3 +135,42 @@ fn a_cloud_and_a_flat_board_from_a_real_pair() {
     println!("{count} points; board of {} corners flat to {rms:.3} mm rms", corners.len());
     assert!(rms < 1.0, "{rms} mm");
 }
+
+/// A range for every pixel: the board's corners lie where the dense cloud has them.
+#[test]
+fn dense_ranges_of_a_real_pair_hold_the_board() {
+    let Some(set) = shared("data/sourishg_stereo") else { return };
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    let file = |name: &str| folder.path().join(name).to_string_lossy().into_owned();
+    std::fs::write(file("pairs.csv"), correspondences(&set.join("corners_opencv_classic.csv"))).expect("written");
+    let image = |name: &str| set.join("images").join(name).to_string_lossy().into_owned();
+    let (rig, left, right) = (write_rig(&set, folder.path()), image("left10.jpg"), image("right10.jpg"));
+    let (cloud, board, pairs) = (file("dense.ply"), file("board.ply"), file("pairs.csv"));
+    let depth = ["depth", "--json", "--rig", &rig, "--left", &left, "--right", &right, "--out"];
+    let result = run_json(&[&depth[..], &[&cloud, "--dense"]].concat());
+    run_json(&[&depth[..], &[&board, "--points", &pairs]].concat());
+
+    let ranges = image::open(file("dense-range.png")).expect("a range image").into_luma16();
+    assert_eq!(ranges.dimensions(), (960, 600));
+    let text = std::fs::read_to_string(&board).expect("a cloud");
+    let (_, body) = text.split_once("end_header\n").expect("a header");
+    let corners: Vec<Vec<f64>> =
+        body.lines().map(|line| line.split(' ').map(|x| x.parse().expect("a number")).collect()).collect();
+    let alike = corners.iter().filter(|corner| {
+        let range = Vector3::new(corner[0], corner[1], corner[2]).norm();
+        let dense = f64::from(ranges.get_pixel(corner[6].round() as u32, corner[7].round() as u32).0[0]);
+        (dense / range - 1.0).abs() < 0.02
+    });
+    let alike = alike.count();
+    println!("{result}; {alike} of {} corners alike", corners.len());
+    assert!(result["measured_share"].as_f64().is_some_and(|share| share > 0.3), "{result}");
+    assert!(
+        alike * 10 >= corners.len() * 9,
+        "{alike} of {} corners lie where the dense ranges have them",
+        corners.len()
+    );
+    // Its header is text, its rows 35 bytes each.
+    let bytes = std::fs::read(&cloud).expect("a dense cloud");
+    let end = bytes.windows(11).position(|window| window == b"end_header\n").expect("a header") + 11;
+    assert_eq!((bytes.len() - end) as u64, 35 * result["points"].as_u64().expect("a count"));
+}

@@ -11,6 +11,7 @@ mod build;
 mod common;
 
 use common::{Simulator, fails_with};
+use vergence_mcu::{Firmware, LogDecoder};
 
 #[test]
 fn the_firmware_answers_at_a_pseudo_terminal() {
@@ -26,4 +27,39 @@ fn the_firmware_answers_at_a_pseudo_terminal() {
 fn a_program_for_another_machine_is_refused() {
     let own = std::env::current_exe().expect("this test is a program");
     fails_with(&["sim", "--elf", own.to_str().expect("a plain path")], 2, &["32-bit ELF"]);
+}
+
+#[test]
+fn the_log_is_decoded_over_the_link() {
+    let elf = build::build("vergence-nucleo-g474");
+    let elf = elf.to_str().expect("a plain path");
+    let simulator = Simulator::start(&["--elf", elf]);
+    // The first host hears what the board said before.
+    let entry = simulator.json(&["log", "--elf", elf, "--count", "1"]);
+    println!("{entry}");
+    let build = simulator.json(&["status"])["build"].as_str().expect("a build").to_owned();
+    assert_eq!((&entry["level"], &entry["text"]), (&"info".into(), &format!("vergence 0.1.0, build {build}").into()));
+    let seconds: f64 = entry["time"].as_str().expect("a time").parse().expect("seconds");
+    assert!((0.0..1.0).contains(&seconds), "{seconds}");
+}
+
+#[test]
+fn the_raw_log_is_what_the_board_sends() {
+    let elf = build::build("vergence-nucleo-g474");
+    let simulator = Simulator::start(&["--elf", elf.to_str().expect("a plain path")]);
+    let output = simulator.run(&["log", "--raw", "--count", "1"]);
+    assert!(output.status.success(), "{}", common::text(&output.stderr));
+    let firmware = Firmware::from_elf(&std::fs::read(elf).expect("it was built")).expect("it is for this chip");
+    let mut decoder = LogDecoder::new(&firmware).expect("it logs by defmt");
+    let entries: Vec<_> = decoder.push(&output.stdout).into_iter().flatten().collect();
+    assert!(entries.iter().any(|entry| entry.text.starts_with("vergence ")), "{entries:?}");
+}
+
+#[test]
+fn the_log_of_another_build_is_refused() {
+    let elf = build::build("vergence-nucleo-g474");
+    let elf = elf.to_str().expect("a plain path");
+    fails_with(&["--port", "sim", "log", "--elf", elf], 2, &["this is build", "the board runs build"]);
+    let boot_loader = build::build("vergence-bootloader");
+    fails_with(&["log", "--elf", boot_loader.to_str().expect("a plain path")], 2, &["no defmt log"]);
 }

@@ -73,8 +73,12 @@ const EXCEPTIONS: &[(&str, &str, &str)] = &[
     ("mio-serial", "MPL-2.0", "the same"),
 ];
 
-fn metadata() -> Value {
-    let manifest = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../Cargo.toml");
+/// The workspaces: what runs on a computer, and what runs on the board, the boot loader included.
+const HOST: &str = "Cargo.toml";
+const BOARD: &str = "firmware/nucleo-g474/Cargo.toml";
+
+fn metadata(workspace: &str) -> Value {
+    let manifest = Path::new(env!("CARGO_MANIFEST_DIR")).join("../..").join(workspace);
     let output = Command::new(env!("CARGO"))
         .args(["metadata", "--format-version", "1", "--locked", "--manifest-path"])
         .arg(manifest)
@@ -90,7 +94,7 @@ fn list(value: &Value) -> &[Value] {
 
 #[test]
 fn dependencies_point_the_right_way() {
-    let metadata = metadata();
+    let metadata = metadata(HOST);
     let members: BTreeSet<&str> = list(&metadata["workspace_members"]).iter().filter_map(Value::as_str).collect();
     let allowed: BTreeMap<_, _> = ALLOWED.iter().copied().collect();
     let mut seen = 0;
@@ -113,7 +117,11 @@ fn dependencies_point_the_right_way() {
 #[test]
 fn licences_are_permissive() {
     let mut strangers = Vec::new();
-    for package in list(&metadata()["packages"]) {
+    let [host, board] = [HOST, BOARD].map(metadata);
+    let known =
+        |metadata: &Value, name: &str| list(&metadata["packages"]).iter().any(|package| package["name"] == name);
+    assert!(known(&host, "tokio") && known(&board, "embassy-stm32") && known(&board, "vergence-bootloader"));
+    for package in list(&host["packages"]).iter().chain(list(&board["packages"])) {
         let name = package["name"].as_str().expect("a name");
         let licence = package["license"].as_str().unwrap_or_default();
         if EXCEPTIONS.iter().any(|(exempt, what, _)| *exempt == name && *what == licence) {

@@ -43,6 +43,10 @@ pub trait Board {
 /// Boot loader and application on the simulated chip.
 pub struct ElfBoard {
     pub machine: Machine<Bench>,
+    /// The speed at which the host speaks.
+    pub baud: u32,
+    /// The speed of what the board last said.
+    pub heard_baud: u32,
 }
 
 /// The application and the boot loader, built once.
@@ -66,7 +70,7 @@ impl Board for ElfBoard {
         assert!(machine.chip_mut().load_flash((ACTIVE.start + CAPACITY) as usize, &seal.to_bytes()));
         // Last, for the symbols.
         machine.load(application.clone()).expect("it fits");
-        Self { machine }
+        Self { machine, baud: BAUD, heard_baud: BAUD }
     }
 
     fn advance(&mut self, to: Microseconds) {
@@ -75,12 +79,15 @@ impl Board for ElfBoard {
     }
 
     fn receive(&mut self, bytes: &[u8]) {
-        let frames: Vec<_> = bytes.iter().map(|&byte| Frame { byte, baud: BAUD, fault: LineFault::None }).collect();
+        let frames: Vec<_> =
+            bytes.iter().map(|&byte| Frame { byte, baud: self.baud, fault: LineFault::None }).collect();
         self.machine.chip_mut().send(UartId::LPUART1, &frames);
     }
 
     fn transmit(&mut self) -> Vec<u8> {
-        self.machine.chip_mut().take_sent(UartId::LPUART1).iter().map(|sent| sent.byte).collect()
+        let sent = self.machine.chip_mut().take_sent(UartId::LPUART1);
+        self.heard_baud = sent.last().map_or(self.heard_baud, |last| last.baud);
+        sent.iter().map(|sent| sent.byte).collect()
     }
 
     fn plant(&self) -> &Plant {

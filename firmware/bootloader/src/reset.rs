@@ -4,7 +4,8 @@ use core::panic::PanicInfo;
 
 use cortex_m_rt::{ExceptionFrame, exception};
 use embassy_stm32::pac;
-use vergence_image::{Death, Survivor};
+use vergence_image::{Death, DeathKind, Survivor};
+use vergence_nucleo_common::death;
 use vergence_nucleo_common::memory::{remember, survivor};
 
 /// Whether the watchdog or the program itself made this reset. The flags stay for the application.
@@ -14,17 +15,16 @@ pub fn fell_by_itself() -> bool {
 }
 
 #[panic_handler]
-fn panic(info: &PanicInfo) -> ! {
+fn panic(_: &PanicInfo) -> ! {
     cortex_m::interrupt::disable();
-    let (file, line) = info.location().map_or(("", 0), |place| (place.file(), place.line()));
-    die(Death::panic(file, line))
+    die(death::here(DeathKind::Panic))
 }
 
 #[allow(unsafe_code, reason = "what cortex-m-rt asks for")]
 // SAFETY: it never returns, and nothing else runs any more.
 #[exception]
 unsafe fn HardFault(frame: &ExceptionFrame) -> ! {
-    die(Death::hard_fault(frame.pc(), frame.lr()))
+    die(death::of_fault(frame))
 }
 
 fn die(death: Death) -> ! {

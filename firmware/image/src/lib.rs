@@ -11,4 +11,4 @@ mod survivor;
 
 pub use file::ImageFile;
 pub use seal::{DEVELOPMENT_KEY, SEAL_LENGTH, Seal, SealError, is_signed_by, sha256};
-pub use survivor::{Death, DeathKind, SURVIVOR_WORDS, Survivor};
+pub use survivor::{Death, DeathKind, SURVIVOR_WORDS, Survivor, TRACE};

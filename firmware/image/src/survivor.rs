@@ -16,30 +16,47 @@ pub struct Survivor {
     pub recovery_wanted: bool,
     /// Starts since power-on.
     pub starts: u32,
-    /// How the application last died.
+    /// How the program last died.
     pub death: Option<Death>,
 }
 
-/// How an application died.
+/// How many addresses are kept of a death.
+pub const TRACE: usize = 8;
+
+/// How a program died.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Death {
     /// Of what.
     pub kind: DeathKind,
-    /// Panic: the line. Fault: the address of the instruction.
-    pub at: u32,
-    /// Panic: 0. Fault: the return address.
-    pub from: u32,
-    /// Panic: the end of the file's name. Fault: zeros.
-    pub file: [u8; 24],
+    /// Where: return addresses of the calls that led there, the latest first; before them, of a fault, the instruction.
+    /// Zeros at the end.
+    pub trace: [u32; TRACE],
 }
 
-/// Of what an application died.
+/// Of what a program died.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum DeathKind {
     /// A Rust panic.
     Panic,
     /// A hard fault of the core.
     HardFault,
+    /// It could not work with the settings it came with.
+    Settings,
+    /// It could not open the serial line.
+    SerialLine,
+}
+
+impl DeathKind {
+    const ALL: [Self; 4] = [Self::Panic, Self::HardFault, Self::Settings, Self::SerialLine];
+
+    /// From 1; zero is no death.
+    const fn number(self) -> u32 {
+        self as u32 + 1
+    }
+
+    fn from_number(number: u32) -> Option<Self> {
+        Self::ALL.into_iter().find(|kind| kind.number() == number)
+    }
 }
 
 impl Survivor {
@@ -49,20 +66,13 @@ impl Survivor {
         if words[0] != MAGIC || words[SURVIVOR_WORDS - 1] != check(words) {
             return Self::default();
         }
-        let kind = match words[4] {
-            1 => Some(DeathKind::Panic),
-            2 => Some(DeathKind::HardFault),
-            _ => None,
-        };
-        let mut file = [0; 24];
-        for (bytes, word) in file.chunks_exact_mut(4).zip(&words[7..13]) {
-            bytes.copy_from_slice(&word.to_le_bytes());
-        }
+        let mut trace = [0; TRACE];
+        trace.copy_from_slice(&words[5..13]);
         Self {
             failed_starts: words[1],
             recovery_wanted: words[2] != 0,
             starts: words[3],
-            death: kind.map(|kind| Death { kind, at: words[5], from: words[6], file }),
+            death: DeathKind::from_number(words[4]).map(|kind| Death { kind, trace }),
         }
     }
 
@@ -75,15 +85,8 @@ impl Survivor {
         words[2] = u32::from(self.recovery_wanted);
         words[3] = self.starts;
         if let Some(death) = self.death {
-            words[4] = match death.kind {
-                DeathKind::Panic => 1,
-                DeathKind::HardFault => 2,
-            };
-            words[5] = death.at;
-            words[6] = death.from;
-            for (word, bytes) in words[7..13].iter_mut().zip(death.file.as_chunks::<4>().0) {
-                *word = u32::from_le_bytes(*bytes);
-            }
+            words[4] = death.kind.number();
+            words[5..13].copy_from_slice(&death.trace);
         }
         words[SURVIVOR_WORDS - 1] = check(&words);
         words
@@ -91,27 +94,11 @@ impl Survivor {
 }
 
 impl Death {
-    /// A panic at `line` of `file`.
+    /// The addresses, without the zeros behind them.
     #[must_use]
-    pub fn panic(file: &str, line: u32) -> Self {
-        let mut name = [0; 24];
-        let bytes = file.as_bytes();
-        let tail = &bytes[bytes.len().saturating_sub(name.len())..];
-        name[..tail.len()].copy_from_slice(tail);
-        Self { kind: DeathKind::Panic, at: line, from: 0, file: name }
-    }
-
-    /// A hard fault of the instruction at `pc`, called from `lr`.
-    #[must_use]
-    pub const fn hard_fault(pc: u32, lr: u32) -> Self {
-        Self { kind: DeathKind::HardFault, at: pc, from: lr, file: [0; 24] }
-    }
-
-    /// The end of the file's name, or nothing.
-    #[must_use]
-    pub fn file(&self) -> &str {
-        let length = self.file.iter().position(|&byte| byte == 0).unwrap_or(self.file.len());
-        core::str::from_utf8(&self.file[..length]).unwrap_or_default()
+    pub fn trace(&self) -> &[u32] {
+        let length = self.trace.iter().position(|&address| address == 0).unwrap_or(TRACE);
+        &self.trace[..length]
     }
 }
 

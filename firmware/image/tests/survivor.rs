@@ -1,13 +1,16 @@
 //! What the board remembers through a reset.
+use proptest::option;
 use proptest::prelude::*;
-use vergence_image::{Death, SURVIVOR_WORDS, Survivor};
+use vergence_image::{Death, DeathKind, SURVIVOR_WORDS, Survivor, TRACE};
 
 fn survivor() -> impl Strategy<Value = Survivor> {
-    let death = prop_oneof![
-        Just(None),
-        ("[ -~]{0,40}", any::<u32>()).prop_map(|(file, line)| Some(Death::panic(&file, line))),
-        any::<(u32, u32)>().prop_map(|(pc, lr)| Some(Death::hard_fault(pc, lr))),
+    let kind = prop_oneof![
+        Just(DeathKind::Panic),
+        Just(DeathKind::HardFault),
+        Just(DeathKind::Settings),
+        Just(DeathKind::SerialLine),
     ];
+    let death = option::of((kind, any::<[u32; TRACE]>()).prop_map(|(kind, trace)| Death { kind, trace }));
     (any::<u32>(), any::<bool>(), any::<u32>(), death).prop_map(|(failed_starts, recovery_wanted, starts, death)| {
         Survivor { failed_starts, recovery_wanted, starts, death }
     })
@@ -34,7 +37,8 @@ fn memory_after_power_on_is_none() {
 }
 
 #[test]
-fn a_panic_keeps_the_end_of_the_file_name() {
-    assert_eq!(Death::panic("a/very/long/way/to/firmware/control/src/axis.rs", 7).file(), "ware/control/src/axis.rs");
-    assert_eq!(Death::panic("src/link.rs", 7).file(), "src/link.rs");
+fn a_trace_ends_before_its_zeros() {
+    let death = |trace| Death { kind: DeathKind::Panic, trace };
+    assert_eq!(death([7, 9, 0, 0, 0, 0, 0, 0]).trace(), [7, 9]);
+    assert_eq!(death([1; TRACE]).trace(), [1; TRACE]);
 }

@@ -39,6 +39,9 @@ pub struct Control {
     services: Services,
     /// When the running tick began.
     tick: Microseconds,
+    /// Kept, for to clear them in every tick would take a quarter of one at rest.
+    received: [u8; 64],
+    frame: [u8; MAX_FRAME],
 }
 
 /// Starts the tick; from now on node, rig and services belong to the interrupt.
@@ -50,7 +53,7 @@ pub fn start(node: Node, rig: Rig, services: Services, timer: Peri<'static, peri
     TIM7.egr().write(|w| w.set_ug(true));
     TIM7.sr().write(|_| {});
     let tick = Microseconds(Instant::now().as_micros());
-    let control = CONTROL.init(Control { node, rig, services, tick });
+    let control = CONTROL.init(Control { node, rig, services, tick, received: [0; 64], frame: [0; MAX_FRAME] });
     critical_section::with(|cs| HANDOVER.borrow_ref_mut(cs).replace(control));
     TIM7.dier().write(|w| w.set_uie(true));
     TIM7.cr1().write(|w| w.set_cen(true));
@@ -92,7 +95,7 @@ impl Control {
     fn begin_tick(&mut self) {
         let since = Instant::now().as_micros().saturating_sub(self.tick.0);
         // Ticks missed while the flash was busy are gone, and the controller sees the gap; one that is late is not.
-        let ticks = (since / TICK_US).max(1);
+        let ticks = if since < 2 * TICK_US { 1 } else { since / TICK_US };
         self.tick = Microseconds(self.tick.0 + ticks * TICK_US);
         if !self.rig.begin_tick() {
             defmt::warn!("steps cut short at {=u64}", self.tick.0);
@@ -102,25 +105,36 @@ impl Control {
     }
 
     fn receive(&mut self) {
-        let mut bytes = [0; 64];
-        while let Ok(count) = link::RECEIVED.try_read(&mut bytes) {
-            let now = Microseconds(Instant::now().as_micros());
-            self.node.receive(now, &bytes[..count], &mut self.rig, &mut self.services);
+        while let Ok(count) = link::RECEIVED.try_read(&mut self.received) {
+            self.take(count);
         }
+    }
+
+    /// Not inlined, or its preparations would be made in every tick, whether or not a byte came.
+    #[inline(never)]
+    fn take(&mut self, count: usize) {
+        let now = Microseconds(Instant::now().as_micros());
+        self.node.receive(now, &self.received[..count], &mut self.rig, &mut self.services);
     }
 
     /// Keeps at most one frame waiting behind the one on the wire, so that the next is chosen as late as possible.
     fn transmit(&mut self) {
         log::forward(|entry| self.node.log(entry));
-        let mut frame = [0; MAX_FRAME];
         while link::TO_SEND.is_empty() {
-            let now = Microseconds(Instant::now().as_micros());
-            let Some(length) = self.node.transmit(now, &mut frame) else {
+            if !self.send_frame() {
                 self.reboot();
                 return;
-            };
-            link::queue(&frame[..length]);
+            }
         }
+    }
+
+    /// Returns whether there was one. Not inlined, for the same reason as [`Self::take`].
+    #[inline(never)]
+    fn send_frame(&mut self) -> bool {
+        let now = Microseconds(Instant::now().as_micros());
+        let Some(length) = self.node.transmit(now, &mut self.frame) else { return false };
+        link::queue(&self.frame[..length]);
+        true
     }
 
     /// Where the host wants another start, the link makes it when the last frame is out.

@@ -2,17 +2,23 @@
 
 #[cfg(feature = "log-rtt")]
 use defmt_rtt as _;
+use embassy_time::Instant;
 use vergence_control::NodeIdentity;
 use vergence_image::DeathKind;
+
+defmt::timestamp!("{=u64:us}", Instant::now().as_micros());
 
 /// Says who starts, and how the last start ended.
 pub fn greet(identity: &NodeIdentity) {
     let [major, minor, patch] = identity.firmware;
     defmt::info!("vergence {=u8}.{=u8}.{=u8}, build {=u64:016x}", major, minor, patch, identity.build);
     let Some(death) = vergence_nucleo_common::memory::survivor().death else { return };
+    let trace = death.trace();
     match death.kind {
-        DeathKind::Panic => defmt::error!("died of a panic in line {=u32} of {=str}", death.at, death.file()),
-        DeathKind::HardFault => defmt::error!("died of a fault at {=u32:#x} from {=u32:#x}", death.at, death.from),
+        DeathKind::Panic => defmt::error!("died of a panic, called from {=[?]:#x}", trace),
+        DeathKind::HardFault => defmt::error!("died of a fault at, called from {=[?]:#x}", trace),
+        DeathKind::Settings => defmt::error!("could not start with the settings of this firmware"),
+        DeathKind::SerialLine => defmt::error!("could not start with the serial line's speed"),
     }
 }
 

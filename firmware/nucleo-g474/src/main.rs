@@ -21,6 +21,7 @@ mod watchdog;
 use board::Board;
 use embassy_executor::Spawner;
 use vergence_control::{BoardSettings, Node, NodeIdentity};
+use vergence_image::DeathKind;
 use vergence_image::layout::HARDWARE;
 use vergence_nucleo_common::Services;
 use vergence_nucleo_common::clocks::{self, Source};
@@ -45,12 +46,12 @@ async fn main(spawner: Spawner) {
     };
     log::greet(&identity);
     let mut services = Services::of_application(&board.flash);
-    let Ok(defaults) = BoardSettings::new(&factory::axes()) else { memory::give_up("factory settings") };
+    let Ok(defaults) = BoardSettings::new(&factory::axes()) else { memory::give_up(DeathKind::Settings) };
     let boot = board::random(board.random).unwrap_or_else(|| survivor().starts);
     let Ok(node) = Node::new(&defaults, identity, boot, &mut services) else {
-        memory::give_up("factory settings");
+        memory::give_up(DeathKind::Settings);
     };
-    let Some((rx, tx)) = board.line.open(node.settings().baud) else { memory::give_up("serial line") };
+    let Some((rx, tx)) = board.line.open(node.settings().baud) else { memory::give_up(DeathKind::SerialLine) };
     control::start(node, board.rig, services, board.tick);
     if let (Ok(receive), Ok(transmit), Ok(watch)) =
         (link::receive(rx), link::transmit(tx), watchdog::watch(board.watchdog, board.led))

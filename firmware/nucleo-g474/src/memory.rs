@@ -4,7 +4,8 @@ use core::panic::PanicInfo;
 
 use cortex_m_rt::{ExceptionFrame, exception};
 use embassy_stm32::pac;
-use vergence_image::{Death, Survivor};
+use vergence_image::{Death, DeathKind, Survivor};
+use vergence_nucleo_common::death;
 use vergence_nucleo_common::memory::{remember, survivor};
 use vergence_protocol::ResetCause;
 use vergence_protocol::management::RebootTo;
@@ -51,22 +52,21 @@ pub fn build_id() -> u64 {
 }
 
 #[panic_handler]
-fn panic(info: &PanicInfo) -> ! {
+fn panic(_: &PanicInfo) -> ! {
     cortex_m::interrupt::disable();
-    let (file, line) = info.location().map_or(("", 0), |place| (place.file(), place.line()));
-    die(Death::panic(file, line))
+    die(death::here(DeathKind::Panic))
 }
 
 #[allow(unsafe_code, reason = "what cortex-m-rt asks for")]
 // SAFETY: it never returns, and shares nothing but the survivor, which nobody else can write any more.
 #[exception]
 unsafe fn HardFault(frame: &ExceptionFrame) -> ! {
-    die(Death::hard_fault(frame.pc(), frame.lr()))
+    die(death::of_fault(frame))
 }
 
-/// Without `what` nothing goes: after three such starts the boot loader waits for another image.
-pub fn give_up(what: &str) -> ! {
-    die(Death::panic(what, 0))
+/// Nothing goes on: after three such starts the boot loader waits for another image.
+pub fn give_up(reason: DeathKind) -> ! {
+    die(death::here(reason))
 }
 
 /// Drivers off, note the cause, start again.

@@ -1,7 +1,7 @@
 //! The core as its user sees it: reset, run, registers, reasons to stop.
 
 use crate::bus::{Bus, Cycle, NEVER};
-use crate::cache::Cache;
+use crate::cache::{Cache, Entries};
 use crate::decode;
 use crate::execute::Trap;
 use crate::instruction::{Instruction, Op};
@@ -91,7 +91,7 @@ pub struct Cpu {
     pub(crate) loaded: bool,
     instructions: u64,
     cache: Cache,
-    code_version: u64,
+    pub(crate) code_version: u64,
 }
 
 impl Default for Cpu {
@@ -187,12 +187,33 @@ impl Cpu {
     }
 
     fn run_to_horizon<B: Bus>(&mut self, bus: &mut B) {
+        let mut decoded = self.cache.lend();
+        let ended = self.run_decoded(bus, &mut decoded);
+        self.cache.take_back(decoded);
+        if let Err(trap) = ended {
+            self.trapped(bus, trap);
+        }
+    }
+
+    fn run_decoded<B: Bus>(&mut self, bus: &mut B, decoded: &mut Entries) -> Result<(), Trap> {
         while self.now < self.horizon {
-            if let Err(trap) = self.step(bus) {
-                self.trapped(bus, trap);
-                return;
+            let pc = self.pc;
+            self.r[15] = pc.wrapping_add(4);
+            let generation = self.cache.generation();
+            let instruction = match decoded.get(pc, generation) {
+                Some(instruction) => instruction,
+                None => decoded.insert(pc, generation, self.decode(bus, pc)?),
+            };
+            self.pc = pc.wrapping_add(instruction.length());
+            self.now = self.now.wrapping_add(1);
+            self.instructions = self.instructions.wrapping_add(1);
+            if self.it == 0 {
+                self.execute(bus, instruction)?;
+            } else {
+                self.execute_in_it_block(bus, *instruction)?;
             }
         }
+        Ok(())
     }
 
     /// Brings chip and core to the same moment and takes the exception that is due.
@@ -272,23 +293,9 @@ impl Cpu {
         self.horizon = 0;
     }
 
-    #[inline(always)]
-    fn step<B: Bus>(&mut self, bus: &mut B) -> Result<(), Trap> {
-        let pc = self.pc;
-        self.r[15] = pc.wrapping_add(4);
-        let instruction = match self.cache.get(pc) {
-            Some(instruction) => instruction,
-            None => self.decode(bus, pc)?,
-        };
-        self.pc = pc.wrapping_add(instruction.length());
-        self.now += 1;
-        self.instructions += 1;
-        if self.it == 0 { self.execute(bus, &instruction) } else { self.step_in_it_block(bus, instruction) }
-    }
-
     /// An instruction whose condition fails takes its cycle and does nothing (A7.3).
     #[inline(never)]
-    fn step_in_it_block<B: Bus>(&mut self, bus: &mut B, mut instruction: Instruction) -> Result<(), Trap> {
+    fn execute_in_it_block<B: Bus>(&mut self, bus: &mut B, mut instruction: Instruction) -> Result<(), Trap> {
         let state = self.it;
         self.it = if state & 7 == 0 { 0 } else { state & 0xe0 | state << 1 & 0x1f };
         // A breakpoint ignores the condition.
@@ -317,14 +324,16 @@ impl Cpu {
         } else {
             decode::narrow(first)
         };
-        self.cache.insert(pc, instruction);
+        self.cache.mark(pc);
         Ok(instruction)
     }
 
     /// Tells the table of decoded instructions of a store.
     #[inline(always)]
     pub(crate) fn code_written(&mut self, address: u32) {
-        self.cache.written(address);
+        if self.cache.written(address) {
+            self.horizon = 0;
+        }
     }
 
     /// Cycles since power-on.

@@ -56,10 +56,16 @@ impl Nvic {
         }
     }
 
+    /// Whether [`Self::observe`] would change nothing.
+    #[inline]
+    pub fn knows(&self, lines: Lines, nmi: bool) -> bool {
+        lines == self.asserted && lines & !self.active & !self.pending == 0 && nmi == self.nmi
+    }
+
     /// Takes note of the chip's lines. An asserted line pends unless its handler runs; there only a new edge does.
     /// Says whether something became pending.
     pub fn observe(&mut self, lines: Lines, nmi: bool) -> bool {
-        if lines == self.asserted && lines & !self.active & !self.pending == 0 && nmi == self.nmi {
+        if self.knows(lines, nmi) {
             return false;
         }
         let fresh = lines & (!self.active | !self.asserted) & !self.pending;

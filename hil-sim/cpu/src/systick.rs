@@ -41,6 +41,7 @@ impl SysTick {
     }
 
     /// When the counter next reaches zero.
+    #[inline]
     pub fn next_event(&self) -> Cycle {
         self.ticks_to_zero().map_or(NEVER, |ticks| self.since.saturating_add(ticks * self.divider()))
     }

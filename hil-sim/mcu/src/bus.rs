@@ -3,7 +3,7 @@
 use vergence_cpu::{Access, Bus, BusFault, Cycle, Lines};
 
 use crate::chip::Chip;
-use crate::memory::{Memory, Place, narrow};
+use crate::memory::{Memory, Place, RAM_BASE, narrow};
 use crate::peripheral::{Moment, Refused};
 use crate::trouble::{Demand, Trouble};
 use crate::unit::Unit;
@@ -20,9 +20,12 @@ impl<W: World> Chip<W> {
         let moment = Moment { now: self.now, clocks: &self.clocks };
         let peripheral = self.units.get(unit);
         peripheral.advance(moment);
+        let quiet = peripheral.reads_quietly(offset);
         match peripheral.read(moment, offset) {
             Ok(word) => {
-                self.react(unit);
+                if !quiet {
+                    self.react(unit);
+                }
                 Ok(narrow(word, address, access))
             }
             Err(Refused(what)) => {
@@ -78,7 +81,7 @@ impl<W: World> Chip<W> {
             self.complain(Trouble::NoRegister { unit: unit.to_string(), offset });
             return Ok(None);
         }
-        if !self.units.rcc.is_clocked(unit) {
+        if self.clocked >> unit.index() & 1 == 0 {
             let register = self.name_of(unit, offset);
             self.complain(Trouble::ClockOff { unit: unit.to_string(), register });
             return Ok(None);
@@ -96,6 +99,15 @@ impl<W: World> Chip<W> {
         self.units.flash.check_ecc(offset as u32 / 8);
     }
 
+    /// How long the core waits for the bank that it has read from.
+    #[cold]
+    fn wait_for_bank(&self) -> Option<u32> {
+        self.stalls.set(false);
+        let (_, until) = self.units.flash.busy()?;
+        let free_at = self.clocks.base.cycle_at(until);
+        Some(u32::try_from(free_at.saturating_sub(self.now)).unwrap_or(u32::MAX))
+    }
+
     /// A read or fetch from a bank that is busy waits until it is free.
     fn note_bank(&self, offset: usize) {
         if self
@@ -109,18 +121,19 @@ impl<W: World> Chip<W> {
     }
 }
 
-impl<W: World> Bus for Chip<W> {
-    #[inline]
-    fn read(&mut self, now: Cycle, address: u32, access: Access) -> Result<u32, BusFault> {
+impl<W: World> Chip<W> {
+    /// A read of anything but SRAM at its own address.
+    #[inline(never)]
+    fn read_elsewhere(&mut self, now: Cycle, address: u32, access: Access) -> Result<u32, BusFault> {
         match Memory::place(address) {
-            Some(Place::Ram(offset)) => self.memory.read_ram(offset, access).ok_or(BusFault),
             Some(Place::Flash(offset)) => {
-                if !self.units.flash.torn.is_empty() {
+                if !self.units.flash.is_calm() {
                     self.check_ecc(offset);
+                    self.note_bank(offset);
                 }
-                self.note_bank(offset);
                 self.memory.read_flash(offset, access).ok_or(BusFault)
             }
+            Some(Place::Ram(offset)) => self.memory.read_ram(offset, access).ok_or(BusFault),
             Some(Place::System(address)) => {
                 let word = self.memory.system_word(address, self.units.flash.options());
                 Ok(narrow(word, address, access))
@@ -134,8 +147,8 @@ impl<W: World> Bus for Chip<W> {
         }
     }
 
-    #[inline]
-    fn write(&mut self, now: Cycle, address: u32, access: Access, value: u32) -> Result<(), BusFault> {
+    #[inline(never)]
+    fn write_elsewhere(&mut self, now: Cycle, address: u32, access: Access, value: u32) -> Result<(), BusFault> {
         match Memory::place(address) {
             Some(Place::Ram(offset)) => self.memory.write_ram(offset, access, value).ok_or(BusFault),
             Some(Place::Flash(offset)) => {
@@ -163,10 +176,30 @@ impl<W: World> Bus for Chip<W> {
             }
         }
     }
+}
+
+impl<W: World> Bus for Chip<W> {
+    #[inline(always)]
+    fn read(&mut self, now: Cycle, address: u32, access: Access) -> Result<u32, BusFault> {
+        match self.memory.read_ram(address.wrapping_sub(RAM_BASE) as usize, access) {
+            Some(value) => Ok(value),
+            None => self.read_elsewhere(now, address, access),
+        }
+    }
+
+    #[inline(always)]
+    fn write(&mut self, now: Cycle, address: u32, access: Access, value: u32) -> Result<(), BusFault> {
+        match self.memory.write_ram(address.wrapping_sub(RAM_BASE) as usize, access, value) {
+            Some(()) => Ok(()),
+            None => self.write_elsewhere(now, address, access, value),
+        }
+    }
 
     #[inline]
     fn fetch(&self, address: u32) -> Result<u16, BusFault> {
-        if let Some(Place::Flash(offset)) = Memory::place(address) {
+        if !self.units.flash.is_calm()
+            && let Some(Place::Flash(offset)) = Memory::place(address)
+        {
             self.note_bank(offset);
         }
         self.memory.fetch(address).ok_or(BusFault)
@@ -178,11 +211,10 @@ impl<W: World> Bus for Chip<W> {
 
     #[inline]
     fn wait_states(&self) -> u32 {
-        if self.stalls.take()
-            && let Some((_, until)) = self.units.flash.busy()
+        if self.stalls.get()
+            && let Some(wait) = self.wait_for_bank()
         {
-            let free_at = self.clocks.base.cycle_at(until);
-            return u32::try_from(free_at.saturating_sub(self.now)).unwrap_or(u32::MAX);
+            return wait;
         }
         // As if the instruction cache never hit: the worst case, see FIDELITY.
         self.units.flash.wait_states()

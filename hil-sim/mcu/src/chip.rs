@@ -56,6 +56,10 @@ pub struct Chip<W> {
     pub(crate) schedule: Schedule,
     pub(crate) sources: RequestSources,
     pub(crate) directory: Directory,
+    /// A bit for each peripheral whose clock runs.
+    pub(crate) clocked: u64,
+    /// Something has happened that may ask for DMA.
+    pub(crate) stirred: bool,
     pub(crate) census: Census,
     pub(crate) world: W,
     pub(crate) terminals: Terminals,
@@ -88,6 +92,8 @@ impl<W: World> Chip<W> {
             schedule: Schedule::new(),
             sources: RequestSources::new(),
             directory,
+            clocked: 0,
+            stirred: true,
             census: Census::new(),
             world,
             terminals: Terminals::default(),
@@ -129,10 +135,17 @@ impl<W: World> Chip<W> {
             self.react(Unit::Gpio(port as u8));
         }
         self.watch_timers();
+        self.find_clocked();
+        self.stirred = true;
         for index in 0..UNITS {
             self.refresh(Unit::at(index));
         }
         self.refresh_world();
+    }
+
+    pub(crate) fn find_clocked(&mut self) {
+        let clocked = |index: &usize| self.units.rcc.is_clocked(Unit::at(*index));
+        self.clocked = (0..UNITS).filter(clocked).fold(0, |all, index| all | 1 << index);
     }
 
     pub(crate) fn instant(&self) -> Instant {
@@ -223,6 +236,7 @@ impl<W: World> Chip<W> {
             self.units.timers.iter_mut().for_each(|timer| timer.set_divider(moment, &tree));
             (0..UNITS).for_each(|index| self.refresh(Unit::at(index)));
             self.refresh_world();
+            self.stirred = true;
         }
         self.check_speed();
     }

@@ -54,29 +54,37 @@ pub(crate) struct Dma {
     number: u8,
     flags: u32,
     channels: [Channel; CHANNELS],
+    /// A bit for each channel that is on.
+    enabled: u8,
 }
 
 impl Dma {
     pub fn new(number: u8) -> Self {
-        Self { number, flags: 0, channels: [Channel::default(); CHANNELS] }
+        Self { number, flags: 0, channels: [Channel::default(); CHANNELS], enabled: 0 }
     }
 
     /// Whether any channel could serve a request.
     pub fn is_idle(&self) -> bool {
-        self.channels.iter().all(|channel| channel.ccr & EN == 0)
+        self.enabled == 0
+    }
+
+    fn find_enabled(&mut self) {
+        let channels = (0..).zip(&self.channels);
+        self.enabled = channels.fold(0, |all, (index, channel)| all | ((channel.ccr & EN) as u8) << index);
     }
 
     /// The transfer that goes next: among enabled channels with something to do, the highest priority, then the lowest
     /// number (§12.4.4). `requested` says whether a channel's request line is up.
     pub fn next_transfer(&self, now: Cycle, requested: impl Fn(usize) -> bool) -> Option<Transfer> {
         (0..CHANNELS)
+            .filter(|&index| self.enabled >> index & 1 == 1)
             .filter(|&index| {
                 let channel = &self.channels[index];
                 let ready = match channel.ccr & MEMORY_TO_MEMORY {
-                    0 => channel.ccr & EN != 0 && requested(index),
+                    0 => requested(index),
                     _ => channel.next.is_some_and(|at| at <= now),
                 };
-                channel.ccr & EN != 0 && channel.left > 0 && ready
+                channel.left > 0 && ready
             })
             .max_by_key(|&index| (self.channels[index].ccr >> 12 & 3, CHANNELS - index))
             .map(|index| self.channels[index].transfer(index))
@@ -86,6 +94,9 @@ impl Dma {
     pub fn finish(&mut self, index: usize, done: bool) {
         let channel = &mut self.channels[index];
         let flags = if done { channel.step() } else { channel.fail() };
+        if !done {
+            self.find_enabled();
+        }
         if flags != 0 {
             self.flags |= (flags | 1) << (4 * index);
         }
@@ -104,7 +115,9 @@ impl Dma {
                 if starts {
                     channel.start(moment.now);
                 }
-                return channel.check();
+                let reply = channel.check();
+                self.find_enabled();
+                return reply;
             }
             4 => {
                 channel.left = value & 0xFFFF;
@@ -211,6 +224,10 @@ impl Peripheral for Dma {
             table
         };
         &TABLE
+    }
+
+    fn reads_quietly(&self, _offset: u32) -> bool {
+        true
     }
 
     fn read(&mut self, _moment: Moment, offset: u32) -> Reply<u32> {

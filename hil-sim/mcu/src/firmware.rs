@@ -86,6 +86,11 @@ impl Firmware {
         }
     }
 
+    /// All functions and variables: addresses and names.
+    pub(crate) fn symbols(&self) -> impl Iterator<Item = (u32, &str)> {
+        self.symbols.iter().map(|symbol| (symbol.address, symbol.name.as_str()))
+    }
+
     /// Where a symbol is, by its whole name.
     #[must_use]
     pub fn address_of(&self, name: &str) -> Option<u32> {

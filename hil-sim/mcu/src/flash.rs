@@ -178,6 +178,11 @@ impl Flash {
         self.running.map(|(operation, until)| (operation.bank(), until))
     }
 
+    /// Nothing is going on, and every word reads as it was written.
+    pub fn is_calm(&self) -> bool {
+        self.running.is_none() && self.torn.is_empty()
+    }
+
     /// Reading or writing flash may raise NMI or begin what ends in an interrupt: the core must look after each access.
     pub fn is_touchy(&self) -> bool {
         !self.torn.is_empty() || self.cr & PG != 0 && self.cr & (EOPIE | ERRIE) != 0

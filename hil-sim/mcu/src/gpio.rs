@@ -87,6 +87,10 @@ impl Peripheral for Port {
         ]
     }
 
+    fn reads_quietly(&self, _offset: u32) -> bool {
+        true
+    }
+
     fn read(&mut self, _moment: Moment, offset: u32) -> Reply<u32> {
         Ok(match offset {
             MODER => self.moder,

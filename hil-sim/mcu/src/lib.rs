@@ -5,6 +5,8 @@
 //! - [`Chip`]: the bus behind the core; each peripheral is a file named as in the reference manual
 //! - [`World`]: whatever is wired to the pins and serial ports
 //! - [`Bench`]: the mechanics of the rig as such a world
+//! - [`SerialDevice`]: what hangs on a serial port, such as a bus of servos
+//! - [`LogDecoder`]: what the firmware says in its log
 //!
 //! Sections in comments are those of the reference manual RM0440 unless another document is named; its chapters kept
 //! their numbers through its revisions, sections within them moved a little. Whatever is missing is refused by the
@@ -26,6 +28,7 @@ mod flash;
 mod gpio;
 mod halt;
 mod iwdg;
+mod log;
 mod machine;
 mod memory;
 mod outside;
@@ -38,6 +41,7 @@ mod rcc;
 mod rng;
 mod rtt;
 mod schedule;
+mod serial_device;
 mod service;
 mod syscfg;
 mod time;
@@ -57,12 +61,14 @@ pub use clocks::ClockTree;
 pub use firmware::{Firmware, FirmwareError};
 pub use flash::FlashOperation;
 pub use halt::{Halt, Place};
+pub use log::{LogDecoder, LogEntry, LogError};
 pub use machine::{Machine, Stops};
 pub use memory::{FLASH_BASE, FLASH_SIZE, RAM_BASE, RAM_SIZE};
 pub use pin::{Drive, Pin};
 pub use power_cut::{Damage, PowerCut};
 pub use rcc::ResetCause;
 pub use rtt::{RttBuffer, read_rtt};
+pub use serial_device::{OnPort, SerialDevice};
 pub use time::{Picoseconds, TimeBase};
 pub use trouble::Trouble;
 pub use uart::{Frame, LineFault, SentByte};

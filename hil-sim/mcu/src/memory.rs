@@ -81,9 +81,11 @@ impl Memory {
 
     #[inline]
     pub fn write_ram(&mut self, offset: usize, access: Access, value: u32) -> Option<()> {
-        let length = bytes(access);
-        let place = self.ram.get_mut(offset..offset + length)?;
-        place.copy_from_slice(value.to_le_bytes().get(..length)?);
+        match access {
+            Access::Byte => *self.ram.get_mut(offset)? = value as u8,
+            Access::Half => *self.ram.get_mut(offset..)?.first_chunk_mut()? = (value as u16).to_le_bytes(),
+            Access::Word => *self.ram.get_mut(offset..)?.first_chunk_mut()? = value.to_le_bytes(),
+        }
         Some(())
     }
 
@@ -143,7 +145,7 @@ pub(crate) fn narrow(word: u32, address: u32, access: Access) -> u32 {
 fn load(bytes: &[u8], offset: usize, access: Access) -> Option<u32> {
     Some(match access {
         Access::Byte => u32::from(*bytes.get(offset)?),
-        Access::Half => u32::from(u16::from_le_bytes(bytes.get(offset..offset + 2)?.try_into().ok()?)),
-        Access::Word => u32::from_le_bytes(bytes.get(offset..offset + 4)?.try_into().ok()?),
+        Access::Half => u32::from(u16::from_le_bytes(*bytes.get(offset..)?.first_chunk()?)),
+        Access::Word => u32::from_le_bytes(*bytes.get(offset..)?.first_chunk()?),
     })
 }

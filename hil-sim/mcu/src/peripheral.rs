@@ -49,6 +49,11 @@ pub(crate) trait Peripheral {
     /// Reads the register at `offset`, a multiple of four.
     fn read(&mut self, moment: Moment, offset: u32) -> Reply<u32>;
 
+    /// Whether a read of the register at `offset` leaves everything as it is, so that nobody need look anew.
+    fn reads_quietly(&self, _offset: u32) -> bool {
+        false
+    }
+
     /// Writes the register at `offset`, a multiple of four; narrow writes come zero-extended.
     fn write(&mut self, moment: Moment, offset: u32, value: u32) -> Reply<()>;
 

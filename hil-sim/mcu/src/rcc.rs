@@ -329,6 +329,10 @@ impl Peripheral for Rcc {
         REGISTERS
     }
 
+    fn reads_quietly(&self, _offset: u32) -> bool {
+        true
+    }
+
     fn read(&mut self, _moment: Moment, offset: u32) -> Reply<u32> {
         let mut value = match offset {
             CFGR => self.get(CFGR) & !0xC | self.system_clock << 2,

@@ -44,6 +44,13 @@ const TRANSFERS_AT_ONCE: u32 = 100_000;
 impl<W: World> Chip<W> {
     /// Makes every transfer that is asked for. Transfers take no time, but see FIDELITY.
     pub(crate) fn serve_dma(&mut self) {
+        // A transfer of one controller may ask for one of the other.
+        while std::mem::take(&mut self.stirred) {
+            self.serve_once();
+        }
+    }
+
+    fn serve_once(&mut self) {
         for dma in 0..2 {
             if self.units.dma[dma].is_idle() {
                 continue;

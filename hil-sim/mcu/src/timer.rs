@@ -271,6 +271,10 @@ impl Peripheral for Timer {
         })
     }
 
+    fn reads_quietly(&self, offset: u32) -> bool {
+        !(CCR1..=CCR4).contains(&offset) && !self.outputs_changed && self.triggers == 0 && self.requests == 0
+    }
+
     fn write(&mut self, moment: Moment, offset: u32, value: u32) -> Reply<()> {
         match offset {
             CR1 => self.write_cr1(moment, value)?,

@@ -23,14 +23,22 @@ impl<W: World> Chip<W> {
                     }
                     self.react(reset);
                 }
+                self.find_clocked();
                 self.reclock();
             }
             Unit::Pwr => self.reclock(),
             Unit::Flash => self.react_to_flash(),
             Unit::Iwdg => self.react_to_watchdog(),
             Unit::Gpio(port) => self.react_to_port(usize::from(port)),
-            Unit::Timer(timer) => self.react_to_timer(timer),
-            Unit::Uart(uart) => self.react_to_uart(uart),
+            Unit::Timer(timer) => {
+                self.stirred = true;
+                self.react_to_timer(timer);
+            }
+            Unit::Uart(uart) => {
+                self.stirred = true;
+                self.react_to_uart(uart);
+            }
+            Unit::Dma(_) | Unit::Dmamux => self.stirred = true,
             _ => {}
         }
         self.refresh(unit);
@@ -107,9 +115,9 @@ impl<W: World> Chip<W> {
         let port = &mut self.units.uarts[uart.index()];
         let baud = port.baud(moment);
         for (cycle, byte) in std::mem::take(&mut port.sent) {
-            self.note_sent(uart, SentByte { at: self.clocks.base.time_of(cycle), byte, baud });
-            let now = self.instant();
-            self.world.byte_sent(uart, byte, now, &mut self.terminals);
+            let sent = SentByte { at: self.clocks.base.time_of(cycle), byte, baud };
+            self.note_sent(uart, sent);
+            self.world.byte_sent(uart, sent, &mut self.terminals);
             self.world_was_told();
         }
         self.settle_pins(self.pads.pins_of_enable(uart));

@@ -4,7 +4,7 @@ use vergence_cpu::Cycle;
 
 use crate::pin::{Drive, Pin};
 use crate::time::Picoseconds;
-use crate::uart::Frame;
+use crate::uart::{Frame, SentByte};
 use crate::unit::UartId;
 
 /// Now, for the world.
@@ -46,8 +46,8 @@ impl Terminals {
     }
 }
 
-/// Everything around the chip. Worlds are composed: a bench of mechanics, a servo bus on a serial port, a trace of
-/// pins. Clone it for a snapshot. Every method has a default that does nothing.
+/// Everything around the chip. Worlds are composed: a bench of mechanics, a servo bus on a serial port
+/// ([`crate::OnPort`]). Clone it for a snapshot. Every method has a default that does nothing.
 pub trait World: Clone {
     /// Pins whose edges it wants to see; looked at again after every reset.
     fn watched(&self) -> Vec<Pin> {
@@ -66,7 +66,7 @@ pub trait World: Clone {
     fn pin_changed(&mut self, _edge: PinEdge, _terminals: &mut Terminals) {}
 
     /// A serial port has sent a byte.
-    fn byte_sent(&mut self, _port: UartId, _byte: u8, _now: Instant, _terminals: &mut Terminals) {}
+    fn byte_sent(&mut self, _port: UartId, _sent: SentByte, _terminals: &mut Terminals) {}
 }
 
 /// Nothing around the chip.
@@ -101,8 +101,8 @@ impl<A: World, B: World> World for (A, B) {
         self.1.pin_changed(edge, terminals);
     }
 
-    fn byte_sent(&mut self, port: UartId, byte: u8, now: Instant, terminals: &mut Terminals) {
-        self.0.byte_sent(port, byte, now, terminals);
-        self.1.byte_sent(port, byte, now, terminals);
+    fn byte_sent(&mut self, port: UartId, sent: SentByte, terminals: &mut Terminals) {
+        self.0.byte_sent(port, sent, terminals);
+        self.1.byte_sent(port, sent, terminals);
     }
 }

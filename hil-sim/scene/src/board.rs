@@ -82,6 +82,13 @@ impl Scene {
         Self::studio().with_board(board, world_from_board)
     }
 
+    /// A `board` alone before an even grey: what is quickest to render where only the board matters.
+    #[must_use]
+    pub fn board_alone(board: Board, world_from_board: Transform<World, Board>) -> Self {
+        const GREY: Rgb = [0.35; 3];
+        Self::empty(GREY).with_board(board, world_from_board)
+    }
+
     /// The scene with a `board` added. Nothing stops it from cutting through what is there.
     #[must_use]
     pub fn with_board(self, board: Board, world_from_board: Transform<World, Board>) -> Self {

@@ -52,6 +52,9 @@ impl Lighting {
     /// The part of ambient light that reaches a point near the room's sides; a side does not shade itself.
     fn openness(&self, point: Vector3<f64>, normal: Vector3<f64>) -> f64 {
         const REACH_MM: f64 = 220.0;
+        if self.occlusion == 0.0 {
+            return 1.0;
+        }
         let [low, high] = self.room;
         (0..3).fold(1.0, |open, axis| {
             let nearest = (point[axis] - low[axis]).min(high[axis] - point[axis]).max(0.0);

@@ -8,7 +8,8 @@ use crate::texture::Rgb;
 /// Lens and sensor of one camera. Values out of their range count as its nearest end.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Optics {
-    /// Rays cast for every pixel, at least 1, spread over the pixel's square.
+    /// Rays cast for every pixel, spread over its square. One alone goes through its centre: enough where nothing is
+    /// finer than a pixel but edges.
     pub samples: u32,
     /// Further rays for a pixel at an edge: where its first ones differ, or its neighbours' much. Where edges are
     /// measured to hundredths of a pixel, as on a checkerboard, take some hundreds.

@@ -21,7 +21,7 @@ impl RangeMap {
         self.size
     }
 
-    /// The range at column `x` and row `y`; `None` outside the image or the field.
+    /// The range at column `x` and row `y`; `None` outside the image or the field, and where nothing is met.
     #[must_use]
     pub fn at(&self, x: u32, y: u32) -> Option<Length> {
         if x >= self.size.width {
@@ -31,7 +31,7 @@ impl RangeMap {
         mm.is_finite().then(|| Length::from_mm(f64::from(*mm)))
     }
 
-    /// Ranges in mm, row by row, `width * height` of them; not a number outside the field.
+    /// Ranges in mm, row by row, `width * height` of them; not a number where [`Self::at`] has none.
     #[must_use]
     pub fn as_mm(&self) -> &[f32] {
         &self.mm

@@ -3,12 +3,12 @@
 use image::RgbImage;
 use nalgebra::Vector3;
 use rayon::prelude::*;
-use vergence_vision::{Angle, Camera, KannalaBrandt, Transform, World};
+use vergence_vision::{Angle, BatchLens, Camera, KannalaBrandt, Transform, World};
 
 use crate::blur::blurred;
 use crate::noise::mix64;
 use crate::optics::unit_pair;
-use crate::rays::{Around, RayGrid};
+use crate::rays::{Around, Eye, RayGrid, lens_of};
 use crate::texture::Rgb;
 use crate::{Optics, RangeMap, Scene};
 
@@ -46,8 +46,9 @@ pub struct Photograph {
 /// Photographs a view. `seed` drives the noise and the choice of rays: the same seed gives the same bytes, on any
 /// number of threads; other seeds give other noise on the same picture.
 ///
-/// A pixel is the mean of the light on its square, which is then spread by the lens. Both are symmetric about the
-/// pixel's centre and the same everywhere, so that nothing is seen beside where it is projected.
+/// Every pixel is looked at by a few rays, those at an edge by many more. A pixel is the mean of the light on its square,
+/// which is then spread by the lens. Both are symmetric about the pixel's centre and the same everywhere, so that nothing is
+/// seen beside where it is projected.
 #[must_use]
 pub fn render(view: &View<'_>, seed: u64) -> Photograph {
     photograph(view, seed, Rows { at_once: BAND, world_from_camera: &|_| view.world_from_camera })
@@ -71,40 +72,75 @@ struct Rows<'a> {
     world_from_camera: &'a (dyn Fn(u32) -> Transform<World, Camera> + Sync),
 }
 
+impl Rows<'_> {
+    /// The view as at a row.
+    fn view<'v>(&self, view: &View<'v>, row: u32) -> View<'v> {
+        View { world_from_camera: (self.world_from_camera)(row), ..*view }
+    }
+}
+
 fn photograph(view: &View<'_>, seed: u64, rows: Rows<'_>) -> Photograph {
     let size = view.camera.size();
     let width = (size.width as usize).max(1);
     let seed_of = |x: usize, y: usize| mix64(mix64(seed) ^ (y * width + x) as u64);
     let pixels = size.width as usize * size.height as usize;
 
-    let mut looks = vec![(Look::default(), f32::NAN); pixels];
-    for_each_in_field(view, rows, &mut looks, |(look, range), here, around, x, y| {
-        *range = here.range_mm(around);
-        *look = here.look(around, view.optics.samples.max(1), seed_of(x, y));
+    let lens = lens_of(view.camera);
+    let mut firsts = vec![First::default(); pixels];
+    for_each_in_field(view, rows, &lens, &mut firsts, |first, here, around, x, y| {
+        *first = here.first(around, seed_of(x, y));
     });
 
     let mut light = vec![[0.0; 3]; pixels];
-    for_each_in_field(view, rows, &mut light, |light, here, around, x, y| {
-        let first = looks[y * width + x].0;
-        let beside = y.saturating_sub(1)..(y + 2).min(size.height as usize);
-        let columns = x.saturating_sub(1)..(x + 2).min(width);
-        let near = beside.flat_map(|y| &looks[y * width..][columns.clone()]).map(|(look, _)| *look);
-        let edge = first.contrast() > EDGE || near.fold(first, Look::joined_contrast).contrast() > STRONG_EDGE;
-        let whole =
-            if edge { first.joined(here.look(around, view.optics.edge_samples, mix64(seed_of(x, y)))) } else { first };
-        let exposure = view.optics.falloff(here.theta(around), view.camera.theta_max()) as f32 / whole.count as f32;
-        *light = whole.sum.map(|c| c * exposure);
+    light.par_iter_mut().enumerate().for_each(|(i, light)| {
+        let First { mut look, exposure, .. } = firsts[i];
+        let (x, y) = (i % width, i / width);
+        if is_edge(&firsts, width, x, y) {
+            let pixel = [x, y].map(|n| n as u32);
+            let here = rows.view(view, pixel[1]);
+            let eye = Eye::new(&lens, &here.world_from_camera);
+            if let Some(around) = RayGrid::new(&eye, pixel, [1, 1]).around(pixel[0], pixel[1]) {
+                look = look.joined(here.look(&around, view.optics.edge_samples, mix64(seed_of(x, y))));
+            }
+        }
+        let exposure = exposure / look.count.max(1) as f32;
+        *light = look.sum.map(|c| c * exposure);
     });
 
     let light = blurred(&light, width, view.optics.blur_px);
-    let mm: Vec<f32> = looks.into_iter().map(|(_, range)| range).collect();
     let mut image = RgbImage::new(size.width, size.height);
-    image.par_chunks_exact_mut(3).zip(&light).zip(&mm).enumerate().for_each(|(i, ((pixel, light), range))| {
-        if range.is_finite() {
+    image.par_chunks_exact_mut(3).zip(&light).zip(&firsts).enumerate().for_each(|(i, ((pixel, light), first))| {
+        if first.look.count > 0 {
             pixel.copy_from_slice(&view.optics.expose(*light, !seed_of(i % width, i / width)));
         }
     });
+    let mm = firsts.into_iter().map(|first| first.range_mm).collect();
     Photograph { image, range: RangeMap::new(size, mm) }
+}
+
+/// Whether a pixel needs more rays.
+fn is_edge(firsts: &[First], width: usize, x: usize, y: usize) -> bool {
+    let look = firsts[y * width + x].look;
+    let rows = y.saturating_sub(1)..(y + 2).min(firsts.len() / width);
+    let columns = x.saturating_sub(1)..(x + 2).min(width);
+    let near = rows.flat_map(|y| &firsts[y * width..][columns.clone()]).map(|first| first.look);
+    look.contrast() > EDGE || near.fold(look, Look::joined_contrast).contrast() > STRONG_EDGE
+}
+
+/// What the first rays of a pixel tell. By default nothing: outside the field.
+#[derive(Clone, Copy, Debug)]
+struct First {
+    look: Look,
+    /// Of the pixel's centre; not a number if its ray meets nothing.
+    range_mm: f32,
+    /// The part of the light that passes the lens.
+    exposure: f32,
+}
+
+impl Default for First {
+    fn default() -> Self {
+        Self { look: Look::default(), range_mm: f32::NAN, exposure: 0.0 }
+    }
 }
 
 /// What some rays of a pixel bring.
@@ -124,11 +160,10 @@ impl Default for Look {
 }
 
 impl Look {
-    fn add(&mut self, colour: Rgb) {
+    /// With one more ray.
+    fn with(self, colour: Rgb) -> Self {
         let level = colour.iter().sum::<f32>() / 3.0;
-        (self.low, self.high) = (self.low.min(level), self.high.max(level));
-        self.sum = std::array::from_fn(|i| self.sum[i] + colour[i]);
-        self.count += 1;
+        self.joined(Self { sum: colour, count: 1, low: level, high: level })
     }
 
     fn joined(self, other: Self) -> Self {
@@ -151,14 +186,16 @@ impl Look {
 fn for_each_in_field<T: Send>(
     view: &View<'_>,
     rows: Rows<'_>,
+    lens: &BatchLens,
     items: &mut [T],
     visit: impl Fn(&mut T, &View<'_>, &Around<'_>, usize, usize) + Sync,
 ) {
     let width = (view.camera.size().width as usize).max(1);
     items.par_chunks_mut(width * rows.at_once).enumerate().for_each(|(number, items)| {
         let top = number * rows.at_once;
-        let here = View { world_from_camera: (rows.world_from_camera)(top as u32), ..*view };
-        let rays = RayGrid::new(view.camera, &here.world_from_camera, top as u32, (items.len() / width) as u32);
+        let here = rows.view(view, top as u32);
+        let eye = Eye::new(lens, &here.world_from_camera);
+        let rays = RayGrid::new(&eye, [0, top as u32], [width, items.len() / width].map(|n| n as u32));
         for (i, item) in items.iter_mut().enumerate() {
             let (x, y) = (i % width, top + i / width);
             if let Some(around) = rays.around(x as u32, y as u32) {
@@ -169,26 +206,34 @@ fn for_each_in_field<T: Send>(
 }
 
 impl View<'_> {
-    /// The range of a pixel's centre; not a number if its ray leaves the scene.
-    fn range_mm(&self, around: &Around<'_>) -> f32 {
-        let met = self.scene.encounter(self.world_from_camera.origin().mm(), around.centre());
-        met.map_or(f32::NAN, |met| met.range() as f32)
+    /// The first look at a pixel.
+    fn first(&self, around: &Around<'_>, hash: u64) -> First {
+        let origin = self.world_from_camera.origin().mm();
+        let theta = self.theta(around);
+        let met = self.scene.encounter(origin, around.centre());
+        let look = if self.optics.samples <= 1 {
+            let finest = 1.0 / self.camera.pixels_per_radian(theta);
+            Look::default().with(self.scene.light(origin, around.centre(), met.as_ref(), finest))
+        } else {
+            self.look(around, self.optics.samples, hash)
+        };
+        let exposure = self.optics.falloff(theta, self.camera.theta_max()) as f32;
+        First { look, range_mm: met.map_or(f32::NAN, |met| met.range() as f32), exposure }
     }
 
     /// The light that `count` rays through a pixel's square bring.
     fn look(&self, around: &Around<'_>, count: u32, hash: u64) -> Look {
         let origin = self.world_from_camera.origin().mm();
         let finest = 1.0 / self.camera.pixels_per_radian(self.theta(around));
-        let mut look = Look::default();
-        for offset in lattice(count, hash) {
-            let colour = around.at(offset).and_then(|direction| {
-                let met = self.scene.encounter(origin, direction)?;
-                Some(self.scene.radiance(origin, direction, &met, finest))
-            });
+        let nearby = around.nearby();
+        lattice(count, hash).fold(Look::default(), |look, offset| {
+            let light = |direction| {
+                let met = self.scene.encounter(origin, direction);
+                self.scene.light(origin, direction, met.as_ref(), finest)
+            };
             // A ray outside the field brings no light.
-            look.add(colour.unwrap_or([0.0; 3]));
-        }
-        look
+            look.with(nearby.at(offset).map_or([0.0; 3], light))
+        })
     }
 
     /// The angle of a pixel's centre to the optical axis.

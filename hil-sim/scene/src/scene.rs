@@ -35,6 +35,8 @@ pub struct Scene {
     solids: Vec<Solid>,
     hierarchy: Hierarchy,
     lighting: Lighting,
+    /// What is seen between and beyond the solids.
+    backdrop: Rgb,
 }
 
 /// Tells the surfaces of a scene apart. The same scene gives the same numbers.
@@ -84,6 +86,17 @@ impl Scene {
             Some(contact.range)
         });
         first
+    }
+
+    /// The light that comes along a ray with this first encounter.
+    pub(crate) fn light(
+        &self,
+        origin: Vector3<f64>,
+        direction: Vector3<f64>,
+        met: Option<&Encounter>,
+        spread: f64,
+    ) -> Rgb {
+        met.map_or(self.backdrop, |met| self.radiance(origin, direction, met, spread))
     }
 
     /// The linear colour of an encounter, of detail no finer than `spread` (radians between neighbouring rays) shows.
@@ -145,10 +158,15 @@ impl Scene {
             };
             Solid::new(Shape::Rectangle { half }, centre, rotation, Material { pattern, seed: side as u32, glow: None })
         };
-        let lighting =
-            Lighting { ambient: [1.0; 3], from_above: 0.0, occlusion: 0.0, room: [low, high], lamps: Vec::new() };
         let solids = walls.into_iter().enumerate().map(|(side, pattern)| wall(side, pattern)).collect();
-        Self { solids: Vec::new(), hierarchy: Hierarchy::default(), lighting }.with(solids)
+        Self::empty([0.0; 3]).lit(|lighting| lighting.room = [low, high]).with(solids)
+    }
+
+    /// Nothing, in even light, before a `backdrop` that is infinitely far.
+    pub(crate) fn empty(backdrop: Rgb) -> Self {
+        let room = [Vector3::repeat(f64::NEG_INFINITY), Vector3::repeat(f64::INFINITY)];
+        let lighting = Lighting { ambient: [1.0; 3], from_above: 0.0, occlusion: 0.0, room, lamps: Vec::new() };
+        Self { solids: Vec::new(), hierarchy: Hierarchy::default(), lighting, backdrop }
     }
 
     /// The scene with more solids.

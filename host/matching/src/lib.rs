@@ -11,10 +11,13 @@
 //! Terms: *keypoint*, a position worth comparing; *descriptor*, what its surroundings look like; *disparity*,
 //! a_L − a_R, the parallax along a row; *level*, the halvings of a view's resolution.
 //!
+//! [`dense_depth`] gives a range to every pixel of the left image instead, with its uncertainty or the reason why there is none.
+//!
 //! Everything is a pure function of its arguments: the same pair gives the same matches on any number of threads.
 
 mod consensus;
 mod corners;
+mod dense;
 mod descriptor;
 mod distinct;
 mod epipolar_band;
@@ -29,6 +32,7 @@ mod shared_frame;
 mod single;
 mod view;
 
+pub use dense::{DenseCounts, DenseDepth, DenseRange, DenseSample, DenseViews, Disparities, Gap, Swept, dense_depth};
 pub use guided::GuidedMatcher;
 pub use matcher::{Drop, ImagePair, Match, MatchError, Matcher, Matches};
 pub use shared_frame::{Shared, SharedFrame};

@@ -86,9 +86,13 @@ impl Extent {
 /// Where the lens shows `ray`, unless that is in the rim or so near the sensor's border that interpolation would read
 /// beyond it.
 pub(crate) fn seen_at<F: Frame>(camera: &KannalaBrandt, ray: &UnitRay<F>) -> Option<Pixel> {
+    camera.project(ray).ok().filter(|pixel| well_inside(camera, ray.vector().z, pixel))
+}
+
+/// Whether a pixel, whose unit ray has this z, lies inside the rim, and as far from the border as interpolation reads.
+pub(crate) fn well_inside(camera: &KannalaBrandt, z: f64, pixel: &Pixel) -> bool {
     const BORDER: f64 = 1.0;
-    let pixel = camera.project(ray).ok()?;
     let inside = |x: f64, n: u32| x >= BORDER && x < f64::from(n) - 1.0 - BORDER;
-    let in_cone = ray.vector().z >= (camera.theta_max() - RIM).rad().cos();
-    (in_cone && inside(pixel.u, camera.size().width) && inside(pixel.v, camera.size().height)).then_some(pixel)
+    let in_cone = z >= (camera.theta_max() - RIM).rad().cos();
+    in_cone && inside(pixel.u, camera.size().width) && inside(pixel.v, camera.size().height)
 }

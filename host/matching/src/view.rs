@@ -6,10 +6,10 @@
 use image::GrayImage;
 use nalgebra::Vector3;
 use rayon::prelude::*;
-use vergence_vision::{Frame, KannalaBrandt, OutsideField, Pixel, Transform, UnitRay};
+use vergence_vision::{BatchLens, Frame, KannalaBrandt, OutsideField, Pixel, Transform, UnitRay};
 
 use crate::plane::{Plane, cubic_weights};
-use crate::shared_field::{Extent, seen_at};
+use crate::shared_field::{Extent, well_inside};
 use crate::{Shared, SharedFrame};
 
 /// A position in a [`View`], in its pixels. (0, 0) is the centre of the top-left one.
@@ -68,8 +68,19 @@ impl Grid {
     #[must_use]
     pub fn position(&self, bearing: &UnitRay<Shared>) -> ViewPixel {
         let d = bearing.vector();
-        let (a, b) = (d.x.atan2(d.y.hypot(d.z)), d.y.atan2(d.z));
+        self.position_of(d.x.atan2(d.y.hypot(d.z)), d.y.atan2(d.z))
+    }
+
+    /// Where the direction with these angles lies, possibly beyond the grid.
+    pub(crate) fn position_of(&self, a: f64, b: f64) -> ViewPixel {
         ViewPixel { x: (a - self.a_min) * self.pixels_per_radian, y: (b - self.b_min) * self.pixels_per_radian }
+    }
+
+    /// The index by rows of the pixel nearest to a position; `None` beyond the grid.
+    pub(crate) fn index_nearest(&self, at: ViewPixel) -> Option<usize> {
+        let (x, y) = (at.x.round(), at.y.round());
+        let inside = x >= 0.0 && y >= 0.0 && x < self.width as f64 && y < self.height as f64;
+        inside.then_some(y as usize * self.width + x as usize)
     }
 
     /// Columns and rows.
@@ -115,15 +126,22 @@ impl<F: Frame> View<F> {
         shared_from_camera: Transform<Shared, F>,
         grid: Grid,
     ) -> Self {
-        let camera_from_shared = shared_from_camera.inverse();
-        let sample = |x: usize, y: usize| {
-            let ray = camera_from_shared * grid.bearing(ViewPixel { x: x as f64, y: y as f64 })?;
-            sample_image(image, seen_at(camera, &ray)?)
-        };
-        let (values, seen) = (0..grid.width * grid.height)
-            .into_par_iter()
-            .map(|i| sample(i % grid.width, i / grid.width).map_or((0.0, false), |value| (value, true)))
-            .unzip();
+        let camera_from_shared = shared_from_camera.inverse().rotation().to_rotation_matrix().into_inner();
+        let lens = BatchLens::new(camera);
+        let mut values = vec![0.0; grid.width * grid.height];
+        let mut seen = vec![false; values.len()];
+        let rows = values.par_chunks_mut(grid.width).zip(seen.par_chunks_mut(grid.width));
+        rows.enumerate().for_each(|(y, (values, seen))| {
+            let ray = |x: usize| (camera_from_shared * direction(grid.a(x as f64), grid.b(y as f64))).into();
+            let rays: Vec<[f64; 3]> = (0..grid.width).map(ray).collect();
+            for ((&[_, _, z], [u, v]), (value, seen)) in
+                rays.iter().zip(lens.project(&rays)).zip(values.iter_mut().zip(seen))
+            {
+                let at = Pixel { u, v };
+                let sampled = well_inside(camera, z, &at).then(|| sample_image(image, at)).flatten();
+                (*value, *seen) = sampled.map_or((0.0, false), |sampled| (sampled, true));
+            }
+        });
         Self { grid, camera: *camera, shared_from_camera, plane: Plane::new(grid.width, grid.height, values), seen }
     }
 
@@ -142,12 +160,7 @@ impl<F: Frame> View<F> {
     /// Whether the camera sees the pixel nearest to `at`, its rim of 1.5° excluded.
     #[must_use]
     pub fn sees(&self, at: ViewPixel) -> bool {
-        let (x, y) = (at.x.round(), at.y.round());
-        x >= 0.0
-            && y >= 0.0
-            && x < self.grid.width as f64
-            && y < self.grid.height as f64
-            && self.seen[y as usize * self.grid.width + x as usize]
+        self.grid.index_nearest(at).is_some_and(|index| self.seen[index])
     }
 
     /// The original image's pixel at a position.
@@ -169,6 +182,11 @@ impl<F: Frame> View<F> {
 
     pub(crate) const fn plane(&self) -> &Plane {
         &self.plane
+    }
+
+    /// Which pixels the camera sees, by rows, its rim of 1.5° excluded.
+    pub(crate) fn seen(&self) -> &[bool] {
+        &self.seen
     }
 }
 

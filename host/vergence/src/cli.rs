@@ -76,6 +76,8 @@ enum Verb {
     Trigger(cmd::trigger::Args),
     /// Measure the link: round trips, losses, repeats.
     LinkTest(cmd::link_test::Args),
+    /// Print the firmware's log.
+    Log(cmd::log::Args),
     /// Show and change the board's settings.
     Config(cmd::config::Args),
     /// Run a simulated board that other programs can talk to.
@@ -168,6 +170,7 @@ fn execute(cli: Cli) -> Result<(), Failure> {
             Verb::Monitor(args) => cmd::monitor::run(&args, &globals, console).await,
             Verb::Trigger(args) => cmd::trigger::run(&args, &globals, console).await,
             Verb::LinkTest(args) => cmd::link_test::run(&args, &globals, console).await,
+            Verb::Log(args) => cmd::log::run(&args, &globals, console).await,
             Verb::Config(args) => cmd::config::run(&args, &globals, console).await,
             Verb::Sim(args) => cmd::sim::run(&args, &globals, console).await,
             Verb::Flash(args) => cmd::flash::run(&args, &globals, console).await,

@@ -15,6 +15,7 @@ pub mod cli;
 mod cmd;
 mod console;
 mod corners;
+pub mod dense;
 pub mod failure;
 mod firmware;
 pub mod link;

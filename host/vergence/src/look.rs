@@ -17,11 +17,11 @@ pub const PIXEL_SIGMA: f64 = 0.2;
 /// Gates are this many standard deviations wide.
 const GATE_SIGMAS: f64 = 3.0;
 /// The nearest range at which points are looked for.
-const NEAREST: Length = Length::from_mm(200.0);
+pub const NEAREST: Length = Length::from_mm(200.0);
 /// The matcher looks at least this far off the known pose, so that a pose which is off can be noticed.
 const LEAST_MATCHING_SIGMA: Angle = Angle::from_deg(0.15);
 /// A point whose range is less certain than this part of it is of no use.
-const MAX_RELATIVE_SIGMA: f64 = 0.05;
+pub const MAX_RELATIVE_SIGMA: f64 = 0.05;
 
 /// How well a corner of a single image is known, in pixels: no other image has registered it.
 const CORNER_SIGMA: f64 = 0.5;
@@ -253,7 +253,9 @@ pub fn bearings(image: &RgbImage, lens: &KannalaBrandt) -> Vec<Bearing> {
     image_corners(&grayscale(image), lens, MOST_BEARINGS).into_iter().filter_map(bearing).collect()
 }
 
-fn colour_at(image: &RgbImage, pixel: Pixel) -> [u8; 3] {
+/// The colour of the pixel nearest to a position, black outside.
+#[must_use]
+pub fn colour_at(image: &RgbImage, pixel: Pixel) -> [u8; 3] {
     // Positions lie on the sensor, so rounding stays inside; the cast saturates if one ever does not.
     let (x, y) = (pixel.u.round().max(0.0) as u32, pixel.v.round().max(0.0) as u32);
     image.get_pixel_checked(x, y).map_or([0; 3], |colour| colour.0)

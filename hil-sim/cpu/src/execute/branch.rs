@@ -19,7 +19,7 @@ impl Cpu {
     #[inline(always)]
     pub(super) fn branch_to<B: Bus>(&mut self, bus: &B, target: u32) {
         self.pc = target & !1;
-        self.now += REFILL + u64::from(bus.wait_states());
+        self.now = self.now.wrapping_add(REFILL + u64::from(bus.wait_states()));
     }
 
     /// BXWritePC() (A2.3.1): an even target faults where it lands.

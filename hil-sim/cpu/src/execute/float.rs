@@ -101,7 +101,7 @@ impl Cpu {
         self.set_single(i.d, result);
     }
 
-    #[inline(always)]
+    #[inline(never)]
     pub(super) fn float_load<B: Bus>(&mut self, bus: &mut B, i: &Instruction) -> Result<(), Trap> {
         self.use_float(bus)?;
         let base = if i.n == 15 { self.r[15] & !3 } else { self.read(i.n) };
@@ -109,7 +109,7 @@ impl Cpu {
         self.load_singles(bus, i, base.wrapping_add(i.immediate))
     }
 
-    #[inline(always)]
+    #[inline(never)]
     pub(super) fn float_store<B: Bus>(&mut self, bus: &mut B, i: &Instruction) -> Result<(), Trap> {
         self.use_float(bus)?;
         let base = if i.n == 15 { self.r[15] & !3 } else { self.read(i.n) };

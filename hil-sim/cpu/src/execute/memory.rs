@@ -57,11 +57,12 @@ impl Cpu {
 
     #[inline(never)]
     fn load_device<B: Bus>(&mut self, bus: &mut B, address: u32, access: Access) -> Result<u32, Trap> {
-        self.horizon = 0;
         let result = if INTERNAL.contains(&address) {
             self.read_private(bus, address, access)
         } else {
-            bus.read(self.now, address, access)
+            let result = bus.read(self.now, address, access);
+            self.look_up(bus);
+            result
         };
         match result {
             Ok(value) => Ok(value),
@@ -86,17 +87,26 @@ impl Cpu {
 
     #[inline(never)]
     fn store_device<B: Bus>(&mut self, bus: &mut B, address: u32, access: Access, value: u32) -> Result<(), Trap> {
-        self.horizon = 0;
         let result = if INTERNAL.contains(&address) {
             self.write_private(bus, address, access, value)
         } else {
             self.code_written(address);
-            bus.write(self.now, address, access, value)
+            let result = bus.write(self.now, address, access, value);
+            self.look_up(bus);
+            result
         };
         match result {
             Ok(()) => Ok(()),
             Err(_) => self.data_fault(address),
         }
+    }
+
+    /// After an access to the chip: goes on only up to its next event, and not at all where something is new.
+    #[inline]
+    fn look_up<B: Bus>(&mut self, bus: &B) {
+        let new =
+            bus.stop_requested() || bus.code_version() != self.code_version || !self.nvic.knows(bus.lines(), bus.nmi());
+        self.horizon = if new { 0 } else { self.horizon.min(bus.next_event()) };
     }
 
     /// A handler of the highest priorities may ask that failing accesses pass unseen (CCR.BFHFNMIGN).
@@ -167,7 +177,7 @@ impl Cpu {
     ) -> Result<(), Trap> {
         let address = self.read(i.n).wrapping_add(i.immediate);
         if i.flags.has(Flags::UNPRIVILEGED) {
-            return self.as_unprivileged(|cpu| cpu.load_to(bus, i, width, address, pipelined));
+            return self.load_unprivileged(bus, i, width, address, pipelined);
         }
         self.load_to(bus, i, width, address, pipelined)
     }
@@ -221,7 +231,7 @@ impl Cpu {
     pub(super) fn store_offset<B: Bus>(&mut self, bus: &mut B, i: &Instruction, width: Width) -> Result<(), Trap> {
         let address = self.read(i.n).wrapping_add(i.immediate);
         if i.flags.has(Flags::UNPRIVILEGED) {
-            return self.as_unprivileged(|cpu| cpu.store(bus, address, width.access(), cpu.read(i.d)));
+            return self.store_unprivileged(bus, address, width, self.read(i.d));
         }
         self.store(bus, address, width.access(), self.read(i.d))
     }
@@ -242,6 +252,23 @@ impl Cpu {
         Ok(())
     }
 
+    #[inline(never)]
+    fn load_unprivileged<B: Bus>(
+        &mut self,
+        bus: &mut B,
+        i: &Instruction,
+        width: Width,
+        address: u32,
+        pipelined: bool,
+    ) -> Result<(), Trap> {
+        self.as_unprivileged(|cpu| cpu.load_to(bus, i, width, address, pipelined))
+    }
+
+    #[inline(never)]
+    fn store_unprivileged<B: Bus>(&mut self, bus: &mut B, address: u32, width: Width, value: u32) -> Result<(), Trap> {
+        self.as_unprivileged(|cpu| cpu.store(bus, address, width.access(), value))
+    }
+
     fn as_unprivileged<T>(&mut self, access: impl FnOnce(&mut Self) -> Result<T, Trap>) -> Result<T, Trap> {
         let before = (self.unprivileged, self.exception);
         // Only the private bus asks; no exception is taken in between.
@@ -258,6 +285,7 @@ impl Cpu {
         (if i.flags.has(Flags::PRE_INDEX) { moved } else { base }, moved)
     }
 
+    #[inline(never)]
     pub(super) fn load_dual<B: Bus>(&mut self, bus: &mut B, i: &Instruction) -> Result<(), Trap> {
         let (address, moved) = self.dual_address(i);
         Self::aligned(address, Access::Word)?;
@@ -272,6 +300,7 @@ impl Cpu {
         Ok(())
     }
 
+    #[inline(never)]
     pub(super) fn store_dual<B: Bus>(&mut self, bus: &mut B, i: &Instruction) -> Result<(), Trap> {
         let (address, moved) = self.dual_address(i);
         Self::aligned(address, Access::Word)?;

@@ -9,7 +9,7 @@ mod parallel;
 
 use crate::bus::Bus;
 use crate::cpu::{Activity, Cpu};
-use crate::instruction::{Flags, Instruction, Op};
+use crate::instruction::{Flags, Instruction, Op, Width};
 
 /// What interrupts an instruction.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -39,9 +39,16 @@ impl Cpu {
             Op::AluRegister(alu) => self.alu_register(alu, i),
             Op::AluShifted(alu) => self.alu_shifted(alu, i),
             Op::ShiftRegister(kind) => self.shift_register(kind, i),
+            // The frequent widths each for itself, so that the compiler makes the most of them.
+            Op::LoadOffset(Width::Word) => return self.load_offset(bus, i, Width::Word, pipelined),
+            Op::LoadOffset(Width::Byte) => return self.load_offset(bus, i, Width::Byte, pipelined),
             Op::LoadOffset(width) => return self.load_offset(bus, i, width, pipelined),
+            Op::LoadRegister(Width::Byte) => return self.load_register(bus, i, Width::Byte, pipelined),
             Op::LoadRegister(width) => return self.load_register(bus, i, width, pipelined),
+            Op::StoreOffset(Width::Word) => return self.store_offset(bus, i, Width::Word),
+            Op::StoreOffset(Width::Byte) => return self.store_offset(bus, i, Width::Byte),
             Op::StoreOffset(width) => return self.store_offset(bus, i, width),
+            Op::StoreRegister(Width::Byte) => return self.store_register(bus, i, Width::Byte),
             Op::StoreRegister(width) => return self.store_register(bus, i, width),
             Op::BranchIf => {
                 if self.condition(i.d) {
@@ -67,13 +74,16 @@ impl Cpu {
             Op::Reverse(kind) => self.reverse(kind, i),
             Op::Multiply(kind) => return self.multiply(kind, i),
             Op::LoadIndexed(width) => return self.load_indexed(bus, i, width, pipelined),
+            Op::LoadLiteral(Width::Word) => return self.load_literal(bus, i, Width::Word, pipelined),
             Op::LoadLiteral(width) => return self.load_literal(bus, i, width, pipelined),
             Op::StoreIndexed(width) => return self.store_indexed(bus, i, width),
-            Op::LoadMultiple => return self.load_multiple(bus, i),
-            Op::StoreMultiple => return self.store_multiple(bus, i),
             Op::BranchExchange => return self.branch_exchange(bus, self.read(i.m)),
             Op::BranchLinkExchange => return self.branch_link_exchange(bus, i),
             Op::IfThen => self.it = i.immediate as u8,
+            Op::LoadMultiple => return self.load_multiple(bus, i),
+            Op::StoreMultiple => return self.store_multiple(bus, i),
+            Op::LoadDual => return self.load_dual(bus, i),
+            Op::StoreDual => return self.store_dual(bus, i),
             Op::Float(float) => return self.float(bus, float, i),
             Op::FloatLoad => return self.float_load(bus, i),
             Op::FloatStore => return self.float_store(bus, i),
@@ -94,8 +104,6 @@ impl Cpu {
             Op::PackHalves => self.pack_halves(i),
             Op::Parallel(operation) => self.parallel(operation, i),
             Op::Select => self.select(i),
-            Op::LoadDual => return self.load_dual(bus, i),
-            Op::StoreDual => return self.store_dual(bus, i),
             Op::LoadExclusive(width) => return self.load_exclusive(bus, i, width),
             Op::StoreExclusive(width) => return self.store_exclusive(bus, i, width),
             Op::ClearExclusive => self.exclusive = false,

@@ -32,6 +32,7 @@ impl Cpu {
     }
 
     /// A division ends early: two cycles and one for every few quotient bits, at most twelve (TRM 3.3.1).
+    #[inline(never)]
     fn divide(&mut self, kind: Multiply, i: &Instruction, n: u32, m: u32) -> Result<(), Trap> {
         if m == 0 && self.system.configuration & configuration::TRAP_DIVIDE != 0 {
             return Err(Trap::DivideByZero);
@@ -53,6 +54,7 @@ impl Cpu {
         Ok(())
     }
 
+    #[inline(always)]
     fn write_long(&mut self, i: &Instruction, value: u64) {
         self.write(i.d, value as u32);
         self.write(i.a, (value >> 32) as u32);

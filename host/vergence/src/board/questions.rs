@@ -87,4 +87,12 @@ impl Board {
     pub async fn next_mark(&mut self) -> Result<FrameMark, Failure> {
         Ok(self.client.next_mark().await?)
     }
+
+    /// The next bytes of the board's log.
+    ///
+    /// # Errors
+    /// Where the link ended.
+    pub async fn next_log(&mut self) -> Result<Vec<u8>, Failure> {
+        Ok(self.client.next_log().await?)
+    }
 }

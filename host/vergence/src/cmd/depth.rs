@@ -1,5 +1,6 @@
 //! `vergence depth`: a cloud from photographs.
 
+mod dense;
 mod motion;
 
 use std::collections::BTreeMap;
@@ -46,6 +47,10 @@ pub struct Args {
     /// angular-linf, reprojection or rectified.
     #[arg(long, value_name = "METHOD", default_value_t)]
     kernel: Kernel,
+    /// A range for every pixel of the left image instead of matched points: a binary cloud, and beside it PNG images of
+    /// range (mm, 16 bits; 0 none, 65535 too far), sigma (0.1 mm), confidence (of 255) and a preview.
+    #[arg(long, conflicts_with_all = ["points", "kernel", "matcher"])]
+    dense: bool,
     /// Write the points as tables too, beside the cloud.
     #[arg(long, value_delimiter = ',', value_name = "FORMAT")]
     also: Vec<TableFormat>,
@@ -75,19 +80,25 @@ pub fn run(args: &Args, globals: &Globals, console: Console) -> Result<(), Failu
             right.remaining()
         )));
     }
-    let matcher = args.matching.matcher(console)?;
+    let matcher = if args.dense { None } else { Some(args.matching.matcher(console)?) };
     let several = args.left.is_dir();
-    let mut results = Vec::new();
+    let (mut results, mut empty) = (Vec::new(), Vec::new());
     while let (Some(left), Some(right)) = (left.grab()?, right.grab()?) {
         let work = console.progress(&format!("{} and {}", left.name, right.name));
+        let Some(matcher) = &matcher else {
+            let result = dense::one_pair([&left, &right], &rig, &pose, &out_of(args, &left)?, console)?;
+            work.finish_and_clear();
+            if dense::is_empty(&result) {
+                empty.push(left.name);
+            }
+            results.push(result);
+            continue;
+        };
         let how =
             How { pairs: pairs.as_deref(), matcher: matcher.as_ref(), kernel: args.kernel, motion: motion.as_ref() };
         let look = one_pair([&left, &right], &rig, &pose, how)?;
         work.finish_and_clear();
-        let out = if several { args.out.join(format!("{}.ply", left.name)) } else { args.out.clone() };
-        if several {
-            make_folder(&args.out)?;
-        }
+        let out = out_of(args, &left)?;
         write_whole(&out, ply(&look.points).as_bytes())?;
         for format in &args.also {
             let table = Table::of_points(&look.points).text(*format);
@@ -102,7 +113,8 @@ pub fn run(args: &Args, globals: &Globals, console: Console) -> Result<(), Failu
     console.result(&match (several, results.pop()) {
         (false, Some(only)) => only,
         (_, last) => json!({ "pairs": results.into_iter().chain(last).collect::<Vec<_>>() }),
-    })
+    })?;
+    if empty.is_empty() { Ok(()) } else { Err(dense::nothing_seen(&empty)) }
 }
 
 /// Where the cameras were: fixed by the rig file, or said on the command line.
@@ -122,6 +134,15 @@ fn pose(args: &Args, rig: &Rig) -> Result<RigPose, Failure> {
     check_range(rig, &positions)?;
     let values: Vec<f64> = positions.iter().map(|position| position.value()).collect();
     Ok(rig.pose_at_values(&values))
+}
+
+/// The cloud's file; for folders, in the folder of clouds, which is made.
+fn out_of(args: &Args, left: &Frame) -> Result<PathBuf, Failure> {
+    if !args.left.is_dir() {
+        return Ok(args.out.clone());
+    }
+    make_folder(&args.out)?;
+    Ok(args.out.join(format!("{}.ply", left.name)))
 }
 
 /// How homologous points are found, and points made of them.

@@ -24,6 +24,7 @@ pub mod flash;
 pub mod home;
 pub mod image;
 pub mod link_test;
+pub mod log;
 pub mod mode;
 pub mod models;
 pub mod monitor;

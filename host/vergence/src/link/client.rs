@@ -13,6 +13,7 @@ use vergence_protocol::{
 use vergence_rig::{ClockMap, Exchange, JointSample};
 
 use super::clock::HostClock;
+use super::error::LinkError;
 use super::knowledge::BoardKnowledge;
 use super::open::OpenWire;
 
@@ -27,29 +28,8 @@ const PROBE_SLOW_US: u64 = 983_900;
 const FAST_PROBES: u32 = 10;
 /// Pulses that may wait to be taken: seconds at the highest rate.
 const MARKS_KEPT: usize = 2_048;
-
-/// Why the link is of no use any more.
-#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
-#[non_exhaustive]
-pub enum LinkError {
-    /// The other end closed it, or the cable was pulled.
-    #[error(
-        "the link closed ({0}): check the cable or the simulator, then try again; nothing moves until you ask again"
-    )]
-    Closed(String),
-    /// Nothing was heard.
-    #[error("no answer within {0:?}: is this the port of a vergence board, and is the board powered?")]
-    Silent(Duration),
-    /// Something was heard, but nothing that makes sense.
-    #[error("{0} bytes arrived but no valid message: another device, or another baud rate, is on this port")]
-    Noise(u32),
-    /// The board restarted, or another host took the session.
-    #[error("the board began anew or another host took it over: run 'vergence status'")]
-    SessionLost,
-    /// A request that cannot be sent now.
-    #[error("the request cannot be sent: {0}")]
-    Unsendable(String),
-}
+/// Pieces of log that may wait to be taken: more than the board keeps.
+const LOGS_KEPT: usize = 256;
 
 enum Command {
     /// Sent reliably; the reply comes back.
@@ -63,6 +43,7 @@ pub struct Client {
     commands: mpsc::Sender<Command>,
     poses: watch::Receiver<Option<PoseReport>>,
     marks: mpsc::Receiver<FrameMark>,
+    logs: mpsc::Receiver<Vec<u8>>,
     end: watch::Receiver<Option<LinkError>>,
     learned: BoardKnowledge,
     clock: HostClock,
@@ -79,6 +60,7 @@ impl Client {
         let (commands, inbox) = mpsc::channel(16);
         let (pose_sender, poses) = watch::channel(None);
         let (mark_sender, marks) = mpsc::channel(MARKS_KEPT);
+        let (log_sender, logs) = mpsc::channel(LOGS_KEPT);
         let (end_sender, end) = watch::channel(None);
         let (opened_sender, opened) = oneshot::channel();
         let learned = BoardKnowledge::new(wire.baud);
@@ -88,6 +70,7 @@ impl Client {
             inbox,
             poses: pose_sender,
             marks: mark_sender,
+            logs: log_sender,
             opened: Some(opened_sender),
             waiting: BTreeMap::new(),
             learned: learned.clone(),
@@ -101,7 +84,7 @@ impl Client {
             end_sender.send_replace(Some(error));
         });
         let compatibility = opened.await.unwrap_or(Err(LinkError::SessionLost))?;
-        Ok(Self { commands, poses, marks, end, learned, clock, session, compatibility })
+        Ok(Self { commands, poses, marks, logs, end, learned, clock, session, compatibility })
     }
 
     /// Whether both ends mean the same messages.
@@ -173,6 +156,17 @@ impl Client {
         while self.marks.try_recv().is_ok() {}
     }
 
+    /// The next bytes of the board's log, however long they take.
+    ///
+    /// # Errors
+    /// [`LinkError`] where the link ended.
+    pub async fn next_log(&mut self) -> Result<Vec<u8>, LinkError> {
+        match self.logs.recv().await {
+            Some(bytes) => Ok(bytes),
+            None => Err(self.why_ended()),
+        }
+    }
+
     /// The pulses of the camera trigger, for whoever listens beside the one who moves; [`Self::next_mark`] hears none from
     /// then on.
     pub fn take_marks(&mut self) -> mpsc::Receiver<FrameMark> {
@@ -208,6 +202,7 @@ struct LinkTask {
     inbox: mpsc::Receiver<Command>,
     poses: watch::Sender<Option<PoseReport>>,
     marks: mpsc::Sender<FrameMark>,
+    logs: mpsc::Sender<Vec<u8>>,
     opened: Option<oneshot::Sender<Result<Compatibility, LinkError>>>,
     waiting: BTreeMap<Ticket, oneshot::Sender<Result<Report, LinkError>>>,
     learned: BoardKnowledge,
@@ -355,7 +350,9 @@ impl LinkTask {
                     }
                 }
                 HostEvent::Report(report) => self.note(now, report),
-                HostEvent::Log(_) | HostEvent::Management(_) => {}
+                // Who does not listen misses it.
+                HostEvent::Log(bytes) => drop(self.logs.try_send(bytes.to_vec())),
+                HostEvent::Management(_) => {}
             }
         }
         Ok(())

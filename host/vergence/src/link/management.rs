@@ -8,8 +8,8 @@ use vergence_protocol::management::{Identity, Management, ManagementReport, Outc
 use vergence_protocol::update::{Upload, UploadState};
 use vergence_protocol::{HostEvent, HostSession, MAX_FRAME, Microseconds};
 
-use super::client::LinkError;
 use super::clock::HostClock;
+use super::error::LinkError;
 use super::open::{OpenWire, Port, open};
 use crate::board::fresh_session;
 use crate::failure::Failure;

@@ -2,13 +2,15 @@
 
 mod client;
 mod clock;
+mod error;
 mod knowledge;
 mod management;
 mod open;
 mod port_lock;
 
-pub use client::{Client, LinkError};
+pub use client::Client;
 pub use clock::HostClock;
+pub use error::LinkError;
 pub use knowledge::BoardKnowledge;
 pub use management::ManagementLink;
 pub use open::{OpenWire, Port, Wire, open};

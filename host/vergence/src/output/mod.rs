@@ -1,9 +1,12 @@
 //! Files that commands write: whole, or not at all.
 
 mod colour_map;
+mod dense_pictures;
+mod dense_ply;
 mod depth_field_svg;
 mod picture;
 mod ply;
+mod range_scale;
 mod table;
 mod text;
 mod zones_plot;
@@ -12,8 +15,10 @@ mod zones_svg;
 use std::io::Write;
 use std::path::Path;
 
-use image::{ImageFormat, RgbImage};
+use image::{EncodableLayout, ImageBuffer, ImageFormat, PixelWithColorType};
 
+pub use dense_pictures::{confidence_image, dense_picture, range_image, sigma_image};
+pub use dense_ply::{DenseRow, dense_ply};
 pub use depth_field_svg::depth_field_svg;
 pub use picture::{DepthPicture, depth_picture, match_picture};
 pub use ply::ply;
@@ -49,7 +54,11 @@ fn readable_by_all() -> std::fs::Permissions {
 ///
 /// # Errors
 /// Says which file and why.
-pub fn write_png(path: &Path, image: &RgbImage) -> Result<(), Failure> {
+pub fn write_png<P>(path: &Path, image: &ImageBuffer<P, Vec<P::Subpixel>>) -> Result<(), Failure>
+where
+    P: PixelWithColorType,
+    [P::Subpixel]: EncodableLayout,
+{
     let mut bytes = std::io::Cursor::new(Vec::new());
     image.write_to(&mut bytes, ImageFormat::Png).map_err(|error| Failure::output(path, error))?;
     write_whole(path, bytes.get_ref())

@@ -1,18 +1,16 @@
 //! Pictures of a look: matches between both views, and range as colour beside the truth.
 
-use image::{Rgb, RgbImage, imageops};
+use image::{RgbImage, imageops};
 use imageproc::drawing::{draw_antialiased_line_segment_mut, draw_filled_circle_mut};
 use imageproc::pixelops::interpolate;
 use vergence_vision::{Length, Pixel};
 
-use super::colour_map::viridis;
-use super::text::{fill, write_text};
+use super::range_scale::{BAR_HEIGHT, MARGIN, RangeScale, dimmed};
+use super::text::write_text;
 use crate::look::{ColouredPoint, Eyes};
 
 /// More lines than this hide each other.
 const MOST_LINES: usize = 150;
-const MARGIN: u32 = 16;
-const BAR_HEIGHT: u32 = 72;
 const DOT_RADIUS: i32 = 4;
 
 /// A range map to compare with: for a pixel of the left image, the true range.
@@ -31,7 +29,7 @@ pub struct DepthPicture<'a> {
 /// Both views side by side; every point as a dot in each, some of them joined by a line, coloured by range.
 #[must_use]
 pub fn match_picture(eyes: Eyes<'_>, points: &[ColouredPoint]) -> RgbImage {
-    let scale = RangeScale::of(points);
+    let scale = RangeScale::of(points.iter().map(range));
     let (width, height) = eyes.left.dimensions();
     let mut canvas = RgbImage::new(2 * width, height + BAR_HEIGHT);
     imageops::replace(&mut canvas, &dimmed(eyes.left), 0, 0);
@@ -57,7 +55,7 @@ pub fn match_picture(eyes: Eyes<'_>, points: &[ColouredPoint]) -> RgbImage {
 /// The measured points on the left image, coloured by range; beside them the truth in the same colours.
 #[must_use]
 pub fn depth_picture(picture: &DepthPicture<'_>) -> RgbImage {
-    let scale = RangeScale::of(picture.points);
+    let scale = RangeScale::of(picture.points.iter().map(range));
     let (width, height) = picture.left.dimensions();
     let panels = if picture.truth.is_some() { 2 } else { 1 };
     let mut canvas = RgbImage::new(panels * width, height + BAR_HEIGHT);
@@ -85,56 +83,4 @@ fn range(point: &ColouredPoint) -> Length {
 
 fn rounded(pixel: Pixel, shift: u32) -> (i32, i32) {
     (pixel.u.round() as i32 + shift.cast_signed(), pixel.v.round() as i32)
-}
-
-/// Half as bright and grey, so that colours stand out.
-fn dimmed(image: &RgbImage) -> RgbImage {
-    let mut dim = image.clone();
-    for pixel in dim.pixels_mut() {
-        let [r, g, b] = pixel.0.map(u16::from);
-        *pixel = Rgb([((r + g + b) / 6) as u8; 3]);
-    }
-    dim
-}
-
-/// Ranges on a logarithmic scale: a step of colour is a step in per cent.
-struct RangeScale {
-    nearest: f64,
-    farthest: f64,
-}
-
-impl RangeScale {
-    /// From the 2 % to the 98 % quantile, so that a stray point does not take all the colours.
-    fn of(points: &[ColouredPoint]) -> Self {
-        let mut ranges: Vec<f64> = points.iter().map(|point| range(point).mm()).collect();
-        ranges.sort_by(f64::total_cmp);
-        let quantile = |share: f64| ranges.get(((ranges.len() as f64 - 1.0) * share).round() as usize).copied();
-        let nearest = quantile(0.02).unwrap_or(100.0);
-        Self { nearest, farthest: quantile(0.98).unwrap_or(1000.0).max(nearest * 1.01) }
-    }
-
-    fn colour(&self, range: Length) -> Rgb<u8> {
-        Rgb(viridis((range.mm() / self.nearest).ln() / (self.farthest / self.nearest).ln()))
-    }
-
-    /// A bar with its ranges below the picture.
-    fn draw(&self, canvas: &mut RgbImage, note: &str) {
-        const TICKS: u32 = 6;
-        let (width, top) = (canvas.width() - 2 * MARGIN, canvas.height() - BAR_HEIGHT + 8);
-        for column in 0..width {
-            let colour = viridis(f64::from(column) / f64::from(width));
-            fill(canvas, (MARGIN + column, top), (1, 20), colour);
-        }
-        for tick in 0..=TICKS {
-            let share = f64::from(tick) / f64::from(TICKS);
-            let mm = self.nearest * (self.farthest / self.nearest).powf(share);
-            let label = format!("{:.2} m", mm / 1000.0);
-            let half = (label.len() as u32) * 8;
-            let x = (MARGIN + (share * f64::from(width)) as u32)
-                .saturating_sub(half)
-                .clamp(MARGIN, MARGIN + width - 2 * half);
-            write_text(canvas, (x, top + 26), 2, &label);
-        }
-        write_text(canvas, (MARGIN, top + 46), 2, note);
-    }
 }

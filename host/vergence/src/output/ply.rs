@@ -4,12 +4,15 @@ use std::fmt::Write;
 
 use crate::look::ColouredPoint;
 
+/// What the columns are, a line of every header.
+pub const COLUMNS_COMMENT: &str = "comment millimetres in the left camera's frame: x right, y down, z forward\n";
+
 /// The points in the left camera's frame, in millimetres, with colour, pixels in both images, sigma of the range, and the
 /// matcher's score.
 #[must_use]
 pub fn ply(points: &[ColouredPoint]) -> String {
     let mut text = format!(
-        "ply\nformat ascii 1.0\ncomment millimetres in the left camera's frame: x right, y down, z forward\n\
+        "ply\nformat ascii 1.0\n{COLUMNS_COMMENT}\
          element vertex {}\n\
          property double x\nproperty double y\nproperty double z\n\
          property uchar red\nproperty uchar green\nproperty uchar blue\n\

@@ -1,0 +1,189 @@
+//! A range for every pixel of the left image.
+//!
+//! The views of both eyes are turned into the shared direction, where the point seen at (a, b) by the left eye lies at
+//! (a - d, b) for the right one: spheres of inverse distances swept through the scene shift one view along the rows of the
+//! other. [`DenseViews::sweep`] tries them all at the coarsest resolution and a few around the coarser answer at the finer
+//! ones, gathers costs of the census transform along paths, and keeps what both eyes agree on; [`DenseViews::register`] finds
+//! the fraction of a pixel and how uncertain it is; [`DenseViews::ranges`] returns to the pixels of the left image.
+//!
+//! Terms: *disparity* d, the parallax along a row; *hypothesis*, a disparity tried; *volume*, a number for each pixel and
+//! hypothesis.
+
+mod census;
+mod depth;
+mod fraction;
+mod levels;
+mod paths;
+mod range;
+mod register;
+mod surface;
+mod volume;
+mod window;
+mod winner;
+
+use nalgebra::Matrix6;
+use rayon::prelude::*;
+use vergence_vision::{Angle, BatchLens, Left, Length, Right};
+
+pub use self::depth::{DenseCounts, DenseDepth, DenseRange, DenseSample, Gap};
+pub use self::fraction::Disparities;
+use self::range::RangeFinder;
+use self::register::Seen;
+use self::surface::SAME_SURFACE;
+use crate::epipolar_band::EpipolarBand;
+use crate::matcher::{ImagePair, MatchError};
+use crate::{Grid, SharedFrame, View, ViewPixel};
+
+/// A parallax of fewer standard deviations cannot be told from none.
+const SIGNIFICANT: f32 = 3.0;
+/// A disparity less certain than this, in pixels, says nothing.
+const LARGEST_SIGMA: f32 = 2.0;
+/// Windows with less than this share of their contrast in common do not show the same thing.
+const LEAST_LIKENESS: f32 = 0.4;
+/// Where the right camera sees a direction neither at infinity nor at this range, it is not shared.
+const NEAR: Length = Length::from_mm(1000.0);
+
+/// A pair of images turned so that their epipolar curves are rows.
+#[derive(Clone, Debug)]
+pub struct DenseViews<'a> {
+    pair: ImagePair<'a>,
+    frame: SharedFrame,
+    left: View<Left>,
+    right: View<Right>,
+}
+
+/// Disparities in whole pixels, refined to where the costs around them are least.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Swept(Vec<f32>);
+
+/// A range for every pixel of the left image of `pair`. `pose_covariance` is that of the relative pose: a turn about the left
+/// axes in radians and a shift of the right camera in the left frame in millimetres.
+///
+/// # Errors
+/// [`MatchError`] where the pair cannot be matched whatever its images show.
+pub fn dense_depth(pair: &ImagePair<'_>, pose_covariance: &Matrix6<f64>) -> Result<DenseDepth, MatchError> {
+    let views = DenseViews::new(pair)?;
+    Ok(views.ranges(&views.register(&views.sweep()), pose_covariance))
+}
+
+impl<'a> DenseViews<'a> {
+    /// Turns both images.
+    ///
+    /// # Errors
+    /// [`MatchError`] where the pair cannot be matched whatever its images show.
+    pub fn new(pair: &ImagePair<'a>) -> Result<Self, MatchError> {
+        pair.check()?;
+        let frame = SharedFrame::new(&pair.left_from_right).ok_or(MatchError::NoBaseline)?;
+        let grid = Grid::covering(&frame, pair.left_camera, pair.right_camera, 1.0).ok_or(MatchError::NoSharedField)?;
+        let left = View::new(pair.left, pair.left_camera, frame.shared_from_left(), grid);
+        let right = View::new(pair.right, pair.right_camera, frame.shared_from_right(), grid);
+        Ok(Self { pair: *pair, frame, left, right })
+    }
+
+    /// The disparity of every pixel of the left view that both eyes agree on.
+    #[must_use]
+    pub fn sweep(&self) -> Swept {
+        Swept(levels::swept(&self.left, &self.right, &self.band(self.pair.nearest)))
+    }
+
+    /// The same to a fraction of a pixel, with what is uncertain.
+    #[must_use]
+    pub fn register(&self, swept: &Swept) -> Disparities {
+        let left = Seen { plane: self.left.plane(), seen: self.left.seen() };
+        let right = Seen { plane: self.right.plane(), seen: self.right.seen() };
+        fraction::registered([left, right], &swept.0)
+    }
+
+    /// From disparities to ranges of the left image's pixels. The covariance is that of [`dense_depth`].
+    #[must_use]
+    pub fn ranges(&self, disparities: &Disparities, pose_covariance: &Matrix6<f64>) -> DenseDepth {
+        let size = self.pair.left_camera.size();
+        let lens = BatchLens::new(self.pair.left_camera);
+        let turn = self.frame.shared_from_left().rotation().to_rotation_matrix().into_inner();
+        let finder = RangeFinder::new(&self.frame, pose_covariance);
+        let near = self.band(NEAR);
+        let mut samples = vec![DenseSample::Gap(Gap::OutsideField); size.width as usize * size.height as usize];
+        samples.par_chunks_mut((size.width as usize).max(1)).enumerate().for_each(|(v, samples)| {
+            let pixels: Vec<[f64; 2]> = (0..size.width).map(|u| [f64::from(u), v as f64]).collect();
+            for (sample, ray) in samples.iter_mut().zip(lens.unproject(&pixels)) {
+                let [x, y, z]: [f64; 3] = (turn * nalgebra::Vector3::from(ray)).into();
+                let direction = [x.atan2(y.hypot(z)), y.atan2(z)];
+                if direction[0].is_finite() {
+                    *sample = self.sample(direction, disparities, &finder, &near);
+                }
+            }
+        });
+        DenseDepth::new(size, samples)
+    }
+
+    /// What is known in the direction (a, b) from the left eye.
+    fn sample(
+        &self,
+        [a, b]: [f64; 2],
+        disparities: &Disparities,
+        finder: &RangeFinder,
+        near: &EpipolarBand,
+    ) -> DenseSample {
+        let grid = self.left.grid();
+        let at = grid.position_of(a, b);
+        let Some(index) = grid.index_nearest(at) else { return DenseSample::Gap(Gap::NotShared) };
+        let disparity = between(&disparities.disparity, grid, at, index);
+        let own = disparities.sigma[index];
+        if disparity.is_nan() {
+            return DenseSample::Gap(self.why_none(at, near));
+        }
+        if own.is_nan() || own > LARGEST_SIGMA {
+            return DenseSample::Gap(Gap::Untextured);
+        }
+        if disparities.likeness[index] < LEAST_LIKENESS {
+            return DenseSample::Gap(Gap::Inconsistent);
+        }
+        if disparity <= SIGNIFICANT * own {
+            return DenseSample::Far;
+        }
+        let radians = |pixels: f32| f64::from(pixels) / grid.pixels_per_radian();
+        let range = finder.at([a, b], radians(disparity), radians(own.hypot(disparities.edge[index])));
+        DenseSample::Measured(DenseRange {
+            range_mm: range.mm as f32,
+            sigma_mm: range.sigma_mm as f32,
+            own_sigma_mm: range.own_sigma_mm as f32,
+            confidence: disparities.likeness[index],
+        })
+    }
+
+    /// Why there is no disparity at a position of the left view.
+    fn why_none(&self, at: ViewPixel, near: &EpipolarBand) -> Gap {
+        let partner = |disparity: f64| ViewPixel { x: at.x - disparity, y: at.y };
+        if !self.left.sees(at) {
+            Gap::OutsideField
+        } else if self.right.sees(at) || self.right.sees(partner(near.largest_disparity(at.x))) {
+            Gap::Inconsistent
+        } else {
+            Gap::NotShared
+        }
+    }
+
+    /// The disparities up to that of a range, for a pose known exactly.
+    fn band(&self, nearest: Length) -> EpipolarBand {
+        EpipolarBand::new(*self.left.grid(), self.frame.baseline(), nearest, Angle::from_rad(0.0))
+    }
+}
+
+/// The disparity between the four pixels around a position, or that of the nearest one where they are not of one surface.
+fn between(disparities: &[f32], grid: &Grid, at: ViewPixel, nearest: usize) -> f32 {
+    let (width, height) = grid.size();
+    let (x, y) = (at.x.max(0.0) as usize, at.y.max(0.0) as usize);
+    let own = disparities[nearest];
+    if x + 1 >= width || y + 1 >= height {
+        return own;
+    }
+    let corner = y * width + x;
+    let around = [corner, corner + 1, corner + width, corner + width + 1].map(|index| disparities[index]);
+    if around.iter().any(|other| other.is_nan() || (other - own).abs() > SAME_SURFACE) {
+        return own;
+    }
+    let (s, t) = ((at.x - x as f64) as f32, (at.y - y as f64) as f32);
+    let along = |from: f32, to: f32| from + s * (to - from);
+    let (above, below) = (along(around[0], around[1]), along(around[2], around[3]));
+    above + t * (below - above)
+}

@@ -1,0 +1,105 @@
+//! From a disparity to a range and its standard deviation.
+//!
+//! With u, v the rays of both eyes in one epipolar plane of normal n, at angles a and a - d across the baseline B, the
+//! range from the left eye and that from the right one are
+//!
+//! ```text
+//! r = B cos(a - d) / sin d        μ = B cos a / sin d        ∂r/∂d = -μ / sin d
+//! ```
+//!
+//! A turn ω of the right eye acts as a disparity n·ω, its shift δ as (n × v)·δ / μ.
+
+use nalgebra::{Matrix6, Vector3, Vector6};
+
+use crate::SharedFrame;
+
+/// What ranges depend on, apart from disparities.
+pub(super) struct RangeFinder {
+    baseline_mm: f64,
+    /// Of turn and shift, in the shared axes.
+    pose: Matrix6<f64>,
+}
+
+/// A range and its standard deviation, with and without the pose's share, in millimetres.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct RangeAt {
+    pub mm: f64,
+    pub sigma_mm: f64,
+    pub own_sigma_mm: f64,
+}
+
+impl RangeFinder {
+    /// `pose` is the covariance of a turn in radians and a shift in millimetres of the right camera, in left axes.
+    pub(super) fn new(frame: &SharedFrame, pose: &Matrix6<f64>) -> Self {
+        let turn = frame.shared_from_left().rotation().to_rotation_matrix();
+        let mut both = Matrix6::zeros();
+        both.fixed_view_mut::<3, 3>(0, 0).copy_from(turn.matrix());
+        both.fixed_view_mut::<3, 3>(3, 3).copy_from(turn.matrix());
+        Self { baseline_mm: frame.baseline().mm(), pose: both * pose * both.transpose() }
+    }
+
+    /// Of the disparity `d` with standard deviation `sigma` at (a, b) of the left view, all in radians. Not a number or
+    /// without sense where d is not positive.
+    pub(super) fn at(&self, [a, b]: [f64; 2], d: f64, sigma: f64) -> RangeAt {
+        let (right, sine) = (a - d, d.sin());
+        let from_right = self.baseline_mm * a.cos() / sine;
+        let variance = sigma * sigma + self.disparity_variance(b, right, from_right);
+        let per_radian = from_right / sine;
+        RangeAt {
+            mm: self.baseline_mm * right.cos() / sine,
+            sigma_mm: per_radian * variance.sqrt(),
+            own_sigma_mm: per_radian * sigma,
+        }
+    }
+
+    /// What the pose adds to the variance of a disparity, in rad², for a point `from_right` millimetres from the right eye.
+    fn disparity_variance(&self, b: f64, right: f64, from_right: f64) -> f64 {
+        let normal = Vector3::new(0.0, -b.cos(), b.sin());
+        let across = Vector3::new(-right.cos(), right.sin() * b.sin(), right.sin() * b.cos()) / from_right;
+        let by_pose = Vector6::new(normal.x, normal.y, normal.z, across.x, across.y, across.z);
+        by_pose.dot(&(self.pose * by_pose)).max(0.0)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use vergence_vision::{
+        Angle, ImageSize, KannalaBrandt, Left, Pixel, PointUncertainty, SharedCovariance, StereoPair, Transform,
+    };
+
+    use super::*;
+
+    /// Ranges, and the pose's share of their variance, as vision has them for single points.
+    #[test]
+    fn ranges_and_their_sigma_agree_with_single_points() {
+        let size = ImageSize { width: 640, height: 640 };
+        let centre = Pixel { u: 319.5, v: 319.5 };
+        let lens = KannalaBrandt::new([180.0, 0.0, 0.0, 0.0, 0.0], 1.0, centre, Angle::from_deg(98.0), size).unwrap();
+        let turn = nalgebra::UnitQuaternion::from_euler_angles(0.1, 0.6, -0.2);
+        let left_from_right = Transform::new(turn, Vector3::new(140.0, 12.0, -30.0));
+        let frame = SharedFrame::new(&left_from_right).unwrap();
+        let spread = Matrix6::from_fn(|i, j| ((3 * i + 5 * j) % 7) as f64 * if i < 3 { 1e-4 } else { 0.05 });
+        let pose = spread * spread.transpose();
+        let finder = RangeFinder::new(&frame, &pose);
+        let shared = SharedCovariance::exact().with_pose(&pose);
+        let pair = StereoPair { left: &lens, right: &lens, left_from_right };
+        for [x, y, z] in [[0.0, 0.0, 400.0], [300.0, -200.0, 900.0], [-500.0, 700.0, 300.0], [100.0, 900.0, -100.0]] {
+            let point = vergence_vision::Point::<Left>::from_mm(Vector3::new(x, y, z));
+            let angles = |mm: Vector3<f64>| [mm.x.atan2(mm.y.hypot(mm.z)), mm.y.atan2(mm.z)];
+            let in_shared = (frame.shared_from_left() * point).mm();
+            let [a, b] = angles(in_shared);
+            let [right, _] = angles(in_shared - Vector3::x() * frame.baseline().mm());
+            let found = finder.at([a, b], a - right, 0.0);
+            assert!((found.mm / point.mm().norm() - 1.0).abs() < 1e-12);
+            let along = point.mm().normalize();
+            let by_pose = PointUncertainty::of(&point, &pair, 0.0).unwrap().covariance(&shared);
+            let expected = along.dot(&(by_pose * along)).sqrt();
+            assert!((found.sigma_mm / expected - 1.0).abs() < 1e-9, "{} is not {expected}", found.sigma_mm);
+            // The disparity's own share, by difference.
+            let step = 1e-6;
+            let moved = finder.at([a, b], a - right + step, 0.0).mm - found.mm;
+            let own = finder.at([a, b], a - right, step).own_sigma_mm;
+            assert!((moved.abs() / own - 1.0).abs() < 1e-3);
+        }
+    }
+}

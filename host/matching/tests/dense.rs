@@ -1,0 +1,286 @@
+//! A range for every pixel, against the exact truth of the simulator's room, and laws that hold without any truth.
+//!
+//! `VERGENCE_SIDE=1280 cargo test --release -p vergence-matching --test dense -- --nocapture` prints the figures of
+//! docs/measured.md.
+#![allow(clippy::unwrap_used, reason = "a test that cannot be set up fails")]
+
+mod common;
+
+use std::collections::BTreeMap;
+
+use common::{Pair, equidistant};
+use image::imageops::flip_horizontal;
+use image::{DynamicImage, GrayImage};
+use nalgebra::{Matrix6, UnitQuaternion, Vector3};
+use vergence_matching::{DenseDepth, DenseRange, DenseSample, DenseViews, ImagePair, MatchError, dense_depth};
+use vergence_scene::{Optics, Photograph, Scene, View, render};
+use vergence_vision::{Angle, Camera, ImageSize, KannalaBrandt, Left, Length, Pixel, Right, Transform, World};
+
+/// The bench's baseline in human mode.
+const BASELINE_MM: f64 = 145.0;
+/// A window whose grey levels spread by this standard deviation is textured: some four times the sensor's noise.
+const TEXTURED: f64 = 4.0;
+/// What the prediction before any picture assumes of a matched position, in pixels of each image.
+const PIXEL_SIGMA: f64 = 0.2;
+
+/// The bench in human mode in the furnished room.
+struct Human {
+    camera: KannalaBrandt,
+    left_from_right: Transform<Left, Right>,
+    photographs: [Photograph; 2],
+    grey: [GrayImage; 2],
+}
+
+impl Human {
+    /// With images of `side` pixels; the lens is the bench's, in proportion.
+    fn new(side: u32) -> Self {
+        let f = 366.0 * f64::from(side) / 1280.0;
+        let centre = f64::from(side) / 2.0 - 0.5;
+        let camera = KannalaBrandt::new(
+            [f, 0.01 * f, -0.004 * f, 0.001 * f, -0.0002 * f],
+            1.0,
+            Pixel { u: centre, v: centre },
+            Angle::from_deg(97.975),
+            ImageSize { width: side, height: side },
+        )
+        .unwrap();
+        let (scene, optics) = (Scene::room(), Optics::default());
+        let photographs = [(-0.5, 1), (0.5, 2)].map(|(place, seed)| {
+            let origin = Vector3::new(place * BASELINE_MM, 0.0, 0.0);
+            let world_from_camera: Transform<World, Camera> = Transform::new(UnitQuaternion::identity(), origin);
+            render(&View { scene: &scene, camera: &camera, world_from_camera, optics: &optics }, seed)
+        });
+        let grey = photographs.each_ref().map(|it| DynamicImage::ImageRgb8(it.image.clone()).to_luma8());
+        let left_from_right = Transform::new(UnitQuaternion::identity(), Vector3::new(BASELINE_MM, 0.0, 0.0));
+        Self { camera, left_from_right, photographs, grey }
+    }
+
+    fn pair(&self) -> ImagePair<'_> {
+        ImagePair {
+            left: &self.grey[0],
+            right: &self.grey[1],
+            left_camera: &self.camera,
+            right_camera: &self.camera,
+            left_from_right: self.left_from_right,
+            pose_sigma: Angle::from_deg(0.0),
+            nearest: Length::from_mm(200.0),
+        }
+    }
+
+    /// The true range of a left pixel, and the relative sigma to be expected there before any picture is taken; `None`
+    /// where not both lenses see it.
+    fn expected(&self, x: u32, y: u32) -> Option<(f64, f64)> {
+        let truth = self.photographs[0].range.at(x, y)?.mm();
+        let point = self.camera.unproject::<Left>(Pixel { u: x.into(), v: y.into() }).ok()?.at(truth);
+        let in_right = self.left_from_right.inverse() * point;
+        let pixel = self.camera.project_point(&in_right).ok()?;
+        let from_right = in_right.mm().norm();
+        let parallax = point.mm().angle(&(point.mm() - self.left_from_right.origin().mm()));
+        let disparity_sigma = PIXEL_SIGMA * 2f64.sqrt() / self.camera.k()[0];
+        self.camera.on_sensor(pixel).then(|| (truth, from_right / parallax.sin() * disparity_sigma / truth))
+    }
+}
+
+/// Standard deviation of the grey levels in the 7 × 7 pixels around.
+fn contrast(image: &GrayImage, x: u32, y: u32) -> f64 {
+    let (mut sum, mut squares, mut count) = (0.0, 0.0, 0.0);
+    for j in y.saturating_sub(3)..(y + 4).min(image.height()) {
+        for i in x.saturating_sub(3)..(x + 4).min(image.width()) {
+            let level = f64::from(image.get_pixel(i, j).0[0]);
+            (sum, squares, count) = (sum + level, squares + level * level, count + 1.0);
+        }
+    }
+    (squares / count - (sum / count) * (sum / count)).max(0.0).sqrt()
+}
+
+/// A share and of how many.
+#[derive(Clone, Copy, Debug, Default)]
+struct Share {
+    good: usize,
+    of: usize,
+}
+
+impl Share {
+    fn count(&mut self, good: bool) {
+        self.good += usize::from(good);
+        self.of += 1;
+    }
+
+    fn value(self) -> f64 {
+        self.good as f64 / self.of.max(1) as f64
+    }
+}
+
+/// How a depth compares with the truth.
+#[derive(Debug, Default)]
+struct Judgement {
+    /// Stated sigma at most 1 % and textured: within 2 %.
+    sure: Share,
+    /// Every other measured pixel: within 3 sigma.
+    elsewhere: Share,
+    /// Predicted sigma at most 1 % before the picture, textured, in both fields: measured and within 2 %. Gaps count as
+    /// failures, also where one eye cannot see.
+    expected: Share,
+    /// All measured pixels: within 1 and within 3 sigma.
+    within: [Share; 2],
+}
+
+fn judge(human: &Human, depth: &DenseDepth) -> Judgement {
+    let side = depth.size().width;
+    let mut judged = Judgement::default();
+    for (index, sample) in (0..side * side).zip(depth.samples()) {
+        let (x, y) = (index % side, index / side);
+        let textured = contrast(&human.grey[0], x, y) >= TEXTURED;
+        let truth = human.photographs[0].range.at(x, y).map(Length::mm);
+        let measured = if let DenseSample::Measured(measured) = sample { Some(measured) } else { None };
+        let off = |it: &DenseRange| truth.map_or(f64::INFINITY, |truth| (it.range().mm() - truth).abs() / truth);
+        if let Some((_, sigma)) = human.expected(x, y)
+            && textured
+            && sigma <= 0.01
+        {
+            judged.expected.count(measured.is_some_and(|it| off(it) <= 0.02));
+        }
+        let Some(measured) = measured else { continue };
+        let sigmas = truth.map_or(f64::INFINITY, |truth| (measured.range().mm() - truth).abs() / measured.sigma().mm());
+        if textured && measured.sigma().mm() <= 0.01 * measured.range().mm() {
+            judged.sure.count(off(measured) <= 0.02);
+        } else {
+            judged.elsewhere.count(sigmas <= 3.0);
+        }
+        judged.within[0].count(sigmas <= 1.0);
+        judged.within[1].count(sigmas <= 3.0);
+    }
+    judged
+}
+
+#[test]
+fn the_room_in_human_mode_is_measured_as_well_as_stated() {
+    let side = std::env::var("VERGENCE_SIDE").map_or(960, |side| side.parse().expect("VERGENCE_SIDE is in pixels"));
+    let human = Human::new(side);
+    let (depth, seconds) = timed(&human.pair());
+    let judged = judge(&human, &depth);
+    let counts = depth.counts();
+    let names: BTreeMap<String, usize> = counts.gaps.iter().map(|(gap, &count)| (gap.to_string(), count)).collect();
+    println!("{side} px: {} measured, {} far, without {names:?}; {seconds}", counts.measured, counts.far);
+    for (name, share) in [
+        ("stated sigma <= 1 % and textured, within 2 %", judged.sure),
+        ("elsewhere, within 3 sigma", judged.elsewhere),
+        ("predicted sigma <= 1 % and textured, measured and within 2 %", judged.expected),
+        ("all measured, within 1 sigma", judged.within[0]),
+        ("all measured, within 3 sigma", judged.within[1]),
+    ] {
+        println!("{name}: {:.1} % of {}", 100.0 * share.value(), share.of);
+    }
+    assert!(judged.sure.of > counts.measured / 3 && judged.sure.value() >= 0.9);
+    assert!(judged.elsewhere.value() >= 0.88);
+    assert!(judged.expected.value() >= 0.78);
+    assert!(judged.within[1].value() >= 0.9);
+}
+
+/// The depth, and what its stages took in a sentence: for people, nothing is asserted of it.
+#[allow(clippy::disallowed_methods, reason = "figures for people")]
+fn timed(pair: &ImagePair<'_>) -> (DenseDepth, String) {
+    let start = std::time::Instant::now();
+    let seconds = || start.elapsed().as_secs_f64();
+    let views = DenseViews::new(pair).unwrap();
+    let turned = seconds();
+    let swept = views.sweep();
+    let sweep = seconds();
+    let disparities = views.register(&swept);
+    let registered = seconds();
+    let depth = views.ranges(&disparities, &Matrix6::zeros());
+    let all = seconds();
+    let text = format!(
+        "turn {turned:.2} s, sweep {:.2} s, register {:.2} s, ranges {:.2} s, in all {all:.2} s",
+        sweep - turned,
+        registered - sweep,
+        all - registered
+    );
+    (depth, text)
+}
+
+#[test]
+fn identical_images_show_what_is_far() {
+    let pair = Pair::new(320, Angle::from_deg(0.0));
+    let left_from_right = Transform::new(UnitQuaternion::identity(), Vector3::new(BASELINE_MM, 0.0, 0.0));
+    let depth =
+        dense_depth(&ImagePair { right: &pair.left, left_from_right, ..pair.images() }, &Matrix6::zeros()).unwrap();
+    let counts = depth.counts();
+    println!("{counts:?}");
+    assert!(counts.far > 20_000 && counts.measured * 1000 < counts.far, "{counts:?}");
+}
+
+/// Mirrored images of swapped eyes show the mirrored scene from the other eye.
+#[test]
+fn swapped_and_mirrored_eyes_measure_the_same() {
+    let pair = Pair::new(320, Angle::from_deg(0.0));
+    let left_from_right = Transform::new(UnitQuaternion::identity(), Vector3::new(BASELINE_MM, 0.0, 0.0));
+    let straight = ImagePair { left_from_right, ..pair.images() };
+    let (flipped_left, flipped_right) = (flip_horizontal(&pair.left), flip_horizontal(&pair.right));
+    let mirrored = ImagePair { left: &flipped_right, right: &flipped_left, ..straight };
+    let [straight, mirrored] = [straight, mirrored].map(|pair| dense_depth(&pair, &Matrix6::zeros()).unwrap());
+    let mut same = Share::default();
+    for (index, sample) in (0..320 * 320).zip(straight.samples()) {
+        let DenseSample::Measured(by_left) = sample else { continue };
+        let pixel = Pixel { u: f64::from(index % 320), v: f64::from(index / 320) };
+        let point = pair.camera.unproject::<Left>(pixel).unwrap().at(by_left.range().mm());
+        let in_right = left_from_right.inverse() * point;
+        let Ok(seen) = pair.camera.project_point(&in_right) else { continue };
+        let at = seen.v.round() as usize * 320 + (319.0 - seen.u).round() as usize;
+        if let DenseSample::Measured(by_right) = mirrored.samples()[at] {
+            let sigma = by_left.sigma().mm().hypot(by_right.sigma().mm());
+            same.count((in_right.mm().norm() - by_right.range().mm()).abs() <= 3.0 * sigma);
+        }
+    }
+    println!("{:.3} of {}", same.value(), same.of);
+    assert!(same.of > 15_000 && same.value() > 0.95, "{same:?}");
+}
+
+#[test]
+fn pictures_without_anything_in_common_have_no_ranges() {
+    let camera = equidistant(320);
+    let noise = |seed: u64| {
+        let mut state = seed;
+        GrayImage::from_fn(320, 320, |_, _| {
+            state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+            image::Luma([(state >> 56) as u8])
+        })
+    };
+    let even = |level: u8| GrayImage::from_pixel(320, 320, image::Luma([level]));
+    let left_from_right = Transform::new(UnitQuaternion::identity(), Vector3::new(BASELINE_MM, 0.0, 0.0));
+    for (left, right) in [(noise(1), noise(2)), (even(0), even(0)), (even(90), even(90)), (even(0), noise(1))] {
+        let pair = ImagePair {
+            left: &left,
+            right: &right,
+            left_camera: &camera,
+            right_camera: &camera,
+            left_from_right,
+            pose_sigma: Angle::from_deg(0.0),
+            nearest: Length::from_mm(200.0),
+        };
+        let counts = dense_depth(&pair, &Matrix6::zeros()).unwrap().counts();
+        println!("{counts:?}");
+        assert!(counts.measured * 100 < 320 * 320, "{counts:?}");
+    }
+}
+
+#[test]
+fn any_number_of_threads_gives_the_same() {
+    let pair = Pair::new(320, Angle::from_deg(30.0));
+    let on = |threads: usize| {
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+        pool.install(|| dense_depth(&pair.images(), &Matrix6::identity()).unwrap())
+    };
+    // Bit for bit: a NaN would not equal itself.
+    assert_eq!(on(1), on(3));
+}
+
+#[test]
+fn a_pose_without_baseline_or_a_wrong_size_is_refused() {
+    let pair = Pair::new(320, Angle::from_deg(0.0));
+    let refused = |pair: ImagePair<'_>| dense_depth(&pair, &Matrix6::zeros()).unwrap_err();
+    let here = Transform::new(UnitQuaternion::identity(), Vector3::zeros());
+    assert_eq!(refused(ImagePair { left_from_right: here, ..pair.images() }), MatchError::NoBaseline);
+    let small = GrayImage::new(300, 320);
+    assert!(matches!(refused(ImagePair { right: &small, ..pair.images() }), MatchError::ImageSize { .. }));
+}
