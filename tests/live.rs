@@ -230,7 +230,7 @@ fn exposures_that_nobody_can_tell_apart_are_told() {
     clock.observe(Exchange { t0: Microseconds(0), t1: Microseconds(0), t2: Microseconds(0), t3: Microseconds(0) });
     let base = TimeBase::Board(clock);
     let ms = Duration::from_millis;
-    let timing = FrameTiming { period: ms(120), exposure: None, rolling: ms(0), readout: ms(120) };
+    let timing = FrameTiming { period: ms(240), exposure: None, rolling: ms(0), readout: ms(240) };
     let mut exposures = Exposures::new(Some(1e5));
     for side in [Side::Left, Side::Right] {
         exposures.hear(side, News::There(timing), &base);
