@@ -146,9 +146,11 @@ fn line(entry: &LogEntry, places: &[String]) -> String {
     format!("{time:>12} s {level:5}  {}{places}", entry.text)
 }
 
-/// The functions that addresses in `text` lie in.
+/// The functions that addresses in `text` lie in. Odd ones are return addresses: the call ends right before them, and may
+/// be the last that its function does.
 fn places(text: &str, firmware: &Firmware) -> Vec<String> {
     let words = text.split(|character: char| !character.is_ascii_alphanumeric());
     let addresses = words.filter_map(|word| u32::from_str_radix(word.strip_prefix("0x")?, 16).ok());
-    addresses.filter_map(|address| Some(format!("{address:#010x} {}", firmware.symbol_at(address)?))).collect()
+    let at = |address: u32| if address & 1 == 1 { (address & !1).saturating_sub(2) } else { address };
+    addresses.filter_map(|address| Some(format!("{address:#010x} {}", firmware.symbol_at(at(address))?))).collect()
 }
