@@ -101,6 +101,80 @@ fn what_cannot_be_kept_or_used_is_refused_in_a_sentence() {
     );
 }
 
+/// Two black photographs for the built-in rig.
+fn black_photograph(folder: &Path) -> String {
+    let file = folder.join("black.png");
+    image::GrayImage::new(1280, 1280).save(&file).expect("written");
+    path(&file).to_owned()
+}
+
+fn depth_of_black(folder: &Path, store: &Path, more: &[&str]) -> std::process::Output {
+    let (black, cloud) = (black_photograph(folder), folder.join("cloud.ply"));
+    let images = ["depth", "--mode", "herbivore", "--left", &black, "--right", &black, "--out", path(&cloud)];
+    run(&[&images[..], &["--models", path(store), "--matcher"], more].concat())
+}
+
+#[test]
+fn black_photographs_have_no_points_and_without_models_the_classical_matcher_serves() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let store = folder.path().join("store");
+    let without = depth_of_black(folder.path(), &store, &["learned"]);
+    assert!(without.status.success(), "{}", text(&without.stderr));
+    assert!(text(&without.stderr).contains("the classical matcher serves"), "{}", text(&without.stderr));
+    assert!(text(&without.stdout).contains("0 points"), "{}", text(&without.stdout));
+
+    let model = tiny_model(folder.path());
+    run_json(&["models", "add", path(&model), "--models", path(&store), "--json"]);
+    let with = depth_of_black(folder.path(), &store, &["tiny"]);
+    assert!(with.status.success() && text(&with.stdout).contains("0 points"), "{}", text(&with.stderr));
+
+    let kept = store.join("tiny").join("extractor64.onnx");
+    std::fs::write(&kept, b"another").expect("the kept file");
+    let changed = depth_of_black(folder.path(), &store, &["tiny"]);
+    assert_eq!(changed.status.code(), Some(1));
+    assert!(text(&changed.stderr).contains("SHA-256"), "{}", text(&changed.stderr));
+}
+
+#[test]
+fn the_faster_runtime_is_on_record_and_another_can_be_asked_for() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let store = folder.path().join("store");
+    let model = tiny_model(folder.path());
+    run_json(&["models", "add", path(&model), "--models", path(&store), "--json"]);
+    let record = std::fs::read_to_string(store.join("tiny/speed.toml")).expect("a record");
+    assert!(record.contains("rten_seconds"), "{record}");
+    let asked = depth_of_black(folder.path(), &store, &["tiny", "--runtime", "rten"]);
+    assert!(text(&asked.stdout).contains("tiny on rten (as asked)"), "{}", text(&asked.stdout));
+    let missing = depth_of_black(folder.path(), &store, &["tiny", "--onnxruntime", "/nonexistent/libonnxruntime.so"]);
+    assert_eq!(missing.status.code(), Some(2));
+    assert!(text(&missing.stderr).contains("ONNX Runtime cannot be used"), "{}", text(&missing.stderr));
+}
+
+/// At 120° networks find many times as much in views as in whole images, and nearly all of it is right.
+#[test]
+fn views_beat_whole_images_where_the_axes_are_far_apart() {
+    let bench = ["bench", "matching", "--separations", "120deg", "--side", "400", "--keypoints", "512", "--json"];
+    let Some(models) = shared("models") else {
+        let found = run_json(&[&bench[..], &["--matcher", "guided"]].concat());
+        assert!(
+            found["rows"][0]["ways"]["classical"]["after"]["precision"].as_f64().expect("a share") > 0.9,
+            "{found}"
+        );
+        return;
+    };
+    let folder = tempfile::tempdir().expect("a folder");
+    let store = folder.path().join("store");
+    run_json(&["models", "add", path(&models), "--models", path(&store), "--json"]);
+    let found = run_json(&[&bench[..], &["--models", path(&store), "--runtime", "rten"]].concat());
+    let ways = &found["rows"][0]["ways"];
+    println!("{ways}");
+    let correct = |way: &str| ways[way]["before"]["correct"].as_u64().expect("a count");
+    assert!(correct("views") > 2 * correct("raw"), "{ways}");
+    for way in ["views", "classical"] {
+        assert!(ways[way]["after"]["precision"].as_f64().expect("a share") > 0.9, "{way}: {ways}");
+    }
+}
+
 #[test]
 fn published_networks_are_known_by_their_tensors() {
     let Some(models) = shared("models") else { return };

@@ -1,5 +1,5 @@
 //! A pose that is off: the matches say so, and are still found.
-#![allow(clippy::unwrap_used, reason = "a test that cannot be set up fails")]
+#![allow(clippy::unwrap_used, clippy::print_stdout, reason = "a test fails loudly and shows its figures")]
 
 mod common;
 
@@ -36,5 +36,21 @@ fn encoders_and_picture_disagree_by_three_tenths_of_a_degree() {
         let error = (found.correction.fixed_rows::<3>(0) - off).norm().to_degrees();
         assert!(error < 0.06, "{axis:?}: the turn is found {error:.3}° off");
         assert!(still * 10 > matches * 7, "{still} of {matches} matches are left");
+    }
+}
+
+/// Far more than any encoder is off: a rig assembled wrong, or a file of another rig.
+#[test]
+fn a_pose_wrong_by_five_degrees_is_noticed_and_most_matches_are_still_found() {
+    for separation in [60.0, 120.0] {
+        let pair = Pair::new(640, Angle::from_deg(separation));
+        let (_, matches) = drift(&pair, Vector3::zeros());
+        let off = Vector3::new(1.0, -1.0, 1.0).normalize() * 5f64.to_radians();
+        let (found, still) = drift(&pair, off);
+        println!("{separation}°: {still} of {matches} matches, the pose is said to be {:.2}° off", found.angle.deg());
+        assert!(still * 10 > matches * 6, "{still} of {matches} matches are left");
+        assert!(found.is_significant());
+        let error = (found.correction.fixed_rows::<3>(0) - off).norm().to_degrees();
+        assert!(error < 0.15, "the turn is found {error:.3}° off");
     }
 }

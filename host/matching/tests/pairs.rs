@@ -30,6 +30,10 @@ fn assert_accurate(pair: &Pair, matches: &Matches, least: usize) {
     assert!(right > 0.98, "{right:.4} of the matches are right");
     assert!(error < 0.12, "median error {error:.3} px");
     assert!(wrong < 0.02, "{wrong:.4} of the depths are wrong");
+    // Both images share the error: √2 of what is said of each.
+    let within = |found: &&vergence_matching::Match| pair.judge(found).error_px < 2.45 * 2f64.sqrt() * found.sigma;
+    let honest = matches.pairs.iter().filter(within).count() as f64 / matches.pairs.len() as f64;
+    assert!(honest > 0.95, "{honest:.3} of the errors are within the 95 % circle of their sigma");
     let near = matches.pairs.iter().map(|found| pair.judge(found)).filter(|verdict| verdict.range_mm < 1500.0);
     let depth = median(near.map(|verdict| verdict.relative_depth_error).collect());
     assert!(depth < 0.005, "median depth error {depth:.4}");
@@ -63,7 +67,8 @@ fn a_pose_known_to_half_a_degree_is_enough() {
     images.pose_sigma = Angle::from_deg(0.5);
     let wary = find(&images);
     assert_accurate(&pair, &wary, 900);
-    assert!(trusting.pairs.len() * 2 < wary.pairs.len(), "{} {}", trusting.pairs.len(), wary.pairs.len());
+    // A pose that is said to be exact and is not loses matches, or so many that it is noticed and they are found again.
+    assert!(trusting.pairs.len() <= wary.pairs.len() + wary.pairs.len() / 20, "{}", trusting.pairs.len());
 }
 
 #[test]

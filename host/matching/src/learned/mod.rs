@@ -26,7 +26,7 @@ pub use network::{Elements, Network, NetworkError, Outlet, Signature, Tensor};
 
 /// Standard deviation of a match that could not be registered, in pixels of the view and in each direction: networks place
 /// keypoints on whole pixels of both views. Measured on rendered pairs: see docs/measured.md.
-const UNREGISTERED_SIGMA: f64 = 0.8;
+const UNREGISTERED_SIGMA: f64 = 0.5;
 
 /// Matches what pre-trained networks find alike.
 pub struct LearnedMatcher {

@@ -87,11 +87,11 @@ impl Class {
                 errors_px.extend(verdict.offset_px.map(f64::abs));
             }
             let range = point.point.mm().norm();
-            let (Some(truth), sigma) = (pair.range(found.left), point.sigma_range.mm()) else { continue };
-            if sigma > Self::USEFUL * range {
+            let sigma = point.sigma_range.mm();
+            if sigma > Self::USEFUL * range || !verdict.range_mm.is_finite() {
                 continue;
             }
-            let off = (range - truth.mm()) / sigma;
+            let off = (range - verdict.range_mm) / sigma;
             useful += 1;
             within += usize::from(off.abs() <= 2.0);
             if verdict.is_right() {
@@ -113,6 +113,8 @@ impl Class {
 struct Verdict {
     offset_px: [f64; 2],
     bearing_rad: f64,
+    /// True range from the left eye.
+    range_mm: f64,
 }
 
 impl Verdict {
@@ -126,12 +128,14 @@ impl Verdict {
             let shown = pair.lens.project(&there).ok()?;
             let found: UnitRay<Right> = pair.lens.unproject(right).ok()?;
             let bearing_rad = angle(&found.vector(), &there.vector());
-            Some(Self { offset_px: [right.u - shown.u, right.v - shown.v], bearing_rad })
+            Some(Self { offset_px: [right.u - shown.u, right.v - shown.v], bearing_rad, range_mm: beside.mm() })
         };
         let verdicts = places.into_iter().filter_map(truth);
-        verdicts
-            .min_by(|a, b| a.error_px().total_cmp(&b.error_px()))
-            .unwrap_or(Self { offset_px: [f64::INFINITY; 2], bearing_rad: f64::INFINITY })
+        verdicts.min_by(|a, b| a.error_px().total_cmp(&b.error_px())).unwrap_or(Self {
+            offset_px: [f64::INFINITY; 2],
+            bearing_rad: f64::INFINITY,
+            range_mm: f64::NAN,
+        })
     }
 
     fn error_px(&self) -> f64 {
