@@ -3,7 +3,7 @@
 //! A [`Scene`] is a closed room of analytic shapes with procedural textures. [`render`] photographs it through a
 //! Kannala-Brandt lens by casting rays: each pixel is the mean of rays spread over its square, then blurred by the
 //! lens, exposed, made noisy and quantised as a sensor does. The range stored with each pixel is that of the ray
-//! through its centre, solved in closed form.
+//! through its centre, solved in closed form. A [`Board`] alone before an even grey ([`Scene::board_alone`]) renders quickest.
 //!
 //! The world frame has x to the right, y down and z forward, in millimetres, so that a camera with the identity pose
 //! looks forward and level. Colours are linear RGB from 0 to 1. The same arguments give the same bytes on any number of

@@ -77,10 +77,17 @@ impl Shot {
         let camera = KannalaBrandt::from_opencv(lens, self.camera.theta_max(), ImageSize { width, height }).unwrap();
         let board = Board { columns: COLUMNS, rows: ROWS, square: SPEC.square };
         let place = Transform::<World, Board>::from_isometry(self.camera_from_board);
-        let scene = Scene::checkerboard(board, place);
+        let scene = Scene::board_alone(board, place);
         let world_from_camera = Transform::<World, Camera>::new(UnitQuaternion::identity(), Vector3::zeros());
         // A noisy sensor: corners are then known to about 0.1 px.
-        let optics = Optics { edge_samples: 24, blur_px: 0.8, read_noise: 9.0, shot_noise: 9.0, ..Optics::default() };
+        let optics = Optics {
+            samples: 1,
+            edge_samples: 24,
+            blur_px: 0.8,
+            read_noise: 9.0,
+            shot_noise: 9.0,
+            ..Optics::default()
+        };
         let view = View { scene: &scene, camera: &camera, world_from_camera, optics: &optics };
         DynamicImage::from(render(&view, self.seed).image).to_luma8()
     }

@@ -1,7 +1,7 @@
 //! Corners of real lenses against the optimum of an independent bundle adjustment (SciPy, finite differences), stored with
 //! them.
 
-#![allow(clippy::panic, clippy::unwrap_used, reason = "a test may fail")]
+#![allow(clippy::panic, clippy::unwrap_used, clippy::print_stdout, reason = "a test may fail, and tells its figures")]
 
 mod intrinsics_sets;
 
@@ -66,21 +66,33 @@ fn few_views_reach_the_optimum_that_a_good_start_reaches() {
 
 /// A twentieth of the corners anywhere in the image: all are found, and the lens is the one that the untouched corners
 /// give. (Against all clean corners it must differ: a twentieth of the data is lost, which alone moves each of 8
-/// parameters by 0.23 sigma, root mean square.)
+/// parameters by 0.23 sigma, root mean square. How often it stays within half a sigma is printed, beside the same without
+/// the corners that were replaced, which is the best that any fit could do.)
 #[test]
 fn gross_errors_do_not_move_the_lens() {
+    let (mut runs, mut near, mut nearest) = (0, 0, 0);
     for set in real_sets() {
         let clean = calibrate(&set, &set.views);
         let sigma: [f64; 8] = std::array::from_fn(|i| clean.covariance[(i, i)].sqrt());
-        for seed in 0..4 {
+        for seed in 0..seeds(4) {
             let (spoilt, untouched) = spoil(&set, seed);
             let found = calibrate(&set, &spoilt);
             let expected = calibrate(&set, &untouched);
             let difference = largest_difference(&found.opencv, &expected.opencv, &sigma);
             assert!(difference <= 0.5, "{}, seed {seed}: {difference} sigma", set.name);
-            assert!(largest_difference(&found.opencv, &clean.opencv, &sigma) <= 1.5, "{}, seed {seed}", set.name);
+            let from_clean = |lens| largest_difference(lens, &clean.opencv, &sigma);
+            assert!(from_clean(&found.opencv) <= 1.5, "{}, seed {seed}", set.name);
+            runs += 1;
+            near += i32::from(from_clean(&found.opencv) <= 0.5);
+            nearest += i32::from(from_clean(&expected.opencv) <= 0.5);
         }
     }
+    println!("within 0.5 sigma of all clean corners: {near} of {runs}; without the replaced corners {nearest}");
+}
+
+/// How many seeds a study runs: `few` unless the environment asks for more.
+fn seeds(few: u64) -> u64 {
+    std::env::var("VERGENCE_SEEDS").ok().and_then(|text| text.parse().ok()).unwrap_or(few)
 }
 
 /// The views with a twentieth of the corners replaced, and without those.

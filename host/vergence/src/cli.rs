@@ -34,8 +34,8 @@ pub struct Globals {
     /// Speed of a serial port.
     #[arg(long, global = true, default_value_t = 921_600)]
     pub baud: u32,
-    /// The rig file. Without it, the active calibration (see `calibrate use`), or else the built-in bench; demo and soak
-    /// always take the bench.
+    /// The rig file. Without it, the active calibration (see `calibrate use`), or else the built-in bench; for demo always
+    /// the bench. Soak has a bench of its own.
     #[arg(long, global = true, env = "VERGENCE_RIG", value_name = "FILE")]
     pub rig: Option<PathBuf>,
     /// How long the board may go without hearing from this program before it brakes, 20ms to 1s.

@@ -83,13 +83,13 @@ impl Camera for SimulatedBoardCamera {
             Failure::usage("the cameras share no field in which a board can be held: choose another pose or board")
         })?;
         // The left camera's frame is the world of this picture.
-        let scene = Scene::checkerboard(self.stage.board, place.renamed::<World, Board>());
+        let scene = Scene::board_alone(self.stage.board, place.renamed::<World, Board>());
         let (camera, world_from_camera): (_, Transform<World, CameraFrame>) = match self.eye {
             Eye::Left => (&self.stage.left, Transform::new(UnitQuaternion::identity(), Vector3::zeros())),
             Eye::Right => (&self.stage.right.0, self.stage.right.1.renamed()),
         };
-        // Corners are edges: many rays there keep them where they are.
-        let optics = Optics { edge_samples: 100, ..Optics::default() };
+        // Corners are edges: many rays there keep them where they are. The rest is plain.
+        let optics = Optics { samples: 1, edge_samples: 100, ..Optics::default() };
         let seed = self.stage.seed.wrapping_mul(4).wrapping_add(self.frames * 2 + u64::from(self.eye == Eye::Right));
         let photograph = render(&View { scene: &scene, camera, world_from_camera, optics: &optics }, seed);
         self.frames += 1;
