@@ -160,7 +160,8 @@ fn errors(run: &Run, rig: &Rig, seeds: u64, believed: Shutter) -> Vec<f64> {
             rows: rig.left_camera.size().height,
         };
         let exposure = PairExposure { left: exposure, right: exposure };
-        let cloud = moving_cloud(&[(pixels, gates.pixel_sigma)], rig, &run.track, &exposure, &gates).expect("the track covers the exposure");
+        let cloud = moving_cloud(&[(pixels, gates.pixel_sigma)], rig, &run.track, &exposure, &gates)
+            .expect("the track covers the exposure");
         let Some(measured) = cloud.points.first() else { continue };
         let truth = run.poses_at(rig, middle).0.inverse() * point;
         let error = measured.point.mm() - truth.mm();

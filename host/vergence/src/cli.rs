@@ -35,7 +35,7 @@ pub struct Globals {
     #[arg(long, global = true, default_value_t = 921_600)]
     pub baud: u32,
     /// The rig file. Without it, the active calibration (see `calibrate use`), or else the built-in bench; for demo always
-    /// the bench. Soak has a bench of its own.
+    /// the bench. Reproduce and soak have rigs of their own.
     #[arg(long, global = true, env = "VERGENCE_RIG", value_name = "FILE")]
     pub rig: Option<PathBuf>,
     /// How long the board may go without hearing from this program before it brakes, 20ms to 1s.
@@ -92,6 +92,8 @@ enum Verb {
     Soak(cmd::soak::Args),
     /// Run the whole rig in simulation: home, herbivore, human, look, measure.
     Demo(cmd::demo::Args),
+    /// Repeat the paper's experiments on the simulated rig.
+    Reproduce(cmd::reproduce::Args),
     /// Turn a pair of photographs into a cloud of points.
     Depth(cmd::depth::Args),
     /// Measure live: a cloud of the newest pair, again and again, while the stages stand or move.
@@ -142,13 +144,13 @@ fn execute(cli: Cli) -> Result<(), Failure> {
     let Cli { mut globals, verb } = cli;
     // A stop must not fail, nor the doctor end, because a calibration cannot be read: they look for themselves.
     let without_rig = matches!(verb, Verb::Demo(_) | Verb::Soak(_) | Verb::Stop(_) | Verb::Doctor(_))
-        || matches!(verb, Verb::Flash(_) | Verb::Image(_));
+        || matches!(verb, Verb::Flash(_) | Verb::Image(_) | Verb::Reproduce(_));
     if globals.rig.is_none() && !without_rig {
         globals.rig = slots::active_rig()?;
     }
     let console = Console::new(globals.json);
     // With the board in this process nothing outside sets the pace: time can be virtual, and motion costs none.
-    let virtual_time = matches!(verb, Verb::Demo(_)) || globals.port.as_deref() == Some("sim");
+    let virtual_time = matches!(verb, Verb::Demo(_) | Verb::Reproduce(_)) || globals.port.as_deref() == Some("sim");
     let runtime = tokio::runtime::Builder::new_current_thread()
         .enable_all()
         .start_paused(virtual_time)
@@ -179,6 +181,7 @@ fn execute(cli: Cli) -> Result<(), Failure> {
             Verb::Soak(args) => cmd::soak::run(&args, console),
             Verb::Demo(args) => cmd::demo::run(&args, &globals, console).await,
             Verb::Run(args) => cmd::run::run(&args, &globals, console).await,
+            Verb::Reproduce(args) => cmd::reproduce::run(&args, &globals, console).await,
             Verb::Depth(args) => cmd::depth::run(&args, &globals, console),
             Verb::Models(args) => cmd::models::run(&args, console),
             Verb::Zones(args) => cmd::zones::run(&args, &globals, console),

@@ -74,11 +74,21 @@ impl Console {
     /// A bar of `bytes` bytes on a terminal, silent elsewhere.
     #[must_use]
     pub fn byte_bar(self, what: &str, bytes: u64) -> ProgressBar {
+        self.bar(what, bytes, "{msg} {wide_bar} {bytes}/{total_bytes} {bytes_per_sec}")
+    }
+
+    /// A bar of `count` things on a terminal, silent elsewhere.
+    #[must_use]
+    pub fn count_bar(self, what: &str, count: u64) -> ProgressBar {
+        self.bar(what, count, "{msg} {wide_bar} {pos}/{len} {eta}")
+    }
+
+    fn bar(self, what: &str, length: u64, template: &str) -> ProgressBar {
         if !self.shows_progress() {
             return ProgressBar::hidden();
         }
-        let bar = ProgressBar::new(bytes).with_message(what.to_owned());
-        if let Ok(style) = ProgressStyle::with_template("{msg} {wide_bar} {bytes}/{total_bytes} {bytes_per_sec}") {
+        let bar = ProgressBar::new(length).with_message(what.to_owned());
+        if let Ok(style) = ProgressStyle::with_template(template) {
             bar.set_style(style);
         }
         bar

@@ -25,11 +25,15 @@ pub mod models;
 pub mod move_plan;
 mod output;
 mod provenance;
+mod python;
+mod reproduce;
 mod rig_file;
 mod rig_zones;
+mod score;
 pub mod setting_text;
 pub mod sim;
 mod slots;
+mod stage_plan;
 mod stopwatch;
 
 pub use cli::run;

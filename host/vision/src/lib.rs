@@ -10,6 +10,8 @@
 //! - [`pose_drift`] tells whether the pose is what the pairs say it is;
 //! - [`BatchLens`] and [`triangulate_batch`] do the arithmetic for whole arrays.
 //!
+//! [`study`] compares the methods of triangulation with each other.
+//!
 //! [`zones_exact`] and [`circle_zones`] tell how much of the surroundings both cameras, one, or none see.
 //!
 //! Conventions: millimetres and radians inside, units named at every boundary; camera frame x right, y down,
@@ -28,6 +30,7 @@ mod import;
 mod kannala_brandt;
 mod lens_derivatives;
 mod pose_drift;
+pub mod study;
 mod triangulation;
 mod uncertainty;
 mod units;
@@ -49,6 +52,6 @@ pub use triangulation::{
 pub use uncertainty::{PointUncertainty, ResidualUncertainty, SHARED_PARAMETERS, SharedCovariance};
 pub use units::{Angle, InvalidQuantity, Length, Time};
 pub use zones::{
-    Arc, BodyMask, Coverage, Eye, PlanarCamera, SolidZones, ZoneMap, Zones, ZonesError, circle_zones, paper_eq3,
-    paper_eq3_applies, solid_zones, symmetric_pair, zones_exact,
+    Arc, BodyMask, Coverage, Eye, PAPER_FIELD, PUBLISHED_MODES, PlanarCamera, PublishedMode, SolidZones, ZoneMap,
+    Zones, ZonesError, circle_zones, paper_eq3, paper_eq3_applies, solid_zones, symmetric_pair, zones_exact,
 };

@@ -11,8 +11,8 @@ use common::{BASELINE, Gaussian, around, count, left_from_middle, left_from_righ
 use nalgebra::Vector3;
 use proptest::prelude::*;
 use vergence_vision::{
-    AngularNorm, Base, Drop, Kernel, Left, Pixel, PixelPair, Point, Rejection, StereoPair, Triangulated, UnitRay,
-    angular, edge_plane, mid2,
+    Angle, AngularNorm, Base, Drop, Kernel, Left, Length, Pixel, PixelPair, Point, Rejection, StereoPair, Triangulated,
+    UnitRay, angular, edge_plane, mid2, study,
 };
 
 fn ray(x: f64, y: f64, z: f64) -> UnitRay<Left> {
@@ -85,45 +85,22 @@ fn names_are_read_and_written() {
     assert!("middle".parse::<Kernel>().is_err());
 }
 
-/// RMS error of the distance from the middle of the rig in millimetres, for 1 px of noise at 560 px/rad: human mode is 0°,
-/// herbivore 120°. Midpoint, pseudo-intersection, L1, L∞, L2 and reprojection, from an independent simulation in numpy.
-const NOISE: [(&str, f64, f64, f64, [f64; 6]); 5] = [
-    ("human, ahead", 0.0, 0.0, 0.0, [2.2202, 2.2203, 2.2203, 2.2203, 2.2203, 2.2203]),
-    ("human, 40° right, 20° up", 0.0, 40.0, 20.0, [2.6246, 2.6246, 2.6246, 2.6246, 2.6246, 2.6070]),
-    ("human, 80° right", 0.0, 80.0, 0.0, [12.04, 12.06, 12.06, 12.06, 12.06, 12.06]),
-    ("herbivore, ahead", 120.0, 0.0, 0.0, [2.2213, 2.2215, 2.2215, 2.2215, 2.2215, 2.2215]),
-    ("herbivore, 25° right", 120.0, 25.0, 0.0, [2.4175, 2.4178, 2.4177, 2.4178, 2.4178, 2.4178]),
-];
-const COLUMNS: [Kernel; 6] = [
-    Kernel::Midpoint,
-    Kernel::PseudoIntersection,
-    Kernel::AngularL1,
-    Kernel::AngularLinf,
-    Kernel::AngularL2,
-    Kernel::Reprojection,
+/// RMS error of the distance from the middle of the rig in millimetres, for 1 px of noise at 560 px/rad, at each of
+/// [`study::NOISE_PLACES`] by each of [`study::METHODS`], from an independent simulation in numpy.
+const NOISE: [[f64; 6]; 5] = [
+    [2.2202, 2.2203, 2.2203, 2.2203, 2.2203, 2.2203],
+    [2.6246, 2.6246, 2.6246, 2.6246, 2.6246, 2.6070],
+    [12.04, 12.06, 12.06, 12.06, 12.06, 12.06],
+    [2.2213, 2.2215, 2.2215, 2.2215, 2.2215, 2.2215],
+    [2.4175, 2.4178, 2.4177, 2.4178, 2.4178, 2.4178],
 ];
 
 #[test]
 fn with_ordinary_noise_no_method_is_better() {
     let samples = count("VERGENCE_SAMPLES", 4000);
-    println!("rms mm: {}", COLUMNS.map(|kernel| kernel.to_string()).join(", "));
-    for (name, separation, azimuth, elevation, expected) in NOISE {
-        let lens = lens(0.0);
-        let pair = StereoPair { left: &lens, right: &lens, left_from_right: left_from_right(separation) };
-        let left_from_middle = left_from_middle(separation);
-        let truth = left_from_middle * Point::from_mm(around(350.0, azimuth, elevation));
-        let exact = see(&pair, &truth).unwrap();
-        let mut gaussian = Gaussian(7);
-        let mut squares = [0.0; 6];
-        for _ in 0..samples {
-            let pixels = PixelPair { left: gaussian.noisy(exact.left, 1.0), right: gaussian.noisy(exact.right, 1.0) };
-            for (kernel, sum) in COLUMNS.iter().zip(&mut squares) {
-                let made = kernel.triangulate(&pixels, &pair).unwrap().point;
-                let error = (left_from_middle.inverse() * made).mm().norm() - 350.0;
-                *sum += error * error;
-            }
-        }
-        let rms = squares.map(|sum| (sum / f64::from(samples)).sqrt());
+    println!("rms mm: {}", study::METHODS.map(|kernel| kernel.to_string()).join(", "));
+    for ((name, place), expected) in study::NOISE_PLACES.into_iter().zip(NOISE) {
+        let rms = study::with_noise(&place, 1.0, samples, 7).unwrap();
         println!("{name:26} {rms:.4?}");
         // Both are samples: theirs of unknown size taken for as good as 20 000 of ours.
         let relative = 4.0 * (0.5 / f64::from(samples) + 0.5 / 20_000.0).sqrt();
@@ -137,41 +114,24 @@ fn with_ordinary_noise_no_method_is_better() {
     }
 }
 
-/// What the right camera sees when its match slips `slip` millimetres downwards along a vertical edge through the point.
-fn slipped(pair: &StereoPair<'_>, separation: f64, place: Vector3<f64>, slip: f64) -> (PixelPair, UnitRay<Left>) {
-    let left_from_middle = left_from_middle(separation);
-    let seen = |at: Vector3<f64>| see(pair, &(left_from_middle * Point::from_mm(at))).unwrap();
-    let pixels = PixelPair { left: seen(place).left, right: seen(place + Vector3::new(0.0, slip, 0.0)).right };
-    (pixels, left_from_middle * UnitRay::<Base>::new(Vector3::y()).unwrap())
-}
-
-/// Error of the depth in millimetres where a match slipped along a vertical edge: separation, place, slip, then midpoint,
-/// pseudo-intersection, L1, L∞, L2 and reprojection, from an independent computation in numpy.
-const SLIPS: [(f64, f64, f64, f64, [f64; 6]); 7] = [
-    (0.0, 350.0, 0.0, 5.0, [-0.416, 0.000, -0.036, 0.000, 0.000, 0.006]),
-    (120.0, 350.0, 0.0, 5.0, [-0.416, 0.000, -0.036, 0.000, 0.000, 0.046]),
-    (0.0, 350.0, 0.0, 20.0, [-6.53, 0.000, -0.57, 0.000, 0.000, 0.09]),
-    (120.0, 350.0, 0.0, 20.0, [-6.53, 0.000, -0.57, 0.000, 0.000, 0.73]),
-    (0.0, 350.0, 0.0, 50.0, [-37.0, 0.000, -3.54, 0.000, -0.001, 0.58]),
-    (120.0, 350.0, 0.0, 50.0, [-37.0, 0.000, -3.54, 0.000, -0.001, 4.55]),
-    (120.0, 350.0, 25.0, 20.0, [-7.77, -0.64, -1.91, -0.72, -0.81, -0.11]),
+/// Error of the depth in millimetres of each of [`study::SLIPS`] by each of [`study::METHODS`], from an independent
+/// computation in numpy.
+const SLIPPED: [[f64; 6]; 7] = [
+    [-0.416, 0.000, -0.036, 0.000, 0.000, 0.006],
+    [-0.416, 0.000, -0.036, 0.000, 0.000, 0.046],
+    [-6.53, 0.000, -0.57, 0.000, 0.000, 0.09],
+    [-6.53, 0.000, -0.57, 0.000, 0.000, 0.73],
+    [-37.0, 0.000, -3.54, 0.000, -0.001, 0.58],
+    [-37.0, 0.000, -3.54, 0.000, -0.001, 4.55],
+    [-7.77, -0.64, -1.91, -0.72, -0.81, -0.11],
 ];
 
 #[test]
 fn a_match_slipped_along_an_edge_moves_the_methods_apart() {
-    println!("dZ mm: {}, edge-plane", COLUMNS.map(|kernel| kernel.to_string()).join(", "));
-    for (separation, range, azimuth, slip, expected) in SLIPS {
-        let lens = lens(0.0);
-        let pair = StereoPair { left: &lens, right: &lens, left_from_right: left_from_right(separation) };
-        let place = around(range, azimuth, 0.0);
-        let (pixels, edge) = slipped(&pair, separation, place, slip);
-        let error = |kernel: &Kernel| {
-            let made = kernel.triangulate(&pixels, &pair).unwrap().point;
-            (left_from_middle(separation).inverse() * made).mm().z - place.z
-        };
-        let found = COLUMNS.each_ref().map(error);
-        let by_edge = error(&Kernel::EdgePlane(edge));
-        println!("{separation:4} {azimuth:3} {slip:3} mm: {found:.3?} {by_edge:.3}");
+    println!("dZ mm: {}, edge-plane", study::METHODS.map(|kernel| kernel.to_string()).join(", "));
+    for ((name, place, slip), expected) in study::SLIPS.into_iter().zip(SLIPPED) {
+        let (found, by_edge) = study::with_slip(&place, slip).unwrap();
+        println!("{name} {slip}: {found:.3?} {by_edge:.3}");
         assert!(by_edge.abs() < 1e-9, "{by_edge}");
         for (found, expected) in found.iter().zip(expected) {
             assert!((found - expected).abs() <= 0.0006_f64.max(0.006 * expected.abs().max(1.0)), "{found} {expected}");
@@ -182,16 +142,17 @@ fn a_match_slipped_along_an_edge_moves_the_methods_apart() {
 /// Off the horizontal plane a vertical edge is not orthogonal to the epipolar plane, and only the edge's own plane helps.
 #[test]
 fn above_the_horizon_only_the_edge_plane_is_exact() {
-    let lens = lens(0.0);
-    let pair = StereoPair { left: &lens, right: &lens, left_from_right: left_from_right(0.0) };
-    let place = around(350.0, 40.0, 20.0);
-    let (pixels, edge) = slipped(&pair, 0.0, place, -20.0);
-    let error = |kernel: Kernel| {
-        let made = kernel.triangulate(&pixels, &pair).unwrap().point;
-        (left_from_middle(0.0).inverse() * made).mm().z - place.z
+    let degrees = Angle::from_deg;
+    let place = study::Place {
+        separation: degrees(0.0),
+        range: Length::from_mm(350.0),
+        azimuth: degrees(40.0),
+        elevation: degrees(20.0),
     };
-    assert!(error(Kernel::EdgePlane(edge)).abs() < 1e-9);
-    assert!(error(Kernel::PseudoIntersection).abs() > 5.0, "{}", error(Kernel::PseudoIntersection));
+    let (errors, by_edge) = study::with_slip(&place, Length::from_mm(-20.0)).unwrap();
+    assert!(by_edge.abs() < 1e-9, "{by_edge}");
+    // The second method is the pseudo-intersection.
+    assert!(errors[1].abs() > 5.0, "{errors:?}");
 }
 
 /// 3 m away, a degree of mismatch across the epipolar plane costs the midpoint a ninth of the range.

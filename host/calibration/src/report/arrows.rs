@@ -1,14 +1,12 @@
 //! Residual arrows over the image.
 
+use vergence_page::{Anchor, Drawing, Path, round_step, significant};
 use vergence_vision::KannalaBrandt;
 
 use super::colour::BLUES;
-use super::html::significant;
 use super::image_frame::ImageFrame;
 use super::pattern::Patch;
-use super::plot::round_step;
 use super::residuals::Sight;
-use super::svg::{Anchor, Drawing, Path};
 
 /// A large arrow (all but one in twenty are shorter) is so long, and shorter where there are many.
 const LONG: [f64; 2] = [13.0, 26.0];

@@ -1,7 +1,8 @@
 //! What a person should look at: each check says what was found and, where it is not good, what to do.
 
+use vergence_page::{counted, escape, fixed, significant};
+
 use super::coverage::FieldCoverage;
-use super::html::{counted, escape, fixed, significant};
 use super::places::{OCTANTS, list, name};
 use crate::Validation;
 

@@ -2,14 +2,13 @@
 
 use std::f64::consts::TAU;
 
+use vergence_page::{Anchor, Drawing, Path, significant};
 use vergence_vision::{Angle, Camera, KannalaBrandt, Pixel};
 
 use super::colour::GREENS;
-use super::html::significant;
 use super::image_frame::ImageFrame;
 use super::places::{OCTANTS, octant};
 use super::residuals::Sight;
-use super::svg::{Anchor, Drawing, Path};
 
 /// Width of a ring of cells.
 const RING_DEG: f64 = 15.0;

@@ -8,11 +8,10 @@
 //! ```
 
 use nalgebra::{Matrix6, Vector3, Vector6};
+use vergence_page::{Anchor, Axes, Drawing, Path};
 use vergence_vision::{KannalaBrandt, Left, Right, Transform, UnitRay};
 
 use super::image_frame::WIDTH;
-use super::plot::Axes;
-use super::svg::{Anchor, Drawing, Path};
 
 /// Two cameras, and how sure their relative pose is.
 pub(super) struct UncertainPair<'a> {
@@ -68,7 +67,7 @@ impl DepthError {
         let high = if least.is_finite() { (1.1 * most).min(HIGHEST * least).max(1e-9) } else { 1.0 };
         let axes = Axes::filling(&drawing, [-90.0, 90.0], [0.0, high]);
         drawing.rect(axes.corner(), axes.extent(), "sensor", "");
-        let range = super::html::significant(self.range_mm, 3);
+        let range = vergence_page::significant(self.range_mm, 3);
         axes.draw(&mut drawing, "direction from straight ahead (°)", &format!("± of the distance at {range} mm (mm)"));
         let points: Vec<_> = self.curve.iter().map(|(degrees, sigma)| axes.at(*degrees, *sigma)).collect();
         drawing.clipped(axes.corner(), axes.extent(), |drawing| {

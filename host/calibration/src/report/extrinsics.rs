@@ -1,6 +1,10 @@
 //! The report of a pair.
 
 use nalgebra::Vector3;
+use vergence_page::{
+    Cell, Row, count, counted, figure, figures, fixed, note, number, panel, plain, section, significant, table, text,
+    with_sigma,
+};
 use vergence_vision::{Angle, KannalaBrandt};
 
 use super::ReportAbout;
@@ -8,11 +12,11 @@ use super::arrows::arrows;
 use super::checks::{self, Check};
 use super::depth::{DepthError, UncertainPair};
 use super::field_angle::field_angle;
-use super::html::{Cell, Row, counted, figure, fixed, note, page, section, significant, table, with_sigma};
+use super::page;
 use super::pattern::{board_shift_px, patches, pattern_px};
 use super::ray_field::RANGE_MM;
 use super::residuals::{Sight, of_extrinsics};
-use super::sections::{count, figures, number, panel, plain, text, verdict};
+use super::sections::verdict;
 use super::verdict::{Verdict, of_depth};
 use crate::{ExtrinsicsCalibration, RelativePose, Side, StereoOutlier, StereoOutlierReason, StereoView};
 
@@ -32,7 +36,7 @@ pub fn extrinsics_report(calibration: &ExtrinsicsCalibration, views: &[StereoVie
         section("Corners left out", &report.outlier_table()),
         report.skipped(),
     ];
-    page("Extrinsics calibration", about, &body.concat())
+    page("Extrinsics calibration", about, body.concat())
 }
 
 /// What the pair of `calibration` is worth, made of `views`.

@@ -1,12 +1,11 @@
 //! Residuals over the angle to the optical axis.
 
+use vergence_page::{Anchor, Axes, Drawing, Path};
 use vergence_vision::Angle;
 
 use super::arrows::{quantile, sorted};
 use super::image_frame::WIDTH;
-use super::plot::Axes;
 use super::residuals::Sight;
-use super::svg::{Anchor, Drawing, Path};
 
 /// The running figure has about so many points,
 const POINTS: usize = 24;

@@ -3,10 +3,8 @@
 use std::f64::consts::TAU;
 
 use nalgebra::Vector3;
+use vergence_page::{Anchor, Drawing, Path, fixed};
 use vergence_vision::{Angle, Camera, ImageSize, KannalaBrandt, Pixel, UnitRay};
-
-use super::html::fixed;
-use super::svg::{Anchor, Drawing, Path};
 
 /// Width of a figure.
 pub(super) const WIDTH: f64 = 620.0;

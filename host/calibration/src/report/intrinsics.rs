@@ -1,6 +1,10 @@
 //! The report of one lens.
 
 use nalgebra::{Point3, Vector3};
+use vergence_page::{
+    Cell, Row, count, counted, figure, figures, fixed, note, number, panel, plain, section, significant, table, text,
+    with_sigma,
+};
 use vergence_vision::{KannalaBrandt, Length};
 
 use super::ReportAbout;
@@ -8,12 +12,12 @@ use super::arrows::{arrows, mean_arrows};
 use super::checks::{self, Check};
 use super::coverage::FieldCoverage;
 use super::field_angle::field_angle;
-use super::html::{Cell, Row, counted, figure, fixed, note, page, section, significant, table, with_sigma};
+use super::page;
 use super::pattern::{Patch, patches, pattern_px};
 use super::ray_field::{BASELINE_MM, RANGE_MM, RayField, Ring, depth_mm};
 use super::ray_map::ray_map;
 use super::residuals::{Sight, of_intrinsics};
-use super::sections::{count, figures, number, panel, plain, text, verdict};
+use super::sections::verdict;
 use super::verdict::Verdict;
 use crate::{BoardView, IntrinsicsCalibration, Outlier, OutlierReason};
 
@@ -32,7 +36,7 @@ pub fn intrinsics_report(calibration: &IntrinsicsCalibration, views: &[BoardView
         section("Views", &report.view_table()),
         section("Corners left out", &report.outlier_table()),
     ];
-    page("Intrinsics calibration", about, &body.concat())
+    page("Intrinsics calibration", about, body.concat())
 }
 
 /// What the lens of `calibration` is worth, made of `views`.

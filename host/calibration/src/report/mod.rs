@@ -14,20 +14,18 @@ mod coverage;
 mod depth;
 mod extrinsics;
 mod field_angle;
-mod html;
 mod image_frame;
 mod intrinsics;
 mod pattern;
 mod places;
-mod plot;
 mod ray_field;
 mod ray_map;
 mod residuals;
 mod sections;
 mod stage;
-mod svg;
 mod verdict;
 
+use vergence_page::{Page, escape};
 use vergence_vision::Angle;
 
 use crate::Validation;
@@ -55,4 +53,14 @@ pub struct ReportAbout {
     pub half_field: Option<Angle>,
     /// How well views are predicted that the calibration did not see, where that was tried.
     pub held_out: Option<Validation>,
+}
+
+/// The whole page of a report; `body` is HTML.
+fn page(kind: &'static str, about: &ReportAbout, body: String) -> String {
+    let origin =
+        vec![("Made by", about.program_version.clone()), ("Date", about.date.clone()), ("Board", about.board.clone())];
+    let inputs = escape(&about.inputs_sha256);
+    let footer =
+        format!("SHA-256 of the inputs: <code>{inputs}</code>. The same inputs give the same page, byte for byte.");
+    vergence_page::page(&Page { kind, title: about.title.clone(), origin, body, footer })
 }

@@ -2,11 +2,11 @@
 
 use std::f64::consts::TAU;
 
+use vergence_page::{Anchor, Drawing, Path, significant};
+
 use super::arrows::{quantile, sorted};
 use super::colour::EMBERS;
-use super::html::significant;
 use super::image_frame::{ImageFrame, direction};
-use super::svg::{Anchor, Drawing, Path};
 use crate::{IntrinsicsCalibration, RayUncertainty};
 
 /// Cells from the axis to the rim, and around.

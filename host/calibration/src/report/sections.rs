@@ -1,7 +1,8 @@
 //! The parts that all reports have.
 
+use vergence_page::escape;
+
 use super::checks::{self, Check};
-use super::html::{Cell, Row, escape, significant};
 
 /// The verdict, its figures, and the checks.
 pub(super) fn verdict(sentence: &str, explanation: &str, facts: &[(&str, String)], list: &[Check]) -> String {
@@ -16,31 +17,4 @@ pub(super) fn verdict(sentence: &str, explanation: &str, facts: &[(&str, String)
         facts.iter().map(fact).collect::<String>(),
         checks::html(list)
     )
-}
-
-/// Tables among figures: titles, and bodies in HTML.
-pub(super) fn panel(tables: &[(&str, String)]) -> String {
-    let part = |(title, body): &(&str, String)| format!("<h3>{}</h3>\n{body}", escape(title));
-    format!("<div class=\"panel\">{}</div>\n", tables.iter().map(part).collect::<String>())
-}
-
-/// Figures, side by side where the page is wide enough.
-pub(super) fn figures(figures: &[String]) -> String {
-    format!("<section class=\"figures\">\n{}</section>\n", figures.concat())
-}
-
-pub(super) fn text(text: impl Into<String>) -> Cell {
-    Cell::Text(text.into())
-}
-
-pub(super) fn number(value: Option<f64>, digits: i32) -> Cell {
-    Cell::Number(value.map_or_else(|| "–".to_owned(), |value| significant(value, digits)))
-}
-
-pub(super) fn count(value: usize) -> Cell {
-    Cell::Number(value.to_string())
-}
-
-pub(super) fn plain(cells: Vec<Cell>) -> Row {
-    Row { cells, marked: false }
 }

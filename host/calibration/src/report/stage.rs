@@ -1,11 +1,15 @@
 //! The report of a moving stage.
 
+use vergence_page::{
+    Cell, Row, counted, figure, figures, fixed, note, number, panel, plain, section, significant, table, text,
+    with_sigma,
+};
 use vergence_rig::{AxisPosition, Rig, Screw};
 
 use super::ReportAbout;
 use super::checks::{self, Check};
-use super::html::{Cell, Row, counted, figure, fixed, note, page, section, significant, table, with_sigma};
-use super::sections::{figures, number, panel, plain, text, verdict};
+use super::page;
+use super::sections::verdict;
 use super::verdict::{in_modes, stage_verdict};
 use crate::{FittedScrew, HeldOutPose, StageCalibration, StagePoseFigures};
 
@@ -26,7 +30,7 @@ pub fn stage_report(stage: &StageCalibration, rig: &Rig, held_out: &[HeldOutPose
         section("Stage poses", &pose_table(&stage.poses)),
         section("Stage poses held out", &held_out_table(held_out)),
     ];
-    page("Stage calibration", about, &body.concat())
+    page("Stage calibration", about, body.concat())
 }
 
 fn top(stage: &StageCalibration, rig: &Rig, held_out: &[HeldOutPose]) -> String {

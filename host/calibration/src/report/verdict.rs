@@ -1,10 +1,10 @@
 //! What a calibration is worth, in a sentence.
 
+use vergence_page::{fixed, significant};
 use vergence_rig::Rig;
 use vergence_vision::Length;
 
 use super::depth::{DepthError, UncertainPair};
-use super::html::{fixed, significant};
 use super::ray_field::RANGE_MM;
 use crate::StageCalibration;
 

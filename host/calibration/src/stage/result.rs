@@ -2,11 +2,14 @@
 
 use nalgebra::{DMatrix, Matrix6, SMatrix};
 use vergence_rig::{AxisPosition, Chain, Link, Rig, RigAxis, Screw};
-use vergence_vision::{Angle, KannalaBrandt, Left, Length, Right, Transform};
+use vergence_vision::{
+    Angle, KannalaBrandt, LENS_PARAMETERS, Left, Length, Right, SHARED_PARAMETERS, SharedCovariance, Transform,
+};
 
 use crate::extrinsics::{
     ExtrinsicsCalibration, Fit, Side, SkippedView, StereoOutlier, StereoView, outliers, refined, rms,
 };
+use crate::reprojection::POSE;
 use crate::stage::figures::{pose_figures, screws, zero_offsets};
 use crate::stage::mechanism::State;
 use crate::stage::model::Model;
@@ -51,6 +54,7 @@ pub struct StageCalibration {
     axes: Vec<RigAxis>,
     state: State,
     mechanism: Vec<Unknown>,
+    /// Of the mechanism's unknowns, then the left and the right lens's where they were refined.
     covariance: DMatrix<f64>,
     reading_sigma: Vec<f64>,
 }
@@ -124,7 +128,27 @@ impl StageCalibration {
     #[must_use]
     pub fn predict(&self, readings: &[AxisPosition]) -> PredictedPose {
         let values: Vec<f64> = readings.iter().map(|reading| reading.value()).collect();
-        predict(&self.state, &self.mechanism, &self.covariance, &self.reading_sigma, &values)
+        predict(&self.state, &self.mechanism, &self.of_mechanism(), &self.reading_sigma, &values)
+    }
+
+    /// What all points of a pair share where the encoders read `readings`: lenses and pose with their correlations.
+    #[must_use]
+    pub fn shared(&self, readings: &[AxisPosition]) -> SharedCovariance {
+        let values: Vec<f64> = readings.iter().map(|reading| reading.value()).collect();
+        let (unknowns, lenses) = (self.mechanism.len(), 2 * LENS_PARAMETERS);
+        // The shared parameters by the unknowns: lenses are themselves, the pose is what the mechanism makes of its own.
+        let mut by_unknowns = DMatrix::zeros(SHARED_PARAMETERS, self.covariance.nrows());
+        let refined = self.covariance.nrows() - unknowns;
+        by_unknowns.view_mut((0, unknowns), (refined, refined)).fill_with_identity();
+        by_unknowns.rows_mut(lenses, POSE).columns_mut(0, unknowns).copy_from(&self.state.derivative(
+            &values,
+            &self.mechanism,
+            None,
+        ));
+        let mut total = &by_unknowns * &self.covariance * by_unknowns.transpose();
+        let mut pose = total.view_mut((lenses, lenses), (POSE, POSE));
+        pose += of_readings(&self.state, &self.reading_sigma, &values);
+        SharedCovariance::joint(SMatrix::from_fn(|row, column| total[(row, column)]))
     }
 
     /// All axes in the middle of their ranges.
@@ -176,13 +200,19 @@ impl StageCalibration {
     fn largest_sigma(&self) -> (Angle, Length) {
         let worst = |matrix: SMatrix<f64, 3, 3>| matrix.symmetric_eigenvalues().max().max(0.0).sqrt();
         let (mut rotation, mut translation) = (0.0f64, 0.0f64);
+        let of_mechanism = self.of_mechanism();
         for values in grid(&self.axes) {
             let exact = vec![0.0; values.len()];
-            let pose = predict(&self.state, &self.mechanism, &self.covariance, &exact, &values);
+            let pose = predict(&self.state, &self.mechanism, &of_mechanism, &exact, &values);
             rotation = rotation.max(worst(pose.covariance.fixed_view::<3, 3>(0, 0).into_owned()));
             translation = translation.max(worst(pose.covariance.fixed_view::<3, 3>(3, 3).into_owned()));
         }
         (Angle::from_rad(rotation), Length::from_mm(translation))
+    }
+
+    fn of_mechanism(&self) -> DMatrix<f64> {
+        let unknowns = self.mechanism.len();
+        self.covariance.view((0, 0), (unknowns, unknowns)).into_owned()
     }
 
     fn scaled(&self, links: &[Link]) -> Vec<Link> {
@@ -213,12 +243,18 @@ fn predict(
     readings: &[f64],
 ) -> PredictedPose {
     let derivative = state.derivative(readings, mechanism, None);
-    let mut total: Matrix6<f64> = &derivative * covariance * derivative.transpose();
-    for (axis, sigma) in reading_sigma.iter().enumerate() {
+    let of_mechanism: Matrix6<f64> = &derivative * covariance * derivative.transpose();
+    let covariance = of_mechanism + of_readings(state, reading_sigma, readings);
+    PredictedPose { left_from_right: named(&state.left_from_right(readings)), covariance }
+}
+
+/// The pose's covariance by the errors of the readings alone.
+fn of_readings(state: &State, reading_sigma: &[f64], readings: &[f64]) -> Matrix6<f64> {
+    let by_axis = reading_sigma.iter().enumerate().map(|(axis, sigma)| {
         let by: Twist = state.by_reading(readings, axis) * *sigma;
-        total += by * by.transpose();
-    }
-    PredictedPose { left_from_right: named(&state.left_from_right(readings)), covariance: total }
+        by * by.transpose()
+    });
+    by_axis.sum()
 }
 
 /// All that the calibration is made of.
@@ -237,8 +273,9 @@ pub(crate) fn calibration(material: Material<'_>) -> Result<StageCalibration, St
     let covariance = fit.covariance.as_ref().ok_or_else(|| StageError::Unobservable(observability.clone()))?;
     // The mechanism's unknowns come first.
     let mechanism: Vec<Unknown> = model.unknowns.iter().copied().filter(|unknown| unknown.is_mechanical()).collect();
-    let covariance = covariance.view((0, 0), (mechanism.len(), mechanism.len())).into_owned();
+    let covariance = without_readings(covariance, mechanism.len(), model.unknowns.len());
     let state = &fit.shared.state;
+    let of_mechanism = covariance.view((0, 0), (mechanism.len(), mechanism.len())).into_owned();
     let names: Vec<String> = rig.axes.iter().map(|axis| axis.name.clone()).collect();
     let sigma = |index: usize| covariance[(index, index)].max(0.0).sqrt();
     let scales = mechanism.iter().enumerate().filter_map(|(index, unknown)| match unknown {
@@ -249,9 +286,9 @@ pub(crate) fn calibration(material: Material<'_>) -> Result<StageCalibration, St
     });
     Ok(StageCalibration {
         screws: screws(state, &mechanism, &sigma, &names),
-        zero_offsets: zero_offsets(rig, &model.nominal, state, &mechanism, &covariance),
+        zero_offsets: zero_offsets(rig, &model.nominal, state, &mechanism, &of_mechanism),
         scales: scales.collect(),
-        at_zero: predict(state, &mechanism, &covariance, &model.reading_sigma, &vec![0.0; rig.axes.len()]),
+        at_zero: predict(state, &mechanism, &of_mechanism, &model.reading_sigma, &vec![0.0; rig.axes.len()]),
         poses: pose_figures(rig, &model, &fit, alone),
         observability,
         rms_px: rms(&fit.errors_px, usable).unwrap_or_default(),
@@ -269,4 +306,11 @@ pub(crate) fn calibration(material: Material<'_>) -> Result<StageCalibration, St
         covariance,
         reading_sigma: model.reading_sigma,
     })
+}
+
+/// The rows and columns of the mechanism's unknowns and of the lenses'; those of the readings at the stage poses, which
+/// nobody asks for later, lie between.
+fn without_readings(covariance: &DMatrix<f64>, mechanism: usize, kinematics: usize) -> DMatrix<f64> {
+    let readings = kinematics - mechanism;
+    covariance.clone().remove_rows(mechanism, readings).remove_columns(mechanism, readings)
 }

@@ -112,7 +112,7 @@ mod tests {
         let automatic = FrameTiming { exposure: None, ..rolling };
         assert_eq!(middle(automatic, StampedAt::Start), [1011, 7]);
         let ExposureDelay { least_us, most_us } = rolling.after_pulse();
-        assert_eq!([least_us.round(), most_us.round()], [9_000.0, 10_000.0]);
+        assert_eq!([least_us, most_us].map(|us| us.round() as i64), [9_000, 10_000]);
     }
 
     #[test]

@@ -1,14 +1,13 @@
 //! A simulated person who holds a chessboard in front of simulated cameras, at another place after every second frame.
 
 use nalgebra::{UnitQuaternion, Vector3};
-use rand::{RngExt, SeedableRng};
-use rand_pcg::Pcg64Mcg;
 use vergence_scene::{Board, Optics, Scene, View, render};
 use vergence_vision::{Camera as CameraFrame, KannalaBrandt, Left, Point, Right, Transform, World};
 
 use super::simulated::Eye;
 use super::{Camera, Frame};
 use crate::failure::Failure;
+use crate::sim::Random;
 
 /// The board is held between these distances from the left camera.
 const RANGE_MM: [f64; 2] = [180.0, 420.0];
@@ -43,10 +42,11 @@ pub struct SimulatedBoardCamera {
 }
 
 impl BoardStage {
-    /// Where the board is held for the `index`th time.
-    fn left_from_board(&self, index: u64) -> Option<Transform<Left, Board>> {
-        let mut random = Pcg64Mcg::seed_from_u64(self.seed ^ (index + 1).wrapping_mul(0x9e37_79b9_7f4a_7c15));
-        let mut uniform = move |low: f64, high: f64| low + (high - low) * random.random::<f64>();
+    /// Where the board is held for the `index`th time; `None` where there is no such place.
+    #[must_use]
+    pub fn left_from_board(&self, index: u64) -> Option<Transform<Left, Board>> {
+        let mut random = Random::new(self.seed ^ (index + 1).wrapping_mul(0x9e37_79b9_7f4a_7c15));
+        let mut uniform = move |low, high| random.between(low, high);
         (0..TRIES).find_map(|_| {
             // Evenly over the sphere as far as the lens sees.
             let (low, turn) = (self.left.theta_max().rad().cos(), uniform(0.0, std::f64::consts::TAU));

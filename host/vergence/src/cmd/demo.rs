@@ -1,6 +1,5 @@
 //! `vergence demo`: the whole rig in simulation, scored against the truth.
 
-mod score;
 mod see;
 
 use std::path::PathBuf;
@@ -19,6 +18,7 @@ use crate::link::{Client, HostClock, OpenWire};
 use crate::output::{DepthPicture, depth_picture, make_folder, match_picture, ply, write_png, write_whole};
 use crate::rig_file;
 use crate::rig_zones::ZONE_RADIUS;
+use crate::score::Spread;
 use crate::sim::{SharedRig, SimulatedRig, spawn_in_process};
 use crate::stopwatch::Stopwatch;
 
@@ -103,7 +103,7 @@ fn save(mode: &Mode, view: &View, args: &Args) -> Result<(), Failure> {
 }
 
 fn in_json(mode: &Mode, view: &View, board: &Board) -> Value {
-    let spread = |spread: &score::Spread| json!({ "median": spread.median, "p95": spread.p95 });
+    let spread = |spread: &Spread| json!({ "median": spread.median, "p95": spread.p95 });
     json!({
         "name": mode.name,
         "commanded": axes_json(board.rig(), &mode.targets),

@@ -30,6 +30,7 @@ pub mod models;
 pub mod monitor;
 pub mod move_to;
 pub mod plan;
+pub mod reproduce;
 pub mod run;
 pub mod sim;
 pub mod soak;

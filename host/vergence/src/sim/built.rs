@@ -1,10 +1,10 @@
 //! A mechanism that was not built exactly as drawn: what a calibration of a simulated rig is there to find.
 
 use nalgebra::{Isometry3, Unit, UnitQuaternion, Vector3};
-use rand::{RngExt, SeedableRng};
-use rand_pcg::Pcg64Mcg;
 use vergence_rig::{Chain, Link, Rig, Screw};
 use vergence_vision::{Frame, Point, Transform};
+
+use super::random::Random;
 
 /// How exactly a mechanism is built by hand, one standard deviation about and along each axis.
 const DIRECTION_RAD: f64 = 0.017;
@@ -16,8 +16,8 @@ const SCALE: f64 = 0.003;
 /// gives the same mechanism.
 #[must_use]
 pub fn built(drawn: &Rig, seed: u64) -> Rig {
-    let mut off = Off(Pcg64Mcg::seed_from_u64(seed));
-    let scales: Vec<f64> = drawn.axes.iter().map(|_| 1.0 + SCALE * off.normal()).collect();
+    let mut off = Off(Random::new(seed));
+    let scales: Vec<f64> = drawn.axes.iter().map(|_| 1.0 + SCALE * off.0.normal()).collect();
     let mount = off.mount();
     let right_at_zero = drawn.right_chain.at_zero();
     Rig {
@@ -28,26 +28,16 @@ pub fn built(drawn: &Rig, seed: u64) -> Rig {
 }
 
 /// Departures from the drawing, one after the other.
-struct Off(Pcg64Mcg);
+struct Off(Random);
 
 impl Off {
-    /// Box and Muller.
-    fn normal(&mut self) -> f64 {
-        let radius = (-2.0 * (1.0 - self.0.random::<f64>()).ln()).sqrt();
-        radius * (std::f64::consts::TAU * self.0.random::<f64>()).cos()
-    }
-
-    fn vector(&mut self, sigma: f64) -> Vector3<f64> {
-        Vector3::from_fn(|_, _| sigma * self.normal())
-    }
-
     fn mount(&mut self) -> Isometry3<f64> {
-        let turn = UnitQuaternion::from_scaled_axis(self.vector(DIRECTION_RAD));
-        Isometry3::from_parts(self.vector(PLACE_MM).into(), turn)
+        let turn = UnitQuaternion::from_scaled_axis(self.0.vector(DIRECTION_RAD));
+        Isometry3::from_parts(self.0.vector(PLACE_MM).into(), turn)
     }
 
     fn direction(&mut self, drawn: Unit<Vector3<f64>>) -> Unit<Vector3<f64>> {
-        UnitQuaternion::from_scaled_axis(self.vector(DIRECTION_RAD)) * drawn
+        UnitQuaternion::from_scaled_axis(self.0.vector(DIRECTION_RAD)) * drawn
     }
 
     fn chain<C: Frame>(
@@ -61,7 +51,7 @@ impl Off {
                 Screw::Slide { along } => Screw::Slide { along: self.direction(along) },
                 Screw::Turn { about, through } => Screw::Turn {
                     about: self.direction(about),
-                    through: Point::from_mm(through.mm() + self.vector(PLACE_MM)),
+                    through: Point::from_mm(through.mm() + self.0.vector(PLACE_MM)),
                 },
             };
             Link { share: link.share * scales.get(link.axis).copied().unwrap_or(1.0), screw, axis: link.axis }

@@ -18,7 +18,7 @@ mod spatial;
 
 use std::f64::consts::{PI, TAU};
 
-pub use paper::{paper_eq3, paper_eq3_applies};
+pub use paper::{PAPER_FIELD, PUBLISHED_MODES, PublishedMode, paper_eq3, paper_eq3_applies};
 pub use spatial::{BodyMask, Eye, SolidZones, circle_zones, solid_zones};
 
 use crate::{Angle, Length};

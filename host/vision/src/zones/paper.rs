@@ -5,6 +5,50 @@ use std::f64::consts::{PI, TAU};
 use super::Zones;
 use crate::{Angle, Length};
 
+/// Horizontal field of the paper's lenses, Sec. II.
+pub const PAPER_FIELD: Angle = Angle::from_deg(195.95);
+
+/// A vision mode of the paper: its figures, and the nominal pose that explains them best. The paper prints neither baseline
+/// nor separation of the modes.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct PublishedMode {
+    /// As the paper calls it.
+    pub name: &'static str,
+    /// Stereo zone as printed.
+    pub stereo: Angle,
+    /// Mono zone as printed, or total field less stereo zone; `None` where neither is.
+    pub mono: Option<Angle>,
+    /// Nominal distance of the optical centres.
+    pub baseline: Length,
+    /// Nominal angle between the optical axes, outward positive.
+    pub separation: Angle,
+    /// Of the circle on which the zones are told.
+    pub radius: Length,
+}
+
+/// The two modes of the bench, and the three of the robot.
+pub const PUBLISHED_MODES: [PublishedMode; 5] = [
+    PublishedMode::new("human", [193.0, f64::NAN], [0.0, 350.0]),
+    PublishedMode::new("herbivore", [56.0, 209.0], [120.0, 350.0]),
+    PublishedMode::new("gecko", [76.0, 207.0], [120.0, 3000.0]),
+    PublishedMode::new("spider", [136.0, 87.0], [60.0, 3000.0]),
+    PublishedMode::new("stick-bug", [140.0, 95.0], [-40.0, 3000.0]),
+];
+
+impl PublishedMode {
+    /// Degrees; the separation in degrees and the radius in millimetres, at the bench's baseline.
+    const fn new(name: &'static str, [stereo, mono]: [f64; 2], [separation, radius]: [f64; 2]) -> Self {
+        Self {
+            name,
+            stereo: Angle::from_deg(stereo),
+            mono: if mono.is_nan() { None } else { Some(Angle::from_deg(mono)) },
+            baseline: Length::from_mm(145.0),
+            separation: Angle::from_deg(separation),
+            radius: Length::from_mm(radius),
+        }
+    }
+}
+
 /// The zones by Eq. 3 of "Bio-inspired reconfigurable stereo vision for robotics using omnidirectional cameras", as
 /// printed, to compare with published figures. For anything else use [`crate::zones_exact`].
 ///

@@ -1,9 +1,9 @@
 //! OpenCV's fisheye model on the same rays.
 
-use std::process::Command;
-
 use serde_json::{Value, json};
 use vergence_vision::{Angle, OpenCvFisheye};
+
+use crate::python::ask_python;
 
 /// Needs only OpenCV and numpy.
 const SCRIPT: &str = include_str!("opencv_fisheye.py");
@@ -40,14 +40,6 @@ pub fn opencv(
     field: Angle,
 ) -> Result<PeerTimes, String> {
     let numbers = [lens.fx, lens.fy, lens.cx, lens.cy].into_iter().chain(lens.k).chain([field.deg()]);
-    let output = Command::new(python)
-        .args(["-c", SCRIPT, &points.to_string(), &repeats.to_string()])
-        .args(numbers.map(|number| number.to_string()))
-        .output()
-        .map_err(|error| format!("{python} does not start: {error}"))?;
-    if !output.status.success() {
-        let said = String::from_utf8_lossy(&output.stderr);
-        return Err(said.lines().last().unwrap_or("it fails without a word").to_owned());
-    }
-    serde_json::from_slice(&output.stdout).map_err(|error| format!("its answer is not understood: {error}"))
+    let arguments = [points.to_string(), repeats.to_string()];
+    ask_python(python, SCRIPT, arguments.into_iter().chain(numbers.map(|number| number.to_string())))
 }

@@ -1,7 +1,6 @@
 //! `vergence calibrate stage`: cameras that move.
 
 mod live;
-mod plan;
 mod recorded;
 mod tell;
 mod truth;

@@ -9,13 +9,13 @@ use vergence_rig::{ExposureDelay, Fate, FramePairing, JointsAt, RigPose, Stamped
 use vergence_scene::Optics;
 use vergence_vision::{KannalaBrandt, Left, Length, Pixel, Transform, World, Zones};
 
-use super::score::{Score, score};
 use crate::board::Board;
 use crate::camera::{Eye, Frame, SimulatedCamera, Stage};
 use crate::failure::Failure;
 use crate::link::HostClock;
 use crate::look::{Eyes, Look, look};
 use crate::rig_zones::rig_zones;
+use crate::score::{Score, score};
 use crate::sim::SharedRig;
 use crate::stopwatch::Stopwatch;
 

@@ -9,7 +9,6 @@ use vergence_protocol::Mode;
 use vergence_rig::{AxisPosition, Rig};
 use vergence_vision::{Camera as CameraFrame, Pixel, Right, UnitRay};
 
-use super::plan::plan;
 use super::recorded::{FOLDER, POSES, column, number};
 use crate::board::{Board, fresh_session};
 use crate::board_watch::{BoardWatch, NAMES, Seen, seen};
@@ -23,6 +22,7 @@ use crate::link::{Client, HostClock, OpenWire, Port};
 use crate::output::{make_folder, write_png, write_whole};
 use crate::rig_file;
 use crate::sim::{SharedRig, SimulatedRig, built, spawn_in_process};
+use crate::stage_plan::stage_plan;
 
 /// How the rig is driven.
 #[derive(Debug, clap::Args)]
@@ -73,7 +73,7 @@ pub async fn fill(
     let drawn = rig_file::load(globals.rig.as_deref())?;
     let (mut rig_board, mut eyes) = open(options, cameras, &drawn, &board, globals, console).await?;
     make_folder(set)?;
-    let plan = plan(&drawn.axes, options.poses.into());
+    let plan = stage_plan(&drawn.axes, options.poses.into());
     let session = Session { set, options, board, drawn: &drawn, console };
     rig_board
         .armed(async |rig_board| {

@@ -1,11 +1,14 @@
 //! Axes of plots, and round numbers for them.
 
-use super::html::fixed;
-use super::svg::{Anchor, Drawing};
+use crate::html::fixed;
+use crate::svg::{Anchor, Drawing};
 
 /// A plot's ranges and the part of the drawing it fills.
-pub(super) struct Axes {
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Axes {
+    /// Lowest and highest value across.
     pub x: [f64; 2],
+    /// Lowest and highest value upwards.
     pub y: [f64; 2],
     left: f64,
     top: f64,
@@ -15,6 +18,7 @@ pub(super) struct Axes {
 
 impl Axes {
     /// Filling `drawing` but for the room that labels need.
+    #[must_use]
     pub fn filling(drawing: &Drawing, x: [f64; 2], y: [f64; 2]) -> Self {
         const LEFT: f64 = 56.0;
         const BOTTOM: f64 = 46.0;
@@ -23,16 +27,22 @@ impl Axes {
         Self { x, y, left: LEFT, top: MARGIN, width, height }
     }
 
+    /// Where values are in the drawing.
+    #[must_use]
     pub fn at(&self, x: f64, y: f64) -> [f64; 2] {
         let share = |value: f64, [low, high]: [f64; 2]| (value - low) / (high - low);
         [self.left + self.width * share(x, self.x), self.top + self.height * (1.0 - share(y, self.y))]
     }
 
-    pub fn corner(&self) -> [f64; 2] {
+    /// The upper left corner of the plot in the drawing.
+    #[must_use]
+    pub const fn corner(&self) -> [f64; 2] {
         [self.left, self.top]
     }
 
-    pub fn extent(&self) -> [f64; 2] {
+    /// Its width and height in the drawing.
+    #[must_use]
+    pub const fn extent(&self) -> [f64; 2] {
         [self.width, self.height]
     }
 
@@ -57,7 +67,8 @@ impl Axes {
 }
 
 /// The round number (1, 2 or 5 times a power of ten) that divides `span` into `parts` or a few less.
-pub(super) fn round_step(span: f64, parts: f64) -> f64 {
+#[must_use]
+pub fn round_step(span: f64, parts: f64) -> f64 {
     let wanted = (span / parts).max(f64::MIN_POSITIVE);
     let power = 10f64.powf(wanted.log10().floor());
     [1.0, 2.0, 5.0, 10.0].map(|digit| digit * power).into_iter().find(|step| *step >= 0.999 * wanted).unwrap_or(wanted)

@@ -6,7 +6,7 @@ use vergence_rig::{AxisPosition, RigAxis};
 /// parts of the ranges, starting at the low ends (the farthest-point design of M. Johnson, L. Moore and D. Ylvisaker,
 /// "Minimax and maximin distance designs", J. Stat. Plan. Inference 26, 1990, taken greedily).
 #[must_use]
-pub fn plan(axes: &[RigAxis], count: usize) -> Vec<Vec<AxisPosition>> {
+pub fn stage_plan(axes: &[RigAxis], count: usize) -> Vec<Vec<AxisPosition>> {
     let levels = axes.iter().fold(vec![Vec::new()], |grid: Vec<Vec<f64>>, _| {
         grid.iter().flat_map(|start| [0.0, 0.5, 1.0].map(|level| [start.as_slice(), &[level]].concat())).collect()
     });
@@ -34,7 +34,7 @@ mod tests {
     #[test]
     fn six_poses_of_the_bench_are_its_corners_its_middle_and_one_more() {
         let bench = vergence_rig::Rig::from_toml(vergence_rig::BENCH_TOML).unwrap();
-        let poses = plan(&bench.axes, 6);
+        let poses = stage_plan(&bench.axes, 6);
         let words: Vec<String> = poses.iter().map(|pose| format!("{} {}", pose[0], pose[1])).collect();
         assert_eq!(
             words[..5],
@@ -47,6 +47,6 @@ mod tests {
             ]
         );
         assert_eq!(poses.len(), 6);
-        assert_eq!(plan(&bench.axes, 100).len(), 9);
+        assert_eq!(stage_plan(&bench.axes, 100).len(), 9);
     }
 }

@@ -2,33 +2,43 @@
 
 use std::fmt::Write as _;
 
-use super::html::escape;
+use crate::html::escape;
 
 /// A drawing; x to the right, y down.
-pub(super) struct Drawing {
+#[derive(Clone, Debug, PartialEq)]
+pub struct Drawing {
     width: f64,
     height: f64,
     body: String,
 }
 
 /// Which side of its place a text ends at.
-#[derive(Clone, Copy)]
-pub(super) enum Anchor {
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Anchor {
+    /// Its left end.
     Start,
+    /// Its middle.
     Middle,
+    /// Its right end.
     End,
 }
 
 impl Drawing {
-    pub fn new(width: f64, height: f64) -> Self {
+    /// An empty one.
+    #[must_use]
+    pub const fn new(width: f64, height: f64) -> Self {
         Self { width, height, body: String::new() }
     }
 
-    pub fn width(&self) -> f64 {
+    /// As given.
+    #[must_use]
+    pub const fn width(&self) -> f64 {
         self.width
     }
 
-    pub fn height(&self) -> f64 {
+    /// As given.
+    #[must_use]
+    pub const fn height(&self) -> f64 {
         self.height
     }
 
@@ -40,6 +50,7 @@ impl Drawing {
         }
     }
 
+    /// A straight line.
     pub fn line(&mut self, from: [f64; 2], to: [f64; 2], class: &str) {
         self.path(&Path::through(&[from, to]), class, "");
     }
@@ -52,6 +63,7 @@ impl Drawing {
         self.path(&path, class, style);
     }
 
+    /// One line of text on its baseline.
     pub fn text(&mut self, [x, y]: [f64; 2], anchor: Anchor, class: &str, text: &str) {
         if !(x.is_finite() && y.is_finite()) {
             return;
@@ -83,6 +95,7 @@ impl Drawing {
     }
 
     /// The element; `label` is for those who cannot see it.
+    #[must_use]
     pub fn svg(&self, label: &str) -> String {
         let (width, height, label) = (short(self.width), short(self.height), escape(label));
         format!("<svg viewBox=\"0 0 {width} {height}\" role=\"img\" aria-label=\"{label}\">\n{}</svg>", self.body)
@@ -95,17 +108,19 @@ impl Drawing {
 }
 
 /// The data of a path. Parts with a coordinate that is not a finite number are left out.
-#[derive(Default)]
-pub(super) struct Path(String);
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct Path(String);
 
 impl Path {
     /// An open line.
+    #[must_use]
     pub fn through(points: &[[f64; 2]]) -> Self {
         let mut path = Self::default();
         path.line(points);
         path
     }
 
+    /// Adds an open line.
     pub fn line(&mut self, points: &[[f64; 2]]) {
         if points.iter().flatten().all(|x| x.is_finite()) {
             for (i, [x, y]) in points.iter().enumerate() {
@@ -115,6 +130,7 @@ impl Path {
         }
     }
 
+    /// Adds a closed line.
     pub fn polygon(&mut self, points: &[[f64; 2]]) {
         if !points.is_empty() && points.iter().flatten().all(|x| x.is_finite()) {
             self.line(points);
@@ -129,6 +145,7 @@ impl Path {
         }
     }
 
+    /// Adds a diagonal cross.
     pub fn cross(&mut self, [x, y]: [f64; 2], half: f64) {
         self.line(&[[x - half, y - half], [x + half, y + half]]);
         self.line(&[[x - half, y + half], [x + half, y - half]]);

@@ -1,0 +1,88 @@
+//! The figures for programs.
+
+use serde_json::{Value, json};
+
+use crate::cmd::report::rounded;
+use crate::cmd::zones::in_degrees;
+use crate::reproduce::{Figures, Matching, ModeZones, Row, Table};
+
+/// One for each method in each mode.
+pub fn rows(table: &Table) -> Vec<Value> {
+    table.rows.iter().map(row).collect()
+}
+
+fn row(row: &Row) -> Value {
+    let mut value = figures(&row.figures);
+    value["mode"] = row.mode.into();
+    value["method"] = row.method.into();
+    value["nees"] = row.nees.map(rounded).into();
+    let step = |(from, figures_): &(f64, Figures)| {
+        let mut value = figures(figures_);
+        value["from_deg"] = (*from).into();
+        value
+    };
+    value["field"] = row.field.iter().map(step).collect::<Vec<_>>().into();
+    value
+}
+
+fn figures(figures: &Figures) -> Value {
+    json!({
+        "corners": figures.corners,
+        "mean_abs_mm": rounded(figures.mean_abs_mm),
+        "rel_percent": rounded(figures.rel_percent),
+        "std_mm": rounded(figures.std_mm),
+        "bias_mm": rounded(figures.bias_mm),
+        "crb_mm": rounded(figures.crb_mm),
+        "crb_pixels_mm": rounded(figures.crb_pixels_mm),
+    })
+}
+
+/// How good the corners were that all of it is made of.
+pub fn corners(table: &Table) -> Value {
+    json!({
+        "seeds": table.seeds,
+        "off_px": rounded(table.corner_px),
+        "stated_px": rounded(table.stated_px),
+        "nees_band": table.nees_band().map(rounded),
+        "photographs": table.photographs[0],
+        "without_board": table.photographs[1],
+        "on_bench": table.corners[0],
+        "refused": table.corners[1],
+    })
+}
+
+/// One for each mode of the paper.
+pub fn zones(modes: &[ModeZones]) -> Vec<Value> {
+    let of = |mode: &ModeZones| {
+        let published = &mode.published;
+        json!({
+            "mode": published.name,
+            "baseline_mm": rounded(published.baseline.mm()),
+            "separation_deg": rounded(published.separation.deg()),
+            "radius_mm": rounded(published.radius.mm()),
+            "published": {
+                "stereo": rounded(published.stereo.deg()),
+                "mono": published.mono.map(|mono| rounded(mono.deg())),
+            },
+            "paper_eq3": mode.paper_eq3.as_ref().map(in_degrees),
+            "exact": mode.exact.as_ref().map(in_degrees),
+        })
+    };
+    modes.iter().map(of).collect()
+}
+
+/// One for each matcher in each mode.
+pub fn matchings(matchings: &[Matching]) -> Vec<Value> {
+    let of = |matching: &Matching| match &matching.outcome {
+        Ok(outcome) => json!({
+            "mode": matching.mode,
+            "matcher": matching.matcher,
+            "points": outcome.points,
+            "median": rounded(outcome.score.all.median),
+            "p95": rounded(outcome.score.all.p95),
+            "outlier_fraction": rounded(outcome.score.outlier_fraction),
+        }),
+        Err(why) => json!({ "mode": matching.mode, "matcher": matching.matcher, "missing": why }),
+    };
+    matchings.iter().map(of).collect()
+}

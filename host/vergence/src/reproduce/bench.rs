@@ -1,0 +1,75 @@
+//! The precision bench of the paper in simulation: the board, the drawing of the rig, and the rig as it was really built.
+
+use vergence_calibration::BoardSpec;
+use vergence_rig::{BENCH_TOML, Rig};
+use vergence_scene::Board;
+use vergence_vision::{ImageSize, KannalaBrandt, Length, OpenCvFisheye};
+
+use crate::failure::Failure;
+use crate::sim::{Random, built};
+
+/// 9 x 6 corners of 20 mm, as in the paper.
+pub const BOARD: BoardSpec = BoardSpec { columns: 9, rows: 6, square: Length::from_mm(20.0) };
+/// The same board as the renderer knows it.
+#[must_use]
+pub const fn scene_board() -> Board {
+    Board { columns: BOARD.columns, rows: BOARD.rows, square: BOARD.square }
+}
+
+/// The modes that the bench compares.
+pub const MODES: [&str; 2] = ["human", "herbivore"];
+/// Sensors of 2048 x 2048 pixels.
+const SIZE: ImageSize = ImageSize { width: 2048, height: 2048 };
+/// The image circle of 196° just fills the sensor. The paper does not publish its lens.
+const PIXELS_PER_RADIAN: f64 = 599.0;
+
+/// One rig: what its maker drew, and what nobody but the simulator knows.
+pub struct Bench {
+    /// Axes, modes and nominal mechanism. Its lenses are those of the built-in bench, and nothing uses them.
+    pub drawn: Rig,
+    /// As it was built: screws off by about a degree and 2 mm, encoders by a few parts in a thousand, other lenses.
+    pub built: Rig,
+}
+
+impl Bench {
+    /// The bench that `seed` stands for.
+    ///
+    /// # Errors
+    /// Where the built-in bench does not read.
+    pub fn new(seed: u64) -> Result<Self, Failure> {
+        let drawn = Rig::from_toml(BENCH_TOML).map_err(|error| Failure::check(error.to_string()))?;
+        let mut random = Random::new(seed ^ 0x6c65_6e73);
+        let (left_camera, right_camera) = (lens(&drawn, &mut random)?, lens(&drawn, &mut random)?);
+        let built = Rig { left_camera, right_camera, ..built(&drawn, seed) };
+        Ok(Self { drawn, built })
+    }
+}
+
+/// The bench's lens on the larger sensor; no two are alike.
+fn lens(drawn: &Rig, random: &mut Random) -> Result<KannalaBrandt, Failure> {
+    let nominal = drawn.left_camera.to_opencv();
+    let fx = PIXELS_PER_RADIAN + 2.0 * random.normal();
+    let middle = 0.5 * f64::from(SIZE.width - 1);
+    let lens = OpenCvFisheye {
+        fx,
+        fy: fx * (1.0 + 3e-4 * random.normal()),
+        cx: middle + 3.0 * random.normal(),
+        cy: middle + 3.0 * random.normal(),
+        k: nominal.k.map(|k| k * (1.0 + 0.05 * random.normal())),
+    };
+    KannalaBrandt::from_opencv(lens, drawn.left_camera.theta_max(), SIZE)
+        .map_err(|error| Failure::check(format!("the bench's lens: {error}")))
+}
+
+/// `lens` on a square sensor of fewer pixels, `side` along each side.
+///
+/// # Errors
+/// Where that is no lens.
+pub fn smaller(lens: &KannalaBrandt, side: u32) -> Result<KannalaBrandt, Failure> {
+    let (mut opencv, size) = (lens.to_opencv(), lens.size());
+    let scale = f64::from(side) / f64::from(size.width);
+    (opencv.fx, opencv.fy) = (opencv.fx * scale, opencv.fy * scale);
+    (opencv.cx, opencv.cy) = ((opencv.cx + 0.5) * scale - 0.5, (opencv.cy + 0.5) * scale - 0.5);
+    KannalaBrandt::from_opencv(opencv, lens.theta_max(), ImageSize { width: side, height: side })
+        .map_err(|error| Failure::check(format!("the smaller lens: {error}")))
+}

@@ -1,0 +1,45 @@
+//! What the cameras see of the bench's board, small, for the page.
+
+use image::RgbImage;
+use nalgebra::{UnitQuaternion, Vector3};
+use vergence_rig::{BENCH_TOML, Rig};
+use vergence_scene::{Optics, Scene, View, render};
+use vergence_vision::{Camera, Transform, World};
+
+use super::axes::Axes;
+use super::bench::{BOARD, MODES, scene_board, smaller};
+use super::measure::DEPTH;
+use crate::failure::Failure;
+
+/// Pixels on a side.
+const SIDE: u32 = 640;
+
+/// A mode's name and what the left and the right camera see of a board straight ahead, side by side.
+///
+/// # Errors
+/// Where the built-in bench does not read.
+pub fn board_pictures(seed: u64) -> Result<Vec<(&'static str, RgbImage)>, Failure> {
+    let rig = Rig::from_toml(BENCH_TOML).map_err(|error| Failure::check(error.to_string()))?;
+    let lens = smaller(&rig.left_camera, SIDE)?;
+    let picture = |name: &'static str| {
+        let values: Vec<f64> = rig.mode(name)?.targets.iter().map(|target| target.value()).collect();
+        let left_from_right = rig.pose_at_values(&values).left_from_right;
+        let axes = Axes::of(&left_from_right);
+        let middle = Vector3::new(f64::from(BOARD.columns - 1), f64::from(BOARD.rows - 1), 0.0);
+        let centre = axes.middle + axes.forward * DEPTH.mm();
+        let rotation = axes.rotation();
+        let place = Transform::new(rotation, centre - rotation * (middle * (0.5 * BOARD.square.mm())));
+        let scene = Scene::checkerboard(scene_board(), place);
+        let optics = Optics::default();
+        let photograph = |world_from_camera: Transform<World, Camera>| {
+            render(&View { scene: &scene, camera: &lens, world_from_camera, optics: &optics }, seed).image
+        };
+        let left = photograph(Transform::new(UnitQuaternion::identity(), Vector3::zeros()));
+        let right = photograph(left_from_right.renamed());
+        let mut both = RgbImage::new(2 * SIDE, SIDE);
+        image::imageops::replace(&mut both, &left, 0, 0);
+        image::imageops::replace(&mut both, &right, i64::from(SIDE), 0);
+        Some((name, both))
+    };
+    Ok(MODES.into_iter().filter_map(picture).collect())
+}
