@@ -235,7 +235,7 @@ mod tests {
             ("{=str}", &[1, 0, 0, 0, 0xFF]),
             ("{}", &[1, 0]),
             ("{}", &[7, 0, 2]),
-            ("{=__internal_Display}", &[b'x']),
+            ("{=__internal_Display}", b"x"),
             ("{=0..3}", &[1]),
         ] {
             assert_eq!(text(format, bytes), None, "{format}");

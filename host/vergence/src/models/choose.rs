@@ -84,22 +84,6 @@ impl MatcherOptions {
                 )));
             }
         };
-        self.load(&store, name, console)
-    }
-
-    /// A learned matcher where a model is installed: the one named, or else the first.
-    ///
-    /// # Errors
-    /// Where the store cannot be read, or the model cannot be loaded.
-    pub fn learned(&self, console: Console) -> Result<Option<Box<dyn Matcher>>, Failure> {
-        let store = ModelStore::open(&self.store)?;
-        match self.matcher.clone().or(store.names()?.into_iter().next()) {
-            Some(name) => self.load(&store, &name, console).map(Some),
-            None => Ok(None),
-        }
-    }
-
-    fn load(&self, store: &ModelStore, name: &str, console: Console) -> Result<Box<dyn Matcher>, Failure> {
         let (runtime, why) = self.runtime.choose(&store.path(name))?;
         let model = load(&store.path(name), &runtime)?;
         console.say(format!("matching with {name} on {} ({why})", runtime.name()))?;

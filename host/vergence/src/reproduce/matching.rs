@@ -5,6 +5,7 @@ use std::path::Path;
 
 use image::{RgbImage, imageops};
 use nalgebra::UnitQuaternion;
+use vergence_matching::learned::LearnedMatcher;
 use vergence_matching::{GuidedMatcher, Matcher};
 use vergence_rig::{BENCH_TOML, Rig, RigPose};
 use vergence_scene::{Optics, Scene, View, render};
@@ -61,7 +62,7 @@ struct Sight {
 /// # Errors
 /// Where an image cannot be written.
 pub fn matchings(
-    learned: &Result<Box<dyn Matcher>, String>,
+    learned: &Result<LearnedMatcher, String>,
     python: &str,
     folder: &Path,
     seed: u64,
@@ -76,11 +77,9 @@ pub fn matchings(
         let guided: &dyn Matcher = &GuidedMatcher::default();
         matchings.push(Matching { mode, matcher: "classical".into(), outcome: sight.matched(guided, &rig, &scene) });
         matchings.push(match learned {
-            Ok(learned) => Matching {
-                mode,
-                matcher: learned.name().to_owned(),
-                outcome: sight.matched(learned.as_ref(), &rig, &scene),
-            },
+            Ok(learned) => {
+                Matching { mode, matcher: learned.name().to_owned(), outcome: sight.matched(learned, &rig, &scene) }
+            }
             Err(why) => Matching { mode, matcher: "learned".into(), outcome: Err(why.clone()) },
         });
         let outcome = sight.rectified(python, folder, &rig, &scene)?;
