@@ -10,8 +10,10 @@ mod elf_rig;
 
 use elf_rig::{BOTH, Board, Conversation, ElfBoard, LEASE_MS, Standing, decode, programs};
 use vergence_cpu::{Access, Bus};
+use vergence_image::layout::HARDWARE;
 use vergence_mcu::{FLASH_BASE, Halt, Picoseconds, RAM_BASE, ResetCause as Bite};
 use vergence_plant::{EncoderFault, bench_settings};
+use vergence_protocol::management::{ImageHeader, Management};
 use vergence_protocol::{
     AxisMask, ControllerState, FaultCode, Mode, MovePhase, Refusal, Report, Request, ResetCause, SettingItem,
     SettingKey, Status, StopKind,
@@ -86,6 +88,11 @@ fn a_hard_limit_cuts_the_drivers() {
     // One tick at 80 mm/s, and what the load then still creeps.
     assert!((80_000.0..80_200.0).contains(&talk.loads()[0]), "{:?}", talk.loads());
     assert_eq!(talk.clear(), Status::Refused(Refusal::CausePersists));
+    // What cannot be cleared must not keep out the firmware that can.
+    let header = ImageHeader { hardware: HARDWARE, version: [1, 0, 0], length: 1_000, ..ImageHeader::default() };
+    talk.host.manage(Management::Begin(header)).expect("the line takes it");
+    talk.wait_for(ControllerState::Updating);
+    assert_eq!(talk.fault().code, FaultCode::HardLimit);
 }
 
 #[test]

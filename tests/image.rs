@@ -70,6 +70,35 @@ fn an_elf_file_becomes_the_bytes_of_flash() {
 }
 
 #[test]
+fn the_version_is_the_applications_own() {
+    let workshop = Workshop::new();
+    let (mut without, out) = (application(), workshop.path("out.vimg"));
+    without.resize(without.len().next_multiple_of(4), 0);
+    // An ELF note: sizes of name and content, type, name, content.
+    let note = [&[4, 0, 0, 0, 4, 0, 0, 0, 1, 0, 0, 0][..], b"VGC\0", &[2, 5, 1, 0]].concat();
+    let with = [&without[..], &note].concat();
+    let [without, with, linked] =
+        [("without.bin", &without), ("with.bin", &with), ("with.elf", &elf(ARM, &[(START, &with)]))]
+            .map(|(name, content)| workshop.file(name, content));
+    let sign = |file: &str, more: &[&str]| {
+        let options =
+            ["image", "sign", file, "--key", "development", "--hardware", "nucleo-g474", "--out", &out, "--json"];
+        [&options[..], more].concat().into_iter().map(str::to_owned).collect::<Vec<_>>()
+    };
+    let made = |arguments: Vec<String>| run_json(&arguments.iter().map(String::as_str).collect::<Vec<_>>());
+    let refused = |arguments: Vec<String>, words: &[&str]| {
+        fails_with(&arguments.iter().map(String::as_str).collect::<Vec<_>>(), 2, words);
+    };
+    for file in [&with, &linked] {
+        assert_eq!(made(sign(file, &[]))["version"], "2.5.1");
+        assert_eq!(made(sign(file, &["--version", "2.5.1"]))["version"], "2.5.1");
+        refused(sign(file, &["--version", "2.6.0"]), &["it is version 2.5.1, not 2.6.0"]);
+    }
+    assert_eq!(made(sign(&without, &["--version", "1.0.0"]))["version"], "1.0.0");
+    refused(sign(&without, &[]), &["without.bin", "--version"]);
+}
+
+#[test]
 fn what_cannot_be_signed_is_told() {
     let workshop = Workshop::new();
     let (app, out) = (application(), workshop.path("out.vimg"));

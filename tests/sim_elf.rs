@@ -10,7 +10,8 @@
 mod build;
 mod common;
 
-use common::{Simulator, fails_with};
+use common::images::Workshop;
+use common::{Simulator, fails_with, run_json};
 use vergence_mcu::{Firmware, LogDecoder};
 
 #[test]
@@ -21,6 +22,30 @@ fn the_firmware_answers_at_a_pseudo_terminal() {
     println!("{status}");
     assert_eq!(status["board"], "nucleo-g474");
     assert_eq!(status["state"], "idle");
+}
+
+#[test]
+fn the_firmware_is_updated_through_its_boot_loader() {
+    let [application, boot_loader] =
+        ["vergence-nucleo-g474", "vergence-bootloader"].map(|package| build::build(package).display().to_string());
+    let workshop = Workshop::new();
+    let image = workshop.path("app.vimg");
+    let sign = ["image", "sign", &application, "--key", "development", "--hardware", "nucleo-g474", "--out", &image];
+    let made = run_json(&[&sign[..], &["--json"]].concat());
+    assert_eq!(made["version"], "0.1.0", "as the application itself says");
+    fails_with(&[&sign[..], &["--version", "0.2.0"]].concat(), 2, &["says that it is version 0.1.0, not 0.2.0"]);
+
+    // Another build of the same version.
+    let mut other = std::fs::read(&image).expect("an image").split_off(128);
+    let note = other.windows(4).position(|window| window == b"GNU\0").expect("a build id");
+    other[note + 4] ^= 0xFF;
+    let (other, made) = workshop.sign(&other, "development", "nucleo-g474", "0.1.0", "other.vimg");
+    let simulator = Simulator::start(&["--elf", &boot_loader, "--elf", &image]);
+    let said = simulator.json(&["flash", "--serial", &other]);
+    assert_eq!((&said["after"]["boot"], &said["after"]["build"]), (&"confirmed".into(), &made["build"]));
+    println!("sent in {} s", said["seconds"]);
+    let status = simulator.json(&["status"]);
+    assert_eq!((&status["reset"], &status["build"]), (&"Software".into(), &made["build"]));
 }
 
 #[test]

@@ -27,7 +27,7 @@ const ALLOWED: &[(&str, &[&str])] = &[
     ("vergence-cpu", &[]),
     ("vergence-mcu", &["vergence-cpu", "vergence-protocol", "vergence-control", "vergence-plant"]),
     ("vergence-plant", &["vergence-protocol", "vergence-control"]),
-    ("vergence-soak", &["vergence-protocol", "vergence-control", "vergence-plant"]),
+    ("vergence-soak", &["vergence-protocol", "vergence-control", "vergence-image", "vergence-mcu", "vergence-plant"]),
     (
         "vergence",
         &[

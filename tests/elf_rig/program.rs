@@ -13,12 +13,7 @@ const SECRET: [u8; 32] = [
 
 /// The application as it lies in flash, from [`ACTIVE`] on, and its seal.
 pub fn sealed(application: &Firmware) -> (Vec<u8>, Seal) {
-    let mut image = Vec::new();
-    for (address, bytes) in application.segments() {
-        let start = (address - FLASH_BASE - ACTIVE.start) as usize;
-        image.resize(image.len().max(start + bytes.len()), 0xFF);
-        image[start..start + bytes.len()].copy_from_slice(bytes);
-    }
+    let image = application.flat(FLASH_BASE + ACTIVE.start);
     let length = u32::try_from(image.len()).expect("a flash is small");
     assert!(length <= CAPACITY);
     let header = ImageHeader { hardware: HARDWARE, version: [0, 1, 0], length, build: 1, sha256: sha256(&image) };

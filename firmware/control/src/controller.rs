@@ -6,7 +6,7 @@
 //! Ready --MoveTo, Jog--> Moving --settled--> Ready      Moving --MoveTo--> Moving (another target)
 //! Moving, Homing --Stop--> Stopping --> Ready           Trial --confirm_trial--> Idle
 //! armed --lease expired--> LinkLost (brakes, latched)   any --fault--> Fault (latched)
-//! LinkLost, Fault --ClearFault--> Idle
+//! LinkLost, Fault --ClearFault--> Idle                  Boot, SelfTest, LinkLost, Fault, drivers off <--> Updating
 //! ```
 
 mod requests;
@@ -68,6 +68,8 @@ pub struct Controller {
     self_test: SelfTest,
     /// Whether the firmware is on trial.
     on_trial: bool,
+    /// Where an update that is given up leads back to.
+    before_update: ControllerState,
     /// When the next control tick is due.
     next_tick: Microseconds,
     active: ActiveMove,
@@ -107,6 +109,7 @@ impl Controller {
             homing: HomingSequence::default(),
             self_test: SelfTest::default(),
             on_trial: false,
+            before_update: ControllerState::Idle,
             next_tick: Microseconds(0),
             active,
             disarm_at_rest: false,
@@ -167,6 +170,12 @@ impl Controller {
     #[must_use]
     pub fn drivers_on(&self) -> bool {
         self.drivers_on
+    }
+
+    /// Whether a fault is latched.
+    #[must_use]
+    pub fn has_fault(&self) -> bool {
+        self.latch.record().is_some()
     }
 
     /// The oldest event not yet taken.

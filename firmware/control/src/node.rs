@@ -186,7 +186,8 @@ impl Node {
         let state = self.controller.state();
         if state != self.state {
             self.state = state;
-            if !matches!(state, ControllerState::LinkLost | ControllerState::Fault) {
+            // What led to a fault is kept until it is cleared.
+            if !self.controller.has_fault() {
                 self.recorder.release();
             }
             self.recorder.record(now, Happening::State(state));

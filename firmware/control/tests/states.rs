@@ -104,6 +104,57 @@ fn firmware_is_taken_only_while_disarmed_and_nothing_moves_meanwhile() {
 }
 
 #[test]
+fn a_fault_that_cannot_be_cleared_does_not_keep_firmware_out() {
+    let mut world = World::homed([linear(), rotary()]);
+    world.rig.emergency_stop = true;
+    world.wait(10 * TICK_US);
+    let fault = world.fault();
+    assert_eq!((fault.code, world.clear()), (FaultCode::EmergencyStop, Status::Refused(Refusal::CausePersists)));
+    assert_eq!(world.controller.begin_update(), Ok(()));
+    // The lease of whoever held the board ends.
+    world.alive = false;
+    world.wait(2_000_000);
+    world.alive = true;
+    assert_eq!((world.pose().state, world.pose().fault), (ControllerState::Updating, Some(fault)));
+    refuses_motion(&mut world, Refusal::Updating);
+    world.controller.end_update();
+    assert_eq!((world.pose().state, world.pose().fault), (ControllerState::Fault, Some(fault)));
+    assert_eq!(world.arm(), Status::Refused(Refusal::Latched));
+    world.rig.emergency_stop = false;
+    world.wait(30 * TICK_US);
+    assert_eq!((world.clear(), world.arm()), (Status::Accepted, Status::Accepted));
+}
+
+/// It was refused as if it were armed, and the host gave up.
+#[test]
+fn a_board_in_its_self_test_takes_firmware_and_goes_on_with_the_test() {
+    let mut world = fresh();
+    for ticks in [0, 3] {
+        world.wait(ticks * TICK_US);
+        let state = world.controller.state();
+        assert_eq!(world.controller.begin_update(), Ok(()), "{state}");
+        world.wait(50_000);
+        assert_eq!(world.controller.state(), ControllerState::Updating);
+        world.controller.end_update();
+        assert_eq!(world.controller.state(), state);
+    }
+    world.wait_for(ControllerState::Idle);
+}
+
+#[test]
+fn a_lost_link_takes_firmware_once_the_drivers_are_off() {
+    let mut world = World::homed([linear(), rotary()]);
+    world.alive = false;
+    world.wait_for(ControllerState::LinkLost);
+    world.wait(2_000_000);
+    assert_eq!(world.controller.begin_update(), Err(Refusal::NotIdle), "the motors are held");
+    assert_eq!(world.ask(HOST, &Request::Stop { kind: StopKind::TorqueOff }), Status::Accepted);
+    assert_eq!(world.controller.begin_update(), Ok(()));
+    world.controller.end_update();
+    assert_eq!(world.controller.state(), ControllerState::LinkLost);
+}
+
+#[test]
 fn a_firmware_on_trial_does_not_move_until_it_is_confirmed() {
     let mut world = fresh();
     world.controller.set_trial();

@@ -3,22 +3,29 @@
 //! Word 0 is the state; word 1, once written, makes the progress invalid; the words from 2 on are written one by one as
 //! pages are copied: two for each page of a swap, then two for each page of its undoing. A swap that is complete but
 //! whose state is not set to "booted" is undone at the next start.
+//!
+//! An erasure that power cuts may spare the state and take the progress: a complete swap would then look like one that
+//! has just begun, and be made once more over its own result. So whoever ends a state first makes its word mean nothing:
+//! zeros may be programmed over anything (RM0440, 3.3.7).
 
 use core::cell::RefCell;
 
-use embassy_boot_stm32::{BlockingFirmwareState, BootLoader, BootLoaderConfig, State};
+use embassy_boot_stm32::{BootLoader, BootLoaderConfig, State};
 use embassy_embedded_hal::flash::partition::BlockingPartition;
 use embassy_sync::blocking_mutex::Mutex;
 use embassy_sync::blocking_mutex::raw::NoopRawMutex;
-use embedded_storage::nor_flash::NorFlash;
+use embedded_storage::nor_flash::{ErrorType, NorFlash, ReadNorFlash};
 use vergence_control::FlashError;
 use vergence_image::layout::{ACTIVE, DFU, PAGE, Region, STATE, WORD};
 
 use crate::flash::FedFlash;
 
-/// A word of the state "swap", and one of progress.
-const SWAP: [u8; WORD as usize] = [0xF0; WORD as usize];
-const DONE: [u8; WORD as usize] = [0; WORD as usize];
+type Word = [u8; WORD as usize];
+
+/// Words of states as embassy-boot writes them, and one of progress, which as a state means nothing.
+const BOOTED: Word = [0xD0; WORD as usize];
+const SWAP: Word = [0xF0; WORD as usize];
+const DONE: Word = [0; WORD as usize];
 
 type Shared<'a> = Mutex<NoopRawMutex, RefCell<&'a mut FedFlash>>;
 type Part<'a> = BlockingPartition<'a, NoopRawMutex, &'a mut FedFlash>;
@@ -35,48 +42,85 @@ impl SwapState {
     /// Begins, goes on with or undoes a swap, if one is due. Returns how the state was found.
     pub fn carry_out(&mut self) -> State {
         let flash = Shared::new(RefCell::new(&mut self.0));
-        let config =
-            BootLoaderConfig { active: part(&flash, ACTIVE), dfu: part(&flash, DFU), state: part(&flash, STATE) };
+        let state = StatePage(part(&flash, STATE));
+        let config = BootLoaderConfig { active: part(&flash, ACTIVE), dfu: part(&flash, DFU), state };
         // It fails only where flash does; what is there may still be sound.
         BootLoader::try_prepare::<_, _, _, { PAGE as usize }>(config).map_or(State::Boot, |loader| loader.state)
     }
 
     /// The state.
     pub fn read(&mut self) -> State {
-        self.state(|state| state.get_state()).unwrap_or(State::Boot)
+        let mut word = DONE;
+        match self.0.read(STATE.start, &mut word) {
+            Ok(()) => State::from(word),
+            Err(_) => State::Boot,
+        }
     }
 
     /// The image in [`DFU`] is to be swapped in at the next start.
     pub fn mark_updated(&mut self) -> Result<(), FlashError> {
-        self.state(|state| state.mark_updated())
+        if self.read() == State::Swap { Ok(()) } else { self.enter(SWAP, 0) }
     }
 
     /// The image that runs is good.
     pub fn mark_booted(&mut self) -> Result<(), FlashError> {
-        self.state(|state| state.mark_booted())
+        self.enter(BOOTED, 0)
     }
 
     /// The last swap is to be undone at the next start, though it was found good: writes the state as it was right after
-    /// that swap. The state itself comes last, so that a cut leaves a state that means nothing.
+    /// that swap.
     pub fn mark_undone(&mut self) -> Result<(), FlashError> {
-        let words_of_swap = ACTIVE.length / PAGE * 2;
+        self.enter(SWAP, ACTIVE.length / PAGE * 2)
+    }
+
+    /// Ends the state and begins another, so many words into its progress. The new state comes last: until then there is
+    /// none.
+    fn enter(&mut self, state: Word, progress: u32) -> Result<(), FlashError> {
         let mut write = || {
+            self.0.write(STATE.start, &DONE)?;
             self.0.erase(STATE.start, STATE.end())?;
-            for word in 2..2 + words_of_swap {
+            for word in 2..2 + progress {
                 self.0.write(STATE.start + word * WORD, &DONE)?;
             }
-            self.0.write(STATE.start, &SWAP)
+            self.0.write(STATE.start, &state)
         };
         write().map_err(|_| FlashError)
     }
+}
 
-    fn state<R, E>(
-        &mut self,
-        act: impl FnOnce(&mut BlockingFirmwareState<'_, Part<'_>>) -> Result<R, E>,
-    ) -> Result<R, FlashError> {
-        let flash = Shared::new(RefCell::new(&mut self.0));
-        let mut word = [0; WORD as usize];
-        act(&mut BlockingFirmwareState::new(part(&flash, STATE), &mut word)).map_err(|_| FlashError)
+/// The state page for embassy-boot's own changes of state.
+struct StatePage<'a>(Part<'a>);
+
+impl ErrorType for StatePage<'_> {
+    type Error = <Part<'static> as ErrorType>::Error;
+}
+
+impl ReadNorFlash for StatePage<'_> {
+    const READ_SIZE: usize = <Part<'static> as ReadNorFlash>::READ_SIZE;
+
+    fn read(&mut self, offset: u32, bytes: &mut [u8]) -> Result<(), Self::Error> {
+        self.0.read(offset, bytes)
+    }
+
+    fn capacity(&self) -> usize {
+        self.0.capacity()
+    }
+}
+
+impl NorFlash for StatePage<'_> {
+    const WRITE_SIZE: usize = <Part<'static> as NorFlash>::WRITE_SIZE;
+    const ERASE_SIZE: usize = <Part<'static> as NorFlash>::ERASE_SIZE;
+
+    fn erase(&mut self, from: u32, to: u32) -> Result<(), Self::Error> {
+        self.0.erase(from, to)
+    }
+
+    fn write(&mut self, offset: u32, bytes: &[u8]) -> Result<(), Self::Error> {
+        // It ends a state by making its progress invalid.
+        if offset == WORD {
+            self.0.write(0, &DONE)?;
+        }
+        self.0.write(offset, bytes)
     }
 }
 

@@ -16,6 +16,7 @@ mod memory;
 mod rig;
 mod steps;
 mod trigger;
+mod version;
 mod watchdog;
 
 use board::Board;
@@ -38,7 +39,7 @@ async fn main(spawner: Spawner) {
     let identity = NodeIdentity {
         board: board::NAME.try_into().unwrap_or_default(),
         hardware: HARDWARE,
-        firmware: version(),
+        firmware: version::version(),
         oldest: OLDEST,
         build: memory::build_id(),
         uid: embassy_stm32::uid::uid(),
@@ -60,22 +61,4 @@ async fn main(spawner: Spawner) {
         spawner.spawn(transmit);
         spawner.spawn(watch);
     }
-}
-
-/// The package's version.
-const fn version() -> [u8; 3] {
-    [
-        part(env!("CARGO_PKG_VERSION_MAJOR")),
-        part(env!("CARGO_PKG_VERSION_MINOR")),
-        part(env!("CARGO_PKG_VERSION_PATCH")),
-    ]
-}
-
-const fn part(digits: &str) -> u8 {
-    let (mut value, mut rest) = (0, digits.as_bytes());
-    while let [digit, after @ ..] = rest {
-        value = value * 10 + (*digit - b'0');
-        rest = after;
-    }
-    value
 }

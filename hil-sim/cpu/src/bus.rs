@@ -31,6 +31,9 @@ pub type Lines = u128;
 /// The chip is event driven: [`next_event`](Self::next_event) says when something will happen by itself, and the core
 /// calls [`advance`](Self::advance) no later than that.
 pub trait Bus {
+    /// Whether reading memory may raise the non-maskable interrupt, so that the core must look after each load.
+    const READS_INTERRUPT: bool = false;
+
     /// Reads at `address`, aligned to the size of the access; the value is zero-extended.
     ///
     /// # Errors
@@ -54,7 +57,7 @@ pub trait Bus {
     fn code_version(&self) -> u64;
 
     /// Extra cycles a taken branch or a fetch costs because of flash wait states, at present.
-    fn wait_states(&self) -> u32;
+    fn wait_states(&self, now: Cycle) -> u32;
 
     /// Brings every peripheral to `now`.
     fn advance(&mut self, now: Cycle);

@@ -90,7 +90,7 @@ pub struct Cpu {
     pub(crate) horizon: Cycle,
     /// The instruction before was a load, so that the next one is pipelined with it.
     pub(crate) loaded: bool,
-    instructions: u64,
+    pub(crate) instructions: u64,
     asleep: Cycle,
     pub(crate) handlers: Option<Box<HandlerTimes>>,
     cache: Cache,

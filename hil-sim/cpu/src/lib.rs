@@ -21,6 +21,7 @@ mod nvic;
 mod operation;
 mod private;
 mod registers;
+mod state;
 mod system;
 mod systick;
 
@@ -28,3 +29,4 @@ pub use bus::{Access, Bus, BusFault, Cycle, Lines, NEVER};
 pub use cpu::{Cpu, Stop};
 pub use fault_status::FaultStatus;
 pub use handlers::HandlerTime;
+pub use state::CoreState;

@@ -101,11 +101,11 @@ impl<W: World> Chip<W> {
 
     /// How long the core waits for the bank that it has read from.
     #[cold]
-    fn wait_for_bank(&self) -> Option<u32> {
+    fn wait_for_bank(&self, now: Cycle) -> Option<u32> {
         self.stalls.set(false);
         let (_, until) = self.units.flash.busy()?;
         let free_at = self.clocks.base.cycle_at(until);
-        Some(u32::try_from(free_at.saturating_sub(self.now)).unwrap_or(u32::MAX))
+        Some(u32::try_from(free_at.saturating_sub(now)).unwrap_or(u32::MAX))
     }
 
     /// A read or fetch from a bank that is busy waits until it is free.
@@ -210,9 +210,9 @@ impl<W: World> Bus for Chip<W> {
     }
 
     #[inline]
-    fn wait_states(&self) -> u32 {
+    fn wait_states(&self, now: Cycle) -> u32 {
         if self.stalls.get()
-            && let Some(wait) = self.wait_for_bank()
+            && let Some(wait) = self.wait_for_bank(now)
         {
             return wait;
         }

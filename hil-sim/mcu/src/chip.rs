@@ -9,6 +9,7 @@ use crate::clocks::{Clocks, VoltageRange, check_core_clock};
 use crate::directory::Directory;
 use crate::memory::Memory;
 use crate::pads::Pads;
+use crate::pages::PageUse;
 use crate::peripheral::{Moment, Refused};
 use crate::rcc::ResetCause;
 use crate::schedule::{Due, Schedule};
@@ -69,6 +70,8 @@ pub struct Chip<W> {
     pub(crate) demand: Option<Demand>,
     /// Code was fetched from a bank of flash that is busy: the next branch waits for it.
     pub(crate) stalls: Cell<bool>,
+    /// Where somebody wants to know.
+    pub(crate) pages: Option<PageUse>,
     pub(crate) troubles: Vec<Trouble>,
     pub(crate) sent: Vec<Vec<SentByte>>,
     power_cycles: u64,
@@ -102,6 +105,7 @@ impl<W: World> Chip<W> {
             code_version: 0,
             demand: None,
             stalls: Cell::new(false),
+            pages: None,
             troubles: Vec::new(),
             sent: vec![Vec::new(); UartId::COUNT],
             power_cycles: 0,

@@ -1,5 +1,6 @@
 //! A firmware image as its ELF file tells it: what to load where, and what is where.
 
+use std::ops::Range;
 use std::sync::Arc;
 
 use object::read::elf::{ElfFile32, ProgramHeader};
@@ -38,6 +39,7 @@ struct Symbol {
 pub struct Firmware {
     segments: Vec<(u32, Vec<u8>)>,
     symbols: Arc<Vec<Symbol>>,
+    code: Vec<Range<u32>>,
 }
 
 impl Firmware {
@@ -59,18 +61,37 @@ impl Firmware {
                 segments.push((header.p_paddr(endian), data.to_vec()));
             }
         }
-        Ok(Self { segments, symbols: Arc::new(symbols(&file)) })
+        Ok(Self { segments, symbols: Arc::new(symbols(&file)), code: code(&file) })
     }
 
     /// A raw image at an address.
     #[must_use]
     pub fn from_image(address: u32, bytes: &[u8]) -> Self {
-        Self { segments: vec![(address, bytes.to_vec())], symbols: Arc::default() }
+        Self { segments: vec![(address, bytes.to_vec())], ..Self::default() }
     }
 
     /// What to load: physical addresses and bytes.
     pub fn segments(&self) -> impl Iterator<Item = (u32, &[u8])> {
         self.segments.iter().map(|(address, bytes)| (*address, bytes.as_slice()))
+    }
+
+    /// The bytes from `start` on, as flash holds them; what is loaded below `start` is left out.
+    #[must_use]
+    pub fn flat(&self, start: u32) -> Vec<u8> {
+        let mut flat = Vec::new();
+        for (address, bytes) in self.segments() {
+            let Some(from) = address.checked_sub(start).map(|from| from as usize) else { continue };
+            let length = flat.len().max(from + bytes.len());
+            flat.resize(length, 0xFF);
+            flat.splice(from..from + bytes.len(), bytes.iter().copied());
+        }
+        flat
+    }
+
+    /// Where code is, as the linker notes it beside the literals in between: in order, not overlapping.
+    #[must_use]
+    pub fn code(&self) -> &[Range<u32>] {
+        &self.code
     }
 
     /// The function or variable that `address` is in, and how far in, such as "control::tick+0x1c".
@@ -96,6 +117,21 @@ impl Firmware {
     pub fn address_of(&self, name: &str) -> Option<u32> {
         self.symbols.iter().find(|symbol| symbol.name == name).map(|symbol| symbol.address)
     }
+}
+
+/// From each mapping symbol "$t" to the next "$t" or "$d" (ELF for the Arm architecture, 5.5.5).
+fn code(file: &ElfFile32<Endianness>) -> Vec<Range<u32>> {
+    let mut marks: Vec<(u32, bool)> = file
+        .symbols()
+        .filter_map(|symbol| match symbol.name().ok()?.get(..2)? {
+            "$t" => Some((symbol.address() as u32 & !1, true)),
+            "$d" => Some((symbol.address() as u32, false)),
+            _ => None,
+        })
+        .collect();
+    marks.sort_unstable();
+    let pairs = marks.windows(2).filter(|pair| pair[0].1);
+    pairs.map(|pair| pair[0].0..pair[1].0).filter(|range| !range.is_empty()).collect()
 }
 
 fn symbols(file: &ElfFile32<Endianness>) -> Vec<Symbol> {

@@ -5,6 +5,7 @@ use std::collections::BTreeSet;
 use vergence_cpu::{Access, Cycle, Lines};
 
 use crate::clocks::Clocks;
+use crate::flash_cells::leave;
 use crate::memory::FLASH_SIZE;
 use crate::peripheral::{Moment, Peripheral, Registers, Reply, only};
 use crate::power_cut::{Damage, PowerCut};
@@ -93,7 +94,9 @@ impl FlashOperation {
         }
     }
 
-    fn range(self) -> std::ops::Range<usize> {
+    /// The bytes that it changes.
+    #[must_use]
+    pub fn range(self) -> std::ops::Range<usize> {
         match self {
             Self::ErasePage(offset) => offset as usize..offset as usize + PAGE,
             Self::EraseBank(bank) => usize::from(bank) * BANK..(usize::from(bank) + 1) * BANK,
@@ -127,6 +130,8 @@ pub(crate) struct Flash {
     half: Option<(u32, u32)>,
     /// Operations begun since power-on of the simulation.
     pub operations: u64,
+    /// Whether whoever runs the chip wants to know of each.
+    pub announces: bool,
     pub cut: Option<PowerCut>,
     pub changes: Vec<Change>,
     /// Double words, by index, that ECC cannot correct.
@@ -146,6 +151,7 @@ impl Flash {
             running: None,
             half: None,
             operations: 0,
+            announces: false,
             cut: None,
             changes: Vec::new(),
             torn: BTreeSet::new(),
@@ -160,6 +166,7 @@ impl Flash {
             torn: std::mem::take(&mut self.torn),
             optr: self.optr,
             operations: self.operations,
+            announces: self.announces,
             cut: self.cut,
             ..fresh
         };
@@ -167,6 +174,11 @@ impl Flash {
 
     pub fn wait_states(&self) -> u32 {
         self.acr & 0xF
+    }
+
+    /// What is being done.
+    pub fn running(&self) -> Option<FlashOperation> {
+        self.running.map(|(operation, _)| operation)
     }
 
     pub fn options(&self) -> u32 {
@@ -183,9 +195,9 @@ impl Flash {
         self.running.is_none() && self.torn.is_empty()
     }
 
-    /// Reading or writing flash may raise NMI or begin what ends in an interrupt: the core must look after each access.
+    /// Writing flash may begin what ends in an interrupt: the core must look after each access.
     pub fn is_touchy(&self) -> bool {
-        !self.torn.is_empty() || self.cr & PG != 0 && self.cr & (EOPIE | ERRIE) != 0
+        self.cr & PG != 0 && self.cr & (EOPIE | ERRIE) != 0
     }
 
     pub fn nmi(&self) -> bool {
@@ -361,25 +373,9 @@ impl Peripheral for Flash {
 impl Change {
     /// Carries the change out on the cells; returns whether power is gone.
     pub fn apply(self, cells: &mut [u8], torn: &mut BTreeSet<u32>) -> bool {
-        let (operation, damage) = match self {
-            Self::Done(operation) => (operation, Damage::Complete),
-            Self::Cut(operation, cut) => (operation, cut.damage),
-        };
-        let range = operation.range();
-        let words = range.start as u32 / 8..range.end as u32 / 8;
-        let Some(place) = cells.get_mut(range) else { return false };
-        match damage {
-            Damage::None => {}
-            Damage::Complete => {
-                match operation {
-                    FlashOperation::Program { value, .. } => place.copy_from_slice(&value.to_le_bytes()),
-                    _ => place.fill(0xFF),
-                }
-                words.for_each(|word| {
-                    torn.remove(&word);
-                });
-            }
-            Damage::Torn { seed } => crate::power_cut::tear(operation, place, words, torn, seed),
+        match self {
+            Self::Done(operation) => leave(operation, Damage::Complete, cells, torn),
+            Self::Cut(operation, cut) => leave(operation, cut.damage, cells, torn),
         }
         matches!(self, Self::Cut(..))
     }

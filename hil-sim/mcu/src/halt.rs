@@ -2,6 +2,7 @@
 
 use std::fmt;
 
+use crate::flash::FlashOperation;
 use crate::time::Picoseconds;
 use crate::trouble::Trouble;
 
@@ -40,6 +41,8 @@ pub enum Halt {
         /// Where.
         place: Place,
     },
+    /// The flash begins an operation.
+    FlashOperation(FlashOperation),
     /// Something that this version does not know.
     Other(String),
 }
@@ -75,6 +78,7 @@ impl fmt::Display for Halt {
             Self::Lockup { place } => write!(formatter, "lockup: a fault within a fault handler, {place}"),
             Self::Trouble { trouble, place } => write!(formatter, "{trouble}; {place}"),
             Self::PowerLost { place } => write!(formatter, "power was cut {place}"),
+            Self::FlashOperation(operation) => write!(formatter, "the flash begins {operation:?}"),
             Self::Other(what) => formatter.write_str(what),
         }
     }

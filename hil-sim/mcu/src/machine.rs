@@ -1,11 +1,12 @@
 //! Core and chip together: the board as its user sees it.
 
-use vergence_cpu::{Cpu, Stop};
+use vergence_cpu::{Cpu, Cycle, Stop};
 
 use crate::chip::{Chip, ChipConfig};
 use crate::firmware::{Firmware, FirmwareError};
 use crate::halt::{Halt, Place};
 use crate::memory::FLASH_BASE;
+use crate::pages::PageUse;
 use crate::rcc::ResetCause;
 use crate::time::Picoseconds;
 use crate::trouble::Demand;
@@ -18,15 +19,18 @@ pub struct Stops {
     pub breakpoints: bool,
     /// Lockup; otherwise time goes on, and the watchdog may bite.
     pub lockups: bool,
+    /// Operations of the flash, right after they began.
+    pub flash_operations: bool,
 }
 
 /// A board. Clone it for a snapshot.
 #[derive(Clone)]
 pub struct Machine<W> {
-    cpu: Cpu,
-    chip: Chip<W>,
+    pub(crate) cpu: Cpu,
+    pub(crate) chip: Chip<W>,
     firmware: Firmware,
     stops: Stops,
+    pub(crate) skips_waiting: bool,
     /// The last reset, and how many there were after power-on.
     reset: ResetCause,
     resets: u64,
@@ -43,6 +47,7 @@ impl<W: World> Machine<W> {
             chip: Chip::new(config, world),
             firmware: Firmware::default(),
             stops: Stops::default(),
+            skips_waiting: false,
             reset: ResetCause::PowerOn,
             resets: 0,
             lockup: None,
@@ -70,6 +75,33 @@ impl<W: World> Machine<W> {
     /// What it stops at.
     pub fn set_stops(&mut self, stops: Stops) {
         self.stops = stops;
+        self.announce_flash();
+    }
+
+    /// Lets loops in which the core only waits for the flash pass at once, by whole turns: the same instructions, the
+    /// same cycles, less work.
+    pub fn set_skips_waiting(&mut self, skips: bool) {
+        self.skips_waiting = skips;
+        self.announce_flash();
+    }
+
+    /// Remembers from now on which pages of flash decide what happens; to be asked for after power-on.
+    pub fn track_pages(&mut self) {
+        let pages = PageUse::default();
+        // A reset has read the first vectors.
+        pages.note(0);
+        self.chip.pages = Some(pages);
+    }
+
+    /// Pages of flash, by number, that were read, executed or programmed since [`Self::track_pages`] before they were
+    /// erased: with any contents of the others everything would have gone the same way. DMA is not looked at.
+    #[must_use]
+    pub fn pages_used(&self) -> Vec<usize> {
+        self.chip.pages.as_ref().map(PageUse::pages).unwrap_or_default()
+    }
+
+    fn announce_flash(&mut self) {
+        self.chip.units.flash.announces = self.skips_waiting || self.stops.flash_operations;
     }
 
     /// Power goes and comes again at once.
@@ -98,13 +130,21 @@ impl<W: World> Machine<W> {
             if self.cpu.now() >= end {
                 return Halt::Reached;
             }
-            // Memory accesses do not make the core look up, peripherals do: go one instruction at a time.
-            let slice = if self.chip.units.flash.is_touchy() { self.cpu.now() + 1 } else { end };
-            let stop = self.cpu.run(&mut self.chip, slice);
+            let stop = self.run_some(end);
             if let Some(halt) = self.handle(stop) {
                 return halt;
             }
         }
+    }
+
+    /// Runs to `end`, or to where there is something to look at before.
+    fn run_some(&mut self, end: Cycle) -> Stop {
+        if self.skips_waiting && self.chip.units.flash.running().is_some() {
+            return self.run_beside_flash(end);
+        }
+        // Memory accesses do not make the core look up, peripherals do: go one instruction at a time.
+        let end = if self.chip.units.flash.is_touchy() { self.cpu.now() + 1 } else { end };
+        self.run_core(end)
     }
 
     /// Runs for a while.
@@ -133,12 +173,16 @@ impl<W: World> Machine<W> {
     }
 
     fn handle_demand(&mut self) -> Option<Halt> {
-        let place = self.place();
         match self.chip.demand.take()? {
+            Demand::FlashBegins => {
+                let operation = self.chip.units.flash.running().filter(|_| self.stops.flash_operations);
+                return operation.map(Halt::FlashOperation);
+            }
             Demand::Watchdog => self.restart(ResetCause::Watchdog),
             Demand::OptionBytes => self.restart(ResetCause::OptionBytes),
-            Demand::Trouble(trouble) => return Some(Halt::Trouble { trouble, place }),
+            Demand::Trouble(trouble) => return Some(Halt::Trouble { trouble, place: self.place() }),
             Demand::PowerLost => {
+                let place = self.place();
                 self.power_on();
                 return Some(Halt::PowerLost { place });
             }

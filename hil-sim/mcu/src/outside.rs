@@ -3,6 +3,7 @@
 use crate::census::Touched;
 use crate::chip::Chip;
 use crate::clocks::ClockTree;
+use crate::flash_cells::FlashCells;
 use crate::pin::Pin;
 use crate::power_cut::PowerCut;
 use crate::time::Picoseconds;
@@ -106,6 +107,19 @@ impl<W: World> Chip<W> {
         self.units.flash.torn.retain(|word| !words.contains(word));
         self.code_version += 1;
         true
+    }
+
+    /// What would outlive the power now.
+    #[must_use]
+    pub fn flash_cells(&self) -> FlashCells {
+        FlashCells::new(&self.memory.flash, &self.units.flash.torn)
+    }
+
+    /// Puts in what outlived the power of another chip.
+    pub fn set_flash_cells(&mut self, cells: &FlashCells) {
+        self.memory.flash.copy_from_slice(cells.bytes());
+        self.units.flash.torn.clone_from(cells.torn());
+        self.code_version += 1;
     }
 
     /// Contents of the SRAMs, 128 KiB from `0x2000_0000`: SRAM1, SRAM2, CCM.

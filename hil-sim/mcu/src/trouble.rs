@@ -75,4 +75,6 @@ pub(crate) enum Demand {
     Watchdog,
     OptionBytes,
     PowerLost,
+    /// An operation of the flash begins.
+    FlashBegins,
 }

@@ -1,6 +1,7 @@
 //! What one peripheral does to the others: pins to interrupts and timers, timers to timers, bytes to the world.
 
 use crate::chip::Chip;
+use crate::flash::{Change, FlashOperation};
 use crate::gpio::Mode;
 use crate::peripheral::Moment;
 use crate::pin::{Drive, Pin, PinSet, Signal};
@@ -48,8 +49,13 @@ impl<W: World> Chip<W> {
         for change in std::mem::take(&mut self.units.flash.changes) {
             let lost = change.apply(&mut self.memory.flash, &mut self.units.flash.torn);
             self.code_version += 1;
+            if let (Change::Done(FlashOperation::ErasePage(offset)), Some(pages)) = (change, &mut self.pages) {
+                pages.erase(offset as usize);
+            }
             if lost {
                 self.ask(Demand::PowerLost);
+            } else if self.units.flash.announces {
+                self.ask(Demand::FlashBegins);
             }
         }
         if std::mem::take(&mut self.units.flash.reload_options) {

@@ -130,11 +130,11 @@ fn only_code_in_the_busy_bank_waits() {
     let mut bench = unlocked();
     program(&mut bench, BANK_2, 1);
     bench.chip.fetch(0x0800_0000).unwrap();
-    assert_eq!(bench.chip.wait_states(), 0, "bank 1 is free");
+    assert_eq!(bench.chip.wait_states(bench.now), 0, "bank 1 is free");
     bench.wait(308);
     bench.chip.fetch(BANK_2).unwrap();
-    assert_eq!(bench.chip.wait_states(), 1_000, "until bank 2 is free");
-    assert_eq!(bench.chip.wait_states(), 0, "it waits only once");
+    assert_eq!(bench.chip.wait_states(bench.now), 1_000, "until bank 2 is free");
+    assert_eq!(bench.chip.wait_states(bench.now), 0, "it waits only once");
 }
 
 #[test]

@@ -171,10 +171,10 @@ fn ram_survives_every_reset_but_power_on() {
 fn breakpoints_stop_only_on_request() {
     // Every exception runs the same code, so without a debugger the second breakpoint locks up.
     let mut machine = Program::default().emit(&[0xBE07, HANG]).machine();
-    machine.set_stops(Stops { breakpoints: true, lockups: false });
+    machine.set_stops(Stops { breakpoints: true, ..Stops::default() });
     let halt = machine.run_for(Picoseconds::milliseconds(1));
     assert!(matches!(halt, Halt::Breakpoint { number: 7, .. }), "{halt}");
-    machine.set_stops(Stops { breakpoints: false, lockups: true });
+    machine.set_stops(Stops { lockups: true, ..Stops::default() });
     let halt = machine.run_for(Picoseconds::milliseconds(1));
     assert!(matches!(halt, Halt::Lockup { .. }), "{halt}");
     machine.set_stops(Stops::default());
@@ -194,7 +194,7 @@ fn erasing(bank: u32) -> (Machine<Nothing>, u64) {
         // LDR R1, [R0]; LSRS R1, R1, #17; BCS to the load; BKPT
         .emit(&[0x6801, 0x0C49, 0xD2FC, 0xBE00])
         .machine();
-    machine.set_stops(Stops { breakpoints: true, lockups: false });
+    machine.set_stops(Stops { breakpoints: true, ..Stops::default() });
     let halt = machine.run_for(Picoseconds::milliseconds(50));
     assert!(matches!(halt, Halt::Breakpoint { .. }), "{halt}");
     let instructions = machine.cpu().instructions();
@@ -231,7 +231,7 @@ fn program(machine: &mut Machine<Nothing>, address: u32) {
 #[test]
 fn a_power_cut_restarts_the_board_with_a_torn_word_that_raises_nmi_at_its_read() {
     let mut machine = Program::default().load(0, 0x0804_0000).emit(&[0x6801, 0xBE01, HANG]).machine();
-    machine.set_stops(Stops { breakpoints: true, lockups: false });
+    machine.set_stops(Stops { breakpoints: true, ..Stops::default() });
     assert!(matches!(machine.run_for(Picoseconds::milliseconds(1)), Halt::Breakpoint { number: 1, .. }));
     machine.chip_mut().set_power_cut(Some(PowerCut { operation: 1, damage: Damage::Torn { seed: 3 } }));
     program(&mut machine, 0x0804_0000);

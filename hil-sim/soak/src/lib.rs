@@ -25,6 +25,7 @@ mod host;
 mod injector;
 mod journal;
 mod line;
+pub mod power_cuts;
 mod promise;
 mod scenario;
 mod simulation;

@@ -18,6 +18,7 @@ mod corners;
 pub mod dense;
 pub mod failure;
 mod firmware;
+pub mod flashing;
 pub mod link;
 pub mod live;
 pub mod look;

@@ -6,25 +6,30 @@ use super::Controller;
 use crate::self_test::SelfTest;
 
 impl Controller {
-    /// A firmware image is about to be taken: nothing moves until [`Self::end_update`].
+    /// A firmware image is about to be taken: nothing moves until [`Self::end_update`]. A latched fault stays latched and
+    /// reported: one that cannot be cleared must not keep out the firmware that can.
     ///
     /// # Errors
-    /// [`Refusal::NotIdle`] unless disarmed without fault, [`Refusal::Updating`] while an image is taken or on trial.
+    /// [`Refusal::NotIdle`] while the drivers are on; [`Refusal::Updating`] while an image is taken or on trial.
     pub fn begin_update(&mut self) -> Result<(), Refusal> {
-        match self.state {
-            ControllerState::Idle => {
-                self.state = ControllerState::Updating;
-                Ok(())
-            }
-            ControllerState::Updating | ControllerState::Trial => Err(Refusal::Updating),
-            _ => Err(Refusal::NotIdle),
+        if self.on_trial || self.state == ControllerState::Updating {
+            return Err(Refusal::Updating);
         }
+        // In its first ticks, too, a board may be told.
+        if self.drivers_on {
+            return Err(Refusal::NotIdle);
+        }
+        // A lease that ends meanwhile concerns nobody.
+        self.holder = None;
+        self.before_update = self.state;
+        self.state = ControllerState::Updating;
+        Ok(())
     }
 
     /// The image was given up; one that was taken ends in a restart instead.
     pub fn end_update(&mut self) {
         if self.state == ControllerState::Updating {
-            self.state = ControllerState::Idle;
+            self.state = self.before_update;
         }
     }
 

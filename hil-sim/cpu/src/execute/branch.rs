@@ -19,7 +19,7 @@ impl Cpu {
     #[inline(always)]
     pub(super) fn branch_to<B: Bus>(&mut self, bus: &B, target: u32) {
         self.pc = target & !1;
-        self.now = self.now.wrapping_add(REFILL + u64::from(bus.wait_states()));
+        self.now = self.now.wrapping_add(REFILL + u64::from(bus.wait_states(self.now)));
     }
 
     /// BXWritePC() (A2.3.1): an even target faults where it lands.
@@ -86,7 +86,7 @@ impl Cpu {
 
     /// Everything is already in order; a barrier only lets what is pending in.
     pub(super) fn barrier<B: Bus>(&mut self, bus: &B) {
-        self.now += REFILL + u64::from(bus.wait_states());
+        self.now += REFILL + u64::from(bus.wait_states(self.now));
         self.horizon = 0;
     }
 }

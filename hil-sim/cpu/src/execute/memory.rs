@@ -50,7 +50,12 @@ impl Cpu {
             return self.load_device(bus, address, access);
         }
         match bus.read(self.now, address, access) {
-            Ok(value) => Ok(value),
+            Ok(value) => {
+                if B::READS_INTERRUPT && bus.nmi() {
+                    self.horizon = 0;
+                }
+                Ok(value)
+            }
             Err(_) => self.data_fault(address).map(|()| 0),
         }
     }

@@ -148,7 +148,7 @@ impl Bus for Board {
         0
     }
 
-    fn wait_states(&self) -> u32 {
+    fn wait_states(&self, _now: Cycle) -> u32 {
         self.wait_states
     }
 

@@ -10,6 +10,7 @@ use std::path::PathBuf;
 use serde_json::{Value, json};
 use vergence_protocol::management::{Identity, Management, Outcome, RebootTo};
 
+pub use self::serial::update;
 use super::connect::port;
 use crate::cli::Globals;
 use crate::console::Console;
@@ -53,7 +54,7 @@ pub async fn run(args: &Args, globals: &Globals, console: Console) -> Result<(),
     let image = args.serial.as_deref().map(crate::firmware::OwnedImage::read).transpose()?;
     let mut link = connect(globals).await?;
     if let Some(image) = image {
-        return serial::run(&image, !args.no_confirm, &mut link, console).await;
+        return console.result(&update(&image, !args.no_confirm, &mut link, console).await?);
     }
     let before = link.identify().await.map_err(|error| link_failure(&error))?;
     let after = if args.rollback {

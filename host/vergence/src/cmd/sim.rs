@@ -33,7 +33,8 @@ pub struct Args {
     /// plays the board's part of an update; what runs is always itself, under the name of the image.
     #[arg(long, value_name = "FILE.pub", default_value = DEVELOPMENT)]
     trust: PathBuf,
-    /// Run this program on a simulated STM32G474; give the boot loader too, before it, for a start through it.
+    /// Run this program on a simulated STM32G474: an ELF file, or a signed image. For a start through the boot loader, and
+    /// for updates, give the boot loader's ELF file, and then a signed image.
     #[arg(long, value_name = "FIRMWARE")]
     elf: Vec<PathBuf>,
     /// Write what all wired pins did to this file when the simulation ends (value change dump, some megabytes for each

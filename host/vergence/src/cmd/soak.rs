@@ -1,5 +1,7 @@
 //! `vergence soak`: fault injection over the whole stack in virtual time.
 
+mod power_cuts;
+
 use std::sync::atomic::{AtomicU64, Ordering};
 
 use serde_json::{Map, Value, json};
@@ -28,9 +30,14 @@ pub struct Args {
     /// Play the scenario of this seed alone and tell what happens in it.
     #[arg(long, value_name = "SEED", conflicts_with_all = ["scenarios", "seed"])]
     only: Option<u64>,
+    #[command(flatten)]
+    power: power_cuts::Options,
 }
 
 pub fn run(args: &Args, console: Console) -> Result<(), Failure> {
+    if let Some(cuts) = args.power.cuts() {
+        return power_cuts::run(&args.power, cuts, console);
+    }
     match args.only {
         Some(seed) => replay(seed, console),
         None => many(args, console),

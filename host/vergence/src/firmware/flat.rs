@@ -3,6 +3,7 @@
 use object::read::elf::{ElfFile32, ProgramHeader};
 use object::{Architecture, Endianness, Object, elf};
 use vergence_image::layout::{ACTIVE, CAPACITY, FLASH_BASE, RAM};
+use vergence_image::notes::build_at;
 use vergence_image::sha256;
 
 use super::hardware::Hardware;
@@ -11,9 +12,6 @@ use super::hardware::Hardware;
 const START: u64 = (FLASH_BASE + ACTIVE.start) as u64;
 /// What flash holds where nothing was written.
 const ERASED: u8 = 0xFF;
-/// The head of an ELF note with a build id of 20 bytes: sizes of name and id, type, name.
-const BUILD_NOTE: [u8; 16] = [4, 0, 0, 0, 20, 0, 0, 0, 3, 0, 0, 0, b'G', b'N', b'U', 0];
-
 /// Whether a file is an ELF file.
 #[must_use]
 pub fn is_elf(file: &[u8]) -> bool {
@@ -40,8 +38,7 @@ pub fn flatten(file: &[u8], hardware: Hardware) -> Result<Vec<u8>, String> {
 /// Which build: the first eight bytes of the linker's build id, as the application itself reads it, or else of the digest.
 #[must_use]
 pub fn build_of(image: &[u8]) -> u64 {
-    let note = image.windows(BUILD_NOTE.len() + 8).step_by(4).find(|window| window.starts_with(&BUILD_NOTE));
-    let id = note.and_then(|note| note.last_chunk().copied());
+    let id = build_at(image).and_then(|at| image.get(at..)?.first_chunk().copied());
     let digest = sha256(image);
     u64::from_be_bytes(id.or_else(|| digest.first_chunk().copied()).unwrap_or_default())
 }

@@ -23,10 +23,24 @@ const UPDATE_PATIENCE: Duration = Duration::from_secs(12);
 /// How often a port that went away is tried.
 const REOPEN: Duration = Duration::from_millis(250);
 
+/// Where a wire comes from, each time anew.
+enum Door {
+    Port(Port, u32),
+    InProcess(Box<dyn FnMut() -> OpenWire + Send>),
+}
+
+impl Door {
+    async fn open(&mut self) -> Result<OpenWire, Failure> {
+        match self {
+            Self::Port(port, baud) => open(port, *baud, false).await,
+            Self::InProcess(wire) => Ok(wire()),
+        }
+    }
+}
+
 /// A link for management requests.
 pub struct ManagementLink {
-    port: Port,
-    baud: u32,
+    door: Door,
     wire: OpenWire,
     session: HostSession,
     clock: HostClock,
@@ -38,8 +52,20 @@ impl ManagementLink {
     /// # Errors
     /// A port that cannot be opened.
     pub async fn open(port: Port, baud: u32) -> Result<Self, Failure> {
-        let wire = open(&port, baud, false).await?;
-        Ok(Self { port, baud, wire, session: HostSession::new(fresh_session()?), clock: HostClock::start() })
+        Self::through(Door::Port(port, baud)).await
+    }
+
+    /// A link to a board in this process; `wire` gives another wire when one has ended.
+    ///
+    /// # Errors
+    /// Where the system gives no random numbers.
+    pub async fn in_process(wire: impl FnMut() -> OpenWire + Send + 'static) -> Result<Self, Failure> {
+        Self::through(Door::InProcess(Box::new(wire))).await
+    }
+
+    async fn through(mut door: Door) -> Result<Self, Failure> {
+        let wire = door.open().await?;
+        Ok(Self { door, wire, session: HostSession::new(fresh_session()?), clock: HostClock::start() })
     }
 
     /// Who is there.
@@ -112,7 +138,7 @@ impl ManagementLink {
         self.session = HostSession::new(fresh_session()?);
         let deadline = tokio::time::Instant::now() + patience;
         loop {
-            match open(&self.port, self.baud, false).await {
+            match self.door.open().await {
                 Ok(wire) => {
                     self.wire = wire;
                     return Ok(());

@@ -4,6 +4,8 @@ use std::path::Path;
 
 use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64Mcg;
+use vergence_image::ImageFile;
+use vergence_image::layout::{ACTIVE, CAPACITY};
 use vergence_mcu::{
     Bench, BenchWiring, ChipConfig, FLASH_BASE, Firmware, Frame, Halt, LineFault, Machine, Picoseconds, Pin, UartId,
 };
@@ -34,8 +36,9 @@ pub struct SimulatedChip {
 }
 
 impl SimulatedChip {
-    /// Gives power to a board with these programs in flash; symbols in messages are those of the last one. Where no
-    /// program is at the start of flash, the last one starts without boot loader. `seed` decides where the stages stand.
+    /// Gives power to a board with these programs in flash, each an ELF file or a signed image; symbols in messages are
+    /// those of the last ELF file. Where no program is at the start of flash, the last one starts without boot loader.
+    /// `seed` decides where the stages stand.
     ///
     /// # Errors
     /// A file that is no program for this chip, or a rig with other axes than the board drives.
@@ -46,13 +49,13 @@ impl SimulatedChip {
         }
         let bench = Bench::new(wiring.clone(), plant(rig, seed));
         let mut machine = Machine::new(ChipConfig::default(), bench);
+        // Swaps and updates wait for the flash most of their time.
+        machine.set_skips_waiting(true);
+        let mut last = None;
         for path in programs {
-            let path = path.as_ref();
-            let bytes = std::fs::read(path).map_err(|error| Failure::input(path, error))?;
-            let firmware = Firmware::from_elf(&bytes).map_err(|error| Failure::input(path, error))?;
-            machine.load(firmware).map_err(|error| Failure::input(path, error))?;
+            last = load(&mut machine, path.as_ref())?;
         }
-        start_without_boot_loader(&mut machine);
+        start(&mut machine, last);
         Ok(Self { machine, wiring, pace: Pace::begin(), baud: BAUD, output: Vec::new(), halt: None })
     }
 
@@ -137,12 +140,29 @@ fn plant(rig: &Rig, seed: u64) -> Plant {
     Plant::new(&mechanics, &positions)
 }
 
+/// Puts a program into flash; returns the offset at which it begins.
+fn load(machine: &mut Machine<Bench>, path: &Path) -> Result<Option<usize>, Failure> {
+    let bytes = std::fs::read(path).map_err(|error| Failure::input(path, error))?;
+    if let Ok(ImageFile { seal, image }) = ImageFile::read(&bytes) {
+        let start = ACTIVE.start as usize;
+        let chip = machine.chip_mut();
+        let fits = image.len() <= CAPACITY as usize
+            && chip.load_flash(start, image)
+            && chip.load_flash(start + CAPACITY as usize, &seal.to_bytes());
+        return if fits { Ok(Some(start)) } else { Err(Failure::input(path, "this image does not fit into flash")) };
+    }
+    let firmware = Firmware::from_elf(&bytes).map_err(|error| Failure::input(path, error))?;
+    let first = firmware.segments().map(|(address, _)| address).min();
+    machine.load(firmware).map_err(|error| Failure::input(path, error))?;
+    Ok(first.map(|address| (address - FLASH_BASE) as usize))
+}
+
 /// The chip looks for its first vectors at the start of flash: where nothing is there, it finds those of the program.
-fn start_without_boot_loader(machine: &mut Machine<Bench>) {
+fn start(machine: &mut Machine<Bench>, program: Option<usize>) {
     let erased = machine.chip().flash().iter().take(ENTRY).all(|&byte| byte == 0xFF);
-    let first = machine.firmware().segments().map(|(address, _)| address).min();
-    let Some(start) = first.filter(|_| erased).map(|address| (address - FLASH_BASE) as usize) else { return };
-    let entry = machine.chip().flash().get(start..start + ENTRY).unwrap_or_default().to_vec();
-    machine.chip_mut().load_flash(0, &entry);
+    if let Some(start) = program.filter(|_| erased) {
+        let entry = machine.chip().flash().get(start..start + ENTRY).unwrap_or_default().to_vec();
+        machine.chip_mut().load_flash(0, &entry);
+    }
     machine.power_on();
 }

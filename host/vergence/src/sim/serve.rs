@@ -13,7 +13,6 @@ use tokio::net::TcpListener;
 use tokio::time::{MissedTickBehavior, interval};
 use tokio_serial::SerialStream;
 
-use super::rig::SharedRig;
 use super::served::{Served, Shared};
 use crate::failure::Failure;
 
@@ -105,11 +104,11 @@ pub async fn serve<B: Served>(board: Shared<B>, listener: Listener) -> Result<()
 
 /// Starts the board inside this process and returns the host's end of its wire.
 #[must_use]
-pub fn spawn_in_process(rig: SharedRig) -> DuplexStream {
+pub fn spawn_in_process<B: Served + Send + 'static>(board: Shared<B>) -> DuplexStream {
     let (host_end, mut board_end) = tokio::io::duplex(1 << 16);
     tokio::spawn(async move {
         // Ends when the host drops its end.
-        let _ = run_board(&rig, &mut board_end).await;
+        let _ = run_board(&board, &mut board_end).await;
     });
     host_end
 }

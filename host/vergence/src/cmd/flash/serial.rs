@@ -4,7 +4,7 @@ use std::cell::Cell;
 use std::time::Duration;
 
 use indicatif::ProgressBar;
-use serde_json::json;
+use serde_json::{Value, json};
 use vergence_protocol::management::{BootState, Identity, ImageHeader, Management};
 use vergence_protocol::update::{Upload, UploadState};
 
@@ -31,12 +31,16 @@ struct Sent {
     seconds: f64,
 }
 
-pub async fn run(
+/// Sends an image, starts it, and where asked for confirms it; returns what there is to tell.
+///
+/// # Errors
+/// What the board refuses, a link that does not come back, an image that does not start.
+pub async fn update(
     image: &OwnedImage,
     confirm: bool,
     link: &mut ManagementLink,
     console: Console,
-) -> Result<(), Failure> {
+) -> Result<Value, Failure> {
     let before = link.identify().await.map_err(|error| link_failure(&error))?;
     accept(image.header(), &before)?;
     tell(&before, console)?;
@@ -53,7 +57,7 @@ pub async fn run(
     if !confirm {
         console.say("keep it with 'vergence flash --confirm'; the next start goes back otherwise")?;
     }
-    console.result(&json!({
+    Ok(json!({
         "image": header_json(image.header()),
         "before": identity_json(&before),
         "after": identity_json(&after),

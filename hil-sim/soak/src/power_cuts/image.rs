@@ -1,0 +1,73 @@
+//! What lies in flash before an update, and what is sent.
+
+use vergence_image::layout::{ACTIVE, CAPACITY, FLASH_BASE, HARDWARE};
+use vergence_image::notes::build_at;
+use vergence_image::{Seal, sha256};
+use vergence_mcu::{Firmware, FlashCells};
+use vergence_protocol::management::ImageHeader;
+
+/// An application and its seal.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct SignedImage {
+    /// Header and signature.
+    pub seal: Seal,
+    /// The bytes for flash.
+    pub bytes: Vec<u8>,
+}
+
+impl SignedImage {
+    /// Seals the bytes of an application.
+    #[must_use]
+    pub fn new(bytes: Vec<u8>, version: [u8; 3], seal: impl Fn(ImageHeader) -> Seal) -> Self {
+        let length = u32::try_from(bytes.len()).unwrap_or(u32::MAX);
+        let build = build_at(&bytes).and_then(|at| bytes.get(at..)?.first_chunk().copied());
+        let build = u64::from_be_bytes(build.unwrap_or_default());
+        let header = ImageHeader { hardware: HARDWARE, version, length, build, sha256: sha256(&bytes) };
+        Self { seal: seal(header), bytes }
+    }
+
+    /// Puts it where the boot loader starts it, as a debug probe would.
+    pub fn install(&self, cells: &mut FlashCells) -> bool {
+        let start = ACTIVE.start as usize;
+        cells.load(start, &self.bytes) && cells.load(start + CAPACITY as usize, &self.seal.to_bytes())
+    }
+
+    /// Whether the boot loader would start it from these cells.
+    #[must_use]
+    pub fn is_installed(&self, cells: &FlashCells) -> bool {
+        let start = ACTIVE.start as usize;
+        let seal_at = start + CAPACITY as usize;
+        let holds = |at: usize, bytes: &[u8]| cells.bytes().get(at..at + bytes.len()) == Some(bytes);
+        let torn = |word: &u32| (start..seal_at + 128).contains(&(*word as usize * 8));
+        holds(start, &self.bytes) && holds(seal_at, &self.seal.to_bytes()) && !cells.torn().iter().any(torn)
+    }
+}
+
+/// The same program in other words: where an instruction adds two registers, they change places, so that most pages
+/// differ and everything goes on as before; and another build id. A swap that mixes up pages cannot hide behind this.
+#[must_use]
+pub fn twin(application: &Firmware) -> Vec<u8> {
+    let start = FLASH_BASE + ACTIVE.start;
+    let mut flat = application.flat(start);
+    for range in application.code() {
+        let mut at = range.start.wrapping_sub(start) as usize;
+        let end = range.end.wrapping_sub(start) as usize;
+        while at + 2 <= end {
+            let Some(half) = flat.get_mut(at..at + 2) else { break };
+            let code = u16::from_le_bytes([half[0], half[1]]);
+            half.copy_from_slice(&swapped(code).to_le_bytes());
+            // Encodings of 32 bits begin so (ARM DDI 0403E, A5.1).
+            at += if code >> 11 >= 0b11101 { 4 } else { 2 };
+        }
+    }
+    if let Some(id) = build_at(&flat).and_then(|at| flat.get_mut(at..at + 8)) {
+        id.iter_mut().for_each(|byte| *byte = !*byte);
+    }
+    flat
+}
+
+/// ADD (register) T1 and the loads and stores with a register offset T1 add Rn and Rm (A7.7.4, A7.7.45 and others).
+const fn swapped(code: u16) -> u16 {
+    let (m, n) = (code >> 6 & 7, code >> 3 & 7);
+    if code & 0xFE00 == 0x1800 || code & 0xF000 == 0x5000 { code & 0xFE07 | n << 6 | m << 3 } else { code }
+}
