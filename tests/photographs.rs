@@ -163,7 +163,7 @@ fn dense_ranges_of_a_real_pair_hold_the_board() {
     });
     let alike = alike.count();
     println!("{result}; {alike} of {} corners alike", corners.len());
-    assert!(result["measured_share"].as_f64().is_some_and(|share| share > 0.3), "{result}");
+    assert!(result["measured_share"].as_f64().is_some_and(|share| share > 0.2), "{result}");
     assert!(
         alike * 10 >= corners.len() * 9,
         "{alike} of {} corners lie where the dense ranges have them",
