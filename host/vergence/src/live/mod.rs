@@ -1,9 +1,9 @@
 //! The live loop: cameras that deliver when they like, a board that tells where the axes were, and a cloud of the newest pair
 //! whenever the matcher is free.
 //!
-//! [`Eyes`] are the cameras; [`Exposures`] finds which of their frames belong together and when they were exposed; [`measure`]
-//! turns that into a [`Measured`]; [`LiveLoop`] keeps them going. Nothing queues: what the matcher has no time for is counted
-//! and dropped, and no cloud holds anything of another.
+//! What the cameras deliver arrives as [`Heard`]; [`Exposures`] finds which of their frames belong together and when they
+//! were exposed; [`measure()`] turns that into a [`Measured`]; [`LiveLoop`] keeps them going. Nothing queues: what the matcher
+//! has no time for is counted and dropped, and no cloud holds anything of another.
 
 mod attached;
 mod exposures;
