@@ -3,8 +3,7 @@
 //! `calib-targets-chessboard` searches for corners and labels a patch of them (`search`). From there on:
 //!
 //! 1. each corner is refined to a fraction of a pixel and must look like one (`refine`, `saddle`);
-//! 2. the patch grows by predicting its missing neighbours and looking there (`grow`, `predict`), after which each corner is
-//!    refined once more, now that its neighbours tell how the edges through it bend;
+//! 2. the patch grows by predicting its missing neighbours and looking there (`grow`, `predict`);
 //! 3. corners that disagree with a smooth board are flagged (`blunders`);
 //! 4. the patch is placed on the board: which corner is the first (`placement`).
 
@@ -126,12 +125,11 @@ pub fn detect(image: &GrayImage, board: &BoardSpec, hint: Option<&KannalaBrandt>
     let intensity = Intensity::new(image);
     let mut lattice = search::labelled_patch(image);
     saddle::keep_corners(&mut lattice, &intensity, hint);
-    refine::refine_all(&mut lattice, &intensity, None);
+    refine::refine_all(&mut lattice, &intensity);
     grow::grow(&mut lattice, &intensity, hint, [columns, rows]);
     if lattice.len() < FEWEST_CORNERS {
         return Err(DetectError::NoBoard { found: lattice.len() });
     }
-    refine::refine_all(&mut lattice, &intensity, hint);
     blunders::flag(&mut lattice, hint);
     let (turned, placement) = placement::place(&lattice, &intensity, hint, [columns, rows])?;
     Ok(Detection::new(&turned, placement, board))

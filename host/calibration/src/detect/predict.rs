@@ -13,8 +13,6 @@ pub struct Prediction {
     pub position: Vector2<f64>,
     /// Pixels per step along the lattice's two axes.
     pub steps: [Vector2<f64>; 2],
-    /// Pixels per square of a step along the first axis, per product of steps, and per square along the second axis.
-    pub bends: [Vector2<f64>; 3],
     /// Variance of the prediction in units of one corner's variance.
     pub variance: f64,
 }
@@ -84,20 +82,18 @@ fn solved(normal: OMatrix<f64, U6, U6>, moments: SMatrix<f64, 6, 2>) -> Option<P
     // A set of corners that leaves a term open (all on one conic) shows as a huge variance.
     const LARGEST_VARIANCE: f64 = 1e3;
     let variance = *inverse.get((0, 0))?;
-    (variance < LARGEST_VARIANCE).then(|| prediction(&(inverse * moments), variance))
+    (variance < LARGEST_VARIANCE).then(|| prediction(&(inverse * moments).fixed_rows::<3>(0).into_owned(), variance))
 }
 
 /// The solution with constant and linear terms only.
 fn linear(normal: &OMatrix<f64, U6, U6>, moments: &SMatrix<f64, 6, 2>) -> Option<Prediction> {
     let inverse = normal.fixed_view::<3, 3>(0, 0).into_owned().cholesky()?.inverse();
-    let mut terms = SMatrix::<f64, 6, 2>::zeros();
-    terms.fixed_rows_mut::<3>(0).copy_from(&(inverse * moments.fixed_rows::<3>(0)));
-    Some(prediction(&terms, *inverse.get((0, 0))?))
+    Some(prediction(&(inverse * moments.fixed_rows::<3>(0)), *inverse.get((0, 0))?))
 }
 
-fn prediction(terms: &SMatrix<f64, 6, 2>, variance: f64) -> Prediction {
-    let term = |i: usize| terms.row(i).transpose();
-    Prediction { position: term(0), steps: [term(1), term(2)], bends: [term(3), term(4), term(5)], variance }
+fn prediction(terms: &SMatrix<f64, 3, 2>, variance: f64) -> Prediction {
+    let [position, along, across] = [0, 1, 2].map(|i| terms.row(i).transpose());
+    Prediction { position, steps: [along, across], variance }
 }
 
 /// Corners near `node` that are not known to be wrong.
@@ -153,52 +149,45 @@ impl<'a> BoardPlane<'a> {
         const PART_OF_CELL: f64 = 0.1;
         let (mut squares, mut areas) = (0.0, 0.0);
         for (&node, found) in lattice.iter().filter(|(_, found)| found.quality != CornerQuality::Blunder) {
-            let Some((position, steps, _)) = self.project(node) else { return false };
+            let Some((position, steps)) = self.project(node) else { return false };
             squares += (position - found.position).norm_squared();
             areas += steps[0].perp(&steps[1]).abs();
         }
         squares < PART_OF_CELL * PART_OF_CELL * areas
     }
 
-    /// The node's projection, steps and bends, all without regard to what was seen near it.
-    fn project(&self, node: Node) -> Option<(Vector2<f64>, [Vector2<f64>; 2], [Vector2<f64>; 3])> {
+    /// The node's projection and steps, both without regard to what was seen near it.
+    fn project(&self, node: Node) -> Option<(Vector2<f64>, [Vector2<f64>; 2])> {
         const HALF: f64 = 0.5;
         let at = |di: f64, dj: f64| {
             let ray = UnitRay::<Camera>::new(self.ray_from_node * (homogeneous(node) + Vector3::new(di, dj, 0.0)))?;
             let pixel = self.camera.project(&ray).ok()?;
             Some(Vector2::new(pixel.u, pixel.v))
         };
-        let here = at(0.0, 0.0)?;
         // One-sided where the field ends within half a cell.
-        let step = |di: f64, dj: f64| match (at(di, dj), at(-di, -dj)) {
-            (Some(ahead), Some(behind)) => Some((ahead - behind, (ahead - 2.0 * here + behind) * 2.0)),
-            (Some(ahead), None) => Some(((ahead - here) * 2.0, Vector2::zeros())),
-            (None, Some(behind)) => Some(((here - behind) * 2.0, Vector2::zeros())),
-            (None, None) => None,
+        let step = |di: f64, dj: f64| match (at(di, dj), at(-di, -dj), at(0.0, 0.0)) {
+            (Some(ahead), Some(behind), _) => Some(ahead - behind),
+            (Some(ahead), None, Some(here)) => Some((ahead - here) * 2.0),
+            (None, Some(behind), Some(here)) => Some((here - behind) * 2.0),
+            _ => None,
         };
-        let ((along, along_bend), (across, across_bend)) = (step(HALF, 0.0)?, step(0.0, HALF)?);
-        let diagonals = [at(HALF, HALF), at(-HALF, -HALF), at(HALF, -HALF), at(-HALF, HALF)];
-        let twist = match diagonals {
-            [Some(a), Some(b), Some(c), Some(d)] => a + b - c - d,
-            _ => Vector2::zeros(),
-        };
-        Some((here, [along, across], [along_bend, twist, across_bend]))
+        Some((at(0.0, 0.0)?, [step(HALF, 0.0)?, step(0.0, HALF)?]))
     }
 
     /// The projection, shifted by what the nearest corners show the camera to be wrong there.
     fn predict(&self, lattice: &Lattice, node: Node) -> Option<Prediction> {
         const NEAR: i32 = 2;
-        let (position, steps, bends) = self.project(node)?;
+        let (position, steps) = self.project(node)?;
         let (mut shift, mut sum) = (Vector2::zeros(), 0.0);
         for (at, found) in usable(lattice, node, NEAR) {
-            if let Some((expected, ..)) = self.project(at) {
+            if let Some((expected, _)) = self.project(at) {
                 let (di, dj) = (f64::from(at[0] - node[0]), f64::from(at[1] - node[1]));
                 let weight = 1.0 / (di * di + dj * dj);
                 shift += (found.position - expected) * weight;
                 sum += weight;
             }
         }
-        (sum > 0.0).then(|| Prediction { position: position + shift / sum, steps, bends, variance: 1.0 / sum })
+        (sum > 0.0).then(|| Prediction { position: position + shift / sum, steps, variance: 1.0 / sum })
     }
 }
 
