@@ -9,6 +9,7 @@
 mod elf_rig;
 
 use elf_rig::{BOTH, Board, Conversation, ElfBoard, LEASE_MS, Standing, decode, programs};
+use vergence_control::{REST_US, RigIo};
 use vergence_cpu::{Access, Bus};
 use vergence_image::layout::HARDWARE;
 use vergence_mcu::{FLASH_BASE, Halt, Picoseconds, RAM_BASE, ResetCause as Bite};
@@ -303,7 +304,7 @@ impl Hang {
             Self::Link => {
                 let task = variable(talk, "link::receive::POOL");
                 // The application's clock began within the first half second.
-                let alarms = now - 500_000..now + 6_000;
+                let alarms = now - 500_000..now + 40_000;
                 let words = talk.board.machine.chip_mut().ram_mut()[task..task + 512].chunks_exact_mut(8);
                 let forgotten = words
                     .filter(|word| alarms.contains(&u64::from_le_bytes((**word).try_into().expect("eight bytes"))))
@@ -326,6 +327,34 @@ fn witnesses(talk: &mut Talk) -> [u32; 2] {
 fn variable(talk: &Talk, name: &str) -> usize {
     let address = talk.board.machine.firmware().address_of(&format!("vergence_nucleo_g474::{name}"));
     (address.expect("the ELF has its symbols") - RAM_BASE) as usize
+}
+
+#[test]
+fn a_board_at_rest_ticks_seldom_and_goes_at_a_word() {
+    let mut talk = Talk::open(&Standing::default());
+    assert_eq!(talk.ask(Request::SetStream { period_us: 0 }), Status::Accepted);
+    for part in 0..20 {
+        talk.alive = false;
+        talk.wait(100_000);
+        let before = witnesses(&mut talk);
+        // All over the tick of a board at rest.
+        talk.now.0 += 1_000_000 + part * (REST_US + 50) / 20;
+        talk.board.advance(talk.now);
+        let [ticks, rounds] = [0, 1].map(|witness| witnesses(&mut talk)[witness] - before[witness]);
+        assert!((45..60).contains(&ticks) && (20..50).contains(&rounds), "{ticks} ticks, {rounds} rounds of the link");
+        // All in one breath: nothing that was left out was missed.
+        let session = talk.host.id();
+        talk.host.submit(talk.now, Request::Arm { session }).expect("there is room");
+        talk.host.submit(talk.now, Request::Home { axes: BOTH }).expect("there is room");
+        talk.alive = true;
+        let steps = talk.board.plant().steps(0);
+        talk.wait(60_000);
+        assert!(talk.faults.is_empty(), "{:?}", talk.faults);
+        assert!(talk.board.plant().drivers_on() && talk.board.plant().steps(0) != steps, "it searches");
+        assert_eq!(talk.ask(Request::Disarm), Status::Accepted);
+        talk.wait(200_000);
+        assert!(!talk.board.plant().drivers_on());
+    }
 }
 
 /// In the middle of a move to the herbivore's pose.

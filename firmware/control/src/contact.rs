@@ -38,6 +38,11 @@ impl Contact {
         self.closed
     }
 
+    /// Whether the readings are as they have been for long enough.
+    pub fn is_settled(&self) -> bool {
+        self.closed == Some(self.reading)
+    }
+
     /// Where it closed, once it is closed for good.
     pub fn edge(&self) -> Option<Counts> {
         self.edge.filter(|_| self.closed == Some(true))

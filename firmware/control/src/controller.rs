@@ -172,6 +172,12 @@ impl Controller {
         self.drivers_on
     }
 
+    /// Whether a tick would find nothing to do until somebody asks for something.
+    #[must_use]
+    pub fn is_at_rest(&self) -> bool {
+        !self.drivers_on && !matches!(self.state, ControllerState::Boot | ControllerState::SelfTest)
+    }
+
     /// Whether a fault is latched.
     #[must_use]
     pub fn has_fault(&self) -> bool {

@@ -47,3 +47,5 @@ pub use updater::Updater;
 
 /// The control tick: how often `poll` wants to run while the drivers are on, in microseconds.
 pub const TICK_US: u64 = 1_000;
+/// How often a [`Node`] at rest wants to run: whole ticks. A board's microsecond counter of 16 bits must hold it.
+pub const REST_US: u64 = 20 * TICK_US;

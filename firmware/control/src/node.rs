@@ -17,6 +17,12 @@ use crate::settings::SettingsError;
 use crate::settings_store;
 use crate::trigger::CameraTrigger;
 use crate::updater::Updater;
+use crate::{REST_US, TICK_US};
+
+/// So long after the last byte from the host whatever it asked for is done and answered.
+const QUIET_US: u64 = 20_000;
+/// A board is told so long before an instant that it shall run then.
+const NOTICE_US: u64 = 20;
 
 /// What a board says of itself.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -52,6 +58,9 @@ pub struct Node {
     /// When the last management request came.
     managed_at: Microseconds,
     reboot: Option<RebootTo>,
+    /// When the host was last heard.
+    heard_at: Microseconds,
+    wakes_at: Microseconds,
     /// As last recorded.
     state: ControllerState,
     stream_period: u64,
@@ -90,6 +99,8 @@ impl Node {
             updater: Updater::default(),
             managed_at: Microseconds(0),
             reboot: None,
+            heard_at: Microseconds(0),
+            wakes_at: Microseconds(0),
             stream_period: 0,
             next_pose: Microseconds(0),
             pose_seq: 0,
@@ -108,8 +119,22 @@ impl Node {
         &self.settings
     }
 
+    /// When [`Self::poll`] is to be called next. To be asked after each call of it and of [`Self::wake`].
+    #[must_use]
+    pub fn wakes_at(&self) -> Microseconds {
+        self.wakes_at
+    }
+
+    /// Somebody speaks: the next tick is due as if the node had not rested. [`Self::receive`] does this by itself; a board
+    /// that takes long over it may set its timer before.
+    pub fn wake(&mut self, now: Microseconds) {
+        self.heard_at = now;
+        self.wakes_at.0 -= self.wakes_at.0.saturating_sub(now.0 + NOTICE_US) / TICK_US * TICK_US;
+    }
+
     /// Takes bytes from the link. Requests to write flash block for some tens of milliseconds; nothing moves then.
     pub fn receive(&mut self, now: Microseconds, bytes: &[u8], io: &mut impl RigIo, services: &mut impl BoardServices) {
+        self.wake(now);
         for &byte in bytes {
             match self.session.receive(now, byte) {
                 Some(BoardEvent::Opened { session }) => {
@@ -135,8 +160,8 @@ impl Node {
         }
     }
 
-    /// Runs the control tick and, where due, trigger and telemetry. Returns when it wants to run again.
-    pub fn poll(&mut self, now: Microseconds, io: &mut impl RigIo) -> Microseconds {
+    /// Runs the control tick and, where due, trigger and telemetry.
+    pub fn poll(&mut self, now: Microseconds, io: &mut impl RigIo) {
         let next_tick = self.controller.poll(now, io);
         self.watch_update(now);
         self.trigger.poll(now, io);
@@ -147,7 +172,17 @@ impl Node {
         self.recorder.watch_switches(now, self.controller.axis_count(), io);
         self.observe(now, io);
         self.stream_pose(now, io);
-        next_tick
+        let rest = if self.is_at_rest(now) { REST_US - TICK_US } else { 0 };
+        self.wakes_at = Microseconds(next_tick.0 + rest);
+    }
+
+    /// Whether nothing is to be done, told or looked at closely.
+    fn is_at_rest(&self, now: Microseconds) -> bool {
+        self.controller.is_at_rest()
+            && self.stream_period == 0
+            && !self.trigger.is_running()
+            && self.recorder.switches_rest(self.controller.axis_count())
+            && now.0 >= self.heard_at.0 + QUIET_US
     }
 
     fn set_stream(&mut self, now: Microseconds, period_us: u32) {

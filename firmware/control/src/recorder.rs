@@ -77,6 +77,11 @@ impl Recorder {
         }
     }
 
+    /// Whether every switch of the first `axes` reads what was last recorded of it.
+    pub fn switches_rest(&self, axes: usize) -> bool {
+        self.switches.iter().take(axes).flatten().all(|switch| switch.contact.is_settled())
+    }
+
     /// Events from number `first` on, or from the oldest that is still there.
     pub fn page(&self, first: u32) -> RecordedEvents {
         let oldest = self.total.wrapping_sub(self.events.len() as u32);

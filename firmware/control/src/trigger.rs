@@ -39,6 +39,11 @@ impl CameraTrigger {
         Ok(())
     }
 
+    /// Whether pulses will come by themselves.
+    pub fn is_running(&self) -> bool {
+        self.train.is_some()
+    }
+
     /// Orders the pulses that are due before the next tick. One that came too late is left out: the grid stays.
     pub fn poll(&mut self, now: Microseconds, io: &mut impl RigIo) {
         let Some((period, next)) = &mut self.train else { return };

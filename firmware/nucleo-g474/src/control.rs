@@ -26,6 +26,11 @@ const PRIORITY: Priority = Priority::P8;
 /// The tick timer counts microseconds.
 const PRESCALER: u16 = 169;
 
+/// How long a tick lasts where something is to be done, and the first one: microseconds.
+const PERIOD: u16 = TICK_US as u16;
+/// The timer cannot be told to end a tick sooner than so many microseconds from now.
+const NOTICE_US: u16 = 3;
+
 /// How many ticks there have been: the watchdog's witness.
 pub static TICKS: AtomicU32 = AtomicU32::new(0);
 
@@ -39,6 +44,8 @@ pub struct Control {
     services: Services,
     /// When the running tick began.
     tick: Microseconds,
+    /// How long it lasts: what the timer is set to, in microseconds.
+    length: u16,
     /// Kept, for to clear them in every tick would take a quarter of one at rest.
     received: [u8; 64],
     frame: [u8; MAX_FRAME],
@@ -49,11 +56,19 @@ pub fn start(node: Node, rig: Rig, services: Services, timer: Peri<'static, peri
     // Dropped, it would stop the clock of the timer.
     core::mem::forget(Timer::new(timer));
     TIM7.psc().write_value(PRESCALER);
-    TIM7.arr().write(|w| w.set_arr((TICK_US - 1) as u16));
+    set_length(PERIOD);
     TIM7.egr().write(|w| w.set_ug(true));
     TIM7.sr().write(|_| {});
     let tick = Microseconds(Instant::now().as_micros());
-    let control = CONTROL.init(Control { node, rig, services, tick, received: [0; 64], frame: [0; MAX_FRAME] });
+    let control = CONTROL.init(Control {
+        node,
+        rig,
+        services,
+        tick,
+        length: PERIOD,
+        received: [0; 64],
+        frame: [0; MAX_FRAME],
+    });
     critical_section::with(|cs| HANDOVER.borrow_ref_mut(cs).replace(control));
     TIM7.dier().write(|w| w.set_uie(true));
     TIM7.cr1().write(|w| w.set_cen(true));
@@ -81,6 +96,18 @@ fn TIM7_DAC() {
     }
 }
 
+/// Sets how long the running tick lasts, a whole number of periods; where it has lasted longer, one period more than that.
+/// Returns what was set.
+fn set_length(length: u16) -> u16 {
+    critical_section::with(|_| {
+        // Behind the counter's back the end would come after 65 ms.
+        let least = (TIM7.cnt().read().cnt() + NOTICE_US).next_multiple_of(PERIOD);
+        let length = length.max(least);
+        TIM7.arr().write(|w| w.set_arr(length - 1));
+        length
+    })
+}
+
 impl Control {
     fn run(&mut self) {
         if TIM7.sr().read().uif() {
@@ -89,19 +116,30 @@ impl Control {
         }
         self.receive();
         self.transmit();
+        self.follow();
     }
 
-    /// Ticks are a whole number of periods apart, whatever the interrupt's latency: both timers run on one clock.
+    /// Ticks are a whole number of periods apart, whatever the interrupt's latency: both timers run on one clock. Those
+    /// missed while the flash was busy are gone, and the controller sees the gap.
     fn begin_tick(&mut self) {
-        let since = Instant::now().as_micros().saturating_sub(self.tick.0);
-        // Ticks missed while the flash was busy are gone, and the controller sees the gap; one that is late is not.
-        let ticks = if since < 2 * TICK_US { 1 } else { since / TICK_US };
-        self.tick = Microseconds(self.tick.0 + ticks * TICK_US);
+        let began = Instant::now().as_micros() - u64::from(TIM7.cnt().read().cnt());
+        let since = u32::try_from(began.saturating_sub(self.tick.0)).unwrap_or(u32::MAX);
+        let ticks = since.saturating_add(u32::from(PERIOD / 2)) / u32::from(PERIOD);
+        self.tick.0 += u64::from(ticks) * TICK_US;
         if !self.rig.begin_tick() {
             defmt::warn!("steps cut short at {=u64}", self.tick.0);
         }
         self.node.poll(self.tick, &mut self.rig);
         TICKS.fetch_add(1, Ordering::Relaxed);
+    }
+
+    /// Makes the timer end the running tick when the node wants to run again.
+    fn follow(&mut self) {
+        let length = self.node.wakes_at().0.saturating_sub(self.tick.0);
+        let length = u16::try_from(length).unwrap_or(PERIOD);
+        if length != self.length {
+            self.length = set_length(length);
+        }
     }
 
     fn receive(&mut self) {
@@ -114,6 +152,9 @@ impl Control {
     #[inline(never)]
     fn take(&mut self, count: usize) {
         let now = Microseconds(Instant::now().as_micros());
+        // At once: what the node makes of the bytes may take until then.
+        self.node.wake(now);
+        self.follow();
         self.node.receive(now, &self.received[..count], &mut self.rig, &mut self.services);
     }
 

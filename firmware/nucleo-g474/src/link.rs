@@ -15,6 +15,8 @@ use crate::control;
 pub const RING: usize = 8 * 1024;
 /// A line that never falls idle is read this often.
 const LOOK: Duration = Duration::from_millis(5);
+/// On a silent one there is nothing to read, but the watchdog wants to see that somebody waits.
+const SILENCE: Duration = Duration::from_millis(40);
 
 /// Bytes for the node.
 pub static RECEIVED: Pipe<CriticalSectionRawMutex, 512> = Pipe::new();
@@ -41,9 +43,12 @@ pub fn queue(frame: &[u8]) {
 #[embassy_executor::task]
 pub async fn receive(mut line: RingBufferedUartRx<'static>) {
     let mut bytes = [0; 256];
+    let mut patience = SILENCE;
     loop {
         ROUNDS.fetch_add(1, Ordering::Relaxed);
-        if let Ok(Ok(count)) = with_timeout(LOOK, line.read(&mut bytes)).await {
+        let read = with_timeout(patience, line.read(&mut bytes)).await;
+        patience = if read.is_ok() { LOOK } else { SILENCE };
+        if let Ok(Ok(count)) = read {
             let mut rest = &bytes[..count];
             while !rest.is_empty() {
                 let taken = RECEIVED.write(rest).await;

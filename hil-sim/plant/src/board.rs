@@ -21,7 +21,8 @@ pub struct NativeBoard {
     services: NativeServices,
     plant: Plant,
     now: Microseconds,
-    next_tick: Microseconds,
+    /// The processor is kept from its tick until then.
+    held_until: Microseconds,
 }
 
 impl NativeBoard {
@@ -56,7 +57,7 @@ impl NativeBoard {
             services,
             plant: Plant::new(mechanics, positions),
             now: Microseconds(0),
-            next_tick: Microseconds(0),
+            held_until: Microseconds(0),
         })
     }
 
@@ -70,7 +71,7 @@ impl NativeBoard {
         self.node = start(&self.settings, cause, boot, &mut self.services)?;
         self.plant.restart_clock();
         self.now = Microseconds(0);
-        self.next_tick = Microseconds(0);
+        self.held_until = Microseconds(0);
         Ok(())
     }
 
@@ -82,10 +83,10 @@ impl NativeBoard {
 
     /// Lets time pass until `to`, running every control tick on its instant.
     pub fn advance(&mut self, to: Microseconds) {
-        while self.next_tick <= to {
-            self.plant.advance(self.next_tick);
-            self.now = self.next_tick;
-            self.next_tick = self.node.poll(self.now, &mut self.plant);
+        while self.next_tick() <= to {
+            self.now = self.next_tick();
+            self.plant.advance(self.now);
+            self.node.poll(self.now, &mut self.plant);
         }
         if to > self.now {
             self.plant.advance(to);
@@ -95,7 +96,11 @@ impl NativeBoard {
 
     /// Keeps the processor from its next control tick for `us` microseconds.
     pub fn delay_tick(&mut self, us: u64) {
-        self.next_tick.0 += us;
+        self.held_until = Microseconds(self.next_tick().0 + us);
+    }
+
+    fn next_tick(&self) -> Microseconds {
+        self.node.wakes_at().max(self.held_until)
     }
 
     /// Takes bytes that arrive now.

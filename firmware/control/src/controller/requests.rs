@@ -6,6 +6,7 @@ use vergence_protocol::{
 };
 
 use super::{ActiveMove, Controller};
+use crate::TICK_US;
 use crate::axis::Axis;
 use crate::homing_sequence::HomingSequence;
 use crate::io::RigIo;
@@ -51,6 +52,8 @@ impl Controller {
         for axis in &mut self.axes {
             axis.adopt_encoder(io);
         }
+        // With the drivers off ticks may be left out, and none of them was missed.
+        self.next_tick.0 += now.0.saturating_sub(self.next_tick.0).div_ceil(TICK_US) * TICK_US;
         self.holder = Some(session);
         self.drivers_on = true;
         io.set_drivers(true);
