@@ -240,6 +240,8 @@ pub enum Refusal {
     NoSetting,
     /// The settings could not be written to flash; the old ones are still there.
     StorageFailed,
+    /// The board is set to drive a machine that its firmware does not know.
+    NoSuchMachine,
 }
 
 impl fmt::Display for Refusal {
@@ -261,6 +263,9 @@ impl fmt::Display for Refusal {
             Self::BadSetting => f.write_str("the setting cannot have this value beside the others"),
             Self::NoSetting => f.write_str("this board has no such setting"),
             Self::StorageFailed => f.write_str("the board could not write its flash: the old settings are still there"),
+            Self::NoSuchMachine => f.write_str(
+                "the board is set to drive the robot, which its firmware cannot yet: run 'vergence config set machine bench'",
+            ),
         }
     }
 }

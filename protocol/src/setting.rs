@@ -47,11 +47,13 @@ pub enum SettingItem {
     StreamPeriod,
     /// Not of an axis: speed of the serial line from the next start on, baud.
     Baud,
+    /// Not of an axis: what the board drives, 0 the stages of the bench, 1 the joints of the robot.
+    Machine,
 }
 
 impl SettingItem {
     /// Every item, in the order of the wire.
-    pub const ALL: [Self; 20] = [
+    pub const ALL: [Self; 21] = [
         Self::Min,
         Self::Max,
         Self::Speed,
@@ -72,12 +74,13 @@ impl SettingItem {
         Self::HomeRepeatability,
         Self::StreamPeriod,
         Self::Baud,
+        Self::Machine,
     ];
 
     /// Whether there is one for each axis.
     #[must_use]
     pub const fn is_of_axis(self) -> bool {
-        !matches!(self, Self::StreamPeriod | Self::Baud)
+        !matches!(self, Self::StreamPeriod | Self::Baud | Self::Machine)
     }
 
     /// Its name for people and files.
@@ -104,6 +107,7 @@ impl SettingItem {
             Self::HomeRepeatability => "home_repeatability",
             Self::StreamPeriod => "stream_period_us",
             Self::Baud => "baud",
+            Self::Machine => "machine",
         }
     }
 }

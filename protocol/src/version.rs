@@ -17,7 +17,7 @@ pub struct ProtocolVersion {
 }
 
 /// The version this crate speaks.
-pub const PROTOCOL: ProtocolVersion = ProtocolVersion { major: 1, minor: 1 };
+pub const PROTOCOL: ProtocolVersion = ProtocolVersion { major: 1, minor: 2 };
 
 /// A hash of the names, order and types of all messages: equal on both sides exactly when both sides mean the same bytes.
 #[must_use]

@@ -96,6 +96,6 @@ fn the_checksum_is_castagnoli() {
 
 /// A change here is a change of the messages: raise `PROTOCOL` and check that the old enum variants kept their places.
 #[test]
-fn the_messages_are_those_of_protocol_1_1() {
-    assert_eq!(schema_hash(), 0x16e2_00ed_3c11_d2d9, "{:#x}", schema_hash());
+fn the_messages_are_those_of_protocol_1_2() {
+    assert_eq!(schema_hash(), 0xda57_74f6_6499_cb5d, "{:#x}", schema_hash());
 }

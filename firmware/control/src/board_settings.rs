@@ -15,6 +15,16 @@ const BAUD: core::ops::RangeInclusive<u32> = 9_600..=12_000_000;
 /// The fastest that the bridges of most boards take.
 const USUAL_BAUD: u32 = 921_600;
 
+/// What a board drives.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Machine {
+    /// The stages of the bench.
+    #[default]
+    Bench,
+    /// The joints of the robot, on its servo bus. No firmware drives them yet.
+    Robot,
+}
+
 /// What the board is set to.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct BoardSettings {
@@ -24,6 +34,8 @@ pub struct BoardSettings {
     pub stream_period_us: u32,
     /// Speed of the serial line from the next start on.
     pub baud: u32,
+    /// What the board drives.
+    pub machine: Machine,
 }
 
 /// Why a setting was not taken.
@@ -45,7 +57,7 @@ impl BoardSettings {
     /// [`SettingsError`] where an axis cannot work with its settings.
     pub fn new(axes: &[AxisSettings]) -> Result<Self, SettingsError> {
         let axes = axes.iter().copied().collect::<heapless::Vec<_, { vergence_protocol::MAX_AXES }>>();
-        let settings = Self { axes, stream_period_us: STREAM_US, baud: USUAL_BAUD };
+        let settings = Self { axes, stream_period_us: STREAM_US, baud: USUAL_BAUD, machine: Machine::Bench };
         settings.validate()?;
         Ok(settings)
     }
@@ -81,6 +93,7 @@ impl BoardSettings {
         match key {
             SettingKey { item: SettingItem::StreamPeriod, axis: 0 } => Some(self.stream_period_us.into()),
             SettingKey { item: SettingItem::Baud, axis: 0 } => Some(self.baud.into()),
+            SettingKey { item: SettingItem::Machine, axis: 0 } => Some((self.machine == Machine::Robot).into()),
             SettingKey { item, axis } => self.axes.get(usize::from(axis))?.item(item),
         }
     }
@@ -102,6 +115,7 @@ impl BoardSettings {
         match key.item {
             SettingItem::StreamPeriod => self.stream_period_us = number(value)?,
             SettingItem::Baud => self.baud = number(value)?,
+            SettingItem::Machine => self.machine = if flag(value)? { Machine::Robot } else { Machine::Bench },
             item => {
                 let axis = self.axes.get_mut(usize::from(key.axis)).ok_or(SettingError::Unknown)?;
                 axis.put(item, value)?;

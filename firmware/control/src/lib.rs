@@ -33,7 +33,7 @@ mod trajectory;
 mod trigger;
 mod updater;
 
-pub use board_settings::{BoardSettings, SettingError};
+pub use board_settings::{BoardSettings, Machine, SettingError};
 pub use controller::{Controller, Event};
 pub use flash::{Flash, FlashError, PAGE, UNIT};
 pub use io::{MAX_STEPS_PER_TICK, RigIo, StepSchedule, TriggerEdge};

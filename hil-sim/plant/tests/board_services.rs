@@ -94,6 +94,21 @@ fn a_setting_that_makes_no_sense_is_refused_with_its_reason() {
 }
 
 #[test]
+fn a_board_set_to_drive_the_robot_is_not_armed_and_says_why() {
+    let mut rigged = Rigged::off(3).open();
+    let machine = SettingKey { item: SettingItem::Machine, axis: 0 };
+    assert_eq!(get(&mut rigged, machine), 0, "the bench from the factory");
+    assert_eq!(set(&mut rigged, machine, 2), Status::Refused(Refusal::BadSetting));
+    assert_eq!(set(&mut rigged, machine, 1), Status::Accepted);
+    assert_eq!(rigged.ask(Request::SaveSettings), Status::Accepted);
+    power_cycle(&mut rigged, 7);
+    assert_eq!(rigged.arm(), Status::Refused(Refusal::NoSuchMachine));
+    assert!(!rigged.board.plant().drivers_on());
+    assert_eq!(set(&mut rigged, machine, 0), Status::Accepted);
+    assert_eq!(rigged.arm(), Status::Accepted);
+}
+
+#[test]
 fn settings_that_cannot_be_written_are_refused_and_the_old_ones_stay() {
     let mut rigged = Rigged::off(4).open();
     set(&mut rigged, SPEED, 50_000);

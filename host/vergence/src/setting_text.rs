@@ -29,6 +29,8 @@ enum Form {
     Flag,
     /// A duration, in microseconds on the wire.
     Period,
+    /// One of these words, by its number.
+    Choice(&'static [&'static str]),
 }
 
 /// Every setting of a board with the axes of `rig`, in the order of a file: first those of no axis.
@@ -70,6 +72,7 @@ fn form(item: SettingItem, kind: AxisKind) -> Form {
         SettingItem::StepsPerUnit | SettingItem::CountsPerUnit | SettingItem::Baud => Form::Number,
         SettingItem::StepsReversed | SettingItem::CountsReversed => Form::Flag,
         SettingItem::StreamPeriod => Form::Period,
+        SettingItem::Machine => Form::Choice(&["bench", "robot"]),
         _ => Form::Quantity(kind, 0),
     }
 }
@@ -103,6 +106,10 @@ impl NamedSetting {
                 Ok(us) => humantime::format_duration(Duration::from_micros(us)).to_string(),
                 Err(_) => format!("{value}us"),
             },
+            Form::Choice(words) => {
+                let word = usize::try_from(value).ok().and_then(|index| words.get(index));
+                word.map_or_else(|| value.to_string(), |word| (*word).to_owned())
+            }
         }
     }
 
@@ -135,6 +142,10 @@ impl NamedSetting {
                 .ok()
                 .and_then(|period| i64::try_from(period.as_micros()).ok())
                 .ok_or_else(|| expected("2ms, or 0s for none")),
+            Form::Choice(words) => (0..)
+                .zip(words)
+                .find_map(|(value, word)| (*word == text).then_some(value))
+                .ok_or_else(|| expected(&words.join(" or "))),
         }
     }
 
@@ -144,7 +155,7 @@ impl NamedSetting {
         match self.form {
             Form::Number => value.into(),
             Form::Flag => (value != 0).into(),
-            Form::Quantity(..) | Form::Period => self.write(value).into(),
+            Form::Quantity(..) | Form::Period | Form::Choice(_) => self.write(value).into(),
         }
     }
 
@@ -185,7 +196,7 @@ mod tests {
     fn every_number_is_read_back_as_it_was_written() {
         for setting in bench() {
             for value in [0, 1, 7, 999, 1_001, 40_000, 2_268_928, 8_000_000, 69_813_170, 2_147_483_647] {
-                let value = if setting.form == Form::Flag { value % 2 } else { value };
+                let value = if matches!(setting.form, Form::Flag | Form::Choice(_)) { value % 2 } else { value };
                 let text = setting.write(value);
                 assert_eq!(setting.read(&text), Ok(value), "{} = {text}", setting.name());
                 assert_eq!(setting.from_toml(&setting.toml(value)), Ok(value), "{} = {text}", setting.name());
@@ -204,6 +215,7 @@ mod tests {
             ("separation.steps_reversed", 1, "true"),
             ("stream_period", 2_000, "2ms"),
             ("baud", 921_600, "921600"),
+            ("machine", 1, "robot"),
         ] {
             assert_eq!(setting(name).write(value), text, "{name}");
         }
@@ -221,6 +233,7 @@ mod tests {
             ("separation.steps_reversed", "yes", "true or false"),
             ("stream_period", "soon", "2ms"),
             ("baud", "fast", "921600"),
+            ("machine", "lathe", "bench or robot"),
         ] {
             let error = setting(name).read(text).unwrap_err();
             assert!(error.contains(word) && error.contains(name), "{error}");

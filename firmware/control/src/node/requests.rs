@@ -5,7 +5,7 @@ use vergence_protocol::{
 };
 
 use super::Node;
-use crate::board_settings::{BoardSettings, SHORTEST_STREAM_US, SettingError};
+use crate::board_settings::{BoardSettings, Machine, SHORTEST_STREAM_US, SettingError};
 use crate::io::RigIo;
 use crate::services::BoardServices;
 use crate::settings_store;
@@ -67,6 +67,8 @@ impl Node {
             Request::SetSetting { key, value } => self.set_setting(now, *key, *value),
             Request::RestoreSettings => self.apply(now, self.defaults.clone()),
             Request::SaveSettings => self.save_settings(now, services),
+            // Settings cannot be changed while armed.
+            Request::Arm { .. } if self.settings.machine == Machine::Robot => Err(Refusal::NoSuchMachine),
             motion => {
                 let session = self.session.session().unwrap_or(SessionId(0));
                 return self.controller.handle(now, session, motion, io);
