@@ -36,6 +36,12 @@ pub fn build_at(image: &[u8]) -> Option<usize> {
     content(image, &BUILD).filter(|&at| image.len() >= at + 8)
 }
 
+/// The build that an application names.
+#[must_use]
+pub fn build_of(image: &[u8]) -> Option<u64> {
+    image.get(build_at(image)?..)?.first_chunk().copied().map(u64::from_be_bytes)
+}
+
 fn content(image: &[u8], head: &[u8; 16]) -> Option<usize> {
     let (words, _) = image.as_chunks::<4>();
     let at = words.windows(4).position(|window| window.as_flattened() == head)?;

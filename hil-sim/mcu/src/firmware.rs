@@ -11,8 +11,11 @@ use object::{Endianness, Object, ObjectSymbol, SymbolKind, elf};
 #[non_exhaustive]
 pub enum FirmwareError {
     /// The bytes are no 32-bit ELF file.
-    #[error("this is no 32-bit ELF file: {0}")]
+    #[error("this cannot be read as a 32-bit ELF file: {0}")]
     NotElf(String),
+    /// Some of what it names is not in it.
+    #[error("this ELF file is cut off")]
+    CutOff,
     /// It is for another processor.
     #[error("this ELF file is not for an Arm processor")]
     NotArm,
@@ -56,8 +59,8 @@ impl Firmware {
         let endian = file.endian();
         let mut segments = Vec::new();
         for header in file.elf_program_headers() {
-            let data = header.data(endian, bytes).unwrap_or_default();
-            if header.p_type(endian) == elf::PT_LOAD && !data.is_empty() {
+            if header.p_type(endian) == elf::PT_LOAD && header.p_filesz(endian) > 0 {
+                let data = header.data(endian, bytes).map_err(|()| FirmwareError::CutOff)?;
                 segments.push((header.p_paddr(endian), data.to_vec()));
             }
         }

@@ -3,38 +3,10 @@
 
 mod common;
 
+use common::serial::*;
 use common::{Bench, GPIOB, LPUART1, USART2, USART3, bench, frame, pin};
 use vergence_cpu::Bus;
 use vergence_mcu::{Frame, LineFault, Nothing, UartId};
-
-const CR1: u32 = 0x00;
-const CR2: u32 = 0x04;
-const CR3: u32 = 0x08;
-const BRR: u32 = 0x0C;
-const RTOR: u32 = 0x14;
-const ISR: u32 = 0x1C;
-const ICR: u32 = 0x20;
-const RDR: u32 = 0x24;
-const TDR: u32 = 0x28;
-
-const UE: u32 = 1;
-const RE: u32 = 1 << 2;
-const TE: u32 = 1 << 3;
-const FIFOEN: u32 = 1 << 29;
-
-const NE: u32 = 1 << 2;
-const FE: u32 = 1 << 1;
-const ORE: u32 = 1 << 3;
-const IDLE: u32 = 1 << 4;
-const RXNE: u32 = 1 << 5;
-const TC: u32 = 1 << 6;
-const TXE: u32 = 1 << 7;
-const RTOF: u32 = 1 << 11;
-
-/// 16 MHz / 139 = 115 108 baud: a bit is 139 cycles, a frame 1390.
-const BIT: u64 = 139;
-const FRAME: u64 = 10 * BIT;
-const BAUD: u32 = 115_108;
 
 /// USART2 on PA2 and PA3, its idle frame over.
 fn port(extra: u32) -> Bench<Nothing> {

@@ -3,26 +3,9 @@
 
 mod common;
 
+use common::serial::{BAUD, BIT, BRR, CR1, CR3, FE, FIFOEN, FRAME, ISR, RDR, RE, RXNE, TDR, TE, UE};
 use common::{Bench, GPIOB, USART2, USART3, bench_with, frame, pin};
 use vergence_mcu::{Frame, Nothing, OnPort, Picoseconds, SentByte, SerialDevice, UartId};
-
-const CR1: u32 = 0x00;
-const CR3: u32 = 0x08;
-const BRR: u32 = 0x0C;
-const ISR: u32 = 0x1C;
-const RDR: u32 = 0x24;
-const TDR: u32 = 0x28;
-const UE: u32 = 1;
-const RE: u32 = 1 << 2;
-const TE: u32 = 1 << 3;
-const FIFOEN: u32 = 1 << 29;
-const FE: u32 = 1 << 1;
-const RXNE: u32 = 1 << 5;
-
-/// 16 MHz / 139 = 115 108 baud.
-const BIT: u64 = 139;
-const FRAME: u64 = 10 * BIT;
-const BAUD: u32 = 115_108;
 
 const ID: u8 = 7;
 /// As servos do: the line is let go before they answer.

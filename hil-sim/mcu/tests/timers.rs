@@ -1,36 +1,13 @@
-//! TIM: counts, updates, outputs, captures, quadrature, chaining (RM0440 §28 to §31). All at 16 MHz.
+//! TIM: counts, updates, outputs (RM0440 §28 to §31). All at 16 MHz.
 #![allow(clippy::unwrap_used, reason = "a test fails by panic")]
 
 mod common;
 
-use common::{Bench, Recorder, TIM1, TIM2, TIM3, TIM15, bench, bench_with, pin};
+use common::timer::*;
+use common::{Bench, Recorder, TIM1, TIM3, TIM15, bench, bench_with, pin};
 use proptest::prelude::*;
 use vergence_cpu::{Bus, NEVER};
 use vergence_mcu::Nothing;
-
-const CR1: u32 = 0x00;
-const CR2: u32 = 0x04;
-const SMCR: u32 = 0x08;
-const DIER: u32 = 0x0C;
-const SR: u32 = 0x10;
-const EGR: u32 = 0x14;
-const CCMR1: u32 = 0x18;
-const CCER: u32 = 0x20;
-const CNT: u32 = 0x24;
-const PSC: u32 = 0x28;
-const ARR: u32 = 0x2C;
-const RCR: u32 = 0x30;
-const CCR1: u32 = 0x34;
-const BDTR: u32 = 0x44;
-
-const CEN: u32 = 1;
-const OPM: u32 = 8;
-const DOWN: u32 = 0x10;
-const ARPE: u32 = 0x80;
-const MOE: u32 = 1 << 15;
-const PWM_1: u32 = 6 << 4;
-const PWM_2: u32 = 7 << 4;
-const TOGGLE: u32 = 3 << 4;
 
 /// TIM1 with its first channel on PA8, which is watched.
 fn pulses() -> Bench<Recorder> {
@@ -234,126 +211,6 @@ fn the_complement_is_the_inverse() {
     assert!(!bench.chip.is_high(pin("PA7")));
     bench.write(TIM1 + BDTR, MOE | 10);
     assert!(bench.complaint().unwrap().ends_with("dead time is not modelled"));
-}
-
-/// TIM3 as an encoder on PA6 and PA7.
-fn encoder(mode: u32) -> Bench<Nothing> {
-    let mut bench = bench();
-    bench.connect("PA6", 2);
-    bench.connect("PA7", 2);
-    bench.write(TIM3 + CCMR1, 0x0101);
-    bench.write(TIM3 + SMCR, mode);
-    bench.write(TIM3 + CR1, CEN);
-    bench
-}
-
-fn turn(bench: &mut Bench<Nothing>, quarters: i32) {
-    const GRAY: [(bool, bool); 4] = [(false, false), (true, false), (true, true), (false, true)];
-    let mut phase = 0i32;
-    for _ in 0..quarters.abs() {
-        phase += quarters.signum();
-        let (a, b) = GRAY[phase.rem_euclid(4) as usize];
-        bench.drive("PA6", a);
-        bench.drive("PA7", b);
-        bench.wait(10);
-    }
-}
-
-#[test]
-fn quadrature_follows_the_manuals_table() {
-    // All edges in mode 3, half of them in modes 1 and 2; up while TI1 leads.
-    for (mode, forward, backward) in [(3, 40, -40), (1, 20, -20), (2, 20, -20)] {
-        let mut bench = encoder(mode);
-        turn(&mut bench, 40);
-        assert_eq!(bench.read(TIM3 + CNT), forward as u32);
-        assert_eq!(bench.read(TIM3 + CR1) & DOWN, 0);
-        turn(&mut bench, -40);
-        assert_eq!(bench.read(TIM3 + CNT), 0);
-        turn(&mut bench, -40);
-        assert_eq!(bench.read(TIM3 + CNT), (0x1_0000 + backward) as u32);
-        assert_eq!(bench.read(TIM3 + CR1) & DOWN, DOWN);
-        assert_eq!(bench.read(TIM3 + SR) & 1, 1, "an underflow is an update");
-    }
-}
-
-#[test]
-fn an_inverted_phase_turns_the_direction() {
-    let mut bench = encoder(3);
-    bench.write(TIM3 + CCER, 2);
-    turn(&mut bench, 40);
-    assert_eq!(bench.read(TIM3 + CNT), 0x1_0000 - 40);
-}
-
-#[test]
-fn the_filter_swallows_short_pulses() {
-    // IC1F = IC2F = 3: eight samples at the timer's clock.
-    let mut bench = encoder(3);
-    bench.write(TIM3 + CCMR1, 0x3131);
-    bench.drive("PA6", true);
-    bench.wait(7);
-    bench.drive("PA6", false);
-    bench.wait(100);
-    assert_eq!(bench.read(TIM3 + CNT), 0);
-    bench.drive("PA6", true);
-    bench.wait(7);
-    assert_eq!(bench.read(TIM3 + CNT), 0);
-    bench.wait(1);
-    assert_eq!(bench.read(TIM3 + CNT), 1);
-}
-
-#[test]
-fn captures_the_count_and_flags_what_was_missed() {
-    let mut bench = bench();
-    bench.connect("PA0", 1);
-    bench.write(TIM2 + CCMR1, 1);
-    bench.write(TIM2 + CCER, 1);
-    bench.write(TIM2 + CR1, CEN);
-    bench.wait(101);
-    bench.drive("PA0", true);
-    assert_eq!(bench.read(TIM2 + SR) & 0x202, 2);
-    bench.wait(50);
-    bench.drive("PA0", false);
-    assert_eq!(bench.read(TIM2 + CCR1), 100, "only rising edges are captured");
-    assert_eq!(bench.read(TIM2 + SR) & 0x202, 0, "reading CCR1 clears the flag");
-    for _ in 0..2 {
-        bench.drive("PA0", true);
-        bench.wait(10);
-        bench.drive("PA0", false);
-    }
-    assert_eq!(bench.read(TIM2 + SR) & 0x202, 0x202, "the second capture came before the first was read");
-    assert_eq!(bench.read(TIM2 + CCR1), 160);
-}
-
-#[test]
-fn one_timer_counts_the_periods_of_another() {
-    let mut bench = bench();
-    // TIM1 sends a trigger at each update, TIM2 counts ITR0, which is TIM1.
-    bench.write(TIM1 + CR2, 2 << 4);
-    bench.write(TIM1 + ARR, 9);
-    bench.write(TIM2 + SMCR, 7);
-    bench.write(TIM2 + CR1, CEN);
-    bench.write(TIM1 + CR1, CEN);
-    bench.wait(1_001);
-    assert_eq!(bench.read(TIM2 + CNT), 100);
-}
-
-#[test]
-fn a_trigger_starts_or_resets_a_timer() {
-    let mut bench = bench();
-    bench.connect("PA0", 1);
-    // Slave mode trigger on TI1FP1.
-    bench.write(TIM2 + CCMR1, 1);
-    bench.write(TIM2 + SMCR, 6 | 5 << 4);
-    bench.wait(10);
-    assert_eq!(bench.read(TIM2 + CR1), 0);
-    bench.drive("PA0", true);
-    assert_eq!(bench.read(TIM2 + CR1), CEN);
-    bench.wait(21);
-    assert_eq!(bench.read(TIM2 + CNT), 20);
-    bench.drive("PA0", false);
-    bench.write(TIM2 + SMCR, 4 | 5 << 4);
-    bench.drive("PA0", true);
-    assert_eq!(bench.read(TIM2 + CNT), 0);
 }
 
 #[test]

@@ -2,6 +2,9 @@
 #![allow(dead_code, reason = "each test file uses its part")]
 #![allow(clippy::unwrap_used, reason = "a test fails by panic")]
 
+pub mod serial;
+pub mod timer;
+
 use vergence_cpu::{Access, Bus, Cycle};
 use vergence_mcu::{Chip, ChipConfig, Drive, Frame, LineFault, Nothing, Pin, PinEdge, Terminals, UartId, World};
 

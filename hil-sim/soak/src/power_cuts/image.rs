@@ -1,7 +1,7 @@
 //! What lies in flash before an update, and what is sent.
 
 use vergence_image::layout::{ACTIVE, CAPACITY, FLASH_BASE, HARDWARE};
-use vergence_image::notes::build_at;
+use vergence_image::notes::{build_at, build_of};
 use vergence_image::{Seal, sha256};
 use vergence_mcu::{Firmware, FlashCells};
 use vergence_protocol::management::ImageHeader;
@@ -20,8 +20,7 @@ impl SignedImage {
     #[must_use]
     pub fn new(bytes: Vec<u8>, version: [u8; 3], seal: impl Fn(ImageHeader) -> Seal) -> Self {
         let length = u32::try_from(bytes.len()).unwrap_or(u32::MAX);
-        let build = build_at(&bytes).and_then(|at| bytes.get(at..)?.first_chunk().copied());
-        let build = u64::from_be_bytes(build.unwrap_or_default());
+        let build = build_of(&bytes).unwrap_or_default();
         let header = ImageHeader { hardware: HARDWARE, version, length, build, sha256: sha256(&bytes) };
         Self { seal: seal(header), bytes }
     }

@@ -1,21 +1,20 @@
 //! From what a linker makes to the bytes that lie in flash.
 
-use object::read::elf::{ElfFile32, ProgramHeader};
-use object::{Architecture, Endianness, Object, elf};
 use vergence_image::layout::{ACTIVE, CAPACITY, FLASH_BASE, RAM};
-use vergence_image::notes::build_at;
-use vergence_image::sha256;
+use vergence_image::{notes, sha256};
+use vergence_mcu::Firmware;
 
 use super::hardware::Hardware;
 
 /// Where an application starts.
-const START: u64 = (FLASH_BASE + ACTIVE.start) as u64;
-/// What flash holds where nothing was written.
-const ERASED: u8 = 0xFF;
+const START: u32 = FLASH_BASE + ACTIVE.start;
+/// How an ELF file begins.
+const MAGIC: &[u8] = b"\x7fELF";
+
 /// Whether a file is an ELF file.
 #[must_use]
 pub fn is_elf(file: &[u8]) -> bool {
-    file.starts_with(&elf::ELFMAG)
+    file.starts_with(MAGIC)
 }
 
 /// The bytes of an application in flash, from an ELF file or such bytes.
@@ -38,65 +37,43 @@ pub fn flatten(file: &[u8], hardware: Hardware) -> Result<Vec<u8>, String> {
 /// Which build: the first eight bytes of the linker's build id, as the application itself reads it, or else of the digest.
 #[must_use]
 pub fn build_of(image: &[u8]) -> u64 {
-    let id = build_at(image).and_then(|at| image.get(at..)?.first_chunk().copied());
-    let digest = sha256(image);
-    u64::from_be_bytes(id.or_else(|| digest.first_chunk().copied()).unwrap_or_default())
+    notes::build_of(image).unwrap_or_else(|| {
+        let digest = sha256(image);
+        u64::from_be_bytes(digest.first_chunk().copied().unwrap_or_default())
+    })
 }
 
 /// Where in flash the contents of an ELF file start.
 ///
 /// # Errors
 /// A file that cannot be read.
-pub fn elf_start(file: &[u8]) -> Result<u64, String> {
-    let lowest = segments(file)?.iter().map(|(address, _)| *address).min();
+pub fn elf_start(file: &[u8]) -> Result<u32, String> {
+    start_of(&read(file)?)
+}
+
+fn read(file: &[u8]) -> Result<Firmware, String> {
+    Firmware::from_elf(file).map_err(|error| error.to_string())
+}
+
+fn start_of(firmware: &Firmware) -> Result<u32, String> {
+    let lowest = firmware.segments().map(|(address, _)| address).min();
     lowest.ok_or_else(|| "this ELF file has nothing to load".into())
 }
 
 fn from_elf(file: &[u8], hardware: Hardware) -> Result<Vec<u8>, String> {
-    let start = if hardware == Hardware::NucleoG474 { START } else { elf_start(file)? };
-    join(&segments(file)?, start)
-}
-
-/// What to load: physical addresses and bytes.
-fn segments(file: &[u8]) -> Result<Vec<(u64, &[u8])>, String> {
-    let parsed: ElfFile32<Endianness> =
-        ElfFile32::parse(file).map_err(|error| format!("this ELF file cannot be read: {error}"))?;
-    if parsed.architecture() != Architecture::Arm {
-        return Err("this ELF file is not for an Arm processor".into());
-    }
-    let mut segments = Vec::new();
-    for header in parsed.elf_program_headers() {
-        let endian = parsed.endian();
-        if header.p_type(endian) == elf::PT_LOAD && header.p_filesz(endian) > 0 {
-            let data = header.data(endian, file).map_err(|()| "this ELF file is cut off".to_owned())?;
-            segments.push((u64::from(header.p_paddr(endian)), data));
-        }
-    }
-    Ok(segments)
-}
-
-/// The segments in their places, and erased flash between them.
-fn join(segments: &[(u64, &[u8])], start: u64) -> Result<Vec<u8>, String> {
-    let mut flat = Vec::new();
-    for (address, data) in segments {
-        let outside = || {
-            format!(
+    let firmware = read(file)?;
+    let start = if hardware == Hardware::NucleoG474 { START } else { start_of(&firmware)? };
+    for (address, data) in firmware.segments() {
+        let end = u64::from(address) + data.len() as u64;
+        if address < start || end > u64::from(start) + u64::from(CAPACITY) {
+            return Err(format!(
                 "a segment of {} bytes at {address:#010x} lies outside the application's flash, which is {CAPACITY} bytes \
                  from {start:#010x}",
                 data.len()
-            )
-        };
-        let end = address.saturating_add(data.len() as u64);
-        if *address < start || end > start + u64::from(CAPACITY) {
-            return Err(outside());
+            ));
         }
-        let (from, to) = ((address - start) as usize, (end - start) as usize);
-        if flat.len() < to {
-            flat.resize(to, ERASED);
-        }
-        flat.get_mut(from..to).ok_or_else(outside)?.copy_from_slice(data);
     }
-    Ok(flat)
+    Ok(firmware.flat(start))
 }
 
 /// A stack in RAM, and a first instruction in the image: else the board would start into nothing.

@@ -9,6 +9,7 @@ use super::busy;
 use crate::cmd::report::rounded;
 use crate::console::Console;
 use crate::failure::Failure;
+use crate::firmware::APPLICATION;
 use crate::rig_file;
 use crate::sim::{Served, SimulatedChip};
 use crate::stopwatch::Stopwatch;
@@ -21,11 +22,7 @@ use crate::stopwatch::Stopwatch;
 #[derive(Debug, clap::Args)]
 pub struct Args {
     /// The firmware.
-    #[arg(
-        long,
-        value_name = "FIRMWARE",
-        default_value = "firmware/nucleo-g474/target/thumbv7em-none-eabihf/release/vergence-nucleo-g474"
-    )]
+    #[arg(long, value_name = "FIRMWARE", default_value = APPLICATION)]
     elf: PathBuf,
     /// Seconds of simulated time for each figure.
     #[arg(long, default_value_t = 5, value_parser = clap::value_parser!(u16).range(1..))]

@@ -59,7 +59,7 @@ pub async fn run(file: &Path, probe: Option<&str>, globals: &Globals, console: C
 /// An ELF file has no seal, so the boot loader would not start it: it can only be the boot loader itself.
 fn check_boot_loader(file: &Path, content: &[u8]) -> Result<(), Failure> {
     let start = elf_start(content).map_err(|problem| Failure::input(file, problem))?;
-    if start == u64::from(FLASH_BASE + BOOTLOADER.start) {
+    if start == FLASH_BASE + BOOTLOADER.start {
         return Ok(());
     }
     Err(Failure::input(

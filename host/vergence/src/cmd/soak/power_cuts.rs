@@ -12,7 +12,7 @@ use vergence_soak::power_cuts::{CutTally, Journey, SignedImage, Sweep, twin};
 use crate::cmd::report::rounded;
 use crate::console::Console;
 use crate::failure::Failure;
-use crate::firmware::{DEVELOPMENT, SecretKey, hex};
+use crate::firmware::{APPLICATION, BOOT_LOADER, DEVELOPMENT, SecretKey, hex};
 use crate::output::write_whole;
 use crate::stopwatch::Stopwatch;
 
@@ -30,20 +30,10 @@ pub struct Options {
     #[arg(long, value_name = "COUNT", conflicts_with_all = ["scenarios", "seed", "only"])]
     power_cuts: Option<usize>,
     /// The application, for the image before the update and, in other words, the one after it.
-    #[arg(
-        long,
-        value_name = "ELF",
-        requires = "power_cuts",
-        default_value = "firmware/nucleo-g474/target/thumbv7em-none-eabihf/release/vergence-nucleo-g474"
-    )]
+    #[arg(long, value_name = "ELF", requires = "power_cuts", default_value = APPLICATION)]
     elf: PathBuf,
     /// The boot loader.
-    #[arg(
-        long,
-        value_name = "ELF",
-        requires = "power_cuts",
-        default_value = "firmware/nucleo-g474/target/thumbv7em-none-eabihf/release/vergence-bootloader"
-    )]
+    #[arg(long, value_name = "ELF", requires = "power_cuts", default_value = BOOT_LOADER)]
     boot_loader: PathBuf,
     /// Keep the counts in this file, and go on with what it holds.
     #[arg(long, value_name = "FILE", requires = "power_cuts")]
