@@ -30,7 +30,7 @@ pub struct Board {
     axes: Vec<AxisInfo>,
     pose: PoseReport,
     lease_ms: u16,
-    moves: u16,
+    latest_move: MoveId,
     progress: ProgressBar,
     stream_note: Option<String>,
 }
@@ -71,9 +71,8 @@ impl Board {
         let Report::Info { info, .. } = client.ask(Request::GetInfo).await? else {
             return Err(Failure::protocol("the board answered a question about itself with something else"));
         };
-        let pose = empty_pose();
-        let mut board =
-            Self { client, rig, info, axes: Vec::new(), pose, lease_ms, moves: 0, progress, stream_note: None };
+        let (axes, pose, latest_move) = (Vec::new(), empty_pose(), MoveId(0));
+        let mut board = Self { client, rig, info, axes, pose, lease_ms, latest_move, progress, stream_note: None };
         board.follow_stream().await?;
         Ok(board)
     }
@@ -229,13 +228,21 @@ impl Board {
         self.client.hold_lease(self.lease_ms).await?;
         self.ask(Request::Arm { session: self.client.session() }).await?;
         let outcome = tokio::select! {
-            outcome = work(self) => outcome,
+            outcome = async { self.take_hold().await?; work(self).await } => outcome,
             _ = tokio::signal::ctrl_c() => Err(Failure::device("interrupted: the stages were told to stop")),
         };
         let disarmed = self.release().await;
         // A latched fault cannot be disarmed; the first failure is the one to tell.
         let value = outcome?;
         disarmed.map(|()| value)
+    }
+
+    /// Waits for a pose from after the arming: from then on nobody else can move the board, and its move is the one before
+    /// our next.
+    async fn take_hold(&mut self) -> Result<(), Failure> {
+        self.wait_until(|pose| pose.state == ControllerState::Ready).await?;
+        self.latest_move = self.pose.move_id;
+        Ok(())
     }
 
     /// Disarms and waits until the board is idle; in motion it brakes first.
@@ -275,7 +282,7 @@ impl Board {
     /// A target out of range, the fault that ended the move, a refusal, or a stop.
     pub async fn move_to(&mut self, mode: Mode, targets: &[AxisPosition]) -> Result<(), Failure> {
         check_range(&self.rig, targets)?;
-        let (id, targets) = (self.next_move(), self.rig.wire_targets(targets));
+        let (id, targets) = (self.next_move_id(), self.rig.wire_targets(targets));
         self.ask(Request::MoveTo(Move { id, mode, targets, speed: Permille::FULL })).await?;
         self.wait_for_move(id).await
     }
@@ -286,15 +293,16 @@ impl Board {
     /// # Errors
     /// The fault that ended the move, a refusal, or a stop.
     pub async fn move_by(&mut self, distances: &[AxisPosition]) -> Result<(), Failure> {
-        let (id, by) = (self.next_move(), self.rig.wire_targets(distances));
+        let (id, by) = (self.next_move_id(), self.rig.wire_targets(distances));
         self.ask(Request::Jog(Jog { id, by, speed: Permille::FULL })).await?;
         self.wait_for_move(id).await
     }
 
-    /// Random sessions make these unique; zero means "no move yet".
-    fn next_move(&mut self) -> MoveId {
-        self.moves = self.moves.wrapping_add(1).max(1);
-        MoveId(self.moves)
+    /// Another than the board's last one: a pose on its way while the move is ordered still tells of that. Zero means "no
+    /// move yet".
+    fn next_move_id(&mut self) -> MoveId {
+        self.latest_move = MoveId(self.latest_move.0.wrapping_add(1).max(1));
+        self.latest_move
     }
 
     async fn wait_for_move(&mut self, id: MoveId) -> Result<(), Failure> {
