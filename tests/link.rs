@@ -9,9 +9,8 @@
 use std::time::Duration;
 
 use vergence::board::Board;
-use vergence::link::{Client, HostClock, OpenWire};
 use vergence::move_plan::MovePlan;
-use vergence::sim::{SharedRig, SimulatedRig, spawn_in_process};
+use vergence::sim::{self, SharedRig, SimulatedRig};
 use vergence_protocol::{SessionId, SettingItem, SettingKey};
 use vergence_rig::{BENCH_TOML, Rig};
 
@@ -29,9 +28,8 @@ async fn board() -> Board {
 
 /// A session with a simulated board.
 async fn board_of(simulated: &SharedRig, session: u32) -> Board {
-    let wire = OpenWire::in_process(spawn_in_process(simulated.clone()));
-    let client = Client::connect(wire, SessionId(session), HostClock::start()).await.expect("a session");
-    Board::new(client, bench(), 100, indicatif::ProgressBar::hidden()).await.expect("a board")
+    let hidden = indicatif::ProgressBar::hidden();
+    sim::board_of(simulated, bench(), SessionId(session), 100, hidden).await.expect("a board")
 }
 
 /// Microseconds from one pose to the next.
