@@ -6,10 +6,11 @@
     reason = "a test fails loudly and shows its figures"
 )]
 
+use std::time::Duration;
+
 use vergence::board::Board;
-use vergence::link::{Client, HostClock, OpenWire};
 use vergence::move_plan::MovePlan;
-use vergence::sim::{SharedRig, SimulatedRig, spawn_in_process};
+use vergence::sim::{self, SharedRig, SimulatedRig};
 use vergence_protocol::{SessionId, SettingItem, SettingKey};
 use vergence_rig::{BENCH_TOML, Rig};
 
@@ -27,9 +28,8 @@ async fn board() -> Board {
 
 /// A session with a simulated board.
 async fn board_of(simulated: &SharedRig, session: u32) -> Board {
-    let wire = OpenWire::in_process(spawn_in_process(simulated.clone()));
-    let client = Client::connect(wire, SessionId(session), HostClock::start()).await.expect("a session");
-    Board::new(client, bench(), 100, indicatif::ProgressBar::hidden()).await.expect("a board")
+    let hidden = indicatif::ProgressBar::hidden();
+    sim::board_of(simulated, bench(), SessionId(session), 100, hidden).await.expect("a board")
 }
 
 /// Microseconds from one pose to the next.
@@ -101,4 +101,32 @@ async fn settings_are_refused_while_armed() {
     assert_eq!(board.setting(key).await, Ok(Some(80_000)));
     board.set(key, 40_000).await.expect("the link holds").expect("it is disarmed");
     assert_eq!(board.setting(key).await, Ok(Some(40_000)));
+}
+
+/// Regression: every session numbered its moves from 1, and a pose that was on its way when a move was ordered still told of
+/// the move of the session before, as settled. The new move then counted as reached where it had not begun.
+#[tokio::test(start_paused = true)]
+#[allow(clippy::disallowed_methods, reason = "virtual time")]
+async fn a_move_of_the_session_before_is_not_taken_for_this_one() {
+    let (simulated, modes) = (simulated(), bench().modes);
+    let mut before = board_of(&simulated, 10).await;
+    let homed = before.armed(async |board| {
+        board.home().await?;
+        board.move_to(modes[0].number, &modes[0].targets).await
+    });
+    homed.await.expect("it moves");
+    drop(before);
+
+    let mut board = board_of(&simulated, 11).await;
+    board
+        .armed(async |board| {
+            // Long enough for a pose to come that nobody has looked at when the move is ordered.
+            tokio::time::sleep(Duration::from_millis(25)).await;
+            board.move_to(modes[1].number, &modes[1].targets).await
+        })
+        .await
+        .expect("it moves");
+    for (reached, target) in board.positions().iter().zip(&modes[1].targets) {
+        assert!(reached.minus(*target).value().abs() < 0.001, "{reached} is not {target}");
+    }
 }

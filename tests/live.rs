@@ -19,12 +19,11 @@ use serde_json::Value;
 use tokio::sync::mpsc;
 use vergence::board::Board;
 use vergence::camera::{FrameTiming, Stage};
-use vergence::link::{Client, HostClock, OpenWire};
 use vergence::live::{
     Exposed, Exposures, Limits, LiveFrame, LiveLoop, Measured, News, Seen, SimulatedEye, TimeBase, Told, Totals,
 };
 use vergence::look::ColouredPoint;
-use vergence::sim::{SharedRig, SimulatedRig, spawn_in_process};
+use vergence::sim::{SharedRig, SimulatedRig, board_of};
 use vergence_matching::GuidedMatcher;
 use vergence_protocol::{AxisList, FrameMark, Microseconds, Mode, Request, SessionId, Trigger};
 use vergence_rig::{AxisPosition, BENCH_TOML, ClockMap, Exchange, HostInstant, Rig, Shutter};
@@ -62,10 +61,8 @@ impl Bench {
     async fn new(believed: [Shutter; 2]) -> Self {
         let rig = rig();
         let simulated = SharedRig::new(SimulatedRig::new(&rig, 1).expect("a simulated rig"));
-        let wire = OpenWire::in_process(spawn_in_process(simulated.clone()));
-        let client = Client::connect(wire, SessionId(7), HostClock::start()).await.expect("a session");
         let hidden = indicatif::ProgressBar::hidden();
-        let mut board = Board::new(client, rig.clone(), 1000, hidden).await.expect("a board");
+        let mut board = board_of(&simulated, rig.clone(), SessionId(7), 1000, hidden).await.expect("a board");
         board.compare_clocks().await.expect("the link holds");
         board.armed(async |board| board.home().await).await.expect("homed");
         let (listener, news) = mpsc::channel(16);

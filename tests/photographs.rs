@@ -8,7 +8,7 @@
 
 mod common;
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use common::{run_json, shared};
 use nalgebra::{Matrix3, Rotation3, Vector3};
@@ -74,6 +74,41 @@ fn flatness(points: &[Vector3<f64>]) -> f64 {
     (scatter.symmetric_eigenvalues().min() / count).sqrt()
 }
 
+/// A photographed pair of the set, and a folder for what is made of it.
+struct RealPair {
+    set: PathBuf,
+    folder: tempfile::TempDir,
+    rig: String,
+}
+
+impl RealPair {
+    /// `None` without the set.
+    fn new() -> Option<Self> {
+        let set = shared("data/sourishg_stereo")?;
+        let folder = tempfile::tempdir().expect("a temporary folder");
+        let rig = write_rig(&set, folder.path());
+        Some(Self { set, folder, rig })
+    }
+
+    fn file(&self, name: &str) -> String {
+        self.folder.path().join(name).to_string_lossy().into_owned()
+    }
+
+    /// A file of the board's corners in both images.
+    fn corners(&self) -> String {
+        let pairs = self.file("pairs.csv");
+        std::fs::write(&pairs, correspondences(&self.set.join("corners_opencv_classic.csv"))).expect("written");
+        pairs
+    }
+
+    fn depth(&self, options: &[&str]) -> Value {
+        let image = |name: &str| self.set.join("images").join(name).to_string_lossy().into_owned();
+        let (left, right) = (image("left10.jpg"), image("right10.jpg"));
+        let depth = ["depth", "--json", "--rig", &self.rig, "--left", &left, "--right", &right];
+        run_json(&[&depth[..], options].concat())
+    }
+}
+
 /// Writes the rig file of the set into `folder`.
 fn write_rig(set: &Path, folder: &Path) -> String {
     let text = std::fs::read_to_string(set.join("reference_opencv_classic_cv5.json")).expect("a reference");
@@ -86,17 +121,12 @@ fn write_rig(set: &Path, folder: &Path) -> String {
 /// The published networks see the same scene, and nearly all that both matchers see lies at the same range.
 #[test]
 fn networks_and_the_classical_matcher_agree_on_a_real_pair() {
-    let (Some(set), Some(models)) = (shared("data/sourishg_stereo"), shared("models")) else { return };
-    let folder = tempfile::tempdir().expect("a temporary folder");
-    let file = |name: &str| folder.path().join(name).to_string_lossy().into_owned();
-    let image = |name: &str| set.join("images").join(name).to_string_lossy().into_owned();
-    let (rig, left, right, store) =
-        (write_rig(&set, folder.path()), image("left10.jpg"), image("right10.jpg"), file("store"));
+    let (Some(pair), Some(models)) = (RealPair::new(), shared("models")) else { return };
+    let store = pair.file("store");
     run_json(&["models", "add", &models.to_string_lossy(), "--models", &store, "--json"]);
-    let depth = ["depth", "--json", "--rig", &rig, "--left", &left, "--right", &right];
-    let (learned, classical) = (file("learned.ply"), file("classical.ply"));
-    run_json(&[&depth[..], &["--out", &learned, "--matcher", "learned", "--models", &store]].concat());
-    run_json(&[&depth[..], &["--out", &classical]].concat());
+    let (learned, classical) = (pair.file("learned.ply"), pair.file("classical.ply"));
+    pair.depth(&["--out", &learned, "--matcher", "learned", "--models", &store]);
+    pair.depth(&["--out", &classical]);
     let [learned, classical] = [learned, classical].map(|cloud| points(Path::new(&cloud)));
     // Points of the two clouds that lie in one direction to half a degree.
     let (mut near, mut alike) = (0, 0);
@@ -114,21 +144,14 @@ fn networks_and_the_classical_matcher_agree_on_a_real_pair() {
 
 #[test]
 fn a_cloud_and_a_flat_board_from_a_real_pair() {
-    let Some(set) = shared("data/sourishg_stereo") else { return };
-    let folder = tempfile::tempdir().expect("a temporary folder");
-    let file = |name: &str| folder.path().join(name).to_string_lossy().into_owned();
-    std::fs::write(file("pairs.csv"), correspondences(&set.join("corners_opencv_classic.csv"))).expect("written");
-    let image = |name: &str| set.join("images").join(name).to_string_lossy().into_owned();
-    let (rig, left, right) = (write_rig(&set, folder.path()), image("left10.jpg"), image("right10.jpg"));
-    let (cloud, board, pairs) = (file("cloud.ply"), file("board.ply"), file("pairs.csv"));
-    let depth = ["depth", "--json", "--rig", &rig, "--left", &left, "--right", &right, "--out"];
-
-    let result = run_json(&[&depth[..], &[&cloud]].concat());
+    let Some(pair) = RealPair::new() else { return };
+    let (cloud, board, pairs) = (pair.file("cloud.ply"), pair.file("board.ply"), pair.corners());
+    let result = pair.depth(&["--out", &cloud]);
     let count = result["points"].as_u64().expect("a count");
     assert!(count >= 200, "{result}");
     assert_eq!(points(Path::new(&cloud)).len() as u64, count);
 
-    let result = run_json(&[&depth[..], &[&board, "--points", &pairs]].concat());
+    let result = pair.depth(&["--out", &board, "--points", &pairs]);
     let corners = points(Path::new(&board));
     assert!(corners.len() >= 50, "{result}");
     let rms = flatness(&corners);
@@ -139,18 +162,12 @@ fn a_cloud_and_a_flat_board_from_a_real_pair() {
 /// A range for every pixel: the board's corners lie where the dense cloud has them.
 #[test]
 fn dense_ranges_of_a_real_pair_hold_the_board() {
-    let Some(set) = shared("data/sourishg_stereo") else { return };
-    let folder = tempfile::tempdir().expect("a temporary folder");
-    let file = |name: &str| folder.path().join(name).to_string_lossy().into_owned();
-    std::fs::write(file("pairs.csv"), correspondences(&set.join("corners_opencv_classic.csv"))).expect("written");
-    let image = |name: &str| set.join("images").join(name).to_string_lossy().into_owned();
-    let (rig, left, right) = (write_rig(&set, folder.path()), image("left10.jpg"), image("right10.jpg"));
-    let (cloud, board, pairs) = (file("dense.ply"), file("board.ply"), file("pairs.csv"));
-    let depth = ["depth", "--json", "--rig", &rig, "--left", &left, "--right", &right, "--out"];
-    let result = run_json(&[&depth[..], &[&cloud, "--dense"]].concat());
-    run_json(&[&depth[..], &[&board, "--points", &pairs]].concat());
+    let Some(pair) = RealPair::new() else { return };
+    let (cloud, board, pairs) = (pair.file("dense.ply"), pair.file("board.ply"), pair.corners());
+    let result = pair.depth(&["--out", &cloud, "--dense"]);
+    pair.depth(&["--out", &board, "--points", &pairs]);
 
-    let ranges = image::open(file("dense-range.png")).expect("a range image").into_luma16();
+    let ranges = image::open(pair.file("dense-range.png")).expect("a range image").into_luma16();
     assert_eq!(ranges.dimensions(), (960, 600));
     let text = std::fs::read_to_string(&board).expect("a cloud");
     let (_, body) = text.split_once("end_header\n").expect("a header");

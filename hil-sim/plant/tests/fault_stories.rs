@@ -11,7 +11,7 @@ use vergence_protocol::{AxisMask, ControllerState, FaultCode, FaultRecord, Micro
 type Harm = fn(&mut Rigged);
 
 const HERBIVORE: [i32; 2] = [145_000, 2_094_395];
-const HUMAN: [i32; 2] = [63_000, 0];
+const HUMAN: [i32; 2] = [145_000, 0];
 
 /// In the middle of a move, at full speed.
 fn under_way() -> Rigged {

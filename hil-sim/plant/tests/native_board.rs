@@ -12,7 +12,7 @@ use vergence_protocol::{
 
 /// Baseline in micrometres, separation in microradians.
 const HERBIVORE: [i32; 2] = [145_000, 2_094_395];
-const HUMAN: [i32; 2] = [63_000, 0];
+const HUMAN: [i32; 2] = [145_000, 0];
 
 /// The reference is the switch edge seen at a tick: late by the way of one tick at most.
 fn reference_error(axis: &AxisSettings) -> f64 {

@@ -1,6 +1,6 @@
 //! A checkerboard target for calibration, and the plain studio it is photographed in.
 
-use nalgebra::Vector3;
+use nalgebra::{UnitQuaternion, Vector3};
 use vergence_vision::{Frame, Length, Point, Transform, World};
 
 use crate::Scene;
@@ -44,6 +44,12 @@ impl Board {
     pub fn centre(&self) -> Point<Self> {
         let middle = Vector3::new(f64::from(self.columns) - 1.0, f64::from(self.rows) - 1.0, 0.0);
         Point::from_mm(middle * (0.5 * self.square.mm()))
+    }
+
+    /// Where the board is, turned by `rotation` with its middle at `middle`, in millimetres.
+    #[must_use]
+    pub fn placed<F: Frame>(&self, rotation: UnitQuaternion<f64>, middle: Vector3<f64>) -> Transform<F, Self> {
+        Transform::new(rotation, middle - rotation * self.centre().mm())
     }
 
     /// Width and height including the border.

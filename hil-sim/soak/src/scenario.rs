@@ -10,7 +10,7 @@ use crate::stages::stages;
 /// Baseline in micrometres, separation in microradians.
 const HERBIVORE: Destination =
     Destination { mode: Mode(1), targets: [Micro(145_000), Micro(2_094_395)], speed: Permille::FULL };
-const HUMAN: Destination = Destination { mode: Mode(2), targets: [Micro(63_000), Micro(0)], speed: Permille::FULL };
+const HUMAN: Destination = Destination { mode: Mode(2), targets: [Micro(145_000), Micro(0)], speed: Permille::FULL };
 /// Modes of random places.
 const ANYWHERE: Mode = Mode(3);
 

@@ -49,7 +49,7 @@ impl Pose {
         let turn = |axis: Vector3<f64>, angle: f64| UnitQuaternion::from_scaled_axis(axis * angle);
         let towards = turn(Vector3::new(-azimuth.sin(), azimuth.cos(), 0.0), theta);
         let rotation = towards * turn(Vector3::z(), roll) * turn(Vector3::y(), tilt);
-        Transform::new(rotation, towards * Vector3::z() * self.distance_mm - rotation * board.centre().mm())
+        board.placed(rotation, towards * Vector3::z() * self.distance_mm)
     }
 }
 

@@ -63,9 +63,6 @@ pub struct FramePairing {
     frames: VecDeque<StampedFrame>,
     fates: VecDeque<Fate>,
     last_event: Option<u32>,
-    last_frame: Option<u32>,
-    events_lost: u64,
-    frames_lost: u64,
 }
 
 impl FramePairing {
@@ -80,17 +77,13 @@ impl FramePairing {
             frames: VecDeque::new(),
             fates: VecDeque::new(),
             last_event: None,
-            last_frame: None,
-            events_lost: 0,
-            frames_lost: 0,
         }
     }
 
     /// An event arrived. One whose number is not higher than the last begins anew.
     pub fn event(&mut self, event: TimedEvent) {
-        match gap(self.last_event.replace(event.seq), event.seq) {
-            Some(lost) => self.events_lost += lost,
-            None => self.give_up_events(usize::MAX),
+        if self.last_event.replace(event.seq).is_some_and(|last| event.seq <= last) {
+            self.give_up_events(usize::MAX);
         }
         self.events.push_back(event);
         self.resolve();
@@ -98,7 +91,6 @@ impl FramePairing {
 
     /// A frame arrived.
     pub fn frame(&mut self, frame: StampedFrame) {
-        self.frames_lost += gap(self.last_frame.replace(frame.seq), frame.seq).unwrap_or(0);
         self.frames.push_back(frame);
         self.resolve();
     }
@@ -119,18 +111,6 @@ impl FramePairing {
     /// The next thing that is certain, in the order in which it became so.
     pub fn take(&mut self) -> Option<Fate> {
         self.fates.pop_front()
-    }
-
-    /// How many events never arrived, by the gaps in their numbers.
-    #[must_use]
-    pub const fn events_lost(&self) -> u64 {
-        self.events_lost
-    }
-
-    /// How many frames the camera took that never arrived, by the gaps in their numbers.
-    #[must_use]
-    pub const fn frames_lost(&self) -> u64 {
-        self.frames_lost
     }
 
     /// How much longer than the time between two events the uncertainty of `frame`'s event is, in microseconds; `None`
@@ -193,13 +173,5 @@ impl FramePairing {
     fn give_up_events(&mut self, count: usize) {
         let count = count.min(self.events.len());
         self.fates.extend(self.events.drain(..count).map(|event| Fate::EventAlone(event.seq)));
-    }
-}
-
-/// How many numbers are left out between two; `None` where they do not grow.
-fn gap(last: Option<u32>, next: u32) -> Option<u64> {
-    match last {
-        None => Some(0),
-        Some(last) => next.checked_sub(last)?.checked_sub(1).map(u64::from),
     }
 }

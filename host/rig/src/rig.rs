@@ -2,7 +2,7 @@
 
 use nalgebra::Isometry3;
 use vergence_protocol::{AxisList, Micro};
-use vergence_vision::{Angle, KannalaBrandt, Left, Length, Right, Transform};
+use vergence_vision::{Angle, KannalaBrandt, Left, Length, Right, Side, Transform};
 
 use crate::axis::{AxisPosition, RigAxis};
 use crate::chain::Chain;
@@ -62,6 +62,15 @@ impl Rig {
             left_chain: Chain::new(Vec::new(), Transform::from_isometry(Isometry3::identity())),
             right_chain: Chain::new(Vec::new(), left_from_right.renamed()),
             calibration_sigma: sigma,
+        }
+    }
+
+    /// The camera on `side`.
+    #[must_use]
+    pub const fn camera(&self, side: Side) -> &KannalaBrandt {
+        match side {
+            Side::Left => &self.left_camera,
+            Side::Right => &self.right_camera,
         }
     }
 

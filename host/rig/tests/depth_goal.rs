@@ -3,11 +3,9 @@
 #![allow(clippy::expect_used, reason = "a test fails loudly")]
 #![allow(clippy::print_stdout, reason = "tests show their figures")]
 
-mod common;
-
-use common::Gaussian;
 use nalgebra::{UnitQuaternion, Vector3};
 use vergence_rig::{BENCH_TOML, DepthField, DepthGoal, DepthSigma, Rig};
+use vergence_vision::study::Gaussian;
 use vergence_vision::{Angle, Kernel, Left, Length, PixelPair, Point, Right, StereoPair, Transform};
 
 const PIXEL_SIGMA: f64 = 0.1;

@@ -4,9 +4,6 @@
 #![allow(clippy::expect_used, reason = "a test fails loudly")]
 #![allow(clippy::print_stdout, reason = "tests show their figures")]
 
-mod common;
-
-use common::Gaussian;
 use nalgebra::Vector3;
 use vergence_control::StepSchedule;
 use vergence_plant::{AxisPlant, bench_mechanics, bench_settings};
@@ -14,6 +11,7 @@ use vergence_protocol::{AxisList, Counts, Microseconds};
 use vergence_rig::{
     BENCH_TOML, BoardInstant, Exposure, JointSample, JointTrack, Joints, PairExposure, Rig, Shutter, moving_cloud,
 };
+use vergence_vision::study::Gaussian;
 use vergence_vision::{Base, Frame, Gates, KannalaBrandt, Left, Length, Pixel, PixelPair, Point, Transform};
 
 const PIXEL_SIGMA: f64 = 0.05;

@@ -1,5 +1,6 @@
-//! A connected board and what can be asked of it: arm under a lease, home, move, stop.
+//! A connected board: what it says of itself, the poses that it sends, and how it is asked.
 
+mod motion;
 mod questions;
 mod stream;
 mod words;
@@ -9,8 +10,8 @@ use std::time::Duration;
 use indicatif::ProgressBar;
 use tokio::time::timeout;
 use vergence_protocol::{
-    AxisInfo, AxisMask, BoardInfo, Compatibility, ControllerState, FaultRecord, Jog, Mode, Move, MoveId, MovePhase,
-    Permille, PoseReport, Refusal, Report, Request, SessionId, Status, StopKind,
+    AxisInfo, AxisMask, BoardInfo, Compatibility, ControllerState, Mode, MoveId, MovePhase, PoseReport, Refusal,
+    Report, Request, SessionId, Status,
 };
 use vergence_rig::{AxisPosition, HostInstant, Rig};
 
@@ -30,7 +31,7 @@ pub struct Board {
     axes: Vec<AxisInfo>,
     pose: PoseReport,
     lease_ms: u16,
-    moves: u16,
+    latest_move: MoveId,
     progress: ProgressBar,
     stream_note: Option<String>,
 }
@@ -71,9 +72,8 @@ impl Board {
         let Report::Info { info, .. } = client.ask(Request::GetInfo).await? else {
             return Err(Failure::protocol("the board answered a question about itself with something else"));
         };
-        let pose = empty_pose();
-        let mut board =
-            Self { client, rig, info, axes: Vec::new(), pose, lease_ms, moves: 0, progress, stream_note: None };
+        let (axes, pose, latest_move) = (Vec::new(), empty_pose(), MoveId(0));
+        let mut board = Self { client, rig, info, axes, pose, lease_ms, latest_move, progress, stream_note: None };
         board.follow_stream().await?;
         Ok(board)
     }
@@ -219,121 +219,6 @@ impl Board {
             }
             _ => Failure::device(message),
         }
-    }
-
-    /// Arms, does `work` under a live lease, and disarms whatever became of it. Ctrl-C stops the stages first.
-    ///
-    /// # Errors
-    /// Those of `work`; a refusal to arm; an interruption.
-    pub async fn armed<T>(&mut self, work: impl AsyncFnOnce(&mut Self) -> Result<T, Failure>) -> Result<T, Failure> {
-        self.client.hold_lease(self.lease_ms).await?;
-        self.ask(Request::Arm { session: self.client.session() }).await?;
-        let outcome = tokio::select! {
-            outcome = work(self) => outcome,
-            _ = tokio::signal::ctrl_c() => Err(Failure::device("interrupted: the stages were told to stop")),
-        };
-        let disarmed = self.release().await;
-        // A latched fault cannot be disarmed; the first failure is the one to tell.
-        let value = outcome?;
-        disarmed.map(|()| value)
-    }
-
-    /// Disarms and waits until the board is idle; in motion it brakes first.
-    ///
-    /// # Errors
-    /// A refusal, or a link that ended.
-    pub async fn disarm(&mut self) -> Result<(), Failure> {
-        self.ask(Request::Disarm).await?;
-        self.wait_until(|pose| pose.state == ControllerState::Idle).await
-    }
-
-    /// Disarms where a motion was given up in the middle: it brakes first, and no lease is held any more.
-    ///
-    /// # Errors
-    /// A refusal, or a link that ended.
-    pub async fn release(&mut self) -> Result<(), Failure> {
-        let disarmed = self.disarm().await;
-        self.client.hold_lease(0).await?;
-        disarmed
-    }
-
-    /// Finds the reference of all axes. The board must be armed.
-    ///
-    /// # Errors
-    /// The fault that ended it, or a refusal.
-    pub async fn home(&mut self) -> Result<(), Failure> {
-        let axes = AxisMask::first(self.rig.axes.len());
-        self.ask(Request::Home { axes }).await?;
-        // A pose that was already on its way still shows the old reference.
-        self.wait_until(|pose| pose.state == ControllerState::Homing).await?;
-        self.wait_until(|pose| pose.state != ControllerState::Homing && pose.referenced == axes).await
-    }
-
-    /// Moves all axes and waits until the encoders confirm it. The board must be armed.
-    ///
-    /// # Errors
-    /// A target out of range, the fault that ended the move, a refusal, or a stop.
-    pub async fn move_to(&mut self, mode: Mode, targets: &[AxisPosition]) -> Result<(), Failure> {
-        check_range(&self.rig, targets)?;
-        let (id, targets) = (self.next_move(), self.rig.wire_targets(targets));
-        self.ask(Request::MoveTo(Move { id, mode, targets, speed: Permille::FULL })).await?;
-        self.wait_for_move(id).await
-    }
-
-    /// Moves all axes by a distance from where they stand, and waits until the encoders confirm it. Works without
-    /// reference, at homing speed. The board must be armed.
-    ///
-    /// # Errors
-    /// The fault that ended the move, a refusal, or a stop.
-    pub async fn move_by(&mut self, distances: &[AxisPosition]) -> Result<(), Failure> {
-        let (id, by) = (self.next_move(), self.rig.wire_targets(distances));
-        self.ask(Request::Jog(Jog { id, by, speed: Permille::FULL })).await?;
-        self.wait_for_move(id).await
-    }
-
-    /// Random sessions make these unique; zero means "no move yet".
-    fn next_move(&mut self) -> MoveId {
-        self.moves = self.moves.wrapping_add(1).max(1);
-        MoveId(self.moves)
-    }
-
-    async fn wait_for_move(&mut self, id: MoveId) -> Result<(), Failure> {
-        self.wait_until(|pose| pose.move_id == id && matches!(pose.phase, MovePhase::Settled | MovePhase::Stopped))
-            .await?;
-        if self.pose.phase == MovePhase::Stopped {
-            return Err(Failure::device("the move was stopped by another command: the stages stand where they are"));
-        }
-        Ok(())
-    }
-
-    /// Stops every motion and waits until all is at rest.
-    ///
-    /// # Errors
-    /// Where the link ended.
-    pub async fn stop(&mut self) -> Result<(), Failure> {
-        self.ask(Request::Stop { kind: StopKind::Decelerate }).await?;
-        let moving = [ControllerState::Moving, ControllerState::Homing, ControllerState::Stopping];
-        self.wait_until(|pose| !moving.contains(&pose.state)).await
-    }
-
-    /// Stays armed for `duration`, or for ever, as long as nothing goes wrong.
-    ///
-    /// # Errors
-    /// The fault that ended it, or a link that ended.
-    pub async fn hold(&mut self, duration: Option<Duration>) -> Result<(), Failure> {
-        let watched = self.wait_for(duration, |_| false).await;
-        watched.unwrap_or(Ok(()))
-    }
-
-    /// Clears the latched fault and returns it; `None` where nothing is latched.
-    ///
-    /// # Errors
-    /// A refusal, such as a cause that persists, or a link that ended.
-    pub async fn clear(&mut self) -> Result<Option<FaultRecord>, Failure> {
-        let Some(fault) = self.pose.fault else { return Ok(None) };
-        self.ask(Request::ClearFault { seen: fault.seq }).await?;
-        self.wait_until(|pose| pose.fault.is_none()).await?;
-        Ok(Some(fault))
     }
 
     /// Waits for poses until one satisfies `done`; a fault that was not latched before ends the wait.

@@ -22,6 +22,22 @@ impl CameraFile {
     pub fn shutter(&self) -> Shutter {
         self.document.as_ref().map_or(Shutter::Global, |document| document.camera.shutter())
     }
+
+    /// The same in the text of `format`. Other programs' files say less than ours.
+    ///
+    /// # Errors
+    /// Where TOML cannot say it.
+    pub fn text(&self, format: CameraFormat) -> Result<String, Failure> {
+        match (format, &self.document) {
+            (CameraFormat::Kalibr, _) => Ok(kalibr::write(&self.cameras)),
+            (CameraFormat::OpenCv, _) => Ok(opencv::write(&self.cameras.left)),
+            (CameraFormat::Toml, Some(document)) => toml_of(document),
+            (CameraFormat::Toml, None) => {
+                let camera = CameraTable::of(&self.cameras.left);
+                toml_of(&CameraDocument { camera, calibration: None, provenance: None })
+            }
+        }
+    }
 }
 
 /// Reads a camera file: ours, OpenCV's or Kalibr's, told apart by their contents.
@@ -42,20 +58,6 @@ pub fn read(path: &Path) -> Result<CameraFile, Failure> {
         }
     };
     Ok(CameraFile { format, cameras, document })
-}
-
-/// A camera in the text of `format`.
-///
-/// # Errors
-/// Where TOML cannot say it.
-pub fn text_of(cameras: &Camchain, format: CameraFormat) -> Result<String, Failure> {
-    Ok(match format {
-        CameraFormat::Kalibr => kalibr::write(cameras),
-        CameraFormat::OpenCv => opencv::write(&cameras.left),
-        CameraFormat::Toml => {
-            toml_of(&CameraDocument { camera: CameraTable::of(&cameras.left), calibration: None, provenance: None })?
-        }
-    })
 }
 
 /// A document as TOML.

@@ -14,7 +14,7 @@ use vergence_rig::HostInstant;
 
 pub use exposure::{FrameTiming, StampedAt};
 pub use files::{FileCamera, read_image};
-pub use simulated::{Eye, SimulatedCamera, Stage};
+pub use simulated::{SimulatedCamera, Stage};
 pub use simulated_board::{BoardStage, SimulatedBoardCamera};
 pub use together::{CameraSet, as_event, as_stamped, side_by_side};
 pub use v4l::{Settings as V4lSettings, V4lCamera};

@@ -5,21 +5,12 @@ use std::sync::Arc;
 use nalgebra::{UnitQuaternion, Vector3};
 use vergence_rig::{HostInstant, RigPose};
 use vergence_scene::{Optics, Scene, View, render};
-use vergence_vision::{Base, Camera as CameraFrame, KannalaBrandt, Left, Transform, World};
+use vergence_vision::{Base, Camera as CameraFrame, KannalaBrandt, Left, Side, Transform, World};
 
 use super::{Camera, Frame};
 use crate::failure::Failure;
 use crate::link::HostClock;
 use crate::sim::SharedRig;
-
-/// Which eye.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Eye {
-    /// The left camera.
-    Left,
-    /// The right camera.
-    Right,
-}
 
 /// The room, and where the rig stands in it.
 #[derive(Clone, Debug)]
@@ -32,8 +23,8 @@ pub struct Stage {
 
 /// One simulated camera.
 pub struct SimulatedCamera {
-    /// Which eye it is.
-    pub eye: Eye,
+    /// Which it is.
+    pub side: Side,
     /// Lens and sensor geometry.
     pub lens: KannalaBrandt,
     /// Lens and sensor quality.
@@ -86,18 +77,18 @@ impl SimulatedCamera {
 
     fn photograph(&mut self, pose: &RigPose) -> Frame {
         let world_from_left = self.stage.world_from_left(pose.base_from_left);
-        let world_from_camera: Transform<World, CameraFrame> = match self.eye {
-            Eye::Left => world_from_left.renamed(),
-            Eye::Right => (world_from_left * pose.left_from_right).renamed(),
+        let world_from_camera: Transform<World, CameraFrame> = match self.side {
+            Side::Left => world_from_left.renamed(),
+            Side::Right => (world_from_left * pose.left_from_right).renamed(),
         };
         let view = View { scene: &self.stage.scene, camera: &self.lens, world_from_camera, optics: &self.optics };
-        // A seed of its own for each eye and frame.
-        let seed = self.seed.wrapping_mul(2).wrapping_add(u64::from(self.eye == Eye::Right));
+        // A seed of its own for each camera and frame.
+        let seed = self.seed.wrapping_mul(2).wrapping_add(self.side.index() as u64);
         let photograph = render(&view, seed.wrapping_add(self.frames << 32));
         self.frames += 1;
         Frame {
             image: photograph.image,
-            name: format!("{:?}{}", self.eye, self.frames).to_lowercase(),
+            name: format!("{}{}", self.side, self.frames),
             seq: u32::try_from(self.frames).ok(),
             exposed_at: Some(HostInstant { us: self.clock.now().0 as f64, error_us: 0.0 }),
         }

@@ -2,9 +2,8 @@
 
 use nalgebra::{UnitQuaternion, Vector3};
 use vergence_scene::{Board, Optics, Scene, View, render};
-use vergence_vision::{Camera as CameraFrame, KannalaBrandt, Left, Point, Right, Transform, World};
+use vergence_vision::{Camera as CameraFrame, KannalaBrandt, Left, Point, Right, Side, Transform, World};
 
-use super::simulated::Eye;
 use super::{Camera, Frame};
 use crate::failure::Failure;
 use crate::sim::Random;
@@ -36,7 +35,7 @@ pub struct SimulatedBoardCamera {
     /// The stage.
     pub stage: BoardStage,
     /// Which camera.
-    pub eye: Eye,
+    pub side: Side,
     /// Frames so far.
     pub frames: u64,
 }
@@ -57,7 +56,7 @@ impl BoardStage {
             let tilt = UnitQuaternion::from_euler_angles(uniform(-0.7, 0.7), uniform(-0.7, 0.7), uniform(-0.5, 0.5));
             let rotation = facing * tilt;
             let centre = towards * uniform(RANGE_MM[0], RANGE_MM[1]);
-            let place = Transform::new(rotation, centre - rotation * self.board.centre().mm());
+            let place = self.board.placed(rotation, centre);
             self.sees(&place).then_some(place)
         })
     }
@@ -84,13 +83,13 @@ impl Camera for SimulatedBoardCamera {
         })?;
         // The left camera's frame is the world of this picture.
         let scene = Scene::board_alone(self.stage.board, place.renamed::<World, Board>());
-        let (camera, world_from_camera): (_, Transform<World, CameraFrame>) = match self.eye {
-            Eye::Left => (&self.stage.left, Transform::new(UnitQuaternion::identity(), Vector3::zeros())),
-            Eye::Right => (&self.stage.right.0, self.stage.right.1.renamed()),
+        let (camera, world_from_camera): (_, Transform<World, CameraFrame>) = match self.side {
+            Side::Left => (&self.stage.left, Transform::new(UnitQuaternion::identity(), Vector3::zeros())),
+            Side::Right => (&self.stage.right.0, self.stage.right.1.renamed()),
         };
         // Corners are edges: many rays there keep them where they are. The rest is plain.
         let optics = Optics { samples: 1, edge_samples: 100, ..Optics::default() };
-        let seed = self.stage.seed.wrapping_mul(4).wrapping_add(self.frames * 2 + u64::from(self.eye == Eye::Right));
+        let seed = self.stage.seed.wrapping_mul(4).wrapping_add(self.frames * 2 + self.side.index() as u64);
         let photograph = render(&View { scene: &scene, camera, world_from_camera, optics: &optics }, seed);
         self.frames += 1;
         let name = format!("frame{:06}", self.frames);

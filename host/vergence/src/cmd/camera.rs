@@ -4,10 +4,10 @@ use std::path::PathBuf;
 
 use nalgebra::Vector3;
 use serde_json::{Value, json};
-use vergence_rig::CameraFormat;
+use vergence_rig::{CameraFormat, Shutter};
 use vergence_vision::{Camera, KannalaBrandt, OpenCvFisheye, Pixel, UnitRay};
 
-use crate::camera_files::{read, read_camera, text_of};
+use crate::camera_files::{read, read_camera};
 use crate::console::Console;
 use crate::failure::Failure;
 use crate::output::write_whole;
@@ -83,7 +83,10 @@ pub fn run(args: &Args, console: Console) -> Result<(), Failure> {
             if file.cameras.right.is_some() && format != CameraFormat::Kalibr {
                 return Err(Failure::usage("the camchain holds a pair; only --to kalibr can hold one"));
             }
-            write_whole(out, text_of(&file.cameras, format)?.as_bytes())?;
+            if format != CameraFormat::Toml && file.shutter() != Shutter::Global {
+                console.warn("the file that is written says nothing of the rolling shutter (line_time)");
+            }
+            write_whole(out, file.text(format)?.as_bytes())?;
             console.say(format!("wrote {}", out.display()))?;
             console.result(&json!({ "out": out }))
         }

@@ -5,12 +5,12 @@ use std::path::PathBuf;
 use serde_json::json;
 use vergence_calibration::{BoardSpec, Coverage};
 use vergence_scene::Board;
-use vergence_vision::ImageSize;
+use vergence_vision::{ImageSize, Side};
 
 use super::board_options::BoardOptions;
 use super::camera_options::CameraOptions;
 use crate::board_watch::{BoardWatch, NAMES, seen};
-use crate::camera::{BoardStage, Camera, CameraSet, Eye, Frame, SimulatedBoardCamera};
+use crate::camera::{BoardStage, Camera, CameraSet, Frame, SimulatedBoardCamera};
 use crate::cli::Globals;
 use crate::console::Console;
 use crate::failure::Failure;
@@ -116,6 +116,6 @@ fn simulated(args: &Args, globals: &Globals, board: &BoardSpec) -> Result<Vec<Bo
         board: Board { columns: board.columns, rows: board.rows, square: board.square },
         seed: args.seed,
     };
-    let eyes = if args.mono { &[Eye::Left][..] } else { &[Eye::Left, Eye::Right] };
-    Ok(eyes.iter().map(|&eye| Box::new(SimulatedBoardCamera { stage, eye, frames: 0 }) as Box<dyn Camera>).collect())
+    let sides = if args.mono { &[Side::Left][..] } else { &[Side::Left, Side::Right] };
+    Ok(sides.iter().map(|&side| Box::new(SimulatedBoardCamera { stage, side, frames: 0 }) as Box<dyn Camera>).collect())
 }

@@ -14,12 +14,11 @@ use crate::board::Board;
 use crate::cli::Globals;
 use crate::console::Console;
 use crate::failure::Failure;
-use crate::link::{Client, HostClock, OpenWire};
 use crate::output::{DepthPicture, depth_picture, make_folder, match_picture, ply, write_png, write_whole};
 use crate::rig_file;
 use crate::rig_zones::ZONE_RADIUS;
 use crate::score::Spread;
-use crate::sim::{SharedRig, SimulatedRig, spawn_in_process};
+use crate::sim::{SharedRig, SimulatedRig, board_of};
 use crate::stopwatch::Stopwatch;
 
 /// Starts a simulated rig in a simulated room, homes it, and in every mode of the rig looks, measures and compares with
@@ -40,13 +39,9 @@ pub async fn run(args: &Args, globals: &Globals, console: Console) -> Result<(),
     let rig = rig_file::load(globals.rig.as_deref())?;
     make_folder(&args.out)?;
     let simulated = SharedRig::new(SimulatedRig::new(&rig, args.seed)?);
-    let wire = OpenWire::in_process(spawn_in_process(simulated.clone()));
-    let clock = HostClock::start();
-    // Seeded, so that not even the session differs between two runs.
-    let client = Client::connect(wire, SessionId((args.seed as u32).max(1)), clock).await?;
-    let progress = console.progress("homing");
-    let mut board = Board::new(client, rig, globals.lease, progress.clone()).await?;
-    let mut eyes = SimulatedEyes::new(board.rig(), &simulated, clock, args.seed);
+    let (session, progress) = (SessionId((args.seed as u32).max(1)), console.progress("homing"));
+    let mut board = board_of(&simulated, rig, session, globals.lease, progress.clone()).await?;
+    let mut eyes = SimulatedEyes::new(board.rig(), &simulated, board.client().clock(), args.seed);
     let modes = board
         .armed(async |board| {
             board.home().await?;

@@ -2,14 +2,12 @@
 
 use std::io::{Write, stdout};
 use std::path::{Path, PathBuf};
-use std::time::Duration;
 
 use serde_json::json;
-use tokio::time::timeout;
 use vergence_mcu::{Firmware, LogDecoder, LogEntry};
 
 use super::connect::connect_any;
-use super::reconnect::{Persistence, reconnect};
+use super::reconnect::Listening;
 use crate::board::Board;
 use crate::cli::Globals;
 use crate::console::Console;
@@ -30,22 +28,16 @@ pub struct Args {
     /// Stop after so many entries, or with --raw after so many pieces.
     #[arg(long)]
     count: Option<u64>,
-    /// Stop after this time.
-    #[arg(long = "for", value_name = "TIME", value_parser = humantime::parse_duration)]
-    duration: Option<Duration>,
     #[command(flatten)]
-    persistence: Persistence,
+    listening: Listening,
 }
 
 pub async fn run(args: &Args, globals: &Globals, console: Console) -> Result<(), Failure> {
-    let program = args.elf.as_deref().map(Program::read).transpose()?;
-    let forever = Duration::from_secs(u64::from(u32::MAX));
-    tokio::select! {
-        outcome = timeout(args.duration.unwrap_or(forever), listen(args, program, globals, console)) => {
-            outcome.unwrap_or(Ok(()))
-        }
-        _ = tokio::signal::ctrl_c() => Ok(()),
-    }
+    let mut program = args.elf.as_deref().map(Program::read).transpose()?;
+    let mut left = args.count.unwrap_or(u64::MAX);
+    let board = connect_any(globals, console, "log").await?;
+    let listen = async |board: &mut Board| pass_on(args.raw, board, program.as_mut(), &mut left, console).await;
+    args.listening.to(board, globals, console, listen).await
 }
 
 /// The firmware that its ELF file describes.
@@ -97,29 +89,6 @@ impl<'a> Program<'a> {
     }
 }
 
-async fn listen(
-    args: &Args,
-    mut program: Option<Program<'_>>,
-    globals: &Globals,
-    console: Console,
-) -> Result<(), Failure> {
-    let mut left = args.count.unwrap_or(u64::MAX);
-    let mut board = connect_any(globals, console, "log").await?;
-    loop {
-        if let Some(program) = &program {
-            program.check(&board)?;
-        }
-        match pass_on(args.raw, &mut board, program.as_mut(), &mut left, console).await {
-            Err(lost) if args.persistence.survives(&lost) => {
-                // The port is free for the next attempt only once this session has let go of it.
-                drop(board);
-                board = reconnect(globals, console, lost).await?;
-            }
-            outcome => return outcome,
-        }
-    }
-}
-
 async fn pass_on(
     raw: bool,
     board: &mut Board,
@@ -127,6 +96,9 @@ async fn pass_on(
     left: &mut u64,
     console: Console,
 ) -> Result<(), Failure> {
+    if let Some(program) = &program {
+        program.check(board)?;
+    }
     while *left > 0 {
         let bytes = board.next_log().await?;
         if raw {

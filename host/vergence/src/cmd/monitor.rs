@@ -2,15 +2,12 @@
 
 mod live;
 
-use std::time::Duration;
-
 use indicatif::ProgressBar;
 use serde_json::Value;
-use tokio::time::timeout;
 
 use self::live::Live;
 use super::connect::connect_with;
-use super::reconnect::{Persistence, reconnect};
+use super::reconnect::Listening;
 use super::report::{clock_json, pose_json};
 use crate::board::{Board, describe_fault, describe_pose};
 use crate::cli::Globals;
@@ -24,34 +21,14 @@ pub struct Args {
     /// Stop after this many poses.
     #[arg(long)]
     count: Option<u64>,
-    /// Stop after this time.
-    #[arg(long = "for", value_name = "TIME", value_parser = humantime::parse_duration)]
-    duration: Option<Duration>,
     #[command(flatten)]
-    persistence: Persistence,
+    listening: Listening,
 }
 
 pub async fn run(args: &Args, globals: &Globals, console: Console) -> Result<(), Failure> {
-    let forever = Duration::from_secs(u64::from(u32::MAX));
-    tokio::select! {
-        outcome = timeout(args.duration.unwrap_or(forever), watch(args, globals, console)) => outcome.unwrap_or(Ok(())),
-        _ = tokio::signal::ctrl_c() => Ok(()),
-    }
-}
-
-async fn watch(args: &Args, globals: &Globals, console: Console) -> Result<(), Failure> {
-    let mut board = connect_with(globals, ProgressBar::hidden()).await?;
+    let board = connect_with(globals, ProgressBar::hidden()).await?;
     let mut left = args.count.unwrap_or(u64::MAX);
-    loop {
-        match show(&mut board, &mut left, console).await {
-            Err(lost) if args.persistence.survives(&lost) => {
-                // The port is free for the next attempt only once this session has let go of it.
-                drop(board);
-                board = reconnect(globals, console, lost).await?;
-            }
-            outcome => return outcome,
-        }
-    }
+    args.listening.to(board, globals, console, async |board| show(board, &mut left, console).await).await
 }
 
 async fn show(board: &mut Board, left: &mut u64, console: Console) -> Result<(), Failure> {

@@ -3,7 +3,7 @@
 use std::time::Duration;
 
 use indicatif::ProgressBar;
-use tokio::time::sleep;
+use tokio::time::{sleep, timeout};
 
 use super::connect::connect_with;
 use crate::board::{Board, describe_pose};
@@ -26,6 +26,57 @@ impl Persistence {
     /// Whether to try again after `failure`.
     pub fn survives(self, failure: &Failure) -> bool {
         !self.no_reconnect && failure.kind() == FailureKind::Link
+    }
+}
+
+/// How long a verb listens to the board, and what it does when the link ends.
+#[derive(Clone, Copy, Debug, clap::Args)]
+pub struct Listening {
+    /// Stop after this time.
+    #[arg(long = "for", value_name = "TIME", value_parser = humantime::parse_duration)]
+    duration: Option<Duration>,
+    #[command(flatten)]
+    persistence: Persistence,
+}
+
+impl Listening {
+    /// Has `listen` listen to `board`, and again to the one that came back, until it has heard enough, the time is over or
+    /// Ctrl-C is pressed.
+    ///
+    /// # Errors
+    /// Those of `listen`, and of [`reconnect`].
+    pub async fn to(
+        self,
+        board: Board,
+        globals: &Globals,
+        console: Console,
+        listen: impl AsyncFnMut(&mut Board) -> Result<(), Failure>,
+    ) -> Result<(), Failure> {
+        let forever = Duration::from_secs(u64::from(u32::MAX));
+        let listening = self.persistently(board, globals, console, listen);
+        tokio::select! {
+            outcome = timeout(self.duration.unwrap_or(forever), listening) => outcome.unwrap_or(Ok(())),
+            _ = tokio::signal::ctrl_c() => Ok(()),
+        }
+    }
+
+    async fn persistently(
+        self,
+        mut board: Board,
+        globals: &Globals,
+        console: Console,
+        mut listen: impl AsyncFnMut(&mut Board) -> Result<(), Failure>,
+    ) -> Result<(), Failure> {
+        loop {
+            match listen(&mut board).await {
+                Err(lost) if self.persistence.survives(&lost) => {
+                    // The port is free for the next attempt only once this session has let go of it.
+                    drop(board);
+                    board = reconnect(globals, console, lost).await?;
+                }
+                outcome => return outcome,
+            }
+        }
     }
 }
 

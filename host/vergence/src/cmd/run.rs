@@ -19,12 +19,12 @@ use crate::cli::Globals;
 use crate::cmd::camera_options::CameraOptions;
 use crate::console::Console;
 use crate::failure::Failure;
-use crate::link::{Client, HostClock, OpenWire, Port};
+use crate::link::{HostClock, Port};
 use crate::live::{Ended, Exposures, Limits, LiveLoop, Publisher, Totals, Unplugged};
 use crate::models::MatcherOptions;
 use crate::output::{TableFormat, make_folder};
 use crate::rig_file;
-use crate::sim::{SharedRig, SimulatedRig, spawn_in_process};
+use crate::sim::{SharedRig, SimulatedRig, board_of};
 
 /// News of cameras that may wait: more frames than that are lost, and their numbers tell.
 const NEWS_KEPT: usize = 16;
@@ -184,9 +184,8 @@ async fn connected(
     match (port(globals)?, wants_simulated) {
         (Port::Simulated, true) => {
             let simulated = SharedRig::new(SimulatedRig::new(rig, args.seed)?);
-            let wire = OpenWire::in_process(spawn_in_process(simulated.clone()));
-            let client = Client::connect(wire, fresh_session()?, HostClock::start()).await?;
-            let board = Board::new(client, rig.clone(), globals.lease, console.progress("live")).await?;
+            let (session, progress) = (fresh_session()?, console.progress("live"));
+            let board = board_of(&simulated, rig.clone(), session, globals.lease, progress).await?;
             Ok((Some(board), Some(simulated)))
         }
         (_, false) if globals.port.as_deref() != Some("sim") => {

@@ -1,6 +1,6 @@
 //! Which frames belong together, and when they were exposed. Pure: frames, pulses and time come in as arguments.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, VecDeque};
 
 use vergence_protocol::{FrameMark, Microseconds};
 use vergence_rig::{BoardInstant, ClockMap, Fate, FramePairing, HostInstant, StampedFrame, TimedEvent};
@@ -50,7 +50,7 @@ pub enum Exposed {
 pub struct Exposures {
     eyes: [Eye; 2],
     sync: Sync,
-    ready: Vec<Exposed>,
+    ready: VecDeque<Exposed>,
     skipped: BTreeMap<&'static str, u64>,
     ambiguity: Ambiguity,
 }
@@ -112,7 +112,7 @@ impl Exposures {
         Self {
             eyes: [unheard(), unheard()],
             sync,
-            ready: Vec::new(),
+            ready: VecDeque::new(),
             skipped: BTreeMap::new(),
             ambiguity: Ambiguity::None,
         }
@@ -148,14 +148,14 @@ impl Exposures {
 
     /// The next thing that can be measured, oldest first.
     pub fn take(&mut self) -> Option<Exposed> {
-        if self.ready.is_empty() { None } else { Some(self.ready.remove(0)) }
+        self.ready.pop_front()
     }
 
     /// A camera tells something.
     pub fn hear(&mut self, side: Side, news: News, base: &TimeBase) {
         match news {
             News::There(timing) => self.there(side, timing),
-            News::Dead(why) => self.eyes[index(side)].dead = Some(why),
+            News::Dead(why) => self.eyes[side.index()].dead = Some(why),
             News::Frame(frame) => self.frame(side, frame, base),
         }
         self.decide(base);
@@ -185,13 +185,13 @@ impl Exposures {
     }
 
     fn there(&mut self, side: Side, timing: FrameTiming) {
-        let eye = &mut self.eyes[index(side)];
+        let eye = &mut self.eyes[side.index()];
         *eye = Eye { timing: Some(timing), ..Eye::default() };
         match &mut self.sync {
             Sync::Triggered { period_us, pulses } => {
                 eye.pulses = Some(FramePairing::new(timing.after_pulse(), *period_us));
                 // It has seen nothing of what was fired before.
-                pulses.values_mut().for_each(|pulse| pulse.slots[index(side)].give_up());
+                pulses.values_mut().for_each(|pulse| pulse.slots[side.index()].give_up());
             }
             Sync::Free(pairing) => {
                 let periods = self.eyes.each_ref().map(|eye| eye.timing.map(|timing| timing.period));
@@ -205,7 +205,7 @@ impl Exposures {
 
     fn frame(&mut self, side: Side, frame: LiveFrame, base: &TimeBase) {
         let (seq, middle) = (frame.seq, frame.middle);
-        let other_dead = self.eyes[1 - index(side)].dead.clone();
+        let other_dead = self.eyes[side.other().index()].dead.clone();
         match &mut self.sync {
             Sync::Free(Some(pairing)) if other_dead.is_none() => match side {
                 Side::Left => pairing.event(as_event(seq, middle)),
@@ -214,21 +214,23 @@ impl Exposures {
             Sync::Free(_) => {
                 let Some(why) = other_dead else { return };
                 match on_base(middle, base) {
-                    Some(middle) => self.ready.push(Exposed::One { side, shot: Box::new(Shot { frame, middle }), why }),
+                    Some(middle) => {
+                        self.ready.push_back(Exposed::One { side, shot: Box::new(Shot { frame, middle }), why });
+                    }
                     None => self.skip("clock_unknown"),
                 }
                 return;
             }
             Sync::Triggered { .. } => {
                 let stamped = StampedFrame { seq, middle };
-                let Some(pairing) = &mut self.eyes[index(side)].pulses else { return };
+                let Some(pairing) = &mut self.eyes[side.index()].pulses else { return };
                 if let (Some(excess), Ambiguity::None) = (pairing.excess_us(&stamped, 0.0), &self.ambiguity) {
                     self.ambiguity = Ambiguity::ToTell(ambiguity(side, excess));
                 }
                 pairing.frame(stamped);
             }
         }
-        self.eyes[index(side)].frames.insert(seq, frame);
+        self.eyes[side.index()].frames.insert(seq, frame);
     }
 
     /// Works off all that is certain now.
@@ -289,7 +291,7 @@ impl Exposures {
             match slots {
                 [Slot::Taken(left), Slot::Taken(right)] => {
                     if let (Some(left), Some(right)) = (shot(0, left), shot(1, right)) {
-                        self.ready.push(Exposed::Pair(Box::new([left, right])));
+                        self.ready.push_back(Exposed::Pair(Box::new([left, right])));
                     }
                 }
                 [Slot::Taken(frame), _] => self.one(Side::Left, shot(0, frame)),
@@ -301,8 +303,8 @@ impl Exposures {
 
     /// A frame without the other camera's: worth something only where that one is dead.
     fn one(&mut self, side: Side, shot: Option<Shot>) {
-        match (self.eyes[1 - index(side)].dead.clone(), shot) {
-            (Some(why), Some(shot)) => self.ready.push(Exposed::One { side, shot: Box::new(shot), why }),
+        match (self.eyes[side.other().index()].dead.clone(), shot) {
+            (Some(why), Some(shot)) => self.ready.push_back(Exposed::One { side, shot: Box::new(shot), why }),
             _ => self.skip(match side {
                 Side::Left => "right_frame_lost",
                 Side::Right => "left_frame_lost",
@@ -321,7 +323,7 @@ impl Exposures {
                         let shot = |frame: LiveFrame| Some(Shot { middle: on_base(frame.middle, base)?, frame });
                         match (shot(left), shot(right)) {
                             (Some(left), Some(right)) => {
-                                self.ready.push(Exposed::Pair(Box::new([left, right])));
+                                self.ready.push_back(Exposed::Pair(Box::new([left, right])));
                                 continue;
                             }
                             _ => "clock_unknown",
@@ -344,13 +346,6 @@ impl Exposures {
             };
             self.skip(reason);
         }
-    }
-}
-
-const fn index(side: Side) -> usize {
-    match side {
-        Side::Left => 0,
-        Side::Right => 1,
     }
 }
 

@@ -11,7 +11,8 @@ use vergence_matching::Matcher;
 use vergence_protocol::FrameMark;
 use vergence_rig::{Rig, TrackGap, middle_pose};
 
-use super::exposures::{Exposed, Exposures, TimeBase, UNHEARD};
+use super::blindness::Blindness;
+use super::exposures::{Exposed, Exposures, TimeBase};
 use super::eye::Heard;
 use super::measure::{Measured, Motion, Seen, measure, pair_exposure};
 use crate::failure::Failure;
@@ -23,8 +24,6 @@ const SETTLE: Duration = Duration::from_millis(20);
 const READINGS: Duration = Duration::from_millis(300);
 /// Readings around an exposure that are taken along, in microseconds.
 const MARGIN_US: f64 = 250_000.0;
-/// Both cameras dead for this long: nothing will come any more.
-const HOPE: Duration = Duration::from_secs(5);
 
 /// When the loop ends by itself.
 #[derive(Clone, Copy, Debug, Default)]
@@ -109,7 +108,7 @@ impl LiveLoop {
         let deadline = limits.time.map(|time| Instant::now() + time);
         let mut settle = interval(SETTLE);
         let (mut work, mut newest): (Option<Work>, Option<Exposed>) = (None, None);
-        let (mut dead, mut blind_since) = ([(); 2].map(|()| Some(UNHEARD.to_owned())), None);
+        let mut blindness = Blindness::default();
         loop {
             if work.is_none() {
                 work = newest.take().map(|exposed| self.start(exposed));
@@ -128,23 +127,7 @@ impl LiveLoop {
                 },
                 (exposed_at, done) = finished(&mut work) => {
                     work = None;
-                    match done {
-                        Ok(measured) => {
-                            match measured.seen {
-                                Seen::Points { .. } => totals.clouds += 1,
-                                Seen::Bearings { .. } => totals.bearings += 1,
-                            }
-                            totals.skipped.clone_from(self.exposures.skipped());
-                            let latency = (self.clock.now().0 as f64 - exposed_at).max(0.0);
-                            let latency = Duration::from_micros(latency as u64);
-                            tell(Told { measured: &measured, latency, totals })?;
-                        }
-                        Err(Reason::Joints(gap)) => self.exposures.skip(match gap {
-                            TrackGap::NotYet => "encoders_silent",
-                            _ => "encoders_unknown",
-                        }),
-                        Err(Reason::Failed(failure)) => return Err(failure),
-                    }
+                    self.conclude(exposed_at, done, totals, &mut tell)?;
                     if limits.results.is_some_and(|most| totals.clouds + totals.bearings >= most) {
                         return Ok(Ended::Done);
                     }
@@ -164,16 +147,38 @@ impl LiveLoop {
                 }
             }
             self.exposures.take_ambiguity().into_iter().for_each(&mut warn);
-            let now_dead = self.exposures.dead().map(|why| why.map(ToOwned::to_owned));
-            tell_changes(&dead, &now_dead, &mut warn);
-            dead = now_dead;
-            match (dead.iter().all(Option::is_some), blind_since) {
-                (false, _) => blind_since = None,
-                (true, None) => blind_since = Some(Instant::now()),
-                (true, Some(since)) if work.is_none() && since.elapsed() > HOPE => return Ok(Ended::Blind),
-                _ => {}
+            if blindness.note(self.exposures.dead(), &mut warn) && work.is_none() {
+                return Ok(Ended::Blind);
             }
         }
+    }
+
+    /// Counts what came of an exposure, and tells it.
+    fn conclude(
+        &mut self,
+        exposed_at: f64,
+        done: Result<Measured, Reason>,
+        totals: &mut Totals,
+        tell: &mut impl FnMut(Told<'_>) -> Result<(), Failure>,
+    ) -> Result<(), Failure> {
+        let measured = match done {
+            Ok(measured) => measured,
+            Err(Reason::Joints(gap)) => {
+                self.exposures.skip(match gap {
+                    TrackGap::NotYet => "encoders_silent",
+                    _ => "encoders_unknown",
+                });
+                return Ok(());
+            }
+            Err(Reason::Failed(failure)) => return Err(failure),
+        };
+        match measured.seen {
+            Seen::Points { .. } => totals.clouds += 1,
+            Seen::Bearings { .. } => totals.bearings += 1,
+        }
+        totals.skipped.clone_from(self.exposures.skipped());
+        let latency = (self.clock.now().0 as f64 - exposed_at).max(0.0);
+        tell(Told { measured: &measured, latency: Duration::from_micros(latency as u64), totals })
     }
 
     fn base(&self) -> TimeBase {
@@ -238,19 +243,6 @@ async fn motion(exposed: &Exposed, rig: &Rig, board: Option<&BoardKnowledge>) ->
                 sleep_until(Instant::now() + Duration::from_millis(2)).await;
             }
             Err(gap) => return Err(gap),
-        }
-    }
-}
-
-/// Says which camera died, and which is back.
-fn tell_changes(before: &[Option<String>; 2], now: &[Option<String>; 2], warn: &mut impl FnMut(String)) {
-    for ((name, before), now) in ["left", "right"].iter().zip(before).zip(now) {
-        let unheard = |why: &Option<String>| why.as_deref() == Some(UNHEARD);
-        match (before, now) {
-            _ if unheard(now) || (unheard(before) && now.is_none()) => {}
-            (_, Some(why)) if before.as_ref() != Some(why) => warn(format!("the {name} camera is dead: {why}")),
-            (Some(_), None) => warn(format!("the {name} camera is there")),
-            _ => {}
         }
     }
 }

@@ -106,11 +106,7 @@ pub fn measure(exposed: Exposed, rig: &Rig, motion: &Motion, matcher: &dyn Match
             let image = develop(*shot)?;
             let develop_seconds = developing.seconds();
             let working = Stopwatch::start();
-            let lens = match side {
-                Side::Left => &rig.left_camera,
-                Side::Right => &rig.right_camera,
-            };
-            let seen = Seen::Bearings { side, bearings: bearings(&image, lens), why };
+            let seen = Seen::Bearings { side, bearings: bearings(&image, rig.camera(side)), why };
             Ok(Measured { seen, middle, develop_seconds, seconds: working.seconds() })
         }
     }

@@ -6,6 +6,7 @@
 //! has no time for is counted and dropped, and no cloud holds anything of another.
 
 mod attached;
+mod blindness;
 mod exposures;
 mod eye;
 mod live_loop;

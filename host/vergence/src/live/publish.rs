@@ -49,11 +49,7 @@ impl Publisher {
                 if let Some(warning) = look.warning() {
                     self.console.say(format!("  warning: {warning}"))?;
                 }
-                if self.console.is_json() {
-                    self.console.result(&self.points_json(told, look, pose, *moving))
-                } else {
-                    Ok(())
-                }
+                self.result(|| self.points_json(told, look, pose, *moving))
             }
             Seen::Bearings { side, bearings, why } => {
                 self.write_bearings(bearings)?;
@@ -61,14 +57,10 @@ impl Publisher {
                     "{:5}  {} bearings of the {side} camera, no range: the {} camera is dead ({why}); {}",
                     self.number,
                     bearings.len(),
-                    other(*side),
+                    side.other(),
                     timing(told)
                 ))?;
-                if self.console.is_json() {
-                    self.console.result(&self.bearings_json(told, *side, bearings, why))
-                } else {
-                    Ok(())
-                }
+                self.result(|| self.bearings_json(told, *side, bearings, why))
             }
         }
     }
@@ -86,6 +78,11 @@ impl Publisher {
             "bearings": totals.bearings,
             "skipped": totals.skipped,
         }))
+    }
+
+    /// A whole cloud in JSON is only made where somebody reads it.
+    fn result(&self, json: impl FnOnce() -> Value) -> Result<(), Failure> {
+        if self.console.is_json() { self.console.result(&json()) } else { Ok(()) }
     }
 
     fn points_line(&self, told: &Told<'_>, look: &Look, pose: &RigPose, moving: bool) -> String {
@@ -117,7 +114,7 @@ impl Publisher {
     fn bearings_json(&self, told: &Told<'_>, side: Side, bearings: &[Bearing], why: &str) -> Value {
         let mut line = self.head_json("bearings", told);
         line["camera"] = side.to_string().into();
-        line["dead"] = json!({ "camera": other(side).to_string(), "why": why });
+        line["dead"] = json!({ "camera": side.other().to_string(), "why": why });
         line["bearings"] = Table::of_bearings(bearings).json();
         line
     }
@@ -174,13 +171,6 @@ impl Publisher {
             }
         }
         Ok(())
-    }
-}
-
-const fn other(side: Side) -> Side {
-    match side {
-        Side::Left => Side::Right,
-        Side::Right => Side::Left,
     }
 }
 

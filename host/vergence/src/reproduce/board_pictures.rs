@@ -7,7 +7,7 @@ use vergence_scene::{Optics, Scene, View, render};
 use vergence_vision::{Camera, Transform, World};
 
 use super::axes::Axes;
-use super::bench::{BOARD, MODES, scene_board, smaller};
+use super::bench::{MODES, scene_board, smaller};
 use super::measure::DEPTH;
 use crate::failure::Failure;
 
@@ -25,10 +25,7 @@ pub fn board_pictures(seed: u64) -> Result<Vec<(&'static str, RgbImage)>, Failur
         let values: Vec<f64> = rig.mode(name)?.targets.iter().map(|target| target.value()).collect();
         let left_from_right = rig.pose_at_values(&values).left_from_right;
         let axes = Axes::of(&left_from_right);
-        let middle = Vector3::new(f64::from(BOARD.columns - 1), f64::from(BOARD.rows - 1), 0.0);
-        let centre = axes.middle + axes.forward * DEPTH.mm();
-        let rotation = axes.rotation();
-        let place = Transform::new(rotation, centre - rotation * (middle * (0.5 * BOARD.square.mm())));
+        let place = scene_board().placed(axes.rotation(), axes.middle + axes.forward * DEPTH.mm());
         let scene = Scene::checkerboard(scene_board(), place);
         let optics = Optics::default();
         let photograph = |world_from_camera: Transform<World, Camera>| {

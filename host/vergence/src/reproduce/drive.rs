@@ -8,8 +8,7 @@ use vergence_vision::{Left, Right, Transform};
 use super::bench::{Bench, MODES};
 use crate::board::Board;
 use crate::failure::Failure;
-use crate::link::{Client, HostClock, OpenWire};
-use crate::sim::{SharedRig, SimulatedRig, spawn_in_process};
+use crate::sim::{SharedRig, SimulatedRig, board_of};
 use crate::stage_plan::stage_plan;
 
 /// Stage poses of a calibration.
@@ -40,10 +39,8 @@ pub struct Drive {
 /// Those of the board.
 pub async fn drive(bench: &Bench, seed: u64, lease_ms: u16, progress: &ProgressBar) -> Result<Drive, Failure> {
     let simulated = SharedRig::new(SimulatedRig::new(&bench.built, seed)?);
-    let wire = OpenWire::in_process(spawn_in_process(simulated.clone()));
-    // Seeded, so that not even the session differs between two runs.
-    let client = Client::connect(wire, SessionId((seed as u32).max(1)), HostClock::start()).await?;
-    let mut board = Board::new(client, bench.drawn.clone(), lease_ms, progress.clone()).await?;
+    let session = SessionId((seed as u32).max(1));
+    let mut board = board_of(&simulated, bench.drawn.clone(), session, lease_ms, progress.clone()).await?;
     let plan = stage_plan(&bench.drawn.axes, STAGE_POSES);
     let modes = MODES.iter().filter_map(|name| bench.drawn.mode(name)).map(|mode| (mode.number, mode.targets.clone()));
     let modes: Vec<_> = modes.collect();

@@ -10,7 +10,7 @@ use vergence_vision::{
 };
 
 use super::axes::Axes;
-use super::bench::{BOARD, Bench, MODES};
+use super::bench::{Bench, MODES, scene_board};
 use super::chain::{Calibrated, both};
 use super::drive::Stop;
 use super::sight::{Eyesight, Seen, same_place};
@@ -111,9 +111,7 @@ fn boards(left_from_right: &Transform<Left, Right>, random: &mut Random) -> Vec<
                 random.between(-TILT_RAD, TILT_RAD),
                 random.between(-TILT_RAD, TILT_RAD),
             );
-            let rotation = axes.rotation() * tilt;
-            let middle = Vector3::new(f64::from(BOARD.columns - 1), f64::from(BOARD.rows - 1), 0.0);
-            Transform::new(rotation, centre - rotation * (middle * (0.5 * BOARD.square.mm())))
+            scene_board().placed(axes.rotation() * tilt, centre)
         })
         .collect()
 }

@@ -3,6 +3,7 @@
 
 mod built;
 mod chip;
+mod connected;
 mod history;
 mod pace;
 mod random;
@@ -12,6 +13,7 @@ mod served;
 
 pub use built::built;
 pub use chip::SimulatedChip;
+pub use connected::board_of;
 pub use history::LoadHistory;
 pub use random::Random;
 pub use rig::{Pulse, SharedRig, SimulatedRig};

@@ -7,10 +7,10 @@ use vergence_matching::GuidedMatcher;
 use vergence_protocol::FrameMark;
 use vergence_rig::{ExposureDelay, Fate, FramePairing, JointsAt, RigPose, StampedFrame, TimedEvent};
 use vergence_scene::Optics;
-use vergence_vision::{KannalaBrandt, Left, Length, Pixel, Transform, World, Zones};
+use vergence_vision::{KannalaBrandt, Left, Length, Pixel, Side, Transform, World, Zones};
 
 use crate::board::Board;
-use crate::camera::{Eye, Frame, SimulatedCamera, Stage};
+use crate::camera::{Frame, SimulatedCamera, Stage};
 use crate::failure::Failure;
 use crate::link::HostClock;
 use crate::look::{Eyes, Look, look};
@@ -53,8 +53,8 @@ impl SimulatedEyes {
     /// Two cameras that ride on `simulated`, in the fixed room.
     pub fn new(rig: &vergence_rig::Rig, simulated: &SharedRig, clock: HostClock, seed: u64) -> Self {
         let stage = Arc::new(Stage::room());
-        let camera = |eye, lens| SimulatedCamera {
-            eye,
+        let camera = |side, lens| SimulatedCamera {
+            side,
             lens,
             optics: Optics::default(),
             stage: Arc::clone(&stage),
@@ -64,8 +64,8 @@ impl SimulatedEyes {
             frames: 0,
         };
         Self {
-            left: camera(Eye::Left, rig.left_camera),
-            right: camera(Eye::Right, rig.right_camera),
+            left: camera(Side::Left, rig.left_camera),
+            right: camera(Side::Right, rig.right_camera),
             rig: simulated.clone(),
             stage,
         }

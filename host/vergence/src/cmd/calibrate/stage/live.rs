@@ -7,21 +7,21 @@ use tokio::task::spawn_blocking;
 use vergence_calibration::{BoardSpec, Coverage};
 use vergence_protocol::Mode;
 use vergence_rig::{AxisPosition, Rig};
-use vergence_vision::{Camera as CameraFrame, Pixel, Right, UnitRay};
+use vergence_vision::{Camera as CameraFrame, Pixel, Right, Side, UnitRay};
 
 use super::recorded::{FOLDER, POSES, column, number};
 use crate::board::{Board, fresh_session};
 use crate::board_watch::{BoardWatch, NAMES, Seen, seen};
-use crate::camera::{BoardStage, Camera, Eye, Frame, SimulatedBoardCamera};
+use crate::camera::{BoardStage, Camera, Frame, SimulatedBoardCamera};
 use crate::cli::Globals;
 use crate::cmd::camera_options::CameraOptions;
 use crate::cmd::connect::{connect, port};
 use crate::console::Console;
 use crate::failure::Failure;
-use crate::link::{Client, HostClock, OpenWire, Port};
+use crate::link::{HostClock, Port};
 use crate::output::{make_folder, write_png, write_whole};
 use crate::rig_file;
-use crate::sim::{SharedRig, SimulatedRig, built, spawn_in_process};
+use crate::sim::{SharedRig, SimulatedRig, board_of, built};
 use crate::stage_plan::stage_plan;
 
 /// How the rig is driven.
@@ -124,10 +124,8 @@ async fn open(
         (Port::Simulated, [only]) if only == "sim" => {
             let built = built(drawn, options.seed);
             let rig = SharedRig::new(SimulatedRig::new(&built, options.seed)?);
-            let wire = OpenWire::in_process(spawn_in_process(rig.clone()));
-            let client = Client::connect(wire, fresh_session()?, HostClock::start()).await?;
-            let progress = console.progress("homing");
-            let board_of_rig = Board::new(client, drawn.clone(), globals.lease, progress).await?;
+            let (session, progress) = (fresh_session()?, console.progress("homing"));
+            let board_of_rig = board_of(&rig, drawn.clone(), session, globals.lease, progress).await?;
             let board = vergence_scene::Board { columns: board.columns, rows: board.rows, square: board.square };
             Ok((board_of_rig, Eyes::Simulated(Box::new(Simulator { rig, built, board, seed: options.seed }))))
         }
@@ -170,8 +168,8 @@ impl Simulator {
             // Another seed for each stage pose, so that the board is held elsewhere.
             seed: self.seed.wrapping_mul(1009).wrapping_add(index as u64),
         };
-        let camera = |eye| Box::new(SimulatedBoardCamera { stage, eye, frames: 0 }) as Box<dyn Camera>;
-        vec![camera(Eye::Left), camera(Eye::Right)]
+        let camera = |side| Box::new(SimulatedBoardCamera { stage, side, frames: 0 }) as Box<dyn Camera>;
+        vec![camera(Side::Left), camera(Side::Right)]
     }
 }
 
