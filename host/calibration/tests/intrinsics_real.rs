@@ -54,7 +54,7 @@ fn kept(views: &[BoardView], calibration: &IntrinsicsCalibration) -> Vec<BoardVi
 fn few_views_reach_the_optimum_that_a_good_start_reaches() {
     let plain = IntrinsicsOptions { outlier_factor: None, ..IntrinsicsOptions::default() };
     for set in real_sets() {
-        for seed in 0..6 {
+        for seed in 0..seeds(6) {
             let views = five(&set, seed);
             let found = calibrate(&set, &views);
             let good = refine_intrinsics(&kept(&views, &found), set.size, &set.reference.lens, &plain).unwrap();

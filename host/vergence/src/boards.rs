@@ -26,6 +26,13 @@ impl Boards {
         self.views.iter().flatten().cloned().collect()
     }
 
+    /// These views, and those of `other`, of the same images, where there is none.
+    #[must_use]
+    pub fn or(self, other: Self) -> Self {
+        let views = self.views.into_iter().zip(other.views).map(|(own, other)| own.or(other)).collect();
+        Self { views, ..self }
+    }
+
     /// The images without one, and why.
     pub fn missed(&self) -> impl Iterator<Item = &(String, DetectError)> {
         self.views.iter().filter_map(|view| view.as_ref().err())
@@ -68,7 +75,7 @@ fn natural_order(name: &str) -> Vec<(String, u64)> {
     parts
 }
 
-/// Looks for the board in every image. With a `hint`, a camera that is roughly right, more corners are found.
+/// Looks for the board in every image. With a `hint`, a camera that is roughly right, more corners are found, and better.
 ///
 /// # Errors
 /// An image that cannot be read, or images of different sizes.

@@ -9,7 +9,7 @@ use super::CornerQuality;
 use super::intensity::Intensity;
 use super::lattice::{Found, Lattice, Node, SIDES};
 use super::predict::{Prediction, Predictor};
-use super::refine::{bound, refine, window};
+use super::refine::refine;
 use super::saddle::{Quadrants, contrast_near, parity, polarity};
 
 /// Adds corners next to those known until no more are found. `size` is the board's, in corners: one row and column
@@ -62,7 +62,8 @@ fn find(image: &Intensity<'_>, expected: &Prediction, colour: f64, contrast: f64
         return None;
     }
     let start = strongest_saddle(image, expected, colour, FARTHEST_PART * spacing)?;
-    let refined = refine(image, start, window(spacing), bound(spacing))?;
+    // Where overexposed white eats the corners of large black squares, the strongest saddle lies aside.
+    let refined = refine(image, start, expected).or_else(|| refine(image, expected.position, expected))?;
     let quadrants = Quadrants::read(image, refined.position, &expected.steps)?;
     let near = (refined.position - expected.position).norm() <= FARTHEST_PART * spacing;
     let clear = quadrants.is_corner(LEAST_PART_OF_CONTRAST * contrast) && quadrants.saddle() * colour > 0.0;

@@ -13,6 +13,8 @@ pub struct Prediction {
     pub position: Vector2<f64>,
     /// Pixels per step along the lattice's two axes.
     pub steps: [Vector2<f64>; 2],
+    /// How the lattice's two axes bend: pixels per square of a step. Zero where no camera tells them.
+    pub bends: [Vector2<f64>; 2],
     /// Variance of the prediction in units of one corner's variance.
     pub variance: f64,
 }
@@ -93,7 +95,7 @@ fn linear(normal: &OMatrix<f64, U6, U6>, moments: &SMatrix<f64, 6, 2>) -> Option
 
 fn prediction(terms: &SMatrix<f64, 3, 2>, variance: f64) -> Prediction {
     let [position, along, across] = [0, 1, 2].map(|i| terms.row(i).transpose());
-    Prediction { position, steps: [along, across], variance }
+    Prediction { position, steps: [along, across], bends: [Vector2::zeros(); 2], variance }
 }
 
 /// Corners near `node` that are not known to be wrong.
@@ -149,45 +151,48 @@ impl<'a> BoardPlane<'a> {
         const PART_OF_CELL: f64 = 0.1;
         let (mut squares, mut areas) = (0.0, 0.0);
         for (&node, found) in lattice.iter().filter(|(_, found)| found.quality != CornerQuality::Blunder) {
-            let Some((position, steps)) = self.project(node) else { return false };
-            squares += (position - found.position).norm_squared();
-            areas += steps[0].perp(&steps[1]).abs();
+            let Some(expected) = self.project(node) else { return false };
+            squares += (expected.position - found.position).norm_squared();
+            areas += expected.steps[0].perp(&expected.steps[1]).abs();
         }
         squares < PART_OF_CELL * PART_OF_CELL * areas
     }
 
-    /// The node's projection and steps, both without regard to what was seen near it.
-    fn project(&self, node: Node) -> Option<(Vector2<f64>, [Vector2<f64>; 2])> {
+    /// The node's projection, without regard to what was seen near it.
+    fn project(&self, node: Node) -> Option<Prediction> {
         const HALF: f64 = 0.5;
         let at = |di: f64, dj: f64| {
             let ray = UnitRay::<Camera>::new(self.ray_from_node * (homogeneous(node) + Vector3::new(di, dj, 0.0)))?;
             let pixel = self.camera.project(&ray).ok()?;
             Some(Vector2::new(pixel.u, pixel.v))
         };
-        // One-sided where the field ends within half a cell.
-        let step = |di: f64, dj: f64| match (at(di, dj), at(-di, -dj), at(0.0, 0.0)) {
-            (Some(ahead), Some(behind), _) => Some(ahead - behind),
-            (Some(ahead), None, Some(here)) => Some((ahead - here) * 2.0),
-            (None, Some(behind), Some(here)) => Some((here - behind) * 2.0),
-            _ => None,
+        let here = at(0.0, 0.0)?;
+        // One-sided, and without a bend, where the field ends within half a cell.
+        let step = |di: f64, dj: f64| match (at(di, dj), at(-di, -dj)) {
+            (Some(ahead), Some(behind)) => Some((ahead - behind, 2.0 * (ahead - 2.0 * here + behind))),
+            (Some(ahead), None) => Some((2.0 * (ahead - here), Vector2::zeros())),
+            (None, Some(behind)) => Some((2.0 * (here - behind), Vector2::zeros())),
+            (None, None) => None,
         };
-        Some((at(0.0, 0.0)?, [step(HALF, 0.0)?, step(0.0, HALF)?]))
+        let ((along, along_bend), (across, across_bend)) = (step(HALF, 0.0)?, step(0.0, HALF)?);
+        Some(Prediction { position: here, steps: [along, across], bends: [along_bend, across_bend], variance: 0.0 })
     }
 
     /// The projection, shifted by what the nearest corners show the camera to be wrong there.
     fn predict(&self, lattice: &Lattice, node: Node) -> Option<Prediction> {
         const NEAR: i32 = 2;
-        let (position, steps) = self.project(node)?;
+        let projected = self.project(node)?;
         let (mut shift, mut sum) = (Vector2::zeros(), 0.0);
         for (at, found) in usable(lattice, node, NEAR) {
-            if let Some((expected, _)) = self.project(at) {
+            if let Some(expected) = self.project(at) {
                 let (di, dj) = (f64::from(at[0] - node[0]), f64::from(at[1] - node[1]));
                 let weight = 1.0 / (di * di + dj * dj);
-                shift += (found.position - expected) * weight;
+                shift += (found.position - expected.position) * weight;
                 sum += weight;
             }
         }
-        (sum > 0.0).then(|| Prediction { position: position + shift / sum, steps, variance: 1.0 / sum })
+        let position = projected.position + shift / sum;
+        (sum > 0.0).then(|| Prediction { position, variance: 1.0 / sum, ..projected })
     }
 }
 

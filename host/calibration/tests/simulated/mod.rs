@@ -177,3 +177,8 @@ pub fn median(mut values: Vec<f64>) -> f64 {
 pub fn seeds(few: u64) -> u64 {
     std::env::var("VERGENCE_SEEDS").ok().and_then(|text| text.parse().ok()).unwrap_or(few)
 }
+
+/// Which seed a study starts at: 0 unless the environment asks for another, so that a long one can be run in parts.
+pub fn first_seed() -> u64 {
+    std::env::var("VERGENCE_FIRST_SEED").ok().and_then(|text| text.parse().ok()).unwrap_or(0)
+}

@@ -47,4 +47,9 @@ pub trait Camera: Send {
     fn timing(&self) -> Option<FrameTiming> {
         None
     }
+
+    /// How many frames were lost before they came here; 0 where nothing numbers them.
+    fn missed(&self) -> u64 {
+        0
+    }
 }

@@ -59,6 +59,12 @@ impl CameraSet {
         self.alone
     }
 
+    /// How many frames of all cameras were lost before they came here.
+    #[must_use]
+    pub fn missed(&self) -> u64 {
+        self.cameras.iter().map(|camera| camera.missed()).sum()
+    }
+
     /// The next frame of each camera, taken together.
     ///
     /// # Errors
@@ -125,12 +131,14 @@ mod tests {
         next: u32,
         late: Duration,
         lost: &'static [u32],
+        missed: u64,
     }
 
     impl Camera for Ticking {
         fn grab(&mut self) -> Result<Option<Frame>, Failure> {
             while self.lost.contains(&self.next) {
                 self.next += 1;
+                self.missed += 1;
             }
             let seq = self.next;
             self.next += 1;
@@ -143,10 +151,14 @@ mod tests {
         fn timing(&self) -> Option<FrameTiming> {
             Some(FrameTiming { period: PERIOD, exposure: None, rolling: Duration::ZERO, readout: PERIOD })
         }
+
+        fn missed(&self) -> u64 {
+            self.missed
+        }
     }
 
     fn ticking(late_ms: u64, lost: &'static [u32]) -> Box<dyn Camera> {
-        Box::new(Ticking { next: 0, late: Duration::from_millis(late_ms), lost })
+        Box::new(Ticking { next: 0, late: Duration::from_millis(late_ms), lost, missed: 0 })
     }
 
     #[test]
@@ -160,6 +172,7 @@ mod tests {
         }
         assert!(!seen.contains(&3) && !seen.contains(&1) && seen.contains(&4), "{seen:?}");
         assert!(set.alone() > 0);
+        assert_eq!(set.missed(), 7);
     }
 
     /// Halfway between two frames nobody can tell which of them is meant.

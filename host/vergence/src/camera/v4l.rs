@@ -97,12 +97,6 @@ impl V4lCamera {
         Ok(Self { path, stream, device, pixels, format, timing, watch, clock })
     }
 
-    /// How many frames the driver dropped.
-    #[must_use]
-    pub fn missed(&self) -> u64 {
-        self.watch.missed()
-    }
-
     /// The camera's own name.
     #[must_use]
     pub fn card(&self) -> String {
@@ -130,6 +124,10 @@ impl Camera for V4lCamera {
 
     fn timing(&self) -> Option<FrameTiming> {
         Some(self.timing)
+    }
+
+    fn missed(&self) -> u64 {
+        self.watch.missed()
     }
 }
 

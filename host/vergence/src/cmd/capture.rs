@@ -84,10 +84,14 @@ pub fn run(args: &Args, globals: &Globals, console: Console) -> Result<(), Failu
     if cameras.alone() > 0 {
         console.say(format!("{} frames had no partner of the other camera taken at the same time", cameras.alone()))?;
     }
+    if cameras.missed() > 0 {
+        console.say(format!("{} frames were lost between the cameras and here", cameras.missed()))?;
+    }
     console.result(&json!({
         "views": watch.taken(),
         "frames": frames_seen,
         "frames_alone": cameras.alone(),
+        "frames_missed": cameras.missed(),
         "complete": complete,
         "out": args.out,
     }))

@@ -9,11 +9,11 @@ use vergence_calibration::{
 };
 use vergence_rig::Rig;
 use vergence_scene::Board;
-use vergence_vision::{Camera, KannalaBrandt, Left, Right, Transform};
+use vergence_vision::{Camera, ImageSize, KannalaBrandt, Left, Right, Transform};
 
 use super::bench::{Bench, scene_board};
 use super::drive::Stop;
-use super::sight::{Eyesight, Seen, Sight};
+use super::sight::{Eyesight, Photo, Seen, Sight};
 use crate::camera::BoardStage;
 use crate::failure::Failure;
 use crate::sim::Random;
@@ -49,7 +49,8 @@ pub fn calibrate(
     let (left, right) = (left?, right?);
     let mut poses = Vec::new();
     for stop in stops {
-        let views = shared_views(bench, &stop.truth, eyesight, random.seed(), &mut tally);
+        let views =
+            shared_views(bench, &stop.truth, [&left.camera, &right.camera], eyesight, random.seed(), &mut tally);
         poses.push(StagePose { readings: stop.readings.clone(), views });
     }
     let rig = Rig { left_camera: left.camera, right_camera: right.camera, ..bench.drawn.clone() };
@@ -85,22 +86,33 @@ fn own_calibration(
 ) -> Result<IntrinsicsCalibration, Failure> {
     let nowhere = Transform::<Left, Right>::new(UnitQuaternion::identity(), Vector3::zeros());
     let held = BoardStage { left: *lens, right: (*lens, nowhere), both: false, board: scene_board(), seed };
-    let seen: Vec<Option<Seen>> = (0..OWN_VIEWS)
+    let photos: Vec<Option<Photo>> = (0..OWN_VIEWS)
         .into_par_iter()
         .map(|index| {
             let place = held.left_from_board(index)?;
-            Sight { lens, camera_from_board: place.renamed(), seed: seed ^ index }.seen(eyesight)
+            Sight { lens, camera_from_board: place.renamed(), seed: seed ^ index }.photograph(eyesight)
         })
         .collect();
+    let seen = |known: Option<&KannalaBrandt>| -> Vec<Option<Seen>> {
+        photos.par_iter().map(|photo| photo.as_ref()?.seen(known)).collect()
+    };
+    // As 'calibrate intrinsics' does: the corners again with the lens that they give.
+    let rough = calibrated(&seen(None), lens.size())?;
+    let seen = seen(Some(&rough.camera));
     seen.iter().for_each(|seen| tally.count(seen));
-    let views: Vec<BoardView> = seen.into_iter().flatten().map(|seen| seen.view).collect();
-    calibrate_intrinsics(&views, lens.size(), &IntrinsicsOptions::default())
+    calibrated(&seen, lens.size())
+}
+
+fn calibrated(seen: &[Option<Seen>], size: ImageSize) -> Result<IntrinsicsCalibration, Failure> {
+    let views: Vec<BoardView> = seen.iter().flatten().map(|seen| seen.view.clone()).collect();
+    calibrate_intrinsics(&views, size, &IntrinsicsOptions::default())
         .map_err(|error| Failure::check(format!("a lens is not calibrated: {error}")))
 }
 
 fn shared_views(
     bench: &Bench,
     left_from_right: &Transform<Left, Right>,
+    known: [&KannalaBrandt; 2],
     eyesight: &Eyesight,
     seed: u64,
     tally: &mut Tally,
@@ -109,7 +121,10 @@ fn shared_views(
     let held = BoardStage { left, right: (right, *left_from_right), both: true, board: scene_board(), seed };
     let seen: Vec<[Option<Seen>; 2]> = (0..SHARED_VIEWS)
         .into_par_iter()
-        .filter_map(|index| Some(both(bench, left_from_right, &held.left_from_board(index)?, eyesight, seed ^ index)))
+        .filter_map(|index| {
+            let left_from_board = held.left_from_board(index)?;
+            Some(both(bench, left_from_right, &left_from_board, known, eyesight, seed ^ index))
+        })
         .collect();
     seen.iter().flatten().for_each(|seen| tally.count(seen));
     let paired = seen.into_iter().filter_map(|[left, right]| Some((left?, right?)));
@@ -124,18 +139,21 @@ fn shared_views(
         .collect()
 }
 
-/// What both cameras make of a board at `left_from_board`.
+/// What both cameras, of which `known` is known, make of a board at `left_from_board`.
 pub fn both(
     bench: &Bench,
     left_from_right: &Transform<Left, Right>,
     left_from_board: &Transform<Left, Board>,
+    known: [&KannalaBrandt; 2],
     eyesight: &Eyesight,
     seed: u64,
 ) -> [Option<Seen>; 2] {
     let in_right: Transform<Camera, Board> = (left_from_right.inverse() * *left_from_board).renamed();
-    let sight = |lens, camera_from_board, seed| Sight { lens, camera_from_board, seed }.seen(eyesight);
+    let sight = |lens, camera_from_board, known, seed| {
+        Sight { lens, camera_from_board, seed }.photograph(eyesight)?.seen(Some(known))
+    };
     [
-        sight(&bench.built.left_camera, left_from_board.renamed(), seed.wrapping_mul(2)),
-        sight(&bench.built.right_camera, in_right, seed.wrapping_mul(2).wrapping_add(1)),
+        sight(&bench.built.left_camera, left_from_board.renamed(), known[0], seed.wrapping_mul(2)),
+        sight(&bench.built.right_camera, in_right, known[1], seed.wrapping_mul(2).wrapping_add(1)),
     ]
 }

@@ -68,13 +68,14 @@ pub fn measure(
     random: &mut Random,
 ) -> Measured {
     let mut measured = Measured::default();
+    let known = [&calibrated.stage.left, &calibrated.stage.right];
     for (mode, stop) in stops.iter().enumerate().take(MODES.len()) {
         let boards = boards(&stop.truth, random);
         let seed = random.seed();
         let seen: Vec<[Option<Seen>; 2]> = boards
             .par_iter()
             .enumerate()
-            .map(|(index, board)| both(bench, &stop.truth, board, eyesight, seed ^ index as u64))
+            .map(|(index, board)| both(bench, &stop.truth, board, known, eyesight, seed ^ index as u64))
             .collect();
         let view = View::new(mode, stop, calibrated);
         let mut squares = Vec::new();

@@ -60,19 +60,53 @@ pub struct Seen {
     pub errors_px: Vec<f64>,
 }
 
+/// What the camera makes of a sight.
+pub struct Photo {
+    truth: BoardView,
+    shown: Shown,
+}
+
+enum Shown {
+    Picture(Window, GrayImage),
+    Corners(BoardView),
+}
+
+impl Photo {
+    /// What our detector, or the projection, makes of it, told what is known of the lens. `None` where no board is found.
+    pub fn seen(&self, known: Option<&KannalaBrandt>) -> Option<Seen> {
+        let (view, labelled) = match &self.shown {
+            Shown::Corners(view) => (view.clone(), true),
+            Shown::Picture(window, image) => {
+                let hint = known.and_then(|lens| window.part_of(lens));
+                let found = detect(image, &BOARD, hint.as_ref()).ok()?;
+                let mut view = found.view("", &BOARD);
+                for Corner { pixel, .. } in &mut view.corners {
+                    *pixel = Pixel { u: pixel.u + f64::from(window.left), v: pixel.v + f64::from(window.top) };
+                }
+                (view, found.placement == Placement::Unique)
+            }
+        };
+        let errors_px = errors(&view, &self.truth);
+        Some(Seen { view, labelled, errors_px })
+    }
+}
+
 impl Sight<'_> {
-    /// What our detector, or the projection, makes of it. `None` where no board is found.
-    pub fn seen(&self, eyesight: &Eyesight) -> Option<Seen> {
+    /// Its photograph; `None` where no corner is in sight.
+    pub fn photograph(self, eyesight: &Eyesight) -> Option<Photo> {
         let truth = self.truth();
         if truth.corners.is_empty() {
             return None;
         }
-        let (view, labelled) = match eyesight.corners {
-            Corners::Projected => (self.moved(&truth, eyesight.noise_px), true),
-            Corners::Rendered => self.detected(&truth, eyesight.noise_px)?,
+        let shown = match eyesight.corners {
+            Corners::Projected => Shown::Corners(self.moved(&truth, eyesight.noise_px)),
+            Corners::Rendered => {
+                let window = Window::about(&truth, self.lens.size());
+                let image = self.picture(&window, eyesight.noise_px)?;
+                Shown::Picture(window, image)
+            }
         };
-        let errors_px = errors(&view, &truth);
-        Some(Seen { view, labelled, errors_px })
+        Some(Photo { truth, shown })
     }
 
     /// The corners where they truly are.
@@ -95,21 +129,9 @@ impl Sight<'_> {
         view
     }
 
-    fn detected(&self, truth: &BoardView, noise_px: f64) -> Option<(BoardView, bool)> {
-        let window = Window::about(truth, self.lens.size());
-        let found = detect(&self.picture(&window, noise_px)?, &BOARD, None).ok()?;
-        let mut view = found.view("", &BOARD);
-        for Corner { pixel, .. } in &mut view.corners {
-            *pixel = Pixel { u: pixel.u + f64::from(window.left), v: pixel.v + f64::from(window.top) };
-        }
-        Some((view, found.placement == Placement::Unique))
-    }
-
-    /// The part of the photograph in the window: the same lens with its centre moved.
+    /// The part of the photograph in the window.
     fn picture(&self, window: &Window, noise_px: f64) -> Option<GrayImage> {
-        let mut lens = self.lens.to_opencv();
-        (lens.cx, lens.cy) = (lens.cx - f64::from(window.left), lens.cy - f64::from(window.top));
-        let camera = KannalaBrandt::from_opencv(lens, self.lens.theta_max(), window.size).ok()?;
+        let camera = window.part_of(self.lens)?;
         let scene = Scene::board_alone(scene_board(), self.camera_from_board.renamed::<World, Board>());
         let world_from_camera = Transform::<World, Camera>::new(UnitQuaternion::identity(), Vector3::zeros());
         let grey = noise_px * GREY_PER_PX;
@@ -143,6 +165,13 @@ impl Window {
         };
         let ((left, width), (top, height)) = (extent(|p| p.u, size.width), extent(|p| p.v, size.height));
         Self { left, top, size: ImageSize { width, height } }
+    }
+
+    /// The same lens before this part of its sensor: its centre moves.
+    fn part_of(&self, lens: &KannalaBrandt) -> Option<KannalaBrandt> {
+        let mut part = lens.to_opencv();
+        (part.cx, part.cy) = (part.cx - f64::from(self.left), part.cy - f64::from(self.top));
+        KannalaBrandt::from_opencv(part, lens.theta_max(), self.size).ok()
     }
 }
 

@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use vergence_calibration::{BoardView, ReportAbout, StereoView};
+use vergence_calibration::{BoardView, IntrinsicsOptions, ReportAbout, StereoView, calibrate_intrinsics};
 use vergence_rig::Provenance;
 use vergence_vision::{Angle, ImageSize, KannalaBrandt};
 
@@ -13,7 +13,8 @@ use crate::corners::{self, FrameView};
 use crate::failure::Failure;
 use crate::provenance::InputHash;
 
-/// Looks for the board in the images that `patterns` name; images without one are told.
+/// Looks for the board in the images that `patterns` name; images without one are told. Without a `hint`, a camera that is
+/// roughly right, it looks twice: the second time with the lens that the first look gives.
 ///
 /// # Errors
 /// No images, or no board in any of them.
@@ -30,7 +31,13 @@ pub fn from_images(
         hash.add(file)?;
     }
     let progress = console.progress(&format!("looking for the board in {} images", files.len()));
-    let boards = detect_in(&files, &board, hint)?;
+    let mut boards = detect_in(&files, &board, hint)?;
+    if hint.is_none() {
+        // Views that give no lens are told apart by the calibration that follows.
+        if let Ok(rough) = calibrate_intrinsics(&boards.found(), boards.size, &IntrinsicsOptions::default()) {
+            boards = detect_in(&files, &board, Some(&rough.camera))?.or(boards);
+        }
+    }
     progress.finish_and_clear();
     for (name, reason) in boards.missed() {
         console.say(format!("{name}: {reason}"))?;
