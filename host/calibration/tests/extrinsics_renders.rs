@@ -194,10 +194,12 @@ fn lens_nees(found: &IntrinsicsCalibration, truth: &KannalaBrandt) -> f64 {
     (off.transpose() * found.covariance.try_inverse().unwrap() * off)[(0, 0)]
 }
 
-/// Mean NEES of χ² variables with 6 degrees of freedom: the band that holds 99 % of all cases.
-fn nees_band(seeds: u64) -> std::ops::Range<f64> {
-    let half = 2.576 * (12.0 / seeds as f64).sqrt();
-    6.0 - half..6.0 + half * (1.0 + 1.0 / (seeds as f64).sqrt())
+/// Mean NEES of χ² variables with 6 degrees of freedom: the band that holds 99 % of all cases (E. Wilson and M. Hilferty,
+/// "The distribution of chi-square", PNAS 17, 1931: its cube root is nearly normal).
+fn nees_band(seeds: usize) -> std::ops::Range<f64> {
+    let variance = 2.0 / (9.0 * 6.0 * seeds as f64);
+    let quantile = |z: f64| 6.0 * (1.0 - variance + z * variance.sqrt()).powi(3);
+    quantile(-2.576)..quantile(2.576)
 }
 
 #[test]
@@ -237,7 +239,7 @@ fn herbivore_pose_from_photographs_alone() {
     let shift = median(apart_of_seeds.iter().map(|e| e.1).collect());
     println!("{count} seeds: median {turn:.4}° {shift:.4} mm, NEES {nees:.2}, corners off by {corner:.3} px per axis");
     assert!(turn <= 0.02 && shift <= 0.12);
-    assert!(nees < nees_band(count as u64).end, "{nees}");
+    assert!(nees_band(count).contains(&nees), "{nees}: {:?}", nees_band(count));
 }
 
 /// The part of the picture that is rendered is where it is said to be.

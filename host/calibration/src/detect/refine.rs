@@ -79,7 +79,12 @@ struct Edges {
 
 impl Edges {
     fn of(expected: &Prediction) -> Option<Self> {
-        Some(Self { steps_from_pixels: cell(&expected.steps).try_inverse()?, bends: expected.bends })
+        // Where the cells only grow along an edge it stays straight; stretching that, too, would make the blur of the
+        // crossing edge lopsided.
+        let square_to = |bend: Vector2<f64>, step: Vector2<f64>| bend - step * (bend.dot(&step) / step.norm_squared());
+        let [along, across] = expected.steps;
+        let bends = [square_to(expected.bends[0], along), square_to(expected.bends[1], across)];
+        Some(Self { steps_from_pixels: cell(&expected.steps).try_inverse()?, bends })
     }
 
     /// Where a place, in pixels from the corner, would be if the edges were straight, and how the place moves with that.
