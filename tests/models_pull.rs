@@ -1,6 +1,11 @@
 //! Models fetched from a server: taken up where they broke, checked, recorded. The server is our own, on this machine: the
 //! publishers' could not be tried.
-#![allow(clippy::expect_used, clippy::panic, reason = "a test fails loudly")]
+#![allow(
+    clippy::expect_used,
+    clippy::panic,
+    clippy::print_stdout,
+    reason = "a test fails loudly and says what it skips"
+)]
 
 mod common;
 
@@ -10,6 +15,7 @@ use std::path::Path;
 use std::sync::{Arc, Mutex};
 
 use common::{fails_with, run_json};
+use serde_json::Value;
 
 /// How the server answers.
 #[derive(Clone, Copy)]
@@ -82,38 +88,40 @@ fn a_broken_download_is_taken_up_and_what_came_first_is_recorded() {
     let folder = tempfile::tempdir().expect("a folder");
     let store = folder.path().to_str().expect("UTF-8");
     let network = tiny("pipeline.onnx");
-    let pull = |server: &Server, more: &[&str]| -> Vec<String> {
-        let from = ["models", "pull", "disk-lightglue", "--models", store, "--json", "--from", &server.address];
-        [&from[..], more].concat().into_iter().map(str::to_owned).collect()
+    let pulled = |server: &Server, more: &[&str], then: &dyn Fn(&[&str]) -> Value| {
+        let pull = ["models", "pull", "disk-lightglue", "--models", store, "--json", "--from", &server.address];
+        then(&[&pull[..], more].concat())
     };
-    let strs = |arguments: &[String]| arguments.iter().map(|argument| argument.to_owned()).collect::<Vec<_>>();
-    let fails = |arguments: Vec<String>, code, words: &[&str]| {
-        fails_with(&strs(&arguments).iter().map(String::as_str).collect::<Vec<_>>(), code, words);
+    let fails = |server: &Server, more: &[&str], code, words: &[&str]| {
+        pulled(server, more, &|arguments| {
+            fails_with(arguments, code, words);
+            Value::Null
+        })
     };
-    let succeeds = |arguments: Vec<String>| run_json(&arguments.iter().map(String::as_str).collect::<Vec<_>>());
+    let succeeds = |server: &Server, more: &[&str]| pulled(server, more, &run_json);
 
     let missing = Server::of(network.clone(), Manner::Missing);
-    fails(pull(&missing, &[]), 2, &["could not be fetched", &missing.address]);
+    fails(&missing, &[], 2, &["could not be fetched", &missing.address]);
 
     let broken = Server::of(network.clone(), Manner::Breaks(100));
-    fails(pull(&broken, &[]), 2, &["could not be fetched", "what came is kept, try again"]);
+    fails(&broken, &[], 2, &["could not be fetched", "what came is kept, try again"]);
     let came =
         std::fs::metadata(folder.path().join(".downloads/disk_lightglue_pipeline.ort.onnx")).expect("kept").len();
     assert!((100..network.len() as u64).contains(&came), "{came}");
 
     let whole = Server::of(network.clone(), Manner::Whole);
-    let first = succeeds(pull(&whole, &[]));
+    let first = succeeds(&whole, &[]);
     assert_eq!(whole.asked(), [usize::try_from(came).expect("small")], "from where it broke on");
     let manifest = std::fs::read_to_string(folder.path().join("disk-lightglue/model.toml")).expect("it is kept");
     let sha256 = first["sha256"].as_str().expect("a digest");
     assert!(manifest.contains(sha256), "{manifest}");
 
-    let mut other = network.clone();
+    let mut other = network;
     *other.last_mut().expect("bytes") ^= 1;
     let changed = Server::of(other, Manner::Whole);
-    fails(pull(&changed, &[]), 1, &["SHA-256", sha256, "nothing was changed"]);
-    fails(pull(&whole, &["--sha256", "00"]), 1, &["not 00"]);
-    assert_eq!(succeeds(pull(&whole, &["--sha256", sha256]))["sha256"], sha256);
+    fails(&changed, &[], 1, &["SHA-256", sha256, "nothing was changed"]);
+    fails(&whole, &["--sha256", "00"], 1, &["not 00"]);
+    assert_eq!(succeeds(&whole, &["--sha256", sha256])["sha256"], sha256);
 }
 
 #[test]

@@ -103,19 +103,27 @@ pub(crate) fn sighting(grid: &Grid, keypoint: &Keypoint, link: &Link) -> Option<
     Some(Sighting { left: grid.bearing(keypoint.at)?, right: grid.bearing(link.right)?, sigma })
 }
 
-/// Drops what a view shows again where the partner might lie.
-pub(crate) fn drop_repeated(links: &mut Links, compared: &Compared<'_>, band: &EpipolarBand) {
-    let (Some(in_left), Some(in_right)) = (Surroundings::of(compared.left), Surroundings::of(compared.right)) else {
-        return;
-    };
-    links.par_iter_mut().zip(compared.keypoints).for_each(|(link, keypoint)| {
-        *link = link.and_then(|link| {
-            let (l, r) = (keypoint.at, link.right);
-            let farthest = band.largest_disparity(l.x);
-            let distinct = in_right.is_distinct(r, l.x - farthest, l.x) && in_left.is_distinct(l, r.x, r.x + farthest);
-            if distinct { Ok(link) } else { Err(Drop::Repeated) }
+/// What both views show along their rows; `None` where they are too small to tell.
+pub(crate) struct Rows<'a>(Option<[Surroundings<'a>; 2]>);
+
+impl<'a> Rows<'a> {
+    pub(crate) fn of(compared: &Compared<'a>) -> Self {
+        Self(Surroundings::of(compared.left).zip(Surroundings::of(compared.right)).map(<[_; 2]>::from))
+    }
+
+    /// Drops what a view shows again where the partner might lie.
+    pub(crate) fn drop_repeated(&self, links: &mut Links, keypoints: &[Keypoint], band: &EpipolarBand) {
+        let Some([in_left, in_right]) = &self.0 else { return };
+        links.par_iter_mut().zip(keypoints).for_each(|(link, keypoint)| {
+            *link = link.and_then(|link| {
+                let (l, r) = (keypoint.at, link.right);
+                let farthest = band.largest_disparity(l.x);
+                let distinct =
+                    in_right.is_distinct(r, l.x - farthest, l.x) && in_left.is_distinct(l, r.x, r.x + farthest);
+                if distinct { Ok(link) } else { Err(Drop::Repeated) }
+            });
         });
-    });
+    }
 }
 
 /// Drops what no neighbour supports, then what is there twice.

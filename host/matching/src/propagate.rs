@@ -11,7 +11,7 @@ use crate::ViewPixel;
 use crate::corners::Keypoint;
 use crate::epipolar_band::EpipolarBand;
 use crate::guided::LEVELS;
-use crate::links::{Compared, Link, Links, drop_repeated, registered};
+use crate::links::{Compared, Link, Links, Rows, registered};
 use crate::matcher::Drop;
 
 /// How often what was found serves as a neighbour of what was not.
@@ -21,52 +21,63 @@ const NEIGHBOURS: usize = 4;
 /// Neighbours whose displacements differ by less say the same, in pixels of the view.
 const SAME_GUESS: f64 = 2.0;
 
+/// A match that says to its neighbours where their partners are.
+struct Known {
+    at: ViewPixel,
+    /// From the left to the right view.
+    moved: [f64; 2],
+    /// Whether nobody has asked it yet.
+    fresh: bool,
+}
+
 /// Seeks partners for the keypoints that have none, from the links there are, of which nearly all must be right.
-pub(crate) fn propagate(links: &mut Links, compared: &Compared<'_>, band: &EpipolarBand) {
+pub(crate) fn propagate(links: &mut Links, compared: &Compared<'_>, rows: &Rows<'_>, band: &EpipolarBand) {
+    let mut known = Vec::new();
+    learn(&mut known, links, compared.keypoints);
     for _ in 0..ROUNDS {
-        let mut found = next_to(links, compared, band);
-        drop_repeated(&mut found, compared, band);
-        if found.iter().all(Result::is_err) {
-            break;
-        }
+        let seek = |(link, keypoint): (&Result<Link, Drop>, &Keypoint)| match link {
+            Ok(_) => Err(Drop::Duplicate),
+            Err(_) => partner(keypoint.at, &known, compared, band),
+        };
+        let mut found: Links = links.par_iter().zip(compared.keypoints).map(seek).collect();
+        rows.drop_repeated(&mut found, compared.keypoints, band);
+        known.iter_mut().for_each(|known| known.fresh = false);
+        learn(&mut known, &found, compared.keypoints);
         for (link, found) in links.iter_mut().zip(found) {
             *link = link.or_else(|reason| found.map_err(|_| reason));
         }
     }
 }
 
-/// A partner for every keypoint that has none and whose neighbours know of one.
-fn next_to(links: &Links, compared: &Compared<'_>, band: &EpipolarBand) -> Links {
-    let moved = |(link, keypoint): (&Result<Link, Drop>, &Keypoint)| {
-        let right = link.as_ref().ok()?.right;
-        Some((keypoint.at, [right.x - keypoint.at.x, right.y - keypoint.at.y]))
+fn learn(known: &mut Vec<Known>, links: &Links, keypoints: &[Keypoint]) {
+    let told = |(link, keypoint): (&Result<Link, Drop>, &Keypoint)| {
+        let (at, right) = (keypoint.at, link.as_ref().ok()?.right);
+        Some(Known { at, moved: [right.x - at.x, right.y - at.y], fresh: true })
     };
-    let known: Vec<(ViewPixel, [f64; 2])> = links.iter().zip(compared.keypoints).filter_map(moved).collect();
-    let partner = |(link, keypoint): (&Result<Link, Drop>, &Keypoint)| {
-        if link.is_ok() {
-            return Err(Drop::Duplicate);
-        }
-        let at = keypoint.at;
-        let tried = guesses(at, &known).into_iter().filter_map(|[dx, dy]| {
-            registered(compared, at, ViewPixel { x: at.x + dx, y: at.y + dy }, LEVELS - 1, band).ok()
-        });
-        tried.max_by(|p, q| p.score.total_cmp(&q.score)).ok_or(Drop::NotRefined)
-    };
-    links.par_iter().zip(compared.keypoints).map(partner).collect()
+    known.extend(links.iter().zip(keypoints).filter_map(told));
+}
+
+/// The best of the partners that the nearest of `known` lead to, as far as they were not asked before.
+fn partner(at: ViewPixel, known: &[Known], compared: &Compared<'_>, band: &EpipolarBand) -> Result<Link, Drop> {
+    let tried = guesses(at, known).into_iter().filter_map(|[dx, dy]| {
+        registered(compared, at, ViewPixel { x: at.x + dx, y: at.y + dy }, LEVELS - 1, band).ok()
+    });
+    tried.max_by(|p, q| p.score.total_cmp(&q.score)).ok_or(Drop::NotRefined)
 }
 
 /// By how much the nearest of `known` moved, nearest first, each only once.
-fn guesses(at: ViewPixel, known: &[(ViewPixel, [f64; 2])]) -> Vec<[f64; 2]> {
-    let distance = |place: &ViewPixel| (place.x - at.x).hypot(place.y - at.y);
-    let mut near: Vec<(f64, [f64; 2])> = known.iter().map(|(place, by)| (distance(place), *by)).collect();
+fn guesses(at: ViewPixel, known: &[Known]) -> Vec<[f64; 2]> {
+    let mut near: Vec<(f64, &Known)> =
+        known.iter().map(|known| ((known.at.x - at.x).hypot(known.at.y - at.y), known)).collect();
     near.sort_by(|p, q| p.0.total_cmp(&q.0));
-    let mut guesses: Vec<[f64; 2]> = Vec::with_capacity(NEIGHBOURS);
-    for (_, by) in near.into_iter().take(NEIGHBOURS) {
-        if guesses.iter().all(|other| (other[0] - by[0]).hypot(other[1] - by[1]) >= SAME_GUESS) {
-            guesses.push(by);
+    near.truncate(NEIGHBOURS);
+    let mut guesses: Vec<(bool, [f64; 2])> = Vec::with_capacity(NEIGHBOURS);
+    for (_, Known { moved, fresh, .. }) in near {
+        if guesses.iter().all(|(_, other)| (other[0] - moved[0]).hypot(other[1] - moved[1]) >= SAME_GUESS) {
+            guesses.push((*fresh, *moved));
         }
     }
-    guesses
+    guesses.into_iter().filter(|(fresh, _)| *fresh).map(|(_, moved)| moved).collect()
 }
 
 #[cfg(test)]
@@ -120,7 +131,7 @@ mod tests {
         let mut links: Links = vec![Err(Drop::NoCandidate); keypoints.len()];
         let first = keypoints[12].at;
         links[12] = Ok(Link { right: ViewPixel { x: first.x - disparity + 1.0, y: first.y }, score: 1.0, sigma: 0.3 });
-        propagate(&mut links, &compared, &band());
+        propagate(&mut links, &compared, &Rows::of(&compared), &band());
 
         // As far as the window of the coarsest level reaches.
         let seen_twice = |keypoint: &Keypoint| keypoint.at.y < HIDDEN as f64 - 36.0;

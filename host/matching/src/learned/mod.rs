@@ -15,7 +15,7 @@ mod network;
 use crate::ViewPixel;
 use crate::corners::Keypoint;
 use crate::guided::{KEYPOINT_TOLERANCE, LEVELS};
-use crate::links::{Compared, Link, Links, agree_on_pose, drop_repeated, in_originals, register, sighting, thin};
+use crate::links::{Compared, Link, Links, Rows, agree_on_pose, in_originals, register, sighting, thin};
 use crate::matcher::{Drop, ImagePair, Match, MatchError, Matcher, Matches};
 use crate::plane::{Plane, Pyramid};
 use crate::propagate::propagate;
@@ -119,9 +119,10 @@ impl Seen {
         let compared = Compared { left: &left, right: &right, keypoints: &keypoints };
         register(&mut links, &compared, &band, Some(UNREGISTERED_SIGMA));
         agree_on_pose(&mut links, &keypoints, &views.grid, pair.pose_sigma);
-        drop_repeated(&mut links, &compared, &band);
+        let rows = Rows::of(&compared);
+        rows.drop_repeated(&mut links, &keypoints, &band);
         thin(&mut links, &keypoints);
-        propagate(&mut links, &compared, &band);
+        propagate(&mut links, &compared, &rows, &band);
         agree_on_pose(&mut links, &keypoints, &views.grid, pair.pose_sigma);
         thin(&mut links, &keypoints);
         in_originals(&links, views, &keypoints, right_keypoints)
