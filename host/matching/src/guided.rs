@@ -7,7 +7,7 @@ use crate::View;
 use crate::corners::{self, Keypoint};
 use crate::descriptor::Descriptor;
 use crate::epipolar_band::EpipolarBand;
-use crate::links::{Compared, Link, Links, agree_on_pose, drop_repeated, in_originals, register, sighting, thin};
+use crate::links::{Compared, Link, Links, Rows, agree_on_pose, in_originals, register, sighting, thin};
 use crate::matcher::{Drop, ImagePair, Match, MatchError, Matcher, Matches};
 use crate::plane::Pyramid;
 use crate::shared_views::SharedViews;
@@ -97,7 +97,7 @@ fn matched(views: &SharedViews<'_>, [left, right]: &[Features; 2], pose_sigma: A
     let mut links = compare(left, right, &band);
     register(&mut links, &compared, &band, None);
     agree_on_pose(&mut links, &left.keypoints, &views.grid, pose_sigma);
-    drop_repeated(&mut links, &compared, &band);
+    Rows::of(&compared).drop_repeated(&mut links, &left.keypoints, &band);
     thin(&mut links, &left.keypoints);
     in_originals(&links, views, &left.keypoints, right.keypoints.len())
 }

@@ -27,6 +27,7 @@ mod links;
 mod matcher;
 mod neighbours;
 mod plane;
+mod propagate;
 mod refine;
 mod shared_field;
 mod shared_frame;

@@ -46,27 +46,38 @@ const EPIPOLAR_SIGMAS: f64 = 3.0;
 /// Replaces every link's right position by the registered one, and drops what the pose does not allow there. What cannot be
 /// registered is dropped too, or kept where it is for certain only to `unregistered` pixels.
 pub(crate) fn register(links: &mut Links, compared: &Compared<'_>, band: &EpipolarBand, unregistered: Option<f64>) {
-    let pyramids = [compared.left, compared.right];
     links.par_iter_mut().zip(compared.keypoints).for_each(|(link, keypoint)| {
         *link = link.and_then(|start| {
-            let registered = match (refine::register(pyramids, keypoint.at, start.right, keypoint.level), unregistered)
-            {
-                (Ok(registered), _) => registered,
-                (Err(reason), Some(sigma)) if stays(reason, &start) => return Ok(Link { sigma, ..start }),
-                (Err(reason), _) => return Err(reason),
-            };
-            if !band.allows(keypoint.at, registered.right, REGISTERED_TOLERANCE) {
-                return Err(Drop::Epipolar);
+            match (registered(compared, keypoint.at, start.right, keypoint.level, band), unregistered) {
+                (Err(reason), Some(sigma)) if stays(reason, &start) => Ok(Link { sigma, ..start }),
+                (outcome, _) => outcome,
             }
-            Ok(Link { right: registered.right, score: registered.correlation, sigma: REGISTERED_SIGMA })
         });
     });
+}
+
+/// Where the right view shows what the left one shows at `left`, sought from `start` on, `level` first.
+///
+/// # Errors
+/// Why it is not to be trusted.
+pub(crate) fn registered(
+    compared: &Compared<'_>,
+    left: ViewPixel,
+    start: ViewPixel,
+    level: usize,
+    band: &EpipolarBand,
+) -> Result<Link, Drop> {
+    let found = refine::register([compared.left, compared.right], left, start, level)?;
+    if !band.allows(left, found.right, REGISTERED_TOLERANCE) {
+        return Err(Drop::Epipolar);
+    }
+    Ok(Link { right: found.right, score: found.correlation, sigma: REGISTERED_SIGMA })
 }
 
 /// Whether a match that could not be registered is still believed: on rendered pairs nine in ten of these are right, but
 /// little more than half of those that registration leaves or does not settle on.
 fn stays(reason: Drop, link: &Link) -> bool {
-    reason != Drop::NotRefined && link.score >= LEAST_UNREGISTERED_SCORE
+    !matches!(reason, Drop::NotRefined | Drop::Epipolar) && link.score >= LEAST_UNREGISTERED_SCORE
 }
 
 /// Drops what is off the epipolar planes of the pose that the links agree on.
@@ -92,19 +103,27 @@ pub(crate) fn sighting(grid: &Grid, keypoint: &Keypoint, link: &Link) -> Option<
     Some(Sighting { left: grid.bearing(keypoint.at)?, right: grid.bearing(link.right)?, sigma })
 }
 
-/// Drops what a view shows again where the partner might lie.
-pub(crate) fn drop_repeated(links: &mut Links, compared: &Compared<'_>, band: &EpipolarBand) {
-    let (Some(in_left), Some(in_right)) = (Surroundings::of(compared.left), Surroundings::of(compared.right)) else {
-        return;
-    };
-    links.par_iter_mut().zip(compared.keypoints).for_each(|(link, keypoint)| {
-        *link = link.and_then(|link| {
-            let (l, r) = (keypoint.at, link.right);
-            let farthest = band.largest_disparity(l.x);
-            let distinct = in_right.is_distinct(r, l.x - farthest, l.x) && in_left.is_distinct(l, r.x, r.x + farthest);
-            if distinct { Ok(link) } else { Err(Drop::Repeated) }
+/// What both views show along their rows; `None` where they are too small to tell.
+pub(crate) struct Rows<'a>(Option<[Surroundings<'a>; 2]>);
+
+impl<'a> Rows<'a> {
+    pub(crate) fn of(compared: &Compared<'a>) -> Self {
+        Self(Surroundings::of(compared.left).zip(Surroundings::of(compared.right)).map(<[_; 2]>::from))
+    }
+
+    /// Drops what a view shows again where the partner might lie.
+    pub(crate) fn drop_repeated(&self, links: &mut Links, keypoints: &[Keypoint], band: &EpipolarBand) {
+        let Some([in_left, in_right]) = &self.0 else { return };
+        links.par_iter_mut().zip(keypoints).for_each(|(link, keypoint)| {
+            *link = link.and_then(|link| {
+                let (l, r) = (keypoint.at, link.right);
+                let farthest = band.largest_disparity(l.x);
+                let distinct =
+                    in_right.is_distinct(r, l.x - farthest, l.x) && in_left.is_distinct(l, r.x, r.x + farthest);
+                if distinct { Ok(link) } else { Err(Drop::Repeated) }
+            });
         });
-    });
+    }
 }
 
 /// Drops what no neighbour supports, then what is there twice.

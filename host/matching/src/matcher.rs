@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 
 use image::GrayImage;
-use vergence_vision::{Angle, ImageSize, KannalaBrandt, Left, Length, Pixel, Right, Side, Transform};
+use vergence_vision::{Angle, ImageSize, KannalaBrandt, Left, Length, Pixel, PixelPair, Right, Side, Transform};
 
 /// Finds the points of the scene seen in both images of a pair.
 pub trait Matcher: Send + Sync {
@@ -48,6 +48,14 @@ pub struct Match {
     pub sigma: f64,
     /// Likeness in [0, 1], comparable within one matcher only.
     pub score: f32,
+}
+
+impl Match {
+    /// Both positions and their standard deviation, as triangulation takes them.
+    #[must_use]
+    pub const fn measured(&self) -> (PixelPair, f64) {
+        (PixelPair { left: self.left, right: self.right }, self.sigma)
+    }
 }
 
 /// The result of [`Matcher::find`]. Every left keypoint is either in `pairs` or counted in `dropped`.

@@ -14,7 +14,7 @@ const B_LIMIT: Angle = Angle::from_deg(105.0);
 /// The outermost ring of the lens, vignetted and least well calibrated.
 const RIM: Angle = Angle::from_deg(1.5);
 /// Besides infinity, the range at which the other camera must see a direction for it to be compared.
-const NEAR: Length = Length::from_mm(1000.0);
+pub(crate) const NEAR: Length = Length::from_mm(1000.0);
 /// A field widened for an uncertain pose is widened by no more than this.
 const MOST_SLACK: Angle = Angle::from_deg(10.0);
 

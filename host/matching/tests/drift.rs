@@ -5,8 +5,8 @@ mod common;
 
 use common::Pair;
 use nalgebra::{Matrix6, UnitQuaternion, Vector3, Vector6};
-use vergence_matching::{GuidedMatcher, ImagePair, Matcher};
-use vergence_vision::{Angle, Left, PixelPair, PoseDrift, Right, StereoPair, Transform, pose_drift};
+use vergence_matching::{GuidedMatcher, ImagePair, Match, Matcher};
+use vergence_vision::{Angle, Left, PoseDrift, Right, StereoPair, Transform, pose_drift};
 
 /// What the picture says with the pose turned by `off`, its sigma stated as 0.02° and 0.1 mm; and how many matches there are.
 fn drift(pair: &Pair, off: Vector3<f64>) -> (PoseDrift, usize) {
@@ -16,8 +16,7 @@ fn drift(pair: &Pair, off: Vector3<f64>) -> (PoseDrift, usize) {
         Transform::new(UnitQuaternion::from_scaled_axis(-off) * truth.rotation(), truth.origin().mm());
     let images = ImagePair { left_from_right: believed, pose_sigma: Angle::from_deg(0.15), ..images };
     let found = GuidedMatcher::default().find(&images).unwrap().pairs;
-    let pixels: Vec<_> =
-        found.iter().map(|found| (PixelPair { left: found.left, right: found.right }, found.sigma)).collect();
+    let pixels: Vec<_> = found.iter().map(Match::measured).collect();
     let rig = StereoPair { left: &pair.camera, right: &pair.camera, left_from_right: believed };
     let (turn, shift) = (0.02f64.to_radians().powi(2), 0.1f64.powi(2));
     let stated = Matrix6::from_diagonal(&Vector6::new(turn, turn, turn, shift, shift, shift));

@@ -1,6 +1,6 @@
 //! ONNX Runtime, loaded from the library file that the caller found.
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::sync::{Mutex, PoisonError};
 
 use ort::environment::Environment;
@@ -10,6 +10,9 @@ use vergence_matching::learned::{Elements, Network, NetworkError, Outlet, Signat
 
 const NAME: &str = "ONNX Runtime";
 
+/// The library that this process has loaded, and its state: there can be only one.
+static LOADED: Mutex<Option<(PathBuf, Environment)>> = Mutex::new(None);
+
 /// The loaded library. It stays loaded until the process ends.
 pub struct OnnxRuntime {
     environment: Environment,
@@ -17,13 +20,24 @@ pub struct OnnxRuntime {
 }
 
 impl OnnxRuntime {
-    /// Loads `library` (`libonnxruntime.so`) and lets each network use `threads` threads.
+    /// Loads `library` (`libonnxruntime.so`), unless it is loaded already, and lets each network use `threads` threads.
     ///
     /// # Errors
-    /// [`NetworkError::Runtime`] where it is not there or too old.
+    /// [`NetworkError::Runtime`] where it is not there or too old, or another one is loaded already.
     pub fn load(library: &Path, threads: usize) -> Result<Self, NetworkError> {
-        let builder = ort::init_from(library).map_err(|error| unusable(&error))?;
-        let environment = builder.with_telemetry(false).build().map_err(|error| unusable(&error))?;
+        let mut loaded = LOADED.lock().unwrap_or_else(PoisonError::into_inner);
+        let environment = match &*loaded {
+            Some((path, environment)) if path == library => environment.clone(),
+            Some((other, _)) => {
+                return Err(unusable(&format!("this process uses {} already, and can use only one", other.display())));
+            }
+            None => {
+                let builder = ort::init_from(library).map_err(|error| unusable(&error))?;
+                let environment = builder.with_telemetry(false).build().map_err(|error| unusable(&error))?;
+                *loaded = Some((library.to_owned(), environment.clone()));
+                environment
+            }
+        };
         Ok(Self { environment, threads })
     }
 

@@ -156,8 +156,7 @@ fn matches(
 }
 
 fn pixel_pairs(found: &Matches) -> Vec<(PixelPair, f64)> {
-    let pair = |m: &Match| (PixelPair { left: m.left, right: m.right }, m.sigma);
-    found.pairs.iter().map(pair).collect()
+    found.pairs.iter().map(Match::measured).collect()
 }
 
 fn stereo<'a>(rig: &'a Rig, pose: &RigPose) -> StereoPair<'a> {

@@ -32,6 +32,7 @@ use self::register::Seen;
 use self::surface::SAME_SURFACE;
 use crate::epipolar_band::EpipolarBand;
 use crate::matcher::{ImagePair, MatchError};
+use crate::shared_field::NEAR;
 use crate::{Grid, SharedFrame, View, ViewPixel};
 
 /// A parallax of fewer standard deviations cannot be told from none.
@@ -40,8 +41,6 @@ const SIGNIFICANT: f32 = 3.0;
 const LARGEST_SIGMA: f32 = 2.0;
 /// Windows with less than this share of their contrast in common do not show the same thing.
 const LEAST_LIKENESS: f32 = 0.4;
-/// Where the right camera sees a direction neither at infinity nor at this range, it is not shared.
-const NEAR: Length = Length::from_mm(1000.0);
 
 /// A pair of images turned so that their epipolar curves are rows.
 #[derive(Clone, Debug)]

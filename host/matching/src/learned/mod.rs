@@ -4,7 +4,8 @@
 //! that both cameras share are left out before the best are taken, so that none of the budget is spent on what the
 //! other camera cannot see. What the networks match is then checked against the pose and thinned as
 //! [`crate::GuidedMatcher`] does it. What can be registered is known to a fraction of a pixel; what cannot is kept with
-//! the larger uncertainty of the networks' own places.
+//! the larger uncertainty of the networks' own places. Then keypoints without a partner are sought where the matches around
+//! them say.
 
 mod contract;
 mod manifest;
@@ -14,9 +15,10 @@ mod network;
 use crate::ViewPixel;
 use crate::corners::Keypoint;
 use crate::guided::{KEYPOINT_TOLERANCE, LEVELS};
-use crate::links::{Compared, Link, Links, agree_on_pose, drop_repeated, in_originals, register, sighting, thin};
+use crate::links::{Compared, Link, Links, Rows, agree_on_pose, in_originals, register, sighting, thin};
 use crate::matcher::{Drop, ImagePair, Match, MatchError, Matcher, Matches};
 use crate::plane::{Plane, Pyramid};
+use crate::propagate::propagate;
 use crate::shared_views::SharedViews;
 use crate::wrong_pose::pose_instead;
 
@@ -26,7 +28,7 @@ pub use network::{Elements, Network, NetworkError, Outlet, Signature, Tensor};
 
 /// Standard deviation of a match that could not be registered, in pixels of the view and in each direction: networks place
 /// keypoints on whole pixels of both views. Measured on rendered pairs: see docs/measured.md.
-const UNREGISTERED_SIGMA: f64 = 0.5;
+const UNREGISTERED_SIGMA: f64 = 0.8;
 
 /// Matches what pre-trained networks find alike.
 pub struct LearnedMatcher {
@@ -117,7 +119,11 @@ impl Seen {
         let compared = Compared { left: &left, right: &right, keypoints: &keypoints };
         register(&mut links, &compared, &band, Some(UNREGISTERED_SIGMA));
         agree_on_pose(&mut links, &keypoints, &views.grid, pair.pose_sigma);
-        drop_repeated(&mut links, &compared, &band);
+        let rows = Rows::of(&compared);
+        rows.drop_repeated(&mut links, &keypoints, &band);
+        thin(&mut links, &keypoints);
+        propagate(&mut links, &compared, &rows, &band);
+        agree_on_pose(&mut links, &keypoints, &views.grid, pair.pose_sigma);
         thin(&mut links, &keypoints);
         in_originals(&links, views, &keypoints, right_keypoints)
     }

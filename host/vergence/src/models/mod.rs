@@ -11,7 +11,7 @@ mod store;
 
 pub use choose::MatcherOptions;
 pub use known::{KNOWN, Known, manifest_for};
-pub use pattern::pattern;
+pub use pattern::{Pattern, SMALL_KEYPOINTS};
 pub use runtime::{Runtime, RuntimeOptions, threads};
 pub use speed::Speed;
 pub use store::{MODEL_FILE, ModelStore, StoreOptions, digest, load, read_manifest};

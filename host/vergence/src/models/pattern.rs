@@ -1,8 +1,50 @@
 //! A picture that networks find keypoints in, the same every time.
 
-/// `side` × `side` pixels with squares of all greys by rows, 0 to 1.
-#[must_use]
-pub fn pattern(side: usize) -> Vec<f32> {
+use vergence_matching::learned::{Found, Model, Picture};
+
+use crate::failure::Failure;
+
+/// Keypoints of the small pattern that are compared.
+pub const SMALL_KEYPOINTS: usize = 512;
+
+/// Squares of all greys.
+pub struct Pattern {
+    values: Vec<f32>,
+    side: usize,
+}
+
+impl Pattern {
+    /// Enough to see that a model works, and which runtime is faster with it: `SMALL_KEYPOINTS` of it are compared.
+    #[must_use]
+    pub fn small() -> Self {
+        Self::new(256)
+    }
+
+    /// `side` × `side` pixels.
+    #[must_use]
+    pub fn new(side: usize) -> Self {
+        Self { values: squares(side), side }
+    }
+
+    /// By rows, 0 to 1.
+    #[must_use]
+    pub fn values(&self) -> &[f32] {
+        &self.values
+    }
+
+    /// The pattern matched with itself: as many matches as keypoints, if all is well.
+    ///
+    /// # Errors
+    /// Where the networks fail.
+    pub fn with_itself(&self, model: &Model, keypoints: usize) -> Result<Found, Failure> {
+        let picture = Picture { values: &self.values, width: self.side, height: self.side };
+        model
+            .compare([picture, picture], keypoints, [&|_| true, &|_| true])
+            .map_err(|error| Failure::check(error.to_string()))
+    }
+}
+
+fn squares(side: usize) -> Vec<f32> {
     /// Pixels for each square.
     const AREA: usize = 164;
     let mut values = vec![0.5; side * side];

@@ -51,15 +51,14 @@ impl RuntimeOptions {
         if self.runtime == Some(Which::Rten) {
             return Ok((Runtime::Rten, "as asked".into()));
         }
-        let found = self.onnx_runtime()?;
-        match (found, Speed::read(folder)) {
-            (None, _) if self.runtime == Some(Which::OnnxRuntime) => Err(Failure::usage(
-                "there is no ONNX Runtime: name its library with --onnxruntime, or install it with pip",
-            )),
-            (None, _) => Ok((Runtime::Rten, "there is no ONNX Runtime".into())),
-            (Some(found), _) if self.runtime.is_some() => Ok((found, "as asked".into())),
-            (Some(found), Some(speed)) => Ok(faster(found, &speed)),
-            (Some(found), None) => Ok((found, "not timed yet, see 'vergence models verify'".into())),
+        match (self.onnx_runtime()?, Speed::read(folder)) {
+            (Err(why), _) if self.runtime == Some(Which::OnnxRuntime) => {
+                Err(Failure::usage(format!("{why}: name its library with --onnxruntime, or install it with pip")))
+            }
+            (Err(why), _) => Ok((Runtime::Rten, why)),
+            (Ok(found), _) if self.runtime.is_some() => Ok((found, "as asked".into())),
+            (Ok(found), Some(speed)) => Ok(faster(found, &speed)),
+            (Ok(found), None) => Ok((found, "not timed yet, see 'vergence models verify'".into())),
         }
     }
 
@@ -71,13 +70,16 @@ impl RuntimeOptions {
         Ok(std::iter::once(Runtime::Rten).chain(self.onnx_runtime()?).collect())
     }
 
-    /// The library named on the command line or by ORT_DYLIB_PATH, which must then work; else one that pip installed.
-    fn onnx_runtime(&self) -> Result<Option<Runtime>, Failure> {
+    /// The library named on the command line or by ORT_DYLIB_PATH, which must then work; else one that pip installed, or why
+    /// there is none that works.
+    fn onnx_runtime(&self) -> Result<Result<Runtime, String>, Failure> {
         let load =
             |library: PathBuf| OnnxRuntime::load(&library, threads()).map(|found| Runtime::OnnxRuntime(found, library));
         match &self.onnxruntime {
-            Some(named) => load(named.clone()).map(Some).map_err(|error| Failure::usage(error.to_string())),
-            None => Ok(installed_by_pip().and_then(|library| load(library).ok())),
+            Some(named) => load(named.clone()).map(Ok).map_err(|error| Failure::usage(error.to_string())),
+            None => Ok(installed_by_pip()
+                .ok_or_else(|| "there is no ONNX Runtime".to_owned())
+                .and_then(|library| load(library).map_err(|error| error.to_string()))),
         }
     }
 }

@@ -3,9 +3,9 @@
 use std::path::{Path, PathBuf};
 
 use serde::{Deserialize, Serialize};
-use vergence_matching::learned::{Model, Picture};
+use vergence_matching::learned::Model;
 
-use super::pattern::pattern;
+use super::pattern::{Pattern, SMALL_KEYPOINTS};
 use super::runtime::Runtime;
 use super::store::load;
 use crate::failure::Failure;
@@ -14,9 +14,6 @@ use crate::stopwatch::Stopwatch;
 
 /// The record, in the model's folder.
 const SPEED_FILE: &str = "speed.toml";
-/// Side of the pattern in pixels, and keypoints of it: enough for the order of the runtimes to be that of whole views.
-const SIDE: usize = 256;
-const KEYPOINTS: usize = 512;
 /// The least of so many runs, the first of which warms up.
 const RUNS: usize = 3;
 
@@ -74,11 +71,10 @@ impl Speed {
 }
 
 fn seconds(model: &Model) -> Option<f64> {
-    let values = pattern(SIDE);
-    let picture = Picture { values: &values, width: SIDE, height: SIDE };
+    let pattern = Pattern::small();
     let run = |_| {
         let watch = Stopwatch::start();
-        model.compare([picture, picture], KEYPOINTS, [&|_| true, &|_| true]).ok()?;
+        pattern.with_itself(model, SMALL_KEYPOINTS).ok()?;
         Some(watch.seconds())
     };
     let runs: Option<Vec<f64>> = (0..RUNS).map(run).collect();

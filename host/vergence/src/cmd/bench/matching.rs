@@ -1,6 +1,7 @@
 //! `vergence bench matching`: what each way of matching finds, over the angle between the optical axes.
 
 mod judge;
+mod means;
 mod simulated_pair;
 mod ways;
 
@@ -11,6 +12,7 @@ use serde_json::json;
 use vergence_vision::Angle;
 
 use self::judge::Tally;
+use self::means::Means;
 use self::simulated_pair::SimulatedPair;
 use self::ways::{Outcome, Way};
 use crate::cmd::report::rounded;
@@ -21,12 +23,18 @@ use crate::models::MatcherOptions;
 /// Photographs the simulated room with two eyes 145 mm apart, each a little pitched and rolled, matches the pair by every
 /// way there is, and counts the matches that are right: those within 2.5 pixels of where the right eye sees what the left
 /// one does. `raw` gives the whole fisheye images to the networks, `views` is `--matcher` with a model, `classical` the one
-/// that needs none. Each before and after the gates of the known pose.
+/// that needs none. Each before and after the gates of the known pose. With several seeds the mean comes after all of them.
 #[derive(Debug, clap::Args)]
 pub struct Args {
     /// Angles between the optical axes, such as 60deg,120deg. Without them 0° to 130° in steps of 10°.
     #[arg(long, value_name = "ANGLES", value_delimiter = ',')]
     separations: Vec<Angle>,
+    /// From so many places in the room, each seed with its own place, heading and mounts.
+    #[arg(long, default_value_t = 1, value_parser = clap::value_parser!(u64).range(1..=100))]
+    seeds: u64,
+    /// The first seed.
+    #[arg(long, default_value_t = 1, value_parser = clap::value_parser!(u64).range(0..=1_000_000))]
+    first_seed: u64,
     /// Side of the images in pixels.
     #[arg(long, default_value_t = 1280, value_parser = clap::value_parser!(u32).range(160..=2560))]
     side: u32,
@@ -52,25 +60,41 @@ pub fn run(args: &Args, console: Console) -> Result<(), Failure> {
         "{} x {} pixels; matches that are right (share of all), before and after the gates",
         args.side, args.side
     ))?;
-    let mut rows = Vec::new();
+    let (mut rows, mut means) = (Vec::new(), Vec::new());
     for separation in separations {
-        let work = console.progress(&format!("{separation}"));
-        let pair = SimulatedPair::new(args.side, separation, args.renders.as_deref())?;
-        // About an axis between all of them.
-        let error = Vector3::new(1.0, -1.0, 1.0).normalize() * args.pose_error.rad();
-        let mut found = serde_json::Map::new();
-        let mut lines = Vec::new();
-        for way in &ways {
-            let outcome = way.find(&pair, error)?;
-            lines.push(format!("  {:>9}: {}", way.name(), in_words(&outcome)));
-            found.insert(way.name().into(), in_json(&outcome));
+        let mut of_ways = vec![Means::default(); ways.len()];
+        for seed in args.first_seed..args.first_seed + args.seeds {
+            let work = console.progress(&format!("{separation:.0}, seed {seed}"));
+            let pair = SimulatedPair::new(args.side, separation, seed, args.renders.as_deref())?;
+            // About an axis between all of them.
+            let error = Vector3::new(1.0, -1.0, 1.0).normalize() * args.pose_error.rad();
+            let (mut found, mut lines) = (serde_json::Map::new(), Vec::new());
+            for (way, means) in ways.iter().zip(&mut of_ways) {
+                let outcome = way.find(&pair, error)?;
+                lines.push(format!("  {:>9}: {}", way.name(), in_words(&outcome)));
+                found.insert(way.name().into(), in_json(&outcome));
+                means.add(&outcome);
+            }
+            work.finish_and_clear();
+            console.say(format!("{separation:.0}, seed {seed}"))?;
+            lines.iter().try_for_each(|line| console.say(line))?;
+            rows.push(json!({ "separation_deg": rounded(separation.deg()), "seed": seed, "ways": found }));
         }
-        work.finish_and_clear();
-        console.say(format!("{separation:.0}"))?;
-        lines.iter().try_for_each(|line| console.say(line))?;
-        rows.push(json!({ "separation_deg": rounded(separation.deg()), "ways": found }));
+        if args.seeds > 1 {
+            console.say(format!("{separation:.0}, mean of {} (least to most)", args.seeds))?;
+        }
+        let mut mean = serde_json::Map::new();
+        for (way, means) in ways.iter().zip(&of_ways) {
+            if args.seeds > 1 {
+                console.say(format!("  {:>9}: {means}", way.name()))?;
+            }
+            mean.insert(way.name().into(), means.json());
+        }
+        means.push(json!({ "separation_deg": rounded(separation.deg()), "ways": mean }));
     }
-    console.result(&json!({ "side": args.side, "pose_error_deg": rounded(args.pose_error.deg()), "rows": rows }))
+    console.result(&json!({
+        "side": args.side, "pose_error_deg": rounded(args.pose_error.deg()), "rows": rows, "means": means
+    }))
 }
 
 fn in_words(outcome: &Outcome) -> String {

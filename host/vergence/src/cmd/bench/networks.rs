@@ -1,16 +1,15 @@
 //! `vergence bench networks`: how long networks take for a pair, beside Python's onnxruntime.
 
-use std::process::Command;
-
 use serde_json::{Value, json};
 use vergence_calibration::median;
-use vergence_matching::learned::{Model, Picture};
+use vergence_matching::learned::Model;
 
 use crate::cmd::report::rounded;
 use crate::console::Console;
 use crate::failure::Failure;
-use crate::models::{ModelStore, Runtime, RuntimeOptions, StoreOptions, load, pattern, read_manifest, threads};
+use crate::models::{ModelStore, Pattern, Runtime, RuntimeOptions, StoreOptions, load, read_manifest, threads};
 use crate::output::write_whole;
+use crate::python::ask_python;
 use crate::stopwatch::Stopwatch;
 
 /// Extracts the keypoints of two pictures of 512 x 512 pixels and matches them, by every runtime there is and by Python's
@@ -62,22 +61,14 @@ pub fn run(args: &Args, console: Console) -> Result<(), Failure> {
     let models: Vec<(&Runtime, Model)> =
         runtimes.iter().map(|runtime| Ok((runtime, load(&folder, runtime)?))).collect::<Result<_, Failure>>()?;
     let scratch = tempfile::tempdir().map_err(|error| Failure::usage(format!("no temporary folder: {error}")))?;
-    let picture = scratch.path().join("picture.f32");
-    write_whole(&picture, &pattern(SIDE).iter().flat_map(|value| value.to_le_bytes()).collect::<Vec<u8>>())?;
+    let (pattern, picture) = (Pattern::new(SIDE), scratch.path().join("picture.f32"));
+    write_whole(&picture, &pattern.values().iter().flat_map(|value| value.to_le_bytes()).collect::<Vec<u8>>())?;
     let manifest = serde_json::to_string(&manifest).map_err(|error| Failure::check(error.to_string()))?;
     let ask = |keypoints: usize| -> Result<PeerTimes, String> {
+        let paths = [&folder, &picture].map(|path| path.display().to_string());
         let numbers = [SIDE, SIDE, keypoints, threads(), usize::from(args.runs)].map(|number| number.to_string());
-        let output = Command::new(&args.python)
-            .args(["-c", include_str!("onnxruntime_pair.py"), &manifest])
-            .args([&folder, &picture])
-            .args(numbers)
-            .output()
-            .map_err(|error| format!("{} does not start: {error}", args.python))?;
-        if !output.status.success() {
-            let said = String::from_utf8_lossy(&output.stderr);
-            return Err(said.lines().last().unwrap_or("it fails without a word").to_owned());
-        }
-        serde_json::from_slice(&output.stdout).map_err(|error| format!("its answer is not understood: {error}"))
+        let arguments = std::iter::once(manifest.clone()).chain(paths).chain(numbers);
+        ask_python(&args.python, include_str!("onnxruntime_pair.py"), arguments)
     };
     console.say(format!("{name}, {SIDE} x {SIDE} pixels, {} threads, milliseconds for a pair (least)", threads()))?;
     let mut rows = Vec::new();
@@ -88,7 +79,7 @@ pub fn run(args: &Args, console: Console) -> Result<(), Failure> {
         let mut found = 0;
         for _ in 0..args.rounds {
             for ((_, model), times) in models.iter().zip(&mut ours) {
-                let (count, taken) = milliseconds(model, keypoints, args.runs)?;
+                let (count, taken) = milliseconds(model, &pattern, keypoints, args.runs)?;
                 found = count;
                 times.extend(taken);
             }
@@ -132,14 +123,10 @@ fn now_is_less(now: &PeerTimes, best: &PeerTimes) -> bool {
 }
 
 /// How many keypoints were compared, and how long each of several runs took after one that warms up.
-fn milliseconds(model: &Model, keypoints: usize, runs: u16) -> Result<(usize, Vec<f64>), Failure> {
-    let values = pattern(SIDE);
-    let picture = Picture { values: &values, width: SIDE, height: SIDE };
+fn milliseconds(model: &Model, pattern: &Pattern, keypoints: usize, runs: u16) -> Result<(usize, Vec<f64>), Failure> {
     let pair = || {
         let watch = Stopwatch::start();
-        let found = model
-            .compare([picture, picture], keypoints, [&|_| true, &|_| true])
-            .map_err(|error| Failure::check(error.to_string()))?;
+        let found = pattern.with_itself(model, keypoints)?;
         Ok::<_, Failure>((found.keypoints[0].len(), 1e3 * watch.seconds()))
     };
     let (found, _) = pair()?;

@@ -1,11 +1,11 @@
 //! `vergence models verify`: are they what they were, do they run, and how fast?
 
 use serde_json::json;
-use vergence_matching::learned::{Model, Picture};
+use vergence_matching::learned::Model;
 
 use crate::console::Console;
 use crate::failure::Failure;
-use crate::models::{ModelStore, RuntimeOptions, Speed, StoreOptions, load, pattern, threads};
+use crate::models::{ModelStore, Pattern, RuntimeOptions, SMALL_KEYPOINTS, Speed, StoreOptions, load, threads};
 
 /// Reads every model, checks digests and tensors, and runs it on a drawn pattern on every runtime there is. Which was
 /// faster is kept beside the model: it serves from then on.
@@ -17,9 +17,6 @@ pub struct Args {
     store: StoreOptions,
 }
 
-/// Side of the drawn pattern in pixels.
-const SIDE: usize = 256;
-const KEYPOINTS: usize = 512;
 /// Keypoints this near are the same, in pixels.
 const SAME_PLACE: f32 = 0.5;
 
@@ -56,13 +53,9 @@ pub fn run(args: &Args, console: Console) -> Result<(), Failure> {
     if failed { Err(Failure::check("a model is not what it should be")) } else { Ok(()) }
 }
 
-/// A picture matched with itself: as many matches as keypoints, if all is well.
+/// How many keypoints of the pattern find themselves.
 fn match_with_itself(model: &Model) -> Result<usize, Failure> {
-    let values = pattern(SIDE);
-    let picture = Picture { values: &values, width: SIDE, height: SIDE };
-    let found = model
-        .compare([picture, picture], KEYPOINTS, [&|_| true, &|_| true])
-        .map_err(|error| Failure::check(error.to_string()))?;
+    let found = Pattern::small().with_itself(model, SMALL_KEYPOINTS)?;
     let same = |&&(i, j, _): &&(usize, usize, f32)| {
         let [[x, y], [to_x, to_y]] = [found.keypoints[0][i], found.keypoints[1][j]];
         (to_x - x).hypot(to_y - y) < SAME_PLACE

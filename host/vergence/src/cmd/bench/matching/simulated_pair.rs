@@ -12,6 +12,7 @@ use vergence_vision::{Angle, Camera, ImageSize, KannalaBrandt, Left, Length, Pix
 use crate::camera::read_image;
 use crate::failure::Failure;
 use crate::output::{make_folder, write_png};
+use crate::sim::Random;
 
 const BASELINE_MM: f64 = 145.0;
 
@@ -26,23 +27,22 @@ pub struct SimulatedPair {
 }
 
 impl SimulatedPair {
-    /// Renders it, or reads it from the folder of `renders` where it is kept there.
+    /// Renders it, or reads it from the folder of `renders` where it is kept there. Every seed has a stand of its own.
     ///
     /// # Errors
     /// Where the folder cannot be read or written.
-    pub fn new(side: u32, separation: Angle, renders: Option<&Path>) -> Result<Self, Failure> {
-        let (lens, scene) = (bench_lens(side)?, Scene::room());
+    pub fn new(side: u32, separation: Angle, seed: u64, renders: Option<&Path>) -> Result<Self, Failure> {
+        let (lens, scene, stand) = (bench_lens(side)?, Scene::room(), Stand::of(seed));
         let half = separation.rad() / 2.0;
-        // As such mounts stand: pitched by 1°, rolled by 2°, each its own way.
-        let world_from_left = eye(-BASELINE_MM / 2.0, [-half, 0.018, 0.036]);
-        let world_from_right = eye(BASELINE_MM / 2.0, [half, -0.016, -0.033]);
-        let photograph = |name: &str, world_from_camera, seed| {
-            let kept = renders.map(|folder| folder.join(format!("{side}-{:.0}-{name}.png", separation.deg())));
+        let world_from_left = stand.eye(-BASELINE_MM / 2.0, -half, stand.mounts[0]);
+        let world_from_right = stand.eye(BASELINE_MM / 2.0, half, stand.mounts[1]);
+        let photograph = |name: &str, world_from_camera, noise| {
+            let kept = renders.map(|folder| folder.join(format!("{seed}-{side}-{:.0}-{name}.png", separation.deg())));
             if let Some(path) = kept.as_deref().filter(|path| path.is_file()) {
                 return Ok(grayscale(&read_image(path)?));
             }
             let view = View { scene: &scene, camera: &lens, world_from_camera, optics: &Optics::default() };
-            let image: RgbImage = render(&view, seed).image;
+            let image: RgbImage = render(&view, noise).image;
             if let (Some(folder), Some(path)) = (renders, kept) {
                 make_folder(folder)?;
                 write_png(&path, &image)?;
@@ -50,8 +50,8 @@ impl SimulatedPair {
             Ok::<_, Failure>(grayscale(&image))
         };
         Ok(Self {
-            left: photograph("left", world_from_left, 1)?,
-            right: photograph("right", world_from_right, 2)?,
+            left: photograph("left", world_from_left, 2 * seed + 1)?,
+            right: photograph("right", world_from_right, 2 * seed + 2)?,
             left_from_right: (world_from_left.inverse() * world_from_right).renamed(),
             world_from_left: world_from_left.renamed(),
             lens,
@@ -66,11 +66,37 @@ impl SimulatedPair {
     }
 }
 
-fn eye(x: f64, [yaw, pitch, roll]: [f64; 3]) -> Transform<World, Camera> {
-    let turn = UnitQuaternion::from_axis_angle(&Vector3::y_axis(), yaw)
-        * UnitQuaternion::from_axis_angle(&Vector3::x_axis(), pitch)
-        * UnitQuaternion::from_axis_angle(&Vector3::z_axis(), roll);
-    Transform::new(turn, Vector3::new(x, 0.0, 0.0))
+/// Where the rig stands in the room, which way it looks, and how its mounts are off.
+struct Stand {
+    middle: Vector3<f64>,
+    heading: f64,
+    /// Pitch and roll of both eyes.
+    mounts: [[f64; 2]; 2],
+}
+
+impl Stand {
+    /// Farthest from the middle of the room, whose nearest half metre is free.
+    const AWAY_MM: Vector3<f64> = Vector3::new(150.0, 100.0, 150.0);
+    const MOST_PITCH: Angle = Angle::from_deg(2.0);
+    const MOST_ROLL: Angle = Angle::from_deg(3.0);
+
+    fn of(seed: u64) -> Self {
+        let mut random = Random::new(seed);
+        let mut within = |reach: f64| random.between(-reach, reach);
+        let heading = within(std::f64::consts::PI);
+        let middle = Self::AWAY_MM.map(&mut within);
+        let mounts = std::array::from_fn(|_| [within(Self::MOST_PITCH.rad()), within(Self::MOST_ROLL.rad())]);
+        Self { middle, heading, mounts }
+    }
+
+    /// The eye at `x` on the bench, turned outwards by `yaw`.
+    fn eye(&self, x: f64, yaw: f64, [pitch, roll]: [f64; 2]) -> Transform<World, Camera> {
+        let heading = UnitQuaternion::from_axis_angle(&Vector3::y_axis(), self.heading);
+        let turn = UnitQuaternion::from_axis_angle(&Vector3::y_axis(), yaw)
+            * UnitQuaternion::from_axis_angle(&Vector3::x_axis(), pitch)
+            * UnitQuaternion::from_axis_angle(&Vector3::z_axis(), roll);
+        Transform::new(heading * turn, self.middle + heading * Vector3::new(x, 0.0, 0.0))
+    }
 }
 
 /// The bench's lens on a sensor of another size.

@@ -4,10 +4,10 @@ use std::collections::BTreeMap;
 
 use nalgebra::{Matrix6, UnitQuaternion, Vector3, Vector6};
 use vergence_matching::learned::{LearnedMatcher, Picture};
-use vergence_matching::{GuidedMatcher, ImagePair, Match, Matcher};
+use vergence_matching::{GuidedMatcher, ImagePair, Match, MatchError, Matcher, Matches};
 use vergence_vision::{
-    Angle, Gates, Left, Length, Pixel, PixelPair, PoseDrift, Right, SharedCovariance, StereoPair, Transform,
-    cloud_of_each, pose_drift,
+    Angle, Gates, Left, Length, Pixel, PoseDrift, Right, SharedCovariance, StereoPair, Transform, cloud_of_each,
+    pose_drift,
 };
 
 use super::judge::Tally;
@@ -79,21 +79,21 @@ impl<'a> Way<'a> {
             pose_sigma: POSE_SIGMA,
             nearest: NEAREST,
         };
-        let failed = |error: &dyn std::fmt::Display| Failure::check(error.to_string());
-        let candidates = match self {
-            Self::Raw(matcher) => whole(matcher, &images)?,
-            Self::Views(matcher) => matcher.candidates(&images).map_err(|error| failed(&error))?,
-            Self::Classical(matcher) => matcher.candidates(&images).map_err(|error| failed(&error))?,
+        let failed = |error: MatchError| Failure::check(error.to_string());
+        let (candidates, found, seconds) = match self {
+            Self::Raw(matcher) => {
+                let watch = Stopwatch::start();
+                let pairs = whole(matcher, &images)?;
+                let seconds = watch.seconds();
+                (pairs.clone(), Matches { pairs, ..Matches::default() }, seconds)
+            }
+            Self::Views(matcher) => timed(matcher.candidates(&images).map_err(failed)?, *matcher, &images)?,
+            Self::Classical(matcher) => timed(matcher.candidates(&images).map_err(failed)?, matcher, &images)?,
         };
-        let watch = Stopwatch::start();
-        let (matches, dropped) = match self {
-            Self::Raw(matcher) => (whole(matcher, &images)?, BTreeMap::new()),
-            Self::Views(matcher) => kept(*matcher, &images)?,
-            Self::Classical(matcher) => kept(matcher, &images)?,
-        };
-        let seconds = watch.seconds();
+        let matches = found.pairs;
+        let dropped = found.dropped.into_iter().map(|(reason, count)| (reason.as_str(), count)).collect();
         let stereo = StereoPair { left: &pair.lens, right: &pair.lens, left_from_right: told };
-        let pixels: Vec<_> = matches.iter().map(|m| (PixelPair { left: m.left, right: m.right }, m.sigma)).collect();
+        let pixels: Vec<_> = matches.iter().map(Match::measured).collect();
         let (turn, shift) = (STATED.0.rad().powi(2), STATED.1.mm().powi(2));
         let stated = Matrix6::from_diagonal(&Vector6::new(turn, turn, turn, shift, shift, shift));
         let drift = pose_drift(&pixels, &stereo, &stated);
@@ -112,10 +112,15 @@ impl<'a> Way<'a> {
     }
 }
 
-fn kept(matcher: &dyn Matcher, images: &ImagePair<'_>) -> Result<(Vec<Match>, BTreeMap<&'static str, usize>), Failure> {
+/// With what a matcher finds, and how long it takes.
+fn timed(
+    candidates: Vec<Match>,
+    matcher: &dyn Matcher,
+    images: &ImagePair<'_>,
+) -> Result<(Vec<Match>, Matches, f64), Failure> {
+    let watch = Stopwatch::start();
     let found = matcher.find(images).map_err(|error| Failure::check(error.to_string()))?;
-    let dropped = found.dropped.into_iter().map(|(reason, count)| (reason.as_str(), count)).collect();
-    Ok((found.pairs, dropped))
+    Ok((candidates, found, watch.seconds()))
 }
 
 /// What the networks match in the images as they are.

@@ -1,0 +1,69 @@
+//! What a way of matching comes to over several seeds.
+
+use std::fmt;
+
+use serde_json::{Value, json};
+
+use super::ways::Outcome;
+use crate::cmd::report::rounded;
+
+/// Counts before and after the gates.
+#[derive(Clone, Debug, Default)]
+pub struct Means {
+    before: Counts,
+    after: Counts,
+}
+
+#[derive(Clone, Debug, Default)]
+struct Counts {
+    matches: usize,
+    correct: Vec<usize>,
+}
+
+impl Means {
+    /// Takes one more seed.
+    pub fn add(&mut self, outcome: &Outcome) {
+        for (counts, tally) in [(&mut self.before, &outcome.before), (&mut self.after, &outcome.after)] {
+            counts.matches += tally.count;
+            counts.correct.push(tally.correct);
+        }
+    }
+
+    /// For programs.
+    pub fn json(&self) -> Value {
+        json!({ "before": self.before.json(), "after": self.after.json() })
+    }
+}
+
+impl Counts {
+    fn mean(&self) -> f64 {
+        self.correct.iter().sum::<usize>() as f64 / self.correct.len().max(1) as f64
+    }
+
+    /// The share of right matches among all of all seeds.
+    fn precision(&self) -> f64 {
+        self.correct.iter().sum::<usize>() as f64 / self.matches.max(1) as f64
+    }
+
+    fn range(&self) -> [usize; 2] {
+        [self.correct.iter().min(), self.correct.iter().max()].map(|count| count.copied().unwrap_or_default())
+    }
+
+    fn json(&self) -> Value {
+        let [least, most] = self.range();
+        json!({ "correct": rounded(self.mean()), "least": least, "most": most, "precision": rounded(self.precision()) })
+    }
+}
+
+impl fmt::Display for Means {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{} -> {}", self.before, self.after)
+    }
+}
+
+impl fmt::Display for Counts {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let [least, most] = self.range();
+        write!(f, "{:.0} ({least} to {most}; {:.2})", self.mean(), self.precision())
+    }
+}
