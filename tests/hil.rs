@@ -270,6 +270,8 @@ fn the_watchdog_bites_where_tick_executor_or_link_hang_and_the_drivers_go_off() 
         // What the host has sent is read.
         talk.wait(6_000);
         hang.befall(&mut talk);
+        // What was under way ends.
+        talk.wait(2_000);
         let before = witnesses(&mut talk);
         talk.wait(200_000);
         let after = witnesses(&mut talk);
