@@ -60,15 +60,8 @@ pub fn start(node: Node, rig: Rig, services: Services, timer: Peri<'static, peri
     TIM7.egr().write(|w| w.set_ug(true));
     TIM7.sr().write(|_| {});
     let tick = Microseconds(Instant::now().as_micros());
-    let control = CONTROL.init(Control {
-        node,
-        rig,
-        services,
-        tick,
-        length: PERIOD,
-        received: [0; 64],
-        frame: [0; MAX_FRAME],
-    });
+    let control =
+        CONTROL.init(Control { node, rig, services, tick, length: PERIOD, received: [0; 64], frame: [0; MAX_FRAME] });
     critical_section::with(|cs| HANDOVER.borrow_ref_mut(cs).replace(control));
     TIM7.dier().write(|w| w.set_uie(true));
     TIM7.cr1().write(|w| w.set_cen(true));
