@@ -26,6 +26,15 @@ pub struct Corner {
     pub board_mm: [f64; 2],
     /// Where the image shows it.
     pub pixel: Pixel,
+    /// Standard deviation of `pixel` per axis, up to a factor that all corners have in common: a calibration weighs its
+    /// corners by it and finds the factor itself. Positive; 1 where nothing is known.
+    pub relative_sigma: f64,
+}
+
+/// Root mean square of relative sigmas: what a standard deviation in their units is in pixels, over all corners. 1 of none.
+pub(crate) fn rms_sigma(relative_sigmas: impl Iterator<Item = f64>) -> f64 {
+    let (sum, count) = relative_sigmas.fold((0.0, 0.0), |(sum, count), sigma| (sum + sigma * sigma, count + 1.0));
+    if count > 0.0 { (sum / count).sqrt() } else { 1.0 }
 }
 
 /// What one image shows of the board; corners may be missing.
@@ -35,6 +44,21 @@ pub struct BoardView {
     pub name: String,
     /// In any order.
     pub corners: Vec<Corner>,
+}
+
+impl Corner {
+    /// A corner of which nothing says that it is better or worse than others.
+    #[must_use]
+    pub const fn new(board_mm: [f64; 2], pixel: Pixel) -> Self {
+        Self { board_mm, pixel, relative_sigma: 1.0 }
+    }
+
+    /// Whether its coordinates are numbers and its sigma is one.
+    pub(crate) fn is_usable(&self) -> bool {
+        let [x, y] = self.board_mm;
+        let numbers = [x, y, self.pixel.u, self.pixel.v, self.relative_sigma];
+        numbers.iter().all(|number| number.is_finite()) && self.relative_sigma > 0.0
+    }
 }
 
 impl BoardSpec {

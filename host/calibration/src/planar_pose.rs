@@ -48,8 +48,8 @@ pub enum PoseError {
     /// Fewer corners than four inside the lens's valid cone.
     #[error("{0} usable corners; the pose of a board needs at least 4")]
     TooFewCorners(usize),
-    /// A corner or pixel is infinite or not a number.
-    #[error("a corner is not a finite number")]
+    /// A corner or pixel is infinite or not a number, or a relative sigma not a positive one.
+    #[error("a corner is not a finite number, or its sigma is not positive")]
     NotFinite,
     /// One board corner is listed twice.
     #[error("the corner at ({x}, {y}) mm of the board is listed twice", x = .0[0], y = .0[1])]
@@ -80,17 +80,20 @@ pub fn board_pose(camera: &KannalaBrandt, view: &BoardView) -> Result<BoardPose,
     let lens = Lens::of(camera);
     let first = refined(&lens, &inside, start, Loss::Squares).ok_or(PoseError::Degenerate)?;
     let second = refined(&lens, &inside, other_tilt(&first.0, &sights), Loss::Squares);
-    let ((pose, cost), other) = match second {
+    let ((pose, _), other) = match second {
         Some(second) if second.1 < first.1 => (second, Some(first)),
         second => (first, second),
     };
-    let rms = |cost: f64| (cost / inside.len() as f64).sqrt();
+    let rms = |pose: &Isometry3<f64>| {
+        let squares = errors_px(&lens, &inside, pose).iter().map(|error| error * error).sum::<f64>();
+        (squares / inside.len() as f64).sqrt()
+    };
     // Where both starts end at the same optimum there is no other tilt.
     let distinct = other.filter(|(other, _)| pose.rotation.angle_to(&other.rotation) > 1e-4);
     Ok(BoardPose {
         camera_from_board: Transform::from_isometry(pose),
-        rms_px: rms(cost),
-        other_tilt_rms_px: distinct.map(|(_, cost)| rms(cost)),
+        rms_px: rms(&pose),
+        other_tilt_rms_px: distinct.map(|(other, _)| rms(&other)),
         corners: inside.len(),
         outside: view.corners.len() - inside.len(),
     })
@@ -98,8 +101,7 @@ pub fn board_pose(camera: &KannalaBrandt, view: &BoardView) -> Result<BoardPose,
 
 /// Refuses corners that are not finite or listed twice.
 pub(crate) fn check(corners: &[Corner]) -> Result<(), PoseError> {
-    let finite = |c: &Corner| c.board_mm.iter().chain(&[c.pixel.u, c.pixel.v]).all(|x| x.is_finite());
-    if !corners.iter().all(finite) {
+    if !corners.iter().all(Corner::is_usable) {
         return Err(PoseError::NotFinite);
     }
     let order = |a: &[f64; 2], b: &[f64; 2]| a.partial_cmp(b).unwrap_or(Ordering::Equal);
@@ -220,11 +222,12 @@ impl ArrowProblem<POSE> for OneBoard<'_> {
             let turned = pose.rotation * Vector2::from(corner.board_mm).push(0.0);
             let Some(projection) = self.lens.project(&(turned + pose.translation.vector)) else {
                 // An infinite cost refuses the step that led here.
-                equations.add(&[f64::INFINITY; 2], &[], &[[0.0; 2]; POSE]);
+                equations.add(&[f64::INFINITY; 2], 1.0, &[], &[[0.0; 2]; POSE]);
                 continue;
             };
             let error = projection.pixel - Vector2::new(corner.pixel.u, corner.pixel.v);
-            equations.add(&error.into(), &[], &(projection.by_point * point_by_move(&turned)).into());
+            let by_pose = projection.by_point * point_by_move(&turned);
+            equations.add(&error.into(), corner.relative_sigma, &[], &by_pose.into());
         }
     }
 

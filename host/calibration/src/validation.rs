@@ -206,9 +206,11 @@ impl ArrowProblem<POSE> for HeldBoard<'_> {
     fn block_residuals(&self, (): &(), _: usize, board: &Isometry3<f64>, equations: &mut Equations<POSE>) {
         for ((side, corner), _) in self.view.corners().zip(self.usable).filter(|(_, usable)| **usable) {
             match self.pair.residual(side, corner, board) {
-                Some(residual) => equations.add(&residual.error.into(), &[], &residual.by_board.into()),
+                Some(residual) => {
+                    equations.add(&residual.error.into(), corner.relative_sigma, &[], &residual.by_board.into())
+                }
                 // An infinite cost refuses the step that led here.
-                None => equations.add(&[f64::INFINITY; 2], &[], &[[0.0; 2]; POSE]),
+                None => equations.add(&[f64::INFINITY; 2], 1.0, &[], &[[0.0; 2]; POSE]),
             }
         }
     }

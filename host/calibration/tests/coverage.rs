@@ -11,10 +11,8 @@ fn board_at(u: f64, v: f64, ratio: f64) -> BoardView {
     let corners = (0..20).map(|index| {
         let (column, row) = (f64::from(index % 5), f64::from(index / 5));
         let stretch = 1.0 + (ratio - 1.0) * column / 4.0;
-        Corner {
-            board_mm: [column * 20.0, row * 20.0],
-            pixel: Pixel { u: u + (column - 2.0) * 20.0, v: v + (row - 1.5) * 20.0 * stretch },
-        }
+        let pixel = Pixel { u: u + (column - 2.0) * 20.0, v: v + (row - 1.5) * 20.0 * stretch };
+        Corner::new([column * 20.0, row * 20.0], pixel)
     });
     BoardView { name: "view".into(), corners: corners.collect() }
 }

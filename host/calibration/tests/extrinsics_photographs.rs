@@ -39,7 +39,7 @@ fn read_views(mut table: csv::Reader<std::fs::File>) -> Vec<StereoView> {
         let (camera, name, frame, _, u, v, x, y): (String, String, u32, u32, f64, f64, f64, f64) = record.unwrap();
         let side = usize::from(camera == "right");
         let view = sides[side].entry(frame).or_insert_with(|| BoardView { name, corners: Vec::new() });
-        view.corners.push(Corner { board_mm: [x, y], pixel: Pixel { u, v } });
+        view.corners.push(Corner::new([x, y], Pixel { u, v }));
     }
     let [left, right] = sides.map(|views| views.into_values().collect::<Vec<_>>());
     StereoView::pair(&left, &right).unwrap()

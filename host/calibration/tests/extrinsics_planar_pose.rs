@@ -34,7 +34,7 @@ fn view_at(camera: &KannalaBrandt, theta_deg: f64, noise_px: f64, dice: &mut Dic
         let point = vergence_vision::Point::<vergence_vision::Camera>::from_mm(point.coords);
         let exact = camera.project_point(&point).unwrap();
         let pixel = Pixel { u: exact.u + noise_px * dice.normal(), v: exact.v + noise_px * dice.normal() };
-        corners.push(Corner { board_mm, pixel });
+        corners.push(Corner::new(board_mm, pixel));
     }
     (pose, BoardView { name: String::new(), corners })
 }
@@ -125,7 +125,7 @@ proptest! {
         corners in prop::collection::vec((any::<[f64; 2]>(), any::<[f64; 2]>()), 0..12),
     ) {
         let corners =
-            corners.into_iter().map(|(board_mm, [u, v])| Corner { board_mm, pixel: Pixel { u, v } }).collect();
+            corners.into_iter().map(|(board_mm, [u, v])| Corner::new(board_mm, Pixel { u, v })).collect();
         let _ = board_pose(&equidistant(98.0), &BoardView { name: String::new(), corners });
     }
 }

@@ -33,7 +33,7 @@ impl ArrowProblem<BLOCK> for Linear {
             };
             let by_shared: [[f64; 2]; SHARED] = std::array::from_fn(|j| [rows[0][j], rows[1][j]]);
             let by_block: [[f64; 2]; BLOCK] = std::array::from_fn(|j| [rows[0][SHARED + j], rows[1][SHARED + j]]);
-            equations.add(&[of(&rows[0]), of(&rows[1])], &by_shared, &by_block);
+            equations.add(&[of(&rows[0]), of(&rows[1])], 1.0, &by_shared, &by_block);
         }
     }
 

@@ -59,7 +59,7 @@ fn view(index: usize, pose: &Isometry3<f64>, sigma: f64, warp: [f64; 2], rng: &m
             Point::<Camera>::from_mm((pose * Point3::new(board_mm[0], board_mm[1], height(board_mm, warp))).coords);
         let seen = reproject(&LENS, &point)?.pixel;
         let pixel = Pixel { u: seen[0] + sigma * normal(rng), v: seen[1] + sigma * normal(rng) };
-        (point.direction()?.angle_to_axis().rad() < HALF_FIELD).then_some(Corner { board_mm, pixel })
+        (point.direction()?.angle_to_axis().rad() < HALF_FIELD).then_some(Corner::new(board_mm, pixel))
     });
     BoardView { name: format!("view {index}"), corners: corners.collect() }
 }
@@ -300,7 +300,7 @@ proptest! {
     #[test]
     fn nonsense_never_panics(numbers in prop::collection::vec(prop::array::uniform4(any_size()), 27)) {
         let corners = |part: &[[f64; 4]]| {
-            let corner = |&[x, y, u, v]: &[f64; 4]| Corner { board_mm: [x, y], pixel: Pixel { u, v } };
+            let corner = |&[x, y, u, v]: &[f64; 4]| Corner::new([x, y], Pixel { u, v });
             part.iter().map(corner).collect()
         };
         let views: Vec<_> = numbers.chunks(9).map(|part| BoardView { name: String::new(), corners: corners(part) }).collect();

@@ -51,7 +51,7 @@ pub fn read(path: &Path, camera: Option<&str>) -> Result<Vec<FrameView>, Failure
         if row.bz_mm.abs() > 1e-9 {
             return Err(fail(format!("the board point of frame {} is {} mm off its plane", row.frame, row.bz_mm)));
         }
-        let corner = Corner { board_mm: [row.bx_mm, row.by_mm], pixel: Pixel { u: row.x, v: row.y } };
+        let corner = Corner::new([row.bx_mm, row.by_mm], Pixel { u: row.x, v: row.y });
         match views.iter_mut().find(|known| known.frame == row.frame) {
             Some(known) => known.view.corners.push(corner),
             None => {

@@ -22,15 +22,16 @@ impl<const B: usize> Equations<B> {
         Self { shared_dimension, loss, upper: vec![0.0; width * width], row: vec![0.0; width], cost: 0.0, residuals: 0 }
     }
 
-    /// Adds one residual of `R` components that count together in the robust loss. `shared[i]` is its derivative by
-    /// the shared step's component `i` (missing ones are zero), `block[i]` by the block step's component `i`.
-    pub fn add<const R: usize>(&mut self, residual: &[f64; R], shared: &[[f64; R]], block: &[[f64; R]; B]) {
-        let s = residual.iter().map(|r| r * r).sum();
+    /// Adds one residual of `R` components, in units of `sigma`, that count together in the robust loss. `shared[i]` is
+    /// its derivative by the shared step's component `i` (missing ones are zero), `block[i]` by the block step's
+    /// component `i`.
+    pub fn add<const R: usize>(&mut self, residual: &[f64; R], sigma: f64, shared: &[[f64; R]], block: &[[f64; R]; B]) {
+        let s = residual.iter().map(|r| r * r).sum::<f64>() / (sigma * sigma);
         self.cost += 0.5 * self.loss.cost(s);
-        self.accumulate(residual, shared, block, self.loss.weight(s).sqrt());
+        self.accumulate(residual, shared, block, self.loss.weight(s).sqrt() / sigma);
     }
 
-    /// As [`Self::add`], but always with the plain square: for priors and sensors that have no outliers.
+    /// As [`Self::add`], but as it is and always with the plain square: for priors and sensors that have no outliers.
     pub fn add_plain<const R: usize>(&mut self, residual: &[f64; R], shared: &[[f64; R]], block: &[[f64; R]; B]) {
         self.cost += 0.5 * residual.iter().map(|r| r * r).sum::<f64>();
         self.accumulate(residual, shared, block, 1.0);

@@ -5,15 +5,16 @@ use nalgebra::{DMatrix, Isometry3};
 
 use crate::Loss;
 use crate::arrow::{self, ArrowOptions};
+use crate::board::rms_sigma;
 use crate::extrinsics::StereoView;
-use crate::extrinsics::gross::{OwnPoses, inliers, median_px};
+use crate::extrinsics::gross::{OwnPoses, inliers, median_of};
 use crate::extrinsics::joint::{Joint, Kinematics, Shared};
 use crate::extrinsics::stereo::{LensKnowledge, LensPrior, Lenses, Pair};
 
 /// The median length of a two-dimensional Gaussian error of unit standard deviation per coordinate: √(2 ln 2).
 const RAYLEIGH_MEDIAN: f64 = 1.177_410_022_515_474_7;
 /// No corner is known better than this, however well a few of them fit; simulated ones may fit perfectly.
-const FINEST_PX: f64 = 1e-3;
+const FINEST: f64 = 1e-3;
 /// Inliers and standard deviation settle in two or three rounds.
 const MOST_ROUNDS: usize = 10;
 
@@ -35,12 +36,21 @@ pub(crate) struct Fit<S> {
     pub inliers: Vec<Vec<bool>>,
     /// Each corner's distance from where it should be.
     pub errors_px: Vec<Vec<f64>>,
-    /// Standard deviation of a pixel coordinate.
-    pub sigma_px: f64,
+    /// Standard deviation of a pixel coordinate in units of the corner's relative sigma.
+    pub sigma: f64,
     /// Of a step of the shared unknowns; `None` where the corners leave one open.
     pub covariance: Option<DMatrix<f64>>,
-    /// Information of the shared unknowns, in units of a pixel coordinate's variance.
+    /// Information of the shared unknowns, in units of `sigma`².
     pub information: DMatrix<f64>,
+}
+
+impl<S> Fit<S> {
+    /// Standard deviation of a pixel coordinate in pixels, root mean square over the inliers of `views`.
+    pub fn sigma_px(&self, views: &[StereoView]) -> f64 {
+        let corners = views.iter().flat_map(StereoView::corners).zip(self.inliers.iter().flatten());
+        let inliers = corners.filter(|(_, inlier)| **inlier);
+        self.sigma * rms_sigma(inliers.map(|((_, corner), _)| corner.relative_sigma))
+    }
 }
 
 /// Why there is no fit.
@@ -71,13 +81,13 @@ impl<K: Kinematics> Task<'_, K> {
     /// The optimum near `start`.
     pub fn fit(&self, start: Start<K::State>) -> Result<Fit<K::State>, NoFit> {
         let Start { mut shared, mut boards, usable } = start;
-        let mut sigma_px = self.settle(&mut shared, &mut boards, &usable)?;
+        let mut sigma = self.settle(&mut shared, &mut boards, &usable)?;
         let mut inliers = self.inliers(&shared, &self.errors_px(&shared, &boards), &usable);
         let mut round = 0;
         loop {
             round += 1;
             let kept: Vec<usize> = (0..inliers.len()).filter(|&view| inliers[view].contains(&true)).collect();
-            let problem = self.problem(self.knowledge, sigma_px, &kept, &inliers)?;
+            let problem = self.problem(self.knowledge, sigma, &kept, &inliers)?;
             let kept_boards = kept.iter().map(|&view| boards[view]).collect();
             let solution = arrow::solve(&problem, shared, kept_boards, &ArrowOptions::default());
             if !solution.cost.is_finite() {
@@ -88,22 +98,20 @@ impl<K: Kinematics> Task<'_, K> {
             let variance = solution.normal.variance().ok_or(NoFit::NotDetermined)?;
             let errors_px = self.errors_px(&shared, &boards);
             let next = self.inliers(&shared, &errors_px, &usable);
-            // Priors are weighed by the pixels' standard deviation, so it must have settled too.
-            let next_sigma = variance.sqrt().max(FINEST_PX);
-            let settled = next == inliers && (next_sigma - sigma_px).abs() <= 1e-3 * sigma_px;
-            sigma_px = next_sigma;
+            // Priors are weighed by the corners' standard deviation, so it must have settled too.
+            let next_sigma = variance.sqrt().max(FINEST);
+            let settled = next == inliers && (next_sigma - sigma).abs() <= 1e-3 * sigma;
+            sigma = next_sigma;
             if settled || round == MOST_ROUNDS {
                 let information = solution.normal.shared_information().ok_or(NoFit::NotDetermined)?;
-                let covariance =
-                    solution.normal.shared_covariance().map(|covariance| covariance * (sigma_px * sigma_px));
-                return Ok(Fit { shared, boards, inliers, errors_px, sigma_px, covariance, information });
+                let covariance = solution.normal.shared_covariance().map(|covariance| covariance * (sigma * sigma));
+                return Ok(Fit { shared, boards, inliers, errors_px, sigma, covariance, information });
             }
             inliers = next;
         }
     }
 
-    /// Brings the unknowns near the optimum, first with the lenses held, and returns the standard deviation of a pixel
-    /// coordinate by the median.
+    /// Brings the unknowns near the optimum, first with the lenses held, and returns [`Fit::sigma`] by the median.
     fn settle(
         &self,
         shared: &mut Shared<K::State>,
@@ -111,27 +119,35 @@ impl<K: Kinematics> Task<'_, K> {
         usable: &[Vec<bool>],
     ) -> Result<f64, NoFit> {
         let every: Vec<usize> = (0..self.views.len()).collect();
-        let mut scale = median_px(&self.errors_px(shared, boards), usable);
+        let mut scale = self.median_deviation(shared, boards, usable);
         for knowledge in [&LensKnowledge::Exact, self.knowledge, self.knowledge] {
             let problem = self.problem(knowledge, scale / RAYLEIGH_MEDIAN, &every, usable)?;
             let loss = if self.robust { Loss::Huber(2.0 * scale) } else { Loss::Squares };
             let options = ArrowOptions { loss, relative_cost: 1e-5, ..ArrowOptions::default() };
             let solution = arrow::solve(&problem, shared.clone(), std::mem::take(boards), &options);
             (*shared, *boards) = (solution.shared, solution.blocks);
-            scale = median_px(&self.errors_px(shared, boards), usable);
+            scale = self.median_deviation(shared, boards, usable);
         }
-        Ok((scale / RAYLEIGH_MEDIAN).max(FINEST_PX))
+        Ok((scale / RAYLEIGH_MEDIAN).max(FINEST))
     }
 
     fn problem<'a>(
         &'a self,
         knowledge: &LensKnowledge,
-        sigma_px: f64,
+        sigma: f64,
         kept: &'a [usize],
         used: &'a [Vec<bool>],
     ) -> Result<Joint<'a, K>, NoFit> {
-        let lens_prior = LensPrior::new(self.lenses, knowledge, sigma_px).ok_or(NoFit::NotACovariance)?;
-        Ok(Joint { kinematics: self.kinematics, lens_prior, sigma_px, views: self.views, kept, used })
+        let lens_prior = LensPrior::new(self.lenses, knowledge, sigma).ok_or(NoFit::NotACovariance)?;
+        Ok(Joint { kinematics: self.kinematics, lens_prior, sigma, views: self.views, kept, used })
+    }
+
+    fn median_deviation(&self, shared: &Shared<K::State>, boards: &[Isometry3<f64>], usable: &[Vec<bool>]) -> f64 {
+        let errors_px = self.errors_px(shared, boards);
+        let in_sigmas = |(view, errors): (&StereoView, &Vec<f64>)| {
+            view.corners().zip(errors).map(|((_, corner), error)| error / corner.relative_sigma).collect()
+        };
+        median_of(&self.views.iter().zip(&errors_px).map(in_sigmas).collect::<Vec<_>>(), usable)
     }
 
     pub fn errors_px(&self, shared: &Shared<K::State>, boards: &[Isometry3<f64>]) -> Vec<Vec<f64>> {

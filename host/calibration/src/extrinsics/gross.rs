@@ -15,8 +15,8 @@ use crate::{Corner, Loss, median};
 const GROSS_CORNER: f64 = 6.0;
 /// A view whose median error is this many medians is gross. A hand-held pair taken a moment apart stays far below.
 const GROSS_VIEW: f64 = 30.0;
-/// Nearer than this nothing is gross, however exact the rest is.
-const NEVER_GROSS_PX: f64 = 0.01;
+/// Nearer than this nothing is gross, however exact the rest is: in pixels, or in relative sigmas.
+const NEVER_GROSS: f64 = 0.01;
 /// A view needs this many corners to carry its own board pose.
 const FEWEST_CORNERS: usize = 4;
 
@@ -24,11 +24,11 @@ const FEWEST_CORNERS: usize = 4;
 pub(crate) type OwnPoses = [Isometry3<f64>; 2];
 
 /// The median of the errors that `counted` allows; never zero, so that it can be the scale of a loss.
-pub(crate) fn median_px(errors_px: &[Vec<f64>], counted: &[Vec<bool>]) -> f64 {
-    const SMALLEST_PX: f64 = 1e-6;
-    let pairs = errors_px.iter().flatten().zip(counted.iter().flatten());
+pub(crate) fn median_of(errors: &[Vec<f64>], counted: &[Vec<bool>]) -> f64 {
+    const SMALLEST: f64 = 1e-6;
+    let pairs = errors.iter().flatten().zip(counted.iter().flatten());
     let errors = pairs.filter(|(_, counted)| **counted).map(|(error, _)| *error).collect();
-    median(errors).unwrap_or(0.0).max(SMALLEST_PX)
+    median(errors).unwrap_or(0.0).max(SMALLEST)
 }
 
 /// The usable corners that are not gross. `joint_errors_px` are those of the joint fit.
@@ -43,10 +43,10 @@ pub(crate) fn inliers(
         .iter()
         .zip(own_poses)
         .zip(usable)
-        .map(|((view, poses), usable)| own_errors_px(lenses, view, poses, usable))
+        .map(|((view, poses), usable)| own_deviations(lenses, view, poses, usable))
         .collect();
-    let corner_limit = (GROSS_CORNER * median_px(&own, usable)).max(NEVER_GROSS_PX);
-    let view_limit = (GROSS_VIEW * median_px(joint_errors_px, usable)).max(NEVER_GROSS_PX);
+    let corner_limit = (GROSS_CORNER * median_of(&own, usable)).max(NEVER_GROSS);
+    let view_limit = (GROSS_VIEW * median_of(joint_errors_px, usable)).max(NEVER_GROSS);
     let judge = |((own, joint), usable): ((&Vec<f64>, &Vec<f64>), &Vec<bool>)| {
         let fine: Vec<bool> = own.iter().zip(usable).map(|(&error, &usable)| usable && error <= corner_limit).collect();
         let enough = fine.iter().filter(|&&fine| fine).count() >= FEWEST_CORNERS;
@@ -56,8 +56,8 @@ pub(crate) fn inliers(
     own.iter().zip(joint_errors_px).zip(usable).map(judge).collect()
 }
 
-/// Each corner's distance from where the rest of its own image puts it.
-fn own_errors_px(lenses: &Lenses, view: &StereoView, poses: &OwnPoses, usable: &[bool]) -> Vec<f64> {
+/// Each corner's distance from where the rest of its own image puts it, in units of its relative sigma.
+fn own_deviations(lenses: &Lenses, view: &StereoView, poses: &OwnPoses, usable: &[bool]) -> Vec<f64> {
     let (left_usable, right_usable) = usable.split_at(view.left.corners.len().min(usable.len()));
     let sides = [
         (&lenses.left, &view.left.corners, &poses[0], left_usable),
@@ -65,9 +65,13 @@ fn own_errors_px(lenses: &Lenses, view: &StereoView, poses: &OwnPoses, usable: &
     ];
     let errors = sides.into_iter().flat_map(|(lens, corners, start, usable)| {
         let kept: Vec<Corner> = corners.iter().zip(usable).filter(|(_, usable)| **usable).map(|(c, _)| *c).collect();
-        let scale = median(errors_px(lens, &kept, start)).unwrap_or(0.0).max(NEVER_GROSS_PX);
+        let deviations = |corners: &[Corner], pose: &Isometry3<f64>| -> Vec<f64> {
+            let errors = errors_px(lens, corners, pose).into_iter().zip(corners);
+            errors.map(|(error, corner)| error / corner.relative_sigma).collect()
+        };
+        let scale = median(deviations(&kept, start)).unwrap_or(0.0).max(NEVER_GROSS);
         let pose = refined(lens, &kept, *start, Loss::Cauchy(scale)).map_or(*start, |(pose, _)| pose);
-        errors_px(lens, corners, &pose)
+        deviations(corners, &pose)
     });
     errors.collect()
 }

@@ -25,8 +25,9 @@ pub(crate) trait Kinematics: Sync {
     /// The move of `left_from_right` at view `view` by the components of a step.
     fn derivative(&self, state: &Self::State, view: usize) -> Matrix6xX<f64>;
 
-    /// Adds what is known of `state` besides the views, with `sigma_px` as the unit.
-    fn add_prior(&self, _state: &Self::State, _sigma_px: f64, _equations: &mut Equations<POSE>) {}
+    /// Adds what is known of `state` besides the views, in units of `sigma`, the standard deviation of a
+    /// pixel coordinate in those of the corner's relative sigma.
+    fn add_prior(&self, _state: &Self::State, _sigma: f64, _equations: &mut Equations<POSE>) {}
 }
 
 /// One relative pose for all views.
@@ -63,7 +64,7 @@ pub(crate) struct Shared<S> {
 pub(crate) struct Joint<'a, K: Kinematics> {
     pub kinematics: &'a K,
     pub lens_prior: LensPrior,
-    pub sigma_px: f64,
+    pub sigma: f64,
     pub views: &'a [StereoView],
     /// Indices of the views that have a block.
     pub kept: &'a [usize],
@@ -99,7 +100,7 @@ impl<K: Kinematics> ArrowProblem<POSE> for Joint<'_, K> {
         for ((side, corner), _) in corners.corners().zip(used).filter(|(_, used)| **used) {
             let Some(residual) = pair.residual(side, corner, left_from_board) else {
                 // An infinite cost refuses the step that led here.
-                equations.add(&[f64::INFINITY; 2], &[], &[[0.0; 2]; POSE]);
+                equations.add(&[f64::INFINITY; 2], 1.0, &[], &[[0.0; 2]; POSE]);
                 continue;
             };
             columns.fill([0.0; 2]);
@@ -109,12 +110,12 @@ impl<K: Kinematics> ArrowProblem<POSE> for Joint<'_, K> {
             }
             let own = if side == Side::Left { lens_column } else { lens_column + LENS };
             columns.iter_mut().skip(own).zip(residual.by_lens.column_iter()).for_each(|(slot, c)| *slot = [c[0], c[1]]);
-            equations.add(&residual.error.into(), &columns, &residual.by_board.into());
+            equations.add(&residual.error.into(), corner.relative_sigma, &columns, &residual.by_board.into());
         }
     }
 
     fn shared_residuals(&self, shared: &Self::Shared, equations: &mut Equations<POSE>) {
-        self.kinematics.add_prior(&shared.state, self.sigma_px, equations);
+        self.kinematics.add_prior(&shared.state, self.sigma, equations);
         self.lens_prior.add_to(&shared.lenses, self.kinematics.dimension(), equations);
     }
 

@@ -78,7 +78,7 @@ pub struct ExtrinsicsCalibration {
     pub covariance: SMatrix<f64, POSE, POSE>,
     /// Over the corners that are not gross.
     pub rms_inlier_px: f64,
-    /// Standard deviation of one pixel coordinate.
+    /// Standard deviation of one pixel coordinate, root mean square over those corners.
     pub sigma_px: f64,
     /// The left lens, refined unless it was exact.
     pub left: KannalaBrandt,
@@ -273,7 +273,7 @@ pub fn calibrate_extrinsics(
         joint: relative(fit.shared.state, every),
         covariance: covariance.fixed_view::<POSE, POSE>(0, 0).into_owned(),
         rms_inlier_px: rms(&fit.errors_px, &fit.inliers).unwrap_or_default(),
-        sigma_px: fit.sigma_px,
+        sigma_px: fit.sigma_px(&views),
         left: refined(&fit.shared.lenses.left, left, Side::Left)?,
         right: refined(&fit.shared.lenses.right, right, Side::Right)?,
         corners_total: usable.iter().map(Vec::len).sum(),

@@ -45,7 +45,7 @@ pub(crate) struct Lenses {
 /// How the lenses enter a problem: whether they move, and what pulls them back.
 pub(crate) struct LensPrior {
     pub start: Lenses,
-    /// Square roots of the information, times the standard deviation of a pixel coordinate; `None` for free lenses.
+    /// Square roots of the information, times `sigma`; `None` for free lenses.
     pull: Option<[SMatrix<f64, LENS, LENS>; 2]>,
     pub dimension: usize,
 }
@@ -84,14 +84,14 @@ impl Lenses {
 }
 
 impl LensPrior {
-    /// `sigma_px` is the standard deviation of a pixel coordinate. `None` for a covariance that is not one.
-    pub fn new(start: Lenses, knowledge: &LensKnowledge, sigma_px: f64) -> Option<Self> {
+    /// `sigma` is the standard deviation of a pixel coordinate in units of the corner's relative sigma. `None` for a covariance that is not one.
+    pub fn new(start: Lenses, knowledge: &LensKnowledge, sigma: f64) -> Option<Self> {
         let root = |covariance: &SMatrix<f64, LENS, LENS>| {
             // Scaled to unit diagonal first: the parameters differ by many orders of magnitude.
             let scale = covariance.diagonal().map(|variance| 1.0 / variance.sqrt());
             let scaled = SMatrix::from_diagonal(&scale);
             let factor = (scaled * covariance * scaled).cholesky()?;
-            Some(factor.l().try_inverse()? * scaled * sigma_px)
+            Some(factor.l().try_inverse()? * scaled * sigma)
         };
         let (pull, dimension) = match knowledge {
             LensKnowledge::Exact => (None, 0),
@@ -180,7 +180,7 @@ mod tests {
     #[test]
     fn derivatives_are_those_of_the_residual() {
         let pair = pair();
-        let corner = Corner { board_mm: [125.0, -40.0], pixel: Pixel { u: 0.0, v: 0.0 } };
+        let corner = Corner::new([125.0, -40.0], Pixel { u: 0.0, v: 0.0 });
         for turn in [0.0, 0.5, 1.0, 1.4] {
             let rotation = UnitQuaternion::from_scaled_axis(Vector3::new(0.2, turn, 0.3));
             let board = Isometry3::from_parts((rotation * Vector3::new(20.0, -30.0, 400.0)).into(), rotation);

@@ -44,7 +44,7 @@ pub(super) fn robust_fit(views: &[Sighting], starts: &[Start]) -> Option<State> 
     let tried = starts.iter().filter(|start| start.median_px <= limit).filter_map(|start| {
         let poses = start.poses.iter().map(|pose| pose.unwrap_or_else(ahead)).collect();
         let state = robust_stage(views, State { shared: Shared::flat(start.lens), poses }, &FEW, 10)?;
-        let cost = distances(views, &state).map(|d| COMPARED.cost(d * d)).sum::<f64>();
+        let cost = of_corners(views, &state, Shared::residual_px).map(|d| COMPARED.cost(d * d)).sum::<f64>();
         cost.is_finite().then_some((cost, state))
     });
     let (_, state) = tried.min_by(|a, b| a.0.total_cmp(&b.0))?;
@@ -74,21 +74,25 @@ fn ahead() -> Isometry3<f64> {
     Isometry3::translation(0.0, 0.0, RANGE_MM)
 }
 
-/// All distances between corners and reprojections, in pixels.
-fn distances<'a>(views: &'a [Sighting], state: &'a State) -> impl Iterator<Item = f64> + 'a {
-    let of_view = |(view, pose): (&'a Sighting, &'a Isometry3<f64>)| {
-        view.sights.iter().map(|sight| state.shared.residual_px(pose, sight))
+/// What `measure` tells of every corner.
+fn of_corners<'a>(
+    views: &'a [Sighting],
+    state: &'a State,
+    measure: impl Fn(&Shared, &Isometry3<f64>, &Sight) -> f64 + Copy + 'a,
+) -> impl Iterator<Item = f64> + 'a {
+    let of_view = move |(view, pose): (&'a Sighting, &'a Isometry3<f64>)| {
+        view.sights.iter().map(move |sight| measure(&state.shared, pose, sight))
     };
     views.iter().zip(&state.poses).flat_map(of_view)
 }
 
-/// The median distance in pixels.
+/// The median deviation.
 fn scale(views: &[Sighting], state: &State) -> Option<f64> {
-    Some(median(distances(views, state).collect())?.max(FINEST_PX)).filter(|scale| scale.is_finite())
+    Some(median(of_corners(views, state, Shared::deviation).collect())?.max(FINEST)).filter(|scale| scale.is_finite())
 }
 
 /// Noise below this is rounding.
-const FINEST_PX: f64 = 1e-4;
+const FINEST: f64 = 1e-4;
 
 /// Gives each board the mirrored tilt where that fits better: a plane's other pose is a local optimum of its own
 /// (D. Oberkampf, D. DeMenthon and L. Davis, CVIU 63(3), 1996).
@@ -100,7 +104,7 @@ fn reconsider_poses(views: &[Sighting], state: &mut State, loss: Loss) {
 
 fn better_pose(shared: &Shared, view: &Sighting, pose: &Isometry3<f64>, loss: Loss) -> Isometry3<f64> {
     let cost = |pose: &Isometry3<f64>| {
-        view.sights.iter().map(|s| 0.5 * loss.cost(shared.residual_px(pose, s).powi(2))).sum::<f64>()
+        view.sights.iter().map(|s| 0.5 * loss.cost(shared.deviation(pose, s).powi(2))).sum::<f64>()
     };
     let options = ArrowOptions { loss, iterations: 15, relative_cost: 1e-4, ..ArrowOptions::default() };
     let other = solve(&Bundle { views: &[view], free: &[] }, *shared, vec![mirrored(pose, view)], &options);
@@ -154,13 +158,13 @@ pub(super) fn inlier_fit(
 
 /// Marks the corners to use: those within `factor` median distances of the used ones. Whether any mark changed.
 fn flag(views: &mut [Sighting], state: &State, factor: f64) -> bool {
-    let used = views.iter().zip(&state.poses).flat_map(|(v, p)| v.used().map(|s| state.shared.residual_px(p, s)));
+    let used = views.iter().zip(&state.poses).flat_map(|(v, p)| v.used().map(|s| state.shared.deviation(p, s)));
     let Some(median) = median(used.collect()) else { return false };
-    let limit = factor * median.max(FINEST_PX);
+    let limit = factor * median.max(FINEST);
     let mut changed = false;
     for (view, pose) in views.iter_mut().zip(&state.poses) {
         for sight in &mut view.sights {
-            let used = state.shared.residual_px(pose, sight) < limit;
+            let used = state.shared.deviation(pose, sight) < limit;
             changed |= used != sight.used;
             sight.used = used;
         }

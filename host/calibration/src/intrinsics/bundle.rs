@@ -32,6 +32,11 @@ impl Shared {
         (du * du + dv * dv).sqrt()
     }
 
+    /// The same in units of the corner's relative sigma.
+    pub fn deviation(&self, pose: &Isometry3<f64>, sight: &Sight) -> f64 {
+        self.residual_px(pose, sight) / sight.relative_sigma
+    }
+
     pub fn on_board(&self, sight: &Sight) -> Point3<f64> {
         let [x, y] = sight.board;
         Point3::new(x, y, self.warp_mm[0] * sight.bow[0] + self.warp_mm[1] * sight.bow[1])
@@ -86,12 +91,12 @@ impl ArrowProblem<POSE> for Bundle<'_> {
         for sight in view.used() {
             let Some(row) = Row::of(shared, pose, sight) else {
                 // No reprojection: the solver refuses a step whose cost is not a number.
-                return equations.add(&[f64::NAN; 2], &[], &[[0.0; 2]; POSE]);
+                return equations.add(&[f64::NAN; 2], 1.0, &[], &[[0.0; 2]; POSE]);
             };
             for (column, &parameter) in columns.iter_mut().zip(self.free) {
                 *column = row.by_shared[parameter];
             }
-            equations.add(&row.residual, &columns[..self.free.len()], &row.by_pose);
+            equations.add(&row.residual, sight.relative_sigma, &columns[..self.free.len()], &row.by_pose);
         }
     }
 
@@ -160,7 +165,7 @@ mod tests {
             warp_mm in prop::array::uniform2(-3.0..3.0),
         ) {
             let pose = Isometry3::new(Vector3::new(x, y, z), Vector3::from(turn));
-            let sight = Sight { board, bow, pixel: [0.0; 2], index: 0, used: true };
+            let sight = Sight { board, bow, pixel: [0.0; 2], relative_sigma: 1.0, index: 0, used: true };
             let lens = OpenCvFisheye { fx: 300.0, fy: 310.0, cx: 600.0, cy: 500.0, k: [0.02, -0.01, 0.004, -0.001] };
             let shared = Shared { lens, warp_mm };
             let seen = pose * shared.on_board(&sight);

@@ -32,8 +32,8 @@ use start::{start_from, starts};
 pub struct IntrinsicsOptions {
     /// Whether to estimate how the board bows out of its plane: two more unknowns.
     pub warp: bool,
-    /// A corner farther from its reprojection than this many times the median distance is left out. `None` keeps every
-    /// corner: plain least squares over all.
+    /// A corner farther from its reprojection than this many times the median distance, both in units of their relative
+    /// sigmas, is left out. `None` keeps every corner: plain least squares over all.
     pub outlier_factor: Option<f64>,
 }
 

@@ -11,6 +11,7 @@ use super::{
     BoardWarp, IntrinsicsCalibration, IntrinsicsError, Outlier, OutlierReason, Parameter, ViewFigures, ViewPose,
 };
 use crate::BoardView;
+use crate::board::rms_sigma;
 
 /// The result; `left_out` are the corners of views too poor to use.
 pub(super) fn report(
@@ -41,6 +42,7 @@ pub(super) fn report(
     let squares =
         |used_only| adjusted.views.iter().enumerate().map(|(i, _)| view_squares(adjusted, i, used_only)).sum();
     let (all, inlier): (Squares, Squares) = (squares(false), squares(true));
+    let used = adjusted.views.iter().flat_map(Sighting::used);
     Ok(IntrinsicsCalibration {
         camera,
         opencv: lens,
@@ -48,7 +50,7 @@ pub(super) fn report(
         warp: covariances.warp(adjusted),
         rms_px: all.rms(),
         rms_inlier_px: inlier.rms(),
-        sigma0_px: covariances.variance.sqrt(),
+        sigma0_px: covariances.variance.sqrt() * rms_sigma(used.map(|sight| sight.relative_sigma)),
         corners_total: given.iter().map(|view| view.corners.len()).sum(),
         corners_inlier: inlier.count,
         views_used: adjusted.views.len(),

@@ -25,7 +25,8 @@ pub struct IntrinsicsCalibration {
     pub rms_px: f64,
     /// The same over the corners used.
     pub rms_inlier_px: f64,
-    /// Estimated noise of a corner's u or v in pixels: the residuals' standard deviation after the degrees of freedom.
+    /// Estimated noise of a corner's u or v in pixels: the residuals' standard deviation after the degrees of freedom,
+    /// root mean square over corners of different sigmas.
     pub sigma0_px: f64,
     /// Corners given.
     pub corners_total: usize,
@@ -150,8 +151,8 @@ pub enum IntrinsicsError {
         /// Views needed.
         needed: usize,
     },
-    /// A coordinate is infinite or not a number.
-    #[error("corner {corner} of view {view} is not a finite number")]
+    /// A coordinate is infinite or not a number, or a relative sigma not a positive one.
+    #[error("corner {corner} of view {view} is not a finite number, or its sigma is not positive")]
     NotFinite {
         /// Index of the view.
         view: usize,

@@ -20,6 +20,7 @@ pub(super) struct Sight {
     /// The board's heights for unit warp along x and along y: 1 − x̂² and 1 − ŷ².
     pub bow: [f64; 2],
     pub pixel: [f64; 2],
+    pub relative_sigma: f64,
     /// Its index in the caller's view.
     pub index: usize,
     pub used: bool,
@@ -98,8 +99,7 @@ fn compare(a: &[f64], b: &[f64]) -> Ordering {
 fn check(view: usize, given: &BoardView) -> Result<(), IntrinsicsError> {
     let position = |corner: &Corner| corner.board_mm;
     let pixel = |corner: &Corner| [corner.pixel.u, corner.pixel.v];
-    if let Some(corner) = given.corners.iter().position(|c| !position(c).iter().chain(&pixel(c)).all(|x| x.is_finite()))
-    {
+    if let Some(corner) = given.corners.iter().position(|corner| !corner.is_usable()) {
         return Err(IntrinsicsError::NotFinite { view, corner });
     }
     let twice = |key: &dyn Fn(&Corner) -> [f64; 2]| {
@@ -158,6 +158,7 @@ impl BoardShape {
                 board: corner.board_mm,
                 bow: [bow(0, corner.board_mm[0]), bow(1, corner.board_mm[1])],
                 pixel: [corner.pixel.u, corner.pixel.v],
+                relative_sigma: corner.relative_sigma,
                 index,
                 used: true,
             })

@@ -94,18 +94,18 @@ impl Kinematics for Model {
         state.derivative(&self.corrected(state, pose), &self.unknowns, Some(pose))
     }
 
-    fn add_prior(&self, state: &State, sigma_px: f64, equations: &mut Equations<POSE>) {
+    fn add_prior(&self, state: &State, sigma: f64, equations: &mut Equations<POSE>) {
         let mut ordinal = Ordinal::default();
         for (column, &unknown) in self.unknowns.iter().enumerate() {
             let nth = ordinal.next(unknown);
             let Some((deviation, by)) = self.deviation(state, unknown, nth) else { continue };
             let first = column - nth % 2;
             let mut shared = vec![[0.0]; first + 2];
-            shared[first..].copy_from_slice(&by.map(|by| [by * sigma_px]));
+            shared[first..].copy_from_slice(&by.map(|by| [by * sigma]));
             if !matches!(unknown, Unknown::Direction { .. } | Unknown::Line { .. }) {
                 shared.truncate(column + 1);
             }
-            equations.add_plain(&[deviation * sigma_px], &shared, &[[0.0]; POSE]);
+            equations.add_plain(&[deviation * sigma], &shared, &[[0.0]; POSE]);
         }
     }
 }

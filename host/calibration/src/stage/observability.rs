@@ -70,7 +70,7 @@ pub(crate) fn observability(
         DVector::from_iterator(mechanism.len(), mechanism.iter().map(|&unknown| unit(unknown, model.tolerance)));
     let scaled =
         |matrix: DMatrix<f64>| DMatrix::from_fn(units.len(), units.len(), |i, j| matrix[(i, j)] * units[i] * units[j]);
-    let information = scaled(marginal(&fit.information, mechanism.len()) / (fit.sigma_px * fit.sigma_px));
+    let information = scaled(marginal(&fit.information, mechanism.len()) / (fit.sigma * fit.sigma));
     let held = DVector::from_iterator(
         mechanism.len(),
         mechanism.iter().map(|&unknown| f64::from(u8::from(model.tolerance.is_some() && is_drawn(unknown)))),

@@ -37,8 +37,10 @@ pub struct StageCalibration {
     pub rms_px: f64,
     /// Over the corners that are not gross.
     pub rms_inlier_px: f64,
-    /// Standard deviation of one pixel coordinate.
+    /// Standard deviation of one pixel coordinate, root mean square over those corners.
     pub sigma_px: f64,
+    /// The same for a corner whose relative sigma is 1: that of any other corner is so many times its own.
+    pub unit_sigma_px: f64,
     /// Corners of all views that took part, both cameras.
     pub corners_total: usize,
     /// Those of them that are not gross.
@@ -293,7 +295,8 @@ pub(crate) fn calibration(material: Material<'_>) -> Result<StageCalibration, St
         observability,
         rms_px: rms(&fit.errors_px, usable).unwrap_or_default(),
         rms_inlier_px: rms(&fit.errors_px, &fit.inliers).unwrap_or_default(),
-        sigma_px: fit.sigma_px,
+        sigma_px: fit.sigma_px(views),
+        unit_sigma_px: fit.sigma,
         corners_total: usable.iter().map(Vec::len).sum(),
         corners_inlier: fit.inliers.iter().flatten().filter(|&&inlier| inlier).count(),
         outliers: outliers(views, usable, &fit),

@@ -75,7 +75,7 @@ fn read_views(path: &Path, camera: &str) -> Vec<BoardView> {
     let mut reader = csv::Reader::from_path(path).unwrap();
     for record in reader.records().map(Result::unwrap).filter(|r| &r[0] == camera) {
         let number = |i: usize| record[i].parse::<f64>().unwrap();
-        let corner = Corner { board_mm: [number(6), number(7)], pixel: Pixel { u: number(4), v: number(5) } };
+        let corner = Corner::new([number(6), number(7)], Pixel { u: number(4), v: number(5) });
         let name = format!("{} {}", &record[1], &record[2]);
         match views.iter_mut().find(|view| view.name == name) {
             Some(view) => view.corners.push(corner),

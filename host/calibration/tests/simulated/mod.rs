@@ -94,7 +94,7 @@ pub fn photograph(
         let point = camera_from_board * Point3::new(board_mm[0], board_mm[1], 0.0);
         let exact = camera.project_point(&Point::<Camera>::from_mm(point.coords)).ok()?;
         let pixel = Pixel { u: exact.u + noise_px * dice.normal(), v: exact.v + noise_px * dice.normal() };
-        (camera.on_sensor(pixel) && camera.unproject::<Camera>(pixel).is_ok()).then_some(Corner { board_mm, pixel })
+        (camera.on_sensor(pixel) && camera.unproject::<Camera>(pixel).is_ok()).then_some(Corner::new(board_mm, pixel))
     };
     BoardView { name: String::new(), corners: board_corners().into_iter().filter_map(see).collect() }
 }

@@ -122,8 +122,15 @@ struct View<'a> {
     mode: usize,
     pair: StereoPair<'a>,
     shared: SharedCovariance,
-    sigma_px: f64,
+    unit_sigma_px: f64,
     truth: Axes,
+}
+
+/// A corner that both cameras see.
+struct Match {
+    pixels: PixelPair,
+    /// Of their coordinates, root mean square over both cameras.
+    sigma_px: f64,
 }
 
 impl<'a> View<'a> {
@@ -134,7 +141,7 @@ impl<'a> View<'a> {
             mode,
             pair: StereoPair { left: &stage.left, right: &stage.right, left_from_right },
             shared: stage.shared(&stop.readings),
-            sigma_px: stage.sigma_px,
+            unit_sigma_px: stage.unit_sigma_px,
             truth: Axes::of(&stop.truth),
         }
     }
@@ -144,34 +151,37 @@ impl<'a> View<'a> {
         for left in &seen[0].view.corners {
             let Some(right) = seen[1].view.corners.iter().find(|right| same_place(left, right)) else { continue };
             measured.corners[0] += 1;
-            let pixels = PixelPair { left: left.pixel, right: right.pixel };
-            if !self.is_one_corner(&pixels) {
+            let found = Match {
+                pixels: PixelPair { left: left.pixel, right: right.pixel },
+                sigma_px: self.unit_sigma_px * rms(left.relative_sigma, right.relative_sigma),
+            };
+            if !self.is_one_corner(&found) {
                 measured.corners[1] += 1;
                 continue;
             }
             let truth = *board * on_board(left);
             measured.samples.extend(METHODS.iter().enumerate().filter_map(|(method, kernel)| {
-                let point = kernel.triangulate(&pixels, &self.pair).ok()?.point;
-                self.sample(method, &point, &truth)
+                let point = kernel.triangulate(&found.pixels, &self.pair).ok()?.point;
+                self.sample(method, &point, found.sigma_px, &truth)
             }));
-            squares.extend(self.square(&pixels, &truth));
+            squares.extend(self.square(&found, &truth));
         }
     }
 
     /// Whether both rays lie in one epipolar plane, as far as that is certain.
-    fn is_one_corner(&self, pixels: &PixelPair) -> bool {
+    fn is_one_corner(&self, Match { pixels, sigma_px }: &Match) -> bool {
         let residual = || {
             let left: UnitRay<Left> = self.pair.left.unproject(pixels.left).ok()?;
             let right: UnitRay<Right> = self.pair.right.unproject(pixels.right).ok()?;
-            let sigma = ResidualUncertainty::of(&left, &right, &self.pair, self.sigma_px)?.sigma(&self.shared);
+            let sigma = ResidualUncertainty::of(&left, &right, &self.pair, *sigma_px)?.sigma(&self.shared);
             let angle = ray_to_plane(&left, &(self.pair.left_from_right * right), &self.pair.left_from_right.origin())?;
             Some(angle.rad().abs() <= GATE_SIGMAS * sigma.rad())
         };
         residual().unwrap_or(false)
     }
 
-    fn sample(&self, method: usize, point: &Point<Left>, truth: &Point<Left>) -> Option<Sample> {
-        let uncertain = PointUncertainty::of(point, &self.pair, self.sigma_px)?;
+    fn sample(&self, method: usize, point: &Point<Left>, sigma_px: f64, truth: &Point<Left>) -> Option<Sample> {
+        let uncertain = PointUncertainty::of(point, &self.pair, sigma_px)?;
         let forward = self.truth.forward;
         let along = |covariance: nalgebra::Matrix3<f64>| (forward.transpose() * covariance * forward).x;
         let from_middle = truth.mm() - self.truth.middle;
@@ -186,12 +196,16 @@ impl<'a> View<'a> {
     }
 
     /// The square of our point's error in units of its covariance.
-    fn square(&self, pixels: &PixelPair, truth: &Point<Left>) -> Option<f64> {
+    fn square(&self, Match { pixels, sigma_px }: &Match, truth: &Point<Left>) -> Option<f64> {
         let point = Kernel::PseudoIntersection.triangulate(pixels, &self.pair).ok()?.point;
-        let covariance = PointUncertainty::of(&point, &self.pair, self.sigma_px)?.covariance(&self.shared);
+        let covariance = PointUncertainty::of(&point, &self.pair, *sigma_px)?.covariance(&self.shared);
         let error = point.mm() - truth.mm();
         Some(error.dot(&covariance.cholesky()?.solve(&error)))
     }
+}
+
+fn rms(a: f64, b: f64) -> f64 {
+    a.hypot(b) / std::f64::consts::SQRT_2
 }
 
 fn on_board(corner: &Corner) -> Point<Board> {
