@@ -134,7 +134,7 @@ fn zones_of_the_herbivore_bench() {
 fn an_in_process_board_homes_and_moves_without_waiting() {
     let home = run_json(&["--port", "sim", "home", "--json"]);
     assert_eq!(home["referenced"], serde_json::json!([true, true]));
-    fails_with(&["--port", "sim", "mode", "human"], 3, &["no reference", "vergence home"]);
+    fails_with(&["--port", "sim", "mode", "human"], 3, &["no reference", "vergence home", "axis 0 is baseline"]);
 }
 
 #[test]

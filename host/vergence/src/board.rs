@@ -207,11 +207,15 @@ impl Board {
     /// A refusal in words.
     #[must_use]
     pub fn refused(&self, refusal: Refusal) -> Failure {
-        let latched = match (refusal, self.pose.fault) {
+        let more = match (refusal, self.pose.fault) {
             (Refusal::Latched, Some(fault)) => format!(" ({})", describe_fault(&self.rig, &fault)),
+            (Refusal::NotReferenced { axis } | Refusal::OutsideLimits { axis }, _) => {
+                let known = self.rig.axes.get(usize::from(axis));
+                known.map(|known| format!(" (axis {axis} is {})", known.name)).unwrap_or_default()
+            }
             _ => String::new(),
         };
-        let message = format!("the board refuses: {refusal}{latched}");
+        let message = format!("the board refuses: {refusal}{more}");
         match refusal {
             Refusal::ReadOnly => Failure::protocol(message),
             Refusal::OutsideLimits { .. } | Refusal::Invalid | Refusal::BadSetting | Refusal::NoSetting => {

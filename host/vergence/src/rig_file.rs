@@ -3,6 +3,7 @@
 use std::path::Path;
 
 use vergence_rig::{BENCH_TOML, Rig};
+use vergence_vision::KannalaBrandt;
 
 use crate::failure::Failure;
 
@@ -11,9 +12,23 @@ use crate::failure::Failure;
 /// # Errors
 /// Says which file and what is wrong with it.
 pub fn load(path: Option<&Path>) -> Result<Rig, Failure> {
-    let Some(path) = path else {
-        return Rig::from_toml(BENCH_TOML).map_err(|error| Failure::usage(format!("the built-in rig: {error}")));
-    };
+    let Some(path) = path else { return bench() };
     let text = std::fs::read_to_string(path).map_err(|error| Failure::input(path, error))?;
     Rig::from_toml(&text).map_err(|error| Failure::input(path, error))
+}
+
+/// The built-in bench with sensors just as wide that have `width` pixels across.
+///
+/// # Errors
+/// Where no pixels are left.
+pub fn bench_with_sensors(width: u32) -> Result<Rig, Failure> {
+    let rig = bench()?;
+    let lens = |camera: KannalaBrandt| {
+        camera.resampled(width).map_err(|error| Failure::usage(format!("sensors of {width} pixels: {error}")))
+    };
+    Ok(Rig { left_camera: lens(rig.left_camera)?, right_camera: lens(rig.right_camera)?, ..rig })
+}
+
+fn bench() -> Result<Rig, Failure> {
+    Rig::from_toml(BENCH_TOML).map_err(|error| Failure::usage(format!("the built-in rig: {error}")))
 }

@@ -101,6 +101,20 @@ impl KannalaBrandt {
         Ok(Self { k, aspect, centre, theta_max: stated, r_max: radius(&k, stated), size })
     }
 
+    /// The same lens before a sensor just as wide that has `width` pixels across and so many fewer or more down.
+    ///
+    /// # Errors
+    /// [`InvalidLens`] where no pixels are left.
+    pub fn resampled(&self, width: u32) -> Result<Self, InvalidLens> {
+        let scale = f64::from(width) / f64::from(self.size.width);
+        let height = (f64::from(self.size.height) * scale).round() as u32;
+        // Pixel centres are whole numbers, so the sensor's corner is at (-1/2, -1/2).
+        let scaled = |coordinate: f64| (coordinate + 0.5) * scale - 0.5;
+        let centre = Pixel { u: scaled(self.centre.u), v: scaled(self.centre.v) };
+        let size = ImageSize { width, height };
+        Self::new(self.k.map(|k| k * scale), self.aspect, centre, Angle::from_rad(self.theta_max), size)
+    }
+
     /// The pixel where `ray` is seen.
     ///
     /// # Errors

@@ -31,31 +31,22 @@ impl KannalaBrandt {
     /// The derivative of the unit ray by the pixel where `ray` is seen, in radians per pixel.
     #[must_use]
     pub fn ray_by_pixel<F: Frame>(&self, ray: &UnitRay<F>) -> Matrix3x2<f64> {
-        let Local { space, image, pixels_per_radian, .. } = self.local(ray);
-        let along = |i: usize| space[i] * image[i].transpose() / pixels_per_radian[i];
-        let mut derivative = along(0) + along(1);
-        derivative.column_mut(1).unscale_mut(self.aspect());
-        derivative
+        self.local(ray).ray_by_pixel(self)
     }
 
     /// The derivative of the pixel where `ray` is seen by the lens's parameters, in the order of [`LENS_PARAMETERS`].
     #[must_use]
     pub fn pixel_by_lens<F: Frame>(&self, ray: &UnitRay<F>) -> SMatrix<f64, 2, LENS_PARAMETERS> {
-        let Local { theta, image: [radial, _], .. } = self.local(ray);
-        let (fx, fy, squared) = (self.k()[0], self.k()[0] * self.aspect(), theta * theta);
-        let distorted = self.radius_at(theta) / fx;
-        let mut columns = SMatrix::zeros();
-        columns[(0, 0)] = distorted * radial.x;
-        columns[(1, 1)] = distorted * radial.y;
-        columns[(0, 2)] = 1.0;
-        columns[(1, 3)] = 1.0;
-        let mut power = theta;
-        for column in 4..LENS_PARAMETERS {
-            power *= squared;
-            columns[(0, column)] = fx * power * radial.x;
-            columns[(1, column)] = fy * power * radial.y;
-        }
-        columns
+        self.local(ray).pixel_by_lens(self)
+    }
+
+    /// [`Self::ray_by_pixel`] and [`Self::pixel_by_lens`] for little more than one of them.
+    pub(crate) fn ray_by_pixel_and_pixel_by_lens<F: Frame>(
+        &self,
+        ray: &UnitRay<F>,
+    ) -> (Matrix3x2<f64>, SMatrix<f64, 2, LENS_PARAMETERS>) {
+        let local = self.local(ray);
+        (local.ray_by_pixel(self), local.pixel_by_lens(self))
     }
 
     fn local<F: Frame>(&self, ray: &UnitRay<F>) -> Local {
@@ -71,5 +62,32 @@ impl KannalaBrandt {
             image: [Vector2::new(cos_phi, sin_phi), Vector2::new(-sin_phi, cos_phi)],
             pixels_per_radian: [self.pixels_per_radian(crate::Angle::from_rad(theta)), across],
         }
+    }
+}
+
+impl Local {
+    fn ray_by_pixel(&self, lens: &KannalaBrandt) -> Matrix3x2<f64> {
+        let along = |i: usize| self.space[i] * self.image[i].transpose() / self.pixels_per_radian[i];
+        let mut derivative = along(0) + along(1);
+        derivative.column_mut(1).unscale_mut(lens.aspect());
+        derivative
+    }
+
+    fn pixel_by_lens(&self, lens: &KannalaBrandt) -> SMatrix<f64, 2, LENS_PARAMETERS> {
+        let (theta, [radial, _]) = (self.theta, self.image);
+        let (fx, fy, squared) = (lens.k()[0], lens.k()[0] * lens.aspect(), theta * theta);
+        let distorted = lens.radius_at(theta) / fx;
+        let mut columns = SMatrix::zeros();
+        columns[(0, 0)] = distorted * radial.x;
+        columns[(1, 1)] = distorted * radial.y;
+        columns[(0, 2)] = 1.0;
+        columns[(1, 3)] = 1.0;
+        let mut power = theta;
+        for column in 4..LENS_PARAMETERS {
+            power *= squared;
+            columns[(0, column)] = fx * power * radial.x;
+            columns[(1, column)] = fy * power * radial.y;
+        }
+        columns
     }
 }

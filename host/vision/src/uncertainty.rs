@@ -21,6 +21,7 @@
 //! of which the first pair is the case e = n. By e itself the point does not move to first order, because the rays meet;
 //! where a match slipped by h along the edge, an edge that is wrong by an angle ε costs about h ε.
 
+use multiversion::multiversion;
 use nalgebra::{Matrix3, Matrix6, RowSVector, SMatrix, Vector3, Vector6};
 
 use crate::lens_derivatives::LENS_PARAMETERS;
@@ -106,17 +107,17 @@ impl PointUncertainty {
         let (by_left, by_right) = by_rays(&point.mm(), &pair.left_from_right.origin().mm(), edge)?;
         let right_range = (point.mm() - pair.left_from_right.origin().mm()).norm();
 
-        let left_pixel = by_left * pair.left.ray_by_pixel(&left);
-        let right_pixel = by_right * turn * pair.right.ray_by_pixel(&in_right);
+        let (left_by_pixel, left_by_lens) = pair.left.ray_by_pixel_and_pixel_by_lens(&left);
+        let (right_by_pixel, right_by_lens) = pair.right.ray_by_pixel_and_pixel_by_lens(&in_right);
+        let left_pixel = by_left * left_by_pixel;
+        let right_pixel = by_right * turn * right_by_pixel;
         let from_pixels =
             (left_pixel * left_pixel.transpose() + right_pixel * right_pixel.transpose()) * (pixel_sigma * pixel_sigma);
 
         // At a fixed pixel the ray turns against what the lens does.
         let mut by_shared = SMatrix::<f64, 3, SHARED_PARAMETERS>::zeros();
-        by_shared.fixed_columns_mut::<LENS_PARAMETERS>(0).copy_from(&(-left_pixel * pair.left.pixel_by_lens(&left)));
-        by_shared
-            .fixed_columns_mut::<LENS_PARAMETERS>(LENS_PARAMETERS)
-            .copy_from(&(-right_pixel * pair.right.pixel_by_lens(&in_right)));
+        by_shared.fixed_columns_mut::<LENS_PARAMETERS>(0).copy_from(&(-left_pixel * left_by_lens));
+        by_shared.fixed_columns_mut::<LENS_PARAMETERS>(LENS_PARAMETERS).copy_from(&(-right_pixel * right_by_lens));
         let right = turn * in_right.vector();
         by_shared.fixed_columns_mut::<3>(2 * LENS_PARAMETERS).copy_from(&(-by_right * right.cross_matrix()));
         by_shared.fixed_columns_mut::<3>(2 * LENS_PARAMETERS + 3).copy_from(&(by_right / right_range));
@@ -134,7 +135,7 @@ impl PointUncertainty {
     /// points lean the same way, so differences between near points are better known than the points.
     #[must_use]
     pub fn covariance_with(&self, other: &Self, shared: &SharedCovariance) -> Matrix3<f64> {
-        self.by_shared * shared.0 * other.by_shared.transpose()
+        times_symmetric(&self.by_shared, &shared.0) * other.by_shared.transpose()
     }
 }
 
@@ -160,18 +161,18 @@ impl ResidualUncertainty {
         let (u, v, t) = (left.vector(), turn * right.vector(), centre.direction()?.vector());
         let (from_u, from_v) = (t.cross(&u), t.cross(&v));
         let sine = from_u.norm().max(from_v.norm());
-        let by_left = v.cross(&t).transpose() / sine * pair.left.ray_by_pixel(left);
-        let by_right = from_u.transpose() / sine * turn * pair.right.ray_by_pixel(right);
+        let (left_by_pixel, left_by_lens) = pair.left.ray_by_pixel_and_pixel_by_lens(left);
+        let (right_by_pixel, right_by_lens) = pair.right.ray_by_pixel_and_pixel_by_lens(right);
+        let by_left = v.cross(&t).transpose() / sine * left_by_pixel;
+        let by_right = from_u.transpose() / sine * turn * right_by_pixel;
         // The shift along the baseline changes nothing.
         let across = u.cross(&v) / (sine * centre.mm().norm());
         let by_shift = (across - t * t.dot(&across)).transpose();
         let by_turn = v.cross(&(from_u / sine)).transpose();
 
         let mut by_shared = RowSVector::<f64, SHARED_PARAMETERS>::zeros();
-        by_shared.fixed_columns_mut::<LENS_PARAMETERS>(0).copy_from(&(-by_left * pair.left.pixel_by_lens(left)));
-        by_shared
-            .fixed_columns_mut::<LENS_PARAMETERS>(LENS_PARAMETERS)
-            .copy_from(&(-by_right * pair.right.pixel_by_lens(right)));
+        by_shared.fixed_columns_mut::<LENS_PARAMETERS>(0).copy_from(&(-by_left * left_by_lens));
+        by_shared.fixed_columns_mut::<LENS_PARAMETERS>(LENS_PARAMETERS).copy_from(&(-by_right * right_by_lens));
         by_shared.fixed_columns_mut::<3>(2 * LENS_PARAMETERS).copy_from(&by_turn);
         by_shared.fixed_columns_mut::<3>(2 * LENS_PARAMETERS + 3).copy_from(&by_shift);
         let from_pixels = (by_left.norm_squared() + by_right.norm_squared()) * pixel_sigma * pixel_sigma;
@@ -190,6 +191,24 @@ impl ResidualUncertainty {
     pub(crate) fn by_pose(&self) -> Vector6<f64> {
         self.by_shared.fixed_columns::<6>(2 * LENS_PARAMETERS).transpose()
     }
+}
+
+/// `rows` times a symmetric matrix. Most of the time of a point's covariance goes here: all columns at once, and rounded
+/// alike whatever the processor, as nothing is fused.
+#[multiversion(targets("x86_64+avx512f+avx512vl", "x86_64+avx2"))]
+fn times_symmetric(
+    rows: &SMatrix<f64, 3, SHARED_PARAMETERS>,
+    symmetric: &SMatrix<f64, SHARED_PARAMETERS, SHARED_PARAMETERS>,
+) -> SMatrix<f64, 3, SHARED_PARAMETERS> {
+    let columns = symmetric.data.0;
+    let mut products = [[0.0; SHARED_PARAMETERS]; 3];
+    for (index, line) in columns.iter().enumerate() {
+        for (row, product) in products.iter_mut().enumerate() {
+            let factor = rows[(row, index)];
+            product.iter_mut().zip(line).for_each(|(sum, value)| *sum += factor * value);
+        }
+    }
+    SMatrix::from_fn(|row, column| products[row][column])
 }
 
 /// G_u and G_v, in millimetres per radian; `along` is the edge, or else the normal of the epipolar plane.

@@ -57,6 +57,18 @@ proptest! {
         prop_assert!(angle_between(&ray, &back) < 1e-12, "{:?} became {:?}", ray, back);
     }
 
+    /// With pixels half as large, pixel n lies where 2n and 2n + 1 meet.
+    #[test]
+    fn a_ray_keeps_its_place_on_a_sensor_of_other_pixels(lens in 0usize..5, part in 0.0..0.99f64, phi in -3.2..3.2f64) {
+        let lens = lenses()[lens];
+        let fine = lens.resampled(2 * SIZE.width).unwrap();
+        prop_assert_eq!(fine.size(), ImageSize { width: 2 * SIZE.width, height: 2 * SIZE.height });
+        let ray = ray(part * lens.theta_max().rad(), phi);
+        let (coarse, fine) = (lens.project(&ray).unwrap(), fine.project(&ray).unwrap());
+        let off = (2.0 * coarse.u + 0.5 - fine.u).hypot(2.0 * coarse.v + 0.5 - fine.v);
+        prop_assert!(off < 1e-9, "{:?} became {:?}", coarse, fine);
+    }
+
     #[test]
     fn a_ray_near_the_axis_returns_to_itself(lens in 0usize..5, exponent in -300.0..-3.0f64, phi in -3.2..3.2f64) {
         let lens = lenses()[lens];

@@ -48,7 +48,11 @@ pub struct Args {
 
 pub fn run(args: &Args, globals: &Globals, console: Console) -> Result<(), Failure> {
     let board = args.board.spec()?;
-    let mut cameras = CameraSet::new(open(args, globals, &board)?);
+    let cameras = CameraSet::new(open(args, globals, &board)?);
+    capture(cameras, &board, args, console)
+}
+
+fn capture(mut cameras: CameraSet, board: &BoardSpec, args: &Args, console: Console) -> Result<(), Failure> {
     make_folder(&args.out)?;
     let mut watch = BoardWatch::new(Vec::new());
     let progress = console.progress("show the board");
@@ -60,7 +64,7 @@ pub fn run(args: &Args, globals: &Globals, console: Console) -> Result<(), Failu
             watch = BoardWatch::new(frames.iter().map(|frame| Coverage::new(size(frame))).collect());
         }
         frames_seen += 1;
-        let news = watch.look(seen(&frames, &board)) && watch.is_news();
+        let news = watch.look(seen(&frames, board)) && watch.is_news();
         if news {
             for (frame, name) in frames.iter().zip(NAMES) {
                 write_png(&args.out.join(format!("{name}{:03}.png", watch.taken())), &frame.image)?;
@@ -122,4 +126,57 @@ fn simulated(args: &Args, globals: &Globals, board: &BoardSpec) -> Result<Vec<Bo
     };
     let sides = if args.mono { &[Side::Left][..] } else { &[Side::Left, Side::Right] };
     Ok(sides.iter().map(|&side| Box::new(SimulatedBoardCamera { stage, side, frames: 0 }) as Box<dyn Camera>).collect())
+}
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used, reason = "a test may fail")]
+
+    use clap::Parser;
+
+    use super::*;
+    use crate::rig_file::bench_with_sensors;
+
+    #[derive(Parser)]
+    struct Line {
+        #[command(flatten)]
+        args: Args,
+    }
+
+    /// Shows the same board some times, then is gone.
+    struct Vanishing {
+        frame: Frame,
+        frames_left: u32,
+    }
+
+    impl Camera for Vanishing {
+        fn grab(&mut self) -> Result<Option<Frame>, Failure> {
+            let gone = || Failure::device("camera /dev/video0 vanished");
+            self.frames_left = self.frames_left.checked_sub(1).ok_or_else(gone)?;
+            Ok(Some(self.frame.clone()))
+        }
+    }
+
+    #[test]
+    fn what_was_taken_before_a_camera_vanished_is_kept() {
+        let (rig, folder) = (bench_with_sensors(640).unwrap(), tempfile::tempdir().unwrap());
+        let out = folder.path().join("set");
+        let command = ["capture", "--board", "9x6", "--square", "20mm", "--cameras", "/dev/video0", "--out"];
+        let Line { args } = Line::parse_from(command.into_iter().map(Into::into).chain([out.clone().into_os_string()]));
+        let board = args.board.spec().unwrap();
+        let nowhere = rig.pose_at_values(&[0.0, 0.0]).left_from_right;
+        let stage = BoardStage {
+            left: rig.left_camera,
+            right: (rig.right_camera, nowhere),
+            both: false,
+            board: Board { columns: board.columns, rows: board.rows, square: board.square },
+            seed: 1,
+        };
+        let frame = SimulatedBoardCamera { stage, side: Side::Left, frames: 0 }.grab().unwrap().unwrap();
+        let cameras = CameraSet::new(vec![Box::new(Vanishing { frame: frame.clone(), frames_left: 3 })]);
+        let failure = capture(cameras, &board, &args, Console::new(true)).unwrap_err();
+        assert_eq!(failure.kind().exit_code(), 3);
+        assert!(failure.to_string().contains("vanished"));
+        assert_eq!(image::open(out.join("left000.png")).unwrap().to_rgb8(), frame.image);
+    }
 }

@@ -60,16 +60,3 @@ fn lens(drawn: &Rig, random: &mut Random) -> Result<KannalaBrandt, Failure> {
     KannalaBrandt::from_opencv(lens, drawn.left_camera.theta_max(), SIZE)
         .map_err(|error| Failure::check(format!("the bench's lens: {error}")))
 }
-
-/// `lens` on a square sensor of fewer pixels, `side` along each side.
-///
-/// # Errors
-/// Where that is no lens.
-pub fn smaller(lens: &KannalaBrandt, side: u32) -> Result<KannalaBrandt, Failure> {
-    let (mut opencv, size) = (lens.to_opencv(), lens.size());
-    let scale = f64::from(side) / f64::from(size.width);
-    (opencv.fx, opencv.fy) = (opencv.fx * scale, opencv.fy * scale);
-    (opencv.cx, opencv.cy) = ((opencv.cx + 0.5) * scale - 0.5, (opencv.cy + 0.5) * scale - 0.5);
-    KannalaBrandt::from_opencv(opencv, lens.theta_max(), ImageSize { width: side, height: side })
-        .map_err(|error| Failure::check(format!("the smaller lens: {error}")))
-}

@@ -2,14 +2,14 @@
 
 use image::RgbImage;
 use nalgebra::{UnitQuaternion, Vector3};
-use vergence_rig::{BENCH_TOML, Rig};
 use vergence_scene::{Optics, Scene, View, render};
 use vergence_vision::{Camera, Transform, World};
 
 use super::axes::Axes;
-use super::bench::{MODES, scene_board, smaller};
+use super::bench::{MODES, scene_board};
 use super::measure::DEPTH;
 use crate::failure::Failure;
+use crate::rig_file::bench_with_sensors;
 
 /// Pixels on a side.
 const SIDE: u32 = 640;
@@ -19,8 +19,8 @@ const SIDE: u32 = 640;
 /// # Errors
 /// Where the built-in bench does not read.
 pub fn board_pictures(seed: u64) -> Result<Vec<(&'static str, RgbImage)>, Failure> {
-    let rig = Rig::from_toml(BENCH_TOML).map_err(|error| Failure::check(error.to_string()))?;
-    let lens = smaller(&rig.left_camera, SIDE)?;
+    let rig = bench_with_sensors(SIDE)?;
+    let lens = rig.left_camera;
     let picture = |name: &'static str| {
         let values: Vec<f64> = rig.mode(name)?.targets.iter().map(|target| target.value()).collect();
         let left_from_right = rig.pose_at_values(&values).left_from_right;

@@ -7,15 +7,16 @@ use image::{RgbImage, imageops};
 use nalgebra::UnitQuaternion;
 use vergence_matching::learned::LearnedMatcher;
 use vergence_matching::{GuidedMatcher, Matcher};
-use vergence_rig::{BENCH_TOML, Rig, RigPose};
+use vergence_rig::{Rig, RigPose};
 use vergence_scene::{Optics, Scene, View, render};
 use vergence_vision::{Base, KannalaBrandt, Left, Length, Pixel, Transform, World};
 
-use super::bench::{MODES, smaller};
+use super::bench::MODES;
 use super::sgbm::sgbm;
 use crate::failure::Failure;
 use crate::look::{Eyes, look};
 use crate::output::{match_picture, write_png};
+use crate::rig_file::bench_with_sensors;
 use crate::score::{Score, score};
 
 /// Pixels on a side of the images.
@@ -67,9 +68,7 @@ pub fn matchings(
     folder: &Path,
     seed: u64,
 ) -> Result<Vec<Matching>, Failure> {
-    let rig = Rig::from_toml(BENCH_TOML).map_err(|error| Failure::check(error.to_string()))?;
-    let (left_camera, right_camera) = (smaller(&rig.left_camera, SIDE)?, smaller(&rig.right_camera, SIDE)?);
-    let rig = Rig { left_camera, right_camera, ..rig };
+    let rig = bench_with_sensors(SIDE)?;
     let scene = Scene::room();
     let mut matchings = Vec::new();
     for sight in MODES.iter().filter_map(|mode| Sight::new(mode, &rig, &scene, seed)) {

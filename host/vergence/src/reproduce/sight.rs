@@ -14,9 +14,9 @@ use crate::sim::Random;
 /// Around the corners of a board: its outer squares and the paper about them.
 const MARGIN_PX: f64 = 90.0;
 /// Noise of so many grey levels makes corners of the bench's boards off by a pixel, by and large.
-const GREY_PER_PX: f64 = 110.0;
-/// Rays for a pixel at an edge of the board.
-const EDGE_SAMPLES: u32 = 100;
+const GREY_PER_PX: f64 = 100.0;
+/// Rays for a pixel at an edge of the board. What so few leave to chance is part of the noise that is measured.
+const EDGE_SAMPLES: u32 = 48;
 /// Of the lens, in pixels.
 const BLUR_PX: f64 = 0.8;
 
@@ -115,7 +115,7 @@ impl Sight<'_> {
             let board_mm = BOARD.corner_mm(index);
             let at = self.camera_from_board * Point::from_mm(Vector3::new(board_mm[0], board_mm[1], 0.0));
             let pixel = self.lens.project_point(&at).ok().filter(|pixel| self.lens.on_sensor(*pixel))?;
-            Some(Corner { board_mm, pixel })
+            Some(Corner::new(board_mm, pixel))
         };
         BoardView { name: String::new(), corners: (0..BOARD.columns * BOARD.rows).filter_map(place).collect() }
     }

@@ -142,7 +142,8 @@ fn plant(rig: &Rig, seed: u64) -> Plant {
 
 /// Puts a program into flash; returns the offset at which it begins.
 fn load(machine: &mut Machine<Bench>, path: &Path) -> Result<Option<usize>, Failure> {
-    let bytes = std::fs::read(path).map_err(|error| Failure::input(path, error))?;
+    let bytes = std::fs::read(path)
+        .map_err(|error| Failure::input(path, format!("{error}; docs/firmware.md says how the firmware is built")))?;
     if let Ok(ImageFile { seal, image }) = ImageFile::read(&bytes) {
         let start = ACTIVE.start as usize;
         let chip = machine.chip_mut();

@@ -5,13 +5,13 @@ use std::path::Path;
 use image::RgbImage;
 use image::imageops::grayscale;
 use nalgebra::{UnitQuaternion, Vector3};
-use vergence_rig::BENCH_TOML;
 use vergence_scene::{Optics, Scene, View, render};
-use vergence_vision::{Angle, Camera, ImageSize, KannalaBrandt, Left, Length, Pixel, Right, Transform, World};
+use vergence_vision::{Angle, Camera, KannalaBrandt, Left, Length, Pixel, Right, Transform, World};
 
 use crate::camera::read_image;
 use crate::failure::Failure;
 use crate::output::{make_folder, write_png};
+use crate::rig_file::bench_with_sensors;
 use crate::sim::Random;
 
 const BASELINE_MM: f64 = 145.0;
@@ -32,7 +32,7 @@ impl SimulatedPair {
     /// # Errors
     /// Where the folder cannot be read or written.
     pub fn new(side: u32, separation: Angle, seed: u64, renders: Option<&Path>) -> Result<Self, Failure> {
-        let (lens, scene, stand) = (bench_lens(side)?, Scene::room(), Stand::of(seed));
+        let (lens, scene, stand) = (bench_with_sensors(side)?.left_camera, Scene::room(), Stand::of(seed));
         let half = separation.rad() / 2.0;
         let world_from_left = stand.eye(-BASELINE_MM / 2.0, -half, stand.mounts[0]);
         let world_from_right = stand.eye(BASELINE_MM / 2.0, half, stand.mounts[1]);
@@ -97,16 +97,4 @@ impl Stand {
             * UnitQuaternion::from_axis_angle(&Vector3::z_axis(), roll);
         Transform::new(heading * turn, self.middle + heading * Vector3::new(x, 0.0, 0.0))
     }
-}
-
-/// The bench's lens on a sensor of another size.
-fn bench_lens(side: u32) -> Result<KannalaBrandt, Failure> {
-    let lens = vergence_rig::Rig::from_toml(BENCH_TOML)
-        .map_err(|error| Failure::check(format!("the built-in rig: {error}")))?
-        .left_camera;
-    let scale = f64::from(side) / f64::from(lens.size().width);
-    let centre = f64::from(side) / 2.0 - 0.5;
-    let size = ImageSize { width: side, height: side };
-    KannalaBrandt::new(lens.k().map(|k| k * scale), 1.0, Pixel { u: centre, v: centre }, lens.theta_max(), size)
-        .map_err(|error| Failure::check(format!("the bench's lens: {error}")))
 }
