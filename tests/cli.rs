@@ -302,8 +302,9 @@ fn depth_of_given_correspondences() {
     let (rig, grey, pairs, out) = (file("rig.toml"), file("grey.png"), file("pairs.csv"), file("cloud.ply"));
     let options = ["--rig", &rig, "--left", &grey, "--right", &grey, "--points", &pairs, "--out", &out];
     // Exact rays meet in one point by every method.
-    for method in ["pseudo-intersection", "midpoint", "mid2", "angular-l1", "angular-linf", "reprojection", "rectified"]
-    {
+    let methods =
+        ["pseudo-intersection", "midpoint", "mid2", "angular-l1", "angular-linf", "reprojection", "rectified"];
+    for method in methods.into_iter().chain(["edge-plane:0,1,0"]) {
         let result = run_json(&[&["depth", "--json", "--kernel", method], &options[..]].concat());
         assert_eq!(result["points"], 1, "{method}: {result}");
         assert_eq!(result["dropped"]["diverging"], 1, "{method}: {result}");

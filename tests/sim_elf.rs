@@ -49,6 +49,23 @@ fn the_firmware_is_updated_through_its_boot_loader() {
 }
 
 #[test]
+fn what_the_pins_did_is_written_at_the_end() {
+    let elf = build::build("vergence-nucleo-g474");
+    let workshop = Workshop::new();
+    let trace = workshop.path("pins.vcd");
+    let mut simulator = Simulator::start(&["--elf", elf.to_str().expect("a plain path"), "--trace", &trace]);
+    simulator.json(&["trigger", "--rate", "50", "--count", "3"]);
+    simulator.terminate();
+    let trace = std::fs::read_to_string(trace).expect("a trace");
+    let wires: Vec<&str> = trace.lines().filter(|line| line.starts_with("$var wire 1 ")).collect();
+    println!("{}", wires.join("\n"));
+    let wire = wires.iter().find(|line| line.contains(" camera_trigger_PB6 ")).expect("the cameras' wire");
+    let rising = format!("1{}", wire.split(' ').nth(3).expect("its sign"));
+    assert!(trace.lines().filter(|line| *line == rising).count() >= 3);
+    assert!(wires.iter().any(|line| line.contains(" step_1_")));
+}
+
+#[test]
 fn a_program_for_another_machine_is_refused() {
     let own = std::env::current_exe().expect("this test is a program");
     fails_with(&["sim", "--elf", own.to_str().expect("a plain path")], 2, &["32-bit ELF"]);

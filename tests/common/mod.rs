@@ -99,6 +99,12 @@ impl Simulator {
         serde_json::from_slice(&output.stdout).expect("JSON")
     }
 
+    /// Asks it to end, and expects that it does so in order.
+    pub fn terminate(&mut self) {
+        let asked = Command::new("kill").arg(self.process.id().to_string()).status().expect("kill runs");
+        assert!(asked.success() && self.process.wait().expect("it was started").success());
+    }
+
     pub fn kill(&mut self) {
         // A process that has ended already is what we want.
         let _ = self.process.kill();

@@ -48,6 +48,8 @@ pub struct BenchWiring {
     pub drivers_off: Pin,
     /// Operated while pressed; also cuts the drivers by itself.
     pub emergency_stop: SwitchWiring,
+    /// A rising edge fires the cameras.
+    pub camera_trigger: Pin,
 }
 
 impl BenchWiring {
@@ -74,14 +76,22 @@ impl BenchWiring {
             hard_limit: switch(C + 3, true),
         };
         let emergency_stop = switch(C + 4, true);
-        Self { axes: vec![baseline, separation], drivers_off: Pin::at(A + 10), emergency_stop }
+        Self {
+            axes: vec![baseline, separation],
+            drivers_off: Pin::at(A + 10),
+            emergency_stop,
+            camera_trigger: Pin::at(B + 6),
+        }
     }
 
     /// Every pin under the name of its signal, for a trace.
     #[must_use]
     pub fn signals(&self) -> Vec<(Pin, String)> {
-        let mut signals =
-            vec![(self.drivers_off, "drivers_off".to_owned()), (self.emergency_stop.pin, "emergency_stop".to_owned())];
+        let mut signals = vec![
+            (self.drivers_off, "drivers_off".to_owned()),
+            (self.emergency_stop.pin, "emergency_stop".to_owned()),
+            (self.camera_trigger, "camera_trigger".to_owned()),
+        ];
         for (index, axis) in self.axes.iter().enumerate() {
             let [a, b] = axis.encoder;
             let names = ["step", "direction", "encoder_a", "encoder_b", "home", "hard_limit"];

@@ -24,6 +24,7 @@ fn rig(position: f64) -> Poked<Bench> {
         }],
         drivers_off: pin("PA10"),
         emergency_stop: switch("PA6", true),
+        camera_trigger: pin("PA7"),
     };
     let plant = Plant::new(&bench_mechanics()[..1], &[position]);
     let mut bench = bench_with(Bench::new(wiring, plant));

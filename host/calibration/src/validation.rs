@@ -10,7 +10,7 @@ use vergence_rig::{AxisPosition, Rig};
 use vergence_vision::{Angle, ImageSize, KannalaBrandt, Length};
 
 use crate::arrow::{self, ArrowOptions, ArrowProblem, Equations};
-use crate::extrinsics::{Lenses, Pair, StereoView, inside};
+use crate::extrinsics::{Lenses, Pair, StereoView, inside, rms};
 use crate::planar_pose::board_pose;
 use crate::reprojection::{POSE, difference, moved};
 use crate::{
@@ -173,18 +173,21 @@ fn validate<V: Clone + Sync, E: Send>(
 /// How well `pair` explains a view when only the board may move. `None` where neither camera places the board.
 fn predicted(pair: &ExtrinsicsCalibration, view: &StereoView) -> Option<HeldOutView> {
     let usable = inside(&pair.left, &pair.right, view);
-    let corners = usable.iter().filter(|&&usable| usable).count();
     let left_from_right = *pair.joint.left_from_right.isometry();
     let known = Pair { left_from_right, lenses: Lenses::of(&pair.left, &pair.right) };
     let by_left = board_pose(&pair.left, &view.left).ok().map(|pose| *pose.camera_from_board.isometry());
     let by_right = board_pose(&pair.right, &view.right).ok();
     let by_right = by_right.map(|pose| left_from_right * pose.camera_from_board.isometry());
-    let cost = |start: Isometry3<f64>| {
+    let fitted = |start: Isometry3<f64>| {
         let problem = HeldBoard { pair: known, view, usable: &usable };
-        arrow::solve(&problem, (), vec![start], &ArrowOptions::default()).cost
+        let solution = arrow::solve(&problem, (), vec![start], &ArrowOptions::default());
+        solution.blocks.first().filter(|_| solution.cost.is_finite()).map(|board| (solution.cost, *board))
     };
-    let cost = [by_left, by_right].into_iter().flatten().map(cost).filter(|cost| cost.is_finite()).reduce(f64::min)?;
-    Some(HeldOutView { view: view.name.clone(), corners, rms_px: (2.0 * cost / corners.max(1) as f64).sqrt() })
+    let fits = [by_left, by_right].into_iter().flatten().filter_map(fitted);
+    let (_, board) = fits.min_by(|a, b| a.0.total_cmp(&b.0))?;
+    let errors_px = [known.errors_px(view, &board)];
+    let corners = usable.iter().filter(|&&usable| usable).count();
+    Some(HeldOutView { view: view.name.clone(), corners, rms_px: rms(&errors_px, &[usable])? })
 }
 
 /// One board seen by a pair that is known.
@@ -207,7 +210,7 @@ impl ArrowProblem<POSE> for HeldBoard<'_> {
         for ((side, corner), _) in self.view.corners().zip(self.usable).filter(|(_, usable)| **usable) {
             match self.pair.residual(side, corner, board) {
                 Some(residual) => {
-                    equations.add(&residual.error.into(), corner.relative_sigma, &[], &residual.by_board.into())
+                    equations.add(&residual.error.into(), corner.relative_sigma, &[], &residual.by_board.into());
                 }
                 // An infinite cost refuses the step that led here.
                 None => equations.add(&[f64::INFINITY; 2], 1.0, &[], &[[0.0; 2]; POSE]),

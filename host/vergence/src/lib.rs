@@ -19,6 +19,7 @@ pub mod dense;
 pub mod failure;
 mod firmware;
 pub mod flashing;
+mod interrupt;
 pub mod link;
 pub mod live;
 pub mod look;

@@ -82,7 +82,13 @@ fn names_are_read_and_written() {
     for kernel in Kernel::ALL {
         assert_eq!(kernel.to_string().parse::<Kernel>(), Ok(kernel));
     }
-    assert!("middle".parse::<Kernel>().is_err());
+    let upright = UnitRay::new(Vector3::new(0.0, 2.0, 0.0)).unwrap();
+    assert_eq!("edge-plane:0, 2, 0".parse(), Ok(Kernel::EdgePlane(upright)));
+    for wrong in
+        ["middle", "edge-plane", "edge-plane:0,1", "edge-plane:0,0,0", "edge-plane:0,up,0", "edge-plane:0,NaN,0"]
+    {
+        assert!(wrong.parse::<Kernel>().is_err(), "{wrong}");
+    }
 }
 
 /// RMS error of the distance from the middle of the rig in millimetres, for 1 px of noise at 560 px/rad, at each of

@@ -84,7 +84,8 @@ impl Lenses {
 }
 
 impl LensPrior {
-    /// `sigma` is the standard deviation of a pixel coordinate in units of the corner's relative sigma. `None` for a covariance that is not one.
+    /// `sigma` is the standard deviation of a pixel coordinate in units of the corner's relative sigma. `None` for a
+    /// covariance that is not one.
     pub fn new(start: Lenses, knowledge: &LensKnowledge, sigma: f64) -> Option<Self> {
         let root = |covariance: &SMatrix<f64, LENS, LENS>| {
             // Scaled to unit diagonal first: the parameters differ by many orders of magnitude.

@@ -10,6 +10,7 @@ use vergence_rig::AxisPosition;
 use super::Board;
 use super::words::check_range;
 use crate::failure::Failure;
+use crate::interrupt::interrupted;
 
 impl Board {
     /// Arms, does `work` under a live lease, and disarms whatever became of it. Ctrl-C stops the stages first.
@@ -21,7 +22,7 @@ impl Board {
         self.ask(Request::Arm { session: self.client.session() }).await?;
         let outcome = tokio::select! {
             outcome = async { self.take_hold().await?; work(self).await } => outcome,
-            _ = tokio::signal::ctrl_c() => Err(Failure::device("interrupted: the stages were told to stop")),
+            () = interrupted() => Err(Failure::device("interrupted: the stages were told to stop")),
         };
         let disarmed = self.release().await;
         // A latched fault cannot be disarmed; the first failure is the one to tell.

@@ -8,6 +8,7 @@ use super::report::say_pose;
 use crate::cli::Globals;
 use crate::console::Console;
 use crate::failure::Failure;
+use crate::interrupt::interrupted;
 
 /// Arms the board and holds its lease until Ctrl-C, then disarms. Other verbs arm by themselves. When the link ends, it
 /// waits until the board is back and says how it stands, but does not arm it again.
@@ -41,7 +42,7 @@ pub async fn run(args: &Args, globals: &Globals, console: Console) -> Result<(),
                     say_pose(console, board.rig(), board.pose())?;
                     Err(Failure::link("the link ended while the board was armed; it is back, and nothing was armed again"))
                 }
-                _ = tokio::signal::ctrl_c() => Err(Failure::link("interrupted before the board came back")),
+                () = interrupted() => Err(Failure::link("interrupted before the board came back")),
             }
         }
         Err(failure) => Err(failure),

@@ -44,7 +44,8 @@ pub struct Args {
     #[arg(long, conflicts_with_all = ["baseline", "separation"])]
     mode: Option<String>,
     /// How two rays make a point: pseudo-intersection, or to compare with it midpoint, mid2, angular-l1, angular-l2,
-    /// angular-linf, reprojection or rectified.
+    /// angular-linf, reprojection, rectified, or for matches on parallel edges edge-plane:X,Y,Z with their direction in
+    /// the left frame.
     #[arg(long, value_name = "METHOD", default_value_t)]
     kernel: Kernel,
     /// A range for every pixel of the left image instead of matched points: a binary cloud, and beside it PNG images of

@@ -10,6 +10,7 @@ use crate::board::{Board, describe_pose};
 use crate::cli::Globals;
 use crate::console::Console;
 use crate::failure::{Failure, FailureKind};
+use crate::interrupt::interrupted;
 
 const FIRST_WAIT: Duration = Duration::from_millis(250);
 const LONGEST_WAIT: Duration = Duration::from_secs(5);
@@ -56,7 +57,7 @@ impl Listening {
         let listening = self.persistently(board, globals, console, listen);
         tokio::select! {
             outcome = timeout(self.duration.unwrap_or(forever), listening) => outcome.unwrap_or(Ok(())),
-            _ = tokio::signal::ctrl_c() => Ok(()),
+            () = interrupted() => Ok(()),
         }
     }
 

@@ -19,6 +19,7 @@ use crate::cli::Globals;
 use crate::cmd::camera_options::CameraOptions;
 use crate::console::Console;
 use crate::failure::Failure;
+use crate::interrupt::interrupted;
 use crate::link::{HostClock, Port};
 use crate::live::{Ended, Exposures, Limits, LiveLoop, Publisher, Totals, Unplugged};
 use crate::models::MatcherOptions;
@@ -154,7 +155,7 @@ async fn both(
     tokio::select! {
         ended = measuring => ended,
         failure = tour.drive(board.as_mut()) => Err(failure),
-        _ = tokio::signal::ctrl_c() => Ok(Ended::Done),
+        () = interrupted() => Ok(Ended::Done),
     }
 }
 

@@ -9,6 +9,7 @@ use crate::cli::Globals;
 use crate::console::Console;
 use crate::failure::Failure;
 use crate::firmware::{DEVELOPMENT, PublicKey};
+use crate::interrupt::interrupted;
 use crate::rig_file;
 use crate::sim::{Listener, Served, Shared, SharedRig, SimulatedChip, SimulatedRig, serve};
 
@@ -79,6 +80,6 @@ async fn serve_until_interrupted<B: Served>(args: &Args, board: Shared<B>, conso
     console.result(&json!({ "port": port }))?;
     tokio::select! {
         outcome = serve(board, listener) => outcome,
-        _ = tokio::signal::ctrl_c() => Ok(()),
+        () = interrupted() => Ok(()),
     }
 }

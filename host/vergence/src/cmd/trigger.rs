@@ -13,6 +13,7 @@ use crate::board::Board;
 use crate::cli::Globals;
 use crate::console::Console;
 use crate::failure::Failure;
+use crate::interrupt::interrupted;
 
 /// Fires both cameras once or at a rate, until Ctrl-C. The board latches the encoders at the edge of each pulse and sends
 /// them with its time: this prints them. Needs no arming.
@@ -53,7 +54,7 @@ pub async fn run(args: &Args, globals: &Globals, console: Console) -> Result<(),
         ended = timeout(args.duration.unwrap_or(forever), listen(&mut board, pulses, &mut heard, console)) => {
             ended.unwrap_or(Ok(()))
         }
-        _ = tokio::signal::ctrl_c() => Ok(()),
+        () = interrupted() => Ok(()),
     };
     ended?;
     board.ask(Request::SetTrigger(Trigger::Off)).await?;

@@ -143,15 +143,12 @@ fn installed_by_pip() -> Option<PathBuf> {
     let prefixes = std::env::var_os("VIRTUAL_ENV").map(PathBuf::from).into_iter();
     let homes = std::env::var_os("HOME").map(|home| PathBuf::from(home).join(".local")).into_iter();
     let system = ["/usr/local", "/usr"].map(PathBuf::from);
-    let mut found: Vec<PathBuf> = prefixes
+    prefixes
         .chain(homes)
         .chain(system)
         .flat_map(|prefix| ["site-packages", "dist-packages"].map(|packages| (prefix.clone(), packages)))
-        .filter_map(|(prefix, packages)| {
+        .find_map(|(prefix, packages)| {
             let pattern = prefix.join("lib/python3*").join(packages).join("onnxruntime/capi/libonnxruntime.so*");
             glob::glob(pattern.to_str()?).ok()?.flatten().next()
         })
-        .collect();
-    found.truncate(1);
-    found.pop()
 }

@@ -3,6 +3,8 @@
 use std::fmt;
 use std::str::FromStr;
 
+use nalgebra::Vector3;
+
 use super::{
     AngularNorm, Triangulated, angular, edge_plane, mid2, midpoint, pseudo_intersection, rectified, reprojection,
 };
@@ -37,7 +39,7 @@ pub enum Kernel {
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[error(
     "'{0}' is no method of triangulation: choose pseudo-intersection, midpoint, mid2, angular-l1, angular-l2, \
-     angular-linf, reprojection or rectified"
+     angular-linf, reprojection, rectified, or edge-plane:X,Y,Z with the direction of the edges in the left frame"
 )]
 pub struct UnknownKernel(String);
 
@@ -114,6 +116,16 @@ impl FromStr for Kernel {
     type Err = UnknownKernel;
 
     fn from_str(name: &str) -> Result<Self, Self::Err> {
-        Self::ALL.into_iter().find(|kernel| kernel.as_str() == name).ok_or_else(|| UnknownKernel(name.to_owned()))
+        let known = match name.strip_prefix("edge-plane:") {
+            Some(direction) => direction_of(direction).map(Self::EdgePlane),
+            None => Self::ALL.into_iter().find(|kernel| kernel.as_str() == name),
+        };
+        known.ok_or_else(|| UnknownKernel(name.to_owned()))
     }
+}
+
+fn direction_of(text: &str) -> Option<UnitRay<Left>> {
+    let components: Vec<f64> = text.split(',').map(|component| component.trim().parse().ok()).collect::<Option<_>>()?;
+    let &[x, y, z] = components.as_slice() else { return None };
+    UnitRay::new(Vector3::new(x, y, z))
 }
