@@ -54,7 +54,8 @@ fn what_the_pins_did_is_written_at_the_end() {
     let workshop = Workshop::new();
     let trace = workshop.path("pins.vcd");
     let mut simulator = Simulator::start(&["--elf", elf.to_str().expect("a plain path"), "--trace", &trace]);
-    simulator.json(&["trigger", "--rate", "50", "--count", "3"]);
+    let fired = simulator.run(&["trigger", "--rate", "50", "--count", "3"]);
+    assert!(fired.status.success(), "{}", common::text(&fired.stderr));
     simulator.terminate();
     let trace = std::fs::read_to_string(trace).expect("a trace");
     let wires: Vec<&str> = trace.lines().filter(|line| line.starts_with("$var wire 1 ")).collect();

@@ -21,7 +21,6 @@
 //! of which the first pair is the case e = n. By e itself the point does not move to first order, because the rays meet;
 //! where a match slipped by h along the edge, an edge that is wrong by an angle ε costs about h ε.
 
-use multiversion::multiversion;
 use nalgebra::{Matrix3, Matrix6, RowSVector, SMatrix, Vector3, Vector6};
 
 use crate::lens_derivatives::LENS_PARAMETERS;
@@ -135,7 +134,7 @@ impl PointUncertainty {
     /// points lean the same way, so differences between near points are better known than the points.
     #[must_use]
     pub fn covariance_with(&self, other: &Self, shared: &SharedCovariance) -> Matrix3<f64> {
-        times_symmetric(&self.by_shared, &shared.0) * other.by_shared.transpose()
+        self.by_shared * shared.0 * other.by_shared.transpose()
     }
 }
 
@@ -191,24 +190,6 @@ impl ResidualUncertainty {
     pub(crate) fn by_pose(&self) -> Vector6<f64> {
         self.by_shared.fixed_columns::<6>(2 * LENS_PARAMETERS).transpose()
     }
-}
-
-/// `rows` times a symmetric matrix. Most of the time of a point's covariance goes here: all columns at once, and rounded
-/// alike whatever the processor, as nothing is fused.
-#[multiversion(targets("x86_64+avx512f+avx512vl", "x86_64+avx2"))]
-fn times_symmetric(
-    rows: &SMatrix<f64, 3, SHARED_PARAMETERS>,
-    symmetric: &SMatrix<f64, SHARED_PARAMETERS, SHARED_PARAMETERS>,
-) -> SMatrix<f64, 3, SHARED_PARAMETERS> {
-    let columns = symmetric.data.0;
-    let mut products = [[0.0; SHARED_PARAMETERS]; 3];
-    for (index, line) in columns.iter().enumerate() {
-        for (row, product) in products.iter_mut().enumerate() {
-            let factor = rows[(row, index)];
-            product.iter_mut().zip(line).for_each(|(sum, value)| *sum += factor * value);
-        }
-    }
-    SMatrix::from_fn(|row, column| products[row][column])
 }
 
 /// G_u and G_v, in millimetres per radian; `along` is the edge, or else the normal of the epipolar plane.
