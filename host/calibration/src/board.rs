@@ -31,12 +31,6 @@ pub struct Corner {
     pub relative_sigma: f64,
 }
 
-/// Root mean square of relative sigmas: what a standard deviation in their units is in pixels, over all corners. 1 of none.
-pub(crate) fn rms_sigma(relative_sigmas: impl Iterator<Item = f64>) -> f64 {
-    let (sum, count) = relative_sigmas.fold((0.0, 0.0), |(sum, count), sigma| (sum + sigma * sigma, count + 1.0));
-    if count > 0.0 { (sum / count).sqrt() } else { 1.0 }
-}
-
 /// What one image shows of the board; corners may be missing.
 #[derive(Clone, Debug, PartialEq)]
 pub struct BoardView {
@@ -51,6 +45,11 @@ impl Corner {
     #[must_use]
     pub const fn new(board_mm: [f64; 2], pixel: Pixel) -> Self {
         Self { board_mm, pixel, relative_sigma: 1.0 }
+    }
+
+    /// A distance in pixels in units of its relative sigma.
+    pub(crate) fn deviation(&self, error_px: f64) -> f64 {
+        error_px / self.relative_sigma
     }
 
     /// Whether its coordinates are numbers and its sigma is one.

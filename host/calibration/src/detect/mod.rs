@@ -162,12 +162,11 @@ impl Detection {
     #[must_use]
     pub fn view(&self, name: &str, board: &BoardSpec) -> BoardView {
         let good = self.corners.iter().filter(|corner| corner.quality == CornerQuality::Good);
-        let corners = good.map(|corner| Corner {
+        let corner = |corner: &DetectedCorner| Corner {
             board_mm: board.corner_mm(corner.index),
             pixel: corner.pixel,
             relative_sigma: corner.sigma_px,
-        });
-        let corners = corners.collect();
-        BoardView { name: name.to_owned(), corners }
+        };
+        BoardView { name: name.to_owned(), corners: good.map(corner).collect() }
     }
 }

@@ -5,10 +5,10 @@ use nalgebra::{DMatrix, Isometry3};
 
 use crate::Loss;
 use crate::arrow::{self, ArrowOptions};
-use crate::board::rms_sigma;
 use crate::extrinsics::StereoView;
 use crate::extrinsics::gross::{OwnPoses, inliers, median_of};
 use crate::extrinsics::joint::{Joint, Kinematics, Shared};
+use crate::extrinsics::report::rms;
 use crate::extrinsics::stereo::{LensKnowledge, LensPrior, Lenses, Pair};
 
 /// The median length of a two-dimensional Gaussian error of unit standard deviation per coordinate: √(2 ln 2).
@@ -47,9 +47,9 @@ pub(crate) struct Fit<S> {
 impl<S> Fit<S> {
     /// Standard deviation of a pixel coordinate in pixels, root mean square over the inliers of `views`.
     pub fn sigma_px(&self, views: &[StereoView]) -> f64 {
-        let corners = views.iter().flat_map(StereoView::corners).zip(self.inliers.iter().flatten());
-        let inliers = corners.filter(|(_, inlier)| **inlier);
-        self.sigma * rms_sigma(inliers.map(|((_, corner), _)| corner.relative_sigma))
+        let sigmas = |view: &StereoView| view.corners().map(|(_, corner)| corner.relative_sigma).collect();
+        let sigmas: Vec<Vec<f64>> = views.iter().map(sigmas).collect();
+        self.sigma * rms(&sigmas, &self.inliers).unwrap_or(1.0)
     }
 }
 
@@ -145,7 +145,7 @@ impl<K: Kinematics> Task<'_, K> {
     fn median_deviation(&self, shared: &Shared<K::State>, boards: &[Isometry3<f64>], usable: &[Vec<bool>]) -> f64 {
         let errors_px = self.errors_px(shared, boards);
         let in_sigmas = |(view, errors): (&StereoView, &Vec<f64>)| {
-            view.corners().zip(errors).map(|((_, corner), error)| error / corner.relative_sigma).collect()
+            view.corners().zip(errors).map(|((_, corner), &error)| corner.deviation(error)).collect()
         };
         median_of(&self.views.iter().zip(&errors_px).map(in_sigmas).collect::<Vec<_>>(), usable)
     }

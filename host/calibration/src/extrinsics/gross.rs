@@ -67,7 +67,7 @@ fn own_deviations(lenses: &Lenses, view: &StereoView, poses: &OwnPoses, usable: 
         let kept: Vec<Corner> = corners.iter().zip(usable).filter(|(_, usable)| **usable).map(|(c, _)| *c).collect();
         let deviations = |corners: &[Corner], pose: &Isometry3<f64>| -> Vec<f64> {
             let errors = errors_px(lens, corners, pose).into_iter().zip(corners);
-            errors.map(|(error, corner)| error / corner.relative_sigma).collect()
+            errors.map(|(error, corner)| corner.deviation(error)).collect()
         };
         let scale = median(deviations(&kept, start)).unwrap_or(0.0).max(NEVER_GROSS);
         let pose = refined(lens, &kept, *start, Loss::Cauchy(scale)).map_or(*start, |(pose, _)| pose);

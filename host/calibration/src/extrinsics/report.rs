@@ -7,9 +7,9 @@ use crate::extrinsics::{
 };
 use crate::reprojection::Lens;
 
-/// Root mean square of the errors that `counted` allows; `None` where it allows none.
-pub(crate) fn rms(errors_px: &[Vec<f64>], counted: &[Vec<bool>]) -> Option<f64> {
-    root_mean_square(errors_px.iter().flatten().zip(counted.iter().flatten()))
+/// Root mean square of the values that `counted` allows; `None` where it allows none.
+pub(crate) fn rms(values: &[Vec<f64>], counted: &[Vec<bool>]) -> Option<f64> {
+    root_mean_square(values.iter().flatten().zip(counted.iter().flatten()))
 }
 
 fn root_mean_square<'a>(errors: impl Iterator<Item = (&'a f64, &'a bool)>) -> Option<f64> {

@@ -11,7 +11,6 @@ use super::{
     BoardWarp, IntrinsicsCalibration, IntrinsicsError, Outlier, OutlierReason, Parameter, ViewFigures, ViewPose,
 };
 use crate::BoardView;
-use crate::board::rms_sigma;
 
 /// The result; `left_out` are the corners of views too poor to use.
 pub(super) fn report(
@@ -42,7 +41,7 @@ pub(super) fn report(
     let squares =
         |used_only| adjusted.views.iter().enumerate().map(|(i, _)| view_squares(adjusted, i, used_only)).sum();
     let (all, inlier): (Squares, Squares) = (squares(false), squares(true));
-    let used = adjusted.views.iter().flat_map(Sighting::used);
+    let sigmas = adjusted.views.iter().flat_map(Sighting::used).map(|sight| Squares::of(sight.relative_sigma));
     Ok(IntrinsicsCalibration {
         camera,
         opencv: lens,
@@ -50,7 +49,7 @@ pub(super) fn report(
         warp: covariances.warp(adjusted),
         rms_px: all.rms(),
         rms_inlier_px: inlier.rms(),
-        sigma0_px: covariances.variance.sqrt() * rms_sigma(used.map(|sight| sight.relative_sigma)),
+        sigma0_px: covariances.variance.sqrt() * sigmas.sum::<Squares>().rms(),
         corners_total: given.iter().map(|view| view.corners.len()).sum(),
         corners_inlier: inlier.count,
         views_used: adjusted.views.len(),
@@ -162,7 +161,7 @@ fn view_figures(given: &[BoardView], adjusted: &Adjusted, covariances: &Covarian
     figures
 }
 
-/// A sum of squared distances.
+/// A sum of squares.
 #[derive(Clone, Copy, Default)]
 struct Squares {
     sum: f64,
@@ -170,6 +169,10 @@ struct Squares {
 }
 
 impl Squares {
+    fn of(value: f64) -> Self {
+        Self { sum: value * value, count: 1 }
+    }
+
     fn rms(self) -> f64 {
         (self.sum / self.count as f64).sqrt()
     }
@@ -184,7 +187,7 @@ impl std::iter::Sum for Squares {
 fn view_squares(adjusted: &Adjusted, block: usize, used_only: bool) -> Squares {
     let of_view = |(view, pose): (&Sighting, &nalgebra::Isometry3<f64>)| {
         let counted = view.sights.iter().filter(|sight| sight.used || !used_only);
-        counted.map(|s| Squares { sum: adjusted.shared.residual_px(pose, s).powi(2), count: 1 }).sum()
+        counted.map(|s| Squares::of(adjusted.shared.residual_px(pose, s))).sum()
     };
     adjusted.views.get(block).zip(adjusted.poses.get(block)).map_or_else(Squares::default, of_view)
 }

@@ -137,8 +137,8 @@ pub fn body(findings: &Findings<'_>) -> Result<String, Failure> {
             "Depth is measured from the baseline along the rig's forward direction. Bound: √(2/π) √(mean variance), the mean \
              absolute error of a method at the Cramér-Rao bound, from the noise of the pixels and of the calibration over the \
              same corners, as the rigs themselves state it corner by corner: no method beats a bound, and errors below it mean \
-             that too much noise is stated. NEES: the square of one corner's error in units of its covariance, 3 on average if that is right; \
-             only our method states one.",
+             that too much noise is stated. NEES: the square of one corner's error in units of its covariance, 3 on average if \
+             that is right; only our method states one.",
         ),
         note(&photographs),
         format!("<h3>With corners off by {} px</h3>\n", fixed(noisier.corner_px, 3)),
