@@ -1,4 +1,4 @@
-//! Calibration by the command line: other programs' corners, the program's own, and what bad input is told.
+//! Calibration by the command line: other programs' corners and the program's own.
 #![allow(
     clippy::expect_used,
     clippy::panic,
@@ -10,6 +10,7 @@ mod common;
 
 use std::path::Path;
 
+use common::cameras::camera_files;
 use common::{fails_with, run_json, shared};
 use serde_json::Value;
 
@@ -113,17 +114,6 @@ fn a_real_pair_comes_to_the_reference_optimum() {
     assert!(number(&depth["points"]) >= 200.0, "{depth}");
 }
 
-/// The camera files of both cameras of the stereo set, from its corners.
-fn camera_files(folder: &Path, work: &Path) -> [String; 2] {
-    let csv = folder.join("corners_opencv_classic.csv").to_string_lossy().into_owned();
-    ["left", "right"].map(|side| {
-        let out = work.join(format!("{side}.toml")).to_string_lossy().into_owned();
-        let from = ["--corners", &csv, "--camera", side, "--size", "960x600"];
-        run_json(&[&["calibrate", "intrinsics", "--json", "--out", &out], &from[..]].concat());
-        out
-    })
-}
-
 /// Lenses held, known up to their covariance, and free: the more is open, the less sure is the pose.
 #[test]
 fn lenses_known_up_to_their_covariance_lie_between_exact_and_free() {
@@ -153,67 +143,6 @@ fn lenses_known_up_to_their_covariance_lie_between_exact_and_free() {
     let mut arguments = pair.to_vec();
     arguments[4] = &bare;
     fails_with(&[&arguments[..], &["known", "--out", &out]].concat(), 2, &["bare.toml", "covariance"]);
-    assert!(!Path::new(&out).exists());
-}
-
-/// What a pair is told of cameras and corners that cannot be used.
-#[test]
-fn bad_pairs_are_refused_and_leave_no_file() {
-    let Some(folder) = shared("data/sourishg_stereo") else { return };
-    let work = tempfile::tempdir().expect("a temporary folder");
-    let file = |name: &str| work.path().join(name).to_string_lossy().into_owned();
-    let [left, right] = camera_files(&folder, work.path());
-    let csv = folder.join("corners_opencv_classic.csv").to_string_lossy().into_owned();
-    let (out, page, bad) = (file("rig.toml"), file("report.html"), file("bad.toml"));
-    let refused = |cameras: [&str; 2], csv: &str, more: &[&str], code: i32, words: &[&str]| {
-        let pair = ["calibrate", "extrinsics", "--left", cameras[0], "--right", cameras[1], "--corners", csv];
-        fails_with(&[&pair[..], &["--out", &out, "--report", &page], more].concat(), code, words);
-        assert!(!Path::new(&out).exists() && !Path::new(&page).exists());
-    };
-    let text = std::fs::read_to_string(&left).expect("a camera file");
-    let line = |key: &str| text.lines().find(|line| line.starts_with(key)).expect("a key").to_owned();
-    std::fs::write(&bad, text.replace(&line("opencv_k1"), "opencv_k1 = -0.9")).expect("written");
-    refused([&bad, &right], &csv, &[], 2, &["bad.toml", "turns over"]);
-    std::fs::write(&bad, text.replace(&line("fx"), "fx = nan")).expect("written");
-    refused([&bad, &right], &csv, &[], 2, &["bad.toml"]);
-    refused([&left, &file("none.toml")], &csv, &[], 2, &["none.toml"]);
-    refused([&left, &right], &csv, &["--cameras", "left", "top"], 2, &["top", "left, right"]);
-    let rows = std::fs::read_to_string(&csv).expect("corners");
-    let (few, wild) = (file("few.csv"), file("wild.csv"));
-    let header = rows.lines().next().expect("a header");
-    let of_frame = |frame: &str| rows.lines().filter(|row| row.split(',').nth(2) == Some(frame)).collect::<Vec<_>>();
-    std::fs::write(&few, [&[header], &of_frame("1")[..]].concat().join("\n")).expect("written");
-    refused([&left, &right], &few, &[], 2, &["1 views", "3"]);
-    // The right camera's corners in another order: good data that nothing fits.
-    let shuffled: Vec<String> = rows
-        .lines()
-        .map(|row| match row.strip_prefix("right,") {
-            Some(rest) => {
-                let cells: Vec<&str> = rest.split(',').collect();
-                let index: usize = cells[2].parse().expect("an index");
-                let other = (index * 7 + 3) % 54;
-                let (x, y) = (24.23 * (other % 9) as f64, 24.23 * (other / 9) as f64);
-                format!("right,{},{},{index},{},{},{x},{y}", cells[0], cells[1], cells[3], cells[4])
-            }
-            None => row.to_owned(),
-        })
-        .collect();
-    std::fs::write(&wild, shuffled.join("\n")).expect("written");
-    let output = common::run(&[
-        "calibrate",
-        "extrinsics",
-        "--left",
-        &left,
-        "--right",
-        &right,
-        "--corners",
-        &wild,
-        "--out",
-        &out,
-    ]);
-    let said = common::text(&output.stderr);
-    println!("{said}");
-    assert!(matches!(output.status.code(), Some(1 | 2)) && said.lines().count() == 1, "{said}");
     assert!(!Path::new(&out).exists());
 }
 
@@ -253,128 +182,6 @@ fn captured_boards_give_the_simulated_lens_back() {
     let off = run_json(&["calibrate", "diff", "--json", &truth, &camera, "--field", "85deg"]);
     println!("{off}");
     assert!(number(&off["median_deg"]) < 0.02 && number(&off["worst_deg"]) < 0.1, "{off}");
-}
-
-/// Corners of a board that is seen from straight ahead, at `distances`.
-fn frontal_csv(distances: &[f64]) -> String {
-    let mut csv = String::from("camera,file,frame,idx,x,y,bx_mm,by_mm\n");
-    for (frame, distance) in distances.iter().enumerate() {
-        for index in 0..54u32 {
-            let (x, y) = (f64::from(index % 9) * 20.0, f64::from(index / 9) * 20.0);
-            let (u, v) = (480.0 + 230.0 * (x - 80.0) / distance, 300.0 + 230.0 * (y - 50.0) / distance);
-            csv += &format!("cam,view{frame}.png,{frame},{index},{u},{v},{x},{y}\n");
-        }
-    }
-    csv
-}
-
-#[test]
-fn bad_corners_are_refused_and_leave_no_file() {
-    let work = tempfile::tempdir().expect("a temporary folder");
-    let file = |name: &str| work.path().join(name).to_string_lossy().into_owned();
-    let (csv, out) = (file("corners.csv"), file("cam.toml"));
-    let several = frontal_csv(&[300.0, 350.0, 400.0, 500.0]);
-    let cases = [
-        (frontal_csv(&[300.0]), "1 view"),
-        (several.clone(), "parallel"),
-        (several.replacen(",0,480", ",0,NaN", 1).replacen("view0.png,0,0,", "view0.png,0,0,NaN", 1), "corners.csv"),
-        (format!("{several}{}", several.lines().nth(1).expect("a row")), "same place"),
-        ("camera,file,frame,idx,x,y\n".to_owned(), "corners"),
-        ("nothing".to_owned(), "corners"),
-    ];
-    for (text, word) in cases {
-        std::fs::write(&csv, text).expect("written");
-        let arguments = ["calibrate", "intrinsics", "--corners", &csv, "--size", "960x600", "--out", &out];
-        fails_with(&arguments, 2, &[word]);
-        assert!(!Path::new(&out).exists());
-    }
-    std::fs::write(&csv, several).expect("written");
-    fails_with(&["calibrate", "intrinsics", "--corners", &csv, "--size", "960", "--out", &out], 2, &["960x600"]);
-    fails_with(
-        &["calibrate", "intrinsics", "--corners", &csv, "--size", "960x600", "--camera", "front"],
-        2,
-        &["front", "cam"],
-    );
-    fails_with(
-        &["calibrate", "intrinsics", "--images", "/nowhere/*.png", "--board", "9x6", "--square", "20mm"],
-        2,
-        &["/nowhere"],
-    );
-    fails_with(
-        &["capture", "--cameras", "/dev/none", "--board", "9x6", "--square", "20mm", "--out", &file("set")],
-        3,
-        &["/dev/none"],
-    );
-}
-
-#[test]
-fn images_without_a_board_or_of_two_sizes_are_told() {
-    let work = tempfile::tempdir().expect("a temporary folder");
-    let file = |name: &str| work.path().join(name).to_string_lossy().into_owned();
-    let grey = |name: &str, width| {
-        image::RgbImage::from_pixel(width, 200, image::Rgb([90; 3])).save(file(name)).expect("a picture");
-    };
-    grey("a0.png", 300);
-    grey("a1.png", 300);
-    let board = ["--board", "9x6", "--square", "20mm"];
-    let pattern = file("a*.png");
-    let arguments = [&["calibrate", "intrinsics", "--images", &pattern], &board[..]].concat();
-    fails_with(&arguments, 2, &["no board", "2 images"]);
-    grey("a2.png", 310);
-    fails_with(&arguments, 2, &["a2.png", "310 x 200"]);
-}
-
-/// A chessboard of `columns` x `rows` inner corners, seen from straight ahead.
-fn chessboard(path: &str, columns: u32, rows: u32) {
-    let square = |x: u32, y: u32| (x / 30 + y / 30).is_multiple_of(2);
-    let picture = image::RgbImage::from_fn(30 * (columns + 5), 30 * (rows + 5), |x, y| {
-        let inside = (60..60 + 30 * (columns + 1)).contains(&x) && (60..60 + 30 * (rows + 1)).contains(&y);
-        image::Rgb([if inside && square(x, y) { 20 } else { 230 }; 3])
-    });
-    image::imageops::blur(&picture, 0.8).save(path).expect("a picture");
-}
-
-#[test]
-fn a_board_of_another_size_is_told() {
-    let work = tempfile::tempdir().expect("a temporary folder");
-    let file = |name: &str| work.path().join(name).to_string_lossy().into_owned();
-    for name in ["a0.png", "a1.png"] {
-        chessboard(&file(name), 11, 8);
-    }
-    let (pattern, out) = (file("a*.png"), file("cam.toml"));
-    let arguments = ["calibrate", "intrinsics", "--images", &pattern, "--square", "20mm", "--out", &out, "--board"];
-    fails_with(&[&arguments[..], &["7x5"]].concat(), 2, &["11 × 8", "7 × 5"]);
-    // The right size, but the same frontal view twice.
-    fails_with(&[&arguments[..], &["11x8"]].concat(), 2, &["no calibration"]);
-    assert!(!Path::new(&out).exists());
-}
-
-/// Corners that are there, but nowhere near a board: the data can be read and the result is no good.
-#[test]
-fn a_fit_that_fails_its_own_check_is_exit_code_1() {
-    let Some(folder) = shared("data/sourishg_stereo") else { return };
-    let work = tempfile::tempdir().expect("a temporary folder");
-    let file = |name: &str| work.path().join(name).to_string_lossy().into_owned();
-    let rows = std::fs::read_to_string(folder.join("corners_opencv_classic.csv")).expect("corners");
-    let shaken: Vec<String> = rows
-        .lines()
-        .enumerate()
-        .map(|(line, row)| {
-            let mut cells: Vec<String> = row.split(',').map(str::to_owned).collect();
-            if line > 0 {
-                for (cell, stride) in [(4, 37), (5, 61)] {
-                    let shift = (line * stride % 41) as f64 - 20.0;
-                    cells[cell] = format!("{}", cells[cell].parse::<f64>().expect("a number") + shift * 0.6);
-                }
-            }
-            cells.join(",")
-        })
-        .collect();
-    let (csv, out, page) = (file("shaken.csv"), file("cam.toml"), file("report.html"));
-    std::fs::write(&csv, shaken.join("\n")).expect("written");
-    let arguments = ["calibrate", "intrinsics", "--corners", &csv, "--camera", "left", "--size", "960x600"];
-    fails_with(&[&arguments[..], &["--out", &out, "--report", &page]].concat(), 1, &["px off"]);
-    assert!(!Path::new(&out).exists() && !Path::new(&page).exists());
 }
 
 #[test]

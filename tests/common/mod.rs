@@ -1,6 +1,7 @@
 //! Running the binary and reading what it says.
 #![allow(dead_code, reason = "each test file uses its own part")]
 
+pub mod cameras;
 pub mod images;
 
 use std::io::{BufRead, BufReader};
