@@ -8,7 +8,7 @@
 //! - [`PointUncertainty`] adds what all points of a pair share: lenses and pose;
 //! - [`cloud()`] does all of this for many pairs of pixels and counts why pairs were dropped;
 //! - [`pose_drift`] tells whether the pose is what the pairs say it is;
-//! - [`BatchLens`] and [`triangulate_batch`] do the arithmetic for whole arrays.
+//! - [`BatchLens`], [`triangulate_batch`] and [`BatchPair`] do the arithmetic for whole arrays.
 //!
 //! [`study`] compares the methods of triangulation with each other.
 //!
@@ -36,7 +36,7 @@ mod uncertainty;
 mod units;
 mod zones;
 
-pub use batch::{BatchLens, BatchTriangulation, Instructions, triangulate_batch};
+pub use batch::{BatchLens, BatchPair, BatchPoints, BatchTriangulation, Instructions, triangulate_batch};
 pub use cloud::{Cloud, CloudPoint, Drop, Gates, PixelPair, StereoPair, cloud, cloud_of_each, cloud_point};
 pub use covariance::{covariance, range_sigma};
 pub use epipolar::{dihedral, ray_to_plane};

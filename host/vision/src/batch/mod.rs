@@ -11,11 +11,15 @@ mod arc_tangent;
 mod chebyshev;
 mod lanes;
 mod lens;
+mod pair;
+mod pairs;
 mod project;
+mod slope;
 mod triangulate;
 mod unproject;
 
 pub use lens::BatchLens;
+pub use pair::{BatchPair, BatchPoints};
 pub use triangulate::{BatchTriangulation, triangulate_batch};
 
 /// Which instructions the kernels may use.

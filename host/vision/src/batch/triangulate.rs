@@ -5,7 +5,8 @@ use multiversion::target::target_cfg_f;
 use nalgebra::{Matrix3, Vector3};
 
 use super::Instructions;
-use super::lanes::{ALWAYS_FUSED, BLOCK, Kernel, column_results, columns_of, multiply_add, rows_of};
+use super::lanes::{ALWAYS_FUSED, Kernel, multiply_add};
+use super::pairs::for_pairs;
 use crate::{Angle, Left, Point};
 
 /// One vector of eight, or two of four: the kernel holds some thirty values per row.
@@ -58,8 +59,7 @@ impl BatchTriangulation {
     pub fn extend(&mut self, rays: [&[[f64; 3]]; 2], sigma: Angle, instructions: Instructions) {
         let count = rays[0].len().min(rays[1].len());
         let rays = rays.map(|rays| &rays[..count]);
-        let t = self.right_centre.mm();
-        let kernel = Triangulate { t, per_baseline: 1.0 / t.norm(), variance: sigma.rad() * sigma.rad() };
+        let kernel = Triangulate::new(&self.right_centre, sigma);
         match instructions {
             Instructions::Best => triangulate_best(&kernel, rays, self),
             Instructions::Baseline => triangulate_all::<ALWAYS_FUSED>(&kernel, rays, self),
@@ -95,39 +95,13 @@ fn triangulate_best(kernel: &Triangulate, rays: [&[[f64; 3]]; 2], out: &mut Batc
 
 #[inline(always)]
 fn triangulate_all<const FUSED: bool>(kernel: &Triangulate, rays: [&[[f64; 3]]; 2], out: &mut BatchTriangulation) {
-    let [left, right] = rays;
-    out.points.reserve(left.len());
-    out.covariances.reserve(left.len());
-    let ((left_blocks, left_rest), (right_blocks, right_rest)) = (left.as_chunks(), right.as_chunks());
-    for (left, right) in left_blocks.iter().zip(right_blocks) {
-        let (points, covariances) = block::<FUSED>(kernel, left, right);
-        out.points.extend_from_slice(&points);
-        out.covariances.extend_from_slice(&covariances);
-    }
-    let count = left_rest.len();
-    if count > 0 {
-        let mut padded = [[[0.0; 3]; BLOCK]; 2];
-        padded[0][..count].copy_from_slice(left_rest);
-        padded[1][..count].copy_from_slice(right_rest);
-        let (points, covariances) = block::<FUSED>(kernel, &padded[0], &padded[1]);
-        out.points.extend_from_slice(&points[..count]);
-        out.covariances.extend_from_slice(&covariances[..count]);
-    }
+    for_pairs::<FUSED, LANES, 7, 4>(kernel, rays, &mut out.points, &mut out.covariances);
 }
 
-#[inline(always)]
-fn block<const FUSED: bool>(
-    kernel: &Triangulate,
-    left: &[[f64; 3]; BLOCK],
-    right: &[[f64; 3]; BLOCK],
-) -> ([[f64; 3]; BLOCK], [[f64; 4]; BLOCK]) {
-    let ([ux, uy, uz], [vx, vy, vz]) = (columns_of(left), columns_of(right));
-    let [px, py, pz, xx, xh, hh, nn] = column_results::<FUSED, LANES, 6, 7>(kernel, &[ux, uy, uz, vx, vy, vz]);
-    (rows_of(&[px, py, pz]), rows_of(&[xx, xh, hh, nn]))
-}
-
-struct Triangulate {
-    t: Vector3<f64>,
+/// What triangulation needs of a pair.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) struct Triangulate {
+    pub t: Vector3<f64>,
     /// One over the length of t.
     per_baseline: f64,
     variance: f64,
@@ -149,6 +123,11 @@ impl Kernel<6, 7> for Triangulate {
 }
 
 impl Triangulate {
+    pub(super) fn new(right_centre: &Point<Left>, sigma: Angle) -> Self {
+        let t = right_centre.mm();
+        Self { t, per_baseline: 1.0 / t.norm(), variance: sigma.rad() * sigma.rad() }
+    }
+
     /// The formulas of the single-point functions without a root: n enters only as w wᵀ / w·w, with w along t × S.
     #[inline(always)]
     fn row<const FUSED: bool>(&self, u: &Vector3<f64>, v: &Vector3<f64>) -> [f64; 7] {

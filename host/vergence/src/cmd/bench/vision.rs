@@ -5,8 +5,8 @@ use std::hint::black_box;
 use nalgebra::{Matrix6, UnitQuaternion, Vector3};
 use serde_json::{Value, json};
 use vergence_vision::{
-    Angle, BatchLens, BatchTriangulation, Camera, ImageSize, Instructions, KannalaBrandt, Left, OpenCvFisheye, Pixel,
-    PointUncertainty, Right, SharedCovariance, StereoPair, Transform, UnitRay, pseudo_intersection, triangulate_batch,
+    Angle, BatchLens, BatchPair, BatchTriangulation, Camera, ImageSize, Instructions, KannalaBrandt, Left,
+    OpenCvFisheye, Pixel, Right, SharedCovariance, StereoPair, Transform, UnitRay, triangulate_batch,
 };
 
 use super::peer_opencv::{PeerTimes, opencv};
@@ -15,8 +15,8 @@ use crate::failure::Failure;
 use crate::stopwatch::Stopwatch;
 
 /// Measures arrays of N x 3 and N x 2 numbers, on one thread: nanoseconds per point, the least of several runs, with OpenCV
-/// and ours taking turns. Pixels and rays go into arrays allocated anew; points with their covariance, 56 bytes each, into
-/// arrays that are there ("anew": allocated again for every run). Without OpenCV (python3 -m pip install opencv-python-headless numpy) its
+/// and ours taking turns. Pixels and rays go into arrays allocated anew, and so do points with the errors they share; points with their
+/// closed-form covariance, 56 bytes each, into arrays that are there ("anew": allocated again for every run). Without OpenCV (python3 -m pip install opencv-python-headless numpy) its
 /// figures are null.
 #[derive(Debug, clap::Args)]
 pub struct Args {
@@ -38,8 +38,8 @@ const FIELD: Angle = Angle::from_deg(99.0);
 const LENS: OpenCvFisheye =
     OpenCvFisheye { fx: 599.0, fy: 598.5, cx: 959.5, cy: 767.5, k: [0.01, -0.004, 0.001, -0.0002] };
 const SIZE: ImageSize = ImageSize { width: 1920, height: 1536 };
-/// A tenth of a pixel.
-const RAY_SIGMA: Angle = Angle::from_rad(0.1 / 599.0);
+const PIXEL_SIGMA: f64 = 0.1;
+const RAY_SIGMA: Angle = Angle::from_rad(PIXEL_SIGMA / 599.0);
 
 pub fn run(args: &Args, console: Console) -> Result<(), Failure> {
     let lens = KannalaBrandt::from_opencv(LENS, Angle::from_deg(99.5), SIZE)
@@ -135,6 +135,7 @@ impl Times {
             "project_ns": self.project_ns,
             "unproject_ns": self.unproject_ns,
             "triangulate_mpts_per_s": 1e3 / self.triangulate_ns,
+            "triangulate_full_mpts_per_s": 1e3 / self.full_ns,
         })
     }
 
@@ -159,8 +160,9 @@ fn measure(lens: &KannalaBrandt, points: u32, repeats: u32, instructions: Instru
     let pair = StereoPair { left: lens, right: lens, left_from_right };
     let shared =
         SharedCovariance::exact().with_pose(&Matrix6::from_diagonal(&[1e-8, 1e-8, 1e-8, 1e-4, 1e-4, 1e-4].into()));
-    // The slow one is measured on fewer points.
-    let few = &left[..left.len().min(20_000)];
+    let uncertain = BatchPair::new(&pair, PIXEL_SIGMA, &shared).with_instructions(instructions);
+    let right_from_left = left_from_right.rotation().inverse();
+    let in_right: Vec<[f64; 3]> = right.iter().map(|ray| (right_from_left * Vector3::from(*ray)).into()).collect();
     let mut triangulated = BatchTriangulation::new(&centre);
     let per_point = |count: usize, work: &mut dyn FnMut()| least_seconds(repeats, work) * 1e9 / count as f64;
     Times {
@@ -174,23 +176,10 @@ fn measure(lens: &KannalaBrandt, points: u32, repeats: u32, instructions: Instru
         triangulate_anew_ns: per_point(left.len(), &mut || {
             drop(black_box(triangulate_batch(black_box(&left), &right, &centre, RAY_SIGMA, instructions)));
         }),
-        full_ns: per_point(few.len(), &mut || {
-            let covariances: Vec<_> = few.iter().zip(&right).map(|(u, v)| full(u, v, &pair, &shared)).collect();
-            drop(black_box(covariances));
+        full_ns: per_point(left.len(), &mut || {
+            drop(black_box(uncertain.triangulate(black_box(&left), &in_right)));
         }),
     }
-}
-
-/// One point with the covariance of its pixels, lenses and pose.
-fn full(
-    u: &[f64; 3],
-    v: &[f64; 3],
-    pair: &StereoPair<'_>,
-    shared: &SharedCovariance,
-) -> Option<nalgebra::Matrix3<f64>> {
-    let [left, right] = [u, v].map(|ray| UnitRay::<Left>::new(Vector3::from(*ray)));
-    let point = pseudo_intersection(&left?, &right?, &pair.left_from_right.origin()).ok()?.point;
-    Some(PointUncertainty::of(&point, pair, 0.1)?.covariance(shared))
 }
 
 fn least_seconds(repeats: u32, work: &mut dyn FnMut()) -> f64 {

@@ -1,0 +1,47 @@
+//! Pairs of rays, block by block, to points and their covariances.
+
+use super::lanes::{BLOCK, Kernel, column_results, columns_of, rows_of};
+
+/// Appends what `kernel` makes of every pair of rays: the first three of its `OUT` columns to `points`, the other `REST` to
+/// `covariances`. Both slices are of one length.
+#[inline(always)]
+pub(super) fn for_pairs<const FUSED: bool, const W: usize, const OUT: usize, const REST: usize>(
+    kernel: &impl Kernel<6, OUT>,
+    [left, right]: [&[[f64; 3]]; 2],
+    points: &mut Vec<[f64; 3]>,
+    covariances: &mut Vec<[f64; REST]>,
+) {
+    const { assert!(OUT == 3 + REST, "a point and its covariance") };
+    points.reserve(left.len());
+    covariances.reserve(left.len());
+    let ((left_blocks, left_rest), (right_blocks, right_rest)) = (left.as_chunks(), right.as_chunks());
+    for (left, right) in left_blocks.iter().zip(right_blocks) {
+        let (new_points, new_covariances) = block::<FUSED, W, OUT, REST>(kernel, left, right);
+        points.extend_from_slice(&new_points);
+        covariances.extend_from_slice(&new_covariances);
+    }
+    let count = left_rest.len();
+    if count > 0 {
+        let mut padded = [[[0.0; 3]; BLOCK]; 2];
+        padded[0][..count].copy_from_slice(left_rest);
+        padded[1][..count].copy_from_slice(right_rest);
+        let (new_points, new_covariances) = block::<FUSED, W, OUT, REST>(kernel, &padded[0], &padded[1]);
+        points.extend_from_slice(&new_points[..count]);
+        covariances.extend_from_slice(&new_covariances[..count]);
+    }
+}
+
+#[inline(always)]
+fn block<const FUSED: bool, const W: usize, const OUT: usize, const REST: usize>(
+    kernel: &impl Kernel<6, OUT>,
+    left: &[[f64; 3]; BLOCK],
+    right: &[[f64; 3]; BLOCK],
+) -> ([[f64; 3]; BLOCK], [[f64; REST]; BLOCK]) {
+    let ([ux, uy, uz], [vx, vy, vz]) = (columns_of(left), columns_of(right));
+    let made = column_results::<FUSED, W, 6, OUT>(kernel, &[ux, uy, uz, vx, vy, vz]);
+    let (points, covariances) = made.split_at(3);
+    (
+        rows_of(&std::array::from_fn::<_, 3, _>(|i| points[i])),
+        rows_of(&std::array::from_fn::<_, REST, _>(|i| covariances[i])),
+    )
+}

@@ -1,0 +1,99 @@
+//! Whole arrays of points with all that is uncertain about them agree with the single-point functions.
+
+#![allow(clippy::unwrap_used, reason = "helpers of tests may panic as tests do")]
+
+use nalgebra::{SMatrix, UnitQuaternion, Vector3};
+use proptest::prelude::*;
+use vergence_vision::{
+    Angle, BatchPair, ImageSize, Instructions, KannalaBrandt, Left, OpenCvFisheye, PointUncertainty, Right,
+    SHARED_PARAMETERS, SharedCovariance, StereoPair, Transform, UnitRay, pseudo_intersection,
+};
+
+const PIXEL_SIGMA: f64 = 0.3;
+/// Sigmas of both lenses and the pose, about those of a calibration.
+const SIGMAS: [f64; SHARED_PARAMETERS] = [
+    0.05, 0.05, 0.04, 0.04, 2e-4, 3e-4, 2e-4, 5e-5, 0.05, 0.05, 0.04, 0.04, 2e-4, 3e-4, 2e-4, 5e-5, 2e-4, 2e-4, 2e-4,
+    0.05, 0.05, 0.05,
+];
+
+fn lens(fx: f64, fy: f64, k: [f64; 4]) -> KannalaBrandt {
+    let camera = OpenCvFisheye { fx, fy, cx: 1039.5, cy: 1031.5, k };
+    KannalaBrandt::from_opencv(camera, Angle::from_deg(99.0), ImageSize { width: 2080, height: 2080 }).unwrap()
+}
+
+/// Correlated throughout: every parameter leans on all others.
+fn shared(mixing: &[f64]) -> SharedCovariance {
+    let mixed = SMatrix::<f64, SHARED_PARAMETERS, SHARED_PARAMETERS>::from_fn(|row, column| {
+        SIGMAS[row] * if row == column { 1.0 } else { 0.3 * mixing[(row * 7 + column * 3) % mixing.len()] }
+    });
+    SharedCovariance::joint(mixed * mixed.transpose())
+}
+
+/// By the single-point functions; `None` where they refuse.
+fn expected(
+    rays: [&[f64; 3]; 2],
+    pair: &StereoPair<'_>,
+    shared: &SharedCovariance,
+) -> Option<(Vector3<f64>, nalgebra::Matrix3<f64>)> {
+    let left = UnitRay::<Left>::new(Vector3::from(*rays[0]))?;
+    let right = pair.left_from_right * UnitRay::<Right>::new(Vector3::from(*rays[1]))?;
+    let point = pseudo_intersection(&left, &right, &pair.left_from_right.origin()).ok()?.point;
+    Some((point.mm(), PointUncertainty::of(&point, pair, PIXEL_SIGMA)?.covariance(shared)))
+}
+
+proptest! {
+    #[test]
+    fn points_and_covariances_agree_with_the_single_point_functions(
+        rows in prop::collection::vec([-1.0..1.0f64, -1.0..1.0, -0.1..1.0, 100.0..3000.0, -1.0..1.0, -1.0..1.0], 1..150),
+        mixing in prop::array::uniform11(-1.0..1.0f64),
+        turn in [-0.3..0.3f64, -1.1..1.1, -0.3..0.3],
+        t in [80.0..200.0f64, -30.0..30.0, -60.0..60.0],
+    ) {
+        let lenses = [lens(560.0, 571.0, [0.01, -0.004, 0.001, -0.0002]), lens(610.0, 598.0, [-0.02, 0.002, 0.0, 0.0])];
+        let left_from_right = Transform::<Left, Right>::new(UnitQuaternion::from_scaled_axis(turn.into()), t.into());
+        let pair = StereoPair { left: &lenses[0], right: &lenses[1], left_from_right };
+        let shared = shared(&mixing);
+        // Rays that miss each other by up to a millimetre, and every fifth time altogether.
+        let (left, right): (Vec<[f64; 3]>, Vec<[f64; 3]>) = rows.iter().enumerate().map(|(i, &[x, y, z, range, a, b])| {
+            let ray = Vector3::new(x, y, z).normalize();
+            let meeting = ray * range - Vector3::from(t) + Vector3::new(a, b, 0.5);
+            let right = if i % 5 == 4 { Vector3::new(a, b, 0.5) } else { left_from_right.rotation().inverse() * meeting };
+            (<[f64; 3]>::from(ray), <[f64; 3]>::from(right.normalize()))
+        }).unzip();
+        for instructions in [Instructions::Best, Instructions::Baseline] {
+            let batch = BatchPair::new(&pair, PIXEL_SIGMA, &shared).with_instructions(instructions);
+            let found = batch.triangulate(&left, &right);
+            prop_assert_eq!(found.points.len(), left.len());
+            prop_assert_eq!(found.covariances.len(), left.len());
+            for (row, (point, &[xx, xy, xz, yy, yz, zz])) in found.points.iter().zip(&found.covariances).enumerate() {
+                let rays = [&left[row], &right[row]];
+                let crossing = Vector3::from(left[row]).cross(&(left_from_right.rotation() * Vector3::from(right[row])));
+                // Where a condition is nearly met, rounding decides.
+                let close_call = crossing.norm() < 1e-3;
+                match expected(rays, &pair, &shared) {
+                    Some((place, covariance)) if !close_call => {
+                        prop_assert!((Vector3::from(*point) - place).norm() < 1e-8 * place.norm());
+                        let full = nalgebra::Matrix3::new(xx, xy, xz, xy, yy, yz, xz, yz, zz);
+                        let off = (full - covariance).amax();
+                        prop_assert!(off < 1e-6 * covariance.trace(), "{} {}", full, covariance);
+                    }
+                    Some(_) => {}
+                    None => prop_assert!(close_call || point.iter().chain(&found.covariances[row]).all(|x| x.is_nan())),
+                }
+            }
+        }
+    }
+}
+
+#[test]
+fn a_ray_along_the_axis_has_a_covariance_too() {
+    let lens = lens(560.0, 560.0, [0.0; 4]);
+    let left_from_right = Transform::<Left, Right>::new(UnitQuaternion::identity(), Vector3::new(145.0, 0.0, 0.0));
+    let pair = StereoPair { left: &lens, right: &lens, left_from_right };
+    let shared = shared(&[0.5]);
+    let rays = [[0.0, 0.0, 1.0], Vector3::new(-145.0, 0.0, 400.0).normalize().into()];
+    let found = BatchPair::new(&pair, PIXEL_SIGMA, &shared).triangulate(&rays[..1], &rays[1..]);
+    let (_, covariance) = expected([&rays[0], &rays[1]], &pair, &shared).unwrap();
+    assert!((found.covariances[0][0] - covariance[(0, 0)]).abs() < 1e-9 * covariance.trace());
+    assert!((found.covariances[0][5] - covariance[(2, 2)]).abs() < 1e-9 * covariance.trace());
+}
