@@ -13,6 +13,8 @@ const SCALE: f64 = (1 << LEVEL) as f64;
 /// Half the window's side, in pixels of the level.
 const HALF: usize = 7;
 const SIDE: usize = 2 * HALF + 1;
+/// A window whose values deviate by less, in grey levels, is flat: it looks like nothing.
+const FLAT: f64 = 0.01;
 /// Correlation from which two places look the same.
 const ALIKE: f32 = 0.93;
 /// Nearer than this, in pixels of the level, a place is the same one.
@@ -23,7 +25,7 @@ const ROWS: usize = 1;
 /// A view prepared for looking along its rows.
 pub(crate) struct Surroundings<'a> {
     plane: &'a Plane,
-    /// One over the norm of the window's deviations from its mean, by its centre; 0 where the window is not all inside.
+    /// One over the norm of the window's deviations from its mean, by its centre; 0 where the window is flat or not all inside.
     inverse_norm: Plane,
 }
 
@@ -31,12 +33,7 @@ impl<'a> Surroundings<'a> {
     /// `None` where the view is too small to have the level.
     pub(crate) fn of(pyramid: &'a Pyramid) -> Option<Self> {
         let plane = pyramid.levels().get(LEVEL)?;
-        let inverse_norm = plane.like(|y, out| {
-            for (x, o) in out.iter_mut().enumerate() {
-                *o = window(plane, x, y).map_or(0.0, |window| 1.0 / norm(&window).max(f32::MIN_POSITIVE));
-            }
-        });
-        Some(Self { plane, inverse_norm })
+        Some(Self { plane, inverse_norm: plane.like(|y, out| inverse_norms(plane, y, out)) })
     }
 
     /// Whether nothing between the columns `from` and `to` of the row of `at` looks like `at` but itself. All are in
@@ -62,6 +59,25 @@ impl<'a> Surroundings<'a> {
             sums.iter_mut().zip(line).zip(other).for_each(|((sum, p), q)| *sum += p * q);
         }
         sums.iter().sum::<f32>() * self.inverse_norm.at(x, y)
+    }
+}
+
+/// For the windows around the pixels of row `y`: n σ² is the sum of squares less n times the squared mean.
+fn inverse_norms(plane: &Plane, y: usize, out: &mut [f32]) {
+    const COUNT: f64 = (SIDE * SIDE) as f64;
+    let Some(first) = y.checked_sub(HALF).filter(|first| first + SIDE <= plane.height()) else { return };
+    let mut columns = vec![[0.0_f64; 2]; plane.width()];
+    for row in first..first + SIDE {
+        for ([sum, squares], value) in columns.iter_mut().zip(plane.row(row)) {
+            let value = f64::from(*value);
+            *sum += value;
+            *squares += value * value;
+        }
+    }
+    for (window, out) in columns.windows(SIDE).zip(&mut out[HALF.min(plane.width())..]) {
+        let [sum, squares] = window.iter().fold([0.0; 2], |[a, b], [c, d]| [a + c, b + d]);
+        let variance = squares / COUNT - (sum / COUNT).powi(2);
+        *out = if variance > FLAT * FLAT { (variance * COUNT).sqrt().recip() as f32 } else { 0.0 };
     }
 }
 

@@ -37,30 +37,30 @@ pub(crate) fn supported(matches: &[Placed]) -> Vec<bool> {
 pub(crate) fn duplicated(matches: &[Placed]) -> Vec<bool> {
     let better = |i: usize, j: usize| {
         let (p, q) = (&matches[i], &matches[j]);
-        distance(p, q) < SAME_POINT
+        distance_squared(p, q) < SAME_POINT * SAME_POINT
             && p.sigma.total_cmp(&q.sigma).then(q.score.total_cmp(&p.score)).then(i.cmp(&j)).is_gt()
     };
     (0..matches.len()).into_par_iter().map(|i| (0..matches.len()).any(|j| better(i, j))).collect()
 }
 
 fn support(one: &Placed, matches: &[Placed]) -> usize {
-    let change = |other: &Placed| {
-        let noise = ALWAYS_AGREE_SIGMAS * one.sigma.hypot(other.sigma);
-        let allowed = noise.max(GRADIENT_LIMIT * distance(one, other));
-        ((other.disparity - one.disparity).abs(), allowed)
-    };
-    let mut nearest: Vec<(f64, (f64, f64))> = matches
+    let change = |other: &Placed| (other.disparity - one.disparity).abs();
+    let mut nearest: Vec<(f64, &Placed)> = matches
         .iter()
-        .map(|other| (distance(one, other), change(other)))
-        .filter(|(distance, _)| *distance >= SAME_POINT)
+        .map(|other| (distance_squared(one, other), other))
+        .filter(|(squared, _)| *squared >= SAME_POINT * SAME_POINT)
         .collect();
     if nearest.len() > NEAREST {
-        nearest.select_nth_unstable_by(NEAREST, |p, q| p.0.total_cmp(&q.0).then(p.1.0.total_cmp(&q.1.0)));
+        nearest.select_nth_unstable_by(NEAREST, |p, q| p.0.total_cmp(&q.0).then(change(p.1).total_cmp(&change(q.1))));
         nearest.truncate(NEAREST);
     }
-    nearest.iter().filter(|(_, (change, allowed))| change <= allowed).count()
+    let agrees = |&(squared, other): &(f64, &Placed)| {
+        let noise = ALWAYS_AGREE_SIGMAS * one.sigma.hypot(other.sigma);
+        change(other) <= noise.max(GRADIENT_LIMIT * squared.sqrt())
+    };
+    nearest.into_iter().filter(agrees).count()
 }
 
-fn distance(p: &Placed, q: &Placed) -> f64 {
-    (p.left.x - q.left.x).hypot(p.left.y - q.left.y)
+fn distance_squared(p: &Placed, q: &Placed) -> f64 {
+    (p.left.x - q.left.x).powi(2) + (p.left.y - q.left.y).powi(2)
 }

@@ -67,17 +67,26 @@ fn partner(at: ViewPixel, known: &[Known], compared: &Compared<'_>, band: &Epipo
 
 /// By how much the nearest of `known` moved, nearest first, each only once.
 fn guesses(at: ViewPixel, known: &[Known]) -> Vec<[f64; 2]> {
-    let mut near: Vec<(f64, &Known)> =
-        known.iter().map(|known| ((known.at.x - at.x).hypot(known.at.y - at.y), known)).collect();
-    near.sort_by(|p, q| p.0.total_cmp(&q.0));
-    near.truncate(NEIGHBOURS);
     let mut guesses: Vec<(bool, [f64; 2])> = Vec::with_capacity(NEIGHBOURS);
-    for (_, Known { moved, fresh, .. }) in near {
+    for Known { moved, fresh, .. } in nearest(at, known) {
         if guesses.iter().all(|(_, other)| (other[0] - moved[0]).hypot(other[1] - moved[1]) >= SAME_GUESS) {
             guesses.push((*fresh, *moved));
         }
     }
     guesses.into_iter().filter(|(fresh, _)| *fresh).map(|(_, moved)| moved).collect()
+}
+
+/// So many of `known` as are asked, nearest first; of equally near ones the earlier.
+fn nearest(at: ViewPixel, known: &[Known]) -> impl Iterator<Item = &Known> {
+    let mut near: Vec<(f64, &Known)> = Vec::with_capacity(NEIGHBOURS + 1);
+    for known in known {
+        let squared = (known.at.x - at.x).powi(2) + (known.at.y - at.y).powi(2);
+        if near.get(NEIGHBOURS - 1).is_none_or(|(farthest, _)| squared < *farthest) {
+            near.insert(near.partition_point(|(other, _)| *other <= squared), (squared, known));
+            near.truncate(NEIGHBOURS);
+        }
+    }
+    near.into_iter().map(|(_, known)| known)
 }
 
 #[cfg(test)]

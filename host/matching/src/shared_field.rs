@@ -1,7 +1,8 @@
 //! What both cameras of a pair see.
 
 use nalgebra::{Rotation3, Vector3};
-use vergence_vision::{Angle, Frame, KannalaBrandt, Length, Pixel, UnitRay};
+use rayon::prelude::*;
+use vergence_vision::{Angle, Frame, KannalaBrandt, Left, Length, Pixel, Right, Transform, UnitRay};
 
 use crate::epipolar_band::EpipolarBand;
 use crate::view::direction;
@@ -21,55 +22,77 @@ const MOST_SLACK: Angle = Angle::from_deg(10.0);
 /// Which directions of each view are worth comparing.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct SharedField<'a> {
-    frame: &'a SharedFrame,
-    left: &'a KannalaBrandt,
-    right: &'a KannalaBrandt,
-    /// How far off the other camera's axis may be.
-    slack: Angle,
+    left: Field<'a, Left>,
+    right: Field<'a, Right>,
+    baseline: Length,
 }
 
 impl<'a> SharedField<'a> {
     /// For a pose known exactly.
-    pub(crate) const fn new(frame: &'a SharedFrame, left: &'a KannalaBrandt, right: &'a KannalaBrandt) -> Self {
-        Self { frame, left, right, slack: Angle::from_deg(0.0) }
+    pub(crate) fn new(frame: &SharedFrame, left: &'a KannalaBrandt, right: &'a KannalaBrandt) -> Self {
+        Self {
+            left: Field::new(left, frame.shared_from_left()),
+            right: Field::new(right, frame.shared_from_right()),
+            baseline: frame.baseline(),
+        }
     }
 
     /// As far as the uncertain pose of `pair` lets one tell.
-    pub(crate) fn of(frame: &'a SharedFrame, pair: &ImagePair<'a>) -> Self {
+    pub(crate) fn of(frame: &SharedFrame, pair: &ImagePair<'a>) -> Self {
         let slack = Angle::from_rad((EpipolarBand::SIGMAS * pair.pose_sigma.rad()).min(MOST_SLACK.rad()));
-        Self { slack, ..Self::new(frame, pair.left_camera, pair.right_camera) }
+        let Self { left, right, baseline } = Self::new(frame, pair.left_camera, pair.right_camera);
+        Self { left: Field { slack, ..left }, right: Field { slack, ..right }, baseline }
     }
 
     /// Whether the left camera sees a bearing and the right camera may see it too, at infinity or at 1 m.
     pub(crate) fn seen_from_left(&self, bearing: &UnitRay<Shared>) -> bool {
-        let (left_from, right_from) =
-            (self.frame.shared_from_left().inverse(), self.frame.shared_from_right().inverse());
-        seen_at(self.left, &(left_from * *bearing)).is_some()
-            && self.parallax_ends(bearing, -1.0).any(|other| self.may_see(self.right, &(right_from * other)))
+        self.left.sees(bearing) && self.parallax_ends(bearing, -1.0).any(|other| self.right.may_see(&other))
     }
 
     /// The same for a bearing of the right camera.
     pub(crate) fn seen_from_right(&self, bearing: &UnitRay<Shared>) -> bool {
-        let (left_from, right_from) =
-            (self.frame.shared_from_left().inverse(), self.frame.shared_from_right().inverse());
-        seen_at(self.right, &(right_from * *bearing)).is_some()
-            && self.parallax_ends(bearing, 1.0).any(|other| self.may_see(self.left, &(left_from * other)))
-    }
-
-    /// Whether `camera` sees a ray, or would if it were turned by the slack.
-    fn may_see<F: Frame>(&self, camera: &KannalaBrandt, ray: &UnitRay<F>) -> bool {
-        let towards_axis = || {
-            let axis = ray.vector().cross(&Vector3::z()).try_normalize(f64::EPSILON)?;
-            UnitRay::new(Rotation3::new(axis * self.slack.rad()) * ray.vector())
-        };
-        seen_at(camera, ray).is_some()
-            || (self.slack.rad() > 0.0 && towards_axis().is_some_and(|ray: UnitRay<F>| seen_at(camera, &ray).is_some()))
+        self.right.sees(bearing) && self.parallax_ends(bearing, 1.0).any(|other| self.left.may_see(&other))
     }
 
     /// The bearings, from a camera displaced by `side` baselines along x, of the point at infinity and the one at 1 m.
     fn parallax_ends(&self, bearing: &UnitRay<Shared>, side: f64) -> impl Iterator<Item = UnitRay<Shared>> {
-        let offset = Vector3::x() * (side * self.frame.baseline().mm());
+        let offset = Vector3::x() * (side * self.baseline.mm());
         [Some(*bearing), UnitRay::new(bearing.at(NEAR.mm()).mm() + offset)].into_iter().flatten()
+    }
+}
+
+/// What one camera sees of the shared directions.
+#[derive(Clone, Copy, Debug)]
+struct Field<'a, F: Frame> {
+    camera: &'a KannalaBrandt,
+    from_shared: Transform<F, Shared>,
+    inside: Inside,
+    /// How far off the camera's axis may be.
+    slack: Angle,
+}
+
+impl<'a, F: Frame> Field<'a, F> {
+    fn new(camera: &'a KannalaBrandt, shared_from_camera: Transform<Shared, F>) -> Self {
+        let from_shared = shared_from_camera.inverse();
+        Self { camera, from_shared, inside: Inside::of(camera), slack: Angle::from_deg(0.0) }
+    }
+
+    fn sees(&self, bearing: &UnitRay<Shared>) -> bool {
+        self.shows(&(self.from_shared * *bearing))
+    }
+
+    /// Whether it sees a bearing, or would if it were turned by the slack.
+    fn may_see(&self, bearing: &UnitRay<Shared>) -> bool {
+        let ray = self.from_shared * *bearing;
+        let towards_axis = || {
+            let axis = ray.vector().cross(&Vector3::z()).try_normalize(f64::EPSILON)?;
+            UnitRay::new(Rotation3::new(axis * self.slack.rad()) * ray.vector())
+        };
+        self.shows(&ray) || (self.slack.rad() > 0.0 && towards_axis().is_some_and(|ray| self.shows(&ray)))
+    }
+
+    fn shows(&self, ray: &UnitRay<F>) -> bool {
+        self.camera.project(ray).is_ok_and(|pixel| self.inside.contains(ray.vector().z, &pixel))
     }
 }
 
@@ -90,10 +113,11 @@ impl Extent {
             UnitRay::new(d).is_some_and(|bearing| field.seen_from_left(&bearing) || field.seen_from_right(&bearing))
         };
         let bounds = (-a_limit..=a_limit)
-            .flat_map(|a| (-b_limit..=b_limit).map(move |b| (a, b)))
+            .into_par_iter()
+            .flat_map_iter(|a| (-b_limit..=b_limit).map(move |b| (a, b)))
             .filter(compared)
             .map(|(a, b)| [a, a, b, b])
-            .reduce(|m, n| [m[0].min(n[0]), m[1].max(n[1]), m[2].min(n[2]), m[3].max(n[3])])?;
+            .reduce_with(|m, n| [m[0].min(n[0]), m[1].max(n[1]), m[2].min(n[2]), m[3].max(n[3])])?;
         let within = |degrees: i32, limit: i32| f64::from(degrees.clamp(-limit, limit)).to_radians();
         Some(Self {
             a_min: within(bounds[0] - 1, a_limit),
@@ -104,16 +128,26 @@ impl Extent {
     }
 }
 
-/// Where the lens shows `ray`, unless that is in the rim or so near the sensor's border that interpolation would read
-/// beyond it.
-pub(crate) fn seen_at<F: Frame>(camera: &KannalaBrandt, ray: &UnitRay<F>) -> Option<Pixel> {
-    camera.project(ray).ok().filter(|pixel| well_inside(camera, ray.vector().z, pixel))
+/// What of an image is looked at: not the rim, nor what is so near the sensor's border that interpolation would read beyond it.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Inside {
+    least_z: f64,
+    most_u: f64,
+    most_v: f64,
 }
 
-/// Whether a pixel, whose unit ray has this z, lies inside the rim, and as far from the border as interpolation reads.
-pub(crate) fn well_inside(camera: &KannalaBrandt, z: f64, pixel: &Pixel) -> bool {
+impl Inside {
     const BORDER: f64 = 1.0;
-    let inside = |x: f64, n: u32| x >= BORDER && x < f64::from(n) - 1.0 - BORDER;
-    let in_cone = z >= (camera.theta_max() - RIM).rad().cos();
-    in_cone && inside(pixel.u, camera.size().width) && inside(pixel.v, camera.size().height)
+
+    pub(crate) fn of(camera: &KannalaBrandt) -> Self {
+        let most = |count: u32| f64::from(count) - 1.0 - Self::BORDER;
+        let size = camera.size();
+        Self { least_z: (camera.theta_max() - RIM).rad().cos(), most_u: most(size.width), most_v: most(size.height) }
+    }
+
+    /// Whether a pixel is, whose unit ray has this z.
+    pub(crate) fn contains(&self, z: f64, pixel: &Pixel) -> bool {
+        let within = |x: f64, most: f64| x >= Self::BORDER && x < most;
+        z >= self.least_z && within(pixel.u, self.most_u) && within(pixel.v, self.most_v)
+    }
 }

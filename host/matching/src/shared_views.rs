@@ -17,6 +17,7 @@ pub(crate) struct SharedViews<'a> {
     pub grid: Grid,
     pub left: View<Left>,
     pub right: View<Right>,
+    field: SharedField<'a>,
     pair: &'a ImagePair<'a>,
 }
 
@@ -37,6 +38,7 @@ impl<'a> SharedViews<'a> {
             grid,
             left: View::new(pair.left, pair.left_camera, frame.shared_from_left(), grid),
             right: View::new(pair.right, pair.right_camera, frame.shared_from_right(), grid),
+            field,
             pair,
         })
     }
@@ -53,14 +55,12 @@ impl<'a> SharedViews<'a> {
 
     /// Whether the left camera sees all around a keypoint, and the right camera may see it too.
     pub(crate) fn shared_from_left(&self, keypoint: &Keypoint) -> bool {
-        let field = SharedField::of(&self.frame, self.pair);
-        surrounded(&self.left, keypoint) && self.grid.bearing(keypoint.at).is_some_and(|b| field.seen_from_left(&b))
+        surrounded(&self.left, keypoint) && self.grid.bearing(keypoint.at).is_some_and(|b| self.field.seen_from_left(&b))
     }
 
     /// The same for a keypoint of the right view.
     pub(crate) fn shared_from_right(&self, keypoint: &Keypoint) -> bool {
-        let field = SharedField::of(&self.frame, self.pair);
-        surrounded(&self.right, keypoint) && self.grid.bearing(keypoint.at).is_some_and(|b| field.seen_from_right(&b))
+        surrounded(&self.right, keypoint) && self.grid.bearing(keypoint.at).is_some_and(|b| self.field.seen_from_right(&b))
     }
 }
 

@@ -9,7 +9,7 @@ use rayon::prelude::*;
 use vergence_vision::{Angle, BatchLens, Frame, KannalaBrandt, OutsideField, Pixel, Transform, UnitRay};
 
 use crate::plane::{Plane, cubic_weights};
-use crate::shared_field::{Extent, SharedField, well_inside};
+use crate::shared_field::{Extent, Inside, SharedField};
 use crate::{Shared, SharedFrame};
 
 /// A position in a [`View`], in its pixels. (0, 0) is the centre of the top-left one.
@@ -131,18 +131,20 @@ impl<F: Frame> View<F> {
         grid: Grid,
     ) -> Self {
         let camera_from_shared = shared_from_camera.inverse().rotation().to_rotation_matrix().into_inner();
-        let lens = BatchLens::new(camera);
+        let (lens, inside) = (BatchLens::new(camera), Inside::of(camera));
         let mut values = vec![0.0; grid.width * grid.height];
         let mut seen = vec![false; values.len()];
+        let columns: Vec<_> = (0..grid.width).map(|x| grid.a(x as f64).sin_cos()).collect();
         let rows = values.par_chunks_mut(grid.width).zip(seen.par_chunks_mut(grid.width));
         rows.enumerate().for_each(|(y, (values, seen))| {
-            let ray = |x: usize| (camera_from_shared * direction(grid.a(x as f64), grid.b(y as f64))).into();
-            let rays: Vec<[f64; 3]> = (0..grid.width).map(ray).collect();
+            let row = grid.b(y as f64).sin_cos();
+            let ray = |column| (camera_from_shared * direction_of(column, row)).into();
+            let rays: Vec<[f64; 3]> = columns.iter().map(|&column| ray(column)).collect();
             for ((&[_, _, z], [u, v]), (value, seen)) in
                 rays.iter().zip(lens.project(&rays)).zip(values.iter_mut().zip(seen))
             {
                 let at = Pixel { u, v };
-                let sampled = well_inside(camera, z, &at).then(|| sample_image(image, at)).flatten();
+                let sampled = inside.contains(z, &at).then(|| sample_image(image, at)).flatten();
                 (*value, *seen) = sampled.map_or((0.0, false), |sampled| (sampled, true));
             }
         });
@@ -203,8 +205,9 @@ impl<F: Frame> View<F> {
 /// The brightness of an 8-bit image between its pixels; `None` where the 4 × 4 pixels around are not all there.
 fn sample_image(image: &GrayImage, at: Pixel) -> Option<f32> {
     let (width, height) = (image.width() as usize, image.height() as usize);
-    let (column, row) = ((at.u.floor() as usize).checked_sub(1)?, (at.v.floor() as usize).checked_sub(1)?);
-    let (wu, wv) = (cubic_weights((at.u - at.u.floor()) as f32), cubic_weights((at.v - at.v.floor()) as f32));
+    let (u, v) = (at.u as usize, at.v as usize);
+    let (column, row) = (u.checked_sub(1)?, v.checked_sub(1)?);
+    let (wu, wv) = (cubic_weights((at.u - u as f64) as f32), cubic_weights((at.v - v as f64) as f32));
     if column + 4 > width || row + 4 > height {
         return None;
     }
@@ -217,5 +220,10 @@ fn sample_image(image: &GrayImage, at: Pixel) -> Option<f32> {
 
 /// d = (sin a, cos a sin b, cos a cos b).
 pub(crate) fn direction(a: f64, b: f64) -> Vector3<f64> {
-    Vector3::new(a.sin(), a.cos() * b.sin(), a.cos() * b.cos())
+    direction_of(a.sin_cos(), b.sin_cos())
+}
+
+/// The same of the sine and cosine of both angles.
+fn direction_of((sin_a, cos_a): (f64, f64), (sin_b, cos_b): (f64, f64)) -> Vector3<f64> {
+    Vector3::new(sin_a, cos_a * sin_b, cos_a * cos_b)
 }
