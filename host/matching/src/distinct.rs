@@ -4,6 +4,10 @@
 //! the true partner may be missing among them while its neighbour is not. Normalised cross-correlation of the place
 //! with everything its own view shows in the band finds such repetitions wherever they are.
 
+use std::ops::Range;
+
+use multiversion::multiversion;
+
 use crate::ViewPixel;
 use crate::plane::{Plane, Pyramid};
 
@@ -17,10 +21,15 @@ const SIDE: usize = 2 * HALF + 1;
 const FLAT: f64 = 0.01;
 /// Correlation from which two places look the same.
 const ALIKE: f32 = 0.93;
+/// How many columns are looked at together.
+const TOGETHER: usize = 16;
 /// Nearer than this, in pixels of the level, a place is the same one.
 const SAME_PLACE: usize = 5;
 /// How far off the row a repetition may lie, in pixels of the level.
 const ROWS: usize = 1;
+
+/// The values around a pixel, by rows.
+type Window = [f32; SIDE * SIDE];
 
 /// A view prepared for looking along its rows.
 pub(crate) struct Surroundings<'a> {
@@ -41,25 +50,42 @@ impl<'a> Surroundings<'a> {
     pub(crate) fn is_distinct(&self, at: ViewPixel, from: f64, to: f64) -> bool {
         let whole = |position: f64| (position / SCALE).round().max(0.0) as usize;
         let (x, y) = (whole(at.x), whole(at.y));
-        let Some(place) = window(self.plane, x, y) else { return true };
-        let least_dot = ALIKE * norm(&place);
-        let looks_alike = |column: usize, row: usize| self.dot(&place, column, row) > least_dot;
+        let Some(place) = window(self.plane, x, y).and_then(normalised) else { return true };
         let columns = whole(from).max(HALF)..(whole(to) + 1).min(self.plane.width().saturating_sub(HALF));
         let rows = y.saturating_sub(ROWS).max(HALF)..(y + ROWS + 1).min(self.plane.height().saturating_sub(HALF));
-        !columns
-            .filter(|column| column.abs_diff(x) > SAME_PLACE)
-            .any(|column| rows.clone().any(|row| looks_alike(column, row)))
+        let before = columns.start..columns.end.min(x.saturating_sub(SAME_PLACE));
+        let after = columns.start.max(x + SAME_PLACE + 1)..columns.end;
+        ![before, after].into_iter().any(|columns| rows.clone().any(|row| self.shows(&place, row, columns.clone())))
     }
 
-    /// Product of a window without mean and the normalised window around a pixel that has one.
-    fn dot(&self, place: &[f32; SIDE * SIDE], x: usize, y: usize) -> f32 {
-        let mut sums = [0.0_f32; SIDE]; // by column, so that the compiler may vectorise
-        for (j, line) in place.chunks_exact(SIDE).enumerate() {
-            let other = &self.plane.row(y - HALF + j)[x - HALF..][..SIDE];
-            sums.iter_mut().zip(line).zip(other).for_each(|((sum, p), q)| *sum += p * q);
-        }
-        sums.iter().sum::<f32>() * self.inverse_norm.at(x, y)
+    /// Whether one of these pixels of row `y`, which all have a window, is surrounded by what looks like `place`, a window
+    /// without mean of norm 1.
+    fn shows(&self, place: &Window, y: usize, columns: Range<usize>) -> bool {
+        let lines = std::array::from_fn(|j| self.plane.row(y - HALF + j));
+        shows(place, &lines, self.inverse_norm.row(y), columns)
     }
+}
+
+/// [`Surroundings::shows`], many columns at a time.
+#[multiversion(targets("x86_64+avx2"))]
+fn shows(place: &Window, lines: &[&[f32]; SIDE], inverse_norms: &[f32], columns: Range<usize>) -> bool {
+    let Some(last) = inverse_norms.len().checked_sub(HALF + TOGETHER).filter(|last| *last >= HALF) else {
+        return false;
+    };
+    columns.clone().step_by(TOGETHER).any(|first| {
+        // Near the border, columns from before are looked at again.
+        let first = first.min(last);
+        let mut sums = [0.0_f32; TOGETHER];
+        for (weights, line) in place.chunks_exact(SIDE).zip(lines) {
+            let around = &line[first - HALF..][..TOGETHER + SIDE - 1];
+            for (i, weight) in weights.iter().enumerate() {
+                sums.iter_mut().zip(&around[i..]).for_each(|(sum, value)| *sum += weight * value);
+            }
+        }
+        let alike = sums.iter().zip(&inverse_norms[first..]).enumerate();
+        let mut alike = alike.filter(|(_, (sum, inverse_norm))| *sum * *inverse_norm > ALIKE);
+        alike.any(|(k, _)| columns.contains(&(first + k)))
+    })
 }
 
 /// For the windows around the pixels of row `y`: n σ² is the sum of squares less n times the squared mean.
@@ -74,15 +100,20 @@ fn inverse_norms(plane: &Plane, y: usize, out: &mut [f32]) {
             *squares += value * value;
         }
     }
-    for (window, out) in columns.windows(SIDE).zip(&mut out[HALF.min(plane.width())..]) {
-        let [sum, squares] = window.iter().fold([0.0; 2], |[a, b], [c, d]| [a + c, b + d]);
+    let (mut sum, mut squares) = (0.0, 0.0);
+    for (x, [new_sum, new_squares]) in columns.iter().enumerate() {
+        sum += new_sum;
+        squares += new_squares;
+        let Some(left) = (x + 1).checked_sub(SIDE) else { continue };
         let variance = squares / COUNT - (sum / COUNT).powi(2);
-        *out = if variance > FLAT * FLAT { (variance * COUNT).sqrt().recip() as f32 } else { 0.0 };
+        out[left + HALF] = if variance > FLAT * FLAT { (variance * COUNT).sqrt().recip() as f32 } else { 0.0 };
+        sum -= columns[left][0];
+        squares -= columns[left][1];
     }
 }
 
 /// The window around a pixel, its mean taken away; `None` where it is not all inside.
-fn window(plane: &Plane, x: usize, y: usize) -> Option<[f32; SIDE * SIDE]> {
+fn window(plane: &Plane, x: usize, y: usize) -> Option<Window> {
     let (column, row) = (x.checked_sub(HALF)?, y.checked_sub(HALF)?);
     if x + HALF >= plane.width() || y + HALF >= plane.height() {
         return None;
@@ -96,6 +127,31 @@ fn window(plane: &Plane, x: usize, y: usize) -> Option<[f32; SIDE * SIDE]> {
     Some(values)
 }
 
-fn norm(values: &[f32; SIDE * SIDE]) -> f32 {
-    values.iter().map(|value| value * value).sum::<f32>().sqrt()
+/// A window without mean, of norm 1; `None` where it is flat.
+fn normalised(window: Window) -> Option<Window> {
+    let norm = window.iter().map(|value| value * value).sum::<f32>().sqrt();
+    (f64::from(norm) > FLAT * SIDE as f64).then(|| window.map(|value| value / norm))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// The window of a flat surface has no shape that could be compared: an overexposed sky repeats nothing.
+    #[test]
+    fn a_flat_surface_repeats_nothing() {
+        const SIZE: usize = 160;
+        let textured = |x: usize, y: usize| (x < 80).then(|| 128.0 + 60.0 * ((x * x + 3 * y) as f32 * 0.05).sin());
+        let values = (0..SIZE * SIZE).map(|i| textured(i % SIZE, i / SIZE).unwrap_or(254.7)).collect();
+        let pyramid = Pyramid::new(&Plane::new(SIZE, SIZE, values), 2);
+        let surroundings = Surroundings::of(&pyramid).unwrap();
+        for y in (30..130).step_by(4) {
+            let at = ViewPixel { x: 50.0, y: f64::from(y) };
+            assert!(surroundings.is_distinct(at, 104.0, 140.0), "{y}");
+        }
+        // And what does repeat is found.
+        let tiled = (0..SIZE * SIZE).map(|i| if (i % SIZE % 40 < 20) == (i / SIZE % 40 < 20) { 200.0 } else { 50.0 });
+        let pyramid = Pyramid::new(&Plane::new(SIZE, SIZE, tiled.collect()), 2);
+        assert!(!Surroundings::of(&pyramid).unwrap().is_distinct(ViewPixel { x: 40.0, y: 80.0 }, 60.0, 140.0));
+    }
 }

@@ -70,21 +70,60 @@ impl Plane {
         Self { width, height, values }
     }
 
-    /// The value between pixels by cubic convolution; `None` within a pixel of the border or outside.
-    pub(crate) fn sample(&self, x: f64, y: f64) -> Option<f32> {
+    /// The values between pixels by cubic convolution, along a row at the columns x, x + step and so on, with a step above 0;
+    /// `None` where one is within a pixel of the border or outside, where they spread over nearly [`Self::SPAN`] pixels, and
+    /// where the plane is narrower than that.
+    #[inline(always)]
+    pub(crate) fn sample_row<const N: usize>(&self, x: f64, step: f64, y: f64) -> Option<[f32; N]> {
         let inside = |x: f64, n: usize| x >= 1.0 && x < n as f64 - 2.0;
-        if !(inside(x, self.width) && inside(y, self.height)) {
+        let last = x + step * (N - 1) as f64;
+        if !(step > 0.0 && inside(y, self.height) && inside(x, self.width) && inside(last, self.width)) {
             return None;
         }
-        let (column, row) = (x as usize, y as usize);
-        let (wx, wy) = (cubic_weights((x - column as f64) as f32), cubic_weights((y - row as f64) as f32));
-        let mut sum = 0.0;
-        for (j, w) in wy.iter().enumerate() {
-            let t = &self.values[(row - 1 + j) * self.width + column - 1..][..4];
-            sum += w * (wx[0] * t[0] + wx[1] * t[1] + wx[2] * t[2] + wx[3] * t[3]);
+        let first = (x as usize - 1).min(self.width.checked_sub(Self::SPAN)?);
+        // A column to spare, for rounding.
+        if last as usize + 4 > first + Self::SPAN {
+            return None;
         }
-        Some(sum)
+        let row = y as usize;
+        let line = |j: usize| self.values.get((row - 1 + j) * self.width + first..)?.first_chunk::<{ Self::SPAN }>();
+        let (lines, wy) = ([line(0)?, line(1)?, line(2)?, line(3)?], cubic_weights((y - row as f64) as f32));
+        let mut mixed = [0.0_f32; Self::SPAN];
+        for i in 0..Self::SPAN {
+            mixed[i] = wy[0] * lines[0][i] + wy[1] * lines[1][i] + wy[2] * lines[2][i] + wy[3] * lines[3][i];
+        }
+        // Places as whole numbers: their parts are had without a conversion that must look out for what is too large.
+        const FRACTION: u32 = 26;
+        let fixed = |length: f64| (length * f64::from(1 << FRACTION)) as u32;
+        let (start, step) = (fixed(x - first as f64), fixed(step));
+        let (mut columns, mut past) = ([0; N], [0.0; N]);
+        for i in 0..N {
+            let place = start.wrapping_add(step.wrapping_mul(i as u32));
+            columns[i] = place >> FRACTION;
+            past[i] = (place & ((1 << FRACTION) - 1)) as i32 as f32 * (1.0 / (1 << FRACTION) as f32);
+        }
+        let mut weights = [[0.0; N]; 4];
+        for i in 0..N {
+            let found = cubic_weights(past[i]);
+            (weights[0][i], weights[1][i], weights[2][i], weights[3][i]) = (found[0], found[1], found[2], found[3]);
+        }
+        let mut taps = [[0.0; N]; 4];
+        for i in 0..N {
+            let found = mixed[columns[i] as usize - 1..].first_chunk::<4>()?;
+            (taps[0][i], taps[1][i], taps[2][i], taps[3][i]) = (found[0], found[1], found[2], found[3]);
+        }
+        let mut values = [0.0; N];
+        for i in 0..N {
+            values[i] = weights[0][i] * taps[0][i]
+                + weights[1][i] * taps[1][i]
+                + weights[2][i] * taps[2][i]
+                + weights[3][i] * taps[3][i];
+        }
+        Some(values)
     }
+
+    /// How many pixels of a row are looked at together.
+    const SPAN: usize = 32;
 }
 
 /// Smoothed planes at resolutions halved from one to the next: position x of level l is 2^l x of level 0.
@@ -103,7 +142,8 @@ impl Pyramid {
     pub(crate) fn new(plane: &Plane, levels: usize) -> Self {
         let mut pyramid: Vec<Plane> = Vec::with_capacity(levels);
         while pyramid.len() < levels {
-            let next = pyramid.last().map_or_else(|| plane.clone(), Plane::decimated);
+            let coarser = pyramid.last().map(Plane::decimated);
+            let next = coarser.as_ref().unwrap_or(plane);
             if next.width.min(next.height) < Self::SMALLEST {
                 break;
             }
@@ -119,6 +159,7 @@ impl Pyramid {
 }
 
 /// Weights of the four pixels around a position `t` past the second of them (Keys 1981, a = −1/2).
+#[inline(always)]
 pub(crate) fn cubic_weights(t: f32) -> [f32; 4] {
     let (t2, t3) = (t * t, t * t * t);
     [0.5 * (2.0 * t2 - t3 - t), 0.5 * (3.0 * t3 - 5.0 * t2 + 2.0), 0.5 * (4.0 * t2 - 3.0 * t3 + t), 0.5 * (t3 - t2)]

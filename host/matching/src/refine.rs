@@ -4,6 +4,9 @@
 //! gain and bias as linear unknowns. Between two views with epipolar rows a plane maps by x' = x + t_x + s_x x + s_y y,
 //! y' = y: rows stay rows. t_y takes up the error of the pose and tells how far off the epipolar curve a match is.
 
+use std::sync::LazyLock;
+
+use multiversion::multiversion;
 use nalgebra::{SMatrix, SVector};
 
 use crate::plane::{Plane, Pyramid};
@@ -121,12 +124,13 @@ struct Fit {
 const UNKNOWNS: usize = 6;
 
 /// Registers `image` to the window of `template` around `at`, from the warp `start`.
+#[multiversion(targets("x86_64+avx2"))]
 fn align(template: &Plane, image: &Plane, at: ViewPixel, start: Warp) -> Result<Fit, Drop> {
-    let window = Window::new(template, at).ok_or(Drop::NotRefined)?;
+    let window = Window::new(&surroundings(template, at).ok_or(Drop::NotRefined)?);
     let inverse = window.normal_matrix().cholesky().ok_or(Drop::Uncertain)?.inverse();
     let mut warp = start;
     for _ in 0..ITERATIONS {
-        let values = window.warped(image, at, &warp).ok_or(Drop::NotRefined)?;
+        let values = warped(image, at, &warp).ok_or(Drop::NotRefined)?;
         let solution = inverse * window.project(&values);
         let gain = solution[4];
         if gain <= 0.0 {
@@ -148,75 +152,133 @@ fn align(template: &Plane, image: &Plane, at: ViewPixel, start: Warp) -> Result<
     Err(Drop::NotRefined)
 }
 
-/// The template's window as the columns of a linear model of the other image's window:
-/// I ≈ gain (T + ∇T · step) + bias.
-struct Window {
-    basis: Vec<SVector<f64, UNKNOWNS>>,
-    weights: Vec<f64>,
+/// One number for each pixel of the window, by rows.
+type Patch = [[f64; SIDE]; SIDE];
+
+/// The window with a pixel more on each side, for its gradients.
+type Padded = [[f64; SIDE + 2]; SIDE + 2];
+
+/// What `template` shows around `at`; `None` where it is not all inside.
+#[inline(always)]
+fn surroundings(template: &Plane, at: ViewPixel) -> Option<Padded> {
+    let mut values = [[0.0; SIDE + 2]; SIDE + 2];
+    for (j, row) in values.iter_mut().enumerate() {
+        let found = template.sample_row::<{ SIDE + 2 }>(at.x + offset(0) - 1.0, 1.0, at.y + offset(j) - 1.0)?;
+        row.iter_mut().zip(found).for_each(|(value, found)| *value = f64::from(found));
+    }
+    Some(values)
 }
 
+/// The template's window as the columns of a linear model of the other image's window:
+/// I ≈ gain (T + ∇T · step) + bias.
+struct Window([Patch; UNKNOWNS]);
+
 impl Window {
-    /// `None` where the window is not all inside.
-    fn new(template: &Plane, at: ViewPixel) -> Option<Self> {
-        const PADDED: usize = SIDE + 2;
-        let mut values = [[0.0; PADDED]; PADDED];
-        for (j, row) in values.iter_mut().enumerate() {
-            for (i, value) in row.iter_mut().enumerate() {
-                let offset = |k: usize| k as f64 - (HALF + 1) as f64;
-                *value = f64::from(template.sample(at.x + offset(i), at.y + offset(j))?);
+    #[inline(always)]
+    fn new(values: &Padded) -> Self {
+        let mean = values[HALF + 1][HALF + 1];
+        let mut columns = [[[0.0; SIDE]; SIDE]; UNKNOWNS];
+        for j in 0..SIDE {
+            let v = offset(j) / HALF as f64;
+            for i in 0..SIDE {
+                let u = offset(i) / HALF as f64;
+                let gx = 0.5 * (values[j + 1][i + 2] - values[j + 1][i]);
+                let gy = 0.5 * (values[j + 2][i + 1] - values[j][i + 1]);
+                columns[0][j][i] = gx;
+                columns[1][j][i] = gy;
+                columns[2][j][i] = u * gx;
+                columns[3][j][i] = v * gx;
+                columns[4][j][i] = values[j + 1][i + 1] - mean;
+                columns[5][j][i] = 1.0;
             }
         }
-        let mean = values[HALF + 1][HALF + 1];
-        let mut basis = Vec::with_capacity(SIDE * SIDE);
-        let mut weights = Vec::with_capacity(SIDE * SIDE);
-        for (x, y) in offsets() {
-            let (i, j) = ((x + HALF as f64) as usize + 1, (y + HALF as f64) as usize + 1);
-            let gx = 0.5 * (values[j][i + 1] - values[j][i - 1]);
-            let gy = 0.5 * (values[j + 1][i] - values[j - 1][i]);
-            let (u, v) = (x / HALF as f64, y / HALF as f64);
-            basis.push(SVector::from([gx, gy, u * gx, v * gx, values[j][i] - mean, 1.0]));
-            weights.push((-0.5 * (x * x + y * y) / (WEIGHT_SIGMA * WEIGHT_SIGMA)).exp());
-        }
-        Some(Self { basis, weights })
+        Self(columns)
     }
 
+    #[inline(always)]
     fn normal_matrix(&self) -> SMatrix<f64, UNKNOWNS, UNKNOWNS> {
-        self.basis.iter().zip(&self.weights).fold(SMatrix::zeros(), |sum, (b, w)| sum + (b * *w) * b.transpose())
+        let mut normal = SMatrix::zeros();
+        for (i, column) in self.0.iter().enumerate() {
+            let weighted = weighted(column);
+            for (k, other) in self.0.iter().enumerate().skip(i) {
+                let product = dot(&weighted, other);
+                (normal[(i, k)], normal[(k, i)]) = (product, product);
+            }
+        }
+        normal
     }
 
-    fn project(&self, values: &[f64]) -> SVector<f64, UNKNOWNS> {
-        let terms = self.basis.iter().zip(&self.weights).zip(values);
-        terms.fold(SVector::zeros(), |sum, ((b, w), value)| sum + b * (w * value))
-    }
-
-    /// The other image under the warped window; `None` where it is not all inside.
-    fn warped(&self, image: &Plane, at: ViewPixel, warp: &Warp) -> Option<Vec<f64>> {
-        offsets()
-            .map(|(x, y)| {
-                let (dx, dy) = warp.apply(x, y);
-                image.sample(at.x + dx, at.y + dy).map(f64::from)
-            })
-            .collect()
+    #[inline(always)]
+    fn project(&self, values: &Patch) -> SVector<f64, UNKNOWNS> {
+        let mut projected = SVector::<f64, UNKNOWNS>::zeros();
+        let weighted = weighted(values);
+        for (projected, column) in projected.iter_mut().zip(&self.0) {
+            *projected = dot(&weighted, column);
+        }
+        projected
     }
 
     /// Correlation of the model with `values`, and the variance of the residuals.
-    fn quality(&self, values: &[f64], solution: &SVector<f64, UNKNOWNS>) -> (f64, f64) {
-        let total: f64 = self.weights.iter().sum();
-        let mean = values.iter().zip(&self.weights).map(|(value, w)| value * w).sum::<f64>() / total;
+    #[inline(always)]
+    fn quality(&self, values: &Patch, solution: &SVector<f64, UNKNOWNS>) -> (f64, f64) {
+        let total: f64 = WEIGHTS.iter().flatten().sum();
+        let mean = dot(&WEIGHTS, values) / total;
         let (mut left_over, mut spread) = (0.0, 0.0);
-        for ((b, w), value) in self.basis.iter().zip(&self.weights).zip(values) {
-            left_over += w * (value - b.dot(solution)).powi(2);
-            spread += w * (value - mean).powi(2);
+        for (j, (values, weights)) in values.iter().zip(&*WEIGHTS).enumerate() {
+            for (i, (value, weight)) in values.iter().zip(weights).enumerate() {
+                let model: f64 = self.0.iter().zip(solution).map(|(column, factor)| column[j][i] * factor).sum();
+                left_over += weight * (value - model).powi(2);
+                spread += weight * (value - mean).powi(2);
+            }
         }
         let correlation = (1.0 - left_over / spread.max(f64::MIN_POSITIVE)).max(0.0).sqrt();
         (correlation, left_over / total)
     }
 }
 
-/// Offsets of the window's pixels from its centre, by rows.
-fn offsets() -> impl Iterator<Item = (f64, f64)> {
-    let side = |k: usize| k as f64 - HALF as f64;
-    (0..SIDE).flat_map(move |j| (0..SIDE).map(move |i| (side(i), side(j))))
+/// The window's Gaussian weights.
+static WEIGHTS: LazyLock<Patch> = LazyLock::new(|| {
+    let weight = |x: f64, y: f64| (-0.5 * (x * x + y * y) / (WEIGHT_SIGMA * WEIGHT_SIGMA)).exp();
+    std::array::from_fn(|j| std::array::from_fn(|i| weight(offset(i), offset(j))))
+});
+
+/// `image` under the warped window around `at`; `None` where it is not all inside.
+#[inline(always)]
+fn warped(image: &Plane, at: ViewPixel, warp: &Warp) -> Option<Patch> {
+    let mut values = [[0.0; SIDE]; SIDE];
+    for (j, row) in values.iter_mut().enumerate() {
+        // A row of the window stays one: y' does not depend on x.
+        let (x, y) = warp.apply(offset(0), offset(j));
+        let found = image.sample_row::<SIDE>(at.x + x, 1.0 + warp.sx, at.y + y)?;
+        row.iter_mut().zip(found).for_each(|(value, found)| *value = f64::from(found));
+    }
+    Some(values)
+}
+
+#[inline(always)]
+fn weighted(values: &Patch) -> Patch {
+    let mut weighted = *values;
+    for (row, weights) in weighted.iter_mut().zip(&*WEIGHTS) {
+        row.iter_mut().zip(weights).for_each(|(value, weight)| *value *= weight);
+    }
+    weighted
+}
+
+/// The sum of products, by columns first so that the compiler may vectorise.
+#[inline(always)]
+fn dot(a: &Patch, b: &Patch) -> f64 {
+    let mut sums = [0.0; SIDE];
+    for (a, b) in a.iter().zip(b) {
+        for i in 0..SIDE {
+            sums[i] += a[i] * b[i];
+        }
+    }
+    sums.iter().sum()
+}
+
+/// How far a row or column of the window is from its centre.
+const fn offset(k: usize) -> f64 {
+    k as f64 - HALF as f64
 }
 
 #[cfg(test)]

@@ -55,12 +55,14 @@ impl<'a> SharedViews<'a> {
 
     /// Whether the left camera sees all around a keypoint, and the right camera may see it too.
     pub(crate) fn shared_from_left(&self, keypoint: &Keypoint) -> bool {
-        surrounded(&self.left, keypoint) && self.grid.bearing(keypoint.at).is_some_and(|b| self.field.seen_from_left(&b))
+        surrounded(&self.left, keypoint)
+            && self.grid.bearing(keypoint.at).is_some_and(|b| self.field.seen_from_left(&b))
     }
 
     /// The same for a keypoint of the right view.
     pub(crate) fn shared_from_right(&self, keypoint: &Keypoint) -> bool {
-        surrounded(&self.right, keypoint) && self.grid.bearing(keypoint.at).is_some_and(|b| self.field.seen_from_right(&b))
+        surrounded(&self.right, keypoint)
+            && self.grid.bearing(keypoint.at).is_some_and(|b| self.field.seen_from_right(&b))
     }
 }
 

@@ -140,12 +140,12 @@ impl<F: Frame> View<F> {
             let row = grid.b(y as f64).sin_cos();
             let ray = |column| (camera_from_shared * direction_of(column, row)).into();
             let rays: Vec<[f64; 3]> = columns.iter().map(|&column| ray(column)).collect();
-            for ((&[_, _, z], [u, v]), (value, seen)) in
-                rays.iter().zip(lens.project(&rays)).zip(values.iter_mut().zip(seen))
-            {
+            let pixels = lens.project(&rays);
+            for (((&[_, _, z], [u, v]), value), seen) in rays.iter().zip(pixels).zip(values).zip(seen) {
                 let at = Pixel { u, v };
-                let sampled = inside.contains(z, &at).then(|| sample_image(image, at)).flatten();
-                (*value, *seen) = sampled.map_or((0.0, false), |sampled| (sampled, true));
+                if let Some(sampled) = inside.contains(z, &at).then(|| sample_image(image, at)).flatten() {
+                    (*value, *seen) = (sampled, true);
+                }
             }
         });
         Self { grid, camera: *camera, shared_from_camera, plane: Plane::new(grid.width, grid.height, values), seen }
@@ -202,20 +202,22 @@ impl<F: Frame> View<F> {
     }
 }
 
-/// The brightness of an 8-bit image between its pixels; `None` where the 4 × 4 pixels around are not all there.
+/// The brightness of an 8-bit image between its pixels, at least one away from its border; `None` below or beyond it.
+#[inline]
 fn sample_image(image: &GrayImage, at: Pixel) -> Option<f32> {
-    let (width, height) = (image.width() as usize, image.height() as usize);
-    let (u, v) = (at.u as usize, at.v as usize);
-    let (column, row) = (u.checked_sub(1)?, v.checked_sub(1)?);
-    let (wu, wv) = (cubic_weights((at.u - u as f64) as f32), cubic_weights((at.v - v as f64) as f32));
-    if column + 4 > width || row + 4 > height {
-        return None;
+    let (column, row) = (at.u as u32, at.v as u32);
+    let wu = cubic_weights((at.u - f64::from(column)) as f32);
+    let wv = cubic_weights((at.v - f64::from(row)) as f32);
+    let (pixels, width): (&[u8], _) = (image.as_raw(), image.width() as usize);
+    let first = (row.checked_sub(1)? as usize) * width + column.checked_sub(1)? as usize;
+    let mut mixed = [0.0_f32; 4];
+    for (j, weight) in wv.iter().enumerate() {
+        let taps: &[u8; 4] = pixels.get(first + j * width..)?.first_chunk()?;
+        for (sum, tap) in mixed.iter_mut().zip(taps) {
+            *sum += weight * f32::from(*tap);
+        }
     }
-    let pixels: &[u8] = image.as_raw();
-    Some((0..4).fold(0.0, |sum, j| {
-        let taps = &pixels[(row + j) * width + column..][..4];
-        sum + wv[j] * taps.iter().zip(&wu).fold(0.0, |sum, (&tap, w)| sum + w * f32::from(tap))
-    }))
+    Some(wu[0] * mixed[0] + wu[1] * mixed[1] + wu[2] * mixed[2] + wu[3] * mixed[3])
 }
 
 /// d = (sin a, cos a sin b, cos a cos b).

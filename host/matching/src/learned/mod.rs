@@ -12,6 +12,8 @@ mod manifest;
 mod model;
 mod network;
 
+use rayon::prelude::*;
+
 use crate::ViewPixel;
 use crate::corners::Keypoint;
 use crate::guided::{KEYPOINT_TOLERANCE, LEVELS};
@@ -45,6 +47,12 @@ impl LearnedMatcher {
     #[must_use]
     pub const fn new(model: Model) -> Self {
         Self { model, keypoints: 2048, oversampling: None }
+    }
+
+    /// The same with every network replaced by what `wrap` makes of it, as [`Model::wrapped`].
+    #[must_use]
+    pub fn wrapped(self, wrap: impl FnMut(Box<dyn Network>) -> Box<dyn Network>) -> Self {
+        Self { model: self.model.wrapped(wrap), ..self }
     }
 
     /// The networks it asks.
@@ -131,7 +139,7 @@ impl Seen {
 
 /// Brightness from 0 to 1.
 fn lit(plane: &Plane) -> Vec<f32> {
-    plane.values().iter().map(|value| (value / 255.0).clamp(0.0, 1.0)).collect()
+    plane.values().par_iter().map(|value| (value / 255.0).clamp(0.0, 1.0)).collect()
 }
 
 fn keypoint(at: Position) -> Keypoint {

@@ -56,6 +56,12 @@ impl Model {
         Ok(Self { manifest, networks })
     }
 
+    /// The same with every network replaced by what `wrap` makes of it, which must take and give the same tensors.
+    #[must_use]
+    pub fn wrapped(self, wrap: impl FnMut(Box<dyn Network>) -> Box<dyn Network>) -> Self {
+        Self { networks: self.networks.into_iter().map(wrap).collect(), ..self }
+    }
+
     /// What it was made from.
     #[must_use]
     pub const fn manifest(&self) -> &Manifest {

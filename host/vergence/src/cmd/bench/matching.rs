@@ -2,6 +2,7 @@
 
 mod judge;
 mod means;
+mod network_clock;
 mod simulated_pair;
 mod ways;
 
@@ -13,6 +14,7 @@ use vergence_vision::Angle;
 
 use self::judge::Tally;
 use self::means::Means;
+use self::network_clock::NetworkClock;
 use self::simulated_pair::SimulatedPair;
 use self::ways::{Outcome, Way};
 use crate::cmd::report::rounded;
@@ -23,7 +25,8 @@ use crate::models::MatcherOptions;
 /// Photographs the simulated room with two eyes 145 mm apart, each a little pitched and rolled, matches the pair by every
 /// way there is, and counts the matches that are right: those within 2.5 pixels of where the right eye sees what the left
 /// one does. `raw` gives the whole fisheye images to the networks, `views` is `--matcher` with a model, `classical` the one
-/// that needs none. Each before and after the gates of the known pose. With several seeds the mean comes after all of them.
+/// that needs none. Each before and after the gates of the known pose, with the time from images to points. With several seeds
+/// the mean comes after all of them.
 #[derive(Debug, clap::Args)]
 pub struct Args {
     /// Angles between the optical axes, such as 60deg,120deg. Without them 0° to 130° in steps of 10°.
@@ -52,7 +55,8 @@ const STEPS: [f64; 14] = [0.0, 10.0, 20.0, 30.0, 40.0, 50.0, 60.0, 70.0, 80.0, 9
 
 pub fn run(args: &Args, console: Console) -> Result<(), Failure> {
     // Once: a process loads one ONNX Runtime.
-    let learned = args.matching.learned(console)?;
+    let clock = NetworkClock::default();
+    let learned = args.matching.learned(console)?.map(|learned| learned.wrapped(|network| clock.watch(network)));
     let ways = Way::all(learned.as_ref(), args.matching.guided());
     let separations =
         if args.separations.is_empty() { STEPS.map(Angle::from_deg).to_vec() } else { args.separations.clone() };
@@ -70,7 +74,7 @@ pub fn run(args: &Args, console: Console) -> Result<(), Failure> {
             let error = Vector3::new(1.0, -1.0, 1.0).normalize() * args.pose_error.rad();
             let (mut found, mut lines) = (serde_json::Map::new(), Vec::new());
             for (way, means) in ways.iter().zip(&mut of_ways) {
-                let outcome = way.find(&pair, error)?;
+                let outcome = way.find(&pair, error, &clock)?;
                 lines.push(format!("  {:>9}: {}", way.name(), in_words(&outcome)));
                 found.insert(way.name().into(), in_json(&outcome));
                 means.add(&outcome);
@@ -101,11 +105,12 @@ fn in_words(outcome: &Outcome) -> String {
     let count = |tally: &Tally| format!("{} ({:.2})", tally.correct, tally.precision());
     let after = &outcome.after;
     let mut line = format!(
-        "{} -> {}, bearings {:.3}° off, {:.1} s",
+        "{} -> {}, bearings {:.3}° off, {:.2} s of which {:.2} in networks",
         count(&outcome.before),
         count(after),
         after.median_bearing_error.deg(),
-        outcome.seconds
+        outcome.seconds,
+        outcome.network_seconds
     );
     for (name, class) in [("sharp", &after.sharp), ("coarse", &after.coarse)] {
         if class.count > 0 {
@@ -148,5 +153,6 @@ fn in_json(outcome: &Outcome) -> serde_json::Value {
         })),
         "dropped": outcome.dropped,
         "seconds": rounded(outcome.seconds),
+        "network_seconds": rounded(outcome.network_seconds),
     })
 }

@@ -7,11 +7,13 @@ use serde_json::{Value, json};
 use super::ways::Outcome;
 use crate::cmd::report::rounded;
 
-/// Counts before and after the gates.
+/// Counts before and after the gates, and times.
 #[derive(Clone, Debug, Default)]
 pub struct Means {
     before: Counts,
     after: Counts,
+    seconds: f64,
+    network_seconds: f64,
 }
 
 #[derive(Clone, Debug, Default)]
@@ -27,11 +29,19 @@ impl Means {
             counts.matches += tally.count;
             counts.correct.push(tally.correct);
         }
+        self.seconds += outcome.seconds;
+        self.network_seconds += outcome.network_seconds;
     }
 
     /// For programs.
     pub fn json(&self) -> Value {
-        json!({ "before": self.before.json(), "after": self.after.json() })
+        let mean = |sum: f64| rounded(sum / self.before.correct.len().max(1) as f64);
+        json!({
+            "before": self.before.json(),
+            "after": self.after.json(),
+            "seconds": mean(self.seconds),
+            "network_seconds": mean(self.network_seconds),
+        })
     }
 }
 
@@ -57,7 +67,8 @@ impl Counts {
 
 impl fmt::Display for Means {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "{} -> {}", self.before, self.after)
+        let share = 100.0 * self.network_seconds / self.seconds;
+        write!(f, "{} -> {}, {share:.0} % of the time in networks", self.before, self.after)
     }
 }
 

@@ -11,6 +11,7 @@ use vergence_vision::{
 };
 
 use super::judge::Tally;
+use super::network_clock::NetworkClock;
 use super::simulated_pair::SimulatedPair;
 use crate::failure::Failure;
 use crate::stopwatch::Stopwatch;
@@ -43,8 +44,9 @@ pub struct Outcome {
     pub dropped: BTreeMap<&'static str, usize>,
     /// What the matches say of the pose.
     pub drift: Option<PoseDrift>,
-    /// How long the gated matches took.
+    /// How long it took from the images to the points, and how much of that the networks ran.
     pub seconds: f64,
+    pub network_seconds: f64,
 }
 
 impl<'a> Way<'a> {
@@ -62,11 +64,12 @@ impl<'a> Way<'a> {
         }
     }
 
-    /// Matches the pair, of which the right camera is said to be turned by `error` against the truth.
+    /// Matches the pair, of which the right camera is said to be turned by `error` against the truth. The networks are
+    /// watched by `clock`.
     ///
     /// # Errors
     /// Where a network fails.
-    pub fn find(&self, pair: &SimulatedPair, error: Vector3<f64>) -> Result<Outcome, Failure> {
+    pub fn find(&self, pair: &SimulatedPair, error: Vector3<f64>, clock: &NetworkClock) -> Result<Outcome, Failure> {
         let truth = pair.left_from_right;
         let told: Transform<Left, Right> =
             Transform::new(UnitQuaternion::from_scaled_axis(-error) * truth.rotation(), truth.origin().mm());
@@ -80,15 +83,17 @@ impl<'a> Way<'a> {
             nearest: NEAREST,
         };
         let failed = |error: MatchError| Failure::check(error.to_string());
-        let (candidates, found, seconds) = match self {
-            Self::Raw(matcher) => {
-                let watch = Stopwatch::start();
-                let pairs = whole(matcher, &images)?;
-                let seconds = watch.seconds();
-                (pairs.clone(), Matches { pairs, ..Matches::default() }, seconds)
-            }
-            Self::Views(matcher) => timed(matcher.candidates(&images).map_err(failed)?, *matcher, &images)?,
-            Self::Classical(matcher) => timed(matcher.candidates(&images).map_err(failed)?, matcher, &images)?,
+        let candidates = match self {
+            Self::Raw(_) => None,
+            Self::Views(matcher) => Some(matcher.candidates(&images).map_err(failed)?),
+            Self::Classical(matcher) => Some(matcher.candidates(&images).map_err(failed)?),
+        };
+        clock.take();
+        let watch = Stopwatch::start();
+        let found = match self {
+            Self::Raw(matcher) => Matches { pairs: whole(matcher, &images)?, ..Matches::default() },
+            Self::Views(matcher) => matcher.find(&images).map_err(failed)?,
+            Self::Classical(matcher) => matcher.find(&images).map_err(failed)?,
         };
         let matches = found.pairs;
         let dropped = found.dropped.into_iter().map(|(reason, count)| (reason.as_str(), count)).collect();
@@ -97,30 +102,19 @@ impl<'a> Way<'a> {
         let (turn, shift) = (STATED.0.rad().powi(2), STATED.1.mm().powi(2));
         let stated = Matrix6::from_diagonal(&Vector6::new(turn, turn, turn, shift, shift, shift));
         let drift = pose_drift(&pixels, &stereo, &stated);
-        // With a pose known to be wrong its gates say nothing: the matcher's own count then.
-        let after = if error.norm() > 0.0 {
-            Tally::of(&matches, pair)
-        } else {
-            let gates = Gates {
-                shared: SharedCovariance::exact().with_pose(&stated),
-                max_relative_sigma: f64::INFINITY,
-                ..Gates::default()
-            };
-            Tally::of_points(&cloud_of_each(&pixels, &stereo, &gates).points, &matches, pair)
+        let gates = Gates {
+            shared: SharedCovariance::exact().with_pose(&stated),
+            max_relative_sigma: f64::INFINITY,
+            ..Gates::default()
         };
-        Ok(Outcome { before: Tally::of(&candidates, pair), after, dropped, drift, seconds })
+        let points = cloud_of_each(&pixels, &stereo, &gates).points;
+        let (seconds, network_seconds) = (watch.seconds(), clock.take());
+        // With a pose known to be wrong its gates say nothing: the matcher's own count then.
+        let wrong = error.norm() > 0.0;
+        let after = if wrong { Tally::of(&matches, pair) } else { Tally::of_points(&points, &matches, pair) };
+        let before = Tally::of(candidates.as_ref().unwrap_or(&matches), pair);
+        Ok(Outcome { before, after, dropped, drift, seconds, network_seconds })
     }
-}
-
-/// With what a matcher finds, and how long it takes.
-fn timed(
-    candidates: Vec<Match>,
-    matcher: &dyn Matcher,
-    images: &ImagePair<'_>,
-) -> Result<(Vec<Match>, Matches, f64), Failure> {
-    let watch = Stopwatch::start();
-    let found = matcher.find(images).map_err(|error| Failure::check(error.to_string()))?;
-    Ok((candidates, found, watch.seconds()))
 }
 
 /// What the networks match in the images as they are.
