@@ -3,9 +3,6 @@
 use multiversion::multiversion;
 use multiversion::target::target_cfg_f;
 
-/// Rows taken from the arrays together: their columns lie side by side on the stack.
-pub(super) const BLOCK: usize = 64;
-
 /// What every processor of this kind fuses. Where it does not, `mul_add` would call a slow library function.
 pub(super) const ALWAYS_FUSED: bool = cfg!(any(target_feature = "fma", target_arch = "aarch64"));
 
@@ -32,7 +29,7 @@ pub(super) fn polynomial<const FUSED: bool, const W: usize>(coefficients: &[f64]
     sum
 }
 
-/// Appends the kernel's results for all `rows` to `out`, `W` at a time.
+/// Appends the kernel's results for all `rows` to `out`, `W` at a time: so few that reading, computing and writing overlap.
 #[inline(always)]
 pub(super) fn for_rows<const FUSED: bool, const W: usize, const IN: usize, const OUT: usize>(
     kernel: &impl Kernel<IN, OUT>,
@@ -40,48 +37,27 @@ pub(super) fn for_rows<const FUSED: bool, const W: usize, const IN: usize, const
     out: &mut Vec<[f64; OUT]>,
 ) {
     out.reserve(rows.len());
-    let (blocks, rest) = rows.as_chunks::<BLOCK>();
+    let (blocks, rest) = rows.as_chunks::<W>();
     for block in blocks {
-        out.extend_from_slice(&block_results::<FUSED, W, IN, OUT>(kernel, block));
+        out.extend_from_slice(&rows_of(&kernel.lanes::<FUSED, W>(columns_of(block))));
     }
     if !rest.is_empty() {
-        let mut padded = [[0.0; IN]; BLOCK];
-        padded[..rest.len()].copy_from_slice(rest);
-        out.extend_from_slice(&block_results::<FUSED, W, IN, OUT>(kernel, &padded)[..rest.len()]);
+        let results = rows_of(&kernel.lanes::<FUSED, W>(columns_of(&padded::<W, IN>(rest))));
+        out.extend_from_slice(&results[..rest.len()]);
     }
 }
 
+/// Fewer than `W` rows, filled up with zeros.
 #[inline(always)]
-fn block_results<const FUSED: bool, const W: usize, const IN: usize, const OUT: usize>(
-    kernel: &impl Kernel<IN, OUT>,
-    rows: &[[f64; IN]; BLOCK],
-) -> [[f64; OUT]; BLOCK] {
-    rows_of(&column_results::<FUSED, W, IN, OUT>(kernel, &columns_of(rows)))
-}
-
-/// The kernel's results for a block given by columns.
-#[inline(always)]
-pub(super) fn column_results<const FUSED: bool, const W: usize, const IN: usize, const OUT: usize>(
-    kernel: &impl Kernel<IN, OUT>,
-    columns: &[[f64; BLOCK]; IN],
-) -> [[f64; BLOCK]; OUT] {
-    let mut results = [[0.0; BLOCK]; OUT];
-    for first in (0..BLOCK).step_by(W) {
-        let mut input = [[0.0; W]; IN];
-        for (lanes, column) in input.iter_mut().zip(columns) {
-            lanes.copy_from_slice(&column[first..first + W]);
-        }
-        let output = kernel.lanes::<FUSED, W>(input);
-        for (column, lanes) in results.iter_mut().zip(&output) {
-            column[first..first + W].copy_from_slice(lanes);
-        }
-    }
-    results
+pub(super) fn padded<const W: usize, const C: usize>(rest: &[[f64; C]]) -> [[f64; C]; W] {
+    let mut padded = [[0.0; C]; W];
+    padded[..rest.len()].copy_from_slice(rest);
+    padded
 }
 
 #[inline(always)]
-pub(super) fn columns_of<const C: usize>(rows: &[[f64; C]; BLOCK]) -> [[f64; BLOCK]; C] {
-    let mut columns = [[0.0; BLOCK]; C];
+pub(super) fn columns_of<const W: usize, const C: usize>(rows: &[[f64; C]; W]) -> [[f64; W]; C] {
+    let mut columns = [[0.0; W]; C];
     for (i, row) in rows.iter().enumerate() {
         for (column, value) in columns.iter_mut().zip(row) {
             column[i] = *value;
@@ -91,8 +67,8 @@ pub(super) fn columns_of<const C: usize>(rows: &[[f64; C]; BLOCK]) -> [[f64; BLO
 }
 
 #[inline(always)]
-pub(super) fn rows_of<const C: usize>(columns: &[[f64; BLOCK]; C]) -> [[f64; C]; BLOCK] {
-    let mut rows = [[0.0; C]; BLOCK];
+pub(super) fn rows_of<const W: usize, const C: usize>(columns: &[[f64; W]; C]) -> [[f64; C]; W] {
+    let mut rows = [[0.0; C]; W];
     for (i, row) in rows.iter_mut().enumerate() {
         for (value, column) in row.iter_mut().zip(columns) {
             *value = column[i];

@@ -1,6 +1,6 @@
-//! Pairs of rays, block by block, to points and their covariances.
+//! Pairs of rays, some at a time, to points and their covariances.
 
-use super::lanes::{BLOCK, Kernel, column_results, columns_of, rows_of};
+use super::lanes::{Kernel, columns_of, padded, rows_of};
 
 /// Appends what `kernel` makes of every pair of rays: the first three of its `OUT` columns to `points`, the other `REST` to
 /// `covariances`. Both slices are of one length.
@@ -22,10 +22,8 @@ pub(super) fn for_pairs<const FUSED: bool, const W: usize, const OUT: usize, con
     }
     let count = left_rest.len();
     if count > 0 {
-        let mut padded = [[[0.0; 3]; BLOCK]; 2];
-        padded[0][..count].copy_from_slice(left_rest);
-        padded[1][..count].copy_from_slice(right_rest);
-        let (new_points, new_covariances) = block::<FUSED, W, OUT, REST>(kernel, &padded[0], &padded[1]);
+        let (left, right) = (padded(left_rest), padded(right_rest));
+        let (new_points, new_covariances) = block::<FUSED, W, OUT, REST>(kernel, &left, &right);
         points.extend_from_slice(&new_points[..count]);
         covariances.extend_from_slice(&new_covariances[..count]);
     }
@@ -34,14 +32,12 @@ pub(super) fn for_pairs<const FUSED: bool, const W: usize, const OUT: usize, con
 #[inline(always)]
 fn block<const FUSED: bool, const W: usize, const OUT: usize, const REST: usize>(
     kernel: &impl Kernel<6, OUT>,
-    left: &[[f64; 3]; BLOCK],
-    right: &[[f64; 3]; BLOCK],
-) -> ([[f64; 3]; BLOCK], [[f64; REST]; BLOCK]) {
+    left: &[[f64; 3]; W],
+    right: &[[f64; 3]; W],
+) -> ([[f64; 3]; W], [[f64; REST]; W]) {
     let ([ux, uy, uz], [vx, vy, vz]) = (columns_of(left), columns_of(right));
-    let made = column_results::<FUSED, W, 6, OUT>(kernel, &[ux, uy, uz, vx, vy, vz]);
-    let (points, covariances) = made.split_at(3);
-    (
-        rows_of(&std::array::from_fn::<_, 3, _>(|i| points[i])),
-        rows_of(&std::array::from_fn::<_, REST, _>(|i| covariances[i])),
-    )
+    let made = kernel.lanes::<FUSED, W>([ux, uy, uz, vx, vy, vz]);
+    let mut covariances = [[0.0; W]; REST];
+    covariances.copy_from_slice(&made[3..]);
+    (rows_of(&[made[0], made[1], made[2]]), rows_of(&covariances))
 }
