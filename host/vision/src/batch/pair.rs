@@ -175,12 +175,12 @@ impl BatchPair {
             rows[row][2 * LENS_PARAMETERS..][..3].copy_from_slice(&cross::<FUSED, W>(right, gradient));
             rows[row][2 * LENS_PARAMETERS + 3..].copy_from_slice(&scaled(&per_range, gradient));
         }
-        (rows, self.from_pixels::<FUSED, W>(&left_rows, &right_rows))
+        (rows, self.pixel_noise::<FUSED, W>(&left_rows, &right_rows))
     }
 
     /// Left and right gradients of the direction in the plane and of that across it, by their pixels.
     #[inline(always)]
-    fn from_pixels<const FUSED: bool, const W: usize>(
+    fn pixel_noise<const FUSED: bool, const W: usize>(
         &self,
         left: &[Gradient<W>; 2],
         right: &[Gradient<W>; 2],
