@@ -17,6 +17,7 @@ mod project;
 mod slope;
 mod triangulate;
 mod unproject;
+mod vectors;
 
 pub use lens::BatchLens;
 pub use pair::{BatchPair, BatchPoints};

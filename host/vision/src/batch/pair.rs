@@ -17,8 +17,9 @@ use nalgebra::{Matrix3, Vector3};
 use super::Instructions;
 use super::lanes::{ALWAYS_FUSED, Kernel, multiply_add};
 use super::pairs::for_pairs;
-use super::slope::{Gradient, LensSlope, cross, dot, scaled};
+use super::slope::{Gradient, LensSlope};
 use super::triangulate::Triangulate;
+use super::vectors::{Vectors, cross, dot, scaled, turned, unit};
 use crate::lens_derivatives::LENS_PARAMETERS;
 use crate::{Angle, SHARED_PARAMETERS, SharedCovariance, StereoPair};
 
@@ -94,8 +95,6 @@ fn all<const FUSED: bool>(pair: &BatchPair, rays: [&[[f64; 3]]; 2], out: &mut Ba
     for_pairs::<FUSED, LANES, 9, 6>(pair, rays, &mut out.points, &mut out.covariances);
 }
 
-/// Three numbers for each lane.
-type Vectors<const W: usize> = [[f64; W]; 3];
 /// The derivatives of one number by what is shared, for each lane.
 type Row<const W: usize> = [[f64; W]; SHARED_PARAMETERS];
 
@@ -141,11 +140,14 @@ impl BatchPair {
         let Geometry { left, right, normal, ranges: [left_range, right_range], per_sine } = at;
         let (mut by_left, mut by_right) = ([0.0; W], [0.0; W]);
         let (mut half_left, mut half_right) = ([0.0; W], [0.0; W]);
+        // A shift of the centre by δ acts as a turn of the ray by δ / μ.
+        let mut per_right_range = [0.0; W];
         for j in 0..W {
             by_left[j] = left_range[j] * per_sine[j];
             by_right[j] = -right_range[j] * per_sine[j];
             half_left[j] = 0.5 * left_range[j];
             half_right[j] = 0.5 * right_range[j];
+            per_right_range[j] = 1.0 / right_range[j];
         }
         let in_plane_left = scaled(&by_left, &cross::<FUSED, W>(normal, left));
         let in_plane_right = scaled(&by_right, &cross::<FUSED, W>(normal, right));
@@ -167,13 +169,8 @@ impl BatchPair {
         }
         for (row, found, gradient) in [(1, &right_rows[0], &in_plane_right), (2, &right_rows[1], &across_right)] {
             rows[row][LENS_PARAMETERS..][..LENS_PARAMETERS].copy_from_slice(&found.by_lens);
-            // A shift of the centre by δ acts as a turn of the ray by δ / μ.
-            let mut per_range = [0.0; W];
-            for j in 0..W {
-                per_range[j] = 1.0 / right_range[j];
-            }
             rows[row][2 * LENS_PARAMETERS..][..3].copy_from_slice(&cross::<FUSED, W>(right, gradient));
-            rows[row][2 * LENS_PARAMETERS + 3..].copy_from_slice(&scaled(&per_range, gradient));
+            rows[row][2 * LENS_PARAMETERS + 3..].copy_from_slice(&scaled(&per_right_range, gradient));
         }
         (rows, self.pixel_noise::<FUSED, W>(&left_rows, &right_rows))
     }
@@ -234,26 +231,6 @@ impl<const W: usize> Geometry<W> {
         }
         Self { left, right, normal, ranges: [left_range, right_range], per_sine }
     }
-}
-
-/// Of length one, and the length.
-#[inline(always)]
-fn unit<const FUSED: bool, const W: usize>(vector: &Vectors<W>) -> (Vectors<W>, [f64; W]) {
-    let (mut norm, mut per_norm) = (dot::<FUSED, W>(vector, vector), [0.0; W]);
-    for j in 0..W {
-        norm[j] = norm[j].sqrt();
-        per_norm[j] = 1.0 / norm[j];
-    }
-    (scaled(&per_norm, vector), norm)
-}
-
-#[inline(always)]
-fn turned<const FUSED: bool, const W: usize>(turn: &Matrix3<f64>, vector: &Vectors<W>) -> Vectors<W> {
-    let mut out = [[0.0; W]; 3];
-    for (row, out) in out.iter_mut().enumerate() {
-        *out = dot::<FUSED, W>(&[[turn[(row, 0)]; W], [turn[(row, 1)]; W], [turn[(row, 2)]; W]], vector);
-    }
-    out
 }
 
 /// The upper triangle, by rows, of the covariance of a sum of `directions` whose factors have the covariance `moved`.

@@ -2,6 +2,7 @@
 
 use super::arc_tangent::angle_from_axis;
 use super::lanes::{multiply_add, polynomial};
+use super::vectors::Vectors;
 use crate::KannalaBrandt;
 use crate::lens_derivatives::LENS_PARAMETERS;
 
@@ -23,7 +24,7 @@ impl LensSlope {
 
     /// The surroundings of unit rays in the camera's frame.
     #[inline(always)]
-    pub(super) fn at<const FUSED: bool, const W: usize>(&self, [x, y, z]: &[[f64; W]; 3]) -> Slope<W> {
+    pub(super) fn at<const FUSED: bool, const W: usize>(&self, [x, y, z]: &Vectors<W>) -> Slope<W> {
         let mut sine = [0.0; W];
         for j in 0..W {
             sine[j] = multiply_add::<FUSED>(x[j], x[j], y[j] * y[j]).sqrt();
@@ -87,7 +88,7 @@ pub(super) struct Gradient<const W: usize> {
 impl<const W: usize> Slope<W> {
     /// Of a number that changes by `gradient` · dray.
     #[inline(always)]
-    pub(super) fn along<const FUSED: bool>(&self, [gx, gy, gz]: &[[f64; W]; 3]) -> Gradient<W> {
+    pub(super) fn along<const FUSED: bool>(&self, [gx, gy, gz]: &Vectors<W>) -> Gradient<W> {
         let mut out = Gradient { by_pixel: [[0.0; W]; 2], by_lens: [[0.0; W]; LENS_PARAMETERS] };
         for j in 0..W {
             let (cosine, sine) = (self.cos_phi[j], self.sin_phi[j]);
@@ -111,35 +112,4 @@ impl<const W: usize> Slope<W> {
         }
         out
     }
-}
-
-#[inline(always)]
-pub(super) fn dot<const FUSED: bool, const W: usize>(a: &[[f64; W]; 3], b: &[[f64; W]; 3]) -> [f64; W] {
-    let mut out = [0.0; W];
-    for j in 0..W {
-        let yz = multiply_add::<FUSED>(a[1][j], b[1][j], a[2][j] * b[2][j]);
-        out[j] = multiply_add::<FUSED>(a[0][j], b[0][j], yz);
-    }
-    out
-}
-
-#[inline(always)]
-pub(super) fn cross<const FUSED: bool, const W: usize>(a: &[[f64; W]; 3], b: &[[f64; W]; 3]) -> [[f64; W]; 3] {
-    let mut out = [[0.0; W]; 3];
-    for j in 0..W {
-        let minor = |i: usize, k: usize| multiply_add::<FUSED>(a[i][j], b[k][j], -(a[k][j] * b[i][j]));
-        (out[0][j], out[1][j], out[2][j]) = (minor(1, 2), minor(2, 0), minor(0, 1));
-    }
-    out
-}
-
-#[inline(always)]
-pub(super) fn scaled<const W: usize>(factor: &[f64; W], vector: &[[f64; W]; 3]) -> [[f64; W]; 3] {
-    let mut out = *vector;
-    for component in &mut out {
-        for j in 0..W {
-            component[j] *= factor[j];
-        }
-    }
-    out
 }
