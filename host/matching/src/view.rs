@@ -202,7 +202,7 @@ impl<F: Frame> View<F> {
     }
 }
 
-/// The brightness of an 8-bit image between its pixels, at least one away from its border; `None` below or beyond it.
+/// The brightness of an 8-bit image between its pixels; `None` where the 4 × 4 pixels around are not all there.
 #[inline]
 fn sample_image(image: &GrayImage, at: Pixel) -> Option<f32> {
     let (column, row) = (at.u as u32, at.v as u32);
@@ -210,6 +210,9 @@ fn sample_image(image: &GrayImage, at: Pixel) -> Option<f32> {
     let wv = cubic_weights((at.v - f64::from(row)) as f32);
     let (pixels, width): (&[u8], _) = (image.as_raw(), image.width() as usize);
     let first = (row.checked_sub(1)? as usize) * width + column.checked_sub(1)? as usize;
+    if column as usize + 3 > width {
+        return None;
+    }
     let mut mixed = [0.0_f32; 4];
     for (j, weight) in wv.iter().enumerate() {
         let taps: &[u8; 4] = pixels.get(first + j * width..)?.first_chunk()?;

@@ -124,3 +124,24 @@ fn a_view_of_a_uniform_image_is_uniform_where_the_camera_sees() {
     }
     assert!(seen * 10 > width * height * 8, "parallel cameras share most of the view: {seen}");
 }
+
+#[test]
+fn an_image_smaller_than_its_camera_shows_nothing_beyond_its_border() {
+    const WIDTH: u32 = 250;
+    let left_from_right = Transform::new(UnitQuaternion::identity(), Vector3::new(145.0, 0.0, 0.0));
+    let frame = SharedFrame::new(&left_from_right).unwrap();
+    let grid = Grid::covering(&frame, &lens(), &lens(), 1.0).unwrap();
+    let image = GrayImage::from_pixel(WIDTH, 320, image::Luma([77]));
+    let view: View<Left> = View::new(&image, &lens(), frame.shared_from_left(), grid);
+    let (width, height) = grid.size();
+    let places = (0..width * height).map(|i| ViewPixel { x: (i % width) as f64, y: (i / width) as f64 });
+    let (mut seen, mut beyond) = (0, 0);
+    for at in places {
+        let Ok(original) = view.original(at) else { continue };
+        let shown = original.u < f64::from(WIDTH - 2);
+        seen += usize::from(view.sees(at));
+        beyond += usize::from(!shown);
+        assert!(shown || !view.sees(at), "{original:?}");
+    }
+    assert!(seen > 1000 && beyond > 1000, "{seen} {beyond}");
+}
