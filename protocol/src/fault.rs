@@ -1,4 +1,4 @@
-//! Why a controller stopped by itself. Defined once, for board and host.
+//! Fault codes: why the controller stopped by itself, and what a person can do about it.
 
 use core::fmt;
 
@@ -7,7 +7,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::Microseconds;
 
-/// What went wrong. Append only: the order is the wire format.
+/// Cause of a fault. Append only: the order is the wire format.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize, Schema)]
 #[non_exhaustive]
 pub enum FaultCode {
@@ -17,34 +17,35 @@ pub enum FaultCode {
     FollowingError,
     /// The encoder did not come to rest inside the tolerance after a move.
     NotSettled,
-    /// Homing went through its whole travel without finding the switch.
+    /// The home switch did not close within the travel of the search.
     HomeSwitchNotFound,
-    /// The home switch stayed closed after backing off.
+    /// The home switch stayed closed while the axis moved away from it.
     HomeSwitchStuck,
-    /// Homing found the switch at two different places.
+    /// The home switch closed at two places that differ by more than the repeatability setting.
     HomeNotRepeatable,
-    /// A hard limit switch closed.
+    /// A hard limit switch opened: an axis is beyond its range, or the switch's wire is broken. The switches are normally
+    /// closed.
     HardLimit,
     /// The emergency stop is pressed.
     EmergencyStop,
     /// The settings contradict themselves.
     BadSettings,
-    /// The motor was driven but the encoder hardly moved.
+    /// The motor made steps but the encoder hardly moved.
     Stall,
-    /// The encoder moved, but less far or further than the motor.
+    /// The encoder moved less far or further than the motor.
     Slip,
-    /// The encoder counts against the motor.
+    /// The encoder counts in the direction opposite to the motor.
     WrongDirection,
-    /// The encoder does not answer, or jumps further than the axis can move.
+    /// The encoder does not count, or jumps further than the axis can move.
     EncoderLost,
     /// The switch of another axis closed during homing.
     HomeSwitchWrong,
-    /// The control tick came too late to keep the trajectory.
+    /// The control tick came too late to keep to the trajectory.
     TickMissed,
 }
 
 impl FaultCode {
-    /// What a person can do about it.
+    /// What a person can do about this fault: an instruction that names the commands to run.
     #[must_use]
     pub const fn remedy(self) -> &'static str {
         match self {
@@ -58,7 +59,9 @@ impl FaultCode {
             }
             Self::HomeSwitchStuck => "free or replace the home switch, then 'vergence clear' and 'vergence home'",
             Self::HomeNotRepeatable => "tighten the home switch, then 'vergence clear' and 'vergence home'",
-            Self::HardLimit => "move the stage off the limit by hand, then 'vergence clear' and 'vergence home'",
+            Self::HardLimit => {
+                "move the stage off the limit by hand and check the switch's wire, then 'vergence clear' and 'vergence home'"
+            }
             Self::EmergencyStop => "release the emergency stop, then 'vergence clear' and 'vergence home'",
             Self::BadSettings => "restore the board's settings",
             Self::Stall => {
@@ -86,7 +89,9 @@ impl fmt::Display for FaultCode {
             Self::HomeSwitchNotFound => "homing did not find the switch",
             Self::HomeSwitchStuck => "the home switch stayed closed",
             Self::HomeNotRepeatable => "homing found the switch at two different places",
-            Self::HardLimit => "a hard limit switch closed",
+            Self::HardLimit => {
+                "a hard limit switch opened: the stage is beyond its range or the switch's wire is broken"
+            }
             Self::EmergencyStop => "the emergency stop is pressed",
             Self::BadSettings => "the board's settings contradict themselves",
             Self::Stall => "the motor was driven but the stage hardly moved",
@@ -99,19 +104,21 @@ impl fmt::Display for FaultCode {
     }
 }
 
-/// The first fault since the last clear; later ones are only counted.
+/// The first fault since the last `ClearFault`; later faults are only counted.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, Schema)]
 pub struct FaultRecord {
-    /// What went wrong.
+    /// Cause of the fault.
     pub code: FaultCode,
-    /// Counts faults since start; `ClearFault` must name it, so that a fault nobody saw cannot be cleared.
+    /// Number of the fault since the board started. `ClearFault` must name it, so that only a fault that the host has
+    /// read can be cleared.
     pub seq: u16,
-    /// When, on the board's clock.
+    /// Time of the fault, board clock.
     pub at: Microseconds,
-    /// On which axis, where it concerns one.
+    /// Axis of the fault, if it concerns one axis.
     pub axis: Option<u8>,
-    /// A number that belongs to the code: the following error or the distance searched in micro-units, the silence in microseconds.
+    /// A number whose meaning depends on the code: the following error or the distance searched in micro-units, or the
+    /// silence of the host in microseconds.
     pub detail: i32,
-    /// How many more faults came after it.
+    /// Number of faults that came after this one.
     pub later: u16,
 }

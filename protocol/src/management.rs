@@ -1,8 +1,10 @@
-//! Management: who are you, take this firmware, start again. Frozen for ever, apart from all other messages, so that a
-//! tool of any age can update a board of any age, and a boot loader needs nothing else. Travels in frames of
-//! [`crate::frame::Kind::Firmware`], with or without a session, whatever major the header names.
+//! Management messages: identify the board, update its firmware, restart it.
 //!
-//! The board is master of the offset: each answer says which byte it wants next, and the host goes on from there.
+//! They are frozen for ever, apart from all other messages, so that a tool of any age can update a board of any age and a
+//! boot loader needs no other messages. They travel in frames of [`crate::frame::Kind::Firmware`], with or without a
+//! session, whatever major version the header names.
+//!
+//! The board decides the offset: each answer names the byte it wants next, and the host continues there.
 
 use core::fmt;
 
@@ -11,34 +13,37 @@ use postcard_schema::Schema;
 use postcard_schema::key::hash::fnv1a64;
 use serde::{Deserialize, Serialize};
 
-/// The most image bytes in one chunk: a multiple of the flash's eight.
+/// Largest number of image bytes in one chunk: a multiple of the eight bytes that the flash programs at once.
 pub const CHUNK: usize = 224;
 
-/// What the host asks. The order is frozen for ever.
+/// Hardware id of the simulated board that runs on the host: "VGSS", little-endian.
+pub const NATIVE_HARDWARE: u32 = 0x5353_4756;
+
+/// A management request of the host. The order is frozen for ever.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize, Schema)]
 pub enum Management {
-    /// Who are you? Answered by [`ManagementReport::Identity`]; all else by [`ManagementReport::Progress`].
+    /// Asks for [`ManagementReport::Identity`]. All other requests are answered by [`ManagementReport::Progress`].
     Identify,
-    /// An image follows. Refused unless the board is disarmed.
+    /// Announces an image. Refused unless the board is disarmed.
     Begin(ImageHeader),
-    /// Bytes of the image.
+    /// Sends bytes of the image.
     Chunk {
-        /// Where they belong; a multiple of eight.
+        /// Offset of the bytes in the image; a multiple of eight.
         offset: u32,
         /// The bytes; the last chunk is filled up with 0xFF to a multiple of eight.
         data: Vec<u8, CHUNK>,
     },
-    /// The image is whole: check it, and start it on trial at the next reboot.
+    /// Ends the image: the board checks it and starts it on trial at the next reboot.
     Commit(Signature),
-    /// The image on trial is good: keep it.
+    /// Keeps the image on trial.
     Confirm,
-    /// Go back to the image before this one at the next reboot.
+    /// Returns to the image before this one at the next reboot.
     Rollback,
-    /// Start again.
+    /// Restarts the board.
     Reboot(RebootTo),
 }
 
-/// A hash of the names, order and types of all management messages. It must never change.
+/// Hash over names, order and types of all management messages. It must never change.
 #[must_use]
 pub const fn schema_hash() -> u64 {
     let requests = u64::from_le_bytes(fnv1a64::hash_ty_path::<Management>("management"));
@@ -46,26 +51,26 @@ pub const fn schema_hash() -> u64 {
     requests.rotate_left(1) ^ reports
 }
 
-/// What an image says of itself, and what its signature covers: these fields in this order, integers little-endian.
+/// Description of an image. The image's signature covers these fields in this order, integers little-endian.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, Schema)]
 pub struct ImageHeader {
-    /// The hardware it is made for.
+    /// Id of the hardware that the image is made for.
     pub hardware: u32,
-    /// Its version: major, minor, patch.
+    /// Version of the image: major, minor, patch.
     pub version: [u8; 3],
-    /// Its length in bytes.
+    /// Length of the image in bytes.
     pub length: u32,
-    /// Which build.
+    /// Build id of the image.
     pub build: u64,
-    /// SHA-256 of its bytes.
+    /// SHA-256 of the image's bytes.
     pub sha256: [u8; 32],
 }
 
 impl ImageHeader {
-    /// How many bytes are signed.
+    /// Number of signed bytes.
     pub const SIGNED: usize = 51;
 
-    /// The bytes that are signed.
+    /// The bytes that the signature covers.
     #[must_use]
     pub fn signed_bytes(&self) -> [u8; Self::SIGNED] {
         let mut bytes = [0; Self::SIGNED];
@@ -78,16 +83,16 @@ impl ImageHeader {
     }
 }
 
-/// An Ed25519 signature (RFC 8032): R, then S.
+/// An Ed25519 signature (RFC 8032, section 5.1.6): R, then S.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, Schema)]
 pub struct Signature {
-    /// First half.
+    /// First half: the encoded point R.
     pub r: [u8; 32],
-    /// Second half.
+    /// Second half: the scalar S.
     pub s: [u8; 32],
 }
 
-/// What to start.
+/// Program to start at a reboot.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, Schema)]
 pub enum RebootTo {
     /// The application.
@@ -96,76 +101,76 @@ pub enum RebootTo {
     Recovery,
 }
 
-/// What the board answers. The order is frozen for ever.
+/// An answer of the board to a management request. The order is frozen for ever.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize, Schema)]
 pub enum ManagementReport {
-    /// Who it is.
+    /// What the board is and runs.
     Identity(Identity),
-    /// Where an update stands.
+    /// State of an update, and the outcome of a request.
     Progress {
         /// Sequence number of the request.
         to: u8,
         /// The next byte of the image that the board wants.
         next: u32,
-        /// Whether the request was carried out.
+        /// Whether the request was carried out, or why not.
         outcome: Outcome,
     },
 }
 
-/// Who answers.
+/// Identity of a board.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, Schema)]
 pub struct Identity {
-    /// The hardware: images must name the same.
+    /// Id of the hardware: images must name the same.
     pub hardware: u32,
-    /// Version of what runs: major, minor, patch.
+    /// Version of the running program: major, minor, patch.
     pub version: [u8; 3],
-    /// Oldest version it accepts.
+    /// Oldest version that the board accepts: major, minor, patch.
     pub oldest: [u8; 3],
-    /// Which build.
+    /// Build id of the running program.
     pub build: u64,
-    /// What runs.
+    /// Kind of program that runs.
     pub boot: BootState,
-    /// The longest image it takes, in bytes.
+    /// Length of the longest image that the board accepts, in bytes.
     pub capacity: u32,
 }
 
-/// What runs, and how it came to.
+/// Which program runs, and how it was chosen.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, Schema)]
 pub enum BootState {
     /// A confirmed application.
     Confirmed,
-    /// A new application that goes back unless it is confirmed.
+    /// A new application; unless it is confirmed, the board returns to the earlier one.
     Trial,
-    /// The application before: the new one was not confirmed, or a rollback was asked for.
+    /// The earlier application: the new one was not confirmed, or a rollback was requested.
     Reverted,
-    /// The boot loader: no application starts.
+    /// The boot loader, because no application starts.
     Recovery,
 }
 
-/// What became of a management request.
+/// Outcome of a management request.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, Schema)]
 pub enum Outcome {
     /// Carried out.
     Done,
-    /// The board is armed, an image on trial must be confirmed first, or another one waits for the reboot.
+    /// The board is armed, an image on trial must be confirmed first, or another image waits for the reboot.
     Busy,
-    /// There is no update to go on with: begin first.
+    /// No update has begun: send `Begin` first.
     NotBegun,
     /// The image is for other hardware.
     WrongHardware,
-    /// The image is empty or longer than the board has room for, or a chunk does not lie in it.
+    /// The image is empty or longer than the board has room for, or a chunk lies outside the image.
     WrongLength,
     /// The image is older than the oldest version the board accepts.
     TooOld,
-    /// The bytes do not have the digest that the header names.
+    /// The image's SHA-256 differs from the header's.
     WrongDigest,
-    /// The signature is not of a key the board trusts.
+    /// The signature is not of a key that the board trusts.
     WrongSignature,
     /// The flash could not be written.
     FlashFailed,
-    /// There is no image before this one.
+    /// There is no earlier image.
     NothingToRollBack,
-    /// Bytes before these are missing: go on from the next byte wanted.
+    /// Bytes before these are missing: continue at the byte that the answer names.
     Missing,
 }
 
@@ -174,15 +179,15 @@ impl fmt::Display for Outcome {
         f.write_str(match self {
             Self::Done => "done",
             Self::Busy => "the board is armed or has an unconfirmed image: disarm, or confirm, and try again",
-            Self::NotBegun => "the board knows of no update: begin again",
+            Self::NotBegun => "the board has no update in progress: start the update again",
             Self::WrongHardware => "the image is for other hardware",
             Self::WrongLength => "the image is empty or longer than the board has room for",
             Self::TooOld => "the image is older than the oldest version the board accepts",
-            Self::WrongDigest => "the image arrived damaged: its digest is another",
+            Self::WrongDigest => "the image arrived damaged: its SHA-256 is wrong",
             Self::WrongSignature => "the image is not signed with a key the board trusts",
             Self::FlashFailed => "the board could not write its flash",
             Self::NothingToRollBack => "there is no earlier image to go back to",
-            Self::Missing => "bytes of the image are missing: go on from the next one wanted",
+            Self::Missing => "bytes of the image are missing: continue at the byte that the board asks for",
         })
     }
 }
@@ -192,7 +197,7 @@ impl fmt::Display for BootState {
         f.write_str(match self {
             Self::Confirmed => "confirmed",
             Self::Trial => "on trial",
-            Self::Reverted => "reverted to the image before",
+            Self::Reverted => "reverted to the earlier image",
             Self::Recovery => "boot loader recovery",
         })
     }

@@ -1,4 +1,4 @@
-//! Bytes to frames, whatever the bytes are.
+//! Finds frames in a stream of bytes; accepts any bytes.
 
 use cobs::{DecodeResult, DecoderState};
 use heapless::Vec;
@@ -7,12 +7,12 @@ use serde::{Deserialize, Serialize};
 
 use crate::frame::{Frame, FrameError, MAX_PACKET};
 
-/// What came in. Each stays at its largest value rather than wrap.
+/// Frames received and dropped. Each counter stays at its largest value instead of wrapping.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, Schema)]
 pub struct LinkCounters {
-    /// Frames whose CRC held.
+    /// Frames with a correct CRC.
     pub frames: u32,
-    /// Dropped: longer than a frame may be.
+    /// Dropped: longer than [`crate::MAX_FRAME`].
     pub too_long: u32,
     /// Dropped: shorter than header and CRC.
     pub too_short: u32,
@@ -22,12 +22,12 @@ pub struct LinkCounters {
     pub checksum: u32,
     /// Dropped: unknown kind of frame.
     pub kind: u32,
-    /// Dropped: the body is not a message we know, or bytes are left after it.
+    /// Dropped: the body is no known message, or bytes follow it.
     pub body: u32,
 }
 
 impl LinkCounters {
-    /// All that was dropped.
+    /// Number of all dropped frames.
     #[must_use]
     pub const fn dropped(&self) -> u32 {
         self.too_long
@@ -38,7 +38,7 @@ impl LinkCounters {
             .saturating_add(self.body)
     }
 
-    /// Counts one dropped frame.
+    /// Counts one frame as dropped because of `error`.
     pub fn count(&mut self, error: FrameError) {
         increment(match error {
             FrameError::TooLong => &mut self.too_long,
@@ -51,12 +51,29 @@ impl LinkCounters {
     }
 }
 
-/// Adds one; the largest value stays.
+/// Adds one to `counter`; the largest value stays.
 pub(crate) const fn increment(counter: &mut u32) {
     *counter = counter.saturating_add(1);
 }
 
-/// Undoes the byte stuffing as bytes arrive and checks each frame at its 0x00.
+/// Undoes the byte stuffing as bytes arrive and checks each frame at its closing 0x00.
+///
+/// ```
+/// use vergence_protocol::frame::{Header, Kind, encode};
+/// use vergence_protocol::{MAX_FRAME, PROTOCOL, Receiver, Request};
+///
+/// let header = Header { major: PROTOCOL.major, kind: Kind::Immediate, seq: 0, ack: 0 };
+/// let mut bytes = [0; MAX_FRAME];
+/// let length = encode(header, &Request::GetInfo, &mut bytes)?;
+/// let mut receiver = Receiver::new();
+/// for &byte in &bytes[..length] {
+///     if let Some(frame) = receiver.push(byte) {
+///         assert_eq!(frame.body::<Request>()?, Request::GetInfo);
+///     }
+/// }
+/// assert_eq!(receiver.counters().frames, 1);
+/// # Ok::<(), vergence_protocol::frame::FrameError>(())
+/// ```
 #[derive(Debug, Default)]
 pub struct Receiver {
     decoder: DecoderState,
@@ -66,13 +83,13 @@ pub struct Receiver {
 }
 
 impl Receiver {
-    /// A receiver that has seen nothing.
+    /// A receiver at the beginning of the stream.
     #[must_use]
     pub fn new() -> Self {
         Self::default()
     }
 
-    /// Takes the next byte; gives the frame that it ended, if it did. What is no frame is counted and skipped.
+    /// Takes the next byte and returns the frame that this byte ends. Bytes that are no frame are counted and skipped.
     pub fn push(&mut self, byte: u8) -> Option<Frame<'_>> {
         match self.decoder.feed(byte) {
             Ok(DecodeResult::NoData) => None,
@@ -104,12 +121,12 @@ impl Receiver {
         }
     }
 
-    /// Counts a frame as dropped after all: whoever read its body could not use it.
+    /// Counts a frame as dropped that [`Self::push`] returned but whose body its reader could not use.
     pub fn reject(&mut self, error: FrameError) {
         self.counters.count(error);
     }
 
-    /// What came in so far.
+    /// Frames received and dropped so far.
     #[must_use]
     pub const fn counters(&self) -> LinkCounters {
         self.counters

@@ -1,4 +1,4 @@
-//! What the flight recorder kept: the last things that happened before a fault.
+//! Events of the board's flight recorder: the last things that happened, kept when a fault is latched.
 
 use core::fmt;
 
@@ -8,26 +8,26 @@ use serde::{Deserialize, Serialize};
 
 use crate::{ControllerState, Counts, FaultCode, Microseconds, MoveId, Refusal, SessionId, StopKind};
 
-/// How many fit into one answer.
+/// Largest number of events in one answer.
 pub const EVENTS_PER_ANSWER: usize = 4;
 
-/// Some of the recorded events, oldest first.
+/// A page of recorded events, oldest first.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize, Schema)]
 pub struct RecordedEvents {
-    /// Number of the first one here; numbers count from 0 at start.
+    /// Number of the first event of this page; events are numbered from 0 when the board starts.
     pub first: u32,
-    /// How many were recorded since start; those that fell out of the ring are gone.
+    /// Number of events recorded since the board started; those that fell out of the ring are gone.
     pub total: u32,
-    /// The events.
+    /// The events of this page.
     pub events: Vec<RecordedEvent, EVENTS_PER_ANSWER>,
 }
 
-/// One event.
+/// One recorded event.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, Schema)]
 pub struct RecordedEvent {
-    /// When, on the board's clock.
+    /// Time of the event, board clock.
     pub at: Microseconds,
-    /// What.
+    /// What happened.
     pub what: Happening,
 }
 
@@ -39,7 +39,7 @@ pub enum Happening {
     Started,
     /// A host opened a session.
     Opened(SessionId),
-    /// The controller changed its state.
+    /// The controller entered this state.
     State(ControllerState),
     /// A move began.
     Move(MoveId),
@@ -47,33 +47,50 @@ pub enum Happening {
     Refused(Refusal),
     /// The host asked for a stop.
     Stop(StopKind),
-    /// A fault was seen; only the first one since a clear is latched.
+    /// A fault was raised; only the first one since the last clear is latched.
     Fault {
-        /// What went wrong.
+        /// Cause of the fault.
         code: FaultCode,
-        /// On which axis, where it concerns one.
+        /// Axis of the fault, if it concerns one axis.
         axis: Option<u8>,
-        /// As in the fault's record.
+        /// As in [`crate::FaultRecord`].
         detail: i32,
     },
-    /// A switch of an axis changed.
+    /// A switch of an axis changed for good: its contact no longer bounces.
     Switch {
-        /// Which axis.
+        /// Index of the axis, from 0.
         axis: u8,
-        /// Its home switch, or else its limit switch.
+        /// True for the home switch, false for the hard limit switch.
         home: bool,
-        /// Whether it is closed now.
-        closed: bool,
+        /// Whether the switch is operated now: home reached (its contact is closed) or a hard limit reached (its
+        /// contact is open, or its wire is broken).
+        operated: bool,
     },
-    /// Where an axis was when the event before this one happened.
+    /// Position of an axis when the previous fault was recorded.
     Encoder {
-        /// Which axis.
+        /// Index of the axis, from 0.
         axis: u8,
-        /// What its encoder read.
+        /// Encoder counts, from the axis zero if the axis is referenced.
         counts: Counts,
     },
     /// Settings were changed, saved or restored.
     Settings,
+}
+
+/// What a switch did, for people. Home switches are normally open, hard limit switches normally closed.
+///
+/// ```
+/// assert_eq!(vergence_protocol::switch_text(true, true), "home switch closed");
+/// assert_eq!(vergence_protocol::switch_text(false, true), "hard limit switch opened");
+/// ```
+#[must_use]
+pub const fn switch_text(home: bool, operated: bool) -> &'static str {
+    match (home, operated) {
+        (true, true) => "home switch closed",
+        (true, false) => "home switch opened",
+        (false, true) => "hard limit switch opened",
+        (false, false) => "hard limit switch closed again",
+    }
 }
 
 impl fmt::Display for Happening {
@@ -88,9 +105,8 @@ impl fmt::Display for Happening {
             Self::Stop(StopKind::TorqueOff) => f.write_str("asked to switch the drivers off"),
             Self::Fault { code, axis: Some(axis), detail } => write!(f, "fault on axis {axis}: {code} ({detail})"),
             Self::Fault { code, axis: None, detail } => write!(f, "fault: {code} ({detail})"),
-            Self::Switch { axis, home, closed } => {
-                let (which, how) = (if *home { "home" } else { "limit" }, if *closed { "closed" } else { "opened" });
-                write!(f, "axis {axis}: {which} switch {how}")
+            Self::Switch { axis, home, operated } => {
+                write!(f, "axis {axis}: {}", switch_text(*home, *operated))
             }
             Self::Encoder { axis, counts } => write!(f, "axis {axis}: encoder at {}", counts.0),
             Self::Settings => f.write_str("settings changed"),

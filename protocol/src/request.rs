@@ -1,141 +1,153 @@
-//! What the host asks of the board.
+//! Requests: messages from the host to the board.
 
 use postcard_schema::Schema;
 use serde::{Deserialize, Serialize};
 
 use crate::{AxisList, AxisMask, Micro, Microseconds, Mode, MoveId, Permille, ProtocolVersion, SessionId, SettingKey};
 
-/// One request. Append only: the order is the wire format. `Hello` and `GetInfo` are frozen for ever.
+/// A request of the host. Append only: the order is the wire format. `Hello` and `GetInfo` are frozen for ever.
+///
+/// Requests that name no answer are answered by [`crate::Report::Ack`].
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize, Schema)]
 pub enum Request {
-    /// Opens a session; a new session id resets sequence numbers, starts the pose stream at its set period
-    /// and switches the camera trigger off. Answered by `Report::Hello`.
+    /// Opens a session. A new session id resets the sequence numbers, starts the pose stream at the period of the setting
+    /// `stream_period_us`, and switches the camera trigger off. Answered by `Report::Hello`.
     Hello {
-        /// What the host speaks.
+        /// Protocol version of the host.
         protocol: ProtocolVersion,
         /// [`crate::schema_hash`] of the host.
         schema: u64,
-        /// The session from now on.
+        /// Id of the session to open.
         session: SessionId,
     },
-    /// Who are you? Answered by `Report::Info`.
+    /// Asks what board this is. Answered by `Report::Info`.
     GetInfo,
-    /// The host is alive: renews the lease of its session.
+    /// Renews the lease of a session: the host is alive.
     Heartbeat {
         /// The session that armed the board.
         session: SessionId,
-        /// How long the board may go without hearing from the host, in milliseconds.
+        /// Time until the lease expires unless it is renewed, in milliseconds.
         lease_ms: u16,
     },
-    /// Clock exchange. Answered by `Report::TimeReply`.
+    /// Asks for the board's time, to relate both clocks. Answered by `Report::TimeReply`.
     TimeProbe {
-        /// When the host sent it, host clock.
+        /// Time at which the host sent the probe, host clock.
         t0: Microseconds,
     },
-    /// What is this axis? Answered by `Report::Axis`.
+    /// Asks for limits and scale of an axis. Answered by `Report::Axis`.
     GetAxis {
-        /// Index from 0.
+        /// Index of the axis, from 0.
         axis: u8,
     },
-    /// Idle to Ready: drivers on. Needs a live lease of the same session.
+    /// Switches the drivers on: Idle to Ready. Needs a lease of the same session that has not expired.
     Arm {
-        /// The session that will hold the lease.
+        /// The session that arms the board.
         session: SessionId,
     },
-    /// Ready to Idle, keeping the reference; in motion it first decelerates.
+    /// Switches the drivers off: Ready to Idle, after deceleration if in motion. The reference is kept.
     Disarm,
-    /// Find the reference of these axes.
+    /// Searches the reference of some axes.
     Home {
-        /// Which axes.
+        /// The axes to home.
         axes: AxisMask,
     },
-    /// Go to an absolute position.
+    /// Moves to an absolute position.
     MoveTo(Move),
-    /// Stop. Needs no arming and no session.
+    /// Stops all motion. Needs neither arming nor a session.
     Stop {
-        /// How.
+        /// How to stop.
         kind: StopKind,
     },
-    /// LinkLost or Fault to Idle, when the cause is gone.
+    /// Clears a latched fault or lost link: to Idle, if the cause is gone.
     ClearFault {
-        /// The `seq` of the fault being cleared: what nobody has seen cannot be cleared.
+        /// `seq` of the fault to clear, so that only a fault that the host has read can be cleared.
         seen: u16,
     },
-    /// Send a Pose every `period_us`; 0 stops.
+    /// Sets the period of the pose stream.
     SetStream {
-        /// Microseconds between two poses.
+        /// Time between two poses in microseconds; 0 ends the stream.
         period_us: u32,
     },
-    /// Go by a distance from here; without reference at homing speed, and then not further than the search for the
-    /// home switch may go. For setting up by hand.
+    /// Moves by a distance, for setting up by hand. Without reference the speed is that of the search for the home switch,
+    /// and the distance is at most that of the search.
     Jog(Jog),
-    /// What is this set to? Answered by `Report::Setting`.
+    /// Asks for a setting. Answered by `Report::Setting`.
     GetSetting(SettingKey),
-    /// Set it; only while disarmed. Works at once and is forgotten at the next start unless saved.
+    /// Changes a setting; only while disarmed. The change acts at once and is lost at the next start unless saved.
     SetSetting {
-        /// What.
+        /// The setting to change.
         key: SettingKey,
-        /// To what.
+        /// Its new value.
         value: i64,
     },
-    /// Keep all settings through the next start; only while disarmed.
+    /// Saves all settings to flash; only while disarmed.
     SaveSettings,
-    /// Back to the settings the firmware came with, not yet saved; only while disarmed.
+    /// Returns to the firmware's default settings without saving them; only while disarmed.
     RestoreSettings,
-    /// Fire the cameras.
+    /// Sets the camera trigger.
     SetTrigger(Trigger),
-    /// What did the flight recorder keep? Answered by `Report::Events`.
+    /// Asks for events of the flight recorder. Answered by `Report::Events`.
     GetEvents {
         /// Number of the first event wanted.
         first: u32,
     },
-    /// How has the link been? Answered by `Report::Statistics`.
+    /// Asks for figures of the link. Answered by `Report::Statistics`.
     GetStatistics,
 }
 
-/// A relative move, all axes together.
+/// A relative move of all axes together.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize, Schema)]
 pub struct Jog {
-    /// Chosen by the host; repeated in every Pose.
+    /// Number of the move, chosen by the host; repeated in every pose.
     pub id: MoveId,
-    /// How far, for every axis.
+    /// Distance for each axis.
     pub by: AxisList<Micro>,
-    /// Share of the largest speed, as in [`Move`].
+    /// Share of each axis's largest speed, as in [`Move`].
     pub speed: Permille,
 }
 
-/// What the camera trigger does. Each pulse latches the encoders and sends a `Report::FrameMark`.
+/// Program of the camera trigger. Each pulse latches the encoders and sends a `Report::TriggerMark`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, Schema)]
 pub enum Trigger {
-    /// Nothing.
+    /// No pulses.
     Off,
     /// One pulse, now.
     Once,
-    /// A pulse every so many microseconds, the first one now.
+    /// Pulses at a fixed period, the first one now.
     Every {
-        /// Microseconds between two pulses.
+        /// Time between two pulses in microseconds.
         period_us: u32,
     },
 }
 
 /// An absolute move: all axes start and finish together.
+///
+/// ```
+/// use vergence_protocol::{AxisList, Micro, Mode, Move, MoveId, Permille, Request};
+///
+/// // Baseline to 65 mm, separation to 0.5 rad, at half speed; no mode.
+/// let targets = AxisList::from_iter([Micro(65_000), Micro(500_000)]);
+/// let request = Request::MoveTo(Move { id: MoveId(1), mode: Mode(0), targets, speed: Permille(500) });
+/// # let _ = request;
+/// ```
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize, Schema)]
 pub struct Move {
-    /// Chosen by the host; repeated in every Pose.
+    /// Number of the move, chosen by the host; repeated in every pose.
     pub id: MoveId,
-    /// The mode this pose is, or zero.
+    /// The mode that the targets stand for, or zero.
     pub mode: Mode,
-    /// Target of every axis.
+    /// Target of each axis.
     pub targets: AxisList<Micro>,
-    /// Share of each axis's largest speed; acceleration and jerk scale with its square and cube, so that the path keeps its shape.
+    /// Share of each axis's largest speed. Acceleration scales with its square and jerk with its cube, so that the path
+    /// keeps its shape.
     pub speed: Permille,
 }
 
-/// How to stop. None of these is an emergency stop: that is a wire to the drivers.
+/// How to stop. Neither is an emergency stop: that is a switch wired to the drivers.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, Schema)]
 pub enum StopKind {
-    /// Decelerate within the limits of acceleration and jerk; the reference is kept.
+    /// Decelerates within the limits of acceleration and jerk; the reference is kept.
     Decelerate,
-    /// Drivers off at once; the reference is lost if the stage was moving.
+    /// Switches the drivers off at once; the reference is lost if an axis was moving.
     TorqueOff,
 }

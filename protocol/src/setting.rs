@@ -1,9 +1,10 @@
-//! Settings of the board, read and written one number at a time.
+//! Settings of the board: names and keys. Settings are read and written one number at a time.
 
 use postcard_schema::Schema;
 use serde::{Deserialize, Serialize};
 
-/// What can be set. Append only: the order is the wire format. Lengths and rates are in micro-units of the axis.
+/// One kind of setting. Append only: the order is the wire format. Positions, distances, speeds, accelerations and jerks
+/// are in [`crate::Micro`] units of the axis.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord, Serialize, Deserialize, Schema)]
 #[non_exhaustive]
 pub enum SettingItem {
@@ -11,48 +12,49 @@ pub enum SettingItem {
     Min,
     /// Highest position a move may ask for.
     Max,
-    /// Largest speed, per second.
+    /// Largest speed, in micro-units per second.
     Speed,
-    /// Largest acceleration, per second squared.
+    /// Largest acceleration, in micro-units per second squared.
     Acceleration,
-    /// Largest jerk, per second cubed.
+    /// Largest jerk, in micro-units per second cubed.
     Jerk,
-    /// Motor steps per metre or revolution.
+    /// Motor steps per metre (linear axis) or per revolution (rotary axis).
     StepsPerUnit,
-    /// Encoder counts per metre or revolution.
+    /// Encoder counts per metre (linear axis) or per revolution (rotary axis).
     CountsPerUnit,
-    /// 1 where the motor turns the other way round.
+    /// 1 if the position rises while the motor's step count falls, else 0.
     StepsReversed,
-    /// 1 where the encoder counts the other way round.
+    /// 1 if the position rises while the encoder's count falls, else 0.
     CountsReversed,
-    /// Largest difference between command and encoder in motion.
+    /// Largest difference between commanded position and encoder before the board raises a fault.
     FollowingError,
-    /// Largest difference between target and encoder at which a move counts as reached.
+    /// Largest difference between target and encoder at which a move counts as settled.
     Tolerance,
-    /// How far the last approach comes from below, so that play is always taken up on the same side; 0 where there is none.
+    /// Length of the last approach, which always comes from below, so that play is taken up on the same side; 0 for an
+    /// axis without play.
     Backlash,
-    /// Where the home switch closes.
+    /// Position at which the home switch closes.
     HomeSwitchAt,
-    /// Speed of the search for the home switch, and of jogs without reference.
+    /// Speed of the search for the home switch, and of jogs without reference, in micro-units per second.
     HomeSeekSpeed,
-    /// Speed of the second approach.
+    /// Speed of the second, slow approach to the home switch, in micro-units per second.
     HomeApproachSpeed,
-    /// How far to back off between the two.
+    /// Distance to back off between the two approaches.
     HomeRetract,
-    /// Largest way of the search.
+    /// Largest distance that the search may travel.
     HomeTravel,
-    /// Largest difference between the two edges.
+    /// Largest difference between the positions at which the two approaches find the switch.
     HomeRepeatability,
-    /// Not of an axis: period of the pose stream from the opening of a session on, microseconds; 0 for none.
+    /// Of the board: period of the pose stream when a session opens, in microseconds; 0 for no stream.
     StreamPeriod,
-    /// Not of an axis: speed of the serial line from the next start on, baud.
+    /// Of the board: speed of the serial line from the next start on, in baud.
     Baud,
-    /// Not of an axis: what the board drives, 0 the stages of the bench, 1 the joints of the robot.
+    /// Of the board: what it drives, 0 for the stages of the bench, 1 for the joints of the robot.
     Machine,
 }
 
 impl SettingItem {
-    /// Every item, in the order of the wire.
+    /// Every item, in wire order.
     pub const ALL: [Self; 21] = [
         Self::Min,
         Self::Max,
@@ -77,13 +79,13 @@ impl SettingItem {
         Self::Machine,
     ];
 
-    /// Whether there is one for each axis.
+    /// Whether each axis has a setting of this kind; else the board has one.
     #[must_use]
     pub const fn is_of_axis(self) -> bool {
         !matches!(self, Self::StreamPeriod | Self::Baud | Self::Machine)
     }
 
-    /// Its name for people and files.
+    /// The name that people type and files hold.
     #[must_use]
     pub const fn name(self) -> &'static str {
         match self {
@@ -112,11 +114,11 @@ impl SettingItem {
     }
 }
 
-/// One setting of one board.
+/// Names one setting of a board.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord, Serialize, Deserialize, Schema)]
 pub struct SettingKey {
-    /// What.
+    /// Kind of setting.
     pub item: SettingItem,
-    /// Of which axis; 0 where the item is not of an axis.
+    /// Index of the axis, from 0; 0 for settings of the board.
     pub axis: u8,
 }

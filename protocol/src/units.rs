@@ -1,4 +1,11 @@
-//! The integers that travel, each with its unit in its type.
+//! The integers of the messages, each with its unit in its type.
+//!
+//! ```
+//! use vergence_protocol::{Micro, Permille};
+//!
+//! let (baseline, half_speed) = (Micro(65_000), Permille(500)); // 65 mm on a linear axis, at half its speed
+//! assert!(half_speed < Permille::FULL && baseline.0 == 65_000);
+//! ```
 
 use postcard_schema::Schema;
 use serde::{Deserialize, Serialize};
@@ -11,23 +18,23 @@ macro_rules! wire_integer {
     )+};
 }
 wire_integer! {
-    /// A position on an axis: micrometres on a linear axis, microradians on a rotary one.
+    /// A position or distance on an axis: micrometres on a linear axis, microradians on a rotary one.
     Micro(i32),
-    /// Encoder counts from the axis zero.
+    /// Encoder counts: from the axis zero if the axis is referenced.
     Counts(i32),
-    /// An instant or a span on the sender's clock, in microseconds.
+    /// A time or a duration on the sender's clock, in microseconds.
     Microseconds(u64),
-    /// Which host is speaking: random, never zero, new for each connection.
+    /// Names the host's session: random, never zero, new for each connection.
     SessionId(u32),
-    /// Names one move, so that its progress can be told from another's.
+    /// Number of a move, chosen by the host, so that its progress is not mistaken for another move's.
     MoveId(u16),
-    /// A vision mode by number; zero is "none". The host knows the names.
+    /// Number of a vision mode; zero is "none". The host knows the names.
     Mode(u8),
-    /// Thousandths.
+    /// A share in thousandths.
     Permille(u16),
 }
 
 impl Permille {
-    /// The whole.
+    /// The whole: 1000 thousandths.
     pub const FULL: Self = Self(1000);
 }

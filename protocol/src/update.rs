@@ -1,44 +1,46 @@
 //! The host's side of a firmware update, without input or output of its own.
 //!
-//! Chunks go out up to four ahead of the answers (go-back-N). The board is master of the offset: whatever it wants next
-//! is sent next, so that a lost chunk, a page that must be written anew, a board that restarted and a host that comes
-//! back later are all the same.
+//! Chunks go out up to four ahead of the answers (go-back-N). The board decides the offset: the host sends the byte that
+//! the board wants next. So a lost chunk, a page that must be written again, a restarted board and a host that comes back
+//! later are handled in one way.
 
 use heapless::Vec;
 
 use crate::management::{CHUNK, ImageHeader, Management, ManagementReport, Outcome, Signature};
 use crate::{HostSession, Microseconds, WINDOW};
 
-/// How far the chunks may be ahead of the answers, in bytes.
+/// Largest distance of the chunks ahead of the answers, in bytes.
 const AHEAD: u32 = (WINDOW * CHUNK) as u32;
-/// Patience at first, in microseconds: four chunks at 115 200 baud and a page to erase.
+/// First time-out of a chunk in microseconds: four chunks at 115 200 baud and the erasure of a page.
 const CHUNK_PATIENCE: u64 = 200_000;
-/// The board hashes the image and checks a signature.
+/// First time-out of `Commit` in microseconds: the board hashes the image and checks its signature.
 const COMMIT_PATIENCE: u64 = 2_000_000;
-/// Patience doubles with every silence, so many times at most.
+/// Largest number of times that a time-out doubles.
 const DOUBLINGS: u32 = 3;
-/// What fills the last chunk: erased flash.
+/// Byte that fills the last chunk: erased flash.
 const FILL: u8 = 0xFF;
-/// Chunks are whole units of flash.
+/// Bytes that the flash programs at once: the length of a chunk is a multiple of it.
 const UNIT: usize = 8;
 
-/// Where an update is.
+/// State of an update.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum UploadState {
-    /// Asking the board to take it, or to go on with it.
+    /// Asking the board to begin or resume the update.
     Beginning,
     /// Sending the image.
     Sending,
     /// The board checks the image.
     Checking,
-    /// The board will start it on trial at its next start.
+    /// Complete: the board will start the image on trial at its next start.
     Done,
-    /// The board refused.
+    /// Refused by the board.
     Failed(Outcome),
 }
 
-/// One update. Loop: [`hear`](Self::hear) what the board answers and [`transmit`](Self::transmit), at the latest at
-/// [`next_wake`](Self::next_wake), until it is done or failed. It never gives up by itself.
+/// One update of a board's firmware.
+///
+/// Loop: give the board's answers to [`hear`](Self::hear) and call [`transmit`](Self::transmit), at the latest at
+/// [`next_wake`](Self::next_wake), until the state is `Done` or `Failed`. An update never gives up by itself.
 #[derive(Debug)]
 pub struct Upload<'a> {
     image: &'a [u8],
@@ -49,18 +51,19 @@ pub struct Upload<'a> {
     next: u32,
     /// The next byte to send.
     sent: u32,
-    /// The request of `Begin` or `Commit` that is not answered.
+    /// Number of the `Begin` or `Commit` that awaits its answer.
     asked: Option<u8>,
-    /// The latest request sent.
+    /// Number of the latest request.
     latest: u8,
-    /// Answers to requests before this one are old news.
+    /// Number of the first request whose answer tells the present state: earlier ones are out of date.
     fresh_from: u8,
+    /// Number of time-outs in a row.
     silences: u32,
     waiting_since: Microseconds,
 }
 
 impl<'a> Upload<'a> {
-    /// An update that has not begun; `None` where the header is not of this image.
+    /// An update that has not begun; `None` if the header's length is not that of `image`.
     #[must_use]
     pub fn new(image: &'a [u8], header: ImageHeader, signature: Signature) -> Option<Self> {
         (usize::try_from(header.length) == Ok(image.len())).then_some(Self {
@@ -78,19 +81,19 @@ impl<'a> Upload<'a> {
         })
     }
 
-    /// Where it is.
+    /// State of the update.
     #[must_use]
     pub const fn state(&self) -> UploadState {
         self.state
     }
 
-    /// How many bytes the board has, and of how many.
+    /// Number of bytes that the board has, and length of the image in bytes.
     #[must_use]
     pub const fn progress(&self) -> (u32, u32) {
         (self.next, self.header.length)
     }
 
-    /// Asks the board anew where it is: for a new `HostSession`. Nothing on one that is done or failed.
+    /// Asks the board again how far the update is: for a new `HostSession`. Ignored if the update is done or has failed.
     pub fn resume(&mut self) {
         if matches!(self.state, UploadState::Beginning | UploadState::Sending | UploadState::Checking) {
             self.enter(UploadState::Beginning);
@@ -98,7 +101,7 @@ impl<'a> Upload<'a> {
         }
     }
 
-    /// Hands `host` what is to be sent now.
+    /// Gives `host` the requests to send at `now`.
     pub fn transmit(&mut self, now: Microseconds, host: &mut HostSession) {
         if self.is_waiting() && now >= self.deadline() {
             self.silences = (self.silences + 1).min(DOUBLINGS);
@@ -114,7 +117,7 @@ impl<'a> Upload<'a> {
         }
     }
 
-    /// When [`Self::transmit`] next has something to send if nothing is heard before; zero is at once.
+    /// Time at which [`Self::transmit`] next has a request if no answer comes before; zero means at once.
     #[must_use]
     pub fn next_wake(&self) -> Option<Microseconds> {
         match self.state {
@@ -124,7 +127,7 @@ impl<'a> Upload<'a> {
         }
     }
 
-    /// Takes an answer of the board.
+    /// Takes an answer of the board, which arrived at `now`.
     pub fn hear(&mut self, now: Microseconds, report: &ManagementReport) {
         let ManagementReport::Progress { to, next, outcome } = *report else { return };
         match self.state {
@@ -147,7 +150,8 @@ impl<'a> Upload<'a> {
         let is_fresh = to.wrapping_sub(self.fresh_from) < 1 << 7;
         match outcome {
             Outcome::Done if next >= self.next => self.go_on(now, next),
-            // A chunk got lost, or a page begins anew. What else is under way will be answered the same: once is enough.
+            // A chunk was lost, or the board repeats a page. All chunks under way bring the same answer: only the first
+            // one acts.
             Outcome::Done | Outcome::Missing if is_fresh => {
                 self.fresh_from = self.latest.wrapping_add(1);
                 self.sent = next;
@@ -159,7 +163,7 @@ impl<'a> Upload<'a> {
         }
     }
 
-    /// The board wants `next`.
+    /// Continues at `next`, the byte that the board wants.
     fn go_on(&mut self, now: Microseconds, next: u32) {
         self.next = next.min(self.header.length);
         self.sent = self.sent.clamp(self.next, self.header.length);
@@ -202,7 +206,7 @@ impl<'a> Upload<'a> {
         }
     }
 
-    /// The chunk that is sent next, filled up to whole units.
+    /// The next chunk to send, filled up to whole units of flash.
     fn chunk(&self) -> Option<Management> {
         let rest = self.image.get(usize::try_from(self.sent).ok()?..)?;
         let mut data: Vec<u8, CHUNK> = rest.iter().take(CHUNK).copied().collect();

@@ -1,8 +1,8 @@
-//! The boot loader: finishes a swap of images or undoes one on trial, judges the image, and starts it. What fails three
+//! The boot loader: finishes or undoes a swap of images, checks the image, and starts it. An application that failed three
 //! times in a row is not started again: a serial recovery waits for another image.
 //!
 //! ```text
-//! power cut at any point --> the swap goes on where it was (embassy-boot)
+//! power cut at any point --> the swap is resumed (embassy-boot)
 //! image on trial, not confirmed --> swapped back
 //! seal broken, other hardware, wrong digest, wrong signature --> swapped back if on trial, else recovery
 //! three starts that ended in a watchdog bite, a panic or a fault --> recovery
@@ -13,7 +13,6 @@
 
 mod recovery;
 mod reset;
-mod start;
 
 use cortex_m_rt::entry;
 use embassy_boot_stm32::State;
@@ -25,20 +24,21 @@ use vergence_nucleo_common::{FedFlash, Services, SwapState, feed_watchdog, memor
 
 use crate::recovery::Line;
 
-/// How long an application may take until it sets the watchdog itself, and anything here between two feedings.
+/// Time-out of the watchdog in microseconds: for an application until it sets the watchdog itself, and for this program
+/// between two feedings.
 const PATIENCE_US: u32 = 2_000_000;
-/// After so many failed starts nothing is started.
+/// Number of failed starts in a row after which the application is not started.
 const ATTEMPTS: u32 = 3;
 
 #[entry]
 fn main() -> ! {
-    // So that a board with a dead crystal can still be reached.
+    // The oscillator inside the chip, so that a board with a dead crystal can still be reached.
     let p = clocks::start(Source::Inside);
     IndependentWatchdog::new(p.IWDG, PATIENCE_US).unleash();
 
     let before = memory::survivor();
-    // A person's button is no failure; a bite of the watchdog and a reset by the program itself are.
-    let failed_starts = if reset::fell_by_itself() { before.failed_starts } else { 0 };
+    // A press of the reset button is no failure; resets by the watchdog and by a program are.
+    let failed_starts = if reset::was_failure() { before.failed_starts } else { 0 };
     let starts = before.starts.wrapping_add(1);
     let mut survivor = Survivor { failed_starts, starts, ..before };
 
@@ -47,14 +47,14 @@ fn main() -> ! {
     feed_watchdog();
     let sound = Seal::check(memory::region(ACTIVE), &DEVELOPMENT_KEY).is_ok();
     if !sound && state == State::Swap {
-        // The swap was just made or just undone. In the first case the next start undoes it.
+        // A swap was just made or undone. If it was made, the next start undoes it.
         memory::remember(&survivor);
         cortex_m::peripheral::SCB::sys_reset();
     }
     if sound && !survivor.recovery_wanted && failed_starts < ATTEMPTS {
         survivor.failed_starts += 1;
         memory::remember(&survivor);
-        start::application();
+        reset::start_application();
     }
     memory::remember(&Survivor { failed_starts: 0, recovery_wanted: false, ..survivor });
     let line = Line { port: p.LPUART1, tx: p.PA2, rx: p.PA3, tx_dma: p.DMA1_CH2, rx_dma: p.DMA1_CH1 };

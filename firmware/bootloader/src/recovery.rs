@@ -1,5 +1,5 @@
-//! Serial recovery: waits on the same line, with the same frames, for another image. It knows management messages only,
-//! which are frozen for ever, so that a host of any age can help.
+//! Serial recovery: waits for another image on the same line, with the same frames. It knows only management messages,
+//! which are frozen for ever, so that a host of any age can send one.
 
 use embassy_stm32::usart::{self, RingBufferedUartRx, Uart, UartTx};
 use embassy_stm32::{Peri, bind_interrupts, dma, mode, peripherals};
@@ -13,9 +13,9 @@ use vergence_protocol::frame::{self, Frame, Header, Kind};
 use vergence_protocol::management::{Identity, Management, ManagementReport, Outcome, RebootTo};
 use vergence_protocol::{MAX_FRAME, PROTOCOL, Receiver};
 
-/// The usual speed: a setting of another is not looked at here.
+/// Speed of the line in baud: always the default, because settings are not read here.
 const BAUD: u32 = 921_600;
-/// What the line hears while a page is erased must fit.
+/// Bytes of the receive ring: holds what arrives while a page is erased.
 const RING: usize = 4096;
 
 bind_interrupts!(struct Interrupts {
@@ -24,28 +24,28 @@ bind_interrupts!(struct Interrupts {
     DMA1_CHANNEL2 => dma::InterruptHandler<peripherals::DMA1_CH2>;
 });
 
-/// The virtual COM port.
+/// The serial line through the ST-LINK's virtual COM port.
 pub struct Line {
-    /// The port.
+    /// The serial port.
     pub port: Peri<'static, peripherals::LPUART1>,
-    /// Its output.
+    /// Output pin.
     pub tx: Peri<'static, peripherals::PA2>,
-    /// Its input.
+    /// Input pin.
     pub rx: Peri<'static, peripherals::PA3>,
-    /// For the output.
+    /// DMA channel of the output.
     pub tx_dma: Peri<'static, peripherals::DMA1_CH2>,
-    /// For the input.
+    /// DMA channel of the input.
     pub rx_dma: Peri<'static, peripherals::DMA1_CH1>,
 }
 
-/// Serves until the host asks for another start.
+/// Serves management requests until the host asks for a restart.
 pub fn serve(line: Line, services: Services) -> ! {
     let Some((mut rx, tx)) = open(line) else { reboot(RebootTo::Application) };
     let mut recovery = Recovery { tx, services, updater: Updater::default(), seq: 0 };
     let mut receiver = Receiver::new();
     loop {
         feed_watchdog();
-        // A line error loses bytes; the frame's zeros and checksum say where it goes on.
+        // A line error loses bytes; the receiver finds the next frame by its zero and checks it by its checksum.
         if let Ok(byte) = Read::<u8>::read(&mut rx)
             && let Some(frame) = receiver.push(byte)
         {
@@ -94,7 +94,7 @@ impl Recovery {
             Management::Begin(header) => self.updater.begin(header, services),
             Management::Chunk { offset, data } => self.updater.chunk(*offset, data, services),
             Management::Commit(signature) => self.updater.commit(signature, services),
-            // What waits for a reboot is confirmed when it runs.
+            // An image can be confirmed only while it runs.
             Management::Confirm => Outcome::NotBegun,
             Management::Rollback => match services.roll_back() {
                 Ok(true) => Outcome::Done,
@@ -111,7 +111,7 @@ impl Recovery {
         self.seq = self.seq.wrapping_add(1);
         let mut buffer = [0; MAX_FRAME];
         if let Ok(length) = frame::encode(header, report, &mut buffer) {
-            // A zero before the frame ends whatever noise came before it.
+            // A zero before the frame ends any noise on the line.
             let _ = self.tx.blocking_write(&[0]).and_then(|()| self.tx.blocking_write(&buffer[..length]));
             let _ = self.tx.blocking_flush();
         }

@@ -1,4 +1,4 @@
-//! Control ticks to be counted by an instrument that counts instructions; `docs/measured.md` names the command.
+//! Control ticks to be counted by an instrument that counts instructions; `docs/measured/control-tick.md` names the command.
 //!
 //! Arguments: number of axes, largest step rate of each in steps a second (0 to stay at rest).
 

@@ -5,6 +5,7 @@ use vergence_protocol::{Counts, Micro, Microseconds};
 use crate::TICK_US;
 use crate::follow::{Following, Lost};
 use crate::io::{RigIo, StepSchedule};
+use crate::plan::{AxisPlanner, PlanStart};
 use crate::profile::Limits;
 use crate::settings::AxisSettings;
 use crate::steps::{Instants, StepCounter};
@@ -14,15 +15,15 @@ use crate::trajectory::{FINE_BITS, Fine, MotionState, Trajectory};
 pub struct Axis {
     pub settings: AxisSettings,
     index: usize,
-    /// Where the axis was told to be: now, at the end of the running tick, and at the end of the next one. Its steps are
-    /// ordered one tick ahead, and a new trajectory begins where the last order ends: the command never jumps.
+    /// Commanded positions: now, at the end of the running tick, and at the end of the next one. Steps are ordered one tick
+    /// ahead, and a new trajectory begins where the last order ends, so that the command never jumps.
     command: [Fine; 3],
     motor: StepCounter,
     following: Following,
     trajectory: Option<Trajectory>,
-    /// How much of the trajectory has been ordered, in microseconds.
+    /// Part of the trajectory that has been ordered, in microseconds.
     elapsed: u64,
-    /// Whether the axis rests at its command with its play taken up from below.
+    /// Whether the axis rests at its command with the play taken up from below.
     from_below: bool,
     /// Raw counts at the axis zero.
     zero_counts: i32,
@@ -53,7 +54,7 @@ impl Axis {
         self.referenced = false;
     }
 
-    /// The encoder's count, rising along the axis.
+    /// The encoder's raw count, with the sign that rises along the axis.
     fn raw_counts(&self, io: &impl RigIo) -> i32 {
         self.rising(io.encoder(self.index))
     }
@@ -66,7 +67,7 @@ impl Axis {
         self.counts_from(io.encoder(self.index))
     }
 
-    /// What the encoder's raw count means from the axis zero.
+    /// Converts a raw encoder count to counts from the axis zero.
     pub fn counts_from(&self, raw: i32) -> Counts {
         Counts(self.rising(raw).wrapping_sub(self.zero_counts))
     }
@@ -75,12 +76,12 @@ impl Axis {
         self.settings.encoder().position_at(self.counts(io).0)
     }
 
-    /// Where the axis was last told to be, at the end of the last tick that was ordered.
+    /// Commanded position at the end of the last tick whose steps are ordered.
     pub fn command(&self) -> Fine {
         self.command[2]
     }
 
-    /// Declares that the encoder count `edge` is at `position`.
+    /// Sets the axis zero so that the encoder count `edge` is at `position`.
     pub fn reference(&mut self, io: &impl RigIo, edge: Counts, position: Micro) {
         let raw_edge = edge.0.wrapping_add(self.zero_counts);
         self.zero_counts = raw_edge.wrapping_sub(self.settings.encoder().counts_at(position));
@@ -88,8 +89,8 @@ impl Axis {
         self.adopt_encoder(io);
     }
 
-    /// Takes the encoder's word for where the axis is: after power-on, after the drivers were off, after homing.
-    /// Without reference that is zero: raw counts may be anywhere, beyond what a position can say.
+    /// Sets the command to the encoder's position: after power-on, after the drivers were off, after homing. Without
+    /// reference that is zero, because raw counts may be beyond the range of a position.
     pub fn adopt_encoder(&mut self, io: &impl RigIo) {
         if !self.referenced {
             self.zero_counts = self.raw_counts(io);
@@ -102,7 +103,7 @@ impl Axis {
         self.following = Following::default();
     }
 
-    /// The state at which a new trajectory begins.
+    /// State at which a new trajectory begins.
     fn state(&self) -> MotionState {
         match &self.trajectory {
             Some(trajectory) => trajectory.state(Microseconds(self.elapsed)),
@@ -110,7 +111,7 @@ impl Axis {
         }
     }
 
-    /// Starts a trajectory from the present state.
+    /// Starts a trajectory that begins at the present state.
     pub fn run(&mut self, trajectory: Trajectory) {
         self.from_below = false;
         self.elapsed = 0;
@@ -128,26 +129,15 @@ impl Axis {
         self.run(Trajectory::reach(self.state(), fine_from(target), limits, 0.0));
     }
 
-    /// The quickest motion to `target` that takes `at_least` so many seconds, at `share` of full speed. From rest
-    /// acceleration and jerk are scaled with it; in mid-move they must serve to brake.
+    /// Plans the quickest motion to `target` that takes at least `at_least` seconds, at `share` of full speed.
     pub fn plan(&self, target: Micro, share: f32, at_least: f32) -> Trajectory {
-        let (from, full) = (self.state(), self.speed_limits());
-        let limits = if from.is_rest() { full.scaled(share) } else { Limits { speed: full.speed * share, ..full } };
-        let target = fine_from(target);
-        let run_up = fine_from(self.settings.backlash);
-        if run_up == 0 || !self.referenced || self.takes_up_play(from, target, run_up) {
-            return Trajectory::reach(from, target, limits, at_least);
-        }
-        Trajectory::reach_from_below(from, (target, run_up), [limits, full.scaled(share)], at_least)
+        // Without reference the low end of the range may be out of reach, so play is not taken up.
+        let backlash = if self.referenced { self.settings.backlash } else { Micro(0) };
+        let planner = AxisPlanner { limits: self.speed_limits(), backlash };
+        planner.plan(PlanStart { motion: self.state(), from_below: self.from_below }, target, share, at_least)
     }
 
-    /// Whether a straight motion ends with the play taken up from below.
-    fn takes_up_play(&self, from: MotionState, target: Fine, run_up: Fine) -> bool {
-        let already_there = from.is_rest() && from.position == target && self.from_below;
-        already_there || Trajectory::stop(from, self.settings.limits()).target() <= target - run_up
-    }
-
-    /// Starts a planned motion that rests at its target until the others have finished too.
+    /// Starts a planned motion that rests at its target until `together` seconds have passed.
     pub fn run_planned(&mut self, mut trajectory: Trajectory, together: f32) {
         let from_below = self.referenced;
         if trajectory.duration() > 0.0 {
@@ -158,18 +148,18 @@ impl Axis {
     }
 
     fn speed_limits(&self) -> Limits {
-        // Without reference nobody knows what is in the way.
+        // Without reference the way may be blocked.
         if self.referenced { self.settings.limits() } else { self.settings.limits_at(self.settings.homing.seek_speed) }
     }
 
-    /// Begins the quickest stop; at rest it does nothing.
+    /// Starts the quickest stop; at rest it does nothing.
     pub fn stop(&mut self) {
         if self.trajectory.is_some() {
             self.run(Trajectory::stop(self.state(), self.settings.limits()));
         }
     }
 
-    /// Drops the trajectory where it is: for drivers that have been switched off.
+    /// Drops the trajectory at the present command, after the drivers were switched off.
     pub fn abandon(&mut self) {
         self.trajectory = None;
         self.command = [self.command[0]; 3];
@@ -203,13 +193,13 @@ impl Axis {
         }
     }
 
-    /// Compares encoder and command; once each tick.
+    /// Compares encoder and command; call it once each tick. Returns the fault, if any.
     pub fn watch(&mut self, io: &impl RigIo) -> Option<Lost> {
         let (counts, position) = (self.counts(io), self.position(io));
         self.following.watch(&self.settings, micro_from(self.command[0]), position, counts)
     }
 
-    /// Where the axis was last told to be, in whole micro-units.
+    /// Commanded position, rounded to micro-units.
     pub fn commanded(&self) -> Micro {
         micro_from(self.command())
     }
@@ -228,7 +218,7 @@ fn fine_from(position: Micro) -> Fine {
     Fine::from(position.0) << FINE_BITS
 }
 
-/// The nearest; saturates.
+/// The nearest micro-unit; saturates.
 fn micro_from(position: Fine) -> Micro {
     let rounded = (position + (1 << (FINE_BITS - 1))) >> FINE_BITS;
     Micro(i32::try_from(rounded).unwrap_or(if rounded < 0 { i32::MIN } else { i32::MAX }))

@@ -1,21 +1,21 @@
-//! All that can be set on a board, one number at a time.
+//! The settings of a board: all axes, pose stream, serial line and machine, each readable as one number.
 
 use vergence_protocol::{AxisList, Micro, SettingItem, SettingKey};
 
 use crate::settings::{AxisSettings, SettingsError};
 
-/// Shorter periods of the pose stream would be longer on the wire than in time (45 bytes at 921 600 baud).
+/// Shortest period of the pose stream in microseconds: a pose of 45 bytes at 921 600 baud takes half of it.
 pub const SHORTEST_STREAM_US: u32 = 1_000;
-/// A stream slower than this is none.
+/// Longest period of the pose stream in microseconds.
 const LONGEST_STREAM_US: u32 = 10_000_000;
-/// Poses at half the rate of the control tick leave room for answers and logs at 921 600 baud.
+/// Default period of the pose stream in microseconds: leaves room for answers and log at 921 600 baud.
 const STREAM_US: u32 = 2_000;
-/// What serial ports and bridges do.
+/// Speeds that serial ports and USB bridges can have.
 const BAUD: core::ops::RangeInclusive<u32> = 9_600..=12_000_000;
-/// The fastest that the bridges of most boards take.
+/// Default speed of the serial line: the fastest that the USB bridges of most boards take.
 const USUAL_BAUD: u32 = 921_600;
 
-/// What a board drives.
+/// The machine that a board drives.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Machine {
     /// The stages of the bench.
@@ -25,36 +25,36 @@ pub enum Machine {
     Robot,
 }
 
-/// What the board is set to.
+/// All settings of a board.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct BoardSettings {
-    /// Every axis.
+    /// Settings of each axis.
     pub axes: AxisList<AxisSettings>,
-    /// Period of the pose stream from the opening of a session on, in microseconds; 0 for none.
+    /// Period of the pose stream when a session opens, in microseconds; 0 for no stream.
     pub stream_period_us: u32,
-    /// Speed of the serial line from the next start on.
+    /// Speed of the serial line from the next start on, in baud.
     pub baud: u32,
-    /// What the board drives.
+    /// The machine that the board drives.
     pub machine: Machine,
 }
 
-/// Why a setting was not taken.
+/// Why a setting was not changed.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 #[non_exhaustive]
 pub enum SettingError {
-    /// There is no such setting on this board.
+    /// The board has no such setting.
     #[error("there is no such setting")]
     Unknown,
-    /// The setting cannot have this value, or not beside the others.
+    /// The setting cannot have this value, at all or beside the other settings.
     #[error("the setting cannot have this value")]
     Value,
 }
 
 impl BoardSettings {
-    /// These axes, the usual stream and line speed.
+    /// Settings with these axes and the default stream, line speed and machine.
     ///
     /// # Errors
-    /// [`SettingsError`] where an axis cannot work with its settings.
+    /// [`SettingsError`] if an axis cannot work with its settings.
     pub fn new(axes: &[AxisSettings]) -> Result<Self, SettingsError> {
         let axes = axes.iter().copied().collect::<heapless::Vec<_, { vergence_protocol::MAX_AXES }>>();
         let settings = Self { axes, stream_period_us: STREAM_US, baud: USUAL_BAUD, machine: Machine::Bench };
@@ -62,10 +62,10 @@ impl BoardSettings {
         Ok(settings)
     }
 
-    /// Checks the whole.
+    /// Checks all settings.
     ///
     /// # Errors
-    /// Says what cannot be.
+    /// [`SettingsError`] names the first setting that cannot work.
     pub fn validate(&self) -> Result<(), SettingsError> {
         if self.axes.is_empty() {
             return Err(SettingsError::AxisCount);
@@ -78,7 +78,7 @@ impl BoardSettings {
         if stream && BAUD.contains(&self.baud) { Ok(()) } else { Err(SettingsError::Link) }
     }
 
-    /// What can be set on this board.
+    /// The keys of all settings of this board.
     pub fn keys(&self) -> impl Iterator<Item = SettingKey> + use<> {
         let axes = self.axes.len();
         SettingItem::ALL.into_iter().flat_map(move |item| {
@@ -87,7 +87,7 @@ impl BoardSettings {
         })
     }
 
-    /// The value of a setting; `None` where there is no such setting.
+    /// Value of a setting; `None` if the board has no such setting.
     #[must_use]
     pub fn get(&self, key: SettingKey) -> Option<i64> {
         match key {
@@ -98,10 +98,10 @@ impl BoardSettings {
         }
     }
 
-    /// These settings with one changed.
+    /// A copy of these settings with one changed.
     ///
     /// # Errors
-    /// [`SettingError`]; the whole would make no sense.
+    /// [`SettingError`] if there is no such setting or the changed settings could not work.
     pub fn with(&self, key: SettingKey, value: i64) -> Result<Self, SettingError> {
         let mut changed = self.clone();
         changed.put(key, value)?;
@@ -109,7 +109,7 @@ impl BoardSettings {
         Ok(changed)
     }
 
-    /// Changes one setting without looking at the others.
+    /// Changes one setting without checking the others.
     pub(crate) fn put(&mut self, key: SettingKey, value: i64) -> Result<(), SettingError> {
         self.get(key).ok_or(SettingError::Unknown)?;
         match key.item {
@@ -126,7 +126,7 @@ impl BoardSettings {
 }
 
 impl AxisSettings {
-    /// One number of an axis; `None` for what is not of an axis.
+    /// Value of an axis setting; `None` for settings of the board.
     fn item(&self, item: SettingItem) -> Option<i64> {
         let homing = &self.homing;
         Some(match item {
@@ -178,7 +178,7 @@ impl AxisSettings {
         Ok(())
     }
 
-    /// Whether a reference found with `self` still says where the axis is under `other`.
+    /// Whether a reference found with the settings `self` is still valid with `other`.
     pub(crate) fn keeps_reference(&self, other: &Self) -> bool {
         let reference = |axis: &Self| (axis.kind, axis.counts_per_unit, axis.counts_reversed, axis.homing.switch_at);
         reference(self) == reference(other)

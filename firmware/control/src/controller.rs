@@ -1,4 +1,4 @@
-//! The state machine: what may move, when, and what stops it.
+//! The controller's state machine: what may move, when, and what stops motion.
 //!
 //! ```text
 //! Boot --> SelfTest --> Idle (or Trial)                 Idle --begin_update--> Updating --end_update--> Idle
@@ -28,14 +28,14 @@ use crate::self_test::SelfTest;
 use crate::settings::{AxisSettings, SettingsError};
 use crate::trajectory::Fine;
 
-/// What the host should hear of at once.
+/// An event that the host should learn of at once.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Event {
-    /// A move changed its phase.
+    /// A move entered a phase.
     MoveState {
-        /// Which move.
+        /// Number of the move.
         id: MoveId,
-        /// Where it is.
+        /// The phase entered.
         phase: MovePhase,
     },
     /// A fault was latched.
@@ -49,28 +49,29 @@ struct ActiveMove {
     mode: Mode,
     targets: AxisList<Micro>,
     phase: MovePhase,
-    /// Since when all encoders are inside the tolerance.
+    /// Time since which all encoders have been inside the tolerance.
     inside_since: Option<Microseconds>,
+    /// Time by which the encoders must be inside the tolerance.
     settle_by: Microseconds,
 }
 
-/// The controller of N axes.
+/// The controller of up to [`vergence_protocol::MAX_AXES`] axes. Time and the board behind [`RigIo`] are arguments.
 #[derive(Debug)]
 pub struct Controller {
     axes: AxisList<Axis>,
     state: ControllerState,
     drivers_on: bool,
     lease: Lease,
-    /// Who armed the board.
+    /// The session that armed the board.
     holder: Option<SessionId>,
     latch: FaultLatch,
     homing: HomingSequence,
     self_test: SelfTest,
     /// Whether the firmware is on trial.
     on_trial: bool,
-    /// Where an update that is given up leads back to.
+    /// State to return to when an update is given up.
     before_update: ControllerState,
-    /// When the next control tick is due.
+    /// Time of the next control tick.
     next_tick: Microseconds,
     active: ActiveMove,
     disarm_at_rest: bool,
@@ -78,10 +79,10 @@ pub struct Controller {
 }
 
 impl Controller {
-    /// A controller that has just started, without reference.
+    /// A controller that has just started; no axis has a reference.
     ///
     /// # Errors
-    /// [`SettingsError`] where an axis cannot work with its settings.
+    /// [`SettingsError`] if an axis cannot work with its settings, or the number of axes is zero or too large.
     pub fn new(settings: &[AxisSettings]) -> Result<Self, SettingsError> {
         let mut axes = AxisList::new();
         for (index, &axis) in settings.iter().enumerate() {
@@ -117,29 +118,28 @@ impl Controller {
         })
     }
 
-    /// How many axes there are.
+    /// Number of axes.
     #[must_use]
     pub fn axis_count(&self) -> usize {
         self.axes.len()
     }
 
-    /// What the host is told of an axis.
+    /// Limits and scale of an axis; `None` if there is no such axis.
     #[must_use]
     pub fn axis_info(&self, axis: usize) -> Option<AxisInfo> {
         self.axes.get(axis).map(|axis| axis.settings.info())
     }
 
-    /// Where an axis was last told to be: at the end of the tick after the running one, as far as is ordered.
+    /// Commanded position of an axis at the end of the last tick whose steps are ordered; `None` if there is no such axis.
     #[must_use]
     pub fn command(&self, axis: usize) -> Option<Fine> {
         self.axes.get(axis).map(Axis::command)
     }
 
-    /// Replaces the settings of all axes. An axis whose zero would be elsewhere loses its reference. To be called only
-    /// while disarmed.
+    /// Replaces the settings of all axes. An axis whose zero would move loses its reference. Call it only while disarmed.
     ///
     /// # Errors
-    /// [`SettingsError`]; nothing was changed.
+    /// [`SettingsError`] if an axis cannot work with its settings; nothing was changed.
     pub fn replace_settings(&mut self, settings: &[AxisSettings]) -> Result<(), SettingsError> {
         if settings.len() != self.axes.len() {
             return Err(SettingsError::AxisCount);
@@ -154,25 +154,25 @@ impl Controller {
         Ok(())
     }
 
-    /// Raw encoder counts of all axes as in a Pose.
+    /// Converts raw encoder counts of all axes to counts as in a pose.
     #[must_use]
     pub fn counts_from(&self, raw: &[i32]) -> AxisList<Counts> {
         self.axes.iter().zip(raw).map(|(axis, &raw)| axis.counts_from(raw)).collect()
     }
 
-    /// What the controller is doing.
+    /// State of the controller.
     #[must_use]
     pub fn state(&self) -> ControllerState {
         self.state
     }
 
-    /// Whether the motors are held or driven.
+    /// Whether the motor drivers are on.
     #[must_use]
     pub fn drivers_on(&self) -> bool {
         self.drivers_on
     }
 
-    /// Whether a tick would find nothing to do until somebody asks for something.
+    /// Whether ticks have nothing to do until a request comes.
     #[must_use]
     pub fn is_at_rest(&self) -> bool {
         !self.drivers_on && !matches!(self.state, ControllerState::Boot | ControllerState::SelfTest)
@@ -184,12 +184,12 @@ impl Controller {
         self.latch.record().is_some()
     }
 
-    /// The oldest event not yet taken.
+    /// Takes the oldest event.
     pub fn take_event(&mut self) -> Option<Event> {
         self.events.pop_front()
     }
 
-    /// Telemetry at `now`.
+    /// The pose at `now`, with number `seq`.
     #[must_use]
     pub fn pose(&self, now: Microseconds, seq: u16, io: &impl RigIo) -> PoseReport {
         let mut referenced = AxisMask::default();
@@ -209,7 +209,7 @@ impl Controller {
         }
     }
 
-    /// The mode of the latest move, claimed only while the encoders confirm it.
+    /// The mode of the latest move while all encoders are inside the tolerance, else none.
     fn mode_reached(&self, io: &impl RigIo) -> Mode {
         let referenced = self.axes.iter().all(Axis::is_referenced);
         let there = referenced && self.active.phase == MovePhase::Settled && self.inside_tolerance(io);
@@ -228,7 +228,8 @@ impl Controller {
         matches!(self.state, ControllerState::LinkLost | ControllerState::Fault)
     }
 
-    /// Takes a heartbeat of `session`. Once latched nobody holds the board: who clears the fault can arm at once.
+    /// Takes a heartbeat of `session`. While a fault is latched no session holds the board, so that the session that
+    /// clears the fault can arm at once.
     pub fn heartbeat(&mut self, now: Microseconds, session: SessionId, lease_ms: u16) {
         let holder = self.holder.filter(|_| !self.is_latched());
         self.lease.renew(now, session, lease_ms, holder);
@@ -249,13 +250,13 @@ impl Controller {
         }
     }
 
-    /// Brings every axis to rest within its limits.
+    /// Gives up the running move and brings every axis to rest within its limits.
     fn brake(&mut self) {
         self.abort_motion();
         self.axes.iter_mut().for_each(Axis::stop);
     }
 
-    /// Gives up the running move.
+    /// Marks the running move as stopped.
     fn abort_motion(&mut self) {
         if matches!(self.active.phase, MovePhase::Running | MovePhase::Settling) {
             self.active.phase = MovePhase::Stopped;
@@ -275,7 +276,7 @@ impl Controller {
         self.tell(Event::MoveState { id: self.active.id, phase: self.active.phase });
     }
 
-    /// Events are a convenience: every Pose repeats what they say, so the oldest may be dropped.
+    /// Queues an event. The oldest may be dropped, because every pose repeats what events say.
     fn tell(&mut self, event: Event) {
         if self.events.is_full() {
             self.events.pop_front();

@@ -1,50 +1,51 @@
-//! Does the encoder follow the command? And if not, which of the two is to be blamed.
+//! Checks that the encoder follows the command, and tells which fault it is if it does not.
 //!
-//! The disagreement of encoder and command over a stretch of travel is watched, not at one instant: the load lags behind
-//! its motor by an amount that changes with the speed, and by far less than a motor that stands.
+//! Encoder and command are compared over a stretch of travel, not at one instant: the load always lags behind its motor,
+//! by an amount that depends on the speed but is far smaller than the error of a blocked motor.
 
 use vergence_protocol::{Counts, FaultCode, Micro};
 
 use crate::settings::AxisSettings;
 
-/// Counts that an encoder at rest may flicker by.
+/// Number of counts by which an encoder at rest may flicker.
 const FLICKER: u32 = 2;
-/// A stretch that was travelled is in order where encoder and motor differ by less than one part in so many.
+/// Over a stretch, encoder and motor may differ by the travelled distance divided by this.
 const SLIP_SHARE: i64 = 8;
 
-/// A disagreement that no longer passes for lag.
+/// A disagreement of encoder and command that is too large for lag.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Lost {
-    /// What it looks like.
+    /// The most probable cause.
     pub code: FaultCode,
-    /// Command less encoder, or how far the encoder jumped, in micro-units.
+    /// Command minus encoder, or the encoder's jump, in micro-units.
     pub detail: i32,
 }
 
-/// Command and encoder at one instant, micro-units.
+/// Commanded and encoder position at one instant, in micro-units.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 struct Place {
     command: i64,
     encoder: i64,
 }
 
-/// What is remembered of one axis since its drivers went on.
+/// State of the check for one axis since its drivers went on.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Following {
     before: Option<(Place, Counts)>,
-    /// Counts when the watch began; whether the encoder has ever left them.
+    /// Counts at the first tick.
     first: Counts,
+    /// Whether the encoder has ever left `first`.
     alive: bool,
-    /// Way of the command: up, down or not at all.
+    /// Direction of the command: 1, -1, or 0 at rest.
     direction: i64,
-    /// Begin of the watched stretch of travel.
+    /// Start of the present stretch of travel.
     stretch: Place,
-    /// Two places on the latest part of it, the older first.
+    /// Two places on the latest part of the stretch, the older one first.
     recent: [Place; 2],
 }
 
 impl Following {
-    /// Takes one tick.
+    /// Checks one tick; returns the fault, if any.
     pub fn watch(&mut self, axis: &AxisSettings, command: Micro, encoder: Micro, counts: Counts) -> Option<Lost> {
         let now = Place { command: command.0.into(), encoder: encoder.0.into() };
         let (before, old_counts) = self.before.replace((now, counts)).unwrap_or_else(|| {
@@ -66,14 +67,15 @@ impl Following {
             (self.stretch, self.recent) = (before, [before; 2]);
         }
         if direction != 0
-            && let Some(code) = self.disagreement(now, before, limit)
+            && let Some(code) = self.disagreement(axis, now, before)
         {
             return lost(code);
         }
         if error.abs() > limit { lost(FaultCode::FollowingError) } else { None }
     }
 
-    fn disagreement(&mut self, now: Place, before: Place, limit: i64) -> Option<FaultCode> {
+    fn disagreement(&mut self, axis: &AxisSettings, now: Place, before: Place) -> Option<FaultCode> {
+        let limit = i64::from(axis.following_error.0);
         let [older, newer] = self.recent;
         if (now.command - newer.command).abs() >= limit / 8 {
             self.recent = [newer, now];
@@ -81,11 +83,15 @@ impl Following {
         let travel = (now.command - self.stretch.command).abs();
         let apart = (travel - self.direction * (now.encoder - self.stretch.encoder)).abs();
         if apart > limit / 2 {
+            // Over a way within the tolerance neither motor nor encoder can be blamed: the limit is below the lag.
+            if travel <= i64::from(axis.tolerance.0) {
+                return Some(FaultCode::FollowingError);
+            }
             let (commanded, made) =
                 ((now.command - older.command).abs(), self.direction * (now.encoder - older.encoder));
             return Some(self.blame(commanded, made));
         }
-        // Who stands just now is judged when that has lasted.
+        // An axis that stands still in this tick is judged later: it may start to move.
         let stands = 4 * self.direction * (now.encoder - before.encoder) < (now.command - before.command).abs();
         if travel < 2 * limit || stands {
             return None;
@@ -94,7 +100,7 @@ impl Following {
         (apart > travel / SLIP_SHARE).then_some(FaultCode::Slip)
     }
 
-    /// `made` of what was lately `commanded`.
+    /// The cause of a disagreement: the encoder moved by `made` while the axis was `commanded` to move.
     fn blame(&self, commanded: i64, made: i64) -> FaultCode {
         if 4 * made < -commanded {
             FaultCode::WrongDirection

@@ -1,6 +1,6 @@
-//! Homing of one axis: seek the switch, retract, approach it again slowly, verify, go to the low end of the range.
+//! Homing of one axis: seeks the switch, retracts, approaches slowly, compares, and moves to the low end of the range.
 //!
-//! The slow edge is the reference; the fast one only checks it (as Klipper and GRBL do).
+//! The edge found slowly is the reference; the edge found fast only checks it (as in Klipper and GRBL).
 
 use vergence_protocol::{Counts, FaultCode, Micro};
 
@@ -10,42 +10,33 @@ use crate::contact::{Contact, DEBOUNCE_TICKS};
 use crate::io::RigIo;
 use crate::trajectory::{MotionState, Trajectory, fine, micro};
 
-/// A switch that is neither open nor closed for so long at rest will never be.
+/// Number of ticks at rest after which a switch that still chatters counts as stuck.
 const LONGEST_LOOK_TICKS: u8 = 200;
 
-/// What homing is doing.
+/// Phase of homing.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Phase {
-    /// At rest: look whether the switch is closed, for so many ticks at most.
-    Look {
-        left: u8,
-    },
-    /// The switch was closed at the start: leave it.
+    /// At rest: waits for the debounced switch, for at most `left` more ticks.
+    Look { left: u8 },
+    /// Leaves the switch, which was closed at the start.
     BackOff,
-    /// Look for the switch.
+    /// Moves down until the switch closes.
     Seek,
-    /// Found; come to rest.
-    Brake {
-        edge: Counts,
-    },
-    /// Leave the switch again.
-    Retract {
-        edge: Counts,
-    },
-    /// Approach it slowly.
-    Approach {
-        edge: Counts,
-    },
-    /// Found again; come to rest.
-    Rest {
-        edge: Counts,
-    },
-    /// Go to the low end of the range.
+    /// Brakes after the switch was found at `edge`.
+    Brake { edge: Counts },
+    /// Leaves the switch again.
+    Retract { edge: Counts },
+    /// Approaches the switch slowly.
+    Approach { edge: Counts },
+    /// Brakes after the switch was found again at `edge`.
+    Rest { edge: Counts },
+    /// Moves to the low end of the range.
     Enter,
+    /// Finished.
     Done,
 }
 
-/// What one tick of homing came to.
+/// Result of one tick of homing.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Progress {
     Running,
@@ -61,12 +52,12 @@ pub struct Homing {
 }
 
 impl Homing {
-    /// Starts with an axis at rest.
+    /// Starts homing of an axis at rest.
     pub fn start() -> Self {
         Self { phase: Phase::Look { left: LONGEST_LOOK_TICKS }, contact: Contact::default() }
     }
 
-    /// One tick.
+    /// Runs one tick.
     pub fn poll(&mut self, axis: &mut Axis, io: &impl RigIo) -> Progress {
         let homing = axis.settings.homing;
         let limits = axis.settings.limits_at(homing.seek_speed);
@@ -136,9 +127,9 @@ impl Homing {
     }
 }
 
-/// Off the switch from wherever a search can have come to rest beyond it. It may still have been speeding up when it
-/// was stopped: taking that back lasts a/j, at no more than the speed of the search. It was stopped when the contact was
-/// sure.
+/// Distance that leaves the switch from the farthest place at which a search can have come to rest beyond it. A search
+/// that was still accelerating when it was stopped travels on for the time a/j at no more than its speed; it was stopped
+/// only when the contact was debounced.
 fn back_off(axis: &Axis) -> Micro {
     let homing = axis.settings.homing;
     let limits = axis.settings.limits_at(homing.seek_speed);

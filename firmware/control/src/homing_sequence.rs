@@ -1,4 +1,4 @@
-//! Homing of several axes: one after the other, so that a switch wired to the wrong axis is told from one of its own.
+//! Homing of several axes, one after the other, so that a switch wired to the wrong axis is noticed.
 
 use vergence_protocol::{AxisList, AxisMask, Counts, FaultCode};
 
@@ -7,7 +7,7 @@ use crate::contact::Contact;
 use crate::homing::{Homing, Progress};
 use crate::io::RigIo;
 
-/// Which axes are still to be homed, and how far the present one is.
+/// The axes still to be homed, and the state of the present one.
 #[derive(Clone, Debug, Default)]
 pub struct HomingSequence {
     left: AxisMask,
@@ -16,7 +16,7 @@ pub struct HomingSequence {
     contacts: AxisList<Contact>,
 }
 
-/// Why homing ended without reference.
+/// Why homing ended without a reference.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct HomingFailure {
     pub code: FaultCode,
@@ -25,7 +25,7 @@ pub struct HomingFailure {
 }
 
 impl HomingSequence {
-    /// Starts with the lowest of `which`: the old references are no longer claimed.
+    /// Starts homing of the axes `which`, the lowest first. They lose their references.
     pub fn start(which: AxisMask, axes: &mut [Axis]) -> Self {
         for (_, axis) in axes.iter_mut().enumerate().filter(|(index, _)| which.contains(*index)) {
             axis.forget_reference();
@@ -33,7 +33,7 @@ impl HomingSequence {
         Self { left: which, present: None, contacts: axes.iter().map(|_| Contact::default()).collect() }
     }
 
-    /// One tick; true when all have their reference.
+    /// Runs one tick; returns true when all axes have their reference.
     pub fn poll(&mut self, axes: &mut [Axis], io: &impl RigIo) -> Result<bool, HomingFailure> {
         let Some((index, homing)) = &mut self.present else { return Ok(self.begin_next(axes)) };
         let index = *index;
@@ -61,7 +61,7 @@ impl HomingSequence {
         next.is_none()
     }
 
-    /// An axis at rest whose switch has closed since `present` moves.
+    /// An axis other than `present` whose switch has closed while `present` moved.
     fn stranger(&mut self, present: usize, io: &impl RigIo) -> Option<usize> {
         let mut stranger = None;
         for (index, contact) in self.contacts.iter_mut().enumerate() {

@@ -1,54 +1,56 @@
-//! The seam between the controller and a board.
+//! The interface between the controller and a board's inputs and outputs.
 
 use heapless::Vec;
 use vergence_protocol::{AxisList, Microseconds};
 
-/// The most steps of one axis in one tick: 100 kHz and some slack.
+/// Largest number of steps of one axis in one tick: 100 at 100 kHz, and some slack.
 pub const MAX_STEPS_PER_TICK: usize = 104;
 
 /// The steps of one axis in one tick.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct StepSchedule {
-    /// When the tick begins: one tick ahead at most, so that a board has its steps before they are due.
+    /// Start of the tick: at most one tick ahead, so that the board has the steps before they are due.
     pub start: Microseconds,
     /// Whether the raw step count rises.
     pub forward: bool,
-    /// When each step is due: nanoseconds after `start`, rising, less than one tick.
+    /// Time of each step in nanoseconds after `start`: rising, less than one tick.
     pub at_ns: Vec<u32, MAX_STEPS_PER_TICK>,
 }
 
-/// A pulse of the camera trigger.
+/// A rising edge of the camera trigger.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct TriggerEdge {
-    /// When the pulse began.
+    /// Time of the edge.
     pub at: Microseconds,
-    /// Every raw encoder count at that instant.
+    /// Raw encoder count of each axis at the edge.
     pub counts: AxisList<i32>,
 }
 
-/// What the controller needs of a board. A real board, the native simulation and tests implement it.
+/// Inputs and outputs of a board. The real board, the native simulation and tests implement it.
 ///
-/// Raw steps and raw counts start at any value at power-on and never jump; the controller keeps its own zero.
+/// Raw steps and raw counts have any value at power-on and never jump; the controller keeps its own zero.
 pub trait RigIo {
-    /// Switches the motor drivers of all axes. Steps not made yet are forgotten, whether on or off.
+    /// Switches the motor drivers of all axes on or off. Steps not made yet are dropped in both cases.
     fn set_drivers(&mut self, on: bool);
-    /// Makes steps on `axis` at their instants, after those ordered before.
+    /// Orders steps of `axis` at their times, after those ordered before.
     fn schedule_steps(&mut self, axis: usize, steps: &StepSchedule);
-    /// The raw step count reached so far.
+    /// The raw count of steps made so far.
     fn steps(&self, axis: usize) -> i32;
     /// The raw encoder count.
     fn encoder(&self, axis: usize) -> i32;
-    /// Whether the home switch is closed.
+    /// Whether the home switch is closed: normally open, it closes at home.
     fn home_switch(&self, axis: usize) -> bool;
-    /// Whether a hard limit switch is closed.
+    /// Whether a hard limit is reached: its switch is normally closed and opens beyond the range, so that a broken wire
+    /// counts as reached.
     fn hard_limit(&self, axis: usize) -> bool;
-    /// Whether the emergency stop is pressed. Hardware has already cut the drivers; software only observes.
+    /// Whether the emergency stop is pressed, or its wire is broken. Hardware has already cut the drivers; the controller
+    /// only observes.
     fn emergency_stop(&self) -> bool;
-    /// Fires the cameras once at `at`, at once where that has passed. A board without trigger does nothing.
+    /// Fires the cameras once at the time `at`, or at once if that has passed. A board without trigger does nothing.
     fn fire_trigger(&mut self, at: Microseconds) {
         let _ = at;
     }
-    /// The oldest trigger pulse not yet taken, its encoders latched at the edge.
+    /// Takes the oldest trigger edge, with the encoders latched at the edge.
     fn take_trigger_edge(&mut self) -> Option<TriggerEdge> {
         None
     }

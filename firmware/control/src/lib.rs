@@ -1,12 +1,13 @@
 //! The controller of the rig: planner, homing, limits and safety states (`no_std`, no async, no I/O).
 //!
-//! [`Controller`] is the heart. It has two entry points: `handle` takes a request, `poll` runs one control tick against
-//! the board behind [`RigIo`]. Time is an argument. [`Node`] adds the serial session, so that a firmware shell, a native
-//! simulation and an emulated board all run the same code.
+//! [`Controller`] has two entry points: `handle` takes a request, `poll` runs one control tick against the board behind
+//! [`RigIo`]. Time is an argument. [`Node`] adds the serial session, so that the firmware, the native simulation and the
+//! emulated board all run the same code.
 //!
-//! Terms: *command* is where the planner wants an axis, *encoder* is where it is; *following error* is their difference;
-//! an axis is *referenced* once homing has tied its encoder to the axis zero; *settled* means that the encoder has
-//! stayed inside the tolerance for a dwell; the *lease* is how long a silent host is trusted; a fault is *latched* until cleared.
+//! Terms: the *command* is the position that the planner wants, the *encoder* the position that is measured, and the
+//! *following error* their difference. An axis is *referenced* once homing has tied its encoder to the axis zero. A move is
+//! *settled* when the encoders have stayed inside the tolerance for a while. The *lease* is the time that the board keeps
+//! going without hearing from its host. A fault is *latched* until it is cleared.
 
 #![no_std]
 
@@ -14,7 +15,6 @@ mod axis;
 mod board_settings;
 mod contact;
 mod controller;
-mod flash;
 mod follow;
 mod homing;
 mod homing_sequence;
@@ -22,6 +22,7 @@ mod io;
 mod latch;
 mod lease;
 mod node;
+mod plan;
 mod profile;
 mod recorder;
 mod self_test;
@@ -35,17 +36,16 @@ mod updater;
 
 pub use board_settings::{BoardSettings, Machine, SettingError};
 pub use controller::{Controller, Event};
-pub use flash::{Flash, FlashError, PAGE, UNIT};
 pub use io::{MAX_STEPS_PER_TICK, RigIo, StepSchedule, TriggerEdge};
 pub use node::{Node, NodeIdentity};
-
+pub use plan::{AxisPlanner, PlanStart, Together};
 pub use profile::Limits;
-pub use services::BoardServices;
+pub use services::{BoardServices, Flash, FlashError, PAGE, UNIT};
 pub use settings::{AxisSettings, HomingSettings, LARGEST_STEP_RATE, Scale, SettingsError};
 pub use trajectory::{FINE_BITS, Fine, MotionState, Trajectory};
 pub use updater::Updater;
 
-/// The control tick: how often `poll` wants to run while the drivers are on, in microseconds.
+/// Period of the control tick in microseconds: [`Controller::poll`] runs this often while the drivers are on.
 pub const TICK_US: u64 = 1_000;
-/// How often a [`Node`] at rest wants to run: whole ticks. A board's microsecond counter of 16 bits must hold it.
+/// Period of the ticks of a [`Node`] at rest, in microseconds: whole ticks, and small enough for a 16-bit counter.
 pub const REST_US: u64 = 20 * TICK_US;

@@ -1,4 +1,5 @@
-//! The controller at the end of its serial link: the same code in the firmware, the native board and the tests.
+//! The node: the controller with its serial session, telemetry, settings, recorder and trigger. Firmware, native board and
+//! tests run this same code.
 
 mod management;
 mod requests;
@@ -19,49 +20,52 @@ use crate::trigger::CameraTrigger;
 use crate::updater::Updater;
 use crate::{REST_US, TICK_US};
 
-/// So long after the last byte from the host whatever it asked for is done and answered.
+/// Time in microseconds after the last byte from the host within which every request is done and answered.
 const QUIET_US: u64 = 20_000;
-/// A board is told so long before an instant that it shall run then.
+/// Shortest notice in microseconds that a board gets of the next tick.
 const NOTICE_US: u64 = 20;
 
-/// What a board says of itself.
+/// Identity of a board and its firmware.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct NodeIdentity {
-    /// What kind of board, at most 16 bytes.
+    /// Kind of board, at most 16 bytes.
     pub board: heapless::String<16>,
-    /// The hardware that firmware images must name.
+    /// Id of the hardware, which firmware images must name.
     pub hardware: u32,
-    /// Firmware version.
+    /// Version of the firmware: major, minor, patch.
     pub firmware: [u8; 3],
-    /// The oldest firmware version that the board accepts.
+    /// Oldest firmware version that the board accepts: major, minor, patch.
     pub oldest: [u8; 3],
-    /// Which build.
+    /// Build id of the firmware.
     pub build: u64,
     /// Unique id of the chip.
     pub uid: [u8; 12],
-    /// Why it started.
+    /// Cause of the last start.
     pub reset: ResetCause,
 }
 
-/// Session, controller, telemetry, settings, recorder and trigger.
+/// The controller with all that the host talks to.
+///
+/// Loop: [`receive`](Self::receive) bytes, call [`poll`](Self::poll) at [`wakes_at`](Self::wakes_at), send the frames of
+/// [`transmit`](Self::transmit).
 #[derive(Debug)]
 pub struct Node {
     session: BoardSession,
     controller: Controller,
     identity: NodeIdentity,
     settings: BoardSettings,
-    /// What the firmware came with.
+    /// Default settings of the firmware.
     defaults: BoardSettings,
     recorder: Recorder,
     trigger: CameraTrigger,
     updater: Updater,
-    /// When the last management request came.
+    /// Time of the last management request.
     managed_at: Microseconds,
     reboot: Option<RebootTo>,
-    /// When the host was last heard.
+    /// Time of the last byte from the host.
     heard_at: Microseconds,
     wakes_at: Microseconds,
-    /// As last recorded.
+    /// State of the controller as last recorded.
     state: ControllerState,
     stream_period: u64,
     next_pose: Microseconds,
@@ -69,11 +73,11 @@ pub struct Node {
 }
 
 impl Node {
-    /// A node with the settings last saved, or else those the firmware came with; its `boot` number differs from the
-    /// last start's.
+    /// A node with the settings last saved, or with `defaults` if there are none. The number `boot` must differ from that
+    /// of the last start.
     ///
     /// # Errors
-    /// [`SettingsError`] where an axis cannot work with the settings that the firmware came with.
+    /// [`SettingsError`] if an axis cannot work with the default settings.
     pub fn new(
         defaults: &BoardSettings,
         identity: NodeIdentity,
@@ -113,26 +117,26 @@ impl Node {
         &self.controller
     }
 
-    /// What the board is set to.
+    /// The settings in effect.
     #[must_use]
     pub fn settings(&self) -> &BoardSettings {
         &self.settings
     }
 
-    /// When [`Self::poll`] is to be called next. To be asked after each call of it and of [`Self::wake`].
+    /// Time at which [`Self::poll`] is to be called next. Ask after each call of it and of [`Self::wake`].
     #[must_use]
     pub fn wakes_at(&self) -> Microseconds {
         self.wakes_at
     }
 
-    /// Somebody speaks: the next tick is due as if the node had not rested. [`Self::receive`] does this by itself; a board
-    /// that takes long over it may set its timer before.
+    /// Ends the rest, because bytes came: the next tick is due as if the node had not rested. [`Self::receive`] does this by
+    /// itself; a board that needs long to receive may set its timer before.
     pub fn wake(&mut self, now: Microseconds) {
         self.heard_at = now;
         self.wakes_at.0 -= self.wakes_at.0.saturating_sub(now.0 + NOTICE_US) / TICK_US * TICK_US;
     }
 
-    /// Takes bytes from the link. Requests to write flash block for some tens of milliseconds; nothing moves then.
+    /// Takes bytes from the link. Requests that write flash block for some tens of milliseconds; nothing moves meanwhile.
     pub fn receive(&mut self, now: Microseconds, bytes: &[u8], io: &mut impl RigIo, services: &mut impl BoardServices) {
         self.wake(now);
         for &byte in bytes {
@@ -140,7 +144,7 @@ impl Node {
                 Some(BoardEvent::Opened { session }) => {
                     self.recorder.record(now, Happening::Opened(session));
                     self.set_stream(now, self.settings.stream_period_us);
-                    // Switching it off is never refused.
+                    // Switching the trigger off is never refused.
                     let _ = self.trigger.set(now, Trigger::Off, io);
                 }
                 Some(BoardEvent::Request { reply_to, request, received_at }) => {
@@ -160,14 +164,14 @@ impl Node {
         }
     }
 
-    /// Runs the control tick and, where due, trigger and telemetry.
+    /// Runs the control tick, and trigger and telemetry when they are due.
     pub fn poll(&mut self, now: Microseconds, io: &mut impl RigIo) {
         let next_tick = self.controller.poll(now, io);
         self.watch_update(now);
         self.trigger.poll(now, io);
         while let Some(edge) = io.take_trigger_edge() {
             let counts = self.controller.counts_from(&edge.counts);
-            self.session.send(vergence_protocol::Report::FrameMark(self.trigger.mark(edge.at, counts)));
+            self.session.send(vergence_protocol::Report::TriggerMark(self.trigger.mark(edge.at, counts)));
         }
         self.recorder.watch_switches(now, self.controller.axis_count(), io);
         self.observe(now, io);
@@ -176,7 +180,7 @@ impl Node {
         self.wakes_at = Microseconds(next_tick.0 + rest);
     }
 
-    /// Whether nothing is to be done, told or looked at closely.
+    /// Whether ticks may be rare: nothing moves, streams, triggers, chatters or is asked.
     fn is_at_rest(&self, now: Microseconds) -> bool {
         self.controller.is_at_rest()
             && self.stream_period == 0
@@ -196,12 +200,12 @@ impl Node {
         }
         self.pose_seq = self.pose_seq.wrapping_add(1);
         self.session.telemetry(self.controller.pose(now, self.pose_seq, io));
-        // Whole periods, so that a late tick does not shift the stream.
+        // The next pose keeps to the period, so that a late tick does not shift the stream.
         let late = (now.0 - self.next_pose.0) / self.stream_period + 1;
         self.next_pose = Microseconds(self.next_pose.0 + late * self.stream_period);
     }
 
-    /// Tells host and recorder what the controller did.
+    /// Passes the controller's events to host and recorder.
     fn observe(&mut self, now: Microseconds, io: &impl RigIo) {
         use vergence_protocol::{MovePhase, Report};
         while let Some(event) = self.controller.take_event() {
@@ -221,7 +225,7 @@ impl Node {
         let state = self.controller.state();
         if state != self.state {
             self.state = state;
-            // What led to a fault is kept until it is cleared.
+            // The recorder keeps what led to a fault until the fault is cleared.
             if !self.controller.has_fault() {
                 self.recorder.release();
             }
@@ -229,18 +233,18 @@ impl Node {
         }
     }
 
-    /// Sends log text to the host when there is nothing better to send; dropped where too much waits.
+    /// Queues a log entry for the host; it is sent when nothing else waits, and dropped if the queue is full.
     pub fn log(&mut self, bytes: &[u8]) {
         self.session.log(bytes);
     }
 
-    /// What the host wants started again. To be asked when [`Self::transmit`] gives nothing more, so that the answer is
-    /// out before.
+    /// Takes the program that the host wants started. Ask when [`Self::transmit`] returns `None`, so that the answer has been
+    /// sent before.
     pub fn take_reboot(&mut self) -> Option<RebootTo> {
         self.reboot.take()
     }
 
-    /// The next frame for the link; call until `None`.
+    /// Writes the next frame for the link and returns its length in bytes. Call it until it returns `None`.
     pub fn transmit(&mut self, now: Microseconds, buffer: &mut [u8; MAX_FRAME]) -> Option<usize> {
         self.session.transmit(now, buffer)
     }

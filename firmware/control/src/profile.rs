@@ -9,19 +9,20 @@ use libm::{fabsf, sqrtf};
 
 use crate::trajectory::{Fine, MotionState, Segment, Trajectory, fine, micro, ticks};
 
-/// Halvings of an interval of speeds: single precision has no more bits.
+/// Number of halvings of an interval of speeds: single precision has no more bits.
 const HALVINGS: u32 = 26;
-/// The cruise is left this share of all ways, and from rest is planned slower by it, so that rounding in single precision
-/// cannot make it shorter than nothing.
+/// Share of all distances that is left for the cruise, and by which a cruise from rest is planned slower, so that rounding in
+/// single precision cannot make its length negative.
 const RESERVE: f32 = 2e-6;
-/// The least jerk that the pieces can hold to a ten-thousandth, per second cubed: a motion that would be slower ends early.
+/// Smallest jerk, in micro-units per second cubed, that the pieces represent to a ten-thousandth. A motion that would need
+/// less ends early.
 const LEAST_JERK: f32 = 1e-3;
-/// The least speed of a cruise as a share of the largest: what is left of a change of speed by rounding is far less.
+/// Smallest speed of a cruise as a share of the largest speed: rounding of a change of speed leaves far less.
 const LEAST_CRUISE: f32 = 4e-6;
-/// A speed that is left over is rounding where it is less than this share of those it was computed from.
+/// A difference of speeds below this share of the speeds is rounding.
 const NOTHING: f32 = 3e-7;
 
-/// What an axis can do, in micro-units per second to the power of one, two and three. All positive.
+/// Limits of an axis, in micro-units per second, per second squared and per second cubed. All are positive.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Limits {
     /// Largest speed.
@@ -45,7 +46,7 @@ impl Limits {
 }
 
 impl Trajectory {
-    /// The quickest way to rest from `from`.
+    /// The quickest motion from `from` to rest.
     #[must_use]
     pub fn stop(from: MotionState, limits: Limits) -> Self {
         let change = Change::between(micro(from.velocity), micro(from.acceleration), 0.0, limits);
@@ -55,8 +56,8 @@ impl Trajectory {
         stop
     }
 
-    /// The quickest motion from `from` to rest at `target` that takes `at_least` so many seconds. One that cannot take
-    /// exactly so long takes longer.
+    /// The quickest motion from `from` to rest at `target` that takes at least `at_least` seconds. A motion that cannot take
+    /// exactly that long takes longer.
     #[must_use]
     pub fn reach(from: MotionState, target: Fine, limits: Limits, at_least: f32) -> Self {
         if from.is_rest() {
@@ -67,11 +68,12 @@ impl Trajectory {
         halting.append(&rest);
         let way = Way::new(from, target, limits);
         let cruising = way.cruise_lasting(at_least).map(|speed| Self::cruising(from, target, way.sign * speed, limits));
-        // Just beyond where it would stop, an axis is there sooner when it does stop than when it creeps on.
+        // To a target just beyond its stop, an axis is quicker when it stops first than when it creeps on.
         cruising.filter(|cruising| cruising.duration() <= halting.duration()).unwrap_or(halting)
     }
 
-    /// The same, with the last `run_up` of the way from below and within `last`: play is taken up on the same side.
+    /// As [`Self::reach`], but the last `run_up` of the way comes from below, within the limits `last`, so that play is taken
+    /// up on the same side.
     #[must_use]
     pub fn reach_from_below(
         from: MotionState,
@@ -85,7 +87,7 @@ impl Trajectory {
         whole
     }
 
-    /// From rest, a longer time is the same path run slower.
+    /// A motion from rest; for a longer duration the same path is run slower.
     fn from_rest(position: Fine, target: Fine, limits: Limits, at_least: f32) -> Self {
         let distance = micro(target - position);
         let length = fabsf(distance);
@@ -100,12 +102,13 @@ impl Trajectory {
         Self::cruising(MotionState::at(position), target, cruise, limits.scaled(slowed))
     }
 
-    /// To the velocity `cruise`, along with it as long as it takes, and to rest.
+    /// A motion that changes to the velocity `cruise`, keeps it as long as necessary, and comes to rest.
     fn cruising(from: MotionState, target: Fine, cruise: f32, limits: Limits) -> Self {
         let mut whole = Self::resting_at(target);
         let speeding = Change::between(micro(from.velocity), micro(from.acceleration), cruise, limits);
         let top = speeding.run(from, |segment| whole.push(segment));
-        // Slowing down is speeding up, backwards from rest at the target: rounding gathers where the axis is quick.
+        // Slowing down is planned as speeding up, backwards from rest at the target, so that rounding errors collect where
+        // the axis is fast.
         let mut slowing = Self::resting_at(0);
         let far =
             Change::between(0.0, 0.0, micro(top.velocity), limits).run(MotionState::default(), |s| slowing.push(s));

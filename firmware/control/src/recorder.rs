@@ -1,4 +1,4 @@
-//! The flight recorder: the last things that happened, and what led to a fault until it is cleared.
+//! The flight recorder: keeps the last events, and after a fault those that led to it until the fault is cleared.
 
 use heapless::Deque;
 use vergence_protocol::{
@@ -8,31 +8,32 @@ use vergence_protocol::{
 use crate::contact::Contact;
 use crate::io::RigIo;
 
-/// How many events are kept.
+/// Number of events that the ring holds.
 const EVENTS: usize = 64;
-/// How many of them may come after a fault: the others are what led to it, and stay.
+/// Number of events recorded after a fault: the rest of the ring keeps the events that led to it.
 const AFTER_FAULT: usize = EVENTS / 2;
 
 /// A ring of events.
 #[derive(Debug, Default)]
 pub struct Recorder {
     events: Deque<RecordedEvent, EVENTS>,
-    /// Recorded since start.
+    /// Number of events recorded since the board started.
     total: u32,
-    /// While a fault is latched: how many more may be recorded.
+    /// While a fault is latched: number of events that may still be recorded.
     room: Option<usize>,
     switches: [[Switch; 2]; MAX_AXES],
 }
 
-/// A switch as last recorded.
+/// A switch: home switch or hard limit switches of one axis.
 #[derive(Clone, Copy, Debug, Default)]
 struct Switch {
     contact: Contact,
-    closed: Option<bool>,
+    /// Whether it was operated when last recorded; `None` before the first debounced reading.
+    operated: Option<bool>,
 }
 
 impl Recorder {
-    /// Records that something happened.
+    /// Records an event, unless the room after a fault is used up.
     pub fn record(&mut self, at: Microseconds, what: Happening) {
         if self.room == Some(0) {
             return;
@@ -46,7 +47,7 @@ impl Recorder {
         self.total = self.total.wrapping_add(1);
     }
 
-    /// Records a fault and where every axis was; what led to it stays until [`Self::release`].
+    /// Records a fault and the encoder counts of every axis; the events that led to it stay until [`Self::release`].
     pub fn record_fault(&mut self, fault: &FaultRecord, counts: &[Counts]) {
         let FaultRecord { code, axis, detail, at, .. } = *fault;
         self.record(at, Happening::Fault { code, axis, detail });
@@ -56,33 +57,33 @@ impl Recorder {
         self.room = self.room.or(Some(AFTER_FAULT));
     }
 
-    /// The fault is cleared: record on.
+    /// Records without limit again: the fault is cleared.
     pub fn release(&mut self) {
         self.room = None;
     }
 
-    /// Reads all switches and records which changed for good.
+    /// Reads the switches of the first `axes` axes and records debounced changes.
     pub fn watch_switches(&mut self, now: Microseconds, axes: usize, io: &impl RigIo) {
         for (axis, index) in (0u8..).zip(0..axes.min(MAX_AXES)) {
             let readings = [io.home_switch(index), io.hard_limit(index)];
             for (which, reading) in readings.into_iter().enumerate() {
                 let switch = &mut self.switches[index][which];
                 switch.contact.read(reading, Counts(0));
-                let closed = switch.contact.is_closed();
-                let before = core::mem::replace(&mut switch.closed, closed);
-                if let (Some(_), Some(closed)) = (before.filter(|_| before != closed), closed) {
-                    self.record(now, Happening::Switch { axis, home: which == 0, closed });
+                let operated = switch.contact.is_closed();
+                let before = core::mem::replace(&mut switch.operated, operated);
+                if let (Some(_), Some(operated)) = (before.filter(|_| before != operated), operated) {
+                    self.record(now, Happening::Switch { axis, home: which == 0, operated });
                 }
             }
         }
     }
 
-    /// Whether every switch of the first `axes` reads what was last recorded of it.
+    /// Whether the latest readings of all switches of the first `axes` axes are debounced.
     pub fn switches_rest(&self, axes: usize) -> bool {
         self.switches.iter().take(axes).flatten().all(|switch| switch.contact.is_settled())
     }
 
-    /// Events from number `first` on, or from the oldest that is still there.
+    /// The events from number `first` on, or from the oldest one still kept.
     pub fn page(&self, first: u32) -> RecordedEvents {
         let oldest = self.total.wrapping_sub(self.events.len() as u32);
         let first = first.max(oldest);

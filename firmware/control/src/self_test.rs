@@ -1,4 +1,4 @@
-//! What is looked at before anything may move: encoders that stand still, switches that know whether they are closed.
+//! The self-test before anything may move: encoders must stand still and switches must not chatter.
 
 use vergence_protocol::{AxisList, FaultCode};
 
@@ -6,11 +6,11 @@ use crate::contact::Contact;
 use crate::io::RigIo;
 use crate::settings::AxisSettings;
 
-/// The test takes so many ticks at least, and this many where a switch chatters.
+/// Shortest duration of the test in ticks, and longest while a switch chatters.
 const LEAST_TICKS: u8 = 10;
 const MOST_TICKS: u8 = 200;
 
-/// What one tick of the test came to.
+/// Result of one tick of the test.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Verdict {
     Running,
@@ -18,7 +18,7 @@ pub enum Verdict {
     Failed { code: FaultCode, axis: Option<usize>, detail: i32 },
 }
 
-/// A running test.
+/// A self-test under way.
 #[derive(Clone, Debug, Default)]
 pub struct SelfTest {
     ticks: u8,
@@ -29,7 +29,7 @@ pub struct SelfTest {
 }
 
 impl SelfTest {
-    /// One tick of a rig with drivers off.
+    /// Runs one tick of the test; the drivers are off.
     pub fn poll<'a>(&mut self, axes: impl Iterator<Item = &'a AxisSettings> + Clone, io: &impl RigIo) -> Verdict {
         let counts: AxisList<i32> = (0..axes.clone().count()).map(|axis| io.encoder(axis)).collect();
         if self.encoders.is_empty() {
@@ -37,7 +37,7 @@ impl SelfTest {
             self.home = counts.iter().map(|_| Contact::default()).collect();
         }
         for (index, ((axis, now), before)) in axes.zip(&counts).zip(&self.encoders).enumerate() {
-            // By hand nobody moves a stage further in a tick than its motor would.
+            // A hand moves a stage less far in a tick than its motor would.
             let jump = axis.encoder().position_at(now.wrapping_sub(*before)).0;
             if jump.unsigned_abs() > axis.largest_jump() {
                 return Verdict::Failed { code: FaultCode::EncoderLost, axis: Some(index), detail: jump };
@@ -54,7 +54,7 @@ impl SelfTest {
         verdict
     }
 
-    /// Whether the rig is fit to move.
+    /// Whether the test was passed.
     pub fn has_passed(&self) -> bool {
         self.passed
     }

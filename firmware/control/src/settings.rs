@@ -1,14 +1,23 @@
-//! What the controller must know of its axes.
+//! Settings of one axis: range, limits, scales and homing.
 
 use vergence_protocol::{AxisInfo, AxisKind, Micro};
 
 use crate::TICK_US;
 use crate::profile::Limits;
 
-/// Encoder counts or motor steps for each metre (linear) or revolution (rotary) of an axis.
+/// Encoder counts or motor steps per metre (linear axis) or revolution (rotary axis).
+///
+/// ```
+/// use vergence_control::Scale;
+/// use vergence_protocol::{AxisKind, Micro};
+///
+/// let encoder = Scale { kind: AxisKind::Linear, per_unit: 2_000_000 }; // half a micrometre a count
+/// assert_eq!(encoder.counts_at(Micro(1_000)), 2_000);
+/// assert_eq!(encoder.position_at(2_000), Micro(1_000));
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Scale {
-    /// Linear or rotary.
+    /// Whether the axis slides or turns.
     pub kind: AxisKind,
     /// Counts or steps per metre or revolution.
     pub per_unit: u32,
@@ -30,13 +39,13 @@ impl Scale {
         saturate(div_round(numerator, i128::from(self.milli_micro())))
     }
 
-    /// Half the distance between two marks, in 2⁻⁴⁰ micro-units.
+    /// Half the distance between two counts or steps, in 2⁻⁴⁰ micro-units.
     pub(crate) fn half_mark_q40(self) -> i64 {
         // At most half a revolution: below 2²² micro-units.
         ((i128::from(self.milli_micro()) << 40) / (i128::from(self.per_unit.max(1)) * 2000)) as i64
     }
 
-    /// The position nearest to a count.
+    /// The position nearest to `counts`.
     #[must_use]
     pub fn position_at(self, counts: i32) -> Micro {
         let numerator = i128::from(counts) * i128::from(self.milli_micro());
@@ -52,90 +61,96 @@ fn saturate(value: i128) -> i32 {
     i32::try_from(value).unwrap_or(if value < 0 { i32::MIN } else { i32::MAX })
 }
 
-/// How an axis finds its reference: a switch beyond the low end of its range.
+/// Settings of the search for the home switch, which is beyond the low end of the range.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct HomingSettings {
-    /// Where the switch closes, in axis coordinates; below `min`.
+    /// Position at which the switch closes; below `min`.
     pub switch_at: Micro,
-    /// Speed of the search, micro-units per second.
+    /// Speed of the search, in micro-units per second.
     pub seek_speed: u32,
-    /// Speed of the second approach, whose edge is the reference.
+    /// Speed of the second approach, whose edge is the reference, in micro-units per second.
     pub approach_speed: u32,
-    /// How far to back off between the two.
+    /// Distance to back off between search and second approach.
     pub retract: Micro,
-    /// Largest way of the search.
+    /// Largest distance that the search may travel.
     pub travel: Micro,
-    /// Largest difference between the two edges.
+    /// Largest difference between the edges found by search and second approach.
     pub repeatability: Micro,
 }
 
-/// One axis.
+/// Settings of one axis.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct AxisSettings {
-    /// Linear or rotary.
+    /// Whether the axis slides or turns.
     pub kind: AxisKind,
     /// Lowest position a move may ask for.
     pub min: Micro,
     /// Highest position a move may ask for.
     pub max: Micro,
-    /// Largest speed, micro-units per second.
+    /// Largest speed, in micro-units per second.
     pub speed: u32,
-    /// Largest acceleration, micro-units per second squared.
+    /// Largest acceleration, in micro-units per second squared.
     pub acceleration: u32,
-    /// Largest jerk, micro-units per second cubed.
+    /// Largest jerk, in micro-units per second cubed.
     pub jerk: u32,
     /// Motor steps per metre or revolution.
     pub steps_per_unit: u32,
     /// Encoder counts per metre or revolution.
     pub counts_per_unit: u32,
-    /// Whether the motor turns the other way round.
+    /// Whether the position rises while the motor's step count falls.
     pub steps_reversed: bool,
-    /// Whether the encoder counts the other way round.
+    /// Whether the position rises while the encoder's count falls.
     pub counts_reversed: bool,
-    /// Largest difference between command and encoder while moving.
+    /// Largest difference between commanded position and encoder before a fault is raised.
     pub following_error: Micro,
-    /// Largest difference between target and encoder at which a move counts as reached.
+    /// Largest difference between target and encoder at which a move counts as settled.
     pub tolerance: Micro,
-    /// How far the last approach of a move comes from below, so that play is always taken up on the same side; 0 where
-    /// there is none.
+    /// Length of the last approach of a move, which always comes from below, so that play is taken up on the same side; 0
+    /// for an axis without play.
     pub backlash: Micro,
-    /// Homing.
+    /// Settings of the search for the home switch.
     pub homing: HomingSettings,
 }
 
-/// Settings that no axis can work with.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+/// Why settings cannot work.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 #[non_exhaustive]
 pub enum SettingsError {
     /// There are no axes, or more than [`vergence_protocol::MAX_AXES`].
+    #[error("a board drives 1 to {} axes", vergence_protocol::MAX_AXES)]
     AxisCount,
     /// A speed, acceleration, jerk, scale, tolerance or distance is not positive.
+    #[error("axis {axis}: speeds, accelerations, jerk, scales, tolerances and distances must be positive")]
     NotPositive {
-        /// Which axis.
+        /// Index of the axis, from 0.
         axis: usize,
     },
-    /// `min` is not below `max`, or the switch does not lie below all that a move may touch, or the play is negative.
+    /// `min` is not below `max`, the home switch is not below all positions of a move (backlash included), or the backlash
+    /// is negative.
+    #[error("axis {axis}: the home switch must lie below the range, and the range must not be empty")]
     Range {
-        /// Which axis.
+        /// Index of the axis, from 0.
         axis: usize,
     },
-    /// At full speed the motor would have to make more than [`LARGEST_STEP_RATE`] steps a second.
+    /// At full speed the motor would make more than [`LARGEST_STEP_RATE`] steps a second.
+    #[error("axis {axis}: at full speed the motor would have to make more than {LARGEST_STEP_RATE} steps a second")]
     StepRate {
-        /// Which axis.
+        /// Index of the axis, from 0.
         axis: usize,
     },
-    /// The serial line or the pose stream cannot be that fast or slow.
+    /// The serial line or the pose stream is too fast or too slow.
+    #[error("the serial line or the pose stream cannot have that rate")]
     Link,
 }
 
-/// The most steps a second that any axis may need.
+/// Largest number of steps a second of any axis.
 pub const LARGEST_STEP_RATE: u32 = 100_000;
 
 impl AxisSettings {
-    /// Checks one axis.
+    /// Checks the settings of axis number `axis`.
     ///
     /// # Errors
-    /// Says what cannot be.
+    /// [`SettingsError`] names the first rule that the settings break.
     pub fn validate(&self, axis: usize) -> Result<(), SettingsError> {
         let rates = [self.speed, self.acceleration, self.jerk, self.steps_per_unit, self.counts_per_unit];
         let homing = &self.homing;
@@ -174,26 +189,27 @@ impl AxisSettings {
         Limits { speed: speed as f32, ..self.limits() }
     }
 
-    /// The encoder.
+    /// Scale of the encoder.
     #[must_use]
     pub const fn encoder(&self) -> Scale {
         Scale { kind: self.kind, per_unit: self.counts_per_unit }
     }
 
-    /// The motor.
+    /// Scale of the motor.
     #[must_use]
     pub const fn motor(&self) -> Scale {
         Scale { kind: self.kind, per_unit: self.steps_per_unit }
     }
 
-    /// How far the encoder may go in one tick: twice as far as at full speed, and what a load that was held springs back.
+    /// Largest change of the encoder in one tick, in micro-units: twice that at full speed, and the distance that a load
+    /// springs back when it is let go.
     pub(crate) fn largest_jump(&self) -> u32 {
         let way_of_a_tick = u64::from(self.speed) * TICK_US / 1_000_000;
         let jump = u64::from(self.following_error.0.unsigned_abs() / 2) + 2 * way_of_a_tick;
         u32::try_from(jump).unwrap_or(u32::MAX)
     }
 
-    /// What the host is told.
+    /// Limits and scale as the host gets them.
     #[must_use]
     pub const fn info(&self) -> AxisInfo {
         AxisInfo {

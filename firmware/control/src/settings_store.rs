@@ -1,15 +1,15 @@
-//! Settings in flash: two pages in turn, so that one whole record is there at every instant.
+//! Settings in flash: two pages are written in turn, so that one complete record exists at every instant.
 //!
 //! A record is `magic | sequence | length | body | CRC-32C`, little-endian, filled up with 0xFF to whole units; the body
-//! is a list of item, axis and value (postcard). The newest record whose CRC holds is the one that counts. Saving
-//! erases and writes the other page, the CRC last: wherever that is cut, the old record is untouched. Items by number
-//! rather than a struct, so that firmware of another version takes from a record what it knows.
+//! is a list of item, axis and value (postcard). The newest record with a correct CRC counts. Saving erases and writes the
+//! other page, the CRC last: a power cut at any point leaves the old record untouched. The record holds item numbers
+//! instead of a struct, so that firmware of another version can read the items that it knows.
 
 use vergence_protocol::frame::checksum;
 use vergence_protocol::{SettingItem, SettingKey};
 
 use crate::board_settings::BoardSettings;
-use crate::flash::{Flash, FlashError, PAGE, UNIT};
+use crate::services::{Flash, FlashError, PAGE, UNIT};
 
 const MAGIC: [u8; 4] = *b"VGS1";
 const HEADER: usize = 12;
@@ -20,8 +20,8 @@ const PAGES: [usize; 2] = [0, 1];
 
 type Page = [u8; PAGE];
 
-/// The settings last saved; `None` where there are none that this board can work with. What the record does not name
-/// is as in `defaults`.
+/// Reads the settings last saved; `None` if none were saved or this board cannot work with them. Items that the record
+/// does not hold are taken from `defaults`.
 pub fn load(flash: &mut impl Flash, defaults: &BoardSettings) -> Option<BoardSettings> {
     let mut page = [0; PAGE];
     let (newest, _) = newest(flash, &mut page)?;
@@ -30,10 +30,10 @@ pub fn load(flash: &mut impl Flash, defaults: &BoardSettings) -> Option<BoardSet
     settings.validate().is_ok().then_some(settings)
 }
 
-/// Keeps `settings`; they are read back before they count as kept.
+/// Saves `settings` and reads them back.
 ///
 /// # Errors
-/// [`FlashError`]: what was saved before is still there.
+/// [`FlashError`] if the flash failed; the settings saved before are still there.
 pub fn save(flash: &mut impl Flash, settings: &BoardSettings) -> Result<(), FlashError> {
     let mut page = [0xFF; PAGE];
     let (other, sequence) = match newest(flash, &mut page) {
@@ -58,11 +58,11 @@ struct Record<'a> {
     body: &'a [u8],
 }
 
-/// Which page holds the newest whole record, and its sequence number.
+/// The page with the newest complete record, and the record's sequence number.
 fn newest(flash: &mut impl Flash, page: &mut Page) -> Option<(usize, u32)> {
     let [first, second] = PAGES.map(|index| read_record(flash, index, page).map(|record| (index, record.sequence)));
     match (first, second) {
-        // Numbers go round: half the range ahead is newer.
+        // Sequence numbers wrap: up to half the range ahead counts as newer.
         (Some(first), Some(second)) => Some(if second.1.wrapping_sub(first.1) < 1 << 31 { second } else { first }),
         (first, second) => first.or(second),
     }
@@ -83,7 +83,7 @@ fn read_record<'a>(flash: &mut impl Flash, index: usize, page: &'a mut Page) -> 
     holds.then_some(Record { sequence: u32::from_le_bytes(*sequence), body })
 }
 
-/// Writes a record to the start of `page`; returns its length.
+/// Writes a record to the start of `page`; returns its length in bytes.
 fn encode(settings: &BoardSettings, sequence: u32, page: &mut Page) -> Option<usize> {
     let mut end = HEADER;
     for key in settings.keys() {
@@ -99,7 +99,7 @@ fn encode(settings: &BoardSettings, sequence: u32, page: &mut Page) -> Option<us
     Some(end + CRC)
 }
 
-/// Takes what this board knows; `None` where the body is no list of settings.
+/// Reads the items that this firmware knows; `None` if the body is no list of settings.
 fn decode(mut body: &[u8], defaults: &BoardSettings) -> Option<BoardSettings> {
     let mut settings = defaults.clone();
     while !body.is_empty() {
@@ -107,7 +107,7 @@ fn decode(mut body: &[u8], defaults: &BoardSettings) -> Option<BoardSettings> {
         let ((item, axis, value), rest) = postcard::take_from_bytes::<(u32, u8, i64)>(body).ok()?;
         body = rest;
         if let Some(&item) = SettingItem::ALL.get(item as usize) {
-            // Neither does it matter if the board once had more axes.
+            // An axis that the board no longer has is ignored as well.
             let _ = settings.put(SettingKey { item, axis }, value);
         }
     }

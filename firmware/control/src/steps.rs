@@ -1,4 +1,4 @@
-//! When a motor must step: the instants at which a trajectory crosses the middle between two steps.
+//! Step times: the times at which a trajectory crosses the middle between two steps.
 
 use heapless::Vec;
 use libm::fabsf;
@@ -7,18 +7,19 @@ use crate::io::MAX_STEPS_PER_TICK;
 use crate::settings::Scale;
 use crate::trajectory::{Fine, Segment, micro, seconds};
 
-/// Newton's method has converged when an instant is known to this, a twentieth of what is promised.
+/// Accuracy in seconds at which Newton's method ends: a twentieth of the promised accuracy.
 const CONVERGED_S: f32 = 50e-9;
-/// Newton's method doubles its digits each time; where it leaves the bracket, halving has narrowed a tick to 15 ns by then.
+/// Largest number of rounds: Newton's method doubles its digits each time; if it leaves the bracket, as many halvings narrow
+/// a tick to 15 ns.
 const MOST_ROUNDS: u32 = 16;
 const NS_PER_S: f32 = 1e9;
-/// The last instant of a tick.
+/// The last nanosecond of a tick.
 const LAST_NS: u32 = 999_999;
 
-/// Instants of steps, nanoseconds after the start of their tick.
+/// Times of steps, in nanoseconds after the start of their tick.
 pub type Instants = Vec<u32, MAX_STEPS_PER_TICK>;
 
-/// Which step a motor is at.
+/// The step at which a motor is.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct StepCounter {
     /// Half the distance between two steps, in 2⁻⁴⁰ micro-units.
@@ -27,25 +28,25 @@ pub struct StepCounter {
 }
 
 impl StepCounter {
-    /// At the step nearest to `position`.
+    /// A motor at the step nearest to `position`.
     pub fn new(motor: Scale, position: Fine) -> Self {
         let half_step = motor.half_mark_q40();
         let halves = (i128::from(position) << 16).div_euclid(i128::from(half_step));
         Self { half_step, step: (halves + 1).div_euclid(2) as i64 }
     }
 
-    /// The middle between this step and the next one above.
+    /// The position halfway between this step and the next one above.
     fn middle_above(&self) -> Fine {
         ((i128::from(2 * self.step + 1) * i128::from(self.half_step)) >> 16) as Fine
     }
 
-    /// Goes to the step nearest to `end`, where the `pieces` of a tick lead; says whether forward, and when each step is
-    /// due. A motor that turns round within a tick makes only the steps that are left over at its end. What finds no room
-    /// waits for the next tick.
+    /// Moves to the step nearest to `end`, to which the `pieces` of a tick lead. Returns whether the steps go forward, and
+    /// the time of each. A motor that turns round within a tick makes only the difference at its end. Steps that find no
+    /// room wait for the next tick.
     pub fn follow(&mut self, pieces: impl Iterator<Item = (f32, Segment)>, end: Fine) -> (bool, Instants) {
         let (above, length) = (self.middle_above(), (self.half_step + (1 << 14)) >> 15);
         let forward = end >= above;
-        // Mirrored, so that the position rises; a step back is made where the middle is passed, not where it is met.
+        // Mirrored, so that the position rises. A step back is made when the middle is passed, not when it is reached.
         let (sign, mut middle) = if forward { (1, above) } else { (-1, length - above + 1) };
         let end = sign * end;
         let mut instants = Instants::new();
@@ -60,7 +61,7 @@ impl StepCounter {
                 middle += length;
             }
         }
-        // What rounding has hidden between two pieces is due at the end.
+        // Steps that rounding has hidden between two pieces are due at the end.
         while middle <= end && instants.push(LAST_NS).is_ok() {
             middle += length;
         }
@@ -69,7 +70,7 @@ impl StepCounter {
     }
 }
 
-/// A piece as a cubic in seconds, mirrored so that it rises in the whole.
+/// A piece as a cubic polynomial of seconds, mirrored so that it rises as a whole.
 #[derive(Clone, Copy, Debug)]
 struct Rise {
     velocity: f32,
@@ -85,7 +86,8 @@ impl Rise {
         Self { velocity, acceleration, jerk, duration: seconds(piece.duration) }
     }
 
-    /// When it has risen by `height`, which it has not `after` but by its end: Newton's method, kept inside a bracket.
+    /// Time at which the piece has risen by `height`, between the time `after` and its end: Newton's method inside a
+    /// bracket.
     fn crosses(&self, height: f32, after: f32) -> f32 {
         let Self { velocity: v, acceleration: a, jerk: j, duration } = *self;
         let (half_a, half_j, sixth_j) = (a / 2.0, j / 2.0, j / 6.0);
@@ -101,9 +103,9 @@ impl Rise {
             let slope = v + t * (a + t * half_j);
             let by = left / slope;
             let newton = t + by;
-            // Also where the slope is zero: then it is not a number, or infinite.
+            // False as well if the slope is zero: then `newton` is infinite or not a number.
             let inside = newton >= low && newton <= high;
-            // What Newton's method leaves over is what the bend makes of the square of its move.
+            // The error left is at most the curvature times the square of the last step.
             let bend = fabsf(a + t * j) + fabsf(j * by);
             let slope_there = v + newton * (a + newton * half_j);
             if inside && bend * by * by < CONVERGED_S * slope.min(slope_there) {

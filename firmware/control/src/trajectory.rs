@@ -1,4 +1,4 @@
-//! A motion in space and time: pieces of constant jerk, evaluated in integers.
+//! Trajectories: positions over time in pieces of constant jerk, evaluated in integers.
 //!
 //! Positions are in 2⁻²⁴ micro-units, durations in 2⁻³² seconds: rounding stays below a ten-thousandth of a step and a
 //! nanosecond over the longest move, and every machine computes the same bits.
@@ -6,7 +6,7 @@
 use heapless::Vec;
 use vergence_protocol::Microseconds;
 
-/// A position in 2⁻²⁴ micro-units, or one of its derivatives by seconds.
+/// A position in 2⁻²⁴ micro-units, or one of its derivatives with respect to seconds.
 pub type Fine = i64;
 
 /// Fraction bits of [`Fine`].
@@ -18,13 +18,13 @@ pub(crate) type Ticks = i64;
 
 const TICKS_PER_SECOND: f32 = 4_294_967_296.0;
 
-/// A stop, a way from rest, and the last approach: three, seven and seven pieces.
+/// Largest number of pieces: three of a stop, seven of a motion from rest and seven of the last approach.
 pub(crate) const MOST_SEGMENTS: usize = 17;
 
-/// Where an axis is at one instant.
+/// State of an axis at one instant.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct MotionState {
-    /// Position.
+    /// Position, in 2⁻²⁴ micro-units.
     pub position: Fine,
     /// Velocity, per second.
     pub velocity: Fine,
@@ -33,13 +33,13 @@ pub struct MotionState {
 }
 
 impl MotionState {
-    /// At rest.
+    /// The state of rest at `position`.
     #[must_use]
     pub const fn at(position: Fine) -> Self {
         Self { position, velocity: 0, acceleration: 0 }
     }
 
-    /// Whether it is at rest.
+    /// Whether the axis is at rest.
     #[must_use]
     pub const fn is_rest(&self) -> bool {
         self.velocity == 0 && self.acceleration == 0
@@ -49,7 +49,7 @@ impl MotionState {
     pub(crate) fn after(&self, time: Ticks, jerk: Fine) -> Self {
         let Self { position, velocity, acceleration } = *self;
         let gained = scale(jerk, time);
-        // Divided last: over minutes the last bit of an acceleration is a whole micro-unit.
+        // The division comes last: over minutes the last bit of an acceleration makes a whole micro-unit.
         let slope = velocity + scale(3 * acceleration + gained, time) / 6;
         Self {
             position: position + scale(slope, time),
@@ -59,17 +59,17 @@ impl MotionState {
     }
 }
 
-/// `rate` per second, for `time`.
+/// `rate` per second times `time`.
 fn scale(rate: Fine, time: Ticks) -> Fine {
     ((i128::from(rate) * i128::from(time) + (1 << 31)) >> 32) as Fine
 }
 
-/// Micro-units as [`Fine`]; saturates.
+/// Converts micro-units to [`Fine`]; saturates.
 pub(crate) fn fine(micro: f32) -> Fine {
     (micro * FINE_PER_MICRO) as Fine
 }
 
-/// [`Fine`] as micro-units.
+/// Converts [`Fine`] to micro-units.
 pub(crate) fn micro(fine: Fine) -> f32 {
     fine as f32 / FINE_PER_MICRO
 }
@@ -100,7 +100,7 @@ impl Segment {
         self.start.after(self.duration, self.jerk)
     }
 
-    /// The same piece run backwards in time, moved to end where `anchor` takes it.
+    /// The same piece backwards in time, with positions mirrored at `anchor`.
     pub fn reversed(&self, anchor: Fine) -> Self {
         let MotionState { position, velocity, acceleration } = self.end();
         let start = MotionState { position: anchor - position, velocity, acceleration: -acceleration };
@@ -108,22 +108,22 @@ impl Segment {
     }
 }
 
-/// A running motion: at rest from its end on.
+/// A motion that ends at rest.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Trajectory {
     segments: Vec<Segment, MOST_SEGMENTS>,
-    /// How long all pieces together take, and some rest after them where others finish later.
+    /// Duration of all pieces, and of the rest after them while other axes finish.
     duration: Ticks,
     target: Fine,
 }
 
 impl Trajectory {
-    /// No motion at all.
+    /// Rest at `position`, without any motion.
     pub(crate) fn resting_at(position: Fine) -> Self {
         Self { segments: Vec::new(), duration: 0, target: position }
     }
 
-    /// Adds a piece. Those without duration are left out; the planner never asks for more than there is room for.
+    /// Adds a piece. A piece without duration is left out; the planner never adds more pieces than there is room for.
     pub(crate) fn push(&mut self, segment: Segment) {
         if segment.duration > 0 && self.segments.push(segment).is_ok() {
             self.duration += segment.duration;
@@ -136,41 +136,41 @@ impl Trajectory {
         self.target = next.target;
     }
 
-    /// The pieces run backwards in time, so that they end at rest at `target`.
+    /// The pieces backwards in time, so that they end at rest at `target`.
     pub(crate) fn backwards(&self, target: Fine) -> impl Iterator<Item = Segment> {
         self.segments.iter().rev().map(move |segment| segment.reversed(target))
     }
 
-    /// Declares where it comes to rest: what rounding has left over is less than a thousandth of a micro-unit.
+    /// Sets the position of rest: it differs by rounding, less than a thousandth of a micro-unit.
     pub(crate) fn rest_at(&mut self, target: Fine) {
         self.target = target;
     }
 
-    /// Rests at the target until `duration` seconds are over, so that axes finish in the same tick.
+    /// Adds rest at the target until `duration` seconds have passed, so that axes finish in the same tick.
     pub fn rest_until(&mut self, duration: f32) {
         self.duration = self.duration.max(ticks(duration));
     }
 
-    /// How long it takes, in seconds.
+    /// Duration in seconds, including the rest at the end.
     #[must_use]
     pub fn duration(&self) -> f32 {
         seconds(self.duration)
     }
 
-    /// From when on it is over, rounded up to a microsecond.
+    /// Time after the start at which the trajectory is over, rounded up to a microsecond.
     #[must_use]
     pub fn ends(&self) -> Microseconds {
         let (whole, rest) = (self.duration >> 32, self.duration & 0xffff_ffff);
         Microseconds((whole * 1_000_000 + ((rest * 1_000_000) >> 32) + 1) as u64)
     }
 
-    /// Where it comes to rest.
+    /// Position of rest at the end.
     #[must_use]
     pub fn target(&self) -> Fine {
         self.target
     }
 
-    /// Where each piece begins: seconds since the start, the state, and the jerk from there on; then the end, at rest.
+    /// Start of each piece: seconds since the start of the trajectory, state, and jerk of the piece; last the end, at rest.
     pub fn knots(&self) -> impl Iterator<Item = (f64, MotionState, Fine)> + '_ {
         let mut begins = 0;
         let pieces = self.segments.iter().map(move |segment| {
@@ -182,7 +182,7 @@ impl Trajectory {
         pieces.chain((self.duration > 0).then_some(end))
     }
 
-    /// The state `elapsed` after the start.
+    /// The state at the time `elapsed` after the start.
     #[must_use]
     pub fn state(&self, elapsed: Microseconds) -> MotionState {
         self.state_at(ticks_of(elapsed.0))
@@ -198,7 +198,7 @@ impl Trajectory {
         MotionState::at(self.target)
     }
 
-    /// Whether it is over `elapsed` after the start.
+    /// Whether the trajectory is over at the time `elapsed` after the start.
     #[must_use]
     pub fn is_over(&self, elapsed: Microseconds) -> bool {
         ticks_of(elapsed.0) >= self.duration

@@ -1,28 +1,29 @@
-//! The camera trigger: pulses on a grid that does not drift.
+//! The camera trigger: single pulses, or pulses at a period that does not drift.
 
-use vergence_protocol::{AxisList, Counts, FrameMark, Microseconds, Refusal, Trigger};
+use vergence_protocol::{AxisList, Counts, Microseconds, Refusal, Trigger, TriggerMark};
 
 use crate::TICK_US;
 use crate::io::RigIo;
 
-/// No camera of the rig is faster at full size, and every pulse must fit the line as a `FrameMark`.
+/// Shortest period in microseconds: no camera of the rig is faster at full size, and the line must carry a `TriggerMark`
+/// for each pulse.
 const SHORTEST_PERIOD_US: u32 = 2_000;
-/// A slower trigger is fired one by one.
+/// Longest period in microseconds: slower triggers are fired one by one.
 const LONGEST_PERIOD_US: u32 = 10_000_000;
 
 /// Fires the cameras and numbers the pulses.
 #[derive(Debug, Default)]
 pub struct CameraTrigger {
-    /// Period in microseconds and the next pulse not yet ordered.
+    /// Period in microseconds, and time of the next pulse not yet ordered.
     train: Option<(u64, Microseconds)>,
     seq: u32,
 }
 
 impl CameraTrigger {
-    /// Begins anew.
+    /// Sets the trigger and numbers its pulses from 0.
     ///
     /// # Errors
-    /// [`Refusal::Invalid`] where the period is too short or too long; the trigger goes on as it was.
+    /// [`Refusal::Invalid`] if the period is too short or too long; the trigger goes on as before.
     pub fn set(&mut self, now: Microseconds, trigger: Trigger, io: &mut impl RigIo) -> Result<(), Refusal> {
         let train = match trigger {
             Trigger::Off | Trigger::Once => None,
@@ -39,12 +40,13 @@ impl CameraTrigger {
         Ok(())
     }
 
-    /// Whether pulses will come by themselves.
+    /// Whether periodic pulses are on.
     pub fn is_running(&self) -> bool {
         self.train.is_some()
     }
 
-    /// Orders the pulses that are due before the next tick. One that came too late is left out: the grid stays.
+    /// Orders the pulse that is due before the next tick, if any. Pulses that come too late are left out; the others keep
+    /// their times.
     pub fn poll(&mut self, now: Microseconds, io: &mut impl RigIo) {
         let Some((period, next)) = &mut self.train else { return };
         let missed = now.0.saturating_sub(next.0).div_ceil(*period);
@@ -55,9 +57,9 @@ impl CameraTrigger {
         }
     }
 
-    /// What the host is told of a pulse.
-    pub fn mark(&mut self, at: Microseconds, counts: AxisList<Counts>) -> FrameMark {
-        let mark = FrameMark { seq: self.seq, at, counts };
+    /// Numbers the pulse at `at` and returns its report for the host.
+    pub fn mark(&mut self, at: Microseconds, counts: AxisList<Counts>) -> TriggerMark {
+        let mark = TriggerMark { seq: self.seq, at, counts };
         self.seq = self.seq.wrapping_add(1);
         mark
     }

@@ -1,39 +1,38 @@
-//! Takes a firmware image into flash: page by page, in any number of attempts.
+//! Writes a firmware image to flash, page by page, in any number of attempts.
 //!
-//! Every unit is compared with what the flash holds and programmed only where it differs, so an attempt that was cut
-//! goes on at the first page whose content differs, and a chunk that comes twice does nothing. A page that differs but
-//! was not erased by this attempt is erased and taken again from its start: the board decides where to go on.
+//! Each unit is compared with the flash and programmed only if it differs. So an attempt that was interrupted continues at
+//! the first page whose content differs, and a repeated chunk does nothing. A page that differs but was not erased in this
+//! attempt is erased and written from its start: the board decides where to continue.
 
 use sha2::{Digest, Sha256};
 use vergence_protocol::management::{ImageHeader, Outcome, Signature};
 
-use crate::flash::{Flash, FlashError, PAGE, UNIT};
-use crate::services::BoardServices;
+use crate::services::{BoardServices, Flash, FlashError, PAGE, UNIT};
 
-/// How much of the image is read at once to hash it.
+/// Number of bytes read at once to hash the image.
 const BLOCK: usize = 256;
 
-/// An image on its way into flash.
+/// An update under way.
 #[derive(Debug, Default)]
 pub struct Updater {
     header: Option<ImageHeader>,
-    /// The next byte wanted, a multiple of the unit.
+    /// Offset of the next byte wanted, a multiple of [`UNIT`].
     next: usize,
-    /// The page that was erased in this attempt and is being programmed.
+    /// The page that was erased last in this attempt and is being programmed.
     fresh: Option<usize>,
-    /// The boot loader was told to start it.
+    /// Whether the boot loader was told to start the image.
     committed: bool,
 }
 
 impl Updater {
-    /// The next byte of the image that is wanted.
+    /// Offset of the next byte of the image that the board wants.
     #[must_use]
     pub fn next(&self) -> u32 {
         let length = self.header.map_or(0, |header| header.length);
         u32::try_from(self.next).unwrap_or(u32::MAX).min(length)
     }
 
-    /// Takes an image, or goes on with the same one. Version and hardware are checked before.
+    /// Begins an image, or resumes the same one. The caller has checked version and hardware.
     pub fn begin(&mut self, header: &ImageHeader, services: &mut impl BoardServices) -> Outcome {
         if self.header == Some(*header) {
             return Outcome::Done;
@@ -49,7 +48,7 @@ impl Updater {
         Outcome::Done
     }
 
-    /// Takes bytes of the image.
+    /// Takes `data`, the bytes of the image at `offset`.
     pub fn chunk(&mut self, offset: u32, data: &[u8], services: &mut impl BoardServices) -> Outcome {
         let (Some(header), Ok(offset)) = (self.header, usize::try_from(offset)) else { return Outcome::NotBegun };
         let end = (header.length as usize).next_multiple_of(UNIT);
@@ -75,10 +74,10 @@ impl Updater {
         Outcome::Done
     }
 
-    /// Stores the next unit; false where its page must be taken again from the start.
+    /// Stores the next unit; returns false if its page must be written again from the start.
     fn store(&mut self, unit: [u8; UNIT], flash: &mut impl Flash) -> Result<bool, FlashError> {
         let mut stored = [0; UNIT];
-        // What cannot be read, as a word torn when power went, must be written anew.
+        // A word that cannot be read, because a power cut tore it, must be written again.
         let holds = flash.read(self.next, &mut stored).is_ok() && stored == unit;
         if !holds {
             let page = self.next / PAGE;
@@ -103,7 +102,7 @@ impl Updater {
         self.fresh = None;
     }
 
-    /// Checks the whole image and tells the boot loader to start it.
+    /// Checks digest and signature of the image and tells the boot loader to start it on trial.
     pub fn commit(&mut self, signature: &Signature, services: &mut impl BoardServices) -> Outcome {
         let Some(header) = self.header else { return Outcome::NotBegun };
         if self.next() < header.length {
@@ -128,7 +127,7 @@ impl Updater {
     }
 }
 
-/// SHA-256 of what the flash holds.
+/// SHA-256 of the first `length` bytes of the flash.
 fn digest(length: usize, flash: &mut impl Flash) -> Result<[u8; 32], FlashError> {
     let mut hash = Sha256::new();
     let mut block = [0; BLOCK];

@@ -1,21 +1,21 @@
-//! An image as a file: its seal, then its bytes. In flash the seal lies behind the image, at a place of its own; in a
-//! file it comes first, so that whoever reads it knows at once what follows.
+//! A firmware image as a file: its seal, then its bytes. In flash the seal has a fixed place behind the image; in a file it
+//! comes first, so that a reader knows at once what follows.
 
 use vergence_protocol::management::ImageHeader;
 
 use crate::seal::{SEAL_LENGTH, Seal, SealError, is_signed_by, sha256};
 
-/// An image file, read.
+/// The contents of an image file.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct ImageFile<'a> {
-    /// What the image says of itself, and its signature.
+    /// Header and signature of the image.
     pub seal: Seal,
-    /// The bytes for flash.
+    /// The image: the bytes for flash.
     pub image: &'a [u8],
 }
 
 impl<'a> ImageFile<'a> {
-    /// Reads a file, whatever hardware it is for. The signature is not judged: see [`Self::is_signed_by`].
+    /// Reads a file for any hardware. The signature is not checked: see [`Self::is_signed_by`].
     ///
     /// # Errors
     /// [`SealError::Missing`], [`SealError::WrongLength`] or [`SealError::WrongDigest`].
@@ -31,13 +31,13 @@ impl<'a> ImageFile<'a> {
         Ok(Self { seal, image })
     }
 
-    /// What the image says of itself.
+    /// Header of the image.
     #[must_use]
     pub const fn header(&self) -> &ImageHeader {
         &self.seal.header
     }
 
-    /// Whether its header is signed by `key`, an Ed25519 public key.
+    /// Whether the header is signed by `key`, an Ed25519 public key.
     #[must_use]
     pub fn is_signed_by(&self, key: &[u8; 32]) -> bool {
         is_signed_by(key, &self.seal.header.signed_bytes(), &self.seal.signature)

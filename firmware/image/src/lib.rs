@@ -1,6 +1,6 @@
-//! What boot loader, application and host must agree on (`no_std`, no I/O): where everything lies in flash
-//! ([`layout`]), how an image is sealed so that a boot loader can judge it ([`Seal`]), how it travels as a file
-//! ([`ImageFile`]), what it says of itself ([`notes`]), and what a board remembers through a reset ([`Survivor`]).
+//! Formats that boot loader, application and host share (`no_std`, no I/O): the layout of the flash ([`layout`]), the seal
+//! by which a boot loader checks an image ([`Seal`]), the image as a file ([`ImageFile`]), version and build id in the image
+//! ([`notes`]), and the memory that a board keeps through a reset ([`Survivor`]).
 
 #![no_std]
 

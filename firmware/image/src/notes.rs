@@ -1,12 +1,12 @@
-//! What an application says of itself in notes among its bytes (ELF notes: sizes of name and content, type, name,
+//! Version and build id of an application, in notes among its bytes (ELF notes: sizes of name and content, type, name,
 //! content; each part fills whole words).
 
-/// The linker's build id: 20 bytes of type 3, owner "GNU".
+/// Head of the linker's note with the build id: 20 bytes of type 3, owner "GNU".
 const BUILD: [u8; 16] = [4, 0, 0, 0, 20, 0, 0, 0, 3, 0, 0, 0, b'G', b'N', b'U', 0];
-/// The version: 4 bytes of type 1, owner "VGC".
+/// Head of the note with the version: 4 bytes of type 1, owner "VGC".
 const VERSION: [u8; 16] = [4, 0, 0, 0, 4, 0, 0, 0, 1, 0, 0, 0, b'V', b'G', b'C', 0];
 
-/// A note that names a version, as an application puts it into flash.
+/// The note with the version, as an application has it in flash.
 #[repr(C, align(4))]
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct VersionNote {
@@ -17,26 +17,27 @@ pub struct VersionNote {
 }
 
 impl VersionNote {
-    /// The note of a version.
+    /// The note of this version: major, minor, patch.
     #[must_use]
     pub const fn new(version: [u8; 3]) -> Self {
         Self { head: VERSION, version, padding: 0 }
     }
 }
 
-/// The version that an application names.
+/// Version of an application (major, minor, patch); `None` if it has no such note.
 #[must_use]
 pub fn version_of(image: &[u8]) -> Option<[u8; 3]> {
     image.get(content(image, &VERSION)?..)?.first_chunk().copied()
 }
 
-/// Where an application keeps its build: the first eight bytes of the linker's build id, most significant first.
+/// Offset of an application's build id: the first eight bytes of the linker's build id, most significant first. `None` if
+/// it has no such note.
 #[must_use]
 pub fn build_at(image: &[u8]) -> Option<usize> {
     content(image, &BUILD).filter(|&at| image.len() >= at + 8)
 }
 
-/// The build that an application names.
+/// Build id of an application; `None` if it has no such note.
 #[must_use]
 pub fn build_of(image: &[u8]) -> Option<u64> {
     image.get(build_at(image)?..)?.first_chunk().copied().map(u64::from_be_bytes)

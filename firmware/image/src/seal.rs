@@ -1,5 +1,5 @@
-//! The seal of an image: its header and signature behind it in flash, so that a swap carries them along and a boot
-//! loader can judge what it finds.
+//! The seal of an image: header and signature, behind the image in flash, so that a swap moves them along and the boot
+//! loader can check the image.
 //!
 //! ```text
 //! 0 magic | 4 signed header | 55 signature | 119 CRC-32C of all before | 123 filled up with 0xFF
@@ -13,15 +13,15 @@ use vergence_protocol::management::{ImageHeader, Signature};
 
 use crate::layout::{CAPACITY, HARDWARE};
 
-/// How many bytes a seal takes: whole words of the flash.
+/// Length of a seal in bytes: whole words of the flash.
 pub const SEAL_LENGTH: usize = 128;
 const MAGIC: [u8; 4] = *b"VGIM";
 const SIGNATURE: usize = 4 + ImageHeader::SIGNED;
 const CHECK: usize = SIGNATURE + 64;
 const CASTAGNOLI: Crc<u32, NoTable> = Crc::<u32, NoTable>::new(&CRC_32_ISCSI);
 
-/// The public key of development images: that of test 1 in RFC 8032, section 7.1, whose secret everybody can read
-/// there. Whoever wants signatures to keep strangers out builds boot loader and application with a key of their own.
+/// Public key of development images: that of test 1 in RFC 8032, section 7.1, whose secret key is published there. For
+/// signatures that keep strangers out, build boot loader and application with a key of your own.
 pub const DEVELOPMENT_KEY: [u8; 32] = [
     0xd7, 0x5a, 0x98, 0x01, 0x82, 0xb1, 0x0a, 0xb7, 0xd5, 0x4b, 0xfe, 0xd3, 0xc9, 0x64, 0x07, 0x3a, 0x0e, 0xe1, 0x72,
     0xf3, 0xda, 0xa6, 0x23, 0x25, 0xaf, 0x02, 0x1a, 0x68, 0xf7, 0x07, 0x51, 0x1a,
@@ -30,9 +30,9 @@ pub const DEVELOPMENT_KEY: [u8; 32] = [
 /// Header and signature of an image.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Seal {
-    /// What the image says of itself.
+    /// Description of the image.
     pub header: ImageHeader,
-    /// Over [`ImageHeader::signed_bytes`].
+    /// Signature over [`ImageHeader::signed_bytes`].
     pub signature: Signature,
 }
 
@@ -44,16 +44,16 @@ pub enum SealError {
     Missing,
     /// The image is for other hardware.
     WrongHardware,
-    /// The header names a length that cannot be.
+    /// The image is not as long as its header says, or its length is impossible.
     WrongLength,
-    /// The bytes do not have the digest that the header names.
+    /// The image's SHA-256 differs from the header's.
     WrongDigest,
-    /// The signature is not of the key.
+    /// The signature is not of the expected key.
     WrongSignature,
 }
 
 impl Seal {
-    /// The bytes for flash.
+    /// The seal as it is stored.
     #[must_use]
     pub fn to_bytes(&self) -> [u8; SEAL_LENGTH] {
         let mut bytes = [0xFF; SEAL_LENGTH];
@@ -66,10 +66,10 @@ impl Seal {
         bytes
     }
 
-    /// Reads a seal.
+    /// Reads a stored seal.
     ///
     /// # Errors
-    /// [`SealError::Missing`].
+    /// [`SealError::Missing`] if the bytes are no seal or are damaged.
     pub fn from_bytes(bytes: &[u8; SEAL_LENGTH]) -> Result<Self, SealError> {
         let check = CASTAGNOLI.checksum(&bytes[..CHECK]).to_le_bytes();
         if bytes[..4] != MAGIC || bytes[CHECK..CHECK + 4] != check {
@@ -86,10 +86,11 @@ impl Seal {
         Ok(Self { header, signature: Signature { r: fields.take(), s: fields.take() } })
     }
 
-    /// Judges the image at the start of `region`, whose seal is at byte [`CAPACITY`]: hardware, length, digest, signature.
+    /// Checks hardware, length, digest and signature of the image at the start of `region`, whose seal is at byte
+    /// [`CAPACITY`].
     ///
     /// # Errors
-    /// Says what is wrong.
+    /// [`SealError`] names the first of these that is wrong.
     pub fn check(region: &[u8], key: &[u8; 32]) -> Result<Self, SealError> {
         let (image, rest) = region.split_at_checked(CAPACITY as usize).ok_or(SealError::Missing)?;
         let seal = Self::from_bytes(rest.first_chunk().ok_or(SealError::Missing)?)?;
@@ -122,8 +123,8 @@ impl fmt::Display for SealError {
             Self::Missing => "this is no signed image, or its header is damaged",
             Self::WrongHardware => "the image is for other hardware",
             Self::WrongLength => "the image is not as long as its header says",
-            Self::WrongDigest => "the image is damaged: its digest is not that of its header",
-            Self::WrongSignature => "the signature is not of the key",
+            Self::WrongDigest => "the image is damaged: its SHA-256 is not that of its header",
+            Self::WrongSignature => "the image is not signed with the expected key",
         })
     }
 }
@@ -137,17 +138,17 @@ pub fn is_signed_by(key: &[u8; 32], message: &[u8], signature: &Signature) -> bo
     salty::PublicKey::try_from(key).and_then(|key| key.verify(message, &(&bytes).into())).is_ok()
 }
 
-/// SHA-256 (FIPS 180-4).
+/// SHA-256 of `bytes` (FIPS 180-4).
 #[must_use]
 pub fn sha256(bytes: &[u8]) -> [u8; 32] {
     Sha256::digest(bytes).into()
 }
 
-/// What is left to read of fields without gaps.
+/// Reader of consecutive fields.
 struct Fields<'a>(&'a [u8]);
 
 impl Fields<'_> {
-    /// The next field; zeros where the bytes end.
+    /// Reads the next field; zeros if the bytes end before it.
     fn take<const N: usize>(&mut self) -> [u8; N] {
         let Some((field, rest)) = self.0.split_first_chunk::<N>() else { return [0; N] };
         self.0 = rest;

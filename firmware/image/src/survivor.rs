@@ -1,8 +1,8 @@
-//! What the board remembers through a reset, in RAM that no start-up code touches. Power-off forgets it.
+//! Memory that the board keeps through a reset, in RAM that no start-up code touches. It is lost at power-off.
 
 use crc::{CRC_32_ISCSI, Crc, NoTable};
 
-/// How many words it takes.
+/// Length of the memory in 32-bit words.
 pub const SURVIVOR_WORDS: usize = 14;
 const MAGIC: u32 = 0x5355_5256;
 const CASTAGNOLI: Crc<u32, NoTable> = Crc::<u32, NoTable>::new(&CRC_32_ISCSI);
@@ -10,46 +10,46 @@ const CASTAGNOLI: Crc<u32, NoTable> = Crc::<u32, NoTable>::new(&CRC_32_ISCSI);
 /// Facts that outlive a reset.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Survivor {
-    /// Starts of the application since it last proved healthy.
+    /// Number of starts of the application since it last ran without failing.
     pub failed_starts: u32,
-    /// Whether the boot loader shall stay in its serial recovery at the next start.
+    /// Whether the boot loader is to stay in its serial recovery at the next start.
     pub recovery_wanted: bool,
-    /// Starts since power-on.
+    /// Number of starts since power-on.
     pub starts: u32,
-    /// How the program last died.
+    /// How the program died last, if it did.
     pub death: Option<Death>,
 }
 
-/// How many addresses are kept of a death.
+/// Number of addresses kept of a death.
 pub const TRACE: usize = 8;
 
 /// How a program died.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Death {
-    /// Of what.
+    /// Cause of the death.
     pub kind: DeathKind,
-    /// Where: return addresses of the calls that led there, the latest first; before them, of a fault, the instruction.
-    /// Zeros at the end.
+    /// Return addresses of the calls that led to the place, the latest first; after a hard fault the address of the
+    /// instruction goes before them. Filled up with zeros.
     pub trace: [u32; TRACE],
 }
 
-/// Of what a program died.
+/// Cause of a death.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum DeathKind {
     /// A Rust panic.
     Panic,
     /// A hard fault of the core.
     HardFault,
-    /// It could not work with the settings it came with.
+    /// The program could not work with its default settings.
     Settings,
-    /// It could not open the serial line.
+    /// The program could not open the serial line.
     SerialLine,
 }
 
 impl DeathKind {
     const ALL: [Self; 4] = [Self::Panic, Self::HardFault, Self::Settings, Self::SerialLine];
 
-    /// From 1; zero is no death.
+    /// Number of the kind from 1; zero means no death.
     const fn number(self) -> u32 {
         self as u32 + 1
     }
@@ -60,7 +60,7 @@ impl DeathKind {
 }
 
 impl Survivor {
-    /// Reads it; whatever is not intact counts as forgotten.
+    /// Reads the memory; if it is not intact, all is forgotten.
     #[must_use]
     pub fn from_words(words: &[u32; SURVIVOR_WORDS]) -> Self {
         if words[0] != MAGIC || words[SURVIVOR_WORDS - 1] != check(words) {
@@ -76,7 +76,7 @@ impl Survivor {
         }
     }
 
-    /// The words to keep.
+    /// The memory as words.
     #[must_use]
     pub fn to_words(&self) -> [u32; SURVIVOR_WORDS] {
         let mut words = [0; SURVIVOR_WORDS];
@@ -94,7 +94,7 @@ impl Survivor {
 }
 
 impl Death {
-    /// The addresses, without the zeros behind them.
+    /// The addresses without the zeros that fill up the list.
     #[must_use]
     pub fn trace(&self) -> &[u32] {
         let length = self.trace.iter().position(|&address| address == 0).unwrap_or(TRACE);

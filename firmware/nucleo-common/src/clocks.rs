@@ -1,22 +1,22 @@
-//! 170 MHz, which needs the supply's boost mode.
+//! Clocks of the chip: the core runs at 170 MHz, which needs the supply's boost mode.
 
 use embassy_stm32::pac::{PWR, RCC, pwr, rcc::vals::Sw};
 use embassy_stm32::rcc::{self, Pll, PllMul, PllPreDiv, PllRDiv, PllSource, Sysclk};
 use embassy_stm32::{Config, Peri, Peripherals, peripherals, time::Hertz};
 
-/// What the clocks count on.
+/// Oscillator that the clocks are derived from.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Source {
     /// The board's crystal of 24 MHz.
     Crystal,
-    /// The oscillator inside the chip: a hundredth less exact, and always there.
+    /// The oscillator inside the chip: accurate to one percent, and always there.
     Inside,
 }
 
 /// Starts the chip and brings its core to 170 MHz.
 ///
-/// First at 16 MHz: the driver's own start resets the supply to its normal mode, good for 150 MHz, and then looks for
-/// the bit that leaves it at the wrong place (bit 0 of `PWR_CR5` in stm32-metapac 21; it is bit 8, RM0440, 6.4.22).
+/// The chip starts at 16 MHz: the driver's own start sets the supply to its normal mode, which is good for 150 MHz, and
+/// tests the boost bit at the wrong place (bit 0 of `PWR_CR5` in stm32-metapac 21; it is bit 8, RM0440, 6.4.22).
 pub fn start(source: Source) -> Peripherals {
     let mut p = embassy_stm32::init(Config::default());
     PWR.cr5().write_value(pwr::regs::Cr5(0));
@@ -42,7 +42,7 @@ fn speed_up(clocks: &mut Peri<'static, peripherals::RCC>, source: Source) {
     rcc::reinit(config, clocks);
 }
 
-/// Back to the 16 MHz that a reset leaves, for a program that starts the chip anew.
+/// Returns to the 16 MHz of a reset, for the next program, which starts the chip anew.
 pub fn slow_down() {
     RCC.cr().modify(|w| w.set_hsion(true));
     while !RCC.cr().read().hsirdy() {}

@@ -1,8 +1,8 @@
-//! Where a program died.
+//! Records where a program died.
 //!
-//! Every function of this target keeps a frame (rustc sets "frame-pointer: always" for it): r7 points to two words on the
-//! stack, the caller's r7 and the return address. So the calls that led to a panic can be told by addresses alone, which
-//! the ELF file turns into names; names of files in the program would take 11 kB of flash.
+//! Every function of this target keeps a stack frame (rustc sets "frame-pointer: always" for it): r7 points to two words on
+//! the stack, the caller's r7 and the return address. So the calls that led to a panic are recorded as addresses, which the
+//! ELF file turns into names; file names in the program would take 11 kB of flash.
 
 use core::arch::asm;
 
@@ -10,7 +10,7 @@ use cortex_m_rt::ExceptionFrame;
 use vergence_image::layout::{ACTIVE, BOOTLOADER, FLASH_BASE, RAM};
 use vergence_image::{Death, DeathKind, TRACE};
 
-/// Of `kind`, here.
+/// A death of `kind` at the place of the call.
 #[inline(always)]
 #[must_use]
 pub fn here(kind: DeathKind) -> Death {
@@ -19,14 +19,14 @@ pub fn here(kind: DeathKind) -> Death {
     Death { kind, trace }
 }
 
-/// Of a hard fault. To be called from its handler, whose frame lies upon that of the function at fault.
+/// A death by hard fault. Call it from the fault's handler, whose stack frame lies on that of the function at fault.
 #[inline(always)]
 #[must_use]
 pub fn of_fault(frame: &ExceptionFrame) -> Death {
     let mut trace = [0; TRACE];
     let [at, rest @ ..] = &mut trace;
     *at = frame.pc();
-    // Where a jump into nowhere came from.
+    // The link register shows where a jump to an address without code came from.
     let (link, calls) = rest.split_at_mut(usize::from(is_code(frame.lr())));
     link.fill(frame.lr());
     if let Some([interrupted, _]) = frame_at(frame_pointer()) {
@@ -46,11 +46,11 @@ fn frame_pointer() -> u32 {
     pointer
 }
 
-/// Fills `trace` with the return addresses of `frame` and those before it, as far as they make sense.
+/// Fills `trace` with the return addresses of `frame` and its callers, as far as they are plausible.
 fn follow(mut frame: u32, trace: &mut [u32]) {
     for address in trace {
         let Some([caller, back]) = frame_at(frame) else { return };
-        // The frames before an interrupt's are not followed.
+        // Frames of code that an interrupt has interrupted are not followed.
         if !is_code(back) || caller <= frame {
             return;
         }
@@ -63,7 +63,7 @@ fn is_code(address: u32) -> bool {
     [BOOTLOADER, ACTIVE].iter().any(|region| (region.start..region.end()).contains(&address.wrapping_sub(FLASH_BASE)))
 }
 
-/// The caller's frame pointer and the return address, where `frame` can be a frame.
+/// The caller's frame pointer and the return address at `frame`, if it can be a stack frame.
 fn frame_at(frame: u32) -> Option<[u32; 2]> {
     let is_stack = frame.is_multiple_of(4) && (RAM.start..RAM.end() - 8).contains(&frame);
     // SAFETY: two words of RAM, which may hold anything.

@@ -1,11 +1,10 @@
-//! What boot loader and application of the NUCLEO-G474RE share: clocks, flash and what becomes of words that power-off tore,
-//! the swap's state, the memory kept through resets, and how a program dies.
+//! Parts that boot loader and application of the NUCLEO-G474RE share: clocks, flash, the state of a swap, the memory kept
+//! through resets, and the record of a program's death.
 
 #![no_std]
 
 pub mod clocks;
 pub mod death;
-mod ecc;
 mod flash;
 pub mod memory;
 mod services;

@@ -1,9 +1,9 @@
-//! Memory that outlives the program: RAM kept through resets, and flash read as it is.
+//! Memory that outlives the program: RAM kept through resets, and flash read as memory.
 
 use vergence_image::layout::{self, Region};
 use vergence_image::{SURVIVOR_WORDS, Survivor};
 
-/// What the board remembers.
+/// Reads the memory kept through resets.
 #[allow(unsafe_code, reason = "RAM outside the program's own")]
 pub fn survivor() -> Survivor {
     let memory = layout::SURVIVOR.start as *const [u32; SURVIVOR_WORDS];
@@ -12,7 +12,7 @@ pub fn survivor() -> Survivor {
     Survivor::from_words(&unsafe { memory.read_volatile() })
 }
 
-/// Makes the board remember.
+/// Writes the memory kept through resets.
 #[allow(unsafe_code, reason = "RAM outside the program's own")]
 pub fn remember(survivor: &Survivor) {
     let memory = layout::SURVIVOR.start as *mut [u32; SURVIVOR_WORDS];
@@ -20,7 +20,7 @@ pub fn remember(survivor: &Survivor) {
     unsafe { memory.write_volatile(survivor.to_words()) };
 }
 
-/// A region of the flash. Not to be held while the region is written.
+/// The bytes of a flash region. Do not hold them while the region is written.
 #[allow(unsafe_code, reason = "flash as memory")]
 pub fn region(region: Region) -> &'static [u8] {
     let start = (layout::FLASH_BASE + region.start) as *const u8;

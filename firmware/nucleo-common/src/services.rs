@@ -1,4 +1,4 @@
-//! Flash, boot loader and trusted key as the node sees them.
+//! Flash, boot loader and trusted key, with the interface of the node.
 
 use embassy_boot_stm32::State;
 use embassy_stm32::{Peri, peripherals};
@@ -11,13 +11,13 @@ use crate::flash::{Area, FedFlash, feed_watchdog};
 use crate::memory;
 use crate::swap::SwapState;
 
-/// Where an image on its way is stored, and where its seal.
+/// Flash of an image that is being received, and of its seal.
 const IMAGE: Region = Region { start: DFU.start, length: CAPACITY };
 const SEAL: Region = Region { start: IMAGE.end(), length: PAGE };
-/// Where a swap leaves the image before: one page up.
+/// Flash in which a swap leaves the earlier image: one page above [`DFU`]'s start.
 const EARLIER: Region = Region { start: DFU.start + PAGE, length: ACTIVE.length };
 
-/// What the node needs besides the mechanics.
+/// The board's flash, boot loader and key.
 pub struct Services {
     settings: Area,
     image: Area,
@@ -27,7 +27,7 @@ pub struct Services {
 }
 
 impl Services {
-    /// Of an application: what runs is what the boot loader left in the state page.
+    /// Services of an application: the boot loader's state page tells which image runs.
     pub fn of_application(flash: &Peri<'static, peripherals::FLASH>) -> Self {
         let mut services = Self::new(flash, BootState::Confirmed);
         services.boot = match services.swap.read() {
@@ -38,14 +38,14 @@ impl Services {
         services
     }
 
-    /// Of the boot loader, when nothing starts.
+    /// Services of the boot loader's recovery.
     pub fn of_recovery(flash: &Peri<'static, peripherals::FLASH>) -> Self {
         Self::new(flash, BootState::Recovery)
     }
 
     #[allow(unsafe_code, reason = "several handles of one flash")]
     fn new(flash: &Peri<'static, peripherals::FLASH>, boot: BootState) -> Self {
-        // SAFETY: as for areas.
+        // SAFETY: as for `Area::new`.
         let whole = FedFlash::new(unsafe { flash.clone_unchecked() });
         let [settings, image, seal] = [SETTINGS, IMAGE, SEAL].map(|region| Area::new(flash, region));
         Self { settings, image, seal, swap: SwapState::new(whole), boot }
@@ -87,7 +87,7 @@ impl BoardServices for Services {
 
     fn roll_back(&mut self) -> Result<bool, FlashError> {
         if self.boot == BootState::Trial {
-            // Any start that comes before a confirmation goes back.
+            // Every start without confirmation returns to the earlier image.
             return Ok(true);
         }
         feed_watchdog();

@@ -1,12 +1,12 @@
-//! What boot loader and application tell each other in the state page of embassy-boot 0.7.
+//! The state page of embassy-boot 0.7, by which boot loader and application tell each other about a swap of images.
 //!
 //! Word 0 is the state; word 1, once written, makes the progress invalid; the words from 2 on are written one by one as
 //! pages are copied: two for each page of a swap, then two for each page of its undoing. A swap that is complete but
 //! whose state is not set to "booted" is undone at the next start.
 //!
-//! An erasure that power cuts may spare the state and take the progress: a complete swap would then look like one that
-//! has just begun, and be made once more over its own result. So whoever ends a state first makes its word mean nothing:
-//! zeros may be programmed over anything (RM0440, 3.3.7).
+//! A power cut during an erasure may leave the state and erase the progress: a complete swap would then look like one
+//! that has just begun and be carried out again over its own result. So the state's word is made meaningless before the
+//! page is erased: zeros may be programmed over anything (RM0440, 3.3.7).
 
 use core::cell::RefCell;
 
@@ -22,7 +22,7 @@ use crate::flash::FedFlash;
 
 type Word = [u8; WORD as usize];
 
-/// Words of states as embassy-boot writes them, and one of progress, which as a state means nothing.
+/// State words as embassy-boot writes them, and a word of progress, which means no state.
 const BOOTED: Word = [0xD0; WORD as usize];
 const SWAP: Word = [0xF0; WORD as usize];
 const DONE: Word = [0; WORD as usize];
@@ -39,16 +39,16 @@ impl SwapState {
         Self(flash)
     }
 
-    /// Begins, goes on with or undoes a swap, if one is due. Returns how the state was found.
+    /// Begins, resumes or undoes a swap, if one is due. Returns the state found before.
     pub fn carry_out(&mut self) -> State {
         let flash = Shared::new(RefCell::new(&mut self.0));
         let state = StatePage(part(&flash, STATE));
         let config = BootLoaderConfig { active: part(&flash, ACTIVE), dfu: part(&flash, DFU), state };
-        // It fails only where flash does; what is there may still be sound.
+        // Only a failing flash makes this fail; the image may still be sound.
         BootLoader::try_prepare::<_, _, _, { PAGE as usize }>(config).map_or(State::Boot, |loader| loader.state)
     }
 
-    /// The state.
+    /// Reads the state.
     pub fn read(&mut self) -> State {
         let mut word = DONE;
         match self.0.read(STATE.start, &mut word) {
@@ -57,24 +57,24 @@ impl SwapState {
         }
     }
 
-    /// The image in [`DFU`] is to be swapped in at the next start.
+    /// Orders a swap with the image in [`DFU`] at the next start.
     pub fn mark_updated(&mut self) -> Result<(), FlashError> {
         if self.read() == State::Swap { Ok(()) } else { self.enter(SWAP, 0) }
     }
 
-    /// The image that runs is good.
+    /// Marks the running image as good.
     pub fn mark_booted(&mut self) -> Result<(), FlashError> {
         self.enter(BOOTED, 0)
     }
 
-    /// The last swap is to be undone at the next start, though it was found good: writes the state as it was right after
-    /// that swap.
+    /// Orders the undoing of the last swap at the next start, although its image was marked as good: writes the state as it
+    /// was right after that swap.
     pub fn mark_undone(&mut self) -> Result<(), FlashError> {
         self.enter(SWAP, ACTIVE.length / PAGE * 2)
     }
 
-    /// Ends the state and begins another, so many words into its progress. The new state comes last: until then there is
-    /// none.
+    /// Ends the state and begins another with `progress` words of progress. The new state is written last: until then there
+    /// is none.
     fn enter(&mut self, state: Word, progress: u32) -> Result<(), FlashError> {
         let mut write = || {
             self.0.write(STATE.start, &DONE)?;

@@ -1,22 +1,19 @@
-//! The NUCLEO-G474RE: which pin and which timer does what. The one place to change for another wiring; docs/firmware.md
-//! has the same as a table. That a pin can do its job is checked by the compiler: `TimerPin<TIM8, Ch1>` and its like
-//! are implemented from the chip's alternate-function data, and each pin can be given away only once.
+//! Pins and timers of the NUCLEO-G474RE. For another wiring, change this file and the table in docs/firmware.md.
+//!
+//! The compiler checks that a pin can do its job: `TimerPin<TIM8, Ch1>` and similar traits are implemented from the chip's
+//! alternate-function data, and each pin can be given away only once.
 
 use embassy_stm32::gpio::{Input, Level, Output, Pull, Speed};
 use embassy_stm32::mode::Async;
 use embassy_stm32::usart::{self, RingBufferedUartRx, Uart, UartTx};
-use embassy_stm32::wdg::IndependentWatchdog;
 use embassy_stm32::{Peri, Peripherals, bind_interrupts, dma, pac, peripherals, rcc};
-use static_cell::StaticCell;
 
 use crate::encoder::Encoder;
-use crate::link;
 use crate::rig::Rig;
 use crate::steps::{StepDma, StepPulses};
 use crate::trigger::Trigger;
-use crate::watchdog::PATIENCE_US;
 
-/// What the board calls itself.
+/// Name of the kind of board.
 pub const NAME: &str = "nucleo-g474";
 
 bind_interrupts!(struct Interrupts {
@@ -33,21 +30,21 @@ impl StepDma for peripherals::DMA1_CH4 {
     const CHANNEL: usize = 3;
 }
 
-/// The board, ready to be given to its users.
+/// The parts of the board, ready to be used.
 pub struct Board {
-    /// What moves.
+    /// Motors, encoders, switches and trigger.
     pub rig: Rig,
     /// Timer of the control tick.
     pub tick: Peri<'static, peripherals::TIM7>,
-    /// Not yet started.
-    pub watchdog: IndependentWatchdog<'static, peripherals::IWDG>,
-    /// LD2.
+    /// Watchdog, not started yet.
+    pub watchdog: Peri<'static, peripherals::IWDG>,
+    /// The green LED LD2.
     pub led: Output<'static>,
-    /// Not yet opened.
+    /// Serial line, not opened yet.
     pub line: SerialLine,
-    /// Random numbers.
+    /// Random number generator.
     pub random: Peri<'static, peripherals::RNG>,
-    /// Flash.
+    /// Flash controller.
     pub flash: Peri<'static, peripherals::FLASH>,
 }
 
@@ -61,9 +58,9 @@ pub struct SerialLine {
 }
 
 impl Board {
-    /// Gives every pin its job. The drivers are off.
+    /// Sets up every pin. The drivers are off.
     pub fn new(p: Peripherals) -> Self {
-        // First of all, so that nothing can move: high is off.
+        // First, so that nothing can move: high switches the drivers off.
         let drivers_off = Output::new(p.PA10, Level::High, Speed::Low);
         let rig = Rig {
             steps: [
@@ -81,7 +78,7 @@ impl Board {
         Self {
             rig,
             tick: p.TIM7,
-            watchdog: IndependentWatchdog::new(p.IWDG, PATIENCE_US),
+            watchdog: p.IWDG,
             led: Output::new(p.PA5, Level::High, Speed::Low),
             line: SerialLine { port: p.LPUART1, tx: p.PA2, rx: p.PA3, tx_dma: p.DMA1_CH2, rx_dma: p.DMA1_CH1 },
             random: p.RNG,
@@ -90,7 +87,7 @@ impl Board {
     }
 }
 
-/// The robot's servo bus will be here, one wire in both directions; nothing else may take these.
+/// Reserves port and pins of the robot's servo bus (one wire in both directions), which no driver uses yet.
 fn reserve_servo_bus<T: usart::Instance>(
     _port: &Peri<'static, T>,
     _data: &Peri<'static, impl usart::TxPin<T>>,
@@ -99,19 +96,22 @@ fn reserve_servo_bus<T: usart::Instance>(
 }
 
 impl SerialLine {
-    /// Opens the line; `None` where it cannot keep that speed.
-    pub fn open(self, baud: u32) -> Option<(RingBufferedUartRx<'static>, UartTx<'static, Async>)> {
-        static RING: StaticCell<[u8; link::RING]> = StaticCell::new();
+    /// Opens the line at `baud`, with `ring` for received bytes; `None` where the port cannot make that speed.
+    pub fn open(
+        self,
+        baud: u32,
+        ring: &'static mut [u8],
+    ) -> Option<(RingBufferedUartRx<'static>, UartTx<'static, Async>)> {
         let mut config = usart::Config::default();
         config.baudrate = baud;
         let Self { port, tx, rx, tx_dma, rx_dma } = self;
         let uart = Uart::new(port, rx, tx, tx_dma, rx_dma, Interrupts, config).ok()?;
         let (tx, rx) = uart.split();
-        Some((rx.into_ring_buffered(RING.init_with(|| [0; link::RING])), tx))
+        Some((rx.into_ring_buffered(ring), tx))
     }
 }
 
-/// One random number, for which the generator takes some microseconds; `None` where it does not work.
+/// One random number, which takes some microseconds; `None` if the generator does not work.
 pub fn random(_generator: Peri<'static, peripherals::RNG>) -> Option<u32> {
     const PATIENCE: u32 = 10_000;
     rcc::enable_and_reset::<peripherals::RNG>();
@@ -119,7 +119,7 @@ pub fn random(_generator: Peri<'static, peripherals::RNG>) -> Option<u32> {
     (0..PATIENCE).find_map(|_| pac::RNG.sr().read().drdy().then(|| pac::RNG.dr().read()))
 }
 
-/// Switches the drivers off from wherever the program died: the pin of [`Rig::drivers_off`], without its owner.
+/// Switches the drivers off when the program dies: sets the pin of [`Rig::drivers_off`] without its owner.
 pub fn cut_drivers() {
     pac::GPIOA.bsrr().write(|w| w.set_bs(10, true));
 }

@@ -1,7 +1,8 @@
-//! The node in its interrupt: one kilohertz tick and one doorbell, above the executor and below the drivers' interrupts.
+//! The node in its interrupt, which the 1 kHz tick and the doorbell raise: above the executor, below the drivers'
+//! interrupts.
 //!
-//! Everything that decides anything runs here, in one place at one priority, so nothing has to be locked: the link's
-//! tasks hand bytes over through [`link::RECEIVED`] and [`link::TO_SEND`] and ring the doorbell.
+//! All decisions are made here, in one place at one priority, so nothing has to be locked: the link's tasks hand bytes
+//! over through [`exchange`] and ring its doorbell.
 
 use core::cell::RefCell;
 use core::sync::atomic::{AtomicU32, Ordering};
@@ -19,41 +20,41 @@ use vergence_nucleo_common::Services;
 use vergence_protocol::{MAX_FRAME, Microseconds};
 
 use crate::rig::Rig;
-use crate::{link, log, memory};
+use crate::{exchange, log, memory};
 
-/// Below the interrupts of time, DMA and serial line, which are short, and above the executor's thread.
+/// Priority below the short interrupts of time, DMA and serial line, and above the executor.
 const PRIORITY: Priority = Priority::P8;
-/// The tick timer counts microseconds.
+/// Prescaler of the tick timer, which counts microseconds.
 const PRESCALER: u16 = 169;
 
-/// How long a tick lasts where something is to be done, and the first one: microseconds.
+/// Length of a tick in microseconds while there is something to do.
 const PERIOD: u16 = TICK_US as u16;
-/// The timer cannot be told to end a tick sooner than so many microseconds from now.
+/// Shortest time in microseconds from now to the end of a tick that the timer can be set to.
 const NOTICE_US: u16 = 3;
 
-/// How many ticks there have been: the watchdog's witness.
+/// Counts the ticks: shows the watchdog that they go on.
 pub static TICKS: AtomicU32 = AtomicU32::new(0);
 
 static CONTROL: StaticCell<Control> = StaticCell::new();
 static HANDOVER: Mutex<RefCell<Option<&'static mut Control>>> = Mutex::new(RefCell::new(None));
 
-/// The node and the mechanics it drives.
+/// The node, and the mechanics that it drives.
 pub struct Control {
     node: Node,
     rig: Rig,
     services: Services,
-    /// When the running tick began.
+    /// Start of the running tick.
     tick: Microseconds,
-    /// How long it lasts: what the timer is set to, in microseconds.
+    /// Length of the running tick, as the timer is set, in microseconds.
     length: u16,
-    /// Kept, for to clear them in every tick would take a quarter of one at rest.
+    /// Reused: clearing it every tick would cost a quarter of an idle tick.
     received: [u8; 64],
     frame: [u8; MAX_FRAME],
 }
 
-/// Starts the tick; from now on node, rig and services belong to the interrupt.
+/// Starts the tick. From now on node, rig and services belong to the interrupt.
 pub fn start(node: Node, rig: Rig, services: Services, timer: Peri<'static, peripherals::TIM7>) {
-    // Dropped, it would stop the clock of the timer.
+    // Forgotten, because dropping it would stop the timer's clock.
     core::mem::forget(Timer::new(timer));
     TIM7.psc().write_value(PRESCALER);
     set_length(PERIOD);
@@ -73,11 +74,6 @@ pub fn start(node: Node, rig: Rig, services: Services, timer: Peri<'static, peri
     }
 }
 
-/// Makes the node look at the link.
-pub fn ring() {
-    interrupt::TIM7_DAC.pend();
-}
-
 #[interrupt]
 fn TIM7_DAC() {
     static mut MINE: Option<&'static mut Control> = None;
@@ -89,11 +85,11 @@ fn TIM7_DAC() {
     }
 }
 
-/// Sets how long the running tick lasts, a whole number of periods; where it has lasted longer, one period more than that.
-/// Returns what was set.
+/// Sets the length of the running tick to `length`, a whole number of periods, or to the end of the present period if that
+/// is later. Returns the length set, in microseconds.
 fn set_length(length: u16) -> u16 {
     critical_section::with(|_| {
-        // Behind the counter's back the end would come after 65 ms.
+        // An end before the counter's present value would come only after 65 ms.
         let least = (TIM7.cnt().read().cnt() + NOTICE_US).next_multiple_of(PERIOD);
         let length = length.max(least);
         TIM7.arr().write(|w| w.set_arr(length - 1));
@@ -112,8 +108,8 @@ impl Control {
         self.follow();
     }
 
-    /// Ticks are a whole number of periods apart, whatever the interrupt's latency: both timers run on one clock. Those
-    /// missed while the flash was busy are gone, and the controller sees the gap.
+    /// Begins a tick. Ticks are whole periods apart, whatever the interrupt's latency, because both timers run on one clock.
+    /// Ticks missed while the flash was busy are left out, and the controller notices the gap.
     fn begin_tick(&mut self) {
         let began = Instant::now().as_micros() - u64::from(TIM7.cnt().read().cnt());
         let since = u32::try_from(began.saturating_sub(self.tick.0)).unwrap_or(u32::MAX);
@@ -126,7 +122,7 @@ impl Control {
         TICKS.fetch_add(1, Ordering::Relaxed);
     }
 
-    /// Makes the timer end the running tick when the node wants to run again.
+    /// Sets the timer to the time at which the node wants to run again.
     fn follow(&mut self) {
         let length = self.node.wakes_at().0.saturating_sub(self.tick.0);
         let length = u16::try_from(length).unwrap_or(PERIOD);
@@ -136,25 +132,25 @@ impl Control {
     }
 
     fn receive(&mut self) {
-        while let Ok(count) = link::RECEIVED.try_read(&mut self.received) {
+        while let Ok(count) = exchange::RECEIVED.try_read(&mut self.received) {
             self.take(count);
         }
     }
 
-    /// Not inlined, or its preparations would be made in every tick, whether or not a byte came.
+    /// Gives `count` received bytes to the node. Not inlined: its stack set-up would otherwise cost time in every tick.
     #[inline(never)]
     fn take(&mut self, count: usize) {
         let now = Microseconds(Instant::now().as_micros());
-        // At once: what the node makes of the bytes may take until then.
+        // Set the timer first: handling the bytes may take until the next tick.
         self.node.wake(now);
         self.follow();
         self.node.receive(now, &self.received[..count], &mut self.rig, &mut self.services);
     }
 
-    /// Keeps at most one frame waiting behind the one on the wire, so that the next is chosen as late as possible.
+    /// Keeps at most one frame waiting behind the one on the wire, so that the node chooses the next as late as possible.
     fn transmit(&mut self) {
         log::forward(|entry| self.node.log(entry));
-        while link::TO_SEND.is_empty() {
+        while exchange::TO_SEND.is_empty() {
             if !self.send_frame() {
                 self.reboot();
                 return;
@@ -162,20 +158,20 @@ impl Control {
         }
     }
 
-    /// Returns whether there was one. Not inlined, for the same reason as [`Self::take`].
+    /// Queues the node's next frame; returns whether there was one. Not inlined, for the reason given at [`Self::take`].
     #[inline(never)]
     fn send_frame(&mut self) -> bool {
         let now = Microseconds(Instant::now().as_micros());
         let Some(length) = self.node.transmit(now, &mut self.frame) else { return false };
-        link::queue(&self.frame[..length]);
+        exchange::queue(&self.frame[..length]);
         true
     }
 
-    /// Where the host wants another start, the link makes it when the last frame is out.
+    /// Passes on the host's wish to reboot: the link restarts the chip when the last frame is sent.
     fn reboot(&mut self) {
         if let Some(to) = self.node.take_reboot() {
             memory::prepare_reboot(to);
-            link::REBOOT.store(true, Ordering::Relaxed);
+            exchange::request_reboot();
         }
     }
 }

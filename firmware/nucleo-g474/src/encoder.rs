@@ -1,4 +1,4 @@
-//! A quadrature encoder on a 32-bit timer: the hardware counts every edge of both lines, and the counter is the raw count.
+//! A quadrature encoder on a 32-bit timer: the hardware counts every edge of both lines; its counter is the raw count.
 
 use embassy_stm32::Peri;
 use embassy_stm32::gpio::{AfType, Flex, Pull};
@@ -7,14 +7,14 @@ use embassy_stm32::pac::timer::vals::{CcmrInputCcs, FilterValue, Sms};
 use embassy_stm32::timer::low_level::Timer;
 use embassy_stm32::timer::{Ch1, Ch2, GeneralInstance32bit4Channel, TimerPin};
 
-/// The counter.
+/// The counter of one encoder.
 pub struct Encoder {
     timer: TimGp32,
     _lines: [Flex<'static>; 2],
 }
 
 impl Encoder {
-    /// Starts to count at zero. The lines are pulled up, for encoders with open collectors.
+    /// Starts to count from zero. The lines are pulled up, for encoders with open-collector outputs.
     pub fn new<T: GeneralInstance32bit4Channel>(
         timer: Peri<'static, T>,
         a: Peri<'static, impl TimerPin<T, Ch1>>,
@@ -26,12 +26,12 @@ impl Encoder {
         lines[1].set_as_af_unchecked(function_b, AfType::input(Pull::Up));
         let owner = Timer::new(timer);
         let timer = owner.regs_gp32();
-        // Dropped, it would stop the clock of the timer.
+        // Forgotten, because dropping it would stop the timer's clock.
         core::mem::forget(owner);
         timer.ccmr_input(0).write(|w| {
             for channel in 0..2 {
                 w.set_ccs(channel, CcmrInputCcs::TI4);
-                // Four equal samples at 170 MHz: what is shorter than 24 ns is no edge.
+                // Four equal samples at 170 MHz: pulses shorter than 24 ns are ignored.
                 w.set_icf(channel, FilterValue::FCK_INT_N4);
             }
         });

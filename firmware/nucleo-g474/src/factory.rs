@@ -1,17 +1,17 @@
-//! The settings a board comes with: the bench, a linear stage for the baseline and a pinion stage for the separation.
+//! Default settings: the bench, with a linear stage for the baseline and a pinion stage for the separation.
 
 use vergence_control::{AxisSettings, HomingSettings};
 use vergence_protocol::{AxisKind, Micro};
 
 use crate::rig::AXES;
 
-/// A positive angle of so many thousandths of a degree in microradians, to the nearest.
+/// Converts a positive angle from thousandths of a degree to the nearest microradian.
 const fn millidegrees(angle: i32) -> i32 {
     ((angle as i64 * 174_532_925 + 5_000_000) / 10_000_000) as i32
 }
 
-/// A 2 mm screw driven by a 200-step motor in 1/8 steps, from 60 mm to 220 mm, and a separation of 0 to 130 degrees of
-/// 64 000 steps for each revolution.
+/// Settings of both axes. Baseline: a screw of 2 mm pitch, a 200-step motor in 1/8 steps, 60 to 220 mm. Separation: 0 to
+/// 130 degrees, 64 000 steps per revolution.
 pub fn axes() -> [AxisSettings; AXES] {
     let baseline = AxisSettings {
         kind: AxisKind::Linear,

@@ -1,45 +1,33 @@
 //! The serial link: two tasks that move bytes between the wire and the node.
 
-use core::sync::atomic::{AtomicBool, AtomicU32, Ordering};
+use core::sync::atomic::{AtomicU32, Ordering};
 
 use embassy_stm32::mode::Async;
 use embassy_stm32::usart::{RingBufferedUartRx, UartTx};
-use embassy_sync::blocking_mutex::raw::CriticalSectionRawMutex;
-use embassy_sync::pipe::Pipe;
 use embassy_time::{Duration, with_timeout};
+use static_cell::StaticCell;
 use vergence_protocol::MAX_FRAME;
 
-use crate::control;
+use crate::exchange::{self, RECEIVED, TO_SEND};
 
-/// What the line hears while no interrupt can be served must fit: 22 ms of a page's erasure at 2 Mbaud, twice.
-pub const RING: usize = 8 * 1024;
-/// A line that never falls idle is read this often.
+/// Bytes of the receive ring: nearly twice what arrives in the 22 ms of a page erasure at 2 Mbaud, when no interrupt is served.
+const RING: usize = 8 * 1024;
+/// Longest wait for a read to end while bytes arrive without a pause.
 const LOOK: Duration = Duration::from_millis(5);
-/// On a silent one there is nothing to read, but the watchdog wants to see that somebody waits.
+/// Longest wait on a silent line: the watchdog must see [`ROUNDS`] grow.
 const SILENCE: Duration = Duration::from_millis(40);
 
-/// Bytes for the node.
-pub static RECEIVED: Pipe<CriticalSectionRawMutex, 512> = Pipe::new();
-/// Bytes for the line.
-pub static TO_SEND: Pipe<CriticalSectionRawMutex, MAX_FRAME> = Pipe::new();
-/// How often the receiver has come round: the watchdog's witness.
+/// Counts the rounds of [`receive`]: shows the watchdog that the task runs.
 pub static ROUNDS: AtomicU32 = AtomicU32::new(0);
 
-/// Whether the chip is to start again once all is sent.
-pub static REBOOT: AtomicBool = AtomicBool::new(false);
-
-/// Hands a frame to [`transmit`]. The pipe must be empty, so that it fits.
-pub fn queue(frame: &[u8]) {
-    let mut rest = frame;
-    // The pipe takes no more at once than up to its end.
-    while let Ok(taken) = TO_SEND.try_write(rest)
-        && taken > 0
-    {
-        rest = &rest[taken..];
-    }
+/// Memory for bytes that DMA has received. Call it once.
+pub fn ring_buffer() -> &'static mut [u8] {
+    static MEMORY: StaticCell<[u8; RING]> = StaticCell::new();
+    MEMORY.init_with(|| [0; RING])
 }
 
-/// Brings bytes in. A line error loses bytes; the frame's zeros and checksum say where it goes on.
+/// Moves bytes from the line to the node. A line error loses bytes; the receiver finds the next frame by its zero and
+/// checks it by its checksum.
 #[embassy_executor::task]
 pub async fn receive(mut line: RingBufferedUartRx<'static>) {
     let mut bytes = [0; 256];
@@ -53,22 +41,22 @@ pub async fn receive(mut line: RingBufferedUartRx<'static>) {
             while !rest.is_empty() {
                 let taken = RECEIVED.write(rest).await;
                 rest = &rest[taken..];
-                control::ring();
+                exchange::ring();
             }
         }
     }
 }
 
-/// Takes bytes out.
+/// Moves bytes from the node to the line, and restarts the chip when that is due.
 #[embassy_executor::task]
 pub async fn transmit(mut line: UartTx<'static, Async>) {
     let mut bytes = [0; MAX_FRAME];
     loop {
         let count = TO_SEND.read(&mut bytes).await;
-        // The next frame may be chosen now: it waits while this one is on the wire.
-        control::ring();
+        // The node may choose the next frame now: it waits while this one is on the wire.
+        exchange::ring();
         let _ = line.write(&bytes[..count]).await;
-        if REBOOT.load(Ordering::Relaxed) && TO_SEND.is_empty() {
+        if exchange::reboot_is_due() {
             // The last byte is still in the shift register.
             let _ = line.flush().await;
             cortex_m::peripheral::SCB::sys_reset();

@@ -1,4 +1,4 @@
-//! The log: defmt frames on the serial link, or with feature `log-rtt` to a debug probe.
+//! The log: defmt entries on the serial link, or with feature `log-rtt` to a debug probe.
 
 #[cfg(feature = "log-rtt")]
 use defmt_rtt as _;
@@ -8,7 +8,7 @@ use vergence_image::DeathKind;
 
 defmt::timestamp!("{=u64:us}", Instant::now().as_micros());
 
-/// Says who starts, and how the last start ended.
+/// Logs version and build of the firmware, and how the last start ended.
 pub fn greet(identity: &NodeIdentity) {
     let [major, minor, patch] = identity.firmware;
     defmt::info!("vergence {=u8}.{=u8}.{=u8}, build {=u64:016x}", major, minor, patch, identity.build);
@@ -22,7 +22,7 @@ pub fn greet(identity: &NodeIdentity) {
     }
 }
 
-/// Hands the oldest entry to `to`, whole, where there is one.
+/// Gives the oldest entry to `to`, if there is one.
 pub fn forward(to: impl FnOnce(&[u8])) {
     #[cfg(feature = "log-link")]
     link::forward(to);
@@ -32,25 +32,25 @@ pub fn forward(to: impl FnOnce(&[u8])) {
 
 #[cfg(feature = "log-link")]
 mod link {
-    //! Entries on their way to the node. What does not fit is lost, a whole entry at a time; nothing ever waits.
+    //! Queue of log entries for the node. An entry that does not fit is dropped whole; logging never waits.
 
     use core::cell::RefCell;
 
     use critical_section::{Mutex, RestoreState};
     use heapless::{Deque, Vec};
 
-    /// The longest entry.
+    /// Length of the longest entry in bytes.
     const ENTRY: usize = 128;
 
     static STATE: Mutex<RefCell<State>> = Mutex::new(RefCell::new(State::new()));
 
     struct State {
         encoder: defmt::Encoder,
-        /// To leave the critical section that spans one entry.
+        /// Leaves the critical section that spans one entry.
         outside: Option<RestoreState>,
         entry: Vec<u8, ENTRY>,
         too_long: bool,
-        /// Entries end with a zero, which is nowhere else in them (rzCOBS).
+        /// Queued entries: each ends with a zero, the only one in it (rzCOBS).
         queue: Deque<u8, 512>,
     }
 
@@ -65,7 +65,7 @@ mod link {
             }
         }
 
-        /// Runs `step` of the encoder, collecting what it writes.
+        /// Runs `step` of the encoder and collects the bytes that it writes.
         fn encode(&mut self, step: impl FnOnce(&mut defmt::Encoder, &mut dyn FnMut(&[u8]))) {
             let Self { encoder, entry, too_long, .. } = self;
             step(encoder, &mut |bytes| *too_long |= entry.extend_from_slice(bytes).is_err());
@@ -80,7 +80,7 @@ mod link {
         let mut entry = Vec::<u8, ENTRY>::new();
         with(|state| {
             while let Some(byte) = state.queue.pop_front() {
-                // Longer ones were never queued.
+                // Longer entries are never queued.
                 let _ = entry.push(byte);
                 if byte == 0 {
                     break;
@@ -95,7 +95,7 @@ mod link {
     #[defmt::global_logger]
     struct Logger;
 
-    // SAFETY: from `acquire` to `release` runs one critical section, so that nobody else can acquire.
+    // SAFETY: one critical section lasts from `acquire` to `release`, so that no other code can acquire.
     #[allow(unsafe_code, reason = "what defmt asks for")]
     unsafe impl defmt::Logger for Logger {
         fn acquire() {
@@ -118,14 +118,14 @@ mod link {
                 state.encode(|encoder, write| encoder.end_frame(write));
                 if !state.too_long && state.entry.len() <= state.queue.capacity() - state.queue.len() {
                     for &byte in &state.entry {
-                        // There is room.
+                        // The queue has room.
                         let _ = state.queue.push_back(byte);
                     }
                 }
                 state.outside.take()
             });
             if let Some(outside) = outside {
-                // SAFETY: it is what `acquire` got.
+                // SAFETY: this is the state that `acquire` saved.
                 unsafe { critical_section::release(outside) };
             }
         }

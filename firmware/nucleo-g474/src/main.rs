@@ -1,14 +1,19 @@
 //! The controller on a NUCLEO-G474RE: pins, timers, interrupts, link, flash and log around [`vergence_control::Node`].
 //!
-//! Three levels of urgency: the interrupts of drivers (trigger edge, time, DMA, serial line), which are short; below
-//! them the node with its one kilohertz tick ([`control`]); below that the executor's tasks ([`link`], [`watchdog`]).
+//! Three levels of urgency: the short interrupts of trigger edge, time, DMA and serial line; below them the node with its
+//! 1 kHz tick ([`control`]); below that the executor's tasks ([`link`], [`watchdog`]).
+//!
+//! Imports go one way: this file starts everything; [`board`] hands out the pins; [`link`] and [`control`] exchange bytes
+//! through [`exchange`] and do not know each other.
 
 #![no_std]
 #![no_main]
 
 mod board;
 mod control;
+mod dying;
 mod encoder;
+mod exchange;
 mod factory;
 mod link;
 mod log;
@@ -28,34 +33,36 @@ use vergence_nucleo_common::Services;
 use vergence_nucleo_common::clocks::{self, Source};
 use vergence_nucleo_common::memory::survivor;
 
-/// The oldest version that this one may be replaced by.
+/// Oldest version that may replace this one: major, minor, patch.
 const OLDEST: [u8; 3] = [0, 1, 0];
 
 #[embassy_executor::main]
 async fn main(spawner: Spawner) {
     let reset = memory::reset_cause();
-    let mut board = Board::new(clocks::start(Source::Crystal));
-    board.watchdog.unleash();
+    let board = Board::new(clocks::start(Source::Crystal));
+    let watchdog = watchdog::start(board.watchdog);
     let identity = NodeIdentity {
         board: board::NAME.try_into().unwrap_or_default(),
         hardware: HARDWARE,
         firmware: version::version(),
         oldest: OLDEST,
-        build: memory::build_id(),
+        build: version::build_id(),
         uid: embassy_stm32::uid::uid(),
         reset,
     };
     log::greet(&identity);
     let mut services = Services::of_application(&board.flash);
-    let Ok(defaults) = BoardSettings::new(&factory::axes()) else { memory::give_up(DeathKind::Settings) };
+    let Ok(defaults) = BoardSettings::new(&factory::axes()) else { dying::give_up(DeathKind::Settings) };
     let boot = board::random(board.random).unwrap_or_else(|| survivor().starts);
     let Ok(node) = Node::new(&defaults, identity, boot, &mut services) else {
-        memory::give_up(DeathKind::Settings);
+        dying::give_up(DeathKind::Settings);
     };
-    let Some((rx, tx)) = board.line.open(node.settings().baud) else { memory::give_up(DeathKind::SerialLine) };
+    let Some((rx, tx)) = board.line.open(node.settings().baud, link::ring_buffer()) else {
+        dying::give_up(DeathKind::SerialLine)
+    };
     control::start(node, board.rig, services, board.tick);
     if let (Ok(receive), Ok(transmit), Ok(watch)) =
-        (link::receive(rx), link::transmit(tx), watchdog::watch(board.watchdog, board.led))
+        (link::receive(rx), link::transmit(tx), watchdog::watch(watchdog, board.led))
     {
         spawner.spawn(receive);
         spawner.spawn(transmit);

@@ -1,4 +1,4 @@
-//! The mechanics as the controller sees them.
+//! The mechanics, with the interface of the controller.
 
 use embassy_stm32::gpio::{Input, Output};
 use vergence_control::{RigIo, StepSchedule, TriggerEdge};
@@ -8,29 +8,30 @@ use crate::encoder::Encoder;
 use crate::steps::StepPulses;
 use crate::trigger::Trigger;
 
-/// How many axes the board drives.
+/// Number of axes that the board drives.
 pub const AXES: usize = 2;
 
-/// Everything that moves or tells where it is.
+/// Motors, encoders, switches and trigger.
 pub struct Rig {
-    /// Step and direction outputs.
+    /// Step and direction outputs of each axis.
     pub steps: [StepPulses; AXES],
-    /// Encoders.
+    /// Encoder of each axis.
     pub encoders: [Encoder; AXES],
-    /// Closed (low) at home.
+    /// Home switches: closed (low) at home.
     pub home_switches: [Input<'static>; AXES],
-    /// Open (high) beyond the range, or where the wire is broken.
+    /// Hard limit switches: normally closed (low), open (high) beyond the range or when the wire is broken.
     pub hard_limits: [Input<'static>; AXES],
-    /// Open (high) while pressed, or where the wire is broken.
+    /// Emergency stop: normally closed (low), open (high) while pressed or when the wire is broken.
     pub emergency_stop: Input<'static>,
-    /// Low switches the drivers on; the pull-up on the drivers' side keeps them off while the chip starts.
+    /// Enable line of the drivers: low switches them on. The pull-up on the drivers' side keeps them off while the chip
+    /// starts.
     pub drivers_off: Output<'static>,
     /// Camera trigger.
     pub trigger: Trigger,
 }
 
 impl Rig {
-    /// Begins what was ordered for the tick that has begun. Returns whether the tick before was kept.
+    /// Starts the steps ordered for the tick that has begun. Returns whether the steps of the tick before were made in time.
     pub fn begin_tick(&mut self) -> bool {
         let mut in_time = true;
         for axis in &mut self.steps {

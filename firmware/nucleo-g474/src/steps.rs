@@ -1,9 +1,9 @@
-//! Step pulses of one axis, made by an advanced timer alone: exactly as many as ordered, each at its instant.
+//! Step pulses of one axis, made by an advanced timer alone: exactly as many as ordered, each at its time.
 //!
 //! The timer counts down at 10 MHz in one-pulse mode and its output is high for the last [`PULSE`] counts of each period
-//! (RM0440, 28.3.17). The repetition counter holds how many periods there are, so that the timer stops by itself after
-//! the last step, whatever the processor does. At each rising edge the compare event makes DMA write the length of the
-//! next period to the auto-reload register, which takes effect at the following underflow.
+//! (RM0440, 28.3.17). The repetition counter holds the number of periods, so that the timer stops by itself after the last
+//! step, whatever the processor does. At each rising edge the compare event makes DMA write the length of the next period
+//! to the auto-reload register, which takes effect at the following underflow.
 
 use core::sync::atomic::{Ordering, compiler_fence};
 
@@ -19,30 +19,30 @@ use vergence_control::{MAX_STEPS_PER_TICK, StepSchedule};
 
 /// Timer counts in a microsecond.
 const COUNTS_PER_US: u32 = 10;
-/// The timers run at 170 MHz.
+/// Prescaler from the timers' 170 MHz to 10 MHz.
 const PRESCALER: u16 = 16;
-/// Length of a pulse in counts, and the least pause after it: 2.5 us is enough for every common driver.
+/// Length of a pulse in counts, and shortest pause after it: 2.5 us is enough for every common driver.
 const PULSE: u32 = 25;
 /// Counts between a change of direction and the rising edge of the first step.
 const DIRECTION_SETUP: u32 = 50;
-/// Everything happens so many counts late, so that there is time to load a list after the tick has begun and the last
-/// pulse of the list before is over.
+/// Delay of all steps in counts, which leaves time to load a list after the tick has begun and the last pulse of the
+/// previous list is over.
 const DELAY: u32 = 200;
-/// In a tick later than this the list before has no more time to end: microseconds.
+/// Time in microseconds after the start of a tick by which the previous list must have ended.
 const PATIENCE_US: u16 = 200;
 
-/// A channel of DMA1 by its number, from 0.
+/// A channel of DMA1.
 pub trait StepDma {
-    /// The number.
+    /// Number of the channel, from 0.
     const CHANNEL: usize;
 }
 
-/// A list for the coming tick; its periods are in the back of the two.
+/// The list ordered for the coming tick; its periods are in the back buffer.
 #[derive(Clone, Copy, Default)]
 struct Ordered {
     count: usize,
     forward: bool,
-    /// When the first step rises, in counts after the beginning of the tick.
+    /// Rising edge of the first step, in counts after the start of the tick.
     first: u32,
 }
 
@@ -54,9 +54,9 @@ pub struct StepPulses {
     direction: Output<'static>,
     forward: bool,
     ordered: Ordered,
-    /// What DMA feeds to the timer, length of a period less one: of the running list, and of the ordered one.
+    /// Lengths of periods less one, which DMA feeds to the timer: of the running list and of the ordered one.
     periods: [[u16; MAX_STEPS_PER_TICK]; 2],
-    /// Which of the two runs.
+    /// Index of the buffer of the running list.
     front: usize,
     running: usize,
     /// The raw step count before the running list.
@@ -76,7 +76,7 @@ impl StepPulses {
         step.set_as_af_unchecked(function, AfType::output(OutputType::PushPull, Speed::Medium));
         let owner = Timer::new(timer);
         let timer = owner.regs_advanced();
-        // Dropped, it would stop the clock of the timer.
+        // Forgotten, because dropping it would stop the timer's clock.
         core::mem::forget(owner);
         configure_timer(timer);
         configure_mux(DMAMUX1.ccr(D::CHANNEL), dma.request());
@@ -94,11 +94,11 @@ impl StepPulses {
         }
     }
 
-    /// Takes the list for the coming tick.
+    /// Orders the steps of the coming tick.
     pub fn order(&mut self, steps: &StepSchedule) {
         let counts = |at_ns: &u32| at_ns * COUNTS_PER_US / 1_000;
         let back = &mut self.periods[1 - self.front];
-        // The last step moves a word as well, for the count; nothing follows it.
+        // DMA moves a word for the last step as well, so that steps can be counted; no period follows it.
         back.fill(u16::MAX);
         for (period, pair) in back.iter_mut().zip(steps.at_ns.windows(2)) {
             let length = counts(&pair[1]).saturating_sub(counts(&pair[0])).max(2 * PULSE);
@@ -108,7 +108,7 @@ impl StepPulses {
         self.ordered = Ordered { count: steps.at_ns.len(), forward: steps.forward, first };
     }
 
-    /// Begins the ordered list in a tick that has begun. Returns whether the list before was over in time.
+    /// Starts the ordered list in a tick that has begun. Returns whether the previous list had ended in time.
     pub fn begin_tick(&mut self) -> bool {
         let in_time = self.wait_for_the_last();
         self.settle();
@@ -128,7 +128,7 @@ impl StepPulses {
         in_time
     }
 
-    /// Forgets every step not made yet; a pulse that has begun is cut short.
+    /// Drops every step not made yet; a pulse that has begun is cut short.
     pub fn abort(&mut self) {
         self.timer.cr1().modify(|w| w.set_cen(false));
         self.settle();
@@ -144,12 +144,12 @@ impl StepPulses {
         self.base.wrapping_add(if self.forward { made } else { -made })
     }
 
-    /// How many steps of the running list have been made: each one moves one word by DMA.
+    /// Number of steps of the running list made so far: DMA moves one word for each.
     fn made(&self) -> usize {
         self.running.saturating_sub(usize::from(self.dma.ndtr().read().ndt()))
     }
 
-    /// A list ends at most [`DELAY`] into the next tick.
+    /// Waits for the end of the running list, at most [`DELAY`] into the next tick; returns whether it came in time.
     fn wait_for_the_last(&self) -> bool {
         while self.timer.cr1().read().cen() {
             if TIM7.cnt().read().cnt() > PATIENCE_US {
@@ -159,14 +159,14 @@ impl StepPulses {
         true
     }
 
-    /// Adds what the running list has made to the count, and stops it.
+    /// Adds the steps made by the running list to the count, and stops the list.
     fn settle(&mut self) {
         self.base = self.count();
         self.dma.cr().modify(|w| w.set_en(false));
         self.running = 0;
     }
 
-    /// Runs `count` periods, the first of them of `first` counts, the others as in the front list.
+    /// Starts `count` periods, the first of `first` counts, the others as in the front buffer.
     fn start(&mut self, first: u32, count: usize) {
         let timer = self.timer;
         timer.arr().write(|w| w.set_arr(u16::try_from(first - 1).unwrap_or(u16::MAX)));
@@ -182,7 +182,7 @@ impl StepPulses {
             w.set_dir(Dir::FROM_MEMORY);
             w.set_minc(true);
             w.set_msize(Size::BITS16);
-            // The register takes a word, and DMA fills up with zeros.
+            // The register takes a word; DMA fills the upper half with zeros.
             w.set_psize(Size::BITS32);
             w.set_pl(Pl::VERY_HIGH);
             w.set_en(true);

@@ -1,5 +1,5 @@
-//! The camera trigger: one pulse of TIM4, one-pulse mode, its rising edge timed by the compare register. The edge's
-//! interrupt is the most urgent of all and latches the encoders.
+//! The camera trigger: a pulse of TIM4 in one-pulse mode, whose compare register times the rising edge. The edge's
+//! interrupt has the highest priority and latches the encoders.
 
 use core::cell::RefCell;
 
@@ -18,14 +18,14 @@ use heapless::Deque;
 use vergence_control::TriggerEdge;
 use vergence_protocol::{AxisList, Microseconds};
 
-/// The timer counts microseconds.
+/// Prescaler of the timer, which counts microseconds.
 const PRESCALER: u16 = 169;
-/// How long the pulse is.
+/// Length of the pulse in microseconds.
 const PULSE_US: u16 = 100;
-/// Pulses further ahead than this wait in software: the counter has 16 bits.
+/// Pulses further ahead than this, in microseconds, wait in software: the counter has 16 bits.
 const HORIZON_US: u64 = 10_000;
 
-/// Instants in microseconds, and both counts.
+/// Edges: time in microseconds, and the counts of both encoders.
 type Edges = Deque<(u64, [i32; 2]), 4>;
 
 static EDGES: Mutex<RefCell<Edges>> = Mutex::new(RefCell::new(Deque::new()));
@@ -37,7 +37,7 @@ pub struct Trigger {
 }
 
 impl Trigger {
-    /// An output at rest.
+    /// Sets up the output, low.
     pub fn new(
         timer: Peri<'static, peripherals::TIM4>,
         pin: Peri<'static, impl TimerPin<peripherals::TIM4, Ch1>>,
@@ -45,7 +45,7 @@ impl Trigger {
         let function = pin.af_num();
         let mut pin = Flex::new(pin);
         pin.set_as_af_unchecked(function, AfType::output(OutputType::PushPull, Speed::Medium));
-        // Dropped, it would stop the clock of the timer.
+        // Forgotten, because dropping it would stop the timer's clock.
         core::mem::forget(Timer::new(timer));
         TIM4.psc().write_value(PRESCALER);
         TIM4.egr().write(|w| w.set_ug(true));
@@ -62,12 +62,12 @@ impl Trigger {
         Self { _pin: pin, due: None }
     }
 
-    /// Asks for a pulse at `at`; one that has not begun is replaced.
+    /// Orders a pulse at `at`; it replaces one that has not begun.
     pub fn fire(&mut self, at: Microseconds) {
         self.due = Some(at);
     }
 
-    /// Starts the timer where a pulse comes due soon. Call in every tick and after [`Self::fire`].
+    /// Starts the timer if a pulse is due soon. Call it in every tick and after [`Self::fire`].
     pub fn poll(&mut self) {
         let Some(at) = self.due else { return };
         let ahead = at.0.saturating_sub(Instant::now().as_micros());
@@ -84,7 +84,7 @@ impl Trigger {
         });
     }
 
-    /// The oldest edge not yet taken.
+    /// Takes the oldest edge.
     pub fn take_edge(&mut self) -> Option<TriggerEdge> {
         let (at, counts) = critical_section::with(|cs| EDGES.borrow_ref_mut(cs).pop_front())?;
         Some(TriggerEdge { at: Microseconds(at), counts: AxisList::from_iter(counts) })
@@ -97,7 +97,7 @@ fn TIM4() {
     let at = Instant::now().as_micros();
     TIM4.sr().write(|_| {});
     critical_section::with(|cs| {
-        // Nobody takes more than one in each tick; what does not fit is as lost as a pose.
+        // A tick brings at most one edge; an edge that does not fit is lost, like a lost pose.
         let _ = EDGES.borrow_ref_mut(cs).push_back((at, counts));
     });
 }

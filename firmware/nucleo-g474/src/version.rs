@@ -1,7 +1,14 @@
-//! Which version this is: one note in flash, for this program and for who signs its image.
+//! Version and build id of this program, in notes in flash, which the tool that signs the image reads as well.
 
 use vergence_image::notes::VersionNote;
 
+#[allow(unsafe_code, reason = "a note that only the linker knows")]
+unsafe extern "C" {
+    /// The ELF note with the build id: sizes of name and id, type, name "GNU", id.
+    static __build_id: [u32; 6];
+}
+
+/// The note with the version.
 #[allow(unsafe_code, reason = "a place that build-id.x keeps")]
 // SAFETY: the section holds nothing else.
 #[unsafe(link_section = ".note.vergence")]
@@ -12,9 +19,18 @@ static NOTE: VersionNote = VersionNote::new([
     part(env!("CARGO_PKG_VERSION_PATCH")),
 ]);
 
-/// The package's version, as it stands in flash.
+/// Version of the package, from the note in flash: major, minor, patch.
 pub fn version() -> [u8; 3] {
     core::hint::black_box(&NOTE).version
+}
+
+/// The first eight bytes of the build id.
+#[allow(unsafe_code, reason = "a note that only the linker knows")]
+pub fn build_id() -> u64 {
+    // SAFETY: build-id.x puts the note there, aligned to words, and nothing writes flash at this place.
+    let note = unsafe { &__build_id };
+    // Most significant byte first: the first hexadecimal digits that tools show.
+    u64::from(note[4].swap_bytes()) << 32 | u64::from(note[5].swap_bytes())
 }
 
 const fn part(digits: &str) -> u8 {

@@ -1,23 +1,31 @@
-//! The independent watchdog, fed only while tick, executor and link all go on.
+//! The independent watchdog, which is fed only while tick, executor and link all go on.
 
 use core::sync::atomic::Ordering;
 
+use embassy_stm32::Peri;
 use embassy_stm32::gpio::Output;
 use embassy_stm32::peripherals::IWDG;
 use embassy_stm32::wdg::IndependentWatchdog;
 use embassy_time::{Duration, Ticker};
 
-use crate::memory;
-use crate::{control, link};
+use crate::{control, link, memory};
 
-/// How long the three may stand still. It must cover what the node does at a stretch while nothing moves: erasing a page
-/// of flash, checking a signature.
-pub const PATIENCE_US: u32 = 500_000;
+/// Longest time that one of the three may stand still, in microseconds. It covers the longest work that the node does
+/// without a break while nothing moves: erasing a page of flash, checking a signature.
+const PATIENCE_US: u32 = 500_000;
+/// Time between two feedings.
 const ROUND: Duration = Duration::from_millis(50);
-/// So many rounds without a bite prove a start good.
+/// After this many feedings a start counts as good.
 const HEALTHY: u32 = 40;
 
-/// The executor's witness is that this task runs.
+/// Starts the watchdog; from now on it must be fed.
+pub fn start(watchdog: Peri<'static, IWDG>) -> IndependentWatchdog<'static, IWDG> {
+    let mut watchdog = IndependentWatchdog::new(watchdog, PATIENCE_US);
+    watchdog.unleash();
+    watchdog
+}
+
+/// Feeds the watchdog while ticks and rounds of the link go on. That this task runs shows that the executor does.
 #[embassy_executor::task]
 pub async fn watch(mut watchdog: IndependentWatchdog<'static, IWDG>, mut led: Output<'static>) {
     let mut every = Ticker::every(ROUND);

@@ -1,27 +1,29 @@
-//! The board's end.
+//! The board's end of the session: answers, events, poses and log go out by urgency.
+
+mod receive;
 
 use heapless::{Deque, Vec};
 
 use super::line::Line;
 use super::results::Results;
 use super::statistics::BoardStatistics;
-use crate::frame::{FrameError, Header, Kind, MAX_FRAME};
+use crate::frame::{Header, Kind, MAX_FRAME};
 use crate::management::{Management, ManagementReport};
 use crate::receiver::{Receiver, increment};
-use crate::{Microseconds, PROTOCOL, PoseReport, Refusal, Report, Request, SessionId, Status, schema_hash};
+use crate::{Microseconds, PROTOCOL, PoseReport, Report, Request, SessionId, schema_hash};
 
-/// How many answers to immediate requests may wait for the line.
+/// Number of answers to immediate requests that may wait for the line.
 const IMMEDIATE: usize = 4;
-/// How many answers to management requests may wait for the line.
+/// Number of answers to management requests that may wait for the line.
 const MANAGEMENT: usize = super::WINDOW;
-/// How many events may wait for the line.
+/// Number of events that may wait for the line.
 const EVENTS: usize = 8;
-/// How many bytes of log may wait for the line.
+/// Number of log bytes that may wait for the line.
 const LOG: usize = 512;
-/// The most bytes of log in one frame: short, because an answer may have to wait for it.
+/// Largest number of log bytes in one frame: small, because an answer may have to wait for the frame.
 pub const LOG_CHUNK: usize = 48;
 
-/// Which request an answer belongs to. Answers that outlive their session go nowhere.
+/// Names the request that an answer belongs to. An answer to a request of an earlier session is dropped.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct ReplyTo {
     immediate: bool,
@@ -29,47 +31,67 @@ pub struct ReplyTo {
     session: Option<SessionId>,
 }
 
-/// What the board hears.
+/// Event that received bytes cause on the board.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum BoardEvent {
-    /// A new session began; what the last one asked for (the telemetry stream) is over.
+    /// A new session began; the pose stream that the last session asked for is over.
     Opened {
-        /// Its id.
+        /// Id of the new session.
         session: SessionId,
     },
-    /// A request: once and in order, or at once for `Heartbeat`, `TimeProbe`, `Stop` and an immediate `GetInfo`.
+    /// A request: delivered once and in order; `Heartbeat`, `TimeProbe`, `Stop` and an immediate `GetInfo` at once.
     Request {
-        /// Give this to [`BoardSession::reply`].
+        /// To be given to [`BoardSession::reply`].
         reply_to: ReplyTo,
-        /// What is asked.
+        /// The request.
         request: Request,
-        /// When its last byte arrived, by the `now` of [`BoardSession::receive`].
+        /// Arrival of the request's last byte: the `now` of [`BoardSession::receive`].
         received_at: Microseconds,
     },
-    /// A management request, from a host of any major, with or without a session. It may come twice.
+    /// A management request, from a host of any major version, with or without a session. It may come twice.
     Management {
-        /// Give this to [`BoardSession::reply_management`].
+        /// To be given to [`BoardSession::reply_management`].
         seq: u8,
-        /// What is asked.
+        /// The request.
         request: Management,
     },
 }
 
+/// The open session.
 #[derive(Clone, Copy, Debug)]
 struct Open {
     session: SessionId,
+    /// The host has another schema: it may read but not move.
     read_only: bool,
 }
 
-/// The board's end, for all sessions from start to power-off. Loop: for each byte [`receive`](Self::receive), and
-/// [`reply`](Self::reply) to the request it gives; then [`transmit`](Self::transmit) until it gives nothing.
+/// The board's end of all sessions from start to power-off.
+///
+/// Loop: give each byte to [`receive`](Self::receive) and [`reply`](Self::reply) to the request that it returns; then
+/// call [`transmit`](Self::transmit) until it returns `None`.
+///
+/// ```
+/// use vergence_protocol::{BoardEvent, BoardSession, HostSession, MAX_FRAME, Microseconds, SessionId};
+///
+/// let (mut host, mut board) = (HostSession::new(SessionId(7)), BoardSession::new(1));
+/// let mut frame = [0; MAX_FRAME];
+/// host.hello();
+/// let length = host.transmit(Microseconds(0), &mut frame).expect("the host says hello");
+/// let events: Vec<_> = frame[..length].iter().filter_map(|&byte| board.receive(Microseconds(500), byte)).collect();
+/// assert_eq!(events, [BoardEvent::Opened { session: SessionId(7) }]);
+/// let length = board.transmit(Microseconds(600), &mut frame).expect("the board answers");
+/// host.receive(Microseconds(900), &frame[..length], |_| {});
+/// assert!(host.is_open());
+/// ```
 #[derive(Debug)]
 pub struct BoardSession {
     boot: u32,
     open: Option<Open>,
     receiver: Receiver,
     line: Line,
+    /// Number of the next frame.
     seq: u8,
+    /// Number of the next request in order.
     expected: u8,
     hello_due: Option<SessionId>,
     nak_due: bool,
@@ -84,7 +106,7 @@ pub struct BoardSession {
 }
 
 impl BoardSession {
-    /// No session yet. `boot` must change with every start of the board.
+    /// A board without a session. `boot` must change with every start of the board.
     #[must_use]
     pub fn new(boot: u32) -> Self {
         Self {
@@ -107,27 +129,8 @@ impl BoardSession {
         }
     }
 
-    /// Takes one byte from the host, any byte, that arrived `now`.
-    pub fn receive(&mut self, now: Microseconds, byte: u8) -> Option<BoardEvent> {
-        let frame = self.receiver.push(byte)?;
-        let header = frame.header;
-        if header.kind == Kind::Firmware {
-            let body = frame.body::<Management>();
-            return self.receive_management(header, body);
-        }
-        let body = frame.body::<Request>();
-        match header.kind {
-            Kind::Immediate | Kind::Control if header.major != PROTOCOL.major => {
-                self.receive_foreign(now, header, body)
-            }
-            Kind::Immediate => self.receive_immediate(now, header, body),
-            Kind::Control => self.receive_sequenced(now, header, body),
-            Kind::Telemetry | Kind::Log | Kind::Firmware | Kind::AckOnly | Kind::Nak => None,
-        }
-    }
-
-    /// Answers a request. The session fills in `to`, and `t2` when a `TimeReply` leaves; it remembers the answers to
-    /// requests in order, to give them again. A `Heartbeat` may go unanswered.
+    /// Answers a request. The session fills in `to`, and `t2` when a `TimeReply` leaves. It remembers the answers to
+    /// requests in order, to repeat them. A `Heartbeat` needs no answer.
     pub fn reply(&mut self, reply_to: ReplyTo, mut report: Report) {
         if reply_to.session != self.session() {
             return;
@@ -150,22 +153,23 @@ impl BoardSession {
         push_out(&mut self.management, report, &mut self.statistics.replies_dropped);
     }
 
-    /// Sends an event: `MoveState`, `Fault` or `FrameMark`. Nothing happens without a session; the oldest goes when too many wait.
+    /// Queues an event: `MoveState`, `Fault` or `TriggerMark`. Ignored without a session; when the queue is full, the
+    /// oldest event is dropped.
     pub fn send(&mut self, report: Report) {
         if self.open.is_some() {
             push_out(&mut self.events, report, &mut self.statistics.events_dropped);
         }
     }
 
-    /// Sends a pose when nothing else is to be sent, and only the latest. Nothing happens without a session.
+    /// Queues a pose, which replaces one that has not been sent yet. Ignored without a session.
     pub fn telemetry(&mut self, pose: PoseReport) {
         if self.open.is_some() && self.pose.replace(pose).is_some() {
             increment(&mut self.statistics.poses_replaced);
         }
     }
 
-    /// Keeps one log entry, text or encoded, to be sent when there is nothing else to send; what is logged before a
-    /// session waits for it. An entry that does not fit is dropped whole.
+    /// Queues one log entry, text or encoded, to be sent when nothing else waits. Entries logged before a session wait for
+    /// it. An entry that does not fit is dropped whole.
     pub fn log(&mut self, entry: &[u8]) {
         if entry.len() > LOG - self.log.len() {
             increment(&mut self.statistics.logs_dropped);
@@ -174,8 +178,8 @@ impl BoardSession {
         self.log.extend(entry.iter().copied());
     }
 
-    /// Writes the next frame to send `now`, or `None` when there is none: answers first, then events, then the pose,
-    /// then the log.
+    /// Writes the next frame to send at `now` and returns its length in bytes, or `None` if none waits. Answers go first,
+    /// then events, then the pose, then the log.
     pub fn transmit(&mut self, now: Microseconds, buffer: &mut [u8; MAX_FRAME]) -> Option<usize> {
         let (kind, body) = self.next_frame(now)?;
         let header = Header { major: PROTOCOL.major, kind, seq: self.seq, ack: self.expected.wrapping_sub(1) };
@@ -189,140 +193,16 @@ impl BoardSession {
         }
     }
 
-    /// The open session.
+    /// Id of the open session, if any.
     #[must_use]
     pub fn session(&self) -> Option<SessionId> {
         self.open.map(|open| open.session)
     }
 
-    /// Figures so far.
+    /// Figures since the board started.
     #[must_use]
     pub fn statistics(&self) -> BoardStatistics {
         BoardStatistics { sent: self.line.sent(), link: self.receiver.counters(), ..self.statistics }
-    }
-
-    fn receive_management(&mut self, header: Header, body: Result<Management, FrameError>) -> Option<BoardEvent> {
-        match body {
-            Ok(request) => Some(BoardEvent::Management { seq: header.seq, request }),
-            Err(error) => {
-                self.receiver.reject(error);
-                None
-            }
-        }
-    }
-
-    /// Of another major only what is frozen for ever is understood, and it opens nothing.
-    fn receive_foreign(
-        &mut self,
-        now: Microseconds,
-        header: Header,
-        body: Result<Request, FrameError>,
-    ) -> Option<BoardEvent> {
-        match body {
-            Ok(Request::Hello { session, .. }) => {
-                self.hello_due = Some(session);
-                None
-            }
-            Ok(request @ Request::GetInfo) => Some(self.deliver(now, true, header.seq, request)),
-            _ => None,
-        }
-    }
-
-    fn receive_immediate(
-        &mut self,
-        now: Microseconds,
-        header: Header,
-        body: Result<Request, FrameError>,
-    ) -> Option<BoardEvent> {
-        match body {
-            Ok(Request::Hello { protocol, schema, session }) => {
-                let read_only = protocol.major != PROTOCOL.major || schema != schema_hash();
-                self.receive_hello(Open { session, read_only })
-            }
-            Ok(request) if super::may_pass_by(&request) => {
-                let needs_session = !matches!(request, Request::Stop { .. });
-                if needs_session && self.open.is_none() {
-                    return self.refuse_without_session();
-                }
-                Some(self.deliver(now, true, header.seq, request))
-            }
-            _ => {
-                self.receiver.reject(FrameError::Body);
-                None
-            }
-        }
-    }
-
-    fn receive_sequenced(
-        &mut self,
-        now: Microseconds,
-        header: Header,
-        body: Result<Request, FrameError>,
-    ) -> Option<BoardEvent> {
-        let Some(open) = self.open else { return self.refuse_without_session() };
-        match header.seq.wrapping_sub(self.expected) {
-            0 => {}
-            1..128 => {
-                increment(&mut self.statistics.gaps);
-                self.nak_due = true;
-                return None;
-            }
-            128.. => {
-                increment(&mut self.statistics.duplicates);
-                self.results.repeat(header.seq);
-                self.ack_due = true;
-                return None;
-            }
-        }
-        self.expected = self.expected.wrapping_add(1);
-        self.nak_due = false;
-        self.ack_due = true;
-        self.results.expect(header.seq);
-        let refusal = match body {
-            Ok(request) if !(open.read_only && moves(&request)) => {
-                return Some(self.deliver(now, false, header.seq, request));
-            }
-            Ok(_) => Refusal::ReadOnly,
-            // Left unanswered it would be repeated for ever.
-            Err(error) => {
-                self.receiver.reject(error);
-                Refusal::Invalid
-            }
-        };
-        self.results.record(header.seq, Report::Ack { to: header.seq, status: Status::Refused(refusal) });
-        None
-    }
-
-    fn receive_hello(&mut self, open: Open) -> Option<BoardEvent> {
-        // Zero means "none": nobody can open it.
-        if open.session == SessionId::default() {
-            return None;
-        }
-        self.hello_due = Some(open.session);
-        if self.session() == Some(open.session) {
-            return None;
-        }
-        self.open = Some(open);
-        self.expected = 0;
-        self.nak_due = false;
-        self.ack_due = false;
-        self.results.clear();
-        self.immediate.clear();
-        self.events.clear();
-        self.pose = None;
-        Some(BoardEvent::Opened { session: open.session })
-    }
-
-    /// A host that does not know of the board's restart learns it from a `Hello` of no session.
-    fn refuse_without_session(&mut self) -> Option<BoardEvent> {
-        increment(&mut self.statistics.without_session);
-        self.hello_due.get_or_insert_default();
-        None
-    }
-
-    fn deliver(&mut self, received_at: Microseconds, immediate: bool, seq: u8, request: Request) -> BoardEvent {
-        let reply_to = ReplyTo { immediate, seq, session: self.session() };
-        BoardEvent::Request { reply_to, request, received_at }
     }
 
     fn next_frame(&mut self, now: Microseconds) -> Option<(Kind, Body)> {
@@ -359,7 +239,7 @@ impl BoardSession {
     }
 }
 
-/// What a frame carries.
+/// Body of an outgoing frame.
 enum Body {
     None,
     Report(Report),
@@ -367,28 +247,12 @@ enum Body {
     Log(Vec<u8, LOG_CHUNK>),
 }
 
-/// What a host of another schema may not ask.
-const fn moves(request: &Request) -> bool {
-    matches!(
-        request,
-        Request::Arm { .. }
-            | Request::Home { .. }
-            | Request::MoveTo(_)
-            | Request::Jog(_)
-            | Request::ClearFault { .. }
-            | Request::SetSetting { .. }
-            | Request::SaveSettings
-            | Request::RestoreSettings
-            | Request::SetTrigger(_)
-    )
-}
-
-/// Puts `report` last; where the queue is full the first goes and is counted.
+/// Appends `report`; if the queue is full, drops its first element and counts it in `dropped`.
 fn push_out<T, const N: usize>(queue: &mut Deque<T, N>, report: T, dropped: &mut u32) {
     if queue.is_full() {
         queue.pop_front();
         increment(dropped);
     }
-    // There is room now.
+    // The queue has room now.
     let _ = queue.push_back(report);
 }

@@ -1,4 +1,4 @@
-//! The host's end.
+//! The host's end of one session.
 
 mod receive;
 
@@ -14,60 +14,60 @@ use crate::management::{Management, ManagementReport};
 use crate::receiver::Receiver;
 use crate::{Microseconds, PROTOCOL, ProtocolVersion, Report, Request, SessionId, schema_hash};
 
-/// How many immediate requests may wait for the line.
+/// Number of immediate requests that may wait for the line.
 const IMMEDIATE: usize = 4;
-/// How many management requests may wait for the line.
+/// Number of management requests that may wait for the line.
 const MANAGEMENT: usize = WINDOW;
 
-/// Names one request of one session, so that its answer can be told from another's.
+/// Names one request of a session, so that its answer can be recognised.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub struct Ticket {
     immediate: bool,
     number: u32,
 }
 
-/// What host and board can do together.
+/// Degree to which host and board understand each other.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Compatibility {
-    /// Everything: both mean the same bytes.
+    /// The schemas are equal: all requests are possible.
     Full,
     /// The schemas differ: the board may be read and stopped but not moved.
     ReadOnly,
-    /// The majors differ: nothing but `GetInfo` by [`HostSession::send_now`], and [`HostSession::manage`].
+    /// The major versions differ: only `GetInfo` by [`HostSession::send_now`] and [`HostSession::manage`] are possible.
     Incompatible {
-        /// What the board speaks.
+        /// Protocol version of the board.
         board: ProtocolVersion,
     },
 }
 
-/// What the host hears.
+/// Event that received bytes cause on the host.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum HostEvent {
     /// The board answered [`HostSession::hello`].
     Opened {
-        /// What can be done now.
+        /// Degree to which host and board understand each other.
         compatibility: Compatibility,
-        /// Changes with every start of the board.
+        /// Number that changes with every start of the board.
         boot: u32,
     },
-    /// The board no longer knows this session: it restarted, or another host opened one. Nothing that awaited an answer
-    /// will get one. Make a new `HostSession` with a new id.
+    /// The board no longer knows this session: it restarted, or another host opened a session. Unanswered requests stay
+    /// unanswered. Make a new `HostSession` with a new id.
     Lost {
-        /// Changes with every start of the board.
+        /// Number that changes with every start of the board.
         boot: u32,
     },
     /// The answer to a request: a report that names one ([`Report::to`]).
     Reply {
-        /// Which request.
+        /// The request that is answered.
         ticket: Ticket,
         /// The answer.
         report: Report,
     },
-    /// All else: `Pose`, `MoveState`, `Fault`, `TimeReply`, `FrameMark`.
+    /// A report that answers no request: `Pose`, `MoveState`, `Fault`, `TimeReply` or `TriggerMark`.
     Report(Report),
-    /// The next bytes of the board's log; an entry may be spread over several, and frames may be lost between.
+    /// The next bytes of the board's log. An entry may be spread over several frames, and frames between may be lost.
     Log(Vec<u8, LOG_CHUNK>),
-    /// The answer to a management request, whether a session is open or not. It may come twice.
+    /// The answer to a management request, with or without a session. It may come twice.
     Management(ManagementReport),
 }
 
@@ -78,17 +78,18 @@ pub enum SubmitError {
     /// The board has not answered `Hello`, is incompatible, or has lost the session.
     #[error("there is no open session with the board")]
     NotOpen,
-    /// As many requests await an answer as may: try again after the next reply.
-    #[error("too many requests await an answer")]
+    /// [`crate::WINDOW`] requests await an answer: try again after the next reply.
+    #[error("too many requests await an answer: try again after the next one")]
     WindowFull,
-    /// More immediate requests than the line takes: call `transmit`.
-    #[error("too many immediate requests wait for the line")]
+    /// Too many requests wait for the line: call `transmit`.
+    #[error("too many requests wait for the serial line")]
     QueueFull,
-    /// The request goes another way: `hello`, `submit` or `send_now`.
-    #[error("this request is sent another way")]
+    /// The request must be sent by another function: `hello`, `submit` or `send_now`.
+    #[error("this request must be sent by another function of the session")]
     WrongWay,
 }
 
+/// Phase of the session.
 #[derive(Clone, Copy, Debug)]
 enum Phase {
     Closed,
@@ -97,8 +98,10 @@ enum Phase {
     Incompatible,
 }
 
-/// The host's end of one session. Loop: [`receive`](Self::receive) what arrived, [`transmit`](Self::transmit) until it
-/// gives nothing, wait for bytes or until [`next_wake`](Self::next_wake).
+/// The host's end of one session; [`crate::BoardSession`] is the other end and shows both in an example.
+///
+/// Loop: give received bytes to [`receive`](Self::receive), call [`transmit`](Self::transmit) until it returns `None`, wait
+/// for bytes or until [`next_wake`](Self::next_wake).
 #[derive(Debug)]
 pub struct HostSession {
     id: SessionId,
@@ -110,6 +113,7 @@ pub struct HostSession {
     immediate_next: u32,
     management: Deque<(u8, Management), MANAGEMENT>,
     management_next: u8,
+    /// Number of the last frame from the board.
     heard_seq: u8,
     heard_at: Option<Microseconds>,
     pose_seq: Option<u16>,
@@ -118,7 +122,7 @@ pub struct HostSession {
 }
 
 impl HostSession {
-    /// A closed session. `id` must be random and not zero: the board takes the same id for the same conversation.
+    /// A closed session. `id` must be random and not zero: the board takes equal ids for the same session.
     #[must_use]
     pub fn new(id: SessionId) -> Self {
         Self {
@@ -139,7 +143,7 @@ impl HostSession {
         }
     }
 
-    /// Sends `Hello`, again and again until the board answers with [`HostEvent::Opened`]. Nothing on a session that was
+    /// Sends `Hello` repeatedly until the board answers and [`HostEvent::Opened`] comes. Ignored on a session that was
     /// opened before.
     pub fn hello(&mut self) {
         if matches!(self.phase, Phase::Closed) && self.heard_at.is_none() {
@@ -147,10 +151,10 @@ impl HostSession {
         }
     }
 
-    /// Takes a request that the board will carry out once and in order; its answer comes as [`HostEvent::Reply`].
+    /// Submits a request that the board carries out once and in order; its answer comes as [`HostEvent::Reply`].
     ///
     /// # Errors
-    /// [`SubmitError`]; the request was not taken.
+    /// [`SubmitError`] if the request was not taken.
     pub fn submit(&mut self, now: Microseconds, request: Request) -> Result<Ticket, SubmitError> {
         match request {
             Request::Hello { .. } | Request::Heartbeat { .. } | Request::TimeProbe { .. } | Request::Stop { .. } => {
@@ -163,17 +167,17 @@ impl HostSession {
         Ok(Ticket { immediate: false, number })
     }
 
-    /// Sends `Heartbeat`, `TimeProbe`, `Stop` or `GetInfo` once, before everything else: the caller repeats it if need
-    /// be. `Stop` overtakes all and needs no open session, though its answer is heard only on one. The `t0` of a
-    /// `TimeProbe` is set when it leaves.
+    /// Sends `Heartbeat`, `TimeProbe`, `Stop` or `GetInfo` once, before all submitted requests; the caller repeats it if
+    /// necessary. A `Stop` goes before all others and needs no open session, but its answer arrives only on an open one.
+    /// The `t0` of a `TimeProbe` is set when it leaves.
     ///
     /// # Errors
-    /// [`SubmitError`]; the request was not taken. A `Stop` is always taken.
+    /// [`SubmitError`] if the request was not taken. A `Stop` is always taken.
     pub fn send_now(&mut self, request: Request) -> Result<Ticket, SubmitError> {
         let number = self.immediate_next;
         let ticket = Ticket { immediate: true, number };
         match (&request, self.phase) {
-            (request, _) if !super::may_pass_by(request) => return Err(SubmitError::WrongWay),
+            (request, _) if !super::may_bypass(request) => return Err(SubmitError::WrongWay),
             (Request::Stop { .. }, _) => {
                 if self.immediate.is_full() {
                     self.immediate.pop_back();
@@ -189,11 +193,11 @@ impl HostSession {
         Ok(ticket)
     }
 
-    /// Sends a management request once, to a board of any major, with or without a session; the caller repeats it if
-    /// need be. Returns its sequence number, which the answer names.
+    /// Sends a management request once, to a board of any major version, with or without a session; the caller repeats it
+    /// if necessary. Returns its sequence number, which the answer names.
     ///
     /// # Errors
-    /// [`SubmitError::QueueFull`]; the request was not taken.
+    /// [`SubmitError::QueueFull`] if the request was not taken.
     pub fn manage(&mut self, request: Management) -> Result<u8, SubmitError> {
         let seq = self.management_next;
         self.management.push_back((seq, request)).map_err(|_| SubmitError::QueueFull)?;
@@ -201,7 +205,7 @@ impl HostSession {
         Ok(seq)
     }
 
-    /// Takes bytes from the board, any bytes, that arrived `now`.
+    /// Takes bytes from the board, which arrived at `now`, and gives `hear` the events that they cause. Any bytes may come.
     pub fn receive(&mut self, now: Microseconds, bytes: &[u8], mut hear: impl FnMut(HostEvent)) {
         for &byte in bytes {
             if let Some(event) = self.receive_byte(now, byte) {
@@ -210,7 +214,7 @@ impl HostSession {
         }
     }
 
-    /// Writes the next frame to send `now`, or `None` when there is none. Call until then.
+    /// Writes the next frame to send at `now` and returns its length in bytes, or `None` if none waits. Call it until then.
     pub fn transmit(&mut self, now: Microseconds, buffer: &mut [u8; MAX_FRAME]) -> Option<usize> {
         let header = |kind, seq, ack| Header { major: PROTOCOL.major, kind, seq, ack };
         if let Some((kind, seq, request)) = self.next_request(now) {
@@ -220,7 +224,7 @@ impl HostSession {
         self.line.write(now, header(Kind::Firmware, seq, self.heard_seq), &request, buffer)
     }
 
-    /// When [`transmit`](Self::transmit) next has something to send if nothing arrives before; zero is at once.
+    /// Time at which [`transmit`](Self::transmit) next has a frame if no bytes arrive before; zero means at once.
     #[must_use]
     pub fn next_wake(&self) -> Option<Microseconds> {
         match self.phase {
@@ -236,25 +240,26 @@ impl HostSession {
         matches!(self.phase, Phase::Open { .. })
     }
 
-    /// The session's id.
+    /// Id of the session.
     #[must_use]
     pub const fn id(&self) -> SessionId {
         self.id
     }
 
-    /// Submitted requests without an answer.
+    /// Number of submitted requests without an answer.
     #[must_use]
     pub fn unanswered(&self) -> usize {
         self.window.len()
     }
 
-    /// When the board was last heard since the session opened, by the `now` of [`receive`](Self::receive).
+    /// Time at which the last frame from the board arrived since the session opened: a `now` of
+    /// [`receive`](Self::receive).
     #[must_use]
     pub const fn heard_at(&self) -> Option<Microseconds> {
         self.heard_at
     }
 
-    /// Figures so far.
+    /// Figures of this session so far.
     #[must_use]
     pub fn statistics(&self) -> HostStatistics {
         HostStatistics {

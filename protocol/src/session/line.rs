@@ -1,4 +1,4 @@
-//! The outgoing side that both ends share.
+//! Outgoing frames: the part that host and board share.
 
 use serde::Serialize;
 
@@ -6,17 +6,20 @@ use crate::Microseconds;
 use crate::frame::{self, Header, MAX_FRAME};
 use crate::receiver::increment;
 
-/// After this much silence (microseconds) a 0x00 goes first: noise on an idle line must not spoil the next frame.
+/// After this silence, in microseconds, a 0x00 goes before the next frame: it ends any noise that an idle line made.
 const IDLE: u64 = 10_000;
 
+/// The outgoing side of a line.
 #[derive(Debug, Default)]
 pub(super) struct Line {
+    /// Time of the last frame written.
     last: Option<Microseconds>,
     sent: u32,
 }
 
 impl Line {
-    /// Writes one frame, with a 0x00 before it where the line was idle. `None` where the body does not fit a frame.
+    /// Writes one frame, after a 0x00 if the line was idle; returns the number of bytes. `None` if the body does not fit a
+    /// frame.
     pub(super) fn write<B: Serialize>(
         &mut self,
         now: Microseconds,
@@ -35,7 +38,7 @@ impl Line {
         Some(length)
     }
 
-    /// Frames written so far.
+    /// Number of frames written so far.
     pub(super) const fn sent(&self) -> u32 {
         self.sent
     }

@@ -1,9 +1,10 @@
-//! The conversation between host and board, without input or output of its own: bytes and times go in, bytes come out.
+//! The session between host and board as two state machines without input or output of their own: bytes and times go in,
+//! bytes and events come out.
 //!
-//! Requests that change something go through a window of four, numbered from 0 in each session, repeated until answered
-//! and delivered once and in order (go-back-N). `Hello`, `Heartbeat`, `TimeProbe` and `Stop` pass by the window: a late
-//! one is worth nothing, and a stop must not queue. The board never repeats by itself: it answers again when asked
-//! again, and all that matters is in every pose.
+//! Requests that change something go through a window of four. They are numbered from 0 in each session, repeated until
+//! answered, and delivered once and in order (go-back-N). `Hello`, `Heartbeat`, `TimeProbe` and `Stop` bypass the window:
+//! a late heartbeat is worth nothing, and a stop must not queue. The board never repeats an answer by itself: it answers
+//! again when the host asks again, and every pose repeats all state that the host must not miss.
 
 mod board;
 mod host;
@@ -20,7 +21,7 @@ pub use window::WINDOW;
 
 use crate::Request;
 
-/// Whether a request may pass by the window. `GetInfo` may, so that a board of another major can be asked what it is.
-const fn may_pass_by(request: &Request) -> bool {
+/// Whether a request may bypass the window. `GetInfo` may, so that a host can identify a board of another major version.
+const fn may_bypass(request: &Request) -> bool {
     matches!(request, Request::Heartbeat { .. } | Request::TimeProbe { .. } | Request::Stop { .. } | Request::GetInfo)
 }

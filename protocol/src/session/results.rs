@@ -1,10 +1,10 @@
-//! What the board answered last, so that a request that comes again is answered again and not done again.
+//! The board's last answers: a repeated request is answered again but not carried out again.
 
 use heapless::Deque;
 
 use crate::Report;
 
-/// Twice the host's window.
+/// Number of answers kept: twice the host's window.
 const RESULTS: usize = 2 * super::WINDOW;
 
 #[derive(Debug)]
@@ -20,7 +20,7 @@ pub(super) struct Results {
 }
 
 impl Results {
-    /// A request was delivered: an answer will come.
+    /// Notes that request `seq` was delivered: its answer will come.
     pub(super) fn expect(&mut self, seq: u8) {
         if self.answers.is_full() {
             self.answers.pop_front();
@@ -29,7 +29,7 @@ impl Results {
         let _ = self.answers.push_back(Answer { seq, report: None, due: false });
     }
 
-    /// The answer came. It is kept if the request is remembered.
+    /// Keeps the answer to request `seq`, if the request is still remembered.
     pub(super) fn record(&mut self, seq: u8, report: Report) {
         if let Some(answer) = self.find(seq) {
             answer.report = Some(report);
@@ -37,14 +37,14 @@ impl Results {
         }
     }
 
-    /// The request came again: send its answer again, once there is one.
+    /// Notes that request `seq` came again: its answer is sent again, once there is one.
     pub(super) fn repeat(&mut self, seq: u8) {
         if let Some(answer) = self.find(seq) {
             answer.due = true;
         }
     }
 
-    /// The next answer to send.
+    /// Takes the next answer to send.
     pub(super) fn transmit(&mut self) -> Option<Report> {
         let answer = self.answers.iter_mut().find(|answer| answer.due && answer.report.is_some())?;
         answer.due = false;

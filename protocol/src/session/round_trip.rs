@@ -1,12 +1,14 @@
-//! How long to wait for an answer (RFC 6298, with bounds for a serial line).
+//! Time-out for answers, from measured round trips (RFC 6298, with bounds for a serial line).
 
 use crate::Microseconds;
 
+/// Time-out before the first measurement, in microseconds.
 const START: u64 = 20_000;
+/// Bounds of the time-out, in microseconds.
 const MIN: u64 = 5_000;
 const MAX: u64 = 250_000;
 
-/// Smoothed round trip and its variation, in microseconds.
+/// Smoothed round-trip time and its variation, in microseconds.
 #[derive(Debug)]
 pub(super) struct RoundTrip {
     smoothed: Option<u64>,
@@ -19,8 +21,9 @@ impl RoundTrip {
         Self { smoothed: None, variation: 0, timeout: START }
     }
 
-    /// Takes one measured round trip. It ends a back-off, so it must come from a request sent only once (Karn and
-    /// Partridge, "Improving Round-Trip Time Estimates in Reliable Transport Protocols", SIGCOMM 1987).
+    /// Takes one measured round trip in microseconds and ends a back-off. The measurement must come from a request that was
+    /// sent only once (Karn and Partridge, "Improving Round-Trip Time Estimates in Reliable Transport Protocols", SIGCOMM
+    /// 1987).
     pub(super) fn sample(&mut self, sample: u64) {
         let sample = sample.min(MAX);
         let smoothed = match self.smoothed {
@@ -37,12 +40,12 @@ impl RoundTrip {
         self.timeout = (smoothed + 4 * self.variation).clamp(MIN, MAX);
     }
 
-    /// After a time-out: wait twice as long.
+    /// Doubles the time-out, after a request has timed out.
     pub(super) fn back_off(&mut self) {
         self.timeout = back_off(self.timeout);
     }
 
-    /// The time-out, backed off `doublings` times more.
+    /// The time-out doubled `doublings` times, at most [`MAX`].
     pub(super) fn timeout_doubled(&self, doublings: u32) -> u64 {
         (self.timeout << doublings.min(8)).min(MAX)
     }
@@ -60,7 +63,7 @@ fn back_off(timeout: u64) -> u64 {
     (2 * timeout).min(MAX)
 }
 
-/// When to ask again for an answer of which no round trip is measured: start, then back off.
+/// Times at which to repeat a request whose round trip is not measured: intervals that double from [`START`].
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Repeat {
     due: Microseconds,
@@ -68,7 +71,7 @@ pub(super) struct Repeat {
 }
 
 impl Repeat {
-    /// At once.
+    /// Due at once.
     pub(super) const fn new() -> Self {
         Self { due: Microseconds(0), interval: START }
     }
@@ -77,7 +80,7 @@ impl Repeat {
         self.due
     }
 
-    /// It was sent `now`.
+    /// Notes that the request was sent at `now`.
     pub(super) fn sent(&mut self, now: Microseconds) {
         self.due = Microseconds(now.0.saturating_add(self.interval));
         self.interval = back_off(self.interval);

@@ -1,4 +1,4 @@
-//! How the link has been, as each end sees it.
+//! Figures of the link, as each end counts them.
 
 use postcard_schema::Schema;
 use serde::{Deserialize, Serialize};
@@ -6,44 +6,44 @@ use serde::{Deserialize, Serialize};
 use crate::Microseconds;
 use crate::receiver::LinkCounters;
 
-/// Figures since the board started.
+/// The board's figures since it started.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, Schema)]
 pub struct BoardStatistics {
     /// Frames sent.
     pub sent: u32,
-    /// Requests that came again and were only answered again.
+    /// Repeated requests: answered again, not carried out again.
     pub duplicates: u32,
-    /// Requests that came too early because one before them was lost.
+    /// Requests dropped because an earlier one was missing.
     pub gaps: u32,
     /// Requests dropped because no session was open.
     pub without_session: u32,
-    /// Answers to immediate and management requests that were pushed out by later ones.
+    /// Answers to immediate and management requests that later ones pushed out of the queue.
     pub replies_dropped: u32,
-    /// Events that were pushed out by later ones.
+    /// Events that later ones pushed out of the queue.
     pub events_dropped: u32,
-    /// Poses that a later one replaced before they were sent.
+    /// Poses that were replaced by later ones before they were sent.
     pub poses_replaced: u32,
-    /// Log entries dropped because too much waited.
+    /// Log entries dropped because the queue was full.
     pub logs_dropped: u32,
-    /// What came in.
+    /// Frames received and dropped.
     pub link: LinkCounters,
 }
 
-/// Figures of one session.
+/// The host's figures of one session.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct HostStatistics {
     /// Frames sent.
     pub sent: u32,
     /// Requests sent again.
     pub retransmitted: u32,
-    /// Smoothed round trip, microseconds; `None` before the first acknowledgement.
+    /// Smoothed round-trip time; `None` before the first acknowledgement.
     pub round_trip: Option<Microseconds>,
-    /// How long an unanswered request waits before it is sent again, microseconds.
+    /// Time after which an unanswered request is sent again.
     pub timeout: Microseconds,
     /// Poses received.
     pub poses: u32,
-    /// Poses that the board numbered but that did not arrive.
+    /// Poses that are missing in the board's numbering.
     pub poses_lost: u32,
-    /// What came in.
+    /// Frames received and dropped.
     pub link: LinkCounters,
 }

@@ -1,4 +1,4 @@
-//! The host's requests that are not answered yet: sent in order, repeated until answered.
+//! The host's unanswered requests: sent in order, repeated until answered.
 
 use heapless::Vec;
 
@@ -6,8 +6,8 @@ use super::round_trip::RoundTrip;
 use crate::receiver::increment;
 use crate::{Microseconds, Request};
 
-/// How far the newest request may be ahead of the oldest unanswered one. The board remembers more results than this, so
-/// that it can answer again whatever the host can still ask again.
+/// Largest number of requests from the oldest unanswered one to the newest. The board remembers more answers than this,
+/// so that it can repeat every answer that the host may still ask for.
 pub const WINDOW: usize = 4;
 
 #[derive(Debug)]
@@ -25,19 +25,20 @@ impl Pending {
         sequence(self.number)
     }
 
-    /// Whether a cumulative acknowledgement covers it.
+    /// Whether the cumulative acknowledgement `ack` covers this request.
     const fn covered_by(&self, ack: u8) -> bool {
         ack.wrapping_sub(self.seq()) < 1 << 7
     }
 
-    /// When it is sent again. One that the board has may just take long to answer: it is asked for ever more rarely.
+    /// Time at which the request is sent again. An acknowledged request may just take long to answer: its repetitions
+    /// become ever rarer.
     fn deadline(&self, round_trip: &RoundTrip) -> Microseconds {
         let doublings = if self.acknowledged { self.transmissions.saturating_sub(1) } else { 0 };
         Microseconds(self.sent_at.0.saturating_add(round_trip.timeout_doubled(doublings)))
     }
 }
 
-/// The number as it travels: its low byte.
+/// The sequence number of request `number` on the wire: its low byte.
 pub(super) const fn sequence(number: u32) -> u8 {
     number as u8
 }
@@ -55,7 +56,7 @@ impl Window {
         Self { pending: Vec::new(), next: 0, round_trip: RoundTrip::new(), retransmitted: 0 }
     }
 
-    /// Takes a request and numbers it; `None` where the window is full.
+    /// Takes a request and returns its number; `None` if the window is full.
     pub(super) fn submit(&mut self, now: Microseconds, request: Request) -> Option<u32> {
         let number = self.next;
         let span = self.pending.first().map_or(0, |oldest| number.wrapping_sub(oldest.number));
@@ -68,7 +69,7 @@ impl Window {
         Some(number)
     }
 
-    /// The next request to send: in order, new ones and those that timed out.
+    /// The next request to send, in order: a new one or one that has timed out.
     pub(super) fn transmit(&mut self, now: Microseconds) -> Option<(u8, Request)> {
         self.time_out(now);
         let pending = self.pending.iter_mut().find(|pending| pending.due)?;
@@ -81,7 +82,7 @@ impl Window {
         Some((pending.seq(), pending.request.clone()))
     }
 
-    /// The board has everything up to `ack`.
+    /// Notes that the board has all requests up to `ack`.
     pub(super) fn acknowledge(&mut self, now: Microseconds, ack: u8) {
         for pending in self.pending.iter_mut().filter(|pending| pending.covered_by(ack) && !pending.acknowledged) {
             pending.acknowledged = true;
@@ -91,7 +92,8 @@ impl Window {
         }
     }
 
-    /// The board misses what follows `ack`. The burst behind one gap brings several of these: one is enough.
+    /// Makes the requests after `ack` due, which the board misses. Each request behind a gap brings one such message; only
+    /// the first of them acts.
     pub(super) fn not_acknowledged(&mut self, now: Microseconds, ack: u8) {
         let patience = self.round_trip.smoothed().map_or(self.round_trip.timeout(), |smoothed| smoothed.0);
         let mut missing = self.pending.iter_mut().skip_while(|pending| pending.covered_by(ack)).peekable();
@@ -103,19 +105,19 @@ impl Window {
         }
     }
 
-    /// The answer to `seq` came: its number, where it was still awaited.
+    /// Removes the request with sequence number `seq`, which was answered; returns its number, if it was still awaited.
     pub(super) fn answer(&mut self, seq: u8) -> Option<u32> {
         let index = self.pending.iter().position(|pending| pending.seq() == seq && pending.transmissions > 0)?;
         Some(self.pending.remove(index).number)
     }
 
-    /// When `transmit` next has something.
+    /// Time at which [`Self::transmit`] next has a request.
     pub(super) fn wake(&self) -> Option<Microseconds> {
         let wake = |pending: &Pending| if pending.due { Microseconds(0) } else { pending.deadline(&self.round_trip) };
         self.pending.iter().map(wake).min()
     }
 
-    /// Requests without an answer.
+    /// Number of requests without an answer.
     pub(super) fn len(&self) -> usize {
         self.pending.len()
     }
@@ -132,8 +134,8 @@ impl Window {
         &self.round_trip
     }
 
-    /// Makes due what waited too long. The board takes nothing behind a gap, so where a request may be lost, all that
-    /// follow are sent again too (go-back-N); where it arrived, only its answer is missing.
+    /// Makes requests due that waited too long. The board takes no request behind a gap, so if a request may be lost, all
+    /// that follow it are sent again too (go-back-N); if it arrived, only its answer is missing.
     fn time_out(&mut self, now: Microseconds) {
         let mut lost = false;
         for pending in self.pending.iter_mut().filter(|pending| !pending.due) {

@@ -1,8 +1,9 @@
-//! What the stories of the session share.
+//! Helpers that the session tests share.
 
 #![allow(dead_code, reason = "each test file uses its part")]
 #![allow(clippy::unwrap_used, clippy::panic, reason = "a test ends by panicking")]
 
+pub mod board;
 pub mod rig;
 
 use vergence_protocol::{

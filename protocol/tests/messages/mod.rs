@@ -7,9 +7,9 @@ use proptest::prelude::*;
 use vergence_protocol::frame::{Header, Kind};
 use vergence_protocol::{
     AxisInfo, AxisKind, AxisMask, BoardInfo, BoardStatistics, ControllerState, Counts, EVENTS_PER_ANSWER, FaultCode,
-    FaultRecord, FrameMark, Happening, Jog, LinkCounters, MAX_AXES, Micro, Microseconds, Mode, Move, MoveId, MovePhase,
-    Permille, PoseReport, ProtocolVersion, RecordedEvent, RecordedEvents, Refusal, Report, Request, ResetCause,
-    SessionId, SettingItem, SettingKey, Status, StopKind, Trigger,
+    FaultRecord, Happening, Jog, LinkCounters, MAX_AXES, Micro, Microseconds, Mode, Move, MoveId, MovePhase, Permille,
+    PoseReport, ProtocolVersion, RecordedEvent, RecordedEvents, Refusal, Report, Request, ResetCause, SessionId,
+    SettingItem, SettingKey, Status, StopKind, Trigger, TriggerMark,
 };
 
 fn micros() -> impl Strategy<Value = Microseconds> {
@@ -72,7 +72,7 @@ fn key() -> impl Strategy<Value = SettingKey> {
 
 fn happening() -> impl Strategy<Value = Happening> {
     let detail = (fault(), any::<i32>(), any::<u8>(), any::<bool>(), any::<bool>());
-    detail.prop_flat_map(|(fault, number, axis, home, closed)| {
+    detail.prop_flat_map(|(fault, number, axis, home, operated)| {
         prop::sample::select(vec![
             Happening::Started,
             Happening::Opened(SessionId(number.unsigned_abs())),
@@ -81,7 +81,7 @@ fn happening() -> impl Strategy<Value = Happening> {
             Happening::Refused(Refusal::NotReferenced { axis }),
             Happening::Stop(StopKind::TorqueOff),
             Happening::Fault { code: fault.code, axis: fault.axis, detail: fault.detail },
-            Happening::Switch { axis, home, closed },
+            Happening::Switch { axis, home, operated },
             Happening::Encoder { axis, counts: Counts(number) },
             Happening::Settings,
         ])
@@ -111,8 +111,8 @@ fn statistics() -> impl Strategy<Value = BoardStatistics> {
     })
 }
 
-fn mark() -> impl Strategy<Value = FrameMark> {
-    (any::<u32>(), micros(), axes(any::<i32>().prop_map(Counts))).prop_map(|(seq, at, counts)| FrameMark {
+fn mark() -> impl Strategy<Value = TriggerMark> {
+    (any::<u32>(), micros(), axes(any::<i32>().prop_map(Counts))).prop_map(|(seq, at, counts)| TriggerMark {
         seq,
         at,
         counts,
@@ -233,7 +233,7 @@ pub fn report() -> impl Strategy<Value = Report> {
         (any::<u8>(), key(), any::<i64>()).prop_map(|(to, key, value)| Report::Setting { to, key, value }),
         (any::<u8>(), events()).prop_map(|(to, events)| Report::Events { to, events }),
         (any::<u8>(), statistics()).prop_map(|(to, statistics)| Report::Statistics { to, statistics }),
-        mark().prop_map(Report::FrameMark),
+        mark().prop_map(Report::TriggerMark),
     ]
 }
 

@@ -1,4 +1,4 @@
-//! Requests: each is executed or refused with a reason; nothing is clamped.
+//! Requests: each is carried out or refused with a reason; values are never clamped.
 
 use vergence_protocol::{
     AxisList, AxisMask, ControllerState, Jog, Micro, Microseconds, Mode, Move, MoveId, MovePhase, Permille, Refusal,
@@ -10,13 +10,11 @@ use crate::TICK_US;
 use crate::axis::Axis;
 use crate::homing_sequence::HomingSequence;
 use crate::io::RigIo;
-
-/// Axes agree on a duration when they differ by less than this share; it takes two rounds from rest.
-const AGREED: f32 = 1e-5;
-const MOST_ROUNDS: u32 = 4;
+use crate::plan::Together;
 
 impl Controller {
-    /// Executes a request of `session` that concerns motion, or says why not. Requests about the link are not its business.
+    /// Carries out a request of `session` that concerns motion, or refuses it. Other requests are refused as
+    /// [`Refusal::Invalid`].
     pub fn handle(&mut self, now: Microseconds, session: SessionId, request: &Request, io: &mut impl RigIo) -> Status {
         let outcome = match request {
             Request::Arm { session: named } if *named == session => self.arm(now, session, io),
@@ -52,7 +50,7 @@ impl Controller {
         for axis in &mut self.axes {
             axis.adopt_encoder(io);
         }
-        // With the drivers off ticks may be left out, and none of them was missed.
+        // Ticks that were left out while the drivers were off do not count as missed.
         self.next_tick.0 += now.0.saturating_sub(self.next_tick.0).div_ceil(TICK_US) * TICK_US;
         self.holder = Some(session);
         self.drivers_on = true;
@@ -75,7 +73,7 @@ impl Controller {
         Ok(())
     }
 
-    /// Checks that the controller is in a state from which motion can come.
+    /// Checks that the controller is in a state in which it can be armed.
     fn may_ever_move(&self) -> Result<(), Refusal> {
         match self.state {
             ControllerState::LinkLost | ControllerState::Fault => Err(Refusal::Latched),
@@ -85,7 +83,7 @@ impl Controller {
         }
     }
 
-    /// Checks that `session` may start a motion now, or change the one that runs.
+    /// Checks that `session` may start a motion now, or change the running one.
     fn may_move(&self, now: Microseconds, session: SessionId) -> Result<(), Refusal> {
         self.may_ever_move()?;
         match self.state {
@@ -114,7 +112,7 @@ impl Controller {
         Ok(())
     }
 
-    /// To another target, also in mid-move: from where the axes are and as fast as they go.
+    /// Moves to a target, also in mid-move: from the present positions and speeds.
     fn move_to(&mut self, now: Microseconds, session: SessionId, order: &Move) -> Result<(), Refusal> {
         self.may_move(now, session)?;
         self.check_order(order.targets.len(), order.speed)?;
@@ -130,7 +128,7 @@ impl Controller {
         Ok(())
     }
 
-    /// By a distance from rest. An axis without reference may go as far as the search for its switch.
+    /// Moves by a distance from rest. An axis without reference may move as far as the search for its switch.
     fn jog(&mut self, now: Microseconds, session: SessionId, jog: &Jog) -> Result<(), Refusal> {
         self.may_start(now, session)?;
         self.check_order(jog.by.len(), jog.speed)?;
@@ -164,23 +162,15 @@ impl Controller {
         self.tell_phase();
     }
 
-    /// All axes start and finish together, in the time of the slowest. One in mid-move may not be able to take just that
-    /// long: then the others wait for it.
+    /// Starts all axes so that they finish together, in the time of the slowest.
     fn start_together(&mut self, targets: &AxisList<Micro>, share: f32) {
-        let (mut together, mut at_least) = (0.0, 0.0);
-        for _ in 0..MOST_ROUNDS {
+        let Together { duration, at_least } = Together::agree(|at_least| {
             let durations = self.axes.iter().zip(targets).map(|(axis, &to)| axis.plan(to, share, at_least).duration());
-            let slowest = durations.fold(0.0, f32::max);
-            let agreed = slowest <= together * (1.0 + AGREED);
-            // A little less, so that rounding does not slow the slowest down once more.
-            (together, at_least) = (slowest, slowest * (1.0 - AGREED));
-            if agreed {
-                break;
-            }
-        }
+            durations.fold(0.0, f32::max)
+        });
         for (axis, &target) in self.axes.iter_mut().zip(targets) {
             let planned = axis.plan(target, share, at_least);
-            axis.run_planned(planned, together);
+            axis.run_planned(planned, duration);
         }
     }
 

@@ -1,4 +1,4 @@
-//! The control tick: watch, decide, command.
+//! The control tick: watches inputs, decides, orders steps.
 
 use vergence_protocol::{ControllerState, FaultCode, Microseconds, MovePhase};
 
@@ -9,14 +9,14 @@ use crate::homing_sequence::HomingFailure;
 use crate::io::RigIo;
 use crate::self_test::Verdict;
 
-/// The encoder must stay inside the tolerance this long before a move counts as reached.
+/// Time in microseconds that the encoders must stay inside the tolerance before a move counts as settled.
 const DWELL_US: u64 = 50_000;
-/// A move that has not settled this long after its trajectory ended is a fault.
+/// Longest time in microseconds from the end of a trajectory until the encoders are inside the tolerance.
 const SETTLE_TIMEOUT_US: u64 = 1_000_000;
 
 impl Controller {
-    /// One control tick: watches inputs and lease, runs homing, moves and stops, orders the steps of the tick after the
-    /// one that begins now. Returns when it wants to run again; earlier it does nothing.
+    /// Runs one control tick: watches inputs and lease, runs homing, moves and stops, orders the steps of the next tick.
+    /// Returns the time of the next tick; earlier calls do nothing.
     pub fn poll(&mut self, now: Microseconds, io: &mut impl RigIo) -> Microseconds {
         if now < self.next_tick {
             return self.next_tick;
@@ -42,8 +42,8 @@ impl Controller {
         self.next_tick
     }
 
-    /// The tick that `now` belongs to. Steps are ordered one tick ahead: one that comes later than that finds the motors
-    /// standing where they should have moved on.
+    /// The start of the tick that `now` belongs to. Steps are ordered one tick ahead: when a tick is later than that, the
+    /// motors have already stood still in mid-move, which is a fault.
     fn keep_time(&mut self, now: Microseconds, io: &mut impl RigIo) -> Microseconds {
         let late = now.0 - self.next_tick.0;
         if late < TICK_US {
@@ -144,14 +144,14 @@ impl Controller {
         }
     }
 
-    /// A fault after which the stages can still be braked and held: the reference survives.
+    /// Raises a fault after which the axes are braked and held: the reference is kept.
     fn fail_softly(&mut self, now: Microseconds, code: FaultCode, axis: usize, detail: i32) {
         self.brake();
         self.state = ControllerState::Fault;
         self.raise(now, code, Some(axis), detail);
     }
 
-    /// A fault after which nothing can be trusted: drivers off, references gone.
+    /// Raises a fault after which positions are unknown: drivers off, references lost.
     fn cut(&mut self, now: Microseconds, code: FaultCode, axis: Option<usize>, detail: i32, io: &mut impl RigIo) {
         self.abort_motion();
         self.cut_drivers(io);

@@ -1,4 +1,4 @@
-//! States in which nothing may move: self-test, taking a firmware image, and its trial.
+//! States in which nothing may move: self-test, firmware update and trial.
 
 use vergence_protocol::{ControllerState, Refusal};
 
@@ -6,34 +6,34 @@ use super::Controller;
 use crate::self_test::SelfTest;
 
 impl Controller {
-    /// A firmware image is about to be taken: nothing moves until [`Self::end_update`]. A latched fault stays latched and
-    /// reported: one that cannot be cleared must not keep out the firmware that can.
+    /// Begins a firmware update: nothing moves until [`Self::end_update`]. A latched fault stays latched and reported, but
+    /// does not prevent the update: new firmware may be the cure.
     ///
     /// # Errors
-    /// [`Refusal::NotIdle`] while the drivers are on; [`Refusal::Updating`] while an image is taken or on trial.
+    /// [`Refusal::NotIdle`] while the drivers are on; [`Refusal::Updating`] while an image is received or on trial.
     pub fn begin_update(&mut self) -> Result<(), Refusal> {
         if self.on_trial || self.state == ControllerState::Updating {
             return Err(Refusal::Updating);
         }
-        // In its first ticks, too, a board may be told.
+        // States before Idle are allowed: an update may begin in the board's first ticks.
         if self.drivers_on {
             return Err(Refusal::NotIdle);
         }
-        // A lease that ends meanwhile concerns nobody.
+        // No session holds the board during an update, so that no lease can expire.
         self.holder = None;
         self.before_update = self.state;
         self.state = ControllerState::Updating;
         Ok(())
     }
 
-    /// The image was given up; one that was taken ends in a restart instead.
+    /// Gives up an update. A completed update ends in a restart instead.
     pub fn end_update(&mut self) {
         if self.state == ControllerState::Updating {
             self.state = self.before_update;
         }
     }
 
-    /// The running firmware is on trial: nothing moves until [`Self::confirm_trial`]. To be called at the start.
+    /// Notes that the running firmware is on trial: nothing moves until [`Self::confirm_trial`]. Call it at the start.
     pub fn set_trial(&mut self) {
         self.on_trial = true;
         if self.state == ControllerState::Idle {
@@ -41,7 +41,7 @@ impl Controller {
         }
     }
 
-    /// The firmware on trial is good.
+    /// Ends the trial: the firmware is good.
     pub fn confirm_trial(&mut self) {
         self.on_trial = false;
         if self.state == ControllerState::Trial {
@@ -49,12 +49,12 @@ impl Controller {
         }
     }
 
-    /// Where a disarmed board without fault is.
+    /// State of a disarmed board without fault.
     pub(super) fn at_rest(&self) -> ControllerState {
         if self.on_trial { ControllerState::Trial } else { ControllerState::Idle }
     }
 
-    /// A board that has not passed its test looks again once the fault is cleared.
+    /// Repeats the self-test after a fault is cleared, if it had not been passed.
     pub(super) fn repeat_self_test(&mut self) {
         if !self.self_test.has_passed() {
             self.self_test = SelfTest::default();

@@ -1,17 +1,16 @@
-//! Management requests: who are you, take this firmware, start again.
+//! Management requests: identify, update, confirm, roll back, reboot.
 
 use vergence_protocol::management::{BootState, Identity, ImageHeader, Management, ManagementReport, Outcome};
 use vergence_protocol::{ControllerState, Microseconds};
 
 use super::Node;
-use crate::flash::{Flash, PAGE};
-use crate::services::BoardServices;
+use crate::services::{BoardServices, Flash, PAGE};
 
-/// A host that is silent for so long in an update has gone; it may go on with it later.
+/// Time in microseconds after which an update without management requests is given up; the host may resume it later.
 const PATIENCE_US: u64 = 10_000_000;
 
 impl Node {
-    /// Carries out a management request; the session fills in whom the answer is for.
+    /// Carries out a management request; the session fills in the number of the request.
     pub(super) fn manage(
         &mut self,
         now: Microseconds,
@@ -68,7 +67,7 @@ impl Node {
         outcome
     }
 
-    /// Goes on with an update while the controller knows of it.
+    /// Runs `go_on` if an update is under way.
     fn in_update(&mut self, go_on: impl FnOnce(&mut Self) -> Outcome) -> Outcome {
         if self.controller.state() == ControllerState::Updating { go_on(self) } else { Outcome::NotBegun }
     }
@@ -81,7 +80,7 @@ impl Node {
         Outcome::Done
     }
 
-    /// Gives up an update whose host has gone.
+    /// Gives up an update whose host has gone silent.
     pub(super) fn watch_update(&mut self, now: Microseconds) {
         if now.0.saturating_sub(self.managed_at.0) > PATIENCE_US {
             self.controller.end_update();

@@ -1,4 +1,4 @@
-//! Requests: the node's own, and those it hands to the controller.
+//! Requests: those of the node, and those that it passes on to the controller.
 
 use vergence_protocol::{
     BoardInfo, ControllerState, Happening, Microseconds, Refusal, Report, Request, SessionId, SettingKey, Status,
@@ -11,7 +11,7 @@ use crate::services::BoardServices;
 use crate::settings_store;
 
 impl Node {
-    /// Carries out a request; `None` where it needs no answer.
+    /// Carries out a request; returns the answer, or `None` if the request needs none.
     pub(super) fn serve(
         &mut self,
         now: Microseconds,
@@ -67,7 +67,7 @@ impl Node {
             Request::SetSetting { key, value } => self.set_setting(now, *key, *value),
             Request::RestoreSettings => self.apply(now, self.defaults.clone()),
             Request::SaveSettings => self.save_settings(now, services),
-            // Settings cannot be changed while armed.
+            // Checked when arming, because settings cannot change while armed.
             Request::Arm { .. } if self.settings.machine == Machine::Robot => Err(Refusal::NoSuchMachine),
             motion => {
                 let session = self.session.session().unwrap_or(SessionId(0));

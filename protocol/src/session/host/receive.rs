@@ -1,4 +1,4 @@
-//! What the host makes of what it hears.
+//! Frames that the host receives: answers, acknowledgements, and signs of a lost session.
 
 use super::{Compatibility, HostEvent, HostSession, Phase, Ticket};
 use crate::frame::{FrameError, Header, Kind};
@@ -62,7 +62,7 @@ impl HostSession {
         }
     }
 
-    /// Acknowledgements mean something between two ends of one major with an open session.
+    /// Takes the acknowledgement in a header; it counts only in an open session with a board of the same major version.
     fn receive_header(&mut self, now: Microseconds, header: Header) {
         if header.major != PROTOCOL.major || !self.is_open() {
             return;
@@ -119,7 +119,7 @@ impl HostSession {
     fn count_pose(&mut self, seq: u16) {
         if let Some(last) = self.pose_seq {
             let lost = seq.wrapping_sub(last).wrapping_sub(1);
-            // More than half the range is a pose out of order or a stream that began again, not a loss.
+            // More than half the range means a pose out of order or a restarted stream, not a loss.
             if lost < 1 << 15 {
                 self.poses_lost = self.poses_lost.saturating_add(u32::from(lost));
             }
