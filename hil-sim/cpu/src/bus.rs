@@ -1,49 +1,49 @@
-//! The seam between the core and the chip around it.
+//! The interface between the core and the chip around it.
 
 /// Core clock cycles since power-on.
 pub type Cycle = u64;
 
-/// No event is due.
+/// The cycle of an event that never comes.
 pub const NEVER: Cycle = Cycle::MAX;
 
 /// How many bytes an access moves.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Access {
-    /// One.
+    /// One byte.
     Byte,
-    /// Two.
+    /// Two bytes.
     Half,
-    /// Four.
+    /// Four bytes.
     Word,
 }
 
-/// An access that nothing answers, or that the chip refuses: a bus fault on the core.
+/// An access that no memory or peripheral answers, or that the chip refuses: a bus fault on the core.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct BusFault;
 
 /// Interrupt lines of the NVIC, line 0 in bit 0.
 pub type Lines = u128;
 
-/// What the core needs of a chip: its memories and peripherals, everything outside the internal part of the private
-/// peripheral bus (`0xE000_0000..=0xE003_FFFF`, which is the core's own). The external part with the chip's debug
-/// registers, DBGMCU among them, is the chip's.
+/// What the core needs from a chip: its memories and peripherals. The internal part of the private peripheral bus
+/// (`0xE000_0000..=0xE003_FFFF`) belongs to the core; its external part with the chip's debug registers, DBGMCU among
+/// them, belongs to the chip.
 ///
-/// The chip is event driven: [`next_event`](Self::next_event) says when something will happen by itself, and the core
+/// The chip is event driven: [`next_event`](Self::next_event) gives the cycle of its next own event, and the core
 /// calls [`advance`](Self::advance) no later than that.
 pub trait Bus {
-    /// Whether reading memory may raise the non-maskable interrupt, so that the core must look after each load.
+    /// Whether reading memory may raise the non-maskable interrupt: the core then checks after each load.
     const READS_INTERRUPT: bool = false;
 
     /// Reads at `address`, aligned to the size of the access; the value is zero-extended.
     ///
     /// # Errors
-    /// [`BusFault`] where nothing answers.
+    /// [`BusFault`] where no memory or peripheral answers.
     fn read(&mut self, now: Cycle, address: u32, access: Access) -> Result<u32, BusFault>;
 
     /// Writes the low bytes of `value` at `address`, aligned to the size of the access.
     ///
     /// # Errors
-    /// [`BusFault`] where nothing answers.
+    /// [`BusFault`] where no memory or peripheral answers.
     fn write(&mut self, now: Cycle, address: u32, access: Access, value: u32) -> Result<(), BusFault>;
 
     /// Reads a half-word of code. Costs no time and has no side effect.
@@ -53,16 +53,16 @@ pub trait Bus {
     fn fetch(&self, address: u32) -> Result<u16, BusFault>;
 
     /// Changes whenever code may have changed other than by the core's own writes to RAM: after flash was erased or
-    /// programmed, or memory was remapped. The core then forgets what it has decoded.
+    /// programmed, or memory was remapped. The core then drops its decoded instructions.
     fn code_version(&self) -> u64;
 
-    /// Extra cycles a taken branch or a fetch costs because of flash wait states, at present.
+    /// Extra cycles that a taken branch or a fetch costs at present because of flash wait states.
     fn wait_states(&self, now: Cycle) -> u32;
 
-    /// Brings every peripheral to `now`.
+    /// Advances every peripheral to `now`.
     fn advance(&mut self, now: Cycle);
 
-    /// When a peripheral will next do something by itself.
+    /// The cycle at which a peripheral next changes by itself.
     fn next_event(&self) -> Cycle;
 
     /// Interrupt lines that are asserted now (level).

@@ -2,16 +2,16 @@
 
 use crate::instruction::{Instruction, Op};
 
-/// Half-words that fit at once: 128 KiB of straight code, more than a controller's image.
+/// Number of half-words that the table holds: 128 KiB of straight code, more than a controller's image.
 const ENTRIES: usize = 1 << 16;
-/// An address beyond the bits that choose its entry.
+/// How far an address is shifted to leave the tag: the bits that do not choose its entry.
 const TAG_SHIFT: u32 = 17;
-/// Stores look here first: one bit for each 1 KiB page, folded, in which something was decoded.
+/// One bit for each 1 KiB page, folded, in which an instruction was decoded: stores look here first.
 const PAGES: usize = 4096;
 
 #[derive(Clone, Copy)]
 struct Entry {
-    /// Upper bits of the address, and above them the generation; zero is neither.
+    /// Upper bits of the address, and above them the generation; zero where the entry is empty.
     tag: u32,
     instruction: Instruction,
 }
@@ -19,19 +19,19 @@ struct Entry {
 /// A direct-mapped table from code address to decoded instruction.
 #[derive(Clone)]
 pub(crate) struct Cache {
-    /// Lent to the loop that runs instructions, which borrows them from here while it changes the core.
+    /// The entries, which the loop that runs instructions takes away while it changes the core.
     entries: Option<Entries>,
-    /// Where a tag holds it; entries of others are forgotten.
+    /// The present generation: entries whose tags hold another one are invalid.
     generation: u32,
     decoded: Box<[u64; PAGES / 64]>,
-    /// Stores over code since the table was lent.
+    /// Addresses of stores over code since the table was lent.
     stale: Vec<u32>,
-    /// The generations began anew since the table was lent: its tags mean nothing any more.
+    /// Whether the generations began anew since the table was lent: its tags are invalid then.
     outworn: bool,
 }
 
 impl Cache {
-    /// The first generation, and the distance to the next.
+    /// The first generation, and the distance from one to the next.
     const GENERATION: u32 = 1 << (32 - TAG_SHIFT);
 
     pub fn new() -> Self {
@@ -39,12 +39,12 @@ impl Cache {
         Self { entries: None, generation: Self::GENERATION, decoded, stale: Vec::new(), outworn: false }
     }
 
-    /// The table, to be given back.
+    /// Takes the table, which must be given back.
     pub fn lend(&mut self) -> Entries {
         self.entries.take().unwrap_or_else(Entries::empty)
     }
 
-    /// The table is back, and forgets what was written over.
+    /// Gives the table back, and drops the entries whose code was written over.
     pub fn take_back(&mut self, mut entries: Entries) {
         if std::mem::take(&mut self.outworn) {
             self.stale.clear();
@@ -61,7 +61,7 @@ impl Cache {
         self.generation
     }
 
-    /// An instruction at `address` was decoded.
+    /// Records that an instruction at `address` was decoded.
     pub fn mark(&mut self, address: u32) {
         for half in [address, address.wrapping_add(2)] {
             let page = page(half);
@@ -69,7 +69,7 @@ impl Cache {
         }
     }
 
-    /// Forgets everything.
+    /// Drops every entry.
     pub fn clear(&mut self) {
         *self.decoded = [0; PAGES / 64];
         self.generation = self.generation.wrapping_add(Self::GENERATION);
@@ -125,7 +125,7 @@ impl Entries {
         &entry.instruction
     }
 
-    /// Forgets what an aligned store of up to four bytes may have changed.
+    /// Drops the entries that an aligned store of up to four bytes may have changed.
     fn forget_around(&mut self, address: u32, generation: u32) {
         let first = (address & !1).wrapping_sub(2);
         for half in 0..3 {
@@ -148,7 +148,7 @@ const fn slot(address: u32) -> usize {
     (address >> 1) as usize % ENTRIES
 }
 
-/// The upper bits keep memories apart that begin at round addresses.
+/// Mixes in the upper bits, which keep memories apart that begin at round addresses.
 #[inline(always)]
 const fn page(address: u32) -> usize {
     (address >> 10 ^ address >> 18) as usize % PAGES

@@ -10,13 +10,13 @@ use crate::nvic::{Nvic, exception};
 use crate::system::{System, sleep};
 use crate::systick::SysTick;
 
-/// Why [`Cpu::run`] came back.
+/// Why [`Cpu::run`] returned.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum Stop {
     /// The clock reached the cycle asked for.
     Reached,
-    /// A BKPT instruction with this number; the PC still points to it. [`Cpu::escalate_breakpoint`] goes on as a chip
+    /// A BKPT instruction with this number; the PC still points to it. [`Cpu::escalate_breakpoint`] continues as a chip
     /// without a debugger does.
     Breakpoint(u8),
     /// A semihosting call (BKPT 0xAB): operation in R0, argument in R1, result expected in R0. The PC is past it.
@@ -74,7 +74,7 @@ pub struct Cpu {
     pub(crate) process_stack: bool,
     /// CONTROL.FPCA: the context has floating-point state.
     pub(crate) float_active: bool,
-    /// Floating-point instructions may run without a further look.
+    /// Whether floating-point instructions may run without another check.
     pub(crate) float_ready: bool,
     pub(crate) s: [u32; 32],
     pub(crate) fpscr: u32,
@@ -86,9 +86,9 @@ pub struct Cpu {
     pub(crate) system: System,
     pub(crate) systick: SysTick,
     pub(crate) now: Cycle,
-    /// Instructions run freely up to here; whatever may change what comes next sets it to zero.
+    /// Instructions run without checks up to this cycle; whatever may change what comes next sets it to zero.
     pub(crate) horizon: Cycle,
-    /// The instruction before was a load, so that the next one is pipelined with it.
+    /// Whether the previous instruction was a load: the next one is pipelined with it.
     pub(crate) loaded: bool,
     pub(crate) instructions: u64,
     asleep: Cycle,
@@ -147,8 +147,8 @@ impl Cpu {
         }
     }
 
-    /// Resets the core: stack pointer and PC from the vector table at address 0. The clock goes on; core registers
-    /// other than SP, LR and PC, unknown after a real reset, are zero.
+    /// Resets the core: stack pointer and PC from the vector table at address 0. The clock continues. Core registers
+    /// other than SP, LR and PC, which are unknown after a real reset, become zero.
     pub fn reset<B: Bus>(&mut self, bus: &mut B) {
         let handlers = self.handlers.take().map(|_| Box::new(HandlerTimes::new()));
         let (now, instructions, asleep) = (self.now, self.instructions, self.asleep);
@@ -168,8 +168,8 @@ impl Cpu {
         }
     }
 
-    /// Runs to the first instruction boundary at or after `until`, or to a reason to stop before. The time of one
-    /// instruction or exception entry may go past `until`.
+    /// Runs to the first instruction boundary at or after `until`, or until there is a reason to stop earlier. The time
+    /// of one instruction or exception entry may exceed `until`.
     pub fn run<B: Bus>(&mut self, bus: &mut B, until: Cycle) -> Stop {
         loop {
             if let Some(stop) = self.settle(bus) {
@@ -186,7 +186,7 @@ impl Cpu {
             }
             self.horizon = until.min(bus.next_event()).min(self.systick.next_event());
             if self.horizon <= self.now {
-                // Something stays due: still one instruction at a time.
+                // An event stays due: one instruction at a time.
                 self.horizon = self.now + 1;
             }
             self.run_to_horizon(bus);
@@ -223,7 +223,7 @@ impl Cpu {
         Ok(())
     }
 
-    /// Brings chip and core to the same moment and takes the exception that is due.
+    /// Advances chip and core to the same cycle and takes the exception that is due.
     fn settle<B: Bus>(&mut self, bus: &mut B) -> Option<Stop> {
         self.synchronize(bus);
         if bus.stop_requested() {
@@ -245,8 +245,8 @@ impl Cpu {
         self.stop.take()
     }
 
-    /// Advances the chip and SysTick to now, notes what they pend, and forgets decoded code that has changed. Events
-    /// that came due meanwhile happen one by one, so that a pulse shorter than an instruction is seen.
+    /// Advances the chip and SysTick to now, records what they pend, and drops decoded code that has changed. Events
+    /// that came due meanwhile happen one by one, so that a pulse shorter than an instruction is noticed.
     pub(crate) fn synchronize<B: Bus>(&mut self, bus: &mut B) {
         let mut due = bus.next_event();
         while due < self.now {
@@ -284,7 +284,7 @@ impl Cpu {
         }
     }
 
-    /// Sleeps to the next thing that can happen.
+    /// Sleeps until the next event that is possible.
     fn pass_time<B: Bus>(&mut self, bus: &mut B, until: Cycle) -> Option<Stop> {
         let next = until.min(bus.next_event()).min(self.systick.next_event());
         if next == NEVER {
@@ -337,7 +337,7 @@ impl Cpu {
         Ok(instruction)
     }
 
-    /// Tells the table of decoded instructions of a store.
+    /// Reports a store to the table of decoded instructions.
     #[inline(always)]
     pub(crate) fn code_written(&mut self, address: u32) {
         if self.cache.written(address) {
@@ -357,18 +357,18 @@ impl Cpu {
         self.instructions
     }
 
-    /// Of the cycles since power-on, those in which the core slept or stood still.
+    /// Cycles since power-on in which the core slept or stood still.
     #[must_use]
     pub fn asleep(&self) -> Cycle {
         self.asleep
     }
 
-    /// Times exception handlers from now on, or from the next reset on anew.
+    /// Starts timing exception handlers; a reset starts the times anew.
     pub fn time_handlers(&mut self) {
         self.handlers = Some(Box::new(HandlerTimes::new()));
     }
 
-    /// What the handler of an exception (16 and up: interrupt lines) took since [`Self::time_handlers`].
+    /// The time that the handler of an exception (16 and up: interrupt lines) took since [`Self::time_handlers`].
     #[must_use]
     pub fn handler_time(&self, exception: u16) -> HandlerTime {
         self.handlers.as_ref().map_or_else(HandlerTime::default, |handlers| handlers.of(exception))

@@ -39,7 +39,7 @@ impl Cpu {
         }
     }
 
-    /// Ends WFI and WFE when their condition holds; WFI wakes for what PRIMASK alone holds back (B1.5.18).
+    /// Ends WFI and WFE when their condition holds; WFI wakes for an exception that only PRIMASK masks (B1.5.18).
     pub(crate) fn wake(&mut self) {
         let awake = match self.activity {
             Activity::Running | Activity::Halted => return,
@@ -66,7 +66,7 @@ impl Cpu {
         }
     }
 
-    /// Stacks the context; whatever is most urgent by then is taken (late arrival).
+    /// Stacks the context and takes the exception that is most urgent by then (late arrival).
     fn enter<B: Bus>(&mut self, bus: &mut B) {
         let value = self.return_value();
         let begun = self.now;
@@ -184,8 +184,8 @@ impl Cpu {
         self.store_words(bus, address, &words)
     }
 
-    /// What a floating-point instruction needs before it runs (ExecuteFPCheck, B1.5.7): access, the lazily stacked
-    /// state stored, and a context of its own.
+    /// Prepares a floating-point instruction (ExecuteFPCheck, B1.5.7): checks access, stores the lazily stacked state,
+    /// and creates a context of its own.
     #[cold]
     pub(crate) fn prepare_float<B: Bus>(&mut self, bus: &mut B) -> Result<(), Trap> {
         const FULL_ACCESS: u32 = 3;
@@ -208,7 +208,7 @@ impl Cpu {
         Ok(())
     }
 
-    /// A load of EXC_RETURN into the PC in handler mode (B1.5.8).
+    /// Returns from an exception after a load of EXC_RETURN into the PC in handler mode (B1.5.8).
     pub(crate) fn exception_return<B: Bus>(&mut self, bus: &mut B, value: u32) {
         let number = self.exception;
         let legal = self.nvic.is_active(number) && self.is_legal_return(value);
@@ -258,7 +258,7 @@ impl Cpu {
         }
     }
 
-    /// A fault of the return itself runs without unstacking first.
+    /// Raises a fault of the return itself, which runs without unstacking first.
     fn chain_fault<B: Bus>(&mut self, bus: &mut B, number: u16, bit: u32, return_value: u32) {
         self.system.fault_status |= bit;
         self.raise_now(number);
@@ -268,7 +268,7 @@ impl Cpu {
         self.start_handler(bus, return_value, begun);
     }
 
-    /// The stacked IPSR contradicts the mode returned to: a fault of the context that was restored.
+    /// Raises the fault of a restored context whose IPSR contradicts the mode returned to.
     fn fault_after_return(&mut self) {
         self.system.fault_status |= status::INVALID_PC;
         self.raise_now(exception::USAGE);
@@ -307,7 +307,7 @@ impl Cpu {
         Ok(())
     }
 
-    /// State that was never stored is still in the registers.
+    /// Keeps floating-point state that was never stored: it is still in the registers.
     fn restore_float<B: Bus>(&mut self, bus: &mut B, address: u32) -> Result<(), Trap> {
         if self.system.float_context & context::LAZY_ACTIVE != 0 {
             self.system.float_context &= !context::LAZY_ACTIVE;

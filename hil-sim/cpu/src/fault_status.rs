@@ -1,16 +1,16 @@
-//! The fault status registers, in words for a person.
+//! The fault status registers as text.
 
 use crate::cpu::Cpu;
 use crate::system::status;
 
-/// What faults have left in CFSR, HFSR and BFAR.
+/// The contents of CFSR, HFSR and BFAR after a fault.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct FaultStatus {
     /// CFSR: faults of memory, bus and use.
     pub configurable: u32,
-    /// HFSR: why the HardFault was taken.
+    /// HFSR: the cause of the HardFault.
     pub hard: u32,
-    /// BFAR, while it is valid: the data address that nothing answered.
+    /// BFAR, while it is valid: the data address that was not answered.
     pub bus_address: Option<u32>,
 }
 
@@ -37,7 +37,7 @@ const HARD: [(u32, &str); 3] = [
 ];
 
 impl FaultStatus {
-    /// One phrase for each thing that happened, those of CFSR first; nothing after a reset.
+    /// One phrase for each bit that is set, those of CFSR first; none after a reset.
     pub fn reasons(self) -> impl Iterator<Item = &'static str> {
         let configurable = CONFIGURABLE.iter().filter(move |(bit, _)| self.configurable & bit != 0);
         let hard = HARD.iter().filter(move |(bit, _)| self.hard & bit != 0);

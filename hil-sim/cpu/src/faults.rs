@@ -33,7 +33,7 @@ impl Trap {
 }
 
 impl Cpu {
-    /// Deals with an instruction that did not simply end.
+    /// Handles an instruction that ended in a fault, a call or a breakpoint.
     #[cold]
     pub(crate) fn trapped<B: Bus>(&mut self, bus: &mut B, trap: Trap) {
         self.horizon = 0;

@@ -1,13 +1,13 @@
-//! How long exception handlers take, for who asks: from the beginning of their entry to the end of their return.
+//! How long exception handlers take, where that is asked for: from the beginning of entry to the end of return.
 
 use crate::bus::Cycle;
 
-/// What the handler of one exception has taken so far, in core cycles.
+/// The time that the handler of one exception has taken so far, in core cycles.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct HandlerTime {
-    /// How often it ran to its end.
+    /// Number of completed runs.
     pub runs: u64,
-    /// In all, without what preempted it.
+    /// Total time without what preempted it.
     pub total: Cycle,
     /// The longest run, without what preempted it.
     pub longest: Cycle,
@@ -15,12 +15,12 @@ pub struct HandlerTime {
     pub longest_span: Cycle,
 }
 
-/// A handler that runs, or that one preempts.
+/// A handler that runs, or that another one preempts.
 #[derive(Clone, Copy)]
 struct Running {
     exception: u16,
     begun: Cycle,
-    /// Of that, what others took.
+    /// The part of that time which other handlers took.
     preempted: Cycle,
 }
 
@@ -32,7 +32,7 @@ pub(crate) struct HandlerTimes {
 }
 
 impl HandlerTimes {
-    /// Exceptions that the NVIC can have.
+    /// Number of exceptions that the NVIC can have.
     const EXCEPTIONS: usize = 256;
 
     pub fn new() -> Self {
@@ -48,10 +48,10 @@ impl HandlerTimes {
         self.running.push(Running { exception, begun: now, preempted: 0 });
     }
 
-    /// The handler that began last is over.
+    /// Ends the handler that began last.
     #[cold]
     pub fn end(&mut self, now: Cycle) {
-        // It may have begun before anybody asked.
+        // It may have begun before timing was asked for.
         let Some(Running { exception, begun, preempted }) = self.running.pop() else { return };
         let span = now - begun;
         if let Some(outer) = self.running.last_mut() {

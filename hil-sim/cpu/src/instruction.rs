@@ -2,8 +2,8 @@
 
 pub(crate) use crate::operation::{Alu, Extend, Float, Lane, Multiply, Op, Parallel, Reverse, Shift, Width};
 
-/// One decoded instruction. Register fields hold numbers of core or of single-precision registers, as the operation
-/// says; what `immediate` holds is said at each operation.
+/// One decoded instruction. Each operation states whether the register fields are core or single-precision registers,
+/// and what `immediate` holds.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) struct Instruction {
     pub op: Op,
@@ -21,7 +21,7 @@ pub(crate) struct Flags(u8);
 
 impl Flags {
     pub const NONE: Self = Self(0);
-    /// Takes four bytes of code.
+    /// The instruction takes four bytes of code.
     pub const WIDE: Self = Self(1);
     /// Updates the condition flags.
     pub const SET: Self = Self(2);
@@ -92,7 +92,7 @@ impl Instruction {
         self
     }
 
-    /// Bytes of code it takes.
+    /// Length of the instruction in bytes of code.
     #[inline(always)]
     pub const fn length(&self) -> u32 {
         if self.flags.has(Flags::WIDE) { 4 } else { 2 }

@@ -1,6 +1,6 @@
 //! An ARMv7E-M core with FPv4-SP (Cortex-M4F): instructions, exceptions, NVIC, SysTick.
 //!
-//! The chip around it is behind [`Bus`]. Time is counted in core clock cycles since power-on; the same program and the
+//! The chip around it implements [`Bus`]. Time is counted in core clock cycles since power-on; the same program and the
 //! same bus give the same cycles every time.
 //!
 //! Source: ARMv7-M Architecture Reference Manual (ARM DDI 0403E); sections in comments are its sections. Timings follow

@@ -62,8 +62,8 @@ impl Nvic {
         lines == self.asserted && lines & !self.active & !self.pending == 0 && nmi == self.nmi
     }
 
-    /// Takes note of the chip's lines. An asserted line pends unless its handler runs; there only a new edge does.
-    /// Says whether something became pending.
+    /// Records the chip's lines. An asserted line pends; while its handler runs, only a new edge does. Returns whether
+    /// an exception became pending.
     pub fn observe(&mut self, lines: Lines, nmi: bool) -> bool {
         if self.knows(lines, nmi) {
             return false;
@@ -108,7 +108,7 @@ impl Nvic {
         }
     }
 
-    /// A line still asserted when its handler ends pends again.
+    /// Pends a line again that is still asserted when its handler ends.
     pub fn deactivate(&mut self, number: u16) {
         match number.checked_sub(exception::FIRST_LINE) {
             Some(line) => {
@@ -172,7 +172,7 @@ impl Nvic {
         }
     }
 
-    /// The exception to take next, whatever runs now: highest priority, then lowest number.
+    /// The exception to take next, regardless of what runs now: highest priority, then lowest number.
     pub fn best_pending(&self) -> Option<u16> {
         let lines = self.pending & self.enabled;
         if lines == 0 && self.system_pending == 0 {

@@ -33,7 +33,7 @@ pub(crate) enum Op {
     /// d = saturated shifted n to `a` bits (shift in `immediate`).
     SignedSaturate,
     UnsignedSaturate,
-    /// The same of both halves, no shift.
+    /// The same for both halves, without shift.
     SignedSaturate16,
     UnsignedSaturate16,
     /// d = halves of n and of shifted m; VARIANT takes the top of n.

@@ -23,12 +23,12 @@ const HANDLER_CONTROL: u32 = 0xe000_ed24;
 const FAULT_STATUS: u32 = 0xe000_ed28;
 const DEBUG_CONTROL: u32 = 0xe000_edfc;
 const SOFTWARE_TRIGGER: u32 = 0xe000_ef00;
-/// Written to the upper half of AIRCR with every change, and what that half reads as.
+/// The key that every write to AIRCR needs in its upper half, and the value that this half reads as.
 const KEY: u32 = 0x05fa;
 const KEY_READ: u32 = 0xfa05;
 
 impl Cpu {
-    /// Reads a register of the core. Anything narrower than a word is part of its word.
+    /// Reads a register of the core. A narrow access reads part of the word.
     #[cold]
     pub(crate) fn read_private<B: Bus>(&mut self, bus: &mut B, address: u32, access: Access) -> Result<u32, BusFault> {
         if !self.privileged() {
@@ -45,8 +45,8 @@ impl Cpu {
         })
     }
 
-    /// Writes a register of the core. The bytes beside a narrow write keep their value, or for the registers that act
-    /// on ones are zero.
+    /// Writes a register of the core. The bytes beside a narrow write keep their value; for registers that act on ones
+    /// they count as zero.
     #[cold]
     pub(crate) fn write_private<B: Bus>(
         &mut self,
@@ -191,7 +191,8 @@ impl Cpu {
         }
     }
 
-    /// ICSR (B3.2.4). VECTPENDING leaves out what BASEPRI or FAULTMASK holds back, but not what PRIMASK does.
+    /// ICSR (B3.2.4). VECTPENDING leaves out exceptions that BASEPRI or FAULTMASK mask, but not those that PRIMASK
+    /// masks.
     fn interrupt_control(&self) -> u32 {
         let flag = |set: bool, bit: u32| u32::from(set) << bit;
         let unmasked = |&number: &u16| self.nvic.priority(number) < self.mask_priority();

@@ -44,7 +44,7 @@ impl Cpu {
         self.pc
     }
 
-    /// The exception that runs, 0 in thread mode.
+    /// The number of the exception that runs, 0 in thread mode.
     #[must_use]
     pub fn exception(&self) -> u16 {
         self.exception

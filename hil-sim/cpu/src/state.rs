@@ -1,9 +1,9 @@
-//! What a core is about to do: for loops that come round to where they were.
+//! The state that decides what a core does next: two equal states mean that a loop changes nothing.
 
 use crate::bus::Cycle;
 use crate::cpu::Cpu;
 
-/// Everything but time, memory, interrupts that wait, and the system's registers.
+/// Everything except time, memory, waiting interrupts, and the system registers.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct CoreState {
     registers: [u32; 16],
@@ -16,7 +16,7 @@ pub struct CoreState {
     fpscr: u32,
     exclusive: bool,
     event: bool,
-    /// The next load is pipelined with the last one.
+    /// Whether the next load is pipelined with the last one.
     loaded: bool,
 }
 
@@ -29,7 +29,7 @@ impl CoreState {
 }
 
 impl Cpu {
-    /// What the core is about to do.
+    /// The present state.
     #[must_use]
     pub fn state(&self) -> CoreState {
         CoreState {
@@ -47,14 +47,13 @@ impl Cpu {
         }
     }
 
-    /// Lets time pass in which the core goes round a loop that changes nothing; whole turns, and nothing may be due
-    /// before their end.
+    /// Lets time pass for whole iterations of a loop that changes nothing. No event may be due before their end.
     pub fn pass_turns(&mut self, cycles: Cycle, instructions: u64) {
         self.now += cycles;
         self.instructions += instructions;
     }
 
-    /// When the core's own timer next does something.
+    /// The cycle at which the core's own timer next changes.
     #[must_use]
     pub fn next_event(&self) -> Cycle {
         self.systick.next_event()

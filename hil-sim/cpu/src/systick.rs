@@ -1,4 +1,4 @@
-//! SysTick (B3.3): a 24-bit down counter, computed from the clock when somebody looks.
+//! SysTick (B3.3): a 24-bit down counter, computed from the clock when it is read.
 
 use crate::bus::{Cycle, NEVER};
 
@@ -46,7 +46,7 @@ impl SysTick {
         self.ticks_to_zero().map_or(NEVER, |ticks| self.since.saturating_add(ticks * self.divider()))
     }
 
-    /// Counts up to `now`; says whether the exception becomes pending.
+    /// Advances the counter to `now`; returns whether the exception becomes pending.
     pub fn advance(&mut self, now: Cycle) -> bool {
         if self.control & ENABLE == 0 {
             self.since = now;
@@ -80,7 +80,7 @@ impl SysTick {
         }
     }
 
-    /// Call [`advance`](Self::advance) first.
+    /// Writes a register. Call [`advance`](Self::advance) first.
     pub fn write(&mut self, offset: u32, value: u32) {
         match offset {
             0 => self.control = value & (ENABLE | INTERRUPT | CORE_CLOCK),

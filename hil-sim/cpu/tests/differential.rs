@@ -1,4 +1,4 @@
-//! The differential program against what QEMU's `mps2-an386` printed for it.
+//! Compares the output of the differential program with that of QEMU's `mps2-an386`.
 #![allow(clippy::expect_used, clippy::panic, reason = "a test helper that fails is a test that fails")]
 
 mod common;
@@ -13,7 +13,7 @@ use vergence_cpu::{Cpu, Stop};
 const EXPECTED: &str = include_str!("differential.txt");
 const WRITE0: u32 = 4;
 const EXIT: u32 = 0x18;
-/// Far more than the program needs; the clock ends a run that hangs.
+/// Limit in cycles, far more than the program needs: it ends a run that hangs.
 const LIMIT: u64 = 4_000_000_000;
 
 /// Builds the program for the target, in a folder of its own.
@@ -52,7 +52,7 @@ fn load(elf: &[u8], board: &mut Board) {
     }
 }
 
-/// Runs the program and gives what it printed.
+/// Runs the program and returns its output.
 fn run() -> String {
     let elf = std::fs::read(build()).expect("the program was built");
     let mut board = Board::default();

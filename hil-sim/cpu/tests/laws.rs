@@ -11,12 +11,13 @@ const STREAMS: u32 = 100_000;
 /// Cycles each of them runs.
 const CYCLES: u64 = 200;
 
-/// Half-words of which more than chance has it start 32-bit instructions, coprocessor ones among them.
+/// Half-words among which the starts of 32-bit instructions, coprocessor ones included, are more frequent than by
+/// chance.
 fn half() -> impl Strategy<Value = u16> {
     prop_oneof![any::<u16>(), 0xe800..=0xffff_u16, 0xec00..=0xefff_u16, 0xbf00..=0xbfff_u16]
 }
 
-/// All that can be seen of a core.
+/// The whole observable state of a core.
 fn state(cpu: &Cpu) -> (Vec<u32>, Vec<u32>, u32, u32, u64, u64) {
     (
         (0..16).map(|number| cpu.register(number)).collect(),
@@ -36,7 +37,7 @@ fn schedule() -> impl Strategy<Value = Vec<(Cycle, Lines)>> {
     })
 }
 
-/// Enables the FPU and lines 0 to 7, gives every register something, then runs the stream. The handlers return.
+/// Enables the FPU and lines 0 to 7, gives every register a value, then runs the stream. The handlers return.
 fn board(stream: &[u16]) -> Board {
     let prologue = [
         common::code::write(common::code::ISER, 0xff),

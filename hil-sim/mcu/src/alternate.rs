@@ -1,10 +1,9 @@
-//! Which alternate function connects which pin to what (DS12288 table 13, 64-pin package), as far as it is
-//! timers and serial ports.
+//! Alternate functions of the pins (DS12288 table 13, 64-pin package), for timers and serial ports.
 
 use crate::pin::{Pin, Signal};
 use crate::unit::{TimerId, UartId};
 
-/// What alternate function `number` connects `pin` to; `None` where the model has nothing there.
+/// The peripheral signal that alternate function `number` connects `pin` to; `None` where the model has none.
 pub(crate) fn alternate_function(pin: Pin, number: u8) -> Option<Signal> {
     let (_, functions) = TABLE.iter().find(|(row, _)| *row == pin.index())?;
     functions.iter().find(|(function, _)| *function == number).map(|&(_, signal)| signal)

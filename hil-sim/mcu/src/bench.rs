@@ -1,5 +1,5 @@
-//! The mechanics of the rig on the pins of the chip: step pulses move motors, edge by edge; encoders answer on their
-//! two lines, switches on theirs.
+//! The mechanics of the rig on the pins of the chip: step pulses move motors edge by edge; encoders and switches drive
+//! their lines.
 
 use vergence_control::{RigIo, StepSchedule};
 use vergence_plant::Plant;
@@ -12,9 +12,9 @@ use crate::world::{Instant, PinEdge, Terminals, World};
 /// A switch to ground with a pull-up on the line.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct SwitchWiring {
-    /// Its line.
+    /// The line of the switch.
     pub pin: Pin,
-    /// The contact is closed, the line low, while nothing is wrong: a broken wire reads as trouble.
+    /// Whether the contact is normally closed (line low): a broken wire then reads as operated.
     pub normally_closed: bool,
 }
 
@@ -24,37 +24,37 @@ impl SwitchWiring {
     }
 }
 
-/// Where an axis is wired.
+/// The pins of one axis.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct AxisWiring {
-    /// A step at each rising edge.
+    /// Step output of the chip: a step at each rising edge.
     pub step: Pin,
-    /// High: the raw step count rises.
+    /// Direction output of the chip; high: the raw step count rises.
     pub direction: Pin,
     /// The encoder's lines A and B; A leads while the count rises.
     pub encoder: [Pin; 2],
-    /// Operated at home.
+    /// Home switch, operated at home.
     pub home: SwitchWiring,
-    /// Operated beyond the range.
+    /// Hard limit, operated beyond the range.
     pub hard_limit: SwitchWiring,
 }
 
-/// Where everything is wired.
+/// The pins of the whole bench.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct BenchWiring {
     /// The axes, in the plant's order.
     pub axes: Vec<AxisWiring>,
     /// High switches the drivers off; the drivers' pull-up keeps it high while the chip does not drive it.
     pub drivers_off: Pin,
-    /// Operated while pressed; also cuts the drivers by itself.
+    /// Emergency stop, operated while pressed; it also cuts the drivers by itself.
     pub emergency_stop: SwitchWiring,
-    /// A rising edge fires the cameras.
+    /// Camera trigger: a rising edge fires the cameras.
     pub camera_trigger: Pin,
 }
 
 impl BenchWiring {
     /// The wiring of the NUCLEO-G474RE firmware (`docs/firmware.md`): baseline on TIM1 and TIM2, separation on TIM8 and
-    /// TIM5; home switches close at home, limits and emergency stop open in trouble.
+    /// TIM5; home switches close at home, limits and emergency stop open when operated.
     #[must_use]
     pub fn nucleo_g474() -> Self {
         const A: usize = 0;
@@ -102,15 +102,15 @@ impl BenchWiring {
     }
 }
 
-/// The mechanics advance in steps of this while something moves, and of the other while nothing does.
+/// Time steps of the mechanics while something moves, and at rest.
 const MOVING_STEP: Microseconds = Microseconds(20);
 const RESTING_STEP: Microseconds = Microseconds(1_000);
-/// So long after the last step pulse the load may still creep.
+/// Time after the last step pulse in which the load may still creep.
 const SETTLING: Microseconds = Microseconds(100_000);
-/// An encoder's edges are at least so far apart, whatever jump it has to show.
+/// Least time between two edges of an encoder, whatever jump it has to show.
 const EDGE_SPACING: Picoseconds = Picoseconds::nanoseconds(200);
 
-/// One encoder's lines: what they show, and what they shall show.
+/// The lines of one encoder: the count that they show, and the count that they are to reach.
 #[derive(Clone, Copy, Debug, Default)]
 struct Lines {
     shown: i32,
@@ -119,7 +119,7 @@ struct Lines {
     spacing: Picoseconds,
 }
 
-/// An axis as its wires know it.
+/// The state of one axis on its wires.
 #[derive(Clone, Copy, Debug, Default)]
 struct AxisState {
     forward: bool,
@@ -156,19 +156,19 @@ impl Bench {
         Self { wiring, plant, axes, emergency_stop: None, next_step, moving_until, pulses }
     }
 
-    /// The mechanics: the truth.
+    /// The simulated mechanics, which know the true positions.
     #[must_use]
     pub fn plant(&self) -> &Plant {
         &self.plant
     }
 
-    /// The mechanics, for doing something to them; their lines follow at once.
+    /// The mechanics, to change them; their lines follow at once.
     pub fn plant_mut(&mut self) -> &mut Plant {
         self.next_step = Picoseconds(0);
         &mut self.plant
     }
 
-    /// Step pulses that each axis has got.
+    /// Step pulses that each axis has received.
     #[must_use]
     pub fn pulses(&self) -> &[u64] {
         &self.pulses
@@ -201,7 +201,7 @@ impl Bench {
         terminals.drive(wiring.pin, wiring.drive(pressed));
     }
 
-    /// At the very beginning: lines that stand show their level.
+    /// Drives the lines at the start: encoders at rest show their level.
     fn connect(&mut self, terminals: &mut Terminals) {
         terminals.drive(self.wiring.drivers_off, Drive::High);
         for (state, wiring) in self.axes.iter().zip(&self.wiring.axes) {
@@ -221,7 +221,7 @@ impl Bench {
         self.wake(now);
     }
 
-    /// Something begins to move: short steps from here on.
+    /// Switches to short time steps, because something begins to move.
     fn wake(&mut self, now: Microseconds) {
         self.moving_until = Microseconds(now.0 + SETTLING.0);
         self.next_step = self.next_step.min(Picoseconds::microseconds(now.0 + MOVING_STEP.0));
@@ -229,7 +229,7 @@ impl Bench {
 }
 
 impl Lines {
-    /// The count is `count` now: its edges are spread over the coming `span`.
+    /// Sets the count to reach; its edges are spread over the coming `span`.
     fn aim(&mut self, count: i32, now: Picoseconds, span: Picoseconds) {
         self.wanted = count;
         let edges = u64::from(self.wanted.wrapping_sub(self.shown).unsigned_abs());
@@ -241,7 +241,7 @@ impl Lines {
         }
     }
 
-    /// Shows edges that are due; returns the line that changes, A (0) or B, and its level.
+    /// Makes the next edge that is due; returns the line that changes, A (0) or B (1), and its level.
     fn edge(&mut self, now: Picoseconds) -> Option<(usize, bool)> {
         let due = self.next.filter(|&at| at <= now)?;
         let before = phases(self.shown);

@@ -1,4 +1,4 @@
-//! The chip as the core sees it.
+//! The chip as the bus of the core.
 
 use vergence_cpu::{Access, Bus, BusFault, Cycle, Lines};
 
@@ -9,7 +9,7 @@ use crate::trouble::{Demand, Trouble};
 use crate::unit::Unit;
 use crate::world::World;
 
-/// Peripherals are in here; what is missing is a gap in the model, not a fault of the program.
+/// Addresses of peripherals: what is missing here is a gap in the model, not a fault of the program.
 const PERIPHERALS: std::ops::Range<u32> = 0x4000_0000..0x6000_0000;
 
 impl<W: World> Chip<W> {
@@ -52,7 +52,7 @@ impl<W: World> Chip<W> {
         let peripheral = self.units.get(unit);
         peripheral.advance(moment);
         let reply = peripheral.write(moment, offset, value);
-        // The slave mode decides who listens to whom.
+        // The slave mode decides which timer triggers which.
         if matches!(unit, Unit::Timer(_)) && offset == 8 {
             self.watch_timers();
         }
@@ -67,8 +67,8 @@ impl<W: World> Chip<W> {
         Ok(())
     }
 
-    /// The peripheral at an address and the offset of the register; `None` where nothing answers and that was
-    /// complained about.
+    /// The peripheral at an address and the offset of the register; `None` where there is none, which has been
+    /// reported.
     fn find(&mut self, address: u32) -> Result<Option<(Unit, u32)>, BusFault> {
         let Some(unit) = self.directory.unit_at(address) else {
             if PERIPHERALS.contains(&address) {
@@ -108,7 +108,7 @@ impl<W: World> Chip<W> {
         Some(u32::try_from(free_at.saturating_sub(now)).unwrap_or(u32::MAX))
     }
 
-    /// A read or fetch from a bank that is busy waits until it is free.
+    /// Makes a read or fetch from a busy bank wait until the bank is free.
     fn note_bank(&self, offset: usize) {
         if self
             .units
@@ -122,7 +122,7 @@ impl<W: World> Chip<W> {
 }
 
 impl<W: World> Chip<W> {
-    /// A read of anything but SRAM at its own address.
+    /// Reads anything except SRAM at its own address.
     #[inline(never)]
     fn read_elsewhere(&mut self, now: Cycle, address: u32, access: Access) -> Result<u32, BusFault> {
         match Memory::place(address) {
@@ -153,7 +153,7 @@ impl<W: World> Chip<W> {
             Some(Place::Ram(offset)) => self.memory.write_ram(offset, access, value).ok_or(BusFault),
             Some(Place::Flash(offset)) => {
                 self.advance_to(now);
-                // Without power nothing more is written.
+                // Without power nothing is written any more.
                 if self.demand == Some(Demand::PowerLost) {
                     return Ok(());
                 }

@@ -10,9 +10,9 @@ const WORDS: usize = 64;
 pub struct Touched {
     /// The peripheral and the register, such as "TIM1.CCR1".
     pub register: String,
-    /// It was read.
+    /// Whether it was read.
     pub read: bool,
-    /// It was written.
+    /// Whether it was written.
     pub written: bool,
 }
 
@@ -33,7 +33,7 @@ impl Census {
         }
     }
 
-    /// Everything touched, by peripheral and offset; `name` finds a register's name.
+    /// All registers touched, by peripheral and offset; `name` gives the name of a register.
     pub fn touched(&self, name: impl Fn(Unit, u32) -> Option<&'static str>) -> Vec<Touched> {
         let marked = self.marks.iter().enumerate().filter(|(_, mark)| **mark != 0);
         marked

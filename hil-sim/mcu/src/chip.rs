@@ -22,16 +22,17 @@ use crate::units::Units;
 use crate::vcd::Trace;
 use crate::world::{Instant, Terminals, World};
 
-/// How the chip is made.
+/// Properties of a chip, and how strict its model is.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct ChipConfig {
     /// The unique device identifier.
     pub uid: [u32; 3],
-    /// Decides what RAM holds at power-on, and the random number generator.
+    /// Seed of the RAM contents at power-on and of the random number generator.
     pub seed: u64,
-    /// Stop at whatever the model does not do. Otherwise such accesses are noted, reads give zero and writes are lost.
+    /// Stop at accesses that the model does not implement. Otherwise they are recorded, reads give zero and writes are
+    /// lost.
     pub strict: bool,
-    /// Let a core clock pass that is too fast for its supply or wait states: it is noted, and the chip goes on.
+    /// Admit a core clock that is too fast for its supply or wait states: it is recorded, and the chip continues.
     pub overclock: bool,
 }
 
@@ -41,9 +42,9 @@ impl Default for ChipConfig {
     }
 }
 
-/// Troubles that are kept where the chip is not strict.
+/// Number of troubles recorded where the chip is not strict.
 const TROUBLES_KEPT: usize = 64;
-/// So many events at one instant are taken for an endless loop.
+/// Number of events at one instant that counts as an endless loop.
 const EVENTS_AT_ONCE: u32 = 100_000;
 
 /// An STM32G474RE wired to a world. Clone it for a snapshot.
@@ -59,7 +60,7 @@ pub struct Chip<W> {
     pub(crate) directory: Directory,
     /// A bit for each peripheral whose clock runs.
     pub(crate) clocked: u64,
-    /// Something has happened that may ask for DMA.
+    /// Whether something has happened that may request DMA.
     pub(crate) stirred: bool,
     pub(crate) census: Census,
     pub(crate) world: W,
@@ -68,19 +69,19 @@ pub struct Chip<W> {
     pub(crate) now: Cycle,
     pub(crate) code_version: u64,
     pub(crate) demand: Option<Demand>,
-    /// Code was fetched from a bank of flash that is busy: the next branch waits for it.
+    /// Whether code was fetched from a busy bank of flash: the next branch waits for it.
     pub(crate) stalls: Cell<bool>,
-    /// Where somebody wants to know.
+    /// The pages of flash used, where that is tracked.
     pub(crate) pages: Option<PageUse>,
     pub(crate) troubles: Vec<Trouble>,
     pub(crate) sent: Vec<Vec<SentByte>>,
     power_cycles: u64,
-    /// The core clock, supply and wait states last looked at.
+    /// The core clock, supply and wait states that were checked last.
     speed: Option<(u32, VoltageRange, u32)>,
 }
 
 impl<W: World> Chip<W> {
-    /// A chip with erased flash that has just got power.
+    /// A chip with erased flash at power-on.
     #[must_use]
     pub fn new(config: ChipConfig, world: W) -> Self {
         let mut units = Units::new(config.seed);
@@ -115,7 +116,7 @@ impl<W: World> Chip<W> {
         chip
     }
 
-    /// Resets everything but the contents of memory; power-on also loses RAM.
+    /// Resets everything except the contents of memory; power-on also loses RAM.
     pub fn reset(&mut self, now: Cycle, cause: ResetCause) {
         self.advance_to(now);
         self.demand = None;
@@ -131,7 +132,7 @@ impl<W: World> Chip<W> {
         self.settle_everything();
     }
 
-    /// Looks at everything anew.
+    /// Determines the state of all peripherals anew.
     pub(crate) fn settle_everything(&mut self) {
         self.pads.watched = self.world.watched().iter().fold(self.trace.watched(), |all, pin| all | pin.set());
         for port in 0..self.units.ports.len() {
@@ -156,7 +157,7 @@ impl<W: World> Chip<W> {
         Instant { cycle: self.now, time: self.clocks.base.time_of(self.now) }
     }
 
-    /// Lets everything happen that is due up to `now`, each thing at its own instant.
+    /// Processes all events that are due up to `now`, each at its own instant.
     #[inline]
     pub(crate) fn advance_to(&mut self, now: Cycle) {
         if self.schedule.next() <= now {
@@ -201,7 +202,7 @@ impl<W: World> Chip<W> {
         self.complain(Trouble::Endless { at: self.now, unit });
     }
 
-    /// Finds anew when a peripheral is due and what it asserts.
+    /// Determines when a peripheral is due and which lines it asserts.
     pub(crate) fn refresh(&mut self, unit: Unit) {
         let peripheral = self.units.get(unit);
         let (due, lines) = (peripheral.due(&self.clocks), peripheral.lines());
@@ -220,13 +221,13 @@ impl<W: World> Chip<W> {
         self.refresh_world();
     }
 
-    /// After the world was told of something.
+    /// Applies what the world did in answer to an event.
     pub(crate) fn world_was_told(&mut self) {
         self.connect_terminals();
         self.refresh_world();
     }
 
-    /// The clock tree may have changed: brings everything to now by the old clocks, then goes on by the new ones.
+    /// Takes over a changed clock tree: advances everything to now by the old clocks, then continues with the new ones.
     pub(crate) fn reclock(&mut self) {
         let tree = self.units.rcc.tree();
         if tree != self.clocks.tree {
@@ -259,7 +260,7 @@ impl<W: World> Chip<W> {
         }
     }
 
-    /// Something is wrong: a strict chip stops, another one keeps a note.
+    /// Reports trouble: a strict chip stops, another one records it.
     pub(crate) fn complain(&mut self, trouble: Trouble) {
         if self.config.strict {
             self.ask(Demand::Trouble(trouble));

@@ -1,4 +1,4 @@
-//! Frequencies of the clock tree (RM0440 §7.2), and what the silicon demands of them.
+//! Frequencies of the clock tree (RM0440 §7.2), and the limits of the silicon.
 
 use crate::peripheral::Reply;
 use crate::time::TimeBase;

@@ -18,7 +18,7 @@ pub(crate) struct Crc {
     cr: u32,
     init: u32,
     polynomial: u32,
-    /// How wide the write to DR is that comes next.
+    /// The width of the next write to DR.
     pub access: Access,
 }
 

@@ -1,4 +1,4 @@
-//! DBGMCU: who the chip is to a debugger, and what stands still under one (RM0440 §47.6).
+//! DBGMCU: identification of the chip, and which peripherals freeze under a debugger (RM0440 §47.6).
 
 use crate::peripheral::{Moment, Peripheral, Registers, Reply};
 

@@ -11,7 +11,7 @@ const LOW_PAGES: usize = 0x90;
 /// Registers of a peripheral lie below this.
 const EXTENT: u32 = 0x100;
 
-/// A table of what is where; the same for every chip.
+/// A table from address to peripheral; the same for every chip.
 #[derive(Clone, Debug)]
 pub(crate) struct Directory {
     pages: Arc<[Option<Unit>; LOW_PAGES]>,

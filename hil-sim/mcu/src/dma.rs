@@ -32,7 +32,7 @@ struct Channel {
     left: u32,
     peripheral: u32,
     memory: u32,
-    /// As written while the channel was off: what circular mode begins again with.
+    /// The count as written while the channel was off: circular mode restarts with it.
     count: u32,
     /// Bytes that the pointers have moved.
     moved: u32,
@@ -73,8 +73,8 @@ impl Dma {
         self.enabled = channels.fold(0, |all, (index, channel)| all | ((channel.ccr & EN) as u8) << index);
     }
 
-    /// The transfer that goes next: among enabled channels with something to do, the highest priority, then the lowest
-    /// number (§12.4.4). `requested` says whether a channel's request line is up.
+    /// The next transfer: among enabled channels with a request, the one of highest priority, then of lowest number
+    /// (§12.4.4). `requested` tells whether the request line of a channel is asserted.
     pub fn next_transfer(&self, now: Cycle, requested: impl Fn(usize) -> bool) -> Option<Transfer> {
         (0..CHANNELS)
             .filter(|&index| self.enabled >> index & 1 == 1)
@@ -90,7 +90,7 @@ impl Dma {
             .map(|index| self.channels[index].transfer(index))
     }
 
-    /// The transfer was made, or its address did not answer.
+    /// Records that the transfer was made, or that its address did not answer.
     pub fn finish(&mut self, index: usize, done: bool) {
         let channel = &mut self.channels[index];
         let flags = if done { channel.step() } else { channel.fail() };
@@ -316,7 +316,7 @@ impl Peripheral for Dmamux {
 
     fn write(&mut self, _moment: Moment, offset: u32, value: u32) -> Reply<()> {
         if let Some(register) = self.ccr.get_mut(offset as usize / 4) {
-            // Synchronization is missing. So are events (EGE, bit 9), but only it and the generators would hear them.
+            // Synchronization is missing. So are events (EGE, bit 9), but only it and the generators would use them.
             only(value, 0x27F)?;
             *register = value;
         }

@@ -35,7 +35,7 @@ impl Default for Exti {
 }
 
 impl Exti {
-    /// The pin chosen for line `line` changed its level.
+    /// Takes a change of level of the pin chosen for line `line`.
     pub fn edge(&mut self, line: usize, rises: bool) {
         let detector = if rises { self.rising } else { self.falling };
         self.pending |= detector & 1 << line;

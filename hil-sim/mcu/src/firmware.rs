@@ -1,4 +1,4 @@
-//! A firmware image as its ELF file tells it: what to load where, and what is where.
+//! A firmware image from its ELF file: segments to load, and symbols.
 
 use std::ops::Range;
 use std::sync::Arc;
@@ -10,21 +10,21 @@ use object::{Endianness, Object, ObjectSymbol, SymbolKind, elf};
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[non_exhaustive]
 pub enum FirmwareError {
-    /// The bytes are no 32-bit ELF file.
+    /// The bytes are not a 32-bit ELF file.
     #[error("this cannot be read as a 32-bit ELF file: {0}")]
     NotElf(String),
-    /// Some of what it names is not in it.
+    /// The file ends before something that it refers to.
     #[error("this ELF file is cut off")]
     CutOff,
-    /// It is for another processor.
+    /// The file is for another processor.
     #[error("this ELF file is not for an Arm processor")]
     NotArm,
     /// A segment lies outside flash.
     #[error("a segment of {length} bytes at {address:#010x} is not in flash")]
     OutsideFlash {
-        /// Where it wants to be loaded.
+        /// The address to load it to.
         address: u32,
-        /// Its length.
+        /// Its length in bytes.
         length: usize,
     },
 }
@@ -49,7 +49,7 @@ impl Firmware {
     /// Reads an ELF file.
     ///
     /// # Errors
-    /// [`FirmwareError`] where it is none, or not for this chip.
+    /// [`FirmwareError`] where it is not an ELF file, or not for this chip.
     pub fn from_elf(bytes: &[u8]) -> Result<Self, FirmwareError> {
         let not_elf = |error: object::Error| FirmwareError::NotElf(error.to_string());
         let file: ElfFile32<Endianness> = ElfFile32::parse(bytes).map_err(not_elf)?;
@@ -73,12 +73,12 @@ impl Firmware {
         Self { segments: vec![(address, bytes.to_vec())], ..Self::default() }
     }
 
-    /// What to load: physical addresses and bytes.
+    /// The segments to load: physical addresses and bytes.
     pub fn segments(&self) -> impl Iterator<Item = (u32, &[u8])> {
         self.segments.iter().map(|(address, bytes)| (*address, bytes.as_slice()))
     }
 
-    /// The bytes from `start` on, as flash holds them; what is loaded below `start` is left out.
+    /// The contents of flash from `start` on; what is loaded below `start` is left out.
     #[must_use]
     pub fn flat(&self, start: u32) -> Vec<u8> {
         let mut flat = Vec::new();
@@ -91,13 +91,13 @@ impl Firmware {
         flat
     }
 
-    /// Where code is, as the linker notes it beside the literals in between: in order, not overlapping.
+    /// Address ranges of code without the literals in between: in order, not overlapping.
     #[must_use]
     pub fn code(&self) -> &[Range<u32>] {
         &self.code
     }
 
-    /// The function or variable that `address` is in, and how far in, such as "control::tick+0x1c".
+    /// The function or variable that contains `address`, with the offset in it, such as "control::tick+0x1c".
     #[must_use]
     pub fn symbol_at(&self, address: u32) -> Option<String> {
         let after = self.symbols.partition_point(|symbol| symbol.address <= address);
@@ -115,7 +115,7 @@ impl Firmware {
         self.symbols.iter().map(|symbol| (symbol.address, symbol.name.as_str()))
     }
 
-    /// Where a symbol is, by its whole name.
+    /// The address of a symbol, by its whole name.
     #[must_use]
     pub fn address_of(&self, name: &str) -> Option<u32> {
         self.symbols.iter().find(|symbol| symbol.name == name).map(|symbol| symbol.address)
@@ -142,7 +142,7 @@ fn symbols(file: &ElfFile32<Endianness>) -> Vec<Symbol> {
     let mut symbols: Vec<_> = named
         .filter_map(|symbol| {
             let name = symbol.name().ok().filter(|name| !name.is_empty() && !name.starts_with('$'))?;
-            // Bit 0 of a function's address says Thumb.
+            // Bit 0 of a function's address marks Thumb code.
             let address = symbol.address() as u32 & !u32::from(symbol.kind() == SymbolKind::Text);
             let name = format!("{:#}", rustc_demangle::demangle(name));
             Some(Symbol { address, size: symbol.size() as u32, name })

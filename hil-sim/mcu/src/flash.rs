@@ -69,10 +69,10 @@ const FACTORY_OPTIONS: u32 = 0xFFEF_F8AA;
 const BANK: usize = FLASH_SIZE / 2;
 pub(crate) const PAGE: usize = 2048;
 
-/// Something the flash does that takes time.
+/// An operation of the flash, which takes time.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum FlashOperation {
-    /// Erases a page; its first byte.
+    /// Erases a page, given by its first byte.
     ErasePage(u32),
     /// Erases a bank, 0 or 1.
     EraseBank(u8),
@@ -80,7 +80,7 @@ pub enum FlashOperation {
     Program {
         /// Bytes from the start of flash, a multiple of eight.
         offset: u32,
-        /// What to.
+        /// The new contents.
         value: u64,
     },
 }
@@ -94,7 +94,7 @@ impl FlashOperation {
         }
     }
 
-    /// The bytes that it changes.
+    /// The range of bytes that the operation changes.
     #[must_use]
     pub fn range(self) -> std::ops::Range<usize> {
         match self {
@@ -109,7 +109,7 @@ impl FlashOperation {
     }
 }
 
-/// What happens when an operation begins; the chip carries it out, since it owns the memory.
+/// The effect of an operation that begins; the chip applies it, since it owns the memory.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Change {
     Done(FlashOperation),
@@ -130,7 +130,7 @@ pub(crate) struct Flash {
     half: Option<(u32, u32)>,
     /// Operations begun since power-on of the simulation.
     pub operations: u64,
-    /// Whether whoever runs the chip wants to know of each.
+    /// Whether each operation stops the machine.
     pub announces: bool,
     pub cut: Option<PowerCut>,
     pub changes: Vec<Change>,
@@ -159,7 +159,7 @@ impl Flash {
         }
     }
 
-    /// Registers after a reset; what is in the cells stays.
+    /// Resets the registers; the cells keep their contents.
     pub fn reset(&mut self) {
         let fresh = Self::new();
         *self = Self {
@@ -176,7 +176,7 @@ impl Flash {
         self.acr & 0xF
     }
 
-    /// What is being done.
+    /// The operation in progress.
     pub fn running(&self) -> Option<FlashOperation> {
         self.running.map(|(operation, _)| operation)
     }
@@ -190,12 +190,12 @@ impl Flash {
         self.running.map(|(operation, until)| (operation.bank(), until))
     }
 
-    /// Nothing is going on, and every word reads as it was written.
+    /// Whether no operation is in progress and every word reads as it was written.
     pub fn is_calm(&self) -> bool {
         self.running.is_none() && self.torn.is_empty()
     }
 
-    /// Writing flash may begin what ends in an interrupt: the core must look after each access.
+    /// Whether writing flash may begin an operation that ends in an interrupt: the core must check after each access.
     pub fn is_touchy(&self) -> bool {
         self.cr & PG != 0 && self.cr & (EOPIE | ERRIE) != 0
     }
@@ -204,7 +204,7 @@ impl Flash {
         self.eccr >> 31 == 1
     }
 
-    /// Firmware reads the double word with this index; says whether ECC finds it torn (§3.3.4).
+    /// Takes a read of the double word with this index; returns whether ECC finds it torn (§3.3.4).
     pub fn check_ecc(&mut self, double_word: u32) {
         if self.torn.contains(&double_word) && self.eccr >> 31 == 0 {
             let bank = u32::from(double_word as usize * 8 >= BANK);
@@ -213,7 +213,7 @@ impl Flash {
         }
     }
 
-    /// Firmware writes into flash at `offset`: two words make a double word (§3.3.7).
+    /// Takes a write into flash at `offset`: two words make a double word (§3.3.7).
     pub fn program(&mut self, moment: Moment, offset: u32, access: Access, value: u32, cells: u64) {
         if self.cr & PG == 0 || self.cr & LOCK != 0 || self.sr & ERRORS != 0 || self.running.is_some() {
             return self.fail(PGSERR);
@@ -251,7 +251,7 @@ impl Flash {
         }
     }
 
-    /// Firmware sets STRT: what to erase (§3.3.6). Page numbers count within the bank.
+    /// Takes the setting of STRT, which begins an erasure (§3.3.6). Page numbers count within the bank.
     fn start(&mut self, moment: Moment) -> Reply<()> {
         if self.sr & ERRORS != 0 || self.running.is_some() {
             self.fail(PGSERR);
@@ -290,7 +290,7 @@ impl Flash {
         if value & STRT != 0 { self.start(moment) } else { Ok(()) }
     }
 
-    /// The two keys one after the other unlock; a wrong one locks until the next reset (§3.3.5).
+    /// Takes a key: the two keys in sequence unlock; a wrong one locks until the next reset (§3.3.5).
     fn write_key(&mut self, value: u32) -> Reply<()> {
         const KEYS: [u32; 2] = [0x4567_0123, 0xCDEF_89AB];
         self.keys = [self.keys[1], value];
@@ -371,7 +371,7 @@ impl Peripheral for Flash {
 }
 
 impl Change {
-    /// Carries the change out on the cells; returns whether power is gone.
+    /// Applies the change to the cells; returns whether the power is gone.
     pub fn apply(self, cells: &mut [u8], torn: &mut BTreeSet<u32>) -> bool {
         match self {
             Self::Done(operation) => leave(operation, Damage::Complete, cells, torn),

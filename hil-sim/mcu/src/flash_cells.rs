@@ -1,4 +1,4 @@
-//! What outlives the power: the cells of flash, sound or torn.
+//! The cells of flash, intact or torn: what persists without power.
 
 use std::collections::BTreeSet;
 use std::hash::{DefaultHasher, Hash, Hasher};
@@ -20,7 +20,7 @@ impl FlashCells {
         Self { bytes: Arc::new(bytes.to_vec()), torn: torn.clone() }
     }
 
-    /// 512 KiB.
+    /// The contents, 512 KiB.
     #[must_use]
     pub fn bytes(&self) -> &[u8] {
         &self.bytes
@@ -32,7 +32,7 @@ impl FlashCells {
         &self.torn
     }
 
-    /// A digest of each page: what is in it, and what of that is torn.
+    /// A digest of each page: its contents, and which of its double words are torn.
     #[must_use]
     pub fn page_digests(&self) -> Vec<u64> {
         let digest = |(page, bytes): (usize, &[u8])| {
@@ -56,20 +56,20 @@ impl FlashCells {
         true
     }
 
-    /// Carries an operation out, or leaves of it what a power cut does.
+    /// Applies an operation, or the part of it that a power cut leaves.
     pub fn operate(&mut self, operation: FlashOperation, damage: Damage) {
         leave(operation, damage, Arc::make_mut(&mut self.bytes).as_mut_slice(), &mut self.torn);
     }
 }
 
 impl Default for FlashCells {
-    /// Erased.
+    /// Erased cells.
     fn default() -> Self {
         Self { bytes: Arc::new(vec![0xFF; FLASH_SIZE]), torn: BTreeSet::new() }
     }
 }
 
-/// What is left of an operation.
+/// The part of an operation that took place.
 pub(crate) fn leave(operation: FlashOperation, damage: Damage, cells: &mut [u8], torn: &mut BTreeSet<u32>) {
     let range = operation.range();
     let words = range.start as u32 / 8..range.end as u32 / 8;

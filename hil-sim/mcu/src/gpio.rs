@@ -33,7 +33,7 @@ pub(crate) struct Port {
     afr: [u32; 2],
     /// Levels of the pins, found by the pads.
     pub levels: u16,
-    /// Some pin may have another level or connection than before.
+    /// Whether some pin may have another level or connection than before.
     pub changed: bool,
 }
 

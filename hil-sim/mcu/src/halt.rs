@@ -1,4 +1,4 @@
-//! Why a machine stands still, in words.
+//! Why a machine stopped, with messages.
 
 use std::fmt;
 
@@ -6,55 +6,55 @@ use crate::flash::FlashOperation;
 use crate::time::Picoseconds;
 use crate::trouble::Trouble;
 
-/// Why [`Machine::run_until`](crate::Machine::run_until) came back.
+/// Why [`Machine::run_until`](crate::Machine::run_until) returned.
 #[derive(Clone, Debug, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum Halt {
-    /// The time asked for has come.
+    /// The time asked for is reached.
     Reached,
     /// Firmware executed a breakpoint instruction with this number.
     Breakpoint {
-        /// The number.
+        /// The number of the breakpoint.
         number: u8,
-        /// Where.
+        /// The place in the program.
         place: Place,
     },
     /// Firmware made a semihosting call.
     Semihosting {
-        /// Where.
+        /// The place in the program.
         place: Place,
     },
-    /// A fault within a fault handler: the core stands until a reset.
+    /// A fault within a fault handler: the core is locked up until a reset.
     Lockup {
-        /// Where.
+        /// The place in the program.
         place: Place,
     },
-    /// Firmware did something that the model does not do.
+    /// The firmware did something that the model does not implement.
     Trouble {
-        /// What.
+        /// What it did.
         trouble: Trouble,
-        /// Where; the instruction before did it.
+        /// The place in the program; the instruction before it was the cause.
         place: Place,
     },
     /// Power was cut.
     PowerLost {
-        /// Where.
+        /// The place in the program.
         place: Place,
     },
     /// The flash begins an operation.
     FlashOperation(FlashOperation),
-    /// Something that this version does not know.
+    /// A reason of the core that this version does not know.
     Other(String),
 }
 
-/// Where and when the core stands.
+/// Where and when the core stopped.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Place {
     /// Program counter.
     pub pc: u32,
     /// The function, where the ELF names it.
     pub symbol: Option<String>,
-    /// When.
+    /// Time since power-on.
     pub time: Picoseconds,
 }
 

@@ -24,11 +24,11 @@ pub(crate) struct Iwdg {
     unlocked: bool,
     /// When the counter was last loaded; `None` before it was started.
     loaded: Option<Picoseconds>,
-    /// When values just written arrive: prescaler, reload, window.
+    /// When values just written take effect: prescaler, reload, window.
     updated_at: [Option<Picoseconds>; 3],
-    /// It has bitten.
+    /// Whether the watchdog has reset the chip.
     pub bites: bool,
-    /// It has just been started.
+    /// Whether the watchdog has just been started.
     pub starts: bool,
 }
 

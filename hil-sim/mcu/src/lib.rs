@@ -1,16 +1,16 @@
 //! The STM32G474RE on its NUCLEO board: memories, clocks, timers, serial ports, DMA, flash. With the core it runs the
-//! unmodified firmware, and everything takes the time that it takes on the silicon.
+//! unmodified firmware, with the times of the silicon as far as the manuals state them.
 //!
 //! - [`Machine`]: core and chip together, with the firmware in flash; what most users want
 //! - [`Chip`]: the bus behind the core; each peripheral is a file named as in the reference manual
-//! - [`World`]: whatever is wired to the pins and serial ports
+//! - [`World`]: everything that is wired to the pins and serial ports
 //! - [`Bench`]: the mechanics of the rig as such a world
-//! - [`SerialDevice`]: what hangs on a serial port, such as a bus of servos
-//! - [`LogDecoder`]: what the firmware says in its log
+//! - [`SerialDevice`]: a device on a serial port, such as a bus of servos
+//! - [`LogDecoder`]: the log of the firmware as text
 //!
 //! Sections in comments are those of the reference manual RM0440 unless another document is named; its chapters kept
-//! their numbers through its revisions, sections within them moved a little. Whatever is missing is refused by the
-//! name of its register. What is simplified is in `FIDELITY.md`.
+//! their numbers through its revisions, sections within them moved a little. What is missing is refused with the
+//! name of its register. Simplifications are listed in `FIDELITY.md`.
 
 mod alternate;
 mod bench;

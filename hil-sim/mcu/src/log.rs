@@ -1,5 +1,5 @@
-//! The firmware's log as text: defmt frames in rzCOBS, each an index into the ELF file's format strings and its arguments
-//! (the defmt book, "Encoding" and "Interned strings"; wire format 4).
+//! The firmware's log as text: defmt frames in rzCOBS, each an index into the ELF file's format strings and its
+//! arguments (the defmt book, "Encoding" and "Interned strings"; wire format 4).
 
 mod arguments;
 
@@ -10,10 +10,10 @@ use serde_json::Value;
 use self::arguments::Arguments;
 use crate::firmware::Firmware;
 
-/// The wire format that is understood.
+/// The wire format that the decoder reads.
 const VERSION: &str = "4";
 const ENCODING: &str = "rzcobs";
-/// More than the longest entry: what has no end by then is noise.
+/// Longer than the longest entry: bytes without an end by then are noise.
 const LONGEST: usize = 4_096;
 
 /// A log that cannot be read.
@@ -23,20 +23,20 @@ pub enum LogError {
     /// The ELF file describes no log.
     #[error("this ELF file has no defmt log: its symbols were stripped, or it logs in another way")]
     NoLog,
-    /// It logs in another way than this program knows.
+    /// The firmware logs in another format than this program reads.
     #[error("this ELF file logs by defmt {what} {found}, and this program reads {known}: pipe --raw into defmt-print")]
     Unknown {
-        /// Which property.
+        /// The property that differs.
         what: &'static str,
-        /// As in the file.
+        /// Its value in the file.
         found: String,
-        /// As understood.
+        /// The value that this program reads.
         known: &'static str,
     },
     /// Bytes were lost, or belong to another program.
     #[error("an entry of {length} bytes cannot be read: bytes were lost on the way")]
     Damaged {
-        /// Encoded.
+        /// The bytes as they came, encoded.
         length: usize,
     },
 }
@@ -44,11 +44,11 @@ pub enum LogError {
 /// One line of the log.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct LogEntry {
-    /// When, as the firmware's timestamp says: seconds since its start.
+    /// The timestamp of the firmware: seconds since its start.
     pub time: Option<String>,
-    /// "trace", "debug", "info", "warn" or "error"; nothing where it is printed at any level.
+    /// "trace", "debug", "info", "warn" or "error"; empty where the entry is printed at any level.
     pub level: Option<String>,
-    /// What.
+    /// The message.
     pub text: String,
 }
 
@@ -68,15 +68,15 @@ pub struct LogDecoder {
     strings: Strings,
     /// The format of the time at the beginning of each entry.
     timestamp: Option<String>,
-    /// The beginning of an entry.
+    /// The bytes of an entry that has not ended yet.
     pending: Vec<u8>,
 }
 
 impl LogDecoder {
-    /// For the log of this firmware.
+    /// A decoder for the log of `firmware`.
     ///
     /// # Errors
-    /// [`LogError`] where it has none that this program can read.
+    /// [`LogError`] where the firmware has no log that this program can read.
     pub fn new(firmware: &Firmware) -> Result<Self, LogError> {
         let names = || firmware.symbols().map(|(_, name)| name);
         for (what, mark, known) in
@@ -93,7 +93,7 @@ impl LogDecoder {
         Ok(Self { strings, timestamp, pending: Vec::new() })
     }
 
-    /// Takes bytes as they come; returns the entries that end in them.
+    /// Decodes the next bytes of the stream; returns the entries that end in them.
     pub fn push(&mut self, bytes: &[u8]) -> Vec<Result<LogEntry, LogError>> {
         let mut entries = Vec::new();
         for &byte in bytes {

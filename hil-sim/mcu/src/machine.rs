@@ -1,4 +1,4 @@
-//! Core and chip together: the board as its user sees it.
+//! Core and chip together: the simulated board.
 
 use vergence_cpu::{Cpu, Cycle, Stop};
 
@@ -12,14 +12,14 @@ use crate::time::Picoseconds;
 use crate::trouble::Demand;
 use crate::world::World;
 
-/// What a machine stops at. A board without debugger stops at none of these.
+/// The events that a machine stops at. A board without debugger stops at none of these.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Stops {
-    /// Breakpoint instructions; otherwise they are faults.
+    /// Stop at breakpoint instructions; otherwise they are faults.
     pub breakpoints: bool,
-    /// Lockup; otherwise time goes on, and the watchdog may bite.
+    /// Stop at lockup; otherwise time continues, and the watchdog may reset the chip.
     pub lockups: bool,
-    /// Operations of the flash, right after they began.
+    /// Stop at flash operations, immediately after they began.
     pub flash_operations: bool,
 }
 
@@ -31,7 +31,7 @@ pub struct Machine<W> {
     firmware: Firmware,
     stops: Stops,
     pub(crate) skips_waiting: bool,
-    /// The last reset, and how many there were after power-on.
+    /// The cause of the last reset, and the number of resets since power-on.
     reset: ResetCause,
     resets: u64,
     /// Where the core last locked up.
@@ -39,7 +39,7 @@ pub struct Machine<W> {
 }
 
 impl<W: World> Machine<W> {
-    /// A board with erased flash that has just got power.
+    /// A board with erased flash at power-on.
     #[must_use]
     pub fn new(config: ChipConfig, world: W) -> Self {
         let mut machine = Self {
@@ -56,10 +56,10 @@ impl<W: World> Machine<W> {
         machine
     }
 
-    /// Loads firmware into flash and starts it as after power-on. What else is in flash stays.
+    /// Loads firmware into flash and starts it as after power-on. The rest of flash is kept.
     ///
     /// # Errors
-    /// [`FirmwareError::OutsideFlash`] where some of it has no place there.
+    /// [`FirmwareError::OutsideFlash`] where a segment lies outside flash.
     pub fn load(&mut self, firmware: Firmware) -> Result<(), FirmwareError> {
         for (address, bytes) in firmware.segments() {
             let offset = address.wrapping_sub(FLASH_BASE) as usize;
@@ -72,29 +72,29 @@ impl<W: World> Machine<W> {
         Ok(())
     }
 
-    /// What it stops at.
+    /// Sets the events that the machine stops at.
     pub fn set_stops(&mut self, stops: Stops) {
         self.stops = stops;
         self.announce_flash();
     }
 
-    /// Lets loops in which the core only waits for the flash pass at once, by whole turns: the same instructions, the
-    /// same cycles, less work.
+    /// Skips whole iterations of loops in which the core only waits for the flash. Instructions and cycles are counted
+    /// as if they had run.
     pub fn set_skips_waiting(&mut self, skips: bool) {
         self.skips_waiting = skips;
         self.announce_flash();
     }
 
-    /// Remembers from now on which pages of flash decide what happens; to be asked for after power-on.
+    /// Starts to record which pages of flash affect the run; call it right after power-on.
     pub fn track_pages(&mut self) {
         let pages = PageUse::default();
-        // A reset has read the first vectors.
+        // The reset has read the first vectors already.
         pages.note(0);
         self.chip.pages = Some(pages);
     }
 
     /// Pages of flash, by number, that were read, executed or programmed since [`Self::track_pages`] before they were
-    /// erased: with any contents of the others everything would have gone the same way. DMA is not looked at.
+    /// erased: the contents of all other pages did not affect the run. Accesses by DMA are not recorded.
     #[must_use]
     pub fn pages_used(&self) -> Vec<usize> {
         self.chip.pages.as_ref().map(PageUse::pages).unwrap_or_default()
@@ -104,13 +104,13 @@ impl<W: World> Machine<W> {
         self.chip.units.flash.announces = self.skips_waiting || self.stops.flash_operations;
     }
 
-    /// Power goes and comes again at once.
+    /// Switches the power off and on again.
     pub fn power_on(&mut self) {
         self.restart(ResetCause::PowerOn);
         self.resets = 0;
     }
 
-    /// The reset button.
+    /// Presses the reset button.
     pub fn press_reset(&mut self) {
         self.restart(ResetCause::Pin);
     }
@@ -122,7 +122,7 @@ impl<W: World> Machine<W> {
         self.cpu.reset(&mut self.chip);
     }
 
-    /// Runs until `time` since power-on, through resets. The last instruction may go past it.
+    /// Runs until `time` since power-on, through resets. The last instruction may exceed it.
     pub fn run_until(&mut self, time: Picoseconds) -> Halt {
         loop {
             // The core clock may have changed meanwhile.
@@ -137,17 +137,17 @@ impl<W: World> Machine<W> {
         }
     }
 
-    /// Runs to `end`, or to where there is something to look at before.
+    /// Runs to `end`, or to an earlier event that must be handled.
     fn run_some(&mut self, end: Cycle) -> Stop {
         if self.skips_waiting && self.chip.units.flash.running().is_some() {
             return self.run_beside_flash(end);
         }
-        // Memory accesses do not make the core look up, peripherals do: go one instruction at a time.
+        // Only accesses to peripherals interrupt the core, accesses to memory do not: run one instruction at a time.
         let end = if self.chip.units.flash.is_touchy() { self.cpu.now() + 1 } else { end };
         self.run_core(end)
     }
 
-    /// Runs for a while.
+    /// Runs for a duration.
     pub fn run_for(&mut self, duration: Picoseconds) -> Halt {
         self.run_until(self.time() + duration)
     }
@@ -190,7 +190,7 @@ impl<W: World> Machine<W> {
         None
     }
 
-    /// Where the core stands.
+    /// The place and time at which the core is.
     #[must_use]
     pub fn place(&self) -> Place {
         let pc = self.cpu.pc();
@@ -203,13 +203,13 @@ impl<W: World> Machine<W> {
         self.chip.clocks.base.time_of(self.cpu.now())
     }
 
-    /// The last reset.
+    /// The cause of the last reset.
     #[must_use]
     pub fn last_reset(&self) -> ResetCause {
         self.reset
     }
 
-    /// Resets since power came.
+    /// Number of resets since power-on.
     #[must_use]
     pub fn resets(&self) -> u64 {
         self.resets
@@ -227,7 +227,7 @@ impl<W: World> Machine<W> {
         &self.cpu
     }
 
-    /// Times exception handlers from now on; [`Cpu::handler_time`] tells.
+    /// Starts to time exception handlers; [`Cpu::handler_time`] returns the times.
     pub fn time_handlers(&mut self) {
         self.cpu.time_handlers();
     }
@@ -238,13 +238,13 @@ impl<W: World> Machine<W> {
         &self.chip
     }
 
-    /// The chip, for doing something to it. Pins and serial lines change at the present instant.
+    /// The chip, to change it. Pins and serial lines change at the present instant.
     pub fn chip_mut(&mut self) -> &mut Chip<W> {
         self.chip.advance_to(self.cpu.now());
         &mut self.chip
     }
 
-    /// The firmware, for its symbols.
+    /// The firmware, with its symbols.
     #[must_use]
     pub fn firmware(&self) -> &Firmware {
         &self.firmware

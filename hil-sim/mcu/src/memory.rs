@@ -1,4 +1,4 @@
-//! Memories and where they appear (RM0440 §2.2.2 and §2.4): flash at `0x0800_0000` and 0, SRAM1, SRAM2 and CCM SRAM at
+//! Memories and their addresses (RM0440 §2.2.2 and §2.4): flash at `0x0800_0000` and 0, SRAM1, SRAM2 and CCM SRAM at
 //! `0x2000_0000`, CCM SRAM also at `0x1000_0000`.
 
 use std::cell::Cell;
@@ -7,13 +7,13 @@ use rand::{Rng, SeedableRng};
 use rand_pcg::Pcg64Mcg;
 use vergence_cpu::Access;
 
-/// Bytes of flash.
+/// Size of flash in bytes.
 pub const FLASH_SIZE: usize = 512 * 1024;
-/// Where flash is.
+/// Address of flash.
 pub const FLASH_BASE: u32 = 0x0800_0000;
-/// Where the SRAMs begin.
+/// Address of the first SRAM.
 pub const RAM_BASE: u32 = 0x2000_0000;
-/// Bytes of all SRAMs: 80 KiB + 16 KiB + 32 KiB of CCM.
+/// Size of all SRAMs in bytes: 80 KiB + 16 KiB + 32 KiB of CCM.
 pub const RAM_SIZE: usize = 128 * 1024;
 
 const CCM_BASE: u32 = 0x1000_0000;
@@ -37,7 +37,7 @@ pub(crate) struct Memory {
     pub ram: Vec<u8>,
     /// The 96 bits of the unique device identifier.
     pub uid: [u32; 3],
-    /// Pieces of RAM, 2 KiB each, that code was fetched from: what others write there the core must decode again.
+    /// Pieces of RAM, 2 KiB each, that code was fetched from: after a write by DMA the core must decode them again.
     fetched: Cell<u64>,
 }
 
@@ -48,13 +48,13 @@ impl Memory {
         memory
     }
 
-    /// RAM forgets: it wakes up with noise, the same for the same seed.
+    /// Fills RAM with noise as at power-on, the same for the same seed.
     pub fn lose_power(&mut self, seed: u64) {
         Pcg64Mcg::seed_from_u64(seed).fill_bytes(&mut self.ram);
         self.fetched.set(0);
     }
 
-    /// What answers at `address`; peripherals do not.
+    /// The memory at `address`; `None` for peripherals and gaps.
     #[inline]
     pub fn place(address: u32) -> Option<Place> {
         const FLASH_END: u32 = FLASH_BASE + FLASH_SIZE as u32;

@@ -1,4 +1,4 @@
-//! The chip from outside: what a debugger, a logic analyser and a far end see and do.
+//! The chip from outside: access as of a debugger, a logic analyser and a serial peer.
 
 use crate::census::Touched;
 use crate::chip::Chip;
@@ -14,13 +14,13 @@ use crate::vcd::Trace;
 use crate::world::{Terminals, World};
 
 impl<W: World> Chip<W> {
-    /// What firmware did that the model does not do, where the chip goes on nevertheless; the first 64.
+    /// Accesses that the model does not implement, where the chip is not strict; the first 64.
     #[must_use]
     pub fn troubles(&self) -> &[Trouble] {
         &self.troubles
     }
 
-    /// What a strict chip has stopped at.
+    /// The access at which a strict chip has stopped.
     #[must_use]
     pub fn complaint(&self) -> Option<&Trouble> {
         match &self.demand {
@@ -29,19 +29,19 @@ impl<W: World> Chip<W> {
         }
     }
 
-    /// Whether the watchdog has bitten, until the reset that follows.
+    /// Whether the watchdog has asked for a reset that has not happened yet.
     #[must_use]
     pub fn watchdog_bites(&self) -> bool {
         self.demand == Some(Demand::Watchdog)
     }
 
-    /// Whether a power cut was met, until power comes again.
+    /// Whether the power was cut and has not returned yet.
     #[must_use]
     pub fn power_is_lost(&self) -> bool {
         self.demand == Some(Demand::PowerLost)
     }
 
-    /// Registers that firmware has touched.
+    /// Registers that the firmware has read or written.
     #[must_use]
     pub fn touched(&mut self) -> Vec<Touched> {
         let names: Vec<_> = (0..UNITS).map(|index| self.units.get(Unit::at(index)).registers()).collect();
@@ -50,7 +50,7 @@ impl<W: World> Chip<W> {
         })
     }
 
-    /// Frequencies at present.
+    /// The present clock frequencies.
     #[must_use]
     pub fn clock_tree(&self) -> ClockTree {
         self.clocks.tree
@@ -75,12 +75,12 @@ impl<W: World> Chip<W> {
         result
     }
 
-    /// Bytes that a serial port has sent since last taken.
+    /// Takes the bytes that a serial port has sent since the last call.
     pub fn take_sent(&mut self, port: UartId) -> Vec<SentByte> {
         std::mem::take(&mut self.sent[port.index()])
     }
 
-    /// The far end sends `frames` to a serial port, one after the other.
+    /// Sends `frames` to a serial port, one after the other.
     pub fn send(&mut self, port: UartId, frames: &[Frame]) {
         self.terminals.frames.extend(frames.iter().map(|&frame| (port, frame)));
         self.connect_terminals();
@@ -109,13 +109,13 @@ impl<W: World> Chip<W> {
         true
     }
 
-    /// What would outlive the power now.
+    /// The contents that persist without power.
     #[must_use]
     pub fn flash_cells(&self) -> FlashCells {
         FlashCells::new(&self.memory.flash, &self.units.flash.torn)
     }
 
-    /// Puts in what outlived the power of another chip.
+    /// Replaces the persistent contents by those of another chip.
     pub fn set_flash_cells(&mut self, cells: &FlashCells) {
         self.memory.flash.copy_from_slice(cells.bytes());
         self.units.flash.torn.clone_from(cells.torn());
@@ -144,7 +144,7 @@ impl<W: World> Chip<W> {
         self.units.flash.torn.iter().map(|&word| word as usize * 8)
     }
 
-    /// Traces pins from now on; what was traced before is forgotten.
+    /// Starts to trace pins; an earlier trace is dropped.
     pub fn trace(&mut self, pins: &[Pin]) {
         let levels = pins.iter().map(|&pin| (pin, self.is_high(pin))).collect();
         self.trace = Trace::new(levels);

@@ -1,4 +1,4 @@
-//! Pins between the chip's inside and its outside: who drives them, and what they are connected to.
+//! Pins between the inside and the outside of the chip: what drives them, and what they are connected to.
 
 use crate::alternate::alternate_function;
 use crate::gpio::Mode;
@@ -16,7 +16,7 @@ pub(crate) struct Pads {
     timer_pins: [[PinSet; 8]; TimerId::COUNT],
     /// Pins of each serial port's driver enable.
     enable_pins: [PinSet; UartId::COUNT],
-    /// Pins that somebody outside looks at.
+    /// Pins whose levels are observed from outside.
     pub watched: PinSet,
 }
 
@@ -61,7 +61,7 @@ impl Pads {
         self.enable_pins[uart.index()]
     }
 
-    /// Which outputs of a timer are looked at, bit x for CHx+1 and its complement.
+    /// Which outputs of a timer are observed, bit x for CHx+1 and its complement.
     pub fn watched_outputs(&self, timer: TimerId) -> u8 {
         let pins = &self.timer_pins[timer.index()];
         (0..4).fold(0, |all, channel| {
@@ -113,7 +113,7 @@ impl Pads {
         }
     }
 
-    /// The level of a pin as everything on it makes it. An output wins over what drives the pin from outside.
+    /// The resulting level of a pin. An output of the chip wins over a driver outside.
     pub fn resolve(&self, units: &Units, pin: Pin) -> bool {
         let port = &units.ports[pin.port()];
         let number = pin.number();
@@ -140,7 +140,7 @@ fn level_of(units: &Units, signal: Signal) -> Option<bool> {
     match signal {
         Signal::Channel(timer, channel) => units.timers[timer.index()].output(usize::from(channel)),
         Signal::Complement(timer, channel) => units.timers[timer.index()].complement(usize::from(channel)),
-        // Frames go whole; the line is shown idle.
+        // Serial lines carry whole frames; the pin shows the idle level.
         Signal::Transmit(_) => Some(true),
         Signal::DriverEnable(uart) => units.uarts[uart.index()].driver_enable(),
         Signal::External(_) | Signal::Receive(_) => None,

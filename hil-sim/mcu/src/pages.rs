@@ -7,8 +7,8 @@ use crate::memory::FLASH_SIZE;
 
 const WORDS: usize = FLASH_SIZE / PAGE / 64;
 
-/// Pages that were read, executed or programmed before the program erased them itself: whatever is in the others, it
-/// goes the same way.
+/// Pages that were read, executed or programmed before the program erased them itself. The contents of the others do
+/// not affect the run.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct PageUse {
     used: [Cell<u64>; WORDS],
@@ -16,19 +16,19 @@ pub(crate) struct PageUse {
 }
 
 impl PageUse {
-    /// Something is done with the page of this byte.
+    /// Records a use of the page that contains this byte.
     pub fn note(&self, offset: usize) {
         let (word, bit) = place(offset);
         self.used[word].set(self.used[word].get() | bit & !self.erased[word]);
     }
 
-    /// The page of this byte is erased.
+    /// Records that the page of this byte is erased.
     pub fn erase(&mut self, offset: usize) {
         let (word, bit) = place(offset);
         self.erased[word] |= bit;
     }
 
-    /// The pages, by number.
+    /// The pages used, by number.
     pub fn pages(&self) -> Vec<usize> {
         let is_used = |page: &usize| self.used[page / 64].get() >> (page % 64) & 1 == 1;
         (0..FLASH_SIZE / PAGE).filter(is_used).collect()

@@ -1,11 +1,11 @@
-//! What every peripheral is to the chip.
+//! The interface between the chip and its peripherals.
 
 use vergence_cpu::{Cycle, Lines, NEVER};
 
 use crate::clocks::Clocks;
 use crate::time::Picoseconds;
 
-/// Now, by both clocks.
+/// The present cycle, with the clocks that give its real time.
 #[derive(Clone, Copy)]
 pub(crate) struct Moment<'a> {
     pub now: Cycle,
@@ -18,7 +18,7 @@ impl Moment<'_> {
     }
 }
 
-/// What firmware asked of a register and the model does not do; a few words for the report.
+/// An access to a register that the model does not implement; a few words for the report.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(crate) struct Refused(pub String);
 
@@ -40,7 +40,7 @@ pub(crate) fn only(value: u32, known: u32) -> Reply<()> {
 /// Offsets and names of the registers that a model has; anything else is refused before it gets there.
 pub(crate) type Registers = &'static [(u32, &'static str)];
 
-/// A block of registers with a life of its own.
+/// A peripheral: a block of registers whose state changes with time.
 ///
 /// The chip calls [`advance`](Self::advance) before each access, and no later than [`due`](Self::due).
 pub(crate) trait Peripheral {
@@ -49,7 +49,7 @@ pub(crate) trait Peripheral {
     /// Reads the register at `offset`, a multiple of four.
     fn read(&mut self, moment: Moment, offset: u32) -> Reply<u32>;
 
-    /// Whether a read of the register at `offset` leaves everything as it is, so that nobody need look anew.
+    /// Whether a read of the register at `offset` has no side effect, so that nothing need be checked after it.
     fn reads_quietly(&self, _offset: u32) -> bool {
         false
     }
@@ -57,10 +57,10 @@ pub(crate) trait Peripheral {
     /// Writes the register at `offset`, a multiple of four; narrow writes come zero-extended.
     fn write(&mut self, moment: Moment, offset: u32, value: u32) -> Reply<()>;
 
-    /// Brings the state to `moment`.
+    /// Advances the state to `moment`.
     fn advance(&mut self, _moment: Moment) {}
 
-    /// When something next happens by itself that somebody could notice.
+    /// The cycle of the next own change that could be observed.
     fn due(&self, _clocks: &Clocks) -> Cycle {
         NEVER
     }

@@ -1,4 +1,4 @@
-//! Pins by their names, and what peripherals connect to them.
+//! Pins by their names, and the peripheral signals that connect to them.
 
 use std::fmt;
 
@@ -62,10 +62,10 @@ impl fmt::Debug for Pin {
     }
 }
 
-/// What drives a pin from outside.
+/// The driver of a pin from outside the chip.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Drive {
-    /// Nothing: pull resistors decide.
+    /// Not driven: pull resistors decide.
     #[default]
     Floating,
     /// Ground.
@@ -82,7 +82,7 @@ impl Drive {
     }
 }
 
-/// What an alternate function connects a pin to.
+/// The peripheral signal that an alternate function connects a pin to.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Signal {
     /// TIMx_CH1 (0) to CH4 (3).

@@ -1,4 +1,4 @@
-//! Power that fails in the middle of a flash operation, and what it leaves in the cells.
+//! A power cut during a flash operation, and what it leaves in the cells.
 
 use std::collections::BTreeSet;
 use std::ops::Range;
@@ -8,30 +8,30 @@ use rand_pcg::Pcg64Mcg;
 
 use crate::flash::FlashOperation;
 
-/// Power fails at a flash operation.
+/// A power cut at a flash operation.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct PowerCut {
-    /// Which: operations are counted from one since the board was made.
+    /// Number of the operation, counted from one since the board was created.
     pub operation: u64,
-    /// What is left behind.
+    /// What the cut leaves.
     pub damage: Damage,
 }
 
-/// What a power cut leaves of the operation that it meets.
+/// What a power cut leaves of the operation in progress.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Damage {
-    /// Nothing has happened yet.
+    /// Nothing has been changed yet.
     None,
-    /// The cells are complete, but firmware never learns of it.
+    /// The cells are complete, but the firmware does not learn of it.
     Complete,
     /// A half-written double word that ECC finds bad, or a page of which some is erased, some is not, and some is bad.
     Torn {
-        /// Decides the bits.
+        /// Seed that decides the bits.
         seed: u64,
     },
 }
 
-/// Leaves an operation half done in its cells. Programming only clears bits, erasing only sets them.
+/// Applies a part of an operation to its cells. Programming only clears bits, erasing only sets them.
 pub(crate) fn tear(
     operation: FlashOperation,
     cells: &mut [u8],

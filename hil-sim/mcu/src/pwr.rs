@@ -13,7 +13,7 @@ const SR2: u32 = 0x14;
 const SCR: u32 = 0x18;
 const CR5: u32 = 0x80;
 
-/// The regulator changes its output within this (DS12288, operating conditions).
+/// Time in which the regulator changes its output (DS12288, operating conditions).
 const REGULATOR_SETTLES: Picoseconds = Picoseconds::microseconds(40);
 
 /// The power controller. Low-power modes are not modelled.

@@ -70,14 +70,14 @@ const RESET_VALUES: &[(u32, u32)] = &[
     (0x80, 0x0437_F801),
 ];
 
-/// Why the chip starts, as RCC_CSR tells it.
+/// Why the chip starts, as RCC_CSR shows it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum ResetCause {
-    /// The supply came.
+    /// Power-on.
     PowerOn,
     /// The reset button.
     Pin,
-    /// Firmware asked for it through SYSRESETREQ.
+    /// The firmware asked for a reset through SYSRESETREQ.
     Software,
     /// The independent watchdog was not fed in time.
     Watchdog,
@@ -86,7 +86,7 @@ pub enum ResetCause {
 }
 
 impl ResetCause {
-    /// Flags of RCC_CSR. The chip pulls its own reset pin low on every reset, so PINRSTF always comes along (§7.1.2).
+    /// Flags of RCC_CSR. The chip pulls its own reset pin low on every reset, so PINRSTF is always set too (§7.1.2).
     fn flags(self) -> u32 {
         const PIN: u32 = 1 << 26;
         PIN | match self {
@@ -108,7 +108,7 @@ pub(crate) struct Rcc {
     /// CFGR.SWS.
     system_clock: u32,
     flags: u32,
-    /// Peripherals that a write to a reset register has just put back.
+    /// Peripherals that a write to a reset register has just reset.
     pub resets: Vec<Unit>,
 }
 
@@ -125,7 +125,7 @@ impl Rcc {
         Self { plain, ready_at: [None; SOURCES.len()], ready, system_clock: 1, flags: 0, resets: Vec::new() }
     }
 
-    /// The flags of RCC_CSR, which outlive a reset.
+    /// The flags of RCC_CSR, which persist through a reset.
     pub fn reset_flags(&self) -> u32 {
         self.get(CSR) & 0xFF80_0000
     }
@@ -185,7 +185,7 @@ impl Rcc {
         Ok(())
     }
 
-    /// The system clock moves to the chosen source as soon as that is ready.
+    /// Switches the system clock to the chosen source as soon as that is ready.
     fn follow_switch(&mut self) {
         let wanted = self.get(CFGR) & 3;
         let ready = match wanted {

@@ -35,7 +35,7 @@ impl Rng {
         Self { random: Pcg64Mcg::seed_from_u64(seed), cr: 0, words: Vec::new(), ready_at: None, clock_error: false }
     }
 
-    /// Registers after a reset; the noise goes on.
+    /// Resets the registers; the noise continues.
     pub fn reset(&mut self) {
         *self = Self { random: self.random.clone(), ..Self::new(0) };
     }

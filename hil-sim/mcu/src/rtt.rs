@@ -2,7 +2,7 @@
 
 use crate::memory::{RAM_BASE, RAM_SIZE};
 
-/// How a control block begins.
+/// The identifier at the beginning of a control block.
 const MAGIC: &[u8; 16] = b"SEGGER RTT\0\0\0\0\0\0";
 /// Bytes before the first description of a buffer, and of each.
 const HEADER: usize = 24;
@@ -13,7 +13,7 @@ const SIZE: usize = 8;
 const WRITE: usize = 12;
 const READ: usize = 16;
 
-/// Where a buffer towards the host is.
+/// The place of a buffer towards the host.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct RttBuffer {
     description: usize,
@@ -22,7 +22,7 @@ pub struct RttBuffer {
 }
 
 impl RttBuffer {
-    /// Finds buffer `index` in RAM (128 KiB from `0x2000_0000`); `None` before firmware has set it up.
+    /// Finds buffer `index` in RAM (128 KiB from `0x2000_0000`); `None` before the firmware has set it up.
     #[must_use]
     pub fn find(ram: &[u8], index: usize) -> Option<Self> {
         let block = find_magic(ram)?;
@@ -34,7 +34,7 @@ impl RttBuffer {
     }
 }
 
-/// Takes what firmware has written since the last time, and tells it so.
+/// Takes the bytes that the firmware has written since the last call, and advances its read position.
 pub fn read_rtt(ram: &mut [u8], buffer: RttBuffer) -> Vec<u8> {
     let offset = |field: usize| word(ram, buffer.description + field).unwrap_or(0) as usize % buffer.size;
     let (write, read) = (offset(WRITE), offset(READ));

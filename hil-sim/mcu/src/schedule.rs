@@ -8,13 +8,13 @@ use crate::unit::{UNITS, Unit};
 pub(crate) struct Schedule {
     due: [Cycle; UNITS],
     lines: [Lines; UNITS],
-    /// When the world is due.
+    /// The cycle of the next event of the world.
     world: Cycle,
     next: Cycle,
     all_lines: Lines,
 }
 
-/// Who is due.
+/// A peripheral or the world, whose event is due.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Due {
     World,
@@ -58,7 +58,7 @@ impl Schedule {
         self.all_lines
     }
 
-    /// Who is due first and when, up to `now`.
+    /// The first that is due up to `now`, and when.
     pub fn first_until(&self, now: Cycle) -> Option<(Cycle, Due)> {
         if self.next > now {
             return None;

@@ -1,17 +1,18 @@
-//! What hangs on a serial port: a device that hears bytes and answers in its own time.
+//! A device on a serial port, which receives bytes and answers in its own time.
 
 use crate::time::Picoseconds;
 use crate::uart::{Frame, SentByte};
 use crate::unit::UartId;
 use crate::world::{Instant, Terminals, World};
 
-/// A device on a serial line, such as the servos on a bus. It is a state machine: no thread, no clock of its own. Clone it
-/// for a snapshot. Put it next to the rest of the world with [`OnPort`]:
+/// A device on a serial line, such as the servos on a bus. It is a state machine: no thread, no clock of its own. Clone
+/// it for a snapshot. Put it next to the rest of the world with [`OnPort`]:
 ///
 /// ```
-/// use vergence_mcu::{ChipConfig, Frame, LineFault, Machine, Nothing, OnPort, Picoseconds, SentByte, SerialDevice, UartId};
+/// use vergence_mcu::{ChipConfig, Frame, LineFault, Machine, Nothing, OnPort, Picoseconds, SentByte, SerialDevice,
+/// UartId};
 ///
-/// /// Says everything again, at the speed at which it was said.
+/// /// Sends every byte back, at the speed at which it came.
 /// #[derive(Clone, Default)]
 /// struct Parrot(Vec<SentByte>);
 ///
@@ -38,21 +39,21 @@ pub trait SerialDevice: Clone {
     /// that stands for all of them.
     fn hear(&mut self, sent: SentByte);
 
-    /// When it next wants to speak.
+    /// When the device next sends; [`Picoseconds::NEVER`] where it is silent.
     fn next_event(&self) -> Picoseconds {
         Picoseconds::NEVER
     }
 
-    /// It is time: what it begins to send now, one frame after the other.
+    /// The frames that the device begins to send now, one after the other.
     fn speak(&mut self, now: Picoseconds) -> Vec<Frame>;
 }
 
 /// A device wired to a port of the chip: a world to be composed with others, `(bench, OnPort { port, device })`.
 #[derive(Clone, Copy, Debug)]
 pub struct OnPort<D> {
-    /// Where it is wired.
+    /// The port of the chip.
     pub port: UartId,
-    /// What is there.
+    /// The device.
     pub device: D,
 }
 

@@ -1,4 +1,4 @@
-//! DMA at work: requests become transfers on the bus.
+//! DMA requests and the transfers that they cause on the bus.
 
 use vergence_cpu::Access;
 
@@ -10,7 +10,7 @@ use crate::trouble::Trouble;
 use crate::unit::{TimerId, UartId, Unit};
 use crate::world::World;
 
-/// Who raises a DMA request.
+/// The source of a DMA request.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Source {
     Timer(TimerId),
@@ -18,7 +18,7 @@ enum Source {
     Uart(UartId, usize),
 }
 
-/// Who raises which request (RM0440 §13.3.2).
+/// The source of each request (RM0440 §13.3.2).
 #[derive(Clone, Debug)]
 pub(crate) struct RequestSources([Option<Source>; 128]);
 
@@ -38,13 +38,13 @@ impl RequestSources {
     }
 }
 
-/// More transfers than this at one instant can only be a mistake.
+/// Number of transfers at one instant that counts as an endless loop.
 const TRANSFERS_AT_ONCE: u32 = 100_000;
 
 impl<W: World> Chip<W> {
-    /// Makes every transfer that is asked for. Transfers take no time, but see FIDELITY.
+    /// Makes every transfer that is requested. Transfers take no time (see FIDELITY.md).
     pub(crate) fn serve_dma(&mut self) {
-        // A transfer of one controller may ask for one of the other.
+        // A transfer of one controller may cause a request to the other.
         while std::mem::take(&mut self.stirred) {
             self.serve_once();
         }

@@ -1,4 +1,4 @@
-//! SYSCFG: which port an EXTI line listens to, and what is mapped at address zero (RM0440 §10).
+//! SYSCFG: the port of each EXTI line, and the memory mapped at address zero (RM0440 §10).
 
 use crate::peripheral::{Moment, Peripheral, Registers, Reply, only};
 
@@ -15,7 +15,7 @@ pub(crate) struct Syscfg {
 }
 
 impl Syscfg {
-    /// The port, 0 for A, whose pin `line` is heard.
+    /// The port, 0 for A, whose pin drives EXTI line `line`.
     pub fn exti_port(&self, line: usize) -> usize {
         (self.exticr[line / 4] >> (4 * (line % 4)) & 0xF) as usize
     }

@@ -9,7 +9,7 @@ use vergence_cpu::{Cycle, NEVER};
 pub struct Picoseconds(pub u64);
 
 impl Picoseconds {
-    /// Never.
+    /// An instant that never comes.
     pub const NEVER: Self = Self(u64::MAX);
 
     /// Whole nanoseconds.
@@ -58,7 +58,7 @@ impl Sub for Picoseconds {
 
 const PER_SECOND: u128 = 1_000_000_000_000;
 
-/// Which instant is which cycle, while the core clock keeps its frequency.
+/// The relation between instants and cycles while the core clock keeps its frequency.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct TimeBase {
     cycle: Cycle,
@@ -96,7 +96,7 @@ impl TimeBase {
         self.cycle.saturating_add(u64::try_from(since).unwrap_or(NEVER))
     }
 
-    /// From `cycle` on, the core clock runs at `hz`. At most a picosecond is lost.
+    /// Changes the core clock to `hz` from `cycle` on. At most a picosecond is lost.
     pub fn change(&mut self, cycle: Cycle, hz: u32) {
         *self = Self { cycle, time: self.time_of(cycle), hz: hz.max(1) };
     }

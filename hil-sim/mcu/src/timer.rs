@@ -3,7 +3,7 @@
 //! modes 1 to 3, input capture, slave modes reset, gated, trigger and external clock 1. What is missing is refused by
 //! name.
 //!
-//! - `counter`: how the count runs, wraps and updates, and when that can be noticed
+//! - `counter`: how the count runs, wraps and updates, and when that is observable
 //! - `output`: compare outputs
 //! - `input`: filters, captures, quadrature, slave modes
 
@@ -111,13 +111,13 @@ pub(crate) struct Timer {
     inputs: [Input; 4],
     /// DMA requests not served yet: bit 0 for the update, 1 to 4 for the channels, 6 for the trigger.
     requests: u32,
-    /// Somebody looks at these outputs: bit x for CHx+1 and its complement.
+    /// The outputs that are observed: bit x for CHx+1 and its complement.
     pub watched: u8,
-    /// Another timer listens to the trigger output.
+    /// Whether another timer uses the trigger output.
     pub heard: bool,
     /// Pulses of the trigger output since last taken.
     pub triggers: u32,
-    /// Outputs may have changed since the pads last looked.
+    /// Whether outputs may have changed since the pads were updated.
     pub outputs_changed: bool,
 }
 
@@ -152,7 +152,7 @@ impl Timer {
         }
     }
 
-    /// The bus clock's divider changes at `moment`, up to which the count has been brought.
+    /// Takes over a changed divider of the bus clock at `moment`, to which the count has been advanced.
     pub fn set_divider(&mut self, moment: Moment, tree: &crate::clocks::ClockTree) {
         self.counter.set_divider(moment.now, tree.timer_divider[self.variant.bus]);
     }
@@ -162,7 +162,7 @@ impl Timer {
         self.variant.request_bit(number).is_some_and(|bit| self.requests >> bit & 1 == 1)
     }
 
-    /// The request was served.
+    /// Clears a request that was served.
     pub fn acknowledge(&mut self, number: u8) {
         if let Some(bit) = self.variant.request_bit(number) {
             self.requests &= !(1 << bit);
@@ -283,7 +283,7 @@ impl Peripheral for Timer {
             DIER => {
                 only(value, 0x5F5F)?;
                 self.dier = value;
-                // A request that is switched off is forgotten.
+                // A request that is switched off is dropped.
                 self.requests &= value >> 8;
             }
             // Flags are cleared by writing zero.

@@ -1,15 +1,15 @@
-//! Why a chip stops by itself, in words.
+//! Why a chip stops by itself, with messages.
 
 use vergence_cpu::{Access, Cycle};
 
-/// Something that firmware did and the model cannot honour, or the silicon would not.
+/// An action of the firmware that the model does not implement, or that the silicon does not allow.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[non_exhaustive]
 pub enum Trouble {
-    /// No peripheral of the model is there.
+    /// The model has no peripheral at the address.
     #[error("nothing is modelled at {address:#010x}")]
     Unmapped {
-        /// Where.
+        /// The address.
         address: u32,
     },
     /// The peripheral has no such register.
@@ -20,7 +20,7 @@ pub enum Trouble {
         /// Bytes from its base.
         offset: u32,
     },
-    /// The peripheral's clock is off: it neither hears nor answers.
+    /// The clock of the peripheral is off: it does not respond.
     #[error("{unit} is used while its clock is off in RCC ({register})")]
     ClockOff {
         /// The peripheral.
@@ -28,7 +28,7 @@ pub enum Trouble {
         /// The register.
         register: &'static str,
     },
-    /// The register does not do that.
+    /// The model of the register does not implement this access.
     #[error("{unit}.{register} (offset {offset:#x}), value {value:#010x}: {what}")]
     Refused {
         /// The peripheral.
@@ -37,7 +37,7 @@ pub enum Trouble {
         register: &'static str,
         /// Bytes from the peripheral's base.
         offset: u32,
-        /// What was written; zero for a read.
+        /// The value written; zero for a read.
         value: u32,
         /// What is wrong with it.
         what: String,
@@ -49,7 +49,7 @@ pub enum Trouble {
         unit: String,
         /// The register.
         register: &'static str,
-        /// How wide.
+        /// The width of the access.
         access: Access,
     },
     /// Clocks that the silicon does not allow.
@@ -58,17 +58,17 @@ pub enum Trouble {
         /// What is wrong.
         what: String,
     },
-    /// Peripherals keep each other busy without end.
+    /// Peripherals cause events of each other without end.
     #[error("peripherals keep each other busy at cycle {at} ({unit})")]
     Endless {
-        /// When.
+        /// The instant.
         at: Cycle,
         /// One of them.
         unit: String,
     },
 }
 
-/// What the chip asks of whoever runs it.
+/// Why the chip asks its machine to stop.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(crate) enum Demand {
     Trouble(Trouble),

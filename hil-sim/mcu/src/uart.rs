@@ -1,8 +1,8 @@
 //! USART, UART and LPUART of version 4: frames with their times, FIFOs, errors, DMA requests (RM0440 §37, §38).
 //!
-//! - `receive`: frames from the far end
-//! - `transmit`: frames to it
-//! - `registers`: what firmware sees
+//! - `receive`: frames from the peer
+//! - `transmit`: frames to the peer
+//! - `registers`: the registers
 
 mod receive;
 mod registers;
@@ -72,16 +72,16 @@ mod flag {
 pub struct Frame {
     /// Data bits.
     pub byte: u8,
-    /// Bits in a second at which it is sent.
+    /// Its speed in bits per second.
     pub baud: u32,
-    /// What is wrong with it.
+    /// Its transmission error.
     pub fault: LineFault,
 }
 
-/// What happens to a frame on the line.
+/// The transmission error of a frame.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum LineFault {
-    /// Nothing.
+    /// No error.
     #[default]
     None,
     /// One of the samples of a bit disagrees with the others.
@@ -93,11 +93,11 @@ pub enum LineFault {
 /// A byte that the chip has sent.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct SentByte {
-    /// When its stop bit was over.
+    /// The end of its stop bit.
     pub at: Picoseconds,
-    /// What it was.
+    /// The data bits.
     pub byte: u8,
-    /// Bits in a second at which it was sent.
+    /// Its speed in bits per second.
     pub baud: u32,
 }
 
@@ -127,7 +127,7 @@ pub(crate) struct Uart {
     idle_until: Cycle,
     /// Received bytes with their error flags.
     inbox: VecDeque<(u8, u32)>,
-    /// Frames that the far end sends one after the other, and the one that arrives.
+    /// Frames that the peer sends one after the other, and the one that arrives.
     incoming: VecDeque<Frame>,
     arriving: Option<(Frame, Shifting)>,
     /// When the line will have been idle for a frame, and for RTOR.
@@ -135,7 +135,7 @@ pub(crate) struct Uart {
     timeout_at: Option<Cycle>,
     /// Whether a pin is connected to transmitter and receiver.
     pub connected: [bool; 2],
-    /// What has just been sent.
+    /// The bytes sent since they were last taken.
     pub sent: Vec<(Cycle, u8)>,
 }
 
@@ -163,12 +163,12 @@ impl Uart {
         }
     }
 
-    /// Registers after a reset; what the far end sends goes on.
+    /// Resets the registers; the peer continues to send.
     pub fn reset(&mut self) {
         *self = Self { incoming: std::mem::take(&mut self.incoming), ..Self::new(self.id) };
     }
 
-    /// Whether DMA shall read (0) or write (1) the data register now.
+    /// Whether a DMA request to read (0) or write (1) the data register is asserted.
     pub fn requests(&self, direction: usize) -> bool {
         if self.cr1 & cr1::UE == 0 {
             return false;
@@ -221,7 +221,7 @@ impl Uart {
         Ok((clocks * prescaler, hertz))
     }
 
-    /// Bits in a second.
+    /// Speed in bits per second.
     pub fn baud(&self, moment: Moment) -> u32 {
         self.bit(moment).map_or(0, |(clocks, hertz)| ((hertz + clocks / 2) / clocks) as u32)
     }

@@ -38,7 +38,7 @@ const GPIO: usize = DMA + 2;
 const TIMER: usize = GPIO + 7;
 const UART: usize = TIMER + TimerId::COUNT;
 
-/// How many peripherals there are; each has an index below this.
+/// Number of peripherals; each has an index below this.
 pub(crate) const UNITS: usize = UART + UartId::COUNT;
 
 impl Unit {
@@ -63,7 +63,7 @@ impl Unit {
         }
     }
 
-    /// Where its registers begin (RM0440 §2.2.2).
+    /// The address of its registers (RM0440 §2.2.2).
     pub(crate) fn base(self) -> u32 {
         match self {
             Self::Rcc => 0x4002_1000,
@@ -83,7 +83,7 @@ impl Unit {
         }
     }
 
-    /// The bit of RCC that switches its clock on: the register's offset and the bit. `None` where it always runs.
+    /// The RCC register (by offset) and bit that switch its clock on. `None` where it always runs.
     pub(crate) fn clock_enable(self) -> Option<(u32, u32)> {
         match self {
             Self::Rcc | Self::Exti | Self::Iwdg | Self::Debug => None,
@@ -205,7 +205,7 @@ impl UartId {
         self.0 as usize
     }
 
-    /// All of them.
+    /// All serial ports.
     pub fn all() -> impl Iterator<Item = Self> {
         (0..Self::COUNT as u8).map(Self)
     }

@@ -35,7 +35,7 @@ pub(crate) struct Units {
 }
 
 impl Units {
-    /// As after power-on; `seed` decides the random numbers.
+    /// All peripherals as after power-on; `seed` decides the random numbers.
     pub fn new(seed: u64) -> Self {
         Self {
             rcc: Rcc::new(ResetCause::PowerOn, 0),
@@ -55,7 +55,7 @@ impl Units {
         }
     }
 
-    /// Every register as after a reset; flash cells, noise and the far ends of serial lines stay.
+    /// Resets every register; flash cells, noise and the peers of serial lines stay as they are.
     pub fn reset(&mut self, cause: ResetCause) {
         let rcc = Rcc::new(cause, self.rcc.reset_flags());
         self.flash.reset();
@@ -71,7 +71,7 @@ impl Units {
         };
     }
 
-    /// Puts one peripheral back, as RCC's reset registers do.
+    /// Resets one peripheral, as RCC's reset registers do.
     pub fn reset_one(&mut self, unit: Unit) {
         match unit {
             Unit::Pwr => self.pwr = Pwr::default(),
@@ -92,7 +92,7 @@ impl Units {
                 self.uarts[uart.index()].reset();
                 self.uarts[uart.index()].connected = connected;
             }
-            // Not in a reset register, or the flash interface, which firmware leaves alone.
+            // Not in a reset register; or the flash interface, which firmware does not reset.
             Unit::Rcc | Unit::Flash | Unit::Exti | Unit::Iwdg | Unit::Debug => {}
         }
     }

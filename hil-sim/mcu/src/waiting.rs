@@ -1,4 +1,4 @@
-//! Running the core beside a flash that is busy or torn.
+//! Running the core while the flash is busy or has torn words.
 
 use vergence_cpu::{Access, Bus, BusFault, CoreState, Cycle, Lines, Stop};
 
@@ -7,17 +7,17 @@ use crate::machine::Machine;
 use crate::memory::{Memory, Place};
 use crate::world::World;
 
-/// FLASH_SR: what a loop that waits for the flash reads.
+/// FLASH_SR, which a loop that waits for the flash reads.
 const FLASH_SR: u32 = 0x4002_2010;
-/// Loops of more instructions are not looked for.
+/// The longest loop that is searched for, in instructions.
 const LONGEST: usize = 12;
 /// The way to such a loop, out of and into functions, is shorter than this; an interrupt may be longer.
 const PATIENCE: usize = 400;
-/// Where no loop was found, one is looked for again after so many cycles.
+/// Cycles after which a loop is searched for again, where none was found.
 const AGAIN: Cycle = 2_000;
 
 impl<W: World> Machine<W> {
-    /// Runs to `end` or a reason to stop. Where words are torn the core must look after each load.
+    /// Runs to `end` or a reason to stop. Where words are torn, the core checks after each load.
     pub(crate) fn run_core(&mut self, end: Cycle) -> Stop {
         if self.chip.units.flash.torn.is_empty() && self.chip.pages.is_none() {
             self.cpu.run(&mut self.chip, end)
@@ -26,8 +26,8 @@ impl<W: World> Machine<W> {
         }
     }
 
-    /// Runs a while, at most to `end`; where the core goes round a loop that only asks whether the flash is busy, by
-    /// whole turns at once to the next event.
+    /// Runs at most to `end`; whole iterations of a loop that only polls whether the flash is busy are skipped up to
+    /// the next event.
     pub(crate) fn run_beside_flash(&mut self, end: Cycle) -> Stop {
         let (cycles, instructions) = match self.find_loop(end) {
             Err(stop) => return stop,
@@ -35,15 +35,15 @@ impl<W: World> Machine<W> {
             Ok(Some(turn)) => turn,
         };
         let due = end.min(self.chip.next_event()).min(self.cpu.next_event());
-        // The last turn before an event is run: what is due is seen where it would have been.
+        // The last iteration before an event is run, so that the event is noticed at the same instruction as otherwise.
         let turns = (due.saturating_sub(self.cpu.now()) / cycles).saturating_sub(1);
         self.cpu.pass_turns(turns * cycles, turns * instructions);
         self.run_core(end.min(due.max(self.cpu.now()) + 1))
     }
 
-    /// Goes on instruction by instruction, and says how many cycles and instructions a turn takes once there were two
-    /// turns of a loop that left everything as it was: the same registers after each instruction of both, no store, and
-    /// no register read but the one that says whether the flash is busy.
+    /// Runs instruction by instruction. Returns the cycles and instructions of an iteration once two iterations of a
+    /// loop have changed nothing: the same registers after each instruction of both, no store, and no peripheral
+    /// register read except the one that shows whether the flash is busy.
     fn find_loop(&mut self, end: Cycle) -> Result<Option<(Cycle, u64)>, Stop> {
         let mut seen: Vec<(CoreState, Cycle)> = Vec::with_capacity(3 * LONGEST);
         let mut bus = Watched { chip: &mut self.chip, disturbed: false };
@@ -70,7 +70,7 @@ impl<W: World> Machine<W> {
     }
 }
 
-/// Cycles and instructions of a turn, if the last states are two equal turns.
+/// Cycles and instructions of an iteration, if the last states are two equal iterations.
 fn turn(seen: &[(CoreState, Cycle)]) -> Option<(Cycle, u64)> {
     let last = seen.len().checked_sub(1)?;
     let length = (1..=LONGEST.min(last / 2)).find(|length| seen[last - length].0.pc() == seen[last].0.pc())?;
@@ -79,8 +79,8 @@ fn turn(seen: &[(CoreState, Cycle)]) -> Option<(Cycle, u64)> {
     (same && now - before == before - first).then_some((now - before, length as u64))
 }
 
-/// The chip, for a core that looks after each load; knows whether anything but the flash's status was looked at or
-/// touched outside plain memory, and which pages of flash.
+/// The chip, for a core that checks after each load. It records whether anything except the flash status was read or
+/// written outside plain memory, and which pages of flash were used.
 struct Watched<'a, W> {
     chip: &'a mut Chip<W>,
     disturbed: bool,

@@ -1,4 +1,4 @@
-//! What one peripheral does to the others: pins to interrupts and timers, timers to timers, bytes to the world.
+//! Connections between peripherals: pins to interrupts and timers, timers to timers, bytes to the world.
 
 use crate::chip::Chip;
 use crate::flash::{Change, FlashOperation};
@@ -11,7 +11,7 @@ use crate::unit::{TimerId, UartId, Unit};
 use crate::world::{PinEdge, World};
 
 impl<W: World> Chip<W> {
-    /// After a peripheral was advanced or written: carries out what it does to others, then looks at it anew.
+    /// Applies the effects of a peripheral on others after it was advanced or written, and determines its state anew.
     pub(crate) fn react(&mut self, unit: Unit) {
         match unit {
             Unit::Rcc => {
@@ -87,10 +87,10 @@ impl<W: World> Chip<W> {
         for number in 0..16 {
             let pin = Pin::at(port * 16 + number);
             self.settle_pin(pin);
-            // A pin newly connected to an input tells its level.
+            // A pin newly connected to an input passes on its level.
             self.tell_input(pin, self.pads.is_high(pin));
         }
-        // A port that was reset has forgotten the levels that did not change.
+        // A port that was reset has lost the levels that did not change.
         self.units.ports[port].levels = self.pads.levels_of_port(port);
     }
 
@@ -129,7 +129,7 @@ impl<W: World> Chip<W> {
         self.settle_pins(self.pads.pins_of_enable(uart));
     }
 
-    /// Tells timers which of their outputs somebody looks at, and which of them other timers listen to.
+    /// Tells timers which of their outputs are observed, and which trigger outputs other timers use.
     pub(crate) fn watch_timers(&mut self) {
         let masters: Vec<_> = self.units.timers.iter().filter_map(crate::timer::Timer::master).collect();
         for timer in TimerId::all() {
@@ -141,7 +141,7 @@ impl<W: World> Chip<W> {
         }
     }
 
-    /// Finds the levels of pins whose outputs may have changed.
+    /// Determines the levels of pins whose outputs may have changed.
     pub(crate) fn settle_pins(&mut self, mut pins: PinSet) {
         while pins != 0 {
             let index = pins.trailing_zeros() as usize;
@@ -173,7 +173,7 @@ impl<W: World> Chip<W> {
         }
     }
 
-    /// A timer input follows its pin.
+    /// Passes the level of a pin to the timer input that it is connected to.
     fn tell_input(&mut self, pin: Pin, high: bool) {
         let Some(Signal::Channel(timer, channel)) = self.pads.signal(pin) else { return };
         let moment = Moment { now: self.now, clocks: &self.clocks };
@@ -183,9 +183,9 @@ impl<W: World> Chip<W> {
         self.react(Unit::Timer(timer));
     }
 
-    /// Carries out what the world asked for, in its order.
+    /// Carries out the requests of the world, in their order.
     pub(crate) fn connect_terminals(&mut self) {
-        // What this causes may make the world ask for more, which nested calls then carry out.
+        // This may cause further requests of the world, which nested calls carry out.
         for (pin, drive) in std::mem::take(&mut self.terminals.drives) {
             self.drive(pin, drive);
         }
@@ -206,7 +206,7 @@ impl<W: World> Chip<W> {
     /// The level of a pin.
     #[must_use]
     pub fn is_high(&self, pin: Pin) -> bool {
-        // A free-running output that nobody watches is brought up to date only when asked.
+        // A free-running output that is not observed is updated only when it is asked for.
         self.pads.resolve(&self.units, pin)
     }
 }

@@ -1,4 +1,4 @@
-//! What the chip is wired to: it sees pins change and bytes leave, and changes inputs and sends bytes in its own time.
+//! The surroundings of the chip: they observe its pins and bytes, drive its inputs, and send bytes in their own time.
 
 use vergence_cpu::Cycle;
 
@@ -7,7 +7,7 @@ use crate::time::Picoseconds;
 use crate::uart::{Frame, SentByte};
 use crate::unit::UartId;
 
-/// Now, for the world.
+/// The present instant, for the world.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Instant {
     /// Core cycles since power-on.
@@ -16,18 +16,18 @@ pub struct Instant {
     pub time: Picoseconds,
 }
 
-/// A pin that has changed its level.
+/// A change of level of a pin.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct PinEdge {
-    /// When.
+    /// The instant.
     pub at: Instant,
-    /// Which.
+    /// The pin.
     pub pin: Pin,
-    /// It is high now.
+    /// Whether the pin is high now.
     pub high: bool,
 }
 
-/// What the world does to the chip's terminals.
+/// The chip's terminals, which the world drives.
 #[derive(Clone, Debug, Default)]
 pub struct Terminals {
     pub(crate) drives: Vec<(Pin, Drive)>,
@@ -40,7 +40,7 @@ impl Terminals {
         self.drives.push((pin, drive));
     }
 
-    /// Sends a frame to a serial port, behind what is already under way.
+    /// Sends a frame to a serial port, after the frames already on their way.
     pub fn send(&mut self, port: UartId, frame: Frame) {
         self.frames.push((port, frame));
     }
@@ -49,27 +49,27 @@ impl Terminals {
 /// Everything around the chip. Worlds are composed: a bench of mechanics, a servo bus on a serial port
 /// ([`crate::OnPort`]). Clone it for a snapshot. Every method has a default that does nothing.
 pub trait World: Clone {
-    /// Pins whose edges it wants to see; looked at again after every reset.
+    /// Pins whose edges the world observes; asked for again after every reset.
     fn watched(&self) -> Vec<Pin> {
         Vec::new()
     }
 
-    /// When it next wants to do something by itself.
+    /// When the world next acts by itself.
     fn next_event(&self) -> Picoseconds {
         Picoseconds::NEVER
     }
 
-    /// Its time has come.
+    /// Acts at the time that it gave.
     fn act(&mut self, _now: Instant, _terminals: &mut Terminals) {}
 
-    /// A watched pin has changed its level.
+    /// Takes a change of level of an observed pin.
     fn pin_changed(&mut self, _edge: PinEdge, _terminals: &mut Terminals) {}
 
-    /// A serial port has sent a byte.
+    /// Takes a byte that a serial port has sent.
     fn byte_sent(&mut self, _port: UartId, _sent: SentByte, _terminals: &mut Terminals) {}
 }
 
-/// Nothing around the chip.
+/// An empty world.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Nothing;
 

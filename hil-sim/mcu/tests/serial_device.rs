@@ -8,11 +8,11 @@ use common::{Bench, GPIOB, USART2, USART3, bench_with, frame, pin};
 use vergence_mcu::{Frame, Nothing, OnPort, Picoseconds, SentByte, SerialDevice, UartId};
 
 const ID: u8 = 7;
-/// As servos do: the line is let go before they answer.
+/// Delay before an answer, as of servos: the line is released before they answer.
 const RETURN_DELAY: Picoseconds = Picoseconds::microseconds(250);
 
-/// Asked by its number and that number's complement, it answers with its number and how often it was asked. Invented for
-/// this test: no robot speaks so.
+/// A device that answers its number and that number's complement with its number and the count of requests. The
+/// protocol is invented for this test.
 #[derive(Clone, Debug)]
 struct Servo {
     baud: u32,

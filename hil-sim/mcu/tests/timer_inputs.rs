@@ -1,4 +1,4 @@
-//! TIM: quadrature, filters, captures, timers that listen to each other (RM0440 §28 to §31). All at 16 MHz.
+//! TIM: quadrature, filters, captures, timers that trigger each other (RM0440 §28 to §31). All at 16 MHz.
 #![allow(clippy::unwrap_used, reason = "a test fails by panic")]
 
 mod common;

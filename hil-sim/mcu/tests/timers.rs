@@ -9,7 +9,7 @@ use proptest::prelude::*;
 use vergence_cpu::{Bus, NEVER};
 use vergence_mcu::Nothing;
 
-/// TIM1 with its first channel on PA8, which is watched.
+/// TIM1 with its first channel on PA8, which is observed.
 fn pulses() -> Bench<Recorder> {
     let mut bench = bench_with(Recorder { pins: vec![pin("PA8")], ..Recorder::default() });
     bench.connect("PA8", 6);
@@ -276,7 +276,7 @@ fn state(bench: &mut Bench<Nothing>) -> [u32; 3] {
 }
 
 proptest! {
-    /// Skipping ahead must not be noticed.
+    /// Skipping ahead must not be observable.
     #[test]
     fn one_leap_equals_many_steps(setup in setups(), cycles in 0u64..2_000) {
         let mut leaping = started(&setup);
@@ -289,7 +289,7 @@ proptest! {
         prop_assert_eq!(state(&mut leaping), state(&mut stepping));
     }
 
-    /// A watched output has the same edges however seldom the chip is looked at.
+    /// An observed output has the same edges however rarely the chip is advanced.
     #[test]
     fn edges_do_not_depend_on_who_looks(setup in setups(), cycles in 1u64..2_000) {
         let run = |step: u64| {

@@ -8,7 +8,7 @@ use vergence_protocol::{AxisKind, Microseconds};
 use crate::encoder::{Encoder, EncoderFault};
 use crate::switch::{Switch, SwitchNoise};
 
-/// What an axis is made of. Positions are axis coordinates in micro-units (µm or µrad).
+/// The mechanics of one axis. Positions are axis coordinates in micro-units (µm or µrad).
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct AxisMechanics {
     /// Motor steps along the axis.
@@ -19,13 +19,13 @@ pub struct AxisMechanics {
     pub backlash: f64,
     /// Play between the encoder and the stage that it stands for, such as of a rack behind its pinion.
     pub encoder_play: f64,
-    /// How fast the load follows the motor: time constant in seconds, above zero.
+    /// Time constant with which the load follows the motor, in seconds, above zero.
     pub compliance: f64,
-    /// Where the home switch closes (at and below).
+    /// Position at and below which the home switch is closed.
     pub home_switch: f64,
-    /// Where the hard limit switches close (at and outside of).
+    /// Positions at and outside of which the hard limit switches open: they are normally closed.
     pub hard_limits: [f64; 2],
-    /// Where the load strikes the frame; the motor loses steps there.
+    /// Mechanical end stops; a motor that pushes the load against one loses steps.
     pub end_stops: [f64; 2],
 }
 
@@ -39,7 +39,7 @@ pub struct AxisPlant {
     steps: i32,
     /// Axis position of motor step zero; changes when steps are lost.
     motor_zero: f64,
-    /// Where the encoder's scale is, and where the stage is.
+    /// Positions of the scale of the encoder and of the stage.
     load: f64,
     stage: f64,
     encoder: Encoder,
@@ -48,12 +48,12 @@ pub struct AxisPlant {
     stalled: bool,
     /// Steps that the rotor will miss.
     to_lose: u32,
-    /// Share of every step that the coupling slips by.
+    /// Share of every step by which the coupling slips.
     slips: f64,
 }
 
 impl AxisPlant {
-    /// An axis standing at `position`, whose encoder starts at count zero there.
+    /// An axis at rest at `position`, where the encoder starts at count zero.
     #[must_use]
     pub fn new(mechanics: AxisMechanics, position: f64) -> Self {
         Self {
@@ -72,13 +72,13 @@ impl AxisPlant {
         }
     }
 
-    /// Where the load truly is.
+    /// The true position of the load.
     #[must_use]
     pub fn load(&self) -> f64 {
         self.load
     }
 
-    /// Where the stage truly is: behind the load by the play between them.
+    /// The true position of the stage, which lags behind the load by the play between them.
     #[must_use]
     pub fn stage(&self) -> f64 {
         self.stage
@@ -106,7 +106,7 @@ impl AxisPlant {
         self.ordered.extend(due);
     }
 
-    /// Forgets the steps not made yet, for when the power goes or comes.
+    /// Drops the steps not made yet, as at power-off and power-on.
     pub fn drop_order(&mut self) {
         self.ordered.clear();
     }
@@ -121,27 +121,27 @@ impl AxisPlant {
         self.stalled = stalled;
     }
 
-    /// The rotor misses the next `steps` steps; a motor at rest loses none.
+    /// Lets the rotor miss the next `steps` steps; a motor at rest loses none.
     pub fn lose_steps(&mut self, steps: u32) {
         self.to_lose += steps;
     }
 
-    /// The coupling slips by `share` of every step, or holds again with 0.
+    /// Lets the coupling slip by `share` of every step; 0 makes it hold again.
     pub fn slip(&mut self, share: f64) {
         self.slips = share;
     }
 
-    /// Makes the encoder fail from here on, or whole again.
+    /// Makes the encoder fail from now on, or work again.
     pub fn fail_encoder(&mut self, fault: Option<EncoderFault>) {
         self.encoder.fail(fault, self.scale_reading());
     }
 
-    /// Makes the home switch behave badly from now on, or well again.
+    /// Adds chatter and spikes to the home switch from now on, or removes them.
     pub fn disturb_home_switch(&mut self, noise: Option<SwitchNoise>) {
         self.home.disturb(noise);
     }
 
-    /// The home switch reads this from now on, whatever it touches, or the truth again.
+    /// Fixes the reading of the home switch from now on, or lets it follow its contact again.
     pub fn fix_home_switch(&mut self, reading: Option<bool>) {
         self.home.fix(reading);
     }
@@ -152,21 +152,21 @@ impl AxisPlant {
         self.home.reads_closed()
     }
 
-    /// Whether a hard limit switch is closed.
+    /// Whether a hard limit is reached: one of the normally closed switches is open.
     #[must_use]
     pub fn hard_limit(&self) -> bool {
         let [low, high] = self.mechanics.hard_limits;
         self.load <= low || self.load >= high
     }
 
-    /// Lets time pass from `from` to `to`; without drivers the motor stands.
+    /// Lets time pass from `from` to `to`; without drivers the motor does not turn.
     pub fn advance(&mut self, from: Microseconds, to: Microseconds, drivers_on: bool) {
         if drivers_on {
             self.turn_motor(to);
         }
         let motor = self.motor_zero + f64::from(self.steps) / counts_per_micro(self.mechanics.motor);
         let play = self.mechanics.backlash / 2.0;
-        // Inside the play the load stands; outside, the transmission pulls it after the motor.
+        // Inside the play the load is at rest; outside, the transmission pulls it after the motor.
         let pulled = self.load.clamp(motor - play, motor + play);
         let dt = (to.0 - from.0) as f64 * 1e-6;
         let share = 1.0 - (-dt / self.mechanics.compliance).exp();
@@ -190,7 +190,7 @@ impl AxisPlant {
         }
     }
 
-    /// A load at an obstacle stays there, and a motor that pulls further loses steps.
+    /// Keeps a load at an obstacle; a motor that pulls further loses steps.
     fn strike(&mut self, [low, high]: [f64; 2], motor: f64) {
         if self.load < low || self.load > high {
             let held = self.load.clamp(low, high);

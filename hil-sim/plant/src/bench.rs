@@ -1,5 +1,5 @@
-//! Stages of a bench for any range and encoder, and the bench itself: a linear stage for the baseline and a pinion stage
-//! for the separation.
+//! Stages of a bench for any range and encoder, and the bench itself: a linear stage for the baseline and a pinion
+//! stage for the separation.
 
 use std::f64::consts::PI;
 
@@ -8,12 +8,12 @@ use vergence_protocol::{AxisKind, Micro};
 
 use crate::axis::AxisMechanics;
 
-/// A stage: what the controller believes of it, and what it is.
+/// A stage: the settings of its controller, and its real mechanics.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Stage {
-    /// What the controller believes.
+    /// The settings of the controller.
     pub settings: AxisSettings,
-    /// What it is.
+    /// The mechanics.
     pub mechanics: AxisMechanics,
 }
 
@@ -79,8 +79,7 @@ impl Stage {
     }
 }
 
-/// Mechanics with the scales that the controller believes in; the hard limits lie `beyond` the range, the end stops
-/// `further` out.
+/// Mechanics with the scales of the settings; the hard limits lie `beyond` the range, the end stops `further` out.
 fn mechanics(settings: &AxisSettings, backlash: f64, beyond: [f64; 2], further: f64) -> AxisMechanics {
     let hard_limits = [f64::from(settings.min.0) - beyond[0], f64::from(settings.max.0) + beyond[1]];
     AxisMechanics {

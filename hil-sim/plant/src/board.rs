@@ -3,17 +3,14 @@
 use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64Mcg;
 use vergence_control::{AxisSettings, BoardSettings, Node, NodeIdentity, SettingsError};
-use vergence_protocol::management::RebootTo;
+use vergence_protocol::management::{NATIVE_HARDWARE, RebootTo};
 use vergence_protocol::{ControllerState, MAX_FRAME, Microseconds, ResetCause};
 
 use crate::axis::AxisMechanics;
 use crate::plant::Plant;
 use crate::services::NativeServices;
 
-/// What firmware images for the native board would name as their hardware.
-pub const NATIVE_HARDWARE: u32 = 0x5353_4756; // "VGSS", little-endian
-
-/// A board without hardware. It lives in its own time: nothing happens between two calls of [`Self::advance`].
+/// A board without hardware, in virtual time: nothing happens between two calls of [`Self::advance`].
 #[derive(Debug)]
 pub struct NativeBoard {
     node: Node,
@@ -21,12 +18,12 @@ pub struct NativeBoard {
     services: NativeServices,
     plant: Plant,
     now: Microseconds,
-    /// The processor is kept from its tick until then.
+    /// Time until which the next control tick is delayed.
     held_until: Microseconds,
 }
 
 impl NativeBoard {
-    /// A board that has just been switched on; `seed` decides where the stages stand.
+    /// A board that has just been switched on; `seed` decides the positions of the stages.
     ///
     /// # Errors
     /// [`SettingsError`] where an axis cannot work with its settings.
@@ -39,7 +36,7 @@ impl NativeBoard {
         Self::standing_at(settings, mechanics, &positions, random.random())
     }
 
-    /// A board that has just been switched on, whose stages stand at `positions` (micro-units). `boot` names this start.
+    /// A board that has just been switched on, with its stages at `positions` (micro-units). `boot` names this start.
     ///
     /// # Errors
     /// [`SettingsError`] where an axis cannot work with its settings.
@@ -61,8 +58,8 @@ impl NativeBoard {
         })
     }
 
-    /// Restarts the board in whatever it is doing: memory is lost, drivers go off, its clock begins again at zero and
-    /// the mechanics keep their place. `boot` names this start.
+    /// Restarts the board in any state: memory is lost, the drivers go off, its clock begins again at zero, and the
+    /// mechanics keep their positions. `boot` names this start.
     ///
     /// # Errors
     /// [`SettingsError`], which cannot be where the settings were taken before.
@@ -94,7 +91,7 @@ impl NativeBoard {
         }
     }
 
-    /// Keeps the processor from its next control tick for `us` microseconds.
+    /// Delays the next control tick by `us` microseconds.
     pub fn delay_tick(&mut self, us: u64) {
         self.held_until = Microseconds(self.next_tick().0 + us);
     }
@@ -108,7 +105,7 @@ impl NativeBoard {
         self.node.receive(self.now, bytes, &mut self.plant, &mut self.services);
     }
 
-    /// All frames that leave now, one after the other.
+    /// Takes all frames that leave now, one after the other.
     pub fn transmit(&mut self) -> Vec<u8> {
         let mut buffer = [0; MAX_FRAME];
         let mut out = Vec::new();
@@ -118,7 +115,7 @@ impl NativeBoard {
         out
     }
 
-    /// What the host wants started again, once all frames have left; the caller does it by [`Self::restart`].
+    /// The restart that the host has asked for, once all frames have left; the caller makes it by [`Self::restart`].
     pub fn take_reboot(&mut self) -> Option<RebootTo> {
         self.node.take_reboot()
     }
@@ -128,24 +125,24 @@ impl NativeBoard {
         self.node.log(entry);
     }
 
-    /// What the controller is doing.
+    /// The state of the controller.
     #[must_use]
     pub fn state(&self) -> ControllerState {
         self.node.controller().state()
     }
 
-    /// Flash and boot loader, for doing something to them.
+    /// Flash and boot loader, to change them.
     pub fn services_mut(&mut self) -> &mut NativeServices {
         &mut self.services
     }
 
-    /// The mechanics: the truth.
+    /// The simulated mechanics, which know the true positions.
     #[must_use]
     pub fn plant(&self) -> &Plant {
         &self.plant
     }
 
-    /// The mechanics, for doing something to them.
+    /// The mechanics, to change them.
     pub fn plant_mut(&mut self) -> &mut Plant {
         &mut self.plant
     }

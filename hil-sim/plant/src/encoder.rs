@@ -1,4 +1,4 @@
-//! A load-side incremental encoder, and the ways in which one fails.
+//! A load-side incremental encoder, and its failures.
 
 use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64Mcg;
@@ -6,22 +6,22 @@ use rand_pcg::Pcg64Mcg;
 /// How an encoder fails.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum EncoderFault {
-    /// The count stands where it is.
+    /// The count does not change any more.
     Stuck,
-    /// The count runs the wrong way from here on: two phases changed places.
+    /// The count runs the wrong way from now on: its channels are swapped.
     Reversed,
     /// Every reading is off by up to `amplitude` counts to either side.
     Noisy {
         /// Largest error in counts, not negative.
         amplitude: i32,
-        /// Decides the errors.
+        /// Seed that decides the errors.
         seed: u64,
     },
-    /// It reads the count at which it was switched on.
+    /// The encoder reads the count at which it was switched on.
     Dead,
 }
 
-/// What an encoder does to the true count.
+/// How the reading depends on the true count.
 #[derive(Clone, Debug)]
 enum Reading {
     True,
@@ -31,7 +31,7 @@ enum Reading {
     Dead,
 }
 
-/// An encoder that counts from wherever it was switched on.
+/// An encoder that counts from the position at which it was switched on.
 #[derive(Clone, Debug)]
 pub struct Encoder {
     zero: i32,
@@ -39,7 +39,7 @@ pub struct Encoder {
 }
 
 impl Encoder {
-    /// Switched on where the scale reads `zero`.
+    /// An encoder that is switched on where the scale reads `zero`.
     pub fn new(zero: i32) -> Self {
         Self { zero, reading: Reading::True }
     }
@@ -56,7 +56,7 @@ impl Encoder {
         }
     }
 
-    /// Fails where the scale reads `scale`, or is whole again.
+    /// Makes the encoder fail where the scale reads `scale`, or work again.
     pub fn fail(&mut self, fault: Option<EncoderFault>, scale: i32) {
         let here = self.raw(scale);
         self.reading = match fault {
@@ -70,7 +70,7 @@ impl Encoder {
         };
     }
 
-    /// Time passes: noise is another one.
+    /// Draws new noise, as time passes.
     pub fn advance(&mut self) {
         if let Reading::Noisy { amplitude, random, error } = &mut self.reading {
             *error = random.random_range(-*amplitude..=*amplitude);

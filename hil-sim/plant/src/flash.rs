@@ -1,15 +1,15 @@
-//! Flash memory in RAM that keeps the rules of real flash, and loses power where it is told to.
+//! Flash memory in RAM that enforces the rules of real flash, and can lose power at a chosen operation.
 
 use rand::{Rng, RngExt, SeedableRng};
 use rand_pcg::Pcg64Mcg;
 use vergence_control::{Flash, FlashError, PAGE, UNIT};
 
-/// How the interrupted operation leaves its page or unit.
+/// State of a page or unit whose operation was interrupted.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Cut {
-    /// As it was: the operation had not begun.
+    /// Unchanged: the operation had not begun.
     Clean,
-    /// Torn: what it worked on reads as garbage.
+    /// Torn: the page or unit reads as garbage.
     Torn,
 }
 
@@ -39,31 +39,31 @@ impl RamFlash {
         }
     }
 
-    /// Power goes in the erase or program operation after `operations` more of them. `seed` decides what is torn.
+    /// Cuts the power in the erase or program operation after `operations` more of them. `seed` decides what is torn.
     pub fn cut_after(&mut self, operations: usize, how: Cut, seed: u64) {
         self.cut = Some((self.operations + operations, how));
         self.garbage = Pcg64Mcg::seed_from_u64(seed);
     }
 
-    /// Power comes again.
+    /// Restores the power.
     pub fn power_on(&mut self) {
         self.cut = None;
         self.powered = true;
     }
 
-    /// Erase and program operations so far.
+    /// Number of erase and program operations so far.
     #[must_use]
     pub fn operations(&self) -> usize {
         self.operations
     }
 
-    /// What the flash holds.
+    /// The contents.
     #[must_use]
     pub fn bytes(&self) -> &[u8] {
         &self.bytes
     }
 
-    /// Puts anything into the flash, as if it had always been there.
+    /// Replaces the contents without operations.
     pub fn overwrite(&mut self, at: usize, bytes: &[u8]) {
         for (offset, &byte) in bytes.iter().enumerate() {
             if let Some(place) = self.bytes.get_mut(at + offset) {
@@ -73,7 +73,7 @@ impl RamFlash {
         }
     }
 
-    /// Whether the operation that begins now goes through. Where power goes, it may tear `from..to`.
+    /// Returns whether the operation that begins now completes. A power cut may tear `from..to`.
     fn operate(&mut self, from: usize, to: usize) -> Result<(), FlashError> {
         if !self.powered || to > self.bytes.len() {
             return Err(FlashError);
@@ -89,7 +89,7 @@ impl RamFlash {
         Ok(())
     }
 
-    /// Each unit is as before, erased or garbage.
+    /// Leaves each unit unchanged, erased or garbage.
     fn tear(&mut self, from: usize, to: usize) {
         for unit in (from..to).step_by(UNIT) {
             match self.garbage.random_range(0..3) {
@@ -118,7 +118,7 @@ impl Flash for RamFlash {
     fn program(&mut self, at: usize, unit: [u8; UNIT]) -> Result<(), FlashError> {
         self.operate(at, at + UNIT)?;
         let programmed = self.programmed.get_mut(at / UNIT).ok_or(FlashError)?;
-        // A unit is written once: the error correction bits beside it are not what they should be after a second time.
+        // A unit is written once: a second time makes the error correction bits beside it wrong.
         if !at.is_multiple_of(UNIT) || std::mem::replace(programmed, true) {
             return Err(FlashError);
         }

@@ -1,7 +1,7 @@
 //! The simulated mechanics of the rig, and the native board: the controller core run in virtual time against them.
 //!
 //! Simulated here: stepper motors, the compliance and backlash of screw and rack, load-side encoders, home and limit
-//! switches, mechanical end stops, and how each of them fails. Everything is deterministic in its seed and its inputs.
+//! switches, mechanical end stops, and the failures of each. The same seed and inputs give the same results.
 
 mod axis;
 mod bench;
@@ -14,9 +14,10 @@ mod switch;
 
 pub use axis::{AxisMechanics, AxisPlant};
 pub use bench::{Stage, bench_mechanics, bench_settings};
-pub use board::{NATIVE_HARDWARE, NativeBoard};
+pub use board::NativeBoard;
 pub use encoder::EncoderFault;
 pub use flash::{Cut, RamFlash};
 pub use plant::Plant;
 pub use services::{Firmware, NativeServices, Verifier};
 pub use switch::SwitchNoise;
+pub use vergence_protocol::management::NATIVE_HARDWARE;

@@ -1,4 +1,4 @@
-//! The whole mechanics behind the controller's seam.
+//! All mechanics behind the I/O interface of the controller.
 
 use std::collections::VecDeque;
 
@@ -16,14 +16,14 @@ pub struct Plant {
     emergency_stop: bool,
     /// The axis whose home switch is wired to each input.
     home_wires: Vec<usize>,
-    /// When the cameras are to be fired.
+    /// When the cameras will be fired.
     trigger_at: Option<Microseconds>,
     trigger_edges: VecDeque<TriggerEdge>,
     exposed: Option<(Microseconds, Vec<f64>)>,
 }
 
 impl Plant {
-    /// Axes standing at `positions` (micro-units), drivers off.
+    /// Axes at rest at `positions` (micro-units), drivers off.
     #[must_use]
     pub fn new(mechanics: &[AxisMechanics], positions: &[f64]) -> Self {
         let axes: Vec<_> =
@@ -40,43 +40,43 @@ impl Plant {
         }
     }
 
-    /// Where every load truly is, in micro-units.
+    /// The true position of every load, in micro-units.
     #[must_use]
     pub fn loads(&self) -> Vec<f64> {
         self.axes.iter().map(AxisPlant::load).collect()
     }
 
-    /// Where the load of `axis` truly is, in micro-units.
+    /// The true position of the load of `axis`, in micro-units.
     #[must_use]
     pub fn load(&self, axis: usize) -> Option<f64> {
         self.axes.get(axis).map(AxisPlant::load)
     }
 
-    /// Where the stage of `axis` truly is, in micro-units: behind the load by the play between them.
+    /// The true position of the stage of `axis`, in micro-units; it lags behind the load by the play between them.
     #[must_use]
     pub fn stage(&self, axis: usize) -> Option<f64> {
         self.axes.get(axis).map(AxisPlant::stage)
     }
 
-    /// The wires of two home switches change places. There is no effect where there is no such axis.
+    /// Swaps the wires of two home switches. There is no effect where there is no such axis.
     pub fn cross_home_switches(&mut self, one: usize, other: usize) {
         if one.max(other) < self.home_wires.len() {
             self.home_wires.swap(one, other);
         }
     }
 
-    /// When the cameras were last fired, and where every load truly was then, in micro-units.
+    /// When the cameras were last fired, and the true position of every load then, in micro-units.
     #[must_use]
     pub fn exposed(&self) -> Option<(Microseconds, &[f64])> {
         self.exposed.as_ref().map(|(at, loads)| (*at, loads.as_slice()))
     }
 
-    /// One axis, for doing something to it; `None` where there is no such axis.
+    /// One axis, to change it; `None` where there is no such axis.
     pub fn axis_mut(&mut self, axis: usize) -> Option<&mut AxisPlant> {
         self.axes.get_mut(axis)
     }
 
-    /// The clock of the board begins again at zero, its outputs fall back to off; the mechanics keep their place.
+    /// Restarts the clock of the board at zero and switches its outputs off; the mechanics keep their positions.
     pub fn restart_clock(&mut self) {
         self.set_drivers(false);
         self.trigger_at = None;
@@ -85,7 +85,7 @@ impl Plant {
         self.now = Microseconds(0);
     }
 
-    /// Whether the motors are held.
+    /// Whether the drivers are on.
     #[must_use]
     pub fn drivers_on(&self) -> bool {
         self.drivers_on
@@ -98,7 +98,7 @@ impl Plant {
     }
 
     /// Wedges the load of `axis` where it is, or frees it. A motor that pulls on a wedged load loses steps, so that the
-    /// encoder stands while the command goes on. There is no effect where there is no such axis.
+    /// encoder stands still while the command continues. There is no effect where there is no such axis.
     pub fn block(&mut self, axis: usize, blocked: bool) {
         if let Some(axis) = self.axes.get_mut(axis) {
             axis.block(blocked);
@@ -114,7 +114,7 @@ impl Plant {
         self.run_to(to);
     }
 
-    /// The trigger's edge: hardware latches every encoder.
+    /// Makes the trigger's edge: hardware latches every encoder.
     fn latch(&mut self) {
         let counts = self.axes.iter().map(AxisPlant::encoder).collect();
         self.trigger_edges.push_back(TriggerEdge { at: self.now, counts });

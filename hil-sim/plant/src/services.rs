@@ -1,43 +1,43 @@
-//! What the native board has besides its mechanics: flash and a boot loader.
+//! Flash and boot loader of the native board.
 
 use vergence_control::{BoardServices, Flash, FlashError};
 use vergence_protocol::management::{BootState, ImageHeader, Signature};
 
 use crate::flash::RamFlash;
 
-/// Pages of the settings.
+/// Number of flash pages for the settings.
 const SETTINGS_PAGES: usize = 2;
-/// Pages for an image: 96 KiB.
+/// Number of flash pages for an image: 96 KiB.
 const IMAGE_PAGES: usize = 48;
 
-/// Whether a signature over the bytes is of this key.
+/// Checks whether a signature of the bytes was made with a key.
 pub type Verifier = fn(&[u8; 32], &[u8; ImageHeader::SIGNED], &Signature) -> bool;
 
-/// An image, as far as a simulation needs to know it.
+/// The properties of an image that the simulation needs.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Firmware {
-    /// Its version.
+    /// Version of the image.
     pub version: [u8; 3],
-    /// Which build.
+    /// Build of the image.
     pub build: u64,
 }
 
-/// Flash and boot loader in RAM. They outlive a restart of the board.
+/// Flash and boot loader in RAM, kept through restarts of the board.
 #[derive(Clone, Debug)]
 pub struct NativeServices {
-    /// Where the settings are kept.
+    /// Flash of the settings.
     pub settings: RamFlash,
-    /// Where a new image is stored.
+    /// Flash of a new image.
     pub image: RamFlash,
-    /// What runs: the name only, for the code is always this.
+    /// The image that runs, by name only: the code is always this program.
     pub running: Firmware,
-    /// How it came to.
+    /// How it came to run.
     pub boot_state: BootState,
     /// The oldest version accepted.
     pub oldest: [u8; 3],
     /// The key whose signatures are trusted.
     pub key: [u8; 32],
-    /// Which signatures are of it.
+    /// The check of signatures by that key.
     pub verifier: Verifier,
     earlier: Option<Firmware>,
     scheduled: Option<Firmware>,
@@ -63,7 +63,8 @@ impl Default for NativeServices {
 }
 
 impl NativeServices {
-    /// What the boot loader does at a start: a scheduled image goes on trial, one that was not confirmed goes back.
+    /// Does what the boot loader does at a start: puts a scheduled image on trial, and reverts one that was not
+    /// confirmed.
     pub fn boot(&mut self) {
         let goes_back = std::mem::take(&mut self.goes_back) || self.boot_state == BootState::Trial;
         if let Some(new) = self.scheduled.take() {

@@ -1,20 +1,20 @@
-//! A mechanical switch: contacts chatter, and long wires catch spikes.
+//! A mechanical switch, whose contacts chatter and whose wires pick up spikes.
 
 use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64Mcg;
 
-/// How badly a switch behaves.
+/// Chatter and spikes of a switch.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SwitchNoise {
-    /// How long the contact chatters after each change, microseconds.
+    /// Duration of the chatter after each change, in microseconds.
     pub chatter_us: u64,
-    /// How often it reads wrong for one instant without any cause: probability each time that it is looked at.
+    /// Probability that one reading is wrong without a cause.
     pub spikes: f64,
-    /// Decides both.
+    /// Seed that decides both.
     pub seed: u64,
 }
 
-/// A switch as its wire reads it.
+/// A switch with its wire.
 #[derive(Clone, Debug)]
 pub struct Switch {
     closed: bool,
@@ -25,29 +25,29 @@ pub struct Switch {
 }
 
 impl Switch {
-    /// A good switch.
+    /// A switch without faults.
     pub fn new(closed: bool) -> Self {
         Self { closed, reading: closed, fixed: None, chatter_left_us: 0, noise: None }
     }
 
-    /// A switch that behaves badly from now on, or well again.
+    /// Adds chatter and spikes from now on, or removes them.
     pub fn disturb(&mut self, noise: Option<SwitchNoise>) {
         self.noise = noise.map(|noise| (noise, Pcg64Mcg::seed_from_u64(noise.seed)));
         self.chatter_left_us = 0;
         self.reading = self.closed;
     }
 
-    /// A switch that reads this whatever happens to it, or is whole again.
+    /// Fixes the reading, or lets it follow the contact again.
     pub fn fix(&mut self, reading: Option<bool>) {
         self.fixed = reading;
     }
 
-    /// What the wire reads.
+    /// The reading of the wire.
     pub fn reads_closed(&self) -> bool {
         self.fixed.unwrap_or(self.reading)
     }
 
-    /// The contact is `closed` after `us` have passed.
+    /// Sets the contact to `closed` after `us` microseconds have passed.
     pub fn advance(&mut self, closed: bool, us: u64) {
         let changed = closed != self.closed;
         self.closed = closed;

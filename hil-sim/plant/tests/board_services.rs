@@ -1,4 +1,4 @@
-//! What a host asks of a board besides motion: settings, flight recorder, link figures, logs, camera trigger.
+//! Requests besides motion: settings, flight recorder, link statistics, logs, camera trigger.
 #![allow(clippy::unwrap_used, clippy::panic, reason = "a test fails by panic")]
 
 mod rigged;
@@ -24,7 +24,7 @@ fn set(rigged: &mut Rigged, key: SettingKey, value: i64) -> Status {
     rigged.ask(Request::SetSetting { key, value })
 }
 
-/// Everything that the recorder holds.
+/// All events that the recorder holds.
 fn recorded(rigged: &mut Rigged) -> Vec<RecordedEvent> {
     let mut events = Vec::new();
     let mut first = 0;
@@ -38,7 +38,7 @@ fn recorded(rigged: &mut Rigged) -> Vec<RecordedEvent> {
     }
 }
 
-/// The board loses power and comes back.
+/// Switches the power of the board off and on again.
 fn power_cycle(rigged: &mut Rigged, session: u32) {
     rigged.board.restart(ResetCause::PowerOn, session).unwrap();
     rigged.board.services_mut().settings.power_on();
@@ -168,7 +168,7 @@ fn the_recorder_tells_what_led_to_a_fault() {
     ];
     assert!(story.is_sorted(), "{events:?}");
     let home_switch =
-        events.iter().any(|event| matches!(event, Happening::Switch { axis: 0, home: true, closed: true }));
+        events.iter().any(|event| matches!(event, Happening::Switch { axis: 0, home: true, operated: true }));
     assert!(home_switch, "homing closed the switch: {events:?}");
     let fault = events.iter().position(|event| matches!(event, Happening::Fault { axis: Some(0), .. })).unwrap();
     let counts: Vec<_> = events[fault + 1..fault + 3].to_vec();

@@ -1,19 +1,20 @@
-//! What the mechanics do wrong, and what the board calls it.
+//! Failures of the mechanics, and the faults that the board reports.
 #![allow(clippy::unwrap_used, reason = "a test fails by panic")]
 
 mod rigged;
 
 use rigged::{BOTH, Rigged};
+use vergence_control::AxisSettings;
 use vergence_plant::{AxisPlant, EncoderFault, bench_mechanics, bench_settings};
 use vergence_protocol::{AxisMask, ControllerState, FaultCode, FaultRecord, Micro, MovePhase, Status};
 
-/// Something done to a rig.
+/// A change to a rig.
 type Harm = fn(&mut Rigged);
 
 const HERBIVORE: [i32; 2] = [145_000, 2_094_395];
 const HUMAN: [i32; 2] = [145_000, 0];
 
-/// In the middle of a move, at full speed.
+/// A rig in the middle of a move, at full speed.
 fn under_way() -> Rigged {
     let mut rigged = Rigged::homed(1);
     assert_eq!(rigged.move_to(HERBIVORE, 1), Status::Accepted);
@@ -25,7 +26,7 @@ fn harm(rigged: &mut Rigged, axis: usize, how: impl FnOnce(&mut AxisPlant)) {
     how(rigged.board.plant_mut().axis_mut(axis).unwrap());
 }
 
-/// The fault that a harm ends in: drivers off, no reference, and the load not far from where it was lost.
+/// The fault that a failure ends in: drivers off, no reference, and the load near the position where it was lost.
 fn fault_after(mut rigged: Rigged, axis: usize, how: impl FnOnce(&mut AxisPlant)) -> FaultRecord {
     let before = rigged.loads()[axis];
     harm(&mut rigged, axis, how);
@@ -108,7 +109,7 @@ fn crossed_stuck_and_dead_home_switches_each_have_their_own_fault() {
     let cases: [(Harm, FaultCode); 3] = [
         (|rigged| rigged.board.plant_mut().cross_home_switches(0, 1), FaultCode::HomeSwitchWrong),
         (|rigged| harm(rigged, 0, |axis| axis.fix_home_switch(Some(true))), FaultCode::HomeSwitchStuck),
-        // A dead one may be beyond the hard limit, which is another's business: here the search ends before it.
+        // A dead one may be beyond the hard limit, which another test covers: here the search ends before it.
         (|rigged| harm(rigged, 0, |axis| axis.fix_home_switch(Some(false))), FaultCode::HomeSwitchNotFound),
     ];
     for (harm, code) in cases {
@@ -193,4 +194,19 @@ fn the_faults_end_when_their_cause_does() {
     assert_eq!(rigged.move_to(HUMAN, 2), Status::Accepted);
     rigged.wait_for(ControllerState::Ready);
     assert_eq!(rigged.pose().phase, MovePhase::Settled);
+}
+
+/// Regression: a limit of 1 um was told as an encoder that does not answer, with the advice to check its cable.
+#[test]
+fn a_limit_below_the_lag_is_told_as_a_following_error() {
+    for axis in 0..2 {
+        let mut settings = bench_settings();
+        settings[axis] = AxisSettings { following_error: Micro(1), ..settings[axis] };
+        let mut rigged = Rigged::with(&settings, &bench_mechanics(), 1).open();
+        assert_eq!(rigged.arm(), Status::Accepted);
+        assert_eq!(rigged.home(), Status::Accepted);
+        rigged.wait_for(ControllerState::Fault);
+        let fault = rigged.fault();
+        assert_eq!((fault.code, fault.axis), (FaultCode::FollowingError, Some(axis as u8)), "{fault:?}");
+    }
 }

@@ -1,4 +1,4 @@
-//! The ways in which the mechanics fail, each alone.
+//! Failures of the mechanics, each alone.
 #![allow(clippy::unwrap_used, reason = "a test fails by panic")]
 
 use vergence_control::{RigIo, StepSchedule};
@@ -170,7 +170,7 @@ fn the_trigger_latches_the_encoders_at_its_edge() {
     assert_eq!((edge.at, edge.counts.as_slice()), (Microseconds(120_250), &there[..]));
     assert!(plant.encoder(0) > there[0] + 100);
     assert_eq!(plant.take_trigger_edge(), None);
-    // What should have been fired before is fired at once.
+    // A pulse whose time has passed is fired at once.
     plant.fire_trigger(Microseconds(10_000));
     plant.advance(Microseconds(151_000));
     assert_eq!(plant.take_trigger_edge().unwrap().at, Microseconds(150_000));

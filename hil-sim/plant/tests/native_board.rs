@@ -1,4 +1,4 @@
-//! The native board at the end of its wire: from power-on to the modes, and through everything that goes wrong.
+//! The native board over its wire: from power-on to the modes, and through its faults.
 
 mod rigged;
 
@@ -24,7 +24,7 @@ fn count(axis: &AxisSettings) -> f64 {
     f64::from(axis.encoder().position_at(1_000_000).0) * 1e-6
 }
 
-/// Longest time to rest from any state within the limits: v/a + 2a/j, the slower axis.
+/// Longest time to rest from any state within the limits: v/a + 2a/j of the slower axis.
 fn longest_stop_us() -> u64 {
     let stop = |axis: &AxisSettings| {
         let [v, a, j] = [axis.speed, axis.acceleration, axis.jerk].map(f64::from);
@@ -33,7 +33,7 @@ fn longest_stop_us() -> u64 {
     bench_settings().iter().map(stop).max().unwrap_or(0)
 }
 
-/// What the board says against the truth, through the scale.
+/// Compares the reported positions with the true ones.
 fn check_counts(rigged: &Rigged) {
     for ((axis, counts), load) in bench_settings().iter().zip(&rigged.pose().counts).zip(rigged.loads()) {
         let off = f64::from(counts.0) * count(axis) - load;
@@ -61,7 +61,7 @@ fn go(rigged: &mut Rigged, targets: [i32; 2], mode: u8) -> u64 {
     took
 }
 
-/// In the middle of a move to the herbivore's pose.
+/// A rig in the middle of a move to the herbivore pose.
 fn under_way(wait_us: u64) -> Rigged {
     let mut rigged = Rigged::homed(1);
     assert_eq!(rigged.move_to(HERBIVORE, 1), Status::Accepted);
@@ -70,7 +70,7 @@ fn under_way(wait_us: u64) -> Rigged {
     rigged
 }
 
-/// Nothing moves for a second.
+/// Checks that nothing moves for a second.
 fn check_rest(rigged: &mut Rigged) {
     let (steps, loads) = (rigged.steps(), rigged.loads());
     rigged.wait(1_000_000);
@@ -145,8 +145,8 @@ fn every_start_position_homes() {
         check_counts(&rigged);
         check_reached(&rigged, bench_settings().map(|axis| axis.min.0));
     }
-    // The whole separation at 20°/s is 6.6 s and the whole baseline at 40 mm/s 4 s; two slow approaches of 1.5 s each, the
-    // retracts and the ways in are the rest.
+    // The whole separation at 20°/s is 6.6 s and the whole baseline at 40 mm/s 4 s; two slow approaches of 1.5 s each,
+    // the retracts and the ways in are the rest.
     assert!((12_000_000..16_000_000).contains(&longest), "{longest} us");
 }
 
@@ -213,7 +213,7 @@ fn a_restarted_board_is_idle_without_reference_and_the_host_learns_of_it() {
     let mut rigged = under_way(500_000);
     rigged.restart_board(2);
     rigged.wait(2_000_000);
-    assert!(rigged.lost);
+    assert!(rigged.lost > 0);
     assert_eq!(rigged.board.state(), ControllerState::Idle);
     assert_eq!(rigged.steps(), [0, 0]);
     rigged.reconnect(0x0a11_7e00);
@@ -310,7 +310,7 @@ fn a_hard_limit_cuts_the_drivers() {
     assert_eq!(rigged.clear(), Rigged::refused(Refusal::CausePersists));
 }
 
-/// Everything that a session does, and what the board said all along.
+/// Runs everything that a session can do; returns all bytes that the board sent.
 fn transcript(seed: u64) -> Vec<u8> {
     let mut rigged = Rigged::homed(seed);
     go(&mut rigged, HERBIVORE, 1);

@@ -4,7 +4,7 @@ use rayon::prelude::*;
 
 use crate::texture::Rgb;
 
-/// Wider spreads than this are no lens's.
+/// Widest point spread of a lens, in pixels.
 const MAX_SIGMA_PX: f64 = 5.0;
 
 /// Convolves an image of rows of `width` pixels with the discrete Gaussian of deviation `sigma` px. Beyond the image
@@ -32,7 +32,7 @@ pub fn blurred(image: &[Rgb], width: usize, sigma: f64) -> Vec<Rgb> {
     both
 }
 
-/// Adds `row` times `weight` as far as both reach. Whole rows at once are what vector instructions are for.
+/// Adds `row` times `weight` as far as both reach. Whole rows let the compiler use vector instructions.
 fn add(sum: &mut [Rgb], weight: f32, row: &[Rgb]) {
     sum.as_flattened_mut().iter_mut().zip(row.as_flattened()).for_each(|(sum, c)| *sum += weight * c);
 }

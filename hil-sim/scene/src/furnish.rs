@@ -21,41 +21,41 @@ pub struct Place {
 
 /// Collects the solids of a room. Each gets another seed, so that no two look the same.
 pub struct Furnisher {
-    /// What there is so far.
+    /// The solids so far.
     pub solids: Vec<Solid>,
     random: Pcg64Mcg,
 }
 
 impl Place {
-    /// At `x`, `z` mm, turned by `yaw_deg`: 0 faces an observer at smaller z.
+    /// A spot at `x`, `z` mm, turned by `yaw_deg`: 0 faces an observer at smaller z.
     pub fn new(x: f64, z: f64, yaw_deg: f64) -> Self {
         Self { position: Vector3::new(x, 0.0, z), yaw: yaw_deg.to_radians() }
     }
 
-    /// At the height `y` (down).
+    /// The same spot at the height `y` (down).
     pub fn at(mut self, y: f64) -> Self {
         self.position.y = y;
         self
     }
 
-    /// Higher by `height`.
+    /// The spot raised by `height`.
     pub fn raised(mut self, height: f64) -> Self {
         self.position.y -= height;
         self
     }
 
-    /// Moved along the piece's own axes.
+    /// The spot moved along the piece's own axes.
     pub fn shifted(mut self, x: f64, z: f64) -> Self {
         self.position += self.rotation() * Vector3::new(x, 0.0, z);
         self
     }
 
-    /// On the surface at height `y`, moved along the piece's own axes.
+    /// The spot on the surface at height `y`, moved along the piece's own axes.
     pub fn on(self, y: f64, x: f64, z: f64) -> Self {
         self.at(y).shifted(x, z)
     }
 
-    /// Turned further.
+    /// The spot turned further.
     pub fn turned(mut self, yaw_deg: f64) -> Self {
         self.yaw += yaw_deg.to_radians();
         self
@@ -67,7 +67,7 @@ impl Place {
 }
 
 impl Furnisher {
-    /// With the seed of all that is random.
+    /// An empty collection; `seed` decides everything random.
     pub fn new(seed: u64) -> Self {
         Self { solids: Vec::new(), random: Pcg64Mcg::seed_from_u64(seed) }
     }

@@ -1,16 +1,16 @@
-//! Simulated fisheye photographs with exact ground truth.
+//! Simulated fisheye images with exact ground truth.
 //!
-//! A [`Scene`] is a closed room of analytic shapes with procedural textures. [`render`] photographs it through a
+//! A [`Scene`] is a closed room of analytic shapes with procedural textures. [`render`] takes an image of it through a
 //! Kannala-Brandt lens by casting rays: each pixel is the mean of rays spread over its square, then blurred by the
 //! lens, exposed, made noisy and quantised as a sensor does. The range stored with each pixel is that of the ray
-//! through its centre, solved in closed form. A [`Board`] alone before an even grey ([`Scene::board_alone`]) renders quickest.
+//! through its centre, solved in closed form. A [`Target`] alone before an even grey ([`Scene::target_alone`]) renders
+//! quickest.
 //!
 //! The world frame has x to the right, y down and z forward, in millimetres, so that a camera with the identity pose
 //! looks forward and level. Colours are linear RGB from 0 to 1. The same arguments give the same bytes on any number of
 //! threads: all randomness is a hash of the seed and of the pixel.
 
 mod blur;
-mod board;
 mod furnish;
 mod hierarchy;
 mod light;
@@ -22,10 +22,11 @@ mod render;
 mod room;
 mod scene;
 mod shape;
+mod target;
 mod texture;
 
-pub use board::Board;
 pub use optics::Optics;
 pub use range_map::RangeMap;
 pub use render::{Photograph, View, render, render_rolling};
 pub use scene::{Hit, Scene, SurfaceId};
+pub use target::Target;

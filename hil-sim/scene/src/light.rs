@@ -7,7 +7,7 @@ use crate::texture::Rgb;
 /// A lamp as a point, whose light falls off with the distance.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Lamp {
-    /// In the world, mm.
+    /// Position in the world, mm.
     pub position: Vector3<f64>,
     /// Irradiance at a surface that faces the lamp from nearby.
     pub power: Rgb,
@@ -18,13 +18,14 @@ pub struct Lamp {
 /// All light of a scene.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Lighting {
-    /// From everywhere.
+    /// Ambient irradiance, the same from all directions.
     pub ambient: Rgb,
-    /// How much brighter than on walls it is on what faces up, and darker on what faces down, 0 to 1.
+    /// How much brighter than on walls the ambient light is on surfaces that face up, and darker on those that face
+    /// down, 0 to 1.
     pub from_above: f64,
-    /// Part of the ambient light that is lost in the room's edges, 0 to 1.
+    /// Share of the ambient light that is lost in the edges of the room, 0 to 1.
     pub occlusion: f64,
-    /// The room's corners: ambient light is dimmed near its sides.
+    /// Opposite corners of the room: ambient light is dimmed near its sides.
     pub room: [Vector3<f64>; 2],
     /// The lamps.
     pub lamps: Vec<Lamp>,

@@ -2,7 +2,7 @@
 
 use nalgebra::Vector3;
 
-/// Share of an octave's amplitude that the next finer one has.
+/// Ratio of the amplitudes of an octave and the next coarser one.
 const PERSISTENCE: f32 = 0.72;
 
 /// Mixes 32 bits so that each output bit depends on all input bits (the finaliser of MurmurHash3, A. Appleby 2011).
@@ -27,12 +27,12 @@ pub fn cell_hash(x: i32, y: i32, seed: u32) -> u32 {
     mix(x.cast_unsigned().wrapping_mul(0x8da6_b343) ^ mix(y.cast_unsigned().wrapping_add(seed)))
 }
 
-/// `hash`'s bits as a fraction in [0, 1). `salt` picks one of many independent fractions.
+/// A fraction in [0, 1) from the bits of `hash`. `salt` selects one of many independent fractions.
 pub fn fraction(hash: u32, salt: u32) -> f32 {
     (mix(hash ^ salt.wrapping_mul(0x9e37_79b9)) >> 8) as f32 / 16_777_216.0
 }
 
-/// A number in whole cells and the rest.
+/// Splits a number into whole cells and the rest.
 pub fn split(x: f64) -> (i32, f32) {
     let towards_zero = x as i32;
     let whole = towards_zero.saturating_sub(i32::from(f64::from(towards_zero) > x));
@@ -45,8 +45,8 @@ pub fn smoothstep(low: f32, high: f32, x: f32) -> f32 {
     t * t * (3.0 - 2.0 * t)
 }
 
-/// How much of a feature of size `cell` survives averaging over `footprint` (both mm): all of it with two samples or
-/// more in a cell, nothing with one, where the sampling theorem would be broken.
+/// Share of the contrast of a feature of size `cell` that remains after averaging over `footprint` (both mm): all of it
+/// with two or more samples in a cell, none with one, where the sampling theorem would be violated.
 pub fn survival(cell: f64, footprint: f64) -> f32 {
     (2.0 - 2.0 * footprint / cell).clamp(0.0, 1.0) as f32
 }

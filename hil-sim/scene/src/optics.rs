@@ -1,15 +1,15 @@
-//! Lens and sensor: how sharp and how dark the picture is, and how light becomes a grey level.
+//! Lens and sensor: sharpness and brightness of the image, and the grey level of light.
 
 use vergence_vision::Angle;
 
 use crate::noise::mix64;
 use crate::texture::Rgb;
 
-/// Lens and sensor of one camera. Values out of their range count as its nearest end.
+/// Lens and sensor of one camera. A value outside its range counts as the nearest end of the range.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Optics {
-    /// Rays cast for every pixel, spread over its square. One alone goes through its centre: enough where nothing is
-    /// finer than a pixel but edges.
+    /// Rays cast for every pixel, spread over its square. A single ray goes through its centre: enough where
+    /// only edges are finer than a pixel.
     pub samples: u32,
     /// Further rays for a pixel at an edge: where its first ones differ, or its neighbours' much. Where edges are
     /// measured to hundredths of a pixel, as on a checkerboard, take some hundreds.
@@ -19,7 +19,7 @@ pub struct Optics {
     pub blur_px: f64,
     /// Standard deviation of the noise in the dark, in grey levels of 255.
     pub read_noise: f64,
-    /// Standard deviation, in grey levels of 255, that a white pixel has besides. Its variance is proportional to the
+    /// Additional standard deviation of a white pixel, in grey levels of 255. Its variance is proportional to the
     /// grey level: that of level g is `read_noise² + shot_noise² g / 255`.
     pub shot_noise: f64,
     /// Part of the light that is lost at the edge of the field, 0 to 1. See [`Optics::falloff`].
@@ -29,14 +29,14 @@ pub struct Optics {
 }
 
 impl Default for Optics {
-    /// A decent lens and a quiet sensor: σ = 0.5 px, noise of 1 to 1.6 grey levels, two fifths lost at the edge.
+    /// An average lens and a low-noise sensor: σ = 0.5 px, noise of 1 to 1.6 grey levels, two fifths lost at the edge.
     fn default() -> Self {
         Self { samples: 6, edge_samples: 12, blur_px: 0.5, read_noise: 1.0, shot_noise: 1.2, vignette: 0.4, gain: 1.0 }
     }
 }
 
 impl Optics {
-    /// A perfect instrument: no blur beyond the pixel, no noise, no vignette, and edges sampled finely.
+    /// A perfect camera: no blur beyond the pixel, no noise, no vignette, and edges sampled finely.
     #[must_use]
     pub const fn ideal() -> Self {
         Self { samples: 6, edge_samples: 200, blur_px: 0.0, read_noise: 0.0, shot_noise: 0.0, vignette: 0.0, gain: 1.0 }

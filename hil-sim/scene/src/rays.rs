@@ -3,7 +3,7 @@
 use nalgebra::{Matrix3, Vector3};
 use vergence_vision::{BatchLens, Camera, Instructions, KannalaBrandt, Pixel, Transform, World};
 
-/// A lens at its place.
+/// A lens with its pose.
 pub struct Eye<'a> {
     lens: &'a BatchLens,
     world_from_camera: Matrix3<f64>,
@@ -23,7 +23,7 @@ pub struct RayGrid<'a> {
 pub struct Around<'a> {
     grid: &'a RayGrid<'a>,
     pixel: Pixel,
-    /// Where the pixel is among the grid's rays.
+    /// Index of the pixel in the grid of rays.
     middle: usize,
     centre: Vector3<f64>,
 }
@@ -37,7 +37,7 @@ pub struct Nearby<'a> {
     derivatives: Option<[Vector3<f64>; 5]>,
 }
 
-/// A camera's lens for many rays; the same picture on every machine.
+/// The lens of a camera, evaluated for many rays; it gives the same image on every machine.
 pub fn lens_of(camera: &KannalaBrandt) -> BatchLens {
     BatchLens::new(camera).with_instructions(Instructions::Baseline)
 }

@@ -1,4 +1,4 @@
-//! Photographs of a scene, with the range of each pixel.
+//! Images of a scene, with the true range of each pixel.
 
 use image::RgbImage;
 use nalgebra::Vector3;
@@ -12,25 +12,25 @@ use crate::rays::{Around, Eye, RayGrid, lens_of};
 use crate::texture::Rgb;
 use crate::{Optics, RangeMap, Scene};
 
-/// Rows rendered by one task.
+/// Number of rows that one task renders.
 const BAND: usize = 16;
 
-/// Contrast between the first rays of a pixel that calls for more of them.
+/// Contrast between the first rays of a pixel above which more are cast.
 const EDGE: f32 = 0.14;
 
-/// The same between a pixel and its neighbours, for edges that cut off a part of it which its first rays missed.
+/// The same between a pixel and its neighbours, for edges that cross the pixel where its first rays missed them.
 const STRONG_EDGE: f32 = 0.3;
 
 /// A camera in front of a scene.
 #[derive(Clone, Copy, Debug)]
 pub struct View<'a> {
-    /// What is photographed.
+    /// The scene.
     pub scene: &'a Scene,
     /// The lens, and the size of the image.
     pub camera: &'a KannalaBrandt,
-    /// Where the camera is.
+    /// The pose of the camera.
     pub world_from_camera: Transform<World, Camera>,
-    /// How good its lens and sensor are.
+    /// Imperfections of its lens and sensor.
     pub optics: &'a Optics,
 }
 
@@ -43,19 +43,19 @@ pub struct Photograph {
     pub range: RangeMap,
 }
 
-/// Photographs a view. `seed` drives the noise and the choice of rays: the same seed gives the same bytes, on any
-/// number of threads; other seeds give other noise on the same picture.
+/// Renders a view. `seed` drives the noise and the choice of rays: the same seed gives the same bytes, on any
+/// number of threads; other seeds give other noise on the same image.
 ///
-/// Every pixel is looked at by a few rays, those at an edge by many more. A pixel is the mean of the light on its square,
-/// which is then spread by the lens. Both are symmetric about the pixel's centre and the same everywhere, so that nothing is
-/// seen beside where it is projected.
+/// A few rays are cast for every pixel, many more for those at an edge. A pixel is the mean of the light on its square,
+/// which the lens then spreads. Both are symmetric about the centre of the pixel and the same everywhere, so that
+/// nothing is displaced from where it is projected.
 #[must_use]
 pub fn render(view: &View<'_>, seed: u64) -> Photograph {
     photograph(view, seed, Rows { at_once: BAND, world_from_camera: &|_| view.world_from_camera })
 }
 
-/// The same through a rolling shutter: every row from where `world_from_camera` says the camera was when that row was
-/// exposed. Nothing moves while a row is exposed, so that motion does not blur.
+/// Renders a view through a rolling shutter: every row from the pose that `world_from_camera` gives for it. Nothing
+/// moves while a row is exposed, so that motion does not blur.
 #[must_use]
 pub fn render_rolling(
     view: &View<'_>,
@@ -65,7 +65,7 @@ pub fn render_rolling(
     photograph(view, seed, Rows { at_once: 1, world_from_camera })
 }
 
-/// How many neighbouring rows are exposed at once, and where the camera is then.
+/// The number of neighbouring rows that are exposed at once, and the pose of the camera then.
 #[derive(Clone, Copy)]
 struct Rows<'a> {
     at_once: usize,
@@ -73,7 +73,7 @@ struct Rows<'a> {
 }
 
 impl Rows<'_> {
-    /// The view as at a row.
+    /// The view at the exposure of a row.
     fn view<'v>(&self, view: &View<'v>, row: u32) -> View<'v> {
         View { world_from_camera: (self.world_from_camera)(row), ..*view }
     }
@@ -127,13 +127,13 @@ fn is_edge(firsts: &[First], width: usize, x: usize, y: usize) -> bool {
     look.contrast() > EDGE || near.fold(look, Look::joined_contrast).contrast() > STRONG_EDGE
 }
 
-/// What the first rays of a pixel tell. By default nothing: outside the field.
+/// The result of the first rays of a pixel. The default is that of a pixel outside the field.
 #[derive(Clone, Copy, Debug)]
 struct First {
     look: Look,
-    /// Of the pixel's centre; not a number if its ray meets nothing.
+    /// Range at the centre of the pixel; not a number if its ray meets nothing.
     range_mm: f32,
-    /// The part of the light that passes the lens.
+    /// The share of the light that passes the lens.
     exposure: f32,
 }
 
@@ -143,7 +143,7 @@ impl Default for First {
     }
 }
 
-/// What some rays of a pixel bring.
+/// The light of some rays of a pixel.
 #[derive(Clone, Copy, Debug)]
 struct Look {
     sum: Rgb,
@@ -160,7 +160,7 @@ impl Default for Look {
 }
 
 impl Look {
-    /// With one more ray.
+    /// Adds the light of one more ray.
     fn with(self, colour: Rgb) -> Self {
         let level = colour.iter().sum::<f32>() / 3.0;
         self.joined(Self { sum: colour, count: 1, low: level, high: level })
@@ -171,7 +171,7 @@ impl Look {
         Self { sum, count: self.count.saturating_add(other.count), ..self.joined_contrast(other) }
     }
 
-    /// With the contrast of both.
+    /// Combines the contrast of two groups of rays.
     fn joined_contrast(self, other: Self) -> Self {
         Self { low: self.low.min(other.low), high: self.high.max(other.high), ..self }
     }
@@ -182,7 +182,8 @@ impl Look {
     }
 }
 
-/// Calls `visit(item, view, rays, x, y)`, the view as at that row, for the pixels of the view inside the lens's field, in parallel.
+/// Calls `visit(item, view, rays, x, y)`, the view as at that row, for the pixels of the view inside the lens's field,
+/// in parallel.
 fn for_each_in_field<T: Send>(
     view: &View<'_>,
     rows: Rows<'_>,
@@ -206,7 +207,7 @@ fn for_each_in_field<T: Send>(
 }
 
 impl View<'_> {
-    /// The first look at a pixel.
+    /// Casts the first rays of a pixel.
     fn first(&self, around: &Around<'_>, hash: u64) -> First {
         let origin = self.world_from_camera.origin().mm();
         let theta = self.theta(around);
@@ -221,7 +222,7 @@ impl View<'_> {
         First { look, range_mm: met.map_or(f32::NAN, |met| met.range() as f32), exposure }
     }
 
-    /// The light that `count` rays through a pixel's square bring.
+    /// The light of `count` rays through the square of a pixel.
     fn look(&self, around: &Around<'_>, count: u32, hash: u64) -> Look {
         let origin = self.world_from_camera.origin().mm();
         let finest = 1.0 / self.camera.pixels_per_radian(self.theta(around));

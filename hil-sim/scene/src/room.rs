@@ -1,7 +1,7 @@
 //! A furnished living room, 4 m wide, 5 m long and 2.6 m high, with the rig in its middle 1.2 m above the floor.
 //!
 //! Much of it stands within half a metre to one and a half of the world's origin, on all sides and at all heights, so
-//! that every vision mode sees near things where it sees with two eyes. The half metre about the origin is free.
+//! that every vision mode sees near objects in its stereo zone. The half metre about the origin is free.
 
 use std::f64::consts::FRAC_PI_2;
 

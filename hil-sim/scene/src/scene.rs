@@ -1,4 +1,4 @@
-//! A scene: solids with materials, lit; and what a ray meets in it.
+//! A scene: lit solids with materials, and the contacts of rays with them.
 
 use nalgebra::{Matrix3, UnitQuaternion, Vector3};
 use vergence_vision::{Length, Point, UnitRay, World};
@@ -8,18 +8,18 @@ use crate::light::Lighting;
 use crate::shape::{Contact, Shape};
 use crate::texture::{Pattern, Rgb};
 
-/// What a surface is made of.
+/// The material of a surface.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Material {
     /// The kind of surface.
     pub pattern: Pattern,
-    /// Which of its variants.
+    /// The variant of that kind.
     pub seed: u32,
-    /// Radiance instead of reflectance: the surface shines by itself, and casts no shadow.
+    /// Radiance, in place of reflectance, of a surface that shines by itself; such a surface casts no shadow.
     pub glow: Option<f32>,
 }
 
-/// A shape at its place.
+/// A shape with its pose and material.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Solid {
     shape: Shape,
@@ -29,26 +29,26 @@ pub struct Solid {
     material: Material,
 }
 
-/// Solids, and the light they are seen in.
+/// Solids and the light on them.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Scene {
     solids: Vec<Solid>,
     hierarchy: Hierarchy,
     lighting: Lighting,
-    /// What is seen between and beyond the solids.
+    /// The background between and beyond the solids.
     backdrop: Rgb,
 }
 
-/// Tells the surfaces of a scene apart. The same scene gives the same numbers.
+/// Number of a surface in its scene. The same scene gives the same numbers.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub struct SurfaceId(usize);
 
-/// What a ray meets first.
+/// The first contact of a ray.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Hit {
     /// Distance along the ray, to rounding error.
     pub range: Length,
-    /// Linear red, green and blue radiance at unit exposure, seen from close by.
+    /// Linear red, green and blue radiance at unit exposure, as seen from near.
     pub colour: [f32; 3],
     /// The surface met.
     pub surface: SurfaceId,
@@ -88,7 +88,7 @@ impl Scene {
         first
     }
 
-    /// The light that comes along a ray with this first encounter.
+    /// The light along a ray with this first encounter.
     pub(crate) fn light(
         &self,
         origin: Vector3<f64>,
@@ -162,7 +162,7 @@ impl Scene {
         Self::empty([0.0; 3]).lit(|lighting| lighting.room = [low, high]).with(solids)
     }
 
-    /// Nothing, in even light, before a `backdrop` that is infinitely far.
+    /// An empty scene in even light, before a `backdrop` at infinity.
     pub(crate) fn empty(backdrop: Rgb) -> Self {
         let room = [Vector3::repeat(f64::NEG_INFINITY), Vector3::repeat(f64::INFINITY)];
         let lighting = Lighting { ambient: [1.0; 3], from_above: 0.0, occlusion: 0.0, room, lamps: Vec::new() };

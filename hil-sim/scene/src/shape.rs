@@ -2,7 +2,7 @@
 
 use nalgebra::{Matrix3, Vector3};
 
-/// Nearer than this (mm) is taken for the surface that the ray starts from.
+/// A contact nearer than this (mm) is taken for the surface that the ray starts from.
 pub const NEAREST_MM: f64 = 1e-6;
 
 /// A surface in its own frame, in millimetres.
@@ -14,13 +14,13 @@ pub enum Shape {
     Ellipse { half: [f64; 2] },
     /// A box with faces at ± `half`.
     Block { half: Vector3<f64> },
-    /// A ball.
+    /// A sphere.
     Sphere { radius: f64 },
     /// A solid cylinder about the y axis, its caps at y = ± `half_height`.
     Cylinder { radius: f64, half_height: f64 },
 }
 
-/// Where a ray meets a shape, in the shape's frame.
+/// The contact of a ray with a shape, in the frame of the shape.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Contact {
     /// Distance along the ray in units of its direction's length.
@@ -36,9 +36,9 @@ pub struct SurfacePoint {
     pub position: Vector3<f64>,
     /// Coordinates in mm along the surface (spheres: the position's x and y).
     pub uv: [f64; 2],
-    /// Tells the faces of one shape apart.
+    /// Number of the face of the shape.
     pub face: u32,
-    /// Extent of the image element that sees the point, mm.
+    /// Extent of a pixel at the point, mm.
     pub footprint: f64,
 }
 

@@ -1,11 +1,11 @@
 //! Procedural materials: reflectance as a function of the place on a surface.
 //!
-//! Each is random at several scales and does not repeat, so that a patch of it can be found again in another picture
-//! and nowhere else. Features finer than the image element's footprint fade to their mean.
+//! Each is random at several scales and does not repeat, so that a patch of it can be found again in another image and
+//! nowhere else. Features finer than the footprint of a pixel fade to their mean.
 
 use nalgebra::Vector3;
 
-use crate::Board;
+use crate::Target;
 use crate::noise::{cell_hash, fraction, octaves, smoothstep, split, survival};
 use crate::shape::SurfacePoint;
 
@@ -34,11 +34,11 @@ pub enum Pattern {
     /// The garden seen through a window, `height` high.
     Garden { height: f64 },
     /// A checkerboard.
-    Print(Board),
+    Print(Target),
 }
 
 impl Pattern {
-    /// The reflectance at `at`, of the variant `seed`.
+    /// The reflectance of the variant `seed` at the place `at`.
     pub fn reflectance(&self, at: &SurfacePoint, seed: u32) -> Rgb {
         let seed = seed.wrapping_add(at.face.wrapping_mul(0x51ed_270b));
         match *self {
@@ -54,7 +54,7 @@ impl Pattern {
             Self::Book { cloth, ink } => book(at, cloth, ink, seed),
             Self::Leaf { light, dark } => leaf(at, light, dark, seed),
             Self::Garden { height } => garden(at, height, seed),
-            Self::Print(board) => board.ink(at),
+            Self::Print(target) => target.ink(at),
         }
     }
 }
@@ -168,7 +168,7 @@ fn blots(at: &SurfacePoint, ground: Rgb, cell: f64, seed: u32) -> Rgb {
     colour
 }
 
-/// How much of one random shape in a cell of side 1 covers the point `p` from the cell's middle.
+/// Coverage, 0 to 1, of the point `p` (from the middle of the cell) by one random shape in a cell of side 1.
 fn blot(hash: u32, p: [f32; 2], footprint: f32) -> f32 {
     const EMPTY: f32 = 0.25;
     if fraction(hash, 0) < EMPTY {

@@ -1,4 +1,4 @@
-//! What holds for every ray, pixel and seed.
+//! Laws for every ray, pixel and seed.
 
 #![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
 
@@ -56,7 +56,7 @@ proptest! {
     }
 }
 
-/// Each row of a rolling shutter shows what a camera sees that stands where this one was then.
+/// Each row of a rolling shutter equals that of a camera at rest in the pose of that row.
 #[test]
 fn a_rolling_shutter_sees_each_row_from_its_own_place() {
     let camera = fisheye(48);

@@ -1,4 +1,4 @@
-//! The sensor does to the light what its data sheet says.
+//! Noise, vignette and exposure of the sensor are as stated.
 
 #![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
 
@@ -6,17 +6,17 @@ mod common;
 
 use common::{fisheye, photograph, pose};
 use nalgebra::{UnitQuaternion, Vector3};
-use vergence_scene::{Board, Optics, Scene};
+use vergence_scene::{Optics, Scene, Target};
 use vergence_vision::{Angle, ImageSize, KannalaBrandt, Length, Pixel, Transform};
 
 /// Mean and variance of the green level of a telephoto view onto one white square, over many seeds.
 fn flat_patch(optics: &Optics) -> (f64, f64) {
     const SIDE: u32 = 12;
     const SEEDS: u64 = 200;
-    let board = Board { columns: 1, rows: 1, square: Length::from_mm(900.0) };
+    let target = Target { columns: 1, rows: 1, square: Length::from_mm(900.0) };
     // The square right of and above the corner is white.
-    let world_from_board = Transform::new(UnitQuaternion::identity(), Vector3::new(-450.0, 450.0, 800.0));
-    let scene = Scene::checkerboard(board, world_from_board);
+    let world_from_target = Transform::new(UnitQuaternion::identity(), Vector3::new(-450.0, 450.0, 800.0));
+    let scene = Scene::target_in_studio(target, world_from_target);
     let size = ImageSize { width: SIDE, height: SIDE };
     let k = [2000.0, 0.0, 0.0, 0.0, 0.0];
     let camera = KannalaBrandt::new(k, 1.0, Pixel { u: 5.5, v: 5.5 }, Angle::from_deg(40.0), size).unwrap();

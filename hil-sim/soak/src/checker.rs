@@ -1,4 +1,4 @@
-//! Looks on: the truth of the mechanics, the bytes that reach the board, the bytes that leave it.
+//! The checker: observes the true mechanics, the bytes that reach the board, and the bytes that leave it.
 
 use vergence_control::RigIo;
 use vergence_plant::{Plant, Stage};
@@ -12,7 +12,7 @@ use crate::journal::Journal;
 use crate::promise::{Promise, Sight, Violation};
 use crate::watched_axis::WatchedAxis;
 
-/// From the end of the lease to the tick that notices it, and from there to the look at its last step.
+/// Time from the end of the lease to the tick that notices it, and from there to the check of its last step.
 const NOTICE_US: u64 = 3_000;
 
 /// States of a disarmed board.
@@ -29,18 +29,18 @@ pub struct Checker {
     axes: Vec<WatchedAxis>,
     from_host: Receiver,
     from_board: Receiver,
-    /// The latest heartbeat of each session, and until when it counts.
+    /// Latest heartbeat of each session, and the end of its lease.
     leases: Vec<(SessionId, u64)>,
     moves: Vec<(MoveId, Mode, Vec<Micro>)>,
-    /// Who has asked to arm with the bytes that just arrived.
+    /// The sessions that asked to arm with the bytes that just arrived.
     arm_asked: Option<SessionId>,
     holder: Option<SessionId>,
     drivers_on: bool,
     clear_asked: Option<u16>,
     fault: Option<FaultRecord>,
-    /// Which axes claim their reference.
+    /// Axes that claim to have a reference.
     referenced: AxisMask,
-    /// No pose since the restart.
+    /// Whether there was no pose since the restart.
     restarted: bool,
     state: Option<ControllerState>,
     busy_since: Option<u64>,
@@ -75,14 +75,14 @@ impl Checker {
         self.violations
     }
 
-    /// Each promise is reported broken once.
+    /// Reports a broken promise, each once.
     pub fn accuse(&mut self, at: Microseconds, promise: Promise, what: String) {
         if self.violations.iter().all(|violation| violation.promise != promise) {
             self.violations.push(Violation { at, promise, what });
         }
     }
 
-    /// An encoder fails, or is whole again.
+    /// Records that an encoder fails, or works again.
     pub fn encoder_shows(&mut self, axis: usize, sight: Sight) {
         if let Some(axis) = self.axes.get_mut(axis) {
             axis.sight = sight;
@@ -91,7 +91,7 @@ impl Checker {
         }
     }
 
-    /// The board restarted: nobody has armed it and it remembers nothing.
+    /// Records a restart of the board: it is not armed, and has lost its state.
     pub fn restarted(&mut self, plant: &Plant) {
         (self.holder, self.fault, self.clear_asked, self.busy_since) = (None, None, None, None);
         self.drivers_on = plant.drivers_on();
@@ -102,11 +102,11 @@ impl Checker {
         }
     }
 
-    /// A millisecond has passed.
+    /// Checks the state after each millisecond.
     pub fn watch(&mut self, now: Microseconds, plant: &Plant) {
         let before = self.holder;
         self.watch_drivers(now, plant);
-        // Until the tick that cut the drivers the motors may have stepped.
+        // The motors may have stepped until the tick that cut the drivers.
         let holder = self.holder.or(before);
         for index in 0..self.axes.len() {
             let (steps, load) = (plant.steps(index), plant.load(index).unwrap_or_default());
@@ -167,7 +167,7 @@ impl Checker {
         self.leases.iter().find(|(named, _)| *named == session).map_or(0, |(_, end)| *end)
     }
 
-    /// v/a + 2a/j, the slowest axis.
+    /// Worst-case braking time, v/a + 2a/j, of the slowest axis.
     fn longest_stop_us(&self) -> u64 {
         let stop = |axis: &WatchedAxis| {
             let settings = &axis.stage.settings;
@@ -177,7 +177,7 @@ impl Checker {
         self.axes.iter().map(stop).max().unwrap_or(0)
     }
 
-    /// Twice the whole search, the slow approach, and some.
+    /// Longest homing: twice the whole search, the slow approach, and a margin.
     fn longest_motion_us(&self) -> u64 {
         let motion = |axis: &WatchedAxis| {
             let homing = &axis.stage.settings.homing;
@@ -188,7 +188,7 @@ impl Checker {
         self.axes.iter().map(motion).sum()
     }
 
-    /// Bytes reach the board.
+    /// Records bytes that reach the board.
     pub fn heard_from_host(&mut self, now: Microseconds, bytes: &[u8]) {
         for &byte in bytes {
             let Some(frame) = self.from_host.push(byte) else { continue };
@@ -210,12 +210,12 @@ impl Checker {
         }
     }
 
-    /// The board has dealt with them.
+    /// Checks the board after it has processed them.
     pub fn received(&mut self, now: Microseconds, plant: &Plant) {
         self.watch_drivers(now, plant);
     }
 
-    /// A frame leaves the board.
+    /// Checks a frame that leaves the board.
     pub fn heard_from_board(&mut self, now: Microseconds, bytes: &[u8], plant: &Plant, journal: &mut Journal) {
         for &byte in bytes {
             let Some(frame) = self.from_board.push(byte) else { continue };
@@ -245,7 +245,7 @@ impl Checker {
             self.accuse(now, Promise::Mode, what);
         }
         if std::mem::take(&mut self.restarted) {
-            // The self-test may have found something since.
+            // The self-test may have found a fault since.
             let new_fault = pose.fault.is_none_or(|fault| fault.seq == 1 && fault.at <= pose.at);
             let fresh = pose.referenced == AxisMask(0) && pose.phase == MovePhase::None && new_fault;
             if !fresh {
@@ -254,7 +254,7 @@ impl Checker {
         }
     }
 
-    /// The first fault stays as it is until it is cleared by its number.
+    /// Checks that the first fault stays unchanged until it is cleared by its number.
     fn check_fault(&mut self, now: Microseconds, told: Option<FaultRecord>) {
         if let Some(first) = self.fault {
             let kept = told
@@ -271,7 +271,7 @@ impl Checker {
         if latched != pose.fault.is_some() {
             self.accuse(now, Promise::FirstFault, format!("state {} with fault {:?}", pose.state, pose.fault));
         }
-        // Latched, the drivers may hold the stages or not.
+        // While a fault is latched, the drivers may be on or off.
         let off = OFF.contains(&pose.state);
         if !latched && off == plant.drivers_on() {
             let on = plant.drivers_on();
@@ -279,7 +279,7 @@ impl Checker {
         }
     }
 
-    /// What is wrong about a reported mode.
+    /// What contradicts a reported mode; `None` where it is true.
     fn wrong_mode(&self, pose: &PoseReport) -> Option<String> {
         let Some((_, mode, targets)) = self.moves.iter().find(|(id, ..)| *id == pose.move_id) else {
             return Some(format!("mode {:?} of a move that nobody asked for", pose.mode));
@@ -294,7 +294,7 @@ impl Checker {
         })
     }
 
-    /// At the end, long after the host has fallen silent.
+    /// The checks at the end, long after the host has fallen silent.
     pub fn check_rest(&mut self, now: Microseconds) {
         if now.0.saturating_sub(self.stepped_at) < 100_000 {
             self.accuse(now, Promise::Ends, "still stepping at the end".into());

@@ -1,4 +1,4 @@
-//! What goes wrong, and when.
+//! The faults of a scenario, and when they begin.
 
 use std::fmt;
 
@@ -8,10 +8,10 @@ use vergence_plant::EncoderFault;
 
 use crate::stages::stages;
 
-/// The kinds by which scenarios are counted.
+/// Kind of fault by which scenarios are counted.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum FaultKind {
-    /// Nothing goes wrong.
+    /// No fault.
     None,
     /// Bytes are damaged, up to one in a thousand.
     ByteErrors,
@@ -19,37 +19,37 @@ pub enum FaultKind {
     Drops,
     /// Frames come twice.
     Duplicates,
-    /// The line holds everything back for up to half a second.
+    /// The line delays everything by up to half a second.
     Stall,
     /// The line is cut for a while.
     Disconnect,
     /// The board restarts, mostly in mid-move.
     Reset,
-    /// An encoder stands still.
+    /// An encoder no longer counts.
     EncoderStuck,
-    /// An encoder runs the wrong way.
+    /// An encoder counts in the wrong direction.
     EncoderReversed,
     /// An encoder becomes noisy and dies.
     EncoderDying,
     /// A home switch chatters and catches spikes.
     SwitchBounce,
-    /// A motor stands while it is stepped.
+    /// A motor stalls while steps are made.
     MotorStall,
     /// A motor loses steps in bursts.
     LostSteps,
     /// A coupling slips.
     Slip,
-    /// A load is wedged.
+    /// A load is blocked.
     BlockedLoad,
-    /// The wires of the home switches have changed places.
+    /// The wires of the home switches are swapped.
     CrossedSwitches,
-    /// The processor is kept from its control tick.
+    /// The control tick of the processor is delayed.
     LateTick,
     /// The emergency stop is pressed.
     EmergencyStop,
     /// The host's clock jumps.
     ClockJump,
-    /// Two or three of these at once.
+    /// Two or three of these faults at once.
     Several,
 }
 
@@ -78,7 +78,7 @@ impl FaultKind {
         Self::Several,
     ];
 
-    /// Its name in lower case.
+    /// The name of the kind in lower case.
     #[must_use]
     pub const fn name(self) -> &'static str {
         match self {
@@ -112,16 +112,16 @@ impl fmt::Display for FaultKind {
     }
 }
 
-/// When a fault begins: so long after the host began a step of its script.
+/// When a fault begins: a time after the host began a step of its script.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Onset {
-    /// Index of the step.
+    /// Index of the step of the script.
     pub step: usize,
-    /// Microseconds after it began.
+    /// Microseconds after the step began.
     pub after_us: u64,
 }
 
-/// One fault. Those without onset last as long as the scenario.
+/// One fault. A fault without onset lasts for the whole scenario.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Fault {
     /// Both directions damage bytes with this probability.
@@ -138,66 +138,66 @@ pub enum Fault {
     Reset(Onset),
     /// An encoder fails, for this many microseconds or for good.
     Encoder {
-        /// When.
+        /// When the fault begins.
         onset: Onset,
-        /// Whose.
+        /// Index of the axis.
         axis: usize,
-        /// How.
+        /// How the encoder fails.
         how: EncoderFault,
-        /// For how long; a noisy encoder is dead afterwards.
+        /// Duration in microseconds; a noisy encoder is dead afterwards.
         lasts_us: Option<u64>,
     },
-    /// The home switch of an axis chatters for so many microseconds after each change and spikes with this probability.
+    /// The home switch of an axis chatters after each change and spikes with a probability.
     SwitchBounce {
-        /// Whose.
+        /// Index of the axis.
         axis: usize,
-        /// Chatter after each change, microseconds.
+        /// Duration of the chatter after each change, in microseconds.
         chatter_us: u64,
         /// Probability of a wrong reading.
         spikes: f64,
     },
-    /// The rotor of an axis stands for this many microseconds.
+    /// The rotor of an axis stalls for a while.
     MotorStall {
-        /// When.
+        /// When the fault begins.
         onset: Onset,
-        /// Whose.
+        /// Index of the axis.
         axis: usize,
-        /// For how long.
+        /// Duration in microseconds.
         lasts_us: u64,
     },
-    /// An axis loses so many steps at the onset and again after this many microseconds.
+    /// An axis loses steps in two bursts.
     LostSteps {
-        /// When.
+        /// When the fault begins.
         onset: Onset,
-        /// Whose.
+        /// Index of the axis.
         axis: usize,
-        /// Steps of a motor that turns.
+        /// Number of steps lost while the motor turns.
         steps: u32,
-        /// Time to the second burst.
+        /// Time from the first to the second burst, in microseconds.
         again_us: u64,
     },
-    /// The coupling of an axis slips by a share of every step for this many microseconds.
+    /// The coupling of an axis slips by a share of every step for a while.
     Slip {
-        /// When.
+        /// When the fault begins.
         onset: Onset,
-        /// Whose.
+        /// Index of the axis.
         axis: usize,
-        /// By how much of each step; below zero the load goes further than the motor.
+        /// Share of each step; below zero the load goes further than the motor.
         share: f64,
-        /// For how long.
+        /// Duration in microseconds.
         lasts_us: u64,
     },
-    /// The wires of the home switches have changed places from the first day on.
+    /// The wires of the home switches are swapped from the start.
     CrossedSwitches,
-    /// The next control tick comes so many microseconds late.
+    /// The next control tick comes late by this many microseconds.
     LateTick(Onset, u64),
-    /// The load of an axis is wedged for this many microseconds.
+    /// The load of an axis is blocked for a while.
     BlockedLoad {
-        /// When.
+        /// When the fault begins.
         onset: Onset,
-        /// Whose.
+        /// Index of the axis.
         axis: usize,
-        /// For how long.
+        /// Duration in microseconds.
         lasts_us: u64,
     },
     /// The emergency stop is pressed for this many microseconds.
@@ -214,7 +214,7 @@ impl Fault {
         let lasts_us = random.random_range(5_000..1_500_000);
         vec![match kind {
             FaultKind::None => return Vec::new(),
-            // Evenly over the orders of magnitude, to 10⁻³.
+            // Uniform in the logarithm, up to 10⁻³.
             FaultKind::ByteErrors => Self::ByteErrors(10_f64.powf(random.random_range(-5.0..-3.0))),
             FaultKind::Drops => Self::Drops(random.random_range(0.01..0.15)),
             FaultKind::Duplicates => Self::Duplicates(random.random_range(0.01..0.3)),
@@ -226,7 +226,7 @@ impl Fault {
                 Self::Encoder { onset, axis, how: EncoderFault::Stuck, lasts_us }
             }
             FaultKind::EncoderReversed => {
-                // Some are wired so from the first day on.
+                // Some boards are wired this way from the start.
                 let onset = if random.random_bool(0.3) { Onset { step: 0, after_us: 0 } } else { onset };
                 Self::Encoder { onset, axis, how: EncoderFault::Reversed, lasts_us: None }
             }

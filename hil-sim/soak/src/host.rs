@@ -1,5 +1,5 @@
-//! A scripted host: it wants things done, keeps the board alive, asks again, clears faults, and in the end gives up.
-//! It never takes up motion again by itself: every arm, home and move is asked for anew.
+//! A scripted host: it executes its script, sends heartbeats, repeats requests, clears faults, and gives up in the end.
+//! It never resumes motion by itself: every arm, home and move is requested anew.
 
 use vergence_protocol::{
     AxisMask, ControllerState, FaultRecord, HostEvent, HostSession, Jog, MAX_FRAME, Microseconds, Move, MoveId,
@@ -9,24 +9,24 @@ use vergence_protocol::{
 use crate::scenario::{Destination, Step};
 use crate::stages::stages;
 
-/// How long the board may go without hearing from the host.
+/// Lease of the host.
 const LEASE_MS: u16 = 100;
 const BEAT_US: u64 = 20_000;
 const POSE_PERIOD_US: u32 = 10_000;
-/// A board that was silent for so long is called anew.
+/// Silence of the board after which the host opens a new session.
 const SILENCE_US: u64 = 300_000;
-/// Before what was refused is asked again.
+/// Time before a refused request is repeated.
 const PAUSE_US: u64 = 100_000;
-/// A person needs longer than this to see what went wrong and mend it.
+/// Time before a fault is cleared, less than a person needs to find and remove its cause.
 const MEND_US: u64 = 300_000;
-/// A request that a talking board has not answered after so many turns (milliseconds) never will be.
+/// Milliseconds without an answer after which a request to a talking board counts as unanswered.
 const PATIENCE: u32 = 6_000;
-/// When to give up: faults cleared, sessions opened, requests for one step of the script.
+/// Limits after which the host gives up: faults cleared, sessions opened, requests for one step of the script.
 const MOST_FAULTS: u32 = 4;
 const MOST_SESSIONS: u32 = 30;
 const MOST_REQUESTS: u32 = 60;
 
-/// What the latest pose said.
+/// The content of the latest pose.
 #[derive(Clone, Copy, Debug)]
 struct Seen {
     state: ControllerState,
@@ -41,7 +41,7 @@ enum Purpose {
     Arm,
     Home,
     Move(MoveId),
-    /// Another target in mid-move.
+    /// A new target in mid-move.
     Turn(MoveId),
     Jog(MoveId),
     Forbidden,
@@ -56,16 +56,16 @@ struct Asked {
     turns: u32,
 }
 
-/// How the script ended for the host.
+/// How the script ended.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum HostEnd {
-    /// Everything was done.
+    /// The script was completed.
     Done,
     /// Too many faults.
     GaveUp,
-    /// The board talks but does not answer.
+    /// The board sends frames but does not answer.
     Unanswered,
-    /// The board did what it had to refuse.
+    /// The board accepted a request that it had to refuse.
     ForbiddenAccepted,
 }
 
@@ -75,13 +75,13 @@ pub struct Host {
     script: Vec<Step>,
     step: usize,
     beat_due: Microseconds,
-    /// When the session was called or last heard.
+    /// When the session was opened, or the board last answered.
     heard: Microseconds,
     streaming: bool,
     asked: Option<Asked>,
     seen: Option<Seen>,
     wait_until: Microseconds,
-    /// What the running step has asked for and got.
+    /// The requests of the running step, and their answers.
     homed: bool,
     going: Option<MoveId>,
     stop_due: Option<Microseconds>,
@@ -89,12 +89,12 @@ pub struct Host {
     turned: bool,
     next_move: u16,
     requests: u32,
-    /// The fault that was looked at last.
+    /// The fault that was handled last.
     mending: Option<u16>,
     faults: u32,
     sessions: u32,
     end: Option<HostEnd>,
-    /// What it did, since the last look.
+    /// Journal entries not taken yet.
     pub notes: Vec<String>,
 }
 
@@ -127,12 +127,12 @@ impl Host {
         host
     }
 
-    /// Which step of the script it is at.
+    /// Index of the present step of the script.
     pub fn step(&self) -> usize {
         self.step
     }
 
-    /// Whether and how it has ended: it says nothing any more.
+    /// How the script has ended; the host is silent then.
     pub fn end(&self) -> Option<HostEnd> {
         self.end
     }
@@ -149,7 +149,7 @@ impl Host {
         }
     }
 
-    /// One turn, each millisecond: decides what to do and sends.
+    /// Runs the host for one millisecond: it decides what to do, and sends.
     pub fn turn(&mut self, now: Microseconds, mut send: impl FnMut(&[u8])) {
         if self.end.is_none() {
             self.keep_alive(now);
@@ -174,7 +174,7 @@ impl Host {
         self.streaming = false;
         self.asked = None;
         self.seen = None;
-        // What was asked for belonged to the session that is gone.
+        // The requests belonged to the session that ended.
         self.homed = false;
     }
 
@@ -185,7 +185,7 @@ impl Host {
         }
         if self.session.is_open() && now >= self.beat_due {
             let beat = Request::Heartbeat { session: self.session.id(), lease_ms: LEASE_MS };
-            // Where the queue is full another one is on its way.
+            // Where the queue is full, another heartbeat is on its way.
             let _ = self.session.send_now(beat);
             self.beat_due = Microseconds(now.0 + BEAT_US);
         }
@@ -207,7 +207,7 @@ impl Host {
         {
             self.notes.push("host: Stop".into());
             let _ = self.session.send_now(Request::Stop { kind: StopKind::Decelerate });
-            // Nobody repeats it but the host; a second one is as good as the first.
+            // The session does not repeat it; a second one has the same effect as the first.
             self.stop_due = Some(Microseconds(now.0 + PAUSE_US));
         }
         if !self.streaming {
@@ -235,7 +235,7 @@ impl Host {
         self.ask(now, Purpose::Clear, Request::ClearFault { seen: fault.seq });
     }
 
-    /// Goes on with a step, given what the board does.
+    /// Continues with a step, depending on the state of the board.
     fn pursue(&mut self, now: Microseconds, step: Step, seen: Seen) {
         if seen.state == ControllerState::Moving
             && let Step::Retarget(_, _, to) = step
@@ -261,7 +261,7 @@ impl Host {
             _ if idle => self.ask(now, Purpose::Arm, Request::Arm { session }),
             Step::Arm => self.next_step(),
             Step::Home if self.homed && seen.referenced => self.next_step(),
-            // Once only: one after the other may end at a hard limit.
+            // Once only: several in sequence may end at a hard limit.
             Step::Jog(_) if self.going.is_some() => self.next_step(),
             Step::Jog(by) => {
                 let id = self.name_move();
@@ -335,7 +335,7 @@ impl Host {
 
     fn answered(&mut self, now: Microseconds, ticket: Ticket, status: Status) {
         let Some(asked) = self.asked.take_if(|asked| asked.ticket == ticket) else { return };
-        // The next pose is younger than the answer.
+        // Wait for a pose that is newer than the answer.
         self.seen = None;
         if let Status::Refused(why) = status {
             self.notes.push(format!("host: refused: {why}"));
@@ -378,7 +378,7 @@ impl Host {
         });
     }
 
-    /// With a last word: off.
+    /// Ends, after switching the drivers off.
     fn give_up(&mut self, why: &str) {
         self.notes.push(format!("host: gives up, {why}"));
         let _ = self.session.send_now(Request::Stop { kind: StopKind::TorqueOff });

@@ -1,4 +1,4 @@
-//! Makes faults happen at their instants.
+//! Makes faults happen at their times.
 
 use vergence_plant::{AxisPlant, EncoderFault, Plant, SwitchNoise};
 use vergence_protocol::Microseconds;
@@ -10,14 +10,14 @@ use crate::line::Line;
 use crate::promise::Sight;
 use crate::scenario::Scenario;
 
-/// Everything that can be harmed.
+/// Everything that faults can act on.
 pub struct World<'a> {
     pub now: Microseconds,
-    /// Where the host's script is, and for how long.
+    /// The present step of the host's script, and since when.
     pub step: usize,
     pub in_step_us: u64,
     pub plant: &'a mut Plant,
-    /// How long the processor is kept from its next tick.
+    /// Delay of the next control tick.
     pub late_us: &'a mut u64,
     pub lines: [&'a mut Line; 2],
     pub host_offset: &'a mut i64,
@@ -45,7 +45,7 @@ impl Injector {
         Self { faults, seed: scenario.seed }
     }
 
-    /// Begins and ends what is due; true where the board restarts now.
+    /// Begins and ends the faults that are due; returns whether the board restarts now.
     pub fn inject(&mut self, world: &mut World<'_>) -> bool {
         let mut restart = false;
         for (fault, progress) in &mut self.faults {
@@ -90,7 +90,7 @@ fn is_due(fault: &Fault, world: &World<'_>) -> bool {
     world.step > step || world.step == step && world.in_step_us >= after_us
 }
 
-/// Begins a fault; gives how long until something is to be done about it again.
+/// Begins a fault; returns the time until its next change.
 fn begin(fault: &Fault, seed: u64, world: &mut World<'_>) -> Option<u64> {
     match *fault {
         Fault::Stall(_, us) => {

@@ -1,4 +1,4 @@
-//! What happened in a scenario, for people.
+//! The events of a scenario as text.
 
 use std::fmt;
 
@@ -11,7 +11,7 @@ pub struct Journal {
 }
 
 impl Journal {
-    /// Writes down what happens at `at`, true time.
+    /// Adds an event at the true time `at`.
     pub fn note(&mut self, at: Microseconds, what: impl Into<String>) {
         self.events.push((at, what.into()));
     }

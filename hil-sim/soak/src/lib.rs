@@ -1,23 +1,23 @@
 //! Fault injection over the whole stack in virtual time, seeded: a scripted host, a line in both directions, the real
-//! controller and simulated mechanics; one fault, or several, in each scenario; and a checker that looks on.
+//! controller and simulated mechanics; one fault, or several, in each scenario; and a checker.
 //!
-//! [`Scenario::of`] draws a scenario from its seed, [`run`] plays it. The checker shares no code with the
-//! controller. It knows the truth of the mechanics and the bytes on the line, and holds the board to these promises:
+//! [`Scenario::of`] draws a scenario from its seed, [`run`] runs it. The checker shares no code with the
+//! controller. It knows the true mechanics and the bytes on the line, and checks these promises of the board:
 //!
-//! - The load stays inside the hard limit switches, but for what no controller can take back: the way of one control
-//!   tick at full speed, and the lag of the load behind its motor.
-//! - Drivers go on only where a session with a live lease asks for it. Motors step only while they are on, and no longer
-//!   after the end of the lease than braking takes in the worst case, v/a + 2a/j: an acceleration that is still growing
-//!   must be taken back first. A move that is asked for before arming, before homing or beyond the range is refused.
+//! - The load stays inside the hard limit switches, except for the distance that no controller can avoid: that of one
+//!   control tick at full speed, and the lag of the load behind its motor.
+//! - Drivers go on only where a session with a live lease asks for it. Motors step only while they are on, and no
+//!   longer after the end of the lease than braking takes in the worst case, v/a + 2a/j: an acceleration that is still growing
+//!   must be reduced first. A move that is asked for before arming, before homing or beyond the range is refused.
 //! - An axis without reference moves no faster than homing does.
 //! - A mode is reported only while the true load is at its target: within the tolerance of the axis, the error of its
-//!   reference, and one encoder count. An encoder that lies cannot be seen through at once: from its failure on the
-//!   largest following error is granted on top.
+//!   reference, and one encoder count. A failed encoder cannot be noticed at once: from its failure on the
+//!   largest following error is added.
 //! - An encoder that stands still, runs backwards or is dead stops its axis: with drivers on, the load goes no further
 //!   than the largest following error and the repeatability of homing.
 //! - The first fault is repeated in every pose until it is cleared by its number.
-//! - What a pose says of the drivers is true; after a restart nothing is armed, referenced or remembered.
-//! - Every motion and every request ends; in the end everything stands still.
+//! - The state of the drivers in a pose is true; after a restart nothing is armed, referenced or latched.
+//! - Every motion and every request ends; in the end everything is at rest.
 
 mod checker;
 mod faults;

@@ -1,4 +1,4 @@
-//! One direction of a serial line: late, and sometimes wrong.
+//! One direction of a serial line, with delays and errors.
 
 use std::collections::VecDeque;
 
@@ -6,21 +6,21 @@ use rand::RngExt;
 use rand_pcg::Pcg64Mcg;
 use vergence_protocol::Microseconds;
 
-/// Nanoseconds that a byte takes at 921 600 baud, ten bits each.
+/// Duration of a byte of ten bits at 921 600 baud, in nanoseconds.
 const BYTE_NS: u64 = 10_851;
 
-/// What goes wrong all the time, as probabilities.
+/// Probabilities of the errors that occur all the time.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct LineFaults {
-    /// That a byte is damaged.
+    /// Probability that a byte is damaged.
     pub byte_errors: f64,
-    /// That a frame, or its end, is lost.
+    /// Probability that a frame, or its end, is lost.
     pub drops: f64,
-    /// That a frame comes twice.
+    /// Probability that a frame comes twice.
     pub duplicates: f64,
 }
 
-/// Bytes under way, in order.
+/// Bytes on their way, in order.
 #[derive(Debug)]
 pub struct Line {
     faults: LineFaults,
@@ -29,16 +29,16 @@ pub struct Line {
     /// Bytes that pass undamaged before the next damaged one.
     good_bytes: u64,
     bytes: VecDeque<u8>,
-    /// When so many bytes more arrive.
+    /// Arrival times, with the number of bytes that arrive then.
     arrivals: VecDeque<(u64, usize)>,
-    /// When the wire is free again, nanoseconds.
+    /// Time at which the wire is free again, in nanoseconds.
     busy_until_ns: u64,
     held_until: u64,
     cut_until: u64,
 }
 
 impl Line {
-    /// A quiet line that starts to go wrong with the first byte.
+    /// A quiet line, whose errors begin with the first byte.
     pub fn new(faults: LineFaults, latency_us: u64, random: Pcg64Mcg) -> Self {
         let mut line = Self {
             faults,
@@ -60,7 +60,7 @@ impl Line {
         self.held_until = until.0;
     }
 
-    /// Loses what is under way and what is sent before `until`.
+    /// Loses the bytes on their way and those sent before `until`.
     pub fn cut(&mut self, until: Microseconds) {
         self.cut_until = until.0;
         self.bytes.clear();
@@ -80,7 +80,7 @@ impl Line {
         }
     }
 
-    /// Moves what has arrived by `now` to the end of `into`.
+    /// Appends the bytes that have arrived by `now` to `into`.
     pub fn deliver(&mut self, now: Microseconds, into: &mut Vec<u8>) {
         if now.0 < self.held_until {
             return;
@@ -112,7 +112,7 @@ impl Line {
         probability > 0.0 && self.random.random_bool(probability)
     }
 
-    /// Geometrically distributed.
+    /// Draws the number of undamaged bytes before the next damaged one: geometrically distributed.
     fn bytes_to_next_error(&mut self) -> u64 {
         let p = self.faults.byte_errors;
         if p <= 0.0 {

@@ -1,42 +1,42 @@
-//! What is promised, and a promise broken.
+//! The promises, and the record of a broken one.
 
 use std::fmt;
 
 use vergence_protocol::Microseconds;
 
-/// What is promised.
+/// A promise of the board.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Promise {
     /// The load stays inside the hard limit switches.
     HardLimit,
-    /// Drivers go on only where a session with a live lease arms; motors step only with drivers on.
+    /// Drivers go on only when a session with a valid lease arms; motors step only with drivers on.
     Armed,
-    /// Motors stop in time after the lease.
+    /// Motors stop in time after the lease expires.
     Lease,
-    /// Moves that must not be are refused.
+    /// Moves that are not allowed are refused.
     Refuses,
     /// Without reference no axis moves faster than homing does.
     Gentle,
-    /// A mode is reported only at its place.
+    /// A mode is reported only while the load is at its target.
     Mode,
     /// An axis whose encoder is lost stops.
     Follows,
     /// The first fault is kept until it is cleared.
     FirstFault,
-    /// What a pose says of the board is true.
+    /// The state of the board in a pose is true.
     State,
-    /// Every motion and every request ends, and in the end everything stands still.
+    /// Every motion and every request ends, and in the end everything is at rest.
     Ends,
 }
 
 /// A broken promise.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Violation {
-    /// When, true time.
+    /// The true time.
     pub at: Microseconds,
-    /// Which.
+    /// The promise.
     pub promise: Promise,
-    /// What was seen.
+    /// What contradicts it.
     pub what: String,
 }
 
@@ -46,13 +46,13 @@ impl fmt::Display for Violation {
     }
 }
 
-/// What an encoder shows of its load.
+/// What an encoder shows of the position of its load.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Sight {
-    /// The truth.
+    /// The true position.
     Clear,
-    /// The truth with noise.
+    /// The true position with noise.
     Blurred,
-    /// Nothing.
+    /// Unrelated to the position.
     Lost,
 }

@@ -1,4 +1,4 @@
-//! A scenario: what the host wants, what goes wrong, and where the stages stand.
+//! A scenario: the script of the host, the faults, and the positions of the stages at the start.
 
 use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64Mcg;
@@ -14,10 +14,10 @@ const HUMAN: Destination = Destination { mode: Mode(2), targets: [Micro(145_000)
 /// Modes of random places.
 const ANYWHERE: Mode = Mode(3);
 
-/// Where a move goes.
+/// The target of a move.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Destination {
-    /// The mode that it is.
+    /// The mode that the target is.
     pub mode: Mode,
     /// Target of each axis.
     pub targets: [Micro; 2],
@@ -25,26 +25,27 @@ pub struct Destination {
     pub speed: Permille,
 }
 
-/// What the host does next. It does what must come before by itself: arms, homes, clears faults.
+/// One step of the script. The host arms, homes and clears faults by itself where a step needs it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Step {
-    /// Ask for a move while disarmed or without reference: it must be refused. Passed over where both are there.
+    /// Ask for a move while disarmed or without reference: it must be refused. Skipped where the board is armed and
+    /// referenced.
     MoveTooEarly(Destination),
     /// Arm.
     Arm,
-    /// Find the reference of all axes.
+    /// Homes all axes.
     Home,
-    /// Go there and wait for the mode.
+    /// Go to the target and wait for its mode.
     Move(Destination),
-    /// Ask for a target beyond the range: it must be refused.
+    /// Requests a target beyond the range, which must be refused.
     MoveTooFar(Destination),
-    /// Go to the first and, after so many microseconds, in mid-move to the second.
+    /// Go to the first target and, after so many microseconds in mid-move, to the second.
     Retarget(Destination, u64, Destination),
-    /// Go by so much on each axis, at full speed; passed over where that would leave the range.
+    /// Go by so much on each axis, at full speed; skipped where that would leave the range.
     Jog([Micro; 2]),
-    /// Go there but stop after so many microseconds.
+    /// Go to the target but stop after so many microseconds.
     MoveAndStop(Destination, u64),
-    /// Do nothing for so many microseconds.
+    /// Waits for this many microseconds.
     Pause(u64),
     /// Disarm.
     Disarm,
@@ -53,24 +54,24 @@ pub enum Step {
 /// One scenario.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Scenario {
-    /// What it was drawn from.
+    /// The seed from which the scenario was drawn.
     pub seed: u64,
-    /// What it is counted as.
+    /// The kind of fault that it counts as.
     pub kind: FaultKind,
-    /// What goes wrong.
+    /// The faults.
     pub faults: Vec<Fault>,
-    /// What the host wants.
+    /// The script of the host.
     pub script: Vec<Step>,
-    /// Where the stages stand at the start, micro-units.
+    /// Positions of the stages at the start, in micro-units.
     pub positions: [f64; 2],
-    /// How long bytes take through adapter and driver at least, microseconds; their time on the wire is added.
+    /// Least delay of bytes in adapter and driver, in microseconds; their time on the wire is added.
     pub latency_us: u64,
-    /// Between the board's ticks and the instants at which the host runs, microseconds.
+    /// Offset between the board's ticks and the instants at which the host runs, in microseconds.
     pub phase_us: u64,
 }
 
 impl Scenario {
-    /// The scenario of this seed.
+    /// Draws the scenario of a seed.
     #[must_use]
     pub fn of(seed: u64) -> Self {
         let random = &mut Pcg64Mcg::seed_from_u64(seed);
@@ -98,7 +99,7 @@ fn script(random: &mut Pcg64Mcg) -> Vec<Step> {
         script.push(Step::MoveTooEarly(HUMAN));
     }
     if random.random_bool(0.3) {
-        // Upwards only, and less than from the highest start to the hard limit: without reference nobody looks out.
+        // Upwards only, and less than from the highest start to the hard limit: without reference no limit is checked.
         script.push(Step::Jog([2_000, 35_000].map(|most| Micro(random.random_range(0..most)))));
     }
     script.push(Step::Home);
@@ -130,7 +131,7 @@ fn anywhere(random: &mut Pcg64Mcg) -> Destination {
     Destination { mode: ANYWHERE, targets, speed: Permille(random.random_range(400..=1000)) }
 }
 
-/// Beyond the range of one axis, by up to a quarter of it.
+/// A target beyond the range of one axis, by up to a quarter of the range.
 fn too_far(random: &mut Pcg64Mcg) -> Destination {
     let mut destination = anywhere(random);
     let axis = random.random_range(0..destination.targets.len());
@@ -141,7 +142,7 @@ fn too_far(random: &mut Pcg64Mcg) -> Destination {
     destination
 }
 
-/// From just off the frame to the end of the range; mostly low, where homing is quick.
+/// A start position from just off the mechanical end to the end of the range; mostly low, where homing is quick.
 fn positions(random: &mut Pcg64Mcg) -> [f64; 2] {
     stages().map(|stage| {
         let low = f64::midpoint(stage.mechanics.home_switch, stage.mechanics.hard_limits[0]);

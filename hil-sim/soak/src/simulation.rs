@@ -1,4 +1,4 @@
-//! Host, line, board and mechanics in virtual time.
+//! Runs host, line, board and mechanics in virtual time.
 
 use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64Mcg;
@@ -16,30 +16,30 @@ use crate::promise::{Promise, Violation};
 use crate::scenario::Scenario;
 use crate::stages::stages;
 
-/// How often everything is looked at.
+/// Period of the host and of the checks.
 const TURN_US: u64 = 1_000;
-/// No scenario lasts longer.
+/// Longest duration of a scenario.
 const LONGEST_US: u64 = 180_000_000;
-/// How long the board is watched after the host has fallen silent: its lease, the longest braking, and some.
+/// How long the board is checked after the host has fallen silent: its lease, the longest braking, and a margin.
 const TAIL_US: u64 = 800_000;
-/// The host's clock at the start: what jumps back stays positive.
+/// The host's clock at the start, so that it stays positive when it jumps back.
 const HOST_START_US: u64 = 10_000_000;
 
-/// What a scenario needs of a board.
+/// What a scenario needs from a board.
 pub trait Board {
     /// Lets time pass until `to` on the board's clock.
     fn advance(&mut self, to: Microseconds);
     /// Takes bytes that arrive now.
     fn receive(&mut self, bytes: &[u8]);
-    /// All frames that leave now, one after the other.
+    /// Takes all frames that leave now, one after the other.
     fn transmit(&mut self) -> Vec<u8>;
-    /// Keeps the processor from its next control tick for so many microseconds.
+    /// Delays the next control tick by so many microseconds.
     fn delay_tick(&mut self, us: u64);
-    /// Restarts in whatever it is doing; its clock begins again at zero.
+    /// Restarts the board in any state; its clock begins again at zero.
     fn restart(&mut self, boot: u32);
-    /// The mechanics: the truth.
+    /// The simulated mechanics, which know the true positions.
     fn plant(&self) -> &Plant;
-    /// The mechanics, for doing something to them.
+    /// The mechanics, to change them.
     fn plant_mut(&mut self) -> &mut Plant;
 }
 
@@ -61,7 +61,7 @@ impl Board for NativeBoard {
     }
 
     fn restart(&mut self, boot: u32) {
-        // Its settings were good enough for the first start.
+        // The settings were accepted at the first start.
         let _ = self.restart(ResetCause::Watchdog, boot);
     }
 
@@ -74,7 +74,7 @@ impl Board for NativeBoard {
     }
 }
 
-/// The board of a scenario as it should be.
+/// The real controller as the board of a scenario, without planted faults.
 ///
 /// # Errors
 /// [`SettingsError`] where the stages cannot be controlled.
@@ -91,26 +91,26 @@ fn boot_number(seed: u64) -> u32 {
 /// How a scenario ended.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Ending {
-    /// The host has done all that it wanted.
+    /// The host has completed its script.
     Completed,
-    /// The host gave up and everything stands still.
+    /// The host gave up and everything is at rest.
     SafeStop,
 }
 
-/// What became of a scenario.
+/// The outcome of a scenario.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Outcome {
-    /// How it ended; says nothing where promises were broken.
+    /// How the scenario ended; without meaning where promises were broken.
     pub ending: Ending,
-    /// Promises that were broken, each once.
+    /// Broken promises, each once.
     pub violations: Vec<Violation>,
-    /// How long it took in virtual time.
+    /// Duration in virtual time.
     pub virtual_time: Microseconds,
-    /// What happened.
+    /// The events.
     pub journal: Journal,
 }
 
-/// Plays `scenario` with `board`, freshly switched on.
+/// Runs `scenario` with `board`, just switched on.
 pub fn run(scenario: &Scenario, board: &mut impl Board) -> Outcome {
     Simulation::new(scenario, board).play()
 }
@@ -179,7 +179,7 @@ impl<'a, B: Board> Simulation<'a, B> {
         self.board.advance(Microseconds(now.0 - self.board_start));
         self.checker.watch(now, self.board.plant());
         let frames = self.board.transmit();
-        // Every frame ends with the one zero byte in it.
+        // Every frame ends with its only zero byte.
         for frame in frames.split_inclusive(|&byte| byte == 0) {
             self.checker.heard_from_board(now, frame, self.board.plant(), &mut self.journal);
             self.to_host.send(now, frame);

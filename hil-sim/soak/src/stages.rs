@@ -1,8 +1,8 @@
-//! The stages that are soaked: the bench's kind.
+//! The stages of all scenarios: those of the bench.
 
 use vergence_plant::{Stage, bench_mechanics, bench_settings};
 
-/// Baseline and separation, as the bench has them.
+/// Baseline and separation of the bench.
 #[must_use]
 pub fn stages() -> [Stage; 2] {
     let [first, second] = bench_settings();

@@ -1,4 +1,4 @@
-//! Many scenarios, counted by kind.
+//! Counts of many scenarios, by kind.
 
 use rayon::prelude::*;
 use vergence_control::SettingsError;
@@ -11,34 +11,34 @@ use crate::simulation::{Ending, native_board, run};
 /// The scenarios of one kind.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct KindTally {
-    /// Which kind.
+    /// The kind of fault.
     pub kind: FaultKind,
-    /// How many there were.
+    /// Number of scenarios.
     pub scenarios: u64,
-    /// How many ended with everything at rest after the host gave up.
+    /// Number that ended with everything at rest after the host gave up.
     pub safe_stops: u64,
-    /// In how many the host has done all that it wanted.
+    /// Number in which the host completed its script.
     pub completed: u64,
-    /// In how many a promise was broken.
+    /// Number in which a promise was broken.
     pub violated: u64,
 }
 
-/// What became of many scenarios.
+/// The outcomes of many scenarios.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Tally {
-    /// Each kind, in the order of [`FaultKind::ALL`].
+    /// The counts of each kind, in the order of [`FaultKind::ALL`].
     pub by_kind: Vec<KindTally>,
-    /// Broken promises and the seeds of their scenarios, in the order of the seeds.
+    /// Broken promises with the seeds of their scenarios, ordered by seed.
     pub violations: Vec<(u64, Violation)>,
     /// Virtual time of all scenarios together, seconds.
     pub virtual_seconds: f64,
 }
 
-/// Plays the scenarios of `count` seeds from `first` on with the board as it should be, on all cores; `progress` is
+/// Runs the scenarios of `count` seeds from `first` on with the real controller, on all cores; `progress` is
 /// called after each, on any of them. The result does not depend on how many there are.
 ///
 /// # Errors
-/// [`SettingsError`] where the stages cannot be controlled.
+/// [`SettingsError`] if the stages cannot be controlled.
 pub fn soak(first: u64, count: u64, progress: impl Fn() + Sync) -> Result<Tally, SettingsError> {
     let results: Vec<_> = (0..count)
         .into_par_iter()

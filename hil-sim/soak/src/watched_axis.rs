@@ -1,4 +1,4 @@
-//! One axis under watch: the truth of its mechanics, and what its encoder can have told the board.
+//! One axis under observation: its true mechanics, and what the board can know from its encoder.
 
 use vergence_control::RigIo;
 use vergence_plant::{Plant, Stage};
@@ -6,30 +6,30 @@ use vergence_plant::{Plant, Stage};
 use crate::faults::Fault;
 use crate::promise::Sight;
 
-/// The control tick, and how finely truth is looked at.
+/// The control tick, which is also the period at which the truth is checked.
 const TICK_S: f64 = 1e-3;
-/// A contact that closes for good is told from a spike within this time; a spike shortly before may pass for its edge.
+/// Time within which a lasting contact is told from a spike; a spike shortly before may pass for its edge.
 const DEBOUNCE_S: f64 = 10e-3;
-/// A speed is kept to this share, and to the steps that rounding moves from one tick to the next.
+/// Tolerance of a speed as a share; steps that rounding moves from one tick to the next are added.
 const SPEED_SHARE: f64 = 1.01;
 
 #[derive(Debug)]
 pub struct WatchedAxis {
     pub stage: Stage,
     pub sight: Sight,
-    /// Whether its encoder has ever lied.
+    /// Whether the encoder has ever failed.
     pub lied: bool,
-    /// How far the reference may be off.
+    /// Largest error of the reference.
     pub reference_error: f64,
     pub steps: i32,
     pub load: f64,
-    /// Where the load was when it was lost from sight with drivers on.
+    /// Position of the load when its encoder was lost with the drivers on.
     pub lost_at: Option<f64>,
 }
 
 impl WatchedAxis {
     pub fn new(index: usize, stage: Stage, faults: &[Fault], plant: &Plant) -> Self {
-        // The reference is the edge seen at a tick.
+        // The reference is the switch's edge, observed at a tick.
         let chatter = faults.iter().find_map(|fault| match *fault {
             Fault::SwitchBounce { axis, chatter_us, .. } if axis == index => {
                 Some(chatter_us as f64 * 1e-6 + DEBOUNCE_S)
@@ -48,7 +48,7 @@ impl WatchedAxis {
         }
     }
 
-    /// What no controller can take back: the way of a tick at full speed, and the load's lag behind its motor.
+    /// The distance that no controller can avoid: that of a tick at full speed, and the load's lag behind its motor.
     pub fn overshoot(&self) -> f64 {
         let mechanics = &self.stage.mechanics;
         f64::from(self.stage.settings.speed) * (TICK_S + mechanics.compliance) + mechanics.backlash
@@ -60,7 +60,7 @@ impl WatchedAxis {
         (beyond > self.overshoot()).then(|| format!("{beyond:.1} beyond its hard limit, at {:.1}", self.load))
     }
 
-    /// Without reference nobody knows what is in the way: homing speed at most.
+    /// The speed limit: homing speed without a reference, because obstacles are unknown then.
     pub fn check_gentle(&self, made: i32) -> Option<String> {
         let settings = &self.stage.settings;
         let step = f64::from(settings.motor().position_at(1_000_000).0) * 1e-6;

@@ -1,4 +1,4 @@
-//! The checker is tested itself: a board with a planted fault of each kind is caught.
+//! Tests of the checker itself: it catches a board with a planted fault of each kind.
 #![allow(clippy::unwrap_used, reason = "a test fails by panic")]
 
 mod planted_board;

@@ -28,7 +28,7 @@ fn seal(header: ImageHeader) -> Seal {
     Seal { header, signature: Signature { r, s } }
 }
 
-/// Boot loader, and the application in its own words and in others.
+/// The boot loader, and the application with its own bytes and with exchanged registers.
 fn programs() -> (Firmware, [SignedImage; 2]) {
     let [application, boot_loader] = ["vergence-nucleo-g474", "vergence-bootloader"].map(|package| {
         let bytes = std::fs::read(build::build(package)).expect("cargo says where the ELF is");
@@ -103,8 +103,8 @@ fn waiting_that_is_skipped_changes_nothing() {
     assert!(skipped.0[4].3 > 500, "a page and more was copied");
 }
 
-/// embassy-boot 0.7 erases the state page while it still says "swap". Where that was cut the old state could outlive the
-/// progress of the swap, which was then made once more over its own result.
+/// embassy-boot 0.7 erases the state page while it still says "swap". After a cut there, the old state could persist
+/// longer than the progress of the swap, which was then repeated over its own result.
 #[test]
 fn a_cut_in_the_erasure_that_ends_a_trial_spoils_no_image() {
     for journey in [Journey::Update, Journey::GoingBack] {

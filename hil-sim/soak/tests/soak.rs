@@ -1,4 +1,4 @@
-//! Scenarios by the hundred, and the same ones again.
+//! Hundreds of scenarios: no promise is broken, and the same seeds give the same result.
 #![allow(clippy::unwrap_used, reason = "a test fails by panic")]
 
 use std::sync::atomic::{AtomicU64, Ordering};
@@ -34,7 +34,7 @@ fn hosts_jog_and_change_their_minds_in_mid_move() {
     }
 }
 
-/// What leaves the mechanics and the encoders whole must not keep a host from what it wants.
+/// A fault that leaves mechanics and encoders intact must not keep a host from completing its script.
 #[test]
 fn faults_of_line_and_host_delay_but_do_not_defeat() {
     let tally = soak(1_000, 200, || {}).unwrap();
@@ -78,8 +78,8 @@ fn seed_435_spikes_on_the_home_switch() {
     assert_eq!(outcome.ending, Ending::Completed);
 }
 
-/// Regression: an encoder that died at a restart failed the self-test before the first pose; the checker took that for a
-/// memory of what was before.
+/// Regression: an encoder that died at a restart failed the self-test before the first pose; the checker took that for
+/// a memory of what was before.
 #[test]
 fn seed_6601_a_self_test_fails_after_a_restart() {
     let outcome = play(6601);

@@ -1,4 +1,4 @@
-//! Runs one instruction form on registers, flags and memory of our choice.
+//! Runs one instruction form on given registers, flags and memory.
 
 use core::arch::naked_asm;
 
@@ -22,7 +22,7 @@ macro_rules! forms {
     };
 }
 
-/// The machine state a form sees and leaves. `run` in assembly knows this layout.
+/// The machine state before and after a form. `run` in assembly knows this layout.
 #[repr(C)]
 pub struct Context {
     code: unsafe extern "C" fn(),

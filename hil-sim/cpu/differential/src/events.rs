@@ -1,4 +1,4 @@
-//! What the exception handlers see, and what they do about it.
+//! What the exception handlers record, and how they act.
 
 use core::arch::{asm, naked_asm};
 use core::sync::atomic::{AtomicBool, AtomicU32, Ordering::Relaxed};
@@ -12,7 +12,7 @@ const ISPR0: *mut u32 = 0xe000_e200 as *mut u32;
 const HARD_FAULT: u32 = 3;
 const USAGE_FAULT: u32 = 6;
 const T_BIT: u32 = 1 << 24;
-/// How far from its start code under test reaches; farther is somewhere else, and logged as it is.
+/// Length of the code under test; addresses beyond it are logged unchanged.
 const NEAR: u32 = 0x100;
 /// Marks of a handler's beginning and end among the events.
 const ENTER: u32 = 0xe000_0000;

@@ -9,7 +9,7 @@ const MIDDLE: Field = Field(0, 3, 5);
 const HIGH: Field = Field(0, 6, 5);
 const TOP: Field = Field(0, 8, 5);
 
-/// Data-processing operations that exist, but for PKH.
+/// Data-processing operations that exist, except PKH.
 fn operation(first: u16, _: u16) -> bool {
     matches!(bits(first, 8, 5), 0..=4 | 8 | 10 | 11 | 13 | 14)
 }

@@ -28,7 +28,7 @@ const MODES: u32 = 32;
 /// Draws from each family of encodings.
 const DRAWS: u32 = 4096;
 
-/// What `start` calls.
+/// The program, called by `start`.
 pub fn main() {
     for group in forms::INTEGER {
         for form in group.iter() {

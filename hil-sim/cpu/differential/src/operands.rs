@@ -1,4 +1,4 @@
-//! Operands: pseudo-random (xorshift32, Marsaglia 2003), with the awkward values more often than chance has them.
+//! Operands: pseudo-random (xorshift32, Marsaglia 2003), with special values more frequent than by chance.
 
 /// A reproducible stream of operands.
 pub struct Operands(u32);
@@ -64,7 +64,7 @@ impl Operands {
         }
     }
 
-    /// Bits of a single: one of the special values, a number of middling size, of any size, a denormal, or any bits.
+    /// Bits of a single: one of the special values, a number of medium size, of any size, a denormal, or any bits.
     pub fn float(&mut self) -> u32 {
         let kind = self.any() >> 27 & 7;
         let value = self.any();

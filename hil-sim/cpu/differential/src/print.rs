@@ -7,7 +7,7 @@ const EXIT: u32 = 0x18;
 /// "The application ended", which debuggers take for success.
 const APPLICATION_EXIT: u32 = 0x20026;
 
-/// A line in the making; what does not fit is cut.
+/// A line being written; what does not fit is cut off.
 pub struct Line {
     bytes: [u8; 256],
     length: usize,

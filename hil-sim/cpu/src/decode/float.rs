@@ -1,4 +1,4 @@
-//! Coprocessor space: FPv4-SP (A6), anything else is absent.
+//! Coprocessor space: FPv4-SP (A6); other coprocessors are absent.
 
 use super::thumb32::UNDEFINED;
 use super::{bit, bits};
@@ -36,7 +36,7 @@ fn m(second: u16) -> u16 {
     bits(second, 3, 0) << 1 | bits(second, 5, 5)
 }
 
-/// The first of the two S registers that make D register `high:low`.
+/// The first of the two S registers that form D register `high:low`.
 fn double(low: u16, high: bool) -> u16 {
     low << 1 | u16::from(high) << 5
 }
@@ -103,7 +103,7 @@ fn expand_immediate(byte: u16) -> u32 {
     (byte & 0x80) << 24 | exponent | (byte & 0x3f) << 19
 }
 
-/// Between one core register and the extension (A6.6).
+/// Transfers between one core register and the extension (A6.6).
 fn transfer(first: u16, second: u16) -> Instruction {
     let t = bits(second, 15, 12);
     let to_core = bit(first, 4);
@@ -121,7 +121,7 @@ fn transfer(first: u16, second: u16) -> Instruction {
     }
 }
 
-/// Between two core registers and the extension (A6.7).
+/// Transfers between two core registers and the extension (A6.7).
 fn transfer_pair(first: u16, second: u16) -> Instruction {
     let (t, t2) = (bits(second, 15, 12), bits(first, 3, 0));
     let m = if bit(second, 8) { double(bits(second, 3, 0), bit(second, 5)) } else { m(second) };

@@ -98,7 +98,7 @@ fn hint_or(width: Width, load: Instruction) -> Instruction {
     if load.d == 15 && width != Width::Word && load.op != Op::Undefined { Instruction::new(Op::Nop) } else { load }
 }
 
-/// The addressing forms that all singles share: offset, register and indexed.
+/// The addressing forms that all single loads and stores share: offset, register and indexed.
 fn single(first: u16, second: u16, [offset, register, indexed]: [Op; 3]) -> Instruction {
     let base = Instruction::new(offset).n(bits(first, 3, 0)).d(bits(second, 15, 12));
     if bit(first, 7) {

@@ -1,4 +1,4 @@
-//! 32-bit instructions: the first fork (A5.3), data processing and branches.
+//! 32-bit instructions: the top-level decoding (A5.3), data processing and branches.
 
 use super::{bit, bits, float, memory, multiply, sign_extend, thumb16};
 use crate::instruction::{Alu, Flags, Instruction, Op, Shift};
@@ -48,7 +48,7 @@ fn operation(first: u16, second: u16) -> Option<(Alu, Instruction)> {
         _ => return None,
     };
     let writes = !matches!(alu, Alu::Test | Alu::TestEqual | Alu::Compare | Alu::CompareNegative);
-    // Writing the PC is unpredictable here; undefined is the outcome that shows.
+    // Writing the PC is unpredictable here; an undefined instruction makes it visible.
     (!writes || d != 15).then(|| (alu, Instruction::new(Op::Nop).d(d).n(n).flags(Flags::SET.when(set))))
 }
 

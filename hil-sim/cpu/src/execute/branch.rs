@@ -7,7 +7,7 @@ use crate::instruction::{Flags, Instruction};
 
 /// Refilling the pipeline takes one to three cycles (TRM 3.3.1), two on average.
 const REFILL: u64 = 2;
-/// From here up a load of the PC in handler mode is an exception return.
+/// Loading the PC with a value from here up in handler mode is an exception return.
 const RETURN_VALUES: u32 = 0xf000_0000;
 
 impl Cpu {
@@ -22,7 +22,7 @@ impl Cpu {
         self.now = self.now.wrapping_add(REFILL + u64::from(bus.wait_states(self.now)));
     }
 
-    /// BXWritePC() (A2.3.1): an even target faults where it lands.
+    /// BXWritePC() (A2.3.1): an even target faults at the target.
     #[inline(always)]
     pub(super) fn branch_exchange<B: Bus>(&mut self, bus: &B, target: u32) -> Result<(), Trap> {
         if target >= RETURN_VALUES && self.exception != 0 {
@@ -84,7 +84,7 @@ impl Cpu {
         self.horizon = 0;
     }
 
-    /// Everything is already in order; a barrier only lets what is pending in.
+    /// A barrier: accesses are in order already, so that it only lets pending exceptions in.
     pub(super) fn barrier<B: Bus>(&mut self, bus: &B) {
         self.now += REFILL + u64::from(bus.wait_states(self.now));
         self.horizon = 0;

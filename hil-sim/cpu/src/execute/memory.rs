@@ -1,4 +1,4 @@
-//! Loads and stores (A7.7), and the road to the bus.
+//! Loads and stores (A7.7), and access to the bus.
 
 use super::Trap;
 use crate::bus::{Access, Bus};
@@ -106,7 +106,7 @@ impl Cpu {
         }
     }
 
-    /// After an access to the chip: goes on only up to its next event, and not at all where something is new.
+    /// After an access to the chip: lets instructions run only up to its next event, and not at all where one is new.
     #[inline]
     fn look_up<B: Bus>(&mut self, bus: &B) {
         let new =
@@ -152,7 +152,7 @@ impl Cpu {
         if address & (size(access) - 1) == 0 { Ok(()) } else { Err(Trap::Unaligned) }
     }
 
-    /// A load into a register, of which the PC is a branch. The load after a load costs one cycle less.
+    /// A load into a register; a load of the PC is a branch. A load after a load costs one cycle less.
     #[inline(always)]
     fn load_to<B: Bus>(
         &mut self,
@@ -276,7 +276,7 @@ impl Cpu {
 
     fn as_unprivileged<T>(&mut self, access: impl FnOnce(&mut Self) -> Result<T, Trap>) -> Result<T, Trap> {
         let before = (self.unprivileged, self.exception);
-        // Only the private bus asks; no exception is taken in between.
+        // Only the private bus calls this; no exception is taken in between.
         (self.unprivileged, self.exception) = (true, 0);
         let result = access(self);
         (self.unprivileged, self.exception) = before;

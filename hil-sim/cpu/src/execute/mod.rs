@@ -11,7 +11,7 @@ use crate::bus::Bus;
 use crate::cpu::{Activity, Cpu};
 use crate::instruction::{Flags, Instruction, Op, Width};
 
-/// What interrupts an instruction.
+/// Why an instruction did not end normally.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Trap {
     Undefined,
@@ -39,7 +39,7 @@ impl Cpu {
             Op::AluRegister(alu) => self.alu_register(alu, i),
             Op::AluShifted(alu) => self.alu_shifted(alu, i),
             Op::ShiftRegister(kind) => self.shift_register(kind, i),
-            // The frequent widths each for itself, so that the compiler makes the most of them.
+            // The frequent widths have arms of their own, so that the compiler specialises them.
             Op::LoadOffset(Width::Word) => return self.load_offset(bus, i, Width::Word, pipelined),
             Op::LoadOffset(Width::Byte) => return self.load_offset(bus, i, Width::Byte, pipelined),
             Op::LoadOffset(width) => return self.load_offset(bus, i, width, pipelined),

@@ -6,7 +6,7 @@ use crate::cpu::Cpu;
 use crate::instruction::{Flags, Instruction, Multiply};
 use crate::system::configuration;
 
-/// Rounds SMMUL and its kin to nearest.
+/// Rounds SMMUL and similar instructions to nearest.
 const HALF_OF_LOW_WORD: i64 = 1 << 31;
 
 impl Cpu {

@@ -165,7 +165,7 @@ impl Environment {
             (Some(x), None) | (None, Some(x)) => return self.finish(x),
             (None, None) => return 0,
         };
-        // The larger exponent is brought down as far as the room above its top bit allows, the smaller one up.
+        // The larger exponent is lowered as far as the space above its top bit allows, the smaller one raised.
         let room = x.significand.leading_zeros().saturating_sub(2);
         let distance = x.exponent.abs_diff(y.exponent);
         let down = distance.min(room);
@@ -194,7 +194,7 @@ impl Environment {
 fn term(value: Unpacked) -> Option<Term> {
     match value {
         Unpacked::Finite { negative, exponent, significand } => {
-            // Singles have 24 significant bits; the zeros below them only take room.
+            // Singles have 24 significant bits; the zeros below them only take space.
             Some(Term { negative, exponent: exponent + 32, significand: u128::from(significand >> 32) })
         }
         _ => None,
@@ -218,7 +218,7 @@ fn shift_sticky_wide(value: u128, amount: u32) -> u128 {
     }
 }
 
-/// Orders all numbers but NaNs; what was flushed to zero counts as zero.
+/// Orders all numbers except NaNs; a number that was flushed to zero counts as zero.
 fn rank(value: Unpacked, bits: u32) -> i64 {
     match value {
         Unpacked::Zero { .. } => 0,

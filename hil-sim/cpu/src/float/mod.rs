@@ -1,7 +1,7 @@
 //! IEEE 754 single precision as FPv4-SP does it (ARM DDI 0403E, A2.5), bit for bit on every host.
 //!
 //! A finite number is unpacked to a sign, an exponent and a 64-bit significand, computed on exactly or with a sticky
-//! last bit, and rounded once. Where the host's own arithmetic must give the same, it is used.
+//! last bit, and rounded once. Where the host's arithmetic must give the same result, it is used.
 
 mod arithmetic;
 mod convert;
@@ -70,7 +70,7 @@ impl Environment {
     }
 }
 
-/// A number taken apart. A finite value is `significand * 2^exponent`, with the significand's top bit at bit 62.
+/// An unpacked number. A finite value is `significand * 2^exponent`, with the significand's top bit at bit 62.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Unpacked {
     Nan { bits: u32 },
@@ -114,9 +114,9 @@ impl Environment {
     }
 
     /// The host's result, where it is all there is to know. Host arithmetic on singles is IEEE 754 with rounding to
-    /// nearest (Rust promises it on every host but 32-bit x86 without SSE2); a normal result above the smallest can
-    /// raise nothing but "inexact". So with that mode and that bit already set (it stays set for the life of most
-    /// programs) nothing is left to compute. NaNs, infinities, zeros and everything tiny take the long way.
+    /// nearest (Rust guarantees it on every host except 32-bit x86 without SSE2); a normal result above the smallest
+    /// can raise nothing but "inexact". So with that mode and that bit already set (it stays set for the life of most
+    /// programs) nothing is left to compute. NaNs, infinities, zeros and tiny numbers are computed bit by bit.
     #[inline(always)]
     fn quick(&self, result: f32) -> Option<u32> {
         const MODES: u32 = 7 << 22;

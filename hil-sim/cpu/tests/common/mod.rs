@@ -19,7 +19,7 @@ pub struct Board {
     pub lines: Lines,
     pub nmi: bool,
     pub wait_states: u32,
-    /// When the lines become what, soonest first.
+    /// Changes of the interrupt lines: cycle and new state, earliest first.
     pub schedule: Vec<(Cycle, Lines)>,
     pub stop: bool,
 }

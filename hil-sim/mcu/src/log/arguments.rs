@@ -6,10 +6,10 @@ use defmt_parser::{DisplayHint, Fragment, Parameter, ParserMode, TimePrecision, 
 
 use super::{FormatString, Strings};
 
-/// What ends a text of unknown length.
+/// The byte that ends a text of unknown length.
 const END_OF_TEXT: u8 = 0xFF;
 
-/// What is left of an entry.
+/// The bytes of an entry that are not decoded yet.
 #[derive(Clone, Copy)]
 pub(super) struct Arguments<'a> {
     pub bytes: &'a [u8],
@@ -33,16 +33,16 @@ impl<'a> Arguments<'a> {
         usize::try_from(self.unsigned(4)?).ok()
     }
 
-    /// An index, and the format string that it means.
+    /// Reads an index; returns the format string of that index.
     pub fn string(&mut self) -> Option<&'a FormatString> {
         let index = u16::try_from(self.unsigned(2)?).ok()?;
         self.strings.get(&index)
     }
 
-    /// A format string filled in. `outer` is how the parent wants its parts shown.
+    /// Fills in a format string. `outer` is the display hint of the parent for its parts.
     pub fn text(&mut self, format: &str, outer: Option<&DisplayHint>) -> Option<String> {
         let fragments = parse(format, ParserMode::ForwardsCompatible).ok()?;
-        // An argument may be shown twice, and is there once.
+        // An argument may be shown twice, but is encoded once.
         let parameters: BTreeMap<usize, &Parameter> = fragments
             .iter()
             .filter_map(|fragment| match fragment {
@@ -58,7 +58,7 @@ impl<'a> Arguments<'a> {
         let shown = fragments.iter().map(|fragment| match fragment {
             Fragment::Literal(text) => Some(text.to_string()),
             Fragment::Parameter(Parameter { index, ty, hint }) => {
-                // "Debug" says nothing of numbers: the parent does.
+                // "Debug" does not decide the format of numbers: the parent does.
                 let own = hint.as_ref().filter(|hint| **hint != DisplayHint::Debug || !is_number(ty));
                 places.get(index)?.clone().argument(ty, own.or(outer))
             }
@@ -109,7 +109,7 @@ impl<'a> Arguments<'a> {
             }
             Type::FormatArray(length) => self.list(*length, hint)?,
             Type::FormatSequence => self.sequence(hint)?,
-            // The firmware has none: defmt-print reads them from --raw.
+            // Our firmware has none; defmt-print reads them from `log --raw`.
             Type::BitField(_) => return None,
         })
     }
@@ -138,7 +138,7 @@ impl<'a> Arguments<'a> {
         Some(format!("[{}]", items?.join(", ")))
     }
 
-    /// Formats one after the other until index zero.
+    /// Reads formats one after the other until index zero.
     fn sequence(&mut self, hint: Option<&DisplayHint>) -> Option<String> {
         let mut text = String::new();
         while !self.bytes.starts_with(&[0, 0]) {
@@ -154,7 +154,7 @@ fn is_number(of: &Type) -> bool {
     !matches!(of, Type::Str | Type::IStr | Type::Format | Type::FormatSlice | Type::FormatArray(_))
 }
 
-/// Whether digits of the word are asked for, not a value with a sign.
+/// Whether the hint asks for the digits of the word, not for a value with a sign.
 fn is_digits(hint: Option<&DisplayHint>) -> bool {
     use DisplayHint::{Binary, Hexadecimal, Octal};
     matches!(hint, Some(Binary { .. } | Hexadecimal { .. } | Octal { .. }))

@@ -3,7 +3,8 @@
 use super::{BDCR, CR, CRRCR, CSR};
 use crate::time::Picoseconds;
 
-/// Clock sources; each is ready after the longest start-up time of the datasheet (DS12288, clock source characteristics).
+/// Clock sources; each is ready after the longest start-up time of the datasheet (DS12288, clock source
+/// characteristics).
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Source {
     Hsi16,
@@ -29,7 +30,7 @@ impl Source {
         }
     }
 
-    /// The register that switches it on, the bit that does, and its bit in CIER and CIFR.
+    /// The register and bit that switch the source on, and its bit in CIER and CIFR.
     pub fn bits(self) -> (u32, u32, u32) {
         match self {
             Self::Hsi16 => (CR, 8, 3),

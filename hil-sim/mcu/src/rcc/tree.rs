@@ -7,7 +7,7 @@ use crate::peripheral::{Refused, Reply};
 use crate::unit::UartId;
 
 impl Rcc {
-    /// The frequencies at present.
+    /// The present frequencies.
     pub fn tree(&self) -> ClockTree {
         let sysclk = match self.system_clock {
             1 => HSI16_HZ,

@@ -1,4 +1,4 @@
-//! How the count runs, wraps and updates, and when that can be noticed (RM0440 §28.3.2 to §28.3.3).
+//! How the count runs, wraps and updates, and when that is observable (RM0440 §28.3.2 to §28.3.3).
 
 use vergence_cpu::{Cycle, NEVER};
 
@@ -38,7 +38,7 @@ impl Counter {
         }
     }
 
-    /// Where a period begins.
+    /// The count at which a period begins.
     fn origin(&self) -> u32 {
         if self.counts_down { self.reload } else { 0 }
     }
@@ -99,7 +99,7 @@ impl Counter {
 }
 
 impl Timer {
-    /// Counts up to `now`.
+    /// Advances the count to `now`.
     pub(super) fn run(&mut self, now: Cycle) {
         loop {
             let counts = self.counter.counts_until(now);
@@ -118,7 +118,7 @@ impl Timer {
         }
     }
 
-    /// Counts without wrapping.
+    /// Advances the count without wrapping.
     fn count_on(&mut self, counts: u64) {
         if counts == 0 {
             return;
@@ -134,7 +134,7 @@ impl Timer {
         }
     }
 
-    /// The last count of a period is over.
+    /// Ends a period after its last count.
     fn wrap(&mut self, overflows: bool) {
         self.counter.since += self.counter.step();
         if overflows {
@@ -151,7 +151,7 @@ impl Timer {
         self.matches_in(here, here);
     }
 
-    /// An overflow is an update once the repetitions are used up.
+    /// Takes an overflow, which is an update once the repetitions are used up.
     pub(super) fn overflow(&mut self) {
         if self.counter.repetitions > 0 {
             self.counter.repetitions -= 1;
@@ -167,7 +167,7 @@ impl Timer {
         }
     }
 
-    /// Whole periods in which nobody notices anything go by at once.
+    /// Skips whole periods in which nothing observable happens.
     fn skip_periods(&mut self, now: Cycle) {
         if self.counter.reload == 0 || self.cr1 & (OPM | UDIS) != 0 || self.keeps_levels() || self.is_update_pending() {
             return;
@@ -189,7 +189,7 @@ impl Timer {
         }
     }
 
-    /// Preloaded values come into use; `flag` unless software asked and URS is set.
+    /// Takes over the preloaded values; `flag` is set unless software asked for the update and URS is set.
     pub(super) fn update(&mut self, flag: bool) {
         self.counter.prescaler = self.psc;
         self.counter.reload = self.arr;
@@ -255,7 +255,7 @@ impl Timer {
         self.match_here();
     }
 
-    /// When the running count next does something that somebody notices.
+    /// The cycle of the next observable change by the running count.
     pub(super) fn count_due(&self) -> Cycle {
         let counter = &self.counter;
         if counter.stopped_after.is_some() || counter.reload == 0 {

@@ -11,7 +11,7 @@ use crate::unit::TimerId;
 pub(super) struct Input {
     raw: bool,
     filtered: bool,
-    /// When the filter will believe `raw`.
+    /// When the filter accepts `raw`.
     settles: Option<Cycle>,
     /// Edges seen by the capture prescaler.
     edges: u32,
@@ -97,7 +97,7 @@ impl Timer {
         Ok(())
     }
 
-    /// The timer whose trigger output this one listens to: internal triggers are the same for all (§28.3.30).
+    /// The timer whose trigger output this one uses: internal triggers are the same for all (§28.3.30).
     pub fn master(&self) -> Option<TimerId> {
         const MASTERS: [u8; 10] = [1, 2, 3, 4, 5, 8, 15, 16, 17, 20];
         if self.slave_mode() < RESET {
@@ -111,7 +111,7 @@ impl Timer {
         TimerId::new(*MASTERS.get(index as usize)?).filter(|&master| master != self.id)
     }
 
-    /// The pin at channel `channel` has this level from `now` on.
+    /// Sets the level of the pin at channel `channel` from `now` on.
     pub fn set_input(&mut self, now: Cycle, channel: usize, high: bool) {
         let Some(input) = self.inputs.get(channel) else { return };
         if input.raw == high {
@@ -120,7 +120,7 @@ impl Timer {
         let delay = self.filter_delay(channel);
         let input = &mut self.inputs[channel];
         input.raw = high;
-        // A level that goes back before the filter believed it never was.
+        // A level that returns before the filter has accepted it has no effect.
         input.settles = (input.filtered != high).then(|| now + delay);
         self.settle_inputs(now);
     }
@@ -135,7 +135,7 @@ impl Timer {
         samples * spacing * clocks * self.counter.divider()
     }
 
-    /// Filters believe what has lasted long enough.
+    /// Lets the filters accept levels that have lasted long enough.
     pub(super) fn settle_inputs(&mut self, now: Cycle) {
         for channel in 0..4 {
             if self.inputs[channel].settles_at() <= now {
@@ -224,7 +224,7 @@ impl Timer {
         self.raise(flag);
     }
 
-    /// The chosen trigger acts on the counter.
+    /// Applies the chosen trigger to the counter.
     pub fn trigger(&mut self, now: Cycle) {
         match self.slave_mode() {
             RESET => self.reinitialize(now),

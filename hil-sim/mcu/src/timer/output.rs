@@ -3,7 +3,7 @@
 use super::{MOE, Timer, UIF};
 use crate::peripheral::{Refused, Reply};
 
-/// What an output channel does (CCMRx.OCxM).
+/// The mode of an output channel (CCMRx.OCxM).
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum OutputMode {
     Frozen,
@@ -49,7 +49,7 @@ impl Timer {
         }
     }
 
-    /// Refuses what the channels cannot do.
+    /// Refuses modes that the channels do not implement.
     pub(super) fn check_channel(&self, channel: usize) -> Reply<()> {
         if self.is_input(channel) {
             return Ok(());
@@ -121,7 +121,7 @@ impl Timer {
         self.drives(bits >> 2 & 1 == 1, 9 + 2 * channel, level)
     }
 
-    /// Without the main switch an output stands at its idle level where OSSI holds it, else it floats.
+    /// The level without the main output switch: the idle level where OSSI is set, else the output floats.
     fn drives(&self, enabled: bool, idle_bit: usize, level: impl Fn() -> bool) -> Option<bool> {
         const OSSI: u32 = 1 << 10;
         if !enabled {
@@ -133,7 +133,7 @@ impl Timer {
         (self.bdtr & OSSI != 0).then(|| self.cr2 >> idle_bit & 1 == 1)
     }
 
-    /// The count takes every value from `first` to `last`.
+    /// Lets the count pass every value from `first` to `last`.
     pub(super) fn matches_in(&mut self, first: u64, last: u64) {
         for channel in 0..self.variant.channels {
             let target = u64::from(self.compare[channel]);

@@ -1,4 +1,4 @@
-//! What sets one timer apart from another (RM0440 §28.2, §29.2, §30.2, §31.2; interrupts §14.3, DMA requests §13.3.2).
+//! The differences between the timers (RM0440 §28.2, §29.2, §30.2, §31.2; interrupts §14.3, DMA requests §13.3.2).
 
 use vergence_cpu::Lines;
 
@@ -14,7 +14,7 @@ pub(super) struct Variant {
     pub highest: u32,
     /// The highest repetition count; zero without repetition counter.
     pub highest_repetition: u32,
-    /// Outputs need BDTR.MOE.
+    /// Whether outputs need BDTR.MOE.
     pub has_main_switch: bool,
     /// NVIC lines of break, update, trigger and channels.
     interrupts: [u32; 4],
@@ -22,7 +22,7 @@ pub(super) struct Variant {
     requests: [u8; 6],
 }
 
-/// No such DMA request.
+/// Marks a DMA request that does not exist.
 const NONE: u8 = 0;
 
 impl Variant {
@@ -82,7 +82,7 @@ impl Variant {
             .fold(0, |lines, (_, line)| lines | 1 << line)
     }
 
-    /// Which request of this timer has this number: 0 the update, 1 to 4 the channels, 6 the trigger.
+    /// The request of this timer with this number: 0 the update, 1 to 4 the channels, 6 the trigger.
     pub fn request_bit(&self, number: u8) -> Option<u32> {
         let index = self.requests.iter().position(|&request| request == number && number != NONE)?;
         Some([1, 2, 3, 4, 0, 6][index])

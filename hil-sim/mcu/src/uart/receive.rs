@@ -1,21 +1,22 @@
-//! Frames from the far end (RM0440 §37.5.6).
+//! Frames from the peer (RM0440 §37.5.6).
 
 use vergence_cpu::{Cycle, NEVER};
 
 use super::{Frame, LineFault, Shifting, Uart, cr1, cr3, flag};
 use crate::peripheral::Moment;
 
-/// How much the far end's bit may differ: §37.5.8 tolerates 3.33 to 4.86 % by configuration; beyond 4 % it fails here.
+/// How much the peer's bit length may differ: §37.5.8 tolerates 3.33 to 4.86 % by configuration; beyond 4 % it fails
+/// here.
 const TOLERANCE_PERCENT: u64 = 4;
 
 impl Uart {
-    /// The far end sends `frame` behind what it is sending.
+    /// Lets the peer send `frame` after what it is sending.
     pub fn receive(&mut self, moment: Moment, frame: Frame) {
         self.incoming.push_back(frame);
         self.arrive_next(moment, moment.now);
     }
 
-    /// Whether the far end has sent everything.
+    /// Whether the peer has sent everything.
     pub fn is_line_quiet(&self) -> bool {
         self.arriving.is_none() && self.incoming.is_empty()
     }
@@ -56,7 +57,8 @@ impl Uart {
         }
     }
 
-    /// What the receiver makes of a frame: one at another baud rate is garbage with a bad stop bit.
+    /// The byte and flags that the receiver makes of a frame: a frame at another baud rate is garbage with a bad stop
+    /// bit.
     fn sample(&mut self, moment: Moment, frame: Frame, byte: u8) {
         let (own, far) = (u64::from(self.baud(moment)), u64::from(frame.baud));
         if own.abs_diff(far) * 100 > own * TOLERANCE_PERCENT {
@@ -70,7 +72,7 @@ impl Uart {
         self.take(moment, byte, errors);
     }
 
-    /// A received byte goes to RDR or the FIFO; one too many is lost and leaves a flag.
+    /// Puts a received byte into RDR or the FIFO; without room it is lost and sets a flag.
     pub(super) fn take(&mut self, _moment: Moment, byte: u8, errors: u32) {
         if self.inbox.len() < self.depth() {
             self.inbox.push_back((byte, errors));
@@ -92,7 +94,7 @@ impl Uart {
         self.timeout_at = (self.cr2 >> 23 & 1 == 1).then(|| sampled + self.half_bits(moment, 1 + 2 * bits));
     }
 
-    /// A read of RDR.
+    /// Takes a read of RDR.
     pub(super) fn pop(&mut self) -> u8 {
         let byte = self.inbox.pop_front().map_or(0, |(byte, _)| byte);
         if let Some(&(_, errors)) = self.inbox.front() {

@@ -1,4 +1,4 @@
-//! What firmware sees of a serial port (RM0440 §37.8, §38.7).
+//! The registers of a serial port (RM0440 §37.8, §38.7).
 
 use vergence_cpu::{Cycle, Lines};
 

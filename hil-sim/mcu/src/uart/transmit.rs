@@ -1,4 +1,4 @@
-//! Frames to the far end (RM0440 §37.5.5).
+//! Frames to the peer (RM0440 §37.5.5).
 
 use vergence_cpu::{Cycle, NEVER};
 
@@ -11,7 +11,7 @@ impl Uart {
         self.outbox.len() < self.depth()
     }
 
-    /// A write to TDR.
+    /// Takes a write to TDR.
     pub(super) fn push(&mut self, moment: Moment, byte: u8) -> Reply<()> {
         if !self.is_on(cr1::TE) {
             return Err("a byte is written while the transmitter is off".into());
@@ -26,12 +26,12 @@ impl Uart {
         Ok(())
     }
 
-    /// The transmitter is switched on: an idle frame goes first.
+    /// Switches the transmitter on, which sends an idle frame first.
     pub(super) fn begin_idle_frame(&mut self, moment: Moment) {
         self.idle_until = moment.now + self.half_bits(moment, 2 * self.frame_bits());
     }
 
-    /// The transmitter is switched off: the frame on the line is finished, the rest is lost.
+    /// Switches the transmitter off: the frame on the line is finished, the rest is lost.
     pub(super) fn stop_sending(&mut self) {
         self.outbox.clear();
         self.isr |= flag::TC;
@@ -53,7 +53,7 @@ impl Uart {
             if self.connected[0] {
                 self.sent.push((ends, byte));
             }
-            // On one wire the receiver hears its own transmitter (§37.5.15).
+            // On one wire the receiver receives from its own transmitter (§37.5.15).
             if self.cr3 & cr3::HDSEL != 0 && self.is_on(cr1::RE) {
                 self.take(moment, byte, 0);
             }

@@ -22,7 +22,7 @@ pub const LPUART1: u32 = 0x4000_8000;
 pub const USART2: u32 = 0x4000_4400;
 pub const USART3: u32 = 0x4000_4800;
 
-/// A world that remembers the edges of the pins it watches.
+/// A world that records the edges of the pins it observes.
 #[derive(Clone, Debug, Default)]
 pub struct Recorder {
     pub pins: Vec<Pin>,
@@ -114,7 +114,7 @@ impl<W: World> Bench<W> {
         self.chip.take_sent(port).iter().map(|sent| sent.byte).collect()
     }
 
-    /// What the chip complains about.
+    /// The troubles that the chip has recorded.
     pub fn complaint(&self) -> Option<String> {
         self.chip.complaint().map(ToString::to_string)
     }

@@ -19,7 +19,7 @@ pub fn pose(position_mm: [f64; 3], yaw_deg: f64) -> Transform<World, Camera> {
     Transform::new(turn, Vector3::from(position_mm))
 }
 
-/// Photographs `scene` from `world_from_camera`.
+/// Renders `scene` from `world_from_camera`.
 pub fn photograph(
     scene: &Scene,
     camera: &KannalaBrandt,

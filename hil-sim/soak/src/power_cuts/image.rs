@@ -1,4 +1,4 @@
-//! What lies in flash before an update, and what is sent.
+//! The image in flash before an update, and the image that is sent.
 
 use vergence_image::layout::{ACTIVE, CAPACITY, FLASH_BASE, HARDWARE};
 use vergence_image::notes::{build_at, build_of};
@@ -25,13 +25,13 @@ impl SignedImage {
         Self { seal: seal(header), bytes }
     }
 
-    /// Puts it where the boot loader starts it, as a debug probe would.
+    /// Writes the image to where the boot loader starts it, as a debug probe would.
     pub fn install(&self, cells: &mut FlashCells) -> bool {
         let start = ACTIVE.start as usize;
         cells.load(start, &self.bytes) && cells.load(start + CAPACITY as usize, &self.seal.to_bytes())
     }
 
-    /// Whether the boot loader would start it from these cells.
+    /// Whether the boot loader would start the image from these cells.
     #[must_use]
     pub fn is_installed(&self, cells: &FlashCells) -> bool {
         let start = ACTIVE.start as usize;
@@ -42,8 +42,8 @@ impl SignedImage {
     }
 }
 
-/// The same program in other words: where an instruction adds two registers, they change places, so that most pages
-/// differ and everything goes on as before; and another build id. A swap that mixes up pages cannot hide behind this.
+/// The same program with different bytes: instructions that add two registers have them exchanged, so that most pages
+/// differ while the program does the same; and another build id. A swap that mixes up pages is thus noticed.
 #[must_use]
 pub fn twin(application: &Firmware) -> Vec<u8> {
     let start = FLASH_BASE + ACTIVE.start;

@@ -1,8 +1,8 @@
-//! Power cuts in the middle of a firmware update: at any operation of the flash, with the word or page under way left
-//! torn. The boot loader and the application are those of the board, on the simulated chip.
+//! Power cuts in the middle of a firmware update: at any operation of the flash, with the word or page in progress
+//! left torn. The boot loader and the application are those of the board, on the simulated chip.
 //!
-//! Nothing outlives the power but the flash. So one whole update is run and every operation of its flash listed; a cut
-//! at one of them is the flash before it, with that operation half done; and a board with this flash gets power.
+//! Only the flash persists without power. One whole update is run and every flash operation listed; a cut at one of
+//! them is the flash before it with that operation half done; then a board with this flash is started.
 
 mod image;
 mod known;

@@ -1,4 +1,4 @@
-//! One cut after the other.
+//! The sweep: power cuts at one flash operation after the other.
 
 use std::ops::Range;
 
@@ -12,19 +12,19 @@ use super::known::KnownStarts;
 use super::talk::Talk;
 use super::tally::CutTally;
 
-/// After every so many cuts the board is updated once more.
+/// Number of cuts after which a board is updated once more.
 const AGAIN_EVERY: usize = 97;
 
-/// In what cuts are made.
+/// The update in which cuts are made.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Journey {
     /// The old image takes the new one, which is confirmed.
     Update,
-    /// Nobody confirms the new one, and the next start goes back.
+    /// The new image is not confirmed, and the next start goes back.
     GoingBack,
 }
 
-/// What a board does when power comes again.
+/// What a board does when the power returns.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Ending {
     /// It runs the image from before the update.
@@ -33,18 +33,18 @@ pub enum Ending {
     New,
     /// The boot loader waits for an image.
     Recovery,
-    /// It does none of these, or takes no update.
+    /// The board does none of these, or takes no update.
     Bricked(String),
 }
 
-/// A cut and what became of the board.
+/// A cut and its outcome.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Cut {
-    /// Its number.
+    /// Number of the cut.
     pub number: usize,
     /// The operation that was cut, counted from zero.
     pub operation: usize,
-    /// What became of the board.
+    /// What the board does afterwards.
     pub ending: Ending,
     /// Whether the start was made; otherwise it equals one that was.
     pub started: bool,
@@ -54,8 +54,8 @@ pub struct Cut {
 
 /// An update, and the cuts that are made in it.
 ///
-/// Cuts are an endless row: first at every erasure, then at every word of the swap's state, then at all others, spread
-/// over the update from the first on; then the same with other damage.
+/// Cuts are an endless sequence: first at every erasure, then at every word of the swap's state, then at all others,
+/// spread over the update from the first on; then the same with other damage.
 pub struct Sweep {
     old: SignedImage,
     new: SignedImage,
@@ -67,10 +67,10 @@ pub struct Sweep {
 }
 
 impl Sweep {
-    /// Makes a journey from `old` to `new` without cuts.
+    /// Runs an update from `old` to `new` without cuts.
     ///
     /// # Errors
-    /// Says why it does not work.
+    /// Says why the update does not work.
     pub fn new(boot_loader: &Firmware, [old, new]: [SignedImage; 2], journey: Journey) -> Result<Self, String> {
         let mut before = FlashCells::default();
         let mut fits = old.install(&mut before);
@@ -94,7 +94,7 @@ impl Sweep {
         Ok(Self { old, new, before, operations, order, known: KnownStarts::default() })
     }
 
-    /// What the flash does without a cut.
+    /// The flash operations of the update without a cut.
     #[must_use]
     pub fn operations(&self) -> &[FlashOperation] {
         &self.operations
@@ -106,13 +106,13 @@ impl Sweep {
         [0, 1].map(|last| self.operations.iter().filter(|&&operation| rank(operation) <= last).count())
     }
 
-    /// Makes cuts, side by side.
+    /// Makes cuts in parallel.
     #[must_use]
     pub fn cut(&self, numbers: Range<usize>) -> Vec<Cut> {
         numbers.into_par_iter().map(|number| self.cut_one(number, number.is_multiple_of(AGAIN_EVERY))).collect()
     }
 
-    /// Makes a cut. Where the board is to be updated `again`, it is started even if an equal start is known.
+    /// Makes a cut. A board that is to be updated `again` is started even if an equal start is known.
     #[must_use]
     pub fn cut_one(&self, number: usize, again: bool) -> Cut {
         let operation = self.order[number % self.order.len()];
@@ -133,7 +133,7 @@ impl Sweep {
         cut
     }
 
-    /// The flash after a cut.
+    /// The contents of flash after a cut.
     #[must_use]
     pub fn remains(&self, number: usize) -> FlashCells {
         let cut = self.order[number % self.order.len()];
@@ -145,7 +145,7 @@ impl Sweep {
         cells
     }
 
-    /// Gives power to a board with this flash: what becomes of it, and the pages that decided.
+    /// Starts a board with this flash; returns the outcome and the pages that affected it.
     fn start(&self, cells: &FlashCells) -> (Ending, Vec<usize>, Talk) {
         let mut talk = Talk::switched_on(cells);
         let ending = self.judge(&mut talk).unwrap_or_else(Ending::Bricked);
@@ -166,7 +166,7 @@ impl Sweep {
         Err(format!("what runs is neither image: {identity:?}"))
     }
 
-    /// To the image that does not run.
+    /// Updates the board to the image that it does not run.
     fn update_again(&self, talk: &mut Talk, ending: &Ending) -> Result<(), String> {
         let image = if *ending == Ending::Old { &self.new } else { &self.old };
         talk.update(image)?;
@@ -183,7 +183,7 @@ impl Sweep {
     }
 }
 
-/// Erasures, words of the state, others.
+/// Sorts operations: erasures, words of the state, others.
 pub(super) fn rank(operation: FlashOperation) -> usize {
     match operation {
         FlashOperation::Program { offset, .. } if (STATE.start..STATE.end()).contains(&offset) => 1,
@@ -192,7 +192,7 @@ pub(super) fn rank(operation: FlashOperation) -> usize {
     }
 }
 
-/// In what order operations are cut. The others come in strides, so that any first part of them covers the update.
+/// The order in which operations are cut. The others come in strides, so that any first part of them covers the update.
 fn order(operations: &[FlashOperation]) -> Vec<usize> {
     let of_rank = |wanted| (0..operations.len()).filter(move |&index| rank(operations[index]) == wanted);
     let others: Vec<usize> = of_rank(2).collect();

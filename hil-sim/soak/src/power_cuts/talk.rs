@@ -12,15 +12,15 @@ use vergence_protocol::{HostEvent, HostSession, MAX_FRAME, Microseconds, Session
 use super::image::SignedImage;
 
 const BAUD: u32 = 921_600;
-/// How often the host looks at the wire.
+/// Period at which the host polls the wire.
 const STEP_US: u64 = 1_000;
-/// How often it asks again.
+/// Period at which the host repeats a request.
 const REPEAT_US: u64 = 100_000;
-/// A swap and its undoing, three failed starts, and some more.
+/// Longest wait: a swap and its undoing, three failed starts, and a margin.
 const START_PATIENCE_US: u64 = 40_000_000;
 const ANSWER_PATIENCE_US: u64 = 5_000_000;
 const UPLOAD_PATIENCE_US: u64 = 60_000_000;
-/// Where the stages stand, in micro-units.
+/// Positions of the stages, in micro-units.
 const STAGES: [f64; 2] = [63_000.0, 40_000.0];
 
 /// A board and its host.
@@ -29,12 +29,12 @@ pub struct Talk {
     host: HostSession,
     now: Microseconds,
     heard: Vec<ManagementReport>,
-    /// Operations of the flash so far, where they are asked for.
+    /// Operations of the flash so far, where they are recorded.
     pub operations: Vec<FlashOperation>,
 }
 
 impl Talk {
-    /// A board with this in flash gets power. Waiting for the flash passes at once.
+    /// Starts a board with these contents of flash. Waiting for the flash is skipped.
     pub fn switched_on(cells: &FlashCells) -> Self {
         let plant = Plant::new(&bench_mechanics(), &STAGES);
         let mut machine = Machine::new(ChipConfig::default(), Bench::new(BenchWiring::nucleo_g474(), plant));
@@ -51,7 +51,7 @@ impl Talk {
         }
     }
 
-    /// Keeps a list of what the flash does.
+    /// Starts to record the flash operations.
     pub fn list_operations(&mut self) {
         self.machine.set_stops(Stops { flash_operations: true, ..Stops::default() });
     }
@@ -86,7 +86,7 @@ impl Talk {
         Ok(())
     }
 
-    /// Asks until an answer is understood.
+    /// Repeats a request until it is answered.
     fn ask_until<T>(
         &mut self,
         request: &Management,
@@ -108,12 +108,12 @@ impl Talk {
         Err(format!("no answer to {request:?} in {patience_us} us, {}", self.machine.place()))
     }
 
-    /// Who answers first, once somebody does.
+    /// The identity of the program that answers first.
     pub fn identify(&mut self) -> Result<Identity, String> {
         self.identify_as(|_| true)
     }
 
-    /// Waits until the board is as it should be.
+    /// Waits until the board is in the state asked for.
     fn identify_as(&mut self, is_it: impl Fn(&Identity) -> bool) -> Result<Identity, String> {
         self.ask_until(&Management::Identify, START_PATIENCE_US, |report| match report {
             ManagementReport::Identity(identity) if is_it(identity) => Some(*identity),
@@ -129,7 +129,7 @@ impl Talk {
         if outcome == Outcome::Done { Ok(()) } else { Err(format!("{request:?} is refused: {outcome}")) }
     }
 
-    /// A whole update: what is on trial is confirmed, the image sent, started, and confirmed.
+    /// Makes a whole update: confirms an image on trial, sends the new one, starts and confirms it.
     pub fn update(&mut self, image: &SignedImage) -> Result<(), String> {
         self.start_on_trial(image)?;
         self.ask(&Management::Confirm)?;
@@ -137,7 +137,7 @@ impl Talk {
         self.identify_as(|now| now.boot == BootState::Confirmed && now.build == build).map(|_| ())
     }
 
-    /// An update that nobody confirms, and a new start: the board goes back.
+    /// Makes an update without confirmation, and a new start: the board goes back.
     pub fn try_and_go_back(&mut self, image: &SignedImage) -> Result<(), String> {
         self.start_on_trial(image)?;
         self.reboot()?;
@@ -154,7 +154,7 @@ impl Talk {
         self.identify_as(|now| now.boot == BootState::Trial && now.build == build).map(|_| ())
     }
 
-    /// Once: a board that starts twice goes back.
+    /// Restarts the board once: an image on trial that starts twice goes back.
     fn reboot(&mut self) -> Result<(), String> {
         let asked = self.host.manage(Management::Reboot(RebootTo::Application));
         asked.map(|_| ()).map_err(|error| error.to_string())

@@ -1,18 +1,18 @@
-//! Counting what became of boards.
+//! Counts of outcomes.
 
 use vergence_mcu::FlashOperation;
 
 use super::sweep::{Cut, Ending, rank};
 
-/// What became of boards, by what was cut.
+/// Counts of outcomes, by the kind of operation that was cut.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct CutTally {
-    /// Cuts at erasures, words of the swap's state, other words; of each the boards that run the old image, the new
-    /// one, wait in recovery, are bricked.
+    /// Rows: cuts at erasures, at words of the swap's state, at other words. Columns: boards that run the old image,
+    /// run the new one, wait in recovery, are bricked.
     pub by_operation: [[u64; 4]; 3],
-    /// Starts that were made; the others equal one of these.
+    /// Number of starts that were made; the others equal one of these.
     pub started: u64,
-    /// Boards that were updated once more.
+    /// Number of boards that were updated once more.
     pub updated: u64,
     /// Number and reason of each cut that bricked a board.
     pub bricked: Vec<(usize, String)>,
@@ -35,7 +35,7 @@ impl CutTally {
         self.updated += u64::from(cut.updated);
     }
 
-    /// Adds what was counted elsewhere.
+    /// Adds the counts of another tally.
     pub fn merge(&mut self, other: &Self) {
         let cells = self.by_operation.iter_mut().flatten().zip(other.by_operation.iter().flatten());
         cells.for_each(|(sum, count)| *sum += count);
@@ -44,13 +44,13 @@ impl CutTally {
         self.bricked.extend(other.bricked.iter().cloned());
     }
 
-    /// How many cuts.
+    /// Number of cuts.
     #[must_use]
     pub fn cuts(&self) -> u64 {
         self.by_operation.iter().flatten().sum()
     }
 
-    /// How many boards ended so: old image, new one, recovery, bricked.
+    /// Number of boards by outcome: old image, new one, recovery, bricked.
     #[must_use]
     pub fn endings(&self) -> [u64; 4] {
         std::array::from_fn(|ending| self.by_operation.iter().map(|row| row[ending]).sum())

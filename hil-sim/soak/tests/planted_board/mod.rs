@@ -1,4 +1,4 @@
-//! The native board with one thing wrong: in its settings, its wiring, or what it says.
+//! The native board with one planted fault: in its settings, its wiring, or its messages.
 
 use vergence_control::{RigIo, StepSchedule};
 use vergence_plant::{NativeBoard, Plant};
@@ -37,9 +37,9 @@ pub struct PlantedBoard {
     said: Receiver,
     session: Option<SessionId>,
     modes: Vec<(MoveId, Mode)>,
-    /// Where the latest move from rest goes.
+    /// The target of the latest move from rest.
     targets: AxisList<Micro>,
-    /// Added to the clock since a restart that was none.
+    /// Offset of the clock since a pretended restart.
     clock_offset: u64,
 }
 
@@ -75,7 +75,7 @@ impl PlantedBoard {
         }
     }
 
-    /// A heartbeat that no host has sent.
+    /// Feeds the board a heartbeat that no host has sent.
     fn forge_heartbeat(&mut self) {
         let Some(session) = self.session else { return };
         let header = Header { major: PROTOCOL.major, kind: Kind::Immediate, seq: 0, ack: 0 };
@@ -94,7 +94,7 @@ impl PlantedBoard {
         }
     }
 
-    /// The same move, but to where the running one goes.
+    /// The same move, with the target of the running one.
     fn to_the_old_target(&self, header: Header, request: &Request) -> Option<Vec<u8>> {
         let Request::MoveTo(order) = request else { return None };
         if self.board.state() != ControllerState::Moving {

@@ -1,4 +1,4 @@
-//! Lanes: six arithmetics of six operations, and the selection by their flags.
+//! Parallel lanes: six operations in six arithmetics each, and the selection by their flags.
 
 use crate::call::Form;
 use crate::forms;

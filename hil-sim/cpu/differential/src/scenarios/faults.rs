@@ -42,7 +42,7 @@ pub fn unmasked(name: &str, enabled: u32) {
     write(0xe000_ed88, 0x00f0_0000);
 }
 
-/// What cannot be taken becomes a HardFault.
+/// A fault that cannot be taken becomes a HardFault.
 pub fn masked() {
     scenario("svc under PRIMASK", code!("cpsid i", "mov r1, lr", "svc #2"), 0);
     // SAFETY: ends the mask that the scenario left.

@@ -5,7 +5,7 @@ use crate::events::{set_raises, set_spoils_float};
 
 const FPCCR: u32 = 0xe000_ef34;
 
-/// Code with values in S0, S1, S7, S15, S16 and FPSCR that an interrupt must keep; gives a sum of what it finds.
+/// Code with values in S0, S1, S7, S15, S16 and FPSCR that an interrupt must keep; returns a sum of what it finds.
 fn float_kept() -> Code {
     code!(
         "vpush {{s16}}",

@@ -1,4 +1,4 @@
-//! A checkerboard target for calibration, and the plain studio it is photographed in.
+//! A calibration target, and the plain studio in which images of it are taken.
 
 use nalgebra::{UnitQuaternion, Vector3};
 use vergence_vision::{Frame, Length, Point, Transform, World};
@@ -13,15 +13,15 @@ const WHITE: Rgb = [0.82, 0.82, 0.80];
 const BLACK: Rgb = [0.04, 0.04, 0.04];
 const BACK: Rgb = [0.30, 0.28, 0.26];
 
-/// White border around the squares, as a part of a square's side.
+/// Width of the white border, as a share of the side of a square.
 const BORDER: f64 = 0.5;
 
 /// A flat checkerboard of no thickness with a white border of half a square.
 ///
-/// As a type it also names the board's own frame: the origin at inner corner (0, 0), x along the rows, y down the
-/// columns, z into the board, so that the printed side is seen from negative z.
+/// As a type it also names the target's own frame: the origin at inner corner (0, 0), x along the rows, y down the
+/// columns, z into the target, so that the printed side is seen from negative z.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Board {
+pub struct Target {
     /// Inner corners along x.
     pub columns: u32,
     /// Inner corners along y.
@@ -30,23 +30,23 @@ pub struct Board {
     pub square: Length,
 }
 
-impl Frame for Board {}
+impl Frame for Target {}
 
-impl Board {
+impl Target {
     /// The inner corner in `column` and `row`, both counted from 0.
     #[must_use]
     pub fn corner(&self, column: u32, row: u32) -> Point<Self> {
         Point::from_mm(Vector3::new(f64::from(column), f64::from(row), 0.0) * self.square.mm())
     }
 
-    /// The middle of the board.
+    /// The middle of the target.
     #[must_use]
     pub fn centre(&self) -> Point<Self> {
         let middle = Vector3::new(f64::from(self.columns) - 1.0, f64::from(self.rows) - 1.0, 0.0);
         Point::from_mm(middle * (0.5 * self.square.mm()))
     }
 
-    /// Where the board is, turned by `rotation` with its middle at `middle`, in millimetres.
+    /// The pose of a target turned by `rotation` with its middle at `middle`, in millimetres.
     #[must_use]
     pub fn placed<F: Frame>(&self, rotation: UnitQuaternion<f64>, middle: Vector3<f64>) -> Transform<F, Self> {
         Transform::new(rotation, middle - rotation * self.centre().mm())
@@ -82,25 +82,25 @@ impl Scene {
         Self::closed(Vector3::repeat(-HALF_MM), Vector3::repeat(HALF_MM), [wall; 6])
     }
 
-    /// A `board` alone in the [studio](Self::studio).
+    /// A `target` alone in the [studio](Self::studio).
     #[must_use]
-    pub fn checkerboard(board: Board, world_from_board: Transform<World, Board>) -> Self {
-        Self::studio().with_board(board, world_from_board)
+    pub fn target_in_studio(target: Target, world_from_target: Transform<World, Target>) -> Self {
+        Self::studio().with_target(target, world_from_target)
     }
 
-    /// A `board` alone before an even grey: what is quickest to render where only the board matters.
+    /// A `target` alone before an even grey, which renders quickest where only the target matters.
     #[must_use]
-    pub fn board_alone(board: Board, world_from_board: Transform<World, Board>) -> Self {
+    pub fn target_alone(target: Target, world_from_target: Transform<World, Target>) -> Self {
         const GREY: Rgb = [0.35; 3];
-        Self::empty(GREY).with_board(board, world_from_board)
+        Self::empty(GREY).with_target(target, world_from_target)
     }
 
-    /// The scene with a `board` added. Nothing stops it from cutting through what is there.
+    /// The scene with a `target` added. The target may intersect other solids.
     #[must_use]
-    pub fn with_board(self, board: Board, world_from_board: Transform<World, Board>) -> Self {
-        let half = board.size().map(|side| 0.5 * side.mm());
-        let middle = world_from_board * board.centre();
-        let material = Material { pattern: Pattern::Print(board), seed: 0, glow: None };
-        self.with(vec![Solid::new(Shape::Rectangle { half }, middle.mm(), world_from_board.rotation(), material)])
+    pub fn with_target(self, target: Target, world_from_target: Transform<World, Target>) -> Self {
+        let half = target.size().map(|side| 0.5 * side.mm());
+        let middle = world_from_target * target.centre();
+        let material = Material { pattern: Pattern::Print(target), seed: 0, glow: None };
+        self.with(vec![Solid::new(Shape::Rectangle { half }, middle.mm(), world_from_target.rotation(), material)])
     }
 }

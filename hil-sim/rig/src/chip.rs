@@ -1,0 +1,172 @@
+//! The unmodified firmware on the simulated chip, its pins wired to the mechanics.
+
+use rand::{RngExt, SeedableRng};
+use rand_pcg::Pcg64Mcg;
+use vergence_board::Served;
+use vergence_image::ImageFile;
+use vergence_image::layout::{ACTIVE, CAPACITY};
+use vergence_mcu::{
+    Bench, BenchWiring, ChipConfig, FLASH_BASE, Firmware, Frame, Halt, LineFault, Machine, Picoseconds, Pin, UartId,
+};
+use vergence_plant::{Plant, Stage};
+use vergence_rig::Rig;
+
+use crate::SimError;
+use crate::rig::stage;
+
+/// The port that the on-board debugger passes on to the host.
+const LINK: UartId = UartId::LPUART1;
+/// Speed of the line until the firmware has sent something, in bits per second.
+const BAUD: u32 = 921_600;
+/// Length of the stack pointer and the entry, with which a vector table begins, in bytes.
+const ENTRY: usize = 8;
+
+/// A program for the chip.
+#[derive(Clone, Copy, Debug)]
+pub struct Program<'a> {
+    /// Name for messages, such as the file name.
+    pub name: &'a str,
+    /// An ELF file, or a signed image.
+    pub bytes: &'a [u8],
+}
+
+/// A board whose processor is simulated too: the unmodified firmware, its pins wired to simulated mechanics.
+pub struct SimulatedChip {
+    machine: Machine<Bench>,
+    wiring: BenchWiring,
+    baud: u32,
+    output: Vec<u8>,
+    halt: Option<Halt>,
+}
+
+impl SimulatedChip {
+    /// Powers a board with these programs in flash. Messages use the symbols of the last ELF file. Where no program is at
+    /// the start of flash, the last one starts without a boot loader. `seed` decides where the stages stand: at the same
+    /// places as those of the native board.
+    ///
+    /// # Errors
+    /// [`SimError::Program`] where a program is none for this chip, [`SimError::OtherAxes`] where the rig does not fit the
+    /// board.
+    pub fn new(programs: &[Program<'_>], rig: &Rig, seed: u64) -> Result<Self, SimError> {
+        let wiring = BenchWiring::nucleo_g474();
+        if rig.axes.len() != wiring.axes.len() {
+            return Err(SimError::OtherAxes { rig: rig.name.clone(), axes: rig.axes.len(), driven: wiring.axes.len() });
+        }
+        let bench = Bench::new(wiring.clone(), plant(rig, seed));
+        let mut machine = Machine::new(ChipConfig::default(), bench);
+        // Most of an update is waiting for the flash.
+        machine.set_skips_waiting(true);
+        let mut last = None;
+        for program in programs {
+            last = load(&mut machine, *program)?;
+        }
+        start(&mut machine, last);
+        Ok(Self { machine, wiring, baud: BAUD, output: Vec::new(), halt: None })
+    }
+
+    /// Traces all wired pins from now on.
+    pub fn trace(&mut self) {
+        let pins: Vec<Pin> = self.wiring.signals().into_iter().map(|(pin, _)| pin).collect();
+        self.machine.chip_mut().trace(&pins);
+    }
+
+    /// The traced pins as a value change dump (IEEE 1364-2005, section 18).
+    #[must_use]
+    pub fn trace_dump(&self) -> String {
+        let signals = self.wiring.signals();
+        let name = |pin: Pin| {
+            let signal = signals.iter().find(|(wired, _)| *wired == pin);
+            signal.map_or_else(|| pin.to_string(), |(_, name)| format!("{name}_{pin}"))
+        };
+        self.machine.chip().vcd(name)
+    }
+
+    /// The chip with its mechanics.
+    pub fn machine(&mut self) -> &mut Machine<Bench> {
+        &mut self.machine
+    }
+
+    /// Runs until `us` microseconds after power-on, unless the processor has stopped.
+    pub fn run_until(&mut self, us: u64) {
+        if self.halt.is_some() {
+            return;
+        }
+        let halt = self.machine.run_until(Picoseconds::microseconds(us));
+        self.halt = (halt != Halt::Reached).then_some(halt);
+        for sent in self.machine.chip_mut().take_sent(LINK) {
+            self.baud = sent.baud;
+            self.output.push(sent.byte);
+        }
+    }
+
+    /// Begins to send bytes to the board, at its own speed, as the debugger's port would.
+    pub fn send(&mut self, bytes: &[u8]) {
+        let frame = |&byte| Frame { byte, baud: self.baud, fault: LineFault::None };
+        let frames: Vec<Frame> = bytes.iter().map(frame).collect();
+        self.machine.chip_mut().send(LINK, &frames);
+    }
+}
+
+impl Served for SimulatedChip {
+    type Error = SimError;
+
+    fn run_until(&mut self, elapsed_us: u64) {
+        self.run_until(elapsed_us);
+    }
+
+    fn receive(&mut self, bytes: &[u8]) {
+        self.send(bytes);
+    }
+
+    fn take_output(&mut self) -> Vec<u8> {
+        std::mem::take(&mut self.output)
+    }
+
+    fn settle(&mut self) -> Result<(), SimError> {
+        match &self.halt {
+            Some(halt) => Err(SimError::Stopped(halt.to_string())),
+            None => Ok(()),
+        }
+    }
+}
+
+/// The mechanics, at the same places as those of the native board for the same seed.
+fn plant(rig: &Rig, seed: u64) -> Plant {
+    let stages: Vec<Stage> = rig.axes.iter().map(stage).collect();
+    let mut random = Pcg64Mcg::seed_from_u64(seed);
+    let place = |stage: &Stage| {
+        let [min, max] = [stage.settings.min, stage.settings.max].map(|end| f64::from(end.0));
+        min + random.random::<f64>() * (max - min)
+    };
+    let positions: Vec<f64> = stages.iter().map(place).collect();
+    let mechanics: Vec<_> = stages.iter().map(|stage| stage.mechanics).collect();
+    Plant::new(&mechanics, &positions)
+}
+
+/// Puts a program into flash; returns the offset at which it begins.
+fn load(machine: &mut Machine<Bench>, Program { name, bytes }: Program<'_>) -> Result<Option<usize>, SimError> {
+    let fail = |why: String| SimError::Program { name: name.to_owned(), why };
+    if let Ok(ImageFile { seal, image }) = ImageFile::read(bytes) {
+        let start = ACTIVE.start as usize;
+        let chip = machine.chip_mut();
+        let fits = image.len() <= CAPACITY as usize
+            && chip.load_flash(start, image)
+            && chip.load_flash(start + CAPACITY as usize, &seal.to_bytes());
+        return if fits { Ok(Some(start)) } else { Err(fail("this image does not fit into flash".into())) };
+    }
+    let firmware = Firmware::from_elf(bytes).map_err(|error| fail(error.to_string()))?;
+    let first = firmware.segments().map(|(address, _)| address).min();
+    machine.load(firmware).map_err(|error| fail(error.to_string()))?;
+    Ok(first.map(|address| (address - FLASH_BASE) as usize))
+}
+
+/// Powers the chip, which reads its first vectors at the start of flash. Where that is erased, those of `program` are
+/// copied there.
+fn start(machine: &mut Machine<Bench>, program: Option<usize>) {
+    let erased = machine.chip().flash().iter().take(ENTRY).all(|&byte| byte == 0xFF);
+    if let Some(start) = program.filter(|_| erased) {
+        let entry = machine.chip().flash().get(start..start + ENTRY).unwrap_or_default().to_vec();
+        machine.chip_mut().load_flash(0, &entry);
+    }
+    machine.power_on();
+}

@@ -1,0 +1,72 @@
+//! True positions of simulated mechanics during the last second, for the cameras on them.
+
+use std::collections::VecDeque;
+
+use vergence_protocol::Microseconds;
+use vergence_rig::{Rig, RigPose};
+
+/// Number of ticks that are kept: more than any exposure and its way to the host take.
+const KEPT: usize = 1_000;
+
+/// True positions of the mechanics, tick by tick.
+#[derive(Clone, Debug, Default)]
+pub struct LoadHistory {
+    /// Time on the board's clock in microseconds, and the load's position on every axis in micro-units.
+    ticks: VecDeque<(f64, Vec<f64>)>,
+}
+
+impl LoadHistory {
+    /// Adds a tick. One not after the last discards what was kept: the board's clock has started again.
+    pub fn push(&mut self, at: Microseconds, loads: Vec<f64>) {
+        let at = at.0 as f64;
+        if self.ticks.back().is_some_and(|(last, _)| *last >= at) {
+            self.ticks.clear();
+        }
+        if self.ticks.len() == KEPT {
+            self.ticks.pop_front();
+        }
+        self.ticks.push_back((at, loads));
+    }
+
+    /// The ticks around `from_us` to `to_us` on the board's clock.
+    #[must_use]
+    pub fn between(&self, from_us: f64, to_us: f64) -> Self {
+        let first = self.ticks.partition_point(|(at, _)| *at <= from_us).saturating_sub(1);
+        let end = (self.ticks.partition_point(|(at, _)| *at < to_us) + 1).min(self.ticks.len());
+        Self { ticks: self.ticks.range(first.min(end)..end).cloned().collect() }
+    }
+
+    /// True pose of `rig` at `us` microseconds on the board's clock, interpolated linearly between two ticks: at the bench's
+    /// largest acceleration the error is below 0.1 um. `None` where nothing is kept.
+    #[must_use]
+    pub fn pose_at(&self, rig: &Rig, us: f64) -> Option<RigPose> {
+        let next = self.ticks.partition_point(|(at, _)| *at < us);
+        let (to, after) = self.ticks.get(next).or(self.ticks.back())?;
+        let (from, before) = self.ticks.get(next.saturating_sub(1))?;
+        let share = if to > from { ((us - from) / (to - from)).clamp(0.0, 1.0) } else { 0.0 };
+        let loads = before.iter().zip(after).map(|(before, after)| before + share * (after - before));
+        let values: Vec<f64> = rig.axes.iter().zip(loads).map(|(axis, load)| axis.value_from_micro(load)).collect();
+        Some(rig.pose_at_values(&values))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_pose_lies_between_two_ticks() {
+        let rig = Rig::from_toml(vergence_rig::BENCH_TOML).expect("the bench");
+        let mut history = LoadHistory::default();
+        for tick in 0..2_000u32 {
+            history.push(Microseconds(u64::from(tick) * 1_000), vec![100_000.0 + 80.0 * f64::from(tick), 0.0]);
+        }
+        let part = history.between(1_500_400.0, 1_502_600.0);
+        assert_eq!(part.ticks.len(), 4);
+        let baseline = |us| part.pose_at(&rig, us).expect("it is kept").axes[0].value();
+        assert!((baseline(1_501_250.0) - (100.0 + 0.08 * 1_501.25)).abs() < 1e-9);
+        // After the last tick nothing moves.
+        assert!((baseline(9e9) - (100.0 + 0.08 * 1_503.0)).abs() < 1e-9);
+        assert!(LoadHistory::default().pose_at(&rig, 0.0).is_none());
+    }
+}

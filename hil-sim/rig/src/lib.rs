@@ -1,0 +1,41 @@
+//! The whole simulated rig in virtual time: board, mechanics, cameras and room.
+//!
+//! - [`SimulatedRig`]: the controller core on simulated mechanics, with the truth beside it
+//! - [`SimulatedChip`]: the unmodified firmware on the simulated microcontroller, wired to the same mechanics
+//! - [`RoomCamera`] and [`LiveCamera`]: cameras on the mechanics, in a furnished [`Room`]
+//! - [`TargetCamera`]: cameras before which a simulated person holds a calibration target ([`HeldTarget`])
+//! - [`built`]: a rig as it was really built, for a calibration to find
+//!
+//! ```
+//! use vergence_rig::{BENCH_TOML, Rig};
+//! use vergence_sim::SimulatedRig;
+//!
+//! let rig = Rig::from_toml(BENCH_TOML)?;
+//! let mut simulated = SimulatedRig::new(&rig, 1)?;
+//! simulated.run_until(1_000_000); // one second
+//! assert!(simulated.true_pose().axes[0].value() > 0.0);
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
+//!
+//! Time is an argument everywhere: a program that serves or watches a simulated rig drives it with its own clock. The same
+//! seed gives the same bytes. Nothing here reads or writes a file.
+
+mod built;
+mod chip;
+mod error;
+mod held_target;
+mod history;
+mod live_camera;
+mod random;
+mod rig;
+mod room;
+
+pub use built::built;
+pub use chip::{Program, SimulatedChip};
+pub use error::SimError;
+pub use held_target::{HeldTarget, TargetCamera, photograph_target};
+pub use history::LoadHistory;
+pub use live_camera::{LiveCamera, Unplugged};
+pub use random::Random;
+pub use rig::{Pulse, SimulatedRig};
+pub use room::{Room, RoomCamera};

@@ -1,0 +1,242 @@
+//! The native board and its mechanics as one simulated rig.
+
+use std::collections::VecDeque;
+
+use vergence_board::Served;
+use vergence_control::{TICK_US, UNIT};
+use vergence_image::is_signed_by;
+use vergence_plant::{NativeBoard, Stage};
+use vergence_protocol::{AxisKind, Microseconds, ResetCause};
+use vergence_rig::{Rig, RigAxis, RigPose};
+
+use crate::SimError;
+use crate::error::refusal;
+use crate::history::LoadHistory;
+
+/// The board's clock when the simulation starts, in microseconds.
+const BOARD_START_US: u64 = 3_000_000;
+/// Drift of the board's clock against the host's: no quartz is exact.
+const BOARD_DRIFT: f64 = 40e-6;
+/// Number of the board's first start; later ones count up.
+const FIRST_BOOT: u32 = 1;
+/// Version of the oldest firmware that may replace the board's own.
+const OLDEST: [u8; 3] = [0, 1, 0];
+/// Number of pulses remembered for [`SimulatedRig::pulses_from`].
+const PULSES_KEPT: usize = 256;
+
+/// A simulated rig: a board that speaks the protocol, and the truth beside it.
+#[derive(Debug)]
+pub struct SimulatedRig {
+    board: NativeBoard,
+    rig: Rig,
+    /// Elapsed time to which the simulation was last run, in microseconds.
+    elapsed_us: u64,
+    /// Elapsed time at which the board last started.
+    began_us: u64,
+    /// What the board's clock showed then.
+    started_us: u64,
+    boot: u32,
+    output: Vec<u8>,
+    /// Number of flash operations up to the last [`Self::changed_flash`].
+    saved_operations: usize,
+    history: LoadHistory,
+    pulses: VecDeque<Pulse>,
+}
+
+/// A pulse of the camera trigger.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Pulse {
+    /// Number of pulses before this one since power-on.
+    pub number: u32,
+    /// Time of its edge, board clock.
+    pub at: Microseconds,
+}
+
+impl SimulatedRig {
+    /// Switches on a simulated rig with one stage for every axis; `seed` decides where they stand.
+    ///
+    /// # Errors
+    /// [`SimError::Axes`] where the rig has no axes, or one that no stage fits.
+    pub fn new(rig: &Rig, seed: u64) -> Result<Self, SimError> {
+        let stages: Vec<Stage> = rig.axes.iter().map(stage).collect();
+        let settings: Vec<_> = stages.iter().map(|stage| stage.settings).collect();
+        let mechanics: Vec<_> = stages.iter().map(|stage| stage.mechanics).collect();
+        let refused = |error| SimError::Axes { rig: rig.name.clone(), why: refusal(error, rig) };
+        let mut board = NativeBoard::new(&settings, &mechanics, seed).map_err(refused)?;
+        board.services_mut().oldest = OLDEST;
+        board.restart(ResetCause::PowerOn, FIRST_BOOT).map_err(refused)?;
+        Ok(Self {
+            board,
+            rig: rig.clone(),
+            elapsed_us: 0,
+            began_us: 0,
+            started_us: BOARD_START_US,
+            boot: FIRST_BOOT,
+            output: Vec::new(),
+            saved_operations: 0,
+            history: LoadHistory::default(),
+            pulses: VecDeque::new(),
+        })
+    }
+
+    /// Lets the board take firmware that is signed by `key`, an Ed25519 public key.
+    pub fn trust(&mut self, key: [u8; 32]) {
+        let services = self.board.services_mut();
+        services.key = key;
+        services.verifier = |key, signed, signature| is_signed_by(key, signed, signature);
+    }
+
+    /// Switches the board on with these bytes in its settings flash; none at all stand for erased flash.
+    ///
+    /// # Errors
+    /// [`SimError::NotFlash`] for bytes of another length, [`SimError::Settings`] where the board refuses the settings.
+    pub fn power_on_with_flash(&mut self, bytes: &[u8]) -> Result<(), SimError> {
+        let flash = &mut self.board.services_mut().settings;
+        if !bytes.is_empty() && bytes.len() != flash.bytes().len() {
+            return Err(SimError::NotFlash);
+        }
+        // Erased units stay as they are: they may still be programmed.
+        let units = bytes.chunks(UNIT).zip((0..).step_by(UNIT));
+        units.filter(|(unit, _)| unit.iter().any(|&b| b != 0xFF)).for_each(|(unit, at)| flash.overwrite(at, unit));
+        self.saved_operations = flash.operations();
+        self.boot += 1;
+        self.board
+            .restart(ResetCause::PowerOn, self.boot)
+            .map_err(|error| SimError::Settings(refusal(error, &self.rig)))
+    }
+
+    /// Contents of the settings flash, where they changed since the last call or since
+    /// [`Self::power_on_with_flash`].
+    pub fn changed_flash(&mut self) -> Option<&[u8]> {
+        let flash = &self.board.services_mut().settings;
+        let changed = std::mem::replace(&mut self.saved_operations, flash.operations()) != flash.operations();
+        changed.then(|| flash.bytes())
+    }
+
+    /// Runs until `elapsed_us` microseconds after the simulation began. What the board sends meanwhile is kept until
+    /// [`Self::take_output`].
+    pub fn run_until(&mut self, elapsed_us: u64) {
+        self.elapsed_us = elapsed_us;
+        let drifted = elapsed_us.saturating_sub(self.began_us) as f64 * (1.0 + BOARD_DRIFT);
+        let until = self.started_us + drifted as u64;
+        // A UART sends while the board runs, not after: a pose must not wait for the next one and be replaced by it.
+        while self.board.now().0 < until {
+            self.board.advance(Microseconds(until.min(self.board.now().0 + TICK_US)));
+            self.output.append(&mut self.board.transmit());
+            self.remember();
+        }
+    }
+
+    /// Keeps the positions and the trigger pulse of this tick for the cameras.
+    fn remember(&mut self) {
+        let plant = self.board.plant();
+        self.history.push(self.board.now(), plant.loads());
+        let Some((at, _)) = plant.exposed() else { return };
+        if self.pulses.back().is_some_and(|last| last.at == at) {
+            return;
+        }
+        let number = self.pulses.back().map_or(0, |last| last.number.wrapping_add(1));
+        if self.pulses.len() == PULSES_KEPT {
+            self.pulses.pop_front();
+        }
+        self.pulses.push_back(Pulse { number, at });
+    }
+
+    /// The last pulses of the camera trigger, from number `first` on.
+    pub fn pulses_from(&self, first: u32) -> impl Iterator<Item = Pulse> {
+        self.pulses.iter().copied().filter(move |pulse| pulse.number >= first)
+    }
+
+    /// True positions of the mechanics during the last second.
+    #[must_use]
+    pub const fn history(&self) -> &LoadHistory {
+        &self.history
+    }
+
+    /// Time on the board's clock.
+    #[must_use]
+    pub fn now(&self) -> Microseconds {
+        self.board.now()
+    }
+
+    /// The rig that is simulated.
+    #[must_use]
+    pub const fn rig(&self) -> &Rig {
+        &self.rig
+    }
+
+    /// Gives bytes of the host to the board, at the time to which it was last run.
+    pub fn receive(&mut self, bytes: &[u8]) {
+        self.board.receive(bytes);
+        self.output.append(&mut self.board.transmit());
+        if self.board.take_reboot().is_some() {
+            self.restart();
+        }
+    }
+
+    /// Starts the board's software again. There is no boot loader to stay in.
+    fn restart(&mut self) {
+        self.boot += 1;
+        // It has started with these settings before.
+        if self.board.restart(ResetCause::Software, self.boot).is_ok() {
+            (self.started_us, self.began_us) = (0, self.elapsed_us);
+        }
+    }
+
+    /// Bytes that the board sent since the last call.
+    pub fn take_output(&mut self) -> Vec<u8> {
+        std::mem::take(&mut self.output)
+    }
+
+    /// The board, to read its state or to harm it.
+    pub fn board(&mut self) -> &mut NativeBoard {
+        &mut self.board
+    }
+
+    /// True pose of the cameras now: from the mechanics, not from the encoders.
+    #[must_use]
+    pub fn true_pose(&self) -> RigPose {
+        self.pose_of(&self.board.plant().loads())
+    }
+
+    /// True pose of the cameras when they were last triggered; `None` before the first pulse.
+    #[must_use]
+    pub fn exposed_pose(&self) -> Option<RigPose> {
+        self.board.plant().exposed().map(|(_, loads)| self.pose_of(loads))
+    }
+
+    fn pose_of(&self, loads: &[f64]) -> RigPose {
+        let values: Vec<f64> =
+            self.rig.axes.iter().zip(loads).map(|(axis, &load)| axis.value_from_micro(load)).collect();
+        self.rig.pose_at_values(&values)
+    }
+}
+
+impl Served for SimulatedRig {
+    type Error = SimError;
+
+    fn run_until(&mut self, elapsed_us: u64) {
+        self.run_until(elapsed_us);
+    }
+
+    fn receive(&mut self, bytes: &[u8]) {
+        self.receive(bytes);
+    }
+
+    fn take_output(&mut self) -> Vec<u8> {
+        self.take_output()
+    }
+
+    fn settle(&mut self) -> Result<(), SimError> {
+        Ok(())
+    }
+}
+
+/// The simulated stage of an axis of the rig file.
+pub(crate) fn stage(axis: &RigAxis) -> Stage {
+    let [min, max] = axis.range.map(|position| position.micro());
+    match axis.kind {
+        AxisKind::Linear => Stage::linear(min, max, axis.counts_per_unit),
+        AxisKind::Rotary => Stage::rotary(min, max, axis.counts_per_unit),
+    }
+}
