@@ -1,4 +1,4 @@
-//! How long the solvers and the detector take, on simulated corners and a rendered board.
+//! How long the solvers and the detector take, on simulated corners and a rendered target.
 //!
 //! `cargo bench -p vergence-calibration`
 #![allow(
@@ -19,10 +19,10 @@ use simulated::stage::{Bench, SIX_POSES};
 use simulated::{Dice, Pair, lens, other_lens, own_views, pair_pose};
 use vergence_calibration::detect::detect;
 use vergence_calibration::{
-    BoardSpec, ExtrinsicsOptions, IntrinsicsOptions, StageOptions, calibrate_extrinsics, calibrate_intrinsics,
+    ExtrinsicsOptions, IntrinsicsOptions, StageOptions, TargetSpec, calibrate_extrinsics, calibrate_intrinsics,
     calibrate_stage,
 };
-use vergence_scene::{Board, Optics, Scene, View, render};
+use vergence_scene::{Optics, Scene, Target, View, render};
 use vergence_vision::{Angle, Camera, ImageSize, KannalaBrandt, Length, Pixel, Transform, World};
 
 fn solvers(criterion: &mut Criterion) {
@@ -46,26 +46,26 @@ fn solvers(criterion: &mut Criterion) {
     });
 }
 
-/// A board of 9 x 6 corners, tilted, in a picture of 1280 x 1280.
+/// A target of 9 x 6 corners, tilted, in a picture of 1280 x 1280.
 fn photograph() -> GrayImage {
     let size = ImageSize { width: 1280, height: 1280 };
     let centre = Pixel { u: 639.8, v: 639.3 };
     let camera = KannalaBrandt::new([374.0, -6.0, 0.5, 0.0, 0.0], 1.001, centre, Angle::from_deg(98.0), size).unwrap();
-    let board = Board { columns: 9, rows: 6, square: Length::from_mm(24.0) };
+    let target = Target { columns: 9, rows: 6, square: Length::from_mm(24.0) };
     let rotation = UnitQuaternion::from_scaled_axis(Vector3::new(0.4, -0.3, 0.2));
     let place =
-        Transform::<World, Board>::new(rotation, Vector3::new(60.0, -20.0, 260.0) - rotation * board.centre().mm());
+        Transform::<World, Target>::new(rotation, Vector3::new(60.0, -20.0, 260.0) - rotation * target.centre().mm());
     let world_from_camera = Transform::<World, Camera>::new(UnitQuaternion::identity(), Vector3::zeros());
-    let (scene, optics) = (Scene::checkerboard(board, place), Optics { edge_samples: 60, ..Optics::default() });
+    let (scene, optics) = (Scene::target_in_studio(target, place), Optics { edge_samples: 60, ..Optics::default() });
     let view = View { scene: &scene, camera: &camera, world_from_camera, optics: &optics };
     DynamicImage::from(render(&view, 1).image).to_luma8()
 }
 
 fn detection(criterion: &mut Criterion) {
-    let (picture, board) = (photograph(), BoardSpec { columns: 9, rows: 6, square: Length::from_mm(24.0) });
-    assert!(detect(&picture, &board, None).unwrap().complete);
+    let (picture, target) = (photograph(), TargetSpec { columns: 9, rows: 6, square: Length::from_mm(24.0) });
+    assert!(detect(&picture, &target, None).unwrap().complete);
     criterion.bench_function("detection, 1280 x 1280", |bencher| {
-        bencher.iter(|| detect(black_box(&picture), &board, None).unwrap());
+        bencher.iter(|| detect(black_box(&picture), &target, None).unwrap());
     });
 }
 

@@ -1,12 +1,12 @@
-//! The rotation and translation between two clouds of corresponding points.
+//! Rigid transform between two sets of corresponding points, by least squares.
 
 use nalgebra::{Matrix3, Rotation3, UnitQuaternion, Vector3};
 use vergence_vision::{Frame, Point, Transform};
 
-/// The singular values of the clouds' covariance must separate by this share of the largest.
+/// Least separation of the singular values of the cross-covariance, as a share of the largest.
 const SEPARATION: f64 = 1e-9;
 
-/// Why two clouds do not determine a transform.
+/// Why two sets of points do not determine a transform.
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum ArunError {
@@ -16,12 +16,12 @@ pub enum ArunError {
     /// A coordinate is infinite or not a number.
     #[error("a coordinate is not a finite number")]
     NotFinite,
-    /// All points on one line, or one cloud so unlike the other that several rotations fit equally.
+    /// All points lie on one line, or the sets differ so much that several rotations fit equally.
     #[error("the points leave the rotation open: they lie on one line, or the clouds are mirror images")]
     Degenerate,
 }
 
-/// The transform that takes the second point of each pair closest to the first, in the sense of least squares.
+/// The transform that maps the second point of each pair closest to the first, in the least-squares sense.
 ///
 /// K. Arun, T. Huang and S. Blostein, "Least-squares fitting of two 3-D point sets", PAMI 9(5), 1987; never a
 /// reflection, by S. Umeyama, "Least-squares estimation of transformation parameters", PAMI 13(4), 1991, eq. 43.

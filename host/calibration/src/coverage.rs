@@ -1,28 +1,28 @@
-//! What a set of board views covers, and what it still needs: advice for the person who holds the board.
+//! What a set of target views covers and still needs: advice for the person who holds the target.
 
 use std::fmt;
 
 use vergence_vision::{ImageSize, Pixel};
 
-use crate::board::BoardView;
+use crate::target::TargetView;
 
-/// The image is divided into so many columns and rows.
+/// Columns and rows of cells that the image is divided into.
 const CELLS: usize = 3;
-/// Each cell wants so many views with a fair part of the board in it.
+/// Views that each cell needs with a fair part of the target in it.
 const VIEWS_PER_CELL: usize = 2;
-/// So many of all views must show the board tilted, or focal length and distance cannot be told apart.
+/// Share of the views that must show the target tilted: otherwise focal length and distance are not separable.
 const TILTED_SHARE: f64 = 0.5;
-/// A cell counts for a view that has this share of its corners there.
+/// Share of a view's corners that must lie in a cell for the view to count there.
 const FAIR_PART: f64 = 0.15;
-/// Opposite sides of the outline differ by this factor where the board is tilted.
+/// Ratio of opposite sides of the outline above which a target counts as tilted.
 const TILT_RATIO: f64 = 1.12;
 
-/// What the views so far cover.
+/// What the views taken so far cover.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Coverage {
     size: ImageSize,
     cells: [[usize; CELLS]; CELLS],
-    /// Cells that a board can be shown in.
+    /// Cells in which a target can be shown.
     within_reach: [[bool; CELLS]; CELLS],
     tilted: usize,
     views: usize,
@@ -37,13 +37,13 @@ pub struct Advice {
 }
 
 impl Coverage {
-    /// Nothing yet, of images of `size`.
+    /// An empty set of views, for images of `size`.
     #[must_use]
     pub fn new(size: ImageSize) -> Self {
         Self { size, cells: [[0; CELLS]; CELLS], within_reach: [[true; CELLS]; CELLS], tilted: 0, views: 0 }
     }
 
-    /// As [`Self::new`], but only parts of the image with a pixel that `reaches` are wanted, such as those that the other
+    /// As [`Self::new`], but only cells with a pixel for which `reaches` holds are needed, such as those that the other
     /// camera sees too.
     #[must_use]
     pub fn within(size: ImageSize, reaches: impl Fn(Pixel) -> bool) -> Self {
@@ -62,21 +62,21 @@ impl Coverage {
         Self { within_reach, ..Self::new(size) }
     }
 
-    /// How many views were taken.
+    /// Number of views taken.
     #[must_use]
     pub fn views(&self) -> usize {
         self.views
     }
 
-    /// Whether `view` shows the board where, or as, it has not been shown enough.
+    /// Whether `view` shows the target at a place or tilt of which more views are needed.
     #[must_use]
-    pub fn is_news(&self, view: &BoardView) -> bool {
+    pub fn is_news(&self, view: &TargetView) -> bool {
         let somewhere_new = self.touched(view).any(|(row, column)| self.cells[row][column] < VIEWS_PER_CELL);
         somewhere_new || (self.wants_tilt() && is_tilted(view))
     }
 
-    /// Takes a view.
-    pub fn add(&mut self, view: &BoardView) {
+    /// Adds a view to the set.
+    pub fn add(&mut self, view: &TargetView) {
         let touched: Vec<_> = self.touched(view).collect();
         for (row, column) in touched {
             self.cells[row][column] += 1;
@@ -85,7 +85,7 @@ impl Coverage {
         self.tilted += usize::from(is_tilted(view));
     }
 
-    /// What to show next; `None` where the set is complete.
+    /// What to show next; `None` if the set is complete.
     #[must_use]
     pub fn advice(&self) -> Option<Advice> {
         let places = (0..CELLS).flat_map(|row| (0..CELLS).map(move |column| (row, column)));
@@ -99,8 +99,8 @@ impl Coverage {
         (self.tilted as f64) < TILTED_SHARE * (self.views.max(1) as f64)
     }
 
-    /// The cells that hold a fair part of the view's corners.
-    fn touched<'a>(&self, view: &'a BoardView) -> impl Iterator<Item = (usize, usize)> + use<'a> {
+    /// Cells (row, column) that hold a fair part of the view's corners.
+    fn touched<'a>(&self, view: &'a TargetView) -> impl Iterator<Item = (usize, usize)> + use<'a> {
         let (width, height) = (f64::from(self.size.width), f64::from(self.size.height));
         let cell =
             move |position: f64, extent: f64| ((position + 0.5) / extent * CELLS as f64).clamp(0.0, 2.0) as usize;
@@ -114,10 +114,10 @@ impl Coverage {
     }
 }
 
-/// Whether opposite sides of the board's outline differ in length by more than a lens would make them.
-fn is_tilted(view: &BoardView) -> bool {
+/// Whether opposite sides of the target's outline differ in length by more than lens distortion explains.
+fn is_tilted(view: &TargetView) -> bool {
     let along = |axis: usize| {
-        let values = || view.corners.iter().map(|corner| corner.board_mm[axis]);
+        let values = || view.corners.iter().map(|corner| corner.target_mm[axis]);
         let (low, high) = values().fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), x| (low.min(x), high.max(x)));
         let [first, last] = [low, high].map(|edge| edge_length(view, axis, edge));
         (first > 0.0 && last > 0.0).then(|| (first / last).max(last / first))
@@ -125,12 +125,12 @@ fn is_tilted(view: &BoardView) -> bool {
     [0, 1].into_iter().filter_map(along).any(|ratio| ratio > TILT_RATIO)
 }
 
-/// Length in the image of the row or column of corners at `edge`, per millimetre of board.
-fn edge_length(view: &BoardView, axis: usize, edge: f64) -> f64 {
-    let mut line: Vec<_> = view.corners.iter().filter(|corner| (corner.board_mm[axis] - edge).abs() < 1e-6).collect();
-    line.sort_by(|a, b| a.board_mm[1 - axis].total_cmp(&b.board_mm[1 - axis]));
+/// Length in the image of the row or column of corners at `edge`, per millimetre of target.
+fn edge_length(view: &TargetView, axis: usize, edge: f64) -> f64 {
+    let mut line: Vec<_> = view.corners.iter().filter(|corner| (corner.target_mm[axis] - edge).abs() < 1e-6).collect();
+    line.sort_by(|a, b| a.target_mm[1 - axis].total_cmp(&b.target_mm[1 - axis]));
     let (Some(first), Some(last)) = (line.first(), line.last()) else { return 0.0 };
-    let mm = last.board_mm[1 - axis] - first.board_mm[1 - axis];
+    let mm = last.target_mm[1 - axis] - first.target_mm[1 - axis];
     let px = (last.pixel.u - first.pixel.u).hypot(last.pixel.v - first.pixel.v);
     if mm > 0.0 { px / mm } else { 0.0 }
 }
@@ -143,6 +143,6 @@ impl fmt::Display for Advice {
             ["lower left", "at the bottom", "lower right"],
         ];
         let place = PLACES.get(self.row).and_then(|row| row.get(self.column)).unwrap_or(&"");
-        write!(f, "show the board {place}{}", if self.tilted { ", tilted" } else { "" })
+        write!(f, "show the target {place}{}", if self.tilted { ", tilted" } else { "" })
     }
 }

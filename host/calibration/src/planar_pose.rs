@@ -1,11 +1,11 @@
-//! The pose of a board from one bundle of rays.
+//! Pose of a planar target from the rays of one image.
 //!
-//! Each corner's bearing f and board position X satisfy a·HX = b·HX = 0 for two tangents a, b of f and the matrix
-//! H ~ `[r1 r2 t]` (the direct linear transform of R. Hartley and A. Zisserman, *Multiple View Geometry*, 2004, §4.1, on
-//! bearings). H's sign follows from f·HX > 0, not from depths, and nothing is divided by z: a board beyond 90° is like any
-//! other. A plane seen from afar has a second, mirrored pose that fits nearly as well (D. Oberkampf, D. DeMenthon and
-//! L. Davis, "Iterative pose estimation using coplanar feature points", CVIU 63(3), 1996), so both are refined on the
-//! reprojection and compared.
+//! Each corner's bearing f and target position X satisfy a·HX = b·HX = 0 for two tangents a, b of f and the matrix H ~
+//! `[r1 r2 t]` (the direct linear transform of R. Hartley and A. Zisserman, *Multiple View Geometry*, 2004, §4.1, on
+//! bearings). H's sign follows from f·HX > 0, not from depths, and nothing is divided by z: a target beyond 90° is like
+//! any other. A plane seen from afar has a second, mirrored pose that fits nearly as well (D. Oberkampf, D. DeMenthon
+//! and L. Davis, "Iterative pose estimation using coplanar feature points", CVIU 63(3), 1996), so both are refined on
+//! the reprojection and compared.
 
 use std::cmp::Ordering;
 
@@ -15,71 +15,70 @@ use nalgebra::{
 use vergence_vision::{Camera, KannalaBrandt, Transform};
 
 use crate::Loss;
-use crate::arrow::{self, ArrowOptions, ArrowProblem, Equations};
 use crate::arun::nearest_rotation;
-use crate::board::{Board, BoardView, Corner};
 use crate::reprojection::{Lens, POSE, moved, point_by_move};
+use crate::schur_lm::{self, Equations, SchurOptions, SchurProblem};
+use crate::target::{Corner, Target, TargetView};
 
 /// Four points in general position determine the pose.
 const FEWEST_CORNERS: usize = 4;
-/// The solution of the DLT must stand out from the next by this share of the largest singular value.
+/// Least separation of the DLT's two smallest singular values, as a share of the largest.
 const SEPARATION: f64 = 1e-7;
 
-/// Where a board is, from one image of it.
+/// Pose of a target, from one image.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct BoardPose {
-    /// The board in the camera frame.
-    pub camera_from_board: Transform<Camera, Board>,
-    /// Distance between corners and reprojection, root mean square per corner.
+pub struct TargetPose {
+    /// Pose of the target in the camera frame.
+    pub camera_from_target: Transform<Camera, Target>,
+    /// Distance between corners and reprojections, root mean square per corner in pixels.
     pub rms_px: f64,
-    /// The same for the other tilt, where it is another local optimum: close to `rms_px` means that the image alone
-    /// does not tell which way the board is tilted.
+    /// The same for the mirrored tilt if that is another local optimum: if it is close to `rms_px`, the image alone
+    /// does not determine which way the target is tilted.
     pub other_tilt_rms_px: Option<f64>,
-    /// Corners used.
+    /// Number of corners used.
     pub corners: usize,
-    /// Corners left out, outside the lens's valid cone.
+    /// Number of corners outside the valid cone of the lens, which are left out.
     pub outside: usize,
 }
 
-/// Why an image does not determine a board's pose.
+/// Why an image does not determine the pose of a target.
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum PoseError {
     /// Fewer corners than four inside the lens's valid cone.
-    #[error("{0} usable corners; the pose of a board needs at least 4")]
+    #[error("{0} usable corners; the pose of a target needs at least 4")]
     TooFewCorners(usize),
     /// A corner or pixel is infinite or not a number, or a relative sigma not a positive one.
     #[error("a corner is not a finite number, or its sigma is not positive")]
     NotFinite,
-    /// One board corner is listed twice.
-    #[error("the corner at ({x}, {y}) mm of the board is listed twice", x = .0[0], y = .0[1])]
+    /// One target corner is listed twice.
+    #[error("the corner at ({x}, {y}) mm of the target is listed twice", x = .0[0], y = .0[1])]
     Duplicate([f64; 2]),
-    /// All corners, but for at most one, on a line of the board or of the image.
+    /// All corners but at most one lie on a line of the target or of the image.
     #[error("the corners leave the pose open: they lie on one line")]
     Degenerate,
 }
 
-/// A board corner and its bearing.
-struct Sight {
-    board: Vector2<f64>,
+/// A corner's position on the target (mm) and its unit bearing in the camera frame.
+struct Observation {
+    target: Vector2<f64>,
     bearing: Vector3<f64>,
 }
 
-/// The pose of the board from the corners of one image, refined on the reprojection.
+/// Pose of the target from the corners of one image, refined by reprojection.
 ///
-/// # Errors
-/// [`PoseError`] where corners are too few, listed twice, not finite or on a line.
-pub fn board_pose(camera: &KannalaBrandt, view: &BoardView) -> Result<BoardPose, PoseError> {
+/// # Errors [`PoseError`] if corners are too few, listed twice, not finite or on a line.
+pub fn target_pose(camera: &KannalaBrandt, view: &TargetView) -> Result<TargetPose, PoseError> {
     check(&view.corners)?;
-    let (inside, sights): (Vec<Corner>, Vec<Sight>) =
-        view.corners.iter().filter_map(|corner| Some((*corner, Sight::through(camera, corner)?))).unzip();
-    if sights.len() < FEWEST_CORNERS {
-        return Err(PoseError::TooFewCorners(sights.len()));
+    let (inside, observations): (Vec<Corner>, Vec<Observation>) =
+        view.corners.iter().filter_map(|corner| Some((*corner, Observation::through(camera, corner)?))).unzip();
+    if observations.len() < FEWEST_CORNERS {
+        return Err(PoseError::TooFewCorners(observations.len()));
     }
-    let start = linear_pose(&sights).ok_or(PoseError::Degenerate)?;
+    let start = linear_pose(&observations).ok_or(PoseError::Degenerate)?;
     let lens = Lens::of(camera);
     let first = refined(&lens, &inside, start, Loss::Squares).ok_or(PoseError::Degenerate)?;
-    let second = refined(&lens, &inside, other_tilt(&first.0, &sights), Loss::Squares);
+    let second = refined(&lens, &inside, other_tilt(&first.0, &observations), Loss::Squares);
     let ((pose, _), other) = match second {
         Some(second) if second.1 < first.1 => (second, Some(first)),
         second => (first, second),
@@ -88,10 +87,10 @@ pub fn board_pose(camera: &KannalaBrandt, view: &BoardView) -> Result<BoardPose,
         let squares = errors_px(&lens, &inside, pose).iter().map(|error| error * error).sum::<f64>();
         (squares / inside.len() as f64).sqrt()
     };
-    // Where both starts end at the same optimum there is no other tilt.
+    // If both starts end at the same optimum there is no other tilt.
     let distinct = other.filter(|(other, _)| pose.rotation.angle_to(&other.rotation) > 1e-4);
-    Ok(BoardPose {
-        camera_from_board: Transform::from_isometry(pose),
+    Ok(TargetPose {
+        camera_from_target: Transform::from_isometry(pose),
         rms_px: rms(&pose),
         other_tilt_rms_px: distinct.map(|(other, _)| rms(&other)),
         corners: inside.len(),
@@ -105,7 +104,7 @@ pub(crate) fn check(corners: &[Corner]) -> Result<(), PoseError> {
         return Err(PoseError::NotFinite);
     }
     let order = |a: &[f64; 2], b: &[f64; 2]| a.partial_cmp(b).unwrap_or(Ordering::Equal);
-    let mut places: Vec<[f64; 2]> = corners.iter().map(|c| c.board_mm).collect();
+    let mut places: Vec<[f64; 2]> = corners.iter().map(|c| c.target_mm).collect();
     places.sort_by(order);
     match places.windows(2).find(|pair| order(&pair[0], &pair[1]).is_eq()) {
         Some(pair) => Err(PoseError::Duplicate(pair[0])),
@@ -113,22 +112,22 @@ pub(crate) fn check(corners: &[Corner]) -> Result<(), PoseError> {
     }
 }
 
-impl Sight {
+impl Observation {
     fn through(camera: &KannalaBrandt, corner: &Corner) -> Option<Self> {
         let bearing = camera.unproject::<Camera>(corner.pixel).ok()?.vector();
-        Some(Self { board: Vector2::from(corner.board_mm), bearing })
+        Some(Self { target: Vector2::from(corner.target_mm), bearing })
     }
 }
 
-/// The DLT. `None` where the corners do not determine it.
-fn linear_pose(sights: &[Sight]) -> Option<Isometry3<f64>> {
-    let (centre, scale) = normalisation(sights)?;
-    let normalised = |sight: &Sight| ((sight.board - centre) / scale).push(1.0);
+/// Pose by the direct linear transform. `None` if the corners do not determine it.
+fn linear_pose(observations: &[Observation]) -> Option<Isometry3<f64>> {
+    let (centre, scale) = normalisation(observations)?;
+    let normalised = |observation: &Observation| ((observation.target - centre) / scale).push(1.0);
     let mut normal = SMatrix::<f64, 9, 9>::zeros();
-    for sight in sights {
-        let board = normalised(sight);
-        for tangent in tangents(&sight.bearing) {
-            let row = SVector::<f64, 9>::from_fn(|i, _| tangent[i % 3] * board[i / 3]);
+    for observation in observations {
+        let target = normalised(observation);
+        for tangent in tangents(&observation.bearing) {
+            let row = SVector::<f64, 9>::from_fn(|i, _| tangent[i % 3] * target[i / 3]);
             normal += row * row.transpose();
         }
     }
@@ -142,21 +141,22 @@ fn linear_pose(sights: &[Sight]) -> Option<Isometry3<f64>> {
     let solution = eigen.eigenvectors.column(order[0]);
     let homography = Matrix3::from_iterator(solution.iter().copied());
 
-    let facing: f64 = sights.iter().map(|sight| sight.bearing.dot(&(homography * normalised(sight)))).sum();
+    let facing: f64 =
+        observations.iter().map(|observation| observation.bearing.dot(&(homography * normalised(observation)))).sum();
     let [h1, h2, h3] = [0, 1, 2].map(|column| homography.column(column) * facing.signum());
     let length = 0.5 * (h1.norm() + h2.norm());
     let rotation =
         nearest_rotation(&Matrix3::from_columns(&[h1 / length, h2 / length, h1.cross(&h2) / (length * length)]))?;
-    // h3 is the image of the board's centre, in units of `scale / length`.
+    // h3 is the image of the target's centre, in units of `scale / length`.
     let origin = h3 * (scale / length) - rotation * centre.push(0.0);
     origin.iter().all(|x| x.is_finite()).then(|| Isometry3::from_parts(Translation3::from(origin), rotation))
 }
 
-/// Centre and root-mean-square radius of the board points.
-fn normalisation(sights: &[Sight]) -> Option<(Vector2<f64>, f64)> {
-    let count = sights.len() as f64;
-    let centre = sights.iter().map(|s| s.board).sum::<Vector2<f64>>() / count;
-    let square = sights.iter().map(|s| (s.board - centre).norm_squared()).sum::<f64>() / count;
+/// Centre and root-mean-square radius of the target points.
+fn normalisation(observations: &[Observation]) -> Option<(Vector2<f64>, f64)> {
+    let count = observations.len() as f64;
+    let centre = observations.iter().map(|s| s.target).sum::<Vector2<f64>>() / count;
+    let square = observations.iter().map(|s| (s.target - centre).norm_squared()).sum::<f64>() / count;
     (square > 0.0).then(|| (centre, square.sqrt()))
 }
 
@@ -166,10 +166,10 @@ fn tangents(bearing: &Vector3<f64>) -> [Vector3<f64>; 2] {
     [first, bearing.cross(&first)]
 }
 
-/// The pose with the tilt turned over: the board reflected in the plane through its centre orthogonal to the line of
-/// sight, and its normal reversed to make a rotation of the reflection.
-fn other_tilt(pose: &Isometry3<f64>, sights: &[Sight]) -> Isometry3<f64> {
-    let Some((centre, _)) = normalisation(sights) else { return *pose };
+/// The mirrored pose: the target reflected in the plane through its centre orthogonal to the line of sight, and its
+/// normal reversed to make a rotation of the reflection.
+fn other_tilt(pose: &Isometry3<f64>, observations: &[Observation]) -> Isometry3<f64> {
+    let Some((centre, _)) = normalisation(observations) else { return *pose };
     let middle = (pose * Point3::from(centre.push(0.0))).coords;
     let Some(sight) = middle.try_normalize(0.0) else { return *pose };
     let reflection = Matrix3::identity() - 2.0 * sight * sight.transpose();
@@ -180,36 +180,37 @@ fn other_tilt(pose: &Isometry3<f64>, sights: &[Sight]) -> Isometry3<f64> {
     Isometry3::from_parts(Translation3::from(middle - rotation * centre.push(0.0)), rotation)
 }
 
-/// The pose that fits the reprojection best, and ρ summed there. `None` where a corner cannot be projected at the start.
+/// Local optimum of the reprojection near `start`, and its cost. `None` if a corner cannot be projected at the start.
 pub(crate) fn refined(
     lens: &Lens,
     corners: &[Corner],
     start: Isometry3<f64>,
     loss: Loss,
 ) -> Option<(Isometry3<f64>, f64)> {
-    let options = ArrowOptions { loss, ..ArrowOptions::default() };
-    let solution = arrow::solve(&OneBoard { lens, corners }, (), vec![start], &options);
+    let options = SchurOptions { loss, ..SchurOptions::default() };
+    let solution = schur_lm::solve(&OneTarget { lens, corners }, (), vec![start], &options);
     let pose = solution.blocks.into_iter().next()?;
     solution.cost.is_finite().then_some((pose, 2.0 * solution.cost))
 }
 
-/// How far each corner is from where the board at `camera_from_board` puts it; infinite where it cannot be projected.
-pub(crate) fn errors_px(lens: &Lens, corners: &[Corner], camera_from_board: &Isometry3<f64>) -> Vec<f64> {
+/// Distance in pixels of each corner from its reprojection with the target at `camera_from_target`; infinite if it
+/// cannot be projected.
+pub(crate) fn errors_px(lens: &Lens, corners: &[Corner], camera_from_target: &Isometry3<f64>) -> Vec<f64> {
     let error = |corner: &Corner| {
-        let point = camera_from_board * Point3::from(Vector2::from(corner.board_mm).push(0.0));
+        let point = camera_from_target * Point3::from(Vector2::from(corner.target_mm).push(0.0));
         let projection = lens.project(&point.coords)?;
         Some((projection.pixel - Vector2::new(corner.pixel.u, corner.pixel.v)).norm())
     };
     corners.iter().map(|corner| error(corner).unwrap_or(f64::INFINITY)).collect()
 }
 
-/// One board seen by one lens that is known.
-struct OneBoard<'a> {
+/// Least-squares problem of one target's pose before a known lens.
+struct OneTarget<'a> {
     lens: &'a Lens,
     corners: &'a [Corner],
 }
 
-impl ArrowProblem<POSE> for OneBoard<'_> {
+impl SchurProblem<POSE> for OneTarget<'_> {
     type Shared = ();
     type Block = Isometry3<f64>;
 
@@ -219,9 +220,9 @@ impl ArrowProblem<POSE> for OneBoard<'_> {
 
     fn block_residuals(&self, (): &(), _: usize, pose: &Isometry3<f64>, equations: &mut Equations<POSE>) {
         for corner in self.corners {
-            let turned = pose.rotation * Vector2::from(corner.board_mm).push(0.0);
+            let turned = pose.rotation * Vector2::from(corner.target_mm).push(0.0);
             let Some(projection) = self.lens.project(&(turned + pose.translation.vector)) else {
-                // An infinite cost refuses the step that led here.
+                // An infinite cost makes the solver refuse this step.
                 equations.add(&[f64::INFINITY; 2], 1.0, &[], &[[0.0; 2]; POSE]);
                 continue;
             };

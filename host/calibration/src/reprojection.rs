@@ -1,7 +1,7 @@
-//! Small moves of lenses and poses.
+//! Local coordinates of lenses and poses, and projection with derivatives.
 //!
-//! Poses are moved in local coordinates `[ω, δ]`: `R ← exp(ω) R`, `t ← t + δ`, in radians and millimetres of the target
-//! frame. Their standard deviations are those of a rotation vector about the target's axes and of the origin's position.
+//! A pose moves in local coordinates `[ω, δ]`: `R ← exp(ω) R`, `t ← t + δ`, in radians about and millimetres along the
+//! axes of the frame it maps to.
 
 use nalgebra::{Isometry3, Matrix2x3, Matrix3, SMatrix, SVector, Translation3, UnitQuaternion, Vector2, Vector3};
 use vergence_vision::{InvalidLens, KannalaBrandt, OpenCvFisheye, Point};
@@ -9,7 +9,7 @@ use vergence_vision::{InvalidLens, KannalaBrandt, OpenCvFisheye, Point};
 pub(crate) use crate::intrinsics::LENS;
 use crate::intrinsics::reproject;
 
-/// Local coordinates of a pose.
+/// Number of local coordinates of a pose.
 pub(crate) const POSE: usize = 6;
 
 /// A lens as a point of the parameter space: fx, fy, cx, cy, k1 to k4.
@@ -48,11 +48,15 @@ impl Lens {
         }
     }
 
-    /// Where `point` is shown, also beyond the field, so that an iteration which strays there finds its way back. `None`
-    /// at the optical centre and straight behind it.
+    /// Image of `point`, also outside the field, so that an iteration which strays there can return. `None` at the
+    /// optical centre and straight behind it.
     pub fn project(&self, point: &Vector3<f64>) -> Option<Projection> {
-        let seen = reproject(&self.0, &Point::from_mm(*point))?;
-        Some(Projection { pixel: seen.pixel.into(), by_point: seen.by_point.into(), by_lens: seen.by_lens.into() })
+        let projected = reproject(&self.0, &Point::from_mm(*point))?;
+        Some(Projection {
+            pixel: projected.pixel.into(),
+            by_point: projected.by_point.into(),
+            by_lens: projected.by_lens.into(),
+        })
     }
 }
 
@@ -60,7 +64,7 @@ impl Lens {
 pub(crate) fn moved(pose: &Isometry3<f64>, delta: &SVector<f64, POSE>) -> Isometry3<f64> {
     let rotation = UnitQuaternion::from_scaled_axis(delta.fixed_rows::<3>(0).into_owned()) * pose.rotation;
     let translation = pose.translation.vector + delta.fixed_rows::<3>(3);
-    // Without this the rounding of many moves would pile up.
+    // Renormalised: rounding errors of many moves would add up.
     let rotation = UnitQuaternion::new_normalize(rotation.into_inner());
     Isometry3::from_parts(Translation3::from(translation), rotation)
 }

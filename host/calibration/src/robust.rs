@@ -1,7 +1,7 @@
 //! Robust losses and the median.
 
-/// How much a residual counts. `scale` is in the residual's unit, and s below is the squared norm of one residual
-/// (a pixel's two components together).
+/// Loss function of a residual. `scale` is in the residual's unit; s is the squared norm of one residual (both
+/// components of a pixel together).
 ///
 /// P. Huber, "Robust estimation of a location parameter", 1964; the redescending losses as in F. Hampel et al.,
 /// "Robust Statistics", 1986, and S. Geman and D. McClure, 1987.

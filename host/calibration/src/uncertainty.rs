@@ -1,4 +1,4 @@
-//! How sure the ray behind a pixel is, from the covariance of the lens.
+//! Uncertainty of the ray behind a pixel, from the covariance of the lens.
 
 use std::f64::consts::PI;
 
@@ -8,23 +8,23 @@ use vergence_vision::{Angle, Camera, KannalaBrandt, OpenCvFisheye, OutsideField,
 use crate::IntrinsicsCalibration;
 use crate::intrinsics::{LENS, reproject};
 
-/// The uncertainty of rays over a lens's field.
+/// Uncertainty of rays over the field of a lens.
 ///
-/// Two parts of a lens's error act differently. A rotation of all rays together is taken up by the poses of whatever is
-/// measured with the lens: it shows in the principal point's σ, but does no harm. What remains does. A. Dima Kogan,
-/// mrcal, "projection uncertainty", removes the rotation for the same reason. Here it is the one that best aligns the
-/// rays, all directions of the valid cone weighted alike. Board distances do not enter: the mean of the other rays is the
-/// reference, not the boards.
+/// The error of a lens has two parts. A common rotation of all rays shows in the standard deviation of the principal
+/// point but is harmless: the poses of whatever is measured absorb it. The rest does harm and is what this type states.
+/// D. Kogan, mrcal, "projection uncertainty", removes the rotation for the same reason. Here the rotation removed is
+/// the one that best aligns all rays of the valid cone, every direction weighted alike, independent of the distances of
+/// the targets.
 #[derive(Clone, Debug, PartialEq)]
 pub struct RayUncertainty {
     camera: KannalaBrandt,
     lens: OpenCvFisheye,
     covariance: SMatrix<f64, LENS, LENS>,
-    /// The common rotation (radians about the camera's axes) for a change of the lens.
+    /// Common rotation (radians about the camera's axes) per change of each lens parameter.
     rotation_by_lens: SMatrix<f64, 3, LENS>,
 }
 
-/// The uncertainty of one ray.
+/// A ray and its covariance.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct RayCovariance {
     /// The ray.
@@ -32,29 +32,29 @@ pub struct RayCovariance {
     /// Unit vectors orthogonal to the ray: away from the optical axis, and around it (in the direction from x to y). On
     /// the axis x and y.
     pub tangents: [Vector3<f64>; 2],
-    /// Covariance along the tangents, in rad².
+    /// Covariance of the ray's direction along `tangents`, in rad².
     pub covariance: Matrix2<f64>,
 }
 
 impl RayCovariance {
-    /// The standard deviation along the worst direction.
+    /// Standard deviation along the worst direction.
     #[must_use]
     pub fn sigma(&self) -> Angle {
         Angle::from_rad(self.covariance.symmetric_eigenvalues().max().max(0.0).sqrt())
     }
 }
 
-/// One point of a map.
+/// One point of a map of ray uncertainty.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct MapPoint {
-    /// Where in the image.
+    /// Position in the image.
     pub pixel: Pixel,
     /// The ray there; `None` outside the valid cone.
     pub ray: Option<RayCovariance>,
 }
 
 impl RayUncertainty {
-    /// Of a calibration.
+    /// The ray uncertainty of a calibrated lens.
     #[must_use]
     pub fn of(calibration: &IntrinsicsCalibration) -> Self {
         let mut uncertainty = Self {
@@ -67,7 +67,7 @@ impl RayUncertainty {
         uncertainty
     }
 
-    /// At `pixel`, without the rotation that all rays have in common.
+    /// Ray at `pixel`, its covariance without the rotation common to all rays.
     ///
     /// # Errors
     /// [`OutsideField`] outside the valid cone.
@@ -75,8 +75,8 @@ impl RayUncertainty {
         self.with(pixel, &self.rotation_by_lens)
     }
 
-    /// At `pixel`, in the camera's own axes: with the rotation that all rays have in common, as a user sees it who fixed
-    /// the camera's pose before and will not estimate it again.
+    /// Ray at `pixel`, its covariance including the rotation common to all rays: for a camera whose pose was fixed
+    /// before and will not be estimated again.
     ///
     /// # Errors
     /// [`OutsideField`] outside the valid cone.
@@ -107,13 +107,12 @@ impl RayUncertainty {
         Ok(RayCovariance { ray, tangents, covariance: left * self.covariance * left.transpose() })
     }
 
-    /// How the ray behind a pixel that stays where it is moves with the lens: the pixel of the moved ray in the moved
-    /// lens is the same, ∂u/∂d δd + ∂u/∂lens δlens = 0.
+    /// Derivative of the ray behind a fixed pixel with respect to the lens, from ∂u/∂d δd + ∂u/∂lens δlens = 0.
     fn ray_by_lens(&self, ray: &UnitRay<Camera>) -> Option<SMatrix<f64, 3, LENS>> {
-        let seen = reproject(&self.lens, &Point::from_mm(ray.vector()))?;
+        let projected = reproject(&self.lens, &Point::from_mm(ray.vector()))?;
         let basis = tangents(&ray.vector());
-        let by_point = Matrix2x3::from_fn(|row, axis| seen.by_point[axis][row]);
-        let by_lens = SMatrix::<f64, 2, LENS>::from_fn(|row, parameter| seen.by_lens[parameter][row]);
+        let by_point = Matrix2x3::from_fn(|row, axis| projected.by_point[axis][row]);
+        let by_lens = SMatrix::<f64, 2, LENS>::from_fn(|row, parameter| projected.by_lens[parameter][row]);
         Some(-(basis * (by_point * basis).try_inverse()? * by_lens))
     }
 

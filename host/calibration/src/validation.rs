@@ -1,69 +1,68 @@
-//! Held-out views: a calibration made without them tells where their corners are.
+//! Cross-validation: views are predicted by a calibration made without them.
 //!
-//! Residuals of the views that a calibration was made of flatter it; those of views it never saw do not (M. Stone,
-//! "Cross-validatory choice and assessment of statistical predictions", J. R. Stat. Soc. B 36(2), 1974). Only the board's
-//! own pose is fitted to a held-out view.
+//! Residuals of the views used for a calibration are too small as a measure of its error; those of held-out views are
+//! not (M. Stone, "Cross-validatory choice and assessment of statistical predictions", J. R. Stat. Soc. B 36(2), 1974).
+//! Only the target's own pose is fitted to a held-out view.
 
 use nalgebra::{Isometry3, SVector};
 use rayon::prelude::*;
 use vergence_rig::{AxisPosition, Rig};
 use vergence_vision::{Angle, ImageSize, KannalaBrandt, Length};
 
-use crate::arrow::{self, ArrowOptions, ArrowProblem, Equations};
 use crate::extrinsics::{Lenses, Pair, StereoView, inside, rms};
-use crate::planar_pose::board_pose;
+use crate::planar_pose::target_pose;
 use crate::reprojection::{POSE, difference, moved};
+use crate::schur_lm::{self, Equations, SchurOptions, SchurProblem};
 use crate::{
-    BoardView, ExtrinsicsCalibration, ExtrinsicsError, ExtrinsicsOptions, FEWEST_STAGE_POSES, IntrinsicsCalibration,
-    IntrinsicsError, IntrinsicsOptions, Side, StageError, StageOptions, StagePose, calibrate_extrinsics,
+    ExtrinsicsCalibration, ExtrinsicsError, ExtrinsicsOptions, FEWEST_STAGE_POSES, IntrinsicsCalibration,
+    IntrinsicsError, IntrinsicsOptions, Side, StageError, StageOptions, StagePose, TargetView, calibrate_extrinsics,
     calibrate_intrinsics, calibrate_stage,
 };
 
-/// How well views are predicted that the calibration did not see.
+/// Prediction error of held-out views.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Validation {
-    /// The views were divided into so many parts; each was predicted by a calibration of the others.
+    /// Number of parts the views were divided into; each was predicted by a calibration of the others.
     pub folds: usize,
     /// Distance between corners and reprojection, root mean square per corner over all held-out views. Corners that the
-    /// calibration of all views left out do not count, nor do those outside the valid cone of one that did not see them.
+    /// calibration of all views left out do not count, nor do those outside the valid cone of the calibration that
+    /// predicts them.
     pub rms_px: f64,
-    /// Each view that could be predicted.
+    /// The views that could be predicted.
     pub views: Vec<HeldOutView>,
 }
 
 impl Validation {
-    /// Whether the held-out views fit nearly as well as `rms_px`, the residual of the views that the calibration was made
-    /// of.
+    /// Whether the held-out views fit nearly as well as the views used for the calibration, whose residual is `rms_px`.
     #[must_use]
     pub fn is_sound(&self, rms_px: f64) -> bool {
-        /// With few views the calibration adapts itself to them, which the degrees of freedom allow; more than this is
-        /// no chance.
+        /// Largest ratio that chance explains: with few views the calibration adapts to them.
         const MOST: f64 = 2.0;
         self.rms_px <= MOST * rms_px
     }
 }
 
-/// A view predicted by a calibration that did not see it.
+/// A view predicted by a calibration made without it.
 #[derive(Clone, Debug, PartialEq)]
 pub struct HeldOutView {
-    /// Its name.
+    /// Name of the view.
     pub view: String,
-    /// Corners that count.
+    /// Number of corners that count.
     pub corners: usize,
-    /// Root mean square distance per corner.
+    /// Root mean square distance per corner, in pixels.
     pub rms_px: f64,
 }
 
-/// A stage pose predicted by a calibration that did not see it.
+/// A stage pose predicted by a calibration made without it.
 #[derive(Clone, Debug, PartialEq)]
 pub struct HeldOutPose {
-    /// What the encoders read.
+    /// Encoder readings.
     pub readings: Vec<AxisPosition>,
-    /// The rotation between the prediction and the pose as calibrated by itself.
+    /// Angle between the predicted orientation and that calibrated from this stage pose alone.
     pub rotation: Angle,
-    /// The distance between the right camera's positions of both.
+    /// Distance between the predicted position of the right camera and that calibrated from this stage pose alone.
     pub translation: Length,
-    /// The square of that difference in units of its covariance: 6 on average where the covariances are honest.
+    /// Squared Mahalanobis length of that difference: 6 on average if the covariances are right.
     pub chi_square: f64,
 }
 
@@ -72,7 +71,7 @@ pub struct HeldOutPose {
 /// # Errors
 /// [`IntrinsicsError`] where the views that are left do not give a calibration.
 pub fn validate_intrinsics(
-    views: &[BoardView],
+    views: &[TargetView],
     size: ImageSize,
     options: &IntrinsicsOptions,
     calibration: &IntrinsicsCalibration,
@@ -83,10 +82,10 @@ pub fn validate_intrinsics(
     };
     validate(views, folds, |kept, held| {
         let lens = calibrate_intrinsics(kept, size, options)?.camera;
-        let predict = |(index, view): &(usize, &BoardView)| {
+        let predict = |(index, view): &(usize, &TargetView)| {
             let corners = view.corners.iter().enumerate().filter(|(corner, _)| counts(*index, *corner));
-            let clean = BoardView { name: view.name.clone(), corners: corners.map(|(_, corner)| *corner).collect() };
-            let pose = board_pose(&lens, &clean).ok()?;
+            let clean = TargetView { name: view.name.clone(), corners: corners.map(|(_, corner)| *corner).collect() };
+            let pose = target_pose(&lens, &clean).ok()?;
             Some(HeldOutView { view: clean.name, corners: pose.corners, rms_px: pose.rms_px })
         };
         Ok(held.iter().filter_map(predict).collect())
@@ -104,17 +103,17 @@ pub fn validate_extrinsics(
     calibration: &ExtrinsicsCalibration,
     folds: usize,
 ) -> Result<Validation, ExtrinsicsError> {
-    let is_outlier = |name: &str, side: Side, board_mm: [f64; 2]| {
+    let is_outlier = |name: &str, side: Side, target_mm: [f64; 2]| {
         calibration.outliers.iter().any(|out| {
-            out.view == name && out.side == side && out.board_mm.map(f64::to_bits) == board_mm.map(f64::to_bits)
+            out.view == name && out.side == side && out.target_mm.map(f64::to_bits) == target_mm.map(f64::to_bits)
         })
     };
     validate(views, folds, |kept, held| {
         let pair = calibrate_extrinsics(left, right, kept, options)?;
         let predict = |(_, view): &(usize, &StereoView)| {
             let mut clean = (*view).clone();
-            clean.left.corners.retain(|corner| !is_outlier(&view.name, Side::Left, corner.board_mm));
-            clean.right.corners.retain(|corner| !is_outlier(&view.name, Side::Right, corner.board_mm));
+            clean.left.corners.retain(|corner| !is_outlier(&view.name, Side::Left, corner.target_mm));
+            clean.right.corners.retain(|corner| !is_outlier(&view.name, Side::Right, corner.target_mm));
             predicted(&pair, &clean)
         };
         Ok(held.iter().filter_map(predict).collect())
@@ -150,7 +149,7 @@ pub fn validate_stage(rig: &Rig, poses: &[StagePose], options: &StageOptions) ->
     poses.par_iter().enumerate().map(without).collect()
 }
 
-/// Runs `fold` on every division of `views` into kept and held-out ones (with their indices).
+/// Calls `fold` for every division of `views` into kept and held-out ones (with their indices).
 fn validate<V: Clone + Sync, E: Send>(
     views: &[V],
     folds: usize,
@@ -170,35 +169,35 @@ fn validate<V: Clone + Sync, E: Send>(
     Ok(Validation { folds, rms_px: (squares / corners.max(1) as f64).sqrt(), views })
 }
 
-/// How well `pair` explains a view when only the board may move. `None` where neither camera places the board.
+/// Fits only the target's pose of `view` to the known `pair`. `None` if neither camera can place the target.
 fn predicted(pair: &ExtrinsicsCalibration, view: &StereoView) -> Option<HeldOutView> {
     let usable = inside(&pair.left, &pair.right, view);
     let left_from_right = *pair.joint.left_from_right.isometry();
     let known = Pair { left_from_right, lenses: Lenses::of(&pair.left, &pair.right) };
-    let by_left = board_pose(&pair.left, &view.left).ok().map(|pose| *pose.camera_from_board.isometry());
-    let by_right = board_pose(&pair.right, &view.right).ok();
-    let by_right = by_right.map(|pose| left_from_right * pose.camera_from_board.isometry());
+    let by_left = target_pose(&pair.left, &view.left).ok().map(|pose| *pose.camera_from_target.isometry());
+    let by_right = target_pose(&pair.right, &view.right).ok();
+    let by_right = by_right.map(|pose| left_from_right * pose.camera_from_target.isometry());
     let fitted = |start: Isometry3<f64>| {
-        let problem = HeldBoard { pair: known, view, usable: &usable };
-        let solution = arrow::solve(&problem, (), vec![start], &ArrowOptions::default());
-        solution.blocks.first().filter(|_| solution.cost.is_finite()).map(|board| (solution.cost, *board))
+        let problem = HeldTarget { pair: known, view, usable: &usable };
+        let solution = schur_lm::solve(&problem, (), vec![start], &SchurOptions::default());
+        solution.blocks.first().filter(|_| solution.cost.is_finite()).map(|target| (solution.cost, *target))
     };
     let fits = [by_left, by_right].into_iter().flatten().filter_map(fitted);
-    let (_, board) = fits.min_by(|a, b| a.0.total_cmp(&b.0))?;
-    let errors_px = [known.errors_px(view, &board)];
+    let (_, target) = fits.min_by(|a, b| a.0.total_cmp(&b.0))?;
+    let errors_px = [known.errors_px(view, &target)];
     let corners = usable.iter().filter(|&&usable| usable).count();
     Some(HeldOutView { view: view.name.clone(), corners, rms_px: rms(&errors_px, &[usable])? })
 }
 
-/// One board seen by a pair that is known.
-struct HeldBoard<'a> {
+/// Least-squares problem of one target's pose before a known pair.
+struct HeldTarget<'a> {
     pair: Pair,
     view: &'a StereoView,
     /// In the order of [`StereoView::corners`].
     usable: &'a [bool],
 }
 
-impl ArrowProblem<POSE> for HeldBoard<'_> {
+impl SchurProblem<POSE> for HeldTarget<'_> {
     type Shared = ();
     type Block = Isometry3<f64>;
 
@@ -206,11 +205,11 @@ impl ArrowProblem<POSE> for HeldBoard<'_> {
         0
     }
 
-    fn block_residuals(&self, (): &(), _: usize, board: &Isometry3<f64>, equations: &mut Equations<POSE>) {
+    fn block_residuals(&self, (): &(), _: usize, target: &Isometry3<f64>, equations: &mut Equations<POSE>) {
         for ((side, corner), _) in self.view.corners().zip(self.usable).filter(|(_, usable)| **usable) {
-            match self.pair.residual(side, corner, board) {
+            match self.pair.residual(side, corner, target) {
                 Some(residual) => {
-                    equations.add(&residual.error.into(), corner.relative_sigma, &[], &residual.by_board.into());
+                    equations.add(&residual.error.into(), corner.relative_sigma, &[], &residual.by_target.into());
                 }
                 // An infinite cost refuses the step that led here.
                 None => equations.add(&[f64::INFINITY; 2], 1.0, &[], &[[0.0; 2]; POSE]),
@@ -220,7 +219,7 @@ impl ArrowProblem<POSE> for HeldBoard<'_> {
 
     fn shared_plus(&self, (): &(), _: &[f64]) {}
 
-    fn block_plus(&self, board: &Isometry3<f64>, step: &SVector<f64, POSE>) -> Isometry3<f64> {
-        moved(board, step)
+    fn block_plus(&self, target: &Isometry3<f64>, step: &SVector<f64, POSE>) -> Isometry3<f64> {
+        moved(target, step)
     }
 }

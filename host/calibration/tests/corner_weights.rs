@@ -5,7 +5,7 @@ mod simulated;
 
 use simulated::{Dice, Pair, error, lens, other_lens, own_views, pair_pose, seeds};
 use vergence_calibration::{
-    BoardView, Corner, ExtrinsicsCalibration, ExtrinsicsOptions, IntrinsicsError, IntrinsicsOptions, StereoView,
+    Corner, ExtrinsicsCalibration, ExtrinsicsOptions, IntrinsicsError, IntrinsicsOptions, StereoView, TargetView,
     calibrate_extrinsics, calibrate_intrinsics,
 };
 use vergence_vision::ImageSize;
@@ -38,7 +38,7 @@ fn blurred_views(seed: u64) -> Vec<StereoView> {
 }
 
 /// The views with each relative sigma changed.
-fn told(views: &[StereoView], change: impl Fn(f64) -> f64) -> Vec<StereoView> {
+fn with_sigmas(views: &[StereoView], change: impl Fn(f64) -> f64) -> Vec<StereoView> {
     let mut views = views.to_vec();
     for corner in views.iter_mut().flat_map(|view| view.left.corners.iter_mut().chain(&mut view.right.corners)) {
         corner.relative_sigma = change(corner.relative_sigma);
@@ -51,9 +51,9 @@ fn calibrated(views: &[StereoView]) -> ExtrinsicsCalibration {
 }
 
 #[test]
-fn told_sigmas_make_the_pose_better_and_its_covariance_honest() {
+fn stated_sigmas_improve_the_pose_and_correct_its_covariance() {
     let seeds = seeds(24);
-    let (mut nees, mut squares, mut squares_untold) = (0.0, 0.0, 0.0);
+    let (mut nees, mut squares, mut squares_unweighted) = (0.0, 0.0, 0.0);
     for seed in 0..seeds {
         let views = blurred_views(seed);
         let of = |found: &ExtrinsicsCalibration| error(&found.joint.left_from_right, &pair().left_from_right);
@@ -61,10 +61,10 @@ fn told_sigmas_make_the_pose_better_and_its_covariance_honest() {
         let off = of(&found);
         nees += (off.transpose() * found.covariance.try_inverse().unwrap() * off)[(0, 0)] / seeds as f64;
         squares += off.fixed_rows::<3>(3).norm_squared();
-        squares_untold += of(&calibrated(&told(&views, |_| 1.0))).fixed_rows::<3>(3).norm_squared();
+        squares_unweighted += of(&calibrated(&with_sigmas(&views, |_| 1.0))).fixed_rows::<3>(3).norm_squared();
     }
-    let gain = (squares_untold / squares).sqrt();
-    println!("{seeds} seeds: NEES {nees:.2}; untold, the position errs {gain:.1} times as much");
+    let gain = (squares_unweighted / squares).sqrt();
+    println!("{seeds} seeds: NEES {nees:.2}; unweighted, the position errs {gain:.1} times as much");
     // 99 % of all means of so many χ² of 6 degrees of freedom.
     let half = 2.576 * (12.0 / seeds as f64).sqrt();
     assert!((6.0 - half..6.0 + 1.2 * half).contains(&nees), "{nees}");
@@ -76,7 +76,7 @@ fn told_sigmas_make_the_pose_better_and_its_covariance_honest() {
 #[test]
 fn only_ratios_of_sigmas_count() {
     let views = blurred_views(0);
-    let (one, many) = (calibrated(&views), calibrated(&told(&views, |sigma| 16.0 * sigma)));
+    let (one, many) = (calibrated(&views), calibrated(&with_sigmas(&views, |sigma| 16.0 * sigma)));
     let apart = error(&one.joint.left_from_right, &many.joint.left_from_right);
     assert!(apart.norm() < 1e-9, "{apart}");
     assert!((one.sigma_px - many.sigma_px).abs() < 1e-9 && one.outliers == many.outliers);
@@ -90,23 +90,23 @@ fn a_lens_has_its_sigmas_from_the_better_corners() {
     let mut dice = Dice::new(7);
     let mut views = own_views(&lens(), 20, 0.0, &mut dice);
     views.iter_mut().for_each(|view| blur(&mut view.corners, &mut dice));
-    let equal: Vec<BoardView> = views
+    let equal: Vec<TargetView> = views
         .iter()
-        .map(|view| BoardView {
-            corners: view.corners.iter().map(|corner| Corner::new(corner.board_mm, corner.pixel)).collect(),
+        .map(|view| TargetView {
+            corners: view.corners.iter().map(|corner| Corner::new(corner.target_mm, corner.pixel)).collect(),
             ..view.clone()
         })
         .collect();
-    let of = |views: &[BoardView]| {
+    let of = |views: &[TargetView]| {
         calibrate_intrinsics(views, ImageSize { width: 2048, height: 2048 }, &IntrinsicsOptions::default())
     };
-    let (told, untold) = (of(&views).unwrap(), of(&equal).unwrap());
-    assert!(told.covariance[(0, 0)] < 0.5 * untold.covariance[(0, 0)]);
-    let off = (told.opencv.fx - lens().to_opencv().fx) / told.covariance[(0, 0)].sqrt();
+    let (weighted, unweighted) = (of(&views).unwrap(), of(&equal).unwrap());
+    assert!(weighted.covariance[(0, 0)] < 0.5 * unweighted.covariance[(0, 0)]);
+    let off = (weighted.opencv.fx - lens().to_opencv().fx) / weighted.covariance[(0, 0)].sqrt();
     assert!(off.abs() < 3.0, "{off}");
     assert!(
-        told.corners_inlier > untold.corners_inlier,
-        "the worse corners are no outliers once it is told how bad they are"
+        weighted.corners_inlier > unweighted.corners_inlier,
+        "the worse corners are no outliers once their weights say how bad they are"
     );
 
     views[3].corners[5].relative_sigma = 0.0;

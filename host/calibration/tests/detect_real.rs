@@ -1,47 +1,40 @@
 //! Real photographs of chessboards against OpenCV's classic detector.
 //!
-//! The data live outside the repository, in the folder that `VERGENCE_SHARED` names or in `shared` beside the checkout;
-//! without them the tests say SKIPPED. `corners_opencv_classic.csv` holds the corners of OpenCV 5.0.0,
+//! The data live outside the repository, see `tests/common/data.rs`. `corners_opencv_classic.csv` holds the corners of OpenCV 5.0.0,
 //! findChessboardCorners + cornerSubPix with a window of 0.4 of the smallest spacing, 5 px at most.
 
 #![allow(clippy::unwrap_used, clippy::panic, reason = "a test fails by panicking")]
 #![allow(clippy::print_stdout, reason = "measured figures are printed")]
 #![allow(clippy::disallowed_methods, reason = "the time that detection takes is printed")]
 
+#[path = "../../../tests/common/data.rs"]
+mod data;
+
 use std::collections::BTreeMap;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use std::time::Instant;
 
+use data::real_data;
 use image::GrayImage;
 use vergence_calibration::detect::{Detection, detect};
-use vergence_calibration::{BoardSpec, BoardView, Corner, IntrinsicsOptions, calibrate_intrinsics};
+use vergence_calibration::{Corner, IntrinsicsOptions, TargetSpec, TargetView, calibrate_intrinsics};
 use vergence_vision::{ImageSize, Length, Pixel};
 
 /// Furthest that two detectors' corners may lie apart to count as the same.
 const SAME_PX: f64 = 1.5;
 
-fn shared(set: &str) -> Option<PathBuf> {
-    let beside = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../../shared");
-    let folder = std::env::var_os("VERGENCE_SHARED").map_or(beside, PathBuf::from).join("data").join(set);
-    let there = folder.join("corners_opencv_classic.csv").exists();
-    if !there {
-        println!("SKIPPED: no {}", folder.display());
-    }
-    there.then_some(folder)
-}
-
 /// Both detectors' corners of one camera.
 #[derive(Default)]
 struct Camera {
     size: Option<ImageSize>,
-    ours: Vec<BoardView>,
-    opencv: Vec<BoardView>,
+    ours: Vec<TargetView>,
+    opencv: Vec<TargetView>,
     images: Vec<GrayImage>,
 }
 
-/// Detects the set's boards, asserts that 99 % of OpenCV's corners are among ours and that both label them alike, and
+/// Detects the set's targets, asserts that 99 % of OpenCV's corners are among ours and that both label them alike, and
 /// returns the corners by camera.
-fn compare(folder: &Path, board: BoardSpec) -> BTreeMap<String, Camera> {
+fn compare(folder: &Path, target: TargetSpec) -> BTreeMap<String, Camera> {
     let mut reference: BTreeMap<(String, String), BTreeMap<u32, Pixel>> = BTreeMap::new();
     for row in csv::Reader::from_path(folder.join("corners_opencv_classic.csv")).unwrap().records() {
         let row = row.unwrap();
@@ -54,16 +47,16 @@ fn compare(folder: &Path, board: BoardSpec) -> BTreeMap<String, Camera> {
     for ((name, file), opencv) in &reference {
         let image = image::open(folder.join("images").join(file)).unwrap().to_luma8();
         let start = Instant::now();
-        let detection = detect(&image, &board, None).unwrap_or_else(|error| panic!("{file}: {error}"));
+        let detection = detect(&image, &target, None).unwrap_or_else(|error| panic!("{file}: {error}"));
         milliseconds.push(start.elapsed().as_secs_f64() * 1e3);
         total += opencv.len();
         complete += usize::from(detection.complete);
-        distances.extend(distances_of_same_corners(&detection, opencv, &board, file));
+        distances.extend(distances_of_same_corners(&detection, opencv, &target, file));
         let camera = cameras.entry(name.clone()).or_default();
         camera.size = Some(ImageSize { width: image.width(), height: image.height() });
-        camera.ours.push(detection.view(file, &board));
-        let corner = |(&index, &pixel): (&u32, &Pixel)| Corner::new(board.corner_mm(index), pixel);
-        camera.opencv.push(BoardView { name: file.clone(), corners: opencv.iter().map(corner).collect() });
+        camera.ours.push(detection.view(file, &target));
+        let corner = |(&index, &pixel): (&u32, &Pixel)| Corner::new(target.corner_mm(index), pixel);
+        camera.opencv.push(TargetView { name: file.clone(), corners: opencv.iter().map(corner).collect() });
         camera.images.push(image);
     }
     distances.sort_by(f64::total_cmp);
@@ -86,10 +79,10 @@ fn compare(folder: &Path, board: BoardSpec) -> BTreeMap<String, Camera> {
 fn distances_of_same_corners(
     detection: &Detection,
     opencv: &BTreeMap<u32, Pixel>,
-    board: &BoardSpec,
+    target: &TargetSpec,
     file: &str,
 ) -> Vec<f64> {
-    let last = board.columns * board.rows - 1;
+    let last = target.columns * target.rows - 1;
     let (mut forwards, mut backwards) = (Vec::new(), Vec::new());
     for corner in &detection.corners {
         let distance = |index: u32| {
@@ -104,17 +97,17 @@ fn distances_of_same_corners(
     forwards
 }
 
-/// Calibrates from both detectors' corners: ours must leave no larger residuals, without a hint as with the lens that they
-/// give. All corners weigh the same, as OpenCV tells no sigma: weights make a better lens, not smaller residuals.
-fn assert_residuals(cameras: &BTreeMap<String, Camera>, board: BoardSpec) {
+/// Calibrates from both detectors' corners: ours must leave no larger residuals, without a hint as with the lens that
+/// they give. All corners weigh the same, as OpenCV tells no sigma: weights make a better lens, not smaller residuals.
+fn assert_residuals(cameras: &BTreeMap<String, Camera>, target: TargetSpec) {
     for (name, camera) in cameras {
-        let calibrate = |views: &[BoardView]| {
+        let calibrate = |views: &[TargetView]| {
             let mut views = views.to_vec();
             views.iter_mut().flat_map(|view| &mut view.corners).for_each(|corner| corner.relative_sigma = 1.0);
             calibrate_intrinsics(&views, camera.size.unwrap(), &IntrinsicsOptions::default()).unwrap()
         };
         let (ours, opencv) = (calibrate(&camera.ours), calibrate(&camera.opencv));
-        let again = |image: &GrayImage| detect(image, &board, Some(&ours.camera)).unwrap().view("", &board);
+        let again = |image: &GrayImage| detect(image, &target, Some(&ours.camera)).unwrap().view("", &target);
         let hinted = calibrate(&camera.images.iter().map(again).collect::<Vec<_>>());
         for (corners, found) in [("found", &ours), ("found again", &hinted)] {
             println!(
@@ -134,36 +127,36 @@ fn assert_residuals(cameras: &BTreeMap<String, Camera>, board: BoardSpec) {
 
 #[test]
 fn moderate_fisheye_stereo() {
-    let board = BoardSpec { columns: 9, rows: 6, square: Length::from_mm(24.23) };
-    if let Some(folder) = shared("sourishg_stereo") {
-        assert_residuals(&compare(&folder, board), board);
+    let target = TargetSpec { columns: 9, rows: 6, square: Length::from_mm(24.23) };
+    if let Some(folder) = real_data("data/sourishg_stereo") {
+        assert_residuals(&compare(&folder, target), target);
     }
 }
 
 #[test]
 fn strong_fisheye_close_up() {
-    let board = BoardSpec { columns: 6, rows: 8, square: Length::from_mm(32.5) };
-    if let Some(folder) = shared("ocam_fisheye1") {
-        assert_residuals(&compare(&folder, board), board);
+    let target = TargetSpec { columns: 6, rows: 8, square: Length::from_mm(32.5) };
+    if let Some(folder) = real_data("data/ocam_fisheye1") {
+        assert_residuals(&compare(&folder, target), target);
     }
 }
 
 #[test]
 fn perspective_stereo() {
-    let board = BoardSpec { columns: 9, rows: 6, square: Length::from_mm(25.0) };
-    if let Some(folder) = shared("opencv_pinhole_stereo") {
-        assert_residuals(&compare(&folder, board), board);
+    let target = TargetSpec { columns: 9, rows: 6, square: Length::from_mm(25.0) };
+    if let Some(folder) = real_data("data/opencv_pinhole_stereo") {
+        assert_residuals(&compare(&folder, target), target);
     }
 }
 
 #[test]
 fn both_cameras_of_a_pair_number_the_corners_alike() {
-    let Some(folder) = shared("sourishg_stereo") else { return };
-    let board = BoardSpec { columns: 9, rows: 6, square: Length::from_mm(24.23) };
+    let Some(folder) = real_data("data/sourishg_stereo") else { return };
+    let target = TargetSpec { columns: 9, rows: 6, square: Length::from_mm(24.23) };
     for number in 1..=19 {
         let [left, right] = ["left", "right"].map(|side| {
             let image = image::open(folder.join("images").join(format!("{side}{number}.jpg"))).unwrap().to_luma8();
-            detect(&image, &board, None).unwrap()
+            detect(&image, &target, None).unwrap()
         });
         // The cameras are parallel: first and last corner lie the same way round in both images.
         let [a, b] = [&left, &right].map(|detection| {

@@ -1,4 +1,4 @@
-//! Boards rendered with known truth: found where they are, labelled as they are, and refused where there is none.
+//! Targets rendered with known truth: found where they are, labelled as they are, and refused where there is none.
 
 #![allow(clippy::unwrap_used, clippy::panic, reason = "a test fails by panicking")]
 #![allow(clippy::print_stdout, reason = "measured figures are printed")]
@@ -7,15 +7,15 @@ use std::collections::BTreeMap;
 
 use image::{DynamicImage, GrayImage, Luma};
 use nalgebra::{UnitQuaternion, Vector3};
-use vergence_calibration::BoardSpec;
+use vergence_calibration::TargetSpec;
 use vergence_calibration::detect::{CornerQuality, DetectError, Detection, Placement, detect};
-use vergence_scene::{Board, Optics, Scene, View, render};
+use vergence_scene::{Optics, Scene, Target, View, render};
 use vergence_vision::{Angle, Camera, ImageSize, KannalaBrandt, Length, Pixel, Point, Transform, World};
 
-const BOARD: Board = Board { columns: 9, rows: 6, square: Length::from_mm(24.0) };
+const TARGET: Target = Target { columns: 9, rows: 6, square: Length::from_mm(24.0) };
 
-fn spec(board: Board) -> BoardSpec {
-    BoardSpec { columns: board.columns, rows: board.rows, square: board.square }
+fn spec(target: Target) -> TargetSpec {
+    TargetSpec { columns: target.columns, rows: target.rows, square: target.square }
 }
 
 /// A lens of 196° on a square sensor of `side` pixels.
@@ -32,7 +32,7 @@ fn optics(blur_px: f64) -> Optics {
     Optics { edge_samples: 60, blur_px, read_noise: 1.3, shot_noise: 1.1, ..Optics::default() }
 }
 
-/// A board that faces the camera at `theta` from its axis, in the direction `azimuth` (0° right, 90° down).
+/// A target that faces the camera at `theta` from its axis, in the direction `azimuth` (0° right, 90° down).
 #[derive(Clone, Copy)]
 struct Pose {
     theta_deg: f64,
@@ -43,13 +43,13 @@ struct Pose {
 }
 
 impl Pose {
-    fn camera_from_board(self, board: Board) -> Transform<Camera, Board> {
+    fn camera_from_target(self, target: Target) -> Transform<Camera, Target> {
         let [theta, azimuth, roll, tilt] =
             [self.theta_deg, self.azimuth_deg, self.roll_deg, self.tilt_deg].map(f64::to_radians);
         let turn = |axis: Vector3<f64>, angle: f64| UnitQuaternion::from_scaled_axis(axis * angle);
         let towards = turn(Vector3::new(-azimuth.sin(), azimuth.cos(), 0.0), theta);
         let rotation = towards * turn(Vector3::z(), roll) * turn(Vector3::y(), tilt);
-        board.placed(rotation, towards * Vector3::z() * self.distance_mm)
+        target.placed(rotation, towards * Vector3::z() * self.distance_mm)
     }
 }
 
@@ -58,18 +58,18 @@ fn photograph(scene: &Scene, camera: &KannalaBrandt, optics: &Optics, seed: u64)
     DynamicImage::from(render(&View { scene, camera, world_from_camera, optics }, seed).image).to_luma8()
 }
 
-fn photograph_board(board: Board, pose: Pose, camera: &KannalaBrandt, optics: &Optics, seed: u64) -> GrayImage {
-    photograph(&Scene::checkerboard(board, pose.camera_from_board(board).renamed()), camera, optics, seed)
+fn photograph_target(target: Target, pose: Pose, camera: &KannalaBrandt, optics: &Optics, seed: u64) -> GrayImage {
+    photograph(&Scene::target_in_studio(target, pose.camera_from_target(target).renamed()), camera, optics, seed)
 }
 
 /// Pixels of the corners by column and row, where all four squares about them are seen to `part` of their side.
-fn truth(board: Board, pose: Pose, camera: &KannalaBrandt, part: f64) -> BTreeMap<[i32; 2], Pixel> {
-    let camera_from_board = pose.camera_from_board(board);
+fn truth(target: Target, pose: Pose, camera: &KannalaBrandt, part: f64) -> BTreeMap<[i32; 2], Pixel> {
+    let camera_from_target = pose.camera_from_target(target);
     let project = |x: f64, y: f64| {
-        let point = Point::<Board>::from_mm(Vector3::new(x, y, 0.0) * board.square.mm());
-        camera.project_point(&(camera_from_board * point)).ok().filter(|&pixel| camera.on_sensor(pixel))
+        let point = Point::<Target>::from_mm(Vector3::new(x, y, 0.0) * target.square.mm());
+        camera.project_point(&(camera_from_target * point)).ok().filter(|&pixel| camera.on_sensor(pixel))
     };
-    let nodes = (0..board.rows as i32).flat_map(|j| (0..board.columns as i32).map(move |i| [i, j]));
+    let nodes = (0..target.rows as i32).flat_map(|j| (0..target.columns as i32).map(move |i| [i, j]));
     nodes
         .filter_map(|[i, j]| {
             let (x, y) = (f64::from(i), f64::from(j));
@@ -81,9 +81,9 @@ fn truth(board: Board, pose: Pose, camera: &KannalaBrandt, part: f64) -> BTreeMa
         .collect()
 }
 
-fn found(detection: &Detection, board: Board) -> Vec<([i32; 2], Pixel)> {
+fn found(detection: &Detection, target: Target) -> Vec<([i32; 2], Pixel)> {
     let good = detection.corners.iter().filter(|corner| corner.quality == CornerQuality::Good);
-    good.map(|corner| ([corner.index % board.columns, corner.index / board.columns].map(|n| n as i32), corner.pixel))
+    good.map(|corner| ([corner.index % target.columns, corner.index / target.columns].map(|n| n as i32), corner.pixel))
         .collect()
 }
 
@@ -92,14 +92,14 @@ fn distance(a: Pixel, b: Pixel) -> f64 {
 }
 
 /// Distances to the truth under the labelling that fits best among those the placement leaves open.
-fn errors(detection: &Detection, board: Board, truth: &BTreeMap<[i32; 2], Pixel>) -> Vec<f64> {
-    let (columns, rows) = (board.columns as i32, board.rows as i32);
+fn errors(detection: &Detection, target: Target, truth: &BTreeMap<[i32; 2], Pixel>) -> Vec<f64> {
+    let (columns, rows) = (target.columns as i32, target.rows as i32);
     let shifts: Vec<[i32; 2]> = match detection.placement {
         Placement::Shifted => (-columns..=columns).flat_map(|i| (-rows..=rows).map(move |j| [i, j])).collect(),
         _ => vec![[0, 0]],
     };
     let turns: &[bool] = if detection.placement == Placement::Unique { &[false] } else { &[false, true] };
-    let found = found(detection, board);
+    let found = found(detection, target);
     let under = |turn: bool, [di, dj]: [i32; 2]| -> Vec<f64> {
         let label = |[i, j]: [i32; 2]| {
             if turn { [columns - 1 - i + di, rows - 1 - j + dj] } else { [i + di, j + dj] }
@@ -120,12 +120,12 @@ fn errors(detection: &Detection, board: Board, truth: &BTreeMap<[i32; 2], Pixel>
 
 /// Asserts that the corners found are labelled rightly and lie where they are projected, and that at least `recall` of
 /// those in full sight are found.
-fn assert_found(detection: &Detection, board: Board, pose: Pose, camera: &KannalaBrandt, recall: f64) {
-    let mut errors = errors(detection, board, &truth(board, pose, camera, 0.0));
+fn assert_found(detection: &Detection, target: Target, pose: Pose, camera: &KannalaBrandt, recall: f64) {
+    let mut errors = errors(detection, target, &truth(target, pose, camera, 0.0));
     errors.sort_by(f64::total_cmp);
     let (mean, p95) = (errors.iter().sum::<f64>() / errors.len() as f64, errors[errors.len() * 95 / 100]);
-    let in_sight = truth(board, pose, camera, 0.5);
-    let found = found(detection, board);
+    let in_sight = truth(target, pose, camera, 0.5);
+    let found = found(detection, target);
     let seen = in_sight.values().filter(|at| found.iter().any(|(_, pixel)| distance(**at, *pixel) < 0.5)).count();
     let sigma = detection.corners.iter().map(|c| c.sigma_px).sum::<f64>() / detection.corners.len() as f64;
     println!(
@@ -143,7 +143,7 @@ fn assert_found(detection: &Detection, board: Board, pose: Pose, camera: &Kannal
 }
 
 #[test]
-fn whole_boards_are_found_at_any_angle() {
+fn whole_targets_are_found_at_any_angle() {
     let camera = fisheye(1280);
     let poses = [
         (Pose { theta_deg: 0.0, azimuth_deg: 0.0, roll_deg: 8.0, tilt_deg: 20.0, distance_mm: 260.0 }, 0.5),
@@ -153,25 +153,25 @@ fn whole_boards_are_found_at_any_angle() {
         (Pose { theta_deg: 80.0, azimuth_deg: 0.0, roll_deg: 0.0, tilt_deg: 0.0, distance_mm: 460.0 }, 0.5),
     ];
     for (seed, (pose, blur)) in poses.into_iter().enumerate() {
-        let image = photograph_board(BOARD, pose, &camera, &optics(blur), seed as u64);
-        let detection = detect(&image, &spec(BOARD), None).unwrap();
-        assert_found(&detection, BOARD, pose, &camera, 1.0);
+        let image = photograph_target(TARGET, pose, &camera, &optics(blur), seed as u64);
+        let detection = detect(&image, &spec(TARGET), None).unwrap();
+        assert_found(&detection, TARGET, pose, &camera, 1.0);
         assert!(detection.complete, "{} corners", detection.corners.len());
         assert_eq!(detection.placement, Placement::Unique);
     }
 }
 
 #[test]
-fn boards_cut_by_the_field_are_found_past_95_degrees() {
+fn targets_cut_by_the_field_are_found_past_95_degrees() {
     let camera = fisheye(1280);
     for (seed, azimuth_deg) in [0.0, 135.0, 250.0].into_iter().enumerate() {
         let pose = Pose { theta_deg: 86.0, azimuth_deg, roll_deg: 15.0, tilt_deg: 0.0, distance_mm: 330.0 };
-        let image = photograph_board(BOARD, pose, &camera, &optics(0.5), seed as u64);
+        let image = photograph_target(TARGET, pose, &camera, &optics(0.5), seed as u64);
         for hint in [None, Some(&camera)] {
-            let detection = detect(&image, &spec(BOARD), hint).unwrap();
-            assert_found(&detection, BOARD, pose, &camera, 0.95);
+            let detection = detect(&image, &spec(TARGET), hint).unwrap();
+            assert_found(&detection, TARGET, pose, &camera, 0.95);
             assert!(!detection.complete);
-            let farthest = found(&detection, BOARD)
+            let farthest = found(&detection, TARGET)
                 .iter()
                 .map(|(_, pixel)| camera.unproject::<Camera>(*pixel).unwrap().angle_to_axis().deg())
                 .fold(0.0, f64::max);
@@ -181,36 +181,36 @@ fn boards_cut_by_the_field_are_found_past_95_degrees() {
 }
 
 #[test]
-fn a_board_cut_by_the_image_is_placed_by_its_ends_and_colours() {
-    // The sensor's left edge cuts columns off; the other three ends of the board are seen.
+fn a_target_cut_by_the_image_is_placed_by_its_ends_and_colours() {
+    // The sensor's left edge cuts columns off; the other three ends of the target are seen.
     let whole = fisheye(1280);
     let pose = Pose { theta_deg: 5.0, azimuth_deg: 0.0, roll_deg: 3.0, tilt_deg: 10.0, distance_mm: 250.0 };
-    let image = photograph_board(BOARD, pose, &whole, &optics(0.5), 3);
+    let image = photograph_target(TARGET, pose, &whole, &optics(0.5), 3);
     for cut in [590, 640] {
         let part = image::imageops::crop_imm(&image, cut, 0, 1280 - cut, 1280).to_image();
         let centre = Pixel { u: whole.centre().u - f64::from(cut), v: whole.centre().v };
         let size = ImageSize { width: 1280 - cut, height: 1280 };
         let camera = KannalaBrandt::new(whole.k(), whole.aspect(), centre, whole.theta_max(), size).unwrap();
-        let detection = detect(&part, &spec(BOARD), None).unwrap();
+        let detection = detect(&part, &spec(TARGET), None).unwrap();
         assert!(!detection.complete);
-        assert_found(&detection, BOARD, pose, &camera, 0.95);
+        assert_found(&detection, TARGET, pose, &camera, 0.95);
         assert_eq!(detection.placement, Placement::Unique);
     }
 }
 
 #[test]
-fn a_board_cut_on_all_sides_has_relative_labels() {
-    let board = Board { columns: 14, rows: 11, ..BOARD };
+fn a_target_cut_on_all_sides_has_relative_labels() {
+    let target = Target { columns: 14, rows: 11, ..TARGET };
     let pose = Pose { theta_deg: 0.0, azimuth_deg: 0.0, roll_deg: 2.0, tilt_deg: 5.0, distance_mm: 300.0 };
-    let image = photograph_board(board, pose, &fisheye(1280), &optics(0.5), 3);
+    let image = photograph_target(target, pose, &fisheye(1280), &optics(0.5), 3);
     let part = image::imageops::crop_imm(&image, 500, 520, 280, 240).to_image();
-    let detection = detect(&part, &spec(board), None).unwrap();
+    let detection = detect(&part, &spec(target), None).unwrap();
     assert_eq!(detection.placement, Placement::Shifted);
     let whole = fisheye(1280);
     let centre = Pixel { u: whole.centre().u - 500.0, v: whole.centre().v - 520.0 };
     let size = ImageSize { width: 280, height: 240 };
     let camera = KannalaBrandt::new(whole.k(), whole.aspect(), centre, whole.theta_max(), size).unwrap();
-    assert_found(&detection, board, pose, &camera, 0.95);
+    assert_found(&detection, target, pose, &camera, 0.95);
 }
 
 #[test]
@@ -218,32 +218,32 @@ fn colours_tell_the_first_corner_where_columns_plus_rows_is_odd() {
     let camera = fisheye(960);
     for roll_deg in [0.0, 90.0, 180.0, 270.0] {
         let pose = Pose { theta_deg: 10.0, azimuth_deg: 30.0, roll_deg, tilt_deg: 10.0, distance_mm: 260.0 };
-        for (board, placement) in [
-            (BOARD, Placement::Unique),
-            (Board { columns: 8, ..BOARD }, Placement::HalfTurn),
-            (Board { columns: 6, ..BOARD }, Placement::HalfTurn),
+        for (target, placement) in [
+            (TARGET, Placement::Unique),
+            (Target { columns: 8, ..TARGET }, Placement::HalfTurn),
+            (Target { columns: 6, ..TARGET }, Placement::HalfTurn),
         ] {
-            let image = photograph_board(board, pose, &camera, &optics(0.5), 1);
-            let detection = detect(&image, &spec(board), None).unwrap();
+            let image = photograph_target(target, pose, &camera, &optics(0.5), 1);
+            let detection = detect(&image, &spec(target), None).unwrap();
             assert_eq!(detection.placement, placement);
             assert!(detection.complete);
             if placement == Placement::Unique {
-                assert_found(&detection, board, pose, &camera, 1.0);
+                assert_found(&detection, target, pose, &camera, 1.0);
             }
         }
     }
 }
 
 #[test]
-fn an_ambiguous_board_is_labelled_upright() {
+fn an_ambiguous_target_is_labelled_upright() {
     // 8 × 6: a half turn changes no colour. Whichever way it is held, the x axis points right, or, near the vertical,
     // the y axis down.
-    let board = Board { columns: 8, ..BOARD };
+    let target = Target { columns: 8, ..TARGET };
     let camera = fisheye(960);
     for roll_deg in [20.0, 200.0] {
         let pose = Pose { theta_deg: 0.0, azimuth_deg: 0.0, roll_deg, tilt_deg: 10.0, distance_mm: 260.0 };
-        let image = photograph_board(board, pose, &camera, &optics(0.5), 1);
-        let detection = detect(&image, &spec(board), None).unwrap();
+        let image = photograph_target(target, pose, &camera, &optics(0.5), 1);
+        let detection = detect(&image, &spec(target), None).unwrap();
         let [first, second] = [0, 1].map(|i| detection.corners[i].pixel);
         assert!(second.u > first.u);
     }
@@ -253,9 +253,9 @@ fn an_ambiguous_board_is_labelled_upright() {
 fn a_painted_out_corner_is_no_good_corner() {
     let camera = fisheye(960);
     let pose = Pose { theta_deg: 10.0, azimuth_deg: 30.0, roll_deg: 12.0, tilt_deg: 10.0, distance_mm: 260.0 };
-    let image = photograph_board(BOARD, pose, &camera, &optics(0.5), 1);
-    let truth = truth(BOARD, pose, &camera, 0.0);
-    let clean = detect(&image, &spec(BOARD), None).unwrap();
+    let image = photograph_target(TARGET, pose, &camera, &optics(0.5), 1);
+    let truth = truth(TARGET, pose, &camera, 0.0);
+    let clean = detect(&image, &spec(TARGET), None).unwrap();
     assert!(clean.complete);
     for victim in [[4, 3], [0, 0], [8, 2]] {
         // A sticker that covers a corner, and one beside it that displaces what looks like a corner.
@@ -267,10 +267,10 @@ fn a_painted_out_corner_is_no_good_corner() {
                 spoilt.put_pixel(u, v, Luma([120]));
             }
             for hint in [None, Some(&camera)] {
-                let detection = detect(&spoilt, &spec(BOARD), hint).unwrap();
-                let index = victim[0] as u32 + victim[1] as u32 * BOARD.columns;
+                let detection = detect(&spoilt, &spec(TARGET), hint).unwrap();
+                let index = victim[0] as u32 + victim[1] as u32 * TARGET.columns;
                 let corner = detection.corners.iter().find(|corner| corner.index == index);
-                // Without a camera model the corner of the board is predicted to a pixel or two only.
+                // Without a camera model the corner of the target is predicted to a pixel or two only.
                 let allowed = if hint.is_some() { 0.7 } else { 2.0 };
                 let off = corner.map(|corner| (corner.quality, distance(corner.pixel, at)));
                 assert!(
@@ -283,37 +283,37 @@ fn a_painted_out_corner_is_no_good_corner() {
 }
 
 #[test]
-fn no_board_is_an_error() {
+fn no_target_is_an_error() {
     let camera = fisheye(960);
     let studio = photograph(&Scene::studio(), &camera, &optics(0.5), 1);
-    assert!(matches!(detect(&studio, &spec(BOARD), None), Err(DetectError::NoBoard { .. })));
+    assert!(matches!(detect(&studio, &spec(TARGET), None), Err(DetectError::NoTarget { .. })));
     let room = photograph(&Scene::room(), &camera, &optics(0.5), 1);
-    let refused = detect(&room, &spec(BOARD), None);
-    assert!(matches!(refused, Err(DetectError::NoBoard { .. })));
+    let refused = detect(&room, &spec(TARGET), None);
+    assert!(matches!(refused, Err(DetectError::NoTarget { .. })));
     for (width, height) in [(0, 0), (1, 1), (3, 200), (64, 48)] {
         let blank = GrayImage::new(width, height);
-        assert_eq!(detect(&blank, &spec(BOARD), None), Err(DetectError::NoBoard { found: 0 }));
+        assert_eq!(detect(&blank, &spec(TARGET), None), Err(DetectError::NoTarget { found: 0 }));
     }
 }
 
 #[test]
-fn a_board_of_another_size_is_an_error_that_names_both() {
+fn a_target_of_another_size_is_an_error_that_names_both() {
     let camera = fisheye(960);
     let pose = Pose { theta_deg: 10.0, azimuth_deg: 30.0, roll_deg: 12.0, tilt_deg: 10.0, distance_mm: 260.0 };
-    let image = photograph_board(BOARD, pose, &camera, &optics(0.5), 1);
+    let image = photograph_target(TARGET, pose, &camera, &optics(0.5), 1);
     for (columns, rows) in [(8, 6), (9, 5), (7, 5), (10, 6), (9, 7), (11, 8), (6, 6)] {
-        let wrong = BoardSpec { columns, rows, square: BOARD.square };
+        let wrong = TargetSpec { columns, rows, square: TARGET.square };
         let Err(DetectError::WrongSize { mut found, expected }) = detect(&image, &wrong, None) else {
             panic!("{columns} × {rows} was accepted");
         };
         found.sort_unstable();
         assert_eq!((found, expected), ([6, 9], [columns, rows]));
     }
-    let transposed = BoardSpec { columns: 6, rows: 9, square: BOARD.square };
+    let transposed = TargetSpec { columns: 6, rows: 9, square: TARGET.square };
     assert!(detect(&image, &transposed, None).unwrap().complete);
     for (columns, rows) in [(0, 0), (1, 20), (3, 3), (300, 4), (u32::MAX, u32::MAX)] {
-        let unusable = BoardSpec { columns, rows, square: BOARD.square };
-        assert_eq!(detect(&image, &unusable, None), Err(DetectError::UnusableBoard { columns, rows }));
+        let unusable = TargetSpec { columns, rows, square: TARGET.square };
+        assert_eq!(detect(&image, &unusable, None), Err(DetectError::UnusableTarget { columns, rows }));
     }
 }
 
@@ -321,9 +321,9 @@ fn a_board_of_another_size_is_an_error_that_names_both() {
 fn the_same_image_gives_the_same_detection() {
     let camera = fisheye(960);
     let pose = Pose { theta_deg: 60.0, azimuth_deg: 30.0, roll_deg: 12.0, tilt_deg: 10.0, distance_mm: 260.0 };
-    let image = photograph_board(BOARD, pose, &camera, &optics(0.8), 1);
-    let first = detect(&image, &spec(BOARD), None).unwrap();
+    let image = photograph_target(TARGET, pose, &camera, &optics(0.8), 1);
+    let first = detect(&image, &spec(TARGET), None).unwrap();
     for _ in 0..5 {
-        assert_eq!(detect(&image, &spec(BOARD), None).unwrap(), first);
+        assert_eq!(detect(&image, &spec(TARGET), None).unwrap(), first);
     }
 }

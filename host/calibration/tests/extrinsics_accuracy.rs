@@ -19,7 +19,8 @@ struct Study {
     nees: f64,
 }
 
-/// A pair and its calibration from `views` boards that both cameras see; the lenses exact, or from 30 views of their own.
+/// A pair and its calibration from `views` targets that both cameras see; the lenses exact, or from 30 views of their
+/// own.
 fn calibrated(seed: u64, separation_deg: f64, views: usize, own_calibration: bool) -> (Pair, ExtrinsicsCalibration) {
     let mut dice = Dice::new(1000 + seed);
     let pair =
@@ -55,15 +56,15 @@ fn study(separation_deg: f64, views: usize, own_calibration: bool, seeds: u64) -
     };
     let study = Study { arun: medians(&arun), joint: medians(&joint), nees };
     println!(
-        "{separation_deg}°, {views} views, own calibration {own_calibration}, {seeds} seeds: Arun {:.4}° {:.4} mm, joint \
-         {:.4}° {:.4} mm, NEES {:.2}",
+        "{separation_deg}°, {views} views, own calibration {own_calibration}, {seeds} seeds: Arun {:.4}° {:.4} mm, \
+         joint {:.4}° {:.4} mm, NEES {:.2}",
         study.arun.0, study.arun.1, study.joint.0, study.joint.1, study.nees
     );
     study
 }
 
-/// The mean of `seeds` χ² variables of 6 degrees of freedom lies here in 99 % of all cases (by the normal limit, a little
-/// wider for few seeds where the distribution is skewed).
+/// The mean of `seeds` χ² variables of 6 degrees of freedom lies here in 99 % of all cases (by the normal limit, a
+/// little wider for few seeds where the distribution is skewed).
 fn nees_band(seeds: u64) -> std::ops::Range<f64> {
     let half = 2.576 * (12.0 / seeds as f64).sqrt();
     6.0 - half..6.0 + half * (1.0 + 1.0 / (seeds as f64).sqrt())

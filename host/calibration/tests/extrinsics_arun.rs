@@ -32,7 +32,7 @@ proptest! {
         prop_assert!((found.origin().mm() - pose.origin().mm()).norm() < 1e-4);
     }
 
-    /// A board is a plane: the third singular value is zero, the rotation still proper and exact.
+    /// A target is a plane: the third singular value is zero, the rotation still proper and exact.
     #[test]
     fn flat_clouds_give_the_exact_transform(pose in transform(), tilt in vector(1.5)) {
         let tilt = UnitQuaternion::from_scaled_axis(tilt);

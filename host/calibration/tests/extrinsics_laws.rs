@@ -1,13 +1,13 @@
-//! Laws of the joint fit: exact data, gross corners, boards beyond 90°, and refusals by name.
+//! Laws of the joint fit: exact data, gross corners, targets beyond 90°, and refusals by name.
 #![allow(clippy::unwrap_used, clippy::print_stdout, reason = "a test may fail, and tells its figures")]
 
 mod simulated;
 
 use nalgebra::{Isometry3, Vector3};
 use proptest::prelude::*;
-use simulated::{Dice, Pair, apart, facing_board, lens, other_lens, pair_pose};
+use simulated::{Dice, Pair, apart, facing_target, lens, other_lens, pair_pose};
 use vergence_calibration::{
-    BoardView, ExtrinsicsError, ExtrinsicsOptions, LensKnowledge, PoseError, Side, StereoOutlierReason, StereoView,
+    ExtrinsicsError, ExtrinsicsOptions, LensKnowledge, PoseError, Side, StereoOutlierReason, StereoView, TargetView,
     calibrate_extrinsics,
 };
 use vergence_vision::Pixel;
@@ -51,16 +51,16 @@ proptest! {
     }
 }
 
-/// Both cameras see every board only beyond 80°, most corners beyond 90°.
+/// Both cameras see every target only beyond 80°, most corners beyond 90°.
 #[test]
-fn boards_seen_only_near_and_beyond_90_degrees() {
+fn targets_seen_only_near_and_beyond_90_degrees() {
     let (mut dice, pair) = (Dice::new(7), pair(176.0, 0.1));
     let forward = pair.left_from_right.rotation().powf(0.5) * Vector3::z();
     let views: Vec<StereoView> = (0..40)
         .map(|index| {
             let range = dice.between(500.0, 900.0);
             let centre = pair.left_from_right.origin().mm() * 0.5 + forward * range + dice.cube(60.0);
-            pair.see(format!("{index}"), &facing_board(&mut dice, centre, 40.0), &mut dice)
+            pair.see(format!("{index}"), &facing_target(&mut dice, centre, 40.0), &mut dice)
         })
         .filter(|view| view.left.corners.len() >= 20 && view.right.corners.len() >= 20)
         .take(12)
@@ -97,12 +97,12 @@ fn gross_corners_are_named_and_left_out() {
 }
 
 #[test]
-fn a_board_counted_from_the_other_end_is_left_out_whole() {
+fn a_target_counted_from_the_other_end_is_left_out_whole() {
     let (mut dice, pair) = (Dice::new(4), pair(60.0, 0.1));
     let mut views = pair.views(10, &mut dice);
     for corner in &mut views[4].right.corners {
-        let [x, y] = corner.board_mm;
-        corner.board_mm = [8.0 * simulated::SQUARE_MM - x, 5.0 * simulated::SQUARE_MM - y];
+        let [x, y] = corner.target_mm;
+        corner.target_mm = [8.0 * simulated::SQUARE_MM - x, 5.0 * simulated::SQUARE_MM - y];
     }
     let found = calibrate(&pair, &views).unwrap();
     assert!(found.outliers.iter().all(|o| o.view == "view 5" && o.reason == StereoOutlierReason::ViewRejected));
@@ -118,7 +118,7 @@ fn missing_corners_are_no_obstacle() {
     let mut views = pair.views(5, &mut dice);
     views[0].left.corners.truncate(20);
     views[0].right.corners.drain(..20);
-    views[1].left.corners.retain(|corner| corner.board_mm[0] < 60.0);
+    views[1].left.corners.retain(|corner| corner.target_mm[0] < 60.0);
     let found = calibrate(&pair, &views).unwrap();
     assert!(apart(&found.joint.left_from_right, &pair.left_from_right).1 < 1e-6);
 }
@@ -131,7 +131,7 @@ fn refusals_are_named() {
     assert_eq!(calibrate(&pair, &views[..2]), Err(ExtrinsicsError::TooFewViews { usable: 2 }));
     assert_eq!(calibrate(&pair, &[]), Err(ExtrinsicsError::TooFewViews { usable: 0 }));
 
-    let lefts: Vec<BoardView> = views.iter().map(|view| view.left.clone()).collect();
+    let lefts: Vec<TargetView> = views.iter().map(|view| view.left.clone()).collect();
     assert_eq!(StereoView::pair(&lefts, &lefts[1..]), Err(ExtrinsicsError::ViewsDoNotPair { left: 4, right: 3 }));
 
     let mut broken = views.clone();
@@ -145,7 +145,7 @@ fn refusals_are_named() {
     let mut twice = views.clone();
     let first = twice[3].left.corners[0];
     twice[3].left.corners.push(first);
-    let reason = PoseError::Duplicate(first.board_mm);
+    let reason = PoseError::Duplicate(first.target_mm);
     assert_eq!(
         calibrate(&pair, &twice),
         Err(ExtrinsicsError::View { view: "view 4".into(), side: Side::Left, reason })
@@ -153,8 +153,8 @@ fn refusals_are_named() {
 
     // A view in which one camera sees a single row of corners is skipped by name, not refused.
     let mut row = views.clone();
-    let y = row[0].left.corners[0].board_mm[1];
-    row[0].left.corners.retain(|corner| (corner.board_mm[1] - y).abs() < 1.0);
+    let y = row[0].left.corners[0].target_mm[1];
+    row[0].left.corners.retain(|corner| (corner.target_mm[1] - y).abs() < 1.0);
     let found = calibrate(&pair, &row).unwrap();
     assert_eq!((found.skipped[0].view.as_str(), found.skipped[0].side), ("view 1", Side::Left));
     assert_eq!(found.skipped[0].reason, PoseError::Degenerate);
@@ -166,7 +166,7 @@ fn refusals_are_named() {
     assert_eq!(refused, Err(ExtrinsicsError::LensCovariance));
 }
 
-/// Parallel boards leave free lenses open.
+/// Parallel targets leave free lenses open.
 #[test]
 fn free_lenses_need_different_tilts() {
     let pair = pair(0.0, 0.0);

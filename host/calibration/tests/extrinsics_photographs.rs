@@ -1,17 +1,20 @@
 //! Real photographs: the stereo pairs of sourishg/fisheye-stereo-calibration, corners by OpenCV 5.0.0, against SciPy's
-//! bundle adjustment of the same corners. Skipped where the data set is not there.
+//! bundle adjustment of the same corners. The data live outside the repository, see
+//! `tests/common/data.rs`.
 #![allow(
     clippy::unwrap_used,
     clippy::print_stdout,
     reason = "a test that cannot go on fails, or says why it is skipped"
 )]
 
-use std::path::PathBuf;
+#[path = "../../../tests/common/data.rs"]
+mod data;
 
+use data::real_data;
 use nalgebra::{Matrix3, Rotation3, UnitQuaternion, Vector3};
 use serde_json::Value;
 use vergence_calibration::{
-    BoardView, Corner, ExtrinsicsCalibration, ExtrinsicsOptions, LensKnowledge, StereoView, calibrate_extrinsics,
+    Corner, ExtrinsicsCalibration, ExtrinsicsOptions, LensKnowledge, StereoView, TargetView, calibrate_extrinsics,
 };
 use vergence_vision::{ImageSize, KannalaBrandt, OpenCvFisheye, Pixel, Transform};
 
@@ -23,22 +26,18 @@ struct Photographs {
 }
 
 fn photographs() -> Option<Photographs> {
-    let shared = std::env::var("VERGENCE_SHARED").unwrap_or_else(|_| "../../../shared".to_owned());
-    let folder = PathBuf::from(shared).join("data/sourishg_stereo");
-    let Ok(table) = csv::Reader::from_path(folder.join("corners_opencv_classic.csv")) else {
-        println!("SKIPPED: no data set in {}", folder.display());
-        return None;
-    };
+    let folder = real_data("data/sourishg_stereo")?;
+    let table = csv::Reader::from_path(folder.join("corners_opencv_classic.csv")).unwrap();
     let text = std::fs::read_to_string(folder.join("reference_opencv_classic_cv5.json")).unwrap();
     Some(Photographs { views: read_views(table), reference: serde_json::from_str(&text).unwrap() })
 }
 
 fn read_views(mut table: csv::Reader<std::fs::File>) -> Vec<StereoView> {
-    let mut sides: [std::collections::BTreeMap<u32, BoardView>; 2] = Default::default();
+    let mut sides: [std::collections::BTreeMap<u32, TargetView>; 2] = Default::default();
     for record in table.deserialize() {
         let (camera, name, frame, _, u, v, x, y): (String, String, u32, u32, f64, f64, f64, f64) = record.unwrap();
         let side = usize::from(camera == "right");
-        let view = sides[side].entry(frame).or_insert_with(|| BoardView { name, corners: Vec::new() });
+        let view = sides[side].entry(frame).or_insert_with(|| TargetView { name, corners: Vec::new() });
         view.corners.push(Corner::new([x, y], Pixel { u, v }));
     }
     let [left, right] = sides.map(|views| views.into_values().collect::<Vec<_>>());
@@ -85,7 +84,7 @@ fn without_gross_corners_the_pose_agrees_within_one_sigma() {
     for outlier in &found.outliers {
         println!(
             "{} {} {:?} {:.2} px {:?}",
-            outlier.view, outlier.side, outlier.board_mm, outlier.error_px, outlier.reason
+            outlier.view, outlier.side, outlier.target_mm, outlier.error_px, outlier.reason
         );
     }
     assert!(found.rms_inlier_px <= 1.01 * trimmed);

@@ -1,12 +1,12 @@
-//! The board pose from one bundle of rays: as accurate at 120° from the axis as on it, and never the wrong tilt.
+//! The target pose from one bundle of rays: as accurate at 120° from the axis as on it, and never the wrong tilt.
 #![allow(clippy::unwrap_used, clippy::print_stdout, reason = "a test may fail, and tells its figures")]
 
 mod simulated;
 
 use nalgebra::{Isometry3, Translation3, UnitQuaternion, Vector3};
 use proptest::prelude::*;
-use simulated::{Dice, facing_board, median, photograph};
-use vergence_calibration::{BoardView, Corner, PoseError, board_pose};
+use simulated::{Dice, facing_target, median, photograph};
+use vergence_calibration::{Corner, PoseError, TargetView, target_pose};
 use vergence_vision::{Angle, ImageSize, KannalaBrandt, Pixel};
 
 /// An equidistant lens of 560 px/rad up to `theta_max_deg`, on a sensor large enough for all of it.
@@ -16,8 +16,8 @@ fn equidistant(theta_max_deg: f64) -> KannalaBrandt {
     KannalaBrandt::new([560.0, 0.0, 0.0, 0.0, 0.0], 1.0, centre, Angle::from_deg(theta_max_deg), size).unwrap()
 }
 
-/// 9 x 6 corners of 20 mm, the board's centre at 350 mm and `theta_deg` from the axis, tilted by 25°.
-fn view_at(camera: &KannalaBrandt, theta_deg: f64, noise_px: f64, dice: &mut Dice) -> (Isometry3<f64>, BoardView) {
+/// 9 x 6 corners of 20 mm, the target's centre at 350 mm and `theta_deg` from the axis, tilted by 25°.
+fn view_at(camera: &KannalaBrandt, theta_deg: f64, noise_px: f64, dice: &mut Dice) -> (Isometry3<f64>, TargetView) {
     let (theta, phi) = (theta_deg.to_radians(), dice.between(0.0, std::f64::consts::TAU));
     let ray = Vector3::new(theta.sin() * phi.cos(), theta.sin() * phi.sin(), theta.cos());
     let facing = UnitQuaternion::rotation_between(&Vector3::z(), &ray)
@@ -29,20 +29,20 @@ fn view_at(camera: &KannalaBrandt, theta_deg: f64, noise_px: f64, dice: &mut Dic
         Isometry3::from_parts(Translation3::from(ray * 350.0 - rotation * Vector3::new(80.0, 50.0, 0.0)), rotation);
     let mut corners = Vec::new();
     for index in 0..54 {
-        let board_mm = [f64::from(index % 9) * 20.0, f64::from(index / 9) * 20.0];
-        let point = pose * nalgebra::Point3::new(board_mm[0], board_mm[1], 0.0);
+        let target_mm = [f64::from(index % 9) * 20.0, f64::from(index / 9) * 20.0];
+        let point = pose * nalgebra::Point3::new(target_mm[0], target_mm[1], 0.0);
         let point = vergence_vision::Point::<vergence_vision::Camera>::from_mm(point.coords);
         let exact = camera.project_point(&point).unwrap();
         let pixel = Pixel { u: exact.u + noise_px * dice.normal(), v: exact.v + noise_px * dice.normal() };
-        corners.push(Corner::new(board_mm, pixel));
+        corners.push(Corner::new(target_mm, pixel));
     }
-    (pose, BoardView { name: String::new(), corners })
+    (pose, TargetView { name: String::new(), corners })
 }
 
 /// Rotation in degrees and translation in millimetres between the truth and the estimate.
-fn errors(truth: &Isometry3<f64>, camera: &KannalaBrandt, view: &BoardView) -> (f64, f64) {
-    let found = board_pose(camera, view).unwrap();
-    let pose = found.camera_from_board.isometry();
+fn errors(truth: &Isometry3<f64>, camera: &KannalaBrandt, view: &TargetView) -> (f64, f64) {
+    let found = target_pose(camera, view).unwrap();
+    let pose = found.camera_from_target.isometry();
     let rotation = truth.rotation.angle_to(&pose.rotation).to_degrees();
     (rotation, (truth.translation.vector - pose.translation.vector).norm())
 }
@@ -86,15 +86,15 @@ fn the_other_tilt_is_never_taken_for_the_pose() {
 
 /// From afar both tilts fit: the pose says so.
 #[test]
-fn an_ambiguous_tilt_is_told() {
+fn an_ambiguous_tilt_is_reported() {
     let camera = equidistant(160.0);
     let mut dice = Dice::new(2);
-    let board = facing_board(&mut dice, Vector3::new(0.0, 0.0, 8000.0), 30.0);
-    let view = photograph(&camera, &board, 0.1, &mut dice);
-    let far = board_pose(&camera, &view).unwrap();
+    let target = facing_target(&mut dice, Vector3::new(0.0, 0.0, 8000.0), 30.0);
+    let view = photograph(&camera, &target, 0.1, &mut dice);
+    let far = target_pose(&camera, &view).unwrap();
     assert!(far.other_tilt_rms_px.unwrap() < 2.0 * far.rms_px);
     let (_, near) = view_at(&camera, 60.0, 0.1, &mut dice);
-    let near = board_pose(&camera, &near).unwrap();
+    let near = target_pose(&camera, &near).unwrap();
     assert!(near.other_tilt_rms_px.is_none_or(|other| other > 5.0 * near.rms_px));
 }
 
@@ -125,8 +125,8 @@ proptest! {
         corners in prop::collection::vec((any::<[f64; 2]>(), any::<[f64; 2]>()), 0..12),
     ) {
         let corners =
-            corners.into_iter().map(|(board_mm, [u, v])| Corner::new(board_mm, Pixel { u, v })).collect();
-        let _ = board_pose(&equidistant(98.0), &BoardView { name: String::new(), corners });
+            corners.into_iter().map(|(target_mm, [u, v])| Corner::new(target_mm, Pixel { u, v })).collect();
+        let _ = target_pose(&equidistant(98.0), &TargetView { name: String::new(), corners });
     }
 }
 
@@ -134,12 +134,12 @@ proptest! {
 fn refusals_are_named() {
     let camera = equidistant(98.0);
     let (_, view) = view_at(&camera, 20.0, 0.1, &mut Dice::new(1));
-    let with = |corners: Vec<Corner>| board_pose(&camera, &BoardView { name: String::new(), corners });
+    let with = |corners: Vec<Corner>| target_pose(&camera, &TargetView { name: String::new(), corners });
     assert_eq!(with(view.corners[..3].to_vec()), Err(PoseError::TooFewCorners(3)));
     assert_eq!(with(view.corners[..9].to_vec()), Err(PoseError::Degenerate));
     assert_eq!(with([&view.corners[..4], &view.corners[..1]].concat()), Err(PoseError::Duplicate([0.0, 0.0])));
     let mut broken = view.corners.clone();
-    broken[7].board_mm[1] = f64::INFINITY;
+    broken[7].target_mm[1] = f64::INFINITY;
     assert_eq!(with(broken), Err(PoseError::NotFinite));
     let mut outside = view.corners;
     outside[0].pixel = Pixel { u: 0.0, v: 0.0 };

@@ -1,7 +1,7 @@
-//! The relative pose of a pair in herbivore pose, from rendered photographs alone: the lenses from their own calibration on
-//! rendered boards, the corners from our detector. Nothing but the renderer knows the truth.
+//! The relative pose of a pair in herbivore pose, from rendered photographs alone: the lenses from their own
+//! calibration on rendered targets, the corners from our detector. Nothing but the renderer knows the truth.
 //!
-//! Only the part of each 2048 x 2048 picture that shows the board is rendered, by the same lens with its centre moved.
+//! Only the part of each 2048 x 2048 picture that shows the target is rendered, by the same lens with its centre moved.
 #![allow(clippy::unwrap_used, clippy::print_stdout, reason = "a test may fail, and tells its figures")]
 
 mod simulated;
@@ -10,37 +10,37 @@ use image::{DynamicImage, GrayImage};
 use nalgebra::{Isometry3, SVector, UnitQuaternion, Vector3};
 use rayon::prelude::*;
 use simulated::{
-    COLUMNS, Dice, Pair, ROWS, SQUARE_MM, apart, error, facing_board, first_seed, lens, median, other_lens, pair_pose,
+    COLUMNS, Dice, Pair, ROWS, SQUARE_MM, apart, error, facing_target, first_seed, lens, median, other_lens, pair_pose,
     photograph, seeds,
 };
 use vergence_calibration::detect::detect;
 use vergence_calibration::{
-    BoardSpec, BoardView, Corner, ExtrinsicsOptions, IntrinsicsCalibration, IntrinsicsOptions, LensKnowledge,
-    StereoView, calibrate_extrinsics, calibrate_intrinsics,
+    Corner, ExtrinsicsOptions, IntrinsicsCalibration, IntrinsicsOptions, LensKnowledge, StereoView, TargetSpec,
+    TargetView, calibrate_extrinsics, calibrate_intrinsics,
 };
-use vergence_scene::{Board, Optics, Scene, View, render};
+use vergence_scene::{Optics, Scene, Target, View, render};
 use vergence_vision::{Camera, ImageSize, KannalaBrandt, Length, OpenCvFisheye, Pixel, Transform, World};
 
-const SPEC: BoardSpec = BoardSpec { columns: COLUMNS, rows: ROWS, square: Length::from_mm(SQUARE_MM) };
+const SPEC: TargetSpec = TargetSpec { columns: COLUMNS, rows: ROWS, square: Length::from_mm(SQUARE_MM) };
 const SHARED_VIEWS: usize = 12;
 const OWN_VIEWS: usize = 30;
-/// Around the corners of a board: its outer squares and the paper about them.
+/// Around the corners of a target: its outer squares and the paper about them.
 const MARGIN_PX: f64 = 90.0;
 
-/// A board before one camera.
+/// A target before one camera.
 #[derive(Clone)]
 struct Shot {
     camera: KannalaBrandt,
-    camera_from_board: Isometry3<f64>,
+    camera_from_target: Isometry3<f64>,
     /// The corners as they truly are.
-    truth: BoardView,
+    truth: TargetView,
     seed: u64,
 }
 
 impl Shot {
-    fn new(camera: &KannalaBrandt, camera_from_board: Isometry3<f64>, dice: &mut Dice) -> Self {
-        let truth = photograph(camera, &camera_from_board, 0.0, dice);
-        Self { camera: *camera, camera_from_board, truth, seed: dice.between(0.0, 1e15) as u64 }
+    fn new(camera: &KannalaBrandt, camera_from_target: Isometry3<f64>, dice: &mut Dice) -> Self {
+        let truth = photograph(camera, &camera_from_target, 0.0, dice);
+        Self { camera: *camera, camera_from_target, truth, seed: dice.between(0.0, 1e15) as u64 }
     }
 
     fn is_whole(&self) -> bool {
@@ -67,9 +67,9 @@ impl Shot {
 
     fn picture(&self, [left, top, width, height]: [u32; 4]) -> GrayImage {
         let camera = cut(&self.camera, [left, top, width, height]);
-        let board = Board { columns: COLUMNS, rows: ROWS, square: SPEC.square };
-        let place = Transform::<World, Board>::from_isometry(self.camera_from_board);
-        let scene = Scene::board_alone(board, place);
+        let target = Target { columns: COLUMNS, rows: ROWS, square: SPEC.square };
+        let place = Transform::<World, Target>::from_isometry(self.camera_from_target);
+        let scene = Scene::target_alone(target, place);
         let world_from_camera = Transform::<World, Camera>::new(UnitQuaternion::identity(), Vector3::zeros());
         // A noisy sensor: corners are then known to about 0.1 px.
         let optics = Optics {
@@ -92,7 +92,7 @@ fn cut(camera: &KannalaBrandt, [left, top, width, height]: [u32; 4]) -> KannalaB
     KannalaBrandt::from_opencv(lens, camera.theta_max(), ImageSize { width, height }).unwrap()
 }
 
-/// The part of a picture that shows the board.
+/// The part of a picture that shows the target.
 struct Photo {
     shot: Shot,
     window: [u32; 4],
@@ -100,8 +100,8 @@ struct Photo {
 }
 
 impl Photo {
-    /// What our detector finds in it, told what is known of the lens.
-    fn detected(&self, lens: Option<&KannalaBrandt>) -> Option<BoardView> {
+    /// Corners that our detector finds in it, given what is known of the lens.
+    fn detected(&self, lens: Option<&KannalaBrandt>) -> Option<TargetView> {
         let hint = lens.map(|lens| cut(lens, self.window));
         let mut view = detect(&self.image, &SPEC, hint.as_ref()).ok()?.view("", &SPEC);
         for Corner { pixel, .. } in &mut view.corners {
@@ -111,17 +111,17 @@ impl Photo {
     }
 
     /// Errors of the corners in u and v, in pixels.
-    fn errors(&self, found: &BoardView) -> Vec<f64> {
+    fn errors(&self, found: &TargetView) -> Vec<f64> {
         let of = |corner: &Corner| {
             let near = |a: [f64; 2], b: [f64; 2]| (a[0] - b[0]).hypot(a[1] - b[1]) < 1e-6;
-            let truth = self.shot.truth.corners.iter().find(|truth| near(truth.board_mm, corner.board_mm))?;
+            let truth = self.shot.truth.corners.iter().find(|truth| near(truth.target_mm, corner.target_mm))?;
             Some([corner.pixel.u - truth.pixel.u, corner.pixel.v - truth.pixel.v])
         };
         found.corners.iter().filter_map(of).flatten().collect()
     }
 }
 
-/// Boards that both cameras see whole.
+/// Targets that both cameras see whole.
 fn shared_shots(pair: &Pair, dice: &mut Dice) -> Vec<[Shot; 2]> {
     let forward = pair.left_from_right.rotation().powf(0.5) * Vector3::z();
     let middle = pair.left_from_right.origin().mm() * 0.5;
@@ -129,9 +129,9 @@ fn shared_shots(pair: &Pair, dice: &mut Dice) -> Vec<[Shot; 2]> {
     while shots.len() < SHARED_VIEWS + 4 {
         let direction = UnitQuaternion::from_scaled_axis(dice.cube(0.6)) * forward;
         let centre = middle + direction * dice.between(320.0, 650.0);
-        let board = facing_board(dice, centre, 40.0);
-        let left = Shot::new(&pair.left, board, dice);
-        let right = Shot::new(&pair.right, pair.left_from_right.inverse().isometry() * board, dice);
+        let target = facing_target(dice, centre, 40.0);
+        let left = Shot::new(&pair.left, target, dice);
+        let right = Shot::new(&pair.right, pair.left_from_right.inverse().isometry() * target, dice);
         if left.is_whole() && right.is_whole() {
             shots.push([left, right]);
         }
@@ -159,15 +159,15 @@ fn shared_views(
     views
 }
 
-/// Boards all over the field, as for the lens's own calibration.
+/// Targets all over the field, as for the lens's own calibration.
 fn own_shots(camera: &KannalaBrandt, dice: &mut Dice) -> Vec<Shot> {
     let mut shots: Vec<Shot> = Vec::new();
     while shots.len() < OWN_VIEWS {
         let (theta, phi) = (dice.between(0.0, 92.0).to_radians(), dice.between(0.0, std::f64::consts::TAU));
         let direction = Vector3::new(theta.sin() * phi.cos(), theta.sin() * phi.sin(), theta.cos());
         let range = dice.between(180.0, 400.0);
-        let board = facing_board(dice, direction * range, 45.0);
-        let shot = Shot::new(camera, board, dice);
+        let target = facing_target(dice, direction * range, 45.0);
+        let shot = Shot::new(camera, target, dice);
         if shot.truth.corners.len() >= 20 {
             shots.push(shot);
         }
@@ -194,8 +194,8 @@ fn lens_nees(found: &IntrinsicsCalibration, truth: &KannalaBrandt) -> f64 {
     (off.transpose() * found.covariance.try_inverse().unwrap() * off)[(0, 0)]
 }
 
-/// Mean NEES of χ² variables with 6 degrees of freedom: the band that holds 99 % of all cases (E. Wilson and M. Hilferty,
-/// "The distribution of chi-square", PNAS 17, 1931: its cube root is nearly normal).
+/// Mean NEES of χ² variables with 6 degrees of freedom: the band that holds 99 % of all cases (E. Wilson and M.
+/// Hilferty, "The distribution of chi-square", PNAS 17, 1931: its cube root is nearly normal).
 fn nees_band(seeds: usize) -> std::ops::Range<f64> {
     let variance = 2.0 / (9.0 * 6.0 * seeds as f64);
     let quantile = |z: f64| 6.0 * (1.0 - variance + z * variance.sqrt()).powi(3);
@@ -247,8 +247,8 @@ fn herbivore_pose_from_photographs_alone() {
 fn renders_show_the_corners_where_the_lens_puts_them() {
     let mut dice = Dice::new(1);
     for centre in [Vector3::new(20.0, -30.0, 300.0), Vector3::new(-280.0, 60.0, 20.0)] {
-        let board = facing_board(&mut dice, centre, 30.0);
-        let photo = Shot::new(&lens(), board, &mut dice).photo();
+        let target = facing_target(&mut dice, centre, 30.0);
+        let photo = Shot::new(&lens(), target, &mut dice).photo();
         let errors = photo.errors(&photo.detected(Some(&lens())).unwrap());
         assert!(errors.len() >= 60 && errors.iter().all(|error| error.abs() < 0.8), "{errors:?}");
     }

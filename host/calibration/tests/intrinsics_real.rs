@@ -1,5 +1,5 @@
-//! Corners of real lenses against the optimum of an independent bundle adjustment (SciPy, finite differences), stored with
-//! them.
+//! Corners of real lenses against the optimum of an independent bundle adjustment (SciPy, finite differences), stored
+//! with them.
 
 #![allow(clippy::panic, clippy::unwrap_used, clippy::print_stdout, reason = "a test may fail, and tells its figures")]
 
@@ -9,11 +9,11 @@ use intrinsics_sets::{RealSet, largest_difference, real_sets};
 use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64Mcg;
 use vergence_calibration::{
-    BoardView, IntrinsicsCalibration, IntrinsicsOptions, calibrate_intrinsics, refine_intrinsics,
+    IntrinsicsCalibration, IntrinsicsOptions, TargetView, calibrate_intrinsics, refine_intrinsics,
 };
 use vergence_vision::Pixel;
 
-fn calibrate(set: &RealSet, views: &[BoardView]) -> IntrinsicsCalibration {
+fn calibrate(set: &RealSet, views: &[TargetView]) -> IntrinsicsCalibration {
     calibrate_intrinsics(views, set.size, &IntrinsicsOptions::default()).unwrap_or_else(|e| panic!("{}: {e}", set.name))
 }
 
@@ -34,14 +34,14 @@ fn real_sets_reach_the_stored_optimum_without_a_hint() {
 }
 
 /// Five views chosen by `seed`.
-fn five(set: &RealSet, seed: u64) -> Vec<BoardView> {
+fn five(set: &RealSet, seed: u64) -> Vec<TargetView> {
     let mut rng = Pcg64Mcg::seed_from_u64(seed);
     let mut left = set.views.clone();
     (0..5).map(|_| left.swap_remove(rng.random_range(0..left.len()))).collect()
 }
 
 /// `views` without the corners that `calibration` left out.
-fn kept(views: &[BoardView], calibration: &IntrinsicsCalibration) -> Vec<BoardView> {
+fn kept(views: &[TargetView], calibration: &IntrinsicsCalibration) -> Vec<TargetView> {
     let mut kept = views.to_vec();
     for outlier in calibration.outliers.iter().rev() {
         kept[outlier.view].corners.remove(outlier.corner);
@@ -66,8 +66,8 @@ fn few_views_reach_the_optimum_that_a_good_start_reaches() {
 
 /// A twentieth of the corners anywhere in the image: all are found, and the lens is the one that the untouched corners
 /// give. (Against all clean corners it must differ: a twentieth of the data is lost, which alone moves each of 8
-/// parameters by 0.23 sigma, root mean square. How often it stays within half a sigma is printed, beside the same without
-/// the corners that were replaced, which is the best that any fit could do.)
+/// parameters by 0.23 sigma, root mean square. How often it stays within half a sigma is printed, beside the same
+/// without the corners that were replaced, which is the best that any fit could do.)
 #[test]
 fn gross_errors_do_not_move_the_lens() {
     let (mut runs, mut near, mut nearest) = (0, 0, 0);
@@ -96,7 +96,7 @@ fn seeds(few: u64) -> u64 {
 }
 
 /// The views with a twentieth of the corners replaced, and without those.
-fn spoil(set: &RealSet, seed: u64) -> (Vec<BoardView>, Vec<BoardView>) {
+fn spoil(set: &RealSet, seed: u64) -> (Vec<TargetView>, Vec<TargetView>) {
     let mut rng = Pcg64Mcg::seed_from_u64(1000 + seed);
     let (mut spoilt, mut untouched) = (set.views.clone(), set.views.clone());
     for (spoilt, untouched) in spoilt.iter_mut().zip(&mut untouched) {

@@ -4,7 +4,7 @@
 
 use nalgebra::{DMatrix, DVector, SVector};
 use proptest::prelude::*;
-use vergence_calibration::arrow::{ArrowOptions, ArrowProblem, Ending, Equations, linearise, solve};
+use vergence_calibration::schur_lm::{Ending, Equations, SchurOptions, SchurProblem, linearise, solve};
 use vergence_calibration::{Loss, median};
 
 const SHARED: usize = 4;
@@ -17,7 +17,7 @@ struct Linear {
     blocks: Vec<Vec<[f64; SHARED + BLOCK + 1]>>,
 }
 
-impl ArrowProblem<BLOCK> for Linear {
+impl SchurProblem<BLOCK> for Linear {
     type Shared = [f64; SHARED];
     type Block = SVector<f64, BLOCK>;
 
@@ -88,7 +88,7 @@ proptest! {
         let expected = &covariance * matrix.transpose() * &right;
         let count = problem.blocks.len();
 
-        let options = ArrowOptions { gradient_cosine: 1e-12, ..ArrowOptions::default() };
+        let options = SchurOptions { gradient_cosine: 1e-12, ..SchurOptions::default() };
         let found = solve(&problem, [0.3; SHARED], vec![SVector::repeat(0.2); count], &options);
         for i in 0..SHARED {
             prop_assert!((found.shared[i] - expected[i]).abs() < 1e-6);
@@ -138,10 +138,10 @@ fn robust_loss_ignores_an_outlier() {
     let mut rows: Vec<_> = (0..8).flat_map(|_| (0..SHARED + BLOCK).map(|j| unit(j, 1.0))).collect();
     rows[0] = unit(0, 1000.0);
     let problem = Linear { blocks: vec![rows] };
-    let options = ArrowOptions { loss: Loss::Cauchy(0.1), ..ArrowOptions::default() };
+    let options = SchurOptions { loss: Loss::Cauchy(0.1), ..SchurOptions::default() };
     let start = || ([0.9; SHARED], vec![SVector::repeat(0.9)]);
     let robust = solve(&problem, start().0, start().1, &options);
-    let plain = solve(&problem, start().0, start().1, &ArrowOptions::default());
+    let plain = solve(&problem, start().0, start().1, &SchurOptions::default());
     assert!((robust.shared[0] - 1.0).abs() < 1e-3, "{:?}", robust.shared);
     assert!(plain.shared[0] > 50.0, "{:?}", plain.shared);
 }
@@ -149,7 +149,7 @@ fn robust_loss_ignores_an_outlier() {
 #[test]
 fn undetermined_unknowns_have_no_covariance_and_stay() {
     let problem = Linear { blocks: vec![vec![[0.0, 1.0, 0.0, 0.0, 1.0, 0.5, 0.2, 2.0]; 4]] };
-    let found = solve(&problem, [0.0, 0.0, 0.25, -0.5], vec![SVector::zeros()], &ArrowOptions::default());
+    let found = solve(&problem, [0.0, 0.0, 0.25, -0.5], vec![SVector::zeros()], &SchurOptions::default());
     assert_eq!(found.shared[2..].to_vec(), [0.25, -0.5]);
     assert!(found.cost < 1e-9);
     assert!(found.normal.shared_covariance().is_none());
@@ -158,7 +158,7 @@ fn undetermined_unknowns_have_no_covariance_and_stay() {
 #[test]
 fn a_start_without_a_cost_is_said_so() {
     let problem = Linear { blocks: vec![vec![[1.0; SHARED + BLOCK + 1]; 4]] };
-    let found = solve(&problem, [f64::NAN; SHARED], vec![SVector::zeros()], &ArrowOptions::default());
+    let found = solve(&problem, [f64::NAN; SHARED], vec![SVector::zeros()], &SchurOptions::default());
     assert_eq!(found.ending, Ending::NotFinite);
     let normal = linearise(&problem, &[0.0; SHARED], &[SVector::zeros()], Loss::Squares);
     assert_eq!(normal.residuals(), 5);

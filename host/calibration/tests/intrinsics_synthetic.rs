@@ -7,7 +7,7 @@ use proptest::prelude::*;
 use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64Mcg;
 use vergence_calibration::{
-    BoardView, Corner, IntrinsicsCalibration, IntrinsicsError, IntrinsicsOptions, OutlierReason, RayUncertainty,
+    Corner, IntrinsicsCalibration, IntrinsicsError, IntrinsicsOptions, OutlierReason, RayUncertainty, TargetView,
     calibrate_intrinsics, reproject,
 };
 use vergence_vision::{Camera, ImageSize, OpenCvFisheye, Pixel, Point, UnitRay};
@@ -25,8 +25,8 @@ fn normal(rng: &mut Pcg64Mcg) -> f64 {
     (-2.0 * u.ln()).sqrt() * (std::f64::consts::TAU * v).cos()
 }
 
-/// A board whose middle is seen at `theta` from the axis and `phi` around it, `range` mm away, facing the camera but for
-/// turns by `tilt` about its own axes. All angles in radians.
+/// A target whose middle is seen at `theta` from the axis and `phi` around it, `range` mm away, facing the camera but
+/// for turns by `tilt` about its own axes. All angles in radians.
 fn pose(theta: f64, phi: f64, range: f64, tilt: [f64; 2]) -> Isometry3<f64> {
     let aim = UnitQuaternion::from_axis_angle(&Vector3::z_axis(), phi)
         * UnitQuaternion::from_axis_angle(&Vector3::y_axis(), theta)
@@ -46,34 +46,34 @@ fn poses() -> Vec<Isometry3<f64>> {
     ring(0.0, 3).chain(ring(0.6, 5)).chain(ring(1.3, 6)).collect()
 }
 
-/// Height of the board for a warp of `[along x, along y]` mm; corners span [-160, 160] × [-100, 100].
+/// Height of the target for a warp of `[along x, along y]` mm; corners span [-160, 160] × [-100, 100].
 fn height([x, y]: [f64; 2], warp: [f64; 2]) -> f64 {
     warp[0] * (1.0 - (x / 160.0).powi(2)) + warp[1] * (1.0 - (y / 100.0).powi(2))
 }
 
 /// 9 × 6 corners at 40 mm as seen through [`LENS`] with noise of `sigma` px, those within the field.
-fn view(index: usize, pose: &Isometry3<f64>, sigma: f64, warp: [f64; 2], rng: &mut Pcg64Mcg) -> BoardView {
+fn view(index: usize, pose: &Isometry3<f64>, sigma: f64, warp: [f64; 2], rng: &mut Pcg64Mcg) -> TargetView {
     let place = |i: usize| [40.0 * (i % 9) as f64 - 160.0, 40.0 * (i / 9) as f64 - 100.0];
-    let corners = (0..54).map(place).filter_map(|board_mm| {
+    let corners = (0..54).map(place).filter_map(|target_mm| {
         let point =
-            Point::<Camera>::from_mm((pose * Point3::new(board_mm[0], board_mm[1], height(board_mm, warp))).coords);
+            Point::<Camera>::from_mm((pose * Point3::new(target_mm[0], target_mm[1], height(target_mm, warp))).coords);
         let seen = reproject(&LENS, &point)?.pixel;
         let pixel = Pixel { u: seen[0] + sigma * normal(rng), v: seen[1] + sigma * normal(rng) };
-        (point.direction()?.angle_to_axis().rad() < HALF_FIELD).then_some(Corner::new(board_mm, pixel))
+        (point.direction()?.angle_to_axis().rad() < HALF_FIELD).then_some(Corner::new(target_mm, pixel))
     });
-    BoardView { name: format!("view {index}"), corners: corners.collect() }
+    TargetView { name: format!("view {index}"), corners: corners.collect() }
 }
 
-fn views(poses: &[Isometry3<f64>], sigma: f64, warp: [f64; 2], seed: u64) -> Vec<BoardView> {
+fn views(poses: &[Isometry3<f64>], sigma: f64, warp: [f64; 2], seed: u64) -> Vec<TargetView> {
     let mut rng = Pcg64Mcg::seed_from_u64(seed);
     poses.iter().enumerate().map(|(i, pose)| view(i, pose, sigma, warp, &mut rng)).collect()
 }
 
-fn good_views(sigma: f64, seed: u64) -> Vec<BoardView> {
+fn good_views(sigma: f64, seed: u64) -> Vec<TargetView> {
     views(&poses(), sigma, [0.0; 2], seed)
 }
 
-fn calibrate(views: &[BoardView]) -> Result<IntrinsicsCalibration, IntrinsicsError> {
+fn calibrate(views: &[TargetView]) -> Result<IntrinsicsCalibration, IntrinsicsError> {
     calibrate_intrinsics(views, SIZE, &IntrinsicsOptions::default())
 }
 
@@ -92,7 +92,7 @@ fn exact_corners_give_the_exact_lens_past_90_degrees() {
     assert_eq!(calibration.corners_inlier, calibration.corners_total);
     assert_eq!(calibration.outliers, []);
     for (view, pose) in calibration.views.iter().zip(poses()) {
-        let found = view.pose.unwrap().camera_from_board;
+        let found = view.pose.unwrap().camera_from_target;
         assert!((found.origin().mm() - pose.translation.vector).norm() < 1e-4);
         assert!(found.rotation().angle_to(&pose.rotation) < 1e-6);
     }
@@ -102,11 +102,11 @@ fn exact_corners_give_the_exact_lens_past_90_degrees() {
 /// [403.9, 563.6] (R, `qchisq(c(.005, .995), 480)`). The same for two directions of the ray at a pixel: 120 degrees of
 /// freedom, [83.9, 163.6]; and for the six of a pose: 360, [294.3, 432.6].
 #[test]
-fn covariances_are_honest() {
+fn covariances_match_the_errors() {
     const SIGMA: f64 = 0.1;
     const SEEDS: u64 = 60;
     let pixel = Pixel { u: 250.0, v: 320.0 };
-    let (mut lens, mut ray, mut board) = (0.0, 0.0, 0.0);
+    let (mut lens, mut ray, mut target) = (0.0, 0.0, 0.0);
     let mut sigma0 = 0.0;
     for seed in 0..SEEDS {
         let calibration = calibrate(&good_views(SIGMA, 100 + seed)).unwrap();
@@ -115,15 +115,15 @@ fn covariances_are_honest() {
         ray += ray_error(&calibration, pixel);
         let found = calibration.views[4].pose.unwrap();
         let truth = poses()[4];
-        let turn = (found.camera_from_board.rotation() * truth.rotation.inverse()).scaled_axis();
-        let shift = found.camera_from_board.origin().mm() - truth.translation.vector;
+        let turn = (found.camera_from_target.rotation() * truth.rotation.inverse()).scaled_axis();
+        let shift = found.camera_from_target.origin().mm() - truth.translation.vector;
         let error = nalgebra::SVector::<f64, 6>::from([turn.x, turn.y, turn.z, shift.x, shift.y, shift.z]);
-        board += error.dot(&(found.covariance.try_inverse().unwrap() * error));
+        target += error.dot(&(found.covariance.try_inverse().unwrap() * error));
         sigma0 += calibration.sigma0_px / SEEDS as f64;
     }
     assert!((403.9..563.6).contains(&lens), "{lens}");
     assert!((83.9..163.6).contains(&ray), "{ray}");
-    assert!((294.3..432.6).contains(&board), "{board}");
+    assert!((294.3..432.6).contains(&target), "{target}");
     assert!((sigma0 / SIGMA - 1.0).abs() < 0.01, "{sigma0}");
 }
 
@@ -141,7 +141,7 @@ fn ray_error(calibration: &IntrinsicsCalibration, pixel: Pixel) -> f64 {
 }
 
 #[test]
-fn the_uncertainty_map_is_least_inside_the_boards_and_knows_no_rotation() {
+fn the_uncertainty_map_is_least_inside_the_targets_and_excludes_a_common_rotation() {
     let calibration = calibrate(&good_views(0.1, 7)).unwrap();
     let uncertainty = RayUncertainty::of(&calibration);
     let map = uncertainty.map(13, 11);
@@ -166,7 +166,7 @@ fn the_uncertainty_map_is_least_inside_the_boards_and_knows_no_rotation() {
 }
 
 #[test]
-fn a_bowed_board_is_found_out() {
+fn a_bowed_target_is_found_out() {
     let warped = views(&poses(), 0.05, [0.8, -0.4], 3);
     let flat = calibrate(&warped).unwrap();
     let options = IntrinsicsOptions { warp: true, ..IntrinsicsOptions::default() };
@@ -192,7 +192,7 @@ fn gross_errors_are_named() {
 }
 
 #[test]
-fn a_view_of_another_board_is_left_out() {
+fn a_view_of_another_target_is_left_out() {
     let mut views = good_views(0.1, 12);
     let mut rng = Pcg64Mcg::seed_from_u64(5);
     for corner in &mut views[6].corners {
@@ -234,14 +234,14 @@ fn corners_that_are_no_numbers_are_refused() {
     views[3].corners[7].pixel.v = f64::NAN;
     assert_eq!(calibrate(&views).unwrap_err(), IntrinsicsError::NotFinite { view: 3, corner: 7 });
     let mut views = good_views(0.1, 1);
-    views[2].corners[5].board_mm[0] = f64::INFINITY;
+    views[2].corners[5].target_mm[0] = f64::INFINITY;
     assert_eq!(calibrate(&views).unwrap_err(), IntrinsicsError::NotFinite { view: 2, corner: 5 });
 }
 
 #[test]
 fn duplicate_corners_are_refused() {
     let mut views = good_views(0.1, 1);
-    views[1].corners[9].board_mm = views[1].corners[4].board_mm;
+    views[1].corners[9].target_mm = views[1].corners[4].target_mm;
     assert_eq!(calibrate(&views).unwrap_err(), IntrinsicsError::DuplicateCorner { view: 1, corner: 9 });
     let mut views = good_views(0.1, 1);
     views[1].corners[3].pixel = views[1].corners[8].pixel;
@@ -257,7 +257,7 @@ fn too_few_corners_are_refused_or_left_out() {
 
     let mut views = good_views(0.1, 1);
     views[0].corners.truncate(7);
-    views[1].corners.retain(|corner| corner.board_mm[1] < -99.0);
+    views[1].corners.retain(|corner| corner.target_mm[1] < -99.0);
     let calibration = calibrate(&views).unwrap();
     let of = |view| calibration.outliers.iter().filter(move |o| o.view == view).map(|o| o.reason).collect::<Vec<_>>();
     assert_eq!(of(0), [OutlierReason::ViewTooSmall; 7]);
@@ -279,7 +279,7 @@ fn parallel_views_are_refused() {
     assert!(matches!(error, IntrinsicsError::ParallelViews { .. }), "{error}");
 }
 
-/// Seen from afar and hardly tilted, a board tells neither its distance nor the focal length.
+/// A target far away and hardly tilted determines neither its distance nor the focal length.
 #[test]
 fn a_weak_set_is_refused() {
     let tilts = [[0.0, 0.0], [0.07, 0.0], [0.0, 0.08], [-0.06, 0.02]];
@@ -303,7 +303,7 @@ proptest! {
             let corner = |&[x, y, u, v]: &[f64; 4]| Corner::new([x, y], Pixel { u, v });
             part.iter().map(corner).collect()
         };
-        let views: Vec<_> = numbers.chunks(9).map(|part| BoardView { name: String::new(), corners: corners(part) }).collect();
+        let views: Vec<_> = numbers.chunks(9).map(|part| TargetView { name: String::new(), corners: corners(part) }).collect();
         let _ = calibrate(&views);
     }
 }
@@ -313,7 +313,7 @@ fn any_size() -> impl Strategy<Value = f64> {
 }
 
 #[test]
-fn noise_is_no_board() {
+fn noise_is_no_target() {
     let mut rng = Pcg64Mcg::seed_from_u64(77);
     let mut views = good_views(0.1, 1);
     for corner in views.iter_mut().flat_map(|view| &mut view.corners) {

@@ -48,10 +48,10 @@ fn close(a: [f64; 2], b: [f64; 2], scale: f64) -> bool {
 proptest! {
     #[test]
     fn the_projection_agrees_with_dual_numbers((parameters, point) in lens_and_point()) {
-        let seen = reproject(&lens(parameters), &Point::from_mm(point.into())).unwrap();
+        let reprojection = reproject(&lens(parameters), &Point::from_mm(point.into())).unwrap();
         let plain = projected(parameters.map(Dual64::from), point.map(Dual64::from)).map(|d| d.re);
-        prop_assert!(close(seen.pixel, plain, 1.0), "{:?} {:?}", seen.pixel, plain);
-        for (index, column) in seen.by_lens.iter().chain(&seen.by_point).enumerate() {
+        prop_assert!(close(reprojection.pixel, plain, 1.0), "{:?} {:?}", reprojection.pixel, plain);
+        for (index, column) in reprojection.by_lens.iter().chain(&reprojection.by_point).enumerate() {
             let dual = derivative(parameters, point, index);
             prop_assert!(close(*column, dual, 1.0), "parameter {index}: {column:?}, dual numbers {dual:?}");
         }
@@ -64,8 +64,8 @@ proptest! {
     ) {
         let rho: f64 = z * f64::tan(theta);
         let point = [rho * phi.cos(), rho * phi.sin(), z];
-        let seen = reproject(&lens(parameters), &Point::from_mm(point.into())).unwrap();
-        for (index, column) in seen.by_lens.iter().chain(&seen.by_point).enumerate() {
+        let reprojection = reproject(&lens(parameters), &Point::from_mm(point.into())).unwrap();
+        for (index, column) in reprojection.by_lens.iter().chain(&reprojection.by_point).enumerate() {
             let dual = derivative(parameters, point, index);
             // The quotients themselves lose digits here: nine remain of the largest derivative.
             prop_assert!((0..2).all(|i| (column[i] - dual[i]).abs() < 1e-7), "{index}: {column:?}, {dual:?}");
@@ -76,11 +76,11 @@ proptest! {
 #[test]
 fn on_the_axis_the_projection_is_the_principal_point() {
     let lens = lens([300.0, 310.0, 500.0, 400.0, 0.01, 0.0, 0.0, 0.0]);
-    let seen = reproject(&lens, &Point::from_mm([0.0, 0.0, 200.0].into())).unwrap();
-    assert!(close(seen.pixel, [500.0, 400.0], 1.0));
-    assert!(close(seen.by_point[0], [1.5, 0.0], 1.0));
-    assert!(close(seen.by_point[1], [0.0, 1.55], 1.0));
-    assert!(close(seen.by_point[2], [0.0, 0.0], 1.0));
+    let reprojection = reproject(&lens, &Point::from_mm([0.0, 0.0, 200.0].into())).unwrap();
+    assert!(close(reprojection.pixel, [500.0, 400.0], 1.0));
+    assert!(close(reprojection.by_point[0], [1.5, 0.0], 1.0));
+    assert!(close(reprojection.by_point[1], [0.0, 1.55], 1.0));
+    assert!(close(reprojection.by_point[2], [0.0, 0.0], 1.0));
 }
 
 #[test]

@@ -84,14 +84,14 @@ fn own_lenses(bench: &Bench, dice: &mut Dice) -> (Rig, LensKnowledge) {
     (rig, LensKnowledge::within(left.covariance, right.covariance))
 }
 
-/// The covariance is honest if 95 % of the unseen poses lie in its 95 % ellipsoid. Over 50 seeds that many do up to 3 %
+/// The covariance is right if 95 % of the unseen poses lie in its 95 % ellipsoid. Over 50 seeds that many do up to 3 %
 /// more or less: the 30 poses of one seed err together. They do so all the more where the lenses are off, 5 %.
-fn assert_honest(tally: &Tally, seeds: u64, scatter_of_50: f64) {
+fn assert_covers(tally: &Tally, seeds: u64, scatter_of_50: f64) {
     let half = scatter_of_50 * (50.0 / seeds as f64).sqrt().max(1.0);
     assert!((tally.coverage() - 0.95).abs() <= half, "coverage {:.3}", tally.coverage());
 }
 
-fn told(what: &str, tally: &Tally) -> (f64, f64) {
+fn summary(what: &str, tally: &Tally) -> (f64, f64) {
     let (rotation, translation) = tally.rms();
     let nees = tally.nees / f64::from(tally.poses);
     println!("{what}: {rotation:.5}° {translation:.4} mm rms, coverage {:.3}, mean NEES {nees:.2}", tally.coverage());
@@ -103,9 +103,9 @@ fn six_poses_predict_the_whole_range() {
     let seeds = seeds(5);
     for (what, own, scatter) in [("exact lenses", false, 0.03), ("lenses of their own calibration", true, 0.05)] {
         let tally = study(&SIX_POSES, own, 100, seeds);
-        let (rotation, translation) = told(what, &tally);
+        let (rotation, translation) = summary(what, &tally);
         assert!(rotation <= 0.02 && translation <= 0.1);
-        assert_honest(&tally, seeds, scatter);
+        assert_covers(&tally, seeds, scatter);
     }
 }
 
@@ -115,7 +115,7 @@ fn six_poses_predict_the_whole_range() {
 fn three_poses_suffice() {
     let seeds = seeds(5);
     let tally = study(&[[60.0, 0.0], [220.0, 1.1], [100.0, 2.27]], false, 300, seeds);
-    let (rotation, translation) = told("three poses", &tally);
+    let (rotation, translation) = summary("three poses", &tally);
     assert!(rotation <= 0.02 && translation <= 1.0);
-    assert_honest(&tally, seeds, 0.03);
+    assert_covers(&tally, seeds, 0.03);
 }

@@ -140,13 +140,13 @@ fn the_advised_poses_make_everything_observable() {
     let weak = |at: &[[f64; 2]], options: &StageOptions| calibrated(&bench, at, 0.1, options).unwrap().observability;
     let known_scales = StageOptions { free_scales: false, ..StageOptions::default() };
     assert_eq!(weak(&at, &known_scales).weak.len(), 1);
-    let mut told = weak(&at, &StageOptions::default());
-    println!("{told}");
-    assert_eq!((told.weak.len(), told.unknowns, told.determined), (2, 18, 16));
-    while !told.weak.is_empty() && at.len() < 6 {
-        at.push([told.next_pose[0].value(), told.next_pose[1].value()]);
-        told = weak(&at, &StageOptions::default());
-        println!("{told}");
+    let mut observability = weak(&at, &StageOptions::default());
+    println!("{observability}");
+    assert_eq!((observability.weak.len(), observability.unknowns, observability.determined), (2, 18, 16));
+    while !observability.weak.is_empty() && at.len() < 6 {
+        at.push([observability.next_pose[0].value(), observability.next_pose[1].value()]);
+        observability = weak(&at, &StageOptions::default());
+        println!("{observability}");
     }
     assert!(at.len() <= 5, "two more poses must do");
 }

@@ -1,4 +1,4 @@
-//! Held-out views and stage poses: what they tell, and what they catch.
+//! Held-out views and stage poses: prediction errors, and the faults that they reveal.
 #![allow(clippy::unwrap_used, clippy::print_stdout, reason = "a test may fail, and tells its figures")]
 
 mod simulated;

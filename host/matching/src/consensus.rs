@@ -1,9 +1,9 @@
-//! What the matches themselves say about the pose, and which of them do not go along.
+//! The error of the pose on which most matches agree, and the test of each match against it.
 //!
-//! The epipolar band is as wide as the pose is uncertain, but the error of the pose is one small motion for all matches:
-//! a rotation ω of the right camera and a change c of the baseline's direction. For bearings l and r in the shared axes
-//! and the normal n = x × l / |x × l| of the epipolar plane, the angle of r off that plane changes to first order by
-//! ω·(r × n) + c·(l × r) / |x × l|. Its most probable value under the prior of the pose, found by iteratively
+//! The epipolar band is as wide as the pose is uncertain, but the error of the pose is one small motion for all
+//! matches: a rotation ω of the right camera and a change c of the baseline's direction. For bearings l and r in the
+//! shared axes and the normal n = x × l / |x × l| of the epipolar plane, the angle of r off that plane changes to first
+//! order by ω·(r × n) + c·(l × r) / |x × l|. The most probable motion under the prior of the pose, found by iteratively
 //! reweighted least squares (P. Holland and R. Welsch, Commun. Stat. A6, 1977), leaves a much narrower band.
 
 use nalgebra::{SMatrix, SVector, UnitQuaternion, Vector3};
@@ -11,36 +11,36 @@ use vergence_vision::{Angle, Left, Right, Transform, UnitRay};
 
 use crate::{Shared, SharedFrame};
 
-/// ω and the two components of c across the baseline.
+/// Number of unknowns: ω and the two components of c across the baseline.
 const UNKNOWNS: usize = 5;
 const ITERATIONS: usize = 16;
-/// The last of them keep the scale of the measurement.
+/// Number of last iterations that use the scale of the measurement.
 const SETTLING: usize = 4;
 
-/// One point of the scene as both cameras see it, in the shared axes.
+/// A match as bearings of both cameras, in the shared axes.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Sighting {
+pub(crate) struct BearingPair {
     pub left: UnitRay<Shared>,
     pub right: UnitRay<Shared>,
-    /// Standard deviation of the one bearing off the epipolar plane of the other.
+    /// Standard deviation of the angle of one bearing off the epipolar plane of the other.
     pub sigma: Angle,
 }
 
-/// The error of the pose as seen by the matches.
+/// The error of the pose on which most matches agree.
 pub(crate) struct Consensus {
-    /// Turn of the right camera.
+    /// Rotation of the right camera.
     turn: UnitQuaternion<f64>,
-    /// Direction of the baseline.
+    /// Corrected direction of the baseline.
     baseline: Vector3<f64>,
     covariance: SMatrix<f64, UNKNOWNS, UNKNOWNS>,
 }
 
 impl Consensus {
-    /// The most probable error of the pose given sightings of which most are right. `pose_sigma` is the prior's standard
-    /// deviation in each component.
+    /// Estimates the most probable error of the pose from matches, most of which are right. `pose_sigma` is the prior's
+    /// standard deviation of each component.
     ///
-    /// With a pose known exactly, or if the equations cannot be solved, there is nothing to correct.
-    pub(crate) fn of(sightings: &[Sighting], pose_sigma: Angle) -> Self {
+    /// With a pose known exactly, or if the equations cannot be solved, the correction is zero.
+    pub(crate) fn of(bearing_pairs: &[BearingPair], pose_sigma: Angle) -> Self {
         let mut consensus =
             Self { turn: UnitQuaternion::identity(), baseline: Vector3::x(), covariance: SMatrix::zeros() };
         if pose_sigma.rad() <= 0.0 {
@@ -48,12 +48,13 @@ impl Consensus {
         }
         let prior = SMatrix::identity() / pose_sigma.rad().powi(2);
         for iteration in 0..ITERATIONS {
-            // The scale shrinks from the prior's to the measurement's, so that the start does not decide who is out.
+            // The scale shrinks from the prior's to the measurement's, so that the start does not decide which matches
+            // are outliers.
             let fade = (1.0 - iteration as f64 / (ITERATIONS - SETTLING) as f64).max(0.0);
             let (mut normal, mut right_side) = (prior, -prior * consensus.correction());
-            for sighting in sightings {
-                let Some(equation) = consensus.equation(sighting) else { continue };
-                let scale = sighting.sigma.rad().max(pose_sigma.rad() * fade * fade);
+            for bearing_pair in bearing_pairs {
+                let Some(equation) = consensus.equation(bearing_pair) else { continue };
+                let scale = bearing_pair.sigma.rad().max(pose_sigma.rad() * fade * fade);
                 let weight = (1.0 + (equation.offset / scale).powi(2)).powi(-2) / (scale * scale);
                 normal += equation.slope * (equation.slope * weight).transpose();
                 right_side -= equation.slope * (weight * equation.offset);
@@ -65,15 +66,15 @@ impl Consensus {
         consensus
     }
 
-    /// How far a sighting is off the corrected epipolar plane, and the standard deviation that the correction leaves there.
-    /// `None` for a left bearing along the baseline, which has no epipolar plane.
-    pub(crate) fn off_plane(&self, sighting: &Sighting) -> Option<(Angle, Angle)> {
-        let equation = self.equation(sighting)?;
+    /// The angle of a match off the corrected epipolar plane, and the standard deviation that the correction leaves
+    /// there. `None` for a left bearing along the baseline, which has no epipolar plane.
+    pub(crate) fn off_plane(&self, bearing_pair: &BearingPair) -> Option<(Angle, Angle)> {
+        let equation = self.equation(bearing_pair)?;
         let variance = equation.slope.dot(&(self.covariance * equation.slope));
         Some((Angle::from_rad(equation.offset.abs()), Angle::from_rad(variance.max(0.0).sqrt())))
     }
 
-    /// The pose that the sightings ask for, where `pose` is the one whose shared axes they are in.
+    /// The corrected pose; `pose` is the stated one, to whose shared axes the bearings refer.
     pub(crate) fn pose(&self, frame: &SharedFrame, pose: &Transform<Left, Right>) -> Transform<Left, Right> {
         let (from_left, from_right) = (frame.shared_from_left().rotation(), frame.shared_from_right().rotation());
         let rotation = from_left.inverse() * self.turn * from_right;
@@ -90,8 +91,8 @@ impl Consensus {
         self.baseline = (self.baseline + Vector3::new(0.0, by[3], by[4])).normalize();
     }
 
-    fn equation(&self, sighting: &Sighting) -> Option<Equation> {
-        let (l, r) = (sighting.left.vector(), self.turn * sighting.right.vector());
+    fn equation(&self, bearing_pair: &BearingPair) -> Option<Equation> {
+        let (l, r) = (bearing_pair.left.vector(), self.turn * bearing_pair.right.vector());
         let across = self.baseline.cross(&l);
         let normal = across.try_normalize(f64::EPSILON)?;
         let turn = r.cross(&normal);
@@ -100,7 +101,7 @@ impl Consensus {
     }
 }
 
-/// offset + slope · step = 0 for a right match.
+/// The equation of a match: offset + slope · step = 0, in radians.
 struct Equation {
     offset: f64,
     slope: SVector<f64, UNKNOWNS>,
@@ -125,19 +126,19 @@ mod tests {
             .collect()
     }
 
-    fn seen([left, right]: &[Vector3<f64>; 2], turn: &UnitQuaternion<f64>) -> Sighting {
+    fn seen([left, right]: &[Vector3<f64>; 2], turn: &UnitQuaternion<f64>) -> BearingPair {
         let (left, right) = (UnitRay::new(*left).unwrap(), UnitRay::new(turn * right).unwrap());
-        Sighting { left, right, sigma: Angle::from_deg(0.03) }
+        BearingPair { left, right, sigma: Angle::from_deg(0.03) }
     }
 
-    /// Every seventh is off its epipolar plane by 15 mrad.
-    fn with_outliers(inliers: &[Sighting]) -> Vec<Sighting> {
-        let mut sightings = inliers.to_vec();
-        for sighting in sightings.iter_mut().step_by(7) {
-            let off_plane = Vector3::x().cross(&sighting.left.vector()).normalize() * 0.015;
-            sighting.right = UnitRay::new(sighting.right.vector() + off_plane).unwrap();
+    /// Moves every seventh match off its epipolar plane by 15 mrad.
+    fn with_outliers(inliers: &[BearingPair]) -> Vec<BearingPair> {
+        let mut bearing_pairs = inliers.to_vec();
+        for bearing_pair in bearing_pairs.iter_mut().step_by(7) {
+            let off_plane = Vector3::x().cross(&bearing_pair.left.vector()).normalize() * 0.015;
+            bearing_pair.right = UnitRay::new(bearing_pair.right.vector() + off_plane).unwrap();
         }
-        sightings
+        bearing_pairs
     }
 
     #[test]
@@ -146,14 +147,14 @@ mod tests {
             let axis = Vector3::new(0.6, -0.4, 0.5).normalize();
             let turn = UnitQuaternion::from_scaled_axis(axis * f64::to_radians(degrees));
             let inliers: Vec<_> = scene().iter().map(|pair| seen(pair, &turn)).collect();
-            let sightings = with_outliers(&inliers);
-            let consensus = Consensus::of(&sightings, Angle::from_deg(sigma));
-            for (i, (sighting, inlier)) in sightings.iter().zip(&inliers).enumerate() {
+            let bearing_pairs = with_outliers(&inliers);
+            let consensus = Consensus::of(&bearing_pairs, Angle::from_deg(sigma));
+            for (i, (bearing_pair, inlier)) in bearing_pairs.iter().zip(&inliers).enumerate() {
                 let (off, sigma) = consensus.off_plane(inlier).unwrap();
                 assert!(off.deg() < 0.02, "{degrees}°: inlier {i} is {off:.4} off");
                 assert!(sigma.deg() < 0.05, "{sigma:.4}");
                 if i % 7 == 0 {
-                    let (off, _) = consensus.off_plane(sighting).unwrap();
+                    let (off, _) = consensus.off_plane(bearing_pair).unwrap();
                     assert!(off.deg() > 0.5, "{degrees}°: outlier {i} is {off:.4} off");
                 }
             }
@@ -171,20 +172,20 @@ mod tests {
             Vector3::new(132.0, 8.0, 57.0),
         );
         let frame = SharedFrame::new(&stated).unwrap();
-        let sightings: Vec<_> = scene()
+        let bearing_pairs: Vec<_> = scene()
             .iter()
             .filter_map(|[left, _]| {
                 let point =
                     vergence_vision::Point::<Left>::from_mm(frame.shared_from_left().rotation().inverse() * left);
                 let right: vergence_vision::Point<Right> = truth.inverse() * point;
-                Some(Sighting {
+                Some(BearingPair {
                     left: frame.shared_from_left() * point.direction()?,
                     right: frame.shared_from_right() * right.direction()?,
                     sigma: Angle::from_deg(0.03),
                 })
             })
             .collect();
-        let asked = Consensus::of(&sightings, Angle::from_deg(3.0)).pose(&frame, &stated);
+        let asked = Consensus::of(&bearing_pairs, Angle::from_deg(3.0)).pose(&frame, &stated);
         let turn = (asked.rotation() * truth.rotation().inverse()).angle();
         let direction = asked.origin().mm().angle(&truth.origin().mm());
         assert!(turn.to_degrees() < 0.02 && direction.to_degrees() < 0.05, "{turn} {direction}");

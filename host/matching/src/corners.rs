@@ -1,20 +1,23 @@
-//! Corners at several resolutions, spread over the view.
+//! Detection of corners at several resolutions, spread over a view or over a single image.
 //!
 //! M. Brown, R. Szeliski and S. Winder, "Multi-image matching using multi-scale oriented patches", CVPR 2005, §2:
-//! maxima of the harmonic mean of the structure tensor's eigenvalues in each level of a pyramid, placed by a quadratic
-//! fit. For spreading, each cell of the view offers its strongest corner first, then its second, and so on.
+//! corners are maxima of the harmonic mean of the structure tensor's eigenvalues in each level of a pyramid, located by
+//! a quadratic fit. To spread them, the strongest corner of every cell of the view is taken first, then the second, and
+//! so on.
 
+use image::GrayImage;
 use rayon::prelude::*;
+use vergence_vision::{Camera, KannalaBrandt, Pixel};
 
 use crate::ViewPixel;
 use crate::plane::{Plane, Pyramid};
 
-/// A position worth comparing.
+/// A position that is compared.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Keypoint {
-    /// In pixels of the view.
+    /// Position in pixels of the view.
     pub at: ViewPixel,
-    /// The pyramid level it was found in.
+    /// Pyramid level of its detection.
     pub level: usize,
 }
 
@@ -29,13 +32,19 @@ struct Corner {
 const INTEGRATION_SIGMA: f32 = 1.5;
 /// Least harmonic mean, in squared grey levels per pixel: noise of 2 grey levels stays below it.
 const LEAST_STRENGTH: f32 = 1.5;
-/// Corners nearer than this to a stronger one of their level are not corners of their own.
+/// Half side of the square in which a corner must be the strongest, in pixels of its level.
 const SUPPRESSION_RADIUS: usize = 2;
-/// Side of the cells corners are spread over, in pixels of the view.
+/// Side of the cells over which corners are spread, in pixels of the view.
 const CELL: f64 = 48.0;
 
-/// At most `budget` corners that `compared` accepts, by rows. Half of the budget is for the finest level, a quarter for
-/// the next, and so on.
+/// Pyramid levels of a single image: the finest only.
+const IMAGE_LEVELS: usize = 1;
+/// Smallest distance of a corner of a single image to the edge of the lens's field in pixels; nearer ones may be the
+/// edge itself.
+const FIELD_MARGIN: f64 = 8.0;
+
+/// Detects at most `budget` corners that `compared` accepts, sorted by rows. Half of the budget is for the finest
+/// level, a quarter for the next, and so on.
 pub(crate) fn detect(pyramid: &Pyramid, budget: usize, compared: impl Fn(&Keypoint) -> bool + Sync) -> Vec<Keypoint> {
     let levels = pyramid.levels();
     let mut keypoints = Vec::with_capacity(budget);
@@ -47,6 +56,30 @@ pub(crate) fn detect(pyramid: &Pyramid, budget: usize, compared: impl Fn(&Keypoi
     }
     keypoints.sort_by(|p, q| p.at.y.total_cmp(&q.at.y).then(p.at.x.total_cmp(&q.at.x)).then(p.level.cmp(&q.level)));
     keypoints
+}
+
+/// Detects at most `most` corners of `image`, spread over the field of `camera`, sorted by rows.
+///
+/// They still give bearings where the other camera has failed. Empty where the image does not have the size that the
+/// camera is calibrated for.
+#[must_use]
+pub fn image_corners(image: &GrayImage, camera: &KannalaBrandt, most: usize) -> Vec<Pixel> {
+    let (width, height) = image.dimensions();
+    if (width, height) != (camera.size().width, camera.size().height) {
+        return Vec::new();
+    }
+    let plane = Plane::new(width as usize, height as usize, image.iter().map(|&level| f32::from(level)).collect());
+    let inside = |keypoint: &Keypoint| {
+        [-FIELD_MARGIN, 0.0, FIELD_MARGIN].iter().all(|dv| {
+            [-FIELD_MARGIN, 0.0, FIELD_MARGIN]
+                .iter()
+                .all(|du| camera.unproject::<Camera>(Pixel { u: keypoint.at.x + du, v: keypoint.at.y + dv }).is_ok())
+        })
+    };
+    detect(&Pyramid::new(&plane, IMAGE_LEVELS), most, inside)
+        .into_iter()
+        .map(|keypoint| Pixel { u: keypoint.at.x, v: keypoint.at.y })
+        .collect()
 }
 
 /// The harmonic mean det/trace of the structure tensor at each pixel.
@@ -74,7 +107,7 @@ fn response(plane: &Plane) -> Plane {
     })
 }
 
-/// The maxima of a response within [`SUPPRESSION_RADIUS`], by rows.
+/// Finds the maxima of a response within [`SUPPRESSION_RADIUS`], sorted by rows.
 fn maxima(response: &Plane, level: usize) -> Vec<Corner> {
     const R: usize = SUPPRESSION_RADIUS;
     let rows = R..response.height().saturating_sub(R);
@@ -83,14 +116,14 @@ fn maxima(response: &Plane, level: usize) -> Vec<Corner> {
         .collect()
 }
 
-/// The corner at (x, y) where the response is largest around and the quadratic through its neighbours peaks nearby.
+/// The corner at (x, y), if the response is largest there and the quadratic through its neighbours peaks nearby.
 fn maximum_at(response: &Plane, x: usize, y: usize, level: usize) -> Option<Corner> {
     const R: usize = SUPPRESSION_RADIUS;
     let centre = response.at(x, y);
     if centre < LEAST_STRENGTH {
         return None;
     }
-    // Of equal neighbours the first by rows is the maximum.
+    // Of equal neighbours the first by rows counts as the maximum.
     let beaten = (y - R..=y + R).flat_map(|j| (x - R..=x + R).map(move |i| (i, j))).any(|(i, j)| {
         let other = response.at(i, j);
         other > centre || (other >= centre && (j, i) < (y, x))
@@ -111,7 +144,7 @@ fn maximum_at(response: &Plane, x: usize, y: usize, level: usize) -> Option<Corn
     })
 }
 
-/// The first `budget` corners when every cell offers its strongest in turn.
+/// Takes `budget` corners: the strongest of every cell, then the second strongest, and so on.
 fn spread(mut corners: Vec<Corner>, budget: usize) -> Vec<Corner> {
     let cell = |corner: &Corner| {
         let at = corner.keypoint.at;

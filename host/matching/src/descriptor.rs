@@ -1,25 +1,25 @@
-//! Gradient histograms that say what the surroundings of a keypoint look like.
+//! Descriptors of keypoints: histograms of the gradients around them.
 //!
 //! D. Lowe, "Distinctive image features from scale-invariant keypoints", IJCV 60(2), 2004, §6: 4 × 4 cells of 8
-//! directions, trilinear shares, normalised, clipped at 0.2 and normalised again. Upright and of one scale per level,
-//! because both views are already turned to a shared direction and sampled alike.
+//! directions with trilinear interpolation, normalised, clipped at 0.2 and normalised again. They are upright and of
+//! one scale per level, because both views are already resampled in the shared axes.
 
 use crate::plane::Plane;
 
 const CELLS: usize = 4;
 const DIRECTIONS: usize = 8;
 const LENGTH: usize = CELLS * CELLS * DIRECTIONS;
-/// Side of a cell in pixels of the level: Lowe's three times the smoothing, which is 1 px plus that of the lens.
+/// Side of a cell in pixels of the level: Lowe's three times the smoothing, here 1 px and that of the lens.
 const CELL: f64 = 4.0;
-/// No direction may dominate (Lowe: 0.2), for the sake of non-linear changes of brightness.
+/// Largest value of a bin (Lowe: 0.2), against non-linear changes of brightness.
 const LARGEST: f32 = 0.2;
 
-/// A unit vector, or zero where there is no gradient at all.
+/// A descriptor: a unit vector, or zero where there is no gradient.
 #[derive(Clone, Debug)]
 pub(crate) struct Descriptor([f32; LENGTH]);
 
 impl Descriptor {
-    /// The descriptor at (x, y) of a smoothed level. What lies outside counts as flat.
+    /// Computes the descriptor at (x, y) of a smoothed level. Gradients outside count as zero.
     pub(crate) fn at(plane: &Plane, x: f64, y: f64) -> Self {
         const REACH: isize = 10; // (CELLS + 1) / 2 cells
         let mut histogram = [0.0; LENGTH];
@@ -37,7 +37,7 @@ impl Descriptor {
         Self(histogram)
     }
 
-    /// Squared distance: 0 for equal surroundings, about 1 and up for unrelated ones.
+    /// Squared Euclidean distance: 0 for equal surroundings, about 1 and more for unrelated ones.
     pub(crate) fn distance_squared(&self, other: &Self) -> f32 {
         const LANES: usize = 16; // independent sums, so that the compiler may vectorise
         let mut sums = [0.0_f32; LANES];
@@ -50,10 +50,10 @@ impl Descriptor {
     }
 }
 
-/// Shares a gradient at (u, v) cells from the centre among its cells and directions.
+/// Adds a gradient at (u, v) cells from the centre to its cells and directions.
 fn add(histogram: &mut [f32; LENGTH], u: f64, v: f64, gx: f32, gy: f32) {
     let magnitude = gx.hypot(gy);
-    // The Gaussian of half the window's width, two cells.
+    // A Gaussian whose sigma is half the window's width, two cells.
     let weight = magnitude * (-0.125 * (u * u + v * v) as f32).exp();
     let turn = f64::from(gy.atan2(gx)) * (DIRECTIONS as f64 / std::f64::consts::TAU);
     let centre = (CELLS as f64 - 1.0) / 2.0;
@@ -70,14 +70,14 @@ fn add(histogram: &mut [f32; LENGTH], u: f64, v: f64, gx: f32, gy: f32) {
     }
 }
 
-/// The two bins next to a coordinate, and their linear shares.
+/// The two bins next to a coordinate with their linear weights.
 fn shares(coordinate: f64) -> [(isize, f32); 2] {
     let floor = coordinate.floor();
     let past = (coordinate - floor) as f32;
     [(floor as isize, 1.0 - past), (floor as isize + 1, past)]
 }
 
-/// Central differences; `None` at and beyond the border.
+/// The gradient by central differences; `None` at and beyond the border.
 fn gradient(plane: &Plane, x: isize, y: isize) -> Option<(f32, f32)> {
     let (x, y) = (usize::try_from(x).ok()?, usize::try_from(y).ok()?);
     if x == 0 || y == 0 || x + 1 >= plane.width() || y + 1 >= plane.height() {

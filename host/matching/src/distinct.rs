@@ -1,8 +1,8 @@
-//! Whether a place looks like no other along its row.
+//! Detection of repeated patterns along a row.
 //!
-//! The ratio of descriptor distances compares with detected keypoints only: on a fence, tiles or a calibration board
-//! the true partner may be missing among them while its neighbour is not. Normalised cross-correlation of the place
-//! with everything its own view shows in the band finds such repetitions wherever they are.
+//! The ratio of descriptor distances compares detected keypoints only: on a fence, on tiles or on a calibration target
+//! the true partner may be missing among them while its neighbour is not. Normalised cross-correlation of the window
+//! around a position with all windows of its own view in the epipolar band finds such repetitions everywhere.
 
 use std::ops::Range;
 
@@ -11,42 +11,43 @@ use multiversion::multiversion;
 use crate::ViewPixel;
 use crate::plane::{Plane, Pyramid};
 
-/// The level compared in: half the resolution shows a larger surrounding for less work.
+/// Pyramid level of the comparison: half the resolution covers larger surroundings for less work.
 const LEVEL: usize = 1;
 const SCALE: f64 = (1 << LEVEL) as f64;
 /// Half the window's side, in pixels of the level.
 const HALF: usize = 7;
 const SIDE: usize = 2 * HALF + 1;
-/// A window whose values deviate by less, in grey levels, is flat: it looks like nothing.
+/// Standard deviation in grey levels below which a window counts as flat and is not compared.
 const FLAT: f64 = 0.01;
-/// Correlation from which two places look the same.
+/// Correlation above which two windows count as the same pattern.
 const ALIKE: f32 = 0.93;
-/// How many columns are looked at together.
+/// Number of columns compared in one step.
 const TOGETHER: usize = 16;
-/// Nearer than this, in pixels of the level, a place is the same one.
+/// Distance in pixels of the level up to which two positions count as one.
 const SAME_PLACE: usize = 5;
-/// How far off the row a repetition may lie, in pixels of the level.
+/// Largest distance of a repetition from the row, in pixels of the level.
 const ROWS: usize = 1;
 
-/// The values around a pixel, by rows.
+/// The values of the window around a pixel, by rows.
 type Window = [f32; SIDE * SIDE];
 
-/// A view prepared for looking along its rows.
+/// A view prepared for the search along its rows.
 pub(crate) struct Surroundings<'a> {
     plane: &'a Plane,
-    /// One over the norm of the window's deviations from its mean, by its centre; 0 where the window is flat or not all inside.
+    /// One over the norm of each window's deviations from its mean, by its centre; 0 where the window is flat or not
+    /// all inside.
     inverse_norm: Plane,
 }
 
 impl<'a> Surroundings<'a> {
-    /// `None` where the view is too small to have the level.
+    /// Prepares a view; `None` where it is too small to have the level.
     pub(crate) fn of(pyramid: &'a Pyramid) -> Option<Self> {
         let plane = pyramid.levels().get(LEVEL)?;
         Some(Self { plane, inverse_norm: plane.like(|y, out| inverse_norms(plane, y, out)) })
     }
 
-    /// Whether nothing between the columns `from` and `to` of the row of `at` looks like `at` but itself. All are in
-    /// pixels of the view; what lies outside is not compared.
+    /// Whether no other position between the columns `from` and `to`, in the row of `at`, shows the same pattern as
+    /// `at`. Columns are in pixels of the view; those outside are not compared.
     pub(crate) fn is_distinct(&self, at: ViewPixel, from: f64, to: f64) -> bool {
         let whole = |position: f64| (position / SCALE).round().max(0.0) as usize;
         let (x, y) = (whole(at.x), whole(at.y));
@@ -58,22 +59,22 @@ impl<'a> Surroundings<'a> {
         ![before, after].into_iter().any(|columns| rows.clone().any(|row| self.shows(&place, row, columns.clone())))
     }
 
-    /// Whether one of these pixels of row `y`, which all have a window, is surrounded by what looks like `place`, a window
-    /// without mean of norm 1.
+    /// Whether the window of one of `columns` in row `y` shows the same pattern as `place`, a window with zero mean and
+    /// norm 1. All columns must have a window.
     fn shows(&self, place: &Window, y: usize, columns: Range<usize>) -> bool {
         let lines = std::array::from_fn(|j| self.plane.row(y - HALF + j));
         shows(place, &lines, self.inverse_norm.row(y), columns)
     }
 }
 
-/// [`Surroundings::shows`], many columns at a time.
+/// The loop of [`Surroundings::shows`], many columns at a time.
 #[multiversion(targets("x86_64+avx2"))]
 fn shows(place: &Window, lines: &[&[f32]; SIDE], inverse_norms: &[f32], columns: Range<usize>) -> bool {
     let Some(last) = inverse_norms.len().checked_sub(HALF + TOGETHER).filter(|last| *last >= HALF) else {
         return false;
     };
     columns.clone().step_by(TOGETHER).any(|first| {
-        // Near the border, columns from before are looked at again.
+        // Near the border some columns are compared twice.
         let first = first.min(last);
         let mut sums = [0.0_f32; TOGETHER];
         for (weights, line) in place.chunks_exact(SIDE).zip(lines) {
@@ -88,7 +89,7 @@ fn shows(place: &Window, lines: &[&[f32]; SIDE], inverse_norms: &[f32], columns:
     })
 }
 
-/// For the windows around the pixels of row `y`: n σ² is the sum of squares less n times the squared mean.
+/// Computes [`Surroundings::inverse_norm`] for row `y`: n σ² is the sum of squares less n times the squared mean.
 fn inverse_norms(plane: &Plane, y: usize, out: &mut [f32]) {
     const COUNT: f64 = (SIDE * SIDE) as f64;
     let Some(first) = y.checked_sub(HALF).filter(|first| first + SIDE <= plane.height()) else { return };
@@ -112,7 +113,7 @@ fn inverse_norms(plane: &Plane, y: usize, out: &mut [f32]) {
     }
 }
 
-/// The window around a pixel, its mean taken away; `None` where it is not all inside.
+/// The window around a pixel less its mean; `None` where it is not all inside.
 fn window(plane: &Plane, x: usize, y: usize) -> Option<Window> {
     let (column, row) = (x.checked_sub(HALF)?, y.checked_sub(HALF)?);
     if x + HALF >= plane.width() || y + HALF >= plane.height() {
@@ -127,7 +128,7 @@ fn window(plane: &Plane, x: usize, y: usize) -> Option<Window> {
     Some(values)
 }
 
-/// A window without mean, of norm 1; `None` where it is flat.
+/// Scales a window of zero mean to norm 1; `None` where it is flat.
 fn normalised(window: Window) -> Option<Window> {
     let norm = window.iter().map(|value| value * value).sum::<f32>().sqrt();
     (f64::from(norm) > FLAT * SIDE as f64).then(|| window.map(|value| value / norm))
@@ -137,7 +138,7 @@ fn normalised(window: Window) -> Option<Window> {
 mod tests {
     use super::*;
 
-    /// The window of a flat surface has no shape that could be compared: an overexposed sky repeats nothing.
+    /// A flat window has no pattern that could repeat, such as an overexposed sky.
     #[test]
     fn a_flat_surface_repeats_nothing() {
         const SIZE: usize = 160;
@@ -149,7 +150,7 @@ mod tests {
             let at = ViewPixel { x: 50.0, y: f64::from(y) };
             assert!(surroundings.is_distinct(at, 104.0, 140.0), "{y}");
         }
-        // And what does repeat is found.
+        // A repeated pattern is found.
         let tiled = (0..SIZE * SIZE).map(|i| if (i % SIZE % 40 < 20) == (i / SIZE % 40 < 20) { 200.0 } else { 50.0 });
         let pyramid = Pyramid::new(&Plane::new(SIZE, SIZE, tiled.collect()), 2);
         assert!(!Surroundings::of(&pyramid).unwrap().is_distinct(ViewPixel { x: 40.0, y: 80.0 }, 60.0, 140.0));

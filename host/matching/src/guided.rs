@@ -1,4 +1,4 @@
-//! The classical matcher: corners, gradient histograms compared inside the epipolar band, registration.
+//! The classical matcher: corners, gradient histograms compared inside the epipolar band, and registration.
 
 use rayon::prelude::*;
 use vergence_vision::{Angle, Frame};
@@ -7,19 +7,19 @@ use crate::View;
 use crate::corners::{self, Keypoint};
 use crate::descriptor::Descriptor;
 use crate::epipolar_band::EpipolarBand;
-use crate::links::{Compared, Link, Links, Rows, agree_on_pose, in_originals, register, sighting, thin};
-use crate::matcher::{Drop, ImagePair, Match, MatchError, Matcher, Matches};
+use crate::links::{Compared, Link, Links, Rows, agree_on_pose, bearing_pair, in_originals, register, thin};
+use crate::matcher::{ImagePair, Match, MatchError, Matcher, Matches, UnmatchedReason};
 use crate::plane::Pyramid;
 use crate::shared_views::SharedViews;
 use crate::wrong_pose::{ANY_POSE, pose_instead};
 
-/// Matches corners by their gradient histograms, guided by the known pose.
+/// A matcher of corners by their gradient histograms, guided by the stated pose.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct GuidedMatcher {
-    /// Most keypoints per view.
+    /// Largest number of keypoints per view.
     pub keypoints: usize,
-    /// Pixels of the view per pixel at the centre of the denser fisheye image, from 1 to 2. `None` takes what makes
-    /// 450 pixels per radian, so that small images are enlarged.
+    /// Pixels of the view per pixel at the centre of the denser fisheye image, from 1 to 2. `None` takes the value that
+    /// gives 450 pixels per radian, so that small images are enlarged.
     pub oversampling: Option<f64>,
 }
 
@@ -29,19 +29,19 @@ impl Default for GuidedMatcher {
     }
 }
 
-/// Resolutions in which keypoints are sought.
+/// Number of pyramid levels in which keypoints are detected.
 pub(crate) const LEVELS: usize = 3;
-/// How far a keypoint may be off, in pixels of its level.
+/// Tolerance of a keypoint's position, in pixels of its level.
 pub(crate) const KEYPOINT_TOLERANCE: f64 = 1.5;
-/// Standard deviation of a corner's place in a view, in pixels of its level.
+/// Standard deviation of a corner's position, in pixels of its level.
 const CORNER_SIGMA: f64 = 0.7;
-/// Where fewer of the keypoints than this have a match, the pose may be far off what is said of it.
+/// Fraction of matched keypoints below which the stated pose may be wrong by degrees.
 const SUSPICIOUSLY_FEW: f64 = 0.05;
-/// Distance beyond which two descriptors do not show the same thing, squared.
+/// Squared distance of descriptors above which they are not of the same point.
 const FARTHEST_SQUARED: f32 = 0.6;
-/// Largest ratio of the best distance to that of the best elsewhere (Lowe 2004, §7.1: 0.8 without guidance), squared.
+/// Largest squared ratio of the best distance to the best one elsewhere (Lowe 2004, §7.1: 0.8 without guidance).
 const RATIO_SQUARED: f32 = 0.85 * 0.85;
-/// Keypoints within this distance are the same place for the ratio, in pixels of their level.
+/// Keypoints within this distance, in pixels of their level, count as one position for the ratio.
 const SAME_PLACE: f64 = 4.0;
 
 impl Matcher for GuidedMatcher {
@@ -59,8 +59,9 @@ impl Matcher for GuidedMatcher {
             return Ok(matches);
         }
         let links = compare(&seen[0], &seen[1], &views.band_for(ANY_POSE));
-        let candidate =
-            |(keypoint, link): (&Keypoint, &Result<Link, Drop>)| sighting(&views.grid, keypoint, link.as_ref().ok()?);
+        let candidate = |(keypoint, link): (&Keypoint, &Result<Link, UnmatchedReason>)| {
+            bearing_pair(&views.grid, keypoint, link.as_ref().ok()?)
+        };
         let candidates: Vec<_> = seen[0].keypoints.iter().zip(&links).filter_map(candidate).collect();
         let Some(pose) = pose_instead(&candidates, &views, pair) else { return Ok(matches) };
         let turned = ImagePair { left_from_right: pose, ..*pair };
@@ -70,10 +71,10 @@ impl Matcher for GuidedMatcher {
 }
 
 impl GuidedMatcher {
-    /// What looks alike inside the epipolar band, before registration and every other test.
+    /// Finds candidates inside the epipolar band by their descriptors, before registration and every other test.
     ///
     /// # Errors
-    /// As [`Matcher::find`].
+    /// The errors of [`Matcher::find`].
     pub fn candidates(&self, pair: &ImagePair<'_>) -> Result<Vec<Match>, MatchError> {
         pair.check()?;
         let views = SharedViews::of(pair, self.oversampling)?;
@@ -90,7 +91,7 @@ impl GuidedMatcher {
     }
 }
 
-/// The matches of the features under the pose of their views.
+/// Matches the features of both views and applies all tests.
 fn matched(views: &SharedViews<'_>, [left, right]: &[Features; 2], pose_sigma: Angle) -> Matches {
     let band = views.band();
     let compared = Compared { left: &left.pyramid, right: &right.pyramid, keypoints: &left.keypoints };
@@ -102,10 +103,10 @@ fn matched(views: &SharedViews<'_>, [left, right]: &[Features; 2], pose_sigma: A
     in_originals(&links, views, &left.keypoints, right.keypoints.len())
 }
 
-/// What is compared of one view.
+/// The keypoints of one view with their descriptors.
 struct Features {
     pyramid: Pyramid,
-    /// By rows.
+    /// Sorted by rows.
     keypoints: Vec<Keypoint>,
     descriptors: Vec<Descriptor>,
 }
@@ -130,13 +131,13 @@ impl Features {
     }
 }
 
-/// The most alike keypoint of `to` for every keypoint of `from`.
+/// Finds the most similar keypoint of `to` for every keypoint of `from`.
 fn nearest(
     from: &Features,
     to: &Features,
     reach: f64,
     allowed: impl Fn(&Keypoint, &Keypoint) -> bool + Sync,
-) -> Vec<Result<usize, Drop>> {
+) -> Vec<Result<usize, UnmatchedReason>> {
     let partner = |i: usize| {
         let (keypoint, descriptor) = (&from.keypoints[i], &from.descriptors[i]);
         let scale = (1_usize << keypoint.level) as f64;
@@ -145,9 +146,10 @@ fn nearest(
             .filter(|&j| to.keypoints[j].level == keypoint.level && allowed(keypoint, &to.keypoints[j]))
             .map(|j| (j, descriptor.distance_squared(&to.descriptors[j])))
             .collect();
-        let &(best, least) = candidates.iter().min_by(|p, q| p.1.total_cmp(&q.1)).ok_or(Drop::NoCandidate)?;
+        let &(best, least) =
+            candidates.iter().min_by(|p, q| p.1.total_cmp(&q.1)).ok_or(UnmatchedReason::NoCandidate)?;
         if least > FARTHEST_SQUARED {
-            return Err(Drop::NoCandidate);
+            return Err(UnmatchedReason::NoCandidate);
         }
         let place = to.keypoints[best].at;
         let elsewhere = |j: usize| {
@@ -155,23 +157,23 @@ fn nearest(
             (at.x - place.x).hypot(at.y - place.y) > SAME_PLACE * scale
         };
         let rivalled = candidates.iter().any(|&(j, d)| least > RATIO_SQUARED * d && elsewhere(j));
-        if rivalled { Err(Drop::Ratio) } else { Ok(best) }
+        if rivalled { Err(UnmatchedReason::Ratio) } else { Ok(best) }
     };
     (0..from.keypoints.len()).into_par_iter().map(partner).collect()
 }
 
-/// Links every left keypoint to the right one it prefers, if that prefers it too.
+/// Links every left keypoint to its most similar right one, if the choice is mutual.
 fn compare(left: &Features, right: &Features, band: &EpipolarBand) -> Links {
     let tolerance = |keypoint: &Keypoint| KEYPOINT_TOLERANCE * (1_usize << keypoint.level) as f64;
     let allowed = |l: &Keypoint, r: &Keypoint| band.allows(l.at, r.at, tolerance(l));
     let reach = band.reach(KEYPOINT_TOLERANCE);
     let forth = nearest(left, right, reach, allowed);
     let back = nearest(right, left, reach, |r, l| allowed(l, r));
-    let link = |(i, partner): (usize, &Result<usize, Drop>)| {
+    let link = |(i, partner): (usize, &Result<usize, UnmatchedReason>)| {
         let j = (*partner)?;
         let (from, to) = (&left.keypoints[i], &right.keypoints[j]);
         let sigma = CORNER_SIGMA * (1_usize << from.level) as f64;
-        if back[j] == Ok(i) { Ok(Link { right: to.at, score: 0.0, sigma }) } else { Err(Drop::NotMutual) }
+        if back[j] == Ok(i) { Ok(Link { right: to.at, score: 0.0, sigma }) } else { Err(UnmatchedReason::NotMutual) }
     };
     forth.iter().enumerate().map(link).collect()
 }

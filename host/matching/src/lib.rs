@@ -1,17 +1,18 @@
-//! Homologous points in pairs of unrectified fisheye images.
+//! Matching of pairs of unrectified fisheye images, sparse and dense.
 //!
-//! Both images are turned into one equirectangular [`View`] whose rows are epipolar curves ([`SharedFrame`]): relative
-//! rotation, roll and the lens's distortion are then common to both, whatever the separation of the axes. What is
-//! found there returns as pixels of the original images, so that nothing downstream sees the view.
+//! Both images are resampled to equirectangular [`View`]s in common axes ([`SharedFrame`]), whose rows are epipolar
+//! curves. This removes the relative rotation, the roll and the lens's distortion, for any separation of the optical
+//! axes. Results are given in pixels of the original images, so that callers never see the views.
 //!
-//! A [`Matcher`] takes an [`ImagePair`] and returns [`Matches`], with a reason for every keypoint it gave up.
-//! [`GuidedMatcher`] is the classical one: corners, gradient histograms compared inside the epipolar band, then least
-//! squares registration. [`learned::LearnedMatcher`] asks pre-trained networks of the LightGlue family instead.
+//! A [`Matcher`] takes an [`ImagePair`] and returns [`Matches`], with a reason for every dropped keypoint.
+//! [`GuidedMatcher`] is the classical one: corners, gradient histograms compared inside the epipolar band, then
+//! least-squares registration. [`learned::LearnedMatcher`] uses pre-trained networks of the LightGlue family instead.
 //!
-//! Terms: *keypoint*, a position worth comparing; *descriptor*, what its surroundings look like; *disparity*,
-//! a_L − a_R, the parallax along a row; *level*, the halvings of a view's resolution.
+//! Terms: a *keypoint* is a position that is compared; a *descriptor* is a vector that describes its surroundings; the
+//! *disparity* a_L − a_R is the parallax along a row; the *level* counts halvings of a view's resolution.
 //!
-//! [`dense_depth`] gives a range to every pixel of the left image instead, with its uncertainty or the reason why there is none.
+//! [`dense_depth`] computes a range with its uncertainty, or the reason why there is none, for every pixel of the left
+//! image.
 //!
 //! Everything is a pure function of its arguments: the same pair gives the same matches on any number of threads.
 
@@ -21,6 +22,7 @@ mod dense;
 mod descriptor;
 mod distinct;
 mod epipolar_band;
+mod grid;
 mod guided;
 pub mod learned;
 mod links;
@@ -32,14 +34,16 @@ mod refine;
 mod shared_field;
 mod shared_frame;
 mod shared_views;
-mod single;
 mod view;
 mod wrong_pose;
 
-pub use dense::{DenseCounts, DenseDepth, DenseRange, DenseSample, DenseViews, Disparities, Gap, Swept, dense_depth};
+pub use corners::image_corners;
+pub use dense::{
+    DenseCounts, DenseDepth, DenseRange, DenseSample, DenseViews, Disparities, Gap, WholeDisparities, dense_depth,
+};
+pub use grid::{Grid, ViewPixel};
 pub use guided::GuidedMatcher;
-pub use matcher::{Drop, ImagePair, Match, MatchError, Matcher, Matches};
+pub use matcher::{ImagePair, Match, MatchError, Matcher, Matches, UnmatchedReason};
 pub use shared_frame::{Shared, SharedFrame};
-pub use single::image_corners;
 pub use vergence_vision::Side;
-pub use view::{Grid, View, ViewPixel};
+pub use view::View;

@@ -1,24 +1,24 @@
-//! What every matcher takes and returns.
+//! The interface of matchers: the pair of images and the matches.
 
 use std::collections::BTreeMap;
 
 use image::GrayImage;
 use vergence_vision::{Angle, ImageSize, KannalaBrandt, Left, Length, Pixel, PixelPair, Right, Side, Transform};
 
-/// Finds the points of the scene seen in both images of a pair.
+/// A matcher: finds the pixels of scene points that both images of a pair show.
 pub trait Matcher: Send + Sync {
     /// A short name for logs and reports.
     fn name(&self) -> &str;
 
-    /// The homologous points of `pair`, in an order that depends on the pair alone. Images without texture give no
-    /// matches, which is not an error.
+    /// Finds the matches of `pair`, in an order that depends on the pair alone. Images without texture give no matches,
+    /// which is not an error.
     ///
     /// # Errors
-    /// [`MatchError`] where the pair cannot be matched whatever its images show.
+    /// [`MatchError`] for a pair that cannot be matched, whatever its images show.
     fn find(&self, pair: &ImagePair<'_>) -> Result<Matches, MatchError>;
 }
 
-/// Two images exposed together, the lenses that made them and what is known of the relative pose.
+/// Two images exposed together, with their lenses and their relative pose.
 #[derive(Clone, Copy, Debug)]
 pub struct ImagePair<'a> {
     /// The left camera's image.
@@ -29,29 +29,29 @@ pub struct ImagePair<'a> {
     pub left_camera: &'a KannalaBrandt,
     /// The right lens and sensor.
     pub right_camera: &'a KannalaBrandt,
-    /// The relative pose, as far as it is known.
+    /// The stated relative pose.
     pub left_from_right: Transform<Left, Right>,
-    /// Standard deviation of the relative rotation's error. Zero trusts the pose; more widens the epipolar band.
+    /// Standard deviation of the relative rotation. Zero trusts the pose; a larger one widens the epipolar band.
     pub pose_sigma: Angle,
-    /// The nearest range from the left camera at which a point may lie.
+    /// The smallest range from the left camera at which points are sought.
     pub nearest: Length,
 }
 
-/// One point of the scene in both images.
+/// A match: the pixels of one scene point in both images.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Match {
-    /// Where the left image shows it.
+    /// Its pixel in the left image.
     pub left: Pixel,
-    /// Where the right image shows it.
+    /// Its pixel in the right image.
     pub right: Pixel,
-    /// Standard deviation of each coordinate of both positions, in pixels of the images, as if both were equally uncertain.
+    /// Standard deviation of each coordinate of both pixels, in pixels of the images; it counts as equal for both.
     pub sigma: f64,
-    /// Likeness in [0, 1], comparable within one matcher only.
+    /// Similarity from 0 to 1, comparable within one matcher only.
     pub score: f32,
 }
 
 impl Match {
-    /// Both positions and their standard deviation, as triangulation takes them.
+    /// The pair of pixels and its standard deviation, as [`vergence_vision::cloud_of_each`] takes them.
     #[must_use]
     pub const fn measured(&self) -> (PixelPair, f64) {
         (PixelPair { left: self.left, right: self.right }, self.sigma)
@@ -61,45 +61,45 @@ impl Match {
 /// The result of [`Matcher::find`]. Every left keypoint is either in `pairs` or counted in `dropped`.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Matches {
-    /// The homologous points.
+    /// The matches.
     pub pairs: Vec<Match>,
-    /// How many left keypoints were given up, by reason.
-    pub dropped: BTreeMap<Drop, usize>,
-    /// Keypoints found in the left image.
+    /// Number of dropped left keypoints for each reason.
+    pub dropped: BTreeMap<UnmatchedReason, usize>,
+    /// Number of keypoints in the left image.
     pub left_keypoints: usize,
-    /// Keypoints found in the right image.
+    /// Number of keypoints in the right image.
     pub right_keypoints: usize,
 }
 
 /// Why a left keypoint has no match, in the order of the tests.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 #[non_exhaustive]
-pub enum Drop {
-    /// No right keypoint lies in the epipolar band, or none looks alike.
+pub enum UnmatchedReason {
+    /// No right keypoint lies in the epipolar band, or none is similar enough.
     NoCandidate,
-    /// Two distinct places in the right image look about equally alike.
+    /// Two distinct positions in the right image are about equally similar.
     Ratio,
-    /// The right keypoint prefers another left keypoint.
+    /// The right keypoint is more similar to another left keypoint.
     NotMutual,
     /// Registration did not converge, moved too far or left the field.
     NotRefined,
     /// The registered patches differ in more than gain and bias.
     LowCorrelation,
-    /// The texture does not fix the position well enough.
+    /// The texture does not determine the position well enough.
     Uncertain,
     /// Registration back from right to left ends elsewhere.
     NotReversible,
     /// The registered position is off the epipolar curve or nearer than the nearest range.
     Epipolar,
-    /// A view shows the same elsewhere along the row.
+    /// A view shows the same pattern again along the row.
     Repeated,
     /// No neighbours support the disparity.
     Isolated,
-    /// Another match has the same place.
+    /// A better match is at the same position.
     Duplicate,
 }
 
-impl Drop {
+impl UnmatchedReason {
     /// The reason in snake case, for reports.
     #[must_use]
     pub const fn as_str(self) -> &'static str {
@@ -119,14 +119,14 @@ impl Drop {
     }
 }
 
-/// Why a pair cannot be matched.
+/// Why a pair of images cannot be matched.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum MatchError {
     /// An image has no pixels.
     #[error("the {0} image is empty")]
     EmptyImage(Side),
-    /// An image is not of its camera's size.
+    /// An image does not have the size that its camera is calibrated for.
     #[error(
         "the {side} image is {} x {}, its camera is calibrated for {} x {}",
         image.width, image.height, camera.width, camera.height
@@ -139,25 +139,25 @@ pub enum MatchError {
         /// The camera's size.
         camera: ImageSize,
     },
-    /// The cameras are at the same place, or the pose is not finite: there are no epipolar curves.
+    /// There are no epipolar curves: the cameras are at the same position, or the pose is not finite.
     #[error("the pose has no baseline: the two cameras must be apart")]
     NoBaseline,
-    /// The nearest range is not positive and finite.
+    /// [`ImagePair::nearest`] is not positive and finite.
     #[error("the nearest range is {0}, it must be positive")]
     Nearest(Length),
-    /// The uncertainty of the pose is negative or not finite.
+    /// [`ImagePair::pose_sigma`] is negative or not finite.
     #[error("the pose's sigma is {0}, it must be zero or positive")]
     PoseSigma(Angle),
-    /// No direction is seen by both cameras.
+    /// The fields of view of the cameras do not overlap.
     #[error("the two cameras share no field of view")]
     NoSharedField,
     /// A network failed.
     #[error(transparent)]
-    Network(#[from] crate::learned::NetworkError),
+    Network(#[from] crate::learned::network::NetworkError),
 }
 
 impl ImagePair<'_> {
-    /// Checks what can be told without looking at the images' content.
+    /// Checks sizes, range and uncertainty, without looking at the images' content.
     pub(crate) fn check(&self) -> Result<(), MatchError> {
         for (side, image, camera) in
             [(Side::Left, self.left, self.left_camera), (Side::Right, self.right, self.right_camera)]

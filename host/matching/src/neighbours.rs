@@ -1,40 +1,42 @@
-//! Agreement of a match with the matches around it.
+//! The test of a match against the matches around it.
 //!
-//! Two points of one opaque surface differ in disparity by less than they are apart: the disparity gradient limit
-//! (S. Pollard, J. Mayhew and J. Frisby, "PMF: a stereo correspondence algorithm using a disparity gradient limit",
-//! Perception 14, 1985). A wrong match rarely finds neighbours within it, a point of a thin object finds some.
+//! Two points of one opaque surface differ in disparity by less than their distance in the image: the disparity
+//! gradient limit (S. Pollard, J. Mayhew and J. Frisby, "PMF: a stereo correspondence algorithm using a disparity
+//! gradient limit", Perception 14, 1985). A wrong match rarely has neighbours within this limit; a point of a thin
+//! object has some.
 
 use rayon::prelude::*;
 
 use crate::ViewPixel;
 
-/// How many of the nearest matches are asked.
+/// Number of nearest matches compared.
 const NEAREST: usize = 8;
-/// How many of them must agree.
+/// Number of them that must agree.
 const SUPPORT: usize = 2;
-/// Largest change of disparity per distance.
+/// Largest change of disparity per distance in the view.
 const GRADIENT_LIMIT: f64 = 0.3;
-/// Disparities differing by no more than this many standard deviations agree at any distance.
+/// Disparities that differ by up to this many standard deviations agree at any distance.
 const ALWAYS_AGREE_SIGMAS: f64 = 1.65;
-/// Two matches within this distance show one point, in pixels.
+/// Matches within this distance, in pixels of the view, are of one point.
 const SAME_POINT: f64 = 2.0;
 
-/// A match as its neighbours see it.
+/// A match with its disparity in pixels of the view.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Placed {
+pub(crate) struct PlacedMatch {
     pub left: ViewPixel,
     pub disparity: f64,
     pub score: f64,
     pub sigma: f64,
 }
 
-/// Whether enough of the nearest other points agree with each match.
-pub(crate) fn supported(matches: &[Placed]) -> Vec<bool> {
+/// Whether each match has enough agreeing neighbours.
+pub(crate) fn supported(matches: &[PlacedMatch]) -> Vec<bool> {
     matches.par_iter().map(|one| support(one, matches) >= SUPPORT).collect()
 }
 
-/// Whether each match has the same place as a better one: better known, or else more alike; of equals, the earlier.
-pub(crate) fn duplicated(matches: &[Placed]) -> Vec<bool> {
+/// Whether each match is at the position of a better one. Better is the smaller standard deviation, then the higher
+/// score, then the lower index.
+pub(crate) fn duplicated(matches: &[PlacedMatch]) -> Vec<bool> {
     let better = |i: usize, j: usize| {
         let (p, q) = (&matches[i], &matches[j]);
         distance_squared(p, q) < SAME_POINT * SAME_POINT
@@ -43,9 +45,9 @@ pub(crate) fn duplicated(matches: &[Placed]) -> Vec<bool> {
     (0..matches.len()).into_par_iter().map(|i| (0..matches.len()).any(|j| better(i, j))).collect()
 }
 
-fn support(one: &Placed, matches: &[Placed]) -> usize {
-    let change = |other: &Placed| (other.disparity - one.disparity).abs();
-    let mut nearest: Vec<(f64, &Placed)> = matches
+fn support(one: &PlacedMatch, matches: &[PlacedMatch]) -> usize {
+    let change = |other: &PlacedMatch| (other.disparity - one.disparity).abs();
+    let mut nearest: Vec<(f64, &PlacedMatch)> = matches
         .iter()
         .map(|other| (distance_squared(one, other), other))
         .filter(|(squared, _)| *squared >= SAME_POINT * SAME_POINT)
@@ -54,13 +56,13 @@ fn support(one: &Placed, matches: &[Placed]) -> usize {
         nearest.select_nth_unstable_by(NEAREST, |p, q| p.0.total_cmp(&q.0).then(change(p.1).total_cmp(&change(q.1))));
         nearest.truncate(NEAREST);
     }
-    let agrees = |&(squared, other): &(f64, &Placed)| {
+    let agrees = |&(squared, other): &(f64, &PlacedMatch)| {
         let noise = ALWAYS_AGREE_SIGMAS * one.sigma.hypot(other.sigma);
         change(other) <= noise.max(GRADIENT_LIMIT * squared.sqrt())
     };
     nearest.into_iter().filter(agrees).count()
 }
 
-fn distance_squared(p: &Placed, q: &Placed) -> f64 {
+fn distance_squared(p: &PlacedMatch, q: &PlacedMatch) -> f64 {
     (p.left.x - q.left.x).powi(2) + (p.left.y - q.left.y).powi(2)
 }

@@ -1,8 +1,8 @@
-//! A brightness image in floating point, its smoothing and its pyramid.
+//! Brightness images in floating point, their smoothing and their pyramids.
 
 use rayon::prelude::*;
 
-/// Values by rows, sampled at whole positions from (0, 0).
+/// An image of one floating-point value per pixel, by rows.
 #[derive(Clone, Debug)]
 pub(crate) struct Plane {
     width: usize,
@@ -36,14 +36,14 @@ impl Plane {
         self.values[y * self.width + x]
     }
 
-    /// A plane of the same size whose row y is filled in by `fill(y, row)`.
+    /// Makes a plane of the same size whose row y is filled by `fill(y, row)`, starting from zeros.
     pub(crate) fn like(&self, fill: impl Fn(usize, &mut [f32]) + Sync) -> Self {
         let mut values = vec![0.0; self.values.len()];
         values.par_chunks_mut(self.width).enumerate().for_each(|(y, row)| fill(y, row));
         Self { width: self.width, height: self.height, values }
     }
 
-    /// Convolved with a Gaussian of `sigma` pixels, the border repeated.
+    /// Convolves with a Gaussian of `sigma` pixels; the border is repeated outwards.
     pub(crate) fn blurred(&self, sigma: f32) -> Self {
         let kernel = gaussian(sigma);
         let radius = kernel.len() / 2;
@@ -63,16 +63,18 @@ impl Plane {
         })
     }
 
-    /// Every second pixel of every second row: position (x, y) comes from (2x, 2y).
+    /// Takes every second pixel of every second row: position (x, y) comes from (2x, 2y).
     fn decimated(&self) -> Self {
         let (width, height) = (self.width.div_ceil(2), self.height.div_ceil(2));
         let values = (0..height).flat_map(|y| self.row(2 * y).iter().step_by(2).copied()).collect();
         Self { width, height, values }
     }
 
-    /// The values between pixels by cubic convolution, along a row at the columns x, x + step and so on, with a step above 0;
-    /// `None` where one is within a pixel of the border or outside, where they spread over more than 45 pixels, and over more
-    /// than 27 in a plane narrower than 48.
+    /// Interpolates `N` values in row y, at the columns x, x + step and so on, by cubic convolution. The step is
+    /// positive.
+    ///
+    /// `None` where a position is within a pixel of the border or outside, where the positions spread over more than 45
+    /// pixels, and where they spread over more than 27 pixels in a plane narrower than 48.
     #[inline(always)]
     pub(crate) fn sample_row<const N: usize>(&self, x: f64, step: f64, y: f64) -> Option<[f32; N]> {
         let inside = |x: f64, n: usize| x >= 1.0 && x < n as f64 - 2.0;
@@ -80,11 +82,11 @@ impl Plane {
         if !(step > 0.0 && inside(y, self.height) && inside(x, self.width) && inside(last, self.width)) {
             return None;
         }
-        // Nearly all are near each other, and fewer pixels are faster.
+        // Most calls span few pixels, and the shorter span is faster.
         if last - x < 27.0 { self.sample_within::<N, 32>(x, step, y) } else { self.sample_within::<N, 48>(x, step, y) }
     }
 
-    /// The same within `SPAN` pixels of a row; all places are inside.
+    /// The loop of [`Self::sample_row`] within `SPAN` pixels of a row; all positions are inside the plane.
     #[inline(always)]
     fn sample_within<const N: usize, const SPAN: usize>(&self, x: f64, step: f64, y: f64) -> Option<[f32; N]> {
         let first = (x as usize - 1).min(self.width.checked_sub(SPAN)?);
@@ -98,8 +100,8 @@ impl Plane {
         for i in 0..SPAN {
             mixed[i] = wy[0] * lines[0][i] + wy[1] * lines[1][i] + wy[2] * lines[2][i] + wy[3] * lines[3][i];
         }
-        // Places as whole numbers, rounded down and so never beyond the last: their parts are had without a conversion that
-        // must look out for what is too large.
+        // Positions in fixed point, rounded down and so never beyond the last: splitting them needs no saturating
+        // conversion.
         const FRACTION: u32 = 25;
         let fixed = |length: f64| (length * f64::from(1 << FRACTION)) as u32;
         let (start, step) = (fixed(x - first as f64), fixed(step));
@@ -130,19 +132,19 @@ impl Plane {
     }
 }
 
-/// Smoothed planes at resolutions halved from one to the next: position x of level l is 2^l x of level 0.
+/// Smoothed planes of halved resolutions: position x of level l is 2^l x of level 0.
 #[derive(Clone, Debug)]
 pub(crate) struct Pyramid {
     levels: Vec<Plane>,
 }
 
 impl Pyramid {
-    /// Smoothing of each level, in its own pixels: enough for halving to lose little and for derivatives to be smooth.
+    /// Smoothing of each level in its own pixels, enough for halving without aliasing and for smooth derivatives.
     const SIGMA: f32 = 1.0;
-    /// A level smaller than this has no room for a descriptor.
+    /// Smallest side of a level, which has room for a descriptor.
     const SMALLEST: usize = 32;
 
-    /// At most `levels` levels of `plane`, fewer where it is small.
+    /// Makes at most `levels` levels of `plane`, fewer where it is small.
     pub(crate) fn new(plane: &Plane, levels: usize) -> Self {
         let mut pyramid: Vec<Plane> = Vec::with_capacity(levels);
         while pyramid.len() < levels {
@@ -156,20 +158,21 @@ impl Pyramid {
         Self { levels: pyramid }
     }
 
-    /// Finest first.
+    /// The levels, finest first.
     pub(crate) fn levels(&self) -> &[Plane] {
         &self.levels
     }
 }
 
-/// Weights of the four pixels around a position `t` past the second of them (Keys 1981, a = −1/2).
+/// Weights of the four pixels around a position `t` past the second of them, by cubic convolution (Keys 1981, a =
+/// −1/2).
 #[inline(always)]
 pub(crate) fn cubic_weights(t: f32) -> [f32; 4] {
     let (t2, t3) = (t * t, t * t * t);
     [0.5 * (2.0 * t2 - t3 - t), 0.5 * (3.0 * t3 - 5.0 * t2 + 2.0), 0.5 * (4.0 * t2 - 3.0 * t3 + t), 0.5 * (t3 - t2)]
 }
 
-/// A normalised Gaussian cut at three sigma.
+/// The weights of a normalised Gaussian, cut off at three sigma.
 fn gaussian(sigma: f32) -> Vec<f32> {
     let radius = (3.0 * sigma).ceil() as i32;
     let weights: Vec<f32> = (-radius..=radius).map(|i| (-0.5 * (i as f32 / sigma).powi(2)).exp()).collect();
@@ -186,7 +189,7 @@ mod tests {
     const SIZE: usize = 70;
 
     proptest! {
-        /// Against the sum over the sixteen pixels around each place.
+        /// Compares with the sum over the sixteen pixels around each position.
         #[test]
         fn a_row_is_sampled_as_its_places_are(
             seed in 0u64..1000, x in 0.0..60.0f64, y in 0.0..70.0f64, step in 0.3..2.6f64,

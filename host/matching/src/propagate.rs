@@ -1,9 +1,9 @@
-//! Partners where the matches around say they are.
+//! Propagation of matches: partners of unmatched keypoints, predicted from the matches around them.
 //!
-//! A keypoint of the left view whose partner was not found among the keypoints of the right one is mostly there all the same:
-//! two views of one surface share less than half of their best keypoints. Its neighbours that have partners say about where,
-//! and registration finds the place (M. Lhuillier and L. Quan, "Match propagation for image-based modeling and rendering",
-//! PAMI 24(8), 2002). What is found passes the tests that every registered match passes.
+//! Two views of one surface share less than half of their best keypoints, so the partner of a left keypoint is often
+//! visible in the right view without being a keypoint there. The displacements of matched neighbours predict it, and
+//! registration finds the position (M. Lhuillier and L. Quan, "Match propagation for image-based modeling and
+//! rendering", PAMI 24(8), 2002). The results pass the tests of every registered match.
 
 use rayon::prelude::*;
 
@@ -12,31 +12,31 @@ use crate::corners::Keypoint;
 use crate::epipolar_band::EpipolarBand;
 use crate::guided::LEVELS;
 use crate::links::{Compared, Link, Links, Rows, registered};
-use crate::matcher::Drop;
+use crate::matcher::UnmatchedReason;
 
-/// How often what was found serves as a neighbour of what was not.
+/// Number of rounds, each of which uses the matches found in the one before.
 const ROUNDS: usize = 3;
-/// How many neighbours are asked.
+/// Number of nearest matches that predict a displacement.
 const NEIGHBOURS: usize = 4;
-/// Neighbours whose displacements differ by less say the same, in pixels of the view.
+/// Displacements that differ by less than this, in pixels of the view, are tried once.
 const SAME_GUESS: f64 = 2.0;
 
-/// A match that says to its neighbours where their partners are.
-struct Known {
+/// A match whose displacement predicts those of its neighbours.
+struct KnownMatch {
     at: ViewPixel,
-    /// From the left to the right view.
+    /// Displacement from the left to the right view, in pixels of the view.
     moved: [f64; 2],
-    /// Whether nobody has asked it yet.
+    /// Whether it was found in the latest round and not used yet.
     fresh: bool,
 }
 
-/// Seeks partners for the keypoints that have none, from the links there are, of which nearly all must be right.
+/// Searches partners for the keypoints without one. Nearly all existing `links` must be right.
 pub(crate) fn propagate(links: &mut Links, compared: &Compared<'_>, rows: &Rows<'_>, band: &EpipolarBand) {
     let mut known = Vec::new();
     learn(&mut known, links, compared.keypoints);
     for _ in 0..ROUNDS {
-        let seek = |(link, keypoint): (&Result<Link, Drop>, &Keypoint)| match link {
-            Ok(_) => Err(Drop::Duplicate),
+        let seek = |(link, keypoint): (&Result<Link, UnmatchedReason>, &Keypoint)| match link {
+            Ok(_) => Err(UnmatchedReason::Duplicate),
             Err(_) => partner(keypoint.at, &known, compared, band),
         };
         let mut found: Links = links.par_iter().zip(compared.keypoints).map(seek).collect();
@@ -49,26 +49,31 @@ pub(crate) fn propagate(links: &mut Links, compared: &Compared<'_>, rows: &Rows<
     }
 }
 
-fn learn(known: &mut Vec<Known>, links: &Links, keypoints: &[Keypoint]) {
-    let told = |(link, keypoint): (&Result<Link, Drop>, &Keypoint)| {
+fn learn(known: &mut Vec<KnownMatch>, links: &Links, keypoints: &[Keypoint]) {
+    let told = |(link, keypoint): (&Result<Link, UnmatchedReason>, &Keypoint)| {
         let (at, right) = (keypoint.at, link.as_ref().ok()?.right);
-        Some(Known { at, moved: [right.x - at.x, right.y - at.y], fresh: true })
+        Some(KnownMatch { at, moved: [right.x - at.x, right.y - at.y], fresh: true })
     };
     known.extend(links.iter().zip(keypoints).filter_map(told));
 }
 
-/// The best of the partners that the nearest of `known` lead to, as far as they were not asked before.
-fn partner(at: ViewPixel, known: &[Known], compared: &Compared<'_>, band: &EpipolarBand) -> Result<Link, Drop> {
+/// The best partner that the displacements of the nearest fresh matches of `known` lead to.
+fn partner(
+    at: ViewPixel,
+    known: &[KnownMatch],
+    compared: &Compared<'_>,
+    band: &EpipolarBand,
+) -> Result<Link, UnmatchedReason> {
     let tried = guesses(at, known).into_iter().filter_map(|[dx, dy]| {
         registered(compared, at, ViewPixel { x: at.x + dx, y: at.y + dy }, LEVELS - 1, band).ok()
     });
-    tried.max_by(|p, q| p.score.total_cmp(&q.score)).ok_or(Drop::NotRefined)
+    tried.max_by(|p, q| p.score.total_cmp(&q.score)).ok_or(UnmatchedReason::NotRefined)
 }
 
-/// By how much the nearest of `known` moved, nearest first, each only once.
-fn guesses(at: ViewPixel, known: &[Known]) -> Vec<[f64; 2]> {
+/// The displacements of the nearest fresh matches of `known`, nearest first, similar ones only once.
+fn guesses(at: ViewPixel, known: &[KnownMatch]) -> Vec<[f64; 2]> {
     let mut guesses: Vec<(bool, [f64; 2])> = Vec::with_capacity(NEIGHBOURS);
-    for Known { moved, fresh, .. } in nearest(at, known) {
+    for KnownMatch { moved, fresh, .. } in nearest(at, known) {
         if guesses.iter().all(|(_, other)| (other[0] - moved[0]).hypot(other[1] - moved[1]) >= SAME_GUESS) {
             guesses.push((*fresh, *moved));
         }
@@ -76,9 +81,9 @@ fn guesses(at: ViewPixel, known: &[Known]) -> Vec<[f64; 2]> {
     guesses.into_iter().filter(|(fresh, _)| *fresh).map(|(_, moved)| moved).collect()
 }
 
-/// So many of `known` as are asked, nearest first; of equally near ones the earlier.
-fn nearest(at: ViewPixel, known: &[Known]) -> impl Iterator<Item = &Known> {
-    let mut near: Vec<(f64, &Known)> = Vec::with_capacity(NEIGHBOURS + 1);
+/// The [`NEIGHBOURS`] nearest of `known`, nearest first; of equally near ones the earlier.
+fn nearest(at: ViewPixel, known: &[KnownMatch]) -> impl Iterator<Item = &KnownMatch> {
+    let mut near: Vec<(f64, &KnownMatch)> = Vec::with_capacity(NEIGHBOURS + 1);
     for known in known {
         let squared = (known.at.x - at.x).powi(2) + (known.at.y - at.y).powi(2);
         if near.get(NEIGHBOURS - 1).is_none_or(|(farthest, _)| squared < *farthest) {
@@ -98,12 +103,12 @@ mod tests {
     use crate::{Grid, SharedFrame};
 
     const SIZE: usize = 256;
-    /// Every surface point is so many pixels further left in the right view.
+    /// Displacement of every surface point to the left in the right view, in pixels.
     const DISPARITY: usize = 13;
-    /// From this row on the right view shows something else.
+    /// First row from which the right view shows another surface.
     const HIDDEN: usize = 170;
 
-    /// Blurred noise, which is the same nowhere else.
+    /// Blurred noise without repetitions.
     fn noise(mut state: u32) -> Plane {
         let mut next = || {
             // Numerical Recipes, 2nd ed., §7.1.
@@ -125,7 +130,7 @@ mod tests {
     }
 
     #[test]
-    fn one_match_leads_to_the_partners_of_all_that_is_seen_twice_and_to_no_others() {
+    fn one_match_propagates_over_the_common_surface_only() {
         let (seen, other) = (noise(1), noise(2));
         let moved = other.like(|y, row| {
             let from = if y < HIDDEN { seen.row(y) } else { other.row(y) };
@@ -137,12 +142,12 @@ mod tests {
         let keypoints: Vec<Keypoint> =
             (0..9).flat_map(|j| (0..9).map(move |i| Keypoint { at: at(i, j), level: 0 })).collect();
         let compared = Compared { left: &left, right: &right, keypoints: &keypoints };
-        let mut links: Links = vec![Err(Drop::NoCandidate); keypoints.len()];
+        let mut links: Links = vec![Err(UnmatchedReason::NoCandidate); keypoints.len()];
         let first = keypoints[12].at;
         links[12] = Ok(Link { right: ViewPixel { x: first.x - disparity + 1.0, y: first.y }, score: 1.0, sigma: 0.3 });
         propagate(&mut links, &compared, &Rows::of(&compared), &band());
 
-        // As far as the window of the coarsest level reaches.
+        // Rows whose window of the coarsest level shows the same surface in both views.
         let seen_twice = |keypoint: &Keypoint| keypoint.at.y < HIDDEN as f64 - 36.0;
         let (mut found, mut all) = (0, 0);
         for (i, (link, keypoint)) in links.iter().zip(&keypoints).enumerate().filter(|(i, _)| *i != 12) {
@@ -150,7 +155,7 @@ mod tests {
             let link = match link {
                 Ok(link) => link,
                 Err(reason) => {
-                    assert_eq!(*reason, Drop::NoCandidate, "the first reason stays");
+                    assert_eq!(*reason, UnmatchedReason::NoCandidate, "the first reason stays");
                     continue;
                 }
             };

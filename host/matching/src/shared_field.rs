@@ -1,25 +1,25 @@
-//! What both cameras of a pair see.
+//! The field of view that both cameras of a pair share.
 
 use nalgebra::{Rotation3, Vector3};
 use rayon::prelude::*;
 use vergence_vision::{Angle, Frame, KannalaBrandt, Left, Length, Pixel, Right, Transform, UnitRay};
 
 use crate::epipolar_band::EpipolarBand;
-use crate::view::direction;
-use crate::{ImagePair, Shared, SharedFrame};
+use crate::grid::{Extent, direction};
+use crate::{Grid, ImagePair, Shared, SharedFrame};
 
-/// Largest |a|: nearer the baseline than 15° disparity says little about range.
+/// Largest |a|: within 15° of the baseline disparity says little about range.
 const A_LIMIT: Angle = Angle::from_deg(75.0);
 /// Largest |b|: a field of 196° ends there for parallel axes.
 const B_LIMIT: Angle = Angle::from_deg(105.0);
-/// The outermost ring of the lens, vignetted and least well calibrated.
+/// Width of the outermost ring of the field, which is vignetted and least well calibrated, and left out.
 const RIM: Angle = Angle::from_deg(1.5);
-/// Besides infinity, the range at which the other camera must see a direction for it to be compared.
+/// A direction is compared if the other camera sees it at infinity or at this range.
 pub(crate) const NEAR: Length = Length::from_mm(1000.0);
-/// A field widened for an uncertain pose is widened by no more than this.
+/// Largest widening of the field for an uncertain pose.
 const MOST_SLACK: Angle = Angle::from_deg(10.0);
 
-/// Which directions of each view are worth comparing.
+/// The directions of each view that are compared.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct SharedField<'a> {
     left: Field<'a, Left>,
@@ -28,7 +28,7 @@ pub(crate) struct SharedField<'a> {
 }
 
 impl<'a> SharedField<'a> {
-    /// For a pose known exactly.
+    /// The shared field for a pose known exactly.
     pub(crate) fn new(frame: &SharedFrame, left: &'a KannalaBrandt, right: &'a KannalaBrandt) -> Self {
         Self {
             left: Field::new(left, frame.shared_from_left()),
@@ -37,37 +37,76 @@ impl<'a> SharedField<'a> {
         }
     }
 
-    /// As far as the uncertain pose of `pair` lets one tell.
+    /// The shared field of `pair`, widened for the uncertainty of its pose.
     pub(crate) fn of(frame: &SharedFrame, pair: &ImagePair<'a>) -> Self {
         let slack = Angle::from_rad((EpipolarBand::SIGMAS * pair.pose_sigma.rad()).min(MOST_SLACK.rad()));
         let Self { left, right, baseline } = Self::new(frame, pair.left_camera, pair.right_camera);
         Self { left: Field { slack, ..left }, right: Field { slack, ..right }, baseline }
     }
 
-    /// Whether the left camera sees a bearing and the right camera may see it too, at infinity or at 1 m.
+    /// Whether the left camera sees a bearing and the right camera may see it at infinity or at 1 m.
     pub(crate) fn seen_from_left(&self, bearing: &UnitRay<Shared>) -> bool {
         self.left.sees(bearing) && self.parallax_ends(bearing, -1.0).any(|other| self.right.may_see(&other))
     }
 
-    /// The same for a bearing of the right camera.
+    /// Whether the right camera sees a bearing and the left camera may see it at infinity or at 1 m.
     pub(crate) fn seen_from_right(&self, bearing: &UnitRay<Shared>) -> bool {
         self.right.sees(bearing) && self.parallax_ends(bearing, 1.0).any(|other| self.left.may_see(&other))
     }
 
-    /// The bearings, from a camera displaced by `side` baselines along x, of the point at infinity and the one at 1 m.
+    /// Finds the bounds of the field on a grid of one degree, and widens them by one degree.
+    pub(crate) fn extent(&self) -> Option<Extent> {
+        let (a_limit, b_limit) = (A_LIMIT.deg() as i32, B_LIMIT.deg() as i32);
+        let compared = |&(a, b): &(i32, i32)| {
+            let d = direction(f64::from(a).to_radians(), f64::from(b).to_radians());
+            UnitRay::new(d).is_some_and(|bearing| self.seen_from_left(&bearing) || self.seen_from_right(&bearing))
+        };
+        let bounds = (-a_limit..=a_limit)
+            .into_par_iter()
+            .flat_map_iter(|a| (-b_limit..=b_limit).map(move |b| (a, b)))
+            .filter(compared)
+            .map(|(a, b)| [a, a, b, b])
+            .reduce_with(|m, n| [m[0].min(n[0]), m[1].max(n[1]), m[2].min(n[2]), m[3].max(n[3])])?;
+        let within = |degrees: i32, limit: i32| f64::from(degrees.clamp(-limit, limit)).to_radians();
+        Some(Extent {
+            a_min: within(bounds[0] - 1, a_limit),
+            a_max: within(bounds[1] + 1, a_limit),
+            b_min: within(bounds[2] - 1, b_limit),
+            b_max: within(bounds[3] + 1, b_limit),
+        })
+    }
+
+    /// The bearings of the points at infinity and at 1 m, from a camera displaced by `side` baselines along x.
     fn parallax_ends(&self, bearing: &UnitRay<Shared>, side: f64) -> impl Iterator<Item = UnitRay<Shared>> {
         let offset = Vector3::x() * (side * self.baseline.mm());
         [Some(*bearing), UnitRay::new(bearing.at(NEAR.mm()).mm() + offset)].into_iter().flatten()
     }
 }
 
-/// What one camera sees of the shared directions.
+impl Grid {
+    /// Makes the grid over the field that both cameras share (at infinity or 1 m), within ±75° of a and ±105° of b.
+    ///
+    /// Its density is that of the denser lens at its axis times `oversampling`, or less where a side would exceed 4096
+    /// pixels. `None` where the fields do not overlap or `oversampling` is not positive.
+    #[must_use]
+    pub fn covering(
+        frame: &SharedFrame,
+        left: &KannalaBrandt,
+        right: &KannalaBrandt,
+        oversampling: f64,
+    ) -> Option<Self> {
+        let field = SharedField::new(frame, left, right);
+        Self::over(&field.extent()?, left.k()[0].max(right.k()[0]) * oversampling)
+    }
+}
+
+/// The field of view of one camera in the shared axes.
 #[derive(Clone, Copy, Debug)]
 struct Field<'a, F: Frame> {
     camera: &'a KannalaBrandt,
     from_shared: Transform<F, Shared>,
     inside: Inside,
-    /// How far off the camera's axis may be.
+    /// Possible error of the direction of the camera's axis.
     slack: Angle,
 }
 
@@ -81,7 +120,7 @@ impl<'a, F: Frame> Field<'a, F> {
         self.shows(&(self.from_shared * *bearing))
     }
 
-    /// Whether it sees a bearing, or would if it were turned by the slack.
+    /// Whether the camera sees a bearing, or would see it when turned by the slack.
     fn may_see(&self, bearing: &UnitRay<Shared>) -> bool {
         let ray = self.from_shared * *bearing;
         let towards_axis = || {
@@ -96,39 +135,8 @@ impl<'a, F: Frame> Field<'a, F> {
     }
 }
 
-/// Ranges of a and b, in radians.
-pub(crate) struct Extent {
-    pub a_min: f64,
-    pub a_max: f64,
-    pub b_min: f64,
-    pub b_max: f64,
-}
-
-impl Extent {
-    /// The bounds of what the cameras share, found on a grid of one degree and widened by that degree.
-    pub(crate) fn of(field: &SharedField<'_>) -> Option<Self> {
-        let (a_limit, b_limit) = (A_LIMIT.deg() as i32, B_LIMIT.deg() as i32);
-        let compared = |&(a, b): &(i32, i32)| {
-            let d = direction(f64::from(a).to_radians(), f64::from(b).to_radians());
-            UnitRay::new(d).is_some_and(|bearing| field.seen_from_left(&bearing) || field.seen_from_right(&bearing))
-        };
-        let bounds = (-a_limit..=a_limit)
-            .into_par_iter()
-            .flat_map_iter(|a| (-b_limit..=b_limit).map(move |b| (a, b)))
-            .filter(compared)
-            .map(|(a, b)| [a, a, b, b])
-            .reduce_with(|m, n| [m[0].min(n[0]), m[1].max(n[1]), m[2].min(n[2]), m[3].max(n[3])])?;
-        let within = |degrees: i32, limit: i32| f64::from(degrees.clamp(-limit, limit)).to_radians();
-        Some(Self {
-            a_min: within(bounds[0] - 1, a_limit),
-            a_max: within(bounds[1] + 1, a_limit),
-            b_min: within(bounds[2] - 1, b_limit),
-            b_max: within(bounds[3] + 1, b_limit),
-        })
-    }
-}
-
-/// What of an image is looked at: not the rim, nor what is so near the sensor's border that interpolation would read beyond it.
+/// The part of an image that is used: without the rim of the field, and without the sensor's border, where
+/// interpolation would read beyond it.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Inside {
     least_z: f64,
@@ -145,7 +153,7 @@ impl Inside {
         Self { least_z: (camera.theta_max() - RIM).rad().cos(), most_u: most(size.width), most_v: most(size.height) }
     }
 
-    /// Whether a pixel is, whose unit ray has this z.
+    /// Whether `pixel`, whose unit ray has this `z`, is in the part that is used.
     pub(crate) fn contains(&self, z: f64, pixel: &Pixel) -> bool {
         let within = |x: f64, most: f64| x >= Self::BORDER && x < most;
         z >= self.least_z && within(pixel.u, self.most_u) && within(pixel.v, self.most_v)

@@ -1,15 +1,17 @@
-//! The direction both cameras are turned to before their images are compared.
+//! The shared axes of a pair, in which both images are compared.
 
 use nalgebra::{Matrix3, Rotation3, UnitQuaternion, Vector3};
 use vergence_vision::{Frame, Left, Length, Right, Transform};
 
-/// The shared axes of a pair: x along the baseline from the left to the right camera, z along the mean of the optical
-/// axes as far as it is orthogonal to x, y = z × x. Each camera is its own origin.
+/// The frame of the shared axes of a pair.
+///
+/// x points along the baseline from the left to the right camera, z along the component of the mean optical axis that
+/// is orthogonal to x, and y = z × x. Each camera is its own origin.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Shared;
 impl Frame for Shared {}
 
-/// How both cameras are turned into the [`Shared`] axes, and how far apart they are.
+/// The rotations of both cameras to the [`Shared`] axes, and the baseline.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SharedFrame {
     shared_from_left: Transform<Shared, Left>,
@@ -18,10 +20,11 @@ pub struct SharedFrame {
 }
 
 impl SharedFrame {
-    /// The shared axes of two cameras; `None` without a baseline (coinciding cameras or a pose that is not finite).
+    /// Computes the shared axes of two cameras; `None` without a baseline (coinciding cameras or a pose that is not
+    /// finite).
     ///
     /// Where the optical axes cancel or run along the baseline, z is taken orthogonal to the cameras' down axes
-    /// instead: any direction orthogonal to the baseline keeps rows epipolar.
+    /// instead. Rows are epipolar for any z orthogonal to the baseline.
     #[must_use]
     pub fn new(left_from_right: &Transform<Left, Right>) -> Option<Self> {
         let x = left_from_right.origin().direction()?.vector();
@@ -39,14 +42,14 @@ impl SharedFrame {
         })
     }
 
-    /// The left camera's turn. Its translation is zero.
+    /// The rotation of the left camera to the shared axes; its translation is zero.
     #[must_use]
     pub const fn shared_from_left(&self) -> Transform<Shared, Left> {
         self.shared_from_left
     }
 
-    /// The right camera's turn. Its translation is zero: the right camera lies at (baseline, 0, 0) of the left one's
-    /// shared axes.
+    /// The rotation of the right camera to the shared axes; its translation is zero. The right camera lies at
+    /// (baseline, 0, 0) of the left one's shared axes.
     #[must_use]
     pub const fn shared_from_right(&self) -> Transform<Shared, Right> {
         self.shared_from_right
@@ -59,9 +62,9 @@ impl SharedFrame {
     }
 }
 
-/// The part of `axis` orthogonal to the unit vector `x`, normalised; `None` where little of it remains.
+/// The normalised component of `axis` orthogonal to the unit vector `x`; `None` where it is short.
 fn orthogonal_to(x: &Vector3<f64>, axis: &Vector3<f64>) -> Option<Vector3<f64>> {
-    /// About 3° between axis and baseline: closer than that, z would follow the noise of the pose.
+    /// Sine of about 3° between axis and baseline; at smaller angles z would follow the noise of the pose.
     const LEAST: f64 = 0.05;
     (axis - x * axis.dot(x)).try_normalize(LEAST)
 }

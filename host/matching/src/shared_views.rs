@@ -1,4 +1,4 @@
-//! Both images of a pair turned into the direction that the cameras share.
+//! Both images of a pair, resampled on one grid in the shared axes.
 
 use vergence_vision::{Angle, Frame, Left, Right};
 
@@ -8,10 +8,10 @@ use crate::matcher::{ImagePair, MatchError};
 use crate::shared_field::SharedField;
 use crate::{Grid, SharedFrame, View, ViewPixel};
 
-/// Density of a view in pixels per radian that small images are enlarged to and large ones need not exceed.
+/// Default density of a view in pixels per radian: small images are enlarged to it.
 const DENSITY: f64 = 450.0;
 
-/// The two views of a pair on one grid, and what of them is worth comparing.
+/// The two views of a pair on one grid, with the field that both cameras share.
 pub(crate) struct SharedViews<'a> {
     pub frame: SharedFrame,
     pub grid: Grid,
@@ -22,17 +22,20 @@ pub(crate) struct SharedViews<'a> {
 }
 
 impl<'a> SharedViews<'a> {
-    /// The views of a pair, with `oversampling` pixels for each of the denser fisheye image, from 1 to 2. `None` takes what
-    /// makes 450 pixels per radian.
+    /// Resamples both images with `oversampling` pixels of the view per pixel of the denser fisheye image, from 1 to 2.
+    /// `None` takes the value that gives 450 pixels per radian.
     ///
     /// # Errors
-    /// Where the pair has no baseline or shares no field.
+    /// [`MatchError::NoBaseline`] or [`MatchError::NoSharedField`].
     pub(crate) fn of(pair: &'a ImagePair<'a>, oversampling: Option<f64>) -> Result<Self, MatchError> {
         let frame = SharedFrame::new(&pair.left_from_right).ok_or(MatchError::NoBaseline)?;
         let density = pair.left_camera.k()[0].max(pair.right_camera.k()[0]);
         let oversampling = oversampling.filter(|o| o.is_finite()).unwrap_or(DENSITY / density).clamp(1.0, 2.0);
         let field = SharedField::of(&frame, pair);
-        let grid = Grid::over(&field, density * oversampling).ok_or(MatchError::NoSharedField)?;
+        let grid = field
+            .extent()
+            .and_then(|extent| Grid::over(&extent, density * oversampling))
+            .ok_or(MatchError::NoSharedField)?;
         Ok(Self {
             frame,
             grid,
@@ -43,30 +46,32 @@ impl<'a> SharedViews<'a> {
         })
     }
 
-    /// Where partners may lie, given how well the pose is known.
+    /// The epipolar band for the uncertainty of the pair's pose.
     pub(crate) fn band(&self) -> EpipolarBand {
         self.band_for(self.pair.pose_sigma)
     }
 
-    /// The same where the pose is known to `pose_sigma`.
+    /// The epipolar band for a standard deviation `pose_sigma` of the pose.
     pub(crate) fn band_for(&self, pose_sigma: Angle) -> EpipolarBand {
         EpipolarBand::new(self.grid, self.frame.baseline(), self.pair.nearest, pose_sigma)
     }
 
-    /// Whether the left camera sees all around a keypoint, and the right camera may see it too.
+    /// Whether a keypoint of the left view is compared: the left camera sees its surroundings, and the right camera may
+    /// see it.
     pub(crate) fn shared_from_left(&self, keypoint: &Keypoint) -> bool {
         surrounded(&self.left, keypoint)
             && self.grid.bearing(keypoint.at).is_some_and(|b| self.field.seen_from_left(&b))
     }
 
-    /// The same for a keypoint of the right view.
+    /// Whether a keypoint of the right view is compared: the right camera sees its surroundings, and the left camera
+    /// may see it.
     pub(crate) fn shared_from_right(&self, keypoint: &Keypoint) -> bool {
         surrounded(&self.right, keypoint)
             && self.grid.bearing(keypoint.at).is_some_and(|b| self.field.seen_from_right(&b))
     }
 }
 
-/// Whether the camera sees all around a keypoint: its rim would look like an edge of the scene.
+/// Whether the camera sees the surroundings of a keypoint. The rim of the field would look like an edge of the scene.
 fn surrounded<F: Frame>(view: &View<F>, keypoint: &Keypoint) -> bool {
     const MARGIN: f64 = 6.0; // of the level
     let reach = MARGIN * (1_usize << keypoint.level) as f64;

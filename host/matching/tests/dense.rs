@@ -1,7 +1,7 @@
-//! A range for every pixel, against the exact truth of the simulator's room, and laws that hold without any truth.
+//! Dense ranges against the exact truth of the simulator's room, and laws that need no truth.
 //!
 //! `VERGENCE_SIDE=1280 cargo test --release -p vergence-matching --test dense -- --nocapture` prints the figures of
-//! docs/measured.md.
+//! docs/measured/dense.md.
 #![allow(clippy::unwrap_used, reason = "a test that cannot be set up fails")]
 
 mod common;
@@ -18,9 +18,9 @@ use vergence_vision::{Angle, Camera, ImageSize, KannalaBrandt, Left, Length, Pix
 
 /// The bench's baseline in human mode.
 const BASELINE_MM: f64 = 145.0;
-/// A window whose grey levels spread by this standard deviation is textured: some four times the sensor's noise.
+/// Smallest standard deviation of grey levels in a textured window: some four times the sensor's noise.
 const TEXTURED: f64 = 4.0;
-/// What the prediction before any picture assumes of a matched position, in pixels of each image.
+/// Standard deviation of a matched position that the prediction assumes, in pixels of each image.
 const PIXEL_SIGMA: f64 = 0.2;
 
 /// The bench in human mode in the furnished room.
@@ -32,7 +32,7 @@ struct Human {
 }
 
 impl Human {
-    /// With images of `side` pixels; the lens is the bench's, in proportion.
+    /// Renders images of `side` pixels; the lens is the bench's, in proportion.
     fn new(side: u32) -> Self {
         let f = 366.0 * f64::from(side) / 1280.0;
         let centre = f64::from(side) / 2.0 - 0.5;
@@ -67,8 +67,7 @@ impl Human {
         }
     }
 
-    /// The true range of a left pixel, and the relative sigma to be expected there before any picture is taken; `None`
-    /// where not both lenses see it.
+    /// The true range of a left pixel, and its predicted relative sigma; `None` where not both lenses see it.
     fn expected(&self, x: u32, y: u32) -> Option<(f64, f64)> {
         let truth = self.photographs[0].range.at(x, y)?.mm();
         let point = self.camera.unproject::<Left>(Pixel { u: x.into(), v: y.into() }).ok()?.at(truth);
@@ -93,7 +92,7 @@ fn contrast(image: &GrayImage, x: u32, y: u32) -> f64 {
     (squares / count - (sum / count) * (sum / count)).max(0.0).sqrt()
 }
 
-/// A share and of how many.
+/// A number of good cases and the number of all.
 #[derive(Clone, Copy, Debug, Default)]
 struct Share {
     good: usize,
@@ -111,15 +110,15 @@ impl Share {
     }
 }
 
-/// How a depth compares with the truth.
+/// Comparison of a dense result with the truth.
 #[derive(Debug, Default)]
 struct Judgement {
     /// Stated sigma at most 1 % and textured: within 2 %.
     sure: Share,
     /// Every other measured pixel: within 3 sigma.
     elsewhere: Share,
-    /// Predicted sigma at most 1 % before the picture, textured, in both fields: measured and within 2 %. Gaps count as
-    /// failures, also where one eye cannot see.
+    /// Predicted sigma at most 1 %, textured, in both fields: measured and within 2 %. Gaps count as failures, also
+    /// where one camera cannot see.
     expected: Share,
     /// All measured pixels: within 1 and within 3 sigma.
     within: [Share; 2],
@@ -177,7 +176,7 @@ fn the_room_in_human_mode_is_measured_as_well_as_stated() {
     assert!(judged.within[1].value() >= 0.9);
 }
 
-/// The depth, and what its stages took in a sentence: for people, nothing is asserted of it.
+/// The dense result, and the times of its stages as a sentence for people.
 #[allow(clippy::disallowed_methods, reason = "figures for people")]
 fn timed(pair: &ImagePair<'_>) -> (DenseDepth, String) {
     let start = std::time::Instant::now();
@@ -200,7 +199,7 @@ fn timed(pair: &ImagePair<'_>) -> (DenseDepth, String) {
 }
 
 #[test]
-fn identical_images_show_what_is_far() {
+fn identical_images_are_far_everywhere() {
     let pair = Pair::new(320, Angle::from_deg(0.0));
     let left_from_right = Transform::new(UnitQuaternion::identity(), Vector3::new(BASELINE_MM, 0.0, 0.0));
     let depth =
@@ -210,9 +209,9 @@ fn identical_images_show_what_is_far() {
     assert!(counts.far > 20_000 && counts.measured * 1000 < counts.far, "{counts:?}");
 }
 
-/// Mirrored images of swapped eyes show the mirrored scene from the other eye.
+/// Mirrored images of swapped cameras show the mirrored scene.
 #[test]
-fn swapped_and_mirrored_eyes_measure_the_same() {
+fn swapped_and_mirrored_cameras_measure_the_same() {
     let pair = Pair::new(320, Angle::from_deg(0.0));
     let left_from_right = Transform::new(UnitQuaternion::identity(), Vector3::new(BASELINE_MM, 0.0, 0.0));
     let straight = ImagePair { left_from_right, ..pair.images() };
@@ -237,7 +236,7 @@ fn swapped_and_mirrored_eyes_measure_the_same() {
 }
 
 #[test]
-fn pictures_without_anything_in_common_have_no_ranges() {
+fn unrelated_images_have_no_ranges() {
     let camera = equidistant(320);
     let noise = |seed: u64| {
         let mut state = seed;

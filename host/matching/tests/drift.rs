@@ -1,4 +1,4 @@
-//! A pose that is off: the matches say so, and are still found.
+//! Wrong poses: they are detected from the matches, and the matches are still found.
 #![allow(clippy::unwrap_used, clippy::print_stdout, reason = "a test fails loudly and shows its figures")]
 
 mod common;
@@ -8,7 +8,7 @@ use nalgebra::{Matrix6, UnitQuaternion, Vector3, Vector6};
 use vergence_matching::{GuidedMatcher, ImagePair, Match, Matcher};
 use vergence_vision::{Angle, Left, PoseDrift, Right, StereoPair, Transform, pose_drift};
 
-/// What the picture says with the pose turned by `off`, its sigma stated as 0.02° and 0.1 mm; and how many matches there are.
+/// The pose drift with the pose turned by `off` and a stated sigma of 0.02° and 0.1 mm, and the number of matches.
 fn drift(pair: &Pair, off: Vector3<f64>) -> (PoseDrift, usize) {
     let images = pair.images();
     let truth = images.left_from_right;
@@ -24,7 +24,7 @@ fn drift(pair: &Pair, off: Vector3<f64>) -> (PoseDrift, usize) {
 }
 
 #[test]
-fn encoders_and_picture_disagree_by_three_tenths_of_a_degree() {
+fn encoders_and_images_disagree_by_three_tenths_of_a_degree() {
     let pair = Pair::new(640, Angle::from_deg(60.0));
     let (right, matches) = drift(&pair, Vector3::zeros());
     assert!(!right.is_significant(), "{} {}", right.chi_squared, right.angle);
@@ -38,7 +38,7 @@ fn encoders_and_picture_disagree_by_three_tenths_of_a_degree() {
     }
 }
 
-/// Far more than any encoder is off: a rig assembled wrong, or a file of another rig.
+/// An error far beyond that of encoders: a rig assembled wrongly, or the file of another rig.
 #[test]
 fn a_pose_wrong_by_five_degrees_is_noticed_and_most_matches_are_still_found() {
     for separation in [60.0, 120.0] {

@@ -1,4 +1,4 @@
-//! Matching pairs of photographs of a scene whose truth is known.
+//! Matching of rendered pairs whose truth is known.
 #![allow(clippy::unwrap_used, reason = "a test that cannot be set up fails")]
 
 mod common;
@@ -15,7 +15,7 @@ fn find(images: &ImagePair<'_>) -> Matches {
     GuidedMatcher::default().find(images).unwrap()
 }
 
-/// Part of the matches within a pixel of the truth, median error in pixels, part with a depth more than 10 % wrong.
+/// Fraction of matches within a pixel of the truth, median error in pixels, fraction with a depth more than 10 % wrong.
 fn accuracy(pair: &Pair, matches: &Matches) -> [f64; 3] {
     let verdicts: Vec<_> = matches.pairs.iter().map(|found| pair.judge(found)).collect();
     let part = |count: usize| count as f64 / verdicts.len() as f64;
@@ -30,7 +30,7 @@ fn assert_accurate(pair: &Pair, matches: &Matches, least: usize) {
     assert!(right > 0.98, "{right:.4} of the matches are right");
     assert!(error < 0.12, "median error {error:.3} px");
     assert!(wrong < 0.02, "{wrong:.4} of the depths are wrong");
-    // Both images share the error: √2 of what is said of each.
+    // The error is shared by both images: √2 of the stated sigma of each.
     let within = |found: &&vergence_matching::Match| pair.judge(found).error_px < 2.45 * 2f64.sqrt() * found.sigma;
     let honest = matches.pairs.iter().filter(within).count() as f64 / matches.pairs.len() as f64;
     assert!(honest > 0.95, "{honest:.3} of the errors are within the 95 % circle of their sigma");
@@ -67,7 +67,8 @@ fn a_pose_known_to_half_a_degree_is_enough() {
     images.pose_sigma = Angle::from_deg(0.5);
     let wary = find(&images);
     assert_accurate(&pair, &wary, 900);
-    // A pose that is said to be exact and is not loses matches, or so many that it is noticed and they are found again.
+    // With a wrong pose stated as exact, some matches are lost, or so many that the error is detected and they are
+    // found.
     assert!(trusting.pairs.len() <= wary.pairs.len() + wary.pairs.len() / 20, "{}", trusting.pairs.len());
 }
 

@@ -1,14 +1,16 @@
 //! Real photographs: pair 10 of sourishg/fisheye-stereo-calibration, two hand-held fisheye cameras of about 180° in an
-//! office. The images are not part of this repository; without them the test says so and passes.
+//! office. The images live outside the repository, see `tests/common/data.rs`.
 #![allow(clippy::unwrap_used, reason = "a test that cannot be set up fails")]
 
-use std::path::PathBuf;
+#[path = "../../../tests/common/data.rs"]
+mod data;
 
+use data::real_data;
 use nalgebra::{Matrix3, Rotation3, UnitQuaternion, Vector3};
 use vergence_matching::{GuidedMatcher, ImagePair, Matcher, SharedFrame};
 use vergence_vision::{Angle, ImageSize, KannalaBrandt, Left, Length, Pixel, Right, Transform};
 
-/// fx, fy, cx, cy, k1..k4 in the form θ (1 + k1 θ² + ...): bundle adjustment of 19 board views, RMS 0.5 px.
+/// fx, fy, cx, cy, k1..k4 in the form θ (1 + k1 θ² + ...): bundle adjustment of 19 target views, RMS 0.5 px.
 const LEFT: [f64; 8] = [
     228.458_513_786,
     228.308_671_792,
@@ -51,15 +53,8 @@ fn lens(p: &[f64; 8], half_field: f64) -> KannalaBrandt {
 
 #[test]
 fn an_office() {
-    let shared = std::env::var_os("VERGENCE_SHARED")
-        .map_or_else(|| PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("../../../shared"), PathBuf::from);
-    let images = shared.join("data/sourishg_stereo/images");
-    let (Ok(left), Ok(right)) = (image::open(images.join("left10.jpg")), image::open(images.join("right10.jpg")))
-    else {
-        println!("skipped: no photographs in {} (VERGENCE_SHARED names their folder)", images.display());
-        return;
-    };
-    let (left, right) = (left.to_luma8(), right.to_luma8());
+    let Some(images) = real_data("data/sourishg_stereo/images") else { return };
+    let [left, right] = ["left10.jpg", "right10.jpg"].map(|name| image::open(images.join(name)).unwrap().to_luma8());
     // The right lens's polynomial turns over soon after 83°.
     let (left_camera, right_camera) = (lens(&LEFT, 95.0), lens(&RIGHT, 83.0));
     let rotation = Rotation3::from_matrix(&Matrix3::from_row_slice(&RIGHT_FROM_LEFT));
@@ -77,7 +72,7 @@ fn an_office() {
     let matches = GuidedMatcher::default().find(&pair).unwrap();
     assert!(matches.pairs.len() >= 400, "{} matches, dropped {:?}", matches.pairs.len(), matches.dropped);
 
-    // The person with the board is near, the desks at the far wall are some metres away.
+    // The person with the target is near, the desks at the far wall are some metres away.
     let frame = SharedFrame::new(&pair.left_from_right).unwrap();
     let parallax = |found: &vergence_matching::Match| {
         let l = frame.shared_from_left() * left_camera.unproject::<Left>(found.left).unwrap();

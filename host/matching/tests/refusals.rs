@@ -1,4 +1,4 @@
-//! Pairs that cannot be matched, and pairs in which there is nothing to match.
+//! Pairs that cannot be matched, and pairs without texture.
 #![allow(clippy::unwrap_used, reason = "a test that cannot be set up fails")]
 
 mod common;
@@ -93,7 +93,7 @@ fn quantities_out_of_range_are_refused() {
 }
 
 #[test]
-fn cameras_that_look_apart_are_refused() {
+fn cameras_without_a_shared_field_are_refused() {
     let size = ImageSize { width: SIDE, height: SIDE };
     let centre = Pixel { u: 99.5, v: 99.5 };
     let narrow = KannalaBrandt::new([100.0, 0.0, 0.0, 0.0, 0.0], 1.0, centre, Angle::from_deg(50.0), size).unwrap();

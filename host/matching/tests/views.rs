@@ -1,4 +1,4 @@
-//! Laws of the shared direction and of its views.
+//! Laws of the shared axes and of views.
 #![allow(clippy::unwrap_used, reason = "a test that cannot be set up fails")]
 
 use image::GrayImage;
@@ -46,7 +46,7 @@ proptest! {
     }
 
     #[test]
-    fn a_view_leads_to_the_pixel_and_back(pose in poses(), x in 0.0..1.0_f64, y in 0.0..1.0_f64) {
+    fn positions_of_a_view_map_to_pixels_and_back(pose in poses(), x in 0.0..1.0_f64, y in 0.0..1.0_f64) {
         let frame = SharedFrame::new(&pose).unwrap();
         let grid = Grid::covering(&frame, &lens(), &lens(), 1.0).unwrap();
         let image = GrayImage::new(320, 320);
@@ -89,7 +89,7 @@ fn x_is_the_baseline_and_z_the_mean_axis() {
 }
 
 #[test]
-fn axes_along_the_baseline_still_make_a_frame() {
+fn optical_axes_along_the_baseline_have_shared_axes() {
     for turn in [UnitQuaternion::identity(), UnitQuaternion::from_axis_angle(&Vector3::y_axis(), std::f64::consts::PI)]
     {
         let one_behind_the_other = Transform::new(turn, Vector3::new(0.0, 0.0, 145.0));
@@ -100,7 +100,7 @@ fn axes_along_the_baseline_still_make_a_frame() {
 }
 
 #[test]
-fn no_baseline_makes_no_frame() {
+fn without_a_baseline_there_are_no_shared_axes() {
     let turn = UnitQuaternion::identity();
     for place in [Vector3::zeros(), Vector3::new(f64::NAN, 0.0, 0.0), Vector3::new(f64::INFINITY, 0.0, 0.0)] {
         assert_eq!(SharedFrame::new(&Transform::new(turn, place)), None);

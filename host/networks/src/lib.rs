@@ -1,8 +1,8 @@
-//! Runs pre-trained networks for [`vergence_matching::learned`].
+//! Runtimes of pre-trained networks for [`vergence_matching::learned`].
 //!
-//! Two runtimes, the same files, the same results: [`rten`](load_rten), pure Rust, always there; and
-//! [`OnnxRuntime`], Microsoft's library, found at run time because it is not ours to ship. Files are read by the
-//! caller: this crate takes bytes.
+//! Two runtimes load the same ONNX files and give the same results: [`rten`](load_rten) is pure Rust and always
+//! available; [`OnnxRuntime`] is Microsoft's library, which is loaded at run time because it is not shipped with this
+//! program. The caller reads the networks' files and passes their bytes.
 
 mod onnx_runtime;
 mod rten;

@@ -1,4 +1,4 @@
-//! ONNX Runtime, loaded from the library file that the caller found.
+//! Networks on ONNX Runtime, a shared library that is loaded at run time.
 
 use std::path::{Path, PathBuf};
 use std::sync::{Mutex, PoisonError};
@@ -10,20 +10,20 @@ use vergence_matching::learned::{Elements, Network, NetworkError, Outlet, Signat
 
 const NAME: &str = "ONNX Runtime";
 
-/// The library that this process has loaded, and its state: there can be only one.
+/// The library that this process has loaded with its environment; a process can load only one.
 static LOADED: Mutex<Option<(PathBuf, Environment)>> = Mutex::new(None);
 
-/// The loaded library. It stays loaded until the process ends.
+/// ONNX Runtime, loaded from a library file. It stays loaded until the process ends.
 pub struct OnnxRuntime {
     environment: Environment,
     threads: usize,
 }
 
 impl OnnxRuntime {
-    /// Loads `library` (`libonnxruntime.so`), unless it is loaded already, and lets each network use `threads` threads.
+    /// Loads `library` (`libonnxruntime.so`), unless it is loaded already. Each network will use `threads` threads.
     ///
     /// # Errors
-    /// [`NetworkError::Runtime`] where it is not there or too old, or another one is loaded already.
+    /// [`NetworkError::Runtime`] where the library is missing or too old, or another one is loaded already.
     pub fn load(library: &Path, threads: usize) -> Result<Self, NetworkError> {
         let mut loaded = LOADED.lock().unwrap_or_else(PoisonError::into_inner);
         let environment = match &*loaded {
@@ -41,10 +41,10 @@ impl OnnxRuntime {
         Ok(Self { environment, threads })
     }
 
-    /// Loads an ONNX file's bytes; `name` is for messages.
+    /// Loads a network from the bytes of an ONNX file; `name` appears in messages.
     ///
     /// # Errors
-    /// [`NetworkError::Load`] where the runtime does not understand it.
+    /// [`NetworkError::Load`] where the runtime does not support the file.
     pub fn network(&self, name: &str, bytes: &[u8]) -> Result<Box<dyn Network>, NetworkError> {
         let failed =
             |error: &dyn std::fmt::Display| NetworkError::Load { network: name.into(), reason: error.to_string() };
@@ -66,7 +66,7 @@ fn outlet(outlet: &OrtOutlet) -> Outlet {
 }
 
 struct Loaded {
-    /// The library's `run` wants the session for itself.
+    /// Behind a lock, because the library's `run` needs exclusive access.
     session: Mutex<Session>,
     signature: Signature,
 }

@@ -1,4 +1,4 @@
-//! rten: an ONNX runtime in Rust.
+//! Networks on rten, an ONNX runtime in Rust.
 
 use rten::{Dimension, Model, NodeId, Value, ValueOrView};
 use rten_tensor::{AsView as _, Layout as _};
@@ -9,10 +9,10 @@ struct Rten {
     signature: Signature,
 }
 
-/// Loads an ONNX file's bytes; `name` is for messages.
+/// Loads a network from the bytes of an ONNX file with rten; `name` appears in messages.
 ///
 /// # Errors
-/// [`NetworkError::Load`] where rten does not understand it.
+/// [`NetworkError::Load`] where rten does not support the file.
 pub fn load_rten(name: &str, bytes: &[u8]) -> Result<Box<dyn Network>, NetworkError> {
     let failed = |error: &dyn std::fmt::Display| NetworkError::Load { network: name.into(), reason: error.to_string() };
     let model = Model::load(bytes.to_vec()).map_err(|error| failed(&error))?;
@@ -52,7 +52,7 @@ fn value(tensor: Tensor) -> Result<Value, NetworkError> {
     match tensor.data {
         Elements::Float(data) => Value::from_shape(&tensor.shape, data).map_err(|error| failed(&error)),
         Elements::Integer(data) => {
-            // rten computes in 32 bits; its own loader narrows the same way.
+            // rten computes with 32-bit integers; its own loader narrows in the same way.
             let narrow: Result<Vec<i32>, _> = data.into_iter().map(i32::try_from).collect();
             let narrow = narrow.map_err(|error| failed(&error))?;
             Value::from_shape(&tensor.shape, narrow).map_err(|error| failed(&error))

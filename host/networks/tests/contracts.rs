@@ -1,12 +1,12 @@
-//! Every way in which exports of the LightGlue family differ, on tiny networks with the same tensors
-//! (`tests/tiny/make.py`), and sentences for those that do not fit.
+//! All forms of exports of the LightGlue family, on tiny networks with the same tensors (`tests/tiny/make.py`), and the
+//! messages for networks that do not fit.
 #![allow(clippy::expect_used, clippy::panic, clippy::disallowed_methods, reason = "a test fails loudly")]
 
 use std::path::Path;
 
 use vergence_matching::learned::{
-    Coordinates, Extractor, Found, Glue, ImageInput, Manifest, MatchForm, MatchOutput, Model, NetworkError, Networks,
-    Picture, Pipeline,
+    Coordinates, Extractor, Glue, GreyImage, ImageInput, KeypointMatches, Manifest, MatchForm, MatchOutput, Model,
+    NetworkError, Networks, Pipeline,
 };
 use vergence_networks::load_rten;
 
@@ -67,14 +67,14 @@ fn load(manifest: Manifest) -> Result<Model, NetworkError> {
     Model::new(manifest, networks?)
 }
 
-fn compare(model: &Model, grey: f32) -> Found {
+fn compare(model: &Model, grey: f32) -> KeypointMatches {
     let values = vec![grey; 40 * 30];
-    let picture = Picture { values: &values, width: 40, height: 30 };
+    let picture = GreyImage { values: &values, width: 40, height: 30 };
     model.compare([picture, picture], 3, [&|_| true, &|[x, _]| x > 10.0]).expect("it runs")
 }
 
-/// Of the four keypoints the first three fit the budget on the left; the two with x > 10 are worth it on the right.
-fn expect_matches_by_descriptor(found: &Found) {
+/// Of the four keypoints the first three fit the budget on the left; the two with x > 10 pass the test on the right.
+fn expect_matches_by_descriptor(found: &KeypointMatches) {
     assert_eq!(found.keypoints[0], [[8.0, 8.0], [24.0, 8.0], [8.0, 24.0]]);
     assert_eq!(found.keypoints[1], [[24.0, 8.0], [24.0, 24.0]]);
     let alike: Vec<_> = found.matches.iter().map(|&(i, j, _)| (i, j)).collect();
@@ -92,23 +92,23 @@ fn separate_networks_of_every_descriptor_width_and_form() {
 }
 
 #[test]
-fn a_black_picture_has_no_keypoints_and_no_matches() {
+fn a_black_image_has_no_keypoints_and_no_matches() {
     let model = load(separate(1, 64, "per_keypoint", MatchForm::PerKeypoint)).expect("the contract holds");
     let found = compare(&model, 0.0);
-    assert_eq!(found, Found::default());
+    assert_eq!(found, KeypointMatches::default());
 }
 
 #[test]
-fn two_pictures_in_one_batch() {
+fn two_images_in_one_batch() {
     let result = output("matches", "mscores", MatchForm::PairsInBatch);
     let model = load(whole("pipeline.onnx", 3, &["images"], &["keypoints"], result)).expect("the contract holds");
     let found = compare(&model, 1.0);
-    // What is not worth it is dropped after the fact: such networks choose their keypoints themselves.
+    // Keypoints that fail the test are dropped afterwards: such networks choose their keypoints themselves.
     assert_eq!(found.matches.iter().map(|&(i, j, _)| (i, j)).collect::<Vec<_>>(), [(1, 1), (3, 3)]);
 }
 
 #[test]
-fn two_pictures_by_name() {
+fn two_images_by_name() {
     let result = output("matches0", "mscores0", MatchForm::Pairs);
     let manifest = whole("end_to_end.onnx", 1, &["image0", "image1"], &["kpts0", "kpts1"], result);
     let found = compare(&load(manifest).expect("the contract holds"), 1.0);
@@ -116,7 +116,7 @@ fn two_pictures_by_name() {
 }
 
 #[test]
-fn what_does_not_fit_is_refused_in_a_sentence() {
+fn networks_that_do_not_fit_are_refused_in_a_sentence() {
     let mut wide = separate(1, 64, "per_keypoint", MatchForm::PerKeypoint);
     if let Networks::Separate { extractor, .. } = &mut wide.networks {
         extractor.descriptor_width = 128;
@@ -139,7 +139,7 @@ fn what_does_not_fit_is_refused_in_a_sentence() {
 }
 
 #[test]
-fn bytes_that_are_no_network_are_an_error() {
+fn bytes_of_no_network_are_an_error() {
     let error = load_rten("noise.onnx", &[7; 100]).err().expect("refused");
     assert!(matches!(error, NetworkError::Load { .. }), "{error}");
 }

@@ -1,14 +1,18 @@
-//! A process has one ONNX Runtime. This test has a process of its own.
-#![allow(clippy::expect_used, clippy::print_stdout, clippy::disallowed_methods, reason = "a test fails loudly")]
+//! A process can load one ONNX Runtime only, so this test has a process of its own.
+#![allow(clippy::expect_used, clippy::disallowed_methods, reason = "a test fails loudly")]
+
+#[path = "../../../tests/common/data.rs"]
+mod data;
 
 use std::path::Path;
 
+use data::say_skipped;
 use vergence_networks::OnnxRuntime;
 
 #[test]
-fn a_library_can_be_asked_for_again_and_another_one_cannot() {
+fn a_library_can_be_loaded_again_and_another_one_cannot() {
     let Some(library) = std::env::var_os("ORT_DYLIB_PATH") else {
-        println!("skipped: ORT_DYLIB_PATH names no ONNX Runtime");
+        say_skipped("ORT_DYLIB_PATH names no ONNX Runtime");
         return;
     };
     let missing = OnnxRuntime::load(Path::new("/nonexistent/libonnxruntime.so"), 1);

@@ -1,5 +1,5 @@
 //! The published networks on a pair of photographs, against Python's onnxruntime 1.31.1: 330 matches of 1024 keypoints.
-//! Networks and photographs may not be redistributed; without them the tests say what they skip.
+//! Networks and photographs live outside the repository, see `tests/common/data.rs`.
 #![allow(
     clippy::expect_used,
     clippy::panic,
@@ -8,23 +8,21 @@
     reason = "a test fails loudly, shows its figures and looks for its data"
 )]
 
+#[path = "../../../tests/common/data.rs"]
+mod data;
+
 use std::path::{Path, PathBuf};
 
-use vergence_matching::learned::{Manifest, Model, Network, NetworkError, Picture};
+use data::{real_data, say_skipped};
+use vergence_matching::learned::{GreyImage, Manifest, Model, Network, NetworkError};
 use vergence_networks::{OnnxRuntime, load_rten};
 
 const KEYPOINTS: usize = 1024;
 const FILES: [&str; 2] = ["xfeat_top4096_f32.onnx", "lighterglue_l6_f32.onnx"];
 
+/// The folder with the networks and the pair of photographs.
 fn models() -> Option<PathBuf> {
-    let shared = std::env::var_os("VERGENCE_SHARED")
-        .map_or_else(|| Path::new(env!("CARGO_MANIFEST_DIR")).join("../../../shared"), PathBuf::from);
-    let models = shared.join("models");
-    if models.join(FILES[0]).is_file() {
-        return Some(models);
-    }
-    println!("skipped: no networks in {}", models.display());
-    None
+    real_data(&format!("models/{}", FILES[0])).and_then(|file| file.parent().map(Path::to_owned))
 }
 
 fn model(folder: &Path, load: impl Fn(&str, &[u8]) -> Result<Box<dyn Network>, NetworkError>) -> Model {
@@ -37,7 +35,7 @@ fn count_matches(folder: &Path, model: &Model) -> [usize; 3] {
         let image = image::open(folder.join(name)).expect("a photograph").to_luma8();
         image.iter().map(|&grey| f32::from(grey) / 255.0).collect::<Vec<f32>>()
     });
-    let [left, right] = [0, 1].map(|i| Picture { values: &pictures[i], width: 640, height: 480 });
+    let [left, right] = [0, 1].map(|i| GreyImage { values: &pictures[i], width: 640, height: 480 });
     let found = model.compare([left, right], KEYPOINTS, [&|_| true, &|_| true]).expect("matches");
     [found.keypoints[0].len(), found.keypoints[1].len(), found.matches.len()]
 }
@@ -59,7 +57,7 @@ fn rten_finds_what_python_finds() {
 fn onnx_runtime_finds_what_python_finds() {
     let Some(folder) = models() else { return };
     let Some(library) = std::env::var_os("ORT_DYLIB_PATH") else {
-        println!("skipped: ORT_DYLIB_PATH names no ONNX Runtime");
+        say_skipped("ORT_DYLIB_PATH names no ONNX Runtime");
         return;
     };
     let runtime = OnnxRuntime::load(Path::new(&library), 2).expect("a runtime");

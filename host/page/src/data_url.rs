@@ -1,7 +1,7 @@
-//! Files inside a page.
+//! Files embedded in a page as data URLs.
 
-/// `bytes` of a file of the media type `media`, such as `image/png`, as a URL that needs nothing besides (RFC 2397, with
-/// base64 of RFC 4648).
+/// Encodes the `bytes` of a file of media type `media`, such as `image/png`, as a data URL (RFC 2397, base64 of RFC
+/// 4648).
 #[must_use]
 pub fn data_url(media: &str, bytes: &[u8]) -> String {
     format!("data:{media};base64,{}", base64(bytes))

@@ -1,16 +1,17 @@
-//! Pages for people: one self-contained HTML file with tables and drawings (SVG), that runs no script and loads nothing.
+//! Reports as self-contained HTML pages with tables and SVG drawings, without scripts or external files.
 //!
-//! Pure: text in, text out. The same arguments give the same bytes.
+//! Every function is pure: the same arguments give the same text.
 
 mod data_url;
 mod html;
 mod plot;
 mod svg;
+mod text;
 
 pub use data_url::data_url;
 pub use html::{
-    Cell, Page, Row, count, counted, escape, figure, figures, fixed, note, number, page, panel, picture, plain,
-    section, significant, table, text, with_sigma,
+    Cell, Page, Row, count, figure, figures, gallery, note, number, page, panel, picture, plain, section, table, text,
 };
 pub use plot::{Axes, round_step};
 pub use svg::{Anchor, Drawing, Path};
+pub use text::{counted, escape, fixed, significant, with_sigma};

@@ -1,14 +1,14 @@
-//! Axes of plots, and round numbers for them.
+//! Axes of plots, with ticks at round numbers.
 
-use crate::html::fixed;
 use crate::svg::{Anchor, Drawing};
+use crate::text::fixed;
 
-/// A plot's ranges and the part of the drawing it fills.
+/// The axes of a plot: their ranges and their area in the drawing.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Axes {
-    /// Lowest and highest value across.
+    /// Lowest and highest value of the horizontal axis.
     pub x: [f64; 2],
-    /// Lowest and highest value upwards.
+    /// Lowest and highest value of the vertical axis.
     pub y: [f64; 2],
     left: f64,
     top: f64,
@@ -17,7 +17,7 @@ pub struct Axes {
 }
 
 impl Axes {
-    /// Filling `drawing` but for the room that labels need.
+    /// Makes axes that fill `drawing`, less the margins for labels.
     #[must_use]
     pub fn filling(drawing: &Drawing, x: [f64; 2], y: [f64; 2]) -> Self {
         const LEFT: f64 = 56.0;
@@ -27,26 +27,26 @@ impl Axes {
         Self { x, y, left: LEFT, top: MARGIN, width, height }
     }
 
-    /// Where values are in the drawing.
+    /// Converts values to a position in the drawing.
     #[must_use]
     pub fn at(&self, x: f64, y: f64) -> [f64; 2] {
         let share = |value: f64, [low, high]: [f64; 2]| (value - low) / (high - low);
         [self.left + self.width * share(x, self.x), self.top + self.height * (1.0 - share(y, self.y))]
     }
 
-    /// The upper left corner of the plot in the drawing.
+    /// The upper left corner of the plot area in the drawing.
     #[must_use]
     pub const fn corner(&self) -> [f64; 2] {
         [self.left, self.top]
     }
 
-    /// Its width and height in the drawing.
+    /// Width and height of the plot area in the drawing.
     #[must_use]
     pub const fn extent(&self) -> [f64; 2] {
         [self.width, self.height]
     }
 
-    /// Grid, numbers and names of both axes.
+    /// Draws the grid, the numbers and the names of both axes.
     pub fn draw(&self, drawing: &mut Drawing, x_name: &str, y_name: &str) {
         let (bottom, right) = (self.top + self.height, self.left + self.width);
         let (x_step, y_step) = (round_step(self.x[1] - self.x[0], 9.0), round_step(self.y[1] - self.y[0], 6.0));
@@ -66,7 +66,7 @@ impl Axes {
     }
 }
 
-/// The round number (1, 2 or 5 times a power of ten) that divides `span` into `parts` or a few less.
+/// The round number (1, 2 or 5 times a power of ten) that divides `span` into `parts` or slightly fewer.
 #[must_use]
 pub fn round_step(span: f64, parts: f64) -> f64 {
     let wanted = (span / parts).max(f64::MIN_POSITIVE);
@@ -74,7 +74,7 @@ pub fn round_step(span: f64, parts: f64) -> f64 {
     [1.0, 2.0, 5.0, 10.0].map(|digit| digit * power).into_iter().find(|step| *step >= 0.999 * wanted).unwrap_or(wanted)
 }
 
-/// Multiples of `step` in the range.
+/// The multiples of `step` in the range.
 fn ticks([low, high]: [f64; 2], step: f64) -> Vec<f64> {
     const MOST: u32 = 40;
     let first = (low / step - 1e-9).ceil();

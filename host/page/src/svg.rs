@@ -1,10 +1,10 @@
-//! Drawings: a thin layer over SVG that writes short numbers and never a number that is none.
+//! Drawings in SVG, with short numbers and without any that are not finite.
 
 use std::fmt::Write as _;
 
-use crate::html::escape;
+use crate::text::escape;
 
-/// A drawing; x to the right, y down.
+/// An SVG drawing; x points to the right, y down.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Drawing {
     width: f64,
@@ -12,37 +12,37 @@ pub struct Drawing {
     body: String,
 }
 
-/// Which side of its place a text ends at.
+/// The part of a text that is at its position.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Anchor {
-    /// Its left end.
+    /// The left end.
     Start,
-    /// Its middle.
+    /// The middle.
     Middle,
-    /// Its right end.
+    /// The right end.
     End,
 }
 
 impl Drawing {
-    /// An empty one.
+    /// Makes an empty drawing.
     #[must_use]
     pub const fn new(width: f64, height: f64) -> Self {
         Self { width, height, body: String::new() }
     }
 
-    /// As given.
+    /// The width of the drawing.
     #[must_use]
     pub const fn width(&self) -> f64 {
         self.width
     }
 
-    /// As given.
+    /// The height of the drawing.
     #[must_use]
     pub const fn height(&self) -> f64 {
         self.height
     }
 
-    /// An element of `class` along `path`, which [`Path`] made; `style` may be empty.
+    /// Draws `path` with the CSS class `class`; `style` may be empty.
     pub fn path(&mut self, path: &Path, class: &str, style: &str) {
         if !path.0.is_empty() {
             let style = if style.is_empty() { String::new() } else { format!(" style=\"{style}\"") };
@@ -50,12 +50,12 @@ impl Drawing {
         }
     }
 
-    /// A straight line.
+    /// Draws a straight line.
     pub fn line(&mut self, from: [f64; 2], to: [f64; 2], class: &str) {
         self.path(&Path::through(&[from, to]), class, "");
     }
 
-    /// The rectangle from its upper left corner.
+    /// Draws a rectangle, given by its upper left corner and its size.
     pub fn rect(&mut self, [x, y]: [f64; 2], [width, height]: [f64; 2], class: &str, style: &str) {
         let corners = [[x, y], [x + width, y], [x + width, y + height], [x, y + height]];
         let mut path = Path::default();
@@ -63,7 +63,13 @@ impl Drawing {
         self.path(&path, class, style);
     }
 
-    /// One line of text on its baseline.
+    /// A picture, already a data URL, that fills the rectangle from its upper left corner.
+    pub fn image(&mut self, [x, y]: [f64; 2], [width, height]: [f64; 2], data: &str) {
+        let ([x, y, width, height], data) = ([x, y, width, height].map(short), escape(data));
+        self.push(format_args!("<image x=\"{x}\" y=\"{y}\" width=\"{width}\" height=\"{height}\" href=\"{data}\"/>"));
+    }
+
+    /// Draws one line of text with its baseline at a position.
     pub fn text(&mut self, [x, y]: [f64; 2], anchor: Anchor, class: &str, text: &str) {
         if !(x.is_finite() && y.is_finite()) {
             return;
@@ -77,24 +83,24 @@ impl Drawing {
         self.push(format_args!("<text class=\"{class}\" x=\"{x}\" y=\"{y}\" text-anchor=\"{anchor}\">{text}</text>"));
     }
 
-    /// A text that reads upwards.
+    /// Draws a text that reads upwards.
     pub fn text_upwards(&mut self, [x, y]: [f64; 2], class: &str, text: &str) {
         let (x, y, text) = (short(x), short(y), escape(text));
         let place = format_args!("transform=\"translate({x} {y}) rotate(-90)\" text-anchor=\"middle\"").to_string();
         self.push(format_args!("<text class=\"{class}\" {place}>{text}</text>"));
     }
 
-    /// Draws what `draw` draws, cut at the rectangle from its upper left corner.
+    /// Runs `draw` and clips its result at a rectangle, given by its upper left corner and its size.
     pub fn clipped(&mut self, [x, y]: [f64; 2], [width, height]: [f64; 2], draw: impl FnOnce(&mut Self)) {
         let [left, top, wide, high] = [x, y, width, height].map(short);
-        // An inner drawing cuts at its border, and needs no name that the page must keep unique.
+        // A nested drawing clips at its border and needs no identifier, which would have to be unique in the page.
         let place = format!("x=\"{left}\" y=\"{top}\" width=\"{wide}\" height=\"{high}\"");
         self.push(format_args!("<svg {place} viewBox=\"{left} {top} {wide} {high}\">"));
         draw(self);
         self.push(format_args!("</svg>"));
     }
 
-    /// The element; `label` is for those who cannot see it.
+    /// Prints the SVG element; `label` is its text for screen readers.
     #[must_use]
     pub fn svg(&self, label: &str) -> String {
         let (width, height, label) = (short(self.width), short(self.height), escape(label));
@@ -102,17 +108,17 @@ impl Drawing {
     }
 
     fn push(&mut self, element: std::fmt::Arguments<'_>) {
-        // Writing to a string does not fail.
+        // Writing to a string cannot fail.
         let _ = writeln!(self.body, "{element}");
     }
 }
 
-/// The data of a path. Parts with a coordinate that is not a finite number are left out.
+/// The data of a path. Parts with a coordinate that is not finite are left out.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Path(String);
 
 impl Path {
-    /// An open line.
+    /// Makes a path of one open line.
     #[must_use]
     pub fn through(points: &[[f64; 2]]) -> Self {
         let mut path = Self::default();
@@ -138,7 +144,7 @@ impl Path {
         }
     }
 
-    /// A dot as large as the line is wide, for lines with round ends.
+    /// Adds a dot, for lines with round ends; it is as large as the line is wide.
     pub fn dot(&mut self, [x, y]: [f64; 2]) {
         if x.is_finite() && y.is_finite() {
             let _ = write!(self.0, "M{} {}h0", short(x), short(y));
@@ -151,7 +157,7 @@ impl Path {
         self.line(&[[x - half, y + half], [x + half, y - half]]);
     }
 
-    /// A line with a head at its end.
+    /// Adds a line with an arrow head at its end.
     pub fn arrow(&mut self, from: [f64; 2], by: [f64; 2]) {
         const HEAD: f64 = 4.5;
         let length = by[0].hypot(by[1]);
@@ -165,7 +171,7 @@ impl Path {
     }
 }
 
-/// To a tenth, without needless characters.
+/// Prints a number to a tenth, in as few characters as possible.
 fn short(x: f64) -> String {
     let text = format!("{x:.1}");
     let text = text.strip_suffix(".0").unwrap_or(&text);

@@ -1,19 +1,19 @@
-//! One axis as the host sees it: name, range and encoder scale.
+//! One axis of the rig on the host's side: its name, range and encoder scale.
 
 use vergence_protocol::{AxisInfo, AxisKind, Counts, Micro};
 use vergence_vision::{Angle, Length};
 
-/// Where an axis is: millimetres or radians, by its kind.
+/// A position of an axis: a length or an angle, by the kind of the axis.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum AxisPosition {
-    /// Of a linear axis.
+    /// Position of a linear axis.
     Linear(Length),
-    /// Of a rotary axis.
+    /// Position of a rotary axis.
     Rotary(Angle),
 }
 
 impl AxisPosition {
-    /// In millimetres or radians, the units of the screw chain.
+    /// The position in millimetres or radians, the units of the screw chain.
     #[must_use]
     pub fn value(self) -> f64 {
         match self {
@@ -22,18 +22,18 @@ impl AxisPosition {
         }
     }
 
-    /// In whole micrometres or microradians, the units of the wire.
+    /// The position in whole micrometres or microradians, the units of the wire.
     #[must_use]
     pub fn micro(self) -> Micro {
         let micro = match self {
             Self::Linear(length) => length.mm() * 1e3,
             Self::Rotary(angle) => angle.rad() * 1e6,
         };
-        // The cast saturates: far outside any axis's range, and refused there.
+        // The cast saturates; such a position is far outside any axis's range and refused there.
         Micro(micro.round() as i32)
     }
 
-    /// From `value` in millimetres or radians.
+    /// Makes a position on an axis of `kind` from `value` in millimetres or radians.
     #[must_use]
     pub fn from_value(kind: AxisKind, value: f64) -> Self {
         match kind {
@@ -42,7 +42,7 @@ impl AxisPosition {
         }
     }
 
-    /// From the wire.
+    /// Makes a position on an axis of `kind` from the wire's micrometres or microradians.
     #[must_use]
     pub fn from_micro(kind: AxisKind, micro: Micro) -> Self {
         match kind {
@@ -66,7 +66,7 @@ impl AxisPosition {
         }
     }
 
-    /// The difference to `other` of the same kind.
+    /// The difference to `other` of the same kind: this position less `other`.
     #[must_use]
     pub fn minus(self, other: Self) -> Self {
         match self {
@@ -77,7 +77,7 @@ impl AxisPosition {
 }
 
 impl std::fmt::Display for AxisPosition {
-    /// With three decimals, or the precision of the format (`{:.1}`).
+    /// Prints three decimals, or the precision of the format (`{:.1}`).
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         let digits = f.precision().unwrap_or(3);
         match self {
@@ -90,20 +90,21 @@ impl std::fmt::Display for AxisPosition {
 /// One axis of the rig.
 #[derive(Clone, Debug, PartialEq)]
 pub struct RigAxis {
-    /// As the modes and the command line call it.
+    /// Its name in modes and on the command line.
     pub name: String,
     /// Linear or rotary.
     pub kind: AxisKind,
     /// Lowest and highest position.
     pub range: [AxisPosition; 2],
-    /// Lowest and highest position at which the cameras' pose was calibrated; `None` where nobody said.
+    /// Lowest and highest position at which the cameras' pose was calibrated; `None` where the rig file does not state
+    /// it.
     pub calibrated: Option<[AxisPosition; 2]>,
     /// Encoder counts per metre or revolution.
     pub counts_per_unit: u32,
 }
 
 impl RigAxis {
-    /// Millimetres or radians per count.
+    /// The size of a count in millimetres or radians.
     #[must_use]
     pub fn value_per_count(&self) -> f64 {
         let unit = match self.kind {
@@ -113,20 +114,21 @@ impl RigAxis {
         unit / f64::from(self.counts_per_unit)
     }
 
-    /// Millimetres or radians at `counts`, which may be interpolated. The encoder changes to n when n is reached from
-    /// below, so the middle of a count is half a count further.
+    /// The position in millimetres or radians at `counts`, which may be interpolated.
+    ///
+    /// The encoder changes to n when n is reached from below, so the middle of a count is half a count further.
     #[must_use]
     pub fn value_at(&self, counts: f64) -> f64 {
         (counts + 0.5) * self.value_per_count()
     }
 
-    /// The counts, with a fraction, at `value` millimetres or radians: the inverse of [`Self::value_at`].
+    /// The counts, with a fraction, at `value` in millimetres or radians: the inverse of [`Self::value_at`].
     #[must_use]
     pub fn counts_at(&self, value: f64) -> f64 {
         value / self.value_per_count() - 0.5
     }
 
-    /// Millimetres or radians at `micro` micrometres or microradians, which may be a fraction.
+    /// The position in millimetres or radians at `micro` in micrometres or microradians, which may be a fraction.
     #[must_use]
     pub fn value_from_micro(&self, micro: f64) -> f64 {
         match self.kind {
@@ -135,23 +137,24 @@ impl RigAxis {
         }
     }
 
-    /// The position at `counts`.
+    /// The position at whole `counts`.
     #[must_use]
     pub fn position_at(&self, counts: Counts) -> AxisPosition {
         AxisPosition::from_value(self.kind, self.value_at(f64::from(counts.0)))
     }
 
-    /// Whether `position` is of this kind of axis and within its range.
+    /// Whether `position` is of this axis's kind and within its range.
     #[must_use]
     pub fn contains(&self, position: AxisPosition) -> bool {
         let [low, high] = self.range;
         position.is_of(self.kind) && position.value() >= low.value() && position.value() <= high.value()
     }
 
-    /// Where `position` lies beyond what was calibrated, by more than an encoder and play explain: a sentence.
+    /// A warning in a sentence where `position` lies outside the calibrated range, by more than encoder and play
+    /// explain.
     #[must_use]
     pub fn extrapolation(&self, position: AxisPosition) -> Option<String> {
-        // As a part of the calibrated range.
+        // Tolerance as a fraction of the calibrated range.
         const SLACK: f64 = 0.005;
         let [low, high] = self.calibrated?;
         let slack = SLACK * (high.value() - low.value());
@@ -165,7 +168,8 @@ impl RigAxis {
         })
     }
 
-    /// What of the board's axis contradicts this one: kind or encoder scale.
+    /// A sentence on what the board states otherwise of this axis, its kind or its encoder scale; `None` where both
+    /// agree.
     #[must_use]
     pub fn contradiction(&self, board: &AxisInfo) -> Option<String> {
         if board.kind != self.kind {

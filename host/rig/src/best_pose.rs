@@ -1,4 +1,4 @@
-//! The pose that meets a depth goal with the widest view.
+//! The search for the pose that meets a depth goal with the widest view.
 
 use vergence_vision::{Angle, Length, circle_zones};
 
@@ -6,39 +6,41 @@ use crate::depth_field::DepthField;
 use crate::goal::{DepthGoal, DepthSigma};
 use crate::rig::Rig;
 
-/// Step of the directions that the goal is checked in.
+/// Step of the azimuths at which the goal is checked.
 const DIRECTION_STEP: Angle = Angle::from_deg(1.0);
-/// Poses of the first grid, over all axes.
+/// Number of poses of the first grid, over all axes.
 const FIRST_GRID: f64 = 700.0;
-/// How many poses are kept from grid to grid, and how many finer grids follow around each.
+/// Number of poses kept from grid to grid.
 const KEPT: usize = 4;
+/// Number of finer grids that follow the first.
 const REFINEMENTS: usize = 9;
-/// Poses of a finer grid along each axis; its step is a quarter of the one before.
+/// Steps of a finer grid to each side along each axis; the step is a quarter of the one before.
 const FINER_GRID: i32 = 4;
 
-/// What a pose gives.
+/// A pose rated by a [`DepthGoal`].
 #[derive(Clone, Debug, PartialEq)]
 pub struct RatedPose {
-    /// Where each axis stands, in millimetres or radians.
+    /// The position of each axis, in millimetres or radians.
     pub values: Vec<f64>,
     /// The largest standard deviation over the goal's directions; `None` where one of them is not seen by both cameras.
     pub worst: Option<Length>,
-    /// How much of the circle at the goal's range at least one camera sees.
+    /// Angle of the circle at the goal's range that at least one camera sees.
     pub seen: Angle,
-    /// How much of it both see.
+    /// Angle of that circle that both cameras see.
     pub stereo: Angle,
-    /// What is lacking: zero where the goal is met.
+    /// Measure of how far the goal is missed; zero where it is met.
     shortfall: f64,
 }
 
 impl RatedPose {
-    /// Whether the goal is met.
+    /// Whether the pose meets the goal.
     #[must_use]
     pub fn meets_goal(&self) -> bool {
         self.shortfall <= 0.0
     }
 
-    /// Whether this pose is to be preferred: the goal met, then the wider view, then the smaller sigma.
+    /// Whether this pose is preferred to `other`: first by the goal met, then by the wider view, then by the smaller
+    /// sigma.
     #[must_use]
     pub fn is_better_than(&self, other: &Self) -> bool {
         let sigma = |pose: &Self| pose.worst.map_or(f64::INFINITY, Length::mm);
@@ -49,7 +51,8 @@ impl RatedPose {
 }
 
 impl Rig {
-    /// What the pose with the axes at `values` gives for `goal`, for matches known to `pixel_sigma` pixels.
+    /// Rates the pose with the axes at `values` (millimetres or radians) by `goal`, for matches with a standard
+    /// deviation of `pixel_sigma` pixels.
     #[must_use]
     pub fn rate_pose(&self, values: &[f64], goal: &DepthGoal, pixel_sigma: f64) -> RatedPose {
         let field = DepthField::new(self, values, pixel_sigma);
@@ -69,8 +72,10 @@ impl Rig {
                 None => unseen += 1,
             }
         }
-        let zones = circle_zones(&field.eyes(), &field.middle(), goal.range).map(|map| map.zones).unwrap_or_default();
-        // A direction that is not seen is worse than any sigma; the share of them leads the search to where all are.
+        let zones =
+            circle_zones(&field.cameras(), &field.middle(), goal.range).map(|map| map.zones).unwrap_or_default();
+        // An unseen direction counts more than any sigma; their fraction leads the search to poses that see all
+        // directions.
         let lacking = (worst / goal.limit.mm() - 1.0).max(0.0);
         let shortfall = lacking / (1.0 + lacking) + f64::from(unseen) / f64::from(count) * 1e3;
         RatedPose {
@@ -82,8 +87,10 @@ impl Rig {
         }
     }
 
-    /// The pose that meets `goal` with the widest view, or where none does, the one that comes nearest. Found on grids over
-    /// the axes' ranges, each finer around the best of the one before.
+    /// Finds the pose that meets `goal` with the widest view, or where none meets it, the one that comes nearest.
+    ///
+    /// The search runs on grids over the axes' ranges, each finer around the best poses of the one before.
+    /// `pixel_sigma` is the standard deviation of matches in pixels.
     #[must_use]
     pub fn best_pose(&self, goal: &DepthGoal, pixel_sigma: f64) -> RatedPose {
         let ranges: Vec<[f64; 2]> = self.axes.iter().map(|axis| axis.range.map(|end| end.value())).collect();
@@ -110,7 +117,7 @@ impl Rig {
     }
 }
 
-/// Every combination of `value(axis, index)` over the axes.
+/// All combinations of `value(axis, index)` over the axes.
 fn grid(axes: usize, indices: std::ops::Range<i32>, value: impl Fn(usize, i32) -> f64) -> Vec<Vec<f64>> {
     (0..axes).fold(vec![Vec::new()], |poses, axis| {
         let longer = |pose: &Vec<f64>| -> Vec<Vec<f64>> {
@@ -120,7 +127,7 @@ fn grid(axes: usize, indices: std::ops::Range<i32>, value: impl Fn(usize, i32) -
     })
 }
 
-/// Puts `pose` among the best, in order; the first found wins a tie.
+/// Inserts `pose` in order among the best; of equal poses the first found stays ahead.
 fn keep(best: &mut Vec<RatedPose>, pose: RatedPose) {
     if best.iter().any(|other| other.values == pose.values) {
         return;

@@ -1,18 +1,18 @@
-//! A camera as TOML: the table that rig files and calibrations share.
+//! Cameras as TOML: the table that rig files and camera files share.
 
 use serde::{Deserialize, Serialize};
 use vergence_vision::{Angle, ImageSize, InvalidLens, KannalaBrandt, OpenCvFisheye, Time};
 
-use crate::moving::Shutter;
+use crate::exposure::Shutter;
 use crate::text::{angle_text, optional_quantity, time_text};
 
-/// The keys of a camera table. Coefficients as in OpenCV fisheye and Kalibr equidistant files.
+/// The keys of a camera table, with coefficients as in OpenCV fisheye and Kalibr equidistant files.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct CameraTable {
     /// Width and height in pixels.
     pub size: [u32; 2],
-    /// Half the field. Absent: as far as the polynomial is valid and the image reaches.
+    /// Half the field of view. If absent, [`OpenCvFisheye::largest_theta`].
     #[serde(
         default,
         deserialize_with = "optional_quantity",
@@ -20,8 +20,8 @@ pub struct CameraTable {
         skip_serializing_if = "Option::is_none"
     )]
     pub theta_max: Option<Angle>,
-    /// Of a rolling shutter: from the exposure of one row to the next one's; negative where the image is read from the
-    /// bottom. Absent: all rows are exposed at once.
+    /// Time from the exposure of one row to that of the next, of a rolling shutter; negative where the image is read
+    /// from the bottom. If absent, all rows are exposed at once.
     #[serde(
         default,
         deserialize_with = "optional_quantity",
@@ -33,22 +33,22 @@ pub struct CameraTable {
     pub fx: f64,
     /// Vertical focal length in pixels.
     pub fy: f64,
-    /// Principal point.
+    /// Column of the principal point in pixels.
     pub cx: f64,
-    /// Principal point.
+    /// Row of the principal point in pixels.
     pub cy: f64,
-    /// Of θ³, as a ratio to θ.
+    /// Coefficient of θ³ relative to that of θ.
     pub opencv_k1: f64,
-    /// Of θ⁵.
+    /// Coefficient of θ⁵ relative to that of θ.
     pub opencv_k2: f64,
-    /// Of θ⁷.
+    /// Coefficient of θ⁷ relative to that of θ.
     pub opencv_k3: f64,
-    /// Of θ⁹.
+    /// Coefficient of θ⁹ relative to that of θ.
     pub opencv_k4: f64,
 }
 
 impl CameraTable {
-    /// The table of a camera with a global shutter.
+    /// Makes the table of a camera with a global shutter.
     #[must_use]
     pub fn of(camera: &KannalaBrandt) -> Self {
         let OpenCvFisheye { fx, fy, cx, cy, k: [opencv_k1, opencv_k2, opencv_k3, opencv_k4] } = camera.to_opencv();
@@ -58,7 +58,7 @@ impl CameraTable {
         Self { size, theta_max, line_time, fx, fy, cx, cy, opencv_k1, opencv_k2, opencv_k3, opencv_k4 }
     }
 
-    /// The same with another shutter.
+    /// Replaces the shutter.
     #[must_use]
     pub fn with_shutter(self, shutter: Shutter) -> Self {
         let line_time = match shutter {
@@ -68,13 +68,13 @@ impl CameraTable {
         Self { line_time, ..self }
     }
 
-    /// How the camera exposes its rows.
+    /// The shutter of the camera.
     #[must_use]
     pub fn shutter(&self) -> Shutter {
         self.line_time.map_or(Shutter::Global, |time| Shutter::Rolling { line_us: time.us() })
     }
 
-    /// The camera of the table.
+    /// Makes the lens that the table describes.
     ///
     /// # Errors
     /// [`InvalidLens`] where no lens has these parameters.
@@ -91,35 +91,35 @@ impl CameraTable {
     }
 }
 
-/// A calibrated camera: the table, how sure it is, and where it comes from.
+/// A camera file: the camera, its calibration's figures, and its provenance.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct CameraDocument {
     /// The camera.
     pub camera: CameraTable,
-    /// How sure it is; absent in files written by hand.
+    /// The calibration's figures; absent in files written by hand.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub calibration: Option<CalibrationTable>,
-    /// Where it comes from.
+    /// The provenance; absent in files written by hand.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub provenance: Option<Provenance>,
 }
 
-/// How sure a camera is.
+/// The figures of a camera's calibration.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct CalibrationTable {
-    /// Point RMS of the corners that the fit kept, in pixels.
+    /// RMS of the corner residuals (distance in the image) in pixels, over the corners that the fit kept.
     pub rms_inlier_px: f64,
-    /// How many it kept.
+    /// Number of corners that the fit kept.
     pub corners: usize,
-    /// From how many views.
+    /// Number of views of the target.
     pub views: usize,
-    /// Covariance of fx, fy, cx, cy, opencv_k1 to opencv_k4, row by row.
+    /// Covariance of fx, fy, cx, cy in pixels and opencv_k1 to opencv_k4, row by row.
     pub covariance: [[f64; 8]; 8],
 }
 
-/// Where a calibration comes from.
+/// Provenance of a calibration.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Provenance {
@@ -127,7 +127,7 @@ pub struct Provenance {
     pub program: String,
     /// SHA-256 over all inputs, in hexadecimal.
     pub inputs_sha256: String,
-    /// When, as the caller said it.
+    /// The date that the caller stated.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub date: Option<String>,
 }

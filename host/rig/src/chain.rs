@@ -1,20 +1,21 @@
-//! Screw chains: where the axes take a camera.
+//! Screw chains: the pose of a camera as a function of the axis positions.
 //!
 //! Product of exponentials, R. Brockett 1984; K. Lynch and F. Park, *Modern Robotics*, 2017, §4.1.1:
-//! `base_from_camera(q) = exp(ξ₁ s₁ q₁) exp(ξ₂ s₂ q₂) ... M`, the screws ξ given in the base frame with all axes at zero.
+//! `base_from_camera(q) = exp(ξ₁ s₁ q₁) exp(ξ₂ s₂ q₂) ... M`, with the screws ξ in the base frame when all axes are at
+//! zero.
 
 use nalgebra::{Isometry3, Translation3, Unit, UnitQuaternion, Vector3};
 use vergence_vision::{Base, Frame, Point, Transform};
 
-/// One screw of unit pitch-free motion.
+/// A unit screw: a translation or a rotation, in the base frame with all axes at zero.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Screw {
-    /// Slides along a direction, by millimetres.
+    /// Translation along a direction, by an amount in millimetres.
     Slide {
-        /// Which way.
+        /// Its direction.
         along: Unit<Vector3<f64>>,
     },
-    /// Turns about a line, by radians.
+    /// Rotation about a line, by an amount in radians.
     Turn {
         /// Direction of the line; right-handed.
         about: Unit<Vector3<f64>>,
@@ -23,18 +24,18 @@ pub enum Screw {
     },
 }
 
-/// A screw, which axis drives it, and what share of the axis position acts.
+/// A screw with the axis that drives it.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Link {
     /// Index of the axis in the rig.
     pub axis: usize,
-    /// Times the axis position is the amount of motion.
+    /// Factor from the axis position to the amount of motion.
     pub share: f64,
-    /// What moves, with all axes at zero.
+    /// The screw, with all axes at zero.
     pub screw: Screw,
 }
 
-/// The way from the base to a camera.
+/// The screws from the base to a camera, and the camera's pose with all axes at zero.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Chain<C: Frame> {
     pub(crate) links: Vec<Link>,
@@ -42,7 +43,7 @@ pub struct Chain<C: Frame> {
 }
 
 impl Screw {
-    /// The motion by `amount` millimetres or radians.
+    /// The motion by `amount` in millimetres or radians.
     #[must_use]
     pub fn displacement(&self, amount: f64) -> Isometry3<f64> {
         match self {
@@ -57,13 +58,13 @@ impl Screw {
 }
 
 impl<C: Frame> Chain<C> {
-    /// From its links, in the order base to camera, and the camera's pose with all axes at zero.
+    /// Makes a chain from its links, in the order base to camera, and the camera's pose with all axes at zero.
     #[must_use]
     pub const fn new(links: Vec<Link>, at_zero: Transform<Base, C>) -> Self {
         Self { links, at_zero }
     }
 
-    /// In the order base to camera.
+    /// The links, in the order base to camera.
     #[must_use]
     pub fn links(&self) -> &[Link] {
         &self.links
@@ -75,7 +76,7 @@ impl<C: Frame> Chain<C> {
         self.at_zero
     }
 
-    /// The camera's pose with the axes at `values` (millimetres or radians each). An axis that has no value is at zero.
+    /// The camera's pose with the axes at `values` (millimetres or radians each). Axes without a value are at zero.
     #[must_use]
     pub fn base_from_camera(&self, values: &[f64]) -> Transform<Base, C> {
         let moved = self.links.iter().fold(Isometry3::identity(), |pose, link| {

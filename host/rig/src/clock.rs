@@ -1,11 +1,11 @@
-//! Which instant on the board's clock an instant on the host's clock is, and the other way round.
+//! Conversion of instants between the board's clock and the host's.
 //!
-//! Every exchange of four timestamps (D. Mills, RFC 5905 §8) limits the board's clock from both sides: the probe cannot
-//! arrive before it was sent, nor the reply leave after it was heard, each by the time its bytes take on the wire. A line
-//! of offset and drift is laid between the limits of the last minutes, by linear programming as in Moon, Skelly and
-//! Towsley, "Estimation and removal of clock skew from network delay measurements" (INFOCOM 1999). Only the quickest
-//! probes and the quickest replies touch that line: a minimum filter for each direction, so one leg that was delayed,
-//! by whatever time, moves nothing. What the limits leave open is the error that is stated.
+//! Every exchange of four timestamps (D. Mills, RFC 5905 §8) limits the offset of the board's clock from both sides:
+//! the probe cannot arrive before it was sent, and the reply cannot leave after it was received, each by the time its
+//! bytes take on the wire. The lines of offset and drift that the limits of the last minutes allow are found by linear
+//! programming, as in Moon, Skelly and Towsley, "Estimation and removal of clock skew from network delay measurements"
+//! (INFOCOM 1999). Only the quickest probes and replies constrain them, which is a minimum filter for each direction: a
+//! message delayed by any time has no effect. The stated error is the range that the limits leave.
 
 mod limit;
 mod line;
@@ -17,56 +17,57 @@ use line::Lines;
 use vergence_protocol::Microseconds;
 use wire::WireTimes;
 
-/// How many exchanges are remembered: two minutes at one each second. Older ones tell less than the drift has changed.
+/// Number of exchanges kept: two minutes at one each second. Over a longer time the drift changes by more than they
+/// tell.
 const KEPT: usize = 128;
-/// The clock is lost when more probes than this are without answer.
+/// The clock counts as lost when more probes than this are unanswered.
 const MOST_UNANSWERED: u32 = 4;
 
-/// One probe and its reply: sent and received on the host clock, arrived and left on the board clock.
+/// The four timestamps of a probe and its reply: `t0` and `t3` on the host's clock, `t1` and `t2` on the board's.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Exchange {
-    /// Host sent the probe.
+    /// The host sent the probe.
     pub t0: Microseconds,
-    /// Board received it.
+    /// The board received the probe.
     pub t1: Microseconds,
-    /// Board sent the reply.
+    /// The board sent the reply.
     pub t2: Microseconds,
-    /// Host received it.
+    /// The host received the reply.
     pub t3: Microseconds,
 }
 
-/// An instant on the board's clock and how far it may be off.
+/// An instant on the board's clock with the bound of its error.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct BoardInstant {
     /// Microseconds since the board started.
     pub us: f64,
-    /// Microseconds; with at least 95 % probability the error is no larger, and nothing is known of it within: treat it
-    /// as uniform over plus or minus this.
+    /// Bound of the error in microseconds, which holds with at least 95 % probability. Within it the error counts as
+    /// uniform.
     pub error_us: f64,
 }
 
-/// An instant on the host's clock and how far it may be off.
+/// An instant on the host's clock with the bound of its error.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct HostInstant {
     /// Microseconds on the host's clock.
     pub us: f64,
-    /// As of [`BoardInstant::error_us`].
+    /// Bound of the error in microseconds, like [`BoardInstant::error_us`].
     pub error_us: f64,
 }
 
-/// How much faster than the host's clock the board's runs, at the latest exchange.
+/// The drift of the board's clock against the host's, at the latest exchange.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ClockDrift {
-    /// Parts per million; negative where the board is slower.
+    /// Drift in parts per million; negative where the board's clock is slower.
     pub ppm: f64,
-    /// Bound of its error in parts per million, as of [`BoardInstant::error_us`].
+    /// Bound of its error in parts per million, like [`BoardInstant::error_us`].
     pub error_ppm: f64,
 }
 
-/// The relation of the two clocks.
+/// The estimated relation of the board's clock and the host's.
 ///
-/// [`Default`] knows nothing of the wire and takes all of the round trip for delay; [`at_baud`](Self::at_baud) knows how
-/// long the frames themselves take.
+/// [`Default`] counts the whole round trip as unknown delay; [`at_baud`](Self::at_baud) subtracts the time that the
+/// frames themselves take on the wire.
 #[derive(Clone, Debug, Default)]
 pub struct ClockMap {
     baud: Option<u32>,
@@ -75,7 +76,7 @@ pub struct ClockMap {
     lines: Option<Lines>,
 }
 
-/// An exchange and what of it the wire took.
+/// An exchange with the time that its frames took on the wire.
 #[derive(Clone, Copy, Debug)]
 struct Timed {
     exchange: Exchange,
@@ -83,20 +84,20 @@ struct Timed {
 }
 
 impl ClockMap {
-    /// Over a wire of `baud` bits each second and ten bits to a byte. Where exchanges are faster than that, as on a USB
-    /// port that only pretends to have a baud rate, it is no longer believed.
+    /// Makes a map for a wire of `baud` bits per second and ten bits per byte. The baud rate is dropped once an
+    /// exchange is faster than it allows, as on a USB port where it has no meaning.
     #[must_use]
     pub fn at_baud(baud: u32) -> Self {
         Self { baud: Some(baud), ..Self::default() }
     }
 
-    /// A probe goes out.
+    /// Counts a probe that was sent.
     pub fn probe_sent(&mut self) {
         self.unanswered = self.unanswered.saturating_add(1);
     }
 
-    /// Takes one exchange. One that cannot have happened, such as a reply before its probe, only counts as an answer; one
-    /// that contradicts earlier exchanges makes them forgotten, for then the board began anew.
+    /// Adds an exchange. An impossible one, such as a reply before its probe, only counts as an answer. One that
+    /// contradicts earlier exchanges discards them, because the board has restarted.
     pub fn observe(&mut self, exchange: Exchange) {
         self.unanswered = 0;
         if !exchange.is_possible() {
@@ -115,40 +116,43 @@ impl ClockMap {
         self.lay_lines();
     }
 
-    /// The board's clock at `host` on the host's clock; `None` before the first exchange. It never runs backwards
-    /// between two exchanges, and the error grows with the distance from the latest.
+    /// Converts `host` on the host's clock to the board's clock; `None` before the first exchange.
+    ///
+    /// Between two exchanges the result never runs backwards, and its error grows with the distance from the latest
+    /// exchange.
     #[must_use]
     pub fn board_at(&self, host: Microseconds) -> Option<BoardInstant> {
         let offset = self.lines.as_ref()?.offset_at(host.0 as f64);
         Some(BoardInstant { us: host.0 as f64 + offset.middle, error_us: offset.error })
     }
 
-    /// The host's clock at `board` on the board's clock, the inverse of [`board_at`](Self::board_at); `None` before the
-    /// first exchange.
+    /// Converts `board` on the board's clock to the host's clock, the inverse of [`board_at`](Self::board_at); `None`
+    /// before the first exchange.
     #[must_use]
     pub fn host_at(&self, board: Microseconds) -> Option<HostInstant> {
         let lines = self.lines.as_ref()?;
         let board = board.0 as f64;
-        // The offset changes by less than a thousandth of the time, so each pass leaves a thousandth of the error: from
-        // a day, below a nanosecond.
+        // The offset changes by less than a thousandth of the time, so each pass reduces the error to a thousandth:
+        // from a day to below a nanosecond.
         let host = (0..6).fold(lines.reference(), |host, _| board - lines.offset_at(host).middle);
         Some(HostInstant { us: host, error_us: lines.offset_at(host).error })
     }
 
-    /// The drift; `None` before the first exchange.
+    /// The drift of the board's clock; `None` before the first exchange.
     #[must_use]
     pub fn drift(&self) -> Option<ClockDrift> {
         let drift = self.lines.as_ref()?.drift();
         Some(ClockDrift { ppm: drift.middle * 1e6, error_ppm: drift.error * 1e6 })
     }
 
-    /// Whether four probes went unanswered and a fifth is on its way. The next exchange ends it.
+    /// Whether the clock is lost: four probes are unanswered and a fifth is sent. The next exchange ends this state.
     #[must_use]
     pub fn is_lost(&self) -> bool {
         self.unanswered > MOST_UNANSWERED
     }
 
-    /// From the newest exchange back to the first that contradicts those after it; that one and all before are forgotten.
+    /// Applies the limits from the newest exchange back to the first that contradicts later ones; that one and all
+    /// older ones are discarded.
     fn lay_lines(&mut self) {
         self.lines = self.exchanges.back().and_then(|newest| Lines::through(&newest.exchange));
         let mut agreeing = 0;

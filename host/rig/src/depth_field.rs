@@ -1,15 +1,14 @@
-//! How well depth will be measured, before anything moves.
+//! Prediction of the uncertainty of depth, before anything moves.
 
 use nalgebra::{Matrix3, Vector3};
 use vergence_vision::{
-    Angle, Base, Eye, Left, Length, Point, PointUncertainty, SharedCovariance, StereoPair, Transform,
+    Angle, Base, Left, Length, PlacedCamera, Point, PointUncertainty, SharedCovariance, StereoPair, Transform,
 };
 
 use crate::pose::RigPose;
 use crate::rig::Rig;
 
-/// The predicted uncertainty of points around a rig in one pose, from the noise of matched pixels, the calibration and the
-/// encoders.
+/// The predicted uncertainty of points around a rig in one pose, from pixel noise, calibration and encoders.
 #[derive(Clone, Debug)]
 pub struct DepthField<'a> {
     rig: &'a Rig,
@@ -18,12 +17,12 @@ pub struct DepthField<'a> {
     pixel_sigma: f64,
 }
 
-/// What is predicted for one point.
+/// The predicted uncertainty of one point.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct PredictedDepth {
     /// The point in the left frame.
     pub point: Point<Left>,
-    /// Its covariance, mm², in the base's axes.
+    /// Its covariance in mm², along the axes of the base frame.
     pub covariance: Matrix3<f64>,
     /// Standard deviation of its forward coordinate.
     pub sigma_forward: Length,
@@ -32,8 +31,8 @@ pub struct PredictedDepth {
 }
 
 impl<'a> DepthField<'a> {
-    /// With the axes standing at `values` (millimetres or radians), read by the encoders, and matches known to `pixel_sigma`
-    /// pixels in each coordinate of each image.
+    /// Prepares the prediction for the axes at rest at `values` (millimetres or radians), and matches with a standard
+    /// deviation of `pixel_sigma` pixels in each coordinate of each image.
     #[must_use]
     pub fn new(rig: &'a Rig, values: &[f64], pixel_sigma: f64) -> Self {
         let pose = rig.pose_read_at(values);
@@ -41,37 +40,39 @@ impl<'a> DepthField<'a> {
         Self { rig, pose, shared, pixel_sigma }
     }
 
-    /// The pose predicted for.
+    /// The pose of the prediction.
     #[must_use]
     pub const fn pose(&self) -> &RigPose {
         &self.pose
     }
 
-    /// Both cameras in their places.
+    /// Both cameras with their poses in the base frame.
     #[must_use]
-    pub fn eyes(&self) -> [Eye<'a>; 2] {
+    pub fn cameras(&self) -> [PlacedCamera<'a>; 2] {
         let (left, right) = (self.pose.base_from_left, self.pose.base_from_left * self.pose.left_from_right);
         [
-            Eye { lens: &self.rig.left_camera, base_from_camera: left.renamed(), body: None },
-            Eye { lens: &self.rig.right_camera, base_from_camera: right.renamed(), body: None },
+            PlacedCamera { lens: &self.rig.left_camera, base_from_camera: left.renamed(), body: None },
+            PlacedCamera { lens: &self.rig.right_camera, base_from_camera: right.renamed(), body: None },
         ]
     }
 
-    /// Halfway between the cameras.
+    /// The middle between both optical centres, in the base frame.
     #[must_use]
     pub fn middle(&self) -> Point<Base> {
-        let [left, right] = self.eyes().map(|eye| eye.base_from_camera.origin().mm());
+        let [left, right] = self.cameras().map(|camera| camera.base_from_camera.origin().mm());
         Point::from_mm((left + right) / 2.0)
     }
 
-    /// For the point at `range` from the middle of both cameras, at an azimuth to the right and an elevation upwards.
-    /// `None` where not both cameras see it, and on the baseline.
+    /// Predicts the uncertainty of the point at `range` from the middle of both cameras, at `azimuth` to the right and
+    /// `elevation` upwards.
+    ///
+    /// `None` where not both cameras see the point, and on the baseline.
     #[must_use]
     pub fn at(&self, azimuth: Angle, elevation: Angle, range: Length) -> Option<PredictedDepth> {
         let (az, el) = (azimuth.rad(), elevation.rad());
         let direction = Vector3::new(az.sin() * el.cos(), -el.sin(), az.cos() * el.cos());
         let in_base = Point::<Base>::from_mm(self.middle().mm() + direction * range.mm());
-        if !self.eyes().iter().all(|eye| eye.sees(&in_base)) {
+        if !self.cameras().iter().all(|camera| camera.sees(&in_base)) {
             return None;
         }
         let left_from_base: Transform<Left, Base> = self.pose.base_from_left.inverse();

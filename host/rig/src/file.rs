@@ -1,39 +1,40 @@
-//! The rig file: TOML with units in the values; an unknown key is an error.
+//! Parsing of the rig file: TOML with units in the values, where an unknown key is an error.
 
-use std::collections::BTreeMap;
+mod modes;
 
 use nalgebra::{Unit, UnitQuaternion, Vector3};
 use serde::Deserialize;
 use vergence_protocol::{AxisKind, MAX_AXES};
 use vergence_vision::{Angle, Frame, InvalidLens, KannalaBrandt, Length, Point, Transform};
 
+use self::modes::ModesFile;
 use crate::axis::{AxisPosition, RigAxis};
 use crate::camera_file::{CameraTable, Provenance};
 use crate::chain::{Chain, Link, Screw};
-use crate::rig::{Mode, Rig};
+use crate::rig::Rig;
 use crate::text::{quantities, quantity};
 
 /// What is wrong with a rig file.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum RigError {
-    /// Not TOML, a missing or unknown key, or a value of the wrong form. Says the line.
+    /// The text is not TOML, a key is missing or unknown, or a value has the wrong form. The message names the line.
     #[error("{0}")]
     Syntax(String),
-    /// A camera that cannot be.
+    /// The parameters of a camera describe no lens.
     #[error("[{camera}.camera]: {lens}")]
     Camera {
         /// `left` or `right`.
         camera: &'static str,
-        /// Why not.
+        /// What is wrong with them.
         lens: InvalidLens,
     },
-    /// A value contradicts another.
+    /// A value is out of its range or contradicts another; the message names both.
     #[error("{0}")]
     Contradiction(String),
 }
 
-/// No stage is longer, in micro-units: positions, and what lies beyond them, fit the wire with room to spare.
+/// Largest position in micrometres or microradians. Positions and margins beyond them fit the wire's 32 bits.
 const LONGEST: u32 = 100_000_000;
 
 #[derive(Deserialize)]
@@ -43,12 +44,12 @@ struct RigFile {
     #[serde(default)]
     axis: Vec<AxisFile>,
     #[serde(default)]
-    modes: BTreeMap<String, BTreeMap<String, String>>,
+    modes: ModesFile,
     left: SideFile,
     right: SideFile,
     #[serde(default)]
     calibration_sigma: SigmaFile,
-    /// For people; nothing depends on it.
+    /// Information for people; nothing depends on it.
     #[serde(default)]
     #[allow(dead_code, reason = "checked for its form only")]
     provenance: Option<Provenance>,
@@ -102,7 +103,7 @@ struct ScrewFile {
     through: [Length; 3],
 }
 
-/// Without a word in the file: the bench's calibration goal.
+/// Standard deviations of the calibrated pose. The default is the bench's calibration goal.
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields, default)]
 struct SigmaFile {
@@ -119,14 +120,22 @@ impl Default for SigmaFile {
 }
 
 impl Rig {
-    /// Reads and checks a rig file.
+    /// Parses and checks the content of a rig file.
+    ///
+    /// ```
+    /// # use vergence_rig::{BENCH_TOML, Rig};
+    /// let rig = Rig::from_toml(BENCH_TOML)?;
+    /// let herbivore = rig.mode("herbivore").expect("a mode of the bench");
+    /// assert_eq!(herbivore.targets[0].to_string(), "145.000 mm");
+    /// # Ok::<(), vergence_rig::RigError>(())
+    /// ```
     ///
     /// # Errors
-    /// [`RigError`] says which key or value and why.
+    /// [`RigError`] names the key or value and what is wrong with it.
     pub fn from_toml(text: &str) -> Result<Self, RigError> {
         let file: RigFile = toml::from_str(text).map_err(|error| RigError::Syntax(error.to_string()))?;
         if file.axis.len() > MAX_AXES {
-            return Err(contradiction(format!("{} axes; a controller has at most {MAX_AXES}", file.axis.len())));
+            return Err(contradiction(format!("{} axes; a board has at most {MAX_AXES}", file.axis.len())));
         }
         let axes = file.axis.iter().map(axis).collect::<Result<Vec<_>, _>>()?;
         for (index, axis) in axes.iter().enumerate() {
@@ -134,13 +143,15 @@ impl Rig {
                 return Err(contradiction(format!("two axes are called '{}'", axis.name)));
             }
         }
-        let modes = (1u8..)
-            .zip(&file.modes)
-            .map(|(number, (name, positions))| mode(number, name, positions, &axes))
-            .collect::<Result<_, _>>()?;
+        if axes.iter().any(|axis| axis.name == modes::NUMBER) {
+            return Err(contradiction(format!(
+                "an axis cannot be called '{0}': in a mode, {0} is its number",
+                modes::NUMBER
+            )));
+        }
         Ok(Self {
             name: file.name,
-            modes,
+            modes: modes::modes(&file.modes, &axes)?,
             left_camera: camera("left", &file.left.camera)?,
             right_camera: camera("right", &file.right.camera)?,
             shutters: [&file.left, &file.right].map(|side| side.camera.shutter()),
@@ -173,7 +184,9 @@ fn axis(file: &AxisFile) -> Result<RigAxis, RigError> {
     let other = if kind == AxisKind::Linear { file.counts_per_revolution } else { file.counts_per_metre };
     let counts_per_unit = match (counts, other) {
         (Some(counts), None) if counts > 0 => counts,
-        _ => return Err(contradiction(format!("axis '{name}' needs {key}, positive, and no other scale"))),
+        _ => {
+            return Err(contradiction(format!("axis '{name}' needs a positive {key}, and no scale of the other kind")));
+        }
     };
     let place = format!("range of axis '{name}'");
     let range = interval(kind, &file.range, &place)?;
@@ -186,37 +199,13 @@ fn axis(file: &AxisFile) -> Result<RigAxis, RigError> {
     Ok(RigAxis { name: name.clone(), kind, range, calibrated, counts_per_unit })
 }
 
-/// From a lower to a higher position.
+/// Parses the ends of a range, of which the first must be the lower.
 fn interval(kind: AxisKind, [low, high]: &[String; 2], place: &str) -> Result<[AxisPosition; 2], RigError> {
     let ends = [position(kind, low, place)?, position(kind, high, place)?];
     if ends[0].value() >= ends[1].value() {
         return Err(contradiction(format!("{place}: {low} is not below {high}")));
     }
     Ok(ends)
-}
-
-fn mode(number: u8, name: &str, positions: &BTreeMap<String, String>, axes: &[RigAxis]) -> Result<Mode, RigError> {
-    if let Some(stranger) = positions.keys().find(|key| axes.iter().all(|axis| axis.name != **key)) {
-        return Err(contradiction(format!("mode '{name}' names an axis '{stranger}' that the rig does not have")));
-    }
-    let targets = axes
-        .iter()
-        .map(|axis| {
-            let text = positions
-                .get(&axis.name)
-                .ok_or_else(|| contradiction(format!("mode '{name}' says nothing of axis '{}'", axis.name)))?;
-            let target = position(axis.kind, text, &format!("mode '{name}', axis '{}'", axis.name))?;
-            if !axis.contains(target) {
-                let [low, high] = axis.range;
-                return Err(contradiction(format!(
-                    "mode '{name}' puts axis '{}' at {target}, outside {low} to {high}",
-                    axis.name
-                )));
-            }
-            Ok(target)
-        })
-        .collect::<Result<_, _>>()?;
-    Ok(Mode { name: name.to_owned(), number: vergence_protocol::Mode(number), targets })
 }
 
 fn camera(side: &'static str, table: &CameraTable) -> Result<KannalaBrandt, RigError> {
@@ -239,7 +228,7 @@ fn link(side: &str, file: &ScrewFile, axes: &[RigAxis]) -> Result<Link, RigError
     let direction = |xyz: [f64; 3]| {
         Unit::try_new(Vector3::from(xyz), 1e-9)
             .filter(|unit| unit.iter().all(|c| c.is_finite()))
-            .ok_or_else(|| contradiction(format!("{place}: the direction has no length")))
+            .ok_or_else(|| contradiction(format!("{place}: the direction must not be zero")))
     };
     let kind = axes.get(axis).map(|axis| axis.kind);
     let screw = match (file.slide_along, file.turn_about, kind) {

@@ -1,33 +1,40 @@
-//! What depth shall be measured how well: `sigma_z <= 1mm at 350mm over +-40deg`.
+//! Goals of depth accuracy, such as `sigma_z <= 1mm at 350mm over +-40deg`.
 
 use std::fmt;
 use std::str::FromStr;
 
 use vergence_vision::{Angle, Length};
 
-/// Which standard deviation.
+/// The standard deviation that a [`DepthGoal`] limits.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum DepthSigma {
-    /// Of the coordinate along forward: `sigma_z`.
+    /// `sigma_z`, of the coordinate along forward.
     Forward,
-    /// Of the distance from the middle of both cameras: `sigma_range`.
+    /// `sigma_range`, of the distance from the middle of both cameras.
     Range,
 }
 
-/// A standard deviation that shall not be exceeded in the horizontal plane, forward and to both sides.
+/// A limit of the standard deviation of depth, in the horizontal plane at one range, over azimuths around forward.
+///
+/// ```
+/// # use vergence_rig::DepthGoal;
+/// let goal: DepthGoal = "sigma_z <= 1mm at 350mm over +-40deg".parse()?;
+/// assert_eq!((goal.limit.mm(), goal.range.mm()), (1.0, 350.0));
+/// # Ok::<(), vergence_rig::InvalidGoal>(())
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct DepthGoal {
-    /// Of what.
+    /// The standard deviation that is limited.
     pub sigma: DepthSigma,
-    /// The largest allowed.
+    /// Its largest allowed value.
     pub limit: Length,
     /// Distance from the middle of both cameras.
     pub range: Length,
-    /// How far to each side of forward.
+    /// Largest azimuth to each side of forward.
     pub half_width: Angle,
 }
 
-/// A text that is no goal.
+/// Error of parsing a [`DepthGoal`].
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[error("'{0}' is no goal: write it as 'sigma_z <= 1mm at 350mm over +-40deg' (or sigma_range)")]
 pub struct InvalidGoal(String);

@@ -1,9 +1,10 @@
-//! The rig: its description, its kinematics, and where its cameras were at an exposure.
+//! The rig: its description, its kinematics, and the pose of its cameras at an exposure.
 //!
-//! A [`Rig`] is read from TOML. Its axes turn encoder counts into positions, a screw chain per camera turns positions into
-//! `base_from_left` and `base_from_right`, a [`ClockMap`] brings the host's instants onto the board's clock, and a
-//! [`JointTrack`] tells the counts at that instant. Together they give a [`RigPose`], or one for every row of the images
-//! ([`moving_cloud`]). A [`DepthField`] tells how well a pose will measure, before anything moves.
+//! A [`Rig`] is read from TOML ([`Rig::from_toml`]). Its axes convert encoder counts to positions, a screw chain per
+//! camera converts positions to `base_from_left` and `base_from_right`, a [`ClockMap`] converts the host's instants to
+//! the board's clock, and a [`JointTrack`] interpolates the counts at that instant. Together they give a [`RigPose`],
+//! or one for every row of the images ([`moving_cloud`]). A [`DepthField`] predicts how well a pose will measure,
+//! before anything moves.
 //!
 //! Everything is a pure function of its arguments: no file is read here.
 
@@ -13,10 +14,13 @@ mod camera_file;
 mod chain;
 mod clock;
 mod depth_field;
+mod exposure;
+mod exposure_timing;
 mod file;
-mod frame_pairing;
 mod goal;
+mod image_pairing;
 mod interchange;
+mod mode;
 mod moving;
 mod pose;
 mod rig;
@@ -30,14 +34,17 @@ pub use camera_file::{CalibrationTable, CameraDocument, CameraTable, Provenance}
 pub use chain::{Chain, Link, Screw};
 pub use clock::{BoardInstant, ClockDrift, ClockMap, Exchange, HostInstant};
 pub use depth_field::{DepthField, PredictedDepth};
+pub use exposure::{Exposure, PairExposure, Shutter};
+pub use exposure_timing::{ExposureTiming, MiddleOfExposure, SequenceWatch, StampedAt};
 pub use file::RigError;
-pub use frame_pairing::{ExposureDelay, Fate, FramePairing, StampedFrame, TimedEvent};
 pub use goal::{DepthGoal, DepthSigma, InvalidGoal};
+pub use image_pairing::{ExposureDelay, ImagePairing, PairingOutcome, StampedImage, TimedEvent};
 pub use interchange::{Camchain, CameraFormat, InterchangeError, kalibr, opencv};
-pub use moving::{Exposure, MiddlePose, PairExposure, Shutter, middle_pose, moving_cloud};
+pub use mode::{Mode, ReportedMode};
+pub use moving::{MiddlePose, middle_pose, moving_cloud};
 pub use pose::RigPose;
-pub use rig::{Mode, Rig};
+pub use rig::Rig;
 pub use track::{JointSample, JointTrack, Joints, JointsAt, SteadyMotion, TrackGap};
 
-/// The built-in bench, as the TOML file a user would write.
+/// The rig file of the built-in bench, as a user would write it.
 pub const BENCH_TOML: &str = include_str!("bench.toml");

@@ -1,87 +1,24 @@
-//! Measuring while the stages move: every row of both images has its own pose.
-
-use std::time::Duration;
+//! Measurement while the stages move, where every row of both images has its own pose.
 
 use vergence_vision::{
-    Angle, Base, Cloud, CloudPoint, Drop, Gates, Left, PixelPair, StereoPair, Transform, cloud_point,
+    Angle, Base, Cloud, CloudPoint, DropReason, Gates, Left, PixelPair, StereoPair, Transform, cloud_point,
 };
 
-use crate::clock::BoardInstant;
+use crate::exposure::PairExposure;
 use crate::pose::RigPose;
 use crate::rig::Rig;
 use crate::track::{Joints, JointsAt, TrackGap};
 
-/// How a sensor exposes its rows.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub enum Shutter {
-    /// All at once.
-    #[default]
-    Global,
-    /// One after the other.
-    Rolling {
-        /// From the middle of one row's exposure to the next one's, in microseconds; negative where the image is read from
-        /// the bottom.
-        line_us: f64,
-    },
-}
-
-impl Shutter {
-    /// From the middle of one row's exposure to the next one's, in microseconds; zero where all are exposed at once.
-    #[must_use]
-    pub const fn line_us(self) -> f64 {
-        match self {
-            Self::Global => 0.0,
-            Self::Rolling { line_us } => line_us,
-        }
-    }
-
-    /// From the exposure of the first of `rows` rows to that of the last, whichever end is read first.
-    #[must_use]
-    pub fn span(self, rows: u32) -> Duration {
-        let us = self.line_us().abs() * f64::from(rows.saturating_sub(1));
-        Duration::from_nanos((us * 1e3).round() as u64)
-    }
-}
-
-/// When one image was exposed.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Exposure {
-    /// The middle of the exposure of the middle row, board clock.
-    pub middle: BoardInstant,
-    /// How the rows follow.
-    pub shutter: Shutter,
-    /// Rows of the image.
-    pub rows: u32,
-}
-
-impl Exposure {
-    /// The middle of the exposure of row `v`, with the error bound of the image's instant: it is the same for all rows.
-    #[must_use]
-    pub fn at_row(&self, v: f64) -> BoardInstant {
-        let lines = v - 0.5 * (f64::from(self.rows) - 1.0);
-        BoardInstant { us: self.middle.us + lines * self.shutter.line_us(), ..self.middle }
-    }
-}
-
-/// Both images of a pair.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct PairExposure {
-    /// Of the left camera.
-    pub left: Exposure,
-    /// Of the right camera.
-    pub right: Exposure,
-}
-
-/// Where the cameras were when the middle rows of a pair were exposed.
+/// The pose of the cameras at the exposure of the middle rows of a pair.
 #[derive(Clone, Debug, PartialEq)]
 pub struct MiddlePose {
-    /// Of the left camera at its middle row, and of the right camera at its own.
+    /// The pose, with each camera at the exposure of its own middle row.
     pub pose: RigPose,
-    /// How far the relative rotation turned from there to the first or the last rows, whichever is farther.
+    /// Change of the relative rotation between the middle rows and the first or last rows, the larger of both.
     pub sweep: Angle,
 }
 
-/// The pose at the middle rows of a pair, and how much it changes until the others.
+/// Computes the pose at the middle rows of a pair, and its change over the other rows.
 ///
 /// # Errors
 /// [`TrackGap`] where the encoder readings do not cover an exposure.
@@ -97,12 +34,11 @@ pub fn middle_pose(rig: &Rig, joints: &impl Joints, exposure: &PairExposure) -> 
     Ok(MiddlePose { pose, sweep: Angle::from_rad(sweep) })
 }
 
-/// The points of `pairs`, each triangulated with the pose of the left camera when its row was exposed and that of the right
-/// camera when its own was, in the frame of the left camera at its middle row. With each pair stands the standard deviation
-/// of its positions in pixels.
+/// Triangulates matches of two moving cameras, each with the poses of both cameras at the exposure of its own rows.
 ///
-/// The covariance of the pose in `gates` is replaced by that of each point's own pose: it grows with the speed of the
-/// stages and the uncertainty of the exposure's instant.
+/// Each match comes with the standard deviation of its positions in pixels. Points are in the frame of the left camera
+/// at its middle row. The covariance of the pose in `gates` is replaced by that of each point's own pose, which grows
+/// with the speed of the stages and the uncertainty of the exposure's instant.
 ///
 /// # Errors
 /// [`TrackGap`] where the encoder readings do not cover an exposure.
@@ -133,7 +69,7 @@ fn point(
     reference_from_base: &Transform<Left, Base>,
     [left, right]: [&JointsAt; 2],
     gates: &Gates,
-) -> Result<CloudPoint, Drop> {
+) -> Result<CloudPoint, DropReason> {
     let pose = rig.pose_of_each(left, right);
     let pair = StereoPair { left: &rig.left_camera, right: &rig.right_camera, left_from_right: pose.left_from_right };
     let gates = Gates { shared: gates.shared.with_pose(&pose.covariance), ..*gates };

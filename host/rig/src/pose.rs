@@ -1,4 +1,4 @@
-//! Where the cameras were at an exposure.
+//! The pose of the rig's cameras with its covariance.
 
 use nalgebra::{Matrix6, Vector6};
 use vergence_vision::{Angle, Base, Left, Length, Right, Transform};
@@ -7,26 +7,28 @@ use crate::axis::AxisPosition;
 use crate::rig::Rig;
 use crate::track::{JointsAt, UNIFORM};
 
-/// The pose of the rig at one instant, with what is uncertain about it.
+/// The pose of the rig at one instant, with its uncertainty.
 #[derive(Clone, Debug, PartialEq)]
 pub struct RigPose {
-    /// The left camera in the base frame.
+    /// The pose of the left camera in the base frame.
     pub base_from_left: Transform<Base, Left>,
-    /// The right camera in the left frame.
+    /// The pose of the right camera in the left frame.
     pub left_from_right: Transform<Left, Right>,
-    /// Where each axis was.
+    /// The position of each axis.
     pub axes: Vec<AxisPosition>,
     /// Standard deviation of the relative rotation, from encoders and calibration.
     pub rotation_sigma: Angle,
     /// Standard deviation of the relative translation, from encoders and calibration.
     pub translation_sigma: Length,
-    /// Covariance of the relative pose, from encoders, their timing and calibration: a turn ω about the left axes in radians
-    /// and a shift δ of the right camera in the left frame in millimetres. The calibration's sigmas count for each component.
+    /// Covariance (6 × 6) of the relative pose, from encoders, their timing and calibration.
+    ///
+    /// Its components are a turn ω about the left axes in radians and a shift δ of the right camera in the left frame
+    /// in millimetres. The calibration's standard deviations apply to each component.
     pub covariance: Matrix6<f64>,
 }
 
 impl RigPose {
-    /// The left camera in the right frame.
+    /// The pose of the left camera in the right frame.
     #[must_use]
     pub fn right_from_left(&self) -> Transform<Right, Left> {
         self.left_from_right.inverse()
@@ -34,7 +36,7 @@ impl RigPose {
 }
 
 impl Rig {
-    /// The pose with the axes at exactly `values` (millimetres or radians), as far as the calibration knows it.
+    /// The pose with the axes at exactly `values` (millimetres or radians), uncertain by the calibration alone.
     #[must_use]
     pub fn pose_at_values(&self, values: &[f64]) -> RigPose {
         let (base_from_left, left_from_right) = self.transforms(values, values);
@@ -49,28 +51,31 @@ impl Rig {
         }
     }
 
-    /// The pose with the axes standing at `values`, read by the encoders.
+    /// The pose with the axes at rest at `values` (millimetres or radians), uncertain by the calibration and by encoder
+    /// counts.
     #[must_use]
     pub fn pose_read_at(&self, values: &[f64]) -> RigPose {
         let counts = self.axes.iter().zip(values).map(|(axis, &value)| axis.counts_at(value)).collect();
         self.pose(&JointsAt { counts, sigma: vec![UNIFORM; self.axes.len()], timing: vec![0.0; self.axes.len()] })
     }
 
-    /// The pose at `joints`, with the encoders' share of the uncertainty to first order.
+    /// The pose at `joints`, uncertain by the calibration and, to first order, by the joints.
     #[must_use]
     pub fn pose(&self, joints: &JointsAt) -> RigPose {
         self.pose_of_each(joints, joints)
     }
 
-    /// The pose of the left camera with the axes at `left`, and of the right camera with the axes at `right`: two instants of
-    /// one motion. The readings' errors count as common to both instants.
+    /// The pose of both cameras at two instants of one motion: the left camera with the axes at `left`, the right one
+    /// at `right`.
+    ///
+    /// The errors of the readings count as common to both instants.
     #[must_use]
     pub fn pose_of_each(&self, left: &JointsAt, right: &JointsAt) -> RigPose {
         let values = [left, right].map(|joints| self.values(joints));
         let exact = self.transforms(&values[0], &values[1]);
         let mut pose = self.pose_at_values(&values[0]);
         (pose.base_from_left, pose.left_from_right) = exact;
-        // By each reading alone, then by the instant, which moves all axes at once.
+        // First the errors of each axis by itself, then that of the instant, which moves all axes together.
         let alone = (0..self.axes.len()).map(|index| {
             [left, right].map(|joints| {
                 let sigma = |i: usize| if i == index { joints.sigma.get(i).copied().unwrap_or(0.0) } else { 0.0 };
@@ -104,14 +109,14 @@ impl Rig {
         self.axes.iter().zip(values).map(|(axis, &value)| AxisPosition::from_value(axis.kind, value)).collect()
     }
 
-    /// The left camera with the axes at `left`, and the right camera, with the axes at `right`, in its frame.
+    /// `base_from_left` with the axes at `left`, and `left_from_right` with the right camera's axes at `right`.
     fn transforms(&self, left: &[f64], right: &[f64]) -> (Transform<Base, Left>, Transform<Left, Right>) {
         let base_from_left = self.left_chain.base_from_camera(left);
         (base_from_left, base_from_left.inverse() * self.right_chain.base_from_camera(right))
     }
 }
 
-/// ω and δ from one pose to another.
+/// The turn ω and the shift δ from one pose to another.
 fn difference(from: &Transform<Left, Right>, to: &Transform<Left, Right>) -> Vector6<f64> {
     let turn = (to.rotation() * from.rotation().inverse()).scaled_axis();
     let shift = to.origin().mm() - from.origin().mm();

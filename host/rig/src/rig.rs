@@ -1,50 +1,42 @@
-//! A rig whose description has been checked.
+//! The rig's description after its checks.
 
 use nalgebra::Isometry3;
-use vergence_protocol::{AxisList, Micro};
-use vergence_vision::{Angle, KannalaBrandt, Left, Length, Right, Side, Transform};
+use vergence_protocol::{AxisList, Micro, PoseReport};
+use vergence_vision::{Angle, InvalidLens, KannalaBrandt, Left, Length, Right, Side, Transform};
 
 use crate::axis::{AxisPosition, RigAxis};
 use crate::chain::Chain;
-use crate::moving::Shutter;
+use crate::exposure::Shutter;
+use crate::mode::{Mode, ReportedMode};
 
-/// The rig: axes, modes, cameras and how the axes carry the cameras.
+/// A rig: its axes, modes and cameras, and the screw chains by which the axes move the cameras.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Rig {
-    /// What it is called.
+    /// Its name in the rig file.
     pub name: String,
-    /// In the order of the controller's axes; none for a pair whose pose is fixed.
+    /// The axes, in the order of the board's; empty for a pair whose pose is fixed.
     pub axes: Vec<RigAxis>,
-    /// By name.
+    /// The modes, sorted by name.
     pub modes: Vec<Mode>,
-    /// The left camera.
+    /// The lens of the left camera.
     pub left_camera: KannalaBrandt,
-    /// The right camera.
+    /// The lens of the right camera.
     pub right_camera: KannalaBrandt,
-    /// How the left and the right camera expose their rows.
+    /// The shutters of the left and the right camera.
     pub shutters: [Shutter; 2],
-    /// From the base to the left camera.
+    /// The screw chain from the base to the left camera.
     pub left_chain: Chain<Left>,
-    /// From the base to the right camera.
+    /// The screw chain from the base to the right camera.
     pub right_chain: Chain<Right>,
-    /// How far the calibrated relative pose may be off: one standard deviation of rotation and translation.
+    /// Standard deviations of the calibrated relative pose: rotation and translation.
     pub calibration_sigma: (Angle, Length),
 }
 
-/// A named pose.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Mode {
-    /// Such as `herbivore`.
-    pub name: String,
-    /// Its number on the wire, from 1.
-    pub number: vergence_protocol::Mode,
-    /// Where each axis goes.
-    pub targets: Vec<AxisPosition>,
-}
-
 impl Rig {
-    /// Two cameras whose pose is fixed: no axes, the base is where the left camera is. `sigma` is the standard deviation
-    /// of rotation and translation of `left_from_right`.
+    /// Makes a rig without axes, of two cameras whose relative pose is fixed. The base frame is that of the left
+    /// camera.
+    ///
+    /// `sigma` holds the standard deviations of rotation and translation of `left_from_right`.
     #[must_use]
     pub fn fixed_pair(
         name: &str,
@@ -65,7 +57,16 @@ impl Rig {
         }
     }
 
-    /// The camera on `side`.
+    /// The rig with sensors of the same size that have `width` pixels across.
+    ///
+    /// # Errors
+    /// Where `width` leaves no pixels.
+    pub fn with_sensors(self, width: u32) -> Result<Self, InvalidLens> {
+        let (left_camera, right_camera) = (self.left_camera.resampled(width)?, self.right_camera.resampled(width)?);
+        Ok(Self { left_camera, right_camera, ..self })
+    }
+
+    /// The lens of the camera on `side`.
     #[must_use]
     pub const fn camera(&self, side: Side) -> &KannalaBrandt {
         match side {
@@ -80,10 +81,17 @@ impl Rig {
         self.modes.iter().find(|mode| mode.name == name)
     }
 
-    /// The name of a mode number of the wire; `None` for zero and for numbers the rig does not name.
+    /// The mode that `pose` reports; `None` while the board reports none.
     #[must_use]
-    pub fn mode_name(&self, number: vergence_protocol::Mode) -> Option<&str> {
-        self.modes.iter().find(|mode| mode.number == number).map(|mode| mode.name.as_str())
+    pub fn reported_mode(&self, pose: &PoseReport) -> Option<ReportedMode<'_>> {
+        if pose.mode == vergence_protocol::Mode(0) {
+            return None;
+        }
+        let Some(mode) = self.modes.iter().find(|mode| mode.number == pose.mode) else {
+            return Some(ReportedMode::Unknown(pose.mode));
+        };
+        let known = mode.is_at(&self.axes, pose);
+        Some(if known { ReportedMode::Known(mode) } else { ReportedMode::Elsewhere(mode) })
     }
 
     /// The index of the axis called `name`.
@@ -92,13 +100,13 @@ impl Rig {
         self.axes.iter().position(|axis| axis.name == name)
     }
 
-    /// A sentence for each axis whose position lies beyond what was calibrated.
+    /// The warnings of [`RigAxis::extrapolation`] for all axes at `positions`.
     #[must_use]
     pub fn extrapolations(&self, positions: &[AxisPosition]) -> Vec<String> {
         self.axes.iter().zip(positions).filter_map(|(axis, &position)| axis.extrapolation(position)).collect()
     }
 
-    /// Positions as they go over the wire.
+    /// Converts positions to the wire's micrometres and microradians.
     #[must_use]
     pub fn wire_targets(&self, positions: &[AxisPosition]) -> AxisList<Micro> {
         positions.iter().take(vergence_protocol::MAX_AXES).map(|position| position.micro()).collect()

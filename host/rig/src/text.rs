@@ -1,4 +1,4 @@
-//! Quantities with units in TOML values.
+//! Serde functions for quantities with units in TOML values.
 
 use std::str::FromStr;
 

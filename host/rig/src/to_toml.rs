@@ -1,4 +1,4 @@
-//! Writing a rig file: what a calibration ends in.
+//! Printing of rig files, as calibrations write them.
 
 use std::collections::BTreeMap;
 
@@ -9,14 +9,14 @@ use vergence_vision::{Angle, Frame, KannalaBrandt, Length};
 use crate::axis::{AxisPosition, RigAxis};
 use crate::camera_file::{CameraTable, Provenance};
 use crate::chain::{Chain, Link, Screw};
-use crate::moving::Shutter;
+use crate::exposure::Shutter;
 use crate::rig::Rig;
 
 #[derive(Serialize)]
 struct File<'a> {
     name: &'a str,
     axis: Vec<Axis<'a>>,
-    modes: BTreeMap<&'a str, BTreeMap<&'a str, String>>,
+    modes: BTreeMap<&'a str, ModeTable<'a>>,
     calibration_sigma: Sigma,
     left: Side<'a>,
     right: Side<'a>,
@@ -34,6 +34,13 @@ struct Axis<'a> {
     counts_per_metre: Option<u32>,
     #[serde(skip_serializing_if = "Option::is_none")]
     counts_per_revolution: Option<u32>,
+}
+
+#[derive(Serialize)]
+struct ModeTable<'a> {
+    number: u8,
+    #[serde(flatten)]
+    positions: BTreeMap<&'a str, String>,
 }
 
 #[derive(Serialize)]
@@ -68,10 +75,10 @@ struct ScrewTable<'a> {
 }
 
 impl Rig {
-    /// The rig file that [`Rig::from_toml`] reads as this rig, with where it comes from.
+    /// Prints the rig file from which [`Rig::from_toml`] makes this rig, with its `provenance`.
     ///
     /// # Errors
-    /// Where TOML cannot say it, in words.
+    /// The message of the TOML writer.
     pub fn to_toml(&self, provenance: &Provenance) -> Result<String, String> {
         let name = |axis: &usize| self.axes.get(*axis).map_or("", |axis| axis.name.as_str());
         let positions = |targets: &[AxisPosition]| -> BTreeMap<&str, String> {
@@ -80,7 +87,14 @@ impl Rig {
         let file = File {
             name: &self.name,
             axis: self.axes.iter().map(axis).collect(),
-            modes: self.modes.iter().map(|mode| (mode.name.as_str(), positions(&mode.targets))).collect(),
+            modes: self
+                .modes
+                .iter()
+                .map(|mode| {
+                    let positions = positions(&mode.targets);
+                    (mode.name.as_str(), ModeTable { number: mode.number.0, positions })
+                })
+                .collect(),
             calibration_sigma: Sigma {
                 rotation: angle(self.calibration_sigma.0),
                 translation: length(self.calibration_sigma.1),
@@ -143,7 +157,7 @@ fn length(length: Length) -> String {
     format!("{:?}mm", length.mm())
 }
 
-/// In degrees, as people write them, where that is the same angle to the last bit; otherwise in radians.
+/// Prints an angle in degrees where that gives the same angle to the last bit, otherwise in radians.
 fn angle(angle: Angle) -> String {
     let degrees = (angle.deg() * 1e9).round() / 1e9;
     if Angle::from_deg(degrees).rad().to_bits() == angle.rad().to_bits() {

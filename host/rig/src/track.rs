@@ -1,4 +1,4 @@
-//! The encoder stream, and the joints at an instant between two of its samples.
+//! The stream of encoder readings, and the joints at an instant between two of them.
 
 use std::collections::VecDeque;
 
@@ -6,36 +6,36 @@ use vergence_protocol::{AxisList, Counts, Microseconds};
 
 use crate::clock::BoardInstant;
 
-/// Two samples further apart than this say nothing of the time between them.
+/// Longest interval between two readings over which counts are interpolated.
 const LONGEST_GAP_US: f64 = 100_000.0;
 
 /// One reading of all encoders.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct JointSample {
-    /// When they were latched, board clock.
+    /// The instant when the encoders were latched, on the board's clock.
     pub at: Microseconds,
-    /// Counts from the axis zero.
+    /// Counts of each axis from its zero.
     pub counts: AxisList<Counts>,
 }
 
-/// The joints at one instant, in counts.
+/// The joint positions at one instant, in counts.
 #[derive(Clone, Debug, PartialEq)]
 pub struct JointsAt {
-    /// Interpolated counts of each axis.
+    /// Interpolated counts of each axis from its zero.
     pub counts: Vec<f64>,
-    /// Standard deviation of each by itself, in counts: the encoder's step, and what the motion between two readings may
-    /// have done besides going straight.
+    /// Standard deviation of each axis by itself, in counts: from the encoder's step, and from motion between two
+    /// readings that is not uniform.
     pub sigma: Vec<f64>,
-    /// How far each moves while the instant is off by one standard deviation, in counts. The instant is the same for all
-    /// axes, so these errors go together; the sign is that of the motion.
+    /// Movement of each axis, in counts, while the instant is off by one standard deviation, with the sign of the
+    /// motion. These errors are fully correlated, because the instant is common to all axes.
     pub timing: Vec<f64>,
 }
 
-/// The standard deviation of an error anywhere within a width of one: 1/√12.
+/// The standard deviation of an error that is uniform over a width of one: 1/√12.
 pub(crate) const UNIFORM: f64 = 0.288_675_134_594_812_9;
 
 impl JointsAt {
-    /// Counts that the board latched at the very instant, as at the edge of a trigger pulse.
+    /// The joints from counts that the board latched at the instant itself, as at the edge of a trigger pulse.
     #[must_use]
     pub fn latched(counts: &[Counts]) -> Self {
         Self {
@@ -46,38 +46,38 @@ impl JointsAt {
     }
 }
 
-/// Why the track does not know the joints at an instant.
+/// Why the joints at an instant are not known.
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum TrackGap {
-    /// The encoder stream has not reached the instant yet.
+    /// No reading after the instant has arrived yet.
     #[error("no encoder reading after the exposure has arrived yet")]
     NotYet,
-    /// The instant is older than everything remembered.
-    #[error("the exposure is older than the remembered encoder readings")]
+    /// The instant is older than all readings kept.
+    #[error("the exposure is older than the encoder readings kept")]
     TooOld,
-    /// The readings around the instant are too far apart.
+    /// The readings around the instant are too far apart; the interval is in milliseconds.
     #[error("encoder readings are missing around the exposure ({0:.0} ms gap)")]
     Gap(f64),
 }
 
-/// Who knows the joints at an instant.
+/// A source of the joint positions at an instant.
 pub trait Joints {
     /// The joints at `instant`.
     ///
     /// # Errors
-    /// [`TrackGap`] where they are not known then.
+    /// [`TrackGap`] where the joints are not known at that instant.
     fn at(&self, instant: BoardInstant) -> Result<JointsAt, TrackGap>;
 }
 
-/// Axes that move evenly, or stand, as somebody said.
+/// Axes that move at constant stated speeds, or stand.
 #[derive(Clone, Debug, PartialEq)]
 pub struct SteadyMotion {
-    /// The instant from which time counts, microseconds on the board's clock.
+    /// The reference instant, in microseconds on the board's clock.
     pub from_us: f64,
-    /// The joints then.
+    /// The joints at the reference instant.
     pub joints: JointsAt,
-    /// How fast each moves, in counts per microsecond.
+    /// Speed of each axis in counts per microsecond.
     pub rates: Vec<f64>,
 }
 
@@ -93,7 +93,7 @@ impl Joints for SteadyMotion {
     }
 }
 
-/// The latest readings of the encoders, in order of time.
+/// A track of the latest encoder readings, in order of time.
 #[derive(Clone, Debug)]
 pub struct JointTrack {
     samples: VecDeque<JointSample>,
@@ -101,14 +101,14 @@ pub struct JointTrack {
 }
 
 impl JointTrack {
-    /// Remembers `capacity` samples, at least two.
+    /// Makes an empty track that keeps up to `capacity` readings, at least two.
     #[must_use]
     pub fn new(capacity: usize) -> Self {
         Self { samples: VecDeque::new(), capacity: capacity.max(2) }
     }
 
-    /// Takes a reading. One that is not later than the last, or has another number of axes, begins a new track: the
-    /// board has started anew.
+    /// Adds a reading. One that is not later than the last, or has another number of axes, clears the track first: the
+    /// board has restarted.
     pub fn push(&mut self, sample: JointSample) {
         let follows = |last: &JointSample| sample.at > last.at && sample.counts.len() == last.counts.len();
         if !self.samples.back().is_none_or(follows) {
@@ -120,10 +120,11 @@ impl JointTrack {
         self.samples.push_back(sample);
     }
 
-    /// The part from `from_us` to `to_us` on the board's clock, with what it takes to interpolate at both.
+    /// Copies the part from `from_us` to `to_us` on the board's clock, with the readings needed to interpolate at both
+    /// ends.
     #[must_use]
     pub fn between(&self, from_us: f64, to_us: f64) -> Self {
-        // The readings around each end, and those beside them, which tell how the motion bends.
+        // The readings around each end, and their neighbours, from which `bend` estimates the curvature of the motion.
         const BESIDE: usize = 2;
         let first = self.reading_from(from_us).saturating_sub(BESIDE);
         let end = (self.reading_from(to_us) + BESIDE).min(self.samples.len());
@@ -131,14 +132,14 @@ impl JointTrack {
         Self { samples, capacity: self.capacity }
     }
 
-    /// The first reading at or after an instant on the board's clock.
+    /// Index of the first reading at or after an instant on the board's clock.
     fn reading_from(&self, us: f64) -> usize {
         self.samples.partition_point(|sample| (sample.at.0 as f64) < us)
     }
 }
 
 impl Joints for JointTrack {
-    /// By linear interpolation between the two readings around `instant`.
+    /// Interpolates linearly between the two readings around `instant`.
     fn at(&self, instant: BoardInstant) -> Result<JointsAt, TrackGap> {
         let after = self.reading_from(instant.us);
         let next = self.samples.get(after).ok_or(TrackGap::NotYet)?;
@@ -158,8 +159,8 @@ impl Joints for JointTrack {
 }
 
 impl JointTrack {
-    /// How far each axis may be off the straight line between two readings: share (1 - share) / 2 of the change of its
-    /// step from this interval to those beside it, the larger of both.
+    /// The possible deviation of each axis from linear motion between two readings, in counts: share (1 - share) / 2 of
+    /// the change of its step from this interval to the neighbouring ones, the larger of both.
     fn bend(&self, after: usize, share: f64) -> Vec<f64> {
         let step = |to: usize, axis: usize| {
             let counts = |index: usize| Some(f64::from(self.samples.get(index)?.counts.get(axis)?.0));
@@ -176,7 +177,8 @@ impl JointTrack {
     }
 }
 
-/// `instant_error` is the bound of the instant's error as a share of the span between the readings.
+/// Interpolates at the fraction `share` between two readings. `instant_error` is the bound of the instant's error as a
+/// fraction of their interval.
 fn interpolate(previous: &JointSample, next: &JointSample, share: f64, bend: &[f64], instant_error: f64) -> JointsAt {
     let mut joints = JointsAt { counts: Vec::new(), sigma: Vec::new(), timing: Vec::new() };
     for ((before, after), bend) in previous.counts.iter().zip(&next.counts).zip(bend) {

@@ -1,4 +1,4 @@
-//! Depth predicted before moving: against sampled errors, and the pose that meets a goal against a fine grid.
+//! Predicted depth errors against sampled ones, and the pose that meets a goal against a fine grid.
 
 #![allow(clippy::expect_used, reason = "a test fails loudly")]
 #![allow(clippy::print_stdout, reason = "tests show their figures")]
@@ -23,7 +23,7 @@ fn pose(baseline: f64, separation: f64) -> [f64; 2] {
 }
 
 #[test]
-fn goals_are_read_and_written() {
+fn goals_are_parsed_and_printed() {
     let goal: DepthGoal = "sigma_z <= 1mm at 350mm over +-40deg".parse().expect("a goal");
     assert_eq!(goal.sigma, DepthSigma::Forward);
     assert!((goal.limit.mm() - 1.0).abs() < 1e-12 && (goal.range.mm() - 350.0).abs() < 1e-9);
@@ -46,7 +46,7 @@ fn goals_are_read_and_written() {
     }
 }
 
-/// Depth errors of matches, calibration and encoders as they would come, in the forward coordinate and the range.
+/// Sampled errors of the forward coordinate and the range, from matches, calibration and encoders.
 fn sampled(rig: &Rig, values: &[f64; 2], azimuth: f64, range: f64, samples: u32) -> Option<[f64; 2]> {
     let field = DepthField::new(rig, values, PIXEL_SIGMA);
     let predicted = field.at(Angle::from_deg(azimuth), level(), Length::from_mm(range))?;
@@ -55,7 +55,7 @@ fn sampled(rig: &Rig, values: &[f64; 2], azimuth: f64, range: f64, samples: u32)
     let mut gaussian = Gaussian(11);
     let mut squares = [0.0; 2];
     for _ in 0..samples {
-        // The encoders tell `values`; the axes stand elsewhere, by less than a count, and the calibration is off.
+        // The encoders report `values`; the axes stand within a count of them, and the calibration has an error.
         let true_values: Vec<f64> = rig
             .axes
             .iter()
@@ -86,7 +86,7 @@ fn sampled(rig: &Rig, values: &[f64; 2], azimuth: f64, range: f64, samples: u32)
 }
 
 #[test]
-fn predicted_depth_errors_are_those_that_come() {
+fn predicted_depth_errors_agree_with_sampled_ones() {
     let rig = bench();
     let mut checked = 0;
     for (baseline, separation) in [(145.0, 0.0), (145.0, 120.0), (60.0, 30.0), (220.0, 90.0)] {
@@ -108,16 +108,16 @@ fn predicted_depth_errors_are_those_that_come() {
 }
 
 #[test]
-fn what_one_camera_does_not_see_has_no_depth() {
+fn a_point_that_one_camera_does_not_see_has_no_depth() {
     let rig = bench();
     let field = DepthField::new(&rig, &pose(145.0, 120.0), PIXEL_SIGMA);
     assert!(field.at(Angle::from_deg(0.0), level(), Length::from_mm(350.0)).is_some());
     assert!(field.at(Angle::from_deg(60.0), level(), Length::from_mm(350.0)).is_none());
 }
 
-/// The pose found is at least as good as every pose of a fine grid.
+/// The best pose is at least as good as every pose of a fine grid.
 #[test]
-fn no_pose_of_a_fine_grid_does_better() {
+fn no_pose_of_a_fine_grid_is_better() {
     let rig = bench();
     for (text, possible) in [
         ("sigma_z <= 1mm at 350mm over +-40deg", true),

@@ -1,4 +1,4 @@
-//! Cameras in other programs' files.
+//! Camera files of other programs.
 #![allow(clippy::expect_used, clippy::panic, reason = "a test fails loudly")]
 
 use nalgebra::{UnitQuaternion, Vector3};
@@ -79,7 +79,7 @@ fn a_pair_keeps_its_pose() {
 }
 
 #[test]
-fn what_cannot_be_read_is_told() {
+fn unreadable_camera_files_are_refused() {
     let radtan = kalibr::write(&Camchain { left: camera(), right: None }).replace("equidistant", "radtan");
     assert!(matches!(kalibr::read(&radtan), Err(InterchangeError::Model(_))));
     assert!(matches!(opencv::read("%YAML:1.0\n---\nK: 3\n"), Err(InterchangeError::Syntax(_))));

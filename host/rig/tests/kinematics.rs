@@ -1,4 +1,4 @@
-//! Where the axes take the cameras.
+//! Kinematics: the poses of the cameras by the positions of the axes.
 #![allow(clippy::expect_used, clippy::panic, reason = "a test fails loudly")]
 
 use nalgebra::{Matrix3, Matrix4, Vector3};
@@ -80,7 +80,7 @@ proptest! {
         prop_assert!((got - expected).norm() < 1e-9, "{} {}", got, expected);
     }
 
-    /// The sigma of the pose is what the joints' sigmas do to it, on top of the calibration's.
+    /// The standard deviations of the joints add to those of the calibration.
     #[test]
     fn joint_sigma_becomes_pose_sigma(x in 120_000.0..440_000.0f64, s in 0.0..36_000.0f64, dx in 0.0..50.0f64, ds in 0.0..50.0f64) {
         let mut rig = bench();
@@ -95,17 +95,4 @@ proptest! {
         let moved = (dx * 0.0005).hypot(baseline * turned / 2.0);
         prop_assert!((pose.translation_sigma.mm() - moved).abs() < 1e-3 * moved + 1e-9, "{:?} {}", pose, moved);
     }
-}
-
-#[test]
-fn modes_have_numbers_and_names() {
-    let rig = bench();
-    for name in ["herbivore", "human"] {
-        let mode = rig.mode(name).expect("a mode");
-        assert_ne!(mode.number.0, 0);
-        assert_eq!(rig.mode_name(mode.number), Some(name));
-    }
-    let wire = rig.wire_targets(&rig.mode("herbivore").expect("a mode").targets);
-    assert_eq!(wire.iter().map(|target| target.0).collect::<Vec<_>>(), [145_000, 2_094_395]);
-    assert_eq!(rig.mode_name(vergence_protocol::Mode(0)), None);
 }

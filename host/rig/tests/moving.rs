@@ -1,5 +1,5 @@
-//! Measuring while the simulated stages move at full speed: rolling shutters, an exposure whose instant is uncertain, and the
-//! same points measured from a standing rig.
+//! Measurement while the simulated stages move at full speed, with rolling shutters and uncertain exposure instants,
+//! against the same points measured from a standing rig.
 
 #![allow(clippy::expect_used, reason = "a test fails loudly")]
 #![allow(clippy::print_stdout, reason = "tests show their figures")]
@@ -17,29 +17,29 @@ use vergence_vision::{Base, Frame, Gates, KannalaBrandt, Left, Length, Pixel, Pi
 const PIXEL_SIGMA: f64 = 0.05;
 const TICK_US: u64 = 100;
 const READING_US: u64 = 5_000;
-/// 1280 rows in 19.2 ms.
+/// A rolling shutter that reads 1280 rows in 19.2 ms.
 const LINE_US: f64 = 15.0;
-/// The host knows the instant of an exposure no better.
+/// Error bound of the instant of an exposure, in microseconds.
 const CLOCK_ERROR_US: f64 = 250.0;
 /// Poses at the ends of the ranges, in micrometres and microradians.
 const FROM: [f64; 2] = [90_000.0, 300_000.0];
 const TO: [f64; 2] = [200_000.0, 1_800_000.0];
 
-/// The calibration is exact: only pixels, encoders and the clock err.
+/// The bench with an exact calibration: only pixels, encoders and the clock have errors.
 fn bench() -> Rig {
     let mut rig = Rig::from_toml(BENCH_TOML).expect("the bench is a rig");
     rig.calibration_sigma = (vergence_vision::Angle::from_rad(0.0), Length::from_mm(0.0));
     rig
 }
 
-/// A run of both stages: what they truly did, and what the encoders told.
+/// A run of both stages: their true motion and the encoder readings.
 struct Run {
-    /// Every tick, in micro-units.
+    /// True positions at every tick, in micrometres and microradians.
     loads: Vec<[f64; 2]>,
     track: JointTrack,
 }
 
-/// Both stages go from `from` to `to` as fast as they may, through a trapezoid of speed; with `to` = `from` they stand.
+/// Moves both stages from `from` to `to` at full speed, with a trapezoid of speed; with `to` = `from` they stand.
 fn run(from: [f64; 2], to: [f64; 2]) -> Run {
     let (settings, mechanics) = (bench_settings(), bench_mechanics());
     let mut axes = [0, 1].map(|i| AxisPlant::new(mechanics[i], from[i]));
@@ -69,7 +69,7 @@ fn run(from: [f64; 2], to: [f64; 2]) -> Run {
     run
 }
 
-/// So many steps, evenly over a tick.
+/// Schedules `by` steps evenly over a tick.
 fn evenly(start: Microseconds, by: i32) -> StepSchedule {
     let count = by.unsigned_abs();
     let at_ns = (0..count).map(|step| (2 * step + 1) * TICK_US as u32 * 500 / count).collect();
@@ -87,7 +87,7 @@ fn counts_at(axis: usize, micro: f64) -> i32 {
     (micro * per_micro).floor() as i32
 }
 
-/// How far after `t` seconds.
+/// The distance moved after `t` seconds.
 fn trapezoid(t: f64, distance: f64, speed: f64, acceleration: f64) -> f64 {
     let ramp = (speed / acceleration).min((distance / acceleration).sqrt());
     let speed = ramp * acceleration;
@@ -103,7 +103,7 @@ fn trapezoid(t: f64, distance: f64, speed: f64, acceleration: f64) -> f64 {
 }
 
 impl Run {
-    /// The true axes, in millimetres and radians.
+    /// The true positions of the axes, in millimetres and radians.
     fn values_at(&self, us: f64) -> [f64; 2] {
         let place = us / TICK_US as f64;
         let (before, share) = (place.floor() as usize, place.fract());
@@ -116,7 +116,8 @@ impl Run {
         (pose.base_from_left, pose.base_from_left * pose.left_from_right)
     }
 
-    /// Where a camera with a rolling shutter shows `point`: the row decides when it is exposed, and that decides the row.
+    /// Projects `point` into a camera with a rolling shutter, by iteration: the row determines the instant of exposure,
+    /// and the instant the row.
     fn seen<C: Frame>(
         &self,
         lens: &KannalaBrandt,
@@ -141,7 +142,7 @@ fn errors(run: &Run, rig: &Rig, seeds: u64, believed: Shutter) -> Vec<f64> {
     let mut found = Vec::new();
     for seed in 0..seeds {
         let mut gaussian = Gaussian(seed);
-        // In the middle of the fastest part of the motion, never at its ends.
+        // An instant in the fastest part of the motion.
         let middle = 300_000.0 + 700_000.0 * gaussian.uniform();
         let aside = Vector3::new(gaussian.uniform() - 0.5, gaussian.uniform() - 0.5, gaussian.uniform()) * 300.0;
         let point = Point::<Base>::from_mm(Vector3::new(75.0, 0.0, 400.0) + aside);
@@ -191,7 +192,7 @@ fn moving_and_standing_rigs_measure_within_what_they_state() {
     assert!((speed - 0.8).abs() < 0.02, "the linear stage moves at its full 80 mm/s: {speed} mm in 10 ms");
     assert_consistent("standing", &errors(&standing, &rig, 500, rolling));
     assert_consistent("moving", &errors(&moving, &rig, 500, rolling));
-    // The check notices a shutter that is not accounted for.
+    // The check fails if the shutter is not taken into account.
     assert!(mean(&errors(&moving, &rig, 500, Shutter::Global)) > 10.0);
 }
 

@@ -1,4 +1,4 @@
-//! Rig files that this program writes.
+//! Printing of rig files, and reading them back.
 #![allow(clippy::expect_used, clippy::unwrap_used, reason = "a test fails loudly")]
 
 use nalgebra::{Isometry3, Unit, UnitQuaternion, Vector3};
@@ -22,7 +22,7 @@ fn the_bench_comes_back_as_it_was() {
     assert_eq!(read.modes, bench.modes);
     assert_eq!(read.calibration_sigma, bench.calibration_sigma);
     assert!((read.left_camera.theta_max().rad() - bench.left_camera.theta_max().rad()).abs() < 1e-15);
-    // People read it too.
+    // The file is readable for people.
     let text = bench.to_toml(&provenance()).expect("TOML");
     assert!(text.contains("separation = \"120.0deg\"") && text.contains("date = \"2026-11-21\""), "{text}");
 }
@@ -44,14 +44,14 @@ fn a_rolling_shutter_comes_back_as_it_was() {
 }
 
 #[test]
-fn a_pose_beyond_the_calibrated_range_is_told() {
+fn a_pose_beyond_the_calibrated_range_gives_a_warning() {
     let rig = with("calibrated = [\"80mm\", \"200mm\"]", "counts_per_metre").expect("a rig");
     assert_eq!(read_back(&rig).axes, rig.axes);
     let told = |mm: f64| rig.axes[0].extrapolation(AxisPosition::Linear(Length::from_mm(mm)));
     assert_eq!([80.0, 140.0, 200.3].map(told), [None, None, None]);
     let said = told(215.0).expect("it lies beyond");
     assert!(said.starts_with("baseline 215.0 mm lies outside 80.0 mm to 200.0 mm"), "{said}");
-    // Nobody said where the other axis was calibrated.
+    // The file states no calibrated range of the other axis.
     assert_eq!(rig.axes[1].extrapolation(AxisPosition::Rotary(Angle::from_deg(129.0))), None);
     assert!(with("calibrated = [\"200mm\", \"80mm\"]", "counts_per_metre").is_err());
 }
@@ -61,7 +61,7 @@ fn vector(bound: f64) -> impl Strategy<Value = Vector3<f64>> {
 }
 
 proptest! {
-    /// Whatever the calibration found, the file says it.
+    /// Any result of a calibration survives printing and parsing.
     #[test]
     fn any_mechanism_comes_back(
         about in vector(1.0), along in vector(1.0), through in vector(300.0), shift in vector(300.0),

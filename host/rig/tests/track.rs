@@ -1,4 +1,4 @@
-//! The encoder stream.
+//! Interpolation of the stream of encoder readings.
 #![allow(clippy::expect_used, reason = "a test fails loudly")]
 
 use proptest::prelude::*;
@@ -28,7 +28,7 @@ proptest! {
 }
 
 #[test]
-fn the_track_says_what_it_does_not_know() {
+fn instants_outside_the_track_are_refused() {
     let mut track = JointTrack::new(3);
     assert_eq!(track.at(instant(0.0)), Err(TrackGap::NotYet));
     for at in [10_000, 20_000, 30_000, 40_000] {
@@ -42,7 +42,7 @@ fn the_track_says_what_it_does_not_know() {
 }
 
 #[test]
-fn a_part_of_the_track_tells_the_same() {
+fn a_part_of_the_track_interpolates_alike() {
     let mut track = JointTrack::new(100);
     for n in 0..50i32 {
         track.push(sample(1_000_000 + 2_000 * n as u64, &[n * n, -3 * n]));
@@ -57,7 +57,7 @@ fn a_part_of_the_track_tells_the_same() {
 }
 
 #[test]
-fn steady_motion_goes_on_as_said() {
+fn steady_motion_continues_at_its_rates() {
     let joints = JointsAt { counts: vec![100.0, 7.0], sigma: vec![0.5, 0.0], timing: vec![0.0, 0.0] };
     let motion = SteadyMotion { from_us: 1e6, joints, rates: vec![-0.25, 0.0] };
     let later = motion.at(BoardInstant { us: 1e6 + 400.0, error_us: 12f64.sqrt() }).expect("it is said");
@@ -67,7 +67,7 @@ fn steady_motion_goes_on_as_said() {
 }
 
 #[test]
-fn a_board_that_begins_anew_begins_a_new_track() {
+fn a_restarted_board_begins_a_new_track() {
     let mut track = JointTrack::new(10);
     track.push(sample(1_000_000, &[5]));
     track.push(sample(1_010_000, &[5]));
@@ -76,7 +76,7 @@ fn a_board_that_begins_anew_begins_a_new_track() {
 }
 
 #[test]
-fn an_uncertain_instant_costs_the_distance_moved_in_it() {
+fn an_uncertain_instant_adds_the_distance_moved_in_it() {
     let mut track = JointTrack::new(10);
     track.push(sample(0, &[0]));
     track.push(sample(10_000, &[1000]));
@@ -88,9 +88,9 @@ fn an_uncertain_instant_costs_the_distance_moved_in_it() {
     assert!((at(100.0).timing[0] - 20.0 / 12f64.sqrt()).abs() < 1e-9);
 }
 
-/// Under constant acceleration the truth is off the straight line by what the track says.
+/// Under constant acceleration the track's sigma covers the deviation from linear motion.
 #[test]
-fn a_bend_of_the_motion_is_owned_up_to() {
+fn accelerated_motion_widens_the_sigma() {
     let mut track = JointTrack::new(10);
     for n in 0..6 {
         track.push(sample(n * 10_000, &[(50 * n * n) as i32]));

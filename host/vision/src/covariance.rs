@@ -1,4 +1,4 @@
-//! How uncertain a pseudo-intersected point is, in closed form.
+//! The covariance of a pseudo-intersected point in closed form.
 //!
 //! With isotropic, independent angular noise σ on both rays, t the right centre, λ = |P|, μ = |P - t|, to first order
 //!
@@ -6,18 +6,20 @@
 //! C = σ² / |t × P|² · [λ⁴ (P - t)(P - t)ᵀ + μ⁴ P Pᵀ]  +  σ² (λ² + μ²) / 4 · n nᵀ        n = (t × P) / |t × P|
 //! ```
 //!
-//! In the epipolar plane, turning the left ray moves the point along the right ray and the other way round; across the
-//! plane, the pseudo-intersection averages both rays.
+//! In the epipolar plane, a turn of the left ray moves the point along the right ray, and a turn of the right ray moves
+//! it along the left ray. Across the plane, the pseudo-intersection averages both rays.
 
 use nalgebra::Matrix3;
 
 use crate::{Angle, Left, Length, Point};
 
-/// The covariance of `point` in mm², in the left frame, for rays with standard deviation `sigma` in each of their two
-/// directions. `None` for a point on the line through both centres, and where an argument is not finite.
+/// The covariance of a pseudo-intersected `point` in mm², in the left frame, for isotropic angular noise of standard
+/// deviation `sigma` on both rays.
+///
+/// `None` for a point on the line through both centres, and where an argument is not finite.
 #[must_use]
 pub fn covariance(point: &Point<Left>, right_centre: &Point<Left>, sigma: Angle) -> Option<Matrix3<f64>> {
-    // The sine to the baseline below which the covariance is without bound for any purpose.
+    // Below this sine to the baseline the covariance counts as unbounded.
     const ALONG_BASELINE: f64 = 1e-9;
     let (p, t) = (point.mm(), right_centre.mm());
     let from_right = p - t;

@@ -1,4 +1,4 @@
-//! Points, rays and rigid transforms that know their coordinate frame.
+//! Points, rays and rigid transforms typed by their coordinate frame.
 
 use std::fmt::Debug;
 use std::marker::PhantomData;
@@ -8,7 +8,7 @@ use nalgebra::{Isometry3, Point3, Translation3, Unit, UnitQuaternion, Vector3};
 
 use crate::Angle;
 
-/// A coordinate frame, as a type. Right-handed; cameras have x right, y down, z along the optical axis.
+/// A coordinate frame, as a type. Frames are right-handed; cameras have x right, y down, z along the optical axis.
 pub trait Frame: Copy + Debug + PartialEq + Send + Sync {}
 
 macro_rules! frames {
@@ -20,15 +20,15 @@ macro_rules! frames {
     )+};
 }
 frames!(
-    /// The left camera: the reference frame of every pair and cloud.
+    /// The frame of the left camera, the reference frame of every pair and cloud.
     Left,
-    /// The right camera.
+    /// The frame of the right camera.
     Right,
-    /// Any one camera, where it does not matter which.
+    /// The frame of any one camera, where it does not matter which.
     Camera,
-    /// The rig's fixed part.
+    /// The frame of the rig's fixed part.
     Base,
-    /// The surroundings.
+    /// The frame of the surroundings.
     World,
 );
 
@@ -46,8 +46,19 @@ pub struct UnitRay<F: Frame> {
     frame: PhantomData<F>,
 }
 
-/// A rigid transform: maps coordinates in `From` to coordinates in `To`. Name values `to_from_from`, as in
-/// `left_from_right`, so that `left_from_right * right_from_base` reads as what it is.
+/// A rigid transform that maps coordinates in frame `From` to coordinates in frame `To`, in millimetres.
+///
+/// Values are named after both frames, as in `left_from_right`, so that equal frames meet in a product:
+///
+/// ```
+/// # use nalgebra::{UnitQuaternion, Vector3};
+/// # use vergence_vision::{Left, Point, Right, Transform};
+/// // The right camera stands 145 mm to the right of the left one and looks the same way.
+/// let left_from_right = Transform::<Left, Right>::new(UnitQuaternion::identity(), Vector3::new(145.0, 0.0, 0.0));
+/// let in_right = Point::<Right>::from_mm(Vector3::new(0.0, 0.0, 500.0));
+/// let in_left: Point<Left> = left_from_right * in_right;
+/// assert_eq!(in_left.mm(), Vector3::new(145.0, 0.0, 500.0));
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Transform<To: Frame, From: Frame> {
     isometry: Isometry3<f64>,
@@ -55,13 +66,13 @@ pub struct Transform<To: Frame, From: Frame> {
 }
 
 impl<F: Frame> Point<F> {
-    /// The point at `mm` millimetres.
+    /// Makes a point from its coordinates in millimetres.
     #[must_use]
     pub const fn from_mm(mm: Vector3<f64>) -> Self {
         Self { mm, frame: PhantomData }
     }
 
-    /// Coordinates in millimetres.
+    /// The coordinates in millimetres.
     #[must_use]
     pub const fn mm(&self) -> Vector3<f64> {
         self.mm
@@ -75,7 +86,7 @@ impl<F: Frame> Point<F> {
 }
 
 impl<F: Frame> UnitRay<F> {
-    /// The direction of `vector`, of any length; `None` where it has none (zero or not finite).
+    /// Makes a ray along `vector` of any length; `None` for a vector that is zero or not finite.
     #[must_use]
     pub fn new(vector: Vector3<f64>) -> Option<Self> {
         // Dividing by the largest component first keeps the squares of very long and very short vectors in range.
@@ -96,13 +107,13 @@ impl<F: Frame> UnitRay<F> {
         Angle::from_rad(self.direction.x.hypot(self.direction.y).atan2(self.direction.z))
     }
 
-    /// The point at `range_mm` along the ray.
+    /// The point on the ray at `range_mm` millimetres from the origin.
     #[must_use]
     pub fn at(&self, range_mm: f64) -> Point<F> {
         Point::from_mm(self.vector() * range_mm)
     }
 
-    /// The same direction in a frame of another name with the same axes, such as `Camera` to `Left`.
+    /// Returns the same coordinates typed by another frame with the same axes, such as `Camera` to `Left`.
     #[must_use]
     pub fn renamed<G: Frame>(&self) -> UnitRay<G> {
         UnitRay { direction: self.direction, frame: PhantomData }
@@ -110,25 +121,25 @@ impl<F: Frame> UnitRay<F> {
 }
 
 impl<To: Frame, From: Frame> Transform<To, From> {
-    /// From rotation and the origin of `From` seen in `To`, in millimetres.
+    /// Makes a transform from its rotation and the origin of `From` in `To`, in millimetres.
     #[must_use]
     pub fn new(rotation: UnitQuaternion<f64>, origin_mm: Vector3<f64>) -> Self {
         Self::from_isometry(Isometry3::from_parts(Translation3::from(origin_mm), rotation))
     }
 
-    /// From an isometry whose translation is in millimetres.
+    /// Makes a transform from an isometry whose translation is in millimetres.
     #[must_use]
     pub const fn from_isometry(isometry: Isometry3<f64>) -> Self {
         Self { isometry, frames: PhantomData }
     }
 
-    /// The isometry, translation in millimetres.
+    /// The isometry, with its translation in millimetres.
     #[must_use]
     pub const fn isometry(&self) -> &Isometry3<f64> {
         &self.isometry
     }
 
-    /// Where the origin of `From` lies in `To`.
+    /// The origin of `From` in `To`.
     #[must_use]
     pub fn origin(&self) -> Point<To> {
         Point::from_mm(self.isometry.translation.vector)
@@ -140,13 +151,13 @@ impl<To: Frame, From: Frame> Transform<To, From> {
         self.isometry.rotation
     }
 
-    /// The way back: `left_from_right.inverse()` is `right_from_left`.
+    /// The inverse transform: `left_from_right.inverse()` is `right_from_left`.
     #[must_use]
     pub fn inverse(&self) -> Transform<From, To> {
         Transform::from_isometry(self.isometry.inverse())
     }
 
-    /// The same transform with its frames named anew.
+    /// Returns the same transform typed by other frames.
     #[must_use]
     pub fn renamed<A: Frame, B: Frame>(&self) -> Transform<A, B> {
         Transform::from_isometry(self.isometry)
@@ -174,7 +185,7 @@ impl<To: Frame, From: Frame> Mul<UnitRay<From>> for Transform<To, From> {
     }
 }
 
-/// One camera of a pair, where it is a value and not a frame.
+/// One camera of a pair, as a value.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Side {
     /// The left camera.
@@ -193,7 +204,7 @@ impl Side {
         }
     }
 
-    /// Its place in arrays of two: left, then right.
+    /// Index in arrays of two: 0 for left, 1 for right.
     #[must_use]
     pub const fn index(self) -> usize {
         match self {

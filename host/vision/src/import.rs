@@ -1,44 +1,45 @@
-//! Lenses from the parameter files of OpenCV and Kalibr.
+//! Conversion of lenses from and to the parameters of OpenCV and Kalibr.
 
 use crate::kannala_brandt::first_turn;
 use crate::{Angle, Camera, ImageSize, InvalidLens, KannalaBrandt, Pixel};
 
-/// The parameters of OpenCV's `cv::fisheye` and of Kalibr's `equidistant` distortion, which share one form:
+/// Lens parameters of OpenCV's `cv::fisheye` and of Kalibr's `equidistant` distortion, which share one form:
 ///
 /// ```text
 /// θd = θ (1 + k1 θ² + k2 θ⁴ + k3 θ⁶ + k4 θ⁸)        u = cx + fx θd cos φ        v = cy + fy θd sin φ
 /// ```
 ///
-/// There is no skew: a file with a skew other than zero is another camera.
+/// The model has no skew; a file with a skew other than zero describes another model.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct OpenCvFisheye {
     /// Horizontal focal length in pixels.
     pub fx: f64,
     /// Vertical focal length in pixels.
     pub fy: f64,
-    /// Column of the principal point.
+    /// Column of the principal point in pixels.
     pub cx: f64,
-    /// Row of the principal point.
+    /// Row of the principal point in pixels.
     pub cy: f64,
-    /// k1 to k4, without unit.
+    /// Distortion coefficients k1 to k4, without unit.
     pub k: [f64; 4],
 }
 
 impl KannalaBrandt {
-    /// From OpenCV's parameters. Their files state no field: where `theta_max` is not known otherwise, see
-    /// [`OpenCvFisheye::largest_theta`].
+    /// Makes a lens from OpenCV's parameters.
+    ///
+    /// OpenCV's files state no field of view: where `theta_max` is unknown, use [`OpenCvFisheye::largest_theta`].
     ///
     /// # Errors
-    /// As [`KannalaBrandt::new`].
+    /// The errors of [`KannalaBrandt::new`].
     pub fn from_opencv(camera: OpenCvFisheye, theta_max: Angle, size: ImageSize) -> Result<Self, InvalidLens> {
-        // Before their quotient hides the signs.
+        // Checked here, because the quotient fy / fx hides two negative signs.
         if camera.fx <= 0.0 || camera.fy <= 0.0 {
             return Err(InvalidLens::FocalLength);
         }
         Self::new(camera.coefficients(), camera.fy / camera.fx, camera.principal_point(), theta_max, size)
     }
 
-    /// The same lens in OpenCV's parameters, which leave out its `theta_max` and size.
+    /// Returns this lens in OpenCV's parameters, which omit `theta_max` and the image size.
     #[must_use]
     pub fn to_opencv(&self) -> OpenCvFisheye {
         let [fx, rest @ ..] = self.k();
@@ -48,10 +49,10 @@ impl KannalaBrandt {
 }
 
 impl OpenCvFisheye {
-    /// [`largest_theta`] of these parameters.
+    /// The largest usable half field of these parameters, see [`largest_theta()`].
     ///
     /// # Errors
-    /// As [`largest_theta`].
+    /// The errors of [`largest_theta()`].
     pub fn largest_theta(&self, size: ImageSize) -> Result<Angle, InvalidLens> {
         if self.fx <= 0.0 || self.fy <= 0.0 {
             return Err(InvalidLens::FocalLength);
@@ -69,16 +70,16 @@ impl OpenCvFisheye {
     }
 }
 
-/// The largest usable half field of a lens whose file states none: the angle seen at the farthest corner of the image,
-/// or a hundredth short of the angle where r(θ) stops growing, whichever is smaller.
+/// The largest usable half field of a lens whose file states none.
 ///
-/// This is what the polynomial allows. A lens with an image circle inside the sensor, or a calibration without points
-/// near the border, is good for less. Arguments as for [`KannalaBrandt::new`].
+/// It is the angle seen at the farthest corner of the image, or 99 % of the angle where r(θ) stops growing, whichever
+/// is smaller. This is the limit of the polynomial: a lens whose image circle lies inside the sensor, or a calibration
+/// without points near the border, is usable for less. The arguments are those of [`KannalaBrandt::new`].
 ///
 /// # Errors
-/// [`InvalidLens`] where the parameters are not a lens at any field.
+/// [`InvalidLens`] where the parameters describe no lens at any field.
 pub fn largest_theta(k: [f64; 5], aspect: f64, centre: Pixel, size: ImageSize) -> Result<Angle, InvalidLens> {
-    // Where dr/dθ nears zero a pixel's ray becomes uncertain without bound.
+    // Near dr/dθ = 0 the uncertainty of a pixel's ray grows without bound.
     const BELOW_TURN: f64 = 0.99;
     const WIDEST: Angle = Angle::from_deg(179.0);
     let limit = first_turn(&k, WIDEST.rad()).map_or(WIDEST, |turn| Angle::from_rad(BELOW_TURN * turn));

@@ -25,13 +25,25 @@ pub struct Pixel {
 /// Width and height of an image in pixels.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct ImageSize {
-    /// Columns.
+    /// Number of pixel columns.
     pub width: u32,
-    /// Rows.
+    /// Number of pixel rows.
     pub height: u32,
 }
 
-/// A lens and sensor: projects rays to pixels and pixels to rays.
+/// A fisheye lens with its sensor: projects rays to pixels and unprojects pixels to rays.
+///
+/// ```
+/// # use vergence_vision::{Angle, Camera, ImageSize, KannalaBrandt, Pixel};
+/// // An equidistant lens with 366 pixels per radian, valid up to 98° from its axis.
+/// let (centre, size) = (Pixel { u: 639.5, v: 639.5 }, ImageSize { width: 1280, height: 1280 });
+/// let lens = KannalaBrandt::new([366.0, 0.0, 0.0, 0.0, 0.0], 1.0, centre, Angle::from_deg(98.0), size)?;
+/// let ray = lens.unproject::<Camera>(Pixel { u: 20.0, v: 639.5 })?;
+/// assert!(ray.vector().z < 0.0, "it points behind the image plane");
+/// let pixel = lens.project(&ray)?;
+/// assert!((pixel.u - 20.0).abs() < 1e-9);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct KannalaBrandt {
     k: [f64; 5],
@@ -42,7 +54,7 @@ pub struct KannalaBrandt {
     size: ImageSize,
 }
 
-/// Why a set of parameters is not a lens.
+/// Why a set of parameters describes no lens.
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum InvalidLens {
@@ -73,8 +85,8 @@ pub enum InvalidLens {
 pub struct OutsideField;
 
 impl KannalaBrandt {
-    /// From the five coefficients in pixels, `aspect` = fy / fx, the principal point, the half field `theta_max` and
-    /// the image size.
+    /// Makes a lens from the five coefficients in pixels, `aspect` = fy / fx, the principal point, the half field
+    /// `theta_max` and the image size.
     ///
     /// # Errors
     /// [`InvalidLens`] where the parameters are not finite, not positive, or r(θ) does not grow up to `theta_max`.
@@ -101,10 +113,11 @@ impl KannalaBrandt {
         Ok(Self { k, aspect, centre, theta_max: stated, r_max: radius(&k, stated), size })
     }
 
-    /// The same lens before a sensor just as wide that has `width` pixels across and so many fewer or more down.
+    /// Returns this lens on a sensor of the same size in millimetres with `width` pixel columns, and rows in
+    /// proportion.
     ///
     /// # Errors
-    /// [`InvalidLens`] where no pixels are left.
+    /// [`InvalidLens`] where the scaled sensor has no pixels.
     pub fn resampled(&self, width: u32) -> Result<Self, InvalidLens> {
         let scale = f64::from(width) / f64::from(self.size.width);
         let height = (f64::from(self.size.height) * scale).round() as u32;
@@ -115,7 +128,7 @@ impl KannalaBrandt {
         Self::new(self.k.map(|k| k * scale), self.aspect, centre, Angle::from_rad(self.theta_max), size)
     }
 
-    /// The pixel where `ray` is seen.
+    /// Projects `ray` to its pixel.
     ///
     /// # Errors
     /// [`OutsideField`] beyond `theta_max`. The pixel may still lie outside the sensor: see [`Self::on_sensor`].
@@ -131,7 +144,7 @@ impl KannalaBrandt {
         Ok(Pixel { u: self.centre.u + scale * d.x, v: self.centre.v + self.aspect * scale * d.y })
     }
 
-    /// The pixel where `point` is seen.
+    /// Projects `point` to its pixel.
     ///
     /// # Errors
     /// [`OutsideField`] beyond `theta_max` and for a point at the optical centre.
@@ -139,10 +152,10 @@ impl KannalaBrandt {
         self.project(&point.direction().ok_or(OutsideField)?)
     }
 
-    /// The ray seen at `pixel`, in the camera frame the caller names.
+    /// Unprojects `pixel` to its ray, in the camera frame `F` that the caller names.
     ///
     /// # Errors
-    /// [`OutsideField`] beyond `theta_max`: never a clamped ray.
+    /// [`OutsideField`] beyond `theta_max`; the ray is never clamped.
     pub fn unproject<F: Frame>(&self, pixel: Pixel) -> Result<UnitRay<F>, OutsideField> {
         let (x, y) = (pixel.u - self.centre.u, (pixel.v - self.centre.v) / self.aspect);
         let r = x.hypot(y);
@@ -154,7 +167,7 @@ impl KannalaBrandt {
         UnitRay::new(Vector3::new(x * scale, y * scale, theta.cos())).ok_or(OutsideField)
     }
 
-    /// θ with r(θ) = `r`, by Newton's method kept inside a shrinking bracket.
+    /// Solves r(θ) = `r` for θ, by Newton's method kept inside a shrinking bracket.
     pub(crate) fn angle_at_radius(&self, r: f64) -> f64 {
         let (mut low, mut high) = (0.0, self.theta_max);
         let mut theta = (r / self.k[0]).clamp(low, high);
@@ -176,20 +189,20 @@ impl KannalaBrandt {
         theta
     }
 
-    /// Whether `pixel` lies on the sensor (half a pixel of border belongs to the outermost pixels).
+    /// Whether `pixel` lies on the sensor. The sensor extends half a pixel beyond the outermost pixel centres.
     #[must_use]
     pub fn on_sensor(&self, pixel: Pixel) -> bool {
         let inside = |x: f64, n: u32| x >= -0.5 && x <= f64::from(n) - 0.5;
         inside(pixel.u, self.size.width) && inside(pixel.v, self.size.height)
     }
 
-    /// The five coefficients in pixels.
+    /// The five coefficients k1 to k5 in pixels.
     #[must_use]
     pub const fn k(&self) -> [f64; 5] {
         self.k
     }
 
-    /// fy / fx.
+    /// The aspect ratio fy / fx.
     #[must_use]
     pub const fn aspect(&self) -> f64 {
         self.aspect
@@ -201,18 +214,18 @@ impl KannalaBrandt {
         self.centre
     }
 
-    /// Half the field: the largest valid angle to the optical axis.
+    /// Half the field of view: the largest valid angle to the optical axis.
     #[must_use]
     pub const fn theta_max(&self) -> Angle {
         Angle::from_rad(self.theta_max)
     }
 
-    /// r(θ) in pixels, for θ in radians.
+    /// The image radius r(θ) in pixels, for θ in radians.
     pub(crate) fn radius_at(&self, theta: f64) -> f64 {
         radius(&self.k, theta)
     }
 
-    /// r(theta_max) in pixels.
+    /// The image radius r(theta_max) in pixels.
     pub(crate) const fn radius_max(&self) -> f64 {
         self.r_max
     }
@@ -223,26 +236,26 @@ impl KannalaBrandt {
         self.size
     }
 
-    /// Pixels per radian at the angle `theta` from the axis, along the radius: dr/dθ.
+    /// The radial resolution dr/dθ in pixels per radian, at the angle `theta` from the optical axis.
     #[must_use]
     pub fn pixels_per_radian(&self, theta: Angle) -> f64 {
         slope(&self.k, theta.rad())
     }
 }
 
-/// r(θ) in pixels.
+/// The image radius r(θ) in pixels.
 fn radius(k: &[f64; 5], theta: f64) -> f64 {
     let s = theta * theta;
     theta * (k[0] + s * (k[1] + s * (k[2] + s * (k[3] + s * k[4]))))
 }
 
-/// dr/dθ in pixels per radian.
+/// The slope dr/dθ in pixels per radian.
 fn slope(k: &[f64; 5], theta: f64) -> f64 {
     let s = theta * theta;
     k[0] + s * (3.0 * k[1] + s * (5.0 * k[2] + s * (7.0 * k[3] + s * 9.0 * k[4])))
 }
 
-/// The first θ up to `limit` where dr/dθ ≤ 0: a scan in thousandths of `limit`, then bisection.
+/// The first θ up to `limit` where dr/dθ ≤ 0, found by a scan in thousandths of `limit` and bisection.
 pub(crate) fn first_turn(k: &[f64; 5], limit: f64) -> Option<f64> {
     const STEPS: u32 = 1000;
     let at = |i: u32| limit * f64::from(i) / f64::from(STEPS);

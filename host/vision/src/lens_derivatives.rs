@@ -1,15 +1,16 @@
-//! How pixels move with rays, rays with pixels, and pixels with the lens's parameters.
+//! Derivatives of pixels by rays, of rays by pixels, and of pixels by the lens's parameters.
 //!
-//! In the directions along and across the radius, a turn of the ray by one radian moves the pixel by dr/dθ and r / sin θ.
+//! A turn of the ray by one radian moves the pixel by dr/dθ along the radius, and by r / sin θ across it.
 
 use nalgebra::{Matrix2x3, Matrix3x2, SMatrix, Vector2, Vector3};
 
 use crate::{Frame, KannalaBrandt, UnitRay};
 
-/// Parameters of a lens in the order of calibrations: fx, fy, cx, cy in pixels, k1 to k4 as OpenCV has them.
+/// Number of lens parameters. Their order is fx, fy, cx, cy in pixels, then k1 to k4 as defined by OpenCV fisheye.
 pub const LENS_PARAMETERS: usize = 8;
 
-/// A ray's surroundings: angle, directions in space and in the image, and how much is moved along each.
+/// A lens's local geometry at a ray: the angle θ, the radial and tangential directions in space and in the image, and
+/// the resolution along each.
 struct Local {
     theta: f64,
     space: [Vector3<f64>; 2],
@@ -18,7 +19,7 @@ struct Local {
 }
 
 impl KannalaBrandt {
-    /// The derivative of the pixel by the direction of `ray` in pixels per radian, for directions that stay of unit length.
+    /// The derivative of the pixel by the unit vector of `ray`, in pixels per radian.
     #[must_use]
     pub fn pixel_by_ray<F: Frame>(&self, ray: &UnitRay<F>) -> Matrix2x3<f64> {
         let Local { space, image, pixels_per_radian, .. } = self.local(ray);
@@ -28,19 +29,19 @@ impl KannalaBrandt {
         derivative
     }
 
-    /// The derivative of the unit ray by the pixel where `ray` is seen, in radians per pixel.
+    /// The derivative of the unit vector of `ray` by its pixel, in radians per pixel.
     #[must_use]
     pub fn ray_by_pixel<F: Frame>(&self, ray: &UnitRay<F>) -> Matrix3x2<f64> {
         self.local(ray).ray_by_pixel(self)
     }
 
-    /// The derivative of the pixel where `ray` is seen by the lens's parameters, in the order of [`LENS_PARAMETERS`].
+    /// The derivative of the pixel of `ray` by the lens's parameters, in the order of [`LENS_PARAMETERS`].
     #[must_use]
     pub fn pixel_by_lens<F: Frame>(&self, ray: &UnitRay<F>) -> SMatrix<f64, 2, LENS_PARAMETERS> {
         self.local(ray).pixel_by_lens(self)
     }
 
-    /// [`Self::ray_by_pixel`] and [`Self::pixel_by_lens`] for little more than one of them.
+    /// Both [`Self::ray_by_pixel`] and [`Self::pixel_by_lens`], at little more than the cost of one.
     pub(crate) fn ray_by_pixel_and_pixel_by_lens<F: Frame>(
         &self,
         ray: &UnitRay<F>,
@@ -53,7 +54,7 @@ impl KannalaBrandt {
         let d = ray.vector();
         let sine = d.x.hypot(d.y);
         let theta = sine.atan2(d.z);
-        // On the axis any radius will do.
+        // On the axis every radial direction is equivalent.
         let (cos_phi, sin_phi) = if sine > 0.0 { (d.x / sine, d.y / sine) } else { (1.0, 0.0) };
         let across = if sine > 0.0 { self.radius_at(theta) / sine } else { self.k()[0] };
         Local {

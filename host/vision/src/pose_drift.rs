@@ -1,13 +1,14 @@
-//! Whether the pose is what the picture says it is.
+//! A test of the stated relative pose against the matches of one pair of images.
 //!
-//! An error of the relative pose turns all epipolar planes together: the angle of each pair of rays to one epipolar plane
-//! changes to first order with a turn ω of the right camera and a shift δ of its centre. The turn and shift that explain most
-//! of the angles follow by iteratively reweighted least squares (P. Holland and R. Welsch, Commun. Stat. A6, 1977) with the
-//! weights of S. Geman and D. McClure (1987), their scale shrinking from that of a gross error to that of the measurement.
+//! An error of the relative pose turns all epipolar planes together: the angle of each pair of rays to one epipolar
+//! plane changes to first order with a turn ω of the right camera and a shift δ of its centre. The turn and shift that
+//! explain most of the angles follow by iteratively reweighted least squares (P. Holland and R. Welsch, Commun. Stat.
+//! A6, 1977) with the weights of S. Geman and D. McClure (1987), their scale shrinking from that of a gross error to
+//! that of the measurement.
 //!
-//! The equations are written anew at the pose found, because to first order a turn of 5° would be wrong by 0.2°.
+//! The equations are linearised again at each pose found, because to first order a turn of 5° would be wrong by 0.2°.
 //!
-//! Nothing is corrected here. Whoever measures is told.
+//! The pose is not corrected here: the result only says how far it is off.
 
 use nalgebra::{Matrix6, UnitQuaternion, Vector3, Vector6};
 
@@ -15,46 +16,49 @@ use crate::epipolar::ray_to_plane;
 use crate::uncertainty::ResidualUncertainty;
 use crate::{Angle, Left, PixelPair, Right, StereoPair, Transform};
 
-/// Fewer pairs say nothing.
+/// Smallest number of usable matches.
 const LEAST_PAIRS: usize = 20;
 const ITERATIONS: usize = 30;
-/// How often the equations are written anew.
+/// How often the equations are linearised again.
 const ROUNDS: usize = 3;
-/// The scale of the first iterations, and the standard deviation of ω and of the baseline's direction without any pairs: so
-/// far off a picture still has matches.
+/// Scale of the first iterations, and prior standard deviation of ω and of the baseline's direction: images still match
+/// with a pose that is off by this much.
 const GROSS: Angle = Angle::from_deg(3.0);
-/// Residuals beyond this many standard deviations belong to wrong pairs.
+/// Residuals beyond this many standard deviations count as wrong matches.
 const SCALE_SIGMAS: f64 = 2.5;
-/// χ² of five unknowns exceeded by one in ten thousand: the shift along the baseline cannot be seen.
+/// χ² of five unknowns with a probability of 1e-4. The sixth, the shift along the baseline, has no effect on the
+/// angles.
 const SIGNIFICANT: f64 = 25.7;
 
-/// What the pairs say of the pose.
+/// The error of the stated relative pose, as estimated from matches.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct PoseDrift {
-    /// The turn that the picture asks for, about the left axes in radians, and the shift of the right camera in the left frame
-    /// in millimetres.
+    /// The correction that the matches suggest: a turn about the left axes in radians, then a shift of the right camera
+    /// in the left frame in millimetres.
     pub correction: Vector6<f64>,
-    /// The covariance of `correction` from the pairs.
+    /// The covariance of `correction` from the matches.
     pub covariance: Matrix6<f64>,
-    /// The angle of the turn.
+    /// The angle of the turn in `correction`.
     pub angle: Angle,
-    /// How unlikely the correction is for a pose as well known as stated: χ² of five unknowns.
+    /// χ² of the correction with five degrees of freedom, by the stated covariance of the pose and that of the
+    /// correction.
     pub chi_squared: f64,
-    /// The share of pairs that agree with the corrected pose.
+    /// The fraction of matches that agree with the corrected pose.
     pub agreeing: f64,
 }
 
 impl PoseDrift {
-    /// Whether the pose is off by more than it is said to be.
+    /// Whether the pose is off by more than its stated covariance explains, at a significance of 1e-4.
     #[must_use]
     pub fn is_significant(&self) -> bool {
         self.chi_squared > SIGNIFICANT
     }
 }
 
-/// Compares the pose of `pair` with what `pixels` say, most of them right to the standard deviation in pixels that stands with
-/// each. `pose` is the stated covariance of the pose, in the coordinates of [`crate::SharedCovariance`]. `None` with fewer
-/// than 20 usable pairs.
+/// Compares the pose of `pair` with matches, each given with its standard deviation in pixels; some may be wrong.
+///
+/// `pose` is the stated covariance of the pose, in the coordinates of [`crate::SharedCovariance`]. Returns `None` with
+/// fewer than 20 usable matches.
 #[must_use]
 pub fn pose_drift(pixels: &[(PixelPair, f64)], pair: &StereoPair<'_>, pose: &Matrix6<f64>) -> Option<PoseDrift> {
     let prior = weak_prior(pair.left_from_right.origin().mm().norm());
@@ -88,26 +92,26 @@ pub fn pose_drift(pixels: &[(PixelPair, f64)], pair: &StereoPair<'_>, pose: &Mat
     Some(PoseDrift { correction, covariance, angle, chi_squared, agreeing })
 }
 
-/// R ← exp(ω) R, t ← t + δ.
+/// Applies a correction to a pose: R ← exp(ω) R, t ← t + δ.
 fn moved(pose: &Transform<Left, Right>, by: &Vector6<f64>) -> Transform<Left, Right> {
     let turn = UnitQuaternion::from_scaled_axis(Vector3::new(by[0], by[1], by[2]));
     Transform::new(turn * pose.rotation(), pose.origin().mm() + by.fixed_rows::<3>(3))
 }
 
-/// What [`moved`] needs to make `to` of `from`.
+/// The correction with which [`moved`] makes `to` of `from`.
 fn difference(to: &Transform<Left, Right>, from: &Transform<Left, Right>) -> Vector6<f64> {
     let turn = (to.rotation() * from.rotation().inverse()).scaled_axis();
     let shift = to.origin().mm() - from.origin().mm();
     Vector6::new(turn.x, turn.y, turn.z, shift.x, shift.y, shift.z)
 }
 
-/// Information without any pairs, which fixes what they do not: the shift along the baseline.
+/// Prior information, which fixes the shift along the baseline: matches cannot.
 fn weak_prior(baseline_mm: f64) -> Matrix6<f64> {
     let (turn, shift) = (GROSS.rad().powi(-2), (GROSS.rad() * baseline_mm).powi(-2));
     Matrix6::from_diagonal(&Vector6::new(turn, turn, turn, shift, shift, shift))
 }
 
-/// offset + slope · correction = 0 for a right pair, to `sigma`.
+/// One match's equation: offset + slope · correction = 0 with standard deviation `sigma`, in radians.
 struct Equation {
     offset: f64,
     slope: Vector6<f64>,
@@ -128,7 +132,7 @@ impl Equation {
         self.offset + self.slope.dot(correction)
     }
 
-    /// 1/σ² times (1 + (residual / scale)²)⁻².
+    /// The weight 1/σ² times (1 + (residual / scale)²)⁻².
     fn weight(&self, correction: &Vector6<f64>, scale: f64) -> f64 {
         let relative = self.residual(correction) / scale;
         (1.0 + relative * relative).powi(-2) / (self.sigma * self.sigma)

@@ -1,7 +1,9 @@
-//! How the methods of triangulation compare on the precision bench: with noise, and with matches that slipped along an edge.
+//! How the methods of triangulation compare on the precision bench: with noise, and with matches that slipped along an
+//! edge.
 //!
-//! Two equal equidistant lenses of 560 px/rad stand 145 mm apart, their axes turned outwards. Points are placed around the
-//! middle of the rig; its axes have x along the baseline, y down and z forward between the cameras. Everything is seeded.
+//! Two equal equidistant lenses of 560 px/rad stand 145 mm apart, their axes turned outwards. Points are placed around
+//! the middle of the rig; its axes have x along the baseline, y down and z forward between the cameras. Everything is
+//! seeded.
 
 use nalgebra::{UnitQuaternion, Vector3};
 
@@ -98,7 +100,8 @@ pub fn left_from_middle(separation: Angle) -> Transform<Left, Base> {
     Transform::new(turned, turned * Vector3::new(BASELINE.mm() / 2.0, 0.0, 0.0))
 }
 
-/// At `range` from the middle of the rig, to the right by an azimuth and upwards by an elevation; rig axes, millimetres.
+/// At `range` from the middle of the rig, to the right by an azimuth and upwards by an elevation; rig axes,
+/// millimetres.
 #[must_use]
 pub fn around(range: Length, azimuth: Angle, elevation: Angle) -> Vector3<f64> {
     let (az, el) = (azimuth.rad(), elevation.rad());
@@ -114,8 +117,8 @@ pub fn see(pair: &StereoPair<'_>, point: &Point<Left>) -> Option<PixelPair> {
 }
 
 /// RMS error of the distance from the middle of the rig in millimetres, of each of [`METHODS`], over `samples` pairs of
-/// pixels with Gaussian noise of `sigma_px` in every coordinate. All methods see the same noise. `None` where a method has
-/// no point.
+/// pixels with Gaussian noise of `sigma_px` in every coordinate. All methods see the same noise. `None` where a method
+/// has no point.
 #[must_use]
 pub fn with_noise(place: &Place, sigma_px: f64, samples: u32, seed: u64) -> Option<[f64; METHODS.len()]> {
     let lens = lens(0.0).ok()?;
@@ -137,8 +140,8 @@ pub fn with_noise(place: &Place, sigma_px: f64, samples: u32, seed: u64) -> Opti
     Some(squares.map(|sum| (sum / f64::from(samples.max(1))).sqrt()))
 }
 
-/// Error of the depth along z of the rig in millimetres, of each of [`METHODS`] and of [`Kernel::EdgePlane`], where the right
-/// match slipped downwards by `slip` along a vertical edge through the point. `None` where a method has no point.
+/// Error of the depth along z of the rig in millimetres, of each of [`METHODS`] and of [`Kernel::EdgePlane`], where the
+/// right match slipped downwards by `slip` along a vertical edge through the point. `None` where a method has no point.
 #[must_use]
 pub fn with_slip(place: &Place, slip: Length) -> Option<([f64; METHODS.len()], f64)> {
     let lens = lens(0.0).ok()?;

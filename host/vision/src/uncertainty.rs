@@ -1,54 +1,59 @@
-//! What a point's uncertainty is made of: the noise of its own two pixels, and the errors that all points of a pair share.
+//! The uncertainty of a point from the noise of its two pixels and from the errors of lenses and pose that all points
+//! share.
 //!
-//! With u, v the rays, λ and μ the ranges, n the normal of the epipolar plane and s = [u, v, n] the sine of the parallax, a
-//! pseudo-intersected point moves to first order with the rays by
+//! With u, v the rays, λ and μ the ranges, n the normal of the epipolar plane and s = [u, v, n] the sine of the
+//! parallax, a pseudo-intersected point moves to first order with the rays by
 //!
 //! ```text
 //! G_u = λ [v (n × u)ᵀ / s + n nᵀ / 2]        G_v = μ [-u (n × v)ᵀ / s + n nᵀ / 2]
 //! ```
 //!
-//! in the plane along the other ray, across it by the mean of both. The right ray turns with the relative pose, both turn
-//! with their lenses; a shift of the right centre by δ acts as a turn of its ray by δ / μ.
+//! A turn in the epipolar plane moves the point along the other ray; a turn across it counts half. The right ray turns
+//! with the relative pose, and both turn with their lenses; a shift of the right centre by δ acts as a turn of its ray
+//! by δ / μ.
 //!
-//! A point triangulated in the plane of an edge e takes its place from where the rays cross as seen along e, and the mean of
-//! both along it. With λ u = t + μ v at the point, D = [u, v, e] and w = (u (v × e)ᵀ + v (e × u)ᵀ + e (u × v)ᵀ) w / D for any
-//! w, the derivatives of λ = [t, v, e] / D and μ = [t, u, e] / D in (λ u + t + μ v) / 2 come to
+//! A point triangulated by [`crate::edge_plane`] lies where the rays cross in the projection along the edge e, and
+//! midway between them along e. With λ u = t + μ v at the point, D = [u, v, e] and w = (u (v × e)ᵀ + v (e × u)ᵀ + e (u
+//! × v)ᵀ) w / D for any w, the derivatives of λ = [t, v, e] / D and μ = [t, u, e] / D in (λ u + t + μ v) / 2 are
 //!
 //! ```text
 //! G_u = λ [v (e × u)ᵀ + e (u × v)ᵀ / 2] / D        G_v = μ [-u (e × v)ᵀ + e (u × v)ᵀ / 2] / D
 //! ```
 //!
-//! of which the first pair is the case e = n. By e itself the point does not move to first order, because the rays meet;
-//! where a match slipped by h along the edge, an edge that is wrong by an angle ε costs about h ε.
+//! The first pair of formulas is the case e = n. An error of e itself does not move the point to first order, because
+//! the rays meet; where a match slipped by h along the edge, an edge direction wrong by an angle ε moves it by about h
+//! ε.
 
 use nalgebra::{Matrix3, Matrix6, RowSVector, SMatrix, Vector3, Vector6};
 
 use crate::lens_derivatives::LENS_PARAMETERS;
 use crate::{Angle, Kernel, Left, Point, Right, StereoPair, UnitRay};
 
-/// Both lenses and the pose.
+/// Number of parameters that all points of a pair share: those of both lenses and the six of the pose.
 pub const SHARED_PARAMETERS: usize = 2 * LENS_PARAMETERS + 6;
 
-/// The covariance of what all points of a pair share, in this order: left lens, right lens (each fx, fy, cx, cy in pixels
-/// and k1 to k4 as OpenCV has them), then the relative pose as a turn ω about the left axes in radians and a shift δ of the
-/// right camera in the left frame in millimetres.
+/// The covariance (22 × 22) of the parameters that all points of a pair share.
+///
+/// Their order is: left lens, right lens (each fx, fy, cx, cy in pixels and k1 to k4 as defined by OpenCV fisheye),
+/// then the relative pose as a turn ω about the left axes in radians and a shift δ of the right camera in the left
+/// frame in millimetres: R ← exp(ω) R, t ← t + δ.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SharedCovariance(SMatrix<f64, SHARED_PARAMETERS, SHARED_PARAMETERS>);
 
 impl SharedCovariance {
-    /// Lenses and pose known exactly.
+    /// The zero covariance, of lenses and pose that are known exactly.
     #[must_use]
     pub fn exact() -> Self {
         Self(SMatrix::zeros())
     }
 
-    /// With all correlations, of lenses and pose calibrated together.
+    /// The full covariance of lenses and pose that were calibrated together, with all correlations.
     #[must_use]
     pub const fn joint(covariance: SMatrix<f64, SHARED_PARAMETERS, SHARED_PARAMETERS>) -> Self {
         Self(covariance)
     }
 
-    /// The same with another covariance of the pose, which then is independent of the lenses.
+    /// Replaces the covariance of the pose (6 × 6) and removes its correlation with the lenses.
     #[must_use]
     pub fn with_pose(mut self, covariance: &Matrix6<f64>) -> Self {
         const POSE: usize = 2 * LENS_PARAMETERS;
@@ -58,7 +63,7 @@ impl SharedCovariance {
         self
     }
 
-    /// The same with lenses calibrated independently of each other and of the pose.
+    /// Replaces the covariances of both lenses (8 × 8) and removes their correlation with each other and with the pose.
     #[must_use]
     pub fn with_lenses(mut self, lenses: [&SMatrix<f64, LENS_PARAMETERS, LENS_PARAMETERS>; 2]) -> Self {
         for (lens, first) in lenses.into_iter().zip([0, LENS_PARAMETERS]) {
@@ -69,32 +74,37 @@ impl SharedCovariance {
         self
     }
 
-    /// The covariance in the stated order.
+    /// The covariance matrix, in the order stated at the type.
     #[must_use]
     pub const fn matrix(&self) -> &SMatrix<f64, SHARED_PARAMETERS, SHARED_PARAMETERS> {
         &self.0
     }
 }
 
-/// How one point depends on its pixels and on what is shared.
+/// The uncertainty of one point, as its covariance from pixel noise and its derivative by the shared parameters.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct PointUncertainty {
-    /// Covariance from the noise of its two pixels alone, mm², left frame.
+    /// Covariance from the noise of its two pixels alone, in mm², left frame.
     pub from_pixels: Matrix3<f64>,
-    /// Derivative of the point by the shared parameters, in the order of [`SharedCovariance`], mm per unit of each.
+    /// Derivative of the point by the shared parameters, in the order of [`SharedCovariance`], in mm per unit of each.
     pub by_shared: SMatrix<f64, 3, SHARED_PARAMETERS>,
 }
 
 impl PointUncertainty {
-    /// Of `point` as `pair` sees it, for noise of `pixel_sigma` pixels in each coordinate of each image. `None` on the line
-    /// through both centres and where an argument is not finite.
+    /// The uncertainty of a pseudo-intersected `point` of `pair`, for noise of `pixel_sigma` pixels in each coordinate
+    /// of each image.
+    ///
+    /// `None` for a point on the line through both centres, and where an argument is not finite.
     #[must_use]
     pub fn of(point: &Point<Left>, pair: &StereoPair<'_>, pixel_sigma: f64) -> Option<Self> {
         Self::by(&Kernel::default(), point, pair, pixel_sigma)
     }
 
-    /// The same of a point made by `kernel`. [`Kernel::EdgePlane`] has a covariance of its own, and none for an edge in the
-    /// epipolar plane; the others have that of the pseudo-intersection to first order in the plane, where the range lies.
+    /// The uncertainty of a point triangulated by `kernel`; the other arguments are those of [`Self::of`].
+    ///
+    /// [`Kernel::EdgePlane`] has a covariance of its own, and none (`None`) for an edge in the epipolar plane. For the
+    /// other methods the covariance is that of the pseudo-intersection, to which they agree to first order in the
+    /// epipolar plane.
     #[must_use]
     pub fn by(kernel: &Kernel, point: &Point<Left>, pair: &StereoPair<'_>, pixel_sigma: f64) -> Option<Self> {
         let edge = match kernel {
@@ -113,7 +123,7 @@ impl PointUncertainty {
         let from_pixels =
             (left_pixel * left_pixel.transpose() + right_pixel * right_pixel.transpose()) * (pixel_sigma * pixel_sigma);
 
-        // At a fixed pixel the ray turns against what the lens does.
+        // At a fixed pixel, a change of the lens turns the ray the other way than it moves the pixel.
         let mut by_shared = SMatrix::<f64, 3, SHARED_PARAMETERS>::zeros();
         by_shared.fixed_columns_mut::<LENS_PARAMETERS>(0).copy_from(&(-left_pixel * left_by_lens));
         by_shared.fixed_columns_mut::<LENS_PARAMETERS>(LENS_PARAMETERS).copy_from(&(-right_pixel * right_by_lens));
@@ -124,35 +134,37 @@ impl PointUncertainty {
         finite.then_some(Self { from_pixels, by_shared })
     }
 
-    /// The point's whole covariance, mm², left frame.
+    /// The point's total covariance in mm², left frame.
     #[must_use]
     pub fn covariance(&self, shared: &SharedCovariance) -> Matrix3<f64> {
         self.from_pixels + self.covariance_with(self, shared)
     }
 
-    /// The covariance of the errors of this point (rows) and `other` (columns): what they share, mm². The same pair's
-    /// points lean the same way, so differences between near points are better known than the points.
+    /// The cross-covariance of this point (rows) and `other` (columns) from the shared parameters, in mm², left frame.
+    ///
+    /// Points of one pair share the errors of lenses and pose, so the difference of two near points is better known
+    /// than either.
     #[must_use]
     pub fn covariance_with(&self, other: &Self, shared: &SharedCovariance) -> Matrix3<f64> {
         self.by_shared * shared.0 * other.by_shared.transpose()
     }
 }
 
-/// How the angle between two rays and one epipolar plane, see [`crate::ray_to_plane`], depends on their pixels and on what
-/// is shared.
+/// The uncertainty of the angle of [`crate::ray_to_plane`], from pixel noise and by the shared parameters.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ResidualUncertainty {
-    /// Variance from the noise of the two pixels alone, rad².
+    /// Variance from the noise of the two pixels alone, in rad².
     pub from_pixels: f64,
-    /// Derivative of the angle by the shared parameters, in the order of [`SharedCovariance`], radians per unit of each.
+    /// Derivative of the angle by the shared parameters, in the order of [`SharedCovariance`], in radians per unit of
+    /// each.
     pub by_shared: RowSVector<f64, SHARED_PARAMETERS>,
 }
 
 impl ResidualUncertainty {
-    /// For two rays that are near one epipolar plane, `right` in the right camera's own frame. `None` where both lie along
-    /// the baseline.
+    /// The uncertainty for two rays near one epipolar plane, each in its own camera's frame.
     ///
-    /// The angle is [t, u, v] over the larger of |t × u| and |t × v|, t of unit length, and changes with each of the three.
+    /// With t of unit length, the angle is [t, u, v] over the larger of |t × u| and |t × v|; it depends on all three
+    /// vectors. `None` where both rays lie along the baseline.
     #[must_use]
     pub fn of(left: &UnitRay<Left>, right: &UnitRay<Right>, pair: &StereoPair<'_>, pixel_sigma: f64) -> Option<Self> {
         let turn = pair.left_from_right.rotation().to_rotation_matrix().into_inner();
@@ -164,7 +176,7 @@ impl ResidualUncertainty {
         let (right_by_pixel, right_by_lens) = pair.right.ray_by_pixel_and_pixel_by_lens(right);
         let by_left = v.cross(&t).transpose() / sine * left_by_pixel;
         let by_right = from_u.transpose() / sine * turn * right_by_pixel;
-        // The shift along the baseline changes nothing.
+        // A shift along the baseline does not change the angle.
         let across = u.cross(&v) / (sine * centre.mm().norm());
         let by_shift = (across - t * t.dot(&across)).transpose();
         let by_turn = v.cross(&(from_u / sine)).transpose();
@@ -186,20 +198,21 @@ impl ResidualUncertainty {
         Angle::from_rad((self.from_pixels + from_shared).sqrt())
     }
 
-    /// The derivative by the pose alone: ω in radians, δ in millimetres.
+    /// The derivative of the angle by the pose alone: ω in radians, δ in millimetres.
     pub(crate) fn by_pose(&self) -> Vector6<f64> {
         self.by_shared.fixed_columns::<6>(2 * LENS_PARAMETERS).transpose()
     }
 }
 
-/// G_u and G_v, in millimetres per radian; `along` is the edge, or else the normal of the epipolar plane.
+/// The matrices G_u and G_v in millimetres per radian. `along` is the edge; `None` takes the normal of the epipolar
+/// plane.
 fn by_rays(
     point: &Vector3<f64>,
     right_centre: &Vector3<f64>,
     along: Option<Vector3<f64>>,
 ) -> Option<(Matrix3<f64>, Matrix3<f64>)> {
-    // The sine to the baseline below which the range is without bound for any purpose, and that of an edge to the epipolar
-    // plane as a part of the parallax.
+    // Below this sine to the baseline the range counts as unbounded; an edge is in the epipolar plane below this sine
+    // to it, relative to that of the parallax.
     const VANISHING: f64 = 1e-9;
     let from_right = point - right_centre;
     let (left_range, right_range) = (point.norm(), from_right.norm());

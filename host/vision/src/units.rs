@@ -1,29 +1,38 @@
-//! Lengths, angles and times as types, read and printed with their units.
+//! Lengths, angles and times as types, parsed and printed with their units.
 
 use std::fmt;
 use std::ops::{Add, Div, Mul, Neg, Sub};
 use std::str::FromStr;
 
-/// A length. Made and read in named units; held in millimetres.
+/// A length, stored in millimetres.
+///
+/// ```
+/// # use vergence_vision::Length;
+/// let baseline: Length = "14.5 cm".parse()?;
+/// assert_eq!(baseline.mm(), 145.0);
+/// assert_eq!(format!("{baseline:.1}"), "145.0 mm");
+/// assert!("145".parse::<Length>().is_err(), "a number without a unit is refused");
+/// # Ok::<(), vergence_vision::InvalidQuantity>(())
+/// ```
 #[derive(Clone, Copy, Debug, Default, PartialEq, PartialOrd)]
 pub struct Length {
     mm: f64,
 }
 
-/// A plane angle. Made and read in named units; held in radians.
+/// A plane angle, stored in radians.
 #[derive(Clone, Copy, Debug, Default, PartialEq, PartialOrd)]
 pub struct Angle {
     rad: f64,
 }
 
 impl Length {
-    /// A length of `mm` millimetres.
+    /// Makes a length of `mm` millimetres.
     #[must_use]
     pub const fn from_mm(mm: f64) -> Self {
         Self { mm }
     }
 
-    /// In millimetres.
+    /// The length in millimetres.
     #[must_use]
     pub const fn mm(self) -> f64 {
         self.mm
@@ -31,25 +40,25 @@ impl Length {
 }
 
 impl Angle {
-    /// An angle of `rad` radians.
+    /// Makes an angle of `rad` radians.
     #[must_use]
     pub const fn from_rad(rad: f64) -> Self {
         Self { rad }
     }
 
-    /// An angle of `deg` degrees.
+    /// Makes an angle of `deg` degrees.
     #[must_use]
     pub const fn from_deg(deg: f64) -> Self {
         Self { rad: deg.to_radians() }
     }
 
-    /// In radians.
+    /// The angle in radians.
     #[must_use]
     pub const fn rad(self) -> f64 {
         self.rad
     }
 
-    /// In degrees.
+    /// The angle in degrees.
     #[must_use]
     pub const fn deg(self) -> f64 {
         self.rad.to_degrees()
@@ -62,27 +71,27 @@ impl Angle {
     }
 }
 
-/// A time between two events, of either sign. Made and read in named units; held in microseconds.
+/// A duration of either sign, stored in microseconds.
 #[derive(Clone, Copy, Debug, Default, PartialEq, PartialOrd)]
 pub struct Time {
     us: f64,
 }
 
 impl Time {
-    /// A time of `us` microseconds.
+    /// Makes a duration of `us` microseconds.
     #[must_use]
     pub const fn from_us(us: f64) -> Self {
         Self { us }
     }
 
-    /// In microseconds.
+    /// The duration in microseconds.
     #[must_use]
     pub const fn us(self) -> f64 {
         self.us
     }
 }
 
-/// A text that is not a number followed by a known unit.
+/// Error of parsing a quantity: the text is not a number followed by a known unit.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[error("'{text}' is not {expected}: write a number and its unit, such as {example}")]
 pub struct InvalidQuantity {
@@ -91,7 +100,7 @@ pub struct InvalidQuantity {
     example: &'static str,
 }
 
-/// Splits `text` into a finite number and the factor of its unit.
+/// Parses a finite number followed by one of `units`, each with its factor; returns their product.
 fn parse_quantity(text: &str, units: &[(&str, f64)]) -> Option<f64> {
     let text = text.trim();
     let unit_start = text.find(|c: char| c.is_alphabetic() && c != 'e' && c != 'E' || c == '°')?;
@@ -105,7 +114,7 @@ fn parse_quantity(text: &str, units: &[(&str, f64)]) -> Option<f64> {
 impl FromStr for Length {
     type Err = InvalidQuantity;
 
-    /// Reads `145mm`, `14.5 cm`, `0.145m` or `20um`. A bare number is refused.
+    /// Parses `145mm`, `14.5 cm`, `0.145m` or `20um`. A number without a unit is refused.
     fn from_str(text: &str) -> Result<Self, Self::Err> {
         const UNITS: [(&str, f64); 5] = [("mm", 1.0), ("cm", 10.0), ("m", 1e3), ("um", 1e-3), ("µm", 1e-3)];
         parse_quantity(text, &UNITS).map(Self::from_mm).ok_or_else(|| InvalidQuantity {
@@ -119,7 +128,7 @@ impl FromStr for Length {
 impl FromStr for Angle {
     type Err = InvalidQuantity;
 
-    /// Reads `120deg`, `120°`, `2.09rad` or `5mrad`. A bare number is refused.
+    /// Parses `120deg`, `120°`, `2.09rad` or `5mrad`. A number without a unit is refused.
     fn from_str(text: &str) -> Result<Self, Self::Err> {
         const DEG: f64 = std::f64::consts::PI / 180.0;
         const UNITS: [(&str, f64); 4] = [("deg", DEG), ("°", DEG), ("rad", 1.0), ("mrad", 1e-3)];
@@ -134,7 +143,7 @@ impl FromStr for Angle {
 impl FromStr for Time {
     type Err = InvalidQuantity;
 
-    /// Reads `15us`, `14.8 µs`, `30ns`, `-2ms` or `0.1s`. A bare number is refused.
+    /// Parses `15us`, `14.8 µs`, `30ns`, `-2ms` or `0.1s`. A number without a unit is refused.
     fn from_str(text: &str) -> Result<Self, Self::Err> {
         const UNITS: [(&str, f64); 5] = [("us", 1.0), ("µs", 1.0), ("ns", 1e-3), ("ms", 1e3), ("s", 1e6)];
         parse_quantity(text, &UNITS).map(Self::from_us).ok_or_else(|| InvalidQuantity {
@@ -146,7 +155,7 @@ impl FromStr for Time {
 }
 
 impl fmt::Display for Length {
-    /// In millimetres, with the precision of the format (`{:.3}`).
+    /// Prints millimetres, with the precision of the format (`{:.3}`).
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         fmt::Display::fmt(&self.mm(), f)?;
         f.write_str(" mm")
@@ -154,7 +163,7 @@ impl fmt::Display for Length {
 }
 
 impl fmt::Display for Angle {
-    /// In degrees, with the precision of the format (`{:.2}`).
+    /// Prints degrees, with the precision of the format (`{:.2}`).
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         fmt::Display::fmt(&self.deg(), f)?;
         f.write_str("°")
@@ -162,7 +171,7 @@ impl fmt::Display for Angle {
 }
 
 impl fmt::Display for Time {
-    /// In microseconds, with the precision of the format (`{:.0}`).
+    /// Prints microseconds, with the precision of the format (`{:.0}`).
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         fmt::Display::fmt(&self.us(), f)?;
         f.write_str(" us")

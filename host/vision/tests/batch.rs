@@ -1,4 +1,4 @@
-//! Whole arrays agree with the single-point functions, on every lens, with either set of instructions.
+//! Batch functions agree with the single-point functions, for every lens and either set of instructions.
 
 #![allow(clippy::unwrap_used, reason = "helpers of tests may panic as tests do")]
 
@@ -10,10 +10,11 @@ use vergence_vision::{
 };
 
 const BOTH: [Instructions; 2] = [Instructions::Best, Instructions::Baseline];
-/// What the batch may add to the error of the single-point functions, in radians.
+/// Largest additional error of the batch functions, in radians.
 const LARGEST_ERROR: f64 = 1e-14;
 
-/// From nearly equidistant to strongly bent; the last two grow at a tenth of f at the rim and have no fast fit.
+/// Lenses from nearly equidistant to strongly bent. At the rim of the last two dr/dθ is a tenth of f, and no polynomial
+/// fits.
 fn lenses() -> Vec<(KannalaBrandt, bool)> {
     let shapes: [([f64; 4], f64, f64, bool); 6] = [
         ([0.0; 4], 1.0, 120.0, true),
@@ -45,7 +46,7 @@ fn rays_over_field(lens: &KannalaBrandt, count: u32) -> Vec<UnitRay<Camera>> {
 }
 
 #[test]
-fn fits_exist_for_ordinary_lenses() {
+fn ordinary_lenses_have_a_fast_unprojection() {
     for (lens, fitted) in lenses() {
         assert_eq!(BatchLens::new(&lens).is_fitted(), fitted, "{lens:?}");
     }
@@ -89,7 +90,7 @@ fn rays_agree_with_the_single_point_functions() {
 }
 
 #[test]
-fn what_is_outside_the_field_is_not_a_number() {
+fn pixels_and_points_outside_the_field_give_nan() {
     for (lens, _) in lenses() {
         let beyond = ray(lens.theta_max().rad() + 1e-6, 0.7).vector();
         let radius = 1.0001 * lens.project(&ray(lens.theta_max().rad() - 1e-9, 0.0)).unwrap().u - 957.3 * 0.0001;

@@ -1,4 +1,4 @@
-//! Whole arrays of points with all that is uncertain about them agree with the single-point functions.
+//! Points and covariances of whole arrays agree with the single-point functions.
 
 #![allow(clippy::unwrap_used, reason = "helpers of tests may panic as tests do")]
 
@@ -10,7 +10,7 @@ use vergence_vision::{
 };
 
 const PIXEL_SIGMA: f64 = 0.3;
-/// Sigmas of both lenses and the pose, about those of a calibration.
+/// Standard deviations of both lenses and the pose, about those of a calibration.
 const SIGMAS: [f64; SHARED_PARAMETERS] = [
     0.05, 0.05, 0.04, 0.04, 2e-4, 3e-4, 2e-4, 5e-5, 0.05, 0.05, 0.04, 0.04, 2e-4, 3e-4, 2e-4, 5e-5, 2e-4, 2e-4, 2e-4,
     0.05, 0.05, 0.05,
@@ -21,7 +21,7 @@ fn lens(fx: f64, fy: f64, k: [f64; 4]) -> KannalaBrandt {
     KannalaBrandt::from_opencv(camera, Angle::from_deg(99.0), ImageSize { width: 2080, height: 2080 }).unwrap()
 }
 
-/// Correlated throughout: every parameter leans on all others.
+/// A covariance in which every parameter is correlated with all others.
 fn shared(mixing: &[f64]) -> SharedCovariance {
     let mixed = SMatrix::<f64, SHARED_PARAMETERS, SHARED_PARAMETERS>::from_fn(|row, column| {
         SIGMAS[row] * if row == column { 1.0 } else { 0.3 * mixing[(row * 7 + column * 3) % mixing.len()] }
@@ -29,7 +29,7 @@ fn shared(mixing: &[f64]) -> SharedCovariance {
     SharedCovariance::joint(mixed * mixed.transpose())
 }
 
-/// By the single-point functions; `None` where they refuse.
+/// The result of the single-point functions; `None` where they refuse.
 fn expected(
     rays: [&[f64; 3]; 2],
     pair: &StereoPair<'_>,
@@ -53,7 +53,7 @@ proptest! {
         let left_from_right = Transform::<Left, Right>::new(UnitQuaternion::from_scaled_axis(turn.into()), t.into());
         let pair = StereoPair { left: &lenses[0], right: &lenses[1], left_from_right };
         let shared = shared(&mixing);
-        // Rays that miss each other by up to a millimetre, and every fifth time altogether.
+        // Rays that miss each other by up to a millimetre; every fifth pair is unrelated.
         let (left, right): (Vec<[f64; 3]>, Vec<[f64; 3]>) = rows.iter().enumerate().map(|(i, &[x, y, z, range, a, b])| {
             let ray = Vector3::new(x, y, z).normalize();
             let meeting = ray * range - Vector3::from(t) + Vector3::new(a, b, 0.5);

@@ -1,11 +1,11 @@
-//! Pixel pairs to points: every pair is accounted for, exact pairs return their points, and each gate has its reason.
+//! Clouds from matches: every match is counted, exact matches return their points, and each gate has its reason.
 
 #![allow(clippy::unwrap_used, reason = "helpers of tests may panic as tests do")]
 
 use nalgebra::{UnitQuaternion, Vector3};
 use proptest::prelude::*;
 use vergence_vision::{
-    Angle, Cloud, Drop, Gates, ImageSize, KannalaBrandt, Left, Length, Pixel, PixelPair, Point, Right,
+    Angle, Cloud, DropReason, Gates, ImageSize, KannalaBrandt, Left, Length, Pixel, PixelPair, Point, Right,
     SharedCovariance, StereoPair, Transform, cloud,
 };
 
@@ -49,8 +49,8 @@ fn accounted(cloud: &Cloud) -> usize {
     cloud.points.len() + cloud.dropped.values().sum::<usize>()
 }
 
-/// What becomes of one pair seen by parallel cameras.
-fn fate(pair: PixelPair, gates: &Gates) -> Option<Drop> {
+/// The drop reason of one match of parallel cameras; `None` for a point.
+fn fate(pair: PixelPair, gates: &Gates) -> Option<DropReason> {
     let (left, right) = (lens(0.0), lens(0.01));
     let rig = StereoPair { left: &left, right: &right, left_from_right: left_from_right(0.0) };
     let cloud = cloud(&[pair], &rig, gates);
@@ -58,7 +58,7 @@ fn fate(pair: PixelPair, gates: &Gates) -> Option<Drop> {
     cloud.dropped.keys().next().copied()
 }
 
-fn fate_of(point: Point<Left>, gates: &Gates) -> Option<Drop> {
+fn fate_of(point: Point<Left>, gates: &Gates) -> Option<DropReason> {
     let (left, right) = (lens(0.0), lens(0.01));
     let rig = StereoPair { left: &left, right: &right, left_from_right: left_from_right(0.0) };
     fate(see(&rig, &point).unwrap(), gates)
@@ -72,30 +72,30 @@ fn each_gate_drops_for_its_own_reason() {
     let rig = StereoPair { left: &left, right: &right, left_from_right: left_from_right(0.0) };
     let seen = see(&rig, &good).unwrap();
     assert_eq!(fate(seen, &gates()), None);
-    assert_eq!(fate(PixelPair { left: outside, ..seen }, &gates()), Some(Drop::OutsideLeftField));
-    assert_eq!(fate(PixelPair { right: outside, ..seen }, &gates()), Some(Drop::OutsideRightField));
+    assert_eq!(fate(PixelPair { left: outside, ..seen }, &gates()), Some(DropReason::OutsideLeftField));
+    assert_eq!(fate(PixelPair { right: outside, ..seen }, &gates()), Some(DropReason::OutsideRightField));
     let raised = Pixel { v: seen.right.v + 10.0, ..seen.right };
-    assert_eq!(fate(PixelPair { right: raised, ..seen }, &gates()), Some(Drop::Epipolar));
+    assert_eq!(fate(PixelPair { right: raised, ..seen }, &gates()), Some(DropReason::Epipolar));
     let crossed = PixelPair { left: Pixel { u: 900.0, v: 1039.5 }, right: Pixel { u: 1200.0, v: 1039.5 } };
-    assert_eq!(fate(crossed, &gates()), Some(Drop::Diverging));
-    assert_eq!(fate_of(at(0.0, 0.0, 1e5), &gates()), Some(Drop::Parallax));
+    assert_eq!(fate(crossed, &gates()), Some(DropReason::Diverging));
+    assert_eq!(fate_of(at(0.0, 0.0, 1e5), &gates()), Some(DropReason::Parallax));
     let near = Gates { max_range: Some(Length::from_mm(300.0)), ..gates() };
-    assert_eq!(fate_of(good, &near), Some(Drop::TooFar));
+    assert_eq!(fate_of(good, &near), Some(DropReason::TooFar));
     let strict = Gates { max_relative_sigma: 1e-3, ..gates() };
-    assert_eq!(fate_of(good, &strict), Some(Drop::Uncertain));
-    assert_eq!(fate_of(at(300.0, 0.0, 0.0), &gates()), Some(Drop::OnBaseline));
+    assert_eq!(fate_of(good, &strict), Some(DropReason::Uncertain));
+    assert_eq!(fate_of(at(300.0, 0.0, 0.0), &gates()), Some(DropReason::OnBaseline));
 }
 
 #[test]
-fn limits_that_are_not_numbers_let_nothing_pass() {
+fn limits_that_are_not_numbers_drop_every_match() {
     let good = at(72.5, 10.0, 350.0);
     let nan = Angle::from_rad(f64::NAN);
     for (gates, reason) in [
-        (Gates { epipolar_sigmas: f64::NAN, ..gates() }, Drop::Epipolar),
-        (Gates { min_parallax: nan, ..gates() }, Drop::Parallax),
-        (Gates { max_range: Some(Length::from_mm(f64::NAN)), ..gates() }, Drop::TooFar),
-        (Gates { pixel_sigma: f64::NAN, ..gates() }, Drop::Uncertain),
-        (Gates { max_relative_sigma: f64::NAN, ..gates() }, Drop::Uncertain),
+        (Gates { epipolar_sigmas: f64::NAN, ..gates() }, DropReason::Epipolar),
+        (Gates { min_parallax: nan, ..gates() }, DropReason::Parallax),
+        (Gates { max_range: Some(Length::from_mm(f64::NAN)), ..gates() }, DropReason::TooFar),
+        (Gates { pixel_sigma: f64::NAN, ..gates() }, DropReason::Uncertain),
+        (Gates { max_relative_sigma: f64::NAN, ..gates() }, DropReason::Uncertain),
     ] {
         assert_eq!(fate_of(good, &gates), Some(reason));
     }
@@ -104,15 +104,15 @@ fn limits_that_are_not_numbers_let_nothing_pass() {
 #[test]
 fn reasons_have_stable_names() {
     let names = [
-        (Drop::OutsideLeftField, "outside_left_field"),
-        (Drop::OutsideRightField, "outside_right_field"),
-        (Drop::Epipolar, "epipolar"),
-        (Drop::OnBaseline, "on_baseline"),
-        (Drop::Diverging, "diverging"),
-        (Drop::Parallax, "parallax"),
-        (Drop::TooFar, "too_far"),
-        (Drop::Uncertain, "uncertain"),
-        (Drop::NoPoint, "no_point"),
+        (DropReason::OutsideLeftField, "outside_left_field"),
+        (DropReason::OutsideRightField, "outside_right_field"),
+        (DropReason::Epipolar, "epipolar"),
+        (DropReason::OnBaseline, "on_baseline"),
+        (DropReason::Diverging, "diverging"),
+        (DropReason::Parallax, "parallax"),
+        (DropReason::TooFar, "too_far"),
+        (DropReason::Uncertain, "uncertain"),
+        (DropReason::NoPoint, "no_point"),
     ];
     assert!(names.is_sorted());
     for (reason, name) in names {
@@ -121,9 +121,9 @@ fn reasons_have_stable_names() {
 }
 
 /// σ = 0.56 px at 560 px/rad is 1 mrad along the radius and, across it, 1 mrad times sin θ / θ: 0.99288 at the angle of
-/// 11.70°. On the midline 350 mm ahead that makes 1.246 mm across the baseline, and with C diagonal there, the range variance
-/// is (0.2581² · 72.5² + 1.2460² · 350²) / (72.5² + 350²). The point lies in the epipolar plane of both axes, so that only the
-/// radial noise counts.
+/// 11.70°. On the midline 350 mm ahead that makes 1.246 mm across the baseline, and with C diagonal there, the range
+/// variance is (0.2581² · 72.5² + 1.2460² · 350²) / (72.5² + 350²). The point lies in the epipolar plane of both axes,
+/// so that only the radial noise counts.
 #[test]
 fn the_range_sigma_follows_from_the_pixel_sigma() {
     let lens = lens(0.0);
@@ -133,14 +133,14 @@ fn the_range_sigma_follows_from_the_pixel_sigma() {
     assert!((cloud.points[0].sigma_range.mm() - 1.2212).abs() < 2e-4, "{:?}", cloud.points);
 }
 
-/// What the pose does not know widens the gate and the covariance.
+/// A larger covariance of the pose widens the gate and the covariance of the point.
 #[test]
-fn the_pose_s_uncertainty_widens_gate_and_covariance() {
+fn uncertainty_of_the_pose_widens_gate_and_covariance() {
     let lens = lens(0.0);
     let rig = StereoPair { left: &lens, right: &lens, left_from_right: left_from_right(0.0) };
     let seen = see(&rig, &at(72.5, 0.0, 350.0)).unwrap();
     let raised = PixelPair { right: Pixel { v: seen.right.v + 4.0, ..seen.right }, ..seen };
-    assert_eq!(fate(raised, &gates()), Some(Drop::Epipolar));
+    assert_eq!(fate(raised, &gates()), Some(DropReason::Epipolar));
     let turn = 0.005f64.powi(2);
     let pose = nalgebra::Matrix6::from_diagonal(&[turn, turn, turn, 0.0, 0.0, 0.0].into());
     let unsure = Gates { shared: SharedCovariance::exact().with_pose(&pose), ..gates() };
@@ -208,8 +208,8 @@ proptest! {
             prop_assert!((found.point.mm() - expected).norm() < 1e-8 * expected.norm());
             prop_assert!(found.residual.abs().rad() < 1e-11);
         }
-        // Nothing exact is dropped but for being near the baseline or far.
-        let explained = [Drop::OnBaseline, Drop::Parallax, Drop::Uncertain];
+        // Exact matches are dropped only near the baseline or far away.
+        let explained = [DropReason::OnBaseline, DropReason::Parallax, DropReason::Uncertain];
         prop_assert!(made.dropped.keys().all(|reason| explained.contains(reason)), "{:?}", made.dropped);
     }
 }

@@ -1,4 +1,4 @@
-//! Numbers computed elsewhere: the Kannala-Brandt projection and its import.
+//! The Kannala-Brandt projection and its import against numbers of other programs.
 
 #![allow(clippy::unwrap_used, reason = "helpers of tests may panic as tests do")]
 
@@ -61,7 +61,7 @@ fn opencv_parameters_survive_the_round_trip() {
 }
 
 #[test]
-fn opencv_parameters_that_are_no_lens_are_refused() {
+fn opencv_parameters_of_no_lens_are_refused() {
     let theta = Angle::from_deg(98.0);
     for (fx, fy) in [(0.0, 600.0), (600.0, 0.0), (-600.0, -600.0)] {
         let camera = OpenCvFisheye { fx, fy, ..bench() };

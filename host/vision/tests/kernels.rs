@@ -1,6 +1,7 @@
-//! The methods of triangulation beside each other: computed vectors, noise, and matches that slipped along an edge.
+//! Comparison of the triangulation methods: computed vectors, noise, and matches that slipped along an edge.
 //!
-//! The tables in full: `VERGENCE_SAMPLES=100000 cargo test --release -p vergence-vision --test kernels -- --nocapture`.
+//! `VERGENCE_SAMPLES=100000 cargo test --release -p vergence-vision --test kernels -- --nocapture` prints the full
+//! tables.
 
 #![allow(clippy::unwrap_used, reason = "helpers of tests may panic as tests do")]
 #![allow(clippy::print_stdout, reason = "tests show their figures")]
@@ -11,8 +12,8 @@ use common::{BASELINE, Gaussian, around, count, left_from_middle, left_from_righ
 use nalgebra::Vector3;
 use proptest::prelude::*;
 use vergence_vision::{
-    Angle, AngularNorm, Base, Drop, Kernel, Left, Length, Pixel, PixelPair, Point, Rejection, StereoPair, Triangulated,
-    UnitRay, angular, edge_plane, mid2, study,
+    Angle, AngularNorm, Base, DropReason, Kernel, Left, Length, Pixel, PixelPair, Point, Rejection, StereoPair,
+    Triangulated, UnitRay, angular, edge_plane, mid2, study,
 };
 
 fn ray(x: f64, y: f64, z: f64) -> UnitRay<Left> {
@@ -71,14 +72,14 @@ fn only_the_rectified_view_ends_at_90_degrees() {
     for kernel in Kernel::ALL {
         let made = kernel.triangulate(&pixels, &pair);
         match kernel {
-            Kernel::Rectified => assert_eq!(made, Err(Drop::NoPoint)),
+            Kernel::Rectified => assert_eq!(made, Err(DropReason::NoPoint)),
             _ => assert!((made.unwrap().point.mm() - behind.mm()).norm() < 1e-6, "{kernel}"),
         }
     }
 }
 
 #[test]
-fn names_are_read_and_written() {
+fn kernel_names_are_parsed_and_printed() {
     for kernel in Kernel::ALL {
         assert_eq!(kernel.to_string().parse::<Kernel>(), Ok(kernel));
     }
@@ -113,7 +114,7 @@ fn with_ordinary_noise_no_method_is_better() {
         for (found, expected) in rms.iter().zip(expected) {
             assert!((found / expected - 1.0).abs() < relative, "{name}: {rms:.4?}, expected {expected}");
         }
-        // Among each other they saw the same noise.
+        // All methods get the same noise.
         for found in &rms[..5] {
             assert!((found / rms[1] - 1.0).abs() < 0.01, "{name}: {rms:.4?}");
         }
@@ -145,7 +146,8 @@ fn a_match_slipped_along_an_edge_moves_the_methods_apart() {
     }
 }
 
-/// Off the horizontal plane a vertical edge is not orthogonal to the epipolar plane, and only the edge's own plane helps.
+/// Off the horizontal plane a vertical edge is not orthogonal to the epipolar plane, and only the edge's own plane
+/// helps.
 #[test]
 fn above_the_horizon_only_the_edge_plane_is_exact() {
     let degrees = Angle::from_deg;

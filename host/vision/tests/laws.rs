@@ -171,7 +171,7 @@ fn a_polynomial_that_turns_over_in_the_field_is_refused() {
 }
 
 #[test]
-fn parameters_that_are_no_lens_are_refused() {
+fn parameters_of_no_lens_are_refused() {
     let k = [599.0, 0.0, 0.0, 0.0, 0.0];
     let field = Angle::from_deg(98.0);
     let new = |k, aspect, theta| KannalaBrandt::new(k, aspect, CENTRE, theta, SIZE).map(|_| ());

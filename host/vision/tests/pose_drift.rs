@@ -1,4 +1,4 @@
-//! What the pairs say of the pose: found in spite of wrong pairs, and silent where there is nothing to tell.
+//! Pose drift: found among wrong matches, and not reported for a pose as good as stated.
 
 #![allow(clippy::unwrap_used, reason = "helpers of tests may panic as tests do")]
 
@@ -13,7 +13,7 @@ use vergence_vision::{
 const PIXEL_SIGMA: f64 = 0.2;
 const SEPARATION: f64 = 60.0;
 
-/// Pairs of points at 0.4 to 4 m as cameras in `true_pose` see them, every third wrong by up to 40 px.
+/// Matches of points at 0.4 to 4 m from cameras in `true_pose`, every third wrong by up to 40 px.
 fn pairs(
     lens: &KannalaBrandt,
     true_pose: Transform<Left, Right>,
@@ -66,7 +66,7 @@ fn a_turn_of_the_right_camera_is_found_among_wrong_pairs() {
     }
 }
 
-/// One pose in a thousand seeds may look off by chance; of forty, none does.
+/// One pose in ten thousand looks wrong by chance; of forty, none does.
 #[test]
 fn a_pose_as_good_as_stated_raises_no_warning() {
     let lens = lens(0.0);
@@ -83,7 +83,7 @@ fn a_pose_as_good_as_stated_raises_no_warning() {
 }
 
 #[test]
-fn few_pairs_say_nothing() {
+fn few_matches_give_no_pose_drift() {
     let lens = lens(0.0);
     let pair = StereoPair { left: &lens, right: &lens, left_from_right: left_from_right(SEPARATION) };
     let some = pairs(&lens, pair.left_from_right, 1, 1000);
@@ -93,7 +93,7 @@ fn few_pairs_say_nothing() {
     assert_eq!(pose_drift(&nowhere, &pair, &stated()), None);
 }
 
-/// The angle to the epipolar plane moves with the pose as its derivative says.
+/// The derivative of the angle to the epipolar plane by the pose, against finite differences.
 #[test]
 fn the_derivative_of_the_residual_agrees_with_differences() {
     let lens = lens(0.02);

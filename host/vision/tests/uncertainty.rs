@@ -14,7 +14,7 @@ use vergence_vision::{
 const SIZE: ImageSize = ImageSize { width: 2080, height: 2080 };
 type Shared = SVector<f64, SHARED_PARAMETERS>;
 
-/// Lens parameters as calibrations name them, and how far each may be off.
+/// Lens parameters in the order of calibrations, and the error of each in pixels or without unit.
 const LENS: [f64; LENS_PARAMETERS] = [560.0, 561.0, 1039.5, 1039.5, 0.01, -0.004, 0.001, -0.0002];
 const LENS_SIGMA: [f64; LENS_PARAMETERS] = [0.05, 0.05, 0.04, 0.04, 2e-4, 3e-4, 2e-4, 5e-5];
 const POSE_SIGMA: [f64; 6] = [2e-4, 2e-4, 2e-4, 0.05, 0.05, 0.05];
@@ -25,7 +25,7 @@ fn lens_of(parameters: &[f64]) -> KannalaBrandt {
     KannalaBrandt::from_opencv(camera, Angle::from_deg(99.0), SIZE).unwrap()
 }
 
-/// Lenses and pose with all shared parameters off by `error`.
+/// Lenses and pose with `error` added to all shared parameters.
 fn disturbed(separation: f64, error: &Shared) -> (KannalaBrandt, KannalaBrandt, Transform<Left, Right>) {
     let lens = |first: usize| lens_of(&std::array::from_fn::<_, 8, _>(|i| LENS[i] + error[first + i]));
     let exact = left_from_right(separation);
@@ -40,7 +40,7 @@ fn triangulated(kernel: &Kernel, pixels: &PixelPair, separation: f64, error: &Sh
     kernel.triangulate(pixels, &pair).unwrap().point.mm()
 }
 
-/// The pseudo-intersection, and an edge that leans away from the epipolar plane's normal by far.
+/// The pseudo-intersection, and an edge far from the normal of the epipolar plane.
 fn kernels() -> [Kernel; 2] {
     [Kernel::PseudoIntersection, Kernel::EdgePlane(UnitRay::new(Vector3::new(0.5, 1.0, 0.4)).unwrap())]
 }
@@ -137,8 +137,8 @@ fn shared_covariance() -> SharedCovariance {
     SharedCovariance::joint(factor * factor.transpose())
 }
 
-/// Two points of each sample share the sample's lenses and pose: 6 numbers, whose normalised error squared has mean 6 and
-/// variance 12. Its mean over the samples stays within four sigma, which a missing correlation would not.
+/// Two points of each sample share the sample's lenses and pose: 6 numbers, whose normalised error squared has mean 6
+/// and variance 12. Its mean over the samples stays within four sigma, which a missing correlation would not.
 #[test]
 fn sampled_errors_agree_with_the_full_covariance_of_two_points() {
     const SAMPLES: u32 = 4000;
@@ -184,9 +184,9 @@ fn sampled_errors_agree_with_the_full_covariance_of_two_points() {
     }
 }
 
-/// Sampled errors of points on an edge: their normalised error squared has mean 3 with the covariance of the edge's own plane,
-/// and not with that of the pseudo-intersection. The range of a vertical edge 40° aside and 20° up is less certain by what an
-/// independent simulation in numpy found, 2.79 against 2.62 mm.
+/// Sampled errors of points on an edge: their normalised error squared has mean 3 with the covariance of the edge's own
+/// plane, and not with that of the pseudo-intersection. The range of a vertical edge 40° aside and 20° up is less
+/// certain by what an independent simulation in numpy found, 2.79 against 2.62 mm.
 #[test]
 fn an_edge_plane_states_its_own_covariance() {
     const SAMPLES: u32 = 8000;
@@ -226,7 +226,7 @@ fn an_edge_plane_states_its_own_covariance() {
     }
 }
 
-/// Seen along an edge in the epipolar plane both rays are one line.
+/// In the projection along an edge in the epipolar plane both rays are one line.
 #[test]
 fn an_edge_in_the_epipolar_plane_has_no_covariance() {
     let lens = lens(0.0);

@@ -1,4 +1,4 @@
-//! Zones of real lenses in space: solid angles, circles, and what a body hides.
+//! Zones of real lenses in space: solid angles, circles, and masks of the body.
 
 #![allow(clippy::unwrap_used, reason = "helpers of tests may panic as tests do")]
 
@@ -7,7 +7,7 @@ use std::f64::consts::PI;
 use nalgebra::{UnitQuaternion, Vector3};
 use proptest::prelude::*;
 use vergence_vision::{
-    Angle, Base, BodyMask, Camera, Eye, ImageSize, KannalaBrandt, Length, Pixel, Point, SolidZones, Transform,
+    Angle, Base, BodyMask, Camera, ImageSize, KannalaBrandt, Length, Pixel, PlacedCamera, Point, SolidZones, Transform,
     ZonesError, circle_zones, paper_eq3_applies, solid_zones, symmetric_pair, zones_exact,
 };
 
@@ -27,10 +27,10 @@ fn cone(field: f64) -> KannalaBrandt {
 }
 
 /// Cameras on a level baseline, turned about the vertical as in a symmetric pair.
-fn pair(lens: &KannalaBrandt, baseline: f64, separation: f64) -> [Eye<'_>; 2] {
+fn pair(lens: &KannalaBrandt, baseline: f64, separation: f64) -> [PlacedCamera<'_>; 2] {
     [-0.5, 0.5].map(|side| {
         let turn = UnitQuaternion::from_axis_angle(&Vector3::y_axis(), (side * separation).to_radians());
-        Eye { lens, base_from_camera: Transform::new(turn, Vector3::x() * (side * baseline)), body: None }
+        PlacedCamera { lens, base_from_camera: Transform::new(turn, Vector3::x() * (side * baseline)), body: None }
     })
 }
 
@@ -38,8 +38,8 @@ fn centre() -> Point<Base> {
     Point::from_mm(Vector3::zeros())
 }
 
-fn solid(eyes: &[Eye<'_>; 2], radius: f64) -> SolidZones {
-    solid_zones(eyes, &centre(), Length::from_mm(radius), 100_000).unwrap()
+fn solid(cameras: &[PlacedCamera<'_>; 2], radius: f64) -> SolidZones {
+    solid_zones(cameras, &centre(), Length::from_mm(radius), 100_000).unwrap()
 }
 
 /// Two cones of half-angle r with their axes d apart share, far away, in steradians (spherical geometry):
@@ -75,28 +75,28 @@ fn solid_angles_of_the_modes() {
 }
 
 #[test]
-fn a_body_in_the_picture_hides_what_is_behind_it() {
+fn a_body_in_the_image_hides_points_behind_it() {
     let lens = cone(180.0);
     let size = lens.size();
     // The left half of the left image is covered.
     let hidden = (0..size.width * size.height).map(|i| i % size.width < size.width / 2).collect();
     let body = BodyMask::new(size, hidden).unwrap();
     let [left, right] = pair(&lens, 1.0, 0.0);
-    let eyes = [Eye { body: Some(&body), ..left }, right];
-    let map = circle_zones(&eyes, &centre(), Length::from_mm(1e5)).unwrap();
+    let cameras = [PlacedCamera { body: Some(&body), ..left }, right];
+    let map = circle_zones(&cameras, &centre(), Length::from_mm(1e5)).unwrap();
     assert!((map.zones.stereo.deg() - 90.0).abs() < 0.1, "{:?}", map.zones);
     assert!((map.zones.mono.deg() - 90.0).abs() < 0.1, "{:?}", map.zones);
-    assert!((solid(&eyes, 1e5).stereo_sr - PI).abs() < 0.01);
+    assert!((solid(&cameras, 1e5).stereo_sr - PI).abs() < 0.01);
     assert_eq!(BodyMask::new(size, vec![false; 3]), None);
 }
 
 #[test]
 fn rigs_without_zones_are_refused() {
     let lens = cone(180.0);
-    let eyes = pair(&lens, 145.0, 0.0);
-    assert_eq!(circle_zones(&eyes, &centre(), Length::from_mm(70.0)), Err(ZonesError::OutsideCircle));
-    assert_eq!(circle_zones(&eyes, &centre(), Length::from_mm(f64::NAN)), Err(ZonesError::NotFinite));
-    assert_eq!(solid_zones(&eyes, &centre(), Length::from_mm(350.0), 0), Err(ZonesError::NoDirections));
+    let cameras = pair(&lens, 145.0, 0.0);
+    assert_eq!(circle_zones(&cameras, &centre(), Length::from_mm(70.0)), Err(ZonesError::OutsideCircle));
+    assert_eq!(circle_zones(&cameras, &centre(), Length::from_mm(f64::NAN)), Err(ZonesError::NotFinite));
+    assert_eq!(solid_zones(&cameras, &centre(), Length::from_mm(350.0), 0), Err(ZonesError::NoDirections));
 }
 
 #[test]
@@ -152,13 +152,13 @@ proptest! {
         let lens = cone(195.95);
         let turn = UnitQuaternion::from_axis_angle(&Vector3::y_axis(), turn.to_radians());
         let turned: Transform<Base, Base> = Transform::new(turn, Vector3::zeros());
-        let eyes = pair(&lens, 145.0, 100.0);
-        let moved = eyes.map(|eye| {
-            let place: Transform<Base, Camera> = turned * eye.base_from_camera;
-            Eye { base_from_camera: place, ..eye }
+        let cameras = pair(&lens, 145.0, 100.0);
+        let moved = cameras.map(|camera| {
+            let place: Transform<Base, Camera> = turned * camera.base_from_camera;
+            PlacedCamera { base_from_camera: place, ..camera }
         });
         let radius = Length::from_mm(350.0);
-        let before = circle_zones(&eyes, &centre(), radius).unwrap().zones;
+        let before = circle_zones(&cameras, &centre(), radius).unwrap().zones;
         let after = circle_zones(&moved, &centre(), radius).unwrap().zones;
         prop_assert!((before.stereo - after.stereo).abs().deg() < 1e-6);
         prop_assert!((before.blind - after.blind).abs().deg() < 1e-6);

@@ -1,4 +1,4 @@
-//! Corners that do not look like the others, or are not where a smooth image of a board has them.
+//! Outliers among the corners: unlike the others, or not where a smooth image of a target has them.
 
 use vergence_vision::KannalaBrandt;
 
@@ -7,14 +7,14 @@ use super::lattice::{Lattice, Node};
 use super::predict::Predictor;
 use crate::median;
 
-/// Marks corners that are no good, by their grey levels and by their place.
+/// Flags bad corners, by their grey levels and by their position.
 pub fn flag(lattice: &mut Lattice, hint: Option<&KannalaBrandt>) {
     flag_unclear(lattice);
     flag_misplaced(lattice, hint);
 }
 
-/// Marks corners whose standard deviation is far above that of the corners about them; further off the lens may be less
-/// sharp.
+/// Flags corners whose standard deviation is far above that of nearby corners; only nearby, since sharpness varies over
+/// the image.
 fn flag_unclear(lattice: &mut Lattice) {
     // On 79 real photographs the greatest is 1.6 times the image's median.
     const MEDIANS: f64 = 1.8;
@@ -33,10 +33,10 @@ fn flag_unclear(lattice: &mut Lattice) {
     }
 }
 
-/// Marks corners that are much further from their prediction than the others, the worst first: one wrong corner
-/// spoils the predictions about it, and they are made again without it.
+/// Flags corners that are much further from their prediction than the others, the worst first: one wrong corner spoils
+/// the predictions of its neighbours, which are repeated without it.
 fn flag_misplaced(lattice: &mut Lattice, hint: Option<&KannalaBrandt>) {
-    // In multiples of the median error. The worst good corner of 79 real photographs, near and strongly curved boards
+    // In multiples of the median error. The worst good corner of 79 real photographs, near and strongly curved targets
     // among them, is 7.9 off where the image curves most, 4 elsewhere.
     const MEDIANS: f64 = 10.0;
     const LEAST_PART_OF_CELL: f64 = 0.03;

@@ -1,4 +1,4 @@
-//! Finds the corners that the search missed, most of them along the border of the board.
+//! Finds corners that the search missed, mostly along the border of the target.
 
 use std::collections::BTreeSet;
 
@@ -12,8 +12,8 @@ use super::predict::{Prediction, Predictor};
 use super::refine::refine;
 use super::saddle::{Quadrants, contrast_near, parity, polarity};
 
-/// Adds corners next to those known until no more are found. `size` is the board's, in corners: one row and column
-/// more are looked for, so that a larger board is noticed.
+/// Adds corners next to those known until no more are found. `size` is that of the target in corners; one more row and
+/// column are searched, so that a larger target is noticed.
 pub fn grow(lattice: &mut Lattice, image: &Intensity<'_>, hint: Option<&KannalaBrandt>, size: [u32; 2]) {
     let longest = size[0].max(size[1]).cast_signed() + 1;
     lattice.drop_loose();
@@ -50,10 +50,10 @@ pub fn grow(lattice: &mut Lattice, image: &Intensity<'_>, hint: Option<&KannalaB
     }
 }
 
-/// The corner near a prediction whose saddle has the sign `colour`, if there is one as clear as its neighbours, whose
-/// contrast is given.
+/// The corner near a prediction whose saddle has the sign `colour`; `None` if there is none as clear as its neighbours,
+/// whose contrast is given.
 fn find(image: &Intensity<'_>, expected: &Prediction, colour: f64, contrast: f64) -> Option<Found> {
-    // A neighbour's corner is a cell away; what is further off than this is something else.
+    // The neighbouring corners are a cell away; anything further off than this is not the one predicted.
     const FARTHEST_PART: f64 = 0.35;
     const LEAST_PART_OF_CONTRAST: f64 = 0.4;
     const SMALLEST_CELL_PX: f64 = 4.0;
@@ -62,7 +62,7 @@ fn find(image: &Intensity<'_>, expected: &Prediction, colour: f64, contrast: f64
         return None;
     }
     let start = strongest_saddle(image, expected, colour, FARTHEST_PART * spacing)?;
-    // Where overexposed white eats the corners of large black squares, the strongest saddle lies aside.
+    // Overexposed white erodes the corners of large black squares and moves the strongest saddle aside.
     let refined = refine(image, start, expected).or_else(|| refine(image, expected.position, expected))?;
     let quadrants = Quadrants::read(image, refined.position, &expected.steps)?;
     let near = (refined.position - expected.position).norm() <= FARTHEST_PART * spacing;

@@ -1,4 +1,4 @@
-//! Grey levels between pixels.
+//! Grey levels at fractional positions.
 
 use image::GrayImage;
 use nalgebra::Vector2;

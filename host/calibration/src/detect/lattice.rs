@@ -1,4 +1,4 @@
-//! Corners by their place in a grid that may be shifted and turned against the board.
+//! Corners in a grid that may be shifted and turned with respect to the target.
 
 use std::collections::BTreeMap;
 
@@ -71,8 +71,8 @@ impl Lattice {
             .filter(move |(at, _)| *at != node)
     }
 
-    /// Drops corners that are part of no cell with corners at all four of its ends. Where the squares end at something
-    /// dark, a single corner may look like one of the board.
+    /// Drops corners that belong to no cell with four corners. Where the squares meet something dark, a single false
+    /// corner may look like one of the target.
     pub fn drop_loose(&mut self) {
         let has = |[i, j]: Node| self.nodes.contains_key(&[i, j]);
         let in_cell = |[i, j]: Node| {

@@ -1,8 +1,8 @@
-//! Which corner of the board is which.
+//! Assignment of a labelled patch to the corners of the target.
 //!
-//! A labelled patch may sit on the board in many ways: turned by quarters, and shifted if part of the board is missing.
-//! A way is possible if the patch lies on the board, if no side of the patch that shows the end of the squares lies
-//! inside the board, and if the colours agree.
+//! A labelled patch may lie on the target in several ways: turned by quarters, and shifted if part of the target is
+//! missing. A placement is possible if the patch lies on the target, if no side of the patch that shows the end of the
+//! squares lies inside the target, and if the colours agree.
 
 use vergence_vision::KannalaBrandt;
 
@@ -12,29 +12,29 @@ use super::lattice::{Lattice, Node, SIDES};
 use super::predict::Predictor;
 use super::saddle::{Quadrants, polarity};
 
-/// How far a detection's labels can be trusted beyond its image.
+/// How certain the corner labels of a detection are beyond its own image.
 ///
-/// The board's x axis turns clockwise into its y axis, as seen. Where columns + rows is odd the colours tell the first
+/// The target's x axis turns clockwise into its y axis, as seen. Where columns + rows is odd the colours tell the first
 /// corner: the square above and to the left of it is black. Where the sum is even a half turn maps the squares onto
-/// squares of the same colour: then, and where part of the board is missing, several labellings are possible, and the
+/// squares of the same colour: then, and where part of the target is missing, several labellings are possible, and the
 /// one whose x axis points most to the right in the image and whose y axis most down is taken.
 ///
 /// One image's corners agree among themselves in every case, which is all that intrinsics need. Two cameras' views of
-/// a board may be paired by index where both are [`Unique`](Self::Unique); where either is
-/// [`HalfTurn`](Self::HalfTurn), only if both cameras stand upright about the same way and the board is not near the
+/// a target may be paired by index where both are [`Unique`](Self::Unique); where either is
+/// [`HalfTurn`](Self::HalfTurn), only if both cameras stand upright about the same way and the target is not near the
 /// quarter turn.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum Placement {
-    /// There is but one possible labelling.
+    /// Only one labelling is possible.
     Unique,
-    /// The whole board is seen, but turned boards look alike: each label may be that of the turned board.
+    /// The whole target is seen, but turned targets look alike: each label may be that of the turned target.
     HalfTurn,
-    /// Part of the board is seen, and several shifts are possible: labels are relative to one another only.
+    /// Part of the target is seen, and several shifts are possible: labels are relative to one another only.
     Shifted,
 }
 
-/// A way to put a patch on a board: turn by quarters, then shift.
+/// A placement of a patch on a target: turn by quarters, then shift.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 struct Way {
     quarters: usize,
@@ -58,10 +58,9 @@ fn turned([i, j]: Node, quarters: usize) -> Node {
     }
 }
 
-/// The lattice with columns and rows of the board of `size` for nodes, and how sure they are.
+/// The lattice with columns and rows of the target of `size` as nodes, and how certain they are.
 ///
-/// # Errors
-/// [`DetectError::WrongSize`] if there is no way to put it on the board.
+/// # Errors [`DetectError::WrongSize`] if it does not fit on the target.
 pub fn place(
     lattice: &Lattice,
     image: &Intensity<'_>,
@@ -69,7 +68,7 @@ pub fn place(
     size: [u32; 2],
 ) -> Result<(Lattice, Placement), DetectError> {
     let predictor = Predictor::new(lattice, hint);
-    let [low, high] = lattice.bounds().ok_or(DetectError::NoBoard { found: 0 })?;
+    let [low, high] = lattice.bounds().ok_or(DetectError::NoTarget { found: 0 })?;
     let patch = Patch {
         low,
         high,
@@ -98,7 +97,7 @@ pub fn place(
     Ok((lattice.relabelled(|node| best.label(node)), placement))
 }
 
-/// A patch as far as its placement is concerned.
+/// Properties of a patch that determine its placement.
 struct Patch {
     low: Node,
     high: Node,
@@ -133,7 +132,7 @@ impl Patch {
         ways
     }
 
-    /// Where the squares end, so must the board.
+    /// Where the squares end the target must end.
     fn ends_agree(&self, way: Way, size: [i32; 2]) -> bool {
         SIDES.iter().zip(self.ends).filter(|(_, ends)| *ends).all(|(&side, _)| {
             let outward = turned(side, way.quarters);
@@ -146,8 +145,8 @@ impl Patch {
         })
     }
 
-    /// Above and to the left of corner (0, 0) is black. That is a choice of labels where turning the board changes that
-    /// colour; where it does not, boards are printed either way, and the colours tell nothing.
+    /// Above and to the left of corner (0, 0) is black. That is a choice of labels where turning the target changes
+    /// that colour; where it does not, targets are printed either way, and the colours tell nothing.
     fn colours_agree(&self, way: Way, size: [i32; 2]) -> bool {
         let [columns_odd, rows_odd] = size.map(|n| n % 2 != 0);
         let colours_tell = columns_odd != rows_odd || (size[0] == size[1] && columns_odd);
@@ -158,7 +157,8 @@ impl Patch {
     }
 }
 
-/// How far, after `quarters` of a turn, the x axis points to the right and the y axis down, in pixels, summed over all cells.
+/// How far, after `quarters` of a turn, the x axis points to the right and the y axis down, in pixels, summed over all
+/// cells.
 fn uprightness(lattice: &Lattice, quarters: usize) -> f64 {
     let right = turned([1, 0], 4 - quarters);
     let down = turned([0, 1], 4 - quarters);

@@ -1,4 +1,4 @@
-//! Where a corner should be, told by the others.
+//! Predicts the position of a corner from the others.
 
 use nalgebra::{Matrix2, Matrix3, OMatrix, OVector, SMatrix, SVector, U6, Vector2, Vector3};
 use vergence_vision::{Camera, KannalaBrandt, Pixel, UnitRay};
@@ -6,14 +6,14 @@ use vergence_vision::{Camera, KannalaBrandt, Pixel, UnitRay};
 use super::CornerQuality;
 use super::lattice::{Found, Lattice, Node};
 
-/// A predicted corner and the board about it.
+/// A predicted corner and the local shape of the target.
 #[derive(Clone, Copy, Debug)]
 pub struct Prediction {
     /// u and v.
     pub position: Vector2<f64>,
     /// Pixels per step along the lattice's two axes.
     pub steps: [Vector2<f64>; 2],
-    /// How the lattice's two axes bend: pixels per square of a step. Zero where no camera tells them.
+    /// Curvature of the lattice's two axes: pixels per squared step. Zero if the camera is unknown.
     pub bends: [Vector2<f64>; 2],
     /// Variance of the prediction in units of one corner's variance.
     pub variance: f64,
@@ -30,16 +30,16 @@ impl Prediction {
 /// Predicts corners of a lattice from the corners about them, never from the corner itself.
 #[derive(Clone, Copy, Debug)]
 pub struct Predictor<'a> {
-    plane: Option<BoardPlane<'a>>,
+    plane: Option<TargetPlane<'a>>,
 }
 
 impl<'a> Predictor<'a> {
     /// With `hint`, through that camera if it sees the corners as a plane to a tenth of a cell.
     pub fn new(lattice: &Lattice, hint: Option<&'a KannalaBrandt>) -> Self {
-        Self { plane: hint.and_then(|camera| BoardPlane::fit(camera, lattice)) }
+        Self { plane: hint.and_then(|camera| TargetPlane::fit(camera, lattice)) }
     }
 
-    /// The corner at `node`; none where too few corners are near.
+    /// Predicted corner at `node`; `None` if too few corners are near.
     pub fn predict(&self, lattice: &Lattice, node: Node) -> Option<Prediction> {
         let smooth = smooth_continuation(lattice, node)?;
         let Some(plane) = self.plane else { return Some(smooth) };
@@ -105,32 +105,32 @@ fn usable(lattice: &Lattice, node: Node, reach: i32) -> impl Iterator<Item = (No
 
 /// A plane seen through a camera: rays are homogeneous coordinates of lattice nodes.
 #[derive(Clone, Copy, Debug)]
-struct BoardPlane<'a> {
+struct TargetPlane<'a> {
     camera: &'a KannalaBrandt,
     ray_from_node: Matrix3<f64>,
 }
 
-impl<'a> BoardPlane<'a> {
+impl<'a> TargetPlane<'a> {
     /// The direct linear transformation on rays (R. Hartley and A. Zisserman, "Multiple View Geometry", 2nd ed.,
     /// alg. 4.1): ray × (H node) = 0, which holds at any angle to the axis. Weights make the error an angle.
     fn fit(camera: &'a KannalaBrandt, lattice: &Lattice) -> Option<Self> {
         const FEWEST: usize = 8;
         let usable = lattice.iter().filter(|(_, found)| found.quality != CornerQuality::Blunder);
-        let sightings: Vec<(Node, Vector3<f64>)> =
+        let observed_views: Vec<(Node, Vector3<f64>)> =
             usable.filter_map(|(&node, found)| Some((node, ray(camera, found.position)?))).collect();
-        if sightings.len() < FEWEST {
+        if observed_views.len() < FEWEST {
             return None;
         }
         let mut plane = Self { camera, ray_from_node: Matrix3::zeros() };
         for _ in 0..3 {
-            plane.ray_from_node = plane.reweighted(&sightings)?;
+            plane.ray_from_node = plane.reweighted(&observed_views)?;
         }
         plane.explains(lattice).then_some(plane)
     }
 
-    fn reweighted(&self, sightings: &[(Node, Vector3<f64>)]) -> Option<Matrix3<f64>> {
+    fn reweighted(&self, observed_views: &[(Node, Vector3<f64>)]) -> Option<Matrix3<f64>> {
         let mut normal = SMatrix::<f64, 9, 9>::zeros();
-        for (node, ray) in sightings {
+        for (node, ray) in observed_views {
             let node = homogeneous(*node);
             let depth = (self.ray_from_node * node).norm();
             let weight = if depth > 0.0 { depth.recip() } else { 1.0 };
@@ -142,7 +142,8 @@ impl<'a> BoardPlane<'a> {
         let least = eigen.eigenvalues.imin();
         let h: OVector<f64, _> = eigen.eigenvectors.column(least).into_owned();
         let matrix = Matrix3::from_row_iterator(h.iter().copied());
-        let towards: f64 = sightings.iter().map(|(node, ray)| ray.dot(&(matrix * homogeneous(*node))).signum()).sum();
+        let towards: f64 =
+            observed_views.iter().map(|(node, ray)| ray.dot(&(matrix * homogeneous(*node))).signum()).sum();
         towards.is_finite().then(|| matrix * towards.signum())
     }
 
@@ -158,7 +159,7 @@ impl<'a> BoardPlane<'a> {
         squares < PART_OF_CELL * PART_OF_CELL * areas
     }
 
-    /// The node's projection, without regard to what was seen near it.
+    /// Projection of the node, without the observations near it.
     fn project(&self, node: Node) -> Option<Prediction> {
         const HALF: f64 = 0.5;
         let at = |di: f64, dj: f64| {
@@ -178,7 +179,7 @@ impl<'a> BoardPlane<'a> {
         Some(Prediction { position: here, steps: [along, across], bends: [along_bend, across_bend], variance: 0.0 })
     }
 
-    /// The projection, shifted by what the nearest corners show the camera to be wrong there.
+    /// The projection, corrected by the mean residual of the nearest corners.
     fn predict(&self, lattice: &Lattice, node: Node) -> Option<Prediction> {
         const NEAR: i32 = 2;
         let projected = self.project(node)?;

@@ -1,15 +1,15 @@
-//! Corners to a fraction of a pixel.
+//! Refinement of corners to a fraction of a pixel.
 //!
 //! W. Förstner and E. Gülch, "A fast operator for detection and precise location of distinct points, corners and
-//! centres of circular features", ISPRS 1987: about a corner each grey-level gradient is square to the line from the
-//! corner to the place of the gradient.
+//! centres of circular features", ISPRS 1987: around a corner each grey-level gradient is orthogonal to the line from
+//! the corner to the gradient's position.
 //!
-//! That holds for straight edges. In a fisheye image they bend, and all gradients of a bent edge point past the corner on
-//! the same side: with radii of 600 px by a hundredth of a pixel. It is little beside the noise of one corner, but common
-//! to all corners of a board, and no number of them averages it out. Where the camera is known, at least roughly, it tells
-//! how the edges bend, and the gradients are taken as they would be if they did not: the frontal-plane refinement of
-//! A. Datta, J.-S. Kim and T. Kanade, "Accurate camera calibration using iterative refinement of control points", ICCV
-//! Workshops 2009, with the corner's surroundings straightened to the second order instead of the whole image.
+//! That holds for straight edges. In a fisheye image they bend, and all gradients of a bent edge point past the corner
+//! on the same side: with radii of 600 px by a hundredth of a pixel. That is small beside the noise of one corner but
+//! common to all corners of a target, so averaging does not remove it. If the camera is known, at least roughly, the
+//! bend of the edges follows from it and the gradients are straightened: the frontal-plane refinement of A. Datta,
+//! J.-S. Kim and T. Kanade, "Accurate camera calibration using iterative refinement of control points", ICCV Workshops
+//! 2009, with the corner's surroundings straightened to the second order instead of the whole image.
 
 use nalgebra::{Matrix2, Vector2};
 use vergence_vision::KannalaBrandt;
@@ -19,7 +19,7 @@ use super::intensity::Intensity;
 use super::lattice::{Lattice, Node};
 use super::predict::{Prediction, Predictor, cell};
 
-/// A corner to a fraction of a pixel.
+/// A refined corner.
 #[derive(Clone, Copy, Debug)]
 pub struct Refined {
     pub position: Vector2<f64>,
@@ -30,8 +30,9 @@ pub struct Refined {
 /// Part of the distance to the neighbouring edges that the window reaches.
 const WINDOW_PART: f64 = 0.5;
 
-/// Least and greatest radius of the window in pixels. Less holds no corner. The greatest was chosen by the residuals of
-/// calibrations from real photographs: they grow slowly above it as edges curve, and on blurred images below it.
+/// Least and greatest radius of the window in pixels. A smaller window holds no corner. The greatest was chosen by the
+/// residuals of calibrations from real photographs: they grow slowly above it as edges curve, and on blurred images
+/// below it.
 const WINDOW_PX: [f64; 2] = [2.6, 9.0];
 
 /// The window's radius where neighbouring edges are `spacing` pixels away.
@@ -40,8 +41,8 @@ fn window(spacing: f64) -> f64 {
     (WINDOW_PART * spacing).clamp(least, greatest)
 }
 
-/// How far a refinement may lead where neighbouring edges are `spacing` pixels away. The search is right to a pixel or
-/// so; where overexposed white eats the corners of large black squares, to some.
+/// Largest distance a refinement may move a corner where neighbouring edges are `spacing` pixels away. The search is
+/// accurate to about a pixel, less where overexposed white erodes the corners of large black squares.
 fn bound(spacing: f64) -> f64 {
     const PART: f64 = 0.15;
     const PX: [f64; 2] = [0.75, 5.0];
@@ -49,7 +50,7 @@ fn bound(spacing: f64) -> f64 {
 }
 
 /// The corner near `start` by the gradients about it, in an image whose lattice there has the steps and bends of
-/// `expected`; none if it is not there, or at the image's border.
+/// `expected`; `None` if there is none, or at the image's border.
 pub fn refine(image: &Intensity<'_>, start: Vector2<f64>, expected: &Prediction) -> Option<Refined> {
     const ITERATIONS: usize = 30;
     const SETTLED_PX: f64 = 1e-3;
@@ -87,8 +88,8 @@ impl Edges {
         Some(Self { steps_from_pixels: cell(&expected.steps).try_inverse()?, bends })
     }
 
-    /// Where a place, in pixels from the corner, would be if the edges were straight, and how the place moves with that.
-    /// To the second order: an edge's third is odd about the corner and does not move it.
+    /// Where a place, in pixels from the corner, would be if the edges were straight, and how the place moves with
+    /// that. To the second order: an edge's third is odd about the corner and does not move it.
     fn straightened(&self, place: Vector2<f64>) -> (Vector2<f64>, Matrix2<f64>) {
         let [along, across] = self.bends;
         let steps = self.steps_from_pixels * place;
@@ -136,8 +137,8 @@ impl Fit {
     }
 }
 
-/// Refines every corner from where it is, along edges that `hint`, if given, knows to bend. Those that leave their bounds
-/// keep their place.
+/// Refines every corner from where it is, along edges that `hint`, if given, knows to bend. Those that leave their
+/// bounds keep their place.
 pub fn refine_all(lattice: &mut Lattice, image: &Intensity<'_>, hint: Option<&KannalaBrandt>) {
     let predictor = Predictor::new(lattice, hint);
     let refined: Vec<(Node, Option<Refined>)> = lattice

@@ -1,4 +1,4 @@
-//! Whether a place looks like the corner of four squares.
+//! Tests whether a position looks like the corner of four squares.
 
 use nalgebra::Vector2;
 use vergence_vision::KannalaBrandt;
@@ -18,7 +18,7 @@ pub struct Quadrants {
 }
 
 impl Quadrants {
-    /// Of the four squares that meet at `position`; none at the image's border.
+    /// Means of the four squares that meet at `position`; `None` at the image's border.
     pub fn read(image: &Intensity<'_>, position: Vector2<f64>, steps: &[Vector2<f64>; 2]) -> Option<Self> {
         Self::sampled(image, position, steps, [0.18, 0.28, 0.38])
     }
@@ -57,7 +57,7 @@ impl Quadrants {
 
     /// Whether opposite squares are alike, adjacent ones differ, and the difference is at least `contrast`.
     pub fn is_corner(&self, contrast: f64) -> bool {
-        // Shading and vignette tilt a corner by less than half its contrast; the outer corner of the board's last
+        // Shading and vignette tilt a corner by less than half its contrast; the outer corner of the target's last
         // square, three parts white and one black, does by twice its contrast.
         const LARGEST_TILT: f64 = 0.7;
         let [[a, b], [c, d]] = self.levels;
@@ -66,12 +66,12 @@ impl Quadrants {
     }
 }
 
-/// 1 or -1: the sign that [`Quadrants::saddle`] has at every corner of a board that has it at node (0, 0).
+/// 1 or -1: the sign that [`Quadrants::saddle`] has at every corner of a target that has it at node (0, 0).
 pub fn parity(node: Node) -> f64 {
     if (node[0] + node[1]).rem_euclid(2) == 0 { 1.0 } else { -1.0 }
 }
 
-/// The saddle at node (0, 0) as all corners tell it: positive where the square ahead along both axes is white.
+/// Saddle at node (0, 0), averaged over all corners: positive if the square ahead along both axes is white.
 pub fn polarity(lattice: &Lattice, image: &Intensity<'_>, predictor: &Predictor<'_>) -> f64 {
     let saddles = lattice.iter().filter_map(|(&node, found)| {
         let prediction = predictor.predict(lattice, node)?;
@@ -89,7 +89,7 @@ pub fn contrast_near(lattice: &Lattice, image: &Intensity<'_>, node: Node, steps
     if count > 0.0 { sum / count } else { 0.0 }
 }
 
-/// Drops what the search took for corners where the image has none, or one of the wrong colours.
+/// Drops false corners of the search: places without a saddle, or with one of the wrong colours.
 pub fn keep_corners(lattice: &mut Lattice, image: &Intensity<'_>, hint: Option<&KannalaBrandt>) {
     let predictor = Predictor::new(lattice, hint);
     let polarity = polarity(lattice, image, &predictor).signum();

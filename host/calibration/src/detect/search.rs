@@ -1,6 +1,6 @@
 //! The first patch of corners: ChESS features labelled by topology.
 //!
-//! S. Bennett and J. Lasenby, "ChESS: quick and robust detection of chess-board features", CVIU 118, 2014.
+//! S. Bennett and J. Lasenby, "ChESS: quick and robust detection of chess-target features", CVIU 118, 2014.
 
 use calib_targets_chessboard::{
     ChessboardDetector, ChessboardParams, GrayImageView, default_chess_config, detect_corners,
@@ -11,11 +11,11 @@ use nalgebra::Vector2;
 use super::CornerQuality;
 use super::lattice::{Found, Lattice};
 
-/// How well the search alone knows a corner.
+/// Standard deviation of a corner found by the search alone, in pixels.
 const SEARCH_SIGMA_PX: f64 = 1.0;
 
 /// The largest labelled patch in the image; empty where there is none. The first axis turns clockwise into the second
-/// as they are seen, as x into y on the printed side of a board.
+/// as they are seen, as x into y on the printed side of a target.
 pub fn labelled_patch(image: &GrayImage) -> Lattice {
     // The search itself panics on an empty image; nothing this small holds a dozen corners.
     const SMALLEST_PX: u32 = 16;

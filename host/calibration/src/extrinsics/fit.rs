@@ -1,28 +1,28 @@
-//! The joint fit: a robust loss brings it near, gross corners are found, and plain least squares on the others has the
+//! The joint fit: a robust loss to get near, then outliers are removed and plain least squares gives result and
 //! covariance.
 
 use nalgebra::{DMatrix, Isometry3};
 
 use crate::Loss;
-use crate::arrow::{self, ArrowOptions};
 use crate::extrinsics::StereoView;
 use crate::extrinsics::gross::{OwnPoses, inliers, median_of};
 use crate::extrinsics::joint::{Joint, Kinematics, Shared};
 use crate::extrinsics::report::rms;
 use crate::extrinsics::stereo::{LensKnowledge, LensPrior, Lenses, Pair};
+use crate::schur_lm::{self, SchurOptions};
 
 /// The median length of a two-dimensional Gaussian error of unit standard deviation per coordinate: √(2 ln 2).
 const RAYLEIGH_MEDIAN: f64 = 1.177_410_022_515_474_7;
-/// No corner is known better than this, however well a few of them fit; simulated ones may fit perfectly.
+/// Smallest standard deviation of a corner, in relative sigmas; simulated corners may fit perfectly.
 const FINEST: f64 = 1e-3;
-/// Inliers and standard deviation settle in two or three rounds.
+/// Most rounds of fit and outlier removal; two or three usually suffice.
 const MOST_ROUNDS: usize = 10;
 
-/// Where the fit starts.
+/// Starting values of the fit.
 pub(crate) struct Start<S> {
     pub shared: Shared<S>,
-    /// `left_from_board` of every view.
-    pub boards: Vec<Isometry3<f64>>,
+    /// `left_from_target` of every view.
+    pub targets: Vec<Isometry3<f64>>,
     /// Whether each corner may be used, in the order of [`StereoView::corners`].
     pub usable: Vec<Vec<bool>>,
 }
@@ -30,15 +30,15 @@ pub(crate) struct Start<S> {
 /// The result of a fit.
 pub(crate) struct Fit<S> {
     pub shared: Shared<S>,
-    /// `left_from_board` of every view; of one without inliers, where it was last.
-    pub boards: Vec<Isometry3<f64>>,
+    /// `left_from_target` of every view; the last value for a view without inliers.
+    pub targets: Vec<Isometry3<f64>>,
     /// Whether each corner is an inlier.
     pub inliers: Vec<Vec<bool>>,
-    /// Each corner's distance from where it should be.
+    /// Distance of each corner from its reprojection.
     pub errors_px: Vec<Vec<f64>>,
     /// Standard deviation of a pixel coordinate in units of the corner's relative sigma.
     pub sigma: f64,
-    /// Of a step of the shared unknowns; `None` where the corners leave one open.
+    /// Covariance of the shared unknowns' step; `None` if the corners do not determine it.
     pub covariance: Option<DMatrix<f64>>,
     /// Information of the shared unknowns, in units of `sigma`².
     pub information: DMatrix<f64>,
@@ -56,77 +56,78 @@ impl<S> Fit<S> {
 /// Why there is no fit.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum NoFit {
-    /// The corners leave an unknown open.
+    /// The corners do not determine an unknown.
     NotDetermined,
-    /// The iteration ended at no optimum.
+    /// The iteration did not reach an optimum.
     Diverged,
     /// A lens's covariance is not positive definite.
     NotACovariance,
 }
 
-/// What is fitted to what.
+/// A fitting task: kinematics, views and what is known of the lenses.
 pub(crate) struct Task<'a, K: Kinematics> {
     pub kinematics: &'a K,
     pub views: &'a [StereoView],
     /// Of every view.
     pub own_poses: &'a [OwnPoses],
-    /// As their own calibration found them.
+    /// Lenses as their own calibration found them.
     pub lenses: Lenses,
     pub knowledge: &'a LensKnowledge,
-    /// Whether gross corners are left out.
+    /// Whether outliers are left out.
     pub robust: bool,
 }
 
 impl<K: Kinematics> Task<'_, K> {
     /// The optimum near `start`.
     pub fn fit(&self, start: Start<K::State>) -> Result<Fit<K::State>, NoFit> {
-        let Start { mut shared, mut boards, usable } = start;
-        let mut sigma = self.settle(&mut shared, &mut boards, &usable)?;
-        let mut inliers = self.inliers(&shared, &self.errors_px(&shared, &boards), &usable);
+        let Start { mut shared, mut targets, usable } = start;
+        let mut sigma = self.settle(&mut shared, &mut targets, &usable)?;
+        let mut inliers = self.inliers(&shared, &self.errors_px(&shared, &targets), &usable);
         let mut round = 0;
         loop {
             round += 1;
             let kept: Vec<usize> = (0..inliers.len()).filter(|&view| inliers[view].contains(&true)).collect();
             let problem = self.problem(self.knowledge, sigma, &kept, &inliers)?;
-            let kept_boards = kept.iter().map(|&view| boards[view]).collect();
-            let solution = arrow::solve(&problem, shared, kept_boards, &ArrowOptions::default());
+            let kept_targets = kept.iter().map(|&view| targets[view]).collect();
+            let solution = schur_lm::solve(&problem, shared, kept_targets, &SchurOptions::default());
             if !solution.cost.is_finite() {
                 return Err(NoFit::Diverged);
             }
             shared = solution.shared;
-            kept.iter().zip(&solution.blocks).for_each(|(&view, board)| boards[view] = *board);
+            kept.iter().zip(&solution.blocks).for_each(|(&view, target)| targets[view] = *target);
             let variance = solution.normal.variance().ok_or(NoFit::NotDetermined)?;
-            let errors_px = self.errors_px(&shared, &boards);
+            let errors_px = self.errors_px(&shared, &targets);
             let next = self.inliers(&shared, &errors_px, &usable);
-            // Priors are weighed by the corners' standard deviation, so it must have settled too.
+            // Priors are weighted by the corners' standard deviation, so that must settle too.
             let next_sigma = variance.sqrt().max(FINEST);
             let settled = next == inliers && (next_sigma - sigma).abs() <= 1e-3 * sigma;
             sigma = next_sigma;
             if settled || round == MOST_ROUNDS {
                 let information = solution.normal.shared_information().ok_or(NoFit::NotDetermined)?;
                 let covariance = solution.normal.shared_covariance().map(|covariance| covariance * (sigma * sigma));
-                return Ok(Fit { shared, boards, inliers, errors_px, sigma, covariance, information });
+                return Ok(Fit { shared, targets, inliers, errors_px, sigma, covariance, information });
             }
             inliers = next;
         }
     }
 
-    /// Brings the unknowns near the optimum, first with the lenses held, and returns [`Fit::sigma`] by the median.
+    /// Brings the unknowns near the optimum, first with the lenses held; returns [`Fit::sigma`] estimated by the
+    /// median.
     fn settle(
         &self,
         shared: &mut Shared<K::State>,
-        boards: &mut Vec<Isometry3<f64>>,
+        targets: &mut Vec<Isometry3<f64>>,
         usable: &[Vec<bool>],
     ) -> Result<f64, NoFit> {
         let every: Vec<usize> = (0..self.views.len()).collect();
-        let mut scale = self.median_deviation(shared, boards, usable);
+        let mut scale = self.median_deviation(shared, targets, usable);
         for knowledge in [&LensKnowledge::Exact, self.knowledge, self.knowledge] {
             let problem = self.problem(knowledge, scale / RAYLEIGH_MEDIAN, &every, usable)?;
             let loss = if self.robust { Loss::Huber(2.0 * scale) } else { Loss::Squares };
-            let options = ArrowOptions { loss, relative_cost: 1e-5, ..ArrowOptions::default() };
-            let solution = arrow::solve(&problem, shared.clone(), std::mem::take(boards), &options);
-            (*shared, *boards) = (solution.shared, solution.blocks);
-            scale = self.median_deviation(shared, boards, usable);
+            let options = SchurOptions { loss, relative_cost: 1e-5, ..SchurOptions::default() };
+            let solution = schur_lm::solve(&problem, shared.clone(), std::mem::take(targets), &options);
+            (*shared, *targets) = (solution.shared, solution.blocks);
+            scale = self.median_deviation(shared, targets, usable);
         }
         Ok((scale / RAYLEIGH_MEDIAN).max(FINEST))
     }
@@ -142,20 +143,20 @@ impl<K: Kinematics> Task<'_, K> {
         Ok(Joint { kinematics: self.kinematics, lens_prior, sigma, views: self.views, kept, used })
     }
 
-    fn median_deviation(&self, shared: &Shared<K::State>, boards: &[Isometry3<f64>], usable: &[Vec<bool>]) -> f64 {
-        let errors_px = self.errors_px(shared, boards);
+    fn median_deviation(&self, shared: &Shared<K::State>, targets: &[Isometry3<f64>], usable: &[Vec<bool>]) -> f64 {
+        let errors_px = self.errors_px(shared, targets);
         let in_sigmas = |(view, errors): (&StereoView, &Vec<f64>)| {
             view.corners().zip(errors).map(|((_, corner), &error)| corner.deviation(error)).collect()
         };
         median_of(&self.views.iter().zip(&errors_px).map(in_sigmas).collect::<Vec<_>>(), usable)
     }
 
-    pub fn errors_px(&self, shared: &Shared<K::State>, boards: &[Isometry3<f64>]) -> Vec<Vec<f64>> {
-        let view_errors = |(index, (view, board)): (usize, (&StereoView, &Isometry3<f64>))| {
+    pub fn errors_px(&self, shared: &Shared<K::State>, targets: &[Isometry3<f64>]) -> Vec<Vec<f64>> {
+        let view_errors = |(index, (view, target)): (usize, (&StereoView, &Isometry3<f64>))| {
             let left_from_right = self.kinematics.left_from_right(&shared.state, index);
-            Pair { left_from_right, lenses: shared.lenses }.errors_px(view, board)
+            Pair { left_from_right, lenses: shared.lenses }.errors_px(view, target)
         };
-        self.views.iter().zip(boards).enumerate().map(view_errors).collect()
+        self.views.iter().zip(targets).enumerate().map(view_errors).collect()
     }
 
     fn inliers(&self, shared: &Shared<K::State>, errors_px: &[Vec<f64>], usable: &[Vec<bool>]) -> Vec<Vec<bool>> {

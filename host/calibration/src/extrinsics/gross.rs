@@ -1,8 +1,8 @@
-//! Which corners and views are gross.
+//! Outliers: gross corners and gross views.
 //!
-//! A gross corner contradicts the other corners of its own image: each image is given its own board pose, so that a pair
-//! whose images were not taken at the same instant does not make its corners gross. A gross view is one on which the two
-//! cameras disagree altogether, such as a board counted from another end.
+//! A gross corner contradicts the other corners of its own image: each image is given its own target pose, so that a
+//! pair whose images were not taken at the same instant does not make its corners gross. A gross view is one on which
+//! the two cameras disagree altogether, such as a target counted from another end.
 
 use nalgebra::Isometry3;
 
@@ -15,15 +15,15 @@ use crate::{Corner, Loss, median};
 const GROSS_CORNER: f64 = 6.0;
 /// A view whose median error is this many medians is gross. A hand-held pair taken a moment apart stays far below.
 const GROSS_VIEW: f64 = 30.0;
-/// Nearer than this nothing is gross, however exact the rest is: in pixels, or in relative sigmas.
+/// Errors below this are never gross, in pixels or relative sigmas.
 const NEVER_GROSS: f64 = 0.01;
-/// A view needs this many corners to carry its own board pose.
+/// Least number of corners for a view to have a target pose of its own.
 const FEWEST_CORNERS: usize = 4;
 
-/// The board as each camera alone places it: in the left and in the right frame.
+/// The target as each camera alone places it: in the left and in the right frame.
 pub(crate) type OwnPoses = [Isometry3<f64>; 2];
 
-/// The median of the errors that `counted` allows; never zero, so that it can be the scale of a loss.
+/// Median of the errors for which `counted` holds; never zero, so that it can be the scale of a loss.
 pub(crate) fn median_of(errors: &[Vec<f64>], counted: &[Vec<bool>]) -> f64 {
     const SMALLEST: f64 = 1e-6;
     let pairs = errors.iter().flatten().zip(counted.iter().flatten());
@@ -56,7 +56,7 @@ pub(crate) fn inliers(
     own.iter().zip(joint_errors_px).zip(usable).map(judge).collect()
 }
 
-/// Each corner's distance from where the rest of its own image puts it, in units of its relative sigma.
+/// Distance of each corner from where the rest of its own image places it, in units of its relative sigma.
 fn own_deviations(lenses: &Lenses, view: &StereoView, poses: &OwnPoses, usable: &[bool]) -> Vec<f64> {
     let (left_usable, right_usable) = usable.split_at(view.left.corners.len().min(usable.len()));
     let sides = [

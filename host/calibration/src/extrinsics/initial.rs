@@ -1,31 +1,32 @@
-//! First values: each camera's board pose from its own bundle of rays, and Arun's fit between the two corner clouds.
+//! Starting values: target poses by each camera alone, and the relative pose that fits both sets of corners to each
+//! other.
 
 use nalgebra::{Isometry3, Point3, Vector2};
 use vergence_vision::{Camera, KannalaBrandt, Left, Point, Right};
 
 use crate::arun::fit_rotation_translation;
-use crate::board::BoardView;
 use crate::extrinsics::Side;
 use crate::extrinsics::gross::OwnPoses;
 use crate::extrinsics::stereo::{Lenses, Pair};
 use crate::extrinsics::{ExtrinsicsError, SkippedView, StereoView};
-use crate::planar_pose::{PoseError, board_pose};
+use crate::planar_pose::{PoseError, target_pose};
+use crate::target::TargetView;
 
-/// A view whose board both cameras place.
+/// A view whose target both cameras place.
 pub(crate) struct PlacedView {
     /// Index of the view among those given.
     pub view: usize,
-    pub left_from_board: Isometry3<f64>,
-    pub right_from_board: Isometry3<f64>,
+    pub left_from_target: Isometry3<f64>,
+    pub right_from_target: Isometry3<f64>,
 }
 
 impl PlacedView {
     pub fn own_poses(&self) -> OwnPoses {
-        [self.left_from_board, self.right_from_board]
+        [self.left_from_target, self.right_from_target]
     }
 }
 
-/// The board poses of all views that have one in both cameras; the others and why.
+/// The target poses of all views that have one in both cameras; the others and why.
 pub(crate) fn place(
     left: &KannalaBrandt,
     right: &KannalaBrandt,
@@ -36,8 +37,8 @@ pub(crate) fn place(
         let sides = [(Side::Left, left, &view.left), (Side::Right, right, &view.right)];
         let poses = sides.map(|(side, camera, seen)| pose(camera, seen).map_err(|reason| (side, reason)));
         match poses {
-            [Ok(left_from_board), Ok(right_from_board)] => {
-                placed.push(PlacedView { view: index, left_from_board, right_from_board });
+            [Ok(left_from_target), Ok(right_from_target)] => {
+                placed.push(PlacedView { view: index, left_from_target, right_from_target });
             }
             [Err((side, reason)), _] | [_, Err((side, reason))] => match reason {
                 PoseError::TooFewCorners(_) | PoseError::Degenerate => {
@@ -50,19 +51,20 @@ pub(crate) fn place(
     Ok((placed, skipped))
 }
 
-fn pose(camera: &KannalaBrandt, seen: &BoardView) -> Result<Isometry3<f64>, PoseError> {
-    board_pose(camera, seen).map(|pose| *pose.camera_from_board.isometry())
+fn pose(camera: &KannalaBrandt, seen: &TargetView) -> Result<Isometry3<f64>, PoseError> {
+    target_pose(camera, seen).map(|pose| *pose.camera_from_target.isometry())
 }
 
-/// Arun's fit between the corners as the left and as the right camera place them.
+/// `left_from_right` that fits the corners as placed by the right camera to those placed by the left (K. Arun et al.,
+/// 1987).
 pub(crate) fn arun(views: &[StereoView], placed: &[PlacedView]) -> Result<Isometry3<f64>, ExtrinsicsError> {
     let mut pairs = Vec::new();
     for place in placed {
         let Some(view) = views.get(place.view) else { continue };
         for (_, corner) in view.corners() {
-            let board = Point3::from(Vector2::from(corner.board_mm).push(0.0));
-            let in_left = Point::<Left>::from_mm((place.left_from_board * board).coords);
-            let in_right = Point::<Right>::from_mm((place.right_from_board * board).coords);
+            let target = Point3::from(Vector2::from(corner.target_mm).push(0.0));
+            let in_left = Point::<Left>::from_mm((place.left_from_target * target).coords);
+            let in_right = Point::<Right>::from_mm((place.right_from_target * target).coords);
             pairs.push((in_left, in_right));
         }
     }
@@ -70,8 +72,8 @@ pub(crate) fn arun(views: &[StereoView], placed: &[PlacedView]) -> Result<Isomet
     Ok(*left_from_right.isometry())
 }
 
-/// `left_from_board` of each view: as the left or as the right camera places it, whichever reprojects better in both.
-pub(crate) fn nearer_boards(
+/// `left_from_target` of each view: as the left or as the right camera places it, whichever reprojects better in both.
+pub(crate) fn nearer_targets(
     lenses: Lenses,
     left_from_right: &Isometry3<f64>,
     views: &[StereoView],
@@ -79,12 +81,12 @@ pub(crate) fn nearer_boards(
 ) -> Vec<Isometry3<f64>> {
     let pair = Pair { left_from_right: *left_from_right, lenses };
     let choose = |place: &PlacedView| {
-        let by_right = left_from_right * place.right_from_board;
+        let by_right = left_from_right * place.right_from_target;
         let squares = |pose: &Isometry3<f64>| {
             let errors = views.get(place.view).map(|view| pair.errors_px(view, pose)).unwrap_or_default();
             errors.iter().map(|error| error * error).sum::<f64>()
         };
-        if squares(&by_right) < squares(&place.left_from_board) { by_right } else { place.left_from_board }
+        if squares(&by_right) < squares(&place.left_from_target) { by_right } else { place.left_from_target }
     };
     placed.iter().map(choose).collect()
 }

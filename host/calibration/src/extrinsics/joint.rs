@@ -1,14 +1,14 @@
-//! The joint problem: every board pose, the lenses, and whatever the cameras' relative pose depends on.
+//! The joint least-squares problem: target poses, lenses, and the unknowns of the relative pose.
 
 use nalgebra::{Isometry3, Matrix6xX, SVector};
 
-use crate::arrow::{ArrowProblem, Equations};
 use crate::extrinsics::Side;
 use crate::extrinsics::StereoView;
 use crate::extrinsics::stereo::{LensPrior, Lenses, Pair};
 use crate::reprojection::{LENS, POSE, moved};
+use crate::schur_lm::{Equations, SchurProblem};
 
-/// What the relative pose of the cameras depends on: one pose for all views, or the axes of a stage.
+/// Model of the relative pose: one pose for all views, or the axes of a stage.
 pub(crate) trait Kinematics: Sync {
     /// The unknowns.
     type State: Clone + Send + Sync;
@@ -72,7 +72,7 @@ pub(crate) struct Joint<'a, K: Kinematics> {
     pub used: &'a [Vec<bool>],
 }
 
-impl<K: Kinematics> ArrowProblem<POSE> for Joint<'_, K> {
+impl<K: Kinematics> SchurProblem<POSE> for Joint<'_, K> {
     type Shared = Shared<K::State>;
     type Block = Isometry3<f64>;
 
@@ -84,7 +84,7 @@ impl<K: Kinematics> ArrowProblem<POSE> for Joint<'_, K> {
         &self,
         shared: &Self::Shared,
         index: usize,
-        left_from_board: &Isometry3<f64>,
+        left_from_target: &Isometry3<f64>,
         equations: &mut Equations<POSE>,
     ) {
         let Some((view, corners, used)) =
@@ -98,7 +98,7 @@ impl<K: Kinematics> ArrowProblem<POSE> for Joint<'_, K> {
         let lens_column = by_step.ncols();
         let mut columns = vec![[0.0; 2]; self.shared_dimension()];
         for ((side, corner), _) in corners.corners().zip(used).filter(|(_, used)| **used) {
-            let Some(residual) = pair.residual(side, corner, left_from_board) else {
+            let Some(residual) = pair.residual(side, corner, left_from_target) else {
                 // An infinite cost refuses the step that led here.
                 equations.add(&[f64::INFINITY; 2], 1.0, &[], &[[0.0; 2]; POSE]);
                 continue;
@@ -110,7 +110,7 @@ impl<K: Kinematics> ArrowProblem<POSE> for Joint<'_, K> {
             }
             let own = if side == Side::Left { lens_column } else { lens_column + LENS };
             columns.iter_mut().skip(own).zip(residual.by_lens.column_iter()).for_each(|(slot, c)| *slot = [c[0], c[1]]);
-            equations.add(&residual.error.into(), corner.relative_sigma, &columns, &residual.by_board.into());
+            equations.add(&residual.error.into(), corner.relative_sigma, &columns, &residual.by_target.into());
         }
     }
 

@@ -1,111 +1,120 @@
-//! The relative pose of two cameras from boards that both see, by their bundles of rays; nothing is rectified.
+//! Relative pose of two cameras from targets that both see, by bundles of rays; no image is rectified.
 //!
-//! Each camera places the board on its own ([`board_pose`](crate::board_pose)), Arun's fit between the two corner clouds
-//! gives a first relative pose, and all of it is refined jointly on the reprojection of every corner. It works the same
-//! where the board is seen only near and beyond 90°.
+//! Each camera alone places the targets ([`target_pose`](crate::target_pose)); fitting both sets of corners to each
+//! other ([`fit_rotation_translation`](crate::fit_rotation_translation)) gives a first relative pose; a joint fit of
+//! all reprojections refines everything. Targets may be near and beyond 90° from the axis.
 
 mod fit;
 mod gross;
 mod initial;
 mod joint;
 mod report;
+mod scatter;
 mod stereo;
 
 use nalgebra::SMatrix;
 use vergence_vision::{InvalidLens, KannalaBrandt, Left, Pixel, Right, Transform};
 
-use crate::board::{Board, BoardView, Corner};
 use crate::planar_pose::PoseError;
 use crate::reprojection::POSE;
+use crate::target::{Corner, Target, TargetView};
 
 pub(crate) use fit::{Fit, NoFit, Start, Task};
 pub(crate) use gross::OwnPoses;
-pub(crate) use initial::{PlacedView, inside, nearer_boards, place};
+pub(crate) use initial::{PlacedView, inside, nearer_targets, place};
 pub(crate) use joint::{FixedPose, Kinematics, Shared};
 pub(crate) use report::{outliers, refined, rms, view_figures};
 pub use stereo::LensKnowledge;
+use stereo::LensPrior;
 pub(crate) use stereo::{Lenses, Pair};
 pub use vergence_vision::Side;
 
-/// Fewer views cannot contradict each other.
+/// Least number of views: fewer cannot contradict each other.
 pub const FEWEST_VIEWS: usize = 3;
 
-/// One board seen by both cameras while neither moved against the other. Corners may be missing in either image.
+/// One target seen by both cameras while neither moved against the other. Corners may be missing in either image.
 #[derive(Clone, Debug, PartialEq)]
 pub struct StereoView {
-    /// For reports.
+    /// Name of the view, for reports.
     pub name: String,
-    /// What the left camera saw.
-    pub left: BoardView,
-    /// What the right camera saw.
-    pub right: BoardView,
+    /// Corners in the left image.
+    pub left: TargetView,
+    /// Corners in the right image.
+    pub right: TargetView,
 }
 
-/// How to calibrate.
+/// Options of [`calibrate_extrinsics`].
 #[derive(Clone, Debug, PartialEq)]
 pub struct ExtrinsicsOptions {
     /// What is known of the lenses.
     pub lenses: LensKnowledge,
-    /// Whether gross corners are found by a robust loss and left out.
+    /// Whether outliers are found by a robust loss and left out.
     pub robust: bool,
 }
 
 impl Default for ExtrinsicsOptions {
-    /// The lenses as given, robust.
+    /// Lenses exactly as given, outliers left out.
     fn default() -> Self {
         Self { lenses: LensKnowledge::Exact, robust: true }
     }
 }
 
-/// A relative pose and how well it fits.
+/// A relative pose and its residual.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct RelativePose {
     /// The right camera in the left frame.
     pub left_from_right: Transform<Left, Right>,
-    /// Distance between corners and reprojection, root mean square per corner of both cameras.
+    /// Distance between corners and reprojections, root mean square per corner of both cameras, in pixels.
     pub rms_px: f64,
 }
 
-/// The calibrated pair.
+/// A calibrated pair.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ExtrinsicsCalibration {
-    /// Arun's fit, each board as one camera places it.
+    /// Start of the joint fit: the targets placed by each camera alone, both sets of corners fitted to each other (K.
+    /// Arun et al., 1987).
     pub arun: RelativePose,
-    /// The joint optimum; its `rms_px` is over all corners, gross ones too.
+    /// Optimum of the joint fit; its `rms_px` is over all corners, outliers included.
     pub joint: RelativePose,
-    /// Of `joint` in local coordinates `[ω, δ]`: rotation vector about the left axes in radians, then the position of the
-    /// right camera in the left frame in millimetres.
+    /// Covariance of `joint` in local coordinates `[ω, δ]`: rotation vector about the left axes in radians, then the
+    /// position of the right camera in the left frame in millimetres.
     pub covariance: SMatrix<f64, POSE, POSE>,
-    /// Over the corners that are not gross.
+    /// How much more the relative poses of single views scatter about `joint` than the noise of their corners explains:
+    /// a ratio of standard deviations, at least 1. More means wrong lenses, images taken at different instants, or a
+    /// target that bends.
+    pub view_scatter: f64,
+    /// As `covariance`, with the noise of the corners multiplied by `view_scatter`: what the pair is worth.
+    pub scattered_covariance: SMatrix<f64, POSE, POSE>,
+    /// Root mean square distance per corner without outliers, in pixels.
     pub rms_inlier_px: f64,
-    /// Standard deviation of one pixel coordinate, root mean square over those corners.
+    /// Standard deviation of one pixel coordinate, root mean square over the corners used.
     pub sigma_px: f64,
-    /// The left lens, refined unless it was exact.
+    /// Left lens, refined unless it was held exact.
     pub left: KannalaBrandt,
-    /// The right lens, refined unless it was exact.
+    /// Right lens, refined unless it was held exact.
     pub right: KannalaBrandt,
-    /// Corners of all views that took part, both cameras.
+    /// Number of corners in all views that took part, both cameras.
     pub corners_total: usize,
-    /// Those of them that are not gross.
+    /// Number of corners used: all but the outliers.
     pub corners_inlier: usize,
-    /// Each view that took part.
+    /// Figures of each view that took part.
     pub views: Vec<StereoViewFigures>,
-    /// Each corner left out.
+    /// The corners left out.
     pub outliers: Vec<StereoOutlier>,
-    /// Each view that did not take part.
+    /// The views that did not take part.
     pub skipped: Vec<SkippedView>,
 }
 
-/// How one view fits.
+/// Residuals of one view.
 #[derive(Clone, Debug, PartialEq)]
 pub struct StereoViewFigures {
     /// Its name.
     pub view: String,
-    /// The board in the left frame.
-    pub left_from_board: Transform<Left, Board>,
-    /// Root mean square of the left and of the right camera's corners that are not gross; `None` without any.
+    /// Pose of the target in the left frame.
+    pub left_from_target: Transform<Left, Target>,
+    /// Root mean square distance of the used corners of the left and the right camera, in pixels; `None` without any.
     pub rms_px: [Option<f64>; 2],
-    /// Corners that are not gross, of the left and of the right camera.
+    /// Number of used corners of the left and the right camera.
     pub corners: [usize; 2],
 }
 
@@ -116,13 +125,13 @@ pub struct StereoOutlier {
     pub view: String,
     /// The camera.
     pub side: Side,
-    /// Where the corner is on the board, in millimetres.
-    pub board_mm: [f64; 2],
-    /// Where the image shows it.
+    /// Position of the corner on the target, in millimetres.
+    pub target_mm: [f64; 2],
+    /// Observed position in the image.
     pub pixel: Pixel,
-    /// How far that is from where it should be.
+    /// Distance from its reprojection, in pixels.
     pub error_px: f64,
-    /// Why it is left out.
+    /// Reason for leaving it out.
     pub reason: StereoOutlierReason,
 }
 
@@ -130,20 +139,30 @@ pub struct StereoOutlier {
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum StereoOutlierReason {
-    /// Much further than the others from where the rest of its own image puts it.
+    /// Much further than others from where the rest of its own image places it.
     Gross,
     /// Outside the lens's valid cone.
     OutsideField,
-    /// The cameras disagree on the whole view, or too few of its corners were left.
+    /// The cameras disagree on the whole view, or too few of its corners are usable.
     ViewRejected,
 }
 
-/// A view that says nothing of the relative pose.
+impl std::fmt::Display for StereoOutlierReason {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.write_str(match self {
+            Self::Gross => "too far from where the rest of its image puts it",
+            Self::OutsideField => "outside the lens's valid cone",
+            Self::ViewRejected => "the cameras disagree on the whole view, or too few corners were left",
+        })
+    }
+}
+
+/// A view without information on the relative pose.
 #[derive(Clone, Debug, PartialEq)]
 pub struct SkippedView {
     /// Its name.
     pub view: String,
-    /// The camera that does not place the board.
+    /// The camera that cannot place the target.
     pub side: Side,
     /// Why not.
     pub reason: PoseError,
@@ -161,10 +180,10 @@ pub enum ExtrinsicsError {
         /// Views of the right camera.
         right: usize,
     },
-    /// Too few views in which both cameras place the board.
-    #[error("{usable} views in which both cameras see enough of the board; at least {FEWEST_VIEWS} are needed")]
+    /// Too few views in which both cameras place the target.
+    #[error("{usable} views in which both cameras see enough of the target; at least {FEWEST_VIEWS} are needed")]
     TooFewViews {
-        /// Those there are.
+        /// Number of such views.
         usable: usize,
     },
     /// A view contradicts itself.
@@ -177,8 +196,8 @@ pub enum ExtrinsicsError {
         /// What is wrong.
         reason: PoseError,
     },
-    /// The corners leave an unknown open: too few views for lenses that are free, or all boards alike.
-    #[error("the views do not determine the calibration: add boards at other places and tilts, or hold the lenses")]
+    /// The corners leave an unknown open: too few views for lenses that are free, or all targets alike.
+    #[error("the views do not determine the calibration: add targets at other places and tilts, or hold the lenses")]
     NotDetermined,
     /// The iteration ended at no optimum.
     #[error("the views contradict each other: no relative pose fits them")]
@@ -211,11 +230,11 @@ impl StereoView {
     ///
     /// # Errors
     /// [`ExtrinsicsError::ViewsDoNotPair`] where one camera has more than the other.
-    pub fn pair(left: &[BoardView], right: &[BoardView]) -> Result<Vec<Self>, ExtrinsicsError> {
+    pub fn pair(left: &[TargetView], right: &[TargetView]) -> Result<Vec<Self>, ExtrinsicsError> {
         if left.len() != right.len() {
             return Err(ExtrinsicsError::ViewsDoNotPair { left: left.len(), right: right.len() });
         }
-        let pair = |(left, right): (&BoardView, &BoardView)| Self {
+        let pair = |(left, right): (&TargetView, &TargetView)| Self {
             name: left.name.clone(),
             left: left.clone(),
             right: right.clone(),
@@ -230,14 +249,13 @@ impl StereoView {
     }
 }
 
-/// Calibrates the relative pose of two cameras, and their lenses if the options let them move.
+/// Calibrates the relative pose of two cameras, and refines their lenses if the options allow it.
 ///
-/// First values by A. Arun et al. 1987 on the boards as each camera places them; then least squares on the reprojection
-/// over the relative pose, every board pose and the lenses: with Huber's loss until near, then without it and without the
-/// corners that are more than six medians from where the rest of their own image puts them.
+/// Starts with K. Arun et al. 1987 on the targets as each camera places them, then least squares on the reprojection
+/// over the relative pose, every target pose and the lenses: first with Huber's loss, then without it and without
+/// outliers, which are more than six medians from where the rest of their own image places them.
 ///
-/// # Errors
-/// [`ExtrinsicsError`] where views are too few, contradict themselves or leave an unknown open.
+/// # Errors [`ExtrinsicsError`] if views are too few, contradict themselves or do not determine an unknown.
 pub fn calibrate_extrinsics(
     left: &KannalaBrandt,
     right: &KannalaBrandt,
@@ -250,7 +268,7 @@ pub fn calibrate_extrinsics(
         return Err(ExtrinsicsError::TooFewViews { usable: placed.len() });
     }
     let arun = initial::arun(views, &placed)?;
-    let boards = nearer_boards(lenses, &arun, views, &placed);
+    let targets = nearer_targets(lenses, &arun, views, &placed);
     let views: Vec<StereoView> = placed.iter().filter_map(|place| views.get(place.view)).cloned().collect();
     let usable: Vec<Vec<bool>> = views.iter().map(|view| inside(left, right, view)).collect();
     let own_poses: Vec<OwnPoses> = placed.iter().map(PlacedView::own_poses).collect();
@@ -262,16 +280,23 @@ pub fn calibrate_extrinsics(
         knowledge: &options.lenses,
         robust: options.robust,
     };
-    let arun_errors = task.errors_px(&Shared { state: arun, lenses }, &boards);
-    let fit = task.fit(Start { shared: Shared { state: arun, lenses }, boards, usable: usable.clone() })?;
+    let arun_errors = task.errors_px(&Shared { state: arun, lenses }, &targets);
+    let fit = task.fit(Start { shared: Shared { state: arun, lenses }, targets, usable: usable.clone() })?;
 
     let covariance = fit.covariance.as_ref().ok_or(ExtrinsicsError::NotDetermined)?;
+    let pair = Pair { left_from_right: fit.shared.state, lenses: fit.shared.lenses };
+    let view_scatter = scatter::view_scatter(&pair, &views, &fit.targets, &fit.inliers, fit.sigma);
+    let lens_prior = LensPrior::new(lenses, &options.lenses, fit.sigma).ok_or(ExtrinsicsError::LensCovariance)?;
+    let scattered_covariance =
+        scatter::scattered_covariance(&fit, &lens_prior, view_scatter).ok_or(ExtrinsicsError::NotDetermined)?;
     let relative = |pose, rms_px| RelativePose { left_from_right: Transform::from_isometry(pose), rms_px };
     let every = rms(&fit.errors_px, &usable).unwrap_or_default();
     Ok(ExtrinsicsCalibration {
         arun: relative(arun, rms(&arun_errors, &usable).unwrap_or_default()),
         joint: relative(fit.shared.state, every),
         covariance: covariance.fixed_view::<POSE, POSE>(0, 0).into_owned(),
+        view_scatter,
+        scattered_covariance,
         rms_inlier_px: rms(&fit.errors_px, &fit.inliers).unwrap_or_default(),
         sigma_px: fit.sigma_px(&views),
         left: refined(&fit.shared.lenses.left, left, Side::Left)?,

@@ -1,4 +1,4 @@
-//! The figures of a fit, corner by corner and view by view.
+//! Residuals of a fit by corner and view.
 
 use vergence_vision::{KannalaBrandt, Transform};
 
@@ -7,7 +7,7 @@ use crate::extrinsics::{
 };
 use crate::reprojection::Lens;
 
-/// Root mean square of the values that `counted` allows; `None` where it allows none.
+/// Root mean square of the values for which `counted` holds; `None` without any.
 pub(crate) fn rms(values: &[Vec<f64>], counted: &[Vec<bool>]) -> Option<f64> {
     root_mean_square(values.iter().flatten().zip(counted.iter().flatten()))
 }
@@ -30,7 +30,7 @@ pub(crate) fn view_figures<S>(views: &[StereoView], fit: &Fit<S>) -> Vec<StereoV
         let parts = [(&errors[..middle], &inliers[..middle]), (&errors[middle..], &inliers[middle..])];
         StereoViewFigures {
             view: view.name.clone(),
-            left_from_board: Transform::from_isometry(fit.boards[index]),
+            left_from_target: Transform::from_isometry(fit.targets[index]),
             rms_px: parts.map(|(errors, inliers)| root_mean_square(errors.iter().zip(inliers))),
             corners: parts.map(|(_, inliers)| inliers.iter().filter(|&&inlier| inlier).count()),
         }
@@ -53,7 +53,7 @@ pub(crate) fn outliers<S>(views: &[StereoView], usable: &[Vec<bool>], fit: &Fit<
             outliers.push(StereoOutlier {
                 view: view.name.clone(),
                 side,
-                board_mm: corner.board_mm,
+                target_mm: corner.target_mm,
                 pixel: corner.pixel,
                 error_px: fit.errors_px[index][place],
                 reason,

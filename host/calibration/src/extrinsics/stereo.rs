@@ -1,34 +1,34 @@
-//! Residuals of one board seen by two cameras, with derivatives.
+//! Residuals of one target seen by two cameras, with derivatives.
 
 use nalgebra::{Isometry3, Matrix3x6, SMatrix, SVector, Vector2};
 use vergence_vision::{KannalaBrandt, Side};
 
-use crate::arrow::Equations;
-use crate::board::Corner;
 use crate::extrinsics::StereoView;
 use crate::reprojection::{LENS, Lens, POSE, point_by_move};
+use crate::schur_lm::Equations;
+use crate::target::Corner;
 
-/// What is known of the two lenses before the views are looked at.
+/// Prior knowledge of the two lenses.
 ///
 /// A lens's parameters are fx, fy, cx, cy and k1 to k4 of [`OpenCvFisheye`](vergence_vision::OpenCvFisheye), in this
 /// order, as in [`IntrinsicsCalibration::covariance`](crate::IntrinsicsCalibration::covariance).
 #[derive(Clone, Debug, PartialEq)]
 pub enum LensKnowledge {
-    /// They are as given.
+    /// The lenses are exactly as given.
     Exact,
-    /// They are as given up to the covariance of their own calibration, from other photographs than these views.
+    /// The lenses are as given, with the covariance of their own calibration from other images than these views.
     Within {
-        /// Of the left lens's parameters.
+        /// Covariance of the left lens's parameters.
         left: Box<SMatrix<f64, LENS, LENS>>,
-        /// Of the right lens's parameters.
+        /// Covariance of the right lens's parameters.
         right: Box<SMatrix<f64, LENS, LENS>>,
     },
-    /// Nothing: the parameters given are only where to start.
+    /// Nothing is known: the parameters given are only starting values.
     Free,
 }
 
 impl LensKnowledge {
-    /// As given up to these covariances of the left and the right lens.
+    /// [`Self::Within`] these covariances of the left and the right lens.
     #[must_use]
     pub fn within(left: SMatrix<f64, LENS, LENS>, right: SMatrix<f64, LENS, LENS>) -> Self {
         Self::Within { left: Box::new(left), right: Box::new(right) }
@@ -42,7 +42,7 @@ pub(crate) struct Lenses {
     pub right: Lens,
 }
 
-/// How the lenses enter a problem: whether they move, and what pulls them back.
+/// Prior of the lenses in a problem: whether they are unknowns, and the information on them.
 pub(crate) struct LensPrior {
     pub start: Lenses,
     /// Square roots of the information, times `sigma`; `None` for free lenses.
@@ -50,19 +50,19 @@ pub(crate) struct LensPrior {
     pub dimension: usize,
 }
 
-/// The relative pose and the lenses: all that the residuals of a view depend on but for the board.
+/// Relative pose and lenses: all that the residuals of a view depend on besides the target's pose.
 #[derive(Clone, Copy)]
 pub(crate) struct Pair {
     pub left_from_right: Isometry3<f64>,
     pub lenses: Lenses,
 }
 
-/// One corner's distance from where it should be, and its derivatives.
+/// Residual of one corner (reprojection less observation, in pixels) and its derivatives.
 pub(crate) struct StereoResidual {
     pub error: Vector2<f64>,
     pub by_relative_pose: SMatrix<f64, 2, POSE>,
     pub by_lens: SMatrix<f64, 2, LENS>,
-    pub by_board: SMatrix<f64, 2, POSE>,
+    pub by_target: SMatrix<f64, 2, POSE>,
 }
 
 impl Lenses {
@@ -84,8 +84,8 @@ impl Lenses {
 }
 
 impl LensPrior {
-    /// `sigma` is the standard deviation of a pixel coordinate in units of the corner's relative sigma. `None` for a
-    /// covariance that is not one.
+    /// `sigma` is the standard deviation of a pixel coordinate in units of the corner's relative sigma. `None` if a
+    /// covariance is not positive definite.
     pub fn new(start: Lenses, knowledge: &LensKnowledge, sigma: f64) -> Option<Self> {
         let root = |covariance: &SMatrix<f64, LENS, LENS>| {
             // Scaled to unit diagonal first: the parameters differ by many orders of magnitude.
@@ -100,6 +100,11 @@ impl LensPrior {
             LensKnowledge::Within { left, right } => (Some([root(left)?, root(right)?]), 2 * LENS),
         };
         Some(Self { start, pull, dimension })
+    }
+
+    /// Information of the left and the right lens's own calibration, times `sigma`²; `None` where it does not count.
+    pub fn information(&self) -> Option<[SMatrix<f64, LENS, LENS>; 2]> {
+        self.pull.as_ref().map(|pull| [0, 1].map(|side: usize| pull[side].transpose() * pull[side]))
     }
 
     /// Adds the pull of the lenses' own calibration; their columns begin at `column` of the shared block.
@@ -123,37 +128,37 @@ impl LensPrior {
 }
 
 impl Pair {
-    /// The residual of `corner`, seen by the camera on `side`, of the board at `left_from_board`. `None` where the
+    /// The residual of `corner`, seen by the camera on `side`, of the target at `left_from_target`. `None` where the
     /// corner cannot be projected.
-    pub fn residual(&self, side: Side, corner: &Corner, left_from_board: &Isometry3<f64>) -> Option<StereoResidual> {
-        let turned = left_from_board.rotation * Vector2::from(corner.board_mm).push(0.0);
-        let in_left = turned + left_from_board.translation.vector;
-        let by_board = point_by_move(&turned);
-        let (projection, by_relative_pose, by_board) = match side {
-            Side::Left => (self.lenses.left.project(&in_left)?, Matrix3x6::zeros(), by_board),
+    pub fn residual(&self, side: Side, corner: &Corner, left_from_target: &Isometry3<f64>) -> Option<StereoResidual> {
+        let turned = left_from_target.rotation * Vector2::from(corner.target_mm).push(0.0);
+        let in_left = turned + left_from_target.translation.vector;
+        let by_target = point_by_move(&turned);
+        let (projection, by_relative_pose, by_target) = match side {
+            Side::Left => (self.lenses.left.project(&in_left)?, Matrix3x6::zeros(), by_target),
             Side::Right => {
                 // Rᵀ(p - t) with R ← exp(ω) R, t ← t + δ.
                 let right_from_left = self.left_from_right.rotation.inverse().to_rotation_matrix();
                 let arm = in_left - self.left_from_right.translation.vector;
                 let in_right = right_from_left * arm;
                 let by_move = -(right_from_left.matrix() * point_by_move(&arm));
-                (self.lenses.right.project(&in_right)?, by_move, right_from_left.matrix() * by_board)
+                (self.lenses.right.project(&in_right)?, by_move, right_from_left.matrix() * by_target)
             }
         };
         Some(StereoResidual {
             error: projection.pixel - Vector2::new(corner.pixel.u, corner.pixel.v),
             by_relative_pose: projection.by_point * by_relative_pose,
             by_lens: projection.by_lens,
-            by_board: projection.by_point * by_board,
+            by_target: projection.by_point * by_target,
         })
     }
 
     /// Length of each residual of `view` in the order of [`StereoView::corners`]; infinite where a corner cannot be
     /// projected.
-    pub fn errors_px(&self, view: &StereoView, left_from_board: &Isometry3<f64>) -> Vec<f64> {
+    pub fn errors_px(&self, view: &StereoView, left_from_target: &Isometry3<f64>) -> Vec<f64> {
         view.corners()
             .map(|(side, corner)| {
-                self.residual(side, corner, left_from_board).map_or(f64::INFINITY, |residual| residual.error.norm())
+                self.residual(side, corner, left_from_target).map_or(f64::INFINITY, |residual| residual.error.norm())
             })
             .collect()
     }
@@ -177,31 +182,31 @@ mod tests {
         Pair { left_from_right, lenses: Lenses { left: lens, right: lens } }
     }
 
-    /// By central differences, of a board from in front to beyond 90°.
+    /// By central differences, of a target from in front to beyond 90°.
     #[test]
     fn derivatives_are_those_of_the_residual() {
         let pair = pair();
         let corner = Corner::new([125.0, -40.0], Pixel { u: 0.0, v: 0.0 });
         for turn in [0.0, 0.5, 1.0, 1.4] {
             let rotation = UnitQuaternion::from_scaled_axis(Vector3::new(0.2, turn, 0.3));
-            let board = Isometry3::from_parts((rotation * Vector3::new(20.0, -30.0, 400.0)).into(), rotation);
+            let target = Isometry3::from_parts((rotation * Vector3::new(20.0, -30.0, 400.0)).into(), rotation);
             for side in [Side::Left, Side::Right] {
-                let derivative = pair.residual(side, &corner, &board).unwrap();
+                let derivative = pair.residual(side, &corner, &target).unwrap();
                 let difference =
                     |changed: &dyn Fn(f64) -> Vector2<f64>, step: f64| (changed(step) - changed(-step)) / (2.0 * step);
                 for component in 0..POSE {
                     let by = |step: f64| SVector::<f64, POSE>::from_fn(|i, _| if i == component { step } else { 0.0 });
                     let step = if component < 3 { 1e-5 } else { 1e-3 };
-                    let by_board = |s: f64| pair.residual(side, &corner, &moved(&board, &by(s))).unwrap().error;
+                    let by_target = |s: f64| pair.residual(side, &corner, &moved(&target, &by(s))).unwrap().error;
                     let by_relative_pose = |s: f64| {
                         let left_from_right = moved(&pair.left_from_right, &by(s));
-                        Pair { left_from_right, ..pair }.residual(side, &corner, &board).unwrap().error
+                        Pair { left_from_right, ..pair }.residual(side, &corner, &target).unwrap().error
                     };
                     let tolerance = if component < 3 { 1e-5 } else { 1e-8 };
-                    let board_error = difference(&by_board, step) - derivative.by_board.column(component);
+                    let target_error = difference(&by_target, step) - derivative.by_target.column(component);
                     let pose_error =
                         difference(&by_relative_pose, step) - derivative.by_relative_pose.column(component);
-                    assert!(board_error.norm() < tolerance, "board {component}: {board_error}");
+                    assert!(target_error.norm() < tolerance, "target {component}: {target_error}");
                     assert!(pose_error.norm() < tolerance, "relative pose {component}: {pose_error}");
                 }
             }

@@ -1,18 +1,18 @@
-//! The joint least-squares problem: one lens, an optional board warp, and the board's pose in every view.
+//! The joint least-squares problem: one lens, an optional bow of the target, and the target's pose in every view.
 
 use nalgebra::{Isometry3, Point3, SVector, Vector3};
 use vergence_vision::{OpenCvFisheye, Point};
 
 use super::lens::{LENS, from_array, reproject, to_array};
-use super::sights::{Sight, Sighting};
-use crate::arrow::{ArrowProblem, Equations};
+use super::observations::{Observation, ObservedView};
 use crate::reprojection::{POSE, moved};
+use crate::schur_lm::{Equations, SchurProblem};
 
-/// What all views share.
+/// Unknowns that all views share.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Shared {
     pub lens: OpenCvFisheye,
-    /// How far the board bows towards +z of its frame at its middle, along x and along y, in millimetres.
+    /// Height of the target's middle towards +z of its frame, from bows along x and along y, in millimetres.
     pub warp_mm: [f64; 2],
 }
 
@@ -24,26 +24,26 @@ impl Shared {
         Self { lens, warp_mm: [0.0; 2] }
     }
 
-    /// Distance in pixels between `sight` and its reprojection; NaN where there is none.
-    pub fn residual_px(&self, pose: &Isometry3<f64>, sight: &Sight) -> f64 {
-        let point = pose * self.on_board(sight);
-        let Some(seen) = reproject(&self.lens, &Point::from_mm(point.coords)) else { return f64::NAN };
-        let [du, dv] = [seen.pixel[0] - sight.pixel[0], seen.pixel[1] - sight.pixel[1]];
+    /// Distance in pixels between `observation` and its reprojection; NaN where there is none.
+    pub fn residual_px(&self, pose: &Isometry3<f64>, observation: &Observation) -> f64 {
+        let point = pose * self.on_target(observation);
+        let Some(projected) = reproject(&self.lens, &Point::from_mm(point.coords)) else { return f64::NAN };
+        let [du, dv] = [projected.pixel[0] - observation.pixel[0], projected.pixel[1] - observation.pixel[1]];
         (du * du + dv * dv).sqrt()
     }
 
-    /// The same in units of the corner's relative sigma.
-    pub fn deviation(&self, pose: &Isometry3<f64>, sight: &Sight) -> f64 {
-        self.residual_px(pose, sight) / sight.relative_sigma
+    /// [`Self::residual_px`] in units of the corner's relative sigma.
+    pub fn deviation(&self, pose: &Isometry3<f64>, observation: &Observation) -> f64 {
+        self.residual_px(pose, observation) / observation.relative_sigma
     }
 
-    pub fn on_board(&self, sight: &Sight) -> Point3<f64> {
-        let [x, y] = sight.board;
-        Point3::new(x, y, self.warp_mm[0] * sight.bow[0] + self.warp_mm[1] * sight.bow[1])
+    pub fn on_target(&self, observation: &Observation) -> Point3<f64> {
+        let [x, y] = observation.target;
+        Point3::new(x, y, self.warp_mm[0] * observation.bow[0] + self.warp_mm[1] * observation.bow[1])
     }
 }
 
-/// Reprojection less corner, and its derivatives column by column.
+/// Residual of one corner (reprojection less observation, in pixels) and its derivatives, column by column.
 struct Row {
     residual: [f64; 2],
     by_shared: [[f64; 2]; SHARED],
@@ -51,19 +51,19 @@ struct Row {
 }
 
 impl Row {
-    fn of(shared: &Shared, pose: &Isometry3<f64>, sight: &Sight) -> Option<Self> {
-        let turned = pose.rotation * shared.on_board(sight).coords;
-        let seen = reproject(&shared.lens, &Point::from_mm(turned + pose.translation.vector))?;
-        let [dx, dy, dz] = seen.by_point;
+    fn of(shared: &Shared, pose: &Isometry3<f64>, observation: &Observation) -> Option<Self> {
+        let turned = pose.rotation * shared.on_target(observation).coords;
+        let projected = reproject(&shared.lens, &Point::from_mm(turned + pose.translation.vector))?;
+        let [dx, dy, dz] = projected.by_point;
         let along = |d: &Vector3<f64>| [0, 1].map(|row| dx[row] * d.x + dy[row] * d.y + dz[row] * d.z);
         let by_height = along(&(pose.rotation * Vector3::z()));
-        let [fx, fy, cx, cy, k1, k2, k3, k4] = seen.by_lens;
-        let [warp_x, warp_y] = sight.bow.map(|bow| by_height.map(|d| bow * d));
+        let [fx, fy, cx, cy, k1, k2, k3, k4] = projected.by_lens;
+        let [warp_x, warp_y] = observation.bow.map(|bow| by_height.map(|d| bow * d));
         // ∂(exp(ω) p)/∂ωᵢ = eᵢ × p.
         let [turn_x, turn_y, turn_z] =
             [Vector3::x(), Vector3::y(), Vector3::z()].map(|axis: Vector3<f64>| along(&axis.cross(&turned)));
         Some(Self {
-            residual: [seen.pixel[0] - sight.pixel[0], seen.pixel[1] - sight.pixel[1]],
+            residual: [projected.pixel[0] - observation.pixel[0], projected.pixel[1] - observation.pixel[1]],
             by_shared: [fx, fy, cx, cy, k1, k2, k3, k4, warp_x, warp_y],
             by_pose: [turn_x, turn_y, turn_z, dx, dy, dz],
         })
@@ -73,11 +73,11 @@ impl Row {
 /// The problem over the used corners of `views`, with only the parameters in `free` (indices into fx, fy, cx, cy, k1 to
 /// k4, warp) adjusted.
 pub(super) struct Bundle<'a> {
-    pub views: &'a [&'a Sighting],
+    pub views: &'a [&'a ObservedView],
     pub free: &'a [usize],
 }
 
-impl ArrowProblem<POSE> for Bundle<'_> {
+impl SchurProblem<POSE> for Bundle<'_> {
     type Shared = Shared;
     type Block = Isometry3<f64>;
 
@@ -88,15 +88,15 @@ impl ArrowProblem<POSE> for Bundle<'_> {
     fn block_residuals(&self, shared: &Shared, index: usize, pose: &Isometry3<f64>, equations: &mut Equations<POSE>) {
         let Some(view) = self.views.get(index) else { return };
         let mut columns = [[0.0; 2]; SHARED];
-        for sight in view.used() {
-            let Some(row) = Row::of(shared, pose, sight) else {
-                // No reprojection: the solver refuses a step whose cost is not a number.
+        for observation in view.used() {
+            let Some(row) = Row::of(shared, pose, observation) else {
+                // No reprojection: the solver rejects a step whose cost is not a number.
                 return equations.add(&[f64::NAN; 2], 1.0, &[], &[[0.0; 2]; POSE]);
             };
             for (column, &parameter) in columns.iter_mut().zip(self.free) {
                 *column = row.by_shared[parameter];
             }
-            equations.add(&row.residual, sight.relative_sigma, &columns[..self.free.len()], &row.by_pose);
+            equations.add(&row.residual, observation.relative_sigma, &columns[..self.free.len()], &row.by_pose);
         }
     }
 
@@ -138,12 +138,12 @@ mod tests {
     }
 
     /// The reprojection with its unknowns (lens, warp, turn, shift) as dual numbers.
-    fn reprojected(unknowns: [Dual64; SHARED + POSE], pose: &Isometry3<f64>, sight: &Sight) -> [Dual64; 2] {
+    fn reprojected(unknowns: [Dual64; SHARED + POSE], pose: &Isometry3<f64>, observation: &Observation) -> [Dual64; 2] {
         let [fx, fy, cx, cy, k1, k2, k3, k4, warp_x, warp_y, a, b, c, dx, dy, dz] = unknowns;
-        let height = warp_x * sight.bow[0] + warp_y * sight.bow[1];
+        let height = warp_x * observation.bow[0] + warp_y * observation.bow[1];
         let axes = pose.rotation.to_rotation_matrix().into_inner();
         let flat: Dual3 = std::array::from_fn(|i| {
-            height * axes[(i, 2)] + (axes[(i, 0)] * sight.board[0] + axes[(i, 1)] * sight.board[1])
+            height * axes[(i, 2)] + (axes[(i, 0)] * observation.target[0] + axes[(i, 1)] * observation.target[1])
         });
         let [x, y, z] = turned([a, b, c], flat);
         let t = pose.translation.vector;
@@ -160,23 +160,23 @@ mod tests {
         fn every_column_agrees_with_dual_numbers(
             turn in prop::array::uniform3(-2.0..2.0),
             [x, y, z] in prop::array::uniform3(-300.0..300.0_f64),
-            board in prop::array::uniform2(-100.0..100.0),
+            target in prop::array::uniform2(-100.0..100.0),
             bow in prop::array::uniform2(0.0..1.0),
             warp_mm in prop::array::uniform2(-3.0..3.0),
         ) {
             let pose = Isometry3::new(Vector3::new(x, y, z), Vector3::from(turn));
-            let sight = Sight { board, bow, pixel: [0.0; 2], relative_sigma: 1.0, index: 0, used: true };
+            let observation = Observation { target, bow, pixel: [0.0; 2], relative_sigma: 1.0, index: 0, used: true };
             let lens = OpenCvFisheye { fx: 300.0, fy: 310.0, cx: 600.0, cy: 500.0, k: [0.02, -0.01, 0.004, -0.001] };
             let shared = Shared { lens, warp_mm };
-            let seen = pose * shared.on_board(&sight);
+            let projected = pose * shared.on_target(&observation);
             // Where the derivatives are not huge: away from the camera and from the direction straight behind it.
-            prop_assume!(seen.coords.norm() > 50.0 && seen.x.hypot(seen.y) > 5.0);
-            let row = Row::of(&shared, &pose, &sight).unwrap();
+            prop_assume!(projected.coords.norm() > 50.0 && projected.x.hypot(projected.y) > 5.0);
+            let row = Row::of(&shared, &pose, &observation).unwrap();
             let values = to_array(&lens).into_iter().chain(warp_mm).chain([0.0; POSE]);
             let values: Vec<f64> = values.collect();
             for (index, column) in row.by_shared.iter().chain(&row.by_pose).enumerate() {
                 let unknowns = std::array::from_fn(|i| Dual64::new(values[i], if i == index { 1.0 } else { 0.0 }));
-                let dual = reprojected(unknowns, &pose, &sight);
+                let dual = reprojected(unknowns, &pose, &observation);
                 for i in 0..2 {
                     prop_assert!((row.residual[i] - dual[i].re).abs() < 1e-8);
                     let error = (column[i] - dual[i].eps).abs();

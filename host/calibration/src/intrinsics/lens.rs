@@ -1,6 +1,7 @@
-//! The lens as calibration sees it: a projection without limits of the field, and its derivatives.
+//! The lens as calibration sees it: a projection without limits of the field, its derivatives, and the valid cone of the
+//! result.
 
-use vergence_vision::{Camera, OpenCvFisheye, Point};
+use vergence_vision::{Angle, Camera, ImageSize, InvalidLens, KannalaBrandt, OpenCvFisheye, Point};
 
 /// fx, fy, cx, cy, k1 to k4.
 pub(crate) const LENS: usize = 8;
@@ -8,18 +9,18 @@ pub(crate) const LENS: usize = 8;
 /// Below this angle to the axis the series of the projection replaces quotients of small numbers.
 const PARAXIAL: f64 = 1e-4;
 
-/// A pixel and its derivatives, column by column: `by_lens[i]` is the derivative of (u, v) by parameter i.
+/// A projected pixel and its derivatives, column by column: `by_lens[i]` is the derivative of (u, v) by parameter i.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Reprojection {
-    /// u and v.
+    /// u and v, in pixels.
     pub pixel: [f64; 2],
-    /// By fx, fy, cx, cy, k1, k2, k3, k4.
+    /// Derivatives by fx, fy, cx, cy, k1, k2, k3, k4.
     pub by_lens: [[f64; 2]; LENS],
-    /// By the point's x, y and z in the camera frame, in pixels per millimetre.
+    /// Derivatives by the point's x, y and z in the camera frame, in pixels per millimetre.
     pub by_point: [[f64; 2]; 3],
 }
 
-/// Where `lens` shows `point`, with analytic derivatives, at any angle to the axis.
+/// Image of `point` through `lens`, with analytic derivatives, at any angle to the axis.
 ///
 /// The four free ratios k1 to k4 over fx, fy are the five-coefficient form of [`vergence_vision::KannalaBrandt`]
 /// rescaled: its coefficients in pixels are fx (1, k1, k2, k3, k4), and its aspect is fy / fx. `None` at the optical
@@ -71,4 +72,31 @@ pub(crate) const fn to_array(lens: &OpenCvFisheye) -> [f64; LENS] {
 /// The lens of [`to_array`].
 pub(crate) const fn from_array([fx, fy, cx, cy, k1, k2, k3, k4]: [f64; LENS]) -> OpenCvFisheye {
     OpenCvFisheye { fx, fy, cx, cy, k: [k1, k2, k3, k4] }
+}
+
+/// Extrapolation of the polynomial beyond the outermost corner that is allowed, as a share of its angle.
+const MARGIN: f64 = 0.05;
+/// Largest valid angle as a share of the angle where r(θ) stops growing: there the ray's uncertainty is unbounded.
+const BELOW_TURN: f64 = 0.99;
+/// Largest angle to the axis of any lens: the direction straight behind it has no image.
+const WIDEST: Angle = Angle::from_deg(179.0);
+
+/// The camera with the valid cone of a calibration: the angle to the axis of the outermost corner used and 5 % more, but
+/// less than the angle where r(θ) turns.
+///
+/// # Errors
+/// [`InvalidLens::TurnsOver`] where r(θ) turns within the corners used: no lens does.
+pub(super) fn with_valid_cone(
+    lens: OpenCvFisheye,
+    outermost: Angle,
+    size: ImageSize,
+) -> Result<KannalaBrandt, InvalidLens> {
+    let wanted = outermost * (1.0 + MARGIN);
+    let wanted = if wanted < WIDEST { wanted } else { WIDEST };
+    match KannalaBrandt::from_opencv(lens, wanted, size) {
+        Err(InvalidLens::TurnsOver { turn, .. }) if turn * BELOW_TURN > outermost => {
+            KannalaBrandt::from_opencv(lens, turn * BELOW_TURN, size)
+        }
+        made => made,
+    }
 }

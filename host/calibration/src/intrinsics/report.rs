@@ -1,20 +1,20 @@
-//! From the optimum to the result: checks of what the views determine, covariance, figures.
+//! Result of a calibration from the optimum: covariance, residuals, and checks that the views determine the lens.
 
 use nalgebra::{DMatrix, SMatrix, Vector3};
 use vergence_vision::{Angle, Camera, ImageSize, Point, Transform};
 
 use super::adjust::Adjusted;
-use super::cone::with_valid_cone;
 use super::lens::LENS;
-use super::sights::{Sight, Sighting};
+use super::lens::with_valid_cone;
+use super::observations::{Observation, ObservedView};
 use super::{
-    BoardWarp, IntrinsicsCalibration, IntrinsicsError, Outlier, OutlierReason, Parameter, ViewFigures, ViewPose,
+    IntrinsicsCalibration, IntrinsicsError, Outlier, OutlierReason, Parameter, TargetWarp, ViewFigures, ViewPose,
 };
-use crate::BoardView;
+use crate::TargetView;
 
-/// The result; `left_out` are the corners of views too poor to use.
+/// Assembles the result; `left_out` are the corners of views that were too poor to use.
 pub(super) fn report(
-    given: &[BoardView],
+    given: &[TargetView],
     size: ImageSize,
     adjusted: &Adjusted,
     mut outliers: Vec<Outlier>,
@@ -28,20 +28,21 @@ pub(super) fn report(
 
     outliers.extend(&adjusted.outliers);
     outliers.extend(adjusted.views.iter().zip(&adjusted.poses).flat_map(|(view, pose)| {
-        let too_far = |sight: &Sight| Outlier {
+        let too_far = |observation: &Observation| Outlier {
             view: view.index,
-            corner: sight.index,
-            residual_px: Some(adjusted.shared.residual_px(pose, sight)).filter(|r| r.is_finite()),
+            corner: observation.index,
+            residual_px: Some(adjusted.shared.residual_px(pose, observation)).filter(|r| r.is_finite()),
             reason: OutlierReason::TooFar,
         };
-        view.sights.iter().filter(|sight| !sight.used).map(too_far)
+        view.observations.iter().filter(|observation| !observation.used).map(too_far)
     }));
     outliers.sort_by_key(|outlier| (outlier.view, outlier.corner));
 
     let squares =
         |used_only| adjusted.views.iter().enumerate().map(|(i, _)| view_squares(adjusted, i, used_only)).sum();
     let (all, inlier): (Squares, Squares) = (squares(false), squares(true));
-    let sigmas = adjusted.views.iter().flat_map(Sighting::used).map(|sight| Squares::of(sight.relative_sigma));
+    let sigmas =
+        adjusted.views.iter().flat_map(ObservedView::used).map(|observation| Squares::of(observation.relative_sigma));
     Ok(IntrinsicsCalibration {
         camera,
         opencv: lens,
@@ -60,7 +61,7 @@ pub(super) fn report(
     })
 }
 
-/// Focal length and distance are exchangeable where all boards are parallel; this far apart they are told apart.
+/// Least spread of the targets' tilts: focal length and distance are not separable if all targets are parallel.
 fn check_tilts(adjusted: &Adjusted) -> Result<Angle, IntrinsicsError> {
     const LEAST_SPREAD: Angle = Angle::from_deg(3.0);
     let normals: Vec<Vector3<f64>> = adjusted.poses.iter().map(|pose| pose.rotation * Vector3::z()).collect();
@@ -75,8 +76,8 @@ fn between(a: &Vector3<f64>, b: &Vector3<f64>) -> f64 {
 }
 
 fn outermost(adjusted: &Adjusted) -> Angle {
-    let angle = |pose: &nalgebra::Isometry3<f64>, sight: &Sight| {
-        let point: Point<Camera> = Point::from_mm((pose * adjusted.shared.on_board(sight)).coords);
+    let angle = |pose: &nalgebra::Isometry3<f64>, observation: &Observation| {
+        let point: Point<Camera> = Point::from_mm((pose * adjusted.shared.on_target(observation)).coords);
         point.direction().map_or(0.0, |ray| ray.angle_to_axis().rad())
     };
     let angles =
@@ -86,9 +87,9 @@ fn outermost(adjusted: &Adjusted) -> Angle {
 
 /// Covariances in pixels, radians and millimetres.
 struct Covariances {
-    /// Of one component of a residual.
+    /// Variance of one component of a residual.
     variance: f64,
-    /// Of lens and warp, for unit variance.
+    /// Covariance of lens and bow for unit variance of a residual.
     shared: DMatrix<f64>,
 }
 
@@ -99,11 +100,11 @@ impl Covariances {
         Ok(Self { variance, shared })
     }
 
-    /// Refuses what no one could use.
+    /// Refuses a calibration that is too uncertain to use.
     fn check(&self, adjusted: &Adjusted, size: ImageSize) -> Result<(), IntrinsicsError> {
-        /// Of the focal length: a metre would be measured as less than 0.9 or more than 1.1.
+        /// Largest standard deviation of the focal length, as a share of it.
         const FOCAL_SHARE: f64 = 0.1;
-        /// Of the image's longer side.
+        /// Largest standard deviation of the principal point, as a share of the image's longer side.
         const CENTRE_SHARE: f64 = 0.1;
         let sigma = |i: usize| (self.variance * self.shared[(i, i)]).sqrt();
         let lens = &adjusted.shared.lens;
@@ -124,10 +125,10 @@ impl Covariances {
         self.shared.fixed_view::<LENS, LENS>(0, 0) * self.variance
     }
 
-    fn warp(&self, adjusted: &Adjusted) -> Option<BoardWarp> {
+    fn warp(&self, adjusted: &Adjusted) -> Option<TargetWarp> {
         let sigma = |i: usize| (self.variance * self.shared[(i, i)]).sqrt();
         let [along_x_mm, along_y_mm] = adjusted.shared.warp_mm;
-        (self.shared.nrows() > LENS).then(|| BoardWarp {
+        (self.shared.nrows() > LENS).then(|| TargetWarp {
             along_x_mm,
             along_y_mm,
             sigma_mm: [sigma(LENS), sigma(LENS + 1)],
@@ -135,7 +136,7 @@ impl Covariances {
     }
 }
 
-fn view_figures(given: &[BoardView], adjusted: &Adjusted, covariances: &Covariances) -> Vec<ViewFigures> {
+fn view_figures(given: &[TargetView], adjusted: &Adjusted, covariances: &Covariances) -> Vec<ViewFigures> {
     let mut figures: Vec<_> = given
         .iter()
         .map(|view| ViewFigures {
@@ -154,7 +155,7 @@ fn view_figures(given: &[BoardView], adjusted: &Adjusted, covariances: &Covarian
         entry.rms_inlier_px = Some(inlier.rms());
         entry.rms_px = Some(view_squares(adjusted, block, false).rms());
         entry.pose = adjusted.normal.block_covariance(block, &covariances.shared).map(|covariance| ViewPose {
-            camera_from_board: Transform::from_isometry(*pose),
+            camera_from_target: Transform::from_isometry(*pose),
             covariance: covariance * covariances.variance,
         });
     }
@@ -185,8 +186,8 @@ impl std::iter::Sum for Squares {
 }
 
 fn view_squares(adjusted: &Adjusted, block: usize, used_only: bool) -> Squares {
-    let of_view = |(view, pose): (&Sighting, &nalgebra::Isometry3<f64>)| {
-        let counted = view.sights.iter().filter(|sight| sight.used || !used_only);
+    let of_view = |(view, pose): (&ObservedView, &nalgebra::Isometry3<f64>)| {
+        let counted = view.observations.iter().filter(|observation| observation.used || !used_only);
         counted.map(|s| Squares::of(adjusted.shared.residual_px(pose, s))).sum()
     };
     adjusted.views.get(block).zip(adjusted.poses.get(block)).map_or_else(Squares::default, of_view)

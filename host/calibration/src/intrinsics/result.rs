@@ -1,4 +1,4 @@
-//! What a calibration tells: the lens, how sure it is, and what was left out and why.
+//! Result of an intrinsics calibration: the lens, its covariance, residuals and outliers.
 
 use std::fmt;
 
@@ -6,7 +6,7 @@ use nalgebra::SMatrix;
 use vergence_vision::{Camera, InvalidLens, KannalaBrandt, OpenCvFisheye, Transform};
 
 use super::lens::LENS;
-use crate::Board;
+use crate::Target;
 
 /// A calibrated lens.
 #[derive(Clone, Debug, PartialEq)]
@@ -17,37 +17,38 @@ pub struct IntrinsicsCalibration {
     /// The same lens in the parameters that were estimated. [`KannalaBrandt`] holds them rescaled: its five
     /// coefficients are fx (1, k1, k2, k3, k4) in pixels, its aspect is fy / fx.
     pub opencv: OpenCvFisheye,
-    /// Covariance of fx, fy, cx, cy (pixels) and k1 to k4 from the noise of the corners, board poses marginalised.
+    /// Covariance of fx, fy, cx, cy (pixels) and k1 to k4 from the noise of the corners, target poses marginalised.
     pub covariance: SMatrix<f64, LENS, LENS>,
-    /// How the board bows, where [`crate::IntrinsicsOptions::warp`] asked for it.
-    pub warp: Option<BoardWarp>,
-    /// Distance between corners and reprojections, √(mean(dx² + dy²)) over all corners of the views used, in pixels.
+    /// Bow of the target, if [`crate::IntrinsicsOptions::warp`] asked for it.
+    pub warp: Option<TargetWarp>,
+    /// Root mean square distance √(mean(dx² + dy²)) between corners and reprojections over all corners of the views
+    /// used, in pixels.
     pub rms_px: f64,
-    /// The same over the corners used.
+    /// Root mean square distance over the corners used, in pixels.
     pub rms_inlier_px: f64,
     /// Estimated noise of a corner's u or v in pixels: the residuals' standard deviation after the degrees of freedom,
     /// root mean square over corners of different sigmas.
     pub sigma0_px: f64,
-    /// Corners given.
+    /// Number of corners given.
     pub corners_total: usize,
-    /// Corners used.
+    /// Number of corners used.
     pub corners_inlier: usize,
-    /// Views used.
+    /// Number of views used.
     pub views_used: usize,
-    /// Largest angle between the planes of two boards: what determines the focal length.
+    /// Largest angle between the planes of two targets; it determines how well the focal length is known.
     pub tilt_spread: vergence_vision::Angle,
     /// The angle to the axis of the outermost corner used.
     pub outermost: vergence_vision::Angle,
-    /// One for each view given, in their order.
+    /// Figures of each view given, in their order.
     pub views: Vec<ViewFigures>,
     /// Every corner left out, by view and corner.
     pub outliers: Vec<Outlier>,
 }
 
-/// The board's height over its plane, towards +z of its frame: along_x (1 − x̂²) + along_y (1 − ŷ²) millimetres, with x̂ and
-/// ŷ from −1 to 1 over the corners.
+/// The target's height over its plane, towards +z of its frame: along_x (1 − x̂²) + along_y (1 − ŷ²) millimetres, with
+/// x̂ and ŷ from −1 to 1 over the corners.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct BoardWarp {
+pub struct TargetWarp {
     /// Height of the middle over the left and right edges, in millimetres.
     pub along_x_mm: f64,
     /// Height of the middle over the upper and lower edges, in millimetres.
@@ -56,28 +57,28 @@ pub struct BoardWarp {
     pub sigma_mm: [f64; 2],
 }
 
-/// How one view fits.
+/// Residuals and pose of one view.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ViewFigures {
-    /// The view's name.
+    /// Name of the view.
     pub name: String,
     /// Corners given.
     pub corners: usize,
-    /// Corners used; none of a view left out.
+    /// Number of corners used; 0 for a view left out.
     pub corners_inlier: usize,
-    /// Root mean square distance of all its corners, in pixels; `None` of a view left out.
+    /// Root mean square distance of all its corners, in pixels; `None` for a view left out.
     pub rms_px: Option<f64>,
     /// The same over the corners used.
     pub rms_inlier_px: Option<f64>,
-    /// Where the board was; `None` of a view left out.
+    /// Pose of the target; `None` for a view left out.
     pub pose: Option<ViewPose>,
 }
 
-/// Where the board was in one view.
+/// Pose of the target in one view.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ViewPose {
-    /// The board in the camera's frame.
-    pub camera_from_board: Transform<Camera, Board>,
+    /// Pose of the target in the camera frame.
+    pub camera_from_target: Transform<Camera, Target>,
     /// Covariance of a small turn ω (radians) and shift δ (millimetres) in the camera's axes, R ← exp(ω) R, t ← t + δ,
     /// with the lens's uncertainty included.
     pub covariance: SMatrix<f64, 6, 6>,
@@ -90,9 +91,9 @@ pub struct Outlier {
     pub view: usize,
     /// Index of the corner in the view.
     pub corner: usize,
-    /// Its distance from the reprojection in pixels, where there is one.
+    /// Distance from its reprojection in pixels; `None` without a reprojection.
     pub residual_px: Option<f64>,
-    /// Why.
+    /// Reason for leaving it out.
     pub reason: OutlierReason,
 }
 
@@ -102,7 +103,7 @@ pub struct Outlier {
 pub enum OutlierReason {
     /// It is too far from its reprojection: see [`crate::IntrinsicsOptions::outlier_factor`].
     TooFar,
-    /// Its view has too few corners to say where the board was.
+    /// Its view has too few corners to determine the target's pose.
     ViewTooSmall,
     /// The corners of its view lie on a line.
     ViewOnALine,
@@ -121,7 +122,7 @@ impl fmt::Display for OutlierReason {
     }
 }
 
-/// A parameter of the lens.
+/// A group of lens parameters.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Parameter {
     /// fx and fy.
@@ -143,7 +144,7 @@ impl fmt::Display for Parameter {
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum IntrinsicsError {
-    /// One view or none.
+    /// Too few views given.
     #[error("{views} views given, at least {needed} with different tilts are needed")]
     TooFewViews {
         /// Views given.
@@ -159,8 +160,8 @@ pub enum IntrinsicsError {
         /// Index of the corner in it.
         corner: usize,
     },
-    /// A place on the board or in the image is listed twice in one view.
-    #[error("corner {corner} of view {view} is at the same place as an earlier one, on the board or in the image")]
+    /// A place on the target or in the image is listed twice in one view.
+    #[error("corner {corner} of view {view} is at the same place as an earlier one, on the target or in the image")]
     DuplicateCorner {
         /// Index of the view.
         view: usize,
@@ -178,7 +179,7 @@ pub enum IntrinsicsError {
         corners: usize,
     },
     /// No lens explains any view.
-    #[error("no lens explains the views: are the corners and the board what they are said to be?")]
+    #[error("no lens explains the views: are the corners and the target what they are said to be?")]
     NoStart,
     /// Most views contradict the lens that fits the others.
     #[error("only {views} views agree on one lens, {needed} are needed: were corners or images mixed up?")]
@@ -188,10 +189,10 @@ pub enum IntrinsicsError {
         /// Views needed.
         needed: usize,
     },
-    /// All boards have nearly the same orientation, which leaves focal length and distance exchangeable.
-    #[error("all boards are parallel within {spread:.2}: tilt the board between the views")]
+    /// All targets have nearly the same orientation, which leaves focal length and distance exchangeable.
+    #[error("all targets are parallel within {spread:.2}: tilt the target between the views")]
     ParallelViews {
-        /// Largest angle between two boards.
+        /// Largest angle between two targets.
         spread: vergence_vision::Angle,
     },
     /// The views fit many lenses nearly as well.

@@ -26,7 +26,7 @@ pub(crate) struct State {
     pub reading_errors: Vec<Vec<f64>>,
 }
 
-/// The mechanism with its axes somewhere: each link's share of the way.
+/// The mechanism at given encoder readings.
 struct Posed<'a> {
     state: &'a State,
     readings: &'a [f64],
@@ -105,7 +105,7 @@ impl State {
     }
 }
 
-/// Of a slide or of the line of a turn.
+/// Direction of a slide, or of the line of a turn.
 pub(crate) fn direction(screw: &Screw) -> Unit<Vector3<f64>> {
     match screw {
         Screw::Slide { along } => *along,

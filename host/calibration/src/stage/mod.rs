@@ -1,4 +1,5 @@
-//! The moving stage: screw axes, encoder scales and the cameras' pose at zero, from boards seen at several stage poses.
+//! The moving stage: screw axes, encoder scales and the cameras' pose at zero, from targets seen at several stage
+//! poses.
 //!
 //! The model is the rig's own screw chain. Each stage pose is calibrated by itself first; then everything is refined
 //! jointly on all corners. Afterwards the relative pose is known wherever the axes stand, with its covariance.
@@ -24,19 +25,19 @@ use crate::stage::model::Model;
 pub use observability::{Observability, WeakDirection};
 pub use result::{EncoderScale, FittedScrew, PredictedPose, StageCalibration, StagePoseFigures, ZeroOffset};
 
-/// Fewer stage poses cannot tell a slide, a turn and the pose at zero apart.
+/// Least number of stage poses: fewer cannot separate a slide, a turn and the pose at zero.
 pub const FEWEST_STAGE_POSES: usize = 3;
 
-/// Boards seen while the stage stood still.
+/// Views taken while the stage stood still.
 #[derive(Clone, Debug, PartialEq)]
 pub struct StagePose {
-    /// What the encoders read, in the order of the rig's axes.
+    /// Encoder readings, in the order of the rig's axes.
     pub readings: Vec<AxisPosition>,
-    /// A dozen or more.
+    /// Views of the target, a dozen or more.
     pub views: Vec<StereoView>,
 }
 
-/// How far a mechanism may be from its drawing: one standard deviation.
+/// Deviation of a mechanism from its drawing: one standard deviation of each kind of unknown.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Tolerance {
     /// Of a screw's direction, about each of two axes.
@@ -48,18 +49,18 @@ pub struct Tolerance {
 }
 
 impl Default for Tolerance {
-    /// A hand-built mechanism.
+    /// Tolerances of a hand-built mechanism: 3°, 10 mm, 1 %.
     fn default() -> Self {
         Self { direction: Angle::from_deg(3.0), position: Length::from_mm(10.0), scale: 0.01 }
     }
 }
 
-/// How to calibrate a stage.
+/// Options of [`calibrate_stage`].
 #[derive(Clone, Debug, PartialEq)]
 pub struct StageOptions {
     /// What is known of the lenses.
     pub lenses: LensKnowledge,
-    /// Whether gross corners are left out.
+    /// Whether outliers are left out.
     pub robust: bool,
     /// Whether the encoders' scales are unknown.
     pub free_scales: bool,
@@ -111,15 +112,15 @@ pub enum StageError {
     /// The joint fit failed.
     #[error(transparent)]
     Joint(ExtrinsicsError),
-    /// The stage poses leave an unknown open.
+    /// The stage poses do not determine an unknown.
     #[error("the stage poses leave the mechanism open: {0}")]
     Unobservable(Observability),
 }
 
-/// Calibrates the chains of `rig` on boards seen at `poses`. The rig's cameras and chains are where it starts.
+/// Calibrates the chains of `rig` on targets seen at `poses`. The rig's cameras and chains are where it starts.
 ///
-/// # Errors
-/// [`StageError`] where stage poses are too few, cannot be calibrated, do not fit the chains or leave them open.
+/// # Errors [`StageError`] if stage poses are too few, cannot be calibrated, do not fit the chains or do not determine
+/// them.
 pub fn calibrate_stage(rig: &Rig, poses: &[StagePose], options: &StageOptions) -> Result<StageCalibration, StageError> {
     if poses.len() < FEWEST_STAGE_POSES {
         return Err(StageError::TooFewPoses(poses.len()));
@@ -138,7 +139,7 @@ pub fn calibrate_stage(rig: &Rig, poses: &[StagePose], options: &StageOptions) -
         robust: options.robust,
     };
     let fit = task
-        .fit(Start { shared: prepared.shared, boards: prepared.boards, usable: prepared.usable.clone() })
+        .fit(Start { shared: prepared.shared, targets: prepared.targets, usable: prepared.usable.clone() })
         .map_err(|reason| StageError::Joint(reason.into()))?;
     let observability = observability::observability(rig, &model, &fit, &alone);
     result::calibration(result::Material {

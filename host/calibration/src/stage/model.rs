@@ -1,17 +1,17 @@
-//! The mechanism at the stage poses of a calibration, and what is known of it beforehand.
+//! The mechanism at the stage poses of a calibration, and its prior.
 
 use nalgebra::{Isometry3, Matrix6xX};
 use vergence_rig::Screw;
 
-use crate::arrow::Equations;
 use crate::extrinsics::Kinematics;
 use crate::reprojection::POSE;
+use crate::schur_lm::Equations;
 use crate::stage::Tolerance;
 use crate::stage::mechanism::{State, direction};
 use crate::stage::twist::across;
 use crate::stage::unknowns::{Ordinal, Unknown};
 
-/// What is fixed while the unknowns are sought.
+/// Constants of the fit: drawing, readings, priors.
 pub(crate) struct Model {
     pub nominal: State,
     pub unknowns: Vec<Unknown>,

@@ -1,4 +1,4 @@
-//! What the stage poses tell of the mechanism, what they do not, and which pose would.
+//! Which unknowns of the mechanism the stage poses determine, and which further pose would help most.
 
 use nalgebra::{DMatrix, DVector, Matrix6};
 use vergence_rig::{AxisPosition, Rig};
@@ -10,36 +10,37 @@ use crate::stage::model::Model;
 use crate::stage::result::grid;
 use crate::stage::unknowns::Unknown;
 
-/// A combination of unknowns that the data know no better than this share of the tolerance is open.
+/// A combination of unknowns is undetermined if its standard deviation from the data exceeds this share of its
+/// tolerance.
 const LEARNED: f64 = 0.5;
-/// Tolerances of the right camera's pose at zero, which has no drawing to hold it: one degree, one millimetre.
+/// Units of the right camera's pose at zero, which no drawing states: one degree, one millimetre.
 const AT_ZERO: (f64, f64) = (0.017_453_292_519_943_295, 1.0);
 /// An axis whose readings differ by less than this share of its range has not moved.
 const MOVED: f64 = 0.01;
 
-/// What the stage poses tell.
+/// Observability of a mechanism from stage poses.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Observability {
-    /// Combinations of unknowns that the corners leave open, the worst first; empty is good.
+    /// Combinations of unknowns that the corners do not determine, the worst first; empty is good.
     pub weak: Vec<WeakDirection>,
-    /// Axes that stood still.
+    /// Names of axes that stood still.
     pub never_moved: Vec<String>,
-    /// Unknowns of the mechanism, and how many combinations of them the corners determine.
+    /// Number of unknowns of the mechanism.
     pub unknowns: usize,
-    /// Those determined.
+    /// Number of combinations of them that the corners determine.
     pub determined: usize,
     /// Ratio of the best and the worst determined combination's information, each in units of its tolerance.
     pub condition: f64,
-    /// The stage pose, among the corners and middles of the axes' ranges, that would tell most.
+    /// The most informative further stage pose, among the corners and middles of the axes' ranges.
     pub next_pose: Vec<AxisPosition>,
 }
 
-/// A combination of unknowns that is open.
+/// A combination of unknowns that the corners do not determine.
 #[derive(Clone, Debug, PartialEq)]
 pub struct WeakDirection {
-    /// The unknowns that take part, in words, the largest part first.
+    /// Names of the unknowns that take part, the largest share first.
     pub unknowns: Vec<String>,
-    /// What the corners alone would know of it, in tolerances (infinite: nothing).
+    /// Standard deviation from the corners alone, in tolerances (infinite: undetermined).
     pub sigma: f64,
 }
 
@@ -58,7 +59,7 @@ impl std::fmt::Display for Observability {
     }
 }
 
-/// Judges the information of `fit`.
+/// Observability from the information of `fit`.
 pub(crate) fn observability(
     rig: &Rig,
     model: &Model,
@@ -77,7 +78,7 @@ pub(crate) fn observability(
     );
     let eigen = information.clone().symmetric_eigen();
     let mut order: Vec<usize> = (0..units.len()).collect();
-    // What the corners know is the information less what the drawing gave.
+    // Information of the corners: the total less that of the drawing.
     let learned: Vec<f64> =
         order.iter().map(|&i| eigen.eigenvalues[i] - eigen.eigenvectors.column(i).map(|x| x * x).dot(&held)).collect();
     order.sort_by(|&a, &b| learned[a].total_cmp(&learned[b]));
@@ -114,7 +115,7 @@ fn unit(unknown: Unknown, tolerance: Option<Tolerance>) -> f64 {
     }
 }
 
-/// Whether the drawing says something of it.
+/// Whether the drawing gives a prior for it.
 fn is_drawn(unknown: Unknown) -> bool {
     matches!(unknown, Unknown::Direction { .. } | Unknown::Line { .. } | Unknown::Scale { .. })
 }
@@ -159,7 +160,7 @@ fn never_moved(rig: &Rig, model: &Model) -> Vec<String> {
 }
 
 /// The pose of [`grid`] that makes the determinant of the information largest (D-optimal design, V. Fedorov, *Theory of
-/// Optimal Experiments*, 1972), if it told as much of its relative pose as those there are do on average.
+/// Optimal Experiments*, 1972), if it gave as much information on its relative pose as the existing ones do on average.
 fn next_pose(
     rig: &Rig,
     state: &State,
@@ -173,7 +174,7 @@ fn next_pose(
     let gain = |values: &Vec<f64>| {
         let derivative = state.derivative(values, mechanism, None) * DMatrix::from_diagonal(units);
         let total = information + derivative.transpose() * told * &derivative;
-        // An information of one in units of the tolerance stands in for what nothing tells of.
+        // An information of one in units of the tolerance stands in for undetermined combinations.
         let regular = total + DMatrix::identity(units.len(), units.len());
         regular.cholesky().map_or(f64::NEG_INFINITY, |factor| factor.l().diagonal().iter().map(|x| x.ln()).sum())
     };

@@ -1,4 +1,4 @@
-//! The calibrated stage, and the relative pose it predicts.
+//! Result of a stage calibration, and the relative pose it predicts.
 
 use nalgebra::{DMatrix, Matrix6, SMatrix};
 use vergence_rig::{AxisPosition, Chain, Link, Rig, RigAxis, Screw};
@@ -21,33 +21,34 @@ use crate::stage::{Observability, StageError};
 /// A calibrated stage.
 #[derive(Clone, Debug)]
 pub struct StageCalibration {
-    /// Every screw of the left chain and then of the right, in their order.
+    /// Screws of the left chain, then of the right, in order.
     pub screws: Vec<FittedScrew>,
-    /// Of each axis that drives a screw.
+    /// Zero offset of each axis that drives a screw.
     pub zero_offsets: Vec<ZeroOffset>,
-    /// Of each axis whose scale was unknown.
+    /// Scale of each axis whose scale was unknown.
     pub scales: Vec<EncoderScale>,
     /// The base extrinsics: the relative pose where all encoders read zero.
     pub at_zero: PredictedPose,
-    /// Each stage pose.
+    /// Figures of each stage pose.
     pub poses: Vec<StagePoseFigures>,
-    /// What the stage poses tell and what they do not.
+    /// Which unknowns the stage poses determine.
     pub observability: Observability,
-    /// Distance between corners and reprojection, root mean square per corner, gross ones included.
+    /// Root mean square distance between corners and reprojections, outliers included, in pixels.
     pub rms_px: f64,
-    /// Over the corners that are not gross.
+    /// Root mean square distance over the corners used, in pixels.
     pub rms_inlier_px: f64,
-    /// Standard deviation of one pixel coordinate, root mean square over those corners.
+    /// Standard deviation of one pixel coordinate, root mean square over the corners used.
     pub sigma_px: f64,
-    /// The same for a corner whose relative sigma is 1: that of any other corner is so many times its own.
+    /// Standard deviation of one pixel coordinate of a corner whose relative sigma is 1; it scales with the relative
+    /// sigma.
     pub unit_sigma_px: f64,
-    /// Corners of all views that took part, both cameras.
+    /// Number of corners in all views that took part, both cameras.
     pub corners_total: usize,
-    /// Those of them that are not gross.
+    /// Number of corners used: all but the outliers.
     pub corners_inlier: usize,
-    /// Each corner left out.
+    /// The corners left out.
     pub outliers: Vec<StereoOutlier>,
-    /// Each view that did not take part.
+    /// The views that did not take part.
     pub skipped: Vec<SkippedView>,
     /// The left lens, refined unless it was exact.
     pub left: KannalaBrandt,
@@ -61,7 +62,7 @@ pub struct StageCalibration {
     reading_sigma: Vec<f64>,
 }
 
-/// A screw as calibrated.
+/// A calibrated screw.
 #[derive(Clone, Debug, PartialEq)]
 pub struct FittedScrew {
     /// The camera whose chain it is in.
@@ -76,24 +77,24 @@ pub struct FittedScrew {
     pub position_sigma: Option<Length>,
 }
 
-/// Where an axis really is, against the drawing, when its encoder reads zero: the part of the right camera's displacement
-/// at zero that moving this axis would make. A mount that is off by as much looks the same.
+/// Offset of an axis from the drawing when its encoder reads zero: the part of the right camera's displacement at zero
+/// that moving this axis would cause. It is not separable from an error of the mount.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ZeroOffset {
     /// The axis.
     pub axis: String,
-    /// To add to a reading.
+    /// Offset to add to a reading.
     pub offset: AxisPosition,
-    /// Its standard deviation.
+    /// Standard deviation of the offset.
     pub sigma: AxisPosition,
 }
 
-/// What an encoder's reading is to be multiplied with.
+/// Factor to multiply an encoder's reading with.
 #[derive(Clone, Debug, PartialEq)]
 pub struct EncoderScale {
     /// The axis.
     pub axis: String,
-    /// 1 where the encoder is as stated.
+    /// The factor; 1 if the encoder is as stated.
     pub scale: f64,
     /// Its standard deviation.
     pub sigma: f64,
@@ -109,16 +110,16 @@ pub struct PredictedPose {
     pub covariance: Matrix6<f64>,
 }
 
-/// How one stage pose fits.
+/// Residuals of one stage pose.
 #[derive(Clone, Debug, PartialEq)]
 pub struct StagePoseFigures {
-    /// What the encoders read.
+    /// Encoder readings.
     pub readings: Vec<AxisPosition>,
     /// The relative pose calibrated from this stage pose alone.
     pub alone: Transform<Left, Right>,
-    /// The rotation between that and the stage's.
+    /// Angle between that orientation and the one that the calibrated stage predicts.
     pub rotation_difference: Angle,
-    /// The distance between the right camera's positions of both.
+    /// Distance between the right camera's positions of both.
     pub translation_difference: Length,
     /// Over the corners of this stage pose that are not gross.
     pub rms_inlier_px: f64,
@@ -133,7 +134,8 @@ impl StageCalibration {
         predict(&self.state, &self.mechanism, &self.of_mechanism(), &self.reading_sigma, &values)
     }
 
-    /// What all points of a pair share where the encoders read `readings`: lenses and pose with their correlations.
+    /// Covariance that all points of a pair share at the encoder readings `readings`: lenses and pose with their
+    /// correlations.
     #[must_use]
     pub fn shared(&self, readings: &[AxisPosition]) -> SharedCovariance {
         let values: Vec<f64> = readings.iter().map(|reading| reading.value()).collect();
@@ -259,7 +261,7 @@ fn of_readings(state: &State, reading_sigma: &[f64], readings: &[f64]) -> Matrix
     by_axis.sum()
 }
 
-/// All that the calibration is made of.
+/// Inputs of [`calibration`].
 pub(crate) struct Material<'a> {
     pub rig: &'a Rig,
     pub model: Model,

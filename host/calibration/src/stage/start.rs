@@ -1,21 +1,21 @@
-//! Where the joint fit of a stage starts: every stage pose calibrated by itself, and the chains fitted to those.
+//! Starting values of the joint fit of a stage: every stage pose calibrated alone, and the chains fitted to those.
 
 use nalgebra::{Isometry3, Matrix6, SVector};
 use vergence_rig::{AxisPosition, Link, Rig, Screw};
 use vergence_vision::{Frame, Transform};
 
-use crate::arrow::{self, ArrowOptions, ArrowProblem, Equations};
 use crate::extrinsics::{
     ExtrinsicsCalibration, ExtrinsicsOptions, Kinematics, LensKnowledge, Lenses, OwnPoses, PlacedView, Shared, Side,
-    StereoView, calibrate_extrinsics, inside, nearer_boards, place,
+    StereoView, calibrate_extrinsics, inside, nearer_targets, place,
 };
 use crate::reprojection::{POSE, difference};
+use crate::schur_lm::{self, Equations, SchurOptions, SchurProblem};
 use crate::stage::mechanism::State;
 use crate::stage::model::Model;
 use crate::stage::unknowns::Unknown;
 use crate::stage::{StageError, StageOptions, StagePose};
 
-/// The model of `rig`, its views still unknown.
+/// Model of `rig` without views.
 pub(crate) fn model(rig: &Rig, poses: &[StagePose], options: &StageOptions) -> Result<Model, StageError> {
     let axes = &rig.axes;
     let belong = |positions: &[AxisPosition]| {
@@ -29,7 +29,7 @@ pub(crate) fn model(rig: &Rig, poses: &[StagePose], options: &StageOptions) -> R
         return Err(StageError::Readings { pose: pose + 1 });
     }
     let reading_sigma: Vec<f64> = if options.reading_sigma.is_empty() {
-        // A uniform error of one step.
+        // Standard deviation of a uniform error of one encoder step.
         axes.iter().map(|axis| axis.value_per_count() / 12f64.sqrt()).collect()
     } else if belong(&options.reading_sigma) {
         options.reading_sigma.iter().map(|sigma| sigma.value()).collect()
@@ -93,7 +93,7 @@ pub(crate) fn poses_alone(
     poses.iter().enumerate().map(calibrate).collect()
 }
 
-/// The chains that fit the stage poses best. `None` where the iteration finds none.
+/// The chains that fit the stage poses best. `None` if the iteration does not converge.
 pub(crate) fn fitted_to_poses(model: &Model, alone: &[ExtrinsicsCalibration]) -> Option<State> {
     let measured: Vec<(Isometry3<f64>, Matrix6<f64>)> = alone
         .iter()
@@ -108,7 +108,7 @@ pub(crate) fn fitted_to_poses(model: &Model, alone: &[ExtrinsicsCalibration]) ->
     let at_zero = model.nominal.right_at_zero * (drawn.inverse() * measured.first()?.0);
     let start = State { right_at_zero: at_zero, ..model.nominal.clone() };
     let problem = ToPoses { model, measured: &measured };
-    let solution = arrow::solve(&problem, start, Vec::new(), &ArrowOptions::default());
+    let solution = schur_lm::solve(&problem, start, Vec::new(), &SchurOptions::default());
     solution.cost.is_finite().then_some(solution.shared)
 }
 
@@ -119,7 +119,7 @@ struct ToPoses<'a> {
     measured: &'a [(Isometry3<f64>, Matrix6<f64>)],
 }
 
-impl ArrowProblem<POSE> for ToPoses<'_> {
+impl SchurProblem<POSE> for ToPoses<'_> {
     type Shared = State;
     type Block = ();
 
@@ -153,7 +153,7 @@ pub(crate) struct Prepared {
     pub pose_of_view: Vec<usize>,
     pub own_poses: Vec<OwnPoses>,
     pub usable: Vec<Vec<bool>>,
-    pub boards: Vec<Isometry3<f64>>,
+    pub targets: Vec<Isometry3<f64>>,
     pub shared: Shared<State>,
 }
 
@@ -171,14 +171,14 @@ pub(crate) fn prepare(
         pose_of_view: Vec::new(),
         own_poses: Vec::new(),
         usable: Vec::new(),
-        boards: Vec::new(),
+        targets: Vec::new(),
         shared: Shared { state: state.clone(), lenses },
     };
     for (index, (pose, _)) in poses.iter().zip(alone).enumerate() {
         let (placed, _) =
             place(left, right, &pose.views).map_err(|reason| StageError::Pose { pose: index + 1, reason })?;
         let left_from_right = state.left_from_right(&model.corrected(state, index));
-        all.boards.extend(nearer_boards(lenses, &left_from_right, &pose.views, &placed));
+        all.targets.extend(nearer_targets(lenses, &left_from_right, &pose.views, &placed));
         all.own_poses.extend(placed.iter().map(PlacedView::own_poses));
         for view in placed.iter().filter_map(|place| pose.views.get(place.view)) {
             all.usable.push(inside(left, right, view));

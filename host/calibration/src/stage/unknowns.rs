@@ -1,4 +1,4 @@
-//! The unknowns of a stage: what each component of a step means.
+//! The unknowns of a stage, one for each component of the solver's step.
 
 use crate::extrinsics::Side;
 
@@ -13,9 +13,9 @@ pub(crate) enum Unknown {
     Rotation,
     /// A component of the right camera's position with all axes at zero.
     Position,
-    /// What an encoder's reading is multiplied with.
+    /// Scale factor of an encoder's readings.
     Scale { axis: usize },
-    /// What is added to an encoder's reading at one stage pose.
+    /// Error of an encoder's reading at one stage pose.
     Reading { pose: usize, axis: usize },
 }
 
@@ -25,7 +25,7 @@ impl Unknown {
         !matches!(self, Self::Reading { .. })
     }
 
-    /// In words, the axes called `names`.
+    /// Description of the unknown; `names` are those of the axes.
     pub fn words(self, names: &[String]) -> String {
         let name = |axis: usize| names.get(axis).map_or("?", String::as_str);
         match self {

@@ -1,19 +1,22 @@
-//! Real corner lists with the stored optimum of an independent bundle adjustment. They live outside the repository: in
-//! the folder named by `VERGENCE_SHARED`, or in `shared` beside the checkout.
+//! Real corner lists with the stored optimum of an independent bundle adjustment. They live outside the repository, see
+//! `tests/common/data.rs`.
 
-#![allow(clippy::unwrap_used, clippy::print_stdout, reason = "a test may fail and say why it was skipped")]
+#![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
 
-use std::path::{Path, PathBuf};
+#[path = "../../../../tests/common/data.rs"]
+mod data;
+
+use std::path::Path;
 
 use serde_json::Value;
-use vergence_calibration::{BoardView, Corner};
+use vergence_calibration::{Corner, TargetView};
 use vergence_vision::{ImageSize, OpenCvFisheye, Pixel};
 
 /// One camera's corners and reference.
 pub struct RealSet {
     pub name: String,
     pub size: ImageSize,
-    pub views: Vec<BoardView>,
+    pub views: Vec<TargetView>,
     pub reference: Reference,
 }
 
@@ -36,15 +39,9 @@ const SETS: [[&str; 4]; 5] = [
     ["ov_plane", "corners_babelcalib_test.csv", "reference_babelcalib_test_cv5.json", "cam"],
 ];
 
-/// All sets; says so where they are absent.
+/// All sets; none if the data are missing.
 pub fn real_sets() -> Vec<RealSet> {
-    let folder = std::env::var_os("VERGENCE_SHARED")
-        .map_or_else(|| Path::new(env!("CARGO_MANIFEST_DIR")).join("../../../shared"), PathBuf::from)
-        .join("data");
-    if !folder.is_dir() {
-        println!("SKIPPED: no {} (set VERGENCE_SHARED)", folder.display());
-        return Vec::new();
-    }
+    let Some(folder) = data::real_data("data") else { return Vec::new() };
     SETS.iter().map(|set| read_set(&folder, set)).collect()
 }
 
@@ -70,8 +67,8 @@ fn read_set(folder: &Path, [set, corners, reference, camera]: &[&str; 4]) -> Rea
     }
 }
 
-fn read_views(path: &Path, camera: &str) -> Vec<BoardView> {
-    let mut views: Vec<BoardView> = Vec::new();
+fn read_views(path: &Path, camera: &str) -> Vec<TargetView> {
+    let mut views: Vec<TargetView> = Vec::new();
     let mut reader = csv::Reader::from_path(path).unwrap();
     for record in reader.records().map(Result::unwrap).filter(|r| &r[0] == camera) {
         let number = |i: usize| record[i].parse::<f64>().unwrap();
@@ -79,7 +76,7 @@ fn read_views(path: &Path, camera: &str) -> Vec<BoardView> {
         let name = format!("{} {}", &record[1], &record[2]);
         match views.iter_mut().find(|view| view.name == name) {
             Some(view) => view.corners.push(corner),
-            None => views.push(BoardView { name, corners: vec![corner] }),
+            None => views.push(TargetView { name, corners: vec![corner] }),
         }
     }
     views

@@ -1,4 +1,4 @@
-//! Boards before simulated cameras: projected corners with Gaussian noise.
+//! Targets before simulated cameras: projected corners with Gaussian noise.
 #![allow(dead_code, reason = "each test file uses its share")]
 
 pub mod stage;
@@ -6,10 +6,10 @@ pub mod stage;
 use nalgebra::{Isometry3, Matrix3, Point3, Rotation3, Translation3, UnitQuaternion, Vector3};
 use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64Mcg;
-use vergence_calibration::{BoardView, Corner, StereoView};
+use vergence_calibration::{Corner, StereoView, TargetView};
 use vergence_vision::{Angle, Camera, ImageSize, KannalaBrandt, Left, Pixel, Point, Right, Transform};
 
-/// Inner corners along x and y, and the square in millimetres, of the boards of these tests.
+/// Inner corners along x and y, and the square in millimetres, of the targets of these tests.
 pub const COLUMNS: u32 = 9;
 pub const ROWS: u32 = 6;
 pub const SQUARE_MM: f64 = 25.0;
@@ -64,13 +64,13 @@ pub fn pair_pose(separation_deg: f64) -> Transform<Left, Right> {
     Transform::new(rotation, Vector3::new(145.0 * half.cos(), 1.5, -145.0 * half.sin()))
 }
 
-/// All corners of the board in board coordinates.
-pub fn board_corners() -> Vec<[f64; 2]> {
+/// All corners of the target in target coordinates.
+pub fn target_corners() -> Vec<[f64; 2]> {
     (0..ROWS).flat_map(|row| (0..COLUMNS).map(move |column| [column, row].map(|n| f64::from(n) * SQUARE_MM))).collect()
 }
 
-/// A board whose centre is at `centre`, facing the origin but for a tilt, with any turn in its plane.
-pub fn facing_board(dice: &mut Dice, centre: Vector3<f64>, largest_tilt_deg: f64) -> Isometry3<f64> {
+/// A target whose centre is at `centre`, facing the origin but for a tilt, with any turn in its plane.
+pub fn facing_target(dice: &mut Dice, centre: Vector3<f64>, largest_tilt_deg: f64) -> Isometry3<f64> {
     let away = centre.normalize();
     let side = Vector3::y().cross(&away).normalize();
     let facing = Rotation3::from_matrix_unchecked(Matrix3::from_columns(&[side, away.cross(&side), away]));
@@ -83,20 +83,20 @@ pub fn facing_board(dice: &mut Dice, centre: Vector3<f64>, largest_tilt_deg: f64
     Isometry3::from_parts(Translation3::from(centre - rotation * middle), rotation)
 }
 
-/// The corners that `camera` sees of the board at `camera_from_board`, off by Gaussian noise.
+/// The corners that `camera` sees of the target at `camera_from_target`, off by Gaussian noise.
 pub fn photograph(
     camera: &KannalaBrandt,
-    camera_from_board: &Isometry3<f64>,
+    camera_from_target: &Isometry3<f64>,
     noise_px: f64,
     dice: &mut Dice,
-) -> BoardView {
-    let see = |board_mm: [f64; 2]| {
-        let point = camera_from_board * Point3::new(board_mm[0], board_mm[1], 0.0);
+) -> TargetView {
+    let see = |target_mm: [f64; 2]| {
+        let point = camera_from_target * Point3::new(target_mm[0], target_mm[1], 0.0);
         let exact = camera.project_point(&Point::<Camera>::from_mm(point.coords)).ok()?;
         let pixel = Pixel { u: exact.u + noise_px * dice.normal(), v: exact.v + noise_px * dice.normal() };
-        (camera.on_sensor(pixel) && camera.unproject::<Camera>(pixel).is_ok()).then_some(Corner::new(board_mm, pixel))
+        (camera.on_sensor(pixel) && camera.unproject::<Camera>(pixel).is_ok()).then_some(Corner::new(target_mm, pixel))
     };
-    BoardView { name: String::new(), corners: board_corners().into_iter().filter_map(see).collect() }
+    TargetView { name: String::new(), corners: target_corners().into_iter().filter_map(see).collect() }
 }
 
 /// A pair of cameras and the noise of their corners.
@@ -108,16 +108,16 @@ pub struct Pair {
 }
 
 impl Pair {
-    pub fn see(&self, name: String, left_from_board: &Isometry3<f64>, dice: &mut Dice) -> StereoView {
-        let right_from_board = self.left_from_right.inverse().isometry() * left_from_board;
+    pub fn see(&self, name: String, left_from_target: &Isometry3<f64>, dice: &mut Dice) -> StereoView {
+        let right_from_target = self.left_from_right.inverse().isometry() * left_from_target;
         StereoView {
             name,
-            left: photograph(&self.left, left_from_board, self.noise_px, dice),
-            right: photograph(&self.right, &right_from_board, self.noise_px, dice),
+            left: photograph(&self.left, left_from_target, self.noise_px, dice),
+            right: photograph(&self.right, &right_from_target, self.noise_px, dice),
         }
     }
 
-    /// `count` boards in the field that both cameras share, at least half of each seen by either.
+    /// `count` targets in the field that both cameras share, at least half of each seen by either.
     pub fn views(&self, count: usize, dice: &mut Dice) -> Vec<StereoView> {
         let half = 0.5 * self.left_from_right.rotation().angle();
         // The direction between the optical axes, from the middle of the baseline.
@@ -128,8 +128,8 @@ impl Pair {
         while views.len() < count {
             let direction = UnitQuaternion::from_scaled_axis(dice.cube(spread)) * forward;
             let centre = middle + direction * dice.between(280.0, 650.0);
-            let board = facing_board(dice, centre, 40.0);
-            let view = self.see(format!("view {}", views.len() + 1), &board, dice);
+            let target = facing_target(dice, centre, 40.0);
+            let view = self.see(format!("view {}", views.len() + 1), &target, dice);
             let enough = (COLUMNS * ROWS) as usize / 2;
             if view.left.corners.len() >= enough && view.right.corners.len() >= enough {
                 views.push(view);
@@ -139,15 +139,15 @@ impl Pair {
     }
 }
 
-/// Photographs of boards all over the field of one camera, for its own calibration.
-pub fn own_views(camera: &KannalaBrandt, count: usize, noise_px: f64, dice: &mut Dice) -> Vec<BoardView> {
+/// Photographs of targets all over the field of one camera, for its own calibration.
+pub fn own_views(camera: &KannalaBrandt, count: usize, noise_px: f64, dice: &mut Dice) -> Vec<TargetView> {
     let mut views = Vec::new();
     while views.len() < count {
         let (theta, phi) = (dice.between(0.0, 92.0).to_radians(), dice.between(0.0, std::f64::consts::TAU));
         let direction = Vector3::new(theta.sin() * phi.cos(), theta.sin() * phi.sin(), theta.cos());
         let range = dice.between(180.0, 400.0);
-        let board = facing_board(dice, direction * range, 45.0);
-        let view = photograph(camera, &board, noise_px, dice);
+        let target = facing_target(dice, direction * range, 45.0);
+        let view = photograph(camera, &target, noise_px, dice);
         if view.corners.len() >= 20 {
             views.push(view);
         }

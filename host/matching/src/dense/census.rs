@@ -1,4 +1,4 @@
-//! The census transform: what survives of a neighbourhood under any change of brightness that keeps its order.
+//! The census transform: one bit per neighbour of a pixel, invariant to any monotonic change of brightness.
 //!
 //! R. Zabih and J. Woodfill, "Non-parametric local transforms for computing visual correspondence", ECCV 1994.
 
@@ -7,12 +7,12 @@ use rayon::prelude::*;
 
 use crate::plane::Plane;
 
-/// Reach of the window along rows and columns: 9 × 7 pixels, whose 62 neighbours fit a word.
+/// Reach of the window along rows and columns: 9 × 7 pixels, whose 62 neighbours fit into 64 bits.
 pub(super) const REACH: [usize; 2] = [4, 3];
-/// What two unrelated neighbourhoods differ by.
+/// Expected number of different bits of two unrelated neighbourhoods.
 pub(super) const UNRELATED: u8 = 31;
 
-/// One bit for every neighbour that is darker than the pixel. The border is repeated outwards.
+/// Computes one word per pixel, with a bit set for every darker neighbour. The border is repeated outwards.
 pub(super) fn census(plane: &Plane) -> Vec<u64> {
     let mut words = vec![0; plane.values().len()];
     words.par_chunks_mut(plane.width()).enumerate().for_each(|(y, out)| {

@@ -1,25 +1,25 @@
-//! What is known of the pixels of the left image.
+//! The dense result: a range, or the reason for none, for every pixel of the left image.
 
 use std::collections::BTreeMap;
 use std::fmt;
 
 use vergence_vision::{ImageSize, Length};
 
-/// For every pixel of the left image its distance from the left optical centre, or why there is none.
+/// Ranges from the left optical centre for all pixels of the left image, with the reason where there is none.
 #[derive(Clone, Debug, PartialEq)]
 pub struct DenseDepth {
     size: ImageSize,
     samples: Vec<DenseSample>,
 }
 
-/// What is known of a pixel.
+/// The result of one pixel.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum DenseSample {
-    /// It has a range.
+    /// Its range was measured.
     Measured(DenseRange),
-    /// Its parallax is not distinguishable from none: it is farther than can be measured.
+    /// It is farther than can be measured: its parallax cannot be distinguished from zero.
     Far,
-    /// Nothing is known.
+    /// Its range is unknown.
     Gap(Gap),
 }
 
@@ -36,29 +36,30 @@ pub struct DenseRange {
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 #[non_exhaustive]
 pub enum Gap {
-    /// Outside the left lens's valid cone, or so near its rim or the sensor's border that no window fits.
+    /// It lies outside the left lens's valid cone, or so near its rim or the sensor's border that no window fits.
     OutsideField,
-    /// The right camera does not see there, or the direction is within 15° of the baseline, where parallax says little.
+    /// The right camera does not see its direction, or the direction is within 15° of the baseline, where parallax says
+    /// little.
     NotShared,
-    /// The views disagree: only one eye sees it, or it looks like something else along its epipolar curve.
+    /// The views disagree: only one camera sees the surface, or it resembles another along its epipolar curve.
     Inconsistent,
-    /// Too little texture to tell.
+    /// The texture is too weak.
     Untextured,
 }
 
-/// How many pixels are what.
+/// Numbers of pixels by their result.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct DenseCounts {
-    /// With a range.
+    /// Number of pixels with a measured range.
     pub measured: usize,
-    /// Farther than can be measured.
+    /// Number of pixels farther than can be measured.
     pub far: usize,
-    /// Without, by reason.
+    /// Number of pixels without a range for each reason.
     pub gaps: BTreeMap<Gap, usize>,
 }
 
 impl DenseDepth {
-    /// From `size.width * size.height` samples by rows.
+    /// Makes the result of `size.width * size.height` samples by rows.
     pub(super) const fn new(size: ImageSize, samples: Vec<DenseSample>) -> Self {
         Self { size, samples }
     }
@@ -69,13 +70,13 @@ impl DenseDepth {
         self.size
     }
 
-    /// By rows, `width * height` of them.
+    /// The `width * height` samples by rows.
     #[must_use]
     pub fn samples(&self) -> &[DenseSample] {
         &self.samples
     }
 
-    /// How many pixels are what.
+    /// Counts the pixels by their result.
     #[must_use]
     pub fn counts(&self) -> DenseCounts {
         let mut counts = DenseCounts::default();
@@ -97,19 +98,19 @@ impl DenseRange {
         Length::from_mm(f64::from(self.range_mm))
     }
 
-    /// Standard deviation of the range from all that is uncertain: noise, contrast, near edges, and the pose.
+    /// Standard deviation of the range from noise, contrast, near edges and the pose.
     #[must_use]
     pub fn sigma(&self) -> Length {
         Length::from_mm(f64::from(self.sigma_mm))
     }
 
-    /// The same with the pose known exactly.
+    /// Standard deviation of the range with the pose known exactly.
     #[must_use]
     pub fn own_sigma(&self) -> Length {
         Length::from_mm(f64::from(self.own_sigma_mm))
     }
 
-    /// The share of the window's contrast that both views have in common, 0 to 1.
+    /// Confidence from 0 to 1: the fraction of the window's contrast that both views have in common.
     #[must_use]
     pub const fn confidence(&self) -> f32 {
         self.confidence
@@ -117,7 +118,7 @@ impl DenseRange {
 }
 
 impl fmt::Display for Gap {
-    /// A stable name in snake case, for reports and files.
+    /// Prints the stable name in snake case, for reports and files.
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.write_str(match self {
             Self::OutsideField => "outside_field",

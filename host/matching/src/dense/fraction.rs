@@ -1,36 +1,37 @@
-//! From whole disparities to fractions of a pixel, with what is uncertain about them.
+//! Refinement of whole disparities to fractions of a pixel, with their standard deviation.
 
-use super::register::{Registration, Seen, register};
+use super::register::{Registration, SampledView, register};
 use super::surface::{Surface, surface};
 
-/// Reach of the windows in which disparities are smoothed and views are registered, in pixels.
+/// Reach of the windows for smoothing and registration, in pixels of the view.
 const REACH: usize = 4;
-/// A registration that moves farther than this did not converge.
+/// Largest shift of a registration in pixels; a larger one did not converge.
 const MOST: f32 = 1.0;
-/// Neighbouring remainders are alike, because views are interpolated: this many pixels tell as much as one.
+/// Number of pixels that count as one observation: residuals of neighbours are correlated, because views are
+/// interpolated.
 const ALIKE: f32 = 4.0;
-/// Standard deviation that interpolation leaves, whatever the contrast, in pixels.
+/// Standard deviation in pixels that interpolation leaves at any contrast.
 const INTERPOLATION: f32 = 0.05;
 
-/// The disparities of a left view, in its pixels; NaN where there are none.
+/// The disparities of a left view with their standard deviations, in pixels of the view; NaN where there are none.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Disparities {
     pub(super) disparity: Vec<f32>,
-    /// Standard deviation from noise, contrast, and how smooth the surface is.
+    /// Standard deviation from noise, contrast and the roughness of the surface.
     pub(super) sigma: Vec<f32>,
-    /// Standard deviation because another surface is near.
+    /// Standard deviation from another surface within the window.
     pub(super) edge: Vec<f32>,
-    /// 0 to 1.
+    /// Fraction of the left window's contrast that the right one explains, 0 to 1.
     pub(super) likeness: Vec<f32>,
 }
 
-/// Smooths and registers twice: the first pass brings slanted surfaces within the reach of the second.
-pub(super) fn registered(eyes: [Seen<'_>; 2], whole: &[f32]) -> Disparities {
-    let width = eyes[0].plane.width();
+/// Smooths and registers twice. The first pass brings slanted surfaces within the reach of the second.
+pub(super) fn registered(views: [SampledView<'_>; 2], whole: &[f32]) -> Disparities {
+    let width = views[0].plane.width();
     let smooth = surface(whole, width, REACH);
-    let moved = moved(&smooth, &register(eyes, &smooth.disparity, REACH));
+    let moved = moved(&smooth, &register(views, &smooth.disparity, REACH));
     let smooth = surface(&moved, width, REACH);
-    let registration = register(eyes, &smooth.disparity, REACH);
+    let registration = register(views, &smooth.disparity, REACH);
     let disparity = self::moved(&smooth, &registration);
     let sigma = registration.sigma.iter().zip(&smooth.roughness);
     let sigma =
@@ -38,7 +39,7 @@ pub(super) fn registered(eyes: [Seen<'_>; 2], whole: &[f32]) -> Disparities {
     Disparities { disparity, sigma: sigma.collect(), edge: smooth.edge, likeness: registration.likeness }
 }
 
-/// The surface, moved where registration converged.
+/// The disparities of the surface, shifted where registration converged.
 fn moved(surface: &Surface, registration: &Registration) -> Vec<f32> {
     let moved = |(&disparity, &shift): (&f32, &f32)| if shift.abs() <= MOST { disparity + shift } else { disparity };
     surface.disparity.iter().zip(&registration.shift).map(moved).collect()

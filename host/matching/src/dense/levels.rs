@@ -1,29 +1,30 @@
-//! From the coarsest level, where every disparity is tried, to the finest, where only those near the coarser answer are.
+//! The search for disparities from the coarsest level, where all are tried, to the finest, where only those near the
+//! coarser result are.
 
 use rayon::prelude::*;
 use vergence_vision::Frame;
 
 use super::census::{REACH, census};
 use super::paths::gathered;
-use super::volume::{Eye, Hypotheses, LANES, costs};
+use super::volume::{CensusView, Hypotheses, LANES, costs};
 use super::winner::winners;
 use crate::View;
 use crate::epipolar_band::EpipolarBand;
 use crate::plane::{Plane, Pyramid};
 
-/// The coarsest level has at most this many pixels.
+/// Largest number of pixels of the coarsest level.
 const COARSEST: usize = 400_000;
-/// Hypotheses tried below infinity: a pose may be off and disparities then negative, in pixels of the coarsest level.
+/// Number of negative disparities tried, in pixels of the coarsest level: they occur if the pose is slightly wrong.
 const BEYOND_INFINITY: i32 = 3;
-/// Hypotheses at the finer levels.
+/// Number of hypotheses at the finer levels.
 const REFINED: usize = LANES;
 
-/// Disparities of the left view's pixels up to those that `band` allows, in pixels; NaN where there is none.
+/// Finds disparities of the left view's pixels, up to those that `band` allows, in pixels; NaN where there is none.
 pub(super) fn swept<L: Frame, R: Frame>(left: &View<L>, right: &View<R>, band: &EpipolarBand) -> Vec<f32> {
     let pixels = left.plane().values().len();
     let count = (0..).find(|level| pixels >> (2 * level) <= COARSEST).unwrap_or(0) + 1;
     let [left_levels, right_levels] = [left.plane(), right.plane()].map(|plane| Pyramid::new(plane, count));
-    let [left_seen, right_seen] = [left.seen(), right.seen()].map(|seen| Seen::new(seen, left.grid().size().0));
+    let [left_seen, right_seen] = [left.seen(), right.seen()].map(|seen| SeenTable::new(seen, left.grid().size().0));
     let largest = (0..left.grid().size().0).map(|x| band.largest_disparity(x as f64)).fold(0.0, f64::max);
     let mut coarser: Option<Vec<f32>> = None;
     for (level, (plane, right_plane)) in left_levels.levels().iter().zip(right_levels.levels()).enumerate().rev() {
@@ -32,22 +33,22 @@ pub(super) fn swept<L: Frame, R: Frame>(left: &View<L>, right: &View<R>, band: &
             None => all(plane, (largest / scale as f64).ceil() as usize),
             Some(disparities) => near(plane, disparities),
         };
-        let left_eye = Eye { words: census(plane), seen: left_seen.level(plane, scale) };
-        let right_eye = Eye { words: census(right_plane), seen: right_seen.level(right_plane, scale) };
-        let sums = gathered(&costs([&left_eye, &right_eye], &hypotheses), &hypotheses);
-        coarser = Some(winners(&sums, [&left_eye.seen, &right_eye.seen], &hypotheses));
+        let left_view = CensusView { words: census(plane), seen: left_seen.level(plane, scale) };
+        let right_view = CensusView { words: census(right_plane), seen: right_seen.level(right_plane, scale) };
+        let sums = gathered(&costs([&left_view, &right_view], &hypotheses), &hypotheses);
+        coarser = Some(winners(&sums, [&left_view.seen, &right_view.seen], &hypotheses));
     }
     coarser.unwrap_or_default()
 }
 
-/// Every disparity up to `largest` at every pixel.
+/// The hypotheses of the coarsest level: every disparity up to `largest` at every pixel.
 fn all(plane: &Plane, largest: usize) -> Hypotheses {
     let count = (largest + 2 * BEYOND_INFINITY as usize + 1).next_multiple_of(LANES);
     let first = vec![-BEYOND_INFINITY; plane.values().len()];
     Hypotheses { width: plane.width(), height: plane.height(), count, first }
 }
 
-/// Those around twice the disparities of the next coarser level.
+/// The hypotheses of a finer level: those around twice the disparities of the next coarser one.
 fn near(plane: &Plane, coarser: &[f32]) -> Hypotheses {
     let (width, height) = (plane.width(), plane.height());
     let coarser_width = width.div_ceil(2);
@@ -61,7 +62,8 @@ fn near(plane: &Plane, coarser: &[f32]) -> Hypotheses {
     Hypotheses { width, height, count: REFINED, first }
 }
 
-/// A row whose gaps take the smaller of the disparities beside them: what only one eye sees is behind.
+/// Fills the gaps of a row with the smaller of the disparities beside them, because surfaces that only one camera sees
+/// are behind.
 fn filled(row: &[f32]) -> Vec<f32> {
     let mut filled = row.to_vec();
     let mut last = f32::INFINITY;
@@ -73,19 +75,19 @@ fn filled(row: &[f32]) -> Vec<f32> {
     for (value, &own) in filled.iter_mut().zip(row).rev() {
         last = if own.is_nan() { last } else { own };
         *value = if own.is_nan() { value.min(last) } else { own };
-        // A row without any disparity starts at infinity's.
+        // A row without any disparity takes zero, that of infinity.
         *value = if value.is_finite() { *value } else { 0.0 };
     }
     filled
 }
 
-/// How many pixels are seen above and to the left of every corner between pixels.
-struct Seen {
+/// A summed-area table of the pixels that a camera sees.
+struct SeenTable {
     counts: Vec<u32>,
     stride: usize,
 }
 
-impl Seen {
+impl SeenTable {
     fn new(seen: &[bool], width: usize) -> Self {
         let stride = width + 1;
         let mut counts = vec![0; stride * (seen.len() / width + 1)];
@@ -99,7 +101,7 @@ impl Seen {
         Self { counts, stride }
     }
 
-    /// The pixels of a level, `scale` pixels apart, whose whole census window is seen.
+    /// Whether the camera sees the whole census window of each pixel of a level, whose pixels are `scale` apart.
     fn level(&self, plane: &Plane, scale: usize) -> Vec<bool> {
         let (width, height) = (self.stride - 1, self.counts.len() / self.stride - 1);
         let reach = REACH.map(|reach| (reach + 1) * scale);

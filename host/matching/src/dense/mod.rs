@@ -1,13 +1,13 @@
-//! A range for every pixel of the left image.
+//! Dense stereo: a range for every pixel of the left image.
 //!
-//! The views of both eyes are turned into the shared direction, where the point seen at (a, b) by the left eye lies at
-//! (a - d, b) for the right one: spheres of inverse distances swept through the scene shift one view along the rows of the
-//! other. [`DenseViews::sweep`] tries them all at the coarsest resolution and a few around the coarser answer at the finer
-//! ones, gathers costs of the census transform along paths, and keeps what both eyes agree on; [`DenseViews::register`] finds
-//! the fraction of a pixel and how uncertain it is; [`DenseViews::ranges`] returns to the pixels of the left image.
+//! Both images are resampled in the shared axes, where a point at (a, b) of the left view lies at (a - d, b) of the
+//! right one. [`DenseViews::sweep`] tries all disparities at the coarsest resolution and a few around the coarser
+//! result at the finer ones, aggregates costs of the census transform along paths, and keeps the disparities on which
+//! both views agree. [`DenseViews::register`] refines them to a fraction of a pixel and computes their uncertainty.
+//! [`DenseViews::ranges`] converts them to ranges of the pixels of the left image.
 //!
-//! Terms: *disparity* d, the parallax along a row; *hypothesis*, a disparity tried; *volume*, a number for each pixel and
-//! hypothesis.
+//! Terms: the *disparity* d is the parallax along a row; a *hypothesis* is a disparity that is tried; a *volume* has
+//! one number for each pixel and hypothesis.
 
 mod census;
 mod depth;
@@ -28,21 +28,21 @@ use vergence_vision::{Angle, BatchLens, Left, Length, Right};
 pub use self::depth::{DenseCounts, DenseDepth, DenseRange, DenseSample, Gap};
 pub use self::fraction::Disparities;
 use self::range::RangeFinder;
-use self::register::Seen;
+use self::register::SampledView;
 use self::surface::SAME_SURFACE;
 use crate::epipolar_band::EpipolarBand;
 use crate::matcher::{ImagePair, MatchError};
 use crate::shared_field::NEAR;
 use crate::{Grid, SharedFrame, View, ViewPixel};
 
-/// A parallax of fewer standard deviations cannot be told from none.
+/// Smallest disparity in standard deviations that differs from zero.
 const SIGNIFICANT: f32 = 3.0;
-/// A disparity less certain than this, in pixels, says nothing.
+/// Largest standard deviation of a disparity that is used, in pixels.
 const LARGEST_SIGMA: f32 = 2.0;
-/// Windows with less than this share of their contrast in common do not show the same thing.
+/// Smallest fraction of contrast that two windows of one surface have in common.
 const LEAST_LIKENESS: f32 = 0.4;
 
-/// A pair of images turned so that their epipolar curves are rows.
+/// A pair of images resampled so that epipolar curves are rows.
 #[derive(Clone, Debug)]
 pub struct DenseViews<'a> {
     pair: ImagePair<'a>,
@@ -51,25 +51,27 @@ pub struct DenseViews<'a> {
     right: View<Right>,
 }
 
-/// Disparities in whole pixels, refined to where the costs around them are least.
+/// Disparities of the left view in whole pixels, refined by a parabola through their costs.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Swept(Vec<f32>);
+pub struct WholeDisparities(Vec<f32>);
 
-/// A range for every pixel of the left image of `pair`. `pose_covariance` is that of the relative pose: a turn about the left
-/// axes in radians and a shift of the right camera in the left frame in millimetres.
+/// Computes a range for every pixel of the left image of `pair`.
+///
+/// `pose_covariance` (6 × 6) is that of the relative pose: a turn about the left axes in radians and a shift of the
+/// right camera in the left frame in millimetres.
 ///
 /// # Errors
-/// [`MatchError`] where the pair cannot be matched whatever its images show.
+/// [`MatchError`] for a pair that cannot be matched, whatever its images show.
 pub fn dense_depth(pair: &ImagePair<'_>, pose_covariance: &Matrix6<f64>) -> Result<DenseDepth, MatchError> {
     let views = DenseViews::new(pair)?;
     Ok(views.ranges(&views.register(&views.sweep()), pose_covariance))
 }
 
 impl<'a> DenseViews<'a> {
-    /// Turns both images.
+    /// Resamples both images in the shared axes.
     ///
     /// # Errors
-    /// [`MatchError`] where the pair cannot be matched whatever its images show.
+    /// [`MatchError`] for a pair that cannot be matched, whatever its images show.
     pub fn new(pair: &ImagePair<'a>) -> Result<Self, MatchError> {
         pair.check()?;
         let frame = SharedFrame::new(&pair.left_from_right).ok_or(MatchError::NoBaseline)?;
@@ -79,21 +81,21 @@ impl<'a> DenseViews<'a> {
         Ok(Self { pair: *pair, frame, left, right })
     }
 
-    /// The disparity of every pixel of the left view that both eyes agree on.
+    /// Finds the disparities of the left view on which both views agree.
     #[must_use]
-    pub fn sweep(&self) -> Swept {
-        Swept(levels::swept(&self.left, &self.right, &self.band(self.pair.nearest)))
+    pub fn sweep(&self) -> WholeDisparities {
+        WholeDisparities(levels::swept(&self.left, &self.right, &self.band(self.pair.nearest)))
     }
 
-    /// The same to a fraction of a pixel, with what is uncertain.
+    /// Refines disparities to a fraction of a pixel, with their standard deviations.
     #[must_use]
-    pub fn register(&self, swept: &Swept) -> Disparities {
-        let left = Seen { plane: self.left.plane(), seen: self.left.seen() };
-        let right = Seen { plane: self.right.plane(), seen: self.right.seen() };
+    pub fn register(&self, swept: &WholeDisparities) -> Disparities {
+        let left = SampledView { plane: self.left.plane(), seen: self.left.seen() };
+        let right = SampledView { plane: self.right.plane(), seen: self.right.seen() };
         fraction::registered([left, right], &swept.0)
     }
 
-    /// From disparities to ranges of the left image's pixels. The covariance is that of [`dense_depth`].
+    /// Converts disparities to ranges of the left image's pixels. The covariance is that of [`dense_depth`].
     #[must_use]
     pub fn ranges(&self, disparities: &Disparities, pose_covariance: &Matrix6<f64>) -> DenseDepth {
         let size = self.pair.left_camera.size();
@@ -115,7 +117,7 @@ impl<'a> DenseViews<'a> {
         DenseDepth::new(size, samples)
     }
 
-    /// What is known in the direction (a, b) from the left eye.
+    /// The result in the direction (a, b) from the left camera.
     fn sample(
         &self,
         [a, b]: [f64; 2],
@@ -150,7 +152,7 @@ impl<'a> DenseViews<'a> {
         })
     }
 
-    /// Why there is no disparity at a position of the left view.
+    /// The reason why there is no disparity at a position of the left view.
     fn why_none(&self, at: ViewPixel, near: &EpipolarBand) -> Gap {
         let partner = |disparity: f64| ViewPixel { x: at.x - disparity, y: at.y };
         if !self.left.sees(at) {
@@ -162,13 +164,14 @@ impl<'a> DenseViews<'a> {
         }
     }
 
-    /// The disparities up to that of a range, for a pose known exactly.
+    /// The epipolar band of disparities up to that of the range `nearest`, for a pose known exactly.
     fn band(&self, nearest: Length) -> EpipolarBand {
         EpipolarBand::new(*self.left.grid(), self.frame.baseline(), nearest, Angle::from_rad(0.0))
     }
 }
 
-/// The disparity between the four pixels around a position, or that of the nearest one where they are not of one surface.
+/// Interpolates the disparity between the four pixels around a position, or takes the nearest one where they are not of
+/// one surface.
 fn between(disparities: &[f32], grid: &Grid, at: ViewPixel, nearest: usize) -> f32 {
     let (width, height) = grid.size();
     let (x, y) = (at.x.max(0.0) as usize, at.y.max(0.0) as usize);

@@ -1,4 +1,4 @@
-//! Costs gathered along paths through the view, so that neighbours agree unless the views say otherwise.
+//! Semiglobal aggregation of costs along paths, so that neighbours agree unless the views contradict.
 //!
 //! H. Hirschmüller, "Stereo processing by semiglobal matching and mutual information", PAMI 30(2), 2008, eq. 13:
 //!
@@ -13,16 +13,16 @@ use rayon::prelude::*;
 
 use super::volume::Hypotheses;
 
-/// Penalty of a step by one hypothesis: slanted surfaces.
+/// Penalty of a step by one hypothesis, as on slanted surfaces.
 const P1: u16 = 8;
-/// Penalty of any other step: edges of things.
+/// Penalty of a larger step, as at edges of objects.
 const P2: u16 = 60;
-/// Columns worked through together.
+/// Number of columns processed together.
 const STRIP: usize = 32;
-/// A hypothesis that the neighbour did not try. No true cost comes near, and adding penalties does not overflow.
+/// Cost of a hypothesis that the neighbour did not try, larger than any true cost. Adding penalties does not overflow.
 const UNTRIED: u16 = u16::MAX / 2;
 
-/// The sum of the path costs of every hypothesis, laid out as `costs`.
+/// Sums the path costs of every hypothesis, in the layout of `costs`.
 pub(super) fn gathered(costs: &[u8], hypotheses: &Hypotheses) -> Vec<u16> {
     let Hypotheses { width, height, count, ref first } = *hypotheses;
     let volume = Volume { costs, first, count };
@@ -57,22 +57,22 @@ pub(super) fn gathered(costs: &[u8], hypotheses: &Hypotheses) -> Vec<u16> {
     sums
 }
 
-/// 0 to `end` and, after `None`, back again.
+/// Counts from 0 to below `end` and, after `None`, back again.
 fn there_and_back(end: usize) -> impl Iterator<Item = Option<usize>> {
     (0..end).map(Some).chain([None]).chain((0..end).rev().map(Some))
 }
 
-/// What paths lead through.
+/// The volume of costs that the paths run through.
 struct Volume<'a> {
     costs: &'a [u8],
     first: &'a [i32],
     count: usize,
 }
 
-/// The costs at the last pixel of a path, with room on both sides for what it did not try.
+/// The costs at the last pixel of a path, padded on both sides for hypotheses that it did not try.
 struct Path {
     first: i32,
-    /// `None` before the first pixel.
+    /// Least cost at the last pixel; `None` before the first pixel.
     least: Option<u16>,
     last: Vec<u16>,
     next: Vec<u16>,
@@ -89,13 +89,13 @@ impl Path {
         self.least = None;
     }
 
-    /// Goes on to a pixel and adds the path's costs there to `sums`.
+    /// Advances the path to a pixel and adds its costs there to `sums`.
     fn advance(&mut self, volume: &Volume<'_>, pixel: usize, sums: &mut [u16]) {
         let (count, room) = (volume.count, volume.count + 2);
         let first = volume.first[pixel];
         let most = room as i32 - 1;
         let from = (room as i32 - 1 + (first - self.first).clamp(-most, most)) as usize;
-        // A path begins with the costs alone.
+        // At its first pixel a path has the costs alone.
         let bounds = self.least.map_or([0, 0], |least| [least, least + P2]);
         let before = &self.last[from..from + count + 2];
         let costs = &volume.costs[pixel * count..(pixel + 1) * count];
@@ -105,7 +105,7 @@ impl Path {
     }
 }
 
-/// One pixel of a path; returns its least cost.
+/// Computes one pixel of a path; returns its least cost.
 #[multiversion(targets("x86_64+avx512f+avx512dq+avx512bw+avx512vl+avx2+fma+popcnt", "x86_64+avx2+fma+popcnt"))]
 fn step(costs: &[u8], before: &[u16], [least, jump]: [u16; 2], here: &mut [u16], sums: &mut [u16]) -> u16 {
     let count = costs.len();

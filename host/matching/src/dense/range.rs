@@ -1,26 +1,26 @@
-//! From a disparity to a range and its standard deviation.
+//! Conversion of a disparity to a range with its standard deviation.
 //!
-//! With u, v the rays of both eyes in one epipolar plane of normal n, at angles a and a - d across the baseline B, the
-//! range from the left eye and that from the right one are
+//! With u, v the rays of both cameras in one epipolar plane of normal n, at angles a and a - d across the baseline B,
+//! the ranges from the left and the right camera are
 //!
 //! ```text
 //! r = B cos(a - d) / sin d        μ = B cos a / sin d        ∂r/∂d = -μ / sin d
 //! ```
 //!
-//! A turn ω of the right eye acts as a disparity n·ω, its shift δ as (n × v)·δ / μ.
+//! A turn ω of the right camera acts as a disparity n·ω, its shift δ as (n × v)·δ / μ.
 
 use nalgebra::{Matrix6, Vector3, Vector6};
 
 use crate::SharedFrame;
 
-/// What ranges depend on, apart from disparities.
+/// Converts disparities to ranges, for one baseline and one covariance of the pose.
 pub(super) struct RangeFinder {
     baseline_mm: f64,
-    /// Of turn and shift, in the shared axes.
+    /// Covariance of turn and shift of the right camera, in the shared axes.
     pose: Matrix6<f64>,
 }
 
-/// A range and its standard deviation, with and without the pose's share, in millimetres.
+/// A range and its standard deviations, with and without the pose, in millimetres.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct RangeAt {
     pub mm: f64,
@@ -38,8 +38,8 @@ impl RangeFinder {
         Self { baseline_mm: frame.baseline().mm(), pose: both * pose * both.transpose() }
     }
 
-    /// Of the disparity `d` with standard deviation `sigma` at (a, b) of the left view, all in radians. Not a number or
-    /// without sense where d is not positive.
+    /// Converts the disparity `d` with standard deviation `sigma` at (a, b) of the left view, all in radians. The
+    /// result is meaningless or NaN where d is not positive.
     pub(super) fn at(&self, [a, b]: [f64; 2], d: f64, sigma: f64) -> RangeAt {
         let (right, sine) = (a - d, d.sin());
         let from_right = self.baseline_mm * a.cos() / sine;
@@ -52,7 +52,8 @@ impl RangeFinder {
         }
     }
 
-    /// What the pose adds to the variance of a disparity, in rad², for a point `from_right` millimetres from the right eye.
+    /// The variance in rad² that the pose adds to a disparity, for a point `from_right` millimetres from the right
+    /// camera.
     fn disparity_variance(&self, b: f64, right: f64, from_right: f64) -> f64 {
         let normal = Vector3::new(0.0, -b.cos(), b.sin());
         let across = Vector3::new(-right.cos(), right.sin() * b.sin(), right.sin() * b.cos()) / from_right;
@@ -69,7 +70,7 @@ mod tests {
 
     use super::*;
 
-    /// Ranges, and the pose's share of their variance, as vision has them for single points.
+    /// Compares ranges, and the part of their variance from the pose, with those of single points in `vergence_vision`.
     #[test]
     fn ranges_and_their_sigma_agree_with_single_points() {
         let size = ImageSize { width: 640, height: 640 };

@@ -1,9 +1,9 @@
-//! Disparities to a fraction of a pixel: the right view is warped onto the left one, and what is still off is solved for.
+//! Dense registration: the remaining shift between the left view and the warped right view, to a fraction of a pixel.
 //!
-//! B. Lucas and T. Kanade, "An iterative image registration technique with an application to stereo vision", IJCAI 1981,
-//! along the epipolar row alone, with gain and bias of the window as further unknowns: L = a R + b + g δ in a window, R the
-//! warped right view and g the mean derivative of both by the disparity. The curvature of the squares over δ, and what
-//! remains of them, say how well δ is known.
+//! B. Lucas and T. Kanade, "An iterative image registration technique with an application to stereo vision", IJCAI
+//! 1981, along the epipolar row alone, with gain and bias of the window as further unknowns: L = a R + b + g δ in a
+//! window, with R the warped right view and g the mean derivative of both by the disparity. The standard deviation of δ
+//! follows from the curvature of the sum of squares and from the residuals.
 
 use multiversion::multiversion;
 use rayon::prelude::*;
@@ -12,34 +12,34 @@ use super::surface::{SAME_SURFACE, offsets};
 use super::window::{LANES, Lanes, Padded, for_blocks};
 use crate::plane::{Plane, cubic_weights};
 
-/// A window needs this many pixels.
+/// Smallest number of pixels of a window.
 const LEAST: f32 = 16.0;
-/// Unknowns of a window.
+/// Number of unknowns of a window.
 const UNKNOWNS: f32 = 3.0;
 
-/// Variance that rounding to whole grey levels leaves in the difference of both views, whatever they show.
+/// Variance that rounding to whole grey levels leaves in the difference of both views.
 const ROUNDING: f32 = 2.0 / 12.0;
 
-/// One eye's view: what it shows and where it sees.
+/// One camera's view: its brightness and the pixels that the camera sees.
 #[derive(Clone, Copy)]
-pub(super) struct Seen<'a> {
+pub(super) struct SampledView<'a> {
     pub plane: &'a Plane,
     pub seen: &'a [bool],
 }
 
-/// What one registration says of each pixel.
+/// The result of a registration for each pixel.
 pub(super) struct Registration {
-    /// What to add to the disparity, in pixels; NaN where nothing is known.
+    /// Correction of the disparity in pixels; NaN where it is unknown.
     pub shift: Vec<f32>,
-    /// Its standard deviation in pixels, were the window's pixels independent.
+    /// Its standard deviation in pixels, if the window's pixels were independent.
     pub sigma: Vec<f32>,
-    /// The share of the left window's contrast that the right one explains, 0 to 1.
+    /// Fraction of the left window's contrast that the right one explains, 0 to 1.
     pub likeness: Vec<f32>,
 }
 
-/// Registers the right view to the left one around `disparity` (NaN where there is none), in windows that reach `reach`
-/// pixels in each direction and hold the pixels of one surface.
-pub(super) fn register([left, right]: [Seen<'_>; 2], disparity: &[f32], reach: usize) -> Registration {
+/// Registers the right view to the left one around `disparity` (NaN where there is none). The windows extend `reach`
+/// pixels in each direction and contain the pixels of one surface.
+pub(super) fn register([left, right]: [SampledView<'_>; 2], disparity: &[f32], reach: usize) -> Registration {
     let (width, count) = (left.plane.width(), disparity.len());
     let (mut warped, mut slope) = (vec![f32::NAN; count], vec![f32::NAN; count]);
     warped.par_chunks_mut(width).zip(slope.par_chunks_mut(width)).enumerate().for_each(|(y, (warped, slope))| {
@@ -58,7 +58,7 @@ pub(super) fn register([left, right]: [Seen<'_>; 2], disparity: &[f32], reach: u
     out
 }
 
-/// The right row at the partners of the left one's pixels, and the mean derivative of both by the disparity.
+/// Samples the right row at the partners of the left row's pixels, and the mean derivative of both by the disparity.
 fn warp(
     [left, right]: [&[f32]; 2],
     [left_seen, right_seen]: [&[bool]; 2],
@@ -80,7 +80,7 @@ fn warp(
     }
 }
 
-/// Derivatives of [`cubic_weights`].
+/// The derivatives of [`cubic_weights`].
 fn cubic_slopes(t: f32) -> [f32; 4] {
     let t2 = t * t;
     [
@@ -107,8 +107,8 @@ fn solve_row(fields: &[Padded; 4], y: usize, reach: usize, [shift, sigma, likene
     });
 }
 
-/// Adds a neighbour on the same surface: 1, L, R, g and their products. L and R count from the centre's values, so that
-/// single precision suffices.
+/// Adds 1, L, R, g and their products of a neighbour on the same surface. L and R are relative to the centre's values,
+/// so that single precision suffices.
 #[inline(always)]
 fn gather(sums: &mut [Lanes; 10], centre: [&Lanes; 4], near: [&Lanes; 4]) {
     let [n, l1, r1, g1, ll, lr, lg, rr, rg, gg] = sums;
@@ -131,7 +131,7 @@ fn gather(sums: &mut [Lanes; 10], centre: [&Lanes; 4], near: [&Lanes; 4]) {
     }
 }
 
-/// Shift, sigma and likeness from the sums of a window.
+/// Solves for shift, sigma and likeness from the sums of a window.
 #[inline(always)]
 fn solve([n, l, r, g, ll, lr, lg, rr, rg, gg]: [f32; 10]) -> Option<[f32; 3]> {
     if n < LEAST {
@@ -139,7 +139,7 @@ fn solve([n, l, r, g, ll, lr, lg, rr, rg, gg]: [f32; 10]) -> Option<[f32; 3]> {
     }
     let (ll, lr, lg) = (ll - l * l / n, lr - l * r / n, lg - l * g / n);
     let (rr, rg, gg) = (rr - r * r / n, rg - r * g / n, gg - g * g / n);
-    // What of g no gain explains.
+    // The part of g that a gain does not explain.
     let own = gg - rg * rg / rr;
     let solvable = own > 0.0 && rr > 0.0 && ll > 0.0;
     if !solvable {

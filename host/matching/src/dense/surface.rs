@@ -1,29 +1,29 @@
-//! Disparities as pieces of smooth surface: a plane through the neighbours that lie on the same one.
+//! Smoothing of disparities by planes through the neighbours on the same surface.
 
 use multiversion::multiversion;
 use rayon::prelude::*;
 
 use super::window::{LANES, Lanes, Padded, for_blocks};
 
-/// Neighbours whose disparity differs by more than this many pixels lie on another surface.
+/// Largest difference in disparity, in pixels, of neighbours on one surface.
 pub(super) const SAME_SURFACE: f32 = 1.5;
-/// A plane needs this many neighbours.
+/// Smallest number of neighbours for a plane.
 const LEAST: f32 = 8.0;
-/// Neighbours nearly on one line, so that this part of their area is left, fix no plane.
+/// Smallest relative spread of neighbours across their main direction; nearly collinear ones determine no plane.
 const LEAST_AREA: f32 = 0.05;
 
-/// A plane through the disparities around each pixel, in pixels; NaN where there is no plane.
+/// The planes through the disparities around each pixel, in pixels; NaN where there is no plane.
 pub(super) struct Surface {
-    /// The plane's disparity at the pixel.
+    /// Disparity of the plane at the pixel.
     pub disparity: Vec<f32>,
-    /// How far the disparities are off the plane, rms.
+    /// RMS distance of the disparities from the plane.
     pub roughness: Vec<f32>,
-    /// How far other surfaces in the window are off the pixel, rms over the whole window. Within a window's reach of an edge
-    /// a pixel may belong to either side, and this is the standard deviation that comes of it.
+    /// RMS over the window of the distance of other surfaces from the pixel. Near an edge a pixel may belong to either
+    /// side; this is the resulting standard deviation.
     pub edge: Vec<f32>,
 }
 
-/// Fits planes to windows that reach `reach` pixels in each direction. `disparities` are NaN where there are none.
+/// Fits planes in windows that extend `reach` pixels in each direction. `disparities` are NaN where there are none.
 pub(super) fn surface(disparities: &[f32], width: usize, reach: usize) -> Surface {
     let field = Padded::new(disparities, width, reach);
     let empty = vec![f32::NAN; disparities.len()];
@@ -53,14 +53,15 @@ fn fit_row(field: &Padded, y: usize, reach: usize, [disparity, roughness, edge]:
     });
 }
 
-/// The offsets of a window, row by row.
+/// The offsets of the pixels of a window, row by row.
 #[inline(always)]
 pub(super) fn offsets(reach: usize) -> impl Iterator<Item = [isize; 2]> {
     let reach = reach as isize;
     (-reach..=reach).flat_map(move |j| (-reach..=reach).map(move |i| [i, j]))
 }
 
-/// Adds a neighbour at (i, j): 1, i, j, i², ij, j², d, id, jd, d² of those on the same surface; 1 of all and d² of the others.
+/// Adds a neighbour at (i, j): 1, i, j, i², ij, j², d, id, jd, d² if it is on the same surface, d² if not, and 1 in any
+/// case.
 #[inline(always)]
 fn gather(sums: &mut [Lanes; 12], centre: &Lanes, near: &Lanes, [i, j]: [f32; 2]) {
     let [n, i1, j1, ii, ij, jj, d1, id, jd, dd, all, others] = sums;
@@ -90,7 +91,7 @@ struct Plane {
     edge: f32,
 }
 
-/// The least-squares plane of the sums, by the normal equations about the mean.
+/// Solves for the least-squares plane from the sums, by the normal equations about the mean.
 #[inline(always)]
 fn solve([n, i, j, ii, ij, jj, d, id, jd, dd, known, other]: [f32; 12]) -> Option<Plane> {
     if n < LEAST {

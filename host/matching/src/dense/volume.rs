@@ -1,11 +1,11 @@
-//! How unlike both views are at every pixel for every hypothesis of its disparity.
+//! The cost volume: the dissimilarity of both views for every pixel and every hypothesis of its disparity.
 
 use multiversion::multiversion;
 use rayon::prelude::*;
 
 use super::census::UNRELATED;
 
-/// Hypotheses come in whole vectors of this many.
+/// Number of hypotheses in a vector; volumes hold whole vectors.
 pub(super) const LANES: usize = 16;
 
 /// The disparities tried at each pixel of a left view: `first[pixel] + i` for i below `count`, in whole pixels.
@@ -18,15 +18,15 @@ pub(super) struct Hypotheses {
     pub first: Vec<i32>,
 }
 
-/// What one eye shows: a census word for each pixel, and which of them are seen with all of their window.
+/// One view for the comparison: a census word for each pixel, and whether the camera sees its whole window.
 #[derive(Clone, Debug)]
-pub(super) struct Eye {
+pub(super) struct CensusView {
     pub words: Vec<u64>,
     pub seen: Vec<bool>,
 }
 
-/// Costs by rows, pixels and hypotheses.
-pub(super) fn costs([left, right]: [&Eye; 2], hypotheses: &Hypotheses) -> Vec<u8> {
+/// Computes the costs, by rows, pixels and hypotheses.
+pub(super) fn costs([left, right]: [&CensusView; 2], hypotheses: &Hypotheses) -> Vec<u8> {
     let Hypotheses { width, height, count, ref first } = *hypotheses;
     let mut costs = vec![UNRELATED; width * height * count];
     costs.par_chunks_mut(width * count).enumerate().for_each(|(y, out)| {
@@ -41,10 +41,10 @@ pub(super) fn costs([left, right]: [&Eye; 2], hypotheses: &Hypotheses) -> Vec<u8
     costs
 }
 
-/// A right row from its end to its beginning, so that growing disparity is growing index, with room on both sides.
+/// A right row in reverse order, so that the index grows with the disparity, padded on both sides.
 struct Reversed {
     words: Vec<u64>,
-    /// All bits where the pixel is seen, else none.
+    /// All bits set where the pixel is seen, no bit elsewhere.
     known: Vec<u64>,
     width: usize,
     margin: usize,
@@ -63,7 +63,7 @@ impl Reversed {
         reversed
     }
 
-    /// Words and which are known for the left pixel x, from disparity `first` on. Beyond the margin nothing is known.
+    /// The words, and whether they are known, of the partners of the left pixel x from disparity `first` on.
     fn partners(&self, x: usize, first: i32, count: usize) -> [&[u64]; 2] {
         let at = (self.margin + self.width) as i64 - 1 - x as i64 + i64::from(first);
         let at = at.clamp(0, (self.width + self.margin) as i64) as usize;

@@ -1,15 +1,15 @@
-//! Windows around pixels, sixteen neighbouring pixels of a row at a time: loops over them become vector instructions.
+//! Windows around sixteen neighbouring pixels of a row at a time, so that loops become vector instructions.
 
-/// How many pixels are worked through together.
+/// Number of pixels processed together.
 pub(super) const LANES: usize = 16;
 
-/// One value for each of them.
+/// One value for each of these pixels.
 pub(super) type Lanes = [f32; LANES];
 
-/// Nothing is known outside the view.
+/// The values outside the view: unknown.
 const OUTSIDE: Lanes = [f32::NAN; LANES];
 
-/// Values with room around them, so that windows and lanes never leave them. The room is NaN.
+/// Values padded with NaN, so that windows and lanes never leave them.
 pub(super) struct Padded {
     values: Vec<f32>,
     stride: usize,
@@ -17,7 +17,7 @@ pub(super) struct Padded {
 }
 
 impl Padded {
-    /// `values` by rows of `width`, for windows that reach `reach` pixels in each direction.
+    /// Pads `values`, by rows of `width`, for windows that extend `reach` pixels in each direction.
     pub(super) fn new(values: &[f32], width: usize, reach: usize) -> Self {
         let stride = width.next_multiple_of(LANES) + 2 * reach;
         let height = values.len() / width.max(1);
@@ -28,7 +28,7 @@ impl Padded {
         Self { values: padded, stride, reach }
     }
 
-    /// The values from column `x` of row `y` on, `offset` columns and rows away.
+    /// The values from column `x` of row `y` on, displaced by `offset` columns and rows.
     #[inline(always)]
     pub(super) fn lanes(&self, x: usize, y: usize, [i, j]: [isize; 2]) -> &Lanes {
         let row = (y + self.reach).wrapping_add_signed(j);
@@ -37,7 +37,7 @@ impl Padded {
     }
 }
 
-/// Visits a row of `width` pixels in blocks: the first column, and how many of the lanes lie on the row.
+/// Visits a row of `width` pixels in blocks, with the first column and the number of lanes on the row.
 #[inline(always)]
 pub(super) fn for_blocks(width: usize, mut visit: impl FnMut(usize, usize)) {
     for x in (0..width).step_by(LANES) {

@@ -1,15 +1,15 @@
-//! The best hypothesis of every pixel, and whether the right view would choose it too.
+//! The choice of the best hypothesis for every pixel, and its check from the right view.
 
 use multiversion::multiversion;
 use rayon::prelude::*;
 
 use super::volume::Hypotheses;
 
-/// Left and right may differ by this many hypotheses.
+/// Largest difference between the choices of the left and the right view, in hypotheses.
 const TOLERANCE: i32 = 1;
 
-/// The disparity chosen at each pixel, in pixels; NaN where there is none, or none that both views agree on. `seen` says where
-/// the left and the right eye see whole windows.
+/// Chooses the disparity of each pixel, in pixels; NaN where there is none, or where the views disagree. `seen` states
+/// where the left and the right camera see whole windows.
 pub(super) fn winners(sums: &[u16], seen: [&[bool]; 2], hypotheses: &Hypotheses) -> Vec<f32> {
     let Hypotheses { width, count, ref first, .. } = *hypotheses;
     let mut disparities = vec![f32::NAN; first.len()];
@@ -40,16 +40,16 @@ fn least(cell: &[u16]) -> usize {
     cell.iter().position(|&sum| sum == smallest).unwrap_or(0)
 }
 
-/// Where the parabola through three sums at -1, 0, 1 is lowest.
+/// The minimum of the parabola through three sums at -1, 0, 1.
 fn vertex([before, at, after]: [f32; 3]) -> f32 {
     let curvature = before + after - 2.0 * at;
     if curvature > 0.0 { 0.5 * (before - after) / curvature } else { 0.0 }
 }
 
-/// For each pixel of the right row, the disparity with the least sum among the left pixels that offer one.
+/// The disparity with the least sum for each pixel of the right row, among the left pixels that map to it.
 fn chosen_by_right(sums: &[u16], first: &[i32], count: usize) -> Vec<i32> {
     let width = first.len();
-    // Backwards, so that growing disparity is growing index; margins take what lies beyond the row.
+    // In reverse order the index grows with the disparity; margins take partners beyond the row.
     let margin = count;
     let mut best = vec![u32::MAX; width + 2 * margin];
     for (x, (cell, &first)) in sums.chunks_exact(count).zip(first).enumerate() {
@@ -60,7 +60,7 @@ fn chosen_by_right(sums: &[u16], first: &[i32], count: usize) -> Vec<i32> {
     (0..width).map(|x| (best[margin + width - 1 - x] & 0xFFFF) as i32 - BIAS).collect()
 }
 
-/// Makes disparities positive, to be kept beside the sum in one word.
+/// Offset that makes disparities positive, to store them with the sum in one word.
 const BIAS: i32 = 0x4000;
 
 #[multiversion(targets("x86_64+avx512f+avx512dq+avx512bw+avx512vl+avx2", "x86_64+avx2"))]

@@ -1,16 +1,16 @@
-//! Does a network have the tensors its manifest names, of shapes that can be what it says?
+//! The check of a network against its manifest: the names and shapes of its tensors.
 
 use super::manifest::{Extractor, Glue, ImageInput, MatchForm, MatchOutput, Pipeline};
 use super::network::{Network, NetworkError, Outlet};
 
-/// One side of a network: named tensors with what they must look like.
+/// A network's tensors, to be checked against its manifest.
 struct Contract<'a> {
     network: &'a str,
     inputs: &'a [Outlet],
     outputs: &'a [Outlet],
 }
 
-/// Dimensions that must fit, from the last one backwards; `None` takes any.
+/// The required last dimensions of a tensor; `None` accepts any extent.
 type Tail<'a> = &'a [Option<usize>];
 
 pub(super) fn check_extractor(
@@ -84,7 +84,7 @@ impl<'a> Contract<'a> {
             let names: Vec<&str> = outlets.iter().map(|outlet| outlet.name.as_str()).collect();
             return self.refuse(format!("it has no {side} '{name}', only {}", names.join(", ")));
         };
-        // A file need not say its shapes; what then comes out is checked when it comes.
+        // A file need not state its shapes; the tensors are then checked when the network runs.
         let Some(shape) = &outlet.shape else { return Ok(()) };
         let fits = shape.len() >= tail.len()
             && shape.iter().rev().zip(tail.iter().rev()).all(|(has, wants)| match (has, wants) {

@@ -1,146 +1,149 @@
-//! Which tensors of which networks mean what: so that other exports of the LightGlue family plug in.
+//! Manifests: descriptions of the tensors of pre-trained networks, so that other exports of the LightGlue family can be
+//! used.
 //!
-//! Exports differ in names, in whether keypoints are normalised, in how matches are listed, and in whether extraction
-//! and matching are one network. A [`Manifest`] says so in a few words; [`super::LearnedMatcher`] checks it against
-//! the networks before it believes it.
+//! Exports differ in names, in the normalisation of keypoints, in the form of the list of matches, and in whether
+//! extraction and matching are one network. A [`Manifest`] states these; [`super::Model::new`] checks it against the
+//! networks.
 
 use serde::{Deserialize, Serialize};
 
-/// A pair of networks, or one that does both.
+/// The description of a model: its image input and its networks.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Manifest {
-    /// What people call it.
+    /// Name of the model.
     pub name: String,
     /// The licence of its weights, as an SPDX expression or in words.
     pub licence: String,
-    /// How images go in.
+    /// Form of the image input.
     pub image: ImageInput,
-    /// The networks.
+    /// The networks with their tensors.
     pub networks: Networks,
 }
 
-/// One network for each step, or one for all.
+/// The networks of a model: one for each step, or one for all.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case", deny_unknown_fields)]
 #[allow(clippy::large_enum_variant, reason = "one in a program: a box would only be in the way")]
 pub enum Networks {
-    /// Keypoints first, then matches.
+    /// Two networks: one extracts keypoints, one matches them.
     Separate {
-        /// Image to keypoints.
+        /// The network from an image to keypoints.
         extractor: Extractor,
-        /// Keypoints to matches.
+        /// The network from keypoints to matches.
         matcher: Glue,
     },
-    /// Two images to keypoints and matches.
+    /// One network from two images to keypoints and matches.
     EndToEnd(Pipeline),
 }
 
-/// How an image becomes a tensor `[1, channels, height, width]`, or two of them one of `[2, ...]`.
+/// The form of the image tensor, `[1, channels, height, width]`, or `[2, ...]` for two images in one batch.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct ImageInput {
-    /// 1 for grey, 3 for grey repeated.
+    /// Number of channels: 1 for grey, 3 for grey repeated.
     pub channels: usize,
-    /// Height and width must be multiples of this; images are continued with black.
+    /// Height and width must be multiples of this; images are padded with black.
     pub multiple_of: usize,
 }
 
-/// Image to keypoints.
+/// A network from an image to keypoints and descriptors.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Extractor {
-    /// The file, beside the manifest.
+    /// Name of the file, in the folder of the manifest.
     pub file: String,
-    /// SHA-256 of the file in hexadecimal, where it is known.
+    /// SHA-256 of the file in hexadecimal, if known.
     #[serde(default)]
     pub sha256: Option<String>,
-    /// Input: the image.
+    /// Name of the input with the image.
     pub image: String,
-    /// Output `[1, N, 2]` or `[N, 2]`: x, y in pixels.
+    /// Name of the output with the keypoints, `[1, N, 2]` or `[N, 2]`: x, y in pixels.
     pub keypoints: String,
-    /// Output `[1, N, D]` or `[N, D]`.
+    /// Name of the output with the descriptors, `[1, N, D]` or `[N, D]`.
     pub descriptors: String,
-    /// Output `[1, N]` or `[N]`: best first; scores of zero and less end the list.
+    /// Name of the output with the scores, `[1, N]` or `[N]`, best first; the first score of zero or less ends the
+    /// list.
     pub scores: String,
-    /// D: how many numbers describe a keypoint.
+    /// Length D of a descriptor.
     pub descriptor_width: usize,
 }
 
-/// Keypoints to matches.
+/// A network from keypoints and descriptors of both images to matches.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Glue {
-    /// The file, beside the manifest.
+    /// Name of the file, in the folder of the manifest.
     pub file: String,
-    /// SHA-256 of the file in hexadecimal, where it is known.
+    /// SHA-256 of the file in hexadecimal, if known.
     #[serde(default)]
     pub sha256: Option<String>,
-    /// Inputs `[1, N, 2]`: keypoints, left and right.
+    /// Names of the inputs with the left and right keypoints, `[1, N, 2]` each.
     pub keypoints: [String; 2],
-    /// Inputs `[1, N, D]`: descriptors, left and right.
+    /// Names of the inputs with the left and right descriptors, `[1, N, D]` each.
     pub descriptors: [String; 2],
-    /// What the keypoints are measured in.
+    /// The coordinates of the keypoints.
     pub coordinates: Coordinates,
-    /// How matches come out.
+    /// The outputs with the matches.
     pub result: MatchOutput,
 }
 
-/// Two images to keypoints and matches.
+/// A network from two images to keypoints and matches.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Pipeline {
-    /// The file, beside the manifest.
+    /// Name of the file, in the folder of the manifest.
     pub file: String,
-    /// SHA-256 of the file in hexadecimal, where it is known.
+    /// SHA-256 of the file in hexadecimal, if known.
     #[serde(default)]
     pub sha256: Option<String>,
-    /// Inputs: two names for two images, one name for both in one batch.
+    /// Names of the inputs: two for two images, one for both in one batch.
     pub images: Vec<String>,
-    /// Outputs in pixels: two names for `[N, 2]` each (or `[1, N, 2]`), one name for `[2, N, 2]`.
+    /// Names of the outputs with the keypoints in pixels: two for `[N, 2]` each (or `[1, N, 2]`), one for `[2, N, 2]`.
     pub keypoints: Vec<String>,
-    /// How matches come out.
+    /// The outputs with the matches.
     pub result: MatchOutput,
 }
 
-/// What keypoints are measured in.
+/// The coordinates of keypoints in a network's input.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Coordinates {
     /// Pixels.
     Pixels,
-    /// (xy − size / 2) / (longer side / 2), as LightGlue's own normalisation.
+    /// Normalised as by LightGlue itself: (xy − size / 2) / (longer side / 2).
     Centred,
 }
 
-/// How matches come out.
+/// The outputs of a network with the matches.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct MatchOutput {
-    /// The output with the indices.
+    /// Name of the output with the indices.
     pub matches: String,
-    /// The output with the scores, 0 to 1.
+    /// Name of the output with the scores, 0 to 1.
     pub scores: String,
-    /// How the indices are listed.
+    /// Form of the list of indices.
     pub form: MatchForm,
-    /// Matches below this score are not believed.
+    /// Matches up to this score are dropped.
     pub threshold: f32,
 }
 
-/// How indices of matches are listed.
+/// The form of a list of matched indices.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum MatchForm {
-    /// `[1, N]`: for every left keypoint the right one, −1 for none; scores likewise.
+    /// `[1, N]`: the index of the right keypoint for every left one, −1 for none; scores `[1, N]`.
     PerKeypoint,
-    /// `[M, 2]`: left and right; scores `[M]`.
+    /// `[M, 2]`: left and right index; scores `[M]`.
     Pairs,
-    /// `[M, 3]`: image pair (always 0 here), left, right; scores `[M]`.
+    /// `[M, 3]`: index of the image pair (always 0 here), left and right index; scores `[M]`.
     PairsInBatch,
 }
 
 impl Manifest {
-    /// XFeat (Potje et al., CVPR 2024) with LighterGlue, as one extractor and one matcher with these file names.
+    /// The manifest of XFeat (Potje et al., CVPR 2024) with LighterGlue, as an extractor and a matcher with these file
+    /// names.
     #[must_use]
     pub fn xfeat_lighterglue(extractor: &str, matcher: &str) -> Self {
         let two = |name: &str| [format!("{name}0"), format!("{name}1")];
@@ -175,7 +178,7 @@ impl Manifest {
         }
     }
 
-    /// Every file it needs, with the digest where it is known.
+    /// The files of the networks, each with its SHA-256 if known.
     pub fn files(&self) -> impl Iterator<Item = (&str, Option<&str>)> {
         let (first, second) = match &self.networks {
             Networks::Separate { extractor, matcher } => {

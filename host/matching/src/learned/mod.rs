@@ -1,70 +1,70 @@
-//! Matching with pre-trained networks of the LightGlue family, on views turned into the shared direction.
+//! Matching with pre-trained networks of the LightGlue family, on views in the shared axes.
 //!
-//! The networks are behind [`Network`]: this crate knows tensors, not runtimes or files. Keypoints outside the field
-//! that both cameras share are left out before the best are taken, so that none of the budget is spent on what the
-//! other camera cannot see. What the networks match is then checked against the pose and thinned as
-//! [`crate::GuidedMatcher`] does it. What can be registered is known to a fraction of a pixel; what cannot is kept with
-//! the larger uncertainty of the networks' own places. Then keypoints without a partner are sought where the matches around
-//! them say.
+//! The trait [`Network`] hides the runtime: this crate handles tensors, not runtimes or files. Keypoints outside the
+//! field that both cameras share are removed before the best ones are taken, so that none of the budget is spent on
+//! points that the other camera cannot see. The networks' matches are tested against the pose and thinned as in
+//! [`crate::GuidedMatcher`]. Registered matches are known to a fraction of a pixel; the others are kept with the larger
+//! uncertainty of the networks' own positions. Finally partners of unmatched keypoints are predicted from the matches
+//! around them.
 
 mod contract;
 mod manifest;
 mod model;
-mod network;
+pub(crate) mod network;
 
 use rayon::prelude::*;
 
 use crate::ViewPixel;
 use crate::corners::Keypoint;
 use crate::guided::{KEYPOINT_TOLERANCE, LEVELS};
-use crate::links::{Compared, Link, Links, Rows, agree_on_pose, in_originals, register, sighting, thin};
-use crate::matcher::{Drop, ImagePair, Match, MatchError, Matcher, Matches};
+use crate::links::{Compared, Link, Links, Rows, agree_on_pose, bearing_pair, in_originals, register, thin};
+use crate::matcher::{ImagePair, Match, MatchError, Matcher, Matches, UnmatchedReason};
 use crate::plane::{Plane, Pyramid};
 use crate::propagate::propagate;
 use crate::shared_views::SharedViews;
 use crate::wrong_pose::pose_instead;
 
 pub use manifest::{Coordinates, Extractor, Glue, ImageInput, Manifest, MatchForm, MatchOutput, Networks, Pipeline};
-pub use model::{Found, Model, Picture, Position, Worth};
+pub use model::{GreyImage, KeypointFilters, KeypointMatches, Model, Position};
 pub use network::{Elements, Network, NetworkError, Outlet, Signature, Tensor};
 
-/// Standard deviation of a match that could not be registered, in pixels of the view and in each direction: networks place
-/// keypoints on whole pixels of both views. Measured on rendered pairs: see docs/measured.md.
+/// Standard deviation of a match without registration, in pixels of the view in each direction: networks place
+/// keypoints on whole pixels of both views. Measured on rendered pairs: see docs/measured/matching.md.
 const UNREGISTERED_SIGMA: f64 = 0.8;
 
-/// Matches what pre-trained networks find alike.
+/// A matcher that uses pre-trained networks.
 pub struct LearnedMatcher {
     model: Model,
-    /// Most keypoints per view.
+    /// Largest number of keypoints per view.
     pub keypoints: usize,
-    /// Pixels of the view per pixel at the centre of the denser fisheye image, from 1 to 2. `None` takes what makes
-    /// 450 pixels per radian.
+    /// Pixels of the view per pixel at the centre of the denser fisheye image, from 1 to 2. `None` takes the value that
+    /// gives 450 pixels per radian.
     pub oversampling: Option<f64>,
 }
 
 impl LearnedMatcher {
-    /// A matcher that compares at most 2048 keypoints of each view.
+    /// Makes a matcher that compares at most 2048 keypoints of each view.
     #[must_use]
     pub const fn new(model: Model) -> Self {
         Self { model, keypoints: 2048, oversampling: None }
     }
 
-    /// The same with every network replaced by what `wrap` makes of it, as [`Model::wrapped`].
+    /// Replaces every network by the result of `wrap`, see [`Model::wrapped`].
     #[must_use]
     pub fn wrapped(self, wrap: impl FnMut(Box<dyn Network>) -> Box<dyn Network>) -> Self {
         Self { model: self.model.wrapped(wrap), ..self }
     }
 
-    /// The networks it asks.
+    /// The model with its networks.
     #[must_use]
     pub const fn model(&self) -> &Model {
         &self.model
     }
 
-    /// What the networks match in the views, before registration and every other test.
+    /// Finds the matches of the networks, before registration and every other test.
     ///
     /// # Errors
-    /// As [`Matcher::find`].
+    /// The errors of [`Matcher::find`].
     pub fn candidates(&self, pair: &ImagePair<'_>) -> Result<Vec<Match>, MatchError> {
         pair.check()?;
         let views = SharedViews::of(pair, self.oversampling)?;
@@ -72,19 +72,19 @@ impl LearnedMatcher {
         Ok(in_originals(&seen.links, &views, &seen.keypoints, seen.right_keypoints).pairs)
     }
 
-    fn compare(&self, views: &SharedViews<'_>) -> Result<Seen, NetworkError> {
+    fn compare(&self, views: &SharedViews<'_>) -> Result<NetworkMatches, NetworkError> {
         let (width, height) = views.grid.size();
         let (left, right) = (lit(views.left.plane()), lit(views.right.plane()));
-        let pictures = [&left, &right].map(|values| Picture { values, width, height });
-        let worth: Worth<'_> =
+        let images = [&left, &right].map(|values| GreyImage { values, width, height });
+        let filters: KeypointFilters<'_> =
             [&|at| views.shared_from_left(&keypoint(at)), &|at| views.shared_from_right(&keypoint(at))];
-        let found = self.model.compare(pictures, self.keypoints, worth)?;
+        let found = self.model.compare(images, self.keypoints, filters)?;
         let [left, right] = found.keypoints;
-        let mut links: Links = vec![Err(Drop::NoCandidate); left.len()];
+        let mut links: Links = vec![Err(UnmatchedReason::NoCandidate); left.len()];
         for (i, j, score) in found.matches {
             links[i] = Ok(Link { right: view_pixel(right[j]), score: f64::from(score), sigma: UNREGISTERED_SIGMA });
         }
-        Ok(Seen { keypoints: left.into_iter().map(keypoint).collect(), right_keypoints: right.len(), links })
+        Ok(NetworkMatches { keypoints: left.into_iter().map(keypoint).collect(), right_keypoints: right.len(), links })
     }
 }
 
@@ -99,7 +99,7 @@ impl Matcher for LearnedMatcher {
         let seen = self.compare(&views)?;
         let linked = seen.keypoints.iter().zip(&seen.links);
         let candidates: Vec<_> =
-            linked.filter_map(|(keypoint, link)| sighting(&views.grid, keypoint, link.as_ref().ok()?)).collect();
+            linked.filter_map(|(keypoint, link)| bearing_pair(&views.grid, keypoint, link.as_ref().ok()?)).collect();
         let Some(pose) = pose_instead(&candidates, &views, pair) else { return Ok(seen.matched(&views, pair)) };
         let turned = ImagePair { left_from_right: pose, ..*pair };
         let views = SharedViews::of(&turned, self.oversampling)?;
@@ -107,21 +107,21 @@ impl Matcher for LearnedMatcher {
     }
 }
 
-/// What the networks made of two views.
-struct Seen {
+/// The result of the networks for two views.
+struct NetworkMatches {
     keypoints: Vec<Keypoint>,
     right_keypoints: usize,
     links: Links,
 }
 
-impl Seen {
-    /// The matches that the pose allows: registered where that succeeds, and as the networks placed them elsewhere.
+impl NetworkMatches {
+    /// Applies all tests: matches are registered where that succeeds, and stay at the networks' positions elsewhere.
     fn matched(self, views: &SharedViews<'_>, pair: &ImagePair<'_>) -> Matches {
         let Self { keypoints, right_keypoints, mut links } = self;
         let band = views.band();
         for (link, keypoint) in links.iter_mut().zip(&keypoints) {
             let allowed = |link: &Link| band.allows(keypoint.at, link.right, KEYPOINT_TOLERANCE);
-            *link = link.and_then(|link| if allowed(&link) { Ok(link) } else { Err(Drop::Epipolar) });
+            *link = link.and_then(|link| if allowed(&link) { Ok(link) } else { Err(UnmatchedReason::Epipolar) });
         }
         let (left, right) = (Pyramid::new(views.left.plane(), LEVELS), Pyramid::new(views.right.plane(), LEVELS));
         let compared = Compared { left: &left, right: &right, keypoints: &keypoints };
@@ -137,7 +137,7 @@ impl Seen {
     }
 }
 
-/// Brightness from 0 to 1.
+/// The brightness of a plane scaled to 0 to 1.
 fn lit(plane: &Plane) -> Vec<f32> {
     plane.values().par_iter().map(|value| (value / 255.0).clamp(0.0, 1.0)).collect()
 }

@@ -1,34 +1,34 @@
-//! The networks of a manifest, run on two grey pictures.
+//! The model: the networks of a manifest, run on two grey images.
 
 use super::contract::{check_extractor, check_glue, check_pipeline};
 use super::manifest::{Coordinates, Extractor, Glue, Manifest, MatchForm, MatchOutput, Networks, Pipeline};
 use super::network::{Network, NetworkError, Tensor};
 
-/// A grey picture: `values` by rows, 0 to 1.
+/// A grey image as the networks take it.
 #[derive(Clone, Copy, Debug)]
-pub struct Picture<'a> {
-    /// Pixels by rows, 0 to 1.
+pub struct GreyImage<'a> {
+    /// Brightness of the pixels by rows, 0 to 1.
     pub values: &'a [f32],
-    /// Columns.
+    /// Number of columns.
     pub width: usize,
-    /// Rows.
+    /// Number of rows.
     pub height: usize,
 }
 
-/// A position in a picture: x to the right, y down, (0, 0) the centre of the first pixel.
+/// A position in an image in pixels: x to the right, y down, (0, 0) the centre of the first pixel.
 pub type Position = [f32; 2];
 
-/// What the networks found.
+/// The keypoints and matches that the networks found.
 #[derive(Clone, Debug, Default, PartialEq)]
-pub struct Found {
-    /// Keypoints that were compared, left and right.
+pub struct KeypointMatches {
+    /// The left and the right keypoints that were compared.
     pub keypoints: [Vec<Position>; 2],
-    /// Left index, right index, score.
+    /// The matches: index of the left keypoint, index of the right keypoint, score.
     pub matches: Vec<(usize, usize, f32)>,
 }
 
-/// Which keypoints of the left and the right picture are worth comparing.
-pub type Worth<'a> = [&'a dyn Fn(Position) -> bool; 2];
+/// The tests whether a keypoint of the left and of the right image is compared.
+pub type KeypointFilters<'a> = [&'a dyn Fn(Position) -> bool; 2];
 
 /// The networks of a manifest, loaded and checked.
 pub struct Model {
@@ -37,10 +37,10 @@ pub struct Model {
 }
 
 impl Model {
-    /// Takes the networks of the manifest, in the order of [`Manifest::files`].
+    /// Makes a model of loaded networks, in the order of [`Manifest::files`], and checks them against the manifest.
     ///
     /// # Errors
-    /// [`NetworkError::Contract`] where a tensor is missing or of another shape than the manifest says.
+    /// [`NetworkError::Contract`] where a tensor is missing or does not have the shape that the manifest states.
     pub fn new(manifest: Manifest, networks: Vec<Box<dyn Network>>) -> Result<Self, NetworkError> {
         match (&manifest.networks, networks.as_slice()) {
             (Networks::Separate { extractor, matcher }, [first, second]) => {
@@ -56,32 +56,37 @@ impl Model {
         Ok(Self { manifest, networks })
     }
 
-    /// The same with every network replaced by what `wrap` makes of it, which must take and give the same tensors.
+    /// Replaces every network by the result of `wrap`, which must have the same inputs and outputs.
     #[must_use]
     pub fn wrapped(self, wrap: impl FnMut(Box<dyn Network>) -> Box<dyn Network>) -> Self {
         Self { networks: self.networks.into_iter().map(wrap).collect(), ..self }
     }
 
-    /// What it was made from.
+    /// The manifest of the model.
     #[must_use]
     pub const fn manifest(&self) -> &Manifest {
         &self.manifest
     }
 
-    /// Compares two pictures: at most `budget` keypoints of each that are `worth` it.
+    /// Matches two images, with at most `budget` keypoints of each that pass the tests `filters`.
     ///
     /// # Errors
-    /// [`NetworkError::Run`] where the networks fail or give tensors that cannot be what they should.
-    pub fn compare(&self, pictures: [Picture<'_>; 2], budget: usize, worth: Worth<'_>) -> Result<Found, NetworkError> {
+    /// [`NetworkError::Run`] where the networks fail or their outputs have impossible shapes or values.
+    pub fn compare(
+        &self,
+        images: [GreyImage<'_>; 2],
+        budget: usize,
+        filters: KeypointFilters<'_>,
+    ) -> Result<KeypointMatches, NetworkError> {
         match (&self.manifest.networks, self.networks.as_slice()) {
             (Networks::Separate { extractor, matcher }, [first, second]) => {
-                let [left, right] = pictures;
-                let left_features = self.extract(extractor, first.as_ref(), left, budget, worth[0])?;
-                let right_features = self.extract(extractor, first.as_ref(), right, budget, worth[1])?;
-                glue(matcher, second.as_ref(), pictures, [left_features, right_features])
+                let [left, right] = images;
+                let left_features = self.extract(extractor, first.as_ref(), left, budget, filters[0])?;
+                let right_features = self.extract(extractor, first.as_ref(), right, budget, filters[1])?;
+                glue(matcher, second.as_ref(), images, [left_features, right_features])
             }
-            (Networks::EndToEnd(pipeline), [only]) => self.end_to_end(pipeline, only.as_ref(), pictures, worth),
-            _ => Ok(Found::default()),
+            (Networks::EndToEnd(pipeline), [only]) => self.end_to_end(pipeline, only.as_ref(), images, filters),
+            _ => Ok(KeypointMatches::default()),
         }
     }
 
@@ -89,12 +94,12 @@ impl Model {
         &self,
         extractor: &Extractor,
         network: &dyn Network,
-        picture: Picture<'_>,
+        image: GreyImage<'_>,
         budget: usize,
-        worth: &dyn Fn(Position) -> bool,
+        is_compared: &dyn Fn(Position) -> bool,
     ) -> Result<Features, NetworkError> {
         let names = [&*extractor.keypoints, &*extractor.descriptors, &*extractor.scores];
-        let given = network.run(vec![(&extractor.image, self.image_tensor(&[picture]))], &names)?;
+        let given = network.run(vec![(&extractor.image, self.image_tensor(&[image]))], &names)?;
         let [keypoints, descriptors, scores] = take(given)?;
         let (positions, scores) = (positions(&keypoints)?, scores.to_floats());
         let width = extractor.descriptor_width;
@@ -105,7 +110,7 @@ impl Model {
         let mut features = Features::default();
         let found = positions.iter().zip(&scores).zip(described.chunks_exact(width));
         for ((&at, _), descriptor) in found.take_while(|((_, score), _)| **score > 0.0) {
-            if features.positions.len() < budget && worth(at) {
+            if features.positions.len() < budget && is_compared(at) {
                 features.positions.push(at);
                 features.descriptors.extend_from_slice(descriptor);
             }
@@ -117,15 +122,15 @@ impl Model {
         &self,
         pipeline: &Pipeline,
         network: &dyn Network,
-        [left, right]: [Picture<'_>; 2],
-        worth: Worth<'_>,
-    ) -> Result<Found, NetworkError> {
+        [left, right]: [GreyImage<'_>; 2],
+        filters: KeypointFilters<'_>,
+    ) -> Result<KeypointMatches, NetworkError> {
         let inputs = match pipeline.images.as_slice() {
             [both] => vec![(both.as_str(), self.image_tensor(&[left, right]))],
             [one, other] => {
                 vec![(one.as_str(), self.image_tensor(&[left])), (other.as_str(), self.image_tensor(&[right]))]
             }
-            _ => return Ok(Found::default()),
+            _ => return Ok(KeypointMatches::default()),
         };
         let mut names: Vec<&str> = pipeline.keypoints.iter().map(String::as_str).collect();
         names.extend([&*pipeline.result.matches, &*pipeline.result.scores]);
@@ -141,31 +146,31 @@ impl Model {
             _ => return Err(NetworkError::Run("it gave another number of tensors than asked".into())),
         };
         let mut matches = listed(&pipeline.result, &matches, &scores, [keypoints[0].len(), keypoints[1].len()])?;
-        matches.retain(|&(i, j, _)| worth[0](keypoints[0][i]) && worth[1](keypoints[1][j]));
-        Ok(Found { keypoints, matches })
+        matches.retain(|&(i, j, _)| filters[0](keypoints[0][i]) && filters[1](keypoints[1][j]));
+        Ok(KeypointMatches { keypoints, matches })
     }
 
-    /// Pictures of one size (the largest of each side), rounded up to what the network takes, continued with black.
-    fn image_tensor(&self, pictures: &[Picture<'_>]) -> Tensor {
+    /// Makes one tensor of images, padded with black to their largest sides and to the multiple that the network takes.
+    fn image_tensor(&self, images: &[GreyImage<'_>]) -> Tensor {
         let input = self.manifest.image;
         let round = |n: usize| n.next_multiple_of(input.multiple_of.max(1));
-        let width = round(pictures.iter().map(|picture| picture.width).max().unwrap_or(0));
-        let height = round(pictures.iter().map(|picture| picture.height).max().unwrap_or(0));
-        let mut values = Vec::with_capacity(pictures.len() * input.channels * width * height);
-        for picture in pictures {
+        let width = round(images.iter().map(|image| image.width).max().unwrap_or(0));
+        let height = round(images.iter().map(|image| image.height).max().unwrap_or(0));
+        let mut values = Vec::with_capacity(images.len() * input.channels * width * height);
+        for image in images {
             for _ in 0..input.channels {
-                for row in picture.values.chunks_exact(picture.width.max(1)) {
+                for row in image.values.chunks_exact(image.width.max(1)) {
                     values.extend_from_slice(row);
-                    values.resize(values.len() + width - picture.width, 0.0);
+                    values.resize(values.len() + width - image.width, 0.0);
                 }
-                values.resize(values.len() + (height - picture.height) * width, 0.0);
+                values.resize(values.len() + (height - image.height) * width, 0.0);
             }
         }
-        Tensor::floats(&[pictures.len(), input.channels, height, width], values)
+        Tensor::floats(&[images.len(), input.channels, height, width], values)
     }
 }
 
-/// Keypoints and their descriptors, one after the other.
+/// Keypoints and their concatenated descriptors.
 #[derive(Default)]
 struct Features {
     positions: Vec<Position>,
@@ -175,18 +180,18 @@ struct Features {
 fn glue(
     glue: &Glue,
     network: &dyn Network,
-    pictures: [Picture<'_>; 2],
+    images: [GreyImage<'_>; 2],
     features: [Features; 2],
-) -> Result<Found, NetworkError> {
+) -> Result<KeypointMatches, NetworkError> {
     let counts = [features[0].positions.len(), features[1].positions.len()];
-    // The networks do not take empty sets.
+    // The networks do not accept empty inputs.
     if counts.contains(&0) {
-        return Ok(Found { keypoints: features.map(|side| side.positions), matches: Vec::new() });
+        return Ok(KeypointMatches { keypoints: features.map(|side| side.positions), matches: Vec::new() });
     }
     let mut inputs = Vec::new();
     for side in 0..2 {
         let count = counts[side];
-        let at = coordinates(glue.coordinates, pictures[side], &features[side].positions);
+        let at = coordinates(glue.coordinates, images[side], &features[side].positions);
         let described = &features[side].descriptors;
         inputs.push((glue.keypoints[side].as_str(), Tensor::floats(&[1, count, 2], at)));
         let width = described.len() / count;
@@ -194,11 +199,11 @@ fn glue(
     }
     let [matches, scores] = take(network.run(inputs, &[&*glue.result.matches, &*glue.result.scores])?)?;
     let matches = listed(&glue.result, &matches, &scores, counts)?;
-    Ok(Found { keypoints: features.map(|side| side.positions), matches })
+    Ok(KeypointMatches { keypoints: features.map(|side| side.positions), matches })
 }
 
-fn coordinates(kind: Coordinates, picture: Picture<'_>, positions: &[Position]) -> Vec<f32> {
-    let (width, height) = (picture.width as f32, picture.height as f32);
+fn coordinates(kind: Coordinates, image: GreyImage<'_>, positions: &[Position]) -> Vec<f32> {
+    let (width, height) = (image.width as f32, image.height as f32);
     let half = width.max(height) / 2.0;
     let convert = |&[x, y]: &Position| match kind {
         Coordinates::Pixels => [x, y],
@@ -207,7 +212,7 @@ fn coordinates(kind: Coordinates, picture: Picture<'_>, positions: &[Position]) 
     positions.iter().flat_map(convert).collect()
 }
 
-/// Index pairs with their scores, whatever form they came in.
+/// Converts a network's list of matches, in any form, to index pairs with their scores.
 fn listed(
     output: &MatchOutput,
     matches: &Tensor,

@@ -1,6 +1,6 @@
-//! What a pre-trained network is to us: named tensors in, named tensors out.
+//! The interface of pre-trained networks: functions from named tensors to named tensors.
 
-/// A dense tensor, row-major.
+/// A dense tensor in row-major order.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Tensor {
     /// Extent of every dimension.
@@ -14,12 +14,12 @@ pub struct Tensor {
 pub enum Elements {
     /// Single precision.
     Float(Vec<f32>),
-    /// Integers of whatever width the network has.
+    /// Integers, of any width in the network.
     Integer(Vec<i64>),
 }
 
 impl Tensor {
-    /// A tensor of floats.
+    /// Makes a tensor of floats.
     #[must_use]
     pub fn floats(shape: &[usize], values: Vec<f32>) -> Self {
         Self { shape: shape.to_vec(), data: Elements::Float(values) }
@@ -44,33 +44,33 @@ impl Tensor {
     }
 }
 
-/// A tensor that a network takes or gives.
+/// An input or output tensor of a network.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Outlet {
-    /// Its name.
+    /// Name of the tensor.
     pub name: String,
-    /// Its dimensions, `None` where they are dynamic; `None` as a whole where the file does not say.
+    /// Extents of its dimensions, `None` for dynamic ones; `None` as a whole where the file does not state the shape.
     pub shape: Option<Vec<Option<usize>>>,
 }
 
-/// What a network takes and gives.
+/// The inputs and outputs of a network.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Signature {
-    /// Inputs.
+    /// The inputs.
     pub inputs: Vec<Outlet>,
-    /// Outputs.
+    /// The outputs.
     pub outputs: Vec<Outlet>,
 }
 
-/// A network that is loaded and can be run.
+/// A loaded network.
 pub trait Network: Send + Sync {
-    /// What it takes and gives.
+    /// Its inputs and outputs.
     fn signature(&self) -> &Signature;
 
-    /// Runs it: `inputs` by name, the outputs in the order of their names in `outputs`.
+    /// Runs the network on `inputs` by name; returns the tensors named in `outputs`, in that order.
     ///
     /// # Errors
-    /// [`NetworkError`] where a name or shape does not fit, or the runtime fails.
+    /// [`NetworkError::Run`] where a name or shape does not fit, or the runtime fails.
     fn run(&self, inputs: Vec<(&str, Tensor)>, outputs: &[&str]) -> Result<Vec<Tensor>, NetworkError>;
 }
 
@@ -81,28 +81,28 @@ pub enum NetworkError {
     /// The runtime could not be loaded.
     #[error("{runtime} cannot be used: {reason}")]
     Runtime {
-        /// Which runtime.
+        /// Name of the runtime.
         runtime: &'static str,
-        /// What it says.
+        /// Message of the runtime.
         reason: String,
     },
     /// The file is not a network that the runtime understands.
     #[error("the network '{network}' cannot be loaded: {reason}")]
     Load {
-        /// Which network.
+        /// Name of the network.
         network: String,
-        /// What the runtime says.
+        /// Message of the runtime.
         reason: String,
     },
     /// The tensors are not those that the manifest describes.
     #[error("the network '{network}' does not fit its manifest: {reason}")]
     Contract {
-        /// Which network.
+        /// Name of the network.
         network: String,
         /// What does not fit.
         reason: String,
     },
-    /// It failed while running.
+    /// The network failed while running.
     #[error("the network failed: {0}")]
     Run(String),
 }

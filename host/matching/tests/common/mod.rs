@@ -14,7 +14,7 @@ use vergence_vision::{
 const THETA_MAX: Angle = Angle::from_deg(98.0);
 pub const BASELINE_MM: f64 = 145.0;
 
-/// Two cameras in a room and what they see.
+/// Two cameras in a room with their rendered images.
 pub struct Pair {
     pub camera: KannalaBrandt,
     pub world_from_left: Transform<World, Left>,
@@ -23,13 +23,13 @@ pub struct Pair {
     pub right: GrayImage,
 }
 
-/// How a match compares with the truth.
+/// Comparison of a match with the truth.
 pub struct Verdict {
-    /// Between the matched right pixel and where the right image shows the left pixel's point, in pixels.
+    /// Distance in pixels between the matched right pixel and the true pixel of the left pixel's point.
     pub error_px: f64,
     /// True range from the left camera.
     pub range_mm: f64,
-    /// Of the triangulated range.
+    /// Relative error of the triangulated range.
     pub relative_depth_error: f64,
 }
 

@@ -1,36 +1,38 @@
-//! What one exchange says for certain.
+//! The limits of the clock offset that one exchange sets.
 
 use vergence_protocol::Microseconds;
 
 use super::Exchange;
-use super::line::WORST_DRIFT;
 use super::wire::WireTimes;
 
-/// Both clocks tell whole microseconds: an instant may be this much later than told.
+/// Largest relative difference of two quartz oscillators.
+pub(super) const WORST_DRIFT: f64 = 200e-6;
+/// Resolution of both clocks in microseconds: an instant may be this much later than its timestamp.
 const TICK_US: f64 = 1.0;
 
-/// A limit of the board's clock less the host's.
+/// A limit of the clock offset, which is the board's clock less the host's.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Limit {
-    /// When it holds, microseconds on the host's clock.
+    /// The instant at which it holds, in microseconds on the host's clock.
     pub host_us: f64,
-    /// The limit, microseconds.
+    /// The limit in microseconds.
     pub offset_us: f64,
-    /// Which limit.
+    /// Whether it is a lower or an upper limit.
     pub side: Side,
 }
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Side {
-    /// The offset is no less.
+    /// A lower limit.
     Least,
-    /// The offset is no more.
+    /// An upper limit.
     Most,
 }
 
 impl Exchange {
-    /// The probe arrived no sooner than its bytes take: at `t0 + probe` the board's clock had not passed `t1`. The reply
-    /// left no later than its bytes take: at `t3 - reply` the board's clock had reached `t2`.
+    /// The limits of the offset. The probe needs the time of its bytes to arrive, so at `t0 + probe` the board's clock
+    /// had not passed `t1`. The reply needs the time of its bytes too, so at `t3 - reply` the board's clock had reached
+    /// `t2`.
     pub(super) fn limits(&self, wire: WireTimes) -> [Limit; 2] {
         let most = Limit {
             host_us: self.t0.0 as f64 + wire.probe_us,
@@ -45,12 +47,12 @@ impl Exchange {
         [most, least]
     }
 
-    /// Whether clocks that run forwards can have told these instants.
+    /// Whether clocks that run forwards can give these timestamps.
     pub(super) fn is_possible(&self) -> bool {
         self.t0 <= self.t3 && self.t1 <= self.t2 && !self.is_faster_than(WireTimes::NONE)
     }
 
-    /// Whether less time passed on the host's clock than on the board's and the wire's together.
+    /// Whether less time passed on the host's clock than the board and the wire together took.
     pub(super) fn is_faster_than(&self, wire: WireTimes) -> bool {
         let away = difference(self.t3, self.t0);
         let explained = difference(self.t2, self.t1) + wire.probe_us + wire.reply_us;
@@ -58,7 +60,7 @@ impl Exchange {
     }
 }
 
-/// `later - earlier` in microseconds; either may be the later one.
+/// Returns `later - earlier` in microseconds, of either sign.
 pub(super) fn difference(later: Microseconds, earlier: Microseconds) -> f64 {
     later.0.wrapping_sub(earlier.0).cast_signed() as f64
 }

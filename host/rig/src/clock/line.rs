@@ -1,36 +1,35 @@
-//! The lines of offset and drift that the exchanges allow: a convex polygon with the offset at the newest exchange as
-//! one coordinate and the drift as the other. Each limit is a half-plane that cuts it (Sutherland and Hodgman, "Reentrant
-//! polygon clipping", CACM 17(1), 1974).
+//! The lines of offset and drift that the exchanges allow.
+//!
+//! They form a convex polygon with the offset at the newest exchange as one coordinate and the drift as the other. Each
+//! limit is a half-plane that cuts it (Sutherland and Hodgman, "Reentrant polygon clipping", CACM 17(1), 1974).
 
 use super::Exchange;
-use super::limit::{Limit, Side};
+use super::limit::{Limit, Side, WORST_DRIFT};
 use super::wire::WireTimes;
 
-/// Two quartz oscillators differ by less than this, parts in one.
-pub(super) const WORST_DRIFT: f64 = 200e-6;
-/// With the temperature the drift walks at random by one part per million in a minute: per square root of a microsecond.
+/// Random walk of the drift with temperature: one part per million in a minute, here per square root of a microsecond.
 const DRIFT_WALK: f64 = 1e-6 / 7_745.966_692_414_834;
-/// Standard deviations of that walk that are allowed for.
+/// Number of standard deviations of that walk by which limits are relaxed.
 const WALK_DEVIATIONS: f64 = 2.0;
 
-/// All lines that the limits so far allow.
+/// The set of all lines that the limits so far allow.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct Lines {
-    /// When the newest reply was heard, microseconds on the host's clock.
+    /// The instant when the newest reply was received, in microseconds on the host's clock.
     reference: f64,
-    /// The offsets of the corners are told from here, for they are many orders smaller.
+    /// Origin of the corners' offsets, which are many orders smaller than it.
     origin: f64,
     corners: Vec<Line>,
 }
 
-/// Board clock less host clock is `offset + drift · (host - reference)`.
+/// A line of the clock offset: `offset + drift · (host - reference)`.
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct Line {
     offset: f64,
     drift: f64,
 }
 
-/// The middle of a range and half its width.
+/// A range by its middle and half its width.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Range {
     pub middle: f64,
@@ -38,8 +37,8 @@ pub(super) struct Range {
 }
 
 impl Lines {
-    /// All lines of a possible drift through what the `newest` exchange allows, whatever the wire; `None` where that is
-    /// nothing.
+    /// The lines of any possible drift that the `newest` exchange allows, without regard to the wire; `None` where
+    /// there are none.
     pub(super) fn through(newest: &Exchange) -> Option<Self> {
         let [most, least] = newest.limits(WireTimes::NONE);
         let origin = 0.5 * (most.offset_us + least.offset_us);
@@ -50,8 +49,8 @@ impl Lines {
         (reach > 0.0).then(|| Self { reference: least.host_us, origin, corners: corners.to_vec() })
     }
 
-    /// The lines within both limits of an exchange, each loosened by what the drift may have changed since; `None` where
-    /// there are none.
+    /// The lines within both limits of an exchange, each relaxed by the possible change of the drift since; `None`
+    /// where there are none.
     pub(super) fn narrowed(&self, limits: [Limit; 2]) -> Option<Self> {
         let corners = limits.iter().fold(self.corners.clone(), |corners, limit| self.cut(&corners, limit));
         (!corners.is_empty()).then_some(Self { corners, ..*self })
@@ -77,19 +76,19 @@ impl Lines {
         kept
     }
 
-    /// When the newest reply was heard, microseconds on the host's clock.
+    /// The instant when the newest reply was received, in microseconds on the host's clock.
     pub(super) fn reference(&self) -> f64 {
         self.reference
     }
 
-    /// Board clock less host clock at `host`, microseconds.
+    /// The clock offset at `host`, in microseconds.
     pub(super) fn offset_at(&self, host: f64) -> Range {
         let after = host - self.reference;
         let Range { middle, error } = Range::of(self.corners.iter().map(|line| line.at(after)));
         Range { middle: self.origin + middle, error: error + walked(after) }
     }
 
-    /// The drift at the reference, parts in one.
+    /// The relative drift at the reference instant.
     pub(super) fn drift(&self) -> Range {
         Range::of(self.corners.iter().map(|line| line.drift))
     }
@@ -116,8 +115,8 @@ impl Range {
     }
 }
 
-/// How far a drift that walks at random leads from a straight line in `span` microseconds: the integral of Brownian
-/// motion has the variance `q² t³ / 3`.
+/// The deviation from a straight line in microseconds that the random walk of the drift causes in `span` microseconds.
+/// The integral of Brownian motion has the variance `q² t³ / 3`.
 fn walked(span: f64) -> f64 {
     let span = span.abs();
     WALK_DEVIATIONS * DRIFT_WALK * span * (span / 3.0).sqrt()

@@ -1,5 +1,6 @@
-//! How long the frames of an exchange take on the wire. The reply is longer than the probe: without this, half of the
-//! difference would be an error of the offset.
+//! The time that the frames of an exchange take on the wire.
+//!
+//! The reply is longer than the probe. Without this correction half of the difference would be an error of the offset.
 
 use serde::Serialize;
 use vergence_protocol::frame::{Header, Kind, encode};
@@ -7,27 +8,28 @@ use vergence_protocol::{MAX_FRAME, PROTOCOL, Report, Request};
 
 use super::Exchange;
 
-/// Start, eight data bits, stop.
+/// Bits on the wire per byte: start bit, eight data bits, stop bit.
 const BITS_PER_BYTE: f64 = 10.0;
-/// A stamp may be this much early: FIFOs hand over before the last bit, adapters pack by their own clock.
+/// A timestamp may be this much early, in microseconds: FIFOs deliver before the last bit, adapters bundle by their own
+/// clock.
 const EARLY_US: f64 = 20.0;
-/// The two ends' baud rates may differ by this, parts in one; at twice as much bytes are misread.
+/// Largest relative difference of the baud rates at both ends; at twice as much bytes are misread.
 const BAUD_ERROR: f64 = 0.02;
 
-/// The least time that each frame takes, microseconds.
+/// The least time that each frame of an exchange takes, in microseconds.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct WireTimes {
-    /// Probe, host to board.
+    /// The time of the probe, from host to board.
     pub probe_us: f64,
-    /// Reply, board to host.
+    /// The time of the reply, from board to host.
     pub reply_us: f64,
 }
 
 impl WireTimes {
-    /// No wire, or an unknown one.
+    /// The times of an unknown wire: zero.
     pub(super) const NONE: Self = Self { probe_us: 0.0, reply_us: 0.0 };
 
-    /// Of the two frames of `exchange`. Both are shortened alike: what is not known must not favour one direction.
+    /// The times of both frames of `exchange`. Both are reduced by the same tolerance, so that it favours no direction.
     pub(super) fn of(exchange: &Exchange, baud: u32) -> Self {
         let Exchange { t0, t1, t2, .. } = *exchange;
         let byte_us = 1e6 * BITS_PER_BYTE / f64::from(baud.max(1));
@@ -38,7 +40,7 @@ impl WireTimes {
     }
 }
 
-/// Bytes of the frame that carries `body`, its closing zero included.
+/// The number of bytes of the frame that carries `body`, with its closing zero.
 fn frame_bytes<B: Serialize>(body: &B) -> f64 {
     let header = Header { major: PROTOCOL.major, kind: Kind::Immediate, seq: 0, ack: 0 };
     encode(header, body, &mut [0; MAX_FRAME]).unwrap_or(0) as f64

@@ -1,4 +1,5 @@
-//! Kalibr camchain YAML: one camera or a pair. Kalibr's translations are in metres; `T_cn_cnm1` is `right_from_left`.
+//! Kalibr's camchain YAML of one camera or a pair. Its translations are in metres, and `T_cn_cnm1` is
+//! `right_from_left`.
 
 use nalgebra::{Matrix3, Rotation3, UnitQuaternion, Vector3};
 use serde::Deserialize;
@@ -36,7 +37,7 @@ impl Camera {
     }
 }
 
-/// Reads a camchain of one or two cameras.
+/// Parses a Kalibr camchain of one or two cameras.
 ///
 /// # Errors
 /// [`InterchangeError`] names the missing key or what is wrong.
@@ -64,7 +65,7 @@ fn left_from_right(rows: &[[f64; 4]; 4]) -> Result<Transform<Left, Right>, Inter
     Ok(Transform::<Right, Left>::new(rotation, metres * 1000.0).inverse())
 }
 
-/// Writes a camchain.
+/// Prints a Kalibr camchain.
 #[must_use]
 pub fn write(chain: &Camchain) -> String {
     let mut text = format!("cam0:\n{}", camera_keys(&chain.left));

@@ -1,53 +1,54 @@
-//! Cameras in the files of other programs: OpenCV's YAML and Kalibr's camchain.
+//! Camera files of other programs: OpenCV's YAML and Kalibr's camchain.
 //!
-//! Both write `θ_d = θ (1 + k1 θ² + k2 θ⁴ + k3 θ⁶ + k4 θ⁸)`. Neither says how far the polynomial is valid; ours adds
-//! `theta_max_deg`, which they ignore, and without it takes the largest angle that the image and the polynomial allow.
+//! Both use `θ_d = θ (1 + k1 θ² + k2 θ⁴ + k3 θ⁶ + k4 θ⁸)`, and neither states up to which angle the polynomial is
+//! valid. Files written here add the key `theta_max_deg`, which both programs ignore. Without it the largest angle is
+//! taken that the image and the polynomial allow ([`OpenCvFisheye::largest_theta`]).
 
 pub mod kalibr;
 pub mod opencv;
 
 use vergence_vision::{Angle, ImageSize, InvalidLens, KannalaBrandt, Left, OpenCvFisheye, Right, Transform};
 
-/// Whose file it is.
+/// The format of a camera file.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum CameraFormat {
-    /// Ours.
+    /// The TOML of this program.
     Toml,
-    /// OpenCV's FileStorage YAML.
+    /// The FileStorage YAML of OpenCV.
     OpenCv,
-    /// Kalibr's camchain YAML.
+    /// The camchain YAML of Kalibr.
     Kalibr,
 }
 
-/// A camera or a pair, and where the second is.
+/// A camera, or a pair with its relative pose.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Camchain {
-    /// `cam0`, the left one of a pair.
+    /// The lens of `cam0`, which is the left camera of a pair.
     pub left: KannalaBrandt,
-    /// `cam1` and its pose, where there is one.
+    /// The lens of `cam1` and its pose, for a pair.
     pub right: Option<(KannalaBrandt, Transform<Left, Right>)>,
 }
 
-/// What is wrong with another program's file.
+/// What is wrong with a camera file of another program.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum InterchangeError {
     /// Not YAML.
     #[error("not readable as YAML: {0}")]
     Syntax(String),
-    /// A key is missing or of the wrong form.
+    /// A key is missing or has the wrong form.
     #[error("{0}")]
     Missing(String),
-    /// Another camera or distortion model.
+    /// The file is of another camera or distortion model.
     #[error("{0}: only the fisheye (equidistant) model is read")]
     Model(String),
-    /// A camera that cannot be.
+    /// The parameters describe no lens.
     #[error("{0}")]
     Lens(InvalidLens),
 }
 
 impl CameraFormat {
-    /// Tells whose file `text` is by what it begins with or contains.
+    /// Recognises the format of the file content `text`.
     #[must_use]
     pub fn of(text: &str) -> Self {
         if text.lines().any(|line| line.trim_end() == "cam0:") {

@@ -1,4 +1,4 @@
-//! OpenCV FileStorage YAML of one fisheye camera.
+//! OpenCV's FileStorage YAML of one fisheye camera.
 
 use serde::Deserialize;
 use vergence_vision::{ImageSize, KannalaBrandt, OpenCvFisheye};
@@ -10,7 +10,7 @@ struct Matrix {
     data: Vec<f64>,
 }
 
-/// Keys as OpenCV's own samples and common tools write them; others are ignored.
+/// The keys that OpenCV's own samples and common tools write; others are ignored.
 #[derive(Deserialize)]
 struct File {
     #[serde(alias = "K", alias = "cameraMatrix", alias = "M1")]
@@ -24,7 +24,7 @@ struct File {
     theta_max_deg: Option<f64>,
 }
 
-/// Reads a camera.
+/// Parses an OpenCV fisheye camera file.
 ///
 /// # Errors
 /// [`InterchangeError`] names the missing key or what is wrong.
@@ -49,7 +49,7 @@ pub fn read(text: &str) -> Result<KannalaBrandt, InterchangeError> {
     camera(OpenCvFisheye { fx, fy, cx, cy, k }, size, file.theta_max_deg)
 }
 
-/// Writes a camera.
+/// Prints an OpenCV fisheye camera file.
 #[must_use]
 pub fn write(camera: &KannalaBrandt) -> String {
     let OpenCvFisheye { fx, fy, cx, cy, k: [k1, k2, k3, k4] } = camera.to_opencv();

@@ -1,4 +1,4 @@
-//! Laws and exact cases.
+//! Laws of the clock map, and exact cases.
 
 use proptest::prelude::*;
 use vergence_protocol::Microseconds;
@@ -22,8 +22,7 @@ fn observed(map: &mut ClockMap, board: impl Fn(u64) -> f64, delays: &[(u64, u64)
 }
 
 proptest! {
-    /// A board clock that starts anywhere, up to 150 ppm off, behind a link with any delays: the error never exceeds
-    /// the bound that is stated.
+    /// With any start, a drift up to 150 ppm and any delays of the link, the error never exceeds the stated bound.
     #[test]
     fn the_clock_map_keeps_its_bound(
         offset in 0u64..10_000_000_000,
@@ -42,7 +41,7 @@ proptest! {
         prop_assert!((told.ppm - 1e6 * drift).abs() <= told.error_ppm, "{:?} {}", told, drift);
     }
 
-    /// The board's clock never stands still or runs backwards, and the way there and back leads to the start.
+    /// The converted clock never stands still or runs backwards, and converting there and back returns the start.
     #[test]
     fn the_conversion_is_monotone_and_has_an_inverse(
         delays in prop::collection::vec((1u64..20_000, 1u64..20_000), 1..20),
@@ -58,9 +57,10 @@ proptest! {
         }
     }
 
-    /// One leg that is late by 16 ms or more moves the estimate by no more than was stated before, and the bound hardly.
+    /// One message that is late by 16 ms or more moves the estimate by no more than the bound before, and hardly
+    /// changes the bound.
     #[test]
-    fn one_late_leg_moves_nothing(
+    fn one_late_message_does_not_move_the_estimate(
         delays in prop::collection::vec((1u64..100, 1u64..100), 2..50),
         late in 16_000u64..900_000,
         down in any::<bool>(),
@@ -79,9 +79,9 @@ proptest! {
         prop_assert!(after.error_us <= 1.5 * before.error_us + 2.0, "{:?} {:?}", before, after);
     }
 
-    /// Whatever the timestamps, what is told is finite.
+    /// Any timestamps give finite results.
     #[test]
-    fn any_timestamps_are_taken(
+    fn any_timestamps_give_finite_results(
         stamps in prop::collection::vec(any::<[u64; 4]>(), 0..20),
         baud in any::<u32>(),
         ask in any::<u64>(),
@@ -125,7 +125,7 @@ fn offset_and_drift_of_exact_exchanges_are_exact() {
 /// At 1 000 000 baud a byte takes 10 us. The probe has 10 bytes around the postcard body of 1 + 4, the reply around
 /// 1 + 4 + 4 + 4: 150 us down, 230 us up.
 #[test]
-fn the_longer_way_up_is_no_error_at_a_known_baud_rate() {
+fn a_longer_reply_is_no_error_at_a_known_baud_rate() {
     let told = |mut map: ClockMap| {
         for second in 3..20 {
             let (t0, arrived) = (second * 1_000_000, second * 1_000_000 + 5_000_000 + 150);

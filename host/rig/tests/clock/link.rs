@@ -1,12 +1,12 @@
-//! A link and a board in virtual time, with the truth about both clocks.
+//! A simulated link and board in virtual time, with the true relation of both clocks.
 
 use vergence_protocol::frame::{Header, Kind, encode};
 use vergence_protocol::{MAX_FRAME, Microseconds, PROTOCOL, Report, Request};
 use vergence_rig::{ClockMap, Exchange};
 
-/// The board's drift changes in steps of this.
+/// Interval between changes of the board's drift, in microseconds.
 const STEP_US: f64 = 100_000.0;
-/// Away from every multiple of a USB frame or a latency timer.
+/// Interval that is no multiple of a USB frame or a latency timer.
 const FAST_PERIOD_US: f64 = 98_390.0;
 const SLOW_PERIOD_US: f64 = 983_900.0;
 
@@ -35,9 +35,9 @@ impl SplitMix {
     }
 }
 
-/// A board's clock: started some time ago, 80 ppm off, and the drift walks at random by 1 ppm in a minute.
+/// A board's clock that started some time ago, is off by 80 ppm, and whose drift walks at random by 1 ppm in a minute.
 struct BoardClock {
-    /// What it shows at each step of the host's clock.
+    /// Reading of the board's clock at each step of the host's clock.
     shown: Vec<f64>,
 }
 
@@ -59,14 +59,14 @@ impl BoardClock {
     }
 }
 
-/// How long a leg takes beyond its bytes, or is said to take: a stamp may be early.
+/// The delay of a message beyond its bytes, as its timestamps show it; a timestamp may be early.
 #[derive(Clone, Copy, Debug)]
 pub enum Delay {
-    /// Uniform between two, microseconds.
+    /// Uniform between two values in microseconds.
     Uniform(f64, f64),
     /// Waits for the next tick of a latency timer of 16 ms, and a millisecond for the transfer.
     LatencyTimer,
-    /// Up to 40 us, but in bursts of some seconds up to this much more.
+    /// Up to 40 us, and in bursts of some seconds up to this much more.
     Bursts(f64),
 }
 
@@ -74,7 +74,7 @@ impl Delay {
     fn of(self, random: &mut SplitMix, host: f64) -> f64 {
         match self {
             Self::Uniform(least, most) => random.between(least, most),
-            // The timer's crystal is not the host's.
+            // The timer has a crystal of its own.
             Self::LatencyTimer => 1_000.0 + 16_000.8 - host % 16_000.8,
             Self::Bursts(most) => {
                 let burst = (host / 3e6) as u64 % 5 >= 3;
@@ -89,14 +89,14 @@ pub struct Link {
     pub baud: Option<u32>,
     pub down: Delay,
     pub up: Delay,
-    /// Share of exchanges that are lost.
+    /// Fraction of exchanges that are lost.
     pub loss: f64,
 }
 
-/// The error of one conversion against the truth and the stated bound, and of the way there and back.
+/// The error of one conversion with the stated bound, and the error of converting there and back.
 #[derive(Clone, Copy, Debug)]
 pub struct Outcome {
-    /// Host clock.
+    /// Instant on the host's clock.
     pub at_us: f64,
     pub error_us: f64,
     pub bound_us: f64,
@@ -105,7 +105,7 @@ pub struct Outcome {
 }
 
 impl Link {
-    /// Probes as a client does for so many seconds, and converts an instant every 50 ms.
+    /// Runs exchanges like a client for some seconds, and converts an instant every 50 ms.
     pub fn run(self, seed: u64, mut map: ClockMap, seconds: f64) -> Vec<Outcome> {
         let mut random = SplitMix(seed);
         let board = BoardClock::new(&mut random, seconds);
@@ -120,7 +120,7 @@ impl Link {
         instants.filter_map(convert).collect()
     }
 
-    /// Those that come back, in order.
+    /// The exchanges that are not lost, in order.
     fn exchanges(self, random: &mut SplitMix, board: &BoardClock, seconds: f64) -> Vec<Exchange> {
         let sent = (0..10 + seconds as u32)
             .map(|n| 1_000.0 + FAST_PERIOD_US * f64::from(n.min(10)) + SLOW_PERIOD_US * f64::from(n.max(10) - 10));

@@ -1,4 +1,4 @@
-//! The relation of the two clocks: links of every kind in virtual time. The laws and exact cases are in `laws`.
+//! The clock map over links of every kind in virtual time. The laws and exact cases are in `laws`.
 #![allow(clippy::expect_used, reason = "a test fails loudly")]
 
 mod laws;
@@ -9,11 +9,11 @@ use vergence_rig::ClockMap;
 
 const SEEDS: u64 = 50;
 const SECONDS: f64 = 180.0;
-/// From here on the bounds count; the coverage counts from the first exchange.
+/// Instant from which the bounds are judged; the coverage counts from the first exchange.
 const SETTLED_US: f64 = 10e6;
 const BAUD: u32 = 921_600;
 
-/// What came of a link over all seeds, in microseconds.
+/// The figures of a link over all seeds, in microseconds.
 #[derive(Debug)]
 #[allow(dead_code, reason = "told where a test fails")]
 struct Figures {
@@ -28,7 +28,7 @@ fn figures(link: Link, map: &ClockMap) -> Figures {
     let runs: Vec<Vec<Outcome>> = (0..SEEDS).map(|seed| link.run(seed, map.clone(), SECONDS)).collect();
     let all = runs.concat();
     for outcome in &all {
-        // The instant on the board's clock was rounded to a whole microsecond in between.
+        // The instant on the board's clock is rounded to a whole microsecond in between.
         assert!(outcome.round_trip_us <= 0.51 && outcome.round_trip_us <= outcome.round_trip_bound_us, "{outcome:?}");
     }
     let settled: Vec<Outcome> = all.iter().copied().filter(|outcome| outcome.at_us >= SETTLED_US).collect();
@@ -52,10 +52,10 @@ fn median(values: impl Iterator<Item = f64>) -> f64 {
     values[values.len() / 2]
 }
 
-/// Two wires, each side early or late by 20 us.
+/// A wire whose timestamps are early or late by 20 us at either end.
 const CLEAN: Link =
     Link { baud: Some(BAUD), down: Delay::Uniform(-20.0, 20.0), up: Delay::Uniform(-20.0, 20.0), loss: 0.0 };
-/// Nothing is early.
+/// A wire without early timestamps.
 const LATE: Link = Link { down: Delay::Uniform(0.0, 40.0), up: Delay::Uniform(0.0, 40.0), ..CLEAN };
 const BRIDGE: Link = Link { up: Delay::Uniform(1e3, 16e3), ..LATE };
 
@@ -76,7 +76,7 @@ fn without_the_baud_rate_half_of_the_wire_is_unknown() {
 
 /// Half a millisecond cannot be told from a shorter way down: the shortest leg up takes a whole one.
 #[test]
-fn a_bridge_is_known_to_a_millisecond() {
+fn a_usb_bridge_is_known_to_a_millisecond() {
     let got = figures(BRIDGE, &ClockMap::at_baud(BAUD));
     assert!(got.coverage >= 0.95 && got.coverage_of_worst_seed >= 0.95, "{got:?}");
     assert!((500.0..1_000.0).contains(&got.median_bound), "{got:?}");
@@ -103,7 +103,7 @@ fn bursts_in_one_direction_cost_little() {
 
 /// A USB port takes any baud rate and is bound by none; the wire time subtracted would be 2 ms of error.
 #[test]
-fn a_baud_rate_that_is_none_is_not_believed() {
+fn a_meaningless_baud_rate_is_dropped() {
     let got = figures(Link { baud: None, ..LATE }, &ClockMap::at_baud(115_200));
     assert!(got.coverage >= 0.95 && got.coverage_of_worst_seed >= 0.95 && got.median_bound < 20.0, "{got:?}");
 }

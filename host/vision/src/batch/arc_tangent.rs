@@ -1,14 +1,14 @@
-//! The angle from the z axis, by one division and one polynomial.
+//! The angle between a vector and the z axis, computed with one division and one polynomial.
 
 use std::f64::consts::{FRAC_PI_2, FRAC_PI_4, PI};
 
 use super::lanes::{multiply_add, polynomial};
 
-/// tan(π/8): up to there the polynomial is good.
+/// Largest argument of the polynomial: tan(π/8).
 const REACH: f64 = 0.414_213_562_373_095_03;
 
-/// (atan(t)/t - 1)/t² as a polynomial in t², ascending: interpolated at Chebyshev nodes over t² ≤ tan²(π/8). With it
-/// the angle is right to 6e-16.
+/// Coefficients of (atan(t)/t - 1)/t² as a polynomial in t², ascending, interpolated at Chebyshev nodes over
+/// t² ≤ tan²(π/8). The angle is right to 6e-16 rad.
 const SERIES: [f64; 12] = [
     -0.333_333_333_333_333_04,
     0.199_999_999_999_839_9,
@@ -24,10 +24,10 @@ const SERIES: [f64; 12] = [
     -0.034_532_477_933_680_56,
 ];
 
-/// atan2(ρ, z) for ρ ≥ 0, from 0 to π; NaN where both are zero or one is not a number.
+/// Returns atan2(ρ, z) for ρ ≥ 0, from 0 to π; NaN where both are zero or one is not a number.
 ///
-/// Turned by 45° or 90° where the quotient would be large: with ρ and |z| for opposite and adjacent side,
-/// atan(ρ/|z|) = π/4 + atan((ρ-|z|)/(ρ+|z|)) = π/2 - atan(|z|/ρ).
+/// Where the quotient would be large, the angle is measured from 45° or 90°. With ρ the opposite and |z| the adjacent
+/// side, atan(ρ/|z|) = π/4 + atan((ρ-|z|)/(ρ+|z|)) = π/2 - atan(|z|/ρ).
 #[inline(always)]
 pub(super) fn angle_from_axis<const FUSED: bool, const W: usize>(rho: &[f64; W], z: &[f64; W]) -> [f64; W] {
     let (mut quotient, mut squared, mut turned) = ([0.0; W], [0.0; W], [0.0; W]);

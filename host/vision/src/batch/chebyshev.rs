@@ -1,12 +1,14 @@
-//! Polynomials that stand for smooth functions.
+//! Polynomial approximation of smooth functions.
 //!
 //! L. Trefethen, *Approximation Theory and Approximation Practice*, 2013, chapters 3 and 4.
 
 use std::f64::consts::PI;
 
-/// The coefficients, ascending in t, of a polynomial of `terms` terms near `function` over t from -1 to 1: the
-/// Chebyshev series from four nodes per term, written in powers of t. That loses no digits that matter while the series
-/// falls faster than (1 + √2) per term; whoever uses it checks the result.
+/// Approximates `function` over t from -1 to 1 by a polynomial of `terms` terms; returns its coefficients, ascending in
+/// t.
+///
+/// The polynomial is the Chebyshev series from four nodes per term, written in powers of t. This conversion keeps all
+/// significant digits while the series falls by more than (1 + √2) per term. Callers check the error themselves.
 pub(super) fn fit(terms: usize, function: impl Fn(f64) -> f64) -> Vec<f64> {
     let count = 4 * terms;
     let angles: Vec<f64> = (0..count).map(|i| PI * (i as f64 + 0.5) / count as f64).collect();
@@ -19,7 +21,7 @@ pub(super) fn fit(terms: usize, function: impl Fn(f64) -> f64) -> Vec<f64> {
     powers(&series)
 }
 
-/// Σ cₙ Tₙ(t) in powers of t, by Clenshaw's recurrence on coefficients: b ← c + 2 t b' - b''.
+/// Converts Σ cₙ Tₙ(t) to powers of t by Clenshaw's recurrence on coefficients: b ← c + 2 t b' - b''.
 fn powers(series: &[f64]) -> Vec<f64> {
     let terms = series.len();
     let (mut next, mut after) = (vec![0.0; terms + 1], vec![0.0; terms + 1]);
@@ -42,7 +44,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_polynomial_is_its_own_fit() {
+    fn a_polynomial_is_approximated_by_itself() {
         let found = fit(5, |t| 2.0 - t + 0.5 * t * t - 3.0 * t.powi(4));
         for (found, expected) in found.iter().zip([2.0, -1.0, 0.5, 0.0, -3.0]) {
             assert!((found - expected).abs() < 1e-14, "{found:?}");
@@ -50,7 +52,7 @@ mod tests {
     }
 
     #[test]
-    fn an_exponential_is_met_to_rounding() {
+    fn an_exponential_is_approximated_to_rounding() {
         let fit = fit(16, f64::exp);
         for i in -100..=100 {
             let t = f64::from(i) / 100.0;

@@ -1,23 +1,24 @@
-//! Rows to lanes and back, and arithmetic that is fused where the machine can.
+//! Conversion between rows and lanes, and fused arithmetic on machines that have it.
 
 use multiversion::multiversion;
 use multiversion::target::target_cfg_f;
 
-/// What every processor of this kind fuses. Where it does not, `mul_add` would call a slow library function.
+/// Whether every processor of the compile target has fused multiply-add. Without it `mul_add` calls a slow library
+/// function.
 pub(super) const ALWAYS_FUSED: bool = cfg!(any(target_feature = "fma", target_arch = "aarch64"));
 
-/// A function of `IN` numbers with `OUT` results, on `W` rows at once and without branches.
+/// A branch-free function of `IN` numbers with `OUT` results, computed for `W` rows at once.
 pub(super) trait Kernel<const IN: usize, const OUT: usize> {
     fn lanes<const FUSED: bool, const W: usize>(&self, columns: [[f64; W]; IN]) -> [[f64; W]; OUT];
 }
 
-/// a b + c
+/// Returns a b + c.
 #[inline(always)]
 pub(super) fn multiply_add<const FUSED: bool>(a: f64, b: f64, c: f64) -> f64 {
     if FUSED { a.mul_add(b, c) } else { a * b + c }
 }
 
-/// The polynomial with `coefficients`, ascending, at each of `t`.
+/// Evaluates the polynomial with ascending `coefficients` at each of `t`.
 #[inline(always)]
 pub(super) fn polynomial<const FUSED: bool, const W: usize>(coefficients: &[f64], t: &[f64; W]) -> [f64; W] {
     let mut sum = [0.0; W];
@@ -29,7 +30,8 @@ pub(super) fn polynomial<const FUSED: bool, const W: usize>(coefficients: &[f64]
     sum
 }
 
-/// Appends the kernel's results for all `rows` to `out`, `W` at a time: so few that reading, computing and writing overlap.
+/// Appends the kernel's results for all `rows` to `out`, `W` rows at a time, so that reading, computing and writing
+/// overlap.
 #[inline(always)]
 pub(super) fn for_rows<const FUSED: bool, const W: usize, const IN: usize, const OUT: usize>(
     kernel: &impl Kernel<IN, OUT>,
@@ -47,7 +49,7 @@ pub(super) fn for_rows<const FUSED: bool, const W: usize, const IN: usize, const
     }
 }
 
-/// Fewer than `W` rows, filled up with zeros.
+/// Fills fewer than `W` rows up with rows of zeros.
 #[inline(always)]
 pub(super) fn padded<const W: usize, const C: usize>(rest: &[[f64; C]]) -> [[f64; C]; W] {
     let mut padded = [[0.0; C]; W];
@@ -77,7 +79,7 @@ pub(super) fn rows_of<const W: usize, const C: usize>(columns: &[[f64; W]; C]) -
     rows
 }
 
-/// What the kernels use on this machine.
+/// Short name of the instructions that the kernels use on this machine.
 #[multiversion(targets("x86_64+avx512f+avx512dq+avx512vl+avx2+fma", "x86_64+avx2+fma"))]
 pub(super) fn best_name() -> &'static str {
     match (target_cfg_f!(target_feature = "avx512f"), target_cfg_f!(target_feature = "avx2")) {

@@ -1,11 +1,11 @@
-//! Many points at once, on one thread, in plain arrays.
+//! Batch kernels: many points at once, on one thread, in plain arrays.
 //!
-//! The kernels are branch-free functions on arrays of lanes that the compiler turns into vector instructions: those of
-//! the machine at hand (AVX-512, or AVX2 and FMA, found at run time), or those every processor of its kind has. The two differ in
-//! the last bits, so results that must repeat to the bit on any machine come from the single-point functions.
+//! The kernels are branch-free functions on arrays of lanes, which the compiler turns into vector instructions: the
+//! best ones found at run time (AVX-512, or AVX2 and FMA), or those that every processor of the target has. The two
+//! differ in the last bits, so results that must repeat to the bit on any machine come from the single-point functions.
 //!
-//! Arrays hold one point, ray or pixel per row: N × 3 or N × 2. What has no result (outside the field, behind a camera,
-//! not a number) is a row of NaN, so that rows keep their place.
+//! Arrays hold one point, ray or pixel per row: N × 3 or N × 2. An input without a result (outside the field, behind a
+//! camera, not a number) gives a row of NaN, so that rows keep their index.
 
 mod arc_tangent;
 mod chebyshev;
@@ -23,18 +23,18 @@ pub use lens::BatchLens;
 pub use pair::{BatchPair, BatchPoints};
 pub use triangulate::{BatchTriangulation, triangulate_batch};
 
-/// Which instructions the kernels may use.
+/// Which processor instructions the batch kernels use.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Instructions {
-    /// The best that the machine has and the kernels know.
+    /// The best instructions that this machine has and the kernels support.
     #[default]
     Best,
-    /// Those that every machine of this kind has, to compare with.
+    /// The instructions that every machine of the compile target has, for comparison.
     Baseline,
 }
 
 impl Instructions {
-    /// A short name of what [`Instructions::Best`] is on this machine.
+    /// Short name of the instructions behind [`Instructions::Best`] on this machine, such as `avx2+fma`.
     #[must_use]
     pub fn best_name() -> &'static str {
         lanes::best_name()

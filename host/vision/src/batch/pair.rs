@@ -1,14 +1,15 @@
-//! Pairs of rays to points with all that is uncertain about them: pixels, lenses, pose.
+//! Triangulation of whole arrays of rays, with the covariance from pixel noise, lenses and pose.
 //!
-//! As [`crate::PointUncertainty`] derives it, but along three directions: a turn of the left ray moves the point along the
-//! right ray v, a turn of the right ray along the left ray u, and both along the normal n of their plane. A *gradient* is how
-//! far the point moves along one of the three, by the ray it is turned with, in mm/rad:
+//! The derivation is that of [`crate::PointUncertainty`], written along three directions: a turn of the left ray moves
+//! the point along the right ray v, a turn of the right ray moves it along the left ray u, and both move it along the
+//! normal n of their plane. A *gradient* is the movement of the point along one of the three per turn of a ray, in
+//! mm/rad:
 //!
 //! ```text
 //! along v: λ n × u / s by the left ray      along u: -μ n × v / s by the right ray      along n: λ n / 2 and μ n / 2
 //! ```
 //!
-//! so that only three rows of derivatives by what is shared are multiplied with its covariance.
+//! Only these three rows of derivatives by the shared parameters are multiplied with the shared covariance.
 
 use multiversion::multiversion;
 use multiversion::target::target_cfg_f;
@@ -23,11 +24,11 @@ use super::vectors::{Vectors, cross, dot, scaled, turned, unit};
 use crate::lens_derivatives::LENS_PARAMETERS;
 use crate::{Angle, SHARED_PARAMETERS, SharedCovariance, StereoPair};
 
-/// One vector of eight, or two of four.
+/// Rows per step: one vector of eight lanes, or two of four.
 const LANES: usize = 8;
 
-/// A pair prepared for whole arrays of rays: pseudo-intersections with the covariance of
-/// [`crate::PointUncertainty::covariance`], several times faster.
+/// A stereo pair prepared for whole arrays of rays: pseudo-intersections with the covariance of
+/// [`crate::PointUncertainty::covariance`], several times faster than one by one.
 #[derive(Clone, Debug, PartialEq)]
 pub struct BatchPair {
     place: Triangulate,
@@ -38,17 +39,18 @@ pub struct BatchPair {
     instructions: Instructions,
 }
 
-/// Points and covariances, in the rows of the rays they come from. NaN where the rays make no point.
+/// Points and covariances of [`BatchPair`], in the rows of their rays. Rows are NaN where the rays make no point.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct BatchPoints {
-    /// N × 3, millimetres, left frame.
+    /// Points: N × 3, millimetres, left frame.
     pub points: Vec<[f64; 3]>,
-    /// N × 6, mm², left frame: xx, xy, xz, yy, yz, zz.
+    /// Covariances: N × 6, mm², left frame, in the order xx, xy, xz, yy, yz, zz.
     pub covariances: Vec<[f64; 6]>,
 }
 
 impl BatchPair {
-    /// Prepares `pair`, for noise of `pixel_sigma` pixels in each coordinate of each image, and what its points share.
+    /// Prepares `pair` for pixel noise of standard deviation `pixel_sigma` in each coordinate of each image, and for
+    /// the covariance `shared` of lenses and pose.
     #[must_use]
     pub fn new(pair: &StereoPair<'_>, pixel_sigma: f64, shared: &SharedCovariance) -> Self {
         Self {
@@ -61,13 +63,14 @@ impl BatchPair {
         }
     }
 
-    /// The same with other instructions.
+    /// Chooses the processor instructions of later calls.
     #[must_use]
     pub fn with_instructions(self, instructions: Instructions) -> Self {
         Self { instructions, ..self }
     }
 
-    /// The points of N pairs of unit rays, each in its own camera's frame. Rays beyond the shorter array are not looked at.
+    /// Triangulates N pairs of unit rays (N × 3), each in its own camera's frame. Rays beyond the shorter array are
+    /// ignored.
     #[must_use]
     pub fn triangulate(&self, left: &[[f64; 3]], right: &[[f64; 3]]) -> BatchPoints {
         let mut out = BatchPoints::default();
@@ -95,10 +98,10 @@ fn all<const FUSED: bool>(pair: &BatchPair, rays: [&[[f64; 3]]; 2], out: &mut Ba
     for_pairs::<FUSED, LANES, 9, 6>(pair, rays, &mut out.points, &mut out.covariances);
 }
 
-/// The derivatives of one number by what is shared, for each lane.
+/// The derivatives of one number by the shared parameters, for each lane.
 type Row<const W: usize> = [[f64; W]; SHARED_PARAMETERS];
 
-/// Where the point is seen from both cameras, and the three directions it moves in.
+/// The rays to the point, the normal of their plane, both ranges in millimetres, and one over the sine of the parallax.
 struct Geometry<const W: usize> {
     left: Vectors<W>,
     right: Vectors<W>,
@@ -134,7 +137,7 @@ impl Kernel<6, 9> for BatchPair {
 }
 
 impl BatchPair {
-    /// How the point moves along v, u and n with what is shared, and the covariance of these from the pixels' noise.
+    /// The derivatives of the point along v, u and n by the shared parameters, and their covariance from pixel noise.
     #[inline(always)]
     fn rows<const FUSED: bool, const W: usize>(&self, at: &Geometry<W>) -> ([Row<W>; 3], [[[f64; W]; 3]; 3]) {
         let Geometry { left, right, normal, ranges: [left_range, right_range], per_sine } = at;
@@ -175,7 +178,8 @@ impl BatchPair {
         (rows, self.pixel_noise::<FUSED, W>(&left_rows, &right_rows))
     }
 
-    /// Left and right gradients of the direction in the plane and of that across it, by their pixels.
+    /// The covariance of the movements along v, u and n from pixel noise. `left` and `right` hold the gradients in the
+    /// epipolar plane and across it.
     #[inline(always)]
     fn pixel_noise<const FUSED: bool, const W: usize>(
         &self,
@@ -197,7 +201,7 @@ impl BatchPair {
         covariance
     }
 
-    /// The covariance of what is shared, times a row.
+    /// The shared covariance times `row`.
     #[inline(always)]
     fn weighted<const FUSED: bool, const W: usize>(&self, row: &Row<W>) -> Row<W> {
         let mut out = [[0.0; W]; SHARED_PARAMETERS];

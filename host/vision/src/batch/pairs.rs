@@ -1,9 +1,9 @@
-//! Pairs of rays, some at a time, to points and their covariances.
+//! The loop over pairs of rays that runs a kernel block by block.
 
 use super::lanes::{Kernel, columns_of, padded, rows_of};
 
-/// Appends what `kernel` makes of every pair of rays: the first three of its `OUT` columns to `points`, the other `REST` to
-/// `covariances`. Both slices are of one length.
+/// Runs `kernel` on every pair of rays. The first three of its `OUT` columns are appended to `points`, the other `REST`
+/// to `covariances`. Both slices of rays have the same length.
 #[inline(always)]
 pub(super) fn for_pairs<const FUSED: bool, const W: usize, const OUT: usize, const REST: usize>(
     kernel: &impl Kernel<6, OUT>,

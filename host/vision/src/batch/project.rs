@@ -1,4 +1,4 @@
-//! Points to pixels.
+//! Projection of whole arrays of points to pixels.
 
 use multiversion::multiversion;
 use multiversion::target::target_cfg_f;
@@ -7,10 +7,10 @@ use super::arc_tangent::angle_from_axis;
 use super::lanes::{ALWAYS_FUSED, Kernel, for_rows, polynomial};
 use crate::KannalaBrandt;
 
-/// Fewer are slower: three columns of numbers that lie by rows are best read in long runs.
+/// Rows per step. Fewer are slower: the three columns of a row-major array are read best in long runs.
 const LANES: usize = 32;
 
-/// What projection needs of a lens.
+/// The parameters of a lens that projection needs.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Project {
     k: [f64; 5],

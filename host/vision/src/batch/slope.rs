@@ -1,4 +1,4 @@
-//! How a lens's pixels and parameters turn its rays, for every lane: see [`crate::lens_derivatives`].
+//! Derivatives of rays by pixels and by lens parameters, for every lane: see [`crate::lens_derivatives`].
 
 use super::arc_tangent::angle_from_axis;
 use super::lanes::{multiply_add, polynomial};
@@ -6,7 +6,7 @@ use super::vectors::Vectors;
 use crate::KannalaBrandt;
 use crate::lens_derivatives::LENS_PARAMETERS;
 
-/// What the derivatives need of a lens.
+/// The parameters of a lens that its derivatives need.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct LensSlope {
     k: [f64; 5],
@@ -22,7 +22,7 @@ impl LensSlope {
         Self { k, derivative, aspect: lens.aspect() }
     }
 
-    /// The surroundings of unit rays in the camera's frame.
+    /// The lens's local geometry at unit rays in the camera's frame.
     #[inline(always)]
     pub(super) fn at<const FUSED: bool, const W: usize>(&self, [x, y, z]: &Vectors<W>) -> Slope<W> {
         let mut sine = [0.0; W];
@@ -49,7 +49,7 @@ impl LensSlope {
             per_across: [0.0; W],
         };
         for j in 0..W {
-            // On the axis any radius will do.
+            // On the axis every radial direction is equivalent.
             let on_axis = sine[j] <= 0.0;
             let per_sine = 1.0 / if on_axis { 1.0 } else { sine[j] };
             out.cos_phi[j] = if on_axis { 1.0 } else { x[j] * per_sine };
@@ -63,7 +63,7 @@ impl LensSlope {
     }
 }
 
-/// A ray's surroundings in the lens.
+/// A lens's local geometry at one ray per lane.
 pub(super) struct Slope<const W: usize> {
     focal: f64,
     per_aspect: f64,
@@ -74,19 +74,21 @@ pub(super) struct Slope<const W: usize> {
     cosine: [f64; W],
     /// The radius over the focal length.
     distorted: [f64; W],
-    /// Radians per pixel along the radius, and across it.
+    /// Radians per pixel along the radius.
     per_radial: [f64; W],
+    /// Radians per pixel across the radius.
     per_across: [f64; W],
 }
 
-/// How a number that depends on a ray changes with the ray's pixel, and at a fixed pixel with the lens's parameters.
+/// The derivatives of a number that depends on a ray: by the ray's pixel, and at a fixed pixel by the lens's
+/// parameters.
 pub(super) struct Gradient<const W: usize> {
     pub by_pixel: [[f64; W]; 2],
     pub by_lens: [[f64; W]; LENS_PARAMETERS],
 }
 
 impl<const W: usize> Slope<W> {
-    /// Of a number that changes by `gradient` · dray.
+    /// The derivatives of a number that changes by `gradient` · dray.
     #[inline(always)]
     pub(super) fn along<const FUSED: bool>(&self, [gx, gy, gz]: &Vectors<W>) -> Gradient<W> {
         let mut out = Gradient { by_pixel: [[0.0; W]; 2], by_lens: [[0.0; W]; LENS_PARAMETERS] };

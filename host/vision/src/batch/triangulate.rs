@@ -1,4 +1,4 @@
-//! Pairs of rays to points with their covariance.
+//! Pseudo-intersection of whole arrays of rays, with the covariance from angular noise.
 
 use multiversion::multiversion;
 use multiversion::target::target_cfg_f;
@@ -9,25 +9,28 @@ use super::lanes::{ALWAYS_FUSED, Kernel, multiply_add};
 use super::pairs::for_pairs;
 use crate::{Angle, Left, Point};
 
-/// One vector of eight, or two of four: the kernel holds some thirty values per row.
+/// Rows per step: one vector of eight lanes, or two of four. The kernel holds some thirty values per row.
 const LANES: usize = 8;
-/// Squared sine below which rays are parallel, or a point lies on the baseline.
+/// Squared sine below which rays count as parallel, or a point as on the baseline.
 const VANISHING_SQUARED: f64 = 1e-18;
 
-/// Points and covariances, in the rows of the rays they come from. NaN where the rays make no point.
+/// Points and covariances of [`triangulate_batch`], in the rows of their rays. Rows are NaN where the rays make no
+/// point.
 #[derive(Clone, Debug, PartialEq)]
 pub struct BatchTriangulation {
-    /// N × 3, millimetres, left frame.
+    /// Points: N × 3, millimetres, left frame.
     pub points: Vec<[f64; 3]>,
-    /// N × 4, mm²: xx, xh, hh and nn in each point's own axes, x along the baseline, h away from it through the point and n
-    /// across the epipolar plane. What is not listed is zero.
+    /// Covariances: N × 4, mm², as xx, xh, hh and nn in each point's own axes: x along the baseline, h away from it
+    /// through the point, n across the epipolar plane. The other elements are zero.
     pub covariances: Vec<[f64; 4]>,
     right_centre: Point<Left>,
 }
 
-/// The pseudo-intersections of N pairs of unit rays, both in the left frame, with their closed-form covariance for an
-/// angular standard deviation `sigma` of each ray. As [`crate::pseudo_intersection`] and [`crate::covariance()`]; what those
-/// refuse is NaN here. Rays beyond the shorter array are not looked at.
+/// Triangulates N pairs of unit rays (N × 3, both in the left frame) by pseudo-intersection, with the closed-form
+/// covariance for an angular standard deviation `sigma` of each ray.
+///
+/// The results are those of [`crate::pseudo_intersection`] and [`crate::covariance()`]; pairs that these refuse give
+/// NaN. Rays beyond the shorter array are ignored.
 ///
 /// With x along the baseline B, H the distance from it, λ and μ the ranges:
 ///
@@ -49,13 +52,13 @@ pub fn triangulate_batch(
 }
 
 impl BatchTriangulation {
-    /// No points yet, of a right camera at `right_centre`.
+    /// An empty batch for a right camera at `right_centre`.
     #[must_use]
     pub const fn new(right_centre: &Point<Left>) -> Self {
         Self { points: Vec::new(), covariances: Vec::new(), right_centre: *right_centre }
     }
 
-    /// Appends what [`triangulate_batch`] returns for the left and right `rays`.
+    /// Appends the results of [`triangulate_batch`] for the left and right `rays`.
     pub fn extend(&mut self, rays: [&[[f64; 3]]; 2], sigma: Angle, instructions: Instructions) {
         let count = rays[0].len().min(rays[1].len());
         let rays = rays.map(|rays| &rays[..count]);
@@ -66,7 +69,7 @@ impl BatchTriangulation {
         }
     }
 
-    /// The covariance of one row in mm², in the left frame; `None` where there is no such row or no point.
+    /// The covariance of one row in mm², in the left frame; `None` where the row does not exist or has no point.
     #[must_use]
     pub fn covariance(&self, row: usize) -> Option<Matrix3<f64>> {
         let (point, [xx, xh, hh, nn]) = (Vector3::from(*self.points.get(row)?), *self.covariances.get(row)?);
@@ -77,7 +80,7 @@ impl BatchTriangulation {
         Some(x * x.transpose() * xx + mixed * xh + h * h.transpose() * hh + n * n.transpose() * nn)
     }
 
-    /// Forgets the rows and keeps their memory.
+    /// Removes all rows and keeps their memory.
     pub fn clear(&mut self) {
         self.points.clear();
         self.covariances.clear();
@@ -98,7 +101,7 @@ fn triangulate_all<const FUSED: bool>(kernel: &Triangulate, rays: [&[[f64; 3]]; 
     for_pairs::<FUSED, LANES, 7, 4>(kernel, rays, &mut out.points, &mut out.covariances);
 }
 
-/// What triangulation needs of a pair.
+/// The parameters of a pair that triangulation needs.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct Triangulate {
     pub t: Vector3<f64>,
@@ -128,7 +131,8 @@ impl Triangulate {
         Self { t, per_baseline: 1.0 / t.norm(), variance: sigma.rad() * sigma.rad() }
     }
 
-    /// The formulas of the single-point functions without a root: n enters only as w wᵀ / w·w, with w along t × S.
+    /// The formulas of the single-point functions without a square root: n enters only as w wᵀ / w·w, with w along t ×
+    /// S.
     #[inline(always)]
     fn row<const FUSED: bool>(&self, u: &Vector3<f64>, v: &Vector3<f64>) -> [f64; 7] {
         let t = &self.t;
@@ -177,7 +181,7 @@ fn dot<const FUSED: bool>(a: &Vector3<f64>, b: &Vector3<f64>) -> f64 {
     multiply_add::<FUSED>(a.x, b.x, multiply_add::<FUSED>(a.y, b.y, a.z * b.z))
 }
 
-/// α a + β b
+/// Returns α a + β b.
 #[inline(always)]
 fn sum<const FUSED: bool>(alpha: f64, a: &Vector3<f64>, beta: f64, b: &Vector3<f64>) -> Vector3<f64> {
     let component = |i: usize| multiply_add::<FUSED>(alpha, a[i], beta * b[i]);

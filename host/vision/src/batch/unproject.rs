@@ -1,7 +1,7 @@
-//! Pixels to rays.
+//! Unprojection of whole arrays of pixels to rays.
 //!
-//! With q = r², both sin θ / r and cos θ are smooth functions of q, so that a ray is (x A(q), y A(q), C(q)) with two
-//! polynomials made once per lens: no root, no iteration, no sine.
+//! With q = r², both sin θ / r and cos θ are smooth functions of q. A ray is (x A(q), y A(q), C(q)) with two
+//! polynomials made once per lens, which needs no root, no iteration and no sine.
 
 use multiversion::multiversion;
 use multiversion::target::target_cfg_f;
@@ -10,27 +10,27 @@ use super::chebyshev::fit;
 use super::lanes::{ALWAYS_FUSED, Kernel, for_rows, polynomial};
 use crate::KannalaBrandt;
 
-/// One vector of eight for each polynomial.
+/// Rows per step: one vector of eight lanes for each polynomial.
 const LANES: usize = 8;
-/// Terms tried, fewest first.
+/// Numbers of polynomial terms that are tried, fewest first.
 const TERMS: std::ops::RangeInclusive<usize> = 12..=48;
-/// Largest error of a component of the ray that a fit may have.
+/// Largest allowed error of a component of the ray.
 const LARGEST_ERROR: f64 = 7e-15;
 
-/// What unprojection needs of a lens.
+/// The polynomials and parameters of a lens that unprojection needs.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct Unproject {
     sine_over_radius: Vec<f64>,
     cosine: Vec<f64>,
     centre: [f64; 2],
     per_aspect: f64,
-    /// r² → t in [-1, 1].
+    /// Factor of the map from r² to t in [-1, 1].
     slope: f64,
     largest_squared: f64,
 }
 
 impl Unproject {
-    /// `None` for a lens so bent that no polynomial of 48 terms is near enough: dr/dθ comes close to zero.
+    /// `None` for a lens that no polynomial of 48 terms approximates closely enough, because dr/dθ comes close to zero.
     pub(super) fn new(lens: &KannalaBrandt) -> Option<Self> {
         TERMS.map(|terms| Self::of_terms(lens, terms)).find(|fit| fit.error(lens) <= LARGEST_ERROR)
     }
@@ -54,7 +54,7 @@ impl Unproject {
         }
     }
 
-    /// The largest error of a component, on a grid of radii.
+    /// The largest error of a component of the ray, on a grid of radii.
     fn error(&self, lens: &KannalaBrandt) -> f64 {
         const RADII: u32 = 500;
         let error = |i: u32| {

@@ -1,4 +1,4 @@
-//! Vectors of three components, one in each lane.
+//! Arithmetic on vectors of three components, one vector in each lane.
 
 use nalgebra::Matrix3;
 
@@ -38,7 +38,7 @@ pub(super) fn scaled<const W: usize>(factor: &[f64; W], vector: &Vectors<W>) -> 
     out
 }
 
-/// Of length one, and the length.
+/// The unit vector along `vector`, and the length of `vector`.
 #[inline(always)]
 pub(super) fn unit<const FUSED: bool, const W: usize>(vector: &Vectors<W>) -> (Vectors<W>, [f64; W]) {
     let (mut norm, mut per_norm) = (dot::<FUSED, W>(vector, vector), [0.0; W]);

@@ -1,25 +1,26 @@
-//! Triangulation with the least angular error.
+//! Triangulation with the least angular error, in closed form.
 //!
-//! S. H. Lee and J. Civera, "Closed-form optimal two-view triangulation based on angular errors", ICCV 2019: the rays are
-//! turned by the least angles, in one of three norms, into one epipolar plane, and intersected there.
+//! S. H. Lee and J. Civera, "Closed-form optimal two-view triangulation based on angular errors", ICCV 2019. Both rays
+//! are turned into one epipolar plane, by angles that are least in one of three norms, and intersected there.
 
 use nalgebra::{Matrix3, Vector3};
 
 use super::{Rejection, Triangulated, in_plane, require, triangulated};
 use crate::{Left, Point, UnitRay};
 
-/// What is least: the sum of the two angles, the sum of the squares of their sines, or the larger of them.
+/// The norm of the two angular errors that [`angular`] minimises.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum AngularNorm {
-    /// L1: only the ray nearer to the baseline turns.
+    /// L1, the sum of both angles: only the ray nearer to the baseline turns.
     L1,
-    /// L2.
+    /// L2, the sum of the squared sines of both angles.
     L2,
-    /// L∞: both turn by the same angle.
+    /// L∞, the larger angle: both rays turn by the same angle.
     Linf,
 }
 
-/// The point with the least angular error in `norm`. Arguments as for [`crate::pseudo_intersection`].
+/// Triangulates with the least angular error in `norm`. The other arguments are those of
+/// [`crate::pseudo_intersection`].
 ///
 /// # Errors
 /// [`Rejection`] for rays that make no point.
@@ -48,11 +49,11 @@ fn longer(a: Vector3<f64>, b: Vector3<f64>) -> Vector3<f64> {
     if a.norm_squared() >= b.norm_squared() { a } else { b }
 }
 
-/// The direction orthogonal to the baseline with the least (n·u)² + (n·v)²: turned by a quarter about the baseline, the
-/// main axis of the normals t × u and t × v.
+/// The direction n orthogonal to the baseline with the least (n·u)² + (n·v)². It is the main axis of the normals t × u
+/// and t × v, turned by 90° about the baseline.
 fn least_squares_normal(from_u: &Vector3<f64>, from_v: &Vector3<f64>, along: &Vector3<f64>) -> Vector3<f64> {
     let spread: Matrix3<f64> = from_u * from_u.transpose() + from_v * from_v.transpose();
-    // The main axis of a matrix of rank two whose null vector is known: a quadratic equation in that plane.
+    // The matrix has rank two and a known null vector, so its main axis solves a quadratic equation in the plane.
     let x = longer(*from_u, *from_v);
     let Some(x) = x.try_normalize(super::VANISHING) else { return x };
     let y = along.cross(&x);

@@ -1,15 +1,16 @@
-//! Triangulation on a line feature.
+//! Triangulation of matches on a straight edge.
 //!
-//! Along an edge a match may slip without being noticed. Seen along the edge both rays are lines in a plane, and where
-//! these cross does not change when a match slips.
+//! A match may slip along an edge without being noticed. In the projection along the edge, both rays are lines in a
+//! plane, and their crossing does not move when a match slips.
 
 use super::{Rejection, Triangulated, VANISHING, plane_normal, require, triangulated};
 use crate::{Left, Point, UnitRay};
 
-/// The point where the rays cross as seen along `edge`, halfway between their heights. Other arguments as for
-/// [`crate::pseudo_intersection`].
+/// Triangulates in the projection along `edge`: the point where both rays cross there, midway between them along the
+/// edge.
 ///
-/// With e the edge: λ = [t, v, e] / [u, v, e], μ = [t, u, e] / [u, v, e], and the point is (λ u + t + μ v) / 2.
+/// With e the edge: λ = [t, v, e] / [u, v, e], μ = [t, u, e] / [u, v, e], and the point is (λ u + t + μ v) / 2. The
+/// other arguments are those of [`crate::pseudo_intersection`].
 ///
 /// # Errors
 /// [`Rejection`] for rays that make no point; [`Rejection::Parallel`] for an edge in the epipolar plane, which fixes no

@@ -1,4 +1,4 @@
-//! The methods of triangulation by name.
+//! The choice of a triangulation method by name.
 
 use std::fmt;
 use std::str::FromStr;
@@ -6,36 +6,39 @@ use std::str::FromStr;
 use nalgebra::Vector3;
 
 use super::{
-    AngularNorm, Triangulated, angular, edge_plane, mid2, midpoint, pseudo_intersection, rectified, reprojection,
+    AngularNorm, Rejection, Triangulated, angular, edge_plane, mid2, midpoint, pseudo_intersection, rectified,
+    reprojection,
 };
-use crate::{Drop, Left, PixelPair, Right, StereoPair, UnitRay};
+use crate::{DropReason, Left, PixelPair, Right, StereoPair, UnitRay};
 
-/// A method of triangulation. Ordinary noise makes no difference between them but for [`Kernel::Rectified`]; they differ
-/// for rays that miss each other by far, as when a match slips along an edge.
+/// A method of triangulation.
+///
+/// With ordinary pixel noise all but [`Kernel::Rectified`] perform alike. They differ for rays that miss each other by
+/// much, as when a match slips along an edge.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub enum Kernel {
-    /// [`pseudo_intersection`]: the default.
+    /// The default, [`pseudo_intersection`].
     #[default]
     PseudoIntersection,
-    /// [`midpoint`].
+    /// The method [`midpoint`].
     Midpoint,
-    /// [`mid2`].
+    /// The method [`mid2`].
     Mid2,
-    /// [`angular`], [`AngularNorm::L1`].
+    /// The method [`angular`] with [`AngularNorm::L1`].
     AngularL1,
-    /// [`angular`], [`AngularNorm::L2`].
+    /// The method [`angular`] with [`AngularNorm::L2`].
     AngularL2,
-    /// [`angular`], [`AngularNorm::Linf`].
+    /// The method [`angular`] with [`AngularNorm::Linf`].
     AngularLinf,
-    /// [`reprojection`].
+    /// The method [`reprojection`].
     Reprojection,
-    /// [`edge_plane`], with the direction of the edge that all matches lie on.
+    /// The method [`edge_plane`], with the common direction of the edges that all matches lie on.
     EdgePlane(UnitRay<Left>),
-    /// [`rectified`].
+    /// The method [`rectified`].
     Rectified,
 }
 
-/// A name that is no method's.
+/// Error of parsing a [`Kernel`]: the name belongs to no method.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[error(
     "'{0}' is no method of triangulation: choose pseudo-intersection, midpoint, mid2, angular-l1, angular-l2, \
@@ -44,7 +47,7 @@ pub enum Kernel {
 pub struct UnknownKernel(String);
 
 impl Kernel {
-    /// All that need no more than the pair.
+    /// All methods without parameters.
     pub const ALL: [Self; 8] = [
         Self::PseudoIntersection,
         Self::Midpoint,
@@ -56,24 +59,24 @@ impl Kernel {
         Self::Rectified,
     ];
 
-    /// The point of two matched pixels.
+    /// Triangulates two matched pixels.
     ///
     /// # Errors
-    /// [`Drop`] for pixels outside the lenses' fields, and for rays that make no point.
-    pub fn triangulate(&self, pixels: &PixelPair, pair: &StereoPair<'_>) -> Result<Triangulated, Drop> {
-        let left = pair.left.unproject::<Left>(pixels.left).map_err(|_| Drop::OutsideLeftField)?;
-        let right = pair.right.unproject::<Right>(pixels.right).map_err(|_| Drop::OutsideRightField)?;
+    /// [`DropReason`] for pixels outside the lenses' fields, and for rays that make no point.
+    pub fn triangulate(&self, pixels: &PixelPair, pair: &StereoPair<'_>) -> Result<Triangulated, DropReason> {
+        let left = pair.left.unproject::<Left>(pixels.left).map_err(|_| DropReason::OutsideLeftField)?;
+        let right = pair.right.unproject::<Right>(pixels.right).map_err(|_| DropReason::OutsideRightField)?;
         self.of_rays(pixels, &left, &right, pair)
     }
 
-    /// The same where the rays of `pixels` are known; `right` in the right camera's own frame.
+    /// Triangulates `pixels` whose rays are known; `right` is in the right camera's own frame.
     pub(crate) fn of_rays(
         &self,
         pixels: &PixelPair,
         left: &UnitRay<Left>,
         right: &UnitRay<Right>,
         pair: &StereoPair<'_>,
-    ) -> Result<Triangulated, Drop> {
+    ) -> Result<Triangulated, DropReason> {
         let (turned, centre) = (pair.left_from_right * *right, pair.left_from_right.origin());
         let made = match self {
             Self::PseudoIntersection => pseudo_intersection(left, &turned, &centre),
@@ -89,7 +92,7 @@ impl Kernel {
         Ok(made?)
     }
 
-    /// A stable name for the command line and for reports.
+    /// The stable name for the command line and for reports.
     #[must_use]
     pub const fn as_str(&self) -> &'static str {
         match self {
@@ -102,6 +105,17 @@ impl Kernel {
             Self::Reprojection => "reprojection",
             Self::EdgePlane(_) => "edge-plane",
             Self::Rectified => "rectified",
+        }
+    }
+}
+
+impl From<Rejection> for DropReason {
+    fn from(rejection: Rejection) -> Self {
+        match rejection {
+            Rejection::Parallel => Self::Parallax,
+            Rejection::OnBaseline => Self::OnBaseline,
+            Rejection::Diverging => Self::Diverging,
+            Rejection::OutsideView | Rejection::NotConverged => Self::NoPoint,
         }
     }
 }

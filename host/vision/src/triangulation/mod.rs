@@ -1,4 +1,4 @@
-//! A point from two rays: the pseudo-intersection, and others to compare with.
+//! Triangulation of two rays: the pseudo-intersection, and other methods for comparison.
 //!
 //! With u, v the unit rays and t the right centre in the left frame, the feet of the common perpendicular are at
 //!
@@ -6,21 +6,21 @@
 //! λ = ((t × v) · (u × v)) / |u × v|²        μ = ((t × u) · (u × v)) / |u × v|²        S = (λ u + t + μ v) / 2
 //! ```
 //!
-//! The midpoint S is short by δ² / (γ² + δ²) of the range, γ the parallax and δ the angle between the epipolar planes.
-//! The pseudo-intersection S' takes from S only its epipolar plane, with normal n = (t × S) / |t × S|, and intersects
-//! the rays projected onto that plane, with [a, b, c] the determinant:
+//! The midpoint S is too near by the fraction δ² / (γ² + δ²) of the range, with γ the parallax and δ the angle between
+//! the epipolar planes. The pseudo-intersection S' uses S only for its epipolar plane, with n = (t × S) / |t × S| as its
+//! normal, and intersects the rays projected onto that plane. With [a, b, c] the determinant:
 //!
 //! ```text
 //! λ' = [t, v, n] / [u, v, n]        μ' = [t, u, n] / [u, v, n]        S' = λ' (u - (u·n) n)
 //! ```
 //!
-//! To first order this plane halves the angle between the two epipolar planes, which puts S' in the family of
-//! Lee and Civera, "Closed-form optimal two-view triangulation based on angular errors", ICCV 2019.
+//! To first order this plane halves the angle between the two epipolar planes, so S' belongs to the family of Lee and
+//! Civera, "Closed-form optimal two-view triangulation based on angular errors", ICCV 2019.
 
 mod angular;
 mod edge_plane;
 mod kernel;
-mod mid2;
+mod midpoint;
 mod rectified;
 mod reprojection;
 
@@ -29,17 +29,18 @@ use nalgebra::Vector3;
 pub use angular::{AngularNorm, angular};
 pub use edge_plane::edge_plane;
 pub use kernel::{Kernel, UnknownKernel};
-pub use mid2::mid2;
+pub use midpoint::{Feet, closest_approach, mid2, midpoint};
 pub use rectified::rectified;
 pub use reprojection::reprojection;
 
 use crate::epipolar::dihedral;
 use crate::{Angle, Left, Length, Point, UnitRay};
 
-/// Sines below this are taken as zero: a range of 10⁹ baselines, where rounding leaves about seven digits.
+/// Sines below this count as zero. It corresponds to a range of 10⁹ baselines, where rounding leaves about seven
+/// digits.
 const VANISHING: f64 = 1e-9;
 
-/// A point seen by both cameras.
+/// A triangulated point with its ranges and the angles between its rays.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Triangulated {
     /// The point in the left frame.
@@ -50,7 +51,7 @@ pub struct Triangulated {
     pub right_range: Length,
     /// The angle between the epipolar planes of the two rays, not negative.
     pub skew: Angle,
-    /// The angle that the baseline spans as seen from the point.
+    /// The parallax: the angle that the baseline spans as seen from the point.
     pub parallax: Angle,
 }
 
@@ -61,14 +62,14 @@ pub enum Rejection {
     /// The rays, or their projections onto the common epipolar plane, are parallel: the range is infinite.
     #[error("parallel rays")]
     Parallel,
-    /// The point lies on the line through both centres (both rays near an epipole), the centres coincide, or they are
-    /// not finite: there is no epipolar plane.
+    /// There is no epipolar plane: the point lies on the line through both centres (both rays near an epipole), or the
+    /// centres coincide or are not finite.
     #[error("on the baseline")]
     OnBaseline,
     /// The rays meet behind a camera.
     #[error("diverging rays")]
     Diverging,
-    /// A ray does not meet the image plane of the rectified view, which holds less than 180°.
+    /// A ray does not meet the image plane of the rectified view, whose field is less than 180°.
     #[error("outside the rectified view")]
     OutsideView,
     /// The reprojection error has no minimum near the rays.
@@ -76,7 +77,18 @@ pub enum Rejection {
     NotConverged,
 }
 
-/// The pseudo-intersection S' of two rays.
+/// Triangulates two rays by their pseudo-intersection S'.
+///
+/// ```
+/// # use nalgebra::Vector3;
+/// # use vergence_vision::{Left, Point, UnitRay, pseudo_intersection};
+/// let point = Vector3::new(50.0, 20.0, 800.0);
+/// let centre = Point::<Left>::from_mm(Vector3::new(145.0, 0.0, 0.0));
+/// let [left, right] = [point, point - centre.mm()].map(|ray| UnitRay::<Left>::new(ray).expect("a direction"));
+/// let found = pseudo_intersection(&left, &right, &centre)?;
+/// assert!((found.point.mm() - point).norm() < 1e-9);
+/// # Ok::<(), vergence_vision::Rejection>(())
+/// ```
 ///
 /// `right` is the right camera's ray turned into the left frame; `right_centre` is the right optical centre.
 ///
@@ -95,7 +107,7 @@ pub fn pseudo_intersection(
     Ok(triangulated(point, left, right, right_centre))
 }
 
-/// Where the rays projected onto the epipolar plane with unit normal `n` meet.
+/// Intersects the rays projected onto the epipolar plane with unit normal `n`; returns the point in millimetres.
 fn in_plane(u: &Vector3<f64>, v: &Vector3<f64>, t: &Vector3<f64>, n: &Vector3<f64>) -> Result<Vector3<f64>, Rejection> {
     let determinant = u.cross(v).dot(n);
     require(determinant.abs() > VANISHING, Rejection::Parallel)?;
@@ -103,74 +115,6 @@ fn in_plane(u: &Vector3<f64>, v: &Vector3<f64>, t: &Vector3<f64>, n: &Vector3<f6
     let mu = t.cross(u).dot(n) / determinant;
     require(lambda > 0.0 && mu > 0.0, Rejection::Diverging)?;
     Ok(lambda * (u - n * u.dot(n)))
-}
-
-/// The midpoint S of the common perpendicular of two rays: the textbook method, biased towards the cameras where the
-/// rays are skew. Arguments as for [`pseudo_intersection`].
-///
-/// # Errors
-/// [`Rejection`] for rays that make no point.
-pub fn midpoint(
-    left: &UnitRay<Left>,
-    right: &UnitRay<Left>,
-    right_centre: &Point<Left>,
-) -> Result<Triangulated, Rejection> {
-    let feet = closest_approach(left, right, right_centre)?;
-    let point = feet.midpoint().mm();
-    plane_normal(&right_centre.mm(), &point)?;
-    require(feet.in_front(), Rejection::Diverging)?;
-    Ok(triangulated(point, left, right, right_centre))
-}
-
-/// Where two rays pass closest to each other.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Feet {
-    /// λ, along the left ray; negative behind the camera.
-    pub left_range: Length,
-    /// μ, along the right ray; negative behind the camera.
-    pub right_range: Length,
-    /// The foot on the left ray.
-    pub left: Point<Left>,
-    /// The foot on the right ray.
-    pub right: Point<Left>,
-}
-
-impl Feet {
-    /// Halfway between the feet: S.
-    #[must_use]
-    pub fn midpoint(&self) -> Point<Left> {
-        Point::from_mm((self.left.mm() + self.right.mm()) / 2.0)
-    }
-
-    /// Whether both feet are in front of their cameras.
-    #[must_use]
-    pub fn in_front(&self) -> bool {
-        self.left_range.mm() > 0.0 && self.right_range.mm() > 0.0
-    }
-}
-
-/// The feet of the common perpendicular of two rays. Arguments as for [`pseudo_intersection`].
-///
-/// # Errors
-/// [`Rejection::Parallel`].
-pub fn closest_approach(
-    left: &UnitRay<Left>,
-    right: &UnitRay<Left>,
-    right_centre: &Point<Left>,
-) -> Result<Feet, Rejection> {
-    let (u, v, t) = (left.vector(), right.vector(), right_centre.mm());
-    // Cross products, because 1 - (u·v)² has lost half its digits where the rays are nearly parallel.
-    let across = u.cross(&v);
-    let sine_squared = across.norm_squared();
-    require(sine_squared > VANISHING * VANISHING, Rejection::Parallel)?;
-    let lambda = t.cross(&v).dot(&across) / sine_squared;
-    let mu = t.cross(&u).dot(&across) / sine_squared;
-    Ok(Feet {
-        left_range: Length::from_mm(lambda),
-        right_range: Length::from_mm(mu),
-        left: Point::from_mm(lambda * u),
-        right: Point::from_mm(t + mu * v),
-    })
 }
 
 /// The unit normal of the epipolar plane through `point`.
@@ -198,7 +142,7 @@ fn triangulated(
     }
 }
 
-/// Stated as what must hold, so that a comparison with NaN rejects.
+/// Takes the condition that must hold, so that a comparison with NaN rejects.
 fn require(holds: bool, otherwise: Rejection) -> Result<(), Rejection> {
     if holds { Ok(()) } else { Err(otherwise) }
 }

@@ -1,8 +1,8 @@
-//! Range from the disparity of a rectified pair: the method of ordinary stereo, to compare with.
+//! Triangulation from the disparity of a rectified pair, the method of ordinary stereo, for comparison.
 //!
-//! Both images are projected onto one plane that holds the direction of the baseline (A. Fusiello, E. Trucco and A. Verri,
-//! "A compact algorithm for rectification of stereo pairs", 2000). With x along the baseline B and z along the mean of the
-//! optical axes as far as it is orthogonal to x, a point has one row y in both views and
+//! Both images are projected onto one plane parallel to the baseline (A. Fusiello, E. Trucco and A. Verri, "A compact
+//! algorithm for rectification of stereo pairs", 2000). With x along the baseline B and z along the mean of the optical
+//! axes as far as it is orthogonal to x, a point has one row y in both views and
 //!
 //! ```text
 //! Z = B / (x_left - x_right)        X = Z x_left        Y = Z (y_left + y_right) / 2
@@ -13,10 +13,10 @@ use nalgebra::{Matrix3, Vector3};
 use super::{Rejection, Triangulated, VANISHING, require, triangulated};
 use crate::{Left, Right, Transform, UnitRay};
 
-/// The point of two rays by the disparity of the rectified views. `right` is in the right camera's own frame.
+/// Triangulates two rays by their disparity in the rectified views. `right` is in the right camera's own frame.
 ///
 /// # Errors
-/// [`Rejection`] for rays that make no point, and for those that the views cannot show: 90° or more off their axis.
+/// [`Rejection`] for rays that make no point, and for rays 90° or more off the axis of the rectified views.
 pub fn rectified(
     left: &UnitRay<Left>,
     right: &UnitRay<Right>,

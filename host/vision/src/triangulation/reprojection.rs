@@ -1,20 +1,21 @@
-//! The point with the least reprojection error: maximum likelihood for equal noise in all pixel coordinates.
+//! Triangulation with the least reprojection error, the maximum likelihood for equal noise in all pixel coordinates.
 //!
-//! R. Hartley and A. Zisserman, *Multiple View Geometry*, 2004, §12.3, here by Gauss-Newton with Levenberg's damping from
-//! the pseudo-intersection.
+//! R. Hartley and A. Zisserman, *Multiple View Geometry*, 2004, §12.3. Solved by Gauss-Newton with Levenberg's damping,
+//! starting at the pseudo-intersection.
 
 use nalgebra::{Matrix3, Vector3};
 
 use super::{Rejection, Triangulated, pseudo_intersection, triangulated};
 use crate::{Frame, KannalaBrandt, Left, Pixel, PixelPair, Point, Right, StereoPair, UnitRay};
 
-/// From a start within a pixel, three or four suffice.
+/// Largest number of iterations; from a start within a pixel, three or four suffice.
 const ITERATIONS: usize = 30;
-/// A step below this part of the range ends the search.
+/// A step below this fraction of the range ends the search.
 const SMALL_STEP: f64 = 1e-12;
 
-/// The point whose images are nearest to `pixels`, which show the rays `left` and `right` (the latter in the right
-/// camera's own frame).
+/// Finds the point whose projections are nearest to `pixels`.
+///
+/// `left` and `right` are the rays of these pixels, each in its own camera's frame.
 ///
 /// # Errors
 /// [`Rejection`] for rays that make no point; [`Rejection::NotConverged`] where no minimum is found.
@@ -44,7 +45,7 @@ pub fn reprojection(
     Err(Rejection::NotConverged)
 }
 
-/// Sum of squares in px², half its gradient, and the normal matrix, by the point's coordinates.
+/// The sum of squared reprojection errors in px², half its gradient and its normal matrix by the point's coordinates.
 struct Errors {
     cost: f64,
     gradient: Vector3<f64>,

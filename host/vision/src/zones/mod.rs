@@ -1,17 +1,17 @@
 //! Stereo, mono and blind zones of two cameras in the horizontal plane.
 //!
-//! The zones are arcs of a circle of some radius about the rig's centre, the viewpoint. Azimuth runs from forward (y),
-//! positive to the right (x). A ray from the centre `c` of a camera with azimuth β meets the circle of radius R at the
-//! central angle
+//! The zones are arcs of a circle about the rig's centre. Azimuth is measured from forward (y), positive to the right
+//! (x). A ray from the centre `c` of a camera with azimuth β meets the circle of radius R at the central angle
 //!
 //! ```text
 //! ψ(β) = β + asin((cx cos β - cy sin β) / R)
 //! ```
 //!
 //! which grows with β while |c| < R. A camera with axis α and half field h therefore sees exactly the arc from ψ(α - h)
-//! to ψ(α + h), whatever the toe-in and for lenses past 180°, and the zones follow from counting two intervals.
+//! to ψ(α + h), for any toe-in and for fields past 180°, and the zones follow from counting two intervals.
 //!
-//! [`circle_zones`] and [`solid_zones`] do without the plane: any two poses, the real lenses, and what the robot's body hides.
+//! [`circle_zones`] and [`solid_zones`] take any two poses in space, the real lenses, and masks of the robot's own
+//! body.
 
 mod paper;
 mod spatial;
@@ -19,11 +19,11 @@ mod spatial;
 use std::f64::consts::{PI, TAU};
 
 pub use paper::{PAPER_FIELD, PUBLISHED_MODES, PublishedMode, paper_eq3, paper_eq3_applies};
-pub use spatial::{BodyMask, Eye, SolidZones, circle_zones, solid_zones};
+pub use spatial::{BodyMask, PlacedCamera, SolidZones, circle_zones, solid_zones};
 
 use crate::{Angle, Length};
 
-/// A camera seen from above.
+/// A camera in the horizontal plane, for [`zones_exact`].
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct PlanarCamera {
     /// Optical centre in millimetres: x to the right, y forward.
@@ -34,18 +34,18 @@ pub struct PlanarCamera {
     pub half_field: Angle,
 }
 
-/// How much of the circle two cameras, one, or none see. The three add up to 360°.
+/// The angles of the stereo, mono and blind zones of the circle. They add up to 360°.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Zones {
-    /// Seen by both cameras.
+    /// Angle seen by both cameras.
     pub stereo: Angle,
-    /// Seen by one camera.
+    /// Angle seen by one camera.
     pub mono: Angle,
-    /// Seen by none.
+    /// Angle seen by no camera.
     pub blind: Angle,
 }
 
-/// What an arc of the circle is seen by.
+/// The number of cameras that see an arc of the circle.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Coverage {
     /// No camera.
@@ -59,25 +59,25 @@ pub enum Coverage {
 /// An arc of the circle with one coverage.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Arc {
-    /// Where it begins: central azimuth from forward, positive to the right, from 0° to 360°.
+    /// Begin as central azimuth from forward, positive to the right, from 0° to 360°.
     pub start: Angle,
-    /// Where it ends, never before `start`; the last arc may pass 360°.
+    /// End, never before `start`; that of the last arc may exceed 360°.
     pub end: Angle,
-    /// What sees it.
+    /// Number of cameras that see it.
     pub coverage: Coverage,
 }
 
-/// The zones and the arcs they consist of.
+/// The zones of a circle and the arcs that they consist of.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ZoneMap {
     /// Total angle of each zone.
     pub zones: Zones,
-    /// Once around the circle in order of azimuth, each arc beginning where the one before ends.
+    /// The arcs once around the circle in order of azimuth, each beginning where the one before ends.
     pub arcs: Vec<Arc>,
 }
 
 impl ZoneMap {
-    /// The part of the stereo zone in the rear half of the circle: what both cameras see past each other's back.
+    /// The part of the stereo zone in the rear half of the circle, where both fields overlap behind the rig.
     #[must_use]
     pub fn rear_overlap(&self) -> Angle {
         let rear = |from: f64, to: f64| (to.min(1.5 * PI) - from.max(0.5 * PI)).max(0.0);
@@ -90,7 +90,8 @@ impl ZoneMap {
         Angle::from_rad(stereo.map(in_rear).sum())
     }
 
-    /// The map of a circle cut at `cuts` (central azimuths in radians), each part as `coverage` finds its middle.
+    /// Makes the map of a circle cut at `cuts` (central azimuths in radians); `coverage` is evaluated at the middle of
+    /// each arc.
     fn from_cuts(cuts: &[f64], coverage: impl Fn(f64) -> Coverage) -> Self {
         let mut starts: Vec<f64> = cuts.iter().map(|cut| cut.rem_euclid(TAU)).collect();
         starts.sort_by(f64::total_cmp);
@@ -119,7 +120,7 @@ impl ZoneMap {
 }
 
 impl Coverage {
-    /// By who sees it.
+    /// The coverage of a direction by which cameras see it.
     const fn of(left: bool, right: bool) -> Self {
         match (left, right) {
             (true, true) => Self::Stereo,
@@ -129,7 +130,7 @@ impl Coverage {
     }
 }
 
-/// Why a rig has no zones.
+/// Why the zones of a pair cannot be computed.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 #[non_exhaustive]
 pub enum ZonesError {
@@ -139,7 +140,7 @@ pub enum ZonesError {
     /// A camera's optical centre is not inside the circle.
     #[error("a camera lies outside the viewing circle: enlarge the radius or reduce the baseline")]
     OutsideCircle,
-    /// A sphere is not looked at in at least one direction.
+    /// The number of directions on the sphere is zero.
     #[error("solid angles need at least one direction")]
     NoDirections,
     /// A half field is not in 0° to 180°.
@@ -147,10 +148,19 @@ pub enum ZonesError {
     HalfField,
 }
 
-/// Arcs not longer than this are where two ends meet, in radians.
+/// Arcs up to this length in radians are rounding errors where two ends meet, and are left out.
 const ROUNDING: f64 = 1e-12;
 
-/// The exact zones of any two cameras on the circle of `radius` about the origin.
+/// Computes the exact zones of two cameras in the plane, on the circle of `radius` about the origin.
+///
+/// ```
+/// # use vergence_vision::{Angle, Length, symmetric_pair, zones_exact};
+/// let human = symmetric_pair(Length::from_mm(145.0), Angle::from_deg(0.0), Angle::from_deg(195.95));
+/// let zones = zones_exact(human, Length::from_mm(3000.0))?.zones;
+/// assert!(((zones.stereo + zones.mono + zones.blind).deg() - 360.0).abs() < 1e-9);
+/// assert!(zones.stereo.deg() > 190.0);
+/// # Ok::<(), vergence_vision::ZonesError>(())
+/// ```
 ///
 /// # Errors
 /// [`ZonesError`] where the input is not finite, a camera is not inside the circle, or a half field is out of range.
@@ -161,8 +171,10 @@ pub fn zones_exact(cameras: [PlanarCamera; 2], radius: Length) -> Result<ZoneMap
     Ok(ZoneMap::from_cuts(&cuts, |azimuth| coverage(&seen, azimuth)))
 }
 
-/// Two equal cameras on a common baseline: the left one at -`baseline` / 2 with its axis at -`separation` / 2, the
-/// right one mirrored. `separation` is positive outwards and negative for toe-in; `field` is the full horizontal field.
+/// Makes two equal cameras on a common baseline: the left one at -`baseline` / 2 with its axis at -`separation` / 2,
+/// the right one mirrored.
+///
+/// `separation` is positive outwards and negative for toe-in; `field` is the full horizontal field.
 #[must_use]
 pub fn symmetric_pair(baseline: Length, separation: Angle, field: Angle) -> [PlanarCamera; 2] {
     [-0.5, 0.5].map(|side| PlanarCamera {
@@ -172,7 +184,7 @@ pub fn symmetric_pair(baseline: Length, separation: Angle, field: Angle) -> [Pla
     })
 }
 
-/// The part of the circle that one camera sees, in radians.
+/// The arc of the circle that one camera sees, in radians.
 struct SeenArc {
     start: f64,
     width: f64,
@@ -195,7 +207,7 @@ fn seen_arc(camera: &PlanarCamera, radius: Length) -> Result<SeenArc, ZonesError
     Ok(SeenArc { start, width: central(axis + half_field) - start })
 }
 
-/// How many cameras see the circle at the central angle `azimuth` in radians.
+/// The coverage of the circle at the central angle `azimuth` in radians.
 fn coverage(seen: &[SeenArc; 2], azimuth: f64) -> Coverage {
     let [left, right] = seen.each_ref().map(|arc| (azimuth - arc.start).rem_euclid(TAU) < arc.width);
     Coverage::of(left, right)

@@ -1,7 +1,7 @@
-//! Zones of any two cameras in space: real lenses, any pose, and what the robot's body hides.
+//! Zones of two cameras in space, with real lenses, any pose, and masks of the robot's own body.
 //!
-//! A camera sees a point where its lens shows it on the sensor, within the valid cone, and not on the robot's own body. The
-//! test is on the angle to the axis; nothing asks for z > 0, because the lenses see past 90°.
+//! A camera sees a point that its lens projects onto the sensor, within the valid cone, and outside the image of the
+//! robot's own body. The test uses the angle to the axis and not the sign of z, because the lenses see past 90°.
 
 use std::f64::consts::{PI, TAU};
 
@@ -10,11 +10,11 @@ use nalgebra::Vector3;
 use super::{Coverage, ZoneMap, ZonesError};
 use crate::{Base, Camera, ImageSize, KannalaBrandt, Length, Pixel, Point, Transform};
 
-/// The circle is cut where visibility changes between two azimuths this many to the turn; an arc narrower than the step
-/// of 0.125° may be missed.
+/// Number of azimuths between which changes of visibility are sought; an arc narrower than the step of 0.125° may be
+/// missed.
 const STEPS: u32 = 2880;
 
-/// Which pixels of a camera show the robot's own body.
+/// A mask of the pixels of a camera that show the robot's own body.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct BodyMask {
     size: ImageSize,
@@ -22,14 +22,15 @@ pub struct BodyMask {
 }
 
 impl BodyMask {
-    /// From one value per pixel, by rows: true where the body is. `None` where the count is not that of the size.
+    /// Makes a mask from one value per pixel, by rows, true where the body is. `None` where their number does not fit
+    /// `size`.
     #[must_use]
     pub fn new(size: ImageSize, hidden: Vec<bool>) -> Option<Self> {
         let pixels = u64::from(size.width) * u64::from(size.height);
         (u64::try_from(hidden.len()) == Ok(pixels)).then_some(Self { size, hidden })
     }
 
-    /// Whether the pixel nearest to `pixel` shows the body. What lies outside the image does not.
+    /// Whether the pixel nearest to `pixel` shows the body; false outside the image.
     #[must_use]
     pub fn hides(&self, pixel: Pixel) -> bool {
         let (column, row) = (pixel.u.round(), pixel.v.round());
@@ -40,19 +41,19 @@ impl BodyMask {
     }
 }
 
-/// A camera in its place.
+/// A camera with its pose in the base frame, for [`circle_zones`] and [`solid_zones`].
 #[derive(Clone, Copy, Debug)]
-pub struct Eye<'a> {
-    /// The lens and sensor.
+pub struct PlacedCamera<'a> {
+    /// The lens with its sensor.
     pub lens: &'a KannalaBrandt,
-    /// Where it is: base x to the right, y down, z forward.
+    /// Its pose; the base frame has x to the right, y down, z forward.
     pub base_from_camera: Transform<Base, Camera>,
-    /// What of the image shows the robot.
+    /// The mask of the robot's own body, if there is one.
     pub body: Option<&'a BodyMask>,
 }
 
-impl Eye<'_> {
-    /// Whether `point` is seen.
+impl PlacedCamera<'_> {
+    /// Whether the camera sees `point`.
     #[must_use]
     pub fn sees(&self, point: &Point<Base>) -> bool {
         let in_camera = self.base_from_camera.inverse() * *point;
@@ -62,47 +63,53 @@ impl Eye<'_> {
     }
 }
 
-/// Solid angles around a rig in steradians. They add up to 4π.
+/// The solid angles of the zones around a rig in steradians. Stereo, mono and blind add up to 4π.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct SolidZones {
-    /// Seen by both cameras.
+    /// Solid angle seen by both cameras.
     pub stereo_sr: f64,
-    /// Seen by one camera.
+    /// Solid angle seen by one camera.
     pub mono_sr: f64,
-    /// Seen by none.
+    /// Solid angle seen by no camera.
     pub blind_sr: f64,
-    /// The part of `stereo_sr` behind the rig.
+    /// The part of `stereo_sr` behind the rig (z < 0).
     pub rear_sr: f64,
 }
 
-/// The zones of two cameras on the horizontal circle of `radius` around `centre`: by azimuth from forward (base z), positive
-/// to the right (base x).
+/// Computes the zones of two cameras on the horizontal circle of `radius` around `centre`.
+///
+/// Azimuth is measured from forward (base z), positive to the right (base x).
 ///
 /// # Errors
 /// [`ZonesError`] where a camera is not inside the circle's sphere or a value is not finite.
-pub fn circle_zones(eyes: &[Eye<'_>; 2], centre: &Point<Base>, radius: Length) -> Result<ZoneMap, ZonesError> {
-    check(eyes, centre, radius)?;
+pub fn circle_zones(
+    cameras: &[PlacedCamera<'_>; 2],
+    centre: &Point<Base>,
+    radius: Length,
+) -> Result<ZoneMap, ZonesError> {
+    check(cameras, centre, radius)?;
     let at = |azimuth: f64| Point::from_mm(centre.mm() + Vector3::new(azimuth.sin(), 0.0, azimuth.cos()) * radius.mm());
-    let [left, right] = eyes;
-    let cuts: Vec<f64> = eyes.iter().flat_map(|eye| changes(|azimuth| eye.sees(&at(azimuth)))).collect();
+    let [left, right] = cameras;
+    let cuts: Vec<f64> = cameras.iter().flat_map(|camera| changes(|azimuth| camera.sees(&at(azimuth)))).collect();
     Ok(ZoneMap::from_cuts(&cuts, |azimuth| {
         let point = at(azimuth);
         Coverage::of(left.sees(&point), right.sees(&point))
     }))
 }
 
-/// The solid angles of two cameras on the sphere of `radius` around `centre`, counted in as many evenly spread `directions`
-/// (a spherical Fibonacci lattice; 200 000 are right to about 0.001 sr).
+/// Computes the solid angles of the zones of two cameras on the sphere of `radius` around `centre`.
+///
+/// They are counted on a spherical Fibonacci lattice of `directions` points; 200 000 are right to about 0.001 sr.
 ///
 /// # Errors
-/// As [`circle_zones`].
+/// The errors of [`circle_zones`], and [`ZonesError::NoDirections`] for zero `directions`.
 pub fn solid_zones(
-    eyes: &[Eye<'_>; 2],
+    cameras: &[PlacedCamera<'_>; 2],
     centre: &Point<Base>,
     radius: Length,
     directions: u32,
 ) -> Result<SolidZones, ZonesError> {
-    check(eyes, centre, radius)?;
+    check(cameras, centre, radius)?;
     if directions == 0 {
         return Err(ZonesError::NoDirections);
     }
@@ -113,7 +120,7 @@ pub fn solid_zones(
         let (across, turn) = ((1.0 - height * height).sqrt(), golden * f64::from(i));
         let direction = Vector3::new(across * turn.cos(), height, across * turn.sin());
         let point = Point::from_mm(centre.mm() + direction * radius.mm());
-        let [left, right] = eyes.each_ref().map(|eye| eye.sees(&point));
+        let [left, right] = cameras.each_ref().map(|camera| camera.sees(&point));
         stereo += u32::from(left && right);
         mono += u32::from(left != right);
         rear += u32::from(left && right && direction.z < 0.0);
@@ -127,9 +134,9 @@ pub fn solid_zones(
     })
 }
 
-fn check(eyes: &[Eye<'_>; 2], centre: &Point<Base>, radius: Length) -> Result<(), ZonesError> {
-    for eye in eyes {
-        let away = (eye.base_from_camera.origin().mm() - centre.mm()).norm();
+fn check(cameras: &[PlacedCamera<'_>; 2], centre: &Point<Base>, radius: Length) -> Result<(), ZonesError> {
+    for camera in cameras {
+        let away = (camera.base_from_camera.origin().mm() - centre.mm()).norm();
         if !away.is_finite() || !radius.mm().is_finite() {
             return Err(ZonesError::NotFinite);
         }
@@ -140,7 +147,7 @@ fn check(eyes: &[Eye<'_>; 2], centre: &Point<Base>, radius: Length) -> Result<()
     Ok(())
 }
 
-/// The azimuths once around where `seen` changes, to rounding.
+/// Finds the azimuths in radians, once around, where `seen` changes, to rounding.
 fn changes(seen: impl Fn(f64) -> bool) -> Vec<f64> {
     let at = |i: u32| TAU * f64::from(i) / f64::from(STEPS);
     let flags: Vec<bool> = (0..=STEPS).map(|i| seen(at(i))).collect();

@@ -1,4 +1,4 @@
-//! What several tests of this crate need: lenses, rigs, sights of points, and Gaussian numbers, in plain numbers.
+//! Helpers of several tests: lenses, rigs, projections of points, and Gaussian numbers.
 
 #![allow(dead_code, reason = "every test uses a part")]
 #![allow(unused_imports, reason = "every test uses a part")]
@@ -23,12 +23,12 @@ pub fn left_from_middle(separation_deg: f64) -> Transform<Left, Base> {
     study::left_from_middle(Angle::from_deg(separation_deg))
 }
 
-/// Millimetres and degrees.
+/// Baseline in millimetres and separation in degrees.
 pub fn around(range: f64, azimuth: f64, elevation: f64) -> Vector3<f64> {
     study::around(Length::from_mm(range), Angle::from_deg(azimuth), Angle::from_deg(elevation))
 }
 
-/// From the environment, for long runs.
+/// The number of samples from the environment, for long runs.
 pub fn count(variable: &str, otherwise: u32) -> u32 {
     std::env::var(variable).ok().and_then(|text| text.parse().ok()).unwrap_or(otherwise)
 }

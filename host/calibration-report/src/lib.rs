@@ -1,0 +1,70 @@
+//! Reports: one self-contained HTML page that tells a person how good a calibration is and what would make it better.
+//!
+//! A page holds its style and its figures (SVG) itself, runs no script and loads nothing. It begins with a verdict in
+//! millimetres, for parallel cameras with baseline B that see a point at the distance Z with rays of standard deviation
+//! σ:
+//!
+//! ```text
+//! dZ = Z² σ √2 / B        Z = 350 mm, B = 145 mm
+//! ```
+
+mod arrows;
+mod checks;
+mod colour;
+mod coverage;
+mod depth;
+mod extrinsics;
+mod field_angle;
+mod image_frame;
+mod images;
+mod intrinsics;
+mod pattern;
+mod ray_field;
+mod ray_map;
+mod residuals;
+mod stage;
+mod verdict;
+
+use vergence_calibration::Validation;
+use vergence_page::{Page, escape};
+use vergence_vision::Angle;
+
+pub use extrinsics::{extrinsics_report, extrinsics_verdict};
+pub use images::ReportImage;
+pub use intrinsics::{intrinsics_report, intrinsics_verdict};
+pub use stage::stage_report;
+pub use verdict::{Verdict, stage_verdict};
+
+/// Origin of a report, and what it shows besides the calibration. Texts may hold any characters: they are escaped.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct ReportAbout {
+    /// Title of the page, such as the camera's name.
+    pub title: String,
+    /// Name and version of the program that calibrated.
+    pub program_version: String,
+    /// SHA-256 of the inputs, in hexadecimal: the same inputs give the same page.
+    pub inputs_sha256: String,
+    /// Date, as printed.
+    pub date: String,
+    /// The target, such as "9 × 6 inner corners, 24.23 mm".
+    pub target: String,
+    /// Half the field of the lens, if known. Coverage is measured against it, otherwise against the sensor's border.
+    pub half_field: Option<Angle>,
+    /// Prediction error of held-out views, if that was tried.
+    pub held_out: Option<Validation>,
+    /// The images of the left or only camera, and of the right, in which the target was looked for; may be empty.
+    pub images: [Vec<ReportImage>; 2],
+}
+
+/// Whole page of a report; `body` is HTML.
+fn page(kind: &'static str, about: &ReportAbout, body: String) -> String {
+    let origin = vec![
+        ("Made by", about.program_version.clone()),
+        ("Date", about.date.clone()),
+        ("Target", about.target.clone()),
+    ];
+    let inputs = escape(&about.inputs_sha256);
+    let footer =
+        format!("SHA-256 of the inputs: <code>{inputs}</code>. The same inputs give the same page, byte for byte.");
+    vergence_page::page(&Page { kind, title: about.title.clone(), origin, body, footer })
+}

@@ -1,0 +1,120 @@
+//! Observed corners of a calibration, with residuals and field angles.
+
+use std::collections::BTreeSet;
+
+use nalgebra::{Isometry3, Point3, Vector3};
+use vergence_calibration::{
+    Corner, ExtrinsicsCalibration, IntrinsicsCalibration, Side, StereoView, TargetView, reproject,
+};
+use vergence_vision::{Camera, KannalaBrandt, OpenCvFisheye, Pixel, Point, UnitRay};
+
+/// One observed corner.
+#[derive(Clone, Copy)]
+pub(crate) struct Observation {
+    /// Index of its view.
+    pub view: usize,
+    /// Observed position in the image.
+    pub observed: Pixel,
+    /// From its reprojection to the observed position, in pixels; `None` without a reprojection.
+    pub error: Option<[f64; 2]>,
+    /// Angle to the optical axis, in radians.
+    pub theta: f64,
+    /// Azimuth from right to down, in radians.
+    pub phi: f64,
+    /// Whether the calibration used it.
+    pub used: bool,
+}
+
+impl Observation {
+    fn new(lens: &OpenCvFisheye, view: usize, observed: Pixel, point: Option<Vector3<f64>>, used: bool) -> Self {
+        let reprojected = point.and_then(|point| reproject(lens, &Point::<Camera>::from_mm(point)));
+        let error = reprojected.map(|r| [observed.u - r.pixel[0], observed.v - r.pixel[1]]);
+        let ray = point.and_then(UnitRay::<Camera>::new);
+        let theta = ray.map_or(0.0, |ray| ray.angle_to_axis().rad());
+        let phi = ((observed.v - lens.cy) / lens.fy).atan2((observed.u - lens.cx) / lens.fx);
+        Self { view, observed, error: error.filter(|e| e.iter().all(|x| x.is_finite())), theta, phi, used }
+    }
+
+    pub fn length(&self) -> Option<f64> {
+        self.error.map(|[u, v]| u.hypot(v))
+    }
+}
+
+/// Every corner of the views that an intrinsics calibration used.
+pub(crate) fn of_intrinsics(calibration: &IntrinsicsCalibration, views: &[TargetView]) -> Vec<Observation> {
+    let left_out: BTreeSet<_> = calibration.outliers.iter().map(|o| (o.view, o.corner)).collect();
+    let height = height_mm(calibration, views);
+    let placed = views.iter().zip(&calibration.views).enumerate();
+    placed
+        .filter_map(|(index, (view, figures))| {
+            Some((index, view, *figures.pose.as_ref()?.camera_from_target.isometry()))
+        })
+        .flat_map(|(index, view, pose)| {
+            let (height, left_out) = (&height, &left_out);
+            view.corners.iter().enumerate().map(move |(place, corner)| {
+                let [x, y] = corner.target_mm;
+                let point = (pose * Point3::new(x, y, height([x, y]))).coords;
+                let used = !left_out.contains(&(index, place));
+                Observation::new(&calibration.opencv, index, corner.pixel, Some(point), used)
+            })
+        })
+        .collect()
+}
+
+/// The height of the target over its plane, as in [`vergence_calibration::TargetWarp`].
+fn height_mm(calibration: &IntrinsicsCalibration, views: &[TargetView]) -> impl Fn([f64; 2]) -> f64 + use<> {
+    let range = |axis: usize| {
+        let places = || views.iter().flat_map(|view| &view.corners).map(|corner| corner.target_mm[axis]);
+        (places().fold(f64::INFINITY, f64::min), places().fold(f64::NEG_INFINITY, f64::max))
+    };
+    let ranges = [range(0), range(1)];
+    let warp = calibration.warp.map(|warp| [warp.along_x_mm, warp.along_y_mm]);
+    move |place| {
+        let bow = |axis: usize| {
+            let (low, high) = ranges[axis];
+            1.0 - ((2.0 * place[axis] - low - high) / (high - low)).powi(2)
+        };
+        warp.map_or(0.0, |[along_x, along_y]| along_x * bow(0) + along_y * bow(1))
+    }
+}
+
+/// Every corner of one camera in the views that an extrinsics calibration used.
+pub(crate) fn of_extrinsics(calibration: &ExtrinsicsCalibration, views: &[StereoView], side: Side) -> Vec<Observation> {
+    let left_out: BTreeSet<_> = calibration
+        .outliers
+        .iter()
+        .filter(|outlier| outlier.side == side)
+        .map(|outlier| key(&outlier.view, outlier.target_mm, outlier.pixel))
+        .collect();
+    let camera: &KannalaBrandt = if side == Side::Left { &calibration.left } else { &calibration.right };
+    let lens = camera.to_opencv();
+    let camera_from_left = match side {
+        Side::Left => Isometry3::identity(),
+        Side::Right => calibration.joint.left_from_right.isometry().inverse(),
+    };
+    let mut observations = Vec::new();
+    for ((index, view), figures) in took_part(calibration, views).zip(&calibration.views) {
+        let camera_from_target = camera_from_left * figures.left_from_target.isometry();
+        let observed: &[Corner] = if side == Side::Left { &view.left.corners } else { &view.right.corners };
+        observations.extend(observed.iter().map(|corner| {
+            let [x, y] = corner.target_mm;
+            let point = (camera_from_target * Point3::new(x, y, 0.0)).coords;
+            let used = !left_out.contains(&key(&view.name, corner.target_mm, corner.pixel));
+            Observation::new(&lens, index, corner.pixel, Some(point), used)
+        }));
+    }
+    observations
+}
+
+/// The views that took part: those given, in their order, without those skipped.
+fn took_part<'a>(
+    calibration: &'a ExtrinsicsCalibration,
+    views: &'a [StereoView],
+) -> impl Iterator<Item = (usize, &'a StereoView)> {
+    let mut wanted = calibration.views.iter().peekable();
+    views.iter().enumerate().filter(move |(_, view)| wanted.next_if(|figures| figures.view == view.name).is_some())
+}
+
+fn key(view: &str, target_mm: [f64; 2], pixel: Pixel) -> (&str, [u64; 4]) {
+    (view, [target_mm[0], target_mm[1], pixel.u, pixel.v].map(f64::to_bits))
+}

@@ -1,0 +1,250 @@
+//! The normal equations in arrow form: their assembly, damped solution and covariance.
+
+use nalgebra::{Cholesky, DMatrix, DVector, Dyn, OMatrix, SMatrix, SVector, U1};
+
+use super::Step;
+use crate::Loss;
+
+/// Collects the residuals of one small block into JᵀJ, Jᵀr and the cost.
+pub struct Equations<const B: usize> {
+    shared_dimension: usize,
+    loss: Loss,
+    /// The upper triangle, row by row, of [J r]ᵀ[J r] with the columns shared, block, residual.
+    upper: Vec<f64>,
+    row: Vec<f64>,
+    cost: f64,
+    residuals: usize,
+}
+
+impl<const B: usize> Equations<B> {
+    pub(super) fn new(shared_dimension: usize, loss: Loss) -> Self {
+        let width = shared_dimension + B + 1;
+        Self { shared_dimension, loss, upper: vec![0.0; width * width], row: vec![0.0; width], cost: 0.0, residuals: 0 }
+    }
+
+    /// Adds one residual of `R` components with standard deviation `sigma`; the robust loss takes them together.
+    /// `shared[i]` is its derivative by the shared step's component `i` (missing ones are zero), `block[i]` by the
+    /// block step's component `i`.
+    pub fn add<const R: usize>(&mut self, residual: &[f64; R], sigma: f64, shared: &[[f64; R]], block: &[[f64; R]; B]) {
+        let s = residual.iter().map(|r| r * r).sum::<f64>() / (sigma * sigma);
+        self.cost += 0.5 * self.loss.cost(s);
+        self.accumulate(residual, shared, block, self.loss.weight(s).sqrt() / sigma);
+    }
+
+    /// As [`Self::add`], with unit standard deviation and without the robust loss: for priors and sensors that have no
+    /// outliers.
+    pub fn add_plain<const R: usize>(&mut self, residual: &[f64; R], shared: &[[f64; R]], block: &[[f64; R]; B]) {
+        self.cost += 0.5 * residual.iter().map(|r| r * r).sum::<f64>();
+        self.accumulate(residual, shared, block, 1.0);
+    }
+
+    fn accumulate<const R: usize>(
+        &mut self,
+        residual: &[f64; R],
+        shared: &[[f64; R]],
+        block: &[[f64; R]; B],
+        weight: f64,
+    ) {
+        self.residuals += R;
+        let n = self.shared_dimension;
+        let width = self.row.len();
+        for component in 0..R {
+            let columns = shared.iter().take(n).chain(std::iter::repeat_n(&[0.0; R], n.saturating_sub(shared.len())));
+            for (slot, column) in self.row.iter_mut().zip(columns.chain(block).chain([residual])) {
+                *slot = weight * column[component];
+            }
+            for i in 0..width {
+                let factor = self.row[i];
+                if factor != 0.0 {
+                    let line = &mut self.upper[i * width + i..(i + 1) * width];
+                    line.iter_mut().zip(&self.row[i..]).for_each(|(sum, x)| *sum += factor * x);
+                }
+            }
+        }
+    }
+
+    fn at(&self, i: usize, j: usize) -> f64 {
+        self.upper[i.min(j) * self.row.len() + i.max(j)]
+    }
+}
+
+/// n × B.
+type Coupling<const B: usize> = OMatrix<f64, Dyn, nalgebra::Const<B>>;
+
+/// The normal equations at one point: the shared block, every small block, and their couplings.
+#[derive(Clone, Debug)]
+pub struct SchurNormal<const B: usize> {
+    shared: DMatrix<f64>,
+    shared_gradient: DVector<f64>,
+    blocks: Vec<SmallBlock<B>>,
+    cost: f64,
+    residuals: usize,
+    squares: f64,
+}
+
+#[derive(Clone, Debug)]
+struct SmallBlock<const B: usize> {
+    matrix: SMatrix<f64, B, B>,
+    gradient: SVector<f64, B>,
+    coupling: Coupling<B>,
+}
+
+impl<const B: usize> SchurNormal<B> {
+    pub(super) fn from_parts(n: usize, common: &Equations<B>, parts: &[Equations<B>]) -> Self {
+        let last = n + B;
+        let mut normal = Self {
+            shared: DMatrix::zeros(n, n),
+            shared_gradient: DVector::zeros(n),
+            blocks: Vec::with_capacity(parts.len()),
+            cost: 0.0,
+            residuals: 0,
+            squares: 0.0,
+        };
+        for part in std::iter::once(common).chain(parts) {
+            normal.shared += DMatrix::from_fn(n, n, |i, j| part.at(i, j));
+            normal.shared_gradient += DVector::from_fn(n, |i, _| part.at(i, last));
+            normal.cost += part.cost;
+            normal.residuals += part.residuals;
+            normal.squares += part.at(last, last);
+        }
+        normal.blocks.extend(parts.iter().map(|part| SmallBlock {
+            matrix: SMatrix::from_fn(|i, j| part.at(n + i, n + j)),
+            gradient: SVector::from_fn(|i, _| part.at(n + i, last)),
+            coupling: Coupling::from_fn_generic(Dyn(n), nalgebra::Const::<B>, |i, j| part.at(i, n + j)),
+        }));
+        normal
+    }
+
+    /// ½ Σ ρ(‖r‖²).
+    #[must_use]
+    pub const fn cost(&self) -> f64 {
+        self.cost
+    }
+
+    /// The number of residual components.
+    #[must_use]
+    pub const fn residuals(&self) -> usize {
+        self.residuals
+    }
+
+    /// The estimated variance of one residual component, Σ r² over the degrees of freedom (residuals less unknowns),
+    /// after the robust weights; `None` without redundancy.
+    #[must_use]
+    pub fn variance(&self) -> Option<f64> {
+        let unknowns = self.shared.nrows() + B * self.blocks.len();
+        let freedom = self.residuals.checked_sub(unknowns).filter(|&f| f > 0)?;
+        Some(self.squares / freedom as f64)
+    }
+
+    /// The largest cosine between a column of the Jacobian and the residuals: zero at a minimum.
+    pub(super) fn gradient_cosine(&self) -> f64 {
+        let length = self.squares.sqrt();
+        let cosine = |gradient: f64, square: f64| {
+            if square > 0.0 && length > 0.0 { gradient.abs() / (square.sqrt() * length) } else { 0.0 }
+        };
+        let shared = self
+            .shared_gradient
+            .iter()
+            .zip(self.shared.diagonal().iter())
+            .map(|(&g, &s)| cosine(g, s))
+            .fold(0.0, f64::max);
+        let block = |b: &SmallBlock<B>| (0..B).map(|i| cosine(b.gradient[i], b.matrix[(i, i)])).fold(0.0, f64::max);
+        self.blocks.iter().map(block).fold(shared, f64::max)
+    }
+
+    /// The minimiser of the linear model plus ½ damping Σ Dᵢδᵢ², D the normal matrix's diagonal (Marquardt, 1963).
+    pub(super) fn damped_step(&self, damping: f64) -> Option<Step<B>> {
+        let reduced = self.reduce(damping)?;
+        let shared = reduced.shared.as_ref().map_or_else(|| DVector::zeros(0), |s| s.solve(&-reduced.gradient));
+        let blocks: Vec<_> = self
+            .blocks
+            .iter()
+            .zip(&reduced.blocks)
+            .map(|(block, factor)| -factor.solve(&(block.gradient + block.coupling.transpose() * &shared)))
+            .collect();
+        let term = |d: f64, g: f64, diagonal: f64| 0.5 * d * (damping * damped_diagonal(diagonal) * d - g);
+        let mut predicted: f64 =
+            (0..shared.len()).map(|i| term(shared[i], self.shared_gradient[i], self.shared[(i, i)])).sum();
+        for (step, block) in blocks.iter().zip(&self.blocks) {
+            predicted += (0..B).map(|i| term(step[i], block.gradient[i], block.matrix[(i, i)])).sum::<f64>();
+        }
+        Some(Step { shared, blocks, predicted })
+    }
+
+    /// The information of the shared unknowns after the small blocks are eliminated: the Schur complement. Its inverse
+    /// is [`Self::shared_covariance`]. `None` where a small block is singular.
+    #[must_use]
+    pub fn shared_information(&self) -> Option<DMatrix<f64>> {
+        let mut schur = self.shared.clone();
+        for block in &self.blocks {
+            schur -= &block.coupling * Cholesky::new(block.matrix)?.solve(&block.coupling.transpose());
+        }
+        Some(schur)
+    }
+
+    /// The marginal covariance of the shared step for unit variance of a residual component: multiply by
+    /// [`Self::variance`]. `None` where the unknowns are not determined.
+    #[must_use]
+    pub fn shared_covariance(&self) -> Option<DMatrix<f64>> {
+        invert_scaled(&self.shared_information()?)
+    }
+
+    /// The marginal covariance of small block `index`, in its local coordinates, given [`Self::shared_covariance`].
+    #[must_use]
+    pub fn block_covariance(&self, index: usize, shared_covariance: &DMatrix<f64>) -> Option<SMatrix<f64, B, B>> {
+        let block = self.blocks.get(index)?;
+        let factor = Cholesky::new(block.matrix)?;
+        let gain: Coupling<B> = factor.solve(&block.coupling.transpose()).transpose();
+        Some(factor.inverse() + gain.transpose() * shared_covariance * gain)
+    }
+
+    /// The covariance between the shared step (rows) and small block `index` (columns).
+    #[must_use]
+    pub fn cross_covariance(&self, index: usize, shared_covariance: &DMatrix<f64>) -> Option<Coupling<B>> {
+        let block = self.blocks.get(index)?;
+        Some(-shared_covariance * Cholesky::new(block.matrix)?.solve(&block.coupling.transpose()).transpose())
+    }
+
+    fn reduce(&self, damping: f64) -> Option<Reduced<B>> {
+        let n = self.shared.nrows();
+        let mut schur = self.shared.clone();
+        (0..n).for_each(|i| schur[(i, i)] += damping * damped_diagonal(self.shared[(i, i)]));
+        let mut gradient = self.shared_gradient.clone();
+        let mut blocks = Vec::with_capacity(self.blocks.len());
+        for block in &self.blocks {
+            let mut matrix = block.matrix;
+            (0..B).for_each(|i| matrix[(i, i)] += damping * damped_diagonal(block.matrix[(i, i)]));
+            let factor = Cholesky::new(matrix)?;
+            if n > 0 {
+                schur -= &block.coupling * factor.solve(&block.coupling.transpose());
+                gradient -= &block.coupling * factor.solve(&block.gradient);
+            }
+            blocks.push(factor);
+        }
+        let shared = if n > 0 { Some(Cholesky::new(schur)?) } else { None };
+        Some(Reduced { shared, gradient, blocks })
+    }
+}
+
+struct Reduced<const B: usize> {
+    shared: Option<Cholesky<f64, Dyn>>,
+    gradient: DVector<f64>,
+    blocks: Vec<Cholesky<f64, nalgebra::Const<B>>>,
+}
+
+/// An unknown that no residual depends on keeps its value; its diagonal of 1 keeps the damped matrix regular.
+fn damped_diagonal(diagonal: f64) -> f64 {
+    if diagonal > 0.0 { diagonal } else { 1.0 }
+}
+
+/// Inverse of a symmetric positive definite matrix whose rows may have very different units; `None` if it is singular.
+fn invert_scaled(matrix: &DMatrix<f64>) -> Option<DMatrix<f64>> {
+    let n = matrix.nrows();
+    let scale: OMatrix<f64, Dyn, U1> = matrix.diagonal().map(|d| 1.0 / d.sqrt());
+    if n == 0 || !scale.iter().all(|s| s.is_finite()) {
+        return (n == 0).then(|| matrix.clone());
+    }
+    let unit = DMatrix::from_fn(n, n, |i, j| matrix[(i, j)] * scale[i] * scale[j]);
+    let inverse = Cholesky::new(unit)?.inverse();
+    Some(DMatrix::from_fn(n, n, |i, j| inverse[(i, j)] * scale[i] * scale[j]))
+}

@@ -1,0 +1,70 @@
+//! Calibration targets and their observed corners.
+
+use vergence_vision::{Frame, Length, Pixel};
+
+/// The frame of a target: x along its rows of corners, y along its columns, the target is the plane z = 0.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Target;
+
+impl Frame for Target {}
+
+/// A chessboard, counted by its inner corners.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct TargetSpec {
+    /// Inner corners along x.
+    pub columns: u32,
+    /// Inner corners along y.
+    pub rows: u32,
+    /// Side of a square.
+    pub square: Length,
+}
+
+/// One corner of a target, observed in an image.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Corner {
+    /// Position on the target, x and y in millimetres; the target is the plane z = 0.
+    pub target_mm: [f64; 2],
+    /// Observed position in the image.
+    pub pixel: Pixel,
+    /// Standard deviation of `pixel` per axis, up to a factor common to all corners: a calibration weights corners by
+    /// it and estimates the factor. Positive; 1 if unknown.
+    pub relative_sigma: f64,
+}
+
+/// The corners that one image shows of the target; some may be missing.
+#[derive(Clone, Debug, PartialEq)]
+pub struct TargetView {
+    /// Name of the image, for reports.
+    pub name: String,
+    /// Observed corners, in any order.
+    pub corners: Vec<Corner>,
+}
+
+impl Corner {
+    /// A corner of relative sigma 1: no better or worse than others.
+    #[must_use]
+    pub const fn new(target_mm: [f64; 2], pixel: Pixel) -> Self {
+        Self { target_mm, pixel, relative_sigma: 1.0 }
+    }
+
+    /// `error_px` divided by the corner's relative sigma.
+    pub(crate) fn deviation(&self, error_px: f64) -> f64 {
+        error_px / self.relative_sigma
+    }
+
+    /// Whether all coordinates are finite and the relative sigma is finite and positive.
+    pub(crate) fn is_usable(&self) -> bool {
+        let [x, y] = self.target_mm;
+        let numbers = [x, y, self.pixel.u, self.pixel.v, self.relative_sigma];
+        numbers.iter().all(|number| number.is_finite()) && self.relative_sigma > 0.0
+    }
+}
+
+impl TargetSpec {
+    /// Position of corner `index`, counted row by row, on the target in millimetres.
+    #[must_use]
+    pub fn corner_mm(&self, index: u32) -> [f64; 2] {
+        let columns = self.columns.max(1);
+        [index % columns, index / columns].map(|n| f64::from(n) * self.square.mm())
+    }
+}
