@@ -6,6 +6,9 @@ use std::time::Duration;
 
 use indicatif::{ProgressBar, ProgressStyle};
 use serde_json::Value;
+use vergence_board::describe_pose;
+use vergence_protocol::PoseReport;
+use vergence_rig::Rig;
 
 use crate::failure::Failure;
 
@@ -96,6 +99,14 @@ impl Console {
 
     fn shows_progress(self) -> bool {
         !self.json && stderr().is_terminal()
+    }
+}
+
+/// Shows each pose of a board on `progress`.
+pub fn shown_on(progress: ProgressBar) -> impl FnMut(&Rig, &PoseReport) + Send + 'static {
+    move |rig, pose| {
+        progress.set_message(describe_pose(rig, pose));
+        progress.tick();
     }
 }
 

@@ -1,41 +1,29 @@
 //! The vergence command: moves the rig, sees, and measures.
 //!
-//! Only this crate touches devices, files, sockets, clocks and the terminal. `cmd` holds one module per verb; `link`
-//! speaks to a board; `sim` is a board without hardware; `camera` gives images; `look` turns a pair of images and a pose
-//! into a cloud; `output` writes files, whole or not at all.
+//! `cmd` holds one module per verb and what verbs share; `sim` reads, serves and drives simulated boards; `live` measures while
+//! the stages move; `output` writes files, whole or not at all. Only this crate touches the terminal.
 //!
 //! Exit codes: 0 ok, 1 check failed, 2 usage or bad input, 3 device, 4 protocol mismatch.
 
-pub mod board;
-mod board_watch;
-mod boards;
-pub mod camera;
 mod camera_files;
 pub mod cli;
 mod cmd;
 mod console;
 mod corners;
-pub mod dense;
+mod csv_file;
 pub mod failure;
 mod firmware;
-pub mod flashing;
 mod interrupt;
-pub mod link;
 pub mod live;
-pub mod look;
-pub mod models;
-pub mod move_plan;
 mod output;
 mod provenance;
-mod python;
-mod reproduce;
 mod rig_file;
-mod rig_zones;
-mod score;
-pub mod setting_text;
+mod serial_ports;
 pub mod sim;
 mod slots;
-mod stage_plan;
+mod stage_times;
 mod stopwatch;
+mod target_images;
+mod target_watch;
 
 pub use cli::run;

@@ -3,7 +3,6 @@
 use std::path::Path;
 
 use vergence_rig::{BENCH_TOML, Rig};
-use vergence_vision::KannalaBrandt;
 
 use crate::failure::Failure;
 
@@ -17,16 +16,13 @@ pub fn load(path: Option<&Path>) -> Result<Rig, Failure> {
     Rig::from_toml(&text).map_err(|error| Failure::input(path, error))
 }
 
-/// The built-in bench with sensors just as wide that have `width` pixels across.
+/// The built-in bench with sensors of the same size that have `width` pixels across.
 ///
 /// # Errors
-/// Where no pixels are left.
+/// Where `width` leaves no pixels.
 pub fn bench_with_sensors(width: u32) -> Result<Rig, Failure> {
-    let rig = bench()?;
-    let lens = |camera: KannalaBrandt| {
-        camera.resampled(width).map_err(|error| Failure::usage(format!("sensors of {width} pixels: {error}")))
-    };
-    Ok(Rig { left_camera: lens(rig.left_camera)?, right_camera: lens(rig.right_camera)?, ..rig })
+    let rig = bench()?.with_sensors(width);
+    rig.map_err(|error| Failure::usage(format!("sensors of {width} pixels: {error}")))
 }
 
 fn bench() -> Result<Rig, Failure> {

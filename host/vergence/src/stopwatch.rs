@@ -1,6 +1,15 @@
 //! How long computations take. Motion is timed by tokio's clock, which may be virtual; this one is always real.
 
-use std::time::Instant;
+use std::sync::LazyLock;
+use std::time::{Duration, Instant};
+
+#[allow(clippy::disallowed_methods, reason = "the clock that libraries are given")]
+static START: LazyLock<Instant> = LazyLock::new(Instant::now);
+
+/// Returns the time since this was first asked: the clock for libraries that time their work.
+pub fn clock() -> Duration {
+    START.elapsed()
+}
 
 /// A running stopwatch.
 #[derive(Clone, Copy, Debug)]

@@ -1,13 +1,10 @@
-//! `vergence bench`: how fast we are, beside others on the same work.
+//! `vergence bench`: the speed of this program beside others on the same work.
 
-mod busy;
 mod calibrate;
 mod matching;
 mod mcu;
+mod means;
 mod networks;
-mod peer;
-mod peer_opencv;
-mod sets;
 mod vision;
 
 use crate::console::Console;
@@ -22,18 +19,18 @@ pub struct Args {
 
 #[derive(Debug, clap::Subcommand)]
 enum Task {
-    /// Calibration and detection of boards, beside OpenCV and SciPy.
+    /// Measures calibration and the detection of targets, beside OpenCV and SciPy.
     ///
     /// Solves every fisheye set and detects every chessboard, then lets OpenCV (cv2.fisheye.calibrate with its crude
     /// guess, the SB detector) and SciPy's bundle adjustment do the same. Everything runs on one thread.
     Calibrate(calibrate::Args),
-    /// Matches that are right, over the angle between the optical axes: whole images, views, without networks.
+    /// Counts right matches over the angle between the optical axes: whole images, views, and without networks.
     Matching(matching::Args),
-    /// The simulated chip: busy code beside QEMU, and the firmware disarmed and armed beside real time.
+    /// Measures the simulated chip: busy code beside QEMU, and the firmware disarmed and armed beside real time.
     Mcu(mcu::Args),
-    /// Networks for a pair, beside Python's onnxruntime.
+    /// Measures networks for a pair, beside Python's onnxruntime.
     Networks(networks::Args),
-    /// Projection, unprojection and triangulation of whole arrays, beside OpenCV.
+    /// Measures projection, unprojection and triangulation of whole arrays, beside OpenCV.
     Vision(vision::Args),
 }
 

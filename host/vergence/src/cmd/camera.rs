@@ -120,8 +120,9 @@ fn in_json(camera: &KannalaBrandt) -> Value {
 fn project(camera: &KannalaBrandt, rays: &[[f64; 3]], console: Console) -> Result<(), Failure> {
     let mut pixels = Vec::new();
     for &ray in rays {
-        let ray = UnitRay::<Camera>::new(Vector3::from(ray))
-            .ok_or_else(|| Failure::usage(format!("{ray:?} is no direction")))?;
+        let ray = UnitRay::<Camera>::new(Vector3::from(ray)).ok_or_else(|| {
+            Failure::usage(format!("({}, {}, {}) has no direction: give a ray other than zero", ray[0], ray[1], ray[2]))
+        })?;
         let pixel = camera.project(&ray).ok();
         console.say(pixel.map_or("outside the lens's valid cone".into(), |p| format!("{:.6} {:.6}", p.u, p.v)))?;
         pixels.push(pixel.map(|p| [p.u, p.v]));

@@ -1,27 +1,25 @@
-//! How attached cameras are set up on the command line.
+//! Options for attached cameras.
 
 use std::time::Duration;
 
+use vergence_board::HostClock;
+use vergence_camera::{Camera, CameraError, V4lCamera, V4lSettings};
 use vergence_vision::ImageSize;
 
-use crate::camera::{Camera, V4lCamera, V4lSettings};
-use crate::failure::Failure;
-use crate::link::HostClock;
-
-/// What is asked of attached cameras; what is not said stays as it is.
+/// Settings of attached cameras; those that are not given stay as they are.
 #[derive(Clone, Copy, Debug, clap::Args)]
 pub struct CameraOptions {
     /// Image size of the cameras.
-    #[arg(long, value_parser = parse_pixels, value_name = "WxH")]
-    size: Option<(u32, u32)>,
-    /// Exposure, such as 5ms.
+    #[arg(long, value_parser = parse_size, value_name = "WxH")]
+    size: Option<ImageSize>,
+    /// Exposure time, such as 5ms.
     #[arg(long, value_parser = humantime::parse_duration)]
     exposure: Option<Duration>,
     /// Gain, in the camera's own unit.
     #[arg(long)]
     gain: Option<i64>,
-    /// How long reading out and sending a frame takes at most, such as 12ms; without it a frame period. The shorter it is
-    /// known to be, the better known is when a frame was exposed.
+    /// Longest time to read out and send an image, such as 12ms; without it, the time from one image to the next. The
+    /// shorter it is, the more exactly the time of an exposure is known.
     #[arg(long, value_name = "TIME", value_parser = humantime::parse_duration)]
     readout: Option<Duration>,
 }
@@ -30,28 +28,50 @@ impl CameraOptions {
     /// Opens the camera at `device`, such as /dev/video0.
     ///
     /// # Errors
-    /// No such camera, or one that offers no format that is understood.
-    pub fn open(&self, device: &str, clock: HostClock) -> Result<Box<dyn Camera>, Failure> {
+    /// No such camera, or none of its pixel formats is understood.
+    pub fn open(&self, device: &str, clock: HostClock) -> Result<Box<dyn Camera>, CameraError> {
         self.open_rolling(device, clock, Duration::ZERO)
     }
 
-    /// The same, for images of `size` where no other is asked for.
+    /// The same options, with images of `size` unless a size was given.
     #[must_use]
     pub fn for_size(self, size: ImageSize) -> Self {
-        Self { size: self.size.or(Some((size.width, size.height))), ..self }
+        Self { size: self.size.or(Some(size)), ..self }
     }
 
-    /// As [`Self::open`] for a camera that exposes its rows one after the other, the last so long after the first.
+    /// Opens a camera that exposes its rows one after the other; `rolling` is the time from the first row to the last.
     ///
     /// # Errors
     /// As of [`Self::open`].
-    pub fn open_rolling(&self, device: &str, clock: HostClock, rolling: Duration) -> Result<Box<dyn Camera>, Failure> {
+    pub fn open_rolling(
+        &self,
+        device: &str,
+        clock: HostClock,
+        rolling: Duration,
+    ) -> Result<Box<dyn Camera>, CameraError> {
         let CameraOptions { size, exposure, gain, readout } = *self;
         let settings = V4lSettings { size, exposure, gain, rolling, readout };
-        Ok(Box::new(V4lCamera::open(device.as_ref(), &settings, clock)?))
+        let now = Box::new(move || Duration::from_micros(clock.now().0));
+        Ok(Box::new(V4lCamera::open(device.as_ref(), &settings, now)?))
     }
 }
 
-fn parse_pixels(text: &str) -> Result<(u32, u32), String> {
-    super::calibrate::parse_size(text).map(|size| (size.width, size.height))
+/// Reads an image size such as 960x600.
+///
+/// # Errors
+/// Says how it is written.
+pub fn parse_size(text: &str) -> Result<ImageSize, String> {
+    const HINT: &str = "write width x height in pixels, such as 960x600";
+    let (width, height) = text.split_once(['x', 'X', '×']).ok_or(HINT)?;
+    let count = |part: &str| part.trim().parse().ok().filter(|n| (1..=100_000).contains(n)).ok_or(HINT);
+    Ok(ImageSize { width: count(width)?, height: count(height)? })
+}
+
+/// Parses a rate of the camera trigger, in pulses per second.
+///
+/// # Errors
+/// A sentence that says what is expected.
+pub fn parse_rate(text: &str) -> Result<f64, String> {
+    let rate = text.parse().ok().filter(|rate| (0.1..=500.0).contains(rate));
+    rate.ok_or_else(|| format!("'{text}' is no rate: choose 0.1 to 500 pulses each second"))
 }

@@ -1,138 +1,205 @@
-//! `vergence capture`: a set of board views, with advice on what to show.
+//! `vergence capture`: a set of target views, with advice on what to show.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
+use std::pin::pin;
 
 use serde_json::json;
-use vergence_calibration::{BoardSpec, Coverage};
-use vergence_scene::Board;
+use tokio::task::spawn_blocking;
+use vergence_board::HostClock;
+use vergence_calibration::{Coverage, TargetSpec};
+use vergence_camera::{Camera, CameraError, CameraImage, CameraSet};
+use vergence_scene::Target;
+use vergence_sim::{HeldTarget, TargetCamera};
 use vergence_vision::{ImageSize, Side};
 
-use super::board_options::BoardOptions;
 use super::camera_options::CameraOptions;
-use crate::board_watch::{BoardWatch, NAMES, seen};
-use crate::camera::{BoardStage, Camera, CameraSet, Frame, SimulatedBoardCamera};
+use super::target_options::TargetOptions;
 use crate::cli::Globals;
 use crate::console::Console;
 use crate::failure::Failure;
-use crate::link::HostClock;
+use crate::interrupt::interrupted;
 use crate::output::{make_folder, write_png};
 use crate::rig_file;
+use crate::target_watch::{NAMES, TargetViews, TargetWatch, observe};
 
-/// Watches one camera or a pair, and keeps an image whenever a still board is seen where it was not seen enough. Every
-/// image is written at once: whatever ends the capture, what was taken is kept.
+/// Watches one camera or a pair, and keeps an image whenever a still target is seen where few views were. Every image is
+/// written at once: whatever ends the capture, the views are kept. In a folder that has views already, more are added.
 #[derive(Debug, clap::Args)]
 pub struct Args {
     #[command(flatten)]
-    board: BoardOptions,
+    target: TargetOptions,
     /// The cameras: one device such as /dev/video0, or left and right; or `sim` for simulated ones.
     #[arg(long, num_args = 1..=2, required = true, value_name = "DEVICE")]
     cameras: Vec<String>,
     /// The folder for the images: left000.png, right000.png and so on.
     #[arg(long, value_name = "DIR")]
     out: PathBuf,
-    /// Stop after this many views, complete or not.
+    /// Stops after this many views, complete or not.
     #[arg(long, default_value_t = 40)]
     views: usize,
-    /// Give up after this many frames.
+    /// Give up after this many images of each camera.
     #[arg(long, default_value_t = 100_000)]
     frames: u64,
     #[command(flatten)]
     camera: CameraOptions,
-    /// Of simulated cameras: one, instead of the pair in its human pose.
+    /// With simulated cameras: one camera instead of the pair in its human pose.
     #[arg(long)]
     mono: bool,
-    /// Of simulated cameras: where the board is held, and the noise.
+    /// With simulated cameras: seed of the places where the target is held, and of the noise.
     #[arg(long, default_value_t = 1)]
     seed: u64,
 }
 
-pub fn run(args: &Args, globals: &Globals, console: Console) -> Result<(), Failure> {
-    let board = args.board.spec()?;
-    let cameras = CameraSet::new(open(args, globals, &board)?);
-    capture(cameras, &board, args, console)
+pub async fn run(args: &Args, globals: &Globals, console: Console) -> Result<(), Failure> {
+    let target = args.target.spec()?;
+    let cameras = CameraSet::new(open(args, globals, &target)?);
+    capture(cameras, target, args, interrupted(), console).await
 }
 
-fn capture(mut cameras: CameraSet, board: &BoardSpec, args: &Args, console: Console) -> Result<(), Failure> {
+/// Counts of a capture.
+#[derive(Default)]
+struct Counts {
+    images: u64,
+    alone: u64,
+    missed: u64,
+}
+
+async fn capture(
+    mut cameras: CameraSet,
+    target: TargetSpec,
+    args: &Args,
+    interruption: impl Future<Output = ()>,
+    console: Console,
+) -> Result<(), Failure> {
     make_folder(&args.out)?;
-    let mut watch = BoardWatch::new(Vec::new());
-    let progress = console.progress("show the board");
-    let advice = |watch: &BoardWatch| watch.advice().unwrap_or_else(|| "the set is complete".into());
-    let mut frames_seen = 0;
-    while watch.taken() < args.views && frames_seen < args.frames && !watch.is_complete() {
-        let frames = cameras.grab()?;
-        if frames_seen == 0 {
-            watch = BoardWatch::new(frames.iter().map(|frame| Coverage::new(size(frame))).collect());
+    let first = first_free(&args.out);
+    let mut interruption = pin!(interruption);
+    let mut watch = TargetWatch::new(Vec::new());
+    let progress = console.progress("show the target");
+    let advice = |watch: &TargetWatch| watch.advice().unwrap_or_else(|| "the set is complete".into());
+    let mut counts = Counts::default();
+    let mut was_interrupted = false;
+    while watch.taken() < args.views && counts.images < args.frames && !watch.is_complete() {
+        let (images, views);
+        (cameras, images, views) = tokio::select! {
+            looked = look(cameras, target) => looked?,
+            () = &mut interruption => {
+                was_interrupted = true;
+                break;
+            }
+        };
+        if counts.images == 0 {
+            watch = TargetWatch::new(images.iter().map(|image| Coverage::new(size(image))).collect());
         }
-        frames_seen += 1;
-        let news = watch.look(seen(&frames, board)) && watch.is_news();
-        if news {
-            for (frame, name) in frames.iter().zip(NAMES) {
-                write_png(&args.out.join(format!("{name}{:03}.png", watch.taken())), &frame.image)?;
+        counts = Counts { images: counts.images + 1, alone: cameras.alone(), missed: cameras.missed() };
+        let is_wanted = watch.observe(views) && watch.is_news();
+        if is_wanted {
+            for (image, name) in images.iter().zip(NAMES) {
+                write_png(&args.out.join(file_name(name, first + watch.taken())), &image.image)?;
             }
             watch.take();
         }
         progress.set_message(format!("{} views; {}", watch.taken(), advice(&watch)));
         progress.tick();
-        if news {
+        if is_wanted {
             progress.suspend(|| console.say(format!("view {} taken; {}", watch.taken(), advice(&watch))))?;
         }
     }
     progress.finish_and_clear();
+    report(&watch, &counts, was_interrupted, args, console)
+}
+
+/// Takes one image with each camera and looks for the target in them, on a thread of its own.
+async fn look(
+    mut cameras: CameraSet,
+    target: TargetSpec,
+) -> Result<(CameraSet, Vec<CameraImage>, TargetViews), Failure> {
+    let looked = spawn_blocking(move || {
+        let images = cameras.grab()?;
+        let views = observe(&images, &target);
+        Ok((cameras, images, views))
+    });
+    looked.await.map_err(|error| Failure::device(format!("looking through the cameras failed: {error}")))?
+}
+
+fn report(
+    watch: &TargetWatch,
+    counts: &Counts,
+    was_interrupted: bool,
+    args: &Args,
+    console: Console,
+) -> Result<(), Failure> {
     let complete = watch.is_complete();
-    console.say(format!(
-        "{} views in {}{}",
-        watch.taken(),
-        args.out.display(),
-        if complete { "; the set is complete" } else { "; the set is not complete" }
-    ))?;
-    if cameras.alone() > 0 {
-        console.say(format!("{} frames had no partner of the other camera taken at the same time", cameras.alone()))?;
+    let state = match (complete, was_interrupted) {
+        (true, _) => "the set is complete",
+        (false, true) => "interrupted: they are kept, and the same command adds to them",
+        (false, false) => "the set is not complete",
+    };
+    console.say(format!("{} views in {}; {state}", watch.taken(), args.out.display()))?;
+    if counts.alone > 0 {
+        console.say(format!("{} images had no partner of the other camera taken at the same time", counts.alone))?;
     }
-    if cameras.missed() > 0 {
-        console.say(format!("{} frames were lost between the cameras and here", cameras.missed()))?;
+    if counts.missed > 0 {
+        console.say(format!("{} images were lost between the cameras and this program", counts.missed))?;
     }
     console.result(&json!({
         "views": watch.taken(),
-        "frames": frames_seen,
-        "frames_alone": cameras.alone(),
-        "frames_missed": cameras.missed(),
+        "frames": counts.images,
+        "frames_alone": counts.alone,
+        "frames_missed": counts.missed,
         "complete": complete,
+        "interrupted": was_interrupted,
         "out": args.out,
     }))
 }
 
-fn size(frame: &Frame) -> ImageSize {
+fn file_name(camera: &str, number: usize) -> String {
+    format!("{camera}{number:03}.png")
+}
+
+/// The first number that no image in `folder` has.
+fn first_free(folder: &Path) -> usize {
+    let is_free = |number: &usize| NAMES.iter().all(|name| !folder.join(file_name(name, *number)).exists());
+    (0..).find(is_free).unwrap_or_default()
+}
+
+fn size(frame: &CameraImage) -> ImageSize {
     ImageSize { width: frame.image.width(), height: frame.image.height() }
 }
 
-fn open(args: &Args, globals: &Globals, board: &BoardSpec) -> Result<Vec<Box<dyn Camera>>, Failure> {
+fn open(args: &Args, globals: &Globals, target: &TargetSpec) -> Result<Vec<Box<dyn Camera>>, Failure> {
     if args.cameras == ["sim"] {
-        return simulated(args, globals, board);
+        return simulated(args, globals, target);
     }
     let clock = HostClock::start();
-    args.cameras.iter().map(|device| args.camera.open(device, clock)).collect()
+    Ok(args.cameras.iter().map(|device| args.camera.open(device, clock)).collect::<Result<_, CameraError>>()?)
 }
 
-fn simulated(args: &Args, globals: &Globals, board: &BoardSpec) -> Result<Vec<Box<dyn Camera>>, Failure> {
+fn simulated(args: &Args, globals: &Globals, target: &TargetSpec) -> Result<Vec<Box<dyn Camera>>, Failure> {
     let rig = rig_file::load(globals.rig.as_deref())?;
     let targets = rig.mode("human").map(|mode| mode.targets.iter().map(|target| target.value()).collect::<Vec<_>>());
     let pose = rig.pose_at_values(&targets.unwrap_or_default());
-    let stage = BoardStage {
+    let held = HeldTarget {
         left: rig.left_camera,
         right: (rig.right_camera, pose.left_from_right),
         both: !args.mono,
-        board: Board { columns: board.columns, rows: board.rows, square: board.square },
+        target: Target { columns: target.columns, rows: target.rows, square: target.square },
         seed: args.seed,
     };
     let sides = if args.mono { &[Side::Left][..] } else { &[Side::Left, Side::Right] };
-    Ok(sides.iter().map(|&side| Box::new(SimulatedBoardCamera { stage, side, frames: 0 }) as Box<dyn Camera>).collect())
+    Ok(sides.iter().map(|&side| Box::new(TargetCamera::new(held, side)) as Box<dyn Camera>).collect())
 }
 
 #[cfg(test)]
 mod tests {
     #![allow(clippy::unwrap_used, reason = "a test may fail")]
 
+    use std::sync::Arc;
+    use std::sync::atomic::{AtomicBool, Ordering};
+    use std::time::Duration;
+
     use clap::Parser;
+    use tokio::sync::Notify;
 
     use super::*;
     use crate::rig_file::bench_with_sensors;
@@ -143,40 +210,84 @@ mod tests {
         args: Args,
     }
 
-    /// Shows the same board some times, then is gone.
-    struct Vanishing {
-        frame: Frame,
-        frames_left: u32,
+    /// A time in which a camera sends nothing.
+    #[derive(Default)]
+    struct Silence {
+        begun: Notify,
+        is_over: AtomicBool,
     }
 
-    impl Camera for Vanishing {
-        fn grab(&mut self) -> Result<Option<Frame>, Failure> {
-            let gone = || Failure::device("camera /dev/video0 vanished");
-            self.frames_left = self.frames_left.checked_sub(1).ok_or_else(gone)?;
-            Ok(Some(self.frame.clone()))
+    /// Shows the same target some times, then is gone, after a silence where there is one.
+    struct Ending {
+        image: CameraImage,
+        images_left: u32,
+        silence: Option<Arc<Silence>>,
+    }
+
+    impl Camera for Ending {
+        fn grab(&mut self) -> Result<Option<CameraImage>, CameraError> {
+            if let Some(left) = self.images_left.checked_sub(1) {
+                self.images_left = left;
+                return Ok(Some(self.image.clone()));
+            }
+            if let Some(silence) = &self.silence {
+                silence.begun.notify_one();
+                std::thread::park_timeout(Duration::from_secs(3));
+                silence.is_over.store(true, Ordering::SeqCst);
+            }
+            Err(CameraError::Vanished { device: "/dev/video0".into(), why: "no such device".into() })
         }
     }
 
-    #[test]
-    fn what_was_taken_before_a_camera_vanished_is_kept() {
-        let (rig, folder) = (bench_with_sensors(640).unwrap(), tempfile::tempdir().unwrap());
-        let out = folder.path().join("set");
-        let command = ["capture", "--board", "9x6", "--square", "20mm", "--cameras", "/dev/video0", "--out"];
-        let Line { args } = Line::parse_from(command.into_iter().map(Into::into).chain([out.clone().into_os_string()]));
-        let board = args.board.spec().unwrap();
+    /// Captures into `out` with a camera that ends after three images, and is interrupted in its silence. Returns the image
+    /// that the camera shows, and the outcome.
+    async fn capture_until_the_end(out: &Path, silence: Option<Arc<Silence>>) -> (CameraImage, Result<(), Failure>) {
+        let rig = bench_with_sensors(640).unwrap();
+        let command = ["capture", "--corners", "9x6", "--square", "20mm", "--cameras", "/dev/video0", "--out"];
+        let Line { args } = Line::parse_from(command.into_iter().map(Into::into).chain([out.as_os_str().to_owned()]));
+        let target = args.target.spec().unwrap();
         let nowhere = rig.pose_at_values(&[0.0, 0.0]).left_from_right;
-        let stage = BoardStage {
+        let held = HeldTarget {
             left: rig.left_camera,
             right: (rig.right_camera, nowhere),
             both: false,
-            board: Board { columns: board.columns, rows: board.rows, square: board.square },
+            target: Target { columns: target.columns, rows: target.rows, square: target.square },
             seed: 1,
         };
-        let frame = SimulatedBoardCamera { stage, side: Side::Left, frames: 0 }.grab().unwrap().unwrap();
-        let cameras = CameraSet::new(vec![Box::new(Vanishing { frame: frame.clone(), frames_left: 3 })]);
-        let failure = capture(cameras, &board, &args, Console::new(true)).unwrap_err();
+        let image = TargetCamera::new(held, Side::Left).grab().unwrap().unwrap();
+        let camera = Ending { image: image.clone(), images_left: 3, silence: silence.clone() };
+        let interruption = async {
+            match silence {
+                Some(silence) => silence.begun.notified().await,
+                None => std::future::pending().await,
+            }
+        };
+        let cameras = CameraSet::new(vec![Box::new(camera)]);
+        (image, capture(cameras, target, &args, interruption, Console::new(true)).await)
+    }
+
+    #[tokio::test]
+    async fn views_taken_before_a_camera_vanished_are_kept() {
+        let folder = tempfile::tempdir().unwrap();
+        let out = folder.path().join("set");
+        let (image, outcome) = capture_until_the_end(&out, None).await;
+        let failure = outcome.unwrap_err();
         assert_eq!(failure.kind().exit_code(), 3);
         assert!(failure.to_string().contains("vanished"));
-        assert_eq!(image::open(out.join("left000.png")).unwrap().to_rgb8(), frame.image);
+        assert_eq!(image::open(out.join("left000.png")).unwrap().to_rgb8(), image.image);
+    }
+
+    /// An interruption does not wait for a camera that sends nothing, and the next capture overwrites nothing.
+    #[tokio::test]
+    async fn an_interrupted_capture_ends_at_once_and_goes_on_later() {
+        let folder = tempfile::tempdir().unwrap();
+        let out = folder.path().join("set");
+        let silence = Arc::new(Silence::default());
+        capture_until_the_end(&out, Some(Arc::clone(&silence))).await.1.unwrap();
+        assert!(!silence.is_over.load(Ordering::SeqCst));
+        let first = std::fs::read(out.join("left000.png")).unwrap();
+        capture_until_the_end(&out, None).await.1.unwrap_err();
+        assert_eq!(std::fs::read(out.join("left000.png")).unwrap(), first);
+        assert!(out.join("left001.png").exists());
     }
 }

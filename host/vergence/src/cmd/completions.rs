@@ -7,10 +7,11 @@ use crate::cli;
 use crate::console::Console;
 use crate::failure::Failure;
 
-/// Prints the script on standard output. For bash: vergence completions bash > ~/.local/share/bash-completion/completions/vergence
+/// Prints the script on standard output. For bash:
+/// vergence completions bash > ~/.local/share/bash-completion/completions/vergence
 #[derive(Debug, clap::Args)]
 pub struct Args {
-    /// Which shell.
+    /// The shell.
     shell: Shell,
 }
 

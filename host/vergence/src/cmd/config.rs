@@ -5,17 +5,16 @@ mod file;
 use std::path::PathBuf;
 
 use serde_json::{Map, Value, json};
-use vergence_protocol::{Refusal, Request};
+use vergence_board::{Board, ManagementLink, NamedSetting, Port, restart, settings};
+use vergence_protocol::{ControllerState, Refusal, Request};
 
-use super::connect::connect_any;
-use crate::board::Board;
+use super::connect::{connect_any, port};
 use crate::cli::Globals;
 use crate::console::Console;
 use crate::failure::Failure;
 use crate::output::write_whole;
-use crate::setting_text::{NamedSetting, settings};
 
-/// Reads and changes what the board knows of its axes and its link. The board checks every value beside all others, and
+/// Prints and changes the board's settings of its axes and its link. The board checks every value beside all others, and
 /// changes nothing while it is armed.
 ///
 /// `stream_period` is how often the board sends its pose, 1ms to 10s or 0s for never, from the next session on. Every verb
@@ -28,30 +27,33 @@ pub struct Args {
 
 #[derive(Debug, clap::Subcommand)]
 enum What {
-    /// Show one setting, or all.
+    /// Prints one setting, or all.
     Get {
-        /// Such as baseline.speed, or baseline for all of that axis.
+        /// The setting, such as baseline.speed, or baseline for all settings of that axis.
         key: Option<String>,
-        /// Write all to a file that `set --file` reads.
+        /// Writes all settings to a file that `set --file` reads.
         #[arg(long, value_name = "FILE", conflicts_with = "key")]
         out: Option<PathBuf>,
     },
-    /// Change a setting, or all that a file names. It works at once, and until the next start unless saved.
+    /// Changes a setting, or all that a file names. The change works at once, and until the next start unless saved.
     Set {
-        /// Such as baseline.speed.
+        /// The setting, such as baseline.speed.
         #[arg(required_unless_present = "file", conflicts_with = "file", requires = "value")]
         key: Option<String>,
-        /// With its unit, such as 40mm/s.
+        /// The value with its unit, such as 40mm/s.
         #[arg(allow_hyphen_values = true)]
         value: Option<String>,
         /// A file that `get --out` wrote.
         #[arg(long, value_name = "FILE")]
         file: Option<PathBuf>,
     },
-    /// Keep the present settings through the next start.
+    /// Saves the present settings: they stay through the next start.
     Save,
-    /// Go back to the settings that the firmware came with, until the next start unless saved.
-    Restore,
+    /// Go back to the settings that the firmware came with, until the next start unless saved. Also called `restore`.
+    #[command(alias = "restore")]
+    Factory,
+    /// Go back to the settings that were saved: the board starts again with them, and its axes must be homed again.
+    Reload,
 }
 
 /// What is forgotten at the next start is said where it is changed.
@@ -60,6 +62,8 @@ const UNSAVED: &str = "'vergence config save' keeps it through the next start";
 pub async fn run(args: &Args, globals: &Globals, console: Console) -> Result<(), Failure> {
     // Settings must stay reachable when they contradict the rig file: they may be what has to be mended.
     let mut board = connect_any(globals, console, "settings").await?;
+    // A refusal names the latched fault, which poses tell.
+    board.next_pose().await?;
     match &args.what {
         What::Get { key: Some(key), .. } if board.rig().axis_index(key).is_none() => {
             get_one(&board, key, console).await
@@ -81,13 +85,34 @@ pub async fn run(args: &Args, globals: &Globals, console: Console) -> Result<(),
             console.say("the settings are saved")?;
             console.result(&json!({ "saved": true }))
         }
-        What::Restore => {
+        What::Reload => reload(board, globals, console).await,
+        What::Factory => {
             board.ask(Request::RestoreSettings).await?;
             console.say("the settings are those that the firmware came with")?;
             say_unsaved(console, true)?;
             console.result(&json!({ "restored": true }))
         }
     }
+}
+
+/// Starts the board again, so that it reads its saved settings.
+async fn reload(board: Board, globals: &Globals, console: Console) -> Result<(), Failure> {
+    let port = port(globals)?;
+    if port == Port::Simulated {
+        return Err(Failure::usage("a board in this process ends with it and saves nothing: name one with --port"));
+    }
+    if board.pose().state != ControllerState::Idle {
+        let state = board.pose().state;
+        let remedy = if board.pose().fault.is_some() { "vergence clear" } else { "vergence disarm" };
+        return Err(Failure::device(format!(
+            "the board is {state}, and starts again only when idle: run '{remedy}' first"
+        )));
+    }
+    board.close().await;
+    let mut link = ManagementLink::open(port, globals.baud).await?;
+    restart(&mut link).await?;
+    console.say("the board has started again with its saved settings: run 'vergence home' before moving")?;
+    console.result(&json!({ "reloaded": true }))
 }
 
 fn say_unsaved(console: Console, changed: bool) -> Result<(), Failure> {
@@ -137,7 +162,7 @@ async fn set_one(board: &Board, name: &str, text: &str, console: Console) -> Res
         Refusal::BadSetting => {
             Failure::usage(format!("{name} cannot be {text} beside the other settings of the board"))
         }
-        _ => board.refused(refusal),
+        _ => board.refused(refusal).into(),
     })?;
     let (now, before) = (setting.write(value), before.map(|before| setting.write(before)));
     console.say(format!("{name} is {now}, it was {}", before.as_deref().unwrap_or("unknown")))?;

@@ -3,25 +3,28 @@
 mod dense;
 mod motion;
 
-use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
+use std::sync::atomic::{AtomicUsize, Ordering};
 
 use serde_json::{Value, json};
-use vergence_matching::Matcher;
-use vergence_rig::{PairExposure, Rig, RigPose, SteadyMotion};
+use vergence_board::check_range;
+use vergence_camera::{Camera, CameraImage, FileCamera};
+use vergence_pipeline::gates::PIXEL_SIGMA;
+use vergence_pipeline::{Method, PairCloud, PairImages, PairPose, cloud_of_pairs, pair_cloud};
+use vergence_rig::{Rig, RigPose};
 use vergence_vision::{ImageSize, Kernel, Pixel, PixelPair};
 
 use self::motion::StageSpeed;
-use super::move_to::StagePose;
+use super::cloud_report::{PoseSource, drift_warning, dropped_json, dropped_lines};
 use super::report::rounded;
-use crate::board::check_range;
-use crate::camera::{Camera, FileCamera, Frame};
+use super::stage_pose::StagePose;
 use crate::cli::Globals;
+use crate::cmd::model_options::MatcherOptions;
 use crate::console::Console;
 use crate::failure::Failure;
-use crate::look::{Eyes, Look, PIXEL_SIGMA, look_by, look_exposed, triangulate};
-use crate::models::MatcherOptions;
-use crate::output::{Table, TableFormat, make_folder, ply, write_whole};
+use crate::interrupt::{interrupted, on_own_thread};
+use crate::output::{Table, TableFormat, check_ending, check_folder, make_folder, match_svg, ply, write_whole};
 use crate::rig_file;
 
 /// Matches two photographs (or two folders of them, paired in the order of their names) taken by the cameras of the rig
@@ -34,25 +37,28 @@ pub struct Args {
     /// The right image, or a folder.
     #[arg(long, value_name = "IMAGE")]
     right: PathBuf,
-    /// The cloud to write; for folders, the folder for one cloud per pair.
+    /// The cloud to write, a name that ends in .ply; for folders, the folder for one cloud per pair.
     #[arg(long, value_name = "FILE")]
     out: PathBuf,
-    /// Triangulate these correspondences instead of matching: CSV with columns u_left,v_left,u_right,v_right in pixels.
+    /// Correspondences to triangulate instead of matching: CSV with columns u_left,v_left,u_right,v_right in pixels.
     #[arg(long, value_name = "CSV")]
     points: Option<PathBuf>,
     /// The vision mode in which the photographs were taken, for a rig with axes.
     #[arg(long, conflicts_with_all = ["baseline", "separation"])]
     mode: Option<String>,
-    /// How two rays make a point: pseudo-intersection, or to compare with it midpoint, mid2, angular-l1, angular-l2,
-    /// angular-linf, reprojection, rectified, or for matches on parallel edges edge-plane:X,Y,Z with their direction in
-    /// the left frame.
+    /// Method of triangulation: pseudo-intersection, or for comparison midpoint, mid2, angular-l1, angular-l2,
+    /// angular-linf, reprojection, rectified; for matches on parallel edges, edge-plane:X,Y,Z with the direction of the
+    /// edges in the left frame.
     #[arg(long, value_name = "METHOD", default_value_t)]
     kernel: Kernel,
-    /// A range for every pixel of the left image instead of matched points: a binary cloud, and beside it PNG images of
-    /// range (mm, 16 bits; 0 none, 65535 too far), sigma (0.1 mm), confidence (of 255) and a preview.
+    /// Measures a range for every pixel of the left image instead of matched points: a binary cloud, and beside it PNG images
+    /// of range (mm, 16 bits; 0 none, 65535 too far), sigma (0.1 mm) and confidence (of 255), and a preview as SVG.
     #[arg(long, conflicts_with_all = ["points", "kernel", "matcher"])]
     dense: bool,
-    /// Write the points as tables too, beside the cloud.
+    /// Draws both images with the matched points, coloured by range, as SVG; for folders, the folder for one picture per pair.
+    #[arg(long, value_name = "SVG", conflicts_with = "dense")]
+    matches: Option<PathBuf>,
+    /// Writes the points as tables too, beside the cloud.
     #[arg(long, value_delimiter = ',', value_name = "FORMAT")]
     also: Vec<TableFormat>,
     #[command(flatten)]
@@ -63,53 +69,74 @@ pub struct Args {
     matching: MatcherOptions,
 }
 
-pub fn run(args: &Args, globals: &Globals, console: Console) -> Result<(), Failure> {
-    let rig = rig_file::load(globals.rig.as_deref())?;
+/// Pairs of images, for whoever interrupts.
+#[derive(Default)]
+struct Progress {
+    all: AtomicUsize,
+    measured: AtomicUsize,
+}
+
+pub async fn run(args: Args, globals: &Globals, console: Console) -> Result<(), Failure> {
+    let (progress, out, rig_path) = (Arc::new(Progress::default()), args.out.clone(), globals.rig.clone());
+    let counted = Arc::clone(&progress);
+    tokio::select! {
+        biased;
+        () = interrupted() => Err(Failure::interrupted(progress.in_words(&out))),
+        outcome = on_own_thread(move || every_pair(&args, rig_path.as_deref(), console, &counted)) => outcome,
+    }
+}
+
+impl Progress {
+    /// What is measured and what is left.
+    fn in_words(&self, out: &Path) -> String {
+        let [all, measured] = [&self.all, &self.measured].map(|count| count.load(Ordering::Relaxed));
+        match measured {
+            0 => format!("interrupted: nothing is written to {} yet; run the command again", out.display()),
+            _ => format!(
+                "interrupted: {measured} of {all} pairs are measured, their clouds are in {}; run the command again for all of \
+                 them, or with folders of the other {}",
+                out.display(),
+                all - measured.min(all)
+            ),
+        }
+    }
+}
+
+/// Measures every pair, one after the other.
+fn every_pair(args: &Args, rig: Option<&Path>, console: Console, progress: &Progress) -> Result<(), Failure> {
+    check_names(args)?;
+    let rig = rig_file::load(rig)?;
     let pose = pose(args, &rig)?;
     for sentence in rig.extrapolations(&pose.axes) {
         console.warn(sentence);
     }
-    let motion = args.speed.motion(&rig, &pose.axes)?;
+    let pair_pose = match args.speed.pose(&rig, &pose.axes)? {
+        Some(moving) => moving,
+        None => PairPose::standing(pose.clone()),
+    };
     let pairs = args.points.as_deref().map(read_pairs).transpose()?;
-    let (mut left, mut right) = (FileCamera::open(&args.left)?, FileCamera::open(&args.right)?);
-    if left.remaining() != right.remaining() {
-        return Err(Failure::usage(format!(
-            "{} has {} images and {} has {}: they must pair up",
-            args.left.display(),
-            left.remaining(),
-            args.right.display(),
-            right.remaining()
-        )));
-    }
+    let (mut left, mut right) = open_images(args)?;
+    progress.all.store(left.remaining(), Ordering::Relaxed);
     let matcher = if args.dense { None } else { Some(args.matching.matcher(console)?) };
     let several = args.left.is_dir();
     let (mut results, mut empty) = (Vec::new(), Vec::new());
     while let (Some(left), Some(right)) = (left.grab()?, right.grab()?) {
         let work = console.progress(&format!("{} and {}", left.name, right.name));
-        let Some(matcher) = &matcher else {
-            let result = dense::one_pair([&left, &right], &rig, &pose, &out_of(args, &left)?, console)?;
-            work.finish_and_clear();
-            if dense::is_empty(&result) {
-                empty.push(left.name);
-            }
-            results.push(result);
-            continue;
-        };
-        let how =
-            How { pairs: pairs.as_deref(), matcher: matcher.as_ref(), kernel: args.kernel, motion: motion.as_ref() };
-        let look = one_pair([&left, &right], &rig, &pose, how)?;
-        work.finish_and_clear();
         let out = out_of(args, &left)?;
-        write_whole(&out, ply(&look.points).as_bytes())?;
-        for format in &args.also {
-            let table = Table::of_points(&look.points).text(*format);
-            write_whole(&out.with_extension(format.extension()), table.as_bytes())?;
+        let result = match &matcher {
+            None => dense::one_pair([&left, &right], &rig, &pose, &out, console)?,
+            Some(matcher) => {
+                let method = Method { matcher: matcher.as_ref(), kernel: args.kernel };
+                let cloud = one_pair([&left, &right], &rig, &pair_pose, pairs.as_deref(), method)?;
+                work.suspend(|| write(args, [&left, &right], &cloud, &rig, &out, console))?
+            }
+        };
+        work.finish_and_clear();
+        if args.dense && dense::is_empty(&result) {
+            empty.push(left.name);
         }
-        console.say(format!("{} points in {}{}", look.points.len(), out.display(), in_words(&look.dropped)))?;
-        if let Some(warning) = look.warning() {
-            console.say(format!("warning: {warning}"))?;
-        }
-        results.push(result(&look, &out));
+        results.push(result);
+        progress.measured.fetch_add(1, Ordering::Relaxed);
     }
     console.result(&match (several, results.pop()) {
         (false, Some(only)) => only,
@@ -118,7 +145,63 @@ pub fn run(args: &Args, globals: &Globals, console: Console) -> Result<(), Failu
     if empty.is_empty() { Ok(()) } else { Err(dense::nothing_seen(&empty)) }
 }
 
-/// Where the cameras were: fixed by the rig file, or said on the command line.
+/// Refuses names of output files that say another format than the one written.
+fn check_names(args: &Args) -> Result<(), Failure> {
+    let several = args.left.is_dir();
+    match several {
+        true => check_folder(&args.out)?,
+        false => _ = check_ending(&args.out, &["ply"])?,
+    }
+    match &args.matches {
+        Some(folder) if several => check_folder(folder),
+        Some(file) => check_ending(file, &["svg"]).map(|_| ()),
+        None => Ok(()),
+    }
+}
+
+fn open_images(args: &Args) -> Result<(FileCamera, FileCamera), Failure> {
+    let (left, right) = (FileCamera::open(&args.left)?, FileCamera::open(&args.right)?);
+    if left.remaining() == right.remaining() {
+        return Ok((left, right));
+    }
+    Err(Failure::usage(format!(
+        "{} has {} images and {} has {}: they must pair up",
+        args.left.display(),
+        left.remaining(),
+        args.right.display(),
+        right.remaining()
+    )))
+}
+
+/// Writes and prints the cloud of one pair.
+fn write(
+    args: &Args,
+    [left, right]: [&CameraImage; 2],
+    cloud: &PairCloud,
+    rig: &Rig,
+    out: &Path,
+    console: Console,
+) -> Result<Value, Failure> {
+    write_whole(out, ply(&cloud.points).as_bytes())?;
+    for format in &args.also {
+        let table = Table::of_points(&cloud.points).text(*format);
+        write_whole(&out.with_extension(format.extension()), table.as_bytes())?;
+    }
+    if let Some(matches) = &args.matches {
+        let path = if args.left.is_dir() { in_folder(matches, left, "svg")? } else { matches.clone() };
+        let images = PairImages { left: &left.image, right: &right.image };
+        let drawn = match_svg(images, cloud).map_err(|error| Failure::output(&path, error))?;
+        write_whole(&path, drawn.as_bytes())?;
+    }
+    console.say(format!("{} points of {} matches in {}", cloud.points.len(), cloud.matches, out.display()))?;
+    dropped_lines(&cloud.dropped).iter().try_for_each(|line| console.say(line))?;
+    if let Some(warning) = drift_warning(cloud, PoseSource::of_photographs(rig)) {
+        console.warn(format!("{} and {}: {warning}", left.name, right.name));
+    }
+    Ok(result(cloud, out))
+}
+
+/// The pose of the cameras: fixed by the rig file, or given on the command line.
 fn pose(args: &Args, rig: &Rig) -> Result<RigPose, Failure> {
     let positions = match &args.mode {
         Some(name) => {
@@ -137,39 +220,36 @@ fn pose(args: &Args, rig: &Rig) -> Result<RigPose, Failure> {
     Ok(rig.pose_at_values(&values))
 }
 
-/// The cloud's file; for folders, in the folder of clouds, which is made.
-fn out_of(args: &Args, left: &Frame) -> Result<PathBuf, Failure> {
-    if !args.left.is_dir() {
-        return Ok(args.out.clone());
-    }
-    make_folder(&args.out)?;
-    Ok(args.out.join(format!("{}.ply", left.name)))
+/// The file for the cloud; where folders are given, in the folder for clouds, which is made.
+fn out_of(args: &Args, left: &CameraImage) -> Result<PathBuf, Failure> {
+    if args.left.is_dir() { in_folder(&args.out, left, "ply") } else { Ok(args.out.clone()) }
 }
 
-/// How homologous points are found, and points made of them.
-#[derive(Clone, Copy)]
-struct How<'a> {
-    pairs: Option<&'a [(PixelPair, f64)]>,
-    matcher: &'a dyn Matcher,
-    kernel: Kernel,
-    motion: Option<&'a (SteadyMotion, PairExposure)>,
+/// The file of a pair in `folder`, which is made.
+fn in_folder(folder: &Path, left: &CameraImage, ending: &str) -> Result<PathBuf, Failure> {
+    make_folder(folder)?;
+    Ok(folder.join(format!("{}.{ending}", left.name)))
 }
 
-fn one_pair([left, right]: [&Frame; 2], rig: &Rig, pose: &RigPose, how: How<'_>) -> Result<Look, Failure> {
+/// The cloud of one pair: of the given correspondences, or of what the matcher finds.
+fn one_pair(
+    [left, right]: [&CameraImage; 2],
+    rig: &Rig,
+    pose: &PairPose,
+    pairs: Option<&[(PixelPair, f64)]>,
+    method: Method<'_>,
+) -> Result<PairCloud, Failure> {
     check_size(left, rig.left_camera.size(), "left")?;
     check_size(right, rig.right_camera.size(), "right")?;
-    let eyes = Eyes { left: &left.image, right: &right.image };
+    let images = PairImages { left: &left.image, right: &right.image };
     let fail = |error: &dyn std::fmt::Display| Failure::usage(format!("{} and {}: {error}", left.name, right.name));
-    match (how.pairs, how.motion) {
-        (Some(pairs), _) => Ok(triangulate(pairs, eyes, rig, pose, how.kernel)),
-        (None, Some((motion, exposure))) => {
-            look_exposed(eyes, rig, motion, exposure, how.matcher).map(|(look, _)| look).map_err(|error| fail(&error))
-        }
-        (None, None) => look_by(how.kernel, eyes, rig, pose, how.matcher).map_err(|error| fail(&error)),
+    match pairs {
+        Some(pairs) => cloud_of_pairs(pairs, images.left, rig, pose, method.kernel).map_err(|error| fail(&error)),
+        None => pair_cloud(images, rig, pose, method, &mut |_| ()).map_err(|error| fail(&error)),
     }
 }
 
-fn check_size(frame: &Frame, size: ImageSize, side: &str) -> Result<(), Failure> {
+fn check_size(frame: &CameraImage, size: ImageSize, side: &str) -> Result<(), Failure> {
     let (width, height) = frame.image.dimensions();
     if (width, height) == (size.width, size.height) {
         return Ok(());
@@ -201,21 +281,20 @@ fn read_pairs(path: &Path) -> Result<Vec<(PixelPair, f64)>, Failure> {
         .collect()
 }
 
-fn in_words(dropped: &BTreeMap<&'static str, usize>) -> String {
-    if dropped.is_empty() {
-        return String::new();
-    }
-    let reasons: Vec<_> = dropped.iter().map(|(reason, count)| format!("{reason} {count}")).collect();
-    format!("; dropped: {}", reasons.join(", "))
-}
-
-fn result(look: &Look, out: &Path) -> Value {
-    let drift = look.pose_drift.as_ref().map(|drift| {
+fn result(cloud: &PairCloud, out: &Path) -> Value {
+    let drift = cloud.pose_drift.as_ref().map(|drift| {
         json!({
             "deg": rounded(drift.angle.deg()),
             "chi_squared": rounded(drift.chi_squared),
             "significant": drift.is_significant(),
         })
     });
-    json!({ "points": look.points.len(), "dropped": look.dropped, "pose_drift": drift, "out": out })
+    json!({
+        "points": cloud.points.len(),
+        "matches": cloud.matches,
+        "keypoints": cloud.keypoints,
+        "dropped": dropped_json(&cloud.dropped),
+        "pose_drift": drift,
+        "out": out,
+    })
 }

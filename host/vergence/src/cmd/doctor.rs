@@ -14,7 +14,7 @@ use crate::failure::Failure;
 #[derive(Debug, clap::Args)]
 pub struct Args {}
 
-/// What a check came to.
+/// Result of a check.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Verdict {
     Pass,
@@ -34,7 +34,7 @@ impl Verdict {
     }
 }
 
-/// One line of the doctor.
+/// A check and its result.
 #[derive(Clone, Debug)]
 struct Finding {
     check: &'static str,

@@ -2,47 +2,46 @@
 
 mod probe;
 mod serial;
-mod start;
 mod swd;
 
 use std::path::PathBuf;
 
 use serde_json::{Value, json};
-use vergence_protocol::management::{Identity, Management, Outcome, RebootTo};
+use vergence_board::{ManagementLink, Port, UpdateError, confirm, hardware_name, restart, roll_back, version_text};
+use vergence_protocol::management::Identity;
 
-pub use self::serial::update;
 use super::connect::port;
 use crate::cli::Globals;
 use crate::console::Console;
 use crate::failure::Failure;
-use crate::firmware::{hardware_name, version_text};
-use crate::link::{LinkError, ManagementLink, Port};
+use crate::firmware::read_image;
+use crate::interrupt::interrupted;
 
-/// Updates the board's firmware. The board keeps the image before: a new one that nobody confirms goes back at the next
-/// start. An update that was cut off goes on where it stopped when the same command is given again. docs/flashing.md
-/// says what signatures protect from, and what not.
+/// Updates the board's firmware. The board keeps the previous image: it returns to it at the next start unless the new one
+/// is confirmed. An interrupted update continues where it stopped when the same command is given again. docs/flashing.md
+/// says what signatures protect against.
 #[derive(Debug, clap::Args)]
 #[command(group = clap::ArgGroup::new("task").required(true))]
 pub struct Args {
-    /// Send a signed image over the link, start it on trial, and confirm it when it answers.
+    /// Sends a signed image over the link, starts it on trial, and confirms it when it answers.
     #[arg(long, value_name = "IMAGE", group = "task")]
     serial: Option<PathBuf>,
-    /// Write a signed image, or the boot loader's ELF file, through a debug probe: needs probe-rs.
+    /// Writes a signed image, or the boot loader's ELF file, through a debug probe: needs probe-rs.
     #[arg(long, value_name = "FILE", group = "task")]
     swd: Option<PathBuf>,
-    /// Go back to the image before this one.
+    /// Goes back to the image before this one.
     #[arg(long, group = "task")]
     rollback: bool,
-    /// Keep the image that is on trial.
+    /// Keeps the image that is on trial.
     #[arg(long, group = "task")]
     confirm: bool,
-    /// Start the board again; an image on trial goes back.
+    /// Restarts the board; an image on trial goes back.
     #[arg(long, group = "task")]
     restart: bool,
-    /// Leave the new image on trial.
+    /// Leaves the new image on trial.
     #[arg(long, requires = "serial")]
     no_confirm: bool,
-    /// Which debug probe, where several are connected: VID:PID or VID:PID:SERIAL.
+    /// The debug probe, where several are connected: VID:PID or VID:PID:SERIAL.
     #[arg(long, requires = "swd", value_name = "PROBE")]
     probe: Option<String>,
 }
@@ -51,19 +50,28 @@ pub async fn run(args: &Args, globals: &Globals, console: Console) -> Result<(),
     if let Some(file) = &args.swd {
         return swd::run(file, args.probe.as_deref(), globals, console).await;
     }
-    let image = args.serial.as_deref().map(crate::firmware::OwnedImage::read).transpose()?;
+    let image = args.serial.as_deref().map(read_image).transpose()?;
     let mut link = connect(globals).await?;
     if let Some(image) = image {
-        return console.result(&update(&image, !args.no_confirm, &mut link, console).await?);
+        return serial::run(&image, !args.no_confirm, &mut link, console).await;
     }
-    let before = link.identify().await.map_err(|error| link_failure(&error))?;
+    tokio::select! {
+        done = change(args, &mut link, console) => done,
+        () = interrupted() => Err(Failure::interrupted(
+            "interrupted: the board goes on with what it was told; 'vergence status' shows what it runs",
+        )),
+    }
+}
+
+/// Goes back, confirms or restarts, and says what the board ran before and after.
+async fn change(args: &Args, link: &mut ManagementLink, console: Console) -> Result<(), Failure> {
+    let before = link.identify().await.map_err(UpdateError::from)?;
     let after = if args.rollback {
-        roll_back(&mut link, &before).await?
+        roll_back(link, &before).await?
     } else if args.confirm {
-        carried_out(link.ask(&Management::Confirm).await.map_err(|error| link_failure(&error))?)?;
-        link.identify().await.map_err(|error| link_failure(&error))?
+        confirm(link).await?
     } else {
-        start::restart(&mut link).await?
+        restart(link).await?
     };
     tell(&after, console)?;
     console.result(&json!({ "before": identity_json(&before), "after": identity_json(&after) }))
@@ -74,30 +82,8 @@ async fn connect(globals: &Globals) -> Result<ManagementLink, Failure> {
     if port == Port::Simulated {
         return Err(Failure::usage("a board in this process ends with it: flash one of 'vergence sim --pty'"));
     }
-    ManagementLink::open(port, globals.baud).await
+    Ok(ManagementLink::open(port, globals.baud).await?)
 }
-
-async fn roll_back(link: &mut ManagementLink, before: &Identity) -> Result<Identity, Failure> {
-    carried_out(link.ask(&Management::Rollback).await.map_err(|error| link_failure(&error))?)?;
-    start::restart_into(link, before, |now| start::went_back(before, now)).await
-}
-
-fn carried_out(outcome: Outcome) -> Result<(), Failure> {
-    match outcome {
-        Outcome::Done => Ok(()),
-        Outcome::WrongHardware | Outcome::WrongLength | Outcome::TooOld | Outcome::WrongSignature => {
-            Err(Failure::usage(format!("the board refuses: {outcome}")))
-        }
-        refused => Err(Failure::device(format!("the board refuses: {refused}"))),
-    }
-}
-
-fn link_failure(error: &LinkError) -> Failure {
-    Failure::link(error.to_string())
-}
-
-/// A reboot into the application: what `start` asks for.
-const REBOOT: Management = Management::Reboot(RebootTo::Application);
 
 fn tell(identity: &Identity, console: Console) -> Result<(), Failure> {
     console.say(format!(

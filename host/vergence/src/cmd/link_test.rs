@@ -3,32 +3,40 @@
 use std::time::Duration;
 
 use serde_json::json;
+use vergence_board::LinkFigures;
 use vergence_protocol::Request;
 
 use super::connect::{connect, is_wire};
-use super::link_figures::LinkFigures;
 use super::report::{clock_json, describe_clock, rounded};
 use crate::cli::Globals;
 use crate::console::Console;
 use crate::failure::Failure;
 
-/// Asks the board two hundred times each second while poses stream, and tells how long answers took beside what the wire
-/// allows, and what was lost or sent again. Moves nothing. Exit code 1 where requests stayed unanswered or poses were lost.
+/// Sends two hundred requests each second while poses stream, and prints how long answers took beside what the wire allows,
+/// and what was lost or sent again. Moves nothing. Exit code 1 where requests stayed unanswered or poses were lost.
 #[derive(Debug, clap::Args)]
 pub struct Args {
-    /// For how long.
-    #[arg(long, default_value_t = 5, value_parser = clap::value_parser!(u64).range(1..=3600))]
-    seconds: u64,
-    /// Period of the pose stream meanwhile, from 1ms.
+    /// Ask for this long, 1s to 1h.
+    #[arg(long = "for", default_value = "5s", value_name = "TIME", value_parser = parse_time, alias = "seconds")]
+    duration: Duration,
+    /// Period of the pose stream during the test, from 1ms.
     #[arg(long, default_value = "2ms", value_parser = humantime::parse_duration, value_name = "TIME")]
     stream: Duration,
+}
+
+/// A time from 1s to 1h; a bare number is seconds.
+fn parse_time(text: &str) -> Result<Duration, String> {
+    let whole = text.parse().ok().map(Duration::from_secs);
+    let time = whole.map_or_else(|| humantime::parse_duration(text).map_err(|error| error.to_string()), Ok)?;
+    let allowed = Duration::from_secs(1)..=Duration::from_secs(3600);
+    if allowed.contains(&time) { Ok(time) } else { Err("choose 1s to 1h".into()) }
 }
 
 pub async fn run(args: &Args, globals: &Globals, console: Console) -> Result<(), Failure> {
     let period_us = u32::try_from(args.stream.as_micros()).unwrap_or(u32::MAX);
     let mut board = connect(globals, console, "measuring the link").await?;
     board.ask(Request::SetStream { period_us }).await?;
-    let figures = LinkFigures::measure(&mut board, Duration::from_secs(args.seconds)).await?;
+    let figures = LinkFigures::measure(&mut board, args.duration).await?;
     let floor = figures.wire_floor_ms(globals.baud);
     let is_wire = is_wire(globals);
     let percentile = |share| figures.percentile(share).unwrap_or(f64::NAN);

@@ -1,29 +1,35 @@
-//! `vergence log`: what the firmware says of itself.
+//! `vergence log`: what happens on the board, and what its firmware logs.
 
 use std::io::{Write, stdout};
 use std::path::{Path, PathBuf};
+use std::time::Duration;
 
 use serde_json::json;
+use tokio::time::timeout;
+use vergence_board::{Board, Followed, Follower, describe_fault};
 use vergence_mcu::{Firmware, LogDecoder, LogEntry};
+use vergence_rig::Rig;
 
-use super::connect::connect_any;
-use super::reconnect::Listening;
-use crate::board::Board;
+use super::reconnect::{Listening, Source};
+use super::report::event_in_words;
 use crate::cli::Globals;
 use crate::console::Console;
 use crate::failure::Failure;
 use crate::firmware::{Hardware, build_of, flatten};
 
-/// Prints the firmware's log until Ctrl-C: time since the board's start, level, text; addresses of code are followed by the
-/// names of their functions. The board sends it when it has nothing better to send, and keeps what fits until somebody
-/// listens. When the link ends, it waits until the board is back.
+/// Prints what happens on the board until Ctrl-C, beginning with what its flight recorder kept: starts, states, moves, stops,
+/// refusals, switches, faults, each with its time since the board's start.
+///
+/// With --elf, the firmware's own log comes too: level, text, and the functions in which addresses lie. The board sends
+/// each text once, to the first host that listens: texts that were sent while another verb ran are gone. When the link ends,
+/// it waits until the board is back.
 #[derive(Debug, clap::Args)]
 pub struct Args {
-    /// The ELF file of the firmware that runs on the board: it holds the texts.
-    #[arg(long, value_name = "FIRMWARE", required_unless_present = "raw")]
+    /// The ELF file of the firmware that runs on the board: it holds the texts of the firmware's log.
+    #[arg(long, value_name = "FIRMWARE")]
     elf: Option<PathBuf>,
-    /// Write the bytes as they come, for defmt-print.
-    #[arg(long)]
+    /// Write the bytes of the firmware's log as they come and nothing else, for defmt-print.
+    #[arg(long, conflicts_with = "elf")]
     raw: bool,
     /// Stop after so many entries, or with --raw after so many pieces.
     #[arg(long)]
@@ -34,10 +40,13 @@ pub struct Args {
 
 pub async fn run(args: &Args, globals: &Globals, console: Console) -> Result<(), Failure> {
     let mut program = args.elf.as_deref().map(Program::read).transpose()?;
-    let mut left = args.count.unwrap_or(u64::MAX);
-    let board = connect_any(globals, console, "log").await?;
-    let listen = async |board: &mut Board| pass_on(args.raw, board, program.as_mut(), &mut left, console).await;
-    args.listening.to(board, globals, console, listen).await
+    let left = args.count.unwrap_or(u64::MAX);
+    let mut printer = Printer { raw: args.raw, left, next_event: 0, console };
+    let listen = async |source: Source<'_>| match source {
+        Source::Board(board) => printer.pass_on(board, program.as_mut()).await,
+        Source::Driver(driver, rig) => printer.follow(driver, rig, program.as_mut()).await,
+    };
+    args.listening.to(globals, console, listen).await
 }
 
 /// The firmware that its ELF file describes.
@@ -89,27 +98,87 @@ impl<'a> Program<'a> {
     }
 }
 
-async fn pass_on(
+/// How long the firmware's log must be silent before the recorder is read: what waits in the log comes first.
+const QUIET: Duration = Duration::from_millis(300);
+
+/// What is still to be printed, over all links to the board.
+struct Printer {
     raw: bool,
-    board: &mut Board,
-    mut program: Option<&mut Program<'_>>,
-    left: &mut u64,
+    /// Entries until the end.
+    left: u64,
+    /// Number of the recorder's event to be printed next.
+    next_event: u32,
     console: Console,
-) -> Result<(), Failure> {
-    if let Some(program) = &program {
-        program.check(board)?;
-    }
-    while *left > 0 {
-        let bytes = board.next_log().await?;
-        if raw {
-            *left -= 1;
-            let mut out = stdout().lock();
-            out.write_all(&bytes).and_then(|()| out.flush()).map_err(|error| Failure::stdout(&error))?;
-        } else if let Some(program) = &mut program {
-            program.tell(&bytes, left, console)?;
+}
+
+impl Printer {
+    async fn pass_on(&mut self, board: &mut Board, mut program: Option<&mut Program<'_>>) -> Result<(), Failure> {
+        if let Some(program) = &program {
+            program.check(board)?;
         }
+        while self.left > 0 {
+            match (timeout(QUIET, board.next_log()).await, &mut program) {
+                (Ok(bytes), _) if self.raw => self.write_raw(&bytes?)?,
+                (Ok(bytes), Some(program)) => program.tell(&bytes?, &mut self.left, self.console)?,
+                (Ok(bytes), None) => drop(bytes?),
+                (Err(_), _) if self.raw => {}
+                (Err(_), _) => self.tell_events(board).await?,
+            }
+        }
+        Ok(())
     }
-    Ok(())
+
+    /// Prints what the driver of the board passes on: the firmware's log, and states and faults as the poses show them. The
+    /// recorder is read again once the driver has ended.
+    async fn follow(
+        &mut self,
+        driver: &mut Follower,
+        rig: &Rig,
+        mut program: Option<&mut Program<'_>>,
+    ) -> Result<(), Failure> {
+        let mut before = None;
+        while self.left > 0 {
+            match (driver.next().await?, &mut program) {
+                (Followed::Pose(pose), _) if !self.raw => {
+                    let now = Some((pose.state, pose.fault));
+                    if before != now {
+                        before = now;
+                        let fault = pose.fault.map(|fault| format!("; {}", describe_fault(rig, &fault)));
+                        let text = format!("state: {}{}", pose.state, fault.unwrap_or_default());
+                        self.tell(pose.at.0, &text)?;
+                    }
+                }
+                (Followed::Log(bytes), _) if self.raw => self.write_raw(&bytes)?,
+                (Followed::Log(bytes), Some(program)) => program.tell(&bytes, &mut self.left, self.console)?,
+                _ => {}
+            }
+        }
+        Ok(())
+    }
+
+    /// Writes a piece of the firmware's log as it came.
+    fn write_raw(&mut self, bytes: &[u8]) -> Result<(), Failure> {
+        self.left -= 1;
+        let mut out = stdout().lock();
+        out.write_all(bytes).and_then(|()| out.flush()).map_err(|error| Failure::stdout(&error))
+    }
+
+    /// Prints one entry at a time of the board's clock, in microseconds.
+    fn tell(&mut self, board_us: u64, text: &str) -> Result<(), Failure> {
+        self.left -= 1;
+        self.console.say(format!("{:12.6} s board  {text}", board_us as f64 * 1e-6))?;
+        self.console.result(&json!({ "board_us": board_us, "text": text }))
+    }
+
+    /// Prints what the flight recorder has kept since it was last read.
+    async fn tell_events(&mut self, board: &Board) -> Result<(), Failure> {
+        let recorded = board.events_from(self.next_event).await?;
+        self.next_event = recorded.next;
+        for event in recorded.events.iter().take(usize::try_from(self.left).unwrap_or(usize::MAX)) {
+            self.tell(event.at.0, &event_in_words(board.rig(), &event.what))?;
+        }
+        Ok(())
+    }
 }
 
 fn line(entry: &LogEntry, places: &[String]) -> String {

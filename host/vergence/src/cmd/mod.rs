@@ -1,34 +1,33 @@
 //! One module per verb.
 
-mod board_options;
 mod camera_options;
+pub mod cloud_report;
 mod connect;
-mod link_figures;
+mod model_options;
+pub mod options;
 mod reconnect;
 pub mod report;
+mod stage_pose;
+mod target_options;
 
-pub mod arm;
 pub mod bench;
 pub mod calibrate;
 pub mod camera;
 pub mod capture;
-pub mod clear;
 pub mod completions;
 pub mod config;
 pub mod demo;
 pub mod depth;
 pub mod devices;
-pub mod disarm;
 pub mod doctor;
 pub mod flash;
-pub mod home;
 pub mod image;
 pub mod link_test;
 pub mod log;
-pub mod mode;
 pub mod models;
 pub mod monitor;
 pub mod move_to;
+pub mod orders;
 pub mod plan;
 pub mod reproduce;
 pub mod run;

@@ -2,23 +2,24 @@
 
 mod live;
 
-use indicatif::ProgressBar;
 use serde_json::Value;
+use vergence_board::{Board, Followed, Follower, describe_fault, describe_pose};
+use vergence_protocol::PoseReport;
+use vergence_rig::Rig;
 
 use self::live::Live;
-use super::connect::connect_with;
-use super::reconnect::Listening;
-use super::report::{clock_json, pose_json};
-use crate::board::{Board, describe_fault, describe_pose};
+use super::reconnect::{Listening, Source};
+use super::report::{clock_json, describe_clock, pose_json};
 use crate::cli::Globals;
 use crate::console::Console;
 use crate::failure::Failure;
 
-/// Shows the axes as they move until Ctrl-C: one line each on a terminal, elsewhere a line for each pose (JSON Lines with
-/// --json). It only reads. When the link ends, it waits until the board is back.
+/// Prints the axes as they move until Ctrl-C: one line each on a terminal, elsewhere a line for each pose (JSON Lines with
+/// --json). It only reads, and makes way for a verb that drives the board: it then shows the poses that this verb passes on.
+/// When the link ends, it waits until the board is back.
 #[derive(Debug, clap::Args)]
 pub struct Args {
-    /// Stop after this many poses.
+    /// Stops after this many poses.
     #[arg(long)]
     count: Option<u64>,
     #[command(flatten)]
@@ -26,18 +27,27 @@ pub struct Args {
 }
 
 pub async fn run(args: &Args, globals: &Globals, console: Console) -> Result<(), Failure> {
-    let board = connect_with(globals, ProgressBar::hidden()).await?;
     let mut left = args.count.unwrap_or(u64::MAX);
-    args.listening.to(board, globals, console, async |board| show(board, &mut left, console).await).await
+    let listen = async |source: Source<'_>| match source {
+        Source::Board(board) => show(board, &mut left, console).await,
+        Source::Driver(driver, rig) => show_followed(driver, rig, &mut left, console).await,
+    };
+    args.listening.to(globals, console, listen).await
 }
 
 async fn show(board: &mut Board, left: &mut u64, console: Console) -> Result<(), Failure> {
+    if board.axes().is_empty() {
+        board.check_axes().await?;
+    }
     let mut live = console.is_live().then(|| Live::new(board.rig()));
     while *left > 0 {
         board.next_pose().await?;
         match &mut live {
-            Some(live) => live.draw(board),
-            None => console.say(line(board))?,
+            Some(live) => {
+                let lost = board.client().statistics().poses_lost;
+                live.draw(board.rig(), board.pose(), format!("{}; {lost} poses lost", describe_clock(board)));
+            }
+            None => console.say(line(board.rig(), board.pose()))?,
         }
         if console.is_json() {
             console.result(&json_line(board))?;
@@ -47,13 +57,29 @@ async fn show(board: &mut Board, left: &mut u64, console: Console) -> Result<(),
     Ok(())
 }
 
-fn line(board: &Board) -> String {
-    let (rig, pose) = (board.rig(), board.pose());
+/// Shows the poses that the driver of the board passes on. Only the driver compares the clocks.
+async fn show_followed(driver: &mut Follower, rig: &Rig, left: &mut u64, console: Console) -> Result<(), Failure> {
+    let mut live = console.is_live().then(|| Live::new(rig));
+    while *left > 0 {
+        let Followed::Pose(pose) = driver.next().await? else { continue };
+        match &mut live {
+            Some(live) => live.draw(rig, &pose, "another vergence drives the board".into()),
+            None => console.say(line(rig, &pose))?,
+        }
+        if console.is_json() {
+            console.result(&pose_json(rig, &pose))?;
+        }
+        *left -= 1;
+    }
+    Ok(())
+}
+
+fn line(rig: &Rig, pose: &PoseReport) -> String {
     let fault = pose.fault.map(|fault| format!("  {}", describe_fault(rig, &fault))).unwrap_or_default();
     format!("{:10.3} s  {}{fault}", pose.at.0 as f64 * 1e-6, describe_pose(rig, pose))
 }
 
-/// The pose, when it was on both clocks, and what the link lost.
+/// The pose, its time on both clocks, and what the link lost.
 fn json_line(board: &Board) -> Value {
     let mut line = pose_json(board.rig(), board.pose());
     line["host_us"] = board.pose_on_host_clock().map(|host| host.us.round()).into();

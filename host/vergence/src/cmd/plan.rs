@@ -3,20 +3,18 @@
 mod goal;
 
 use serde_json::{Value, json};
+use vergence_board::{AxisPlan, Board, MovePlan, MoveStart, check_range};
+use vergence_pipeline::{ZONE_RADIUS, rig_zones};
 use vergence_protocol::AxisKind;
 use vergence_rig::{AxisPosition, Rig, RigAxis};
 
 use super::connect::connect;
-use super::move_to::{StagePose, is_referenced, named_mode};
-use super::report::{axes_json, rounded};
-use super::zones::in_degrees;
-use crate::board::{Board, check_range};
+use super::report::{axes_json, rounded, zones_json};
+use super::stage_pose::{StagePose, named_mode};
 use crate::cli::Globals;
 use crate::console::Console;
 use crate::failure::Failure;
-use crate::move_plan::{AxisPlan, MovePlan};
 use crate::rig_file;
-use crate::rig_zones::{ZONE_RADIUS, rig_zones};
 
 /// Plans a move with the board's own planner and limits, and moves nothing. It begins where the stages stand, or at the
 /// low ends of their ranges, where homing leaves them. Without --port it plans for the stages of 'vergence sim'.
@@ -27,10 +25,10 @@ pub struct Args {
     mode: Option<String>,
     #[command(flatten)]
     stage: StagePose,
-    /// Begin at this mode.
+    /// The mode to begin at.
     #[arg(long, value_name = "MODE")]
     from: Option<String>,
-    /// Show every segment: time, position, velocity, acceleration, jerk.
+    /// Prints every segment: time, position, velocity, acceleration, jerk.
     #[arg(long)]
     dump: bool,
     #[command(flatten)]
@@ -50,9 +48,12 @@ pub async fn run(args: &Args, globals: &Globals, console: Console) -> Result<(),
     };
     let to = target(args, &rig, &from)?;
     check_range(&rig, &to)?;
-    let plan = MovePlan::new(&rig, &board.limits().await?, &from, &to);
+    // The verbs that move arm the board anew.
+    let start = MoveStart { positions: &from, from_below: false };
+    let plan = MovePlan::new(&rig, &board.limits().await?, start, &to);
     let values: Vec<f64> = to.iter().map(|position| position.value()).collect();
-    let zones = rig_zones(&rig, &rig.pose_at_values(&values))?;
+    let zones = rig_zones(&rig, &rig.pose_at_values(&values))
+        .map_err(|error| Failure::check(format!("the zones of this pose: {error}")))?;
     let wide = rig.axes.iter().map(|axis| axis.name.len()).max().unwrap_or(0);
     for (axis, planned) in rig.axes.iter().zip(&plan.axes) {
         let peak = AxisPosition::from_value(axis.kind, planned.peak_speed());
@@ -76,14 +77,14 @@ pub async fn run(args: &Args, globals: &Globals, console: Console) -> Result<(),
         "duration_s": rounded(plan.duration),
         "from": axes_json(&rig, &from),
         "to": axes_json(&rig, &to),
-        "zones_deg": in_degrees(&zones),
+        "zones_deg": zones_json(&zones),
         "axes": rig.axes.iter().zip(&plan.axes).map(|(axis, planned)| axis_json(axis, planned)).collect::<Vec<_>>(),
     }))
 }
 
 fn standing(board: &Board) -> Vec<AxisPosition> {
     let rig = board.rig();
-    if is_referenced(board) {
+    if board.is_referenced() {
         return board.standing();
     }
     rig.axes.iter().map(|axis| axis.range[0]).collect()

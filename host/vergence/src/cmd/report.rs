@@ -1,10 +1,11 @@
 //! What several verbs say of a board.
 
 use serde_json::{Map, Value, json};
-use vergence_protocol::PoseReport;
+use vergence_board::{Board, describe_fault, describe_pose, positions};
+use vergence_protocol::{Happening, PoseReport};
 use vergence_rig::{AxisPosition, Rig};
+use vergence_vision::Zones;
 
-use crate::board::{Board, describe_fault, describe_pose, positions};
 use crate::console::Console;
 use crate::failure::Failure;
 
@@ -22,6 +23,16 @@ pub fn axes_json(rig: &Rig, positions: &[AxisPosition]) -> Value {
         AxisPosition::Rotary(angle) => (format!("{}_deg", axis.name), json!(rounded(angle.deg()))),
     });
     Value::Object(entries.collect::<Map<_, _>>())
+}
+
+/// Zones in degrees; an angle that is not a number becomes null.
+#[must_use]
+pub fn zones_json(zones: &Zones) -> Value {
+    json!({
+        "stereo": rounded(zones.stereo.deg()),
+        "mono": rounded(zones.mono.deg()),
+        "blind": rounded(zones.blind.deg()),
+    })
 }
 
 /// A pose for programs.
@@ -42,7 +53,7 @@ pub fn pose_json(rig: &Rig, pose: &PoseReport) -> Value {
     json!({
         "board_us": pose.at.0,
         "state": pose.state.to_string(),
-        "mode": rig.mode_name(pose.mode),
+        "mode": rig.reported_mode(pose).map(|mode| mode.to_string()),
         "axes": axes_json(rig, &positions(rig, pose)),
         "referenced": referenced,
         "fault": fault,
@@ -85,4 +96,23 @@ pub fn say_pose(console: Console, rig: &Rig, pose: &PoseReport) -> Result<(), Fa
         console.say(format!("  {}", describe_fault(rig, &fault)))?;
     }
     console.result(&pose_json(rig, pose))
+}
+
+/// An event of the flight recorder in words, with the rig's names and units.
+#[must_use]
+pub fn event_in_words(rig: &Rig, what: &Happening) -> String {
+    let axis = |index: u8| rig.axes.get(usize::from(index));
+    let name = |index: u8| axis(index).map_or_else(|| format!("axis {index}"), |axis| axis.name.clone());
+    match *what {
+        Happening::Fault { code, axis: Some(index), .. } => format!("FAULT on {}: {code}", name(index)),
+        Happening::Fault { code, axis: None, .. } => format!("FAULT: {code}"),
+        Happening::Switch { axis: index, home, operated } => {
+            format!("{}: {}", name(index), vergence_protocol::switch_text(home, operated))
+        }
+        Happening::Encoder { axis: index, counts } => match axis(index) {
+            Some(axis) => format!("{} was at {} by its encoder", axis.name, axis.position_at(counts)),
+            None => what.to_string(),
+        },
+        _ => what.to_string(),
+    }
 }

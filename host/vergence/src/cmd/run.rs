@@ -1,4 +1,4 @@
-//! `vergence run`: measures live, while the stages stand or move.
+//! `vergence run`: measures live, while the stages stand still or move.
 
 mod cameras;
 mod tour;
@@ -8,47 +8,46 @@ use std::sync::Arc;
 use std::time::Duration;
 
 use tokio::sync::mpsc;
+use vergence_board::{Board, HostClock, Port, fresh_session};
+use vergence_pipeline::Exposures;
 use vergence_protocol::{Request, Trigger};
 use vergence_rig::Rig;
 
 use self::tour::Tour;
 use super::connect::{connect, port};
-use super::move_to::is_referenced;
-use crate::board::{Board, fresh_session};
 use crate::cli::Globals;
 use crate::cmd::camera_options::CameraOptions;
+use crate::cmd::model_options::MatcherOptions;
 use crate::console::Console;
 use crate::failure::Failure;
 use crate::interrupt::interrupted;
-use crate::link::{HostClock, Port};
-use crate::live::{Ended, Exposures, Limits, LiveLoop, Publisher, Totals, Unplugged};
-use crate::models::MatcherOptions;
-use crate::output::{TableFormat, make_folder};
+use crate::live::{Ended, Limits, LiveLoop, MatchingTime, Publisher, Totals};
+use crate::output::{TableFormat, check_folder, make_folder};
 use crate::rig_file;
 use crate::sim::{SharedRig, SimulatedRig, board_of};
 
-/// News of cameras that may wait: more frames than that are lost, and their numbers tell.
-const NEWS_KEPT: usize = 16;
+/// Number of camera events that may wait; images beyond it are lost, which the gap in their numbers shows.
+const EVENTS_KEPT: usize = 16;
 
-/// Pairs the frames of both cameras, matches them and triangulates, again and again: a cloud of the newest pair whenever the
-/// matcher is free, in the frame of the left camera. Nothing queues, and no cloud holds anything of an older one; what is
-/// skipped is counted by reason.
+/// Pairs the images of both cameras, matches and triangulates them, again and again: a cloud of the newest pair whenever the
+/// matcher is free, in the frame of the left camera. Nothing queues, and no cloud holds anything of an older one; skipped
+/// exposures are counted by reason.
 ///
-/// The board fires the cameras (--rate), and every row is measured with the axes where they were when it was exposed, so that
-/// the stages may move: with --mode they do. When a camera dies, the other's corners come as bearings, without range, until it
-/// is back. Ctrl-C brakes, disarms and ends.
+/// The board fires the cameras (--rate). Every row is measured with the pose at its own exposure, so the stages may move: with
+/// --mode they do. When a camera dies, the corners of the other are written as bearings, without range, until it is back.
+/// Ctrl-C brakes, disarms and ends.
 #[derive(Debug, clap::Args)]
 pub struct Args {
     /// The left and the right camera, such as /dev/video0 /dev/video2; or `sim` on a simulated rig.
     #[arg(long, num_args = 1..=2, required = true, value_name = "DEVICE")]
     cameras: Vec<String>,
-    /// So many pulses of the camera trigger each second, 0.1 to 500.
-    #[arg(long, default_value_t = 10.0, value_name = "HZ", value_parser = super::trigger::parse_rate)]
+    /// Pulses of the camera trigger per second, 0.1 to 500.
+    #[arg(long, default_value_t = 10.0, value_name = "HZ", value_parser = super::camera_options::parse_rate)]
     rate: f64,
-    /// The cameras are not fired but run freely; frames are paired by their time stamps.
+    /// The cameras are not fired but run freely; images are paired by their time stamps.
     #[arg(long)]
     free: bool,
-    /// A folder for `cloud.ply`, always the newest.
+    /// The folder for `cloud.ply`, always the newest cloud.
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
     /// Keep every cloud, in files with numbers.
@@ -57,32 +56,33 @@ pub struct Args {
     /// Write points and bearings as tables too.
     #[arg(long, requires = "out", value_delimiter = ',', value_name = "FORMAT")]
     also: Vec<TableFormat>,
-    /// End after so many results.
+    /// End after this many results.
     #[arg(long, value_name = "COUNT")]
     frames: Option<u64>,
-    /// End after so many seconds.
-    #[arg(long, value_name = "SECONDS", value_parser = parse_seconds)]
-    seconds: Option<Duration>,
+    /// End after this time.
+    #[arg(long = "for", value_name = "TIME", value_parser = parse_time, alias = "seconds")]
+    duration: Option<Duration>,
     #[command(flatten)]
     tour: tour::Options,
     #[command(flatten)]
     matching: MatcherOptions,
     #[command(flatten)]
     camera: CameraOptions,
-    /// Of simulated cameras: where the stages stand at first, and the noise.
+    /// With simulated cameras: sets where the stages stand at first and the noise of the images.
     #[arg(long, default_value_t = 1)]
     seed: u64,
-    /// Of simulated cameras: one is unplugged for a while of its life, such as left@2s..4s.
-    #[arg(long, value_name = "WHEN")]
-    unplug: Vec<Unplugged>,
-    /// On a simulated rig: how much of its time matching takes. Without it, as much as it really took.
+    /// With simulated cameras: unplugs one for a while, such as left@2s..4s after the start.
+    #[arg(long, value_name = "WHEN", value_parser = cameras::parse_unplugged)]
+    unplug: Vec<vergence_sim::Unplugged>,
+    /// On a simulated rig: how long matching takes on its clock. Without it, as long as it really takes.
     #[arg(long, value_name = "TIME", value_parser = humantime::parse_duration)]
     match_time: Option<Duration>,
 }
 
-fn parse_seconds(text: &str) -> Result<Duration, String> {
+/// A time such as `2s` or `90s`; a bare number is seconds.
+fn parse_time(text: &str) -> Result<Duration, String> {
     let seconds = text.parse().ok().and_then(|seconds| Duration::try_from_secs_f64(seconds).ok());
-    seconds.ok_or_else(|| format!("'{text}' is no number of seconds"))
+    seconds.map_or_else(|| humantime::parse_duration(text).map_err(|error| error.to_string()), Ok)
 }
 
 pub async fn run(args: &Args, globals: &Globals, console: Console) -> Result<(), Failure> {
@@ -90,15 +90,16 @@ pub async fn run(args: &Args, globals: &Globals, console: Console) -> Result<(),
     let tour = args.tour.read(&rig)?;
     let matcher = Arc::from(args.matching.matcher(console)?);
     if let Some(folder) = &args.out {
+        check_folder(folder)?;
         make_folder(folder)?;
     }
     let (mut board, simulated) = connected(args, globals, &rig, console).await?;
-    // Frames and pulses are told apart on the clock of the link.
+    // Images and pulses are stamped on the clock of the link.
     let clock = board.as_ref().map_or_else(HostClock::start, |board| board.client().clock());
     if let Some(board) = &mut board {
         board.compare_clocks().await?;
         tour.home(board).await?;
-        if !is_referenced(board) {
+        if !board.is_referenced() {
             return Err(Failure::device(
                 "the axes have no reference, so nobody knows where the cameras are: run 'vergence home', or add --home",
             ));
@@ -108,20 +109,24 @@ pub async fn run(args: &Args, globals: &Globals, console: Console) -> Result<(),
         }
     }
     let period = (board.is_some() && !args.free).then_some(1e6 / args.rate);
-    let (listener, news) = mpsc::channel(NEWS_KEPT);
+    let (listener, events) = mpsc::channel(EVENTS_KEPT);
     cameras::start(args, &rig, simulated.as_ref(), clock, &listener)?;
-    // The loop ends when nobody tells it anything any more.
+    // The loop ends when no sender is left.
     drop(listener);
     let rig = Arc::new(rig);
     let mut live = LiveLoop {
         rig: Arc::clone(&rig),
         matcher,
-        news,
+        events,
         marks: period.and(board.as_mut()).map(|board| board.client_mut().take_marks()),
         board: board.as_ref().map(|board| board.client().knowledge()),
         clock,
         exposures: Exposures::new(period),
-        simulated: simulated.is_some().then_some(args.match_time),
+        matching_time: match (&simulated, args.match_time) {
+            (None, _) => MatchingTime::Real,
+            (Some(_), None) => MatchingTime::Measured,
+            (Some(_), Some(time)) => MatchingTime::Fixed(time),
+        },
     };
     let mut publisher =
         Publisher { console, rig, out: args.out.clone(), keep: args.keep, also: args.also.clone(), number: 0 };
@@ -130,17 +135,21 @@ pub async fn run(args: &Args, globals: &Globals, console: Console) -> Result<(),
         board.ask(Request::SetTrigger(Trigger::Every { period_us: period.round() as u32 })).await?;
     }
     let ended = both(args, &mut live, &tour, &mut board, &mut publisher, &mut totals).await;
-    let settled = settle(&mut board, &tour).await;
+    // A simulated board ends with this process, and its time stands still as long as the matcher works.
+    let settled = match (&ended, &simulated) {
+        (Ok(None), Some(_)) => Ok(()),
+        _ => settle(&mut board, &tour).await,
+    };
     publisher.end(&totals)?;
     let ended = ended?;
     settled?;
     match ended {
-        Ended::Done => Ok(()),
-        Ended::Blind => Err(Failure::device("both cameras are dead: see what was said of each above")),
+        Some(Ended::Done) | None => Ok(()),
+        Some(Ended::Blind) => Err(Failure::device("both cameras are dead: see what was said of each above")),
     }
 }
 
-/// Measures while the stages go where they are sent, until one of both ends it or Ctrl-C is pressed.
+/// Measures while the stages go where they are sent, until either ends; `None` where the program is asked to end.
 async fn both(
     args: &Args,
     live: &mut LiveLoop,
@@ -148,24 +157,24 @@ async fn both(
     board: &mut Option<Board>,
     publisher: &mut Publisher,
     totals: &mut Totals,
-) -> Result<Ended, Failure> {
+) -> Result<Option<Ended>, Failure> {
     let console = publisher.console;
-    let limits = Limits { results: args.frames, time: args.seconds };
-    let measuring = live.run(limits, totals, |told| publisher.publish(&told), |warning| console.warn(warning));
+    let limits = Limits { results: args.frames, time: args.duration };
+    let measuring = live.run(limits, totals, |result| publisher.publish(&result), |warning| console.warn(warning));
     tokio::select! {
-        ended = measuring => ended,
+        ended = measuring => ended.map(Some),
         failure = tour.drive(board.as_mut()) => Err(failure),
-        () = interrupted() => Ok(Ended::Done),
+        () = interrupted() => Ok(None),
     }
 }
 
-/// Leaves the board as it was found: at rest, disarmed, the cameras not fired.
+/// Leaves the board at rest, disarmed, with the camera trigger off.
 async fn settle(board: &mut Option<Board>, tour: &Tour) -> Result<(), Failure> {
     let Some(board) = board else { return Ok(()) };
     if tour.moves() {
         board.release().await?;
     }
-    board.ask(Request::SetTrigger(Trigger::Off)).await
+    Ok(board.ask(Request::SetTrigger(Trigger::Off)).await?)
 }
 
 /// The board, where the rig has axes; beside it the mechanics, where they are simulated.
@@ -192,6 +201,6 @@ async fn connected(
         (_, false) if globals.port.as_deref() != Some("sim") => {
             Ok((Some(connect(globals, console, "live").await?), None))
         }
-        _ => Err(Failure::usage("on a simulated rig ride simulated cameras: --port sim --cameras sim")),
+        _ => Err(Failure::usage("a simulated rig has simulated cameras: --port sim --cameras sim")),
     }
 }

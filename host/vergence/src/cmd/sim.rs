@@ -3,6 +3,7 @@
 use std::path::PathBuf;
 
 use serde_json::json;
+use vergence_board::Shared;
 use vergence_rig::Rig;
 
 use crate::cli::Globals;
@@ -10,8 +11,9 @@ use crate::console::Console;
 use crate::failure::Failure;
 use crate::firmware::{DEVELOPMENT, PublicKey};
 use crate::interrupt::interrupted;
+use crate::output::write_whole;
 use crate::rig_file;
-use crate::sim::{Listener, Served, Shared, SharedRig, SimulatedChip, SimulatedRig, serve};
+use crate::sim::{KeptRig, Listener, Served, SharedRig, SimulatedRig, serve, simulated_chip};
 
 /// Runs the controller core against simulated mechanics in real time and prints the port to give to other verbs.
 /// The motors, screws, encoders and switches are simulated; controller and protocol are the real ones. With --elf the
@@ -51,26 +53,29 @@ pub async fn run(args: &Args, globals: &Globals, console: Console) -> Result<(),
     }
     let mut simulated = SimulatedRig::new(&rig, args.seed)?;
     simulated.trust(PublicKey::named(&args.trust)?.0);
-    if let Some(path) = &args.flash {
-        simulated.keep_flash_in(path)?;
+    match &args.flash {
+        Some(file) => serve_until_interrupted(args, Shared::new(KeptRig::new(simulated, file)?), console).await,
+        None => serve_until_interrupted(args, SharedRig::new(simulated), console).await,
     }
-    serve_until_interrupted(args, SharedRig::new(simulated), console).await
 }
 
 async fn run_firmware(args: &Args, rig: &Rig, console: Console) -> Result<(), Failure> {
-    let mut chip = SimulatedChip::new(&args.elf, rig, args.seed)?;
+    let mut chip = simulated_chip(&args.elf, rig, args.seed)?;
     if args.trace.is_some() {
         chip.trace();
     }
     let chip = Shared::new(chip);
     let outcome = serve_until_interrupted(args, chip.clone(), console).await;
     if let Some(path) = &args.trace {
-        chip.lock().write_trace(path)?;
+        write_whole(path, chip.lock().trace_dump().as_bytes())?;
     }
     outcome
 }
 
-async fn serve_until_interrupted<B: Served>(args: &Args, board: Shared<B>, console: Console) -> Result<(), Failure> {
+async fn serve_until_interrupted<B>(args: &Args, board: Shared<B>, console: Console) -> Result<(), Failure>
+where
+    B: Served<Error: Into<Failure>>,
+{
     let listener = match &args.tcp {
         Some(address) => Listener::tcp(address).await?,
         None => Listener::pty()?,
@@ -79,7 +84,7 @@ async fn serve_until_interrupted<B: Served>(args: &Args, board: Shared<B>, conso
     console.say(format!("simulated board at {port}\ntry: vergence --port {port} home"))?;
     console.result(&json!({ "port": port }))?;
     tokio::select! {
-        outcome = serve(board, listener) => outcome,
+        outcome = serve(board, listener) => Ok(outcome?),
         () = interrupted() => Ok(()),
     }
 }

@@ -12,7 +12,7 @@ use crate::console::Console;
 use crate::failure::Failure;
 use crate::stopwatch::Stopwatch;
 
-/// More broken promises than this are only counted.
+/// Most broken promises that are printed; more are only counted.
 const MOST_TOLD: usize = 20;
 
 /// Plays scenarios in which something goes wrong: bytes, frames, the line, the board, encoders, switches, motors, the
@@ -27,7 +27,7 @@ pub struct Args {
     /// The seed of the first scenario; the next ones follow it.
     #[arg(long, default_value_t = 1)]
     seed: u64,
-    /// Play the scenario of this seed alone and tell what happens in it.
+    /// Plays the scenario of this seed alone, and prints what happens in it.
     #[arg(long, value_name = "SEED", conflicts_with_all = ["scenarios", "seed"])]
     only: Option<u64>,
     #[command(flatten)]
@@ -55,7 +55,7 @@ fn many(args: &Args, console: Console) -> Result<(), Failure> {
             progress.tick();
         }
     })
-    .map_err(|error| Failure::check(format!("the controller refuses the simulated stages ({error:?})")))?;
+    .map_err(|error| Failure::check(format!("the controller refuses the simulated stages ({error})")))?;
     progress.finish_and_clear();
     let seconds = stopwatch.seconds();
     console.say(table(&tally))?;
@@ -113,7 +113,7 @@ fn accuse(tally: &Tally) -> Result<(), Failure> {
 fn replay(seed: u64, console: Console) -> Result<(), Failure> {
     let scenario = Scenario::of(seed);
     let mut board = native_board(&scenario)
-        .map_err(|error| Failure::check(format!("the controller refuses the simulated stages ({error:?})")))?;
+        .map_err(|error| Failure::check(format!("the controller refuses the simulated stages ({error})")))?;
     let outcome = play(&scenario, &mut board);
     console.say(outcome.journal.to_string().trim_end())?;
     console.result(&replay_in_json(&scenario, &outcome))?;

@@ -3,23 +3,30 @@
 mod why;
 
 use serde_json::json;
+use vergence_board::{Followed, Follower};
 
 use self::why::Story;
-use super::connect::connect;
+use super::connect::{connect, port};
 use super::report::{clock_json, describe_clock, pose_json, say_pose};
 use crate::cli::Globals;
 use crate::console::Console;
 use crate::failure::Failure;
+use crate::rig_file;
 
-/// Reads the board without touching anything.
+/// Reads the state of the board and changes nothing.
 #[derive(Debug, clap::Args)]
 pub struct Args {
-    /// Also tell what led to the fault: the last things that the board's recorder kept.
+    /// Also prints what led to the fault: the last events in the board's recorder.
     #[arg(long)]
     why: bool,
 }
 
 pub async fn run(args: &Args, globals: &Globals, console: Console) -> Result<(), Failure> {
+    if !args.why
+        && let Some(driver) = Follower::attach(&port(globals)?).await
+    {
+        return say_followed(driver, globals, console).await;
+    }
     let mut board = connect(globals, console, "status").await?;
     board.compare_clocks().await?;
     let story = if args.why { Some(Story::read(&board).await?) } else { None };
@@ -43,5 +50,16 @@ pub async fn run(args: &Args, globals: &Globals, console: Console) -> Result<(),
     match story {
         Some(story) => story.tell(board.rig(), console),
         None => Ok(()),
+    }
+}
+
+/// Says where the board is by what its driver passes on; nothing is asked of the board.
+async fn say_followed(mut driver: Follower, globals: &Globals, console: Console) -> Result<(), Failure> {
+    let rig = rig_file::load(globals.rig.as_deref())?;
+    loop {
+        if let Followed::Pose(pose) = driver.next().await? {
+            console.say("another vergence holds the port; this is what it passes on")?;
+            return say_pose(console, &rig, &pose);
+        }
     }
 }

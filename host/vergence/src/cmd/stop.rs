@@ -4,15 +4,14 @@ use std::time::Duration;
 
 use serde_json::json;
 use tokio::io::AsyncWriteExt;
+use vergence_board::{HostClock, OpenWire, Port, fresh_session, open};
 use vergence_protocol::{HostSession, MAX_FRAME, Request, StopKind};
 
 use super::connect::{connect_any, port};
 use super::report::say_pose;
-use crate::board::fresh_session;
 use crate::cli::Globals;
 use crate::console::Console;
 use crate::failure::Failure;
-use crate::link::{HostClock, OpenWire, Port, open};
 use crate::rig_file;
 use crate::slots;
 

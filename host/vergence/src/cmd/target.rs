@@ -1,30 +1,28 @@
 //! `vergence target`: a chessboard to print.
 
-use std::fmt::Write;
 use std::path::PathBuf;
 
 use serde_json::json;
-use vergence_calibration::BoardSpec;
 use vergence_vision::Length;
 
-use super::board_options::parse_inner_corners;
+use super::target_options::parse_inner_corners;
 use crate::console::Console;
 use crate::failure::Failure;
-use crate::output::write_whole;
+use crate::output::{Sheet, check_ending, write_whole};
 
-/// Draws a chessboard as SVG in true size. Print it at 100 %, glue it to something flat, and measure the squares.
+/// Draws a chessboard in true size, as SVG or PDF. Print it at 100 %, glue it to something flat, and measure the squares.
 #[derive(Debug, clap::Args)]
 pub struct Args {
     /// Inner corners, such as 9x6.
-    #[arg(long, value_parser = parse_inner_corners)]
-    board: (u32, u32),
+    #[arg(long = "corners", alias = "board", value_parser = parse_inner_corners, value_name = "CxR")]
+    inner_corners: (u32, u32),
     /// Side of a square.
     #[arg(long)]
     square: Length,
     /// The sheet; the long side lies across.
     #[arg(long, default_value = "a4")]
     paper: Paper,
-    /// The file to write.
+    /// The file to write: its ending, .svg or .pdf, says which kind.
     #[arg(long, short, value_name = "FILE")]
     out: PathBuf,
 }
@@ -53,6 +51,18 @@ impl std::str::FromStr for Paper {
     }
 }
 
+impl std::fmt::Display for Paper {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.write_str(match self {
+            Self::A4 => "A4",
+            Self::A3 => "A3",
+            Self::A2 => "A2",
+            Self::A1 => "A1",
+            Self::A0 => "A0",
+        })
+    }
+}
+
 impl Paper {
     /// Long and short side in millimetres.
     const fn size(self) -> (f64, f64) {
@@ -67,48 +77,32 @@ impl Paper {
 }
 
 pub fn run(args: &Args, console: Console) -> Result<(), Failure> {
-    let (columns, rows) = args.board;
-    let board = BoardSpec { columns, rows, square: args.square };
+    let (columns, rows) = args.inner_corners;
     let (width, height) = args.paper.size();
     let side = args.square.mm();
     if side.is_nan() || side <= 0.0 {
-        return Err(Failure::usage(format!("squares of {} are none", args.square)));
+        return Err(Failure::usage(format!("squares cannot have a side of {}: give a positive length", args.square)));
     }
     // The squares around the inner corners, and a white border of half a square that detectors need.
     let (needed_width, needed_height) = (side * (f64::from(columns) + 2.0), side * (f64::from(rows) + 2.0));
     if needed_width > width || needed_height > height {
         return Err(Failure::usage(format!(
             "{columns}x{rows} corners of {side} mm need {needed_width:.0} x {needed_height:.0} mm with their border, \
-             and {:?} has {width:.0} x {height:.0} mm: choose smaller squares or a larger sheet",
+             and {} has {width:.0} x {height:.0} mm: choose smaller squares or a larger sheet",
             args.paper
         )));
     }
-    write_whole(&args.out, svg(&board, (width, height)).as_bytes())?;
+    let sheet = Sheet {
+        size: (width, height),
+        squares: (columns + 1, rows + 1),
+        side,
+        label: format!("{columns}x{rows} inner corners, {side} mm squares"),
+    };
+    let bytes = match check_ending(&args.out, &["svg", "pdf"])? {
+        "pdf" => sheet.pdf(),
+        _ => sheet.svg().into_bytes(),
+    };
+    write_whole(&args.out, &bytes)?;
     console.say(format!("wrote {}: print it at 100 % and check a square with a ruler", args.out.display()))?;
     console.result(&json!({ "out": args.out }))
-}
-
-fn svg(board: &BoardSpec, (width, height): (f64, f64)) -> String {
-    let side = board.square.mm();
-    let (columns, rows) = (board.columns + 1, board.rows + 1);
-    let (left, top) = ((width - side * f64::from(columns)) / 2.0, (height - side * f64::from(rows)) / 2.0);
-    let mut text = format!(
-        "<svg xmlns=\"http://www.w3.org/2000/svg\" width=\"{width}mm\" height=\"{height}mm\" viewBox=\"0 0 {width} {height}\">\n\
-         <rect width=\"{width}\" height=\"{height}\" fill=\"white\"/>\n<g fill=\"black\" shape-rendering=\"crispEdges\">\n"
-    );
-    for (row, column) in (0..rows).flat_map(|row| (0..columns).map(move |column| (row, column))) {
-        if (row + column).is_multiple_of(2) {
-            let (x, y) = (left + side * f64::from(column), top + side * f64::from(row));
-            let _ = writeln!(text, "<rect x=\"{x}\" y=\"{y}\" width=\"{side}\" height=\"{side}\"/>");
-        }
-    }
-    let _ = writeln!(
-        text,
-        "</g>\n<text x=\"{left}\" y=\"{}\" font-family=\"sans-serif\" font-size=\"3\" fill=\"#888\">{}x{} inner corners, \
-         {side} mm squares</text>\n</svg>",
-        height - 2.0,
-        board.columns,
-        board.rows
-    );
-    text
 }

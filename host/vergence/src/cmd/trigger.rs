@@ -4,12 +4,13 @@ use std::time::Duration;
 
 use serde_json::json;
 use tokio::time::timeout;
-use vergence_protocol::{FrameMark, Request, Trigger};
+use vergence_board::Board;
+use vergence_protocol::{Request, Trigger, TriggerMark};
 use vergence_rig::AxisPosition;
 
+use super::camera_options::parse_rate;
 use super::connect::connect;
 use super::report::{axes_json, rounded};
-use crate::board::Board;
 use crate::cli::Globals;
 use crate::console::Console;
 use crate::failure::Failure;
@@ -32,11 +33,6 @@ pub struct Args {
     /// Stop after this time.
     #[arg(long = "for", requires = "rate", value_name = "TIME", value_parser = humantime::parse_duration)]
     duration: Option<Duration>,
-}
-
-pub fn parse_rate(text: &str) -> Result<f64, String> {
-    let rate = text.parse().ok().filter(|rate| (0.1..=500.0).contains(rate));
-    rate.ok_or_else(|| format!("'{text}' is no rate: choose 0.1 to 500 pulses each second"))
 }
 
 pub async fn run(args: &Args, globals: &Globals, console: Console) -> Result<(), Failure> {
@@ -80,7 +76,7 @@ async fn listen(board: &mut Board, pulses: Option<u64>, heard: &mut Heard, conso
     Ok(())
 }
 
-fn tell(board: &Board, mark: &FrameMark, console: Console) -> Result<(), Failure> {
+fn tell(board: &Board, mark: &TriggerMark, console: Console) -> Result<(), Failure> {
     let rig = board.rig();
     let positions: Vec<AxisPosition> =
         rig.axes.iter().zip(&mark.counts).map(|(axis, &counts)| axis.position_at(counts)).collect();

@@ -4,16 +4,16 @@ mod rig;
 
 use std::path::PathBuf;
 
-use serde_json::{Value, json};
+use serde_json::json;
 use vergence_vision::{Angle, Length, Zones, paper_eq3, paper_eq3_applies, symmetric_pair, zones_exact};
 
-use super::report::rounded;
+use super::report::{rounded, zones_json};
 use crate::cli::Globals;
 use crate::console::Console;
 use crate::failure::Failure;
-use crate::output::{ZonesOf, write_whole, zones_plot, zones_svg};
+use crate::output::{ZonesOf, check_ending, seen_by_cones, write_whole, zones_plot, zones_svg};
 
-/// Angles, seen from the middle of the rig, of a horizontal circle around it: exact, and by equation 3 of the paper
+/// Prints the zones as angles of a horizontal circle around the middle of the rig: exact, and by equation 3 of the paper
 /// "Bio-inspired reconfigurable stereo vision for robotics using omnidirectional cameras" as printed. With --mode, those of
 /// the rig file's own cameras in that mode, and solid angles.
 #[derive(Debug, clap::Args)]
@@ -36,11 +36,12 @@ pub struct Args {
     /// Radius of the circle.
     #[arg(long, value_name = "LENGTH", default_value = "350mm")]
     radius: Length,
-    /// Draw the zones.
-    #[arg(long, value_name = "FILE")]
+    /// Draw a plan: the places that both cameras, one or none see.
+    #[arg(long, value_name = "SVG")]
     svg: Option<PathBuf>,
-    /// Draw curves over separation and over radius, as SVG.
-    #[arg(long, value_name = "FILE", conflicts_with = "mode")]
+    /// Draw curves of the zones over separation and over radius. With --mode, those of two equal cameras at the mode's
+    /// baseline and separation.
+    #[arg(long, value_name = "SVG")]
     plot: Option<PathBuf>,
     #[command(flatten)]
     rig: rig::RigOptions,
@@ -48,8 +49,9 @@ pub struct Args {
 
 pub fn run(args: &Args, globals: &Globals, console: Console) -> Result<(), Failure> {
     let Args { fov, radius, .. } = *args;
+    args.svg.iter().chain(&args.plot).try_for_each(|path| check_ending(path, &["svg"]).map(|_| ()))?;
     let (Some(baseline), Some(separation)) = (args.baseline, args.separation) else {
-        return rig::run(&args.rig, radius, args.svg.as_deref(), globals, console);
+        return rig::run(args, globals, console);
     };
     if baseline.mm() <= 0.0 {
         return Err(Failure::usage(format!("a baseline of {baseline} is none: choose a positive one")));
@@ -59,7 +61,8 @@ pub fn run(args: &Args, globals: &Globals, console: Console) -> Result<(), Failu
     let published = paper_eq3(fov, separation, baseline, radius);
     let applies = paper_eq3_applies(fov, separation, baseline, radius);
     if let Some(path) = &args.svg {
-        write_whole(path, zones_svg(&map, &cameras, radius).as_bytes())?;
+        let drawn = zones_svg(&map.zones, &cameras, radius, &|place| seen_by_cones(&cameras, place));
+        write_whole(path, drawn.map_err(|error| Failure::output(path, error))?.as_bytes())?;
     }
     if let Some(path) = &args.plot {
         write_whole(path, zones_plot(&ZonesOf { baseline, separation, field: fov, radius }).as_bytes())?;
@@ -67,9 +70,9 @@ pub fn run(args: &Args, globals: &Globals, console: Console) -> Result<(), Failu
     console.say(format!("exact:      {}", in_words(&map.zones)))?;
     console.say(format!("paper Eq.3: {}{}", in_words(&published), if applies { "" } else { OUTSIDE }))?;
     console.result(&json!({
-        "exact": in_degrees(&map.zones),
+        "exact": zones_json(&map.zones),
         "rear_overlap": rounded(map.rear_overlap().deg()),
-        "paper_eq3": in_degrees(&published),
+        "paper_eq3": zones_json(&published),
         "paper_eq3_applies": applies,
     }))
 }
@@ -78,14 +81,4 @@ const OUTSIDE: &str = "  (outside the equation's domain)";
 
 fn in_words(zones: &Zones) -> String {
     format!("stereo {:.2}, mono {:.2}, blind {:.2}", zones.stereo, zones.mono, zones.blind)
-}
-
-/// In degrees; a number that is none becomes null.
-#[must_use]
-pub fn in_degrees(zones: &Zones) -> Value {
-    json!({
-        "stereo": rounded(zones.stereo.deg()),
-        "mono": rounded(zones.mono.deg()),
-        "blind": rounded(zones.blind.deg()),
-    })
 }

@@ -15,7 +15,7 @@ pub enum Hardware {
 }
 
 impl Hardware {
-    /// What images for it name as their hardware.
+    /// The number that image headers hold.
     #[must_use]
     pub const fn id(self) -> u32 {
         match self {
@@ -23,18 +23,4 @@ impl Hardware {
             Self::NativeSim => NATIVE_HARDWARE,
         }
     }
-
-    const fn name(self) -> &'static str {
-        match self {
-            Self::NucleoG474 => "nucleo-g474",
-            Self::NativeSim => "native-sim",
-        }
-    }
-}
-
-/// The name of a board, or its number where it is unknown.
-#[must_use]
-pub fn hardware_name(id: u32) -> String {
-    let known = Hardware::value_variants().iter().find(|hardware| hardware.id() == id);
-    known.map_or_else(|| format!("unknown hardware {id:#010x}"), |hardware| hardware.name().into())
 }

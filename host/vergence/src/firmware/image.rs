@@ -1,43 +1,23 @@
-//! Image files, and what they say of themselves.
+//! Image headers as JSON, versions from the command line, and reading image files.
 
 use std::path::Path;
 
 use serde_json::{Value, json};
-use vergence_image::{ImageFile, Seal};
+use vergence_board::{FirmwareImage, hardware_name, version_text};
 use vergence_protocol::management::ImageHeader;
 
-use super::hardware::hardware_name;
 use super::keys::hex;
 use crate::failure::Failure;
 
-/// An image file, read and found whole.
-pub struct OwnedImage {
-    /// Header and signature.
-    pub seal: Seal,
-    /// The bytes for flash.
-    pub bytes: Vec<u8>,
+/// Reads a signed image file.
+///
+/// # Errors
+/// A usage failure that names the file: it cannot be read, is no image, or is damaged.
+pub fn read_image(path: &Path) -> Result<FirmwareImage, Failure> {
+    FirmwareImage::read(path).map_err(|error| Failure::input(path, error))
 }
 
-impl OwnedImage {
-    /// Reads an image file.
-    ///
-    /// # Errors
-    /// A file that is none, or a damaged one.
-    pub fn read(path: &Path) -> Result<Self, Failure> {
-        let file = std::fs::read(path).map_err(|error| Failure::input(path, error))?;
-        let ImageFile { seal, image } = ImageFile::read(&file)
-            .map_err(|error| Failure::input(path, format!("{error}; images are made with 'vergence image sign'")))?;
-        Ok(Self { seal, bytes: image.to_vec() })
-    }
-
-    /// What it says of itself.
-    #[must_use]
-    pub const fn header(&self) -> &ImageHeader {
-        &self.seal.header
-    }
-}
-
-/// A header for programs.
+/// An image header as JSON.
 #[must_use]
 pub fn header_json(header: &ImageHeader) -> Value {
     json!({
@@ -49,16 +29,10 @@ pub fn header_json(header: &ImageHeader) -> Value {
     })
 }
 
-/// `1.2.3`.
-#[must_use]
-pub fn version_text([major, minor, patch]: [u8; 3]) -> String {
-    format!("{major}.{minor}.{patch}")
-}
-
-/// A version of three numbers.
+/// Parses a version of three numbers.
 ///
 /// # Errors
-/// Says what is expected.
+/// A sentence that says what is expected.
 pub fn parse_version(text: &str) -> Result<[u8; 3], String> {
     let numbers: Option<Vec<u8>> = text.split('.').map(|part| part.parse().ok()).collect();
     numbers

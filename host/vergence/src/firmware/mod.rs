@@ -8,6 +8,6 @@ mod keys;
 
 pub use built::{APPLICATION, BOOT_LOADER};
 pub use flat::{build_of, elf_start, flatten, is_elf};
-pub use hardware::{Hardware, hardware_name};
-pub use image::{OwnedImage, header_json, parse_version, version_text};
+pub use hardware::Hardware;
+pub use image::{header_json, parse_version, read_image};
 pub use keys::{DEVELOPMENT, PublicKey, SecretKey, fresh_secret, hex};

@@ -1,40 +1,38 @@
-//! Which cameras are dead, and for how long both are.
+//! Which cameras are gone, and for how long both are.
 
 use std::time::Duration;
 
 use tokio::time::Instant;
+use vergence_pipeline::CameraGone;
 
-use super::exposures::UNHEARD;
-
-/// Both cameras dead for this long: nothing will come any more.
+/// With both cameras gone for this long, nothing will come any more.
 const HOPE: Duration = Duration::from_secs(5);
 
-/// What was known of the cameras last.
+/// What was known of the cameras last (left, right).
 pub struct Blindness {
-    dead: [Option<String>; 2],
+    gone: [Option<CameraGone>; 2],
     since: Option<Instant>,
 }
 
 impl Default for Blindness {
     fn default() -> Self {
-        Self { dead: [(); 2].map(|()| Some(UNHEARD.to_owned())), since: None }
+        Self { gone: [const { Some(CameraGone::Unheard) }; 2], since: None }
     }
 }
 
 impl Blindness {
-    /// Says which camera died, and which is back; whether both have been dead so long that there is no hope.
-    pub fn note(&mut self, dead: [Option<&str>; 2], mut warn: impl FnMut(String)) -> bool {
-        for ((name, before), now) in ["left", "right"].iter().zip(&self.dead).zip(dead) {
-            let before = before.as_deref();
-            match (before, now) {
-                _ if now == Some(UNHEARD) || (before == Some(UNHEARD) && now.is_none()) => {}
-                (_, Some(why)) if before != now => warn(format!("the {name} camera is dead: {why}")),
+    /// Warns of a camera that failed or is back. Whether both have been gone so long that there is no hope.
+    pub fn note(&mut self, gone: [Option<&CameraGone>; 2], mut warn: impl FnMut(String)) -> bool {
+        for ((name, before), now) in ["left", "right"].iter().zip(&self.gone).zip(gone) {
+            match (before.as_ref(), now) {
+                (_, Some(CameraGone::Unheard)) | (Some(CameraGone::Unheard), None) => {}
+                (before, Some(why)) if before != now => warn(format!("the {name} camera is dead: {why}")),
                 (Some(_), None) => warn(format!("the {name} camera is there")),
                 _ => {}
             }
         }
-        self.dead = dead.map(|why| why.map(ToOwned::to_owned));
-        if self.dead.iter().any(Option::is_none) {
+        self.gone = gone.map(Option::<&CameraGone>::cloned);
+        if self.gone.iter().any(Option::is_none) {
             self.since = None;
             return false;
         }

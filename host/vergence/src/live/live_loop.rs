@@ -1,4 +1,4 @@
-//! The loop itself: it listens to cameras and board, keeps the newest exposure, and measures it when the matcher is free.
+//! The loop itself: listens to cameras and board, keeps the newest exposure, and measures it when the matcher is free.
 
 use std::collections::BTreeMap;
 use std::pin::Pin;
@@ -7,28 +7,31 @@ use std::time::Duration;
 
 use tokio::sync::mpsc::Receiver;
 use tokio::time::{Instant, interval, sleep, sleep_until};
+use vergence_board::{BoardKnowledge, HostClock};
+use vergence_camera::{CameraEvent, PendingImage};
 use vergence_matching::Matcher;
-use vergence_protocol::FrameMark;
-use vergence_rig::{Rig, TrackGap, middle_pose};
+use vergence_pipeline::{
+    Ambiguity, Exposed, Exposures, Motion, Observation, PairPose, SkipReason, TimeBase, pair_exposure,
+};
+use vergence_protocol::TriggerMark;
+use vergence_rig::{Rig, StampedImage, TrackGap};
+use vergence_vision::Side;
 
 use super::blindness::Blindness;
-use super::exposures::{Exposed, Exposures, TimeBase};
-use super::eye::Heard;
-use super::measure::{Measured, Motion, Seen, measure, pair_exposure};
+use super::measure::{Measurement, PosedExposure, measure};
 use crate::failure::Failure;
-use crate::link::{BoardKnowledge, HostClock};
 
-/// How often what never came is given up.
+/// How often overdue images and pulses are given up.
 const SETTLE: Duration = Duration::from_millis(20);
-/// Encoder readings for an exposure arrive within this, or not at all.
+/// Longest wait for the encoder readings of an exposure.
 const READINGS: Duration = Duration::from_millis(300);
-/// Readings around an exposure that are taken along, in microseconds.
+/// Encoder readings this long before and after an exposure are kept with it, in microseconds.
 const MARGIN_US: f64 = 250_000.0;
 
-/// When the loop ends by itself.
+/// When the loop ends without being interrupted.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Limits {
-    /// After so many results.
+    /// After this many results.
     pub results: Option<u64>,
     /// After this time.
     pub time: Option<Duration>,
@@ -37,86 +40,109 @@ pub struct Limits {
 /// Why the loop ended.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Ended {
-    /// There are as many results as were asked for, or the time is over.
+    /// A limit was reached.
     Done,
     /// Both cameras are dead.
     Blind,
 }
 
-/// What became of everything so far.
+/// Counts of results and of what was skipped.
 #[derive(Clone, Debug, Default)]
 pub struct Totals {
-    /// Clouds.
+    /// Number of clouds.
     pub clouds: u64,
-    /// Sets of bearings.
+    /// Number of sets of bearings.
     pub bearings: u64,
-    /// What was skipped, by reason.
-    pub skipped: BTreeMap<&'static str, u64>,
+    /// Number of exposures that were skipped, by reason.
+    pub skipped: BTreeMap<SkipReason, u64>,
 }
 
-/// What a result of the loop is told with.
-pub struct Told<'a> {
-    /// The result.
-    pub measured: &'a Measured,
-    /// From the middle of the exposure until now.
+/// A result of the loop.
+pub struct LiveResult<'a> {
+    /// Points or bearings.
+    pub measurement: &'a Measurement,
+    /// Time from the middle of the exposure until now.
     pub latency: Duration,
-    /// What became of everything so far.
+    /// Counts so far, this result included.
     pub totals: &'a Totals,
 }
 
-/// Everything that the loop needs. It owns no device.
+/// How long matching takes on the clock of the loop, which may be simulated.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum MatchingTime {
+    /// The clock is real: it runs while the matcher works.
+    Real,
+    /// The clock is simulated and stands still meanwhile: it is advanced by the time that matching really took.
+    Measured,
+    /// The clock is simulated: it is advanced by this time, so that results do not depend on the computer.
+    Fixed(Duration),
+}
+
+/// The parts of the live loop. It owns no device.
 pub struct LiveLoop {
-    /// The rig.
+    /// The rig that measures.
     pub rig: Arc<Rig>,
     /// Finds homologous points.
     pub matcher: Arc<dyn Matcher>,
-    /// The cameras.
-    pub news: Receiver<Heard>,
-    /// The pulses of the camera trigger; `None` where the cameras run freely.
-    pub marks: Option<Receiver<FrameMark>>,
-    /// What is known of the board; `None` for a rig without axes.
+    /// Events of both cameras.
+    pub events: Receiver<(Side, CameraEvent)>,
+    /// Pulses of the camera trigger; `None` where the cameras run freely.
+    pub marks: Option<Receiver<TriggerMark>>,
+    /// Clock map and encoder track of the board; `None` for a rig without axes.
     pub board: Option<BoardKnowledge>,
-    /// The host's clock.
+    /// The host's clock, on which images are stamped.
     pub clock: HostClock,
-    /// Which frames belong together.
-    pub exposures: Exposures,
-    /// Where time is simulated: matching takes so much of it; `None` as much as it really took.
-    pub simulated: Option<Option<Duration>>,
+    /// Pairs images and pulses.
+    pub exposures: Exposures<PendingImage>,
+    /// How long matching takes on the clock of the loop.
+    pub matching_time: MatchingTime,
 }
 
-/// A measurement under way. The host's time of the exposure goes with it.
-type Work = Pin<Box<dyn Future<Output = (f64, Result<Measured, Reason>)>>>;
+impl MatchingTime {
+    /// Advances a simulated clock by the time of `measurement`. Decoding takes none of it: simulated images are rendered,
+    /// which a real camera does not do.
+    async fn pass(self, measurement: &Measurement) {
+        match self {
+            Self::Real => {}
+            Self::Measured => sleep(Duration::from_secs_f64(measurement.seconds)).await,
+            Self::Fixed(time) => sleep(time).await,
+        }
+    }
+}
 
-/// Why an exposure came to nothing.
-enum Reason {
+/// A measurement under way, which ends with the host's time of the exposure in microseconds.
+type Work = Pin<Box<dyn Future<Output = (f64, Result<Measurement, NoResult>)>>>;
+
+/// Why an exposure gave no result.
+enum NoResult {
     Joints(TrackGap),
     Failed(Failure),
 }
 
 impl LiveLoop {
-    /// Runs until `limits` are reached or both cameras are dead; tells each result.
+    /// Runs until `limits` are reached or both cameras are dead; calls `publish` with each result and `warn` with sentences for
+    /// people.
     ///
     /// # Errors
-    /// Those of `tell`; a pair that cannot be measured whatever the images show; a link that ended.
+    /// Those of `publish`; a pair that cannot be measured whatever the images show; a link that ended.
     pub async fn run(
         &mut self,
         limits: Limits,
         totals: &mut Totals,
-        mut tell: impl FnMut(Told<'_>) -> Result<(), Failure>,
+        mut publish: impl FnMut(LiveResult<'_>) -> Result<(), Failure>,
         mut warn: impl FnMut(String),
     ) -> Result<Ended, Failure> {
         let deadline = limits.time.map(|time| Instant::now() + time);
         let mut settle = interval(SETTLE);
-        let (mut work, mut newest): (Option<Work>, Option<Exposed>) = (None, None);
+        let (mut work, mut newest): (Option<Work>, Option<Exposed<PendingImage>>) = (None, None);
         let mut blindness = Blindness::default();
         loop {
             if work.is_none() {
                 work = newest.take().map(|exposed| self.start(exposed));
             }
             tokio::select! {
-                Some(heard) = self.news.recv() => {
-                    let base = self.base();
-                    self.exposures.hear(heard.side, heard.news, &base);
+                Some((side, event)) = self.events.recv() => {
+                    self.take_event(side, event);
                 }
                 mark = next(&mut self.marks) => match mark {
                     Some(mark) => {
@@ -127,7 +153,7 @@ impl LiveLoop {
                 },
                 (exposed_at, done) = finished(&mut work) => {
                     work = None;
-                    self.conclude(exposed_at, done, totals, &mut tell)?;
+                    self.conclude(exposed_at, done, totals, &mut publish)?;
                     if limits.results.is_some_and(|most| totals.clouds + totals.bearings >= most) {
                         return Ok(Ended::Done);
                     }
@@ -143,77 +169,98 @@ impl LiveLoop {
             }
             while let Some(exposed) = self.exposures.take() {
                 if newest.replace(exposed).is_some() {
-                    self.exposures.skip("newer_came");
+                    self.exposures.skip(SkipReason::NewerCame);
                 }
             }
-            self.exposures.take_ambiguity().into_iter().for_each(&mut warn);
-            if blindness.note(self.exposures.dead(), &mut warn) && work.is_none() {
+            self.exposures.take_ambiguity().map(in_words).into_iter().for_each(&mut warn);
+            if blindness.note(self.exposures.gone(), &mut warn) && work.is_none() {
                 return Ok(Ended::Blind);
             }
         }
     }
 
-    /// Counts what came of an exposure, and tells it.
+    /// Counts the outcome of an exposure and publishes its result.
     fn conclude(
         &mut self,
         exposed_at: f64,
-        done: Result<Measured, Reason>,
+        done: Result<Measurement, NoResult>,
         totals: &mut Totals,
-        tell: &mut impl FnMut(Told<'_>) -> Result<(), Failure>,
+        publish: &mut impl FnMut(LiveResult<'_>) -> Result<(), Failure>,
     ) -> Result<(), Failure> {
-        let measured = match done {
-            Ok(measured) => measured,
-            Err(Reason::Joints(gap)) => {
+        let measurement = match done {
+            Ok(measurement) => measurement,
+            Err(NoResult::Joints(gap)) => {
                 self.exposures.skip(match gap {
-                    TrackGap::NotYet => "encoders_silent",
-                    _ => "encoders_unknown",
+                    TrackGap::NotYet => SkipReason::EncodersSilent,
+                    _ => SkipReason::EncodersUnknown,
                 });
                 return Ok(());
             }
-            Err(Reason::Failed(failure)) => return Err(failure),
+            Err(NoResult::Failed(failure)) => return Err(failure),
         };
-        match measured.seen {
-            Seen::Points { .. } => totals.clouds += 1,
-            Seen::Bearings { .. } => totals.bearings += 1,
+        match measurement.observation {
+            Observation::Points { .. } => totals.clouds += 1,
+            Observation::Bearings { .. } => totals.bearings += 1,
         }
         totals.skipped.clone_from(self.exposures.skipped());
         let latency = (self.clock.now().0 as f64 - exposed_at).max(0.0);
-        tell(Told { measured: &measured, latency: Duration::from_micros(latency as u64), totals })
+        publish(LiveResult { measurement: &measurement, latency: Duration::from_micros(latency as u64), totals })
+    }
+
+    /// Takes an event of a camera.
+    fn take_event(&mut self, side: Side, event: CameraEvent) {
+        let base = self.base();
+        match event {
+            CameraEvent::Attached(timing) => self.exposures.camera_ready(side, timing, &base),
+            CameraEvent::Lost(why) => self.exposures.camera_failed(side, why, &base),
+            CameraEvent::Image(image) => {
+                let stamp = StampedImage { seq: image.seq, middle: image.middle };
+                self.exposures.image(side, stamp, image, &base);
+            }
+        }
     }
 
     fn base(&self) -> TimeBase {
         self.board.as_ref().map_or(TimeBase::Host, |board| TimeBase::Board(board.clock_map()))
     }
 
-    /// Begins to measure, beside the link, which must not wait.
-    fn start(&self, exposed: Exposed) -> Work {
+    /// Begins to measure on a thread of its own: the link must not wait.
+    fn start(&self, exposed: Exposed<PendingImage>) -> Work {
         let (rig, matcher, board) = (Arc::clone(&self.rig), Arc::clone(&self.matcher), self.board.clone());
-        let (simulated, exposed_at) = (self.simulated, host_middle(&exposed));
+        let (matching_time, exposed_at) = (self.matching_time, host_middle(&exposed));
         Box::pin(async move {
-            let motion = match motion(&exposed, &rig, board.as_ref()).await {
-                Ok(motion) => motion,
-                Err(gap) => return (exposed_at, Err(Reason::Joints(gap))),
+            let posed = match posed(exposed, &rig, board.as_ref()).await {
+                Ok(posed) => posed,
+                Err(gap) => return (exposed_at, Err(NoResult::Joints(gap))),
             };
-            let worked = tokio::task::spawn_blocking(move || measure(exposed, &rig, &motion, matcher.as_ref())).await;
+            let worked = tokio::task::spawn_blocking(move || measure(posed, &rig, matcher.as_ref())).await;
             let outcome = worked.unwrap_or_else(|error| Err(Failure::device(format!("measuring failed: {error}"))));
-            // Simulated time stood still meanwhile. Rendering takes none of it: real cameras do not render.
-            if let (Some(takes), Ok(measured)) = (simulated, &outcome) {
-                sleep(takes.unwrap_or(Duration::from_secs_f64(measured.seconds))).await;
+            if let Ok(measurement) = &outcome {
+                matching_time.pass(measurement).await;
             }
-            (exposed_at, outcome.map_err(Reason::Failed))
+            (exposed_at, outcome.map_err(NoResult::Failed))
         })
     }
 }
 
+/// A sentence for images that time cannot tell apart.
+fn in_words(Ambiguity { side, excess_us }: Ambiguity) -> String {
+    format!(
+        "images of the {side} camera may belong to either of two pulses: the instant of their exposure is known {:.0} ms too \
+         badly for this rate; fire more slowly, or give --exposure and --readout",
+        (excess_us / 1000.0).ceil()
+    )
+}
+
 /// The next pulse; never where the cameras run freely.
-async fn next(marks: &mut Option<Receiver<FrameMark>>) -> Option<FrameMark> {
+async fn next(marks: &mut Option<Receiver<TriggerMark>>) -> Option<TriggerMark> {
     match marks {
         Some(marks) => marks.recv().await,
         None => std::future::pending().await,
     }
 }
 
-async fn finished(work: &mut Option<Work>) -> (f64, Result<Measured, Reason>) {
+async fn finished(work: &mut Option<Work>) -> (f64, Result<Measurement, NoResult>) {
     match work {
         Some(work) => work.await,
         None => std::future::pending().await,
@@ -221,24 +268,35 @@ async fn finished(work: &mut Option<Work>) -> (f64, Result<Measured, Reason>) {
 }
 
 /// The middle of the exposure on the host's clock, in microseconds.
-fn host_middle(exposed: &Exposed) -> f64 {
+fn host_middle(exposed: &Exposed<PendingImage>) -> f64 {
     match exposed {
-        Exposed::Pair(shots) => shots[0].frame.middle.us,
-        Exposed::One { shot, .. } => shot.frame.middle.us,
+        Exposed::Pair(images) => images[0].image.middle.us,
+        Exposed::One { image, .. } => image.image.middle.us,
     }
 }
 
-/// The encoder readings that cover an exposure, as soon as they have come.
-async fn motion(exposed: &Exposed, rig: &Rig, board: Option<&BoardKnowledge>) -> Result<Motion, TrackGap> {
-    let (Some(board), Exposed::Pair(shots)) = (board, exposed) else { return Ok(Motion::Fixed) };
-    let middles = shots.each_ref().map(|shot| shot.middle);
+/// The exposure with its pose, as soon as the encoder readings that cover it have come.
+async fn posed(
+    exposed: Exposed<PendingImage>,
+    rig: &Rig,
+    board: Option<&BoardKnowledge>,
+) -> Result<PosedExposure, TrackGap> {
+    let images = match exposed {
+        Exposed::Pair(images) => images,
+        Exposed::One { side, image, why } => return Ok(PosedExposure::One { side, image, why }),
+    };
+    let middles = images.each_ref().map(|image| image.middle);
     let exposure = pair_exposure(rig, middles);
+    let Some(board) = board else {
+        let pose = PairPose::in_motion(rig, Motion::Fixed, exposure)?;
+        return Ok(PosedExposure::Pair(images, Box::new(pose)));
+    };
     let (first, last) = (middles[0].us.min(middles[1].us), middles[0].us.max(middles[1].us));
     let patience = Instant::now() + READINGS;
     loop {
         let track = board.track_between(first - MARGIN_US, last + MARGIN_US);
-        match middle_pose(rig, &track, &exposure) {
-            Ok(_) => return Ok(Motion::Read(track)),
+        match PairPose::in_motion(rig, Motion::Read(track), exposure) {
+            Ok(pose) => return Ok(PosedExposure::Pair(images, Box::new(pose))),
             Err(TrackGap::NotYet) if Instant::now() < patience => {
                 sleep_until(Instant::now() + Duration::from_millis(2)).await;
             }

@@ -1,71 +1,71 @@
-//! What the live loop gives to people, to files and to programs.
+//! The results of the live loop for people, as files and for programs.
 //!
-//! In a folder, `cloud.ply` is always the newest cloud, written whole; it is taken away while one camera is dead, so that nobody
-//! takes an old cloud for a new one, and `bearings.csv` stands in its place. To programs each result is one line of JSON.
+//! In a folder, `cloud.ply` is always the newest cloud, written whole; it is removed while one camera is dead, so that nobody
+//! takes an old cloud for a new one, and `bearings.csv` is written instead. With `--json` each result is one line of JSON.
 
 use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use serde_json::{Value, json};
+use vergence_pipeline::{Bearing, CameraGone, Observation, PairCloud};
 use vergence_rig::{Rig, RigPose};
 use vergence_vision::Side;
 
-use super::live_loop::{Told, Totals};
-use super::measure::Seen;
+use super::live_loop::{LiveResult, Totals};
+use crate::cmd::cloud_report::{PoseSource, drift_warning, dropped_json};
 use crate::cmd::report::{axes_json, rounded};
 use crate::console::Console;
 use crate::failure::Failure;
-use crate::look::{Bearing, Look};
 use crate::output::{Table, TableFormat, ply, write_whole};
 
 /// Where results go.
 pub struct Publisher {
-    /// Lines for people or programs.
+    /// Prints lines for people or programs.
     pub console: Console,
     /// The rig that measures.
     pub rig: Arc<Rig>,
-    /// A folder for files.
+    /// A folder for files; `None` writes none.
     pub out: Option<PathBuf>,
-    /// A numbered file for every result, instead of one with the newest.
+    /// Write a numbered file for every result, instead of one file with the newest.
     pub keep: bool,
     /// Tables beside the PLY files.
     pub also: Vec<TableFormat>,
-    /// Results so far.
+    /// Number of results so far.
     pub number: u64,
 }
 
 impl Publisher {
-    /// Gives out one result.
+    /// Prints and writes one result.
     ///
     /// # Errors
     /// Where a file or standard output cannot be written.
-    pub fn publish(&mut self, told: &Told<'_>) -> Result<(), Failure> {
+    pub fn publish(&mut self, result: &LiveResult<'_>) -> Result<(), Failure> {
         self.number += 1;
-        match &told.measured.seen {
-            Seen::Points { look, pose, moving } => {
-                self.write_cloud(look)?;
-                self.console.say(self.points_line(told, look, pose, *moving))?;
-                if let Some(warning) = look.warning() {
-                    self.console.say(format!("  warning: {warning}"))?;
+        match &result.measurement.observation {
+            Observation::Points { cloud, pose, moving } => {
+                self.write_cloud(cloud)?;
+                self.console.say(self.points_line(result, cloud, pose, *moving))?;
+                if let Some(warning) = drift_warning(cloud, self.pose_source()) {
+                    self.console.warn(format!("cloud {}: {warning}", self.number));
                 }
-                self.result(|| self.points_json(told, look, pose, *moving))
+                self.print_json(|| self.points_json(result, cloud, pose, *moving))
             }
-            Seen::Bearings { side, bearings, why } => {
+            Observation::Bearings { side, bearings, why } => {
                 self.write_bearings(bearings)?;
                 self.console.say(format!(
                     "{:5}  {} bearings of the {side} camera, no range: the {} camera is dead ({why}); {}",
                     self.number,
                     bearings.len(),
                     side.other(),
-                    timing(told)
+                    timing(result)
                 ))?;
-                self.result(|| self.bearings_json(told, *side, bearings, why))
+                self.print_json(|| self.bearings_json(result, *side, bearings, why))
             }
         }
     }
 
-    /// What became of everything.
+    /// Prints the totals.
     ///
     /// # Errors
     /// Where standard output cannot be written.
@@ -76,29 +76,29 @@ impl Publisher {
             "kind": "end",
             "clouds": totals.clouds,
             "bearings": totals.bearings,
-            "skipped": totals.skipped,
+            "skipped": skipped_json(totals),
         }))
     }
 
     /// A whole cloud in JSON is only made where somebody reads it.
-    fn result(&self, json: impl FnOnce() -> Value) -> Result<(), Failure> {
+    fn print_json(&self, json: impl FnOnce() -> Value) -> Result<(), Failure> {
         if self.console.is_json() { self.console.result(&json()) } else { Ok(()) }
     }
 
-    fn points_line(&self, told: &Told<'_>, look: &Look, pose: &RigPose, moving: bool) -> String {
+    fn points_line(&self, result: &LiveResult<'_>, cloud: &PairCloud, pose: &RigPose, moving: bool) -> String {
         let axes = self.rig.axes.iter().zip(&pose.axes).map(|(axis, at)| format!("{} {at:.2}", axis.name));
         let axes = axes.collect::<Vec<_>>().join(", ");
         let moving = if moving { ", moving" } else { "" };
         let place = if axes.is_empty() { String::new() } else { format!(" at {axes}{moving}") };
-        format!("{:5}  {} points{place}; {}", self.number, look.points.len(), timing(told))
+        format!("{:5}  {} points{place}; {}", self.number, cloud.points.len(), timing(result))
     }
 
-    fn points_json(&self, told: &Told<'_>, look: &Look, pose: &RigPose, moving: bool) -> Value {
+    fn points_json(&self, result: &LiveResult<'_>, cloud: &PairCloud, pose: &RigPose, moving: bool) -> Value {
         let placed = pose.base_from_left;
-        let mut line = self.head_json("cloud", told);
-        line["points"] = look.points.len().into();
-        line["matches"] = look.matches.into();
-        line["dropped"] = json!(look.dropped);
+        let mut line = self.head_json("cloud", result);
+        line["points"] = cloud.points.len().into();
+        line["matches"] = cloud.matches.into();
+        line["dropped"] = dropped_json(&cloud.dropped);
         line["axes"] = axes_json(&self.rig, &pose.axes);
         line["moving"] = moving.into();
         line["beyond_calibration"] = json!(self.rig.extrapolations(&pose.axes));
@@ -106,36 +106,36 @@ impl Publisher {
             "origin_mm": placed.origin().mm().as_slice(),
             "rotation_vector": placed.rotation().scaled_axis().as_slice(),
         });
-        line["warning"] = json!(look.warning());
-        line["cloud"] = Table::of_points(&look.points).json();
+        line["warning"] = json!(drift_warning(cloud, self.pose_source()));
+        line["cloud"] = Table::of_points(&cloud.points).json();
         line
     }
 
-    fn bearings_json(&self, told: &Told<'_>, side: Side, bearings: &[Bearing], why: &str) -> Value {
-        let mut line = self.head_json("bearings", told);
+    fn bearings_json(&self, result: &LiveResult<'_>, side: Side, bearings: &[Bearing], why: &CameraGone) -> Value {
+        let mut line = self.head_json("bearings", result);
         line["camera"] = side.to_string().into();
-        line["dead"] = json!({ "camera": side.other().to_string(), "why": why });
+        line["dead"] = json!({ "camera": side.other().to_string(), "why": why.to_string() });
         line["bearings"] = Table::of_bearings(bearings).json();
         line
     }
 
-    fn head_json(&self, kind: &str, told: &Told<'_>) -> Value {
+    fn head_json(&self, kind: &str, result: &LiveResult<'_>) -> Value {
         json!({
             "kind": kind,
             "number": self.number,
-            "exposed_us": rounded(told.measured.middle.us),
-            "exposed_error_us": rounded(told.measured.middle.error_us),
-            "latency_ms": told.latency.as_micros() as f64 / 1000.0,
-            "work_ms": rounded(told.measured.seconds * 1e3),
-            "skipped": told.totals.skipped,
+            "exposed_us": rounded(result.measurement.middle.us),
+            "exposed_error_us": rounded(result.measurement.middle.error_us),
+            "latency_ms": result.latency.as_micros() as f64 / 1000.0,
+            "work_ms": rounded(result.measurement.seconds * 1e3),
+            "skipped": skipped_json(result.totals),
         })
     }
 
-    fn write_cloud(&self, look: &Look) -> Result<(), Failure> {
+    fn write_cloud(&self, cloud: &PairCloud) -> Result<(), Failure> {
         let Some(folder) = &self.out else { return Ok(()) };
         self.withdraw(folder, "bearings", &["csv", "json"])?;
-        write_whole(&self.file(folder, "cloud", "ply"), ply(&look.points).as_bytes())?;
-        let table = Table::of_points(&look.points);
+        write_whole(&self.file(folder, "cloud", "ply"), ply(&cloud.points).as_bytes())?;
+        let table = Table::of_points(&cloud.points);
         self.also.iter().try_for_each(|format| {
             write_whole(&self.file(folder, "cloud", format.extension()), table.text(*format).as_bytes())
         })
@@ -151,6 +151,10 @@ impl Publisher {
         })
     }
 
+    fn pose_source(&self) -> PoseSource {
+        if self.rig.axes.is_empty() { PoseSource::RigFile } else { PoseSource::Encoders }
+    }
+
     fn file(&self, folder: &Path, stem: &str, extension: &str) -> PathBuf {
         match self.keep {
             true => folder.join(format!("{stem}{:06}.{extension}", self.number)),
@@ -158,7 +162,7 @@ impl Publisher {
         }
     }
 
-    /// Takes away what is not the newest any more.
+    /// Removes files that are no longer the newest result.
     fn withdraw(&self, folder: &Path, stem: &str, extensions: &[&str]) -> Result<(), Failure> {
         if self.keep {
             return Ok(());
@@ -174,12 +178,16 @@ impl Publisher {
     }
 }
 
-fn timing(told: &Told<'_>) -> String {
-    let skipped: u64 = told.totals.skipped.values().sum();
-    format!("{} ms after the exposure, {skipped} skipped so far", told.latency.as_millis())
+fn timing(result: &LiveResult<'_>) -> String {
+    let skipped: u64 = result.totals.skipped.values().sum();
+    format!("{} ms after the exposure, {skipped} skipped so far", result.latency.as_millis())
+}
+
+fn skipped_json(totals: &Totals) -> Value {
+    totals.skipped.iter().map(|(reason, count)| (reason.as_str().to_owned(), json!(count))).collect()
 }
 
 fn in_words(totals: &Totals) -> String {
-    let reasons: Vec<_> = totals.skipped.iter().map(|(reason, count)| format!("{reason} {count}")).collect();
+    let reasons: Vec<_> = totals.skipped.iter().map(|(reason, count)| format!("{} {count}", reason.as_str())).collect();
     if reasons.is_empty() { String::new() } else { format!("; skipped: {}", reasons.join(", ")) }
 }

@@ -1,17 +1,16 @@
 //! A range for every pixel as images: to compute with, and to look at.
 
-use image::{ImageBuffer, Luma, Rgb, RgbImage, imageops};
+use image::{ImageBuffer, ImageError, ImageFormat, Luma, Rgb, RgbImage};
 use vergence_matching::{DenseDepth, DenseSample};
 
-use super::range_scale::{BAR_HEIGHT, MARGIN, RangeScale, dimmed};
-use super::text::write_text;
+use super::panels::{ColourScale, Panels, light_grey};
 
 /// 16 bits of grey for each pixel.
 pub type Grey16 = ImageBuffer<Luma<u16>, Vec<u16>>;
 
-/// What the range image says of a pixel that is farther than can be measured, and of one at 65 534 mm or more.
+/// The value of the range image for a pixel that is farther than can be measured, and for one at 65 534 mm or more.
 const FAR: u16 = u16::MAX;
-/// Steps of the sigma image to the millimetre.
+/// Steps of the sigma image per millimetre.
 const SIGMA_STEPS: f64 = 10.0;
 
 /// The distance from the left optical centre in whole millimetres; 0 where there is none, 65535 where it is farther than
@@ -36,7 +35,7 @@ pub fn sigma_image(depth: &DenseDepth) -> Grey16 {
     })
 }
 
-/// How alike both windows are, from 1 (not at all) to 255 (the same); 0 where there is no distance.
+/// The similarity of both windows, from 1 (not at all) to 255 (the same); 0 where there is no distance.
 #[must_use]
 pub fn confidence_image(depth: &DenseDepth) -> ImageBuffer<Luma<u8>, Vec<u8>> {
     image_of(depth, |sample| match sample {
@@ -56,28 +55,29 @@ where
     })
 }
 
-/// The left image, and beside it every range as colour: dark near, light far, white farther than can be measured, the grey
+/// The left image, and beside it the range of every pixel as colour: white where it is farther than can be measured, the grey
 /// image where there is none.
-#[must_use]
-pub fn dense_picture(left: &RgbImage, depth: &DenseDepth) -> RgbImage {
+///
+/// # Errors
+/// Where an image cannot be encoded.
+pub fn dense_svg(left: &RgbImage, depth: &DenseDepth) -> Result<String, ImageError> {
     let ranges = depth.samples().iter().filter_map(|sample| match sample {
-        DenseSample::Measured(point) => Some(point.range()),
+        DenseSample::Measured(point) => Some(point.range().mm()),
         DenseSample::Far | DenseSample::Gap(_) => None,
     });
-    let scale = RangeScale::of(ranges);
-    let (width, height) = left.dimensions();
-    let mut canvas = RgbImage::new(2 * width, height + BAR_HEIGHT);
-    imageops::replace(&mut canvas, left, 0, 0);
-    imageops::replace(&mut canvas, &dimmed(left), i64::from(width), 0);
-    for (index, sample) in (0..width * height).zip(depth.samples()) {
+    let scale = ColourScale::of_ranges(ranges);
+    let width = left.width().max(1);
+    let mut coloured = light_grey(left);
+    for (index, sample) in (0..width * left.height()).zip(depth.samples()) {
         let colour = match sample {
-            DenseSample::Measured(point) => scale.colour(point.range()),
-            DenseSample::Far => Rgb([255; 3]),
+            DenseSample::Measured(point) => scale.colour(point.range().mm()),
+            DenseSample::Far => [255; 3],
             DenseSample::Gap(_) => continue,
         };
-        canvas.put_pixel(width + index % width, index / width, colour);
+        coloured.put_pixel(index % width, index / width, Rgb(colour));
     }
-    write_text(&mut canvas, (width + MARGIN, MARGIN), 2, "range");
-    scale.draw(&mut canvas, "grey image: no range; white: farther than measurable");
-    canvas
+    let mut panels = Panels::new(left.dimensions(), &["left image", "range"]);
+    panels.image(0, left, ImageFormat::Jpeg)?;
+    panels.image(1, &coloured, ImageFormat::Png)?;
+    Ok(panels.finish(&scale, "range of every pixel; grey: none; white: farther than can be measured"))
 }

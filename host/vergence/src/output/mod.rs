@@ -1,14 +1,15 @@
 //! Files that commands write: whole, or not at all.
 
+mod cloud_pictures;
 mod colour_map;
 mod dense_pictures;
 mod dense_ply;
 mod depth_field_svg;
-mod picture;
+mod endings;
+mod panels;
 mod ply;
-mod range_scale;
 mod table;
-mod text;
+mod target_sheet;
 mod zones_plot;
 mod zones_svg;
 
@@ -17,14 +18,16 @@ use std::path::Path;
 
 use image::{EncodableLayout, ImageBuffer, ImageFormat, PixelWithColorType};
 
-pub use dense_pictures::{confidence_image, dense_picture, range_image, sigma_image};
+pub use cloud_pictures::{depth_svg, error_svg, match_svg};
+pub use dense_pictures::{confidence_image, dense_svg, range_image, sigma_image};
 pub use dense_ply::{DenseRow, dense_ply};
 pub use depth_field_svg::depth_field_svg;
-pub use picture::{DepthPicture, depth_picture, match_picture};
+pub use endings::{check_ending, check_folder};
 pub use ply::ply;
 pub use table::{Table, TableFormat};
+pub use target_sheet::Sheet;
 pub use zones_plot::{ZonesOf, zones_plot};
-pub use zones_svg::zones_svg;
+pub use zones_svg::{seen_by_cones, zones_svg};
 
 use crate::failure::Failure;
 

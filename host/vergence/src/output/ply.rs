@@ -2,9 +2,9 @@
 
 use std::fmt::Write;
 
-use crate::look::ColouredPoint;
+use vergence_pipeline::ColouredPoint;
 
-/// What the columns are, a line of every header.
+/// The line of every header that explains unit and frame.
 pub const COLUMNS_COMMENT: &str = "comment millimetres in the left camera's frame: x right, y down, z forward\n";
 
 /// The points in the left camera's frame, in millimetres, with colour, pixels in both images, sigma of the range, and the

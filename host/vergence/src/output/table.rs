@@ -1,20 +1,19 @@
 //! Points and bearings as tables, for programs: CSV, or JSON with named columns and rows of numbers.
 
 use serde_json::{Value, json};
+use vergence_pipeline::{Bearing, ColouredPoint};
 
-use crate::look::{Bearing, ColouredPoint};
-
-/// How a table is written.
+/// The format of a table.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
 pub enum TableFormat {
-    /// Comma-separated, with a line of names.
+    /// Comma-separated, with the names of the columns in the first line.
     Csv,
     /// `{"about", "columns", "rows"}`.
     Json,
 }
 
 impl TableFormat {
-    /// Of a file in it.
+    /// The ending of a file in this format, without the dot.
     #[must_use]
     pub const fn extension(self) -> &'static str {
         match self {
@@ -27,7 +26,7 @@ impl TableFormat {
 /// Named columns, and a row of numbers for each point.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Table {
-    /// What the rows are about, in a sentence.
+    /// What the rows mean.
     about: &'static str,
     columns: &'static [&'static str],
     rows: Vec<Vec<f64>>,
@@ -59,7 +58,7 @@ const BEARINGS: &str = "directions in the camera's own frame (x right, y down, z
 const BEARING_COLUMNS: [&str; 9] = ["x", "y", "z", "red", "green", "blue", "u", "v", "sigma_deg"];
 
 impl Table {
-    /// Of a cloud.
+    /// A row for each point of a cloud.
     #[must_use]
     pub fn of_points(points: &[ColouredPoint]) -> Self {
         let row = |ColouredPoint { point, colour, score }: &ColouredPoint| {
@@ -78,7 +77,7 @@ impl Table {
         Self { about: POINTS, columns: &POINT_COLUMNS, rows: points.iter().map(row).collect() }
     }
 
-    /// Of what one camera alone sees.
+    /// A row for each bearing of one camera.
     #[must_use]
     pub fn of_bearings(bearings: &[Bearing]) -> Self {
         let row = |bearing: &Bearing| {
@@ -90,7 +89,7 @@ impl Table {
         Self { about: BEARINGS, columns: &BEARING_COLUMNS, rows: bearings.iter().map(row).collect() }
     }
 
-    /// In `format`.
+    /// The table in `format`.
     #[must_use]
     pub fn text(&self, format: TableFormat) -> String {
         match format {
@@ -99,7 +98,7 @@ impl Table {
         }
     }
 
-    /// With a line of names and a line for each row.
+    /// A line of names, then a line for each row.
     #[must_use]
     pub fn csv(&self) -> String {
         let lines = self.rows.iter().map(|row| row.iter().map(|&value| number(value)).collect::<Vec<_>>().join(","));
@@ -115,7 +114,7 @@ impl Table {
     }
 }
 
-/// Six digits after the point: a nanometre, a micropixel.
+/// Rounded to six decimals: a nanometre, a micropixel.
 fn rounded(value: f64) -> f64 {
     (value * 1e6).round() / 1e6
 }

@@ -1,21 +1,14 @@
-//! The simulated rig: the native board or the firmware on a simulated chip, its own clock, and the ways to reach it
-//! (pipe, pty, TCP).
+//! Simulated boards for the command: read from files, served, and driven in this process.
 
-mod built;
-mod chip;
 mod connected;
-mod history;
-mod pace;
-mod random;
-mod rig;
-mod serve;
-mod served;
+mod files;
 
-pub use built::built;
-pub use chip::SimulatedChip;
+use vergence_board::Shared;
+
 pub use connected::board_of;
-pub use history::LoadHistory;
-pub use random::Random;
-pub use rig::{Pulse, SharedRig, SimulatedRig};
-pub use serve::{Listener, serve, spawn_in_process};
-pub use served::{Served, Shared};
+pub use files::{KeptRig, simulated_chip};
+pub use vergence_board::{Listener, Served, serve, spawn_in_process};
+pub use vergence_sim::{Random, SimulatedChip, SimulatedRig, built};
+
+/// A simulated rig, shared between the task that serves it and the cameras on it.
+pub type SharedRig = Shared<SimulatedRig>;

@@ -1,38 +1,31 @@
 //! `vergence bench matching`: what each way of matching finds, over the angle between the optical axes.
 
-mod judge;
-mod means;
-mod network_clock;
-mod simulated_pair;
-mod ways;
-
 use std::path::PathBuf;
 
 use nalgebra::Vector3;
 use serde_json::json;
+use vergence_bench::matching::{Class, NetworkClock, Outcome, SimulatedPair, Tally, Way};
 use vergence_vision::Angle;
 
-use self::judge::Tally;
-use self::means::Means;
-use self::network_clock::NetworkClock;
-use self::simulated_pair::SimulatedPair;
-use self::ways::{Outcome, Way};
+use super::means::Means;
+use crate::cmd::model_options::MatcherOptions;
 use crate::cmd::report::rounded;
 use crate::console::Console;
 use crate::failure::Failure;
-use crate::models::MatcherOptions;
+use crate::rig_file::bench_with_sensors;
+use crate::stopwatch::clock;
 
-/// Photographs the simulated room with two eyes 145 mm apart, each a little pitched and rolled, matches the pair by every
-/// way there is, and counts the matches that are right: those within 2.5 pixels of where the right eye sees what the left
-/// one does. `raw` gives the whole fisheye images to the networks, `views` is `--matcher` with a model, `classical` the one
-/// that needs none. Each before and after the gates of the known pose, with the time from images to points. With several seeds
-/// the mean comes after all of them.
+/// Photographs the simulated room with two cameras 145 mm apart, each a little pitched and rolled, matches the pair in every
+/// way, and counts the right matches: those within 2.5 pixels of where the right camera sees the same point. `raw` gives the
+/// whole fisheye images to the networks, `views` is `--matcher` with a model, `classical` the matcher without networks. All
+/// counts stand before and after the gates of the known pose, with the time from images to points. With several seeds the
+/// mean follows.
 #[derive(Debug, clap::Args)]
 pub struct Args {
     /// Angles between the optical axes, such as 60deg,120deg. Without them 0° to 130° in steps of 10°.
     #[arg(long, value_name = "ANGLES", value_delimiter = ',')]
     separations: Vec<Angle>,
-    /// From so many places in the room, each seed with its own place, heading and mounts.
+    /// Count of seeds; each has its own place in the room, heading and mounts.
     #[arg(long, default_value_t = 1, value_parser = clap::value_parser!(u64).range(1..=100))]
     seeds: u64,
     /// The first seed.
@@ -41,10 +34,10 @@ pub struct Args {
     /// Side of the images in pixels.
     #[arg(long, default_value_t = 1280, value_parser = clap::value_parser!(u32).range(160..=2560))]
     side: u32,
-    /// Tell the matchers a pose that is wrong by this angle.
+    /// Gives the matchers a pose that is wrong by this angle.
     #[arg(long, value_name = "ANGLE", default_value = "0deg")]
     pose_error: Angle,
-    /// Keep what is rendered in this folder, and take from there what is.
+    /// The folder that keeps rendered images; images that it has are not rendered again.
     #[arg(long, value_name = "DIR")]
     renders: Option<PathBuf>,
     #[command(flatten)]
@@ -55,8 +48,9 @@ const STEPS: [f64; 14] = [0.0, 10.0, 20.0, 30.0, 40.0, 50.0, 60.0, 70.0, 80.0, 9
 
 pub fn run(args: &Args, console: Console) -> Result<(), Failure> {
     // Once: a process loads one ONNX Runtime.
-    let clock = NetworkClock::default();
-    let learned = args.matching.learned(console)?.map(|learned| learned.wrapped(|network| clock.watch(network)));
+    let networks = NetworkClock::new(clock);
+    let learned = args.matching.learned(console)?.map(|learned| learned.wrapped(|network| networks.watch(network)));
+    let lens = bench_with_sensors(args.side)?.left_camera;
     let ways = Way::all(learned.as_ref(), args.matching.guided());
     let separations =
         if args.separations.is_empty() { STEPS.map(Angle::from_deg).to_vec() } else { args.separations.clone() };
@@ -69,12 +63,12 @@ pub fn run(args: &Args, console: Console) -> Result<(), Failure> {
         let mut of_ways = vec![Means::default(); ways.len()];
         for seed in args.first_seed..args.first_seed + args.seeds {
             let work = console.progress(&format!("{separation:.0}, seed {seed}"));
-            let pair = SimulatedPair::new(args.side, separation, seed, args.renders.as_deref())?;
+            let pair = SimulatedPair::new(lens, separation, seed, args.renders.as_deref())?;
             // About an axis between all of them.
             let error = Vector3::new(1.0, -1.0, 1.0).normalize() * args.pose_error.rad();
             let (mut found, mut lines) = (serde_json::Map::new(), Vec::new());
             for (way, means) in ways.iter().zip(&mut of_ways) {
-                let outcome = way.find(&pair, error, &clock)?;
+                let outcome = way.find(&pair, error, &networks)?;
                 lines.push(format!("  {:>9}: {}", way.name(), in_words(&outcome)));
                 found.insert(way.name().into(), in_json(&outcome));
                 means.add(&outcome);
@@ -133,7 +127,7 @@ fn in_words(outcome: &Outcome) -> String {
 
 fn in_json(outcome: &Outcome) -> serde_json::Value {
     let counts = |tally: &Tally| json!({ "matches": tally.count, "correct": tally.correct, "precision": rounded(tally.precision()) });
-    let class = |class: &judge::Class| {
+    let class = |class: &Class| {
         json!({
             "count": class.count,
             "sigma_px": rounded(class.sigma_px),

@@ -3,22 +3,22 @@
 use std::path::PathBuf;
 
 use serde_json::json;
+use vergence_bench::busy::{PARTS, Program};
 use vergence_protocol::{HostSession, MAX_FRAME, Microseconds, Request, SessionId};
 
-use super::busy;
 use crate::cmd::report::rounded;
 use crate::console::Console;
 use crate::failure::Failure;
 use crate::firmware::APPLICATION;
 use crate::rig_file;
-use crate::sim::{Served, SimulatedChip};
-use crate::stopwatch::Stopwatch;
+use crate::sim::{Served, SimulatedChip, simulated_chip};
+use crate::stopwatch::{Stopwatch, clock};
 
 /// Runs a hash over RAM (on QEMU too, where qemu-system-arm is installed), then the firmware disarmed without a host, then
 /// armed with its 1 kHz tick and poses at 100 Hz.
 ///
-/// Every figure is one of the machine that this runs on. Each run is timed in ten parts and the fastest counts: the others
-/// had to share the machine.
+/// The figures depend on this machine. Each run is timed in ten parts and the fastest counts: the others had to share the
+/// machine.
 #[derive(Debug, clap::Args)]
 pub struct Args {
     /// The firmware.
@@ -31,20 +31,18 @@ pub struct Args {
 
 /// Where the stages stand at the start.
 const SEED: u64 = 1;
-/// So many parts are timed.
-pub const PARTS: u64 = 10;
-/// A start and a session take less.
+/// More than a start and the opening of a session take.
 const STARTING_US: u64 = 1_000_000;
-/// How often the host looks at the wire.
+/// Period at which the host reads the wire.
 const STEP_US: u64 = 1_000;
 const POSE_PERIOD_US: u32 = 10_000;
 const BEAT_US: u64 = 100_000;
 const LEASE_MS: u16 = 500;
 
 pub fn run(args: &Args, console: Console) -> Result<(), Failure> {
-    let program = busy::Program::for_seconds(args.seconds);
-    let busy = program.on_the_chip()?;
-    let qemu = program.on_qemu()?;
+    let program = Program::for_seconds(args.seconds);
+    let busy = program.on_the_chip(clock)?;
+    let qemu = program.on_qemu(clock)?;
     let idle = idle(args)?;
     let ready = ready(args)?;
     console.say(format!("busy code: {busy:.0} million instructions a second"))?;
@@ -64,7 +62,7 @@ pub fn run(args: &Args, console: Console) -> Result<(), Failure> {
 }
 
 fn chip(args: &Args) -> Result<SimulatedChip, Failure> {
-    SimulatedChip::new(&[&args.elf], &rig_file::load(None)?, SEED)
+    simulated_chip(&[&args.elf], &rig_file::load(None)?, SEED)
 }
 
 fn idle(args: &Args) -> Result<f64, Failure> {
@@ -72,7 +70,7 @@ fn idle(args: &Args) -> Result<f64, Failure> {
     chip.run_until(STARTING_US);
     fastest(args, |us| {
         chip.run_until(us);
-        chip.settle()
+        Ok(chip.settle()?)
     })
 }
 

@@ -10,33 +10,35 @@ use crate::camera_files::read_camera;
 use crate::console::Console;
 use crate::failure::Failure;
 
-/// Compares the rays of two camera files over the image. The rotation that fits them best is taken out first: a turned
-/// camera is another pose, not another lens.
+/// Compares the rays of two camera files over the image. The rotation that fits them best is removed first: it is a
+/// difference of pose, not of the lens.
 #[derive(Debug, clap::Args)]
 pub struct Args {
     /// One camera file.
     a: PathBuf,
     /// The other.
     b: PathBuf,
-    /// Compare up to this angle from the axis; without it, where both are valid.
+    /// Compare up to this angle from the optical axis; without it, wherever both cameras are valid.
     #[arg(long)]
     field: Option<Angle>,
-    /// Fail where any ray differs by more than this.
+    /// Fail if any ray differs by more than this angle.
     #[arg(long)]
     limit: Option<Angle>,
 }
 
-/// Rays on a grid of so many columns and rows.
+/// Number of columns, and of rows, of the grid of pixels whose rays are compared.
 const GRID: u32 = 60;
 
 pub fn run(args: &Args, console: Console) -> Result<(), Failure> {
     let (a, b) = (read_camera(&args.a)?, read_camera(&args.b)?);
     if a.size() != b.size() {
-        return Err(Failure::usage("the cameras have different image sizes: these are no calibrations of one camera"));
+        return Err(Failure::usage(
+            "the cameras have different image sizes: two calibrations of one camera have the same",
+        ));
     }
     let rays = rays(&a, &b, args.field);
     if rays.len() < 10 {
-        return Err(Failure::usage("the fields of the cameras hardly overlap: nothing can be compared"));
+        return Err(Failure::usage("the fields of the cameras hardly overlap: too few rays to compare"));
     }
     let turn = best_rotation(&rays);
     let mut angles: Vec<f64> = rays.iter().map(|(a, b)| (turn * b).cross(a).norm().atan2((turn * b).dot(a))).collect();
@@ -57,7 +59,7 @@ pub fn run(args: &Args, console: Console) -> Result<(), Failure> {
     }
 }
 
-/// The rays of the same pixels.
+/// Rays of both cameras for the same pixels, on a grid.
 fn rays(a: &KannalaBrandt, b: &KannalaBrandt, field: Option<Angle>) -> Vec<(Vector3<f64>, Vector3<f64>)> {
     let size = a.size();
     let inside = |ray: &Vector3<f64>| field.is_none_or(|field| ray.z.acos() <= field.rad());

@@ -2,48 +2,52 @@
 
 use std::path::PathBuf;
 
+use nalgebra::Matrix6;
 use serde_json::{Value, json};
 use vergence_calibration::{
-    ExtrinsicsCalibration, ExtrinsicsOptions, RelativePose, ReportAbout, StereoView, calibrate_extrinsics,
-    extrinsics_report, extrinsics_verdict, validate_extrinsics,
+    ExtrinsicsCalibration, ExtrinsicsOptions, RelativePose, StereoView, calibrate_extrinsics, validate_extrinsics,
 };
+use vergence_calibration_report::{ReportAbout, ReportImage, extrinsics_report, extrinsics_verdict};
 use vergence_rig::Rig;
 use vergence_vision::{Angle, KannalaBrandt, Length};
 
 use super::options::{
     KnownLenses, LensOptions, ResultOptions, check_fit, check_held_out, held_out_json, tell_held_out, verdict_json,
 };
-use super::views::{PairImages, about, pairs_from_corners};
-use crate::cmd::board_options::BoardOptions;
+use super::views::{PairPatterns, about, pairs_from_corners};
+use crate::cmd::target_options::TargetOptions;
 use crate::console::Console;
 use crate::failure::Failure;
 use crate::provenance::InputHash;
 use crate::stopwatch::Stopwatch;
 
-/// Calibrates the pose of the right camera from a board that both cameras see. The rig file that it writes is what
-/// `vergence depth --rig` takes.
+/// Calibrates a fixed pair: the pose of the right camera, from views of a target that both cameras see. The rig file that
+/// it writes is for `vergence depth --rig`.
 #[derive(Debug, clap::Args)]
 pub struct Args {
     #[command(flatten)]
     lenses: LensOptions,
     #[command(flatten)]
-    board: BoardOptions,
-    /// Images of the left camera; they pair with the right ones in the order of their names.
-    #[arg(long, num_args = 1.., required_unless_present = "corners", conflicts_with = "corners", requires = "right_images")]
+    target: TargetOptions,
+    /// Images of the left camera: files, patterns such as 'left*.jpg', or a folder. They pair with the right ones by the
+    /// last number in their names, or in the order of their names.
+    #[arg(long, num_args = 1.., required_unless_present = "csv", conflicts_with = "csv", requires = "right_images")]
     left_images: Vec<String>,
-    /// Images of the right camera.
+    /// Images of the right camera, as those of the left one.
     #[arg(long, num_args = 1.., requires = "left_images")]
     right_images: Vec<String>,
-    /// Corners instead of images: CSV with columns camera,file,frame,idx,x,y,bx_mm,by_mm; frames pair the views.
-    #[arg(long, value_name = "CSV")]
-    corners: Option<PathBuf>,
-    /// What the CSV file calls the left and the right camera.
+    /// Corners instead of images: a CSV file with the columns camera,file,frame,idx,x,y,bx_mm,by_mm. Rows of both cameras
+    /// with the same frame number are a pair.
+    #[arg(long, value_name = "FILE")]
+    csv: Option<PathBuf>,
+    /// Names of the left and the right camera in the CSV file.
     #[arg(long, num_args = 2, value_names = ["LEFT", "RIGHT"], default_values = ["left", "right"])]
     cameras: Vec<String>,
-    /// Least squares over all corners, without looking for gross errors.
+    /// Fit all corners by least squares, without a search for outliers.
     #[arg(long)]
     no_loss: bool,
-    /// Check on views that the calibration does not see: so many parts of the views are held out in turn.
+    /// Check against views that the calibration does not use: divide the views into this many parts and hold out each in
+    /// turn.
     #[arg(long, value_name = "PARTS", value_parser = clap::value_parser!(u16).range(2..))]
     holdout: Option<u16>,
     #[command(flatten)]
@@ -53,10 +57,10 @@ pub struct Args {
 pub fn run(args: &Args, console: Console) -> Result<(), Failure> {
     args.result.check()?;
     let mut hash = InputHash::default();
-    let KnownLenses { left, right, shutters, knowledge } = args.lenses.read(&mut hash)?.ok_or_else(|| {
+    let KnownLenses { left, right, shutters, knowledge } = args.lenses.read(&mut hash, console)?.ok_or_else(|| {
         Failure::usage("name the camera files with --left and --right: vergence calibrate intrinsics makes them")
     })?;
-    let views = views(args, (&left, &right), &mut hash, console)?;
+    let (views, images) = views(args, (&left, &right), &mut hash, console)?;
     let options = ExtrinsicsOptions { lenses: knowledge, robust: !args.no_loss };
     let solving = Stopwatch::start();
     let calibration = calibrate_extrinsics(&left, &right, &views, &options)
@@ -75,8 +79,8 @@ pub fn run(args: &Args, console: Console) -> Result<(), Failure> {
         .to_toml(&provenance)
         .map_err(Failure::check)?;
     args.result.write(&rig, || {
-        let about = about(args.result.name("Pair"), &args.board, &provenance, None);
-        extrinsics_report(&calibration, &views, &ReportAbout { held_out: held_out.clone(), ..about })
+        let about = about(args.result.name("Pair"), &args.target, &provenance, None);
+        extrinsics_report(&calibration, &views, &ReportAbout { held_out: held_out.clone(), images, ..about })
     })?;
     tell(&calibration, console)?;
     tell_held_out(held_out.as_ref(), console)?;
@@ -92,21 +96,22 @@ fn views(
     cameras: (&KannalaBrandt, &KannalaBrandt),
     hash: &mut InputHash,
     console: Console,
-) -> Result<Vec<StereoView>, Failure> {
-    match &args.corners {
+) -> Result<(Vec<StereoView>, [Vec<ReportImage>; 2]), Failure> {
+    match &args.csv {
         Some(path) => {
             let frames = pairs_from_corners(path, &args.cameras, hash)?;
-            Ok(frames.into_iter().map(|(_, view)| view).collect())
+            Ok((frames.into_iter().map(|(_, view)| view).collect(), Default::default()))
         }
         None => {
-            let images = PairImages { left: &args.left_images, right: &args.right_images, board: &args.board, cameras };
+            let images =
+                PairPatterns { left: &args.left_images, right: &args.right_images, target: &args.target, cameras };
             images.views(hash, console)
         }
     }
 }
 
 fn rig(calibration: &ExtrinsicsCalibration, name: &str) -> Rig {
-    let sigma = sigma(calibration);
+    let sigma = sigma(&calibration.scattered_covariance);
     let norm = |part: &[f64]| part.iter().map(|x| x * x).sum::<f64>().sqrt();
     Rig::fixed_pair(
         name,
@@ -117,8 +122,8 @@ fn rig(calibration: &ExtrinsicsCalibration, name: &str) -> Rig {
 }
 
 /// Of the rotation in radians about the left axes, and of the position in millimetres.
-fn sigma(calibration: &ExtrinsicsCalibration) -> [f64; 6] {
-    std::array::from_fn(|index| calibration.covariance[(index, index)].max(0.0).sqrt())
+fn sigma(covariance: &Matrix6<f64>) -> [f64; 6] {
+    std::array::from_fn(|index| covariance[(index, index)].max(0.0).sqrt())
 }
 
 fn tell(calibration: &ExtrinsicsCalibration, console: Console) -> Result<(), Failure> {
@@ -133,22 +138,22 @@ fn tell(calibration: &ExtrinsicsCalibration, console: Console) -> Result<(), Fai
     };
     console.say(line("each camera alone", &calibration.arun))?;
     console.say(line("joint            ", &calibration.joint))?;
-    let sigma = sigma(calibration);
+    let sigma = sigma(&calibration.scattered_covariance);
     let degrees: Vec<_> = sigma[..3].iter().map(|rad| format!("{:.4}", rad.to_degrees())).collect();
     let mm: Vec<_> = sigma[3..].iter().map(|mm| format!("{mm:.3}")).collect();
     console.say(format!("  sigma: rotation {} °, position {} mm", degrees.join(" "), mm.join(" ")))?;
     console.say(format!(
-        "  {} of {} corners, {:.3} px rms without the gross ones",
+        "  {} of {} corners, {:.3} px rms without the outliers",
         calibration.corners_inlier, calibration.corners_total, calibration.rms_inlier_px
     ))?;
     for outlier in &calibration.outliers {
         console.say(format!(
-            "  left out: {:?} of {}, corner at {:?} mm, {:.2} px off ({:?})",
-            outlier.side, outlier.view, outlier.board_mm, outlier.error_px, outlier.reason
+            "  left out: {} camera, {}, corner at {:?} mm, {:.2} px off: {}",
+            outlier.side, outlier.view, outlier.target_mm, outlier.error_px, outlier.reason
         ))?;
     }
     for skipped in &calibration.skipped {
-        console.say(format!("  view not used: {} ({:?} camera: {})", skipped.view, skipped.side, skipped.reason))?;
+        console.say(format!("  view not used: {} ({} camera: {})", skipped.view, skipped.side, skipped.reason))?;
     }
     Ok(())
 }
@@ -166,7 +171,8 @@ fn in_json(calibration: &ExtrinsicsCalibration, seconds: f64) -> Value {
     joint["rms_inlier_px"] = json!(calibration.rms_inlier_px);
     joint["translation_mm"] = json!(calibration.joint.left_from_right.origin().mm().as_slice());
     joint["rotation_vector"] = json!(turn.as_slice());
-    joint["sigma"] = json!(sigma(calibration));
+    joint["sigma"] = json!(sigma(&calibration.covariance));
+    joint["view_scatter"] = json!(calibration.view_scatter);
     // The vectors above are left_from_right; others, OpenCV among them, write the way back.
     let back = calibration.joint.left_from_right.inverse();
     joint["right_from_left"] = json!({

@@ -4,45 +4,48 @@ use std::path::PathBuf;
 
 use serde_json::{Value, json};
 use vergence_calibration::{
-    BoardView, IntrinsicsCalibration, IntrinsicsOptions, ReportAbout, calibrate_intrinsics, intrinsics_report,
-    intrinsics_verdict, validate_intrinsics,
+    IntrinsicsCalibration, IntrinsicsOptions, TargetView, calibrate_intrinsics, validate_intrinsics,
 };
+use vergence_calibration_report::{ReportAbout, ReportImage, intrinsics_report, intrinsics_verdict};
 use vergence_rig::{CalibrationTable, CameraDocument, CameraTable};
 use vergence_vision::{Angle, ImageSize, OpenCvFisheye};
 
 use super::options::{ResultOptions, check_fit, check_held_out, held_out_json, tell_held_out, verdict_json};
-use super::views::{about, from_corners, from_images, parse_size};
+use super::views::{about, from_corners, from_images};
 use crate::camera_files::toml_of;
-use crate::cmd::board_options::BoardOptions;
+use crate::cmd::camera_options::parse_size;
+use crate::cmd::target_options::TargetOptions;
 use crate::console::Console;
 use crate::failure::Failure;
 use crate::provenance::InputHash;
 use crate::stopwatch::Stopwatch;
+use crate::target_images::files;
 
-/// Calibrates one camera from views of a chessboard at different tilts, out to the rim of the image.
+/// Calibrates one camera from views of a target at different tilts, out to the rim of the image.
 #[derive(Debug, clap::Args)]
 pub struct Args {
     #[command(flatten)]
-    board: BoardOptions,
-    /// Images of the board; patterns such as 'left*.jpg' are understood.
-    #[arg(long, num_args = 1.., required_unless_present = "corners", conflicts_with = "corners")]
+    target: TargetOptions,
+    /// Images of the target: files, patterns such as 'left*.jpg', or folders.
+    #[arg(long, num_args = 1.., required_unless_present = "csv", conflicts_with = "csv")]
     images: Vec<String>,
-    /// Corners instead of images: CSV with columns camera,file,frame,idx,x,y,bx_mm,by_mm.
-    #[arg(long, value_name = "CSV", requires = "size")]
-    corners: Option<PathBuf>,
-    /// Which camera of the CSV file.
-    #[arg(long, requires = "corners")]
+    /// Corners instead of images: a CSV file with the columns camera,file,frame,idx,x,y,bx_mm,by_mm.
+    #[arg(long, value_name = "FILE", requires = "size")]
+    csv: Option<PathBuf>,
+    /// The camera whose corners are taken from the CSV file.
+    #[arg(long, requires = "csv")]
     camera: Option<String>,
     /// Size of the images of the CSV file, such as 960x600.
-    #[arg(long, value_parser = parse_size, requires = "corners")]
+    #[arg(long, value_parser = parse_size, requires = "csv")]
     size: Option<ImageSize>,
-    /// Estimate how the board bows out of its plane, too.
+    /// Also estimate how the target bows out of its plane.
     #[arg(long)]
     warp: bool,
-    /// The whole field of the lens where its maker tells, such as 195.95deg: the report then measures coverage against it.
+    /// Full field of view of the lens by its data sheet, such as 195.95deg: the report then measures coverage against it.
     #[arg(long, value_name = "ANGLE")]
     fov: Option<Angle>,
-    /// Check on views that the calibration does not see: so many parts of the views are held out in turn.
+    /// Check against views that the calibration does not use: divide the views into this many parts and hold out each in
+    /// turn.
     #[arg(long, value_name = "PARTS", value_parser = clap::value_parser!(u16).range(2..))]
     holdout: Option<u16>,
     #[command(flatten)]
@@ -54,7 +57,7 @@ const NAMES: [&str; 8] = ["fx", "fy", "cx", "cy", "k1", "k2", "k3", "k4"];
 pub fn run(args: &Args, console: Console) -> Result<(), Failure> {
     args.result.check()?;
     let mut hash = InputHash::default();
-    let (views, size) = views(args, &mut hash, console)?;
+    let Views { views, size, images } = views(args, &mut hash, console)?;
     let solving = Stopwatch::start();
     let options = IntrinsicsOptions { warp: args.warp, ..IntrinsicsOptions::default() };
     let calibration = calibrate_intrinsics(&views, size, &options)
@@ -82,8 +85,12 @@ pub fn run(args: &Args, console: Console) -> Result<(), Failure> {
     args.result.write(&toml_of(&document)?, || {
         let title = args.result.name(args.camera.as_deref().unwrap_or("Camera"));
         let half_field = args.fov.map(|field| Angle::from_rad(0.5 * field.rad()));
-        let about = about(title, &args.board, &provenance, half_field);
-        intrinsics_report(&calibration, &views, &ReportAbout { held_out: held_out.clone(), ..about })
+        let about = about(title, &args.target, &provenance, half_field);
+        intrinsics_report(
+            &calibration,
+            &views,
+            &ReportAbout { held_out: held_out.clone(), images: [images, Vec::new()], ..about },
+        )
     })?;
     tell(&calibration, &views, console)?;
     tell_held_out(held_out.as_ref(), console)?;
@@ -94,12 +101,22 @@ pub fn run(args: &Args, console: Console) -> Result<(), Failure> {
     console.result(&result)
 }
 
-fn views(args: &Args, hash: &mut InputHash, console: Console) -> Result<(Vec<BoardView>, ImageSize), Failure> {
-    match (&args.corners, args.size) {
-        (Some(corners), Some(size)) => Ok((from_corners(corners, args.camera.as_deref(), hash)?, size)),
+/// The views of a target, the size of their images, and the images, reduced for the report, where there are any.
+struct Views {
+    views: Vec<TargetView>,
+    size: ImageSize,
+    images: Vec<ReportImage>,
+}
+
+fn views(args: &Args, hash: &mut InputHash, console: Console) -> Result<Views, Failure> {
+    match (&args.csv, args.size) {
+        (Some(csv), Some(size)) => {
+            let views = from_corners(csv, args.camera.as_deref(), hash)?;
+            Ok(Views { views, size, images: Vec::new() })
+        }
         _ => {
-            let boards = from_images(&args.images, &args.board, None, hash, console)?;
-            Ok((boards.found(), boards.size))
+            let targets = from_images(&files(&args.images)?, &args.target, None, hash, console)?;
+            Ok(Views { views: targets.found(), size: targets.size, images: targets.images })
         }
     }
 }
@@ -113,7 +130,7 @@ fn sigma(calibration: &IntrinsicsCalibration) -> [f64; 8] {
     std::array::from_fn(|index| calibration.covariance[(index, index)].max(0.0).sqrt())
 }
 
-fn tell(calibration: &IntrinsicsCalibration, views: &[BoardView], console: Console) -> Result<(), Failure> {
+fn tell(calibration: &IntrinsicsCalibration, views: &[TargetView], console: Console) -> Result<(), Failure> {
     console.say(format!(
         "{} of {} corners in {} of {} views: {:.3} px rms ({:.3} px with the outliers), valid to {:.2} from the axis",
         calibration.corners_inlier,

@@ -4,8 +4,9 @@ use std::path::{Path, PathBuf};
 
 use nalgebra::SMatrix;
 use serde_json::{Value, json};
-use vergence_calibration::{LensKnowledge, Validation, Verdict};
-use vergence_rig::{Provenance, Shutter};
+use vergence_calibration::{LensKnowledge, Validation};
+use vergence_calibration_report::Verdict;
+use vergence_rig::{CalibrationTable, Provenance, Shutter};
 use vergence_vision::KannalaBrandt;
 
 use crate::camera_files::{self, CameraFile};
@@ -24,9 +25,10 @@ pub struct LensOptions {
     /// The right camera file.
     #[arg(long, value_name = "FILE", requires = "left")]
     right: Option<PathBuf>,
-    /// What may change of the lenses: nothing, all of it as far as the covariance in the camera files allows, or all of it.
-    #[arg(long, default_value = "exact")]
-    lenses: Lenses,
+    /// What may change of the lenses: nothing (exact), as much as the covariance in the camera files allows (known), or
+    /// everything (free). Unless given: known where both camera files carry a covariance, exact otherwise.
+    #[arg(long)]
+    lenses: Option<Lenses>,
 }
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
@@ -50,12 +52,18 @@ impl LensOptions {
     ///
     /// # Errors
     /// A file that is none, or that does not say how well it is known.
-    pub fn read(&self, hash: &mut InputHash) -> Result<Option<KnownLenses>, Failure> {
+    pub fn read(&self, hash: &mut InputHash, console: Console) -> Result<Option<KnownLenses>, Failure> {
         let (Some(left), Some(right)) = (&self.left, &self.right) else { return Ok(None) };
         hash.add(left)?;
         hash.add(right)?;
         let files = (camera_files::read(left)?, camera_files::read(right)?);
-        let knowledge = match self.lenses {
+        let sure = [&files.0, &files.1].iter().all(|file| calibration_table(file).is_some());
+        if self.lenses.is_none() && !sure {
+            console.say(
+                "the camera files carry no covariance, so the lenses are held exact: their errors are not counted",
+            )?;
+        }
+        let knowledge = match self.lenses.unwrap_or(if sure { Lenses::Known } else { Lenses::Exact }) {
             Lenses::Exact => LensKnowledge::Exact,
             Lenses::Free => LensKnowledge::Free,
             Lenses::Known => LensKnowledge::within(covariance(left, &files.0)?, covariance(right, &files.1)?),
@@ -69,7 +77,7 @@ impl LensOptions {
     /// # Errors
     /// Where a covariance is asked for that only camera files have.
     pub fn without_files(&self) -> Result<LensKnowledge, Failure> {
-        match self.lenses {
+        match self.lenses.unwrap_or(Lenses::Exact) {
             Lenses::Exact => Ok(LensKnowledge::Exact),
             Lenses::Free => Ok(LensKnowledge::Free),
             Lenses::Known => {
@@ -79,10 +87,13 @@ impl LensOptions {
     }
 }
 
+fn calibration_table(file: &CameraFile) -> Option<&CalibrationTable> {
+    file.document.as_ref().and_then(|document| document.calibration.as_ref())
+}
+
 fn covariance(path: &Path, file: &CameraFile) -> Result<SMatrix<f64, 8, 8>, Failure> {
-    let table = file.document.as_ref().and_then(|document| document.calibration.as_ref());
-    let table =
-        table.ok_or_else(|| Failure::input(path, "it has no covariance: calibrate it here, or use --lenses exact"))?;
+    let table = calibration_table(file)
+        .ok_or_else(|| Failure::input(path, "it has no covariance: calibrate it here, or use --lenses exact"))?;
     Ok(SMatrix::from_fn(|row, column| table.covariance[row][column]))
 }
 
@@ -92,7 +103,7 @@ pub struct ResultOptions {
     /// The calibration file to write.
     #[arg(long, value_name = "FILE")]
     pub out: Option<PathBuf>,
-    /// Keep the calibration under this name; `vergence calibrate use NAME` makes it the active one.
+    /// Keeps the calibration under this name; `vergence calibrate use NAME` makes it the active one.
     #[arg(long, value_name = "NAME")]
     slot: Option<String>,
     #[command(flatten)]
@@ -146,7 +157,7 @@ impl ResultOptions {
     }
 }
 
-/// No board and no lens of the model leaves residuals like these, in pixels.
+/// No target and no lens of the model leaves residuals like these, in pixels.
 const WORST_RMS_PX: f64 = 3.0;
 /// Where more corners are left out, what fits the rest is an accident.
 const FEWEST_INLIERS: f64 = 0.7;
@@ -158,7 +169,7 @@ const FEWEST_INLIERS: f64 = 0.7;
 pub fn check_fit(rms_inlier_px: f64, corners_inlier: usize, corners_total: usize) -> Result<(), Failure> {
     if rms_inlier_px.is_nan() || rms_inlier_px > WORST_RMS_PX {
         return Err(Failure::check(format!(
-            "the best fit is {rms_inlier_px:.1} px off: board, images or cameras are not what they are said to be"
+            "the best fit is {rms_inlier_px:.1} px off: target, images or cameras are not what they are said to be"
         )));
     }
     if (corners_inlier as f64) < FEWEST_INLIERS * corners_total as f64 {

@@ -1,4 +1,4 @@
-//! `vergence calibrate list | use | rollback`: the calibrations that are kept.
+//! `vergence calibrate list`, `use` and `rollback`: calibrations kept under names.
 
 use serde_json::json;
 
@@ -6,24 +6,23 @@ use crate::console::Console;
 use crate::failure::Failure;
 use crate::slots::{SlotKind, Slots, StoreOptions};
 
-/// Lists the calibrations that are kept, where they come from, and which one is active.
+/// Lists the calibrations that are kept, with their origin, and marks the active one.
 #[derive(Debug, clap::Args)]
 pub struct List {
     #[command(flatten)]
     store: StoreOptions,
 }
 
-/// Makes a calibration of a pair or stage the active one: the rig of every verb that is given no --rig. It is swapped
-/// whole or not at all.
+/// Makes a calibration of a pair or stage the active one: every verb that is given no --rig then uses it.
 #[derive(Debug, clap::Args)]
 pub struct Use {
-    /// The calibration's name.
+    /// Name of the calibration.
     name: String,
     #[command(flatten)]
     store: StoreOptions,
 }
 
-/// Makes the calibration active again that was so before.
+/// Makes the previously active calibration active again.
 #[derive(Debug, clap::Args)]
 pub struct Rollback {
     #[command(flatten)]

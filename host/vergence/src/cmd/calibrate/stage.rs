@@ -7,52 +7,52 @@ mod truth;
 
 use std::path::PathBuf;
 
-use vergence_calibration::{
-    StageError, StageOptions, StagePose, calibrate_stage, stage_report, stage_verdict, validate_stage,
-};
+use vergence_calibration::{StageError, StageOptions, StagePose, calibrate_stage, validate_stage};
+use vergence_calibration_report::{stage_report, stage_verdict};
 use vergence_rig::Rig;
 
 use super::options::{KnownLenses, LensOptions, ResultOptions, check_fit, verdict_json};
 use super::views::about;
 use crate::cli::Globals;
-use crate::cmd::board_options::BoardOptions;
+use crate::cmd::target_options::TargetOptions;
 use crate::console::Console;
 use crate::failure::Failure;
 use crate::provenance::InputHash;
 use crate::rig_file;
 use crate::stopwatch::Stopwatch;
 
-/// Calibrates how the axes carry the cameras; --rig names the drawing.
+/// Calibrates how the axes carry the cameras, from views at several stage poses; --rig names the nominal rig.
 #[derive(Debug, clap::Args)]
-#[group(id = "source", required = true, multiple = false, args = ["set", "corners"])]
+#[group(id = "source", required = true, multiple = false, args = ["set", "csv"])]
 pub struct Args {
     #[command(flatten)]
     lenses: LensOptions,
     #[command(flatten)]
-    board: BoardOptions,
-    /// The folder with poses.csv and the images; with --live it is made.
+    target: TargetOptions,
+    /// A folder with the images and poses.csv; --live creates it.
     ///
-    /// It has one folder of images for each stage pose, left000.png, right000.png and so on, as `vergence capture --out
-    /// DIR/pose01` takes them. The columns of poses.csv are `folder` and the encoder reading of every axis of the rig,
-    /// called after it: baseline_mm, separation_deg.
+    /// It has one folder for each stage pose, with images left000.png, right000.png and so on, as `vergence capture --out
+    /// DIR/pose01` takes them. The columns of poses.csv are `folder` and, for every axis of the rig, its encoder reading,
+    /// named after the axis: baseline_mm, separation_deg.
     #[arg(long, value_name = "DIR")]
     set: Option<PathBuf>,
-    /// Corners and encoder readings instead of images.
+    /// Corners and encoder readings instead of images, in a CSV file.
     ///
-    /// The columns are camera,file,frame,idx,x,y,bx_mm,by_mm and, in every row, the encoder reading of every axis of the
-    /// rig, called after it: baseline_mm, separation_deg. Frames are numbered through the whole file and pair the views;
-    /// frames with the same readings make a stage pose.
-    #[arg(long, value_name = "CSV")]
-    corners: Option<PathBuf>,
-    /// The left and the right camera: as the CSV file calls them (left right), or with --live their devices, or sim.
+    /// The columns are camera,file,frame,idx,x,y,bx_mm,by_mm and, for every axis of the rig, its encoder reading, named
+    /// after the axis: baseline_mm, separation_deg. Frame numbers count through the whole file. Rows of both cameras with
+    /// the same number are a pair; pairs with the same readings are one stage pose.
+    #[arg(long, value_name = "FILE")]
+    csv: Option<PathBuf>,
+    /// The left and the right camera: their names in the CSV file (left right unless given), or with --live their devices,
+    /// or sim.
     #[arg(long, num_args = 1..=2, value_name = "CAMERA")]
     cameras: Vec<String>,
     #[command(flatten)]
     live: live::Options,
-    /// Least squares over all corners, without looking for gross errors.
+    /// Fit all corners by least squares, without a search for outliers.
     #[arg(long)]
     no_loss: bool,
-    /// Check by leaving out one stage pose after the other; at least four are needed.
+    /// Check the calibration by leaving out one stage pose after the other; needs at least four.
     #[arg(long)]
     holdout: bool,
     #[command(flatten)]
@@ -72,7 +72,7 @@ pub async fn run(args: &Args, globals: &Globals, console: Console) -> Result<(),
     if let Some(path) = &globals.rig {
         hash.add(path)?;
     }
-    let (drawn, knowledge) = match args.lenses.read(&mut hash)? {
+    let (drawn, knowledge) = match args.lenses.read(&mut hash, console)? {
         Some(KnownLenses { left, right, shutters, knowledge }) => {
             (Rig { left_camera: left, right_camera: right, shutters, ..drawn }, knowledge)
         }
@@ -97,7 +97,7 @@ pub async fn run(args: &Args, globals: &Globals, console: Console) -> Result<(),
     let verdict = stage_verdict(&stage, &rig);
     let provenance = args.result.provenance(hash);
     args.result.write(&rig.to_toml(&provenance).map_err(Failure::check)?, || {
-        stage_report(&stage, &rig, &held_out, &about(rig.name.clone(), &args.board, &provenance, None))
+        stage_report(&stage, &rig, &held_out, &about(rig.name.clone(), &args.target, &provenance, None))
     })?;
     tell::tell(&stage, &held_out, console)?;
     console.say(&verdict.sentence)?;
@@ -110,24 +110,24 @@ pub async fn run(args: &Args, globals: &Globals, console: Console) -> Result<(),
     console.result(&result)
 }
 
-/// Fills the set, where that is asked for; the rig as it was really built, where it is simulated.
+/// Takes the views of --live; returns the true rig where it is simulated.
 async fn live(args: &Args, globals: &Globals, console: Console) -> Result<Option<Rig>, Failure> {
     match (&args.set, args.live.live) {
-        (Some(set), true) => live::fill(set, &args.live, &args.cameras, args.board.spec()?, globals, console).await,
+        (Some(set), true) => live::fill(set, &args.live, &args.cameras, args.target.spec()?, globals, console).await,
         (None, true) => Err(Failure::usage("say where the images go: --live --set DIR")),
         (_, false) => Ok(None),
     }
 }
 
 fn poses(args: &Args, rig: &Rig, hash: &mut InputHash, console: Console) -> Result<Vec<StagePose>, Failure> {
-    match (&args.set, &args.corners) {
-        (Some(set), _) => recorded::from_set(set, rig, &args.board, hash, console),
+    match (&args.set, &args.csv) {
+        (Some(set), _) => recorded::from_set(set, rig, &args.target, hash, console),
         (_, Some(csv)) => recorded::from_corners(csv, rig, &args.cameras, hash),
-        _ => Err(Failure::usage("name the views: --set DIR or --corners CSV")),
+        _ => Err(Failure::usage("name the views: --set DIR or --csv FILE")),
     }
 }
 
-/// Views that contradict the drawing are valid data whose result fails; everything else is wrong input.
+/// Views that contradict the nominal rig are valid data with a result that fails; all else is wrong input.
 fn no_calibration(error: &StageError) -> Failure {
     let message = format!("no calibration: {error}");
     match error {

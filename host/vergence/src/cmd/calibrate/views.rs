@@ -1,71 +1,83 @@
-//! Where board views come from: images, or a CSV file of corners.
+//! Target views for the calibrations, from images or from a CSV file of corners.
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
-use vergence_calibration::{BoardView, IntrinsicsOptions, ReportAbout, StereoView, calibrate_intrinsics};
+use vergence_calibration::{IntrinsicsOptions, StereoView, TargetView, calibrate_intrinsics};
+use vergence_calibration_report::{ReportAbout, ReportImage};
 use vergence_rig::Provenance;
-use vergence_vision::{Angle, ImageSize, KannalaBrandt};
+use vergence_vision::{Angle, KannalaBrandt};
 
-use crate::boards::{Boards, detect_in, files};
-use crate::cmd::board_options::BoardOptions;
+use crate::cmd::target_options::TargetOptions;
 use crate::console::Console;
 use crate::corners::{self, FrameView};
 use crate::failure::Failure;
 use crate::provenance::InputHash;
+use crate::target_images::{MissedReason, PairedFiles, TargetImages, detect_in, files, paired};
 
-/// Looks for the board in the images that `patterns` name; images without one are told. Without a `hint`, a camera that is
-/// roughly right, it looks twice: the second time with the lens that the first look gives.
+/// Looks for the target in images and names those without one. Without a `hint`, a camera that is roughly right, it
+/// looks twice: the second time with the lens that the first look gives.
 ///
 /// # Errors
-/// No images, or no board in any of them.
+/// Images that cannot be read, or no target in any of them.
 pub fn from_images(
-    patterns: &[String],
-    board: &BoardOptions,
+    files: &[PathBuf],
+    target: &TargetOptions,
     hint: Option<&KannalaBrandt>,
     hash: &mut InputHash,
     console: Console,
-) -> Result<Boards, Failure> {
-    let board = board.spec()?;
-    let files = files(patterns)?;
-    for file in &files {
+) -> Result<TargetImages, Failure> {
+    let target = target.spec()?;
+    for file in files {
         hash.add(file)?;
     }
-    let progress = console.progress(&format!("looking for the board in {} images", files.len()));
-    let mut boards = detect_in(&files, &board, hint)?;
+    let progress = console.progress(&format!("looking for the target in {} images", files.len()));
+    let mut targets = detect_in(files, &target, hint)?;
     if hint.is_none() {
-        // Views that give no lens are told apart by the calibration that follows.
-        if let Ok(rough) = calibrate_intrinsics(&boards.found(), boards.size, &IntrinsicsOptions::default()) {
-            boards = detect_in(&files, &board, Some(&rough.camera))?.or(boards);
+        // Where the views give no lens, the calibration that follows says why.
+        if let Ok(rough) = calibrate_intrinsics(&targets.found(), targets.size, &IntrinsicsOptions::default()) {
+            targets = detect_in(files, &target, Some(&rough.camera))?.or(targets);
         }
     }
     progress.finish_and_clear();
-    for (name, reason) in boards.missed() {
-        console.say(format!("{name}: {reason}"))?;
+    for missed in targets.missed() {
+        match missed.reason {
+            MissedReason::NoTarget(_) => console.say(missed)?,
+            MissedReason::Damaged(_) => console.warn(missed.to_string()),
+        }
     }
-    if boards.found().is_empty() {
-        let reason = boards.missed().next().map(|(name, reason)| format!("{name}: {reason}")).unwrap_or_default();
-        return Err(Failure::usage(format!("no board in any of {} images ({reason})", files.len())));
+    if targets.found().is_empty() {
+        let reason = targets.missed().next().map(ToString::to_string).unwrap_or_default();
+        return Err(Failure::usage(format!("no target in any of {} images ({reason})", files.len())));
     }
-    Ok(boards)
+    Ok(targets)
 }
 
-/// Images of a pair; they pair up in the order of their names.
-pub struct PairImages<'a> {
+/// Images of a pair, as files, patterns or folders.
+pub struct PairPatterns<'a> {
     pub left: &'a [String],
     pub right: &'a [String],
-    pub board: &'a BoardOptions,
+    pub target: &'a TargetOptions,
     /// The cameras, at least roughly.
     pub cameras: (&'a KannalaBrandt, &'a KannalaBrandt),
 }
 
-impl PairImages<'_> {
-    /// The pairs in which both images show the board.
+impl PairPatterns<'_> {
+    /// The pairs in which both images show the target, and all paired images of either camera, reduced for a report;
+    /// images without a partner are named.
     ///
     /// # Errors
     /// As [`from_images`]; images that do not pair up, or are not of the cameras' sizes.
-    pub fn views(&self, hash: &mut InputHash, console: Console) -> Result<Vec<StereoView>, Failure> {
-        let left = from_images(self.left, self.board, Some(self.cameras.0), hash, console)?;
-        let right = from_images(self.right, self.board, Some(self.cameras.1), hash, console)?;
+    pub fn views(
+        &self,
+        hash: &mut InputHash,
+        console: Console,
+    ) -> Result<(Vec<StereoView>, [Vec<ReportImage>; 2]), Failure> {
+        let PairedFiles { pairs: [left, right], alone } = paired([files(self.left)?, files(self.right)?])?;
+        for file in alone {
+            console.warn(format!("{}: left out: the other camera has no image of this number", file.display()));
+        }
+        let left = from_images(&left, self.target, Some(self.cameras.0), hash, console)?;
+        let right = from_images(&right, self.target, Some(self.cameras.1), hash, console)?;
         for (name, images, camera) in [("left", left.size, self.cameras.0), ("right", right.size, self.cameras.1)] {
             if images != camera.size() {
                 return Err(Failure::usage(format!(
@@ -78,26 +90,20 @@ impl PairImages<'_> {
                 )));
             }
         }
-        if left.views.len() != right.views.len() {
-            return Err(Failure::usage(format!(
-                "{} left images and {} right ones: they must pair up",
-                left.views.len(),
-                right.views.len()
-            )));
-        }
         let pairs = left.views.into_iter().zip(right.views);
-        Ok(pairs.filter_map(|(left, right)| Some(stereo_view(left.ok()?, right.ok()?))).collect())
+        let views = pairs.filter_map(|(left, right)| Some(stereo_view(left.ok()?, right.ok()?))).collect();
+        Ok((views, [left.images, right.images]))
     }
 }
 
-fn stereo_view(left: BoardView, right: BoardView) -> StereoView {
+fn stereo_view(left: TargetView, right: TargetView) -> StereoView {
     StereoView { name: left.name.clone(), left, right }
 }
 
-/// The frames of a CSV file that both of its `cameras` have, in their order.
+/// Reads the pairs of a CSV file, by frame number: the frames in which both `cameras` have corners.
 ///
 /// # Errors
-/// As reading the file; other than two cameras.
+/// Those of the file; other than two cameras.
 pub fn pairs_from_corners(
     path: &Path,
     cameras: &[String],
@@ -118,30 +124,19 @@ pub fn pairs_from_corners(
     Ok(corners::read(path, Some(&left))?.into_iter().filter_map(pair).collect())
 }
 
-/// The views of one camera in a CSV file.
+/// Reads the views of one camera from a CSV file.
 ///
 /// # Errors
-/// As reading the file.
-pub fn from_corners(path: &Path, camera: Option<&str>, hash: &mut InputHash) -> Result<Vec<BoardView>, Failure> {
+/// Those of the file.
+pub fn from_corners(path: &Path, camera: Option<&str>, hash: &mut InputHash) -> Result<Vec<TargetView>, Failure> {
     hash.add(path)?;
     Ok(corners::read(path, camera)?.into_iter().map(|frame| frame.view).collect())
 }
 
-/// `960x600`.
-///
-/// # Errors
-/// Says what is expected.
-pub fn parse_size(text: &str) -> Result<ImageSize, String> {
-    const HINT: &str = "write width x height in pixels, such as 960x600";
-    let (width, height) = text.split_once(['x', 'X', '×']).ok_or(HINT)?;
-    let count = |part: &str| part.trim().parse().ok().filter(|n| (1..=100_000).contains(n)).ok_or(HINT);
-    Ok(ImageSize { width: count(width)?, height: count(height)? })
-}
-
-/// What a report says of its origin; `half_field` of the lens where it is known.
+/// Heading of a report: title, origin and target. `half_field` is half the field of the lens by its data sheet.
 #[must_use]
-pub fn about(title: String, board: &BoardOptions, provenance: &Provenance, half_field: Option<Angle>) -> ReportAbout {
-    let board = board.spec().map_or_else(
+pub fn about(title: String, target: &TargetOptions, provenance: &Provenance, half_field: Option<Angle>) -> ReportAbout {
+    let target = target.spec().map_or_else(
         |_| "as in the corner file".into(),
         |spec| format!("{} × {} inner corners, {}", spec.columns, spec.rows, spec.square),
     );
@@ -150,8 +145,8 @@ pub fn about(title: String, board: &BoardOptions, provenance: &Provenance, half_
         program_version: provenance.program.clone(),
         inputs_sha256: provenance.inputs_sha256.clone(),
         date: provenance.date.clone().unwrap_or_default(),
-        board,
+        target,
         half_field,
-        held_out: None,
+        ..ReportAbout::default()
     }
 }

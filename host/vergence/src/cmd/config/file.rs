@@ -2,12 +2,11 @@
 
 use std::path::Path;
 
+use vergence_board::{Board, NamedSetting};
 use vergence_protocol::Refusal;
 
 use super::read_all;
-use crate::board::Board;
 use crate::failure::Failure;
-use crate::setting_text::NamedSetting;
 
 /// The settings as a file.
 pub fn text(board: &Board, settings: &[(NamedSetting, i64)]) -> String {
@@ -85,7 +84,7 @@ async fn set_all(board: &Board, mut wanted: Vec<Change>, done: &mut Vec<Change>)
             match board.set(change.setting.key, change.value).await? {
                 Ok(()) => done.push(change),
                 Err(Refusal::BadSetting) => misfits.push(change),
-                Err(refusal) => return Err(board.refused(refusal)),
+                Err(refusal) => return Err(board.refused(refusal).into()),
             }
         }
         if misfits.is_empty() {

@@ -1,19 +1,19 @@
-//! Photographs taken while the stages moved evenly.
+//! The pose of images taken while the stages moved at constant speed.
 
-use vergence_rig::{AxisPosition, BoardInstant, JointsAt, PairExposure, Rig, SteadyMotion};
+use vergence_pipeline::{Motion, PairPose, pair_exposure};
+use vergence_rig::{AxisPosition, BoardInstant, JointsAt, Rig, SteadyMotion};
 use vergence_vision::{Angle, Length};
 
 use crate::failure::Failure;
-use crate::live::pair_exposure;
 
-/// How fast the stages moved while the photographs were taken. It matters where the rig file says that a camera exposes row
-/// after row (`line_time`).
+/// How fast the stages moved while the images were taken. It matters where the rig file says that a camera exposes row after
+/// row (`line_time`).
 #[derive(Clone, Copy, Debug, clap::Args)]
 pub struct StageSpeed {
-    /// How fast the baseline grew, such as 80mm/s; the baseline itself is that of the middle row.
+    /// Speed at which the baseline grew, such as 80mm/s; the baseline itself is that of the middle row.
     #[arg(long, value_name = "SPEED", value_parser = linear, allow_hyphen_values = true, conflicts_with_all = ["points", "kernel"])]
     baseline_speed: Option<Length>,
-    /// How fast the separation grew, such as 60deg/s.
+    /// Speed at which the separation angle grew, such as 60deg/s.
     #[arg(long, value_name = "SPEED", value_parser = rotary, allow_hyphen_values = true, conflicts_with_all = ["points", "kernel"])]
     separation_speed: Option<Angle>,
 }
@@ -31,15 +31,12 @@ fn rotary(text: &str) -> Result<Angle, String> {
 }
 
 impl StageSpeed {
-    /// The motion through `positions` at the middle rows, and the exposure that goes with it; `None` where nothing moved.
+    /// The pose of every row, for images whose middle rows were exposed with the axes at `positions`; `None` where no speed is
+    /// given.
     ///
     /// # Errors
-    /// A speed of an axis that the rig does not have.
-    pub fn motion(
-        &self,
-        rig: &Rig,
-        positions: &[AxisPosition],
-    ) -> Result<Option<(SteadyMotion, PairExposure)>, Failure> {
+    /// The speed of an axis that the rig does not have.
+    pub fn pose(&self, rig: &Rig, positions: &[AxisPosition]) -> Result<Option<PairPose>, Failure> {
         if self.baseline_speed.is_none() && self.separation_speed.is_none() {
             return Ok(None);
         }
@@ -60,6 +57,9 @@ impl StageSpeed {
         let known = vec![0.0; rig.axes.len()];
         let joints = JointsAt { counts, sigma: known.clone(), timing: known };
         let middle = BoardInstant { us: 0.0, error_us: 0.0 };
-        Ok(Some((SteadyMotion { from_us: 0.0, joints, rates }, pair_exposure(rig, [middle; 2]))))
+        let motion = Motion::Steady(SteadyMotion { from_us: 0.0, joints, rates });
+        PairPose::in_motion(rig, motion, pair_exposure(rig, [middle; 2]))
+            .map(Some)
+            .map_err(|error| Failure::usage(error.to_string()))
     }
 }

@@ -2,24 +2,22 @@
 
 use std::time::Duration;
 
+use vergence_board::{Board, LinkFigures, describe_fault};
 use vergence_protocol::{Compatibility, ControllerState, ResetCause, SettingItem, SettingKey};
 use vergence_rig::AxisPosition;
 
 use super::Finding;
-use crate::board::{Board, describe_fault};
 use crate::cli::Globals;
 use crate::cmd::connect::{connect, is_wire};
-use crate::cmd::link_figures::LinkFigures;
-use crate::cmd::move_to::is_referenced;
 use crate::cmd::report::describe_clock;
 use crate::console::Console;
 use crate::failure::{Failure, FailureKind};
 
-/// Long enough for the clocks to be compared ten times.
+/// Time in which the clocks are compared ten times.
 const LISTEN: Duration = Duration::from_secs(2);
-/// A board whose clock is known worse than this pairs images with wrong poses: at 60°/s it is 0.06°.
+/// Largest error of the clock that pairs images with the right poses: at 60°/s it makes 0.06°.
 const CLOCK_ERROR_US: f64 = 1_000.0;
-/// No quartz is worse.
+/// Largest drift of a quartz clock.
 const DRIFT_PPM: f64 = 200.0;
 
 pub async fn examine(globals: &Globals, console: Console) -> Vec<Finding> {
@@ -30,7 +28,7 @@ pub async fn examine(globals: &Globals, console: Console) -> Vec<Finding> {
     let mut findings = vec![versions(&board), reset(&board)];
     match LinkFigures::measure(&mut board, LISTEN).await {
         Ok(figures) => findings.push(link(&figures, globals.lease)),
-        Err(failure) => findings.push(unreachable(&failure)),
+        Err(error) => findings.push(unreachable(&error.into())),
     }
     findings.extend([clock(&board), state(&board), reference(&board)]);
     findings.extend(limits(&board));
@@ -77,7 +75,7 @@ fn reset(board: &Board) -> Finding {
     }
 }
 
-/// Why the board started, in words.
+/// Reason for the board's last start, in words.
 fn describe_reset(cause: ResetCause) -> &'static str {
     match cause {
         ResetCause::PowerOn => "switching it on",
@@ -140,13 +138,13 @@ fn state(board: &Board) -> Finding {
 }
 
 fn reference(board: &Board) -> Finding {
-    if is_referenced(board) {
+    if board.is_referenced() {
         return Finding::pass("reference", "all axes know where they are");
     }
     Finding::warn("reference", "axes do not know where they are", "vergence home")
 }
 
-/// The range of the rig file must be one that the board grants.
+/// Checks that the board grants the range of the rig file.
 fn limits(board: &Board) -> Vec<Finding> {
     let axes = board.rig().axes.iter().zip(board.axes());
     axes.map(|(axis, info)| {
@@ -165,7 +163,7 @@ fn limits(board: &Board) -> Vec<Finding> {
     .collect()
 }
 
-/// Settings must be readable, and the line speed the one in use: a changed one works from the next start on.
+/// Checks that the settings can be read, and that the saved line speed is the one in use.
 async fn settings(board: &Board, globals: &Globals) -> Finding {
     let read = async |item| board.setting(SettingKey { item, axis: 0 }).await;
     match (read(SettingItem::Baud).await, read(SettingItem::StreamPeriod).await) {
@@ -176,7 +174,7 @@ async fn settings(board: &Board, globals: &Globals) -> Finding {
         ),
         (Ok(Some(baud)), Ok(Some(_))) => Finding::pass("settings", format!("can be read; {baud} baud")),
         (Err(failure), _) | (_, Err(failure)) => {
-            Finding::fail("settings", failure.to_string(), "check the link, or 'vergence config restore'")
+            Finding::fail("settings", failure.to_string(), "check the link, or 'vergence config factory'")
         }
         _ => Finding::warn("settings", "this firmware keeps no settings", "update the firmware"),
     }

@@ -5,11 +5,11 @@ use std::os::unix::fs::MetadataExt;
 use std::path::{Path, PathBuf};
 
 use rustix::fs::{Access, access};
+use vergence_board::Port;
 
 use super::Finding;
 use crate::cli::Globals;
 use crate::cmd::connect::port as chosen_port;
-use crate::link::Port;
 use crate::{rig_file, slots};
 
 /// The rig that verbs would use: the file named, the active calibration, or the built-in bench.
@@ -35,7 +35,7 @@ pub fn rig(globals: &Globals) -> (Option<PathBuf>, Finding) {
     (path, finding)
 }
 
-/// The port and whether this user may use it.
+/// Checks that the port exists and that this user may use it.
 pub fn port(globals: &Globals) -> Finding {
     let port = match chosen_port(globals) {
         Ok(port) => port,
@@ -57,7 +57,7 @@ pub fn port(globals: &Globals) -> Finding {
     }
 }
 
-/// The cameras of the kernel.
+/// Checks the cameras that the kernel lists.
 pub fn cameras() -> Vec<Finding> {
     let cameras = video_devices();
     if cameras.is_empty() {
@@ -82,7 +82,7 @@ fn video_devices() -> Vec<PathBuf> {
     cameras
 }
 
-/// What to do where this user may not read and write `device`; `None` where he may.
+/// Remedy where this user may not read and write `device`; `None` where that is allowed.
 fn forbidden(device: &Path) -> Option<String> {
     access(device, Access::READ_OK | Access::WRITE_OK).err()?;
     let group = fs::metadata(device).ok().and_then(|metadata| group_name(metadata.gid()));

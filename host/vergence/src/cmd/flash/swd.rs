@@ -5,6 +5,7 @@ use std::path::Path;
 use std::time::Duration;
 
 use serde_json::{Value, json};
+use vergence_board::{FirmwareImage, hardware_name};
 use vergence_image::layout::{ACTIVE, BOOTLOADER, CAPACITY, FLASH_BASE, HARDWARE, STATE};
 use vergence_protocol::management::Identity;
 
@@ -13,7 +14,7 @@ use super::{connect, identity_json, tell};
 use crate::cli::Globals;
 use crate::console::Console;
 use crate::failure::Failure;
-use crate::firmware::{OwnedImage, elf_start, hardware_name, header_json, is_elf};
+use crate::firmware::{elf_start, header_json, is_elf, read_image};
 
 /// How long the board may take to start.
 const START_PATIENCE: Duration = Duration::from_secs(10);
@@ -27,7 +28,7 @@ pub async fn run(file: &Path, probe: Option<&str>, globals: &Globals, console: C
         tell(&board, console)?;
         return console.result(&json!({ "image": Value::Null, "after": identity_json(&board) }));
     }
-    let image = OwnedImage::read(file)?;
+    let image = read_image(file)?;
     if image.header().hardware != HARDWARE {
         let hardware = hardware_name(image.header().hardware);
         return Err(Failure::input(
@@ -72,7 +73,7 @@ fn check_boot_loader(file: &Path, content: &[u8]) -> Result<(), Failure> {
 }
 
 /// What flash shall hold from the state page on: no swap under way, the image, and its seal behind.
-fn in_flash(image: &OwnedImage) -> Option<Vec<u8>> {
+fn in_flash(image: &FirmwareImage) -> Option<Vec<u8>> {
     let mut flash = vec![0xFF; (STATE.length + ACTIVE.length) as usize];
     let (code, behind) = flash.get_mut(STATE.length as usize..)?.split_at_mut_checked(CAPACITY as usize)?;
     code.get_mut(..image.bytes.len())?.copy_from_slice(&image.bytes);

@@ -1,11 +1,9 @@
 //! The monitor on a terminal: lines that are drawn over.
 
 use indicatif::{MultiProgress, ProgressBar, ProgressDrawTarget, ProgressStyle};
+use vergence_board::{describe_fault, positions};
 use vergence_protocol::PoseReport;
 use vergence_rig::{AxisPosition, Rig, RigAxis};
-
-use crate::board::{Board, describe_fault, positions};
-use crate::cmd::report::describe_clock;
 
 /// More often than this nobody sees.
 const DRAWS_PER_SECOND: u8 = 20;
@@ -41,10 +39,10 @@ impl Live {
         Self { state, axes, link, fault, before: None, speeds: vec![0.0; rig.axes.len()], lines }
     }
 
-    pub fn draw(&mut self, board: &Board) {
-        let (rig, pose) = (board.rig(), board.pose());
+    /// Draws a pose; `link` is a line about the link.
+    pub fn draw(&mut self, rig: &Rig, pose: &PoseReport, link: String) {
         self.measure_speeds(rig, pose);
-        let mode = rig.mode_name(pose.mode).map(|name| format!(" [{name}]")).unwrap_or_default();
+        let mode = rig.reported_mode(pose).map(|mode| format!(" [{mode}]")).unwrap_or_default();
         show(&self.state, format!("{}{mode}  {:.2} s since the board started", pose.state, pose.at.0 as f64 * 1e-6));
         let width = rig.axes.iter().map(|axis| axis.name.len()).max().unwrap_or(0);
         for (index, (axis, position)) in rig.axes.iter().zip(positions(rig, pose)).enumerate() {
@@ -55,7 +53,7 @@ impl Live {
             let [position, speed] = [position, speed].map(|it| it.to_string());
             show(line, format!("{:width$}  {position:>11}  {speed:>11}/s  {where_it_is}", axis.name));
         }
-        show(&self.link, format!("{}; {} poses lost", describe_clock(board), board.client().statistics().poses_lost));
+        show(&self.link, link);
         show(&self.fault, pose.fault.map(|fault| describe_fault(rig, &fault)).unwrap_or_default());
     }
 

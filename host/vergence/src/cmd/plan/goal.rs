@@ -10,10 +10,10 @@ use crate::cli::Globals;
 use crate::cmd::report::{axes_json, rounded};
 use crate::console::Console;
 use crate::failure::Failure;
-use crate::output::{depth_field_svg, write_whole};
+use crate::output::{check_ending, depth_field_svg, write_whole};
 use crate::rig_file;
 
-/// How well depth shall be known.
+/// The required accuracy of depth.
 #[derive(Debug, clap::Args)]
 pub struct GoalOptions {
     /// The largest standard deviation of the forward coordinate (sigma_z) or the distance (sigma_range), at a distance from
@@ -21,10 +21,10 @@ pub struct GoalOptions {
     /// "sigma_z <= 1mm at 350mm over +-40deg".
     #[arg(long, value_name = "GOAL", conflicts_with_all = ["mode", "baseline", "separation", "from", "dump"])]
     goal: Option<DepthGoal>,
-    /// How well matched positions are known, in pixels.
+    /// Standard deviation of matched positions, in pixels.
     #[arg(long, value_name = "PIXELS", default_value_t = 0.1, requires = "goal", value_parser = positive)]
     pixel_sigma: f64,
-    /// Draw the predicted standard deviation over directions and distances, as SVG.
+    /// Draws the predicted standard deviation over directions and distances to this file, as SVG.
     #[arg(long, value_name = "FILE", requires = "goal")]
     field: Option<PathBuf>,
 }
@@ -41,21 +41,23 @@ fn positive(text: &str) -> Result<f64, String> {
     if value > 0.0 && value.is_finite() { Ok(value) } else { Err(format!("{text} is not positive")) }
 }
 
-/// Finds the pose and tells it.
+/// Finds the pose for the goal and prints it.
 ///
 /// # Errors
-/// Exit code 1 where no pose meets the goal; the nearest one is told.
+/// Exit code 1 where no pose meets the goal; the nearest pose is printed.
 pub fn run(options: &GoalOptions, globals: &Globals, console: Console) -> Result<(), Failure> {
     let goal = options.goal.ok_or_else(|| Failure::usage("say a --goal"))?;
     let rig = rig_file::load(globals.rig.as_deref())?;
     let best = rig.best_pose(&goal, options.pixel_sigma);
     let positions = positions(&rig, &best);
-    if let Some(path) = &options.field {
-        let field = DepthField::new(&rig, &best.values, options.pixel_sigma);
-        write_whole(path, depth_field_svg(&field, goal.range * 3.0).as_bytes())?;
-    }
     let place: Vec<_> =
         rig.axes.iter().zip(&positions).map(|(axis, position)| format!("{} {position}", axis.name)).collect();
+    if let Some(path) = &options.field {
+        check_ending(path, &["svg"])?;
+        let field = DepthField::new(&rig, &best.values, options.pixel_sigma);
+        let title = format!("Predicted depth error at {}", place.join(", "));
+        write_whole(path, depth_field_svg(&title, &field, goal.range * 3.0).as_bytes())?;
+    }
     let sigma = match best.worst {
         Some(worst) => format!("at most {worst:.4} over the asked directions"),
         None => "but not every asked direction is seen by both cameras".to_owned(),

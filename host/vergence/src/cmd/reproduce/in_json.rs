@@ -2,9 +2,8 @@
 
 use serde_json::{Value, json};
 
-use crate::cmd::report::rounded;
-use crate::cmd::zones::in_degrees;
-use crate::reproduce::{Figures, Matching, ModeZones, Row, Table};
+use crate::cmd::report::{rounded, zones_json};
+use vergence_reproduce::{Figures, Matching, ModeZones, Row, Table};
 
 /// One for each method in each mode.
 pub fn rows(table: &Table) -> Vec<Value> {
@@ -37,7 +36,7 @@ fn figures(figures: &Figures) -> Value {
     })
 }
 
-/// How good the corners were that all of it is made of.
+/// Quality of the corners of all views.
 pub fn corners(table: &Table) -> Value {
     json!({
         "seeds": table.seeds,
@@ -64,8 +63,8 @@ pub fn zones(modes: &[ModeZones]) -> Vec<Value> {
                 "stereo": rounded(published.stereo.deg()),
                 "mono": published.mono.map(|mono| rounded(mono.deg())),
             },
-            "paper_eq3": mode.paper_eq3.as_ref().map(in_degrees),
-            "exact": mode.exact.as_ref().map(in_degrees),
+            "paper_eq3": mode.paper_eq3.as_ref().map(zones_json),
+            "exact": mode.exact.as_ref().map(zones_json),
         })
     };
     modes.iter().map(of).collect()

@@ -2,14 +2,14 @@
 
 use crate::console::Console;
 use crate::failure::Failure;
-use crate::reproduce::{Matching, Table};
+use vergence_reproduce::{Matching, Table};
 
 pub fn bench(tables: [&Table; 2], console: Console) -> Result<(), Failure> {
     for table in tables {
         let [low, high] = table.nees_band();
         console.say(format!(
-            "{} rigs, corners off by {:.3} px (the rigs say {:.3}); {} of {} photographs without a board, {} of {} corners \
-             refused; 95 % band of the NEES {low:.2} to {high:.2}",
+            "{} rigs, corners off by {:.3} px (the rigs say {:.3}); {} of {} photographs without a target, {} of {} \
+             corners refused; 95 % band of the NEES {low:.2} to {high:.2}",
             table.seeds,
             table.corner_px,
             table.stated_px,
@@ -46,7 +46,7 @@ pub fn matchings(matchings: &[Matching], console: Console) -> Result<(), Failure
                 100.0 * outcome.score.all.median,
                 100.0 * outcome.score.outlier_fraction
             ))?,
-            Err(why) => console.say(format!("  {mode:<10} {matcher:<24} missing: {why}"))?,
+            Err(why) => console.say(format!("  {mode:<10} {matcher:<24} was not run: {why}"))?,
         }
     }
     Ok(())

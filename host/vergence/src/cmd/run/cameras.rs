@@ -3,17 +3,37 @@
 use std::sync::Arc;
 
 use tokio::sync::mpsc::Sender;
+use vergence_board::HostClock;
+use vergence_camera::{Camera, CameraError, CameraEvent, attach};
 use vergence_rig::Rig;
+use vergence_sim::{LiveCamera, Room, RoomCamera, Unplugged};
 use vergence_vision::Side;
 
 use super::Args;
-use crate::camera::{Camera, Stage};
 use crate::failure::Failure;
-use crate::link::HostClock;
-use crate::live::{Heard, SimulatedEye, attach};
+use crate::live::drive;
 use crate::sim::SharedRig;
 
-/// Starts both cameras; whatever they have to tell goes to `listener`.
+/// Reads when a simulated camera is unplugged, in time since its start: `left@2s..4s`.
+///
+/// # Errors
+/// Says how it is written.
+pub fn parse_unplugged(text: &str) -> Result<Unplugged, String> {
+    let read = || {
+        let (side, times) = text.split_once('@')?;
+        let (from, until) = times.split_once("..")?;
+        let side = match side {
+            "left" => Side::Left,
+            "right" => Side::Right,
+            _ => return None,
+        };
+        let time = |text| humantime::parse_duration(text).ok();
+        Some(Unplugged { side, from: time(from)?, until: time(until)? })
+    };
+    read().ok_or_else(|| format!("'{text}' does not say when a camera is unplugged: write it like left@2s..4s"))
+}
+
+/// Starts both cameras; their events go to `listener`.
 ///
 /// # Errors
 /// Where neither camera is there.
@@ -22,7 +42,7 @@ pub fn start(
     rig: &Rig,
     simulated: Option<&SharedRig>,
     clock: HostClock,
-    listener: &Sender<Heard>,
+    listener: &Sender<(Side, CameraEvent)>,
 ) -> Result<(), Failure> {
     match (simulated, args.cameras.as_slice()) {
         (Some(mechanics), _) => {
@@ -34,21 +54,13 @@ pub fn start(
     }
 }
 
-fn simulate(args: &Args, rig: &Rig, mechanics: &SharedRig, clock: HostClock, listener: &Sender<Heard>) {
-    let stage = Arc::new(Stage::room());
+fn simulate(args: &Args, rig: &Rig, mechanics: &SharedRig, clock: HostClock, listener: &Sender<(Side, CameraEvent)>) {
+    let room = Arc::new(Room::with_rig());
     let lenses = [(Side::Left, rig.left_camera), (Side::Right, rig.right_camera)];
     for ((side, lens), shutter) in lenses.into_iter().zip(rig.shutters) {
-        let eye = SimulatedEye {
-            side,
-            lens,
-            shutter,
-            stage: Arc::clone(&stage),
-            rig: mechanics.clone(),
-            clock,
-            seed: args.seed,
-            unplugged: args.unplug.clone(),
-        };
-        tokio::spawn(eye.ride(listener.clone()));
+        let camera = RoomCamera { side, lens, room: Arc::clone(&room), seed: args.seed };
+        let camera = LiveCamera::new(camera, shutter, &args.unplug);
+        tokio::spawn(drive(camera, mechanics.clone(), clock, listener.clone()));
     }
 }
 
@@ -57,7 +69,7 @@ fn attach_both(
     rig: &Rig,
     devices: [&String; 2],
     clock: HostClock,
-    listener: &Sender<Heard>,
+    listener: &Sender<(Side, CameraEvent)>,
 ) -> Result<(), Failure> {
     let lenses = [rig.left_camera, rig.right_camera];
     let openers: Vec<_> = devices
@@ -70,7 +82,7 @@ fn attach_both(
             move || options.open_rolling(&device, clock, rolling)
         })
         .collect();
-    let opened: Vec<Result<Box<dyn Camera>, Failure>> = openers.iter().map(|open| open()).collect();
+    let opened: Vec<Result<Box<dyn Camera>, CameraError>> = openers.iter().map(|open| open()).collect();
     if let [Err(left), Err(right)] = opened.as_slice() {
         return Err(Failure::device(format!("there is no camera: {left}\n{right}")));
     }
@@ -79,4 +91,20 @@ fn attach_both(
         attach(side, move || first.take().unwrap_or_else(&open), listener.clone());
     }
     Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use std::time::Duration;
+
+    use super::*;
+
+    #[test]
+    fn the_time_of_unplugging_is_parsed() {
+        let out = parse_unplugged("left@2s..3500ms").expect("it is well formed");
+        assert_eq!((out.side, out.from, out.until.as_millis()), (Side::Left, Duration::from_secs(2), 3500));
+        for wrong in ["left", "left@2s", "top@1s..2s", "left@1..2"] {
+            assert!(parse_unplugged(wrong).is_err_and(|error| error.contains("left@2s..4s")), "{wrong}");
+        }
+    }
 }

@@ -3,27 +3,28 @@
 use std::future::pending;
 use std::time::Duration;
 
+use vergence_board::Board;
 use vergence_rig::{Mode, Rig};
 
-use crate::board::Board;
-use crate::cmd::move_to::named_mode;
+use crate::cmd::stage_pose::named_mode;
 use crate::failure::Failure;
+use crate::interrupt::{armed, interrupted};
 
-/// What the stages do meanwhile.
+/// Where the stages go meanwhile.
 #[derive(Debug, clap::Args)]
 pub struct Options {
-    /// Find the reference of all axes first.
+    /// Finds the reference of all axes first.
     #[arg(long)]
     home: bool,
-    /// Go to this mode while measuring; several, one after the other. Without it nothing moves.
+    /// The mode to move to while measuring; several are visited in turn. Without it nothing moves.
     #[arg(long, value_name = "NAME")]
     mode: Vec<String>,
-    /// Stay so long in each mode before the next.
+    /// Time in each mode before the next.
     #[arg(long, value_name = "TIME", default_value = "2s", value_parser = humantime::parse_duration)]
     stay: Duration,
 }
 
-/// The same, checked.
+/// Checked options: the modes are those of a rig.
 pub struct Tour {
     home: bool,
     modes: Vec<Mode>,
@@ -31,7 +32,7 @@ pub struct Tour {
 }
 
 impl Options {
-    /// The tour in `rig`.
+    /// The modes of `rig` that the options name.
     ///
     /// # Errors
     /// A mode that the rig does not have.
@@ -52,13 +53,13 @@ impl Tour {
     /// # Errors
     /// Those of the board.
     pub async fn home(&self, board: &mut Board) -> Result<(), Failure> {
-        if self.home { board.armed(async |board| board.home().await).await } else { Ok(()) }
+        if self.home { armed(board, async |board| Ok(board.home().await?)).await } else { Ok(()) }
     }
 
-    /// Goes from mode to mode, and then stays disarmed in the last one for ever. It only ends with what went wrong.
+    /// Goes from mode to mode, and then stays disarmed in the last one for ever. It ends only with a failure.
     pub async fn drive(&self, board: Option<&mut Board>) -> Failure {
         let Some(board) = board.filter(|_| self.moves()) else { return pending().await };
-        let driven = board.armed(async |board| {
+        let driven = board.armed(interrupted(), async |board| -> Result<(), Failure> {
             for mode in &self.modes {
                 board.move_to(mode.number, &mode.targets).await?;
                 board.hold(Some(self.stay)).await?;

@@ -16,9 +16,9 @@ use crate::firmware::{APPLICATION, BOOT_LOADER, DEVELOPMENT, SecretKey, hex};
 use crate::output::write_whole;
 use crate::stopwatch::Stopwatch;
 
-/// Cuts between two looks at the clock and two writings of the state.
+/// Cuts after which the state is saved and the clock is read.
 const CHUNK: usize = 64;
-/// More bricked boards than this are only counted.
+/// Most bricked boards that are printed; more are only counted.
 const MOST_TOLD: usize = 20;
 
 /// Options of power cuts.
@@ -35,13 +35,13 @@ pub struct Options {
     /// The boot loader.
     #[arg(long, value_name = "ELF", requires = "power_cuts", default_value = BOOT_LOADER)]
     boot_loader: PathBuf,
-    /// Keep the counts in this file, and go on with what it holds.
+    /// Keeps the counts in this file, and continues with those that it holds.
     #[arg(long, value_name = "FILE", requires = "power_cuts")]
     state: Option<PathBuf>,
 }
 
 impl Options {
-    /// How many cuts are asked for.
+    /// Cuts that were asked for; `None` for the scenarios.
     pub const fn cuts(&self) -> Option<usize> {
         self.power_cuts
     }

@@ -1,10 +1,11 @@
 //! The flight recorder as a story: what happened, and how long before or after the fault.
 
 use serde_json::{Value, json};
+use vergence_board::{Board, RecordedEvents};
 use vergence_protocol::{FaultCode, Happening, Microseconds, RecordedEvent};
 use vergence_rig::Rig;
 
-use crate::board::Board;
+use crate::cmd::report::event_in_words;
 use crate::console::Console;
 use crate::failure::Failure;
 
@@ -24,7 +25,7 @@ impl Story {
     /// # Errors
     /// A firmware without recorder, or a link that ended.
     pub async fn read(board: &Board) -> Result<Self, Failure> {
-        let (events, gone) = board.events().await?;
+        let RecordedEvents { events, lost: gone, .. } = board.events().await?;
         let is_fault = |event: &&RecordedEvent| matches!(event.what, Happening::Fault { .. });
         let recorded = events.iter().rev().find(is_fault).map(|event| event.at);
         let (origin, since) = match (board.pose().fault, recorded) {
@@ -44,9 +45,18 @@ impl Story {
         if self.gone > 0 {
             console.say(format!("              ({} earlier events are gone)", self.gone))?;
         }
-        for event in &self.events {
+        // Every verb opens a session: of several in a row only the last is shown.
+        let mut sessions = 0;
+        for (event, next) in self.events.iter().zip(self.events.iter().skip(1).map(Some).chain([None])) {
+            let is_session = |event: &RecordedEvent| matches!(event.what, Happening::Opened(_));
+            if is_session(event) && next.is_some_and(is_session) {
+                sessions += 1;
+                continue;
+            }
+            let before = if sessions > 0 { format!(" (and {sessions} before it)") } else { String::new() };
+            sessions = 0;
             let seconds = self.relative_us(event) as f64 * 1e-6;
-            console.say(format!("  {seconds:+11.6}  {}", in_words(rig, &event.what)))?;
+            console.say(format!("  {seconds:+11.6}  {}{before}", event_in_words(rig, &event.what)))?;
         }
         Ok(())
     }
@@ -57,7 +67,7 @@ impl Story {
             json!({
                 "board_us": event.at.0,
                 "from_fault_us": self.relative_us(event),
-                "text": in_words(rig, &event.what),
+                "text": event_in_words(rig, &event.what),
                 "fault": fault_code(&event.what).map(|code| format!("{code:?}")),
             })
         });
@@ -73,24 +83,5 @@ fn fault_code(what: &Happening) -> Option<FaultCode> {
     match what {
         Happening::Fault { code, .. } => Some(*code),
         _ => None,
-    }
-}
-
-/// With the rig's names and units in place of numbers.
-fn in_words(rig: &Rig, what: &Happening) -> String {
-    let axis = |index: u8| rig.axes.get(usize::from(index));
-    let name = |index: u8| axis(index).map_or_else(|| format!("axis {index}"), |axis| axis.name.clone());
-    match *what {
-        Happening::Fault { code, axis: Some(index), .. } => format!("FAULT on {}: {code}", name(index)),
-        Happening::Fault { code, axis: None, .. } => format!("FAULT: {code}"),
-        Happening::Switch { axis: index, home, closed } => {
-            let (which, how) = (if home { "home" } else { "limit" }, if closed { "closed" } else { "opened" });
-            format!("{}: {which} switch {how}", name(index))
-        }
-        Happening::Encoder { axis: index, counts } => match axis(index) {
-            Some(axis) => format!("{} was at {} by its encoder", axis.name, axis.position_at(counts)),
-            None => what.to_string(),
-        },
-        _ => what.to_string(),
     }
 }

@@ -1,4 +1,4 @@
-//! Stage poses that were recorded: a set folder, or a CSV file of corners and readings.
+//! Recorded stage poses: a set folder, or a CSV file of corners and encoder readings.
 
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -7,22 +7,23 @@ use vergence_calibration::{StagePose, StereoView};
 use vergence_protocol::AxisKind;
 use vergence_rig::{AxisPosition, Rig, RigAxis};
 
-use crate::cmd::board_options::BoardOptions;
-use crate::cmd::calibrate::views::{PairImages, pairs_from_corners};
+use crate::cmd::calibrate::views::{PairPatterns, pairs_from_corners};
+use crate::cmd::target_options::TargetOptions;
 use crate::console::Console;
+use crate::csv_file::CsvFile;
 use crate::failure::Failure;
 use crate::provenance::InputHash;
 
-/// The file of a set that has the readings.
+/// File of a set with the encoder readings.
 pub const POSES: &str = "poses.csv";
-/// Its column with the folder of each stage pose.
+/// Column of [`POSES`] with the folder of each stage pose.
 pub const FOLDER: &str = "folder";
-/// Readings that differ by fewer encoder steps are those of one stage pose.
+/// Largest difference between readings of one stage pose, in encoder steps.
 const SAME_STEPS: f64 = 2.0;
-/// A reading may lie outside the range by this share of it: stages stop near an end, not on it.
+/// Part of the range by which a reading may lie outside it: stages stop near an end, not on it.
 const OVERSHOOT: f64 = 0.01;
 
-/// The column of an axis's readings.
+/// Name of the column with the readings of an axis.
 pub fn column(axis: &RigAxis) -> String {
     match axis.kind {
         AxisKind::Linear => format!("{}_mm", axis.name),
@@ -30,7 +31,7 @@ pub fn column(axis: &RigAxis) -> String {
     }
 }
 
-/// The number in that column.
+/// Value of a reading in its column, in millimetres or degrees.
 pub fn number(position: AxisPosition) -> f64 {
     match position {
         AxisPosition::Linear(length) => length.mm(),
@@ -38,38 +39,39 @@ pub fn number(position: AxisPosition) -> f64 {
     }
 }
 
-/// The stage poses of a set folder.
+/// Reads the stage poses of a set folder.
 ///
 /// # Errors
-/// Says which file and what is wrong.
+/// A file that cannot be used, by name, and by line in poses.csv.
 pub fn from_set(
     set: &Path,
     rig: &Rig,
-    board: &BoardOptions,
+    target: &TargetOptions,
     hash: &mut InputHash,
     console: Console,
 ) -> Result<Vec<StagePose>, Failure> {
     let path = set.join(POSES);
     hash.add(&path)?;
     let mut poses = Vec::new();
-    let mut table = Table::open(&path, rig)?;
+    let file = CsvFile::read(&path)?;
+    let table = Table::new(&file, rig)?;
     let folder_column = table.column(FOLDER)?;
-    while let Some(row) = table.next_row()? {
+    for row in table.rows()? {
         let folder = set.join(row.get(folder_column).unwrap_or_default());
         let readings = table.readings(&row)?;
         let images = |side: &str| [folder.join(format!("{side}*")).to_string_lossy().into_owned()];
         let (left, right) = (images("left"), images("right"));
         let cameras = (&rig.left_camera, &rig.right_camera);
-        let views = PairImages { left: &left, right: &right, board, cameras }.views(hash, console)?;
+        let views = PairPatterns { left: &left, right: &right, target, cameras }.views(hash, console)?.0;
         poses.push(StagePose { readings, views });
     }
     Ok(poses)
 }
 
-/// The stage poses of a CSV file.
+/// Reads the stage poses of a CSV file.
 ///
 /// # Errors
-/// Says which row and what is wrong.
+/// A row that cannot be used, by line.
 pub fn from_corners(
     path: &Path,
     rig: &Rig,
@@ -77,17 +79,16 @@ pub fn from_corners(
     hash: &mut InputHash,
 ) -> Result<Vec<StagePose>, Failure> {
     let mut of_frame: BTreeMap<i64, Vec<AxisPosition>> = BTreeMap::new();
-    let mut table = Table::open(path, rig)?;
+    let file = CsvFile::read(path)?;
+    let table = Table::new(&file, rig)?;
     let frame_column = table.column("frame")?;
-    while let Some(row) = table.next_row()? {
+    for row in table.rows()? {
         let Some(frame) = row.get(frame_column).and_then(|text| text.trim().parse().ok()) else { continue };
         let readings = table.readings(&row)?;
         let known = of_frame.entry(frame).or_insert_with(|| readings.clone());
         if *known != readings {
-            return Err(Failure::input(
-                path,
-                format!("frame {frame} has two different readings: number the frames through the whole file"),
-            ));
+            let problem = format!("frame {frame} has two different readings: number the frames through the whole file");
+            return Err(file.wrong_row(row.position(), problem));
         }
     }
     let mut poses: Vec<StagePose> = Vec::new();
@@ -113,20 +114,15 @@ fn add(poses: &mut Vec<StagePose>, rig: &Rig, readings: &[AxisPosition], view: S
 
 /// A CSV file with a column for the readings of every axis.
 struct Table<'a> {
-    path: &'a Path,
-    reader: csv::Reader<std::fs::File>,
+    file: &'a CsvFile,
     headers: csv::StringRecord,
     axes: Vec<(&'a RigAxis, usize)>,
 }
 
 impl<'a> Table<'a> {
-    fn open(path: &'a Path, rig: &'a Rig) -> Result<Self, Failure> {
-        let mut reader = csv::ReaderBuilder::new()
-            .trim(csv::Trim::All)
-            .from_path(path)
-            .map_err(|error| Failure::input(path, error))?;
-        let headers = reader.headers().map_err(|error| Failure::input(path, error))?.clone();
-        let mut table = Self { path, reader, headers, axes: Vec::new() };
+    fn new(file: &'a CsvFile, rig: &'a Rig) -> Result<Self, Failure> {
+        let headers = file.reader().headers().map_err(|error| file.wrong(error))?.clone();
+        let mut table = Self { file, headers, axes: Vec::new() };
         table.axes =
             rig.axes.iter().map(|axis| Ok((axis, table.column(&column(axis))?))).collect::<Result<_, Failure>>()?;
         Ok(table)
@@ -134,23 +130,21 @@ impl<'a> Table<'a> {
 
     fn column(&self, name: &str) -> Result<usize, Failure> {
         self.headers.iter().position(|header| header == name).ok_or_else(|| {
-            Failure::input(self.path, format!("it has no column '{name}', only {}", self.headers.as_slice()))
+            let present = self.headers.iter().collect::<Vec<_>>().join(", ");
+            self.file.wrong(format!("it has no column '{name}', only {present}"))
         })
     }
 
-    fn next_row(&mut self) -> Result<Option<csv::StringRecord>, Failure> {
-        let mut row = csv::StringRecord::new();
-        let more = self.reader.read_record(&mut row).map_err(|error| Failure::input(self.path, error))?;
-        Ok(more.then_some(row))
+    fn rows(&self) -> Result<Vec<csv::StringRecord>, Failure> {
+        let read = |row: Result<_, csv::Error>| row.map_err(|error| self.file.unreadable(&error, &self.headers));
+        self.file.reader().into_records().map(read).collect()
     }
 
     fn readings(&self, row: &csv::StringRecord) -> Result<Vec<AxisPosition>, Failure> {
-        let line = row.position().map_or(0, csv::Position::line);
         let reading = |(axis, index): &(&RigAxis, usize)| {
             let text = row.get(*index).unwrap_or_default();
             let fail = |problem: &str| {
-                let name = column(axis);
-                Failure::input(self.path, format!("line {line}: '{text}' in column {name} {problem}"))
+                self.file.wrong_row(row.position(), format!("'{text}' in column {} {problem}", column(axis)))
             };
             let value: f64 =
                 text.parse().ok().filter(|v: &f64| v.is_finite()).ok_or_else(|| fail("is not a number"))?;

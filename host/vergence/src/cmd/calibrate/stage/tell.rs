@@ -1,4 +1,4 @@
-//! What is said of a calibrated stage.
+//! Results of a stage calibration, as text and as JSON.
 
 use serde_json::{Value, json};
 use vergence_calibration::{HeldOutPose, StageCalibration};
@@ -38,7 +38,7 @@ pub fn tell(stage: &StageCalibration, held_out: &[HeldOutPose], console: Console
         console.say(format!("  zero of {}: {} ± {}", zero.axis, zero.offset, zero.sigma))?;
     }
     for skipped in &stage.skipped {
-        console.say(format!("  view not used: {} ({:?} camera: {})", skipped.view, skipped.side, skipped.reason))?;
+        console.say(format!("  view not used: {} ({} camera: {})", skipped.view, skipped.side, skipped.reason))?;
     }
     for pose in held_out {
         let readings = in_words(&pose.readings);
@@ -48,7 +48,8 @@ pub fn tell(stage: &StageCalibration, held_out: &[HeldOutPose], console: Console
     console.say(format!("  {}", stage.observability))
 }
 
-fn in_words(readings: &[AxisPosition]) -> String {
+/// Readings of the encoders, in the order of the axes.
+pub fn in_words(readings: &[AxisPosition]) -> String {
     readings.iter().map(ToString::to_string).collect::<Vec<_>>().join(", ")
 }
 

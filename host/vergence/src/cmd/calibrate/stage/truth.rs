@@ -1,4 +1,4 @@
-//! A calibration of a simulated stage against the mechanism as it was really built.
+//! Compares a calibration of a simulated stage with the mechanism as it was really built.
 
 use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64Mcg;
@@ -9,11 +9,11 @@ use vergence_rig::{AxisPosition, Rig};
 use crate::console::Console;
 use crate::failure::Failure;
 
-/// So many unseen poses are looked at.
+/// Number of random poses at which both are compared.
 const POSES: usize = 30;
 
-/// How far the predicted relative pose is from the true one, over poses anywhere in the range. The truth scores the
-/// calibration and is used for nothing else.
+/// Difference between the predicted and the true relative pose, rms over random poses in the range of the axes. The truth is
+/// used for this score alone.
 ///
 /// # Errors
 /// Where standard output cannot be written.

@@ -1,0 +1,69 @@
+//! Errors of cameras and image files.
+
+use std::path::PathBuf;
+
+/// Why a camera or an image file gives no image.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[non_exhaustive]
+pub enum CameraError {
+    /// A file or folder cannot be read.
+    #[error("{}: {why}", path.display())]
+    Unreadable {
+        /// The file or folder.
+        path: PathBuf,
+        /// The operating system's reason.
+        why: String,
+    },
+    /// A file is not a whole JPEG or PNG image.
+    #[error("{}: not a readable image: {why}", path.display())]
+    NotAnImage {
+        /// The file.
+        path: PathBuf,
+        /// What is wrong with its contents.
+        why: String,
+    },
+    /// A folder holds no image.
+    #[error("{}: no JPEG or PNG image in this folder", .0.display())]
+    NoImages(PathBuf),
+    /// A camera cannot be opened or set up.
+    #[error("camera {}: {why}; is it attached, and free of other programs?", device.display())]
+    Unavailable {
+        /// Device file of the camera.
+        device: PathBuf,
+        /// The operating system's reason.
+        why: String,
+    },
+    /// A camera offers no pixel format that is understood at the size that was asked for.
+    #[error("camera {} offers none of GREY, YUYV, MJPG at {width} x {height}: choose another --size", device.display())]
+    NoFormat {
+        /// Device file of the camera.
+        device: PathBuf,
+        /// Image width in pixels.
+        width: u32,
+        /// Image height in pixels.
+        height: u32,
+    },
+    /// A camera sends one damaged image after the other.
+    #[error("camera {} sends only damaged images: check its cable", .0.display())]
+    Damaged(PathBuf),
+    /// A camera that was open stopped sending.
+    #[error("camera {} vanished: {why}; images taken before are kept", device.display())]
+    Vanished {
+        /// Device file of the camera.
+        device: PathBuf,
+        /// The operating system's reason.
+        why: String,
+    },
+    /// A camera has no more images.
+    #[error("a camera has no more images")]
+    Ended,
+    /// Two cameras never exposed at the same time.
+    #[error("in {images} images the two cameras never exposed at the same time: check that both run at the same rate")]
+    OutOfStep {
+        /// Number of images taken with each camera.
+        images: usize,
+    },
+    /// A simulated camera has nothing to show.
+    #[error("{0}")]
+    Simulated(String),
+}

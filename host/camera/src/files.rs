@@ -1,0 +1,77 @@
+//! Images from files: one file, or all images of a folder in the order of their names.
+
+use std::collections::VecDeque;
+use std::path::{Path, PathBuf};
+
+use image::RgbImage;
+
+use crate::{Camera, CameraError, CameraImage, jpeg};
+
+/// Image files, one after the other.
+#[derive(Debug)]
+pub struct FileCamera {
+    files: VecDeque<PathBuf>,
+}
+
+impl FileCamera {
+    /// The file at `path`, or every JPEG and PNG in the folder at `path`.
+    ///
+    /// # Errors
+    /// [`CameraError::Unreadable`] or [`CameraError::NoImages`].
+    pub fn open(path: &Path) -> Result<Self, CameraError> {
+        Ok(Self { files: image_files(path)?.into() })
+    }
+
+    /// Number of images left.
+    #[must_use]
+    pub fn remaining(&self) -> usize {
+        self.files.len()
+    }
+}
+
+impl Camera for FileCamera {
+    fn grab(&mut self) -> Result<Option<CameraImage>, CameraError> {
+        let Some(path) = self.files.pop_front() else { return Ok(None) };
+        let name = path.file_stem().unwrap_or_default().to_string_lossy().into_owned();
+        Ok(Some(CameraImage { image: read_image(&path)?, name, seq: None, exposed_at: None }))
+    }
+}
+
+/// The file at `path`, or every JPEG and PNG in the folder at `path`, in the order of their names.
+///
+/// # Errors
+/// [`CameraError::Unreadable`] where nothing is there, [`CameraError::NoImages`] for a folder without images.
+pub fn image_files(path: &Path) -> Result<Vec<PathBuf>, CameraError> {
+    let unreadable = |error: std::io::Error| CameraError::Unreadable { path: path.into(), why: error.to_string() };
+    if !path.metadata().map_err(unreadable)?.is_dir() {
+        return Ok(vec![path.to_owned()]);
+    }
+    let mut files = Vec::new();
+    for entry in path.read_dir().map_err(unreadable)? {
+        let file = entry.map_err(unreadable)?.path();
+        let extension = file.extension().map(|e| e.to_string_lossy().to_lowercase());
+        if matches!(extension.as_deref(), Some("jpg" | "jpeg" | "png")) {
+            files.push(file);
+        }
+    }
+    if files.is_empty() {
+        return Err(CameraError::NoImages(path.into()));
+    }
+    files.sort();
+    Ok(files)
+}
+
+/// Reads a JPEG or PNG image.
+///
+/// # Errors
+/// [`CameraError::Unreadable`] where the file cannot be read, [`CameraError::NotAnImage`] where it is damaged or truncated.
+pub fn read_image(path: &Path) -> Result<RgbImage, CameraError> {
+    let not_an_image = |why: String| CameraError::NotAnImage { path: path.into(), why };
+    let bytes =
+        std::fs::read(path).map_err(|error| CameraError::Unreadable { path: path.into(), why: error.to_string() })?;
+    if !jpeg::is_whole(&bytes) {
+        return Err(not_an_image("the file ends before the picture does; copy it again".into()));
+    }
+    let image = image::load_from_memory(&bytes).map_err(|error| not_an_image(error.to_string()))?;
+    Ok(image.into_rgb8())
+}

@@ -1,0 +1,57 @@
+//! Cameras of the Linux kernel and image files, behind one trait.
+//!
+//! [`V4lCamera`] is an attached camera, [`FileCamera`] a folder of images. A [`CameraSet`] takes images with one or two of
+//! them, paired by exposure time where the cameras stamp their images. [`attach`] watches a camera from a thread of its own
+//! and reports what happens as [`CameraEvent`]s. Simulated cameras implement [`Camera`] too, in a crate of their own.
+
+mod attached;
+mod error;
+mod event;
+mod files;
+mod jpeg;
+mod pixel_format;
+mod set;
+mod v4l;
+
+use image::RgbImage;
+use vergence_rig::{ExposureTiming, HostInstant};
+
+pub use attached::attach;
+pub use error::CameraError;
+pub use event::{CameraEvent, Develop, PendingImage};
+pub use files::{FileCamera, image_files, read_image};
+pub use set::CameraSet;
+pub use v4l::{HostTime, V4lCamera, V4lSettings};
+
+/// One image and the time of its exposure.
+#[derive(Clone, Debug)]
+pub struct CameraImage {
+    /// The image, 8 bits per channel.
+    pub image: RgbImage,
+    /// Name for messages and file names.
+    pub name: String,
+    /// The camera's own number of the image, lost ones counted; `None` where it does not count.
+    pub seq: Option<u32>,
+    /// Middle of the exposure of the middle row, on the host's clock, with its largest error; `None` where it is unknown, as
+    /// for a file.
+    pub exposed_at: Option<HostInstant>,
+}
+
+/// A source of images.
+pub trait Camera: Send {
+    /// Takes the next image; `None` after the last one.
+    ///
+    /// # Errors
+    /// Which camera or file failed, and why.
+    fn grab(&mut self) -> Result<Option<CameraImage>, CameraError>;
+
+    /// Timing of the exposures; `None` where images have no time, as those of a folder.
+    fn timing(&self) -> Option<ExposureTiming> {
+        None
+    }
+
+    /// Number of images lost between the camera and [`Self::grab`]; 0 where images are not numbered.
+    fn missed(&self) -> u64 {
+        0
+    }
+}

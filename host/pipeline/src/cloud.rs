@@ -1,0 +1,170 @@
+//! From a pair of images and a pose to a cloud: match, gate, triangulate, colour.
+
+use std::collections::BTreeMap;
+
+use image::RgbImage;
+use vergence_matching::{Match, MatchError, Matcher, Matches, UnmatchedReason};
+use vergence_rig::{Rig, TrackGap, moving_cloud};
+use vergence_vision::{
+    Cloud, CloudPoint, DropReason, Kernel, PixelPair, PoseDrift, StereoPair, cloud_of_each, pose_drift,
+};
+
+use crate::gates::{cloud_gates, matching_sigma};
+use crate::pair::{PairImages, colour_at};
+use crate::pose::PairPose;
+use crate::stage::Stage;
+
+/// A point with its colour in the left image.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct ColouredPoint {
+    /// The point.
+    pub point: CloudPoint,
+    /// sRGB.
+    pub colour: [u8; 3],
+    /// The matcher's similarity of both places, 0 to 1; 1 where the correspondences were given.
+    pub score: f32,
+}
+
+/// Candidates that made no point, counted by reason. The counts have different units and are never added: a left keypoint
+/// without a match is no match.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct Dropped {
+    /// Left keypoints for which the matcher found no match.
+    pub keypoints: BTreeMap<UnmatchedReason, usize>,
+    /// Matches that failed a gate of the cloud.
+    pub matches: BTreeMap<DropReason, usize>,
+}
+
+/// The sparse result of one pair.
+#[derive(Clone, Debug, Default)]
+pub struct PairCloud {
+    /// The points, in millimetres in the frame of the left camera (at its middle row, where the stages moved).
+    pub points: Vec<ColouredPoint>,
+    /// Left keypoints that the matcher tried; 0 where the correspondences were given.
+    pub keypoints: usize,
+    /// Matches: every one is a point, or counted in `dropped.matches`.
+    pub matches: usize,
+    /// Why the others made no point.
+    pub dropped: Dropped,
+    /// The correction of the pose that the matches ask for, where there are enough of them. It is not applied.
+    pub pose_drift: Option<PoseDrift>,
+}
+
+impl PairCloud {
+    /// The drift, where the matches disagree with the pose by more than its stated uncertainty.
+    #[must_use]
+    pub fn significant_drift(&self) -> Option<&PoseDrift> {
+        self.pose_drift.as_ref().filter(|drift| drift.is_significant())
+    }
+}
+
+/// How points are made of a pair.
+#[derive(Clone, Copy)]
+pub struct Method<'a> {
+    /// Finds homologous points.
+    pub matcher: &'a dyn Matcher,
+    /// Makes a point of two rays.
+    pub kernel: Kernel,
+}
+
+impl<'a> From<&'a dyn Matcher> for Method<'a> {
+    /// Pseudo-intersection of what `matcher` finds.
+    fn from(matcher: &'a dyn Matcher) -> Self {
+        Self { matcher, kernel: Kernel::default() }
+    }
+}
+
+/// Why a pair makes no cloud.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+pub enum PairCloudError {
+    /// The images cannot be matched.
+    #[error(transparent)]
+    Match(#[from] MatchError),
+    /// The joints at the exposure are not known.
+    #[error(transparent)]
+    Joints(#[from] TrackGap),
+}
+
+/// Matches two images and triangulates the matches with the pose that the cameras had when each row was exposed. `ended`
+/// hears of the end of each stage.
+///
+/// ```no_run
+/// use image::RgbImage;
+/// use vergence_matching::{GuidedMatcher, Matcher};
+/// use vergence_pipeline::{Method, PairCloudError, PairImages, PairPose, pair_cloud};
+/// use vergence_rig::Rig;
+///
+/// fn points(rig: &Rig, left: &RgbImage, right: &RgbImage) -> Result<usize, PairCloudError> {
+///     // The axes at 145 mm and 60 degrees.
+///     let pose = PairPose::standing(rig.pose_read_at(&[145.0, 60f64.to_radians()]));
+///     let matcher: &dyn Matcher = &GuidedMatcher::default();
+///     let cloud = pair_cloud(PairImages { left, right }, rig, &pose, Method::from(matcher), &mut |_| ())?;
+///     Ok(cloud.points.len())
+/// }
+/// ```
+///
+/// # Errors
+/// Where the images do not belong to the cameras, the cameras share no field, or the joints of a row are not known.
+pub fn pair_cloud(
+    images: PairImages<'_>,
+    rig: &Rig,
+    pose: &PairPose,
+    method: Method<'_>,
+    ended: &mut dyn FnMut(Stage),
+) -> Result<PairCloud, PairCloudError> {
+    let middle = pose.at_middle();
+    let sigma = matching_sigma(middle, pose.sweep());
+    let found = images.with_grey(rig, middle, sigma, |pair| method.matcher.find(pair))?;
+    ended(Stage::Match);
+    let pairs: Vec<_> = found.pairs.iter().map(Match::measured).collect();
+    let cloud = cloud_of_pairs(&pairs, images.left, rig, pose, method.kernel)?;
+    ended(Stage::Triangulate);
+    Ok(cloud.scored(found))
+}
+
+/// Triangulates given correspondences, each with the standard deviation of its positions in pixels; `left` colours the points.
+///
+/// # Errors
+/// [`TrackGap`] where the joints of a row are not known.
+pub fn cloud_of_pairs(
+    pairs: &[(PixelPair, f64)],
+    left: &RgbImage,
+    rig: &Rig,
+    pose: &PairPose,
+    kernel: Kernel,
+) -> Result<PairCloud, TrackGap> {
+    let middle = pose.at_middle();
+    let gates = cloud_gates(rig, middle, kernel);
+    let stereo =
+        StereoPair { left: &rig.left_camera, right: &rig.right_camera, left_from_right: middle.left_from_right };
+    let Cloud { points, dropped } = match pose.rows() {
+        None => cloud_of_each(pairs, &stereo, &gates),
+        Some((motion, exposure)) => moving_cloud(pairs, rig, motion, exposure, &gates)?,
+    };
+    // While the pose turns by more than it is uncertain, one correction for all rows means nothing.
+    let drift = pose.is_steady().then(|| pose_drift(pairs, &stereo, &middle.covariance)).flatten();
+    let coloured = |point: CloudPoint| {
+        let colour = colour_at(left, point.pixels.left);
+        ColouredPoint { point, colour, score: 1.0 }
+    };
+    Ok(PairCloud {
+        points: points.into_iter().map(coloured).collect(),
+        keypoints: 0,
+        matches: pairs.len(),
+        dropped: Dropped { matches: dropped, ..Dropped::default() },
+        pose_drift: drift,
+    })
+}
+
+impl PairCloud {
+    /// Adds what only the matcher knows: scores, and keypoints without a match.
+    fn scored(mut self, found: Matches) -> Self {
+        for point in &mut self.points {
+            point.score = found.pairs.get(point.point.pair_index).map_or(0.0, |found| found.score);
+        }
+        self.keypoints = found.left_keypoints;
+        self.dropped.keypoints = found.dropped;
+        self
+    }
+}

@@ -1,0 +1,39 @@
+//! What a match must satisfy to become a point: the one place for the limits that all verbs share.
+
+use vergence_rig::{Rig, RigPose};
+use vergence_vision::{Angle, Gates, Kernel, Length, SharedCovariance};
+
+/// Default standard deviation of a pixel position, in pixels.
+pub const PIXEL_SIGMA: f64 = 0.2;
+/// Standard deviation of the position of a corner in a single image, in pixels: no second image has registered it.
+pub const CORNER_SIGMA: f64 = 0.5;
+/// Width of the gates, in standard deviations.
+pub const GATE_SIGMAS: f64 = 3.0;
+/// The nearest range at which points are searched.
+pub const NEAREST: Length = Length::from_mm(200.0);
+/// Smallest rotation error that the matcher allows for, so that a pose which is off can be noticed.
+pub const LEAST_MATCHING_SIGMA: Angle = Angle::from_deg(0.15);
+/// Largest standard deviation of a point's range from its own two pixels, as a part of the range.
+pub const MAX_RELATIVE_SIGMA: f64 = 0.05;
+
+/// The gates for clouds of `rig` in `pose`: as wide as pixels and pose are uncertain.
+#[must_use]
+pub fn cloud_gates(rig: &Rig, pose: &RigPose, kernel: Kernel) -> Gates {
+    let pixel = PIXEL_SIGMA / rig.left_camera.pixels_per_radian(Angle::from_rad(0.0));
+    Gates {
+        epipolar_sigmas: GATE_SIGMAS,
+        min_parallax: Angle::from_rad(GATE_SIGMAS * std::f64::consts::SQRT_2 * pixel),
+        max_range: None,
+        pixel_sigma: PIXEL_SIGMA,
+        max_relative_sigma: MAX_RELATIVE_SIGMA,
+        shared: SharedCovariance::exact().with_pose(&pose.covariance),
+        kernel,
+    }
+}
+
+/// The standard deviation of the relative rotation that the matcher allows for. `sweep` is how far the pose turns while the
+/// images are exposed.
+#[must_use]
+pub fn matching_sigma(pose: &RigPose, sweep: Angle) -> Angle {
+    Angle::from_rad(pose.rotation_sigma.rad().hypot(sweep.rad()).max(LEAST_MATCHING_SIGMA.rad()))
+}

@@ -1,0 +1,37 @@
+//! From images and a pose to a cloud: pairing of exposures, gates, triangulation, drift of the pose, dense ranges, bearings,
+//! zones.
+//!
+//! - [`Exposures`] finds which images of both cameras belong together, and when they were exposed;
+//! - [`PairPose`] says where both cameras were while a pair was exposed: at rest, at a trigger pulse, or in motion;
+//! - [`pair_cloud`] matches a [`PairImages`] and triangulates what passes the [`gates`]; [`cloud_of_pairs`] triangulates given
+//!   correspondences;
+//! - [`dense_ranges`] measures every pixel of the left image;
+//! - [`bearings`] gives the directions that one camera alone can see;
+//! - [`observe_pair`] and [`observe_one`] make an [`Observation`] of what a live rig delivers;
+//! - [`rig_zones`] says what the cameras of a rig cover, [`score`] compares ranges with the truth.
+//!
+//! Everything here is a pure function of its arguments: no clock, no file, no thread, no sentence for people. Callers who want
+//! to know how long a [`Stage`] takes pass a callback.
+
+mod bearings;
+mod cloud;
+mod dense;
+mod exposures;
+pub mod gates;
+mod observation;
+mod pair;
+mod pose;
+mod score;
+mod stage;
+mod zones;
+
+pub use bearings::{Bearing, bearings};
+pub use cloud::{ColouredPoint, Dropped, Method, PairCloud, PairCloudError, cloud_of_pairs, pair_cloud};
+pub use dense::dense_ranges;
+pub use exposures::{Ambiguity, CameraGone, Exposed, ExposedImage, Exposures, SkipReason, TimeBase};
+pub use observation::{Observation, observe_one, observe_pair};
+pub use pair::{PairImages, colour_at};
+pub use pose::{Motion, PairPose, TriggeredImage, UnpairedImage, pair_exposure};
+pub use score::{Score, Spread, score};
+pub use stage::Stage;
+pub use zones::{ZONE_RADIUS, rig_zones};

@@ -1,0 +1,43 @@
+//! One seed: another rig, driven, calibrated and used.
+
+use crate::bench::Bench;
+use crate::chain::calibrate;
+use crate::drive::Drive;
+use crate::error::ReproduceError;
+use crate::measure::{Measured, measure};
+use crate::target_shot::CornerSource;
+use vergence_sim::Random;
+
+/// What one seed came to.
+#[derive(Clone, Debug)]
+pub struct SeedResult {
+    /// The bench.
+    pub measured: Measured,
+    /// How far the corners of the calibration were from where they truly are, in pixels.
+    pub calibration_errors_px: Vec<f64>,
+    /// Photographs of the calibration, and those in which no target was found.
+    pub photographs: [usize; 2],
+    /// The noise of a corner's u or v as the rig itself estimates it, in pixels.
+    pub stated_px: f64,
+}
+
+/// Calibrates the bench where it was driven, and measures with it. The same arguments give the same result.
+///
+/// # Errors
+/// Where the views give no calibration.
+pub fn one_seed(
+    bench: &Bench,
+    drive: &Drive,
+    corner_source: &CornerSource,
+    seed: u64,
+) -> Result<SeedResult, ReproduceError> {
+    let mut random = Random::new(seed);
+    let calibrated = calibrate(bench, &drive.calibration, corner_source, &mut random)?;
+    let measured = measure(bench, &drive.modes, &calibrated, corner_source, &mut random);
+    Ok(SeedResult {
+        measured,
+        stated_px: calibrated.stage.sigma_px,
+        calibration_errors_px: calibrated.errors_px,
+        photographs: calibrated.photographs,
+    })
+}

@@ -1,0 +1,109 @@
+//! Options that several verbs share: the port, the rig file, and what a session with a board needs.
+
+use std::path::PathBuf;
+
+use crate::failure::Failure;
+use crate::slots;
+
+/// Speed of a serial port unless --baud says otherwise, in bits per second.
+const BAUD: u32 = 921_600;
+/// How long a board may go without a heartbeat unless --lease says otherwise, in milliseconds.
+const LEASE_MS: u16 = 100;
+
+/// The options of a verb beside shared `options`, of which it takes only those that act on it.
+#[derive(Debug, clap::Args)]
+pub struct With<O: clap::Args, A: clap::Args> {
+    // First, so that the description of the verb is that of its own arguments.
+    #[command(flatten)]
+    pub options: O,
+    #[command(flatten)]
+    pub args: A,
+}
+
+#[derive(Clone, Debug, clap::Args)]
+pub struct PortOptions {
+    /// The board: a serial device, tcp:HOST:PORT, or sim for a simulated one in this process. Without it, the only
+    /// serial device there is.
+    #[arg(long, global = true, env = "VERGENCE_PORT", value_name = "PORT", help_heading = "Board")]
+    port: Option<String>,
+    /// Speed of a serial port.
+    #[arg(long, global = true, default_value_t = BAUD, help_heading = "Board")]
+    baud: u32,
+}
+
+#[derive(Clone, Debug, clap::Args)]
+pub struct RigFileOptions {
+    /// The rig file. Without it, the active calibration (see `calibrate use`), or else the built-in bench.
+    #[arg(long, global = true, env = "VERGENCE_RIG", value_name = "FILE")]
+    rig: Option<PathBuf>,
+}
+
+#[derive(Clone, Debug, clap::Args)]
+pub struct BoardOptions {
+    #[command(flatten)]
+    port: PortOptions,
+    #[command(flatten)]
+    rig: RigFileOptions,
+    /// How long the board may go without hearing from this program before it brakes, 20ms to 1s.
+    #[arg(long, global = true, default_value = "100ms", value_parser = parse_lease, value_name = "TIME", help_heading = "Board")]
+    lease: u16,
+}
+
+/// The board and the rig that a verb works with.
+#[derive(Clone, Debug)]
+pub struct Globals {
+    /// The port that was named.
+    pub port: Option<String>,
+    /// Speed of a serial port, in bits per second.
+    pub baud: u32,
+    /// The rig file; `None` for the built-in bench.
+    pub rig: Option<PathBuf>,
+    /// How long the board may go without a heartbeat, in milliseconds.
+    pub lease: u16,
+}
+
+/// Options that say which board or rig a verb works with.
+pub trait Choice {
+    /// The choice as it was given.
+    fn given(&self) -> Globals;
+
+    /// The choice with the rig of the active calibration where no rig file was named.
+    ///
+    /// # Errors
+    /// Where the store of calibrations cannot be read.
+    fn chosen(&self) -> Result<Globals, Failure> {
+        let given = self.given();
+        let rig = match given.rig {
+            Some(rig) => Some(rig),
+            None => slots::active_rig()?,
+        };
+        Ok(Globals { rig, ..given })
+    }
+}
+
+impl Choice for PortOptions {
+    fn given(&self) -> Globals {
+        Globals { port: self.port.clone(), baud: self.baud, rig: None, lease: LEASE_MS }
+    }
+}
+
+impl Choice for RigFileOptions {
+    fn given(&self) -> Globals {
+        Globals { port: None, baud: BAUD, rig: self.rig.clone(), lease: LEASE_MS }
+    }
+}
+
+impl Choice for BoardOptions {
+    fn given(&self) -> Globals {
+        Globals { rig: self.rig.rig.clone(), lease: self.lease, ..self.port.given() }
+    }
+}
+
+/// A duration that the board accepts as a lease, in milliseconds.
+fn parse_lease(text: &str) -> Result<u16, String> {
+    let duration: std::time::Duration = humantime::parse_duration(text).map_err(|error| error.to_string())?;
+    match u16::try_from(duration.as_millis()) {
+        Ok(ms @ 20..=1000) => Ok(ms),
+        _ => Err("a lease is 20ms to 1s".into()),
+    }
+}

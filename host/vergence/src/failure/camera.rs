@@ -1,0 +1,18 @@
+//! Exit codes of errors from cameras and image files: a bad file is bad input, anything else a device error.
+
+use vergence_camera::CameraError;
+
+use super::Failure;
+
+impl From<CameraError> for Failure {
+    fn from(error: CameraError) -> Self {
+        let message = error.to_string();
+        match error {
+            CameraError::Unreadable { .. }
+            | CameraError::NotAnImage { .. }
+            | CameraError::NoImages(_)
+            | CameraError::Simulated(_) => Self::usage(message),
+            _ => Self::device(message),
+        }
+    }
+}

@@ -1,0 +1,117 @@
+//! Watches a target before cameras: whether it is seen, held still, and worth a view.
+
+use image::imageops::grayscale;
+use rayon::prelude::*;
+use vergence_calibration::detect::detect;
+use vergence_calibration::{Coverage, TargetSpec, TargetView};
+use vergence_camera::CameraImage;
+
+/// Largest motion of a corner between two images of a target that is held still, in pixels.
+const STILL_PX: f64 = 1.0;
+/// Mean motion of the corners from which a target counts as held elsewhere, in pixels.
+const ELSEWHERE_PX: f64 = 25.0;
+
+/// Names of the cameras in file names.
+pub const NAMES: [&str; 2] = ["left", "right"];
+
+/// Views at one instant, one for each camera; empty where one of them does not see the target.
+pub type TargetViews = Vec<TargetView>;
+
+/// Looks for the target in the images of one instant.
+#[must_use]
+pub fn observe(frames: &[CameraImage], target: &TargetSpec) -> TargetViews {
+    let view =
+        |frame: &CameraImage| Some(detect(&grayscale(&frame.image), target, None).ok()?.view(&frame.name, target));
+    frames.par_iter().map(view).collect::<Option<_>>().unwrap_or_default()
+}
+
+/// A set of views being taken: its coverage, its views, and the last observation.
+pub struct TargetWatch {
+    coverage: Vec<Coverage>,
+    last: TargetViews,
+    views: Vec<TargetViews>,
+}
+
+impl TargetWatch {
+    /// An empty set with a coverage for each camera.
+    #[must_use]
+    pub fn new(coverage: Vec<Coverage>) -> Self {
+        Self { coverage, last: TargetViews::new(), views: Vec::new() }
+    }
+
+    /// Takes the views of now; returns whether all cameras see the target held still.
+    pub fn observe(&mut self, now: TargetViews) -> bool {
+        let before = std::mem::replace(&mut self.last, now);
+        !before.is_empty()
+            && before.len() == self.last.len()
+            && before.iter().zip(&self.last).all(|(a, b)| is_still(a, b))
+    }
+
+    /// Whether the last views add coverage.
+    #[must_use]
+    pub fn is_news(&self) -> bool {
+        self.coverage.iter().zip(&self.last).any(|(coverage, view)| coverage.is_news(view))
+    }
+
+    /// Whether the target is held elsewhere than in every view of the set.
+    #[must_use]
+    pub fn is_elsewhere(&self) -> bool {
+        self.views.iter().all(|taken| taken.iter().zip(&self.last).any(|(a, b)| distance(a, b) > ELSEWHERE_PX))
+    }
+
+    /// Adds the last views to the set.
+    pub fn take(&mut self) {
+        for (coverage, view) in self.coverage.iter_mut().zip(&self.last) {
+            coverage.add(view);
+        }
+        self.views.push(self.last.clone());
+    }
+
+    /// Number of views in the set.
+    #[must_use]
+    pub fn taken(&self) -> usize {
+        self.views.len()
+    }
+
+    /// Whether the coverage of every camera is complete.
+    #[must_use]
+    pub fn is_complete(&self) -> bool {
+        !self.coverage.is_empty() && self.coverage.iter().all(|coverage| coverage.advice().is_none())
+    }
+
+    /// Advice on what to show next; `None` where nothing is missing.
+    #[must_use]
+    pub fn advice(&self) -> Option<String> {
+        let advice = self.coverage.iter().zip(NAMES).find_map(|(coverage, name)| Some((coverage.advice()?, name)));
+        advice.map(|(advice, name)| match self.coverage.len() {
+            0 | 1 => advice.to_string(),
+            _ => format!("{name} camera: {advice}"),
+        })
+    }
+}
+
+/// Whether the target did not move.
+fn is_still(before: &TargetView, now: &TargetView) -> bool {
+    let (mut count, mut worst) = (0, 0f64);
+    for px in motion(before, now) {
+        (count, worst) = (count + 1, worst.max(px));
+    }
+    count * 2 >= now.corners.len() && count > 0 && worst < STILL_PX
+}
+
+/// Mean motion of the corners that both views have, in pixels; infinite where they have none in common.
+fn distance(before: &TargetView, now: &TargetView) -> f64 {
+    let (count, sum) = motion(before, now).fold((0.0, 0.0), |(count, sum), px| (count + 1.0, sum + px));
+    if count > 0.0 { sum / count } else { f64::INFINITY }
+}
+
+fn motion<'a>(before: &'a TargetView, now: &'a TargetView) -> impl Iterator<Item = f64> + 'a {
+    now.corners.iter().filter_map(|corner| {
+        let same = before.corners.iter().find(|other| same_place(other.target_mm, corner.target_mm))?;
+        Some((corner.pixel.u - same.pixel.u).hypot(corner.pixel.v - same.pixel.v))
+    })
+}
+
+fn same_place([x, y]: [f64; 2], [other_x, other_y]: [f64; 2]) -> bool {
+    (x - other_x).abs() < 1e-6 && (y - other_y).abs() < 1e-6
+}
