@@ -38,10 +38,10 @@ fn script<B: Board>() -> Done {
     };
     rest(&mut talk, &mut done);
 
-    talk.steps = Some(Vec::new());
+    talk.watched_steps = Some(Vec::new());
     assert_eq!(talk.move_to(HERBIVORE, 1), Status::Accepted);
     talk.wait_for(ControllerState::Ready);
-    done.steps = talk.steps.take().expect("they were watched");
+    done.steps = talk.watched_steps.take().expect("they were watched");
     rest(&mut talk, &mut done);
 
     assert_eq!(talk.move_to(HUMAN, 2), Status::Accepted);

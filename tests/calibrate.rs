@@ -11,7 +11,7 @@ mod common;
 use std::path::Path;
 
 use common::cameras::camera_files;
-use common::{fails_with, run_json, shared};
+use common::{fails_with, real_data, run_json};
 use serde_json::Value;
 
 fn number(value: &Value) -> f64 {
@@ -36,9 +36,9 @@ const SETS: [[&str; 6]; 5] = [
 #[test]
 fn every_real_set_comes_to_the_reference_optimum_without_a_hint() {
     for [set, corners, camera, size, file, named] in SETS {
-        let Some(folder) = shared(&format!("data/{set}")) else { return };
+        let Some(folder) = real_data(&format!("data/{set}")) else { return };
         let csv = folder.join(corners).to_string_lossy().into_owned();
-        let mut arguments = vec!["calibrate", "intrinsics", "--json", "--corners", &csv, "--size", size];
+        let mut arguments = vec!["calibrate", "intrinsics", "--json", "--csv", &csv, "--size", size];
         if !camera.is_empty() {
             arguments.extend(["--camera", camera]);
         }
@@ -63,7 +63,7 @@ fn every_real_set_comes_to_the_reference_optimum_without_a_hint() {
 
 #[test]
 fn a_real_pair_comes_to_the_reference_optimum() {
-    let Some(folder) = shared("data/sourishg_stereo") else { return };
+    let Some(folder) = real_data("data/sourishg_stereo") else { return };
     let work = tempfile::tempdir().expect("a temporary folder");
     let file = |name: &str| work.path().join(name).to_string_lossy().into_owned();
     let csv = folder.join("corners_opencv_classic.csv").to_string_lossy().into_owned();
@@ -73,7 +73,7 @@ fn a_real_pair_comes_to_the_reference_optimum() {
             "calibrate",
             "intrinsics",
             "--json",
-            "--corners",
+            "--csv",
             &csv,
             "--camera",
             side,
@@ -84,19 +84,8 @@ fn a_real_pair_comes_to_the_reference_optimum() {
         ]);
     }
     let (left, right, rig) = (file("left.toml"), file("right.toml"), file("rig.toml"));
-    let pair = [
-        "calibrate",
-        "extrinsics",
-        "--json",
-        "--left",
-        &left,
-        "--right",
-        &right,
-        "--corners",
-        &csv,
-        "--lenses",
-        "free",
-    ];
+    let pair =
+        ["calibrate", "extrinsics", "--json", "--left", &left, "--right", &right, "--csv", &csv, "--lenses", "free"];
     let stereo = &reference(&folder, "reference_opencv_classic_cv5.json")["stereo"];
     let all = run_json(&[&pair[..], &["--no-loss"]].concat());
     assert!(number(&all["joint"]["rms_px"]) <= 1.001 * number(&stereo["kb4_scipy_ba"]["rms_px"]), "{all}");
@@ -117,11 +106,11 @@ fn a_real_pair_comes_to_the_reference_optimum() {
 /// Lenses held, known up to their covariance, and free: the more is open, the less sure is the pose.
 #[test]
 fn lenses_known_up_to_their_covariance_lie_between_exact_and_free() {
-    let Some(folder) = shared("data/sourishg_stereo") else { return };
+    let Some(folder) = real_data("data/sourishg_stereo") else { return };
     let work = tempfile::tempdir().expect("a temporary folder");
     let [left, right] = camera_files(&folder, work.path());
     let csv = folder.join("corners_opencv_classic.csv").to_string_lossy().into_owned();
-    let pair = ["calibrate", "extrinsics", "--json", "--left", &left, "--right", &right, "--corners", &csv, "--lenses"];
+    let pair = ["calibrate", "extrinsics", "--json", "--left", &left, "--right", &right, "--csv", &csv, "--lenses"];
     let [exact, known, free] = ["exact", "known", "free"].map(|lenses| run_json(&[&pair[..], &[lenses]].concat()));
     let sigma = |result: &Value| (0..6).map(|i| number(&result["joint"]["sigma"][i]).powi(2)).sum::<f64>();
     println!("{}, {}, {}", exact["joint"], known["joint"], free["joint"]);
@@ -146,30 +135,57 @@ fn lenses_known_up_to_their_covariance_lie_between_exact_and_free() {
     assert!(!Path::new(&out).exists());
 }
 
+/// Unless told otherwise the lenses move as far as their covariance allows, and are held only where there is none.
+#[test]
+fn lenses_are_known_unless_their_files_carry_no_covariance() {
+    let Some(folder) = real_data("data/sourishg_stereo") else { return };
+    let work = tempfile::tempdir().expect("a temporary folder");
+    let [left, right] = camera_files(&folder, work.path());
+    let csv = folder.join("corners_opencv_classic.csv").to_string_lossy().into_owned();
+    let calibrate = |left: &str, more: &[&str]| {
+        let pair = ["calibrate", "extrinsics", "--json", "--left", left, "--right", &right, "--csv", &csv];
+        run_json(&[&pair[..], more].concat())
+    };
+    let [exact, known] = ["exact", "known"].map(|lenses| calibrate(&left, &["--lenses", lenses]));
+    assert_eq!(calibrate(&left, &[])["joint"], known["joint"]);
+    // The set's cameras were not triggered together: no lens makes the views agree, and the sentence says so.
+    for result in [&exact, &known] {
+        println!("scatter {}: {}", result["joint"]["view_scatter"], result["verdict"]["text"]);
+        assert!(number(&result["joint"]["view_scatter"]) > 1.3);
+        assert!(result["verdict"]["text"].as_str().expect("a sentence").contains("The views disagree"));
+    }
+    assert!(number(&known["verdict"]["depth_sigma_mm"]) > 1.0 && number(&exact["verdict"]["depth_sigma_mm"]) > 0.5);
+    let text = std::fs::read_to_string(&left).expect("a camera file");
+    let bare = work.path().join("bare.toml").to_string_lossy().into_owned();
+    std::fs::write(&bare, text.split("[calibration]").next().expect("a camera")).expect("written");
+    assert_eq!(calibrate(&bare, &[])["joint"], exact["joint"]);
+}
+
 /// A small lens past 90°, so that rendering is quick.
 fn small_rig() -> String {
     vergence_rig::BENCH_TOML.replace("[1280, 1280]", "[640, 640]").replace("366.0", "183.0").replace("639.5", "319.5")
 }
 
 #[test]
-fn captured_boards_give_the_simulated_lens_back() {
+fn captured_targets_give_the_simulated_lens_back() {
     let work = tempfile::tempdir().expect("a temporary folder");
     let file = |name: &str| work.path().join(name).to_string_lossy().into_owned();
     let (rig, set, camera, truth) = (file("rig.toml"), file("set"), file("cam.toml"), file("truth.toml"));
     std::fs::write(&rig, small_rig()).expect("a rig file");
-    let board = ["--board", "9x6", "--square", "20mm"];
+    let target = ["--corners", "9x6", "--square", "20mm"];
     let taken = run_json(
         &[
             &["capture", "--json", "--rig", &rig, "--cameras", "sim", "--mono", "--out", &set, "--frames", "120"],
-            &board[..],
+            &target[..],
         ]
         .concat(),
     );
     println!("{taken}");
     assert_eq!(taken["complete"], true, "{taken}");
     let images = format!("{set}/left*.png");
-    let found =
-        run_json(&[&["calibrate", "intrinsics", "--json", "--images", &images, "--out", &camera], &board[..]].concat());
+    let found = run_json(
+        &[&["calibrate", "intrinsics", "--json", "--images", &images, "--out", &camera], &target[..]].concat(),
+    );
     println!("{} px rms, valid to {}°", found["rms_inlier_px"], found["theta_max_deg"]);
     assert!(number(&found["rms_inlier_px"]) < 0.2, "{found}");
     let rig = vergence_rig::Rig::from_toml(&small_rig()).expect("a rig");
@@ -186,12 +202,12 @@ fn captured_boards_give_the_simulated_lens_back() {
 
 #[test]
 fn held_out_views_and_the_verdict_are_told() {
-    let Some(folder) = shared("data/ocam_fisheye1") else { return };
+    let Some(folder) = real_data("data/ocam_fisheye1") else { return };
     let work = tempfile::tempdir().expect("a temporary folder");
     let file = |name: &str| work.path().join(name).to_string_lossy().into_owned();
     let csv = folder.join("corners_opencv_classic.csv").to_string_lossy().into_owned();
     let (page, store) = (file("report.html"), file("kept"));
-    let arguments = ["calibrate", "intrinsics", "--json", "--corners", &csv, "--size", "1032x778", "--holdout", "5"];
+    let arguments = ["calibrate", "intrinsics", "--json", "--csv", &csv, "--size", "1032x778", "--holdout", "5"];
     let more = ["--report", &page, "--fov", "190deg", "--store", &store, "--slot", "front", "--date", "2026-11-21"];
     let result = run_json(&[&arguments[..], &more].concat());
     let (held_out, used) = (number(&result["held_out"]["rms_px"]), number(&result["rms_inlier_px"]));
@@ -238,12 +254,12 @@ fn camera_files_are_converted_and_applied() {
 #[test]
 fn a_target_is_drawn_in_true_size_or_refused() {
     let work = tempfile::tempdir().expect("a temporary folder");
-    let out = work.path().join("board.svg").to_string_lossy().into_owned();
-    run_json(&["target", "--json", "--board", "9x6", "--square", "20mm", "--paper", "A4", "-o", &out]);
+    let out = work.path().join("target.svg").to_string_lossy().into_owned();
+    run_json(&["target", "--json", "--corners", "9x6", "--square", "20mm", "--paper", "A4", "-o", &out]);
     let svg = std::fs::read_to_string(&out).expect("a drawing");
     assert!(svg.contains("width=\"297mm\"") && svg.matches("width=\"20\"").count() == 35);
     fails_with(
-        &["target", "--board", "9x6", "--square", "40mm", "--paper", "A4", "-o", &out],
+        &["target", "--corners", "9x6", "--square", "40mm", "--paper", "A4", "-o", &out],
         2,
         &["A4", "larger sheet"],
     );

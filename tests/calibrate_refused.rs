@@ -11,19 +11,19 @@ mod common;
 use std::path::Path;
 
 use common::cameras::camera_files;
-use common::{fails_with, shared};
+use common::{fails_with, real_data};
 
 /// What a pair is told of cameras and corners that cannot be used.
 #[test]
 fn bad_pairs_are_refused_and_leave_no_file() {
-    let Some(folder) = shared("data/sourishg_stereo") else { return };
+    let Some(folder) = real_data("data/sourishg_stereo") else { return };
     let work = tempfile::tempdir().expect("a temporary folder");
     let file = |name: &str| work.path().join(name).to_string_lossy().into_owned();
     let [left, right] = camera_files(&folder, work.path());
     let csv = folder.join("corners_opencv_classic.csv").to_string_lossy().into_owned();
     let (out, page, bad) = (file("rig.toml"), file("report.html"), file("bad.toml"));
     let refused = |cameras: [&str; 2], csv: &str, more: &[&str], code: i32, words: &[&str]| {
-        let pair = ["calibrate", "extrinsics", "--left", cameras[0], "--right", cameras[1], "--corners", csv];
+        let pair = ["calibrate", "extrinsics", "--left", cameras[0], "--right", cameras[1], "--csv", csv];
         fails_with(&[&pair[..], &["--out", &out, "--report", &page], more].concat(), code, words);
         assert!(!Path::new(&out).exists() && !Path::new(&page).exists());
     };
@@ -56,25 +56,15 @@ fn bad_pairs_are_refused_and_leave_no_file() {
         })
         .collect();
     std::fs::write(&wild, shuffled.join("\n")).expect("written");
-    let output = common::run(&[
-        "calibrate",
-        "extrinsics",
-        "--left",
-        &left,
-        "--right",
-        &right,
-        "--corners",
-        &wild,
-        "--out",
-        &out,
-    ]);
+    let output =
+        common::run(&["calibrate", "extrinsics", "--left", &left, "--right", &right, "--csv", &wild, "--out", &out]);
     let said = common::text(&output.stderr);
     println!("{said}");
     assert!(matches!(output.status.code(), Some(1 | 2)) && said.lines().count() == 1, "{said}");
     assert!(!Path::new(&out).exists());
 }
 
-/// Corners of a board that is seen from straight ahead, at `distances`.
+/// Corners of a target that is seen from straight ahead, at `distances`.
 fn frontal_csv(distances: &[f64]) -> String {
     let mut csv = String::from("camera,file,frame,idx,x,y,bx_mm,by_mm\n");
     for (frame, distance) in distances.iter().enumerate() {
@@ -103,31 +93,31 @@ fn bad_corners_are_refused_and_leave_no_file() {
     ];
     for (text, word) in cases {
         std::fs::write(&csv, text).expect("written");
-        let arguments = ["calibrate", "intrinsics", "--corners", &csv, "--size", "960x600", "--out", &out];
+        let arguments = ["calibrate", "intrinsics", "--csv", &csv, "--size", "960x600", "--out", &out];
         fails_with(&arguments, 2, &[word]);
         assert!(!Path::new(&out).exists());
     }
     std::fs::write(&csv, several).expect("written");
-    fails_with(&["calibrate", "intrinsics", "--corners", &csv, "--size", "960", "--out", &out], 2, &["960x600"]);
+    fails_with(&["calibrate", "intrinsics", "--csv", &csv, "--size", "960", "--out", &out], 2, &["960x600"]);
     fails_with(
-        &["calibrate", "intrinsics", "--corners", &csv, "--size", "960x600", "--camera", "front"],
+        &["calibrate", "intrinsics", "--csv", &csv, "--size", "960x600", "--camera", "front"],
         2,
         &["front", "cam"],
     );
     fails_with(
-        &["calibrate", "intrinsics", "--images", "/nowhere/*.png", "--board", "9x6", "--square", "20mm"],
+        &["calibrate", "intrinsics", "--images", "/nowhere/*.png", "--corners", "9x6", "--square", "20mm"],
         2,
         &["/nowhere"],
     );
     fails_with(
-        &["capture", "--cameras", "/dev/none", "--board", "9x6", "--square", "20mm", "--out", &file("set")],
+        &["capture", "--cameras", "/dev/none", "--corners", "9x6", "--square", "20mm", "--out", &file("set")],
         3,
         &["/dev/none"],
     );
 }
 
 #[test]
-fn images_without_a_board_or_of_two_sizes_are_told() {
+fn images_without_a_target_or_of_two_sizes_are_told() {
     let work = tempfile::tempdir().expect("a temporary folder");
     let file = |name: &str| work.path().join(name).to_string_lossy().into_owned();
     let grey = |name: &str, width| {
@@ -135,12 +125,87 @@ fn images_without_a_board_or_of_two_sizes_are_told() {
     };
     grey("a0.png", 300);
     grey("a1.png", 300);
-    let board = ["--board", "9x6", "--square", "20mm"];
+    let target = ["--corners", "9x6", "--square", "20mm"];
     let pattern = file("a*.png");
-    let arguments = [&["calibrate", "intrinsics", "--images", &pattern], &board[..]].concat();
-    fails_with(&arguments, 2, &["no board", "2 images"]);
+    let arguments = [&["calibrate", "intrinsics", "--images", &pattern], &target[..]].concat();
+    fails_with(&arguments, 2, &["no target", "2 images"]);
     grey("a2.png", 310);
     fails_with(&arguments, 2, &["a2.png", "310 x 200"]);
+}
+
+/// A wrong cell is named by the line that an editor shows, with Windows line ends and blank lines too.
+#[test]
+fn a_wrong_cell_is_named_by_its_line() {
+    let work = tempfile::tempdir().expect("a temporary folder");
+    let file = |name: &str| work.path().join(name).to_string_lossy().into_owned();
+    let (csv, out) = (file("corners.csv"), file("cam.toml"));
+    let good = frontal_csv(&[300.0]);
+    // The header is line 1.
+    let wrong: Vec<String> = good
+        .lines()
+        .enumerate()
+        .map(
+            |(index, line)| {
+                if index == 10 { line.replacen("cam,view0.png,0", "cam,view0.png,x", 1) } else { line.into() }
+            },
+        )
+        .collect();
+    for (text, line) in [
+        (wrong.join("\n"), "line 11: column frame"),
+        (wrong.join("\r\n"), "line 11: column frame"),
+        (wrong.join("\n\n"), "line 21: column frame"),
+    ] {
+        std::fs::write(&csv, text).expect("written");
+        fails_with(&["calibrate", "intrinsics", "--csv", &csv, "--size", "960x600", "--out", &out], 2, &[line]);
+    }
+    let short = format!("{good}cam,view0.png\n");
+    std::fs::write(&csv, short).expect("written");
+    let arguments = ["calibrate", "intrinsics", "--csv", &csv, "--size", "960x600", "--out", &out];
+    fails_with(&arguments, 2, &["line 56: it has 2 columns"]);
+}
+
+/// Folders are taken as sets; damaged images and those without a partner are left out with a word.
+#[test]
+fn damaged_images_and_gaps_in_folders_are_left_out_with_a_word() {
+    let work = tempfile::tempdir().expect("a temporary folder");
+    let file = |name: &str| work.path().join(name).to_string_lossy().into_owned();
+    for folder in ["left", "right"] {
+        std::fs::create_dir(file(folder)).expect("a folder");
+    }
+    for name in ["left/left0.png", "left/left1.png", "left/left2.png", "right/right0.png", "right/right2.png"] {
+        chessboard(&file(name), 9, 6);
+    }
+    let whole = std::fs::read(file("left/left2.png")).expect("an image");
+    std::fs::write(file("left/left2.png"), &whole[..whole.len() / 2]).expect("written");
+    let target = ["--corners", "9x6", "--square", "20mm"];
+    let left = file("left");
+    // Frontal views give no calibration, but the damaged one is no reason to stop.
+    let arguments = [&["calibrate", "intrinsics", "--images", &left], &target[..]].concat();
+    fails_with(&arguments, 2, &["left2.png: left out", "no calibration"]);
+    std::fs::write(file("damaged.png"), &whole[..100]).expect("written");
+    let damaged = file("damaged.png");
+    let arguments = [&["calibrate", "intrinsics", "--images", &damaged], &target[..]].concat();
+    fails_with(&arguments, 2, &["none of 1 images can be read", "damaged.png"]);
+    std::fs::copy(file("right/right0.png"), file("left/right0.png")).expect("copied");
+    let arguments = [&["calibrate", "intrinsics", "--images", &left], &target[..]].concat();
+    fails_with(&arguments, 2, &["images of both cameras"]);
+    std::fs::remove_file(file("left/right0.png")).expect("removed");
+    let cameras = plain_cameras(&work);
+    let (right, cameras) = (file("right"), cameras.each_ref().map(String::as_str));
+    let pair = ["calibrate", "extrinsics", "--left", cameras[0], "--right", cameras[1]];
+    let images = ["--left-images", &left, "--right-images", &right];
+    fails_with(&[&pair[..], &images, &target].concat(), 2, &["left1.png: left out: the other camera"]);
+}
+
+/// Camera files with the image size of the chessboards of these tests.
+fn plain_cameras(work: &tempfile::TempDir) -> [String; 2] {
+    ["left.toml", "right.toml"].map(|name| {
+        let path = work.path().join(name).to_string_lossy().into_owned();
+        let lens = "fx = 200.0\nfy = 200.0\ncx = 209.5\ncy = 164.5\n";
+        let distortion = "opencv_k1 = 0.0\nopencv_k2 = 0.0\nopencv_k3 = 0.0\nopencv_k4 = 0.0\n";
+        std::fs::write(&path, format!("[camera]\nsize = [420, 330]\n{lens}{distortion}")).expect("written");
+        path
+    })
 }
 
 /// A chessboard of `columns` x `rows` inner corners, seen from straight ahead.
@@ -154,24 +219,24 @@ fn chessboard(path: &str, columns: u32, rows: u32) {
 }
 
 #[test]
-fn a_board_of_another_size_is_told() {
+fn a_target_of_another_size_is_told() {
     let work = tempfile::tempdir().expect("a temporary folder");
     let file = |name: &str| work.path().join(name).to_string_lossy().into_owned();
     for name in ["a0.png", "a1.png"] {
         chessboard(&file(name), 11, 8);
     }
     let (pattern, out) = (file("a*.png"), file("cam.toml"));
-    let arguments = ["calibrate", "intrinsics", "--images", &pattern, "--square", "20mm", "--out", &out, "--board"];
+    let arguments = ["calibrate", "intrinsics", "--images", &pattern, "--square", "20mm", "--out", &out, "--corners"];
     fails_with(&[&arguments[..], &["7x5"]].concat(), 2, &["11 × 8", "7 × 5"]);
     // The right size, but the same frontal view twice.
     fails_with(&[&arguments[..], &["11x8"]].concat(), 2, &["no calibration"]);
     assert!(!Path::new(&out).exists());
 }
 
-/// Corners that are there, but nowhere near a board: the data can be read and the result is no good.
+/// Corners that are there, but nowhere near a target: the data can be read and the result is no good.
 #[test]
 fn a_fit_that_fails_its_own_check_is_exit_code_1() {
-    let Some(folder) = shared("data/sourishg_stereo") else { return };
+    let Some(folder) = real_data("data/sourishg_stereo") else { return };
     let work = tempfile::tempdir().expect("a temporary folder");
     let file = |name: &str| work.path().join(name).to_string_lossy().into_owned();
     let rows = std::fs::read_to_string(folder.join("corners_opencv_classic.csv")).expect("corners");
@@ -191,7 +256,7 @@ fn a_fit_that_fails_its_own_check_is_exit_code_1() {
         .collect();
     let (csv, out, page) = (file("shaken.csv"), file("cam.toml"), file("report.html"));
     std::fs::write(&csv, shaken.join("\n")).expect("written");
-    let arguments = ["calibrate", "intrinsics", "--corners", &csv, "--camera", "left", "--size", "960x600"];
+    let arguments = ["calibrate", "intrinsics", "--csv", &csv, "--camera", "left", "--size", "960x600"];
     fails_with(&[&arguments[..], &["--out", &out, "--report", &page]].concat(), 1, &["px off"]);
     assert!(!Path::new(&out).exists() && !Path::new(&page).exists());
 }

@@ -122,7 +122,7 @@ fn a_calibration_is_kept_once() {
     let store = Store::new();
     let csv = store.path("corners.csv");
     std::fs::write(&csv, "camera,file,frame,idx,x,y,bx_mm,by_mm\n").expect("written");
-    let calibrate = ["calibrate", "intrinsics", "--corners", &csv, "--size", "960x600", "--slot"];
+    let calibrate = ["calibrate", "intrinsics", "--csv", &csv, "--size", "960x600", "--slot"];
     store.refuses(&[&calibrate[..], &["wide"]].concat(), &["wide", "kept already"]);
     store.refuses(&[&calibrate[..], &["../escape"]].concat(), &["no name"]);
     // A calibration that fails keeps nothing.

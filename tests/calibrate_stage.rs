@@ -53,7 +53,7 @@ impl Dice {
 fn seen(
     lens: &KannalaBrandt,
     camera_from_left: &Isometry3<f64>,
-    board: &[Vector3<f64>],
+    target: &[Vector3<f64>],
     dice: &mut Dice,
 ) -> Option<Vec<Pixel>> {
     let corner = |at: &Vector3<f64>| {
@@ -61,11 +61,11 @@ fn seen(
         let exact = lens.project_point(&Point::<Left>::from_mm(point.coords)).ok().filter(|p| lens.on_sensor(*p))?;
         Some(Pixel { u: exact.u + 0.1 * dice.normal(), v: exact.v + 0.1 * dice.normal() })
     };
-    board.iter().map(corner).collect()
+    target.iter().map(corner).collect()
 }
 
-/// A 9 x 6 board of 20 mm somewhere between the optical axes, in the left frame.
-fn board(rig: &Rig, at: [f64; 2], dice: &mut Dice) -> Vec<Vector3<f64>> {
+/// A 9 x 6 target of 20 mm somewhere between the optical axes, in the left frame.
+fn target(rig: &Rig, at: [f64; 2], dice: &mut Dice) -> Vec<Vector3<f64>> {
     let right_axis = rig.pose_at_values(&at).left_from_right.rotation() * Vector3::z();
     let middle = (Vector3::z() + right_axis).normalize();
     let towards = (middle + 0.5 * Vector3::new(dice.uniform(), dice.uniform(), dice.uniform())).normalize();
@@ -76,7 +76,7 @@ fn board(rig: &Rig, at: [f64; 2], dice: &mut Dice) -> Vec<Vector3<f64>> {
     (0..54).map(|i| centre + rotation * corner(i)).collect()
 }
 
-/// Corners and readings of `views` boards at each of `poses` (millimetres and radians).
+/// Corners and readings of `views` targets at each of `poses` (millimetres and radians).
 fn csv(rig: &Rig, poses: &[[f64; 2]], views: usize) -> String {
     let mut text = String::from("camera,file,frame,idx,x,y,bx_mm,by_mm,baseline_mm,separation_deg\n");
     let (mut dice, mut frame) = (Dice(7), 0);
@@ -84,9 +84,9 @@ fn csv(rig: &Rig, poses: &[[f64; 2]], views: usize) -> String {
         let left_from_right: Transform<Left, _> = rig.pose_at_values(&at).left_from_right;
         let mut taken = 0;
         while taken < views {
-            let board = board(rig, at, &mut dice);
-            let left = seen(&rig.left_camera, &Isometry3::identity(), &board, &mut dice);
-            let right = seen(&rig.right_camera, left_from_right.inverse().isometry(), &board, &mut dice);
+            let target = target(rig, at, &mut dice);
+            let left = seen(&rig.left_camera, &Isometry3::identity(), &target, &mut dice);
+            let right = seen(&rig.right_camera, left_from_right.inverse().isometry(), &target, &mut dice);
             let (Some(left), Some(right)) = (left, right) else { continue };
             for (name, pixels) in [("left", left), ("right", right)] {
                 for (index, pixel) in pixels.iter().enumerate() {
@@ -122,7 +122,7 @@ fn recorded_corners_give_a_rig_file_for_every_pose() {
     let (corners, out, page) = (file("corners.csv"), file("rig.toml"), file("report.html"));
     let truth = as_built();
     std::fs::write(&corners, csv(&truth, &SIX, 12)).expect("written");
-    let arguments = ["calibrate", "stage", "--json", "--corners", &corners, "--out", &out, "--report", &page];
+    let arguments = ["calibrate", "stage", "--json", "--csv", &corners, "--out", &out, "--report", &page];
     let result = run_json(&[&arguments[..], &["--holdout", "--date", "2026-11-21"]].concat());
     println!("{}", result["verdict"]);
     assert_eq!(result["poses"].as_array().map(Vec::len), Some(6));
@@ -153,7 +153,7 @@ fn three_poses_suffice_and_say_which_would_help() {
     let (corners, out) = (file("corners.csv"), file("rig.toml"));
     let truth = as_built();
     std::fs::write(&corners, csv(&truth, &[[60.0, 0.0], [220.0, 1.1], [100.0, 2.2]], 12)).expect("written");
-    let result = run_json(&["calibrate", "stage", "--json", "--corners", &corners, "--out", &out]);
+    let result = run_json(&["calibrate", "stage", "--json", "--csv", &corners, "--out", &out]);
     let weak = result["observability"]["weak"].as_array().expect("a list");
     let words = result["observability"]["text"].as_str().expect("words");
     println!("{words}");
@@ -184,16 +184,16 @@ fn bad_stage_data_is_told_and_leaves_no_file() {
     ];
     for (text, code, words) in cases {
         std::fs::write(&corners, text).expect("written");
-        fails_with(&["calibrate", "stage", "--corners", &corners, "--out", &out, "--report", &page], code, words);
+        fails_with(&["calibrate", "stage", "--csv", &corners, "--out", &out, "--report", &page], code, words);
         assert!(!Path::new(&out).exists() && !Path::new(&page).exists());
     }
     std::fs::write(&corners, good).expect("written");
-    fails_with(&["calibrate", "stage", "--corners", &corners, "--lenses", "known", "--out", &out], 2, &["--left"]);
-    fails_with(&["calibrate", "stage", "--out", &out], 2, &["--set", "--corners"]);
+    fails_with(&["calibrate", "stage", "--csv", &corners, "--lenses", "known", "--out", &out], 2, &["--left"]);
+    fails_with(&["calibrate", "stage", "--out", &out], 2, &["--set", "--csv"]);
     fails_with(&["calibrate", "stage", "--set", &file("none"), "--out", &out], 2, &["poses.csv"]);
-    let board = ["--board", "9x6", "--square", "20mm"];
+    let target = ["--corners", "9x6", "--square", "20mm"];
     let live = ["--port", "sim", "calibrate", "stage", "--live", "--set", &file("set")];
-    fails_with(&[&live[..], &board, &["--cameras", "/dev/none", "/dev/none"]].concat(), 2, &["--cameras sim"]);
+    fails_with(&[&live[..], &target, &["--cameras", "/dev/none", "/dev/none"]].concat(), 2, &["--cameras sim"]);
     assert!(!Path::new(&out).exists() && !Path::new(&file("set")).exists());
 }
 
@@ -209,7 +209,7 @@ fn a_simulated_rig_calibrates_itself() {
     let (drawing, set, out) = (file("drawing.toml"), file("set"), file("rig.toml"));
     std::fs::write(&drawing, small_rig()).expect("written");
     let common =
-        ["--rig", &drawing, "calibrate", "stage", "--json", "--board", "7x5", "--square", "30mm", "--set", &set];
+        ["--rig", &drawing, "calibrate", "stage", "--json", "--corners", "7x5", "--square", "30mm", "--set", &set];
     let live = ["--port", "sim", "--live", "--cameras", "sim", "--poses", "4", "--views", "4", "--seed", "3"];
     let result = run_json(&[&common[..], &live].concat());
     println!("{}\n{}", result["verdict"]["text"], result["truth"]);
@@ -224,9 +224,13 @@ fn a_simulated_rig_calibrates_itself() {
     let again = run_json(&[&common[..], &["--out", &out]].concat());
     assert_eq!(again["rms_inlier_px"], result["rms_inlier_px"]);
     assert!(Path::new(&out).exists());
-    fails_with(&[&common[..], &live].concat(), 2, &["a set is there already"]);
-    // Images of another camera, or a board of another kind.
-    fails_with(&["calibrate", "stage", "--board", "7x5", "--square", "30mm", "--set", &set], 2, &["480 x 480", "1280"]);
-    let wrong = ["--rig", &drawing, "calibrate", "stage", "--board", "9x6", "--square", "30mm", "--set", &set];
-    fails_with(&wrong, 2, &["no board"]);
+    fails_with(&[&common[..], &live].concat(), 2, &["holds a set already"]);
+    // Images of another camera, or a target of another kind.
+    fails_with(
+        &["calibrate", "stage", "--corners", "7x5", "--square", "30mm", "--set", &set],
+        2,
+        &["480 x 480", "1280"],
+    );
+    let wrong = ["--rig", &drawing, "calibrate", "stage", "--corners", "9x6", "--square", "30mm", "--set", &set];
+    fails_with(&wrong, 2, &["no target"]);
 }

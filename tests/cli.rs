@@ -55,41 +55,6 @@ fn path(folder: &tempfile::TempDir, name: &str) -> String {
     folder.path().join(name).to_string_lossy().into_owned()
 }
 
-/// A small grey picture with some texture.
-fn picture(path: &str, width: u32, height: u32) {
-    image::RgbImage::from_fn(width, height, |x, y| image::Rgb([((x * 7 + y * 13) % 251) as u8; 3]))
-        .save(path)
-        .expect("a picture is written");
-}
-
-/// A pair whose pose is fixed, for 64 x 48 images.
-const SMALL_RIG: &str = r#"
-name = "small"
-[left.camera]
-size = [64, 48]
-fx = 20.0
-fy = 20.0
-cx = 31.5
-cy = 23.5
-opencv_k1 = 0.0
-opencv_k2 = 0.0
-opencv_k3 = 0.0
-opencv_k4 = 0.0
-[right.camera]
-size = [64, 48]
-fx = 20.0
-fy = 20.0
-cx = 31.5
-cy = 23.5
-opencv_k1 = 0.0
-opencv_k2 = 0.0
-opencv_k3 = 0.0
-opencv_k4 = 0.0
-[right.at_zero]
-origin = ["100mm", "0mm", "0mm"]
-rotation_vector = ["0deg", "0deg", "0deg"]
-"#;
-
 #[test]
 fn every_verb_has_help() {
     let overview = text(&run(&["--help"]).stdout);
@@ -103,11 +68,19 @@ fn every_verb_has_help() {
 }
 
 #[test]
-fn the_readme_names_every_verb_and_no_other() {
-    let readme =
-        std::fs::read_to_string(Path::new(env!("CARGO_MANIFEST_DIR")).join("../../README.md")).expect("README");
-    let table: Vec<_> = readme.lines().filter_map(|line| line.strip_prefix("| `")?.split(['`', ' ']).next()).collect();
-    assert_eq!(table, VERBS);
+fn the_page_of_commands_names_every_verb_and_no_other() {
+    let page = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../docs/commands.md");
+    let page = std::fs::read_to_string(page).expect("docs/commands.md");
+    let named = |line: &str| {
+        let rest = line.strip_prefix("### vergence ").or_else(|| line.strip_prefix("| `vergence "))?;
+        Some(rest.split(['`', ' ']).next().unwrap_or_default().to_owned())
+    };
+    let mut named: Vec<String> = page.lines().filter_map(named).collect();
+    named.sort();
+    named.dedup();
+    let mut verbs = VERBS.to_vec();
+    verbs.sort_unstable();
+    assert_eq!(named, verbs);
 }
 
 #[test]
@@ -143,11 +116,11 @@ fn a_plan_is_a_text_that_can_be_compared() {
     let plan = dump();
     assert_eq!(plan, dump());
     for line in [
-        "baseline    60.000 mm -> 145.000 mm, at most 45.454 mm/s",
+        "baseline    60.000 mm -> 145.000 mm, at most 45.455 mm/s",
         "takes 2.310 s within the limits of native-sim",
-        "     0.00000      60.0000       0.0000        0.000       1467.4",
-        "     2.31001     145.0000       0.0000        0.000          0.0",
-        "     0.31000       9.3000      59.9998        0.000          0.0",
+        "     0.00000      60.0000       0.0000        0.000       1467.5",
+        "     2.30998     145.0000       0.0000        0.000          0.0",
+        "     0.31000       9.3000      59.9999        0.000          0.0",
     ] {
         assert!(plan.lines().any(|it| it.ends_with(line)), "'{line}' is not in\n{plan}");
     }
@@ -256,120 +229,66 @@ fn a_rig_file_is_checked_to_the_key() {
 }
 
 #[test]
-fn depth_refuses_bad_images_and_leaves_no_file() {
-    let folder = temporary();
-    let file = |name: &str| path(&folder, name);
-    let (rig, out) = (file("rig.toml"), file("cloud.ply"));
-    std::fs::write(&rig, SMALL_RIG).expect("a rig file is written");
-    picture(&file("good.png"), 64, 48);
-    picture(&file("wide.png"), 65, 48);
-    let whole = std::fs::read(file("good.png")).expect("just written");
-    std::fs::write(file("cut.png"), &whole[..whole.len() / 2]).expect("half a picture is written");
-    picture(&file("good.jpg"), 64, 48);
-    let whole = std::fs::read(file("good.jpg")).expect("just written");
-    std::fs::write(file("cut.jpg"), &whole[..whole.len() - 20]).expect("most of a picture is written");
-    std::fs::write(file("bad.csv"), "u_left,v_left,u_right\n1,2,3\n").expect("written");
-    let good = file("good.png");
-    let depth = |left: &str, right: &str, more: &[&str], words: &[&str]| {
-        let pair = ["depth", "--rig", &rig, "--left", left, "--right", right, "--out", &out];
-        fails_with(&[&pair, more].concat(), 2, words);
-        assert!(!Path::new(&out).exists(), "an output file was left behind");
-    };
-    depth(&file("missing.png"), &good, &[], &["missing.png"]);
-    depth(&good, &file("cut.png"), &[], &["cut.png", "not a readable image"]);
-    // Decoders fill what a JPEG lacks with grey.
-    depth(&good, &file("cut.jpg"), &[], &["cut.jpg", "ends before"]);
-    depth(&good, &file("wide.png"), &[], &["wide", "65 x 48", "64 x 48"]);
-    depth(&good, &good, &["--points", &file("bad.csv")], &["bad.csv", "v_right"]);
-    depth(&good, &good, &["--separation", "10deg"], &["separation"]);
-    depth(&good, folder.path().to_str().expect("a name"), &[], &["must pair up"]);
-    assert_eq!(std::fs::read_dir(folder.path()).expect("a folder").count(), 7, "only the inputs are there");
-}
-
-#[test]
-fn depth_of_given_correspondences() {
-    let folder = temporary();
-    let file = |name: &str| path(&folder, name);
-    std::fs::write(file("rig.toml"), SMALL_RIG).expect("a rig file is written");
-    picture(&file("grey.png"), 64, 48);
-    // Equidistant, 20 px/rad, 100 mm apart: 45° on the left and straight ahead on the right meet at (100, 0, 100).
-    let column = 31.5 + 20.0 * std::f64::consts::FRAC_PI_4;
-    std::fs::write(
-        file("pairs.csv"),
-        format!("u_left,v_left,u_right,v_right\n{column},23.5,31.5,23.5\n31.5,23.5,60,23.5\n"),
-    )
-    .expect("written");
-    let (rig, grey, pairs, out) = (file("rig.toml"), file("grey.png"), file("pairs.csv"), file("cloud.ply"));
-    let options = ["--rig", &rig, "--left", &grey, "--right", &grey, "--points", &pairs, "--out", &out];
-    // Exact rays meet in one point by every method.
-    let methods =
-        ["pseudo-intersection", "midpoint", "mid2", "angular-l1", "angular-linf", "reprojection", "rectified"];
-    for method in methods.into_iter().chain(["edge-plane:0,1,0"]) {
-        let result = run_json(&[&["depth", "--json", "--kernel", method], &options[..]].concat());
-        assert_eq!(result["points"], 1, "{method}: {result}");
-        assert_eq!(result["dropped"]["diverging"], 1, "{method}: {result}");
-        assert!(result["pose_drift"].is_null(), "two pairs say nothing of the pose");
-        let cloud = std::fs::read_to_string(&out).expect("a cloud");
-        let (header, body) = cloud.split_once("end_header\n").expect("a PLY header");
-        assert!(header.contains("element vertex 1") && header.contains("property double u_left"));
-        let numbers: Vec<f64> = body.split_whitespace().map(|word| word.parse().expect("a number")).collect();
-        for (got, expected) in numbers.iter().zip([100.0, 0.0, 100.0]) {
-            assert!((got - expected).abs() < 0.01, "{method}: {numbers:?}");
-        }
-    }
-    fails_with(&[&["depth", "--kernel", "guess"], &options[..]].concat(), 2, &["guess", "midpoint"]);
-    run_json(&[&["depth", "--json", "--also", "csv,json"], &options[..]].concat());
-    let csv = std::fs::read_to_string(file("cloud.csv")).expect("a table");
-    let row: Vec<f64> =
-        csv.lines().nth(1).expect("a row").split(',').map(|number| number.parse().expect("a number")).collect();
-    let json: serde_json::Value =
-        serde_json::from_str(&std::fs::read_to_string(file("cloud.json")).expect("a table")).expect("JSON");
-    assert!(csv.starts_with("x_mm,y_mm,z_mm,red,green,blue,u_left") && csv.lines().count() == 2, "{csv}");
-    assert_eq!(
-        (json["columns"][10].as_str(), json["rows"][0].as_array().map(Vec::len)),
-        (Some("sigma_range_mm"), Some(18))
-    );
-    assert!((row[0] - 100.0).abs() < 0.01 && (row[2] - 100.0).abs() < 0.01, "{row:?}");
-    // The variance of the range, along (1, 0, 1): half of xx and zz, and xz.
-    let along = (0.5 * (row[12] + row[17]) + row[14]).sqrt();
-    assert!((along / row[10] - 1.0).abs() < 1e-3, "{along} {}", row[10]);
-}
-
-#[test]
-fn dense_depth_refuses_bad_input_and_says_where_nothing_is_seen() {
-    let folder = temporary();
-    let file = |name: &str| path(&folder, name);
-    let (rig, together, out) = (file("rig.toml"), file("together.toml"), file("cloud.ply"));
-    std::fs::write(&rig, SMALL_RIG).expect("a rig file is written");
-    std::fs::write(&together, SMALL_RIG.replace("\"100mm\"", "\"0mm\"")).expect("a rig file is written");
-    picture(&file("good.png"), 64, 48);
-    picture(&file("wide.png"), 65, 48);
-    image::RgbImage::new(64, 48).save(file("black.png")).expect("a picture is written");
-    let (good, wide, black) = (file("good.png"), file("wide.png"), file("black.png"));
-    let depth = |rig: &str, left: &str, right: &str, more: &[&str], code: i32, words: &[&str]| {
-        let pair = ["depth", "--dense", "--rig", rig, "--left", left, "--right", right, "--out", &out];
-        fails_with(&[&pair, more].concat(), code, words);
-    };
-    depth(&rig, &good, &wide, &[], 2, &["wide", "65 x 48", "64 x 48"]);
-    depth(&together, &good, &good, &[], 2, &["no baseline"]);
-    depth(&rig, &good, &good, &["--points", "pairs.csv"], 2, &["--dense", "--points"]);
-    depth(&rig, &good, &good, &["--matcher", "guided"], 2, &["--dense", "--matcher"]);
-    assert!(!Path::new(&out).exists(), "an output file was left behind");
-    depth(&rig, &black, &black, &[], 1, &["no pixel of black has a range", "dark"]);
-    let ranges = image::open(file("cloud-range.png")).expect("the range image is written").into_luma16();
-    assert!(ranges.dimensions() == (64, 48) && ranges.pixels().all(|range| range.0 == [0]));
-    for name in ["cloud.ply", "cloud-sigma.png", "cloud-confidence.png", "cloud-preview.png"] {
-        assert!(Path::new(&file(name)).exists(), "{name} is written");
-    }
-}
-
-#[test]
 fn a_bench_without_its_data_or_peers_says_so() {
     let folder = temporary();
     let bench = ["bench", "calibrate", "--shared", folder.path().to_str().expect("a name")];
     fails_with(&bench, 2, &["no calibration data", "VERGENCE_SHARED"]);
-    let Some(shared) = common::shared("data") else { return };
+    let Some(shared) = common::real_data("data") else { return };
     let shared = shared.parent().expect("above it").to_string_lossy().into_owned();
     let bench = ["bench", "calibrate", "--shared", &shared, "--python", "/nowhere/python"];
     fails_with(&bench, 2, &["/nowhere/python", "--no-peer"]);
+}
+
+#[test]
+fn a_target_is_svg_or_pdf_by_its_ending() {
+    let folder = temporary();
+    let target = |file: &str| {
+        ["target", "--corners", "9x6", "--square", "25mm", "--out"]
+            .map(str::to_owned)
+            .into_iter()
+            .chain([path(&folder, file)])
+            .collect::<Vec<_>>()
+    };
+    for (file, start) in [("t.svg", "<svg"), ("t.pdf", "%PDF-1.4"), ("t.PDF", "%PDF-1.4")] {
+        let arguments = target(file);
+        let output = run(&arguments.iter().map(String::as_str).collect::<Vec<_>>());
+        assert!(output.status.success(), "{}", text(&output.stderr));
+        assert!(std::fs::read(folder.path().join(file)).expect("written").starts_with(start.as_bytes()), "{file}");
+    }
+    for file in ["t.png", "t"] {
+        let arguments = target(file);
+        fails_with(&arguments.iter().map(String::as_str).collect::<Vec<_>>(), 2, &[file, ".svg or .pdf"]);
+        assert!(!folder.path().join(file).exists());
+    }
+}
+
+#[test]
+fn a_verb_shows_only_the_options_that_act_on_it() {
+    let help = |arguments: &[&str]| text(&run(arguments).stdout);
+    let models = help(&["models", "list", "--help"]);
+    for option in ["--lease", "--port", "--baud", "--rig"] {
+        assert!(!models.contains(option), "{models}");
+        assert!(help(&["config", "get", "--help"]).contains(option), "{option}");
+    }
+    assert!(!help(&["depth", "--help"]).contains("--port") && help(&["depth", "--help"]).contains("--rig"));
+    assert!(help(&["flash", "--help"]).contains("--port") && !help(&["flash", "--help"]).contains("--lease"));
+    fails_with(&["models", "list", "--lease", "1s"], 2, &["--lease"]);
+    let overview = help(&["--help"]);
+    let at = |word: &str| overview.find(word).unwrap_or_else(|| panic!("{word} is missing: {overview}"));
+    assert!(at("Calibrate:") < at("  capture ") && at("  capture ") < at("Move:") && at("Move:") < at("  home "));
+    assert_eq!(overview, help(&["help"]));
+    assert_eq!(help(&["help", "config", "get"]), help(&["config", "get", "--help"]));
+}
+
+#[test]
+fn a_failure_is_json_where_results_are() {
+    for arguments in [&["--json", "--rig", "/nowhere/rig.toml", "mode", "human"][..], &["depth", "--json"]] {
+        let output = run(arguments);
+        assert_eq!(output.status.code(), Some(2));
+        let said: serde_json::Value = serde_json::from_slice(&output.stderr).expect("JSON");
+        assert_eq!(said["error"]["kind"], "usage", "{said}");
+        assert_eq!(said["error"]["exit_code"], 2, "{said}");
+        assert!(said["error"]["message"].as_str().is_some_and(|message| message.len() > 20), "{said}");
+        assert!(output.stdout.is_empty());
+    }
 }

@@ -41,9 +41,26 @@ fn both_modes_see_what_is_there_and_the_same_seed_gives_the_same_bytes() {
         assert!(number(&mode["depth_rel_err_within_1500mm"]["median"]) < 0.01);
         assert!(number(&mode["depth_rel_err"]["median"]) < 0.01);
         assert!(number(&mode["outlier_fraction"]) < 0.02);
+        // A keypoint without a match is not a match without a point: each count adds up by itself.
+        let sum = |what: &str| -> f64 {
+            mode["dropped"][what].as_object().expect("counts by reason").values().map(number).sum()
+        };
+        let [points, matches, keypoints] = ["points", "matches", "keypoints"].map(|what| number(&mode[what]));
+        let (dropped_keypoints, dropped_matches) = (sum("keypoints"), sum("matches"));
+        assert!((points + dropped_matches - matches).abs() < 0.5, "{points} + {dropped_matches} of {matches}");
+        assert!(
+            (matches + dropped_keypoints - keypoints).abs() < 0.5,
+            "{matches} + {dropped_keypoints} of {keypoints}"
+        );
     }
     demo("1", folders[1].path());
-    for file in ["herbivore.ply", "human.ply", "herbivore-matches.png", "human-depth.png"] {
+    let drawing = std::fs::read_to_string(folders[0].path().join("herbivore-matches.svg")).expect("a drawing");
+    let (points, matches) = (&modes[0]["points"], &modes[0]["matches"]);
+    assert!(drawing.contains(&format!("range of {points} points of {matches} matches")), "counts as in the table");
+    assert_eq!(drawing.matches("<circle").count() as u64, 2 * points.as_u64().expect("a count"));
+    let files = ["herbivore.ply", "human.ply", "herbivore-left.png", "human-right.png"];
+    let drawings = ["herbivore-matches.svg", "human-depth.svg", "human-error.svg"];
+    for file in files.into_iter().chain(drawings) {
         let [first, second] = folders.each_ref().map(|folder| std::fs::read(folder.path().join(file)).expect(file));
         assert!(first == second, "{file} differs between two runs with the same seed");
     }

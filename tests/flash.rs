@@ -191,6 +191,28 @@ fn a_host_that_dies_in_mid_upload_is_followed_by_one_that_goes_on() {
     assert_eq!(runs(&said), ["1.0.0", "confirmed"]);
 }
 
+#[test]
+fn an_interrupted_update_says_what_is_left_and_how_to_go_on() {
+    let story = Story::new();
+    let board = story.board(&["--tcp", "127.0.0.1:0"]);
+    let (image, _) = story.image("1.0.0", 60_000, 8);
+    let (port, held) = line(&board.port, vec![20_000]);
+    let mut command = vergence(&["--port", &port, "flash", "--serial", &image]);
+    let host = command.stderr(Stdio::piped()).spawn().expect("the binary runs");
+    let wire = held.recv().expect("the line is held up");
+    #[allow(clippy::disallowed_methods, reason = "how long a process takes to end")]
+    let asked = std::time::Instant::now();
+    let sent = Command::new("kill").args(["-INT", &host.id().to_string()]).status().expect("kill runs");
+    assert!(sent.success());
+    let output = host.wait_with_output().expect("it ends");
+    assert!(asked.elapsed().as_secs_f64() < 1.0, "it took {:?}", asked.elapsed());
+    fails(&output, 3, &["of 60000 bytes", "old image", "same command again", "flash --restart"]);
+    drop((wire.shutdown(Shutdown::Both), wire));
+    let said = board.json(&["flash", "--serial", &image]);
+    let from = said["sent_from"].as_u64().expect("a place");
+    assert!((15_000..20_000).contains(&from), "it went on at {from}");
+}
+
 /// A stand-in for probe-rs that writes down what it is told and keeps what it should download.
 fn probe_rs(workshop: &Workshop, version: &str, download: &str) -> String {
     let folder = workshop.path("bin");

@@ -18,12 +18,9 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::{Arc, OnceLock};
 
 use common::images::Workshop;
-use serde_json::Value;
 use tokio::io::{AsyncReadExt, AsyncWriteExt, DuplexStream};
-use vergence::failure::Failure;
-use vergence::flashing::{Console, OwnedImage, update};
-use vergence::link::{ManagementLink, OpenWire};
-use vergence::sim::{Shared, SimulatedChip, spawn_in_process};
+use vergence::sim::{SimulatedChip, simulated_chip};
+use vergence_board::{FirmwareImage, ManagementLink, OpenWire, Shared, UpdateError, Updated, spawn_in_process, update};
 use vergence_mcu::ResetCause;
 use vergence_protocol::management::{BootState, Identity, Management, Outcome, RebootTo};
 use vergence_rig::{BENCH_TOML, Rig};
@@ -49,20 +46,20 @@ impl Story {
         let rig = Rig::from_toml(BENCH_TOML).expect("the bench is a rig");
         static BOOT_LOADER: OnceLock<PathBuf> = OnceLock::new();
         let boot_loader = BOOT_LOADER.get_or_init(|| build::build("vergence-bootloader")).clone();
-        let board = Shared::new(SimulatedChip::new(&[boot_loader, installed.into()], &rig, 1).expect("a board"));
+        let board = Shared::new(simulated_chip(&[boot_loader, installed.into()], &rig, 1).expect("a board"));
         let wire = board.clone();
         let link = ManagementLink::in_process(move || OpenWire::in_process(spawn_in_process(wire.clone()))).await;
         Self { workshop, board, link: link.expect("a link") }
     }
 
-    async fn flash(&mut self, variant: Variant, version: [u8; 3]) -> Result<Value, Failure> {
+    async fn flash(&mut self, variant: Variant, version: [u8; 3]) -> Result<Updated, UpdateError> {
         let image = sign(&self.workshop, variant, version);
         self.flash_file(&image).await
     }
 
-    async fn flash_file(&mut self, image: &str) -> Result<Value, Failure> {
-        let image = OwnedImage::read(image.as_ref()).expect("an image");
-        update(&image, true, &mut self.link, Console::new(true)).await
+    async fn flash_file(&mut self, image: &str) -> Result<Updated, UpdateError> {
+        let image = FirmwareImage::read(image.as_ref()).expect("an image");
+        update(&image, true, &mut self.link, |_| {}).await
     }
 
     async fn runs(&mut self) -> ([u8; 3], BootState) {
@@ -94,10 +91,10 @@ fn sign(workshop: &Workshop, variant: Variant, version: [u8; 3]) -> String {
 async fn from_old_to_new_and_back() {
     let mut story = Story::of(Variant::Good).await;
     let there = story.flash(Variant::Good, [1, 2, 0]).await.expect("an update");
-    assert_eq!((&there["before"]["version"], &there["after"]["version"]), (&"1.0.0".into(), &"1.2.0".into()));
-    assert_eq!((&there["after"]["boot"], &there["sent_from"]), (&"confirmed".into(), &0.into()));
+    assert_eq!((there.before.version, there.after.version), ([1, 0, 0], [1, 2, 0]));
+    assert_eq!((there.after.boot, there.sent_from), (BootState::Confirmed, 0));
     let back = story.flash(Variant::Good, [1, 1, 0]).await.expect("an older one is not too old");
-    assert_eq!((&back["before"]["version"], &back["after"]["version"]), (&"1.2.0".into(), &"1.1.0".into()));
+    assert_eq!((back.before.version, back.after.version), ([1, 2, 0], [1, 1, 0]));
     // One reset for each swap.
     assert_eq!(story.board.lock().machine().resets(), 2);
 }
@@ -111,7 +108,7 @@ async fn what_must_not_run_is_refused_by_the_board_itself() {
     let refused = story.flash_file(&unknown).await.expect_err("a stranger signed it").to_string();
     assert!(refused.contains("not signed with a key the board trusts"), "{refused}");
 
-    let header = *OwnedImage::read(unknown.as_ref()).expect("an image").header();
+    let header = *FirmwareImage::read(unknown.as_ref()).expect("an image").header();
     for (header, outcome) in [
         (vergence_protocol::management::ImageHeader { hardware: 7, ..header }, Outcome::WrongHardware),
         (vergence_protocol::management::ImageHeader { version: [0, 0, 9], ..header }, Outcome::TooOld),
@@ -163,7 +160,7 @@ async fn an_update_goes_on_after_the_link_was_cut() {
     .await
     .expect("a link");
     let said = story.flash(Variant::Good, [1, 1, 0]).await.expect("an update");
-    assert_eq!((&said["link_losses"], &said["after"]["version"]), (&2.into(), &"1.1.0".into()));
+    assert_eq!((said.link_losses, said.after.version), (2, [1, 1, 0]));
     assert_eq!(opened.load(Ordering::Relaxed), 3);
 }
 

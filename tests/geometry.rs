@@ -59,6 +59,10 @@ fn zones_draw_their_curves() {
     // Three exact and three published curves in each of both diagrams.
     assert!(curves.matches("<polyline").count() >= 12);
     assert_eq!(curves.matches("stroke-dasharray").count(), 6);
+    // Those of a mode are those of two equal cameras at its baseline and separation.
+    run_json(&["zones", "--mode", "herbivore", "--plot", &svg, "--json"]);
+    assert!(drawing(&svg).contains("baseline 145 mm"), "{}", drawing(&svg));
+    fails_with(&["zones", "--mode", "herbivore", "--svg", "zones.pdf"], 2, &["'.pdf' is not written", ".svg"]);
 }
 
 #[test]
@@ -71,7 +75,10 @@ fn a_depth_goal_finds_its_pose_before_anything_moves() {
     assert!(best["worst_sigma_mm"].as_f64().expect("mm") <= 1.0, "{best}");
     assert!(best["stereo_deg"].as_f64().expect("degrees") >= 80.0, "{best}");
     assert!(best["seen_deg"].as_f64().expect("degrees") > 285.0, "{best}");
-    assert!(drawing(&svg).contains("rgb("));
+    let field = drawing(&svg);
+    assert!(field.contains("rgb(") && field.contains("Predicted depth error at baseline"), "a title");
+    assert!(field.contains(">350 mm<") || field.contains(">525 mm<"), "range rings");
+    assert!(field.contains(">90°<") && field.contains(">-90°<"), "angles");
     let impossible = run(&["plan", "--goal", "sigma_z <= 1um at 3m over +-40deg"]);
     assert_eq!(impossible.status.code(), Some(1), "{}", text(&impossible.stdout));
     fails_with(&["plan", "--goal", "as good as possible"], 2, &["is no goal"]);

@@ -8,7 +8,7 @@
 
 mod elf_rig;
 
-use elf_rig::{BOTH, Board, Conversation, ElfBoard, LEASE_MS, Standing, decode, programs};
+use elf_rig::{BOTH, Board, Conversation, ElfBoard, LEASE_MS, Standing, Wired, decode, programs};
 use vergence_control::{REST_US, RigIo};
 use vergence_cpu::{Access, Bus};
 use vergence_image::layout::HARDWARE;
@@ -23,9 +23,6 @@ use vergence_protocol::{
 /// Baseline in micrometres, separation in microradians.
 const HERBIVORE: [i32; 2] = [145_000, 2_094_395];
 const HUMAN: [i32; 2] = [145_000, 0];
-
-/// With the wiring table.
-const DOCUMENTATION: &str = include_str!("../docs/firmware.md");
 
 type Talk = Conversation<ElfBoard>;
 
@@ -213,38 +210,6 @@ fn a_panic_and_a_fault_cut_the_drivers_and_tell_where_they_came_from() {
         let entry = log.iter().find(|entry| entry.starts_with("error: died of a ")).expect("it tells");
         assert!(entry.contains(said) && entry.contains(&format!("{from:#x}")), "{entry}");
     }
-}
-
-#[test]
-fn pins_are_set_as_the_wiring_table_says() {
-    let mut talk = Talk::open(&Standing::default());
-    let rows: Vec<_> = DOCUMENTATION.lines().filter(|line| line.contains("(AF")).collect();
-    let mut seen = 0;
-    for row in rows {
-        let cells: Vec<_> = row.split('|').map(str::trim).collect();
-        let functions = cells[3].split("(AF").skip(1).map(|rest| rest.split(')').next().expect("a number"));
-        let functions: Vec<u32> = functions.map(|number| number.parse().expect("a number")).collect();
-        for (index, name) in cells[2].split(", ").enumerate() {
-            if cells[1].contains("reserved") {
-                continue;
-            }
-            let function = functions.get(index).or(functions.first()).expect("a function for each pin");
-            assert_eq!(alternate_function(&mut talk, name), Some(*function), "{row}");
-            seen += 1;
-        }
-    }
-    assert_eq!(seen, 9, "link, steps, encoders, trigger");
-}
-
-/// The alternate function that the firmware has given to a pin such as "PA2" (RM0440, 9.4.1, 9.4.10).
-fn alternate_function(talk: &mut Talk, name: &str) -> Option<u32> {
-    let port = 0x4800_0000 + 0x400 * u32::from(name.as_bytes()[1] - b'A');
-    let number: u32 = name[2..].parse().expect("a number");
-    let machine = &mut talk.board.machine;
-    let now = machine.cpu().now();
-    let mut read = |offset| machine.chip_mut().read(now, port + offset, Access::Word).expect("it is there");
-    let is_alternate = read(0) >> (2 * number) & 3 == 2;
-    is_alternate.then(|| read(0x20 + 4 * (number / 8)) >> (4 * (number % 8)) & 0xF)
 }
 
 /// The control register of TIM7, which makes the control tick, and the interrupt enables of TIM15, which wakes tasks.

@@ -47,7 +47,7 @@ fn an_image_tells_what_it_is_and_whose() {
 
     // One bit of the image, of the header, of the signature; and the end missing.
     let whole = std::fs::read(&image).expect("an image");
-    for (at, word) in [(140, "digest"), (8, "no signed image"), (60, "no signed image")] {
+    for (at, word) in [(140, "SHA-256"), (8, "no signed image"), (60, "no signed image")] {
         let mut damaged = whole.clone();
         damaged[at] ^= 1;
         fails_with(&["image", "info", &workshop.file("bad.vimg", &damaged)], 2, &["bad.vimg", word]);

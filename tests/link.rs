@@ -6,11 +6,11 @@
     reason = "a test fails loudly and shows its figures"
 )]
 
+use std::future::pending;
 use std::time::Duration;
 
-use vergence::board::Board;
-use vergence::move_plan::MovePlan;
 use vergence::sim::{self, SharedRig, SimulatedRig};
+use vergence_board::{Board, BoardError, MovePlan, MoveStart};
 use vergence_protocol::{SessionId, SettingItem, SettingKey};
 use vergence_rig::{BENCH_TOML, Rig};
 
@@ -67,9 +67,10 @@ async fn the_board_s_own_stream_period_is_kept_to() {
 async fn a_plan_takes_as_long_as_the_move() {
     let mut board = board().await;
     let modes = board.rig().modes.clone();
-    let plan = MovePlan::new(&bench(), &board.limits().await.expect("limits"), &modes[0].targets, &modes[1].targets);
+    let start = MoveStart { positions: &modes[0].targets, from_below: true };
+    let plan = MovePlan::new(&bench(), &board.limits().await.expect("limits"), start, &modes[1].targets);
     board
-        .armed(async |board| {
+        .armed(pending(), async |board| -> Result<_, BoardError> {
             board.home().await?;
             board.move_to(modes[0].number, &modes[0].targets).await?;
             let start = tokio::time::Instant::now();
@@ -89,7 +90,7 @@ async fn settings_are_refused_while_armed() {
     let mut board = board().await;
     let key = SettingKey { item: SettingItem::Speed, axis: 0 };
     let refusal = board
-        .armed(async |board| {
+        .armed(pending(), async |board| -> Result<_, BoardError> {
             assert_eq!(board.setting(key).await?, Some(80_000));
             board.set(key, 40_000).await
         })
@@ -110,7 +111,7 @@ async fn settings_are_refused_while_armed() {
 async fn a_move_of_the_session_before_is_not_taken_for_this_one() {
     let (simulated, modes) = (simulated(), bench().modes);
     let mut before = board_of(&simulated, 10).await;
-    let homed = before.armed(async |board| {
+    let homed = before.armed(pending(), async |board| -> Result<_, BoardError> {
         board.home().await?;
         board.move_to(modes[0].number, &modes[0].targets).await
     });
@@ -119,7 +120,7 @@ async fn a_move_of_the_session_before_is_not_taken_for_this_one() {
 
     let mut board = board_of(&simulated, 11).await;
     board
-        .armed(async |board| {
+        .armed(pending(), async |board| -> Result<_, BoardError> {
             // Long enough for a pose to come that nobody has looked at when the move is ordered.
             tokio::time::sleep(Duration::from_millis(25)).await;
             board.move_to(modes[1].number, &modes[1].targets).await

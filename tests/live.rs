@@ -8,6 +8,7 @@
 
 mod common;
 
+use std::future::pending;
 use std::io::{BufRead, BufReader, Read};
 use std::path::Path;
 use std::process::{Command, Stdio};
@@ -17,16 +18,15 @@ use std::time::Duration;
 use common::{fails_with, run, text, vergence};
 use serde_json::Value;
 use tokio::sync::mpsc;
-use vergence::board::Board;
-use vergence::camera::{FrameTiming, Stage};
-use vergence::live::{
-    Exposed, Exposures, Limits, LiveFrame, LiveLoop, Measured, News, Seen, SimulatedEye, TimeBase, Told, Totals,
-};
-use vergence::look::ColouredPoint;
+use vergence::failure::Failure;
+use vergence::live::{Limits, LiveLoop, LiveResult, MatchingTime, Measurement, Totals, drive};
 use vergence::sim::{SharedRig, SimulatedRig, board_of};
+use vergence_board::Board;
 use vergence_matching::GuidedMatcher;
-use vergence_protocol::{AxisList, FrameMark, Microseconds, Mode, Request, SessionId, Trigger};
-use vergence_rig::{AxisPosition, BENCH_TOML, ClockMap, Exchange, HostInstant, Rig, Shutter};
+use vergence_pipeline::{ColouredPoint, Exposures, Observation};
+use vergence_protocol::{Mode, Request, SessionId, Trigger};
+use vergence_rig::{AxisPosition, BENCH_TOML, Rig, Shutter};
+use vergence_sim::{LiveCamera, Room, RoomCamera};
 use vergence_vision::{Angle, Left, Length, Side};
 
 /// The bench with small cameras whose rows are exposed one after the other, 20 ms from the first to the last.
@@ -49,7 +49,7 @@ fn pose(baseline_mm: f64, separation_deg: f64) -> [AxisPosition; 2] {
 /// A homed rig with cameras whose rows are exposed as `rig` says, measured as `believed` says.
 struct Bench {
     simulated: SharedRig,
-    stage: Arc<Stage>,
+    room: Arc<Room>,
     board: Board,
     live: LiveLoop,
     rig: Rig,
@@ -64,38 +64,38 @@ impl Bench {
         let hidden = indicatif::ProgressBar::hidden();
         let mut board = board_of(&simulated, rig.clone(), SessionId(7), 1000, hidden).await.expect("a board");
         board.compare_clocks().await.expect("the link holds");
-        board.armed(async |board| board.home().await).await.expect("homed");
-        let (listener, news) = mpsc::channel(16);
+        board.armed(pending(), async |board| board.home().await).await.expect("homed");
+        let (listener, events) = mpsc::channel(16);
         let clock = board.client().clock();
-        let stage = Arc::new(Stage::room());
+        let room = Arc::new(Room::with_rig());
         for (side, lens, shutter) in
             [(Side::Left, rig.left_camera, rig.shutters[0]), (Side::Right, rig.right_camera, rig.shutters[1])]
         {
-            let (stage, rig) = (Arc::clone(&stage), simulated.clone());
-            let eye = SimulatedEye { side, lens, shutter, stage, rig, clock, seed: 3, unplugged: Vec::new() };
-            tokio::spawn(eye.ride(listener.clone()));
+            let camera = RoomCamera { side, lens, room: Arc::clone(&room), seed: 3 };
+            let camera = LiveCamera::new(camera, shutter, &[]);
+            tokio::spawn(drive(camera, simulated.clone(), clock, listener.clone()));
         }
         let live = LiveLoop {
             rig: Arc::new(Rig { shutters: believed, ..rig.clone() }),
             matcher: Arc::new(GuidedMatcher::default()),
-            news,
+            events,
             marks: Some(board.client_mut().take_marks()),
             board: Some(board.client().knowledge()),
             clock,
             exposures: Exposures::new(Some(f64::from(PERIOD_US))),
-            simulated: Some(Some(Duration::from_millis(50))),
+            matching_time: MatchingTime::Fixed(Duration::from_millis(50)),
         };
-        Self { simulated, stage, board, live, rig }
+        Self { simulated, room, board, live, rig }
     }
 
     /// Goes to `from`, and then measures `results` times on the way to `to`, when the stages have reached their speed. The
     /// normalised errors of all ranges.
     async fn errors_on_the_way(mut self, [from, to]: [[AxisPosition; 2]; 2], results: u64) -> Vec<f64> {
         const TO_SPEED: Duration = Duration::from_millis(600);
-        let Self { simulated, stage, board, live, rig } = &mut self;
+        let Self { simulated, room, board, live, rig } = &mut self;
         let (mut errors, mut totals) = (Vec::new(), Totals::default());
         board
-            .armed(async |board| {
+            .armed(pending(), async |board| -> Result<_, Failure> {
                 board.move_to(Mode(0), &from).await?;
                 let trigger = Request::SetTrigger(Trigger::Every { period_us: PERIOD_US });
                 let mut triggered = Box::pin(board.move_to(Mode(0), &to));
@@ -103,12 +103,12 @@ impl Bench {
                 let gone = tokio::time::timeout(TO_SPEED, &mut triggered).await;
                 drop(triggered);
                 board.ask(trigger).await?;
-                let tell = |told: Told<'_>| {
-                    errors.extend(normalised(told.measured, simulated, stage, rig));
+                let publish = |result: LiveResult<'_>| {
+                    errors.extend(normalised(result.measurement, simulated, room, rig));
                     Ok(())
                 };
                 let limits = Limits { results: Some(results), time: Some(Duration::from_secs(20)) };
-                live.run(limits, &mut totals, tell, |warning| println!("{warning}")).await?;
+                live.run(limits, &mut totals, publish, |warning| println!("{warning}")).await?;
                 if gone.is_err() {
                     board.stop().await?;
                 }
@@ -122,24 +122,24 @@ impl Bench {
 }
 
 /// How far each range is off the truth, in its stated sigma.
-fn normalised(measured: &Measured, simulated: &SharedRig, stage: &Stage, rig: &Rig) -> Vec<f64> {
-    let Seen::Points { look, moving, .. } = &measured.seen else { panic!("two cameras are there") };
+fn normalised(measurement: &Measurement, simulated: &SharedRig, room: &Room, rig: &Rig) -> Vec<f64> {
+    let Observation::Points { cloud, moving, .. } = &measurement.observation else { panic!("two cameras are there") };
     let history = simulated.lock().history().clone();
     // The camera reacts at once, which nobody told: the middle is stated half a millisecond late, as its bound allows.
-    let middle = measured.middle.us - measured.middle.error_us;
-    let left_at = |us: f64| stage.world_from_left(history.pose_at(rig, us).expect("remembered").base_from_left);
+    let middle = measurement.middle.us - measurement.middle.error_us;
+    let left_at = |us: f64| room.world_from_left(history.pose_at(rig, us).expect("remembered").base_from_left);
     let reference = left_at(middle);
     let error = |ColouredPoint { point, .. }: &ColouredPoint| {
         let pixel = point.pixels.left;
         let row = middle + (pixel.v - 159.5) * rig.shutters[0].line_us();
         let there = left_at(row);
         let ray = there * rig.left_camera.unproject::<Left>(pixel).ok()?;
-        let hit = stage.scene.cast(&there.origin(), &ray)?;
+        let hit = room.scene.cast(&there.origin(), &ray)?;
         let truth = ray.at(hit.range.mm()).mm() + there.origin().mm();
         let range = (truth - reference.origin().mm()).norm();
         Some((point.point.mm().norm() - range) / point.sigma_range.mm())
     };
-    let errors: Vec<f64> = look.points.iter().filter_map(error).collect();
+    let errors: Vec<f64> = cloud.points.iter().filter_map(error).collect();
     println!("{} points, moving: {moving}, median |z| {:.2}", errors.len(), median(&errors));
     errors
 }
@@ -165,82 +165,6 @@ async fn static_and_moving_clouds_agree_within_what_they_state() {
     // The check notices a shutter that the rig file does not tell.
     let wrong = Bench::new([Shutter::Global; 2]).await.errors_on_the_way([far, near], 1).await;
     assert!(wrong.is_empty() || median(&wrong) > 2.0 * median(&moving), "{}", median(&wrong));
-}
-
-/// What a camera tells of the frame that belongs to pulse `number`, and a pulse.
-fn frame_of(number: u32, seq: u32) -> News {
-    let middle = HostInstant { us: 1e6 + f64::from(number) * 1e5 + 2_500.0, error_us: 1_000.0 };
-    News::Frame(LiveFrame { seq, middle, picture: Box::new(|| Ok(image::RgbImage::new(1, 1))) })
-}
-
-fn mark(seq: u32) -> FrameMark {
-    FrameMark { seq, at: Microseconds(1_000_000 + 100_000 * u64::from(seq)), counts: AxisList::new() }
-}
-
-/// A camera that comes back holds nothing up, and what it missed is not waited for.
-#[test]
-fn exposures_go_on_when_a_camera_dies_and_comes_back() {
-    let mut clock = ClockMap::default();
-    let [t0, t1] = [0, 1].map(|_| Microseconds(500_000));
-    clock.observe(Exchange { t0, t1, t2: t1, t3: t0 });
-    let base = TimeBase::Board(clock);
-    let ms = Duration::from_millis;
-    let timing = FrameTiming { period: ms(33), exposure: Some(ms(4)), rolling: ms(0), readout: ms(8) };
-    let mut exposures = Exposures::new(Some(1e5));
-    exposures.hear(Side::Left, News::There(timing), &base);
-    exposures.hear(Side::Right, News::There(timing), &base);
-    exposures.pulse(&mark(0), &base);
-    exposures.hear(Side::Left, frame_of(0, 0), &base);
-    assert!(exposures.take().is_none(), "half a pair");
-    exposures.hear(Side::Right, frame_of(0, 7), &base);
-    let Some(Exposed::Pair(shots)) = exposures.take() else { panic!("a pair") };
-    // Half the exposure after the edge, and the camera's reaction of up to a millisecond.
-    assert_eq!((shots[0].middle.us, shots[0].middle.error_us), (1_002_500.0, 500.0));
-
-    exposures.pulse(&mark(1), &base);
-    exposures.hear(Side::Right, frame_of(1, 8), &base);
-    exposures.hear(Side::Left, News::Dead("the cable".into()), &base);
-    let Some(Exposed::One { side: Side::Right, why, .. }) = exposures.take() else { panic!("the right camera lives") };
-    assert_eq!(why, "the cable");
-    exposures.pulse(&mark(2), &base);
-    exposures.hear(Side::Left, News::There(timing), &base);
-    exposures.hear(Side::Right, frame_of(2, 9), &base);
-    assert!(exposures.take().is_none(), "its left frame was never taken, and both are there");
-    exposures.pulse(&mark(3), &base);
-    exposures.hear(Side::Left, frame_of(3, 0), &base);
-    exposures.hear(Side::Right, frame_of(3, 10), &base);
-    assert!(matches!(exposures.take(), Some(Exposed::Pair(_))));
-    // A frame that is lost is counted when the next one comes.
-    exposures.pulse(&mark(4), &base);
-    exposures.hear(Side::Left, frame_of(4, 1), &base);
-    exposures.pulse(&mark(5), &base);
-    exposures.hear(Side::Right, frame_of(5, 12), &base);
-    exposures.hear(Side::Left, frame_of(5, 2), &base);
-    assert!(matches!(exposures.take(), Some(Exposed::Pair(_))));
-    assert_eq!(exposures.skipped().get("right_frame_lost"), Some(&1));
-}
-
-/// At a rate at which frames cannot be told apart nothing is guessed, and it is said once.
-#[test]
-fn exposures_that_nobody_can_tell_apart_are_told() {
-    let mut clock = ClockMap::default();
-    clock.observe(Exchange { t0: Microseconds(0), t1: Microseconds(0), t2: Microseconds(0), t3: Microseconds(0) });
-    let base = TimeBase::Board(clock);
-    let ms = Duration::from_millis;
-    let timing = FrameTiming { period: ms(240), exposure: None, rolling: ms(0), readout: ms(240) };
-    let mut exposures = Exposures::new(Some(1e5));
-    for side in [Side::Left, Side::Right] {
-        exposures.hear(side, News::There(timing), &base);
-    }
-    for number in 0..3 {
-        exposures.pulse(&mark(number), &base);
-        exposures.hear(Side::Left, frame_of(number, number), &base);
-        exposures.hear(Side::Right, frame_of(number, number), &base);
-    }
-    assert!(exposures.take().is_none());
-    assert_eq!(exposures.skipped().get("frame_of_either_pulse"), Some(&6));
-    assert!(exposures.take_ambiguity().is_some_and(|said| said.contains("--readout")));
-    assert_eq!(exposures.take_ambiguity(), None);
 }
 
 fn lines(output: &[u8]) -> Vec<Value> {

@@ -10,7 +10,7 @@ mod common;
 
 use std::path::{Path, PathBuf};
 
-use common::{fails_with, run, run_json, shared, text};
+use common::{fails_with, real_data, run, run_json, text};
 
 /// A model of tiny networks in a folder of its own, described by model.toml.
 fn tiny_model(folder: &Path) -> PathBuf {
@@ -115,13 +115,15 @@ fn depth_of_black(folder: &Path, store: &Path, more: &[&str]) -> std::process::O
 }
 
 #[test]
-fn black_photographs_have_no_points_and_without_models_the_classical_matcher_serves() {
+fn black_photographs_have_no_points_and_a_learned_matcher_that_is_asked_for_must_be_kept() {
     let folder = tempfile::tempdir().expect("a folder");
     let store = folder.path().join("store");
+    let classical = depth_of_black(folder.path(), &store, &["guided"]);
+    assert!(classical.status.success(), "{}", text(&classical.stderr));
+    assert!(text(&classical.stdout).contains("0 points"), "{}", text(&classical.stdout));
     let without = depth_of_black(folder.path(), &store, &["learned"]);
-    assert!(without.status.success(), "{}", text(&without.stderr));
-    assert!(text(&without.stderr).contains("the classical matcher serves"), "{}", text(&without.stderr));
-    assert!(text(&without.stdout).contains("0 points"), "{}", text(&without.stdout));
+    assert_eq!(without.status.code(), Some(2), "{}", text(&without.stdout));
+    assert!(text(&without.stderr).contains("no model is kept"), "{}", text(&without.stderr));
 
     let model = tiny_model(folder.path());
     run_json(&["models", "add", path(&model), "--models", path(&store), "--json"]);
@@ -154,7 +156,7 @@ fn the_faster_runtime_is_on_record_and_another_can_be_asked_for() {
 #[test]
 fn views_beat_whole_images_where_the_axes_are_far_apart() {
     let bench = ["bench", "matching", "--separations", "120deg", "--side", "400", "--keypoints", "512", "--json"];
-    let Some(models) = shared("models") else {
+    let Some(models) = real_data("models") else {
         let found = run_json(&[&bench[..], &["--matcher", "guided"]].concat());
         assert!(
             found["rows"][0]["ways"]["classical"]["after"]["precision"].as_f64().expect("a share") > 0.9,
@@ -177,7 +179,7 @@ fn views_beat_whole_images_where_the_axes_are_far_apart() {
 
 #[test]
 fn published_networks_are_known_by_their_tensors() {
-    let Some(models) = shared("models") else { return };
+    let Some(models) = real_data("models") else { return };
     let folder = tempfile::tempdir().expect("a folder");
     let store = folder.path().join("store");
     let added = run_json(&["models", "add", path(&models), "--models", path(&store), "--json"]);

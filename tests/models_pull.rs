@@ -104,7 +104,7 @@ fn a_broken_download_is_taken_up_and_what_came_first_is_recorded() {
     fails(&missing, &[], 2, &["could not be fetched", &missing.address]);
 
     let broken = Server::of(network.clone(), Manner::Breaks(100));
-    fails(&broken, &[], 2, &["could not be fetched", "what came is kept, try again"]);
+    fails(&broken, &[], 2, &["could not be fetched", "the part that came is kept, try again"]);
     let came =
         std::fs::metadata(folder.path().join(".downloads/disk_lightglue_pipeline.ort.onnx")).expect("kept").len();
     assert!((100..network.len() as u64).contains(&came), "{came}");

@@ -10,7 +10,7 @@ mod common;
 
 use std::path::{Path, PathBuf};
 
-use common::{run_json, shared};
+use common::{real_data, run_json};
 use nalgebra::{Matrix3, Rotation3, Vector3};
 use serde_json::Value;
 
@@ -44,7 +44,7 @@ fn rig_file(reference: &Value) -> String {
     )
 }
 
-/// The board corners of pair 10 in both images.
+/// The target corners of pair 10 in both images.
 fn correspondences(corners: &Path) -> String {
     let mut reader = csv::Reader::from_path(corners).expect("corners");
     let mut sides = [const { Vec::new() }; 2];
@@ -84,7 +84,7 @@ struct RealPair {
 impl RealPair {
     /// `None` without the set.
     fn new() -> Option<Self> {
-        let set = shared("data/sourishg_stereo")?;
+        let set = real_data("data/sourishg_stereo")?;
         let folder = tempfile::tempdir().expect("a temporary folder");
         let rig = write_rig(&set, folder.path());
         Some(Self { set, folder, rig })
@@ -94,7 +94,7 @@ impl RealPair {
         self.folder.path().join(name).to_string_lossy().into_owned()
     }
 
-    /// A file of the board's corners in both images.
+    /// A file of the target's corners in both images.
     fn corners(&self) -> String {
         let pairs = self.file("pairs.csv");
         std::fs::write(&pairs, correspondences(&self.set.join("corners_opencv_classic.csv"))).expect("written");
@@ -121,7 +121,7 @@ fn write_rig(set: &Path, folder: &Path) -> String {
 /// The published networks see the same scene, and nearly all that both matchers see lies at the same range.
 #[test]
 fn networks_and_the_classical_matcher_agree_on_a_real_pair() {
-    let (Some(pair), Some(models)) = (RealPair::new(), shared("models")) else { return };
+    let (Some(pair), Some(models)) = (RealPair::new(), real_data("models")) else { return };
     let store = pair.file("store");
     run_json(&["models", "add", &models.to_string_lossy(), "--models", &store, "--json"]);
     let (learned, classical) = (pair.file("learned.ply"), pair.file("classical.ply"));
@@ -143,33 +143,33 @@ fn networks_and_the_classical_matcher_agree_on_a_real_pair() {
 }
 
 #[test]
-fn a_cloud_and_a_flat_board_from_a_real_pair() {
+fn a_cloud_and_a_flat_target_from_a_real_pair() {
     let Some(pair) = RealPair::new() else { return };
-    let (cloud, board, pairs) = (pair.file("cloud.ply"), pair.file("board.ply"), pair.corners());
+    let (cloud, target, pairs) = (pair.file("cloud.ply"), pair.file("target.ply"), pair.corners());
     let result = pair.depth(&["--out", &cloud]);
     let count = result["points"].as_u64().expect("a count");
     assert!(count >= 200, "{result}");
     assert_eq!(points(Path::new(&cloud)).len() as u64, count);
 
-    let result = pair.depth(&["--out", &board, "--points", &pairs]);
-    let corners = points(Path::new(&board));
+    let result = pair.depth(&["--out", &target, "--points", &pairs]);
+    let corners = points(Path::new(&target));
     assert!(corners.len() >= 50, "{result}");
     let rms = flatness(&corners);
-    println!("{count} points; board of {} corners flat to {rms:.3} mm rms", corners.len());
+    println!("{count} points; target of {} corners flat to {rms:.3} mm rms", corners.len());
     assert!(rms < 1.0, "{rms} mm");
 }
 
-/// A range for every pixel: the board's corners lie where the dense cloud has them.
+/// A range for every pixel: the target's corners lie where the dense cloud has them.
 #[test]
-fn dense_ranges_of_a_real_pair_hold_the_board() {
+fn dense_ranges_of_a_real_pair_hold_the_target() {
     let Some(pair) = RealPair::new() else { return };
-    let (cloud, board, pairs) = (pair.file("dense.ply"), pair.file("board.ply"), pair.corners());
+    let (cloud, target, pairs) = (pair.file("dense.ply"), pair.file("target.ply"), pair.corners());
     let result = pair.depth(&["--out", &cloud, "--dense"]);
-    pair.depth(&["--out", &board, "--points", &pairs]);
+    pair.depth(&["--out", &target, "--points", &pairs]);
 
     let ranges = image::open(pair.file("dense-range.png")).expect("a range image").into_luma16();
     assert_eq!(ranges.dimensions(), (960, 600));
-    let text = std::fs::read_to_string(&board).expect("a cloud");
+    let text = std::fs::read_to_string(&target).expect("a cloud");
     let (_, body) = text.split_once("end_header\n").expect("a header");
     let corners: Vec<Vec<f64>> =
         body.lines().map(|line| line.split(' ').map(|x| x.parse().expect("a number")).collect()).collect();

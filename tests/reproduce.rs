@@ -1,6 +1,7 @@
 //! The paper's tables in one command: small, with projected corners. The whole chain with rendered photographs takes about a
-//! minute for each rig; its table is in docs/measured.md.
+//! minute for each rig; its table is in docs/measured/paper.md.
 #![allow(
+    clippy::disallowed_methods,
     clippy::expect_used,
     clippy::panic,
     clippy::print_stdout,
@@ -11,7 +12,7 @@ mod common;
 
 use std::path::Path;
 
-use common::{fails_with, run_json};
+use common::{fails_with, run_json, text, vergence};
 use serde_json::Value;
 
 fn reproduce(out: &Path) -> Value {
@@ -99,4 +100,29 @@ fn zones_and_matches_stand_beside_the_published() {
 fn bad_input_is_refused_in_a_sentence() {
     fails_with(&["reproduce", "--seeds", "0"], 2, &["--seeds"]);
     fails_with(&["reproduce", "--seeds", "1", "--out", "/dev/null/page"], 2, &["/dev/null/page"]);
+}
+
+/// The whole chain takes minutes for each rig: an interruption must not wait for it.
+#[test]
+fn an_interruption_ends_it_within_a_second_and_says_how_to_go_on() {
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    let out = folder.path().to_str().expect("a name");
+    for signal in ["-INT", "-TERM"] {
+        let arguments = ["reproduce", "--seeds", "8", "--no-matching", "--out", out, "--json"];
+        let child = vergence(&arguments).stderr(std::process::Stdio::piped()).spawn().expect("the binary runs");
+        // Long enough to be at the photographs.
+        std::thread::sleep(std::time::Duration::from_secs(3));
+        let kill =
+            std::process::Command::new("kill").args([signal, &child.id().to_string()]).status().expect("kill runs");
+        let asked = std::time::Instant::now();
+        assert!(kill.success());
+        let output = child.wait_with_output().expect("it ends");
+        // A second, and another one for a busy machine.
+        assert!(asked.elapsed().as_secs_f64() < 2.0, "{signal}: {:.1} s", asked.elapsed().as_secs_f64());
+        assert_eq!(output.status.code(), Some(3));
+        let said = text(&output.stderr);
+        assert!(said.contains("interrupted while measuring") && said.contains("no page was written"), "{said}");
+        assert!(said.contains("Run the same command again"), "{said}");
+        assert!(!folder.path().join("reproduce.html").exists());
+    }
 }

@@ -175,6 +175,10 @@ fn a_jog_needs_no_reference_and_the_trigger_no_arming() {
     assert_eq!(jogged["referenced"], serde_json::json!([false, false]));
     near(&jogged["moved_by"]["baseline_mm"], 5.0);
     near(&jogged["moved_by"]["separation_deg"], -2.0);
+    // Without a reference, arming puts the zero where the axis stands.
+    let back = simulator.json(&["move", "--by", "--baseline", "-5mm"]);
+    near(&back["moved_by"]["baseline_mm"], -5.0);
+    near(&back["moved_by"]["separation_deg"], 0.0);
     let lines = simulator.run(&["trigger", "--rate", "50", "--count", "10", "--json"]);
     let marks: Vec<serde_json::Value> =
         text(&lines.stdout).lines().map(|line| serde_json::from_str(line).expect("JSON")).collect();
@@ -190,9 +194,11 @@ fn stop_works_while_another_vergence_holds_the_port() {
     simulator.json(&["home"]);
     let mover = simulator.command(&["mode", "herbivore"]).stderr(std::process::Stdio::piped()).spawn().expect("runs");
     wait(0.8);
-    let second = simulator.run(&["status"]);
+    let second = simulator.run(&["disarm"]);
     assert_eq!(second.status.code(), Some(3));
     assert!(text(&second.stderr).contains("in use"));
+    // The one that drives passes on what the board reports.
+    assert_eq!(simulator.json(&["status"])["state"], "moving");
     // Not even a rig file that is none keeps it from stopping.
     assert!(simulator.run(&["--rig", "/nowhere/rig.toml", "stop"]).status.success());
     let moved = mover.wait_with_output().expect("it ends");

@@ -20,7 +20,8 @@ const ALLOWED: &[(&str, &[&str])] = &[
     ("vergence-vision", &[]),
     ("vergence-rig", &["vergence-protocol", "vergence-vision"]),
     ("vergence-page", &[]),
-    ("vergence-calibration", &["vergence-vision", "vergence-rig", "vergence-page"]),
+    ("vergence-calibration", &["vergence-vision", "vergence-rig"]),
+    ("vergence-calibration-report", &["vergence-vision", "vergence-rig", "vergence-calibration", "vergence-page"]),
     ("vergence-matching", &["vergence-vision"]),
     ("vergence-networks", &["vergence-matching"]),
     ("vergence-scene", &["vergence-vision"]),
@@ -28,6 +29,57 @@ const ALLOWED: &[(&str, &[&str])] = &[
     ("vergence-mcu", &["vergence-cpu", "vergence-protocol", "vergence-control", "vergence-plant"]),
     ("vergence-plant", &["vergence-protocol", "vergence-control"]),
     ("vergence-soak", &["vergence-protocol", "vergence-control", "vergence-image", "vergence-mcu", "vergence-plant"]),
+    ("vergence-pipeline", &["vergence-protocol", "vergence-vision", "vergence-rig", "vergence-matching"]),
+    ("vergence-board", &["vergence-protocol", "vergence-control", "vergence-image", "vergence-vision", "vergence-rig"]),
+    ("vergence-camera", &["vergence-vision", "vergence-rig"]),
+    ("vergence-models", &["vergence-matching", "vergence-networks"]),
+    (
+        "vergence-sim",
+        &[
+            "vergence-protocol",
+            "vergence-control",
+            "vergence-image",
+            "vergence-vision",
+            "vergence-rig",
+            "vergence-board",
+            "vergence-camera",
+            "vergence-scene",
+            "vergence-mcu",
+            "vergence-plant",
+        ],
+    ),
+    (
+        "vergence-reproduce",
+        &[
+            "vergence-protocol",
+            "vergence-vision",
+            "vergence-rig",
+            "vergence-calibration",
+            "vergence-matching",
+            "vergence-page",
+            "vergence-pipeline",
+            "vergence-board",
+            "vergence-camera",
+            "vergence-scene",
+            "vergence-sim",
+        ],
+    ),
+    (
+        "vergence-bench",
+        &[
+            "vergence-vision",
+            "vergence-rig",
+            "vergence-calibration",
+            "vergence-matching",
+            "vergence-networks",
+            "vergence-models",
+            "vergence-pipeline",
+            "vergence-camera",
+            "vergence-scene",
+            "vergence-sim",
+            "vergence-mcu",
+        ],
+    ),
     (
         "vergence",
         &[
@@ -37,6 +89,7 @@ const ALLOWED: &[(&str, &[&str])] = &[
             "vergence-vision",
             "vergence-rig",
             "vergence-calibration",
+            "vergence-calibration-report",
             "vergence-matching",
             "vergence-networks",
             "vergence-page",
@@ -44,13 +97,27 @@ const ALLOWED: &[(&str, &[&str])] = &[
             "vergence-mcu",
             "vergence-plant",
             "vergence-soak",
+            "vergence-pipeline",
+            "vergence-board",
+            "vergence-camera",
+            "vergence-models",
+            "vergence-sim",
+            "vergence-reproduce",
+            "vergence-bench",
         ],
     ),
 ];
 
-/// Only host/vergence touches devices, files, sockets, clocks, threads and the terminal.
-const ONLY_FOR_THE_BINARY: &[&str] =
-    &["tokio", "tokio-serial", "serialport", "clap", "indicatif", "tempfile", "moq-v4l"];
+/// Libraries that touch devices, files, sockets, clocks or the terminal, and the crates that may use each.
+const ONLY_FOR: &[(&str, &[&str])] = &[
+    ("tokio", &["vergence-board", "vergence-camera", "vergence"]),
+    ("tokio-serial", &["vergence-board", "vergence"]),
+    ("serialport", &["vergence-board", "vergence"]),
+    ("moq-v4l", &["vergence-camera"]),
+    ("tempfile", &["vergence-models", "vergence-bench", "vergence"]),
+    ("clap", &["vergence"]),
+    ("indicatif", &["vergence"]),
+];
 
 /// Permissive licences.
 const LICENCES: &[&str] = &[
@@ -110,7 +177,8 @@ fn dependencies_point_the_right_way() {
         for dependency in list(&package["dependencies"]).iter().filter(|d| d["kind"] != "dev") {
             let used = dependency["name"].as_str().expect("a name");
             assert!(!used.starts_with("vergence") || may.contains(&used), "{name} must not use {used}");
-            assert!(name == "vergence" || !ONLY_FOR_THE_BINARY.contains(&used), "{name} must not use {used}");
+            let users = ONLY_FOR.iter().find(|(library, _)| *library == used).map(|(_, users)| *users);
+            assert!(users.is_none_or(|users| users.contains(&name)), "{name} must not use {used}");
         }
     }
     assert_eq!(seen, ALLOWED.len(), "a crate of the house is missing from the workspace");
@@ -148,4 +216,61 @@ fn protocol_and_control_need_no_operating_system() {
         .output()
         .expect("cargo runs");
     assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+}
+
+/// The files of the board's application, and which others of them each imports.
+fn imports_of_board_files() -> BTreeMap<String, BTreeSet<String>> {
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../firmware/nucleo-g474/src");
+    let files: BTreeMap<String, String> = std::fs::read_dir(folder)
+        .expect("the folder is there")
+        .map(|entry| entry.expect("an entry").path())
+        .map(|path| (path.file_stem().expect("a name").to_string_lossy().into_owned(), path))
+        .map(|(name, path)| (name, std::fs::read_to_string(path).expect("a text")))
+        .collect();
+    let imports = |text: &str| {
+        let paths = text.split("crate::").skip(1).flat_map(|rest| match rest.strip_prefix('{') {
+            Some(list) => list.split('}').next().unwrap_or_default().split(',').collect(),
+            None => vec![rest],
+        });
+        let names = paths.map(|path| path.trim().split(|letter: char| !letter.is_alphanumeric() && letter != '_'));
+        names.filter_map(|mut name| name.next().filter(|name| files.contains_key(*name)).map(str::to_owned)).collect()
+    };
+    files.iter().map(|(name, text)| (name.clone(), imports(text))).collect()
+}
+
+#[test]
+fn the_boards_files_do_not_import_each_other_in_a_ring() {
+    let mut left = imports_of_board_files();
+    assert!(left["control"].contains("exchange") && left["dying"].contains("board"), "imports are found: {left:?}");
+    // Take away what imports nothing that is left, until nothing can be taken away: the rest is in or above a ring.
+    loop {
+        let names: BTreeSet<String> = left.keys().cloned().collect();
+        left.retain(|_, imports| imports.iter().any(|import| names.contains(import)));
+        if left.len() == names.len() {
+            break;
+        }
+    }
+    assert!(left.is_empty(), "in or above a ring: {left:?}");
+}
+
+/// The Rust files below `folder`.
+fn sources(folder: &Path) -> Vec<std::path::PathBuf> {
+    let entries = std::fs::read_dir(folder).expect("the folder is there").map(|entry| entry.expect("an entry").path());
+    let nested = entries.flat_map(|path| match path.is_dir() {
+        true if path.ends_with("target") => Vec::new(),
+        true => sources(&path),
+        false => vec![path],
+    });
+    nested.filter(|path| path.extension().is_some_and(|ending| ending == "rs")).collect()
+}
+
+#[test]
+fn every_test_finds_real_data_by_one_function() {
+    let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("../..");
+    let tests = ["host", "hil-sim", "protocol", "firmware", "tests"].map(|folder| sources(&root.join(folder))).concat();
+    let tests: Vec<_> = tests.iter().filter(|path| path.components().any(|part| part.as_os_str() == "tests")).collect();
+    let asks =
+        |path: &Path| std::fs::read_to_string(path).expect("a text").contains(concat!("var", "_os(\"VERGENCE_SHARED"));
+    let asking: Vec<_> = tests.iter().filter(|path| asks(path)).collect();
+    assert!(asking.len() == 1 && asking[0].ends_with("tests/common/data.rs"), "{asking:?}");
 }

@@ -1,13 +1,15 @@
 //! Running the binary and reading what it says.
-#![allow(dead_code, reason = "each test file uses its own part")]
+#![allow(dead_code, unused_imports, reason = "each test file uses its own part")]
 
 pub mod cameras;
+pub mod data;
 pub mod images;
 
 use std::io::{BufRead, BufReader};
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use std::process::{Child, Command, Output, Stdio};
 
+pub use data::real_data;
 use serde_json::Value;
 
 /// The binary with `arguments`, and none of the caller's own settings.
@@ -21,22 +23,6 @@ pub fn vergence(arguments: &[&str]) -> Command {
         .stdin(Stdio::null());
     command.env("VERGENCE_STORE", "/nowhere/calibrations");
     command
-}
-
-/// The folder with real data, which is not part of the repository.
-pub fn shared_root() -> PathBuf {
-    std::env::var_os("VERGENCE_SHARED")
-        .map_or_else(|| Path::new(env!("CARGO_MANIFEST_DIR")).join("../../../shared"), PathBuf::from)
-}
-
-/// Such a file or folder; where it is missing, says what is skipped.
-pub fn shared(inside: &str) -> Option<PathBuf> {
-    let found = shared_root().join(inside);
-    if found.exists() {
-        return Some(found);
-    }
-    println!("SKIPPED: {} is not there; set VERGENCE_SHARED to the folder that has it", found.display());
-    None
 }
 
 /// Runs it to its end.
@@ -66,6 +52,21 @@ pub fn text(bytes: &[u8]) -> String {
     String::from_utf8_lossy(bytes).into_owned()
 }
 
+/// Whether the verb that `arguments` name has an option for its lease.
+fn takes_a_lease(arguments: &[&str]) -> bool {
+    let mut whole = vergence::cli::command();
+    whole.build();
+    let mut verb = &whole;
+    for word in arguments {
+        match verb.find_subcommand(word) {
+            Some(inner) => verb = inner,
+            None if verb.has_subcommands() => {}
+            None => break,
+        }
+    }
+    verb.get_arguments().any(|option| option.get_long() == Some("lease"))
+}
+
 /// A `vergence sim` in its own process; ends with the value.
 pub struct Simulator {
     process: Child,
@@ -83,9 +84,12 @@ impl Simulator {
         Self { process, port }
     }
 
-    /// The verb over this simulator's port. The lease is long: the machine that runs the tests may be busy.
+    /// The verb over this simulator's port. Where it holds a lease, that is long: the machine that runs the tests may be busy.
     pub fn command(&self, arguments: &[&str]) -> Command {
-        let mut command = vergence(&["--port", &self.port, "--lease", "1s"]);
+        let mut command = vergence(&["--port", &self.port]);
+        if takes_a_lease(arguments) {
+            command.args(["--lease", "1s"]);
+        }
         command.args(arguments);
         command
     }

@@ -8,6 +8,7 @@ use vergence_plant::{AxisMechanics, NativeBoard, Plant, bench_mechanics, bench_s
 use vergence_protocol::Microseconds;
 
 use super::build::build;
+use super::conversation::{Conversation, Wired};
 use super::program::sealed;
 
 /// The speed of the line from the factory.
@@ -26,18 +27,33 @@ impl Default for Standing {
     }
 }
 
-/// A board with its mechanics. Time counts from when it got power.
-pub trait Board {
+/// A board that a conversation can begin with.
+pub trait Board: Wired {
     /// Gets power.
     fn switched_on(standing: &Standing) -> Self;
-    fn advance(&mut self, to: Microseconds);
-    /// Bytes begin to arrive now.
-    fn receive(&mut self, bytes: &[u8]);
-    /// Bytes that have left since this was last asked.
-    fn transmit(&mut self) -> Vec<u8>;
-    fn plant(&self) -> &Plant;
     /// Does something to the mechanics.
     fn with_plant(&mut self, act: impl FnOnce(&mut Plant));
+}
+
+impl<B: Board> Conversation<B> {
+    /// A board that has just got power, and a host that has not spoken yet.
+    pub fn off(standing: &Standing) -> Self {
+        Self::with_board(B::switched_on(standing), Microseconds(0))
+    }
+
+    /// A session with telemetry, disarmed.
+    pub fn open(standing: &Standing) -> Self {
+        let mut talk = Self::off(standing);
+        talk.connect();
+        talk
+    }
+
+    /// Armed and homed.
+    pub fn homed(standing: &Standing) -> Self {
+        let mut talk = Self::open(standing);
+        talk.arm_and_home();
+        talk
+    }
 }
 
 /// Boot loader and application on the simulated chip.
@@ -73,6 +89,12 @@ impl Board for ElfBoard {
         Self { machine, baud: BAUD, heard_baud: BAUD }
     }
 
+    fn with_plant(&mut self, act: impl FnOnce(&mut Plant)) {
+        self.machine.chip_mut().with_world(|bench, _| act(bench.plant_mut()));
+    }
+}
+
+impl Wired for ElfBoard {
     fn advance(&mut self, to: Microseconds) {
         let halt = self.machine.run_until(Picoseconds::microseconds(to.0));
         assert!(halt == Halt::Reached, "{halt}");
@@ -93,31 +115,11 @@ impl Board for ElfBoard {
     fn plant(&self) -> &Plant {
         self.machine.chip().world().plant()
     }
-
-    fn with_plant(&mut self, act: impl FnOnce(&mut Plant)) {
-        self.machine.chip_mut().with_world(|bench, _| act(bench.plant_mut()));
-    }
 }
 
 impl Board for NativeBoard {
     fn switched_on(standing: &Standing) -> Self {
         Self::standing_at(&bench_settings(), &standing.mechanics, &standing.at, 1).expect("the bench works")
-    }
-
-    fn advance(&mut self, to: Microseconds) {
-        self.advance(to);
-    }
-
-    fn receive(&mut self, bytes: &[u8]) {
-        self.receive(bytes);
-    }
-
-    fn transmit(&mut self) -> Vec<u8> {
-        self.transmit()
-    }
-
-    fn plant(&self) -> &Plant {
-        self.plant()
     }
 
     fn with_plant(&mut self, act: impl FnOnce(&mut Plant)) {

@@ -4,10 +4,11 @@
 
 mod board;
 mod build;
+#[path = "../conversation.rs"]
 mod conversation;
 mod log;
 mod program;
 
 pub use board::{Board, ElfBoard, Standing, programs};
-pub use conversation::{BOTH, Conversation, LEASE_MS};
+pub use conversation::{BOTH, Conversation, LEASE_MS, Wired};
 pub use log::decode;
