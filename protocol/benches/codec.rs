@@ -44,13 +44,13 @@ fn message<M: Serialize + DeserializeOwned>(criterion: &mut Criterion, name: &st
     let mut receiver = Receiver::new();
     group.bench_function("decode", |bencher| {
         bencher.iter(|| {
-            let mut heard = None;
+            let mut received = None;
             for &byte in black_box(&frame) {
                 if let Some(frame) = receiver.push(byte) {
-                    heard = frame.body::<M>().ok();
+                    received = frame.body::<M>().ok();
                 }
             }
-            heard
+            received
         });
     });
     group.bench_function("decode, postcard alone", |bencher| {

@@ -104,7 +104,7 @@ pub enum RebootTo {
 /// An answer of the board to a management request. The order is frozen for ever.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize, Schema)]
 pub enum ManagementReport {
-    /// What the board is and runs.
+    /// Identity of the board and of its program.
     Identity(Identity),
     /// State of an update, and the outcome of a request.
     Progress {
@@ -134,7 +134,7 @@ pub struct Identity {
     pub capacity: u32,
 }
 
-/// Which program runs, and how it was chosen.
+/// The running program and the reason why it was chosen.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, Schema)]
 pub enum BootState {
     /// A confirmed application.

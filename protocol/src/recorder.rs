@@ -27,11 +27,11 @@ pub struct RecordedEvents {
 pub struct RecordedEvent {
     /// Time of the event, board clock.
     pub at: Microseconds,
-    /// What happened.
+    /// The recorded event.
     pub what: Happening,
 }
 
-/// What happened. Append only: the order is the wire format.
+/// A recorded event. Append only: the order is the wire format.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, Schema)]
 #[non_exhaustive]
 pub enum Happening {
@@ -53,7 +53,7 @@ pub enum Happening {
         code: FaultCode,
         /// Axis of the fault, if it concerns one axis.
         axis: Option<u8>,
-        /// As in [`crate::FaultRecord`].
+        /// Detail of the fault, as in [`crate::FaultRecord`].
         detail: i32,
     },
     /// A switch of an axis changed for good: its contact no longer bounces.

@@ -55,7 +55,7 @@ pub enum Request {
     MoveTo(Move),
     /// Stops all motion. Needs neither arming nor a session.
     Stop {
-        /// How to stop.
+        /// Kind of stop.
         kind: StopKind,
     },
     /// Clears a latched fault or lost link: to Idle, if the cause is gone.
@@ -77,7 +77,7 @@ pub enum Request {
     SetSetting {
         /// The setting to change.
         key: SettingKey,
-        /// Its new value.
+        /// New value of the setting.
         value: i64,
     },
     /// Saves all settings to flash; only while disarmed.

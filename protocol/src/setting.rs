@@ -47,7 +47,7 @@ pub enum SettingItem {
     HomeRepeatability,
     /// Of the board: period of the pose stream when a session opens, in microseconds; 0 for no stream.
     StreamPeriod,
-    /// Of the board: speed of the serial line from the next start on, in baud.
+    /// Speed of the board's serial line from the next start on, in baud.
     Baud,
     /// Of the board: what it drives, 0 for the stages of the bench, 1 for the joints of the robot.
     Machine,

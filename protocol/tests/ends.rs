@@ -4,7 +4,7 @@
 
 mod common;
 
-use common::board::{ask, header, hello_report, host_frame, open_board, refused, sent, tell};
+use common::board::{ask, deliver, header, hello_report, host_frame, open_board, refused, sent};
 use common::{SESSION, answer, board_info, hello, move_to, pose};
 use vergence_protocol::frame::{Kind, encode};
 use vergence_protocol::management::Management;
@@ -25,11 +25,11 @@ fn a_new_session_drops_queued_reports_and_late_answers() {
     board.send(Report::MoveState { id: MoveId(1), phase: MovePhase::Running });
     board.telemetry(pose(1));
     let new = SessionId(2);
-    let opened = tell(&mut board, &host_frame(header(Kind::Immediate, 0), &hello(new)));
+    let opened = deliver(&mut board, &host_frame(header(Kind::Immediate, 0), &hello(new)));
     assert_eq!(opened, [BoardEvent::Opened { session: new }]);
     board.reply(late, answer(&Request::Disarm));
     assert_eq!(sent(&mut board), [hello_report(new, 1)]);
-    assert_eq!(tell(&mut board, &host_frame(header(Kind::Immediate, 0), &hello(new))), []);
+    assert_eq!(deliver(&mut board, &host_frame(header(Kind::Immediate, 0), &hello(new))), []);
     assert_eq!(sent(&mut board), [hello_report(new, 1)], "the same hello only answers again");
     ask(&mut board, header(Kind::Control, 0), &Request::Disarm);
     board.reply(late, answer(&Request::Disarm));
@@ -60,7 +60,7 @@ fn a_gap_is_reported_and_nothing_is_delivered_out_of_order() {
     let mut board = open_board();
     ask(&mut board, header(Kind::Control, 0), &Request::Disarm);
     for seq in [2, 3] {
-        assert_eq!(tell(&mut board, &host_frame(header(Kind::Control, seq), &move_to(1))), []);
+        assert_eq!(deliver(&mut board, &host_frame(header(Kind::Control, seq), &move_to(1))), []);
     }
     assert_eq!(sent(&mut board), [(Kind::Nak, None)]);
     ask(&mut board, header(Kind::Control, 1), &move_to(1));
@@ -74,7 +74,7 @@ fn an_unreadable_request_is_refused_and_not_asked_for_again() {
     let mut board = open_board();
     let mut buffer = [0; MAX_FRAME];
     let length = encode(header(Kind::Control, 0), &(200_u8, 1_u8), &mut buffer).unwrap();
-    assert_eq!(tell(&mut board, &buffer[..length]), []);
+    assert_eq!(deliver(&mut board, &buffer[..length]), []);
     assert_eq!(sent(&mut board), [refused(0, Refusal::Invalid)]);
     assert_eq!(board.statistics().link.body, 1);
     ask(&mut board, header(Kind::Control, 1), &Request::Disarm);
@@ -120,7 +120,7 @@ fn without_a_session_the_board_sends_nothing() {
     board.send(Report::MoveState { id: MoveId(1), phase: MovePhase::Running });
     assert_eq!(sent(&mut board), []);
     let nobody = host_frame(header(Kind::Immediate, 0), &hello(SessionId(0)));
-    assert_eq!(tell(&mut board, &nobody), [], "zero is no session");
+    assert_eq!(deliver(&mut board, &nobody), [], "zero is no session");
     assert_eq!(sent(&mut board), []);
 }
 
@@ -142,7 +142,7 @@ fn a_delimiter_goes_before_the_first_frame_and_after_silence() {
 #[test]
 fn motion_requests_cannot_bypass_the_window() {
     let mut board = open_board();
-    assert_eq!(tell(&mut board, &host_frame(header(Kind::Immediate, 0), &move_to(1))), []);
+    assert_eq!(deliver(&mut board, &host_frame(header(Kind::Immediate, 0), &move_to(1))), []);
     assert_eq!(board.statistics().link.body, 1);
 }
 
@@ -170,7 +170,7 @@ fn the_log_goes_last_and_waits_for_a_session() {
     let entry: Vec<u8> = (0..100).collect();
     board.log(&entry);
     assert_eq!(sent_log(&mut board), (vec![], vec![]));
-    tell(&mut board, &host_frame(header(Kind::Immediate, 0), &hello(SESSION)));
+    deliver(&mut board, &host_frame(header(Kind::Immediate, 0), &hello(SESSION)));
     board.telemetry(pose(1));
     let control = ask(&mut board, header(Kind::Control, 0), &Request::Disarm);
     board.reply(control, answer(&Request::Disarm));
@@ -198,15 +198,15 @@ fn a_host_receives_the_log_of_its_session() {
     board.log(b"hello");
     let mut buffer = [0; MAX_FRAME];
     let length = board.transmit(Microseconds(2000), &mut buffer).unwrap();
-    let mut heard = Vec::new();
-    host.receive(Microseconds(1), &buffer[..length], |event| heard.push(event));
-    assert_eq!(heard, [], "no session yet");
+    let mut received = Vec::new();
+    host.receive(Microseconds(1), &buffer[..length], |event| received.push(event));
+    assert_eq!(received, [], "no session yet");
     host.hello();
     let report = Report::Hello { protocol: PROTOCOL, schema: schema_hash(), session: SESSION, boot: 9 };
     let mut opening = [0; MAX_FRAME];
     let opened = encode(header(Kind::Immediate, 0), &report, &mut opening).unwrap();
     host.receive(Microseconds(2), &opening[..opened], |_| {});
-    host.receive(Microseconds(3), &buffer[..length], |event| heard.push(event));
-    assert_eq!(heard, [HostEvent::Log(heapless::Vec::from_slice(b"hello").unwrap())]);
+    host.receive(Microseconds(3), &buffer[..length], |event| received.push(event));
+    assert_eq!(received, [HostEvent::Log(heapless::Vec::from_slice(b"hello").unwrap())]);
     assert_eq!(host.heard_at(), Some(Microseconds(3)));
 }

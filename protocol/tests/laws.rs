@@ -82,12 +82,12 @@ proptest! {
         let mut cuts: Vec<usize> = cuts.iter().map(|cut| cut.index(stream.len())).collect();
         cuts.extend([0, stream.len()]);
         cuts.sort_unstable();
-        let mut heard = Vec::new();
+        let mut received = Vec::new();
         for cut in cuts.windows(2) {
-            host.receive(Microseconds(2), &stream[cut[0]..cut[1]], |event| heard.push(event));
+            host.receive(Microseconds(2), &stream[cut[0]..cut[1]], |event| received.push(event));
         }
         let sent: Vec<_> = poses.into_iter().map(|pose| HostEvent::Report(Report::Pose(pose))).collect();
-        prop_assert_eq!(heard, sent);
+        prop_assert_eq!(received, sent);
     }
 
     #[test]
@@ -206,7 +206,7 @@ fn random_bytes_yield_nothing() {
         let byte = if rng.random_bool(0.03) { 0 } else { rng.random() };
         assert_eq!(receiver.push(byte), None);
         assert_eq!(board.receive(Microseconds(time), byte), None);
-        host.receive(Microseconds(time), &[byte], |event| panic!("heard {event:?}"));
+        host.receive(Microseconds(time), &[byte], |event| panic!("received {event:?}"));
     }
     // Few random runs are well stuffed; these all are, so that only the CRC stands between them and a message.
     let mut stuffed = [0; 64];

@@ -57,9 +57,9 @@ fn check<M: Serialize + DeserializeOwned + PartialEq + Debug>(message: &M, expec
     let length = encode(header, message, &mut buffer).unwrap();
     assert_eq!(&buffer[..length], expected, "{message:?}");
     let mut receiver = Receiver::new();
-    let heard: Vec<M> =
+    let received: Vec<M> =
         expected.iter().filter_map(|&byte| receiver.push(byte).map(|frame| frame.body().unwrap())).collect();
-    assert_eq!(heard.iter().collect::<Vec<_>>(), [message]);
+    assert_eq!(received.iter().collect::<Vec<_>>(), [message]);
 }
 
 #[test]

@@ -4,7 +4,7 @@
 
 mod common;
 
-use common::board::{ask, header, hello_report, host_frame, refused, sent, tell};
+use common::board::{ask, deliver, header, hello_report, host_frame, refused, sent};
 use common::{SESSION, answer, board_info, move_to, pose};
 use vergence_protocol::frame::{Header, Kind, encode};
 use vergence_protocol::management::{Management, ManagementReport, Outcome};
@@ -48,14 +48,14 @@ fn a_host_of_another_major_learns_only_what_board_it_is() {
     let foreign = |kind, seq| Header { major: PROTOCOL.major + 1, kind, seq, ack: 0 };
     let protocol = ProtocolVersion { major: PROTOCOL.major + 1, minor: 0 };
     let hello = Request::Hello { protocol, schema: schema_hash(), session: SESSION };
-    assert_eq!(tell(&mut board, &host_frame(foreign(Kind::Immediate, 0), &hello)), []);
+    assert_eq!(deliver(&mut board, &host_frame(foreign(Kind::Immediate, 0), &hello)), []);
     assert_eq!(sent(&mut board), [hello_report(SESSION, 1)]);
     assert_eq!(board.session(), None);
     let stop = Request::Stop { kind: StopKind::Decelerate };
     let heartbeat = Request::Heartbeat { session: SESSION, lease_ms: 100 };
     for request in [move_to(1), stop, heartbeat, Request::Disarm] {
         for kind in [Kind::Control, Kind::Immediate] {
-            assert_eq!(tell(&mut board, &host_frame(foreign(kind, 0), &request)), [], "{request:?}");
+            assert_eq!(deliver(&mut board, &host_frame(foreign(kind, 0), &request)), [], "{request:?}");
         }
     }
     assert_eq!(sent(&mut board), []);
@@ -71,26 +71,26 @@ fn management_works_with_every_major_and_without_a_session() {
     for (major, seq) in [(PROTOCOL.major, 3), (PROTOCOL.major + 1, 4), (0, 5), (255, 6)] {
         let header = Header { major, kind: Kind::Firmware, seq, ack: 0 };
         let length = encode(header, &Management::Confirm, &mut buffer).unwrap();
-        let heard = tell(&mut board, &buffer[..length]);
-        assert_eq!(heard, [BoardEvent::Management { seq, request: Management::Confirm }]);
+        let received = deliver(&mut board, &buffer[..length]);
+        assert_eq!(received, [BoardEvent::Management { seq, request: Management::Confirm }]);
         board.reply_management(seq, PROGRESS);
     }
     assert_eq!(board.session(), None);
     let mut host = HostSession::new(SESSION);
-    let mut heard = Vec::new();
+    let mut received = Vec::new();
     while let Some(length) = board.transmit(Microseconds(0), &mut buffer) {
-        host.receive(Microseconds(1), &buffer[..length], |event| heard.push(event));
+        host.receive(Microseconds(1), &buffer[..length], |event| received.push(event));
     }
     let expected = [3, 4, 5, 6].map(|to| ManagementReport::Progress { to, next: 0, outcome: Outcome::Done });
-    assert_eq!(heard, expected.map(HostEvent::Management));
-    assert_eq!(tell(&mut board, &host_frame(header(Kind::Firmware, 0), &move_to(1))), [], "motion is no management");
+    assert_eq!(received, expected.map(HostEvent::Management));
+    assert_eq!(deliver(&mut board, &host_frame(header(Kind::Firmware, 0), &move_to(1))), [], "motion is no management");
 }
 
 #[test]
 fn a_host_of_another_schema_may_only_read() {
     let mut board = BoardSession::new(1);
     let hello = Request::Hello { protocol: PROTOCOL, schema: schema_hash() ^ 1, session: SESSION };
-    tell(&mut board, &host_frame(header(Kind::Immediate, 0), &hello));
+    deliver(&mut board, &host_frame(header(Kind::Immediate, 0), &hello));
     assert_eq!(sent(&mut board), [hello_report(SESSION, 1)]);
     let motion = [
         Request::Arm { session: SESSION },
@@ -104,10 +104,10 @@ fn a_host_of_another_schema_may_only_read() {
         Request::SetTrigger(Trigger::Once),
     ];
     for (seq, request) in (0..).zip(&motion) {
-        assert_eq!(tell(&mut board, &host_frame(header(Kind::Control, seq), request)), []);
+        assert_eq!(deliver(&mut board, &host_frame(header(Kind::Control, seq), request)), []);
         assert_eq!(sent(&mut board), [refused(seq, Refusal::ReadOnly)]);
     }
-    assert_eq!(tell(&mut board, &host_frame(header(Kind::Control, 2), &motion[2])), []);
+    assert_eq!(deliver(&mut board, &host_frame(header(Kind::Control, 2), &motion[2])), []);
     assert_eq!(sent(&mut board), [refused(2, Refusal::ReadOnly)], "refused again when asked again");
     let reading = [
         Request::GetInfo,

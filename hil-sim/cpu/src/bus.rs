@@ -6,7 +6,7 @@ pub type Cycle = u64;
 /// The cycle of an event that never comes.
 pub const NEVER: Cycle = Cycle::MAX;
 
-/// How many bytes an access moves.
+/// Number of bytes that an access moves.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Access {
     /// One byte.

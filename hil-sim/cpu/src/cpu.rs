@@ -33,7 +33,7 @@ pub enum Stop {
     Requested,
 }
 
-/// What the core waits for.
+/// The event that the core waits for.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Activity {
     Running,

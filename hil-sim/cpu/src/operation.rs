@@ -24,7 +24,7 @@ pub(crate) enum Op {
     BitfieldInsert,
     /// d = `a` bits of n from bit `immediate`, zero-extended.
     UnsignedExtract,
-    /// The same, sign-extended.
+    /// Extract and sign-extend.
     SignedExtract,
     /// d = n + extended(m rotated right by `immediate`); n = 15 adds nothing.
     Extend(Extend),
@@ -33,7 +33,7 @@ pub(crate) enum Op {
     /// d = saturated shifted n to `a` bits (shift in `immediate`).
     SignedSaturate,
     UnsignedSaturate,
-    /// The same for both halves, without shift.
+    /// Signed saturation of both halves, without shift.
     SignedSaturate16,
     UnsignedSaturate16,
     /// d = halves of n and of shifted m; VARIANT takes the top of n.
@@ -190,7 +190,7 @@ pub(crate) enum Reverse {
     LeadingZeros,
 }
 
-/// What a load or store moves.
+/// Size and signedness of the value that a load or store moves.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Width {
     Word,
@@ -243,7 +243,7 @@ pub(crate) enum Multiply {
     AbsoluteDifferencesAccumulate,
 }
 
-/// What the lanes of a parallel instruction do.
+/// Operation on each lane of a parallel instruction.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Parallel {
     Add16,

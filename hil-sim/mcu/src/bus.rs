@@ -99,7 +99,7 @@ impl<W: World> Chip<W> {
         self.units.flash.check_ecc(offset as u32 / 8);
     }
 
-    /// How long the core waits for the bank that it has read from.
+    /// Cycles for which the core waits for the bank that it has read from.
     #[cold]
     fn wait_for_bank(&self, now: Cycle) -> Option<u32> {
         self.stalls.set(false);

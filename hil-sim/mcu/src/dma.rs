@@ -273,7 +273,7 @@ impl Peripheral for Dma {
     }
 }
 
-/// Which request goes to which channel: 0 to 7 of DMA1, 8 to 15 of DMA2.
+/// Request routed to each channel: 0 to 7 of DMA1, 8 to 15 of DMA2.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Dmamux {
     ccr: [u32; 2 * CHANNELS],

@@ -24,7 +24,7 @@ pub enum FirmwareError {
     OutsideFlash {
         /// The address to load it to.
         address: u32,
-        /// Its length in bytes.
+        /// Length of the segment in bytes.
         length: usize,
     },
 }

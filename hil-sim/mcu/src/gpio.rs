@@ -13,7 +13,7 @@ const AFRL: u32 = 0x20;
 const AFRH: u32 = 0x24;
 const BRR: u32 = 0x28;
 
-/// How a pin is used.
+/// Mode of a pin.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Mode {
     Input,

@@ -31,7 +31,7 @@ pub enum Halt {
     },
     /// The firmware did something that the model does not implement.
     Trouble {
-        /// What it did.
+        /// The forbidden action of the program.
         trouble: Trouble,
         /// The place in the program; the instruction before it was the cause.
         place: Place,
@@ -47,7 +47,7 @@ pub enum Halt {
     Other(String),
 }
 
-/// Where and when the core stopped.
+/// Place and time at which the core stopped.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Place {
     /// Program counter.

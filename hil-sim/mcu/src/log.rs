@@ -28,7 +28,7 @@ pub enum LogError {
     Unknown {
         /// The property that differs.
         what: &'static str,
-        /// Its value in the file.
+        /// Value of the entry in the file.
         found: String,
         /// The value that this program reads.
         known: &'static str,

@@ -34,7 +34,7 @@ pub struct Machine<W> {
     /// The cause of the last reset, and the number of resets since power-on.
     reset: ResetCause,
     resets: u64,
-    /// Where the core last locked up.
+    /// Place at which the core last locked up.
     lockup: Option<Place>,
 }
 
@@ -215,7 +215,7 @@ impl<W: World> Machine<W> {
         self.resets
     }
 
-    /// Where the core last locked up, if it ever did.
+    /// Place at which the core last locked up, if it ever did.
     #[must_use]
     pub fn last_lockup(&self) -> Option<&Place> {
         self.lockup.as_ref()

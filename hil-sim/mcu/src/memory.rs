@@ -122,7 +122,7 @@ impl Memory {
     }
 }
 
-/// How many bytes an access moves.
+/// Number of bytes that an access moves.
 pub(crate) fn bytes(access: Access) -> usize {
     match access {
         Access::Byte => 1,

@@ -61,7 +61,7 @@ impl Pads {
         self.enable_pins[uart.index()]
     }
 
-    /// Which outputs of a timer are observed, bit x for CHx+1 and its complement.
+    /// Mask of the outputs of a timer that are observed, bit x for CHx+1 and its complement.
     pub fn watched_outputs(&self, timer: TimerId) -> u8 {
         let pins = &self.timer_pins[timer.index()];
         (0..4).fold(0, |all, channel| {

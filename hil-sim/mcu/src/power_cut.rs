@@ -13,11 +13,11 @@ use crate::flash::FlashOperation;
 pub struct PowerCut {
     /// Number of the operation, counted from one since the board was created.
     pub operation: u64,
-    /// What the cut leaves.
+    /// Damage that the cut leaves.
     pub damage: Damage,
 }
 
-/// What a power cut leaves of the operation in progress.
+/// Damage that a power cut leaves in the operation in progress.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Damage {
     /// Nothing has been changed yet.

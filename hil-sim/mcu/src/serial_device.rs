@@ -17,7 +17,7 @@ use crate::world::{Instant, Terminals, World};
 /// struct Parrot(Vec<SentByte>);
 ///
 /// impl SerialDevice for Parrot {
-///     fn hear(&mut self, sent: SentByte) {
+///     fn receive(&mut self, sent: SentByte) {
 ///         self.0.push(sent);
 ///     }
 ///
@@ -37,7 +37,7 @@ use crate::world::{Instant, Terminals, World};
 pub trait SerialDevice: Clone {
     /// The chip has sent a byte. On a bus of one wire devices hear each other as well: that is for the device to model
     /// that stands for all of them.
-    fn hear(&mut self, sent: SentByte);
+    fn receive(&mut self, sent: SentByte);
 
     /// When the device next sends; [`Picoseconds::NEVER`] where it is silent.
     fn next_event(&self) -> Picoseconds {
@@ -70,7 +70,7 @@ impl<D: SerialDevice> World for OnPort<D> {
 
     fn byte_sent(&mut self, port: UartId, sent: SentByte, _terminals: &mut Terminals) {
         if port == self.port {
-            self.device.hear(sent);
+            self.device.receive(sent);
         }
     }
 }

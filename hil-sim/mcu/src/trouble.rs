@@ -39,7 +39,7 @@ pub enum Trouble {
         offset: u32,
         /// The value written; zero for a read.
         value: u32,
-        /// What is wrong with it.
+        /// The reason for the refusal.
         what: String,
     },
     /// An access that is too narrow for the register.
@@ -55,7 +55,7 @@ pub enum Trouble {
     /// Clocks that the silicon does not allow.
     #[error("{what}")]
     Clocks {
-        /// What is wrong.
+        /// The rule that is violated.
         what: String,
     },
     /// Peripherals cause events of each other without end.

@@ -72,9 +72,9 @@ mod flag {
 pub struct Frame {
     /// Data bits.
     pub byte: u8,
-    /// Its speed in bits per second.
+    /// Speed of the line in bits per second.
     pub baud: u32,
-    /// Its transmission error.
+    /// Transmission error injected into the byte.
     pub fault: LineFault,
 }
 
@@ -97,7 +97,7 @@ pub struct SentByte {
     pub at: Picoseconds,
     /// The data bits.
     pub byte: u8,
-    /// Its speed in bits per second.
+    /// Speed of the line in bits per second.
     pub baud: u32,
 }
 

@@ -22,7 +22,7 @@ struct Servo {
 }
 
 impl SerialDevice for Servo {
-    fn hear(&mut self, SentByte { at, byte, .. }: SentByte) {
+    fn receive(&mut self, SentByte { at, byte, .. }: SentByte) {
         if self.last == Some(ID) && byte == !ID {
             self.asked += 1;
             self.answers_at = Some(at + RETURN_DELAY);
@@ -64,7 +64,7 @@ fn ask(bench: &mut Bench<(Nothing, OnPort<Servo>)>, port: u32) {
     bench.wait(2 * FRAME);
 }
 
-fn heard(bench: &mut Bench<(Nothing, OnPort<Servo>)>) -> Vec<u8> {
+fn answers(bench: &mut Bench<(Nothing, OnPort<Servo>)>) -> Vec<u8> {
     let mut bytes = Vec::new();
     while bench.read(USART3 + ISR) & RXNE != 0 {
         bytes.push(bench.read(USART3 + RDR) as u8);
@@ -76,20 +76,20 @@ fn heard(bench: &mut Bench<(Nothing, OnPort<Servo>)>) -> Vec<u8> {
 fn a_servo_on_the_reserved_port_answers_after_its_delay() {
     let mut bench = bus(BAUD);
     ask(&mut bench, USART3);
-    assert_eq!(heard(&mut bench), [ID, !ID], "one wire: its own question");
+    assert_eq!(answers(&mut bench), [ID, !ID], "one wire: its own question");
     assert!(!bench.chip.is_high(pin("PB14")), "the line is free for the answer");
     // 250 us are 4000 cycles at 16 MHz.
     bench.wait(4_000 + FRAME / 2);
-    assert!(heard(&mut bench).is_empty());
+    assert!(answers(&mut bench).is_empty());
     bench.wait(FRAME);
-    assert_eq!(heard(&mut bench), [ID]);
+    assert_eq!(answers(&mut bench), [ID]);
     bench.wait(FRAME);
-    assert_eq!(heard(&mut bench), [1]);
+    assert_eq!(answers(&mut bench), [1]);
     let mut again = Bench { chip: bench.chip.clone(), now: bench.now };
     for bench in [&mut bench, &mut again] {
         ask(bench, USART3);
         bench.wait(4_000 + 2 * FRAME);
-        assert_eq!(heard(bench), [ID, !ID, ID, 2], "a snapshot goes on like the original");
+        assert_eq!(answers(bench), [ID, !ID, ID, 2], "a snapshot goes on like the original");
     }
 }
 
@@ -98,10 +98,10 @@ fn other_ports_are_not_its_own_and_other_speeds_are_noise() {
     let mut bench = bus(BAUD);
     ask(&mut bench, USART2);
     bench.wait(4_000 + 2 * FRAME);
-    assert!(heard(&mut bench).is_empty());
+    assert!(answers(&mut bench).is_empty());
     let mut bench = bus(1_000_000);
     ask(&mut bench, USART3);
-    assert_eq!(heard(&mut bench), [ID, !ID]);
+    assert_eq!(answers(&mut bench), [ID, !ID]);
     bench.wait(4_000 + 2 * FRAME);
     assert_ne!(bench.read(USART3 + ISR) & FE, 0);
 }

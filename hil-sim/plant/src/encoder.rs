@@ -3,7 +3,7 @@
 use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64Mcg;
 
-/// How an encoder fails.
+/// Kind of failure of an encoder.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum EncoderFault {
     /// The count does not change any more.
@@ -21,7 +21,7 @@ pub enum EncoderFault {
     Dead,
 }
 
-/// How the reading depends on the true count.
+/// Relation between the reading and the true count.
 #[derive(Clone, Debug)]
 enum Reading {
     True,

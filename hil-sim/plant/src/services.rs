@@ -31,7 +31,7 @@ pub struct NativeServices {
     pub image: RamFlash,
     /// The image that runs, by name only: the code is always this program.
     pub running: Firmware,
-    /// How it came to run.
+    /// State in which the boot loader started the program.
     pub boot_state: BootState,
     /// The oldest version accepted.
     pub oldest: [u8; 3],

@@ -12,7 +12,7 @@ pub enum SimError {
     Axes {
         /// Name of the rig.
         rig: String,
-        /// What the controller refuses.
+        /// The reason why the controller refuses the settings.
         why: String,
     },
     /// The simulated chip is wired to other axes than the rig has.
@@ -30,7 +30,7 @@ pub enum SimError {
     Program {
         /// Name of the program.
         name: String,
-        /// What is wrong with it.
+        /// The reason why the file is refused.
         why: String,
     },
     /// Bytes that are not the flash of a simulated board.
@@ -44,7 +44,7 @@ pub enum SimError {
     Stopped(String),
 }
 
-/// What the controller refuses about the axes of `rig`, in words.
+/// Puts the controller's refusal of the axes of `rig` in words.
 pub(crate) fn refusal(error: SettingsError, rig: &Rig) -> String {
     let name = |axis: usize| rig.axes.get(axis).map_or_else(|| axis.to_string(), |axis| format!("'{}'", axis.name));
     match error {

@@ -33,7 +33,7 @@ pub struct SimulatedRig {
     elapsed_us: u64,
     /// Elapsed time at which the board last started.
     began_us: u64,
-    /// What the board's clock showed then.
+    /// Time of the board's clock at the start, in microseconds.
     started_us: u64,
     boot: u32,
     output: Vec<u8>,

@@ -32,7 +32,7 @@ impl Place {
         Self { position: Vector3::new(x, 0.0, z), yaw: yaw_deg.to_radians() }
     }
 
-    /// The same spot at the height `y` (down).
+    /// Moves this spot to the height `y` (down).
     pub fn at(mut self, y: f64) -> Self {
         self.position.y = y;
         self

@@ -4,14 +4,14 @@ use nalgebra::{Matrix3, Vector3};
 use vergence_vision::{BatchLens, Camera, Instructions, KannalaBrandt, Pixel, Transform, World};
 
 /// A lens with its pose.
-pub struct Eye<'a> {
+pub struct PosedLens<'a> {
     lens: &'a BatchLens,
     world_from_camera: Matrix3<f64>,
 }
 
 /// The rays of the pixel centres of a rectangle and of their neighbours, in the world.
 pub struct RayGrid<'a> {
-    eye: &'a Eye<'a>,
+    posed: &'a PosedLens<'a>,
     left: u32,
     top: u32,
     stride: usize,
@@ -28,9 +28,9 @@ pub struct Around<'a> {
     centre: Vector3<f64>,
 }
 
-/// How the ray changes about a pixel.
+/// Derivatives of a ray about a pixel.
 pub struct Nearby<'a> {
-    eye: &'a Eye<'a>,
+    posed: &'a PosedLens<'a>,
     pixel: Pixel,
     centre: Vector3<f64>,
     /// First and second derivatives per pixel: u, v, uu, uv, vv. `None` at the edge of the field.
@@ -42,7 +42,7 @@ pub fn lens_of(camera: &KannalaBrandt) -> BatchLens {
     BatchLens::new(camera).with_instructions(Instructions::Baseline)
 }
 
-impl<'a> Eye<'a> {
+impl<'a> PosedLens<'a> {
     pub fn new(lens: &'a BatchLens, world_from_camera: &Transform<World, Camera>) -> Self {
         Self { lens, world_from_camera: world_from_camera.rotation().to_rotation_matrix().into_inner() }
     }
@@ -59,18 +59,18 @@ impl<'a> Eye<'a> {
 
 impl<'a> RayGrid<'a> {
     /// For the rectangle of `columns` and `rows` whose first pixel is in column `left` and row `top`.
-    pub fn new(eye: &'a Eye<'a>, [left, top]: [u32; 2], [columns, rows]: [u32; 2]) -> Self {
+    pub fn new(posed: &'a PosedLens<'a>, [left, top]: [u32; 2], [columns, rows]: [u32; 2]) -> Self {
         let pixels: Vec<[f64; 2]> = (0..rows + 2)
             .flat_map(|row| (0..columns + 2).map(move |column| (column, row)))
             .map(|(column, row)| [f64::from(left) + f64::from(column) - 1.0, f64::from(top) + f64::from(row) - 1.0])
             .collect();
-        Self { eye, left, top, stride: columns as usize + 2, rays: eye.lens.unproject(&pixels) }
+        Self { posed, left, top, stride: columns as usize + 2, rays: posed.lens.unproject(&pixels) }
     }
 
     /// The ray of a pixel of the rectangle; `None` outside the field.
     pub fn around(&'a self, x: u32, y: u32) -> Option<Around<'a>> {
         let middle = ((y - self.top) as usize + 1) * self.stride + (x - self.left) as usize + 1;
-        let centre = self.eye.in_world(&self.rays[middle])?;
+        let centre = self.posed.in_world(&self.rays[middle])?;
         Some(Around { grid: self, pixel: Pixel { u: f64::from(x), v: f64::from(y) }, middle, centre })
     }
 }
@@ -85,7 +85,7 @@ impl<'a> Around<'a> {
     pub fn nearby(&self) -> Nearby<'a> {
         let (grid, centre) = (self.grid, self.centre);
         let ray = |row: usize, column: usize| {
-            grid.eye.in_world(&grid.rays[self.middle + row * grid.stride + column - grid.stride - 1])
+            grid.posed.in_world(&grid.rays[self.middle + row * grid.stride + column - grid.stride - 1])
         };
         let derivatives = || {
             let (west, east, north, south) = (ray(1, 0)?, ray(1, 2)?, ray(0, 1)?, ray(2, 1)?);
@@ -93,7 +93,7 @@ impl<'a> Around<'a> {
             let bend = |a: Vector3<f64>, b: Vector3<f64>| a - 2.0 * centre + b;
             Some([0.5 * (east - west), 0.5 * (south - north), bend(west, east), 0.25 * twist, bend(north, south)])
         };
-        Nearby { eye: grid.eye, pixel: self.pixel, centre, derivatives: derivatives() }
+        Nearby { posed: grid.posed, pixel: self.pixel, centre, derivatives: derivatives() }
     }
 }
 
@@ -104,7 +104,7 @@ impl Nearby<'_> {
     /// ten-thousandth of a pixel for any offset that matters.
     pub fn at(&self, [u, v]: [f64; 2]) -> Option<Vector3<f64>> {
         let Some([du, dv, duu, duv, dvv]) = self.derivatives else {
-            return self.eye.ray(Pixel { u: self.pixel.u + u, v: self.pixel.v + v });
+            return self.posed.ray(Pixel { u: self.pixel.u + u, v: self.pixel.v + v });
         };
         let ray = self.centre + du * u + dv * v + duu * (0.5 * u * u) + duv * (u * v) + dvv * (0.5 * v * v);
         Some(ray / ray.norm())
@@ -125,8 +125,8 @@ mod tests {
         let camera = KannalaBrandt::new(k, 1.002, centre, Angle::from_deg(98.0), size).unwrap();
         let pose = Transform::new(UnitQuaternion::from_euler_angles(0.3, -1.1, 0.2), Vector3::zeros());
         let lens = lens_of(&camera);
-        let eye = Eye::new(&lens, &pose);
-        let grid = RayGrid::new(&eye, [0, 300], [640, 40]);
+        let posed = PosedLens::new(&lens, &pose);
+        let grid = RayGrid::new(&posed, [0, 300], [640, 40]);
         for (x, y) in [(321, 318), (100, 320), (15, 310), (620, 339), (400, 300)] {
             let nearby = grid.around(x, y).unwrap().nearby();
             for offset in [[0.0, 0.0], [0.5, -0.5], [1.4, 1.1], [-2.0, 0.3]] {

@@ -8,7 +8,7 @@ use vergence_vision::{Angle, BatchLens, Camera, KannalaBrandt, Transform, World}
 use crate::blur::blurred;
 use crate::noise::mix64;
 use crate::optics::unit_pair;
-use crate::rays::{Around, Eye, RayGrid, lens_of};
+use crate::rays::{Around, PosedLens, RayGrid, lens_of};
 use crate::texture::Rgb;
 use crate::{Optics, RangeMap, Scene};
 
@@ -93,24 +93,24 @@ fn photograph(view: &View<'_>, seed: u64, rows: Rows<'_>) -> Photograph {
 
     let mut light = vec![[0.0; 3]; pixels];
     light.par_iter_mut().enumerate().for_each(|(i, light)| {
-        let First { mut look, exposure, .. } = firsts[i];
+        let First { mut samples, exposure, .. } = firsts[i];
         let (x, y) = (i % width, i / width);
         if is_edge(&firsts, width, x, y) {
             let pixel = [x, y].map(|n| n as u32);
             let here = rows.view(view, pixel[1]);
-            let eye = Eye::new(&lens, &here.world_from_camera);
-            if let Some(around) = RayGrid::new(&eye, pixel, [1, 1]).around(pixel[0], pixel[1]) {
-                look = look.joined(here.look(&around, view.optics.edge_samples, mix64(seed_of(x, y))));
+            let posed = PosedLens::new(&lens, &here.world_from_camera);
+            if let Some(around) = RayGrid::new(&posed, pixel, [1, 1]).around(pixel[0], pixel[1]) {
+                samples = samples.joined(here.samples(&around, view.optics.edge_samples, mix64(seed_of(x, y))));
             }
         }
-        let exposure = exposure / look.count.max(1) as f32;
-        *light = look.sum.map(|c| c * exposure);
+        let exposure = exposure / samples.count.max(1) as f32;
+        *light = samples.sum.map(|c| c * exposure);
     });
 
     let light = blurred(&light, width, view.optics.blur_px);
     let mut image = RgbImage::new(size.width, size.height);
     image.par_chunks_exact_mut(3).zip(&light).zip(&firsts).enumerate().for_each(|(i, ((pixel, light), first))| {
-        if first.look.count > 0 {
+        if first.samples.count > 0 {
             pixel.copy_from_slice(&view.optics.expose(*light, !seed_of(i % width, i / width)));
         }
     });
@@ -120,17 +120,17 @@ fn photograph(view: &View<'_>, seed: u64, rows: Rows<'_>) -> Photograph {
 
 /// Whether a pixel needs more rays.
 fn is_edge(firsts: &[First], width: usize, x: usize, y: usize) -> bool {
-    let look = firsts[y * width + x].look;
+    let samples = firsts[y * width + x].samples;
     let rows = y.saturating_sub(1)..(y + 2).min(firsts.len() / width);
     let columns = x.saturating_sub(1)..(x + 2).min(width);
-    let near = rows.flat_map(|y| &firsts[y * width..][columns.clone()]).map(|first| first.look);
-    look.contrast() > EDGE || near.fold(look, Look::joined_contrast).contrast() > STRONG_EDGE
+    let near = rows.flat_map(|y| &firsts[y * width..][columns.clone()]).map(|first| first.samples);
+    samples.contrast() > EDGE || near.fold(samples, LightSamples::joined_contrast).contrast() > STRONG_EDGE
 }
 
 /// The result of the first rays of a pixel. The default is that of a pixel outside the field.
 #[derive(Clone, Copy, Debug)]
 struct First {
-    look: Look,
+    samples: LightSamples,
     /// Range at the centre of the pixel; not a number if its ray meets nothing.
     range_mm: f32,
     /// The share of the light that passes the lens.
@@ -139,13 +139,13 @@ struct First {
 
 impl Default for First {
     fn default() -> Self {
-        Self { look: Look::default(), range_mm: f32::NAN, exposure: 0.0 }
+        Self { samples: LightSamples::default(), range_mm: f32::NAN, exposure: 0.0 }
     }
 }
 
 /// The light of some rays of a pixel.
 #[derive(Clone, Copy, Debug)]
-struct Look {
+struct LightSamples {
     sum: Rgb,
     count: u32,
     /// The least and the most light, as the mean of red, green and blue.
@@ -153,13 +153,13 @@ struct Look {
     high: f32,
 }
 
-impl Default for Look {
+impl Default for LightSamples {
     fn default() -> Self {
         Self { sum: [0.0; 3], count: 0, low: f32::INFINITY, high: 0.0 }
     }
 }
 
-impl Look {
+impl LightSamples {
     /// Adds the light of one more ray.
     fn with(self, colour: Rgb) -> Self {
         let level = colour.iter().sum::<f32>() / 3.0;
@@ -195,8 +195,8 @@ fn for_each_in_field<T: Send>(
     items.par_chunks_mut(width * rows.at_once).enumerate().for_each(|(number, items)| {
         let top = number * rows.at_once;
         let here = rows.view(view, top as u32);
-        let eye = Eye::new(lens, &here.world_from_camera);
-        let rays = RayGrid::new(&eye, [0, top as u32], [width, items.len() / width].map(|n| n as u32));
+        let posed = PosedLens::new(lens, &here.world_from_camera);
+        let rays = RayGrid::new(&posed, [0, top as u32], [width, items.len() / width].map(|n| n as u32));
         for (i, item) in items.iter_mut().enumerate() {
             let (x, y) = (i % width, top + i / width);
             if let Some(around) = rays.around(x as u32, y as u32) {
@@ -212,28 +212,28 @@ impl View<'_> {
         let origin = self.world_from_camera.origin().mm();
         let theta = self.theta(around);
         let met = self.scene.encounter(origin, around.centre());
-        let look = if self.optics.samples <= 1 {
+        let samples = if self.optics.samples <= 1 {
             let finest = 1.0 / self.camera.pixels_per_radian(theta);
-            Look::default().with(self.scene.light(origin, around.centre(), met.as_ref(), finest))
+            LightSamples::default().with(self.scene.light(origin, around.centre(), met.as_ref(), finest))
         } else {
-            self.look(around, self.optics.samples, hash)
+            self.samples(around, self.optics.samples, hash)
         };
         let exposure = self.optics.falloff(theta, self.camera.theta_max()) as f32;
-        First { look, range_mm: met.map_or(f32::NAN, |met| met.range() as f32), exposure }
+        First { samples, range_mm: met.map_or(f32::NAN, |met| met.range() as f32), exposure }
     }
 
     /// The light of `count` rays through the square of a pixel.
-    fn look(&self, around: &Around<'_>, count: u32, hash: u64) -> Look {
+    fn samples(&self, around: &Around<'_>, count: u32, hash: u64) -> LightSamples {
         let origin = self.world_from_camera.origin().mm();
         let finest = 1.0 / self.camera.pixels_per_radian(self.theta(around));
         let nearby = around.nearby();
-        lattice(count, hash).fold(Look::default(), |look, offset| {
+        lattice(count, hash).fold(LightSamples::default(), |samples, offset| {
             let light = |direction| {
                 let met = self.scene.encounter(origin, direction);
                 self.scene.light(origin, direction, met.as_ref(), finest)
             };
             // A ray outside the field brings no light.
-            look.with(nearby.at(offset).map_or([0.0; 3], light))
+            samples.with(nearby.at(offset).map_or([0.0; 3], light))
         })
     }
 

@@ -279,7 +279,7 @@ impl Checker {
         }
     }
 
-    /// What contradicts a reported mode; `None` where it is true.
+    /// Returns the contradiction to a reported mode; `None` where it is true.
     fn wrong_mode(&self, pose: &PoseReport) -> Option<String> {
         let Some((_, mode, targets)) = self.moves.iter().find(|(id, ..)| *id == pose.move_id) else {
             return Some(format!("mode {:?} of a move that nobody asked for", pose.mode));

@@ -142,7 +142,7 @@ pub enum Fault {
         onset: Onset,
         /// Index of the axis.
         axis: usize,
-        /// How the encoder fails.
+        /// Kind of failure of the encoder.
         how: EncoderFault,
         /// Duration in microseconds; a noisy encoder is dead afterwards.
         lasts_us: Option<u64>,

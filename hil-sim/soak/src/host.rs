@@ -56,7 +56,7 @@ struct Asked {
     turns: u32,
 }
 
-/// How the script ended.
+/// Ending of the script.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum HostEnd {
     /// The script was completed.
@@ -132,7 +132,7 @@ impl Host {
         self.step
     }
 
-    /// How the script has ended; the host is silent then.
+    /// Ending of the script once it is over; the host is silent then.
     pub fn end(&self) -> Option<HostEnd> {
         self.end
     }

@@ -36,7 +36,7 @@ pub struct Violation {
     pub at: Microseconds,
     /// The promise.
     pub promise: Promise,
-    /// What contradicts it.
+    /// The observation that contradicts the promise.
     pub what: String,
 }
 
@@ -46,7 +46,7 @@ impl fmt::Display for Violation {
     }
 }
 
-/// What an encoder shows of the position of its load.
+/// Relation of an encoder's reading to the position of its load.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Sight {
     /// The true position.

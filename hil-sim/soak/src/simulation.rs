@@ -25,7 +25,7 @@ const TAIL_US: u64 = 800_000;
 /// The host's clock at the start, so that it stays positive when it jumps back.
 const HOST_START_US: u64 = 10_000_000;
 
-/// What a scenario needs from a board.
+/// Operations that a scenario needs from a board.
 pub trait Board {
     /// Lets time pass until `to` on the board's clock.
     fn advance(&mut self, to: Microseconds);
@@ -88,7 +88,7 @@ fn boot_number(seed: u64) -> u32 {
     seed as u32
 }
 
-/// How a scenario ended.
+/// Ending of a scenario.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Ending {
     /// The host has completed its script.

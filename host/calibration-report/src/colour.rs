@@ -3,10 +3,10 @@
 /// A scale of colours from low to high.
 pub(crate) struct Ramp(&'static [[f64; 3]]);
 
-/// For residuals.
+/// Colour ramp of residuals.
 pub(crate) const BLUES: Ramp =
     Ramp(&[[158.0, 190.0, 224.0], [86.0, 136.0, 193.0], [38.0, 84.0, 150.0], [16.0, 38.0, 88.0]]);
-/// For uncertainty: dark is bad.
+/// Colour ramp of uncertainty: dark is bad.
 pub(crate) const EMBERS: Ramp = Ramp(&[
     [255.0, 248.0, 224.0],
     [252.0, 220.0, 150.0],
@@ -15,7 +15,7 @@ pub(crate) const EMBERS: Ramp = Ramp(&[
     [168.0, 52.0, 44.0],
     [98.0, 20.0, 38.0],
 ]);
-/// For coverage.
+/// Colour ramp of coverage.
 pub(crate) const GREENS: Ramp = Ramp(&[[229.0, 243.0, 236.0], [150.0, 205.0, 180.0], [66.0, 148.0, 122.0]]);
 
 impl Ramp {

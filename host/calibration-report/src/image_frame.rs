@@ -59,7 +59,7 @@ impl ImageFrame {
         [self.size.width, self.size.height].map(|n| self.scale * f64::from(n.max(1)))
     }
 
-    /// Where the legend begins.
+    /// Upper left corner of the legend in the picture's coordinates.
     pub fn legend(&self) -> [f64; 2] {
         [self.left, MARGIN + self.extent()[1] + 14.0]
     }

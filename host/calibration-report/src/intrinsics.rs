@@ -23,7 +23,7 @@ use crate::verdict::Verdict;
 
 /// Most outliers listed one by one.
 const MOST_LISTED: usize = 60;
-/// What stands below the images.
+/// Legend below the images.
 pub(crate) const IMAGES: &str = "Dots are the corners used, crosses those left out.";
 
 /// The report of an intrinsics calibration: one self-contained HTML page, well-formed as XML.

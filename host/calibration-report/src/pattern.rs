@@ -104,7 +104,7 @@ pub(crate) struct Neighbours {
 }
 
 impl Neighbours {
-    /// Of the corners used; `None` without two in one view.
+    /// The pattern in the residuals of the corners used; `None` without two in one view.
     pub fn of(observations: &[Observation]) -> Option<Self> {
         let mut views: BTreeMap<usize, Vec<(Pixel, [f64; 2])>> = BTreeMap::new();
         for observation in observations.iter().filter(|observation| observation.used) {

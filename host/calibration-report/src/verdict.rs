@@ -11,7 +11,7 @@ use crate::ray_field::RANGE_MM;
 /// Half angle around straight ahead that the verdict covers; errors further towards the baseline are in the figures.
 const CENTRAL_DEG: f64 = 45.0;
 
-/// What a calibration is worth, for a person.
+/// The worth of a calibration in words for a person.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Verdict {
     /// Such as "Good to 0.2 mm at 350 mm straight ahead; weakest ...".

@@ -17,7 +17,7 @@ const FAIR_PART: f64 = 0.15;
 /// Ratio of opposite sides of the outline above which a target counts as tilted.
 const TILT_RATIO: f64 = 1.12;
 
-/// What the views taken so far cover.
+/// Share of the field of view that the views taken so far cover.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Coverage {
     size: ImageSize,
@@ -28,7 +28,7 @@ pub struct Coverage {
     views: usize,
 }
 
-/// What to show next.
+/// The view that a person should show next.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Advice {
     column: usize,
@@ -85,7 +85,7 @@ impl Coverage {
         self.tilted += usize::from(is_tilted(view));
     }
 
-    /// What to show next; `None` if the set is complete.
+    /// The view to show next; `None` if the set is complete.
     #[must_use]
     pub fn advice(&self) -> Option<Advice> {
         let places = (0..CELLS).flat_map(|row| (0..CELLS).map(move |column| (row, column)));

@@ -19,7 +19,7 @@ pub enum CameraError {
     NotAnImage {
         /// The file.
         path: PathBuf,
-        /// What is wrong with its contents.
+        /// The reason why the contents are refused.
         why: String,
     },
     /// A folder holds no image.

@@ -26,7 +26,7 @@ impl fmt::Debug for PendingImage {
     }
 }
 
-/// What happens to a camera.
+/// An event in the life of a camera.
 #[derive(Debug)]
 pub enum CameraEvent {
     /// The camera is attached, for the first time or again, and exposes like this.

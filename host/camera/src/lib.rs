@@ -42,7 +42,7 @@ pub trait Camera: Send {
     /// Takes the next image; `None` after the last one.
     ///
     /// # Errors
-    /// Which camera or file failed, and why.
+    /// Returns an error that names the camera or file and the cause.
     fn grab(&mut self) -> Result<Option<CameraImage>, CameraError>;
 
     /// Timing of the exposures; `None` where images have no time, as those of a folder.

@@ -40,9 +40,9 @@ pub struct ImagePair<'a> {
 /// A match: the pixels of one scene point in both images.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Match {
-    /// Its pixel in the left image.
+    /// Pixel of the match in the left image.
     pub left: Pixel,
-    /// Its pixel in the right image.
+    /// Pixel of the match in the right image.
     pub right: Pixel,
     /// Standard deviation of each coordinate of both pixels, in pixels of the images; it counts as equal for both.
     pub sigma: f64,
@@ -132,7 +132,7 @@ pub enum MatchError {
         image.width, image.height, camera.width, camera.height
     )]
     ImageSize {
-        /// Which camera.
+        /// The camera concerned.
         side: Side,
         /// The image's size.
         image: ImageSize,

@@ -50,11 +50,11 @@ pub(crate) fn propagate(links: &mut Links, compared: &Compared<'_>, rows: &Rows<
 }
 
 fn learn(known: &mut Vec<KnownMatch>, links: &Links, keypoints: &[Keypoint]) {
-    let told = |(link, keypoint): (&Result<Link, UnmatchedReason>, &Keypoint)| {
+    let known_of = |(link, keypoint): (&Result<Link, UnmatchedReason>, &Keypoint)| {
         let (at, right) = (keypoint.at, link.as_ref().ok()?.right);
         Some(KnownMatch { at, moved: [right.x - at.x, right.y - at.y], fresh: true })
     };
-    known.extend(links.iter().zip(keypoints).filter_map(told));
+    known.extend(links.iter().zip(keypoints).filter_map(known_of));
 }
 
 /// The best partner that the displacements of the nearest fresh matches of `known` lead to.

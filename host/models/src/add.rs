@@ -15,9 +15,9 @@ use crate::store::{MODEL_FILE, ModelStore, read_manifest};
 /// A model that was added to the store.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Added {
-    /// Its name in the store.
+    /// Name of the model in the store.
     pub name: String,
-    /// Its folder in the store.
+    /// Folder of the model in the store.
     pub folder: PathBuf,
 }
 
@@ -26,7 +26,7 @@ pub struct Added {
 /// one ONNX file. `name` replaces the name in the manifest.
 ///
 /// # Errors
-/// Where a file cannot be read or written, or the networks fit no manifest.
+/// Fails if a file cannot be read or written, or the networks fit no manifest.
 pub fn add(
     store: &ModelStore,
     source: &Path,

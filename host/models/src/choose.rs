@@ -6,7 +6,7 @@ use crate::error::ModelsError;
 use crate::runtime::Runtimes;
 use crate::store::{ModelStore, load};
 
-/// Which model is wanted.
+/// The model wanted for matching.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum ModelName<'a> {
     /// The model that is kept under this name.
@@ -17,7 +17,7 @@ pub enum ModelName<'a> {
 
 /// A loaded model.
 pub struct Chosen {
-    /// Its name in the store.
+    /// Name of the model in the store.
     pub name: String,
     /// The networks.
     pub model: Model,

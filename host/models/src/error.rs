@@ -16,7 +16,7 @@ pub enum ModelsError {
     Read {
         /// The file or folder.
         path: PathBuf,
-        /// What the system or the parser says.
+        /// The message of the system or the parser.
         reason: String,
     },
     /// A file or folder cannot be written.
@@ -24,7 +24,7 @@ pub enum ModelsError {
     Write {
         /// The file or folder.
         path: PathBuf,
-        /// What the system says.
+        /// The message of the system.
         reason: String,
     },
     /// The name of a model or of one of its files cannot name a folder or file of the store.
@@ -51,9 +51,9 @@ pub enum ModelsError {
     /// A downloaded file is not the network it should be.
     #[error("{reason}; the download is in {}", .path.display())]
     DownloadNetwork {
-        /// What is wrong with it.
+        /// The error of the network.
         reason: NetworkError,
-        /// Where it is.
+        /// Path of the file.
         path: PathBuf,
     },
     /// The download failed.
@@ -61,7 +61,7 @@ pub enum ModelsError {
     Fetch {
         /// The address.
         address: String,
-        /// What curl says.
+        /// The message of curl.
         reason: String,
         /// Whether a part of the file came and is kept.
         partial: bool,
@@ -69,7 +69,7 @@ pub enum ModelsError {
     /// The program that downloads is missing.
     #[error("curl does not start ({reason}): install it, or fetch {address} yourself and add it")]
     Curl {
-        /// What the system says.
+        /// The message of the system.
         reason: String,
         /// The address that was asked for.
         address: String,
@@ -82,7 +82,7 @@ pub enum ModelsError {
     NotOffered {
         /// The model.
         name: &'static str,
-        /// What it is and how to get it.
+        /// The missing thing and how to get it.
         about: &'static str,
     },
     /// The licence forbids commercial use, and the user has not accepted it.
@@ -90,7 +90,7 @@ pub enum ModelsError {
     NonCommercial {
         /// The model.
         name: &'static str,
-        /// Its licence.
+        /// Licence of the model.
         licence: &'static str,
     },
     /// The networks in these files fit no known model, or several.

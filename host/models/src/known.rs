@@ -9,9 +9,9 @@ use crate::runtime::Runtime;
 /// A model with publicly known tensors.
 #[derive(Debug)]
 pub struct Known {
-    /// Its name in `vergence models`.
+    /// Name of the model in `vergence models`.
     pub name: &'static str,
-    /// What it is and where it comes from.
+    /// Origin and kind of the model.
     pub about: &'static str,
     /// The licence of its weights.
     pub licence: &'static str,

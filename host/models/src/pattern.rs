@@ -33,7 +33,7 @@ impl Pattern {
     /// Matches the pattern with itself: a sound model finds nearly as many matches as keypoints.
     ///
     /// # Errors
-    /// Where the networks fail.
+    /// Fails if the networks fail.
     pub fn with_itself(&self, model: &Model, keypoints: usize) -> Result<KeypointMatches, NetworkError> {
         let picture = GreyImage { values: &self.values, width: self.side, height: self.side };
         model.compare([picture, picture], keypoints, [&|_| true, &|_| true])

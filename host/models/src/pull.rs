@@ -24,9 +24,9 @@ pub struct Pull<'a> {
 /// A model that was fetched and kept.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Pulled {
-    /// Its name.
+    /// Name of the model.
     pub name: &'static str,
-    /// Its folder in the store.
+    /// Folder of the model in the store.
     pub folder: PathBuf,
     /// SHA-256 of the file in hexadecimal, on record from now on.
     pub sha256: String,
@@ -63,7 +63,7 @@ impl<'a> Pull<'a> {
     /// `progress` gets the part that has come, 0 to 1. Returns the path of the file.
     ///
     /// # Errors
-    /// Where curl is missing or fails.
+    /// Fails if curl is missing or fails.
     pub fn fetch(&self, store: &ModelStore, progress: &mut dyn FnMut(f64)) -> Result<PathBuf, ModelsError> {
         let downloads = store.path(".downloads");
         make_folder(&downloads)?;
@@ -84,7 +84,7 @@ impl<'a> Pull<'a> {
     /// times it on every runtime.
     ///
     /// # Errors
-    /// Where it is another file, or cannot be kept.
+    /// Fails if it is another file, or cannot be kept.
     pub fn keep(
         &self,
         store: &ModelStore,
@@ -118,7 +118,7 @@ impl<'a> Pull<'a> {
 /// Exit code of curl where the server cannot continue an interrupted download.
 const NO_RANGES: i32 = 33;
 
-/// How curl ended, and its last message.
+/// Runs curl; returns its exit status and its last message.
 fn curl(address: &str, to: &Path, progress: &mut dyn FnMut(f64)) -> Result<(ExitStatus, String), ModelsError> {
     let failed = |error: std::io::Error| ModelsError::Curl { reason: error.to_string(), address: address.to_owned() };
     let mut child = Command::new("curl")

@@ -16,7 +16,7 @@ pub enum Runtime {
     OnnxRuntime(OnnxRuntime, PathBuf),
 }
 
-/// Which runtimes may be used.
+/// The runtimes that may be used.
 #[derive(Clone, Debug, Default)]
 pub struct Runtimes {
     /// The runtime that must run the networks; `None` for the one that was faster when the model was added or verified.
@@ -45,7 +45,7 @@ impl Runtimes {
     /// model's record, else ONNX Runtime where it is installed.
     ///
     /// # Errors
-    /// Where the wanted runtime is missing, or the named library cannot be loaded.
+    /// Fails if the wanted runtime is missing, or the named library cannot be loaded.
     pub fn choose(&self, folder: &Path) -> Result<(Runtime, String), ModelsError> {
         if self.wanted == Some(RuntimeKind::Rten) {
             return Ok((Runtime::Rten, "as asked".into()));
@@ -62,7 +62,7 @@ impl Runtimes {
     /// Every runtime on this machine.
     ///
     /// # Errors
-    /// Where the named library cannot be loaded.
+    /// Fails if the named library cannot be loaded.
     pub fn all(&self) -> Result<Vec<Runtime>, ModelsError> {
         Ok(std::iter::once(Runtime::Rten).chain(self.onnx_runtime()?).collect())
     }
@@ -92,7 +92,7 @@ fn faster(found: Runtime, speed: &Speed) -> (Runtime, String) {
 }
 
 impl Runtime {
-    /// Its name.
+    /// Name of the runtime.
     #[must_use]
     pub fn name(&self) -> &'static str {
         match self {
@@ -120,7 +120,7 @@ impl Runtime {
     /// Loads a model from the bytes of its files.
     ///
     /// # Errors
-    /// Where a file is not a network, or has other tensors than the manifest says.
+    /// Fails if a file is not a network, or has other tensors than the manifest says.
     pub fn model(&self, manifest: Manifest, files: &[(String, Vec<u8>)]) -> Result<Model, NetworkError> {
         let networks: Result<Vec<_>, _> = files.iter().map(|(file, bytes)| self.network(file, bytes)).collect();
         Model::new(manifest, networks?)

@@ -35,7 +35,7 @@ impl Speed {
     /// Times the model in `folder` on every runtime, and writes the record there.
     ///
     /// # Errors
-    /// Where the record cannot be written.
+    /// Fails if the record cannot be written.
     pub fn measure(folder: &Path, runtimes: &[Runtime], threads: usize, clock: Clock) -> Result<Self, ModelsError> {
         let mut speed = Self { threads, ..Self::default() };
         for runtime in runtimes {

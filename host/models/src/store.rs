@@ -21,7 +21,7 @@ impl ModelStore {
     /// The store in `folder`; without one, `vergence/models` in the user's data folder. Nothing is written.
     ///
     /// # Errors
-    /// Where no folder is named and the user has no data folder.
+    /// Fails if no folder is named and the user has no data folder.
     pub fn open(folder: Option<PathBuf>) -> Result<Self, ModelsError> {
         let folder = folder.or_else(default_folder).ok_or(ModelsError::NoDataFolder)?;
         Ok(Self { folder })
@@ -42,7 +42,7 @@ impl ModelStore {
     /// The names of all models, in order.
     ///
     /// # Errors
-    /// Where the folder exists and cannot be read.
+    /// Fails if the folder exists and cannot be read.
     pub fn names(&self) -> Result<Vec<String>, ModelsError> {
         let entries = match std::fs::read_dir(&self.folder) {
             Ok(entries) => entries,
@@ -100,7 +100,7 @@ impl ModelStore {
 /// Reads a model's manifest from its folder.
 ///
 /// # Errors
-/// Where it is missing or not understood.
+/// Fails if the manifest is missing or not understood.
 pub fn read_manifest(folder: &Path) -> Result<Manifest, ModelsError> {
     let path = folder.join(MODEL_FILE);
     let text = std::fs::read_to_string(&path).map_err(|error| ModelsError::read(&path, error))?;

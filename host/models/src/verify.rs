@@ -12,7 +12,7 @@ use crate::store::{ModelStore, load};
 /// Keypoints this near are the same, in pixels.
 const SAME_PLACE: f32 = 0.5;
 
-/// How a model does on one runtime.
+/// Result of a model on one runtime.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Verdict {
     /// The runtime's name.
@@ -27,7 +27,7 @@ pub struct Verdict {
 /// kept beside the model: [`crate::choose`] reads them.
 ///
 /// # Errors
-/// Where the times cannot be written.
+/// Fails if the times cannot be written.
 pub fn verify(store: &ModelStore, name: &str, runtimes: &[Runtime], clock: Clock) -> Result<Vec<Verdict>, ModelsError> {
     let folder = store.path(name);
     let outcomes: Vec<_> = runtimes
@@ -41,7 +41,7 @@ pub fn verify(store: &ModelStore, name: &str, runtimes: &[Runtime], clock: Clock
     Ok(outcomes.into_iter().map(verdict).collect())
 }
 
-/// How many keypoints of the pattern match themselves.
+/// Counts the keypoints of the pattern that match themselves.
 fn match_with_itself(model: &Model) -> Result<usize, ModelsError> {
     let found = Pattern::small().with_itself(model, SMALL_KEYPOINTS).map_err(ModelsError::Run)?;
     let same = |&&(i, j, _): &&(usize, usize, f32)| {

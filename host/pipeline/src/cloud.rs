@@ -58,7 +58,7 @@ impl PairCloud {
     }
 }
 
-/// How points are made of a pair.
+/// Rules by which a pair becomes points.
 #[derive(Clone, Copy)]
 pub struct Method<'a> {
     /// Finds homologous points.

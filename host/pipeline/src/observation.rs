@@ -36,7 +36,7 @@ pub enum Observation {
 /// The points of a pair.
 ///
 /// # Errors
-/// As [`pair_cloud`].
+/// The same errors as [`pair_cloud`].
 pub fn observe_pair(
     images: PairImages<'_>,
     rig: &Rig,

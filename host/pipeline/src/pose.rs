@@ -7,7 +7,7 @@ use vergence_rig::{
 };
 use vergence_vision::Angle;
 
-/// What is known of the joints of a rig while a pair was exposed.
+/// Joint positions of a rig while a pair was exposed, and their uncertainty.
 #[derive(Clone, Debug)]
 pub enum Motion {
     /// The readings of the encoders around the exposure.
@@ -57,7 +57,7 @@ pub struct TriggeredImage<'a> {
     pub counts: &'a [Counts],
     /// The time stamp of the image, on the host's clock.
     pub stamp: StampedImage,
-    /// How long after a pulse an image of this camera may be exposed.
+    /// Range of delays after a pulse in which this camera may expose an image.
     pub delay: ExposureDelay,
 }
 

@@ -10,7 +10,7 @@ pub const ZONE_RADIUS: Length = Length::from_mm(350.0);
 /// The zones on a circle of [`ZONE_RADIUS`] in the horizontal plane, around the middle between both cameras.
 ///
 /// # Errors
-/// Where a camera stands outside the circle.
+/// Fails if a camera stands outside the circle.
 pub fn rig_zones(rig: &Rig, pose: &RigPose) -> Result<Zones, ZonesError> {
     let base_from_right = pose.base_from_left * pose.left_from_right;
     let centres = [pose.base_from_left.origin().mm(), base_from_right.origin().mm()];

@@ -90,7 +90,7 @@ impl std::fmt::Display for AxisPosition {
 /// One axis of the rig.
 #[derive(Clone, Debug, PartialEq)]
 pub struct RigAxis {
-    /// Its name in modes and on the command line.
+    /// Name of the axis in modes and on the command line.
     pub name: String,
     /// Linear or rotary.
     pub kind: AxisKind,

@@ -12,7 +12,7 @@ use vergence_vision::{Base, Frame, Point, Transform};
 pub enum Screw {
     /// Translation along a direction, by an amount in millimetres.
     Slide {
-        /// Its direction.
+        /// Direction of the translation.
         along: Unit<Vector3<f64>>,
     },
     /// Rotation about a line, by an amount in radians.

@@ -22,7 +22,7 @@ pub struct DepthField<'a> {
 pub struct PredictedDepth {
     /// The point in the left frame.
     pub point: Point<Left>,
-    /// Its covariance in mm², along the axes of the base frame.
+    /// Covariance of the point in mm², along the axes of the base frame.
     pub covariance: Matrix3<f64>,
     /// Standard deviation of its forward coordinate.
     pub sigma_forward: Length,

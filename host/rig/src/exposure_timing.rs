@@ -49,7 +49,7 @@ pub struct MiddleOfExposure {
 }
 
 impl MiddleOfExposure {
-    /// The same in microseconds, where the stamp was taken on the host's clock.
+    /// The instant in microseconds, where the stamp was taken on the host's clock.
     #[must_use]
     pub const fn on_host(self) -> HostInstant {
         HostInstant { us: micros(self.at), error_us: micros(self.error) }

@@ -14,7 +14,7 @@ use crate::chain::{Chain, Link, Screw};
 use crate::rig::Rig;
 use crate::text::{quantities, quantity};
 
-/// What is wrong with a rig file.
+/// The reason why a rig file is refused.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum RigError {
@@ -26,7 +26,7 @@ pub enum RigError {
     Camera {
         /// `left` or `right`.
         camera: &'static str,
-        /// What is wrong with them.
+        /// The reason why the lens is refused.
         lens: InvalidLens,
     },
     /// A value is out of its range or contradicts another; the message names both.

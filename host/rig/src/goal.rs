@@ -26,7 +26,7 @@ pub enum DepthSigma {
 pub struct DepthGoal {
     /// The standard deviation that is limited.
     pub sigma: DepthSigma,
-    /// Its largest allowed value.
+    /// Largest allowed standard deviation.
     pub limit: Length,
     /// Distance from the middle of both cameras.
     pub range: Length,

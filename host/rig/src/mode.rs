@@ -11,7 +11,7 @@ use crate::axis::{AxisPosition, RigAxis};
 pub struct Mode {
     /// Such as `herbivore`.
     pub name: String,
-    /// Its number on the wire, from 1; unique in a rig file.
+    /// Number of the mode on the wire, from 1; unique in a rig file.
     pub number: ModeNumber,
     /// The position of each axis, in the order of [`crate::Rig::axes`].
     pub targets: Vec<AxisPosition>,

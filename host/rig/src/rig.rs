@@ -12,7 +12,7 @@ use crate::mode::{Mode, ReportedMode};
 /// A rig: its axes, modes and cameras, and the screw chains by which the axes move the cameras.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Rig {
-    /// Its name in the rig file.
+    /// Name of the rig in its file.
     pub name: String,
     /// The axes, in the order of the board's; empty for a pair whose pose is fixed.
     pub axes: Vec<RigAxis>,
@@ -60,7 +60,7 @@ impl Rig {
     /// The rig with sensors of the same size that have `width` pixels across.
     ///
     /// # Errors
-    /// Where `width` leaves no pixels.
+    /// Fails if `width` leaves no pixels.
     pub fn with_sensors(self, width: u32) -> Result<Self, InvalidLens> {
         let (left_camera, right_camera) = (self.left_camera.resampled(width)?, self.right_camera.resampled(width)?);
         Ok(Self { left_camera, right_camera, ..self })

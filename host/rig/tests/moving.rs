@@ -152,9 +152,9 @@ fn errors(run: &Run, rig: &Rig, seeds: u64, believed: Shutter) -> Vec<f64> {
         );
         let (Some(left), Some(right)) = (left, right) else { continue };
         let pixels = PixelPair { left: gaussian.noisy(left, PIXEL_SIGMA), right: gaussian.noisy(right, PIXEL_SIGMA) };
-        let told = middle + CLOCK_ERROR_US * (2.0 * gaussian.uniform() - 1.0);
+        let stated = middle + CLOCK_ERROR_US * (2.0 * gaussian.uniform() - 1.0);
         let exposure = Exposure {
-            middle: BoardInstant { us: told, error_us: CLOCK_ERROR_US },
+            middle: BoardInstant { us: stated, error_us: CLOCK_ERROR_US },
             shutter: believed,
             rows: rig.left_camera.size().height,
         };

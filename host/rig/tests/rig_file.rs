@@ -47,10 +47,10 @@ fn a_rolling_shutter_comes_back_as_it_was() {
 fn a_pose_beyond_the_calibrated_range_gives_a_warning() {
     let rig = with("calibrated = [\"80mm\", \"200mm\"]", "counts_per_metre").expect("a rig");
     assert_eq!(read_back(&rig).axes, rig.axes);
-    let told = |mm: f64| rig.axes[0].extrapolation(AxisPosition::Linear(Length::from_mm(mm)));
-    assert_eq!([80.0, 140.0, 200.3].map(told), [None, None, None]);
-    let said = told(215.0).expect("it lies beyond");
-    assert!(said.starts_with("baseline 215.0 mm lies outside 80.0 mm to 200.0 mm"), "{said}");
+    let warning_at = |mm: f64| rig.axes[0].extrapolation(AxisPosition::Linear(Length::from_mm(mm)));
+    assert_eq!([80.0, 140.0, 200.3].map(warning_at), [None, None, None]);
+    let warning = warning_at(215.0).expect("it lies beyond");
+    assert!(warning.starts_with("baseline 215.0 mm lies outside 80.0 mm to 200.0 mm"), "{warning}");
     // The file states no calibrated range of the other axis.
     assert_eq!(rig.axes[1].extrapolation(AxisPosition::Rotary(Angle::from_deg(129.0))), None);
     assert!(with("calibrated = [\"200mm\", \"80mm\"]", "counts_per_metre").is_err());

@@ -54,7 +54,7 @@ impl Default for Gates {
 pub struct CloudPoint {
     /// Index of its match in the input.
     pub pair_index: usize,
-    /// Its match.
+    /// The match from which the point was triangulated.
     pub pixels: PixelPair,
     /// The point in the left frame.
     pub point: Point<Left>,

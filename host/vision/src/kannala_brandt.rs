@@ -72,7 +72,7 @@ pub enum InvalidLens {
         "the lens polynomial turns over at {turn:.2}, inside theta_max = {stated:.2}: reduce theta_max or recalibrate"
     )]
     TurnsOver {
-        /// Where dr/dθ first reaches zero.
+        /// Field angle at which dr/dθ first reaches zero.
         turn: Angle,
         /// The stated limit of the field.
         stated: Angle,

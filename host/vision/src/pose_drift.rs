@@ -19,7 +19,7 @@ use crate::{Angle, Left, PixelPair, Right, StereoPair, Transform};
 /// Smallest number of usable matches.
 const LEAST_PAIRS: usize = 20;
 const ITERATIONS: usize = 30;
-/// How often the equations are linearised again.
+/// Number of times the equations are linearised again.
 const ROUNDS: usize = 3;
 /// Scale of the first iterations, and prior standard deviation of ω and of the baseline's direction: images still match
 /// with a pose that is off by this much.

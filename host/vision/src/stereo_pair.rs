@@ -7,9 +7,9 @@ use crate::{KannalaBrandt, Left, Pixel, Right, Transform};
 /// A match: the pixels where both images show the same scene point.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct PixelPair {
-    /// Its pixel in the left image.
+    /// Pixel of the point in the left image.
     pub left: Pixel,
-    /// Its pixel in the right image.
+    /// Pixel of the point in the right image.
     pub right: Pixel,
 }
 

@@ -21,13 +21,13 @@ pub fn header(kind: Kind, seq: u8) -> Header {
 }
 
 /// Gives `bytes` to the board and collects the events.
-pub fn tell(board: &mut BoardSession, bytes: &[u8]) -> Vec<BoardEvent> {
+pub fn deliver(board: &mut BoardSession, bytes: &[u8]) -> Vec<BoardEvent> {
     bytes.iter().filter_map(|&byte| board.receive(Microseconds(1000), byte)).collect()
 }
 
 /// Gives `request` to the board and returns where to reply.
 pub fn ask(board: &mut BoardSession, header: Header, request: &Request) -> ReplyTo {
-    match tell(board, &host_frame(header, request)).as_slice() {
+    match deliver(board, &host_frame(header, request)).as_slice() {
         [BoardEvent::Request { reply_to, request: delivered, received_at: Microseconds(1000) }]
             if delivered == request =>
         {
@@ -61,8 +61,8 @@ pub fn refused(to: u8, refusal: Refusal) -> (Kind, Option<Report>) {
 
 pub fn open_board() -> BoardSession {
     let mut board = BoardSession::new(1);
-    let heard = tell(&mut board, &host_frame(header(Kind::Immediate, 0), &hello(SESSION)));
-    assert_eq!(heard, [BoardEvent::Opened { session: SESSION }]);
+    let received = deliver(&mut board, &host_frame(header(Kind::Immediate, 0), &hello(SESSION)));
+    assert_eq!(received, [BoardEvent::Opened { session: SESSION }]);
     assert_eq!(sent(&mut board), [hello_report(SESSION, 1)]);
     board
 }

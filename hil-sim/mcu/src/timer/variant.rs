@@ -7,7 +7,7 @@ use crate::unit::TimerId;
 /// The features of a timer.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Variant {
-    /// Which peripheral bus feeds it: 0 for APB1.
+    /// Peripheral bus that clocks the timer: 0 for APB1.
     pub bus: usize,
     pub channels: usize,
     /// The highest count: 16 or 32 bits.

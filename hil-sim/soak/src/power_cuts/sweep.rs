@@ -24,7 +24,7 @@ pub enum Journey {
     GoingBack,
 }
 
-/// What a board does when the power returns.
+/// State of a board after the power has returned.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Ending {
     /// It runs the image from before the update.
@@ -44,7 +44,7 @@ pub struct Cut {
     pub number: usize,
     /// The operation that was cut, counted from zero.
     pub operation: usize,
-    /// What the board does afterwards.
+    /// State of the board afterwards.
     pub ending: Ending,
     /// Whether the start was made; otherwise it equals one that was.
     pub started: bool,

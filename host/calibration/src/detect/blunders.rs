@@ -56,7 +56,7 @@ struct Error {
     node: Node,
     /// Distance to the prediction in its standard deviations, up to a common factor.
     normalised: f64,
-    /// The same in parts of a cell.
+    /// Distance from the predicted position as a part of the cell's side.
     part_of_cell: f64,
 }
 

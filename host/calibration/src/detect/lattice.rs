@@ -86,7 +86,7 @@ impl Lattice {
         }
     }
 
-    /// The same corners at other nodes.
+    /// A lattice of the same corners with every node renamed by `label`.
     pub fn relabelled(&self, label: impl Fn(Node) -> Node) -> Self {
         Self { nodes: self.nodes.iter().map(|(&node, &found)| (label(node), found)).collect() }
     }

@@ -132,7 +132,7 @@ impl Patch {
         ways
     }
 
-    /// Where the squares end the target must end.
+    /// Whether the target ends where its squares end along `way`.
     fn ends_agree(&self, way: Way, size: [i32; 2]) -> bool {
         SIDES.iter().zip(self.ends).filter(|(_, ends)| *ends).all(|(&side, _)| {
             let outward = turned(side, way.quarters);

@@ -68,7 +68,7 @@ pub(crate) enum NoFit {
 pub(crate) struct Task<'a, K: Kinematics> {
     pub kinematics: &'a K,
     pub views: &'a [StereoView],
-    /// Of every view.
+    /// Poses of the target in each view, one entry for a view.
     pub own_poses: &'a [OwnPoses],
     /// Lenses as their own calibration found them.
     pub lenses: Lenses,

@@ -46,7 +46,7 @@ pub struct StereoView {
 /// Options of [`calibrate_extrinsics`].
 #[derive(Clone, Debug, PartialEq)]
 pub struct ExtrinsicsOptions {
-    /// What is known of the lenses.
+    /// Prior knowledge of both lenses.
     pub lenses: LensKnowledge,
     /// Whether outliers are found by a robust loss and left out.
     pub robust: bool,
@@ -108,7 +108,7 @@ pub struct ExtrinsicsCalibration {
 /// Residuals of one view.
 #[derive(Clone, Debug, PartialEq)]
 pub struct StereoViewFigures {
-    /// Its name.
+    /// Name of the view.
     pub view: String,
     /// Pose of the target in the left frame.
     pub left_from_target: Transform<Left, Target>,
@@ -160,7 +160,7 @@ impl std::fmt::Display for StereoOutlierReason {
 /// A view without information on the relative pose.
 #[derive(Clone, Debug, PartialEq)]
 pub struct SkippedView {
-    /// Its name.
+    /// Name of the view.
     pub view: String,
     /// The camera that cannot place the target.
     pub side: Side,
@@ -189,11 +189,11 @@ pub enum ExtrinsicsError {
     /// A view contradicts itself.
     #[error("view '{view}', {side} camera: {reason}")]
     View {
-        /// Its name.
+        /// Name of the view.
         view: String,
         /// The camera.
         side: Side,
-        /// What is wrong.
+        /// The reason why the target's pose cannot be found.
         reason: PoseError,
     },
     /// The corners leave an unknown open: too few views for lenses that are free, or all targets alike.

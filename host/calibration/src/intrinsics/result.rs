@@ -68,7 +68,7 @@ pub struct ViewFigures {
     pub corners_inlier: usize,
     /// Root mean square distance of all its corners, in pixels; `None` for a view left out.
     pub rms_px: Option<f64>,
-    /// The same over the corners used.
+    /// Root mean square distance of the corners used, in pixels; `None` for a view left out.
     pub rms_inlier_px: Option<f64>,
     /// Pose of the target; `None` for a view left out.
     pub pose: Option<ViewPose>,
@@ -103,7 +103,7 @@ pub struct Outlier {
 pub enum OutlierReason {
     /// It is too far from its reprojection: see [`crate::IntrinsicsOptions::outlier_factor`].
     TooFar,
-    /// Its view has too few corners to determine the target's pose.
+    /// The view of this corner has too few corners to determine the target's pose.
     ViewTooSmall,
     /// The corners of its view lie on a line.
     ViewOnALine,
@@ -198,9 +198,9 @@ pub enum IntrinsicsError {
     /// The views fit many lenses nearly as well.
     #[error("the views do not determine the {parameter}: its standard deviation would be {sigma_px:.1} px")]
     Undetermined {
-        /// What is not determined.
+        /// The parameter that the views do not determine.
         parameter: Parameter,
-        /// Its standard deviation in pixels.
+        /// Standard deviation of the parameter's effect on the image, in pixels.
         sigma_px: f64,
     },
     /// As [`Self::Undetermined`], to the last digit: two unknowns act alike, or there are more of them than corners.

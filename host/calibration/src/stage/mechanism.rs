@@ -20,9 +20,9 @@ pub(crate) struct State {
     pub left_at_zero: Isometry3<f64>,
     pub right: Vec<Link>,
     pub right_at_zero: Isometry3<f64>,
-    /// Of each axis.
+    /// Scale of the encoder of each axis, as a ratio to its nominal scale.
     pub scales: Vec<f64>,
-    /// Of each axis at each stage pose, millimetres or radians.
+    /// Error of the reading of each axis at each stage pose, in millimetres or radians.
     pub reading_errors: Vec<Vec<f64>>,
 }
 

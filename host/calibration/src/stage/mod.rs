@@ -40,11 +40,11 @@ pub struct StagePose {
 /// Deviation of a mechanism from its drawing: one standard deviation of each kind of unknown.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Tolerance {
-    /// Of a screw's direction, about each of two axes.
+    /// Standard deviation of a screw's direction about each of two axes.
     pub direction: Angle,
-    /// Of the line of a turn, along each of two axes.
+    /// Standard deviation of the position of a rotation's line along each of two axes.
     pub position: Length,
-    /// Of an encoder's scale, as a ratio.
+    /// Standard deviation of an encoder's scale, as a ratio.
     pub scale: f64,
 }
 
@@ -58,7 +58,7 @@ impl Default for Tolerance {
 /// Options of [`calibrate_stage`].
 #[derive(Clone, Debug, PartialEq)]
 pub struct StageOptions {
-    /// What is known of the lenses.
+    /// Prior knowledge of both lenses.
     pub lenses: LensKnowledge,
     /// Whether outliers are left out.
     pub robust: bool,

@@ -31,7 +31,7 @@ pub struct StageCalibration {
     pub at_zero: PredictedPose,
     /// Figures of each stage pose.
     pub poses: Vec<StagePoseFigures>,
-    /// Which unknowns the stage poses determine.
+    /// The unknowns that the stage poses determine.
     pub observability: Observability,
     /// Root mean square distance between corners and reprojections, outliers included, in pixels.
     pub rms_px: f64,
@@ -96,7 +96,7 @@ pub struct EncoderScale {
     pub axis: String,
     /// The factor; 1 if the encoder is as stated.
     pub scale: f64,
-    /// Its standard deviation.
+    /// Standard deviation of the value.
     pub sigma: f64,
 }
 

@@ -47,7 +47,7 @@ pub(crate) struct Ordinal {
 }
 
 impl Ordinal {
-    /// How many components of the same unknown came directly before.
+    /// Counts the components of the same unknown that came directly before.
     pub fn next(&mut self, unknown: Unknown) -> usize {
         self.count = if self.last == Some(unknown) { self.count + 1 } else { 0 };
         self.last = Some(unknown);

@@ -15,11 +15,11 @@ pub struct DenseDepth {
 /// The result of one pixel.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum DenseSample {
-    /// Its range was measured.
+    /// The range of this pixel was measured.
     Measured(DenseRange),
     /// It is farther than can be measured: its parallax cannot be distinguished from zero.
     Far,
-    /// Its range is unknown.
+    /// The range of this pixel is unknown, for the reason given.
     Gap(Gap),
 }
 

@@ -64,7 +64,7 @@ pub struct Signature {
 
 /// A loaded network.
 pub trait Network: Send + Sync {
-    /// Its inputs and outputs.
+    /// Names, types and shapes of the inputs and outputs.
     fn signature(&self) -> &Signature;
 
     /// Runs the network on `inputs` by name; returns the tensors named in `outputs`, in that order.
@@ -99,7 +99,7 @@ pub enum NetworkError {
     Contract {
         /// Name of the network.
         network: String,
-        /// What does not fit.
+        /// The mismatch between network and manifest.
         reason: String,
     },
     /// The network failed while running.

@@ -15,7 +15,7 @@ impl Warp {
         (x + self.tx + self.sx * x + self.sy * y, y + self.ty)
     }
 
-    /// The same warp at a resolution `factor` times as high.
+    /// Returns this warp at a resolution `factor` times as high.
     #[inline]
     pub(super) fn scaled(&self, factor: f64) -> Self {
         Self { tx: self.tx * factor, ty: self.ty * factor, ..*self }

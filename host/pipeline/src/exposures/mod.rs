@@ -17,7 +17,7 @@ use self::free_running::FreeRunning;
 pub use self::outcome::{Ambiguity, CameraGone, Exposed, ExposedImage, SkipReason};
 use self::triggered::Triggered;
 
-/// What has been on its way for longer than this is lost, in microseconds.
+/// Images and marks on their way for longer than this are lost, in microseconds.
 const PATIENCE_US: f64 = 500_000.0;
 
 /// The clock of the instants in an [`ExposedImage`].
@@ -54,7 +54,7 @@ enum Pairing<T> {
     FreeRunning(FreeRunning),
 }
 
-/// What is known of one camera.
+/// Images and marks of one camera that wait for each other.
 struct CameraQueue<T> {
     timing: Option<ExposureTiming>,
     /// `None` while it delivers.
@@ -73,7 +73,7 @@ impl<T> CameraQueue<T> {
     }
 }
 
-/// What was decided so far.
+/// Pairs and losses decided so far.
 struct Results<T> {
     ready: VecDeque<Exposed<T>>,
     skipped: BTreeMap<SkipReason, u64>,

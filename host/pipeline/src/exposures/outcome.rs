@@ -12,7 +12,7 @@ pub struct ExposedImage<T> {
     pub middle: BoardInstant,
 }
 
-/// What can be measured.
+/// Images ready to be measured: a pair, or one image where the other camera is gone.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Exposed<T> {
     /// The images of both cameras (left, right), exposed together.
@@ -21,7 +21,7 @@ pub enum Exposed<T> {
     One {
         /// The camera that delivered it.
         side: Side,
-        /// Its image.
+        /// Image of that camera.
         image: Box<ExposedImage<T>>,
         /// Why the other camera is gone.
         why: CameraGone,

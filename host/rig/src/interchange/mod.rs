@@ -29,7 +29,7 @@ pub struct Camchain {
     pub right: Option<(KannalaBrandt, Transform<Left, Right>)>,
 }
 
-/// What is wrong with a camera file of another program.
+/// The reason why a camera file of another program is refused.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum InterchangeError {

@@ -37,8 +37,8 @@ proptest! {
         prop_assert!((got.us - board(ask)).abs() <= got.error_us, "{:?} {}", got, board(ask));
         let back = map.host_at(Microseconds(board(ask) as u64)).expect("there were exchanges");
         prop_assert!((back.us - ask as f64).abs() <= back.error_us + 1.0, "{:?} {}", back, ask);
-        let told = map.drift().expect("there were exchanges");
-        prop_assert!((told.ppm - 1e6 * drift).abs() <= told.error_ppm, "{:?} {}", told, drift);
+        let stated = map.drift().expect("there were exchanges");
+        prop_assert!((stated.ppm - 1e6 * drift).abs() <= stated.error_ppm, "{:?} {}", stated, drift);
     }
 
     /// The converted clock never stands still or runs backwards, and converting there and back returns the start.
@@ -49,9 +49,9 @@ proptest! {
     ) {
         let mut map = ClockMap::default();
         observed(&mut map, |host| 5e9 + host as f64 * (1.0 + 80e-6), &delays);
-        let told: Vec<f64> = hosts.iter().map(|&host| board_at(&map, host).us).collect();
-        prop_assert!(told.is_sorted_by(|a, b| a < b));
-        for (&host, us) in hosts.iter().zip(told) {
+        let stated: Vec<f64> = hosts.iter().map(|&host| board_at(&map, host).us).collect();
+        prop_assert!(stated.is_sorted_by(|a, b| a < b));
+        for (&host, us) in hosts.iter().zip(stated) {
             let back = map.host_at(Microseconds(us.round() as u64)).expect("there were exchanges");
             prop_assert!((back.us - host as f64).abs() < 0.51, "{:?} {}", back, host);
         }
@@ -93,9 +93,9 @@ proptest! {
         }
         let board = map.board_at(Microseconds(ask));
         let host = map.host_at(Microseconds(ask));
-        prop_assert!(board.is_none_or(|told| told.us.is_finite() && told.error_us >= 0.0));
-        prop_assert!(host.is_none_or(|told| told.us.is_finite() && told.error_us >= 0.0));
-        prop_assert!(map.drift().is_none_or(|told| told.ppm.abs() <= 200.0 + 1e-9));
+        prop_assert!(board.is_none_or(|stated| stated.us.is_finite() && stated.error_us >= 0.0));
+        prop_assert!(host.is_none_or(|stated| stated.us.is_finite() && stated.error_us >= 0.0));
+        prop_assert!(map.drift().is_none_or(|stated| stated.ppm.abs() <= 200.0 + 1e-9));
     }
 }
 
@@ -126,16 +126,16 @@ fn offset_and_drift_of_exact_exchanges_are_exact() {
 /// 1 + 4 + 4 + 4: 150 us down, 230 us up.
 #[test]
 fn a_longer_reply_is_no_error_at_a_known_baud_rate() {
-    let told = |mut map: ClockMap| {
+    let clock_of = |mut map: ClockMap| {
         for second in 3..20 {
             let (t0, arrived) = (second * 1_000_000, second * 1_000_000 + 5_000_000 + 150);
             map.observe(exchange(t0, arrived, arrived, t0 + 150 + 230));
         }
         board_at(&map, 20_000_000)
     };
-    let known = told(ClockMap::at_baud(1_000_000));
+    let known = clock_of(ClockMap::at_baud(1_000_000));
     assert!((known.us - 25_000_000.0).abs() < 0.01, "{known:?}");
-    let unknown = told(ClockMap::default());
+    let unknown = clock_of(ClockMap::default());
     assert!((unknown.us - (25_000_000.0 - 40.0)).abs() < 0.01, "{unknown:?}");
     assert!(known.error_us < 60.0 && unknown.error_us > 190.0, "{known:?} {unknown:?}");
 }
@@ -150,11 +150,11 @@ fn four_probes_without_answer_lose_the_clock_and_one_answer_finds_it() {
     }
     map.probe_sent();
     assert!(map.is_lost());
-    let told = |map: &ClockMap| board_at(map, 6_000_000);
-    let lost = told(&map);
+    let clock_of = |map: &ClockMap| board_at(map, 6_000_000);
+    let lost = clock_of(&map);
     map.observe(exchange(5_999_900, 6_000_400, 6_000_400, 6_000_000));
     assert!(!map.is_lost());
-    assert!(told(&map).error_us < 100.0 && lost.error_us > 1_000.0, "{lost:?}");
+    assert!(clock_of(&map).error_us < 100.0 && lost.error_us > 1_000.0, "{lost:?}");
 }
 
 #[test]

@@ -137,8 +137,8 @@ impl Link {
         let arrived = sent + self.wire_us(&Request::TimeProbe { t0 }) + self.down.of(random, sent);
         let left = arrived + random.between(20.0, 1_000.0);
         let (t1, t2) = (micro(board.at(arrived)), micro(board.at(left)));
-        let heard = left + self.wire_us(&Report::TimeReply { t0, t1, t2 }) + self.up.of(random, left);
-        Exchange { t0, t1, t2, t3: micro(heard) }
+        let returned = left + self.wire_us(&Report::TimeReply { t0, t1, t2 }) + self.up.of(random, left);
+        Exchange { t0, t1, t2, t3: micro(returned) }
     }
 
     fn wire_us<B: serde::Serialize>(self, body: &B) -> f64 {
@@ -149,12 +149,12 @@ impl Link {
 }
 
 fn outcome(map: &ClockMap, board: &BoardClock, now: u64) -> Option<Outcome> {
-    let told = map.board_at(Microseconds(now))?;
-    let back = map.host_at(Microseconds(told.us.round() as u64))?;
+    let stated = map.board_at(Microseconds(now))?;
+    let back = map.host_at(Microseconds(stated.us.round() as u64))?;
     Some(Outcome {
         at_us: now as f64,
-        error_us: (told.us - board.at(now as f64)).abs(),
-        bound_us: told.error_us,
+        error_us: (stated.us - board.at(now as f64)).abs(),
+        bound_us: stated.error_us,
         round_trip_us: (back.us - now as f64).abs(),
         round_trip_bound_us: back.error_us,
     })

@@ -15,7 +15,7 @@ const BAUD: u32 = 921_600;
 
 /// The figures of a link over all seeds, in microseconds.
 #[derive(Debug)]
-#[allow(dead_code, reason = "told where a test fails")]
+#[allow(dead_code, reason = "printed where a test fails")]
 struct Figures {
     coverage: f64,
     coverage_of_worst_seed: f64,

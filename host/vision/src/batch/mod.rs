@@ -23,7 +23,7 @@ pub use lens::BatchLens;
 pub use pair::{BatchPair, BatchPoints};
 pub use triangulate::{BatchTriangulation, triangulate_batch};
 
-/// Which processor instructions the batch kernels use.
+/// Processor instructions that the batch kernels may use.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Instructions {
     /// The best instructions that this machine has and the kernels support.

@@ -45,9 +45,9 @@ const VANISHING: f64 = 1e-9;
 pub struct Triangulated {
     /// The point in the left frame.
     pub point: Point<Left>,
-    /// Its distance from the left optical centre.
+    /// Distance from the left optical centre.
     pub left_range: Length,
-    /// Its distance from the right optical centre.
+    /// Distance from the right optical centre.
     pub right_range: Length,
     /// The angle between the epipolar planes of the two rays, not negative.
     pub skew: Angle,

@@ -46,7 +46,7 @@ impl BodyMask {
 pub struct PlacedCamera<'a> {
     /// The lens with its sensor.
     pub lens: &'a KannalaBrandt,
-    /// Its pose; the base frame has x to the right, y down, z forward.
+    /// Pose of the camera; the base frame has x to the right, y down, z forward.
     pub base_from_camera: Transform<Base, Camera>,
     /// The mask of the robot's own body, if there is one.
     pub body: Option<&'a BodyMask>,
