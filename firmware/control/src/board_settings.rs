@@ -1,8 +1,8 @@
 //! The settings of a board: all axes, pose stream, serial line and machine, each readable as one number.
 
-use vergence_protocol::{AxisList, Micro, SettingItem, SettingKey};
+use vergence_protocol::{AxisKind, AxisList, Micro, SettingItem, SettingKey};
 
-use crate::settings::{AxisSettings, SettingsError};
+use crate::settings::{AxisSettings, HomingSettings, SettingsError};
 
 /// Shortest period of the pose stream in microseconds: a pose of 45 bytes at 921 600 baud takes half of it.
 pub const SHORTEST_STREAM_US: u32 = 1_000;
@@ -59,6 +59,21 @@ impl BoardSettings {
         let axes = axes.iter().copied().collect::<heapless::Vec<_, { vergence_protocol::MAX_AXES }>>();
         let settings = Self { axes, stream_period_us: STREAM_US, baud: USUAL_BAUD, machine: Machine::Bench };
         settings.validate()?;
+        Ok(settings)
+    }
+
+    /// Settings of a board whose axes are of these `kinds`, with the `values` given and zero where none is given. They are
+    /// not checked: see [`Self::validate`].
+    ///
+    /// # Errors
+    /// [`SettingError`] if a value names no setting of such a board, or does not fit its number.
+    pub fn from_values(
+        kinds: &[AxisKind],
+        values: impl IntoIterator<Item = (SettingKey, i64)>,
+    ) -> Result<Self, SettingError> {
+        let axes = kinds.iter().take(vergence_protocol::MAX_AXES).map(|&kind| AxisSettings::blank(kind)).collect();
+        let mut settings = Self { axes, stream_period_us: STREAM_US, baud: USUAL_BAUD, machine: Machine::Bench };
+        values.into_iter().try_for_each(|(key, value)| settings.put(key, value))?;
         Ok(settings)
     }
 
@@ -126,6 +141,35 @@ impl BoardSettings {
 }
 
 impl AxisSettings {
+    /// Settings of an axis of this kind that are all zero.
+    fn blank(kind: AxisKind) -> Self {
+        let nothing = Micro(0);
+        let homing = HomingSettings {
+            switch_at: nothing,
+            seek_speed: 0,
+            approach_speed: 0,
+            retract: nothing,
+            travel: nothing,
+            repeatability: nothing,
+        };
+        Self {
+            kind,
+            min: nothing,
+            max: nothing,
+            speed: 0,
+            acceleration: 0,
+            jerk: 0,
+            steps_per_unit: 0,
+            counts_per_unit: 0,
+            steps_reversed: false,
+            counts_reversed: false,
+            following_error: nothing,
+            tolerance: nothing,
+            backlash: nothing,
+            homing,
+        }
+    }
+
     /// Value of an axis setting; `None` for settings of the board.
     fn item(&self, item: SettingItem) -> Option<i64> {
         let homing = &self.homing;

@@ -67,6 +67,8 @@ pub struct Controller {
     latch: FaultLatch,
     homing: HomingSequence,
     self_test: SelfTest,
+    /// Whether the saved settings were refused and nobody has been told yet.
+    settings_lost: bool,
     /// Whether the firmware is on trial.
     on_trial: bool,
     /// State to return to when an update is given up.
@@ -109,6 +111,7 @@ impl Controller {
             latch: FaultLatch::default(),
             homing: HomingSequence::default(),
             self_test: SelfTest::default(),
+            settings_lost: false,
             on_trial: false,
             before_update: ControllerState::Idle,
             next_tick: Microseconds(0),
@@ -116,6 +119,11 @@ impl Controller {
             disarm_at_rest: false,
             events: Deque::new(),
         })
+    }
+
+    /// Notes that the saved settings were refused, so that the self-test ends in a fault. Call it at the start.
+    pub fn distrust_settings(&mut self) {
+        self.settings_lost = true;
     }
 
     /// Number of axes.

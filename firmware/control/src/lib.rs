@@ -13,6 +13,7 @@
 
 mod axis;
 mod board_settings;
+mod bounds;
 mod contact;
 mod controller;
 mod follow;
@@ -35,6 +36,7 @@ mod trigger;
 mod updater;
 
 pub use board_settings::{BoardSettings, Machine, SettingError};
+pub use bounds::LONGEST_BRAKING_MS;
 pub use controller::{Controller, Event};
 pub use io::{MAX_STEPS_PER_TICK, RigIo, StepSchedule, TriggerEdge};
 pub use node::{Node, NodeIdentity};

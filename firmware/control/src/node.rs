@@ -15,7 +15,7 @@ use crate::io::RigIo;
 use crate::recorder::Recorder;
 use crate::services::BoardServices;
 use crate::settings::SettingsError;
-use crate::settings_store;
+use crate::settings_store::{self, Saved};
 use crate::trigger::CameraTrigger;
 use crate::updater::Updater;
 use crate::{REST_US, TICK_US};
@@ -73,8 +73,9 @@ pub struct Node {
 }
 
 impl Node {
-    /// A node with the settings last saved, or with `defaults` if there are none. The number `boot` must differ from that
-    /// of the last start.
+    /// A node with the settings last saved, or with `defaults` if there are none. Saved settings that this firmware refuses
+    /// are replaced by `defaults` too, and a fault keeps the board from moving with them unnoticed. The number `boot` must
+    /// differ from that of the last start.
     ///
     /// # Errors
     /// [`SettingsError`] if an axis cannot work with the default settings.
@@ -84,8 +85,13 @@ impl Node {
         boot: u32,
         services: &mut impl BoardServices,
     ) -> Result<Self, SettingsError> {
-        let settings = settings_store::load(services.settings_flash(), defaults).unwrap_or_else(|| defaults.clone());
+        let saved = settings_store::load(services.settings_flash(), defaults);
+        let refused = saved == Saved::Refused;
+        let settings = saved.settings().unwrap_or_else(|| defaults.clone());
         let mut controller = Controller::new(&settings.axes)?;
+        if refused {
+            controller.distrust_settings();
+        }
         if services.boot_state() == BootState::Trial {
             controller.set_trial();
         }

@@ -1,8 +1,9 @@
 //! Settings of one axis: range, limits, scales and homing.
 
-use vergence_protocol::{AxisInfo, AxisKind, Micro};
+use vergence_protocol::{AxisInfo, AxisKind, Micro, SettingItem};
 
 use crate::TICK_US;
+use crate::bounds::{self, LONGEST_BRAKING_MS};
 use crate::profile::Limits;
 
 /// Encoder counts or motor steps per metre (linear axis) or revolution (rotary axis).
@@ -25,7 +26,7 @@ pub struct Scale {
 
 impl Scale {
     /// Thousandths of a micro-unit in one unit: 10⁶ µm in a metre, 2π·10⁶ µrad in a revolution.
-    const fn milli_micro(self) -> i64 {
+    pub(crate) const fn milli_micro(self) -> i64 {
         match self.kind {
             AxisKind::Linear => 1_000_000_000,
             AxisKind::Rotary => 6_283_185_307,
@@ -138,6 +139,31 @@ pub enum SettingsError {
         /// Index of the axis, from 0.
         axis: usize,
     },
+    /// With this value beside the other settings the board could not keep one of its promises.
+    #[error("axis {axis}: {name} must lie between {least} and {most}: {why}", name = item.name())]
+    Outside {
+        /// Index of the axis, from 0.
+        axis: usize,
+        /// The setting.
+        item: SettingItem,
+        /// Smallest value that the other settings allow, in the setting's own unit.
+        least: i64,
+        /// Largest value that the other settings allow, in the setting's own unit.
+        most: i64,
+        /// Reason for the bounds.
+        why: &'static str,
+    },
+    /// A stop from full speed takes longer than [`LONGEST_BRAKING_MS`].
+    #[error(
+        "axis {axis}: braking from full speed would take {milliseconds} ms, longer than {LONGEST_BRAKING_MS} ms: \
+         raise acceleration or jerk, or lower the speed"
+    )]
+    Braking {
+        /// Index of the axis, from 0.
+        axis: usize,
+        /// Time to brake from full speed, in milliseconds.
+        milliseconds: u32,
+    },
     /// The serial line or the pose stream is too fast or too slow.
     #[error("the serial line or the pose stream cannot have that rate")]
     Link,
@@ -168,7 +194,7 @@ impl AxisSettings {
         if steps > u128::from(LARGEST_STEP_RATE) * self.motor().milli_micro() as u128 {
             return Err(SettingsError::StepRate { axis });
         }
-        Ok(())
+        bounds::check(self, axis)
     }
 
     /// Whether a move may ask for `position`.
@@ -183,10 +209,10 @@ impl AxisSettings {
         Limits { speed: self.speed as f32, acceleration: self.acceleration as f32, jerk: self.jerk as f32 }
     }
 
-    /// The limits of homing at `speed`: full acceleration and jerk.
+    /// The limits of homing at `speed`, but no faster than the axis may move: full acceleration and jerk.
     #[must_use]
     pub fn limits_at(&self, speed: u32) -> Limits {
-        Limits { speed: speed as f32, ..self.limits() }
+        Limits { speed: speed.min(self.speed) as f32, ..self.limits() }
     }
 
     /// Scale of the encoder.

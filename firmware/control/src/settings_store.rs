@@ -20,14 +20,37 @@ const PAGES: [usize; 2] = [0, 1];
 
 type Page = [u8; PAGE];
 
-/// Reads the settings last saved; `None` if none were saved or this board cannot work with them. Items that the record
-/// does not hold are taken from `defaults`.
-pub fn load(flash: &mut impl Flash, defaults: &BoardSettings) -> Option<BoardSettings> {
+/// The settings found in flash.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum Saved {
+    /// No complete record: none were saved yet.
+    Nothing,
+    /// The settings last saved.
+    Settings(BoardSettings),
+    /// A complete record with settings that this firmware refuses.
+    Refused,
+}
+
+impl Saved {
+    /// The saved settings; `None` where there are none or this firmware refuses them.
+    #[must_use]
+    pub fn settings(self) -> Option<BoardSettings> {
+        match self {
+            Self::Settings(settings) => Some(settings),
+            Self::Nothing | Self::Refused => None,
+        }
+    }
+}
+
+/// Reads the settings last saved. Items that the record does not hold are taken from `defaults`.
+pub fn load(flash: &mut impl Flash, defaults: &BoardSettings) -> Saved {
     let mut page = [0; PAGE];
-    let (newest, _) = newest(flash, &mut page)?;
-    let body = read_record(flash, newest, &mut page)?.body;
-    let settings = decode(body, defaults)?;
-    settings.validate().is_ok().then_some(settings)
+    let Some((newest, _)) = newest(flash, &mut page) else { return Saved::Nothing };
+    let Some(record) = read_record(flash, newest, &mut page) else { return Saved::Nothing };
+    match decode(record.body, defaults) {
+        Some(settings) if settings.validate().is_ok() => Saved::Settings(settings),
+        _ => Saved::Refused,
+    }
 }
 
 /// Saves `settings` and reads them back.

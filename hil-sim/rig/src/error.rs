@@ -57,6 +57,6 @@ pub(crate) fn refusal(error: SettingsError, rig: &Rig) -> String {
         SettingsError::StepRate { axis } => {
             format!("axis {} needs more than {} steps a second", name(axis), vergence_control::LARGEST_STEP_RATE)
         }
-        other => format!("its controller refuses the settings ({other:?})"),
+        other => format!("its controller refuses the settings: {other}"),
     }
 }

@@ -56,8 +56,8 @@ fn mode_from_steps() {
 }
 
 #[test]
-fn the_encoder_is_not_compared_with_the_command() {
-    catches(Defect::NoFollowingCheck, Promise::Follows);
+fn the_encoder_is_compared_too_loosely() {
+    catches(Defect::LooseFollowingCheck, Promise::Follows);
 }
 
 #[test]

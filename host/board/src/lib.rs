@@ -11,6 +11,7 @@ mod link;
 mod link_figures;
 mod move_plan;
 mod serve;
+mod setting_check;
 mod setting_text;
 mod update;
 
@@ -23,6 +24,7 @@ pub use link::{
 pub use link_figures::LinkFigures;
 pub use move_plan::{AxisLimits, AxisPlan, Knot, MovePlan, MoveStart};
 pub use serve::{BoardGuard, ListenError, Listener, ServeError, Served, Shared, serve, spawn_in_process};
+pub use setting_check::why_refused;
 pub use setting_text::{NamedSetting, settings};
 pub use update::{
     FirmwareImage, ImageFileError, UpdateError, UpdateEvent, Updated, confirm, hardware_name, restart, roll_back,

@@ -56,6 +56,10 @@ impl Controller {
     }
 
     fn poll_self_test(&mut self, now: Microseconds, io: &impl RigIo) {
+        if core::mem::take(&mut self.settings_lost) {
+            self.state = ControllerState::Fault;
+            return self.raise(now, FaultCode::BadSettings, None, 0);
+        }
         match self.self_test.poll(self.axes.iter().map(|axis| &axis.settings), io) {
             Verdict::Running => {}
             Verdict::Passed => self.state = self.at_rest(),

@@ -18,7 +18,7 @@ pub enum Defect {
     RefusesNothing,
     NoSwitches,
     ModeFromSteps,
-    NoFollowingCheck,
+    LooseFollowingCheck,
     LatestFault,
     FaultForgotten,
     DriversStayOn,
@@ -49,8 +49,8 @@ impl PlantedBoard {
         for stage in &mut stages {
             match defect {
                 Defect::WeakBrakes => {
-                    stage.settings.acceleration /= 8;
-                    stage.settings.jerk /= 64;
+                    stage.settings.acceleration /= 5;
+                    stage.settings.jerk /= 25;
                 }
                 Defect::NoRangeCheck => stage.settings.max.0 *= 2,
                 Defect::NoSwitches => {
@@ -58,7 +58,10 @@ impl PlantedBoard {
                     stage.mechanics.hard_limits = [-1e9, 1e9];
                 }
                 Defect::FastWithoutReference => stage.settings.homing.seek_speed = stage.settings.speed,
-                Defect::NoFollowingCheck => stage.settings.following_error = Micro(i32::MAX),
+                // The loosest check that the controller accepts.
+                Defect::LooseFollowingCheck => {
+                    stage.settings.following_error = Micro((stage.settings.max.0 - stage.settings.min.0) / 25);
+                }
                 _ => {}
             }
         }

@@ -5,7 +5,7 @@ mod file;
 use std::path::PathBuf;
 
 use serde_json::{Map, Value, json};
-use vergence_board::{Board, ManagementLink, NamedSetting, Port, restart, settings};
+use vergence_board::{Board, ManagementLink, NamedSetting, Port, restart, settings, why_refused};
 use vergence_protocol::{ControllerState, Refusal, Request};
 
 use super::connect::{connect_any, port};
@@ -158,12 +158,15 @@ async fn set_one(board: &Board, name: &str, text: &str, console: Console) -> Res
     let setting = find(board, name)?;
     let value = setting.read(text).map_err(Failure::usage)?;
     let before = board.setting(setting.key).await?;
-    board.set(setting.key, value).await?.map_err(|refusal| match refusal {
-        Refusal::BadSetting => {
-            Failure::usage(format!("{name} cannot be {text} beside the other settings of the board"))
+    match board.set(setting.key, value).await? {
+        Ok(()) => {}
+        Err(Refusal::BadSetting) => {
+            let reason = why_refused(board.rig(), &read_all(board).await?, [(setting.key, value)]);
+            let reason = reason.unwrap_or_else(|| "it does not go with the other settings of the board".into());
+            return Err(Failure::usage(format!("{name} cannot be {text}: {reason}")));
         }
-        _ => board.refused(refusal).into(),
-    })?;
+        Err(refusal) => return Err(board.refused(refusal).into()),
+    }
     let (now, before) = (setting.write(value), before.map(|before| setting.write(before)));
     console.say(format!("{name} is {now}, it was {}", before.as_deref().unwrap_or("unknown")))?;
     say_unsaved(console, before.as_ref() != Some(&now))?;

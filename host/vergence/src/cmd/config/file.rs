@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use vergence_board::{Board, NamedSetting};
+use vergence_board::{Board, NamedSetting, why_refused};
 use vergence_protocol::Refusal;
 
 use super::read_all;
@@ -95,7 +95,12 @@ async fn set_all(board: &Board, mut wanted: Vec<Change>, done: &mut Vec<Change>)
                 .iter()
                 .map(|change| format!("{} = {}", change.setting.name(), change.setting.write(change.value)));
             let names = names.collect::<Vec<_>>().join(", ");
-            return Err(Failure::usage(format!("nothing was changed: the board refuses {names} beside the others")));
+            let changes = misfits.iter().map(|change| (change.setting.key, change.value));
+            let reason = why_refused(board.rig(), &read_all(board).await?, changes);
+            let reason = reason.map_or_else(String::new, |reason| format!(": {reason}"));
+            return Err(Failure::usage(format!(
+                "nothing was changed: the board refuses {names} beside the others{reason}"
+            )));
         }
         wanted = misfits;
     }

@@ -1,0 +1,114 @@
+//! Bounds of axis settings beyond which the board could not keep its promises: to notice a stage that does not follow, to
+//! call a move settled only where it is, and to stop in a stated time.
+//!
+//! Each bound is in proportion to the axis: a share of its range, a mark of its encoder, or another of its settings.
+
+use vergence_protocol::SettingItem;
+
+use crate::settings::{AxisSettings, Scale, SettingsError};
+
+/// Longest time to brake from full speed, in milliseconds.
+pub const LONGEST_BRAKING_MS: u32 = 2_000;
+/// Acceleration rises to its largest value in two control ticks or more: at most this share of it in a second.
+const FASTEST_RISE: i64 = 500;
+/// Homing may travel this many times the range.
+const MOST_TRAVEL: i64 = 3;
+
+/// The values that a setting may have beside the others.
+struct Bound {
+    item: SettingItem,
+    value: i64,
+    least: i64,
+    most: i64,
+    why: &'static str,
+}
+
+/// Checks the settings of axis number `axis`, whose range is not empty and whose rates are positive.
+///
+/// # Errors
+/// [`SettingsError::Outside`] with the first setting out of its bounds, or [`SettingsError::Braking`].
+pub(crate) fn check(settings: &AxisSettings, axis: usize) -> Result<(), SettingsError> {
+    let outside = bounds(settings).into_iter().find(|bound| !(bound.least..=bound.most).contains(&bound.value));
+    if let Some(Bound { item, least, most, why, .. }) = outside {
+        return Err(SettingsError::Outside { axis, item, least, most, why });
+    }
+    let milliseconds = braking_ms(settings);
+    if milliseconds > LONGEST_BRAKING_MS {
+        return Err(SettingsError::Braking { axis, milliseconds });
+    }
+    Ok(())
+}
+
+fn bounds(settings: &AxisSettings) -> [Bound; 9] {
+    let homing = &settings.homing;
+    let [min, max] = [settings.min, settings.max].map(|end| i64::from(end.0));
+    let range = max - min;
+    let reached = settings.encoder().position_at(1).0.max(settings.motor().position_at(1).0 / 2);
+    let furthest = (min.abs().max(max.abs()) + MOST_TRAVEL * range).max(1);
+    let finest = |scale: Scale| i64::from(i32::MAX / 2) * (scale.milli_micro() / 1000) / furthest;
+    let bound = |item, value: i64, least: i64, most: i64, why| Bound { item, value, least, most, why };
+    [
+        bound(
+            SettingItem::FollowingError,
+            settings.following_error.0.into(),
+            1,
+            range / 25,
+            "a stage that does not follow would go unnoticed",
+        ),
+        bound(
+            SettingItem::Tolerance,
+            settings.tolerance.0.into(),
+            reached.max(1).into(),
+            range / 250,
+            "below, encoder and motor cannot reach it; above, a move would count as settled where it is not",
+        ),
+        bound(SettingItem::Backlash, settings.backlash.0.into(), 0, range / 20, "it is the play of a stage, not a way"),
+        bound(
+            SettingItem::Jerk,
+            settings.jerk.into(),
+            1,
+            i64::from(settings.acceleration) * FASTEST_RISE,
+            "acceleration must take two control ticks to rise",
+        ),
+        bound(SettingItem::HomeRetract, homing.retract.0.into(), 1, range / 10, "it leads away from the switch"),
+        bound(
+            SettingItem::HomeTravel,
+            homing.travel.0.into(),
+            1,
+            MOST_TRAVEL * range,
+            "a search that misses the switch must end",
+        ),
+        bound(
+            SettingItem::HomeRepeatability,
+            homing.repeatability.0.into(),
+            1,
+            range / 100,
+            "a bad reference would go unnoticed",
+        ),
+        bound(
+            SettingItem::StepsPerUnit,
+            settings.steps_per_unit.into(),
+            1,
+            finest(settings.motor()),
+            "all steps from end to end, and as many again, must fit in 31 bits",
+        ),
+        bound(
+            SettingItem::CountsPerUnit,
+            settings.counts_per_unit.into(),
+            1,
+            finest(settings.encoder()),
+            "all counts from end to end, and as many again, must fit in 31 bits",
+        ),
+    ]
+}
+
+/// Time to come to rest from full speed, in milliseconds: v/a + a/j, or 2 √(v/j) where full acceleration is not reached.
+fn braking_ms(settings: &AxisSettings) -> u32 {
+    let [speed, acceleration, jerk] = [settings.speed, settings.acceleration, settings.jerk].map(|rate| rate as f32);
+    let seconds = if acceleration * acceleration <= speed * jerk {
+        speed / acceleration + acceleration / jerk
+    } else {
+        2.0 * libm::sqrtf(speed / jerk)
+    };
+    (seconds * 1e3) as u32
+}
