@@ -15,7 +15,7 @@ use crate::io::RigIo;
 use crate::recorder::Recorder;
 use crate::services::BoardServices;
 use crate::settings::SettingsError;
-use crate::settings_store::{self, Saved};
+use crate::settings_store;
 use crate::trigger::CameraTrigger;
 use crate::updater::Updater;
 use crate::{REST_US, TICK_US};
@@ -86,10 +86,10 @@ impl Node {
         services: &mut impl BoardServices,
     ) -> Result<Self, SettingsError> {
         let saved = settings_store::load(services.settings_flash(), defaults);
-        let refused = saved == Saved::Refused;
-        let settings = saved.settings().unwrap_or_else(|| defaults.clone());
+        let are_refused = saved.is_err();
+        let settings = saved.ok().flatten().unwrap_or_else(|| defaults.clone());
         let mut controller = Controller::new(&settings.axes)?;
-        if refused {
+        if are_refused {
             controller.distrust_settings();
         }
         if services.boot_state() == BootState::Trial {

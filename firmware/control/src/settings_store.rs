@@ -20,37 +20,22 @@ const PAGES: [usize; 2] = [0, 1];
 
 type Page = [u8; PAGE];
 
-/// The settings found in flash.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub enum Saved {
-    /// No complete record: none were saved yet.
-    Nothing,
-    /// The settings last saved.
-    Settings(BoardSettings),
-    /// A complete record with settings that this firmware refuses.
-    Refused,
-}
+/// A complete record holds settings that this firmware refuses.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
+#[error("the saved settings are refused by this firmware")]
+pub struct SettingsRefused;
 
-impl Saved {
-    /// The saved settings; `None` where there are none or this firmware refuses them.
-    #[must_use]
-    pub fn settings(self) -> Option<BoardSettings> {
-        match self {
-            Self::Settings(settings) => Some(settings),
-            Self::Nothing | Self::Refused => None,
-        }
-    }
-}
-
-/// Reads the settings last saved. Items that the record does not hold are taken from `defaults`.
-pub fn load(flash: &mut impl Flash, defaults: &BoardSettings) -> Saved {
+/// Reads the settings last saved; `None` if none were saved. Items that the record does not hold are taken from `defaults`.
+///
+/// # Errors
+/// [`SettingsRefused`] if the board cannot work with what was saved.
+pub fn load(flash: &mut impl Flash, defaults: &BoardSettings) -> Result<Option<BoardSettings>, SettingsRefused> {
     let mut page = [0; PAGE];
-    let Some((newest, _)) = newest(flash, &mut page) else { return Saved::Nothing };
-    let Some(record) = read_record(flash, newest, &mut page) else { return Saved::Nothing };
-    match decode(record.body, defaults) {
-        Some(settings) if settings.validate().is_ok() => Saved::Settings(settings),
-        _ => Saved::Refused,
-    }
+    let newest = newest(flash, &mut page);
+    let Some(record) = newest.and_then(|(newest, _)| read_record(flash, newest, &mut page)) else { return Ok(None) };
+    let settings = decode(record.body, defaults).ok_or(SettingsRefused)?;
+    settings.validate().map_err(|_| SettingsRefused)?;
+    Ok(Some(settings))
 }
 
 /// Saves `settings` and reads them back.

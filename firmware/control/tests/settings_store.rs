@@ -30,11 +30,11 @@ fn saved(saves: u32) -> RamFlash {
 #[test]
 fn what_was_saved_last_is_loaded() {
     let mut flash = RamFlash::new(2);
-    assert_eq!(settings_store::load(&mut flash, &defaults()).settings(), None, "erased flash");
+    assert_eq!(settings_store::load(&mut flash, &defaults()), Ok(None), "erased flash");
     for speed in 1..50 {
         let settings = with_speed(speed);
         settings_store::save(&mut flash, &settings).unwrap();
-        assert_eq!(settings_store::load(&mut flash, &defaults()).settings(), Some(settings));
+        assert_eq!(settings_store::load(&mut flash, &defaults()), Ok(Some(settings)));
     }
 }
 
@@ -56,13 +56,13 @@ fn a_cut_at_any_operation_leaves_old_or_new_never_neither() {
                 let outcome = settings_store::save(&mut flash, &with_speed(7));
                 assert_eq!(outcome.is_ok(), at == operations, "{how:?} {saves} {at}");
                 flash.power_on();
-                match settings_store::load(&mut flash, &defaults()).settings().map(|settings| settings.axes[1].speed) {
+                match settings_store::load(&mut flash, &defaults()).unwrap().map(|settings| settings.axes[1].speed) {
                     Some(7) => new += 1,
                     Some(speed) if speed == 999 + saves => old += 1,
                     other => panic!("{how:?} at {at} after {saves} saves: {other:?}"),
                 }
                 settings_store::save(&mut flash, &with_speed(8)).unwrap();
-                assert_eq!(settings_store::load(&mut flash, &defaults()).settings(), Some(with_speed(8)));
+                assert_eq!(settings_store::load(&mut flash, &defaults()), Ok(Some(with_speed(8))));
             }
         }
     }
@@ -80,7 +80,7 @@ fn over_many_cut_saves_the_last_good_record_survives() {
             flash.cut_after((round as usize * 7) % 40, how, round.into());
             let outcome = settings_store::save(&mut flash, &with_speed(speed));
             flash.power_on();
-            let loaded = settings_store::load(&mut flash, &defaults()).settings().unwrap().axes[1].speed;
+            let loaded = settings_store::load(&mut flash, &defaults()).unwrap().unwrap().axes[1].speed;
             assert!(loaded == kept || loaded == speed, "round {round}: {loaded}, not {kept} or {speed}");
             assert!(outcome.is_err() || loaded == speed);
             kept = loaded;
@@ -98,7 +98,7 @@ fn sequence_numbers_go_round() {
     }
     for speed in [5, 6, 7] {
         settings_store::save(&mut flash, &with_speed(speed)).unwrap();
-        assert_eq!(settings_store::load(&mut flash, &defaults()).settings().unwrap().axes[1].speed, speed);
+        assert_eq!(settings_store::load(&mut flash, &defaults()).unwrap().unwrap().axes[1].speed, speed);
     }
 }
 
@@ -128,7 +128,7 @@ fn an_item_of_later_firmware_is_passed_over_and_one_that_is_missing_is_as_delive
     seal(&mut record);
     let mut flash = RamFlash::new(2);
     flash.overwrite(0, &record);
-    assert_eq!(settings_store::load(&mut flash, &defaults()).settings(), Some(with_speed(777)));
+    assert_eq!(settings_store::load(&mut flash, &defaults()), Ok(Some(with_speed(777))));
 }
 
 #[test]
@@ -137,7 +137,7 @@ fn a_record_that_no_axis_can_work_with_is_not_taken() {
     settings.axes[1].speed = 0;
     let mut flash = RamFlash::new(2);
     settings_store::save(&mut flash, &settings).unwrap();
-    assert_eq!(settings_store::load(&mut flash, &defaults()).settings(), None);
+    assert_eq!(settings_store::load(&mut flash, &defaults()), Err(settings_store::SettingsRefused));
 }
 
 /// Flash whose words cannot be read, as after an uncorrectable error.
@@ -165,7 +165,7 @@ impl Flash for Unreadable {
 fn a_page_that_cannot_be_read_is_no_record() {
     let mut flash = Unreadable(saved(2), 1);
     assert_eq!(
-        settings_store::load(&mut flash, &defaults()).settings().unwrap().axes[1].speed,
+        settings_store::load(&mut flash, &defaults()).unwrap().unwrap().axes[1].speed,
         1_000,
         "the older one is left"
     );
@@ -217,7 +217,7 @@ proptest! {
             }
             let mut flash = RamFlash::new(2);
             settings_store::save(&mut flash, &after).unwrap();
-            prop_assert_eq!(settings_store::load(&mut flash, &before).settings(), Some(after));
+            prop_assert_eq!(settings_store::load(&mut flash, &before), Ok(Some(after)));
         }
     }
 
@@ -235,10 +235,10 @@ proptest! {
         }
         let mut flash = RamFlash::new(2);
         flash.overwrite(0, &record);
-        if let Some(settings) = settings_store::load(&mut flash, &defaults()).settings() {
+        if let Ok(Some(settings)) = settings_store::load(&mut flash, &defaults()) {
             prop_assert!(settings.validate().is_ok());
         }
         settings_store::save(&mut flash, &with_speed(9)).unwrap();
-        prop_assert_eq!(settings_store::load(&mut flash, &defaults()).settings(), Some(with_speed(9)));
+        prop_assert_eq!(settings_store::load(&mut flash, &defaults()), Ok(Some(with_speed(9))));
     }
 }

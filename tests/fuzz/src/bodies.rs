@@ -259,10 +259,10 @@ pub fn settings_store(data: &[u8]) {
         record.extend(checksum(&record).to_le_bytes());
         flash.overwrite(0, &record);
     }
-    if let Some(settings) = settings_store::load(&mut flash, &defaults).settings() {
+    if let Ok(Some(settings)) = settings_store::load(&mut flash, &defaults) {
         assert!(settings.validate().is_ok());
         assert!(settings_store::save(&mut flash, &settings).is_ok());
-        assert_eq!(settings_store::load(&mut flash, &defaults).settings(), Some(settings));
+        assert_eq!(settings_store::load(&mut flash, &defaults), Ok(Some(settings)));
     }
 }
 
