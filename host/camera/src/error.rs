@@ -22,6 +22,14 @@ pub enum CameraError {
         /// What is wrong with its contents.
         why: String,
     },
+    /// An image is no mask of its camera.
+    #[error("{}: {why}", path.display())]
+    Mask {
+        /// The file.
+        path: PathBuf,
+        /// What is wrong with it.
+        why: String,
+    },
     /// A folder holds no image.
     #[error("{}: no JPEG or PNG image in this folder", .0.display())]
     NoImages(PathBuf),

@@ -19,7 +19,7 @@ use vergence_rig::{ExposureTiming, HostInstant};
 pub use attached::attach;
 pub use error::CameraError;
 pub use event::{CameraEvent, Develop, PendingImage};
-pub use files::{FileCamera, image_files, read_image};
+pub use files::{FileCamera, image_files, read_image, read_mask};
 pub use set::CameraSet;
 pub use v4l::{HostTime, V4lCamera, V4lSettings};
 

@@ -4,13 +4,13 @@ use std::path::PathBuf;
 
 use nalgebra::Vector3;
 use serde_json::{Value, json};
+use vergence_files::write_whole;
 use vergence_rig::{CameraFormat, Shutter};
 use vergence_vision::{Camera, KannalaBrandt, OpenCvFisheye, Pixel, UnitRay};
 
 use crate::camera_files::{read, read_camera};
 use crate::console::Console;
 use crate::failure::Failure;
-use crate::output::write_whole;
 
 /// Works on camera files: this program's TOML, OpenCV's YAML (fisheye), Kalibr's camchain (pinhole-equidistant).
 #[derive(Debug, clap::Args)]

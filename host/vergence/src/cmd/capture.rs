@@ -8,6 +8,7 @@ use tokio::task::spawn_blocking;
 use vergence_board::HostClock;
 use vergence_calibration::{Coverage, TargetSpec};
 use vergence_camera::{Camera, CameraError, CameraImage, CameraSet};
+use vergence_files::{make_folder, write_png};
 use vergence_scene::Target;
 use vergence_sim::{HeldTarget, TargetCamera};
 use vergence_vision::{ImageSize, Side};
@@ -18,7 +19,6 @@ use crate::cli::Globals;
 use crate::console::Console;
 use crate::failure::Failure;
 use crate::interrupt::interrupted;
-use crate::output::{make_folder, write_png};
 use crate::rig_file;
 use crate::target_watch::{NAMES, TargetViews, TargetWatch, observe};
 

@@ -5,9 +5,9 @@ mod power_cuts;
 use std::sync::atomic::{AtomicU64, Ordering};
 
 use serde_json::{Map, Value, json};
+use vergence_rig::rounded;
 use vergence_soak::{Outcome, Scenario, Tally, native_board, run as play, soak};
 
-use super::report::rounded;
 use crate::console::Console;
 use crate::failure::Failure;
 use crate::stopwatch::Stopwatch;

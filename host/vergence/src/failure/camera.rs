@@ -10,6 +10,7 @@ impl From<CameraError> for Failure {
         match error {
             CameraError::Unreadable { .. }
             | CameraError::NotAnImage { .. }
+            | CameraError::Mask { .. }
             | CameraError::NoImages(_)
             | CameraError::Simulated(_) => Self::usage(message),
             _ => Self::device(message),

@@ -9,9 +9,9 @@ use vergence_bench::peer::{Peer, PeerCalibration, PeerFit};
 use vergence_bench::sets::{CORNER_SETS, IMAGE_SETS, meta, shared};
 use vergence_calibration::TargetSpec;
 use vergence_camera::read_image;
+use vergence_rig::rounded;
 use vergence_vision::Length;
 
-use crate::cmd::report::rounded;
 use crate::console::Console;
 use crate::corners;
 use crate::failure::Failure;

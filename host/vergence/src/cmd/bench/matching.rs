@@ -5,11 +5,11 @@ use std::path::PathBuf;
 use nalgebra::Vector3;
 use serde_json::json;
 use vergence_bench::matching::{Class, NetworkClock, Outcome, SimulatedPair, Tally, Way};
+use vergence_rig::rounded;
 use vergence_vision::Angle;
 
 use super::means::Means;
 use crate::cmd::model_options::MatcherOptions;
-use crate::cmd::report::rounded;
 use crate::console::Console;
 use crate::failure::Failure;
 use crate::rig_file::bench_with_sensors;

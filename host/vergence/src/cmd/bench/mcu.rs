@@ -5,8 +5,8 @@ use std::path::PathBuf;
 use serde_json::json;
 use vergence_bench::busy::{PARTS, Program};
 use vergence_protocol::{HostSession, MAX_FRAME, Microseconds, Request, SessionId};
+use vergence_rig::rounded;
 
-use crate::cmd::report::rounded;
 use crate::console::Console;
 use crate::failure::Failure;
 use crate::firmware::APPLICATION;

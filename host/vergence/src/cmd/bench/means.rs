@@ -6,7 +6,7 @@ use serde_json::{Value, json};
 
 use vergence_bench::matching::Outcome;
 
-use crate::cmd::report::rounded;
+use vergence_rig::rounded;
 
 /// Counts before and after the gates, and times.
 #[derive(Clone, Debug, Default)]

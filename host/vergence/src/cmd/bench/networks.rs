@@ -3,9 +3,9 @@
 use serde_json::{Value, json};
 use vergence_bench::networks::{NetworkBench, NetworkTimes, PairTime, SIDE};
 use vergence_models::threads;
+use vergence_rig::rounded;
 
 use crate::cmd::model_options::{RuntimeOptions, StoreOptions};
-use crate::cmd::report::rounded;
 use crate::console::Console;
 use crate::failure::Failure;
 use crate::stopwatch::clock;

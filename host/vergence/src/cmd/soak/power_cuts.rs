@@ -3,17 +3,17 @@
 use std::path::{Path, PathBuf};
 
 use serde_json::{Value, json};
+use vergence_files::write_whole;
 use vergence_image::layout::{ACTIVE, FLASH_BASE};
 use vergence_image::notes::version_of;
 use vergence_image::sha256;
 use vergence_mcu::Firmware;
+use vergence_rig::rounded;
 use vergence_soak::power_cuts::{CutTally, Journey, SignedImage, Sweep, twin};
 
-use crate::cmd::report::rounded;
 use crate::console::Console;
 use crate::failure::Failure;
 use crate::firmware::{APPLICATION, BOOT_LOADER, DEVELOPMENT, SecretKey, hex};
-use crate::output::write_whole;
 use crate::stopwatch::Stopwatch;
 
 /// Cuts after which the state is saved and the clock is read.
