@@ -3,10 +3,9 @@
 use std::fmt;
 
 use serde_json::{Value, json};
-
-use vergence_bench::matching::Outcome;
-
 use vergence_rig::rounded;
+
+use crate::matching::ways::Outcome;
 
 /// Counts before and after the gates, and times.
 #[derive(Clone, Debug, Default)]
@@ -35,6 +34,7 @@ impl Means {
     }
 
     /// The figures as JSON.
+    #[must_use]
     pub fn json(&self) -> Value {
         let mean = |sum: f64| rounded(sum / self.before.correct.len().max(1) as f64);
         json!({
