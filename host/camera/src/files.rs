@@ -28,6 +28,19 @@ impl FileCamera {
     pub fn remaining(&self) -> usize {
         self.files.len()
     }
+
+    /// Opens the images of the left and of the right camera: two files, or two folders with as many images.
+    ///
+    /// # Errors
+    /// As [`Self::open`]; [`CameraError::Uneven`] where the images do not pair up.
+    pub fn open_pair(left: &Path, right: &Path) -> Result<[Self; 2], CameraError> {
+        let cameras = [Self::open(left)?, Self::open(right)?];
+        let counts = cameras.each_ref().map(Self::remaining);
+        if counts[0] == counts[1] {
+            return Ok(cameras);
+        }
+        Err(CameraError::Uneven { paths: [left.into(), right.into()], counts })
+    }
 }
 
 impl Camera for FileCamera {

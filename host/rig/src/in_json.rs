@@ -1,7 +1,7 @@
-//! Positions and zones as JSON, for reports.
+//! Positions, zones and cameras for reports: as JSON, cameras in words too.
 
 use serde_json::{Map, Value, json};
-use vergence_vision::Zones;
+use vergence_vision::{KannalaBrandt, OpenCvFisheye, Zones};
 
 use crate::{AxisPosition, Rig};
 
@@ -28,5 +28,31 @@ pub fn zones_json(zones: &Zones) -> Value {
         "stereo": rounded(zones.stereo.deg()),
         "mono": rounded(zones.mono.deg()),
         "blind": rounded(zones.blind.deg()),
+    })
+}
+
+/// Size, valid field and coefficients of a camera for people.
+#[must_use]
+pub fn camera_in_words(camera: &KannalaBrandt) -> String {
+    let OpenCvFisheye { fx, fy, cx, cy, k: [k1, k2, k3, k4] } = camera.to_opencv();
+    let size = camera.size();
+    format!(
+        "{} x {} px, valid to {:.2} from the axis\nfx {fx:.4}  fy {fy:.4}  cx {cx:.4}  cy {cy:.4}\n\
+         opencv_k1 {k1:.6}  opencv_k2 {k2:.6}  opencv_k3 {k3:.6}  opencv_k4 {k4:.6}",
+        size.width,
+        size.height,
+        camera.theta_max()
+    )
+}
+
+/// Size, valid field and coefficients of a camera for programs.
+#[must_use]
+pub fn camera_json(camera: &KannalaBrandt) -> Value {
+    let OpenCvFisheye { fx, fy, cx, cy, k: [k1, k2, k3, k4] } = camera.to_opencv();
+    let size = camera.size();
+    json!({
+        "size": [size.width, size.height],
+        "theta_max_deg": camera.theta_max().deg(),
+        "opencv": {"fx": fx, "fy": fy, "cx": cx, "cy": cy, "k1": k1, "k2": k2, "k3": k3, "k4": k4},
     })
 }

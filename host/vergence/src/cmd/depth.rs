@@ -19,7 +19,7 @@ use vergence_pipeline::{
     Method, PairCloud, PairImages, PairPose, StageTimes, cloud_of_pairs, dense_ranges, pair_cloud,
 };
 use vergence_rig::{Rig, RigPose};
-use vergence_vision::{ImageSize, Kernel, Pixel, PixelPair};
+use vergence_vision::{Kernel, Pixel, PixelPair, Side};
 
 use self::motion::StageSpeed;
 use super::stage_pose::StagePose;
@@ -120,7 +120,7 @@ fn every_pair(args: &Args, rig: Option<&Path>, console: Console, progress: &Prog
         None => PairPose::standing(pose.clone()),
     };
     let pairs = args.points.as_deref().map(read_pairs).transpose()?;
-    let (mut left, mut right) = open_images(args)?;
+    let [mut left, mut right] = FileCamera::open_pair(&args.left, &args.right)?;
     progress.all.store(left.remaining(), Ordering::Relaxed);
     let matcher = if args.dense { None } else { Some(args.matching.matcher(console)?) };
     let several = args.left.is_dir();
@@ -167,8 +167,8 @@ fn one_dense_pair(
     out: &Path,
     console: Console,
 ) -> Result<(Value, bool), Failure> {
-    check_size(left, rig.left_camera.size(), "left")?;
-    check_size(right, rig.right_camera.size(), "right")?;
+    left.check_size(rig.left_camera.size(), Side::Left)?;
+    right.check_size(rig.right_camera.size(), Side::Right)?;
     let images = PairImages { left: &left.image, right: &right.image };
     let mut times = StageTimes::start(clock);
     let depth = dense_ranges(images, rig, pose, &mut |stage| times.ended(stage))
@@ -191,20 +191,6 @@ fn check_names(args: &Args) -> Result<(), Failure> {
         None => {}
     }
     Ok(())
-}
-
-fn open_images(args: &Args) -> Result<(FileCamera, FileCamera), Failure> {
-    let (left, right) = (FileCamera::open(&args.left)?, FileCamera::open(&args.right)?);
-    if left.remaining() == right.remaining() {
-        return Ok((left, right));
-    }
-    Err(Failure::usage(format!(
-        "{} has {} images and {} has {}: they must pair up",
-        args.left.display(),
-        left.remaining(),
-        args.right.display(),
-        right.remaining()
-    )))
 }
 
 /// Writes and prints the cloud of one pair.
@@ -268,26 +254,14 @@ fn one_pair(
     pairs: Option<&[(PixelPair, f64)]>,
     method: Method<'_>,
 ) -> Result<PairCloud, Failure> {
-    check_size(left, rig.left_camera.size(), "left")?;
-    check_size(right, rig.right_camera.size(), "right")?;
+    left.check_size(rig.left_camera.size(), Side::Left)?;
+    right.check_size(rig.right_camera.size(), Side::Right)?;
     let images = PairImages { left: &left.image, right: &right.image };
     let fail = |error: &dyn std::fmt::Display| Failure::usage(format!("{} and {}: {error}", left.name, right.name));
     match pairs {
         Some(pairs) => cloud_of_pairs(pairs, images.left, rig, pose, method.kernel).map_err(|error| fail(&error)),
         None => pair_cloud(images, rig, pose, method, &mut |_| ()).map_err(|error| fail(&error)),
     }
-}
-
-fn check_size(frame: &CameraImage, size: ImageSize, side: &str) -> Result<(), Failure> {
-    let (width, height) = frame.image.dimensions();
-    if (width, height) == (size.width, size.height) {
-        return Ok(());
-    }
-    Err(Failure::usage(format!(
-        "{side} image '{}' is {width} x {height}, but the {side} camera of the rig file is {} x {}: use the images the \
-         camera was calibrated with, or its rig file",
-        frame.name, size.width, size.height
-    )))
 }
 
 /// Reads correspondences from a CSV file with a header.

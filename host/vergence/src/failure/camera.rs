@@ -11,6 +11,8 @@ impl From<CameraError> for Failure {
             CameraError::Unreadable { .. }
             | CameraError::NotAnImage { .. }
             | CameraError::Mask { .. }
+            | CameraError::Uneven { .. }
+            | CameraError::Size { .. }
             | CameraError::NoImages(_)
             | CameraError::Simulated(_) => Self::usage(message),
             _ => Self::device(message),
