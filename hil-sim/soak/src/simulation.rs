@@ -2,6 +2,7 @@
 
 use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64Mcg;
+use serde_json::{Value, json};
 use vergence_control::SettingsError;
 use vergence_plant::{NativeBoard, Plant};
 use vergence_protocol::{Microseconds, ResetCause};
@@ -108,6 +109,22 @@ pub struct Outcome {
     pub virtual_time: Microseconds,
     /// The events.
     pub journal: Journal,
+}
+
+impl Outcome {
+    /// Ending, broken promises and all events for programs; `scenario` is what was run.
+    #[must_use]
+    pub fn json(&self, scenario: &Scenario) -> Value {
+        let events = self.journal.events().iter().map(|(at, what)| json!({ "us": at.0, "what": what }));
+        let violations = self.violations.iter().map(|broken| json!({ "us": broken.at.0, "what": broken.to_string() }));
+        json!({
+            "seed": scenario.seed,
+            "fault": scenario.kind.name(),
+            "ending": format!("{:?}", self.ending),
+            "violations": violations.collect::<Vec<_>>(),
+            "log": events.collect::<Vec<_>>(),
+        })
+    }
 }
 
 /// Runs `scenario` with `board`, just switched on.

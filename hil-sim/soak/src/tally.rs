@@ -1,12 +1,16 @@
 //! Counts of many scenarios, by kind.
 
 use rayon::prelude::*;
+use serde_json::{Map, Value, json};
 use vergence_control::SettingsError;
 
 use crate::faults::FaultKind;
 use crate::promise::Violation;
 use crate::scenario::Scenario;
 use crate::simulation::{Ending, native_board, run};
+
+/// Most broken promises that are told; more are only counted.
+const MOST_TOLD: usize = 20;
 
 /// The scenarios of one kind.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -64,4 +68,48 @@ pub fn soak(first: u64, count: u64, progress: impl Fn() + Sync) -> Result<Tally,
         tally.violations.extend(violations.into_iter().map(|violation| (seed, violation)));
     }
     Ok(tally)
+}
+
+impl Tally {
+    /// The counts of each kind that occurred, as a table for people.
+    #[must_use]
+    pub fn table(&self) -> String {
+        let head =
+            format!("{:<18}{:>10}{:>11}{:>11}{:>10}", "fault", "scenarios", "completed", "safe stops", "violated");
+        let rows = self.by_kind.iter().filter(|row| row.scenarios > 0).map(|row| {
+            format!(
+                "{:<18}{:>10}{:>11}{:>11}{:>10}",
+                row.kind, row.scenarios, row.completed, row.safe_stops, row.violated
+            )
+        });
+        std::iter::once(head).chain(rows).collect::<Vec<_>>().join("\n")
+    }
+
+    /// The counts for programs.
+    #[must_use]
+    pub fn json(&self) -> Value {
+        let by_fault: Map<String, Value> = self
+            .by_kind
+            .iter()
+            .map(|row| {
+                let counts =
+                    json!({ "scenarios": row.scenarios, "safe_stops": row.safe_stops, "completed": row.completed });
+                (row.kind.name().to_owned(), counts)
+            })
+            .collect();
+        json!({ "violations": self.violations.len(), "by_fault": by_fault })
+    }
+
+    /// The first broken promises with the seeds of their scenarios, and how to replay one; `None` where all were kept.
+    #[must_use]
+    pub fn accusation(&self) -> Option<String> {
+        let (first, _) = self.violations.first()?;
+        let told = self.violations.iter().take(MOST_TOLD);
+        let lines: Vec<String> = told.map(|(seed, violation)| format!("  seed {seed}: {violation}")).collect();
+        Some(format!(
+            "{} promises broken:\n{}\nreplay one: vergence soak --only {first}",
+            self.violations.len(),
+            lines.join("\n")
+        ))
+    }
 }

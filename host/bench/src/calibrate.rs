@@ -1,12 +1,18 @@
 //! Seconds of a calibration and of the detection of a chessboard, on one thread.
 
+use std::path::PathBuf;
+
 use image::GrayImage;
+use image::imageops::grayscale;
+use serde_json::{Value, json};
 use vergence_calibration::detect::detect;
 use vergence_calibration::{IntrinsicsOptions, TargetSpec, TargetView, calibrate_intrinsics, median};
+use vergence_camera::read_image;
+use vergence_rig::rounded;
 use vergence_vision::ImageSize;
 
 use crate::error::BenchError;
-use crate::peer::PeerCalibration;
+use crate::peer::{PeerCalibration, PeerFit};
 use crate::{Clock, timed};
 
 /// A fit within this factor of the least-squares optimum has converged.
@@ -93,6 +99,53 @@ impl OneThread {
         detections.found += usize::from(found.is_ok());
         detections.complete += usize::from(found.is_ok_and(|found| found.complete));
     }
+
+    /// Looks for `target` in every image file.
+    ///
+    /// # Errors
+    /// [`BenchError::Image`] where one cannot be read.
+    pub fn detect_files(&self, paths: &[PathBuf], target: &TargetSpec) -> Result<Detections, BenchError> {
+        let mut found = Detections::default();
+        for path in paths {
+            let image = read_image(path).map_err(|error| BenchError::Image(error.to_string()))?;
+            self.detect(&grayscale(&image), target, &mut found);
+        }
+        Ok(found)
+    }
+}
+
+impl Solve {
+    /// Seconds and errors for people, beside those of the `peers`; `what` names the set.
+    #[must_use]
+    pub fn in_words(&self, what: &str, peers: Option<&PeerCalibration>) -> String {
+        let ms = |seconds: Option<f64>| seconds.map_or_else(|| "failed".into(), |s| format!("{:.1} ms", 1e3 * s));
+        let px = |px: Option<f64>| px.map_or_else(|| "-".into(), |px| format!("{px:.3} px"));
+        let fit = |fit: &PeerFit| format!("{} ({})", ms(fit.seconds), px(fit.rms_px));
+        let ours = format!("{} ({})", ms(Some(self.seconds)), px(Some(self.rms_px)));
+        let peers = peers.map(|peers| format!("; OpenCV {}; SciPy {}", fit(&peers.opencv), fit(&peers.scipy)));
+        format!("{what} ({} corners): {ours}{}", self.corners, peers.unwrap_or_default())
+    }
+
+    /// The same for programs.
+    #[must_use]
+    pub fn json(&self, peers: Option<&PeerCalibration>) -> Value {
+        let mut value = json!({
+            "corners": self.corners,
+            "seconds": self.seconds,
+            "rms_px": self.rms_px,
+            "rms_inlier_px": self.rms_inlier_px,
+        });
+        if let Some(peers) = peers {
+            let fit = |fit: &PeerFit| json!({ "seconds": fit.seconds, "rms_px": fit.rms_px, "error": fit.error });
+            let comparison = Comparison::of(self.seconds, peers);
+            value["opencv"] = fit(&peers.opencv);
+            value["opencv"]["converged"] = comparison.opencv_converged.into();
+            value["scipy"] = fit(&peers.scipy);
+            value["no_slower_than_opencv"] = comparison.no_slower_than_opencv.into();
+            value["a_tenth_of_scipy"] = comparison.a_tenth_of_scipy.into();
+        }
+        value
+    }
 }
 
 impl Comparison {
@@ -119,5 +172,37 @@ impl Detections {
     #[must_use]
     pub fn median_ms(&self) -> f64 {
         median(self.milliseconds.clone()).unwrap_or_default()
+    }
+
+    /// Counts and time for people, beside those of the peer (boards, milliseconds) where it was asked; `name` is the set's.
+    #[must_use]
+    pub fn in_words(&self, name: &str, peer: Option<(usize, f64)>) -> String {
+        let peer = peer.map(|(targets, theirs)| format!("; OpenCV SB found in {targets}, {:.1} ms", rounded(theirs)));
+        format!(
+            "{name}: found in {} of {} images, {} of them complete, {:.1} ms an image{}",
+            self.found,
+            self.images(),
+            self.complete,
+            rounded(self.median_ms()),
+            peer.unwrap_or_default()
+        )
+    }
+
+    /// The same for programs.
+    #[must_use]
+    pub fn json(&self, name: &str, peer: Option<(usize, f64)>) -> Value {
+        let ours = self.median_ms();
+        let mut value = json!({
+            "set": name,
+            "images": self.images(),
+            "boards": self.found,
+            "complete": self.complete,
+            "median_ms": ours,
+        });
+        if let Some((targets, theirs)) = peer {
+            value["opencv_sb"] = json!({ "boards": targets, "median_ms": theirs });
+            value["no_slower_than_opencv"] = json!(ours <= theirs);
+        }
+        value
     }
 }

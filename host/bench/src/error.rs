@@ -3,6 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use vergence_models::ModelsError;
+use vergence_sim::SimError;
 
 /// Why something could not be measured.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
@@ -11,6 +12,9 @@ pub enum BenchError {
     /// A model cannot be used.
     #[error(transparent)]
     Models(#[from] ModelsError),
+    /// The simulated board cannot be started, or stops.
+    #[error(transparent)]
+    Sim(#[from] SimError),
     /// A file cannot be read or is not understood.
     #[error("{}: {reason}", .path.display())]
     Read {

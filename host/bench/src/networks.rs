@@ -2,9 +2,11 @@
 
 use std::path::{Path, PathBuf};
 
+use serde_json::{Value, json};
 use vergence_calibration::median;
 use vergence_matching::learned::{Manifest, Model};
 use vergence_models::{ModelsError, Pattern, Runtime, load, read_manifest, threads};
+use vergence_rig::rounded;
 
 use crate::error::BenchError;
 use crate::python::ask_python;
@@ -144,5 +146,34 @@ impl<'a> NetworkBench<'a> {
     /// The file with the pattern: 32-bit floating-point numbers by rows.
     fn image(&self) -> PathBuf {
         self.scratch.path().join("image.f32")
+    }
+}
+
+impl NetworkTimes {
+    /// Milliseconds for people.
+    #[must_use]
+    pub fn in_words(&self) -> String {
+        let one = |name: &str, time: &PairTime| format!("{name} {:.0} ({:.0})", time.median_ms, time.least_ms);
+        let mut all: Vec<String> = self.runtimes.iter().map(|(name, time)| one(name, time)).collect();
+        all.extend(self.python.as_ref().map(|peer| one(&format!("Python's onnxruntime {}", peer.version), &peer.time)));
+        format!("{:>6} keypoints: {}", self.keypoints, all.join(", "))
+    }
+
+    /// The same for programs.
+    #[must_use]
+    pub fn json(&self) -> Value {
+        let time =
+            |time: &PairTime| json!({ "median_ms": rounded(time.median_ms), "least_ms": rounded(time.least_ms) });
+        let mut row = json!({ "keypoints": self.keypoints });
+        for (name, of_runtime) in &self.runtimes {
+            row[*name] = time(of_runtime);
+        }
+        row["python"] = self.python.as_ref().map_or(Value::Null, |peer| {
+            let mut value = time(&peer.time);
+            value["keypoints"] = peer.keypoints.into();
+            value["version"] = peer.version.as_str().into();
+            value
+        });
+        row
     }
 }

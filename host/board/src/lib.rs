@@ -10,12 +10,16 @@ mod error;
 mod link;
 mod link_figures;
 mod move_plan;
+mod plan_table;
 mod serve;
 mod setting_check;
 mod setting_text;
 mod update;
 
-pub use board::{Board, RecordedEvents, check_range, describe_fault, describe_pose, positions, staying};
+pub use board::{
+    Board, RecordedEvents, check_range, clock_json, describe_clock, describe_fault, describe_pose, event_in_words,
+    pose_json, positions, staying,
+};
 pub use error::BoardError;
 pub use link::{
     BoardKnowledge, Client, Followed, Follower, HostClock, LinkError, ManagementLink, OpenError, OpenWire, Port,

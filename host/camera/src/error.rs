@@ -2,6 +2,8 @@
 
 use std::path::PathBuf;
 
+use vergence_vision::{ImageSize, Side};
+
 /// Why a camera or an image file gives no image.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[non_exhaustive]
@@ -21,6 +23,38 @@ pub enum CameraError {
         path: PathBuf,
         /// The reason why the contents are refused.
         why: String,
+    },
+    /// An image is no mask of its camera.
+    #[error("{}: {why}", path.display())]
+    Mask {
+        /// The file.
+        path: PathBuf,
+        /// What is wrong with it.
+        why: String,
+    },
+    /// The images of both cameras do not pair up.
+    #[error("{} has {} images and {} has {}: they must pair up", paths[0].display(), counts[0], paths[1].display(), counts[1])]
+    Uneven {
+        /// File or folder of the left camera and of the right one.
+        paths: [PathBuf; 2],
+        /// Number of images of each.
+        counts: [usize; 2],
+    },
+    /// An image is not of the size of its camera.
+    #[error(
+        "{side} image '{name}' is {} x {}, but the {side} camera of the rig file is {} x {}: use the images the camera was \
+         calibrated with, or its rig file",
+        size.width, size.height, wanted.width, wanted.height
+    )]
+    Size {
+        /// The camera.
+        side: Side,
+        /// Name of the image.
+        name: String,
+        /// Size of the image.
+        size: ImageSize,
+        /// Size of the images of the camera.
+        wanted: ImageSize,
     },
     /// A folder holds no image.
     #[error("{}: no JPEG or PNG image in this folder", .0.display())]

@@ -15,11 +15,12 @@ mod v4l;
 
 use image::RgbImage;
 use vergence_rig::{ExposureTiming, HostInstant};
+use vergence_vision::{ImageSize, Side};
 
 pub use attached::attach;
 pub use error::CameraError;
 pub use event::{CameraEvent, Develop, PendingImage};
-pub use files::{FileCamera, image_files, read_image};
+pub use files::{FileCamera, image_files, read_image, read_mask};
 pub use set::CameraSet;
 pub use v4l::{HostTime, V4lCamera, V4lSettings};
 
@@ -35,6 +36,26 @@ pub struct CameraImage {
     /// Middle of the exposure of the middle row, on the host's clock, with its largest error; `None` where it is unknown, as
     /// for a file.
     pub exposed_at: Option<HostInstant>,
+}
+
+impl CameraImage {
+    /// Width and height in pixels.
+    #[must_use]
+    pub fn size(&self) -> ImageSize {
+        ImageSize { width: self.image.width(), height: self.image.height() }
+    }
+
+    /// Checks that the image is as large as those of the camera at `side` of the rig, `wanted`.
+    ///
+    /// # Errors
+    /// [`CameraError::Size`]
+    pub fn check_size(&self, wanted: ImageSize, side: Side) -> Result<(), CameraError> {
+        let size = self.size();
+        if size == wanted {
+            return Ok(());
+        }
+        Err(CameraError::Size { side, name: self.name.clone(), size, wanted })
+    }
 }
 
 /// A source of images.

@@ -23,6 +23,18 @@ pub struct Verdict {
     pub seconds: Option<f64>,
 }
 
+impl Verdict {
+    /// Matches and time, or why the model cannot be used.
+    #[must_use]
+    pub fn in_words(&self) -> String {
+        match (&self.matches, self.seconds) {
+            (Ok(matches), Some(seconds)) => format!("ok: {matches} matches of a pattern with itself, {seconds:.2} s"),
+            (Ok(matches), None) => format!("ok: {matches} matches of a pattern with itself"),
+            (Err(error), _) => error.to_string(),
+        }
+    }
+}
+
 /// Runs the model `name` on every runtime, one verdict each. Where all of them can use it, it is timed, and the times are
 /// kept beside the model: [`crate::choose`] reads them.
 ///

@@ -8,10 +8,10 @@
 //! - [`dense_ranges`] measures every pixel of the left image;
 //! - [`bearings`] gives the directions that one camera alone can see;
 //! - [`observe_pair`] and [`observe_one`] make an [`Observation`] of what a live rig delivers;
-//! - [`rig_zones`] says what the cameras of a rig cover, [`score`] compares ranges with the truth.
+//! - [`rig_zones`] and [`RigView`] say what the cameras of a rig cover, [`score`] compares ranges with the truth.
 //!
 //! Everything here is a pure function of its arguments: no clock, no file, no thread, no sentence for people. Callers who want
-//! to know how long a [`Stage`] takes pass a callback.
+//! to know how long a [`Stage`] takes pass a callback, such as that of [`StageTimes`].
 
 mod bearings;
 mod cloud;
@@ -33,5 +33,5 @@ pub use observation::{Observation, observe_one, observe_pair};
 pub use pair::{PairImages, colour_at};
 pub use pose::{Motion, PairPose, TriggeredImage, UnpairedImage, pair_exposure};
 pub use score::{Score, Spread, score};
-pub use stage::Stage;
-pub use zones::{ZONE_RADIUS, rig_zones};
+pub use stage::{Stage, StageTimes};
+pub use zones::{RigView, ZONE_RADIUS, rig_zones};

@@ -2,8 +2,8 @@
 
 use vergence_protocol::Counts;
 use vergence_rig::{
-    BoardInstant, Exposure, ExposureDelay, ImagePairing, JointTrack, Joints, JointsAt, MiddlePose, PairExposure,
-    PairingOutcome, Rig, RigPose, StampedImage, SteadyMotion, TimedEvent, TrackGap, middle_pose,
+    AxisPosition, BoardInstant, Exposure, ExposureDelay, ImagePairing, JointTrack, Joints, JointsAt, MiddlePose,
+    PairExposure, PairingOutcome, Rig, RigPose, StampedImage, SteadyMotion, TimedEvent, TrackGap, middle_pose,
 };
 use vergence_vision::Angle;
 
@@ -90,6 +90,21 @@ impl PairPose {
     pub fn in_motion(rig: &Rig, motion: Motion, exposure: PairExposure) -> Result<Self, TrackGap> {
         let middle = middle_pose(rig, &motion, &exposure)?;
         Ok(Self { middle, rows: Some((motion, exposure)) })
+    }
+
+    /// A pose for every row, for a pair whose middle rows were exposed with the axes at `positions` while they moved steadily.
+    /// `speeds` are in millimetres or radians per second, one for each axis; positions and instants are taken as exact.
+    ///
+    /// # Errors
+    /// As [`Self::in_motion`].
+    pub fn at_speed(rig: &Rig, positions: &[AxisPosition], speeds: &[f64]) -> Result<Self, TrackGap> {
+        let rates = rig.axes.iter().zip(speeds).map(|(axis, speed)| speed * 1e-6 / axis.value_per_count()).collect();
+        let counts = rig.axes.iter().zip(positions).map(|(axis, at)| axis.counts_at(at.value())).collect();
+        let known = vec![0.0; rig.axes.len()];
+        let joints = JointsAt { counts, sigma: known.clone(), timing: known };
+        let middle = BoardInstant { us: 0.0, error_us: 0.0 };
+        let motion = Motion::Steady(SteadyMotion { from_us: 0.0, joints, rates });
+        Self::in_motion(rig, motion, pair_exposure(rig, [middle; 2]))
     }
 
     /// The pose of the left camera at its middle row, and of the right camera at its own.

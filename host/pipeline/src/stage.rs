@@ -1,4 +1,6 @@
-//! The stages of the work on one pair, for callers who measure how long each takes.
+//! The stages of the work on one pair, and how long each takes by the caller's clock.
+
+use std::time::Duration;
 
 /// A stage of the work on one pair of images, in the order in which they run.
 ///
@@ -42,5 +44,40 @@ impl Stage {
             Self::Register => "register",
             Self::Range => "range",
         }
+    }
+}
+
+/// How long each stage took: a stopwatch that is read at the end of every stage, by a clock that the caller passes in.
+#[derive(Clone, Debug)]
+pub struct StageTimes {
+    clock: fn() -> Duration,
+    began: Duration,
+    seconds: Vec<(Stage, f64)>,
+}
+
+impl StageTimes {
+    /// Starts the first stage. `clock` returns the time since some fixed instant.
+    #[must_use]
+    pub fn start(clock: fn() -> Duration) -> Self {
+        Self { clock, began: clock(), seconds: Vec::new() }
+    }
+
+    /// Notes the time of `stage`, which ends now, and starts the next.
+    pub fn ended(&mut self, stage: Stage) {
+        let now = (self.clock)();
+        self.seconds.push((stage, now.saturating_sub(self.began).as_secs_f64()));
+        self.began = now;
+    }
+
+    /// The stages in the order in which they ran, in seconds.
+    #[must_use]
+    pub fn seconds(&self) -> &[(Stage, f64)] {
+        &self.seconds
+    }
+
+    /// How long `stage` took, in seconds; zero where it did not run.
+    #[must_use]
+    pub fn of(&self, stage: Stage) -> f64 {
+        self.seconds.iter().filter(|(ran, _)| *ran == stage).map(|(_, seconds)| seconds).sum()
     }
 }

@@ -9,14 +9,13 @@ use vergence_calibration::{
 };
 use vergence_rig::Rig;
 use vergence_scene::Target;
-use vergence_sim::HeldTarget;
+use vergence_sim::{HeldTarget, Random};
 use vergence_vision::{Camera, ImageSize, KannalaBrandt, Left, Right, Transform};
 
 use crate::bench::{Bench, scene_target};
 use crate::drive::Stop;
 use crate::error::ReproduceError;
 use crate::target_shot::{CornerSource, FoundCorners, Photo, TargetShot};
-use vergence_sim::Random;
 
 /// Views of each lens's own calibration.
 const OWN_VIEWS: u64 = 30;

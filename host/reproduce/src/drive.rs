@@ -1,12 +1,18 @@
-//! Where the simulated rig stands while it is calibrated and while it measures.
+//! Drives the simulated rig over the real protocol: where it stands while it is calibrated and while it measures, by its
+//! encoders and in truth.
 
+use vergence_board::{Board, Shared};
 use vergence_calibration::stage_plan;
-use vergence_protocol::Mode;
-use vergence_rig::AxisPosition;
+use vergence_protocol::{Mode, PoseReport, SessionId};
+use vergence_rig::{AxisPosition, Rig};
+use vergence_sim::SimulatedRig;
 use vergence_vision::{Left, Right, Transform};
 
 use crate::bench::{Bench, MODES};
+use crate::error::ReproduceError;
 
+/// Lease of the simulated boards, in milliseconds.
+const LEASE_MS: u16 = 100;
 /// Stage poses of a calibration.
 const STAGE_POSES: usize = 6;
 
@@ -48,4 +54,44 @@ impl Route {
             modes: modes.map(|mode| (mode.number, mode.targets.clone())).collect(),
         }
     }
+}
+
+/// Homes the simulated rig of `bench` and drives it along its route over the real protocol; `observer` hears of every pose.
+/// The same `seed` gives the same readings.
+///
+/// # Errors
+/// Those of the simulation and of the board.
+pub async fn drive(
+    bench: &Bench,
+    seed: u64,
+    observer: impl FnMut(&Rig, &PoseReport) + Send + 'static,
+) -> Result<Drive, ReproduceError> {
+    let simulated = Shared::new(SimulatedRig::new(&bench.built, seed)?);
+    let session = SessionId((seed as u32).max(1));
+    let board = Board::in_process(simulated.clone(), bench.drawn.clone(), session, LEASE_MS).await?;
+    let mut board = board.observed(observer);
+    let route = Route::of(bench);
+    board
+        .armed(std::future::pending(), async |board| -> Result<Drive, ReproduceError> {
+            board.home().await?;
+            let mut drive = Drive { calibration: Vec::new(), modes: Vec::new() };
+            for (stops, targets) in [(&mut drive.calibration, &route.calibration), (&mut drive.modes, &route.modes)] {
+                for (mode, targets) in targets {
+                    stops.push(stop(board, &simulated, *mode, targets).await?);
+                }
+            }
+            Ok(drive)
+        })
+        .await
+}
+
+async fn stop(
+    board: &mut Board,
+    rig: &Shared<SimulatedRig>,
+    mode: Mode,
+    targets: &[AxisPosition],
+) -> Result<Stop, ReproduceError> {
+    board.move_to(mode, targets).await?;
+    board.next_pose().await?;
+    Ok(Stop { readings: board.positions(), truth: rig.lock().true_pose().left_from_right })
 }

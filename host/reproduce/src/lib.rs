@@ -1,34 +1,41 @@
 //! Repeats the experiments of the paper "Bio-inspired reconfigurable stereo vision for robotics using omnidirectional
 //! cameras" on the simulated rig, from photographs to tables and one page.
 //!
-//! The precision bench is another rig for every seed ([`Bench`]). The caller drives its stage along a [`Route`] over the
-//! real protocol and returns a [`Drive`]. [`one_seed`] then calibrates both lenses and the stage from photographs of a
-//! target, and measures corners of targets 350 mm away by every method; [`Table`] sums up all seeds. Only the renderer and
-//! the score know the truth.
+//! The precision bench is another rig for every seed ([`Bench`]). [`drive()`] moves its stage along a [`Route`] over the real
+//! protocol and returns a [`Drive`]. [`one_seed`] then calibrates both lenses and the stage from photographs of a target, and
+//! measures corners of targets 350 mm away by every method; [`Table`] sums up all seeds. Only the renderer and the score know
+//! the truth.
 //!
-//! Beside it stand the zones of all modes ([`mode_zones`]), the methods of triangulation ([`vergence_vision::study`]), and matches in the simulated
-//! room ([`matchings`]). [`reproduction_page`] puts all of it on one page. The same seeds give the same bytes.
+//! Beside it stand the zones of all modes ([`mode_zones`]), the methods of triangulation ([`study`]), and matches in the
+//! simulated room ([`matchings`]). [`experiments`] does all of it and puts it on one page ([`reproduction_page`]). The same
+//! seeds give the same bytes. [`demo`] measures every mode of a simulated rig in its room, scored against the truth.
 //!
-//! Nothing here reads a clock or a file, or runs another program: the caller passes in what does.
+//! Nothing here runs another program or prints: the caller passes in what does, and the clock. Only [`demo::View::write`]
+//! writes files.
 
 mod axes;
 mod bench;
 mod chain;
+pub mod demo;
 mod drive;
 mod error;
+mod experiments;
 mod matching;
 mod measure;
 mod one_seed;
 mod page;
+mod report;
 mod sgbm;
+pub mod study;
 mod tally;
 mod target_images;
 mod target_shot;
 mod zones;
 
 pub use bench::{Bench, MODES};
-pub use drive::{Drive, Route, Stop};
-pub use error::ReproduceError;
+pub use drive::{Drive, Route, Stop, drive};
+pub use error::{DemoError, ReproduceError};
+pub use experiments::{DrivenRig, Plan, Progress, Results, experiments};
 pub use matching::{Matching, MatchingTools, Outcome, Picture, matchings};
 pub use measure::{METHODS, Measured, Sample};
 pub use one_seed::{SeedResult, one_seed};

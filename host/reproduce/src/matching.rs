@@ -5,7 +5,8 @@ use image::{RgbImage, imageops};
 use nalgebra::UnitQuaternion;
 use vergence_matching::learned::LearnedMatcher;
 use vergence_matching::{GuidedMatcher, Matcher};
-use vergence_pipeline::{Method, PairCloud, PairImages, PairPose, Score, pair_cloud, score};
+use vergence_output::match_svg;
+use vergence_pipeline::{Method, PairImages, PairPose, Score, pair_cloud, score};
 use vergence_rig::{Rig, RigPose};
 use vergence_scene::{Optics, Scene, View, render};
 use vergence_vision::{Base, KannalaBrandt, Left, Length, Pixel, Transform, World};
@@ -65,8 +66,6 @@ struct RoomInMode {
 pub struct MatchingTools<'a> {
     /// The learned matcher, or a sentence that says why there is none.
     pub learned: Result<&'a LearnedMatcher, String>,
-    /// Draws the matches of a pair over its images, as SVG.
-    pub draw: &'a dyn Fn(PairImages<'_>, &PairCloud) -> Result<String, String>,
     /// Runs OpenCV's semi-global matching in Python.
     pub opencv: &'a dyn Fn(&SgbmTask<'_>) -> Result<SgbmAnswer, String>,
 }
@@ -82,7 +81,7 @@ pub fn matchings(tools: &MatchingTools<'_>, seed: u64) -> Result<Vec<Matching>, 
     let mut matchings = Vec::new();
     for room in MODES.iter().filter_map(|mode| RoomInMode::new(mode, &rig, &scene, seed)) {
         let mode = room.mode;
-        let matched = |matcher: &dyn Matcher| room.matched(matcher, &rig, &scene, tools.draw);
+        let matched = |matcher: &dyn Matcher| room.matched(matcher, &rig, &scene);
         matchings.push(Matching { mode, matcher: "classical".into(), outcome: matched(&GuidedMatcher::default()) });
         matchings.push(match &tools.learned {
             Ok(learned) => Matching { mode, matcher: learned.name().to_owned(), outcome: matched(*learned) },
@@ -118,13 +117,7 @@ impl RoomInMode {
         PairImages { left: &self.left, right: &self.right }
     }
 
-    fn matched(
-        &self,
-        matcher: &dyn Matcher,
-        rig: &Rig,
-        scene: &Scene,
-        draw: &dyn Fn(PairImages<'_>, &PairCloud) -> Result<String, String>,
-    ) -> Result<Outcome, String> {
+    fn matched(&self, matcher: &dyn Matcher, rig: &Rig, scene: &Scene) -> Result<Outcome, String> {
         let pose = PairPose::standing(self.pose.clone());
         let cloud = pair_cloud(self.images(), rig, &pose, Method::from(matcher), &mut |_| ())
             .map_err(|error| error.to_string())?;
@@ -133,7 +126,7 @@ impl RoomInMode {
         Ok(Outcome {
             points: cloud.points.len(),
             score: self.scored(ranges, rig, scene),
-            picture: Picture::Svg(draw(self.images(), &cloud)?),
+            picture: Picture::Svg(match_svg(self.images(), &cloud).map_err(|error| error.to_string())?),
             note: format!("{} matches before the gates", cloud.matches),
         })
     }

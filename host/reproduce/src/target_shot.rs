@@ -6,11 +6,10 @@ use nalgebra::{UnitQuaternion, Vector3};
 use vergence_calibration::detect::{Placement, detect};
 use vergence_calibration::{Corner, TargetView};
 use vergence_scene::{Optics, Target};
-use vergence_sim::photograph_target;
+use vergence_sim::{Random, photograph_target};
 use vergence_vision::{Camera, ImageSize, KannalaBrandt, Pixel, Point, Transform, World};
 
 use crate::bench::{TARGET, scene_target};
-use vergence_sim::Random;
 
 /// Margin around the corners of a target, for its outer squares and the paper around them.
 const MARGIN_PX: f64 = 90.0;

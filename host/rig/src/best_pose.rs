@@ -1,9 +1,12 @@
 //! The search for the pose that meets a depth goal with the widest view.
 
+use serde_json::{Value, json};
 use vergence_vision::{Angle, Length, circle_zones};
 
+use crate::axis::AxisPosition;
 use crate::depth_field::DepthField;
 use crate::goal::{DepthGoal, DepthSigma};
+use crate::in_json::{axes_json, rounded};
 use crate::rig::Rig;
 
 /// Step of the azimuths at which the goal is checked.
@@ -37,6 +40,24 @@ impl RatedPose {
     #[must_use]
     pub fn meets_goal(&self) -> bool {
         self.shortfall <= 0.0
+    }
+
+    /// The position of each axis of `rig`.
+    #[must_use]
+    pub fn positions(&self, rig: &Rig) -> Vec<AxisPosition> {
+        rig.axes.iter().zip(&self.values).map(|(axis, &value)| AxisPosition::from_value(axis.kind, value)).collect()
+    }
+
+    /// Pose, sigma and view for programs.
+    #[must_use]
+    pub fn json(&self, rig: &Rig) -> Value {
+        json!({
+            "meets_goal": self.meets_goal(),
+            "pose": axes_json(rig, &self.positions(rig)),
+            "worst_sigma_mm": self.worst.map(Length::mm).map(rounded),
+            "seen_deg": rounded(self.seen.deg()),
+            "stereo_deg": rounded(self.stereo.deg()),
+        })
     }
 
     /// Whether this pose is preferred to `other`: first by the goal met, then by the wider view, then by the smaller

@@ -19,6 +19,7 @@ mod exposure_timing;
 mod file;
 mod goal;
 mod image_pairing;
+mod in_json;
 mod interchange;
 mod mode;
 mod moving;
@@ -39,6 +40,7 @@ pub use exposure_timing::{ExposureTiming, MiddleOfExposure, SequenceWatch, Stamp
 pub use file::RigError;
 pub use goal::{DepthGoal, DepthSigma, InvalidGoal};
 pub use image_pairing::{ExposureDelay, ImagePairing, PairingOutcome, StampedImage, TimedEvent};
+pub use in_json::{axes_json, camera_in_words, camera_json, rounded, zones_json};
 pub use interchange::{Camchain, CameraFormat, InterchangeError, kalibr, opencv};
 pub use mode::{Mode, ReportedMode};
 pub use moving::{MiddlePose, middle_pose, moving_cloud};

@@ -6,7 +6,7 @@ use std::time::Duration;
 
 use indicatif::{ProgressBar, ProgressStyle};
 use serde_json::Value;
-use vergence_board::describe_pose;
+use vergence_board::{describe_fault, describe_pose, pose_json};
 use vergence_protocol::PoseReport;
 use vergence_rig::Rig;
 
@@ -45,6 +45,18 @@ impl Console {
     /// Where standard output cannot be written.
     pub fn result(self, value: &Value) -> Result<(), Failure> {
         if self.json { print_line(value) } else { Ok(()) }
+    }
+
+    /// Says where the board is now.
+    ///
+    /// # Errors
+    /// Where standard output cannot be written.
+    pub fn say_pose(self, rig: &Rig, pose: &PoseReport) -> Result<(), Failure> {
+        self.say(describe_pose(rig, pose))?;
+        if let Some(fault) = pose.fault {
+            self.say(format!("  {}", describe_fault(rig, &fault)))?;
+        }
+        self.result(&pose_json(rig, pose))
     }
 
     /// Something that people should know while a command goes on: on standard error, in JSON too.

@@ -6,10 +6,10 @@
 
 use std::path::PathBuf;
 
+use vergence_files::{make_folder, write_whole};
 use vergence_rig::{CameraDocument, Provenance, Rig};
 
 use crate::failure::Failure;
-use crate::output::{make_folder, write_whole};
 
 const STORE_VARIABLE: &str = "VERGENCE_STORE";
 /// The file with the history of active calibrations.
@@ -104,7 +104,7 @@ impl Slots {
     pub fn keep(&self, name: &str, text: &str) -> Result<(), Failure> {
         self.check_free(name)?;
         make_folder(&self.folder)?;
-        write_whole(&self.path(name), text.as_bytes())
+        Ok(write_whole(&self.path(name), text.as_bytes())?)
     }
 
     /// All of them, by name.
@@ -177,7 +177,7 @@ impl Slots {
     fn write_history(&self, history: &[String]) -> Result<(), Failure> {
         let from = history.len().saturating_sub(LONGEST_HISTORY);
         let text: String = history.iter().skip(from).map(|name| format!("{name}\n")).collect();
-        write_whole(&self.folder.join(ACTIVE), text.as_bytes())
+        Ok(write_whole(&self.folder.join(ACTIVE), text.as_bytes())?)
     }
 
     fn check_rig(&self, name: &str) -> Result<(), Failure> {

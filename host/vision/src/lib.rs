@@ -30,7 +30,6 @@ mod kannala_brandt;
 mod lens_derivatives;
 mod pose_drift;
 mod stereo_pair;
-pub mod study;
 mod triangulation;
 mod uncertainty;
 mod units;

@@ -1,7 +1,7 @@
 //! The image in flash before an update, and the image that is sent.
 
 use vergence_image::layout::{ACTIVE, CAPACITY, FLASH_BASE, HARDWARE};
-use vergence_image::notes::{build_at, build_of};
+use vergence_image::notes::{build_at, build_of, version_of};
 use vergence_image::{Seal, sha256};
 use vergence_mcu::{Firmware, FlashCells};
 use vergence_protocol::management::ImageHeader;
@@ -23,6 +23,15 @@ impl SignedImage {
         let build = build_of(&bytes).unwrap_or_default();
         let header = ImageHeader { hardware: HARDWARE, version, length, build, sha256: sha256(&bytes) };
         Self { seal: seal(header), bytes }
+    }
+
+    /// The image before an update of `application` and the one after it, which is its [`twin`].
+    #[must_use]
+    pub fn before_and_after(application: &Firmware, seal: impl Fn(ImageHeader) -> Seal) -> [Self; 2] {
+        [application.flat(FLASH_BASE + ACTIVE.start), twin(application)].map(|bytes| {
+            let version = version_of(&bytes).unwrap_or_default();
+            Self::new(bytes, version, &seal)
+        })
     }
 
     /// Writes the image to where the boot loader starts it, as a debug probe would.

@@ -6,10 +6,12 @@
 
 mod image;
 mod known;
+mod state;
 mod sweep;
 mod talk;
 mod tally;
 
 pub use image::{SignedImage, twin};
+pub use state::{CutState, CutStateError};
 pub use sweep::{Cut, Ending, Journey, Sweep};
 pub use tally::CutTally;

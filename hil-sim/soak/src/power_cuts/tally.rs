@@ -4,6 +4,9 @@ use vergence_mcu::FlashOperation;
 
 use super::sweep::{Cut, Ending, rank};
 
+/// Most bricked boards that are told; more are only counted.
+const MOST_TOLD: usize = 20;
+
 /// Counts of outcomes, by the kind of operation that was cut.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct CutTally {
@@ -54,5 +57,29 @@ impl CutTally {
     #[must_use]
     pub fn endings(&self) -> [u64; 4] {
         std::array::from_fn(|ending| self.by_operation.iter().map(|row| row[ending]).sum())
+    }
+
+    /// A row for each kind of operation that was cut, for people.
+    #[must_use]
+    pub fn table(&self) -> String {
+        let head = format!("{:<18}{:>8}{:>10}{:>10}{:>10}{:>9}", "cut at", "cuts", "old", "new", "recovery", "bricked");
+        let names = ["an erasure", "a word of state", "another word"];
+        let rows = names.iter().zip(self.by_operation).map(|(name, row)| {
+            let [old, new, recovery, bricked] = row;
+            let cuts: u64 = row.iter().sum();
+            format!("{name:<18}{cuts:>8}{old:>10}{new:>10}{recovery:>10}{bricked:>9}")
+        });
+        std::iter::once(head).chain(rows).collect::<Vec<_>>().join("\n")
+    }
+
+    /// The first bricked boards, each with its reason; `None` where there are none.
+    #[must_use]
+    pub fn accusation(&self) -> Option<String> {
+        if self.bricked.is_empty() {
+            return None;
+        }
+        let told = self.bricked.iter().take(MOST_TOLD);
+        let lines: Vec<String> = told.map(|(number, why)| format!("  cut {number}: {why}")).collect();
+        Some(format!("{} boards bricked:\n{}", self.bricked.len(), lines.join("\n")))
     }
 }

@@ -2,6 +2,7 @@
 
 mod motion;
 mod questions;
+mod report;
 mod stream;
 mod words;
 
@@ -10,15 +11,17 @@ use std::time::Duration;
 use tokio::time::timeout;
 use vergence_protocol::{
     AxisInfo, AxisMask, BoardInfo, Compatibility, ControllerState, Mode, MoveId, MovePhase, PoseReport, Refusal,
-    Report, Request, Status,
+    Report, Request, SessionId, Status,
 };
 use vergence_rig::{AxisPosition, HostInstant, Rig};
 
 pub use self::questions::RecordedEvents;
-pub use self::words::{check_range, describe_fault, describe_pose, positions, staying};
+pub use self::report::{clock_json, describe_clock, pose_json};
+pub use self::words::{check_range, describe_fault, describe_pose, event_in_words, positions, staying};
 
 use crate::error::BoardError;
-use crate::link::Client;
+use crate::link::{Client, HostClock, OpenWire};
+use crate::serve::{Served, Shared, spawn_in_process};
 
 /// Longest wait for the end of a motion. Homing and moves of a bench take seconds.
 const MOTION_TIMEOUT: Duration = Duration::from_secs(120);
@@ -50,6 +53,21 @@ impl Board {
         board.check_axes().await?;
         board.next_pose().await?;
         Ok(board)
+    }
+
+    /// Connects by the real protocol to a simulated board that is served in this process; `drawn` is what the host believes
+    /// of the rig. A seeded `session` keeps even that the same in every run.
+    ///
+    /// # Errors
+    /// As [`Self::new`].
+    pub async fn in_process<B: Served + Send + 'static>(
+        simulated: Shared<B>,
+        drawn: Rig,
+        session: SessionId,
+        lease_ms: u16,
+    ) -> Result<Self, BoardError> {
+        let wire = OpenWire::in_process(spawn_in_process(simulated));
+        Self::new(Client::connect(wire, session, HostClock::start()).await?, drawn, lease_ms).await
     }
 
     /// Takes over a client of a board that may not fit the rig: the board can be asked and set, and must not be moved.

@@ -1,6 +1,6 @@
-//! Poses and faults as sentences, and positions checked against the rig's ranges.
+//! Poses, faults and events as sentences, and positions checked against the rig's ranges.
 
-use vergence_protocol::{AxisKind, FaultRecord, PoseReport};
+use vergence_protocol::{AxisKind, FaultRecord, Happening, PoseReport, switch_text};
 use vergence_rig::{AxisPosition, Rig, RigAxis};
 use vergence_vision::{Angle, Length};
 
@@ -57,4 +57,23 @@ pub fn describe_fault(rig: &Rig, fault: &FaultRecord) -> String {
     let axis = fault.axis.and_then(|index| rig.axes.get(usize::from(index)));
     let axis = axis.map(|axis| format!(" on axis '{}'", axis.name)).unwrap_or_default();
     format!("{}{axis}; {}", fault.code, fault.code.remedy())
+}
+
+/// An event of the flight recorder in words, with the rig's names and units.
+#[must_use]
+pub fn event_in_words(rig: &Rig, what: &Happening) -> String {
+    let axis = |index: u8| rig.axes.get(usize::from(index));
+    let name = |index: u8| axis(index).map_or_else(|| format!("axis {index}"), |axis| axis.name.clone());
+    match *what {
+        Happening::Fault { code, axis: Some(index), .. } => format!("FAULT on {}: {code}", name(index)),
+        Happening::Fault { code, axis: None, .. } => format!("FAULT: {code}"),
+        Happening::Switch { axis: index, home, operated } => {
+            format!("{}: {}", name(index), switch_text(home, operated))
+        }
+        Happening::Encoder { axis: index, counts } => match axis(index) {
+            Some(axis) => format!("{} was at {} by its encoder", axis.name, axis.position_at(counts)),
+            None => what.to_string(),
+        },
+        _ => what.to_string(),
+    }
 }

@@ -1,7 +1,9 @@
 //! The methods of triangulation on the page.
 
 use vergence_page::{Cell, fixed, note, plain, table, text};
-use vergence_vision::{Kernel, study};
+use vergence_vision::Kernel;
+
+use crate::study;
 
 /// The tables of triangulation with noise and with slipped matches.
 pub fn body(samples: u32) -> String {

@@ -3,7 +3,6 @@
 mod calibrate;
 mod matching;
 mod mcu;
-mod means;
 mod networks;
 mod vision;
 

@@ -3,14 +3,14 @@
 use std::path::PathBuf;
 
 use nalgebra::Vector3;
-use serde_json::{Value, json};
-use vergence_rig::{CameraFormat, Shutter};
-use vergence_vision::{Camera, KannalaBrandt, OpenCvFisheye, Pixel, UnitRay};
+use serde_json::json;
+use vergence_files::write_whole;
+use vergence_rig::{CameraFormat, Shutter, camera_in_words, camera_json};
+use vergence_vision::{Camera, KannalaBrandt, Pixel, UnitRay};
 
 use crate::camera_files::{read, read_camera};
 use crate::console::Console;
 use crate::failure::Failure;
-use crate::output::write_whole;
 
 /// Works on camera files: this program's TOML, OpenCV's YAML (fisheye), Kalibr's camchain (pinhole-equidistant).
 #[derive(Debug, clap::Args)]
@@ -68,9 +68,10 @@ pub fn run(args: &Args, console: Console) -> Result<(), Failure> {
             let file = read(file)?;
             let right = file.cameras.right.map(|(camera, _)| camera);
             for camera in [Some(file.cameras.left), right].into_iter().flatten() {
-                show(&camera, console)?;
+                console.say(camera_in_words(&camera))?;
             }
-            let cameras: Vec<_> = [Some(file.cameras.left), right].into_iter().flatten().map(|c| in_json(&c)).collect();
+            let cameras: Vec<_> =
+                [Some(file.cameras.left), right].into_iter().flatten().map(|c| camera_json(&c)).collect();
             console.result(&json!({"format": format!("{:?}", file.format).to_lowercase(), "cameras": cameras}))
         }
         Task::Convert { file, to, out } => {
@@ -93,28 +94,6 @@ pub fn run(args: &Args, console: Console) -> Result<(), Failure> {
         Task::Project { file, rays } => project(&read_camera(file)?, rays, console),
         Task::Unproject { file, pixels } => unproject(&read_camera(file)?, pixels, console),
     }
-}
-
-fn show(camera: &KannalaBrandt, console: Console) -> Result<(), Failure> {
-    let OpenCvFisheye { fx, fy, cx, cy, k: [k1, k2, k3, k4] } = camera.to_opencv();
-    let size = camera.size();
-    console.say(format!(
-        "{} x {} px, valid to {:.2} from the axis\nfx {fx:.4}  fy {fy:.4}  cx {cx:.4}  cy {cy:.4}\n\
-         opencv_k1 {k1:.6}  opencv_k2 {k2:.6}  opencv_k3 {k3:.6}  opencv_k4 {k4:.6}",
-        size.width,
-        size.height,
-        camera.theta_max()
-    ))
-}
-
-fn in_json(camera: &KannalaBrandt) -> Value {
-    let OpenCvFisheye { fx, fy, cx, cy, k: [k1, k2, k3, k4] } = camera.to_opencv();
-    let size = camera.size();
-    json!({
-        "size": [size.width, size.height],
-        "theta_max_deg": camera.theta_max().deg(),
-        "opencv": {"fx": fx, "fy": fy, "cx": cx, "cy": cy, "k1": k1, "k2": k2, "k3": k3, "k4": k4},
-    })
 }
 
 fn project(camera: &KannalaBrandt, rays: &[[f64; 3]], console: Console) -> Result<(), Failure> {

@@ -8,9 +8,10 @@ use tokio::task::spawn_blocking;
 use vergence_board::HostClock;
 use vergence_calibration::{Coverage, TargetSpec};
 use vergence_camera::{Camera, CameraError, CameraImage, CameraSet};
+use vergence_files::{make_folder, write_png};
 use vergence_scene::Target;
 use vergence_sim::{HeldTarget, TargetCamera};
-use vergence_vision::{ImageSize, Side};
+use vergence_vision::Side;
 
 use super::camera_options::CameraOptions;
 use super::target_options::TargetOptions;
@@ -18,7 +19,6 @@ use crate::cli::Globals;
 use crate::console::Console;
 use crate::failure::Failure;
 use crate::interrupt::interrupted;
-use crate::output::{make_folder, write_png};
 use crate::rig_file;
 use crate::target_watch::{NAMES, TargetViews, TargetWatch, observe};
 
@@ -89,7 +89,7 @@ async fn capture(
             }
         };
         if counts.images == 0 {
-            watch = TargetWatch::new(images.iter().map(|image| Coverage::new(size(image))).collect());
+            watch = TargetWatch::new(images.iter().map(|image| Coverage::new(image.size())).collect());
         }
         counts = Counts { images: counts.images + 1, alone: cameras.alone(), missed: cameras.missed() };
         let is_wanted = watch.observe(views) && watch.is_news();
@@ -161,10 +161,6 @@ fn file_name(camera: &str, number: usize) -> String {
 fn first_free(folder: &Path) -> usize {
     let is_free = |number: &usize| NAMES.iter().all(|name| !folder.join(file_name(name, *number)).exists());
     (0..).find(is_free).unwrap_or_default()
-}
-
-fn size(frame: &CameraImage) -> ImageSize {
-    ImageSize { width: frame.image.width(), height: frame.image.height() }
 }
 
 fn open(args: &Args, globals: &Globals, target: &TargetSpec) -> Result<Vec<Box<dyn Camera>>, Failure> {

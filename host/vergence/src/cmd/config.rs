@@ -6,13 +6,13 @@ use std::path::PathBuf;
 
 use serde_json::{Map, Value, json};
 use vergence_board::{Board, ManagementLink, NamedSetting, Port, restart, settings, why_refused};
+use vergence_files::write_whole;
 use vergence_protocol::{ControllerState, Refusal, Request};
 
 use super::connect::{connect_any, port};
 use crate::cli::Globals;
 use crate::console::Console;
 use crate::failure::Failure;
-use crate::output::write_whole;
 
 /// Prints and changes the board's settings of its axes and its link. The board checks every value beside all others, and
 /// changes nothing while it is armed.

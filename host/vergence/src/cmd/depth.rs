@@ -1,6 +1,5 @@
 //! `vergence depth`: a cloud from photographs.
 
-mod dense;
 mod motion;
 
 use std::path::{Path, PathBuf};
@@ -10,22 +9,28 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 use serde_json::{Value, json};
 use vergence_board::check_range;
 use vergence_camera::{Camera, CameraImage, FileCamera};
+use vergence_files::make_folder;
+use vergence_output::{
+    DenseCloud, PoseSource, TableFormat, check_ending, check_folder, cloud_json, drift_warning, dropped_lines,
+    match_svg, write_cloud, write_drawing,
+};
 use vergence_pipeline::gates::PIXEL_SIGMA;
-use vergence_pipeline::{Method, PairCloud, PairImages, PairPose, cloud_of_pairs, pair_cloud};
+use vergence_pipeline::{
+    Method, PairCloud, PairImages, PairPose, StageTimes, cloud_of_pairs, dense_ranges, pair_cloud,
+};
 use vergence_rig::{Rig, RigPose};
-use vergence_vision::{ImageSize, Kernel, Pixel, PixelPair};
+use vergence_vision::{Kernel, Pixel, PixelPair, Side};
 
 use self::motion::StageSpeed;
-use super::cloud_report::{PoseSource, drift_warning, dropped_json, dropped_lines};
-use super::report::rounded;
 use super::stage_pose::StagePose;
 use crate::cli::Globals;
 use crate::cmd::model_options::MatcherOptions;
+use crate::cmd::options::TableOption;
 use crate::console::Console;
 use crate::failure::Failure;
 use crate::interrupt::{interrupted, on_own_thread};
-use crate::output::{Table, TableFormat, check_ending, check_folder, make_folder, match_svg, ply, write_whole};
 use crate::rig_file;
+use crate::stopwatch::clock;
 
 /// Matches two photographs (or two folders of them, paired in the order of their names) taken by the cameras of the rig
 /// file, and writes the points as PLY in millimetres in the left camera's frame.
@@ -60,7 +65,7 @@ pub struct Args {
     matches: Option<PathBuf>,
     /// Writes the points as tables too, beside the cloud.
     #[arg(long, value_delimiter = ',', value_name = "FORMAT")]
-    also: Vec<TableFormat>,
+    also: Vec<TableOption>,
     #[command(flatten)]
     stage: StagePose,
     #[command(flatten)]
@@ -115,7 +120,7 @@ fn every_pair(args: &Args, rig: Option<&Path>, console: Console, progress: &Prog
         None => PairPose::standing(pose.clone()),
     };
     let pairs = args.points.as_deref().map(read_pairs).transpose()?;
-    let (mut left, mut right) = open_images(args)?;
+    let [mut left, mut right] = FileCamera::open_pair(&args.left, &args.right)?;
     progress.all.store(left.remaining(), Ordering::Relaxed);
     let matcher = if args.dense { None } else { Some(args.matching.matcher(console)?) };
     let several = args.left.is_dir();
@@ -124,7 +129,11 @@ fn every_pair(args: &Args, rig: Option<&Path>, console: Console, progress: &Prog
         let work = console.progress(&format!("{} and {}", left.name, right.name));
         let out = out_of(args, &left)?;
         let result = match &matcher {
-            None => dense::one_pair([&left, &right], &rig, &pose, &out, console)?,
+            None => {
+                let (result, is_empty) = one_dense_pair([&left, &right], &rig, &pose, &out, console)?;
+                empty.extend(is_empty.then(|| left.name.clone()));
+                result
+            }
             Some(matcher) => {
                 let method = Method { matcher: matcher.as_ref(), kernel: args.kernel };
                 let cloud = one_pair([&left, &right], &rig, &pair_pose, pairs.as_deref(), method)?;
@@ -132,9 +141,6 @@ fn every_pair(args: &Args, rig: Option<&Path>, console: Console, progress: &Prog
             }
         };
         work.finish_and_clear();
-        if args.dense && dense::is_empty(&result) {
-            empty.push(left.name);
-        }
         results.push(result);
         progress.measured.fetch_add(1, Ordering::Relaxed);
     }
@@ -142,7 +148,34 @@ fn every_pair(args: &Args, rig: Option<&Path>, console: Console, progress: &Prog
         (false, Some(only)) => only,
         (_, last) => json!({ "pairs": results.into_iter().chain(last).collect::<Vec<_>>() }),
     })?;
-    if empty.is_empty() { Ok(()) } else { Err(dense::nothing_seen(&empty)) }
+    if empty.is_empty() {
+        return Ok(());
+    }
+    // Their files are written all the same: every pixel is a gap.
+    Err(Failure::check(format!(
+        "no pixel of {} has a range: the images are dark, without texture, or not of this pose",
+        empty.join(", ")
+    )))
+}
+
+/// Measures one pair and writes the cloud to `out` and images beside it. Returns the result, and whether no pixel has a
+/// range or is known to be far.
+fn one_dense_pair(
+    [left, right]: [&CameraImage; 2],
+    rig: &Rig,
+    pose: &RigPose,
+    out: &Path,
+    console: Console,
+) -> Result<(Value, bool), Failure> {
+    left.check_size(rig.left_camera.size(), Side::Left)?;
+    right.check_size(rig.right_camera.size(), Side::Right)?;
+    let images = PairImages { left: &left.image, right: &right.image };
+    let mut times = StageTimes::start(clock);
+    let depth = dense_ranges(images, rig, pose, &mut |stage| times.ended(stage))
+        .map_err(|error| Failure::usage(format!("{} and {}: {error}", left.name, right.name)))?;
+    let written = DenseCloud::write(&depth, &times, images, (rig, pose), out)?;
+    console.say(written.in_words())?;
+    Ok((written.json(), written.is_empty()))
 }
 
 /// Refuses names of output files that say another format than the one written.
@@ -153,24 +186,11 @@ fn check_names(args: &Args) -> Result<(), Failure> {
         false => _ = check_ending(&args.out, &["ply"])?,
     }
     match &args.matches {
-        Some(folder) if several => check_folder(folder),
-        Some(file) => check_ending(file, &["svg"]).map(|_| ()),
-        None => Ok(()),
+        Some(folder) if several => check_folder(folder)?,
+        Some(file) => _ = check_ending(file, &["svg"])?,
+        None => {}
     }
-}
-
-fn open_images(args: &Args) -> Result<(FileCamera, FileCamera), Failure> {
-    let (left, right) = (FileCamera::open(&args.left)?, FileCamera::open(&args.right)?);
-    if left.remaining() == right.remaining() {
-        return Ok((left, right));
-    }
-    Err(Failure::usage(format!(
-        "{} has {} images and {} has {}: they must pair up",
-        args.left.display(),
-        left.remaining(),
-        args.right.display(),
-        right.remaining()
-    )))
+    Ok(())
 }
 
 /// Writes and prints the cloud of one pair.
@@ -182,23 +202,18 @@ fn write(
     out: &Path,
     console: Console,
 ) -> Result<Value, Failure> {
-    write_whole(out, ply(&cloud.points).as_bytes())?;
-    for format in &args.also {
-        let table = Table::of_points(&cloud.points).text(*format);
-        write_whole(&out.with_extension(format.extension()), table.as_bytes())?;
-    }
+    write_cloud(out, &cloud.points, args.also.iter().copied().map(TableFormat::from))?;
     if let Some(matches) = &args.matches {
         let path = if args.left.is_dir() { in_folder(matches, left, "svg")? } else { matches.clone() };
         let images = PairImages { left: &left.image, right: &right.image };
-        let drawn = match_svg(images, cloud).map_err(|error| Failure::output(&path, error))?;
-        write_whole(&path, drawn.as_bytes())?;
+        write_drawing(&path, match_svg(images, cloud))?;
     }
     console.say(format!("{} points of {} matches in {}", cloud.points.len(), cloud.matches, out.display()))?;
     dropped_lines(&cloud.dropped).iter().try_for_each(|line| console.say(line))?;
     if let Some(warning) = drift_warning(cloud, PoseSource::of_photographs(rig)) {
         console.warn(format!("{} and {}: {warning}", left.name, right.name));
     }
-    Ok(result(cloud, out))
+    Ok(cloud_json(cloud, out))
 }
 
 /// The pose of the cameras: fixed by the rig file, or given on the command line.
@@ -239,26 +254,14 @@ fn one_pair(
     pairs: Option<&[(PixelPair, f64)]>,
     method: Method<'_>,
 ) -> Result<PairCloud, Failure> {
-    check_size(left, rig.left_camera.size(), "left")?;
-    check_size(right, rig.right_camera.size(), "right")?;
+    left.check_size(rig.left_camera.size(), Side::Left)?;
+    right.check_size(rig.right_camera.size(), Side::Right)?;
     let images = PairImages { left: &left.image, right: &right.image };
     let fail = |error: &dyn std::fmt::Display| Failure::usage(format!("{} and {}: {error}", left.name, right.name));
     match pairs {
         Some(pairs) => cloud_of_pairs(pairs, images.left, rig, pose, method.kernel).map_err(|error| fail(&error)),
         None => pair_cloud(images, rig, pose, method, &mut |_| ()).map_err(|error| fail(&error)),
     }
-}
-
-fn check_size(frame: &CameraImage, size: ImageSize, side: &str) -> Result<(), Failure> {
-    let (width, height) = frame.image.dimensions();
-    if (width, height) == (size.width, size.height) {
-        return Ok(());
-    }
-    Err(Failure::usage(format!(
-        "{side} image '{}' is {width} x {height}, but the {side} camera of the rig file is {} x {}: use the images the \
-         camera was calibrated with, or its rig file",
-        frame.name, size.width, size.height
-    )))
 }
 
 /// Reads correspondences from a CSV file with a header.
@@ -279,22 +282,4 @@ fn read_pairs(path: &Path) -> Result<Vec<(PixelPair, f64)>, Failure> {
             Ok((pixels, PIXEL_SIGMA))
         })
         .collect()
-}
-
-fn result(cloud: &PairCloud, out: &Path) -> Value {
-    let drift = cloud.pose_drift.as_ref().map(|drift| {
-        json!({
-            "deg": rounded(drift.angle.deg()),
-            "chi_squared": rounded(drift.chi_squared),
-            "significant": drift.is_significant(),
-        })
-    });
-    json!({
-        "points": cloud.points.len(),
-        "matches": cloud.matches,
-        "keypoints": cloud.keypoints,
-        "dropped": dropped_json(&cloud.dropped),
-        "pose_drift": drift,
-        "out": out,
-    })
 }

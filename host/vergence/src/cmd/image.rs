@@ -4,6 +4,7 @@ use std::path::{Path, PathBuf};
 
 use serde_json::json;
 use vergence_board::{hardware_name, version_text};
+use vergence_files::write_whole;
 use vergence_image::notes::version_of;
 use vergence_image::{is_signed_by, sha256};
 use vergence_protocol::management::ImageHeader;
@@ -14,7 +15,6 @@ use crate::firmware::{
     DEVELOPMENT, Hardware, PublicKey, SecretKey, build_of, flatten, fresh_secret, header_json, hex, parse_version,
     read_image,
 };
-use crate::output::write_whole;
 
 /// Makes keys, signs firmware images and prints what an image holds. Boards take signed images only: see docs/flashing.md.
 #[derive(Debug, clap::Args)]

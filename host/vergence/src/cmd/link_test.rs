@@ -3,11 +3,11 @@
 use std::time::Duration;
 
 use serde_json::json;
-use vergence_board::LinkFigures;
+use vergence_board::{LinkFigures, clock_json, describe_clock};
 use vergence_protocol::Request;
+use vergence_rig::rounded;
 
 use super::connect::{connect, is_wire};
-use super::report::{clock_json, describe_clock, rounded};
 use crate::cli::Globals;
 use crate::console::Console;
 use crate::failure::Failure;

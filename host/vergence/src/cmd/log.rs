@@ -6,12 +6,11 @@ use std::time::Duration;
 
 use serde_json::json;
 use tokio::time::timeout;
-use vergence_board::{Board, Followed, Follower, describe_fault};
+use vergence_board::{Board, Followed, Follower, describe_fault, event_in_words};
 use vergence_mcu::{Firmware, LogDecoder, LogEntry};
 use vergence_rig::Rig;
 
 use super::reconnect::{Listening, Source};
-use super::report::event_in_words;
 use crate::cli::Globals;
 use crate::console::Console;
 use crate::failure::Failure;

@@ -1,12 +1,10 @@
 //! One module per verb.
 
 mod camera_options;
-pub mod cloud_report;
 mod connect;
 mod model_options;
 pub mod options;
 mod reconnect;
-pub mod report;
 mod stage_pose;
 mod target_options;
 

@@ -138,13 +138,7 @@ fn check(args: &VerifyArgs, console: Console) -> Result<(), Failure> {
     let mut failed = false;
     for name in store.names()? {
         for verdict in verify(&store, &name, &runtimes, clock)? {
-            let message = match (&verdict.matches, verdict.seconds) {
-                (Ok(matches), Some(seconds)) => {
-                    format!("ok: {matches} matches of a pattern with itself, {seconds:.2} s")
-                }
-                (Ok(matches), None) => format!("ok: {matches} matches of a pattern with itself"),
-                (Err(error), _) => error.to_string(),
-            };
+            let message = verdict.in_words();
             console.say(format!("{name} on {}: {message}", verdict.runtime))?;
             failed |= verdict.matches.is_err();
             results.push(json!({

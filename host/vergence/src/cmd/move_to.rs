@@ -1,11 +1,10 @@
 //! `vergence move`: goes to any pose, or by a distance.
 
-use vergence_board::{check_range, describe_pose};
+use vergence_board::{check_range, describe_pose, pose_json};
 use vergence_protocol::Mode;
-use vergence_rig::{AxisPosition, Rig};
+use vergence_rig::{AxisPosition, Rig, axes_json};
 
 use super::connect::connect;
-use super::report::{axes_json, pose_json};
 use super::stage_pose::{Goal, StagePose, go};
 use crate::cli::Globals;
 use crate::console::Console;

@@ -2,6 +2,8 @@
 
 use std::path::PathBuf;
 
+use vergence_output::TableFormat;
+
 use crate::failure::Failure;
 use crate::slots;
 
@@ -96,6 +98,24 @@ impl Choice for RigFileOptions {
 impl Choice for BoardOptions {
     fn given(&self) -> Globals {
         Globals { rig: self.rig.rig.clone(), lease: self.lease, ..self.port.given() }
+    }
+}
+
+/// The format of a table that is written beside a cloud.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
+pub enum TableOption {
+    /// Comma-separated, with the names of the columns in the first line.
+    Csv,
+    /// `{"about", "columns", "rows"}`.
+    Json,
+}
+
+impl From<TableOption> for TableFormat {
+    fn from(option: TableOption) -> Self {
+        match option {
+            TableOption::Csv => Self::Csv,
+            TableOption::Json => Self::Json,
+        }
     }
 }
 

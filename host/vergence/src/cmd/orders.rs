@@ -6,7 +6,6 @@ use vergence_board::describe_fault;
 
 use super::connect::connect;
 use super::reconnect::{Persistence, reconnect};
-use super::report::say_pose;
 use super::stage_pose::{Goal, go, named_mode};
 use crate::cli::Globals;
 use crate::console::Console;
@@ -36,15 +35,15 @@ pub async fn arm(args: &Arm, globals: &Globals, console: Console) -> Result<(), 
     })
     .await;
     match held {
-        Ok(()) => say_pose(console, board.rig(), board.pose()),
+        Ok(()) => console.say_pose(board.rig(), board.pose()),
         // This is how it is meant to end: the board is disarmed now.
-        Err(ended) if ended.kind() == FailureKind::Interrupted => say_pose(console, board.rig(), board.pose()),
+        Err(ended) if ended.kind() == FailureKind::Interrupted => console.say_pose(board.rig(), board.pose()),
         Err(lost) if args.persistence.survives(&lost) => {
             drop(board);
             tokio::select! {
                 board = reconnect(globals, console, lost) => {
                     let board = board?;
-                    say_pose(console, board.rig(), board.pose())?;
+                    console.say_pose(board.rig(), board.pose())?;
                     Err(Failure::link("the link ended while the board was armed; it is back, and nothing was armed again"))
                 }
                 () = interrupted() => Err(Failure::link("interrupted before the board came back")),
@@ -61,7 +60,7 @@ pub struct Disarm {}
 pub async fn disarm(_: &Disarm, globals: &Globals, console: Console) -> Result<(), Failure> {
     let mut board = connect(globals, console, "disarming").await?;
     board.disarm().await?;
-    say_pose(console, board.rig(), board.pose())
+    console.say_pose(board.rig(), board.pose())
 }
 
 /// Clears the latched fault, says what it was, and leaves the board disarmed.
@@ -74,7 +73,7 @@ pub async fn clear(_: &Clear, globals: &Globals, console: Console) -> Result<(),
         Some(fault) => console.say(format!("cleared: {}", describe_fault(board.rig(), &fault)))?,
         None => console.say("there was nothing to clear")?,
     }
-    say_pose(console, board.rig(), board.pose())
+    console.say_pose(board.rig(), board.pose())
 }
 
 /// Seeks the home switch of every axis, approaches it again slowly, and moves to the low end of the range.
@@ -84,7 +83,7 @@ pub struct Home {}
 pub async fn home(_: &Home, globals: &Globals, console: Console) -> Result<(), Failure> {
     let mut board = connect(globals, console, "homing").await?;
     armed(&mut board, async |board| Ok(board.home().await?)).await?;
-    say_pose(console, board.rig(), board.pose())
+    console.say_pose(board.rig(), board.pose())
 }
 
 /// Moves all axes to a mode that the rig file names, and waits until the encoders confirm it.

@@ -2,14 +2,12 @@
 
 mod goal;
 
-use serde_json::{Value, json};
-use vergence_board::{AxisPlan, Board, MovePlan, MoveStart, check_range};
+use serde_json::json;
+use vergence_board::{Board, MovePlan, MoveStart, check_range};
 use vergence_pipeline::{ZONE_RADIUS, rig_zones};
-use vergence_protocol::AxisKind;
-use vergence_rig::{AxisPosition, Rig, RigAxis};
+use vergence_rig::{AxisPosition, Rig, axes_json, rounded, zones_json};
 
 use super::connect::connect;
-use super::report::{axes_json, rounded, zones_json};
 use super::stage_pose::{StagePose, named_mode};
 use crate::cli::Globals;
 use crate::console::Console;
@@ -70,7 +68,7 @@ pub async fn run(args: &Args, globals: &Globals, console: Console) -> Result<(),
     ))?;
     if args.dump {
         for (axis, planned) in rig.axes.iter().zip(&plan.axes) {
-            console.say(dump(axis, planned))?;
+            console.say(planned.table(axis))?;
         }
     }
     console.result(&json!({
@@ -78,7 +76,7 @@ pub async fn run(args: &Args, globals: &Globals, console: Console) -> Result<(),
         "from": axes_json(&rig, &from),
         "to": axes_json(&rig, &to),
         "zones_deg": zones_json(&zones),
-        "axes": rig.axes.iter().zip(&plan.axes).map(|(axis, planned)| axis_json(axis, planned)).collect::<Vec<_>>(),
+        "axes": rig.axes.iter().zip(&plan.axes).map(|(axis, planned)| planned.json(axis)).collect::<Vec<_>>(),
     }))
 }
 
@@ -96,52 +94,4 @@ fn target(args: &Args, rig: &Rig, from: &[AxisPosition]) -> Result<Vec<AxisPosit
     }
     let named = args.stage.of_axes(rig)?;
     Ok(named.iter().zip(from).map(|(named, &from)| named.unwrap_or(from)).collect())
-}
-
-/// Millimetres, or degrees in place of radians.
-fn unit(kind: AxisKind) -> (&'static str, f64) {
-    match kind {
-        AxisKind::Linear => ("mm", 1.0),
-        AxisKind::Rotary => ("deg", 1f64.to_degrees()),
-    }
-}
-
-/// A table that can be compared line by line.
-fn dump(axis: &RigAxis, planned: &AxisPlan) -> String {
-    let (unit, scale) = unit(axis.kind);
-    let mut text = format!("\n{}\n", axis.name);
-    let heads = ["time s".into(), unit.into(), format!("{unit}/s"), format!("{unit}/s2"), format!("{unit}/s3")];
-    text += &row(&heads);
-    for knot in &planned.knots {
-        let [position, velocity, acceleration, jerk] =
-            [knot.position, knot.velocity, knot.acceleration, knot.jerk].map(|value| scale * value);
-        let numbers = [(knot.time, 5), (position, 4), (velocity, 4), (acceleration, 3), (jerk, 1)];
-        text += &row(&numbers.map(|(number, digits)| plain(number, digits)));
-    }
-    text.trim_end().to_owned()
-}
-
-fn row(cells: &[String; 5]) -> String {
-    let [time, position, velocity, acceleration, jerk] = cells;
-    format!("  {time:>10} {position:>12} {velocity:>12} {acceleration:>12} {jerk:>12}\n")
-}
-
-/// A number with fixed digits; what rounds to zero has no sign.
-fn plain(number: f64, digits: usize) -> String {
-    let text = format!("{number:.digits$}");
-    if text.trim_start_matches(['-', '0', '.']).is_empty() { text.trim_start_matches('-').to_owned() } else { text }
-}
-
-fn axis_json(axis: &RigAxis, planned: &AxisPlan) -> Value {
-    let (unit, scale) = unit(axis.kind);
-    let segments = planned.knots.iter().map(|knot| {
-        json!({
-            "time_s": knot.time,
-            "position": rounded(scale * knot.position),
-            "velocity": rounded(scale * knot.velocity),
-            "acceleration": rounded(scale * knot.acceleration),
-            "jerk": rounded(scale * knot.jerk),
-        })
-    });
-    json!({ "axis": axis.name, "unit": unit, "segments": segments.collect::<Vec<_>>() })
 }

@@ -1,30 +1,21 @@
 //! `vergence reproduce`: the paper's tables in one command.
 
-mod drive;
-mod in_json;
-mod opencv;
-mod tell;
-
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex};
 
-use rayon::prelude::*;
+use indicatif::ProgressBar;
 use serde_json::json;
-use vergence_matching::learned::LearnedMatcher;
+use vergence_bench::ask_python;
+use vergence_files::{make_folder, write_png, write_whole};
 use vergence_reproduce::{
-    Bench, CornerSource, Corners, Drive, Findings, Matching, MatchingTools, ModeZones, Table, matchings, mode_zones,
-    one_seed, reproduction_page, target_images,
+    Bench, Corners, DrivenRig, MatchingTools, Plan, Progress, SgbmAnswer, SgbmTask, drive, experiments,
 };
-use vergence_vision::PAPER_FIELD;
+use vergence_rig::rounded;
 
-use self::drive::drive;
-use self::opencv::semi_global_matching;
 use super::model_options::MatcherOptions;
-use super::report::rounded;
-use crate::console::Console;
+use crate::console::{Console, shown_on};
 use crate::failure::Failure;
 use crate::interrupt::{interrupted, on_own_thread};
-use crate::output::{ZonesOf, make_folder, match_svg, write_whole, zones_plot};
 use crate::stopwatch::Stopwatch;
 
 /// Repeats the paper's experiments on the simulated rig and writes them to one page.
@@ -71,35 +62,37 @@ enum CornersOption {
     Projected,
 }
 
-/// Noise of the corners in pixels: of the class that the goals are for, and twice that.
-const NOISE_PX: [f64; 2] = [0.1, 0.2];
-/// Seed of the simulated room and of the pictures.
-const PICTURE_SEED: u64 = 1;
-
-/// A rig and the stops of its stage.
-type Driven = (u64, Bench, Drive);
-
 /// What the command is at, for people and for the last words of an interrupted one.
 #[derive(Clone)]
 struct Stage(Arc<Mutex<String>>);
-
-/// Results of the computation.
-struct Results {
-    tables: [Table; 2],
-    zones: Vec<ModeZones>,
-    matchings: Vec<Matching>,
-    html: String,
-}
 
 pub async fn run(args: &Args, console: Console) -> Result<(), Failure> {
     let whole = Stopwatch::start();
     make_folder(&args.out)?;
     let learned = if args.no_matching { None } else { args.matching.learned(console)? };
     let stage = Stage::new("driving the rigs");
+    let plan = Plan {
+        seeds: args.seeds,
+        noisy_seeds: args.noisy_seeds,
+        corners: args.corners.into(),
+        samples: args.samples,
+        matching: !args.no_matching,
+    };
     let work = async {
         let rigs = driven(args.seeds, console).await?;
-        let (args, stage) = (args.clone(), stage.clone());
-        on_own_thread(move || compute(&args, &rigs, learned.as_ref(), console, &stage)).await
+        let (python, out, stage) = (args.python.clone(), args.out.clone(), stage.clone());
+        on_own_thread(move || {
+            let tools = MatchingTools {
+                learned: learned.as_ref().ok_or_else(|| "no model is kept: see 'vergence models'".to_owned()),
+                opencv: &|task| semi_global_matching(&python, &out, task),
+            };
+            let shown = Shown::new(console);
+            Ok(experiments(&plan, &rigs, &tools, &|progress| {
+                stage.is(progress.to_string());
+                shown.follow(progress);
+            })?)
+        })
+        .await
     };
     let results = tokio::select! {
         results = work => results?,
@@ -107,19 +100,12 @@ pub async fn run(args: &Args, console: Console) -> Result<(), Failure> {
     };
     let page = args.out.join("reproduce.html");
     write_whole(&page, results.html.as_bytes())?;
-    let [table, noisier] = &results.tables;
-    tell::bench([table, noisier], console)?;
-    tell::matchings(&results.matchings, console)?;
+    results.lines().iter().try_for_each(|line| console.say(line))?;
     console.say(format!("{} shows all results; {:.0} s", page.display(), whole.seconds()))?;
-    console.result(&json!({
-        "bench": in_json::rows(table),
-        "zones": in_json::zones(&results.zones),
-        "corners": in_json::corners(table),
-        "noisier": { "bench": in_json::rows(noisier), "corners": in_json::corners(noisier) },
-        "matching": in_json::matchings(&results.matchings),
-        "page": page,
-        "seconds": rounded(whole.seconds()),
-    }))
+    let mut figures = results.json();
+    figures["page"] = json!(page);
+    figures["seconds"] = rounded(whole.seconds()).into();
+    console.result(&figures)
 }
 
 impl Stage {
@@ -142,114 +128,61 @@ impl Stage {
     }
 }
 
+/// The progress of the experiments on the terminal: a spinner, or a bar that counts rigs.
+struct Shown {
+    console: Console,
+    bar: Mutex<ProgressBar>,
+}
+
+impl Shown {
+    fn new(console: Console) -> Self {
+        Self { console, bar: Mutex::new(ProgressBar::hidden()) }
+    }
+
+    fn follow(&self, progress: Progress) {
+        let Ok(mut bar) = self.bar.lock() else { return };
+        let next = match progress {
+            Progress::Measuring { done: 1.., .. } => return bar.inc(1),
+            Progress::Measuring { noise_px, rigs, .. } => {
+                self.console.count_bar(&format!("rigs, corners of {noise_px} px"), rigs as u64)
+            }
+            Progress::Matching => self.console.progress(&progress.to_string()),
+            Progress::Drawing => ProgressBar::hidden(),
+        };
+        std::mem::replace(&mut *bar, next).finish_and_clear();
+    }
+}
+
 /// Drives every seed's rig through its calibration and its modes.
-async fn driven(seeds: u32, console: Console) -> Result<Vec<Driven>, Failure> {
+async fn driven(seeds: u32, console: Console) -> Result<Vec<DrivenRig>, Failure> {
     let progress = console.progress("driving the rigs");
     let mut rigs = Vec::new();
     for seed in 0..u64::from(seeds) {
         let bench = Bench::new(seed)?;
-        let drive = drive(&bench, seed, &progress).await?;
-        rigs.push((seed, bench, drive));
+        let drive = drive(&bench, seed, shown_on(progress.clone())).await?;
+        rigs.push(DrivenRig { seed, bench, drive });
     }
     progress.finish_and_clear();
     Ok(rigs)
 }
 
-/// Everything after driving: matchings, calibrations, measurements and the page.
-fn compute(
-    args: &Args,
-    rigs: &[Driven],
-    learned: Option<&LearnedMatcher>,
-    console: Console,
-    stage: &Stage,
-) -> Result<Results, Failure> {
-    let matchings = if args.no_matching { Vec::new() } else { matched(args, learned, console, stage)? };
-    let noisy = args.noisy_seeds.unwrap_or(args.seeds.div_ceil(5)).min(args.seeds) as usize;
-    let [table, noisier] = [(NOISE_PX[0], rigs.len()), (NOISE_PX[1], noisy)].map(|(noise_px, seeds)| {
-        let source = CornerSource { corners: args.corners.into(), noise_px };
-        all_seeds(rigs.get(..seeds).unwrap_or_default(), &source, console, stage)
-    });
-    let tables = [table?, noisier?];
-    stage.is("drawing the page".into());
-    let zones = mode_zones();
-    let html = reproduction_page(&Findings {
-        tables: tables.each_ref(),
-        rendered: args.corners == CornersOption::Rendered,
-        zones: &zones,
-        zones_svg: &zones_of_herbivore(&zones),
-        matchings: &matchings,
-        targets: &target_images(PICTURE_SEED)?,
-        samples: args.samples,
-        command: command(args, noisy),
-    })?;
-    Ok(Results { tables, zones, matchings, html })
-}
-
-/// The command as the page names it: what decides its bytes.
-fn command(args: &Args, noisy: usize) -> String {
-    let corners = if args.corners == CornersOption::Rendered { "" } else { " --corners projected" };
-    let matching = if args.no_matching { " --no-matching" } else { "" };
-    format!(
-        "vergence reproduce --seeds {} --noisy-seeds {noisy} --samples {}{corners}{matching}",
-        args.seeds, args.samples
-    )
-}
-
-/// Computes all seeds in parallel; their order decides the order of the results.
-fn all_seeds(rigs: &[Driven], source: &CornerSource, console: Console, stage: &Stage) -> Result<Table, Failure> {
-    let what = format!("rigs, corners of {} px", source.noise_px);
-    let progress = console.count_bar(&what, rigs.len() as u64);
-    let report = || {
-        stage.is(format!(
-            "measuring with corners of {} px, {} of {} rigs done",
-            source.noise_px,
-            progress.position(),
-            rigs.len()
-        ));
-    };
-    report();
-    let results: Result<Vec<_>, _> = rigs
-        .par_iter()
-        .map(|(seed, bench, drive)| {
-            let result = one_seed(bench, drive, source, *seed);
-            progress.inc(1);
-            report();
-            result
-        })
-        .collect();
-    progress.finish_and_clear();
-    Ok(Table::of(&results?))
-}
-
-fn matched(
-    args: &Args,
-    learned: Option<&LearnedMatcher>,
-    console: Console,
-    stage: &Stage,
-) -> Result<Vec<Matching>, Failure> {
-    stage.is("matching in the simulated room".into());
-    let progress = console.progress("matching in the simulated room");
-    let tools = MatchingTools {
-        learned: learned.ok_or_else(|| "no model is kept: see 'vergence models'".to_owned()),
-        draw: &|images, cloud| match_svg(images, cloud).map_err(|error| error.to_string()),
-        opencv: &|task| semi_global_matching(&args.python, &args.out, task),
-    };
-    let matchings = matchings(&tools, PICTURE_SEED)?;
-    progress.finish_and_clear();
-    Ok(matchings)
-}
-
-/// Curves of the zones of the herbivore mode, as SVG.
-fn zones_of_herbivore(zones: &[ModeZones]) -> String {
-    let herbivore = zones.iter().find(|mode| mode.published.name == "herbivore");
-    herbivore.map_or_else(String::new, |mode| {
-        zones_plot(&ZonesOf {
-            baseline: mode.published.baseline,
-            separation: mode.published.separation,
-            field: PAPER_FIELD,
-            radius: mode.published.radius,
-        })
-    })
+/// Writes the images of `task` to `folder`, and runs its script in `python`.
+///
+/// # Errors
+/// A sentence that says why there is no answer.
+fn semi_global_matching(python: &str, folder: &Path, task: &SgbmTask<'_>) -> Result<SgbmAnswer, String> {
+    let file = |what: &str| folder.join(format!("{}-{what}.png", task.mode));
+    let (left, right, picture) = (file("left"), file("right"), file("sgbm"));
+    for (path, image) in [(&left, task.images[0]), (&right, task.images[1])] {
+        write_png(path, image).map_err(|failure| failure.to_string())?;
+    }
+    let mut argument = task.argument.clone();
+    for (name, path) in [("left", &left), ("right", &right), ("picture", &picture)] {
+        argument[name] = json!(path);
+    }
+    let figures = ask_python(python, task.script, [argument.to_string()])?;
+    let picture = image::open(&picture).map_err(|error| format!("{}: {error}", picture.display()))?.to_rgb8();
+    Ok(SgbmAnswer { figures, picture })
 }
 
 impl From<CornersOption> for Corners {

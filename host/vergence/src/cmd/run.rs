@@ -9,6 +9,8 @@ use std::time::Duration;
 
 use tokio::sync::mpsc;
 use vergence_board::{Board, HostClock, Port, fresh_session};
+use vergence_files::make_folder;
+use vergence_output::{TableFormat, check_folder};
 use vergence_pipeline::Exposures;
 use vergence_protocol::{Request, Trigger};
 use vergence_rig::Rig;
@@ -18,11 +20,11 @@ use super::connect::{connect, port};
 use crate::cli::Globals;
 use crate::cmd::camera_options::CameraOptions;
 use crate::cmd::model_options::MatcherOptions;
+use crate::cmd::options::TableOption;
 use crate::console::Console;
 use crate::failure::Failure;
 use crate::interrupt::interrupted;
 use crate::live::{Ended, Limits, LiveLoop, MatchingTime, Publisher, Totals};
-use crate::output::{TableFormat, check_folder, make_folder};
 use crate::rig_file;
 use crate::sim::{SharedRig, SimulatedRig, board_of};
 
@@ -55,7 +57,7 @@ pub struct Args {
     keep: bool,
     /// Write points and bearings as tables too.
     #[arg(long, requires = "out", value_delimiter = ',', value_name = "FORMAT")]
-    also: Vec<TableFormat>,
+    also: Vec<TableOption>,
     /// End after this many results.
     #[arg(long, value_name = "COUNT")]
     frames: Option<u64>,
@@ -128,8 +130,14 @@ pub async fn run(args: &Args, globals: &Globals, console: Console) -> Result<(),
             (Some(_), Some(time)) => MatchingTime::Fixed(time),
         },
     };
-    let mut publisher =
-        Publisher { console, rig, out: args.out.clone(), keep: args.keep, also: args.also.clone(), number: 0 };
+    let mut publisher = Publisher {
+        console,
+        rig,
+        out: args.out.clone(),
+        keep: args.keep,
+        also: args.also.iter().copied().map(TableFormat::from).collect(),
+        number: 0,
+    };
     let mut totals = Totals::default();
     if let (Some(board), Some(period)) = (&board, period) {
         board.ask(Request::SetTrigger(Trigger::Every { period_us: period.round() as u32 })).await?;

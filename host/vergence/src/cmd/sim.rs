@@ -4,6 +4,7 @@ use std::path::PathBuf;
 
 use serde_json::json;
 use vergence_board::Shared;
+use vergence_files::write_whole;
 use vergence_rig::Rig;
 
 use crate::cli::Globals;
@@ -11,7 +12,6 @@ use crate::console::Console;
 use crate::failure::Failure;
 use crate::firmware::{DEVELOPMENT, PublicKey};
 use crate::interrupt::interrupted;
-use crate::output::write_whole;
 use crate::rig_file;
 use crate::sim::{KeptRig, Listener, Served, SharedRig, SimulatedRig, serve, simulated_chip};
 

@@ -1,12 +1,11 @@
 //! Poses of the stages: named on the command line, by a mode, or reached by a move.
 
 use serde_json::json;
-use vergence_board::{Board, check_range, describe_pose};
+use vergence_board::{Board, check_range, describe_pose, pose_json};
 use vergence_protocol::Mode;
-use vergence_rig::{AxisPosition, Rig};
+use vergence_rig::{AxisPosition, Rig, axes_json};
 use vergence_vision::{Angle, Length};
 
-use super::report::{axes_json, pose_json};
 use crate::console::Console;
 use crate::failure::Failure;
 use crate::interrupt::armed;

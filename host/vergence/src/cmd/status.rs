@@ -3,11 +3,10 @@
 mod why;
 
 use serde_json::json;
-use vergence_board::{Followed, Follower};
+use vergence_board::{Followed, Follower, clock_json, describe_clock, pose_json};
 
 use self::why::Story;
 use super::connect::{connect, port};
-use super::report::{clock_json, describe_clock, pose_json, say_pose};
 use crate::cli::Globals;
 use crate::console::Console;
 use crate::failure::Failure;
@@ -46,7 +45,7 @@ pub async fn run(args: &Args, globals: &Globals, console: Console) -> Result<(),
     }
     console.say(format!("{} firmware {major}.{minor}.{patch}, rig '{}'", info.board, board.rig().name))?;
     console.say(describe_clock(&board))?;
-    say_pose(console, board.rig(), board.pose())?;
+    console.say_pose(board.rig(), board.pose())?;
     match story {
         Some(story) => story.tell(board.rig(), console),
         None => Ok(()),
@@ -59,7 +58,7 @@ async fn say_followed(mut driver: Follower, globals: &Globals, console: Console)
     loop {
         if let Followed::Pose(pose) = driver.next().await? {
             console.say("another vergence holds the port; this is what it passes on")?;
-            return say_pose(console, &rig, &pose);
+            return console.say_pose(&rig, &pose);
         }
     }
 }

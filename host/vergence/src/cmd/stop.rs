@@ -8,7 +8,6 @@ use vergence_board::{HostClock, OpenWire, Port, fresh_session, open};
 use vergence_protocol::{HostSession, MAX_FRAME, Request, StopKind};
 
 use super::connect::{connect_any, port};
-use super::report::say_pose;
 use crate::cli::Globals;
 use crate::console::Console;
 use crate::failure::Failure;
@@ -31,7 +30,7 @@ pub async fn run(_: &Args, globals: &Globals, console: Console) -> Result<(), Fa
     board.stop().await?;
     // Only now does it matter whether positions can be told.
     if board.check_axes().await.is_ok() {
-        return say_pose(console, board.rig(), board.pose());
+        return console.say_pose(board.rig(), board.pose());
     }
     console.say(format!("{}; the rig file does not describe this board", board.pose().state))?;
     console.result(&json!({ "state": board.pose().state.to_string() }))

@@ -6,11 +6,10 @@ use serde_json::json;
 use tokio::time::timeout;
 use vergence_board::Board;
 use vergence_protocol::{Request, Trigger, TriggerMark};
-use vergence_rig::AxisPosition;
+use vergence_rig::{AxisPosition, axes_json, rounded};
 
 use super::camera_options::parse_rate;
 use super::connect::connect;
-use super::report::{axes_json, rounded};
 use crate::cli::Globals;
 use crate::console::Console;
 use crate::failure::Failure;

@@ -5,13 +5,14 @@ mod rig;
 use std::path::PathBuf;
 
 use serde_json::json;
+use vergence_files::write_whole;
+use vergence_output::{ZonesOf, check_ending, seen_by_cones, write_drawing, zones_plot, zones_svg};
+use vergence_rig::{rounded, zones_json};
 use vergence_vision::{Angle, Length, Zones, paper_eq3, paper_eq3_applies, symmetric_pair, zones_exact};
 
-use super::report::{rounded, zones_json};
 use crate::cli::Globals;
 use crate::console::Console;
 use crate::failure::Failure;
-use crate::output::{ZonesOf, check_ending, seen_by_cones, write_whole, zones_plot, zones_svg};
 
 /// Prints the zones as angles of a horizontal circle around the middle of the rig: exact, and by equation 3 of the paper
 /// "Bio-inspired reconfigurable stereo vision for robotics using omnidirectional cameras" as printed. With --mode, those of
@@ -49,7 +50,9 @@ pub struct Args {
 
 pub fn run(args: &Args, globals: &Globals, console: Console) -> Result<(), Failure> {
     let Args { fov, radius, .. } = *args;
-    args.svg.iter().chain(&args.plot).try_for_each(|path| check_ending(path, &["svg"]).map(|_| ()))?;
+    for path in args.svg.iter().chain(&args.plot) {
+        check_ending(path, &["svg"])?;
+    }
     let (Some(baseline), Some(separation)) = (args.baseline, args.separation) else {
         return rig::run(args, globals, console);
     };
@@ -62,7 +65,7 @@ pub fn run(args: &Args, globals: &Globals, console: Console) -> Result<(), Failu
     let applies = paper_eq3_applies(fov, separation, baseline, radius);
     if let Some(path) = &args.svg {
         let drawn = zones_svg(&map.zones, &cameras, radius, &|place| seen_by_cones(&cameras, place));
-        write_whole(path, drawn.map_err(|error| Failure::output(path, error))?.as_bytes())?;
+        write_drawing(path, drawn)?;
     }
     if let Some(path) = &args.plot {
         write_whole(path, zones_plot(&ZonesOf { baseline, separation, field: fov, radius }).as_bytes())?;

@@ -9,6 +9,7 @@ impl From<BenchError> for Failure {
         let message = error.to_string();
         match error {
             BenchError::Models(error) => error.into(),
+            BenchError::Sim(error) => error.into(),
             BenchError::Threads(_) => Self::device(message),
             BenchError::Qemu(_) | BenchError::Chip(_) | BenchError::Work(_) => Self::check(message),
             _ => Self::usage(message),

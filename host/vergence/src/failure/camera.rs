@@ -10,6 +10,9 @@ impl From<CameraError> for Failure {
         match error {
             CameraError::Unreadable { .. }
             | CameraError::NotAnImage { .. }
+            | CameraError::Mask { .. }
+            | CameraError::Uneven { .. }
+            | CameraError::Size { .. }
             | CameraError::NoImages(_)
             | CameraError::Simulated(_) => Self::usage(message),
             _ => Self::device(message),

@@ -4,7 +4,9 @@
 mod bench;
 mod board;
 mod camera;
+mod files;
 mod models;
+mod output;
 mod reproduce;
 mod sim;
 

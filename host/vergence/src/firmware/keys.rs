@@ -7,11 +7,11 @@ use std::path::Path;
 
 use ed25519_dalek::{Signer, SigningKey};
 use rand::TryRng;
+use vergence_files::write_whole;
 use vergence_image::{DEVELOPMENT_KEY, Seal};
 use vergence_protocol::management::{ImageHeader, Signature};
 
 use crate::failure::Failure;
-use crate::output::write_whole;
 
 /// The name of the key whose secret everybody knows.
 pub const DEVELOPMENT: &str = "development";
@@ -97,7 +97,7 @@ impl PublicKey {
     /// # Errors
     /// Where it cannot be written.
     pub fn write(&self, path: &Path) -> Result<(), Failure> {
-        write_whole(path, format!("{PUBLIC} {}\n", hex(&self.0)).as_bytes())
+        Ok(write_whole(path, format!("{PUBLIC} {}\n", hex(&self.0)).as_bytes())?)
     }
 }
 

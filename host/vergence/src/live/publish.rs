@@ -8,16 +8,15 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use serde_json::{Value, json};
+use vergence_files::write_whole;
+use vergence_output::{PoseSource, Table, TableFormat, drift_warning, dropped_json, ply};
 use vergence_pipeline::{Bearing, CameraGone, Observation, PairCloud};
-use vergence_rig::{Rig, RigPose};
+use vergence_rig::{Rig, RigPose, axes_json, rounded};
 use vergence_vision::Side;
 
 use super::live_loop::{LiveResult, Totals};
-use crate::cmd::cloud_report::{PoseSource, drift_warning, dropped_json};
-use crate::cmd::report::{axes_json, rounded};
 use crate::console::Console;
 use crate::failure::Failure;
-use crate::output::{Table, TableFormat, ply, write_whole};
 
 /// Where results go.
 pub struct Publisher {
@@ -137,7 +136,7 @@ impl Publisher {
         write_whole(&self.file(folder, "cloud", "ply"), ply(&cloud.points).as_bytes())?;
         let table = Table::of_points(&cloud.points);
         self.also.iter().try_for_each(|format| {
-            write_whole(&self.file(folder, "cloud", format.extension()), table.text(*format).as_bytes())
+            Ok(write_whole(&self.file(folder, "cloud", format.extension()), table.text(*format).as_bytes())?)
         })
     }
 
@@ -147,7 +146,7 @@ impl Publisher {
         let table = Table::of_bearings(bearings);
         let formats = if self.also.is_empty() { &[TableFormat::Csv][..] } else { &self.also };
         formats.iter().try_for_each(|format| {
-            write_whole(&self.file(folder, "bearings", format.extension()), table.text(*format).as_bytes())
+            Ok(write_whole(&self.file(folder, "bearings", format.extension()), table.text(*format).as_bytes())?)
         })
     }
 

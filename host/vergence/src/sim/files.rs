@@ -4,11 +4,11 @@ use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
 
 use vergence_board::Served;
+use vergence_files::write_whole;
 use vergence_rig::Rig;
 use vergence_sim::{Program, SimError, SimulatedChip, SimulatedRig};
 
 use crate::failure::Failure;
-use crate::output::write_whole;
 
 /// Powers a simulated chip with these programs, each an ELF file or a signed image, as [`SimulatedChip::new`].
 ///
@@ -64,6 +64,6 @@ impl Served for KeptRig {
     }
 
     fn settle(&mut self) -> Result<(), Failure> {
-        self.rig.changed_flash().map_or(Ok(()), |bytes| write_whole(&self.file, bytes))
+        self.rig.changed_flash().map_or(Ok(()), |bytes| Ok(write_whole(&self.file, bytes)?))
     }
 }

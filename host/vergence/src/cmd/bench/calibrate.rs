@@ -2,16 +2,13 @@
 
 use std::path::{Path, PathBuf};
 
-use image::imageops::grayscale;
 use serde_json::{Value, json};
-use vergence_bench::calibrate::{Comparison, Detections, OneThread, Solve};
-use vergence_bench::peer::{Peer, PeerCalibration, PeerFit};
+use vergence_bench::calibrate::OneThread;
+use vergence_bench::peer::Peer;
 use vergence_bench::sets::{CORNER_SETS, IMAGE_SETS, meta, shared};
 use vergence_calibration::TargetSpec;
-use vergence_camera::read_image;
 use vergence_vision::Length;
 
-use crate::cmd::report::rounded;
 use crate::console::Console;
 use crate::corners;
 use crate::failure::Failure;
@@ -52,8 +49,8 @@ pub fn run(args: &Args, console: Console) -> Result<(), Failure> {
             let views: Vec<_> = corners::read(&path, Some(camera))?.into_iter().map(|frame| frame.view).collect();
             let solve = thread.solve(&views, meta.size(), args.runs).map_err(|error| Failure::input(&path, error))?;
             let peers = peers.as_ref().and_then(|peers| peers.get(index));
-            console.say(solve_in_words(&format!("{name} {corners_file} {camera}"), &solve, peers))?;
-            let mut value = solve_json(&solve, peers);
+            console.say(solve.in_words(&format!("{name} {corners_file} {camera}"), peers))?;
+            let mut value = solve.json(peers);
             value["set"] = name.into();
             value["corners_file"] = corners_file.into();
             value["camera"] = camera.as_str().into();
@@ -65,34 +62,6 @@ pub fn run(args: &Args, console: Console) -> Result<(), Failure> {
         detections.push(detection);
     }
     console.result(&json!({ "solve": solves, "detection": detections, "peers": peer.is_some() }))
-}
-
-fn solve_in_words(what: &str, solve: &Solve, peers: Option<&PeerCalibration>) -> String {
-    let ms = |seconds: Option<f64>| seconds.map_or_else(|| "failed".into(), |s| format!("{:.1} ms", 1e3 * s));
-    let px = |px: Option<f64>| px.map_or_else(|| "-".into(), |px| format!("{px:.3} px"));
-    let fit = |fit: &PeerFit| format!("{} ({})", ms(fit.seconds), px(fit.rms_px));
-    let ours = format!("{} ({})", ms(Some(solve.seconds)), px(Some(solve.rms_px)));
-    let peers = peers.map(|peers| format!("; OpenCV {}; SciPy {}", fit(&peers.opencv), fit(&peers.scipy)));
-    format!("{what} ({} corners): {ours}{}", solve.corners, peers.unwrap_or_default())
-}
-
-fn solve_json(solve: &Solve, peers: Option<&PeerCalibration>) -> Value {
-    let mut value = json!({
-        "corners": solve.corners,
-        "seconds": solve.seconds,
-        "rms_px": solve.rms_px,
-        "rms_inlier_px": solve.rms_inlier_px,
-    });
-    if let Some(peers) = peers {
-        let fit = |fit: &PeerFit| json!({ "seconds": fit.seconds, "rms_px": fit.rms_px, "error": fit.error });
-        let comparison = Comparison::of(solve.seconds, peers);
-        value["opencv"] = fit(&peers.opencv);
-        value["opencv"]["converged"] = comparison.opencv_converged.into();
-        value["scipy"] = fit(&peers.scipy);
-        value["no_slower_than_opencv"] = comparison.no_slower_than_opencv.into();
-        value["a_tenth_of_scipy"] = comparison.a_tenth_of_scipy.into();
-    }
-    value
 }
 
 /// Detects the chessboard in the images of a set; says the result and returns it as JSON.
@@ -108,31 +77,8 @@ fn detection(
     let [columns, rows] = meta.board_inner_corners;
     let target = TargetSpec { columns, rows, square: Length::from_mm(meta.square_mm) };
     let paths = files(&[set.join(pattern).to_string_lossy().into_owned()])?;
-    let mut found = Detections::default();
-    for path in &paths {
-        thread.detect(&grayscale(&read_image(path)?), &target, &mut found);
-    }
-    let ours = found.median_ms();
-    let mut line = format!(
-        "{name}: found in {} of {} images, {} of them complete, {:.1} ms an image",
-        found.found,
-        found.images(),
-        found.complete,
-        rounded(ours)
-    );
-    let mut value = json!({
-        "set": name,
-        "images": found.images(),
-        "boards": found.found,
-        "complete": found.complete,
-        "median_ms": ours,
-    });
-    if let Some(peer) = peer {
-        let (targets, theirs) = peer.detect(&paths, meta.board_inner_corners)?;
-        line += &format!("; OpenCV SB found in {targets}, {:.1} ms", rounded(theirs));
-        value["opencv_sb"] = json!({ "boards": targets, "median_ms": theirs });
-        value["no_slower_than_opencv"] = json!(ours <= theirs);
-    }
-    console.say(line)?;
-    Ok(value)
+    let found = thread.detect_files(&paths, &target)?;
+    let peer = peer.map(|peer| peer.detect(&paths, meta.board_inner_corners)).transpose()?;
+    console.say(found.in_words(name, peer))?;
+    Ok(found.json(name, peer))
 }

@@ -4,12 +4,11 @@ use std::path::PathBuf;
 
 use nalgebra::Vector3;
 use serde_json::json;
-use vergence_bench::matching::{Class, NetworkClock, Outcome, SimulatedPair, Tally, Way};
+use vergence_bench::matching::{Means, NetworkClock, SimulatedPair, Way};
+use vergence_rig::rounded;
 use vergence_vision::Angle;
 
-use super::means::Means;
 use crate::cmd::model_options::MatcherOptions;
-use crate::cmd::report::rounded;
 use crate::console::Console;
 use crate::failure::Failure;
 use crate::rig_file::bench_with_sensors;
@@ -69,8 +68,8 @@ pub fn run(args: &Args, console: Console) -> Result<(), Failure> {
             let (mut found, mut lines) = (serde_json::Map::new(), Vec::new());
             for (way, means) in ways.iter().zip(&mut of_ways) {
                 let outcome = way.find(&pair, error, &networks)?;
-                lines.push(format!("  {:>9}: {}", way.name(), in_words(&outcome)));
-                found.insert(way.name().into(), in_json(&outcome));
+                lines.push(format!("  {:>9}: {}", way.name(), outcome.in_words()));
+                found.insert(way.name().into(), outcome.json());
                 means.add(&outcome);
             }
             work.finish_and_clear();
@@ -93,60 +92,4 @@ pub fn run(args: &Args, console: Console) -> Result<(), Failure> {
     console.result(&json!({
         "side": args.side, "pose_error_deg": rounded(args.pose_error.deg()), "rows": rows, "means": means
     }))
-}
-
-fn in_words(outcome: &Outcome) -> String {
-    let count = |tally: &Tally| format!("{} ({:.2})", tally.correct, tally.precision());
-    let after = &outcome.after;
-    let mut line = format!(
-        "{} -> {}, bearings {:.3}° off, {:.2} s of which {:.2} in networks",
-        count(&outcome.before),
-        count(after),
-        after.median_bearing_error.deg(),
-        outcome.seconds,
-        outcome.network_seconds
-    );
-    for (name, class) in [("sharp", &after.sharp), ("coarse", &after.coarse)] {
-        if class.count > 0 {
-            line += &format!(
-                "; {name} {} sigma {:.2} px, spread {:.2} px, NEES {:.2}, {:.0} % within 2 sigma",
-                class.count,
-                class.sigma_px,
-                class.spread_px,
-                class.nees,
-                100.0 * class.within_two_sigma
-            );
-        }
-    }
-    if let Some(drift) = &outcome.drift {
-        let word = if drift.is_significant() { "disagree" } else { "agree" };
-        line += &format!("; pose and picture {word} ({:.2}°)", drift.angle.deg());
-    }
-    line
-}
-
-fn in_json(outcome: &Outcome) -> serde_json::Value {
-    let counts = |tally: &Tally| json!({ "matches": tally.count, "correct": tally.correct, "precision": rounded(tally.precision()) });
-    let class = |class: &Class| {
-        json!({
-            "count": class.count,
-            "sigma_px": rounded(class.sigma_px),
-            "spread_px": rounded(class.spread_px),
-            "range_nees": rounded(class.nees),
-            "within_two_sigma": rounded(class.within_two_sigma),
-        })
-    };
-    json!({
-        "before": counts(&outcome.before),
-        "after": counts(&outcome.after),
-        "median_bearing_error_deg": rounded(outcome.after.median_bearing_error.deg()),
-        "sharp": class(&outcome.after.sharp),
-        "coarse": class(&outcome.after.coarse),
-        "drift": outcome.drift.as_ref().map(|drift| json!({
-            "deg": rounded(drift.angle.deg()), "significant": drift.is_significant()
-        })),
-        "dropped": outcome.dropped,
-        "seconds": rounded(outcome.seconds),
-        "network_seconds": rounded(outcome.network_seconds),
-    })
 }

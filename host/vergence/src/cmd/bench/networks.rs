@@ -1,11 +1,10 @@
 //! `vergence bench networks`: the time that networks take for a pair.
 
-use serde_json::{Value, json};
-use vergence_bench::networks::{NetworkBench, NetworkTimes, PairTime, SIDE};
+use serde_json::json;
+use vergence_bench::networks::{NetworkBench, SIDE};
 use vergence_models::threads;
 
 use crate::cmd::model_options::{RuntimeOptions, StoreOptions};
-use crate::cmd::report::rounded;
 use crate::console::Console;
 use crate::failure::Failure;
 use crate::stopwatch::clock;
@@ -49,33 +48,11 @@ pub fn run(args: &Args, console: Console) -> Result<(), Failure> {
     let mut rows = Vec::new();
     for keypoints in KEYPOINTS {
         let times = bench.times(keypoints, args.rounds, args.runs)?;
-        console.say(in_words(&times))?;
+        console.say(times.in_words())?;
         if let Err(why) = &times.python {
             console.say(format!("        Python's onnxruntime was not measured: {why}"))?;
         }
-        rows.push(in_json(&times));
+        rows.push(times.json());
     }
     console.result(&json!({ "model": name, "side": SIDE, "threads": threads(), "rows": rows }))
-}
-
-fn in_words(times: &NetworkTimes) -> String {
-    let one = |name: &str, time: &PairTime| format!("{name} {:.0} ({:.0})", time.median_ms, time.least_ms);
-    let mut all: Vec<String> = times.runtimes.iter().map(|(name, time)| one(name, time)).collect();
-    all.extend(times.python.as_ref().map(|peer| one(&format!("Python's onnxruntime {}", peer.version), &peer.time)));
-    format!("{:>6} keypoints: {}", times.keypoints, all.join(", "))
-}
-
-fn in_json(times: &NetworkTimes) -> Value {
-    let time = |time: &PairTime| json!({ "median_ms": rounded(time.median_ms), "least_ms": rounded(time.least_ms) });
-    let mut row = json!({ "keypoints": times.keypoints });
-    for (name, of_runtime) in &times.runtimes {
-        row[*name] = time(of_runtime);
-    }
-    row["python"] = times.python.as_ref().map_or(Value::Null, |peer| {
-        let mut value = time(&peer.time);
-        value["keypoints"] = peer.keypoints.into();
-        value["version"] = peer.version.as_str().into();
-        value
-    });
-    row
 }

@@ -1,7 +1,6 @@
 //! `vergence bench vision`: the cost of a point.
 
-use serde_json::{Value, json};
-use vergence_bench::vision::{OpenCvTimes, VisionTimes, vision};
+use vergence_bench::vision::vision;
 
 use crate::console::Console;
 use crate::failure::Failure;
@@ -29,7 +28,7 @@ pub fn run(args: &Args, console: Console) -> Result<(), Failure> {
     let opencv = bench.opencv.as_ref();
     console.say(format!("{} points, one thread, ns per point (ratio to OpenCV)", args.points))?;
     for (name, times) in [(bench.instructions, &bench.best), ("baseline", &bench.baseline)] {
-        console.say(format!("{name:>10}: {}", in_words(times, opencv.ok())))?;
+        console.say(format!("{name:>10}: {}", times.in_words(opencv.ok())))?;
     }
     match opencv {
         Ok(peer) => console.say(format!(
@@ -40,45 +39,7 @@ pub fn run(args: &Args, console: Console) -> Result<(), Failure> {
     }
     console.say(format!("largest error of a ray over 0° to 99°: {:.1e} rad", bench.max_ray_error))?;
     for (points, times) in &bench.growth {
-        console.say(format!("{points:>10} points: {}", in_words(times, None)))?;
+        console.say(format!("{points:>10} points: {}", times.in_words(None)))?;
     }
-    let opencv = |peer: &OpenCvTimes| json!({ "project_ns": peer.project_ns, "unproject_ns": peer.unproject_ns, "version": peer.version });
-    console.result(&json!({
-        "project_ns": bench.best.project_ns,
-        "unproject_ns": bench.best.unproject_ns,
-        "max_ray_error_rad": bench.max_ray_error,
-        "triangulate_mpts_per_s": 1e3 / bench.best.triangulate_ns,
-        "triangulate_allocated_anew_mpts_per_s": 1e3 / bench.best.triangulate_anew_ns,
-        "triangulate_full_mpts_per_s": 1e3 / bench.best.full_ns,
-        "instructions": bench.instructions,
-        "baseline": {
-            "project_ns": bench.baseline.project_ns,
-            "unproject_ns": bench.baseline.unproject_ns,
-            "triangulate_mpts_per_s": 1e3 / bench.baseline.triangulate_ns,
-            "triangulate_full_mpts_per_s": 1e3 / bench.baseline.full_ns,
-        },
-        "opencv": bench.opencv.as_ref().map_or(Value::Null, opencv),
-        "growth": bench.growth.iter().map(|(points, times)| growth(*points, times)).collect::<Vec<_>>(),
-    }))
-}
-
-fn in_words(times: &VisionTimes, peer: Option<&OpenCvTimes>) -> String {
-    let ratio = |ours: f64, theirs: f64| format!(" ({:.3})", ours / theirs);
-    let project = peer.map_or(String::new(), |peer| ratio(times.project_ns, peer.project_ns));
-    let unproject = peer.map_or(String::new(), |peer| ratio(times.unproject_ns, peer.unproject_ns));
-    format!(
-        "project {:.1}{project}, unproject {:.1}{unproject}, triangulate {:.1} (anew {:.1}, with shared errors {:.0})",
-        times.project_ns, times.unproject_ns, times.triangulate_ns, times.triangulate_anew_ns, times.full_ns
-    )
-}
-
-fn growth(points: u32, times: &VisionTimes) -> Value {
-    json!({
-        "points": points,
-        "project_ns": times.project_ns,
-        "unproject_ns": times.unproject_ns,
-        "triangulate_ns": times.triangulate_ns,
-        "triangulate_anew_ns": times.triangulate_anew_ns,
-        "triangulate_full_ns": times.full_ns,
-    })
+    console.result(&bench.json())
 }

@@ -6,13 +6,13 @@ use nalgebra::SMatrix;
 use serde_json::{Value, json};
 use vergence_calibration::{LensKnowledge, Validation};
 use vergence_calibration_report::Verdict;
+use vergence_files::write_whole;
 use vergence_rig::{CalibrationTable, Provenance, Shutter};
 use vergence_vision::KannalaBrandt;
 
 use crate::camera_files::{self, CameraFile};
 use crate::console::Console;
 use crate::failure::Failure;
-use crate::output::write_whole;
 use crate::provenance::InputHash;
 use crate::slots::{Slots, StoreOptions};
 

@@ -1,7 +1,7 @@
 //! The pose of images taken while the stages moved at constant speed.
 
-use vergence_pipeline::{Motion, PairPose, pair_exposure};
-use vergence_rig::{AxisPosition, BoardInstant, JointsAt, Rig, SteadyMotion};
+use vergence_pipeline::PairPose;
+use vergence_rig::{AxisPosition, Rig};
 use vergence_vision::{Angle, Length};
 
 use crate::failure::Failure;
@@ -44,22 +44,16 @@ impl StageSpeed {
             ("baseline", self.baseline_speed.map(AxisPosition::Linear)),
             ("separation", self.separation_speed.map(AxisPosition::Rotary)),
         ];
-        let mut rates = vec![0.0; rig.axes.len()];
+        let mut speeds = vec![0.0; rig.axes.len()];
         for (name, speed) in named {
             let Some(speed) = speed else { continue };
-            let axis = rig.axes.iter().zip(&mut rates).find(|(axis, _)| axis.name == name && speed.is_of(axis.kind));
-            let Some((axis, rate)) = axis else {
+            let axis = rig.axes.iter().zip(&mut speeds).find(|(axis, _)| axis.name == name && speed.is_of(axis.kind));
+            let Some((_, of_axis)) = axis else {
                 return Err(Failure::usage(format!("rig '{}' has no axis '{name}' that moves like this", rig.name)));
             };
-            *rate = speed.value() * 1e-6 / axis.value_per_count();
+            *of_axis = speed.value();
         }
-        let counts = rig.axes.iter().zip(positions).map(|(axis, at)| axis.counts_at(at.value())).collect();
-        let known = vec![0.0; rig.axes.len()];
-        let joints = JointsAt { counts, sigma: known.clone(), timing: known };
-        let middle = BoardInstant { us: 0.0, error_us: 0.0 };
-        let motion = Motion::Steady(SteadyMotion { from_us: 0.0, joints, rates });
-        PairPose::in_motion(rig, motion, pair_exposure(rig, [middle; 2]))
-            .map(Some)
-            .map_err(|error| Failure::usage(error.to_string()))
+        let moving = PairPose::at_speed(rig, positions, &speeds);
+        moving.map(Some).map_err(|error| Failure::usage(error.to_string()))
     }
 }

@@ -2,14 +2,13 @@
 
 use std::time::Duration;
 
-use vergence_board::{Board, LinkFigures, describe_fault};
+use vergence_board::{Board, LinkFigures, describe_clock, describe_fault};
 use vergence_protocol::{Compatibility, ControllerState, ResetCause, SettingItem, SettingKey};
 use vergence_rig::AxisPosition;
 
 use super::Finding;
 use crate::cli::Globals;
 use crate::cmd::connect::{connect, is_wire};
-use crate::cmd::report::describe_clock;
 use crate::console::Console;
 use crate::failure::{Failure, FailureKind};
 

@@ -2,15 +2,13 @@
 
 use std::path::PathBuf;
 
-use serde_json::{Value, json};
-use vergence_rig::{AxisPosition, DepthField, DepthGoal, RatedPose, Rig};
-use vergence_vision::Length;
+use vergence_files::write_whole;
+use vergence_output::{check_ending, depth_field_svg};
+use vergence_rig::{DepthField, DepthGoal};
 
 use crate::cli::Globals;
-use crate::cmd::report::{axes_json, rounded};
 use crate::console::Console;
 use crate::failure::Failure;
-use crate::output::{check_ending, depth_field_svg, write_whole};
 use crate::rig_file;
 
 /// The required accuracy of depth.
@@ -49,7 +47,7 @@ pub fn run(options: &GoalOptions, globals: &Globals, console: Console) -> Result
     let goal = options.goal.ok_or_else(|| Failure::usage("say a --goal"))?;
     let rig = rig_file::load(globals.rig.as_deref())?;
     let best = rig.best_pose(&goal, options.pixel_sigma);
-    let positions = positions(&rig, &best);
+    let positions = best.positions(&rig);
     let place: Vec<_> =
         rig.axes.iter().zip(&positions).map(|(axis, position)| format!("{} {position}", axis.name)).collect();
     if let Some(path) = &options.field {
@@ -66,23 +64,9 @@ pub fn run(options: &GoalOptions, globals: &Globals, console: Console) -> Result
     console.say(format!("{}: {sigma}", place.join(", ")))?;
     console
         .say(format!("sees {:.1} of the circle of {:.0}, {:.1} of it with both", best.seen, goal.range, best.stereo))?;
-    console.result(&result(&rig, &best, &positions))?;
+    console.result(&best.json(&rig))?;
     if best.meets_goal() {
         return Ok(());
     }
     Err(Failure::check(format!("no pose of rig '{}' meets {goal}: this one comes nearest", rig.name)))
-}
-
-fn positions(rig: &Rig, pose: &RatedPose) -> Vec<AxisPosition> {
-    rig.axes.iter().zip(&pose.values).map(|(axis, &value)| AxisPosition::from_value(axis.kind, value)).collect()
-}
-
-fn result(rig: &Rig, best: &RatedPose, positions: &[AxisPosition]) -> Value {
-    json!({
-        "meets_goal": best.meets_goal(),
-        "pose": axes_json(rig, positions),
-        "worst_sigma_mm": best.worst.map(Length::mm).map(rounded),
-        "seen_deg": rounded(best.seen.deg()),
-        "stereo_deg": rounded(best.stereo.deg()),
-    })
 }

@@ -1,11 +1,10 @@
 //! The flight recorder as a story: what happened, and how long before or after the fault.
 
 use serde_json::{Value, json};
-use vergence_board::{Board, RecordedEvents};
+use vergence_board::{Board, RecordedEvents, event_in_words};
 use vergence_protocol::{FaultCode, Happening, Microseconds, RecordedEvent};
 use vergence_rig::Rig;
 
-use crate::cmd::report::event_in_words;
 use crate::console::Console;
 use crate::failure::Failure;
 

@@ -7,6 +7,7 @@ use std::cell::Cell;
 use std::path::Path;
 
 use vergence_calibration::{TargetSpec, stage_plan};
+use vergence_files::make_folder;
 use vergence_protocol::Mode;
 use vergence_rig::Rig;
 
@@ -19,7 +20,6 @@ use crate::cmd::camera_options::CameraOptions;
 use crate::console::Console;
 use crate::failure::Failure;
 use crate::interrupt::interrupted;
-use crate::output::make_folder;
 use crate::rig_file;
 
 /// Options of a rig that drives itself.

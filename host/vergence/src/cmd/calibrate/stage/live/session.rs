@@ -7,6 +7,7 @@ use tokio::task::spawn_blocking;
 use vergence_board::Board;
 use vergence_calibration::{Coverage, TargetSpec};
 use vergence_camera::{Camera, CameraError, CameraImage};
+use vergence_files::{make_folder, write_png, write_whole};
 use vergence_rig::{AxisPosition, Rig};
 use vergence_vision::{Camera as CameraFrame, Pixel, Right, UnitRay};
 
@@ -15,7 +16,6 @@ use super::cameras::RigCameras;
 use crate::cmd::calibrate::stage::recorded::{FOLDER, POSES, column, number};
 use crate::console::Console;
 use crate::failure::Failure;
-use crate::output::{make_folder, write_png, write_whole};
 use crate::target_watch::{NAMES, TargetViews, TargetWatch, observe};
 
 /// Largest motion of an axis while views are taken, in encoder steps.
@@ -127,7 +127,7 @@ impl Session<'_> {
         let columns = self.nominal.axes.iter().map(column);
         let header = [FOLDER.to_owned()].into_iter().chain(columns).collect::<Vec<_>>().join(",");
         let text = [header].iter().chain(rows).map(|line| format!("{line}\n")).collect::<String>();
-        write_whole(&self.set.join(POSES), text.as_bytes())
+        Ok(write_whole(&self.set.join(POSES), text.as_bytes())?)
     }
 }
 

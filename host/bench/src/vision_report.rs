@@ -1,0 +1,56 @@
+//! The times of [`crate::vision`] for people and for programs.
+
+use serde_json::{Value, json};
+
+use crate::vision::{OpenCvTimes, VisionBench, VisionTimes};
+
+impl VisionTimes {
+    /// Nanoseconds for people, with the ratio to those of the `peer`.
+    #[must_use]
+    pub fn in_words(&self, peer: Option<&OpenCvTimes>) -> String {
+        let ratio = |ours: f64, theirs: f64| format!(" ({:.3})", ours / theirs);
+        let project = peer.map_or(String::new(), |peer| ratio(self.project_ns, peer.project_ns));
+        let unproject = peer.map_or(String::new(), |peer| ratio(self.unproject_ns, peer.unproject_ns));
+        format!(
+            "project {:.1}{project}, unproject {:.1}{unproject}, triangulate {:.1} (anew {:.1}, with shared errors {:.0})",
+            self.project_ns, self.unproject_ns, self.triangulate_ns, self.triangulate_anew_ns, self.full_ns
+        )
+    }
+
+    /// The times of `points` points, for programs.
+    fn growth(&self, points: u32) -> Value {
+        json!({
+            "points": points,
+            "project_ns": self.project_ns,
+            "unproject_ns": self.unproject_ns,
+            "triangulate_ns": self.triangulate_ns,
+            "triangulate_anew_ns": self.triangulate_anew_ns,
+            "triangulate_full_ns": self.full_ns,
+        })
+    }
+}
+
+impl VisionBench {
+    /// All figures for programs.
+    #[must_use]
+    pub fn json(&self) -> Value {
+        let opencv = |peer: &OpenCvTimes| json!({ "project_ns": peer.project_ns, "unproject_ns": peer.unproject_ns, "version": peer.version });
+        json!({
+            "project_ns": self.best.project_ns,
+            "unproject_ns": self.best.unproject_ns,
+            "max_ray_error_rad": self.max_ray_error,
+            "triangulate_mpts_per_s": 1e3 / self.best.triangulate_ns,
+            "triangulate_allocated_anew_mpts_per_s": 1e3 / self.best.triangulate_anew_ns,
+            "triangulate_full_mpts_per_s": 1e3 / self.best.full_ns,
+            "instructions": self.instructions,
+            "baseline": {
+                "project_ns": self.baseline.project_ns,
+                "unproject_ns": self.baseline.unproject_ns,
+                "triangulate_mpts_per_s": 1e3 / self.baseline.triangulate_ns,
+                "triangulate_full_mpts_per_s": 1e3 / self.baseline.full_ns,
+            },
+            "opencv": self.opencv.as_ref().map_or(Value::Null, opencv),
+            "growth": self.growth.iter().map(|(points, times)| times.growth(*points)).collect::<Vec<_>>(),
+        })
+    }
+}

@@ -1,0 +1,59 @@
+//! Pose and clock of a board for reports: as JSON, and the clock in words.
+
+use serde_json::{Value, json};
+use vergence_protocol::PoseReport;
+use vergence_rig::{Rig, axes_json, rounded};
+
+use super::Board;
+use super::words::{describe_fault, positions};
+
+/// A pose for programs.
+#[must_use]
+pub fn pose_json(rig: &Rig, pose: &PoseReport) -> Value {
+    let referenced: Vec<bool> = (0..rig.axes.len()).map(|axis| pose.referenced.contains(axis)).collect();
+    let fault = pose.fault.map(|fault| {
+        json!({
+            "code": format!("{:?}", fault.code),
+            "text": describe_fault(rig, &fault),
+            "seq": fault.seq,
+            "board_us": fault.at.0,
+            "axis": fault.axis.and_then(|axis| rig.axes.get(usize::from(axis))).map(|axis| &axis.name),
+            "detail": fault.detail,
+            "later": fault.later,
+        })
+    });
+    json!({
+        "board_us": pose.at.0,
+        "state": pose.state.to_string(),
+        "mode": rig.reported_mode(pose).map(|mode| mode.to_string()),
+        "axes": axes_json(rig, &positions(rig, pose)),
+        "referenced": referenced,
+        "fault": fault,
+    })
+}
+
+/// How well the board's clock is known, in words.
+#[must_use]
+pub fn describe_clock(board: &Board) -> String {
+    let map = board.client().clock_map();
+    match (map.board_at(board.client().clock().now()), map.drift()) {
+        _ if map.is_lost() => "clock lost: the board does not answer its probes".into(),
+        (Some(now), Some(drift)) => {
+            format!("clock within {:.0} us, drift {:+.1} \u{b1} {:.1} ppm", now.error_us, drift.ppm, drift.error_ppm)
+        }
+        _ => "clock not compared yet".into(),
+    }
+}
+
+/// How well the board's clock is known. The bound holds with 95 %; sigma is that of an error anywhere within it.
+#[must_use]
+pub fn clock_json(board: &Board) -> Value {
+    let map = board.client().clock_map();
+    let error = map.board_at(board.client().clock().now()).map(|now| now.error_us);
+    json!({
+        "error_us": error.map(rounded),
+        "sigma_us": error.map(|error| rounded(error / 3f64.sqrt())),
+        "drift_ppm": map.drift().map(|drift| rounded(drift.ppm)),
+        "lost": map.is_lost(),
+    })
+}

@@ -1,0 +1,117 @@
+//! What is said of a cloud: what was dropped, and whether the images contradict the pose.
+
+use std::path::Path;
+
+use serde_json::{Map, Value, json};
+use vergence_pipeline::{Dropped, PairCloud};
+use vergence_rig::{Rig, rounded};
+use vergence_vision::PoseDrift;
+
+/// Where a pose comes from.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum PoseSource {
+    /// The encoders of the rig.
+    Encoders,
+    /// The command line.
+    CommandLine,
+    /// The rig file, whose rig does not move.
+    RigFile,
+}
+
+impl PoseSource {
+    /// Where `vergence depth` has the pose of `rig` from.
+    #[must_use]
+    pub fn of_photographs(rig: &Rig) -> Self {
+        if rig.axes.is_empty() { Self::RigFile } else { Self::CommandLine }
+    }
+}
+
+/// A sentence where the images disagree with the pose by more than its stated uncertainty.
+#[must_use]
+pub fn drift_warning(cloud: &PairCloud, source: PoseSource) -> Option<String> {
+    let PoseDrift { angle, .. } = cloud.significant_drift()?;
+    Some(match source {
+        PoseSource::Encoders => format!(
+            "the encoders and the images disagree by {angle:.2}: nothing was corrected; calibrate again or check the mounts"
+        ),
+        PoseSource::CommandLine => format!(
+            "the pose on the command line and the images disagree by {angle:.2}: nothing was corrected; check --mode, \
+             --baseline and --separation, or calibrate again"
+        ),
+        PoseSource::RigFile => format!(
+            "the pose in the rig file and the images disagree by {angle:.2}: nothing was corrected; calibrate again, or check \
+             that the images belong to this rig"
+        ),
+    })
+}
+
+/// `{"keypoints": {...}, "matches": {...}}`, each with a count for every reason that occurred.
+#[must_use]
+pub fn dropped_json(dropped: &Dropped) -> Value {
+    let keypoints: Map<_, _> = dropped.keypoints.iter().map(|(why, n)| (why.as_str().to_owned(), json!(n))).collect();
+    let matches: Map<_, _> = dropped.matches.iter().map(|(why, n)| (why.as_str().to_owned(), json!(n))).collect();
+    json!({ "keypoints": keypoints, "matches": matches })
+}
+
+/// What is counted of a cloud that was written to `out`, and its drift.
+#[must_use]
+pub fn cloud_json(cloud: &PairCloud, out: &Path) -> Value {
+    let drift = cloud.pose_drift.as_ref().map(|drift| {
+        json!({
+            "deg": rounded(drift.angle.deg()),
+            "chi_squared": rounded(drift.chi_squared),
+            "significant": drift.is_significant(),
+        })
+    });
+    json!({
+        "points": cloud.points.len(),
+        "matches": cloud.matches,
+        "keypoints": cloud.keypoints,
+        "dropped": dropped_json(&cloud.dropped),
+        "pose_drift": drift,
+        "out": out,
+    })
+}
+
+/// One line for the keypoints without a match and one for the matches without a point, where there are any.
+#[must_use]
+pub fn dropped_lines(dropped: &Dropped) -> Vec<String> {
+    let keypoints: Vec<_> = dropped.keypoints.iter().map(|(why, &count)| (why.as_str(), count)).collect();
+    let matches: Vec<_> = dropped.matches.iter().map(|(why, &count)| (why.as_str(), count)).collect();
+    let line = |what: &str, counts: &[(&str, usize)]| {
+        let total: usize = counts.iter().map(|(_, count)| count).sum();
+        let reasons: Vec<_> = counts.iter().map(|(why, count)| format!("{why} {count}")).collect();
+        (total > 0).then(|| format!("  {total} {what}: {}", reasons.join(", ")))
+    };
+    [line("keypoints without a match", &keypoints), line("matches without a point", &matches)]
+        .into_iter()
+        .flatten()
+        .collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use nalgebra::{Matrix6, Vector6};
+    use vergence_vision::Angle;
+
+    use super::*;
+
+    #[test]
+    fn a_pose_without_encoders_is_not_blamed_on_them() {
+        let drift = PoseDrift {
+            correction: Vector6::zeros(),
+            covariance: Matrix6::identity(),
+            angle: Angle::from_deg(1.5),
+            chi_squared: 400.0,
+            agreeing: 0.9,
+        };
+        let cloud = PairCloud { pose_drift: Some(drift), ..PairCloud::default() };
+        let said = |source| drift_warning(&cloud, source).expect("a significant drift");
+        assert!(said(PoseSource::Encoders).starts_with("the encoders and the images disagree by 1.50"));
+        for source in [PoseSource::CommandLine, PoseSource::RigFile] {
+            assert!(!said(source).contains("encoder") && said(source).contains("1.50"), "{}", said(source));
+        }
+        let slight = PairCloud { pose_drift: Some(PoseDrift { chi_squared: 1.0, ..drift }), ..PairCloud::default() };
+        assert_eq!(drift_warning(&slight, PoseSource::Encoders), None);
+    }
+}

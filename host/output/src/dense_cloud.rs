@@ -1,0 +1,129 @@
+//! The files of a dense measurement, and what is said of it.
+
+use std::path::{Path, PathBuf};
+
+use serde_json::{Map, Value, json};
+use vergence_files::{FileError, write_png, write_whole};
+use vergence_matching::{DenseDepth, DenseSample};
+use vergence_pipeline::gates::MAX_RELATIVE_SIGMA;
+use vergence_pipeline::{PairImages, StageTimes, colour_at};
+use vergence_rig::{Rig, RigPose, rounded};
+use vergence_vision::{Left, Pixel};
+
+use crate::pictures::{confidence_image, dense_svg, range_image, sigma_image, write_drawing};
+use crate::points::{DenseRow, dense_ply};
+
+/// A range for every pixel of a left image, written as a cloud with images beside it.
+pub struct DenseCloud<'a> {
+    depth: &'a DenseDepth,
+    times: &'a StageTimes,
+    points: usize,
+    /// The file of the cloud.
+    out: &'a Path,
+}
+
+impl<'a> DenseCloud<'a> {
+    /// Writes `depth`, which was measured in `images` taken at `pose`: the cloud to `out`, and beside it PNG images of range,
+    /// sigma and confidence, and a preview as SVG.
+    ///
+    /// # Errors
+    /// [`FileError::Write`].
+    pub fn write(
+        depth: &'a DenseDepth,
+        times: &'a StageTimes,
+        images: PairImages<'_>,
+        (rig, pose): (&Rig, &RigPose),
+        out: &'a Path,
+    ) -> Result<Self, FileError> {
+        let rows = rows(depth, images, rig, pose);
+        write_whole(out, &dense_ply(&rows))?;
+        write_png(&beside(out, "range", "png"), &range_image(depth))?;
+        write_png(&beside(out, "sigma", "png"), &sigma_image(depth))?;
+        write_png(&beside(out, "confidence", "png"), &confidence_image(depth))?;
+        write_drawing(&beside(out, "preview", "svg"), dense_svg(images.left, depth))?;
+        Ok(Self { depth, times, points: rows.len(), out })
+    }
+
+    /// Whether no pixel has a range or is known to be far.
+    #[must_use]
+    pub fn is_empty(&self) -> bool {
+        let counts = self.depth.counts();
+        counts.measured == 0 && counts.far == 0
+    }
+
+    /// Counts, gaps by reason, and times, for people.
+    #[must_use]
+    pub fn in_words(&self) -> String {
+        let counts = self.depth.counts();
+        let pixels = self.depth.samples().len();
+        let percent = |count: usize| 100.0 * count as f64 / pixels.max(1) as f64;
+        let gaps: Vec<_> = counts.gaps.iter().map(|(gap, &count)| format!("{gap} {:.1} %", percent(count))).collect();
+        let seconds = self.times.seconds();
+        let stages: Vec<_> =
+            seconds.iter().map(|(stage, seconds)| format!("{} {seconds:.2}", stage.as_str())).collect();
+        format!(
+            "{} points in {}\n  pixels   {pixels}: {:.1} % have a range, {:.1} % are farther than measurable\n  \
+             none     {}\n  seconds  {}, in all {:.2}",
+            self.points,
+            self.out.display(),
+            percent(counts.measured),
+            percent(counts.far),
+            if gaps.is_empty() { "nowhere".into() } else { gaps.join(", ") },
+            stages.join(", "),
+            seconds.iter().map(|(_, seconds)| seconds).sum::<f64>(),
+        )
+    }
+
+    /// The same for programs, with the names of all files.
+    #[must_use]
+    pub fn json(&self) -> Value {
+        let counts = self.depth.counts();
+        let pixels = self.depth.samples().len();
+        let gaps: Map<_, _> = counts.gaps.iter().map(|(gap, &count)| (gap.to_string(), json!(count))).collect();
+        let seconds = self.times.seconds().iter();
+        let seconds: Map<_, _> =
+            seconds.map(|&(stage, seconds)| (stage.as_str().to_owned(), json!(rounded(seconds)))).collect();
+        json!({
+            "points": self.points,
+            "pixels": pixels,
+            "measured": counts.measured,
+            "measured_share": rounded(counts.measured as f64 / pixels.max(1) as f64),
+            "far": counts.far,
+            "gaps": gaps,
+            "stage_seconds": seconds,
+            "out": self.out,
+            "range_png": beside(self.out, "range", "png"),
+            "sigma_png": beside(self.out, "sigma", "png"),
+            "confidence_png": beside(self.out, "confidence", "png"),
+            "preview_svg": beside(self.out, "preview", "svg"),
+        })
+    }
+}
+
+/// `cloud-range.png` beside `cloud.ply`.
+fn beside(out: &Path, what: &str, ending: &str) -> PathBuf {
+    let stem = out.file_stem().unwrap_or_default().to_string_lossy();
+    out.with_file_name(format!("{stem}-{what}.{ending}"))
+}
+
+/// A row for each point whose own range is known to a twentieth, as in the sparse cloud.
+fn rows(depth: &DenseDepth, images: PairImages<'_>, rig: &Rig, pose: &RigPose) -> Vec<DenseRow> {
+    let right_from_left = pose.right_from_left();
+    let width = depth.size().width.max(1);
+    let row = |(index, sample): (u32, &DenseSample)| {
+        let DenseSample::Measured(measured) = sample else { return None };
+        if measured.own_sigma().mm() > MAX_RELATIVE_SIGMA * measured.range().mm() {
+            return None;
+        }
+        let pixel = Pixel { u: f64::from(index % width), v: f64::from(index / width) };
+        let point = rig.left_camera.unproject::<Left>(pixel).ok()?.at(measured.range().mm());
+        let in_right = rig.right_camera.project_point(&(right_from_left * point)).ok()?;
+        Some(DenseRow {
+            point: point.mm().map(|mm| mm as f32).into(),
+            colour: colour_at(images.left, pixel),
+            pixels: [pixel.u, pixel.v, in_right.u, in_right.v].map(|value| value as f32),
+            sigma: measured.sigma().mm() as f32,
+        })
+    };
+    (0..).zip(depth.samples()).filter_map(row).collect()
+}

@@ -1,0 +1,29 @@
+//! What is drawn and written of a measurement, for people and for other programs.
+//!
+//! - [`match_svg`], [`depth_svg`], [`error_svg`] and [`dense_svg`] draw what was measured on the images; [`zones_svg`],
+//!   [`zones_plot`] and [`depth_field_svg`] what a rig can see and how well;
+//! - [`ply`], [`dense_ply`] and [`Table`] are clouds for other programs; [`DenseCloud`] writes all files of a dense one;
+//! - [`drift_warning`], [`dropped_lines`] and [`cloud_json`] say what became of a pair;
+//! - [`Sheet`] is a chessboard to print;
+//! - [`check_ending`] refuses a file name whose ending says another format.
+//!
+//! Drawings and texts are pure functions of their arguments; what writes a file says so by its name.
+
+mod cloud_report;
+mod dense_cloud;
+mod endings;
+mod error;
+mod pictures;
+mod points;
+mod target_sheet;
+
+pub use cloud_report::{PoseSource, cloud_json, drift_warning, dropped_json, dropped_lines};
+pub use dense_cloud::DenseCloud;
+pub use endings::{check_ending, check_folder};
+pub use error::OutputError;
+pub use pictures::{
+    ZonesOf, confidence_image, dense_svg, depth_field_svg, depth_svg, error_svg, match_svg, range_image, seen_by_cones,
+    sigma_image, write_drawing, write_scored_pair, zones_plot, zones_svg,
+};
+pub use points::{DenseRow, Table, TableFormat, dense_ply, ply, write_cloud};
+pub use target_sheet::{Paper, Sheet};

@@ -1,0 +1,124 @@
+//! Points and bearings as tables, for programs: CSV, or JSON with named columns and rows of numbers.
+
+use serde_json::{Value, json};
+use vergence_pipeline::{Bearing, ColouredPoint};
+
+/// The format of a table.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum TableFormat {
+    /// Comma-separated, with the names of the columns in the first line.
+    Csv,
+    /// `{"about", "columns", "rows"}`.
+    Json,
+}
+
+impl TableFormat {
+    /// The ending of a file in this format, without the dot.
+    #[must_use]
+    pub const fn extension(self) -> &'static str {
+        match self {
+            Self::Csv => "csv",
+            Self::Json => "json",
+        }
+    }
+}
+
+/// Named columns, and a row of numbers for each point.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Table {
+    /// What the rows mean.
+    about: &'static str,
+    columns: &'static [&'static str],
+    rows: Vec<Vec<f64>>,
+}
+
+const POINTS: &str =
+    "points in the left camera's frame (x right, y down, z forward), sigma of their distance and covariance";
+const POINT_COLUMNS: [&str; 18] = [
+    "x_mm",
+    "y_mm",
+    "z_mm",
+    "red",
+    "green",
+    "blue",
+    "u_left",
+    "v_left",
+    "u_right",
+    "v_right",
+    "sigma_range_mm",
+    "score",
+    "cov_xx_mm2",
+    "cov_xy_mm2",
+    "cov_xz_mm2",
+    "cov_yy_mm2",
+    "cov_yz_mm2",
+    "cov_zz_mm2",
+];
+const BEARINGS: &str = "directions in the camera's own frame (x right, y down, z forward), of length one: not points";
+const BEARING_COLUMNS: [&str; 9] = ["x", "y", "z", "red", "green", "blue", "u", "v", "sigma_deg"];
+
+impl Table {
+    /// A row for each point of a cloud.
+    #[must_use]
+    pub fn of_points(points: &[ColouredPoint]) -> Self {
+        let row = |ColouredPoint { point, colour, score }: &ColouredPoint| {
+            let (at, covariance) = (point.point.mm(), &point.covariance);
+            let (left, right) = (point.pixels.left, point.pixels.right);
+            let upper = [(0, 0), (0, 1), (0, 2), (1, 1), (1, 2), (2, 2)].map(|place| covariance[place]);
+            let colour = colour.map(f64::from);
+            [
+                &[at.x, at.y, at.z][..],
+                &colour,
+                &[left.u, left.v, right.u, right.v, point.sigma_range.mm(), f64::from(*score)],
+                &upper,
+            ]
+            .concat()
+        };
+        Self { about: POINTS, columns: &POINT_COLUMNS, rows: points.iter().map(row).collect() }
+    }
+
+    /// A row for each bearing of one camera.
+    #[must_use]
+    pub fn of_bearings(bearings: &[Bearing]) -> Self {
+        let row = |bearing: &Bearing| {
+            let direction = bearing.direction.vector();
+            let [red, green, blue] = bearing.colour.map(f64::from);
+            let pixel = bearing.pixel;
+            vec![direction.x, direction.y, direction.z, red, green, blue, pixel.u, pixel.v, bearing.sigma.deg()]
+        };
+        Self { about: BEARINGS, columns: &BEARING_COLUMNS, rows: bearings.iter().map(row).collect() }
+    }
+
+    /// The table in `format`.
+    #[must_use]
+    pub fn text(&self, format: TableFormat) -> String {
+        match format {
+            TableFormat::Csv => self.csv(),
+            TableFormat::Json => self.json().to_string() + "\n",
+        }
+    }
+
+    /// A line of names, then a line for each row.
+    #[must_use]
+    pub fn csv(&self) -> String {
+        let lines = self.rows.iter().map(|row| row.iter().map(|&value| number(value)).collect::<Vec<_>>().join(","));
+        [self.columns.join(",")].into_iter().chain(lines).map(|line| line + "\n").collect()
+    }
+
+    /// `{"about", "columns", "rows"}`.
+    #[must_use]
+    pub fn json(&self) -> Value {
+        let rows: Vec<Vec<f64>> =
+            self.rows.iter().map(|row| row.iter().map(|&value| rounded(value)).collect()).collect();
+        json!({ "about": self.about, "columns": self.columns, "rows": rows })
+    }
+}
+
+/// Rounded to six decimals: a nanometre, a micropixel.
+fn rounded(value: f64) -> f64 {
+    (value * 1e6).round() / 1e6
+}
+
+fn number(value: f64) -> String {
+    rounded(value).to_string()
+}

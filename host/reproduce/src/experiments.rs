@@ -1,0 +1,204 @@
+//! All experiments, one after the other, and their results.
+
+use std::fmt;
+use std::sync::atomic::{AtomicUsize, Ordering};
+
+use rayon::prelude::*;
+use serde_json::{Value, json};
+use vergence_output::{ZonesOf, zones_plot};
+use vergence_vision::PAPER_FIELD;
+
+use crate::bench::Bench;
+use crate::drive::Drive;
+use crate::error::ReproduceError;
+use crate::matching::{Matching, MatchingTools, matchings};
+use crate::one_seed::one_seed;
+use crate::page::{Findings, reproduction_page};
+use crate::report;
+use crate::tally::Table;
+use crate::target_images::target_images;
+use crate::target_shot::{CornerSource, Corners};
+use crate::zones::{ModeZones, mode_zones};
+
+/// Noise of the corners in pixels: of the class that the goals are for, and twice that.
+const NOISE_PX: [f64; 2] = [0.1, 0.2];
+/// Seed of the simulated room and of the pictures.
+const PICTURE_SEED: u64 = 1;
+
+/// What is repeated, and how often.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Plan {
+    /// Number of rigs.
+    pub seeds: u32,
+    /// Number of rigs that are also measured with twice the noise; `None` for a fifth of them.
+    pub noisy_seeds: Option<u32>,
+    /// Where the corners come from.
+    pub corners: Corners,
+    /// Samples for each point of the study of triangulation.
+    pub samples: u32,
+    /// Whether the simulated room is matched.
+    pub matching: bool,
+}
+
+/// A rig of the precision bench and the stops of its stage.
+pub struct DrivenRig {
+    /// The seed that the rig was drawn by.
+    pub seed: u64,
+    /// The rig, as drawn and as built.
+    pub bench: Bench,
+    /// Where its stage came to stand.
+    pub drive: Drive,
+}
+
+/// What the experiments are at.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Progress {
+    /// Matches in the simulated room.
+    Matching,
+    /// Calibrations and measurements.
+    Measuring {
+        /// Noise of the corners, in pixels.
+        noise_px: f64,
+        /// Number of rigs that are measured.
+        done: usize,
+        /// Number of all rigs.
+        rigs: usize,
+    },
+    /// The page.
+    Drawing,
+}
+
+/// Results of all experiments.
+pub struct Results {
+    /// The bench with corners of the class that the goals are for, and with twice the noise.
+    pub tables: [Table; 2],
+    /// Zones of all modes.
+    pub zones: Vec<ModeZones>,
+    /// Results of all matchers in all modes.
+    pub matchings: Vec<Matching>,
+    /// The page that shows all of it.
+    pub html: String,
+}
+
+impl Plan {
+    /// Number of rigs that are measured with twice the noise.
+    fn noisy(&self) -> usize {
+        self.noisy_seeds.unwrap_or(self.seeds.div_ceil(5)).min(self.seeds) as usize
+    }
+
+    /// The command as the page names it: what decides its bytes.
+    fn command(&self) -> String {
+        let corners = if self.corners == Corners::Rendered { "" } else { " --corners projected" };
+        let matching = if self.matching { "" } else { " --no-matching" };
+        format!(
+            "vergence reproduce --seeds {} --noisy-seeds {} --samples {}{corners}{matching}",
+            self.seeds,
+            self.noisy(),
+            self.samples
+        )
+    }
+}
+
+impl fmt::Display for Progress {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Matching => f.write_str("matching in the simulated room"),
+            Self::Measuring { noise_px, done, rigs } => {
+                write!(f, "measuring with corners of {noise_px} px, {done} of {rigs} rigs done")
+            }
+            Self::Drawing => f.write_str("drawing the page"),
+        }
+    }
+}
+
+/// Matches, calibrates, measures and draws the page, with the rigs that were driven; all rigs are computed in parallel.
+/// `progress` is called from any thread.
+///
+/// # Errors
+/// Where a simulated bench cannot be built or calibrated, or a picture cannot be drawn.
+pub fn experiments(
+    plan: &Plan,
+    rigs: &[DrivenRig],
+    tools: &MatchingTools<'_>,
+    progress: &(dyn Fn(Progress) + Sync),
+) -> Result<Results, ReproduceError> {
+    let matchings = match plan.matching {
+        false => Vec::new(),
+        true => {
+            progress(Progress::Matching);
+            matchings(tools, PICTURE_SEED)?
+        }
+    };
+    let [table, noisier] = [(NOISE_PX[0], rigs.len()), (NOISE_PX[1], plan.noisy())].map(|(noise_px, seeds)| {
+        let source = CornerSource { corners: plan.corners, noise_px };
+        all_seeds(rigs.get(..seeds).unwrap_or_default(), &source, progress)
+    });
+    let tables = [table?, noisier?];
+    progress(Progress::Drawing);
+    let zones = mode_zones();
+    let html = reproduction_page(&Findings {
+        tables: tables.each_ref(),
+        rendered: plan.corners == Corners::Rendered,
+        zones: &zones,
+        zones_svg: &zones_of_herbivore(&zones),
+        matchings: &matchings,
+        targets: &target_images(PICTURE_SEED)?,
+        samples: plan.samples,
+        command: plan.command(),
+    })?;
+    Ok(Results { tables, zones, matchings, html })
+}
+
+/// Computes all seeds in parallel; their order decides the order of the results.
+fn all_seeds(
+    rigs: &[DrivenRig],
+    source: &CornerSource,
+    progress: &(dyn Fn(Progress) + Sync),
+) -> Result<Table, ReproduceError> {
+    let measuring = |done| Progress::Measuring { noise_px: source.noise_px, done, rigs: rigs.len() };
+    progress(measuring(0));
+    let done = AtomicUsize::new(0);
+    let results: Result<Vec<_>, _> = rigs
+        .par_iter()
+        .map(|DrivenRig { seed, bench, drive }| {
+            let result = one_seed(bench, drive, source, *seed);
+            progress(measuring(done.fetch_add(1, Ordering::Relaxed) + 1));
+            result
+        })
+        .collect();
+    Ok(Table::of(&results?))
+}
+
+/// Curves of the zones of the herbivore mode, as SVG.
+fn zones_of_herbivore(zones: &[ModeZones]) -> String {
+    let herbivore = zones.iter().find(|mode| mode.published.name == "herbivore");
+    herbivore.map_or_else(String::new, |mode| {
+        zones_plot(&ZonesOf {
+            baseline: mode.published.baseline,
+            separation: mode.published.separation,
+            field: PAPER_FIELD,
+            radius: mode.published.radius,
+        })
+    })
+}
+
+impl Results {
+    /// Bench and matches for people, a line for each figure.
+    #[must_use]
+    pub fn lines(&self) -> Vec<String> {
+        [report::bench_lines(self.tables.each_ref()), report::matching_lines(&self.matchings)].concat()
+    }
+
+    /// All figures for programs.
+    #[must_use]
+    pub fn json(&self) -> Value {
+        let [table, noisier] = &self.tables;
+        json!({
+            "bench": report::rows(table),
+            "zones": report::zones(&self.zones),
+            "corners": report::corners(table),
+            "noisier": { "bench": report::rows(noisier), "corners": report::corners(noisier) },
+            "matching": report::matchings(&self.matchings),
+        })
+    }
+}

@@ -1,0 +1,33 @@
+//! Helpers of several tests: lenses, rigs, projections of points, and Gaussian numbers.
+
+#![allow(dead_code, reason = "every test uses a part")]
+#![allow(unused_imports, reason = "every test uses a part")]
+#![allow(clippy::unwrap_used, reason = "helpers of tests may panic as tests do")]
+
+use nalgebra::Vector3;
+use vergence_reproduce::study;
+use vergence_vision::{Angle, Base, KannalaBrandt, Left, Length, Right, Transform};
+
+pub use vergence_reproduce::study::{Gaussian, see};
+
+pub fn lens(k1: f64) -> KannalaBrandt {
+    study::lens(k1).unwrap()
+}
+
+pub fn left_from_right(separation_deg: f64) -> Transform<Left, Right> {
+    study::left_from_right(Angle::from_deg(separation_deg))
+}
+
+pub fn left_from_middle(separation_deg: f64) -> Transform<Left, Base> {
+    study::left_from_middle(Angle::from_deg(separation_deg))
+}
+
+/// Baseline in millimetres and separation in degrees.
+pub fn around(range: f64, azimuth: f64, elevation: f64) -> Vector3<f64> {
+    study::around(Length::from_mm(range), Angle::from_deg(azimuth), Angle::from_deg(elevation))
+}
+
+/// The number of samples from the environment, for long runs.
+pub fn count(variable: &str, otherwise: u32) -> u32 {
+    std::env::var(variable).ok().and_then(|text| text.parse().ok()).unwrap_or(otherwise)
+}

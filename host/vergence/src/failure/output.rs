@@ -1,0 +1,11 @@
+//! Exit codes of errors from drawing and writing: a file that cannot be written is bad input.
+
+use vergence_output::OutputError;
+
+use super::Failure;
+
+impl From<OutputError> for Failure {
+    fn from(error: OutputError) -> Self {
+        Self::usage(error.to_string())
+    }
+}
