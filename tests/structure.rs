@@ -32,6 +32,7 @@ const ALLOWED: &[(&str, &[&str])] = &[
     ("vergence-pipeline", &["vergence-protocol", "vergence-vision", "vergence-rig", "vergence-matching"]),
     ("vergence-board", &["vergence-protocol", "vergence-control", "vergence-image", "vergence-vision", "vergence-rig"]),
     ("vergence-camera", &["vergence-vision", "vergence-rig"]),
+    ("vergence-files", &[]),
     ("vergence-models", &["vergence-matching", "vergence-networks"]),
     (
         "vergence-sim",
@@ -46,6 +47,34 @@ const ALLOWED: &[(&str, &[&str])] = &[
             "vergence-scene",
             "vergence-mcu",
             "vergence-plant",
+        ],
+    ),
+    (
+        "vergence-live",
+        &[
+            "vergence-protocol",
+            "vergence-vision",
+            "vergence-rig",
+            "vergence-matching",
+            "vergence-pipeline",
+            "vergence-board",
+            "vergence-camera",
+            "vergence-sim",
+        ],
+    ),
+    (
+        "vergence-calibration-input",
+        &[
+            "vergence-protocol",
+            "vergence-vision",
+            "vergence-rig",
+            "vergence-calibration",
+            "vergence-calibration-report",
+            "vergence-board",
+            "vergence-camera",
+            "vergence-files",
+            "vergence-scene",
+            "vergence-sim",
         ],
     ),
     (
@@ -93,6 +122,9 @@ const ALLOWED: &[(&str, &[&str])] = &[
             "vergence-matching",
             "vergence-networks",
             "vergence-page",
+            "vergence-files",
+            "vergence-calibration-input",
+            "vergence-live",
             "vergence-scene",
             "vergence-mcu",
             "vergence-plant",
@@ -110,11 +142,11 @@ const ALLOWED: &[(&str, &[&str])] = &[
 
 /// Libraries that touch devices, files, sockets, clocks or the terminal, and the crates that may use each.
 const ONLY_FOR: &[(&str, &[&str])] = &[
-    ("tokio", &["vergence-board", "vergence-camera", "vergence"]),
+    ("tokio", &["vergence-board", "vergence-camera", "vergence-live", "vergence-calibration-input", "vergence"]),
     ("tokio-serial", &["vergence-board", "vergence"]),
     ("serialport", &["vergence-board", "vergence"]),
     ("moq-v4l", &["vergence-camera"]),
-    ("tempfile", &["vergence-models", "vergence-bench", "vergence"]),
+    ("tempfile", &["vergence-files", "vergence-models", "vergence-bench", "vergence"]),
     ("clap", &["vergence"]),
     ("indicatif", &["vergence"]),
 ];

@@ -8,12 +8,12 @@ use vergence_board::{HostClock, OpenWire, Port, fresh_session, open};
 use vergence_protocol::{HostSession, MAX_FRAME, Request, StopKind};
 
 use super::connect::{connect_any, port};
+use super::options::active_rig;
 use super::report::say_pose;
 use crate::cli::Globals;
 use crate::console::Console;
 use crate::failure::Failure;
 use crate::rig_file;
-use crate::slots;
 
 /// Decelerates every axis within its limits and keeps the reference. Needs no arming. It is software: the emergency stop
 /// is the switch that cuts the drivers.
@@ -39,7 +39,7 @@ pub async fn run(_: &Args, globals: &Globals, console: Console) -> Result<(), Fa
 
 /// A rig file that cannot be read is no reason not to stop.
 fn with_readable_rig(globals: &Globals) -> Globals {
-    let rig = globals.rig.clone().or_else(|| slots::active_rig().ok().flatten());
+    let rig = globals.rig.clone().or_else(|| active_rig().ok().flatten());
     let rig = rig.filter(|path| rig_file::load(Some(path)).is_ok());
     Globals { rig, ..globals.clone() }
 }

@@ -10,12 +10,13 @@ use vergence_board::Port;
 use super::Finding;
 use crate::cli::Globals;
 use crate::cmd::connect::port as chosen_port;
-use crate::{rig_file, slots};
+use crate::cmd::options::active_rig;
+use crate::rig_file;
 
 /// The rig that verbs would use: the file named, the active calibration, or the built-in bench.
 pub fn rig(globals: &Globals) -> (Option<PathBuf>, Finding) {
     const MEND: &str = "mend the file, which docs/rig-file.md describes, or 'vergence calibrate rollback'";
-    let (path, is_active) = match (&globals.rig, slots::active_rig()) {
+    let (path, is_active) = match (&globals.rig, active_rig()) {
         (Some(path), _) => (Some(path.clone()), false),
         (None, Ok(active)) => (active, true),
         (None, Err(failure)) => return (None, Finding::fail("rig", failure.to_string(), MEND)),

@@ -6,25 +6,16 @@
 
 use std::path::PathBuf;
 
+use vergence_files::{FileError, make_folder, read_text, write_whole};
 use vergence_rig::{CameraDocument, Provenance, Rig};
 
-use crate::failure::Failure;
-use crate::output::{make_folder, write_whole};
+use crate::StoreError;
 
-const STORE_VARIABLE: &str = "VERGENCE_STORE";
 /// The file with the history of active calibrations.
 const ACTIVE: &str = "active";
 const SUFFIX: &str = ".toml";
 /// So many steps back are remembered.
 const LONGEST_HISTORY: usize = 100;
-
-/// Where calibrations are kept.
-#[derive(Clone, Debug, Default, clap::Args)]
-pub struct StoreOptions {
-    /// The folder that calibrations are kept in. Without it, vergence/calibrations in the user's data folder.
-    #[arg(long, env = STORE_VARIABLE, value_name = "DIR")]
-    pub store: Option<PathBuf>,
-}
 
 /// The kept calibrations.
 pub struct Slots {
@@ -45,34 +36,33 @@ pub enum SlotKind {
 /// A kept calibration.
 #[derive(Clone, Debug)]
 pub struct Slot {
+    /// Its name.
     pub name: String,
+    /// What it holds.
     pub kind: SlotKind,
+    /// Whether it is the active one.
     pub active: bool,
     /// Where it comes from, where it says so.
     pub provenance: Option<Provenance>,
+    /// Its file.
     pub path: PathBuf,
 }
 
-/// The rig file that is active in the store of the environment; `None` where there is no store, or none is active.
-///
-/// # Errors
-/// Where the store is there and cannot be read.
-pub fn active_rig() -> Result<Option<PathBuf>, Failure> {
-    let store = std::env::var_os(STORE_VARIABLE).map(PathBuf::from);
-    let Ok(slots) = Slots::open(&StoreOptions { store }) else { return Ok(None) };
-    Ok(slots.active()?.map(|name| slots.path(&name)))
-}
-
 impl Slots {
-    /// The store that the options name; nothing is written.
+    /// The store in `folder`, or else in vergence/calibrations in the user's data folder; nothing is written.
     ///
     /// # Errors
-    /// Where no folder is named and the user has no data folder.
-    pub fn open(options: &StoreOptions) -> Result<Self, Failure> {
-        let folder = options.store.clone().or_else(default_folder).ok_or_else(|| {
-            Failure::usage("there is no data folder for calibrations: name one with --store, or set VERGENCE_STORE")
-        })?;
-        Ok(Self { folder })
+    /// [`StoreError::NoDataFolder`] where no folder is named and the user has no data folder.
+    pub fn open(folder: Option<PathBuf>) -> Result<Self, StoreError> {
+        Ok(Self { folder: folder.or_else(default_folder).ok_or(StoreError::NoDataFolder)? })
+    }
+
+    /// The rig file that is active; `None` where none is.
+    ///
+    /// # Errors
+    /// Where the store is there and cannot be read.
+    pub fn active_rig(&self) -> Result<Option<PathBuf>, StoreError> {
+        Ok(self.active()?.map(|name| self.path(&name)))
     }
 
     /// The file of slot `name`.
@@ -84,15 +74,13 @@ impl Slots {
     ///
     /// # Errors
     /// A name that is none, or is taken.
-    pub fn check_free(&self, name: &str) -> Result<(), Failure> {
+    pub fn check_free(&self, name: &str) -> Result<(), StoreError> {
         let letters = |c: char| c.is_ascii_alphanumeric() || matches!(c, '-' | '_' | '.');
         if name.is_empty() || name.starts_with('.') || !name.chars().all(letters) {
-            return Err(Failure::usage(format!("'{name}' is no name for a calibration: use letters, digits, - _ .")));
+            return Err(StoreError::Name(name.to_owned()));
         }
         if self.path(name).exists() {
-            return Err(Failure::usage(format!(
-                "a calibration '{name}' is kept already and is not overwritten: choose another name"
-            )));
+            return Err(StoreError::Taken(name.to_owned()));
         }
         Ok(())
     }
@@ -101,30 +89,29 @@ impl Slots {
     ///
     /// # Errors
     /// As [`Self::check_free`], or where it cannot be written.
-    pub fn keep(&self, name: &str, text: &str) -> Result<(), Failure> {
+    pub fn keep(&self, name: &str, text: &str) -> Result<(), StoreError> {
         self.check_free(name)?;
         make_folder(&self.folder)?;
-        write_whole(&self.path(name), text.as_bytes())
+        Ok(write_whole(&self.path(name), text.as_bytes())?)
     }
 
     /// All of them, by name.
     ///
     /// # Errors
     /// Where the folder cannot be read; a folder that is not there has none.
-    pub fn list(&self) -> Result<Vec<Slot>, Failure> {
+    pub fn list(&self) -> Result<Vec<Slot>, StoreError> {
         let active = self.active()?;
         let entries = match std::fs::read_dir(&self.folder) {
             Ok(entries) => entries,
             Err(error) if error.kind() == std::io::ErrorKind::NotFound => return Ok(Vec::new()),
-            Err(error) => return Err(Failure::input(&self.folder, error)),
+            Err(error) => return Err(FileError::read(&self.folder, error).into()),
         };
         let mut slots = Vec::new();
         for entry in entries {
-            let path = entry.map_err(|error| Failure::input(&self.folder, error))?.path();
+            let path = entry.map_err(|error| FileError::read(&self.folder, error))?.path();
             let file = path.file_name().unwrap_or_default().to_string_lossy().into_owned();
             let Some(name) = file.strip_suffix(SUFFIX).filter(|name| !name.starts_with('.')) else { continue };
-            let (kind, provenance) =
-                std::fs::read_to_string(&path).map_or((SlotKind::Unreadable, None), |text| describe(&text));
+            let (kind, provenance) = read_text(&path).map_or((SlotKind::Unreadable, None), |text| describe(&text));
             slots.push(Slot { name: name.to_owned(), kind, active: active.as_deref() == Some(name), provenance, path });
         }
         slots.sort_by(|a, b| a.name.cmp(&b.name));
@@ -135,7 +122,7 @@ impl Slots {
     ///
     /// # Errors
     /// No such slot, or none that holds a rig; the active one stays as it was.
-    pub fn activate(&self, name: &str) -> Result<(), Failure> {
+    pub fn activate(&self, name: &str) -> Result<(), StoreError> {
         self.check_rig(name)?;
         let mut history = self.history()?;
         if history.last().map(String::as_str) != Some(name) {
@@ -148,10 +135,10 @@ impl Slots {
     ///
     /// # Errors
     /// Where nothing was active before, or what was is no longer usable; the active one stays as it was.
-    pub fn rollback(&self) -> Result<Option<String>, Failure> {
+    pub fn rollback(&self) -> Result<Option<String>, StoreError> {
         let mut history = self.history()?;
         if history.pop().is_none() {
-            return Err(Failure::usage("no calibration is active: there is nothing to go back to"));
+            return Err(StoreError::NothingBefore);
         }
         let before = history.last().cloned();
         if let Some(name) = &before {
@@ -161,39 +148,35 @@ impl Slots {
         Ok(before)
     }
 
-    fn active(&self) -> Result<Option<String>, Failure> {
+    fn active(&self) -> Result<Option<String>, StoreError> {
         Ok(self.history()?.pop())
     }
 
-    fn history(&self) -> Result<Vec<String>, Failure> {
+    fn history(&self) -> Result<Vec<String>, StoreError> {
         let path = self.folder.join(ACTIVE);
         match std::fs::read_to_string(&path) {
             Ok(text) => Ok(text.lines().filter(|line| !line.is_empty()).map(str::to_owned).collect()),
             Err(error) if error.kind() == std::io::ErrorKind::NotFound => Ok(Vec::new()),
-            Err(error) => Err(Failure::input(&path, error)),
+            Err(error) => Err(FileError::read(&path, error).into()),
         }
     }
 
-    fn write_history(&self, history: &[String]) -> Result<(), Failure> {
+    fn write_history(&self, history: &[String]) -> Result<(), StoreError> {
         let from = history.len().saturating_sub(LONGEST_HISTORY);
         let text: String = history.iter().skip(from).map(|name| format!("{name}\n")).collect();
-        write_whole(&self.folder.join(ACTIVE), text.as_bytes())
+        Ok(write_whole(&self.folder.join(ACTIVE), text.as_bytes())?)
     }
 
-    fn check_rig(&self, name: &str) -> Result<(), Failure> {
+    fn check_rig(&self, name: &str) -> Result<(), StoreError> {
         let slots = self.list()?;
         let Some(slot) = slots.iter().find(|slot| slot.name == name) else {
-            let names: Vec<_> = slots.into_iter().map(|slot| slot.name).collect();
-            let known = if names.is_empty() { "none is".to_owned() } else { format!("there are {}", names.join(", ")) };
-            return Err(Failure::usage(format!("no calibration '{name}' is kept: {known}")));
+            let kept = slots.into_iter().map(|slot| slot.name).collect();
+            return Err(StoreError::NotKept { name: name.to_owned(), kept });
         };
         match slot.kind {
             SlotKind::Rig => Ok(()),
-            SlotKind::Camera => Err(Failure::usage(format!(
-                "'{name}' is a camera, not a rig: give {} to --left or --right",
-                slot.path.display()
-            ))),
-            SlotKind::Unreadable => Err(Failure::input(&slot.path, "not a calibration that this program understands")),
+            SlotKind::Camera => Err(StoreError::IsCamera { name: name.to_owned(), path: slot.path.clone() }),
+            SlotKind::Unreadable => Err(StoreError::Unreadable(slot.path.clone())),
         }
     }
 }

@@ -2,10 +2,13 @@
 
 use std::path::Path;
 
-use vergence_rig::{Camchain, CameraDocument, CameraFormat, CameraTable, Shutter, kalibr, opencv};
+use vergence_calibration::IntrinsicsCalibration;
+use vergence_rig::{
+    CalibrationTable, Camchain, CameraDocument, CameraFormat, CameraTable, Provenance, Shutter, kalibr, opencv,
+};
 use vergence_vision::KannalaBrandt;
 
-use crate::failure::Failure;
+use crate::InputError;
 
 /// A camera file that has been read.
 pub struct CameraFile {
@@ -19,6 +22,7 @@ pub struct CameraFile {
 
 impl CameraFile {
     /// How the camera exposes its rows: only our own files say.
+    #[must_use]
     pub fn shutter(&self) -> Shutter {
         self.document.as_ref().map_or(Shutter::Global, |document| document.camera.shutter())
     }
@@ -27,14 +31,14 @@ impl CameraFile {
     ///
     /// # Errors
     /// Where TOML cannot say it.
-    pub fn text(&self, format: CameraFormat) -> Result<String, Failure> {
+    pub fn text(&self, format: CameraFormat) -> Result<String, InputError> {
         match (format, &self.document) {
             (CameraFormat::Kalibr, _) => Ok(kalibr::write(&self.cameras)),
             (CameraFormat::OpenCv, _) => Ok(opencv::write(&self.cameras.left)),
-            (CameraFormat::Toml, Some(document)) => toml_of(document),
+            (CameraFormat::Toml, Some(document)) => camera_toml(document),
             (CameraFormat::Toml, None) => {
                 let camera = CameraTable::of(&self.cameras.left);
-                toml_of(&CameraDocument { camera, calibration: None, provenance: None })
+                camera_toml(&CameraDocument { camera, calibration: None, provenance: None })
             }
         }
     }
@@ -44,9 +48,9 @@ impl CameraFile {
 ///
 /// # Errors
 /// Says which file and what is wrong.
-pub fn read(path: &Path) -> Result<CameraFile, Failure> {
-    let text = std::fs::read_to_string(path).map_err(|error| Failure::input(path, error))?;
-    let fail = |error: &dyn std::fmt::Display| Failure::input(path, error);
+pub fn read_camera_file(path: &Path) -> Result<CameraFile, InputError> {
+    let text = vergence_files::read_text(path)?;
+    let fail = |error: &dyn std::fmt::Display| InputError::wrong(path, error);
     let single = |left| Camchain { left, right: None };
     let format = CameraFormat::of(&text);
     let (cameras, document) = match format {
@@ -60,18 +64,34 @@ pub fn read(path: &Path) -> Result<CameraFile, Failure> {
     Ok(CameraFile { format, cameras, document })
 }
 
-/// A document as TOML.
+/// The text of a camera file of our own.
 ///
 /// # Errors
 /// Where TOML cannot say it.
-pub fn toml_of(document: &CameraDocument) -> Result<String, Failure> {
-    toml::to_string(document).map_err(|error| Failure::check(format!("the camera cannot be written: {error}")))
+pub fn camera_toml(document: &CameraDocument) -> Result<String, InputError> {
+    toml::to_string(document).map_err(|error| InputError::Untold(error.to_string()))
+}
+
+/// The camera file of our own for a calibrated camera.
+#[must_use]
+pub fn document_of(calibration: &IntrinsicsCalibration, provenance: Provenance) -> CameraDocument {
+    let covariance = &calibration.covariance;
+    CameraDocument {
+        camera: CameraTable::of(&calibration.camera),
+        calibration: Some(CalibrationTable {
+            rms_inlier_px: calibration.rms_inlier_px,
+            corners: calibration.corners_inlier,
+            views: calibration.views_used,
+            covariance: std::array::from_fn(|row| std::array::from_fn(|column| covariance[(row, column)])),
+        }),
+        provenance: Some(provenance),
+    }
 }
 
 /// The camera of a file that holds one.
 ///
 /// # Errors
-/// As [`read`].
-pub fn read_camera(path: &Path) -> Result<KannalaBrandt, Failure> {
-    Ok(read(path)?.cameras.left)
+/// As [`read_camera_file`].
+pub fn read_camera(path: &Path) -> Result<KannalaBrandt, InputError> {
+    Ok(read_camera_file(path)?.cameras.left)
 }

@@ -6,8 +6,8 @@ use serde::Deserialize;
 use vergence_calibration::{Corner, TargetView};
 use vergence_vision::Pixel;
 
+use crate::InputError;
 use crate::csv_file::CsvFile;
-use crate::failure::Failure;
 
 /// One row. Other columns are ignored; a height `bz_mm` above the target must be zero.
 #[derive(Deserialize)]
@@ -36,7 +36,7 @@ pub struct FrameView {
 ///
 /// # Errors
 /// A row that cannot be read, by line; a camera that is not in the file.
-pub fn read(path: &Path, camera: Option<&str>) -> Result<Vec<FrameView>, Failure> {
+pub fn read_corners(path: &Path, camera: Option<&str>) -> Result<Vec<FrameView>, InputError> {
     let file = CsvFile::read(path)?;
     let fail = |problem: String| file.wrong(problem);
     let mut reader = file.reader();

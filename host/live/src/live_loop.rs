@@ -17,9 +17,9 @@ use vergence_protocol::TriggerMark;
 use vergence_rig::{Rig, StampedImage, TrackGap};
 use vergence_vision::Side;
 
-use super::blindness::Blindness;
-use super::measure::{Measurement, PosedExposure, measure};
-use crate::failure::Failure;
+use crate::blindness::Blindness;
+use crate::measure::{Measurement, PosedExposure, measure};
+use crate::{Clock, LiveError};
 
 /// How often overdue images and pulses are given up.
 const SETTLE: Duration = Duration::from_millis(20);
@@ -96,6 +96,8 @@ pub struct LiveLoop {
     pub exposures: Exposures<PendingImage>,
     /// How long matching takes on the clock of the loop.
     pub matching_time: MatchingTime,
+    /// Tells how long matching really takes.
+    pub stopwatch: Clock,
 }
 
 impl MatchingTime {
@@ -116,7 +118,7 @@ type Work = Pin<Box<dyn Future<Output = (f64, Result<Measurement, NoResult>)>>>;
 /// Why an exposure gave no result.
 enum NoResult {
     Joints(TrackGap),
-    Failed(Failure),
+    Failed(LiveError),
 }
 
 impl LiveLoop {
@@ -124,14 +126,14 @@ impl LiveLoop {
     /// people.
     ///
     /// # Errors
-    /// Those of `publish`; a pair that cannot be measured whatever the images show; a link that ended.
-    pub async fn run(
+    /// Those of `publish`; [`LiveError`]: a pair that cannot be measured whatever the images show, a link that ended.
+    pub async fn run<E: From<LiveError>>(
         &mut self,
         limits: Limits,
         totals: &mut Totals,
-        mut publish: impl FnMut(LiveResult<'_>) -> Result<(), Failure>,
+        mut publish: impl FnMut(LiveResult<'_>) -> Result<(), E>,
         mut warn: impl FnMut(String),
-    ) -> Result<Ended, Failure> {
+    ) -> Result<Ended, E> {
         let deadline = limits.time.map(|time| Instant::now() + time);
         let mut settle = interval(SETTLE);
         let (mut work, mut newest): (Option<Work>, Option<Exposed<PendingImage>>) = (None, None);
@@ -149,7 +151,7 @@ impl LiveLoop {
                         let base = self.base();
                         self.exposures.pulse(&mark, &base);
                     }
-                    None => return Err(Failure::link("the link to the board ended: nothing more can be measured")),
+                    None => return Err(LiveError::LinkEnded.into()),
                 },
                 (exposed_at, done) = finished(&mut work) => {
                     work = None;
@@ -180,13 +182,13 @@ impl LiveLoop {
     }
 
     /// Counts the outcome of an exposure and publishes its result.
-    fn conclude(
+    fn conclude<E: From<LiveError>>(
         &mut self,
         exposed_at: f64,
         done: Result<Measurement, NoResult>,
         totals: &mut Totals,
-        publish: &mut impl FnMut(LiveResult<'_>) -> Result<(), Failure>,
-    ) -> Result<(), Failure> {
+        publish: &mut impl FnMut(LiveResult<'_>) -> Result<(), E>,
+    ) -> Result<(), E> {
         let measurement = match done {
             Ok(measurement) => measurement,
             Err(NoResult::Joints(gap)) => {
@@ -196,7 +198,7 @@ impl LiveLoop {
                 });
                 return Ok(());
             }
-            Err(NoResult::Failed(failure)) => return Err(failure),
+            Err(NoResult::Failed(error)) => return Err(error.into()),
         };
         match measurement.observation {
             Observation::Points { .. } => totals.clouds += 1,
@@ -227,14 +229,14 @@ impl LiveLoop {
     /// Begins to measure on a thread of its own: the link must not wait.
     fn start(&self, exposed: Exposed<PendingImage>) -> Work {
         let (rig, matcher, board) = (Arc::clone(&self.rig), Arc::clone(&self.matcher), self.board.clone());
-        let (matching_time, exposed_at) = (self.matching_time, host_middle(&exposed));
+        let (matching_time, stopwatch, exposed_at) = (self.matching_time, self.stopwatch, host_middle(&exposed));
         Box::pin(async move {
             let posed = match posed(exposed, &rig, board.as_ref()).await {
                 Ok(posed) => posed,
                 Err(gap) => return (exposed_at, Err(NoResult::Joints(gap))),
             };
-            let worked = tokio::task::spawn_blocking(move || measure(posed, &rig, matcher.as_ref())).await;
-            let outcome = worked.unwrap_or_else(|error| Err(Failure::device(format!("measuring failed: {error}"))));
+            let worked = tokio::task::spawn_blocking(move || measure(posed, &rig, matcher.as_ref(), stopwatch)).await;
+            let outcome = worked.unwrap_or_else(|error| Err(LiveError::Measuring(error.to_string())));
             if let Ok(measurement) = &outcome {
                 matching_time.pass(measurement).await;
             }

@@ -1,5 +1,7 @@
 //! Decodes the images of an exposure and measures them, and how long both take.
 
+use std::time::Duration;
+
 use image::RgbImage;
 use vergence_camera::PendingImage;
 use vergence_matching::Matcher;
@@ -9,8 +11,7 @@ use vergence_pipeline::{
 use vergence_rig::{BoardInstant, Rig};
 use vergence_vision::Side;
 
-use crate::failure::Failure;
-use crate::stopwatch::Stopwatch;
+use crate::{Clock, LiveError};
 
 /// An exposure whose pose is known.
 pub enum PosedExposure {
@@ -39,35 +40,48 @@ pub struct Measurement {
     pub seconds: f64,
 }
 
-/// Decodes and measures `exposure`.
+impl Measurement {
+    /// A measurement by its times: when decoding began, when matching began, and the end.
+    fn new(observation: Observation, middle: BoardInstant, [begun, decoded, done]: [Duration; 3]) -> Self {
+        let seconds = |from: Duration, to: Duration| to.saturating_sub(from).as_secs_f64();
+        Self { observation, middle, decode_seconds: seconds(begun, decoded), seconds: seconds(decoded, done) }
+    }
+}
+
+/// Decodes and measures `exposure`; `clock` says how long both take.
 ///
 /// # Errors
 /// An image that cannot be decoded or is not of its camera's size, a row whose joints are not known, cameras that share no
 /// field.
-pub fn measure(exposure: PosedExposure, rig: &Rig, matcher: &dyn Matcher) -> Result<Measurement, Failure> {
-    let decoding = Stopwatch::start();
+pub fn measure(
+    exposure: PosedExposure,
+    rig: &Rig,
+    matcher: &dyn Matcher,
+    clock: Clock,
+) -> Result<Measurement, LiveError> {
+    let begun = clock();
     match exposure {
         PosedExposure::Pair(images, pose) => {
             let [left, right] = *images;
             let middle = left.middle;
             let (left, right) = rayon::join(|| decode(left), || decode(right));
             let (left, right) = (left?, right?);
-            let (decode_seconds, working) = (decoding.seconds(), Stopwatch::start());
+            let decoded = clock();
             let images = PairImages { left: &left, right: &right };
             let observation = observe_pair(images, rig, &pose, Method::from(matcher))
-                .map_err(|error| Failure::device(format!("the pair cannot be measured: {error}")))?;
-            Ok(Measurement { observation, middle, decode_seconds, seconds: working.seconds() })
+                .map_err(|error| LiveError::Unmeasurable(error.to_string()))?;
+            Ok(Measurement::new(observation, middle, [begun, decoded, clock()]))
         }
         PosedExposure::One { side, image, why } => {
             let middle = image.middle;
             let image = decode(*image)?;
-            let (decode_seconds, working) = (decoding.seconds(), Stopwatch::start());
+            let decoded = clock();
             let observation = observe_one(&image, rig, side, why);
-            Ok(Measurement { observation, middle, decode_seconds, seconds: working.seconds() })
+            Ok(Measurement::new(observation, middle, [begun, decoded, clock()]))
         }
     }
 }
 
-fn decode(exposed: ExposedImage<PendingImage>) -> Result<RgbImage, Failure> {
+fn decode(exposed: ExposedImage<PendingImage>) -> Result<RgbImage, LiveError> {
     Ok((exposed.image.develop)()?)
 }

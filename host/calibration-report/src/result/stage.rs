@@ -1,61 +1,57 @@
-//! Results of a stage calibration, as text and as JSON.
+//! The result of a stage calibration as lines of text and as JSON.
 
 use serde_json::{Value, json};
 use vergence_calibration::{HeldOutPose, StageCalibration};
-use vergence_rig::{AxisPosition, Rig, Screw};
+use vergence_rig::{AxisPosition, Rig, RigAxis, Screw, positions_in_words};
 
-use super::recorded::{column, number};
-use crate::console::Console;
-use crate::failure::Failure;
-
-pub fn tell(stage: &StageCalibration, held_out: &[HeldOutPose], console: Console) -> Result<(), Failure> {
-    console.say(format!(
+/// The result of a stage calibration as lines for people; `held_out` are the stage poses that were left out in turn.
+#[must_use]
+pub fn stage_lines(stage: &StageCalibration, held_out: &[HeldOutPose]) -> Vec<String> {
+    let mut lines = vec![format!(
         "{} stage poses, {} of {} corners: {:.3} px rms ({:.3} px with the outliers)",
         stage.poses.len(),
         stage.corners_inlier,
         stage.corners_total,
         stage.rms_inlier_px,
         stage.rms_px
-    ))?;
+    )];
     for pose in &stage.poses {
-        console.say(format!(
+        lines.push(format!(
             "  at {}: {:.3} px rms; {:.4}° and {:.3} mm from the pose of its own views",
-            in_words(&pose.readings),
+            positions_in_words(&pose.readings),
             pose.rms_inlier_px,
             pose.rotation_difference.deg(),
             pose.translation_difference.mm()
-        ))?;
+        ));
     }
     for fitted in &stage.screws {
         let place = fitted.position_sigma.map(|sigma| format!(", {:.3} mm", sigma.mm())).unwrap_or_default();
         let sigma = fitted.direction_sigma.deg();
-        console.say(format!("  screw of {} ({} camera): known to {sigma:.4}°{place}", fitted.axis, fitted.side))?;
+        lines.push(format!("  screw of {} ({} camera): known to {sigma:.4}°{place}", fitted.axis, fitted.side));
     }
     for scale in &stage.scales {
-        console.say(format!("  scale of {}: {:.6} ± {:.6}", scale.axis, scale.scale, scale.sigma))?;
+        lines.push(format!("  scale of {}: {:.6} ± {:.6}", scale.axis, scale.scale, scale.sigma));
     }
     for zero in &stage.zero_offsets {
-        console.say(format!("  zero of {}: {} ± {}", zero.axis, zero.offset, zero.sigma))?;
+        lines.push(format!("  zero of {}: {} ± {}", zero.axis, zero.offset, zero.sigma));
     }
     for skipped in &stage.skipped {
-        console.say(format!("  view not used: {} ({} camera: {})", skipped.view, skipped.side, skipped.reason))?;
+        lines.push(format!("  view not used: {} ({} camera: {})", skipped.view, skipped.side, skipped.reason));
     }
     for pose in held_out {
-        let readings = in_words(&pose.readings);
+        let readings = positions_in_words(&pose.readings);
         let (turn, shift) = (pose.rotation.deg(), pose.translation.mm());
-        console.say(format!("  without the pose at {readings} it is predicted to {turn:.4}° and {shift:.3} mm"))?;
+        lines.push(format!("  without the pose at {readings} it is predicted to {turn:.4}° and {shift:.3} mm"));
     }
-    console.say(format!("  {}", stage.observability))
+    lines.push(format!("  {}", stage.observability));
+    lines
 }
 
-/// Readings of the encoders, in the order of the axes.
-pub fn in_words(readings: &[AxisPosition]) -> String {
-    readings.iter().map(ToString::to_string).collect::<Vec<_>>().join(", ")
-}
-
-pub fn in_json(rig: &Rig, stage: &StageCalibration, held_out: &[HeldOutPose]) -> Value {
+/// The result of a stage calibration of `rig` for programs; `held_out` are the stage poses that were left out in turn.
+#[must_use]
+pub fn stage_json(rig: &Rig, stage: &StageCalibration, held_out: &[HeldOutPose]) -> Value {
     let readings = |positions: &[AxisPosition]| -> Value {
-        let entries = rig.axes.iter().zip(positions).map(|(axis, &at)| (column(axis), json!(number(at))));
+        let entries = rig.axes.iter().zip(positions).map(|(axis, &at)| (RigAxis::column(axis), json!(at.mm_or_deg())));
         Value::Object(entries.collect())
     };
     let poses: Vec<_> = stage
@@ -91,7 +87,7 @@ pub fn in_json(rig: &Rig, stage: &StageCalibration, held_out: &[HeldOutPose]) ->
     let zeros: Vec<_> = stage
         .zero_offsets
         .iter()
-        .map(|zero| json!({ "axis": zero.axis, "offset": number(zero.offset), "sigma": number(zero.sigma) }))
+        .map(|zero| json!({ "axis": zero.axis, "offset": zero.offset.mm_or_deg(), "sigma": zero.sigma.mm_or_deg() }))
         .collect();
     let held_out: Vec<_> = held_out
         .iter()

@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use crate::failure::Failure;
+use crate::InputError;
 
 /// A CSV file that has been read. The header is line 1.
 pub struct CsvFile {
@@ -15,9 +15,8 @@ impl CsvFile {
     ///
     /// # Errors
     /// Where it cannot be read.
-    pub fn read(path: &Path) -> Result<Self, Failure> {
-        let bytes = std::fs::read(path).map_err(|error| Failure::input(path, error))?;
-        Ok(Self { path: path.to_owned(), bytes })
+    pub fn read(path: &Path) -> Result<Self, InputError> {
+        Ok(Self { path: path.to_owned(), bytes: vergence_files::read(path)? })
     }
 
     /// The rows after the header, whose cells may have blanks around them.
@@ -34,21 +33,21 @@ impl CsvFile {
         1 + before.iter().chain(ends).filter(|byte| **byte == b'\n').count()
     }
 
-    /// A failure that is about the file.
-    pub fn wrong(&self, problem: impl std::fmt::Display) -> Failure {
-        Failure::input(&self.path, problem)
+    /// An error that is about the file.
+    pub fn wrong(&self, problem: impl std::fmt::Display) -> InputError {
+        InputError::wrong(&self.path, problem)
     }
 
-    /// A failure that is about the row at `position`, where that is known.
-    pub fn wrong_row(&self, position: Option<&csv::Position>, problem: impl std::fmt::Display) -> Failure {
+    /// An error that is about the row at `position`, where that is known.
+    pub fn wrong_row(&self, position: Option<&csv::Position>, problem: impl std::fmt::Display) -> InputError {
         match position {
             Some(position) => self.wrong(format!("line {}: {problem}", self.line(position))),
             None => self.wrong(problem),
         }
     }
 
-    /// A failure for an error of the reader; `headers` name its columns.
-    pub fn unreadable(&self, error: &csv::Error, headers: &csv::StringRecord) -> Failure {
+    /// An error for one of the reader; `headers` name its columns.
+    pub fn unreadable(&self, error: &csv::Error, headers: &csv::StringRecord) -> InputError {
         match error.kind() {
             csv::ErrorKind::Deserialize { pos, err } => {
                 let name = err.field().and_then(|index| headers.get(usize::try_from(index).ok()?));

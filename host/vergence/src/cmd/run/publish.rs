@@ -8,11 +8,11 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use serde_json::{Value, json};
+use vergence_live::{LiveResult, Totals};
 use vergence_pipeline::{Bearing, CameraGone, Observation, PairCloud};
 use vergence_rig::{Rig, RigPose};
 use vergence_vision::Side;
 
-use super::live_loop::{LiveResult, Totals};
 use crate::cmd::cloud_report::{PoseSource, drift_warning, dropped_json};
 use crate::cmd::report::{axes_json, rounded};
 use crate::console::Console;

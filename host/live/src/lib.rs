@@ -6,12 +6,19 @@
 //! Nothing queues: what the matcher has no time for is counted and dropped, and no cloud holds anything of another.
 
 mod blindness;
+mod cameras;
+mod error;
 mod live_loop;
 mod measure;
-mod publish;
-mod simulated;
+mod tour;
 
+use std::time::Duration;
+
+pub use cameras::{attach_both, drive, simulate_both};
+pub use error::LiveError;
 pub use live_loop::{Ended, Limits, LiveLoop, LiveResult, MatchingTime, Totals};
 pub use measure::{Measurement, PosedExposure, measure};
-pub use publish::Publisher;
-pub use simulated::drive;
+pub use tour::Tour;
+
+/// Returns the time since some fixed instant, always the real one: by it the loop tells how long matching takes.
+pub type Clock = fn() -> Duration;

@@ -1,18 +1,16 @@
 //! Recorded stage poses: a set folder, or a CSV file of corners and encoder readings.
 
 use std::collections::BTreeMap;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
-use vergence_calibration::{StagePose, StereoView};
+use vergence_calibration::{StagePose, StereoView, TargetSpec};
 use vergence_protocol::AxisKind;
 use vergence_rig::{AxisPosition, Rig, RigAxis};
 
-use crate::cmd::calibrate::views::{PairPatterns, pairs_from_corners};
-use crate::cmd::target_options::TargetOptions;
-use crate::console::Console;
+use crate::InputError;
 use crate::csv_file::CsvFile;
-use crate::failure::Failure;
-use crate::provenance::InputHash;
+use crate::input_hash::InputHash;
+use crate::views::{PairImages, PairLenses, ViewEvent, pairs_in_corners};
 
 /// File of a set with the encoder readings.
 pub const POSES: &str = "poses.csv";
@@ -23,61 +21,56 @@ const SAME_STEPS: f64 = 2.0;
 /// Part of the range by which a reading may lie outside it: stages stop near an end, not on it.
 const OVERSHOOT: f64 = 0.01;
 
-/// Name of the column with the readings of an axis.
-pub fn column(axis: &RigAxis) -> String {
-    match axis.kind {
-        AxisKind::Linear => format!("{}_mm", axis.name),
-        AxisKind::Rotary => format!("{}_deg", axis.name),
-    }
-}
+/// The stage poses of a set folder: the encoder readings of each, and the folder of its images.
+pub struct RecordedSet(Vec<(Vec<AxisPosition>, PathBuf)>);
 
-/// Value of a reading in its column, in millimetres or degrees.
-pub fn number(position: AxisPosition) -> f64 {
-    match position {
-        AxisPosition::Linear(length) => length.mm(),
-        AxisPosition::Rotary(angle) => angle.deg(),
+impl RecordedSet {
+    /// Reads poses.csv of the folder `set`, and adds it to `hash`.
+    ///
+    /// # Errors
+    /// [`InputError`] where the file cannot be used, by line.
+    pub fn read(set: &Path, rig: &Rig, hash: &mut InputHash) -> Result<Self, InputError> {
+        let path = set.join(POSES);
+        hash.add(&path)?;
+        let file = CsvFile::read(&path)?;
+        let table = Table::new(&file, rig)?;
+        let folder = table.column(FOLDER)?;
+        let pose = |row: csv::StringRecord| Ok((table.readings(&row)?, set.join(row.get(folder).unwrap_or_default())));
+        table.rows()?.into_iter().map(pose).collect::<Result<_, InputError>>().map(Self)
     }
-}
 
-/// Reads the stage poses of a set folder.
-///
-/// # Errors
-/// A file that cannot be used, by name, and by line in poses.csv.
-pub fn from_set(
-    set: &Path,
-    rig: &Rig,
-    target: &TargetOptions,
-    hash: &mut InputHash,
-    console: Console,
-) -> Result<Vec<StagePose>, Failure> {
-    let path = set.join(POSES);
-    hash.add(&path)?;
-    let mut poses = Vec::new();
-    let file = CsvFile::read(&path)?;
-    let table = Table::new(&file, rig)?;
-    let folder_column = table.column(FOLDER)?;
-    for row in table.rows()? {
-        let folder = set.join(row.get(folder_column).unwrap_or_default());
-        let readings = table.readings(&row)?;
-        let images = |side: &str| [folder.join(format!("{side}*")).to_string_lossy().into_owned()];
-        let (left, right) = (images("left"), images("right"));
-        let cameras = (&rig.left_camera, &rig.right_camera);
-        let views = PairPatterns { left: &left, right: &right, target, cameras }.views(hash, console)?.0;
-        poses.push(StagePose { readings, views });
+    /// Looks for the target in the images of each stage pose, and adds them to `hash`; `tell` is called with each event.
+    ///
+    /// # Errors
+    /// [`InputError`] where images cannot be used; those of `tell`.
+    pub fn stage_poses<E: From<InputError>>(
+        self,
+        target: &TargetSpec,
+        lenses: PairLenses<'_>,
+        hash: &mut InputHash,
+        tell: &mut impl FnMut(ViewEvent<'_>) -> Result<(), E>,
+    ) -> Result<Vec<StagePose>, E> {
+        let mut poses = Vec::new();
+        for (readings, folder) in self.0 {
+            let images = |side: &str| [folder.join(format!("{side}*")).to_string_lossy().into_owned()];
+            let (left, right) = (images("left"), images("right"));
+            let views = PairImages::named([&left, &right], tell)?.views(target, lenses, hash, tell)?.0;
+            poses.push(StagePose { readings, views });
+        }
+        Ok(poses)
     }
-    Ok(poses)
 }
 
 /// Reads the stage poses of a CSV file.
 ///
 /// # Errors
 /// A row that cannot be used, by line.
-pub fn from_corners(
+pub fn stage_poses_in_corners(
     path: &Path,
     rig: &Rig,
     cameras: &[String],
     hash: &mut InputHash,
-) -> Result<Vec<StagePose>, Failure> {
+) -> Result<Vec<StagePose>, InputError> {
     let mut of_frame: BTreeMap<i64, Vec<AxisPosition>> = BTreeMap::new();
     let file = CsvFile::read(path)?;
     let table = Table::new(&file, rig)?;
@@ -92,7 +85,7 @@ pub fn from_corners(
         }
     }
     let mut poses: Vec<StagePose> = Vec::new();
-    for (frame, view) in pairs_from_corners(path, cameras, hash)? {
+    for (frame, view) in pairs_in_corners(path, cameras, hash)? {
         let Some(readings) = of_frame.get(&frame) else { continue };
         add(&mut poses, rig, readings, view);
     }
@@ -120,31 +113,31 @@ struct Table<'a> {
 }
 
 impl<'a> Table<'a> {
-    fn new(file: &'a CsvFile, rig: &'a Rig) -> Result<Self, Failure> {
+    fn new(file: &'a CsvFile, rig: &'a Rig) -> Result<Self, InputError> {
         let headers = file.reader().headers().map_err(|error| file.wrong(error))?.clone();
         let mut table = Self { file, headers, axes: Vec::new() };
         table.axes =
-            rig.axes.iter().map(|axis| Ok((axis, table.column(&column(axis))?))).collect::<Result<_, Failure>>()?;
+            rig.axes.iter().map(|axis| Ok((axis, table.column(&axis.column())?))).collect::<Result<_, InputError>>()?;
         Ok(table)
     }
 
-    fn column(&self, name: &str) -> Result<usize, Failure> {
+    fn column(&self, name: &str) -> Result<usize, InputError> {
         self.headers.iter().position(|header| header == name).ok_or_else(|| {
             let present = self.headers.iter().collect::<Vec<_>>().join(", ");
             self.file.wrong(format!("it has no column '{name}', only {present}"))
         })
     }
 
-    fn rows(&self) -> Result<Vec<csv::StringRecord>, Failure> {
+    fn rows(&self) -> Result<Vec<csv::StringRecord>, InputError> {
         let read = |row: Result<_, csv::Error>| row.map_err(|error| self.file.unreadable(&error, &self.headers));
         self.file.reader().into_records().map(read).collect()
     }
 
-    fn readings(&self, row: &csv::StringRecord) -> Result<Vec<AxisPosition>, Failure> {
+    fn readings(&self, row: &csv::StringRecord) -> Result<Vec<AxisPosition>, InputError> {
         let reading = |(axis, index): &(&RigAxis, usize)| {
             let text = row.get(*index).unwrap_or_default();
             let fail = |problem: &str| {
-                self.file.wrong_row(row.position(), format!("'{text}' in column {} {problem}", column(axis)))
+                self.file.wrong_row(row.position(), format!("'{text}' in column {} {problem}", axis.column()))
             };
             let value: f64 =
                 text.parse().ok().filter(|v: &f64| v.is_finite()).ok_or_else(|| fail("is not a number"))?;
