@@ -30,7 +30,17 @@ const ALLOWED: &[(&str, &[&str])] = &[
     ("vergence-plant", &["vergence-protocol", "vergence-control"]),
     ("vergence-soak", &["vergence-protocol", "vergence-control", "vergence-image", "vergence-mcu", "vergence-plant"]),
     ("vergence-pipeline", &["vergence-protocol", "vergence-vision", "vergence-rig", "vergence-matching"]),
-    ("vergence-board", &["vergence-protocol", "vergence-control", "vergence-image", "vergence-vision", "vergence-rig"]),
+    (
+        "vergence-board",
+        &[
+            "vergence-protocol",
+            "vergence-control",
+            "vergence-image",
+            "vergence-vision",
+            "vergence-rig",
+            "vergence-files",
+        ],
+    ),
     ("vergence-camera", &["vergence-vision", "vergence-rig"]),
     ("vergence-files", &[]),
     ("vergence-models", &["vergence-matching", "vergence-networks"]),
@@ -146,7 +156,7 @@ const ONLY_FOR: &[(&str, &[&str])] = &[
     ("tokio-serial", &["vergence-board", "vergence"]),
     ("serialport", &["vergence-board", "vergence"]),
     ("moq-v4l", &["vergence-camera"]),
-    ("tempfile", &["vergence-files", "vergence-models", "vergence-bench", "vergence"]),
+    ("tempfile", &["vergence-files", "vergence-board", "vergence-models", "vergence-bench", "vergence"]),
     ("clap", &["vergence"]),
     ("indicatif", &["vergence"]),
 ];

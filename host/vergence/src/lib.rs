@@ -13,7 +13,6 @@ mod firmware;
 mod interrupt;
 mod output;
 mod rig_file;
-mod serial_ports;
 pub mod sim;
 mod stage_times;
 mod stopwatch;

@@ -3,12 +3,12 @@
 mod live;
 
 use serde_json::Value;
-use vergence_board::{Board, Followed, Follower, describe_fault, describe_pose};
+use vergence_board::{Board, Followed, Follower, Source, describe_fault, describe_pose};
 use vergence_protocol::PoseReport;
 use vergence_rig::Rig;
 
 use self::live::Live;
-use super::reconnect::{Listening, Source};
+use super::reconnect::Listening;
 use super::report::{clock_json, describe_clock, pose_json};
 use crate::cli::Globals;
 use crate::console::Console;

@@ -1,21 +1,10 @@
-//! Image headers as JSON, versions from the command line, and reading image files.
-
-use std::path::Path;
+//! Image headers as JSON, and versions as people write them.
 
 use serde_json::{Value, json};
-use vergence_board::{FirmwareImage, hardware_name, version_text};
 use vergence_protocol::management::ImageHeader;
 
 use super::keys::hex;
-use crate::failure::Failure;
-
-/// Reads a signed image file.
-///
-/// # Errors
-/// A usage failure that names the file: it cannot be read, is no image, or is damaged.
-pub fn read_image(path: &Path) -> Result<FirmwareImage, Failure> {
-    FirmwareImage::read(path).map_err(|error| Failure::input(path, error))
-}
+use crate::update::{hardware_name, version_text};
 
 /// An image header as JSON.
 #[must_use]

@@ -1,11 +1,14 @@
 //! The installed probe-rs: a debug probe's program, driven as a child process.
 
 use std::ffi::OsStr;
-use std::io::ErrorKind;
+use std::io::{ErrorKind, Write};
 use std::path::Path;
 use std::process::{Command, Output, Stdio};
 
-use crate::failure::Failure;
+use vergence_image::layout::{ACTIVE, CAPACITY, FLASH_BASE, STATE};
+
+use super::ProbeError;
+use crate::update::FirmwareImage;
 
 const PROGRAM: &str = "probe-rs";
 /// The chip of the NUCLEO-G474RE, as probe-rs calls it.
@@ -21,44 +24,57 @@ pub struct ProbeRs<'a> {
 
 impl<'a> ProbeRs<'a> {
     /// Looks for it. `probe` names one of several debug probes.
-    pub fn find(probe: Option<&'a str>) -> Result<Self, Failure> {
+    ///
+    /// # Errors
+    /// [`ProbeError`].
+    pub fn find(probe: Option<&'a str>) -> Result<Self, ProbeError> {
         let output = run(&[OsStr::new("--version")])?;
         let said = String::from_utf8_lossy(&output.stdout);
         // "probe-rs 0.32.0 (git commit: ...)"
         let version = said.split_whitespace().nth(1).unwrap_or("of unknown version").to_owned();
         let numbers: Vec<u32> = version.split('.').map_while(|part| part.parse().ok()).collect();
         if numbers.len() < OLDEST.len() || numbers.as_slice() < OLDEST.as_slice() {
-            let [major, minor] = OLDEST;
-            return Err(Failure::device(format!(
-                "the installed probe-rs is {version}, needed is {major}.{minor} or newer: cargo install probe-rs-tools --locked"
-            )));
+            return Err(ProbeError::TooOld { found: version, oldest: OLDEST });
         }
         Ok(Self { version, probe })
     }
 
     /// Its version.
+    #[must_use]
     pub fn version(&self) -> &str {
         &self.version
     }
 
     /// Writes an ELF file to where it is linked, and reads it back.
-    pub fn download_elf(&self, file: &Path) -> Result<(), Failure> {
+    ///
+    /// # Errors
+    /// [`ProbeError`].
+    pub fn download_elf(&self, file: &Path) -> Result<(), ProbeError> {
         self.carry_out("download", &[OsStr::new("--verify"), "--binary-format".as_ref(), "elf".as_ref(), file.as_ref()])
     }
 
-    /// Writes raw bytes to `address`, and reads them back.
-    pub fn download_bytes(&self, file: &Path, address: u32) -> Result<(), Failure> {
-        let address = format!("{address:#010x}");
+    /// Writes `image` where the boot loader looks for it, and reads it back; its seal is written behind it.
+    ///
+    /// # Errors
+    /// [`ProbeError`].
+    pub fn download_image(&self, image: &FlashContents) -> Result<(), ProbeError> {
+        let fail = |error: std::io::Error| ProbeError::Temporary(error.to_string());
+        let mut raw = tempfile::NamedTempFile::new().map_err(fail)?;
+        raw.write_all(&image.0).map_err(fail)?;
+        let address = format!("{:#010x}", FLASH_BASE + STATE.start);
         let options = ["--verify", "--binary-format", "bin", "--base-address", &address].map(OsStr::new);
-        self.carry_out("download", &[&options[..], &[file.as_os_str()]].concat())
+        self.carry_out("download", &[&options[..], &[raw.path().as_os_str()]].concat())
     }
 
     /// Starts the chip.
-    pub fn reset(&self) -> Result<(), Failure> {
+    ///
+    /// # Errors
+    /// [`ProbeError`].
+    pub fn reset(&self) -> Result<(), ProbeError> {
         self.carry_out("reset", &[])
     }
 
-    fn carry_out(&self, what: &str, arguments: &[&OsStr]) -> Result<(), Failure> {
+    fn carry_out(&self, what: &str, arguments: &[&OsStr]) -> Result<(), ProbeError> {
         let mut all = [what, "--chip", CHIP, "--non-interactive"].map(OsStr::new).to_vec();
         if let Some(probe) = self.probe {
             all.extend(["--probe", probe].map(OsStr::new));
@@ -68,18 +84,31 @@ impl<'a> ProbeRs<'a> {
         if output.status.success() {
             return Ok(());
         }
-        Err(Failure::device(explain(&[output.stdout, output.stderr].concat())))
+        Err(ProbeError::Failed(explain(&[output.stdout, output.stderr].concat())))
     }
 }
 
-fn run(arguments: &[&OsStr]) -> Result<Output, Failure> {
+/// What flash shall hold from the state page on: no swap under way, the image, and its seal behind.
+pub struct FlashContents(Vec<u8>);
+
+impl FlashContents {
+    /// The contents for `image`; `None` where it is too long.
+    #[must_use]
+    pub fn of(image: &FirmwareImage) -> Option<Self> {
+        let mut flash = vec![0xFF; (STATE.length + ACTIVE.length) as usize];
+        let (code, behind) = flash.get_mut(STATE.length as usize..)?.split_at_mut_checked(CAPACITY as usize)?;
+        code.get_mut(..image.bytes.len())?.copy_from_slice(&image.bytes);
+        let seal = image.seal.to_bytes();
+        behind.get_mut(..seal.len())?.copy_from_slice(&seal);
+        Some(Self(flash))
+    }
+}
+
+fn run(arguments: &[&OsStr]) -> Result<Output, ProbeError> {
     let mut command = Command::new(PROGRAM);
     command.args(arguments).stdin(Stdio::null()).output().map_err(|error| match error.kind() {
-        ErrorKind::NotFound => Failure::device(
-            "probe-rs is not installed, which writes flash through a debug probe: cargo install probe-rs-tools --locked, or \
-             see https://probe.rs; with a boot loader on the board, 'vergence flash --serial' needs no probe",
-        ),
-        _ => Failure::device(format!("probe-rs cannot be run: {error}")),
+        ErrorKind::NotFound => ProbeError::Missing,
+        _ => ProbeError::Unusable(error.to_string()),
     })
 }
 

@@ -2,16 +2,13 @@
 
 use std::time::Duration;
 
-use vergence_board::{Board, LinkFigures, describe_fault};
 use vergence_protocol::{Compatibility, ControllerState, ResetCause, SettingItem, SettingKey};
 use vergence_rig::AxisPosition;
 
 use super::Finding;
-use crate::cli::Globals;
-use crate::cmd::connect::{connect, is_wire};
-use crate::cmd::report::describe_clock;
-use crate::console::Console;
-use crate::failure::{Failure, FailureKind};
+use crate::board::{Board, describe_fault};
+use crate::error::BoardError;
+use crate::link_figures::LinkFigures;
 
 /// Time in which the clocks are compared ten times.
 const LISTEN: Duration = Duration::from_secs(2);
@@ -20,30 +17,30 @@ const CLOCK_ERROR_US: f64 = 1_000.0;
 /// Largest drift of a quartz clock.
 const DRIFT_PPM: f64 = 200.0;
 
-pub async fn examine(globals: &Globals, console: Console) -> Vec<Finding> {
-    let mut board = match connect(globals, console, "examining the board").await {
-        Ok(board) => board,
-        Err(failure) => return vec![unreachable(&failure)],
-    };
-    let mut findings = vec![versions(&board), reset(&board)];
-    match LinkFigures::measure(&mut board, LISTEN).await {
-        Ok(figures) => findings.push(link(&figures, globals.lease)),
-        Err(error) => findings.push(unreachable(&error.into())),
-    }
-    findings.extend([clock(&board), state(&board), reference(&board)]);
-    findings.extend(limits(&board));
-    findings.push(settings(&board, globals).await);
-    findings
+/// What the checks of a board must know of the command.
+#[derive(Clone, Copy, Debug)]
+pub struct BoardChecks {
+    /// How long the board may go without a heartbeat, in milliseconds.
+    pub lease_ms: u16,
+    /// Speed of the line in bits per second; `None` where bytes take no time.
+    pub line_baud: Option<u32>,
+    /// Says how well the clock of the board is known.
+    pub clock_in_words: fn(&Board) -> String,
+    /// Says what is wrong where the board can no longer be reached.
+    pub unreachable: fn(BoardError) -> Finding,
 }
 
-fn unreachable(failure: &Failure) -> Finding {
-    match failure.kind() {
-        FailureKind::Protocol => {
-            Finding::fail("versions", failure.to_string(), "use the vergence and the firmware of one release")
-        }
-        FailureKind::Usage => Finding::fail("rig", failure.to_string(), "the rig file must describe this board"),
-        _ => Finding::fail("link", failure.to_string(), "check cable, power, --baud and who else uses the port"),
+/// Checks the board with its link, clock, state and settings; listens for two seconds, and moves nothing.
+pub async fn check_board(board: &mut Board, checks: BoardChecks) -> Vec<Finding> {
+    let mut findings = vec![versions(board), reset(board)];
+    match LinkFigures::measure(board, LISTEN).await {
+        Ok(figures) => findings.push(link(&figures, checks.lease_ms)),
+        Err(error) => findings.push((checks.unreachable)(error)),
     }
+    findings.extend([clock(board, (checks.clock_in_words)(board)), state(board), reference(board)]);
+    findings.extend(limits(board));
+    findings.push(settings(board, checks.line_baud).await);
+    findings
 }
 
 fn versions(board: &Board) -> Finding {
@@ -111,9 +108,9 @@ fn link(figures: &LinkFigures, lease_ms: u16) -> Finding {
     Finding::pass("link", format!("{summary}; nothing was lost"))
 }
 
-fn clock(board: &Board) -> Finding {
+fn clock(board: &Board, reason: String) -> Finding {
     let map = board.client().clock_map();
-    let (reason, now) = (describe_clock(board), map.board_at(board.client().clock().now()));
+    let now = map.board_at(board.client().clock().now());
     match (now, map.drift()) {
         _ if map.is_lost() => Finding::fail("clock", reason, "check the link: poses cannot be paired with images"),
         (Some(now), Some(drift)) if now.error_us < CLOCK_ERROR_US && drift.ppm.abs() < DRIFT_PPM => {
@@ -164,17 +161,20 @@ fn limits(board: &Board) -> Vec<Finding> {
 }
 
 /// Checks that the settings can be read, and that the saved line speed is the one in use.
-async fn settings(board: &Board, globals: &Globals) -> Finding {
+async fn settings(board: &Board, line_baud: Option<u32>) -> Finding {
     let read = async |item| board.setting(SettingKey { item, axis: 0 }).await;
     match (read(SettingItem::Baud).await, read(SettingItem::StreamPeriod).await) {
-        (Ok(Some(baud)), Ok(Some(_))) if is_wire(globals) && baud != i64::from(globals.baud) => Finding::warn(
-            "settings",
-            format!("the board will speak {baud} baud from its next start on, and this is {}", globals.baud),
-            format!("use --baud {baud} from then on, or 'vergence config set baud {}'", globals.baud),
-        ),
+        (Ok(Some(baud)), Ok(Some(_))) if line_baud.is_some_and(|now| baud != i64::from(now)) => {
+            let now = line_baud.unwrap_or_default();
+            Finding::warn(
+                "settings",
+                format!("the board will speak {baud} baud from its next start on, and this is {now}"),
+                format!("use --baud {baud} from then on, or 'vergence config set baud {now}'"),
+            )
+        }
         (Ok(Some(baud)), Ok(Some(_))) => Finding::pass("settings", format!("can be read; {baud} baud")),
-        (Err(failure), _) | (_, Err(failure)) => {
-            Finding::fail("settings", failure.to_string(), "check the link, or 'vergence config factory'")
+        (Err(error), _) | (_, Err(error)) => {
+            Finding::fail("settings", error.to_string(), "check the link, or 'vergence config factory'")
         }
         _ => Finding::warn("settings", "this firmware keeps no settings", "update the firmware"),
     }

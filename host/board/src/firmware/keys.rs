@@ -7,11 +7,11 @@ use std::path::Path;
 
 use ed25519_dalek::{Signer, SigningKey};
 use rand::TryRng;
+use vergence_files::{FileError, read_text, write_whole};
 use vergence_image::{DEVELOPMENT_KEY, Seal};
 use vergence_protocol::management::{ImageHeader, Signature};
 
-use crate::failure::Failure;
-use crate::output::write_whole;
+use super::KeyError;
 
 /// The name of the key whose secret everybody knows.
 pub const DEVELOPMENT: &str = "development";
@@ -31,11 +31,9 @@ pub struct PublicKey(pub [u8; 32]);
 ///
 /// # Errors
 /// Where it gives none.
-pub fn fresh_secret() -> Result<SecretKey, Failure> {
+pub fn fresh_secret() -> Result<SecretKey, KeyError> {
     let mut seed = [0; 32];
-    rand::rngs::SysRng
-        .try_fill_bytes(&mut seed)
-        .map_err(|error| Failure::device(format!("the operating system gives no random numbers: {error}")))?;
+    rand::rngs::SysRng.try_fill_bytes(&mut seed).map_err(|error| KeyError::Random(error.to_string()))?;
     Ok(SecretKey(SigningKey::from_bytes(&seed)))
 }
 
@@ -44,11 +42,11 @@ impl SecretKey {
     ///
     /// # Errors
     /// A file that holds none.
-    pub fn named(name: &Path) -> Result<Self, Failure> {
+    pub fn named(name: &Path) -> Result<Self, KeyError> {
         if name.as_os_str() == DEVELOPMENT {
             return key_bytes(DEVELOPMENT_SECRET)
                 .map(|seed| Self(SigningKey::from_bytes(&seed)))
-                .ok_or_else(|| Failure::usage("the development key is none"));
+                .ok_or(KeyError::Development);
         }
         let seed = read(name, SECRET, "a secret key: make one with 'vergence image keygen'")?;
         Ok(Self(SigningKey::from_bytes(&seed)))
@@ -71,12 +69,12 @@ impl SecretKey {
     ///
     /// # Errors
     /// Where there is a file already, or none can be written.
-    pub fn write_new(&self, path: &Path) -> Result<(), Failure> {
+    pub fn write_new(&self, path: &Path) -> Result<(), KeyError> {
         let line = format!("{SECRET} {}\n", hex(self.0.as_bytes()));
         let mut options = OpenOptions::new();
         options.write(true).create_new(true).mode(0o600);
         let written = options.open(path).and_then(|mut file| file.write_all(line.as_bytes()));
-        written.map_err(|error| Failure::output(path, error))
+        written.map_err(|error| FileError::write(path, error).into())
     }
 }
 
@@ -85,7 +83,7 @@ impl PublicKey {
     ///
     /// # Errors
     /// A file that holds none.
-    pub fn named(name: &Path) -> Result<Self, Failure> {
+    pub fn named(name: &Path) -> Result<Self, KeyError> {
         if name.as_os_str() == DEVELOPMENT {
             return Ok(Self(DEVELOPMENT_KEY));
         }
@@ -96,17 +94,17 @@ impl PublicKey {
     ///
     /// # Errors
     /// Where it cannot be written.
-    pub fn write(&self, path: &Path) -> Result<(), Failure> {
-        write_whole(path, format!("{PUBLIC} {}\n", hex(&self.0)).as_bytes())
+    pub fn write(&self, path: &Path) -> Result<(), KeyError> {
+        Ok(write_whole(path, format!("{PUBLIC} {}\n", hex(&self.0)).as_bytes())?)
     }
 }
 
-fn read(path: &Path, kind: &str, wanted: &str) -> Result<[u8; 32], Failure> {
-    let text = std::fs::read_to_string(path).map_err(|error| Failure::input(path, error))?;
-    text.trim()
+fn read(path: &Path, kind: &str, wanted: &'static str) -> Result<[u8; 32], KeyError> {
+    read_text(path)?
+        .trim()
         .strip_prefix(kind)
         .and_then(|digits| key_bytes(digits.trim()))
-        .ok_or_else(|| Failure::input(path, format!("this is not {wanted}")))
+        .ok_or_else(|| KeyError::NotAKey { path: path.to_owned(), wanted })
 }
 
 fn key_bytes(digits: &str) -> Option<[u8; 32]> {

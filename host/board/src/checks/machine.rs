@@ -1,50 +1,18 @@
-//! What can be known without asking the board.
+//! What can be known of this machine without asking the board.
 
 use std::fs;
 use std::os::unix::fs::MetadataExt;
 use std::path::{Path, PathBuf};
 
 use rustix::fs::{Access, access};
-use vergence_board::Port;
 
 use super::Finding;
-use crate::cli::Globals;
-use crate::cmd::connect::port as chosen_port;
-use crate::cmd::options::active_rig;
-use crate::rig_file;
-
-/// The rig that verbs would use: the file named, the active calibration, or the built-in bench.
-pub fn rig(globals: &Globals) -> (Option<PathBuf>, Finding) {
-    const MEND: &str = "mend the file, which docs/rig-file.md describes, or 'vergence calibrate rollback'";
-    let (path, is_active) = match (&globals.rig, active_rig()) {
-        (Some(path), _) => (Some(path.clone()), false),
-        (None, Ok(active)) => (active, true),
-        (None, Err(failure)) => return (None, Finding::fail("rig", failure.to_string(), MEND)),
-    };
-    let finding = match (rig_file::load(path.as_deref()), &path) {
-        (Err(failure), _) => Finding::fail("rig", failure.to_string(), MEND),
-        (Ok(rig), Some(path)) => {
-            let active = if is_active { "the active calibration, " } else { "" };
-            Finding::pass("rig", format!("'{}' from {active}{}", rig.name, path.display()))
-        }
-        (Ok(rig), None) => Finding::warn(
-            "rig",
-            format!("the built-in '{}', which is nobody's real rig; no calibration is active", rig.name),
-            "calibrate, or name your rig file with --rig or VERGENCE_RIG",
-        ),
-    };
-    (path, finding)
-}
+use crate::link::Port;
 
 /// Checks that the port exists and that this user may use it.
-pub fn port(globals: &Globals) -> Finding {
-    let port = match chosen_port(globals) {
-        Ok(port) => port,
-        Err(failure) => {
-            return Finding::fail("port", failure.to_string(), "see 'vergence devices' for the ports there are");
-        }
-    };
-    match &port {
+#[must_use]
+pub fn check_port(port: &Port) -> Finding {
+    match port {
         Port::Serial(path) if !path.exists() => Finding::fail(
             "port",
             format!("there is no {port}"),
@@ -59,7 +27,8 @@ pub fn port(globals: &Globals) -> Finding {
 }
 
 /// Checks the cameras that the kernel lists.
-pub fn cameras() -> Vec<Finding> {
+#[must_use]
+pub fn check_cameras() -> Vec<Finding> {
     let cameras = video_devices();
     if cameras.is_empty() {
         let remedy = "connect the cameras; simulated ones need none";
