@@ -106,7 +106,7 @@ impl Bench {
                 board.ask(trigger).await?;
                 let publish = |result: LiveResult<'_>| {
                     errors.extend(normalised(result.measurement, simulated, room, rig));
-                    Ok(())
+                    Ok::<(), Failure>(())
                 };
                 let limits = Limits { results: Some(results), time: Some(Duration::from_secs(20)) };
                 live.run(limits, &mut totals, publish, |warning| println!("{warning}")).await?;
