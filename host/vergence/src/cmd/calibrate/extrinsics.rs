@@ -11,7 +11,7 @@ use vergence_calibration_report::{
 use vergence_rig::Rig;
 
 use super::options::{LensOptions, ResultOptions};
-use super::views::tell_views;
+use super::tell_views;
 use crate::cmd::target_options::TargetOptions;
 use crate::console::Console;
 use crate::failure::Failure;

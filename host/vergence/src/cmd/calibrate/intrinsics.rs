@@ -13,7 +13,7 @@ use vergence_calibration_report::{
 use vergence_vision::{Angle, ImageSize};
 
 use super::options::ResultOptions;
-use super::views::tell_views;
+use super::tell_views;
 use crate::cmd::camera_options::parse_size;
 use crate::cmd::target_options::TargetOptions;
 use crate::console::Console;

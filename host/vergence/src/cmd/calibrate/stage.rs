@@ -11,7 +11,7 @@ use vergence_calibration_report::{ReportAbout, stage_json, stage_lines, stage_re
 use vergence_rig::Rig;
 
 use super::options::{LensOptions, ResultOptions};
-use super::views::tell_views;
+use super::tell_views;
 use crate::cli::Globals;
 use crate::cmd::target_options::TargetOptions;
 use crate::console::Console;
