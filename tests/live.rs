@@ -19,9 +19,9 @@ use common::{fails_with, run, text, vergence};
 use serde_json::Value;
 use tokio::sync::mpsc;
 use vergence::failure::Failure;
-use vergence::live::{Limits, LiveLoop, LiveResult, MatchingTime, Measurement, Totals, drive};
 use vergence::sim::{SharedRig, SimulatedRig, board_of};
 use vergence_board::Board;
+use vergence_live::{Limits, LiveLoop, LiveResult, MatchingTime, Measurement, Totals, drive};
 use vergence_matching::GuidedMatcher;
 use vergence_pipeline::{ColouredPoint, Exposures, Observation};
 use vergence_protocol::{Mode, Request, SessionId, Trigger};
@@ -84,6 +84,7 @@ impl Bench {
             clock,
             exposures: Exposures::new(Some(f64::from(PERIOD_US))),
             matching_time: MatchingTime::Fixed(Duration::from_millis(50)),
+            stopwatch: || Duration::ZERO,
         };
         Self { simulated, room, board, live, rig }
     }
@@ -105,7 +106,7 @@ impl Bench {
                 board.ask(trigger).await?;
                 let publish = |result: LiveResult<'_>| {
                     errors.extend(normalised(result.measurement, simulated, room, rig));
-                    Ok(())
+                    Ok::<(), Failure>(())
                 };
                 let limits = Limits { results: Some(results), time: Some(Duration::from_secs(20)) };
                 live.run(limits, &mut totals, publish, |warning| println!("{warning}")).await?;

@@ -42,8 +42,19 @@ const ALLOWED: &[(&str, &[&str])] = &[
             "vergence-files",
         ],
     ),
-    ("vergence-board", &["vergence-protocol", "vergence-control", "vergence-image", "vergence-vision", "vergence-rig"]),
+    (
+        "vergence-board",
+        &[
+            "vergence-protocol",
+            "vergence-control",
+            "vergence-image",
+            "vergence-vision",
+            "vergence-rig",
+            "vergence-files",
+        ],
+    ),
     ("vergence-camera", &["vergence-vision", "vergence-rig"]),
+    ("vergence-files", &[]),
     ("vergence-models", &["vergence-matching", "vergence-networks"]),
     (
         "vergence-sim",
@@ -58,6 +69,34 @@ const ALLOWED: &[(&str, &[&str])] = &[
             "vergence-scene",
             "vergence-mcu",
             "vergence-plant",
+        ],
+    ),
+    (
+        "vergence-live",
+        &[
+            "vergence-protocol",
+            "vergence-vision",
+            "vergence-rig",
+            "vergence-matching",
+            "vergence-pipeline",
+            "vergence-board",
+            "vergence-camera",
+            "vergence-sim",
+        ],
+    ),
+    (
+        "vergence-calibration-input",
+        &[
+            "vergence-protocol",
+            "vergence-vision",
+            "vergence-rig",
+            "vergence-calibration",
+            "vergence-calibration-report",
+            "vergence-board",
+            "vergence-camera",
+            "vergence-files",
+            "vergence-scene",
+            "vergence-sim",
         ],
     ),
     (
@@ -111,6 +150,8 @@ const ALLOWED: &[(&str, &[&str])] = &[
             "vergence-page",
             "vergence-files",
             "vergence-output",
+            "vergence-calibration-input",
+            "vergence-live",
             "vergence-scene",
             "vergence-mcu",
             "vergence-plant",
@@ -128,11 +169,11 @@ const ALLOWED: &[(&str, &[&str])] = &[
 
 /// Libraries that touch devices, files, sockets, clocks or the terminal, and the crates that may use each.
 const ONLY_FOR: &[(&str, &[&str])] = &[
-    ("tokio", &["vergence-board", "vergence-camera", "vergence"]),
+    ("tokio", &["vergence-board", "vergence-camera", "vergence-live", "vergence-calibration-input", "vergence"]),
     ("tokio-serial", &["vergence-board", "vergence"]),
     ("serialport", &["vergence-board", "vergence"]),
     ("moq-v4l", &["vergence-camera"]),
-    ("tempfile", &["vergence-files", "vergence-models", "vergence-bench", "vergence"]),
+    ("tempfile", &["vergence-files", "vergence-board", "vergence-models", "vergence-bench", "vergence"]),
     ("clap", &["vergence"]),
     ("indicatif", &["vergence"]),
 ];

@@ -4,6 +4,7 @@
 //! - [`SimulatedChip`]: the unmodified firmware on the simulated microcontroller, wired to the same mechanics
 //! - [`RoomCamera`] and [`LiveCamera`]: cameras on the mechanics, in a furnished [`Room`]
 //! - [`TargetCamera`]: cameras before which a simulated person holds a calibration target ([`HeldTarget`])
+//! - [`flatten`] and [`FirmwareLog`]: what a linker makes, as the bytes in flash and as the texts of the firmware's log
 //! - [`built`]: a rig as it was really built, for a calibration to find
 //!
 //! ```
@@ -20,9 +21,11 @@
 //! Time is an argument everywhere: a program that serves or watches a simulated rig drives it with its own clock. The same
 //! seed gives the same bytes. Nothing here reads or writes a file.
 
+mod application;
 mod built;
 mod chip;
 mod error;
+mod firmware_log;
 mod held_target;
 mod history;
 mod live_camera;
@@ -30,9 +33,11 @@ mod random;
 mod rig;
 mod room;
 
+pub use application::{ApplicationError, build_of, check_boot_loader, flatten, is_elf};
 pub use built::built;
 pub use chip::{Program, SimulatedChip};
 pub use error::SimError;
+pub use firmware_log::{FirmwareLog, PlacedEntry};
 pub use held_target::{HeldTarget, TargetCamera, photograph_target};
 pub use history::LoadHistory;
 pub use live_camera::{LiveCamera, Unplugged};

@@ -2,34 +2,47 @@
 //!
 //! [`Client`] holds one protocol session over an open wire, and [`Board`] drives a rig through it: settings, homing, moves.
 //! [`ManagementLink`] sends the requests that need no session, and [`update()`] brings new firmware into the board with them.
-//! [`MovePlan`] shows a move before it is made. [`serve()`] is the other end of a wire: it runs a simulated board at the pace
+//! [`Listening`] reads a board for long, also beside a program that drives it. [`check_board`] says what is well and what is
+//! not. [`SecretKey`] signs images, and [`ProbeRs`] writes them through a debug probe. [`MovePlan`] shows a move before it is made. [`serve()`] is the other end of a wire: it runs a simulated board at the pace
 //! of the clock. All errors are typed and carry a sentence that says what, where, and what to do.
 
 mod board;
+mod checks;
 mod error;
+mod firmware;
 mod link;
 mod link_figures;
+mod listening;
 mod move_plan;
 mod plan_table;
 mod serve;
 mod setting_check;
 mod setting_text;
+mod settings_file;
 mod update;
 
 pub use board::{
     Board, RecordedEvents, check_range, clock_json, describe_clock, describe_fault, describe_pose, event_in_words,
     pose_json, positions, staying,
 };
+pub use checks::{BoardChecks, Finding, Verdict, check_board, check_cameras, check_port};
 pub use error::BoardError;
+pub use firmware::{
+    DEVELOPMENT, FlashContents, KeyError, ProbeError, ProbeRs, PublicKey, SecretKey, fresh_secret, header_json, hex,
+    parse_version,
+};
 pub use link::{
     BoardKnowledge, Client, Followed, Follower, HostClock, LinkError, ManagementLink, OpenError, OpenWire, Port,
-    PortLock, ReaderMark, Wire, fresh_session, is_held, is_wanted, open,
+    PortLock, ReaderMark, Wire, describe_port, fresh_session, is_candidate, is_held, is_st_link, is_wanted, open,
+    serial_ports, stop_unheard,
 };
-pub use link_figures::LinkFigures;
+pub use link_figures::{LinkFigures, LinkLosses};
+pub use listening::{Listening, Source, reach_again};
 pub use move_plan::{AxisLimits, AxisPlan, Knot, MovePlan, MoveStart};
 pub use serve::{BoardGuard, ListenError, Listener, ServeError, Served, Shared, serve, spawn_in_process};
 pub use setting_check::why_refused;
 pub use setting_text::{NamedSetting, settings};
+pub use settings_file::SettingsFileError;
 pub use update::{
     FirmwareImage, ImageFileError, UpdateError, UpdateEvent, Updated, confirm, hardware_name, restart, roll_back,
     update, version_text,

@@ -3,6 +3,7 @@
 use std::time::Duration;
 
 use serde::Serialize;
+use serde_json::{Value, json};
 use tokio::time::{MissedTickBehavior, interval};
 use vergence_protocol::frame::{Header, Kind, encode};
 use vergence_protocol::{BoardStatistics, HostStatistics, MAX_FRAME, PROTOCOL, Report, Request, Status};
@@ -29,6 +30,16 @@ pub struct LinkFigures {
     pub host: HostStatistics,
     /// The board's counts since it started; `None` where its firmware keeps none.
     pub board: Option<BoardStatistics>,
+}
+
+/// What the link lost while it was asked.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
+#[error("the link lost {requests} requests and {poses} poses: check cable, baud rate and what else uses the processor")]
+pub struct LinkLosses {
+    /// Requests that were never answered.
+    pub requests: u32,
+    /// Poses that did not arrive.
+    pub poses: u32,
 }
 
 impl LinkFigures {
@@ -72,6 +83,76 @@ impl LinkFigures {
     #[must_use]
     pub fn wire_floor_ms(&self, baud: u32) -> f64 {
         1e3 * BITS_PER_BYTE * self.bytes.iter().sum::<usize>() as f64 / f64::from(baud.max(1))
+    }
+
+    /// Whether nothing was lost.
+    ///
+    /// # Errors
+    /// [`LinkLosses`], with what was.
+    pub fn check(&self) -> Result<(), LinkLosses> {
+        let (requests, poses) = (self.unanswered, self.host.poses_lost);
+        if requests > 0 || poses > 0 { Err(LinkLosses { requests, poses }) } else { Ok(()) }
+    }
+
+    /// The figures as lines for people. The line has `baud` bits per second; where it `is_wire`, bytes take time on it.
+    #[must_use]
+    pub fn lines(&self, baud: u32, is_wire: bool) -> Vec<String> {
+        let percentile = |share| self.percentile(share).unwrap_or(f64::NAN);
+        let ([request, answer], host) = (self.bytes, &self.host);
+        vec![
+            format!(
+                "requests    {} answered, {} unanswered, {} frames sent again",
+                self.round_trips_ms.len(),
+                self.unanswered,
+                host.retransmitted
+            ),
+            format!(
+                "round trip  median {:.3} ms, 95 % {:.3} ms, 99 % {:.3} ms, longest {:.3} ms",
+                percentile(0.5),
+                percentile(0.95),
+                percentile(0.99),
+                percentile(1.0)
+            ),
+            format!(
+                "wire floor  {:.3} ms: {request} + {answer} bytes of 10 bits at {baud} baud{}",
+                self.wire_floor_ms(baud),
+                if is_wire { "" } else { "; this port is no wire, its bytes take no time" }
+            ),
+            format!("poses       {} received, {} lost", host.poses, host.poses_lost),
+            format!("host heard  {} frames, dropped {}", host.link.frames, host.link.dropped()),
+            match &self.board {
+                Some(board) => format!(
+                    "board heard {} frames, dropped {}, {} twice, {} after a gap; replaced {} poses unsent (since its start)",
+                    board.link.frames,
+                    board.link.dropped(),
+                    board.duplicates,
+                    board.gaps,
+                    board.poses_replaced
+                ),
+                None => "board heard unknown: this firmware keeps no counts".into(),
+            },
+        ]
+    }
+
+    /// The figures for programs, as those of [`Self::lines`].
+    #[must_use]
+    pub fn json(&self, baud: u32, is_wire: bool) -> Value {
+        let rounded = |value: f64| (value * 1e4).round() / 1e4;
+        let percentile = |share| rounded(self.percentile(share).unwrap_or(f64::NAN));
+        json!({
+            "requests": self.round_trips_ms.len() + self.unanswered as usize,
+            "unanswered": self.unanswered,
+            "retransmitted": self.host.retransmitted,
+            "round_trip_ms": {
+                "median": percentile(0.5), "p95": percentile(0.95), "p99": percentile(0.99), "max": percentile(1.0),
+            },
+            "wire_floor_ms": rounded(self.wire_floor_ms(baud)),
+            "is_wire": is_wire,
+            "poses": self.host.poses,
+            "poses_lost": self.host.poses_lost,
+            "host": self.host.link,
+            "board": self.board,
+        })
     }
 }
 

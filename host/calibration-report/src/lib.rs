@@ -22,16 +22,22 @@ mod pattern;
 mod ray_field;
 mod ray_map;
 mod residuals;
+mod result;
 mod stage;
 mod verdict;
 
-use vergence_calibration::Validation;
+use vergence_calibration::{TargetSpec, Validation};
 use vergence_page::{Page, escape};
+use vergence_rig::Provenance;
 use vergence_vision::Angle;
 
 pub use extrinsics::{extrinsics_report, extrinsics_verdict};
 pub use images::ReportImage;
 pub use intrinsics::{intrinsics_report, intrinsics_verdict};
+pub use result::{
+    extrinsics_json, extrinsics_lines, fixed_pair, held_out_json, held_out_line, intrinsics_json, intrinsics_lines,
+    stage_json, stage_lines,
+};
 pub use stage::stage_report;
 pub use verdict::{Verdict, stage_verdict};
 
@@ -54,6 +60,27 @@ pub struct ReportAbout {
     pub held_out: Option<Validation>,
     /// The images of the left or only camera, and of the right, in which the target was looked for; may be empty.
     pub images: [Vec<ReportImage>; 2],
+}
+
+impl ReportAbout {
+    /// The heading of a report: title, origin and target; without a target the corners came from a file. `half_field` is half
+    /// the field of the lens by its data sheet.
+    #[must_use]
+    pub fn new(title: String, target: Option<&TargetSpec>, provenance: &Provenance, half_field: Option<Angle>) -> Self {
+        let target = target.map_or_else(
+            || "as in the corner file".into(),
+            |spec| format!("{} × {} inner corners, {}", spec.columns, spec.rows, spec.square),
+        );
+        Self {
+            title,
+            program_version: provenance.program.clone(),
+            inputs_sha256: provenance.inputs_sha256.clone(),
+            date: provenance.date.clone().unwrap_or_default(),
+            target,
+            half_field,
+            ..Self::default()
+        }
+    }
 }
 
 /// Whole page of a report; `body` is HTML.

@@ -7,7 +7,9 @@ mod arun;
 mod coverage;
 pub mod detect;
 mod extrinsics;
+mod fit_check;
 mod intrinsics;
+mod lens_difference;
 mod planar_pose;
 mod reprojection;
 mod robust;
@@ -24,10 +26,12 @@ pub use extrinsics::{
     ExtrinsicsCalibration, ExtrinsicsError, ExtrinsicsOptions, FEWEST_VIEWS, LensKnowledge, RelativePose, Side,
     SkippedView, StereoOutlier, StereoOutlierReason, StereoView, StereoViewFigures, calibrate_extrinsics,
 };
+pub use fit_check::{Unfit, check_fit};
 pub use intrinsics::{
     IntrinsicsCalibration, IntrinsicsError, IntrinsicsOptions, Outlier, OutlierReason, Parameter, Reprojection,
     TargetWarp, ViewFigures, ViewPose, calibrate_intrinsics, refine_intrinsics, reproject,
 };
+pub use lens_difference::{LensDifference, LensDifferenceError};
 pub use planar_pose::{PoseError, TargetPose, target_pose};
 pub use robust::{Loss, median};
 pub use stage::{

@@ -22,6 +22,15 @@ impl AxisPosition {
         }
     }
 
+    /// The position in millimetres or degrees, the units of CSV files and JSON.
+    #[must_use]
+    pub fn mm_or_deg(self) -> f64 {
+        match self {
+            Self::Linear(length) => length.mm(),
+            Self::Rotary(angle) => angle.deg(),
+        }
+    }
+
     /// The position in whole micrometres or microradians, the units of the wire.
     #[must_use]
     pub fn micro(self) -> Micro {
@@ -76,6 +85,12 @@ impl AxisPosition {
     }
 }
 
+/// Positions of several axes in words, such as "120.000 mm, 45.000°".
+#[must_use]
+pub fn positions_in_words(positions: &[AxisPosition]) -> String {
+    positions.iter().map(ToString::to_string).collect::<Vec<_>>().join(", ")
+}
+
 impl std::fmt::Display for AxisPosition {
     /// Prints three decimals, or the precision of the format (`{:.1}`).
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
@@ -104,6 +119,16 @@ pub struct RigAxis {
 }
 
 impl RigAxis {
+    /// Name of the column or field with positions of the axis in CSV files and JSON, such as `baseline_mm` or
+    /// `separation_deg`. Its values are those of [`AxisPosition::mm_or_deg`].
+    #[must_use]
+    pub fn column(&self) -> String {
+        match self.kind {
+            AxisKind::Linear => format!("{}_mm", self.name),
+            AxisKind::Rotary => format!("{}_deg", self.name),
+        }
+    }
+
     /// The size of a count in millimetres or radians.
     #[must_use]
     pub fn value_per_count(&self) -> f64 {

@@ -29,7 +29,7 @@ mod text;
 mod to_toml;
 mod track;
 
-pub use axis::{AxisPosition, RigAxis};
+pub use axis::{AxisPosition, RigAxis, positions_in_words};
 pub use best_pose::RatedPose;
 pub use camera_file::{CalibrationTable, CameraDocument, CameraTable, Provenance};
 pub use chain::{Chain, Link, Screw};

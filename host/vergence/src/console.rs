@@ -39,6 +39,14 @@ impl Console {
         if self.json { Ok(()) } else { print_line(&line) }
     }
 
+    /// Lines for people; nothing in JSON.
+    ///
+    /// # Errors
+    /// Where standard output cannot be written.
+    pub fn say_lines(self, lines: impl IntoIterator<Item = String>) -> Result<(), Failure> {
+        lines.into_iter().try_for_each(|line| self.say(line))
+    }
+
     /// The result for programs; nothing in text.
     ///
     /// # Errors

@@ -8,10 +8,10 @@ use vergence_protocol::{Compatibility, HostStatistics, PoseReport, Report, Reque
 use vergence_rig::ClockMap;
 
 use super::clock::HostClock;
-use super::error::LinkError;
+use super::error::{LinkError, OpenError};
 use super::follow::Broadcaster;
 use super::knowledge::BoardKnowledge;
-use super::open::OpenWire;
+use super::open::{OpenWire, Port};
 use super::task::{Command, LinkTask, Outlets};
 
 /// Longest wait for the reply to a request, retransmissions included.
@@ -57,6 +57,15 @@ impl Client {
         });
         let compatibility = opened.await.unwrap_or(Err(LinkError::SessionLost))?;
         Ok(Self { commands, poses, marks, logs, end, knowledge, clock, session, compatibility })
+    }
+
+    /// Opens session `session` over `wire`, which leads to `port`.
+    ///
+    /// # Errors
+    /// [`OpenError::Unanswered`] where the board does not answer within two seconds.
+    pub async fn at(port: &Port, wire: OpenWire, session: SessionId, clock: HostClock) -> Result<Self, OpenError> {
+        let opened = Self::connect(wire, session, clock).await;
+        opened.map_err(|error| OpenError::Unanswered { port: port.clone(), why: unanswered(port, &error) })
     }
 
     /// Whether host and board speak the same protocol version.
@@ -173,5 +182,16 @@ impl Client {
 
     fn why_ended(&self) -> LinkError {
         self.end.borrow().clone().unwrap_or(LinkError::SessionLost)
+    }
+}
+
+/// Why nobody answered. A TCP address that could be reached has a simulator behind it, which serves one host at a time.
+fn unanswered(port: &Port, error: &LinkError) -> String {
+    match (port, error) {
+        (Port::Tcp(_), LinkError::Silent(patience)) => format!(
+            "connected, but no answer within {patience:?}: the port is in use by another vergence, or this is no vergence \
+             board; let the other one finish first"
+        ),
+        _ => error.to_string(),
     }
 }

@@ -3,6 +3,8 @@
 use std::path::PathBuf;
 use std::time::Duration;
 
+use super::open::Port;
+
 /// Why a link ended, or a request got no answer.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[non_exhaustive]
@@ -60,10 +62,40 @@ pub enum OpenError {
         /// What the operating system said.
         problem: String,
     },
+    /// A stop cannot be sent.
+    #[error("the stop cannot be sent: {0}")]
+    NoStop(String),
+    /// The port was opened, and its board does not answer or cannot be written to.
+    #[error("{port}: {why}")]
+    Unanswered {
+        /// The port.
+        port: Port,
+        /// Why the link did not begin, and what to do.
+        why: String,
+    },
     /// A simulated board lives in this process and has no port.
     #[error("a simulated board is not opened but started")]
     Simulated,
+    /// The operating system does not list the serial ports.
+    #[error("cannot list the serial ports: {0}")]
+    List(String),
+    /// No port is named, and none looks like a board; these others are there.
+    #[error("no serial device found on USB{}: connect the board, or {CHOICE}", not_tried(.0))]
+    NoDevice(Vec<String>),
+    /// No port is named, and several look like a board.
+    #[error("several serial devices found ({}): {CHOICE}", .0.join(", "))]
+    SeveralDevices(Vec<String>),
     /// No random numbers for a session id.
     #[error("the operating system gives no random numbers: {0}")]
     Random(String),
+}
+
+/// What to do where the port is not clear.
+const CHOICE: &str = "name one with --port, or run a simulated board with 'vergence sim --pty'";
+
+fn not_tried(others: &[String]) -> String {
+    match others {
+        [] => String::new(),
+        others => format!(" ({} is not tried unless named)", others.join(", ")),
+    }
 }

@@ -8,7 +8,9 @@ mod knowledge;
 mod management;
 mod open;
 mod port_lock;
+mod ports;
 mod session_id;
+mod stop_unheard;
 mod task;
 
 pub use client::Client;
@@ -19,4 +21,6 @@ pub use knowledge::BoardKnowledge;
 pub use management::ManagementLink;
 pub use open::{OpenWire, Port, Wire, open};
 pub use port_lock::{PortLock, ReaderMark, is_held, is_wanted};
+pub use ports::{describe_port, is_candidate, is_st_link, serial_ports};
 pub use session_id::fresh_session;
+pub use stop_unheard::stop_unheard;

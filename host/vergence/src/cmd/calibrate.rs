@@ -6,7 +6,9 @@ mod intrinsics;
 mod options;
 mod slots;
 mod stage;
-mod views;
+
+use indicatif::ProgressBar;
+use vergence_calibration_input::{MissedReason, ViewEvent};
 
 use crate::cmd::options::{BoardOptions, Choice, With};
 use crate::console::Console;
@@ -51,5 +53,26 @@ pub async fn run(args: &Args, console: Console) -> Result<(), Failure> {
         Task::List(args) => slots::list(args, console),
         Task::Use(args) => slots::activate(args, console),
         Task::Rollback(args) => slots::rollback(args, console),
+    }
+}
+
+/// Shows that images are looked at, and names those that give no view.
+fn tell_views(console: Console) -> impl FnMut(ViewEvent<'_>) -> Result<(), Failure> {
+    let mut progress: Option<ProgressBar> = None;
+    move |event| {
+        match event {
+            ViewEvent::Looking(images) => {
+                progress = Some(console.progress(&format!("looking for the target in {images} images")));
+            }
+            ViewEvent::Looked => _ = progress.take().map(|progress| progress.finish_and_clear()),
+            ViewEvent::Missed(missed) => match missed.reason {
+                MissedReason::NoTarget(_) => console.say(missed)?,
+                MissedReason::Damaged(_) => console.warn(missed.to_string()),
+            },
+            ViewEvent::Alone(file) => {
+                console.warn(format!("{}: left out: the other camera has no image of this number", file.display()));
+            }
+        }
+        Ok(())
     }
 }

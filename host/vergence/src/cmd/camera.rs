@@ -4,11 +4,11 @@ use std::path::PathBuf;
 
 use nalgebra::Vector3;
 use serde_json::json;
+use vergence_calibration_input::{read_camera, read_camera_file};
 use vergence_files::write_whole;
 use vergence_rig::{CameraFormat, Shutter, camera_in_words, camera_json};
 use vergence_vision::{Camera, KannalaBrandt, Pixel, UnitRay};
 
-use crate::camera_files::{read, read_camera};
 use crate::console::Console;
 use crate::failure::Failure;
 
@@ -65,7 +65,7 @@ enum Format {
 pub fn run(args: &Args, console: Console) -> Result<(), Failure> {
     match &args.task {
         Task::Show { file } => {
-            let file = read(file)?;
+            let file = read_camera_file(file)?;
             let right = file.cameras.right.map(|(camera, _)| camera);
             for camera in [Some(file.cameras.left), right].into_iter().flatten() {
                 console.say(camera_in_words(&camera))?;
@@ -75,7 +75,7 @@ pub fn run(args: &Args, console: Console) -> Result<(), Failure> {
             console.result(&json!({"format": format!("{:?}", file.format).to_lowercase(), "cameras": cameras}))
         }
         Task::Convert { file, to, out } => {
-            let file = read(file)?;
+            let file = read_camera_file(file)?;
             let format = match to {
                 Format::Toml => CameraFormat::Toml,
                 Format::Opencv => CameraFormat::OpenCv,

@@ -7,6 +7,7 @@ use serde_json::json;
 use tokio::task::spawn_blocking;
 use vergence_board::HostClock;
 use vergence_calibration::{Coverage, TargetSpec};
+use vergence_calibration_input::{NAMES, TargetViews, TargetWatch, observe};
 use vergence_camera::{Camera, CameraError, CameraImage, CameraSet};
 use vergence_files::{make_folder, write_png};
 use vergence_scene::Target;
@@ -20,7 +21,6 @@ use crate::console::Console;
 use crate::failure::Failure;
 use crate::interrupt::interrupted;
 use crate::rig_file;
-use crate::target_watch::{NAMES, TargetViews, TargetWatch, observe};
 
 /// Watches one camera or a pair, and keeps an image whenever a still target is seen where few views were. Every image is
 /// written at once: whatever ends the capture, the views are kept. In a folder that has views already, more are added.

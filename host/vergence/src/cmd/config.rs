@@ -1,11 +1,9 @@
 //! `vergence config`: the board's settings.
 
-mod file;
-
 use std::path::PathBuf;
 
 use serde_json::{Map, Value, json};
-use vergence_board::{Board, ManagementLink, NamedSetting, Port, restart, settings, why_refused};
+use vergence_board::{Board, ManagementLink, NamedSetting, Port, SettingsFileError, restart, settings, why_refused};
 use vergence_files::write_whole;
 use vergence_protocol::{ControllerState, Refusal, Request};
 
@@ -70,7 +68,10 @@ pub async fn run(args: &Args, globals: &Globals, console: Console) -> Result<(),
         }
         What::Get { key: axis, out } => get_all(&board, axis.as_deref(), out.as_ref(), console).await,
         What::Set { file: Some(path), .. } => {
-            let changed = file::apply(&mut board, path).await?;
+            let changed = board.set_all(&vergence_files::read_text(path)?).await.map_err(|error| match error {
+                SettingsFileError::Wrong(problem) => Failure::input(path, problem),
+                _ => error.into(),
+            })?;
             let list = changed.iter().map(|change| format!("\n  {change}")).collect::<String>();
             console.say(format!("{} settings changed{list}", changed.len()))?;
             say_unsaved(console, !changed.is_empty())?;
@@ -139,10 +140,10 @@ async fn get_one(board: &Board, name: &str, console: Console) -> Result<(), Fail
 
 /// All settings, or those of one axis.
 async fn get_all(board: &Board, axis: Option<&str>, out: Option<&PathBuf>, console: Console) -> Result<(), Failure> {
-    let mut present = read_all(board).await?;
+    let mut present = board.settings().await?;
     present.retain(|(setting, _)| axis.is_none() || setting.axis.as_deref() == axis);
     if let Some(path) = out {
-        write_whole(path, file::text(board, &present).as_bytes())?;
+        write_whole(path, board.settings_text(&present).as_bytes())?;
         console.say(format!("{} settings written to {}", present.len(), path.display()))?;
     } else {
         let width = present.iter().map(|(setting, _)| setting.name().len()).max().unwrap_or(0);
@@ -161,7 +162,7 @@ async fn set_one(board: &Board, name: &str, text: &str, console: Console) -> Res
     match board.set(setting.key, value).await? {
         Ok(()) => {}
         Err(Refusal::BadSetting) => {
-            let reason = why_refused(board.rig(), &read_all(board).await?, [(setting.key, value)]);
+            let reason = why_refused(board.rig(), &board.settings().await?, [(setting.key, value)]);
             let reason = reason.unwrap_or_else(|| "it does not go with the other settings of the board".into());
             return Err(Failure::usage(format!("{name} cannot be {text}: {reason}")));
         }
@@ -171,17 +172,6 @@ async fn set_one(board: &Board, name: &str, text: &str, console: Console) -> Res
     console.say(format!("{name} is {now}, it was {}", before.as_deref().unwrap_or("unknown")))?;
     say_unsaved(console, before.as_ref() != Some(&now))?;
     console.result(&json!({ "setting": name, "value": now, "before": before }))
-}
-
-/// Every setting that the board has, and its value.
-async fn read_all(board: &Board) -> Result<Vec<(NamedSetting, i64)>, Failure> {
-    let mut present = Vec::new();
-    for setting in settings(board.rig()) {
-        if let Some(value) = board.setting(setting.key).await? {
-            present.push((setting, value));
-        }
-    }
-    Ok(present)
 }
 
 fn json_value(setting: &NamedSetting, value: i64) -> Value {

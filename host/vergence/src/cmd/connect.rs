@@ -1,14 +1,13 @@
 //! From the command line's options to a connected board.
 
 use indicatif::ProgressBar;
-use vergence_board::{Board, Client, HostClock, LinkError, OpenWire, Port, fresh_session, open};
+use vergence_board::{Board, Client, HostClock, OpenWire, Port, fresh_session, open};
 use vergence_rig::Rig;
 
 use crate::cli::Globals;
 use crate::console::{Console, shown_on};
 use crate::failure::Failure;
 use crate::rig_file;
-use crate::serial_ports::{boards, ports};
 use crate::sim::{SharedRig, SimulatedRig, spawn_in_process};
 
 /// Where the stages of an in-process board stand.
@@ -64,21 +63,7 @@ async fn client(globals: &Globals) -> Result<(Client, Rig), Failure> {
     let rig = rig_file::load(globals.rig.as_deref())?;
     let port = port(globals)?;
     let wire = wire(&port, globals.baud, &rig).await?;
-    let client = Client::connect(wire, fresh_session()?, HostClock::start())
-        .await
-        .map_err(|error| Failure::device(format!("{port}: {}", unanswered(&port, &error))))?;
-    Ok((client, rig))
-}
-
-/// Why nobody answered. A TCP address that could be reached has a simulator behind it, which serves one host at a time.
-fn unanswered(port: &Port, error: &LinkError) -> String {
-    match (port, error) {
-        (Port::Tcp(_), LinkError::Silent(patience)) => format!(
-            "connected, but no answer within {patience:?}: the port is in use by another vergence, or this is no vergence \
-             board; let the other one finish first"
-        ),
-        _ => error.to_string(),
-    }
+    Ok((Client::at(&port, wire, fresh_session()?, HostClock::start()).await?, rig))
 }
 
 /// The port that the options name, or the only one there is.
@@ -86,33 +71,13 @@ fn unanswered(port: &Port, error: &LinkError) -> String {
 /// # Errors
 /// None, or several.
 pub fn port(globals: &Globals) -> Result<Port, Failure> {
-    if let Some(Ok(port)) = globals.port.as_deref().map(str::parse) {
-        return Ok(port);
-    }
-    let hint = "name one with --port, or run a simulated board with 'vergence sim --pty'";
-    let found = boards()?;
-    match found.as_slice() {
-        [] => {
-            let others: Vec<String> = ports()?.into_iter().map(|port| port.port_name).collect();
-            let others = match others.as_slice() {
-                [] => String::new(),
-                others => format!(" ({} is not tried unless named)", others.join(", ")),
-            };
-            Err(Failure::device(format!("no serial device found on USB{others}: connect the board, or {hint}")))
-        }
-        [only] => Ok(Port::Serial(only.into())),
-        several => Err(Failure::usage(format!("several serial devices found ({}): {hint}", several.join(", ")))),
-    }
+    Ok(Port::named_or_only(globals.port.as_deref())?)
 }
 
 /// Whether bytes take time on this port: pseudo-terminals and TCP carry them at once.
 #[must_use]
 pub fn is_wire(globals: &Globals) -> bool {
-    match port(globals) {
-        // A name that a rule or a person gave to the device is still that device.
-        Ok(Port::Serial(path)) => !path.canonicalize().unwrap_or(path).starts_with("/dev/pts"),
-        _ => false,
-    }
+    port(globals).is_ok_and(Port::is_wire)
 }
 
 async fn wire(port: &Port, baud: u32, rig: &Rig) -> Result<OpenWire, Failure> {

@@ -1,78 +1,35 @@
 //! `vergence doctor`: what is well, what is not, and what to do.
 
-mod board;
-mod machine;
+use std::path::PathBuf;
 
-use serde_json::{Value, json};
+use serde_json::json;
+use vergence_board::{BoardChecks, Finding, Verdict, check_board, check_cameras, check_port, describe_clock};
 
+use super::connect::{connect, is_wire, port};
+use super::options::active_rig;
 use crate::cli::Globals;
 use crate::console::Console;
-use crate::failure::Failure;
+use crate::failure::{Failure, FailureKind};
+use crate::rig_file;
 
 /// Checks rig file, ports, permissions, cameras, and the board with its link, clock, state and settings. Moves nothing.
 /// Each line passes, warns or fails, with the reason and a remedy. Exit code 1 when one fails.
 #[derive(Debug, clap::Args)]
 pub struct Args {}
 
-/// Result of a check.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Verdict {
-    Pass,
-    Warn,
-    Fail,
-}
-
-impl Verdict {
-    const ALL: [Self; 3] = [Self::Pass, Self::Warn, Self::Fail];
-
-    fn name(self) -> &'static str {
-        match self {
-            Self::Pass => "pass",
-            Self::Warn => "warn",
-            Self::Fail => "fail",
-        }
-    }
-}
-
-/// A check and its result.
-#[derive(Clone, Debug)]
-struct Finding {
-    check: &'static str,
-    verdict: Verdict,
-    reason: String,
-    remedy: Option<String>,
-}
-
-impl Finding {
-    fn pass(check: &'static str, reason: impl Into<String>) -> Self {
-        Self { check, verdict: Verdict::Pass, reason: reason.into(), remedy: None }
-    }
-
-    fn warn(check: &'static str, reason: impl Into<String>, remedy: impl Into<String>) -> Self {
-        Self { check, verdict: Verdict::Warn, reason: reason.into(), remedy: Some(remedy.into()) }
-    }
-
-    fn fail(check: &'static str, reason: impl Into<String>, remedy: impl Into<String>) -> Self {
-        Self { check, verdict: Verdict::Fail, reason: reason.into(), remedy: Some(remedy.into()) }
-    }
-
-    fn json(&self) -> Value {
-        json!({
-            "check": self.check, "verdict": self.verdict.name(), "reason": self.reason, "remedy": self.remedy,
-        })
-    }
-}
-
 pub async fn run(_: &Args, globals: &Globals, console: Console) -> Result<(), Failure> {
-    let (rig, rig_finding) = machine::rig(globals);
+    let (rig, rig_finding) = check_rig(globals);
     let globals = &Globals { rig, ..globals.clone() };
     let mut findings = vec![rig_finding];
-    findings.extend(machine::cameras());
-    let port = machine::port(globals);
+    findings.extend(check_cameras());
+    let port = match port(globals) {
+        Ok(port) => check_port(&port),
+        Err(failure) => Finding::fail("port", failure.to_string(), "see 'vergence devices' for the ports there are"),
+    };
     let reachable = port.verdict != Verdict::Fail;
     findings.push(port);
     if reachable {
-        findings.extend(board::examine(globals, console).await);
+        findings.extend(examine(globals, console).await);
     }
     for Finding { check, verdict, reason, remedy } in &findings {
         console.say(format!("{}  {check:<9} {reason}", verdict.name()))?;
@@ -91,4 +48,50 @@ pub async fn run(_: &Args, globals: &Globals, console: Console) -> Result<(), Fa
         return Err(Failure::check(format!("{failed} of {} checks failed", findings.len())));
     }
     Ok(())
+}
+
+/// The rig that verbs would use: the file named, the active calibration, or the built-in bench.
+fn check_rig(globals: &Globals) -> (Option<PathBuf>, Finding) {
+    const MEND: &str = "mend the file, which docs/rig-file.md describes, or 'vergence calibrate rollback'";
+    let (path, is_active) = match (&globals.rig, active_rig()) {
+        (Some(path), _) => (Some(path.clone()), false),
+        (None, Ok(active)) => (active, true),
+        (None, Err(failure)) => return (None, Finding::fail("rig", failure.to_string(), MEND)),
+    };
+    let finding = match (rig_file::load(path.as_deref()), &path) {
+        (Err(failure), _) => Finding::fail("rig", failure.to_string(), MEND),
+        (Ok(rig), Some(path)) => {
+            let active = if is_active { "the active calibration, " } else { "" };
+            Finding::pass("rig", format!("'{}' from {active}{}", rig.name, path.display()))
+        }
+        (Ok(rig), None) => Finding::warn(
+            "rig",
+            format!("the built-in '{}', which is nobody's real rig; no calibration is active", rig.name),
+            "calibrate, or name your rig file with --rig or VERGENCE_RIG",
+        ),
+    };
+    (path, finding)
+}
+
+async fn examine(globals: &Globals, console: Console) -> Vec<Finding> {
+    let checks = BoardChecks {
+        lease_ms: globals.lease,
+        line_baud: is_wire(globals).then_some(globals.baud),
+        clock_in_words: describe_clock,
+        unreachable: |error| unreachable(&error.into()),
+    };
+    match connect(globals, console, "examining the board").await {
+        Ok(mut board) => check_board(&mut board, checks).await,
+        Err(failure) => vec![unreachable(&failure)],
+    }
+}
+
+fn unreachable(failure: &Failure) -> Finding {
+    match failure.kind() {
+        FailureKind::Protocol => {
+            Finding::fail("versions", failure.to_string(), "use the vergence and the firmware of one release")
+        }
+        FailureKind::Usage => Finding::fail("rig", failure.to_string(), "the rig file must describe this board"),
+        _ => Finding::fail("link", failure.to_string(), "check cable, power, --baud and who else uses the port"),
+    }
 }

@@ -1,6 +1,5 @@
 //! `vergence flash`: firmware into the board, and back.
 
-mod probe;
 mod serial;
 mod swd;
 

@@ -6,15 +6,14 @@ use std::time::Duration;
 
 use serde_json::json;
 use tokio::time::timeout;
-use vergence_board::{Board, Followed, Follower, describe_fault, event_in_words};
-use vergence_mcu::{Firmware, LogDecoder, LogEntry};
+use vergence_board::{Board, Followed, Follower, Source, describe_fault, event_in_words};
 use vergence_rig::Rig;
+use vergence_sim::{FirmwareLog, PlacedEntry};
 
-use super::reconnect::{Listening, Source};
+use super::reconnect::Listening;
 use crate::cli::Globals;
 use crate::console::Console;
 use crate::failure::Failure;
-use crate::firmware::{Hardware, build_of, flatten};
 
 /// Prints what happens on the board until Ctrl-C, beginning with what its flight recorder kept: starts, states, moves, stops,
 /// refusals, switches, faults, each with its time since the board's start.
@@ -48,43 +47,37 @@ pub async fn run(args: &Args, globals: &Globals, console: Console) -> Result<(),
     args.listening.to(globals, console, listen).await
 }
 
-/// The firmware that its ELF file describes.
+/// The firmware's log, and the ELF file that holds its texts.
 struct Program<'a> {
     path: &'a Path,
-    firmware: Firmware,
-    decoder: LogDecoder,
-    build: u64,
+    log: FirmwareLog,
 }
 
 impl<'a> Program<'a> {
     fn read(path: &'a Path) -> Result<Self, Failure> {
-        let bytes = std::fs::read(path).map_err(|error| Failure::input(path, error))?;
-        let firmware = Firmware::from_elf(&bytes).map_err(|error| Failure::input(path, error))?;
-        let decoder = LogDecoder::new(&firmware).map_err(|error| Failure::input(path, error))?;
-        let image = flatten(&bytes, Hardware::NucleoG474).map_err(|problem| Failure::input(path, problem))?;
-        Ok(Self { path, firmware, decoder, build: build_of(&image) })
+        let log = FirmwareLog::new(&vergence_files::read(path)?).map_err(|error| Failure::input(path, error))?;
+        Ok(Self { path, log })
     }
 
     /// With the texts of another build the log would say anything.
     fn check(&self, board: &Board) -> Result<(), Failure> {
-        let runs = board.info().build;
-        if self.build == runs {
+        let (given, runs) = (self.log.build(), board.info().build);
+        if given == runs {
             return Ok(());
         }
         let problem = format!(
-            "this is build {:016x} and the board runs build {runs:016x}: give the ELF file of what was flashed",
-            self.build
+            "this is build {given:016x} and the board runs build {runs:016x}: give the ELF file of what was flashed"
         );
         Err(Failure::input(self.path, problem))
     }
 
     fn tell(&mut self, bytes: &[u8], left: &mut u64, console: Console) -> Result<(), Failure> {
-        for entry in self.decoder.push(bytes) {
-            match entry {
-                Ok(entry) if *left > 0 => {
+        for placed in self.log.push(bytes) {
+            match placed {
+                Ok(placed) if *left > 0 => {
                     *left -= 1;
-                    let places = places(&entry.text, &self.firmware);
-                    console.say(line(&entry, &places))?;
+                    console.say(placed.line())?;
+                    let PlacedEntry { entry, places } = placed;
                     console.result(&json!({
                         "time": entry.time, "level": entry.level, "text": entry.text, "places": places,
                     }))?;
@@ -178,19 +171,4 @@ impl Printer {
         }
         Ok(())
     }
-}
-
-fn line(entry: &LogEntry, places: &[String]) -> String {
-    let (time, level) = (entry.time.as_deref().unwrap_or_default(), entry.level.as_deref().unwrap_or_default());
-    let places: String = places.iter().map(|place| format!("\n{:21}{place}", "")).collect();
-    format!("{time:>12} s {level:5}  {}{places}", entry.text)
-}
-
-/// The functions that addresses in `text` lie in. Odd ones are return addresses: the call ends right before them, and may
-/// be the last that its function does.
-fn places(text: &str, firmware: &Firmware) -> Vec<String> {
-    let words = text.split(|character: char| !character.is_ascii_alphanumeric());
-    let addresses = words.filter_map(|word| u32::from_str_radix(word.strip_prefix("0x")?, 16).ok());
-    let at = |address: u32| if address & 1 == 1 { (address & !1).saturating_sub(2) } else { address };
-    addresses.filter_map(|address| Some(format!("{address:#010x} {}", firmware.symbol_at(at(address))?))).collect()
 }

@@ -3,12 +3,14 @@
 mod live;
 
 use serde_json::Value;
-use vergence_board::{Board, Followed, Follower, clock_json, describe_clock, describe_fault, describe_pose, pose_json};
+use vergence_board::{
+    Board, Followed, Follower, Source, clock_json, describe_clock, describe_fault, describe_pose, pose_json,
+};
 use vergence_protocol::PoseReport;
 use vergence_rig::Rig;
 
 use self::live::Live;
-use super::reconnect::{Listening, Source};
+use super::reconnect::Listening;
 use crate::cli::Globals;
 use crate::console::Console;
 use crate::failure::Failure;

@@ -2,15 +2,46 @@
 
 use std::path::PathBuf;
 
+use vergence_calibration_input::Slots;
 use vergence_output::TableFormat;
 
 use crate::failure::Failure;
-use crate::slots;
 
 /// Speed of a serial port unless --baud says otherwise, in bits per second.
 const BAUD: u32 = 921_600;
 /// How long a board may go without a heartbeat unless --lease says otherwise, in milliseconds.
 const LEASE_MS: u16 = 100;
+
+/// Names the folder that calibrations are kept in.
+const STORE_VARIABLE: &str = "VERGENCE_STORE";
+
+/// Where calibrations are kept.
+#[derive(Clone, Debug, Default, clap::Args)]
+pub struct StoreOptions {
+    /// The folder that calibrations are kept in. Without it, vergence/calibrations in the user's data folder.
+    #[arg(long, env = STORE_VARIABLE, value_name = "DIR")]
+    store: Option<PathBuf>,
+}
+
+impl StoreOptions {
+    /// The store; nothing is written.
+    ///
+    /// # Errors
+    /// Where no folder is named and the user has no data folder.
+    pub fn open(&self) -> Result<Slots, Failure> {
+        Ok(Slots::open(self.store.clone())?)
+    }
+}
+
+/// The rig file that is active in the store of the environment; `None` where there is no store, or none is active.
+///
+/// # Errors
+/// Where the store is there and cannot be read.
+pub fn active_rig() -> Result<Option<PathBuf>, Failure> {
+    let store = std::env::var_os(STORE_VARIABLE).map(PathBuf::from);
+    let Ok(slots) = Slots::open(store) else { return Ok(None) };
+    Ok(slots.active_rig()?)
+}
 
 /// The options of a verb beside shared `options`, of which it takes only those that act on it.
 #[derive(Debug, clap::Args)]
@@ -77,7 +108,7 @@ pub trait Choice {
         let given = self.given();
         let rig = match given.rig {
             Some(rig) => Some(rig),
-            None => slots::active_rig()?,
+            None => active_rig()?,
         };
         Ok(Globals { rig, ..given })
     }

@@ -1,6 +1,7 @@
 //! `vergence run`: measures live, while the stages stand still or move.
 
 mod cameras;
+mod publish;
 mod tour;
 
 use std::path::PathBuf;
@@ -10,12 +11,13 @@ use std::time::Duration;
 use tokio::sync::mpsc;
 use vergence_board::{Board, HostClock, Port, fresh_session};
 use vergence_files::make_folder;
+use vergence_live::{Ended, Limits, LiveLoop, MatchingTime, Totals, Tour};
 use vergence_output::{TableFormat, check_folder};
 use vergence_pipeline::Exposures;
 use vergence_protocol::{Request, Trigger};
 use vergence_rig::Rig;
 
-use self::tour::Tour;
+use self::publish::Publisher;
 use super::connect::{connect, port};
 use crate::cli::Globals;
 use crate::cmd::camera_options::CameraOptions;
@@ -24,9 +26,9 @@ use crate::cmd::options::TableOption;
 use crate::console::Console;
 use crate::failure::Failure;
 use crate::interrupt::interrupted;
-use crate::live::{Ended, Limits, LiveLoop, MatchingTime, Publisher, Totals};
 use crate::rig_file;
 use crate::sim::{SharedRig, SimulatedRig, board_of};
+use crate::stopwatch::clock as stopwatch;
 
 /// Number of camera events that may wait; images beyond it are lost, which the gap in their numbers shows.
 const EVENTS_KEPT: usize = 16;
@@ -89,7 +91,7 @@ fn parse_time(text: &str) -> Result<Duration, String> {
 
 pub async fn run(args: &Args, globals: &Globals, console: Console) -> Result<(), Failure> {
     let rig = rig_file::load(globals.rig.as_deref())?;
-    let tour = args.tour.read(&rig)?;
+    let tour = args.tour.tour(&rig)?;
     let matcher = Arc::from(args.matching.matcher(console)?);
     if let Some(folder) = &args.out {
         check_folder(folder)?;
@@ -100,7 +102,7 @@ pub async fn run(args: &Args, globals: &Globals, console: Console) -> Result<(),
     let clock = board.as_ref().map_or_else(HostClock::start, |board| board.client().clock());
     if let Some(board) = &mut board {
         board.compare_clocks().await?;
-        tour.home(board).await?;
+        args.tour.home(board).await?;
         if !board.is_referenced() {
             return Err(Failure::device(
                 "the axes have no reference, so nobody knows where the cameras are: run 'vergence home', or add --home",
@@ -129,6 +131,7 @@ pub async fn run(args: &Args, globals: &Globals, console: Console) -> Result<(),
             (Some(_), None) => MatchingTime::Measured,
             (Some(_), Some(time)) => MatchingTime::Fixed(time),
         },
+        stopwatch,
     };
     let mut publisher = Publisher {
         console,
@@ -171,7 +174,7 @@ async fn both(
     let measuring = live.run(limits, totals, |result| publisher.publish(&result), |warning| console.warn(warning));
     tokio::select! {
         ended = measuring => ended.map(Some),
-        failure = tour.drive(board.as_mut()) => Err(failure),
+        error = tour.drive(board.as_mut(), interrupted()) => Err(error.into()),
         () = interrupted() => Ok(None),
     }
 }

@@ -2,7 +2,9 @@
 
 use std::fmt;
 
-use vergence_board::{BoardError, LinkError, ListenError, OpenError, ServeError, UpdateError};
+use vergence_board::{
+    BoardError, KeyError, LinkError, ListenError, OpenError, ProbeError, ServeError, SettingsFileError, UpdateError,
+};
 use vergence_protocol::Refusal;
 use vergence_protocol::management::Outcome;
 
@@ -20,7 +22,7 @@ impl From<LinkError> for Failure {
 impl From<OpenError> for Failure {
     fn from(error: OpenError) -> Self {
         match error {
-            OpenError::Simulated => Self::usage(error.to_string()),
+            OpenError::Simulated | OpenError::SeveralDevices(_) => Self::usage(error.to_string()),
             _ => Self::device(error.to_string()),
         }
     }
@@ -64,6 +66,30 @@ impl From<UpdateError> for Failure {
             | UpdateError::TooLong { .. }
             | UpdateError::Length => Self::usage(message),
             _ => Self::device(message),
+        }
+    }
+}
+
+impl From<KeyError> for Failure {
+    fn from(error: KeyError) -> Self {
+        match error {
+            KeyError::Random(_) => Self::device(error.to_string()),
+            _ => Self::usage(error.to_string()),
+        }
+    }
+}
+
+impl From<ProbeError> for Failure {
+    fn from(error: ProbeError) -> Self {
+        Self::device(error.to_string())
+    }
+}
+
+impl From<SettingsFileError> for Failure {
+    fn from(error: SettingsFileError) -> Self {
+        match error {
+            SettingsFileError::Board(error) => error.into(),
+            _ => Self::usage(error.to_string()),
         }
     }
 }

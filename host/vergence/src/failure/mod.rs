@@ -3,8 +3,11 @@
 
 mod bench;
 mod board;
+mod calibration;
+mod calibration_input;
 mod camera;
 mod files;
+mod live;
 mod models;
 mod output;
 mod reproduce;

@@ -7,13 +7,12 @@ use vergence_bench::calibrate::OneThread;
 use vergence_bench::peer::Peer;
 use vergence_bench::sets::{CORNER_SETS, IMAGE_SETS, meta, shared};
 use vergence_calibration::TargetSpec;
+use vergence_calibration_input::{named_images, read_corners};
 use vergence_vision::Length;
 
 use crate::console::Console;
-use crate::corners;
 use crate::failure::Failure;
 use crate::stopwatch::clock;
-use crate::target_images::files;
 
 /// Solves every fisheye set and detects every chessboard, then lets OpenCV (`cv2.fisheye.calibrate` with its crude guess,
 /// the SB detector) and SciPy's bundle adjustment do the same by the scripts in the folder `bench` beside the data.
@@ -46,7 +45,7 @@ pub fn run(args: &Args, console: Console) -> Result<(), Failure> {
         let peers = peer.map(|peer| peer.calibrate(&set, corners_file, &meta.cameras)).transpose()?;
         for (index, camera) in meta.cameras.iter().enumerate() {
             let path = set.join(corners_file);
-            let views: Vec<_> = corners::read(&path, Some(camera))?.into_iter().map(|frame| frame.view).collect();
+            let views: Vec<_> = read_corners(&path, Some(camera))?.into_iter().map(|frame| frame.view).collect();
             let solve = thread.solve(&views, meta.size(), args.runs).map_err(|error| Failure::input(&path, error))?;
             let peers = peers.as_ref().and_then(|peers| peers.get(index));
             console.say(solve.in_words(&format!("{name} {corners_file} {camera}"), peers))?;
@@ -76,7 +75,7 @@ fn detection(
     let meta = meta(set)?;
     let [columns, rows] = meta.board_inner_corners;
     let target = TargetSpec { columns, rows, square: Length::from_mm(meta.square_mm) };
-    let paths = files(&[set.join(pattern).to_string_lossy().into_owned()])?;
+    let paths = named_images(&[set.join(pattern).to_string_lossy().into_owned()])?;
     let found = thread.detect_files(&paths, &target)?;
     let peer = peer.map(|peer| peer.detect(&paths, meta.board_inner_corners)).transpose()?;
     console.say(found.in_words(name, peer))?;

@@ -1,10 +1,11 @@
 //! `vergence calibrate list`, `use` and `rollback`: calibrations kept under names.
 
 use serde_json::json;
+use vergence_calibration_input::SlotKind;
 
+use crate::cmd::options::StoreOptions;
 use crate::console::Console;
 use crate::failure::Failure;
-use crate::slots::{SlotKind, Slots, StoreOptions};
 
 /// Lists the calibrations that are kept, with their origin, and marks the active one.
 #[derive(Debug, clap::Args)]
@@ -30,7 +31,7 @@ pub struct Rollback {
 }
 
 pub fn list(args: &List, console: Console) -> Result<(), Failure> {
-    let slots = Slots::open(&args.store)?.list()?;
+    let slots = args.store.open()?.list()?;
     if slots.is_empty() {
         console.say("no calibration is kept: vergence calibrate ... --slot NAME keeps one")?;
     }
@@ -62,13 +63,13 @@ pub fn list(args: &List, console: Console) -> Result<(), Failure> {
 }
 
 pub fn activate(args: &Use, console: Console) -> Result<(), Failure> {
-    Slots::open(&args.store)?.activate(&args.name)?;
+    args.store.open()?.activate(&args.name)?;
     console.say(format!("'{}' is active", args.name))?;
     console.result(&json!({ "active": args.name }))
 }
 
 pub fn rollback(args: &Rollback, console: Console) -> Result<(), Failure> {
-    let before = Slots::open(&args.store)?.rollback()?;
+    let before = args.store.open()?.rollback()?;
     match &before {
         Some(name) => console.say(format!("'{name}' is active again"))?,
         None => console.say("none is active: the built-in rig is used")?,

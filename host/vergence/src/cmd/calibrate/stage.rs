@@ -1,23 +1,21 @@
 //! `vergence calibrate stage`: cameras that move.
 
 mod live;
-mod recorded;
-mod tell;
-mod truth;
 
 use std::path::PathBuf;
 
-use vergence_calibration::{StageError, StageOptions, StagePose, calibrate_stage, validate_stage};
-use vergence_calibration_report::{stage_report, stage_verdict};
+use serde_json::json;
+use vergence_calibration::{StageError, StageOptions, StagePose, calibrate_stage, check_fit, validate_stage};
+use vergence_calibration_input::{InputHash, KnownLenses, RecordedSet, TrueError, stage_poses_in_corners};
+use vergence_calibration_report::{ReportAbout, stage_json, stage_lines, stage_report, stage_verdict};
 use vergence_rig::Rig;
 
-use super::options::{KnownLenses, LensOptions, ResultOptions, check_fit, verdict_json};
-use super::views::about;
+use super::options::{LensOptions, ResultOptions};
+use super::tell_views;
 use crate::cli::Globals;
 use crate::cmd::target_options::TargetOptions;
 use crate::console::Console;
 use crate::failure::Failure;
-use crate::provenance::InputHash;
 use crate::rig_file;
 use crate::stopwatch::Stopwatch;
 
@@ -97,15 +95,22 @@ pub async fn run(args: &Args, globals: &Globals, console: Console) -> Result<(),
     let verdict = stage_verdict(&stage, &rig);
     let provenance = args.result.provenance(hash);
     args.result.write(&rig.to_toml(&provenance).map_err(Failure::check)?, || {
-        stage_report(&stage, &rig, &held_out, &about(rig.name.clone(), &args.target, &provenance, None))
+        let about = ReportAbout::new(rig.name.clone(), args.target.spec().ok().as_ref(), &provenance, None);
+        stage_report(&stage, &rig, &held_out, &about)
     })?;
-    tell::tell(&stage, &held_out, console)?;
+    console.say_lines(stage_lines(&stage, &held_out))?;
     console.say(&verdict.sentence)?;
-    let mut result = tell::in_json(&rig, &stage, &held_out);
+    let mut result = stage_json(&rig, &stage, &held_out);
     result["seconds"] = seconds.into();
-    result["verdict"] = verdict_json(&verdict);
+    result["verdict"] = verdict.json();
     if let Some(built) = built {
-        result["truth"] = truth::compare(&stage, &built, args.live.seed, console)?;
+        let TrueError { poses, rotation, translation } = TrueError::of(&stage, &built, args.live.seed);
+        let (rotation_deg, translation_mm) = (rotation.deg(), translation.mm());
+        console.say(format!(
+            "against the simulated truth at {poses} unseen poses: {rotation_deg:.4}° and {translation_mm:.4} mm rms"
+        ))?;
+        result["truth"] =
+            json!({ "poses": poses, "rotation_rms_deg": rotation_deg, "translation_rms_mm": translation_mm });
     }
     console.result(&result)
 }
@@ -121,8 +126,11 @@ async fn live(args: &Args, globals: &Globals, console: Console) -> Result<Option
 
 fn poses(args: &Args, rig: &Rig, hash: &mut InputHash, console: Console) -> Result<Vec<StagePose>, Failure> {
     match (&args.set, &args.csv) {
-        (Some(set), _) => recorded::from_set(set, rig, &args.target, hash, console),
-        (_, Some(csv)) => recorded::from_corners(csv, rig, &args.cameras, hash),
+        (Some(set), _) => {
+            let (set, lenses) = (RecordedSet::read(set, rig, hash)?, [&rig.left_camera, &rig.right_camera]);
+            set.stage_poses(&args.target.spec()?, lenses, hash, &mut tell_views(console))
+        }
+        (_, Some(csv)) => Ok(stage_poses_in_corners(csv, rig, &args.cameras, hash)?),
         _ => Err(Failure::usage("name the views: --set DIR or --csv FILE")),
     }
 }

@@ -1,28 +1,27 @@
 //! `vergence flash --swd`: writing flash through a debug probe.
 
-use std::io::Write;
 use std::path::Path;
 use std::time::Duration;
 
 use serde_json::{Value, json};
-use vergence_board::{FirmwareImage, hardware_name};
-use vergence_image::layout::{ACTIVE, BOOTLOADER, CAPACITY, FLASH_BASE, HARDWARE, STATE};
+use vergence_board::{FlashContents, ProbeError, ProbeRs, hardware_name};
+use vergence_image::layout::HARDWARE;
 use vergence_protocol::management::Identity;
+use vergence_sim::{check_boot_loader, is_elf};
 
-use super::probe::ProbeRs;
 use super::{connect, identity_json, tell};
 use crate::cli::Globals;
 use crate::console::Console;
 use crate::failure::Failure;
-use crate::firmware::{elf_start, header_json, is_elf, read_image};
+use crate::firmware::{header_json, read_image};
 
 /// How long the board may take to start.
 const START_PATIENCE: Duration = Duration::from_secs(10);
 
 pub async fn run(file: &Path, probe: Option<&str>, globals: &Globals, console: Console) -> Result<(), Failure> {
-    let content = std::fs::read(file).map_err(|error| Failure::input(file, error))?;
+    let content = vergence_files::read(file)?;
     if is_elf(&content) {
-        check_boot_loader(file, &content)?;
+        check_boot_loader(&content).map_err(|error| Failure::input(file, error))?;
         write(probe, console, |probe_rs| probe_rs.download_elf(file))?;
         let board = ask(globals).await?;
         tell(&board, console)?;
@@ -36,13 +35,8 @@ pub async fn run(file: &Path, probe: Option<&str>, globals: &Globals, console: C
             format!("the image is for {hardware}, a debug probe reaches nucleo-g474 only"),
         ));
     }
-    let flash = in_flash(&image).ok_or_else(|| Failure::input(file, "the image is too long"))?;
-    write(probe, console, |probe_rs| {
-        let fail = |error| Failure::device(format!("no temporary file can be written: {error}"));
-        let mut raw = tempfile::NamedTempFile::new().map_err(fail)?;
-        raw.write_all(&flash).map_err(fail)?;
-        probe_rs.download_bytes(raw.path(), FLASH_BASE + STATE.start)
-    })?;
+    let flash = FlashContents::of(&image).ok_or_else(|| Failure::input(file, "the image is too long"))?;
+    write(probe, console, |probe_rs| probe_rs.download_image(&flash))?;
     let board = ask(globals).await?;
     tell(&board, console)?;
     console.result(&json!({ "image": header_json(image.header()), "after": identity_json(&board) }))?;
@@ -57,35 +51,10 @@ pub async fn run(file: &Path, probe: Option<&str>, globals: &Globals, console: C
     )))
 }
 
-/// An ELF file has no seal, so the boot loader would not start it: it can only be the boot loader itself.
-fn check_boot_loader(file: &Path, content: &[u8]) -> Result<(), Failure> {
-    let start = elf_start(content).map_err(|problem| Failure::input(file, problem))?;
-    if start == FLASH_BASE + BOOTLOADER.start {
-        return Ok(());
-    }
-    Err(Failure::input(
-        file,
-        format!(
-            "this ELF file starts at {start:#010x} and is not the boot loader, which starts signed images only: sign it with \
-             'vergence image sign' and flash the image"
-        ),
-    ))
-}
-
-/// What flash shall hold from the state page on: no swap under way, the image, and its seal behind.
-fn in_flash(image: &FirmwareImage) -> Option<Vec<u8>> {
-    let mut flash = vec![0xFF; (STATE.length + ACTIVE.length) as usize];
-    let (code, behind) = flash.get_mut(STATE.length as usize..)?.split_at_mut_checked(CAPACITY as usize)?;
-    code.get_mut(..image.bytes.len())?.copy_from_slice(&image.bytes);
-    let seal = image.seal.to_bytes();
-    behind.get_mut(..seal.len())?.copy_from_slice(&seal);
-    Some(flash)
-}
-
 fn write(
     probe: Option<&str>,
     console: Console,
-    download: impl FnOnce(&ProbeRs<'_>) -> Result<(), Failure>,
+    download: impl FnOnce(&ProbeRs<'_>) -> Result<(), ProbeError>,
 ) -> Result<(), Failure> {
     let progress = console.progress("writing flash");
     let probe_rs = ProbeRs::find(probe)?;

@@ -1,17 +1,15 @@
 //! The cameras that `vergence run` names.
 
-use std::sync::Arc;
-
 use tokio::sync::mpsc::Sender;
 use vergence_board::HostClock;
-use vergence_camera::{Camera, CameraError, CameraEvent, attach};
-use vergence_rig::Rig;
-use vergence_sim::{LiveCamera, Room, RoomCamera, Unplugged};
-use vergence_vision::Side;
+use vergence_camera::CameraEvent;
+use vergence_live::{attach_both, simulate_both};
+use vergence_rig::{Rig, Shutter};
+use vergence_sim::Unplugged;
+use vergence_vision::{KannalaBrandt, Side};
 
 use super::Args;
 use crate::failure::Failure;
-use crate::live::drive;
 use crate::sim::SharedRig;
 
 /// Reads when a simulated camera is unplugged, in time since its start: `left@2s..4s`.
@@ -46,51 +44,21 @@ pub fn start(
 ) -> Result<(), Failure> {
     match (simulated, args.cameras.as_slice()) {
         (Some(mechanics), _) => {
-            simulate(args, rig, mechanics, clock, listener);
+            simulate_both(rig, mechanics, (args.seed, &args.unplug), clock, listener);
             Ok(())
         }
-        (None, [left, right]) => attach_both(args, rig, [left, right], clock, listener),
+        (None, [left, right]) => {
+            let opener = |device: &String, lens: KannalaBrandt, shutter: Shutter| {
+                let (device, options) = (device.clone(), args.camera.for_size(lens.size()));
+                let rolling = shutter.span(lens.size().height);
+                move || options.open_rolling(&device, clock, rolling)
+            };
+            let [left_shutter, right_shutter] = rig.shutters;
+            let left = opener(left, rig.left_camera, left_shutter);
+            Ok(attach_both([left, opener(right, rig.right_camera, right_shutter)], listener)?)
+        }
         _ => Err(Failure::usage("name the left and the right camera: --cameras /dev/video0 /dev/video2")),
     }
-}
-
-fn simulate(args: &Args, rig: &Rig, mechanics: &SharedRig, clock: HostClock, listener: &Sender<(Side, CameraEvent)>) {
-    let room = Arc::new(Room::with_rig());
-    let lenses = [(Side::Left, rig.left_camera), (Side::Right, rig.right_camera)];
-    for ((side, lens), shutter) in lenses.into_iter().zip(rig.shutters) {
-        let camera = RoomCamera { side, lens, room: Arc::clone(&room), seed: args.seed };
-        let camera = LiveCamera::new(camera, shutter, &args.unplug);
-        tokio::spawn(drive(camera, mechanics.clone(), clock, listener.clone()));
-    }
-}
-
-fn attach_both(
-    args: &Args,
-    rig: &Rig,
-    devices: [&String; 2],
-    clock: HostClock,
-    listener: &Sender<(Side, CameraEvent)>,
-) -> Result<(), Failure> {
-    let lenses = [rig.left_camera, rig.right_camera];
-    let openers: Vec<_> = devices
-        .into_iter()
-        .zip(lenses)
-        .zip(rig.shutters)
-        .map(|((device, lens), shutter)| {
-            let (device, options) = (device.clone(), args.camera.for_size(lens.size()));
-            let rolling = shutter.span(lens.size().height);
-            move || options.open_rolling(&device, clock, rolling)
-        })
-        .collect();
-    let opened: Vec<Result<Box<dyn Camera>, CameraError>> = openers.iter().map(|open| open()).collect();
-    if let [Err(left), Err(right)] = opened.as_slice() {
-        return Err(Failure::device(format!("there is no camera: {left}\n{right}")));
-    }
-    for ((side, open), first) in [Side::Left, Side::Right].into_iter().zip(openers).zip(opened) {
-        let mut first = Some(first);
-        attach(side, move || first.take().unwrap_or_else(&open), listener.clone());
-    }
-    Ok(())
 }
 
 #[cfg(test)]

@@ -1,26 +1,22 @@
-//! The rig drives itself through the stage poses while a person holds the target.
+//! `vergence calibrate stage --live`: the rig drives itself through the stage poses while a person holds the target.
 
-mod cameras;
-mod session;
-
-use std::cell::Cell;
 use std::path::Path;
 
+use indicatif::ProgressBar;
+use vergence_board::{Board, HostClock, Port, fresh_session};
 use vergence_calibration::{TargetSpec, stage_plan};
-use vergence_files::make_folder;
-use vergence_protocol::Mode;
+use vergence_calibration_input::{LiveEvent, LiveSet, RigCameras, SimulatedTarget};
+use vergence_camera::CameraError;
 use vergence_rig::Rig;
 
-use self::cameras::{RigCameras, open};
-use self::session::Session;
-use super::recorded::POSES;
-use super::tell::in_words;
 use crate::cli::Globals;
 use crate::cmd::camera_options::CameraOptions;
+use crate::cmd::connect::{connect, port};
 use crate::console::Console;
 use crate::failure::Failure;
 use crate::interrupt::interrupted;
 use crate::rig_file;
+use crate::sim::{SharedRig, SimulatedRig, board_of, built};
 
 /// Options of a rig that drives itself.
 #[derive(Debug, clap::Args)]
@@ -47,81 +43,79 @@ pub struct Options {
     camera: CameraOptions,
 }
 
-/// Number of stage poses that a calibration needs.
-const FEWEST_POSES: usize = 3;
-
-/// Takes the views of the set folder `set`. Every image is written at once, and poses.csv after every stage pose: they stay,
-/// whatever ends the program. Returns the rig as it was really built where it is simulated.
+/// Takes the views of the set `folder`. Returns the rig as it was really built where it is simulated.
 ///
 /// # Errors
-/// Those of the board and the cameras; a stage that does not stand still.
+/// Those of the board and the cameras; a stage that does not stand still; an interruption.
 pub async fn fill(
-    set: &Path,
+    folder: &Path,
     options: &Options,
     cameras: &[String],
     target: TargetSpec,
     globals: &Globals,
     console: Console,
 ) -> Result<Option<Rig>, Failure> {
-    if set.join(POSES).exists() {
-        return Err(Failure::output(set, "it holds a set already: choose another folder"));
-    }
+    LiveSet::check_free(folder)?;
     let nominal = rig_file::load(globals.rig.as_deref())?;
-    let (mut rig_board, mut rig_cameras) = open(options, cameras, &nominal, &target, globals, console).await?;
-    make_folder(set)?;
+    let (mut rig_board, mut rig_cameras) = open(options, cameras, &nominal, target, globals, console).await?;
+    let set = LiveSet { folder, target, nominal: &nominal, views: options.views.into(), images: options.frames };
     let plan = stage_plan(&nominal.axes, options.poses.into());
-    let session = Session { set, options, target, nominal: &nominal, console };
-    let (mut rows, was_interrupted) = (Vec::new(), Cell::new(false));
-    let interruption = async {
-        interrupted().await;
-        was_interrupted.set(true);
-    };
-    let outcome = rig_board
-        .armed(interruption, async |rig_board| -> Result<(), Failure> {
-            rig_board.home().await?;
-            for (index, targets) in plan.iter().enumerate() {
-                rig_board.move_to(Mode(0), targets).await?;
-                let heading = format!("pose {} of {} at {}", index + 1, plan.len(), in_words(targets));
-                rows.push(session.stage_pose(index, &heading, rig_board, &mut rig_cameras).await?);
-                session.write_poses(&rows)?;
-            }
-            Ok(())
-        })
-        .await;
-    if was_interrupted.get() {
-        return Err(Failure::interrupted(how_to_go_on(set, rows.len(), plan.len())));
-    }
-    outcome?;
+    set.fill(&plan, &mut rig_board, &mut rig_cameras, interrupted(), tell(console)).await?;
     Ok(match rig_cameras {
-        RigCameras::Simulated(simulator) => Some(simulator.built),
+        RigCameras::Simulated(simulated) => Some(simulated.built),
         RigCameras::Attached(_) => None,
     })
 }
 
-/// What an interrupted set is good for.
-fn how_to_go_on(set: &Path, kept: usize, wanted: usize) -> String {
-    let folder = set.display();
-    match kept {
-        0 => "interrupted: no stage pose is complete; run the same command again".to_owned(),
-        FEWEST_POSES.. => format!(
-            "interrupted: {kept} of {wanted} stage poses are kept in {folder}; without --live and --cameras, the same \
-             command calibrates from them"
-        ),
-        _ => format!(
-            "interrupted: {kept} of {wanted} stage poses are kept in {folder}, too few for a calibration; begin again \
-             with another --set"
-        ),
+fn tell(console: Console) -> impl FnMut(LiveEvent<'_>) -> Result<(), Failure> {
+    let mut progress: Option<ProgressBar> = None;
+    move |event| {
+        match event {
+            LiveEvent::Begins(heading) => progress = Some(console.progress(heading)),
+            LiveEvent::Advice(text) => {
+                if let Some(progress) = &progress {
+                    progress.set_message(text);
+                    progress.tick();
+                }
+            }
+            LiveEvent::Complete(sentence) => {
+                _ = progress.take().map(|progress| progress.finish_and_clear());
+                console.say(sentence)?;
+            }
+        }
+        Ok(())
     }
 }
 
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn an_interrupted_set_is_told_what_it_is_good_for() {
-        let told = |kept| how_to_go_on("set".as_ref(), kept, 6);
-        assert!(told(0).contains("same command again") && told(2).contains("another --set"));
-        assert!(told(3).contains("3 of 6 stage poses are kept in set") && told(3).contains("without --live"));
+/// Connects to the board and opens the cameras.
+///
+/// # Errors
+/// Those of the board and the cameras; simulated cameras on a real rig, or the other way round.
+async fn open(
+    options: &Options,
+    cameras: &[String],
+    nominal: &Rig,
+    target: TargetSpec,
+    globals: &Globals,
+    console: Console,
+) -> Result<(Board, RigCameras), Failure> {
+    match (port(globals)?, cameras) {
+        (Port::Simulated, [only]) if only == "sim" => {
+            let (seed, built) = (options.seed, built(nominal, options.seed));
+            let rig = SharedRig::new(SimulatedRig::new(&built, seed)?);
+            let (session, progress) = (fresh_session()?, console.progress("homing"));
+            let board_of_rig = board_of(&rig, nominal.clone(), session, globals.lease, progress).await?;
+            Ok((board_of_rig, RigCameras::Simulated(Box::new(SimulatedTarget { rig, built, target, seed }))))
+        }
+        (Port::Simulated, _) => {
+            Err(Failure::usage("a simulated rig has simulated cameras: use --port sim with --cameras sim"))
+        }
+        (_, [left, right]) => {
+            let clock = HostClock::start();
+            let attached = [left, right].map(|device| options.camera.open(device, clock));
+            let attached = attached.into_iter().collect::<Result<_, CameraError>>()?;
+            Ok((connect(globals, console, "homing").await?, RigCameras::Attached(attached)))
+        }
+        _ => Err(Failure::usage("name the left and the right camera: --cameras /dev/video0 /dev/video2")),
     }
 }

@@ -1,0 +1,73 @@
+//! What can be known of this machine without asking the board.
+
+use std::fs;
+use std::os::unix::fs::MetadataExt;
+use std::path::{Path, PathBuf};
+
+use rustix::fs::{Access, access};
+
+use super::Finding;
+use crate::link::Port;
+
+/// Checks that the port exists and that this user may use it.
+#[must_use]
+pub fn check_port(port: &Port) -> Finding {
+    match port {
+        Port::Serial(path) if !path.exists() => Finding::fail(
+            "port",
+            format!("there is no {port}"),
+            "connect and power the board, and see 'vergence devices' for the ports there are",
+        ),
+        Port::Serial(path) => match forbidden(path) {
+            Some(remedy) => Finding::fail("port", format!("you may not read and write {port}"), remedy),
+            None => Finding::pass("port", format!("{port} may be read and written")),
+        },
+        Port::Tcp(_) | Port::Simulated => Finding::pass("port", port.to_string()),
+    }
+}
+
+/// Checks the cameras that the kernel lists.
+#[must_use]
+pub fn check_cameras() -> Vec<Finding> {
+    let cameras = video_devices();
+    if cameras.is_empty() {
+        let remedy = "connect the cameras; simulated ones need none";
+        return vec![Finding::warn("cameras", "there is no /dev/video device", remedy)];
+    }
+    let check = |path: &PathBuf| match forbidden(path) {
+        Some(remedy) => Finding::fail("cameras", format!("you may not use {}", path.display()), remedy),
+        None => Finding::pass("cameras", format!("{} may be used", path.display())),
+    };
+    cameras.iter().map(check).collect()
+}
+
+fn video_devices() -> Vec<PathBuf> {
+    let Ok(entries) = fs::read_dir("/dev") else { return Vec::new() };
+    let is_camera = |path: &PathBuf| {
+        let name = path.file_name().unwrap_or_default().to_string_lossy();
+        name.strip_prefix("video").is_some_and(|number| number.parse::<u32>().is_ok())
+    };
+    let mut cameras: Vec<_> = entries.flatten().map(|entry| entry.path()).filter(is_camera).collect();
+    cameras.sort();
+    cameras
+}
+
+/// Remedy where this user may not read and write `device`; `None` where that is allowed.
+fn forbidden(device: &Path) -> Option<String> {
+    access(device, Access::READ_OK | Access::WRITE_OK).err()?;
+    let group = fs::metadata(device).ok().and_then(|metadata| group_name(metadata.gid()));
+    Some(match group.as_deref() {
+        Some("root") | None => format!("ask for a udev rule that lets you use {}", device.display()),
+        Some(group) => format!("sudo usermod -aG {group} $USER, then log out and in again"),
+    })
+}
+
+/// The name of a group: `dialout` owns serial ports on Debian, `uucp` on Arch.
+fn group_name(id: u32) -> Option<String> {
+    let groups = fs::read_to_string("/etc/group").ok()?;
+    let mut fields = groups.lines().map(|line| line.split(':'));
+    fields.find_map(|mut line| {
+        let name = line.next()?;
+        (line.nth(1)?.parse() == Ok(id)).then(|| name.to_owned())
+    })
+}

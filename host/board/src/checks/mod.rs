@@ -1,0 +1,73 @@
+//! Checks of a board and of the machine that it is connected to: what is well, what is not, and what to do.
+
+mod board;
+mod machine;
+
+use serde_json::{Value, json};
+
+pub use self::board::{BoardChecks, check_board};
+pub use self::machine::{check_cameras, check_port};
+
+/// Result of a check.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Verdict {
+    /// All is well.
+    Pass,
+    /// It works, but not as well as it could.
+    Warn,
+    /// It does not work.
+    Fail,
+}
+
+impl Verdict {
+    /// All of them, the best first.
+    pub const ALL: [Self; 3] = [Self::Pass, Self::Warn, Self::Fail];
+
+    /// Its name, for people and programs.
+    #[must_use]
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Pass => "pass",
+            Self::Warn => "warn",
+            Self::Fail => "fail",
+        }
+    }
+}
+
+/// A check and its result.
+#[derive(Clone, Debug)]
+pub struct Finding {
+    /// What was checked, in one word.
+    pub check: &'static str,
+    /// The result.
+    pub verdict: Verdict,
+    /// What was found, as a sentence.
+    pub reason: String,
+    /// What to do; `None` where all is well.
+    pub remedy: Option<String>,
+}
+
+impl Finding {
+    /// A check that passes.
+    pub fn pass(check: &'static str, reason: impl Into<String>) -> Self {
+        Self { check, verdict: Verdict::Pass, reason: reason.into(), remedy: None }
+    }
+
+    /// A check that passes with a warning.
+    pub fn warn(check: &'static str, reason: impl Into<String>, remedy: impl Into<String>) -> Self {
+        Self { check, verdict: Verdict::Warn, reason: reason.into(), remedy: Some(remedy.into()) }
+    }
+
+    /// A check that fails.
+    pub fn fail(check: &'static str, reason: impl Into<String>, remedy: impl Into<String>) -> Self {
+        Self { check, verdict: Verdict::Fail, reason: reason.into(), remedy: Some(remedy.into()) }
+    }
+
+    /// The finding for programs.
+    #[must_use]
+    pub fn json(&self) -> Value {
+        json!({
+            "check": self.check, "verdict": self.verdict.name(), "reason": self.reason, "remedy": self.remedy,
+        })
+    }
+}

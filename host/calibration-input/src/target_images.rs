@@ -1,0 +1,130 @@
+//! Targets in image files.
+
+use std::fmt;
+use std::path::{Path, PathBuf};
+
+use image::imageops::grayscale;
+use rayon::prelude::*;
+use vergence_calibration::detect::{DetectError, detect};
+use vergence_calibration::{TargetSpec, TargetView};
+use vergence_calibration_report::ReportImage;
+use vergence_camera::{CameraError, read_image};
+use vergence_vision::{ImageSize, KannalaBrandt};
+
+use crate::InputError;
+use crate::image_files::name_of;
+
+/// Targets found in a set of images.
+pub struct TargetImages {
+    /// Size of all images.
+    pub size: ImageSize,
+    /// One entry for each image, in their order: the view, or why there is none.
+    pub views: Vec<Result<TargetView, Missed>>,
+    /// Every image that can be read, reduced for a report.
+    pub images: Vec<ReportImage>,
+}
+
+/// An image that gives no view.
+#[derive(Clone, Debug)]
+pub struct Missed {
+    /// File name of the image.
+    pub name: String,
+    /// Why it gives none.
+    pub reason: MissedReason,
+}
+
+/// Why an image gives no view.
+#[derive(Clone, Debug)]
+pub enum MissedReason {
+    /// No target was found in the image.
+    NoTarget(DetectError),
+    /// The file is damaged.
+    Damaged(String),
+}
+
+impl fmt::Display for Missed {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match &self.reason {
+            MissedReason::NoTarget(error) => write!(f, "{}: {error}", self.name),
+            MissedReason::Damaged(why) => write!(f, "{}: left out: {why}", self.name),
+        }
+    }
+}
+
+impl TargetImages {
+    /// The views in which a target was found.
+    #[must_use]
+    pub fn found(&self) -> Vec<TargetView> {
+        self.views.iter().flatten().cloned().collect()
+    }
+
+    /// These views; for images without one, the view of `other`, which is of the same images.
+    #[must_use]
+    pub fn or(self, other: Self) -> Self {
+        let views = self.views.into_iter().zip(other.views).map(|(own, other)| own.or(other)).collect();
+        Self { views, ..self }
+    }
+
+    /// The images without a view.
+    pub fn missed(&self) -> impl Iterator<Item = &Missed> {
+        self.views.iter().filter_map(|view| view.as_ref().err())
+    }
+}
+
+/// Looks for the target in every image. With a `hint`, a camera that is roughly right, more corners are found, and
+/// better. A damaged image gives no view.
+///
+/// # Errors
+/// A file that cannot be opened, images of different sizes, or only damaged ones.
+pub fn detect_in(
+    files: &[PathBuf],
+    target: &TargetSpec,
+    hint: Option<&KannalaBrandt>,
+) -> Result<TargetImages, InputError> {
+    let looked: Vec<_> = files.par_iter().map(|path| look(path, target, hint)).collect::<Result<_, InputError>>()?;
+    let Some((width, height)) = looked.iter().find_map(|looked| looked.size) else {
+        let first = looked.iter().find_map(|looked| looked.view.as_ref().err()).map(ToString::to_string);
+        return Err(InputError::Damaged { images: files.len(), first });
+    };
+    for (path, Looked { size, .. }) in files.iter().zip(&looked) {
+        if let Some(other) = size.filter(|size| *size != (width, height)) {
+            return Err(InputError::wrong(
+                path,
+                format!(
+                    "it is {} x {} and the images before are {width} x {height}: calibrate one size at a time",
+                    other.0, other.1
+                ),
+            ));
+        }
+    }
+    let (views, images): (Vec<_>, Vec<_>) = looked.into_iter().map(|looked| (looked.view, looked.reduced)).unzip();
+    Ok(TargetImages { size: ImageSize { width, height }, views, images: images.into_iter().flatten().collect() })
+}
+
+/// What one file gives.
+struct Looked {
+    /// Width and height; `None` if the file is damaged.
+    size: Option<(u32, u32)>,
+    view: Result<TargetView, Missed>,
+    /// The image, reduced for a report; `None` if the file is damaged.
+    reduced: Option<ReportImage>,
+}
+
+fn look(path: &Path, target: &TargetSpec, hint: Option<&KannalaBrandt>) -> Result<Looked, InputError> {
+    let name = name_of(path);
+    let image = match read_image(path) {
+        Ok(image) => image,
+        Err(CameraError::NotAnImage { why, .. }) => {
+            let view = Err(Missed { name, reason: MissedReason::Damaged(why) });
+            return Ok(Looked { size: None, view, reduced: None });
+        }
+        Err(error) => return Err(error.into()),
+    };
+    let grey = grayscale(&image);
+    let reduced = Some(ReportImage::new(&name, &grey));
+    let view = match detect(&grey, target, hint) {
+        Ok(detection) => Ok(detection.view(&name, target)),
+        Err(error) => Err(Missed { name, reason: MissedReason::NoTarget(error) }),
+    };
+    Ok(Looked { size: Some(image.dimensions()), view, reduced })
+}

@@ -1,0 +1,74 @@
+//! The cameras of the live loop, attached or simulated.
+
+use std::sync::Arc;
+
+use tokio::sync::mpsc::Sender;
+use tokio::time::{Instant, sleep};
+use vergence_board::{HostClock, Shared};
+use vergence_camera::{Camera, CameraError, CameraEvent, attach};
+use vergence_rig::Rig;
+use vergence_sim::{LiveCamera, Room, RoomCamera, SimulatedRig, Unplugged};
+use vergence_vision::Side;
+
+use crate::LiveError;
+
+/// Watches two attached cameras, left and right; `openers` open them, now and after each time that one was gone. Their events go
+/// to `listener`.
+///
+/// # Errors
+/// [`LiveError::NoCamera`] where neither is there now.
+pub fn attach_both<O>(openers: [O; 2], listener: &Sender<(Side, CameraEvent)>) -> Result<(), LiveError>
+where
+    O: Fn() -> Result<Box<dyn Camera>, CameraError> + Send + 'static,
+{
+    let opened = match openers.each_ref().map(|open| open()) {
+        [Err(left), Err(right)] => return Err(LiveError::NoCamera([left, right])),
+        opened => opened,
+    };
+    for ((side, open), first) in [Side::Left, Side::Right].into_iter().zip(openers).zip(opened) {
+        let mut first = Some(first);
+        attach(side, move || first.take().unwrap_or_else(&open), listener.clone());
+    }
+    Ok(())
+}
+
+/// Starts two simulated cameras on `mechanics` in the furnished room, and unplugs them as `unplugged` says; `seed` is that of
+/// the noise of their images. Their events go to `listener`.
+pub fn simulate_both(
+    rig: &Rig,
+    mechanics: &Shared<SimulatedRig>,
+    (seed, unplugged): (u64, &[Unplugged]),
+    clock: HostClock,
+    listener: &Sender<(Side, CameraEvent)>,
+) {
+    let room = Arc::new(Room::with_rig());
+    let lenses = [(Side::Left, rig.left_camera), (Side::Right, rig.right_camera)];
+    for ((side, lens), shutter) in lenses.into_iter().zip(rig.shutters) {
+        let camera = RoomCamera { side, lens, room: Arc::clone(&room), seed };
+        let camera = LiveCamera::new(camera, shutter, unplugged);
+        tokio::spawn(drive(camera, mechanics.clone(), clock, listener.clone()));
+    }
+}
+
+/// Passes the events of `camera` to the listener until it is closed. `rig` carries the camera; `clock` stamps its images.
+pub async fn drive(
+    mut camera: LiveCamera,
+    rig: Shared<SimulatedRig>,
+    clock: HostClock,
+    listener: Sender<(Side, CameraEvent)>,
+) {
+    let born = Instant::now();
+    while !listener.is_closed() {
+        let events = {
+            let mut rig = rig.lock();
+            rig.run_to_now();
+            camera.poll(&rig, born.elapsed(), clock.now())
+        };
+        for event in events {
+            if listener.send((camera.side(), event)).await.is_err() {
+                return;
+            }
+        }
+        sleep(LiveCamera::POLL_PERIOD).await;
+    }
+}

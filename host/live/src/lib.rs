@@ -1,0 +1,24 @@
+//! The live loop: cameras that deliver when they like, a board that tells where the axes were, and a cloud of the newest pair
+//! whenever the matcher is free.
+//!
+//! The cameras send [`vergence_camera::CameraEvent`]s; [`vergence_pipeline::Exposures`] finds which of their images belong
+//! together and when they were exposed; [`measure()`] turns that into a [`Measurement`]; [`LiveLoop`] keeps them going.
+//! Nothing queues: what the matcher has no time for is counted and dropped, and no cloud holds anything of another.
+
+mod blindness;
+mod cameras;
+mod error;
+mod live_loop;
+mod measure;
+mod tour;
+
+use std::time::Duration;
+
+pub use cameras::{attach_both, drive, simulate_both};
+pub use error::LiveError;
+pub use live_loop::{Ended, Limits, LiveLoop, LiveResult, MatchingTime, Totals};
+pub use measure::{Measurement, PosedExposure, measure};
+pub use tour::Tour;
+
+/// Returns the time since some fixed instant, always the real one: by it the loop tells how long matching takes.
+pub type Clock = fn() -> Duration;

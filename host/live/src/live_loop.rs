@@ -1,0 +1,308 @@
+//! The loop itself: listens to cameras and board, keeps the newest exposure, and measures it when the matcher is free.
+
+use std::collections::BTreeMap;
+use std::pin::Pin;
+use std::sync::Arc;
+use std::time::Duration;
+
+use tokio::sync::mpsc::Receiver;
+use tokio::time::{Instant, interval, sleep, sleep_until};
+use vergence_board::{BoardKnowledge, HostClock};
+use vergence_camera::{CameraEvent, PendingImage};
+use vergence_matching::Matcher;
+use vergence_pipeline::{
+    Ambiguity, Exposed, Exposures, Motion, Observation, PairPose, SkipReason, TimeBase, pair_exposure,
+};
+use vergence_protocol::TriggerMark;
+use vergence_rig::{Rig, StampedImage, TrackGap};
+use vergence_vision::Side;
+
+use crate::blindness::Blindness;
+use crate::measure::{Measurement, PosedExposure, measure};
+use crate::{Clock, LiveError};
+
+/// How often overdue images and pulses are given up.
+const SETTLE: Duration = Duration::from_millis(20);
+/// Longest wait for the encoder readings of an exposure.
+const READINGS: Duration = Duration::from_millis(300);
+/// Encoder readings this long before and after an exposure are kept with it, in microseconds.
+const MARGIN_US: f64 = 250_000.0;
+
+/// When the loop ends without being interrupted.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Limits {
+    /// After this many results.
+    pub results: Option<u64>,
+    /// After this time.
+    pub time: Option<Duration>,
+}
+
+/// Why the loop ended.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Ended {
+    /// A limit was reached.
+    Done,
+    /// Both cameras are dead.
+    Blind,
+}
+
+/// Counts of results and of what was skipped.
+#[derive(Clone, Debug, Default)]
+pub struct Totals {
+    /// Number of clouds.
+    pub clouds: u64,
+    /// Number of sets of bearings.
+    pub bearings: u64,
+    /// Number of exposures that were skipped, by reason.
+    pub skipped: BTreeMap<SkipReason, u64>,
+}
+
+/// A result of the loop.
+pub struct LiveResult<'a> {
+    /// Points or bearings.
+    pub measurement: &'a Measurement,
+    /// Time from the middle of the exposure until now.
+    pub latency: Duration,
+    /// Counts so far, this result included.
+    pub totals: &'a Totals,
+}
+
+/// How long matching takes on the clock of the loop, which may be simulated.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum MatchingTime {
+    /// The clock is real: it runs while the matcher works.
+    Real,
+    /// The clock is simulated and stands still meanwhile: it is advanced by the time that matching really took.
+    Measured,
+    /// The clock is simulated: it is advanced by this time, so that results do not depend on the computer.
+    Fixed(Duration),
+}
+
+/// The parts of the live loop. It owns no device.
+pub struct LiveLoop {
+    /// The rig that measures.
+    pub rig: Arc<Rig>,
+    /// Finds homologous points.
+    pub matcher: Arc<dyn Matcher>,
+    /// Events of both cameras.
+    pub events: Receiver<(Side, CameraEvent)>,
+    /// Pulses of the camera trigger; `None` where the cameras run freely.
+    pub marks: Option<Receiver<TriggerMark>>,
+    /// Clock map and encoder track of the board; `None` for a rig without axes.
+    pub board: Option<BoardKnowledge>,
+    /// The host's clock, on which images are stamped.
+    pub clock: HostClock,
+    /// Pairs images and pulses.
+    pub exposures: Exposures<PendingImage>,
+    /// How long matching takes on the clock of the loop.
+    pub matching_time: MatchingTime,
+    /// Tells how long matching really takes.
+    pub stopwatch: Clock,
+}
+
+impl MatchingTime {
+    /// Advances a simulated clock by the time of `measurement`. Decoding takes none of it: simulated images are rendered,
+    /// which a real camera does not do.
+    async fn pass(self, measurement: &Measurement) {
+        match self {
+            Self::Real => {}
+            Self::Measured => sleep(Duration::from_secs_f64(measurement.seconds)).await,
+            Self::Fixed(time) => sleep(time).await,
+        }
+    }
+}
+
+/// A measurement under way, which ends with the host's time of the exposure in microseconds.
+type Work = Pin<Box<dyn Future<Output = (f64, Result<Measurement, NoResult>)>>>;
+
+/// Why an exposure gave no result.
+enum NoResult {
+    Joints(TrackGap),
+    Failed(LiveError),
+}
+
+impl LiveLoop {
+    /// Runs until `limits` are reached or both cameras are dead; calls `publish` with each result and `warn` with sentences for
+    /// people.
+    ///
+    /// # Errors
+    /// Those of `publish`; [`LiveError`]: a pair that cannot be measured whatever the images show, a link that ended.
+    pub async fn run<E: From<LiveError>>(
+        &mut self,
+        limits: Limits,
+        totals: &mut Totals,
+        mut publish: impl FnMut(LiveResult<'_>) -> Result<(), E>,
+        mut warn: impl FnMut(String),
+    ) -> Result<Ended, E> {
+        let deadline = limits.time.map(|time| Instant::now() + time);
+        let mut settle = interval(SETTLE);
+        let (mut work, mut newest): (Option<Work>, Option<Exposed<PendingImage>>) = (None, None);
+        let mut blindness = Blindness::default();
+        loop {
+            if work.is_none() {
+                work = newest.take().map(|exposed| self.start(exposed));
+            }
+            tokio::select! {
+                Some((side, event)) = self.events.recv() => {
+                    self.take_event(side, event);
+                }
+                mark = next(&mut self.marks) => match mark {
+                    Some(mark) => {
+                        let base = self.base();
+                        self.exposures.pulse(&mark, &base);
+                    }
+                    None => return Err(LiveError::LinkEnded.into()),
+                },
+                (exposed_at, done) = finished(&mut work) => {
+                    work = None;
+                    self.conclude(exposed_at, done, totals, &mut publish)?;
+                    if limits.results.is_some_and(|most| totals.clouds + totals.bearings >= most) {
+                        return Ok(Ended::Done);
+                    }
+                }
+                _ = settle.tick() => {
+                    let base = self.base();
+                    self.exposures.settle(self.clock.now(), &base);
+                    totals.skipped.clone_from(self.exposures.skipped());
+                    if deadline.is_some_and(|deadline| Instant::now() >= deadline) {
+                        return Ok(Ended::Done);
+                    }
+                }
+            }
+            while let Some(exposed) = self.exposures.take() {
+                if newest.replace(exposed).is_some() {
+                    self.exposures.skip(SkipReason::NewerCame);
+                }
+            }
+            self.exposures.take_ambiguity().map(in_words).into_iter().for_each(&mut warn);
+            if blindness.note(self.exposures.gone(), &mut warn) && work.is_none() {
+                return Ok(Ended::Blind);
+            }
+        }
+    }
+
+    /// Counts the outcome of an exposure and publishes its result.
+    fn conclude<E: From<LiveError>>(
+        &mut self,
+        exposed_at: f64,
+        done: Result<Measurement, NoResult>,
+        totals: &mut Totals,
+        publish: &mut impl FnMut(LiveResult<'_>) -> Result<(), E>,
+    ) -> Result<(), E> {
+        let measurement = match done {
+            Ok(measurement) => measurement,
+            Err(NoResult::Joints(gap)) => {
+                self.exposures.skip(match gap {
+                    TrackGap::NotYet => SkipReason::EncodersSilent,
+                    _ => SkipReason::EncodersUnknown,
+                });
+                return Ok(());
+            }
+            Err(NoResult::Failed(error)) => return Err(error.into()),
+        };
+        match measurement.observation {
+            Observation::Points { .. } => totals.clouds += 1,
+            Observation::Bearings { .. } => totals.bearings += 1,
+        }
+        totals.skipped.clone_from(self.exposures.skipped());
+        let latency = (self.clock.now().0 as f64 - exposed_at).max(0.0);
+        publish(LiveResult { measurement: &measurement, latency: Duration::from_micros(latency as u64), totals })
+    }
+
+    /// Takes an event of a camera.
+    fn take_event(&mut self, side: Side, event: CameraEvent) {
+        let base = self.base();
+        match event {
+            CameraEvent::Attached(timing) => self.exposures.camera_ready(side, timing, &base),
+            CameraEvent::Lost(why) => self.exposures.camera_failed(side, why, &base),
+            CameraEvent::Image(image) => {
+                let stamp = StampedImage { seq: image.seq, middle: image.middle };
+                self.exposures.image(side, stamp, image, &base);
+            }
+        }
+    }
+
+    fn base(&self) -> TimeBase {
+        self.board.as_ref().map_or(TimeBase::Host, |board| TimeBase::Board(board.clock_map()))
+    }
+
+    /// Begins to measure on a thread of its own: the link must not wait.
+    fn start(&self, exposed: Exposed<PendingImage>) -> Work {
+        let (rig, matcher, board) = (Arc::clone(&self.rig), Arc::clone(&self.matcher), self.board.clone());
+        let (matching_time, stopwatch, exposed_at) = (self.matching_time, self.stopwatch, host_middle(&exposed));
+        Box::pin(async move {
+            let posed = match posed(exposed, &rig, board.as_ref()).await {
+                Ok(posed) => posed,
+                Err(gap) => return (exposed_at, Err(NoResult::Joints(gap))),
+            };
+            let worked = tokio::task::spawn_blocking(move || measure(posed, &rig, matcher.as_ref(), stopwatch)).await;
+            let outcome = worked.unwrap_or_else(|error| Err(LiveError::Measuring(error.to_string())));
+            if let Ok(measurement) = &outcome {
+                matching_time.pass(measurement).await;
+            }
+            (exposed_at, outcome.map_err(NoResult::Failed))
+        })
+    }
+}
+
+/// A sentence for images that time cannot tell apart.
+fn in_words(Ambiguity { side, excess_us }: Ambiguity) -> String {
+    format!(
+        "images of the {side} camera may belong to either of two pulses: the instant of their exposure is known {:.0} ms too \
+         badly for this rate; fire more slowly, or give --exposure and --readout",
+        (excess_us / 1000.0).ceil()
+    )
+}
+
+/// The next pulse; never where the cameras run freely.
+async fn next(marks: &mut Option<Receiver<TriggerMark>>) -> Option<TriggerMark> {
+    match marks {
+        Some(marks) => marks.recv().await,
+        None => std::future::pending().await,
+    }
+}
+
+async fn finished(work: &mut Option<Work>) -> (f64, Result<Measurement, NoResult>) {
+    match work {
+        Some(work) => work.await,
+        None => std::future::pending().await,
+    }
+}
+
+/// The middle of the exposure on the host's clock, in microseconds.
+fn host_middle(exposed: &Exposed<PendingImage>) -> f64 {
+    match exposed {
+        Exposed::Pair(images) => images[0].image.middle.us,
+        Exposed::One { image, .. } => image.image.middle.us,
+    }
+}
+
+/// The exposure with its pose, as soon as the encoder readings that cover it have come.
+async fn posed(
+    exposed: Exposed<PendingImage>,
+    rig: &Rig,
+    board: Option<&BoardKnowledge>,
+) -> Result<PosedExposure, TrackGap> {
+    let images = match exposed {
+        Exposed::Pair(images) => images,
+        Exposed::One { side, image, why } => return Ok(PosedExposure::One { side, image, why }),
+    };
+    let middles = images.each_ref().map(|image| image.middle);
+    let exposure = pair_exposure(rig, middles);
+    let Some(board) = board else {
+        let pose = PairPose::in_motion(rig, Motion::Fixed, exposure)?;
+        return Ok(PosedExposure::Pair(images, Box::new(pose)));
+    };
+    let (first, last) = (middles[0].us.min(middles[1].us), middles[0].us.max(middles[1].us));
+    let patience = Instant::now() + READINGS;
+    loop {
+        let track = board.track_between(first - MARGIN_US, last + MARGIN_US);
+        match PairPose::in_motion(rig, Motion::Read(track), exposure) {
+            Ok(pose) => return Ok(PosedExposure::Pair(images, Box::new(pose))),
+            Err(TrackGap::NotYet) if Instant::now() < patience => {
+                sleep_until(Instant::now() + Duration::from_millis(2)).await;
+            }
+            Err(gap) => return Err(gap),
+        }
+    }
+}
