@@ -100,7 +100,6 @@ const ALLOWED: &[(&str, &[&str])] = &[
         "vergence",
         &[
             "vergence-protocol",
-            "vergence-control",
             "vergence-image",
             "vergence-vision",
             "vergence-rig",
@@ -108,7 +107,6 @@ const ALLOWED: &[(&str, &[&str])] = &[
             "vergence-calibration-report",
             "vergence-matching",
             "vergence-networks",
-            "vergence-page",
             "vergence-files",
             "vergence-output",
             "vergence-scene",
