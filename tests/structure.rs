@@ -139,7 +139,6 @@ const ALLOWED: &[(&str, &[&str])] = &[
         "vergence",
         &[
             "vergence-protocol",
-            "vergence-control",
             "vergence-image",
             "vergence-vision",
             "vergence-rig",
@@ -147,7 +146,6 @@ const ALLOWED: &[(&str, &[&str])] = &[
             "vergence-calibration-report",
             "vergence-matching",
             "vergence-networks",
-            "vergence-page",
             "vergence-files",
             "vergence-output",
             "vergence-calibration-input",
