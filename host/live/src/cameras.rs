@@ -22,7 +22,7 @@ where
     O: Fn() -> Result<Box<dyn Camera>, CameraError> + Send + 'static,
 {
     let opened = match openers.each_ref().map(|open| open()) {
-        [Err(left), Err(right)] => return Err(LiveError::NoCamera([left, right])),
+        [Err(left), Err(right)] => return Err(LiveError::NoCamera(Box::new([left, right]))),
         opened => opened,
     };
     for ((side, open), first) in [Side::Left, Side::Right].into_iter().zip(openers).zip(opened) {

@@ -8,7 +8,7 @@ use vergence_camera::CameraError;
 pub enum LiveError {
     /// Neither camera is there when the loop begins.
     #[error("there is no camera: {}\n{}", .0[0], .0[1])]
-    NoCamera([CameraError; 2]),
+    NoCamera(Box<[CameraError; 2]>),
     /// An image cannot be decoded.
     #[error(transparent)]
     Image(#[from] CameraError),
