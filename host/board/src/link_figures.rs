@@ -119,17 +119,17 @@ impl LinkFigures {
                 if is_wire { "" } else { "; this port is no wire, its bytes take no time" }
             ),
             format!("poses       {} received, {} lost", host.poses, host.poses_lost),
-            format!("host heard  {} frames, dropped {}", host.link.frames, host.link.dropped()),
+            format!("host received  {} frames, dropped {}", host.link.frames, host.link.dropped()),
             match &self.board {
                 Some(board) => format!(
-                    "board heard {} frames, dropped {}, {} twice, {} after a gap; replaced {} poses unsent (since its start)",
+                    "board received {} frames, dropped {}, {} twice, {} after a gap; replaced {} poses unsent (since its start)",
                     board.link.frames,
                     board.link.dropped(),
                     board.duplicates,
                     board.gaps,
                     board.poses_replaced
                 ),
-                None => "board heard unknown: this firmware keeps no counts".into(),
+                None => "board received unknown: this firmware keeps no counts".into(),
             },
         ]
     }

@@ -108,7 +108,7 @@ async fn leave_to_driver(port: &Port) {
     let _ = timeout(HANDOVER, waited).await;
 }
 
-/// Tries to connect until the board is back, with twice the wait after each attempt. `tell` is called with an error that
+/// Tries to connect until the board is back, with twice the wait after each attempt. `report` is called with an error that
 /// `may_pass` when it differs from the one before, of which `lost` is the first.
 ///
 /// # Errors
@@ -117,17 +117,17 @@ pub async fn reach_again<E: PartialEq>(
     lost: E,
     mut connect: impl AsyncFnMut() -> Result<Board, E>,
     may_pass: impl Fn(&E) -> bool,
-    mut tell: impl FnMut(&E),
+    mut report: impl FnMut(&E),
 ) -> Result<Board, E> {
-    let (mut wait, mut told) = (FIRST_WAIT, lost);
+    let (mut wait, mut known) = (FIRST_WAIT, lost);
     loop {
         sleep(wait).await;
         wait = LONGEST_WAIT.min(2 * wait);
         match connect().await {
             Err(error) if may_pass(&error) => {
-                if error != told {
-                    tell(&error);
-                    told = error;
+                if error != known {
+                    report(&error);
+                    known = error;
                 }
             }
             outcome => return outcome,

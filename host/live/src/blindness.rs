@@ -16,7 +16,7 @@ pub struct Blindness {
 
 impl Default for Blindness {
     fn default() -> Self {
-        Self { gone: [const { Some(CameraGone::Unheard) }; 2], since: None }
+        Self { gone: [const { Some(CameraGone::Unknown) }; 2], since: None }
     }
 }
 
@@ -25,7 +25,7 @@ impl Blindness {
     pub fn note(&mut self, gone: [Option<&CameraGone>; 2], mut warn: impl FnMut(String)) -> bool {
         for ((name, before), now) in ["left", "right"].iter().zip(&self.gone).zip(gone) {
             match (before.as_ref(), now) {
-                (_, Some(CameraGone::Unheard)) | (Some(CameraGone::Unheard), None) => {}
+                (_, Some(CameraGone::Unknown)) | (Some(CameraGone::Unknown), None) => {}
                 (before, Some(why)) if before != now => warn(format!("the {name} camera is dead: {why}")),
                 (Some(_), None) => warn(format!("the {name} camera is there")),
                 _ => {}

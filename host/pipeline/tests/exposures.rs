@@ -35,7 +35,7 @@ fn exposures_go_on_when_a_camera_dies_and_comes_back() {
     let base = board(0);
     let timing = ExposureTiming { period: ms(33), exposure: Some(ms(4)), rolling: ms(0), readout: ms(8) };
     let mut exposures = Exposures::new(Some(1e5));
-    assert_eq!(exposures.gone(), [Some(&CameraGone::Unheard); 2]);
+    assert_eq!(exposures.gone(), [Some(&CameraGone::Unknown); 2]);
     exposures.camera_ready(Side::Left, timing, &base);
     exposures.camera_ready(Side::Right, timing, &base);
     assert_eq!(exposures.gone(), [None, None]);

@@ -7,7 +7,7 @@ use clap::{ArgMatches, CommandFactory, FromArgMatches, Parser, Subcommand};
 use serde_json::json;
 
 use crate::cmd;
-pub use crate::cmd::options::Globals;
+pub use crate::cmd::options::CommonOptions;
 use crate::cmd::options::{BoardOptions, Choice, PortOptions, RigFileOptions, With};
 use crate::console::Console;
 use crate::failure::{Failure, FailureKind};

@@ -79,14 +79,14 @@ impl<'a> Way<'a> {
         networks: &NetworkClock,
     ) -> Result<Outcome, BenchError> {
         let truth = pair.left_from_right;
-        let told: Transform<Left, Right> =
+        let stated: Transform<Left, Right> =
             Transform::new(UnitQuaternion::from_scaled_axis(-error) * truth.rotation(), truth.origin().mm());
         let images = ImagePair {
             left: &pair.left,
             right: &pair.right,
             left_camera: &pair.lens,
             right_camera: &pair.lens,
-            left_from_right: told,
+            left_from_right: stated,
             pose_sigma: POSE_SIGMA,
             nearest: NEAREST,
         };
@@ -105,7 +105,7 @@ impl<'a> Way<'a> {
         };
         let matches = found.pairs;
         let dropped = found.dropped.into_iter().map(|(reason, count)| (reason.as_str(), count)).collect();
-        let stereo = StereoPair { left: &pair.lens, right: &pair.lens, left_from_right: told };
+        let stereo = StereoPair { left: &pair.lens, right: &pair.lens, left_from_right: stated };
         let pixels: Vec<_> = matches.iter().map(Match::measured).collect();
         let (turn, shift) = (STATED.0.rad().powi(2), STATED.1.mm().powi(2));
         let stated = Matrix6::from_diagonal(&Vector6::new(turn, turn, turn, shift, shift, shift));

@@ -133,6 +133,6 @@ fn explain(said: &[u8]) -> String {
         "probe-rs failed"
     };
     let last = said.lines().map(str::trim).filter(|line| !line.is_empty()).collect::<Vec<_>>();
-    let told = last.get(last.len().saturating_sub(3)..).unwrap_or_default().join("; ");
-    format!("{remedy} (probe-rs said: {told})")
+    let last_words = last.get(last.len().saturating_sub(3)..).unwrap_or_default().join("; ");
+    format!("{remedy} (probe-rs said: {last_words})")
 }

@@ -61,7 +61,7 @@ pub struct Updated {
     pub seconds: f64,
 }
 
-/// Sends an image, starts it on trial, and with `confirm` makes the board keep it. `tell` is called with each event.
+/// Sends an image, starts it on trial, and with `confirm` makes the board keep it. `report` is called with each event.
 ///
 /// # Errors
 /// [`UpdateError`]: the board refuses, the link does not come back, or the image does not start.
@@ -69,15 +69,15 @@ pub async fn update(
     image: &FirmwareImage,
     confirm: bool,
     link: &mut ManagementLink,
-    mut tell: impl FnMut(UpdateEvent),
+    mut report: impl FnMut(UpdateEvent),
 ) -> Result<Updated, UpdateError> {
     let before = link.identify().await?;
     check_fits(image.header(), &before)?;
-    tell(UpdateEvent::Begins(before));
+    report(UpdateEvent::Begins(before));
     let start = Instant::now();
-    let (sent_from, link_losses) = send(image, link, &mut tell).await?;
+    let (sent_from, link_losses) = send(image, link, &mut report).await?;
     let seconds = start.elapsed().as_secs_f64();
-    tell(UpdateEvent::Sent { bytes: image.header().length - sent_from, seconds });
+    report(UpdateEvent::Sent { bytes: image.header().length - sent_from, seconds });
     let mut after = restart_into(link, &before, |now| is_on_trial(image.header(), now)).await?;
     if confirm {
         after = self::confirm(link).await?;
@@ -119,7 +119,7 @@ fn is_on_trial(header: &ImageHeader, board: &Identity) -> bool {
 async fn send(
     image: &FirmwareImage,
     link: &mut ManagementLink,
-    tell: &mut impl FnMut(UpdateEvent),
+    report: &mut impl FnMut(UpdateEvent),
 ) -> Result<(u32, u32), UpdateError> {
     let mut upload = Upload::new(&image.bytes, *image.header(), image.seal.signature).ok_or(UpdateError::Length)?;
     let (mut from, mut link_losses) = (None, 0);
@@ -130,14 +130,14 @@ async fn send(
             if matches!(upload.state(), UploadState::Sending | UploadState::Checking) {
                 from.get_or_insert(sent);
             }
-            tell(UpdateEvent::Progress { sent, length: image.header().length });
+            report(UpdateEvent::Progress { sent, length: image.header().length });
         };
         let Err(lost) = link.upload(&mut upload, show).await else { break };
         link_losses += 1;
         if link_losses > MOST_LOSSES {
             return Err(later(&lost));
         }
-        tell(UpdateEvent::LinkLost(lost));
+        report(UpdateEvent::LinkLost(lost));
         link.reopen(LINK_PATIENCE).await.map_err(|error| later(&error))?;
         link.identify_within(LINK_PATIENCE).await.map_err(|error| later(&error))?;
         upload.resume();

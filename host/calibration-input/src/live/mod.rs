@@ -129,8 +129,8 @@ mod tests {
 
     #[test]
     fn an_interrupted_set_is_told_what_it_is_good_for() {
-        let told = |kept| how_to_go_on("set".as_ref(), kept, 6);
-        assert!(told(0).contains("same command again") && told(2).contains("another --set"));
-        assert!(told(3).contains("3 of 6 stage poses are kept in set") && told(3).contains("without --live"));
+        let advice = |kept| how_to_go_on("set".as_ref(), kept, 6);
+        assert!(advice(0).contains("same command again") && advice(2).contains("another --set"));
+        assert!(advice(3).contains("3 of 6 stage poses are kept in set") && advice(3).contains("without --live"));
     }
 }

@@ -169,11 +169,12 @@ fn next_pose(
     information: &DMatrix<f64>,
     alone: &[ExtrinsicsCalibration],
 ) -> Vec<AxisPosition> {
-    let told: Matrix6<f64> = alone.iter().filter_map(|pose| pose.covariance.try_inverse()).sum::<Matrix6<f64>>()
-        / (alone.len().max(1) as f64);
+    let alone_information: Matrix6<f64> =
+        alone.iter().filter_map(|pose| pose.covariance.try_inverse()).sum::<Matrix6<f64>>()
+            / (alone.len().max(1) as f64);
     let gain = |values: &Vec<f64>| {
         let derivative = state.derivative(values, mechanism, None) * DMatrix::from_diagonal(units);
-        let total = information + derivative.transpose() * told * &derivative;
+        let total = information + derivative.transpose() * alone_information * &derivative;
         // An information of one in units of the tolerance stands in for undetermined combinations.
         let regular = total + DMatrix::identity(units.len(), units.len());
         regular.cholesky().map_or(f64::NEG_INFINITY, |factor| factor.l().diagonal().iter().map(|x| x.ln()).sum())

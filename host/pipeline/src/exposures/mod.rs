@@ -64,8 +64,8 @@ struct CameraQueue<T> {
 }
 
 impl<T> CameraQueue<T> {
-    fn unheard() -> Self {
-        Self { timing: None, gone: Some(CameraGone::Unheard), images: BTreeMap::new() }
+    fn empty() -> Self {
+        Self { timing: None, gone: Some(CameraGone::Unknown), images: BTreeMap::new() }
     }
 
     fn remove(&mut self, seq: u32) -> Option<(HostInstant, T)> {
@@ -98,7 +98,7 @@ impl<T> Exposures<T> {
         };
         let results =
             Results { ready: VecDeque::new(), skipped: BTreeMap::new(), ambiguity: None, ambiguity_taken: false };
-        Self { cameras: [CameraQueue::unheard(), CameraQueue::unheard()], pairing, results }
+        Self { cameras: [CameraQueue::empty(), CameraQueue::empty()], pairing, results }
     }
 
     /// Why each camera (left, right) delivers nothing; `None` for one that delivers.

@@ -31,9 +31,9 @@ pub enum Exposed<T> {
 /// Why a camera delivers nothing.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum CameraGone {
-    /// Nothing was heard of it yet.
+    /// It has delivered nothing yet.
     #[error("it has not answered yet")]
-    Unheard,
+    Unknown,
     /// It failed; the driver gave this reason.
     #[error("{0}")]
     Failed(String),

@@ -57,7 +57,7 @@ pub async fn run(args: &Args, console: Console) -> Result<(), Failure> {
 }
 
 /// Shows that images are looked at, and names those that give no view.
-fn tell_views(console: Console) -> impl FnMut(ViewEvent<'_>) -> Result<(), Failure> {
+fn print_views(console: Console) -> impl FnMut(ViewEvent<'_>) -> Result<(), Failure> {
     let mut progress: Option<ProgressBar> = None;
     move |event| {
         match event {

@@ -16,7 +16,7 @@ use vergence_vision::Side;
 
 use super::camera_options::CameraOptions;
 use super::target_options::TargetOptions;
-use crate::cli::Globals;
+use crate::cli::CommonOptions;
 use crate::console::Console;
 use crate::failure::Failure;
 use crate::interrupt::interrupted;
@@ -50,9 +50,9 @@ pub struct Args {
     seed: u64,
 }
 
-pub async fn run(args: &Args, globals: &Globals, console: Console) -> Result<(), Failure> {
+pub async fn run(args: &Args, common: &CommonOptions, console: Console) -> Result<(), Failure> {
     let target = args.target.spec()?;
-    let cameras = CameraSet::new(open(args, globals, &target)?);
+    let cameras = CameraSet::new(open(args, common, &target)?);
     capture(cameras, target, args, interrupted(), console).await
 }
 
@@ -163,16 +163,16 @@ fn first_free(folder: &Path) -> usize {
     (0..).find(is_free).unwrap_or_default()
 }
 
-fn open(args: &Args, globals: &Globals, target: &TargetSpec) -> Result<Vec<Box<dyn Camera>>, Failure> {
+fn open(args: &Args, common: &CommonOptions, target: &TargetSpec) -> Result<Vec<Box<dyn Camera>>, Failure> {
     if args.cameras == ["sim"] {
-        return simulated(args, globals, target);
+        return simulated(args, common, target);
     }
     let clock = HostClock::start();
     Ok(args.cameras.iter().map(|device| args.camera.open(device, clock)).collect::<Result<_, CameraError>>()?)
 }
 
-fn simulated(args: &Args, globals: &Globals, target: &TargetSpec) -> Result<Vec<Box<dyn Camera>>, Failure> {
-    let rig = rig_file::load(globals.rig.as_deref())?;
+fn simulated(args: &Args, common: &CommonOptions, target: &TargetSpec) -> Result<Vec<Box<dyn Camera>>, Failure> {
+    let rig = rig_file::load(common.rig.as_deref())?;
     let targets = rig.mode("human").map(|mode| mode.targets.iter().map(|target| target.value()).collect::<Vec<_>>());
     let pose = rig.pose_at_values(&targets.unwrap_or_default());
     let held = HeldTarget {

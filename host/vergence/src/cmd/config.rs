@@ -8,7 +8,7 @@ use vergence_files::write_whole;
 use vergence_protocol::{ControllerState, Refusal, Request};
 
 use super::connect::{connect_any, port};
-use crate::cli::Globals;
+use crate::cli::CommonOptions;
 use crate::console::Console;
 use crate::failure::Failure;
 
@@ -57,9 +57,9 @@ enum What {
 /// What is forgotten at the next start is said where it is changed.
 const UNSAVED: &str = "'vergence config save' keeps it through the next start";
 
-pub async fn run(args: &Args, globals: &Globals, console: Console) -> Result<(), Failure> {
+pub async fn run(args: &Args, common: &CommonOptions, console: Console) -> Result<(), Failure> {
     // Settings must stay reachable when they contradict the rig file: they may be what has to be mended.
-    let mut board = connect_any(globals, console, "settings").await?;
+    let mut board = connect_any(common, console, "settings").await?;
     // A refusal names the latched fault, which poses tell.
     board.next_pose().await?;
     match &args.what {
@@ -86,7 +86,7 @@ pub async fn run(args: &Args, globals: &Globals, console: Console) -> Result<(),
             console.say("the settings are saved")?;
             console.result(&json!({ "saved": true }))
         }
-        What::Reload => reload(board, globals, console).await,
+        What::Reload => reload(board, common, console).await,
         What::Factory => {
             board.ask(Request::RestoreSettings).await?;
             console.say("the settings are those that the firmware came with")?;
@@ -97,8 +97,8 @@ pub async fn run(args: &Args, globals: &Globals, console: Console) -> Result<(),
 }
 
 /// Starts the board again, so that it reads its saved settings.
-async fn reload(board: Board, globals: &Globals, console: Console) -> Result<(), Failure> {
-    let port = port(globals)?;
+async fn reload(board: Board, common: &CommonOptions, console: Console) -> Result<(), Failure> {
+    let port = port(common)?;
     if port == Port::Simulated {
         return Err(Failure::usage("a board in this process ends with it and saves nothing: name one with --port"));
     }
@@ -110,7 +110,7 @@ async fn reload(board: Board, globals: &Globals, console: Console) -> Result<(),
         )));
     }
     board.close().await;
-    let mut link = ManagementLink::open(port, globals.baud).await?;
+    let mut link = ManagementLink::open(port, common.baud).await?;
     restart(&mut link).await?;
     console.say("the board has started again with its saved settings: run 'vergence home' before moving")?;
     console.result(&json!({ "reloaded": true }))

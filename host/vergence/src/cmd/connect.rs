@@ -4,7 +4,7 @@ use indicatif::ProgressBar;
 use vergence_board::{Board, Client, HostClock, OpenWire, Port, fresh_session, open};
 use vergence_rig::Rig;
 
-use crate::cli::Globals;
+use crate::cli::CommonOptions;
 use crate::console::{Console, shown_on};
 use crate::failure::Failure;
 use crate::rig_file;
@@ -17,8 +17,8 @@ const SIM_SEED: u64 = 1;
 ///
 /// # Errors
 /// No board, a board of another protocol or rig, a bad rig file.
-pub async fn connect(globals: &Globals, console: Console, what: &str) -> Result<Board, Failure> {
-    let board = connect_with(globals, console.progress(what)).await?;
+pub async fn connect(common: &CommonOptions, console: Console, what: &str) -> Result<Board, Failure> {
+    let board = connect_with(common, console.progress(what)).await?;
     Ok(noted(board, console))
 }
 
@@ -34,9 +34,9 @@ fn noted(board: Board, console: Console) -> Board {
 ///
 /// # Errors
 /// As of [`connect`].
-pub async fn connect_with(globals: &Globals, progress: ProgressBar) -> Result<Board, Failure> {
-    let (client, rig) = client(globals).await?;
-    let board = Board::new(client, rig, globals.lease).await?;
+pub async fn connect_with(common: &CommonOptions, progress: ProgressBar) -> Result<Board, Failure> {
+    let (client, rig) = client(common).await?;
+    let board = Board::new(client, rig, common.lease).await?;
     Ok(board.observed(shown_on(progress)))
 }
 
@@ -44,9 +44,9 @@ pub async fn connect_with(globals: &Globals, progress: ProgressBar) -> Result<Bo
 ///
 /// # Errors
 /// No board, a board of another protocol, a bad rig file.
-pub async fn connect_any(globals: &Globals, console: Console, what: &str) -> Result<Board, Failure> {
-    let (client, rig) = client(globals).await?;
-    let board = Board::open(client, rig, globals.lease).await?;
+pub async fn connect_any(common: &CommonOptions, console: Console, what: &str) -> Result<Board, Failure> {
+    let (client, rig) = client(common).await?;
+    let board = Board::open(client, rig, common.lease).await?;
     Ok(noted(board.observed(shown_on(console.progress(what))), console))
 }
 
@@ -54,15 +54,15 @@ pub async fn connect_any(globals: &Globals, console: Console, what: &str) -> Res
 ///
 /// # Errors
 /// No board, a board of another protocol, a bad rig file.
-pub async fn connect_quietly(globals: &Globals, console: Console) -> Result<Board, Failure> {
-    let (client, rig) = client(globals).await?;
-    Ok(noted(Board::open(client, rig, globals.lease).await?, console))
+pub async fn connect_quietly(common: &CommonOptions, console: Console) -> Result<Board, Failure> {
+    let (client, rig) = client(common).await?;
+    Ok(noted(Board::open(client, rig, common.lease).await?, console))
 }
 
-async fn client(globals: &Globals) -> Result<(Client, Rig), Failure> {
-    let rig = rig_file::load(globals.rig.as_deref())?;
-    let port = port(globals)?;
-    let wire = wire(&port, globals.baud, &rig).await?;
+async fn client(common: &CommonOptions) -> Result<(Client, Rig), Failure> {
+    let rig = rig_file::load(common.rig.as_deref())?;
+    let port = port(common)?;
+    let wire = wire(&port, common.baud, &rig).await?;
     Ok((Client::at(&port, wire, fresh_session()?, HostClock::start()).await?, rig))
 }
 
@@ -70,14 +70,14 @@ async fn client(globals: &Globals) -> Result<(Client, Rig), Failure> {
 ///
 /// # Errors
 /// None, or several.
-pub fn port(globals: &Globals) -> Result<Port, Failure> {
-    Ok(Port::named_or_only(globals.port.as_deref())?)
+pub fn port(common: &CommonOptions) -> Result<Port, Failure> {
+    Ok(Port::named_or_only(common.port.as_deref())?)
 }
 
 /// Whether bytes take time on this port: pseudo-terminals and TCP carry them at once.
 #[must_use]
-pub fn is_wire(globals: &Globals) -> bool {
-    port(globals).is_ok_and(Port::is_wire)
+pub fn is_wire(common: &CommonOptions) -> bool {
+    port(common).is_ok_and(Port::is_wire)
 }
 
 async fn wire(port: &Port, baud: u32, rig: &Rig) -> Result<OpenWire, Failure> {

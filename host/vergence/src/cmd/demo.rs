@@ -12,7 +12,7 @@ use vergence_protocol::SessionId;
 use vergence_reproduce::demo::{Pulse, SimulatedPair};
 use vergence_rig::{Rig, rounded};
 
-use crate::cli::Globals;
+use crate::cli::CommonOptions;
 use crate::console::Console;
 use crate::failure::Failure;
 use crate::interrupt::{interrupted, on_own_thread};
@@ -33,10 +33,10 @@ pub struct Args {
     out: PathBuf,
 }
 
-pub async fn run(args: &Args, globals: &Globals, console: Console) -> Result<(), Failure> {
+pub async fn run(args: &Args, common: &CommonOptions, console: Console) -> Result<(), Failure> {
     let whole = Stopwatch::start();
     check_folder(&args.out)?;
-    let rig = rig_file::load(globals.rig.as_deref())?;
+    let rig = rig_file::load(common.rig.as_deref())?;
     make_folder(&args.out)?;
     let (all, measured) = (rig.modes.len(), Cell::new(0));
     let modes = tokio::select! {
@@ -47,7 +47,7 @@ pub async fn run(args: &Args, globals: &Globals, console: Console) -> Result<(),
             measured.get(),
             args.out.display()
         ))),
-        modes = every_mode(args, globals, rig, &measured, console) => modes,
+        modes = every_mode(args, common, rig, &measured, console) => modes,
     }?;
     console.say(format!("clouds and pictures are in {}; {:.1} s in all", args.out.display(), whole.seconds()))?;
     console.result(&json!({ "modes": modes, "seconds": rounded(whole.seconds()) }))
@@ -56,14 +56,14 @@ pub async fn run(args: &Args, globals: &Globals, console: Console) -> Result<(),
 /// Homes the rig and measures in every mode; counts them in `measured`.
 async fn every_mode(
     args: &Args,
-    globals: &Globals,
+    common: &CommonOptions,
     rig: Rig,
     measured: &Cell<usize>,
     console: Console,
 ) -> Result<Vec<Value>, Failure> {
     let simulated = SharedRig::new(SimulatedRig::new(&rig, args.seed)?);
     let (session, progress) = (SessionId((args.seed as u32).max(1)), console.progress("homing"));
-    let mut board = board_of(&simulated, rig, session, globals.lease, progress.clone()).await?;
+    let mut board = board_of(&simulated, rig, session, common.lease, progress.clone()).await?;
     let cameras = Arc::new(SimulatedPair::new(board.rig(), &simulated, args.seed));
     let modes = board.armed(pending(), async |board| -> Result<_, Failure> {
         board.home().await?;

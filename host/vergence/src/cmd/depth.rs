@@ -23,7 +23,7 @@ use vergence_vision::{Kernel, Pixel, PixelPair, Side};
 
 use self::motion::StageSpeed;
 use super::stage_pose::StagePose;
-use crate::cli::Globals;
+use crate::cli::CommonOptions;
 use crate::cmd::model_options::MatcherOptions;
 use crate::cmd::options::TableOption;
 use crate::console::Console;
@@ -81,8 +81,8 @@ struct Progress {
     measured: AtomicUsize,
 }
 
-pub async fn run(args: Args, globals: &Globals, console: Console) -> Result<(), Failure> {
-    let (progress, out, rig_path) = (Arc::new(Progress::default()), args.out.clone(), globals.rig.clone());
+pub async fn run(args: Args, common: &CommonOptions, console: Console) -> Result<(), Failure> {
+    let (progress, out, rig_path) = (Arc::new(Progress::default()), args.out.clone(), common.rig.clone());
     let counted = Arc::clone(&progress);
     tokio::select! {
         biased;

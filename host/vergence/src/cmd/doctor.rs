@@ -7,7 +7,7 @@ use vergence_board::{BoardChecks, Finding, Verdict, check_board, check_cameras, 
 
 use super::connect::{connect, is_wire, port};
 use super::options::active_rig;
-use crate::cli::Globals;
+use crate::cli::CommonOptions;
 use crate::console::Console;
 use crate::failure::{Failure, FailureKind};
 use crate::rig_file;
@@ -17,19 +17,19 @@ use crate::rig_file;
 #[derive(Debug, clap::Args)]
 pub struct Args {}
 
-pub async fn run(_: &Args, globals: &Globals, console: Console) -> Result<(), Failure> {
-    let (rig, rig_finding) = check_rig(globals);
-    let globals = &Globals { rig, ..globals.clone() };
+pub async fn run(_: &Args, common: &CommonOptions, console: Console) -> Result<(), Failure> {
+    let (rig, rig_finding) = check_rig(common);
+    let common = &CommonOptions { rig, ..common.clone() };
     let mut findings = vec![rig_finding];
     findings.extend(check_cameras());
-    let port = match port(globals) {
+    let port = match port(common) {
         Ok(port) => check_port(&port),
         Err(failure) => Finding::fail("port", failure.to_string(), "see 'vergence devices' for the ports there are"),
     };
     let reachable = port.verdict != Verdict::Fail;
     findings.push(port);
     if reachable {
-        findings.extend(examine(globals, console).await);
+        findings.extend(examine(common, console).await);
     }
     for Finding { check, verdict, reason, remedy } in &findings {
         console.say(format!("{}  {check:<9} {reason}", verdict.name()))?;
@@ -51,9 +51,9 @@ pub async fn run(_: &Args, globals: &Globals, console: Console) -> Result<(), Fa
 }
 
 /// The rig that verbs would use: the file named, the active calibration, or the built-in bench.
-fn check_rig(globals: &Globals) -> (Option<PathBuf>, Finding) {
+fn check_rig(common: &CommonOptions) -> (Option<PathBuf>, Finding) {
     const MEND: &str = "mend the file, which docs/rig-file.md describes, or 'vergence calibrate rollback'";
-    let (path, is_active) = match (&globals.rig, active_rig()) {
+    let (path, is_active) = match (&common.rig, active_rig()) {
         (Some(path), _) => (Some(path.clone()), false),
         (None, Ok(active)) => (active, true),
         (None, Err(failure)) => return (None, Finding::fail("rig", failure.to_string(), MEND)),
@@ -73,14 +73,14 @@ fn check_rig(globals: &Globals) -> (Option<PathBuf>, Finding) {
     (path, finding)
 }
 
-async fn examine(globals: &Globals, console: Console) -> Vec<Finding> {
+async fn examine(common: &CommonOptions, console: Console) -> Vec<Finding> {
     let checks = BoardChecks {
-        lease_ms: globals.lease,
-        line_baud: is_wire(globals).then_some(globals.baud),
+        lease_ms: common.lease,
+        line_baud: is_wire(common).then_some(common.baud),
         clock_in_words: describe_clock,
         unreachable: |error| unreachable(&error.into()),
     };
-    match connect(globals, console, "examining the board").await {
+    match connect(common, console, "examining the board").await {
         Ok(mut board) => check_board(&mut board, checks).await,
         Err(failure) => vec![unreachable(&failure)],
     }

@@ -10,7 +10,7 @@ use vergence_board::{ManagementLink, Port, UpdateError, confirm, hardware_name, 
 use vergence_protocol::management::Identity;
 
 use super::connect::port;
-use crate::cli::Globals;
+use crate::cli::CommonOptions;
 use crate::console::Console;
 use crate::failure::Failure;
 use crate::firmware::read_image;
@@ -45,12 +45,12 @@ pub struct Args {
     probe: Option<String>,
 }
 
-pub async fn run(args: &Args, globals: &Globals, console: Console) -> Result<(), Failure> {
+pub async fn run(args: &Args, common: &CommonOptions, console: Console) -> Result<(), Failure> {
     if let Some(file) = &args.swd {
-        return swd::run(file, args.probe.as_deref(), globals, console).await;
+        return swd::run(file, args.probe.as_deref(), common, console).await;
     }
     let image = args.serial.as_deref().map(read_image).transpose()?;
-    let mut link = connect(globals).await?;
+    let mut link = connect(common).await?;
     if let Some(image) = image {
         return serial::run(&image, !args.no_confirm, &mut link, console).await;
     }
@@ -72,19 +72,19 @@ async fn change(args: &Args, link: &mut ManagementLink, console: Console) -> Res
     } else {
         restart(link).await?
     };
-    tell(&after, console)?;
+    print_identity(&after, console)?;
     console.result(&json!({ "before": identity_json(&before), "after": identity_json(&after) }))
 }
 
-async fn connect(globals: &Globals) -> Result<ManagementLink, Failure> {
-    let port = port(globals)?;
+async fn connect(common: &CommonOptions) -> Result<ManagementLink, Failure> {
+    let port = port(common)?;
     if port == Port::Simulated {
         return Err(Failure::usage("a board in this process ends with it: flash one of 'vergence sim --pty'"));
     }
-    Ok(ManagementLink::open(port, globals.baud).await?)
+    Ok(ManagementLink::open(port, common.baud).await?)
 }
 
-fn tell(identity: &Identity, console: Console) -> Result<(), Failure> {
+fn print_identity(identity: &Identity, console: Console) -> Result<(), Failure> {
     console.say(format!(
         "{} runs {} (build {:016x}), {}",
         hardware_name(identity.hardware),

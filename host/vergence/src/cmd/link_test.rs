@@ -6,7 +6,7 @@ use vergence_board::{LinkFigures, clock_json, describe_clock};
 use vergence_protocol::Request;
 
 use super::connect::{connect, is_wire};
-use crate::cli::Globals;
+use crate::cli::CommonOptions;
 use crate::console::Console;
 use crate::failure::Failure;
 
@@ -30,15 +30,15 @@ fn parse_time(text: &str) -> Result<Duration, String> {
     if allowed.contains(&time) { Ok(time) } else { Err("choose 1s to 1h".into()) }
 }
 
-pub async fn run(args: &Args, globals: &Globals, console: Console) -> Result<(), Failure> {
+pub async fn run(args: &Args, common: &CommonOptions, console: Console) -> Result<(), Failure> {
     let period_us = u32::try_from(args.stream.as_micros()).unwrap_or(u32::MAX);
-    let mut board = connect(globals, console, "measuring the link").await?;
+    let mut board = connect(common, console, "measuring the link").await?;
     board.ask(Request::SetStream { period_us }).await?;
     let figures = LinkFigures::measure(&mut board, args.duration).await?;
-    let is_wire = is_wire(globals);
-    console.say_lines(figures.lines(globals.baud, is_wire))?;
+    let is_wire = is_wire(common);
+    console.say_lines(figures.lines(common.baud, is_wire))?;
     console.say(format!("            {}", describe_clock(&board)))?;
-    let mut result = figures.json(globals.baud, is_wire);
+    let mut result = figures.json(common.baud, is_wire);
     result["clock"] = clock_json(&board);
     console.result(&result)?;
     figures.check().map_err(|losses| Failure::check(losses.to_string()))

@@ -11,7 +11,7 @@ use vergence_rig::Rig;
 use vergence_sim::{FirmwareLog, PlacedEntry};
 
 use super::reconnect::Listening;
-use crate::cli::Globals;
+use crate::cli::CommonOptions;
 use crate::console::Console;
 use crate::failure::Failure;
 
@@ -36,7 +36,7 @@ pub struct Args {
     listening: Listening,
 }
 
-pub async fn run(args: &Args, globals: &Globals, console: Console) -> Result<(), Failure> {
+pub async fn run(args: &Args, common: &CommonOptions, console: Console) -> Result<(), Failure> {
     let mut program = args.elf.as_deref().map(Program::read).transpose()?;
     let left = args.count.unwrap_or(u64::MAX);
     let mut printer = Printer { raw: args.raw, left, next_event: 0, console };
@@ -44,7 +44,7 @@ pub async fn run(args: &Args, globals: &Globals, console: Console) -> Result<(),
         Source::Board(board) => printer.pass_on(board, program.as_mut()).await,
         Source::Driver(driver, rig) => printer.follow(driver, rig, program.as_mut()).await,
     };
-    args.listening.to(globals, console, listen).await
+    args.listening.to(common, console, listen).await
 }
 
 /// The firmware's log, and the ELF file that holds its texts.
@@ -71,7 +71,7 @@ impl<'a> Program<'a> {
         Err(Failure::input(self.path, problem))
     }
 
-    fn tell(&mut self, bytes: &[u8], left: &mut u64, console: Console) -> Result<(), Failure> {
+    fn print(&mut self, bytes: &[u8], left: &mut u64, console: Console) -> Result<(), Failure> {
         for placed in self.log.push(bytes) {
             match placed {
                 Ok(placed) if *left > 0 => {
@@ -111,10 +111,10 @@ impl Printer {
         while self.left > 0 {
             match (timeout(QUIET, board.next_log()).await, &mut program) {
                 (Ok(bytes), _) if self.raw => self.write_raw(&bytes?)?,
-                (Ok(bytes), Some(program)) => program.tell(&bytes?, &mut self.left, self.console)?,
+                (Ok(bytes), Some(program)) => program.print(&bytes?, &mut self.left, self.console)?,
                 (Ok(bytes), None) => drop(bytes?),
                 (Err(_), _) if self.raw => {}
-                (Err(_), _) => self.tell_events(board).await?,
+                (Err(_), _) => self.print_events(board).await?,
             }
         }
         Ok(())
@@ -137,11 +137,11 @@ impl Printer {
                         before = now;
                         let fault = pose.fault.map(|fault| format!("; {}", describe_fault(rig, &fault)));
                         let text = format!("state: {}{}", pose.state, fault.unwrap_or_default());
-                        self.tell(pose.at.0, &text)?;
+                        self.print(pose.at.0, &text)?;
                     }
                 }
                 (Followed::Log(bytes), _) if self.raw => self.write_raw(&bytes)?,
-                (Followed::Log(bytes), Some(program)) => program.tell(&bytes, &mut self.left, self.console)?,
+                (Followed::Log(bytes), Some(program)) => program.print(&bytes, &mut self.left, self.console)?,
                 _ => {}
             }
         }
@@ -156,18 +156,18 @@ impl Printer {
     }
 
     /// Prints one entry at a time of the board's clock, in microseconds.
-    fn tell(&mut self, board_us: u64, text: &str) -> Result<(), Failure> {
+    fn print(&mut self, board_us: u64, text: &str) -> Result<(), Failure> {
         self.left -= 1;
         self.console.say(format!("{:12.6} s board  {text}", board_us as f64 * 1e-6))?;
         self.console.result(&json!({ "board_us": board_us, "text": text }))
     }
 
     /// Prints what the flight recorder has kept since it was last read.
-    async fn tell_events(&mut self, board: &Board) -> Result<(), Failure> {
+    async fn print_events(&mut self, board: &Board) -> Result<(), Failure> {
         let recorded = board.events_from(self.next_event).await?;
         self.next_event = recorded.next;
         for event in recorded.events.iter().take(usize::try_from(self.left).unwrap_or(usize::MAX)) {
-            self.tell(event.at.0, &event_in_words(board.rig(), &event.what))?;
+            self.print(event.at.0, &event_in_words(board.rig(), &event.what))?;
         }
         Ok(())
     }

@@ -11,7 +11,7 @@ use vergence_rig::Rig;
 
 use self::live::Live;
 use super::reconnect::Listening;
-use crate::cli::Globals;
+use crate::cli::CommonOptions;
 use crate::console::Console;
 use crate::failure::Failure;
 
@@ -27,13 +27,13 @@ pub struct Args {
     listening: Listening,
 }
 
-pub async fn run(args: &Args, globals: &Globals, console: Console) -> Result<(), Failure> {
+pub async fn run(args: &Args, common: &CommonOptions, console: Console) -> Result<(), Failure> {
     let mut left = args.count.unwrap_or(u64::MAX);
     let listen = async |source: Source<'_>| match source {
         Source::Board(board) => show(board, &mut left, console).await,
         Source::Driver(driver, rig) => show_followed(driver, rig, &mut left, console).await,
     };
-    args.listening.to(globals, console, listen).await
+    args.listening.to(common, console, listen).await
 }
 
 async fn show(board: &mut Board, left: &mut u64, console: Console) -> Result<(), Failure> {

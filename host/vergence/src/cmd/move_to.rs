@@ -6,7 +6,7 @@ use vergence_rig::{AxisPosition, Rig, axes_json};
 
 use super::connect::connect;
 use super::stage_pose::{Goal, StagePose, go};
-use crate::cli::Globals;
+use crate::cli::CommonOptions;
 use crate::console::Console;
 use crate::failure::Failure;
 use crate::interrupt::armed;
@@ -22,28 +22,33 @@ pub struct Args {
     stage: StagePose,
 }
 
-pub async fn run(args: &Args, globals: &Globals, console: Console) -> Result<(), Failure> {
+pub async fn run(args: &Args, common: &CommonOptions, console: Console) -> Result<(), Failure> {
     if args.stage.is_empty() {
         return Err(Failure::usage("say where to: --baseline 120mm, --separation 45deg, or both"));
     }
-    let rig = rig_file::load(globals.rig.as_deref())?;
+    let rig = rig_file::load(common.rig.as_deref())?;
     let named = args.stage.of_axes(&rig)?;
     if args.by {
-        return go_by(&rig, &named, globals, console).await;
+        return go_by(&rig, &named, common, console).await;
     }
     // What is named is checked before the board is touched; the rest stays where it is.
     let certain: Vec<_> =
         named.iter().zip(&rig.axes).map(|(position, axis)| position.unwrap_or(axis.range[0])).collect();
     check_range(&rig, &certain)?;
-    let mut board = connect(globals, console, "moving").await?;
+    let mut board = connect(common, console, "moving").await?;
     let targets = named.iter().zip(board.standing()).map(|(named, present)| named.unwrap_or(present)).collect();
     go(&mut board, &Goal { mode: Mode(0), targets }, console).await
 }
 
-async fn go_by(rig: &Rig, named: &[Option<AxisPosition>], globals: &Globals, console: Console) -> Result<(), Failure> {
+async fn go_by(
+    rig: &Rig,
+    named: &[Option<AxisPosition>],
+    common: &CommonOptions,
+    console: Console,
+) -> Result<(), Failure> {
     let axes = named.iter().zip(&rig.axes);
     let by: Vec<_> = axes.map(|(by, axis)| by.unwrap_or(AxisPosition::from_value(axis.kind, 0.0))).collect();
-    let mut board = connect(globals, console, "moving").await?;
+    let mut board = connect(common, console, "moving").await?;
     if board.is_referenced() {
         let targets = board.standing().iter().zip(&by).map(|(before, &by)| before.plus(by)).collect::<Vec<_>>();
         check_range(rig, &targets)?;

@@ -84,7 +84,7 @@ pub struct BoardOptions {
 
 /// The board and the rig that a verb works with.
 #[derive(Clone, Debug)]
-pub struct Globals {
+pub struct CommonOptions {
     /// The port that was named.
     pub port: Option<String>,
     /// Speed of a serial port, in bits per second.
@@ -98,37 +98,37 @@ pub struct Globals {
 /// Options that say which board or rig a verb works with.
 pub trait Choice {
     /// The choice as it was given.
-    fn given(&self) -> Globals;
+    fn given(&self) -> CommonOptions;
 
     /// The choice with the rig of the active calibration where no rig file was named.
     ///
     /// # Errors
     /// Where the store of calibrations cannot be read.
-    fn chosen(&self) -> Result<Globals, Failure> {
+    fn chosen(&self) -> Result<CommonOptions, Failure> {
         let given = self.given();
         let rig = match given.rig {
             Some(rig) => Some(rig),
             None => active_rig()?,
         };
-        Ok(Globals { rig, ..given })
+        Ok(CommonOptions { rig, ..given })
     }
 }
 
 impl Choice for PortOptions {
-    fn given(&self) -> Globals {
-        Globals { port: self.port.clone(), baud: self.baud, rig: None, lease: LEASE_MS }
+    fn given(&self) -> CommonOptions {
+        CommonOptions { port: self.port.clone(), baud: self.baud, rig: None, lease: LEASE_MS }
     }
 }
 
 impl Choice for RigFileOptions {
-    fn given(&self) -> Globals {
-        Globals { port: None, baud: BAUD, rig: self.rig.clone(), lease: LEASE_MS }
+    fn given(&self) -> CommonOptions {
+        CommonOptions { port: None, baud: BAUD, rig: self.rig.clone(), lease: LEASE_MS }
     }
 }
 
 impl Choice for BoardOptions {
-    fn given(&self) -> Globals {
-        Globals { rig: self.rig.rig.clone(), lease: self.lease, ..self.port.given() }
+    fn given(&self) -> CommonOptions {
+        CommonOptions { rig: self.rig.rig.clone(), lease: self.lease, ..self.port.given() }
     }
 }
 

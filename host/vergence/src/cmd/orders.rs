@@ -7,7 +7,7 @@ use vergence_board::describe_fault;
 use super::connect::connect;
 use super::reconnect::{Persistence, reconnect};
 use super::stage_pose::{Goal, go, named_mode};
-use crate::cli::Globals;
+use crate::cli::CommonOptions;
 use crate::console::Console;
 use crate::failure::{Failure, FailureKind};
 use crate::interrupt::{armed, interrupted};
@@ -24,8 +24,8 @@ pub struct Arm {
     persistence: Persistence,
 }
 
-pub async fn arm(args: &Arm, globals: &Globals, console: Console) -> Result<(), Failure> {
-    let mut board = connect(globals, console, "arming").await?;
+pub async fn arm(args: &Arm, common: &CommonOptions, console: Console) -> Result<(), Failure> {
+    let mut board = connect(common, console, "arming").await?;
     let held = armed(&mut board, async |board| {
         console.say(match args.duration {
             Some(_) => "armed",
@@ -41,7 +41,7 @@ pub async fn arm(args: &Arm, globals: &Globals, console: Console) -> Result<(), 
         Err(lost) if args.persistence.survives(&lost) => {
             drop(board);
             tokio::select! {
-                board = reconnect(globals, console, lost) => {
+                board = reconnect(common, console, lost) => {
                     let board = board?;
                     console.say_pose(board.rig(), board.pose())?;
                     Err(Failure::link("the link ended while the board was armed; it is back, and nothing was armed again"))
@@ -57,8 +57,8 @@ pub async fn arm(args: &Arm, globals: &Globals, console: Console) -> Result<(), 
 #[derive(Debug, clap::Args)]
 pub struct Disarm {}
 
-pub async fn disarm(_: &Disarm, globals: &Globals, console: Console) -> Result<(), Failure> {
-    let mut board = connect(globals, console, "disarming").await?;
+pub async fn disarm(_: &Disarm, common: &CommonOptions, console: Console) -> Result<(), Failure> {
+    let mut board = connect(common, console, "disarming").await?;
     board.disarm().await?;
     console.say_pose(board.rig(), board.pose())
 }
@@ -67,8 +67,8 @@ pub async fn disarm(_: &Disarm, globals: &Globals, console: Console) -> Result<(
 #[derive(Debug, clap::Args)]
 pub struct Clear {}
 
-pub async fn clear(_: &Clear, globals: &Globals, console: Console) -> Result<(), Failure> {
-    let mut board = connect(globals, console, "clearing").await?;
+pub async fn clear(_: &Clear, common: &CommonOptions, console: Console) -> Result<(), Failure> {
+    let mut board = connect(common, console, "clearing").await?;
     match board.clear().await? {
         Some(fault) => console.say(format!("cleared: {}", describe_fault(board.rig(), &fault)))?,
         None => console.say("there was nothing to clear")?,
@@ -80,8 +80,8 @@ pub async fn clear(_: &Clear, globals: &Globals, console: Console) -> Result<(),
 #[derive(Debug, clap::Args)]
 pub struct Home {}
 
-pub async fn home(_: &Home, globals: &Globals, console: Console) -> Result<(), Failure> {
-    let mut board = connect(globals, console, "homing").await?;
+pub async fn home(_: &Home, common: &CommonOptions, console: Console) -> Result<(), Failure> {
+    let mut board = connect(common, console, "homing").await?;
     armed(&mut board, async |board| Ok(board.home().await?)).await?;
     console.say_pose(board.rig(), board.pose())
 }
@@ -93,10 +93,10 @@ pub struct Mode {
     name: String,
 }
 
-pub async fn mode(args: &Mode, globals: &Globals, console: Console) -> Result<(), Failure> {
-    let rig = rig_file::load(globals.rig.as_deref())?;
+pub async fn mode(args: &Mode, common: &CommonOptions, console: Console) -> Result<(), Failure> {
+    let rig = rig_file::load(common.rig.as_deref())?;
     let mode = named_mode(&rig, &args.name)?;
     let goal = Goal { mode: mode.number, targets: mode.targets.clone() };
-    let mut board = connect(globals, console, &args.name).await?;
+    let mut board = connect(common, console, &args.name).await?;
     go(&mut board, &goal, console).await
 }

@@ -9,7 +9,7 @@ use vergence_rig::{AxisPosition, Rig, axes_json, rounded, zones_json};
 
 use super::connect::connect;
 use super::stage_pose::{StagePose, named_mode};
-use crate::cli::Globals;
+use crate::cli::CommonOptions;
 use crate::console::Console;
 use crate::failure::Failure;
 use crate::rig_file;
@@ -33,13 +33,13 @@ pub struct Args {
     goal: goal::GoalOptions,
 }
 
-pub async fn run(args: &Args, globals: &Globals, console: Console) -> Result<(), Failure> {
+pub async fn run(args: &Args, common: &CommonOptions, console: Console) -> Result<(), Failure> {
     if args.goal.is_given() {
-        return goal::run(&args.goal, globals, console);
+        return goal::run(&args.goal, common, console);
     }
-    let rig = rig_file::load(globals.rig.as_deref())?;
-    let globals = Globals { port: globals.port.clone().or_else(|| Some("sim".into())), ..globals.clone() };
-    let board = connect(&globals, console, "planning").await?;
+    let rig = rig_file::load(common.rig.as_deref())?;
+    let common = CommonOptions { port: common.port.clone().or_else(|| Some("sim".into())), ..common.clone() };
+    let board = connect(&common, console, "planning").await?;
     let from = match &args.from {
         Some(name) => named_mode(&rig, name)?.targets.clone(),
         None => standing(&board),

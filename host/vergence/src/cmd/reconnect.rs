@@ -7,7 +7,7 @@ use tokio::time::timeout;
 use vergence_board::{Board, Source, describe_pose, reach_again};
 
 use super::connect::{connect_quietly, connect_with, port};
-use crate::cli::Globals;
+use crate::cli::CommonOptions;
 use crate::console::Console;
 use crate::failure::{Failure, FailureKind};
 use crate::interrupt::interrupted;
@@ -47,12 +47,12 @@ impl Listening {
     /// Those of `listen`, of connecting, and of [`reconnect`].
     pub async fn to(
         self,
-        globals: &Globals,
+        common: &CommonOptions,
         console: Console,
         listen: impl AsyncFnMut(Source<'_>) -> Result<(), Failure>,
     ) -> Result<(), Failure> {
         let forever = Duration::from_secs(u64::from(u32::MAX));
-        let listening = self.persistently(globals, console, listen);
+        let listening = self.persistently(common, console, listen);
         tokio::select! {
             outcome = timeout(self.duration.unwrap_or(forever), listening) => outcome.unwrap_or(Ok(())),
             () = interrupted() => Ok(()),
@@ -61,20 +61,20 @@ impl Listening {
 
     async fn persistently(
         self,
-        globals: &Globals,
+        common: &CommonOptions,
         console: Console,
         listen: impl AsyncFnMut(Source<'_>) -> Result<(), Failure>,
     ) -> Result<(), Failure> {
-        let rig = rig_file::load(globals.rig.as_deref())?;
+        let rig = rig_file::load(common.rig.as_deref())?;
         let listening = vergence_board::Listening {
-            port: &port(globals)?,
+            port: &port(common)?,
             rig: &rig,
             persists: !self.persistence.no_reconnect,
             is_end_of_link: |failure: &Failure| failure.kind() == FailureKind::Link,
         };
         let connect = async |lost| match lost {
-            Some(lost) => reconnect(globals, console, lost).await,
-            None => connect_quietly(globals, console).await,
+            Some(lost) => reconnect(common, console, lost).await,
+            None => connect_quietly(common, console).await,
         };
         listening.listen(connect, listen).await
     }
@@ -84,9 +84,9 @@ impl Listening {
 ///
 /// # Errors
 /// A board that came back with another protocol or rig.
-pub async fn reconnect(globals: &Globals, console: Console, lost: Failure) -> Result<Board, Failure> {
+pub async fn reconnect(common: &CommonOptions, console: Console, lost: Failure) -> Result<Board, Failure> {
     console.warn(format!("{lost}\ntrying to reach it again; Ctrl-C ends this"));
-    let connect = async || connect_with(globals, ProgressBar::hidden()).await;
+    let connect = async || connect_with(common, ProgressBar::hidden()).await;
     let may_pass = |failure: &Failure| matches!(failure.kind(), FailureKind::Device | FailureKind::Link);
     let board = reach_again(lost, connect, may_pass, |failure| console.warn(failure)).await?;
     console.warn(format!("connected again: {}", describe_pose(board.rig(), board.pose())));

@@ -19,7 +19,7 @@ use vergence_rig::Rig;
 
 use self::publish::Publisher;
 use super::connect::{connect, port};
-use crate::cli::Globals;
+use crate::cli::CommonOptions;
 use crate::cmd::camera_options::CameraOptions;
 use crate::cmd::model_options::MatcherOptions;
 use crate::cmd::options::TableOption;
@@ -89,15 +89,15 @@ fn parse_time(text: &str) -> Result<Duration, String> {
     seconds.map_or_else(|| humantime::parse_duration(text).map_err(|error| error.to_string()), Ok)
 }
 
-pub async fn run(args: &Args, globals: &Globals, console: Console) -> Result<(), Failure> {
-    let rig = rig_file::load(globals.rig.as_deref())?;
+pub async fn run(args: &Args, common: &CommonOptions, console: Console) -> Result<(), Failure> {
+    let rig = rig_file::load(common.rig.as_deref())?;
     let tour = args.tour.tour(&rig)?;
     let matcher = Arc::from(args.matching.matcher(console)?);
     if let Some(folder) = &args.out {
         check_folder(folder)?;
         make_folder(folder)?;
     }
-    let (mut board, simulated) = connected(args, globals, &rig, console).await?;
+    let (mut board, simulated) = connected(args, common, &rig, console).await?;
     // Images and pulses are stamped on the clock of the link.
     let clock = board.as_ref().map_or_else(HostClock::start, |board| board.client().clock());
     if let Some(board) = &mut board {
@@ -191,7 +191,7 @@ async fn settle(board: &mut Option<Board>, tour: &Tour) -> Result<(), Failure> {
 /// The board, where the rig has axes; beside it the mechanics, where they are simulated.
 async fn connected(
     args: &Args,
-    globals: &Globals,
+    common: &CommonOptions,
     rig: &Rig,
     console: Console,
 ) -> Result<(Option<Board>, Option<SharedRig>), Failure> {
@@ -202,15 +202,15 @@ async fn connected(
             false => Ok((None, None)),
         };
     }
-    match (port(globals)?, wants_simulated) {
+    match (port(common)?, wants_simulated) {
         (Port::Simulated, true) => {
             let simulated = SharedRig::new(SimulatedRig::new(rig, args.seed)?);
             let (session, progress) = (fresh_session()?, console.progress("live"));
-            let board = board_of(&simulated, rig.clone(), session, globals.lease, progress).await?;
+            let board = board_of(&simulated, rig.clone(), session, common.lease, progress).await?;
             Ok((Some(board), Some(simulated)))
         }
-        (_, false) if globals.port.as_deref() != Some("sim") => {
-            Ok((Some(connect(globals, console, "live").await?), None))
+        (_, false) if common.port.as_deref() != Some("sim") => {
+            Ok((Some(connect(common, console, "live").await?), None))
         }
         _ => Err(Failure::usage("a simulated rig has simulated cameras: --port sim --cameras sim")),
     }

@@ -7,7 +7,7 @@ use vergence_board::Shared;
 use vergence_files::write_whole;
 use vergence_rig::Rig;
 
-use crate::cli::Globals;
+use crate::cli::CommonOptions;
 use crate::console::Console;
 use crate::failure::Failure;
 use crate::firmware::{DEVELOPMENT, PublicKey};
@@ -46,8 +46,8 @@ pub struct Args {
     trace: Option<PathBuf>,
 }
 
-pub async fn run(args: &Args, globals: &Globals, console: Console) -> Result<(), Failure> {
-    let rig = rig_file::load(globals.rig.as_deref())?;
+pub async fn run(args: &Args, common: &CommonOptions, console: Console) -> Result<(), Failure> {
+    let rig = rig_file::load(common.rig.as_deref())?;
     if !args.elf.is_empty() {
         return run_firmware(args, &rig, console).await;
     }

@@ -7,7 +7,7 @@ use vergence_board::{Followed, Follower, clock_json, describe_clock, pose_json};
 
 use self::why::Story;
 use super::connect::{connect, port};
-use crate::cli::Globals;
+use crate::cli::CommonOptions;
 use crate::console::Console;
 use crate::failure::Failure;
 use crate::rig_file;
@@ -20,13 +20,13 @@ pub struct Args {
     why: bool,
 }
 
-pub async fn run(args: &Args, globals: &Globals, console: Console) -> Result<(), Failure> {
+pub async fn run(args: &Args, common: &CommonOptions, console: Console) -> Result<(), Failure> {
     if !args.why
-        && let Some(driver) = Follower::attach(&port(globals)?).await
+        && let Some(driver) = Follower::attach(&port(common)?).await
     {
-        return say_followed(driver, globals, console).await;
+        return say_followed(driver, common, console).await;
     }
-    let mut board = connect(globals, console, "status").await?;
+    let mut board = connect(common, console, "status").await?;
     board.compare_clocks().await?;
     let story = if args.why { Some(Story::read(&board).await?) } else { None };
     let info = board.info();
@@ -47,14 +47,14 @@ pub async fn run(args: &Args, globals: &Globals, console: Console) -> Result<(),
     console.say(describe_clock(&board))?;
     console.say_pose(board.rig(), board.pose())?;
     match story {
-        Some(story) => story.tell(board.rig(), console),
+        Some(story) => story.print(board.rig(), console),
         None => Ok(()),
     }
 }
 
 /// Says where the board is by what its driver passes on; nothing is asked of the board.
-async fn say_followed(mut driver: Follower, globals: &Globals, console: Console) -> Result<(), Failure> {
-    let rig = rig_file::load(globals.rig.as_deref())?;
+async fn say_followed(mut driver: Follower, common: &CommonOptions, console: Console) -> Result<(), Failure> {
+    let rig = rig_file::load(common.rig.as_deref())?;
     loop {
         if let Followed::Pose(pose) = driver.next().await? {
             console.say("another vergence holds the port; this is what it passes on")?;

@@ -5,7 +5,7 @@ use vergence_board::{Port, open, stop_unheard};
 
 use super::connect::{connect_any, port};
 use super::options::active_rig;
-use crate::cli::Globals;
+use crate::cli::CommonOptions;
 use crate::console::Console;
 use crate::failure::Failure;
 use crate::rig_file;
@@ -15,16 +15,16 @@ use crate::rig_file;
 #[derive(Debug, clap::Args)]
 pub struct Args {}
 
-pub async fn run(_: &Args, globals: &Globals, console: Console) -> Result<(), Failure> {
-    if let port @ Port::Serial(_) = port(globals)? {
-        let wire = open(&port, globals.baud, true).await?;
+pub async fn run(_: &Args, common: &CommonOptions, console: Console) -> Result<(), Failure> {
+    if let port @ Port::Serial(_) = port(common)? {
+        let wire = open(&port, common.baud, true).await?;
         if wire.lock.is_none() {
             stop_unheard(&port, wire).await?;
             console.say("stop sent; the vergence that holds the port tells what became of it")?;
             return console.result(&json!({"stop": "sent", "confirmed": false}));
         }
     }
-    let mut board = connect_any(&with_readable_rig(globals), console, "stopping").await?;
+    let mut board = connect_any(&with_readable_rig(common), console, "stopping").await?;
     board.stop().await?;
     // Only now does it matter whether positions can be told.
     if board.check_axes().await.is_ok() {
@@ -35,8 +35,8 @@ pub async fn run(_: &Args, globals: &Globals, console: Console) -> Result<(), Fa
 }
 
 /// A rig file that cannot be read is no reason not to stop.
-fn with_readable_rig(globals: &Globals) -> Globals {
-    let rig = globals.rig.clone().or_else(|| active_rig().ok().flatten());
+fn with_readable_rig(common: &CommonOptions) -> CommonOptions {
+    let rig = common.rig.clone().or_else(|| active_rig().ok().flatten());
     let rig = rig.filter(|path| rig_file::load(Some(path)).is_ok());
-    Globals { rig, ..globals.clone() }
+    CommonOptions { rig, ..common.clone() }
 }

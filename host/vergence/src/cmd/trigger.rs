@@ -10,7 +10,7 @@ use vergence_rig::{AxisPosition, axes_json, rounded};
 
 use super::camera_options::parse_rate;
 use super::connect::connect;
-use crate::cli::Globals;
+use crate::cli::CommonOptions;
 use crate::console::Console;
 use crate::failure::Failure;
 use crate::interrupt::interrupted;
@@ -34,8 +34,8 @@ pub struct Args {
     duration: Option<Duration>,
 }
 
-pub async fn run(args: &Args, globals: &Globals, console: Console) -> Result<(), Failure> {
-    let mut board = connect(globals, console, "trigger").await?;
+pub async fn run(args: &Args, common: &CommonOptions, console: Console) -> Result<(), Failure> {
+    let mut board = connect(common, console, "trigger").await?;
     board.compare_clocks().await?;
     let trigger = match args.rate {
         Some(rate) => Trigger::Every { period_us: (1e6 / rate).round() as u32 },
@@ -43,39 +43,44 @@ pub async fn run(args: &Args, globals: &Globals, console: Console) -> Result<(),
     };
     let pulses = if args.once { Some(1) } else { args.count };
     board.ask(Request::SetTrigger(trigger)).await?;
-    let mut heard = Heard::default();
+    let mut received = Received::default();
     let forever = Duration::from_secs(u64::from(u32::MAX));
     let ended = tokio::select! {
-        ended = timeout(args.duration.unwrap_or(forever), listen(&mut board, pulses, &mut heard, console)) => {
+        ended = timeout(args.duration.unwrap_or(forever), listen(&mut board, pulses, &mut received, console)) => {
             ended.unwrap_or(Ok(()))
         }
         () = interrupted() => Ok(()),
     };
     ended?;
     board.ask(Request::SetTrigger(Trigger::Off)).await?;
-    console.say(format!("{} pulses, {} of their marks were lost", heard.marks, heard.lost))
+    console.say(format!("{} pulses, {} of their marks were lost", received.marks, received.lost))
 }
 
 /// How many marks came, and how many their numbers say are missing.
 #[derive(Debug, Default)]
-struct Heard {
+struct Received {
     marks: u64,
     lost: u64,
     next: u32,
 }
 
-async fn listen(board: &mut Board, pulses: Option<u64>, heard: &mut Heard, console: Console) -> Result<(), Failure> {
-    while pulses.is_none_or(|pulses| heard.marks + heard.lost < pulses) {
+async fn listen(
+    board: &mut Board,
+    pulses: Option<u64>,
+    received: &mut Received,
+    console: Console,
+) -> Result<(), Failure> {
+    while pulses.is_none_or(|pulses| received.marks + received.lost < pulses) {
         let mark = board.next_mark().await?;
-        heard.lost += u64::from(mark.seq.wrapping_sub(heard.next));
-        heard.marks += 1;
-        heard.next = mark.seq.wrapping_add(1);
-        tell(board, &mark, console)?;
+        received.lost += u64::from(mark.seq.wrapping_sub(received.next));
+        received.marks += 1;
+        received.next = mark.seq.wrapping_add(1);
+        print_mark(board, &mark, console)?;
     }
     Ok(())
 }
 
-fn tell(board: &Board, mark: &TriggerMark, console: Console) -> Result<(), Failure> {
+fn print_mark(board: &Board, mark: &TriggerMark, console: Console) -> Result<(), Failure> {
     let rig = board.rig();
     let positions: Vec<AxisPosition> =
         rig.axes.iter().zip(&mark.counts).map(|(axis, &counts)| axis.position_at(counts)).collect();

@@ -10,7 +10,7 @@ use vergence_output::{ZonesOf, check_ending, seen_by_cones, write_drawing, zones
 use vergence_rig::{rounded, zones_json};
 use vergence_vision::{Angle, Length, Zones, paper_eq3, paper_eq3_applies, symmetric_pair, zones_exact};
 
-use crate::cli::Globals;
+use crate::cli::CommonOptions;
 use crate::console::Console;
 use crate::failure::Failure;
 
@@ -48,13 +48,13 @@ pub struct Args {
     rig: rig::RigOptions,
 }
 
-pub fn run(args: &Args, globals: &Globals, console: Console) -> Result<(), Failure> {
+pub fn run(args: &Args, common: &CommonOptions, console: Console) -> Result<(), Failure> {
     let Args { fov, radius, .. } = *args;
     for path in args.svg.iter().chain(&args.plot) {
         check_ending(path, &["svg"])?;
     }
     let (Some(baseline), Some(separation)) = (args.baseline, args.separation) else {
-        return rig::run(args, globals, console);
+        return rig::run(args, common, console);
     };
     if baseline.mm() <= 0.0 {
         return Err(Failure::usage(format!("a baseline of {baseline} is none: choose a positive one")));

@@ -11,7 +11,7 @@ use vergence_calibration_report::{
 use vergence_rig::Rig;
 
 use super::options::{LensOptions, ResultOptions};
-use super::tell_views;
+use super::print_views;
 use crate::cmd::target_options::TargetOptions;
 use crate::console::Console;
 use crate::failure::Failure;
@@ -94,9 +94,9 @@ fn views(args: &Args, lenses: PairLenses<'_>, hash: &mut InputHash, console: Con
             Ok((frames.into_iter().map(|(_, view)| view).collect(), Default::default()))
         }
         None => {
-            let mut tell = tell_views(console);
-            let images = PairImages::named([&args.left_images, &args.right_images], &mut tell)?;
-            images.views(&args.target.spec()?, lenses, hash, &mut tell)
+            let mut print = print_views(console);
+            let images = PairImages::named([&args.left_images, &args.right_images], &mut print)?;
+            images.views(&args.target.spec()?, lenses, hash, &mut print)
         }
     }
 }

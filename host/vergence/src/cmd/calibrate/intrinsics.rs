@@ -13,7 +13,7 @@ use vergence_calibration_report::{
 use vergence_vision::{Angle, ImageSize};
 
 use super::options::ResultOptions;
-use super::tell_views;
+use super::print_views;
 use crate::cmd::camera_options::parse_size;
 use crate::cmd::target_options::TargetOptions;
 use crate::console::Console;
@@ -103,7 +103,7 @@ fn views(args: &Args, hash: &mut InputHash, console: Console) -> Result<Views, F
         }
         _ => {
             let files = named_images(&args.images)?;
-            let targets = views_in_images(&files, &args.target.spec()?, None, hash, &mut tell_views(console))?;
+            let targets = views_in_images(&files, &args.target.spec()?, None, hash, &mut print_views(console))?;
             Ok(Views { views: targets.found(), size: targets.size, images: targets.images })
         }
     }

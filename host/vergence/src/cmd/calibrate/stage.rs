@@ -11,8 +11,8 @@ use vergence_calibration_report::{ReportAbout, stage_json, stage_lines, stage_re
 use vergence_rig::Rig;
 
 use super::options::{LensOptions, ResultOptions};
-use super::tell_views;
-use crate::cli::Globals;
+use super::print_views;
+use crate::cli::CommonOptions;
 use crate::cmd::target_options::TargetOptions;
 use crate::console::Console;
 use crate::failure::Failure;
@@ -57,9 +57,9 @@ pub struct Args {
     result: ResultOptions,
 }
 
-pub async fn run(args: &Args, globals: &Globals, console: Console) -> Result<(), Failure> {
+pub async fn run(args: &Args, common: &CommonOptions, console: Console) -> Result<(), Failure> {
     args.result.check()?;
-    let drawn = rig_file::load(globals.rig.as_deref())?;
+    let drawn = rig_file::load(common.rig.as_deref())?;
     if drawn.axes.is_empty() {
         return Err(Failure::usage(format!(
             "rig '{}' has no axes: 'vergence calibrate extrinsics' is for pairs whose pose is fixed",
@@ -67,7 +67,7 @@ pub async fn run(args: &Args, globals: &Globals, console: Console) -> Result<(),
         )));
     }
     let mut hash = InputHash::default();
-    if let Some(path) = &globals.rig {
+    if let Some(path) = &common.rig {
         hash.add(path)?;
     }
     let (drawn, knowledge) = match args.lenses.read(&mut hash, console)? {
@@ -76,7 +76,7 @@ pub async fn run(args: &Args, globals: &Globals, console: Console) -> Result<(),
         }
         None => (drawn, args.lenses.without_files()?),
     };
-    let built = live(args, globals, console).await?;
+    let built = live(args, common, console).await?;
     let poses = poses(args, &drawn, &mut hash, console)?;
     let options = StageOptions { lenses: knowledge, robust: !args.no_loss, ..StageOptions::default() };
     let solving = Stopwatch::start();
@@ -116,9 +116,9 @@ pub async fn run(args: &Args, globals: &Globals, console: Console) -> Result<(),
 }
 
 /// Takes the views of --live; returns the true rig where it is simulated.
-async fn live(args: &Args, globals: &Globals, console: Console) -> Result<Option<Rig>, Failure> {
+async fn live(args: &Args, common: &CommonOptions, console: Console) -> Result<Option<Rig>, Failure> {
     match (&args.set, args.live.live) {
-        (Some(set), true) => live::fill(set, &args.live, &args.cameras, args.target.spec()?, globals, console).await,
+        (Some(set), true) => live::fill(set, &args.live, &args.cameras, args.target.spec()?, common, console).await,
         (None, true) => Err(Failure::usage("say where the images go: --live --set DIR")),
         (_, false) => Ok(None),
     }
@@ -128,7 +128,7 @@ fn poses(args: &Args, rig: &Rig, hash: &mut InputHash, console: Console) -> Resu
     match (&args.set, &args.csv) {
         (Some(set), _) => {
             let (set, lenses) = (RecordedSet::read(set, rig, hash)?, [&rig.left_camera, &rig.right_camera]);
-            set.stage_poses(&args.target.spec()?, lenses, hash, &mut tell_views(console))
+            set.stage_poses(&args.target.spec()?, lenses, hash, &mut print_views(console))
         }
         (_, Some(csv)) => Ok(stage_poses_in_corners(csv, rig, &args.cameras, hash)?),
         _ => Err(Failure::usage("name the views: --set DIR or --csv FILE")),

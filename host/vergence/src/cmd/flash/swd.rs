@@ -9,8 +9,8 @@ use vergence_image::layout::HARDWARE;
 use vergence_protocol::management::Identity;
 use vergence_sim::{check_boot_loader, is_elf};
 
-use super::{connect, identity_json, tell};
-use crate::cli::Globals;
+use super::{connect, identity_json, print_identity};
+use crate::cli::CommonOptions;
 use crate::console::Console;
 use crate::failure::Failure;
 use crate::firmware::{header_json, read_image};
@@ -18,13 +18,13 @@ use crate::firmware::{header_json, read_image};
 /// How long the board may take to start.
 const START_PATIENCE: Duration = Duration::from_secs(10);
 
-pub async fn run(file: &Path, probe: Option<&str>, globals: &Globals, console: Console) -> Result<(), Failure> {
+pub async fn run(file: &Path, probe: Option<&str>, common: &CommonOptions, console: Console) -> Result<(), Failure> {
     let content = vergence_files::read(file)?;
     if is_elf(&content) {
         check_boot_loader(&content).map_err(|error| Failure::input(file, error))?;
         write(probe, console, |probe_rs| probe_rs.download_elf(file))?;
-        let board = ask(globals).await?;
-        tell(&board, console)?;
+        let board = ask(common).await?;
+        print_identity(&board, console)?;
         return console.result(&json!({ "image": Value::Null, "after": identity_json(&board) }));
     }
     let image = read_image(file)?;
@@ -37,8 +37,8 @@ pub async fn run(file: &Path, probe: Option<&str>, globals: &Globals, console: C
     }
     let flash = FlashContents::of(&image).ok_or_else(|| Failure::input(file, "the image is too long"))?;
     write(probe, console, |probe_rs| probe_rs.download_image(&flash))?;
-    let board = ask(globals).await?;
-    tell(&board, console)?;
+    let board = ask(common).await?;
+    print_identity(&board, console)?;
     console.result(&json!({ "image": header_json(image.header()), "after": identity_json(&board) }))?;
     if board.build == image.header().build {
         return Ok(());
@@ -65,10 +65,10 @@ fn write(
 }
 
 /// Who started.
-async fn ask(globals: &Globals) -> Result<Identity, Failure> {
+async fn ask(common: &CommonOptions) -> Result<Identity, Failure> {
     let unasked = |failure: &dyn std::fmt::Display| {
         Failure::device(format!("the flash is written, but the board could not be asked what it runs: {failure}"))
     };
-    let mut link = connect(globals).await.map_err(|failure| unasked(&failure))?;
+    let mut link = connect(common).await.map_err(|failure| unasked(&failure))?;
     link.identify_within(START_PATIENCE).await.map_err(|error| unasked(&error))
 }

@@ -6,7 +6,7 @@ use vergence_files::write_whole;
 use vergence_output::{check_ending, depth_field_svg};
 use vergence_rig::{DepthField, DepthGoal};
 
-use crate::cli::Globals;
+use crate::cli::CommonOptions;
 use crate::console::Console;
 use crate::failure::Failure;
 use crate::rig_file;
@@ -43,9 +43,9 @@ fn positive(text: &str) -> Result<f64, String> {
 ///
 /// # Errors
 /// Exit code 1 where no pose meets the goal; the nearest pose is printed.
-pub fn run(options: &GoalOptions, globals: &Globals, console: Console) -> Result<(), Failure> {
+pub fn run(options: &GoalOptions, common: &CommonOptions, console: Console) -> Result<(), Failure> {
     let goal = options.goal.ok_or_else(|| Failure::usage("say a --goal"))?;
-    let rig = rig_file::load(globals.rig.as_deref())?;
+    let rig = rig_file::load(common.rig.as_deref())?;
     let best = rig.best_pose(&goal, options.pixel_sigma);
     let positions = best.positions(&rig);
     let place: Vec<_> =

@@ -39,7 +39,7 @@ impl Story {
     ///
     /// # Errors
     /// Where standard output cannot be written.
-    pub fn tell(&self, rig: &Rig, console: Console) -> Result<(), Failure> {
+    pub fn print(&self, rig: &Rig, console: Console) -> Result<(), Failure> {
         console.say(format!("what happened, in seconds from {}", self.since))?;
         if self.gone > 0 {
             console.say(format!("              ({} earlier events are gone)", self.gone))?;

@@ -11,7 +11,7 @@ use vergence_rig::{rounded, zones_json};
 use vergence_vision::{circle_zones, solid_zones};
 
 use super::{Args, in_words};
-use crate::cli::Globals;
+use crate::cli::CommonOptions;
 use crate::console::Console;
 use crate::failure::Failure;
 use crate::rig_file;
@@ -33,9 +33,9 @@ pub struct RigOptions {
 /// Right to 0.001 sr.
 const DIRECTIONS: u32 = 200_000;
 
-pub fn run(args: &Args, globals: &Globals, console: Console) -> Result<(), Failure> {
+pub fn run(args: &Args, common: &CommonOptions, console: Console) -> Result<(), Failure> {
     let (options, radius) = (&args.rig, args.radius);
-    let rig = rig_file::load(globals.rig.as_deref())?;
+    let rig = rig_file::load(common.rig.as_deref())?;
     let name = options.mode.as_deref().unwrap_or_default();
     let mode = rig.mode(name).ok_or_else(|| Failure::usage(format!("rig '{}' has no mode '{name}'", rig.name)))?;
     let values: Vec<f64> = mode.targets.iter().map(|position| position.value()).collect();

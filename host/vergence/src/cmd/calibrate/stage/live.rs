@@ -9,7 +9,7 @@ use vergence_calibration_input::{LiveEvent, LiveSet, RigCameras, SimulatedTarget
 use vergence_camera::CameraError;
 use vergence_rig::Rig;
 
-use crate::cli::Globals;
+use crate::cli::CommonOptions;
 use crate::cmd::camera_options::CameraOptions;
 use crate::cmd::connect::{connect, port};
 use crate::console::Console;
@@ -52,22 +52,22 @@ pub async fn fill(
     options: &Options,
     cameras: &[String],
     target: TargetSpec,
-    globals: &Globals,
+    common: &CommonOptions,
     console: Console,
 ) -> Result<Option<Rig>, Failure> {
     LiveSet::check_free(folder)?;
-    let nominal = rig_file::load(globals.rig.as_deref())?;
-    let (mut rig_board, mut rig_cameras) = open(options, cameras, &nominal, target, globals, console).await?;
+    let nominal = rig_file::load(common.rig.as_deref())?;
+    let (mut rig_board, mut rig_cameras) = open(options, cameras, &nominal, target, common, console).await?;
     let set = LiveSet { folder, target, nominal: &nominal, views: options.views.into(), images: options.frames };
     let plan = stage_plan(&nominal.axes, options.poses.into());
-    set.fill(&plan, &mut rig_board, &mut rig_cameras, interrupted(), tell(console)).await?;
+    set.fill(&plan, &mut rig_board, &mut rig_cameras, interrupted(), print_events(console)).await?;
     Ok(match rig_cameras {
         RigCameras::Simulated(simulated) => Some(simulated.built),
         RigCameras::Attached(_) => None,
     })
 }
 
-fn tell(console: Console) -> impl FnMut(LiveEvent<'_>) -> Result<(), Failure> {
+fn print_events(console: Console) -> impl FnMut(LiveEvent<'_>) -> Result<(), Failure> {
     let mut progress: Option<ProgressBar> = None;
     move |event| {
         match event {
@@ -96,15 +96,15 @@ async fn open(
     cameras: &[String],
     nominal: &Rig,
     target: TargetSpec,
-    globals: &Globals,
+    common: &CommonOptions,
     console: Console,
 ) -> Result<(Board, RigCameras), Failure> {
-    match (port(globals)?, cameras) {
+    match (port(common)?, cameras) {
         (Port::Simulated, [only]) if only == "sim" => {
             let (seed, built) = (options.seed, built(nominal, options.seed));
             let rig = SharedRig::new(SimulatedRig::new(&built, seed)?);
             let (session, progress) = (fresh_session()?, console.progress("homing"));
-            let board_of_rig = board_of(&rig, nominal.clone(), session, globals.lease, progress).await?;
+            let board_of_rig = board_of(&rig, nominal.clone(), session, common.lease, progress).await?;
             Ok((board_of_rig, RigCameras::Simulated(Box::new(SimulatedTarget { rig, built, target, seed }))))
         }
         (Port::Simulated, _) => {
@@ -114,7 +114,7 @@ async fn open(
             let clock = HostClock::start();
             let attached = [left, right].map(|device| options.camera.open(device, clock));
             let attached = attached.into_iter().collect::<Result<_, CameraError>>()?;
-            Ok((connect(globals, console, "homing").await?, RigCameras::Attached(attached)))
+            Ok((connect(common, console, "homing").await?, RigCameras::Attached(attached)))
         }
         _ => Err(Failure::usage("name the left and the right camera: --cameras /dev/video0 /dev/video2")),
     }
