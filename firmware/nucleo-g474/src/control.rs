@@ -15,12 +15,12 @@ use embassy_stm32::timer::low_level::Timer;
 use embassy_stm32::{Peri, peripherals};
 use embassy_time::Instant;
 use static_cell::StaticCell;
-use vergence_control::{Node, TICK_US};
+use vergence_control::{MovePlanner, Node, TICK_US};
 use vergence_nucleo_common::Services;
 use vergence_protocol::{MAX_FRAME, Microseconds};
 
 use crate::rig::Rig;
-use crate::{exchange, log, memory};
+use crate::{exchange, log, memory, planning};
 
 /// Priority below the short interrupts of time, DMA and serial line, and above the executor.
 const PRIORITY: Priority = Priority::P8;
@@ -43,6 +43,8 @@ pub struct Control {
     node: Node,
     rig: Rig,
     services: Services,
+    /// The plan that waits for its tick.
+    plan: Option<&'static mut MovePlanner>,
     /// Start of the running tick.
     tick: Microseconds,
     /// Length of the running tick, as the timer is set, in microseconds.
@@ -61,8 +63,16 @@ pub fn start(node: Node, rig: Rig, services: Services, timer: Peri<'static, peri
     TIM7.egr().write(|w| w.set_ug(true));
     TIM7.sr().write(|_| {});
     let tick = Microseconds(Instant::now().as_micros());
-    let control =
-        CONTROL.init(Control { node, rig, services, tick, length: PERIOD, received: [0; 64], frame: [0; MAX_FRAME] });
+    let control = CONTROL.init(Control {
+        node,
+        rig,
+        services,
+        plan: None,
+        tick,
+        length: PERIOD,
+        received: [0; 64],
+        frame: [0; MAX_FRAME],
+    });
     critical_section::with(|cs| HANDOVER.borrow_ref_mut(cs).replace(control));
     TIM7.dier().write(|w| w.set_uie(true));
     TIM7.cr1().write(|w| w.set_cen(true));
@@ -104,6 +114,7 @@ impl Control {
             self.begin_tick();
         }
         self.receive();
+        planning::exchange(&mut self.node, &mut self.plan);
         self.transmit();
         self.follow();
     }

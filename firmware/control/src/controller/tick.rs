@@ -34,6 +34,7 @@ impl Controller {
             _ => {}
         }
         if self.drivers_on {
+            self.count_planning();
             for axis in &mut self.axes {
                 axis.advance(tick, io);
             }
@@ -107,7 +108,7 @@ impl Controller {
     }
 
     fn poll_move(&mut self, now: Microseconds, io: &impl RigIo) {
-        if self.any_moving() {
+        if self.planning.is_some() || self.any_moving() {
             return;
         }
         if self.active.phase == MovePhase::Running {

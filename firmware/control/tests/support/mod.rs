@@ -178,6 +178,7 @@ impl World {
 
     fn tick(&mut self) {
         let next = self.controller.poll(self.now, &mut self.rig);
+        self.controller.plan_at_once();
         assert_eq!(next.0, self.now.0 + TICK_US);
         self.next_tick = next.0;
         self.watch.tick(self.now, &self.controller, &mut self.rig);
