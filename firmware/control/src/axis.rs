@@ -177,7 +177,7 @@ impl Axis {
 
     /// Whether steps are still to be made.
     pub fn is_moving(&self) -> bool {
-        self.trajectory.is_some() || self.command[0] != self.command[2]
+        self.trajectory.is_some() || self.command != [self.command[0]; 3]
     }
 
     /// Orders the steps of the tick after the one that begins now.

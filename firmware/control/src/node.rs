@@ -181,6 +181,11 @@ impl Node {
         self.controller.plan_at_once();
     }
 
+    /// Judges a tick that comes `late` microseconds after its time: [`Controller::allow_delay`].
+    pub fn allow_delay(&mut self, now: Microseconds, late: u64, io: &mut impl RigIo) {
+        self.controller.allow_delay(now, late, io);
+    }
+
     /// Runs the control tick, and trigger and telemetry when they are due.
     pub fn poll(&mut self, now: Microseconds, io: &mut impl RigIo) {
         let next_tick = self.controller.poll(now, io);

@@ -62,20 +62,21 @@ pub fn start(node: Node, rig: Rig, services: Services, timer: Peri<'static, peri
     set_length(PERIOD);
     TIM7.egr().write(|w| w.set_ug(true));
     TIM7.sr().write(|_| {});
-    let tick = Microseconds(Instant::now().as_micros());
     let control = CONTROL.init(Control {
         node,
         rig,
         services,
         plan: None,
-        tick,
+        tick: Microseconds(0),
         length: PERIOD,
         received: [0; 64],
         frame: [0; MAX_FRAME],
     });
-    critical_section::with(|cs| HANDOVER.borrow_ref_mut(cs).replace(control));
     TIM7.dier().write(|w| w.set_uie(true));
     TIM7.cr1().write(|w| w.set_cen(true));
+    // Not before the counter runs: moving the node to its place takes some 300 us.
+    control.tick = Microseconds(Instant::now().as_micros());
+    critical_section::with(|cs| HANDOVER.borrow_ref_mut(cs).replace(control));
     interrupt::TIM7_DAC.set_priority(PRIORITY);
     // SAFETY: the handler has what it needs; nothing relies on this interrupt being masked.
     #[allow(unsafe_code, reason = "unmasking an interrupt")]
@@ -129,6 +130,9 @@ impl Control {
         if !self.rig.begin_tick() {
             defmt::warn!("steps cut short at {=u64}", self.tick.0);
         }
+        // After the wait for the steps of the tick before, so that steps cut short are a delay as well.
+        let late = Instant::now().as_micros().saturating_sub(self.tick.0);
+        self.node.allow_delay(self.tick, late, &mut self.rig);
         self.node.poll(self.tick, &mut self.rig);
         TICKS.fetch_add(1, Ordering::Relaxed);
     }
