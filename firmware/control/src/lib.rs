@@ -1,7 +1,8 @@
 //! The controller of the rig: planner, homing, limits and safety states (`no_std`, no async, no I/O).
 //!
 //! [`Controller`] has two entry points: `handle` takes a request, `poll` runs one control tick against the board behind
-//! [`RigIo`]. Time is an argument. [`Node`] adds the serial session, so that the firmware, the native simulation and the
+//! [`RigIo`]. Moves are planned elsewhere, below the tick: `take_plan_request`, [`MovePlanner`], `give_plan`. Time is an
+//! argument. [`Node`] adds the serial session, so that the firmware, the native simulation and the
 //! emulated board all run the same code.
 //!
 //! Terms: the *command* is the position that the planner wants, the *encoder* the position that is measured, and the

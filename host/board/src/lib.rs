@@ -18,7 +18,7 @@ pub use board::{Board, RecordedEvents, check_range, describe_fault, describe_pos
 pub use error::BoardError;
 pub use link::{
     BoardKnowledge, Client, Followed, Follower, HostClock, LinkError, ManagementLink, OpenError, OpenWire, Port,
-    PortLock, ReaderMark, Wire, fresh_session, is_held, is_wanted, open,
+    PortLock, ReaderMark, RepeatedStop, Wire, fresh_session, is_held, is_wanted, open,
 };
 pub use link_figures::LinkFigures;
 pub use move_plan::{AxisLimits, AxisPlan, Knot, MovePlan, MoveStart};

@@ -8,6 +8,7 @@ mod knowledge;
 mod management;
 mod open;
 mod port_lock;
+mod repeated_stop;
 mod session_id;
 mod task;
 
@@ -19,4 +20,5 @@ pub use knowledge::BoardKnowledge;
 pub use management::ManagementLink;
 pub use open::{OpenWire, Port, Wire, open};
 pub use port_lock::{PortLock, ReaderMark, is_held, is_wanted};
+pub use repeated_stop::RepeatedStop;
 pub use session_id::fresh_session;
