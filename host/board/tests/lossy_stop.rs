@@ -1,7 +1,13 @@
 //! Stops over a line that loses one byte in a thousand: how long the stages go on at most.
 //!
 //! `VERGENCE_STOPS=20000` makes that many.
-#![allow(clippy::expect_used, clippy::print_stdout, reason = "a test fails loudly and shows its figures")]
+#![allow(
+    clippy::expect_used,
+    clippy::panic,
+    clippy::print_stdout,
+    clippy::indexing_slicing,
+    reason = "a test fails loudly and shows its figures"
+)]
 
 use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64Mcg;
