@@ -9,10 +9,14 @@
 
 mod elf_rig;
 
-use elf_rig::{Conversation, ElfBoard, Standing};
+use elf_rig::{BOTH, Conversation, ElfBoard, Standing, Wired};
 use vergence_control::Scale;
 use vergence_mcu::{Bench, BenchWiring, Drive, Machine, Picoseconds};
-use vergence_protocol::{AxisKind, ControllerState, Request, SettingItem, SettingKey, Status};
+use vergence_plant::bench_settings;
+use vergence_protocol::{
+    AxisKind, ControllerState, Jog, Micro, MoveId, MovePhase, Permille, Request, SettingItem, SettingKey, Status,
+    StopKind, Trigger,
+};
 
 const CORE_HZ: u64 = 170_000_000;
 /// A tick in core cycles.
@@ -27,8 +31,8 @@ const POSE_PERIOD_US: u32 = 1_000;
 /// What both axes do in the same time, each at its full speed on the way: 60 degrees take their second and longer ramps.
 const FAR: [f64; 2] = [84_000.0, 1_047_198.0];
 
-/// Both axes in the middle of a move, at 100 kHz each, with poses at 1 kHz.
-fn at_full_speed() -> Conversation<ElfBoard> {
+/// Disarmed, with poses at 1 kHz, and motors that make 100 000 steps a second at full speed.
+fn geared() -> Conversation<ElfBoard> {
     let mut standing = Standing::default();
     for ((mechanics, kind), per_unit) in
         standing.mechanics.iter_mut().zip([AxisKind::Linear, AxisKind::Rotary]).zip(STEPS_PER_UNIT)
@@ -41,14 +45,27 @@ fn at_full_speed() -> Conversation<ElfBoard> {
         assert_eq!(talk.ask(Request::SetSetting { key, value: steps.into() }), Status::Accepted);
     }
     assert_eq!(talk.ask(Request::SetStream { period_us: POSE_PERIOD_US }), Status::Accepted);
-    assert_eq!(talk.arm(), Status::Accepted);
-    assert_eq!(talk.home(), Status::Accepted);
-    talk.wait_for(ControllerState::Ready);
-    let [baseline, separation] = talk.loads();
-    let targets = [baseline + FAR[0], separation + FAR[1]].map(|target| target as i32);
-    assert_eq!(talk.move_to(targets, 1), Status::Accepted);
-    talk.wait(400_000);
     talk
+}
+
+/// Both axes in the middle of a move, at 100 kHz each, with poses at 1 kHz.
+fn at_full_speed() -> Conversation<ElfBoard> {
+    let mut talk = geared();
+    talk.arm_and_home();
+    cruise(&mut talk);
+    talk
+}
+
+/// Goes on until both axes make 100 000 steps a second.
+fn cruise(talk: &mut Conversation<ElfBoard>) {
+    let loads = talk.loads();
+    let settings = bench_settings();
+    let away = |axis: usize| {
+        let middle = f64::from(settings[axis].min.0 + settings[axis].max.0) / 2.0;
+        loads[axis] + if loads[axis] < middle { FAR[axis] } else { -FAR[axis] }
+    };
+    assert_eq!(talk.move_to([0, 1].map(|axis| away(axis) as i32), 1), Status::Accepted);
+    talk.wait(400_000);
 }
 
 fn pulses(machine: &Machine<Bench>) -> [u64; 2] {
@@ -81,6 +98,97 @@ fn the_tick_leaves_most_of_the_processor_free_at_100_khz_on_both_axes() {
     assert!(rates.iter().all(|&rate| rate.abs_diff(STEP_HZ) < STEP_HZ / 100), "{rates:?}");
     assert!(tick.runs >= 400 && tick.longest_span < TICK, "{tick:?}");
     assert!(talk.faults.is_empty(), "{:?}", talk.faults);
+}
+
+/// What is asked while both axes make 100 000 steps a second, and poses come at 1 kHz.
+fn questions() -> Vec<(&'static str, Request)> {
+    let key = SettingKey { item: SettingItem::Backlash, axis: 0 };
+    vec![
+        ("poses", Request::SetStream { period_us: POSE_PERIOD_US }),
+        ("trigger", Request::SetTrigger(Trigger::Every { period_us: 2_000 })),
+        ("one axis", Request::GetAxis { axis: 1 }),
+        ("identity", Request::GetInfo),
+        ("statistics", Request::GetStatistics),
+        ("log of events", Request::GetEvents { first: 0 }),
+        ("a setting", Request::GetSetting(key)),
+        ("a setting, refused", Request::SetSetting { key, value: 100 }),
+        ("settings to save, refused", Request::SaveSettings),
+        ("a search, refused", Request::Home { axes: BOTH }),
+        ("a fault to clear, refused", Request::ClearFault { seen: 1 }),
+    ]
+}
+
+/// Prints the longest run of the node since the last call, with what preempted it, and returns it in cycles.
+fn worst(talk: &mut Conversation<ElfBoard>, what: &str) -> u64 {
+    let longest = talk.board.machine.cpu().handler_time(TICK_EXCEPTION).longest_span;
+    println!("{:>4} us: {what}", longest * 1_000_000 / CORE_HZ);
+    talk.board.machine.time_handlers();
+    longest
+}
+
+/// Places within a tick at which a request arrives.
+const ARRIVALS: u64 = 8;
+
+/// Lets the host speak at another place of the board's ticks.
+fn arrive_elsewhere(talk: &mut Conversation<ElfBoard>) {
+    talk.wait(2_000);
+    talk.now.0 += 1_000 / ARRIVALS;
+    talk.board.advance(talk.now);
+}
+
+#[test]
+fn no_request_makes_a_tick_longer_than_half_of_its_period() {
+    let mut talk = geared();
+    talk.board.machine.time_handlers();
+    let mut all = Vec::new();
+    let key = SettingKey { item: SettingItem::Backlash, axis: 0 };
+    assert_eq!(talk.ask(Request::SetSetting { key, value: 200 }), Status::Accepted);
+    talk.wait(20_000);
+    all.push(worst(&mut talk, "a setting, disarmed"));
+    assert_eq!(talk.arm(), Status::Accepted);
+    talk.wait(20_000);
+    all.push(worst(&mut talk, "to arm"));
+    assert_eq!(talk.home(), Status::Accepted);
+    talk.wait_for(ControllerState::Ready);
+    all.push(worst(&mut talk, "homing of both axes"));
+    let by = [20_000, 300_000].into_iter().map(Micro).collect();
+    assert_eq!(talk.ask(Request::Jog(Jog { id: MoveId(99), by, speed: Permille::FULL })), Status::Accepted);
+    talk.wait_for(ControllerState::Ready);
+    all.push(worst(&mut talk, "a jog"));
+    cruise(&mut talk);
+    all.push(worst(&mut talk, "a move, up to full speed"));
+    for (what, question) in questions() {
+        for _ in 0..ARRIVALS {
+            talk.answer(question.clone());
+            arrive_elsewhere(&mut talk);
+        }
+        all.push(worst(&mut talk, what));
+        if talk.pose().phase != MovePhase::Running {
+            cruise(&mut talk);
+            worst(&mut talk, "a move, up to full speed");
+        }
+    }
+    cruise(&mut talk);
+    let [baseline, separation] = talk.loads();
+    for (what, by) in [("one way", [10_000.0, 100_000.0]), ("the other way", [-10_000.0, -100_000.0])] {
+        let targets = [baseline + by[0], separation + by[1]].map(|target| target as i32);
+        for _ in 0..ARRIVALS {
+            assert_eq!(talk.move_to(targets, 1), Status::Accepted);
+            arrive_elsewhere(&mut talk);
+        }
+        talk.wait(30_000);
+        all.push(worst(&mut talk, &format!("a new target, {what}")));
+    }
+    assert_eq!(talk.pose().state, ControllerState::Moving);
+    assert_eq!(talk.ask(Request::Stop { kind: StopKind::Decelerate }), Status::Accepted);
+    talk.wait_for(ControllerState::Ready);
+    all.push(worst(&mut talk, "a stop, down to rest"));
+    cruise(&mut talk);
+    assert_eq!(talk.ask(Request::Disarm), Status::Accepted);
+    talk.wait_for(ControllerState::Idle);
+    all.push(worst(&mut talk, "disarmed in mid-move"));
+    assert!(talk.faults.is_empty(), "{:?}", talk.faults);
+    assert!(all.iter().all(|&cycles| cycles < TICK / 2), "{all:?}");
 }
 
 /// Places within a tick at which the switch opens.

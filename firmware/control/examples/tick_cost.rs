@@ -6,7 +6,8 @@ use std::hint::black_box;
 use std::process::ExitCode;
 
 use vergence_control::{
-    AxisSettings, Controller, FINE_BITS, HomingSettings, Limits, MotionState, RigIo, StepSchedule, Trajectory,
+    AxisSettings, Controller, FINE_BITS, HomingSettings, Limits, MotionState, MovePlanner, PlanRequest, RigIo,
+    StepSchedule, Trajectory,
 };
 use vergence_protocol::{AxisKind, ControllerState, Jog, Micro, Microseconds, MoveId, Permille, Request, SessionId};
 
@@ -81,11 +82,10 @@ fn tick(controller: &mut Controller, now: u64, rig: &mut Rig) {
     black_box(next);
 }
 
-/// What is counted, too.
+/// What is counted, too: the plan of all axes from rest.
 #[inline(never)]
-fn plan(controller: &mut Controller, now: u64, request: &Request, rig: &mut Rig) {
-    let status = controller.handle(Microseconds(now), HOST, request, rig);
-    black_box(status);
+fn plan(request: PlanRequest) -> MovePlanner {
+    black_box(MovePlanner::planned(request))
 }
 
 /// What is counted, too: the plan of one axis for another target in mid-move.
@@ -112,11 +112,15 @@ fn main() -> ExitCode {
     let way = (0..axes).map(|_| Micro(500_000)).collect();
     let jog = Request::Jog(Jog { id: MoveId(1), by: way, speed: Permille::FULL });
     if step_rate > 0 {
-        plan(&mut controller, now, &jog, &mut rig);
+        controller.handle(Microseconds(now), HOST, &jog, &mut rig);
     }
+    let planned = controller.take_plan_request().map(plan);
     // Up to full speed uncounted.
     for _ in 0..200 {
         now = controller.poll(Microseconds(now), &mut rig).0;
+        if let Some(planned) = &planned {
+            controller.give_plan(planned);
+        }
     }
     for _ in 0..TICKS {
         controller.heartbeat(Microseconds(now), HOST, 1_000);

@@ -5,6 +5,7 @@ use vergence_protocol::{Counts, Micro, Microseconds};
 use crate::TICK_US;
 use crate::follow::{Following, Lost};
 use crate::io::{RigIo, StepSchedule};
+use crate::move_planner::PlannedWay;
 use crate::plan::{AxisPlanner, PlanStart};
 use crate::profile::Limits;
 use crate::settings::AxisSettings;
@@ -105,8 +106,13 @@ impl Axis {
 
     /// State at which a new trajectory begins.
     fn state(&self) -> MotionState {
+        self.state_after(0)
+    }
+
+    /// State at which a trajectory begins that is started in so many ticks, where nothing else is started before.
+    pub fn state_after(&self, ticks: u32) -> MotionState {
         match &self.trajectory {
-            Some(trajectory) => trajectory.state(Microseconds(self.elapsed)),
+            Some(trajectory) => trajectory.state(Microseconds(self.elapsed + u64::from(ticks) * TICK_US)),
             None => MotionState::at(self.command()),
         }
     }
@@ -129,20 +135,24 @@ impl Axis {
         self.run(Trajectory::reach(self.state(), fine_from(target), limits, 0.0));
     }
 
-    /// Plans the quickest motion to `target` that takes at least `at_least` seconds, at `share` of full speed.
-    pub fn plan(&self, target: Micro, share: f32, at_least: f32) -> Trajectory {
+    /// The way to `target` of a plan that begins in so many ticks.
+    pub fn way(&self, ticks: u32, target: Micro) -> PlannedWay {
         // Without reference the low end of the range may be out of reach, so play is not taken up.
         let backlash = if self.referenced { self.settings.backlash } else { Micro(0) };
         let planner = AxisPlanner { limits: self.speed_limits(), backlash };
-        planner.plan(PlanStart { motion: self.state(), from_below: self.from_below }, target, share, at_least)
+        let start = PlanStart { motion: self.state_after(ticks), from_below: self.from_below };
+        PlannedWay { planner, start, target }
     }
 
-    /// Starts a planned motion that rests at its target until `together` seconds have passed.
-    pub fn run_planned(&mut self, mut trajectory: Trajectory, together: f32) {
+    /// Starts a planned motion, which begins at the present state and rests at its target until `together` seconds have
+    /// passed.
+    pub fn run_planned(&mut self, trajectory: &Trajectory, together: f32) {
         let from_below = self.referenced;
         if trajectory.duration() > 0.0 {
-            trajectory.rest_until(together);
-            self.run(trajectory);
+            self.run(trajectory.clone());
+            if let Some(running) = &mut self.trajectory {
+                running.rest_until(together);
+            }
         }
         self.from_below = from_below;
     }
@@ -167,7 +177,7 @@ impl Axis {
 
     /// Whether steps are still to be made.
     pub fn is_moving(&self) -> bool {
-        self.trajectory.is_some() || self.command[0] != self.command[2]
+        self.trajectory.is_some() || self.command != [self.command[0]; 3]
     }
 
     /// Orders the steps of the tick after the one that begins now.

@@ -9,6 +9,7 @@
 //! LinkLost, Fault --ClearFault--> Idle                  Boot, SelfTest, LinkLost, Fault, drivers off <--> Updating
 //! ```
 
+mod planning;
 mod requests;
 mod tick;
 mod update;
@@ -19,6 +20,8 @@ use vergence_protocol::{
     MovePhase, PoseReport, SessionId,
 };
 
+pub use self::planning::PLAN_TICKS;
+use self::planning::Planning;
 use crate::axis::Axis;
 use crate::homing_sequence::HomingSequence;
 use crate::io::RigIo;
@@ -48,6 +51,8 @@ struct ActiveMove {
     id: MoveId,
     mode: Mode,
     targets: AxisList<Micro>,
+    /// Share of full speed.
+    share: f32,
     phase: MovePhase,
     /// Time since which all encoders have been inside the tolerance.
     inside_since: Option<Microseconds>,
@@ -76,6 +81,10 @@ pub struct Controller {
     /// Time of the next control tick.
     next_tick: Microseconds,
     active: ActiveMove,
+    /// The plan for the latest move, until it begins.
+    planning: Option<Planning>,
+    /// Number of the latest plan.
+    plans: u32,
     disarm_at_rest: bool,
     events: Deque<Event, 8>,
 }
@@ -98,6 +107,7 @@ impl Controller {
             id: MoveId(0),
             mode: Mode(0),
             targets: AxisList::new(),
+            share: 1.0,
             phase: MovePhase::None,
             inside_since: None,
             settle_by: Microseconds(0),
@@ -116,6 +126,8 @@ impl Controller {
             before_update: ControllerState::Idle,
             next_tick: Microseconds(0),
             active,
+            planning: None,
+            plans: 0,
             disarm_at_rest: false,
             events: Deque::new(),
         })
@@ -251,6 +263,7 @@ impl Controller {
     }
 
     fn cut_drivers(&mut self, io: &mut impl RigIo) {
+        self.planning = None;
         self.drivers_on = false;
         io.set_drivers(false);
         for axis in &mut self.axes {
@@ -261,6 +274,7 @@ impl Controller {
     /// Gives up the running move and brings every axis to rest within its limits.
     fn brake(&mut self) {
         self.abort_motion();
+        self.planning = None;
         self.axes.iter_mut().for_each(Axis::stop);
     }
 

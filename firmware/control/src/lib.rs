@@ -1,7 +1,8 @@
 //! The controller of the rig: planner, homing, limits and safety states (`no_std`, no async, no I/O).
 //!
 //! [`Controller`] has two entry points: `handle` takes a request, `poll` runs one control tick against the board behind
-//! [`RigIo`]. Time is an argument. [`Node`] adds the serial session, so that the firmware, the native simulation and the
+//! [`RigIo`]. Moves are planned elsewhere, below the tick: `take_plan_request`, [`MovePlanner`], `give_plan`. Time is an
+//! argument. [`Node`] adds the serial session, so that the firmware, the native simulation and the
 //! emulated board all run the same code.
 //!
 //! Terms: the *command* is the position that the planner wants, the *encoder* the position that is measured, and the
@@ -22,6 +23,7 @@ mod homing_sequence;
 mod io;
 mod latch;
 mod lease;
+mod move_planner;
 mod node;
 mod plan;
 mod profile;
@@ -37,10 +39,11 @@ mod updater;
 
 pub use board_settings::{BoardSettings, Machine, SettingError};
 pub use bounds::LONGEST_BRAKING_MS;
-pub use controller::{Controller, Event};
+pub use controller::{Controller, Event, PLAN_TICKS};
 pub use io::{MAX_STEPS_PER_TICK, RigIo, StepSchedule, TriggerEdge};
+pub use move_planner::{MovePlanner, PlanRequest, PlannedWay};
 pub use node::{Node, NodeIdentity};
-pub use plan::{AxisPlanner, PlanStart, Together};
+pub use plan::{AxisPlanner, PlanStart};
 pub use profile::Limits;
 pub use services::{BoardServices, Flash, FlashError, PAGE, UNIT};
 pub use settings::{AxisSettings, HomingSettings, LARGEST_STEP_RATE, Scale, SettingsError};

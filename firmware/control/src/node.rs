@@ -12,6 +12,7 @@ use vergence_protocol::{
 use crate::board_settings::BoardSettings;
 use crate::controller::{Controller, Event};
 use crate::io::RigIo;
+use crate::move_planner::{MovePlanner, PlanRequest};
 use crate::recorder::Recorder;
 use crate::services::BoardServices;
 use crate::settings::SettingsError;
@@ -168,6 +169,27 @@ impl Node {
                 None => {}
             }
         }
+    }
+
+    /// Takes the request for a plan of a move, if there is one: [`Controller::take_plan_request`]. Ask after each call of
+    /// [`Self::receive`] and [`Self::poll`].
+    pub fn take_plan_request(&mut self) -> Option<PlanRequest> {
+        self.controller.take_plan_request()
+    }
+
+    /// Takes a plan; returns false where it begins later: [`Controller::give_plan`].
+    pub fn give_plan(&mut self, plan: &MovePlanner) -> bool {
+        self.controller.give_plan(plan)
+    }
+
+    /// Makes the plan that begins with the next tick, if any, here and now: [`Controller::plan_at_once`].
+    pub fn plan_at_once(&mut self) {
+        self.controller.plan_at_once();
+    }
+
+    /// Judges a tick that comes `late` microseconds after its time: [`Controller::allow_delay`].
+    pub fn allow_delay(&mut self, now: Microseconds, late: u64, io: &mut impl RigIo) {
+        self.controller.allow_delay(now, late, io);
     }
 
     /// Runs the control tick, and trigger and telemetry when they are due.

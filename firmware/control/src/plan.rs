@@ -1,16 +1,9 @@
-//! Planning the move of one axis, and the time in which several axes move together.
-//!
-//! The controller plans with these functions, and so does a host that shows a move before it is made.
+//! Planning the move of one axis.
 
 use vergence_protocol::Micro;
 
 use crate::profile::Limits;
 use crate::trajectory::{FINE_BITS, Fine, MotionState, Trajectory};
-
-/// Durations of axes agree when they differ by less than this share. From rest that takes two rounds.
-const AGREED: f32 = 1e-5;
-/// Largest number of rounds in which axes look for a common duration.
-const MOST_ROUNDS: u32 = 4;
 
 /// The properties of an axis that decide how it moves.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -49,32 +42,5 @@ impl AxisPlanner {
         let from = start.motion;
         let already_there = from.is_rest() && from.position == target && start.from_below;
         already_there || Trajectory::stop(from, self.limits).target() <= target - run_up
-    }
-}
-
-/// The time of a move of several axes that start and finish together.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Together {
-    /// Seconds from the start to the end of the slowest axis; the others rest until then.
-    pub duration: f32,
-    /// What each axis is planned to take at least, in seconds: a little less, so that rounding does not slow the slowest
-    /// axis down.
-    pub at_least: f32,
-}
-
-impl Together {
-    /// Finds the time in which all axes finish together. `slowest` plans all axes for at least so many seconds, and returns
-    /// the longest duration. An axis in mid-move may not be able to take just that long: then the others wait for it.
-    pub fn agree(mut slowest: impl FnMut(f32) -> f32) -> Self {
-        let mut together = Self { duration: 0.0, at_least: 0.0 };
-        for _ in 0..MOST_ROUNDS {
-            let duration = slowest(together.at_least);
-            let agreed = duration <= together.duration * (1.0 + AGREED);
-            together = Self { duration, at_least: duration * (1.0 - AGREED) };
-            if agreed {
-                break;
-            }
-        }
-        together
     }
 }

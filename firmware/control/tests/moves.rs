@@ -201,7 +201,8 @@ fn a_move_to_here_settles_after_the_dwell() {
     assert_eq!(world.move_to([100_000, 1_000_000]), Status::Accepted);
     world.wait_for(ControllerState::Ready);
     assert_eq!(world.move_to([100_000, 1_000_000]), Status::Accepted);
-    world.wait(55_000);
+    // 50 ms of dwell, after 8 ms in which the move is planned.
+    world.wait(63_000);
     assert_eq!(world.pose().phase, MovePhase::Settled);
 }
 

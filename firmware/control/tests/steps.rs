@@ -5,7 +5,7 @@ mod support;
 use proptest::prelude::*;
 use proptest::test_runner::RngSeed;
 use support::{HOST, TICK_US, World, linear, rotary};
-use vergence_control::{AxisSettings, FINE_BITS, Fine, LARGEST_STEP_RATE, Limits, MotionState, Trajectory};
+use vergence_control::{AxisSettings, FINE_BITS, Fine, LARGEST_STEP_RATE, Limits, MotionState, PLAN_TICKS, Trajectory};
 use vergence_protocol::{ControllerState, Request, Status, StopKind};
 
 const FINE: f64 = (1 << FINE_BITS) as f64;
@@ -36,11 +36,24 @@ impl Ideal {
         self.position(us) * (1.0 - rest) + self.position(us + 1) * rest
     }
 
-    /// Goes on to another trajectory from the instant at which the next order begins.
-    fn change(&mut self, world: &World, plan: impl FnOnce(MotionState) -> Trajectory) {
-        let last_tick = world.now.0 / TICK_US * TICK_US;
-        let start = last_tick + 2 * TICK_US;
+    /// The instant at which the next order begins.
+    fn next(world: &World) -> u64 {
+        world.now.0 / TICK_US * TICK_US + 2 * TICK_US
+    }
+
+    /// Goes on to another trajectory once it is planned; where another one is still being planned, that one begins first.
+    fn go_to(&mut self, world: &World, plan: impl FnOnce(MotionState) -> Trajectory) {
+        let asked = Self::next(world).max(self.pieces.last().map_or(0, |(start, _)| *start));
+        let start = asked + u64::from(PLAN_TICKS) * TICK_US;
         let trajectory = plan(self.state(start));
+        self.pieces.push((start, trajectory));
+    }
+
+    /// Stops at once; what is still being planned never begins.
+    fn stop(&mut self, world: &World, limits: Limits) {
+        let start = Self::next(world);
+        self.pieces.retain(|(begins, _)| *begins <= start);
+        let trajectory = Trajectory::stop(self.state(start), limits);
         self.pieces.push((start, trajectory));
     }
 
@@ -88,11 +101,11 @@ proptest! {
         let fine = |target: i32| Fine::from(target) << FINE_BITS;
         let mut ideal = Ideal { pieces: Vec::new(), rest: world.controller.command(0).unwrap() };
         prop_assert_eq!(world.move_by(HOST, [first, 0], speed), Status::Accepted);
-        ideal.change(&world, |from| Trajectory::reach(from, fine(first), full.scaled(f32::from(speed) / 1000.0), 0.0));
+        ideal.go_to(&world, |from| Trajectory::reach(from, fine(first), full.scaled(f32::from(speed) / 1000.0), 0.0));
         world.wait(wait);
         prop_assert_eq!(world.move_by(HOST, [second, 0], other), Status::Accepted);
         let share = f32::from(other) / 1000.0;
-        ideal.change(&world, |from| {
+        ideal.go_to(&world, |from| {
             let limits = Limits { speed: full.speed * share, ..full };
             Trajectory::reach(from, fine(second), if from.is_rest() { full.scaled(share) } else { limits }, 0.0)
         });
@@ -100,7 +113,7 @@ proptest! {
         let moves = world.controller.state() == ControllerState::Moving;
         prop_assert_eq!(world.ask(HOST, &Request::Stop { kind: StopKind::Decelerate }), Status::Accepted);
         if moves {
-            ideal.change(&world, |from| Trajectory::stop(from, full));
+            ideal.stop(&world, full);
         }
         world.wait_for(ControllerState::Ready);
         check(&ideal, &world, &axis);

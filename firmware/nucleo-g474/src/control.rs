@@ -15,12 +15,12 @@ use embassy_stm32::timer::low_level::Timer;
 use embassy_stm32::{Peri, peripherals};
 use embassy_time::Instant;
 use static_cell::StaticCell;
-use vergence_control::{Node, TICK_US};
+use vergence_control::{MovePlanner, Node, TICK_US};
 use vergence_nucleo_common::Services;
 use vergence_protocol::{MAX_FRAME, Microseconds};
 
 use crate::rig::Rig;
-use crate::{exchange, log, memory};
+use crate::{exchange, log, memory, planning};
 
 /// Priority below the short interrupts of time, DMA and serial line, and above the executor.
 const PRIORITY: Priority = Priority::P8;
@@ -43,6 +43,8 @@ pub struct Control {
     node: Node,
     rig: Rig,
     services: Services,
+    /// The plan that waits for its tick.
+    plan: Option<&'static mut MovePlanner>,
     /// Start of the running tick.
     tick: Microseconds,
     /// Length of the running tick, as the timer is set, in microseconds.
@@ -60,12 +62,21 @@ pub fn start(node: Node, rig: Rig, services: Services, timer: Peri<'static, peri
     set_length(PERIOD);
     TIM7.egr().write(|w| w.set_ug(true));
     TIM7.sr().write(|_| {});
-    let tick = Microseconds(Instant::now().as_micros());
-    let control =
-        CONTROL.init(Control { node, rig, services, tick, length: PERIOD, received: [0; 64], frame: [0; MAX_FRAME] });
-    critical_section::with(|cs| HANDOVER.borrow_ref_mut(cs).replace(control));
+    let control = CONTROL.init(Control {
+        node,
+        rig,
+        services,
+        plan: None,
+        tick: Microseconds(0),
+        length: PERIOD,
+        received: [0; 64],
+        frame: [0; MAX_FRAME],
+    });
     TIM7.dier().write(|w| w.set_uie(true));
     TIM7.cr1().write(|w| w.set_cen(true));
+    // Not before the counter runs: moving the node to its place takes some 300 us.
+    control.tick = Microseconds(Instant::now().as_micros());
+    critical_section::with(|cs| HANDOVER.borrow_ref_mut(cs).replace(control));
     interrupt::TIM7_DAC.set_priority(PRIORITY);
     // SAFETY: the handler has what it needs; nothing relies on this interrupt being masked.
     #[allow(unsafe_code, reason = "unmasking an interrupt")]
@@ -104,6 +115,7 @@ impl Control {
             self.begin_tick();
         }
         self.receive();
+        planning::exchange(&mut self.node, &mut self.plan);
         self.transmit();
         self.follow();
     }
@@ -118,6 +130,9 @@ impl Control {
         if !self.rig.begin_tick() {
             defmt::warn!("steps cut short at {=u64}", self.tick.0);
         }
+        // After the wait for the steps of the tick before, so that steps cut short are a delay as well.
+        let late = Instant::now().as_micros().saturating_sub(self.tick.0);
+        self.node.allow_delay(self.tick, late, &mut self.rig);
         self.node.poll(self.tick, &mut self.rig);
         TICKS.fetch_add(1, Ordering::Relaxed);
     }

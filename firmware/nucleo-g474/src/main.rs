@@ -1,10 +1,10 @@
 //! The controller on a NUCLEO-G474RE: pins, timers, interrupts, link, flash and log around [`vergence_control::Node`].
 //!
 //! Three levels of urgency: the short interrupts of trigger edge, time, DMA and serial line; below them the node with its
-//! 1 kHz tick ([`control`]); below that the executor's tasks ([`link`], [`watchdog`]).
+//! 1 kHz tick ([`control`]); below that the executor's tasks ([`link`], [`planning`], [`watchdog`]).
 //!
 //! Imports go one way: this file starts everything; [`board`] hands out the pins; [`link`] and [`control`] exchange bytes
-//! through [`exchange`] and do not know each other.
+//! through [`exchange`] and do not know each other; [`control`] gets its plans through [`planning`].
 
 #![no_std]
 #![no_main]
@@ -18,6 +18,7 @@ mod factory;
 mod link;
 mod log;
 mod memory;
+mod planning;
 mod rig;
 mod steps;
 mod trigger;
@@ -61,11 +62,15 @@ async fn main(spawner: Spawner) {
         dying::give_up(DeathKind::SerialLine)
     };
     control::start(node, board.rig, services, board.tick);
-    if let (Ok(receive), Ok(transmit), Ok(watch)) =
-        (link::receive(rx), link::transmit(tx), watchdog::watch(watchdog, board.led))
-    {
+    if let (Ok(receive), Ok(transmit), Ok(plan), Ok(watch)) = (
+        link::receive(rx),
+        link::transmit(tx),
+        planning::plan(planning::planner()),
+        watchdog::watch(watchdog, board.led),
+    ) {
         spawner.spawn(receive);
         spawner.spawn(transmit);
+        spawner.spawn(plan);
         spawner.spawn(watch);
     }
 }

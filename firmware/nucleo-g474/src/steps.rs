@@ -28,7 +28,8 @@ const DIRECTION_SETUP: u32 = 50;
 /// Delay of all steps in counts, which leaves time to load a list after the tick has begun and the last pulse of the
 /// previous list is over.
 const DELAY: u32 = 200;
-/// Time in microseconds after the start of a tick by which the previous list must have ended.
+/// Time in microseconds after the start of a tick by which the previous list must have ended: the controller takes a longer
+/// delay for a fault.
 const PATIENCE_US: u16 = 200;
 
 /// A channel of DMA1.
@@ -97,14 +98,18 @@ impl StepPulses {
     /// Orders the steps of the coming tick.
     pub fn order(&mut self, steps: &StepSchedule) {
         let counts = |at_ns: &u32| at_ns * COUNTS_PER_US / 1_000;
-        let back = &mut self.periods[1 - self.front];
-        // DMA moves a word for the last step as well, so that steps can be counted; no period follows it.
-        back.fill(u16::MAX);
-        for (period, pair) in back.iter_mut().zip(steps.at_ns.windows(2)) {
-            let length = counts(&pair[1]).saturating_sub(counts(&pair[0])).max(2 * PULSE);
-            *period = u16::try_from(length - 1).unwrap_or(u16::MAX);
+        let mut instants = steps.at_ns.iter().map(counts);
+        let first = instants.next().unwrap_or(0);
+        let mut last = first;
+        let mut periods = self.periods[1 - self.front].iter_mut();
+        for (at, period) in instants.zip(&mut periods) {
+            *period = (at.saturating_sub(last).max(2 * PULSE) - 1) as u16;
+            last = at;
         }
-        let first = steps.at_ns.first().map_or(0, counts);
+        // DMA moves a word for the last step as well, so that steps can be counted; no period follows it.
+        if let Some(after) = periods.next() {
+            *after = u16::MAX;
+        }
         self.ordered = Ordered { count: steps.at_ns.len(), forward: steps.forward, first };
     }
 
@@ -149,7 +154,7 @@ impl StepPulses {
         self.running.saturating_sub(usize::from(self.dma.ndtr().read().ndt()))
     }
 
-    /// Waits for the end of the running list, at most [`DELAY`] into the next tick; returns whether it came in time.
+    /// Waits for the end of the running list, at most [`PATIENCE_US`] into the next tick; returns whether it came in time.
     fn wait_for_the_last(&self) -> bool {
         while self.timer.cr1().read().cen() {
             if TIM7.cnt().read().cnt() > PATIENCE_US {

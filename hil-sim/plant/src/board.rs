@@ -84,6 +84,7 @@ impl NativeBoard {
             self.now = self.next_tick();
             self.plant.advance(self.now);
             self.node.poll(self.now, &mut self.plant);
+            self.node.plan_at_once();
         }
         if to > self.now {
             self.plant.advance(to);

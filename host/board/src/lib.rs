@@ -33,8 +33,8 @@ pub use firmware::{
 };
 pub use link::{
     BoardKnowledge, Client, Followed, Follower, HostClock, LinkError, ManagementLink, OpenError, OpenWire, Port,
-    PortLock, ReaderMark, Wire, describe_port, fresh_session, is_candidate, is_held, is_st_link, is_wanted, open,
-    serial_ports, stop_unheard,
+    PortLock, ReaderMark, RepeatedStop, Wire, describe_port, fresh_session, is_candidate, is_held, is_st_link,
+    is_wanted, open, send_stop, serial_ports, stop_beside,
 };
 pub use link_figures::{LinkFigures, LinkLosses};
 pub use listening::{Listening, Source, reach_again};

@@ -1,6 +1,8 @@
 //! The board's plan of a move, computed on the host by the board's own planner, so that it can be read before it is made.
 
-use vergence_control::{AxisPlanner, FINE_BITS, Fine, Limits, MotionState, PlanStart, Together, Trajectory};
+use vergence_control::{
+    AxisPlanner, FINE_BITS, Fine, Limits, MotionState, MovePlanner, PlanRequest, PlanStart, PlannedWay, Trajectory,
+};
 use vergence_protocol::{AxisInfo, Micro};
 use vergence_rig::{AxisPosition, Rig, RigAxis};
 
@@ -62,22 +64,19 @@ impl MovePlan {
     /// Plans the move of `rig` from `start` to the targets `to`, one for each axis, within the limits of the board.
     #[must_use]
     pub fn new(rig: &Rig, limits: &[AxisLimits], start: MoveStart<'_>, to: &[AxisPosition]) -> Self {
-        let ways: Vec<_> = rig.axes.iter().zip(limits).zip(start.positions.iter().zip(to)).collect();
-        let plan = |limits: &AxisLimits, from: AxisPosition, to: AxisPosition, at_least: f32| {
+        let ways = limits.iter().zip(start.positions.iter().zip(to)).map(|(limits, (from, to))| {
             let motion = MotionState::at(Fine::from(from.micro().0) << FINE_BITS);
             let start = PlanStart { motion, from_below: start.from_below };
-            limits.planner().plan(start, to.micro(), FULL_SPEED, at_least)
-        };
-        let together = Together::agree(|at_least| {
-            let durations =
-                ways.iter().map(|((_, limits), (from, to))| plan(limits, **from, **to, at_least).duration());
-            durations.fold(0.0, f32::max)
+            PlannedWay { planner: limits.planner(), start, target: to.micro() }
         });
-        let axes = ways.iter().map(|((axis, limits), (from, to))| {
-            let planned = plan(limits, **from, **to, together.at_least);
-            AxisPlan { from: **from, to: **to, knots: knots(axis, &planned) }
+        let planned = MovePlanner::planned(PlanRequest { number: 0, share: FULL_SPEED, ways: ways.collect() });
+        let ways = rig.axes.iter().zip(start.positions.iter().zip(to));
+        let axes = ways.zip(planned.trajectories()).map(|((axis, (from, to)), trajectory)| AxisPlan {
+            from: *from,
+            to: *to,
+            knots: knots(axis, trajectory),
         });
-        Self { duration: f64::from(together.duration), axes: axes.collect() }
+        Self { duration: f64::from(planned.duration()), axes: axes.collect() }
     }
 }
 

@@ -10,7 +10,6 @@ use crate::TICK_US;
 use crate::axis::Axis;
 use crate::homing_sequence::HomingSequence;
 use crate::io::RigIo;
-use crate::plan::Together;
 
 impl Controller {
     /// Carries out a request of `session` that concerns motion, or refuses it. Other requests are refused as
@@ -155,23 +154,12 @@ impl Controller {
 
     fn begin(&mut self, id: MoveId, mode: Mode, targets: AxisList<Micro>, speed: Permille) {
         self.abort_motion();
-        self.start_together(&targets, f32::from(speed.0) / f32::from(Permille::FULL.0));
         let (inside_since, settle_by) = (None, Microseconds(0));
-        self.active = ActiveMove { id, mode, targets, phase: MovePhase::Running, inside_since, settle_by };
+        let share = f32::from(speed.0) / f32::from(Permille::FULL.0);
+        self.active = ActiveMove { id, mode, targets, share, phase: MovePhase::Running, inside_since, settle_by };
+        self.want_plan();
         self.state = ControllerState::Moving;
         self.tell_phase();
-    }
-
-    /// Starts all axes so that they finish together, in the time of the slowest.
-    fn start_together(&mut self, targets: &AxisList<Micro>, share: f32) {
-        let Together { duration, at_least } = Together::agree(|at_least| {
-            let durations = self.axes.iter().zip(targets).map(|(axis, &to)| axis.plan(to, share, at_least).duration());
-            durations.fold(0.0, f32::max)
-        });
-        for (axis, &target) in self.axes.iter_mut().zip(targets) {
-            let planned = axis.plan(target, share, at_least);
-            axis.run_planned(planned, duration);
-        }
     }
 
     fn stop(&mut self, kind: StopKind, io: &mut impl RigIo) {

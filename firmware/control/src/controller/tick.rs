@@ -11,6 +11,9 @@ use crate::self_test::Verdict;
 
 /// Time in microseconds that the encoders must stay inside the tolerance before a move counts as settled.
 const DWELL_US: u64 = 50_000;
+/// Latest time in microseconds after which a tick may come while steps are made. A board that starts the steps of a tick by
+/// its interrupt lets the list of the tick before end meanwhile, which is late by as much.
+const LATEST_US: u64 = 200;
 /// Longest time in microseconds from the end of a trajectory until the encoders are inside the tolerance.
 const SETTLE_TIMEOUT_US: u64 = 1_000_000;
 
@@ -34,6 +37,7 @@ impl Controller {
             _ => {}
         }
         if self.drivers_on {
+            self.count_planning();
             for axis in &mut self.axes {
                 axis.advance(tick, io);
             }
@@ -42,17 +46,20 @@ impl Controller {
         self.next_tick
     }
 
-    /// The start of the tick that `now` belongs to. Steps are ordered one tick ahead: when a tick is later than that, the
-    /// motors have already stood still in mid-move, which is a fault.
+    /// The start of the tick that `now` belongs to.
     fn keep_time(&mut self, now: Microseconds, io: &mut impl RigIo) -> Microseconds {
         let late = now.0 - self.next_tick.0;
-        if late < TICK_US {
-            return self.next_tick;
-        }
-        if self.drivers_on && self.any_moving() {
+        self.allow_delay(now, late, io);
+        if late < TICK_US { self.next_tick } else { now }
+    }
+
+    /// Judges a tick that comes `late` microseconds after its time: the steps of a tick begin with it, so that motors in
+    /// mid-move stand still until then. More than [`LATEST_US`] is a fault. A board that calls [`Self::poll`] with the time
+    /// at which a tick was due, not that at which it came, calls this before.
+    pub fn allow_delay(&mut self, now: Microseconds, late: u64, io: &mut impl RigIo) {
+        if late > LATEST_US && self.drivers_on && self.any_moving() {
             self.cut(now, FaultCode::TickMissed, None, i32::try_from(late).unwrap_or(i32::MAX), io);
         }
-        now
     }
 
     fn poll_self_test(&mut self, now: Microseconds, io: &impl RigIo) {
@@ -111,7 +118,7 @@ impl Controller {
     }
 
     fn poll_move(&mut self, now: Microseconds, io: &impl RigIo) {
-        if self.any_moving() {
+        if self.planning.is_some() || self.any_moving() {
             return;
         }
         if self.active.phase == MovePhase::Running {

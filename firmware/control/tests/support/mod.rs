@@ -91,6 +91,8 @@ pub struct World {
     next_beat: u64,
     /// Whether the host sends heartbeats.
     pub alive: bool,
+    /// Whether plans are made as soon as their tick comes; else the test makes them.
+    pub plans_itself: bool,
     move_id: u16,
 }
 
@@ -110,6 +112,7 @@ impl World {
             next_tick: 0,
             next_beat: 137,
             alive: true,
+            plans_itself: true,
             move_id: 0,
         };
         world.wait(2 * BEAT_US);
@@ -178,6 +181,9 @@ impl World {
 
     fn tick(&mut self) {
         let next = self.controller.poll(self.now, &mut self.rig);
+        if self.plans_itself {
+            self.controller.plan_at_once();
+        }
         assert_eq!(next.0, self.now.0 + TICK_US);
         self.next_tick = next.0;
         self.watch.tick(self.now, &self.controller, &mut self.rig);

@@ -9,8 +9,9 @@ mod management;
 mod open;
 mod port_lock;
 mod ports;
+mod repeated_stop;
 mod session_id;
-mod stop_unheard;
+mod stop_beside;
 mod task;
 
 pub use client::Client;
@@ -22,5 +23,6 @@ pub use management::ManagementLink;
 pub use open::{OpenWire, Port, Wire, open};
 pub use port_lock::{PortLock, ReaderMark, is_held, is_wanted};
 pub use ports::{describe_port, is_candidate, is_st_link, serial_ports};
+pub use repeated_stop::RepeatedStop;
 pub use session_id::fresh_session;
-pub use stop_unheard::stop_unheard;
+pub use stop_beside::{send_stop, stop_beside};

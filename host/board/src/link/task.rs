@@ -18,6 +18,7 @@ use super::error::LinkError;
 use super::follow::{Broadcaster, Followed};
 use super::knowledge::BoardKnowledge;
 use super::open::OpenWire;
+use super::repeated_stop::RepeatedStop;
 
 /// Longest wait for the answer to the first Hello.
 const HELLO_TIMEOUT: Duration = Duration::from_secs(2);
@@ -52,6 +53,8 @@ pub(super) struct LinkTask {
     /// Receives the outcome of the first Hello; `None` once it was sent.
     opened: Option<oneshot::Sender<Result<Compatibility, LinkError>>>,
     waiting: BTreeMap<Ticket, oneshot::Sender<Result<Report, LinkError>>>,
+    /// Stops that the board has not answered yet.
+    stops: Vec<(RepeatedStop, oneshot::Sender<Result<Report, LinkError>>)>,
     knowledge: BoardKnowledge,
     /// The lease in milliseconds, and when the next heartbeat is due.
     heartbeat: Option<(u16, Microseconds)>,
@@ -77,6 +80,7 @@ impl LinkTask {
             outlets,
             opened: Some(opened),
             waiting: BTreeMap::new(),
+            stops: Vec::new(),
             knowledge,
             heartbeat: None,
             next_probe: Microseconds(0),
@@ -128,7 +132,8 @@ impl LinkTask {
         if let Some(opened) = self.opened.take() {
             let _ = opened.send(Err(error.clone()));
         }
-        for reply in std::mem::take(&mut self.waiting).into_values() {
+        let stops = std::mem::take(&mut self.stops).into_iter().map(|(_, reply)| reply);
+        for reply in std::mem::take(&mut self.waiting).into_values().chain(stops) {
             let _ = reply.send(Err(error.clone()));
         }
         error
@@ -141,6 +146,7 @@ impl LinkTask {
             opening.then_some(hello_deadline),
             (!opening).then_some(self.next_probe),
             self.heartbeat.map(|(_, due)| due),
+            self.stops.iter().map(|(stop, _)| stop.due()).min(),
         ];
         deadlines.into_iter().flatten().min().unwrap_or(hello_deadline)
     }
@@ -150,6 +156,7 @@ impl LinkTask {
         let now = self.clock.now();
         self.queue_heartbeat(now);
         self.queue_probe(now);
+        self.queue_stops(now);
         let mut frame = [0; MAX_FRAME];
         while let Some(length) = self.session.transmit(self.clock.now(), &mut frame) {
             wire.stream.write_all(frame.get(..length).unwrap_or_default()).await?;
@@ -164,6 +171,15 @@ impl LinkTask {
             // Five heartbeats per lease: four may be lost. A full queue already holds one.
             self.heartbeat = Some((lease_ms, Microseconds(now.0 + u64::from(lease_ms) * 1000 / 5)));
             let _ = self.session.send_now(Request::Heartbeat { session: self.session.id(), lease_ms });
+        }
+    }
+
+    /// Sends stops again that are not answered; those that nobody waits for any more are dropped.
+    fn queue_stops(&mut self, now: Microseconds) {
+        self.stops.retain(|(_, reply)| !reply.is_closed());
+        for (stop, _) in &mut self.stops {
+            // A full queue already holds one.
+            let _ = stop.send(now, &mut self.session);
         }
     }
 
@@ -183,21 +199,18 @@ impl LinkTask {
         match command {
             Command::Hold { lease_ms: 0 } => self.heartbeat = None,
             Command::Hold { lease_ms } => self.heartbeat = Some((lease_ms, now)),
-            Command::Ask { request, reply } => {
-                // A stop must not wait until earlier requests are acknowledged.
-                let sent = match request {
-                    Request::Stop { .. } => self.session.send_now(request),
-                    _ => self.session.submit(now, request),
-                };
-                match sent {
-                    Ok(ticket) => {
-                        self.waiting.insert(ticket, reply);
-                    }
-                    Err(error) => {
-                        let _ = reply.send(Err(LinkError::Unsendable(error.to_string())));
-                    }
-                }
+            // A stop must not wait until earlier requests are acknowledged.
+            Command::Ask { request: Request::Stop { kind }, reply } => {
+                self.stops.push((RepeatedStop::new(kind, now), reply));
             }
+            Command::Ask { request, reply } => match self.session.submit(now, request) {
+                Ok(ticket) => {
+                    self.waiting.insert(ticket, reply);
+                }
+                Err(error) => {
+                    let _ = reply.send(Err(LinkError::Unsendable(error.to_string())));
+                }
+            },
         }
     }
 
@@ -216,7 +229,9 @@ impl LinkTask {
                 }
                 HostEvent::Lost { .. } => return Err(LinkError::SessionLost),
                 HostEvent::Reply { ticket, report } => {
-                    if let Some(reply) = self.waiting.remove(&ticket) {
+                    let stop = self.stops.iter().position(|(stop, _)| stop.is_answered_by(ticket));
+                    let stop = stop.map(|index| self.stops.swap_remove(index).1);
+                    if let Some(reply) = stop.or_else(|| self.waiting.remove(&ticket)) {
                         let _ = reply.send(Ok(report));
                     }
                 }

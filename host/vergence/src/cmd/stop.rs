@@ -1,7 +1,7 @@
 //! `vergence stop`: brakes now.
 
 use serde_json::json;
-use vergence_board::{Port, open, stop_unheard};
+use vergence_board::{Port, open, send_stop, stop_beside};
 
 use super::connect::{connect_any, port};
 use super::options::active_rig;
@@ -17,16 +17,21 @@ pub struct Args {}
 
 pub async fn run(_: &Args, common: &CommonOptions, console: Console) -> Result<(), Failure> {
     if let port @ Port::Serial(_) = port(common)? {
-        let wire = open(&port, common.baud, true).await?;
+        let mut wire = open(&port, common.baud, true).await?;
         if wire.lock.is_none() {
-            stop_unheard(&port, wire).await?;
-            console.say("stop sent; the vergence that holds the port tells what became of it")?;
-            return console.result(&json!({"stop": "sent", "confirmed": false}));
+            let Some(state) = stop_beside(&port, wire).await? else {
+                console.say("stop sent; the vergence that holds the port shows what became of it")?;
+                return console.result(&json!({"stop": "sent", "confirmed": false}));
+            };
+            console.say(format!("stopped: {state}"))?;
+            return console.result(&json!({"stop": "sent", "confirmed": true, "state": state.to_string()}));
         }
+        // Before the session, which takes some round trips to open; the answer comes to the one after it.
+        send_stop(&port, &mut wire).await?;
     }
     let mut board = connect_any(&with_readable_rig(common), console, "stopping").await?;
     board.stop().await?;
-    // Only now does it matter whether positions can be told.
+    // Only now does it matter whether positions are known.
     if board.check_axes().await.is_ok() {
         return console.say_pose(board.rig(), board.pose());
     }

@@ -1,0 +1,91 @@
+//! Control ticks that come late in mid-move: up to 200 us no step is lost, and later is a fault, on the chip as on the native
+//! board.
+#![allow(clippy::expect_used, clippy::panic, reason = "a test fails loudly")]
+
+mod elf_rig;
+
+use elf_rig::{Board, Conversation, ElfBoard, Standing};
+use vergence_cpu::{Access, Bus};
+use vergence_mcu::Picoseconds;
+use vergence_plant::NativeBoard;
+use vergence_protocol::{ControllerState, FaultCode, MovePhase, Status};
+
+const HERBIVORE: [i32; 2] = [145_000, 2_094_395];
+const TIM7_DIER: u32 = 0x4000_140C;
+const TIM7_CNT: u32 = 0x4000_1424;
+/// Delays without and with a fault, in microseconds. The chip needs some microseconds more to begin a tick.
+const HARMLESS: [u64; 4] = [20, 90, 150, 185];
+const TOO_LATE: [u64; 4] = [210, 400, 900, 1_500];
+
+/// A board whose next tick can be delayed.
+trait Delayed: Board {
+    fn delay_next_tick(&mut self, us: u64);
+}
+
+impl Delayed for NativeBoard {
+    fn delay_next_tick(&mut self, us: u64) {
+        self.delay_tick(us);
+    }
+}
+
+impl Delayed for ElfBoard {
+    /// Masks the interrupt of the tick's timer until so long after its next update.
+    fn delay_next_tick(&mut self, us: u64) {
+        let access = |talk: &mut Self, value: Option<u32>, register| {
+            let cycle = talk.machine.cpu().now();
+            let chip = talk.machine.chip_mut();
+            match value {
+                Some(value) => chip.write(cycle, register, Access::Word, value).map(|_| 0).expect("it is there"),
+                None => chip.read(cycle, register, Access::Word).expect("it is there"),
+            }
+        };
+        let passed = u64::from(access(self, None, TIM7_CNT));
+        access(self, Some(0), TIM7_DIER);
+        self.machine.run_for(Picoseconds::microseconds(1_000 - passed + us));
+        access(self, Some(1), TIM7_DIER);
+    }
+}
+
+/// In the middle of a move at full speed.
+fn under_way<B: Board>() -> Conversation<B> {
+    let mut talk = Conversation::<B>::homed(&Standing::default());
+    assert_eq!(talk.move_to(HERBIVORE, 1), Status::Accepted);
+    talk.wait(400_000);
+    assert_eq!(talk.pose().state, ControllerState::Moving);
+    talk
+}
+
+/// The motors' steps at the end of a move in which ticks came late.
+fn steps_after<B: Delayed>(delays: &[u64]) -> [i32; 2] {
+    let mut talk = under_way::<B>();
+    for &us in delays {
+        talk.board.delay_next_tick(us);
+        talk.wait(20_000);
+    }
+    talk.wait_for(ControllerState::Ready);
+    assert_eq!((talk.pose().phase, talk.faults.as_slice()), (MovePhase::Settled, [].as_slice()));
+    talk.steps()
+}
+
+/// The faults that one late tick leads to.
+fn faults_of<B: Delayed>(us: u64) -> Vec<FaultCode> {
+    let mut talk = under_way::<B>();
+    talk.board.delay_next_tick(us);
+    talk.wait(20_000);
+    assert!(!talk.board.plant().drivers_on() && talk.pose().referenced.0 == 0, "{us}");
+    talk.faults.iter().map(|fault| fault.code).collect()
+}
+
+#[test]
+fn ticks_that_are_a_little_late_lose_no_step() {
+    assert_eq!(steps_after::<NativeBoard>(&HARMLESS), steps_after::<NativeBoard>(&[]));
+    assert_eq!(steps_after::<ElfBoard>(&HARMLESS), steps_after::<ElfBoard>(&[]));
+}
+
+#[test]
+fn a_tick_that_is_too_late_is_missed() {
+    for us in TOO_LATE {
+        assert_eq!(faults_of::<NativeBoard>(us), [FaultCode::TickMissed], "{us}");
+        assert_eq!(faults_of::<ElfBoard>(us), [FaultCode::TickMissed], "{us}");
+    }
+}
