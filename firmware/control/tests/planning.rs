@@ -76,7 +76,8 @@ fn a_host_that_changes_its_mind_faster_than_plans_are_made_is_followed() {
         assert_eq!(world.move_to([100_000 + 100 * part, 1_000_000]), Status::Accepted);
         world.wait(5 * TICK_US);
     }
-    assert!(world.rig.axes[0].load > 80_000.0, "it moves meanwhile");
+    let load = world.rig.axes[0].load;
+    assert!(load > 70_000.0, "it moves meanwhile: {load}");
     world.wait_for(ControllerState::Ready);
     assert_eq!(world.pose().phase, MovePhase::Settled);
     assert!((world.rig.axes[0].load - 105_900.0).abs() < 30.0);

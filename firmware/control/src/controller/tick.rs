@@ -54,7 +54,7 @@ impl Controller {
     }
 
     /// Judges a tick that comes `late` microseconds after its time: the steps of a tick begin with it, so that motors in
-    /// mid-move stand still until then. More than [`LATEST_US`] is a fault. A board that calls [`Self::poll`] with the time
+    /// mid-move stand still until then. More than 200 us is a fault. A board that calls [`Self::poll`] with the time
     /// at which a tick was due, not that at which it came, calls this before.
     pub fn allow_delay(&mut self, now: Microseconds, late: u64, io: &mut impl RigIo) {
         if late > LATEST_US && self.drivers_on && self.any_moving() {
