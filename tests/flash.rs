@@ -259,7 +259,8 @@ fn a_debug_probe_writes_image_and_seal_and_the_board_is_asked() {
     let file = std::fs::read(&image).expect("an image");
     let (state, active) = got.split_at(2_048);
     assert!(state.iter().all(|&byte| byte == 0xFF), "no swap may be under way");
-    assert_eq!((&active[..file.len() - 128], &active[98_304..98_304 + 128]), (&file[128..], &file[..128]));
+    let seal_at = vergence_image::layout::CAPACITY as usize;
+    assert_eq!((&active[..file.len() - 128], &active[seal_at..seal_at + 128]), (&file[128..], &file[..128]));
 
     // The boot loader itself.
     let boot_loader = story.workshop.file("boot.elf", &elf(ARM, &[(0x0800_0000, &[1; 64])]));

@@ -54,7 +54,6 @@ const ALLOWED: &[(&str, &[&str])] = &[
         ],
     ),
     ("vergence-camera", &["vergence-vision", "vergence-rig"]),
-    ("vergence-files", &[]),
     ("vergence-models", &["vergence-matching", "vergence-networks"]),
     (
         "vergence-sim",

@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use serde_json::{Map, Value, json};
 use vergence_files::{FileError, write_png, write_whole};
 use vergence_matching::{DenseDepth, DenseSample};
-use vergence_pipeline::gates::MAX_RELATIVE_SIGMA;
+use vergence_pipeline::limits::MAX_RELATIVE_SIGMA;
 use vergence_pipeline::{PairImages, StageTimes, colour_at};
 use vergence_rig::{Rig, RigPose, rounded};
 use vergence_vision::{Left, Pixel};

@@ -5,7 +5,7 @@ use image::imageops::grayscale;
 use vergence_matching::image_corners;
 use vergence_vision::{Angle, Camera, KannalaBrandt, Pixel, UnitRay};
 
-use crate::gates::CORNER_SIGMA;
+use crate::limits::CORNER_SIGMA;
 use crate::pair::colour_at;
 
 /// Most bearings of one image.

@@ -9,7 +9,7 @@ use vergence_vision::{
     Cloud, CloudPoint, DropReason, Kernel, PixelPair, PoseDrift, StereoPair, cloud_of_each, pose_drift,
 };
 
-use crate::gates::{cloud_gates, matching_sigma};
+use crate::limits::{cloud_gates, matching_sigma};
 use crate::pair::{PairImages, colour_at};
 use crate::pose::PairPose;
 use crate::stage::Stage;

@@ -3,7 +3,7 @@
 //!
 //! - [`Exposures`] finds which images of both cameras belong together, and when they were exposed;
 //! - [`PairPose`] says where both cameras were while a pair was exposed: at rest, at a trigger pulse, or in motion;
-//! - [`pair_cloud`] matches a [`PairImages`] and triangulates what passes the [`gates`]; [`cloud_of_pairs`] triangulates given
+//! - [`pair_cloud`] matches a [`PairImages`] and triangulates what passes the gates, whose [`limits`] all verbs share; [`cloud_of_pairs`] triangulates given
 //!   correspondences;
 //! - [`dense_ranges`] measures every pixel of the left image;
 //! - [`bearings`] gives the directions that one camera alone can see;
@@ -17,7 +17,7 @@ mod bearings;
 mod cloud;
 mod dense;
 mod exposures;
-pub mod gates;
+pub mod limits;
 mod observation;
 mod pair;
 mod pose;

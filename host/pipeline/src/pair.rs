@@ -6,7 +6,7 @@ use vergence_matching::ImagePair;
 use vergence_rig::{Rig, RigPose};
 use vergence_vision::{Angle, Pixel};
 
-use crate::gates::NEAREST;
+use crate::limits::NEAREST;
 
 /// The images that both cameras took at one instant.
 #[derive(Clone, Copy, Debug)]

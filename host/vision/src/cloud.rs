@@ -1,4 +1,4 @@
-//! Triangulation of matched pixels to a cloud of points with their uncertainty, and a reason for every dropped match.
+//! Triangulation of matched pixels to a cloud of points with their uncertainty; [`Gates`] decide which matches become points.
 
 use std::collections::BTreeMap;
 
@@ -6,48 +6,9 @@ use nalgebra::Matrix3;
 
 use crate::covariance::range_sigma;
 use crate::epipolar::ray_to_plane;
-use crate::triangulation::{Kernel, Triangulated};
-use crate::uncertainty::{PointUncertainty, ResidualUncertainty, SharedCovariance};
-use crate::{Angle, DropReason, Left, Length, PixelPair, Point, Right, StereoPair};
-
-/// Settings of triangulation: standard deviations, the limits that a match must satisfy, and the method.
-///
-/// A limit that is not a number drops every match.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Gates {
-    /// Largest angle of one ray to the epipolar plane of the other, in standard deviations of that angle, which come
-    /// from pixel noise and from the shared parameters.
-    pub epipolar_sigmas: f64,
-    /// Smallest parallax: the angle that the baseline spans as seen from the point.
-    pub min_parallax: Angle,
-    /// Largest distance from the left optical centre; `None` for no limit.
-    pub max_range: Option<Length>,
-    /// Standard deviation of a matched position in pixels, in each coordinate of each image.
-    pub pixel_sigma: f64,
-    /// Largest standard deviation of the range from the noise of its own two pixels, as a fraction of the range. The
-    /// uncertainty of lenses and pose is reported but not limited here: it bends the cloud as a whole.
-    pub max_relative_sigma: f64,
-    /// Covariance of lenses and pose, which all points share.
-    pub shared: SharedCovariance,
-    /// The method of triangulation.
-    pub kernel: Kernel,
-}
-
-impl Default for Gates {
-    /// Three standard deviations at the epipolar gate, lenses and pose known exactly, matches good to 0.2 pixels, and
-    /// ranges with a standard deviation up to a twentieth.
-    fn default() -> Self {
-        Self {
-            epipolar_sigmas: 3.0,
-            min_parallax: Angle::from_rad(0.0),
-            max_range: None,
-            pixel_sigma: 0.2,
-            max_relative_sigma: 0.05,
-            shared: SharedCovariance::exact(),
-            kernel: Kernel::PseudoIntersection,
-        }
-    }
-}
+use crate::triangulation::Triangulated;
+use crate::uncertainty::{PointUncertainty, ResidualUncertainty};
+use crate::{Angle, DropReason, Gates, Left, Length, PixelPair, Point, Right, StereoPair};
 
 /// A triangulated point with its match and its uncertainty.
 #[derive(Clone, Copy, Debug, PartialEq)]

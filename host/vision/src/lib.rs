@@ -25,6 +25,7 @@ mod cloud;
 mod covariance;
 mod epipolar;
 mod frames;
+mod gates;
 mod import;
 mod kannala_brandt;
 mod lens_derivatives;
@@ -36,15 +37,16 @@ mod units;
 mod zones;
 
 pub use batch::{BatchLens, BatchPair, BatchPoints, BatchTriangulation, Instructions, triangulate_batch};
-pub use cloud::{Cloud, CloudPoint, Gates, cloud, cloud_of_each, cloud_point};
+pub use cloud::{Cloud, CloudPoint, cloud, cloud_of_each, cloud_point};
 pub use covariance::{covariance, range_sigma};
 pub use epipolar::{dihedral, ray_to_plane};
 pub use frames::{Base, Camera, Frame, Left, Point, Right, Side, Transform, UnitRay, World};
+pub use gates::{DropReason, Gates};
 pub use import::{OpenCvFisheye, largest_theta};
 pub use kannala_brandt::{ImageSize, InvalidLens, KannalaBrandt, OutsideField, Pixel};
 pub use lens_derivatives::LENS_PARAMETERS;
 pub use pose_drift::{PoseDrift, pose_drift};
-pub use stereo_pair::{DropReason, PixelPair, StereoPair};
+pub use stereo_pair::{PixelPair, StereoPair};
 pub use triangulation::{
     AngularNorm, Feet, Kernel, Rejection, Triangulated, UnknownKernel, angular, closest_approach, edge_plane, mid2,
     midpoint, pseudo_intersection, rectified, reprojection,

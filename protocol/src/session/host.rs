@@ -6,9 +6,9 @@ use heapless::{Deque, Vec};
 
 use super::board::LOG_CHUNK;
 use super::line::Line;
+use super::retransmission::{WINDOW, Window, sequence};
 use super::round_trip::Repeat;
 use super::statistics::HostStatistics;
-use super::window::{WINDOW, Window, sequence};
 use crate::frame::{Header, Kind, MAX_FRAME};
 use crate::management::{Management, ManagementReport};
 use crate::receiver::Receiver;

@@ -10,14 +10,14 @@ mod board;
 mod host;
 mod line;
 mod results;
+mod retransmission;
 mod round_trip;
 mod statistics;
-mod window;
 
 pub use board::{BoardEvent, BoardSession, LOG_CHUNK, ReplyTo};
 pub use host::{Compatibility, HostEvent, HostSession, SubmitError, Ticket};
+pub use retransmission::WINDOW;
 pub use statistics::{BoardStatistics, HostStatistics};
-pub use window::WINDOW;
 
 use crate::Request;
 

@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use nalgebra::{Matrix6, UnitQuaternion, Vector3, Vector6};
 use vergence_matching::learned::{GreyImage, LearnedMatcher};
 use vergence_matching::{GuidedMatcher, ImagePair, Match, MatchError, Matcher, Matches};
-use vergence_pipeline::gates::NEAREST;
+use vergence_pipeline::limits::NEAREST;
 use vergence_vision::{
     Angle, Gates, Left, Length, Pixel, PoseDrift, Right, SharedCovariance, StereoPair, Transform, cloud_of_each,
     pose_drift,

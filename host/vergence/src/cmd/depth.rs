@@ -14,7 +14,7 @@ use vergence_output::{
     DenseCloud, PoseSource, TableFormat, check_ending, check_folder, cloud_json, drift_warning, dropped_lines,
     match_svg, write_cloud, write_drawing,
 };
-use vergence_pipeline::gates::PIXEL_SIGMA;
+use vergence_pipeline::limits::PIXEL_SIGMA;
 use vergence_pipeline::{
     Method, PairCloud, PairImages, PairPose, StageTimes, cloud_of_pairs, dense_ranges, pair_cloud,
 };

@@ -2,7 +2,7 @@
 
 use super::{Compatibility, HostEvent, HostSession, Phase, Ticket};
 use crate::frame::{FrameError, Header, Kind};
-use crate::session::window::sequence;
+use crate::session::retransmission::sequence;
 use crate::{Microseconds, PROTOCOL, ProtocolVersion, Report, SessionId, schema_hash};
 
 impl HostSession {

@@ -1,4 +1,4 @@
-//! What a match must satisfy to become a point: the one place for the limits that all verbs share.
+//! The limits of the gates (`vergence_vision::Gates`) that all verbs share, in one place.
 
 use vergence_rig::{Rig, RigPose};
 use vergence_vision::{Angle, Gates, Kernel, Length, SharedCovariance};
