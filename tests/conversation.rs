@@ -175,12 +175,12 @@ impl<B: Wired> Conversation<B> {
             self.board.advance(Microseconds(self.now.0 - self.board_start));
             self.sample();
         }
-        self.hear();
+        self.receive();
         if self.alive {
             self.speak();
         }
         if self.is_prompt {
-            self.hear();
+            self.receive();
         }
     }
 
@@ -206,7 +206,7 @@ impl<B: Wired> Conversation<B> {
         }
     }
 
-    fn hear(&mut self) {
+    fn receive(&mut self) {
         let bytes = self.board.transmit();
         self.sent.extend_from_slice(&bytes);
         if !self.alive {

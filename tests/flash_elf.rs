@@ -21,6 +21,7 @@ use common::images::Workshop;
 use tokio::io::{AsyncReadExt, AsyncWriteExt, DuplexStream};
 use vergence::sim::{SimulatedChip, simulated_chip};
 use vergence_board::{FirmwareImage, ManagementLink, OpenWire, Shared, UpdateError, Updated, spawn_in_process, update};
+use vergence_image::layout::ACTIVE;
 use vergence_mcu::ResetCause;
 use vergence_protocol::management::{BootState, Identity, Management, Outcome, RebootTo};
 use vergence_rig::{BENCH_TOML, Rig};
@@ -190,6 +191,9 @@ async fn an_image_that_hangs_or_panics_at_every_start_ends_in_recovery() {
     }
 }
 
+/// Offset in flash up to which the half-written image reaches.
+const HALF: u32 = 0x1_8000;
+
 #[tokio::test(start_paused = true)]
 async fn a_half_written_image_is_not_started() {
     let workshop = Workshop::new();
@@ -198,7 +202,8 @@ async fn a_half_written_image_is_not_started() {
     {
         // As an interrupted debug probe leaves it.
         let mut board = story.board.lock();
-        assert!(board.machine().chip_mut().load_flash(0x1_8000, &[0xFF; 0x1_0800]));
+        let rest = vec![0xFF; (ACTIVE.end() - HALF) as usize];
+        assert!(board.machine().chip_mut().load_flash(HALF as usize, &rest));
         board.machine().power_on();
     }
     story.reach_recovery().await;

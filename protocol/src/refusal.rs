@@ -65,7 +65,7 @@ impl fmt::Display for Refusal {
         match self {
             Self::NotArmed => f.write_str("the controller is disarmed: arm it first"),
             Self::WrongSession => f.write_str("another session holds the controller: wait until it disarms"),
-            Self::NoLease => f.write_str("the board hears no heartbeat from this session"),
+            Self::NoLease => f.write_str("the board receives no heartbeat from this session"),
             Self::NotReferenced { axis } => write!(f, "axis {axis} has no reference: run 'vergence home' first"),
             Self::OutsideLimits { axis } => write!(f, "the target of axis {axis} lies outside its limits"),
             Self::Busy => f.write_str("the stages are in motion: wait or run 'vergence stop'"),

@@ -39,7 +39,7 @@ pub enum UploadState {
 
 /// One update of a board's firmware.
 ///
-/// Loop: give the board's answers to [`hear`](Self::hear) and call [`transmit`](Self::transmit), at the latest at
+/// Loop: give the board's answers to [`receive`](Self::receive) and call [`transmit`](Self::transmit), at the latest at
 /// [`next_wake`](Self::next_wake), until the state is `Done` or `Failed`. An update never gives up by itself.
 #[derive(Debug)]
 pub struct Upload<'a> {
@@ -128,14 +128,14 @@ impl<'a> Upload<'a> {
     }
 
     /// Takes an answer of the board, which arrived at `now`.
-    pub fn hear(&mut self, now: Microseconds, report: &ManagementReport) {
+    pub fn receive(&mut self, now: Microseconds, report: &ManagementReport) {
         let ManagementReport::Progress { to, next, outcome } = *report else { return };
         match self.state {
             UploadState::Beginning if self.asked == Some(to) => match outcome {
                 Outcome::Done => self.go_on(now, next),
                 refused => self.enter(UploadState::Failed(refused)),
             },
-            UploadState::Sending => self.hear_chunk(now, to, next, outcome),
+            UploadState::Sending => self.receive_chunk(now, to, next, outcome),
             UploadState::Checking if self.asked == Some(to) => match outcome {
                 Outcome::Done => self.enter(UploadState::Done),
                 Outcome::Missing => self.go_on(now, next),
@@ -146,7 +146,7 @@ impl<'a> Upload<'a> {
         }
     }
 
-    fn hear_chunk(&mut self, now: Microseconds, to: u8, next: u32, outcome: Outcome) {
+    fn receive_chunk(&mut self, now: Microseconds, to: u8, next: u32, outcome: Outcome) {
         let is_fresh = to.wrapping_sub(self.fresh_from) < 1 << 7;
         match outcome {
             Outcome::Done if next >= self.next => self.go_on(now, next),

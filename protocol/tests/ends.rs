@@ -208,5 +208,5 @@ fn a_host_receives_the_log_of_its_session() {
     host.receive(Microseconds(2), &opening[..opened], |_| {});
     host.receive(Microseconds(3), &buffer[..length], |event| received.push(event));
     assert_eq!(received, [HostEvent::Log(heapless::Vec::from_slice(b"hello").unwrap())]);
-    assert_eq!(host.heard_at(), Some(Microseconds(3)));
+    assert_eq!(host.last_received_at(), Some(Microseconds(3)));
 }

@@ -49,7 +49,7 @@ pub fn serve(line: Line, services: Services) -> ! {
         if let Ok(byte) = Read::<u8>::read(&mut rx)
             && let Some(frame) = receiver.push(byte)
         {
-            recovery.hear(&frame);
+            recovery.receive(&frame);
         }
     }
 }
@@ -73,7 +73,7 @@ struct Recovery {
 }
 
 impl Recovery {
-    fn hear(&mut self, frame: &Frame<'_>) {
+    fn receive(&mut self, frame: &Frame<'_>) {
         if frame.header.kind != Kind::Firmware {
             return;
         }

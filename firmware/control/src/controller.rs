@@ -72,7 +72,7 @@ pub struct Controller {
     latch: FaultLatch,
     homing: HomingSequence,
     self_test: SelfTest,
-    /// Whether the saved settings were refused and nobody has been told yet.
+    /// Whether the saved settings were refused and nobody knows yet.
     settings_lost: bool,
     /// Whether the firmware is on trial.
     on_trial: bool,
@@ -282,7 +282,7 @@ impl Controller {
     fn abort_motion(&mut self) {
         if matches!(self.active.phase, MovePhase::Running | MovePhase::Settling) {
             self.active.phase = MovePhase::Stopped;
-            self.tell_phase();
+            self.queue_phase();
         }
     }
 
@@ -290,16 +290,16 @@ impl Controller {
         if self.latch.raise(code, now, axis, detail)
             && let Some(record) = self.latch.record()
         {
-            self.tell(Event::Fault(record));
+            self.queue(Event::Fault(record));
         }
     }
 
-    fn tell_phase(&mut self) {
-        self.tell(Event::MoveState { id: self.active.id, phase: self.active.phase });
+    fn queue_phase(&mut self) {
+        self.queue(Event::MoveState { id: self.active.id, phase: self.active.phase });
     }
 
     /// Queues an event. The oldest may be dropped, because every pose repeats what events say.
-    fn tell(&mut self, event: Event) {
+    fn queue(&mut self, event: Event) {
         if self.events.is_full() {
             self.events.pop_front();
         }

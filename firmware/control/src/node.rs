@@ -64,7 +64,7 @@ pub struct Node {
     managed_at: Microseconds,
     reboot: Option<RebootTo>,
     /// Time of the last byte from the host.
-    heard_at: Microseconds,
+    last_byte_at: Microseconds,
     wakes_at: Microseconds,
     /// State of the controller as last recorded.
     state: ControllerState,
@@ -110,7 +110,7 @@ impl Node {
             updater: Updater::default(),
             managed_at: Microseconds(0),
             reboot: None,
-            heard_at: Microseconds(0),
+            last_byte_at: Microseconds(0),
             wakes_at: Microseconds(0),
             stream_period: 0,
             next_pose: Microseconds(0),
@@ -139,7 +139,7 @@ impl Node {
     /// Ends the rest, because bytes came: the next tick is due as if the node had not rested. [`Self::receive`] does this by
     /// itself; a board that needs long to receive may set its timer before.
     pub fn wake(&mut self, now: Microseconds) {
-        self.heard_at = now;
+        self.last_byte_at = now;
         self.wakes_at.0 -= self.wakes_at.0.saturating_sub(now.0 + NOTICE_US) / TICK_US * TICK_US;
     }
 
@@ -214,7 +214,7 @@ impl Node {
             && self.stream_period == 0
             && !self.trigger.is_running()
             && self.recorder.switches_rest(self.controller.axis_count())
-            && now.0 >= self.heard_at.0 + QUIET_US
+            && now.0 >= self.last_byte_at.0 + QUIET_US
     }
 
     fn set_stream(&mut self, now: Microseconds, period_us: u32) {

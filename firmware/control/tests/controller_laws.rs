@@ -159,7 +159,7 @@ proptest! {
         world.wait(silence);
         world.alive = false;
         let moving = world.controller.state() == ControllerState::Moving;
-        // A heartbeat may have been heard just now; from here on none is.
+        // A heartbeat may have come just now; from here on none is.
         let ends = world.watch.lease_ends();
         world.wait(ends.next_multiple_of(TICK_US) - world.now.0);
         prop_assert_eq!(world.controller.state(), ControllerState::LinkLost, "not at the first tick after the lease");
@@ -169,7 +169,7 @@ proptest! {
         prop_assert_eq!(pose.fault_code(), Some(FaultCode::LeaseExpired));
         prop_assert_eq!(pose.referenced, AxisMask::first(2));
         prop_assert_ne!(pose.phase, MovePhase::Running);
-        // Silence is told from the last heartbeat to the tick that noticed.
+        // Silence counts from the last heartbeat to the tick that noticed.
         let silent = pose.fault.unwrap().detail;
         let lease = i32::from(LEASE_MS) * 1000;
         prop_assert!((lease..lease + 1000).contains(&silent), "{silent}");

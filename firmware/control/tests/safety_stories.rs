@@ -109,7 +109,7 @@ fn a_lease_is_never_longer_than_a_second() {
     let mut world = homed();
     world.alive = false;
     world.controller.heartbeat(world.now, HOST, u16::MAX);
-    world.watch.heard(world.now, HOST, 1000);
+    world.watch.heartbeat(world.now, HOST, 1000);
     world.wait(999_000);
     assert_eq!(world.controller.state(), ControllerState::Ready);
     world.wait(2 * TICK_US);

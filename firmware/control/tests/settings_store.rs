@@ -13,7 +13,7 @@ fn defaults() -> BoardSettings {
     BoardSettings::new(&bench_settings()).unwrap()
 }
 
-/// Settings that can be told from others by `speed`.
+/// Settings that differ from others by `speed`.
 fn with_speed(speed: u32) -> BoardSettings {
     defaults().with(SPEED, speed.into()).unwrap()
 }

@@ -259,7 +259,7 @@ fn what_waits_for_the_reboot_is_not_overwritten() {
     assert_eq!(bench.manage(Management::Begin(other)).1, Outcome::Busy);
     let chunk = Management::Chunk { offset: 0, data: heapless::Vec::from_slice(&[1; 8]).unwrap() };
     assert_eq!(bench.manage(chunk), (3_000, Outcome::Done), "a late duplicate does nothing");
-    assert_eq!(bench.manage(Management::Commit(signature)).1, Outcome::Done, "asked twice, told twice");
+    assert_eq!(bench.manage(Management::Commit(signature)).1, Outcome::Done, "asked twice, answered twice");
     assert!(bench.holds(&bytes));
 }
 

@@ -88,7 +88,7 @@ impl<W: World> Chip<W> {
             let pin = Pin::at(port * 16 + number);
             self.settle_pin(pin);
             // A pin newly connected to an input passes on its level.
-            self.tell_input(pin, self.pads.is_high(pin));
+            self.set_input(pin, self.pads.is_high(pin));
         }
         // A port that was reset has lost the levels that did not change.
         self.units.ports[port].levels = self.pads.levels_of_port(port);
@@ -164,7 +164,7 @@ impl<W: World> Chip<W> {
             self.units.exti.edge(pin.number(), high);
             self.refresh(Unit::Exti);
         }
-        self.tell_input(pin, high);
+        self.set_input(pin, high);
         if self.pads.watched & pin.set() != 0 {
             let edge = PinEdge { at: self.instant(), pin, high };
             self.trace.note(edge);
@@ -174,7 +174,7 @@ impl<W: World> Chip<W> {
     }
 
     /// Passes the level of a pin to the timer input that it is connected to.
-    fn tell_input(&mut self, pin: Pin, high: bool) {
+    fn set_input(&mut self, pin: Pin, high: bool) {
         let Some(Signal::Channel(timer, channel)) = self.pads.signal(pin) else { return };
         let moment = Moment { now: self.now, clocks: &self.clocks };
         let state = &mut self.units.timers[timer.index()];

@@ -37,7 +37,7 @@ fn fault_after(mut rigged: Rigged, axis: usize, how: impl FnOnce(&mut AxisPlant)
     assert_eq!(fault.axis, Some(axis as u8));
     if fault.code != FaultCode::FollowingError && fault.code != FaultCode::Slip {
         let way = (rigged.loads()[axis] - before).abs();
-        // Half the following error, and the telemetry that tells of it.
+        // Half the following error, and the telemetry that shows it.
         let axis = bench_settings()[axis];
         let allowed = f64::from(axis.following_error.0) + 0.010 * f64::from(axis.speed);
         assert!(way < allowed, "{way} of {allowed}");
@@ -199,7 +199,7 @@ fn the_faults_end_when_their_cause_does() {
     assert_eq!(rigged.pose().phase, MovePhase::Settled);
 }
 
-/// Regression: a limit of 1 um was told as an encoder that does not answer, with the advice to check its cable.
+/// Regression: a limit of 1 um was shown as an encoder that does not answer, with the advice to check its cable.
 #[test]
 fn a_limit_below_the_lag_is_told_as_a_following_error() {
     for axis in 0..2 {

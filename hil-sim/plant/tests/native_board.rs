@@ -123,11 +123,12 @@ fn counts_follow_the_truth_all_the_way() {
         let truth = bench_settings().into_iter().zip(rigged.loads());
         truth.map(|(axis, load)| (load / count(&axis)).floor() as i32).collect()
     };
-    let zero: Vec<i32> = exact(&rigged).iter().zip(&rigged.pose().counts).map(|(truth, told)| told.0 - truth).collect();
+    let zero: Vec<i32> =
+        exact(&rigged).iter().zip(&rigged.pose().counts).map(|(truth, reported)| reported.0 - truth).collect();
     for targets in [HERBIVORE, HUMAN, [220_000, 2_268_928], [60_000, 1_000_000]] {
         go(&mut rigged, targets, 1);
-        for ((truth, told), zero) in exact(&rigged).iter().zip(&rigged.pose().counts).zip(&zero) {
-            assert!((told.0 - truth - zero).abs() <= 1, "told {told:?}, truth {truth}, zero {zero}");
+        for ((truth, reported), zero) in exact(&rigged).iter().zip(&rigged.pose().counts).zip(&zero) {
+            assert!((reported.0 - truth - zero).abs() <= 1, "reported {reported:?}, truth {truth}, zero {zero}");
         }
     }
 }

@@ -9,7 +9,7 @@ use vergence_protocol::{
 
 use crate::faults::Fault;
 use crate::journal::Journal;
-use crate::promise::{Promise, Sight, Violation};
+use crate::promise::{EncoderReading, Promise, Violation};
 use crate::watched_axis::WatchedAxis;
 
 /// Time from the end of the lease to the tick that notices it, and from there to the check of its last step.
@@ -83,10 +83,10 @@ impl Checker {
     }
 
     /// Records that an encoder fails, or works again.
-    pub fn encoder_shows(&mut self, axis: usize, sight: Sight) {
+    pub fn encoder_shows(&mut self, axis: usize, reading: EncoderReading) {
         if let Some(axis) = self.axes.get_mut(axis) {
-            axis.sight = sight;
-            axis.lied |= sight != Sight::Clear;
+            axis.reading = reading;
+            axis.misread |= reading != EncoderReading::Clear;
             axis.lost_at = None;
         }
     }
@@ -113,7 +113,8 @@ impl Checker {
             let axis = &mut self.axes[index];
             let made = steps.wrapping_sub(axis.steps);
             (axis.steps, axis.load) = (steps, load);
-            axis.lost_at = (axis.sight == Sight::Lost && plant.drivers_on()).then(|| axis.lost_at.unwrap_or(load));
+            axis.lost_at =
+                (axis.reading == EncoderReading::Lost && plant.drivers_on()).then(|| axis.lost_at.unwrap_or(load));
             if let Some(what) = axis.check_hard_limit() {
                 self.accuse(now, Promise::HardLimit, format!("axis {index}: {what}"));
             }
@@ -189,7 +190,7 @@ impl Checker {
     }
 
     /// Records bytes that reach the board.
-    pub fn heard_from_host(&mut self, now: Microseconds, bytes: &[u8]) {
+    pub fn received_from_host(&mut self, now: Microseconds, bytes: &[u8]) {
         for &byte in bytes {
             let Some(frame) = self.from_host.push(byte) else { continue };
             let Ok(request) = frame.body::<Request>() else { continue };
@@ -216,7 +217,7 @@ impl Checker {
     }
 
     /// Checks a frame that leaves the board.
-    pub fn heard_from_board(&mut self, now: Microseconds, bytes: &[u8], plant: &Plant, journal: &mut Journal) {
+    pub fn received_from_board(&mut self, now: Microseconds, bytes: &[u8], plant: &Plant, journal: &mut Journal) {
         for &byte in bytes {
             let Some(frame) = self.from_board.push(byte) else { continue };
             match frame.body::<Report>() {
@@ -255,15 +256,16 @@ impl Checker {
     }
 
     /// Checks that the first fault stays unchanged until it is cleared by its number.
-    fn check_fault(&mut self, now: Microseconds, told: Option<FaultRecord>) {
+    fn check_fault(&mut self, now: Microseconds, reported: Option<FaultRecord>) {
         if let Some(first) = self.fault {
-            let kept = told
-                .is_some_and(|told| told.later >= first.later && FaultRecord { later: first.later, ..told } == first);
+            let kept = reported.is_some_and(|reported| {
+                reported.later >= first.later && FaultRecord { later: first.later, ..reported } == first
+            });
             if !kept && self.clear_asked != Some(first.seq) {
-                self.accuse(now, Promise::FirstFault, format!("{first:?} became {told:?}"));
+                self.accuse(now, Promise::FirstFault, format!("{first:?} became {reported:?}"));
             }
         }
-        self.fault = told;
+        self.fault = reported;
     }
 
     fn check_state(&mut self, now: Microseconds, pose: &PoseReport, plant: &Plant) {

@@ -76,7 +76,7 @@ pub struct Host {
     step: usize,
     beat_due: Microseconds,
     /// When the session was opened, or the board last answered.
-    heard: Microseconds,
+    last_report_at: Microseconds,
     streaming: bool,
     asked: Option<Asked>,
     seen: Option<Seen>,
@@ -105,7 +105,7 @@ impl Host {
             script,
             step: 0,
             beat_due: Microseconds(0),
-            heard: now,
+            last_report_at: now,
             streaming: false,
             asked: None,
             seen: None,
@@ -141,10 +141,10 @@ impl Host {
     pub fn receive(&mut self, now: Microseconds, bytes: &[u8]) {
         // One byte at a time: a byte ends one frame at most.
         for byte in bytes {
-            let mut heard = None;
-            self.session.receive(now, std::slice::from_ref(byte), |event| heard = Some(event));
-            if let Some(event) = heard {
-                self.hear(now, event);
+            let mut received = None;
+            self.session.receive(now, std::slice::from_ref(byte), |event| received = Some(event));
+            if let Some(event) = received {
+                self.receive_event(now, event);
             }
         }
     }
@@ -170,7 +170,7 @@ impl Host {
         }
         self.session = HostSession::new(SessionId(0x5e55_0000 + self.sessions));
         self.session.hello();
-        self.heard = now;
+        self.last_report_at = now;
         self.streaming = false;
         self.asked = None;
         self.seen = None;
@@ -179,7 +179,7 @@ impl Host {
     }
 
     fn keep_alive(&mut self, now: Microseconds) {
-        if now.0.saturating_sub(self.heard.0) > SILENCE_US {
+        if now.0.saturating_sub(self.last_report_at.0) > SILENCE_US {
             self.notes.push("host: the board is silent, calling again".into());
             self.connect(now);
         }
@@ -309,11 +309,11 @@ impl Host {
         }
     }
 
-    fn hear(&mut self, now: Microseconds, event: HostEvent) {
+    fn receive_event(&mut self, now: Microseconds, event: HostEvent) {
         if self.end.is_some() {
             return;
         }
-        self.heard = now;
+        self.last_report_at = now;
         match event {
             HostEvent::Lost { boot } => {
                 self.notes.push(format!("host: the session is lost, boot {boot}"));

@@ -7,7 +7,7 @@ use crate::checker::Checker;
 use crate::faults::{Fault, Onset};
 use crate::journal::Journal;
 use crate::line::Line;
-use crate::promise::Sight;
+use crate::promise::EncoderReading;
 use crate::scenario::Scenario;
 
 /// Everything that faults can act on.
@@ -165,12 +165,12 @@ fn end(fault: &Fault, world: &mut World<'_>) {
 
 fn fail_encoder(world: &mut World<'_>, axis: usize, how: Option<EncoderFault>) {
     on_axis(world, axis, |axis| axis.fail_encoder(how));
-    let sight = match how {
-        None => Sight::Clear,
-        Some(EncoderFault::Noisy { .. }) => Sight::Blurred,
-        Some(EncoderFault::Stuck | EncoderFault::Reversed | EncoderFault::Dead) => Sight::Lost,
+    let reading = match how {
+        None => EncoderReading::Clear,
+        Some(EncoderFault::Noisy { .. }) => EncoderReading::Blurred,
+        Some(EncoderFault::Stuck | EncoderFault::Reversed | EncoderFault::Dead) => EncoderReading::Lost,
     };
-    world.checker.encoder_shows(axis, sight);
+    world.checker.encoder_shows(axis, reading);
 }
 
 fn on_axis(world: &mut World<'_>, axis: usize, act: impl FnOnce(&mut AxisPlant)) {

@@ -48,7 +48,7 @@ impl fmt::Display for Violation {
 
 /// Relation of an encoder's reading to the position of its load.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Sight {
+pub enum EncoderReading {
     /// The true position.
     Clear,
     /// The true position with noise.

@@ -198,14 +198,14 @@ impl<'a, B: Board> Simulation<'a, B> {
         let frames = self.board.transmit();
         // Every frame ends with its only zero byte.
         for frame in frames.split_inclusive(|&byte| byte == 0) {
-            self.checker.heard_from_board(now, frame, self.board.plant(), &mut self.journal);
+            self.checker.received_from_board(now, frame, self.board.plant(), &mut self.journal);
             self.to_host.send(now, frame);
         }
         self.run_host();
         self.bytes.clear();
         self.to_board.deliver(now, &mut self.bytes);
         if !self.bytes.is_empty() {
-            self.checker.heard_from_host(now, &self.bytes);
+            self.checker.received_from_host(now, &self.bytes);
             self.board.receive(&self.bytes);
             self.checker.received(now, self.board.plant());
         }

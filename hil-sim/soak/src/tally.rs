@@ -9,8 +9,8 @@ use crate::promise::Violation;
 use crate::scenario::Scenario;
 use crate::simulation::{Ending, native_board, run};
 
-/// Most broken promises that are told; more are only counted.
-const MOST_TOLD: usize = 20;
+/// Most broken promises that are listed; more are only counted.
+const MOST_LISTED: usize = 20;
 
 /// The scenarios of one kind.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -104,8 +104,8 @@ impl Tally {
     #[must_use]
     pub fn accusation(&self) -> Option<String> {
         let (first, _) = self.violations.first()?;
-        let told = self.violations.iter().take(MOST_TOLD);
-        let lines: Vec<String> = told.map(|(seed, violation)| format!("  seed {seed}: {violation}")).collect();
+        let listed = self.violations.iter().take(MOST_LISTED);
+        let lines: Vec<String> = listed.map(|(seed, violation)| format!("  seed {seed}: {violation}")).collect();
         Some(format!(
             "{} promises broken:\n{}\nreplay one: vergence soak --only {first}",
             self.violations.len(),

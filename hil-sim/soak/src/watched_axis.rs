@@ -4,11 +4,11 @@ use vergence_control::RigIo;
 use vergence_plant::{Plant, Stage};
 
 use crate::faults::Fault;
-use crate::promise::Sight;
+use crate::promise::EncoderReading;
 
 /// The control tick, which is also the period at which the truth is checked.
 const TICK_S: f64 = 1e-3;
-/// Time within which a lasting contact is told from a spike; a spike shortly before may pass for its edge.
+/// Time within which a lasting contact is distinguished from a spike; a spike shortly before may pass for its edge.
 const DEBOUNCE_S: f64 = 10e-3;
 /// Tolerance of a speed as a share; steps that rounding moves from one tick to the next are added.
 const SPEED_SHARE: f64 = 1.01;
@@ -16,9 +16,9 @@ const SPEED_SHARE: f64 = 1.01;
 #[derive(Debug)]
 pub struct WatchedAxis {
     pub stage: Stage,
-    pub sight: Sight,
+    pub reading: EncoderReading,
     /// Whether the encoder has ever failed.
-    pub lied: bool,
+    pub misread: bool,
     /// Largest error of the reference.
     pub reference_error: f64,
     pub steps: i32,
@@ -39,8 +39,8 @@ impl WatchedAxis {
         let late = TICK_S + chatter.unwrap_or(0.0);
         Self {
             stage,
-            sight: Sight::Clear,
-            lied: false,
+            reading: EncoderReading::Clear,
+            misread: false,
             reference_error: f64::from(stage.settings.homing.approach_speed) * late,
             steps: plant.steps(index),
             load: plant.load(index).unwrap_or_default(),
@@ -79,7 +79,7 @@ impl WatchedAxis {
     pub fn mode_tolerance(&self) -> f64 {
         let settings = &self.stage.settings;
         let count = f64::from(settings.encoder().position_at(1_000_000).0) * 1e-6;
-        let blind = if self.lied { f64::from(settings.following_error.0) } else { 0.0 };
+        let blind = if self.misread { f64::from(settings.following_error.0) } else { 0.0 };
         f64::from(settings.tolerance.0) + self.reference_error + 2.0 * count + blind
     }
 }

@@ -114,8 +114,8 @@ pub struct HostSession {
     management: Deque<(u8, Management), MANAGEMENT>,
     management_next: u8,
     /// Number of the last frame from the board.
-    heard_seq: u8,
-    heard_at: Option<Microseconds>,
+    received_seq: u8,
+    last_received_at: Option<Microseconds>,
     pose_seq: Option<u16>,
     poses: u32,
     poses_lost: u32,
@@ -135,8 +135,8 @@ impl HostSession {
             immediate_next: 0,
             management: Deque::new(),
             management_next: 0,
-            heard_seq: 0,
-            heard_at: None,
+            received_seq: 0,
+            last_received_at: None,
             pose_seq: None,
             poses: 0,
             poses_lost: 0,
@@ -146,7 +146,7 @@ impl HostSession {
     /// Sends `Hello` repeatedly until the board answers and [`HostEvent::Opened`] comes. Ignored on a session that was
     /// opened before.
     pub fn hello(&mut self) {
-        if matches!(self.phase, Phase::Closed) && self.heard_at.is_none() {
+        if matches!(self.phase, Phase::Closed) && self.last_received_at.is_none() {
             self.phase = Phase::Opening(Repeat::new());
         }
     }
@@ -205,11 +205,11 @@ impl HostSession {
         Ok(seq)
     }
 
-    /// Takes bytes from the board, which arrived at `now`, and gives `hear` the events that they cause. Any bytes may come.
-    pub fn receive(&mut self, now: Microseconds, bytes: &[u8], mut hear: impl FnMut(HostEvent)) {
+    /// Takes bytes from the board, which arrived at `now`, and gives `on_event` the events that they cause. Any bytes may come.
+    pub fn receive(&mut self, now: Microseconds, bytes: &[u8], mut on_event: impl FnMut(HostEvent)) {
         for &byte in bytes {
             if let Some(event) = self.receive_byte(now, byte) {
-                hear(event);
+                on_event(event);
             }
         }
     }
@@ -218,10 +218,10 @@ impl HostSession {
     pub fn transmit(&mut self, now: Microseconds, buffer: &mut [u8; MAX_FRAME]) -> Option<usize> {
         let header = |kind, seq, ack| Header { major: PROTOCOL.major, kind, seq, ack };
         if let Some((kind, seq, request)) = self.next_request(now) {
-            return self.line.write(now, header(kind, seq, self.heard_seq), &request, buffer);
+            return self.line.write(now, header(kind, seq, self.received_seq), &request, buffer);
         }
         let (seq, request) = self.management.pop_front()?;
-        self.line.write(now, header(Kind::Firmware, seq, self.heard_seq), &request, buffer)
+        self.line.write(now, header(Kind::Firmware, seq, self.received_seq), &request, buffer)
     }
 
     /// Time at which [`transmit`](Self::transmit) next has a frame if no bytes arrive before; zero means at once.
@@ -255,8 +255,8 @@ impl HostSession {
     /// Time at which the last frame from the board arrived since the session opened: a `now` of
     /// [`receive`](Self::receive).
     #[must_use]
-    pub const fn heard_at(&self) -> Option<Microseconds> {
-        self.heard_at
+    pub const fn last_received_at(&self) -> Option<Microseconds> {
+        self.last_received_at
     }
 
     /// Figures of this session so far.

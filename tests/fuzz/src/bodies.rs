@@ -299,7 +299,7 @@ pub fn management(data: &[u8]) {
         let answer = framed(Kind::Firmware, 0, 0, PROTOCOL.major, &Raw(&answer));
         host.receive(Microseconds(now), &answer, |event| {
             if let HostEvent::Management(report) = event {
-                upload.hear(Microseconds(now), &report);
+                upload.receive(Microseconds(now), &report);
             }
         });
         let (stored, total) = upload.progress();

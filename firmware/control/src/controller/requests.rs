@@ -159,7 +159,7 @@ impl Controller {
         self.active = ActiveMove { id, mode, targets, share, phase: MovePhase::Running, inside_since, settle_by };
         self.want_plan();
         self.state = ControllerState::Moving;
-        self.tell_phase();
+        self.queue_phase();
     }
 
     fn stop(&mut self, kind: StopKind, io: &mut impl RigIo) {

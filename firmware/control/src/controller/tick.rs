@@ -124,7 +124,7 @@ impl Controller {
         if self.active.phase == MovePhase::Running {
             self.active.phase = MovePhase::Settling;
             self.active.settle_by = Microseconds(now.0 + SETTLE_TIMEOUT_US);
-            self.tell_phase();
+            self.queue_phase();
         }
         if !self.inside_tolerance(io) {
             self.active.inside_since = None;
@@ -138,7 +138,7 @@ impl Controller {
         if now.0 - since.0 >= DWELL_US {
             self.active.phase = MovePhase::Settled;
             self.state = ControllerState::Ready;
-            self.tell_phase();
+            self.queue_phase();
         }
     }
 

@@ -174,7 +174,7 @@ impl World {
     fn beat(&mut self) {
         if self.alive {
             self.controller.heartbeat(self.now, HOST, LEASE_MS);
-            self.watch.heard(self.now, HOST, LEASE_MS);
+            self.watch.heartbeat(self.now, HOST, LEASE_MS);
         }
         self.next_beat += BEAT_US;
     }
@@ -192,7 +192,7 @@ impl World {
     /// A heartbeat of another host.
     pub fn other_beats(&mut self) {
         self.controller.heartbeat(self.now, OTHER, LEASE_MS);
-        self.watch.heard(self.now, OTHER, LEASE_MS);
+        self.watch.heartbeat(self.now, OTHER, LEASE_MS);
     }
 
     /// Asks the controller now, between two ticks.

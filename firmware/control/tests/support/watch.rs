@@ -31,7 +31,7 @@ impl Path {
         self.base = (at, steps);
     }
 
-    /// Takes a command and the steps ordered for it. An axis at rest may be told where it is: that is no motion.
+    /// Takes a command and the steps ordered for it. An axis at rest may be set to where it is: that is no motion.
     fn push(&mut self, commanded: f64, steps: i32, step: f64) {
         let rests = (self.ago(0) - self.ago(1)).abs() < 1e-9;
         if rests && (commanded - self.ago(0)).abs() > f64::from(self.settings.speed) * 1e-6 {
@@ -135,7 +135,7 @@ impl Watch {
         self.lease.1
     }
 
-    pub fn heard(&mut self, now: Microseconds, session: SessionId, lease_ms: u16) {
+    pub fn heartbeat(&mut self, now: Microseconds, session: SessionId, lease_ms: u16) {
         if is_latched(self.state) || self.holder.is_none_or(|holder| holder == session) {
             self.lease = (session, now.0 + u64::from(lease_ms) * 1000);
         }
@@ -292,7 +292,7 @@ impl Watch {
     }
 }
 
-/// Where an axis was last told to be, in micro-units.
+/// The last commanded position of an axis, in micro-units.
 pub fn commanded(controller: &Controller, axis: usize) -> f64 {
     controller.command(axis).unwrap() as f64 / f64::from(1 << FINE_BITS)
 }

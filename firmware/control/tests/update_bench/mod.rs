@@ -123,7 +123,7 @@ impl Bench {
             upload.transmit(Microseconds(self.now), &mut self.host);
             self.step();
             for answer in std::mem::take(&mut self.answers) {
-                upload.hear(Microseconds(self.now), &answer);
+                upload.receive(Microseconds(self.now), &answer);
             }
         }
         upload.state()
@@ -174,7 +174,7 @@ impl Bench {
     }
 }
 
-/// The frame with another major in its header: from a host of another age, or as that one would hear it.
+/// The frame with another major in its header: from a host of another age, or as that one would receive it.
 pub fn foreign<M: Serialize + DeserializeOwned>(frame: &[u8], major: Option<u8>) -> Vec<u8> {
     let Some(major) = major else { return frame.to_vec() };
     let (mut receiver, mut buffer) = (Receiver::new(), [0; MAX_FRAME]);

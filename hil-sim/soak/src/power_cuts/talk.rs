@@ -28,7 +28,7 @@ pub struct Talk {
     machine: Machine<Bench>,
     host: HostSession,
     now: Microseconds,
-    heard: Vec<ManagementReport>,
+    reports: Vec<ManagementReport>,
     /// Operations of the flash so far, where they are recorded.
     pub operations: Vec<FlashOperation>,
 }
@@ -46,7 +46,7 @@ impl Talk {
             machine,
             host: HostSession::new(SessionId(1)),
             now: Microseconds(0),
-            heard: Vec::new(),
+            reports: Vec::new(),
             operations: Vec::new(),
         }
     }
@@ -71,10 +71,10 @@ impl Talk {
             }
         }
         let sent: Vec<u8> = self.machine.chip_mut().take_sent(UartId::LPUART1).iter().map(|sent| sent.byte).collect();
-        let heard = &mut self.heard;
+        let reports = &mut self.reports;
         self.host.receive(self.now, &sent, |event| {
             if let HostEvent::Management(report) = event {
-                heard.push(report);
+                reports.push(report);
             }
         });
         let mut frame = [0; MAX_FRAME];
@@ -101,7 +101,7 @@ impl Talk {
                 next = self.now.0 + REPEAT_US;
             }
             self.step()?;
-            if let Some(answer) = std::mem::take(&mut self.heard).iter().find_map(&understand) {
+            if let Some(answer) = std::mem::take(&mut self.reports).iter().find_map(&understand) {
                 return Ok(answer);
             }
         }
@@ -167,8 +167,8 @@ impl Talk {
         while self.now.0 < give_up {
             upload.transmit(self.now, &mut self.host);
             self.step()?;
-            for report in std::mem::take(&mut self.heard) {
-                upload.hear(self.now, &report);
+            for report in std::mem::take(&mut self.reports) {
+                upload.receive(self.now, &report);
             }
             match upload.state() {
                 UploadState::Done => return Ok(()),

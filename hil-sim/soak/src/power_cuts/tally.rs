@@ -4,8 +4,8 @@ use vergence_mcu::FlashOperation;
 
 use super::sweep::{Cut, Ending, rank};
 
-/// Most bricked boards that are told; more are only counted.
-const MOST_TOLD: usize = 20;
+/// Most bricked boards that are listed; more are only counted.
+const MOST_LISTED: usize = 20;
 
 /// Counts of outcomes, by the kind of operation that was cut.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
@@ -78,8 +78,8 @@ impl CutTally {
         if self.bricked.is_empty() {
             return None;
         }
-        let told = self.bricked.iter().take(MOST_TOLD);
-        let lines: Vec<String> = told.map(|(number, why)| format!("  cut {number}: {why}")).collect();
+        let listed = self.bricked.iter().take(MOST_LISTED);
+        let lines: Vec<String> = listed.map(|(number, why)| format!("  cut {number}: {why}")).collect();
         Some(format!("{} boards bricked:\n{}", self.bricked.len(), lines.join("\n")))
     }
 }

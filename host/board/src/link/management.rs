@@ -125,7 +125,7 @@ impl ManagementLink {
             let wake = upload.next_wake().map_or(give_up, |wake| wake.min(give_up));
             for report in self.exchange(wake).await? {
                 last_report = self.clock.now();
-                upload.hear(last_report, &report);
+                upload.receive(last_report, &report);
             }
             progress(upload);
         }

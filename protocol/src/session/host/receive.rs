@@ -67,8 +67,8 @@ impl HostSession {
         if header.major != PROTOCOL.major || !self.is_open() {
             return;
         }
-        self.heard_seq = header.seq;
-        self.heard_at = Some(now);
+        self.received_seq = header.seq;
+        self.last_received_at = Some(now);
         self.window.acknowledge(now, header.ack);
         if header.kind == Kind::Nak {
             self.window.not_acknowledged(now, header.ack);
@@ -91,7 +91,7 @@ impl HostSession {
                 } else {
                     Compatibility::Full
                 };
-                self.heard_at = Some(now);
+                self.last_received_at = Some(now);
                 self.phase = match compatibility {
                     Compatibility::Incompatible { .. } => Phase::Incompatible,
                     Compatibility::Full | Compatibility::ReadOnly => Phase::Open { boot },
