@@ -34,7 +34,7 @@ const BAD: [(SettingItem, u8, i64); 36] = [
     (SettingItem::StepsPerUnit, 1, 20),             // A step of 18 degrees: no target is reached.
     (SettingItem::CountsPerUnit, 0, 0),             // No encoder.
     (SettingItem::CountsPerUnit, 0, 10_000),        // A count of 0.1 mm: no target is reached.
-    (SettingItem::CountsPerUnit, 0, 2_000_000_000), // More counts than a counter holds.
+    (SettingItem::CountsPerUnit, 0, 4_000_000_000), // More counts than a counter holds.
     (SettingItem::StepsReversed, 0, 2),             // Neither yes nor no.
     (SettingItem::FollowingError, 0, 0),            // A fault at rest.
     (SettingItem::FollowingError, 0, 10_000),       // A blocked stage goes unnoticed for 10 mm.
@@ -46,7 +46,7 @@ const BAD: [(SettingItem, u8, i64); 36] = [
     (SettingItem::Backlash, 1, 500_000),            // A run-up of 29 degrees.
     (SettingItem::HomeSwitchAt, 0, 60_000),         // The switch inside the range.
     (SettingItem::HomeSeekSpeed, 0, 0),             // A search that never ends.
-    (SettingItem::HomeTravel, 0, 500_000),          // A search of three times the range.
+    (SettingItem::HomeTravel, 0, 3_000_000),        // A search of three metres.
     (SettingItem::HomeRepeatability, 1, 50_000),    // A reference that is 2.9 degrees off.
     (SettingItem::StreamPeriod, 0, 10),             // Faster than the line.
     (SettingItem::Baud, 0, 300),                    // No serial port has it.

@@ -1,9 +1,10 @@
 //! Bounds of axis settings beyond which the board could not keep its promises: to notice a stage that does not follow, to
 //! call a move settled only where it is, and to stop in a stated time.
 //!
-//! Each bound is in proportion to the axis: a share of its range, a mark of its encoder, or another of its settings.
+//! Each bound is in proportion to the axis: a share of its whole travel, which is the way that homing may go, a mark of its
+//! encoder, or another of its settings. The range is no measure: a host may narrow it for a while.
 
-use vergence_protocol::SettingItem;
+use vergence_protocol::{AxisKind, SettingItem};
 
 use crate::settings::{AxisSettings, Scale, SettingsError};
 
@@ -11,8 +12,8 @@ use crate::settings::{AxisSettings, Scale, SettingsError};
 pub const LONGEST_BRAKING_MS: u32 = 2_000;
 /// Acceleration rises to its largest value in two control ticks or more: at most this share of it in a second.
 const FASTEST_RISE: i64 = 500;
-/// Homing may travel this many times the range.
-const MOST_TRAVEL: i64 = 3;
+/// Longest travel of an axis: two metres or two turns.
+const LONGEST_TRAVEL: [i64; 2] = [2_000_000, 12_566_371];
 
 /// The values that a setting may have beside the others.
 struct Bound {
@@ -23,7 +24,7 @@ struct Bound {
     why: &'static str,
 }
 
-/// Checks the settings of axis number `axis`, whose range is not empty and whose rates are positive.
+/// Checks the settings of axis number `axis`, whose range is not empty, and whose rates and distances are positive.
 ///
 /// # Errors
 /// [`SettingsError::Outside`] with the first setting out of its bounds, or [`SettingsError::Braking`].
@@ -42,9 +43,11 @@ pub(crate) fn check(settings: &AxisSettings, axis: usize) -> Result<(), Settings
 fn bounds(settings: &AxisSettings) -> [Bound; 9] {
     let homing = &settings.homing;
     let [min, max] = [settings.min, settings.max].map(|end| i64::from(end.0));
-    let range = max - min;
+    let travel = i64::from(homing.travel.0);
+    let [slides, turns] = LONGEST_TRAVEL;
+    let longest = if settings.kind == AxisKind::Linear { slides } else { turns };
     let reached = settings.encoder().position_at(1).0.max(settings.motor().position_at(1).0 / 2);
-    let furthest = (min.abs().max(max.abs()) + MOST_TRAVEL * range).max(1);
+    let furthest = min.abs().max(max.abs()) + travel.max(1);
     let finest = |scale: Scale| i64::from(i32::MAX / 2) * (scale.milli_micro() / 1000) / furthest;
     let bound = |item, value: i64, least: i64, most: i64, why| Bound { item, value, least, most, why };
     [
@@ -52,17 +55,23 @@ fn bounds(settings: &AxisSettings) -> [Bound; 9] {
             SettingItem::FollowingError,
             settings.following_error.0.into(),
             1,
-            range / 25,
+            travel / 25,
             "a stage that does not follow would go unnoticed",
         ),
         bound(
             SettingItem::Tolerance,
             settings.tolerance.0.into(),
             reached.max(1).into(),
-            range / 250,
+            travel / 250,
             "below, encoder and motor cannot reach it; above, a move would count as settled where it is not",
         ),
-        bound(SettingItem::Backlash, settings.backlash.0.into(), 0, range / 20, "it is the play of a stage, not a way"),
+        bound(
+            SettingItem::Backlash,
+            settings.backlash.0.into(),
+            0,
+            travel / 20,
+            "it is the play of a stage, not a way",
+        ),
         bound(
             SettingItem::Jerk,
             settings.jerk.into(),
@@ -70,19 +79,13 @@ fn bounds(settings: &AxisSettings) -> [Bound; 9] {
             i64::from(settings.acceleration) * FASTEST_RISE,
             "acceleration must take two control ticks to rise",
         ),
-        bound(SettingItem::HomeRetract, homing.retract.0.into(), 1, range / 10, "it leads away from the switch"),
-        bound(
-            SettingItem::HomeTravel,
-            homing.travel.0.into(),
-            1,
-            MOST_TRAVEL * range,
-            "a search that misses the switch must end",
-        ),
+        bound(SettingItem::HomeRetract, homing.retract.0.into(), 1, travel / 10, "it leads away from the switch"),
+        bound(SettingItem::HomeTravel, travel, 1, longest, "a search that misses the switch must end"),
         bound(
             SettingItem::HomeRepeatability,
             homing.repeatability.0.into(),
             1,
-            range / 100,
+            travel / 100,
             "a bad reference would go unnoticed",
         ),
         bound(

@@ -23,7 +23,7 @@ fn a_reason_gives_the_bounds_in_the_settings_own_unit() {
     let given = |name, text| reason(name, text).expect("refused");
     assert_eq!(
         given("baseline.tolerance", "5mm"),
-        "baseline.tolerance must lie between 0.001mm and 0.64mm: below, encoder and motor cannot reach it; above, a \
+        "baseline.tolerance must lie between 0.001mm and 0.8mm: below, encoder and motor cannot reach it; above, a \
          move would count as settled where it is not"
     );
     assert!(given("separation.following_error", "45deg").starts_with("separation.following_error must lie between"));

@@ -60,7 +60,7 @@ impl PlantedBoard {
                 Defect::FastWithoutReference => stage.settings.homing.seek_speed = stage.settings.speed,
                 // The loosest check that the controller accepts.
                 Defect::LooseFollowingCheck => {
-                    stage.settings.following_error = Micro((stage.settings.max.0 - stage.settings.min.0) / 25);
+                    stage.settings.following_error = Micro(stage.settings.homing.travel.0 / 25);
                 }
                 _ => {}
             }
