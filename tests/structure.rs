@@ -29,7 +29,10 @@ const ALLOWED: &[(&str, &[&str])] = &[
     ("vergence-cpu", &[]),
     ("vergence-mcu", &["vergence-cpu", "vergence-protocol", "vergence-control", "vergence-plant"]),
     ("vergence-plant", &["vergence-protocol", "vergence-control"]),
-    ("vergence-soak", &["vergence-protocol", "vergence-control", "vergence-image", "vergence-mcu", "vergence-plant"]),
+    (
+        "vergence-soak",
+        &["vergence-protocol", "vergence-control", "vergence-image", "vergence-cpu", "vergence-mcu", "vergence-plant"],
+    ),
     ("vergence-pipeline", &["vergence-protocol", "vergence-vision", "vergence-rig", "vergence-matching"]),
     (
         "vergence-output",

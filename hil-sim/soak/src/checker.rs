@@ -32,10 +32,14 @@ pub struct Checker {
     /// Latest heartbeat of each session, and the end of its lease.
     leases: Vec<(SessionId, u64)>,
     moves: Vec<(MoveId, Mode, Vec<Micro>)>,
-    /// The sessions that asked to arm with the bytes that just arrived.
-    arm_asked: Option<SessionId>,
+    /// The session that asked to arm last, and when.
+    arm_asked: Option<(SessionId, u64)>,
     holder: Option<SessionId>,
     drivers_on: bool,
+    /// Time at which the drivers were switched last.
+    switched_at: u64,
+    /// Longest delay of the board: [`crate::Board::delay_us`].
+    delay_us: u64,
     clear_asked: Option<u16>,
     fault: Option<FaultRecord>,
     /// Axes that claim to have a reference.
@@ -49,7 +53,7 @@ pub struct Checker {
 }
 
 impl Checker {
-    pub fn new(stages: impl IntoIterator<Item = Stage>, faults: &[Fault], plant: &Plant) -> Self {
+    pub fn new(stages: impl IntoIterator<Item = Stage>, faults: &[Fault], plant: &Plant, delay_us: u64) -> Self {
         let axes = stages.into_iter().enumerate().map(|(index, stage)| WatchedAxis::new(index, stage, faults, plant));
         Self {
             axes: axes.collect(),
@@ -60,6 +64,8 @@ impl Checker {
             arm_asked: None,
             holder: None,
             drivers_on: false,
+            switched_at: 0,
+            delay_us,
             clear_asked: None,
             fault: None,
             referenced: AxisMask(0),
@@ -139,9 +145,13 @@ impl Checker {
 
     fn watch_drivers(&mut self, now: Microseconds, plant: &Plant) {
         let was_on = std::mem::replace(&mut self.drivers_on, plant.drivers_on());
-        let asked = self.arm_asked.take();
+        if was_on != self.drivers_on {
+            self.switched_at = now.0;
+        }
         match (was_on, self.drivers_on) {
             (false, true) => {
+                let in_time = |(_, at): &(SessionId, u64)| now.0 <= at + self.delay_us;
+                let asked = self.arm_asked.take().filter(in_time).map(|(session, _)| session);
                 self.holder = asked.filter(|&session| self.lease_end(session) > now.0);
                 if self.holder.is_none() {
                     self.accuse(now, Promise::Armed, format!("drivers go on though armed by {asked:?}"));
@@ -158,7 +168,7 @@ impl Checker {
             return self.accuse(now, Promise::Armed, format!("axis {axis} steps though nobody has armed"));
         };
         let lease_end = self.lease_end(holder);
-        if now.0 > lease_end + self.longest_stop_us() + NOTICE_US {
+        if now.0 > lease_end + self.longest_stop_us() + NOTICE_US + self.delay_us {
             let late = now.0 - lease_end;
             self.accuse(now, Promise::Lease, format!("axis {axis} steps {late} us after the lease"));
         }
@@ -200,7 +210,7 @@ impl Checker {
                     self.leases.retain(|(named, _)| *named != session);
                     self.leases.push((session, end));
                 }
-                Request::Arm { session } => self.arm_asked = Some(session),
+                Request::Arm { session } => self.arm_asked = Some((session, now.0)),
                 Request::ClearFault { seen } => self.clear_asked = Some(seen),
                 Request::MoveTo(order) => {
                     self.moves.retain(|(id, ..)| *id != order.id);
@@ -275,7 +285,8 @@ impl Checker {
         }
         // While a fault is latched, the drivers may be on or off.
         let off = OFF.contains(&pose.state);
-        if !latched && off == plant.drivers_on() {
+        let settled = now.0 >= self.switched_at + self.delay_us;
+        if !latched && settled && off == plant.drivers_on() {
             let on = plant.drivers_on();
             self.accuse(now, Promise::State, format!("{} while drivers on is {on}", pose.state));
         }

@@ -20,6 +20,7 @@
 //! - Every motion and every request ends; in the end everything is at rest.
 
 mod checker;
+mod chip_board;
 mod faults;
 mod host;
 mod injector;
@@ -33,6 +34,7 @@ mod stages;
 mod tally;
 mod watched_axis;
 
+pub use chip_board::{ChipBoard, ChipFlash};
 pub use faults::{Fault, FaultKind, Onset};
 pub use journal::Journal;
 pub use promise::{Promise, Violation};

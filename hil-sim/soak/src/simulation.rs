@@ -36,12 +36,21 @@ pub trait Board {
     fn transmit(&mut self) -> Vec<u8>;
     /// Delays the next control tick by so many microseconds.
     fn delay_tick(&mut self, us: u64);
-    /// Restarts the board in any state; its clock begins again at zero.
-    fn restart(&mut self, boot: u32);
+    /// Restarts the board in any state; the clock by which it is advanced reads `now` then.
+    fn restart(&mut self, boot: u32, now: Microseconds);
     /// The simulated mechanics, which know the true positions.
     fn plant(&self) -> &Plant;
-    /// The mechanics, to change them.
-    fn plant_mut(&mut self) -> &mut Plant;
+    /// Changes the mechanics.
+    fn with_plant(&mut self, act: &mut dyn FnMut(&mut Plant));
+    /// Longest time from bytes that arrive to what they cause, and from a change to the pose that reports it, in
+    /// microseconds.
+    fn delay_us(&self) -> u64 {
+        0
+    }
+    /// The reason why the board works no more; `None` while it works.
+    fn halted(&self) -> Option<String> {
+        None
+    }
 }
 
 impl Board for NativeBoard {
@@ -61,7 +70,7 @@ impl Board for NativeBoard {
         self.delay_tick(us);
     }
 
-    fn restart(&mut self, boot: u32) {
+    fn restart(&mut self, boot: u32, _now: Microseconds) {
         // The settings were accepted at the first start.
         let _ = self.restart(ResetCause::Watchdog, boot);
     }
@@ -70,8 +79,8 @@ impl Board for NativeBoard {
         self.plant()
     }
 
-    fn plant_mut(&mut self) -> &mut Plant {
-        self.plant_mut()
+    fn with_plant(&mut self, act: &mut dyn FnMut(&mut Plant)) {
+        act(self.plant_mut());
     }
 }
 
@@ -158,7 +167,7 @@ impl<'a, B: Board> Simulation<'a, B> {
         let now = Microseconds(scenario.phase_us);
         journal.note(now, format!("seed {}, {}: {:?}", scenario.seed, scenario.kind, scenario.faults));
         Self {
-            checker: Checker::new(stages(), &scenario.faults, board.plant()),
+            checker: Checker::new(stages(), &scenario.faults, board.plant(), board.delay_us()),
             board,
             board_start: 0,
             boot: boot_number(scenario.seed),
@@ -179,6 +188,10 @@ impl<'a, B: Board> Simulation<'a, B> {
         let mut silent_since = None;
         while silent_since.is_none_or(|since: u64| self.now.0 < since + TAIL_US) {
             self.turn();
+            if let Some(halt) = self.board.halted() {
+                self.checker.accuse(self.now, Promise::Ends, format!("the board works no more: {halt}"));
+                break;
+            }
             if self.host.end().is_some() {
                 silent_since = silent_since.or(Some(self.now.0));
             }
@@ -229,25 +242,27 @@ impl<'a, B: Board> Simulation<'a, B> {
     }
 
     fn inject(&mut self) {
-        let mut late_us = 0;
-        let mut world = World {
-            now: self.now,
-            step: self.host.step(),
-            in_step_us: self.now.0 - self.step_since.0,
-            plant: self.board.plant_mut(),
-            late_us: &mut late_us,
-            lines: [&mut self.to_host, &mut self.to_board],
-            host_offset: &mut self.host_offset,
-            checker: &mut self.checker,
-            journal: &mut self.journal,
-        };
-        let restarts = self.injector.inject(&mut world);
+        let (mut late_us, mut restarts) = (0, false);
+        self.board.with_plant(&mut |plant| {
+            let mut world = World {
+                now: self.now,
+                step: self.host.step(),
+                in_step_us: self.now.0 - self.step_since.0,
+                plant,
+                late_us: &mut late_us,
+                lines: [&mut self.to_host, &mut self.to_board],
+                host_offset: &mut self.host_offset,
+                checker: &mut self.checker,
+                journal: &mut self.journal,
+            };
+            restarts = self.injector.inject(&mut world);
+        });
         if late_us > 0 {
             self.board.delay_tick(late_us);
         }
         if restarts {
             self.boot = self.boot.wrapping_add(1);
-            self.board.restart(self.boot);
+            self.board.restart(self.boot, Microseconds(self.phase_us));
             self.board_start = self.now.0 - self.phase_us;
             // Not yet one turn of its clock has passed.
             self.checker.restarted(self.board.plant());

@@ -2,12 +2,11 @@
 
 use rayon::prelude::*;
 use serde_json::{Map, Value, json};
-use vergence_control::SettingsError;
 
 use crate::faults::FaultKind;
 use crate::promise::Violation;
 use crate::scenario::Scenario;
-use crate::simulation::{Ending, native_board, run};
+use crate::simulation::{Board, Ending, run};
 
 /// Most broken promises that are listed; more are only counted.
 const MOST_LISTED: usize = 20;
@@ -38,21 +37,26 @@ pub struct Tally {
     pub virtual_seconds: f64,
 }
 
-/// Runs the scenarios of `count` seeds from `first` on with the real controller, on all cores; `progress` is
-/// called after each, on any of them. The result does not depend on how many there are.
+/// Runs the scenarios of `count` seeds from `first` on, each with a board of its own that `board` makes, on all cores;
+/// `progress` is called after each, on any of them. The result does not depend on how many there are.
 ///
 /// # Errors
-/// [`SettingsError`] if the stages cannot be controlled.
-pub fn soak(first: u64, count: u64, progress: impl Fn() + Sync) -> Result<Tally, SettingsError> {
+/// An error of `board`.
+pub fn soak<B: Board, E: Send>(
+    first: u64,
+    count: u64,
+    board: impl Fn(&Scenario) -> Result<B, E> + Sync,
+    progress: impl Fn() + Sync,
+) -> Result<Tally, E> {
     let results: Vec<_> = (0..count)
         .into_par_iter()
         .map(|index| {
             let scenario = Scenario::of(first.wrapping_add(index));
-            let outcome = run(&scenario, &mut native_board(&scenario)?);
+            let outcome = run(&scenario, &mut board(&scenario)?);
             progress();
             Ok((scenario.seed, scenario.kind, outcome.ending, outcome.violations, outcome.virtual_time))
         })
-        .collect::<Result<_, SettingsError>>()?;
+        .collect::<Result<_, E>>()?;
     let empty = |kind| KindTally { kind, scenarios: 0, safe_stops: 0, completed: 0, violated: 0 };
     let mut tally = Tally { by_kind: FaultKind::ALL.map(empty).to_vec(), violations: Vec::new(), virtual_seconds: 0.0 };
     for (seed, kind, ending, violations, time) in results {

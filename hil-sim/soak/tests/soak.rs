@@ -13,7 +13,7 @@ fn play(seed: u64) -> Outcome {
 #[test]
 fn three_hundred_scenarios_break_no_promise() {
     let played = AtomicU64::new(0);
-    let tally = soak(1, 300, || {
+    let tally = soak(1, 300, native_board, || {
         played.fetch_add(1, Ordering::Relaxed);
     })
     .unwrap();
@@ -37,7 +37,7 @@ fn hosts_jog_and_change_their_minds_in_mid_move() {
 /// A fault that leaves mechanics and encoders intact must not keep a host from completing its script.
 #[test]
 fn faults_of_line_and_host_delay_but_do_not_defeat() {
-    let tally = soak(1_000, 200, || {}).unwrap();
+    let tally = soak(1_000, 200, native_board, || {}).unwrap();
     let harmless = [
         FaultKind::None,
         FaultKind::ByteErrors,
@@ -65,7 +65,7 @@ fn the_same_seed_gives_the_same_log() {
 
 #[test]
 fn the_order_of_the_cores_does_not_matter() {
-    let all = soak(1, 40, || {}).unwrap();
+    let all = soak(1, 40, native_board, || {}).unwrap();
     let seconds: f64 = (1..=40).map(|seed| play(seed).virtual_time.0 as f64 * 1e-6).sum();
     assert!((all.virtual_seconds - seconds).abs() < 1e-6);
 }

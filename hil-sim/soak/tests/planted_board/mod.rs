@@ -202,7 +202,7 @@ impl Board for PlantedBoard {
         self.board.delay_tick(us);
     }
 
-    fn restart(&mut self, boot: u32) {
+    fn restart(&mut self, boot: u32, _now: Microseconds) {
         if self.defect == Defect::RestartsWithMemory {
             self.clock_offset = self.board.now().0;
         } else {
@@ -214,7 +214,7 @@ impl Board for PlantedBoard {
         self.board.plant()
     }
 
-    fn plant_mut(&mut self) -> &mut Plant {
-        self.board.plant_mut()
+    fn with_plant(&mut self, act: &mut dyn FnMut(&mut Plant)) {
+        act(self.board.plant_mut());
     }
 }

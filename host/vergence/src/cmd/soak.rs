@@ -1,11 +1,12 @@
 //! `vergence soak`: fault injection over the whole stack in virtual time.
 
 mod power_cuts;
+mod programs;
 
 use std::sync::atomic::{AtomicU64, Ordering};
 
 use vergence_rig::rounded;
-use vergence_soak::{Scenario, native_board, run as play, soak};
+use vergence_soak::{Board, Scenario, native_board, run as play, soak};
 
 use crate::console::Console;
 use crate::failure::Failure;
@@ -14,7 +15,8 @@ use crate::stopwatch::Stopwatch;
 /// Plays scenarios in which something goes wrong: bytes, frames, the line, the board, encoders, switches, motors, the
 /// host's clock. A checker that knows the truth looks on: no stage passes a hard limit or moves without lease and arm, no
 /// mode is reported that is not reached, the first fault is kept, and everything ends. Host session, protocol and
-/// controller are the real ones; line and mechanics are simulated. Exit code 1 where a promise is broken.
+/// controller are the real ones; line and mechanics are simulated. The controller runs without a chip, or with --elf as the
+/// board's own firmware on the simulated chip. Exit code 1 where a promise is broken.
 #[derive(Debug, clap::Args)]
 pub struct Args {
     /// How many scenarios.
@@ -27,31 +29,52 @@ pub struct Args {
     #[arg(long, value_name = "SEED", conflicts_with_all = ["scenarios", "seed"])]
     only: Option<u64>,
     #[command(flatten)]
+    programs: programs::Options,
+    #[command(flatten)]
     power: power_cuts::Options,
 }
 
 pub fn run(args: &Args, console: Console) -> Result<(), Failure> {
     if let Some(cuts) = args.power.cuts() {
-        return power_cuts::run(&args.power, cuts, console);
+        return power_cuts::run(&args.power, &args.programs, cuts, console);
     }
+    if args.programs.on_chip() {
+        let flash = args.programs.flash()?;
+        return on_boards(args, |scenario| Ok(flash.board(scenario)), console);
+    }
+    let native = |scenario: &Scenario| {
+        native_board(scenario)
+            .map_err(|error| Failure::check(format!("the controller refuses the simulated stages ({error})")))
+    };
+    on_boards(args, native, console)
+}
+
+fn on_boards<B: Board>(
+    args: &Args,
+    board: impl Fn(&Scenario) -> Result<B, Failure> + Sync,
+    console: Console,
+) -> Result<(), Failure> {
     match args.only {
-        Some(seed) => replay(seed, console),
-        None => many(args, console),
+        Some(seed) => replay(seed, board, console),
+        None => many(args, board, console),
     }
 }
 
-fn many(args: &Args, console: Console) -> Result<(), Failure> {
+fn many<B: Board>(
+    args: &Args,
+    board: impl Fn(&Scenario) -> Result<B, Failure> + Sync,
+    console: Console,
+) -> Result<(), Failure> {
     let stopwatch = Stopwatch::start();
     let progress = console.progress("soaking");
     let (played, every) = (AtomicU64::new(0), (args.scenarios / 200).max(1));
-    let tally = soak(args.seed, args.scenarios, || {
+    let tally = soak(args.seed, args.scenarios, board, || {
         let played = played.fetch_add(1, Ordering::Relaxed) + 1;
         if played.is_multiple_of(every) {
             progress.set_message(format!("{played} of {} scenarios", args.scenarios));
             progress.tick();
         }
-    })
-    .map_err(|error| Failure::check(format!("the controller refuses the simulated stages ({error})")))?;
+    })?;
     progress.finish_and_clear();
     let seconds = stopwatch.seconds();
     console.say(tally.table())?;
@@ -68,11 +91,13 @@ fn many(args: &Args, console: Console) -> Result<(), Failure> {
     tally.accusation().map_or(Ok(()), |broken| Err(Failure::check(broken)))
 }
 
-fn replay(seed: u64, console: Console) -> Result<(), Failure> {
+fn replay<B: Board>(
+    seed: u64,
+    board: impl Fn(&Scenario) -> Result<B, Failure>,
+    console: Console,
+) -> Result<(), Failure> {
     let scenario = Scenario::of(seed);
-    let mut board = native_board(&scenario)
-        .map_err(|error| Failure::check(format!("the controller refuses the simulated stages ({error})")))?;
-    let outcome = play(&scenario, &mut board);
+    let outcome = play(&scenario, &mut board(&scenario)?);
     console.say(outcome.journal.to_string().trim_end())?;
     console.result(&outcome.json(&scenario))?;
     match outcome.violations.len() {

@@ -1,16 +1,14 @@
 //! `vergence soak --power-cuts`: power cuts in the middle of a firmware update.
 
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 use vergence_files::write_whole;
-use vergence_image::sha256;
-use vergence_mcu::Firmware;
 use vergence_rig::rounded;
-use vergence_soak::power_cuts::{CutState, Journey, SignedImage, Sweep};
+use vergence_soak::power_cuts::{CutState, Journey, Sweep};
 
+use super::programs::{self, Programs};
 use crate::console::Console;
 use crate::failure::Failure;
-use crate::firmware::{APPLICATION, BOOT_LOADER, DEVELOPMENT, SecretKey, hex};
 use crate::stopwatch::Stopwatch;
 
 /// Cuts after which the state is saved and the clock is read.
@@ -24,12 +22,6 @@ pub struct Options {
     /// the application are those of the board, on the simulated chip; the word or page under way is left torn.
     #[arg(long, value_name = "COUNT", conflicts_with_all = ["scenarios", "seed", "only"])]
     power_cuts: Option<usize>,
-    /// The application, for the image before the update and, in other words, the one after it.
-    #[arg(long, value_name = "ELF", requires = "power_cuts", default_value = APPLICATION)]
-    elf: PathBuf,
-    /// The boot loader.
-    #[arg(long, value_name = "ELF", requires = "power_cuts", default_value = BOOT_LOADER)]
-    boot_loader: PathBuf,
     /// Keeps the counts in this file, and continues with those that it holds.
     #[arg(long, value_name = "FILE", requires = "power_cuts")]
     state: Option<PathBuf>,
@@ -42,8 +34,8 @@ impl Options {
     }
 }
 
-pub fn run(options: &Options, cuts: usize, console: Console) -> Result<(), Failure> {
-    let (sweep, programs) = prepare(options)?;
+pub fn run(options: &Options, programs: &programs::Options, cuts: usize, console: Console) -> Result<(), Failure> {
+    let (sweep, programs) = prepare(programs.read()?)?;
     let mut state = match &options.state {
         Some(path) if path.exists() => {
             let bytes = std::fs::read(path).map_err(|error| Failure::input(path, error))?;
@@ -69,18 +61,8 @@ pub fn run(options: &Options, cuts: usize, console: Console) -> Result<(), Failu
     state.tally.accusation().map_or(Ok(()), |bricked| Err(Failure::check(bricked)))
 }
 
-fn prepare(options: &Options) -> Result<(Sweep, String), Failure> {
-    let read = |path: &Path| {
-        let bytes = std::fs::read(path).map_err(|error| {
-            Failure::input(path, format!("{error}; docs/firmware.md says how the firmware is built"))
-        })?;
-        let firmware = Firmware::from_elf(&bytes).map_err(|error| Failure::input(path, error))?;
-        Ok::<_, Failure>((firmware, bytes))
-    };
-    let ((application, elf), (boot_loader, boot_elf)) = (read(&options.elf)?, read(&options.boot_loader)?);
-    let key = SecretKey::named(Path::new(DEVELOPMENT))?;
-    let images = SignedImage::before_and_after(&application, |header| key.seal(header));
-    let sweep = Sweep::new(&boot_loader, images, Journey::Update)
+fn prepare(programs: Programs) -> Result<(Sweep, String), Failure> {
+    let sweep = Sweep::new(&programs.boot_loader, programs.images, Journey::Update)
         .map_err(|problem| Failure::check(format!("an update without power cuts does not work: {problem}")))?;
-    Ok((sweep, hex(&sha256(&[elf, boot_elf].concat()))))
+    Ok((sweep, programs.digest))
 }

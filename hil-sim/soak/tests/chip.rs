@@ -1,0 +1,63 @@
+//! Scenarios with the board's own firmware on the simulated chip: no promise is broken there either.
+#![allow(
+    clippy::expect_used,
+    clippy::panic,
+    clippy::print_stdout,
+    reason = "a test fails loudly and shows its figures"
+)]
+
+mod programs;
+
+use std::convert::Infallible;
+use std::sync::OnceLock;
+
+use programs::programs;
+use vergence_plant::Plant;
+use vergence_soak::{ChipBoard, ChipFlash, Promise, Scenario, run, soak, stages};
+
+/// Scenarios to play, unless `VERGENCE_ELF_SCENARIOS` names another number.
+const SCENARIOS: u64 = 40;
+
+fn flash() -> &'static ChipFlash {
+    static READ: OnceLock<ChipFlash> = OnceLock::new();
+    READ.get_or_init(|| {
+        let (boot_loader, [application, _]) = programs();
+        ChipFlash::new(&boot_loader, &application).expect("they fit")
+    })
+}
+
+#[test]
+fn the_firmware_breaks_no_promise() {
+    let named = std::env::var("VERGENCE_ELF_SCENARIOS").ok();
+    let count = named.map_or(SCENARIOS, |count| count.parse().expect("a number of scenarios"));
+    let board = |scenario: &Scenario| Ok::<ChipBoard, Infallible>(flash().board(scenario));
+    let tally = soak(1, count, board, || {}).expect("boards cannot fail");
+    println!("{}\n{:.0} s of virtual time", tally.table(), tally.virtual_seconds);
+    assert!(tally.violations.is_empty(), "{:#?}", tally.violations);
+}
+
+#[test]
+fn the_same_seed_gives_the_same_log() {
+    let play = |seed| {
+        let scenario = Scenario::of(seed);
+        run(&scenario, &mut flash().board(&scenario))
+    };
+    assert_eq!(play(3), play(3));
+}
+
+/// The checker finds a defect through the chip as well: here stages without switches, which the firmware cannot save.
+#[test]
+fn missing_switches_are_found() {
+    let mechanics = stages().map(|stage| {
+        let mut mechanics = stage.mechanics;
+        mechanics.home_switch = -1e9;
+        mechanics.hard_limits = [-1e9, 1e9];
+        mechanics
+    });
+    let broken = (1..=6).any(|seed| {
+        let scenario = Scenario::of(seed);
+        let outcome = run(&scenario, &mut flash().board_before(Plant::new(&mechanics, &scenario.positions)));
+        outcome.violations.iter().any(|violation| violation.promise == Promise::HardLimit)
+    });
+    assert!(broken, "the stages ran beyond their hard limits and nobody noticed");
+}
