@@ -14,7 +14,6 @@ mod blur;
 mod furnish;
 mod hierarchy;
 mod light;
-mod noise;
 mod optics;
 mod range_map;
 mod rays;
@@ -24,6 +23,7 @@ mod scene;
 mod shape;
 mod target;
 mod texture;
+mod texture_noise;
 
 pub use optics::Optics;
 pub use range_map::RangeMap;

@@ -2,8 +2,8 @@
 
 use vergence_vision::Angle;
 
-use crate::noise::mix64;
 use crate::texture::Rgb;
+use crate::texture_noise::mix64;
 
 /// Lens and sensor of one camera. A value outside its range counts as the nearest end of the range.
 #[derive(Clone, Copy, Debug, PartialEq)]

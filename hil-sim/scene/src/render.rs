@@ -6,10 +6,10 @@ use rayon::prelude::*;
 use vergence_vision::{Angle, BatchLens, Camera, KannalaBrandt, Transform, World};
 
 use crate::blur::blurred;
-use crate::noise::mix64;
 use crate::optics::unit_pair;
 use crate::rays::{Around, PosedLens, RayGrid, lens_of};
 use crate::texture::Rgb;
+use crate::texture_noise::mix64;
 use crate::{Optics, RangeMap, Scene};
 
 /// Number of rows that one task renders.

@@ -6,8 +6,8 @@
 use nalgebra::Vector3;
 
 use crate::Target;
-use crate::noise::{cell_hash, fraction, octaves, smoothstep, split, survival};
 use crate::shape::SurfacePoint;
+use crate::texture_noise::{cell_hash, fraction, octaves, smoothstep, split, survival};
 
 /// Linear red, green and blue.
 pub type Rgb = [f32; 3];

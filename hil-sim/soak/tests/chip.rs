@@ -16,7 +16,7 @@ use vergence_plant::Plant;
 use vergence_soak::{ChipBoard, ChipFlash, Promise, Scenario, run, soak, stages};
 
 /// Scenarios to play, unless `VERGENCE_ELF_SCENARIOS` names another number.
-const SCENARIOS: u64 = 40;
+const SCENARIOS: u64 = 24;
 
 fn flash() -> &'static ChipFlash {
     static READ: OnceLock<ChipFlash> = OnceLock::new();

@@ -9,8 +9,7 @@
 mod programs;
 
 use programs::programs;
-use vergence_image::layout::{ACTIVE, FLASH_BASE};
-use vergence_mcu::{Bench, BenchWiring, ChipConfig, Firmware, Halt, Machine, Picoseconds};
+use vergence_mcu::{Bench, BenchWiring, ChipConfig, Halt, Machine, Picoseconds};
 use vergence_plant::{Plant, bench_mechanics};
 use vergence_soak::power_cuts::{Cut, CutTally, Journey, Sweep};
 

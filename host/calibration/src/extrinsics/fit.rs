@@ -5,8 +5,8 @@ use nalgebra::{DMatrix, Isometry3};
 
 use crate::Loss;
 use crate::extrinsics::StereoView;
-use crate::extrinsics::gross::{OwnPoses, inliers, median_of};
 use crate::extrinsics::joint::{Joint, Kinematics, Shared};
+use crate::extrinsics::outliers::{OwnPoses, inliers, median_of};
 use crate::extrinsics::report::rms;
 use crate::extrinsics::stereo::{LensKnowledge, LensPrior, Lenses, Pair};
 use crate::schur_lm::{self, SchurOptions};

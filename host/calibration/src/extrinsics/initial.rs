@@ -6,7 +6,7 @@ use vergence_vision::{Camera, KannalaBrandt, Left, Point, Right};
 
 use crate::arun::fit_rotation_translation;
 use crate::extrinsics::Side;
-use crate::extrinsics::gross::OwnPoses;
+use crate::extrinsics::outliers::OwnPoses;
 use crate::extrinsics::stereo::{Lenses, Pair};
 use crate::extrinsics::{ExtrinsicsError, SkippedView, StereoView};
 use crate::planar_pose::{PoseError, target_pose};

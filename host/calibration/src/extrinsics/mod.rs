@@ -5,9 +5,9 @@
 //! all reprojections refines everything. Targets may be near and beyond 90° from the axis.
 
 mod fit;
-mod gross;
 mod initial;
 mod joint;
+mod outliers;
 mod report;
 mod scatter;
 mod stereo;
@@ -20,9 +20,9 @@ use crate::reprojection::POSE;
 use crate::target::{Corner, Target, TargetView};
 
 pub(crate) use fit::{Fit, NoFit, Start, Task};
-pub(crate) use gross::OwnPoses;
 pub(crate) use initial::{PlacedView, inside, nearer_targets, place};
 pub(crate) use joint::{FixedPose, Kinematics, Shared};
+pub(crate) use outliers::OwnPoses;
 pub(crate) use report::{outliers, refined, rms, view_figures};
 pub use stereo::LensKnowledge;
 use stereo::LensPrior;

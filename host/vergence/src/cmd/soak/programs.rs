@@ -12,6 +12,7 @@ use crate::firmware::{APPLICATION, BOOT_LOADER, DEVELOPMENT, SecretKey, hex};
 
 /// Options that name the programs.
 #[derive(Debug, clap::Args)]
+#[group(skip)]
 pub struct Options {
     /// Play on the board's own firmware on the simulated chip: this application, or without a value the one that cargo
     /// built in this repository. With --power-cuts: the image before the update and, in other words, the one after it.
