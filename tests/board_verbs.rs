@@ -128,8 +128,10 @@ fn the_log_tells_what_happened_and_what_happens() {
 fn a_port_in_use_is_not_taken_for_a_board_without_power() {
     let simulator = Simulator::start(&["--tcp", "127.0.0.1:0"]);
     let mut child = armed(&simulator);
-    let said = fails(&simulator.run(&["status"]), 3, &["in use by another vergence"]);
-    assert!(!said.contains("powered"), "{said}");
+    for verb in [&["status"][..], &["flash", "--restart"]] {
+        let said = fails(&simulator.run(verb), 3, &["in use by another vergence"]);
+        assert!(!said.contains("powered"), "{said}");
+    }
     signal(&child, "-INT");
     child.wait().expect("it ends");
 }

@@ -65,7 +65,7 @@ impl Client {
     /// [`OpenError::Unanswered`] where the board does not answer within two seconds.
     pub async fn at(port: &Port, wire: OpenWire, session: SessionId, clock: HostClock) -> Result<Self, OpenError> {
         let opened = Self::connect(wire, session, clock).await;
-        opened.map_err(|error| OpenError::Unanswered { port: port.clone(), why: unanswered(port, &error) })
+        opened.map_err(|error| OpenError::Unanswered { port: port.clone(), why: error.behind(port).to_string() })
     }
 
     /// Whether host and board speak the same protocol version.
@@ -182,16 +182,5 @@ impl Client {
 
     fn why_ended(&self) -> LinkError {
         self.end.borrow().clone().unwrap_or(LinkError::SessionLost)
-    }
-}
-
-/// Why nobody answered. A TCP address that could be reached has a simulator behind it, which serves one host at a time.
-fn unanswered(port: &Port, error: &LinkError) -> String {
-    match (port, error) {
-        (Port::Tcp(_), LinkError::Silent(patience)) => format!(
-            "connected, but no answer within {patience:?}: the port is in use by another vergence, or this is no vergence \
-             board; let the other one finish first"
-        ),
-        _ => error.to_string(),
     }
 }

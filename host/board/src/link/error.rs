@@ -17,6 +17,12 @@ pub enum LinkError {
     /// Nothing arrived.
     #[error("no answer within {0:?}: is this the port of a vergence board, and is the board powered?")]
     Silent(Duration),
+    /// Nothing arrived through a TCP connection, behind which a simulator serves one host at a time.
+    #[error(
+        "connected, but no answer within {0:?}: the port is in use by another vergence, or this is no vergence board; let \
+         the other one finish first"
+    )]
+    Taken(Duration),
     /// Bytes arrived, but no valid message.
     #[error("{0} bytes arrived but no valid message: another device, or another baud rate, is on this port")]
     Noise(u32),
@@ -26,6 +32,16 @@ pub enum LinkError {
     /// The request cannot be sent now.
     #[error("the request cannot be sent: {0}")]
     Unsendable(String),
+}
+
+impl LinkError {
+    /// This error where it came from `port`: what answers nothing behind TCP is taken.
+    pub(super) fn behind(self, port: &Port) -> Self {
+        match (port, self) {
+            (Port::Tcp(_), Self::Silent(patience)) => Self::Taken(patience),
+            (_, error) => error,
+        }
+    }
 }
 
 /// Why a port cannot be opened.

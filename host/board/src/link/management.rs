@@ -168,7 +168,11 @@ impl ManagementLink {
                 return Ok(answer);
             }
         }
-        Err(LinkError::Silent(patience))
+        let silent = LinkError::Silent(patience);
+        Err(match &self.source {
+            WireSource::Port(port, _) => silent.behind(port),
+            WireSource::InProcess(_) => silent,
+        })
     }
 
     /// The first report that `understand` accepts as an answer; `None` where none came within `patience`.

@@ -105,7 +105,7 @@ async fn reboot(link: &mut ManagementLink) -> Result<(), UpdateError> {
 async fn look(link: &mut ManagementLink) -> Result<Option<Identity>, UpdateError> {
     match timeout(UNHEARD, link.identify()).await {
         Ok(Ok(identity)) => Ok(Some(identity)),
-        Err(_) | Ok(Err(LinkError::Silent(_))) => Ok(None),
+        Err(_) | Ok(Err(LinkError::Silent(_) | LinkError::Taken(_))) => Ok(None),
         Ok(Err(_)) => {
             link.reopen(START_PATIENCE).await?;
             Ok(None)
