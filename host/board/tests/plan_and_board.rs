@@ -5,6 +5,7 @@ use std::convert::Infallible;
 use std::future::pending;
 
 use proptest::prelude::*;
+use proptest::test_runner::RngSeed;
 use vergence_board::{
     AxisPlan, Board, BoardError, Client, HostClock, MovePlan, MoveStart, OpenWire, Served, Shared, spawn_in_process,
 };
@@ -153,7 +154,7 @@ async fn compare(seed: u64, backlash: [i32; 2], moves: Vec<Step>) {
 }
 
 proptest! {
-    #![proptest_config(ProptestConfig { cases: 24, ..ProptestConfig::default() })]
+    #![proptest_config(ProptestConfig { cases: 24, rng_seed: RngSeed::Fixed(0x5eed), ..ProptestConfig::default() })]
     #[test]
     fn the_board_executes_what_the_host_planned(
         seed in 1..1_000u64,
