@@ -1,7 +1,6 @@
 //! The board's own firmware on the simulated chip as the board of a scenario.
 
 use vergence_cpu::{Access, Bus};
-use vergence_image::layout::FLASH_BASE;
 use vergence_mcu::{
     Bench, BenchWiring, ChipConfig, Firmware, FlashCells, Frame, Halt, LineFault, Machine, Picoseconds, UartId,
 };
@@ -32,12 +31,7 @@ impl ChipFlash {
     /// Flash with this boot loader and this application; `None` where they do not fit.
     #[must_use]
     pub fn new(boot_loader: &Firmware, application: &SignedImage) -> Option<Self> {
-        let mut cells = FlashCells::default();
-        let mut fits = application.install(&mut cells);
-        for (address, bytes) in boot_loader.segments() {
-            fits &= cells.load(address.wrapping_sub(FLASH_BASE) as usize, bytes);
-        }
-        fits.then_some(Self(cells))
+        application.delivered_with(boot_loader).map(Self)
     }
 
     /// A board with this flash, just switched on, before the stages of `scenario`.

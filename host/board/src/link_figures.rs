@@ -7,6 +7,7 @@ use serde_json::{Value, json};
 use tokio::time::{MissedTickBehavior, interval};
 use vergence_protocol::frame::{Header, Kind, encode};
 use vergence_protocol::{BoardStatistics, HostStatistics, MAX_FRAME, PROTOCOL, Report, Request, Status};
+use vergence_rig::rounded;
 
 use crate::board::Board;
 use crate::error::BoardError;
@@ -137,7 +138,6 @@ impl LinkFigures {
     /// The figures for programs, as those of [`Self::lines`].
     #[must_use]
     pub fn json(&self, baud: u32, is_wire: bool) -> Value {
-        let rounded = |value: f64| (value * 1e4).round() / 1e4;
         let percentile = |share| rounded(self.percentile(share).unwrap_or(f64::NAN));
         json!({
             "requests": self.round_trips_ms.len() + self.unanswered as usize,

@@ -34,6 +34,17 @@ impl SignedImage {
         })
     }
 
+    /// Flash of a delivered board: the image, and the boot loader that starts it; `None` where they do not fit.
+    #[must_use]
+    pub fn delivered_with(&self, boot_loader: &Firmware) -> Option<FlashCells> {
+        let mut cells = FlashCells::default();
+        let mut fits = self.install(&mut cells);
+        for (address, bytes) in boot_loader.segments() {
+            fits &= cells.load(address.wrapping_sub(FLASH_BASE) as usize, bytes);
+        }
+        fits.then_some(cells)
+    }
+
     /// Writes the image to where the boot loader starts it, as a debug probe would.
     pub fn install(&self, cells: &mut FlashCells) -> bool {
         let start = ACTIVE.start as usize;

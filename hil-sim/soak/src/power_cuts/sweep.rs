@@ -4,7 +4,7 @@ use std::ops::Range;
 
 use rayon::prelude::*;
 use vergence_image::layout::{PAGE, STATE};
-use vergence_mcu::{Damage, FLASH_BASE, Firmware, FlashCells, FlashOperation};
+use vergence_mcu::{Damage, Firmware, FlashCells, FlashOperation};
 use vergence_protocol::management::BootState;
 
 use super::image::SignedImage;
@@ -72,14 +72,7 @@ impl Sweep {
     /// # Errors
     /// Says why the update does not work.
     pub fn new(boot_loader: &Firmware, [old, new]: [SignedImage; 2], journey: Journey) -> Result<Self, String> {
-        let mut before = FlashCells::default();
-        let mut fits = old.install(&mut before);
-        for (address, bytes) in boot_loader.segments() {
-            fits &= before.load(address.wrapping_sub(FLASH_BASE) as usize, bytes);
-        }
-        if !fits {
-            return Err("boot loader and application do not fit into flash".into());
-        }
+        let before = old.delivered_with(boot_loader).ok_or("boot loader and application do not fit into flash")?;
         let mut talk = Talk::switched_on(&before);
         talk.list_operations();
         let last = match journey {

@@ -6,7 +6,7 @@ use vergence_protocol::{Compatibility, ControllerState, ResetCause, SettingItem,
 use vergence_rig::AxisPosition;
 
 use super::Finding;
-use crate::board::{Board, describe_fault};
+use crate::board::{Board, describe_clock, describe_fault};
 use crate::error::BoardError;
 use crate::link_figures::LinkFigures;
 
@@ -24,8 +24,6 @@ pub struct BoardChecks {
     pub lease_ms: u16,
     /// Speed of the line in bits per second; `None` where bytes take no time.
     pub line_baud: Option<u32>,
-    /// Says how well the clock of the board is known.
-    pub clock_in_words: fn(&Board) -> String,
     /// Says what is wrong where the board can no longer be reached.
     pub unreachable: fn(BoardError) -> Finding,
 }
@@ -37,7 +35,7 @@ pub async fn check_board(board: &mut Board, checks: BoardChecks) -> Vec<Finding>
         Ok(figures) => findings.push(link(&figures, checks.lease_ms)),
         Err(error) => findings.push((checks.unreachable)(error)),
     }
-    findings.extend([clock(board, (checks.clock_in_words)(board)), state(board), reference(board)]);
+    findings.extend([clock(board), state(board), reference(board)]);
     findings.extend(limits(board));
     findings.push(settings(board, checks.line_baud).await);
     findings
@@ -108,7 +106,8 @@ fn link(figures: &LinkFigures, lease_ms: u16) -> Finding {
     Finding::pass("link", format!("{summary}; nothing was lost"))
 }
 
-fn clock(board: &Board, reason: String) -> Finding {
+fn clock(board: &Board) -> Finding {
+    let reason = describe_clock(board);
     let map = board.client().clock_map();
     let now = map.board_at(board.client().clock().now());
     match (now, map.drift()) {

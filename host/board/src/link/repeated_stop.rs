@@ -3,7 +3,7 @@
 use vergence_protocol::{HostSession, Microseconds, Request, StopKind, SubmitError, Ticket};
 
 /// Time in microseconds between two sendings: one frame in fifty is lost where one byte in a thousand is.
-const REPEAT_US: u64 = 20_000;
+pub(super) const REPEAT_US: u64 = 20_000;
 
 /// A stop on its way. Call [`Self::send`] at [`Self::due`] until a reply answers it ([`Self::is_answered_by`]).
 #[derive(Clone, Debug)]

@@ -11,6 +11,7 @@ use super::clock::HostClock;
 use super::error::OpenError;
 use super::follow::{Followed, Follower};
 use super::open::{OpenWire, Port};
+use super::repeated_stop::REPEAT_US;
 use super::session_id::fresh_session;
 
 /// Number of times that a stop is sent without any pose: one of so many arrives even where one frame in fifty is lost.
@@ -18,7 +19,7 @@ const BLIND: u32 = 10;
 /// Number of times that a stop is sent in all: for two seconds.
 const MOST: u32 = 100;
 /// Time between two of them.
-const APART: Duration = Duration::from_millis(20);
+const APART: Duration = Duration::from_micros(REPEAT_US);
 
 /// Sends one stop over `wire`, which leads to `port`, in a session of its own: the board takes a stop from anybody.
 ///

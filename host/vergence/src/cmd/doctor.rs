@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 
 use serde_json::json;
-use vergence_board::{BoardChecks, Finding, Verdict, check_board, check_cameras, check_port, describe_clock};
+use vergence_board::{BoardChecks, Finding, Verdict, check_board, check_cameras, check_port};
 
 use super::connect::{connect, is_wire, port};
 use super::options::active_rig;
@@ -77,7 +77,6 @@ async fn examine(common: &CommonOptions, console: Console) -> Vec<Finding> {
     let checks = BoardChecks {
         lease_ms: common.lease,
         line_baud: is_wire(common).then_some(common.baud),
-        clock_in_words: describe_clock,
         unreachable: |error| unreachable(&error.into()),
     };
     match connect(common, console, "examining the board").await {
