@@ -44,6 +44,8 @@ pub struct AxisPlant {
     stage: f64,
     encoder: Encoder,
     home: Switch,
+    /// Reading of a hard limit that does not follow the load.
+    limit_fixed: Option<bool>,
     blocked: bool,
     stalled: bool,
     /// Steps that the rotor will miss.
@@ -65,6 +67,7 @@ impl AxisPlant {
             stage: position,
             encoder: Encoder::new(scale_reading(mechanics.encoder, position)),
             home: Switch::new(position <= mechanics.home_switch),
+            limit_fixed: None,
             blocked: false,
             stalled: false,
             to_lose: 0,
@@ -152,11 +155,16 @@ impl AxisPlant {
         self.home.reads_closed()
     }
 
+    /// Fixes the reading of the hard limit from now on, or lets it follow the load again.
+    pub fn fix_hard_limit(&mut self, reading: Option<bool>) {
+        self.limit_fixed = reading;
+    }
+
     /// Whether a hard limit is reached: one of the normally closed switches is open.
     #[must_use]
     pub fn hard_limit(&self) -> bool {
         let [low, high] = self.mechanics.hard_limits;
-        self.load <= low || self.load >= high
+        self.limit_fixed.unwrap_or(self.load <= low || self.load >= high)
     }
 
     /// Lets time pass from `from` to `to`; without drivers the motor does not turn.

@@ -19,6 +19,8 @@ pub enum EncoderFault {
     },
     /// The encoder reads the count at which it was switched on.
     Dead,
+    /// The encoder has no supply: its count stands still, and goes on from there when the supply returns.
+    Unpowered,
 }
 
 /// Relation between the reading and the true count.
@@ -26,6 +28,7 @@ pub enum EncoderFault {
 enum Reading {
     True,
     Stuck(i32),
+    Unpowered(i32),
     Mirrored(i32),
     Noisy { amplitude: i32, random: Pcg64Mcg, error: i32 },
     Dead,
@@ -49,7 +52,7 @@ impl Encoder {
         let count = scale.wrapping_sub(self.zero);
         match self.reading {
             Reading::True => count,
-            Reading::Stuck(at) => at,
+            Reading::Stuck(at) | Reading::Unpowered(at) => at,
             Reading::Mirrored(pivot) => pivot.wrapping_sub(count.wrapping_sub(pivot)),
             Reading::Noisy { error, .. } => count.wrapping_add(error),
             Reading::Dead => 0,
@@ -59,6 +62,10 @@ impl Encoder {
     /// Makes the encoder fail where the scale reads `scale`, or work again.
     pub fn fail(&mut self, fault: Option<EncoderFault>, scale: i32) {
         let here = self.raw(scale);
+        if let Reading::Unpowered(at) = self.reading {
+            // An incremental encoder does not know how far it was moved meanwhile.
+            self.zero = scale.wrapping_sub(at);
+        }
         self.reading = match fault {
             None => Reading::True,
             Some(EncoderFault::Stuck) => Reading::Stuck(here),
@@ -67,6 +74,7 @@ impl Encoder {
                 Reading::Noisy { amplitude: amplitude.max(0), random: Pcg64Mcg::seed_from_u64(seed), error: 0 }
             }
             Some(EncoderFault::Dead) => Reading::Dead,
+            Some(EncoderFault::Unpowered) => Reading::Unpowered(here),
         };
     }
 

@@ -1,32 +1,35 @@
 //! The checker: observes the true mechanics, the bytes that reach the board, and the bytes that leave it.
 
+mod reports;
+
+use std::collections::VecDeque;
+
 use vergence_control::RigIo;
 use vergence_plant::{Plant, Stage};
 use vergence_protocol::{
-    AxisMask, ControllerState, FaultRecord, Micro, Microseconds, Mode, MoveId, MovePhase, PoseReport, Receiver, Report,
-    Request, SessionId,
+    AxisMask, ControllerState, FaultRecord, Micro, Microseconds, Mode, MoveId, Receiver, Request, SessionId, StopKind,
 };
 
+use crate::board_clock::BoardClock;
 use crate::faults::Fault;
-use crate::journal::Journal;
 use crate::promise::{EncoderReading, Promise, Violation};
+use crate::pulses::Pulses;
+use crate::settings_in_force::{AxisLimits, SettingsInForce};
 use crate::watched_axis::WatchedAxis;
 
 /// Time from the end of the lease to the tick that notices it, and from there to the check of its last step.
 const NOTICE_US: u64 = 3_000;
-
-/// States of a disarmed board.
-const OFF: [ControllerState; 5] = [
-    ControllerState::Idle,
-    ControllerState::Boot,
-    ControllerState::SelfTest,
-    ControllerState::Updating,
-    ControllerState::Trial,
-];
+/// Time for which the answer to a clock probe is awaited.
+const PROBE_US: u64 = 1_000_000;
 
 #[derive(Debug)]
 pub struct Checker {
     axes: Vec<WatchedAxis>,
+    settings: SettingsInForce,
+    clock: BoardClock,
+    pulses: Pulses,
+    /// Arrivals of clock probes: the host's time in them, and the true time.
+    probes: VecDeque<(Microseconds, u64)>,
     from_host: Receiver,
     from_board: Receiver,
     /// Latest heartbeat of each session, and the end of its lease.
@@ -49,14 +52,27 @@ pub struct Checker {
     state: Option<ControllerState>,
     busy_since: Option<u64>,
     stepped_at: u64,
+    /// When the host last requested a stop, and which; until it requests a motion again.
+    stop_asked: Option<(u64, StopKind)>,
+    /// Since when the emergency stop is pressed.
+    pressed_since: Option<u64>,
     violations: Vec<Violation>,
 }
 
 impl Checker {
     pub fn new(stages: impl IntoIterator<Item = Stage>, faults: &[Fault], plant: &Plant, delay_us: u64) -> Self {
         let axes = stages.into_iter().enumerate().map(|(index, stage)| WatchedAxis::new(index, stage, faults, plant));
+        let axes: Vec<WatchedAxis> = axes.collect();
         Self {
-            axes: axes.collect(),
+            settings: SettingsInForce::new(
+                axes.iter()
+                    .map(|axis| axis.stage.settings)
+                    .map(|axis| AxisLimits { speed: axis.speed, max: axis.max.0 }),
+            ),
+            axes,
+            clock: BoardClock::default(),
+            pulses: Pulses::default(),
+            probes: VecDeque::new(),
             from_host: Receiver::new(),
             from_board: Receiver::new(),
             leases: Vec::new(),
@@ -73,6 +89,8 @@ impl Checker {
             state: None,
             busy_since: None,
             stepped_at: 0,
+            stop_asked: None,
+            pressed_since: None,
             violations: Vec::new(),
         }
     }
@@ -103,6 +121,11 @@ impl Checker {
         self.drivers_on = plant.drivers_on();
         self.restarted = true;
         self.state = None;
+        self.referenced = AxisMask(0);
+        self.clock = BoardClock::default();
+        self.pulses.forget();
+        self.probes.clear();
+        self.settings.restarted();
         for (index, axis) in self.axes.iter_mut().enumerate() {
             axis.steps = plant.steps(index);
         }
@@ -112,26 +135,35 @@ impl Checker {
     pub fn watch(&mut self, now: Microseconds, plant: &Plant) {
         let before = self.holder;
         self.watch_drivers(now, plant);
+        self.watch_stops(now, plant);
+        self.pulses.watch(now, plant);
         // The motors may have stepped until the tick that cut the drivers.
         let holder = self.holder.or(before);
         for index in 0..self.axes.len() {
             let (steps, load) = (plant.steps(index), plant.load(index).unwrap_or_default());
             let axis = &mut self.axes[index];
             let made = steps.wrapping_sub(axis.steps);
-            (axis.steps, axis.load) = (steps, load);
+            axis.steps = steps;
+            axis.observe(load);
             axis.lost_at =
                 (axis.reading == EncoderReading::Lost && plant.drivers_on()).then(|| axis.lost_at.unwrap_or(load));
-            if let Some(what) = axis.check_hard_limit() {
+            if let Some(what) = axis.check_hard_limit(self.referenced.contains(index)) {
                 self.accuse(now, Promise::HardLimit, format!("axis {index}: {what}"));
+            }
+            // Homing gives an axis its reference outside the range.
+            if self.referenced.contains(index)
+                && self.state != Some(ControllerState::Homing)
+                && let Some(limits) = self.settings.limits().get(index)
+                && let Some(what) = self.axes[index].check_range(limits.max)
+            {
+                self.accuse(now, Promise::Range, format!("axis {index}: {what}"));
             }
             if let Some(what) = self.axes[index].check_following() {
                 self.accuse(now, Promise::Follows, format!("axis {index}: {what}"));
             }
             if made != 0 {
                 self.check_step(now, index, holder);
-                if !self.referenced.contains(index)
-                    && let Some(what) = self.axes[index].check_gentle(made)
-                {
+                if let Some(what) = self.axes[index].check_speed(made, self.speed_limit(index)) {
                     self.accuse(now, Promise::Gentle, format!("axis {index}: {what}"));
                 }
             }
@@ -141,6 +173,12 @@ impl Checker {
         {
             self.accuse(now, Promise::Ends, format!("{:?} does not end", self.state));
         }
+    }
+
+    /// The largest speed of an axis: that of homing without a reference, because obstacles are unknown then.
+    fn speed_limit(&self, axis: usize) -> u32 {
+        let limit = self.settings.limits().get(axis).map_or(0, |limits| limits.speed);
+        if self.referenced.contains(axis) { limit } else { limit.min(self.axes[axis].stage.settings.homing.seek_speed) }
     }
 
     fn watch_drivers(&mut self, now: Microseconds, plant: &Plant) {
@@ -162,8 +200,31 @@ impl Checker {
         }
     }
 
+    /// Checks that emergency stop and stops without torque switch the drivers off.
+    fn watch_stops(&mut self, now: Microseconds, plant: &Plant) {
+        self.pressed_since = plant.emergency_stop().then(|| self.pressed_since.unwrap_or(now.0));
+        let noticed = NOTICE_US + self.delay_us;
+        let overdue = |since: u64| self.drivers_on && now.0 > since + noticed;
+        let pressed = self.pressed_since.is_some_and(overdue);
+        // A board may be armed again after a stop.
+        let since = self.switched_at.saturating_sub(self.delay_us);
+        let torque = matches!(self.stop_asked, Some((at, StopKind::TorqueOff)) if overdue(at) && since <= at);
+        if pressed {
+            self.accuse(now, Promise::EmergencyStop, "drivers stay on while it is pressed".into());
+        }
+        if torque {
+            self.accuse(now, Promise::Stops, "drivers stay on after a stop without torque".into());
+        }
+    }
+
     fn check_step(&mut self, now: Microseconds, axis: usize, holder: Option<SessionId>) {
         self.stepped_at = now.0;
+        if let Some((asked, _)) = self.stop_asked
+            && now.0 > asked + self.longest_stop_us() + NOTICE_US + self.delay_us
+        {
+            let late = now.0 - asked;
+            self.accuse(now, Promise::Stops, format!("axis {axis} steps {late} us after a stop was requested"));
+        }
         let Some(holder) = holder else {
             return self.accuse(now, Promise::Armed, format!("axis {axis} steps though nobody has armed"));
         };
@@ -204,15 +265,23 @@ impl Checker {
         for &byte in bytes {
             let Some(frame) = self.from_host.push(byte) else { continue };
             let Ok(request) = frame.body::<Request>() else { continue };
+            self.settings.requested(frame.header.seq, &request);
             match request {
+                Request::TimeProbe { t0 } => {
+                    self.probes.push_back((t0, now.0));
+                    self.probes.retain(|(_, at)| now.0 - at < PROBE_US);
+                }
                 Request::Heartbeat { session, lease_ms } => {
                     let end = now.0 + u64::from(lease_ms) * 1000;
                     self.leases.retain(|(named, _)| *named != session);
                     self.leases.push((session, end));
                 }
+                Request::Stop { kind } => self.stop_asked = Some((now.0, kind)),
+                Request::Home { .. } | Request::Jog(_) => self.stop_asked = None,
                 Request::Arm { session } => self.arm_asked = Some((session, now.0)),
                 Request::ClearFault { seen } => self.clear_asked = Some(seen),
                 Request::MoveTo(order) => {
+                    self.stop_asked = None;
                     self.moves.retain(|(id, ..)| *id != order.id);
                     self.moves.push((order.id, order.mode, order.targets.to_vec()));
                 }
@@ -224,87 +293,6 @@ impl Checker {
     /// Checks the board after it has processed them.
     pub fn received(&mut self, now: Microseconds, plant: &Plant) {
         self.watch_drivers(now, plant);
-    }
-
-    /// Checks a frame that leaves the board.
-    pub fn received_from_board(&mut self, now: Microseconds, bytes: &[u8], plant: &Plant, journal: &mut Journal) {
-        for &byte in bytes {
-            let Some(frame) = self.from_board.push(byte) else { continue };
-            match frame.body::<Report>() {
-                Ok(Report::Pose(pose)) => self.check_pose(now, &pose, plant, journal),
-                Ok(Report::Fault(record)) => {
-                    journal.note(now, format!("board: {}: {record:?}", record.code));
-                    self.check_fault(now, Some(record));
-                }
-                _ => {}
-            }
-        }
-    }
-
-    fn check_pose(&mut self, now: Microseconds, pose: &PoseReport, plant: &Plant, journal: &mut Journal) {
-        if self.state.replace(pose.state) != Some(pose.state) {
-            journal.note(now, format!("board: {}, loads {:.1?}", pose.state, plant.loads()));
-        }
-        let busy = matches!(pose.state, ControllerState::Homing | ControllerState::Moving | ControllerState::Stopping);
-        self.busy_since = if busy { self.busy_since.or(Some(now.0)) } else { None };
-        self.referenced = pose.referenced;
-        self.check_fault(now, pose.fault);
-        self.check_state(now, pose, plant);
-        if pose.mode != Mode(0)
-            && let Some(what) = self.wrong_mode(pose)
-        {
-            self.accuse(now, Promise::Mode, what);
-        }
-        if std::mem::take(&mut self.restarted) {
-            // The self-test may have found a fault since.
-            let new_fault = pose.fault.is_none_or(|fault| fault.seq == 1 && fault.at <= pose.at);
-            let fresh = pose.referenced == AxisMask(0) && pose.phase == MovePhase::None && new_fault;
-            if !fresh {
-                self.accuse(now, Promise::State, format!("remembers what was before its start: {pose:?}"));
-            }
-        }
-    }
-
-    /// Checks that the first fault stays unchanged until it is cleared by its number.
-    fn check_fault(&mut self, now: Microseconds, reported: Option<FaultRecord>) {
-        if let Some(first) = self.fault {
-            let kept = reported.is_some_and(|reported| {
-                reported.later >= first.later && FaultRecord { later: first.later, ..reported } == first
-            });
-            if !kept && self.clear_asked != Some(first.seq) {
-                self.accuse(now, Promise::FirstFault, format!("{first:?} became {reported:?}"));
-            }
-        }
-        self.fault = reported;
-    }
-
-    fn check_state(&mut self, now: Microseconds, pose: &PoseReport, plant: &Plant) {
-        let latched = matches!(pose.state, ControllerState::LinkLost | ControllerState::Fault);
-        if latched != pose.fault.is_some() {
-            self.accuse(now, Promise::FirstFault, format!("state {} with fault {:?}", pose.state, pose.fault));
-        }
-        // While a fault is latched, the drivers may be on or off.
-        let off = OFF.contains(&pose.state);
-        let settled = now.0 >= self.switched_at + self.delay_us;
-        if !latched && settled && off == plant.drivers_on() {
-            let on = plant.drivers_on();
-            self.accuse(now, Promise::State, format!("{} while drivers on is {on}", pose.state));
-        }
-    }
-
-    /// Returns the contradiction to a reported mode; `None` where it is true.
-    fn wrong_mode(&self, pose: &PoseReport) -> Option<String> {
-        let Some((_, mode, targets)) = self.moves.iter().find(|(id, ..)| *id == pose.move_id) else {
-            return Some(format!("mode {:?} of a move that nobody asked for", pose.mode));
-        };
-        if *mode != pose.mode {
-            return Some(format!("mode {:?} of a move to {mode:?}", pose.mode));
-        }
-        let mut pairs = self.axes.iter().zip(targets).enumerate();
-        pairs.find_map(|(index, (axis, target))| {
-            let (off, allowed) = (axis.load - f64::from(target.0), axis.mode_tolerance());
-            (off.abs() > allowed).then(|| format!("{mode:?} but axis {index} is off by {off:.1} of {allowed:.1}"))
-        })
     }
 
     /// The checks at the end, long after the host has fallen silent.

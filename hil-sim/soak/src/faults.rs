@@ -5,6 +5,7 @@ use std::fmt;
 use rand::RngExt;
 use rand_pcg::Pcg64Mcg;
 use vergence_plant::EncoderFault;
+use vergence_protocol::Micro;
 
 use crate::stages::stages;
 
@@ -43,6 +44,12 @@ pub enum FaultKind {
     BlockedLoad,
     /// The wires of the home switches are swapped.
     CrossedSwitches,
+    /// The hard limit of an axis never opens.
+    DeadLimit,
+    /// The supply of the encoders fails for a while.
+    EncoderSupply,
+    /// The host jogs far before homing, toward a limit.
+    RashJog,
     /// The control tick of the processor is delayed.
     LateTick,
     /// The emergency stop is pressed.
@@ -55,7 +62,7 @@ pub enum FaultKind {
 
 impl FaultKind {
     /// All kinds.
-    pub const ALL: [Self; 20] = [
+    pub const ALL: [Self; 23] = [
         Self::None,
         Self::ByteErrors,
         Self::Drops,
@@ -72,6 +79,9 @@ impl FaultKind {
         Self::Slip,
         Self::BlockedLoad,
         Self::CrossedSwitches,
+        Self::DeadLimit,
+        Self::EncoderSupply,
+        Self::RashJog,
         Self::LateTick,
         Self::EmergencyStop,
         Self::ClockJump,
@@ -98,6 +108,9 @@ impl FaultKind {
             Self::Slip => "slip",
             Self::BlockedLoad => "blocked_load",
             Self::CrossedSwitches => "crossed_switches",
+            Self::DeadLimit => "dead_limit",
+            Self::EncoderSupply => "encoder_supply",
+            Self::RashJog => "rash_jog",
             Self::LateTick => "late_tick",
             Self::EmergencyStop => "emergency_stop",
             Self::ClockJump => "clock_jump",
@@ -189,6 +202,12 @@ pub enum Fault {
     },
     /// The wires of the home switches are swapped from the start.
     CrossedSwitches,
+    /// The hard limit of this axis never opens.
+    DeadLimit(usize),
+    /// All encoders are without supply for this many microseconds: they miss what is moved meanwhile.
+    EncoderSupply(Onset, u64),
+    /// The script has a jog by so much before homing. One beyond the longest search must be refused.
+    RashJog([Micro; 2]),
     /// The next control tick comes late by this many microseconds.
     LateTick(Onset, u64),
     /// The load of an axis is blocked for a while.
@@ -245,6 +264,15 @@ impl Fault {
             }
             FaultKind::Slip => Self::Slip { onset, axis, share: random.random_range(-0.5..0.9), lasts_us },
             FaultKind::CrossedSwitches => Self::CrossedSwitches,
+            FaultKind::DeadLimit => Self::DeadLimit(axis),
+            // From a dip of a millisecond to a connector that is put back.
+            FaultKind::EncoderSupply => Self::EncoderSupply(onset, 10_f64.powf(random.random_range(3.0..6.5)) as u64),
+            FaultKind::RashJog => {
+                let mut by = [Micro(0); 2];
+                let travel = stages()[axis].settings.homing.travel.0;
+                by[axis] = Micro(random.random_range(-travel..=travel) / 4 * 5);
+                Self::RashJog(by)
+            }
             FaultKind::LateTick => Self::LateTick(onset, random.random_range(100..3_000)),
             FaultKind::BlockedLoad => Self::BlockedLoad { onset, axis, lasts_us },
             FaultKind::EmergencyStop => Self::EmergencyStop(onset, lasts_us),

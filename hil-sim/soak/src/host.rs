@@ -1,12 +1,17 @@
 //! A scripted host: it executes its script, sends heartbeats, repeats requests, clears faults, and gives up in the end.
 //! It never resumes motion by itself: every arm, home and move is requested anew.
 
+mod answers;
+mod errands;
+
+use vergence_plant::Stage;
+use vergence_protocol::management::Identity;
 use vergence_protocol::{
-    AxisMask, ControllerState, FaultRecord, HostEvent, HostSession, Jog, MAX_FRAME, Microseconds, Move, MoveId,
-    MovePhase, Permille, Refusal, Report, Request, SessionId, Status, StopKind, Ticket,
+    AxisMask, ControllerState, FaultRecord, HostSession, Jog, MAX_FRAME, Micro, Microseconds, Move, MoveId, Permille,
+    Request, SessionId, StopKind, Ticket,
 };
 
-use crate::scenario::{Destination, Step};
+use crate::scenario::{Destination, Errand, Step};
 use crate::stages::stages;
 
 /// Lease of the host.
@@ -45,6 +50,10 @@ enum Purpose {
     Turn(MoveId),
     Jog(MoveId),
     Forbidden,
+    /// A request that moves nothing.
+    Errand,
+    /// A setting to be saved afterwards.
+    Set,
     Clear,
     Disarm,
 }
@@ -89,6 +98,12 @@ pub struct Host {
     turned: bool,
     next_move: u16,
     requests: u32,
+    /// Whether the setting of the running step is changed and not yet saved.
+    unsaved: bool,
+    /// The identity of the board, once it was asked for.
+    identity: Option<Identity>,
+    probe_us: Option<u64>,
+    probe_due: Microseconds,
     /// The fault that was handled last.
     mending: Option<u16>,
     faults: u32,
@@ -99,7 +114,7 @@ pub struct Host {
 }
 
 impl Host {
-    pub fn new(script: Vec<Step>, now: Microseconds) -> Self {
+    pub fn new(script: Vec<Step>, probe_us: Option<u64>, now: Microseconds) -> Self {
         let mut host = Self {
             session: HostSession::new(SessionId(1)),
             script,
@@ -117,6 +132,10 @@ impl Host {
             turned: false,
             next_move: 0,
             requests: 0,
+            unsaved: false,
+            identity: None,
+            probe_us,
+            probe_due: now,
             mending: None,
             faults: 0,
             sessions: 0,
@@ -175,7 +194,7 @@ impl Host {
         self.asked = None;
         self.seen = None;
         // The requests belonged to the session that ended.
-        self.homed = false;
+        (self.homed, self.unsaved) = (false, false);
     }
 
     fn keep_alive(&mut self, now: Microseconds) {
@@ -188,6 +207,10 @@ impl Host {
             // Where the queue is full, another heartbeat is on its way.
             let _ = self.session.send_now(beat);
             self.beat_due = Microseconds(now.0 + BEAT_US);
+        }
+        if let Some(period) = self.probe_us.filter(|_| self.session.is_open() && now >= self.probe_due) {
+            let _ = self.session.send_now(Request::TimeProbe { t0: now });
+            self.probe_due = Microseconds(now.0 + period);
         }
         if let Some(asked) = &mut self.asked {
             asked.turns += 1;
@@ -243,6 +266,10 @@ impl Host {
         {
             return self.ask_turn(now, to);
         }
+        if seen.state == ControllerState::Updating && step == Step::Errand(Errand::Update) {
+            let session = self.session.id();
+            return self.ask(now, Purpose::Forbidden, Request::Arm { session });
+        }
         if !matches!(seen.state, ControllerState::Idle | ControllerState::Ready) {
             return;
         }
@@ -258,15 +285,19 @@ impl Host {
                 self.wait_until = Microseconds(now.0 + us);
             }
             Step::Pause(_) => self.next_step(),
+            Step::Errand(errand) => self.run_errand(now, errand, idle),
             _ if idle => self.ask(now, Purpose::Arm, Request::Arm { session }),
             Step::Arm => self.next_step(),
             Step::Home if self.homed && seen.referenced => self.next_step(),
             // Once only: several in sequence may end at a hard limit.
             Step::Jog(_) if self.going.is_some() => self.next_step(),
             Step::Jog(by) => {
+                let beyond = |(by, stage): (&Micro, Stage)| by.0.abs() > stage.settings.homing.travel.0;
+                let forbidden = !seen.referenced && by.iter().zip(stages()).any(beyond);
                 let id = self.name_move();
+                let purpose = if forbidden { Purpose::Forbidden } else { Purpose::Jog(id) };
                 let jog = Jog { id, by: by.into_iter().collect(), speed: Permille::FULL };
-                self.ask(now, Purpose::Jog(id), Request::Jog(jog));
+                self.ask(now, purpose, Request::Jog(jog));
             }
             Step::Retarget(..) if self.turned && seen.settled == self.going => self.next_step(),
             Step::Retarget(_, _, to) if self.going.is_some() && seen.referenced => self.ask_turn(now, to),
@@ -298,9 +329,8 @@ impl Host {
     }
 
     fn ask(&mut self, now: Microseconds, purpose: Purpose, request: Request) {
-        self.requests += 1;
-        if self.requests > MOST_REQUESTS {
-            return self.give_up("no progress");
+        if !self.may_ask() {
+            return;
         }
         self.notes.push(format!("host: {request:?}"));
         match self.session.submit(now, request) {
@@ -309,69 +339,19 @@ impl Host {
         }
     }
 
-    fn receive_event(&mut self, now: Microseconds, event: HostEvent) {
-        if self.end.is_some() {
-            return;
+    /// Counts a request of the running step, and gives up after too many.
+    fn may_ask(&mut self) -> bool {
+        self.requests += 1;
+        if self.requests > MOST_REQUESTS {
+            self.give_up("no progress");
         }
-        self.last_report_at = now;
-        match event {
-            HostEvent::Lost { boot } => {
-                self.notes.push(format!("host: the session is lost, boot {boot}"));
-                self.connect(now);
-            }
-            HostEvent::Reply { ticket, report: Report::Ack { status, .. } } => self.answered(now, ticket, status),
-            HostEvent::Report(Report::Pose(pose)) => {
-                self.seen = Some(Seen {
-                    state: pose.state,
-                    referenced: pose.referenced == AxisMask::first(stages().len()),
-                    settled: (pose.phase == MovePhase::Settled).then_some(pose.move_id),
-                    fault: pose.fault,
-                });
-            }
-            HostEvent::Opened { .. } | HostEvent::Reply { .. } | HostEvent::Report(_) => {}
-            HostEvent::Log(_) | HostEvent::Management(_) => {}
-        }
-    }
-
-    fn answered(&mut self, now: Microseconds, ticket: Ticket, status: Status) {
-        let Some(asked) = self.asked.take_if(|asked| asked.ticket == ticket) else { return };
-        // Wait for a pose that is newer than the answer.
-        self.seen = None;
-        if let Status::Refused(why) = status {
-            self.notes.push(format!("host: refused: {why}"));
-            self.wait_until = Microseconds(now.0 + PAUSE_US);
-        }
-        match (asked.purpose, status) {
-            (Purpose::Stream, _) => self.streaming = status == Status::Accepted,
-            (Purpose::Home, _) => self.homed = status == Status::Accepted,
-            (Purpose::Move(id), Status::Accepted) => {
-                self.going = Some(id);
-                match self.script.get(self.step) {
-                    Some(Step::MoveAndStop(_, us)) => self.stop_due = Some(Microseconds(now.0 + us)),
-                    Some(Step::Retarget(_, us, _)) => self.turn_due = Some(Microseconds(now.0 + us)),
-                    _ => {}
-                }
-            }
-            (Purpose::Turn(id), Status::Accepted) => (self.going, self.turned) = (Some(id), true),
-            (Purpose::Jog(id), Status::Accepted) => self.going = Some(id),
-            (Purpose::Jog(_), Status::Refused(Refusal::OutsideLimits { .. })) => self.next_step(),
-            (Purpose::Forbidden, Status::Accepted) => self.finish(HostEnd::ForbiddenAccepted),
-            (Purpose::Forbidden, Status::Refused(_)) => self.next_step(),
-            (Purpose::Clear, Status::Accepted) => {
-                self.mending = None;
-                self.faults += 1;
-                if self.faults > MOST_FAULTS {
-                    self.give_up("too many faults");
-                }
-            }
-            _ => {}
-        }
+        self.end.is_none()
     }
 
     fn next_step(&mut self) {
         self.step += 1;
         (self.homed, self.going, self.stop_due, self.requests) = (false, None, None, 0);
-        (self.turned, self.turn_due) = (false, None);
+        (self.turned, self.turn_due, self.unsaved) = (false, None, false);
         self.notes.push(match self.script.get(self.step) {
             Some(step) => format!("host: next is {step:?}"),
             None => "host: all done".into(),

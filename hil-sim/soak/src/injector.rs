@@ -73,10 +73,12 @@ impl Injector {
 fn is_due(fault: &Fault, world: &World<'_>) -> bool {
     let onset = match *fault {
         Fault::ByteErrors(_) | Fault::Drops(_) | Fault::Duplicates(_) => return false,
-        Fault::SwitchBounce { .. } | Fault::CrossedSwitches => return true,
+        Fault::RashJog(_) => return false,
+        Fault::SwitchBounce { .. } | Fault::CrossedSwitches | Fault::DeadLimit(_) => return true,
         Fault::Stall(onset, _)
         | Fault::Disconnect(onset, _)
         | Fault::Reset(onset)
+        | Fault::EncoderSupply(onset, _)
         | Fault::EmergencyStop(onset, _)
         | Fault::ClockJump(onset, _)
         | Fault::Encoder { onset, .. }
@@ -136,6 +138,14 @@ fn begin(fault: &Fault, seed: u64, world: &mut World<'_>) -> Option<u64> {
             world.plant.cross_home_switches(0, 1);
             None
         }
+        Fault::DeadLimit(axis) => {
+            on_axis(world, axis, |axis| axis.fix_hard_limit(Some(false)));
+            None
+        }
+        Fault::EncoderSupply(_, us) => {
+            supply_encoders(world, false);
+            Some(us)
+        }
         Fault::LateTick(_, us) => {
             *world.late_us = us;
             None
@@ -144,7 +154,7 @@ fn begin(fault: &Fault, seed: u64, world: &mut World<'_>) -> Option<u64> {
             on_axis(world, axis, |axis| axis.block(true));
             Some(lasts_us)
         }
-        Fault::Reset(_) | Fault::ByteErrors(_) | Fault::Drops(_) | Fault::Duplicates(_) => None,
+        Fault::RashJog(_) | Fault::Reset(_) | Fault::ByteErrors(_) | Fault::Drops(_) | Fault::Duplicates(_) => None,
     }
 }
 
@@ -159,8 +169,15 @@ fn end(fault: &Fault, world: &mut World<'_>) {
         Fault::LostSteps { axis, steps, .. } => on_axis(world, axis, |axis| axis.lose_steps(steps)),
         Fault::BlockedLoad { axis, .. } => on_axis(world, axis, |axis| axis.block(false)),
         Fault::Slip { axis, .. } => on_axis(world, axis, |axis| axis.slip(0.0)),
+        Fault::EncoderSupply(..) => supply_encoders(world, true),
         _ => {}
     }
+}
+
+/// Cuts or restores the supply of all encoders.
+fn supply_encoders(world: &mut World<'_>, on: bool) {
+    let how = (!on).then_some(EncoderFault::Unpowered);
+    (0..world.plant.loads().len()).for_each(|axis| fail_encoder(world, axis, how));
 }
 
 fn fail_encoder(world: &mut World<'_>, axis: usize, how: Option<EncoderFault>) {
@@ -168,7 +185,7 @@ fn fail_encoder(world: &mut World<'_>, axis: usize, how: Option<EncoderFault>) {
     let reading = match how {
         None => EncoderReading::Clear,
         Some(EncoderFault::Noisy { .. }) => EncoderReading::Blurred,
-        Some(EncoderFault::Stuck | EncoderFault::Reversed | EncoderFault::Dead) => EncoderReading::Lost,
+        Some(_) => EncoderReading::Lost,
     };
     world.checker.encoder_shows(axis, reading);
 }

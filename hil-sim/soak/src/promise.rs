@@ -13,10 +13,22 @@ pub enum Promise {
     Armed,
     /// Motors stop in time after the lease expires.
     Lease,
+    /// Motors stop in time after a stop is requested, and the drivers go off where it asks for that.
+    Stops,
+    /// The drivers go off while the emergency stop is pressed.
+    EmergencyStop,
+    /// No axis with a reference moves on outside its range.
+    Range,
     /// Moves that are not allowed are refused.
     Refuses,
-    /// Without reference no axis moves faster than homing does.
+    /// Without reference no axis moves faster than homing does, and none ever faster than its setting.
     Gentle,
+    /// Reported positions are true.
+    Position,
+    /// The times that the board states fit one offset between its clock and the true time.
+    Clock,
+    /// The cameras saw each reported pulse, where it is reported.
+    Trigger,
     /// A mode is reported only while the load is at its target.
     Mode,
     /// An axis whose encoder is lost stops.

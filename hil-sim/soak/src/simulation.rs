@@ -171,7 +171,7 @@ impl<'a, B: Board> Simulation<'a, B> {
             board,
             board_start: 0,
             boot: boot_number(scenario.seed),
-            host: Host::new(scenario.script.clone(), Microseconds(now.0 + HOST_START_US)),
+            host: Host::new(scenario.script.clone(), scenario.probe_us, Microseconds(now.0 + HOST_START_US)),
             host_offset: HOST_START_US as i64,
             to_host: line(),
             to_board: line(),

@@ -3,7 +3,8 @@
 
 use std::sync::atomic::{AtomicU64, Ordering};
 
-use vergence_soak::{Ending, FaultKind, Outcome, Scenario, native_board, run, soak};
+use vergence_plant::EncoderFault;
+use vergence_soak::{Ending, Fault, FaultKind, Onset, Outcome, Scenario, native_board, run, soak};
 
 fn play(seed: u64) -> Outcome {
     let scenario = Scenario::of(seed);
@@ -72,18 +73,40 @@ fn the_order_of_the_cores_does_not_matter() {
 
 /// Regression: two spikes on the home switch passed for its edges; the mode was reported four centimetres away.
 #[test]
-fn seed_435_spikes_on_the_home_switch() {
-    let outcome = play(435);
-    assert!(outcome.violations.is_empty(), "{}", outcome.journal);
-    assert_eq!(outcome.ending, Ending::Completed);
+fn spikes_on_the_home_switch_do_not_pass_for_its_edges() {
+    for seed in 1..=60 {
+        let scenario = Scenario::of_kind(seed, FaultKind::SwitchBounce);
+        let outcome = run(&scenario, &mut native_board(&scenario).unwrap());
+        assert!(outcome.violations.is_empty(), "{}", outcome.journal);
+        assert_eq!(outcome.ending, Ending::Completed);
+    }
 }
 
 /// Regression: an encoder that died at a restart failed the self-test before the first pose; the checker took that for
 /// a memory of what was before.
 #[test]
-fn seed_6601_a_self_test_fails_after_a_restart() {
-    let outcome = play(6601);
+fn a_self_test_that_fails_after_a_restart_is_no_memory() {
+    let onset = Onset { step: 2, after_us: 300_000 };
+    let how = EncoderFault::Noisy { amplitude: 1_000, seed: 1 };
+    let faults = vec![
+        Fault::Encoder { onset, axis: 0, how, lasts_us: Some(900_000) },
+        Fault::Disconnect(onset, 400_000),
+        Fault::Reset(onset),
+    ];
+    let scenario = Scenario { faults, ..Scenario::of_kind(1, FaultKind::Several) };
+    let outcome = run(&scenario, &mut native_board(&scenario).unwrap());
     assert!(outcome.violations.is_empty(), "{}", outcome.journal);
+    assert_eq!(outcome.journal.to_string().matches("board: self-test").count(), 2, "{}", outcome.journal);
+}
+
+#[test]
+fn hosts_run_errands_too() {
+    let logs: String = (1..=60).map(|seed| play(seed).journal.to_string()).collect();
+    for part in
+        ["host: SetTrigger(Every", "host: SetSetting {", "host: SaveSettings", "host: Begin(", "board: taking firmware"]
+    {
+        assert!(logs.contains(part), "{part}");
+    }
 }
 
 #[test]
