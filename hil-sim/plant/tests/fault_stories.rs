@@ -67,6 +67,16 @@ fn a_coupling_that_gives_way_is_a_slip() {
 }
 
 #[test]
+fn encoders_that_lose_their_supply_in_mid_move_stop_it() {
+    let mut rigged = under_way();
+    (0..2).for_each(|axis| harm(&mut rigged, axis, |axis| axis.fail_encoder(Some(EncoderFault::Unpowered))));
+    rigged.wait_for(ControllerState::Fault);
+    assert!(matches!(rigged.fault().code, FaultCode::Stall | FaultCode::FollowingError), "{:?}", rigged.fault());
+    assert!(!rigged.board.plant().drivers_on());
+    assert_eq!(rigged.pose().referenced, AxisMask(0), "the positions are wrong when the supply returns");
+}
+
+#[test]
 fn a_creeping_loss_is_a_following_error() {
     for axis in 0..2 {
         let fault = fault_after(under_way(), axis, |axis| axis.slip(0.05));

@@ -53,6 +53,32 @@ fn a_stuck_encoder_stands_and_knows_the_truth_afterwards() {
 }
 
 #[test]
+fn an_encoder_without_supply_misses_what_is_moved_meanwhile() {
+    let mut plant = plant();
+    travel(&mut plant, 0, STEPS);
+    let before = plant.encoder(0);
+    plant.axis_mut(0).unwrap().fail_encoder(Some(EncoderFault::Unpowered));
+    travel(&mut plant, 250_000, STEPS);
+    assert_eq!(plant.encoder(0), before);
+    plant.axis_mut(0).unwrap().fail_encoder(None);
+    assert_eq!(plant.encoder(0), before);
+    travel(&mut plant, 500_000, STEPS);
+    assert!((plant.encoder(0) - before - COUNTS).abs() < 10);
+    check_load(&plant, START + 3.0 * WAY);
+}
+
+#[test]
+fn a_dead_hard_limit_reads_as_it_was_told() {
+    let beyond = bench_mechanics()[0].hard_limits[1] + 1.0;
+    let mut plant = Plant::new(&bench_mechanics(), &[beyond, 1_000_000.0]);
+    assert!(plant.hard_limit(0));
+    plant.axis_mut(0).unwrap().fix_hard_limit(Some(false));
+    assert!(!plant.hard_limit(0));
+    plant.axis_mut(0).unwrap().fix_hard_limit(None);
+    assert!(plant.hard_limit(0));
+}
+
+#[test]
 fn a_reversed_encoder_turns_back_where_it_was_reversed() {
     let mut plant = plant();
     travel(&mut plant, 0, STEPS);

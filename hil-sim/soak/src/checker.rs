@@ -8,6 +8,7 @@ use vergence_control::RigIo;
 use vergence_plant::{Plant, Stage};
 use vergence_protocol::{
     AxisMask, ControllerState, FaultRecord, Micro, Microseconds, Mode, MoveId, Receiver, Request, SessionId, StopKind,
+    TriggerMark,
 };
 
 use crate::board_clock::BoardClock;
@@ -28,6 +29,8 @@ pub struct Checker {
     settings: SettingsInForce,
     clock: BoardClock,
     pulses: Pulses,
+    /// Reports of pulses that were not checked yet, and when they came.
+    marks: VecDeque<(u64, TriggerMark)>,
     /// Arrivals of clock probes: the host's time in them, and the true time.
     probes: VecDeque<(Microseconds, u64)>,
     from_host: Receiver,
@@ -72,6 +75,7 @@ impl Checker {
             axes,
             clock: BoardClock::default(),
             pulses: Pulses::default(),
+            marks: VecDeque::new(),
             probes: VecDeque::new(),
             from_host: Receiver::new(),
             from_board: Receiver::new(),
@@ -124,6 +128,7 @@ impl Checker {
         self.referenced = AxisMask(0);
         self.clock = BoardClock::default();
         self.pulses.forget();
+        self.marks.clear();
         self.probes.clear();
         self.settings.restarted();
         for (index, axis) in self.axes.iter_mut().enumerate() {
@@ -137,6 +142,7 @@ impl Checker {
         self.watch_drivers(now, plant);
         self.watch_stops(now, plant);
         self.pulses.watch(now, plant);
+        self.check_pulses(now);
         // The motors may have stepped until the tick that cut the drivers.
         let holder = self.holder.or(before);
         for index in 0..self.axes.len() {

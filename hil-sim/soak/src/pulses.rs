@@ -7,8 +7,9 @@ use vergence_protocol::Microseconds;
 
 use crate::board_clock::BoardClock;
 
-/// Period at which the truth is looked at, in microseconds.
-const LOOK_US: u64 = 1_000;
+/// Longest time in microseconds from a pulse to the look that shows it: at rest the mechanics of the simulated chip go on
+/// by a millisecond, and each millisecond is looked at.
+pub const LOOK_US: u64 = 2_000;
 /// Time after which the report of a pulse is not awaited any more, in microseconds.
 const FORGOTTEN_US: u64 = 1_000_000;
 

@@ -13,10 +13,7 @@ use std::sync::OnceLock;
 
 use programs::programs;
 use vergence_plant::Plant;
-use vergence_soak::{ChipBoard, ChipFlash, Promise, Scenario, run, soak, stages};
-
-/// Scenarios to play, unless `VERGENCE_ELF_SCENARIOS` names another number.
-const SCENARIOS: u64 = 24;
+use vergence_soak::{ChipBoard, ChipFlash, FaultKind, Promise, Scenario, run, soak, stages};
 
 fn flash() -> &'static ChipFlash {
     static READ: OnceLock<ChipFlash> = OnceLock::new();
@@ -27,11 +24,22 @@ fn flash() -> &'static ChipFlash {
 }
 
 #[test]
-fn the_firmware_breaks_no_promise() {
-    let named = std::env::var("VERGENCE_ELF_SCENARIOS").ok();
-    let count = named.map_or(SCENARIOS, |count| count.parse().expect("a number of scenarios"));
+fn the_firmware_breaks_no_promise_whatever_the_fault() {
+    for (seed, kind) in (1..).zip(FaultKind::ALL) {
+        let scenario = Scenario::of_kind(seed, kind);
+        let outcome = run(&scenario, &mut flash().board(&scenario));
+        println!("{kind}: {:?} after {:.1} s", outcome.ending, outcome.virtual_time.0 as f64 * 1e-6);
+        assert!(outcome.violations.is_empty(), "{}", outcome.journal);
+    }
+}
+
+#[test]
+fn random_scenarios_break_no_promise() {
+    let Ok(named) = std::env::var("VERGENCE_ELF_SCENARIOS") else {
+        return println!("SKIPPED random scenarios: VERGENCE_ELF_SCENARIOS names how many, a second each");
+    };
     let board = |scenario: &Scenario| Ok::<ChipBoard, Infallible>(flash().board(scenario));
-    let tally = soak(1, count, board, || {}).expect("boards cannot fail");
+    let tally = soak(1, named.parse().expect("a number of scenarios"), board, || {}).expect("boards cannot fail");
     println!("{}\n{:.0} s of virtual time", tally.table(), tally.virtual_seconds);
     assert!(tally.violations.is_empty(), "{:#?}", tally.violations);
 }

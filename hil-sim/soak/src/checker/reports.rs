@@ -8,6 +8,7 @@ use vergence_protocol::{
 use super::Checker;
 use crate::journal::Journal;
 use crate::promise::Promise;
+use crate::pulses::LOOK_US;
 use crate::watched_axis::WatchedAxis;
 
 /// The control tick, in microseconds.
@@ -38,7 +39,7 @@ impl Checker {
                 }
                 Ok(Report::Ack { to, status }) => self.settings.answered(to, status),
                 Ok(Report::TimeReply { t0, t1, t2 }) => self.check_times(now, t0, [t1, t2]),
-                Ok(Report::TriggerMark(mark)) => self.check_pulse(now, &mark),
+                Ok(Report::TriggerMark(mark)) => self.marks.push_back((now.0, mark)),
                 _ => {}
             }
         }
@@ -101,6 +102,13 @@ impl Checker {
         let wrong = wrong.or_else(|| (t2 < t1).then(|| format!("answered at {t2:?} before {t1:?}")));
         if let Some(what) = wrong {
             self.accuse(now, Promise::Clock, what);
+        }
+    }
+
+    /// Checks the reports of pulses once the mechanics must have shown them.
+    pub(super) fn check_pulses(&mut self, now: Microseconds) {
+        while let Some((_, mark)) = self.marks.pop_front_if(|(came, _)| now.0 >= *came + LOOK_US) {
+            self.check_pulse(now, &mark);
         }
     }
 
