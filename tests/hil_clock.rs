@@ -30,8 +30,8 @@ const BEAT_US: u64 = 20_000;
 const PROBE_US: [u64; 2] = [98_390, 983_900];
 const FAST_PROBES: u32 = 10;
 const TRIGGER_US: u32 = 10_000;
-/// What the time in a mark may be off: whole microseconds, and the way into the interrupt.
-const TRIGGER_BOUND_US: f64 = 2.0;
+/// What the time in a mark may be off: whole microseconds, and the way into the interrupt where interrupts are locked.
+const TRIGGER_BOUND_US: f64 = 3.0;
 /// Numbers of the moves here, so that none is one of those before.
 const FIRST_MOVE: u16 = 1_000;
 /// Seconds with each adapter, unless `VERGENCE_CLOCK_SECONDS` says more.
