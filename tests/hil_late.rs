@@ -1,6 +1,11 @@
 //! Control ticks that come late in mid-move: up to 200 us no step is lost, and later is a fault, on the chip as on the native
 //! board.
-#![allow(clippy::expect_used, clippy::panic, reason = "a test fails loudly")]
+#![allow(
+    clippy::expect_used,
+    clippy::panic,
+    clippy::print_stdout,
+    reason = "a test fails loudly and shows its figures"
+)]
 
 mod elf_rig;
 
@@ -8,7 +13,7 @@ use elf_rig::{Board, Conversation, ElfBoard, Standing};
 use vergence_cpu::{Access, Bus};
 use vergence_mcu::Picoseconds;
 use vergence_plant::NativeBoard;
-use vergence_protocol::{ControllerState, FaultCode, MovePhase, Status};
+use vergence_protocol::{ControllerState, FaultCode, MovePhase, Request, Status};
 
 const HERBIVORE: [i32; 2] = [145_000, 2_094_395];
 const TIM7_DIER: u32 = 0x4000_140C;
@@ -74,6 +79,37 @@ fn faults_of<B: Delayed>(us: u64) -> Vec<FaultCode> {
     talk.wait(20_000);
     assert!(!talk.board.plant().drivers_on() && talk.pose().referenced.0 == 0, "{us}");
     talk.faults.iter().map(|fault| fault.code).collect()
+}
+
+/// How far a pose lies off the line through its neighbours, in counts of the faster axis, where some ticks come late at a
+/// constant speed.
+fn unevenness<B: Delayed>() -> f64 {
+    let mut talk = under_way::<B>();
+    assert_eq!(talk.ask(Request::SetStream { period_us: 1_000 }), Status::Accepted);
+    let mut poses = Vec::new();
+    for _ in 0..40 {
+        if poses.len() % 10 == 5 {
+            talk.board.delay_next_tick(150);
+        }
+        talk.wait(1_000);
+        let pose = talk.pose();
+        poses.push((pose.at.0 as f64, f64::from(pose.counts[0].0)));
+    }
+    poses.dedup();
+    let off = poses.windows(3).map(|near| {
+        let [(t0, c0), (t1, c1), (t2, c2)] = [near[0], near[1], near[2]];
+        (c0 + (c2 - c0) * (t1 - t0) / (t2 - t0) - c1).abs()
+    });
+    assert!(poses.len() > 30 && (poses[30].1 - poses[0].1).abs() > 1_000.0, "{poses:?}");
+    off.fold(0.0, f64::max)
+}
+
+/// Poses of the chip gave the time at which the tick was due, and lay 10 counts off that line.
+#[test]
+fn a_pose_of_a_late_tick_carries_the_time_at_which_the_encoders_were_read() {
+    let worst = [unevenness::<NativeBoard>(), unevenness::<ElfBoard>()];
+    println!("off the line: {worst:?} counts");
+    assert!(worst.iter().all(|&counts| counts < 5.0), "{worst:?}");
 }
 
 #[test]

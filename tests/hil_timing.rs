@@ -9,13 +9,11 @@
 
 mod elf_rig;
 
-use elf_rig::{BOTH, Conversation, ElfBoard, Standing, Wired};
-use vergence_control::Scale;
+use elf_rig::{BOTH, Conversation, ElfBoard, POSE_PERIOD_US, Wired, at_full_speed, cruise, geared};
 use vergence_mcu::{Bench, BenchWiring, Drive, Machine, Picoseconds};
-use vergence_plant::bench_settings;
 use vergence_protocol::{
-    AxisKind, ControllerState, Jog, Micro, MoveId, MovePhase, Permille, Request, SettingItem, SettingKey, Status,
-    StopKind, Trigger,
+    ControllerState, Jog, Micro, MoveId, MovePhase, Permille, Request, SettingItem, SettingKey, Status, StopKind,
+    Trigger,
 };
 
 const CORE_HZ: u64 = 170_000_000;
@@ -23,51 +21,7 @@ const CORE_HZ: u64 = 170_000_000;
 const TICK: u64 = CORE_HZ / 1_000;
 /// The interrupt of TIM7, line 55, which runs the node.
 const TICK_EXCEPTION: u16 = 16 + 55;
-/// Steps for each metre and each turn: 100 kHz, the most that settings may ask for, at the 80 mm/s and 60 degrees/s of the
-/// bench.
-const STEPS_PER_UNIT: [u32; 2] = [1_250_000, 599_999];
 const STEP_HZ: u64 = 100_000;
-const POSE_PERIOD_US: u32 = 1_000;
-/// What both axes do in the same time, each at its full speed on the way: 60 degrees take their second and longer ramps.
-const FAR: [f64; 2] = [84_000.0, 1_047_198.0];
-
-/// Disarmed, with poses at 1 kHz, and motors that make 100 000 steps a second at full speed.
-fn geared() -> Conversation<ElfBoard> {
-    let mut standing = Standing::default();
-    for ((mechanics, kind), per_unit) in
-        standing.mechanics.iter_mut().zip([AxisKind::Linear, AxisKind::Rotary]).zip(STEPS_PER_UNIT)
-    {
-        mechanics.motor = Scale { kind, per_unit };
-    }
-    let mut talk = Conversation::open(&standing);
-    for (axis, steps) in (0..).zip(STEPS_PER_UNIT) {
-        let key = SettingKey { item: SettingItem::StepsPerUnit, axis };
-        assert_eq!(talk.ask(Request::SetSetting { key, value: steps.into() }), Status::Accepted);
-    }
-    assert_eq!(talk.ask(Request::SetStream { period_us: POSE_PERIOD_US }), Status::Accepted);
-    talk
-}
-
-/// Both axes in the middle of a move, at 100 kHz each, with poses at 1 kHz.
-fn at_full_speed() -> Conversation<ElfBoard> {
-    let mut talk = geared();
-    talk.arm_and_home();
-    cruise(&mut talk);
-    talk
-}
-
-/// Goes on until both axes make 100 000 steps a second.
-fn cruise(talk: &mut Conversation<ElfBoard>) {
-    let loads = talk.loads();
-    let settings = bench_settings();
-    let away = |axis: usize| {
-        let middle = f64::from(settings[axis].min.0 + settings[axis].max.0) / 2.0;
-        loads[axis] + if loads[axis] < middle { FAR[axis] } else { -FAR[axis] }
-    };
-    assert_eq!(talk.move_to([0, 1].map(|axis| away(axis) as i32), 1), Status::Accepted);
-    talk.wait(400_000);
-}
-
 fn pulses(machine: &Machine<Bench>) -> [u64; 2] {
     machine.chip().world().pulses().try_into().expect("two axes")
 }

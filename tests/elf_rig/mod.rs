@@ -2,13 +2,17 @@
 //! loader and all, or the native board that runs the same controller.
 #![allow(dead_code, unused_imports, reason = "each test file uses its own part")]
 
+mod adapter;
 mod board;
 mod build;
 #[path = "../conversation.rs"]
 mod conversation;
+mod full_speed;
 mod log;
 mod program;
 
+pub use adapter::{Adapter, AdapterKind};
 pub use board::{Board, ElfBoard, Standing, programs};
 pub use conversation::{BOTH, Conversation, LEASE_MS, Wired};
+pub use full_speed::{POSE_PERIOD_US, at_full_speed, cruise, far_from, geared};
 pub use log::decode;

@@ -209,7 +209,7 @@ impl Controller {
         self.events.pop_front()
     }
 
-    /// The pose at `now`, with number `seq`.
+    /// The pose of the tick of `now`, with number `seq`, and with the time at which the encoders were read.
     #[must_use]
     pub fn pose(&self, now: Microseconds, seq: u16, io: &impl RigIo) -> PoseReport {
         let mut referenced = AxisMask::default();
@@ -217,7 +217,7 @@ impl Controller {
             referenced = referenced.with(index);
         }
         PoseReport {
-            at: now,
+            at: io.encoders_read_at(now),
             seq,
             counts: self.axes.iter().map(|axis| axis.counts(io)).collect(),
             referenced,

@@ -38,6 +38,11 @@ pub trait RigIo {
     fn steps(&self, axis: usize) -> i32;
     /// The raw encoder count.
     fn encoder(&self, axis: usize) -> i32;
+    /// When the encoders were read that [`Self::encoder`] gives in the tick of `now`. A board that reads them at another
+    /// instant than that at which the tick was due says so: at 80 mm/s a pose is off by 80 nm for each microsecond.
+    fn encoders_read_at(&self, now: Microseconds) -> Microseconds {
+        now
+    }
     /// Whether the home switch is closed: normally open, it closes at home.
     fn home_switch(&self, axis: usize) -> bool;
     /// Whether a hard limit is reached: its switch is normally closed and opens beyond the range, so that a broken wire

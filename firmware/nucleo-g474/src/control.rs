@@ -123,6 +123,7 @@ impl Control {
     /// Begins a tick. Ticks are whole periods apart, whatever the interrupt's latency, because both timers run on one clock.
     /// Ticks missed while the flash was busy are left out, and the controller notices the gap.
     fn begin_tick(&mut self) {
+        self.rig.latch_encoders();
         let began = Instant::now().as_micros() - u64::from(TIM7.cnt().read().cnt());
         let since = u32::try_from(began.saturating_sub(self.tick.0)).unwrap_or(u32::MAX);
         let ticks = since.saturating_add(u32::from(PERIOD / 2)) / u32::from(PERIOD);
@@ -134,6 +135,7 @@ impl Control {
         let late = Instant::now().as_micros().saturating_sub(self.tick.0);
         self.node.allow_delay(self.tick, late, &mut self.rig);
         self.node.poll(self.tick, &mut self.rig);
+        self.rig.release_encoders();
         TICKS.fetch_add(1, Ordering::Relaxed);
     }
 

@@ -2,6 +2,7 @@
 
 use core::sync::atomic::{AtomicU32, Ordering};
 
+use embassy_futures::yield_now;
 use embassy_stm32::mode::Async;
 use embassy_stm32::usart::{RingBufferedUartRx, UartTx};
 use embassy_time::{Duration, with_timeout};
@@ -43,6 +44,8 @@ pub async fn receive(mut line: RingBufferedUartRx<'static>) {
                 rest = &rest[taken..];
                 exchange::ring();
             }
+            // Requests may come faster than they are done: the answers to those before must not wait for the last.
+            yield_now().await;
         }
     }
 }

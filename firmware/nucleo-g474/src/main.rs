@@ -27,6 +27,7 @@ mod watchdog;
 
 use board::Board;
 use embassy_executor::Spawner;
+use embassy_stm32::pac::{TIM15, timer::vals::Urs};
 use vergence_control::{BoardSettings, Node, NodeIdentity};
 use vergence_image::DeathKind;
 use vergence_image::layout::HARDWARE;
@@ -41,6 +42,7 @@ const OLDEST: [u8; 3] = [0, 1, 0];
 async fn main(spawner: Spawner) {
     let reset = memory::reset_cause();
     let board = Board::new(clocks::start(Source::Crystal));
+    count_microseconds();
     let watchdog = watchdog::start(board.watchdog);
     let identity = NodeIdentity {
         board: board::NAME.try_into().unwrap_or_default(),
@@ -73,4 +75,15 @@ async fn main(spawner: Spawner) {
         spawner.spawn(plan);
         spawner.spawn(watch);
     }
+}
+
+/// Sets the timer of the executor's time to microseconds: its driver computed the prescaler for half the speed of the buses
+/// ([`clocks::start`]). Nobody has asked for the time yet.
+fn count_microseconds() {
+    let half = TIM15.psc().read();
+    TIM15.psc().write_value(2 * half + 1);
+    // An update takes the prescaler over; it must not count as the end of a period.
+    TIM15.cr1().modify(|w| w.set_urs(Urs::COUNTER_ONLY));
+    TIM15.egr().write(|w| w.set_ug(true));
+    TIM15.cr1().modify(|w| w.set_urs(Urs::ANY_EVENT));
 }

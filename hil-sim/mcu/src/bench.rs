@@ -128,6 +128,17 @@ struct AxisState {
     hard_limit: Option<bool>,
 }
 
+/// A rising edge of the camera trigger's pin, and what the encoders' lines and the mechanics showed then.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Fired {
+    /// The instant of the edge.
+    pub at: Instant,
+    /// The count that the lines of each encoder show.
+    pub counts: Vec<i32>,
+    /// The true position of every load, in micro-units.
+    pub loads: Vec<f64>,
+}
+
 /// The mechanics, wired to the chip.
 #[derive(Clone, Debug)]
 pub struct Bench {
@@ -138,6 +149,7 @@ pub struct Bench {
     next_step: Picoseconds,
     moving_until: Microseconds,
     pulses: Vec<u64>,
+    fired: Option<Fired>,
 }
 
 impl Bench {
@@ -153,7 +165,7 @@ impl Bench {
             .collect();
         let pulses = vec![0; axes.len()];
         let (next_step, moving_until) = (Picoseconds(0), Microseconds(0));
-        Self { wiring, plant, axes, emergency_stop: None, next_step, moving_until, pulses }
+        Self { wiring, plant, axes, emergency_stop: None, next_step, moving_until, pulses, fired: None }
     }
 
     /// The simulated mechanics, which know the true positions.
@@ -172,6 +184,18 @@ impl Bench {
     #[must_use]
     pub fn pulses(&self) -> &[u64] {
         &self.pulses
+    }
+
+    /// The count that the lines of each encoder show: what a counter without error has counted.
+    #[must_use]
+    pub fn counts_on_lines(&self) -> Vec<i32> {
+        self.axes.iter().map(|axis| axis.lines.shown).collect()
+    }
+
+    /// The latest rising edge of the camera trigger.
+    #[must_use]
+    pub fn fired(&self) -> Option<&Fired> {
+        self.fired.as_ref()
     }
 
     fn advance_plant(&mut self, now: Microseconds, terminals: &mut Terminals) {
@@ -262,7 +286,7 @@ fn phases(count: i32) -> [bool; 2] {
 impl World for Bench {
     fn watched(&self) -> Vec<Pin> {
         let axes = self.wiring.axes.iter().flat_map(|axis| [axis.step, axis.direction]);
-        axes.chain([self.wiring.drivers_off]).collect()
+        axes.chain([self.wiring.drivers_off, self.wiring.camera_trigger]).collect()
     }
 
     fn next_event(&self) -> Picoseconds {
@@ -286,6 +310,9 @@ impl World for Bench {
             self.plant.advance(now);
             self.plant.set_drivers(!edge.high);
             self.wake(now);
+        }
+        if edge.pin == self.wiring.camera_trigger && edge.high {
+            self.fired = Some(Fired { at: edge.at, counts: self.counts_on_lines(), loads: self.plant.loads() });
         }
         for axis in 0..self.wiring.axes.len() {
             let wiring = self.wiring.axes[axis];

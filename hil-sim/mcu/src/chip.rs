@@ -5,16 +5,16 @@ use std::cell::Cell;
 use vergence_cpu::{Cycle, NEVER};
 
 use crate::census::Census;
-use crate::clocks::{Clocks, VoltageRange, check_core_clock};
+use crate::clocks::{ClockTree, Clocks, VoltageRange, check_core_clock, check_step};
 use crate::directory::Directory;
 use crate::memory::Memory;
 use crate::pads::Pads;
 use crate::pages::PageUse;
-use crate::peripheral::{Moment, Refused};
+use crate::peripheral::{Moment, Refused, Reply};
 use crate::rcc::ResetCause;
 use crate::schedule::{Due, Schedule};
 use crate::service::RequestSources;
-use crate::time::TimeBase;
+use crate::time::{Picoseconds, TimeBase};
 use crate::trouble::{Demand, Trouble};
 use crate::uart::SentByte;
 use crate::unit::{UNITS, UartId, Unit};
@@ -78,6 +78,8 @@ pub struct Chip<W> {
     power_cycles: u64,
     /// The core clock, supply and wait states that were checked last.
     speed: Option<(u32, VoltageRange, u32)>,
+    /// When the core clock last changed.
+    stepped_at: Picoseconds,
 }
 
 impl<W: World> Chip<W> {
@@ -111,6 +113,7 @@ impl<W: World> Chip<W> {
             sent: vec![Vec::new(); UartId::COUNT],
             power_cycles: 0,
             speed: None,
+            stepped_at: Picoseconds(0),
         };
         chip.settle_everything();
         chip
@@ -235,6 +238,7 @@ impl<W: World> Chip<W> {
             for index in 0..UNITS {
                 self.units.get(Unit::at(index)).advance(moment);
             }
+            self.check_step(&tree);
             self.clocks.base.change(self.now, tree.hclk);
             self.clocks.tree = tree;
             let moment = Moment { now: self.now, clocks: &self.clocks };
@@ -253,7 +257,19 @@ impl<W: World> Chip<W> {
         }
         self.speed = Some(speed);
         let (hclk, range, wait_states) = speed;
-        match check_core_clock(hclk, range, wait_states) {
+        self.judge_clocks(check_core_clock(hclk, range, wait_states));
+    }
+
+    fn check_step(&mut self, after: &ClockTree) {
+        let (before, now) = (self.clocks.tree, self.clocks.base.time_of(self.now));
+        self.judge_clocks(check_step(&before, after, now - self.stepped_at));
+        if (before.hclk, before.from_pll) != (after.hclk, after.from_pll) {
+            self.stepped_at = now;
+        }
+    }
+
+    fn judge_clocks(&mut self, verdict: Reply<()>) {
+        match verdict {
             Err(Refused(what)) if self.config.overclock => self.note(Trouble::Clocks { what }),
             Err(Refused(what)) => self.complain(Trouble::Clocks { what }),
             Ok(()) => {}

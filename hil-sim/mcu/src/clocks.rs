@@ -1,7 +1,7 @@
 //! Frequencies of the clock tree (RM0440 §7.2), and the limits of the silicon.
 
 use crate::peripheral::Reply;
-use crate::time::TimeBase;
+use crate::time::{Picoseconds, TimeBase};
 use crate::unit::UartId;
 
 /// The crystal of the NUCLEO-G474RE board (UM2505 §6.8.1).
@@ -30,6 +30,42 @@ pub struct ClockTree {
     pub(crate) uart: [u32; UartId::COUNT],
     /// The 48 MHz clock of the random number generator.
     pub(crate) clk48: u32,
+    /// Whether the PLL gives the system clock.
+    pub(crate) from_pll: bool,
+}
+
+impl ClockTree {
+    /// Whether the core runs faster than the system clock may step, with its whole speed.
+    fn is_beyond_one_step(&self) -> bool {
+        self.from_pll && self.hclk > ONE_STEP_HZ && self.hclk == self.sysclk
+    }
+}
+
+/// Highest core clock to which, or from which, the system clock may step at once (RM0440 §7.2.7).
+const ONE_STEP_HZ: u32 = 80_000_000;
+/// Shortest time in the state between, with AHB divided by two.
+const BETWEEN: Picoseconds = Picoseconds::microseconds(1);
+
+/// Refuses a step between the PLL and another source with a core clock above 80 MHz: AHB must be divided for a microsecond
+/// (RM0440 §7.2.7; §6.1.5 asks for the same on the way to the boost mode). `lasted` is how long the core clock was that of
+/// `before`.
+pub(crate) fn check_step(before: &ClockTree, after: &ClockTree, lasted: Picoseconds) -> Reply<()> {
+    let fast = if after.from_pll { after } else { before };
+    if before.from_pll != after.from_pll && fast.is_beyond_one_step() {
+        let words = format!(
+            "the core clock steps from {} to {} Hz at once: AHB must be divided by two for 1 us, where the system clock is \
+             switched to or from the PLL above 80 MHz (RM0440 7.2.7)",
+            before.hclk, after.hclk
+        );
+        return Err(crate::peripheral::Refused(words));
+    }
+    let is_between = before.from_pll && before.sysclk > ONE_STEP_HZ && !before.is_beyond_one_step();
+    let leaves = after.is_beyond_one_step() || !after.from_pll;
+    if is_between && leaves && lasted < BETWEEN {
+        let words = format!("AHB was divided for {} ns, which must be at least 1 us (RM0440 7.2.7)", lasted.0 / 1_000);
+        return Err(crate::peripheral::Refused(words));
+    }
+    Ok(())
 }
 
 /// The tree, and how its core clock counts time.

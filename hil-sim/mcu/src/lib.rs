@@ -57,7 +57,7 @@ mod waiting;
 mod wiring;
 mod world;
 
-pub use bench::{AxisWiring, Bench, BenchWiring, SwitchWiring};
+pub use bench::{AxisWiring, Bench, BenchWiring, Fired, SwitchWiring};
 pub use census::Touched;
 pub use chip::{Chip, ChipConfig};
 pub use clocks::ClockTree;

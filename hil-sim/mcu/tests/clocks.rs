@@ -3,7 +3,7 @@
 
 mod common;
 
-use common::{FLASH, GPIOA, PWR, RCC, TIM2, bare, bench};
+use common::{Bench, FLASH, GPIOA, PWR, RCC, TIM2, bare, bench};
 use proptest::prelude::*;
 use vergence_cpu::Bus;
 use vergence_mcu::{Nothing, Picoseconds, TimeBase};
@@ -22,6 +22,55 @@ fn wakes_up_on_hsi16() {
     assert_eq!((tree.sysclk, tree.hclk, tree.pclk), (16_000_000, 16_000_000, [16_000_000; 2]));
 }
 
+/// A chip whose PLL gives 170 MHz from HSI16, in boost mode and with the wait states, still running at 16 MHz.
+fn before_the_step() -> Bench<Nothing> {
+    let mut bench = bare(Nothing);
+    bench.write(RCC + 0x58, 1 << 28);
+    bench.write(PWR + 0x80, 0);
+    bench.write(FLASH, 0x0004_0604);
+    bench.write(RCC + 0xC, 2 | 3 << 4 | 85 << 8 | 1 << 24);
+    bench.modify(RCC, 0, 1 << 24);
+    bench.wait(640);
+    bench
+}
+
+#[test]
+fn a_step_above_80_mhz_goes_by_way_of_a_divided_bus() {
+    let mut bench = before_the_step();
+    bench.write(RCC + 8, 3);
+    let complaint = bench.complaint().unwrap();
+    assert!(
+        complaint.contains("from 16000000 to 170000000 Hz at once") && complaint.contains("RM0440 7.2.7"),
+        "{complaint}"
+    );
+
+    let mut bench = before_the_step();
+    bench.write(RCC + 8, 3 | 0b1000 << 4);
+    bench.wait(84);
+    bench.write(RCC + 8, 3);
+    assert_eq!(bench.complaint().unwrap(), "AHB was divided for 988 ns, which must be at least 1 us (RM0440 7.2.7)");
+
+    let mut bench = before_the_step();
+    bench.write(RCC + 8, 3 | 0b1000 << 4);
+    bench.wait(85);
+    bench.write(RCC + 8, 3);
+    assert_eq!((bench.complaint(), bench.chip.clock_tree().hclk), (None, 170_000_000));
+    bench.write(RCC + 8, 1);
+    assert!(bench.complaint().unwrap().contains("from 170000000 to 16000000 Hz at once"));
+}
+
+#[test]
+fn the_way_down_from_170_mhz_is_divided_too() {
+    let mut bench = before_the_step();
+    bench.write(RCC + 8, 3 | 0b1000 << 4);
+    bench.wait(100);
+    bench.write(RCC + 8, 3);
+    bench.write(RCC + 8, 3 | 0b1000 << 4);
+    bench.wait(85);
+    bench.write(RCC + 8, 1 | 0b1000 << 4);
+    assert_eq!((bench.complaint(), bench.chip.clock_tree().hclk), (None, 8_000_000));
+}
+
 #[test]
 fn runs_at_170_mhz_from_the_crystal_after_honest_times() {
     let mut bench = bare(Nothing);
@@ -36,11 +85,14 @@ fn runs_at_170_mhz_from_the_crystal_after_honest_times() {
     assert_eq!(bench.read(RCC) >> 17 & 1, 1);
     bench.write(RCC + 0xC, PLL_170);
     bench.modify(RCC, 0, 1 << 24);
-    bench.write(RCC + 8, 3);
+    bench.write(RCC + 8, 3 | 0b1000 << 4);
     assert_eq!(bench.read(RCC + 8) >> 2 & 3, 1, "the switch waits for the PLL");
-    // 40 µs at 16 MHz.
-    bench.wait(640);
+    // 40 µs at 8 MHz.
+    bench.wait(320);
     assert_eq!(bench.read(RCC + 8) >> 2 & 3, 3);
+    // 1 µs at 85 MHz.
+    bench.wait(85);
+    bench.write(RCC + 8, 3);
     assert_eq!(bench.chip.clock_tree().hclk, 170_000_000);
     assert_eq!(bench.complaint(), None);
     let before = bench.chip.time();
@@ -56,8 +108,9 @@ fn a_core_clock_beyond_the_supply_is_refused() {
     bench.wait(32_000);
     bench.write(RCC + 0xC, PLL_170);
     bench.modify(RCC, 0, 1 << 24);
+    bench.write(RCC + 8, 3 | 0b1000 << 4);
+    bench.wait(500);
     bench.write(RCC + 8, 3);
-    bench.wait(640);
     assert_eq!(bench.complaint().unwrap(), "a core clock of 170000000 Hz is too fast for range 1");
 }
 
@@ -69,8 +122,9 @@ fn missing_wait_states_are_refused() {
     bench.write(FLASH, 0x0004_0603);
     bench.write(RCC + 0xC, 2 | 3 << 4 | 85 << 8 | 1 << 24);
     bench.modify(RCC, 0, 1 << 24);
+    bench.write(RCC + 8, 3 | 0b1000 << 4);
+    bench.wait(500);
     bench.write(RCC + 8, 3);
-    bench.wait(640);
     let complaint = bench.complaint().unwrap();
     assert!(complaint.ends_with("range 1 boost needs 4 flash wait states, not 3"), "{complaint}");
 }

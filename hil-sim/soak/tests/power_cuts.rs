@@ -43,6 +43,53 @@ fn a_cut_at_every_erasure_every_state_word_and_a_part_of_the_rest_ends_in_an_int
     }
 }
 
+/// Cuts in other journeys than an update: all that `VERGENCE_POWER_CUTS` asks for, else a share of those at erasures and
+/// words of the swap's state.
+fn cuts_of(sweep: &Sweep, share: usize) -> Vec<Cut> {
+    if let Ok(count) = std::env::var("VERGENCE_POWER_CUTS") {
+        let operations = sweep.operations().len();
+        return sweep.cut(0..count.parse::<usize>().expect("a number of cuts").min(operations));
+    }
+    let [_, critical] = sweep.critical();
+    (0..share).map(|part| sweep.cut_one(part * critical / share, part == 0)).collect()
+}
+
+#[test]
+fn going_back_and_rolling_back_end_in_an_intact_image() {
+    for journey in [Journey::GoingBack, Journey::Rollback] {
+        let sweep = sweep(journey);
+        println!("{journey:?}: {} operations", sweep.operations().len());
+        let tally = sweep.tally(&cuts_of(&sweep, 6));
+        assert_none_lost(&tally);
+        assert!(tally.updated > 0 && tally.endings()[1] > 0, "{tally:?}");
+    }
+}
+
+/// There is no sound image before: a board either has the new one, or still waits for it.
+#[test]
+fn an_update_through_the_recovery_ends_in_the_new_image_or_in_the_recovery() {
+    let sweep = sweep(Journey::Recovery);
+    println!("{} operations", sweep.operations().len());
+    let tally = sweep.tally(&cuts_of(&sweep, 6));
+    println!("{tally:?}");
+    let [old, new, recovery, bricked] = tally.endings();
+    assert_eq!((old, bricked), (0, 0), "{:?}", tally.bricked);
+    assert!(tally.updated > 0 && new + recovery > 0, "{tally:?}");
+}
+
+/// Every setting is that of the last saving or that of the one before, all of the same one, and saving works again.
+#[test]
+fn settings_that_are_being_saved_are_the_old_or_the_new_ones() {
+    let sweep = sweep(Journey::Settings);
+    let all = sweep.operations().len();
+    println!("{all} operations");
+    let parts = if std::env::var_os("VERGENCE_POWER_CUTS").is_some() { all } else { all.min(24) };
+    let cuts: Vec<Cut> = (0..parts).map(|part| sweep.cut_one(part * all / parts, part.is_multiple_of(4))).collect();
+    let tally = sweep.tally(&cuts);
+    assert_none_lost(&tally);
+    assert!(tally.updated > 4 && tally.endings()[0] > 4, "{tally:?}");
+}
+
 /// A start that finishes a swap: the same cycles, instructions, registers, memories, whether waiting is skipped or not.
 #[test]
 fn waiting_that_is_skipped_changes_nothing() {

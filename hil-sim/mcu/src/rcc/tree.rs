@@ -35,7 +35,7 @@ impl Rcc {
             2 if self.get(PLLCFGR) >> 20 & 1 == 1 => self.pll(self.get(PLLCFGR) >> 21 & 3),
             _ => 0,
         };
-        ClockTree { sysclk, hclk, pclk, timer_divider, uart, clk48 }
+        ClockTree { sysclk, hclk, pclk, timer_divider, uart, clk48, from_pll: self.system_clock == 3 }
     }
 
     fn when_ready(&self, source: Source, hz: u32) -> u32 {

@@ -8,7 +8,7 @@ use super::tally::CutTally;
 /// What was counted so far, and of which programs.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct CutState {
-    /// Identifies the programs, such as by their hash.
+    /// Identifies the programs, such as by their hash, and the journey.
     programs: String,
     /// Number of cuts that were made: all before this one.
     pub done: usize,
@@ -24,7 +24,7 @@ pub enum CutStateError {
     #[error("no state of power cuts: {0}")]
     Damaged(String),
     /// The cuts were made with other programs.
-    #[error("these cuts were made with other programs: take another file")]
+    #[error("these cuts were made with other programs or on another journey: take another file")]
     OtherPrograms,
 }
 
@@ -80,10 +80,10 @@ impl CutState {
     #[must_use]
     pub fn in_words(&self, sweep: &Sweep) -> String {
         format!(
-            "{}\n{} operations of the flash in an update; {} cuts, {} starts made, the others equal one of these; {} updated \
-             again",
+            "{}\n{} operations of the flash in {}; {} cuts, {} starts made, the others equal one of these; {} second attempts",
             self.tally.table(),
             sweep.operations().len(),
+            sweep.journey().in_words(),
             self.tally.cuts(),
             self.tally.started,
             self.tally.updated,
@@ -95,6 +95,7 @@ impl CutState {
     pub fn figures(&self, sweep: &Sweep) -> Value {
         let [old, new, recovery, bricked] = self.tally.endings();
         json!({
+            "journey": sweep.journey().name(),
             "flash_operations": sweep.operations().len(),
             "cuts": self.tally.cuts(),
             "bricked": bricked,

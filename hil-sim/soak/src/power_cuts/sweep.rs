@@ -5,35 +5,26 @@ use std::ops::Range;
 use rayon::prelude::*;
 use vergence_image::layout::{PAGE, STATE};
 use vergence_mcu::{Damage, Firmware, FlashCells, FlashOperation};
-use vergence_protocol::management::BootState;
 
 use super::image::SignedImage;
+use super::journey::{Course, Journey};
 use super::known::KnownStarts;
 use super::talk::Talk;
 use super::tally::CutTally;
 
-/// Number of cuts after which a board is updated once more.
+/// Number of cuts after which a second attempt is made.
 const AGAIN_EVERY: usize = 97;
-
-/// The update in which cuts are made.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Journey {
-    /// The old image takes the new one, which is confirmed.
-    Update,
-    /// The new image is not confirmed, and the next start goes back.
-    GoingBack,
-}
 
 /// State of a board after the power has returned.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Ending {
-    /// It runs the image from before the update.
+    /// It runs the image from before, or has the settings from before.
     Old,
-    /// It runs the new image.
+    /// It runs the new image, or has the new settings.
     New,
     /// The boot loader waits for an image.
     Recovery,
-    /// The board does none of these, or takes no update.
+    /// The board does none of these, or a second attempt fails.
     Bricked(String),
 }
 
@@ -48,18 +39,16 @@ pub struct Cut {
     pub ending: Ending,
     /// Whether the start was made; otherwise it equals one that was.
     pub started: bool,
-    /// Whether a whole update was made afterwards.
+    /// Whether a second attempt was made afterwards.
     pub updated: bool,
 }
 
-/// An update, and the cuts that are made in it.
+/// A journey, and the cuts that are made in it.
 ///
 /// Cuts are an endless sequence: first at every erasure, then at every word of the swap's state, then at all others,
-/// spread over the update from the first on; then the same with other damage.
+/// spread over the journey from the first on; then the same with other damage.
 pub struct Sweep {
-    old: SignedImage,
-    new: SignedImage,
-    before: FlashCells,
+    course: Course,
     operations: Vec<FlashOperation>,
     /// Operations in the order in which they are cut.
     order: Vec<usize>,
@@ -67,27 +56,27 @@ pub struct Sweep {
 }
 
 impl Sweep {
-    /// Runs an update from `old` to `new` without cuts.
+    /// Runs a journey without cuts. The board is delivered with the first image; the second is the one that is sent.
     ///
     /// # Errors
-    /// Says why the update does not work.
-    pub fn new(boot_loader: &Firmware, [old, new]: [SignedImage; 2], journey: Journey) -> Result<Self, String> {
-        let before = old.delivered_with(boot_loader).ok_or("boot loader and application do not fit into flash")?;
-        let mut talk = Talk::switched_on(&before);
+    /// Says why the journey does not work.
+    pub fn new(boot_loader: &Firmware, images: [SignedImage; 2], journey: Journey) -> Result<Self, String> {
+        let mut course = Course::prepare(journey, boot_loader, images)?;
+        let mut talk = Talk::switched_on(&course.before);
         talk.list_operations();
-        let last = match journey {
-            Journey::Update => talk.update(&new).map(|()| &new),
-            Journey::GoingBack => talk.try_and_go_back(&new).map(|()| &old),
-        }?;
-        if !last.is_installed(&talk.machine().chip().flash_cells()) {
-            return Err("without a cut the flash does not hold the image that it should".into());
-        }
+        course.travel(&mut talk)?;
         let operations = std::mem::take(&mut talk.operations);
         let order = order(&operations);
-        Ok(Self { old, new, before, operations, order, known: KnownStarts::default() })
+        Ok(Self { course, operations, order, known: KnownStarts::default() })
     }
 
-    /// The flash operations of the update without a cut.
+    /// The journey.
+    #[must_use]
+    pub fn journey(&self) -> Journey {
+        self.course.journey
+    }
+
+    /// The flash operations of the journey without a cut.
     #[must_use]
     pub fn operations(&self) -> &[FlashOperation] {
         &self.operations
@@ -105,7 +94,7 @@ impl Sweep {
         numbers.into_par_iter().map(|number| self.cut_one(number, number.is_multiple_of(AGAIN_EVERY))).collect()
     }
 
-    /// Makes a cut. A board that is to be updated `again` is started even if an equal start is known.
+    /// Makes a cut. A board on which it is to be tried `again` is started even if an equal start is known.
     #[must_use]
     pub fn cut_one(&self, number: usize, again: bool) -> Cut {
         let operation = self.order[number % self.order.len()];
@@ -114,13 +103,13 @@ impl Sweep {
         if !again && let Some(ending) = self.known.find(&digests) {
             return Cut { number, operation, ending, started: false, updated: false };
         }
-        let (ending, pages, mut talk) = self.start(&cells);
+        let (ending, pages, mut talk) = self.start(&cells, operation);
         self.known.remember(&pages, &digests, &ending);
         let mut cut = Cut { number, operation, ending, started: true, updated: false };
         if again && !matches!(cut.ending, Ending::Bricked(_)) || cut.ending == Ending::Recovery {
-            match self.update_again(&mut talk, &cut.ending) {
+            match self.course.try_again(&mut talk, &cut.ending) {
                 Ok(()) => cut.updated = true,
-                Err(problem) => cut.ending = Ending::Bricked(format!("no update after the cut: {problem}")),
+                Err(problem) => cut.ending = Ending::Bricked(format!("a second attempt fails: {problem}")),
             }
         }
         cut
@@ -130,7 +119,7 @@ impl Sweep {
     #[must_use]
     pub fn remains(&self, number: usize) -> FlashCells {
         let cut = self.order[number % self.order.len()];
-        let mut cells = self.before.clone();
+        let mut cells = self.course.before.clone();
         for &operation in &self.operations[..cut] {
             cells.operate(operation, Damage::Complete);
         }
@@ -138,33 +127,11 @@ impl Sweep {
         cells
     }
 
-    /// Starts a board with this flash; returns the outcome and the pages that affected it.
-    fn start(&self, cells: &FlashCells) -> (Ending, Vec<usize>, Talk) {
+    /// Starts a board with this flash, where this operation was cut; returns the outcome and the pages that affected it.
+    fn start(&self, cells: &FlashCells, operation: usize) -> (Ending, Vec<usize>, Talk) {
         let mut talk = Talk::switched_on(cells);
-        let ending = self.judge(&mut talk).unwrap_or_else(Ending::Bricked);
+        let ending = self.course.judge(&mut talk, operation).unwrap_or_else(Ending::Bricked);
         (ending, talk.machine().pages_used(), talk)
-    }
-
-    fn judge(&self, talk: &mut Talk) -> Result<Ending, String> {
-        let identity = talk.identify()?;
-        if identity.boot == BootState::Recovery {
-            return Ok(Ending::Recovery);
-        }
-        let cells = talk.machine().chip().flash_cells();
-        for (image, ending) in [(&self.old, Ending::Old), (&self.new, Ending::New)] {
-            if image.is_installed(&cells) && identity.build == image.seal.header.build {
-                return Ok(ending);
-            }
-        }
-        Err(format!("what runs is neither image: {identity:?}"))
-    }
-
-    /// Updates the board to the image that it does not run.
-    fn update_again(&self, talk: &mut Talk, ending: &Ending) -> Result<(), String> {
-        let image = if *ending == Ending::Old { &self.new } else { &self.old };
-        talk.update(image)?;
-        let holds = image.is_installed(&talk.machine().chip().flash_cells());
-        if holds { Ok(()) } else { Err("the flash does not hold the image".into()) }
     }
 
     /// Counts cuts.
@@ -185,7 +152,7 @@ pub(super) fn rank(operation: FlashOperation) -> usize {
     }
 }
 
-/// The order in which operations are cut. The others come in strides, so that any first part of them covers the update.
+/// The order in which operations are cut. The others come in strides, so that any first part of them covers the journey.
 fn order(operations: &[FlashOperation]) -> Vec<usize> {
     let of_rank = |wanted| (0..operations.len()).filter(move |&index| rank(operations[index]) == wanted);
     let others: Vec<usize> = of_rank(2).collect();

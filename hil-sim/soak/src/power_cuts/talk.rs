@@ -1,4 +1,4 @@
-//! A host on the serial line of a simulated board: management requests, in virtual time.
+//! A host on the serial line of a simulated board, in virtual time: management requests, and those of a session.
 
 use vergence_mcu::{
     Bench, BenchWiring, ChipConfig, FlashCells, FlashOperation, Frame, Halt, LineFault, Machine, Picoseconds, Stops,
@@ -7,14 +7,14 @@ use vergence_mcu::{
 use vergence_plant::{Plant, bench_mechanics};
 use vergence_protocol::management::{BootState, Identity, Management, ManagementReport, Outcome, RebootTo};
 use vergence_protocol::update::{Upload, UploadState};
-use vergence_protocol::{HostEvent, HostSession, MAX_FRAME, Microseconds, SessionId};
+use vergence_protocol::{HostEvent, HostSession, MAX_FRAME, Microseconds, Report, Request, SessionId, Ticket};
 
 use super::image::SignedImage;
 
 const BAUD: u32 = 921_600;
 /// Period at which the host polls the wire.
 const STEP_US: u64 = 1_000;
-/// Period at which the host repeats a request.
+/// Period at which the host repeats a request: less than a rollback takes, whose answer must come all the same.
 const REPEAT_US: u64 = 100_000;
 /// Longest wait: a swap and its undoing, three failed starts, and a margin.
 const START_PATIENCE_US: u64 = 40_000_000;
@@ -29,6 +29,7 @@ pub struct Talk {
     host: HostSession,
     now: Microseconds,
     reports: Vec<ManagementReport>,
+    replies: Vec<(Ticket, Report)>,
     /// Operations of the flash so far, where they are recorded.
     pub operations: Vec<FlashOperation>,
 }
@@ -47,6 +48,7 @@ impl Talk {
             host: HostSession::new(SessionId(1)),
             now: Microseconds(0),
             reports: Vec::new(),
+            replies: Vec::new(),
             operations: Vec::new(),
         }
     }
@@ -71,11 +73,11 @@ impl Talk {
             }
         }
         let sent: Vec<u8> = self.machine.chip_mut().take_sent(UartId::LPUART1).iter().map(|sent| sent.byte).collect();
-        let reports = &mut self.reports;
-        self.host.receive(self.now, &sent, |event| {
-            if let HostEvent::Management(report) = event {
-                reports.push(report);
-            }
+        let (reports, replies) = (&mut self.reports, &mut self.replies);
+        self.host.receive(self.now, &sent, |event| match event {
+            HostEvent::Management(report) => reports.push(report),
+            HostEvent::Reply { ticket, report } => replies.push((ticket, report)),
+            _ => {}
         });
         let mut frame = [0; MAX_FRAME];
         while let Some(length) = self.host.transmit(self.now, &mut frame) {
@@ -106,6 +108,32 @@ impl Talk {
             }
         }
         Err(format!("no answer to {request:?} in {patience_us} us, {}", self.machine.place()))
+    }
+
+    /// Opens a session.
+    pub fn open(&mut self) -> Result<(), String> {
+        self.host.hello();
+        let give_up = self.now.0 + START_PATIENCE_US;
+        while !self.host.is_open() {
+            if self.now.0 > give_up {
+                return Err(format!("no session opens, {}", self.machine.place()));
+            }
+            self.step()?;
+        }
+        Ok(())
+    }
+
+    /// Makes a request in the session, and waits for its answer.
+    pub fn ask_session(&mut self, request: Request) -> Result<Report, String> {
+        let ticket = self.host.submit(self.now, request.clone()).map_err(|error| error.to_string())?;
+        let give_up = self.now.0 + ANSWER_PATIENCE_US;
+        while self.now.0 < give_up {
+            self.step()?;
+            if let Some(index) = self.replies.iter().position(|(answered, _)| *answered == ticket) {
+                return Ok(self.replies.swap_remove(index).1);
+            }
+        }
+        Err(format!("no answer to {request:?}, {}", self.machine.place()))
     }
 
     /// The identity of the program that answers first.
@@ -142,6 +170,15 @@ impl Talk {
         self.start_on_trial(image)?;
         self.reboot()?;
         self.identify_as(|now| now.boot == BootState::Reverted).map(|_| ())
+    }
+
+    /// Gives up the confirmed image for `image`, the one before it.
+    pub fn roll_back(&mut self, image: &SignedImage) -> Result<(), String> {
+        self.identify()?;
+        self.ask(&Management::Rollback)?;
+        self.reboot()?;
+        let build = image.seal.header.build;
+        self.identify_as(|now| now.boot == BootState::Reverted && now.build == build).map(|_| ())
     }
 
     fn start_on_trial(&mut self, image: &SignedImage) -> Result<(), String> {

@@ -10,12 +10,12 @@ const MOST_LISTED: usize = 20;
 /// Counts of outcomes, by the kind of operation that was cut.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct CutTally {
-    /// Rows: cuts at erasures, at words of the swap's state, at other words. Columns: boards that run the old image,
-    /// run the new one, wait in recovery, are bricked.
+    /// Rows: cuts at erasures, at words of the swap's state, at other words. Columns: boards with the old image or
+    /// settings, with the new ones, in recovery, bricked.
     pub by_operation: [[u64; 4]; 3],
     /// Number of starts that were made; the others equal one of these.
     pub started: u64,
-    /// Number of boards that were updated once more.
+    /// Number of boards on which a second attempt was made.
     pub updated: u64,
     /// Number and reason of each cut that bricked a board.
     pub bricked: Vec<(usize, String)>,

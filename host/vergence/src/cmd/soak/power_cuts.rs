@@ -1,7 +1,8 @@
-//! `vergence soak --power-cuts`: power cuts in the middle of a firmware update.
+//! `vergence soak --power-cuts`: power cuts in the middle of a firmware update, or of what else writes the flash.
 
 use std::path::PathBuf;
 
+use clap::builder::PossibleValuesParser;
 use vergence_files::write_whole;
 use vergence_rig::rounded;
 use vergence_soak::power_cuts::{CutState, Journey, Sweep};
@@ -22,6 +23,10 @@ pub struct Options {
     /// the application are those of the board, on the simulated chip; the word or page under way is left torn.
     #[arg(long, value_name = "COUNT", conflicts_with_all = ["scenarios", "seed", "only"])]
     power_cuts: Option<usize>,
+    /// What is done while the power is cut: an update; one that is not confirmed and taken back; a rollback; an update
+    /// through the recovery; or settings that are saved.
+    #[arg(long, value_name = "NAME", requires = "power_cuts", default_value = "update", value_parser = journey_names())]
+    journey: String,
     /// Keeps the counts in this file, and continues with those that it holds.
     #[arg(long, value_name = "FILE", requires = "power_cuts")]
     state: Option<PathBuf>,
@@ -32,10 +37,18 @@ impl Options {
     pub const fn cuts(&self) -> Option<usize> {
         self.power_cuts
     }
+
+    fn journey(&self) -> Journey {
+        Journey::ALL.into_iter().find(|journey| journey.name() == self.journey).unwrap_or(Journey::Update)
+    }
+}
+
+fn journey_names() -> PossibleValuesParser {
+    PossibleValuesParser::new(Journey::ALL.map(Journey::name))
 }
 
 pub fn run(options: &Options, programs: &programs::Options, cuts: usize, console: Console) -> Result<(), Failure> {
-    let (sweep, programs) = prepare(programs.read()?)?;
+    let (sweep, programs) = prepare(programs.read()?, options.journey())?;
     let mut state = match &options.state {
         Some(path) if path.exists() => {
             let bytes = std::fs::read(path).map_err(|error| Failure::input(path, error))?;
@@ -61,8 +74,10 @@ pub fn run(options: &Options, programs: &programs::Options, cuts: usize, console
     state.tally.accusation().map_or(Ok(()), |bricked| Err(Failure::check(bricked)))
 }
 
-fn prepare(programs: Programs) -> Result<(Sweep, String), Failure> {
-    let sweep = Sweep::new(&programs.boot_loader, programs.images, Journey::Update)
-        .map_err(|problem| Failure::check(format!("an update without power cuts does not work: {problem}")))?;
-    Ok((sweep, programs.digest))
+fn prepare(programs: Programs, journey: Journey) -> Result<(Sweep, String), Failure> {
+    let sweep = Sweep::new(&programs.boot_loader, programs.images, journey).map_err(|problem| {
+        Failure::check(format!("{} without power cuts does not work: {problem}", journey.in_words()))
+    })?;
+    let digest = if journey == Journey::Update { programs.digest } else { programs.digest + " " + journey.name() };
+    Ok((sweep, digest))
 }
