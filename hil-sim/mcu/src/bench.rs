@@ -312,6 +312,10 @@ impl World for Bench {
             self.wake(now);
         }
         if edge.pin == self.wiring.camera_trigger && edge.high {
+            self.plant.fire_trigger(now);
+            self.plant.advance(now);
+            // The chip latches its own counters.
+            while self.plant.take_trigger_edge().is_some() {}
             self.fired = Some(Fired { at: edge.at, counts: self.counts_on_lines(), loads: self.plant.loads() });
         }
         for axis in 0..self.wiring.axes.len() {

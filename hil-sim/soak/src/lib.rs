@@ -28,12 +28,14 @@
 
 mod board_clock;
 mod checker;
+#[cfg(feature = "chip")]
 mod chip_board;
 mod faults;
 mod host;
 mod injector;
 mod journal;
 mod line;
+#[cfg(feature = "chip")]
 pub mod power_cuts;
 mod promise;
 mod pulses;
@@ -44,6 +46,7 @@ mod stages;
 mod tally;
 mod watched_axis;
 
+#[cfg(feature = "chip")]
 pub use chip_board::{ChipBoard, ChipFlash};
 pub use faults::{Fault, FaultKind, Onset};
 pub use journal::Journal;
