@@ -55,7 +55,7 @@ pub struct Checker {
     state: Option<ControllerState>,
     busy_since: Option<u64>,
     stepped_at: u64,
-    /// When the host last requested a stop, and which; until it requests a motion again.
+    /// When the host requested a stop first, and which; until it requests a motion again.
     stop_asked: Option<(u64, StopKind)>,
     /// Since when the emergency stop is pressed.
     pressed_since: Option<u64>,
@@ -282,7 +282,10 @@ impl Checker {
                     self.leases.retain(|(named, _)| *named != session);
                     self.leases.push((session, end));
                 }
-                Request::Stop { kind } => self.stop_asked = Some((now.0, kind)),
+                // A host that repeats a stop gets no more time for it.
+                Request::Stop { kind } => {
+                    self.stop_asked.get_or_insert((now.0, kind));
+                }
                 Request::Home { .. } | Request::Jog(_) => self.stop_asked = None,
                 Request::Arm { session } => self.arm_asked = Some((session, now.0)),
                 Request::ClearFault { seen } => self.clear_asked = Some(seen),

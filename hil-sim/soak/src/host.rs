@@ -55,6 +55,8 @@ enum Purpose {
     /// A setting to be saved afterwards.
     Set,
     Clear,
+    /// A clear that names another fault.
+    WrongClear,
     Disarm,
 }
 
@@ -252,8 +254,9 @@ impl Host {
     fn clear(&mut self, now: Microseconds, fault: FaultRecord) {
         (self.homed, self.stop_due, self.turn_due) = (false, None, None);
         if self.mending.replace(fault.seq) != Some(fault.seq) {
-            self.wait_until = Microseconds(now.0 + MEND_US);
-            return;
+            // A number that the host has not read clears nothing.
+            let seen = fault.seq.wrapping_add(1);
+            return self.ask(now, Purpose::WrongClear, Request::ClearFault { seen });
         }
         self.ask(now, Purpose::Clear, Request::ClearFault { seen: fault.seq });
     }

@@ -159,16 +159,20 @@ fn script(random: &mut Pcg64Mcg) -> Vec<Step> {
 
 fn excursion(ranges: &Ranges, random: &mut Pcg64Mcg) -> Step {
     match random.random_range(0..15) {
-        10..14 => {
-            Step::Retarget(anywhere(ranges, random), random.random_range(1_000..1_500_000), anywhere(ranges, random))
-        }
+        10..14 => Step::Retarget(anywhere(ranges, random), in_mid_move(1_500_000, random), anywhere(ranges, random)),
         14 => Step::Jog([30_000, 400_000].map(|most| Micro(random.random_range(-most..most)))),
         0..5 => Step::Move(anywhere(ranges, random)),
-        5..7 => Step::MoveAndStop(anywhere(ranges, random), random.random_range(1_000..800_000)),
+        5..7 => Step::MoveAndStop(anywhere(ranges, random), in_mid_move(800_000, random)),
         7 => Step::MoveTooFar(too_far(ranges, random)),
         8 => Step::Pause(random.random_range(10_000..500_000)),
         _ => Step::Disarm,
     }
+}
+
+/// Microseconds after the begin of a move, often so few that it is still being planned.
+fn in_mid_move(longest: u64, random: &mut Pcg64Mcg) -> u64 {
+    let most = if random.random_bool(0.3) { 10_000 } else { longest };
+    random.random_range(1_000..most)
 }
 
 /// A request that moves nothing; `ranges` are the positions that moves may ask for afterwards.

@@ -278,7 +278,7 @@ impl<'a, B: Board> Simulation<'a, B> {
                 Ending::SafeStop
             }
             Some(HostEnd::ForbiddenAccepted) => {
-                self.checker.accuse(now, Promise::Refuses, "a move that must be refused was accepted".into());
+                self.checker.accuse(now, Promise::Refuses, "a request that must be refused was accepted".into());
                 Ending::SafeStop
             }
             Some(HostEnd::GaveUp) | None => Ending::SafeStop,

@@ -3,7 +3,7 @@
 use vergence_protocol::management::ManagementReport;
 use vergence_protocol::{AxisMask, HostEvent, Microseconds, MovePhase, Refusal, Report, Status, Ticket};
 
-use super::{Host, HostEnd, MOST_FAULTS, PAUSE_US, Purpose, Seen};
+use super::{Host, HostEnd, MEND_US, MOST_FAULTS, PAUSE_US, Purpose, Seen};
 use crate::scenario::Step;
 use crate::stages::stages;
 
@@ -57,7 +57,8 @@ impl Host {
             (Purpose::Jog(_), Status::Refused(Refusal::OutsideLimits { .. })) => self.next_step(),
             (Purpose::Errand, Status::Accepted) => self.next_step(),
             (Purpose::Set, Status::Accepted) => self.unsaved = true,
-            (Purpose::Forbidden, Status::Accepted) => self.finish(HostEnd::ForbiddenAccepted),
+            (Purpose::Forbidden | Purpose::WrongClear, Status::Accepted) => self.finish(HostEnd::ForbiddenAccepted),
+            (Purpose::WrongClear, Status::Refused(_)) => self.wait_until = Microseconds(now.0 + MEND_US),
             (Purpose::Forbidden, Status::Refused(_)) => self.next_step(),
             (Purpose::Clear, Status::Accepted) => {
                 self.mending = None;
