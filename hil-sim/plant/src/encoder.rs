@@ -19,6 +19,8 @@ pub enum EncoderFault {
     },
     /// The encoder reads the count at which it was switched on.
     Dead,
+    /// Its supply has gone: the lines stand still. When it returns, what moved meanwhile was never counted.
+    Unsupplied,
 }
 
 /// Relation between the reading and the true count.
@@ -26,6 +28,7 @@ pub enum EncoderFault {
 enum Reading {
     True,
     Stuck(i32),
+    Unsupplied(i32),
     Mirrored(i32),
     Noisy { amplitude: i32, random: Pcg64Mcg, error: i32 },
     Dead,
@@ -49,7 +52,7 @@ impl Encoder {
         let count = scale.wrapping_sub(self.zero);
         match self.reading {
             Reading::True => count,
-            Reading::Stuck(at) => at,
+            Reading::Stuck(at) | Reading::Unsupplied(at) => at,
             Reading::Mirrored(pivot) => pivot.wrapping_sub(count.wrapping_sub(pivot)),
             Reading::Noisy { error, .. } => count.wrapping_add(error),
             Reading::Dead => 0,
@@ -59,9 +62,13 @@ impl Encoder {
     /// Makes the encoder fail where the scale reads `scale`, or work again.
     pub fn fail(&mut self, fault: Option<EncoderFault>, scale: i32) {
         let here = self.raw(scale);
+        if let Reading::Unsupplied(at) = self.reading {
+            self.zero = scale.wrapping_sub(at);
+        }
         self.reading = match fault {
             None => Reading::True,
             Some(EncoderFault::Stuck) => Reading::Stuck(here),
+            Some(EncoderFault::Unsupplied) => Reading::Unsupplied(here),
             Some(EncoderFault::Reversed) => Reading::Mirrored(here),
             Some(EncoderFault::Noisy { amplitude, seed }) => {
                 Reading::Noisy { amplitude: amplitude.max(0), random: Pcg64Mcg::seed_from_u64(seed), error: 0 }

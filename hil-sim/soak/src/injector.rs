@@ -168,7 +168,9 @@ fn fail_encoder(world: &mut World<'_>, axis: usize, how: Option<EncoderFault>) {
     let reading = match how {
         None => EncoderReading::Clear,
         Some(EncoderFault::Noisy { .. }) => EncoderReading::Blurred,
-        Some(EncoderFault::Stuck | EncoderFault::Reversed | EncoderFault::Dead) => EncoderReading::Lost,
+        Some(EncoderFault::Stuck | EncoderFault::Reversed | EncoderFault::Dead | EncoderFault::Unsupplied) => {
+            EncoderReading::Lost
+        }
     };
     world.checker.encoder_shows(axis, reading);
 }
