@@ -179,7 +179,7 @@ impl Watch {
         let fired = self.board.machine.chip().world().fired().cloned();
         if let Some(fired) = fired {
             let at = self.board_clock(fired.at.time.0 as f64 / 1e6);
-            if self.fired.last().is_none_or(|(last, _)| *last != at) {
+            if self.fired.last().is_none_or(|(last, _)| *last < at) {
                 self.fired.push((at, fired.counts.try_into().expect("two axes")));
             }
         }

@@ -53,7 +53,9 @@ impl FaultCode {
             Self::FollowingError => {
                 "look for an obstacle or a slipping coupling, then 'vergence clear' and 'vergence home'"
             }
-            Self::NotSettled => "look for backlash or vibration at the stage, then 'vergence clear'",
+            Self::NotSettled => {
+                "look for backlash or vibration at the stage, and at the encoder's supply, then 'vergence clear' and 'vergence home'"
+            }
             Self::HomeSwitchNotFound => {
                 "check the home switch and its wiring, then 'vergence clear' and 'vergence home'"
             }

@@ -224,7 +224,7 @@ fn a_move_is_settled_by_the_encoder_not_by_the_command() {
 }
 
 #[test]
-fn a_move_that_does_not_settle_is_a_fault_that_keeps_the_reference() {
+fn a_move_that_does_not_settle_is_a_fault_after_which_that_axis_does_not_know_where_it_is() {
     let mut world = homed();
     world.move_to([100_000, 1_000_000]);
     world.rig.axes[0].misread = 100.0;
@@ -233,7 +233,7 @@ fn a_move_that_does_not_settle_is_a_fault_that_keeps_the_reference() {
     let fault = pose.fault.unwrap();
     assert_eq!((fault.code, fault.axis, pose.phase), (FaultCode::NotSettled, Some(0), MovePhase::Stopped));
     assert!((-101..=-99).contains(&fault.detail), "{}", fault.detail);
-    assert_eq!((pose.referenced, pose.mode), (BOTH, Mode(0)));
+    assert_eq!((pose.referenced, pose.mode), (AxisMask::default().with(1), Mode(0)));
     assert!(world.rig.drivers, "the stage is held");
 }
 

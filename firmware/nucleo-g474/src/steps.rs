@@ -179,6 +179,10 @@ impl StepPulses {
         // Loads counter, prescaler and repetition counter.
         timer.egr().write(|w| w.set_ug(true));
         timer.sr().write(|_| {});
+        // A request that was pending when the list before was dropped would be served for this one, and counted as a step:
+        // the timer holds it until its enable is withdrawn.
+        timer.dier().write(|_| {});
+        timer.dier().write(|w| w.set_ccde(0, true));
         self.dma.ndtr().write(|w| w.set_ndt(u16::try_from(count).unwrap_or(0)));
         self.dma.par().write_value(timer.arr().as_ptr() as u32);
         self.dma.mar().write_value(self.periods[self.front].as_ptr() as u32);

@@ -124,7 +124,7 @@ impl<W: World> Chip<W> {
         self.advance_to(now);
         self.demand = None;
         self.units.reset(cause);
-        if cause == ResetCause::PowerOn {
+        if cause.is_of_power() {
             self.power_cycles += 1;
             self.memory.lose_power(self.config.seed ^ self.power_cycles << 32);
         }

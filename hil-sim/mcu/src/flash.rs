@@ -172,6 +172,11 @@ impl Flash {
         };
     }
 
+    /// OPTR.BOR_LEV (§3.7.8).
+    pub fn brown_out_level(&self) -> usize {
+        (self.optr >> 8 & 7) as usize
+    }
+
     pub fn wait_states(&self) -> u32 {
         self.acr & 0xF
     }

@@ -67,6 +67,13 @@ impl Iwdg {
         self.loaded = Some(now);
     }
 
+    /// Stands for a duration, from now on.
+    pub fn stand(&mut self, duration: Picoseconds) {
+        let later = |at: &mut Option<Picoseconds>| *at = at.map(|at| at + duration);
+        later(&mut self.loaded);
+        self.updated_at.iter_mut().for_each(later);
+    }
+
     fn set(&mut self, moment: Moment, which: usize, value: u32) -> Reply<()> {
         if !self.unlocked {
             return Err("the watchdog's registers are locked".into());

@@ -45,6 +45,7 @@ mod rtt;
 mod schedule;
 mod serial_device;
 mod service;
+mod supply;
 mod syscfg;
 mod time;
 mod timer;

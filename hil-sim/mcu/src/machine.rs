@@ -36,6 +36,8 @@ pub struct Machine<W> {
     resets: u64,
     /// Place at which the core last locked up.
     lockup: Option<Place>,
+    /// Whether the supply is too low: the chip is held in reset.
+    pub(crate) in_brown_out: bool,
 }
 
 impl<W: World> Machine<W> {
@@ -51,6 +53,7 @@ impl<W: World> Machine<W> {
             reset: ResetCause::PowerOn,
             resets: 0,
             lockup: None,
+            in_brown_out: false,
         };
         machine.cpu.reset(&mut machine.chip);
         machine
@@ -106,6 +109,7 @@ impl<W: World> Machine<W> {
 
     /// Switches the power off and on again.
     pub fn power_on(&mut self) {
+        self.in_brown_out = false;
         self.restart(ResetCause::PowerOn);
         self.resets = 0;
     }
@@ -115,7 +119,7 @@ impl<W: World> Machine<W> {
         self.restart(ResetCause::Pin);
     }
 
-    fn restart(&mut self, cause: ResetCause) {
+    pub(crate) fn restart(&mut self, cause: ResetCause) {
         self.reset = cause;
         self.resets += 1;
         self.chip.reset(self.cpu.now(), cause);
@@ -124,6 +128,9 @@ impl<W: World> Machine<W> {
 
     /// Runs until `time` since power-on, through resets. The last instruction may exceed it.
     pub fn run_until(&mut self, time: Picoseconds) -> Halt {
+        if self.in_brown_out {
+            return self.stand_until(time);
+        }
         loop {
             // The core clock may have changed meanwhile.
             let end = self.chip.clocks.base.cycle_at(time);
@@ -172,7 +179,7 @@ impl<W: World> Machine<W> {
         None
     }
 
-    fn handle_demand(&mut self) -> Option<Halt> {
+    pub(crate) fn handle_demand(&mut self) -> Option<Halt> {
         match self.chip.demand.take()? {
             Demand::FlashBegins => {
                 let operation = self.chip.units.flash.running().filter(|_| self.stops.flash_operations);

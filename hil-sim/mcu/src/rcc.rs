@@ -75,6 +75,8 @@ const RESET_VALUES: &[(u32, u32)] = &[
 pub enum ResetCause {
     /// Power-on.
     PowerOn,
+    /// The supply fell below the brown-out threshold. RCC_CSR shows it like power-on (§7.4.28).
+    BrownOut,
     /// The reset button.
     Pin,
     /// The firmware asked for a reset through SYSRESETREQ.
@@ -86,11 +88,16 @@ pub enum ResetCause {
 }
 
 impl ResetCause {
+    /// Whether registers and RAM lost their power.
+    pub(crate) const fn is_of_power(self) -> bool {
+        matches!(self, Self::PowerOn | Self::BrownOut)
+    }
+
     /// Flags of RCC_CSR. The chip pulls its own reset pin low on every reset, so PINRSTF is always set too (§7.1.2).
     fn flags(self) -> u32 {
         const PIN: u32 = 1 << 26;
         PIN | match self {
-            Self::PowerOn => 1 << 27,
+            Self::PowerOn | Self::BrownOut => 1 << 27,
             Self::Pin => 0,
             Self::Software => 1 << 28,
             Self::Watchdog => 1 << 29,
@@ -119,7 +126,7 @@ impl Rcc {
             plain[offset as usize / 4] = value;
         }
         plain[CR as usize / 4] = 1 << 8;
-        plain[CSR as usize / 4] = if cause == ResetCause::PowerOn { 0 } else { flags_before } | cause.flags();
+        plain[CSR as usize / 4] = if cause.is_of_power() { 0 } else { flags_before } | cause.flags();
         let mut ready = [false; SOURCES.len()];
         ready[Source::Hsi16 as usize] = true;
         Self { plain, ready_at: [None; SOURCES.len()], ready, system_clock: 1, flags: 0, resets: Vec::new() }

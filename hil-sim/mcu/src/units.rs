@@ -62,8 +62,11 @@ impl Units {
         self.rng.reset();
         self.uarts.iter_mut().for_each(Uart::reset);
         let fresh = Self::new(0);
+        // A system reset leaves the debug registers alone (§47.6.3).
+        let debug = if cause.is_of_power() { Debug::default() } else { self.debug.clone() };
         *self = Self {
             rcc,
+            debug,
             flash: self.flash.clone(),
             rng: self.rng.clone(),
             uarts: std::mem::take(&mut self.uarts),

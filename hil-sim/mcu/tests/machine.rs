@@ -157,6 +157,60 @@ fn a_hang_ends_with_the_watchdog() {
     assert_eq!(machine.resets(), 2);
 }
 
+/// DBGMCU_APB1FZR1, whose bit 12 freezes the independent watchdog under a debugger (RM0440 §47.6.4).
+const APB1FZR1: u32 = 0xE004_2008;
+
+#[test]
+fn a_debugger_halts_the_core_and_the_watchdog_only_where_it_is_frozen() {
+    let started = || Program::default().store(0x4000_3000, 0xCCCC).emit(&[HANG]).machine();
+    let mut machine = started();
+    machine.run_until(Picoseconds::milliseconds(10));
+    let pc = machine.place().pc;
+    assert_eq!(machine.halt_core(Picoseconds::milliseconds(2_000)), Halt::Reached);
+    assert_eq!((machine.resets(), machine.last_reset()), (1, ResetCause::Watchdog));
+
+    let mut machine = started();
+    machine.run_until(Picoseconds::milliseconds(10));
+    let now = machine.cpu().now();
+    machine.chip_mut().write(now, APB1FZR1, Access::Word, 1 << 12).unwrap();
+    let instructions = machine.cpu().instructions();
+    machine.halt_core(Picoseconds::milliseconds(2_000));
+    assert_eq!((machine.resets(), machine.place().pc, machine.cpu().instructions()), (0, pc, instructions));
+    // It goes on from where it stood: 512 ms of its own time.
+    machine.run_until(Picoseconds::milliseconds(2_511));
+    assert_eq!(machine.resets(), 0);
+    machine.run_until(Picoseconds::milliseconds(2_513));
+    assert_eq!(machine.resets(), 1);
+    let now = machine.cpu().now();
+    let kept = machine.chip_mut().read(now, APB1FZR1, Access::Word).unwrap();
+    assert_eq!(kept, 1 << 12, "a system reset leaves the debug registers alone");
+}
+
+#[test]
+fn a_supply_below_the_brown_out_threshold_holds_the_chip_in_reset() {
+    let mut machine = blinking();
+    machine.run_until(Picoseconds::microseconds(20));
+    // Level 0, as delivered: 1.64 V falling, 1.66 V rising.
+    machine.set_supply(1_700);
+    machine.run_until(Picoseconds::microseconds(40));
+    assert_eq!(machine.resets(), 0);
+    machine.chip_mut().ram_mut()[..4].copy_from_slice(b"lost");
+    machine.set_supply(1_600);
+    let instructions = machine.cpu().instructions();
+    machine.run_until(Picoseconds::microseconds(100));
+    machine.set_supply(1_650);
+    machine.run_until(Picoseconds::microseconds(120));
+    assert_eq!((machine.cpu().instructions(), machine.chip().is_high(pin("PA5"))), (instructions, false));
+    machine.set_supply(3_300);
+    machine.run_until(Picoseconds::microseconds(140));
+    assert!(machine.cpu().instructions() > instructions);
+    assert_eq!((machine.resets(), machine.last_reset()), (1, ResetCause::BrownOut));
+    assert_ne!(&machine.chip().ram()[..4], b"lost");
+    let now = machine.cpu().now();
+    // Nothing but the flags of power and pin (§7.4.28).
+    assert_eq!(machine.chip_mut().read(now, 0x4002_1094, Access::Word).unwrap(), 0x0C00_0000);
+}
+
 #[test]
 fn ram_survives_every_reset_but_power_on() {
     let mut machine = Program::default().emit(&[HANG]).machine();

@@ -23,6 +23,36 @@ fn edges(bench: &Bench<Recorder>, begin: u64) -> Vec<(u64, bool)> {
     edges.filter(|edge| edge.at.cycle >= begin).map(|edge| (edge.at.cycle - begin, edge.high)).collect()
 }
 
+/// A timer keeps a request that its DMA channel does not serve, because the channel was switched off: it is served when the
+/// channel is switched on again, unless the timer's enable was withdrawn meanwhile.
+#[test]
+fn a_dma_request_that_was_pending_at_an_abort_is_served_later_unless_it_is_withdrawn() {
+    const CHANNEL: u32 = 0x4002_0008;
+    const RAM: u32 = 0x2000_0000;
+    /// On, from memory, memory increments, half words to words.
+    const ON: u32 = 1 | 1 << 4 | 1 << 7 | 1 << 10 | 2 << 8;
+    for (withdrawn, left, reload) in [(false, 1, 111), (true, 2, 9_999)] {
+        let mut bench = bench();
+        bench.write(RAM, 222 << 16 | 111);
+        // TIM1_CH1 to channel 1 of DMA1.
+        bench.write(0x4002_0800, 42);
+        bench.write(CHANNEL + 4, 2);
+        bench.write(CHANNEL + 8, TIM1 + ARR);
+        bench.write(CHANNEL + 12, RAM);
+        bench.write(TIM1 + ARR, 9_999);
+        bench.write(TIM1 + DIER, 1 << 9);
+        // The compare event of channel 1, while the DMA channel is off.
+        bench.write(TIM1 + EGR, 1 << 1);
+        if withdrawn {
+            bench.write(TIM1 + DIER, 0);
+            bench.write(TIM1 + DIER, 1 << 9);
+        }
+        bench.write(CHANNEL, ON);
+        bench.wait(20);
+        assert_eq!((bench.read(CHANNEL + 4), bench.read(TIM1 + ARR)), (left, reload), "withdrawn: {withdrawn}");
+    }
+}
+
 #[test]
 fn counts_one_clock_after_its_start_through_the_prescaler() {
     let mut bench = bench();

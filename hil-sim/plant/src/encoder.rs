@@ -69,6 +69,7 @@ impl Encoder {
         self.reading = match fault {
             None => Reading::True,
             Some(EncoderFault::Stuck) => Reading::Stuck(here),
+            Some(EncoderFault::Unpowered) => Reading::Unpowered(here),
             Some(EncoderFault::Reversed) => Reading::Mirrored(here),
             Some(EncoderFault::Noisy { amplitude, seed }) => {
                 Reading::Noisy { amplitude: amplitude.max(0), random: Pcg64Mcg::seed_from_u64(seed), error: 0 }

@@ -130,6 +130,7 @@ impl Controller {
             self.active.inside_since = None;
             if now >= self.active.settle_by {
                 let (axis, error) = self.worst_error(io);
+                self.doubt_references(io);
                 self.fail_softly(now, FaultCode::NotSettled, axis, error);
             }
             return;
@@ -139,6 +140,16 @@ impl Controller {
             self.active.phase = MovePhase::Settled;
             self.state = ControllerState::Ready;
             self.queue_phase();
+        }
+    }
+
+    /// Forgets where the axes are that are not at their targets: steps or counts were lost, such as in a gap of the encoder's
+    /// supply, and nobody can say which of them.
+    fn doubt_references(&mut self, io: &impl RigIo) {
+        for (axis, &target) in self.axes.iter_mut().zip(&self.active.targets) {
+            if !axis.is_at(target, io) {
+                axis.forget_reference();
+            }
         }
     }
 
@@ -155,7 +166,7 @@ impl Controller {
         }
     }
 
-    /// Raises a fault after which the axes are braked and held: the reference is kept.
+    /// Raises a fault after which the axes are braked and held, with the references that they have.
     fn fail_softly(&mut self, now: Microseconds, code: FaultCode, axis: usize, detail: i32) {
         self.brake();
         self.state = ControllerState::Fault;

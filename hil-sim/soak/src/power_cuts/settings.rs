@@ -22,16 +22,16 @@ impl Talk {
     /// Sets and saves the settings of this number.
     pub fn save(&mut self, number: i64) -> Result<(), String> {
         for (key, first) in CHANGED {
-            self.ask_done(Request::SetSetting { key, value: first + number })?;
+            self.ask_done(&Request::SetSetting { key, value: first + number })?;
         }
-        self.ask_done(Request::SaveSettings)
+        self.ask_done(&Request::SaveSettings)
     }
 
     /// The number of the saving that the board's settings are from.
     pub fn saved(&mut self) -> Result<i64, String> {
         let mut numbers = Vec::new();
         for (key, first) in CHANGED {
-            match self.ask_session(Request::GetSetting(key))? {
+            match self.ask_session(&Request::GetSetting(key))? {
                 Report::Setting { value, .. } => numbers.push(value - first),
                 other => return Err(format!("{key:?} is answered by {other:?}")),
             }
@@ -42,8 +42,8 @@ impl Talk {
         }
     }
 
-    fn ask_done(&mut self, request: Request) -> Result<(), String> {
-        match self.ask_session(request.clone())? {
+    fn ask_done(&mut self, request: &Request) -> Result<(), String> {
+        match self.ask_session(request)? {
             Report::Ack { status: Status::Accepted, .. } => Ok(()),
             other => Err(format!("{request:?} is answered by {other:?}")),
         }

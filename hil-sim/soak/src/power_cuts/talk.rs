@@ -124,7 +124,7 @@ impl Talk {
     }
 
     /// Makes a request in the session, and waits for its answer.
-    pub fn ask_session(&mut self, request: Request) -> Result<Report, String> {
+    pub fn ask_session(&mut self, request: &Request) -> Result<Report, String> {
         let ticket = self.host.submit(self.now, request.clone()).map_err(|error| error.to_string())?;
         let give_up = self.now.0 + ANSWER_PATIENCE_US;
         while self.now.0 < give_up {
