@@ -92,7 +92,7 @@ impl fmt::Display for Refusal {
                 "the board is set to drive the robot, which its firmware cannot yet: run 'vergence config set machine bench'",
             ),
             Self::DriverNotReady { axis, why: Some(why) } => {
-                write!(f, "axis {axis} cannot be driven: {why}")
+                write!(f, "axis {axis} cannot be driven: {why}; 'vergence doctor' says what to do")
             }
             Self::DriverNotReady { axis, why: None } => {
                 write!(f, "the motor driver of axis {axis} is getting its settings: try again in a second")
