@@ -112,7 +112,7 @@ fn a_motor_driver_that_cannot_be_used_is_told_by_every_verb() {
     let simulator = Simulator::start(&["--pty"]);
     let healthy = text(&simulator.run(&["status"]).stdout);
     assert!(!healthy.contains("driver"), "{healthy}");
-    fails(&simulator.run(&["config", "set", "separation.run_current", "3000mA"]), 2, &["245mA", "1768mA"]);
+    fails(&simulator.run(&["config", "set", "separation.run_current", "3000mA"]), 2, &["245mA", "1767mA"]);
     let set = simulator.run(&["config", "set", "separation.driver", "tmc2209"]);
     assert!(text(&set.stdout).contains("separation.driver is tmc2209, it was plain"), "{}", text(&set.stderr));
     std::thread::sleep(std::time::Duration::from_millis(300));

@@ -4,11 +4,11 @@
 //! alternate-function data, and each pin can be given away only once.
 
 use embassy_stm32::gpio::{Input, Level, Output, Pull, Speed};
-use embassy_stm32::mode::{Async, Blocking};
-use embassy_stm32::usart::{self, HalfDuplexReadback, OutputConfig, RingBufferedUartRx, Uart, UartTx};
+use embassy_stm32::mode::Async;
+use embassy_stm32::usart::{self, RingBufferedUartRx, Uart, UartTx};
 use embassy_stm32::{Peri, Peripherals, bind_interrupts, dma, pac, peripherals, rcc};
 
-use crate::drivers;
+use crate::drivers::DriverWire;
 use crate::encoder::Encoder;
 use crate::rig::Rig;
 use crate::steps::{StepDma, StepPulses};
@@ -43,7 +43,7 @@ pub struct Board {
     pub led: Output<'static>,
     /// Serial line, not opened yet.
     pub line: SerialLine,
-    /// Serial line of the motor drivers, not opened yet.
+    /// Serial line of the motor drivers.
     pub driver_line: DriverWire,
     /// Random number generator.
     pub random: Peri<'static, peripherals::RNG>,
@@ -84,27 +84,10 @@ impl Board {
             watchdog: p.IWDG,
             led: Output::new(p.PA5, Level::High, Speed::Low),
             line: SerialLine { port: p.LPUART1, tx: p.PA2, rx: p.PA3, tx_dma: p.DMA1_CH2, rx_dma: p.DMA1_CH1 },
-            driver_line: DriverWire { port: p.UART4, wire: p.PC10 },
+            driver_line: DriverWire::new(p.UART4, p.PC10),
             random: p.RNG,
             flash: p.FLASH,
         }
-    }
-}
-
-/// The one wire to the motor drivers.
-pub struct DriverWire {
-    port: Peri<'static, peripherals::UART4>,
-    wire: Peri<'static, peripherals::PC10>,
-}
-
-impl DriverWire {
-    /// Opens the line; the board hears what it says. `None` where the port cannot make the speed.
-    pub fn open(self) -> Option<Uart<'static, Blocking>> {
-        let mut config = usart::Config::default();
-        config.baudrate = drivers::BAUD;
-        // Whoever speaks pulls the wire down (RM0440, 37.5.15). The pull-up keeps a wire without drivers quiet.
-        config.tx_config = OutputConfig::OpenDrainPullUp;
-        Uart::new_blocking_half_duplex(self.port, self.wire, config, HalfDuplexReadback::Readback).ok()
     }
 }
 

@@ -8,11 +8,12 @@ use core::future::pending;
 
 use critical_section::Mutex;
 use embassy_futures::select::{Either, select};
+use embassy_stm32::gpio::{AfType, Flex, OutputType, Pull, Speed};
 use embassy_stm32::interrupt;
 use embassy_stm32::interrupt::{InterruptExt, Priority};
-use embassy_stm32::mode::Blocking;
 use embassy_stm32::pac::UART4;
-use embassy_stm32::usart::Uart;
+use embassy_stm32::usart::TxPin;
+use embassy_stm32::{Peri, peripherals, rcc};
 use embassy_sync::blocking_mutex::raw::CriticalSectionRawMutex;
 use embassy_sync::pipe::Pipe;
 use embassy_sync::signal::Signal;
@@ -21,8 +22,10 @@ use vergence_control::driver::{DriverLine, LONGEST};
 use vergence_control::{DriverKind, DriverSettings};
 use vergence_protocol::{AxisList, DriverState, Microseconds};
 
+use crate::rig::AXES;
+
 /// Speed of the line in baud: a request and its reply take half a millisecond. The drivers find it out by themselves.
-pub const BAUD: u32 = 250_000;
+const BAUD: u32 = 250_000;
 /// Below the trigger's edge, above the node.
 const PRIORITY: Priority = Priority::P4;
 
@@ -31,14 +34,48 @@ static HEARD: Pipe<CriticalSectionRawMutex, { 2 * LONGEST }> = Pipe::new();
 /// Wakes the task: [`SHARED`] has changed.
 static CHANGED: Signal<CriticalSectionRawMutex, ()> = Signal::new();
 static SHARED: Mutex<RefCell<Shared>> =
-    Mutex::new(RefCell::new(Shared { settings: None, motors_on: false, states: AxisList::new() }));
+    Mutex::new(RefCell::new(Shared { settings: None, motors_on: false, states: [DriverState::Plain; AXES] }));
+
+/// The one wire to the motor drivers.
+pub struct DriverWire {
+    _pin: Flex<'static>,
+}
+
+impl DriverWire {
+    /// Sets up port and pin: one wire for both directions (RM0440, 37.5.15). Whoever speaks pulls it down; the pull-up keeps a
+    /// wire without drivers quiet.
+    pub fn new(_port: Peri<'static, peripherals::UART4>, pin: Peri<'static, impl TxPin<peripherals::UART4>>) -> Self {
+        let function = pin.af_num();
+        let mut pin = Flex::new(pin);
+        pin.set_as_af_unchecked(function, AfType::output_pull(OutputType::OpenDrain, Speed::Medium, Pull::Up));
+        rcc::enable_and_reset::<peripherals::UART4>();
+        let clock = rcc::frequency::<peripherals::UART4>().0;
+        UART4.brr().write(|w| w.set_brr(((clock + BAUD / 2) / BAUD) as u16));
+        UART4.cr3().write(|w| w.set_hdsel(true));
+        UART4.cr1().write(|w| {
+            w.set_fifoen(true);
+            w.set_te(true);
+            // The board hears itself.
+            w.set_re(true);
+            w.set_rxneie(true);
+            w.set_ue(true);
+        });
+        interrupt::UART4.set_priority(PRIORITY);
+        // SAFETY: the handler is complete; nothing relies on this interrupt being masked.
+        #[allow(unsafe_code, reason = "unmasking an interrupt")]
+        unsafe {
+            interrupt::UART4.enable();
+        }
+        Self { _pin: pin }
+    }
+}
 
 /// What node and task tell each other.
 struct Shared {
     /// New settings that the task has not taken yet.
-    settings: Option<AxisList<DriverSettings>>,
+    settings: Option<[DriverSettings; AXES]>,
     motors_on: bool,
-    states: AxisList<DriverState>,
+    states: [DriverState; AXES],
 }
 
 fn with_shared<R>(act: impl FnOnce(&mut Shared) -> R) -> R {
@@ -47,13 +84,14 @@ fn with_shared<R>(act: impl FnOnce(&mut Shared) -> R) -> R {
 
 /// Gives the drivers of all axes these settings. Until the task has done so they do not count as usable.
 pub fn configure(settings: &AxisList<DriverSettings>) {
+    let Some(settings) = settings.first_chunk::<AXES>() else { return };
     with_shared(|shared| {
-        shared.settings = Some(settings.clone());
-        let state = |driver: &DriverSettings| match driver.kind {
+        shared.settings = Some(*settings);
+        let state = |driver: DriverSettings| match driver.kind {
             DriverKind::Plain => DriverState::Plain,
             DriverKind::Tmc2209 => DriverState::Starting,
         };
-        shared.states = settings.iter().map(state).collect();
+        shared.states = settings.map(state);
     });
     CHANGED.signal(());
 }
@@ -71,8 +109,7 @@ pub fn state(axis: usize) -> DriverState {
 
 /// Runs the line.
 #[embassy_executor::task]
-pub async fn supervise(port: Uart<'static, Blocking>) {
-    begin(port);
+pub async fn supervise(_wire: DriverWire) {
     let mut line = DriverLine::default();
     let mut bytes = [0; 2 * LONGEST];
     loop {
@@ -99,23 +136,6 @@ pub async fn supervise(port: Uart<'static, Blocking>) {
 
 fn now() -> Microseconds {
     Microseconds(Instant::now().as_micros())
-}
-
-/// Lets received bytes interrupt.
-fn begin(port: Uart<'static, Blocking>) {
-    // Forgotten, because dropping it would stop the port's clock.
-    core::mem::forget(port);
-    // The receiver is on already, so that the board hears itself.
-    UART4.cr1().modify(|w| {
-        w.set_te(true);
-        w.set_rxneie(true);
-    });
-    interrupt::UART4.set_priority(PRIORITY);
-    // SAFETY: the handler is complete; nothing relies on this interrupt being masked.
-    #[allow(unsafe_code, reason = "unmasking an interrupt")]
-    unsafe {
-        interrupt::UART4.enable();
-    }
 }
 
 fn take_orders(line: &mut DriverLine) {

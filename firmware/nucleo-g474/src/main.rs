@@ -62,14 +62,13 @@ async fn main(spawner: Spawner) {
     let Some((rx, tx)) = board.line.open(node.settings().baud, link::ring_buffer()) else {
         dying::give_up(DeathKind::SerialLine)
     };
-    let Some(drivers_port) = board.driver_line.open() else { dying::give_up(DeathKind::SerialLine) };
     control::start(node, board.rig, services, board.tick);
     if let (Ok(receive), Ok(transmit), Ok(plan), Ok(watch), Ok(supervise)) = (
         link::receive(rx),
         link::transmit(tx),
         planning::plan(planning::planner()),
         watchdog::watch(watchdog, board.led),
-        drivers::supervise(drivers_port),
+        drivers::supervise(board.driver_line),
     ) {
         spawner.spawn(receive);
         spawner.spawn(transmit);

@@ -34,7 +34,7 @@ fn a_reason_gives_the_bounds_in_the_settings_own_unit() {
     assert!(given("baseline.speed", "0mm/s").contains("must be positive"));
     assert_eq!(
         given("baseline.run_current", "3000mA"),
-        "baseline.run_current must lie between 245mA and 1768mA: the driver cannot regulate another current by its \
+        "baseline.run_current must lie between 245mA and 1767mA: the driver cannot regulate another current by its \
          sense resistors"
     );
     assert!(given("separation.hold_current", "900mA").contains("800mA"));

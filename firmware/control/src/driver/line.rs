@@ -64,16 +64,16 @@ pub struct DriverLine {
 impl DriverLine {
     /// Sets the drivers of all axes, in the order of their addresses. A driver whose settings are the same goes on.
     pub fn configure(&mut self, settings: impl IntoIterator<Item = DriverSettings>) {
-        let before = core::mem::take(&mut self.channels);
-        self.channels = settings
-            .into_iter()
-            .take(before.capacity())
-            .enumerate()
-            .map(|(index, new)| {
-                let same = before.get(index).filter(|channel| *channel.settings() == new);
-                same.cloned().unwrap_or_else(|| Channel::new(new))
-            })
-            .collect();
+        for (index, new) in settings.into_iter().enumerate() {
+            match self.channels.get_mut(index) {
+                Some(channel) if *channel.settings() == new => {}
+                Some(channel) => *channel = Channel::new(new),
+                // An axis too many is none of the board's.
+                None => {
+                    let _ = self.channels.push(Channel::new(new));
+                }
+            }
+        }
         self.exchange = None;
         self.pause_until = Microseconds(0);
     }

@@ -44,37 +44,32 @@ impl Default for DriverSettings {
     }
 }
 
-/// Range of the sense voltage.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+/// Range of the sense voltage (section 9 of the datasheet).
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Range {
     /// Whether it is the lower one, with the finer steps of current.
     pub is_low: bool,
-    /// Largest sense voltage in microvolts (section 9).
-    microvolts: u64,
+    /// Largest sense voltage in millivolts.
+    millivolts: f32,
 }
 
-const LOW: Range = Range { is_low: true, microvolts: 180_000 };
-const HIGH: Range = Range { is_low: false, microvolts: 325_000 };
+const LOW: Range = Range { is_low: true, millivolts: 180.0 };
+const HIGH: Range = Range { is_low: false, millivolts: 325.0 };
 /// What the chip adds to the sense resistor, in milliohms.
-const INNER_MOHM: u32 = 20;
-/// The square root of two, in thousandths.
-const ROOT_2: u64 = 1_414;
+const INNER_MOHM: f32 = 20.0;
 /// Largest effective current that the chip stands, in milliamperes.
 const CHIP_MA: u32 = 2_000;
 
 impl Range {
-    /// Effective current in milliamperes at `parts` 32nds of the range (section 9).
-    fn current(self, sense_mohm: u32, parts: u64) -> u32 {
-        let ohms = u64::from(sense_mohm + INNER_MOHM) * ROOT_2;
-        u32::try_from(self.microvolts * 1000 * parts / (32 * ohms)).unwrap_or(u32::MAX)
+    /// Effective current at the end of the range, in milliamperes.
+    fn full_ma(self, sense_mohm: u32) -> f32 {
+        self.millivolts * 1e3 / (sense_mohm as f32 + INNER_MOHM) / core::f32::consts::SQRT_2
     }
 
-    /// The current scale, 0 to 31, nearest to an effective current.
+    /// The current scale nearest to an effective current: n stands for n + 1 of 32 parts of the range.
     fn scale(self, sense_mohm: u32, current_ma: u32) -> u32 {
-        let ohms = u64::from(sense_mohm + INNER_MOHM) * ROOT_2;
-        let full = self.microvolts * 1000;
-        let parts = (u64::from(current_ma) * 32 * ohms + full / 2) / full;
-        (parts as u32).clamp(1, 32) - 1
+        let parts = current_ma as f32 * 32.0 / self.full_ma(sense_mohm);
+        ((parts + 0.5) as u32).clamp(1, 32) - 1
     }
 }
 
@@ -82,12 +77,13 @@ impl DriverSettings {
     /// Smallest and largest run current that the sense resistors allow, in milliamperes: a quarter of the lower range, below
     /// which microsteps become coarse, and the whole higher range or what the chip stands.
     pub(crate) fn currents(&self) -> [u32; 2] {
-        [LOW.current(self.sense_mohm, 8) + 1, HIGH.current(self.sense_mohm, 32).min(CHIP_MA)]
+        let [low, high] = [LOW, HIGH].map(|range| range.full_ma(self.sense_mohm) as u32);
+        [low / 4 + 1, high.min(CHIP_MA)]
     }
 
     /// The range, and the current scales of motion and rest in it.
     pub(super) fn current_scale(&self) -> (Range, u32, u32) {
-        let range = if self.run_ma <= LOW.current(self.sense_mohm, 32) { LOW } else { HIGH };
+        let range = if self.run_ma as f32 <= LOW.full_ma(self.sense_mohm) { LOW } else { HIGH };
         let scale = |current| range.scale(self.sense_mohm, current);
         (range, scale(self.run_ma), scale(self.hold_ma))
     }
