@@ -18,11 +18,9 @@ use embassy_sync::blocking_mutex::raw::CriticalSectionRawMutex;
 use embassy_sync::pipe::Pipe;
 use embassy_sync::signal::Signal;
 use embassy_time::{Instant, Timer};
-use vergence_control::driver::{DriverLine, LONGEST};
+use vergence_control::driver::{ADDRESSES, DriverLine, LONGEST};
 use vergence_control::{DriverKind, DriverSettings};
 use vergence_protocol::{AxisList, DriverState, Microseconds};
-
-use crate::rig::AXES;
 
 /// Speed of the line in baud: a request and its reply take half a millisecond. The drivers find it out by themselves.
 const BAUD: u32 = 250_000;
@@ -34,7 +32,7 @@ static HEARD: Pipe<CriticalSectionRawMutex, { 2 * LONGEST }> = Pipe::new();
 /// Wakes the task: [`SHARED`] has changed.
 static CHANGED: Signal<CriticalSectionRawMutex, ()> = Signal::new();
 static SHARED: Mutex<RefCell<Shared>> =
-    Mutex::new(RefCell::new(Shared { settings: None, motors_on: false, states: [DriverState::Plain; AXES] }));
+    Mutex::new(RefCell::new(Shared { settings: None, motors_on: false, states: [DriverState::Plain; ADDRESSES] }));
 
 /// The one wire to the motor drivers.
 pub struct DriverWire {
@@ -73,9 +71,9 @@ impl DriverWire {
 /// What node and task tell each other.
 struct Shared {
     /// New settings that the task has not taken yet.
-    settings: Option<[DriverSettings; AXES]>,
+    settings: Option<[DriverSettings; ADDRESSES]>,
     motors_on: bool,
-    states: [DriverState; AXES],
+    states: [DriverState; ADDRESSES],
 }
 
 fn with_shared<R>(act: impl FnOnce(&mut Shared) -> R) -> R {
@@ -84,9 +82,9 @@ fn with_shared<R>(act: impl FnOnce(&mut Shared) -> R) -> R {
 
 /// Gives the drivers of all axes these settings. Until the task has done so they do not count as usable.
 pub fn configure(settings: &AxisList<DriverSettings>) {
-    let Some(settings) = settings.first_chunk::<AXES>() else { return };
+    let settings = core::array::from_fn(|axis| settings.get(axis).copied().unwrap_or_default());
     with_shared(|shared| {
-        shared.settings = Some(*settings);
+        shared.settings = Some(settings);
         let state = |driver: DriverSettings| match driver.kind {
             DriverKind::Plain => DriverState::Plain,
             DriverKind::Tmc2209 => DriverState::Starting,

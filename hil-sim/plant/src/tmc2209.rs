@@ -281,8 +281,8 @@ fn crc8(bytes: &[u8]) -> u8 {
     let mut crc = 0u8;
     for byte in bytes {
         for bit in 0..8 {
-            let feedback = (crc >> 7 ^ byte >> bit) & 1;
-            crc = crc << 1 ^ feedback * 7;
+            let feedback = ((crc >> 7) ^ (byte >> bit)) & 1;
+            crc = (crc << 1) ^ (feedback * 7);
         }
     }
     crc
