@@ -106,6 +106,25 @@ fn settings_go_back_to_the_saved_ones_or_to_the_factory_s() {
 }
 
 /// Regression: the log of a simulated board was always empty, and so was that of a real one after any other verb.
+/// The simulated stages have plain drivers, so that a driver with a serial line is one that does not answer.
+#[test]
+fn a_motor_driver_that_cannot_be_used_is_told_by_every_verb() {
+    let simulator = Simulator::start(&["--pty"]);
+    let healthy = text(&simulator.run(&["status"]).stdout);
+    assert!(!healthy.contains("driver"), "{healthy}");
+    fails(&simulator.run(&["config", "set", "separation.run_current", "3000mA"]), 2, &["245mA", "1767mA"]);
+    let set = simulator.run(&["config", "set", "separation.driver", "tmc2209"]);
+    assert!(text(&set.stdout).contains("separation.driver is tmc2209, it was plain"), "{}", text(&set.stderr));
+    std::thread::sleep(std::time::Duration::from_millis(300));
+    let status = text(&simulator.run(&["status"]).stdout);
+    assert!(status.contains("motor driver of separation: not usable: the motor driver does not answer"), "{status}");
+    let doctor = text(&simulator.run(&["doctor"]).stdout);
+    assert!(doctor.contains("cannot be used") && doctor.contains("serial wire"), "{doctor}");
+    fails(&simulator.run(&["home"]), 3, &["does not answer", "separation", "vergence doctor"]);
+    assert!(simulator.run(&["config", "set", "separation.driver", "plain"]).status.success());
+    assert!(simulator.run(&["home"]).status.success());
+}
+
 #[test]
 fn the_log_tells_what_happened_and_what_happens() {
     let simulator = Simulator::start(&["--pty"]);

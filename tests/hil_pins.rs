@@ -36,7 +36,7 @@ fn pins_are_set_as_the_wiring_table_says() {
         }
     }
     let count = |wanted: fn(&Use) -> bool| checked.iter().filter(|one| wanted(one)).count();
-    assert_eq!(count(|one| matches!(one, Use::Alternate(_))), 9, "link, steps, encoders, trigger");
+    assert_eq!(count(|one| matches!(one, Use::Alternate(_))), 10, "link, steps, encoders, trigger, drivers' line");
     assert_eq!(count(|&one| one == Use::Output), 4, "both directions, drivers off, LED");
     assert_eq!(count(|&one| one == Use::Input), 5, "home switches, hard limits, emergency stop");
 }

@@ -42,6 +42,18 @@ pub enum FaultCode {
     HomeSwitchWrong,
     /// The control tick came too late to keep to the trajectory.
     TickMissed,
+    /// A motor driver does not answer on its serial line.
+    DriverSilent,
+    /// What a motor driver answers is garbled.
+    DriverGarbled,
+    /// A motor driver did not take its settings, or has others than it was given.
+    DriverUnset,
+    /// A motor driver was reset and has lost its settings, or its supply is too low.
+    DriverReset,
+    /// A motor driver is too hot and has switched its outputs off.
+    DriverOverheated,
+    /// A short circuit at the outputs of a motor driver, which has switched them off.
+    DriverShort,
 }
 
 impl FaultCode {
@@ -78,6 +90,22 @@ impl FaultCode {
                 "check that each home switch is wired to its own axis, then 'vergence clear' and 'vergence home'"
             }
             Self::TickMissed => "lower the rate of steps and poses, then 'vergence clear' and 'vergence home'",
+            Self::DriverSilent => {
+                "check the driver's supply, its serial wire and its address, then 'vergence clear' and 'vergence home'"
+            }
+            Self::DriverGarbled => {
+                "check the drivers' serial wire, its pull-up and that no two drivers have the same address, then 'vergence clear' and 'vergence home'"
+            }
+            Self::DriverUnset => {
+                "check that the driver is a TMC2209 and its serial wire is sound, then 'vergence clear' and 'vergence home'"
+            }
+            Self::DriverReset => "check the drivers' motor supply, then 'vergence clear' and 'vergence home'",
+            Self::DriverOverheated => {
+                "let the driver cool, lower 'run_current' or cool it better, then 'vergence clear' and 'vergence home'"
+            }
+            Self::DriverShort => {
+                "switch off, check the motor and its wires for a short circuit, then 'vergence clear' and 'vergence home'"
+            }
         }
     }
 }
@@ -102,6 +130,12 @@ impl fmt::Display for FaultCode {
             Self::EncoderLost => "the encoder does not answer",
             Self::HomeSwitchWrong => "homing closed the switch of another axis",
             Self::TickMissed => "the control tick came too late",
+            Self::DriverSilent => "the motor driver does not answer",
+            Self::DriverGarbled => "what the motor driver answers is garbled",
+            Self::DriverUnset => "the motor driver does not have the settings that it was given",
+            Self::DriverReset => "the motor driver has lost its supply and its settings",
+            Self::DriverOverheated => "the motor driver was too hot and switched off",
+            Self::DriverShort => "the motor driver found a short circuit and switched off",
         })
     }
 }

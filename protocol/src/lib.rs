@@ -11,6 +11,7 @@
 #![no_std]
 
 mod axis;
+mod driver;
 mod fault;
 pub mod frame;
 mod identity;
@@ -27,6 +28,7 @@ mod units;
 pub mod update;
 
 pub use axis::{AxisInfo, AxisKind, AxisList, AxisMask, MAX_AXES};
+pub use driver::DriverState;
 pub use fault::{FaultCode, FaultRecord};
 pub use frame::MAX_FRAME;
 pub use identity::{BoardInfo, PROTOCOL, ProtocolVersion, ResetCause, schema_hash};

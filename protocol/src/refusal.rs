@@ -5,6 +5,8 @@ use core::fmt;
 use postcard_schema::Schema;
 use serde::{Deserialize, Serialize};
 
+use crate::FaultCode;
+
 /// Outcome of a request.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, Schema)]
 pub enum Status {
@@ -58,6 +60,13 @@ pub enum Refusal {
     StorageFailed,
     /// The board is set to drive a machine that its firmware cannot drive.
     NoSuchMachine,
+    /// The motor driver of an axis cannot be used.
+    DriverNotReady {
+        /// Index of the axis, from 0.
+        axis: u8,
+        /// Why; `None` while the driver gets its settings.
+        why: Option<FaultCode>,
+    },
 }
 
 impl fmt::Display for Refusal {
@@ -82,6 +91,12 @@ impl fmt::Display for Refusal {
             Self::NoSuchMachine => f.write_str(
                 "the board is set to drive the robot, which its firmware cannot yet: run 'vergence config set machine bench'",
             ),
+            Self::DriverNotReady { axis, why: Some(why) } => {
+                write!(f, "axis {axis} cannot be driven: {why}; 'vergence doctor' says what to do")
+            }
+            Self::DriverNotReady { axis, why: None } => {
+                write!(f, "the motor driver of axis {axis} is getting its settings: try again in a second")
+            }
         }
     }
 }

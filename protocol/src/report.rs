@@ -4,8 +4,8 @@ use postcard_schema::Schema;
 use serde::{Deserialize, Serialize};
 
 use crate::{
-    AxisInfo, AxisList, AxisMask, BoardInfo, BoardStatistics, ControllerState, Counts, FaultCode, FaultRecord,
-    Microseconds, Mode, MoveId, MovePhase, ProtocolVersion, RecordedEvents, SessionId, SettingKey, Status,
+    AxisInfo, AxisList, AxisMask, BoardInfo, BoardStatistics, ControllerState, Counts, DriverState, FaultCode,
+    FaultRecord, Microseconds, Mode, MoveId, MovePhase, ProtocolVersion, RecordedEvents, SessionId, SettingKey, Status,
 };
 
 /// A report of the board. Append only: the order is the wire format. `Hello` and `Info` are frozen for ever.
@@ -90,6 +90,15 @@ pub enum Report {
     },
     /// The camera trigger fired.
     TriggerMark(TriggerMark),
+    /// Answers `Request::GetDriver`.
+    Driver {
+        /// Sequence number of the request.
+        to: u8,
+        /// Index of the axis, from 0.
+        axis: u8,
+        /// State of its motor driver.
+        state: DriverState,
+    },
 }
 
 /// One pulse of the camera trigger.
@@ -136,7 +145,8 @@ impl Report {
             | Self::Axis { to, .. }
             | Self::Setting { to, .. }
             | Self::Events { to, .. }
-            | Self::Statistics { to, .. } => Some(*to),
+            | Self::Statistics { to, .. }
+            | Self::Driver { to, .. } => Some(*to),
             _ => None,
         }
     }
@@ -148,7 +158,8 @@ impl Report {
             | Self::Axis { to, .. }
             | Self::Setting { to, .. }
             | Self::Events { to, .. }
-            | Self::Statistics { to, .. } => Some(to),
+            | Self::Statistics { to, .. }
+            | Self::Driver { to, .. } => Some(to),
             _ => None,
         }
     }

@@ -93,6 +93,11 @@ pub enum Request {
     },
     /// Asks for figures of the link. Answered by `Report::Statistics`.
     GetStatistics,
+    /// Asks for the state of the motor driver of an axis. Answered by `Report::Driver`.
+    GetDriver {
+        /// Index of the axis, from 0.
+        axis: u8,
+    },
 }
 
 /// A relative move of all axes together.

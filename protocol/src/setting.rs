@@ -51,11 +51,25 @@ pub enum SettingItem {
     Baud,
     /// Of the board: what it drives, 0 for the stages of the bench, 1 for the joints of the robot.
     Machine,
+    /// Motor driver of the axis: 0 for step and direction only, 1 for a TMC2209 with its serial line.
+    Driver,
+    /// Resistors by which the driver measures the current, in milliohms.
+    SenseResistor,
+    /// Effective current of the motor in motion, in milliamperes.
+    RunCurrent,
+    /// Effective current of the motor at rest, in milliamperes.
+    HoldCurrent,
+    /// Time at rest until the current falls, in microseconds.
+    HoldDelay,
+    /// Microsteps that the driver makes of a full step, a power of two up to 256.
+    Microsteps,
+    /// 1 if the driver regulates the voltage (quiet), 0 if it regulates the current.
+    StealthChop,
 }
 
 impl SettingItem {
     /// Every item, in wire order.
-    pub const ALL: [Self; 21] = [
+    pub const ALL: [Self; 28] = [
         Self::Min,
         Self::Max,
         Self::Speed,
@@ -77,6 +91,13 @@ impl SettingItem {
         Self::StreamPeriod,
         Self::Baud,
         Self::Machine,
+        Self::Driver,
+        Self::SenseResistor,
+        Self::RunCurrent,
+        Self::HoldCurrent,
+        Self::HoldDelay,
+        Self::Microsteps,
+        Self::StealthChop,
     ];
 
     /// Whether each axis has a setting of this kind; else the board has one.
@@ -110,6 +131,13 @@ impl SettingItem {
             Self::StreamPeriod => "stream_period_us",
             Self::Baud => "baud",
             Self::Machine => "machine",
+            Self::Driver => "driver",
+            Self::SenseResistor => "sense_resistor",
+            Self::RunCurrent => "run_current",
+            Self::HoldCurrent => "hold_current",
+            Self::HoldDelay => "hold_delay",
+            Self::Microsteps => "microsteps",
+            Self::StealthChop => "stealth_chop",
         }
     }
 }

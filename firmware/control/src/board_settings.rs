@@ -2,6 +2,7 @@
 
 use vergence_protocol::{AxisKind, AxisList, Micro, SettingItem, SettingKey};
 
+use crate::driver::{DriverKind, DriverSettings};
 use crate::settings::{AxisSettings, HomingSettings, SettingsError};
 
 /// Shortest period of the pose stream in microseconds: a pose of 45 bytes at 921 600 baud takes half of it.
@@ -62,8 +63,8 @@ impl BoardSettings {
         Ok(settings)
     }
 
-    /// Settings of a board whose axes are of these `kinds`, with the `values` given and zero where none is given. They are
-    /// not checked: see [`Self::validate`].
+    /// Settings of a board whose axes are of these `kinds`, with the `values` given; others are zero, and those of motor
+    /// drivers as delivered. They are not checked: see [`Self::validate`].
     ///
     /// # Errors
     /// [`SettingError`] if a value names no setting of such a board, or does not fit its number.
@@ -141,7 +142,7 @@ impl BoardSettings {
 }
 
 impl AxisSettings {
-    /// Settings of an axis of this kind that are all zero.
+    /// Settings of an axis of this kind that are all zero, but for a plain motor driver.
     fn blank(kind: AxisKind) -> Self {
         let nothing = Micro(0);
         let homing = HomingSettings {
@@ -167,12 +168,13 @@ impl AxisSettings {
             tolerance: nothing,
             backlash: nothing,
             homing,
+            driver: DriverSettings::default(),
         }
     }
 
     /// Value of an axis setting; `None` for settings of the board.
     fn item(&self, item: SettingItem) -> Option<i64> {
-        let homing = &self.homing;
+        let (homing, driver) = (&self.homing, &self.driver);
         Some(match item {
             SettingItem::Min => self.min.0.into(),
             SettingItem::Max => self.max.0.into(),
@@ -192,12 +194,19 @@ impl AxisSettings {
             SettingItem::HomeRetract => homing.retract.0.into(),
             SettingItem::HomeTravel => homing.travel.0.into(),
             SettingItem::HomeRepeatability => homing.repeatability.0.into(),
+            SettingItem::Driver => (driver.kind == DriverKind::Tmc2209).into(),
+            SettingItem::SenseResistor => driver.sense_mohm.into(),
+            SettingItem::RunCurrent => driver.run_ma.into(),
+            SettingItem::HoldCurrent => driver.hold_ma.into(),
+            SettingItem::HoldDelay => driver.hold_delay_us.into(),
+            SettingItem::Microsteps => driver.microsteps.into(),
+            SettingItem::StealthChop => driver.stealth_chop.into(),
             _ => return None,
         })
     }
 
     fn put(&mut self, item: SettingItem, value: i64) -> Result<(), SettingError> {
-        let homing = &mut self.homing;
+        let (homing, driver) = (&mut self.homing, &mut self.driver);
         match item {
             SettingItem::Min => self.min = micro(value)?,
             SettingItem::Max => self.max = micro(value)?,
@@ -217,6 +226,13 @@ impl AxisSettings {
             SettingItem::HomeRetract => homing.retract = micro(value)?,
             SettingItem::HomeTravel => homing.travel = micro(value)?,
             SettingItem::HomeRepeatability => homing.repeatability = micro(value)?,
+            SettingItem::Driver => driver.kind = if flag(value)? { DriverKind::Tmc2209 } else { DriverKind::Plain },
+            SettingItem::SenseResistor => driver.sense_mohm = number(value)?,
+            SettingItem::RunCurrent => driver.run_ma = number(value)?,
+            SettingItem::HoldCurrent => driver.hold_ma = number(value)?,
+            SettingItem::HoldDelay => driver.hold_delay_us = number(value)?,
+            SettingItem::Microsteps => driver.microsteps = number(value)?,
+            SettingItem::StealthChop => driver.stealth_chop = flag(value)?,
             _ => return Err(SettingError::Unknown),
         }
         Ok(())

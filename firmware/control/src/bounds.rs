@@ -6,6 +6,7 @@
 
 use vergence_protocol::{AxisKind, SettingItem};
 
+use crate::driver::{ADDRESSES, DriverKind, DriverSettings};
 use crate::settings::{AxisSettings, Scale, SettingsError};
 
 /// Longest time to brake from full speed, in milliseconds.
@@ -29,7 +30,8 @@ struct Bound {
 /// # Errors
 /// [`SettingsError::Outside`] with the first setting out of its bounds, or [`SettingsError::Braking`].
 pub(crate) fn check(settings: &AxisSettings, axis: usize) -> Result<(), SettingsError> {
-    let outside = bounds(settings).into_iter().find(|bound| !(bound.least..=bound.most).contains(&bound.value));
+    let mut all = bounds(settings).into_iter().chain(driver_bounds(&settings.driver, axis));
+    let outside = all.find(|bound| !(bound.least..=bound.most).contains(&bound.value));
     if let Some(Bound { item, least, most, why, .. }) = outside {
         return Err(SettingsError::Outside { axis, item, least, most, why });
     }
@@ -102,6 +104,35 @@ fn bounds(settings: &AxisSettings) -> [Bound; 9] {
             finest(settings.encoder()),
             "all counts from end to end, and as many again, must fit in 31 bits",
         ),
+    ]
+}
+
+/// Bounds of the settings of a motor driver, also of those that a plain driver does not use: then they hold when its kind
+/// is changed.
+fn driver_bounds(driver: &DriverSettings, axis: usize) -> [Bound; 5] {
+    let [least, most] = driver.currents().map(i64::from);
+    let run = i64::from(driver.run_ma);
+    let bound = |item, value: u32, least: i64, most: i64, why| Bound { item, value: value.into(), least, most, why };
+    let kind = (driver.kind == DriverKind::Tmc2209).into();
+    let kinds = (axis < ADDRESSES).into();
+    [
+        bound(SettingItem::Driver, kind, 0, kinds, "the drivers' line has four addresses"),
+        bound(SettingItem::SenseResistor, driver.sense_mohm, 50, 1_000, "with others the driver measures no current"),
+        bound(
+            SettingItem::RunCurrent,
+            driver.run_ma,
+            least,
+            most,
+            "the driver cannot regulate another current by its sense resistors",
+        ),
+        bound(
+            SettingItem::HoldCurrent,
+            driver.hold_ma,
+            run / 8,
+            run,
+            "the current at rest is a share of that in motion",
+        ),
+        bound(SettingItem::HoldDelay, driver.hold_delay_us, 50_000, 5_500_000, "the driver can count no other time"),
     ]
 }
 

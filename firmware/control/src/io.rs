@@ -1,7 +1,9 @@
 //! The interface between the controller and a board's inputs and outputs.
 
 use heapless::Vec;
-use vergence_protocol::{AxisList, Microseconds};
+use vergence_protocol::{AxisList, DriverState, Microseconds};
+
+use crate::driver::DriverSettings;
 
 /// Largest number of steps of one axis in one tick: 100 at 100 kHz, and some slack.
 pub const MAX_STEPS_PER_TICK: usize = 104;
@@ -51,6 +53,16 @@ pub trait RigIo {
     /// Whether the emergency stop is pressed, or its wire is broken. Hardware has already cut the drivers; the controller
     /// only observes.
     fn emergency_stop(&self) -> bool;
+    /// Sets the motor drivers of all axes that have a serial line, from now on; until that is done [`Self::driver`] does not
+    /// call them usable. A board without such a line does nothing.
+    fn configure_drivers(&mut self, drivers: &AxisList<DriverSettings>) {
+        let _ = drivers;
+    }
+    /// State of the motor driver of an axis.
+    fn driver(&self, axis: usize) -> DriverState {
+        let _ = axis;
+        DriverState::Plain
+    }
     /// Fires the cameras once at the time `at`, or at once if that has passed. A board without trigger does nothing.
     fn fire_trigger(&mut self, at: Microseconds) {
         let _ = at;

@@ -60,6 +60,8 @@ pub struct Node {
     recorder: Recorder,
     trigger: CameraTrigger,
     updater: Updater,
+    /// Whether the motor drivers have yet to be told their settings.
+    drivers_wait: bool,
     /// Time of the last management request.
     managed_at: Microseconds,
     reboot: Option<RebootTo>,
@@ -108,6 +110,7 @@ impl Node {
             recorder,
             trigger: CameraTrigger::default(),
             updater: Updater::default(),
+            drivers_wait: true,
             managed_at: Microseconds(0),
             reboot: None,
             last_byte_at: Microseconds(0),
@@ -194,6 +197,9 @@ impl Node {
 
     /// Runs the control tick, and trigger and telemetry when they are due.
     pub fn poll(&mut self, now: Microseconds, io: &mut impl RigIo) {
+        if core::mem::take(&mut self.drivers_wait) {
+            self.tell_drivers(io);
+        }
         let next_tick = self.controller.poll(now, io);
         self.watch_update(now);
         self.trigger.poll(now, io);
@@ -206,6 +212,10 @@ impl Node {
         self.stream_pose(now, io);
         let rest = if self.is_at_rest(now) { REST_US - TICK_US } else { 0 };
         self.wakes_at = Microseconds(next_tick.0 + rest);
+    }
+
+    fn tell_drivers(&self, io: &mut impl RigIo) {
+        io.configure_drivers(&self.settings.axes.iter().map(|axis| axis.driver).collect());
     }
 
     /// Whether ticks may be rare: nothing moves, streams, triggers, chatters or is asked.

@@ -4,6 +4,7 @@ use vergence_protocol::{AxisInfo, AxisKind, Micro, SettingItem};
 
 use crate::TICK_US;
 use crate::bounds::{self, LONGEST_BRAKING_MS};
+use crate::driver::DriverSettings;
 use crate::profile::Limits;
 
 /// Encoder counts or motor steps per metre (linear axis) or revolution (rotary axis).
@@ -111,6 +112,8 @@ pub struct AxisSettings {
     pub backlash: Micro,
     /// Settings of the search for the home switch.
     pub homing: HomingSettings,
+    /// Settings of the motor driver.
+    pub driver: DriverSettings,
 }
 
 /// Why settings cannot work.
@@ -164,6 +167,12 @@ pub enum SettingsError {
         /// Time to brake from full speed, in milliseconds.
         milliseconds: u32,
     },
+    /// The number of microsteps is no power of two up to 256.
+    #[error("axis {axis}: microsteps must be a power of two, at most 256")]
+    Microsteps {
+        /// Index of the axis, from 0.
+        axis: usize,
+    },
     /// The serial line or the pose stream is too fast or too slow.
     #[error("the serial line or the pose stream cannot have that rate")]
     Link,
@@ -193,6 +202,9 @@ impl AxisSettings {
         let steps = u128::from(fastest) * u128::from(self.steps_per_unit) * 1000;
         if steps > u128::from(LARGEST_STEP_RATE) * self.motor().milli_micro() as u128 {
             return Err(SettingsError::StepRate { axis });
+        }
+        if !(1..=256).contains(&self.driver.microsteps) || !self.driver.microsteps.is_power_of_two() {
+            return Err(SettingsError::Microsteps { axis });
         }
         bounds::check(self, axis)
     }

@@ -4,7 +4,8 @@ mod support;
 
 use support::{HOST, LEASE_MS, OTHER, TICK_US, World, linear, rotary};
 use vergence_protocol::{
-    AxisMask, ControllerState, Counts, FaultCode, Mode, MovePhase, Refusal, Request, SessionId, Status, StopKind,
+    AxisMask, ControllerState, Counts, DriverState, FaultCode, Mode, MovePhase, Refusal, Request, SessionId, Status,
+    StopKind,
 };
 
 const BOTH: AxisMask = AxisMask::first(2);
@@ -280,6 +281,47 @@ fn the_emergency_stop_is_observed_latched_and_cleared_only_when_released() {
     assert_eq!(world.pose().referenced, AxisMask(0));
     world.rig.emergency_stop = true;
     assert_eq!(world.arm(), refused(Refusal::CausePersists));
+}
+
+/// All that a motor driver can report. Each leaves the motors without power and the positions unknown.
+const DRIVER_FAULTS: [FaultCode; 6] = [
+    FaultCode::DriverSilent,
+    FaultCode::DriverGarbled,
+    FaultCode::DriverUnset,
+    FaultCode::DriverReset,
+    FaultCode::DriverOverheated,
+    FaultCode::DriverShort,
+];
+
+#[test]
+fn a_motor_driver_that_fails_cuts_all_motors_within_a_tick() {
+    for code in DRIVER_FAULTS {
+        let mut world = under_way();
+        world.rig.axes[1].driver = DriverState::Hot;
+        world.wait(10 * TICK_US);
+        assert_eq!(world.controller.state(), ControllerState::Moving, "a warning stops nothing");
+        world.rig.axes[1].driver = DriverState::Failed(code);
+        world.wait(TICK_US);
+        assert_eq!((world.fault().code, world.fault().axis), (code, Some(1)));
+        assert_eq!((world.rig.drivers, world.pose().referenced), (false, AxisMask(0)));
+        // Clearing is no use while it lasts, and arming says why.
+        assert_eq!(world.clear(), Status::Accepted);
+        assert_eq!(world.arm(), refused(Refusal::DriverNotReady { axis: 1, why: Some(code) }));
+        world.rig.axes[1].driver = DriverState::Starting;
+        assert_eq!(world.arm(), refused(Refusal::DriverNotReady { axis: 1, why: None }));
+        assert!(!world.rig.drivers);
+        world.rig.axes[1].driver = DriverState::Ready;
+        assert_eq!(world.arm(), Status::Accepted);
+    }
+}
+
+#[test]
+fn a_motor_driver_that_fails_while_disarmed_is_no_fault() {
+    let mut world = World::new([100_000.0, 0.0]);
+    world.wait(100_000);
+    world.rig.axes[0].driver = DriverState::Failed(FaultCode::DriverSilent);
+    world.wait(100_000);
+    assert_eq!((world.controller.state(), world.pose().fault), (ControllerState::Idle, None));
 }
 
 #[test]

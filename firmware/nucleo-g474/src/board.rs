@@ -8,6 +8,7 @@ use embassy_stm32::mode::Async;
 use embassy_stm32::usart::{self, RingBufferedUartRx, Uart, UartTx};
 use embassy_stm32::{Peri, Peripherals, bind_interrupts, dma, pac, peripherals, rcc};
 
+use crate::drivers::DriverWire;
 use crate::encoder::Encoder;
 use crate::rig::Rig;
 use crate::steps::{StepDma, StepPulses};
@@ -42,6 +43,8 @@ pub struct Board {
     pub led: Output<'static>,
     /// Serial line, not opened yet.
     pub line: SerialLine,
+    /// Serial line of the motor drivers.
+    pub driver_line: DriverWire,
     /// Random number generator.
     pub random: Peri<'static, peripherals::RNG>,
     /// Flash controller.
@@ -82,6 +85,7 @@ impl Board {
             watchdog: p.IWDG,
             led: Output::new(p.PA5, Level::High, Speed::Low),
             line: SerialLine { port: p.LPUART1, tx: p.PA2, rx: p.PA3, tx_dma: p.DMA1_CH2, rx_dma: p.DMA1_CH1 },
+            driver_line: DriverWire::new(p.UART4, p.PC10),
             random: p.RNG,
             flash: p.FLASH,
         }

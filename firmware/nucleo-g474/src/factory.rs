@@ -1,6 +1,6 @@
 //! Default settings: the bench, with a linear stage for the baseline and a pinion stage for the separation.
 
-use vergence_control::{AxisSettings, HomingSettings};
+use vergence_control::{AxisSettings, DriverSettings, HomingSettings};
 use vergence_protocol::{AxisKind, Micro};
 
 use crate::rig::AXES;
@@ -35,6 +35,7 @@ pub fn axes() -> [AxisSettings; AXES] {
             travel: Micro(200_000),
             repeatability: Micro(200),
         },
+        driver: DriverSettings::default(),
     };
     let separation = AxisSettings {
         kind: AxisKind::Rotary,
@@ -58,6 +59,7 @@ pub fn axes() -> [AxisSettings; AXES] {
             travel: Micro(millidegrees(160_000)),
             repeatability: Micro(millidegrees(100)),
         },
+        driver: DriverSettings::default(),
     };
     [baseline, separation]
 }

@@ -1,7 +1,7 @@
 //! The controller on a NUCLEO-G474RE: pins, timers, interrupts, link, flash and log around [`vergence_control::Node`].
 //!
 //! Three levels of urgency: the short interrupts of trigger edge, time, DMA and serial line; below them the node with its
-//! 1 kHz tick ([`control`]); below that the executor's tasks ([`link`], [`planning`], [`watchdog`]).
+//! 1 kHz tick ([`control`]); below that the executor's tasks ([`link`], [`planning`], [`drivers`], [`watchdog`]).
 //!
 //! Imports go one way: this file starts everything; [`board`] hands out the pins; [`link`] and [`control`] exchange bytes
 //! through [`exchange`] and do not know each other; [`control`] gets its plans through [`planning`].
@@ -11,6 +11,7 @@
 
 mod board;
 mod control;
+mod drivers;
 mod dying;
 mod encoder;
 mod exchange;
@@ -64,16 +65,18 @@ async fn main(spawner: Spawner) {
         dying::give_up(DeathKind::SerialLine)
     };
     control::start(node, board.rig, services, board.tick);
-    if let (Ok(receive), Ok(transmit), Ok(plan), Ok(watch)) = (
+    if let (Ok(receive), Ok(transmit), Ok(plan), Ok(watch), Ok(supervise)) = (
         link::receive(rx),
         link::transmit(tx),
         planning::plan(planning::planner()),
         watchdog::watch(watchdog, board.led),
+        drivers::supervise(board.driver_line),
     ) {
         spawner.spawn(receive);
         spawner.spawn(transmit);
         spawner.spawn(plan);
         spawner.spawn(watch);
+        spawner.spawn(supervise);
     }
 }
 

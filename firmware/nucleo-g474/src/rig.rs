@@ -2,9 +2,10 @@
 
 use embassy_stm32::gpio::{Input, Output};
 use embassy_time::Instant;
-use vergence_control::{RigIo, StepSchedule, TriggerEdge};
-use vergence_protocol::Microseconds;
+use vergence_control::{DriverSettings, RigIo, StepSchedule, TriggerEdge};
+use vergence_protocol::{AxisList, DriverState, Microseconds};
 
+use crate::drivers;
 use crate::encoder::Encoder;
 use crate::steps::StepPulses;
 use crate::trigger::Trigger;
@@ -74,6 +75,7 @@ impl RigIo for Rig {
             self.drivers_off.set_high();
         }
         self.steps.iter_mut().for_each(StepPulses::abort);
+        drivers::set_motors(on);
     }
 
     fn schedule_steps(&mut self, axis: usize, steps: &StepSchedule) {
@@ -107,6 +109,14 @@ impl RigIo for Rig {
 
     fn emergency_stop(&self) -> bool {
         self.emergency_stop.is_high()
+    }
+
+    fn configure_drivers(&mut self, settings: &AxisList<DriverSettings>) {
+        drivers::configure(settings);
+    }
+
+    fn driver(&self, axis: usize) -> DriverState {
+        drivers::state(axis)
     }
 
     fn fire_trigger(&mut self, at: Microseconds) {

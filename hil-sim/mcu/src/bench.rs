@@ -2,11 +2,13 @@
 //! their lines.
 
 use vergence_control::{RigIo, StepSchedule};
-use vergence_plant::Plant;
+use vergence_plant::{DriverReply, Plant};
 use vergence_protocol::Microseconds;
 
 use crate::pin::{Drive, Pin};
 use crate::time::Picoseconds;
+use crate::uart::{Frame, LineFault, SentByte};
+use crate::unit::UartId;
 use crate::world::{Instant, PinEdge, Terminals, World};
 
 /// A switch to ground with a pull-up on the line.
@@ -50,6 +52,8 @@ pub struct BenchWiring {
     pub emergency_stop: SwitchWiring,
     /// Camera trigger: a rising edge fires the cameras.
     pub camera_trigger: Pin,
+    /// Port of the one wire to TMC2209 drivers.
+    pub driver_line: UartId,
 }
 
 impl BenchWiring {
@@ -81,6 +85,7 @@ impl BenchWiring {
             drivers_off: Pin::at(A + 10),
             emergency_stop,
             camera_trigger: Pin::at(B + 6),
+            driver_line: UartId::UART4,
         }
     }
 
@@ -150,6 +155,9 @@ pub struct Bench {
     moving_until: Microseconds,
     pulses: Vec<u64>,
     fired: Option<Fired>,
+    /// End of the last byte from the chip to the drivers, and what a driver will answer when, at which speed.
+    spoken_at: Picoseconds,
+    reply: Option<(Picoseconds, u32, DriverReply)>,
 }
 
 impl Bench {
@@ -164,8 +172,18 @@ impl Bench {
             })
             .collect();
         let pulses = vec![0; axes.len()];
-        let (next_step, moving_until) = (Picoseconds(0), Microseconds(0));
-        Self { wiring, plant, axes, emergency_stop: None, next_step, moving_until, pulses, fired: None }
+        Self {
+            wiring,
+            plant,
+            axes,
+            emergency_stop: None,
+            next_step: Picoseconds(0),
+            moving_until: Microseconds(0),
+            pulses,
+            fired: None,
+            spoken_at: Picoseconds(0),
+            reply: None,
+        }
     }
 
     /// The simulated mechanics, which know the true positions.
@@ -290,7 +308,8 @@ impl World for Bench {
     }
 
     fn next_event(&self) -> Picoseconds {
-        self.axes.iter().filter_map(|axis| axis.lines.next).fold(self.next_step, Picoseconds::min)
+        let replies = self.reply.map_or(Picoseconds::NEVER, |(at, ..)| at);
+        self.axes.iter().filter_map(|axis| axis.lines.next).fold(self.next_step.min(replies), Picoseconds::min)
     }
 
     fn act(&mut self, now: Instant, terminals: &mut Terminals) {
@@ -299,8 +318,27 @@ impl World for Bench {
                 terminals.drive(wiring.encoder[line], Drive::level(high));
             }
         }
+        if let Some((_, baud, reply)) = self.reply.take_if(|(at, ..)| *at <= now.time) {
+            for byte in reply.bytes {
+                terminals.send(self.wiring.driver_line, Frame { byte, baud, fault: LineFault::None });
+            }
+        }
         if self.next_step <= now.time {
             self.advance_plant(microseconds(now), terminals);
+        }
+    }
+
+    fn byte_sent(&mut self, port: UartId, sent: SentByte, _terminals: &mut Terminals) {
+        if port != self.wiring.driver_line {
+            return;
+        }
+        // A datagram begins after twelve bits of rest (section 4.1.1 of the TMC2209's datasheet); a byte takes ten.
+        let bit = Picoseconds(1_000_000_000_000 / u64::from(sent.baud.max(1)));
+        let begins = sent.at.0 > self.spoken_at.0 + 22 * bit.0;
+        self.spoken_at = sent.at;
+        if let Some(reply) = self.plant.drivers_mut().hear_byte(sent.byte, begins) {
+            let at = Picoseconds(sent.at.0 + u64::from(reply.after_bits) * bit.0);
+            self.reply = Some((at, sent.baud, reply));
         }
     }
 

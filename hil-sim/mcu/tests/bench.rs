@@ -3,8 +3,9 @@
 
 mod common;
 
+use common::serial::{BIT, BRR, CR1, CR3, FIFOEN, FRAME, ISR, RDR, RE, RXNE, TDR, TE, UE};
 use common::{Bench as Poked, GPIOA, TIM1, TIM2, bench_with, pin};
-use vergence_mcu::{AxisWiring, Bench, BenchWiring, SwitchWiring};
+use vergence_mcu::{AxisWiring, Bench, BenchWiring, SwitchWiring, UartId};
 use vergence_plant::{Plant, bench_mechanics};
 
 const HOME: u32 = 4;
@@ -25,6 +26,7 @@ fn rig(position: f64) -> Poked<Bench> {
         drivers_off: pin("PA10"),
         emergency_stop: switch("PA6", true),
         camera_trigger: pin("PA7"),
+        driver_line: UartId::UART4,
     };
     let plant = Plant::new(&bench_mechanics()[..1], &[position]);
     let mut bench = bench_with(Bench::new(wiring, plant));
@@ -166,4 +168,45 @@ fn a_reset_of_the_chip_lets_the_drivers_go() {
     switch_drivers_on(&mut bench);
     bench.chip.reset(bench.now, vergence_mcu::ResetCause::Software);
     assert!(!bench.chip.world().plant().drivers_on());
+}
+
+const UART4: u32 = 0x4000_4C00;
+
+fn heard(bench: &mut Poked<Bench>) -> Vec<u8> {
+    let mut bytes = Vec::new();
+    while bench.read(UART4 + ISR) & RXNE != 0 {
+        bytes.push(bench.read(UART4 + RDR) as u8);
+    }
+    bytes
+}
+
+/// One wire (RM0440, 37.5.15): the port hears itself, then the driver, which begins eight bits later as after reset.
+#[test]
+fn a_motor_driver_answers_on_its_wire() {
+    let mut bench = rig(100_000.0);
+    bench.chip.with_world(|world, _| world.plant_mut().drivers_mut().attach(0, 8));
+    bench.connect("PC10", 5);
+    bench.write(UART4 + BRR, BIT as u32);
+    bench.write(UART4 + CR3, 1 << 3);
+    bench.write(UART4 + CR1, UE | RE | TE | FIFOEN);
+    bench.wait(2 * FRAME);
+    for _ in 0..2 {
+        let request = [0x05, 0x00, 0x06, 0x6F];
+        request.iter().for_each(|&byte| bench.write(UART4 + TDR, byte));
+        bench.wait(4 * FRAME);
+        assert_eq!(heard(&mut bench), request.map(|byte| byte as u8));
+        bench.wait(8 * BIT + FRAME - BIT);
+        assert!(heard(&mut bench).is_empty());
+        bench.wait(2 * BIT);
+        assert_eq!(heard(&mut bench), [0x05]);
+        bench.wait(7 * FRAME);
+        let reply = heard(&mut bench);
+        assert_eq!(reply[..5], [0xFF, 0x06, 0x21, 0x00, 0x00], "the version of the chip");
+    }
+    // Another driver's address, and a wrong checksum.
+    for request in [[0x05, 0x01, 0x06, 0x0B], [0x05, 0x00, 0x06, 0x6E]] {
+        request.iter().for_each(|&byte| bench.write(UART4 + TDR, byte));
+        bench.wait(20 * FRAME);
+        assert_eq!(heard(&mut bench), request.map(|byte| byte as u8));
+    }
 }

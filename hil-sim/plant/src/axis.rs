@@ -52,6 +52,8 @@ pub struct AxisPlant {
     to_lose: u32,
     /// Share of every step by which the coupling slips.
     slips: f64,
+    /// Way of a step pulse, in steps of the motor's scale; not 1 where the driver has other microsteps, or drives nothing.
+    step_size: f64,
 }
 
 impl AxisPlant {
@@ -72,6 +74,7 @@ impl AxisPlant {
             stalled: false,
             to_lose: 0,
             slips: 0.0,
+            step_size: 1.0,
         }
     }
 
@@ -134,6 +137,11 @@ impl AxisPlant {
         self.slips = share;
     }
 
+    /// Sets the way of a step pulse, in steps of the motor's scale.
+    pub fn set_step_size(&mut self, size: f64) {
+        self.step_size = size;
+    }
+
     /// Makes the encoder fail from now on, or work again.
     pub fn fail_encoder(&mut self, fault: Option<EncoderFault>) {
         self.encoder.fail(fault, self.scale_reading());
@@ -192,7 +200,8 @@ impl AxisPlant {
         while let Some((_, forward)) = self.ordered.pop_front_if(|(at, _)| *at <= to.0 * 1000) {
             let by = if forward { 1 } else { -1 };
             self.steps += by;
-            let lost = if self.stalled || self.to_lose > 0 { 1.0 } else { self.slips };
+            let turned = if self.stalled || self.to_lose > 0 { 0.0 } else { (1.0 - self.slips) * self.step_size };
+            let lost = 1.0 - turned;
             self.to_lose = self.to_lose.saturating_sub(1);
             self.motor_zero -= f64::from(by) * step * lost;
         }

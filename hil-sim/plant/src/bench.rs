@@ -3,7 +3,7 @@
 
 use std::f64::consts::PI;
 
-use vergence_control::{AxisSettings, HomingSettings};
+use vergence_control::{AxisSettings, DriverSettings, HomingSettings};
 use vergence_protocol::{AxisKind, Micro};
 
 use crate::axis::AxisMechanics;
@@ -43,6 +43,7 @@ impl Stage {
                 travel: Micro(max.0 - min.0 + 40_000),
                 repeatability: Micro(200),
             },
+            driver: DriverSettings::default(),
         };
         Self { settings, mechanics: mechanics(&settings, 8.0, [8_000.0, 6_000.0], 2_000.0) }
     }
@@ -73,6 +74,7 @@ impl Stage {
                 travel: Micro(max.0 - min.0 + degrees(30.0)),
                 repeatability: Micro(degrees(0.1)),
             },
+            driver: DriverSettings::default(),
         };
         let limit = f64::from(degrees(5.0));
         Self { settings, mechanics: mechanics(&settings, 120.0, [limit, limit], f64::from(degrees(1.0))) }

@@ -75,7 +75,6 @@ impl Encoder {
                 Reading::Noisy { amplitude: amplitude.max(0), random: Pcg64Mcg::seed_from_u64(seed), error: 0 }
             }
             Some(EncoderFault::Dead) => Reading::Dead,
-            Some(EncoderFault::Unpowered) => Reading::Unpowered(here),
         };
     }
 

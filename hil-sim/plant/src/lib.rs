@@ -6,18 +6,22 @@
 mod axis;
 mod bench;
 mod board;
+mod drivers;
 mod encoder;
 mod flash;
 mod plant;
 mod services;
 mod switch;
+mod tmc2209;
 
 pub use axis::{AxisMechanics, AxisPlant};
 pub use bench::{Stage, bench_mechanics, bench_settings};
 pub use board::NativeBoard;
+pub use drivers::Drivers;
 pub use encoder::EncoderFault;
 pub use flash::{Cut, RamFlash};
 pub use plant::Plant;
 pub use services::{Firmware, NativeServices, Verifier};
 pub use switch::SwitchNoise;
+pub use tmc2209::{DriverFaults, DriverReply, Tmc2209};
 pub use vergence_protocol::management::NATIVE_HARDWARE;

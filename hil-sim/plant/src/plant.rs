@@ -2,10 +2,12 @@
 
 use std::collections::VecDeque;
 
-use vergence_control::{RigIo, StepSchedule, TriggerEdge};
-use vergence_protocol::Microseconds;
+use vergence_control::driver::DriverLine;
+use vergence_control::{DriverSettings, RigIo, StepSchedule, TriggerEdge};
+use vergence_protocol::{AxisList, DriverState, Microseconds};
 
 use crate::axis::{AxisMechanics, AxisPlant};
+use crate::drivers::Drivers;
 
 /// All axes, the driver enable and the emergency stop.
 #[derive(Clone, Debug)]
@@ -20,6 +22,9 @@ pub struct Plant {
     trigger_at: Option<Microseconds>,
     trigger_edges: VecDeque<TriggerEdge>,
     exposed: Option<(Microseconds, Vec<f64>)>,
+    drivers: Drivers,
+    /// The native board's end of the drivers' serial line.
+    line: DriverLine,
 }
 
 impl Plant {
@@ -37,6 +42,8 @@ impl Plant {
             trigger_at: None,
             trigger_edges: VecDeque::new(),
             exposed: None,
+            drivers: Drivers::default(),
+            line: DriverLine::default(),
         }
     }
 
@@ -76,12 +83,24 @@ impl Plant {
         self.axes.get_mut(axis)
     }
 
+    /// The TMC2209 drivers of the axes; without any the drivers are plain.
+    pub fn drivers_mut(&mut self) -> &mut Drivers {
+        &mut self.drivers
+    }
+
+    /// The TMC2209 drivers of the axes.
+    #[must_use]
+    pub fn drivers(&self) -> &Drivers {
+        &self.drivers
+    }
+
     /// Restarts the clock of the board at zero and switches its outputs off; the mechanics keep their positions.
     pub fn restart_clock(&mut self) {
         self.set_drivers(false);
         self.trigger_at = None;
         self.trigger_edges.clear();
         self.exposed = None;
+        self.line = DriverLine::default();
         self.now = Microseconds(0);
     }
 
@@ -94,6 +113,7 @@ impl Plant {
     /// Presses or releases the emergency stop, which cuts the drivers in hardware.
     pub fn press_emergency_stop(&mut self, pressed: bool) {
         self.emergency_stop = pressed;
+        self.drivers.supply(!pressed);
         self.axes.iter_mut().for_each(AxisPlant::drop_order);
     }
 
@@ -111,7 +131,20 @@ impl Plant {
             self.run_to(at.max(self.now));
             self.latch();
         }
+        self.run_line(to);
         self.run_to(to);
+    }
+
+    /// Runs the native board's exchanges with the drivers, which take no time.
+    fn run_line(&mut self, to: Microseconds) {
+        while let Some(at) = self.line.wakes_at().filter(|at| *at <= to) {
+            let now = at.max(self.now);
+            self.run_to(now);
+            let Some(datagram) = self.line.poll(now) else { continue };
+            let reply = self.drivers.hear(&datagram);
+            let bytes = datagram.into_iter().chain(reply.into_iter().flat_map(|reply| reply.bytes));
+            bytes.for_each(|byte| self.line.receive(now, byte));
+        }
     }
 
     /// Makes the trigger's edge: hardware latches every encoder.
@@ -123,8 +156,11 @@ impl Plant {
 
     fn run_to(&mut self, to: Microseconds) {
         let powered = self.is_powered();
-        for axis in &mut self.axes {
+        for (index, axis) in self.axes.iter_mut().enumerate() {
+            axis.set_step_size(self.drivers.step_size(index));
+            let before = axis.steps();
             axis.advance(self.now, to, powered);
+            self.drivers.advance(index, to, axis.steps() != before);
         }
         self.now = to;
     }
@@ -137,6 +173,8 @@ impl Plant {
 impl RigIo for Plant {
     fn set_drivers(&mut self, on: bool) {
         self.drivers_on = on;
+        self.drivers.enable(on);
+        self.line.set_motors(on);
         self.axes.iter_mut().for_each(AxisPlant::drop_order);
     }
 
@@ -167,6 +205,14 @@ impl RigIo for Plant {
 
     fn emergency_stop(&self) -> bool {
         self.emergency_stop
+    }
+
+    fn configure_drivers(&mut self, drivers: &AxisList<DriverSettings>) {
+        self.line.configure(drivers.iter().copied());
+    }
+
+    fn driver(&self, axis: usize) -> DriverState {
+        self.line.state(axis)
     }
 
     fn fire_trigger(&mut self, at: Microseconds) {

@@ -47,6 +47,9 @@ fn in_words(rig: &Rig, error: SettingsError) -> String {
                 },
             )
         }
+        SettingsError::Microsteps { axis } => {
+            format!("{}.microsteps must be a power of two, at most 256", name(axis))
+        }
         SettingsError::Braking { axis, milliseconds } => {
             let most = vergence_control::LONGEST_BRAKING_MS;
             format!(

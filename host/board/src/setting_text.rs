@@ -25,6 +25,8 @@ enum Form {
     Quantity(AxisKind, u8),
     /// A whole number.
     Number,
+    /// A whole number with this unit behind it.
+    Unit(&'static str),
     /// True or false.
     Flag,
     /// A duration, in microseconds on the wire.
@@ -69,9 +71,14 @@ fn form(item: SettingItem, kind: AxisKind) -> Form {
         SettingItem::Speed | SettingItem::HomeSeekSpeed | SettingItem::HomeApproachSpeed => Form::Quantity(kind, 1),
         SettingItem::Acceleration => Form::Quantity(kind, 2),
         SettingItem::Jerk => Form::Quantity(kind, 3),
-        SettingItem::StepsPerUnit | SettingItem::CountsPerUnit | SettingItem::Baud => Form::Number,
-        SettingItem::StepsReversed | SettingItem::CountsReversed => Form::Flag,
-        SettingItem::StreamPeriod => Form::Period,
+        SettingItem::StepsPerUnit | SettingItem::CountsPerUnit | SettingItem::Baud | SettingItem::Microsteps => {
+            Form::Number
+        }
+        SettingItem::StepsReversed | SettingItem::CountsReversed | SettingItem::StealthChop => Form::Flag,
+        SettingItem::StreamPeriod | SettingItem::HoldDelay => Form::Period,
+        SettingItem::SenseResistor => Form::Unit("mOhm"),
+        SettingItem::RunCurrent | SettingItem::HoldCurrent => Form::Unit("mA"),
+        SettingItem::Driver => Form::Choice(&["plain", "tmc2209"]),
         SettingItem::Machine => Form::Choice(&["bench", "robot"]),
         _ => Form::Quantity(kind, 0),
     }
@@ -101,6 +108,7 @@ impl NamedSetting {
                 format!("{number}{unit}{per}")
             }
             Form::Number => value.to_string(),
+            Form::Unit(unit) => format!("{value}{unit}"),
             Form::Flag => (value != 0).to_string(),
             Form::Period => match u64::try_from(value) {
                 Ok(us) => humantime::format_duration(Duration::from_micros(us)).to_string(),
@@ -137,6 +145,10 @@ impl NamedSetting {
                 micro.map(|micro| micro.round() as i64).map_err(|error| fail(error.to_string()))
             }
             Form::Number => text.parse().map_err(|_| expected("921600")),
+            Form::Unit(unit) => text
+                .strip_suffix(unit)
+                .and_then(|number| number.trim().parse().ok())
+                .ok_or_else(|| expected(&self.write(800))),
             Form::Flag => text.parse::<bool>().map(i64::from).map_err(|_| expected("true or false")),
             Form::Period => humantime::parse_duration(text)
                 .ok()
@@ -155,7 +167,7 @@ impl NamedSetting {
         match self.form {
             Form::Number => value.into(),
             Form::Flag => (value != 0).into(),
-            Form::Quantity(..) | Form::Period | Form::Choice(_) => self.write(value).into(),
+            Form::Quantity(..) | Form::Unit(_) | Form::Period | Form::Choice(_) => self.write(value).into(),
         }
     }
 
@@ -216,6 +228,10 @@ mod tests {
             ("stream_period", 2_000, "2ms"),
             ("baud", 921_600, "921600"),
             ("machine", 1, "robot"),
+            ("baseline.driver", 1, "tmc2209"),
+            ("baseline.run_current", 800, "800mA"),
+            ("separation.sense_resistor", 110, "110mOhm"),
+            ("separation.hold_delay", 500_000, "500ms"),
         ] {
             assert_eq!(setting(name).write(value), text, "{name}");
         }
@@ -234,6 +250,8 @@ mod tests {
             ("stream_period", "soon", "2ms"),
             ("baud", "fast", "921600"),
             ("machine", "lathe", "bench or robot"),
+            ("baseline.run_current", "0.8A", "800mA"),
+            ("baseline.hold_current", "400", "800mA"),
         ] {
             let error = setting(name).read(text).unwrap_err();
             assert!(error.contains(word) && error.contains(name), "{error}");

@@ -32,6 +32,13 @@ fn a_reason_gives_the_bounds_in_the_settings_own_unit() {
     assert!(given("baseline.speed", "5m/s").contains("100000 steps a second"));
     assert!(given("baseline.min", "230mm").contains("baseline.min must lie below baseline.max"));
     assert!(given("baseline.speed", "0mm/s").contains("must be positive"));
+    assert_eq!(
+        given("baseline.run_current", "3000mA"),
+        "baseline.run_current must lie between 245mA and 1767mA: the driver cannot regulate another current by its \
+         sense resistors"
+    );
+    assert!(given("separation.hold_current", "900mA").contains("800mA"));
+    assert!(given("baseline.microsteps", "12").contains("baseline.microsteps must be a power of two"));
     assert!(given("baud", "300").contains("serial line"));
 }
 

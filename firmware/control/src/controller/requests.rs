@@ -1,8 +1,8 @@
 //! Requests: each is carried out or refused with a reason; values are never clamped.
 
 use vergence_protocol::{
-    AxisList, AxisMask, ControllerState, Jog, Micro, Microseconds, Mode, Move, MoveId, MovePhase, Permille, Refusal,
-    Request, SessionId, Status, StopKind,
+    AxisList, AxisMask, ControllerState, DriverState, Jog, Micro, Microseconds, Mode, Move, MoveId, MovePhase,
+    Permille, Refusal, Request, SessionId, Status, StopKind,
 };
 
 use super::{ActiveMove, Controller};
@@ -46,6 +46,11 @@ impl Controller {
         if io.emergency_stop() {
             return Err(Refusal::CausePersists);
         }
+        (0u8..).take(self.axes.len()).try_for_each(|axis| match io.driver(axis.into()) {
+            state if state.is_usable() => Ok(()),
+            DriverState::Failed(code) => Err(Refusal::DriverNotReady { axis, why: Some(code) }),
+            _ => Err(Refusal::DriverNotReady { axis, why: None }),
+        })?;
         for axis in &mut self.axes {
             axis.adopt_encoder(io);
         }

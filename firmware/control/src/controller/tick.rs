@@ -1,6 +1,6 @@
 //! The control tick: watches inputs, decides, orders steps.
 
-use vergence_protocol::{ControllerState, FaultCode, Microseconds, MovePhase};
+use vergence_protocol::{ControllerState, DriverState, FaultCode, Microseconds, MovePhase};
 
 use super::Controller;
 use crate::TICK_US;
@@ -85,6 +85,19 @@ impl Controller {
             self.cut(now, FaultCode::EmergencyStop, None, 0, io);
         } else if let Some(axis) = (0..self.axes.len()).find(|&axis| io.hard_limit(axis)) {
             self.cut(now, FaultCode::HardLimit, Some(axis), 0, io);
+        } else {
+            self.watch_drivers(now, io);
+        }
+    }
+
+    /// A driver that is not usable any more cannot hold its axis: it is cut, and with it all others.
+    fn watch_drivers(&mut self, now: Microseconds, io: &mut impl RigIo) {
+        let failed = (0..self.axes.len()).find_map(|axis| match io.driver(axis) {
+            DriverState::Failed(code) => Some((axis, code)),
+            _ => None,
+        });
+        if let Some((axis, code)) = failed {
+            self.cut(now, code, Some(axis), 0, io);
         }
     }
 

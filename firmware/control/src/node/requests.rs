@@ -35,6 +35,10 @@ impl Node {
                 Some(value) => Report::Setting { to: 0, key: *key, value },
                 None => refused(Refusal::NoSetting),
             },
+            Request::GetDriver { axis } if usize::from(*axis) < self.controller.axis_count() => {
+                Report::Driver { to: 0, axis: *axis, state: io.driver(usize::from(*axis)) }
+            }
+            Request::GetDriver { .. } => refused(Refusal::Invalid),
             Request::GetEvents { first } => Report::Events { to: 0, events: self.recorder.page(*first) },
             Request::GetStatistics => Report::Statistics { to: 0, statistics: self.session.statistics() },
             change => {
@@ -64,8 +68,8 @@ impl Node {
                 Ok(())
             }
             Request::SetTrigger(trigger) => self.trigger.set(now, *trigger, io),
-            Request::SetSetting { key, value } => self.set_setting(now, *key, *value),
-            Request::RestoreSettings => self.apply(now, self.defaults.clone()),
+            Request::SetSetting { key, value } => self.set_setting(now, *key, *value, io),
+            Request::RestoreSettings => self.apply(now, self.defaults.clone(), io),
             Request::SaveSettings => self.save_settings(now, services),
             // Checked when arming, because settings cannot change while armed.
             Request::Arm { .. } if self.settings.machine == Machine::Robot => Err(Refusal::NoSuchMachine),
@@ -80,19 +84,26 @@ impl Node {
         }
     }
 
-    fn set_setting(&mut self, now: Microseconds, key: SettingKey, value: i64) -> Result<(), Refusal> {
+    fn set_setting(
+        &mut self,
+        now: Microseconds,
+        key: SettingKey,
+        value: i64,
+        io: &mut impl RigIo,
+    ) -> Result<(), Refusal> {
         let changed = self.settings.with(key, value).map_err(|error| match error {
             SettingError::Unknown => Refusal::NoSetting,
             SettingError::Value => Refusal::BadSetting,
         })?;
-        self.apply(now, changed)
+        self.apply(now, changed, io)
     }
 
     /// Puts settings into effect.
-    fn apply(&mut self, now: Microseconds, settings: BoardSettings) -> Result<(), Refusal> {
+    fn apply(&mut self, now: Microseconds, settings: BoardSettings, io: &mut impl RigIo) -> Result<(), Refusal> {
         self.must_be_idle()?;
         self.controller.replace_settings(&settings.axes).map_err(|_| Refusal::BadSetting)?;
         self.settings = settings;
+        self.tell_drivers(io);
         self.recorder.record(now, Happening::Settings);
         Ok(())
     }

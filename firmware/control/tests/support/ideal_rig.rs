@@ -4,7 +4,7 @@ use std::collections::VecDeque;
 use std::f64::consts::TAU;
 
 use vergence_control::{AxisSettings, RigIo, Scale, StepSchedule};
-use vergence_protocol::{AxisKind, Microseconds};
+use vergence_protocol::{AxisKind, DriverState, Microseconds};
 
 /// How a home switch behaves.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -35,6 +35,8 @@ pub struct IdealAxis {
     pub load: f64,
     pub switch: HomeSwitch,
     pub hard_limit: bool,
+    /// What the motor driver says of itself.
+    pub driver: DriverState,
     /// The load stands still whatever the motor does; let go, it springs to the motor.
     pub blocked: bool,
     /// The encoder reads wrong by this much.
@@ -61,6 +63,7 @@ impl IdealAxis {
             load,
             switch: HomeSwitch::Good,
             hard_limit: false,
+            driver: DriverState::Plain,
             blocked: false,
             misread: 0.0,
             grip: 1.0,
@@ -189,6 +192,10 @@ impl RigIo for IdealRig {
 
     fn hard_limit(&self, axis: usize) -> bool {
         self.axes[axis].hard_limit
+    }
+
+    fn driver(&self, axis: usize) -> DriverState {
+        self.axes[axis].driver
     }
 
     fn emergency_stop(&self) -> bool {

@@ -5,7 +5,7 @@
 mod ideal_rig;
 mod watch;
 
-use vergence_control::{AxisSettings, Controller, HomingSettings, RigIo};
+use vergence_control::{AxisSettings, Controller, DriverSettings, HomingSettings, RigIo};
 use vergence_protocol::{
     AxisKind, AxisMask, ControllerState, FaultRecord, Jog, Micro, Microseconds, Mode, Move, MoveId, Permille,
     PoseReport, Request, SessionId, Status,
@@ -44,6 +44,7 @@ pub fn linear() -> AxisSettings {
             travel: Micro(200_000),
             repeatability: Micro(300),
         },
+        driver: DriverSettings::default(),
     }
 }
 
@@ -71,6 +72,7 @@ pub fn rotary() -> AxisSettings {
             travel: Micro(2_792_527),
             repeatability: Micro(3_000),
         },
+        driver: DriverSettings::default(),
     }
 }
 

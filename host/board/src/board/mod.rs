@@ -241,7 +241,12 @@ impl Board {
         };
         let more = match (refusal, self.pose.fault) {
             (Refusal::Latched, Some(fault)) => format!(" ({})", describe_fault(&self.rig, &fault)),
-            (Refusal::NotReferenced { axis } | Refusal::OutsideLimits { axis }, _) => {
+            (
+                Refusal::NotReferenced { axis }
+                | Refusal::OutsideLimits { axis }
+                | Refusal::DriverNotReady { axis, .. },
+                _,
+            ) => {
                 let known = self.rig.axes.get(usize::from(axis));
                 known.map(|known| format!(" (axis {axis} is {})", known.name)).unwrap_or_default()
             }

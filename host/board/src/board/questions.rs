@@ -4,7 +4,7 @@ use std::time::Duration;
 
 use tokio::time::timeout;
 use vergence_protocol::{
-    Micro, RecordedEvent, Refusal, Report, Request, SettingItem, SettingKey, Status, Trigger, TriggerMark,
+    DriverState, Micro, RecordedEvent, Refusal, Report, Request, SettingItem, SettingKey, Status, Trigger, TriggerMark,
 };
 
 use super::Board;
@@ -56,6 +56,32 @@ impl Board {
     /// [`BoardError`] where the link ended.
     pub async fn set(&self, key: SettingKey, value: i64) -> Result<Result<(), Refusal>, BoardError> {
         self.request(Request::SetSetting { key, value }).await
+    }
+
+    /// State of the motor driver of an axis; `None` where the board has no such axis or its firmware cannot tell.
+    ///
+    /// # Errors
+    /// [`BoardError`]: a refusal, or a link that ended.
+    pub async fn driver(&self, axis: u8) -> Result<Option<DriverState>, BoardError> {
+        match self.client.ask(Request::GetDriver { axis }).await? {
+            Report::Driver { state, .. } => Ok(Some(state)),
+            Report::Ack { status: Status::Refused(Refusal::Invalid), .. } => Ok(None),
+            Report::Ack { status: Status::Refused(refusal), .. } => Err(self.refused(refusal)),
+            _ => Err(BoardError::OtherAnswer("a question about a motor driver")),
+        }
+    }
+
+    /// The motor drivers that the board can tell of, with the names of their axes.
+    ///
+    /// # Errors
+    /// [`BoardError`]: a refusal, or a link that ended.
+    pub async fn drivers(&self) -> Result<Vec<(String, DriverState)>, BoardError> {
+        let mut drivers = Vec::new();
+        for (axis, known) in (0u8..).zip(&self.rig.axes) {
+            let state = self.driver(axis).await?;
+            drivers.extend(state.filter(|state| *state != DriverState::Plain).map(|state| (known.name.clone(), state)));
+        }
+        Ok(drivers)
     }
 
     /// All events in the flight recorder.

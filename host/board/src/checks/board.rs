@@ -2,7 +2,7 @@
 
 use std::time::Duration;
 
-use vergence_protocol::{Compatibility, ControllerState, ResetCause, SettingItem, SettingKey};
+use vergence_protocol::{Compatibility, ControllerState, DriverState, ResetCause, SettingItem, SettingKey};
 use vergence_rig::AxisPosition;
 
 use super::Finding;
@@ -38,7 +38,28 @@ pub async fn check_board(board: &mut Board, checks: BoardChecks) -> Vec<Finding>
     findings.extend([clock(board), state(board), reference(board)]);
     findings.extend(limits(board));
     findings.push(settings(board, checks.line_baud).await);
+    findings.extend(drivers(board).await);
     findings
+}
+
+/// Checks the motor drivers that tell how they are.
+async fn drivers(board: &Board) -> Vec<Finding> {
+    // Where the link fails, other checks say so.
+    let drivers = board.drivers().await.unwrap_or_default();
+    let judged = drivers.into_iter().map(|(axis, state)| {
+        let reason = format!("the motor driver of {axis} is {state}");
+        match state {
+            DriverState::Failed(code) => {
+                Finding::fail("drivers", format!("the motor driver of {axis} cannot be used: {code}"), code.remedy())
+            }
+            DriverState::Hot => {
+                Finding::warn("drivers", reason, "lower its 'run_current' or 'hold_current', or cool it")
+            }
+            DriverState::Starting => Finding::warn("drivers", reason, "try again in a second"),
+            _ => Finding::pass("drivers", reason),
+        }
+    });
+    judged.collect()
 }
 
 fn versions(board: &Board) -> Finding {

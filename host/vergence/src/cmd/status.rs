@@ -29,6 +29,7 @@ pub async fn run(args: &Args, common: &CommonOptions, console: Console) -> Resul
     let mut board = connect(common, console, "status").await?;
     board.compare_clocks().await?;
     let story = if args.why { Some(Story::read(&board).await?) } else { None };
+    let drivers = board.drivers().await?;
     let info = board.info();
     let [major, minor, patch] = info.firmware;
     if console.is_json() {
@@ -38,6 +39,9 @@ pub async fn run(args: &Args, common: &CommonOptions, console: Console) -> Resul
         status["build"] = json!(format!("{:016x}", info.build));
         status["reset"] = json!(format!("{:?}", info.reset));
         status["clock"] = clock_json(&board);
+        if !drivers.is_empty() {
+            status["drivers"] = drivers.iter().map(|(axis, state)| (axis.clone(), json!(state.to_string()))).collect();
+        }
         if let Some(story) = &story {
             status["why"] = story.json(board.rig());
         }
@@ -46,6 +50,9 @@ pub async fn run(args: &Args, common: &CommonOptions, console: Console) -> Resul
     console.say(format!("{} firmware {major}.{minor}.{patch}, rig '{}'", info.board, board.rig().name))?;
     console.say(describe_clock(&board))?;
     console.say_pose(board.rig(), board.pose())?;
+    for (axis, state) in drivers {
+        console.say(format!("motor driver of {axis}: {state}"))?;
+    }
     match story {
         Some(story) => story.print(board.rig(), console),
         None => Ok(()),

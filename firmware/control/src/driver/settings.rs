@@ -1,0 +1,90 @@
+//! Settings of the motor driver of one axis.
+
+/// Kind of a motor driver.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum DriverKind {
+    /// Step and direction inputs only; its current is set on its own board.
+    #[default]
+    Plain,
+    /// A TMC2209 with its serial line; its address is the number of the axis.
+    Tmc2209,
+}
+
+/// Settings of a motor driver. A plain driver uses none of them but its kind.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct DriverSettings {
+    /// Kind of the driver.
+    pub kind: DriverKind,
+    /// Resistors that measure the current, in milliohms.
+    pub sense_mohm: u32,
+    /// Current of the motor in motion: effective value, in milliamperes.
+    pub run_ma: u32,
+    /// Current of the motor at rest: effective value, in milliamperes.
+    pub hold_ma: u32,
+    /// Time at rest until the current falls, in microseconds.
+    pub hold_delay_us: u32,
+    /// Microsteps that the driver makes of a full step, a power of two; the scale of the motor counts these.
+    pub microsteps: u32,
+    /// Whether the driver regulates the voltage (quiet) instead of the current (more torque at speed).
+    pub stealth_chop: bool,
+}
+
+impl Default for DriverSettings {
+    /// A plain driver. The other values suit the usual driver modules and a small motor.
+    fn default() -> Self {
+        Self {
+            kind: DriverKind::Plain,
+            sense_mohm: 110,
+            run_ma: 800,
+            hold_ma: 400,
+            hold_delay_us: 500_000,
+            microsteps: 8,
+            stealth_chop: true,
+        }
+    }
+}
+
+/// Range of the sense voltage (section 9 of the datasheet).
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Range {
+    /// Whether it is the lower one, with the finer steps of current.
+    pub is_low: bool,
+    /// Largest sense voltage in millivolts.
+    millivolts: f32,
+}
+
+const LOW: Range = Range { is_low: true, millivolts: 180.0 };
+const HIGH: Range = Range { is_low: false, millivolts: 325.0 };
+/// What the chip adds to the sense resistor, in milliohms.
+const INNER_MOHM: f32 = 20.0;
+/// Largest effective current that the chip stands, in milliamperes.
+const CHIP_MA: u32 = 2_000;
+
+impl Range {
+    /// Effective current at the end of the range, in milliamperes.
+    fn full_ma(self, sense_mohm: u32) -> f32 {
+        self.millivolts * 1e3 / (sense_mohm as f32 + INNER_MOHM) / core::f32::consts::SQRT_2
+    }
+
+    /// The current scale nearest to an effective current: n stands for n + 1 of 32 parts of the range.
+    fn scale(self, sense_mohm: u32, current_ma: u32) -> u32 {
+        let parts = current_ma as f32 * 32.0 / self.full_ma(sense_mohm);
+        ((parts + 0.5) as u32).clamp(1, 32) - 1
+    }
+}
+
+impl DriverSettings {
+    /// Smallest and largest run current that the sense resistors allow, in milliamperes: a quarter of the lower range, below
+    /// which microsteps become coarse, and the whole higher range or what the chip stands.
+    pub(crate) fn currents(&self) -> [u32; 2] {
+        let [low, high] = [LOW, HIGH].map(|range| range.full_ma(self.sense_mohm) as u32);
+        [low / 4 + 1, high.min(CHIP_MA)]
+    }
+
+    /// The range, and the current scales of motion and rest in it.
+    pub(super) fn current_scale(&self) -> (Range, u32, u32) {
+        let range = if self.run_ma as f32 <= LOW.full_ma(self.sense_mohm) { LOW } else { HIGH };
+        let scale = |current| range.scale(self.sense_mohm, current);
+        (range, scale(self.run_ma), scale(self.hold_ma))
+    }
+}
