@@ -58,6 +58,13 @@ pub enum Refusal {
     StorageFailed,
     /// The board is set to drive a machine that its firmware cannot drive.
     NoSuchMachine,
+    /// No host was heard yet at the new speed of the serial line, so that it cannot be saved.
+    LineOnTrial,
+    /// An axis is at its hard limit: only a short jog away from it is allowed.
+    AtHardLimit {
+        /// Index of the axis, from 0.
+        axis: u8,
+    },
 }
 
 impl fmt::Display for Refusal {
@@ -82,6 +89,10 @@ impl fmt::Display for Refusal {
             Self::NoSuchMachine => f.write_str(
                 "the board is set to drive the robot, which its firmware cannot yet: run 'vergence config set machine bench'",
             ),
+            Self::LineOnTrial => f.write_str("the new speed of the line is on trial: open the link at it first"),
+            Self::AtHardLimit { axis } => {
+                write!(f, "axis {axis} is at its hard limit: only a short 'vergence move --by' away from it is allowed")
+            }
         }
     }
 }

@@ -90,6 +90,13 @@ pub enum Report {
     },
     /// The camera trigger fired.
     TriggerMark(TriggerMark),
+    /// Answers `Request::GetKey`.
+    Key {
+        /// Sequence number of the request.
+        to: u8,
+        /// Public key whose signatures the board trusts (Ed25519, RFC 8032).
+        key: [u8; 32],
+    },
 }
 
 /// One pulse of the camera trigger.
@@ -136,7 +143,8 @@ impl Report {
             | Self::Axis { to, .. }
             | Self::Setting { to, .. }
             | Self::Events { to, .. }
-            | Self::Statistics { to, .. } => Some(*to),
+            | Self::Statistics { to, .. }
+            | Self::Key { to, .. } => Some(*to),
             _ => None,
         }
     }
@@ -148,7 +156,8 @@ impl Report {
             | Self::Axis { to, .. }
             | Self::Setting { to, .. }
             | Self::Events { to, .. }
-            | Self::Statistics { to, .. } => Some(to),
+            | Self::Statistics { to, .. }
+            | Self::Key { to, .. } => Some(to),
             _ => None,
         }
     }

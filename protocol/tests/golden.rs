@@ -96,6 +96,6 @@ fn the_checksum_is_castagnoli() {
 
 /// A change here is a change of the messages: raise `PROTOCOL` and check that the old enum variants kept their places.
 #[test]
-fn the_messages_are_those_of_protocol_1_3() {
-    assert_eq!(schema_hash(), 0xa1f6_70f3_ad23_643e, "{:#x}", schema_hash());
+fn the_messages_are_those_of_protocol_1_4() {
+    assert_eq!(schema_hash(), 0x45b1_9ae1_fbe3_34e1, "{:#x}", schema_hash());
 }

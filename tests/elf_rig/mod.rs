@@ -10,5 +10,7 @@ mod log;
 mod program;
 
 pub use board::{Board, ElfBoard, Standing, programs};
+pub use build::build_trusting;
 pub use conversation::{BOTH, Conversation, LEASE_MS, Wired};
 pub use log::decode;
+pub use program::{DEVELOPMENT_SECRET, sealed_by};

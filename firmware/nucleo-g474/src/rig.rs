@@ -26,6 +26,8 @@ pub struct Rig {
     /// Enable line of the drivers: low switches them on. The pull-up on the drivers' side keeps them off while the chip
     /// starts.
     pub drivers_off: Output<'static>,
+    /// Asks the drivers for their holding current: high.
+    pub holding: Output<'static>,
     /// Camera trigger.
     pub trigger: Trigger,
 }
@@ -50,6 +52,10 @@ impl RigIo for Rig {
             self.drivers_off.set_high();
         }
         self.steps.iter_mut().for_each(StepPulses::abort);
+    }
+
+    fn set_holding(&mut self, holding: bool) {
+        self.holding.set_level(holding.into());
     }
 
     fn schedule_steps(&mut self, axis: usize, steps: &StepSchedule) {

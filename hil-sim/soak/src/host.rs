@@ -354,7 +354,9 @@ impl Host {
             }
             (Purpose::Turn(id), Status::Accepted) => (self.going, self.turned) = (Some(id), true),
             (Purpose::Jog(id), Status::Accepted) => self.going = Some(id),
-            (Purpose::Jog(_), Status::Refused(Refusal::OutsideLimits { .. })) => self.next_step(),
+            (Purpose::Jog(_), Status::Refused(Refusal::OutsideLimits { .. } | Refusal::AtHardLimit { .. })) => {
+                self.next_step();
+            }
             (Purpose::Forbidden, Status::Accepted) => self.finish(HostEnd::ForbiddenAccepted),
             (Purpose::Forbidden, Status::Refused(_)) => self.next_step(),
             (Purpose::Clear, Status::Accepted) => {

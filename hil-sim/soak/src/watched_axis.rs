@@ -57,7 +57,9 @@ impl WatchedAxis {
     pub fn check_hard_limit(&self) -> Option<String> {
         let [low, high] = self.stage.mechanics.hard_limits;
         let beyond = (low - self.load).max(self.load - high);
-        (beyond > self.overshoot()).then(|| format!("{beyond:.1} beyond its hard limit, at {:.1}", self.load))
+        // One wrong reading is no limit, so that a second tick may pass.
+        let allowed = self.overshoot() + f64::from(self.stage.settings.speed) * TICK_S;
+        (beyond > allowed).then(|| format!("{beyond:.1} beyond its hard limit, at {:.1}", self.load))
     }
 
     /// The speed limit: homing speed without a reference, because obstacles are unknown then.

@@ -60,6 +60,7 @@ fn name(item: SettingItem, kind: Option<AxisKind>) -> &'static str {
         (SettingItem::CountsPerUnit, Some(AxisKind::Linear)) => "counts_per_metre",
         (SettingItem::CountsPerUnit, Some(AxisKind::Rotary)) => "counts_per_revolution",
         (SettingItem::StreamPeriod, _) => "stream_period",
+        (SettingItem::HoldAfter, _) => "hold_after",
         _ => item.name(),
     }
 }
@@ -71,7 +72,7 @@ fn form(item: SettingItem, kind: AxisKind) -> Form {
         SettingItem::Jerk => Form::Quantity(kind, 3),
         SettingItem::StepsPerUnit | SettingItem::CountsPerUnit | SettingItem::Baud => Form::Number,
         SettingItem::StepsReversed | SettingItem::CountsReversed => Form::Flag,
-        SettingItem::StreamPeriod => Form::Period,
+        SettingItem::StreamPeriod | SettingItem::HoldAfter => Form::Period,
         SettingItem::Machine => Form::Choice(&["bench", "robot"]),
         _ => Form::Quantity(kind, 0),
     }
@@ -216,6 +217,7 @@ mod tests {
             ("stream_period", 2_000, "2ms"),
             ("baud", 921_600, "921600"),
             ("machine", 1, "robot"),
+            ("hold_after", 5_000_000, "5s"),
         ] {
             assert_eq!(setting(name).write(value), text, "{name}");
         }

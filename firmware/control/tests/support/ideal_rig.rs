@@ -35,6 +35,8 @@ pub struct IdealAxis {
     pub load: f64,
     pub switch: HomeSwitch,
     pub hard_limit: bool,
+    /// Positions at and beyond which the hard limit is reached.
+    pub hard_limits: [f64; 2],
     /// The load stands still whatever the motor does; let go, it springs to the motor.
     pub blocked: bool,
     /// The encoder reads wrong by this much.
@@ -61,6 +63,7 @@ impl IdealAxis {
             load,
             switch: HomeSwitch::Good,
             hard_limit: false,
+            hard_limits: [f64::NEG_INFINITY, f64::INFINITY],
             blocked: false,
             misread: 0.0,
             grip: 1.0,
@@ -188,7 +191,8 @@ impl RigIo for IdealRig {
     }
 
     fn hard_limit(&self, axis: usize) -> bool {
-        self.axes[axis].hard_limit
+        let IdealAxis { hard_limit, hard_limits: [low, high], load, .. } = self.axes[axis];
+        hard_limit || load <= low || load >= high
     }
 
     fn emergency_stop(&self) -> bool {
