@@ -48,7 +48,7 @@ pub enum SettingItem {
     /// Of the board: period of the pose stream when a session opens, in microseconds; 0 for no stream.
     StreamPeriod,
     /// Speed of the board's serial line in baud. It changes once the answer has left, and returns to the one before unless
-    /// the board receives a frame at the new one within five seconds; only then can it be saved.
+    /// a session is heard at the new one within five seconds; only then can it be saved.
     Baud,
     /// Of the board: what it drives, 0 for the stages of the bench, 1 for the joints of the robot.
     Machine,

@@ -1,10 +1,10 @@
-//! The speed of the serial line. A new one is on trial until a host is heard at it; without one the board returns to the
-//! speed before. A board that hears nobody looks for a host: it listens at the speed that is set and at that of the
+//! The speed of the serial line. A new one is on trial until a host with an open session is heard at it, which has heard the
+//! board as well; without one the board returns to the speed before. A board that hears nobody looks for a host: it listens at the speed that is set and at that of the
 //! factory in turn.
 
 use vergence_protocol::Microseconds;
 
-/// Longest time in microseconds that a new speed stays without a host being heard: opening a port and a session takes a
+/// Longest time in microseconds that a new speed stays without a request of a session: opening a port and a session takes a
 /// host two seconds at most.
 const TRIAL_US: u64 = 5_000_000;
 /// Silence of the host in microseconds after which the board looks for it. An open session asks for the time each second.
@@ -54,7 +54,7 @@ impl LineSpeed {
         self.next.is_some()
     }
 
-    /// Whether no host was heard at the new speed yet.
+    /// Whether no session was heard at the new speed yet.
     pub fn is_on_trial(&self) -> bool {
         self.trial.is_some()
     }
@@ -70,10 +70,21 @@ impl LineSpeed {
 
     /// Takes note of a whole frame of a host.
     pub fn hear(&mut self, now: Microseconds) {
-        if self.next.is_none() && now.0 >= self.changed_at.0 + LATE_US {
+        if self.is_of_present(now) {
             self.heard_at = Some(now);
+        }
+    }
+
+    /// Takes note of a request of an open session: host and board hear each other.
+    pub fn converse(&mut self, now: Microseconds) {
+        if self.is_of_present(now) {
             self.trial = None;
         }
+    }
+
+    /// Whether what arrives now was sent at the present speed.
+    fn is_of_present(&self, now: Microseconds) -> bool {
+        self.next.is_none() && now.0 >= self.changed_at.0 + LATE_US
     }
 
     /// Takes note that all frames have left: a speed that waits comes into effect.

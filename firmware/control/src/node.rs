@@ -171,6 +171,7 @@ impl Node {
                     let _ = self.trigger.set(now, Trigger::Off, io);
                 }
                 Some(BoardEvent::Request { reply_to, request, received_at }) => {
+                    self.line.converse(now);
                     let reply = self.serve(now, &request, received_at, io, services);
                     self.observe(now, io);
                     if let Some(reply) = reply {

@@ -19,6 +19,8 @@ struct Line {
     services: NativeServices,
     host: HostSession,
     host_baud: u32,
+    /// Whether nothing of the board reaches the host.
+    is_deaf: bool,
     now: u64,
     answers: Vec<Report>,
 }
@@ -41,7 +43,7 @@ impl Line {
         let node = Node::new(&defaults, identity, 1, &mut services).unwrap();
         let plant = Plant::new(&bench_mechanics(), &[100_000.0, 500_000.0]);
         let (host, answers) = (HostSession::new(SessionId(1)), Vec::new());
-        Self { node, plant, services, host, host_baud: baud, now: 0, answers }
+        Self { node, plant, services, host, host_baud: baud, is_deaf: false, now: 0, answers }
     }
 
     fn open() -> Self {
@@ -76,7 +78,7 @@ impl Line {
         }
         let baud = self.node.baud();
         while let Some(length) = self.node.transmit(now, &mut frame) {
-            if baud == self.host_baud {
+            if baud == self.host_baud && !self.is_deaf {
                 self.host.receive(now, &frame[..length], |event| {
                     if let HostEvent::Reply { report, .. } = event {
                         self.answers.push(report);
@@ -146,6 +148,18 @@ fn a_frame_at_the_new_speed_settles_it() {
         line.ask(Request::GetSetting(BAUD));
     }
     assert_eq!((line.node.baud(), line.node.settings().baud), (FAST, FAST));
+}
+
+/// One direction of the line does not prove the other.
+#[test]
+fn a_host_that_does_not_hear_the_board_settles_nothing() {
+    let mut line = Line::open();
+    line.set(FAST);
+    (line.host_baud, line.is_deaf) = (FAST, true);
+    line.host = HostSession::new(SessionId(2));
+    line.host.hello();
+    line.run(4_800_000);
+    assert_eq!((line.node.baud(), line.node.settings().baud), (FACTORY, FACTORY));
 }
 
 #[test]

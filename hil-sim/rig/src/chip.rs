@@ -125,8 +125,8 @@ impl SimulatedChip {
     /// Begins to send bytes to the board: at the speed of the host, or at the board's own where the host has none.
     pub fn send(&mut self, bytes: &[u8]) {
         let baud = self.host_baud.unwrap_or(self.baud);
-        let fault = if baud > self.fastest_baud { LineFault::Framing } else { LineFault::None };
-        let frame = |&byte| Frame { byte, baud, fault };
+        let garble = if baud > self.fastest_baud { 0x5A } else { 0 };
+        let frame = |&byte: &u8| Frame { byte: byte ^ garble, baud, fault: LineFault::None };
         let frames: Vec<Frame> = bytes.iter().map(frame).collect();
         self.machine.chip_mut().send(LINK, &frames);
     }
