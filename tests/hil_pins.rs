@@ -37,7 +37,7 @@ fn pins_are_set_as_the_wiring_table_says() {
     }
     let count = |wanted: fn(&Use) -> bool| checked.iter().filter(|one| wanted(one)).count();
     assert_eq!(count(|one| matches!(one, Use::Alternate(_))), 10, "link, steps, encoders, trigger, drivers' line");
-    assert_eq!(count(|&one| one == Use::Output), 4, "both directions, drivers off, LED");
+    assert_eq!(count(|&one| one == Use::Output), 5, "both directions, drivers off, holding current, LED");
     assert_eq!(count(|&one| one == Use::Input), 5, "home switches, hard limits, emergency stop");
 }
 
@@ -162,11 +162,12 @@ fn a_broken_limit_wire_counts_as_the_limit_reached() {
         talk.wait_for(ControllerState::Fault);
         assert_eq!((talk.fault().code, talk.fault().axis), (FaultCode::HardLimit, Some(axis)));
         assert!(!talk.board.plant().drivers_on());
-        assert_eq!(talk.clear(), Status::Refused(Refusal::CausePersists));
+        assert_eq!(talk.clear(), Status::Accepted);
+        assert_eq!(talk.arm(), Status::Accepted);
+        assert_eq!(talk.ask(Request::Home { axes: BOTH }), Status::Refused(Refusal::AtHardLimit { axis }));
         talk.board.machine.chip_mut().drive(wire, Drive::Low);
         talk.wait(20_000);
-        assert_eq!(talk.clear(), Status::Accepted);
-        assert_eq!(talk.ask(Request::Home { axes: BOTH }), Status::Refused(Refusal::NotArmed));
+        assert_eq!(talk.ask(Request::Home { axes: BOTH }), Status::Accepted);
     }
     let text = FaultCode::HardLimit.to_string();
     assert!(text.contains("opened") && text.contains("wire is broken"), "{text}");

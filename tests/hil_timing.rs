@@ -170,7 +170,7 @@ fn stopping(mut machine: Machine<Bench>) -> (u64, u64) {
 }
 
 #[test]
-fn a_limit_switch_stops_the_steps_within_a_tick_and_the_time_of_one() {
+fn a_limit_switch_stops_the_steps_within_two_ticks_and_the_time_of_one() {
     let talk = at_full_speed();
     let mut machine = talk.board.machine;
     let mut times = Vec::new();
@@ -182,6 +182,6 @@ fn a_limit_switch_stops_the_steps_within_a_tick_and_the_time_of_one() {
     let spread = |times: &[u64]| (times.iter().min().copied().unwrap_or(0), times.iter().max().copied().unwrap_or(0));
     println!("from the limit switch to the last step, at {PHASES} places of a tick: {:?} us", spread(&steps));
     println!("and to the drivers' enable: {:?} us", spread(&drivers));
-    // The tick samples the switch: a whole one may pass first, and then it must run that far.
-    assert!(spread(&steps).1 < 1_500 && spread(&drivers).1 < 1_500);
+    // Two ticks sample the switch: a whole one may pass first, and the second must run that far.
+    assert!(spread(&steps).1 < 2_500 && spread(&drivers).1 < 2_500);
 }

@@ -28,7 +28,7 @@ pub enum FaultCode {
     HardLimit,
     /// The emergency stop is pressed.
     EmergencyStop,
-    /// The settings contradict themselves.
+    /// The saved settings are not in effect: this firmware refuses them, or the board was started without them.
     BadSettings,
     /// The motor made steps but the encoder hardly moved.
     Stall,
@@ -74,10 +74,12 @@ impl FaultCode {
             Self::HomeSwitchStuck => "free or replace the home switch, then 'vergence clear' and 'vergence home'",
             Self::HomeNotRepeatable => "tighten the home switch, then 'vergence clear' and 'vergence home'",
             Self::HardLimit => {
-                "move the stage off the limit by hand and check the switch's wire, then 'vergence clear' and 'vergence home'"
+                "check the switch's wire; 'vergence clear', then 'vergence move --by' a short way off the limit, and 'vergence home'"
             }
             Self::EmergencyStop => "release the emergency stop, then 'vergence clear' and 'vergence home'",
-            Self::BadSettings => "restore the board's settings",
+            Self::BadSettings => {
+                "'vergence clear', set what your rig needs, then 'vergence config save'; or 'vergence config reload'"
+            }
             Self::Stall => {
                 "look for an obstacle, or lower speed and acceleration, then 'vergence clear' and 'vergence home'"
             }
@@ -123,7 +125,7 @@ impl fmt::Display for FaultCode {
                 "a hard limit switch opened: the stage is beyond its range or the switch's wire is broken"
             }
             Self::EmergencyStop => "the emergency stop is pressed",
-            Self::BadSettings => "the board's settings contradict themselves",
+            Self::BadSettings => "the saved settings are not in effect: the board runs with those of the factory",
             Self::Stall => "the motor was driven but the stage hardly moved",
             Self::Slip => "the stage moved less far or further than its motor",
             Self::WrongDirection => "the encoder counts against the motor",

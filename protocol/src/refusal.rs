@@ -67,6 +67,13 @@ pub enum Refusal {
         /// Why; `None` while the driver gets its settings.
         why: Option<FaultCode>,
     },
+    /// No host was heard yet at the new speed of the serial line, so that it cannot be saved.
+    LineOnTrial,
+    /// An axis is at its hard limit: only a short jog away from it is allowed.
+    AtHardLimit {
+        /// Index of the axis, from 0.
+        axis: u8,
+    },
 }
 
 impl fmt::Display for Refusal {
@@ -96,6 +103,10 @@ impl fmt::Display for Refusal {
             }
             Self::DriverNotReady { axis, why: None } => {
                 write!(f, "the motor driver of axis {axis} is getting its settings: try again in a second")
+            }
+            Self::LineOnTrial => f.write_str("the new speed of the line is on trial: open the link at it first"),
+            Self::AtHardLimit { axis } => {
+                write!(f, "axis {axis} is at its hard limit: only a short 'vergence move --by' away from it is allowed")
             }
         }
     }

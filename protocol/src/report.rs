@@ -99,6 +99,13 @@ pub enum Report {
         /// State of its motor driver.
         state: DriverState,
     },
+    /// Answers `Request::GetKey`.
+    Key {
+        /// Sequence number of the request.
+        to: u8,
+        /// Public key whose signatures the board trusts (Ed25519, RFC 8032).
+        key: [u8; 32],
+    },
 }
 
 /// One pulse of the camera trigger.
@@ -146,7 +153,8 @@ impl Report {
             | Self::Setting { to, .. }
             | Self::Events { to, .. }
             | Self::Statistics { to, .. }
-            | Self::Driver { to, .. } => Some(*to),
+            | Self::Driver { to, .. }
+            | Self::Key { to, .. } => Some(*to),
             _ => None,
         }
     }
@@ -159,7 +167,8 @@ impl Report {
             | Self::Setting { to, .. }
             | Self::Events { to, .. }
             | Self::Statistics { to, .. }
-            | Self::Driver { to, .. } => Some(to),
+            | Self::Driver { to, .. }
+            | Self::Key { to, .. } => Some(to),
             _ => None,
         }
     }

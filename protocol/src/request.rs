@@ -69,7 +69,9 @@ pub enum Request {
         period_us: u32,
     },
     /// Moves by a distance, for setting up by hand. Without reference the speed is that of the search for the home switch,
-    /// and the distance is at most that of the search.
+    /// and the distance is at most that of the search. At a hard limit whose fault was cleared it is the only motion: away
+    /// from the limit and at most `home_retract` beyond the place where it was met, or half as far in either direction where
+    /// the axis was at rest then.
     Jog(Jog),
     /// Asks for a setting. Answered by `Report::Setting`.
     GetSetting(SettingKey),
@@ -98,6 +100,8 @@ pub enum Request {
         /// Index of the axis, from 0.
         axis: u8,
     },
+    /// Asks whose firmware images the board takes. Answered by `Report::Key`.
+    GetKey,
 }
 
 /// A relative move of all axes together.

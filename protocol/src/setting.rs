@@ -47,7 +47,8 @@ pub enum SettingItem {
     HomeRepeatability,
     /// Of the board: period of the pose stream when a session opens, in microseconds; 0 for no stream.
     StreamPeriod,
-    /// Speed of the board's serial line from the next start on, in baud.
+    /// Speed of the board's serial line in baud. It changes once the answer has left, and returns to the one before unless
+    /// a session is heard at the new one within five seconds; only then can it be saved.
     Baud,
     /// Of the board: what it drives, 0 for the stages of the bench, 1 for the joints of the robot.
     Machine,
@@ -65,11 +66,13 @@ pub enum SettingItem {
     Microsteps,
     /// 1 if the driver regulates the voltage (quiet), 0 if it regulates the current.
     StealthChop,
+    /// Of the board: time in microseconds at rest after which the motors get their holding current; 0 for never.
+    HoldAfter,
 }
 
 impl SettingItem {
     /// Every item, in wire order.
-    pub const ALL: [Self; 28] = [
+    pub const ALL: [Self; 29] = [
         Self::Min,
         Self::Max,
         Self::Speed,
@@ -98,12 +101,13 @@ impl SettingItem {
         Self::HoldDelay,
         Self::Microsteps,
         Self::StealthChop,
+        Self::HoldAfter,
     ];
 
     /// Whether each axis has a setting of this kind; else the board has one.
     #[must_use]
     pub const fn is_of_axis(self) -> bool {
-        !matches!(self, Self::StreamPeriod | Self::Baud | Self::Machine)
+        !matches!(self, Self::StreamPeriod | Self::Baud | Self::Machine | Self::HoldAfter)
     }
 
     /// The name that people type and files hold.
@@ -138,6 +142,7 @@ impl SettingItem {
             Self::HoldDelay => "hold_delay",
             Self::Microsteps => "microsteps",
             Self::StealthChop => "stealth_chop",
+            Self::HoldAfter => "hold_after_us",
         }
     }
 }

@@ -1,15 +1,28 @@
 //! The firmware's ELF files.
+#![allow(dead_code, reason = "each test file uses its own part")]
 
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
 /// Builds a package of the firmware as `docs/firmware.md` says; returns its ELF file.
 pub fn build(package: &str) -> PathBuf {
-    let target = Path::new(env!("CARGO_TARGET_TMPDIR")).join("firmware");
+    build_in("firmware", package, None)
+}
+
+/// Builds it to trust the key of this line, as `docs/flashing.md` says; returns its ELF file.
+pub fn build_trusting(package: &str, line: &str) -> PathBuf {
+    let file = Path::new(env!("CARGO_TARGET_TMPDIR")).join("own.key.pub");
+    std::fs::write(&file, line).expect("the folder is ours");
+    build_in("firmware-own-key", package, Some(&file))
+}
+
+fn build_in(folder: &str, package: &str, key: Option<&Path>) -> PathBuf {
+    let target = Path::new(env!("CARGO_TARGET_TMPDIR")).join(folder);
     let output = Command::new(env!("CARGO"))
         .args(["build", "--release", "--locked", "-p", package, "--target-dir"])
         .arg(&target)
         .current_dir(Path::new(env!("CARGO_MANIFEST_DIR")).join("../../firmware/nucleo-g474"))
+        .env("VERGENCE_PUBLIC_KEY", key.unwrap_or(Path::new("")))
         .output()
         .expect("cargo runs");
     assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));

@@ -38,10 +38,11 @@ pub struct Line {
     pub rx_dma: Peri<'static, peripherals::DMA1_CH1>,
 }
 
-/// Serves management requests until the host asks for a restart.
-pub fn serve(line: Line, services: Services) -> ! {
+/// Serves management requests until the host asks for a restart. Images older than `oldest` (major, minor, patch) are
+/// refused.
+pub fn serve(line: Line, services: Services, oldest: [u8; 3]) -> ! {
     let Some((mut rx, tx)) = open(line) else { reboot(RebootTo::Application) };
-    let mut recovery = Recovery { tx, services, updater: Updater::default(), seq: 0 };
+    let mut recovery = Recovery { tx, services, oldest, updater: Updater::default(), seq: 0 };
     let mut receiver = Receiver::new();
     loop {
         feed_watchdog();
@@ -68,6 +69,7 @@ fn open(line: Line) -> Option<(RingBufferedUartRx<'static>, UartTx<'static, mode
 struct Recovery {
     tx: UartTx<'static, mode::Async>,
     services: Services,
+    oldest: [u8; 3],
     updater: Updater,
     seq: u8,
 }
@@ -89,8 +91,9 @@ impl Recovery {
     fn carry_out(&mut self, seq: u8, request: &Management) -> ManagementReport {
         let services = &mut self.services;
         let outcome = match request {
-            Management::Identify => return ManagementReport::Identity(identify(services)),
+            Management::Identify => return ManagementReport::Identity(identify(services, self.oldest)),
             Management::Begin(header) if header.hardware != HARDWARE => Outcome::WrongHardware,
+            Management::Begin(header) if header.version < self.oldest => Outcome::TooOld,
             Management::Begin(header) => self.updater.begin(header, services),
             Management::Chunk { offset, data } => self.updater.chunk(*offset, data, services),
             Management::Commit(signature) => self.updater.commit(signature, services),
@@ -118,11 +121,11 @@ impl Recovery {
     }
 }
 
-fn identify(services: &mut Services) -> Identity {
+fn identify(services: &mut Services, oldest: [u8; 3]) -> Identity {
     Identity {
         hardware: HARDWARE,
         version: [0; 3],
-        oldest: [0; 3],
+        oldest,
         build: 0,
         boot: services.boot_state(),
         capacity: u32::try_from(services.image_flash().pages() * PAGE).unwrap_or(u32::MAX),

@@ -4,6 +4,7 @@ use vergence_protocol::{Counts, Micro, Microseconds};
 
 use crate::TICK_US;
 use crate::follow::{Following, Lost};
+use crate::hard_limit::HardLimit;
 use crate::io::{RigIo, StepSchedule};
 use crate::move_planner::PlannedWay;
 use crate::plan::{AxisPlanner, PlanStart};
@@ -21,6 +22,7 @@ pub struct Axis {
     command: [Fine; 3],
     motor: StepCounter,
     following: Following,
+    limit: HardLimit,
     trajectory: Option<Trajectory>,
     /// Part of the trajectory that has been ordered, in microseconds.
     elapsed: u64,
@@ -39,6 +41,7 @@ impl Axis {
             command: [0; 3],
             motor: StepCounter::new(settings.motor(), 0),
             following: Following::default(),
+            limit: HardLimit::default(),
             trajectory: None,
             elapsed: 0,
             from_below: false,
@@ -217,6 +220,29 @@ impl Axis {
     /// Whether the encoder reads `target` within the tolerance.
     pub fn is_at(&self, target: Micro, io: &impl RigIo) -> bool {
         self.position(io).0.abs_diff(target.0) <= self.settings.tolerance.0.unsigned_abs()
+    }
+
+    /// Reads the hard limit; call it once each tick.
+    pub fn read_limit(&mut self, io: &impl RigIo) {
+        let motion = (self.command[2] - self.command[0]).signum();
+        self.limit.read(io.hard_limit(self.index), self.raw_counts(io), motion);
+    }
+
+    pub fn limit(&self) -> &HardLimit {
+        &self.limit
+    }
+
+    /// Notes that somebody knows of the hard limit, if it is reached.
+    pub fn acknowledge_limit(&mut self) {
+        self.limit.acknowledge();
+    }
+
+    /// Whether the axis may move by `distance` as far as its hard limit is concerned.
+    pub fn limit_lets_go(&self, distance: Micro, io: &impl RigIo) -> bool {
+        let from = self.settings.encoder().position_at(self.raw_counts(io).wrapping_sub(self.limit.met_at())).0;
+        let retract = self.settings.homing.retract.0;
+        let to = i64::from(from) + i64::from(distance.0);
+        !self.limit.is_reached() || self.limit.lets_go(from.into(), to, retract.into())
     }
 
     pub fn home_switch(&self, io: &impl RigIo) -> bool {

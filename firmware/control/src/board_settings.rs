@@ -1,4 +1,4 @@
-//! The settings of a board: all axes, pose stream, serial line and machine, each readable as one number.
+//! The settings of a board: all axes, pose stream, serial line, machine and holding current, each readable as one number.
 
 use vergence_protocol::{AxisKind, AxisList, Micro, SettingItem, SettingKey};
 
@@ -15,6 +15,11 @@ const STREAM_US: u32 = 2_000;
 const BAUD: core::ops::RangeInclusive<u32> = 9_600..=12_000_000;
 /// Default speed of the serial line: the fastest that the USB bridges of most boards take.
 const USUAL_BAUD: u32 = 921_600;
+
+/// Default time in microseconds until the holding current: a pause between two moves is shorter.
+const HOLD_AFTER_US: u32 = 5_000_000;
+/// Bounds of that time in microseconds: a stage has settled after the shortest, and the longest keeps no motor warm for hours.
+const HOLD_AFTER: core::ops::RangeInclusive<u32> = 100_000..=600_000_000;
 
 /// The machine that a board drives.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -33,10 +38,12 @@ pub struct BoardSettings {
     pub axes: AxisList<AxisSettings>,
     /// Period of the pose stream when a session opens, in microseconds; 0 for no stream.
     pub stream_period_us: u32,
-    /// Speed of the serial line from the next start on, in baud.
+    /// Speed of the serial line in baud: on trial until a host is heard at it, and the speed at a start.
     pub baud: u32,
     /// The machine that the board drives.
     pub machine: Machine,
+    /// Time in microseconds at rest after which the motors get their holding current; 0 for never.
+    pub hold_after_us: u32,
 }
 
 /// Why a setting was not changed.
@@ -58,7 +65,13 @@ impl BoardSettings {
     /// [`SettingsError`] if an axis cannot work with its settings.
     pub fn new(axes: &[AxisSettings]) -> Result<Self, SettingsError> {
         let axes = axes.iter().copied().collect::<heapless::Vec<_, { vergence_protocol::MAX_AXES }>>();
-        let settings = Self { axes, stream_period_us: STREAM_US, baud: USUAL_BAUD, machine: Machine::Bench };
+        let settings = Self {
+            axes,
+            stream_period_us: STREAM_US,
+            baud: USUAL_BAUD,
+            machine: Machine::Bench,
+            hold_after_us: HOLD_AFTER_US,
+        };
         settings.validate()?;
         Ok(settings)
     }
@@ -73,7 +86,13 @@ impl BoardSettings {
         values: impl IntoIterator<Item = (SettingKey, i64)>,
     ) -> Result<Self, SettingError> {
         let axes = kinds.iter().take(vergence_protocol::MAX_AXES).map(|&kind| AxisSettings::blank(kind)).collect();
-        let mut settings = Self { axes, stream_period_us: STREAM_US, baud: USUAL_BAUD, machine: Machine::Bench };
+        let mut settings = Self {
+            axes,
+            stream_period_us: STREAM_US,
+            baud: USUAL_BAUD,
+            machine: Machine::Bench,
+            hold_after_us: HOLD_AFTER_US,
+        };
         values.into_iter().try_for_each(|(key, value)| settings.put(key, value))?;
         Ok(settings)
     }
@@ -91,7 +110,14 @@ impl BoardSettings {
         }
         let stream =
             self.stream_period_us == 0 || (SHORTEST_STREAM_US..=LONGEST_STREAM_US).contains(&self.stream_period_us);
-        if stream && BAUD.contains(&self.baud) { Ok(()) } else { Err(SettingsError::Link) }
+        if !stream || !BAUD.contains(&self.baud) {
+            return Err(SettingsError::Link);
+        }
+        if self.hold_after_us == 0 || HOLD_AFTER.contains(&self.hold_after_us) {
+            Ok(())
+        } else {
+            Err(SettingsError::Hold)
+        }
     }
 
     /// The keys of all settings of this board.
@@ -110,6 +136,7 @@ impl BoardSettings {
             SettingKey { item: SettingItem::StreamPeriod, axis: 0 } => Some(self.stream_period_us.into()),
             SettingKey { item: SettingItem::Baud, axis: 0 } => Some(self.baud.into()),
             SettingKey { item: SettingItem::Machine, axis: 0 } => Some((self.machine == Machine::Robot).into()),
+            SettingKey { item: SettingItem::HoldAfter, axis: 0 } => Some(self.hold_after_us.into()),
             SettingKey { item, axis } => self.axes.get(usize::from(axis))?.item(item),
         }
     }
@@ -131,6 +158,7 @@ impl BoardSettings {
         match key.item {
             SettingItem::StreamPeriod => self.stream_period_us = number(value)?,
             SettingItem::Baud => self.baud = number(value)?,
+            SettingItem::HoldAfter => self.hold_after_us = number(value)?,
             SettingItem::Machine => self.machine = if flag(value)? { Machine::Robot } else { Machine::Bench },
             item => {
                 let axis = self.axes.get_mut(usize::from(key.axis)).ok_or(SettingError::Unknown)?;

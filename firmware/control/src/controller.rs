@@ -23,6 +23,7 @@ use vergence_protocol::{
 pub use self::planning::PLAN_TICKS;
 use self::planning::Planning;
 use crate::axis::Axis;
+use crate::holding::Holding;
 use crate::homing_sequence::HomingSequence;
 use crate::io::RigIo;
 use crate::latch::FaultLatch;
@@ -71,8 +72,9 @@ pub struct Controller {
     holder: Option<SessionId>,
     latch: FaultLatch,
     homing: HomingSequence,
+    holding: Holding,
     self_test: SelfTest,
-    /// Whether the saved settings were refused and nobody knows yet.
+    /// Whether the saved settings are not in effect and nobody knows yet.
     settings_lost: bool,
     /// Whether the firmware is on trial.
     on_trial: bool,
@@ -120,6 +122,7 @@ impl Controller {
             holder: None,
             latch: FaultLatch::default(),
             homing: HomingSequence::default(),
+            holding: Holding::default(),
             self_test: SelfTest::default(),
             settings_lost: false,
             on_trial: false,
@@ -133,7 +136,7 @@ impl Controller {
         })
     }
 
-    /// Notes that the saved settings were refused, so that the self-test ends in a fault. Call it at the start.
+    /// Notes that the saved settings are not in effect, so that the self-test ends in a fault. Call it at the start.
     pub fn distrust_settings(&mut self) {
         self.settings_lost = true;
     }
@@ -172,6 +175,11 @@ impl Controller {
             axis.settings = *new;
         }
         Ok(())
+    }
+
+    /// Sets the time in microseconds at rest after which the motors get their holding current; 0 for never.
+    pub fn hold_after(&mut self, us: u64) {
+        self.holding.set_after(us);
     }
 
     /// Converts raw encoder counts of all axes to counts as in a pose.

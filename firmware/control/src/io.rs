@@ -34,6 +34,11 @@ pub struct TriggerEdge {
 pub trait RigIo {
     /// Switches the motor drivers of all axes on or off. Steps not made yet are dropped in both cases.
     fn set_drivers(&mut self, on: bool);
+    /// Asks the drivers of all axes for their holding current (true) or for the full one. A board whose drivers cannot
+    /// reduce their current does nothing.
+    fn set_holding(&mut self, holding: bool) {
+        let _ = holding;
+    }
     /// Orders steps of `axis` at their times, after those ordered before.
     fn schedule_steps(&mut self, axis: usize, steps: &StepSchedule);
     /// The raw count of steps made so far.

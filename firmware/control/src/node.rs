@@ -12,6 +12,7 @@ use vergence_protocol::{
 use crate::board_settings::BoardSettings;
 use crate::controller::{Controller, Event};
 use crate::io::RigIo;
+use crate::line_speed::LineSpeed;
 use crate::move_planner::{MovePlanner, PlanRequest};
 use crate::recorder::Recorder;
 use crate::services::BoardServices;
@@ -65,6 +66,7 @@ pub struct Node {
     /// Time of the last management request.
     managed_at: Microseconds,
     reboot: Option<RebootTo>,
+    line: LineSpeed,
     /// Time of the last byte from the host.
     last_byte_at: Microseconds,
     wakes_at: Microseconds,
@@ -76,8 +78,8 @@ pub struct Node {
 }
 
 impl Node {
-    /// A node with the settings last saved, or with `defaults` if there are none. Saved settings that this firmware refuses
-    /// are replaced by `defaults` too, and a fault keeps the board from moving with them unnoticed. The number `boot` must
+    /// A node with the settings last saved, or with `defaults` if there are none. Saved settings that this firmware refuses,
+    /// or that are to be left aside, are replaced by `defaults` too, and a fault keeps the board from moving with them unnoticed. The number `boot` must
     /// differ from that of the last start.
     ///
     /// # Errors
@@ -88,11 +90,13 @@ impl Node {
         boot: u32,
         services: &mut impl BoardServices,
     ) -> Result<Self, SettingsError> {
+        let are_left = services.leaves_settings();
         let saved = settings_store::load(services.settings_flash(), defaults);
-        let are_refused = saved.is_err();
-        let settings = saved.ok().flatten().unwrap_or_else(|| defaults.clone());
+        let are_lost = saved.is_err() || are_left;
+        let settings = saved.ok().flatten().filter(|_| !are_left).unwrap_or_else(|| defaults.clone());
         let mut controller = Controller::new(&settings.axes)?;
-        if are_refused {
+        controller.hold_after(settings.hold_after_us.into());
+        if are_lost {
             controller.distrust_settings();
         }
         if services.boot_state() == BootState::Trial {
@@ -105,6 +109,7 @@ impl Node {
             state: controller.state(),
             controller,
             identity,
+            line: LineSpeed::new(settings.baud, defaults.baud),
             settings,
             defaults: defaults.clone(),
             recorder,
@@ -133,6 +138,13 @@ impl Node {
         &self.settings
     }
 
+    /// The speed of the serial line, in baud. It changes when [`Self::transmit`] has nothing left: the board then lets its
+    /// line follow, once the last byte is on the wire.
+    #[must_use]
+    pub fn baud(&self) -> u32 {
+        self.line.present()
+    }
+
     /// Time at which [`Self::poll`] is to be called next. Ask after each call of it and of [`Self::wake`].
     #[must_use]
     pub fn wakes_at(&self) -> Microseconds {
@@ -150,7 +162,11 @@ impl Node {
     pub fn receive(&mut self, now: Microseconds, bytes: &[u8], io: &mut impl RigIo, services: &mut impl BoardServices) {
         self.wake(now);
         for &byte in bytes {
-            match self.session.receive(now, byte) {
+            let event = self.session.receive(now, byte);
+            if self.session.take_heard() {
+                self.line.hear(now);
+            }
+            match event {
                 Some(BoardEvent::Opened { session }) => {
                     self.recorder.record(now, Happening::Opened(session));
                     self.set_stream(now, self.settings.stream_period_us);
@@ -158,6 +174,7 @@ impl Node {
                     let _ = self.trigger.set(now, Trigger::Off, io);
                 }
                 Some(BoardEvent::Request { reply_to, request, received_at }) => {
+                    self.line.converse(now);
                     let reply = self.serve(now, &request, received_at, io, services);
                     self.observe(now, io);
                     if let Some(reply) = reply {
@@ -202,6 +219,10 @@ impl Node {
         }
         let next_tick = self.controller.poll(now, io);
         self.watch_update(now);
+        if let Some(before) = self.line.poll(now, self.settings.baud) {
+            self.settings.baud = before;
+            self.recorder.record(now, Happening::Settings);
+        }
         self.trigger.poll(now, io);
         while let Some(edge) = io.take_trigger_edge() {
             let counts = self.controller.counts_from(&edge.counts);
@@ -233,7 +254,8 @@ impl Node {
     }
 
     fn stream_pose(&mut self, now: Microseconds, io: &impl RigIo) {
-        if self.stream_period == 0 || now < self.next_pose {
+        // A stream faster than a slow line would keep it from ever changing its speed.
+        if self.stream_period == 0 || now < self.next_pose || self.line.is_changing() {
             return;
         }
         self.pose_seq = self.pose_seq.wrapping_add(1);
@@ -284,6 +306,10 @@ impl Node {
 
     /// Writes the next frame for the link and returns its length in bytes. Call it until it returns `None`.
     pub fn transmit(&mut self, now: Microseconds, buffer: &mut [u8; MAX_FRAME]) -> Option<usize> {
-        self.session.transmit(now, buffer)
+        let length = self.session.transmit(now, buffer);
+        if length.is_none() {
+            self.line.run_dry(now);
+        }
+        length
     }
 }

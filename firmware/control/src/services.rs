@@ -39,10 +39,16 @@ pub trait BoardServices {
     fn settings_flash(&mut self) -> &mut impl Flash;
     /// The flash that holds a new image until the boot loader takes it.
     fn image_flash(&mut self) -> &mut impl Flash;
+    /// Whether the saved settings are to be left aside at this start, because a person wants that.
+    fn leaves_settings(&self) -> bool {
+        false
+    }
     /// Which program runs, and how it was chosen.
     fn boot_state(&self) -> BootState;
     /// Whether `signature` over `signed` is of a key that the board trusts (Ed25519, RFC 8032).
     fn trusts(&self, signed: &[u8; ImageHeader::SIGNED], signature: &Signature) -> bool;
+    /// The key whose signatures the board trusts.
+    fn trusted_key(&self) -> [u8; 32];
     /// Seals the stored image, whose digest and signature have been checked, and tells the boot loader to start it on trial
     /// at the next start.
     ///

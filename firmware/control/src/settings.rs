@@ -176,6 +176,9 @@ pub enum SettingsError {
     /// The serial line or the pose stream is too fast or too slow.
     #[error("the serial line or the pose stream cannot have that rate")]
     Link,
+    /// The time until the holding current is too short or too long.
+    #[error("the time until the holding current must be 0 or lie between 100 ms and 10 min")]
+    Hold,
 }
 
 /// Largest number of steps a second of any axis.

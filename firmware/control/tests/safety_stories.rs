@@ -253,19 +253,6 @@ fn a_blocked_stage_cuts_the_drivers_and_loses_the_reference() {
 }
 
 #[test]
-fn a_hard_limit_cuts_the_drivers_until_the_stage_is_off_it() {
-    let mut world = under_way();
-    world.rig.axes[0].hard_limit = true;
-    world.wait(TICK_US);
-    assert!(!world.rig.drivers);
-    assert_eq!(world.pose().fault.map(|fault| (fault.code, fault.axis)), Some((FaultCode::HardLimit, Some(0))));
-    assert_eq!(world.clear(), refused(Refusal::CausePersists));
-    world.rig.axes[0].hard_limit = false;
-    assert_eq!(world.clear(), Status::Accepted);
-    assert_eq!(world.pose().referenced, AxisMask(0));
-}
-
-#[test]
 fn the_emergency_stop_is_observed_latched_and_cleared_only_when_released() {
     let mut world = under_way();
     world.rig.emergency_stop = true;

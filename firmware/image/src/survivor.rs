@@ -5,6 +5,9 @@ use crc::{CRC_32_ISCSI, Crc, NoTable};
 /// Length of the memory in 32-bit words.
 pub const SURVIVOR_WORDS: usize = 14;
 const MAGIC: u32 = 0x5355_5256;
+/// Bits of the word that says what the next start is to do.
+const RECOVERY: u32 = 1;
+const DEFAULTS: u32 = 2;
 const CASTAGNOLI: Crc<u32, NoTable> = Crc::<u32, NoTable>::new(&CRC_32_ISCSI);
 
 /// Facts that outlive a reset.
@@ -14,6 +17,8 @@ pub struct Survivor {
     pub failed_starts: u32,
     /// Whether the boot loader is to stay in its serial recovery at the next start.
     pub recovery_wanted: bool,
+    /// Whether the application is to leave the saved settings aside at its next start.
+    pub defaults_wanted: bool,
     /// Number of starts since power-on.
     pub starts: u32,
     /// How the program died last, if it did.
@@ -70,7 +75,8 @@ impl Survivor {
         trace.copy_from_slice(&words[5..13]);
         Self {
             failed_starts: words[1],
-            recovery_wanted: words[2] != 0,
+            recovery_wanted: words[2] & RECOVERY != 0,
+            defaults_wanted: words[2] & DEFAULTS != 0,
             starts: words[3],
             death: DeathKind::from_number(words[4]).map(|kind| Death { kind, trace }),
         }
@@ -82,7 +88,7 @@ impl Survivor {
         let mut words = [0; SURVIVOR_WORDS];
         words[0] = MAGIC;
         words[1] = self.failed_starts;
-        words[2] = u32::from(self.recovery_wanted);
+        words[2] = u32::from(self.recovery_wanted) * RECOVERY + u32::from(self.defaults_wanted) * DEFAULTS;
         words[3] = self.starts;
         if let Some(death) = self.death {
             words[4] = death.kind.number();

@@ -11,8 +11,9 @@ fn survivor() -> impl Strategy<Value = Survivor> {
         Just(DeathKind::SerialLine),
     ];
     let death = option::of((kind, any::<[u32; TRACE]>()).prop_map(|(kind, trace)| Death { kind, trace }));
-    (any::<u32>(), any::<bool>(), any::<u32>(), death).prop_map(|(failed_starts, recovery_wanted, starts, death)| {
-        Survivor { failed_starts, recovery_wanted, starts, death }
+    (any::<u32>(), any::<[bool; 2]>(), any::<u32>(), death).prop_map(|(failed_starts, wanted, starts, death)| {
+        let [recovery_wanted, defaults_wanted] = wanted;
+        Survivor { failed_starts, recovery_wanted, defaults_wanted, starts, death }
     })
 }
 

@@ -4,10 +4,11 @@ use embassy_boot_stm32::State;
 use embassy_stm32::{Peri, peripherals};
 use vergence_control::{BoardServices, Flash, FlashError, UNIT};
 use vergence_image::layout::{ACTIVE, CAPACITY, DFU, PAGE, Region, SETTINGS};
-use vergence_image::{DEVELOPMENT_KEY, Seal, is_signed_by};
+use vergence_image::{Seal, is_signed_by};
 use vergence_protocol::management::{BootState, ImageHeader, Signature};
 
 use crate::flash::{Area, FedFlash, feed_watchdog};
+use crate::key::trusted_key;
 use crate::memory;
 use crate::swap::SwapState;
 
@@ -24,17 +25,20 @@ pub struct Services {
     seal: Area,
     swap: SwapState,
     boot: BootState,
+    leaves_settings: bool,
 }
 
 impl Services {
-    /// Services of an application: the boot loader's state page tells which image runs.
-    pub fn of_application(flash: &Peri<'static, peripherals::FLASH>) -> Self {
+    /// Services of an application: the boot loader's state page tells which image runs. With `leaves_settings` the saved
+    /// settings are left aside at this start.
+    pub fn of_application(flash: &Peri<'static, peripherals::FLASH>, leaves_settings: bool) -> Self {
         let mut services = Self::new(flash, BootState::Confirmed);
         services.boot = match services.swap.read() {
             State::Swap => BootState::Trial,
             State::Revert => BootState::Reverted,
             State::Boot | State::DfuDetach => BootState::Confirmed,
         };
+        services.leaves_settings = leaves_settings;
         services
     }
 
@@ -48,7 +52,7 @@ impl Services {
         // SAFETY: as for `Area::new`.
         let whole = FedFlash::new(unsafe { flash.clone_unchecked() });
         let [settings, image, seal] = [SETTINGS, IMAGE, SEAL].map(|region| Area::new(flash, region));
-        Self { settings, image, seal, swap: SwapState::new(whole), boot }
+        Self { settings, image, seal, swap: SwapState::new(whole), boot, leaves_settings: false }
     }
 }
 
@@ -61,13 +65,21 @@ impl BoardServices for Services {
         &mut self.image
     }
 
+    fn leaves_settings(&self) -> bool {
+        self.leaves_settings
+    }
+
     fn boot_state(&self) -> BootState {
         self.boot
     }
 
     fn trusts(&self, signed: &[u8; ImageHeader::SIGNED], signature: &Signature) -> bool {
         feed_watchdog();
-        is_signed_by(&DEVELOPMENT_KEY, signed, signature)
+        is_signed_by(trusted_key(), signed, signature)
+    }
+
+    fn trusted_key(&self) -> [u8; 32] {
+        *trusted_key()
     }
 
     fn schedule_trial(&mut self, image: &ImageHeader, signature: &Signature) -> Result<(), FlashError> {
@@ -91,7 +103,7 @@ impl BoardServices for Services {
             return Ok(true);
         }
         feed_watchdog();
-        if Seal::check(memory::region(EARLIER), &DEVELOPMENT_KEY).is_err() {
+        if Seal::check(memory::region(EARLIER), trusted_key()).is_err() {
             return Ok(false);
         }
         self.swap.mark_undone()?;

@@ -5,11 +5,12 @@
 
 use embassy_stm32::gpio::{Input, Level, Output, Pull, Speed};
 use embassy_stm32::mode::Async;
-use embassy_stm32::usart::{self, RingBufferedUartRx, Uart, UartTx};
+use embassy_stm32::usart::{self, Uart, UartTx};
 use embassy_stm32::{Peri, Peripherals, bind_interrupts, dma, pac, peripherals, rcc};
 
 use crate::drivers::DriverWire;
 use crate::encoder::Encoder;
+use crate::receiver::{Bell, Receiver};
 use crate::rig::Rig;
 use crate::steps::{StepDma, StepPulses};
 use crate::trigger::Trigger;
@@ -18,7 +19,7 @@ use crate::trigger::Trigger;
 pub const NAME: &str = "nucleo-g474";
 
 bind_interrupts!(struct Interrupts {
-    LPUART1 => usart::InterruptHandler<peripherals::LPUART1>;
+    LPUART1 => Bell, usart::InterruptHandler<peripherals::LPUART1>;
     DMA1_CHANNEL1 => dma::InterruptHandler<peripherals::DMA1_CH1>;
     DMA1_CHANNEL2 => dma::InterruptHandler<peripherals::DMA1_CH2>;
 });
@@ -75,6 +76,7 @@ impl Board {
             hard_limits: [Input::new(p.PC2, Pull::Up), Input::new(p.PC3, Pull::Up)],
             emergency_stop: Input::new(p.PC4, Pull::Up),
             drivers_off,
+            holding: Output::new(p.PB5, Level::Low, Speed::Low),
             trigger: Trigger::new(p.TIM4, p.PB6),
             latched: None,
         };
@@ -101,18 +103,14 @@ fn reserve_servo_bus<T: usart::Instance>(
 }
 
 impl SerialLine {
-    /// Opens the line at `baud`, with `ring` for received bytes; `None` where the port cannot make that speed.
-    pub fn open(
-        self,
-        baud: u32,
-        ring: &'static mut [u8],
-    ) -> Option<(RingBufferedUartRx<'static>, UartTx<'static, Async>)> {
+    /// Opens the line at `baud`; `None` where the port cannot make that speed.
+    pub fn open(self, baud: u32) -> Option<(Receiver, UartTx<'static, Async>)> {
         let mut config = usart::Config::default();
         config.baudrate = baud;
         let Self { port, tx, rx, tx_dma, rx_dma } = self;
         let uart = Uart::new(port, rx, tx, tx_dma, rx_dma, Interrupts, config).ok()?;
         let (tx, rx) = uart.split();
-        Some((rx.into_ring_buffered(ring), tx))
+        Some((Receiver::start(rx), tx))
     }
 }
 

@@ -43,6 +43,8 @@ pub struct Control {
     node: Node,
     rig: Rig,
     services: Services,
+    /// Speed of the line as it was last passed on, in baud.
+    baud: u32,
     /// The plan that waits for its tick.
     plan: Option<&'static mut MovePlanner>,
     /// Start of the running tick.
@@ -63,6 +65,7 @@ pub fn start(node: Node, rig: Rig, services: Services, timer: Peri<'static, peri
     TIM7.egr().write(|w| w.set_ug(true));
     TIM7.sr().write(|_| {});
     let control = CONTROL.init(Control {
+        baud: node.baud(),
         node,
         rig,
         services,
@@ -173,6 +176,7 @@ impl Control {
         log::forward(|entry| self.node.log(entry));
         while exchange::TO_SEND.is_empty() {
             if !self.send_frame() {
+                self.change_speed();
                 self.reboot();
                 return;
             }
@@ -186,6 +190,14 @@ impl Control {
         let Some(length) = self.node.transmit(now, &mut self.frame) else { return false };
         exchange::queue(&self.frame[..length]);
         true
+    }
+
+    /// Passes on another speed of the line: the link takes it after all frames before.
+    fn change_speed(&mut self) {
+        let baud = self.node.baud();
+        if baud != core::mem::replace(&mut self.baud, baud) {
+            exchange::BAUD.signal(baud);
+        }
     }
 
     /// Passes on the host's wish to reboot: the link restarts the chip when the last frame is sent.

@@ -1,5 +1,5 @@
-//! What the link's tasks and the node in its interrupt hand to each other: bytes in, bytes out, a wish to restart, and a
-//! doorbell. Both use this file and neither knows the other.
+//! What the link's tasks and the node in its interrupt hand to each other: bytes in, bytes out, another speed of the line,
+//! a wish to restart, and a doorbell. Both use this file and neither knows the other.
 
 use core::sync::atomic::{AtomicBool, Ordering};
 
@@ -7,12 +7,15 @@ use embassy_stm32::interrupt;
 use embassy_stm32::interrupt::InterruptExt;
 use embassy_sync::blocking_mutex::raw::CriticalSectionRawMutex;
 use embassy_sync::pipe::Pipe;
+use embassy_sync::signal::Signal;
 use vergence_protocol::MAX_FRAME;
 
 /// Bytes from the line for the node.
 pub static RECEIVED: Pipe<CriticalSectionRawMutex, 512> = Pipe::new();
 /// Bytes from the node for the line: one frame at most.
 pub static TO_SEND: Pipe<CriticalSectionRawMutex, MAX_FRAME> = Pipe::new();
+/// The speed that the line gets when all bytes before are sent, in baud.
+pub static BAUD: Signal<CriticalSectionRawMutex, u32> = Signal::new();
 
 /// Whether the chip is to restart once all bytes are sent.
 static REBOOT: AtomicBool = AtomicBool::new(false);

@@ -20,6 +20,7 @@ mod link;
 mod log;
 mod memory;
 mod planning;
+mod receiver;
 mod rig;
 mod steps;
 mod trigger;
@@ -36,9 +37,6 @@ use vergence_nucleo_common::Services;
 use vergence_nucleo_common::clocks::{self, Source};
 use vergence_nucleo_common::memory::survivor;
 
-/// Oldest version that may replace this one: major, minor, patch.
-const OLDEST: [u8; 3] = [0, 1, 0];
-
 #[embassy_executor::main]
 async fn main(spawner: Spawner) {
     let reset = memory::reset_cause();
@@ -49,19 +47,19 @@ async fn main(spawner: Spawner) {
         board: board::NAME.try_into().unwrap_or_default(),
         hardware: HARDWARE,
         firmware: version::version(),
-        oldest: OLDEST,
+        oldest: version::oldest(),
         build: version::build_id(),
         uid: embassy_stm32::uid::uid(),
         reset,
     };
     log::greet(&identity);
-    let mut services = Services::of_application(&board.flash);
+    let mut services = Services::of_application(&board.flash, memory::take_defaults_wanted());
     let Ok(defaults) = BoardSettings::new(&factory::axes()) else { dying::give_up(DeathKind::Settings) };
     let boot = board::random(board.random).unwrap_or_else(|| survivor().starts);
     let Ok(node) = Node::new(&defaults, identity, boot, &mut services) else {
         dying::give_up(DeathKind::Settings);
     };
-    let Some((rx, tx)) = board.line.open(node.settings().baud, link::ring_buffer()) else {
+    let Some((rx, tx)) = board.line.open(node.baud()) else {
         dying::give_up(DeathKind::SerialLine)
     };
     control::start(node, board.rig, services, board.tick);

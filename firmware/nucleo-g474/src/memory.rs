@@ -16,6 +16,13 @@ pub fn prepare_reboot(to: RebootTo) {
     remember(&Survivor { failed_starts: 0, recovery_wanted: to == RebootTo::Recovery, ..survivor() });
 }
 
+/// Whether this start is to leave the saved settings aside; the next one is not.
+pub fn take_defaults_wanted() -> bool {
+    let before = survivor();
+    remember(&Survivor { defaults_wanted: false, ..before });
+    before.defaults_wanted
+}
+
 /// Cause of the last reset, from the flags of the reset controller; clears them for the next time.
 pub fn reset_cause() -> ResetCause {
     let flags = pac::RCC.csr().read();

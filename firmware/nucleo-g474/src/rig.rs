@@ -28,6 +28,8 @@ pub struct Rig {
     /// Enable line of the drivers: low switches them on. The pull-up on the drivers' side keeps them off while the chip
     /// starts.
     pub drivers_off: Output<'static>,
+    /// Asks the drivers for their holding current: high.
+    pub holding: Output<'static>,
     /// Camera trigger.
     pub trigger: Trigger,
     /// The encoders as the running tick found them; `None` outside ticks.
@@ -76,6 +78,10 @@ impl RigIo for Rig {
         }
         self.steps.iter_mut().for_each(StepPulses::abort);
         drivers::set_motors(on);
+    }
+
+    fn set_holding(&mut self, holding: bool) {
+        self.holding.set_level(holding.into());
     }
 
     fn schedule_steps(&mut self, axis: usize, steps: &StepSchedule) {

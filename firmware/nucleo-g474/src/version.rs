@@ -1,4 +1,5 @@
-//! Version and build id of this program, in notes in flash, which the tool that signs the image reads as well.
+//! Version of this program, oldest version that may replace it, and build id, in notes in flash: the tool that signs the
+//! image and the boot loader's recovery read them as well.
 
 use vergence_image::notes::VersionNote;
 
@@ -19,9 +20,21 @@ static NOTE: VersionNote = VersionNote::new([
     part(env!("CARGO_PKG_VERSION_PATCH")),
 ]);
 
+/// The note with the oldest version that may replace this one.
+#[allow(unsafe_code, reason = "a place that build-id.x keeps")]
+// SAFETY: the section holds nothing else but the note with the version.
+#[unsafe(link_section = ".note.vergence")]
+#[used]
+static OLDEST: VersionNote = VersionNote::oldest([0, 1, 0]);
+
 /// Version of the package, from the note in flash: major, minor, patch.
 pub fn version() -> [u8; 3] {
     core::hint::black_box(&NOTE).version
+}
+
+/// Oldest version that may replace this one, from the note in flash: major, minor, patch.
+pub fn oldest() -> [u8; 3] {
+    core::hint::black_box(&OLDEST).version
 }
 
 /// The first eight bytes of the build id.

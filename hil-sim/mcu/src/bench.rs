@@ -48,6 +48,8 @@ pub struct BenchWiring {
     pub axes: Vec<AxisWiring>,
     /// High switches the drivers off; the drivers' pull-up keeps it high while the chip does not drive it.
     pub drivers_off: Pin,
+    /// High asks the drivers for their holding current.
+    pub holding: Pin,
     /// Emergency stop, operated while pressed; it also cuts the drivers by itself.
     pub emergency_stop: SwitchWiring,
     /// Camera trigger: a rising edge fires the cameras.
@@ -83,6 +85,7 @@ impl BenchWiring {
         Self {
             axes: vec![baseline, separation],
             drivers_off: Pin::at(A + 10),
+            holding: Pin::at(B + 5),
             emergency_stop,
             camera_trigger: Pin::at(B + 6),
             driver_line: UartId::UART4,
@@ -94,6 +97,7 @@ impl BenchWiring {
     pub fn signals(&self) -> Vec<(Pin, String)> {
         let mut signals = vec![
             (self.drivers_off, "drivers_off".to_owned()),
+            (self.holding, "holding".to_owned()),
             (self.emergency_stop.pin, "emergency_stop".to_owned()),
             (self.camera_trigger, "camera_trigger".to_owned()),
         ];
@@ -304,7 +308,7 @@ fn phases(count: i32) -> [bool; 2] {
 impl World for Bench {
     fn watched(&self) -> Vec<Pin> {
         let axes = self.wiring.axes.iter().flat_map(|axis| [axis.step, axis.direction]);
-        axes.chain([self.wiring.drivers_off, self.wiring.camera_trigger]).collect()
+        axes.chain([self.wiring.drivers_off, self.wiring.holding, self.wiring.camera_trigger]).collect()
     }
 
     fn next_event(&self) -> Picoseconds {
@@ -348,6 +352,9 @@ impl World for Bench {
             self.plant.advance(now);
             self.plant.set_drivers(!edge.high);
             self.wake(now);
+        }
+        if edge.pin == self.wiring.holding {
+            self.plant.set_holding(edge.high);
         }
         if edge.pin == self.wiring.camera_trigger && edge.high {
             self.plant.fire_trigger(now);

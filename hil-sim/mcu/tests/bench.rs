@@ -23,6 +23,7 @@ fn rig(position: f64) -> Poked<Bench> {
             home: switch("PA4", false),
             hard_limit: switch("PA5", true),
         }],
+        holding: pin("PB5"),
         drivers_off: pin("PA10"),
         emergency_stop: switch("PA6", true),
         camera_trigger: pin("PA7"),

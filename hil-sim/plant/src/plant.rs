@@ -15,6 +15,7 @@ pub struct Plant {
     axes: Vec<AxisPlant>,
     now: Microseconds,
     drivers_on: bool,
+    holding: bool,
     emergency_stop: bool,
     /// The axis whose home switch is wired to each input.
     home_wires: Vec<usize>,
@@ -38,6 +39,7 @@ impl Plant {
             axes,
             now: Microseconds(0),
             drivers_on: false,
+            holding: false,
             emergency_stop: false,
             trigger_at: None,
             trigger_edges: VecDeque::new(),
@@ -97,6 +99,7 @@ impl Plant {
     /// Restarts the clock of the board at zero and switches its outputs off; the mechanics keep their positions.
     pub fn restart_clock(&mut self) {
         self.set_drivers(false);
+        self.holding = false;
         self.trigger_at = None;
         self.trigger_edges.clear();
         self.exposed = None;
@@ -108,6 +111,12 @@ impl Plant {
     #[must_use]
     pub fn drivers_on(&self) -> bool {
         self.drivers_on
+    }
+
+    /// Whether the drivers are asked for their holding current.
+    #[must_use]
+    pub fn is_holding(&self) -> bool {
+        self.holding
     }
 
     /// Presses or releases the emergency stop, which cuts the drivers in hardware.
@@ -176,6 +185,10 @@ impl RigIo for Plant {
         self.drivers.enable(on);
         self.line.set_motors(on);
         self.axes.iter_mut().for_each(AxisPlant::drop_order);
+    }
+
+    fn set_holding(&mut self, holding: bool) {
+        self.holding = holding;
     }
 
     fn schedule_steps(&mut self, axis: usize, steps: &StepSchedule) {

@@ -94,6 +94,10 @@ impl BoardServices for NativeServices {
         (self.verifier)(&self.key, signed, signature)
     }
 
+    fn trusted_key(&self) -> [u8; 32] {
+        self.key
+    }
+
     fn schedule_trial(&mut self, image: &ImageHeader, _signature: &Signature) -> Result<(), FlashError> {
         self.scheduled = Some(Firmware { version: image.version, build: image.build });
         Ok(())

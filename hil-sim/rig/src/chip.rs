@@ -34,7 +34,11 @@ pub struct Program<'a> {
 pub struct SimulatedChip {
     machine: Machine<Bench>,
     wiring: BenchWiring,
+    /// The speed of what the board last said.
     baud: u32,
+    /// The speed of the host, and the fastest that its adapter makes.
+    host_baud: Option<u32>,
+    fastest_baud: u32,
     output: Vec<u8>,
     halt: Option<Halt>,
 }
@@ -61,7 +65,20 @@ impl SimulatedChip {
             last = load(&mut machine, *program)?;
         }
         start(&mut machine, last);
-        Ok(Self { machine, wiring, baud: BAUD, output: Vec::new(), halt: None })
+        Ok(Self {
+            machine,
+            wiring,
+            baud: BAUD,
+            host_baud: None,
+            fastest_baud: u32::MAX,
+            output: Vec::new(),
+            halt: None,
+        })
+    }
+
+    /// Limits the speeds that the host's adapter can make, in bits per second: at a faster one every byte is garbled.
+    pub fn limit_adapter(&mut self, fastest: u32) {
+        self.fastest_baud = fastest;
     }
 
     /// Traces all wired pins from now on.
@@ -95,13 +112,21 @@ impl SimulatedChip {
         self.halt = (halt != Halt::Reached).then_some(halt);
         for sent in self.machine.chip_mut().take_sent(LINK) {
             self.baud = sent.baud;
-            self.output.push(sent.byte);
+            self.output.push(if self.is_clear(sent.baud) { sent.byte } else { sent.byte ^ 0x5A });
         }
     }
 
-    /// Begins to send bytes to the board, at its own speed, as the debugger's port would.
+    /// Whether the host reads bytes of this speed as they are.
+    fn is_clear(&self, baud: u32) -> bool {
+        let host = self.host_baud.unwrap_or(baud);
+        host <= self.fastest_baud && host.abs_diff(baud) < host / 25
+    }
+
+    /// Begins to send bytes to the board: at the speed of the host, or at the board's own where the host has none.
     pub fn send(&mut self, bytes: &[u8]) {
-        let frame = |&byte| Frame { byte, baud: self.baud, fault: LineFault::None };
+        let baud = self.host_baud.unwrap_or(self.baud);
+        let garble = if baud > self.fastest_baud { 0x5A } else { 0 };
+        let frame = |&byte: &u8| Frame { byte: byte ^ garble, baud, fault: LineFault::None };
         let frames: Vec<Frame> = bytes.iter().map(frame).collect();
         self.machine.chip_mut().send(LINK, &frames);
     }
@@ -112,6 +137,10 @@ impl Served for SimulatedChip {
 
     fn run_until(&mut self, elapsed_us: u64) {
         self.run_until(elapsed_us);
+    }
+
+    fn hear_at(&mut self, baud: u32) {
+        self.host_baud = Some(baud);
     }
 
     fn receive(&mut self, bytes: &[u8]) {

@@ -77,6 +77,17 @@ pub enum BoardError {
     /// Another command stopped the move.
     #[error("the move was stopped by another command: the stages stand where they are")]
     Stopped,
+    /// The board is heard neither at the new speed of its line nor at the one before.
+    #[error(
+        "the board answers neither at {to} nor at {from} baud: check the cable; after a reset it listens at the saved speed \
+         and at 921600 baud in turn"
+    )]
+    LineLost {
+        /// The speed before.
+        from: u32,
+        /// The new speed.
+        to: u32,
+    },
     /// The mark of a trigger pulse did not arrive.
     #[error("the board fired the cameras but did not say where the axes were")]
     NoMark,

@@ -10,6 +10,7 @@ mod board;
 mod checks;
 mod error;
 mod firmware;
+mod line_speed;
 mod link;
 mod link_figures;
 mod listening;
@@ -31,6 +32,7 @@ pub use firmware::{
     DEVELOPMENT, FlashContents, KeyError, ProbeError, ProbeRs, PublicKey, SecretKey, fresh_secret, header_json, hex,
     parse_version,
 };
+pub use line_speed::{SpeedChange, change_line_speed};
 pub use link::{
     BoardKnowledge, Client, Followed, Follower, HostClock, LinkError, ManagementLink, OpenError, OpenWire, Port,
     PortLock, ReaderMark, RepeatedStop, Wire, describe_port, fresh_session, is_candidate, is_held, is_st_link,
@@ -42,7 +44,7 @@ pub use move_plan::{AxisLimits, AxisPlan, Knot, MovePlan, MoveStart};
 pub use serve::{BoardGuard, ListenError, Listener, ServeError, Served, Shared, serve, spawn_in_process};
 pub use setting_check::why_refused;
 pub use setting_text::{NamedSetting, settings};
-pub use settings_file::SettingsFileError;
+pub use settings_file::{SettingsChanged, SettingsFileError};
 pub use update::{
     FirmwareImage, ImageFileError, UpdateError, UpdateEvent, Updated, confirm, hardware_name, restart, roll_back,
     update, version_text,

@@ -62,6 +62,7 @@ fn name(item: SettingItem, kind: Option<AxisKind>) -> &'static str {
         (SettingItem::CountsPerUnit, Some(AxisKind::Linear)) => "counts_per_metre",
         (SettingItem::CountsPerUnit, Some(AxisKind::Rotary)) => "counts_per_revolution",
         (SettingItem::StreamPeriod, _) => "stream_period",
+        (SettingItem::HoldAfter, _) => "hold_after",
         _ => item.name(),
     }
 }
@@ -75,7 +76,7 @@ fn form(item: SettingItem, kind: AxisKind) -> Form {
             Form::Number
         }
         SettingItem::StepsReversed | SettingItem::CountsReversed | SettingItem::StealthChop => Form::Flag,
-        SettingItem::StreamPeriod | SettingItem::HoldDelay => Form::Period,
+        SettingItem::StreamPeriod | SettingItem::HoldDelay | SettingItem::HoldAfter => Form::Period,
         SettingItem::SenseResistor => Form::Unit("mOhm"),
         SettingItem::RunCurrent | SettingItem::HoldCurrent => Form::Unit("mA"),
         SettingItem::Driver => Form::Choice(&["plain", "tmc2209"]),
@@ -232,6 +233,7 @@ mod tests {
             ("baseline.run_current", 800, "800mA"),
             ("separation.sense_resistor", 110, "110mOhm"),
             ("separation.hold_delay", 500_000, "500ms"),
+            ("hold_after", 5_000_000, "5s"),
         ] {
             assert_eq!(setting(name).write(value), text, "{name}");
         }

@@ -1,6 +1,6 @@
 //! The board's settings in a file: TOML, one table for each axis.
 
-use vergence_protocol::Refusal;
+use vergence_protocol::{Refusal, SettingItem};
 
 use crate::board::Board;
 use crate::error::BoardError;
@@ -20,6 +20,15 @@ pub enum SettingsFileError {
     /// The board refuses these settings, for the reason given.
     #[error("nothing was changed: the board refuses {0}")]
     Refused(String),
+}
+
+/// What a file of settings changed.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct SettingsChanged {
+    /// The changes in words.
+    pub changed: Vec<String>,
+    /// The speed of the line that the file asks for, where it is another one: [`crate::change_line_speed`] makes it.
+    pub baud: Option<u32>,
 }
 
 impl Board {
@@ -52,14 +61,17 @@ impl Board {
         text
     }
 
-    /// Sets everything that the text of a file names and that is different now, or nothing. Returns the changes in words.
+    /// Sets everything that the text of a file names and that is different now, or nothing. The speed of the line is left
+    /// as it is, because this link would end.
     ///
     /// # Errors
     /// [`SettingsFileError`]: anything that is no setting, or a value that the board refuses.
-    pub async fn set_all(&self, text: &str) -> Result<Vec<String>, SettingsFileError> {
+    pub async fn set_all(&self, text: &str) -> Result<SettingsChanged, SettingsFileError> {
         let table: toml::Table =
             text.parse().map_err(|error: toml::de::Error| SettingsFileError::Wrong(error.message().to_owned()))?;
-        let wanted = wanted(&table, &self.settings().await?).map_err(SettingsFileError::Wrong)?;
+        let mut wanted = wanted(&table, &self.settings().await?).map_err(SettingsFileError::Wrong)?;
+        let baud = wanted.extract_if(.., |change| change.setting.key.item == SettingItem::Baud).last();
+        let baud = baud.and_then(|change| u32::try_from(change.value).ok());
         let mut done = Vec::new();
         let outcome = set_each(self, wanted, &mut done).await;
         if outcome.is_err() {
@@ -73,7 +85,7 @@ impl Board {
             let Change { setting, before, value } = change;
             format!("{} is {}, it was {}", setting.name(), setting.write(*value), setting.write(*before))
         };
-        Ok(done.iter().map(in_words).collect())
+        Ok(SettingsChanged { changed: done.iter().map(in_words).collect(), baud })
     }
 }
 

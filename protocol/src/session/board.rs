@@ -88,6 +88,7 @@ pub struct BoardSession {
     boot: u32,
     open: Option<Open>,
     receiver: Receiver,
+    heard: bool,
     line: Line,
     /// Number of the next frame.
     seq: u8,
@@ -113,6 +114,7 @@ impl BoardSession {
             boot,
             open: None,
             receiver: Receiver::new(),
+            heard: false,
             line: Line::default(),
             seq: 0,
             expected: 0,
@@ -197,6 +199,11 @@ impl BoardSession {
     #[must_use]
     pub fn session(&self) -> Option<SessionId> {
         self.open.map(|open| open.session)
+    }
+
+    /// Whether a whole frame has come since the last call, of whatever kind and with whatever body.
+    pub fn take_heard(&mut self) -> bool {
+        core::mem::take(&mut self.heard)
     }
 
     /// Figures since the board started.

@@ -63,6 +63,7 @@ pub fn request() -> impl Strategy<Value = Request> {
         .prop_map(Request::SetTrigger),
         any::<u32>().prop_map(|first| Request::GetEvents { first }),
         Just(Request::GetStatistics),
+        Just(Request::GetKey),
     ]
 }
 
@@ -148,6 +149,8 @@ fn status() -> impl Strategy<Value = Status> {
         Just(Refusal::CausePersists),
         Just(Refusal::Invalid),
         Just(Refusal::ReadOnly),
+        Just(Refusal::LineOnTrial),
+        any::<u8>().prop_map(|axis| Refusal::AtHardLimit { axis }),
     ];
     prop_oneof![Just(Status::Accepted), refusal.prop_map(Status::Refused)]
 }

@@ -1,7 +1,7 @@
 //! Requests: each is carried out or refused with a reason; values are never clamped.
 
 use vergence_protocol::{
-    AxisList, AxisMask, ControllerState, DriverState, Jog, Micro, Microseconds, Mode, Move, MoveId, MovePhase,
+    AxisList, AxisMask, ControllerState, DriverState, FaultCode, Jog, Micro, Microseconds, Mode, Move, MoveId, MovePhase,
     Permille, Refusal, Request, SessionId, Status, StopKind,
 };
 
@@ -21,7 +21,7 @@ impl Controller {
             Request::Disarm => self.disarm(io),
             Request::Home { axes } => self.home(now, session, *axes),
             Request::MoveTo(target) => self.move_to(now, session, target),
-            Request::Jog(jog) => self.jog(now, session, jog),
+            Request::Jog(jog) => self.jog(now, session, jog, io),
             Request::Stop { kind } => {
                 self.stop(*kind, io);
                 Ok(())
@@ -105,8 +105,17 @@ impl Controller {
         if self.state == ControllerState::Ready { Ok(()) } else { Err(Refusal::Busy) }
     }
 
+    /// Checks that no axis is at its hard limit.
+    fn must_be_off_limits(&self) -> Result<(), Refusal> {
+        match (0u8..).zip(&self.axes).find(|(_, axis)| axis.limit().is_reached()) {
+            Some((axis, _)) => Err(Refusal::AtHardLimit { axis }),
+            None => Ok(()),
+        }
+    }
+
     fn home(&mut self, now: Microseconds, session: SessionId, axes: AxisMask) -> Result<(), Refusal> {
         self.may_start(now, session)?;
+        self.must_be_off_limits()?;
         if axes == AxisMask::default() || axes.0 & !AxisMask::first(self.axes.len()).0 != 0 {
             return Err(Refusal::Invalid);
         }
@@ -119,6 +128,7 @@ impl Controller {
     /// Moves to a target, also in mid-move: from the present positions and speeds.
     fn move_to(&mut self, now: Microseconds, session: SessionId, order: &Move) -> Result<(), Refusal> {
         self.may_move(now, session)?;
+        self.must_be_off_limits()?;
         self.check_order(order.targets.len(), order.speed)?;
         for (index, (axis, &position)) in (0u8..).zip(self.axes.iter().zip(&order.targets)) {
             if !axis.is_referenced() {
@@ -132,8 +142,9 @@ impl Controller {
         Ok(())
     }
 
-    /// Moves by a distance from rest. An axis without reference may move as far as the search for its switch.
-    fn jog(&mut self, now: Microseconds, session: SessionId, jog: &Jog) -> Result<(), Refusal> {
+    /// Moves by a distance from rest. An axis without reference may move as far as the search for its switch, and one at its
+    /// hard limit a short way off it. Such an axis has no reference, so that its speed is that of the search.
+    fn jog(&mut self, now: Microseconds, session: SessionId, jog: &Jog, io: &impl RigIo) -> Result<(), Refusal> {
         self.may_start(now, session)?;
         self.check_order(jog.by.len(), jog.speed)?;
         let mut targets = AxisList::new();
@@ -145,6 +156,9 @@ impl Controller {
             };
             if by.0 != 0 && !allowed {
                 return Err(Refusal::OutsideLimits { axis: index });
+            }
+            if by.0 != 0 && !axis.limit_lets_go(*by, io) {
+                return Err(Refusal::AtHardLimit { axis: index });
             }
             targets.push(target).map_err(|_| Refusal::Invalid)?;
         }
@@ -197,8 +211,12 @@ impl Controller {
         if self.any_moving() {
             return Err(Refusal::Busy);
         }
-        if io.emergency_stop() || (0..self.axes.len()).any(|axis| io.hard_limit(axis)) {
+        if io.emergency_stop() {
             return Err(Refusal::CausePersists);
+        }
+        // Whoever clears it knows of it; a limit reached behind another fault is a fault of its own when armed.
+        if self.latch.record().is_some_and(|record| record.code == FaultCode::HardLimit) {
+            self.axes.iter_mut().for_each(Axis::acknowledge_limit);
         }
         self.latch.clear(seen);
         self.go_idle(io);

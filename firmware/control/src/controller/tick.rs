@@ -43,6 +43,9 @@ impl Controller {
             }
             self.watch_following(now, io);
         }
+        // A plan begins ticks after its request, and a search with the next tick: the current is there before.
+        let at_rest = self.drivers_on && self.planning.is_none() && !self.any_moving();
+        self.holding.poll(now, at_rest, io);
         self.next_tick
     }
 
@@ -78,12 +81,15 @@ impl Controller {
     }
 
     fn watch_inputs(&mut self, now: Microseconds, io: &mut impl RigIo) {
+        for axis in &mut self.axes {
+            axis.read_limit(io);
+        }
         if !self.drivers_on {
             return;
         }
         if io.emergency_stop() {
             self.cut(now, FaultCode::EmergencyStop, None, 0, io);
-        } else if let Some(axis) = (0..self.axes.len()).find(|&axis| io.hard_limit(axis)) {
+        } else if let Some(axis) = self.axes.iter().position(|axis| axis.limit().trips()) {
             self.cut(now, FaultCode::HardLimit, Some(axis), 0, io);
         } else {
             self.watch_drivers(now, io);

@@ -1,7 +1,8 @@
 //! Requests: those of the node, and those that it passes on to the controller.
 
 use vergence_protocol::{
-    BoardInfo, ControllerState, Happening, Microseconds, Refusal, Report, Request, SessionId, SettingKey, Status,
+    BoardInfo, ControllerState, Happening, Microseconds, Refusal, Report, Request, SessionId, SettingItem, SettingKey,
+    Status,
 };
 
 use super::Node;
@@ -41,6 +42,7 @@ impl Node {
             Request::GetDriver { .. } => refused(Refusal::Invalid),
             Request::GetEvents { first } => Report::Events { to: 0, events: self.recorder.page(*first) },
             Request::GetStatistics => Report::Statistics { to: 0, statistics: self.session.statistics() },
+            Request::GetKey => Report::Key { to: 0, key: services.trusted_key() },
             change => {
                 let status = self.change(now, change, io, services);
                 match (&status, change) {
@@ -95,13 +97,19 @@ impl Node {
             SettingError::Unknown => Refusal::NoSetting,
             SettingError::Value => Refusal::BadSetting,
         })?;
-        self.apply(now, changed, io)
+        let before = self.settings.baud;
+        self.apply(now, changed, io)?;
+        if key.item == SettingItem::Baud {
+            self.line.try_out(self.settings.baud, before);
+        }
+        Ok(())
     }
 
-    /// Puts settings into effect.
+    /// Puts settings into effect; the line keeps its speed.
     fn apply(&mut self, now: Microseconds, settings: BoardSettings, io: &mut impl RigIo) -> Result<(), Refusal> {
         self.must_be_idle()?;
         self.controller.replace_settings(&settings.axes).map_err(|_| Refusal::BadSetting)?;
+        self.controller.hold_after(settings.hold_after_us.into());
         self.settings = settings;
         self.tell_drivers(io);
         self.recorder.record(now, Happening::Settings);
@@ -110,6 +118,9 @@ impl Node {
 
     fn save_settings(&mut self, now: Microseconds, services: &mut impl BoardServices) -> Result<(), Refusal> {
         self.must_be_idle()?;
+        if self.line.is_on_trial() {
+            return Err(Refusal::LineOnTrial);
+        }
         settings_store::save(services.settings_flash(), &self.settings).map_err(|_| Refusal::StorageFailed)?;
         self.recorder.record(now, Happening::Settings);
         Ok(())

@@ -37,6 +37,8 @@ pub struct IdealAxis {
     pub hard_limit: bool,
     /// What the motor driver says of itself.
     pub driver: DriverState,
+    /// Positions at and beyond which the hard limit is reached.
+    pub hard_limits: [f64; 2],
     /// The load stands still whatever the motor does; let go, it springs to the motor.
     pub blocked: bool,
     /// The encoder reads wrong by this much.
@@ -64,6 +66,7 @@ impl IdealAxis {
             switch: HomeSwitch::Good,
             hard_limit: false,
             driver: DriverState::Plain,
+            hard_limits: [f64::NEG_INFINITY, f64::INFINITY],
             blocked: false,
             misread: 0.0,
             grip: 1.0,
@@ -191,7 +194,8 @@ impl RigIo for IdealRig {
     }
 
     fn hard_limit(&self, axis: usize) -> bool {
-        self.axes[axis].hard_limit
+        let IdealAxis { hard_limit, hard_limits: [low, high], load, .. } = self.axes[axis];
+        hard_limit || load <= low || load >= high
     }
 
     fn driver(&self, axis: usize) -> DriverState {

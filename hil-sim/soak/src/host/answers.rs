@@ -54,7 +54,9 @@ impl Host {
             }
             (Purpose::Turn(id), Status::Accepted) => (self.going, self.turned) = (Some(id), true),
             (Purpose::Jog(id), Status::Accepted) => self.going = Some(id),
-            (Purpose::Jog(_), Status::Refused(Refusal::OutsideLimits { .. })) => self.next_step(),
+            (Purpose::Jog(_), Status::Refused(Refusal::OutsideLimits { .. } | Refusal::AtHardLimit { .. })) => {
+                self.next_step();
+            }
             (Purpose::Errand, Status::Accepted) => self.next_step(),
             (Purpose::Set, Status::Accepted) => self.unsaved = true,
             (Purpose::Forbidden | Purpose::WrongClear, Status::Accepted) => self.finish(HostEnd::ForbiddenAccepted),

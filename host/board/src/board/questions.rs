@@ -9,6 +9,7 @@ use vergence_protocol::{
 
 use super::Board;
 use crate::error::BoardError;
+use crate::firmware::PublicKey;
 use crate::move_plan::AxisLimits;
 
 /// Events of the flight recorder.
@@ -47,6 +48,17 @@ impl Board {
             Report::Ack { status: Status::Refused(Refusal::NoSetting | Refusal::Invalid), .. } => Ok(None),
             Report::Ack { status: Status::Refused(refusal), .. } => Err(self.refused(refusal)),
             _ => Err(BoardError::OtherAnswer("a question about a setting")),
+        }
+    }
+
+    /// The public key whose images the board takes; `None` where its firmware does not say.
+    ///
+    /// # Errors
+    /// [`BoardError`]: a link that ended.
+    pub async fn trusted_key(&self) -> Result<Option<PublicKey>, BoardError> {
+        match self.client.ask(Request::GetKey).await? {
+            Report::Key { key, .. } => Ok(Some(PublicKey(key))),
+            _ => Ok(None),
         }
     }
 

@@ -39,6 +39,7 @@ pub async fn check_board(board: &mut Board, checks: BoardChecks) -> Vec<Finding>
     findings.extend(limits(board));
     findings.push(settings(board, checks.line_baud).await);
     findings.extend(drivers(board).await);
+    findings.push(key(board).await);
     findings
 }
 
@@ -180,6 +181,20 @@ fn limits(board: &Board) -> Vec<Finding> {
     .collect()
 }
 
+/// Checks whose firmware images the board takes.
+async fn key(board: &Board) -> Finding {
+    match board.trusted_key().await {
+        Ok(Some(key)) if key.is_development() => Finding::warn(
+            "key",
+            "the board takes firmware of the development key: anybody can sign for it",
+            "build boot loader and application with a key of your own: docs/flashing.md",
+        ),
+        Ok(Some(key)) => Finding::pass("key", format!("the board takes firmware of {}", key.describe())),
+        Ok(None) => Finding::warn("key", "this firmware does not say whose images it takes", "update the firmware"),
+        Err(error) => Finding::fail("key", error.to_string(), "check the link"),
+    }
+}
+
 /// Checks that the settings can be read, and that the saved line speed is the one in use.
 async fn settings(board: &Board, line_baud: Option<u32>) -> Finding {
     let read = async |item| board.setting(SettingKey { item, axis: 0 }).await;
@@ -188,8 +203,8 @@ async fn settings(board: &Board, line_baud: Option<u32>) -> Finding {
             let now = line_baud.unwrap_or_default();
             Finding::warn(
                 "settings",
-                format!("the board will speak {baud} baud from its next start on, and this is {now}"),
-                format!("use --baud {baud} from then on, or 'vergence config set baud {now}'"),
+                format!("the board is set to {baud} baud, and was found at {now}"),
+                format!("use --baud {baud}, or 'vergence config set baud {now}'"),
             )
         }
         (Ok(Some(baud)), Ok(Some(_))) => Finding::pass("settings", format!("can be read; {baud} baud")),

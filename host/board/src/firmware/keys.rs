@@ -90,6 +90,18 @@ impl PublicKey {
         read(name, PUBLIC, "a public key, which 'vergence image keygen' writes to a .pub file").map(Self)
     }
 
+    /// Whether it is the key whose secret everybody knows.
+    #[must_use]
+    pub fn is_development(&self) -> bool {
+        self.0 == DEVELOPMENT_KEY
+    }
+
+    /// The key in words: its first bytes, or the name of the development key.
+    #[must_use]
+    pub fn describe(&self) -> String {
+        if self.is_development() { "the development key".into() } else { format!("key {}...", hex(&self.0[..8])) }
+    }
+
     /// Writes a file.
     ///
     /// # Errors

@@ -7,6 +7,7 @@ use tokio::time::timeout;
 use vergence_protocol::{Compatibility, HostStatistics, PoseReport, Report, Request, SessionId, TriggerMark};
 use vergence_rig::ClockMap;
 
+use super::attention::Attention;
 use super::clock::HostClock;
 use super::error::{LinkError, OpenError};
 use super::follow::Broadcaster;
@@ -29,6 +30,7 @@ pub struct Client {
     logs: mpsc::Receiver<Vec<u8>>,
     end: watch::Receiver<Option<LinkError>>,
     knowledge: BoardKnowledge,
+    attention: Attention,
     clock: HostClock,
     session: SessionId,
     compatibility: Compatibility,
@@ -50,13 +52,15 @@ impl Client {
         // Without a socket nobody can follow; the board can still be driven.
         let followers = wire.lock.as_ref().and_then(|lock| Broadcaster::start(lock).ok());
         let outlets = Outlets { poses: pose_sender, marks: mark_sender, logs: log_sender, followers };
-        let task = LinkTask::new(session, clock, inbox, outlets, opened_sender, knowledge.clone());
+        let attention = Attention::new(clock.now());
+        let noted = (knowledge.clone(), attention.clone());
+        let task = LinkTask::new(session, clock, inbox, outlets, opened_sender, noted);
         tokio::spawn(async move {
             let error = task.run(wire).await;
             end_sender.send_replace(Some(error));
         });
         let compatibility = opened.await.unwrap_or(Err(LinkError::SessionLost))?;
-        Ok(Self { commands, poses, marks, logs, end, knowledge, clock, session, compatibility })
+        Ok(Self { commands, poses, marks, logs, end, knowledge, attention, clock, session, compatibility })
     }
 
     /// Opens session `session` over `wire`, which leads to `port`.
@@ -91,6 +95,7 @@ impl Client {
     /// # Errors
     /// [`LinkError`] where the link ended or the board stayed silent.
     pub async fn ask(&self, request: Request) -> Result<Report, LinkError> {
+        self.attention.pay(self.clock.now());
         let (reply, answer) = oneshot::channel();
         self.commands.send(Command::Ask { request, reply }).await.map_err(|_| self.why_ended())?;
         match timeout(REPLY_TIMEOUT, answer).await {
@@ -101,6 +106,8 @@ impl Client {
     }
 
     /// Sends heartbeats from now on that keep a lease of `lease_ms` milliseconds alive; zero stops them, and the lease runs out.
+    /// They depend on this handle: without a call of [`Self::next_pose`] or [`Self::ask`] for a second while the board moves, or
+    /// for two minutes while it rests, they stop, because the program that moves the board hangs.
     ///
     /// # Errors
     /// [`LinkError`] where the link ended.
@@ -115,7 +122,10 @@ impl Client {
     pub async fn next_pose(&mut self) -> Result<PoseReport, LinkError> {
         const PATIENCE: Duration = Duration::from_secs(1);
         match timeout(PATIENCE, self.poses.changed()).await {
-            Ok(Ok(())) => self.poses.borrow_and_update().clone().ok_or(LinkError::Silent(PATIENCE)),
+            Ok(Ok(())) => {
+                self.attention.pay(self.clock.now());
+                self.poses.borrow_and_update().clone().ok_or(LinkError::Silent(PATIENCE))
+            }
             Ok(Err(_)) => Err(self.why_ended()),
             Err(_) => Err(LinkError::Silent(PATIENCE)),
         }

@@ -1,5 +1,6 @@
 //! The link to a controller board: how a port is opened, and the two clients that speak over it.
 
+mod attention;
 mod client;
 mod clock;
 mod error;

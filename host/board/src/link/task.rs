@@ -8,11 +8,12 @@ use tokio::io::{AsyncReadExt, AsyncWriteExt};
 use tokio::sync::{mpsc, oneshot, watch};
 use tokio::time::sleep_until;
 use vergence_protocol::{
-    Compatibility, HostEvent, HostSession, MAX_FRAME, Microseconds, PoseReport, Report, Request, SessionId, Ticket,
-    TriggerMark,
+    Compatibility, ControllerState, HostEvent, HostSession, MAX_FRAME, Microseconds, PoseReport, Report, Request,
+    SessionId, Ticket, TriggerMark,
 };
 use vergence_rig::{Exchange, JointSample};
 
+use super::attention::Attention;
 use super::clock::HostClock;
 use super::error::LinkError;
 use super::follow::{Broadcaster, Followed};
@@ -56,6 +57,9 @@ pub(super) struct LinkTask {
     /// Stops that the board has not answered yet.
     stops: Vec<(RepeatedStop, oneshot::Sender<Result<Report, LinkError>>)>,
     knowledge: BoardKnowledge,
+    attention: Attention,
+    /// State of the board in the latest pose.
+    state: ControllerState,
     /// The lease in milliseconds, and when the next heartbeat is due.
     heartbeat: Option<(u16, Microseconds)>,
     next_probe: Microseconds,
@@ -71,7 +75,7 @@ impl LinkTask {
         inbox: mpsc::Receiver<Command>,
         outlets: Outlets,
         opened: oneshot::Sender<Result<Compatibility, LinkError>>,
-        knowledge: BoardKnowledge,
+        (knowledge, attention): (BoardKnowledge, Attention),
     ) -> Self {
         Self {
             session: HostSession::new(session),
@@ -82,6 +86,8 @@ impl LinkTask {
             waiting: BTreeMap::new(),
             stops: Vec::new(),
             knowledge,
+            attention,
+            state: ControllerState::Idle,
             heartbeat: None,
             next_probe: Microseconds(0),
             probes: 0,
@@ -170,6 +176,9 @@ impl LinkTask {
         {
             // Five heartbeats per lease: four may be lost. A full queue already holds one.
             self.heartbeat = Some((lease_ms, Microseconds(now.0 + u64::from(lease_ms) * 1000 / 5)));
+            if !self.attention.is_paid(now, self.state) {
+                return;
+            }
             let _ = self.session.send_now(Request::Heartbeat { session: self.session.id(), lease_ms });
         }
     }
@@ -257,6 +266,7 @@ impl LinkTask {
     fn note(&mut self, now: Microseconds, report: Report) {
         match report {
             Report::Pose(pose) => {
+                self.state = pose.state;
                 self.knowledge.note_joints(JointSample { at: pose.at, counts: pose.counts.clone() });
                 self.pass_on(|| Followed::Pose(pose.clone()));
                 self.outlets.poses.send_replace(Some(pose));

@@ -111,7 +111,7 @@ pub async fn serve<B: Served>(board: Shared<B>, listener: Listener) -> Result<()
     let fail = |error: io::Error| ServeError::Link(error.to_string());
     match listener {
         Listener::Pty { mut ours, theirs: _kept_open, .. } => {
-            let ended = run_board(&board, &mut ours).await;
+            let ended = run_board(&board, &mut ours, |wire| wire.baud_rate().ok()).await;
             board.lock().settle().map_err(ServeError::Board)?;
             ended.map_err(fail)
         }
@@ -128,7 +128,7 @@ pub async fn serve<B: Served>(board: Shared<B>, listener: Listener) -> Result<()
                 board.lock().settle().map_err(ServeError::Board)?;
             };
             // A host that goes away is not a failure of the simulator.
-            let _ = run_board(&board, &mut stream).await;
+            let _ = run_board(&board, &mut stream, |_| None).await;
             board.lock().settle().map_err(ServeError::Board)?;
         },
     }
@@ -140,7 +140,7 @@ pub fn spawn_in_process<B: Served + Send + 'static>(board: Shared<B>) -> DuplexS
     let (host_end, mut board_end) = tokio::io::duplex(1 << 16);
     tokio::spawn(async move {
         // Ends when the host drops its end of the pipe.
-        let _ = run_board(&board, &mut board_end).await;
+        let _ = run_board(&board, &mut board_end, |_| None).await;
     });
     host_end
 }
@@ -151,7 +151,12 @@ fn ticks() -> tokio::time::Interval {
     pace
 }
 
-async fn run_board<B: Served, W: AsyncRead + AsyncWrite + Unpin>(board: &Shared<B>, wire: &mut W) -> io::Result<()> {
+/// Runs the board on `wire` until that ends. `baud` is the speed that the host has given its end, where it has one.
+async fn run_board<B: Served, W: AsyncRead + AsyncWrite + Unpin>(
+    board: &Shared<B>,
+    wire: &mut W,
+    baud: impl Fn(&W) -> Option<u32>,
+) -> io::Result<()> {
     let mut pace = ticks();
     let mut input = [0; 1024];
     loop {
@@ -163,6 +168,9 @@ async fn run_board<B: Served, W: AsyncRead + AsyncWrite + Unpin>(board: &Shared<
                 }
                 let mut board = board.lock();
                 board.run_to_now();
+                if let Some(baud) = baud(wire) {
+                    board.hear_at(baud);
+                }
                 board.receive(input.get(..length).unwrap_or_default());
             }
             _ = pace.tick() => board.lock().run_to_now(),

@@ -12,6 +12,11 @@ pub trait Served {
 
     /// Runs until `elapsed_us` microseconds after the simulation began. Calls never go back in time.
     fn run_until(&mut self, elapsed_us: u64);
+    /// Takes note of the speed at which the host speaks and listens, in bits per second. A board on whose wire bytes take no
+    /// time does nothing.
+    fn hear_at(&mut self, baud: u32) {
+        let _ = baud;
+    }
     /// Takes bytes from the host, at the time to which the board was last run.
     fn receive(&mut self, bytes: &[u8]);
     /// Bytes that the board sent since the last call.

@@ -3,11 +3,14 @@
 use std::path::PathBuf;
 
 use serde_json::{Map, Value, json};
-use vergence_board::{Board, ManagementLink, NamedSetting, Port, SettingsFileError, restart, settings, why_refused};
+use vergence_board::{
+    Board, ManagementLink, NamedSetting, Port, SettingsChanged, SettingsFileError, SpeedChange, change_line_speed,
+    restart, settings, why_refused,
+};
 use vergence_files::write_whole;
-use vergence_protocol::{ControllerState, Refusal, Request};
+use vergence_protocol::{ControllerState, Refusal, Request, SettingItem, SettingKey};
 
-use super::connect::{connect_any, port};
+use super::connect::{connect_any, is_wire, port};
 use crate::cli::CommonOptions;
 use crate::console::Console;
 use crate::failure::Failure;
@@ -17,6 +20,9 @@ use crate::failure::Failure;
 ///
 /// `stream_period` is how often the board sends its pose, 1ms to 10s or 0s for never, from the next session on. Every verb
 /// takes it as it is; one that must follow the board more closely than every 100ms asks for more while it runs, and says so.
+///
+/// `baud` is the speed of the serial line. `set baud` opens the line at the new speed and saves all present settings once the
+/// board was heard at it; where it is not, board and host go back to the speed before, and the exit code is 3.
 #[derive(Debug, clap::Args)]
 pub struct Args {
     #[command(subcommand)]
@@ -68,18 +74,23 @@ pub async fn run(args: &Args, common: &CommonOptions, console: Console) -> Resul
         }
         What::Get { key: axis, out } => get_all(&board, axis.as_deref(), out.as_ref(), console).await,
         What::Set { file: Some(path), .. } => {
-            let changed = board.set_all(&vergence_files::read_text(path)?).await.map_err(|error| match error {
-                SettingsFileError::Wrong(problem) => Failure::input(path, problem),
-                _ => error.into(),
-            })?;
+            let SettingsChanged { changed, baud } =
+                board.set_all(&vergence_files::read_text(path)?).await.map_err(|error| match error {
+                    SettingsFileError::Wrong(problem) => Failure::input(path, problem),
+                    _ => error.into(),
+                })?;
             let list = changed.iter().map(|change| format!("\n  {change}")).collect::<String>();
             console.say(format!("{} settings changed{list}", changed.len()))?;
             say_unsaved(console, !changed.is_empty())?;
-            console.result(&json!({ "changed": changed }))
+            if let Some(baud) = baud {
+                change_baud(board, common, baud, false).await?;
+                console.say(format!("the line is at {baud} baud, and wants --baud {baud} from now on"))?;
+            }
+            console.result(&json!({ "changed": changed, "baud": baud }))
         }
         What::Set { key, value, .. } => {
             let (key, value) = (key.as_deref().unwrap_or_default(), value.as_deref().unwrap_or_default());
-            set_one(&board, key, value, console).await
+            set_one(board, key, value, common, console).await
         }
         What::Save => {
             board.ask(Request::SaveSettings).await?;
@@ -91,6 +102,10 @@ pub async fn run(args: &Args, common: &CommonOptions, console: Console) -> Resul
             board.ask(Request::RestoreSettings).await?;
             console.say("the settings are those that the firmware came with")?;
             say_unsaved(console, true)?;
+            let baud = board.setting(SettingKey { item: SettingItem::Baud, axis: 0 }).await?;
+            if let Some(baud) = baud.filter(|&baud| is_wire(common) && baud != i64::from(common.baud)) {
+                console.warn(format!("the line goes to {baud} baud once the board has heard nobody for 5 s"));
+            }
             console.result(&json!({ "restored": true }))
         }
     }
@@ -155,10 +170,22 @@ async fn get_all(board: &Board, axis: Option<&str>, out: Option<&PathBuf>, conso
     console.result(&Value::Object(entries.collect::<Map<_, _>>()))
 }
 
-async fn set_one(board: &Board, name: &str, text: &str, console: Console) -> Result<(), Failure> {
-    let setting = find(board, name)?;
+async fn set_one(
+    board: Board,
+    name: &str,
+    text: &str,
+    common: &CommonOptions,
+    console: Console,
+) -> Result<(), Failure> {
+    let setting = find(&board, name)?;
     let value = setting.read(text).map_err(Failure::usage)?;
     let before = board.setting(setting.key).await?;
+    if setting.key.item == SettingItem::Baud && before.is_some_and(|before| before != value) {
+        let baud = u32::try_from(value).map_err(|_| Failure::usage(format!("{name} cannot be {text}")))?;
+        change_baud(board, common, baud, true).await?;
+        console.say(format!("{name} is {baud}, and saved with all present settings; use --baud {baud} from now on"))?;
+        return console.result(&json!({ "setting": name, "value": text, "saved": true }));
+    }
     match board.set(setting.key, value).await? {
         Ok(()) => {}
         Err(Refusal::BadSetting) => {
@@ -172,6 +199,27 @@ async fn set_one(board: &Board, name: &str, text: &str, console: Console) -> Res
     console.say(format!("{name} is {now}, it was {}", before.as_deref().unwrap_or("unknown")))?;
     say_unsaved(console, before.as_ref() != Some(&now))?;
     console.result(&json!({ "setting": name, "value": now, "before": before }))
+}
+
+/// Changes the speed of the line to `baud`, where board and adapter can both make it.
+async fn change_baud(board: Board, common: &CommonOptions, baud: u32, save: bool) -> Result<(), Failure> {
+    let port = port(common)?;
+    if port == Port::Simulated {
+        return Err(Failure::usage("a board in this process has no line: name one with --port"));
+    }
+    let key = SettingKey { item: SettingItem::Baud, axis: 0 };
+    if let Some(reason) = why_refused(board.rig(), &board.settings().await?, [(key, i64::from(baud))]) {
+        return Err(Failure::usage(format!("baud cannot be {baud}: {reason}")));
+    }
+    let before = common.baud;
+    match change_line_speed(board, &port, [before, baud], save).await? {
+        SpeedChange::Changed => Ok(()),
+        SpeedChange::WentBack => Err(Failure::device(format!(
+            "nothing is heard at {baud} baud: the board is back at {before} baud, and nothing was saved; the adapter or the \
+             cable cannot make {baud}"
+        ))),
+        SpeedChange::Refused(refusal) => Err(Failure::device(format!("the board refuses: {refusal}"))),
+    }
 }
 
 fn json_value(setting: &NamedSetting, value: i64) -> Value {

@@ -40,6 +40,10 @@ pub struct Args {
     /// for updates, give the boot loader's ELF file, and then a signed image.
     #[arg(long, value_name = "FIRMWARE")]
     elf: Vec<PathBuf>,
+    /// The fastest speed that the simulated serial adapter makes, in bits per second: at a faster one nobody is understood,
+    /// as where a cable or a bridge cannot follow.
+    #[arg(long, value_name = "BAUD", requires = "elf")]
+    adapter: Option<u32>,
     /// Write what all wired pins did to this file when the simulation ends (value change dump, some megabytes for each
     /// second of motion).
     #[arg(long, value_name = "FILE", requires = "elf")]
@@ -63,6 +67,9 @@ async fn run_firmware(args: &Args, rig: &Rig, console: Console) -> Result<(), Fa
     let mut chip = simulated_chip(&args.elf, rig, args.seed)?;
     if args.trace.is_some() {
         chip.trace();
+    }
+    if let Some(fastest) = args.adapter {
+        chip.limit_adapter(fastest);
     }
     let chip = Shared::new(chip);
     let outcome = serve_until_interrupted(args, chip.clone(), console).await;

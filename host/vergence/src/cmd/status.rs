@@ -3,7 +3,7 @@
 mod why;
 
 use serde_json::json;
-use vergence_board::{Followed, Follower, clock_json, describe_clock, pose_json};
+use vergence_board::{Followed, Follower, clock_json, describe_clock, hex, pose_json};
 
 use self::why::Story;
 use super::connect::{connect, port};
@@ -28,6 +28,10 @@ pub async fn run(args: &Args, common: &CommonOptions, console: Console) -> Resul
     }
     let mut board = connect(common, console, "status").await?;
     board.compare_clocks().await?;
+    let key = board.trusted_key().await?;
+    if key.is_some_and(|key| key.is_development()) {
+        console.warn("the board takes firmware of the development key, for which anybody can sign: docs/flashing.md");
+    }
     let story = if args.why { Some(Story::read(&board).await?) } else { None };
     let drivers = board.drivers().await?;
     let info = board.info();
@@ -38,6 +42,7 @@ pub async fn run(args: &Args, common: &CommonOptions, console: Console) -> Resul
         status["firmware"] = json!(format!("{major}.{minor}.{patch}"));
         status["build"] = json!(format!("{:016x}", info.build));
         status["reset"] = json!(format!("{:?}", info.reset));
+        status["key"] = json!(key.map(|key| if key.is_development() { "development".into() } else { hex(&key.0) }));
         status["clock"] = clock_json(&board);
         if !drivers.is_empty() {
             status["drivers"] = drivers.iter().map(|(axis, state)| (axis.clone(), json!(state.to_string()))).collect();

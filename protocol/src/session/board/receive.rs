@@ -10,6 +10,7 @@ impl BoardSession {
     /// Takes the next byte from the host, which arrived at `now`. Any byte may come.
     pub fn receive(&mut self, now: Microseconds, byte: u8) -> Option<BoardEvent> {
         let frame = self.receiver.push(byte)?;
+        self.heard = true;
         let header = frame.header;
         if header.kind == Kind::Firmware {
             let body = frame.body::<Management>();
