@@ -70,6 +70,15 @@ impl Encoder {
         };
     }
 
+    /// Counts from zero again where the scale reads `scale`; a failure lasts.
+    pub fn restart(&mut self, scale: i32) {
+        self.zero = scale;
+        match &mut self.reading {
+            Reading::Stuck(at) | Reading::Mirrored(at) => *at = 0,
+            Reading::True | Reading::Noisy { .. } | Reading::Dead => {}
+        }
+    }
+
     /// Draws new noise, as time passes.
     pub fn advance(&mut self) {
         if let Reading::Noisy { amplitude, random, error } = &mut self.reading {

@@ -12,7 +12,7 @@ mod plant;
 mod services;
 mod switch;
 
-pub use axis::{AxisMechanics, AxisPlant};
+pub use axis::{AxisMechanics, AxisPlant, StepMade};
 pub use bench::{Stage, bench_mechanics, bench_settings};
 pub use board::NativeBoard;
 pub use encoder::EncoderFault;

@@ -21,6 +21,7 @@
 
 mod checker;
 mod chip_board;
+pub mod differential;
 mod faults;
 mod host;
 mod injector;
