@@ -73,6 +73,7 @@ impl Board {
             emergency_stop: Input::new(p.PC4, Pull::Up),
             drivers_off,
             trigger: Trigger::new(p.TIM4, p.PB6),
+            latched: None,
         };
         reserve_servo_bus(&p.USART3, &p.PB10, &p.PB14);
         Self {

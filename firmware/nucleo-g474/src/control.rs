@@ -134,6 +134,7 @@ impl Control {
         let late = Instant::now().as_micros().saturating_sub(self.tick.0);
         self.node.allow_delay(self.tick, late, &mut self.rig);
         self.node.poll(self.tick, &mut self.rig);
+        self.rig.end_tick();
         TICKS.fetch_add(1, Ordering::Relaxed);
     }
 

@@ -28,17 +28,27 @@ pub struct Rig {
     pub drivers_off: Output<'static>,
     /// Camera trigger.
     pub trigger: Trigger,
+    /// Counts of the encoders at the start of the running tick; `None` between two ticks.
+    pub latched: Option<[i32; AXES]>,
 }
 
 impl Rig {
-    /// Starts the steps ordered for the tick that has begun. Returns whether the steps of the tick before were made in time.
+    /// Latches the encoders and starts the steps ordered for the tick that has begun. Returns whether the steps of the tick
+    /// before were made in time.
     pub fn begin_tick(&mut self) -> bool {
+        // The pose of a tick names its start, and is made up to 0.4 ms later.
+        self.latched = Some(self.encoders.each_ref().map(Encoder::count));
         let mut in_time = true;
         for axis in &mut self.steps {
             in_time &= axis.begin_tick();
         }
         self.trigger.poll();
         in_time
+    }
+
+    /// Reads the encoders themselves again, until the next tick.
+    pub fn end_tick(&mut self) {
+        self.latched = None;
     }
 }
 
@@ -63,7 +73,10 @@ impl RigIo for Rig {
     }
 
     fn encoder(&self, axis: usize) -> i32 {
-        self.encoders.get(axis).map_or(0, Encoder::count)
+        match &self.latched {
+            Some(counts) => counts.get(axis).copied().unwrap_or(0),
+            None => self.encoders.get(axis).map_or(0, Encoder::count),
+        }
     }
 
     fn home_switch(&self, axis: usize) -> bool {

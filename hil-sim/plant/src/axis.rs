@@ -94,6 +94,11 @@ impl AxisPlant {
         self.made.as_mut().map(std::mem::take).unwrap_or_default()
     }
 
+    /// Lets a failed encoder count again from the count that it shows, as after its cable was mended: its counter does not jump.
+    pub fn mend_encoder(&mut self) {
+        self.encoder.go_on(self.scale_reading());
+    }
+
     /// Counts from zero again, as an encoder's counter does whose chip restarts.
     pub fn restart_encoder(&mut self) {
         self.encoder.restart(self.scale_reading());

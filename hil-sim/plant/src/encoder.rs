@@ -70,6 +70,12 @@ impl Encoder {
         };
     }
 
+    /// Counts truly again, from the count that it shows where the scale reads `scale`.
+    pub fn go_on(&mut self, scale: i32) {
+        self.zero = scale.wrapping_sub(self.raw(scale));
+        self.reading = Reading::True;
+    }
+
     /// Counts from zero again where the scale reads `scale`; a failure lasts.
     pub fn restart(&mut self, scale: i32) {
         self.zero = scale;

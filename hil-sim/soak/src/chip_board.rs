@@ -78,9 +78,8 @@ impl ChipBoard {
     /// When the first control tick of the running firmware comes, in microseconds since the chip got power; `None` before
     /// its timer runs. To be asked within a tick of the start.
     pub(crate) fn first_tick_us(&mut self) -> Option<u64> {
-        let is_set = |chip: &mut Self, register, bit: u32| {
-            chip.register(register, None).is_some_and(|value| value & bit != 0)
-        };
+        let is_set =
+            |chip: &mut Self, register, bit: u32| chip.register(register, None).is_some_and(|value| value & bit != 0);
         // The timer has no clock before.
         let runs = is_set(self, RCC_APB1ENR1, TIM7EN) && is_set(self, TIM7_DIER, 1);
         let passed = if runs { self.register(TIM7_CNT, None) } else { None };

@@ -33,7 +33,7 @@ fn both_boards_do_the_same_in_random_sessions() {
     }
     let named = std::env::var("VERGENCE_DIFFERENTIAL").ok();
     let count = named.map_or(SESSIONS, |count| count.parse().expect("a number of sessions"));
-    let tally = differential(1, count, flash(), || {}).expect("the bench works");
+    let tally = differential(std::env::var("START").map_or(1, |s| s.parse().unwrap()), count, flash(), || {}).expect("the bench works");
     println!("{}\n{:.0} s of virtual time", tally.table(), tally.virtual_seconds);
     assert!(tally.differences.is_empty(), "{}", tally.accusation().unwrap_or_default());
 }

@@ -7,13 +7,13 @@ use super::difference::{Difference, Figures};
 use super::messages;
 use super::pair::{Pair, Snapshot};
 use super::side::Stream;
-use super::slack::{Slack, apart};
+use super::slack::{HOMING_TICKS, Slack, apart};
 use super::steps::Steps;
 
 /// Longest time in microseconds from a message of one board to the same of the other: a page of flash is erased meanwhile.
 const PATIENCE_US: u64 = 300_000;
 /// Ticks after which a pose is compared, so that later ticks of the native board are known.
-const LATER_TICKS: u64 = 8;
+const LATER_TICKS: u64 = HOMING_TICKS + 3;
 /// Time in microseconds without steps after which motors and loads are at rest.
 const REST_US: u64 = 60_000;
 /// Most microseconds by which a tick may come late without a fault.
@@ -34,7 +34,7 @@ impl Apart {
     /// Most ticks from an event on one board to the same on the other.
     pub fn ticks(self) -> u64 {
         match self {
-            Self { homing: true, .. } => 5,
+            Self { homing: true, .. } => HOMING_TICKS,
             Self { failing: true, .. } => 3,
             // The encoders come into the tolerance, and stay.
             _ => 1,
@@ -182,7 +182,8 @@ impl Comparison {
             }
             self.figures.poses_a_tick_apart += 1;
         }
-        let ticks = if self.apart.homing || self.apart.failing || self.apart.late { self.apart.ticks() } else { 0 };
+        let homes_apart = self.apart.homing && self.steps.iter().any(Steps::is_apart);
+        let ticks = if homes_apart || self.apart.failing || self.apart.late { self.apart.ticks() } else { 0 };
         for axis in 0..2 {
             // On one board the axis may have got its reference some ticks earlier.
             if native.pose.referenced.contains(axis) != chip.referenced.contains(axis) {
@@ -192,6 +193,11 @@ impl Comparison {
             let allowed = self.slack.counts(axis, ticks as f64);
             let field = format!("counts of axis {axis} in state {}", native.pose.state);
             Difference::unless_close(field, 0.0, f64::from(apart(ours, theirs)), allowed)?;
+            if ticks == 0
+                && let Some(ticks) = self.slack.ticks_of(axis, apart(ours, theirs))
+            {
+                self.figures.lag_us = self.figures.lag_us.max(ticks * TICK_US as f64);
+            }
             if native.pose.state == ControllerState::Ready && chip.referenced.contains(axis) && !self.apart.failing {
                 let most = &mut self.figures.rest_counts[axis];
                 *most = (*most).max(apart(ours, theirs));
@@ -208,6 +214,7 @@ impl Comparison {
                 self.moved_at_us = pair_time(&native.steps[axis], &chip.steps[axis]).max(self.moved_at_us);
             }
             let steps = &mut self.steps[axis];
+            let was_apart = steps.is_apart();
             steps.compare(
                 axis,
                 [&mut native.steps[axis], &mut chip.steps[axis]],
@@ -216,6 +223,9 @@ impl Comparison {
                 self.slack.target_steps(axis),
                 &mut self.figures,
             )?;
+            if self.apart.homing && steps.is_apart() && !was_apart {
+                self.slack.homes_apart(axis);
+            }
         }
         Ok(())
     }
@@ -261,10 +271,7 @@ impl Comparison {
 }
 
 /// The time of the session of the latest step, in microseconds.
-fn pair_time(
-    native: &std::collections::VecDeque<(u64, bool)>,
-    chip: &std::collections::VecDeque<(u64, bool)>,
-) -> u64 {
+fn pair_time(native: &std::collections::VecDeque<(u64, bool)>, chip: &std::collections::VecDeque<(u64, bool)>) -> u64 {
     let last = |steps: &std::collections::VecDeque<(u64, bool)>| steps.back().map_or(0, |(at, _)| at / 1_000);
     last(native).max(last(chip))
 }

@@ -2,6 +2,7 @@
 
 use std::fmt;
 
+use super::steps::Phase;
 use crate::journal::Journal;
 
 /// The first difference of a session: something that the boards did not do alike.
@@ -55,8 +56,12 @@ pub struct Figures {
     pub poses_a_tick_apart: u64,
     /// Motions in which the boards saw a switch or an encoder at different ticks; their later steps are only counted.
     pub motions_apart: u64,
-    /// Largest difference of step instants by phase, in microseconds.
+    /// Largest difference of step instants by phase, in microseconds, of steps that come faster than 10 kHz.
     pub step_us: [f64; 5],
+    /// The same of all steps, as a share of the time since the step before.
+    pub step_share: [f64; 5],
+    /// Largest difference of counts in mid-move as the time in which the axis goes as far, in microseconds.
+    pub lag_us: f64,
     /// Largest difference of the counts at rest with a reference, for each axis.
     pub rest_counts: [i32; 2],
     /// Largest difference of the instants of requests as the boards' clocks show them, in microseconds.
@@ -64,6 +69,16 @@ pub struct Figures {
 }
 
 impl Figures {
+    /// Records that a step was `us` apart, `interval_us` after the step before.
+    pub fn note_step(&mut self, phase: Phase, us: f64, interval_us: f64) {
+        let most = &mut self.step_share[phase as usize];
+        *most = most.max(us / interval_us.max(1.0));
+        if interval_us < 100.0 {
+            let most = &mut self.step_us[phase as usize];
+            *most = most.max(us);
+        }
+    }
+
     /// Adds those of another session.
     pub fn merge(&mut self, other: &Self) {
         self.messages += other.messages;
@@ -72,7 +87,9 @@ impl Figures {
         self.poses_a_tick_apart += other.poses_a_tick_apart;
         self.motions_apart += other.motions_apart;
         self.request_us = self.request_us.max(other.request_us);
-        for (mine, theirs) in self.step_us.iter_mut().zip(other.step_us) {
+        self.lag_us = self.lag_us.max(other.lag_us);
+        let theirs = other.step_us.into_iter().chain(other.step_share);
+        for (mine, theirs) in self.step_us.iter_mut().chain(&mut self.step_share).zip(theirs) {
             *mine = mine.max(theirs);
         }
         for (mine, theirs) in self.rest_counts.iter_mut().zip(other.rest_counts) {

@@ -4,7 +4,6 @@ use std::collections::VecDeque;
 
 use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64Mcg;
-use vergence_control::TICK_US;
 use vergence_plant::NativeBoard;
 use vergence_protocol::frame::{Header, Kind, encode};
 use vergence_protocol::{
@@ -255,8 +254,10 @@ impl Driver {
         for mishap in std::mem::take(&mut self.mishaps) {
             self.pair.with_plants(|plant| mishap.end(plant));
         }
-        self.wait(MEND_TICKS)?;
-        self.comparison.apart.failing = false;
+        if self.comparison.apart.failing {
+            self.wait(MEND_TICKS)?;
+            self.comparison.apart.failing = false;
+        }
         for _ in 0..2 {
             if let Some(fault) = self.pair.native().pose().fault {
                 self.ask(&Request::ClearFault { seen: fault.seq });
@@ -272,6 +273,6 @@ impl Driver {
             self.wait(20)?;
             self.rest()?;
         }
-        self.wait(TICK_US / 100)
+        self.wait(10)
     }
 }

@@ -10,7 +10,7 @@ use vergence_protocol::{
 use super::compare::Comparison;
 use super::difference::Difference;
 use super::side::Said;
-use super::slack::apart;
+use super::slack::{HOMING_TICKS, apart};
 
 /// Most microseconds from the instant at which one board takes a request to that at which the other does: the node on the
 /// chip may be in its tick.
@@ -146,14 +146,19 @@ fn recorded(with: &mut Comparison, native: &RecordedEvents, chip: &RecordedEvent
             (Happening::Encoder { axis, counts: _ }, Happening::Encoder { axis: a, counts: _ }) => {
                 Difference::unless_equal("axis of a recorded encoder", &axis, &a)?;
             }
-            (
-                Happening::Fault { code, axis, detail: _ },
-                Happening::Fault { code: c, axis: a, detail: _ },
-            ) => Difference::unless_equal("recorded fault", &(code, axis), &(c, a))?,
+            (Happening::Fault { code, axis, detail: _ }, Happening::Fault { code: c, axis: a, detail: _ }) => {
+                Difference::unless_equal("recorded fault", &(code, axis), &(c, a))?
+            }
             (ours, theirs) => Difference::unless_equal("recorded event", &ours, &theirs)?,
         }
         // Those of former motions are read as well.
-        times(with, "time of a recorded event", native.at, chip.at, 5.0 * TICK_US as f64 + REQUEST_US + 0.5)?;
+        times(
+            with,
+            "time of a recorded event",
+            native.at,
+            chip.at,
+            (HOMING_TICKS * TICK_US) as f64 + REQUEST_US + 0.5,
+        )?;
     }
     Ok(())
 }

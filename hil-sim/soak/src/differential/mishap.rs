@@ -44,7 +44,7 @@ impl Mishap {
     /// Mends it.
     pub fn end(self, plant: &mut Plant) {
         match self {
-            Self::EncoderStuck(axis) | Self::EncoderReversed(axis) => on(plant, axis, |axis| axis.fail_encoder(None)),
+            Self::EncoderStuck(axis) | Self::EncoderReversed(axis) => on(plant, axis, AxisPlant::mend_encoder),
             Self::Stalled(axis) => on(plant, axis, |axis| axis.stall(false)),
             Self::StepsLost(axis, _) => on(plant, axis, AxisPlant::keep_steps),
             Self::Slips(axis, _) => on(plant, axis, |axis| axis.slip(0.0)),

@@ -21,7 +21,7 @@ pub const ARRIVALS_US: [u64; 2] = [150, 650];
 /// Longest time from a reset to the first tick: boot loader and signature check take some 0.2 s.
 const LONGEST_START_US: u64 = 2_000_000;
 /// Ticks that are kept of the native board: more than the boards may be apart.
-const KEPT: usize = 64;
+const KEPT: usize = 128;
 
 /// The native board just after a tick.
 #[derive(Clone, Debug)]

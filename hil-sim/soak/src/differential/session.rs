@@ -59,11 +59,11 @@ impl Session {
         let mut draw = Draw { random: Pcg64Mcg::seed_from_u64(seed ^ 0xd1ff), acts: Vec::new(), moves: 0 };
         let positions = stages().map(|stage| {
             let low = f64::midpoint(stage.mechanics.home_switch, stage.mechanics.hard_limits[0]);
-            let share: f64 = draw.random.random::<f64>().powi(4) * 0.5;
+            let share: f64 = draw.random.random::<f64>().powi(4) * 0.3;
             low + share * (f64::from(stage.settings.max.0) - low)
         });
         draw.begin();
-        for _ in 0..draw.random.random_range(2..=4) {
+        for _ in 0..draw.random.random_range(1..=3) {
             draw.episode();
         }
         draw.end();
@@ -108,6 +108,12 @@ impl Draw {
         }
         if self.happens(0.4) {
             self.settings();
+        }
+        if self.happens(0.8) {
+            // So that homing is soon over.
+            for (axis, value) in [(0, 1_000), (1, 12_000)] {
+                self.ask(Request::SetSetting { key: SettingKey { item: SettingItem::HomeRetract, axis }, value });
+            }
         }
         self.acts.push(Act::Arm);
         if self.happens(0.3) {

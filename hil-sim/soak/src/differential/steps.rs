@@ -9,6 +9,8 @@ use super::difference::{Difference, Figures};
 
 /// The list of a tick runs so much later on the chip, in nanoseconds.
 const LATE_NS: i64 = 20_000;
+/// Steps by which the way back from the home switch may differ: it is rounded from an encoder's count.
+const HOMING_STEPS: f64 = 2.0;
 /// Longest time between two steps that counts as their distance, in nanoseconds.
 const LONGEST_NS: u64 = 20_000_000;
 
@@ -89,13 +91,13 @@ impl Steps {
             chip.pop_front();
             let phase = self.phase(ours.0, pose);
             let us = (theirs.0 as i64 - ours.0 as i64 - LATE_NS) as f64 * 1e-3;
-            let apart_us = (target_steps - 1.0) * self.interval_ns as f64 * 1e-3;
+            let differing = if apart.homing { HOMING_STEPS } else { target_steps - 1.0 };
+            let apart_us = differing * self.interval_ns as f64 * 1e-3;
             let late_us = if apart.late { 200.0 } else { 0.0 };
             if ours.1 == theirs.1 && us.abs() <= phase.bound_us() + apart_us + late_us {
                 figures.steps += 1;
                 if !apart.late {
-                    let most = &mut figures.step_us[phase as usize];
-                    *most = most.max(us.abs());
+                    figures.note_step(phase, us.abs(), self.interval_ns as f64 * 1e-3);
                 }
             } else if apart.homing || apart.failing {
                 self.apart = true;

@@ -85,8 +85,11 @@ impl DifferentialTally {
             format!("{:<28}{:>12}", "step instants", figures.steps),
             format!("{:<28}{:>12}", "  motions some ticks apart", figures.motions_apart),
         ];
-        let apart = Phase::ALL.iter().zip(figures.step_us);
-        lines.extend(apart.map(|(phase, us)| format!("{:<28}{us:>9.1} us", format!("steps, {}", phase.name()))));
+        let apart = Phase::ALL.iter().zip(figures.step_us.iter().zip(figures.step_share));
+        lines.extend(apart.map(|(phase, (us, share))| {
+            format!("{:<28}{us:>9.1} us{share:>9.2} steps", format!("steps, {}", phase.name()))
+        }));
+        lines.push(format!("{:<28}{:>9.0} us", "counts in mid-move", figures.lag_us));
         for (axis, counts) in figures.rest_counts.iter().enumerate() {
             lines.push(format!("{:<28}{counts:>12}", format!("counts at rest, axis {axis}")));
         }
@@ -98,8 +101,9 @@ impl DifferentialTally {
     #[must_use]
     pub fn json(&self) -> Value {
         let figures = &self.figures;
-        let steps: serde_json::Map<_, _> =
-            Phase::ALL.iter().zip(figures.step_us).map(|(phase, us)| (phase.name().to_owned(), us.into())).collect();
+        let by_phase = |values: [f64; 5]| -> serde_json::Map<_, _> {
+            Phase::ALL.iter().zip(values).map(|(phase, value)| (phase.name().to_owned(), value.into())).collect()
+        };
         json!({
             "sessions": self.sessions,
             "differences": self.differences.len(),
@@ -108,7 +112,9 @@ impl DifferentialTally {
             "poses_some_ticks_apart": figures.poses_a_tick_apart,
             "steps": figures.steps,
             "motions_some_ticks_apart": figures.motions_apart,
-            "steps_us_apart": steps,
+            "steps_us_apart": by_phase(figures.step_us),
+            "steps_apart": by_phase(figures.step_share),
+            "counts_us_apart": figures.lag_us,
             "counts_apart_at_rest": figures.rest_counts,
             "requests_us_apart": figures.request_us,
         })
