@@ -8,7 +8,7 @@ use super::messages;
 use super::pair::{Pair, Snapshot};
 use super::side::Stream;
 use super::slack::{HOMING_TICKS, Slack, apart};
-use super::steps::Steps;
+use super::steps::{Moment, Steps};
 
 /// Longest time in microseconds from a message of one board to the same of the other: a page of flash is erased meanwhile.
 const PATIENCE_US: u64 = 300_000;
@@ -208,6 +208,11 @@ impl Comparison {
 
     fn compare_steps(&mut self, pair: &mut Pair) -> Result<(), Difference> {
         let pose = pair.ticks.back().map(|tick| tick.pose.clone());
+        let made = |tick: usize, axis: usize| {
+            let steps = |tick: usize| pair.ticks.iter().rev().nth(tick).map_or(0, |tick| tick.steps[axis]);
+            steps(tick).wrapping_sub(steps(tick + 1))
+        };
+        let steady = [0, 1].map(|axis| (1..4).all(|tick| made(0, axis).abs_diff(made(tick, axis)) <= 1));
         let [native, chip] = &mut pair.sides;
         for axis in 0..2 {
             if !native.steps[axis].is_empty() || !chip.steps[axis].is_empty() {
@@ -218,7 +223,7 @@ impl Comparison {
             steps.compare(
                 axis,
                 [&mut native.steps[axis], &mut chip.steps[axis]],
-                pose.as_ref(),
+                Moment { pose: pose.as_ref(), steady: steady[axis] },
                 self.apart,
                 self.slack.target_steps(axis),
                 &mut self.figures,

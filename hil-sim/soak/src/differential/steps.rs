@@ -9,8 +9,8 @@ use super::difference::{Difference, Figures};
 
 /// The list of a tick runs so much later on the chip, in nanoseconds.
 const LATE_NS: i64 = 20_000;
-/// Steps by which the way back from the home switch may differ: it is rounded from an encoder's count.
-const HOMING_STEPS: f64 = 2.0;
+/// Steps by which the way back from the home switch may differ: it is counted by the encoder, which lags in the fast search.
+const HOMING_STEPS: f64 = 4.0;
 /// Longest time between two steps that counts as their distance, in nanoseconds.
 const LONGEST_NS: u64 = 20_000_000;
 
@@ -56,6 +56,15 @@ impl Phase {
     }
 }
 
+/// What the native board was doing.
+#[derive(Clone, Copy, Debug)]
+pub struct Moment<'a> {
+    /// Its latest pose.
+    pub pose: Option<&'a PoseReport>,
+    /// Whether the axis goes at a constant speed.
+    pub steady: bool,
+}
+
 /// The steps of one axis since its last rest.
 #[derive(Clone, Debug, Default)]
 pub struct Steps {
@@ -77,7 +86,7 @@ impl Steps {
         &mut self,
         axis: usize,
         [native, chip]: [&mut VecDeque<(u64, bool)>; 2],
-        pose: Option<&PoseReport>,
+        Moment { pose, steady }: Moment<'_>,
         apart: Apart,
         target_steps: f64,
         figures: &mut Figures,
@@ -89,7 +98,7 @@ impl Steps {
             }
             native.pop_front();
             chip.pop_front();
-            let phase = self.phase(ours.0, pose);
+            let phase = self.phase(ours.0, pose, steady);
             let us = (theirs.0 as i64 - ours.0 as i64 - LATE_NS) as f64 * 1e-3;
             let differing = if apart.homing { HOMING_STEPS } else { target_steps - 1.0 };
             let apart_us = differing * self.interval_ns as f64 * 1e-3;
@@ -110,9 +119,8 @@ impl Steps {
         Ok(())
     }
 
-    fn phase(&mut self, at_ns: u64, pose: Option<&PoseReport>) -> Phase {
+    fn phase(&mut self, at_ns: u64, pose: Option<&PoseReport>, steady: bool) -> Phase {
         let interval = self.last_ns.map_or(LONGEST_NS, |last| at_ns.saturating_sub(last).min(LONGEST_NS));
-        let steady = interval.abs_diff(self.interval_ns) * 200 < interval;
         (self.last_ns, self.interval_ns) = (Some(at_ns), interval);
         let Some(pose) = pose else { return Phase::Changing };
         let first = *self.first_move.get_or_insert(pose.move_id);

@@ -20,7 +20,7 @@ pub struct Options {
     /// Cut the power so many times in the middle of a firmware update instead: at every erasure first, then at every word
     /// of the swap's state, then at all others, spread over the update; beyond that with other damage. The boot loader and
     /// the application are those of the board, on the simulated chip; the word or page under way is left torn.
-    #[arg(long, value_name = "COUNT", conflicts_with_all = ["scenarios", "seed", "only"])]
+    #[arg(long, value_name = "COUNT", conflicts_with_all = ["scenarios", "seed", "only", "differential"])]
     power_cuts: Option<usize>,
     /// Keeps the counts in this file, and continues with those that it holds.
     #[arg(long, value_name = "FILE", requires = "power_cuts")]
