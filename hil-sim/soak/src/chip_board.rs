@@ -75,6 +75,11 @@ impl ChipBoard {
         self.machine.time().0 / Picoseconds::microseconds(1).0
     }
 
+    /// How often the chip was reset.
+    pub(crate) fn resets(&self) -> u64 {
+        self.machine.resets()
+    }
+
     /// When the first control tick of the running firmware comes, in microseconds since the chip got power; `None` before
     /// its timer runs. To be asked within a tick of the start.
     pub(crate) fn first_tick_us(&mut self) -> Option<u64> {

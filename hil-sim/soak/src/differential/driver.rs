@@ -4,8 +4,12 @@ use std::collections::VecDeque;
 
 use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64Mcg;
-use vergence_plant::NativeBoard;
+use serde::Serialize;
+use vergence_image::layout::HARDWARE;
+use vergence_image::sha256;
+use vergence_plant::{NATIVE_HARDWARE, NativeBoard};
 use vergence_protocol::frame::{Header, Kind, encode};
+use vergence_protocol::management::{CHUNK, ImageHeader, Management, RebootTo, Signature};
 use vergence_protocol::{
     AxisMask, ControllerState, MAX_FRAME, Microseconds, PROTOCOL, Request, SessionId, schema_hash,
 };
@@ -24,6 +28,8 @@ const LEASE_MS: u16 = 100;
 /// Ticks at rest after which the session goes on, and longest wait for that.
 const REST_TICKS: u64 = 90;
 const LONGEST_TICKS: u64 = 30_000;
+/// Ticks for a management request: a page is erased, or a signature checked.
+const UPDATE_TICKS: u64 = 60;
 /// Sessions are numbered from here.
 const FIRST_SESSION: u32 = 0x5e55_0000;
 /// Ticks after a fault was mended, so that encoders and switches show it.
@@ -47,9 +53,10 @@ struct Driver {
     alive: bool,
     beat_in: u64,
     /// Frames that wait for the line.
-    waiting: VecDeque<Vec<u8>>,
+    waiting: VecDeque<[Vec<u8>; 2]>,
     control: u8,
     immediate: u8,
+    management: u8,
     mishaps: Vec<Mishap>,
     boots: u32,
 }
@@ -68,6 +75,7 @@ impl Driver {
             waiting: VecDeque::new(),
             control: 0,
             immediate: 0,
+            management: 0,
             mishaps: Vec::new(),
             boots: session.seed as u32,
         }
@@ -139,6 +147,7 @@ impl Driver {
             }
             Act::LateTick(us) => self.delay(*us),
             Act::Reset => self.reset(),
+            Act::Update(image) => self.update(image),
             Act::Recover => self.recover(),
             Act::ReadEvents => {
                 for first in (0..64).step_by(4) {
@@ -163,9 +172,9 @@ impl Driver {
                     }
                 };
             }
-            if let Some(frame) = self.waiting.pop_front() {
+            if let Some(frames) = self.waiting.pop_front() {
                 let phase = self.random.random_range(ARRIVALS_US[0]..ARRIVALS_US[1]);
-                self.pair.send(&frame, phase);
+                self.pair.send(frames, phase);
             }
             self.pair.turn();
             if let Some(halt) = self.pair.halted() {
@@ -176,12 +185,10 @@ impl Driver {
         Ok(())
     }
 
+    /// Queues a message for both boards.
     fn queue(&mut self, kind: Kind, seq: u8, request: &Request) {
-        let header = Header { major: PROTOCOL.major, kind, seq, ack: 0 };
-        let mut frame = [0; MAX_FRAME];
-        // Every request fits a frame.
-        let length = encode(header, request, &mut frame).unwrap_or(0);
-        self.waiting.push_back(frame[..length].to_vec());
+        let frame = framed(kind, seq, request);
+        self.waiting.push_back([frame.clone(), frame]);
     }
 
     fn ask(&mut self, request: &Request) {
@@ -238,15 +245,60 @@ impl Driver {
         self.wait(1)
     }
 
-    fn reset(&mut self) -> Result<(), Difference> {
-        self.boots += 1;
-        (self.open, self.alive) = (false, true);
-        self.waiting.clear();
-        if !self.pair.restart(self.boots) {
+    /// Sends an image whose signature is not good, asks for this and that, and lets the boards restart.
+    fn update(&mut self, image: &[u8]) -> Result<(), Difference> {
+        let length = u32::try_from(image.len()).unwrap_or(u32::MAX);
+        let header = ImageHeader { version: [9, 0, 0], length, sha256: sha256(image), ..ImageHeader::default() };
+        let [native, chip] =
+            [NATIVE_HARDWARE, HARDWARE].map(|hardware| Management::Begin(ImageHeader { hardware, ..header }));
+        let both = |request: Management| [request.clone(), request];
+        let mut requests = vec![both(Management::Identify), both(Management::Begin(header)), [native, chip]];
+        for (index, bytes) in image.chunks(CHUNK).enumerate() {
+            let mut data: heapless::Vec<u8, CHUNK> = bytes.iter().copied().collect();
+            let _ = data.resize(bytes.len().next_multiple_of(8), 0xFF);
+            requests.push(both(Management::Chunk { offset: (index * CHUNK) as u32, data }));
+        }
+        requests.push(both(Management::Commit(Signature { r: [1; 32], s: [2; 32] })));
+        requests.push(both(Management::Rollback));
+        for [native, chip] in requests {
+            self.manage([&native, &chip]);
+            self.wait(UPDATE_TICKS)?;
+        }
+        let resets = self.pair.resets();
+        let reboot = Management::Reboot(RebootTo::Application);
+        self.manage([&reboot, &reboot]);
+        for _ in 0..UPDATE_TICKS {
+            self.wait(1)?;
+            if self.pair.resets() != resets {
+                (self.open, self.boots) = (false, self.boots + 1);
+                self.waiting.clear();
+                return self.started(|pair, boot| pair.follow_reboot(boot));
+            }
+        }
+        // The drivers may be on.
+        Ok(())
+    }
+
+    fn manage(&mut self, requests: [&Management; 2]) {
+        let seq = self.management;
+        self.management = self.management.wrapping_add(1);
+        self.waiting.push_back(requests.map(|request| framed(Kind::Firmware, seq, request)));
+    }
+
+    /// Waits until both boards run again.
+    fn started(&mut self, start: impl FnOnce(&mut Pair, u32) -> bool) -> Result<(), Difference> {
+        if !start(&mut self.pair, self.boots) {
             return Err(Difference::new("restart", "runs", self.pair.halted()));
         }
         self.comparison.restarted(&self.pair);
         self.wait(10)
+    }
+
+    fn reset(&mut self) -> Result<(), Difference> {
+        self.boots += 1;
+        (self.open, self.alive) = (false, true);
+        self.waiting.clear();
+        self.started(Pair::restart)
     }
 
     fn recover(&mut self) -> Result<(), Difference> {
@@ -275,4 +327,13 @@ impl Driver {
         }
         self.wait(10)
     }
+}
+
+/// One frame with this message.
+fn framed<M: Serialize>(kind: Kind, seq: u8, message: &M) -> Vec<u8> {
+    let header = Header { major: PROTOCOL.major, kind, seq, ack: 0 };
+    let mut frame = [0; MAX_FRAME];
+    // Every request fits a frame.
+    let length = encode(header, message, &mut frame).unwrap_or(0);
+    frame[..length].to_vec()
 }

@@ -4,6 +4,7 @@ use std::collections::VecDeque;
 
 use vergence_control::TICK_US;
 use vergence_plant::{NativeBoard, Plant};
+use vergence_protocol::management::RebootTo;
 use vergence_protocol::{Microseconds, PoseReport, ResetCause};
 
 use super::side::Side;
@@ -20,6 +21,8 @@ const HANDLING_US: u64 = 50;
 pub const ARRIVALS_US: [u64; 2] = [150, 650];
 /// Longest time from a reset to the first tick: boot loader and signature check take some 0.2 s.
 const LONGEST_START_US: u64 = 2_000_000;
+/// Time in which loads come to rest, in microseconds.
+const SWINGING_US: u64 = 200_000;
 /// Ticks that are kept of the native board: more than the boards may be apart.
 const KEPT: usize = 128;
 
@@ -125,6 +128,21 @@ impl Pair {
     /// Presses the reset button of both boards and waits until they run again. Returns false where one does not.
     pub fn restart(&mut self, boot: u32) -> bool {
         self.chip.restart(boot, Microseconds(self.now_us));
+        self.start_again(boot, ResetCause::Pin)
+    }
+
+    /// How often the chip was reset.
+    pub fn resets(&self) -> u64 {
+        self.chip.resets()
+    }
+
+    /// Restarts the native board beside a chip that has restarted by itself, and waits until both run. Returns false where
+    /// the host has not asked the native board for it, or one does not run.
+    pub fn follow_reboot(&mut self, boot: u32) -> bool {
+        self.native.take_reboot() == Some(RebootTo::Application) && self.start_again(boot, ResetCause::Software)
+    }
+
+    fn start_again(&mut self, boot: u32, cause: ResetCause) -> bool {
         let reset_at = self.now_us;
         // Half a frame may have been on the wire.
         let _ = self.chip.transmit();
@@ -132,23 +150,24 @@ impl Pair {
         self.sides.iter_mut().for_each(Side::forget);
         // What still swings comes to rest while the chip starts.
         let native = &mut self.native;
-        let started = native.restart(ResetCause::Pin, boot).is_ok();
-        for us in (0..LONGEST_START_US / 10).step_by(STEP_US as usize) {
+        let started = native.restart(cause, boot).is_ok();
+        for us in (0..SWINGING_US).step_by(STEP_US as usize) {
             native.plant_mut().advance(Microseconds(us));
         }
-        started && native.restart(ResetCause::Pin, boot).is_ok() && self.start() && self.now_us > reset_at
+        started && native.restart(cause, boot).is_ok() && self.start() && self.now_us > reset_at
     }
 
-    /// Sends a frame that ends `phase_us` after the beginning of a tick, the first one in which it can end.
-    pub fn send(&mut self, frame: &[u8], phase_us: u64) {
-        let takes = (frame.len() as u64 * BYTE_NS).div_ceil(1_000);
+    /// Sends each board its frame, of the same length, so that it ends `phase_us` after the beginning of a tick, the first one
+    /// in which it can end.
+    pub fn send(&mut self, [native, chip]: [Vec<u8>; 2], phase_us: u64) {
+        let takes = (chip.len() as u64 * BYTE_NS).div_ceil(1_000);
         let soonest = self.now_us.max(self.free_us) + takes;
         let ticks = self.native_clock(soonest).saturating_sub(phase_us).div_ceil(TICK_US);
         let end = self.start_us + ticks * TICK_US + phase_us;
         self.run_to(end - takes);
-        self.chip.receive(frame);
+        self.chip.receive(&chip);
         self.free_us = end;
-        self.on_the_wire.push_back((end + HANDLING_US, frame.to_vec()));
+        self.on_the_wire.push_back((end + HANDLING_US, native));
     }
 
     /// Delays the next tick of both boards by `us` microseconds.

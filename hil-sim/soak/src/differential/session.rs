@@ -30,6 +30,8 @@ pub enum Act {
     Mishap(Mishap),
     /// The next control tick comes so many microseconds late.
     LateTick(u64),
+    /// An update with these bytes and a bad signature, and then a restart.
+    Update(Vec<u8>),
     /// The reset button is pressed.
     Reset,
     /// Mend the mechanics, clear a fault, arm, and home what has no reference: what a person would do.
@@ -235,7 +237,7 @@ impl Draw {
 
     /// Something that a host does, or that befalls the board.
     fn episode(&mut self) {
-        match self.random.random_range(0..16) {
+        match self.random.random_range(0..18) {
             0..3 => self.go(),
             3..6 => {
                 self.go();
@@ -287,6 +289,13 @@ impl Draw {
                 self.acts.push(Act::Open(period));
             }
             13 => self.nonsense(),
+            14 => {
+                self.ask(Request::Disarm);
+                let length = self.random.random_range(1..2_500);
+                let image = (0..length).map(|_| self.random.random()).collect();
+                self.acts.push(Act::Update(image));
+                self.acts.push(Act::Open(PERIODS_US[3]));
+            }
             _ => self.mishap(),
         }
         self.acts.push(Act::Rest);

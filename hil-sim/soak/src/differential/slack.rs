@@ -120,9 +120,9 @@ impl Slack {
         (self.motors[axis] + self.places[axis]) / self.step(axis) + 2.0
     }
 
-    /// Steps by which targets are apart.
+    /// Steps by which targets are apart: by the references, and two that start and target are rounded to.
     pub fn target_steps(&self, axis: usize) -> f64 {
-        self.places[axis] / self.step(axis) + 1.0
+        if self.places[axis] > 0.0 { self.places[axis] / self.step(axis) + 2.0 } else { 0.0 }
     }
 }
 

@@ -12,7 +12,10 @@ const LATE_NS: i64 = 20_000;
 /// Steps by which the way back from the home switch may differ: it is counted by the encoder, which lags in the fast search.
 const HOMING_STEPS: f64 = 4.0;
 /// Longest time between two steps that counts as their distance, in nanoseconds.
-const LONGEST_NS: u64 = 20_000_000;
+const LONGEST_NS: u64 = 60_000_000;
+/// Longest time in microseconds from the turn of one motor to that of the other: with targets some steps apart, one makes some
+/// steps more before it turns.
+const TURNING_US: f64 = 30_000.0;
 
 /// The phases of a motion whose step instants are compared; each has its bound.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -100,15 +103,18 @@ impl Steps {
             chip.pop_front();
             let phase = self.phase(ours.0, pose, steady);
             let us = (theirs.0 as i64 - ours.0 as i64 - LATE_NS) as f64 * 1e-3;
-            let differing = if apart.homing { HOMING_STEPS } else { target_steps - 1.0 };
-            let apart_us = differing * self.interval_ns as f64 * 1e-3;
+            let differing = if apart.homing { HOMING_STEPS } else { target_steps };
+            // Where the speed changes, the next steps may be twice as far apart as these.
+            let stretched = if matches!(phase, Phase::Homing | Phase::Steady) { 1.0 } else { 2.0 };
+            let apart_us = stretched * differing * self.interval_ns as f64 * 1e-3;
+            let turns = ours.1 != theirs.1 && target_steps > 0.0 && us.abs() < TURNING_US;
             let late_us = if apart.late { 200.0 } else { 0.0 };
             if ours.1 == theirs.1 && us.abs() <= phase.bound_us() + apart_us + late_us {
                 figures.steps += 1;
                 if !apart.late {
                     figures.note_step(phase, us.abs(), self.interval_ns as f64 * 1e-3);
                 }
-            } else if apart.homing || apart.failing {
+            } else if apart.homing || apart.failing || turns {
                 self.apart = true;
             } else {
                 let field = format!("instant of a step of axis {axis}, {}, us", phase.name());
