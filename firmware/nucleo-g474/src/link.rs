@@ -38,7 +38,6 @@ pub async fn receive(mut line: Receiver) {
         }
         // Requests may come faster than they are done: the answers to those before must not wait for the last.
         yield_now().await;
-        }
     }
 }
 

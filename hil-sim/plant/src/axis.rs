@@ -54,6 +54,17 @@ pub struct AxisPlant {
     slips: f64,
     /// Way of a step pulse, in steps of the motor's scale; not 1 where the driver has other microsteps, or drives nothing.
     step_size: f64,
+    /// The steps made since they were last taken, where they are recorded.
+    made: Option<Vec<StepMade>>,
+}
+
+/// One step of a motor.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct StepMade {
+    /// Time of the step on the clock of the plant, in nanoseconds.
+    pub at_ns: u64,
+    /// Whether the raw step count rose.
+    pub forward: bool,
 }
 
 impl AxisPlant {
@@ -75,7 +86,28 @@ impl AxisPlant {
             to_lose: 0,
             slips: 0.0,
             step_size: 1.0,
+            made: None,
         }
+    }
+
+    /// Records the instants of all steps from now on.
+    pub fn record_steps(&mut self) {
+        self.made.get_or_insert_default();
+    }
+
+    /// Takes the steps recorded since the last call, in order; empty where nothing is recorded.
+    pub fn take_steps(&mut self) -> Vec<StepMade> {
+        self.made.as_mut().map(std::mem::take).unwrap_or_default()
+    }
+
+    /// Lets a failed encoder count again from the count that it shows, as after its cable was mended: its counter does not jump.
+    pub fn mend_encoder(&mut self) {
+        self.encoder.go_on(self.scale_reading());
+    }
+
+    /// Counts from zero again, as an encoder's counter does whose chip restarts.
+    pub fn restart_encoder(&mut self) {
+        self.encoder.restart(self.scale_reading());
     }
 
     /// The true position of the load.
@@ -130,6 +162,11 @@ impl AxisPlant {
     /// Lets the rotor miss the next `steps` steps; a motor at rest loses none.
     pub fn lose_steps(&mut self, steps: u32) {
         self.to_lose += steps;
+    }
+
+    /// Lets the rotor miss no more steps.
+    pub fn keep_steps(&mut self) {
+        self.to_lose = 0;
     }
 
     /// Lets the coupling slip by `share` of every step; 0 makes it hold again.
@@ -197,9 +234,12 @@ impl AxisPlant {
 
     fn turn_motor(&mut self, to: Microseconds) {
         let step = 1.0 / counts_per_micro(self.mechanics.motor);
-        while let Some((_, forward)) = self.ordered.pop_front_if(|(at, _)| *at <= to.0 * 1000) {
+        while let Some((at_ns, forward)) = self.ordered.pop_front_if(|(at, _)| *at <= to.0 * 1000) {
             let by = if forward { 1 } else { -1 };
             self.steps += by;
+            if let Some(made) = &mut self.made {
+                made.push(StepMade { at_ns, forward });
+            }
             let turned = if self.stalled || self.to_lose > 0 { 0.0 } else { (1.0 - self.slips) * self.step_size };
             let lost = 1.0 - turned;
             self.to_lose = self.to_lose.saturating_sub(1);

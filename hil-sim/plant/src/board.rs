@@ -4,7 +4,7 @@ use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64Mcg;
 use vergence_control::{AxisSettings, BoardSettings, Node, NodeIdentity, SettingsError};
 use vergence_protocol::management::{NATIVE_HARDWARE, RebootTo};
-use vergence_protocol::{ControllerState, MAX_FRAME, Microseconds, ResetCause};
+use vergence_protocol::{ControllerState, MAX_FRAME, Microseconds, PoseReport, ResetCause};
 
 use crate::axis::AxisMechanics;
 use crate::plant::Plant;
@@ -130,6 +130,12 @@ impl NativeBoard {
     #[must_use]
     pub fn state(&self) -> ControllerState {
         self.node.controller().state()
+    }
+
+    /// The pose that the board would report now, with number zero.
+    #[must_use]
+    pub fn pose(&self) -> PoseReport {
+        self.node.controller().pose(self.now, 0, &self.plant)
     }
 
     /// Flash and boot loader, to change them.

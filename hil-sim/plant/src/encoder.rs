@@ -78,6 +78,21 @@ impl Encoder {
         };
     }
 
+    /// Counts truly again, from the count that it shows where the scale reads `scale`.
+    pub fn go_on(&mut self, scale: i32) {
+        self.zero = scale.wrapping_sub(self.raw(scale));
+        self.reading = Reading::True;
+    }
+
+    /// Counts from zero again where the scale reads `scale`; a failure lasts.
+    pub fn restart(&mut self, scale: i32) {
+        self.zero = scale;
+        match &mut self.reading {
+            Reading::Stuck(at) | Reading::Unpowered(at) | Reading::Mirrored(at) => *at = 0,
+            Reading::True | Reading::Noisy { .. } | Reading::Dead => {}
+        }
+    }
+
     /// Draws new noise, as time passes.
     pub fn advance(&mut self) {
         if let Reading::Noisy { amplitude, random, error } = &mut self.reading {

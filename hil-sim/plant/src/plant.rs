@@ -96,15 +96,22 @@ impl Plant {
         &self.drivers
     }
 
-    /// Restarts the clock of the board at zero and switches its outputs off; the mechanics keep their positions.
+    /// Restarts the clock of the board at zero, its counters of the encoders too, and switches its outputs off; the mechanics
+    /// keep their positions.
     pub fn restart_clock(&mut self) {
         self.set_drivers(false);
         self.holding = false;
+        self.axes.iter_mut().for_each(AxisPlant::restart_encoder);
         self.trigger_at = None;
         self.trigger_edges.clear();
         self.exposed = None;
         self.line = DriverLine::default();
         self.now = Microseconds(0);
+    }
+
+    /// Records the instants of all steps from now on.
+    pub fn record_steps(&mut self) {
+        self.axes.iter_mut().for_each(AxisPlant::record_steps);
     }
 
     /// Whether the drivers are on.

@@ -79,6 +79,41 @@ fn a_dead_hard_limit_reads_as_it_was_told() {
 }
 
 #[test]
+fn a_mended_encoder_goes_on_from_the_count_that_it_shows() {
+    let mut plant = plant();
+    plant.axis_mut(0).unwrap().fail_encoder(Some(EncoderFault::Stuck));
+    travel(&mut plant, 0, STEPS);
+    plant.axis_mut(0).unwrap().mend_encoder();
+    assert_eq!(plant.encoder(0), 0);
+    travel(&mut plant, 300_000, STEPS);
+    assert!((plant.encoder(0) - COUNTS).abs() < 10);
+}
+
+/// The counter is in the chip: the native board's went on counting from where it got power.
+#[test]
+fn a_restart_counts_from_zero_again_also_with_a_stuck_encoder() {
+    for fault in [None, Some(EncoderFault::Stuck), Some(EncoderFault::Reversed)] {
+        let mut plant = plant();
+        travel(&mut plant, 0, STEPS);
+        plant.axis_mut(0).unwrap().fail_encoder(fault);
+        plant.restart_clock();
+        assert_eq!(plant.encoder(0), 0, "{fault:?}");
+    }
+}
+
+#[test]
+fn recorded_steps_are_those_that_were_made_at_their_instants() {
+    let mut plant = plant();
+    plant.record_steps();
+    travel(&mut plant, 0, 400);
+    let made = plant.axis_mut(0).unwrap().take_steps();
+    let at: Vec<u64> = (0..400).map(|step| step * 500_000).collect();
+    assert_eq!(made.iter().map(|step| step.at_ns).collect::<Vec<_>>(), at);
+    assert!(made.iter().all(|step| step.forward) && plant.steps(0) == 400);
+    assert!(plant.axis_mut(0).unwrap().take_steps().is_empty());
+}
+
+#[test]
 fn a_reversed_encoder_turns_back_where_it_was_reversed() {
     let mut plant = plant();
     travel(&mut plant, 0, STEPS);

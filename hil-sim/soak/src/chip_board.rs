@@ -20,6 +20,9 @@ const DELAY_US: u64 = 5_000;
 /// Registers of TIM7, whose interrupt is the control tick (RM0440, 31.4): its enable bit and its counter, in microseconds.
 const TIM7_DIER: u32 = 0x4000_140C;
 const TIM7_CNT: u32 = 0x4000_1424;
+/// The clocks of peripherals and the bit for that of TIM7 (RM0440, 7.4.19).
+const RCC_APB1ENR1: u32 = 0x4002_1058;
+const TIM7EN: u32 = 1 << 5;
 /// Period of the control tick, in microseconds.
 const TICK_US: u64 = 1_000;
 
@@ -65,6 +68,27 @@ impl ChipBoard {
             let halt = self.machine.run_until(time);
             self.halted = (halt != Halt::Reached).then_some(halt);
         }
+    }
+
+    /// The time of the chip, in microseconds since it got power.
+    pub(crate) fn now_us(&self) -> u64 {
+        self.machine.time().0 / Picoseconds::microseconds(1).0
+    }
+
+    /// How often the chip was reset.
+    pub(crate) fn resets(&self) -> u64 {
+        self.machine.resets()
+    }
+
+    /// When the first control tick of the running firmware comes, in microseconds since the chip got power; `None` before
+    /// its timer runs. To be asked within a tick of the start.
+    pub(crate) fn first_tick_us(&mut self) -> Option<u64> {
+        let is_set =
+            |chip: &mut Self, register, bit: u32| chip.register(register, None).is_some_and(|value| value & bit != 0);
+        // The timer has no clock before.
+        let runs = is_set(self, RCC_APB1ENR1, TIM7EN) && is_set(self, TIM7_DIER, 1);
+        let passed = if runs { self.register(TIM7_CNT, None) } else { None };
+        passed.map(|passed| self.now_us() - u64::from(passed) + TICK_US)
     }
 
     fn register(&mut self, address: u32, value: Option<u32>) -> Option<u32> {

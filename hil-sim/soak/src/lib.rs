@@ -30,6 +30,8 @@ mod board_clock;
 mod checker;
 #[cfg(feature = "chip")]
 mod chip_board;
+#[cfg(feature = "chip")]
+pub mod differential;
 mod faults;
 mod host;
 mod injector;

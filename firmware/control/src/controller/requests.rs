@@ -1,8 +1,8 @@
 //! Requests: each is carried out or refused with a reason; values are never clamped.
 
 use vergence_protocol::{
-    AxisList, AxisMask, ControllerState, DriverState, FaultCode, Jog, Micro, Microseconds, Mode, Move, MoveId, MovePhase,
-    Permille, Refusal, Request, SessionId, Status, StopKind,
+    AxisList, AxisMask, ControllerState, DriverState, FaultCode, Jog, Micro, Microseconds, Mode, Move, MoveId,
+    MovePhase, Permille, Refusal, Request, SessionId, Status, StopKind,
 };
 
 use super::{ActiveMove, Controller};

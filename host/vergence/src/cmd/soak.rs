@@ -1,5 +1,6 @@
 //! `vergence soak`: fault injection over the whole stack in virtual time.
 
+mod differential;
 mod power_cuts;
 mod programs;
 
@@ -12,6 +13,9 @@ use crate::console::Console;
 use crate::failure::Failure;
 use crate::stopwatch::Stopwatch;
 
+/// Scenarios, unless the command line names another number.
+const SCENARIOS: u64 = 10_000;
+
 /// Plays scenarios in which something goes wrong: bytes, frames, the line, the board, encoders, switches, motors, the
 /// host's clock. A checker that knows the truth looks on: no stage passes a hard limit or moves without lease and arm, no
 /// mode is reported that is not reached, the first fault is kept, and everything ends. Host session, protocol and
@@ -19,15 +23,20 @@ use crate::stopwatch::Stopwatch;
 /// board's own firmware on the simulated chip. Exit code 1 where a promise is broken.
 #[derive(Debug, clap::Args)]
 pub struct Args {
-    /// How many scenarios.
-    #[arg(long, default_value_t = 10_000, value_name = "COUNT")]
-    scenarios: u64,
+    /// How many scenarios; 10 000 unless named, of --differential 100.
+    #[arg(long, value_name = "COUNT")]
+    scenarios: Option<u64>,
     /// The seed of the first scenario; the next ones follow it.
     #[arg(long, default_value_t = 1)]
     seed: u64,
     /// Plays the scenario of this seed alone, and prints what happens in it.
     #[arg(long, value_name = "SEED", conflicts_with_all = ["scenarios", "seed"])]
     only: Option<u64>,
+    /// Plays random sessions on both boards instead: on the controller without a chip and, with the same bytes and the same
+    /// mishaps at the same instants, on the board's own firmware. Every message, pose, step and place must agree, except for
+    /// what hil-sim/FIDELITY.md lists. Exit code 1 where they differ.
+    #[arg(long)]
+    differential: bool,
     #[command(flatten)]
     programs: programs::Options,
     #[command(flatten)]
@@ -37,6 +46,13 @@ pub struct Args {
 pub fn run(args: &Args, console: Console) -> Result<(), Failure> {
     if let Some(cuts) = args.power.cuts() {
         return power_cuts::run(&args.power, &args.programs, cuts, console);
+    }
+    if args.differential {
+        let flash = args.programs.flash()?;
+        return match args.only {
+            Some(seed) => differential::replay(seed, &flash, console),
+            None => differential::many(args.seed, args.scenarios, &flash, console),
+        };
     }
     if args.programs.on_chip() {
         let flash = args.programs.flash()?;
@@ -67,11 +83,12 @@ fn many<B: Board>(
 ) -> Result<(), Failure> {
     let stopwatch = Stopwatch::start();
     let progress = console.progress("soaking");
-    let (played, every) = (AtomicU64::new(0), (args.scenarios / 200).max(1));
-    let tally = soak(args.seed, args.scenarios, board, || {
+    let scenarios = args.scenarios.unwrap_or(SCENARIOS);
+    let (played, every) = (AtomicU64::new(0), (scenarios / 200).max(1));
+    let tally = soak(args.seed, scenarios, board, || {
         let played = played.fetch_add(1, Ordering::Relaxed) + 1;
         if played.is_multiple_of(every) {
-            progress.set_message(format!("{played} of {} scenarios", args.scenarios));
+            progress.set_message(format!("{played} of {scenarios} scenarios"));
             progress.tick();
         }
     })?;
@@ -79,13 +96,12 @@ fn many<B: Board>(
     let seconds = stopwatch.seconds();
     console.say(tally.table())?;
     console.say(format!(
-        "{} scenarios, {} promises broken; {:.1} h of virtual time in {seconds:.1} s",
-        args.scenarios,
+        "{scenarios} scenarios, {} promises broken; {:.1} h of virtual time in {seconds:.1} s",
         tally.violations.len(),
         tally.virtual_seconds / 3600.0,
     ))?;
     let mut result = tally.json();
-    result["scenarios"] = args.scenarios.into();
+    result["scenarios"] = scenarios.into();
     result["seconds"] = rounded(seconds).into();
     console.result(&result)?;
     tally.accusation().map_or(Ok(()), |broken| Err(Failure::check(broken)))

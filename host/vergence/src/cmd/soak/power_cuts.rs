@@ -21,7 +21,7 @@ pub struct Options {
     /// Cut the power so many times in the middle of a firmware update instead: at every erasure first, then at every word
     /// of the swap's state, then at all others, spread over the update; beyond that with other damage. The boot loader and
     /// the application are those of the board, on the simulated chip; the word or page under way is left torn.
-    #[arg(long, value_name = "COUNT", conflicts_with_all = ["scenarios", "seed", "only"])]
+    #[arg(long, value_name = "COUNT", conflicts_with_all = ["scenarios", "seed", "only", "differential"])]
     power_cuts: Option<usize>,
     /// What is done while the power is cut: an update; one that is not confirmed and taken back; a rollback; an update
     /// through the recovery; or settings that are saved.
