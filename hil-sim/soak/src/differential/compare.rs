@@ -214,7 +214,7 @@ impl Comparison {
         };
         let steady = [0, 1].map(|axis| (1..4).all(|tick| made(0, axis).abs_diff(made(tick, axis)) <= 1));
         let [native, chip] = &mut pair.sides;
-        for axis in 0..2 {
+        for (axis, &steady) in steady.iter().enumerate() {
             if !native.steps[axis].is_empty() || !chip.steps[axis].is_empty() {
                 self.moved_at_us = pair_time(&native.steps[axis], &chip.steps[axis]).max(self.moved_at_us);
             }
@@ -223,7 +223,7 @@ impl Comparison {
             steps.compare(
                 axis,
                 [&mut native.steps[axis], &mut chip.steps[axis]],
-                Moment { pose: pose.as_ref(), steady: steady[axis] },
+                Moment { pose: pose.as_ref(), steady },
                 self.apart,
                 self.slack.target_steps(axis),
                 &mut self.figures,

@@ -147,7 +147,7 @@ fn recorded(with: &mut Comparison, native: &RecordedEvents, chip: &RecordedEvent
                 Difference::unless_equal("axis of a recorded encoder", &axis, &a)?;
             }
             (Happening::Fault { code, axis, detail: _ }, Happening::Fault { code: c, axis: a, detail: _ }) => {
-                Difference::unless_equal("recorded fault", &(code, axis), &(c, a))?
+                Difference::unless_equal("recorded fault", &(code, axis), &(c, a))?;
             }
             (ours, theirs) => Difference::unless_equal("recorded event", &ours, &theirs)?,
         }

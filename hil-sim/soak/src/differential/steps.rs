@@ -96,7 +96,8 @@ impl Steps {
     ) -> Result<(), Difference> {
         while let (Some(&ours), Some(&theirs)) = (native.front(), chip.front()) {
             if self.apart {
-                (native.clear(), chip.clear());
+                native.clear();
+                chip.clear();
                 return Ok(());
             }
             native.pop_front();
