@@ -56,9 +56,7 @@ async fn main(spawner: Spawner) {
     let Ok(node) = Node::new(&defaults, identity, boot, &mut services) else {
         dying::give_up(DeathKind::Settings);
     };
-    let Some((rx, tx)) = board.line.open(node.baud()) else {
-        dying::give_up(DeathKind::SerialLine)
-    };
+    let Some((rx, tx)) = board.line.open(node.baud()) else { dying::give_up(DeathKind::SerialLine) };
     control::start(node, board.rig, services, board.tick);
     if let (Ok(receive), Ok(transmit), Ok(plan), Ok(watch)) = (
         link::receive(rx),
