@@ -130,7 +130,7 @@ fn line_errors_cost_the_frames_that_they_hit_and_no_more() {
 const BUTTON: &str = "PC13";
 
 /// Asks again until somebody answers, as every tool that updates a board does.
-fn manage(talk: &mut Talk, request: Management) -> ManagementReport {
+fn manage(talk: &mut Talk, request: &Management) -> ManagementReport {
     talk.management.clear();
     for _ in 0..20 {
         talk.host.manage(request.clone()).expect("the line takes it");
@@ -143,7 +143,7 @@ fn manage(talk: &mut Talk, request: Management) -> ManagementReport {
 }
 
 fn identity(talk: &mut Talk) -> Identity {
-    let ManagementReport::Identity(identity) = manage(talk, Management::Identify) else { panic!("no identity") };
+    let ManagementReport::Identity(identity) = manage(talk, &Management::Identify) else { panic!("no identity") };
     identity
 }
 
@@ -159,7 +159,7 @@ fn the_button_at_reset_leads_to_recovery_and_to_the_settings_of_the_factory() {
     talk.wait(500_000);
     talk.board.machine.chip_mut().drive(button, Drive::Floating);
     assert_eq!(identity(&mut talk).boot, BootState::Recovery);
-    let restarted = manage(&mut talk, Management::Reboot(RebootTo::Application));
+    let restarted = manage(&mut talk, &Management::Reboot(RebootTo::Application));
     assert!(matches!(restarted, ManagementReport::Progress { outcome: Outcome::Done, .. }), "{restarted:?}");
     println!("the application answers after {:.2} s", seconds_to_reconnect(&mut talk, 7));
     assert!(talk.board.heard_baud.abs_diff(FACTORY) < FACTORY / 1_000, "{}", talk.board.heard_baud);
@@ -179,7 +179,7 @@ fn the_button_at_reset_leads_to_recovery_and_to_the_settings_of_the_factory() {
 fn recovery_refuses_what_is_older_than_the_installed_application_accepts() {
     let mut talk = with_saved(FACTORY);
     assert_eq!(identity(&mut talk).oldest, [0, 1, 0]);
-    manage(&mut talk, Management::Reboot(RebootTo::Recovery));
+    manage(&mut talk, &Management::Reboot(RebootTo::Recovery));
     talk.wait(1_000_000);
     let recovery = identity(&mut talk);
     assert_eq!((recovery.boot, recovery.oldest), (BootState::Recovery, [0, 1, 0]));
@@ -190,12 +190,12 @@ fn recovery_refuses_what_is_older_than_the_installed_application_accepts() {
         ManagementReport::Progress { outcome, .. } => outcome,
         other => panic!("{other:?}"),
     };
-    assert_eq!(outcome(manage(&mut talk, begin([0, 0, 9]))), Outcome::TooOld);
-    assert_eq!(outcome(manage(&mut talk, begin([0, 1, 0]))), Outcome::Done);
+    assert_eq!(outcome(manage(&mut talk, &begin([0, 0, 9]))), Outcome::TooOld);
+    assert_eq!(outcome(manage(&mut talk, &begin([0, 1, 0]))), Outcome::Done);
     // A board without a whole application takes whatever is signed: nothing says what it would accept.
     assert!(talk.board.machine.chip_mut().load_flash(ACTIVE.start as usize + 0x4000, &[0; 64]));
     talk.board.machine.press_reset();
     talk.wait(1_000_000);
     assert_eq!(identity(&mut talk).oldest, [0; 3]);
-    assert_eq!(outcome(manage(&mut talk, begin([0, 0, 9]))), Outcome::Done);
+    assert_eq!(outcome(manage(&mut talk, &begin([0, 0, 9]))), Outcome::Done);
 }
