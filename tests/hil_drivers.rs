@@ -288,6 +288,25 @@ stories!(
     a_driver_with_other_settings_is_a_fault,
 );
 
+/// Saved settings reach drivers that have lost theirs with the power, before anything may move.
+#[test]
+fn saved_settings_reach_the_drivers_at_the_start() {
+    let mut talk = set_up::<ElfBoard>();
+    assert_eq!(talk.ask(Request::SaveSettings), Status::Accepted);
+    for axis in 0..2 {
+        with_chip(&mut talk, axis, |chip| chip.supply(false));
+        with_chip(&mut talk, axis, |chip| chip.supply(true));
+    }
+    let lost = talk.lost;
+    talk.board.machine.power_on();
+    talk.wait_until("the restart goes unnoticed", |talk| talk.lost > lost);
+    talk.reconnect(7);
+    talk.wait(SETTING_US);
+    assert_eq!([0, 1].map(|axis| state(&mut talk, axis)), [DriverState::Ready; 2]);
+    assert_eq!([0, 1].map(|axis| chip(&talk, axis).microsteps()), [MICROSTEPS; 2]);
+    assert_eq!(talk.arm(), Status::Accepted);
+}
+
 /// With plain drivers, as delivered, the line is never used.
 #[test]
 fn a_plain_rig_says_nothing_on_the_line() {
