@@ -65,11 +65,13 @@ pub enum SettingItem {
     Microsteps,
     /// 1 if the driver regulates the voltage (quiet), 0 if it regulates the current.
     StealthChop,
+    /// Largest error at the end of a move that a short second move corrects, as of a screw whose pitch varies; 0 for none.
+    Correction,
 }
 
 impl SettingItem {
     /// Every item, in wire order.
-    pub const ALL: [Self; 28] = [
+    pub const ALL: [Self; 29] = [
         Self::Min,
         Self::Max,
         Self::Speed,
@@ -98,6 +100,7 @@ impl SettingItem {
         Self::HoldDelay,
         Self::Microsteps,
         Self::StealthChop,
+        Self::Correction,
     ];
 
     /// Whether each axis has a setting of this kind; else the board has one.
@@ -138,6 +141,7 @@ impl SettingItem {
             Self::HoldDelay => "hold_delay",
             Self::Microsteps => "microsteps",
             Self::StealthChop => "stealth_chop",
+            Self::Correction => "correction",
         }
     }
 }
