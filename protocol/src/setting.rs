@@ -68,11 +68,13 @@ pub enum SettingItem {
     StealthChop,
     /// Of the board: time in microseconds at rest after which the motors get their holding current; 0 for never.
     HoldAfter,
+    /// Largest error at the end of a move that a short second move corrects, as of a screw whose pitch varies; 0 for none.
+    Correction,
 }
 
 impl SettingItem {
     /// Every item, in wire order.
-    pub const ALL: [Self; 29] = [
+    pub const ALL: [Self; 30] = [
         Self::Min,
         Self::Max,
         Self::Speed,
@@ -102,6 +104,7 @@ impl SettingItem {
         Self::Microsteps,
         Self::StealthChop,
         Self::HoldAfter,
+        Self::Correction,
     ];
 
     /// Whether each axis has a setting of this kind; else the board has one.
@@ -143,6 +146,7 @@ impl SettingItem {
             Self::Microsteps => "microsteps",
             Self::StealthChop => "stealth_chop",
             Self::HoldAfter => "hold_after_us",
+            Self::Correction => "correction",
         }
     }
 }

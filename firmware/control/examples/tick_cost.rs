@@ -64,6 +64,7 @@ fn axis(step_rate: u32) -> AxisSettings {
         following_error: Micro(1_000),
         tolerance: Micro(20),
         backlash: Micro(0),
+        correction: Micro(0),
         homing: HomingSettings {
             switch_at: Micro(-1_000),
             seek_speed: 10_000,

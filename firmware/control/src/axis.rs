@@ -217,9 +217,14 @@ impl Axis {
         micro_from(self.command())
     }
 
+    /// Target minus encoder.
+    pub fn error(&self, target: Micro, io: &impl RigIo) -> Micro {
+        Micro(target.0.saturating_sub(self.position(io).0))
+    }
+
     /// Whether the encoder reads `target` within the tolerance.
     pub fn is_at(&self, target: Micro, io: &impl RigIo) -> bool {
-        self.position(io).0.abs_diff(target.0) <= self.settings.tolerance.0.unsigned_abs()
+        self.error(target, io).0.unsigned_abs() <= self.settings.tolerance.0.unsigned_abs()
     }
 
     /// Reads the hard limit; call it once each tick.

@@ -195,6 +195,7 @@ impl AxisSettings {
             following_error: nothing,
             tolerance: nothing,
             backlash: nothing,
+            correction: nothing,
             homing,
             driver: DriverSettings::default(),
         }
@@ -229,6 +230,7 @@ impl AxisSettings {
             SettingItem::HoldDelay => driver.hold_delay_us.into(),
             SettingItem::Microsteps => driver.microsteps.into(),
             SettingItem::StealthChop => driver.stealth_chop.into(),
+            SettingItem::Correction => self.correction.0.into(),
             _ => return None,
         })
     }
@@ -261,6 +263,7 @@ impl AxisSettings {
             SettingItem::HoldDelay => driver.hold_delay_us = number(value)?,
             SettingItem::Microsteps => driver.microsteps = number(value)?,
             SettingItem::StealthChop => driver.stealth_chop = flag(value)?,
+            SettingItem::Correction => self.correction = micro(value)?,
             _ => return Err(SettingError::Unknown),
         }
         Ok(())

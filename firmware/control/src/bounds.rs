@@ -42,7 +42,7 @@ pub(crate) fn check(settings: &AxisSettings, axis: usize) -> Result<(), Settings
     Ok(())
 }
 
-fn bounds(settings: &AxisSettings) -> [Bound; 9] {
+fn bounds(settings: &AxisSettings) -> [Bound; 10] {
     let homing = &settings.homing;
     let [min, max] = [settings.min, settings.max].map(|end| i64::from(end.0));
     let travel = i64::from(homing.travel.0);
@@ -73,6 +73,13 @@ fn bounds(settings: &AxisSettings) -> [Bound; 9] {
             0,
             travel / 20,
             "it is the play of a stage, not a way",
+        ),
+        bound(
+            SettingItem::Correction,
+            settings.correction.0.into(),
+            0,
+            i64::from(settings.following_error.0) / 2,
+            "a stage that is further off did not follow",
         ),
         bound(
             SettingItem::Jerk,

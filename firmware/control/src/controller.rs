@@ -11,6 +11,7 @@
 
 mod planning;
 mod requests;
+mod settling;
 mod tick;
 mod update;
 
@@ -57,8 +58,10 @@ struct ActiveMove {
     phase: MovePhase,
     /// Time since which all encoders have been inside the tolerance.
     inside_since: Option<Microseconds>,
-    /// Time by which the encoders must be inside the tolerance.
-    settle_by: Microseconds,
+    /// Since when the axes rest.
+    rests_since: Option<Microseconds>,
+    /// Number of short moves that corrected the end.
+    corrections: u8,
 }
 
 /// The controller of up to [`vergence_protocol::MAX_AXES`] axes. Time and the board behind [`RigIo`] are arguments.
@@ -112,7 +115,8 @@ impl Controller {
             share: 1.0,
             phase: MovePhase::None,
             inside_since: None,
-            settle_by: Microseconds(0),
+            rests_since: None,
+            corrections: 0,
         };
         Ok(Self {
             axes,

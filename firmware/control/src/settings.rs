@@ -110,6 +110,9 @@ pub struct AxisSettings {
     /// Length of the last approach of a move, which always comes from below, so that play is taken up on the same side; 0
     /// for an axis without play.
     pub backlash: Micro,
+    /// Largest error at the end of a move that a short second move corrects, as of a screw whose pitch varies; 0 for none.
+    /// Steps or counts that were lost are not noticed up to it.
+    pub correction: Micro,
     /// Settings of the search for the home switch.
     pub homing: HomingSettings,
     /// Settings of the motor driver.

@@ -27,6 +27,7 @@ pub fn axes() -> [AxisSettings; AXES] {
         following_error: Micro(1_000),
         tolerance: Micro(20),
         backlash: Micro(0),
+        correction: Micro(0),
         homing: HomingSettings {
             switch_at: Micro(58_000),
             seek_speed: 40_000,
@@ -51,6 +52,7 @@ pub fn axes() -> [AxisSettings; AXES] {
         following_error: Micro(millidegrees(1_000)),
         tolerance: Micro(millidegrees(20)),
         backlash: Micro(0),
+        correction: Micro(0),
         homing: HomingSettings {
             switch_at: Micro(-millidegrees(1_500)),
             seek_speed: millidegrees(20_000).unsigned_abs(),

@@ -17,6 +17,8 @@ pub struct AxisMechanics {
     pub encoder: Scale,
     /// Play between motor and load.
     pub backlash: f64,
+    /// Errors of the screw or pinion between motor and load.
+    pub pitch: PitchError,
     /// Play between the encoder and the stage that it stands for, such as of a rack behind its pinion.
     pub encoder_play: f64,
     /// Time constant with which the load follows the motor, in seconds, above zero.
@@ -29,6 +31,25 @@ pub struct AxisMechanics {
     pub end_stops: [f64; 2],
 }
 
+/// How far a screw or pinion leads the load beside where a perfect one would, in micro-units.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct PitchError {
+    /// Error that grows with the position: micro-units for each micro-unit.
+    pub lead: f64,
+    /// Largest error that returns with each period, such as of a turn of the screw.
+    pub wobble: f64,
+    /// That period in micro-units; of no effect where `wobble` is zero.
+    pub period: f64,
+}
+
+impl PitchError {
+    /// The error at a position of the motor.
+    fn at(&self, position: f64) -> f64 {
+        let turn = if self.wobble == 0.0 { 0.0 } else { std::f64::consts::TAU * position / self.period };
+        self.lead * position + self.wobble * turn.sin()
+    }
+}
+
 /// The state of one axis.
 #[derive(Clone, Debug)]
 pub struct AxisPlant {
@@ -39,6 +60,8 @@ pub struct AxisPlant {
     steps: i32,
     /// Axis position of motor step zero; changes when steps are lost.
     motor_zero: f64,
+    /// Error of the pitch where the axis started: only differences move the load.
+    pitch_zero: f64,
     /// Positions of the scale of the encoder and of the stage.
     load: f64,
     stage: f64,
@@ -76,6 +99,7 @@ impl AxisPlant {
             ordered: VecDeque::new(),
             steps: 0,
             motor_zero: position,
+            pitch_zero: mechanics.pitch.at(position),
             load: position,
             stage: position,
             encoder: Encoder::new(scale_reading(mechanics.encoder, position)),
@@ -217,7 +241,8 @@ impl AxisPlant {
         if drivers_on {
             self.turn_motor(to);
         }
-        let motor = self.motor_zero + f64::from(self.steps) / counts_per_micro(self.mechanics.motor);
+        let turned = self.motor_zero + f64::from(self.steps) / counts_per_micro(self.mechanics.motor);
+        let motor = turned + self.mechanics.pitch.at(turned) - self.pitch_zero;
         let play = self.mechanics.backlash / 2.0;
         // Inside the play the load is at rest; outside, the transmission pulls it after the motor.
         let pulled = self.load.clamp(motor - play, motor + play);

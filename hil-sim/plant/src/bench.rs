@@ -6,7 +6,7 @@ use std::f64::consts::PI;
 use vergence_control::{AxisSettings, DriverSettings, HomingSettings};
 use vergence_protocol::{AxisKind, Micro};
 
-use crate::axis::AxisMechanics;
+use crate::axis::{AxisMechanics, PitchError};
 
 /// A stage: the settings of its controller, and its real mechanics.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -35,6 +35,7 @@ impl Stage {
             following_error: Micro(1_000),
             tolerance: Micro(20),
             backlash: Micro(0),
+            correction: Micro(0),
             homing: HomingSettings {
                 switch_at: Micro(min.0 - 2_000),
                 seek_speed: 40_000,
@@ -65,6 +66,7 @@ impl Stage {
             following_error: Micro(degrees(1.0)),
             tolerance: Micro(degrees(0.02)),
             backlash: Micro(0),
+            correction: Micro(0),
             homing: HomingSettings {
                 switch_at: Micro(min.0 - degrees(1.5)),
                 // A search stopped while it speeds up needs 2.5° more, and the hard limit is 3.5° beyond the switch.
@@ -88,6 +90,7 @@ fn mechanics(settings: &AxisSettings, backlash: f64, beyond: [f64; 2], further: 
         motor: settings.motor(),
         encoder: settings.encoder(),
         backlash,
+        pitch: PitchError::default(),
         encoder_play: 0.0,
         compliance: 2e-3,
         home_switch: f64::from(settings.homing.switch_at.0),

@@ -14,7 +14,7 @@ mod services;
 mod switch;
 mod tmc2209;
 
-pub use axis::{AxisMechanics, AxisPlant, StepMade};
+pub use axis::{AxisMechanics, AxisPlant, PitchError, StepMade};
 pub use bench::{Stage, bench_mechanics, bench_settings};
 pub use board::NativeBoard;
 pub use drivers::Drivers;

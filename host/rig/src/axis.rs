@@ -116,6 +116,9 @@ pub struct RigAxis {
     pub calibrated: Option<[AxisPosition; 2]>,
     /// Encoder counts per metre or revolution.
     pub counts_per_unit: u32,
+    /// Play between encoder and stage in millimetres or radians: the stage is up to half of it to either side of where the
+    /// encoder says.
+    pub play: f64,
 }
 
 impl RigAxis {
@@ -145,6 +148,13 @@ impl RigAxis {
     #[must_use]
     pub fn value_at(&self, counts: f64) -> f64 {
         (counts + 0.5) * self.value_per_count()
+    }
+
+    /// Standard deviation in counts of the stage beside its encoder's reading, whose own is `reading` counts. A stage with play
+    /// that was moved lies at one end of the play or at the other.
+    #[must_use]
+    pub fn sigma_with_play(&self, reading: f64) -> f64 {
+        reading.hypot(0.5 * self.play / self.value_per_count())
     }
 
     /// The counts, with a fraction, at `value` in millimetres or radians: the inverse of [`Self::value_at`].

@@ -64,6 +64,7 @@ struct AxisFile {
     calibrated: Option<[String; 2]>,
     counts_per_metre: Option<u32>,
     counts_per_revolution: Option<u32>,
+    play: Option<String>,
 }
 
 #[derive(Clone, Copy, Deserialize)]
@@ -196,7 +197,12 @@ fn axis(file: &AxisFile) -> Result<RigAxis, RigError> {
     }
     let place = format!("calibrated range of axis '{name}'");
     let calibrated = file.calibrated.as_ref().map(|ends| interval(kind, ends, &place)).transpose()?;
-    Ok(RigAxis { name: name.clone(), kind, range, calibrated, counts_per_unit })
+    let place = format!("play of axis '{name}'");
+    let play = file.play.as_ref().map_or(Ok(0.0), |play| position(kind, play, &place).map(AxisPosition::value))?;
+    if !(0.0..=range[1].value() - range[0].value()).contains(&play) {
+        return Err(contradiction(format!("{place} must not be negative, nor more than its range")));
+    }
+    Ok(RigAxis { name: name.clone(), kind, range, calibrated, counts_per_unit, play })
 }
 
 /// Parses the ends of a range, of which the first must be the lower.

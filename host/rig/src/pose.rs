@@ -3,7 +3,7 @@
 use nalgebra::{Matrix6, Vector6};
 use vergence_vision::{Angle, Base, Left, Length, Right, Transform};
 
-use crate::axis::AxisPosition;
+use crate::axis::{AxisPosition, RigAxis};
 use crate::rig::Rig;
 use crate::track::{JointsAt, UNIFORM};
 
@@ -16,7 +16,7 @@ pub struct RigPose {
     pub left_from_right: Transform<Left, Right>,
     /// The position of each axis.
     pub axes: Vec<AxisPosition>,
-    /// Standard deviation of the relative rotation, from encoders and calibration.
+    /// Standard deviation of the relative rotation, from encoders, their play and calibration.
     pub rotation_sigma: Angle,
     /// Standard deviation of the relative translation, from encoders and calibration.
     pub translation_sigma: Length,
@@ -78,8 +78,10 @@ impl Rig {
         // First the errors of each axis by itself, then that of the instant, which moves all axes together.
         let alone = (0..self.axes.len()).map(|index| {
             [left, right].map(|joints| {
-                let sigma = |i: usize| if i == index { joints.sigma.get(i).copied().unwrap_or(0.0) } else { 0.0 };
-                (0..self.axes.len()).map(sigma).collect::<Vec<f64>>()
+                let of_reading = joints.sigma.get(index).copied().unwrap_or(0.0);
+                let sigma =
+                    |(i, axis): (usize, &RigAxis)| if i == index { axis.sigma_with_play(of_reading) } else { 0.0 };
+                self.axes.iter().enumerate().map(sigma).collect::<Vec<f64>>()
             })
         });
         let together = [left, right].map(|joints| joints.timing.clone());

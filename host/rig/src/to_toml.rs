@@ -34,6 +34,8 @@ struct Axis<'a> {
     counts_per_metre: Option<u32>,
     #[serde(skip_serializing_if = "Option::is_none")]
     counts_per_revolution: Option<u32>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    play: Option<String>,
 }
 
 #[derive(Serialize)]
@@ -120,6 +122,7 @@ fn axis(axis: &RigAxis) -> Axis<'_> {
         calibrated: axis.calibrated.map(|ends| ends.map(position)),
         counts_per_metre: scale_of(AxisKind::Linear),
         counts_per_revolution: scale_of(AxisKind::Rotary),
+        play: (axis.play > 0.0).then(|| position(AxisPosition::from_value(axis.kind, axis.play))),
     }
 }
 

@@ -173,9 +173,10 @@ impl Controller {
 
     fn begin(&mut self, id: MoveId, mode: Mode, targets: AxisList<Micro>, speed: Permille) {
         self.abort_motion();
-        let (inside_since, settle_by) = (None, Microseconds(0));
         let share = f32::from(speed.0) / f32::from(Permille::FULL.0);
-        self.active = ActiveMove { id, mode, targets, share, phase: MovePhase::Running, inside_since, settle_by };
+        let (inside_since, rests_since, corrections) = (None, None, 0);
+        let phase = MovePhase::Running;
+        self.active = ActiveMove { id, mode, targets, share, phase, inside_since, rests_since, corrections };
         self.want_plan();
         self.state = ControllerState::Moving;
         self.queue_phase();

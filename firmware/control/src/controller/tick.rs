@@ -1,6 +1,6 @@
 //! The control tick: watches inputs, decides, orders steps.
 
-use vergence_protocol::{ControllerState, DriverState, FaultCode, Microseconds, MovePhase};
+use vergence_protocol::{ControllerState, DriverState, FaultCode, Microseconds};
 
 use super::Controller;
 use crate::TICK_US;
@@ -9,14 +9,9 @@ use crate::homing_sequence::HomingFailure;
 use crate::io::RigIo;
 use crate::self_test::Verdict;
 
-/// Time in microseconds that the encoders must stay inside the tolerance before a move counts as settled.
-const DWELL_US: u64 = 50_000;
 /// Latest time in microseconds after which a tick may come while steps are made. A board that starts the steps of a tick by
 /// its interrupt lets the list of the tick before end meanwhile, which is late by as much.
 const LATEST_US: u64 = 200;
-/// Longest time in microseconds from the end of a trajectory until the encoders are inside the tolerance.
-const SETTLE_TIMEOUT_US: u64 = 1_000_000;
-
 impl Controller {
     /// Runs one control tick: watches inputs and lease, runs homing, moves and stops, orders the steps of the next tick.
     /// Returns the time of the next tick; earlier calls do nothing.
@@ -136,47 +131,6 @@ impl Controller {
         }
     }
 
-    fn poll_move(&mut self, now: Microseconds, io: &impl RigIo) {
-        if self.planning.is_some() || self.any_moving() {
-            return;
-        }
-        if self.active.phase == MovePhase::Running {
-            self.active.phase = MovePhase::Settling;
-            self.active.settle_by = Microseconds(now.0 + SETTLE_TIMEOUT_US);
-            self.queue_phase();
-        }
-        if !self.inside_tolerance(io) {
-            self.active.inside_since = None;
-            if now >= self.active.settle_by {
-                let (axis, error) = self.worst_error(io);
-                self.doubt_references(io);
-                self.fail_softly(now, FaultCode::NotSettled, axis, error);
-            }
-            return;
-        }
-        let since = *self.active.inside_since.get_or_insert(now);
-        if now.0 - since.0 >= DWELL_US {
-            self.active.phase = MovePhase::Settled;
-            self.state = ControllerState::Ready;
-            self.queue_phase();
-        }
-    }
-
-    /// Forgets where the axes are that are not at their targets: steps or counts were lost, such as in a gap of the encoder's
-    /// supply, and nobody can say which of them.
-    fn doubt_references(&mut self, io: &impl RigIo) {
-        for (axis, &target) in self.axes.iter_mut().zip(&self.active.targets) {
-            if !axis.is_at(target, io) {
-                axis.forget_reference();
-            }
-        }
-    }
-
-    fn worst_error(&self, io: &impl RigIo) -> (usize, i32) {
-        let errors = self.axes.iter().zip(&self.active.targets).map(|(axis, target)| target.0 - axis.position(io).0);
-        errors.enumerate().max_by_key(|(_, error)| error.abs()).unwrap_or((0, 0))
-    }
-
     fn finish_stop(&mut self, io: &mut impl RigIo) {
         if self.disarm_at_rest {
             self.go_idle(io);
@@ -186,7 +140,7 @@ impl Controller {
     }
 
     /// Raises a fault after which the axes are braked and held, with the references that they have.
-    fn fail_softly(&mut self, now: Microseconds, code: FaultCode, axis: usize, detail: i32) {
+    pub(super) fn fail_softly(&mut self, now: Microseconds, code: FaultCode, axis: usize, detail: i32) {
         self.brake();
         self.state = ControllerState::Fault;
         self.raise(now, code, Some(axis), detail);

@@ -36,6 +36,7 @@ pub fn linear() -> AxisSettings {
         following_error: Micro(1_000),
         tolerance: Micro(20),
         backlash: Micro(0),
+        correction: Micro(0),
         homing: HomingSettings {
             switch_at: Micro(58_000),
             seek_speed: 100_000,
@@ -64,6 +65,7 @@ pub fn rotary() -> AxisSettings {
         following_error: Micro(17_453),
         tolerance: Micro(349),
         backlash: Micro(0),
+        correction: Micro(0),
         homing: HomingSettings {
             switch_at: Micro(-26_180),
             seek_speed: 1_000_000,
