@@ -16,7 +16,7 @@ pub const BOOTLOADER: Region = Region { start: 0, length: 62 * 1024 };
 /// Flash page for the progress of a swap: a word for the state, one for its validity, and four for each page of
 /// [`ACTIVE`].
 pub const STATE: Region = Region { start: 0xF800, length: PAGE };
-/// Flash of the running application, and a page for its seal. A swap moves all of it, in 5 s at most, so it is small.
+/// Flash of the running application, and a page for its seal. A swap moves all of it, in 6 s at most, so it is small.
 pub const ACTIVE: Region = Region { start: 0x1_0000, length: CAPACITY + PAGE };
 /// Flash of the settings: two pages, written in turn.
 pub const SETTINGS: Region = Region { start: 0x3_F000, length: 2 * PAGE };
@@ -25,7 +25,7 @@ pub const SETTINGS: Region = Region { start: 0x3_F000, length: 2 * PAGE };
 pub const DFU: Region = Region { start: 0x4_0000, length: ACTIVE.length + PAGE };
 
 /// Length of the longest image in bytes. The seal begins at this offset behind every image.
-pub const CAPACITY: u32 = 108 * 1024;
+pub const CAPACITY: u32 = 122 * 1024;
 
 /// RAM for variables and stack: SRAM1 and SRAM2 less [`SURVIVOR`].
 pub const RAM: Region = Region { start: 0x2000_0000, length: 95 * 1024 };

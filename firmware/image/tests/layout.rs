@@ -45,9 +45,9 @@ fn the_seal_is_whole_words_behind_the_longest_image() {
 
 /// Erasing takes 22.5 ms a page, programming 85 us a word (STM32G474 data sheet, typical), and each page goes two ways.
 #[test]
-fn a_swap_takes_less_than_five_seconds() {
+fn a_swap_takes_less_than_six_seconds() {
     let page_us = 22_500 + PAGE / WORD * 85;
-    assert!(ACTIVE.length / PAGE * 2 * page_us < 5_000_000);
+    assert!(ACTIVE.length / PAGE * 2 * page_us < 6_000_000);
 }
 
 #[test]
