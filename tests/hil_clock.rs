@@ -152,7 +152,7 @@ impl Watch {
 
     /// Puts another adapter between host and board, which forgets what the first one told about the clock.
     fn plug(&mut self, kind: AdapterKind) {
-        self.adapter = Adapter::new(kind, self.us, self.now());
+        self.adapter.become_kind(kind, self.us);
         self.map = ClockMap::at_baud(BAUD);
         (self.next_probe, self.probes) = (0, 0);
         (self.offset, self.drift) = (Worst::default(), Worst::default());

@@ -1,5 +1,6 @@
 //! `vergence config set baud` on the firmware, behind a serial adapter that makes the speed and one that does not.
 #![allow(clippy::expect_used, clippy::panic, reason = "a test fails loudly")]
+#![allow(clippy::disallowed_methods, reason = "the simulated board runs in real time")]
 
 #[path = "elf_rig/build.rs"]
 mod build;

@@ -55,6 +55,12 @@ impl Adapter {
         Self { kind, since: (us, clock.0), to_board: Pipe::default(), from_board: Pipe::default(), random }
     }
 
+    /// Behaves in another way from a true time on; bytes on their way arrive as they would have.
+    pub fn become_kind(&mut self, kind: AdapterKind, us: u64) {
+        self.since = (us, self.host_clock(us) as u64);
+        self.kind = kind;
+    }
+
     /// The host's clock at a true time, in microseconds and their fraction.
     pub fn host_clock(&self, us: u64) -> f64 {
         let (from, clock) = self.since;

@@ -94,6 +94,8 @@ impl RigIo for Rig {
         self.steps.get(axis).map_or(0, StepPulses::count)
     }
 
+    // Not inlined: copies of it in the controller would take 5 kB of flash.
+    #[inline(never)]
     fn encoder(&self, axis: usize) -> i32 {
         match &self.latched {
             Some(latched) => latched.counts.get(axis).copied().unwrap_or(0),
