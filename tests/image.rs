@@ -108,7 +108,7 @@ fn what_cannot_be_signed_is_told() {
         fails_with(&[&["image", "sign", &input], &options[..]].concat(), 2, words);
         assert!(!Path::new(&out).exists());
     };
-    refused("empty.bin", &[], &["empty.bin", "1 to 110592 bytes"]);
+    refused("empty.bin", &[], &["empty.bin", "1 to 124928 bytes"]);
     refused("long.bin", &vec![0; 110_593], &["110593"]);
     refused("noise.bin", &[7; 100], &["vector table"]);
     refused("x86.elf", &elf(3, &[(START, &app)]), &["not for an Arm processor"]);

@@ -45,6 +45,11 @@ pub trait RigIo {
     fn steps(&self, axis: usize) -> i32;
     /// The raw encoder count.
     fn encoder(&self, axis: usize) -> i32;
+    /// Names the highest rate at which the encoder of `axis` will count, in counts a second, so that a board can ignore shorter
+    /// pulses of its lines. A board without a filter does nothing.
+    fn expect_counts(&mut self, axis: usize, per_second: u32) {
+        let _ = (axis, per_second);
+    }
     /// When the encoders were read that [`Self::encoder`] gives in the tick of `now`. A board that reads them at another
     /// instant than that at which the tick was due says so: at 80 mm/s a pose is off by 80 nm for each microsecond.
     fn encoders_read_at(&self, now: Microseconds) -> Microseconds {

@@ -215,7 +215,7 @@ impl Node {
     /// Runs the control tick, and trigger and telemetry when they are due.
     pub fn poll(&mut self, now: Microseconds, io: &mut impl RigIo) {
         if core::mem::take(&mut self.drivers_wait) {
-            self.tell_drivers(io);
+            self.configure(io);
         }
         let next_tick = self.controller.poll(now, io);
         self.watch_update(now);
@@ -235,7 +235,11 @@ impl Node {
         self.wakes_at = Microseconds(next_tick.0 + rest);
     }
 
-    fn tell_drivers(&self, io: &mut impl RigIo) {
+    /// Puts the settings of motor drivers and encoders into effect.
+    fn configure(&self, io: &mut impl RigIo) {
+        for (index, axis) in self.settings.axes.iter().enumerate() {
+            io.expect_counts(index, axis.count_rate());
+        }
         io.configure_drivers(&self.settings.axes.iter().map(|axis| axis.driver).collect());
     }
 

@@ -227,6 +227,14 @@ impl AxisSettings {
         Limits { speed: self.speed as f32, acceleration: self.acceleration as f32, jerk: self.jerk as f32 }
     }
 
+    /// Counts of the encoder in a second at full speed.
+    #[must_use]
+    pub fn count_rate(&self) -> u32 {
+        let counts =
+            u64::from(self.speed) * u64::from(self.counts_per_unit) * 1000 / self.encoder().milli_micro() as u64;
+        u32::try_from(counts).unwrap_or(u32::MAX)
+    }
+
     /// The limits of homing at `speed`, but no faster than the axis may move: full acceleration and jerk.
     #[must_use]
     pub fn limits_at(&self, speed: u32) -> Limits {

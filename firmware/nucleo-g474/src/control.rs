@@ -127,6 +127,7 @@ impl Control {
     /// Ticks missed while the flash was busy are left out, and the controller notices the gap.
     fn begin_tick(&mut self) {
         self.rig.latch_encoders();
+        let due = self.tick.0 + u64::from(self.length);
         let began = Instant::now().as_micros() - u64::from(TIM7.cnt().read().cnt());
         let since = u32::try_from(began.saturating_sub(self.tick.0)).unwrap_or(u32::MAX);
         let ticks = since.saturating_add(u32::from(PERIOD / 2)) / u32::from(PERIOD);
@@ -138,8 +139,8 @@ impl Control {
         if !self.rig.begin_tick() {
             defmt::warn!("steps cut short at {=u64}", self.tick.0);
         }
-        // After the wait for the steps of the tick before, so that steps cut short are a delay as well.
-        let late = Instant::now().as_micros().saturating_sub(self.tick.0);
+        // After the wait for the steps of the tick before, so that steps cut short are a delay as well; with the ticks left out.
+        let late = Instant::now().as_micros().saturating_sub(due);
         self.node.allow_delay(self.tick, late, &mut self.rig);
         self.node.poll(self.tick, &mut self.rig);
         self.rig.release_encoders();

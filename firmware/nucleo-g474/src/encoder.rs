@@ -3,9 +3,22 @@
 use embassy_stm32::Peri;
 use embassy_stm32::gpio::{AfType, Flex, Pull};
 use embassy_stm32::pac::timer::TimGp32;
-use embassy_stm32::pac::timer::vals::{CcmrInputCcs, FilterValue, Sms};
+use embassy_stm32::pac::timer::vals::{CcmrInputCcs, Ckd, FilterValue, Sms};
 use embassy_stm32::timer::low_level::Timer;
 use embassy_stm32::timer::{Ch1, Ch2, GeneralInstance32bit4Channel, TimerPin};
+
+/// Filters of the lines (RM0440, 29.5.9, IC1F) and the pulses that they swallow, in nanoseconds, with the sampling clock at a
+/// quarter of 170 MHz.
+const FILTERS: [(FilterValue, u32); 8] = [
+    (FilterValue::FDTS_DIV32_N8, 6_024),
+    (FilterValue::FDTS_DIV32_N5, 3_765),
+    (FilterValue::FDTS_DIV16_N6, 2_259),
+    (FilterValue::FDTS_DIV8_N8, 1_506),
+    (FilterValue::FDTS_DIV4_N8, 753),
+    (FilterValue::FDTS_DIV2_N8, 376),
+    (FilterValue::FCK_INT_N8, 47),
+    (FilterValue::FCK_INT_N4, 24),
+];
 
 /// The counter of one encoder.
 pub struct Encoder {
@@ -28,17 +41,21 @@ impl Encoder {
         let timer = owner.regs_gp32();
         // Forgotten, because dropping it would stop the timer's clock.
         core::mem::forget(owner);
-        timer.ccmr_input(0).write(|w| {
-            for channel in 0..2 {
-                w.set_ccs(channel, CcmrInputCcs::TI4);
-                // Four equal samples at 170 MHz: pulses shorter than 24 ns are ignored.
-                w.set_icf(channel, FilterValue::FCK_INT_N4);
-            }
-        });
+        timer.ccmr_input(0).write(|w| (0..2).for_each(|channel| w.set_ccs(channel, CcmrInputCcs::TI4)));
+        timer.cr1().write(|w| w.set_ckd(Ckd::DIV4));
         timer.smcr().write(|w| w.set_sms(Sms::ENCODER_MODE_3));
         timer.arr().write_value(u32::MAX);
-        timer.cr1().write(|w| w.set_cen(true));
+        timer.cr1().modify(|w| w.set_cen(true));
         Self { timer, _lines: lines }
+    }
+
+    /// Swallows pulses that are shorter than a quarter of the time between two counts at `per_second`: a stage may be pushed by
+    /// hand four times as fast.
+    pub fn expect(&mut self, per_second: u32) {
+        let longest = 250_000_000 / per_second.max(1);
+        let fits = FILTERS.iter().find(|(_, swallowed)| *swallowed <= longest);
+        let filter = fits.map_or(FilterValue::FCK_INT_N4, |(filter, _)| *filter);
+        self.timer.ccmr_input(0).modify(|w| (0..2).for_each(|channel| w.set_icf(channel, filter)));
     }
 
     /// The raw count.

@@ -103,6 +103,12 @@ impl RigIo for Rig {
         }
     }
 
+    fn expect_counts(&mut self, axis: usize, per_second: u32) {
+        if let Some(encoder) = self.encoders.get_mut(axis) {
+            encoder.expect(per_second);
+        }
+    }
+
     fn encoders_read_at(&self, now: Microseconds) -> Microseconds {
         self.latched.map_or(now, |latched| latched.at)
     }

@@ -111,7 +111,7 @@ impl Node {
         self.controller.replace_settings(&settings.axes).map_err(|_| Refusal::BadSetting)?;
         self.controller.hold_after(settings.hold_after_us.into());
         self.settings = settings;
-        self.tell_drivers(io);
+        self.configure(io);
         self.recorder.record(now, Happening::Settings);
         Ok(())
     }
