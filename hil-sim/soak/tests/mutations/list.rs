@@ -69,8 +69,8 @@ pub const CAUGHT: &[Mutation] = &[
     planted(
         "hard limits are not watched",
         "controller/tick.rs",
-        ".find(|&axis| io.hard_limit(axis))",
-        ".find(|_| false)",
+        ".position(|axis| axis.limit().trips())",
+        ".position(|_| false)",
     ),
     planted("the emergency stop is not watched", "controller/tick.rs", "if io.emergency_stop() {", "if false {"),
     planted("one reading is a contact", "contact.rs", "DEBOUNCE_TICKS: u8 = 5", "DEBOUNCE_TICKS: u8 = 1"),
@@ -109,9 +109,9 @@ pub const CAUGHT: &[Mutation] = &[
     ),
     planted(
         "an axis that is off never gives up",
-        "controller/tick.rs",
-        "if now >= self.active.settle_by {",
-        "if false {",
+        "controller/settling.rs",
+        "} else if now.0 - rests_since.0 >= SETTLE_TIMEOUT_US {",
+        "} else if false {",
     ),
     planted(
         "the tolerance is fifty times as large",
@@ -293,8 +293,8 @@ pub const HOLES: &[Mutation] = &[
     planted(
         "arming ignores the emergency stop",
         "controller/requests.rs",
-        "        if io.emergency_stop() {\n            return Err(Refusal::CausePersists);\n        }\n        for",
-        "        for",
+        "        if io.emergency_stop() {\n            return Err(Refusal::CausePersists);\n        }\n        (0u8..)",
+        "        (0u8..)",
     ),
     // The native board plans in no time: tests/hil_retarget.rs shows plans that come late.
     planted(
