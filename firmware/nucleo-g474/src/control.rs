@@ -136,15 +136,22 @@ impl Control {
         if self.tick.0.abs_diff(began) > u64::from(PERIOD / 4) {
             self.tick.0 = began;
         }
+        // A tick that is too late makes no steps.
+        self.judge_delay(due);
         if !self.rig.begin_tick() {
             defmt::warn!("steps cut short at {=u64}", self.tick.0);
         }
         // After the wait for the steps of the tick before, so that steps cut short are a delay as well; with the ticks left out.
-        let late = Instant::now().as_micros().saturating_sub(due);
-        self.node.allow_delay(self.tick, late, &mut self.rig);
+        self.judge_delay(due);
         self.node.poll(self.tick, &mut self.rig);
         self.rig.release_encoders();
         TICKS.fetch_add(1, Ordering::Relaxed);
+    }
+
+    /// Lets the node judge how late it is in the tick that was due at `due`.
+    fn judge_delay(&mut self, due: u64) {
+        let late = Instant::now().as_micros().saturating_sub(due);
+        self.node.allow_delay(self.tick, late, &mut self.rig);
     }
 
     /// Sets the timer to the time at which the node wants to run again.
