@@ -176,16 +176,16 @@ fn a_broken_limit_wire_counts_as_the_limit_reached() {
     assert!(text.contains("opened") && text.contains("wire is broken"), "{text}");
 }
 
-/// The filter of an encoder's lines swallows what is shorter than a quarter of the time between two counts at full speed: 1.5 us
+/// The filter of an encoder's lines swallows what is shorter than an eighth of the time between two counts at full speed: 0.75 us
 /// at 160 kHz, and at most 6 us. It follows a change of the settings.
 #[test]
 fn short_pulses_on_an_encoder_s_line_are_not_counted() {
     let mut talk = Talk::open(&Standing::default());
-    assert_eq!(swallowed_us(&mut talk, "PA0", 0x4000_0024), 2);
+    assert_eq!(swallowed_us(&mut talk, "PA0", 0x4000_0024), 1);
     assert_eq!(swallowed_us(&mut talk, "PB2", 0x4000_0C24), 7);
     let key = SettingKey { item: SettingItem::Speed, axis: 0 };
     assert_eq!(talk.ask(Request::SetSetting { key, value: 20_000 }), Status::Accepted);
-    assert_eq!(swallowed_us(&mut talk, "PA0", 0x4000_0024), 7, "a quarter of the speed");
+    assert_eq!(swallowed_us(&mut talk, "PA0", 0x4000_0024), 3, "a quarter of the speed");
 }
 
 /// Time after which a new level of a line is counted, in whole microseconds; the counter is at this address.

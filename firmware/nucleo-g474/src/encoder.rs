@@ -49,10 +49,10 @@ impl Encoder {
         Self { timer, _lines: lines }
     }
 
-    /// Swallows pulses that are shorter than a quarter of the time between two counts at `per_second`: a stage may be pushed by
-    /// hand four times as fast.
+    /// Swallows pulses that are shorter than an eighth of the time between two counts at `per_second`: counts are late by no
+    /// more, and a stage may be pushed by hand eight times as fast.
     pub fn expect(&mut self, per_second: u32) {
-        let longest = 250_000_000 / per_second.max(1);
+        let longest = 125_000_000 / per_second.max(1);
         let fits = FILTERS.iter().find(|(_, swallowed)| *swallowed <= longest);
         let filter = fits.map_or(FilterValue::FCK_INT_N4, |(filter, _)| *filter);
         self.timer.ccmr_input(0).modify(|w| (0..2).for_each(|channel| w.set_icf(channel, filter)));
