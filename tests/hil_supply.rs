@@ -12,7 +12,7 @@ mod elf_rig;
 use elf_rig::{BOTH, Board, Conversation, ElfBoard, Standing, Wired};
 use vergence_cpu::{Access, Bus};
 use vergence_mcu::{Picoseconds, ResetCause as Bite};
-use vergence_plant::{EncoderFault, NativeBoard};
+use vergence_plant::{AxisPlant, EncoderFault, NativeBoard};
 use vergence_protocol::{AxisMask, ControllerState, FaultCode, MovePhase, ResetCause, Status};
 
 const HERBIVORE: [i32; 2] = [145_000, 2_094_395];
@@ -98,13 +98,13 @@ const GAPS_OF_THE_CHIP_US: [u64; 3] = [100, 400, 5_000];
 fn gap<B: Board>(us: u64) -> (Option<FaultCode>, AxisMask, [f64; 2]) {
     let mut talk = under_way::<B>(THERE);
     let off = |talk: &Conversation<B>| f64::from(talk.pose().counts[0].0) * 0.5 - talk.loads()[0];
-    let fail = |talk: &mut Conversation<B>, fault| {
-        talk.board.with_plant(|plant| plant.axis_mut(0).expect("it is there").fail_encoder(fault));
+    let encoder = |talk: &mut Conversation<B>, act: fn(&mut AxisPlant)| {
+        talk.board.with_plant(|plant| act(plant.axis_mut(0).expect("it is there")));
     };
-    fail(&mut talk, Some(EncoderFault::Unpowered));
+    encoder(&mut talk, |axis| axis.fail_encoder(Some(EncoderFault::Stuck)));
     talk.now.0 += us;
     talk.board.advance(talk.now);
-    fail(&mut talk, None);
+    encoder(&mut talk, AxisPlant::mend_encoder);
     talk.wait(2_000_000);
     let (code, referenced, lost) = (talk.pose().fault.map(|fault| fault.code), talk.pose().referenced, off(&talk));
     if code.is_some() {

@@ -65,15 +65,20 @@ impl BoardSettings {
     /// [`SettingsError`] if an axis cannot work with its settings.
     pub fn new(axes: &[AxisSettings]) -> Result<Self, SettingsError> {
         let axes = axes.iter().copied().collect::<heapless::Vec<_, { vergence_protocol::MAX_AXES }>>();
-        let settings = Self {
+        let settings = Self::delivered(axes);
+        settings.validate()?;
+        Ok(settings)
+    }
+
+    /// These axes, and everything else as delivered.
+    fn delivered(axes: AxisList<AxisSettings>) -> Self {
+        Self {
             axes,
             stream_period_us: STREAM_US,
             baud: USUAL_BAUD,
             machine: Machine::Bench,
             hold_after_us: HOLD_AFTER_US,
-        };
-        settings.validate()?;
-        Ok(settings)
+        }
     }
 
     /// Settings of a board whose axes are of these `kinds`, with the `values` given; others are zero, and those of motor
@@ -86,13 +91,7 @@ impl BoardSettings {
         values: impl IntoIterator<Item = (SettingKey, i64)>,
     ) -> Result<Self, SettingError> {
         let axes = kinds.iter().take(vergence_protocol::MAX_AXES).map(|&kind| AxisSettings::blank(kind)).collect();
-        let mut settings = Self {
-            axes,
-            stream_period_us: STREAM_US,
-            baud: USUAL_BAUD,
-            machine: Machine::Bench,
-            hold_after_us: HOLD_AFTER_US,
-        };
+        let mut settings = Self::delivered(axes);
         values.into_iter().try_for_each(|(key, value)| settings.put(key, value))?;
         Ok(settings)
     }

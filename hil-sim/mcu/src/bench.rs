@@ -137,15 +137,13 @@ struct AxisState {
     hard_limit: Option<bool>,
 }
 
-/// A rising edge of the camera trigger's pin, and what the encoders' lines and the mechanics showed then.
+/// A rising edge of the camera trigger's pin, and what the encoders' lines showed then.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Fired {
     /// The instant of the edge.
     pub at: Instant,
     /// The count that the lines of each encoder show.
     pub counts: Vec<i32>,
-    /// The true position of every load, in micro-units.
-    pub loads: Vec<f64>,
 }
 
 /// The mechanics, wired to the chip.
@@ -361,7 +359,7 @@ impl World for Bench {
             self.plant.advance(now);
             // The chip latches its own counters.
             while self.plant.take_trigger_edge().is_some() {}
-            self.fired = Some(Fired { at: edge.at, counts: self.counts_on_lines(), loads: self.plant.loads() });
+            self.fired = Some(Fired { at: edge.at, counts: self.counts_on_lines() });
         }
         for axis in 0..self.wiring.axes.len() {
             let wiring = self.wiring.axes[axis];

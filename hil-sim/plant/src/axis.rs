@@ -124,7 +124,8 @@ impl AxisPlant {
         self.made.as_mut().map(std::mem::take).unwrap_or_default()
     }
 
-    /// Lets a failed encoder count again from the count that it shows, as after its cable was mended: its counter does not jump.
+    /// Lets a failed encoder count again from the count that it shows, as after its cable was mended or its supply returned:
+    /// its counter does not jump, and what was moved meanwhile was never counted.
     pub fn mend_encoder(&mut self) {
         self.encoder.go_on(self.scale_reading());
     }

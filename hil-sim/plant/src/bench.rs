@@ -18,6 +18,18 @@ pub struct Stage {
 }
 
 impl Stage {
+    /// Length of a motor step in micro-units of the axis.
+    #[must_use]
+    pub fn micro_per_step(&self) -> f64 {
+        f64::from(self.settings.motor().position_at(1_000_000).0) * 1e-6
+    }
+
+    /// Length of an encoder count in micro-units of the axis.
+    #[must_use]
+    pub fn micro_per_count(&self) -> f64 {
+        f64::from(self.settings.encoder().position_at(1_000_000).0) * 1e-6
+    }
+
     /// A 2 mm screw driven by a 200-step motor in 1/8 steps, with a linear encoder; home switch 2 mm below `min`.
     #[must_use]
     pub fn linear(min: Micro, max: Micro, counts_per_metre: u32) -> Self {

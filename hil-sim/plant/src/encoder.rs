@@ -19,8 +19,6 @@ pub enum EncoderFault {
     },
     /// The encoder reads the count at which it was switched on.
     Dead,
-    /// The encoder has no supply: its count stands still, and goes on from there when the supply returns.
-    Unpowered,
 }
 
 /// Relation between the reading and the true count.
@@ -28,7 +26,6 @@ pub enum EncoderFault {
 enum Reading {
     True,
     Stuck(i32),
-    Unpowered(i32),
     Mirrored(i32),
     Noisy { amplitude: i32, random: Pcg64Mcg, error: i32 },
     Dead,
@@ -52,7 +49,7 @@ impl Encoder {
         let count = scale.wrapping_sub(self.zero);
         match self.reading {
             Reading::True => count,
-            Reading::Stuck(at) | Reading::Unpowered(at) => at,
+            Reading::Stuck(at) => at,
             Reading::Mirrored(pivot) => pivot.wrapping_sub(count.wrapping_sub(pivot)),
             Reading::Noisy { error, .. } => count.wrapping_add(error),
             Reading::Dead => 0,
@@ -62,14 +59,9 @@ impl Encoder {
     /// Makes the encoder fail where the scale reads `scale`, or work again.
     pub fn fail(&mut self, fault: Option<EncoderFault>, scale: i32) {
         let here = self.raw(scale);
-        if let Reading::Unpowered(at) = self.reading {
-            // An incremental encoder does not know how far it was moved meanwhile.
-            self.zero = scale.wrapping_sub(at);
-        }
         self.reading = match fault {
             None => Reading::True,
             Some(EncoderFault::Stuck) => Reading::Stuck(here),
-            Some(EncoderFault::Unpowered) => Reading::Unpowered(here),
             Some(EncoderFault::Reversed) => Reading::Mirrored(here),
             Some(EncoderFault::Noisy { amplitude, seed }) => {
                 Reading::Noisy { amplitude: amplitude.max(0), random: Pcg64Mcg::seed_from_u64(seed), error: 0 }
@@ -88,7 +80,7 @@ impl Encoder {
     pub fn restart(&mut self, scale: i32) {
         self.zero = scale;
         match &mut self.reading {
-            Reading::Stuck(at) | Reading::Unpowered(at) | Reading::Mirrored(at) => *at = 0,
+            Reading::Stuck(at) | Reading::Mirrored(at) => *at = 0,
             Reading::True | Reading::Noisy { .. } | Reading::Dead => {}
         }
     }

@@ -69,7 +69,7 @@ fn a_coupling_that_gives_way_is_a_slip() {
 #[test]
 fn encoders_that_lose_their_supply_in_mid_move_stop_it() {
     let mut rigged = under_way();
-    (0..2).for_each(|axis| harm(&mut rigged, axis, |axis| axis.fail_encoder(Some(EncoderFault::Unpowered))));
+    (0..2).for_each(|axis| harm(&mut rigged, axis, |axis| axis.fail_encoder(Some(EncoderFault::Stuck))));
     rigged.wait_for(ControllerState::Fault);
     assert!(matches!(rigged.fault().code, FaultCode::Stall | FaultCode::FollowingError), "{:?}", rigged.fault());
     assert!(!rigged.board.plant().drivers_on());

@@ -57,10 +57,10 @@ fn an_encoder_without_supply_misses_what_is_moved_meanwhile() {
     let mut plant = plant();
     travel(&mut plant, 0, STEPS);
     let before = plant.encoder(0);
-    plant.axis_mut(0).unwrap().fail_encoder(Some(EncoderFault::Unpowered));
+    plant.axis_mut(0).unwrap().fail_encoder(Some(EncoderFault::Stuck));
     travel(&mut plant, 250_000, STEPS);
     assert_eq!(plant.encoder(0), before);
-    plant.axis_mut(0).unwrap().fail_encoder(None);
+    plant.axis_mut(0).unwrap().mend_encoder();
     assert_eq!(plant.encoder(0), before);
     travel(&mut plant, 500_000, STEPS);
     assert!((plant.encoder(0) - before - COUNTS).abs() < 10);

@@ -176,8 +176,14 @@ fn end(fault: &Fault, world: &mut World<'_>) {
 
 /// Cuts or restores the supply of all encoders.
 fn supply_encoders(world: &mut World<'_>, on: bool) {
-    let how = (!on).then_some(EncoderFault::Unpowered);
-    (0..world.plant.loads().len()).for_each(|axis| fail_encoder(world, axis, how));
+    for axis in 0..world.plant.loads().len() {
+        if on {
+            on_axis(world, axis, AxisPlant::mend_encoder);
+            world.checker.encoder_shows(axis, EncoderReading::Clear);
+        } else {
+            fail_encoder(world, axis, Some(EncoderFault::Stuck));
+        }
+    }
 }
 
 fn fail_encoder(world: &mut World<'_>, axis: usize, how: Option<EncoderFault>) {

@@ -97,9 +97,7 @@ impl WatchedAxis {
 
     /// Checks the steps `made` in a tick against a limit of the speed, in micro-units per second.
     pub fn check_speed(&self, made: i32, limit: u32) -> Option<String> {
-        let settings = &self.stage.settings;
-        let step = f64::from(settings.motor().position_at(1_000_000).0) * 1e-6;
-        let allowed = f64::from(limit) * TICK_S * SPEED_SHARE / step + 2.0;
+        let allowed = f64::from(limit) * TICK_S * SPEED_SHARE / self.stage.micro_per_step() + 2.0;
         let speed = f64::from(made.abs());
         (speed > allowed).then(|| format!("{speed} steps of {allowed:.1} in a tick"))
     }
@@ -126,15 +124,10 @@ impl WatchedAxis {
         if !self.is_clear() {
             return None;
         }
-        let allowed = self.reference_error + 2.0 * self.count();
+        let allowed = self.reference_error + 2.0 * self.stage.micro_per_count();
         let said = f64::from(self.stage.settings.encoder().position_at(counts.0).0);
         let off = (low - said).max(said - high);
         (off > allowed).then(|| format!("reported {off:.1} of {allowed:.1} beside its load"))
-    }
-
-    /// One encoder count in micro-units.
-    fn count(&self) -> f64 {
-        f64::from(self.stage.settings.encoder().position_at(1_000_000).0) * 1e-6
     }
 
     pub fn check_following(&self) -> Option<String> {
@@ -147,6 +140,6 @@ impl WatchedAxis {
     pub fn mode_tolerance(&self) -> f64 {
         let settings = &self.stage.settings;
         let blind = if self.misread { f64::from(settings.following_error.0) } else { 0.0 };
-        f64::from(settings.tolerance.0) + self.reference_error + 2.0 * self.count() + blind
+        f64::from(settings.tolerance.0) + self.reference_error + 2.0 * self.stage.micro_per_count() + blind
     }
 }

@@ -9,20 +9,11 @@
 mod programs;
 
 use std::convert::Infallible;
-use std::sync::OnceLock;
 
-use programs::programs;
+use programs::flash;
 use rayon::prelude::*;
 use vergence_plant::Plant;
-use vergence_soak::{ChipBoard, ChipFlash, FaultKind, Promise, Scenario, run, soak, stages};
-
-fn flash() -> &'static ChipFlash {
-    static READ: OnceLock<ChipFlash> = OnceLock::new();
-    READ.get_or_init(|| {
-        let (boot_loader, [application, _]) = programs();
-        ChipFlash::new(&boot_loader, &application).expect("they fit")
-    })
-}
+use vergence_soak::{ChipBoard, FaultKind, Promise, Scenario, run, soak, stages};
 
 #[test]
 fn the_firmware_breaks_no_promise_whatever_the_fault() {

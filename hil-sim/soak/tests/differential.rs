@@ -8,26 +8,16 @@
 
 mod programs;
 
-use std::sync::OnceLock;
-
-use programs::programs;
+use programs::flash;
 use vergence_plant::{AxisMechanics, NativeBoard, Plant};
 use vergence_protocol::{Micro, Mode, Move, MoveId, Permille, Request, SettingItem, SettingKey, Trigger};
 use vergence_soak::differential::{Act, Session, Verdict, differential, play};
-use vergence_soak::{ChipFlash, stages};
+use vergence_soak::stages;
 
 /// Sessions to play, unless `VERGENCE_DIFFERENTIAL` names another number.
 const SESSIONS: u64 = 12;
 /// Places of the stages in the session of the planted differences, in micro-units: near home.
 const PLACES: [f64; 2] = [59_000.0, -10_000.0];
-
-fn flash() -> &'static ChipFlash {
-    static READ: OnceLock<ChipFlash> = OnceLock::new();
-    READ.get_or_init(|| {
-        let (boot_loader, [application, _]) = programs();
-        ChipFlash::new(&boot_loader, &application).expect("they fit")
-    })
-}
 
 #[test]
 fn both_boards_do_the_same_in_random_sessions() {

@@ -54,12 +54,12 @@ impl Slack {
 
     /// Micro-units for each motor step.
     pub fn step(&self, axis: usize) -> f64 {
-        f64::from(self.settings(axis).motor().position_at(1_000_000).0) * 1e-6
+        self.stages[axis].micro_per_step()
     }
 
     /// Micro-units for each count.
     fn count(&self, axis: usize) -> f64 {
-        f64::from(self.settings(axis).encoder().position_at(1_000_000).0) * 1e-6
+        self.stages[axis].micro_per_count()
     }
 
     /// Takes the next tick of the native board.

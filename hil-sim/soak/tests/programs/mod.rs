@@ -1,13 +1,17 @@
 //! The board's own programs, as cargo builds them.
 #![allow(clippy::expect_used, clippy::panic, reason = "a test fails loudly")]
+#![allow(dead_code, reason = "each test file uses its own part")]
 
 #[path = "../../../../tests/elf_rig/build.rs"]
 mod build;
+
+use std::sync::OnceLock;
 
 use vergence_image::Seal;
 use vergence_image::layout::{ACTIVE, FLASH_BASE};
 use vergence_mcu::Firmware;
 use vergence_protocol::management::{ImageHeader, Signature};
+use vergence_soak::ChipFlash;
 use vergence_soak::power_cuts::{SignedImage, twin};
 
 /// RFC 8032, section 7.1, test 1: the key of development images.
@@ -33,4 +37,13 @@ pub fn programs() -> (Firmware, [SignedImage; 2]) {
     let pages = old.len().div_ceil(2048);
     assert!(5 * differing >= 4 * pages, "{differing} of {pages} pages differ: a swap could mix up the others unseen");
     (boot_loader, [old, new].map(|bytes| SignedImage::new(bytes, [0, 1, 0], seal)))
+}
+
+/// The flash of a delivered board with these programs.
+pub fn flash() -> &'static ChipFlash {
+    static READ: OnceLock<ChipFlash> = OnceLock::new();
+    READ.get_or_init(|| {
+        let (boot_loader, [application, _]) = programs();
+        ChipFlash::new(&boot_loader, &application).expect("they fit")
+    })
 }
