@@ -9,7 +9,7 @@
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
-use vergence_image::layout::{ACTIVE, BOOTLOADER, CAPACITY, FLASH_BASE, RAM};
+use vergence_image::layout::{BOOTLOADER, CAPACITY, FLASH_BASE, IMAGE, RAM};
 
 /// What the stack may need at least: interrupts upon a task that plans a move.
 const STACK: u32 = 16 * 1024;
@@ -71,7 +71,7 @@ fn the_firmware_builds_and_fits() {
 
 #[test]
 fn each_program_begins_with_its_vector_table() {
-    for (package, region) in [("vergence-nucleo-g474", ACTIVE), ("vergence-bootloader", BOOTLOADER)] {
+    for (package, region) in [("vergence-nucleo-g474", IMAGE), ("vergence-bootloader", BOOTLOADER)] {
         let first = sections(&build(package)).iter().map(|section| section.address).min();
         assert_eq!(first, Some(FLASH_BASE + region.start), "{package}");
     }

@@ -252,15 +252,15 @@ fn a_debug_probe_writes_image_and_seal_and_the_board_is_asked() {
     let log = std::fs::read_to_string(format!("{path}/log")).expect("a log");
     let told: Vec<&str> = log.lines().collect();
     let download =
-        "download --chip STM32G474RETx --non-interactive --verify --binary-format bin --base-address 0x0800f800";
+        "download --chip STM32G474RETx --non-interactive --verify --binary-format bin --base-address 0x0800e800";
     assert!(told[0].starts_with(download), "{log}");
     assert_eq!(told[1], "reset --chip STM32G474RETx --non-interactive");
     let got = std::fs::read(format!("{path}/got")).expect("what was downloaded");
     let file = std::fs::read(&image).expect("an image");
-    let (state, active) = got.split_at(2_048);
+    let (state, active) = got.split_at(4_096);
     assert!(state.iter().all(|&byte| byte == 0xFF), "no swap may be under way");
-    let seal_at = vergence_image::layout::CAPACITY as usize;
-    assert_eq!((&active[..file.len() - 128], &active[seal_at..seal_at + 128]), (&file[128..], &file[..128]));
+    // A seal, a page of its own, then the image.
+    assert_eq!((&active[..128], &active[2_048..]), (&file[..128], &file[128..]));
 
     // The boot loader itself.
     let boot_loader = story.workshop.file("boot.elf", &elf(ARM, &[(0x0800_0000, &[1; 64])]));

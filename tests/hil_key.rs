@@ -6,7 +6,7 @@
 mod elf_rig;
 
 use elf_rig::{Conversation, DEVELOPMENT_SECRET, ElfBoard, Standing, build_trusting, programs, sealed_by};
-use vergence_image::layout::{ACTIVE, CAPACITY, FLASH_BASE, HARDWARE};
+use vergence_image::layout::{ACTIVE, FLASH_BASE, HARDWARE, IMAGE};
 use vergence_image::{DEVELOPMENT_KEY, sha256};
 use vergence_mcu::Firmware;
 use vergence_protocol::management::{BootState, ImageHeader, Management, ManagementReport, Outcome, Signature};
@@ -26,7 +26,7 @@ fn own_key() -> [u8; 32] {
 
 /// Application and boot loader that trust the own key, as they lie in flash.
 fn own_programs() -> [Vec<u8>; 2] {
-    let starts = [FLASH_BASE + ACTIVE.start, FLASH_BASE];
+    let starts = [FLASH_BASE + IMAGE.start, FLASH_BASE];
     if std::env::var_os("VERGENCE_OWN_KEY").is_some() {
         let line = own_key().iter().fold("vergence-public-key ".to_owned(), |line, byte| format!("{line}{byte:02x}"));
         let built = ["vergence-nucleo-g474", "vergence-bootloader"].map(|package| {
@@ -53,8 +53,8 @@ fn board(secret: &[u8; 32]) -> Talk {
     let mut talk = Talk::off(&Standing::default());
     let chip = talk.board.machine.chip_mut();
     let seal = sealed_by(secret, &application).to_bytes();
-    assert!(chip.load_flash(0, &boot_loader) && chip.load_flash(ACTIVE.start as usize, &application));
-    assert!(chip.load_flash((ACTIVE.start + CAPACITY) as usize, &seal));
+    assert!(chip.load_flash(0, &boot_loader) && chip.load_flash(IMAGE.start as usize, &application));
+    assert!(chip.load_flash(ACTIVE.start as usize, &seal));
     talk.board.machine.power_on();
     talk.wait(600_000);
     talk

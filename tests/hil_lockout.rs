@@ -11,7 +11,7 @@ mod elf_rig;
 
 use elf_rig::{Conversation, ElfBoard, Standing};
 use vergence_control::{BoardSettings, Flash, PAGE, settings_store};
-use vergence_image::layout::{ACTIVE, HARDWARE, SETTINGS};
+use vergence_image::layout::{HARDWARE, IMAGE, SETTINGS};
 use vergence_mcu::{Drive, Pin};
 use vergence_plant::{RamFlash, bench_settings};
 use vergence_protocol::management::{
@@ -193,7 +193,7 @@ fn recovery_refuses_what_is_older_than_the_installed_application_accepts() {
     assert_eq!(outcome(manage(&mut talk, &begin([0, 0, 9]))), Outcome::TooOld);
     assert_eq!(outcome(manage(&mut talk, &begin([0, 1, 0]))), Outcome::Done);
     // A board without a whole application takes whatever is signed: nothing says what it would accept.
-    assert!(talk.board.machine.chip_mut().load_flash(ACTIVE.start as usize + 0x4000, &[0; 64]));
+    assert!(talk.board.machine.chip_mut().load_flash(IMAGE.start as usize + 0x4000, &[0; 64]));
     talk.board.machine.press_reset();
     talk.wait(1_000_000);
     assert_eq!(identity(&mut talk).oldest, [0; 3]);

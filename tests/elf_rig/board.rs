@@ -2,7 +2,7 @@
 
 use std::sync::OnceLock;
 
-use vergence_image::layout::{ACTIVE, CAPACITY};
+use vergence_image::layout::ACTIVE;
 use vergence_mcu::{Bench, BenchWiring, ChipConfig, Firmware, Frame, Halt, LineFault, Machine, Picoseconds, UartId};
 use vergence_plant::{AxisMechanics, NativeBoard, Plant, bench_mechanics, bench_settings};
 use vergence_protocol::Microseconds;
@@ -83,7 +83,7 @@ impl Board for ElfBoard {
         let mut machine = Machine::new(ChipConfig::default(), Bench::new(BenchWiring::nucleo_g474(), plant));
         machine.load(boot_loader.clone()).expect("it fits");
         let (_, seal) = sealed(application);
-        assert!(machine.chip_mut().load_flash((ACTIVE.start + CAPACITY) as usize, &seal.to_bytes()));
+        assert!(machine.chip_mut().load_flash(ACTIVE.start as usize, &seal.to_bytes()));
         // Last, for the symbols.
         machine.load(application.clone()).expect("it fits");
         Self { machine, baud: BAUD, heard_baud: BAUD }

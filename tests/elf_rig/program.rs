@@ -1,6 +1,6 @@
 //! The application sealed as the boot loader wants it.
 
-use vergence_image::layout::{ACTIVE, CAPACITY, FLASH_BASE, HARDWARE};
+use vergence_image::layout::{CAPACITY, FLASH_BASE, HARDWARE, IMAGE};
 use vergence_image::{Seal, sha256};
 use vergence_mcu::Firmware;
 use vergence_protocol::management::{ImageHeader, Signature};
@@ -11,9 +11,9 @@ pub const DEVELOPMENT_SECRET: [u8; 32] = [
     0x69, 0x7b, 0x32, 0x69, 0x19, 0x70, 0x3b, 0xac, 0x03, 0x1c, 0xae, 0x7f, 0x60,
 ];
 
-/// The application as it lies in flash, from [`ACTIVE`] on, and its seal.
+/// The application as it lies in flash, from [`IMAGE`] on, and its seal.
 pub fn sealed(application: &Firmware) -> (Vec<u8>, Seal) {
-    let image = application.flat(FLASH_BASE + ACTIVE.start);
+    let image = application.flat(FLASH_BASE + IMAGE.start);
     let seal = sealed_by(&DEVELOPMENT_SECRET, &image);
     (image, seal)
 }

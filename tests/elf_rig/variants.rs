@@ -2,7 +2,7 @@
 
 use std::sync::OnceLock;
 
-use vergence_image::layout::{ACTIVE, FLASH_BASE};
+use vergence_image::layout::{FLASH_BASE, IMAGE};
 use vergence_image::notes::{VersionNote, build_at, version_of};
 use vergence_mcu::Firmware;
 
@@ -23,7 +23,7 @@ pub enum Variant {
     BadVectors,
 }
 
-const START: u32 = FLASH_BASE + ACTIVE.start;
+const START: u32 = FLASH_BASE + IMAGE.start;
 /// B to itself.
 const HANG: u16 = 0xE7FE;
 

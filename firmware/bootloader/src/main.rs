@@ -19,7 +19,7 @@ use cortex_m_rt::entry;
 use embassy_boot_stm32::State;
 use embassy_stm32::gpio::{Input, Pull};
 use embassy_stm32::wdg::IndependentWatchdog;
-use vergence_image::layout::ACTIVE;
+use vergence_image::layout::{ACTIVE, IMAGE};
 use vergence_image::notes::oldest_of;
 use vergence_image::{Seal, Survivor};
 use vergence_nucleo_common::clocks::{self, Source};
@@ -65,7 +65,7 @@ fn main() -> ! {
     let defaults_wanted = survivor.defaults_wanted || wants_recovery;
     memory::remember(&Survivor { failed_starts: 0, recovery_wanted: false, defaults_wanted, ..survivor });
     // The oldest version that the installed application accepts, which its signature covers.
-    let installed = seal.and_then(|seal| memory::region(ACTIVE).get(..seal.header.length as usize));
+    let installed = seal.and_then(|seal| memory::region(IMAGE).get(..seal.header.length as usize));
     let oldest = installed.and_then(oldest_of).unwrap_or_default();
     let line = Line { port: p.LPUART1, tx: p.PA2, rx: p.PA3, tx_dma: p.DMA1_CH2, rx_dma: p.DMA1_CH1 };
     recovery::serve(line, services, oldest)

@@ -20,7 +20,7 @@ pub fn was_failure() -> bool {
 pub fn start_application() -> ! {
     cortex_m::interrupt::disable();
     clocks::slow_down();
-    let table = layout::FLASH_BASE + layout::ACTIVE.start;
+    let table = layout::FLASH_BASE + layout::IMAGE.start;
     // SAFETY: this program ends here, and the image was checked: its first words are a stack pointer and an entry.
     unsafe {
         let mut core = Peripherals::steal();

@@ -1,8 +1,9 @@
 //! Layout of flash and RAM of the STM32G474RE (512 KiB in two banks, pages of 2 KiB, programmed 8 bytes at a time). The
 //! linker's `memory.x` files hold the same figures; a test compares them.
 
-/// Hardware id of this board, which images name in [`vergence_protocol::management::ImageHeader::hardware`].
-pub const HARDWARE: u32 = 0x4734_5645;
+/// Hardware id of this board and layout, which images name in [`vergence_protocol::management::ImageHeader::hardware`]. It
+/// changes with the layout, because an image that expects another one would write into the boot loader.
+pub const HARDWARE: u32 = 0x4734_5646;
 
 /// Address of the flash; all flash offsets below count from here.
 pub const FLASH_BASE: u32 = 0x0800_0000;
@@ -12,20 +13,31 @@ pub const PAGE: u32 = 2 * 1024;
 pub const WORD: u32 = 8;
 
 /// Flash of the boot loader.
-pub const BOOTLOADER: Region = Region { start: 0, length: 62 * 1024 };
-/// Flash page for the progress of a swap: a word for the state, one for its validity, and four for each page of
-/// [`ACTIVE`].
-pub const STATE: Region = Region { start: 0xF800, length: PAGE };
-/// Flash of the running application, and a page for its seal. A swap moves all of it, in 6 s at most, so it is small.
-pub const ACTIVE: Region = Region { start: 0x1_0000, length: CAPACITY + PAGE };
+pub const BOOTLOADER: Region = Region { start: 0, length: 58 * 1024 };
+/// Flash pages for the progress of a swap: a word for the state, one for its validity, four for each page of [`ACTIVE`], and
+/// in the last word the number of pages that the swap moves.
+pub const STATE: Region = Region { start: 0xE800, length: 2 * PAGE };
+/// Flash of the running application: a page for its seal, then the image. A swap moves the seal and as many pages as the
+/// longer of the two images has.
+pub const ACTIVE: Region = Region { start: 0xF800, length: PAGE + CAPACITY };
 /// Flash of the settings: two pages, written in turn.
 pub const SETTINGS: Region = Region { start: 0x3_F000, length: 2 * PAGE };
-/// Flash of the next image, and after a swap of the earlier one: one page more than [`ACTIVE`], as the swap needs. It lies
-/// in the second bank, so that the application runs on while this is written.
+/// Flash of the next image with its seal, and after a swap of the earlier one: one page more than [`ACTIVE`], as the swap
+/// needs. It lies in the second bank, so that the application runs on while this is written.
 pub const DFU: Region = Region { start: 0x4_0000, length: ACTIVE.length + PAGE };
 
-/// Length of the longest image in bytes. The seal begins at this offset behind every image.
-pub const CAPACITY: u32 = 122 * 1024;
+/// Flash of the image of the running application, behind its seal. Its vector table is at the start.
+pub const IMAGE: Region = Region { start: ACTIVE.start + PAGE, length: CAPACITY };
+/// Length of the longest image in bytes.
+pub const CAPACITY: u32 = 184 * 1024;
+
+/// Number of pages that a swap moves for images of these lengths in bytes: those of the longer one, and that of the seal.
+#[must_use]
+pub const fn pages_to_swap(one: u32, other: u32) -> u32 {
+    let longer = if one > other { one } else { other };
+    let longer = if longer < CAPACITY { longer } else { CAPACITY };
+    1 + longer.div_ceil(PAGE)
+}
 
 /// RAM for variables and stack: SRAM1 and SRAM2 less [`SURVIVOR`].
 pub const RAM: Region = Region { start: 0x2000_0000, length: 95 * 1024 };

@@ -1,5 +1,5 @@
-//! The seal of an image: header and signature, behind the image in flash, so that a swap moves them along and the boot
-//! loader can check the image.
+//! The seal of an image: header and signature, in the page before the image in flash, so that a swap moves them along and
+//! the boot loader can check the image.
 //!
 //! ```text
 //! 0 magic | 4 signed header | 55 signature | 119 CRC-32C of all before | 123 filled up with 0xFF
@@ -11,7 +11,7 @@ use crc::{CRC_32_ISCSI, Crc, NoTable};
 use sha2::{Digest, Sha256};
 use vergence_protocol::management::{ImageHeader, Signature};
 
-use crate::layout::{CAPACITY, HARDWARE};
+use crate::layout::{CAPACITY, HARDWARE, PAGE};
 
 /// Length of a seal in bytes: whole words of the flash.
 pub const SEAL_LENGTH: usize = 128;
@@ -86,14 +86,14 @@ impl Seal {
         Ok(Self { header, signature: Signature { r: fields.take(), s: fields.take() } })
     }
 
-    /// Checks hardware, length, digest and signature of the image at the start of `region`, whose seal is at byte
-    /// [`CAPACITY`].
+    /// Checks hardware, length, digest and signature of the image in `region`, which begins with the seal in a page of its
+    /// own.
     ///
     /// # Errors
     /// [`SealError`] names the first of these that is wrong.
     pub fn check(region: &[u8], key: &[u8; 32]) -> Result<Self, SealError> {
-        let (image, rest) = region.split_at_checked(CAPACITY as usize).ok_or(SealError::Missing)?;
-        let seal = Self::from_bytes(rest.first_chunk().ok_or(SealError::Missing)?)?;
+        let (seal, image) = region.split_at_checked(PAGE as usize).ok_or(SealError::Missing)?;
+        let seal = Self::from_bytes(seal.first_chunk().ok_or(SealError::Missing)?)?;
         seal.header_is_for_us()?;
         let length = usize::try_from(seal.header.length).map_err(|_| SealError::WrongLength)?;
         let image = image.get(..length).ok_or(SealError::WrongLength)?;

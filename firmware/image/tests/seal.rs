@@ -2,7 +2,7 @@
 #![allow(clippy::unwrap_used, reason = "a test fails loudly")]
 
 use proptest::prelude::*;
-use vergence_image::layout::{ACTIVE, CAPACITY, HARDWARE};
+use vergence_image::layout::{ACTIVE, CAPACITY, HARDWARE, PAGE};
 use vergence_image::{DEVELOPMENT_KEY, ImageFile, SEAL_LENGTH, Seal, SealError, sha256};
 use vergence_protocol::management::{ImageHeader, Signature};
 
@@ -26,8 +26,8 @@ fn header(image: &[u8]) -> ImageHeader {
 /// An image as it lies in flash, sealed with `seal`.
 fn region(image: &[u8], seal: &Seal) -> Vec<u8> {
     let mut region = vec![0xFF; ACTIVE.length as usize];
-    region[..image.len()].copy_from_slice(image);
-    region[CAPACITY as usize..][..SEAL_LENGTH].copy_from_slice(&seal.to_bytes());
+    region[..SEAL_LENGTH].copy_from_slice(&seal.to_bytes());
+    region[PAGE as usize..][..image.len()].copy_from_slice(image);
     region
 }
 
@@ -82,7 +82,8 @@ proptest! {
         let image = [0xC3; 256];
         let mut bytes = region(&image, &sign(header(&image)));
         // The image, the seal's fields and their check; what fills the rest up says nothing.
-        let judged: Vec<usize> = (0..image.len()).chain(CAPACITY as usize..CAPACITY as usize + SEAL_LENGTH - 5).collect();
+        let start = PAGE as usize;
+        let judged: Vec<usize> = (0..SEAL_LENGTH - 5).chain(start..start + image.len()).collect();
         bytes[judged[at.index(judged.len())]] ^= 1 << bit;
         prop_assert!(Seal::check(&bytes, &DEVELOPMENT_KEY).is_err());
     }

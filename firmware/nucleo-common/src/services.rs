@@ -3,7 +3,7 @@
 use embassy_boot_stm32::State;
 use embassy_stm32::{Peri, peripherals};
 use vergence_control::{BoardServices, Flash, FlashError, UNIT};
-use vergence_image::layout::{ACTIVE, CAPACITY, DFU, PAGE, Region, SETTINGS};
+use vergence_image::layout::{ACTIVE, CAPACITY, DFU, PAGE, Region, SETTINGS, pages_to_swap};
 use vergence_image::{Seal, is_signed_by};
 use vergence_protocol::management::{BootState, ImageHeader, Signature};
 
@@ -12,10 +12,10 @@ use crate::key::trusted_key;
 use crate::memory;
 use crate::swap::SwapState;
 
-/// Flash of an image that is being received, and of its seal.
-const IMAGE: Region = Region { start: DFU.start, length: CAPACITY };
-const SEAL: Region = Region { start: IMAGE.end(), length: PAGE };
-/// Flash in which a swap leaves the earlier image: one page above [`DFU`]'s start.
+/// Flash of an image that is being received, and of its seal before it.
+const SEAL: Region = Region { start: DFU.start, length: PAGE };
+const RECEIVED: Region = Region { start: SEAL.end(), length: CAPACITY };
+/// Flash in which a swap leaves the earlier image and its seal: one page above [`DFU`]'s start.
 const EARLIER: Region = Region { start: DFU.start + PAGE, length: ACTIVE.length };
 
 /// The board's flash, boot loader and key.
@@ -51,7 +51,7 @@ impl Services {
     fn new(flash: &Peri<'static, peripherals::FLASH>, boot: BootState) -> Self {
         // SAFETY: as for `Area::new`.
         let whole = FedFlash::new(unsafe { flash.clone_unchecked() });
-        let [settings, image, seal] = [SETTINGS, IMAGE, SEAL].map(|region| Area::new(flash, region));
+        let [settings, image, seal] = [SETTINGS, RECEIVED, SEAL].map(|region| Area::new(flash, region));
         Self { settings, image, seal, swap: SwapState::new(whole), boot, leaves_settings: false }
     }
 }
@@ -88,7 +88,7 @@ impl BoardServices for Services {
         for (index, unit) in seal.as_chunks::<UNIT>().0.iter().enumerate() {
             self.seal.program(index * UNIT, *unit)?;
         }
-        self.swap.mark_updated()
+        self.swap.mark_updated(pages_to_swap(image.length, installed_length()))
     }
 
     fn confirm(&mut self) -> Result<(), FlashError> {
@@ -103,10 +103,14 @@ impl BoardServices for Services {
             return Ok(true);
         }
         feed_watchdog();
-        if Seal::check(memory::region(EARLIER), trusted_key()).is_err() {
-            return Ok(false);
-        }
-        self.swap.mark_undone()?;
+        let Ok(earlier) = Seal::check(memory::region(EARLIER), trusted_key()) else { return Ok(false) };
+        self.swap.mark_undone(pages_to_swap(earlier.header.length, installed_length()))?;
         Ok(true)
     }
+}
+
+/// Length in bytes of the installed image; zero where it has no seal, because nothing can return to it then.
+fn installed_length() -> u32 {
+    let seal = memory::region(ACTIVE).first_chunk().and_then(|seal| Seal::from_bytes(seal).ok());
+    seal.map_or(0, |seal| seal.header.length)
 }

@@ -1,11 +1,11 @@
 //! From what a linker makes to the bytes that lie in flash.
 
-use vergence_image::layout::{ACTIVE, BOOTLOADER, CAPACITY, FLASH_BASE, HARDWARE, RAM};
+use vergence_image::layout::{BOOTLOADER, CAPACITY, FLASH_BASE, HARDWARE, IMAGE, RAM};
 use vergence_image::{notes, sha256};
 use vergence_mcu::Firmware;
 
 /// Where an application starts.
-const START: u32 = FLASH_BASE + ACTIVE.start;
+const START: u32 = FLASH_BASE + IMAGE.start;
 /// How an ELF file begins.
 const MAGIC: &[u8] = b"\x7fELF";
 
@@ -112,6 +112,6 @@ fn from_elf(file: &[u8], hardware: u32) -> Result<Vec<u8>, ApplicationError> {
 fn starts_with_vectors(image: &[u8]) -> bool {
     let word = |at: usize| Some(u32::from_le_bytes(image.get(at..at + 4)?.try_into().ok()?));
     let (Some(stack), Some(reset)) = (word(0), word(4)) else { return false };
-    let code = (FLASH_BASE + ACTIVE.start)..(FLASH_BASE + ACTIVE.start + image.len() as u32);
+    let code = (FLASH_BASE + IMAGE.start)..(FLASH_BASE + IMAGE.start + image.len() as u32);
     stack > RAM.start && stack <= RAM.end() && reset & 1 == 1 && code.contains(&reset)
 }

@@ -4,7 +4,7 @@ use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64Mcg;
 use vergence_board::Served;
 use vergence_image::ImageFile;
-use vergence_image::layout::{ACTIVE, CAPACITY};
+use vergence_image::layout::{ACTIVE, CAPACITY, IMAGE};
 use vergence_mcu::{
     Bench, BenchWiring, ChipConfig, FLASH_BASE, Firmware, Frame, Halt, LineFault, Machine, Picoseconds, Pin, UartId,
 };
@@ -176,11 +176,11 @@ fn plant(rig: &Rig, seed: u64) -> Plant {
 fn load(machine: &mut Machine<Bench>, Program { name, bytes }: Program<'_>) -> Result<Option<usize>, SimError> {
     let fail = |why: String| SimError::Program { name: name.to_owned(), why };
     if let Ok(ImageFile { seal, image }) = ImageFile::read(bytes) {
-        let start = ACTIVE.start as usize;
+        let start = IMAGE.start as usize;
         let chip = machine.chip_mut();
         let fits = image.len() <= CAPACITY as usize
             && chip.load_flash(start, image)
-            && chip.load_flash(start + CAPACITY as usize, &seal.to_bytes());
+            && chip.load_flash(ACTIVE.start as usize, &seal.to_bytes());
         return if fits { Ok(Some(start)) } else { Err(fail("this image does not fit into flash".into())) };
     }
     let firmware = Firmware::from_elf(bytes).map_err(|error| fail(error.to_string()))?;

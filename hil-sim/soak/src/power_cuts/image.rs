@@ -1,6 +1,6 @@
 //! The image in flash before an update, and the image that is sent.
 
-use vergence_image::layout::{ACTIVE, CAPACITY, FLASH_BASE, HARDWARE};
+use vergence_image::layout::{ACTIVE, FLASH_BASE, HARDWARE, IMAGE};
 use vergence_image::notes::{build_at, build_of, version_of};
 use vergence_image::{Seal, sha256};
 use vergence_mcu::{Firmware, FlashCells};
@@ -28,7 +28,7 @@ impl SignedImage {
     /// The image before an update of `application` and the one after it, which is its [`twin`].
     #[must_use]
     pub fn before_and_after(application: &Firmware, seal: impl Fn(ImageHeader) -> Seal) -> [Self; 2] {
-        [application.flat(FLASH_BASE + ACTIVE.start), twin(application)].map(|bytes| {
+        [application.flat(FLASH_BASE + IMAGE.start), twin(application)].map(|bytes| {
             let version = version_of(&bytes).unwrap_or_default();
             Self::new(bytes, version, &seal)
         })
@@ -47,17 +47,15 @@ impl SignedImage {
 
     /// Writes the image to where the boot loader starts it, as a debug probe would.
     pub fn install(&self, cells: &mut FlashCells) -> bool {
-        let start = ACTIVE.start as usize;
-        cells.load(start, &self.bytes) && cells.load(start + CAPACITY as usize, &self.seal.to_bytes())
+        cells.load(ACTIVE.start as usize, &self.seal.to_bytes()) && cells.load(IMAGE.start as usize, &self.bytes)
     }
 
     /// Whether the boot loader would start the image from these cells.
     #[must_use]
     pub fn is_installed(&self, cells: &FlashCells) -> bool {
-        let start = ACTIVE.start as usize;
-        let seal_at = start + CAPACITY as usize;
+        let [seal_at, start] = [ACTIVE, IMAGE].map(|region| region.start as usize);
         let holds = |at: usize, bytes: &[u8]| cells.bytes().get(at..at + bytes.len()) == Some(bytes);
-        let torn = |word: &u32| (start..seal_at + 128).contains(&(*word as usize * 8));
+        let torn = |word: &u32| (seal_at..start + self.bytes.len()).contains(&(*word as usize * 8));
         holds(start, &self.bytes) && holds(seal_at, &self.seal.to_bytes()) && !cells.torn().iter().any(torn)
     }
 }
@@ -66,7 +64,7 @@ impl SignedImage {
 /// differ while the program does the same; and another build id. A swap that mixes up pages is thus noticed.
 #[must_use]
 pub fn twin(application: &Firmware) -> Vec<u8> {
-    let start = FLASH_BASE + ACTIVE.start;
+    let start = FLASH_BASE + IMAGE.start;
     let mut flat = application.flat(start);
     for range in application.code() {
         let mut at = range.start.wrapping_sub(start) as usize;

@@ -1,6 +1,6 @@
 //! What a board does while the power is cut: updates, ways back, settings that are saved.
 
-use vergence_image::layout::{ACTIVE, PAGE};
+use vergence_image::layout::{IMAGE, PAGE};
 use vergence_mcu::{Firmware, FlashCells};
 use vergence_protocol::management::BootState;
 
@@ -80,7 +80,7 @@ impl Course {
             }
             Journey::Recovery => {
                 let mut before = delivered;
-                before.load((ACTIVE.start + 7 * PAGE) as usize, b"neither image");
+                before.load((IMAGE.start + 7 * PAGE) as usize, b"neither image");
                 course(old, new, before)
             }
             Journey::Settings => {

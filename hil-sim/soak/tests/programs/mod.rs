@@ -8,7 +8,7 @@ mod build;
 use std::sync::OnceLock;
 
 use vergence_image::Seal;
-use vergence_image::layout::{ACTIVE, FLASH_BASE};
+use vergence_image::layout::{FLASH_BASE, IMAGE};
 use vergence_mcu::Firmware;
 use vergence_protocol::management::{ImageHeader, Signature};
 use vergence_soak::ChipFlash;
@@ -32,7 +32,7 @@ pub fn programs() -> (Firmware, [SignedImage; 2]) {
         let bytes = std::fs::read(build::build(package)).expect("cargo says where the ELF is");
         Firmware::from_elf(&bytes).expect("the ELF is for this chip")
     });
-    let [old, new] = [application.flat(FLASH_BASE + ACTIVE.start), twin(&application)];
+    let [old, new] = [application.flat(FLASH_BASE + IMAGE.start), twin(&application)];
     let differing = old.chunks(2048).zip(new.chunks(2048)).filter(|(old, new)| old != new).count();
     let pages = old.len().div_ceil(2048);
     assert!(5 * differing >= 4 * pages, "{differing} of {pages} pages differ: a swap could mix up the others unseen");

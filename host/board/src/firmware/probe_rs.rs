@@ -5,7 +5,7 @@ use std::io::{ErrorKind, Write};
 use std::path::Path;
 use std::process::{Command, Output, Stdio};
 
-use vergence_image::layout::{ACTIVE, CAPACITY, FLASH_BASE, STATE};
+use vergence_image::layout::{FLASH_BASE, IMAGE, STATE};
 
 use super::ProbeError;
 use crate::update::FirmwareImage;
@@ -88,18 +88,20 @@ impl<'a> ProbeRs<'a> {
     }
 }
 
-/// What flash shall hold from the state page on: no swap under way, the image, and its seal behind.
+/// What flash shall hold from the state pages on: no swap under way, the seal, and the image.
 pub struct FlashContents(Vec<u8>);
 
 impl FlashContents {
     /// The contents for `image`; `None` where it is too long.
     #[must_use]
     pub fn of(image: &FirmwareImage) -> Option<Self> {
-        let mut flash = vec![0xFF; (STATE.length + ACTIVE.length) as usize];
-        let (code, behind) = flash.get_mut(STATE.length as usize..)?.split_at_mut_checked(CAPACITY as usize)?;
-        code.get_mut(..image.bytes.len())?.copy_from_slice(&image.bytes);
-        let seal = image.seal.to_bytes();
-        behind.get_mut(..seal.len())?.copy_from_slice(&seal);
+        if image.bytes.len() > IMAGE.length as usize {
+            return None;
+        }
+        let seal = [vec![0xFF; STATE.length as usize], image.seal.to_bytes().to_vec()].concat();
+        let mut flash = vec![0xFF; (IMAGE.start - STATE.start) as usize];
+        flash.get_mut(..seal.len())?.copy_from_slice(&seal);
+        flash.extend_from_slice(&image.bytes);
         Some(Self(flash))
     }
 }

@@ -8,7 +8,7 @@ use vergence_protocol::management::{BootState, Identity, Management, Outcome, Re
 use super::{UpdateError, carried_out};
 use crate::link::{LinkError, ManagementLink};
 
-/// Longest restart. A swap of both images takes some 6 s, the application's start less than one.
+/// Longest restart. A swap of the longest images takes some 9 s, the application's start less than one.
 const START_PATIENCE: Duration = Duration::from_secs(30);
 /// A board that still runs the old image after this time did not receive the request to restart.
 const UNHEARD: Duration = Duration::from_secs(4);
