@@ -142,8 +142,9 @@ fn every_command_in_a_page_parses() {
 fn the_drawing_has_the_pins_of_the_board() {
     let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("../..");
     let read = |path: &str| fs::read_to_string(root.join(path)).expect("a file of the repository");
-    let (board, page, drawing) =
-        (read("firmware/nucleo-g474/src/board.rs"), read("docs/firmware.md"), read("docs/wiring.svg"));
+    let board =
+        ["board.rs", "wiring/two_axes.rs"].map(|file| read(&format!("firmware/nucleo-g474/src/{file}"))).concat();
+    let (page, drawing) = (read("docs/firmware.md"), read("docs/wiring.svg"));
     // The serial line and the light are on the board itself; the servo bus is only reserved.
     let not_wired = ["PA2", "PA3", "PA5", "PB10", "PB14"];
     let pins = board.split("p.P").skip(1).map(|rest| {
@@ -156,5 +157,5 @@ fn the_drawing_has_the_pins_of_the_board() {
         assert!(drawing.contains(&format!(">{pin}<")), "{pin} is not in docs/wiring.svg");
         drawn += 1;
     }
-    assert!(drawn >= 15, "only {drawn} pins were found in board.rs");
+    assert!(drawn >= 15, "only {drawn} pins were found in board.rs and two_axes.rs");
 }

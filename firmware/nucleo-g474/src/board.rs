@@ -1,4 +1,5 @@
-//! Pins and timers of the NUCLEO-G474RE. For another wiring, change this file and the table in docs/firmware.md.
+//! Pins and timers of the NUCLEO-G474RE. The stages are wired in a file of [`wiring`], which a feature of the package chooses:
+//! for another wiring change that file and the table in docs/firmware.md.
 //!
 //! The compiler checks that a pin can do its job: `TimerPin<TIM8, Ch1>` and similar traits are implemented from the chip's
 //! alternate-function data, and each pin can be given away only once.
@@ -11,9 +12,17 @@ use embassy_stm32::{Peri, Peripherals, bind_interrupts, dma, pac, peripherals, r
 use crate::drivers::DriverWire;
 use crate::encoder::Encoder;
 use crate::receiver::{Bell, Receiver};
-use crate::rig::Rig;
-use crate::steps::{StepDma, StepPulses};
+use crate::rig::{Rig, Stage};
+use crate::steps::StepPulses;
 use crate::trigger::Trigger;
+
+#[cfg(all(feature = "one-axis", feature = "three-axes"))]
+compile_error!("a board has one wiring: choose one of the features one-axis and three-axes, or none for two axes");
+
+#[cfg_attr(feature = "one-axis", path = "wiring/one_axis.rs")]
+#[cfg_attr(feature = "three-axes", path = "wiring/three_axes.rs")]
+#[cfg_attr(not(any(feature = "one-axis", feature = "three-axes")), path = "wiring/two_axes.rs")]
+pub mod wiring;
 
 /// Name of the kind of board.
 pub const NAME: &str = "nucleo-g474";
@@ -23,14 +32,6 @@ bind_interrupts!(struct Interrupts {
     DMA1_CHANNEL1 => dma::InterruptHandler<peripherals::DMA1_CH1>;
     DMA1_CHANNEL2 => dma::InterruptHandler<peripherals::DMA1_CH2>;
 });
-
-impl StepDma for peripherals::DMA1_CH3 {
-    const CHANNEL: usize = 2;
-}
-
-impl StepDma for peripherals::DMA1_CH4 {
-    const CHANNEL: usize = 3;
-}
 
 /// The parts of the board, ready to be used.
 pub struct Board {
@@ -66,18 +67,14 @@ impl Board {
     pub fn new(p: Peripherals) -> Self {
         // First, so that nothing can move: high switches the drivers off.
         let drivers_off = Output::new(p.PA10, Level::High, Speed::Low);
+        let stages = wiring::stages!(p);
+        let counters = stages.each_ref().map(|stage| stage.encoder.counter());
         let rig = Rig {
-            steps: [
-                StepPulses::new(p.TIM1, p.PA8, p.PA9, p.DMA1_CH3),
-                StepPulses::new(p.TIM8, p.PC6, p.PC8, p.DMA1_CH4),
-            ],
-            encoders: [Encoder::new(p.TIM2, p.PA0, p.PA1), Encoder::new(p.TIM5, p.PB2, p.PC12)],
-            home_switches: [Input::new(p.PC0, Pull::Up), Input::new(p.PC1, Pull::Up)],
-            hard_limits: [Input::new(p.PC2, Pull::Up), Input::new(p.PC3, Pull::Up)],
+            stages,
             emergency_stop: Input::new(p.PC4, Pull::Up),
             drivers_off,
             holding: Output::new(p.PB5, Level::Low, Speed::Low),
-            trigger: Trigger::new(p.TIM4, p.PB6),
+            trigger: Trigger::new(p.TIM4, p.PB6, counters),
             latched: None,
         };
         reserve_servo_bus(&p.USART3, &p.PB10, &p.PB14);

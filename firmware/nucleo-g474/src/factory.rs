@@ -3,6 +3,7 @@
 use vergence_control::{AxisSettings, DriverSettings, HomingSettings};
 use vergence_protocol::{AxisKind, Micro};
 
+use crate::board::wiring;
 use crate::rig::AXES;
 
 /// Converts a positive angle from thousandths of a degree to the nearest microradian.
@@ -10,10 +11,17 @@ const fn millidegrees(angle: i32) -> i32 {
     ((angle as i64 * 174_532_925 + 5_000_000) / 10_000_000) as i32
 }
 
-/// Settings of both axes. Baseline: a screw of 2 mm pitch, a 200-step motor in 1/8 steps, 60 to 220 mm. Separation: 0 to
-/// 130 degrees, 64 000 steps per revolution.
+/// Settings of all axes.
 pub fn axes() -> [AxisSettings; AXES] {
-    let baseline = AxisSettings {
+    wiring::AXES.map(|kind| match kind {
+        AxisKind::Linear => linear(),
+        AxisKind::Rotary => rotary(),
+    })
+}
+
+/// A linear stage: a screw of 2 mm pitch, a 200-step motor in 1/8 steps, 60 to 220 mm.
+fn linear() -> AxisSettings {
+    AxisSettings {
         kind: AxisKind::Linear,
         min: Micro(60_000),
         max: Micro(220_000),
@@ -37,8 +45,12 @@ pub fn axes() -> [AxisSettings; AXES] {
             repeatability: Micro(200),
         },
         driver: DriverSettings::default(),
-    };
-    let separation = AxisSettings {
+    }
+}
+
+/// A pinion stage: 0 to 130 degrees, 64 000 steps per revolution.
+fn rotary() -> AxisSettings {
+    AxisSettings {
         kind: AxisKind::Rotary,
         min: Micro(0),
         max: Micro(millidegrees(130_000)),
@@ -62,6 +74,5 @@ pub fn axes() -> [AxisSettings; AXES] {
             repeatability: Micro(millidegrees(100)),
         },
         driver: DriverSettings::default(),
-    };
-    [baseline, separation]
+    }
 }

@@ -5,24 +5,31 @@ use embassy_time::Instant;
 use vergence_control::{DriverSettings, RigIo, StepSchedule, TriggerEdge};
 use vergence_protocol::{AxisList, DriverState, Microseconds};
 
+use crate::board::wiring;
 use crate::drivers;
 use crate::encoder::Encoder;
 use crate::steps::StepPulses;
 use crate::trigger::Trigger;
 
 /// Number of axes that the board drives.
-pub const AXES: usize = 2;
+pub const AXES: usize = wiring::AXES.len();
+
+/// What one axis is wired to.
+pub struct Stage {
+    /// Step and direction outputs.
+    pub steps: StepPulses,
+    /// Encoder.
+    pub encoder: Encoder,
+    /// Home switch: closed (low) at home.
+    pub home_switch: Input<'static>,
+    /// Hard limit switch: normally closed (low), open (high) beyond the range or when the wire is broken.
+    pub hard_limit: Input<'static>,
+}
 
 /// Motors, encoders, switches and trigger.
 pub struct Rig {
-    /// Step and direction outputs of each axis.
-    pub steps: [StepPulses; AXES],
-    /// Encoder of each axis.
-    pub encoders: [Encoder; AXES],
-    /// Home switches: closed (low) at home.
-    pub home_switches: [Input<'static>; AXES],
-    /// Hard limit switches: normally closed (low), open (high) beyond the range or when the wire is broken.
-    pub hard_limits: [Input<'static>; AXES],
+    /// The axes.
+    pub stages: [Stage; AXES],
     /// Emergency stop: normally closed (low), open (high) while pressed or when the wire is broken.
     pub emergency_stop: Input<'static>,
     /// Enable line of the drivers: low switches them on. The pull-up on the drivers' side keeps them off while the chip
@@ -48,7 +55,7 @@ impl Rig {
     /// axis moves on by 32 um.
     pub fn latch_encoders(&mut self) {
         self.latched = Some(critical_section::with(|_| Latched {
-            counts: self.encoders.each_ref().map(Encoder::count),
+            counts: self.stages.each_ref().map(|stage| stage.encoder.count()),
             at: Microseconds(Instant::now().as_micros()),
         }));
     }
@@ -61,8 +68,8 @@ impl Rig {
     /// Starts the steps ordered for the tick that has begun. Returns whether the steps of the tick before were made in time.
     pub fn begin_tick(&mut self) -> bool {
         let mut in_time = true;
-        for axis in &mut self.steps {
-            in_time &= axis.begin_tick();
+        for stage in &mut self.stages {
+            in_time &= stage.steps.begin_tick();
         }
         self.trigger.poll();
         in_time
@@ -76,7 +83,7 @@ impl RigIo for Rig {
         } else {
             self.drivers_off.set_high();
         }
-        self.steps.iter_mut().for_each(StepPulses::abort);
+        self.stages.iter_mut().for_each(|stage| stage.steps.abort());
         drivers::set_motors(on);
     }
 
@@ -85,13 +92,13 @@ impl RigIo for Rig {
     }
 
     fn schedule_steps(&mut self, axis: usize, steps: &StepSchedule) {
-        if let Some(axis) = self.steps.get_mut(axis) {
-            axis.order(steps);
+        if let Some(stage) = self.stages.get_mut(axis) {
+            stage.steps.order(steps);
         }
     }
 
     fn steps(&self, axis: usize) -> i32 {
-        self.steps.get(axis).map_or(0, StepPulses::count)
+        self.stages.get(axis).map_or(0, |stage| stage.steps.count())
     }
 
     // Not inlined: copies of it in the controller would take 5 kB of flash.
@@ -99,13 +106,13 @@ impl RigIo for Rig {
     fn encoder(&self, axis: usize) -> i32 {
         match &self.latched {
             Some(latched) => latched.counts.get(axis).copied().unwrap_or(0),
-            None => self.encoders.get(axis).map_or(0, Encoder::count),
+            None => self.stages.get(axis).map_or(0, |stage| stage.encoder.count()),
         }
     }
 
     fn expect_counts(&mut self, axis: usize, per_second: u32) {
-        if let Some(encoder) = self.encoders.get_mut(axis) {
-            encoder.expect(per_second);
+        if let Some(stage) = self.stages.get_mut(axis) {
+            stage.encoder.expect(per_second);
         }
     }
 
@@ -114,11 +121,11 @@ impl RigIo for Rig {
     }
 
     fn home_switch(&self, axis: usize) -> bool {
-        self.home_switches.get(axis).is_some_and(Input::is_low)
+        self.stages.get(axis).is_some_and(|stage| stage.home_switch.is_low())
     }
 
     fn hard_limit(&self, axis: usize) -> bool {
-        self.hard_limits.get(axis).is_some_and(Input::is_high)
+        self.stages.get(axis).is_some_and(|stage| stage.hard_limit.is_high())
     }
 
     fn emergency_stop(&self) -> bool {
@@ -139,6 +146,8 @@ impl RigIo for Rig {
     }
 
     fn take_trigger_edge(&mut self) -> Option<TriggerEdge> {
-        self.trigger.take_edge()
+        let (at, raw) = self.trigger.take_edge()?;
+        let counts = self.stages.iter().zip(raw).map(|(stage, raw)| stage.encoder.extended(raw)).collect();
+        Some(TriggerEdge { at, counts })
     }
 }

@@ -13,6 +13,7 @@ use embassy_stm32::pac::bdma::vals::{Dir, Pl, Size};
 use embassy_stm32::pac::timer::TimAdv;
 use embassy_stm32::pac::timer::vals::{self, Ocm};
 use embassy_stm32::pac::{DMA1, DMAMUX1, TIM7, bdma, dmamux};
+use embassy_stm32::peripherals;
 use embassy_stm32::timer::low_level::Timer;
 use embassy_stm32::timer::{AdvancedInstance4Channel, Ch1, Dma, TimerPin};
 use vergence_control::{MAX_STEPS_PER_TICK, StepSchedule};
@@ -37,6 +38,15 @@ pub trait StepDma {
     /// Number of the channel, from 0.
     const CHANNEL: usize;
 }
+
+macro_rules! channels {
+    ($($channel:ident = $number:literal),*) => {
+        $(impl StepDma for peripherals::$channel { const CHANNEL: usize = $number; })*
+    };
+}
+
+// The serial line has the first two.
+channels!(DMA1_CH3 = 2, DMA1_CH4 = 3, DMA1_CH5 = 4, DMA1_CH6 = 5, DMA1_CH7 = 6, DMA1_CH8 = 7);
 
 /// The list ordered for the coming tick; its periods are in the back buffer.
 #[derive(Clone, Copy, Default)]

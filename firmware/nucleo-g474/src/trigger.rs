@@ -4,6 +4,7 @@
 use core::cell::RefCell;
 
 use critical_section::Mutex;
+use embassy_stm32::Peri;
 use embassy_stm32::gpio::{AfType, Flex, OutputType, Speed};
 use embassy_stm32::interrupt;
 use embassy_stm32::interrupt::{InterruptExt, Priority};
@@ -12,11 +13,12 @@ use embassy_stm32::pac::timer::vals::Ocm;
 use embassy_stm32::peripherals;
 use embassy_stm32::timer::low_level::Timer;
 use embassy_stm32::timer::{Ch1, TimerPin};
-use embassy_stm32::{Peri, pac};
 use embassy_time::Instant;
 use heapless::Deque;
-use vergence_control::TriggerEdge;
-use vergence_protocol::{AxisList, Microseconds};
+use vergence_protocol::Microseconds;
+
+use crate::encoder::Counter;
+use crate::rig::AXES;
 
 /// Prescaler of the timer, which counts microseconds.
 const PRESCALER: u16 = 169;
@@ -25,10 +27,16 @@ const PULSE_US: u16 = 100;
 /// Pulses further ahead than this, in microseconds, wait in software: the counter has 16 bits.
 const HORIZON_US: u64 = 10_000;
 
-/// Edges: time in microseconds, and the counts of both encoders.
-type Edges = Deque<(u64, [i32; 2]), 4>;
+/// An edge: its time, and the counters of all encoders.
+pub type Edge = (Microseconds, [u32; AXES]);
 
-static EDGES: Mutex<RefCell<Edges>> = Mutex::new(RefCell::new(Deque::new()));
+/// What the interrupt reads and writes.
+struct Shared {
+    counters: Option<[Counter; AXES]>,
+    edges: Deque<Edge, 4>,
+}
+
+static SHARED: Mutex<RefCell<Shared>> = Mutex::new(RefCell::new(Shared { counters: None, edges: Deque::new() }));
 
 /// The trigger output.
 pub struct Trigger {
@@ -37,11 +45,13 @@ pub struct Trigger {
 }
 
 impl Trigger {
-    /// Sets up the output, low.
+    /// Sets up the output, low. At each edge it reads these counters.
     pub fn new(
         timer: Peri<'static, peripherals::TIM4>,
         pin: Peri<'static, impl TimerPin<peripherals::TIM4, Ch1>>,
+        counters: [Counter; AXES],
     ) -> Self {
+        critical_section::with(|cs| SHARED.borrow_ref_mut(cs).counters = Some(counters));
         let function = pin.af_num();
         let mut pin = Flex::new(pin);
         pin.set_as_af_unchecked(function, AfType::output(OutputType::PushPull, Speed::Medium));
@@ -85,19 +95,21 @@ impl Trigger {
     }
 
     /// Takes the oldest edge.
-    pub fn take_edge(&mut self) -> Option<TriggerEdge> {
-        let (at, counts) = critical_section::with(|cs| EDGES.borrow_ref_mut(cs).pop_front())?;
-        Some(TriggerEdge { at: Microseconds(at), counts: AxisList::from_iter(counts) })
+    pub fn take_edge(&mut self) -> Option<Edge> {
+        critical_section::with(|cs| SHARED.borrow_ref_mut(cs).edges.pop_front())
     }
 }
 
 #[interrupt]
 fn TIM4() {
-    let counts = [pac::TIM2.cnt().read().cast_signed(), pac::TIM5.cnt().read().cast_signed()];
-    let at = Instant::now().as_micros();
-    TIM4.sr().write(|_| {});
     critical_section::with(|cs| {
-        // A tick brings at most one edge; an edge that does not fit is lost, like a lost pose.
-        let _ = EDGES.borrow_ref_mut(cs).push_back((at, counts));
+        let mut shared = SHARED.borrow_ref_mut(cs);
+        let counts = shared.counters.map(|counters| counters.map(Counter::read));
+        let at = Microseconds(Instant::now().as_micros());
+        TIM4.sr().write(|_| {});
+        if let Some(counts) = counts {
+            // A tick brings at most one edge; an edge that does not fit is lost, like a lost pose.
+            let _ = shared.edges.push_back((at, counts));
+        }
     });
 }

@@ -1,6 +1,8 @@
 //! The mechanics of the rig on the pins of the chip: step pulses move motors edge by edge; encoders and switches drive
 //! their lines.
 
+mod nucleo_g474;
+
 use vergence_control::{RigIo, StepSchedule};
 use vergence_plant::{DriverReply, Plant};
 use vergence_protocol::Microseconds;
@@ -59,39 +61,6 @@ pub struct BenchWiring {
 }
 
 impl BenchWiring {
-    /// The wiring of the NUCLEO-G474RE firmware (`docs/firmware.md`): baseline on TIM1 and TIM2, separation on TIM8 and
-    /// TIM5; home switches close at home, limits and emergency stop open when operated.
-    #[must_use]
-    pub fn nucleo_g474() -> Self {
-        const A: usize = 0;
-        const B: usize = 16;
-        const C: usize = 32;
-        let switch = |index, normally_closed| SwitchWiring { pin: Pin::at(index), normally_closed };
-        let baseline = AxisWiring {
-            step: Pin::at(A + 8),
-            direction: Pin::at(A + 9),
-            encoder: [Pin::at(A), Pin::at(A + 1)],
-            home: switch(C, false),
-            hard_limit: switch(C + 2, true),
-        };
-        let separation = AxisWiring {
-            step: Pin::at(C + 6),
-            direction: Pin::at(C + 8),
-            encoder: [Pin::at(B + 2), Pin::at(C + 12)],
-            home: switch(C + 1, false),
-            hard_limit: switch(C + 3, true),
-        };
-        let emergency_stop = switch(C + 4, true);
-        Self {
-            axes: vec![baseline, separation],
-            drivers_off: Pin::at(A + 10),
-            holding: Pin::at(B + 5),
-            emergency_stop,
-            camera_trigger: Pin::at(B + 6),
-            driver_line: UartId::UART4,
-        }
-    }
-
     /// Every pin under the name of its signal, for a trace.
     #[must_use]
     pub fn signals(&self) -> Vec<(Pin, String)> {

@@ -52,10 +52,9 @@ impl SimulatedChip {
     /// [`SimError::Program`] where a program is none for this chip, [`SimError::OtherAxes`] where the rig does not fit the
     /// board.
     pub fn new(programs: &[Program<'_>], rig: &Rig, seed: u64) -> Result<Self, SimError> {
-        let wiring = BenchWiring::nucleo_g474();
-        if rig.axes.len() != wiring.axes.len() {
-            return Err(SimError::OtherAxes { rig: rig.name.clone(), axes: rig.axes.len(), driven: wiring.axes.len() });
-        }
+        let axes = rig.axes.len();
+        let unknown = || SimError::OtherAxes { rig: rig.name.clone(), axes };
+        let wiring = BenchWiring::nucleo_g474_of(axes).ok_or_else(unknown)?;
         let bench = Bench::new(wiring.clone(), plant(rig, seed));
         let mut machine = Machine::new(ChipConfig::default(), bench);
         // Most of an update is waiting for the flash.

@@ -15,15 +15,13 @@ pub enum SimError {
         /// The reason why the controller refuses the settings.
         why: String,
     },
-    /// The simulated chip is wired to other axes than the rig has.
-    #[error("rig '{rig}' has {axes} axes, and the board drives {driven}")]
+    /// No wiring of the simulated chip has so many axes.
+    #[error("rig '{rig}' has {axes} axes, and the wirings of the board have one to three")]
     OtherAxes {
         /// Name of the rig.
         rig: String,
         /// Number of axes of the rig.
         axes: usize,
-        /// Number of axes that the board drives.
-        driven: usize,
     },
     /// A program cannot run on the chip.
     #[error("{name}: {why}")]
