@@ -283,6 +283,7 @@ fn imports_of_board_files() -> BTreeMap<String, BTreeSet<String>> {
     let files: BTreeMap<String, String> = std::fs::read_dir(folder)
         .expect("the folder is there")
         .map(|entry| entry.expect("an entry").path())
+        .filter(|path| path.is_file())
         .map(|path| (path.file_stem().expect("a name").to_string_lossy().into_owned(), path))
         .map(|(name, path)| (name, std::fs::read_to_string(path).expect("a text")))
         .collect();

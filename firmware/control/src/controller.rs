@@ -21,8 +21,8 @@ use vergence_protocol::{
     MovePhase, PoseReport, SessionId,
 };
 
-pub use self::planning::PLAN_TICKS;
 use self::planning::Planning;
+pub use self::planning::plan_ticks;
 use crate::axis::Axis;
 use crate::holding::Holding;
 use crate::homing_sequence::HomingSequence;

@@ -43,7 +43,7 @@ mod updater;
 
 pub use board_settings::{BoardSettings, Machine, SettingError};
 pub use bounds::LONGEST_BRAKING_MS;
-pub use controller::{Controller, Event, PLAN_TICKS};
+pub use controller::{Controller, Event, plan_ticks};
 pub use driver::{DriverKind, DriverSettings};
 pub use io::{MAX_STEPS_PER_TICK, RigIo, StepSchedule, TriggerEdge};
 pub use move_planner::{MovePlanner, PlanRequest, PlannedWay};

@@ -3,8 +3,11 @@
 mod support;
 
 use support::{HOST, TICK_US, World, linear, rotary};
-use vergence_control::{MovePlanner, PLAN_TICKS, RigIo};
+use vergence_control::{MovePlanner, RigIo, plan_ticks};
 use vergence_protocol::{ControllerState, MovePhase, Request, Status, StopKind};
+
+/// Ticks in which a plan of both axes is made.
+const PLAN_TICKS: u32 = plan_ticks(2);
 
 /// Settings and start as in `World`, but plans are made by the test.
 fn homed() -> World {

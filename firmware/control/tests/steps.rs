@@ -5,7 +5,7 @@ mod support;
 use proptest::prelude::*;
 use proptest::test_runner::RngSeed;
 use support::{HOST, TICK_US, World, linear, rotary};
-use vergence_control::{AxisSettings, FINE_BITS, Fine, LARGEST_STEP_RATE, Limits, MotionState, PLAN_TICKS, Trajectory};
+use vergence_control::{AxisSettings, FINE_BITS, Fine, LARGEST_STEP_RATE, Limits, MotionState, Trajectory, plan_ticks};
 use vergence_protocol::{ControllerState, Request, Status, StopKind};
 
 const FINE: f64 = (1 << FINE_BITS) as f64;
@@ -44,7 +44,7 @@ impl Ideal {
     /// Goes on to another trajectory once it is planned; where another one is still being planned, that one begins first.
     fn go_to(&mut self, world: &World, plan: impl FnOnce(MotionState) -> Trajectory) {
         let asked = Self::next(world).max(self.pieces.last().map_or(0, |(start, _)| *start));
-        let start = asked + u64::from(PLAN_TICKS) * TICK_US;
+        let start = asked + u64::from(plan_ticks(1)) * TICK_US;
         let trajectory = plan(self.state(start));
         self.pieces.push((start, trajectory));
     }

@@ -1,5 +1,5 @@
-//! Pins and timers of the NUCLEO-G474RE. The stages are wired in a file of [`wiring`], which a feature of the package chooses:
-//! for another wiring change that file and the table in docs/firmware.md.
+//! Pins and timers of the NUCLEO-G474RE. The stages are wired in a file of [`crate::wiring`], which a feature of the package
+//! chooses: for another wiring change that file and the table in docs/firmware.md.
 //!
 //! The compiler checks that a pin can do its job: `TimerPin<TIM8, Ch1>` and similar traits are implemented from the chip's
 //! alternate-function data, and each pin can be given away only once.
@@ -15,14 +15,7 @@ use crate::receiver::{Bell, Receiver};
 use crate::rig::{Rig, Stage};
 use crate::steps::StepPulses;
 use crate::trigger::Trigger;
-
-#[cfg(all(feature = "one-axis", feature = "three-axes"))]
-compile_error!("a board has one wiring: choose one of the features one-axis and three-axes, or none for two axes");
-
-#[cfg_attr(feature = "one-axis", path = "wiring/one_axis.rs")]
-#[cfg_attr(feature = "three-axes", path = "wiring/three_axes.rs")]
-#[cfg_attr(not(any(feature = "one-axis", feature = "three-axes")), path = "wiring/two_axes.rs")]
-pub mod wiring;
+use crate::wiring;
 
 /// Name of the kind of board.
 pub const NAME: &str = "nucleo-g474";

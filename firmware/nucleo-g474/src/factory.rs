@@ -3,8 +3,8 @@
 use vergence_control::{AxisSettings, DriverSettings, HomingSettings};
 use vergence_protocol::{AxisKind, Micro};
 
-use crate::board::wiring;
 use crate::rig::AXES;
+use crate::wiring;
 
 /// Converts a positive angle from thousandths of a degree to the nearest microradian.
 const fn millidegrees(angle: i32) -> i32 {

@@ -27,6 +27,14 @@ mod trigger;
 mod version;
 mod watchdog;
 
+#[cfg(all(feature = "one-axis", feature = "three-axes"))]
+compile_error!("a board has one wiring: choose one of the features one-axis and three-axes, or none for two axes");
+
+#[cfg_attr(feature = "one-axis", path = "wiring/one_axis.rs")]
+#[cfg_attr(feature = "three-axes", path = "wiring/three_axes.rs")]
+#[cfg_attr(not(any(feature = "one-axis", feature = "three-axes")), path = "wiring/two_axes.rs")]
+mod wiring;
+
 use board::Board;
 use embassy_executor::Spawner;
 use embassy_stm32::pac::{TIM15, timer::vals::Urs};

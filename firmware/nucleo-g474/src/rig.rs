@@ -5,11 +5,11 @@ use embassy_time::Instant;
 use vergence_control::{DriverSettings, RigIo, StepSchedule, TriggerEdge};
 use vergence_protocol::{AxisList, DriverState, Microseconds};
 
-use crate::board::wiring;
 use crate::drivers;
 use crate::encoder::Encoder;
 use crate::steps::StepPulses;
 use crate::trigger::Trigger;
+use crate::wiring;
 
 /// Number of axes that the board drives.
 pub const AXES: usize = wiring::AXES.len();

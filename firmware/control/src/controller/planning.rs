@@ -1,6 +1,6 @@
 //! Plans of moves: asked for here, made elsewhere below the control tick, and begun at a tick that is fixed beforehand.
 //!
-//! A plan takes longer than a tick. It therefore starts from the state in which the axes will be [`PLAN_TICKS`] ticks after
+//! A plan takes longer than a tick. It therefore starts from the state in which the axes will be [`plan_ticks`] ticks after
 //! the request; until then the axes go on as before, or rest. Whatever changes their motion meanwhile (a stop, a fault)
 //! drops the plan, and a plan that comes too late is asked for again with more time.
 
@@ -9,9 +9,16 @@ use vergence_protocol::{AxisList, Micro};
 use super::Controller;
 use crate::move_planner::{MovePlanner, PlanRequest};
 
-/// Ticks from a request to the begin of its plan: twice what planning takes on the slowest board beside two axes at
-/// 100 kHz.
-pub const PLAN_TICKS: u32 = 8;
+/// Ticks from a request to the begin of its plan for so many axes, of which each is planned by itself: twice what planning takes
+/// on the slowest board beside two axes at 100 kHz (`tests/hil_planning.rs`).
+#[must_use]
+pub const fn plan_ticks(axes: usize) -> u32 {
+    const OF_EACH: u32 = 4;
+    const AT_LEAST: u32 = 8;
+    let ticks = (axes as u32).saturating_mul(OF_EACH);
+    if ticks > AT_LEAST { ticks } else { AT_LEAST }
+}
+
 /// Largest number of ticks that a plan gets after it came too late.
 const MOST_TICKS: u32 = 64;
 
@@ -59,7 +66,7 @@ impl Controller {
             }
             self.planning = None;
             if is_outdated {
-                self.plan_within(PLAN_TICKS);
+                self.plan_within(plan_ticks(self.axes.len()));
             }
         }
         true
@@ -80,7 +87,7 @@ impl Controller {
     pub(super) fn want_plan(&mut self) {
         match &mut self.planning {
             Some(planning) => planning.is_outdated = true,
-            None => self.plan_within(PLAN_TICKS),
+            None => self.plan_within(plan_ticks(self.axes.len())),
         }
     }
 
