@@ -21,6 +21,7 @@ mod goal;
 mod image_pairing;
 mod in_json;
 mod interchange;
+pub mod linkage;
 mod mode;
 mod moving;
 mod pose;

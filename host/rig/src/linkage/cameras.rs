@@ -1,0 +1,88 @@
+//! The cameras on the trunk: on the two front side links, from corner A towards B and from corner F towards E.
+
+use nalgebra::{Isometry3, Matrix3, Rotation3, SMatrix, Translation3, UnitQuaternion, Vector3};
+use vergence_vision::{Left, Right, Transform};
+
+use super::{Loop, NotDriven, TrunkJoint, TrunkLinks};
+
+const JOINTS: usize = TrunkJoint::COUNT;
+
+/// Where the cameras sit on their links; both sides are mirror images.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct TrunkCameras {
+    /// Length of the side links in millimetres.
+    pub side: f64,
+    /// Distance from the front corner along the link, in millimetres.
+    pub along: f64,
+    /// Distance outward from the link, in millimetres.
+    pub outward: f64,
+    /// Angle of the optical axis from the link's front end outward, in radians.
+    pub angle: f64,
+}
+
+impl Default for TrunkCameras {
+    /// 60 degrees outward, inferred from the published separations of the modes; 50 mm along the link and 25 mm outward, assumed.
+    fn default() -> Self {
+        let side = TrunkLinks::default().side;
+        Self { side, along: 50.0, outward: 25.0, angle: 60_f64.to_radians() }
+    }
+}
+
+impl TrunkCameras {
+    /// The left camera in the frame of its link: x from corner A to B, z up, so that -y is outward.
+    fn link_from_left(&self) -> Isometry3<f64> {
+        let axis = Vector3::new(-self.angle.cos(), -self.angle.sin(), 0.0);
+        mounted(Vector3::new(self.along, -self.outward, 0.0), axis)
+    }
+
+    /// The right camera in the frame of its link: x from corner E to F.
+    fn link_from_right(&self) -> Isometry3<f64> {
+        let axis = Vector3::new(self.angle.cos(), -self.angle.sin(), 0.0);
+        mounted(Vector3::new(self.side - self.along, -self.outward, 0.0), axis)
+    }
+
+    /// Pose of the right camera in the left one's frame, with the trunk's joints at `angles` in radians.
+    #[must_use]
+    pub fn left_from_right(&self, trunk: &Loop<JOINTS>, angles: &[f64; JOINTS]) -> Transform<Left, Right> {
+        let right_link_from_left_link = trunk.between(TrunkJoint::F.index(), JOINTS + TrunkJoint::A.index(), angles);
+        let right_from_left = self.link_from_right().inverse() * right_link_from_left_link * self.link_from_left();
+        Transform::from_isometry(right_from_left.inverse())
+    }
+
+    /// Motion of the right camera in the left one's frame for each radian of a driven joint: turn in radians, shift of its centre in
+    /// millimetres. Columns of joints that are not driven are zero.
+    ///
+    /// # Errors
+    /// [`NotDriven`] at a singular shape, where the passive joints do not follow the driven ones.
+    pub fn sensitivity(
+        &self,
+        trunk: &Loop<JOINTS>,
+        angles: &[f64; JOINTS],
+        driven: &[bool; JOINTS],
+    ) -> Result<SMatrix<f64, 6, JOINTS>, NotDriven> {
+        let following = trunk.following(angles, driven)?;
+        let mut slopes = SMatrix::<f64, 6, JOINTS>::zeros();
+        let right = self.left_from_right(trunk, angles).isometry().translation.vector;
+        let right_link_from_left =
+            trunk.between(TrunkJoint::F.index(), JOINTS + TrunkJoint::A.index(), angles) * self.link_from_left();
+        let mut frame = Isometry3::identity();
+        // The joints between the links, from right to left: each turns the right camera backwards about its axis.
+        for joint in [TrunkJoint::F, TrunkJoint::FrontFold, TrunkJoint::A].map(TrunkJoint::index) {
+            frame *= trunk.joints()[joint].before_from_after(angles[joint]);
+            let left_from_frame = right_link_from_left.inverse() * frame;
+            let axis = left_from_frame.rotation * -Vector3::z();
+            let shift = axis.cross(&(right - left_from_frame.translation.vector));
+            let turned = SMatrix::<f64, 6, 1>::from_iterator(axis.iter().chain(shift.iter()).copied());
+            slopes += turned * following.row(joint);
+        }
+        Ok(slopes)
+    }
+}
+
+/// A camera at `at` that looks along `axis` and whose lower side is that of the trunk (-z of the link).
+fn mounted(at: Vector3<f64>, axis: Vector3<f64>) -> Isometry3<f64> {
+    let down = -Vector3::z();
+    let columns = Matrix3::from_columns(&[down.cross(&axis), down, axis]);
+    let rotation = UnitQuaternion::from_rotation_matrix(&Rotation3::from_matrix_unchecked(columns));
+    Isometry3::from_parts(Translation3::from(at), rotation)
+}

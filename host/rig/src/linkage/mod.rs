@@ -1,0 +1,22 @@
+//! Closed loops of links: the folding trunk that carries a robot's cameras.
+//!
+//! A [`Loop`] is a chain of revolute joints in Craig's modified Denavit-Hartenberg form (J. Craig, *Introduction to
+//! Robotics*, 3rd ed., §3.4) whose product is the identity. Of its joints some are driven; the others follow. The paper's
+//! trunk is [`trunk`]: eight links, of which two pairs fold against each other.
+//!
+//! With both folds flat the trunk is a planar six-bar, which [`SixBar`] solves in closed form. [`Loop::close`] solves any loop
+//! from a start near the answer. Where both apply they agree (`tests/linkage.rs`).
+
+mod cameras;
+mod closing;
+mod dh;
+mod mobility;
+mod six_bar;
+mod trunk;
+
+pub use cameras::TrunkCameras;
+pub use closing::{CloseError, Closed};
+pub use dh::{DhJoint, Loop};
+pub use mobility::{Mobility, NotDriven};
+pub use six_bar::{Corners, SixBar, SixBarError};
+pub use trunk::{TrunkJoint, TrunkLinks, trunk};

@@ -1,0 +1,97 @@
+//! The planar six-bar that the trunk is while both folds are flat, in closed form.
+//!
+//! Corners A to F go round: A, B, C on the left from front to rear, D, E, F on the right from rear to front. Angles are interior.
+
+use std::f64::consts::{PI, TAU};
+
+use nalgebra::{Rotation2, Vector2};
+
+/// Lengths of the links of a planar six-bar, in millimetres.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct SixBar {
+    /// Links AB, BC, DE and EF.
+    pub side: f64,
+    /// Links CD and FA.
+    pub end: f64,
+}
+
+/// Interior angles of the corners A to F in radians, from 0 to a whole turn.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Corners(pub [f64; 6]);
+
+/// Why there is no six-bar with these angles.
+#[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+pub enum SixBarError {
+    /// Corners D and F are farther apart than both links between them reach.
+    #[error("corners D and F are {apart_mm:.3} mm apart, and the links between them reach {reach_mm:.3} mm")]
+    TooFar {
+        /// Distance of D and F in millimetres.
+        apart_mm: f64,
+        /// Reach of both links in millimetres.
+        reach_mm: f64,
+    },
+    /// Corners D and F coincide: E may lie anywhere on a circle.
+    #[error("corners D and F coincide, so that corner E may lie anywhere around them")]
+    Undetermined,
+}
+
+impl SixBar {
+    /// All shapes with these interior angles of A, B and C, in radians: corner E outward, and inward; once where D, E and F are in
+    /// line.
+    ///
+    /// # Errors
+    /// [`SixBarError`] where there is none, or one for every place of E.
+    pub fn shapes(&self, driven: [f64; 3]) -> Result<Vec<Corners>, SixBarError> {
+        let [a, b, c] = driven;
+        // Directions of the links, going round; CD lies along x, and the inside is to the left of each link.
+        let bc = c - PI;
+        let ab = bc - (PI - b);
+        let fa = ab - (PI - a);
+        let d = Vector2::new(self.end, 0.0);
+        let f = -self.side * (direction(bc) + direction(ab)) - self.end * direction(fa);
+        let (apart, reach) = ((f - d).norm(), 2.0 * self.side);
+        // What rounding leaves of links in line.
+        let rounding = 1e-12 * reach;
+        if apart > reach + rounding {
+            return Err(SixBarError::TooFar { apart_mm: apart, reach_mm: reach });
+        }
+        if apart <= rounding {
+            return Err(SixBarError::Undetermined);
+        }
+        let middle = (d + f) / 2.0;
+        let beside = Rotation2::new(PI / 2.0) * (f - d) / apart;
+        let height = (self.side.powi(2) - (apart / 2.0).powi(2)).max(0.0).sqrt();
+        let heights = if apart >= reach - rounding { vec![0.0] } else { vec![-height, height] };
+        let shape = |height: f64| {
+            let e = middle + beside * height;
+            let (de, ef) = (heading(e - d), heading(f - e));
+            let interior = |turn: f64| (PI - turn).rem_euclid(TAU);
+            let [a, b, c] = driven.map(|angle| angle.rem_euclid(TAU));
+            Corners([a, b, c, interior(de), interior(ef - de), interior(fa - ef)])
+        };
+        Ok(heights.into_iter().map(shape).collect())
+    }
+}
+
+fn direction(angle: f64) -> Vector2<f64> {
+    Vector2::new(angle.cos(), angle.sin())
+}
+
+fn heading(way: Vector2<f64>) -> f64 {
+    way.y.atan2(way.x)
+}
+
+impl Corners {
+    /// The shape of `shapes` that is nearest to this one, by the largest difference of an angle: the branch of a linkage that moves
+    /// continuously. `None` where there is none.
+    #[must_use]
+    pub fn nearest(&self, shapes: &[Self]) -> Option<Self> {
+        let apart = |other: &Self| {
+            let differences =
+                self.0.iter().zip(other.0).map(|(one, other)| ((one - other + PI).rem_euclid(TAU) - PI).abs());
+            differences.fold(0.0, f64::max)
+        };
+        shapes.iter().copied().min_by(|one, other| apart(one).total_cmp(&apart(other)))
+    }
+}
