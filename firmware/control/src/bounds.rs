@@ -6,7 +6,7 @@
 
 use vergence_protocol::{AxisKind, SettingItem};
 
-use crate::driver::{ADDRESSES, DriverKind, DriverSettings};
+use crate::driver::{ADDRESSES, DriverKind, DriverSettings, LEAST_FULL_STEPS};
 use crate::settings::{AxisSettings, Scale, SettingsError};
 
 /// Longest time to brake from full speed, in milliseconds.
@@ -30,7 +30,8 @@ struct Bound {
 /// # Errors
 /// [`SettingsError::Outside`] with the first setting out of its bounds, or [`SettingsError::Braking`].
 pub(crate) fn check(settings: &AxisSettings, axis: usize) -> Result<(), SettingsError> {
-    let mut all = bounds(settings).into_iter().chain(driver_bounds(&settings.driver, axis));
+    let mut all =
+        bounds(settings).into_iter().chain(driver_bounds(&settings.driver, axis)).chain(stall_bounds(settings));
     let outside = all.find(|bound| !(bound.least..=bound.most).contains(&bound.value));
     if let Some(Bound { item, least, most, why, .. }) = outside {
         return Err(SettingsError::Outside { axis, item, least, most, why });
@@ -110,6 +111,55 @@ fn bounds(settings: &AxisSettings) -> [Bound; 10] {
             1,
             finest(settings.encoder()),
             "all counts from end to end, and as many again, must fit in 31 bits",
+        ),
+    ]
+}
+
+/// Bounds of homing by StallGuard and of its watch (datasheet of the TMC2209, rev. 1.09, sections 11 and 15.4).
+fn stall_bounds(settings: &AxisSettings) -> [Bound; 5] {
+    let AxisSettings { driver, homing, switches, .. } = settings;
+    let is_used = switches.stall_guard();
+    let can_be_used = driver.kind == DriverKind::Tmc2209 && driver.stealth_chop;
+    // Microsteps are scaled to full steps by their number, and speeds are those at three quarters of homing.
+    let full_steps =
+        |count: u64| i64::from(settings.motor().position_at((count * u64::from(driver.microsteps)) as i32).0);
+    let bound = |item, value: i64, least: i64, most: i64, why| Bound { item, value, least, most, why };
+    let only = |least: i64| if is_used { least } else { 0 };
+    [
+        bound(
+            SettingItem::HomeSwitch,
+            switches.home as i64,
+            0,
+            if can_be_used { 2 } else { 1 },
+            "StallGuard needs driver = tmc2209 and stealth_chop = true",
+        ),
+        bound(
+            SettingItem::StallThreshold,
+            switches.stall_threshold.into(),
+            only(1),
+            255,
+            "with 0 the driver never reports a stall",
+        ),
+        bound(
+            SettingItem::StallWatch,
+            switches.stall_watch.into(),
+            0,
+            is_used.into(),
+            "the board reads DIAG only where home_switch = stallguard",
+        ),
+        bound(
+            SettingItem::HomeSeekSpeed,
+            homing.seek_speed.min(settings.speed).into(),
+            only(full_steps(LEAST_FULL_STEPS * 4 / 3 + 1)),
+            i64::from(u32::MAX),
+            "slower than 267 full steps a second StallGuard does not work",
+        ),
+        bound(
+            SettingItem::FollowingError,
+            settings.following_error.0.into(),
+            only(full_steps(16)),
+            i64::from(i32::MAX),
+            "the motor must press for eight full steps until it is known to stall",
         ),
     ]
 }

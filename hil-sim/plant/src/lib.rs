@@ -11,10 +11,11 @@ mod encoder;
 mod flash;
 mod plant;
 mod services;
+mod stall_guard;
 mod switch;
 mod tmc2209;
 
-pub use axis::{AxisMechanics, AxisPlant, PitchError, StepMade};
+pub use axis::{AxisMechanics, AxisPlant, PitchError, StepMade, StopMechanics, SwitchMechanics};
 pub use bench::{Stage, bench_mechanics, bench_settings};
 pub use board::NativeBoard;
 pub use drivers::Drivers;

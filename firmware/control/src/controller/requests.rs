@@ -119,6 +119,10 @@ impl Controller {
         if axes == AxisMask::default() || axes.0 & !AxisMask::first(self.axes.len()).0 != 0 {
             return Err(Refusal::Invalid);
         }
+        let aside = (0u8..).zip(&self.axes).find(|(_, axis)| !axis.settings.switch_is_at_home());
+        if let Some((axis, _)) = aside.filter(|(axis, _)| axes.contains(usize::from(*axis))) {
+            return Err(Refusal::HomeSwitchAside { axis });
+        }
         self.homing = HomingSequence::start(axes, &mut self.axes);
         self.active.phase = MovePhase::None;
         self.state = ControllerState::Homing;
