@@ -151,14 +151,14 @@ fn stall_bounds(settings: &AxisSettings) -> [Bound; 5] {
             SettingItem::HomeSeekSpeed,
             homing.seek_speed.min(settings.speed).into(),
             only(full_steps(LEAST_FULL_STEPS * 4 / 3 + 1)),
-            i64::from(u32::MAX),
+            settings.speed.into(),
             "slower than 267 full steps a second StallGuard does not work",
         ),
         bound(
             SettingItem::FollowingError,
             settings.following_error.0.into(),
             only(full_steps(16)),
-            i64::from(i32::MAX),
+            i64::from(homing.travel.0) / 25,
             "the motor must press for eight full steps until it is known to stall",
         ),
     ]

@@ -361,6 +361,10 @@ fn an_end_that_is_not_where_the_switch_is_refuses_to_home() {
         assert_eq!(world.arm(), Status::Accepted);
         assert_eq!(world.home(BOTH), Status::Refused(Refusal::HomeSwitchAside { axis: 1 }));
         assert_eq!(world.home(FIRST), Status::Accepted);
+        settings[0].switches.home_end = settings[1].switches.home_end;
+        let mut world = World::with(settings, [100_000.0, 500_000.0]);
+        assert_eq!(world.arm(), Status::Accepted);
+        assert_eq!(world.home(AxisMask(2)), Status::Refused(Refusal::HomeSwitchAside { axis: 1 }));
     }
 }
 

@@ -6,7 +6,8 @@ use std::f64::consts::PI;
 use vergence_control::{AxisSettings, DriverSettings, HomingSettings, SwitchSettings};
 use vergence_protocol::{AxisKind, Micro};
 
-use crate::axis::{AxisMechanics, PitchError, StopMechanics, SwitchMechanics};
+use crate::axis::{AxisMechanics, PitchError};
+use crate::ends::{StopMechanics, SwitchMechanics};
 
 /// A stage: the settings of its controller, and its real mechanics.
 #[derive(Clone, Copy, Debug, PartialEq)]

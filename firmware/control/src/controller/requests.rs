@@ -119,8 +119,8 @@ impl Controller {
         if axes == AxisMask::default() || axes.0 & !AxisMask::first(self.axes.len()).0 != 0 {
             return Err(Refusal::Invalid);
         }
-        let aside = (0u8..).zip(&self.axes).find(|(_, axis)| !axis.settings.switch_is_at_home());
-        if let Some((axis, _)) = aside.filter(|(axis, _)| axes.contains(usize::from(*axis))) {
+        let mut named = (0u8..).zip(&self.axes).filter(|(index, _)| axes.contains(usize::from(*index)));
+        if let Some((axis, _)) = named.find(|(_, axis)| !axis.settings.switch_is_at_home()) {
             return Err(Refusal::HomeSwitchAside { axis });
         }
         self.homing = HomingSequence::start(axes, &mut self.axes);
