@@ -30,17 +30,23 @@ struct Bound {
 /// # Errors
 /// [`SettingsError::Outside`] with the first setting out of its bounds, or [`SettingsError::Braking`].
 pub(crate) fn check(settings: &AxisSettings, axis: usize) -> Result<(), SettingsError> {
-    let mut all =
-        bounds(settings).into_iter().chain(driver_bounds(&settings.driver, axis)).chain(stall_bounds(settings));
-    let outside = all.find(|bound| !(bound.least..=bound.most).contains(&bound.value));
-    if let Some(Bound { item, least, most, why, .. }) = outside {
-        return Err(SettingsError::Outside { axis, item, least, most, why });
-    }
+    within(axis, &bounds(settings))?;
+    within(axis, &driver_bounds(&settings.driver, axis))?;
+    within(axis, &stall_bounds(settings))?;
     let milliseconds = braking_ms(settings);
     if milliseconds > LONGEST_BRAKING_MS {
         return Err(SettingsError::Braking { axis, milliseconds });
     }
     Ok(())
+}
+
+// Not inlined: three copies of it would take a kilobyte of flash.
+#[inline(never)]
+fn within(axis: usize, bounds: &[Bound]) -> Result<(), SettingsError> {
+    match bounds.iter().find(|bound| !(bound.least..=bound.most).contains(&bound.value)) {
+        Some(&Bound { item, least, most, why, .. }) => Err(SettingsError::Outside { axis, item, least, most, why }),
+        None => Ok(()),
+    }
 }
 
 fn bounds(settings: &AxisSettings) -> [Bound; 10] {

@@ -19,9 +19,9 @@ pub struct Rig {
     pub steps: [StepPulses; AXES],
     /// Encoder of each axis.
     pub encoders: [Encoder; AXES],
-    /// Home switches: closed (low) at home.
+    /// Lines of the home switches: low while a contact is closed, high while the output DIAG of a driver reports a stall.
     pub home_switches: [Input<'static>; AXES],
-    /// Hard limit switches: normally closed (low), open (high) beyond the range or when the wire is broken.
+    /// Lines of the hard limit switches: high while a contact is open or the wire is broken.
     pub hard_limits: [Input<'static>; AXES],
     /// Emergency stop: normally closed (low), open (high) while pressed or when the wire is broken.
     pub emergency_stop: Input<'static>,

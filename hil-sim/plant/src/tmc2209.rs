@@ -162,7 +162,7 @@ impl Tmc2209 {
     }
 
     /// Whether the output DIAG is high: a driver error, or a stall. The driver reports stalls with StealthChop only, and only
-    /// while TCOOLTHRS >= TSTEP > TPWMTHRS (section 5.4, SGTHRS and SG_RESULT).
+    /// while TCOOLTHRS >= TSTEP > TPWMTHRS (section 5.3, SGTHRS).
     #[must_use]
     pub fn diag(&self) -> bool {
         let [tstep, fastest, slowest, result, threshold] =

@@ -1,4 +1,4 @@
-//! StallGuard of the simulated TMC2209: when it reports a stall (datasheet rev. 1.09, sections 5.4 and 11), and an end stop
+//! StallGuard of the simulated TMC2209: when it reports a stall (datasheet rev. 1.09, sections 5.3 and 11), and an end stop
 //! at which a motor loses its steps.
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic, reason = "a test fails by panic")]
 
