@@ -134,7 +134,7 @@ fn ends_and_contacts_of_switches_are_settings_with_words() {
     let simulator = Simulator::start(&["--pty"]);
     let set = |key: &str, value: &str| simulator.run(&["config", "set", key, value]);
     assert!(text(&set("baseline.home_end", "high").stdout).contains("baseline.home_end is high, it was low"));
-    fails(&simulator.run(&["home"]), 3, &["home_switch_at", "home_end", "axis 0"]);
+    fails(&simulator.run(&["home"]), 3, &["home_switch_at", "home_end", "baseline"]);
     let doctor = text(&simulator.run(&["doctor"]).stdout);
     assert!(doctor.contains("other end of its range") && doctor.contains("baseline.home_end"), "{doctor}");
     // Both at once, from a file; the switch that is said to be there is not.

@@ -126,11 +126,11 @@ fn stall_bounds(settings: &AxisSettings) -> [Bound; 5] {
     let AxisSettings { driver, homing, switches, .. } = settings;
     let is_used = switches.stall_guard();
     let can_be_used = driver.kind == DriverKind::Tmc2209 && driver.stealth_chop;
-    // Microsteps are scaled to full steps by their number, and speeds are those at three quarters of homing.
+    // Way of so many full steps. The speed is that at which StallGuard works, by three quarters of homing.
     let full_steps =
         |count: u64| i64::from(settings.motor().position_at((count * u64::from(driver.microsteps)) as i32).0);
+    let [slowest, shortest] = if is_used { [LEAST_FULL_STEPS * 4 / 3 + 1, 16].map(full_steps) } else { [0; 2] };
     let bound = |item, value: i64, least: i64, most: i64, why| Bound { item, value, least, most, why };
-    let only = |least: i64| if is_used { least } else { 0 };
     [
         bound(
             SettingItem::HomeSwitch,
@@ -142,7 +142,7 @@ fn stall_bounds(settings: &AxisSettings) -> [Bound; 5] {
         bound(
             SettingItem::StallThreshold,
             switches.stall_threshold.into(),
-            only(1),
+            is_used.into(),
             255,
             "with 0 the driver never reports a stall",
         ),
@@ -156,14 +156,14 @@ fn stall_bounds(settings: &AxisSettings) -> [Bound; 5] {
         bound(
             SettingItem::HomeSeekSpeed,
             homing.seek_speed.min(settings.speed).into(),
-            only(full_steps(LEAST_FULL_STEPS * 4 / 3 + 1)),
+            slowest,
             settings.speed.into(),
             "slower than 267 full steps a second StallGuard does not work",
         ),
         bound(
             SettingItem::FollowingError,
             settings.following_error.0.into(),
-            only(full_steps(16)),
+            shortest,
             i64::from(homing.travel.0) / 25,
             "the motor must press for eight full steps until it is known to stall",
         ),

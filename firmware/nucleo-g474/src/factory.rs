@@ -37,7 +37,7 @@ pub fn axes() -> [AxisSettings; AXES] {
             repeatability: Micro(200),
         },
         driver: DriverSettings::default(),
-            switches: SwitchSettings::default(),
+        switches: SwitchSettings::default(),
     };
     let separation = AxisSettings {
         kind: AxisKind::Rotary,
@@ -63,7 +63,7 @@ pub fn axes() -> [AxisSettings; AXES] {
             repeatability: Micro(millidegrees(100)),
         },
         driver: DriverSettings::default(),
-            switches: SwitchSettings::default(),
+        switches: SwitchSettings::default(),
     };
     [baseline, separation]
 }

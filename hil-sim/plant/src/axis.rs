@@ -339,7 +339,8 @@ impl AxisPlant {
             self.load = self.load.clamp(low - give, high + give);
             let slack = self.mechanics.backlash / 2.0;
             let reachable = motor.clamp(self.load - slack, self.load + slack);
-            if reachable != motor {
+            let is_pulled = motor < reachable || motor > reachable;
+            if is_pulled {
                 self.motor_zero += reachable - outward * self.mechanics.stop.fall_back - motor;
                 self.trembles = TREMBLING_STEPS;
             }
