@@ -339,8 +339,7 @@ impl AxisPlant {
             self.load = self.load.clamp(low - give, high + give);
             let slack = self.mechanics.backlash / 2.0;
             let reachable = motor.clamp(self.load - slack, self.load + slack);
-            let is_pulled = motor < reachable || motor > reachable;
-            if is_pulled {
+            if (motor - reachable).abs() > 0.0 {
                 self.motor_zero += reachable - outward * self.mechanics.stop.fall_back - motor;
                 self.trembles = TREMBLING_STEPS;
             }

@@ -91,7 +91,7 @@ fn a_free_motor_gives_more_than_a_held_one_and_more_the_faster_it_turns() {
     let mut plant = plant();
     run(&mut plant, 1, 100, STEP_NS);
     let free = read(&mut plant, SG_RESULT);
-    assert!(!diag(&plant) && free > 100 && free % 2 == 0, "{free}");
+    assert!(!diag(&plant) && free > 100 && free.is_multiple_of(2), "{free}");
     run(&mut plant, 101, 500, STEP_NS);
     let held = read(&mut plant, SG_RESULT);
     assert!(diag(&plant) && held <= 100, "{held}");
