@@ -128,6 +128,39 @@ fn a_motor_driver_that_cannot_be_used_is_told_by_every_verb() {
     assert!(simulator.run(&["home"]).status.success());
 }
 
+/// The simulated stages have their switches at the low end, normally open, and limits that are normally closed.
+#[test]
+fn ends_and_contacts_of_switches_are_settings_with_words() {
+    let simulator = Simulator::start(&["--pty"]);
+    let set = |key: &str, value: &str| simulator.run(&["config", "set", key, value]);
+    assert!(text(&set("baseline.home_end", "high").stdout).contains("baseline.home_end is high, it was low"));
+    fails(&simulator.run(&["home"]), 3, &["home_switch_at", "home_end", "baseline"]);
+    let doctor = text(&simulator.run(&["doctor"]).stdout);
+    assert!(doctor.contains("other end of its range") && doctor.contains("baseline.home_end"), "{doctor}");
+    // Both at once, from a file; the switch that is said to be there is not.
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    let file = folder.path().join("high.toml");
+    std::fs::write(&file, "[baseline]\nhome_switch_at = \"222mm\"\nhome_end = \"high\"\n").expect("the folder is ours");
+    let file = file.to_str().expect("a name");
+    assert!(simulator.run(&["config", "set", "--file", file]).status.success());
+    assert!(simulator.run(&["config", "factory"]).status.success());
+    for (key, value, words) in [
+        ("baseline.home_switch", "stallguard", ["normally_open", "tmc2209"]),
+        ("baseline.home_switch", "optical", ["normally_closed", "stallguard"]),
+        ("baseline.stall_watch", "true", ["false", "stallguard"]),
+        ("baseline.home_switch_at", "100mm", ["baseline.min", "baseline.max"]),
+    ] {
+        fails(&set(key, value), 2, &words);
+    }
+    let warns = |verb: &str| {
+        let output = simulator.run(&[verb]);
+        text(&output.stdout).contains("normally open") || text(&output.stderr).contains("normally open")
+    };
+    assert!(!warns("status") && !warns("doctor"));
+    assert!(set("separation.hard_limit", "normally_open").status.success());
+    assert!(warns("status") && warns("doctor"));
+}
+
 #[test]
 fn the_log_tells_what_happened_and_what_happens() {
     let simulator = Simulator::start(&["--pty"]);

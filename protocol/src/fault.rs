@@ -54,6 +54,10 @@ pub enum FaultCode {
     DriverOverheated,
     /// A short circuit at the outputs of a motor driver, which has switched them off.
     DriverShort,
+    /// A motor driver reported a stall in a move, or in homing where the stage moved freely.
+    DriverStall,
+    /// Homing by StallGuard met the end of the axis, and the motor driver reported no stall.
+    StallMissed,
 }
 
 impl FaultCode {
@@ -108,6 +112,12 @@ impl FaultCode {
             Self::DriverShort => {
                 "switch off, check the motor and its wires for a short circuit, then 'vergence clear' and 'vergence home'"
             }
+            Self::DriverStall => {
+                "look for an obstacle; if the way was free, lower 'stall_threshold'; then 'vergence clear' and 'vergence home'"
+            }
+            Self::StallMissed => {
+                "check the wire of DIAG, raise 'stall_threshold' or 'home_seek_speed', then 'vergence clear' and 'vergence home'"
+            }
         }
     }
 }
@@ -138,6 +148,8 @@ impl fmt::Display for FaultCode {
             Self::DriverReset => "the motor driver has lost its supply and its settings",
             Self::DriverOverheated => "the motor driver was too hot and switched off",
             Self::DriverShort => "the motor driver found a short circuit and switched off",
+            Self::DriverStall => "the motor driver reported a stall where the stage should move freely",
+            Self::StallMissed => "homing met the end of the axis and the motor driver reported no stall",
         })
     }
 }

@@ -74,6 +74,11 @@ pub enum Refusal {
         /// Index of the axis, from 0.
         axis: u8,
     },
+    /// The home switch of an axis lies at the other end of the range than the setting `home_end` says.
+    HomeSwitchAside {
+        /// Index of the axis, from 0.
+        axis: u8,
+    },
 }
 
 impl fmt::Display for Refusal {
@@ -108,6 +113,10 @@ impl fmt::Display for Refusal {
             Self::AtHardLimit { axis } => {
                 write!(f, "axis {axis} is at its hard limit: only a short 'vergence move --by' away from it is allowed")
             }
+            Self::HomeSwitchAside { axis } => write!(
+                f,
+                "'home_switch_at' of axis {axis} lies at the other end of the range than 'home_end' says: set one of them"
+            ),
         }
     }
 }

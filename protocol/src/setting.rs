@@ -70,11 +70,22 @@ pub enum SettingItem {
     HoldAfter,
     /// Largest error at the end of a move that a short second move corrects, as of a screw whose pitch varies; 0 for none.
     Correction,
+    /// End of the range at which homing seeks: 0 for the low one, 1 for the high one.
+    HomeEnd,
+    /// What tells the axis that it is at home: 0 for a normally open switch, 1 for a normally closed one, 2 for StallGuard of
+    /// its TMC2209, whose output DIAG is on the line of the switch.
+    HomeSwitch,
+    /// Contacts of the hard limit switches: 0 for normally closed, 1 for normally open.
+    HardLimit,
+    /// SGTHRS of a TMC2209, 1 to 255: it reports a stall where its StallGuard value is at most twice this.
+    StallThreshold,
+    /// 1 if a stall that the driver reports in a move is a fault, else 0.
+    StallWatch,
 }
 
 impl SettingItem {
     /// Every item, in wire order.
-    pub const ALL: [Self; 30] = [
+    pub const ALL: [Self; 35] = [
         Self::Min,
         Self::Max,
         Self::Speed,
@@ -105,6 +116,11 @@ impl SettingItem {
         Self::StealthChop,
         Self::HoldAfter,
         Self::Correction,
+        Self::HomeEnd,
+        Self::HomeSwitch,
+        Self::HardLimit,
+        Self::StallThreshold,
+        Self::StallWatch,
     ];
 
     /// Whether each axis has a setting of this kind; else the board has one.
@@ -147,6 +163,11 @@ impl SettingItem {
             Self::StealthChop => "stealth_chop",
             Self::HoldAfter => "hold_after_us",
             Self::Correction => "correction",
+            Self::HomeEnd => "home_end",
+            Self::HomeSwitch => "home_switch",
+            Self::HardLimit => "hard_limit",
+            Self::StallThreshold => "stall_threshold",
+            Self::StallWatch => "stall_watch",
         }
     }
 }

@@ -7,7 +7,7 @@ use std::process::ExitCode;
 
 use vergence_control::{
     AxisSettings, Controller, DriverSettings, FINE_BITS, HomingSettings, Limits, MotionState, MovePlanner, PlanRequest,
-    RigIo, StepSchedule, Trajectory,
+    RigIo, StepSchedule, SwitchSettings, Trajectory,
 };
 use vergence_protocol::{AxisKind, ControllerState, Jog, Micro, Microseconds, MoveId, Permille, Request, SessionId};
 
@@ -74,6 +74,7 @@ fn axis(step_rate: u32) -> AxisSettings {
             repeatability: Micro(100),
         },
         driver: DriverSettings::default(),
+        switches: SwitchSettings::default(),
     }
 }
 

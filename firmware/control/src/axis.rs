@@ -11,6 +11,7 @@ use crate::plan::{AxisPlanner, PlanStart};
 use crate::profile::Limits;
 use crate::settings::AxisSettings;
 use crate::steps::{Instants, StepCounter};
+use crate::switches::StallLine;
 use crate::trajectory::{FINE_BITS, Fine, MotionState, Trajectory};
 
 #[derive(Clone, Debug)]
@@ -23,6 +24,7 @@ pub struct Axis {
     motor: StepCounter,
     following: Following,
     limit: HardLimit,
+    stall: StallLine,
     trajectory: Option<Trajectory>,
     /// Part of the trajectory that has been ordered, in microseconds.
     elapsed: u64,
@@ -42,6 +44,7 @@ impl Axis {
             motor: StepCounter::new(settings.motor(), 0),
             following: Following::default(),
             limit: HardLimit::default(),
+            stall: StallLine::default(),
             trajectory: None,
             elapsed: 0,
             from_below: false,
@@ -99,6 +102,11 @@ impl Axis {
         if !self.referenced {
             self.zero_counts = self.raw_counts(io);
         }
+        self.rest_at_encoder(io);
+    }
+
+    /// Ends all motion at once, with the command at the encoder's position: after a press against an end stop.
+    pub fn rest_at_encoder(&mut self, io: &impl RigIo) {
         let position = fine_from(self.position(io));
         self.trajectory = None;
         self.from_below = false;
@@ -230,7 +238,8 @@ impl Axis {
     /// Reads the hard limit; call it once each tick.
     pub fn read_limit(&mut self, io: &impl RigIo) {
         let motion = (self.command[2] - self.command[0]).signum();
-        self.limit.read(io.hard_limit(self.index), self.raw_counts(io), motion);
+        let is_reached = self.settings.switches.is_limit(io.hard_limit(self.index));
+        self.limit.read(is_reached, self.raw_counts(io), motion);
     }
 
     pub fn limit(&self) -> &HardLimit {
@@ -250,8 +259,20 @@ impl Axis {
         !self.limit.is_reached() || self.limit.lets_go(from.into(), to, retract.into())
     }
 
+    /// Whether the home switch is operated, or the motor driver on its line reports a stall.
     pub fn home_switch(&self, io: &impl RigIo) -> bool {
-        io.home_switch(self.index)
+        self.settings.switches.is_home(io.home_switch(self.index))
+    }
+
+    /// Reads whether the motor driver reports a stall while the speed is constant; call it once each tick.
+    pub fn reads_stall(&mut self, io: &impl RigIo) -> bool {
+        let MotionState { velocity, acceleration, .. } = self.state();
+        self.stall.read(self.home_switch(io), velocity != 0 && acceleration == 0)
+    }
+
+    /// Whether the speed had been constant for so long at the last reading that a missing report says something.
+    pub fn stall_may_be_judged(&self) -> bool {
+        self.stall.may_be_judged()
     }
 }
 

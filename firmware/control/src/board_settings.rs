@@ -4,6 +4,7 @@ use vergence_protocol::{AxisKind, AxisList, Micro, SettingItem, SettingKey};
 
 use crate::driver::{DriverKind, DriverSettings};
 use crate::settings::{AxisSettings, HomingSettings, SettingsError};
+use crate::switches::{HomeEnd, HomeSensor, SwitchSettings};
 
 /// Shortest period of the pose stream in microseconds: a pose of 45 bytes at 921 600 baud takes half of it.
 pub const SHORTEST_STREAM_US: u32 = 1_000;
@@ -197,12 +198,13 @@ impl AxisSettings {
             correction: nothing,
             homing,
             driver: DriverSettings::default(),
+            switches: SwitchSettings::default(),
         }
     }
 
     /// Value of an axis setting; `None` for settings of the board.
     fn item(&self, item: SettingItem) -> Option<i64> {
-        let (homing, driver) = (&self.homing, &self.driver);
+        let (homing, driver, switches) = (&self.homing, &self.driver, &self.switches);
         Some(match item {
             SettingItem::Min => self.min.0.into(),
             SettingItem::Max => self.max.0.into(),
@@ -230,12 +232,17 @@ impl AxisSettings {
             SettingItem::Microsteps => driver.microsteps.into(),
             SettingItem::StealthChop => driver.stealth_chop.into(),
             SettingItem::Correction => self.correction.0.into(),
+            SettingItem::HomeEnd => (switches.home_end == HomeEnd::High).into(),
+            SettingItem::HomeSwitch => switches.home as i64,
+            SettingItem::HardLimit => switches.limits_normally_open.into(),
+            SettingItem::StallThreshold => switches.stall_threshold.into(),
+            SettingItem::StallWatch => switches.stall_watch.into(),
             _ => return None,
         })
     }
 
     fn put(&mut self, item: SettingItem, value: i64) -> Result<(), SettingError> {
-        let (homing, driver) = (&mut self.homing, &mut self.driver);
+        let (homing, driver, switches) = (&mut self.homing, &mut self.driver, &mut self.switches);
         match item {
             SettingItem::Min => self.min = micro(value)?,
             SettingItem::Max => self.max = micro(value)?,
@@ -263,6 +270,11 @@ impl AxisSettings {
             SettingItem::Microsteps => driver.microsteps = number(value)?,
             SettingItem::StealthChop => driver.stealth_chop = flag(value)?,
             SettingItem::Correction => self.correction = micro(value)?,
+            SettingItem::HomeEnd => switches.home_end = if flag(value)? { HomeEnd::High } else { HomeEnd::Low },
+            SettingItem::HomeSwitch => switches.home = sensor(value)?,
+            SettingItem::HardLimit => switches.limits_normally_open = flag(value)?,
+            SettingItem::StallThreshold => switches.stall_threshold = number(value)?,
+            SettingItem::StallWatch => switches.stall_watch = flag(value)?,
             _ => return Err(SettingError::Unknown),
         }
         Ok(())
@@ -270,8 +282,9 @@ impl AxisSettings {
 
     /// Whether a reference found with the settings `self` is still valid with `other`.
     pub(crate) fn keeps_reference(&self, other: &Self) -> bool {
-        let reference = |axis: &Self| (axis.kind, axis.counts_per_unit, axis.counts_reversed, axis.homing.switch_at);
-        reference(self) == reference(other)
+        let scale = |axis: &Self| (axis.kind, axis.counts_per_unit, axis.counts_reversed);
+        let home = |axis: &Self| (axis.homing.switch_at, axis.switches.home_end, axis.switches.home);
+        scale(self) == scale(other) && home(self) == home(other)
     }
 }
 
@@ -281,6 +294,15 @@ fn micro(value: i64) -> Result<Micro, SettingError> {
 
 fn number(value: i64) -> Result<u32, SettingError> {
     u32::try_from(value).map_err(|_| SettingError::Value)
+}
+
+fn sensor(value: i64) -> Result<HomeSensor, SettingError> {
+    match value {
+        0 => Ok(HomeSensor::NormallyOpen),
+        1 => Ok(HomeSensor::NormallyClosed),
+        2 => Ok(HomeSensor::StallGuard),
+        _ => Err(SettingError::Value),
+    }
 }
 
 fn flag(value: i64) -> Result<bool, SettingError> {

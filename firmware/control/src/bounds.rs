@@ -6,7 +6,7 @@
 
 use vergence_protocol::{AxisKind, SettingItem};
 
-use crate::driver::{ADDRESSES, DriverKind, DriverSettings};
+use crate::driver::{ADDRESSES, DriverKind, DriverSettings, LEAST_FULL_STEPS};
 use crate::settings::{AxisSettings, Scale, SettingsError};
 
 /// Longest time to brake from full speed, in milliseconds.
@@ -30,16 +30,23 @@ struct Bound {
 /// # Errors
 /// [`SettingsError::Outside`] with the first setting out of its bounds, or [`SettingsError::Braking`].
 pub(crate) fn check(settings: &AxisSettings, axis: usize) -> Result<(), SettingsError> {
-    let mut all = bounds(settings).into_iter().chain(driver_bounds(&settings.driver, axis));
-    let outside = all.find(|bound| !(bound.least..=bound.most).contains(&bound.value));
-    if let Some(Bound { item, least, most, why, .. }) = outside {
-        return Err(SettingsError::Outside { axis, item, least, most, why });
-    }
+    within(axis, &bounds(settings))?;
+    within(axis, &driver_bounds(&settings.driver, axis))?;
+    within(axis, &stall_bounds(settings))?;
     let milliseconds = braking_ms(settings);
     if milliseconds > LONGEST_BRAKING_MS {
         return Err(SettingsError::Braking { axis, milliseconds });
     }
     Ok(())
+}
+
+// Not inlined: three copies of it would take a kilobyte of flash.
+#[inline(never)]
+fn within(axis: usize, bounds: &[Bound]) -> Result<(), SettingsError> {
+    match bounds.iter().find(|bound| !(bound.least..=bound.most).contains(&bound.value)) {
+        Some(&Bound { item, least, most, why, .. }) => Err(SettingsError::Outside { axis, item, least, most, why }),
+        None => Ok(()),
+    }
 }
 
 fn bounds(settings: &AxisSettings) -> [Bound; 10] {
@@ -110,6 +117,55 @@ fn bounds(settings: &AxisSettings) -> [Bound; 10] {
             1,
             finest(settings.encoder()),
             "all counts from end to end, and as many again, must fit in 31 bits",
+        ),
+    ]
+}
+
+/// Bounds of homing by StallGuard and of its watch (datasheet of the TMC2209, rev. 1.09, sections 11 and 15.4).
+fn stall_bounds(settings: &AxisSettings) -> [Bound; 5] {
+    let AxisSettings { driver, homing, switches, .. } = settings;
+    let is_used = switches.stall_guard();
+    let can_be_used = driver.kind == DriverKind::Tmc2209 && driver.stealth_chop;
+    // Way of so many full steps. The speed is that at which StallGuard works, by three quarters of homing.
+    let full_steps =
+        |count: u64| i64::from(settings.motor().position_at((count * u64::from(driver.microsteps)) as i32).0);
+    let [slowest, shortest] = if is_used { [LEAST_FULL_STEPS * 4 / 3 + 1, 16].map(full_steps) } else { [0; 2] };
+    let bound = |item, value: i64, least: i64, most: i64, why| Bound { item, value, least, most, why };
+    [
+        bound(
+            SettingItem::HomeSwitch,
+            switches.home as i64,
+            0,
+            if can_be_used { 2 } else { 1 },
+            "StallGuard needs driver = tmc2209 and stealth_chop = true",
+        ),
+        bound(
+            SettingItem::StallThreshold,
+            switches.stall_threshold.into(),
+            is_used.into(),
+            255,
+            "with 0 the driver never reports a stall",
+        ),
+        bound(
+            SettingItem::StallWatch,
+            switches.stall_watch.into(),
+            0,
+            is_used.into(),
+            "the board reads DIAG only where home_switch = stallguard",
+        ),
+        bound(
+            SettingItem::HomeSeekSpeed,
+            homing.seek_speed.min(settings.speed).into(),
+            slowest,
+            settings.speed.into(),
+            "slower than 267 full steps a second StallGuard does not work",
+        ),
+        bound(
+            SettingItem::FollowingError,
+            settings.following_error.0.into(),
+            shortest,
+            i64::from(homing.travel.0) / 25,
+            "the motor must press for eight full steps until it is known to stall",
         ),
     ]
 }

@@ -1,4 +1,4 @@
-//! Homing of one axis: seeks the switch, retracts, approaches slowly, compares, and moves to the low end of the range.
+//! Homing of one axis: seeks the switch, retracts, approaches slowly, compares, and moves to the nearest end of the range.
 //!
 //! The edge found slowly is the reference; the edge found fast only checks it (as in Klipper and GRBL).
 
@@ -11,7 +11,7 @@ use crate::io::RigIo;
 use crate::trajectory::{MotionState, Trajectory, fine, micro};
 
 /// Number of ticks at rest after which a switch that still chatters counts as stuck.
-const LONGEST_LOOK_TICKS: u8 = 200;
+pub const LONGEST_LOOK_TICKS: u8 = 200;
 
 /// Phase of homing.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -20,7 +20,7 @@ enum Phase {
     Look { left: u8 },
     /// Leaves the switch, which was closed at the start.
     BackOff,
-    /// Moves down until the switch closes.
+    /// Moves to the end that is home until the switch is operated.
     Seek,
     /// Brakes after the switch was found at `edge`.
     Brake { edge: Counts },
@@ -30,7 +30,7 @@ enum Phase {
     Approach { edge: Counts },
     /// Brakes after the switch was found again at `edge`.
     Rest { edge: Counts },
-    /// Moves to the low end of the range.
+    /// Moves to the end of the range.
     Enter,
     /// Finished.
     Done,
@@ -60,6 +60,7 @@ impl Homing {
     /// Runs one tick.
     pub fn poll(&mut self, axis: &mut Axis, io: &impl RigIo) -> Progress {
         let homing = axis.settings.homing;
+        let sign = axis.settings.switches.home_end.sign();
         let limits = axis.settings.limits_at(homing.seek_speed);
         let moving = axis.is_moving();
         let counts = axis.counts(io);
@@ -72,13 +73,13 @@ impl Homing {
                 None => return stuck(0),
             },
             Phase::Look { .. } if closed => {
-                axis.travel(back_off(axis), limits);
+                axis.travel(Micro(-sign * back_off(axis)), limits);
                 Phase::BackOff
             }
             Phase::BackOff if moving => Phase::BackOff,
-            Phase::BackOff if closed => return stuck(back_off(axis).0),
+            Phase::BackOff if closed => return stuck(back_off(axis)),
             Phase::Look { .. } | Phase::BackOff => {
-                axis.travel(Micro(-homing.travel.0), limits);
+                axis.travel(Micro(sign * homing.travel.0), limits);
                 Phase::Seek
             }
             Phase::Seek => match edge_now {
@@ -92,14 +93,14 @@ impl Homing {
             Phase::Brake { edge } if moving => Phase::Brake { edge },
             Phase::Brake { edge } => {
                 let overshoot = axis.settings.encoder().position_at(edge.0.wrapping_sub(counts.0));
-                axis.travel(Micro(homing.retract.0.saturating_add(overshoot.0)), limits);
+                axis.travel(Micro((-sign * homing.retract.0).saturating_add(overshoot.0)), limits);
                 Phase::Retract { edge }
             }
             Phase::Retract { edge } if moving => Phase::Retract { edge },
             Phase::Retract { .. } if closed => return stuck(homing.retract.0),
             Phase::Retract { edge } => {
                 let slow = axis.settings.limits_at(homing.approach_speed);
-                axis.travel(Micro(homing.retract.0.saturating_mul(-2)), slow);
+                axis.travel(Micro((sign * homing.retract.0).saturating_mul(2)), slow);
                 Phase::Approach { edge }
             }
             Phase::Approach { edge } => match edge_now {
@@ -117,7 +118,7 @@ impl Homing {
             Phase::Rest { edge } if moving => Phase::Rest { edge },
             Phase::Rest { edge } => {
                 axis.reference(io, edge, homing.switch_at);
-                axis.go_to(axis.settings.min, limits);
+                axis.go_to(axis.settings.home_position(), limits);
                 Phase::Enter
             }
             Phase::Enter if moving => Phase::Enter,
@@ -130,13 +131,17 @@ impl Homing {
 /// Distance that leaves the switch from the farthest place at which a search can have come to rest beyond it. A search
 /// that was still accelerating when it was stopped travels on for the time a/j at no more than its speed; it was stopped
 /// only when the contact was debounced.
-fn back_off(axis: &Axis) -> Micro {
-    let homing = axis.settings.homing;
-    let limits = axis.settings.limits_at(homing.seek_speed);
+fn back_off(axis: &Axis) -> i32 {
+    axis.settings.homing.retract.0.saturating_add(run_out(axis) as i32)
+}
+
+/// Way of a search from the edge of its switch until it rests; it also gets its speed on it.
+pub fn run_out(axis: &Axis) -> f32 {
+    let limits = axis.settings.limits_at(axis.settings.homing.seek_speed);
     let at_speed = MotionState { velocity: fine(limits.speed), ..MotionState::default() };
     let braking = micro(Trajectory::stop(at_speed, limits).target()) + limits.speed * limits.acceleration / limits.jerk;
     let unsure = limits.speed * f32::from(DEBOUNCE_TICKS) * TICK_US as f32 * 1e-6;
-    Micro(homing.retract.0.saturating_add((braking + unsure) as i32))
+    braking + unsure
 }
 
 fn stuck(distance: i32) -> Progress {

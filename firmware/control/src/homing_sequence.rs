@@ -4,16 +4,25 @@ use vergence_protocol::{AxisList, AxisMask, Counts, FaultCode};
 
 use crate::axis::Axis;
 use crate::contact::Contact;
+use crate::follow::Lost;
 use crate::homing::{Homing, Progress};
 use crate::io::RigIo;
+use crate::stall_homing::StallHoming;
 
 /// The axes still to be homed, and the state of the present one.
 #[derive(Clone, Debug, Default)]
 pub struct HomingSequence {
     left: AxisMask,
-    present: Option<(usize, Homing)>,
+    present: Option<(usize, Way)>,
     /// The home switches of all axes.
     contacts: AxisList<Contact>,
+}
+
+/// How an axis finds its end.
+#[derive(Clone, Copy, Debug)]
+enum Way {
+    Switch(Homing),
+    Stall(StallHoming),
 }
 
 /// Why homing ended without a reference.
@@ -35,15 +44,19 @@ impl HomingSequence {
 
     /// Runs one tick; returns true when all axes have their reference.
     pub fn poll(&mut self, axes: &mut [Axis], io: &impl RigIo) -> Result<bool, HomingFailure> {
-        let Some((index, homing)) = &mut self.present else { return Ok(self.begin_next(axes)) };
+        let Some((index, way)) = &mut self.present else { return Ok(self.begin_next(axes)) };
         let index = *index;
         let Some(axis) = axes.get_mut(index) else { return Ok(true) };
-        match homing.poll(axis, io) {
+        let progress = match way {
+            Way::Switch(homing) => homing.poll(axis, io),
+            Way::Stall(homing) => homing.poll(axis, io),
+        };
+        match progress {
             Progress::Running => {}
             Progress::Done => self.present = None,
             Progress::Failed { code, detail } => return Err(HomingFailure { code, axis: index, detail }),
         }
-        match self.stranger(index, io) {
+        match self.stranger(index, axes, io) {
             Some(stranger) => {
                 let detail = i32::try_from(stranger).unwrap_or(i32::MAX);
                 Err(HomingFailure { code: FaultCode::HomeSwitchWrong, axis: index, detail })
@@ -56,17 +69,28 @@ impl HomingSequence {
         let next = (0..axes.len()).find(|&index| self.left.contains(index));
         if let Some(index) = next {
             self.left.0 &= !(1 << index);
-            self.present = Some((index, Homing::start()));
+            let by_stall = axes.get(index).is_some_and(|axis| axis.settings.switches.stall_guard());
+            let way = if by_stall { Way::Stall(StallHoming::start()) } else { Way::Switch(Homing::start()) };
+            self.present = Some((index, way));
         }
         next.is_none()
     }
 
+    /// Takes a disagreement of encoder and command of an axis; returns whether homing expects it.
+    pub fn takes(&mut self, axis: usize, lost: &Lost) -> bool {
+        match &mut self.present {
+            Some((present, Way::Stall(homing))) if *present == axis => homing.takes(lost),
+            _ => false,
+        }
+    }
+
     /// An axis other than `present` whose switch has closed while `present` moved.
-    fn stranger(&mut self, present: usize, io: &impl RigIo) -> Option<usize> {
+    fn stranger(&mut self, present: usize, axes: &[Axis], io: &impl RigIo) -> Option<usize> {
         let mut stranger = None;
-        for (index, contact) in self.contacts.iter_mut().enumerate() {
+        let switches = self.contacts.iter_mut().zip(axes).enumerate();
+        for (index, (contact, axis)) in switches.filter(|(_, (_, axis))| !axis.settings.switches.stall_guard()) {
             let was_open = contact.is_closed() == Some(false);
-            contact.read(io.home_switch(index), Counts(0));
+            contact.read(axis.home_switch(io), Counts(0));
             if was_open && contact.is_closed() == Some(true) && index != present {
                 stranger = stranger.or(Some(index));
             }

@@ -55,10 +55,9 @@ pub trait RigIo {
     fn encoders_read_at(&self, now: Microseconds) -> Microseconds {
         now
     }
-    /// Whether the home switch is closed: normally open, it closes at home.
+    /// Whether the line of the home switch is low: a switch to ground is closed, or a driver on that line reports no stall.
     fn home_switch(&self, axis: usize) -> bool;
-    /// Whether a hard limit is reached: its switch is normally closed and opens beyond the range, so that a broken wire
-    /// counts as reached.
+    /// Whether the line of the hard limit is high: a switch to ground is open, or its wire is broken.
     fn hard_limit(&self, axis: usize) -> bool;
     /// Whether the emergency stop is pressed, or its wire is broken. Hardware has already cut the drivers; the controller
     /// only observes.

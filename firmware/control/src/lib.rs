@@ -36,7 +36,9 @@ mod self_test;
 mod services;
 mod settings;
 pub mod settings_store;
+mod stall_homing;
 mod steps;
+mod switches;
 mod trajectory;
 mod trigger;
 mod updater;
@@ -52,6 +54,7 @@ pub use plan::{AxisPlanner, PlanStart};
 pub use profile::Limits;
 pub use services::{BoardServices, Flash, FlashError, PAGE, UNIT};
 pub use settings::{AxisSettings, HomingSettings, LARGEST_STEP_RATE, Scale, SettingsError};
+pub use switches::{HomeEnd, HomeSensor, SwitchSettings};
 pub use trajectory::{FINE_BITS, Fine, MotionState, Trajectory};
 pub use updater::Updater;
 

@@ -16,7 +16,7 @@ use crate::line_speed::LineSpeed;
 use crate::move_planner::{MovePlanner, PlanRequest};
 use crate::recorder::Recorder;
 use crate::services::BoardServices;
-use crate::settings::SettingsError;
+use crate::settings::{AxisSettings, SettingsError};
 use crate::settings_store;
 use crate::trigger::CameraTrigger;
 use crate::updater::Updater;
@@ -228,7 +228,7 @@ impl Node {
             let counts = self.controller.counts_from(&edge.counts);
             self.session.send(vergence_protocol::Report::TriggerMark(self.trigger.mark(edge.at, counts)));
         }
-        self.recorder.watch_switches(now, self.controller.axis_count(), io);
+        self.recorder.watch_switches(now, &self.settings.axes, io);
         self.observe(now, io);
         self.stream_pose(now, io);
         let rest = if self.is_at_rest(now) { REST_US - TICK_US } else { 0 };
@@ -240,7 +240,7 @@ impl Node {
         for (index, axis) in self.settings.axes.iter().enumerate() {
             io.expect_counts(index, axis.count_rate());
         }
-        io.configure_drivers(&self.settings.axes.iter().map(|axis| axis.driver).collect());
+        io.configure_drivers(&self.settings.axes.iter().map(AxisSettings::driver_settings).collect());
     }
 
     /// Whether ticks may be rare: nothing moves, streams, triggers, chatters or is asked.

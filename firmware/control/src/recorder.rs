@@ -7,6 +7,7 @@ use vergence_protocol::{
 
 use crate::contact::Contact;
 use crate::io::RigIo;
+use crate::settings::AxisSettings;
 
 /// Number of events that the ring holds.
 const EVENTS: usize = 64;
@@ -62,12 +63,14 @@ impl Recorder {
         self.room = None;
     }
 
-    /// Reads the switches of the first `axes` axes and records debounced changes.
-    pub fn watch_switches(&mut self, now: Microseconds, axes: usize, io: &impl RigIo) {
-        for (axis, index) in (0u8..).zip(0..axes.min(MAX_AXES)) {
-            let readings = [io.home_switch(index), io.hard_limit(index)];
+    /// Reads the switches of these axes and records debounced changes.
+    pub fn watch_switches(&mut self, now: Microseconds, axes: &[AxisSettings], io: &impl RigIo) {
+        for (axis, AxisSettings { switches, .. }) in (0u8..).zip(axes) {
+            let index = usize::from(axis);
+            let readings = [switches.is_home(io.home_switch(index)), switches.is_limit(io.hard_limit(index))];
             for (which, reading) in readings.into_iter().enumerate() {
-                let switch = &mut self.switches[index][which];
+                let Some([home, limit]) = self.switches.get_mut(index) else { continue };
+                let switch = if which == 0 { home } else { limit };
                 switch.contact.read(reading, Counts(0));
                 let operated = switch.contact.is_closed();
                 let before = core::mem::replace(&mut switch.operated, operated);

@@ -4,8 +4,9 @@ use vergence_protocol::{AxisInfo, AxisKind, Micro, SettingItem};
 
 use crate::TICK_US;
 use crate::bounds::{self, LONGEST_BRAKING_MS};
-use crate::driver::DriverSettings;
+use crate::driver::{DriverSettings, StallLimits};
 use crate::profile::Limits;
+use crate::switches::{HomeEnd, SwitchSettings};
 
 /// Encoder counts or motor steps per metre (linear axis) or revolution (rotary axis).
 ///
@@ -35,7 +36,9 @@ impl Scale {
     }
 
     /// The count nearest to `position`.
+    // Not inlined, as its counterpart: copies would take kilobytes of flash.
     #[must_use]
+    #[inline(never)]
     pub fn counts_at(self, position: Micro) -> i32 {
         let numerator = i128::from(position.0) * i128::from(self.per_unit) * 1000;
         saturate(div_round(numerator, i128::from(self.milli_micro())))
@@ -49,6 +52,7 @@ impl Scale {
 
     /// The position nearest to `counts`.
     #[must_use]
+    #[inline(never)]
     pub fn position_at(self, counts: i32) -> Micro {
         let numerator = i128::from(counts) * i128::from(self.milli_micro());
         Micro(saturate(div_round(numerator, i128::from(self.per_unit.max(1)) * 1000)))
@@ -63,10 +67,11 @@ fn saturate(value: i128) -> i32 {
     i32::try_from(value).unwrap_or(if value < 0 { i32::MIN } else { i32::MAX })
 }
 
-/// Settings of the search for the home switch, which is beyond the low end of the range.
+/// Settings of the search for the home switch, which is beyond an end of the range.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct HomingSettings {
-    /// Position at which the switch closes; below `min`.
+    /// Position at which the switch changes: below `min`, or above `max` where the high end is home. With StallGuard, where the
+    /// axis meets its end stop.
     pub switch_at: Micro,
     /// Speed of the search, in micro-units per second.
     pub seek_speed: u32,
@@ -117,6 +122,8 @@ pub struct AxisSettings {
     pub homing: HomingSettings,
     /// Settings of the motor driver.
     pub driver: DriverSettings,
+    /// Ends, contacts and StallGuard.
+    pub switches: SwitchSettings,
 }
 
 /// Why settings cannot work.
@@ -132,9 +139,9 @@ pub enum SettingsError {
         /// Index of the axis, from 0.
         axis: usize,
     },
-    /// `min` is not below `max`, the home switch is not below all positions of a move (backlash included), or the backlash
-    /// is negative.
-    #[error("axis {axis}: the home switch must lie below the range, and the range must not be empty")]
+    /// `min` is not below `max`, the home switch lies among the positions of a move (backlash included), or the backlash is
+    /// negative.
+    #[error("axis {axis}: the home switch must lie outside the range, and the range must not be empty")]
     Range {
         /// Index of the axis, from 0.
         axis: usize,
@@ -200,8 +207,8 @@ impl AxisSettings {
         if !positive || distances.iter().any(|distance| distance.0 <= 0) {
             return Err(SettingsError::NotPositive { axis });
         }
-        let lowest = i64::from(self.min.0) - i64::from(self.backlash.0);
-        if self.min >= self.max || self.backlash.0 < 0 || i64::from(homing.switch_at.0) >= lowest {
+        let switch_inside = !self.switch_is_below() && homing.switch_at <= self.max;
+        if self.min >= self.max || self.backlash.0 < 0 || switch_inside {
             return Err(SettingsError::Range { axis });
         }
         let fastest = u64::from(self.speed.max(homing.seek_speed).max(homing.approach_speed));
@@ -213,6 +220,41 @@ impl AxisSettings {
             return Err(SettingsError::Microsteps { axis });
         }
         bounds::check(self, axis)
+    }
+
+    /// Whether the home switch lies below all positions of a move, backlash included.
+    fn switch_is_below(&self) -> bool {
+        i64::from(self.homing.switch_at.0) < i64::from(self.min.0) - i64::from(self.backlash.0)
+    }
+
+    /// Whether the home switch lies at the end that is home. Settings that differ are no error, because they are changed
+    /// one at a time, but nothing homes by them.
+    #[must_use]
+    pub fn switch_is_at_home(&self) -> bool {
+        self.switch_is_below() == (self.switches.home_end == HomeEnd::Low)
+    }
+
+    /// The end of the range that is nearest to the home switch.
+    #[must_use]
+    pub const fn home_position(&self) -> Micro {
+        match self.switches.home_end {
+            HomeEnd::Low => self.min,
+            HomeEnd::High => self.max,
+        }
+    }
+
+    /// The settings for the motor driver, with those of StallGuard.
+    #[must_use]
+    pub fn driver_settings(&self) -> DriverSettings {
+        let stall = if self.switches.stall_guard() { self.stall_limits() } else { None };
+        DriverSettings { stall, ..self.driver }
+    }
+
+    /// Threshold of a stall, and the TSTEP of the lowest speed at which a driver reports one: three quarters of that of homing.
+    fn stall_limits(&self) -> Option<StallLimits> {
+        let speed = self.homing.seek_speed.min(self.speed);
+        let steps = u64::from(speed) * u64::from(self.steps_per_unit) * 1000 / self.motor().milli_micro() as u64;
+        StallLimits::at(steps * 3 / 4, self.driver.microsteps, self.switches.stall_threshold)
     }
 
     /// Whether a move may ask for `position`.

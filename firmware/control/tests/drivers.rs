@@ -3,8 +3,9 @@
 #![allow(clippy::unwrap_used, reason = "a test ends by panicking")]
 
 use vergence_control::driver::{ADDRESSES, DriverLine, Register, request, value_of, write};
+use vergence_control::{AxisSettings, HomeSensor, SwitchSettings};
 use vergence_control::{DriverKind, DriverSettings};
-use vergence_plant::{DriverFaults, Drivers};
+use vergence_plant::{DriverFaults, Drivers, bench_settings};
 use vergence_protocol::{DriverState, FaultCode, Microseconds};
 
 /// Time of an exchange on the line, in microseconds.
@@ -187,4 +188,25 @@ fn any_bytes_at_any_time_do_no_harm() {
     }
     bench.run(400_000);
     assert_eq!(bench.line.state(0), DriverState::Ready);
+}
+
+/// TCOOLTHRS stands at three quarters of the speed of homing: 12 MHz by 256 of the full steps a second (datasheet, section
+/// 5.3). The bench: 40 mm/s of 800 steps/mm make 4000 full steps a second, 20 degrees/s of 64 000 a turn 444.
+#[test]
+fn a_stall_is_reported_from_three_quarters_of_the_speed_of_homing_on() {
+    let stall =
+        |settings: AxisSettings| settings.driver_settings().stall.map(|stall| (stall.longest_tstep, stall.threshold));
+    let by_stall = |mut settings: AxisSettings| {
+        settings.driver.kind = DriverKind::Tmc2209;
+        settings.switches = SwitchSettings { home: HomeSensor::StallGuard, stall_threshold: 50, ..settings.switches };
+        assert_eq!(settings.validate(0), Ok(()));
+        settings
+    };
+    let [baseline, separation] = bench_settings();
+    assert_eq!(stall(baseline), None, "it has a switch");
+    assert_eq!(stall(by_stall(baseline)), Some((15, 50)));
+    assert_eq!(stall(by_stall(separation)), Some((140, 50)));
+    let mut slow = by_stall(baseline);
+    slow.speed = 10_000;
+    assert_eq!(stall(slow), Some((62, 50)), "homing is never faster than `speed`");
 }

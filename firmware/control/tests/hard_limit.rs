@@ -3,14 +3,23 @@
 mod support;
 
 use support::{TICK_US, World, linear, rotary};
+use vergence_control::AxisSettings;
 use vergence_protocol::{AxisMask, ControllerState, FaultCode, Refusal, Status};
 
 const BOTH: AxisMask = AxisMask::first(2);
 const FAR: [i32; 2] = [200_000, 2_000_000];
 const AT_LIMIT: Status = Status::Refused(Refusal::AtHardLimit { axis: 0 });
 
-fn under_way() -> World {
-    let mut world = World::homed([linear(), rotary()]);
+/// Both axes with hard limits of either contact.
+fn axes(normally_open: bool) -> [AxisSettings; 2] {
+    [linear(), rotary()].map(|mut axis| {
+        axis.switches.limits_normally_open = normally_open;
+        axis
+    })
+}
+
+fn under_way(normally_open: bool) -> World {
+    let mut world = World::homed(axes(normally_open));
     assert_eq!(world.move_to(FAR), Status::Accepted);
     world.wait(400_321);
     assert!(world.watch.moves());
@@ -33,18 +42,20 @@ fn at_the_upper_limit() -> World {
 
 #[test]
 fn one_reading_stops_nothing_and_two_cut_the_drivers() {
-    let mut world = under_way();
-    for _ in 0..50 {
+    for normally_open in [false, true] {
+        let mut world = under_way(normally_open);
+        for _ in 0..50 {
+            world.rig.axes[0].hard_limit = true;
+            world.wait(TICK_US);
+            world.rig.axes[0].hard_limit = false;
+            world.wait(TICK_US);
+        }
+        assert_eq!(world.controller.state(), ControllerState::Moving);
         world.rig.axes[0].hard_limit = true;
-        world.wait(TICK_US);
-        world.rig.axes[0].hard_limit = false;
-        world.wait(TICK_US);
+        world.wait(2 * TICK_US);
+        assert!(!world.rig.drivers);
+        assert_eq!((world.fault().code, world.fault().axis), (FaultCode::HardLimit, Some(0)));
     }
-    assert_eq!(world.controller.state(), ControllerState::Moving);
-    world.rig.axes[0].hard_limit = true;
-    world.wait(2 * TICK_US);
-    assert!(!world.rig.drivers);
-    assert_eq!((world.fault().code, world.fault().axis), (FaultCode::HardLimit, Some(0)));
 }
 
 #[test]
@@ -81,7 +92,7 @@ fn only_a_short_jog_away_from_the_limit_is_allowed() {
 
 #[test]
 fn a_wire_that_breaks_in_mid_range_never_lets_an_axis_run_away() {
-    let mut world = under_way();
+    let mut world = under_way(false);
     world.rig.axes[0].hard_limit = true;
     world.wait_for(ControllerState::Fault);
     let met = world.rig.axes[0].load;
@@ -115,7 +126,7 @@ fn where_the_way_out_is_unknown_half_as_far_may_be_tried_in_either_direction() {
 
 #[test]
 fn a_limit_behind_another_fault_is_a_fault_of_its_own() {
-    let mut world = under_way();
+    let mut world = under_way(false);
     world.rig.emergency_stop = true;
     world.wait_for(ControllerState::Fault);
     world.rig.axes[1].hard_limit = true;

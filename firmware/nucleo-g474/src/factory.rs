@@ -1,6 +1,6 @@
 //! Default settings: the bench, with a linear stage for the baseline and a pinion stage for the separation.
 
-use vergence_control::{AxisSettings, DriverSettings, HomingSettings};
+use vergence_control::{AxisSettings, DriverSettings, HomingSettings, SwitchSettings};
 use vergence_protocol::{AxisKind, Micro};
 
 use crate::rig::AXES;
@@ -45,6 +45,7 @@ fn linear() -> AxisSettings {
             repeatability: Micro(200),
         },
         driver: DriverSettings::default(),
+        switches: SwitchSettings::default(),
     }
 }
 
@@ -74,5 +75,6 @@ fn rotary() -> AxisSettings {
             repeatability: Micro(millidegrees(100)),
         },
         driver: DriverSettings::default(),
+        switches: SwitchSettings::default(),
     }
 }

@@ -20,9 +20,9 @@ pub struct Stage {
     pub steps: StepPulses,
     /// Encoder.
     pub encoder: Encoder,
-    /// Home switch: closed (low) at home.
+    /// Line of the home switch: low while its contact is closed, high while the output DIAG of a driver reports a stall.
     pub home_switch: Input<'static>,
-    /// Hard limit switch: normally closed (low), open (high) beyond the range or when the wire is broken.
+    /// Line of the hard limit switch: high while its contact is open or the wire is broken.
     pub hard_limit: Input<'static>,
 }
 

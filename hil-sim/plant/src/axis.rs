@@ -2,10 +2,11 @@
 
 use std::collections::VecDeque;
 
-use vergence_control::{Scale, StepSchedule};
+use vergence_control::{HomeEnd, Scale, StepSchedule};
 use vergence_protocol::{AxisKind, Microseconds};
 
 use crate::encoder::{Encoder, EncoderFault};
+use crate::ends::{StopMechanics, SwitchMechanics};
 use crate::switch::{Switch, SwitchNoise};
 
 /// The mechanics of one axis. Positions are axis coordinates in micro-units (µm or µrad).
@@ -23,13 +24,31 @@ pub struct AxisMechanics {
     pub encoder_play: f64,
     /// Time constant with which the load follows the motor, in seconds, above zero.
     pub compliance: f64,
-    /// Position at and below which the home switch is closed.
+    /// Position at and beyond which the home switch is operated.
     pub home_switch: f64,
-    /// Positions at and outside of which the hard limit switches open: they are normally closed.
+    /// Ends and contacts of the switches.
+    pub switches: SwitchMechanics,
+    /// Positions at and outside of which the hard limit switches are operated.
     pub hard_limits: [f64; 2],
     /// Mechanical end stops; a motor that pushes the load against one loses steps.
     pub end_stops: [f64; 2],
+    /// What the end stops do to a motor that pushes.
+    pub stop: StopMechanics,
 }
+
+impl AxisMechanics {
+    /// Whether the home switch is operated where the load is at `position`.
+    fn is_home(&self, position: f64) -> bool {
+        match self.switches.home_end {
+            HomeEnd::Low => position <= self.home_switch,
+            HomeEnd::High => position >= self.home_switch,
+        }
+    }
+}
+
+/// Step pulses, a full step and more at up to 64 microsteps, in which a rotor that was thrown out of step gives its driver
+/// no other sign than a standing one.
+const TREMBLING_STEPS: u32 = 64;
 
 /// How far a screw or pinion leads the load beside where a perfect one would, in micro-units.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -75,6 +94,12 @@ pub struct AxisPlant {
     to_lose: u32,
     /// Share of every step by which the coupling slips.
     slips: f64,
+    /// Share of the motor's largest force with which an end stop or a wedged load held it in the last advance.
+    pressed: f64,
+    /// Steps still to be made until a rotor that has lost its step turns with its field again.
+    trembles: u32,
+    /// Times of the last two steps in nanoseconds.
+    last_steps: [u64; 2],
     /// Way of a step pulse, in steps of the motor's scale; not 1 where the driver has other microsteps, or drives nothing.
     step_size: f64,
     /// The steps made since they were last taken, where they are recorded.
@@ -103,12 +128,15 @@ impl AxisPlant {
             load: position,
             stage: position,
             encoder: Encoder::new(scale_reading(mechanics.encoder, position)),
-            home: Switch::new(position <= mechanics.home_switch),
+            home: Switch::new(mechanics.is_home(position)),
             limit_fixed: None,
             blocked: false,
             stalled: false,
             to_lose: 0,
             slips: 0.0,
+            pressed: 0.0,
+            trembles: 0,
+            last_steps: [0; 2],
             step_size: 1.0,
             made: None,
         }
@@ -219,10 +247,28 @@ impl AxisPlant {
         self.home.fix(reading);
     }
 
-    /// Whether the home switch reads closed.
+    /// Whether the home switch is read as operated.
     #[must_use]
     pub fn home_switch(&self) -> bool {
         self.home.reads_closed()
+    }
+
+    /// Whether the line of the home switch is low: its contact is closed.
+    #[must_use]
+    pub fn home_line_is_low(&self) -> bool {
+        self.home.reads_closed() != self.mechanics.switches.home_normally_closed
+    }
+
+    /// Share of its largest force that the motor needs against an end stop or a wedged load, 0 to 1.
+    #[must_use]
+    pub fn pressed(&self) -> f64 {
+        if self.trembles > 0 { 1.0 } else { self.pressed }
+    }
+
+    /// Times of the last two steps on the clock of the plant in nanoseconds, the later one first.
+    #[must_use]
+    pub fn last_steps(&self) -> [u64; 2] {
+        self.last_steps
     }
 
     /// Fixes the reading of the hard limit from now on, or lets it follow the load again.
@@ -230,11 +276,17 @@ impl AxisPlant {
         self.limit_fixed = reading;
     }
 
-    /// Whether a hard limit is reached: one of the normally closed switches is open.
+    /// Whether a hard limit is reached.
     #[must_use]
     pub fn hard_limit(&self) -> bool {
         let [low, high] = self.mechanics.hard_limits;
         self.limit_fixed.unwrap_or(self.load <= low || self.load >= high)
+    }
+
+    /// Whether the line of the hard limit is high: its contact is open.
+    #[must_use]
+    pub fn limit_line_is_high(&self) -> bool {
+        self.hard_limit() != self.mechanics.switches.limits_normally_open
     }
 
     /// Lets time pass from `from` to `to`; without drivers the motor does not turn.
@@ -249,13 +301,16 @@ impl AxisPlant {
         let pulled = self.load.clamp(motor - play, motor + play);
         let dt = (to.0 - from.0) as f64 * 1e-6;
         let share = 1.0 - (-dt / self.mechanics.compliance).exp();
-        let held_by = if self.blocked { [self.load; 2] } else { self.mechanics.end_stops };
+        let (held_by, give) = match self.blocked {
+            true => ([self.load; 2], 0.0),
+            false => (self.mechanics.end_stops, self.mechanics.stop.give),
+        };
         self.load += (pulled - self.load) * share;
-        self.strike(held_by, motor);
+        self.strike(held_by, give, motor);
         let play = self.mechanics.encoder_play / 2.0;
         self.stage = self.stage.clamp(self.load - play, self.load + play);
         self.encoder.advance();
-        self.home.advance(self.load <= self.mechanics.home_switch, to.0 - from.0);
+        self.home.advance(self.mechanics.is_home(self.load), to.0 - from.0);
     }
 
     fn turn_motor(&mut self, to: Microseconds) {
@@ -263,6 +318,8 @@ impl AxisPlant {
         while let Some((at_ns, forward)) = self.ordered.pop_front_if(|(at, _)| *at <= to.0 * 1000) {
             let by = if forward { 1 } else { -1 };
             self.steps += by;
+            self.last_steps = [at_ns, self.last_steps[0]];
+            self.trembles = self.trembles.saturating_sub(1);
             if let Some(made) = &mut self.made {
                 made.push(StepMade { at_ns, forward });
             }
@@ -273,14 +330,19 @@ impl AxisPlant {
         }
     }
 
-    /// Keeps a load at an obstacle; a motor that pulls further loses steps.
-    fn strike(&mut self, [low, high]: [f64; 2], motor: f64) {
-        if self.load < low || self.load > high {
-            let held = self.load.clamp(low, high);
-            self.load = held;
+    /// Keeps a load at an obstacle that yields by `give` at most; a motor that pulls further loses steps.
+    fn strike(&mut self, [low, high]: [f64; 2], give: f64, motor: f64) {
+        let deep = (low - self.load).max(self.load - high).max(0.0);
+        self.pressed = if deep < give { deep / give } else { f64::from(u8::from(deep > 0.0)) };
+        if deep > give {
+            let outward = if self.load < low { -1.0 } else { 1.0 };
+            self.load = self.load.clamp(low - give, high + give);
             let slack = self.mechanics.backlash / 2.0;
-            let reachable = motor.clamp(held - slack, held + slack);
-            self.motor_zero += reachable - motor;
+            let reachable = motor.clamp(self.load - slack, self.load + slack);
+            if (motor - reachable).abs() > 0.0 {
+                self.motor_zero += reachable - outward * self.mechanics.stop.fall_back - motor;
+                self.trembles = TREMBLING_STEPS;
+            }
         }
     }
 }

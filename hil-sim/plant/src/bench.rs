@@ -3,10 +3,11 @@
 
 use std::f64::consts::PI;
 
-use vergence_control::{AxisSettings, DriverSettings, HomingSettings};
+use vergence_control::{AxisSettings, DriverSettings, HomingSettings, SwitchSettings};
 use vergence_protocol::{AxisKind, Micro};
 
 use crate::axis::{AxisMechanics, PitchError};
+use crate::ends::{StopMechanics, SwitchMechanics};
 
 /// A stage: the settings of its controller, and its real mechanics.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -57,6 +58,7 @@ impl Stage {
                 repeatability: Micro(200),
             },
             driver: DriverSettings::default(),
+            switches: SwitchSettings::default(),
         };
         Self { settings, mechanics: mechanics(&settings, 8.0, [8_000.0, 6_000.0], 2_000.0) }
     }
@@ -89,6 +91,7 @@ impl Stage {
                 repeatability: Micro(degrees(0.1)),
             },
             driver: DriverSettings::default(),
+            switches: SwitchSettings::default(),
         };
         let limit = f64::from(degrees(5.0));
         Self { settings, mechanics: mechanics(&settings, 120.0, [limit, limit], f64::from(degrees(1.0))) }
@@ -106,8 +109,10 @@ fn mechanics(settings: &AxisSettings, backlash: f64, beyond: [f64; 2], further: 
         encoder_play: 0.0,
         compliance: 2e-3,
         home_switch: f64::from(settings.homing.switch_at.0),
+        switches: SwitchMechanics::default(),
         hard_limits,
         end_stops: [hard_limits[0] - further, hard_limits[1] + further],
+        stop: StopMechanics::default(),
     }
 }
 

@@ -2,7 +2,7 @@
 
 use vergence_protocol::Microseconds;
 
-use crate::tmc2209::{DriverReply, Tmc2209};
+use crate::tmc2209::{DriverReply, Tmc2209, Turning};
 
 /// A driver, and the microsteps that the scale of its motor counts.
 #[derive(Clone, Debug)]
@@ -52,10 +52,10 @@ impl Drivers {
         self.chips().for_each(|chip| chip.enable(on));
     }
 
-    /// Lets time pass for the driver of an axis.
-    pub fn advance(&mut self, axis: usize, now: Microseconds, stepped: bool) {
+    /// Lets time pass for the driver of an axis, whose motor did this meanwhile.
+    pub fn advance(&mut self, axis: usize, now: Microseconds, motor: Turning) {
         if let Some(chip) = self.chip_mut(axis) {
-            chip.advance(now, stepped);
+            chip.advance(now, motor);
         }
     }
 

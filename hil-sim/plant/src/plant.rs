@@ -8,6 +8,7 @@ use vergence_protocol::{AxisList, DriverState, Microseconds};
 
 use crate::axis::{AxisMechanics, AxisPlant};
 use crate::drivers::Drivers;
+use crate::tmc2209::{Tmc2209, Turning};
 
 /// All axes, the driver enable and the emergency stop.
 #[derive(Clone, Debug)]
@@ -19,6 +20,10 @@ pub struct Plant {
     emergency_stop: bool,
     /// The axis whose home switch is wired to each input.
     home_wires: Vec<usize>,
+    /// Axes whose driver's output DIAG is wired to the input of the home switch.
+    diag_wires: Vec<usize>,
+    /// Axes at whose input the wire of DIAG is broken: its pull-up keeps it high.
+    broken_diag: Vec<usize>,
     /// When the cameras will be fired.
     trigger_at: Option<Microseconds>,
     trigger_edges: VecDeque<TriggerEdge>,
@@ -36,6 +41,8 @@ impl Plant {
             mechanics.iter().zip(positions).map(|(&axis, &position)| AxisPlant::new(axis, position)).collect();
         Self {
             home_wires: (0..axes.len()).collect(),
+            diag_wires: Vec::new(),
+            broken_diag: Vec::new(),
             axes,
             now: Microseconds(0),
             drivers_on: false,
@@ -72,6 +79,16 @@ impl Plant {
         if one.max(other) < self.home_wires.len() {
             self.home_wires.swap(one, other);
         }
+    }
+
+    /// Wires the output DIAG of an axis' driver to the input of its home switch, in place of the switch.
+    pub fn wire_diag(&mut self, axis: usize) {
+        self.diag_wires.push(axis);
+    }
+
+    /// Breaks the wire of DIAG at the input of an axis: its pull-up keeps it high.
+    pub fn break_diag(&mut self, axis: usize) {
+        self.broken_diag.push(axis);
     }
 
     /// When the cameras were last fired, and the true position of every load then, in micro-units.
@@ -176,7 +193,8 @@ impl Plant {
             axis.set_step_size(self.drivers.step_size(index));
             let before = axis.steps();
             axis.advance(self.now, to, powered);
-            self.drivers.advance(index, to, axis.steps() != before);
+            let steps = axis.steps().abs_diff(before);
+            self.drivers.advance(index, to, Turning { steps, last: axis.last_steps(), pressed: axis.pressed() });
         }
         self.now = to;
     }
@@ -215,12 +233,16 @@ impl RigIo for Plant {
     }
 
     fn home_switch(&self, axis: usize) -> bool {
+        if self.diag_wires.contains(&axis) {
+            let is_high = self.broken_diag.contains(&axis) || self.drivers.chip(axis).is_some_and(Tmc2209::diag);
+            return !is_high;
+        }
         let switch = self.home_wires.get(axis).and_then(|&wired| self.axes.get(wired));
-        switch.is_some_and(AxisPlant::home_switch)
+        switch.is_some_and(AxisPlant::home_line_is_low)
     }
 
     fn hard_limit(&self, axis: usize) -> bool {
-        self.axes.get(axis).is_some_and(AxisPlant::hard_limit)
+        self.axes.get(axis).is_some_and(AxisPlant::limit_line_is_high)
     }
 
     fn emergency_stop(&self) -> bool {

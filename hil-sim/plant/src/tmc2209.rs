@@ -4,6 +4,9 @@
 
 use vergence_protocol::Microseconds;
 
+use crate::stall_guard::StallGuard;
+pub use crate::stall_guard::Turning;
+
 /// Bytes of a reply, and the time that the line rests before it, in bits.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct DriverReply {
@@ -33,14 +36,19 @@ const NODECONF: usize = 0x03;
 const IOIN: usize = 0x06;
 const IHOLD_IRUN: usize = 0x10;
 const TPOWERDOWN: usize = 0x11;
+const TSTEP: usize = 0x12;
+const TPWMTHRS: usize = 0x13;
+const TCOOLTHRS: usize = 0x14;
+const SGTHRS: usize = 0x40;
+const SG_RESULT: usize = 0x41;
 const CHOPCONF: usize = 0x6C;
 const DRV_STATUS: usize = 0x6F;
 const PWMCONF: usize = 0x70;
 
 /// Registers that can be read (section 5): others read as zero.
-const READABLE: [usize; 7] = [GCONF, GSTAT, IFCNT, IOIN, CHOPCONF, DRV_STATUS, PWMCONF];
+const READABLE: [usize; 9] = [GCONF, GSTAT, IFCNT, IOIN, TSTEP, SG_RESULT, CHOPCONF, DRV_STATUS, PWMCONF];
 /// Registers that can be written: a write to another counts, and changes nothing.
-const WRITABLE: [usize; 7] = [GCONF, NODECONF, IHOLD_IRUN, TPOWERDOWN, 0x13, CHOPCONF, PWMCONF];
+const WRITABLE: [usize; 9] = [GCONF, NODECONF, IHOLD_IRUN, TPOWERDOWN, TPWMTHRS, TCOOLTHRS, SGTHRS, CHOPCONF, PWMCONF];
 
 /// Temperatures at which the driver warns and switches off, in degrees Celsius (section 5.5.3, OTTRIM 00).
 const WARNS_AT: f64 = 120.0;
@@ -72,6 +80,7 @@ pub struct Tmc2209 {
     faults: DriverFaults,
     now: Microseconds,
     stepped_at: Microseconds,
+    stall_guard: StallGuard,
 }
 
 impl Tmc2209 {
@@ -90,6 +99,7 @@ impl Tmc2209 {
             faults: DriverFaults::default(),
             now: Microseconds(0),
             stepped_at: Microseconds(0),
+            stall_guard: StallGuard::default(),
         };
         driver.reset();
         driver
@@ -140,12 +150,33 @@ impl Tmc2209 {
         self.registers[CHOPCONF] ^= 1 << 24;
     }
 
-    /// Notes that time has passed, and whether steps were made meanwhile.
-    pub fn advance(&mut self, now: Microseconds, stepped: bool) {
+    /// Notes that time has passed, and what the motor did meanwhile.
+    pub fn advance(&mut self, now: Microseconds, motor: Turning) {
         self.now = now;
-        if stepped {
+        if motor.steps > 0 {
             self.stepped_at = now;
         }
+        let microsteps = self.microsteps();
+        self.stall_guard.advance(now, motor, microsteps);
+        (self.registers[TSTEP], self.registers[SG_RESULT]) = (self.stall_guard.tstep(), self.stall_guard.result());
+    }
+
+    /// Whether the output DIAG is high: a driver error, or a stall. The driver reports stalls with StealthChop only, and only
+    /// while TCOOLTHRS >= TSTEP > TPWMTHRS (section 5.3, SGTHRS).
+    #[must_use]
+    pub fn diag(&self) -> bool {
+        let [tstep, fastest, slowest, result, threshold] =
+            [TSTEP, TPWMTHRS, TCOOLTHRS, SG_RESULT, SGTHRS].map(|register| self.registers[register]);
+        let stealth_chop = self.registers[GCONF] >> 2 & 1 == 0;
+        let is_on = self.drives() && stealth_chop && slowest >= tstep && tstep > fastest;
+        let error = self.registers[GSTAT] & 1 << 1 != 0;
+        self.is_supplied && (error || is_on && result <= 2 * (threshold & 0xFF))
+    }
+
+    /// The StallGuard value of the last full step: the higher, the less load.
+    #[must_use]
+    pub fn sg_result(&self) -> u32 {
+        self.registers[SG_RESULT]
     }
 
     /// Microsteps of a full step: by register, or by the address pins (section 3.3).

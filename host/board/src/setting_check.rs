@@ -29,7 +29,8 @@ fn in_words(rig: &Rig, error: SettingsError) -> String {
         SettingsError::Range { axis } => {
             let axis = name(axis);
             format!(
-                "{axis}.min must lie below {axis}.max, and {axis}.home_switch_at below {axis}.min less {axis}.backlash"
+                "{axis}.min must lie below {axis}.max, and {axis}.home_switch_at below {axis}.min less {axis}.backlash or \
+                 above {axis}.max"
             )
         }
         SettingsError::StepRate { axis } => {

@@ -72,14 +72,22 @@ fn form(item: SettingItem, kind: AxisKind) -> Form {
         SettingItem::Speed | SettingItem::HomeSeekSpeed | SettingItem::HomeApproachSpeed => Form::Quantity(kind, 1),
         SettingItem::Acceleration => Form::Quantity(kind, 2),
         SettingItem::Jerk => Form::Quantity(kind, 3),
-        SettingItem::StepsPerUnit | SettingItem::CountsPerUnit | SettingItem::Baud | SettingItem::Microsteps => {
-            Form::Number
-        }
-        SettingItem::StepsReversed | SettingItem::CountsReversed | SettingItem::StealthChop => Form::Flag,
+        SettingItem::StepsPerUnit
+        | SettingItem::CountsPerUnit
+        | SettingItem::Baud
+        | SettingItem::Microsteps
+        | SettingItem::StallThreshold => Form::Number,
+        SettingItem::StepsReversed
+        | SettingItem::CountsReversed
+        | SettingItem::StealthChop
+        | SettingItem::StallWatch => Form::Flag,
         SettingItem::StreamPeriod | SettingItem::HoldDelay | SettingItem::HoldAfter => Form::Period,
         SettingItem::SenseResistor => Form::Unit("mOhm"),
         SettingItem::RunCurrent | SettingItem::HoldCurrent => Form::Unit("mA"),
         SettingItem::Driver => Form::Choice(&["plain", "tmc2209"]),
+        SettingItem::HomeEnd => Form::Choice(&["low", "high"]),
+        SettingItem::HomeSwitch => Form::Choice(&["normally_open", "normally_closed", "stallguard"]),
+        SettingItem::HardLimit => Form::Choice(&["normally_closed", "normally_open"]),
         SettingItem::Machine => Form::Choice(&["bench", "robot"]),
         _ => Form::Quantity(kind, 0),
     }
@@ -234,6 +242,10 @@ mod tests {
             ("separation.sense_resistor", 110, "110mOhm"),
             ("separation.hold_delay", 500_000, "500ms"),
             ("hold_after", 5_000_000, "5s"),
+            ("baseline.home_end", 1, "high"),
+            ("separation.home_switch", 2, "stallguard"),
+            ("baseline.hard_limit", 0, "normally_closed"),
+            ("baseline.stall_threshold", 50, "50"),
         ] {
             assert_eq!(setting(name).write(value), text, "{name}");
         }
@@ -254,6 +266,7 @@ mod tests {
             ("machine", "lathe", "bench or robot"),
             ("baseline.run_current", "0.8A", "800mA"),
             ("baseline.hold_current", "400", "800mA"),
+            ("baseline.home_end", "left", "low or high"),
         ] {
             let error = setting(name).read(text).unwrap_err();
             assert!(error.contains(word) && error.contains(name), "{error}");

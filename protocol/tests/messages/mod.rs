@@ -151,6 +151,7 @@ fn status() -> impl Strategy<Value = Status> {
         Just(Refusal::ReadOnly),
         Just(Refusal::LineOnTrial),
         any::<u8>().prop_map(|axis| Refusal::AtHardLimit { axis }),
+        any::<u8>().prop_map(|axis| Refusal::HomeSwitchAside { axis }),
     ];
     prop_oneof![Just(Status::Accepted), refusal.prop_map(Status::Refused)]
 }

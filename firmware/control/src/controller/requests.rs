@@ -119,6 +119,10 @@ impl Controller {
         if axes == AxisMask::default() || axes.0 & !AxisMask::first(self.axes.len()).0 != 0 {
             return Err(Refusal::Invalid);
         }
+        let mut named = (0u8..).zip(&self.axes).filter(|(index, _)| axes.contains(usize::from(*index)));
+        if let Some((axis, _)) = named.find(|(_, axis)| !axis.settings.switch_is_at_home()) {
+            return Err(Refusal::HomeSwitchAside { axis });
+        }
         self.homing = HomingSequence::start(axes, &mut self.axes);
         self.active.phase = MovePhase::None;
         self.state = ControllerState::Homing;

@@ -37,6 +37,7 @@ impl Controller {
                 axis.advance(tick, io);
             }
             self.watch_following(now, io);
+            self.watch_stalls(now, io);
         }
         // A plan begins ticks after its request, and a search with the next tick: the current is there before.
         let at_rest = self.drivers_on && self.planning.is_none() && !self.any_moving();
@@ -115,11 +116,27 @@ impl Controller {
 
     fn watch_following(&mut self, now: Microseconds, io: &mut impl RigIo) {
         let mut first = None;
+        let homes = self.state == ControllerState::Homing;
         for (index, axis) in self.axes.iter_mut().enumerate() {
-            first = first.or(axis.watch(io).map(|lost| (index, lost)));
+            let lost = axis.watch(io).filter(|lost| !(homes && self.homing.takes(index, lost)));
+            first = first.or(lost.map(|lost| (index, lost)));
         }
         if let Some((axis, lost)) = first {
             self.cut(now, lost.code, Some(axis), lost.detail, io);
+        }
+    }
+
+    /// A stall that a driver reports in a move is a fault where the settings want it: the motor may have lost its place.
+    fn watch_stalls(&mut self, now: Microseconds, io: &mut impl RigIo) {
+        let mut stalled = None;
+        if self.state == ControllerState::Moving {
+            for (index, axis) in self.axes.iter_mut().enumerate().filter(|(_, axis)| axis.settings.switches.stall_watch)
+            {
+                stalled = stalled.or(axis.reads_stall(io).then_some(index));
+            }
+        }
+        if stalled.is_some() {
+            self.cut(now, FaultCode::DriverStall, stalled, 0, io);
         }
     }
 

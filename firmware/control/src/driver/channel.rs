@@ -1,7 +1,7 @@
 //! One driver: is it there, give it its settings, read them back, watch it.
 //!
 //! ```text
-//! Identify --> CountBefore --> Write 0..6 --> CountAfter --> Verify 0..3 --> Watch
+//! Identify --> CountBefore --> Write 0..8 --> CountAfter --> Verify 0..3 --> Watch
 //! Watch --other settings--> Doubt
 //! any --three exchanges failed, wrong value, error flag--> Rest (100 ms) --> Identify
 //! ```

@@ -16,4 +16,5 @@ mod settings;
 pub use datagram::{ADDRESSES, Datagram, LONGEST, request, value_of, write};
 pub use line::DriverLine;
 pub use registers::Register;
-pub use settings::{DriverKind, DriverSettings};
+pub(crate) use settings::LEAST_FULL_STEPS;
+pub use settings::{DriverKind, DriverSettings, StallLimits};

@@ -20,6 +20,10 @@ pub enum Register {
     IHoldIRun = 0x10,
     /// Time at rest until the current falls.
     TPowerDown = 0x11,
+    /// Longest time of a step at which a stall is reported.
+    TCoolThrs = 0x14,
+    /// Threshold of a stall.
+    SgThrs = 0x40,
     /// Chopper, range of the current, microsteps.
     ChopConf = 0x6C,
     /// Temperature, short circuits, present current.
@@ -69,7 +73,7 @@ const POWER_DOWN_US: u32 = 21_845;
 /// Writes that give a driver its settings, in their order. What happened is cleared first, so that a reset in the midst
 /// of the others is noticed.
 #[must_use]
-pub fn configuration(settings: &DriverSettings) -> [(Register, u32); 6] {
+pub fn configuration(settings: &DriverSettings) -> [(Register, u32); 8] {
     let (range, run, hold) = settings.current_scale();
     let chopper = if settings.stealth_chop { 0 } else { SPREAD_CYCLE };
     let low_range = if range.is_low { LOW_RANGE } else { 0 };
@@ -82,5 +86,7 @@ pub fn configuration(settings: &DriverSettings) -> [(Register, u32); 6] {
         (Register::ChopConf, CHOPCONF | low_range | resolution << 24),
         (Register::IHoldIRun, hold | run << 8 | FALL),
         (Register::TPowerDown, (settings.hold_delay_us / POWER_DOWN_US).min(255)),
+        (Register::TCoolThrs, settings.stall.map_or(0, |stall| stall.longest_tstep)),
+        (Register::SgThrs, settings.stall.map_or(0, |stall| stall.threshold)),
     ]
 }

@@ -27,6 +27,33 @@ pub struct DriverSettings {
     pub microsteps: u32,
     /// Whether the driver regulates the voltage (quiet) instead of the current (more torque at speed).
     pub stealth_chop: bool,
+    /// When the driver reports a stall at its output DIAG; `None` for never.
+    pub stall: Option<StallLimits>,
+}
+
+/// Smallest rate of full steps a second at which StallGuard works: a turn a second of a motor with 200 full steps. Below,
+/// the voltage that the turning rotor induces is too small (section 11.4 of the datasheet).
+pub(crate) const LEAST_FULL_STEPS: u64 = 200;
+/// Clock of the chip in hertz.
+const CLOCK: u64 = 12_000_000;
+/// Largest value of TCOOLTHRS.
+const LONGEST_TSTEP: u64 = (1 << 20) - 1;
+
+/// When a driver reports a stall (section 11 of the datasheet).
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct StallLimits {
+    /// SGTHRS: the driver reports a stall where SG_RESULT is at most twice this.
+    pub threshold: u32,
+    /// TCOOLTHRS: longest time of 1/256 of a full step, in clocks of 12 MHz, at which it reports one.
+    pub longest_tstep: u32,
+}
+
+impl StallLimits {
+    /// Limits that hold from so many steps a second on; `None` for none at all.
+    pub(crate) fn at(steps_per_second: u64, microsteps: u32, threshold: u32) -> Option<Self> {
+        let longest = (CLOCK * u64::from(microsteps)).checked_div(steps_per_second * 256)?;
+        Some(Self { threshold, longest_tstep: longest.min(LONGEST_TSTEP) as u32 })
+    }
 }
 
 impl Default for DriverSettings {
@@ -40,6 +67,7 @@ impl Default for DriverSettings {
             hold_delay_us: 500_000,
             microsteps: 8,
             stealth_chop: true,
+            stall: None,
         }
     }
 }

@@ -93,6 +93,10 @@ impl Node {
         value: i64,
         io: &mut impl RigIo,
     ) -> Result<(), Refusal> {
+        // First, because a check of all settings takes too long for a tick in motion.
+        if self.settings.get(key).is_some() {
+            self.must_be_idle()?;
+        }
         let changed = self.settings.with(key, value).map_err(|error| match error {
             SettingError::Unknown => Refusal::NoSetting,
             SettingError::Value => Refusal::BadSetting,

@@ -3,13 +3,13 @@
 use std::collections::VecDeque;
 use std::f64::consts::TAU;
 
-use vergence_control::{AxisSettings, RigIo, Scale, StepSchedule};
+use vergence_control::{AxisSettings, HomeEnd, HomeSensor, RigIo, Scale, StepSchedule, SwitchSettings};
 use vergence_protocol::{AxisKind, DriverState, Microseconds};
 
 /// How a home switch behaves.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum HomeSwitch {
-    /// Closes at its place and below.
+    /// Operated at its place and beyond.
     Good,
     NeverCloses,
     StuckClosed,
@@ -20,6 +20,7 @@ pub struct IdealAxis {
     motor: f64,
     encoder: f64,
     pub switch_at: f64,
+    switches: SwitchSettings,
     /// Raw numbers at power-on.
     raw_steps: i32,
     raw_counts: i32,
@@ -55,6 +56,7 @@ impl IdealAxis {
             motor: per_micro(settings.motor()),
             encoder: per_micro(settings.encoder()),
             switch_at: f64::from(settings.homing.switch_at.0),
+            switches: settings.switches,
             raw_steps: raw[0],
             raw_counts: raw[1],
             steps: 0,
@@ -90,11 +92,13 @@ impl IdealAxis {
         1.0 / self.motor
     }
 
+    /// Whether the home switch is operated.
     pub fn closed(&self) -> bool {
-        match self.switch {
-            HomeSwitch::Good => self.load <= self.switch_at,
-            HomeSwitch::NeverCloses => false,
-            HomeSwitch::StuckClosed => true,
+        match (self.switch, self.switches.home_end) {
+            (HomeSwitch::Good, HomeEnd::Low) => self.load <= self.switch_at,
+            (HomeSwitch::Good, HomeEnd::High) => self.load >= self.switch_at,
+            (HomeSwitch::NeverCloses, _) => false,
+            (HomeSwitch::StuckClosed, _) => true,
         }
     }
 }
@@ -190,12 +194,13 @@ impl RigIo for IdealRig {
 
     fn home_switch(&self, axis: usize) -> bool {
         let wire = if self.crossed_switches { 1 - axis } else { axis };
-        self.axes[wire].closed()
+        let axis = &self.axes[wire];
+        axis.closed() == (axis.switches.home == HomeSensor::NormallyOpen)
     }
 
     fn hard_limit(&self, axis: usize) -> bool {
-        let IdealAxis { hard_limit, hard_limits: [low, high], load, .. } = self.axes[axis];
-        hard_limit || load <= low || load >= high
+        let IdealAxis { hard_limit, hard_limits: [low, high], load, switches, .. } = self.axes[axis];
+        (hard_limit || load <= low || load >= high) != switches.limits_normally_open
     }
 
     fn driver(&self, axis: usize) -> DriverState {

@@ -135,7 +135,7 @@ pub const CAUGHT: &[Mutation] = &[
     planted(
         "homing ends beyond the low end",
         "homing.rs",
-        "axis.go_to(axis.settings.min, limits);",
+        "axis.go_to(axis.settings.home_position(), limits);",
         "axis.go_to(Micro(axis.settings.min.0 - 100_000), limits);",
     ),
     planted(

@@ -62,6 +62,39 @@ impl Board {
         }
     }
 
+    /// Names of the axes whose hard limit switches are normally open, so that the board cannot notice a broken wire.
+    ///
+    /// # Errors
+    /// [`BoardError`]: a refusal, or a link that ended.
+    pub async fn open_limits(&self) -> Result<Vec<String>, BoardError> {
+        let mut names = Vec::new();
+        for (axis, rig_axis) in (0..).zip(&self.rig().axes) {
+            if self.setting(SettingKey { item: SettingItem::HardLimit, axis }).await? == Some(1) {
+                names.push(rig_axis.name.clone());
+            }
+        }
+        Ok(names)
+    }
+
+    /// Names of the axes whose home switch lies at the other end of the range than the setting `home_end` says: they cannot
+    /// be homed.
+    ///
+    /// # Errors
+    /// [`BoardError`]: a refusal, or a link that ended.
+    pub async fn homes_aside(&self) -> Result<Vec<String>, BoardError> {
+        let mut names = Vec::new();
+        for ((axis, rig_axis), info) in (0..).zip(&self.rig().axes).zip(&self.axes) {
+            let end = self.setting(SettingKey { item: SettingItem::HomeEnd, axis }).await?;
+            let at = self.setting(SettingKey { item: SettingItem::HomeSwitchAt, axis }).await?;
+            if let (Some(end), Some(at)) = (end, at)
+                && (end == 1) != (at > i64::from(info.max.0))
+            {
+                names.push(rig_axis.name.clone());
+            }
+        }
+        Ok(names)
+    }
+
     /// Changes a setting to a value in wire units, or returns the board's refusal.
     ///
     /// # Errors

@@ -38,9 +38,27 @@ pub async fn check_board(board: &mut Board, checks: BoardChecks) -> Vec<Finding>
     findings.extend([clock(board), state(board), reference(board)]);
     findings.extend(limits(board));
     findings.push(settings(board, checks.line_baud).await);
+    findings.extend(switches(board).await);
     findings.extend(drivers(board).await);
     findings.push(key(board).await);
     findings
+}
+
+/// Checks how the board understands its switches.
+async fn switches(board: &Board) -> Vec<Finding> {
+    // Where the link fails, other checks say so.
+    let aside = board.homes_aside().await.unwrap_or_default().into_iter().map(|axis| {
+        let reason = format!("'home_switch_at' of {axis} lies at the other end of its range than 'home_end' says");
+        let remedy = format!("'vergence config set {axis}.home_end', or '{axis}.home_switch_at'");
+        Finding::fail("switches", reason, remedy)
+    });
+    let open = board.open_limits().await.unwrap_or_default().into_iter().map(|axis| {
+        let reason = format!("the hard limit switches of {axis} are normally open: a broken wire goes unnoticed");
+        let remedy =
+            format!("use normally closed switches, then 'vergence config set {axis}.hard_limit normally_closed'");
+        Finding::warn("switches", reason, remedy)
+    });
+    aside.chain(open).collect()
 }
 
 /// Checks the motor drivers that tell how they are.

@@ -32,6 +32,9 @@ pub async fn run(args: &Args, common: &CommonOptions, console: Console) -> Resul
     if key.is_some_and(|key| key.is_development()) {
         console.warn("the board takes firmware of the development key, for which anybody can sign: docs/flashing.md");
     }
+    for axis in board.open_limits().await? {
+        console.warn(format!("the hard limit switches of {axis} are normally open: a broken wire goes unnoticed"));
+    }
     let story = if args.why { Some(Story::read(&board).await?) } else { None };
     let drivers = board.drivers().await?;
     let info = board.info();
