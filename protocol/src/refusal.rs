@@ -74,6 +74,13 @@ pub enum Refusal {
         /// Index of the axis, from 0.
         axis: u8,
     },
+    /// The encoder of an axis cannot be used.
+    EncoderNotReady {
+        /// Index of the axis, from 0.
+        axis: u8,
+        /// Why; `None` while the encoder has not answered yet.
+        why: Option<FaultCode>,
+    },
 }
 
 impl fmt::Display for Refusal {
@@ -107,6 +114,12 @@ impl fmt::Display for Refusal {
             Self::LineOnTrial => f.write_str("the new speed of the line is on trial: open the link at it first"),
             Self::AtHardLimit { axis } => {
                 write!(f, "axis {axis} is at its hard limit: only a short 'vergence move --by' away from it is allowed")
+            }
+            Self::EncoderNotReady { axis, why: Some(why) } => {
+                write!(f, "axis {axis} does not know where it is: {why}; 'vergence doctor' says what to do")
+            }
+            Self::EncoderNotReady { axis, why: None } => {
+                write!(f, "the encoder of axis {axis} has not answered yet: try again in a second")
             }
         }
     }

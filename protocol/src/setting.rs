@@ -70,11 +70,17 @@ pub enum SettingItem {
     HoldAfter,
     /// Largest error at the end of a move that a short second move corrects, as of a screw whose pitch varies; 0 for none.
     Correction,
+    /// Encoder counts from one index pulse to the next; 0 for an encoder without index.
+    IndexEvery,
+    /// Encoder of the axis: 0 for two lines in quadrature, 1 for an AS5048A, which knows its angle.
+    Encoder,
+    /// Reading of an absolute encoder at the axis zero, in counts within its turn.
+    EncoderZero,
 }
 
 impl SettingItem {
     /// Every item, in wire order.
-    pub const ALL: [Self; 30] = [
+    pub const ALL: [Self; 33] = [
         Self::Min,
         Self::Max,
         Self::Speed,
@@ -105,6 +111,9 @@ impl SettingItem {
         Self::StealthChop,
         Self::HoldAfter,
         Self::Correction,
+        Self::IndexEvery,
+        Self::Encoder,
+        Self::EncoderZero,
     ];
 
     /// Whether each axis has a setting of this kind; else the board has one.
@@ -147,6 +156,9 @@ impl SettingItem {
             Self::StealthChop => "stealth_chop",
             Self::HoldAfter => "hold_after_us",
             Self::Correction => "correction",
+            Self::IndexEvery => "index_every",
+            Self::Encoder => "encoder",
+            Self::EncoderZero => "encoder_zero",
         }
     }
 }

@@ -96,6 +96,6 @@ fn the_checksum_is_castagnoli() {
 
 /// A change here is a change of the messages: raise `PROTOCOL` and check that the old enum variants kept their places.
 #[test]
-fn the_messages_are_those_of_protocol_1_4() {
-    assert_eq!(schema_hash(), 0x866d_5c11_dc7c_6d2f, "{:#x}", schema_hash());
+fn the_messages_are_those_of_protocol_1_5() {
+    assert_eq!(schema_hash(), 0x6140_ffad_99fa_9060, "{:#x}", schema_hash());
 }

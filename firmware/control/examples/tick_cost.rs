@@ -6,8 +6,8 @@ use std::hint::black_box;
 use std::process::ExitCode;
 
 use vergence_control::{
-    AxisSettings, Controller, DriverSettings, FINE_BITS, HomingSettings, Limits, MotionState, MovePlanner, PlanRequest,
-    RigIo, StepSchedule, Trajectory,
+    AxisSettings, Controller, DriverSettings, EncoderSettings, FINE_BITS, HomingSettings, Limits, MotionState,
+    MovePlanner, PlanRequest, RigIo, StepSchedule, Trajectory,
 };
 use vergence_protocol::{AxisKind, ControllerState, Jog, Micro, Microseconds, MoveId, Permille, Request, SessionId};
 
@@ -74,6 +74,7 @@ fn axis(step_rate: u32) -> AxisSettings {
             repeatability: Micro(100),
         },
         driver: DriverSettings::default(),
+        feedback: EncoderSettings::default(),
     }
 }
 

@@ -3,6 +3,7 @@
 use vergence_protocol::{AxisKind, AxisList, Micro, SettingItem, SettingKey};
 
 use crate::driver::{DriverKind, DriverSettings};
+use crate::encoder::{EncoderKind, EncoderSettings};
 use crate::settings::{AxisSettings, HomingSettings, SettingsError};
 
 /// Shortest period of the pose stream in microseconds: a pose of 45 bytes at 921 600 baud takes half of it.
@@ -197,12 +198,13 @@ impl AxisSettings {
             correction: nothing,
             homing,
             driver: DriverSettings::default(),
+            feedback: EncoderSettings::default(),
         }
     }
 
     /// Value of an axis setting; `None` for settings of the board.
     fn item(&self, item: SettingItem) -> Option<i64> {
-        let (homing, driver) = (&self.homing, &self.driver);
+        let (homing, driver, encoder) = (&self.homing, &self.driver, &self.feedback);
         Some(match item {
             SettingItem::Min => self.min.0.into(),
             SettingItem::Max => self.max.0.into(),
@@ -230,12 +232,15 @@ impl AxisSettings {
             SettingItem::Microsteps => driver.microsteps.into(),
             SettingItem::StealthChop => driver.stealth_chop.into(),
             SettingItem::Correction => self.correction.0.into(),
+            SettingItem::IndexEvery => encoder.index_every.into(),
+            SettingItem::Encoder => encoder.is_absolute().into(),
+            SettingItem::EncoderZero => encoder.zero.into(),
             _ => return None,
         })
     }
 
     fn put(&mut self, item: SettingItem, value: i64) -> Result<(), SettingError> {
-        let (homing, driver) = (&mut self.homing, &mut self.driver);
+        let (homing, driver, encoder) = (&mut self.homing, &mut self.driver, &mut self.feedback);
         match item {
             SettingItem::Min => self.min = micro(value)?,
             SettingItem::Max => self.max = micro(value)?,
@@ -263,6 +268,11 @@ impl AxisSettings {
             SettingItem::Microsteps => driver.microsteps = number(value)?,
             SettingItem::StealthChop => driver.stealth_chop = flag(value)?,
             SettingItem::Correction => self.correction = micro(value)?,
+            SettingItem::IndexEvery => encoder.index_every = number(value)?,
+            SettingItem::Encoder => {
+                encoder.kind = if flag(value)? { EncoderKind::As5048a } else { EncoderKind::Quadrature };
+            }
+            SettingItem::EncoderZero => encoder.zero = number(value)?,
             _ => return Err(SettingError::Unknown),
         }
         Ok(())
@@ -271,7 +281,9 @@ impl AxisSettings {
     /// Whether a reference found with the settings `self` is still valid with `other`.
     pub(crate) fn keeps_reference(&self, other: &Self) -> bool {
         let reference = |axis: &Self| (axis.kind, axis.counts_per_unit, axis.counts_reversed, axis.homing.switch_at);
-        reference(self) == reference(other)
+        // The range of an absolute encoder tells which of its turns is meant.
+        let range = |axis: &Self| axis.feedback.is_absolute().then_some((axis.min, axis.max));
+        reference(self) == reference(other) && self.feedback == other.feedback && range(self) == range(other)
     }
 }
 

@@ -7,11 +7,16 @@ use crate::contact::Contact;
 use crate::homing::{Homing, Progress};
 use crate::io::RigIo;
 
+/// Ticks in which axes with an absolute encoder are watched instead of homed: long enough for hosts to hear of it.
+const WATCH_TICKS: u8 = 50;
+
 /// The axes still to be homed, and the state of the present one.
 #[derive(Clone, Debug, Default)]
 pub struct HomingSequence {
     left: AxisMask,
     present: Option<(usize, Homing)>,
+    /// Ticks left of [`WATCH_TICKS`].
+    watch: u8,
     /// The home switches of all axes.
     contacts: AxisList<Contact>,
 }
@@ -25,12 +30,17 @@ pub struct HomingFailure {
 }
 
 impl HomingSequence {
-    /// Starts homing of the axes `which`, the lowest first. They lose their references.
+    /// Starts homing of the axes `which`, the lowest first. They lose their references, but for those with an absolute
+    /// encoder, which need no homing.
     pub fn start(which: AxisMask, axes: &mut [Axis]) -> Self {
-        for (_, axis) in axes.iter_mut().enumerate().filter(|(index, _)| which.contains(*index)) {
+        let mut left = AxisMask::default();
+        let needs = |axis: &Axis| !axis.settings.feedback.is_absolute();
+        for (index, axis) in axes.iter_mut().enumerate().filter(|(index, axis)| which.contains(*index) && needs(axis)) {
             axis.forget_reference();
+            left = left.with(index);
         }
-        Self { left: which, present: None, contacts: axes.iter().map(|_| Contact::default()).collect() }
+        let watch = if left == which { 0 } else { WATCH_TICKS };
+        Self { left, watch, present: None, contacts: axes.iter().map(|_| Contact::default()).collect() }
     }
 
     /// Runs one tick; returns true when all axes have their reference.
@@ -57,6 +67,10 @@ impl HomingSequence {
         if let Some(index) = next {
             self.left.0 &= !(1 << index);
             self.present = Some((index, Homing::start()));
+        }
+        if next.is_none() && self.watch > 0 {
+            self.watch -= 1;
+            return false;
         }
         next.is_none()
     }

@@ -5,6 +5,7 @@ use vergence_protocol::{AxisInfo, AxisKind, Micro, SettingItem};
 use crate::TICK_US;
 use crate::bounds::{self, LONGEST_BRAKING_MS};
 use crate::driver::DriverSettings;
+use crate::encoder::EncoderSettings;
 use crate::profile::Limits;
 
 /// Encoder counts or motor steps per metre (linear axis) or revolution (rotary axis).
@@ -35,7 +36,9 @@ impl Scale {
     }
 
     /// The count nearest to `position`.
+    // Not inlined, as its counterpart: copies would take kilobytes of flash.
     #[must_use]
+    #[inline(never)]
     pub fn counts_at(self, position: Micro) -> i32 {
         let numerator = i128::from(position.0) * i128::from(self.per_unit) * 1000;
         saturate(div_round(numerator, i128::from(self.milli_micro())))
@@ -49,6 +52,7 @@ impl Scale {
 
     /// The position nearest to `counts`.
     #[must_use]
+    #[inline(never)]
     pub fn position_at(self, counts: i32) -> Micro {
         let numerator = i128::from(counts) * i128::from(self.milli_micro());
         Micro(saturate(div_round(numerator, i128::from(self.per_unit.max(1)) * 1000)))
@@ -117,6 +121,8 @@ pub struct AxisSettings {
     pub homing: HomingSettings,
     /// Settings of the motor driver.
     pub driver: DriverSettings,
+    /// Settings of the encoder.
+    pub feedback: EncoderSettings,
 }
 
 /// Why settings cannot work.

@@ -8,8 +8,9 @@ use embassy_stm32::mode::Async;
 use embassy_stm32::usart::{self, Uart, UartTx};
 use embassy_stm32::{Peri, Peripherals, bind_interrupts, dma, pac, peripherals, rcc};
 
+use crate::absolute::AbsoluteEncoders;
 use crate::drivers::DriverWire;
-use crate::encoder::Encoder;
+use crate::encoder::{Encoder, IndexLines};
 use crate::receiver::{Bell, Receiver};
 use crate::rig::Rig;
 use crate::steps::{StepDma, StepPulses};
@@ -72,6 +73,8 @@ impl Board {
                 StepPulses::new(p.TIM8, p.PC6, p.PC8, p.DMA1_CH4),
             ],
             encoders: [Encoder::new(p.TIM2, p.PA0, p.PA1), Encoder::new(p.TIM5, p.PB2, p.PC12)],
+            index_lines: IndexLines::new(p.PB11, p.PB12),
+            absolute: AbsoluteEncoders::new(p.SPI1, p.PB3, p.PA6, p.PA7, [p.PB0.into(), p.PA4.into()]),
             home_switches: [Input::new(p.PC0, Pull::Up), Input::new(p.PC1, Pull::Up)],
             hard_limits: [Input::new(p.PC2, Pull::Up), Input::new(p.PC3, Pull::Up)],
             emergency_stop: Input::new(p.PC4, Pull::Up),
@@ -79,6 +82,8 @@ impl Board {
             holding: Output::new(p.PB5, Level::Low, Speed::Low),
             trigger: Trigger::new(p.TIM4, p.PB6),
             latched: None,
+            before: crate::rig::Latched::default(),
+            latest: crate::rig::Latched::default(),
         };
         reserve_servo_bus(&p.USART3, &p.PB10, &p.PB14);
         Self {

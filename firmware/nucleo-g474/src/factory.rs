@@ -1,6 +1,6 @@
 //! Default settings: the bench, with a linear stage for the baseline and a pinion stage for the separation.
 
-use vergence_control::{AxisSettings, DriverSettings, HomingSettings};
+use vergence_control::{AxisSettings, DriverSettings, EncoderSettings, HomingSettings};
 use vergence_protocol::{AxisKind, Micro};
 
 use crate::rig::AXES;
@@ -37,6 +37,7 @@ pub fn axes() -> [AxisSettings; AXES] {
             repeatability: Micro(200),
         },
         driver: DriverSettings::default(),
+        feedback: EncoderSettings::default(),
     };
     let separation = AxisSettings {
         kind: AxisKind::Rotary,
@@ -62,6 +63,7 @@ pub fn axes() -> [AxisSettings; AXES] {
             repeatability: Micro(millidegrees(100)),
         },
         driver: DriverSettings::default(),
+        feedback: EncoderSettings::default(),
     };
     [baseline, separation]
 }

@@ -2,11 +2,12 @@
 
 use embassy_stm32::gpio::{Input, Output};
 use embassy_time::Instant;
-use vergence_control::{DriverSettings, RigIo, StepSchedule, TriggerEdge};
-use vergence_protocol::{AxisList, DriverState, Microseconds};
+use vergence_control::{DriverSettings, EncoderKind, IndexEdges, RigIo, StepSchedule, TriggerEdge};
+use vergence_protocol::{AxisList, DriverState, EncoderState, Microseconds};
 
+use crate::absolute::AbsoluteEncoders;
 use crate::drivers;
-use crate::encoder::Encoder;
+use crate::encoder::{Encoder, IndexLines};
 use crate::steps::StepPulses;
 use crate::trigger::Trigger;
 
@@ -19,6 +20,10 @@ pub struct Rig {
     pub steps: [StepPulses; AXES],
     /// Encoder of each axis.
     pub encoders: [Encoder; AXES],
+    /// Index lines of the encoders.
+    pub index_lines: IndexLines,
+    /// Absolute encoders, which stand for the others where they are in use.
+    pub absolute: AbsoluteEncoders,
     /// Home switches: closed (low) at home.
     pub home_switches: [Input<'static>; AXES],
     /// Hard limit switches: normally closed (low), open (high) beyond the range or when the wire is broken.
@@ -34,10 +39,14 @@ pub struct Rig {
     pub trigger: Trigger,
     /// The encoders as the running tick found them; `None` outside ticks.
     pub latched: Option<Latched>,
+    /// The encoders as the latest two ticks found them, the older first.
+    pub before: Latched,
+    /// The later one.
+    pub latest: Latched,
 }
 
 /// Counts of all encoders at one instant.
-#[derive(Clone, Copy)]
+#[derive(Clone, Copy, Default)]
 pub struct Latched {
     at: Microseconds,
     counts: [i32; AXES],
@@ -47,15 +56,31 @@ impl Rig {
     /// Reads the encoders and the clock: the tick that begins works with these. Its own work takes up to 0.4 ms, in which an
     /// axis moves on by 32 um.
     pub fn latch_encoders(&mut self) {
-        self.latched = Some(critical_section::with(|_| Latched {
+        let mut latched = critical_section::with(|_| Latched {
             counts: self.encoders.each_ref().map(Encoder::count),
             at: Microseconds(Instant::now().as_micros()),
-        }));
+        });
+        // Some 10 us later for each absolute encoder.
+        self.absolute.ask();
+        for (axis, count) in latched.counts.iter_mut().enumerate() {
+            *count = self.absolute.count(axis).unwrap_or(*count);
+        }
+        self.before = core::mem::replace(&mut self.latest, latched);
+        self.latched = Some(latched);
     }
 
     /// Ends the tick: from now on encoders are read when they are asked for.
     pub fn release_encoders(&mut self) {
         self.latched = None;
+    }
+
+    /// The count of an axis between the latest two ticks: an absolute encoder cannot be latched by an edge.
+    fn between_ticks(&self, axis: usize, at: Microseconds) -> i32 {
+        let count = |tick: &Latched| tick.counts.get(axis).copied().unwrap_or(0);
+        let since = at.0.saturating_sub(self.before.at.0) as i64;
+        let between = (self.latest.at.0.saturating_sub(self.before.at.0) as i64).max(1);
+        let way = i64::from(count(&self.latest).wrapping_sub(count(&self.before)));
+        count(&self.before).wrapping_add((way * since.min(between) / between) as i32)
     }
 
     /// Starts the steps ordered for the tick that has begun. Returns whether the steps of the tick before were made in time.
@@ -99,7 +124,7 @@ impl RigIo for Rig {
     fn encoder(&self, axis: usize) -> i32 {
         match &self.latched {
             Some(latched) => latched.counts.get(axis).copied().unwrap_or(0),
-            None => self.encoders.get(axis).map_or(0, Encoder::count),
+            None => self.absolute.count(axis).or(self.encoders.get(axis).map(Encoder::count)).unwrap_or(0),
         }
     }
 
@@ -107,6 +132,18 @@ impl RigIo for Rig {
         if let Some(encoder) = self.encoders.get_mut(axis) {
             encoder.expect(per_second);
         }
+    }
+
+    fn use_encoder(&mut self, axis: usize, kind: EncoderKind) {
+        self.absolute.use_encoder(axis, kind);
+    }
+
+    fn encoder_state(&self, axis: usize) -> EncoderState {
+        self.absolute.state(axis)
+    }
+
+    fn take_index(&mut self, axis: usize) -> IndexEdges {
+        self.index_lines.take(axis)
     }
 
     fn encoders_read_at(&self, now: Microseconds) -> Microseconds {
@@ -139,6 +176,12 @@ impl RigIo for Rig {
     }
 
     fn take_trigger_edge(&mut self) -> Option<TriggerEdge> {
-        self.trigger.take_edge()
+        let mut edge = self.trigger.take_edge()?;
+        for (axis, count) in edge.counts.iter_mut().enumerate() {
+            if self.absolute.count(axis).is_some() {
+                *count = self.between_ticks(axis, edge.at);
+            }
+        }
+        Some(edge)
     }
 }

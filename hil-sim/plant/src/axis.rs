@@ -2,9 +2,10 @@
 
 use std::collections::VecDeque;
 
-use vergence_control::{Scale, StepSchedule};
-use vergence_protocol::{AxisKind, Microseconds};
+use vergence_control::{As5048a, EncoderKind, IndexEdge, IndexEdges, Scale, StepSchedule};
+use vergence_protocol::{AxisKind, EncoderState, Microseconds};
 
+use crate::as5048a::As5048aChip;
 use crate::encoder::{Encoder, EncoderFault};
 use crate::switch::{Switch, SwitchNoise};
 
@@ -21,6 +22,8 @@ pub struct AxisMechanics {
     pub pitch: PitchError,
     /// Play between the encoder and the stage that it stands for, such as of a rack behind its pinion.
     pub encoder_play: f64,
+    /// Marks of the scale from one index pulse to the next, 0 for none, and how long a pulse is high.
+    pub index: [i32; 2],
     /// Time constant with which the load follows the motor, in seconds, above zero.
     pub compliance: f64,
     /// Position at and below which the home switch is closed.
@@ -66,6 +69,11 @@ pub struct AxisPlant {
     load: f64,
     stage: f64,
     encoder: Encoder,
+    /// Edges of the index line since they were last taken.
+    index_edges: IndexEdges,
+    /// An absolute encoder beside the scale, and what the native board has read of it, where it reads it.
+    magnet: Option<As5048aChip>,
+    reader: Option<As5048a>,
     home: Switch,
     /// Reading of a hard limit that does not follow the load.
     limit_fixed: Option<bool>,
@@ -103,6 +111,9 @@ impl AxisPlant {
             load: position,
             stage: position,
             encoder: Encoder::new(scale_reading(mechanics.encoder, position)),
+            index_edges: IndexEdges::new(),
+            magnet: None,
+            reader: None,
             home: Switch::new(position <= mechanics.home_switch),
             limit_fixed: None,
             blocked: false,
@@ -130,8 +141,91 @@ impl AxisPlant {
         self.encoder.go_on(self.scale_reading());
     }
 
+    /// Lets the encoder miss so many counts, as at a burst of noise on its lines; negative ones are counted too many.
+    pub fn lose_counts(&mut self, counts: i32) {
+        self.encoder.lose(counts);
+    }
+
+    /// Puts an absolute encoder on the axis.
+    pub fn mount(&mut self, magnet: As5048aChip) {
+        self.magnet = Some(magnet);
+    }
+
+    /// The absolute encoder, to make it fail.
+    pub fn magnet_mut(&mut self) -> Option<&mut As5048aChip> {
+        self.magnet.as_mut()
+    }
+
+    /// Exchanges a frame with the absolute encoder; `None` where there is none.
+    pub fn magnet_frame(&mut self, question: u16) -> Option<u16> {
+        let load = self.load;
+        self.magnet.as_mut().map(|magnet| magnet.frame(question, load))
+    }
+
+    /// Reads this kind of encoder from now on, as the native board does.
+    pub(crate) fn use_encoder(&mut self, kind: EncoderKind) {
+        match kind {
+            EncoderKind::Quadrature => self.reader = None,
+            EncoderKind::As5048a => self.reader = self.reader.or(Some(As5048a::default())),
+        }
+    }
+
+    /// Asks the absolute encoder for its angle, where it is in use. A line without an encoder is pulled up.
+    pub(crate) fn ask_magnet(&mut self) {
+        if let Some(mut reader) = self.reader {
+            reader.ask(|question| Some(self.magnet_frame(question).unwrap_or(u16::MAX)));
+            self.reader = Some(reader);
+        }
+    }
+
+    /// What the absolute encoder in use says of itself.
+    pub(crate) fn encoder_state(&self) -> EncoderState {
+        self.reader.map_or(EncoderState::Plain, |reader| reader.state())
+    }
+
+    /// Takes the first rise and fall of the index line since the last call.
+    pub(crate) fn take_index(&mut self) -> IndexEdges {
+        std::mem::take(&mut self.index_edges)
+    }
+
+    /// Whether the index line is high where the lines of the encoder show the count `raw`; `None` without an index.
+    #[must_use]
+    pub fn index_line(&self, raw: i32) -> Option<bool> {
+        let [every, width] = self.mechanics.index;
+        let scale = self.encoder.scale_at(raw).unwrap_or_else(|| self.scale_reading());
+        (every > 0).then(|| scale.rem_euclid(every) < width)
+    }
+
+    /// Notes the edges of the index line between the marks `before` and `after` of the scale.
+    fn pass_index(&mut self, before: i32, after: i32) {
+        let [every, width] = self.mechanics.index;
+        if every <= 0 || width <= 0 || before == after {
+            return;
+        }
+        let rises = after > before;
+        let marks = before.min(after) + 1..=before.max(after);
+        // The line changes where the scale reaches a mark on the way up, and leaves it on the way down.
+        let mut edges: Vec<_> = marks
+            .filter(|mark| [0, width].contains(&mark.rem_euclid(every)))
+            .map(|mark| IndexEdge {
+                count: self.encoder.raw(if rises { mark } else { mark - 1 }),
+                rises: (mark.rem_euclid(every) == 0) == rises,
+            })
+            .collect();
+        if !rises {
+            edges.reverse();
+        }
+        for edge in edges {
+            if !self.index_edges.iter().any(|known| known.rises == edge.rises) {
+                // There is room for one of each kind.
+                let _ = self.index_edges.push(edge);
+            }
+        }
+    }
+
     /// Counts from zero again, as an encoder's counter does whose chip restarts.
     pub fn restart_encoder(&mut self) {
+        self.reader = None;
         self.encoder.restart(self.scale_reading());
     }
 
@@ -150,7 +244,7 @@ impl AxisPlant {
     /// The raw encoder count.
     #[must_use]
     pub fn encoder(&self) -> i32 {
-        self.encoder.raw(self.scale_reading())
+        self.reader.map_or_else(|| self.encoder.raw(self.scale_reading()), |reader| reader.count())
     }
 
     fn scale_reading(&self) -> i32 {
@@ -248,6 +342,7 @@ impl AxisPlant {
         // Inside the play the load is at rest; outside, the transmission pulls it after the motor.
         let pulled = self.load.clamp(motor - play, motor + play);
         let dt = (to.0 - from.0) as f64 * 1e-6;
+        let before = self.scale_reading();
         let share = 1.0 - (-dt / self.mechanics.compliance).exp();
         let held_by = if self.blocked { [self.load; 2] } else { self.mechanics.end_stops };
         self.load += (pulled - self.load) * share;
@@ -255,6 +350,7 @@ impl AxisPlant {
         let play = self.mechanics.encoder_play / 2.0;
         self.stage = self.stage.clamp(self.load - play, self.load + play);
         self.encoder.advance();
+        self.pass_index(before, self.scale_reading());
         self.home.advance(self.load <= self.mechanics.home_switch, to.0 - from.0);
     }
 

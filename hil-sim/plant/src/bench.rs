@@ -3,7 +3,7 @@
 
 use std::f64::consts::PI;
 
-use vergence_control::{AxisSettings, DriverSettings, HomingSettings};
+use vergence_control::{AxisSettings, DriverSettings, EncoderSettings, HomingSettings};
 use vergence_protocol::{AxisKind, Micro};
 
 use crate::axis::{AxisMechanics, PitchError};
@@ -57,6 +57,7 @@ impl Stage {
                 repeatability: Micro(200),
             },
             driver: DriverSettings::default(),
+            feedback: EncoderSettings::default(),
         };
         Self { settings, mechanics: mechanics(&settings, 8.0, [8_000.0, 6_000.0], 2_000.0) }
     }
@@ -89,6 +90,7 @@ impl Stage {
                 repeatability: Micro(degrees(0.1)),
             },
             driver: DriverSettings::default(),
+            feedback: EncoderSettings::default(),
         };
         let limit = f64::from(degrees(5.0));
         Self { settings, mechanics: mechanics(&settings, 120.0, [limit, limit], f64::from(degrees(1.0))) }
@@ -104,6 +106,7 @@ fn mechanics(settings: &AxisSettings, backlash: f64, beyond: [f64; 2], further: 
         backlash,
         pitch: PitchError::default(),
         encoder_play: 0.0,
+        index: [0; 2],
         compliance: 2e-3,
         home_switch: f64::from(settings.homing.switch_at.0),
         hard_limits,

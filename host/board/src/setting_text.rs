@@ -75,6 +75,8 @@ fn form(item: SettingItem, kind: AxisKind) -> Form {
         SettingItem::StepsPerUnit | SettingItem::CountsPerUnit | SettingItem::Baud | SettingItem::Microsteps => {
             Form::Number
         }
+        SettingItem::IndexEvery | SettingItem::EncoderZero => Form::Number,
+        SettingItem::Encoder => Form::Choice(&["quadrature", "as5048a"]),
         SettingItem::StepsReversed | SettingItem::CountsReversed | SettingItem::StealthChop => Form::Flag,
         SettingItem::StreamPeriod | SettingItem::HoldDelay | SettingItem::HoldAfter => Form::Period,
         SettingItem::SenseResistor => Form::Unit("mOhm"),

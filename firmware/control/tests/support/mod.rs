@@ -5,7 +5,7 @@
 mod ideal_rig;
 mod watch;
 
-use vergence_control::{AxisSettings, Controller, DriverSettings, HomingSettings, RigIo};
+use vergence_control::{AxisSettings, Controller, DriverSettings, EncoderSettings, HomingSettings, RigIo};
 use vergence_protocol::{
     AxisKind, AxisMask, ControllerState, FaultRecord, Jog, Micro, Microseconds, Mode, Move, MoveId, Permille,
     PoseReport, Request, SessionId, Status,
@@ -46,6 +46,7 @@ pub fn linear() -> AxisSettings {
             repeatability: Micro(300),
         },
         driver: DriverSettings::default(),
+        feedback: EncoderSettings::default(),
     }
 }
 
@@ -75,6 +76,7 @@ pub fn rotary() -> AxisSettings {
             repeatability: Micro(3_000),
         },
         driver: DriverSettings::default(),
+        feedback: EncoderSettings::default(),
     }
 }
 

@@ -244,7 +244,8 @@ impl Board {
             (
                 Refusal::NotReferenced { axis }
                 | Refusal::OutsideLimits { axis }
-                | Refusal::DriverNotReady { axis, .. },
+                | Refusal::DriverNotReady { axis, .. }
+                | Refusal::EncoderNotReady { axis, .. },
                 _,
             ) => {
                 let known = self.rig.axes.get(usize::from(axis));
