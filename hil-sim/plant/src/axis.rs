@@ -22,6 +22,8 @@ pub struct AxisMechanics {
     pub pitch: PitchError,
     /// Play between the encoder and the stage that it stands for, such as of a rack behind its pinion.
     pub encoder_play: f64,
+    /// Errors of the encoder's scale: how much further it reads than the load is.
+    pub scale: PitchError,
     /// Marks of the scale from one index pulse to the next, 0 for none, and how long a pulse is high.
     pub index: [i32; 2],
     /// Time constant with which the load follows the motor, in seconds, above zero.
@@ -46,8 +48,9 @@ pub struct PitchError {
 }
 
 impl PitchError {
-    /// The error at a position of the motor.
-    fn at(&self, position: f64) -> f64 {
+    /// The error at a position.
+    #[must_use]
+    pub fn at(&self, position: f64) -> f64 {
         let turn = if self.wobble == 0.0 { 0.0 } else { std::f64::consts::TAU * position / self.period };
         self.lead * position + self.wobble * turn.sin()
     }
@@ -110,7 +113,7 @@ impl AxisPlant {
             pitch_zero: mechanics.pitch.at(position),
             load: position,
             stage: position,
-            encoder: Encoder::new(scale_reading(mechanics.encoder, position)),
+            encoder: Encoder::new(scale_reading(&mechanics, position)),
             index_edges: IndexEdges::new(),
             magnet: None,
             reader: None,
@@ -248,7 +251,7 @@ impl AxisPlant {
     }
 
     fn scale_reading(&self) -> i32 {
-        scale_reading(self.mechanics.encoder, self.load)
+        scale_reading(&self.mechanics, self.load)
     }
 
     /// Steps made so far.
@@ -381,9 +384,9 @@ impl AxisPlant {
     }
 }
 
-/// The mark of an encoder's scale at a position.
-fn scale_reading(encoder: Scale, position: f64) -> i32 {
-    (position * counts_per_micro(encoder)).floor() as i32
+/// The mark of the scale of an axis's encoder at a position of the load.
+fn scale_reading(mechanics: &AxisMechanics, position: f64) -> i32 {
+    ((position + mechanics.scale.at(position)) * counts_per_micro(mechanics.encoder)).floor() as i32
 }
 
 /// Counts (or steps) for each micro-unit of the axis.

@@ -106,6 +106,7 @@ fn mechanics(settings: &AxisSettings, backlash: f64, beyond: [f64; 2], further: 
         backlash,
         pitch: PitchError::default(),
         encoder_play: 0.0,
+        scale: PitchError::default(),
         index: [0; 2],
         compliance: 2e-3,
         home_switch: f64::from(settings.homing.switch_at.0),

@@ -187,7 +187,7 @@ fn limits(board: &Board) -> Vec<Finding> {
         let [low, high] = axis.range;
         let [min, max] = [info.min, info.max].map(|end| AxisPosition::from_micro(axis.kind, end));
         let name = &axis.name;
-        if low.micro() < info.min || high.micro() > info.max {
+        if axis.wire_position(low) < info.min || axis.wire_position(high) > info.max {
             return Finding::fail(
                 "limits",
                 format!("the rig file lets {name} go from {low} to {high}, the board from {min} to {max}"),
