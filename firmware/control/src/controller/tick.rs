@@ -22,8 +22,8 @@ impl Controller {
         let tick = self.keep_time(now, io);
         self.next_tick = Microseconds(tick.0 + TICK_US);
         self.watch_inputs(now, io);
-        self.watch_lease(now);
         self.watch_indices(now, io);
+        self.watch_lease(now);
         match self.state {
             ControllerState::Boot => self.state = ControllerState::SelfTest,
             ControllerState::SelfTest => self.poll_self_test(now, io),
