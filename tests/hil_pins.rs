@@ -39,9 +39,13 @@ fn pins_are_set_as_the_wiring_table_says() {
         }
     }
     let count = |wanted: fn(&Use) -> bool| checked.iter().filter(|one| wanted(one)).count();
-    assert_eq!(count(|one| matches!(one, Use::Alternate(_))), 10, "link, steps, encoders, trigger, drivers' line");
-    assert_eq!(count(|&one| one == Use::Output), 5, "both directions, drivers off, holding current, LED");
-    assert_eq!(count(|&one| one == Use::Input), 5, "home switches, hard limits, emergency stop");
+    assert_eq!(count(|one| matches!(one, Use::Alternate(_))), 13, "link, steps, encoders, trigger, drivers' line, SPI");
+    assert_eq!(
+        count(|&one| one == Use::Output),
+        7,
+        "both directions, drivers off, holding current, encoders' select, LED"
+    );
+    assert_eq!(count(|&one| one == Use::Input), 7, "index lines, home switches, hard limits, emergency stop");
 }
 
 /// The use of pin `index` of a table row that names `peripheral`: "input", "output" or "TIM2_CH1, CH2 (AF1)". Where the

@@ -15,8 +15,8 @@ use elf_rig::{Board, Conversation, ElfBoard, Standing};
 use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64Mcg;
 use vergence_plant::{NativeBoard, PitchError, bench_mechanics, bench_settings};
-use vergence_protocol::{ControllerState, FaultCode, MovePhase, Request, SettingItem, SettingKey, Status};
-use vergence_rig::{JointsAt, Rig};
+use vergence_protocol::{AxisKind, ControllerState, FaultCode, MovePhase, Request, SettingItem, SettingKey, Status};
+use vergence_rig::{AxisPosition, JointsAt, Rig};
 
 /// Poses in the normal run.
 const POSES: usize = 5;
@@ -122,6 +122,78 @@ fn the_firmware_settles_on_a_screw_with_pitch_error() {
 #[test]
 fn the_native_board_settles_on_a_screw_with_pitch_error() {
     settles_and_knows_how_well::<NativeBoard>("native board");
+}
+
+/// An error of the baseline's scale that grows by 150 um over the range and waves by 40 um, beside play of 20 um.
+fn uneven() -> Standing {
+    let mut mechanics = bench_mechanics();
+    mechanics[0].scale = PitchError { lead: 150.0 / 160_000.0, wobble: 40.0, period: 120_000.0 };
+    mechanics[0].encoder_play = PLAY[0];
+    Standing { mechanics, ..Standing::default() }
+}
+
+/// The bench's rig file with this play of the baseline in micrometres and, where asked for, the table of its errors each 5 mm.
+fn uneven_rig(play: f64, has_table: bool) -> Rig {
+    let (scale, home) = (uneven().mechanics[0].scale, f64::from(bench_settings()[0].homing.switch_at.0));
+    let entry = |millimetres: u32| {
+        let load = f64::from(millimetres) * 1e3;
+        // Homing sets the encoder to the truth at the switch.
+        let further = scale.at(load) - scale.at(home);
+        format!("[\"{:.4}mm\", \"{:.4}um\"]", (load + further) * 1e-3, -further)
+    };
+    let entries = (55..=225).step_by(5).map(entry).collect::<Vec<_>>().join(", ");
+    let table = if has_table { format!("pitch_error = [{entries}]\n") } else { String::new() };
+    let text = include_str!("../host/rig/src/bench.toml").replacen(
+        "counts_per_metre",
+        &format!("play = \"{play}um\"\n{table}counts_per_metre"),
+        1,
+    );
+    let exact = "[calibration_sigma]\nrotation = \"0deg\"\ntranslation = \"0mm\"\n";
+    Rig::from_toml(&format!("{text}\n{exact}")).expect("a rig file")
+}
+
+/// The table makes poses true, and targets too; without it they are as true only where the stated sigma is wider.
+fn a_table_corrects_the_scale<B: Board>(board: &str) {
+    let [table, blind, wide] =
+        [(PLAY[0], true), (PLAY[0], false), (400.0, false)].map(|(play, table)| uneven_rig(play, table));
+    let mut talk = Conversation::<B>::open(&uneven());
+    // Steps and counts disagree where the scale is off; short moves correct that.
+    let key = SettingKey { item: SettingItem::Correction, axis: 0 };
+    assert_eq!(talk.ask(Request::SetSetting { key, value: CORRECTION[0] }), Status::Accepted);
+    talk.arm_and_home();
+    let mut poses = Vec::new();
+    for millimetres in [215.0, 90.0, 150.0, 200.0, 120.0, 180.0] {
+        let mut targets = table.mode("herbivore").expect("a mode").targets.clone();
+        targets[0] = AxisPosition::from_value(AxisKind::Linear, millimetres);
+        let wire = table.wire_targets(&targets);
+        assert_eq!(talk.move_to([wire[0].0, 100_000], 1), Status::Accepted);
+        talk.wait_for(ControllerState::Ready);
+        talk.wait(20_000);
+        assert_eq!(talk.pose().phase, MovePhase::Settled, "{:?}", talk.faults);
+        let stage = |axis: usize| talk.board.plant().stage(axis).expect("two axes");
+        let off = stage(0) - millimetres * 1e3;
+        assert!(off.abs() < 35.0, "{off} um off: the tolerance, and half of the play");
+        poses.push(Pose { counts: talk.pose().counts.to_vec(), truth: vec![stage(0) * 1e-3, stage(1) * 1e-6] });
+    }
+    let [with, without, widened] = [&table, &blind, &wide].map(|rig| covered(rig, &poses)[0]);
+    let sigma = |rig: &Rig| rig.pose(&JointsAt::latched(&poses[0].counts)).translation_sigma.mm() * 1e3;
+    let (narrow, broad) = (sigma(&table), sigma(&wide));
+    println!(
+        "{board}: the stated sigma of {narrow:.0} um covers {with:.2} of the poses with the table, {without:.2} without"
+    );
+    println!("{board}: without the table {broad:.0} um cover {widened:.2}");
+    assert!(with >= 0.95 && without < 0.5 && widened >= 0.95, "{with} {without} {widened}");
+    assert!(narrow * 5.0 < broad);
+}
+
+#[test]
+fn a_table_corrects_the_scale_on_the_firmware() {
+    a_table_corrects_the_scale::<ElfBoard>("firmware");
+}
+
+#[test]
+fn a_table_corrects_the_scale_on_the_native_board() {
+    a_table_corrects_the_scale::<NativeBoard>("native board");
 }
 
 #[test]

@@ -58,6 +58,14 @@ pub enum FaultCode {
     DriverStall,
     /// Homing by StallGuard met the end of the axis, and the motor driver reported no stall.
     StallMissed,
+    /// At an index pulse the count of the encoder was another than at the pulses before: counts were lost or gained.
+    EncoderDrift,
+    /// The index pulse of the encoder did not come where it was due.
+    IndexMissing,
+    /// What an absolute encoder answers is garbled, or it did not understand its question.
+    EncoderGarbled,
+    /// The magnet of an absolute encoder is too weak or too strong, or not above it.
+    EncoderMagnet,
 }
 
 impl FaultCode {
@@ -118,6 +126,18 @@ impl FaultCode {
             Self::StallMissed => {
                 "check the wire of DIAG, raise 'stall_threshold' or 'home_seek_speed', then 'vergence clear' and 'vergence home'"
             }
+            Self::EncoderDrift => {
+                "check the encoder's supply, shield and plug, and that its scale is clean, then 'vergence clear' and 'vergence home'"
+            }
+            Self::IndexMissing => {
+                "check the encoder's index wire and the setting 'index_every', then 'vergence clear' and 'vergence home'"
+            }
+            Self::EncoderGarbled => {
+                "check the wires between board and encoder: short, twisted with ground, then 'vergence clear'"
+            }
+            Self::EncoderMagnet => {
+                "check the distance between magnet and encoder, and that it is centred, then 'vergence clear'"
+            }
         }
     }
 }
@@ -150,6 +170,10 @@ impl fmt::Display for FaultCode {
             Self::DriverShort => "the motor driver found a short circuit and switched off",
             Self::DriverStall => "the motor driver reported a stall where the stage should move freely",
             Self::StallMissed => "homing met the end of the axis and the motor driver reported no stall",
+            Self::EncoderDrift => "the encoder has lost or gained counts: its index pulse came at another count",
+            Self::IndexMissing => "the encoder's index pulse did not come",
+            Self::EncoderGarbled => "what the absolute encoder answers is garbled",
+            Self::EncoderMagnet => "the absolute encoder reads its magnet badly",
         })
     }
 }

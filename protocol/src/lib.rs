@@ -12,6 +12,7 @@
 
 mod axis;
 mod driver;
+mod encoder;
 mod fault;
 pub mod frame;
 mod identity;
@@ -29,6 +30,7 @@ pub mod update;
 
 pub use axis::{AxisInfo, AxisKind, AxisList, AxisMask, MAX_AXES};
 pub use driver::DriverState;
+pub use encoder::EncoderState;
 pub use fault::{FaultCode, FaultRecord};
 pub use frame::MAX_FRAME;
 pub use identity::{BoardInfo, PROTOCOL, ProtocolVersion, ResetCause, schema_hash};

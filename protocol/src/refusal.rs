@@ -79,6 +79,13 @@ pub enum Refusal {
         /// Index of the axis, from 0.
         axis: u8,
     },
+    /// The encoder of an axis cannot be used.
+    EncoderNotReady {
+        /// Index of the axis, from 0.
+        axis: u8,
+        /// Why; `None` while the encoder has not answered yet.
+        why: Option<FaultCode>,
+    },
 }
 
 impl fmt::Display for Refusal {
@@ -117,6 +124,12 @@ impl fmt::Display for Refusal {
                 f,
                 "'home_switch_at' of axis {axis} lies at the other end of the range than 'home_end' says: set one of them"
             ),
+            Self::EncoderNotReady { axis, why: Some(why) } => {
+                write!(f, "axis {axis} does not know where it is: {why}; 'vergence doctor' says what to do")
+            }
+            Self::EncoderNotReady { axis, why: None } => {
+                write!(f, "the encoder of axis {axis} has not answered yet: try again in a second")
+            }
         }
     }
 }

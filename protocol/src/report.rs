@@ -4,8 +4,9 @@ use postcard_schema::Schema;
 use serde::{Deserialize, Serialize};
 
 use crate::{
-    AxisInfo, AxisList, AxisMask, BoardInfo, BoardStatistics, ControllerState, Counts, DriverState, FaultCode,
-    FaultRecord, Microseconds, Mode, MoveId, MovePhase, ProtocolVersion, RecordedEvents, SessionId, SettingKey, Status,
+    AxisInfo, AxisList, AxisMask, BoardInfo, BoardStatistics, ControllerState, Counts, DriverState, EncoderState,
+    FaultCode, FaultRecord, Microseconds, Mode, MoveId, MovePhase, ProtocolVersion, RecordedEvents, SessionId,
+    SettingKey, Status,
 };
 
 /// A report of the board. Append only: the order is the wire format. `Hello` and `Info` are frozen for ever.
@@ -106,6 +107,15 @@ pub enum Report {
         /// Public key whose signatures the board trusts (Ed25519, RFC 8032).
         key: [u8; 32],
     },
+    /// Answers `Request::GetEncoder`.
+    Encoder {
+        /// Sequence number of the request.
+        to: u8,
+        /// Index of the axis, from 0.
+        axis: u8,
+        /// State of its encoder.
+        state: EncoderState,
+    },
 }
 
 /// One pulse of the camera trigger.
@@ -154,7 +164,8 @@ impl Report {
             | Self::Events { to, .. }
             | Self::Statistics { to, .. }
             | Self::Driver { to, .. }
-            | Self::Key { to, .. } => Some(*to),
+            | Self::Key { to, .. }
+            | Self::Encoder { to, .. } => Some(*to),
             _ => None,
         }
     }
@@ -168,7 +179,8 @@ impl Report {
             | Self::Events { to, .. }
             | Self::Statistics { to, .. }
             | Self::Driver { to, .. }
-            | Self::Key { to, .. } => Some(to),
+            | Self::Key { to, .. }
+            | Self::Encoder { to, .. } => Some(to),
             _ => None,
         }
     }

@@ -102,6 +102,11 @@ pub enum Request {
     },
     /// Asks whose firmware images the board takes. Answered by `Report::Key`.
     GetKey,
+    /// Asks for the state of the encoder of an axis. Answered by `Report::Encoder`.
+    GetEncoder {
+        /// Index of the axis, from 0.
+        axis: u8,
+    },
 }
 
 /// A relative move of all axes together.

@@ -81,11 +81,17 @@ pub enum SettingItem {
     StallThreshold,
     /// 1 if a stall that the driver reports in a move is a fault, else 0.
     StallWatch,
+    /// Encoder counts from one index pulse to the next; 0 for an encoder without index.
+    IndexEvery,
+    /// Encoder of the axis: 0 for two lines in quadrature, 1 for an AS5048A, which knows its angle.
+    Encoder,
+    /// Reading of an absolute encoder at the axis zero, in counts within its turn.
+    EncoderZero,
 }
 
 impl SettingItem {
     /// Every item, in wire order.
-    pub const ALL: [Self; 35] = [
+    pub const ALL: [Self; 38] = [
         Self::Min,
         Self::Max,
         Self::Speed,
@@ -121,6 +127,9 @@ impl SettingItem {
         Self::HardLimit,
         Self::StallThreshold,
         Self::StallWatch,
+        Self::IndexEvery,
+        Self::Encoder,
+        Self::EncoderZero,
     ];
 
     /// Whether each axis has a setting of this kind; else the board has one.
@@ -168,6 +177,9 @@ impl SettingItem {
             Self::HardLimit => "hard_limit",
             Self::StallThreshold => "stall_threshold",
             Self::StallWatch => "stall_watch",
+            Self::IndexEvery => "index_every",
+            Self::Encoder => "encoder",
+            Self::EncoderZero => "encoder_zero",
         }
     }
 }

@@ -6,8 +6,8 @@ use std::hint::black_box;
 use std::process::ExitCode;
 
 use vergence_control::{
-    AxisSettings, Controller, DriverSettings, FINE_BITS, HomingSettings, Limits, MotionState, MovePlanner, PlanRequest,
-    RigIo, StepSchedule, SwitchSettings, Trajectory,
+    AxisSettings, Controller, DriverSettings, EncoderSettings, FINE_BITS, HomingSettings, Limits, MotionState,
+    MovePlanner, PlanRequest, RigIo, StepSchedule, SwitchSettings, Trajectory,
 };
 use vergence_protocol::{AxisKind, ControllerState, Jog, Micro, Microseconds, MoveId, Permille, Request, SessionId};
 
@@ -75,6 +75,7 @@ fn axis(step_rate: u32) -> AxisSettings {
         },
         driver: DriverSettings::default(),
         switches: SwitchSettings::default(),
+        feedback: EncoderSettings::default(),
     }
 }
 

@@ -1,10 +1,12 @@
 //! One axis: command, encoder, reference and the trajectory it runs.
 
-use vergence_protocol::{Counts, Micro, Microseconds};
+use vergence_protocol::{Counts, EncoderState, Micro, Microseconds};
 
 use crate::TICK_US;
+use crate::encoder::TURN;
 use crate::follow::{Following, Lost};
 use crate::hard_limit::HardLimit;
+use crate::index::IndexWatch;
 use crate::io::{RigIo, StepSchedule};
 use crate::move_planner::PlannedWay;
 use crate::plan::{AxisPlanner, PlanStart};
@@ -25,6 +27,7 @@ pub struct Axis {
     following: Following,
     limit: HardLimit,
     stall: StallLine,
+    index_pulses: IndexWatch,
     trajectory: Option<Trajectory>,
     /// Part of the trajectory that has been ordered, in microseconds.
     elapsed: u64,
@@ -45,6 +48,7 @@ impl Axis {
             following: Following::default(),
             limit: HardLimit::default(),
             stall: StallLine::default(),
+            index_pulses: IndexWatch::default(),
             trajectory: None,
             elapsed: 0,
             from_below: false,
@@ -93,7 +97,53 @@ impl Axis {
         let raw_edge = edge.0.wrapping_add(self.zero_counts);
         self.zero_counts = raw_edge.wrapping_sub(self.settings.encoder().counts_at(position));
         self.referenced = true;
+        self.index_pulses = IndexWatch::begin(io.encoder(self.index));
         self.adopt_encoder(io);
+    }
+
+    /// Sets the axis zero by an absolute encoder: of the places that read the same, the one nearest to the middle of the range.
+    pub fn reference_absolutely(&mut self, io: &impl RigIo) {
+        let (settings, turn) = (&self.settings, TURN.cast_signed());
+        let middle = settings.encoder().counts_at(Micro(settings.min.0 / 2 + settings.max.0 / 2));
+        let raw = self.raw_counts(io);
+        let from_zero = raw.wrapping_sub(self.rising(settings.feedback.zero.cast_signed()));
+        let from_middle = (from_zero.wrapping_sub(middle).wrapping_add(turn / 2)).rem_euclid(turn) - turn / 2;
+        self.zero_counts = raw.wrapping_sub(middle.wrapping_add(from_middle));
+        self.referenced = true;
+        self.adopt_encoder(io);
+    }
+
+    /// While the motors are off: an axis with an absolute encoder knows where it is as long as its encoder answers.
+    #[inline(never)]
+    pub fn follow_encoder(&mut self, io: &impl RigIo) {
+        if self.settings.feedback.is_absolute() {
+            let is_usable = io.encoder_state(self.index).is_usable();
+            match (self.referenced, is_usable) {
+                (false, true) => self.reference_absolutely(io),
+                (true, false) => self.forget_reference(),
+                _ => {}
+            }
+        }
+    }
+
+    /// What is known of the encoder beyond its count.
+    pub fn encoder_state(&self, io: &impl RigIo) -> EncoderState {
+        match (self.settings.feedback.is_absolute(), self.settings.feedback.index_every) {
+            (true, _) => io.encoder_state(self.index),
+            (false, 0) => EncoderState::Plain,
+            (false, _) => self.index_pulses.state(),
+        }
+    }
+
+    /// Checks the count at the index pulses; call it once each tick. Returns the fault, if any.
+    pub fn watch_index(&mut self, io: &mut impl RigIo) -> Option<Lost> {
+        let edges = io.take_index(self.index);
+        let every = self.settings.feedback.index_every;
+        if every == 0 || !self.referenced {
+            return None;
+        }
+        let most = self.settings.largest_drift();
+        self.index_pulses.watch(every, most, io.encoder(self.index), &edges)
     }
 
     /// Sets the command to the encoder's position: after power-on, after the drivers were off, after homing. Without

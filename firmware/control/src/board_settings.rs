@@ -3,6 +3,7 @@
 use vergence_protocol::{AxisKind, AxisList, Micro, SettingItem, SettingKey};
 
 use crate::driver::{DriverKind, DriverSettings};
+use crate::encoder::{EncoderKind, EncoderSettings};
 use crate::settings::{AxisSettings, HomingSettings, SettingsError};
 use crate::switches::{HomeEnd, HomeSensor, SwitchSettings};
 
@@ -199,12 +200,13 @@ impl AxisSettings {
             homing,
             driver: DriverSettings::default(),
             switches: SwitchSettings::default(),
+            feedback: EncoderSettings::default(),
         }
     }
 
     /// Value of an axis setting; `None` for settings of the board.
     fn item(&self, item: SettingItem) -> Option<i64> {
-        let (homing, driver, switches) = (&self.homing, &self.driver, &self.switches);
+        let (homing, driver, switches, encoder) = (&self.homing, &self.driver, &self.switches, &self.feedback);
         Some(match item {
             SettingItem::Min => self.min.0.into(),
             SettingItem::Max => self.max.0.into(),
@@ -237,12 +239,16 @@ impl AxisSettings {
             SettingItem::HardLimit => switches.limits_normally_open.into(),
             SettingItem::StallThreshold => switches.stall_threshold.into(),
             SettingItem::StallWatch => switches.stall_watch.into(),
+            SettingItem::IndexEvery => encoder.index_every.into(),
+            SettingItem::Encoder => encoder.is_absolute().into(),
+            SettingItem::EncoderZero => encoder.zero.into(),
             _ => return None,
         })
     }
 
     fn put(&mut self, item: SettingItem, value: i64) -> Result<(), SettingError> {
-        let (homing, driver, switches) = (&mut self.homing, &mut self.driver, &mut self.switches);
+        let (homing, driver) = (&mut self.homing, &mut self.driver);
+        let (switches, encoder) = (&mut self.switches, &mut self.feedback);
         match item {
             SettingItem::Min => self.min = micro(value)?,
             SettingItem::Max => self.max = micro(value)?,
@@ -275,6 +281,11 @@ impl AxisSettings {
             SettingItem::HardLimit => switches.limits_normally_open = flag(value)?,
             SettingItem::StallThreshold => switches.stall_threshold = number(value)?,
             SettingItem::StallWatch => switches.stall_watch = flag(value)?,
+            SettingItem::IndexEvery => encoder.index_every = number(value)?,
+            SettingItem::Encoder => {
+                encoder.kind = if flag(value)? { EncoderKind::As5048a } else { EncoderKind::Quadrature };
+            }
+            SettingItem::EncoderZero => encoder.zero = number(value)?,
             _ => return Err(SettingError::Unknown),
         }
         Ok(())
@@ -284,7 +295,10 @@ impl AxisSettings {
     pub(crate) fn keeps_reference(&self, other: &Self) -> bool {
         let scale = |axis: &Self| (axis.kind, axis.counts_per_unit, axis.counts_reversed);
         let home = |axis: &Self| (axis.homing.switch_at, axis.switches.home_end, axis.switches.home);
-        scale(self) == scale(other) && home(self) == home(other)
+        // The range of an absolute encoder tells which of its turns is meant.
+        let range = |axis: &Self| axis.feedback.is_absolute().then_some((axis.min, axis.max));
+        let encoder = |axis: &Self| (axis.feedback, range(axis));
+        scale(self) == scale(other) && home(self) == home(other) && encoder(self) == encoder(other)
     }
 }
 

@@ -7,6 +7,7 @@
 use vergence_protocol::{AxisKind, SettingItem};
 
 use crate::driver::{ADDRESSES, DriverKind, DriverSettings, LEAST_FULL_STEPS};
+use crate::encoder::{ABSOLUTE_AXES, TURN};
 use crate::settings::{AxisSettings, Scale, SettingsError};
 
 /// Longest time to brake from full speed, in milliseconds.
@@ -33,6 +34,7 @@ pub(crate) fn check(settings: &AxisSettings, axis: usize) -> Result<(), Settings
     within(axis, &bounds(settings))?;
     within(axis, &driver_bounds(&settings.driver, axis))?;
     within(axis, &stall_bounds(settings))?;
+    within(axis, &encoder_bounds(settings, axis))?;
     let milliseconds = braking_ms(settings);
     if milliseconds > LONGEST_BRAKING_MS {
         return Err(SettingsError::Braking { axis, milliseconds });
@@ -196,6 +198,39 @@ fn driver_bounds(driver: &DriverSettings, axis: usize) -> [Bound; 5] {
             "the current at rest is a share of that in motion",
         ),
         bound(SettingItem::HoldDelay, driver.hold_delay_us, 50_000, 5_500_000, "the driver can count no other time"),
+    ]
+}
+
+/// Bounds of the settings of an encoder.
+fn encoder_bounds(settings: &AxisSettings, axis: usize) -> [Bound; 3] {
+    let encoder = &settings.feedback;
+    let [min, max] = [settings.min, settings.max].map(|end| i64::from(settings.encoder().counts_at(end)));
+    // At full speed a pulse may come in each second tick: the board keeps one for a tick.
+    let least = (4 * i64::from(settings.largest_drift())).max(i64::from(settings.count_rate() / 500));
+    let (least, most) = match encoder.index_every {
+        0 => (0, 0),
+        _ if encoder.is_absolute() => (0, 0),
+        _ => (least, max - min),
+    };
+    // A sixteenth of the turn is left for the ways to the hard limits, so that no two places read the same.
+    let fits = axis < ABSOLUTE_AXES && max - min <= i64::from(TURN - TURN / 16);
+    let bound = |item, value: u32, least: i64, most: i64, why| Bound { item, value: value.into(), least, most, why };
+    [
+        bound(
+            SettingItem::IndexEvery,
+            encoder.index_every,
+            least,
+            most,
+            "pulses must come within the range and two ticks apart; an absolute encoder has none",
+        ),
+        bound(
+            SettingItem::Encoder,
+            encoder.is_absolute().into(),
+            0,
+            fits.into(),
+            "the range must lie within 15/16 of a turn of an absolute encoder, on axis 0 or 1",
+        ),
+        bound(SettingItem::EncoderZero, encoder.zero, 0, i64::from(TURN) - 1, "the encoder reads 14 bits"),
     ]
 }
 

@@ -17,8 +17,8 @@ mod update;
 
 use heapless::Deque;
 use vergence_protocol::{
-    AxisInfo, AxisList, AxisMask, ControllerState, Counts, FaultCode, FaultRecord, Micro, Microseconds, Mode, MoveId,
-    MovePhase, PoseReport, SessionId,
+    AxisInfo, AxisList, AxisMask, ControllerState, Counts, EncoderState, FaultCode, FaultRecord, Micro, Microseconds,
+    Mode, MoveId, MovePhase, PoseReport, SessionId,
 };
 
 use self::planning::Planning;
@@ -184,6 +184,12 @@ impl Controller {
     /// Sets the time in microseconds at rest after which the motors get their holding current; 0 for never.
     pub fn hold_after(&mut self, us: u64) {
         self.holding.set_after(us);
+    }
+
+    /// What is known of the encoder of an axis beyond its count; nothing if there is no such axis.
+    #[must_use]
+    pub fn encoder_state(&self, axis: usize, io: &impl RigIo) -> EncoderState {
+        self.axes.get(axis).map_or(EncoderState::Plain, |axis| axis.encoder_state(io))
     }
 
     /// Converts raw encoder counts of all axes to counts as in a pose.

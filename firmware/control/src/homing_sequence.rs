@@ -9,11 +9,16 @@ use crate::homing::{Homing, Progress};
 use crate::io::RigIo;
 use crate::stall_homing::StallHoming;
 
+/// Ticks in which axes with an absolute encoder are watched instead of homed: long enough for hosts to hear of it.
+const WATCH_TICKS: u8 = 50;
+
 /// The axes still to be homed, and the state of the present one.
 #[derive(Clone, Debug, Default)]
 pub struct HomingSequence {
     left: AxisMask,
     present: Option<(usize, Way)>,
+    /// Ticks left of [`WATCH_TICKS`].
+    watch: u8,
     /// The home switches of all axes.
     contacts: AxisList<Contact>,
 }
@@ -34,12 +39,17 @@ pub struct HomingFailure {
 }
 
 impl HomingSequence {
-    /// Starts homing of the axes `which`, the lowest first. They lose their references.
+    /// Starts homing of the axes `which`, the lowest first. They lose their references, but for those with an absolute
+    /// encoder, which need no homing.
     pub fn start(which: AxisMask, axes: &mut [Axis]) -> Self {
-        for (_, axis) in axes.iter_mut().enumerate().filter(|(index, _)| which.contains(*index)) {
+        let mut left = AxisMask::default();
+        let needs = |axis: &Axis| !axis.settings.feedback.is_absolute();
+        for (index, axis) in axes.iter_mut().enumerate().filter(|(index, axis)| which.contains(*index) && needs(axis)) {
             axis.forget_reference();
+            left = left.with(index);
         }
-        Self { left: which, present: None, contacts: axes.iter().map(|_| Contact::default()).collect() }
+        let watch = if left == which { 0 } else { WATCH_TICKS };
+        Self { left, watch, present: None, contacts: axes.iter().map(|_| Contact::default()).collect() }
     }
 
     /// Runs one tick; returns true when all axes have their reference.
@@ -72,6 +82,10 @@ impl HomingSequence {
             let by_stall = axes.get(index).is_some_and(|axis| axis.settings.switches.stall_guard());
             let way = if by_stall { Way::Stall(StallHoming::start()) } else { Way::Switch(Homing::start()) };
             self.present = Some((index, way));
+        }
+        if next.is_none() && self.watch > 0 {
+            self.watch -= 1;
+            return false;
         }
         next.is_none()
     }

@@ -1,9 +1,10 @@
 //! The interface between the controller and a board's inputs and outputs.
 
 use heapless::Vec;
-use vergence_protocol::{AxisList, DriverState, Microseconds};
+use vergence_protocol::{AxisList, DriverState, EncoderState, Microseconds};
 
 use crate::driver::DriverSettings;
+use crate::encoder::EncoderKind;
 
 /// Largest number of steps of one axis in one tick: 100 at 100 kHz, and some slack.
 pub const MAX_STEPS_PER_TICK: usize = 104;
@@ -28,6 +29,18 @@ pub struct TriggerEdge {
     pub counts: AxisList<i32>,
 }
 
+/// An edge of an encoder's index line.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct IndexEdge {
+    /// Raw encoder count at the edge.
+    pub count: i32,
+    /// Whether the line rises.
+    pub rises: bool,
+}
+
+/// The first rise and the first fall of an index line in a tick, in their order.
+pub type IndexEdges = Vec<IndexEdge, 2>;
+
 /// Inputs and outputs of a board. The real board, the native simulation and tests implement it.
 ///
 /// Raw steps and raw counts have any value at power-on and never jump; the controller keeps its own zero.
@@ -49,6 +62,22 @@ pub trait RigIo {
     /// pulses of its lines. A board without a filter does nothing.
     fn expect_counts(&mut self, axis: usize, per_second: u32) {
         let _ = (axis, per_second);
+    }
+    /// Names the kind of encoder of `axis`, which [`Self::encoder`] reads from now on. A board without such encoders does
+    /// nothing.
+    fn use_encoder(&mut self, axis: usize, kind: EncoderKind) {
+        let _ = (axis, kind);
+    }
+    /// What an absolute encoder says of itself; of another one nothing.
+    fn encoder_state(&self, axis: usize) -> EncoderState {
+        let _ = axis;
+        EncoderState::Plain
+    }
+    /// Takes the edges of the index line since the last call, in their order: the first rise and the first fall. A board without
+    /// index lines has none.
+    fn take_index(&mut self, axis: usize) -> IndexEdges {
+        let _ = axis;
+        IndexEdges::new()
     }
     /// When the encoders were read that [`Self::encoder`] gives in the tick of `now`. A board that reads them at another
     /// instant than that at which the tick was due says so: at 80 mm/s a pose is off by 80 nm for each microsecond.

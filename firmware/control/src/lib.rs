@@ -12,17 +12,20 @@
 
 #![no_std]
 
+mod as5048a;
 mod axis;
 mod board_settings;
 mod bounds;
 mod contact;
 mod controller;
 pub mod driver;
+mod encoder;
 mod follow;
 mod hard_limit;
 mod holding;
 mod homing;
 mod homing_sequence;
+mod index;
 mod io;
 mod latch;
 mod lease;
@@ -43,11 +46,13 @@ mod trajectory;
 mod trigger;
 mod updater;
 
+pub use as5048a::As5048a;
 pub use board_settings::{BoardSettings, Machine, SettingError};
 pub use bounds::LONGEST_BRAKING_MS;
 pub use controller::{Controller, Event, plan_ticks};
 pub use driver::{DriverKind, DriverSettings};
-pub use io::{MAX_STEPS_PER_TICK, RigIo, StepSchedule, TriggerEdge};
+pub use encoder::{EncoderKind, EncoderSettings, TURN};
+pub use io::{IndexEdge, IndexEdges, MAX_STEPS_PER_TICK, RigIo, StepSchedule, TriggerEdge};
 pub use move_planner::{MovePlanner, PlanRequest, PlannedWay};
 pub use node::{Node, NodeIdentity};
 pub use plan::{AxisPlanner, PlanStart};

@@ -239,6 +239,7 @@ impl Node {
     fn configure(&self, io: &mut impl RigIo) {
         for (index, axis) in self.settings.axes.iter().enumerate() {
             io.expect_counts(index, axis.count_rate());
+            io.use_encoder(index, axis.feedback.kind);
         }
         io.configure_drivers(&self.settings.axes.iter().map(AxisSettings::driver_settings).collect());
     }

@@ -5,6 +5,7 @@ use vergence_protocol::{AxisInfo, AxisKind, Micro, SettingItem};
 use crate::TICK_US;
 use crate::bounds::{self, LONGEST_BRAKING_MS};
 use crate::driver::{DriverSettings, StallLimits};
+use crate::encoder::EncoderSettings;
 use crate::profile::Limits;
 use crate::switches::{HomeEnd, SwitchSettings};
 
@@ -124,6 +125,8 @@ pub struct AxisSettings {
     pub driver: DriverSettings,
     /// Ends, contacts and StallGuard.
     pub switches: SwitchSettings,
+    /// Settings of the encoder.
+    pub feedback: EncoderSettings,
 }
 
 /// Why settings cannot work.

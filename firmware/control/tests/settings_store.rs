@@ -175,7 +175,7 @@ fn a_page_that_cannot_be_read_is_no_record() {
 #[test]
 fn every_key_of_a_board_can_be_read_and_no_other() {
     let settings = defaults();
-    assert_eq!(settings.keys().count(), 2 * 31 + 4);
+    assert_eq!(settings.keys().count(), 2 * 34 + 4);
     for item in SettingItem::ALL {
         for axis in 0..=u8::MAX {
             let key = SettingKey { item, axis };

@@ -9,10 +9,11 @@ use embassy_stm32::mode::Async;
 use embassy_stm32::usart::{self, Uart, UartTx};
 use embassy_stm32::{Peri, Peripherals, bind_interrupts, dma, pac, peripherals, rcc};
 
+use crate::absolute::AbsoluteEncoders;
 use crate::drivers::DriverWire;
-use crate::encoder::Encoder;
+use crate::encoder::{Encoder, IndexLines};
 use crate::receiver::{Bell, Receiver};
-use crate::rig::{Rig, Stage};
+use crate::rig::{Latched, Rig, Stage};
 use crate::steps::StepPulses;
 use crate::trigger::Trigger;
 use crate::wiring;
@@ -64,11 +65,15 @@ impl Board {
         let counters = stages.each_ref().map(|stage| stage.encoder.counter());
         let rig = Rig {
             stages,
+            index_lines: IndexLines::new(p.PB11, p.PB12, counters),
+            absolute: AbsoluteEncoders::new(p.SPI1, p.PB3, p.PA6, p.PA7, [p.PB0.into(), p.PA4.into()]),
             emergency_stop: Input::new(p.PC4, Pull::Up),
             drivers_off,
             holding: Output::new(p.PB5, Level::Low, Speed::Low),
             trigger: Trigger::new(p.TIM4, p.PB6, counters),
             latched: None,
+            before: Latched::default(),
+            latest: Latched::default(),
         };
         reserve_servo_bus(&p.USART3, &p.PB10, &p.PB14);
         Self {

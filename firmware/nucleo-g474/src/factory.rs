@@ -1,6 +1,6 @@
 //! Default settings: the bench, with a linear stage for the baseline and a pinion stage for the separation.
 
-use vergence_control::{AxisSettings, DriverSettings, HomingSettings, SwitchSettings};
+use vergence_control::{AxisSettings, DriverSettings, EncoderSettings, HomingSettings, SwitchSettings};
 use vergence_protocol::{AxisKind, Micro};
 
 use crate::rig::AXES;
@@ -46,6 +46,7 @@ fn linear() -> AxisSettings {
         },
         driver: DriverSettings::default(),
         switches: SwitchSettings::default(),
+        feedback: EncoderSettings::default(),
     }
 }
 
@@ -76,5 +77,6 @@ fn rotary() -> AxisSettings {
         },
         driver: DriverSettings::default(),
         switches: SwitchSettings::default(),
+        feedback: EncoderSettings::default(),
     }
 }

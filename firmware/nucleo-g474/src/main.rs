@@ -9,6 +9,7 @@
 #![no_std]
 #![no_main]
 
+mod absolute;
 mod board;
 mod control;
 mod drivers;

@@ -2,11 +2,12 @@
 
 use embassy_stm32::gpio::{Input, Output};
 use embassy_time::Instant;
-use vergence_control::{DriverSettings, RigIo, StepSchedule, TriggerEdge};
-use vergence_protocol::{AxisList, DriverState, Microseconds};
+use vergence_control::{DriverSettings, EncoderKind, IndexEdges, RigIo, StepSchedule, TriggerEdge};
+use vergence_protocol::{AxisList, DriverState, EncoderState, Microseconds};
 
+use crate::absolute::AbsoluteEncoders;
 use crate::drivers;
-use crate::encoder::Encoder;
+use crate::encoder::{Encoder, IndexLines};
 use crate::steps::StepPulses;
 use crate::trigger::Trigger;
 use crate::wiring;
@@ -30,6 +31,10 @@ pub struct Stage {
 pub struct Rig {
     /// The axes.
     pub stages: [Stage; AXES],
+    /// Index lines of the encoders.
+    pub index_lines: IndexLines,
+    /// Absolute encoders, which stand for the others where they are in use.
+    pub absolute: AbsoluteEncoders,
     /// Emergency stop: normally closed (low), open (high) while pressed or when the wire is broken.
     pub emergency_stop: Input<'static>,
     /// Enable line of the drivers: low switches them on. The pull-up on the drivers' side keeps them off while the chip
@@ -41,10 +46,14 @@ pub struct Rig {
     pub trigger: Trigger,
     /// The encoders as the running tick found them; `None` outside ticks.
     pub latched: Option<Latched>,
+    /// The encoders as the latest two ticks found them, the older first.
+    pub before: Latched,
+    /// The later one.
+    pub latest: Latched,
 }
 
 /// Counts of all encoders at one instant.
-#[derive(Clone, Copy)]
+#[derive(Clone, Copy, Default)]
 pub struct Latched {
     at: Microseconds,
     counts: [i32; AXES],
@@ -54,15 +63,31 @@ impl Rig {
     /// Reads the encoders and the clock: the tick that begins works with these. Its own work takes up to 0.4 ms, in which an
     /// axis moves on by 32 um.
     pub fn latch_encoders(&mut self) {
-        self.latched = Some(critical_section::with(|_| Latched {
+        let mut latched = critical_section::with(|_| Latched {
             counts: self.stages.each_ref().map(|stage| stage.encoder.count()),
             at: Microseconds(Instant::now().as_micros()),
-        }));
+        });
+        // Some 10 us later for each absolute encoder.
+        self.absolute.ask();
+        for (axis, count) in latched.counts.iter_mut().enumerate() {
+            *count = self.absolute.count(axis).unwrap_or(*count);
+        }
+        self.before = core::mem::replace(&mut self.latest, latched);
+        self.latched = Some(latched);
     }
 
     /// Ends the tick: from now on encoders are read when they are asked for.
     pub fn release_encoders(&mut self) {
         self.latched = None;
+    }
+
+    /// The count of an axis between the latest two ticks: an absolute encoder cannot be latched by an edge.
+    fn between_ticks(&self, axis: usize, at: Microseconds) -> i32 {
+        let count = |tick: &Latched| tick.counts.get(axis).copied().unwrap_or(0);
+        let since = at.0.saturating_sub(self.before.at.0) as i64;
+        let between = (self.latest.at.0.saturating_sub(self.before.at.0) as i64).max(1);
+        let way = i64::from(count(&self.latest).wrapping_sub(count(&self.before)));
+        count(&self.before).wrapping_add((way * since.min(between) / between) as i32)
     }
 
     /// Starts the steps ordered for the tick that has begun. Returns whether the steps of the tick before were made in time.
@@ -106,7 +131,7 @@ impl RigIo for Rig {
     fn encoder(&self, axis: usize) -> i32 {
         match &self.latched {
             Some(latched) => latched.counts.get(axis).copied().unwrap_or(0),
-            None => self.stages.get(axis).map_or(0, |stage| stage.encoder.count()),
+            None => self.absolute.count(axis).or(self.stages.get(axis).map(|stage| stage.encoder.count())).unwrap_or(0),
         }
     }
 
@@ -114,6 +139,18 @@ impl RigIo for Rig {
         if let Some(stage) = self.stages.get_mut(axis) {
             stage.encoder.expect(per_second);
         }
+    }
+
+    fn use_encoder(&mut self, axis: usize, kind: EncoderKind) {
+        self.absolute.use_encoder(axis, kind);
+    }
+
+    fn encoder_state(&self, axis: usize) -> EncoderState {
+        self.absolute.state(axis)
+    }
+
+    fn take_index(&mut self, axis: usize) -> IndexEdges {
+        self.index_lines.take(axis)
     }
 
     fn encoders_read_at(&self, now: Microseconds) -> Microseconds {
@@ -147,7 +184,12 @@ impl RigIo for Rig {
 
     fn take_trigger_edge(&mut self) -> Option<TriggerEdge> {
         let (at, raw) = self.trigger.take_edge()?;
-        let counts = self.stages.iter().zip(raw).map(|(stage, raw)| stage.encoder.extended(raw)).collect();
+        let counts =
+            self.stages.iter().zip(raw).enumerate().map(|(axis, (stage, raw))| match self.absolute.count(axis) {
+                Some(_) => self.between_ticks(axis, at),
+                None => stage.encoder.extended(raw),
+            });
+        let counts = counts.collect();
         Some(TriggerEdge { at, counts })
     }
 }

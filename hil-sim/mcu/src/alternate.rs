@@ -1,7 +1,7 @@
-//! Alternate functions of the pins (DS12288 table 13, 64-pin package), for timers and serial ports.
+//! Alternate functions of the pins (DS12288 table 13, 64-pin package), for timers, serial ports and SPI.
 
 use crate::pin::{Pin, Signal};
-use crate::unit::{TimerId, UartId};
+use crate::unit::{SpiId, TimerId, UartId};
 
 /// The peripheral signal that alternate function `number` connects `pin` to; `None` where the model has none.
 pub(crate) fn alternate_function(pin: Pin, number: u8) -> Option<Signal> {
@@ -61,13 +61,33 @@ const TABLE: &[(usize, &[(u8, Signal)])] = &[
         ],
     ),
     (pin(b'A', 4), &[(2, channel(3, 2))]),
-    (pin(b'A', 5), &[(1, channel(2, 1)), (2, external(2))]),
-    (pin(b'A', 6), &[(1, channel(16, 1)), (2, channel(3, 1))]),
-    (pin(b'A', 7), &[(1, channel(17, 1)), (2, channel(3, 2)), (4, complement(8, 1)), (6, complement(1, 1))]),
+    (pin(b'A', 5), &[(1, channel(2, 1)), (2, external(2)), (5, Signal::SpiClock(SpiId::SPI1))]),
+    (pin(b'A', 6), &[(1, channel(16, 1)), (2, channel(3, 1)), (5, Signal::SpiIn(SpiId::SPI1))]),
+    (
+        pin(b'A', 7),
+        &[
+            (1, channel(17, 1)),
+            (2, channel(3, 2)),
+            (4, complement(8, 1)),
+            (5, Signal::SpiOut(SpiId::SPI1)),
+            (6, complement(1, 1)),
+        ],
+    ),
     (pin(b'A', 8), &[(6, channel(1, 1)), (10, external(4))]),
     (pin(b'A', 9), &[(6, channel(1, 2)), (7, Signal::Transmit(UartId::USART1)), (10, channel(2, 3))]),
-    (pin(b'A', 10), &[(6, channel(1, 3)), (7, Signal::Receive(UartId::USART1)), (10, channel(2, 4))]),
-    (pin(b'A', 11), &[(6, complement(1, 1)), (10, channel(4, 1)), (11, channel(1, 4))]),
+    (
+        pin(b'A', 10),
+        &[
+            (5, Signal::SpiIn(SpiId::SPI2)),
+            (6, channel(1, 3)),
+            (7, Signal::Receive(UartId::USART1)),
+            (10, channel(2, 4)),
+        ],
+    ),
+    (
+        pin(b'A', 11),
+        &[(5, Signal::SpiOut(SpiId::SPI2)), (6, complement(1, 1)), (10, channel(4, 1)), (11, channel(1, 4))],
+    ),
     (
         pin(b'A', 12),
         &[
@@ -107,6 +127,8 @@ const TABLE: &[(usize, &[(u8, Signal)])] = &[
             (1, channel(2, 2)),
             (2, external(4)),
             (4, complement(8, 1)),
+            (5, Signal::SpiClock(SpiId::SPI1)),
+            (6, Signal::SpiClock(SpiId::SPI3)),
             (7, Signal::Transmit(UartId::USART2)),
             (10, external(3)),
         ],
@@ -117,11 +139,22 @@ const TABLE: &[(usize, &[(u8, Signal)])] = &[
             (1, channel(16, 1)),
             (2, channel(3, 1)),
             (4, complement(8, 2)),
+            (5, Signal::SpiIn(SpiId::SPI1)),
+            (6, Signal::SpiIn(SpiId::SPI3)),
             (7, Signal::Receive(UartId::USART2)),
             (8, Signal::DriverEnable(UartId::UART5)),
         ],
     ),
-    (pin(b'B', 5), &[(2, channel(3, 2)), (3, complement(8, 3)), (10, channel(17, 1))]),
+    (
+        pin(b'B', 5),
+        &[
+            (2, channel(3, 2)),
+            (3, complement(8, 3)),
+            (5, Signal::SpiOut(SpiId::SPI1)),
+            (6, Signal::SpiOut(SpiId::SPI3)),
+            (10, channel(17, 1)),
+        ],
+    ),
     (
         pin(b'B', 6),
         &[
@@ -159,9 +192,20 @@ const TABLE: &[(usize, &[(u8, Signal)])] = &[
         &[(1, channel(2, 4)), (7, Signal::Receive(UartId::USART3)), (8, Signal::Transmit(UartId::LPUART1))],
     ),
     (pin(b'B', 12), &[(2, external(5)), (8, Signal::DriverEnable(UartId::LPUART1))]),
-    (pin(b'B', 13), &[(6, complement(1, 1))]),
-    (pin(b'B', 14), &[(1, channel(15, 1)), (6, complement(1, 2)), (7, Signal::DriverEnable(UartId::USART3))]),
-    (pin(b'B', 15), &[(1, channel(15, 2)), (2, complement(15, 1)), (4, complement(1, 3))]),
+    (pin(b'B', 13), &[(5, Signal::SpiClock(SpiId::SPI2)), (6, complement(1, 1))]),
+    (
+        pin(b'B', 14),
+        &[
+            (1, channel(15, 1)),
+            (5, Signal::SpiIn(SpiId::SPI2)),
+            (6, complement(1, 2)),
+            (7, Signal::DriverEnable(UartId::USART3)),
+        ],
+    ),
+    (
+        pin(b'B', 15),
+        &[(1, channel(15, 2)), (2, complement(15, 1)), (4, complement(1, 3)), (5, Signal::SpiOut(SpiId::SPI2))],
+    ),
     (pin(b'C', 0), &[(2, channel(1, 1)), (8, Signal::Receive(UartId::LPUART1))]),
     (pin(b'C', 1), &[(2, channel(1, 2)), (8, Signal::Transmit(UartId::LPUART1))]),
     (pin(b'C', 2), &[(2, channel(1, 3)), (6, channel(20, 2))]),
@@ -174,14 +218,33 @@ const TABLE: &[(usize, &[(u8, Signal)])] = &[
     (pin(b'C', 9), &[(2, channel(3, 4)), (4, channel(8, 4))]),
     (
         pin(b'C', 10),
-        &[(4, complement(8, 1)), (5, Signal::Transmit(UartId::UART4)), (7, Signal::Transmit(UartId::USART3))],
+        &[
+            (4, complement(8, 1)),
+            (5, Signal::Transmit(UartId::UART4)),
+            (6, Signal::SpiClock(SpiId::SPI3)),
+            (7, Signal::Transmit(UartId::USART3)),
+        ],
     ),
     (
         pin(b'C', 11),
-        &[(4, complement(8, 2)), (5, Signal::Receive(UartId::UART4)), (7, Signal::Receive(UartId::USART3))],
+        &[
+            (4, complement(8, 2)),
+            (5, Signal::Receive(UartId::UART4)),
+            (6, Signal::SpiIn(SpiId::SPI3)),
+            (7, Signal::Receive(UartId::USART3)),
+        ],
     ),
-    (pin(b'C', 12), &[(1, channel(5, 2)), (4, complement(8, 3)), (5, Signal::Transmit(UartId::UART5))]),
+    (
+        pin(b'C', 12),
+        &[
+            (1, channel(5, 2)),
+            (4, complement(8, 3)),
+            (5, Signal::Transmit(UartId::UART5)),
+            (6, Signal::SpiOut(SpiId::SPI3)),
+        ],
+    ),
     (pin(b'C', 13), &[(4, complement(1, 1)), (6, complement(8, 4))]),
     (pin(b'D', 2), &[(2, external(3)), (5, Signal::Receive(UartId::UART5))]),
     (pin(b'F', 0), &[(6, complement(1, 3))]),
+    (pin(b'F', 1), &[(5, Signal::SpiClock(SpiId::SPI2))]),
 ];

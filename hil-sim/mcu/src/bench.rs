@@ -7,10 +7,12 @@ use vergence_control::{RigIo, StepSchedule};
 use vergence_plant::{DriverReply, Plant};
 use vergence_protocol::Microseconds;
 
+use crate::encoder_lines::{Lines, Selection, phases};
 use crate::pin::{Drive, Pin};
+use crate::spi::SpiFrame;
 use crate::time::Picoseconds;
 use crate::uart::{Frame, LineFault, SentByte};
-use crate::unit::UartId;
+use crate::unit::{SpiId, UartId};
 use crate::world::{Instant, PinEdge, Terminals, World};
 
 /// A switch to ground with a pull-up on the line.
@@ -41,6 +43,10 @@ pub struct AxisWiring {
     pub home: SwitchWiring,
     /// Hard limit, operated beyond the range.
     pub hard_limit: SwitchWiring,
+    /// The encoder's index line, where it is wired.
+    pub index: Option<Pin>,
+    /// Low selects the absolute encoder, where it is wired.
+    pub select: Option<Pin>,
 }
 
 /// The pins of the whole bench.
@@ -58,6 +64,8 @@ pub struct BenchWiring {
     pub camera_trigger: Pin,
     /// Port of the one wire to TMC2209 drivers.
     pub driver_line: UartId,
+    /// Bus of the absolute encoders.
+    pub encoder_bus: SpiId,
 }
 
 impl BenchWiring {
@@ -75,6 +83,8 @@ impl BenchWiring {
             let names = ["step", "direction", "encoder_a", "encoder_b", "home", "hard_limit"];
             let pins = [axis.step, axis.direction, a, b, axis.home.pin, axis.hard_limit.pin];
             signals.extend(pins.into_iter().zip(names.map(|name| format!("{name}_{index}"))));
+            let others = [(axis.index, "encoder_index"), (axis.select, "encoder_select")];
+            signals.extend(others.into_iter().filter_map(|(pin, name)| Some((pin?, format!("{name}_{index}")))));
         }
         signals
     }
@@ -85,18 +95,6 @@ const MOVING_STEP: Microseconds = Microseconds(20);
 const RESTING_STEP: Microseconds = Microseconds(1_000);
 /// Time after the last step pulse in which the load may still creep.
 const SETTLING: Microseconds = Microseconds(100_000);
-/// Least time between two edges of an encoder, whatever jump it has to show.
-const EDGE_SPACING: Picoseconds = Picoseconds::nanoseconds(200);
-
-/// The lines of one encoder: the count that they show, and the count that they are to reach.
-#[derive(Clone, Copy, Debug, Default)]
-struct Lines {
-    shown: i32,
-    wanted: i32,
-    next: Option<Picoseconds>,
-    spacing: Picoseconds,
-}
-
 /// The state of one axis on its wires.
 #[derive(Clone, Copy, Debug, Default)]
 struct AxisState {
@@ -104,6 +102,8 @@ struct AxisState {
     lines: Lines,
     home: Option<bool>,
     hard_limit: Option<bool>,
+    index: Option<bool>,
+    selection: Selection,
 }
 
 /// A rising edge of the camera trigger's pin, and what the encoders' lines showed then.
@@ -138,7 +138,7 @@ impl Bench {
         let axes: Vec<_> = (0..wiring.axes.len())
             .map(|axis| {
                 let count = plant.encoder(axis);
-                let lines = Lines { shown: count, wanted: count, ..Lines::default() };
+                let lines = Lines::at(count);
                 AxisState { lines, ..AxisState::default() }
             })
             .collect();
@@ -204,6 +204,7 @@ impl Bench {
                 terminals.drive(wiring.hard_limit.pin, wiring.hard_limit.drive(limit));
             }
         }
+        (0..self.wiring.axes.len()).for_each(|axis| self.show_index(axis, terminals));
         let pressed = self.plant.emergency_stop();
         match self.emergency_stop.replace(pressed) {
             None => self.connect(terminals),
@@ -224,6 +225,17 @@ impl Bench {
         }
     }
 
+    /// Sets the index line of an axis to its level at the count that the encoder's lines show.
+    fn show_index(&mut self, axis: usize, terminals: &mut Terminals) {
+        let (Some(state), Some(wiring)) = (self.axes.get_mut(axis), self.wiring.axes.get(axis)) else { return };
+        let level = self.plant.index_line(axis, state.lines.shown);
+        if let (Some(pin), Some(high)) = (wiring.index, level)
+            && state.index.replace(high) != Some(high)
+        {
+            terminals.drive(pin, Drive::level(high));
+        }
+    }
+
     fn step(&mut self, axis: usize, now: Microseconds) {
         if let Some(pulses) = self.pulses.get_mut(axis) {
             *pulses += 1;
@@ -241,40 +253,10 @@ impl Bench {
     }
 }
 
-impl Lines {
-    /// Sets the count to reach; its edges are spread over the coming `span`.
-    fn aim(&mut self, count: i32, now: Picoseconds, span: Picoseconds) {
-        self.wanted = count;
-        let edges = u64::from(self.wanted.wrapping_sub(self.shown).unsigned_abs());
-        if edges == 0 {
-            self.next = None;
-        } else {
-            self.spacing = Picoseconds((span.0 / (edges + 1)).max(EDGE_SPACING.0));
-            self.next = Some(now + self.spacing);
-        }
-    }
-
-    /// Makes the next edge that is due; returns the line that changes, A (0) or B (1), and its level.
-    fn edge(&mut self, now: Picoseconds) -> Option<(usize, bool)> {
-        let due = self.next.filter(|&at| at <= now)?;
-        let before = phases(self.shown);
-        self.shown = self.shown.wrapping_add(self.wanted.wrapping_sub(self.shown).signum());
-        self.next = (self.shown != self.wanted).then(|| due + self.spacing);
-        let after = phases(self.shown);
-        let line = usize::from(before[0] == after[0]);
-        Some((line, after[line]))
-    }
-}
-
-/// Levels of A and B at a count: A leads while it rises.
-fn phases(count: i32) -> [bool; 2] {
-    let quarter = count.rem_euclid(4);
-    [quarter == 1 || quarter == 2, quarter >= 2]
-}
-
 impl World for Bench {
     fn watched(&self) -> Vec<Pin> {
-        let axes = self.wiring.axes.iter().flat_map(|axis| [axis.step, axis.direction]);
+        let axes =
+            self.wiring.axes.iter().flat_map(|axis| [Some(axis.step), Some(axis.direction), axis.select]).flatten();
         axes.chain([self.wiring.drivers_off, self.wiring.holding, self.wiring.camera_trigger]).collect()
     }
 
@@ -284,9 +266,10 @@ impl World for Bench {
     }
 
     fn act(&mut self, now: Instant, terminals: &mut Terminals) {
-        for (state, wiring) in self.axes.iter_mut().zip(&self.wiring.axes) {
-            while let Some((line, high)) = state.lines.edge(now.time) {
-                terminals.drive(wiring.encoder[line], Drive::level(high));
+        for axis in 0..self.wiring.axes.len() {
+            while let Some((line, high)) = self.axes[axis].lines.edge(now.time) {
+                terminals.drive(self.wiring.axes[axis].encoder[line], Drive::level(high));
+                self.show_index(axis, terminals);
             }
         }
         if let Some((_, baud, reply)) = self.reply.take_if(|(at, ..)| *at <= now.time) {
@@ -297,6 +280,15 @@ impl World for Bench {
         if self.next_step <= now.time {
             self.advance_plant(microseconds(now), terminals);
         }
+    }
+
+    fn frame_exchanged(&mut self, port: SpiId, frame: SpiFrame) -> Option<u16> {
+        let axis = self.axes.iter().position(|state| state.selection.is_selected())?;
+        if port != self.wiring.encoder_bus || !self.axes[axis].selection.understands(&frame) {
+            return None;
+        }
+        self.plant.advance(Microseconds(frame.to.0 / 1_000_000));
+        self.plant.axis_mut(axis)?.magnet_frame(frame.word)
     }
 
     fn byte_sent(&mut self, port: UartId, sent: SentByte, _terminals: &mut Terminals) {
@@ -334,6 +326,8 @@ impl World for Bench {
             let wiring = self.wiring.axes[axis];
             if edge.pin == wiring.direction {
                 self.axes[axis].forward = edge.high;
+            } else if wiring.select == Some(edge.pin) {
+                self.axes[axis].selection.select(edge);
             } else if edge.pin == wiring.step && edge.high {
                 self.step(axis, now);
             }

@@ -18,6 +18,9 @@ impl<W: World> Chip<W> {
         let Some((unit, offset)) = self.find(address)? else { return Ok(0) };
         self.census.note(unit, offset, false);
         let moment = Moment { now: self.now, clocks: &self.clocks };
+        if let Unit::Spi(spi) = unit {
+            self.units.spis[spi.index()].access = access;
+        }
         let peripheral = self.units.get(unit);
         peripheral.advance(moment);
         let quiet = peripheral.reads_quietly(offset);
@@ -48,6 +51,9 @@ impl<W: World> Chip<W> {
         let moment = Moment { now: self.now, clocks: &self.clocks };
         if unit == Unit::Crc {
             self.units.crc.access = access;
+        }
+        if let Unit::Spi(spi) = unit {
+            self.units.spis[spi.index()].access = access;
         }
         let peripheral = self.units.get(unit);
         peripheral.advance(moment);

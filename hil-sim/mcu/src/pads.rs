@@ -3,7 +3,7 @@
 use crate::alternate::alternate_function;
 use crate::gpio::Mode;
 use crate::pin::{Drive, PINS, Pin, PinSet, Signal};
-use crate::unit::{TimerId, UartId};
+use crate::unit::{SpiId, TimerId, UartId};
 use crate::units::Units;
 
 /// All pins.
@@ -77,6 +77,18 @@ impl Pads {
         [sends, sends || has(Signal::Receive(uart))]
     }
 
+    /// Whether an SPI has pins for its clock, its input and its output.
+    pub fn connected_spi(&self, spi: SpiId) -> [bool; 3] {
+        [Signal::SpiClock(spi), Signal::SpiIn(spi), Signal::SpiOut(spi)]
+            .map(|wanted| self.signals.contains(&Some(wanted)))
+    }
+
+    /// The level of the input of an SPI, where no device drives it.
+    pub fn input_of_spi(&self, spi: SpiId) -> bool {
+        let pin = self.signals.iter().position(|signal| *signal == Some(Signal::SpiIn(spi)));
+        pin.is_some_and(|index| self.is_high(Pin::at(index)))
+    }
+
     /// Connects the pins of a port anew after its registers changed; returns whether any connection changed.
     pub fn connect(&mut self, units: &Units, port: usize) -> bool {
         let mut changed = false;
@@ -143,6 +155,8 @@ fn level_of(units: &Units, signal: Signal) -> Option<bool> {
         // Serial lines carry whole frames; the pin shows the idle level.
         Signal::Transmit(_) => Some(true),
         Signal::DriverEnable(uart) => units.uarts[uart.index()].driver_enable(),
-        Signal::External(_) | Signal::Receive(_) => None,
+        Signal::SpiClock(spi) => units.spis[spi.index()].idle_clock(),
+        Signal::SpiOut(spi) => units.spis[spi.index()].idle_output(),
+        Signal::External(_) | Signal::Receive(_) | Signal::SpiIn(_) => None,
     }
 }

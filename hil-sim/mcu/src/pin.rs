@@ -2,7 +2,7 @@
 
 use std::fmt;
 
-use crate::unit::{TimerId, UartId};
+use crate::unit::{SpiId, TimerId, UartId};
 
 /// A pin of ports A to G, such as PA8.
 #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
@@ -97,4 +97,10 @@ pub(crate) enum Signal {
     Receive(UartId),
     /// A serial port's driver enable or request to send.
     DriverEnable(UartId),
+    /// SPIx_SCK.
+    SpiClock(SpiId),
+    /// SPIx_MISO.
+    SpiIn(SpiId),
+    /// SPIx_MOSI.
+    SpiOut(SpiId),
 }

@@ -19,6 +19,7 @@ pub(crate) enum Unit {
     Gpio(u8),
     Timer(TimerId),
     Uart(UartId),
+    Spi(SpiId),
 }
 
 const PLAIN: [Unit; 10] = [
@@ -37,9 +38,10 @@ const DMA: usize = PLAIN.len();
 const GPIO: usize = DMA + 2;
 const TIMER: usize = GPIO + 7;
 const UART: usize = TIMER + TimerId::COUNT;
+const SPI: usize = UART + UartId::COUNT;
 
 /// Number of peripherals; each has an index below this.
-pub(crate) const UNITS: usize = UART + UartId::COUNT;
+pub(crate) const UNITS: usize = SPI + SpiId::COUNT;
 
 impl Unit {
     pub(crate) fn index(self) -> usize {
@@ -48,6 +50,7 @@ impl Unit {
             Self::Gpio(port) => GPIO + usize::from(port),
             Self::Timer(timer) => TIMER + timer.index(),
             Self::Uart(uart) => UART + uart.index(),
+            Self::Spi(spi) => SPI + spi.index(),
             plain => PLAIN.iter().position(|&unit| unit == plain).unwrap_or(0),
         }
     }
@@ -55,6 +58,7 @@ impl Unit {
     /// The peripheral at `index`, below [`UNITS`].
     pub(crate) fn at(index: usize) -> Self {
         match index {
+            SPI.. => Self::Spi(SpiId((index - SPI) as u8)),
             UART.. => Self::Uart(UartId((index - UART) as u8)),
             TIMER.. => Self::Timer(TimerId((index - TIMER) as u8)),
             GPIO.. => Self::Gpio((index - GPIO) as u8),
@@ -80,6 +84,7 @@ impl Unit {
             Self::Gpio(port) => 0x4800_0000 + 0x400 * u32::from(port),
             Self::Timer(timer) => timer.base(),
             Self::Uart(uart) => uart.base(),
+            Self::Spi(spi) => spi.base(),
         }
     }
 
@@ -97,6 +102,7 @@ impl Unit {
             Self::Gpio(port) => Some((0x4C, u32::from(port))),
             Self::Timer(timer) => Some(timer.clock_enable()),
             Self::Uart(uart) => Some(uart.clock_enable()),
+            Self::Spi(spi) => Some(spi.clock_enable()),
         }
     }
 }
@@ -118,6 +124,7 @@ impl fmt::Display for Unit {
             Self::Gpio(port) => write!(formatter, "GPIO{}", char::from(b'A' + port)),
             Self::Timer(timer) => write!(formatter, "TIM{}", timer.number()),
             Self::Uart(uart) => write!(formatter, "{uart}"),
+            Self::Spi(spi) => write!(formatter, "{spi}"),
         }
     }
 }
@@ -231,5 +238,50 @@ impl UartId {
 impl fmt::Display for UartId {
     fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
         formatter.write_str(["USART1", "USART2", "USART3", "UART4", "UART5", "LPUART1"][self.index()])
+    }
+}
+
+/// A synchronous serial port.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub struct SpiId(u8);
+
+impl SpiId {
+    pub(crate) const COUNT: usize = 3;
+    /// SPI1.
+    pub const SPI1: Self = Self(0);
+    /// SPI2.
+    pub const SPI2: Self = Self(1);
+    /// SPI3.
+    pub const SPI3: Self = Self(2);
+
+    pub(crate) const fn index(self) -> usize {
+        self.0 as usize
+    }
+
+    pub(crate) fn all() -> impl Iterator<Item = Self> {
+        (0..Self::COUNT as u8).map(Self)
+    }
+
+    fn base(self) -> u32 {
+        [0x4001_3000, 0x4000_3800, 0x4000_3C00][self.index()]
+    }
+
+    fn clock_enable(self) -> (u32, u32) {
+        [(0x60, 12), (0x58, 14), (0x58, 15)][self.index()]
+    }
+
+    pub(crate) fn interrupt(self) -> u32 {
+        [35, 36, 51][self.index()]
+    }
+
+    /// The peripheral bus that clocks it: APB1 (0) or APB2 (1).
+    pub(crate) fn bus(self) -> usize {
+        usize::from(self == Self::SPI1)
+    }
+}
+
+impl fmt::Display for SpiId {
+    fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
+        formatter.write_str(["SPI1", "SPI2", "SPI3"][self.index()])
     }
 }

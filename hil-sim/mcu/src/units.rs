@@ -11,10 +11,11 @@ use crate::peripheral::Peripheral;
 use crate::pwr::Pwr;
 use crate::rcc::{Rcc, ResetCause};
 use crate::rng::Rng;
+use crate::spi::Spi;
 use crate::syscfg::Syscfg;
 use crate::timer::Timer;
 use crate::uart::Uart;
-use crate::unit::{TimerId, UartId, Unit};
+use crate::unit::{SpiId, TimerId, UartId, Unit};
 
 #[derive(Clone, Debug)]
 pub(crate) struct Units {
@@ -32,6 +33,7 @@ pub(crate) struct Units {
     pub ports: [Port; 7],
     pub timers: Vec<Timer>,
     pub uarts: Vec<Uart>,
+    pub spis: Vec<Spi>,
 }
 
 impl Units {
@@ -52,6 +54,7 @@ impl Units {
             ports: std::array::from_fn(|port| Port::new(port as u8)),
             timers: TimerId::all().map(Timer::new).collect(),
             uarts: UartId::all().map(Uart::new).collect(),
+            spis: SpiId::all().map(Spi::new).collect(),
         }
     }
 
@@ -95,6 +98,11 @@ impl Units {
                 self.uarts[uart.index()].reset();
                 self.uarts[uart.index()].connected = connected;
             }
+            Unit::Spi(spi) => {
+                let connected = self.spis[spi.index()].connected;
+                self.spis[spi.index()] = Spi::new(spi);
+                self.spis[spi.index()].connected = connected;
+            }
             // Not in a reset register; or the flash interface, which firmware does not reset.
             Unit::Rcc | Unit::Flash | Unit::Exti | Unit::Iwdg | Unit::Debug => {}
         }
@@ -116,6 +124,7 @@ impl Units {
             Unit::Gpio(port) => &mut self.ports[usize::from(port)],
             Unit::Timer(timer) => &mut self.timers[timer.index()],
             Unit::Uart(uart) => &mut self.uarts[uart.index()],
+            Unit::Spi(spi) => &mut self.spis[spi.index()],
         }
     }
 }

@@ -7,7 +7,7 @@ use crate::peripheral::Moment;
 use crate::pin::{Drive, Pin, PinSet, Signal};
 use crate::trouble::Demand;
 use crate::uart::SentByte;
-use crate::unit::{TimerId, UartId, Unit};
+use crate::unit::{SpiId, TimerId, UartId, Unit};
 use crate::world::{PinEdge, World};
 
 impl<W: World> Chip<W> {
@@ -39,6 +39,7 @@ impl<W: World> Chip<W> {
                 self.stirred = true;
                 self.react_to_uart(uart);
             }
+            Unit::Spi(spi) => self.react_to_spi(spi),
             Unit::Dma(_) | Unit::Dmamux => self.stirred = true,
             _ => {}
         }
@@ -81,6 +82,9 @@ impl<W: World> Chip<W> {
         if self.pads.connect(&self.units, port) {
             for uart in UartId::all() {
                 self.units.uarts[uart.index()].connected = self.pads.connected(uart);
+            }
+            for spi in SpiId::all() {
+                self.units.spis[spi.index()].connected = self.pads.connected_spi(spi);
             }
             self.watch_timers();
         }
@@ -127,6 +131,18 @@ impl<W: World> Chip<W> {
             self.world_was_told();
         }
         self.settle_pins(self.pads.pins_of_enable(uart));
+    }
+
+    fn react_to_spi(&mut self, spi: SpiId) {
+        let moment = Moment { now: self.now, clocks: &self.clocks };
+        for frame in self.units.spis[spi.index()].take_sent(moment) {
+            let [clocked, hears, _] = self.units.spis[spi.index()].connected;
+            let answer = if clocked { self.world.frame_exchanged(spi, frame) } else { None };
+            let floating = if self.pads.input_of_spi(spi) { u16::MAX } else { 0 };
+            let word = answer.filter(|_| hears).unwrap_or(floating);
+            self.units.spis[spi.index()].receive(word);
+        }
+        self.world_was_told();
     }
 
     /// Tells timers which of their outputs are observed, and which trigger outputs other timers use.

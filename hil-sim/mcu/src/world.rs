@@ -3,9 +3,10 @@
 use vergence_cpu::Cycle;
 
 use crate::pin::{Drive, Pin};
+use crate::spi::SpiFrame;
 use crate::time::Picoseconds;
 use crate::uart::{Frame, SentByte};
-use crate::unit::UartId;
+use crate::unit::{SpiId, UartId};
 
 /// The present instant, for the world.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -67,6 +68,12 @@ pub trait World: Clone {
 
     /// Takes a byte that a serial port has sent.
     fn byte_sent(&mut self, _port: UartId, _sent: SentByte, _terminals: &mut Terminals) {}
+
+    /// Takes a frame that an SPI has sent, and returns what a device has sent in it at the same time; `None` where none is
+    /// selected.
+    fn frame_exchanged(&mut self, _port: SpiId, _frame: SpiFrame) -> Option<u16> {
+        None
+    }
 }
 
 /// An empty world.
@@ -104,5 +111,10 @@ impl<A: World, B: World> World for (A, B) {
     fn byte_sent(&mut self, port: UartId, sent: SentByte, terminals: &mut Terminals) {
         self.0.byte_sent(port, sent, terminals);
         self.1.byte_sent(port, sent, terminals);
+    }
+
+    fn frame_exchanged(&mut self, port: SpiId, frame: SpiFrame) -> Option<u16> {
+        let answers = [self.0.frame_exchanged(port, frame), self.1.frame_exchanged(port, frame)];
+        answers.into_iter().flatten().next()
     }
 }

@@ -5,7 +5,7 @@ mod common;
 
 use common::serial::{BIT, BRR, CR1, CR3, FIFOEN, FRAME, ISR, RDR, RE, RXNE, TDR, TE, UE};
 use common::{Bench as Poked, GPIOA, TIM1, TIM2, bench_with, pin};
-use vergence_mcu::{AxisWiring, Bench, BenchWiring, SwitchWiring, UartId};
+use vergence_mcu::{AxisWiring, Bench, BenchWiring, SpiId, SwitchWiring, UartId};
 use vergence_plant::{Plant, bench_mechanics};
 
 const HOME: u32 = 4;
@@ -22,12 +22,15 @@ fn rig(position: f64) -> Poked<Bench> {
             encoder: [pin("PA0"), pin("PA1")],
             home: switch("PA4", false),
             hard_limit: switch("PA5", true),
+            index: None,
+            select: None,
         }],
         holding: pin("PB5"),
         drivers_off: pin("PA10"),
         emergency_stop: switch("PA6", true),
         camera_trigger: pin("PA7"),
         driver_line: UartId::UART4,
+        encoder_bus: SpiId::SPI1,
     };
     let plant = Plant::new(&bench_mechanics()[..1], &[position]);
     let mut bench = bench_with(Bench::new(wiring, plant));

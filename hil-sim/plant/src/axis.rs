@@ -1,10 +1,13 @@
 //! One axis of the mechanics: motor, transmission, encoder and switches.
 
+mod encoders;
+
 use std::collections::VecDeque;
 
-use vergence_control::{HomeEnd, Scale, StepSchedule};
+use vergence_control::{As5048a, HomeEnd, IndexEdges, Scale, StepSchedule};
 use vergence_protocol::{AxisKind, Microseconds};
 
+use crate::as5048a::As5048aChip;
 use crate::encoder::{Encoder, EncoderFault};
 use crate::ends::{StopMechanics, SwitchMechanics};
 use crate::switch::{Switch, SwitchNoise};
@@ -22,6 +25,10 @@ pub struct AxisMechanics {
     pub pitch: PitchError,
     /// Play between the encoder and the stage that it stands for, such as of a rack behind its pinion.
     pub encoder_play: f64,
+    /// Errors of the encoder's scale: how much further it reads than the load is.
+    pub scale: PitchError,
+    /// Marks of the scale from one index pulse to the next, 0 for none, and how long a pulse is high.
+    pub index: [i32; 2],
     /// Time constant with which the load follows the motor, in seconds, above zero.
     pub compliance: f64,
     /// Position at and beyond which the home switch is operated.
@@ -62,8 +69,9 @@ pub struct PitchError {
 }
 
 impl PitchError {
-    /// The error at a position of the motor.
-    fn at(&self, position: f64) -> f64 {
+    /// The error at a position.
+    #[must_use]
+    pub fn at(&self, position: f64) -> f64 {
         let turn = if self.wobble == 0.0 { 0.0 } else { std::f64::consts::TAU * position / self.period };
         self.lead * position + self.wobble * turn.sin()
     }
@@ -85,6 +93,11 @@ pub struct AxisPlant {
     load: f64,
     stage: f64,
     encoder: Encoder,
+    /// Edges of the index line since they were last taken.
+    index_edges: IndexEdges,
+    /// An absolute encoder beside the scale, and what the native board has read of it, where it reads it.
+    magnet: Option<As5048aChip>,
+    reader: Option<As5048a>,
     home: Switch,
     /// Reading of a hard limit that does not follow the load.
     limit_fixed: Option<bool>,
@@ -127,7 +140,10 @@ impl AxisPlant {
             pitch_zero: mechanics.pitch.at(position),
             load: position,
             stage: position,
-            encoder: Encoder::new(scale_reading(mechanics.encoder, position)),
+            encoder: Encoder::new(scale_reading(&mechanics, position)),
+            index_edges: IndexEdges::new(),
+            magnet: None,
+            reader: None,
             home: Switch::new(mechanics.is_home(position)),
             limit_fixed: None,
             blocked: false,
@@ -160,6 +176,7 @@ impl AxisPlant {
 
     /// Counts from zero again, as an encoder's counter does whose chip restarts.
     pub fn restart_encoder(&mut self) {
+        self.reader = None;
         self.encoder.restart(self.scale_reading());
     }
 
@@ -178,11 +195,11 @@ impl AxisPlant {
     /// The raw encoder count.
     #[must_use]
     pub fn encoder(&self) -> i32 {
-        self.encoder.raw(self.scale_reading())
+        self.reader.map_or_else(|| self.encoder.raw(self.scale_reading()), |reader| reader.count())
     }
 
     fn scale_reading(&self) -> i32 {
-        scale_reading(self.mechanics.encoder, self.load)
+        scale_reading(&self.mechanics, self.load)
     }
 
     /// Steps made so far.
@@ -300,6 +317,7 @@ impl AxisPlant {
         // Inside the play the load is at rest; outside, the transmission pulls it after the motor.
         let pulled = self.load.clamp(motor - play, motor + play);
         let dt = (to.0 - from.0) as f64 * 1e-6;
+        let before = self.scale_reading();
         let share = 1.0 - (-dt / self.mechanics.compliance).exp();
         let (held_by, give) = match self.blocked {
             true => ([self.load; 2], 0.0),
@@ -310,6 +328,7 @@ impl AxisPlant {
         let play = self.mechanics.encoder_play / 2.0;
         self.stage = self.stage.clamp(self.load - play, self.load + play);
         self.encoder.advance();
+        self.pass_index(before, self.scale_reading());
         self.home.advance(self.mechanics.is_home(self.load), to.0 - from.0);
     }
 
@@ -347,9 +366,9 @@ impl AxisPlant {
     }
 }
 
-/// The mark of an encoder's scale at a position.
-fn scale_reading(encoder: Scale, position: f64) -> i32 {
-    (position * counts_per_micro(encoder)).floor() as i32
+/// The mark of the scale of an axis's encoder at a position of the load.
+fn scale_reading(mechanics: &AxisMechanics, position: f64) -> i32 {
+    ((position + mechanics.scale.at(position)) * counts_per_micro(mechanics.encoder)).floor() as i32
 }
 
 /// Counts (or steps) for each micro-unit of the axis.

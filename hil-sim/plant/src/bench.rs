@@ -3,7 +3,7 @@
 
 use std::f64::consts::PI;
 
-use vergence_control::{AxisSettings, DriverSettings, HomingSettings, SwitchSettings};
+use vergence_control::{AxisSettings, DriverSettings, EncoderSettings, HomingSettings, SwitchSettings};
 use vergence_protocol::{AxisKind, Micro};
 
 use crate::axis::{AxisMechanics, PitchError};
@@ -59,6 +59,7 @@ impl Stage {
             },
             driver: DriverSettings::default(),
             switches: SwitchSettings::default(),
+            feedback: EncoderSettings::default(),
         };
         Self { settings, mechanics: mechanics(&settings, 8.0, [8_000.0, 6_000.0], 2_000.0) }
     }
@@ -92,6 +93,7 @@ impl Stage {
             },
             driver: DriverSettings::default(),
             switches: SwitchSettings::default(),
+            feedback: EncoderSettings::default(),
         };
         let limit = f64::from(degrees(5.0));
         Self { settings, mechanics: mechanics(&settings, 120.0, [limit, limit], f64::from(degrees(1.0))) }
@@ -107,6 +109,8 @@ fn mechanics(settings: &AxisSettings, backlash: f64, beyond: [f64; 2], further: 
         backlash,
         pitch: PitchError::default(),
         encoder_play: 0.0,
+        scale: PitchError::default(),
+        index: [0; 2],
         compliance: 2e-3,
         home_switch: f64::from(settings.homing.switch_at.0),
         switches: SwitchMechanics::default(),

@@ -76,6 +76,16 @@ impl Encoder {
         self.reading = Reading::True;
     }
 
+    /// Misses `counts` on its way up, or counts as many too many.
+    pub fn lose(&mut self, counts: i32) {
+        self.zero = self.zero.wrapping_add(counts);
+    }
+
+    /// The scale's reading where the raw count is `raw`; `None` where the count does not follow the scale.
+    pub fn scale_at(&self, raw: i32) -> Option<i32> {
+        matches!(self.reading, Reading::True).then(|| raw.wrapping_add(self.zero))
+    }
+
     /// Counts from zero again where the scale reads `scale`; a failure lasts.
     pub fn restart(&mut self, scale: i32) {
         self.zero = scale;

@@ -3,6 +3,7 @@
 //! Simulated here: stepper motors, the compliance and backlash of screw and rack, load-side encoders, home and limit
 //! switches, mechanical end stops, and the failures of each. The same seed and inputs give the same results.
 
+mod as5048a;
 mod axis;
 mod bench;
 mod board;
@@ -16,6 +17,7 @@ mod stall_guard;
 mod switch;
 mod tmc2209;
 
+pub use as5048a::{As5048aChip, MagnetFault};
 pub use axis::{AxisMechanics, AxisPlant, PitchError, StepMade};
 pub use bench::{Stage, bench_mechanics, bench_settings};
 pub use board::NativeBoard;

@@ -3,8 +3,8 @@
 use std::collections::VecDeque;
 
 use vergence_control::driver::DriverLine;
-use vergence_control::{DriverSettings, RigIo, StepSchedule, TriggerEdge};
-use vergence_protocol::{AxisList, DriverState, Microseconds};
+use vergence_control::{DriverSettings, EncoderKind, IndexEdges, RigIo, StepSchedule, TriggerEdge};
+use vergence_protocol::{AxisList, DriverState, EncoderState, Microseconds};
 
 use crate::axis::{AxisMechanics, AxisPlant};
 use crate::drivers::Drivers;
@@ -72,6 +72,12 @@ impl Plant {
     #[must_use]
     pub fn stage(&self, axis: usize) -> Option<f64> {
         self.axes.get(axis).map(AxisPlant::stage)
+    }
+
+    /// Whether the index line of an encoder is high where its lines show the count `raw`; `None` without an index.
+    #[must_use]
+    pub fn index_line(&self, axis: usize, raw: i32) -> Option<bool> {
+        self.axes.get(axis)?.index_line(raw)
     }
 
     /// Swaps the wires of two home switches. There is no effect where there is no such axis.
@@ -166,6 +172,7 @@ impl Plant {
         }
         self.run_line(to);
         self.run_to(to);
+        self.axes.iter_mut().for_each(AxisPlant::ask_magnet);
     }
 
     /// Runs the native board's exchanges with the drivers, which take no time.
@@ -182,6 +189,7 @@ impl Plant {
 
     /// Makes the trigger's edge: hardware latches every encoder.
     fn latch(&mut self) {
+        self.axes.iter_mut().for_each(AxisPlant::ask_magnet);
         let counts = self.axes.iter().map(AxisPlant::encoder).collect();
         self.trigger_edges.push_back(TriggerEdge { at: self.now, counts });
         self.exposed = Some((self.now, self.loads()));
@@ -230,6 +238,20 @@ impl RigIo for Plant {
 
     fn encoder(&self, axis: usize) -> i32 {
         self.axes.get(axis).map_or(0, AxisPlant::encoder)
+    }
+
+    fn use_encoder(&mut self, axis: usize, kind: EncoderKind) {
+        if let Some(axis) = self.axes.get_mut(axis) {
+            axis.use_encoder(kind);
+        }
+    }
+
+    fn encoder_state(&self, axis: usize) -> EncoderState {
+        self.axes.get(axis).map_or(EncoderState::Plain, AxisPlant::encoder_state)
+    }
+
+    fn take_index(&mut self, axis: usize) -> IndexEdges {
+        self.axes.get_mut(axis).map(AxisPlant::take_index).unwrap_or_default()
     }
 
     fn home_switch(&self, axis: usize) -> bool {

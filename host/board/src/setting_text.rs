@@ -76,7 +76,10 @@ fn form(item: SettingItem, kind: AxisKind) -> Form {
         | SettingItem::CountsPerUnit
         | SettingItem::Baud
         | SettingItem::Microsteps
-        | SettingItem::StallThreshold => Form::Number,
+        | SettingItem::StallThreshold
+        | SettingItem::IndexEvery
+        | SettingItem::EncoderZero => Form::Number,
+        SettingItem::Encoder => Form::Choice(&["quadrature", "as5048a"]),
         SettingItem::StepsReversed
         | SettingItem::CountsReversed
         | SettingItem::StealthChop

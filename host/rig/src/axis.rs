@@ -3,6 +3,8 @@
 use vergence_protocol::{AxisInfo, AxisKind, Counts, Micro};
 use vergence_vision::{Angle, Length};
 
+use crate::pitch::PitchTable;
+
 /// A position of an axis: a length or an angle, by the kind of the axis.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum AxisPosition {
@@ -119,6 +121,8 @@ pub struct RigAxis {
     /// Play between encoder and stage in millimetres or radians: the stage is up to half of it to either side of where the
     /// encoder says.
     pub play: f64,
+    /// Error of the encoder's scale over the travel.
+    pub pitch: PitchTable,
 }
 
 impl RigAxis {
@@ -142,12 +146,12 @@ impl RigAxis {
         unit / f64::from(self.counts_per_unit)
     }
 
-    /// The position in millimetres or radians at `counts`, which may be interpolated.
+    /// The position in millimetres or radians at `counts`, which may be interpolated, corrected by the table of its pitch.
     ///
     /// The encoder changes to n when n is reached from below, so the middle of a count is half a count further.
     #[must_use]
     pub fn value_at(&self, counts: f64) -> f64 {
-        (counts + 0.5) * self.value_per_count()
+        self.pitch.truth((counts + 0.5) * self.value_per_count())
     }
 
     /// Standard deviation in counts of the stage beside its encoder's reading, whose own is `reading` counts. A stage with play
@@ -160,7 +164,7 @@ impl RigAxis {
     /// The counts, with a fraction, at `value` in millimetres or radians: the inverse of [`Self::value_at`].
     #[must_use]
     pub fn counts_at(&self, value: f64) -> f64 {
-        value / self.value_per_count() - 0.5
+        self.pitch.encoder(value) / self.value_per_count() - 0.5
     }
 
     /// The position in millimetres or radians at `micro` in micrometres or microradians, which may be a fraction.
@@ -170,6 +174,12 @@ impl RigAxis {
             AxisKind::Linear => micro * 1e-3,
             AxisKind::Rotary => micro * 1e-6,
         }
+    }
+
+    /// The position that the board must be sent to, by its encoder, so that the stage is at `position`.
+    #[must_use]
+    pub fn wire_position(&self, position: AxisPosition) -> Micro {
+        AxisPosition::from_value(self.kind, self.pitch.encoder(position.value())).micro()
     }
 
     /// The position at whole `counts`.

@@ -11,6 +11,7 @@ use self::modes::ModesFile;
 use crate::axis::{AxisPosition, RigAxis};
 use crate::camera_file::{CameraTable, Provenance};
 use crate::chain::{Chain, Link, Screw};
+use crate::pitch::PitchTable;
 use crate::rig::Rig;
 use crate::text::{quantities, quantity};
 
@@ -65,6 +66,7 @@ struct AxisFile {
     counts_per_metre: Option<u32>,
     counts_per_revolution: Option<u32>,
     play: Option<String>,
+    pitch_error: Option<Vec<[String; 2]>>,
 }
 
 #[derive(Clone, Copy, Deserialize)]
@@ -202,7 +204,16 @@ fn axis(file: &AxisFile) -> Result<RigAxis, RigError> {
     if !(0.0..=range[1].value() - range[0].value()).contains(&play) {
         return Err(contradiction(format!("{place} must not be negative, nor more than its range")));
     }
-    Ok(RigAxis { name: name.clone(), kind, range, calibrated, counts_per_unit, play })
+    let pitch = file.pitch_error.as_ref().map_or(Ok(PitchTable::default()), |entries| pitch(kind, entries, name))?;
+    Ok(RigAxis { name: name.clone(), kind, range, calibrated, counts_per_unit, play, pitch })
+}
+
+/// Parses a table of pitch errors: positions by the encoder, and how much further the stage is.
+fn pitch(kind: AxisKind, entries: &[[String; 2]], name: &str) -> Result<PitchTable, RigError> {
+    let place = format!("pitch_error of axis '{name}'");
+    let value = |text: &String| position(kind, text, &place).map(AxisPosition::value);
+    let entries = entries.iter().map(|[at, error]| Ok([value(at)?, value(error)?])).collect::<Result<_, RigError>>()?;
+    PitchTable::new(entries).map_err(|error| contradiction(format!("{place}: {error}")))
 }
 
 /// Parses the ends of a range, of which the first must be the lower.

@@ -106,9 +106,16 @@ impl Rig {
         self.axes.iter().zip(positions).filter_map(|(axis, &position)| axis.extrapolation(position)).collect()
     }
 
-    /// Converts positions to the wire's micrometres and microradians.
+    /// Converts positions of all axes to the wire's micrometres and microradians, by the axes' encoders.
     #[must_use]
     pub fn wire_targets(&self, positions: &[AxisPosition]) -> AxisList<Micro> {
-        positions.iter().take(vergence_protocol::MAX_AXES).map(|position| position.micro()).collect()
+        let axes = self.axes.iter().take(vergence_protocol::MAX_AXES);
+        axes.zip(positions).map(|(axis, &position)| axis.wire_position(position)).collect()
+    }
+
+    /// Converts distances to the wire's micrometres and microradians.
+    #[must_use]
+    pub fn wire_distances(&self, distances: &[AxisPosition]) -> AxisList<Micro> {
+        distances.iter().take(vergence_protocol::MAX_AXES).map(|distance| distance.micro()).collect()
     }
 }

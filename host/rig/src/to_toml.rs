@@ -36,6 +36,8 @@ struct Axis<'a> {
     counts_per_revolution: Option<u32>,
     #[serde(skip_serializing_if = "Option::is_none")]
     play: Option<String>,
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pitch_error: Vec<[String; 2]>,
 }
 
 #[derive(Serialize)]
@@ -122,6 +124,12 @@ fn axis(axis: &RigAxis) -> Axis<'_> {
         calibrated: axis.calibrated.map(|ends| ends.map(position)),
         counts_per_metre: scale_of(AxisKind::Linear),
         counts_per_revolution: scale_of(AxisKind::Rotary),
+        pitch_error: axis
+            .pitch
+            .entries()
+            .iter()
+            .map(|entry| entry.map(|value| position(AxisPosition::from_value(axis.kind, value))))
+            .collect(),
         play: (axis.play > 0.0).then(|| position(AxisPosition::from_value(axis.kind, axis.play))),
     }
 }

@@ -1,8 +1,8 @@
 //! Requests: each is carried out or refused with a reason; values are never clamped.
 
 use vergence_protocol::{
-    AxisList, AxisMask, ControllerState, DriverState, FaultCode, Jog, Micro, Microseconds, Mode, Move, MoveId,
-    MovePhase, Permille, Refusal, Request, SessionId, Status, StopKind,
+    AxisList, AxisMask, ControllerState, DriverState, EncoderState, FaultCode, Jog, Micro, Microseconds, Mode, Move,
+    MoveId, MovePhase, Permille, Refusal, Request, SessionId, Status, StopKind,
 };
 
 use super::{ActiveMove, Controller};
@@ -51,7 +51,13 @@ impl Controller {
             DriverState::Failed(code) => Err(Refusal::DriverNotReady { axis, why: Some(code) }),
             _ => Err(Refusal::DriverNotReady { axis, why: None }),
         })?;
+        (0u8..).take(self.axes.len()).try_for_each(|axis| match self.encoder_state(axis.into(), io) {
+            state if state.is_usable() => Ok(()),
+            EncoderState::Failed(code) => Err(Refusal::EncoderNotReady { axis, why: Some(code) }),
+            _ => Err(Refusal::EncoderNotReady { axis, why: None }),
+        })?;
         for axis in &mut self.axes {
+            axis.follow_encoder(io);
             axis.adopt_encoder(io);
         }
         // Ticks that were left out while the drivers were off do not count as missed.

@@ -78,7 +78,11 @@ impl Controller {
     }
 
     fn worst_error(&self, io: &impl RigIo) -> (usize, i32) {
-        let errors = self.axes.iter().zip(&self.active.targets).map(|(axis, &target)| axis.error(target, io).0);
-        errors.enumerate().max_by_key(|(_, error)| error.abs()).unwrap_or((0, 0))
+        let errors = self.axes.iter().zip(&self.active.targets).map(|(axis, &target)| {
+            let error = axis.error(target, io).0;
+            (error.abs() / axis.settings.tolerance.0.max(1), error)
+        });
+        // Axes have different units: what counts is how often the error is the tolerance.
+        errors.enumerate().max_by_key(|(_, (share, _))| *share).map_or((0, 0), |(axis, (_, error))| (axis, error))
     }
 }

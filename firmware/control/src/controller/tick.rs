@@ -1,6 +1,6 @@
 //! The control tick: watches inputs, decides, orders steps.
 
-use vergence_protocol::{ControllerState, DriverState, FaultCode, Microseconds};
+use vergence_protocol::{ControllerState, DriverState, EncoderState, FaultCode, Microseconds};
 
 use super::Controller;
 use crate::TICK_US;
@@ -22,6 +22,7 @@ impl Controller {
         let tick = self.keep_time(now, io);
         self.next_tick = Microseconds(tick.0 + TICK_US);
         self.watch_inputs(now, io);
+        self.watch_indices(now, io);
         self.watch_lease(now);
         match self.state {
             ControllerState::Boot => self.state = ControllerState::SelfTest,
@@ -29,6 +30,7 @@ impl Controller {
             ControllerState::Homing => self.poll_homing(now, io),
             ControllerState::Moving => self.poll_move(now, io),
             ControllerState::Stopping if !self.any_moving() => self.finish_stop(io),
+            ControllerState::Idle => self.axes.iter_mut().for_each(|axis| axis.follow_encoder(io)),
             _ => {}
         }
         if self.drivers_on {
@@ -92,11 +94,15 @@ impl Controller {
         }
     }
 
-    /// A driver that is not usable any more cannot hold its axis: it is cut, and with it all others.
+    /// A driver that is not usable any more cannot hold its axis, and without its encoder nobody knows where it is: it is cut,
+    /// and with it all others.
     fn watch_drivers(&mut self, now: Microseconds, io: &mut impl RigIo) {
         let failed = (0..self.axes.len()).find_map(|axis| match io.driver(axis) {
             DriverState::Failed(code) => Some((axis, code)),
-            _ => None,
+            _ => match self.encoder_state(axis, io) {
+                EncoderState::Failed(code) => Some((axis, code)),
+                _ => None,
+            },
         });
         if let Some((axis, code)) = failed {
             self.cut(now, code, Some(axis), 0, io);
@@ -137,6 +143,19 @@ impl Controller {
         }
         if stalled.is_some() {
             self.cut(now, FaultCode::DriverStall, stalled, 0, io);
+        }
+    }
+
+    /// Checks the counts at the index pulses. An axis whose count has drifted is off by a known small way, so that it is
+    /// braked, and loses its reference.
+    fn watch_indices(&mut self, now: Microseconds, io: &mut impl RigIo) {
+        let is_judged = !matches!(self.state, ControllerState::Updating | ControllerState::Trial);
+        for index in 0..self.axes.len() {
+            let lost = self.axes.get_mut(index).and_then(|axis| axis.watch_index(io));
+            if let Some(lost) = lost.filter(|_| is_judged) {
+                self.fail_softly(now, lost.code, index, lost.detail);
+                self.axes.iter_mut().skip(index).take(1).for_each(Axis::forget_reference);
+            }
         }
     }
 

@@ -39,7 +39,11 @@ impl Node {
             Request::GetDriver { axis } if usize::from(*axis) < self.controller.axis_count() => {
                 Report::Driver { to: 0, axis: *axis, state: io.driver(usize::from(*axis)) }
             }
-            Request::GetDriver { .. } => refused(Refusal::Invalid),
+            Request::GetEncoder { axis } if usize::from(*axis) < self.controller.axis_count() => {
+                let state = self.controller.encoder_state((*axis).into(), io);
+                Report::Encoder { to: 0, axis: *axis, state }
+            }
+            Request::GetDriver { .. } | Request::GetEncoder { .. } => refused(Refusal::Invalid),
             Request::GetEvents { first } => Report::Events { to: 0, events: self.recorder.page(*first) },
             Request::GetStatistics => Report::Statistics { to: 0, statistics: self.session.statistics() },
             Request::GetKey => Report::Key { to: 0, key: services.trusted_key() },

@@ -5,7 +5,9 @@
 mod ideal_rig;
 mod watch;
 
-use vergence_control::{AxisSettings, Controller, DriverSettings, HomingSettings, RigIo, SwitchSettings};
+use vergence_control::{
+    AxisSettings, Controller, DriverSettings, EncoderSettings, HomingSettings, RigIo, SwitchSettings,
+};
 use vergence_protocol::{
     AxisKind, AxisMask, ControllerState, FaultRecord, Jog, Micro, Microseconds, Mode, Move, MoveId, Permille,
     PoseReport, Request, SessionId, Status,
@@ -47,6 +49,7 @@ pub fn linear() -> AxisSettings {
         },
         driver: DriverSettings::default(),
         switches: SwitchSettings::default(),
+        feedback: EncoderSettings::default(),
     }
 }
 
@@ -77,6 +80,7 @@ pub fn rotary() -> AxisSettings {
         },
         driver: DriverSettings::default(),
         switches: SwitchSettings::default(),
+        feedback: EncoderSettings::default(),
     }
 }
 

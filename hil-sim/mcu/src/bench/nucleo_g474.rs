@@ -2,7 +2,7 @@
 
 use super::{AxisWiring, BenchWiring, SwitchWiring};
 use crate::pin::Pin;
-use crate::unit::UartId;
+use crate::unit::{SpiId, UartId};
 
 const A: usize = 0;
 const B: usize = 16;
@@ -35,34 +35,48 @@ impl BenchWiring {
             emergency_stop: switch(C + 4, true),
             camera_trigger: Pin::at(B + 6),
             driver_line: UartId::UART4,
+            encoder_bus: SpiId::SPI1,
         }
     }
 }
 
 fn one_axis() -> Vec<AxisWiring> {
-    vec![axis([A + 8, A + 9], [A, A + 1], [C, C + 2])]
+    vec![first()]
+}
+
+/// The baseline of a board with one axis or two.
+fn first() -> AxisWiring {
+    axis([A + 8, A + 9], [A, A + 1], [C, C + 2], Some([B + 11, B]))
 }
 
 fn two_axes() -> Vec<AxisWiring> {
-    vec![axis([A + 8, A + 9], [A, A + 1], [C, C + 2]), axis([C + 6, C + 8], [B + 2, C + 12], [C + 1, C + 3])]
+    vec![first(), axis([C + 6, C + 8], [B + 2, C + 12], [C + 1, C + 3], Some([B + 12, A + 4]))]
 }
 
 fn three_axes() -> Vec<AxisWiring> {
     vec![
-        axis([A + 8, A + 9], [A + 15, B + 3], [C, C + 2]),
-        axis([C + 6, C + 8], [A, A + 1], [C + 1, C + 3]),
-        axis([B + 2, C + 9], [A + 6, A + 7], [B, B + 1]),
+        axis([A + 8, A + 9], [A + 15, A + 1], [C, C + 2], Some([B + 11, B])),
+        axis([C + 6, C + 8], [A, C + 12], [C + 1, C + 3], Some([B + 12, A + 4])),
+        axis([B + 2, C + 9], [B + 4, C + 7], [B + 1, C + 5], None),
     ]
 }
 
-/// An axis with its step and direction pins, the lines of its encoder, home switch and hard limit.
-fn axis([step, direction]: [usize; 2], encoder: [usize; 2], [home, hard_limit]: [usize; 2]) -> AxisWiring {
+/// An axis with its step and direction pins, the lines of its encoder, home switch and hard limit, and where it has them its index
+/// line and the line that selects its absolute encoder.
+fn axis(
+    [step, direction]: [usize; 2],
+    encoder: [usize; 2],
+    [home, hard_limit]: [usize; 2],
+    more: Option<[usize; 2]>,
+) -> AxisWiring {
     AxisWiring {
         step: Pin::at(step),
         direction: Pin::at(direction),
         encoder: encoder.map(Pin::at),
         home: switch(home, false),
         hard_limit: switch(hard_limit, true),
+        index: more.map(|[index, _]| Pin::at(index)),
+        select: more.map(|[_, select]| Pin::at(select)),
     }
 }
 

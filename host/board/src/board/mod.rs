@@ -245,7 +245,8 @@ impl Board {
                 Refusal::NotReferenced { axis }
                 | Refusal::OutsideLimits { axis }
                 | Refusal::DriverNotReady { axis, .. }
-                | Refusal::HomeSwitchAside { axis },
+                | Refusal::HomeSwitchAside { axis }
+                | Refusal::EncoderNotReady { axis, .. },
                 _,
             ) => {
                 let known = self.rig.axes.get(usize::from(axis));

@@ -94,7 +94,7 @@ impl Board {
     /// # Errors
     /// [`BoardError`]: the fault that ended the move, a refusal, or a stop.
     pub async fn move_by(&mut self, distances: &[AxisPosition]) -> Result<(), BoardError> {
-        let (id, by) = (self.next_move_id(), self.rig.wire_targets(distances));
+        let (id, by) = (self.next_move_id(), self.rig.wire_distances(distances));
         self.ask(Request::Jog(Jog { id, by, speed: Permille::FULL })).await?;
         self.wait_for_move(id).await
     }

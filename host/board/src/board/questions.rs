@@ -4,7 +4,8 @@ use std::time::Duration;
 
 use tokio::time::timeout;
 use vergence_protocol::{
-    DriverState, Micro, RecordedEvent, Refusal, Report, Request, SettingItem, SettingKey, Status, Trigger, TriggerMark,
+    DriverState, EncoderState, Micro, RecordedEvent, Refusal, Report, Request, SettingItem, SettingKey, Status,
+    Trigger, TriggerMark,
 };
 
 use super::Board;
@@ -127,6 +128,33 @@ impl Board {
             drivers.extend(state.filter(|state| *state != DriverState::Plain).map(|state| (known.name.clone(), state)));
         }
         Ok(drivers)
+    }
+
+    /// State of the encoder of an axis; `None` where the board has no such axis or its firmware cannot tell.
+    ///
+    /// # Errors
+    /// [`BoardError`]: a refusal, or a link that ended.
+    pub async fn encoder(&self, axis: u8) -> Result<Option<EncoderState>, BoardError> {
+        match self.client.ask(Request::GetEncoder { axis }).await? {
+            Report::Encoder { state, .. } => Ok(Some(state)),
+            Report::Ack { status: Status::Refused(Refusal::Invalid), .. } => Ok(None),
+            Report::Ack { status: Status::Refused(refusal), .. } => Err(self.refused(refusal)),
+            _ => Err(BoardError::OtherAnswer("a question about an encoder")),
+        }
+    }
+
+    /// The encoders of which the board can tell more than a count, with the names of their axes.
+    ///
+    /// # Errors
+    /// [`BoardError`]: a refusal, or a link that ended.
+    pub async fn encoders(&self) -> Result<Vec<(String, EncoderState)>, BoardError> {
+        let mut encoders = Vec::new();
+        for (axis, known) in (0u8..).zip(&self.rig.axes) {
+            let state = self.encoder(axis).await?;
+            let told = state.filter(|state| *state != EncoderState::Plain);
+            encoders.extend(told.map(|state| (known.name.clone(), state)));
+        }
+        Ok(encoders)
     }
 
     /// All events in the flight recorder.

@@ -2,7 +2,9 @@
 
 use std::time::Duration;
 
-use vergence_protocol::{Compatibility, ControllerState, DriverState, ResetCause, SettingItem, SettingKey};
+use vergence_protocol::{
+    Compatibility, ControllerState, DriverState, EncoderState, ResetCause, SettingItem, SettingKey,
+};
 use vergence_rig::AxisPosition;
 
 use super::Finding;
@@ -40,6 +42,7 @@ pub async fn check_board(board: &mut Board, checks: BoardChecks) -> Vec<Finding>
     findings.push(settings(board, checks.line_baud).await);
     findings.extend(switches(board).await);
     findings.extend(drivers(board).await);
+    findings.extend(encoders(board).await);
     findings.push(key(board).await);
     findings
 }
@@ -76,6 +79,21 @@ async fn drivers(board: &Board) -> Vec<Finding> {
             }
             DriverState::Starting => Finding::warn("drivers", reason, "try again in a second"),
             _ => Finding::pass("drivers", reason),
+        }
+    });
+    judged.collect()
+}
+
+/// Checks the encoders that tell more than a count.
+async fn encoders(board: &Board) -> Vec<Finding> {
+    // Where the link fails, other checks say so.
+    let encoders = board.encoders().await.unwrap_or_default();
+    let judged = encoders.into_iter().map(|(axis, state)| {
+        let reason = format!("the encoder of {axis}: {state}");
+        match state {
+            EncoderState::Failed(code) => Finding::fail("encoders", reason, code.remedy()),
+            EncoderState::Starting => Finding::warn("encoders", reason, "try again in a second"),
+            _ => Finding::pass("encoders", reason),
         }
     });
     judged.collect()
@@ -187,7 +205,7 @@ fn limits(board: &Board) -> Vec<Finding> {
         let [low, high] = axis.range;
         let [min, max] = [info.min, info.max].map(|end| AxisPosition::from_micro(axis.kind, end));
         let name = &axis.name;
-        if low.micro() < info.min || high.micro() > info.max {
+        if axis.wire_position(low) < info.min || axis.wire_position(high) > info.max {
             return Finding::fail(
                 "limits",
                 format!("the rig file lets {name} go from {low} to {high}, the board from {min} to {max}"),

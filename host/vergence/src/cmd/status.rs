@@ -37,6 +37,7 @@ pub async fn run(args: &Args, common: &CommonOptions, console: Console) -> Resul
     }
     let story = if args.why { Some(Story::read(&board).await?) } else { None };
     let drivers = board.drivers().await?;
+    let encoders = board.encoders().await?;
     let info = board.info();
     let [major, minor, patch] = info.firmware;
     if console.is_json() {
@@ -50,6 +51,10 @@ pub async fn run(args: &Args, common: &CommonOptions, console: Console) -> Resul
         if !drivers.is_empty() {
             status["drivers"] = drivers.iter().map(|(axis, state)| (axis.clone(), json!(state.to_string()))).collect();
         }
+        if !encoders.is_empty() {
+            status["encoders"] =
+                encoders.iter().map(|(axis, state)| (axis.clone(), json!(state.to_string()))).collect();
+        }
         if let Some(story) = &story {
             status["why"] = story.json(board.rig());
         }
@@ -60,6 +65,9 @@ pub async fn run(args: &Args, common: &CommonOptions, console: Console) -> Resul
     console.say_pose(board.rig(), board.pose())?;
     for (axis, state) in drivers {
         console.say(format!("motor driver of {axis}: {state}"))?;
+    }
+    for (axis, state) in encoders {
+        console.say(format!("encoder of {axis}: {state}"))?;
     }
     match story {
         Some(story) => story.print(board.rig(), console),
