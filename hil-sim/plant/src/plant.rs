@@ -214,6 +214,11 @@ impl RigIo for Plant {
         self.axes.get(axis).map_or(0, AxisPlant::encoder)
     }
 
+    fn encoders_read_at(&self, _now: Microseconds) -> Microseconds {
+        // They read now whatever tick this is.
+        self.now
+    }
+
     fn home_switch(&self, axis: usize) -> bool {
         let switch = self.home_wires.get(axis).and_then(|&wired| self.axes.get(wired));
         switch.is_some_and(AxisPlant::home_switch)
