@@ -61,8 +61,15 @@ impl Rig {
     /// Starts the steps ordered for the tick that has begun. Returns whether the steps of the tick before were made in time.
     pub fn begin_tick(&mut self) -> bool {
         let mut in_time = true;
-        for axis in &mut self.steps {
-            in_time &= axis.begin_tick();
+        let mut waits = self.steps.each_ref().map(|_| true);
+        // No axis waits for the last pulse of another: its first step may be due before.
+        while waits.contains(&true) {
+            for (axis, waits) in self.steps.iter_mut().zip(&mut waits) {
+                if *waits && axis.is_ready() {
+                    *waits = false;
+                    in_time &= axis.begin_tick();
+                }
+            }
         }
         self.trigger.poll();
         in_time

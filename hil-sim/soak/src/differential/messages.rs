@@ -103,7 +103,8 @@ fn faults(with: &mut Comparison, native: &FaultRecord, chip: &FaultRecord) -> Re
 impl Comparison {
     /// Notes that the boards have different names for a failure at the edge of two rules.
     fn note_names(&mut self, native: &FaultRecord, chip: &FaultRecord) {
-        let near = |fault: &FaultRecord| matches!(fault.code, FaultCode::Stall | FaultCode::Slip | FaultCode::WrongDirection);
+        let near =
+            |fault: &FaultRecord| matches!(fault.code, FaultCode::Stall | FaultCode::Slip | FaultCode::WrongDirection);
         let differ = native.code != chip.code && near(native) && near(chip);
         if differ && self.slack.is_between_stall_and_slip(usize::from(native.axis.unwrap_or_default())) {
             self.named_apart = true;
