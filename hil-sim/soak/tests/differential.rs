@@ -11,7 +11,7 @@ mod programs;
 use programs::delivered;
 use vergence_plant::{AxisMechanics, NativeBoard, Stage};
 use vergence_protocol::{Micro, Mode, Move, MoveId, Permille, Request, SettingItem, SettingKey, Trigger};
-use vergence_soak::differential::{Act, Fate, Session, Verdict, differential, play};
+use vergence_soak::differential::{Act, Fate, Figures, Mishap, Session, Verdict, differential, play};
 use vergence_soak::stages;
 
 /// Sessions to play, unless `VERGENCE_DIFFERENTIAL` names another number; from seed 1 on, or from `VERGENCE_DIFFERENTIAL_FROM`.
@@ -61,16 +61,6 @@ fn updated(fate: Fate) -> Session {
 /// Plays a session with two boards that are alike.
 fn both_alike(session: &Session) -> Verdict {
     compare(session, delivered().native(&stages(), &PLACES, 1).expect("it works"))
-}
-
-/// Seeds of sessions to be looked at, with what happens in them.
-#[test]
-#[ignore = "shows the sessions that VERGENCE_SEEDS names"]
-fn shown() {
-    for seed in std::env::var("VERGENCE_SEEDS").expect("seeds").split(',').map(|seed| seed.parse().expect("a seed")) {
-        let verdict = Session::of(seed).on_both(delivered()).expect("the bench works");
-        println!("seed {seed}\n{}", verdict.journal);
-    }
 }
 
 #[test]
@@ -131,6 +121,46 @@ fn found(named: &str, verdict: &Verdict) {
 fn boards_that_are_alike_do_not_differ() {
     let verdict = verdict(|_| {});
     assert_eq!(verdict.difference, None, "{}", verdict.journal);
+    // 20 us of the steps, 20 of the mechanics, 20 of the edges; and where an axis goes 50 counts a tick or more, two counts of
+    // rounding and the 2.5 of a step are up to 90 us.
+    let lag_us = verdict.figures.lag_us;
+    println!("counts in mid-move: {lag_us:.0} us apart");
+    assert!((20.0..150.0).contains(&lag_us), "{lag_us}");
+}
+
+/// What two boards that are alike do from these places of the baseline, or with these mishaps; none may differ.
+fn figures(sessions: impl Iterator<Item = Session>) -> Figures {
+    let mut all = Figures::default();
+    for session in sessions {
+        let native = delivered().native(&stages(), &session.positions, 1).expect("it works");
+        let mechanics = stages().map(|stage| stage.mechanics);
+        let verdict = play(&session, native, delivered().chip(&mechanics, &session.positions), delivered().next());
+        assert_eq!(verdict.difference, None, "{}", verdict.journal);
+        all.merge(&verdict.figures);
+    }
+    all
+}
+
+#[test]
+fn a_home_switch_may_be_seen_a_tick_earlier_or_later() {
+    let from = |place| Session { positions: [PLACES[0] + f64::from(place) * 7.0, PLACES[1]], ..session() };
+    let figures = figures((0..6).map(from));
+    println!("{} motions apart", figures.motions_apart);
+    assert!(figures.motions_apart > 0);
+}
+
+#[test]
+fn a_failure_between_a_stall_and_a_slip_may_have_either_name() {
+    let slips = |share| {
+        let mut session = session();
+        let acts = [go(3, [64_000, 600_000], 300), Act::Mishap(Mishap::Slips(1, share)), Act::Wait(300), Act::Recover];
+        session.acts.splice(7.., acts);
+        session
+    };
+    let shares = (0..10).map(|number| 0.742 + 0.0016 * f64::from(number));
+    let figures = figures(shares.map(slips));
+    println!("{} of 10 with two names", figures.named_apart);
+    assert!(figures.named_apart > 0);
 }
 
 #[test]
