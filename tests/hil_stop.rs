@@ -200,7 +200,7 @@ fn braking_begins(pulses: &[StepMade], ordered_us: u64) -> f64 {
     let begins = pulses.iter().enumerate().skip(ordered).filter_map(|(number, step)| {
         let behind = (step.at_ns as f64 - last) / period - (number + 1 - ordered) as f64;
         let since = (6.0 * behind / jerk).cbrt();
-        (BEHIND[0]..BEHIND[1]).contains(&behind).then(|| step.at_ns as f64 * 1e-3 - since * 1e6)
+        (BEHIND[0]..BEHIND[1]).contains(&behind).then_some(step.at_ns as f64 * 1e-3 - since * 1e6)
     });
     let begins: Vec<f64> = begins.collect();
     assert!(begins.len() > 10, "the motor brakes: {}", begins.len());

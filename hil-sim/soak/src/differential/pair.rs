@@ -19,8 +19,8 @@ const BYTE_NS: u64 = 10_851;
 const HANDLING_US: u64 = 50;
 /// The part of a tick in which frames end, in microseconds after its start: both boards take them in the same tick.
 pub const ARRIVALS_US: [u64; 2] = [150, 650];
-/// Longest time from a reset to the first tick: boot loader and signature check take some 0.2 s, and a swap of two images some
-/// seven seconds: 144 erasures of 22 ms and 36 200 words of 82 us (DS12288, table 55).
+/// Longest time from a reset to the first tick: boot loader and signature check take some 0.13 s, and a swap of two images 5.5 s
+/// (docs/firmware.md).
 const LONGEST_START_US: u64 = 15_000_000;
 /// Time in which loads come to rest, in microseconds.
 const SWINGING_US: u64 = 200_000;
