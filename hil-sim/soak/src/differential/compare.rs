@@ -193,7 +193,10 @@ impl Comparison {
                 continue;
             }
             let (ours, theirs) = (native.pose.counts[axis], chip.counts[axis]);
-            let allowed = self.slack.counts_at(axis, ticks as f64, speed_near(pair, native, axis));
+            let mut allowed = self.slack.counts_at(axis, ticks as f64, speed_near(pair, native, axis));
+            if self.apart.homing {
+                allowed += self.slack.search_counts(axis);
+            }
             let field = format!("counts of axis {axis} in state {}", native.pose.state);
             Difference::unless_close(field, 0.0, f64::from(apart(ours, theirs)), allowed)?;
             if ticks == 0

@@ -138,6 +138,13 @@ impl Slack {
         self.way_back(axis) / self.step(axis) + 1.0
     }
 
+    /// Counts by which a search may end apart although its steps do not show it: where the axes are some steps apart before, as
+    /// after drivers that went off in mid-move, steps are allowed as much, and the switch may be seen a tick earlier or later.
+    pub fn search_counts(&self, axis: usize) -> f64 {
+        let unseen = self.places[axis] > self.way_back(axis);
+        if unseen { per_tick(self.settings(axis).homing.seek_speed) / self.count(axis) } else { 0.0 }
+    }
+
     /// An axis goes back from its home switch.
     pub fn goes_back(&mut self, axis: usize) {
         let way = self.way_back(axis);
