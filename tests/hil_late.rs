@@ -10,14 +10,10 @@
 mod elf_rig;
 
 use elf_rig::{Board, Conversation, ElfBoard, Standing};
-use vergence_cpu::{Access, Bus};
-use vergence_mcu::Picoseconds;
 use vergence_plant::NativeBoard;
 use vergence_protocol::{ControllerState, FaultCode, MovePhase, Request, Status};
 
 const HERBIVORE: [i32; 2] = [145_000, 2_094_395];
-const TIM7_DIER: u32 = 0x4000_140C;
-const TIM7_CNT: u32 = 0x4000_1424;
 /// Delays without and with a fault, in microseconds. The chip needs some microseconds more to begin a tick.
 const HARMLESS: [u64; 4] = [20, 90, 150, 185];
 const TOO_LATE: [u64; 4] = [210, 400, 900, 1_500];
@@ -34,20 +30,8 @@ impl Delayed for NativeBoard {
 }
 
 impl Delayed for ElfBoard {
-    /// Masks the interrupt of the tick's timer until so long after its next update.
     fn delay_next_tick(&mut self, us: u64) {
-        let access = |talk: &mut Self, value: Option<u32>, register| {
-            let cycle = talk.machine.cpu().now();
-            let chip = talk.machine.chip_mut();
-            match value {
-                Some(value) => chip.write(cycle, register, Access::Word, value).map(|_| 0).expect("it is there"),
-                None => chip.read(cycle, register, Access::Word).expect("it is there"),
-            }
-        };
-        let passed = u64::from(access(self, None, TIM7_CNT));
-        access(self, Some(0), TIM7_DIER);
-        self.machine.run_for(Picoseconds::microseconds(1_000 - passed + us));
-        access(self, Some(1), TIM7_DIER);
+        self.delay_tick(us);
     }
 }
 

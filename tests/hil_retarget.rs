@@ -1,5 +1,5 @@
-//! New targets in mid-move: the firmware on the simulated chip takes them at any phase of a move without a fault, and comes to
-//! rest where the native board does.
+//! New targets in mid-move: the firmware on the simulated chip takes them at any phase of a move without a fault, its
+//! acceleration does not jump where a new plan takes over, and it comes to rest where the native board does.
 //!
 //! `VERGENCE_RETARGETS=1000` tries that many.
 #![allow(
@@ -11,10 +11,10 @@
 
 mod elf_rig;
 
-use elf_rig::{Board, Conversation, ElfBoard, Standing};
+use elf_rig::{Board, Continuity, Conversation, ElfBoard, Standing};
 use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64Mcg;
-use vergence_plant::{NativeBoard, bench_settings};
+use vergence_plant::{NativeBoard, StepMade, bench_settings};
 use vergence_protocol::{ControllerState, Counts, Microseconds, MovePhase, Request, SettingItem, SettingKey, Status};
 
 const SEED: u64 = 20;
@@ -56,6 +56,21 @@ fn rows(retargets: usize) -> Vec<Vec<Order>> {
     (0..retargets.div_ceil(IN_A_ROW)).map(|_| (0..=IN_A_ROW).map(|_| order()).collect()).collect()
 }
 
+/// The largest jerk of an axis, in steps per second cubed.
+fn jerk(axis: usize) -> f64 {
+    let settings = bench_settings()[axis];
+    f64::from(settings.jerk) / (f64::from(settings.motor().position_at(1_000_000).0) * 1e-6)
+}
+
+/// Takes the pulses of a motion from the mechanics, and adds what they show.
+fn look<B: Board>(talk: &mut Conversation<B>, shown: &mut [Continuity; 2]) {
+    for (axis, shown) in shown.iter_mut().enumerate() {
+        let mut made = Vec::new();
+        talk.board.with_plant(|plant| made = plant.axis_mut(axis).expect("it is there").take_steps());
+        shown.merge(&Continuity::of(&made, jerk(axis)));
+    }
+}
+
 /// Sends each row of targets, lets the board settle after it, and returns the counts at each rest.
 fn rests<B: Board>(rows: &[Vec<Order>]) -> Vec<Vec<Counts>> {
     let mut talk = Conversation::<B>::open(&Standing::default());
@@ -64,7 +79,8 @@ fn rests<B: Board>(rows: &[Vec<Order>]) -> Vec<Vec<Counts>> {
         assert_eq!(talk.ask(Request::SetSetting { key, value: backlash.into() }), Status::Accepted);
     }
     talk.arm_and_home();
-    let mut phases = [0; 2];
+    talk.board.with_plant(vergence_plant::Plant::record_steps);
+    let (mut phases, mut shown) = ([0; 2], [Continuity::default(); 2]);
     let rests = rows.iter().map(|row| {
         for order in row {
             let was_moving = talk.pose().phase == MovePhase::Running;
@@ -80,11 +96,58 @@ fn rests<B: Board>(rows: &[Vec<Order>]) -> Vec<Vec<Counts>> {
         talk.wait_for(ControllerState::Ready);
         talk.wait(50_000);
         assert_eq!(talk.pose().phase, MovePhase::Settled);
+        look(&mut talk, &mut shown);
         talk.pose().counts.to_vec()
     });
     let rests = rests.collect();
+    for (axis, shown) in shown.iter().enumerate() {
+        println!("axis {axis}: {shown:.3?} of a jerk of {:.0}", jerk(axis));
+        assert!(shown.windows > 500 * rows.len() && shown.worst <= 1.0, "axis {axis}: {shown:?}");
+    }
     println!("{} targets at rest or while settling, {} in mid-move", phases[0], phases[1]);
     rests
+}
+
+/// The pulses of an axis that speeds up with `acceleration` at `speed`, and with less by `jump` after half of a fifth of a second;
+/// pulses of each millisecond are late by up to 1.5 us.
+fn pulses(speed: f64, acceleration: f64, jump: f64) -> Vec<StepMade> {
+    const HALF_S: f64 = 0.1;
+    let mut random = Pcg64Mcg::seed_from_u64(SEED);
+    let late: Vec<f64> = (0..201).map(|_| random.random_range(0.0..1.5e-6)).collect();
+    let place = |at: f64| {
+        let after = (at - HALF_S).max(0.0);
+        speed * at + acceleration * at * at / 2.0 - jump * after * after / 2.0
+    };
+    let mut made = Vec::new();
+    let mut at = 0.0;
+    for step in 1.. {
+        // Newton's method: the speed hardly changes from step to step.
+        for _ in 0..20 {
+            at += (f64::from(step) - place(at)) / (speed + acceleration * at);
+        }
+        if at >= 2.0 * HALF_S {
+            return made;
+        }
+        made.push(StepMade { at_ns: ((at + late[(at * 1e3) as usize]) * 1e9) as u64, forward: true });
+    }
+    made
+}
+
+/// A plan that begins without the acceleration of the one before would be noticed: at full speed from 0.4 of the largest one,
+/// at a tenth of it from a quarter.
+#[test]
+fn a_jump_of_the_acceleration_shows_in_the_pulses() {
+    for axis in 0..2 {
+        let settings = bench_settings()[axis];
+        let step = f64::from(settings.motor().position_at(1_000_000).0) * 1e-6;
+        let [most, fastest] = [settings.acceleration, settings.speed].map(|rate| f64::from(rate) / step);
+        for (speed, share) in [(0.8, 0.4), (0.1, 0.25)] {
+            let smooth = Continuity::of(&pulses(speed * fastest, most / 2.0, 0.0), jerk(axis));
+            let jumps = Continuity::of(&pulses(speed * fastest, most / 2.0, share * most), jerk(axis));
+            println!("axis {axis}, speed {speed}: {smooth:.3?}, with a jump {jumps:.3?}");
+            assert!(smooth.windows > 100 && smooth.worst < 0.5 && jumps.worst > 1.0, "{smooth:?} {jumps:?}");
+        }
+    }
 }
 
 /// The largest difference of the steps that an axis made in two milliseconds, one after the other.

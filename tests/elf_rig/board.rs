@@ -2,6 +2,7 @@
 
 use std::sync::OnceLock;
 
+use vergence_cpu::{Access, Bus};
 use vergence_image::layout::ACTIVE;
 use vergence_mcu::{Bench, BenchWiring, ChipConfig, Firmware, Frame, Halt, LineFault, Machine, Picoseconds, UartId};
 use vergence_plant::{AxisMechanics, NativeBoard, Plant, bench_mechanics, bench_settings};
@@ -11,6 +12,9 @@ use super::build::build;
 use super::conversation::{Conversation, Wired};
 use super::program::sealed;
 
+/// Registers of the timer whose interrupt is the control tick (RM0440, 31.4): its interrupt enable and its microseconds.
+const TIM7_DIER: u32 = 0x4000_140C;
+const TIM7_CNT: u32 = 0x4000_1424;
 /// The speed of the line from the factory.
 const BAUD: u32 = 921_600;
 
@@ -74,6 +78,30 @@ pub fn programs() -> &'static [Firmware; 2] {
             Firmware::from_elf(&bytes).expect("the ELF is for this chip")
         })
     })
+}
+
+impl ElfBoard {
+    /// Microseconds since the running control tick was due.
+    pub fn tick_passed_us(&mut self) -> u64 {
+        self.register(TIM7_CNT, None).into()
+    }
+
+    /// Masks the interrupt of the tick's timer until so long after its next update.
+    pub fn delay_tick(&mut self, us: u64) {
+        let passed = self.tick_passed_us();
+        self.register(TIM7_DIER, Some(0));
+        self.machine.run_for(Picoseconds::microseconds(1_000 - passed + us));
+        self.register(TIM7_DIER, Some(1));
+    }
+
+    fn register(&mut self, address: u32, value: Option<u32>) -> u32 {
+        let cycle = self.machine.cpu().now();
+        let chip = self.machine.chip_mut();
+        match value {
+            Some(value) => chip.write(cycle, address, Access::Word, value).map(|_| 0).expect("it is there"),
+            None => chip.read(cycle, address, Access::Word).expect("it is there"),
+        }
+    }
 }
 
 impl Board for ElfBoard {

@@ -5,6 +5,7 @@
 mod adapter;
 mod board;
 mod build;
+mod continuity;
 #[path = "../conversation.rs"]
 mod conversation;
 mod full_speed;
@@ -14,6 +15,7 @@ mod program;
 pub use adapter::{Adapter, AdapterKind};
 pub use board::{Board, ElfBoard, Standing, programs};
 pub use build::{build_trusting, build_wired};
+pub use continuity::Continuity;
 pub use conversation::{BOTH, Conversation, LEASE_MS, Wired};
 pub use full_speed::{POSE_PERIOD_US, at_full_speed, cruise, far_from, geared};
 pub use log::decode;

@@ -93,8 +93,15 @@ impl Rig {
     /// Starts the steps ordered for the tick that has begun. Returns whether the steps of the tick before were made in time.
     pub fn begin_tick(&mut self) -> bool {
         let mut in_time = true;
-        for stage in &mut self.stages {
-            in_time &= stage.steps.begin_tick();
+        let mut waits = [true; AXES];
+        // No axis waits for the last pulse of another: its first step may be due before.
+        while waits.contains(&true) {
+            for (stage, waits) in self.stages.iter_mut().zip(&mut waits) {
+                if *waits && stage.steps.is_ready() {
+                    *waits = false;
+                    in_time &= stage.steps.begin_tick();
+                }
+            }
         }
         self.trigger.poll();
         in_time

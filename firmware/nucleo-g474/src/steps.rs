@@ -123,9 +123,15 @@ impl StepPulses {
         self.ordered = Ordered { count: steps.at_ns.len(), forward: steps.forward, first };
     }
 
-    /// Starts the ordered list in a tick that has begun. Returns whether the previous list had ended in time.
+    /// Whether the previous list has ended, or [`PATIENCE_US`] of the tick have passed.
+    pub fn is_ready(&self) -> bool {
+        !self.runs() || TIM7.cnt().read().cnt() > PATIENCE_US
+    }
+
+    /// Starts the ordered list in a tick that has begun. Returns whether the previous list had ended; one that had not is cut
+    /// short.
     pub fn begin_tick(&mut self) -> bool {
-        let in_time = self.wait_for_the_last();
+        let in_time = !self.runs();
         self.settle();
         let ordered = core::mem::take(&mut self.ordered);
         if ordered.count > 0 {
@@ -135,10 +141,14 @@ impl StepPulses {
                 self.direction.set_level(if self.forward { Level::High } else { Level::Low });
             }
             self.front = 1 - self.front;
-            let now = u32::from(TIM7.cnt().read().cnt()) * COUNTS_PER_US;
             let least = if turned { DIRECTION_SETUP } else { COUNTS_PER_US };
-            let rise = (DELAY + ordered.first).saturating_sub(now).max(least);
-            self.start(rise + PULSE, ordered.count);
+            // An interrupt between the look at the clock and the start would delay the list: by 4 us where it was the serial
+            // line's, which is a jump of speed at each end of the tick.
+            critical_section::with(|_| {
+                let now = u32::from(TIM7.cnt().read().cnt()) * COUNTS_PER_US;
+                let rise = (DELAY + ordered.first).saturating_sub(now).max(least);
+                self.start(rise + PULSE, ordered.count);
+            });
         }
         in_time
     }
@@ -164,14 +174,8 @@ impl StepPulses {
         self.running.saturating_sub(usize::from(self.dma.ndtr().read().ndt()))
     }
 
-    /// Waits for the end of the running list, at most [`PATIENCE_US`] into the next tick; returns whether it came in time.
-    fn wait_for_the_last(&self) -> bool {
-        while self.timer.cr1().read().cen() {
-            if TIM7.cnt().read().cnt() > PATIENCE_US {
-                return false;
-            }
-        }
-        true
+    fn runs(&self) -> bool {
+        self.timer.cr1().read().cen()
     }
 
     /// Adds the steps made by the running list to the count, and stops the list.

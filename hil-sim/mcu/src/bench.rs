@@ -236,12 +236,14 @@ impl Bench {
         }
     }
 
-    fn step(&mut self, axis: usize, now: Microseconds) {
+    fn step(&mut self, axis: usize, at: Instant) {
         if let Some(pulses) = self.pulses.get_mut(axis) {
             *pulses += 1;
         }
         let forward = self.axes.get(axis).is_some_and(|state| state.forward);
-        let at_ns = [0].into_iter().collect();
+        let now = microseconds(at);
+        let past_ns = at.time.0 / 1_000 - now.0 * 1_000;
+        let at_ns = [past_ns as u32].into_iter().collect();
         self.plant.schedule_steps(axis, &StepSchedule { start: now, forward, at_ns });
         self.wake(now);
     }
@@ -329,7 +331,7 @@ impl World for Bench {
             } else if wiring.select == Some(edge.pin) {
                 self.axes[axis].selection.select(edge);
             } else if edge.pin == wiring.step && edge.high {
-                self.step(axis, now);
+                self.step(axis, edge.at);
             }
         }
     }

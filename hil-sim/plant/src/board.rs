@@ -2,7 +2,7 @@
 
 use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64Mcg;
-use vergence_control::{AxisSettings, BoardSettings, Node, NodeIdentity, SettingsError};
+use vergence_control::{AxisSettings, BoardSettings, Node, NodeIdentity, SettingsError, TICK_US};
 use vergence_protocol::management::{NATIVE_HARDWARE, RebootTo};
 use vergence_protocol::{ControllerState, MAX_FRAME, Microseconds, PoseReport, ResetCause};
 
@@ -81,15 +81,25 @@ impl NativeBoard {
     /// Lets time pass until `to`, running every control tick on its instant.
     pub fn advance(&mut self, to: Microseconds) {
         while self.next_tick() <= to {
+            let due = self.node.wakes_at();
             self.now = self.next_tick();
             self.plant.advance(self.now);
-            self.node.poll(self.now, &mut self.plant);
-            self.node.plan_at_once();
+            self.tick(due);
         }
         if to > self.now {
             self.plant.advance(to);
             self.now = to;
         }
+    }
+
+    /// Runs the control tick that was due at `due`. Ticks keep to whole periods, as those of a board whose timer goes on
+    /// whatever the latency: those that a delay has taken are left out.
+    fn tick(&mut self, due: Microseconds) {
+        let late = self.now.0.saturating_sub(due.0);
+        let tick = Microseconds(due.0 + late / TICK_US * TICK_US);
+        self.node.allow_delay(tick, late, &mut self.plant);
+        self.node.poll(tick, &mut self.plant);
+        self.node.plan_at_once();
     }
 
     /// Delays the next control tick by `us` microseconds.

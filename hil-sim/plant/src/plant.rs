@@ -254,6 +254,11 @@ impl RigIo for Plant {
         self.axes.get_mut(axis).map(AxisPlant::take_index).unwrap_or_default()
     }
 
+    fn encoders_read_at(&self, _now: Microseconds) -> Microseconds {
+        // They read now whatever tick this is.
+        self.now
+    }
+
     fn home_switch(&self, axis: usize) -> bool {
         if self.diag_wires.contains(&axis) {
             let is_high = self.broken_diag.contains(&axis) || self.drivers.chip(axis).is_some_and(Tmc2209::diag);

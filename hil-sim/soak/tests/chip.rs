@@ -27,11 +27,16 @@ fn the_firmware_breaks_no_promise_whatever_the_fault() {
 
 #[test]
 fn random_scenarios_break_no_promise() {
-    let Ok(named) = std::env::var("VERGENCE_ELF_SCENARIOS") else {
-        return println!("SKIPPED random scenarios: VERGENCE_ELF_SCENARIOS names how many, a second each");
+    let named = |name: &str| std::env::var(name).ok().map(|number| number.parse().expect("a number"));
+    let Some(count) = named("VERGENCE_ELF_SCENARIOS") else {
+        return println!(
+            "SKIPPED random scenarios: VERGENCE_ELF_SCENARIOS names how many, two seconds each, and \
+             VERGENCE_ELF_SCENARIOS_FROM the first seed"
+        );
     };
+    let first = named("VERGENCE_ELF_SCENARIOS_FROM").unwrap_or(1);
     let board = |scenario: &Scenario| Ok::<ChipBoard, Infallible>(flash().board(scenario));
-    let tally = soak(1, named.parse().expect("a number of scenarios"), board, || {}).expect("boards cannot fail");
+    let tally = soak(first, count, board, || {}).expect("boards cannot fail");
     println!("{}\n{:.0} s of virtual time", tally.table(), tally.virtual_seconds);
     assert!(tally.violations.is_empty(), "{:#?}", tally.violations);
 }

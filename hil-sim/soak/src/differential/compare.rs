@@ -49,6 +49,8 @@ pub struct Comparison {
     pub clocks: Option<i64>,
     pub slack: Slack,
     pub apart: Apart,
+    /// Whether the boards have given different names to a failure between a stall and a slip.
+    pub named_apart: bool,
     pub figures: Figures,
     steps: [Steps; 2],
     /// Chip's motor steps less those of the native board, at the last rest.
@@ -63,6 +65,7 @@ impl Comparison {
             clocks: None,
             slack: Slack::new(),
             apart: Apart::default(),
+            named_apart: false,
             figures: Figures::default(),
             steps: [Steps::default(), Steps::default()],
             offsets: [0; 2],
@@ -190,7 +193,10 @@ impl Comparison {
                 continue;
             }
             let (ours, theirs) = (native.pose.counts[axis], chip.counts[axis]);
-            let allowed = self.slack.counts(axis, ticks as f64);
+            let mut allowed = self.slack.counts_at(axis, ticks as f64, speed_near(pair, native, axis));
+            if self.apart.homing {
+                allowed += self.slack.search_counts(axis);
+            }
             let field = format!("counts of axis {axis} in state {}", native.pose.state);
             Difference::unless_close(field, 0.0, f64::from(apart(ours, theirs)), allowed)?;
             if ticks == 0
@@ -223,13 +229,16 @@ impl Comparison {
             steps.compare(
                 axis,
                 [&mut native.steps[axis], &mut chip.steps[axis]],
-                Moment { pose: pose.as_ref(), steady },
+                Moment { pose: pose.as_ref(), steady, steps_back: self.slack.steps_back(axis) },
                 self.apart,
                 self.slack.target_steps(axis),
                 &mut self.figures,
             )?;
             if self.apart.homing && steps.is_apart() && !was_apart {
                 self.slack.homes_apart(axis);
+            }
+            if steps.went_back() {
+                self.slack.goes_back(axis);
             }
         }
         Ok(())
@@ -273,6 +282,14 @@ impl Comparison {
         self.slack.rested();
         (self.apart.homing, self.apart.late) = (false, false);
     }
+}
+
+/// The largest way of a load in the ticks around this one, in micro-units.
+fn speed_near(pair: &Pair, tick: &Snapshot, axis: usize) -> f64 {
+    const NEAR_US: u64 = 2 * TICK_US;
+    let near = pair.ticks.iter().filter(|other| other.pose.at.0.abs_diff(tick.pose.at.0) <= NEAR_US);
+    let loads: Vec<f64> = near.map(|tick| tick.loads[axis]).collect();
+    loads.windows(2).map(|pair| (pair[1] - pair[0]).abs()).fold(0.0, f64::max)
 }
 
 /// The time of the session of the latest step, in microseconds.

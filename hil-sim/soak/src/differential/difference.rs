@@ -56,6 +56,8 @@ pub struct Figures {
     pub poses_a_tick_apart: u64,
     /// Motions in which the boards saw a switch or an encoder at different ticks; their later steps are only counted.
     pub motions_apart: u64,
+    /// Failures between a stall and a slip, to which the boards gave different names.
+    pub named_apart: u64,
     /// Largest difference of step instants by phase, in microseconds, of steps that come faster than 10 kHz.
     pub step_us: [f64; 5],
     /// The same of all steps, as a share of the time since the step before.
@@ -86,6 +88,7 @@ impl Figures {
         self.steps += other.steps;
         self.poses_a_tick_apart += other.poses_a_tick_apart;
         self.motions_apart += other.motions_apart;
+        self.named_apart += other.named_apart;
         self.request_us = self.request_us.max(other.request_us);
         self.lag_us = self.lag_us.max(other.lag_us);
         let theirs = other.step_us.into_iter().chain(other.step_share);

@@ -32,12 +32,25 @@ pub enum Act {
     LateTick(u64),
     /// An update with these bytes and a bad signature, and then a restart.
     Update(Vec<u8>),
+    /// A whole update, which both boards accept.
+    Install(Fate),
     /// The reset button is pressed.
     Reset,
     /// Mend the mechanics, clear a fault, arm, and home what has no reference: what a person would do.
     Recover,
     /// Read all recorded events.
     ReadEvents,
+}
+
+/// What becomes of an image that a board has accepted and started on trial.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Fate {
+    /// It is confirmed.
+    Kept,
+    /// It is not confirmed, and the next start goes back to the image before.
+    Reverted,
+    /// It is confirmed, and a rollback goes back to the image before.
+    RolledBack,
 }
 
 /// One session.
@@ -54,6 +67,9 @@ pub struct Session {
 /// Periods of telemetry, in microseconds.
 const PERIODS_US: [u32; 5] = [1_000, 2_000, 3_700, 5_000, 10_000];
 
+/// Share of sessions with a whole update.
+const INSTALLS: f64 = 0.03;
+
 impl Session {
     /// Draws the session of a seed.
     #[must_use]
@@ -68,6 +84,7 @@ impl Session {
         for _ in 0..draw.random.random_range(1..=3) {
             draw.episode();
         }
+        draw.install(seed);
         draw.end();
         Self { seed, acts: draw.acts, positions }
     }
@@ -138,6 +155,18 @@ impl Draw {
             self.acts.push(Act::Rest);
         }
         self.acts.push(Act::Recover);
+    }
+
+    /// In few sessions a whole update, which takes as long as all else. Drawn apart from the rest of the session.
+    fn install(&mut self, seed: u64) {
+        let mut random = Pcg64Mcg::seed_from_u64(seed ^ 0x1a57);
+        if random.random_bool(INSTALLS) {
+            let fates = [Fate::Kept, Fate::Reverted, Fate::RolledBack];
+            let fate = fates[random.random_range(0..fates.len())];
+            self.acts.push(Act::Ask(Request::Disarm, 20));
+            self.acts.extend([Act::Rest, Act::Install(fate), Act::Recover]);
+            self.go();
+        }
     }
 
     fn end(&mut self) {

@@ -44,6 +44,8 @@ pub struct Side {
     receiver: Receiver,
     /// Messages of each kind, with the time of the session in microseconds at which they were there.
     said: [VecDeque<(u64, Said)>; 6],
+    /// How many of each kind were heard.
+    counts: [u64; 6],
     /// Poses.
     pub poses: VecDeque<PoseReport>,
     /// Steps of each axis: time of the session in nanoseconds, and whether forward.
@@ -85,6 +87,12 @@ impl Side {
             self.heard.pop_front();
         }
         self.said[stream as usize].push_back((now_us, said));
+        self.counts[stream as usize] += 1;
+    }
+
+    /// How many messages of a kind were heard.
+    pub fn count(&self, stream: Stream) -> u64 {
+        self.counts[stream as usize]
     }
 
     /// The oldest message of a kind.

@@ -9,8 +9,6 @@ use super::difference::{Difference, Figures};
 
 /// The list of a tick runs so much later on the chip, in nanoseconds.
 const LATE_NS: i64 = 20_000;
-/// Steps by which the way back from the home switch may differ: it is counted by the encoder, which lags in the fast search.
-const HOMING_STEPS: f64 = 4.0;
 /// Longest time between two steps that counts as their distance, in nanoseconds.
 const LONGEST_NS: u64 = 60_000_000;
 /// Longest time in microseconds from the turn of one motor to that of the other: with targets some steps apart, one makes some
@@ -66,6 +64,9 @@ pub struct Moment<'a> {
     pub pose: Option<&'a PoseReport>,
     /// Whether the axis goes at a constant speed.
     pub steady: bool,
+    /// Steps by which the way back from the home switch may differ: it is counted by the encoder, which lags in the fast
+    /// search.
+    pub steps_back: f64,
 }
 
 /// The steps of one axis since its last rest.
@@ -74,6 +75,9 @@ pub struct Steps {
     last_ns: Option<u64>,
     interval_ns: u64,
     first_move: Option<MoveId>,
+    /// Whether the axis has searched downwards, and whether it has gone back upwards since.
+    searched: bool,
+    went_back: bool,
     /// Whether the boards make different steps from here on.
     apart: bool,
 }
@@ -84,12 +88,17 @@ impl Steps {
         self.apart
     }
 
+    /// Whether the axis has gone back from its home switch.
+    pub fn went_back(&self) -> bool {
+        self.went_back
+    }
+
     /// Compares the steps that both boards have made: native first.
     pub fn compare(
         &mut self,
         axis: usize,
         [native, chip]: [&mut VecDeque<(u64, bool)>; 2],
-        Moment { pose, steady }: Moment<'_>,
+        Moment { pose, steady, steps_back }: Moment<'_>,
         apart: Apart,
         target_steps: f64,
         figures: &mut Figures,
@@ -104,7 +113,8 @@ impl Steps {
             chip.pop_front();
             let phase = self.phase(ours.0, pose, steady);
             let us = (theirs.0 as i64 - ours.0 as i64 - LATE_NS) as f64 * 1e-3;
-            let differing = if apart.homing { HOMING_STEPS } else { target_steps };
+            let goes_back = apart.homing && self.goes_back(ours.1);
+            let differing = if goes_back { target_steps.max(steps_back) } else { target_steps };
             // Where the speed changes, the next steps may be twice as far apart as these.
             let stretched = if matches!(phase, Phase::Homing | Phase::Steady) { 1.0 } else { 2.0 };
             let apart_us = stretched * differing * self.interval_ns as f64 * 1e-3;
@@ -124,6 +134,13 @@ impl Steps {
             }
         }
         Ok(())
+    }
+
+    /// Notes the direction of a step in homing; returns whether it belongs to the way back from the switch or to what follows.
+    fn goes_back(&mut self, forward: bool) -> bool {
+        self.went_back |= forward && self.searched;
+        self.searched |= !forward;
+        self.went_back
     }
 
     fn phase(&mut self, at_ns: u64, pose: Option<&PoseReport>, steady: bool) -> Phase {

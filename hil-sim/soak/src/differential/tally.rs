@@ -3,13 +3,12 @@
 use rayon::prelude::*;
 use serde_json::{Value, json};
 use vergence_control::SettingsError;
-use vergence_plant::{NativeBoard, Plant};
 
+use super::delivered::Delivered;
 use super::difference::{Difference, Figures, Verdict};
 use super::driver::play;
 use super::session::Session;
 use super::steps::Phase;
-use crate::chip_board::ChipFlash;
 use crate::stages::stages;
 
 /// Most differences that are listed; more are only counted.
@@ -29,14 +28,14 @@ pub struct DifferentialTally {
 }
 
 impl Session {
-    /// Plays the session on a native board and on a chip with this flash, both just switched on.
+    /// Plays the session on both boards, just switched on.
     ///
     /// # Errors
     /// [`SettingsError`] where the stages cannot be controlled.
-    pub fn on_both(&self, flash: &ChipFlash) -> Result<Verdict, SettingsError> {
-        let (settings, mechanics) = (stages().map(|stage| stage.settings), stages().map(|stage| stage.mechanics));
-        let native = NativeBoard::standing_at(&settings, &mechanics, &self.positions, self.seed as u32)?;
-        Ok(play(self, native, flash.board_before(Plant::new(&mechanics, &self.positions))))
+    pub fn on_both(&self, boards: &Delivered) -> Result<Verdict, SettingsError> {
+        let mechanics = stages().map(|stage| stage.mechanics);
+        let native = boards.native(&stages(), &self.positions, self.seed as u32)?;
+        Ok(play(self, native, boards.chip(&mechanics, &self.positions), boards.next()))
     }
 }
 
@@ -47,14 +46,14 @@ impl Session {
 pub fn differential(
     first: u64,
     count: u64,
-    flash: &ChipFlash,
+    boards: &Delivered,
     progress: impl Fn() + Sync,
 ) -> Result<DifferentialTally, SettingsError> {
     let verdicts: Vec<_> = (0..count)
         .into_par_iter()
         .map(|index| {
             let seed = first.wrapping_add(index);
-            let verdict = Session::of(seed).on_both(flash)?;
+            let verdict = Session::of(seed).on_both(boards)?;
             progress();
             Ok((seed, verdict))
         })
@@ -84,6 +83,7 @@ impl DifferentialTally {
             format!("{:<28}{:>12}", "  seen some ticks apart", figures.poses_a_tick_apart),
             format!("{:<28}{:>12}", "step instants", figures.steps),
             format!("{:<28}{:>12}", "  motions some ticks apart", figures.motions_apart),
+            format!("{:<28}{:>12}", "faults with two names", figures.named_apart),
         ];
         let apart = Phase::ALL.iter().zip(figures.step_us.iter().zip(figures.step_share));
         lines.extend(apart.map(|(phase, (us, share))| {
@@ -112,6 +112,7 @@ impl DifferentialTally {
             "poses_some_ticks_apart": figures.poses_a_tick_apart,
             "steps": figures.steps,
             "motions_some_ticks_apart": figures.motions_apart,
+            "faults_with_two_names": figures.named_apart,
             "steps_us_apart": by_phase(figures.step_us),
             "steps_apart": by_phase(figures.step_share),
             "counts_us_apart": figures.lag_us,

@@ -12,6 +12,7 @@ use vergence_image::layout::{FLASH_BASE, IMAGE};
 use vergence_mcu::Firmware;
 use vergence_protocol::management::{ImageHeader, Signature};
 use vergence_soak::ChipFlash;
+use vergence_soak::differential::Delivered;
 use vergence_soak::power_cuts::{SignedImage, twin};
 
 /// RFC 8032, section 7.1, test 1: the key of development images.
@@ -26,12 +27,26 @@ fn seal(header: ImageHeader) -> Seal {
     Seal { header, signature: Signature { r, s } }
 }
 
-/// The boot loader, and the application with its own bytes and with exchanged registers.
-pub fn programs() -> (Firmware, [SignedImage; 2]) {
-    let [application, boot_loader] = ["vergence-nucleo-g474", "vergence-bootloader"].map(|package| {
+/// The application and the boot loader.
+fn built() -> [Firmware; 2] {
+    ["vergence-nucleo-g474", "vergence-bootloader"].map(|package| {
         let bytes = std::fs::read(build::build(package)).expect("cargo says where the ELF is");
         Firmware::from_elf(&bytes).expect("the ELF is for this chip")
-    });
+    })
+}
+
+/// Both boards with these programs.
+pub fn delivered() -> &'static Delivered {
+    static READ: OnceLock<Delivered> = OnceLock::new();
+    READ.get_or_init(|| {
+        let [application, boot_loader] = built();
+        Delivered::new(&boot_loader, &application, seal).expect("they fit")
+    })
+}
+
+/// The boot loader, and the application with its own bytes and with exchanged registers.
+pub fn programs() -> (Firmware, [SignedImage; 2]) {
+    let [application, boot_loader] = built();
     let [old, new] = [application.flat(FLASH_BASE + IMAGE.start), twin(&application)];
     let differing = old.chunks(2048).zip(new.chunks(2048)).filter(|(old, new)| old != new).count();
     let pages = old.len().div_ceil(2048);

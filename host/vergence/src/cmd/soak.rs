@@ -48,10 +48,10 @@ pub fn run(args: &Args, console: Console) -> Result<(), Failure> {
         return power_cuts::run(&args.power, &args.programs, cuts, console);
     }
     if args.differential {
-        let flash = args.programs.flash()?;
+        let boards = args.programs.delivered()?;
         return match args.only {
-            Some(seed) => differential::replay(seed, &flash, console),
-            None => differential::many(args.seed, args.scenarios, &flash, console),
+            Some(seed) => differential::replay(seed, &boards, console),
+            None => differential::many(args.seed, args.scenarios, &boards, console),
         };
     }
     if args.programs.on_chip() {

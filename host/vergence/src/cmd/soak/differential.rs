@@ -4,8 +4,7 @@ use std::sync::atomic::{AtomicU64, Ordering};
 
 use serde_json::json;
 use vergence_rig::rounded;
-use vergence_soak::ChipFlash;
-use vergence_soak::differential::{Session, differential};
+use vergence_soak::differential::{Delivered, Session, differential};
 
 use crate::console::Console;
 use crate::failure::Failure;
@@ -15,11 +14,11 @@ use crate::stopwatch::Stopwatch;
 const SESSIONS: u64 = 100;
 
 /// Plays `scenarios` sessions from the seed `first` on.
-pub fn many(first: u64, scenarios: Option<u64>, flash: &ChipFlash, console: Console) -> Result<(), Failure> {
+pub fn many(first: u64, scenarios: Option<u64>, boards: &Delivered, console: Console) -> Result<(), Failure> {
     let count = scenarios.unwrap_or(SESSIONS);
     let stopwatch = Stopwatch::start();
     let (progress, played) = (console.progress("comparing"), AtomicU64::new(0));
-    let tally = differential(first, count, flash, || {
+    let tally = differential(first, count, boards, || {
         let played = played.fetch_add(1, Ordering::Relaxed) + 1;
         progress.set_message(format!("{played} of {count} sessions"));
         progress.tick();
@@ -40,8 +39,8 @@ pub fn many(first: u64, scenarios: Option<u64>, flash: &ChipFlash, console: Cons
 }
 
 /// Plays the session of one seed, and prints what happens in it.
-pub fn replay(seed: u64, flash: &ChipFlash, console: Console) -> Result<(), Failure> {
-    let verdict = Session::of(seed).on_both(flash).map_err(|error| refused(&error))?;
+pub fn replay(seed: u64, boards: &Delivered, console: Console) -> Result<(), Failure> {
+    let verdict = Session::of(seed).on_both(boards).map_err(|error| refused(&error))?;
     console.say(verdict.journal.to_string().trim_end())?;
     let difference = verdict.difference.map(|difference| difference.to_string());
     console.result(&json!({ "seed": seed, "difference": difference }))?;

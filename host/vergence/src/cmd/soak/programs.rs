@@ -5,6 +5,7 @@ use std::path::{Path, PathBuf};
 use vergence_image::sha256;
 use vergence_mcu::Firmware;
 use vergence_soak::ChipFlash;
+use vergence_soak::differential::Delivered;
 use vergence_soak::power_cuts::SignedImage;
 
 use crate::failure::Failure;
@@ -47,10 +48,23 @@ impl Options {
             .ok_or_else(|| Failure::usage("boot loader and application do not fit into flash"))
     }
 
+    /// Both boards with the same programs, and the image of an update.
+    pub fn delivered(&self) -> Result<Delivered, Failure> {
+        let [(application, _), (boot_loader, _)] = self.files()?;
+        let key = SecretKey::named(Path::new(DEVELOPMENT))?;
+        Delivered::new(&boot_loader, &application, |header| key.seal(header))
+            .ok_or_else(|| Failure::usage("boot loader and application do not fit into flash"))
+    }
+
+    /// The files of application and boot loader.
+    fn files(&self) -> Result<[(Firmware, Vec<u8>); 2], Failure> {
+        let application = self.elf.as_deref().unwrap_or(Path::new(APPLICATION));
+        Ok([read(application)?, read(&self.boot_loader)?])
+    }
+
     /// Reads both programs.
     pub fn read(&self) -> Result<Programs, Failure> {
-        let application = self.elf.as_deref().unwrap_or(Path::new(APPLICATION));
-        let ((application, elf), (boot_loader, boot_elf)) = (read(application)?, read(&self.boot_loader)?);
+        let [(application, elf), (boot_loader, boot_elf)] = self.files()?;
         let key = SecretKey::named(Path::new(DEVELOPMENT))?;
         let images = SignedImage::before_and_after(&application, |header| key.seal(header));
         Ok(Programs { boot_loader, images, digest: hex(&sha256(&[elf, boot_elf].concat())) })
