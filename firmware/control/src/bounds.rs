@@ -65,9 +65,9 @@ fn bounds(settings: &AxisSettings) -> [Bound; 10] {
         bound(
             SettingItem::FollowingError,
             settings.following_error.0.into(),
-            1,
+            2 * i64::from(settings.tolerance.0),
             travel / 25,
-            "a stage that does not follow would go unnoticed",
+            "below twice 'tolerance', a stage could arrive without following; above, one that does not follow would go unnoticed",
         ),
         bound(
             SettingItem::Tolerance,
