@@ -5,6 +5,8 @@ use std::collections::VecDeque;
 use vergence_protocol::Microseconds;
 use vergence_rig::{Rig, RigPose};
 
+use crate::BentRail;
+
 /// Number of ticks that are kept: more than any exposure and its way to the host take.
 const KEPT: usize = 1_000;
 
@@ -13,6 +15,8 @@ const KEPT: usize = 1_000;
 pub struct LoadHistory {
     /// Time on the board's clock in microseconds, and the load's position on every axis in micro-units.
     ticks: VecDeque<(f64, Vec<f64>)>,
+    /// The rail, where it is not straight.
+    pub(crate) rail: Option<BentRail>,
 }
 
 impl LoadHistory {
@@ -33,7 +37,7 @@ impl LoadHistory {
     pub fn between(&self, from_us: f64, to_us: f64) -> Self {
         let first = self.ticks.partition_point(|(at, _)| *at <= from_us).saturating_sub(1);
         let end = (self.ticks.partition_point(|(at, _)| *at < to_us) + 1).min(self.ticks.len());
-        Self { ticks: self.ticks.range(first.min(end)..end).cloned().collect() }
+        Self { ticks: self.ticks.range(first.min(end)..end).cloned().collect(), rail: self.rail }
     }
 
     /// True pose of `rig` at `us` microseconds on the board's clock, interpolated linearly between two ticks: at the bench's
@@ -44,9 +48,18 @@ impl LoadHistory {
         let (to, after) = self.ticks.get(next).or(self.ticks.back())?;
         let (from, before) = self.ticks.get(next.saturating_sub(1))?;
         let share = if to > from { ((us - from) / (to - from)).clamp(0.0, 1.0) } else { 0.0 };
-        let loads = before.iter().zip(after).map(|(before, after)| before + share * (after - before));
-        let values: Vec<f64> = rig.axes.iter().zip(loads).map(|(axis, load)| axis.value_from_micro(load)).collect();
-        Some(rig.pose_at_values(&values))
+        let loads: Vec<f64> =
+            before.iter().zip(after).map(|(before, after)| before + share * (after - before)).collect();
+        Some(self.pose_of(rig, &loads))
+    }
+
+    /// True pose of `rig` with its loads at these positions, in micro-units.
+    pub(crate) fn pose_of(&self, rig: &Rig, loads: &[f64]) -> RigPose {
+        let values: Vec<f64> = rig.axes.iter().zip(loads).map(|(axis, &load)| axis.value_from_micro(load)).collect();
+        match self.rail {
+            Some(rail) => rail.pose(rig, &values),
+            None => rig.pose_at_values(&values),
+        }
     }
 }
 

@@ -5,7 +5,7 @@
 //! - [`RoomCamera`] and [`LiveCamera`]: cameras on the mechanics, in a furnished [`Room`]
 //! - [`TargetCamera`]: cameras before which a simulated person holds a calibration target ([`HeldTarget`])
 //! - [`flatten`] and [`FirmwareLog`]: what a linker makes, as the bytes in flash and as the texts of the firmware's log
-//! - [`built`]: a rig as it was really built, for a calibration to find
+//! - [`built`]: a rig as it was really built, for a calibration to find; [`BentRail`]: a rail that is not straight
 //!
 //! ```
 //! use vergence_rig::{BENCH_TOML, Rig};
@@ -22,6 +22,7 @@
 //! seed gives the same bytes. Nothing here reads or writes a file.
 
 mod application;
+mod bent_rail;
 mod built;
 mod chip;
 mod error;
@@ -34,6 +35,7 @@ mod rig;
 mod room;
 
 pub use application::{ApplicationError, build_of, check_boot_loader, flatten, is_elf};
+pub use bent_rail::BentRail;
 pub use built::built;
 pub use chip::{Program, SimulatedChip};
 pub use error::SimError;

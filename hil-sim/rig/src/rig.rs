@@ -9,9 +9,9 @@ use vergence_plant::{NativeBoard, Stage};
 use vergence_protocol::{AxisKind, Microseconds, ResetCause};
 use vergence_rig::{Rig, RigAxis, RigPose};
 
-use crate::SimError;
 use crate::error::refusal;
 use crate::history::LoadHistory;
+use crate::{BentRail, SimError};
 
 /// The board's clock when the simulation starts, in microseconds.
 const BOARD_START_US: u64 = 3_000_000;
@@ -193,6 +193,11 @@ impl SimulatedRig {
         &mut self.board
     }
 
+    /// Bends a rail from now on: the cameras move as it takes them, and neither board nor rig file knows.
+    pub fn bend_rail(&mut self, rail: BentRail) {
+        self.history.rail = Some(rail);
+    }
+
     /// True pose of the cameras now: from the mechanics, not from the encoders.
     #[must_use]
     pub fn true_pose(&self) -> RigPose {
@@ -206,9 +211,7 @@ impl SimulatedRig {
     }
 
     fn pose_of(&self, loads: &[f64]) -> RigPose {
-        let values: Vec<f64> =
-            self.rig.axes.iter().zip(loads).map(|(axis, &load)| axis.value_from_micro(load)).collect();
-        self.rig.pose_at_values(&values)
+        self.history.pose_of(&self.rig, loads)
     }
 }
 
