@@ -108,8 +108,8 @@ fn what_cannot_be_signed_is_told() {
         fails_with(&[&["image", "sign", &input], &options[..]].concat(), 2, words);
         assert!(!Path::new(&out).exists());
     };
-    refused("empty.bin", &[], &["empty.bin", "1 to 124928 bytes"]);
-    refused("long.bin", &vec![0; 124_929], &["124929"]);
+    refused("empty.bin", &[], &["empty.bin", "1 to 188416 bytes"]);
+    refused("long.bin", &vec![0; 188_417], &["188417"]);
     refused("noise.bin", &[7; 100], &["vector table"]);
     refused("x86.elf", &elf(3, &[(START, &app)]), &["not for an Arm processor"]);
     refused("elsewhere.elf", &elf(ARM, &[(0x0800_0000, &app)]), &["0x08000000", "outside"]);

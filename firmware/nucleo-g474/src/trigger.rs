@@ -18,7 +18,7 @@ use heapless::Deque;
 use vergence_protocol::Microseconds;
 
 use crate::encoder::Counter;
-use crate::rig::AXES;
+use crate::wiring;
 
 /// Prescaler of the timer, which counts microseconds.
 const PRESCALER: u16 = 169;
@@ -26,6 +26,9 @@ const PRESCALER: u16 = 169;
 const PULSE_US: u16 = 100;
 /// Pulses further ahead than this, in microseconds, wait in software: the counter has 16 bits.
 const HORIZON_US: u64 = 10_000;
+
+/// Number of encoders.
+const AXES: usize = wiring::AXES.len();
 
 /// An edge: its time, and the counters of all encoders.
 pub type Edge = (Microseconds, [u32; AXES]);

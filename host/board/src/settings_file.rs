@@ -117,8 +117,11 @@ fn wanted(table: &toml::Table, present: &[(NamedSetting, i64)]) -> Result<Vec<Ch
     Ok(changes)
 }
 
-/// Sets one after the other. One that does not fit beside the others now may fit once they have changed too.
+/// Sets one after the other. One that does not fit beside the others now may fit once they have changed too. The place of a home
+/// switch comes after the range: it may lie on either side of it, and on the wrong one it would be in the way of a range that
+/// moves past itself.
 async fn set_each(board: &Board, mut wanted: Vec<Change>, done: &mut Vec<Change>) -> Result<(), SettingsFileError> {
+    wanted.sort_by_key(|change| change.setting.key.item == SettingItem::HomeSwitchAt);
     loop {
         let mut misfits = Vec::new();
         let before = wanted.len();
