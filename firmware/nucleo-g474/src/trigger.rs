@@ -105,10 +105,10 @@ impl Trigger {
 
 #[interrupt]
 fn TIM4() {
+    let at = Microseconds(Instant::now().as_micros());
     critical_section::with(|cs| {
         let mut shared = SHARED.borrow_ref_mut(cs);
         let counts = shared.counters.map(|counters| counters.map(Counter::read));
-        let at = Microseconds(Instant::now().as_micros());
         TIM4.sr().write(|_| {});
         if let Some(counts) = counts {
             // A tick brings at most one edge; an edge that does not fit is lost, like a lost pose.

@@ -7,8 +7,8 @@ use crate::flash::RamFlash;
 
 /// Number of flash pages for the settings.
 const SETTINGS_PAGES: usize = 2;
-/// Number of flash pages for an image: 122 KiB, as on the NUCLEO-G474RE.
-const IMAGE_PAGES: usize = 61;
+/// Number of flash pages for an image: 184 KiB, as on the NUCLEO-G474RE.
+const IMAGE_PAGES: usize = 92;
 
 /// Checks whether a signature of the bytes was made with a key.
 pub type Verifier = fn(&[u8; 32], &[u8; ImageHeader::SIGNED], &Signature) -> bool;
