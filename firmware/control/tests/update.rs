@@ -34,7 +34,7 @@ fn a_host_of_another_major_can_ask_who_it_is_and_update_it() {
         oldest: [0, 0, 0],
         build: 30,
         boot: BootState::Confirmed,
-        capacity: 61 * PAGE as u32,
+        capacity: 92 * PAGE as u32,
     };
     assert_eq!(bench.answers, [ManagementReport::Identity(identity)]);
 }
