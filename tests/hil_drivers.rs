@@ -4,7 +4,7 @@
 
 mod elf_rig;
 
-use elf_rig::{Board, Conversation, ElfBoard, Standing};
+use elf_rig::{Board, Conversation, ElfBoard, Standing, stories};
 use vergence_mcu::UartId;
 use vergence_plant::{DriverFaults, NativeBoard, Tmc2209};
 use vergence_protocol::{
@@ -263,17 +263,6 @@ fn a_driver_with_other_settings_is_a_fault<B: Board>() {
     let mut talk = armed::<B>();
     with_chip(&mut talk, 0, Tmc2209::flip_microsteps);
     is_cut_by(&mut talk, 0, FaultCode::DriverUnset);
-}
-
-macro_rules! stories {
-    ($($story:ident),* $(,)?) => {
-        mod native {
-            $(#[test] fn $story() { super::$story::<super::NativeBoard>(); })*
-        }
-        mod firmware {
-            $(#[test] fn $story() { super::$story::<super::ElfBoard>(); })*
-        }
-    };
 }
 
 stories!(

@@ -4,7 +4,7 @@
 
 mod elf_rig;
 
-use elf_rig::{Board, Conversation, ElfBoard, Standing};
+use elf_rig::{Board, Conversation, ElfBoard, Standing, stories};
 use vergence_control::HomeEnd;
 use vergence_plant::{AxisMechanics, NativeBoard, bench_settings};
 use vergence_protocol::{
@@ -155,17 +155,6 @@ fn normally_open_limits_stop_too<B: Board>() {
     assert!(!talk.board.plant().drivers_on());
     talk.wait_for(ControllerState::Fault);
     assert_eq!((talk.fault().code, talk.fault().axis), (FaultCode::HardLimit, Some(1)));
-}
-
-macro_rules! stories {
-    ($($story:ident),* $(,)?) => {
-        mod native {
-            $(#[test] fn $story() { super::$story::<super::NativeBoard>(); })*
-        }
-        mod firmware {
-            $(#[test] fn $story() { super::$story::<super::ElfBoard>(); })*
-        }
-    };
 }
 
 stories!(

@@ -11,7 +11,7 @@
 
 mod elf_rig;
 
-use elf_rig::{Board, Conversation, ElfBoard, Standing};
+use elf_rig::{Board, Conversation, ElfBoard, Standing, stories};
 use vergence_plant::{NativeBoard, StopMechanics, bench_settings};
 use vergence_protocol::{
     AxisMask, ControllerState, FaultCode, Jog, Micro, MoveId, MovePhase, Permille, Refusal, Request, SettingItem,
@@ -240,17 +240,6 @@ fn the_native_board_homes_by_stall() {
 #[test]
 fn the_firmware_homes_by_stall() {
     an_axis_without_switch_homes_by_stall::<ElfBoard>("firmware");
-}
-
-macro_rules! stories {
-    ($($story:ident),* $(,)?) => {
-        mod native {
-            $(#[test] fn $story() { super::$story::<super::NativeBoard>(); })*
-        }
-        mod firmware {
-            $(#[test] fn $story() { super::$story::<super::ElfBoard>(); })*
-        }
-    };
 }
 
 stories!(

@@ -11,6 +11,7 @@ mod conversation;
 mod full_speed;
 mod log;
 mod program;
+mod stories;
 
 pub use adapter::{Adapter, AdapterKind};
 pub use board::{Board, ElfBoard, Standing, programs};
@@ -20,3 +21,4 @@ pub use conversation::{BOTH, Conversation, LEASE_MS, Wired};
 pub use full_speed::{POSE_PERIOD_US, at_full_speed, cruise, far_from, geared};
 pub use log::decode;
 pub use program::{DEVELOPMENT_SECRET, sealed_by};
+pub(crate) use stories::stories;
