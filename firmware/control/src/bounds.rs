@@ -62,20 +62,19 @@ fn bounds(settings: &AxisSettings) -> [Bound; 10] {
     let finest = |scale: Scale| i64::from(i32::MAX / 2) * (scale.milli_micro() / 1000) / furthest;
     let bound = |item, value: i64, least: i64, most: i64, why| Bound { item, value, least, most, why };
     [
-        // Before the following error, whose bounds it moves.
+        bound(
+            SettingItem::FollowingError,
+            settings.following_error.0.into(),
+            1,
+            travel / 25,
+            "a stage that does not follow would go unnoticed",
+        ),
         bound(
             SettingItem::Tolerance,
             settings.tolerance.0.into(),
             reached.max(1).into(),
             travel / 250,
             "below, encoder and motor cannot reach it; above, a move would count as settled where it is not",
-        ),
-        bound(
-            SettingItem::FollowingError,
-            settings.following_error.0.into(),
-            2 * i64::from(settings.tolerance.0),
-            travel / 25,
-            "below twice 'tolerance', a stage could arrive without following; above, one that does not follow would go unnoticed",
         ),
         bound(
             SettingItem::Backlash,

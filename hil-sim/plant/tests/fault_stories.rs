@@ -209,13 +209,12 @@ fn the_faults_end_when_their_cause_does() {
     assert_eq!(rigged.pose().phase, MovePhase::Settled);
 }
 
-/// Regression: a limit of a few micrometres was shown as an encoder that does not answer, with the advice to check its cable.
+/// Regression: a limit of 1 um was shown as an encoder that does not answer, with the advice to check its cable.
 #[test]
 fn a_limit_below_the_lag_is_told_as_a_following_error() {
     for axis in 0..2 {
         let mut settings = bench_settings();
-        let tolerance = Micro([2, 100][axis]);
-        settings[axis] = AxisSettings { following_error: Micro(2 * tolerance.0), tolerance, ..settings[axis] };
+        settings[axis] = AxisSettings { following_error: Micro(1), ..settings[axis] };
         let mut rigged = Rigged::with(&settings, &bench_mechanics(), 1).open();
         assert_eq!(rigged.arm(), Status::Accepted);
         assert_eq!(rigged.home(), Status::Accepted);
