@@ -5,16 +5,22 @@
 mod build;
 mod common;
 
+use std::sync::{Mutex, MutexGuard, PoisonError};
+
 use common::{Simulator, text};
 
 fn rig_file(name: &str) -> String {
     format!("{}/../../docs/rigs/{name}.toml", env!("CARGO_MANIFEST_DIR"))
 }
 
-/// Starts a board whose firmware was built with `feature`, wired for the rig of the file.
-fn simulator(feature: &str, rig: &str) -> Simulator {
+/// One simulated chip at a time: they run in real time, and the machine may be busy.
+static TURN: Mutex<()> = Mutex::new(());
+
+/// Starts a board whose firmware was built with `feature`, wired for the rig of the file. The next one waits for the first value.
+fn simulator(feature: &str, rig: &str) -> (MutexGuard<'static, ()>, Simulator) {
+    let turn = TURN.lock().unwrap_or_else(PoisonError::into_inner);
     let elf = build::build_wired(feature).display().to_string();
-    Simulator::start(&["--rig", rig, "--elf", &elf])
+    (turn, Simulator::start(&["--rig", rig, "--elf", &elf]))
 }
 
 /// Homes the rig and goes to these modes, where the board must report these positions, in millimetres and degrees.
@@ -38,7 +44,8 @@ fn goes_to(simulator: &Simulator, rig: &str, modes: &[(&str, &[(&str, f64)])]) {
 fn one_linear_stage() {
     let rig = rig_file("one-axis");
     let modes: [(&str, &[_]); 2] = [("near", &[("baseline_mm", 70.0)]), ("far", &[("baseline_mm", 210.0)])];
-    goes_to(&simulator("one-axis", &rig), &rig, &modes);
+    let (_turn, simulator) = simulator("one-axis", &rig);
+    goes_to(&simulator, &rig, &modes);
 }
 
 const ASIDE: (&str, &[(&str, f64)]) = ("aside", &[("baseline_mm", 100.0), ("left_deg", 10.0), ("right_deg", 110.0)]);
@@ -47,7 +54,8 @@ const AHEAD: (&str, &[(&str, f64)]) = ("ahead", &[("baseline_mm", 145.0), ("left
 #[test]
 fn a_linear_stage_and_a_pinion_for_each_camera() {
     let rig = rig_file("three-axes");
-    goes_to(&simulator("three-axes", &rig), &rig, &[ASIDE, AHEAD]);
+    let (_turn, simulator) = simulator("three-axes", &rig);
+    goes_to(&simulator, &rig, &[ASIDE, AHEAD]);
 }
 
 /// The third encoder has a counter of 16 bits, which 110 degrees of this encoder turn over four times.
@@ -57,7 +65,7 @@ fn a_counter_of_16_bits_is_extended() {
     let (before, last) = file.rsplit_once("counts_per_revolution = 100000").expect("the last axis");
     let workshop = common::images::Workshop::new();
     let rig = workshop.file("rig.toml", format!("{before}counts_per_revolution = 1000000{last}").as_bytes());
-    let simulator = simulator("three-axes", &rig);
+    let (_turn, simulator) = simulator("three-axes", &rig);
     let set = simulator.run(&["--rig", &rig, "config", "set", "right.counts_per_revolution", "1000000"]);
     assert!(set.status.success(), "{}", text(&set.stderr));
     goes_to(&simulator, &rig, &[ASIDE, AHEAD, ASIDE]);
@@ -66,7 +74,7 @@ fn a_counter_of_16_bits_is_extended() {
 #[test]
 fn a_rig_with_other_axes_than_the_firmware_is_refused() {
     let rig = rig_file("one-axis");
-    let simulator = simulator("one-axis", &rig);
+    let (_turn, simulator) = simulator("one-axis", &rig);
     let output = simulator.run(&["home"]);
     let said = text(&output.stderr);
     println!("{said}");
