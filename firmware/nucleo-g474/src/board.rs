@@ -11,7 +11,8 @@ use embassy_stm32::{Peri, Peripherals, bind_interrupts, dma, pac, peripherals, r
 
 use crate::absolute::AbsoluteEncoders;
 use crate::drivers::DriverWire;
-use crate::encoder::{Encoder, IndexLines};
+use crate::encoder::Encoder;
+use crate::index_lines::IndexLines;
 use crate::receiver::{Bell, Receiver};
 use crate::rig::{Latched, Rig, Stage};
 use crate::steps::StepPulses;

@@ -17,6 +17,7 @@ mod dying;
 mod encoder;
 mod exchange;
 mod factory;
+mod index_lines;
 mod link;
 mod log;
 mod memory;

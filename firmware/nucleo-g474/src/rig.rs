@@ -7,7 +7,8 @@ use vergence_protocol::{AxisList, DriverState, EncoderState, Microseconds};
 
 use crate::absolute::AbsoluteEncoders;
 use crate::drivers;
-use crate::encoder::{Encoder, IndexLines};
+use crate::encoder::Encoder;
+use crate::index_lines::IndexLines;
 use crate::steps::StepPulses;
 use crate::trigger::Trigger;
 use crate::wiring;
