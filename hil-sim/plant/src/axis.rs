@@ -317,7 +317,8 @@ impl AxisPlant {
         // Inside the play the load is at rest; outside, the transmission pulls it after the motor.
         let pulled = self.load.clamp(motor - play, motor + play);
         let dt = (to.0 - from.0) as f64 * 1e-6;
-        let before = self.scale_reading();
+        // Most encoders have no index, and this runs each 20 us.
+        let before = (self.mechanics.index[0] > 0).then(|| self.scale_reading());
         let share = 1.0 - (-dt / self.mechanics.compliance).exp();
         let (held_by, give) = match self.blocked {
             true => ([self.load; 2], 0.0),
@@ -328,7 +329,9 @@ impl AxisPlant {
         let play = self.mechanics.encoder_play / 2.0;
         self.stage = self.stage.clamp(self.load - play, self.load + play);
         self.encoder.advance();
-        self.pass_index(before, self.scale_reading());
+        if let Some(before) = before {
+            self.pass_index(before, self.scale_reading());
+        }
         self.home.advance(self.mechanics.is_home(self.load), to.0 - from.0);
     }
 
