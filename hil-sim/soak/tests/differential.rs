@@ -163,6 +163,22 @@ fn a_failure_between_a_stall_and_a_slip_may_have_either_name() {
     assert!(figures.named_apart > 0);
 }
 
+/// Regression: with a following error of 2 um both boards found a slip, four ticks apart.
+#[test]
+fn a_limit_at_the_lag_of_a_sound_load_may_be_exceeded_some_ticks_apart() {
+    let limited = |axis: u8, value: i64| {
+        let mut session = session();
+        let key = SettingKey { item: SettingItem::FollowingError, axis };
+        session.acts.insert(1, Act::Ask(Request::SetSetting { key, value }, 10));
+        session
+    };
+    let baseline = [1, 2, 4, 8, 16, 32].map(|limit| limited(0, limit));
+    let separation = [10, 40, 80, 160, 320, 640].map(|limit| limited(1, limit));
+    let figures = figures(baseline.into_iter().chain(separation));
+    println!("{} poses some ticks apart", figures.poses_a_tick_apart);
+    assert!(figures.poses_a_tick_apart > 0);
+}
+
 #[test]
 fn another_speed_or_acceleration_is_found_in_the_instants_of_steps() {
     found("instant of a step of axis", &verdict(|stages| stages[0].settings.speed -= 400));

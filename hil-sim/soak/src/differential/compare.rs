@@ -7,7 +7,7 @@ use super::difference::{Difference, Figures};
 use super::messages;
 use super::pair::{Pair, Snapshot};
 use super::side::Stream;
-use super::slack::{HOMING_TICKS, Slack, apart};
+use super::slack::{HOMING_TICKS, LAG_LIMIT_TICKS, Slack, apart};
 use super::steps::{Moment, Steps};
 
 /// Longest time in microseconds from a message of one board to the same of the other: a page of flash is erased meanwhile.
@@ -28,13 +28,21 @@ pub struct Apart {
     pub failing: bool,
     /// A tick came late.
     pub late: bool,
+    /// The largest following error was set to no more than the lag of a sound load.
+    pub at_the_lag: bool,
 }
 
 impl Apart {
+    /// Whether the encoders of both boards may show a fault some ticks apart.
+    pub fn in_faults(self) -> bool {
+        self.failing || self.at_the_lag
+    }
+
     /// Most ticks from an event on one board to the same on the other.
     pub fn ticks(self) -> u64 {
         match self {
             Self { homing: true, .. } => HOMING_TICKS,
+            Self { at_the_lag: true, .. } => LAG_LIMIT_TICKS,
             Self { failing: true, .. } => 3,
             // The encoders come into the tolerance, and stay.
             _ => 1,
@@ -186,7 +194,7 @@ impl Comparison {
             self.figures.poses_a_tick_apart += 1;
         }
         let homes_apart = self.apart.homing && self.steps.iter().any(Steps::is_apart);
-        let ticks = if homes_apart || self.apart.failing || self.apart.late { self.apart.ticks() } else { 0 };
+        let ticks = if homes_apart || self.apart.in_faults() || self.apart.late { self.apart.ticks() } else { 0 };
         for axis in 0..2 {
             // On one board the axis may have got its reference some ticks earlier.
             if native.pose.referenced.contains(axis) != chip.referenced.contains(axis) {
@@ -204,7 +212,8 @@ impl Comparison {
             {
                 self.figures.lag_us = self.figures.lag_us.max(ticks * TICK_US as f64);
             }
-            if native.pose.state == ControllerState::Ready && chip.referenced.contains(axis) && !self.apart.failing {
+            if native.pose.state == ControllerState::Ready && chip.referenced.contains(axis) && !self.apart.in_faults()
+            {
                 let most = &mut self.figures.rest_counts[axis];
                 *most = (*most).max(apart(ours, theirs));
             }

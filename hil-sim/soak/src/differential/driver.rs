@@ -8,7 +8,8 @@ use serde::Serialize;
 use vergence_plant::NativeBoard;
 use vergence_protocol::frame::{Header, Kind, encode};
 use vergence_protocol::{
-    AxisMask, ControllerState, MAX_FRAME, Microseconds, PROTOCOL, Request, SessionId, StopKind, schema_hash,
+    AxisMask, ControllerState, MAX_FRAME, Microseconds, PROTOCOL, Request, SessionId, SettingItem, SettingKey,
+    StopKind, schema_hash,
 };
 
 use super::compare::Comparison;
@@ -17,6 +18,7 @@ use super::difference::{Difference, Verdict};
 use super::mishap::Mishap;
 use super::pair::{ARRIVALS_US, Pair};
 use super::session::{Act, Session};
+use super::slack::LAG_LIMITS;
 use crate::chip_board::ChipBoard;
 use crate::journal::Journal;
 
@@ -195,6 +197,10 @@ impl<'a> Driver<'a> {
     }
 
     pub(super) fn ask(&mut self, request: &Request) {
+        if let Request::SetSetting { key: SettingKey { item: SettingItem::FollowingError, axis }, value } = request {
+            let limit = LAG_LIMITS.get(usize::from(*axis)).copied().unwrap_or_default();
+            self.comparison.apart.at_the_lag |= (1..=limit).contains(value);
+        }
         self.queue(Kind::Control, self.control, request);
         self.control = self.control.wrapping_add(1);
     }

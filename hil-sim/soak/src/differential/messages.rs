@@ -148,7 +148,7 @@ fn marks(with: &mut Comparison, native: &TriggerMark, chip: &TriggerMark) -> Res
     times(with, "time of a pulse", native.at, chip.at, REQUEST_US)?;
     let late = (native.at.0 as i64).abs_diff(with.native_time(chip.at.0)) as f64 / TICK_US as f64;
     for (axis, (&ours, &theirs)) in native.counts.iter().zip(&chip.counts).enumerate() {
-        let ticks = if with.apart.homing || with.apart.failing { with.apart.ticks() as f64 } else { 0.0 };
+        let ticks = if with.apart.homing || with.apart.in_faults() { with.apart.ticks() as f64 } else { 0.0 };
         let allowed = with.slack.counts(axis, late + ticks);
         let field = format!("counts of axis {axis} at a pulse");
         Difference::unless_close(field, 0.0, f64::from(apart(ours, theirs)), allowed)?;

@@ -17,6 +17,10 @@ const ROUNDING: f64 = 2.0;
 /// Ticks by which homing may be apart on both boards, where one sees a switch a tick earlier than the other: the fast search goes
 /// as far in a tick as the slow approach in 20 (baseline) and 10 (separation), and the second axis follows the first.
 pub const HOMING_TICKS: u64 = 34;
+/// Largest following errors of each axis, in micro-units, that the lag and the play of a sound load reach.
+pub const LAG_LIMITS: [i64; 2] = [50, 1_000];
+/// Ticks by which both boards may find such a limit exceeded: the lag grows by less than a count in a tick.
+pub const LAG_LIMIT_TICKS: u64 = 12;
 /// Ticks by which a motion may end apart that an encoder, a switch or a request ends at once.
 const CUT_TICKS: f64 = 2.0;
 /// Counts by which places may be apart that both boards give the same reference: one for the count at which the switch closed,

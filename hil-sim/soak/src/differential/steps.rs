@@ -125,7 +125,7 @@ impl Steps {
                 if !apart.late {
                     figures.note_step(phase, us.abs(), self.interval_ns as f64 * 1e-3);
                 }
-            } else if apart.homing || apart.failing || turns {
+            } else if apart.homing || apart.in_faults() || turns {
                 self.apart = true;
             } else {
                 let field = format!("instant of a step of axis {axis}, {}, us", phase.name());
