@@ -7,16 +7,22 @@
 //! With both folds flat the trunk is a planar six-bar, which [`SixBar`] solves in closed form. [`Loop::close`] solves any loop
 //! from a start near the answer. Where both apply they agree (`tests/linkage.rs`).
 
+mod bodies;
 mod cameras;
+mod clearance;
 mod closing;
 mod dh;
 mod mobility;
+mod path;
 mod six_bar;
 mod trunk;
 
+pub use bodies::{Gap, TrunkBodies, TrunkBody};
 pub use cameras::TrunkCameras;
+pub use clearance::{Clearance, CornerLimits, FlatTrunk, WantedClearance};
 pub use closing::{CloseError, Closed};
 pub use dh::{DhJoint, Loop};
 pub use mobility::{Mobility, NotDriven};
+pub use path::{Branch, Leg, LegSample, NoPath, PathEnd, TrunkPath};
 pub use six_bar::{Corners, SixBar, SixBarError};
 pub use trunk::{TrunkJoint, TrunkLinks, trunk};

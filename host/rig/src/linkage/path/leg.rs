@@ -1,0 +1,99 @@
+//! One leg of a path: all driven corners run in a straight line, from rest to rest.
+
+use super::{LONGEST_PASSAGE, Space};
+use crate::linkage::{Clearance, CornerLimits, Corners};
+
+/// Interior angles of the corners A, B and C in radians.
+pub(super) type Driven = [f64; 3];
+
+/// Distance of the samples along a leg, in radians of the corner that moves most: half a degree.
+const SAMPLE: f64 = 8.73e-3;
+
+/// A shape along a leg.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct LegSample {
+    /// The share of the way, from 0 to 1.
+    pub share: f64,
+    /// The shape there.
+    pub shape: Corners,
+    /// Its clearance.
+    pub room: Clearance,
+}
+
+/// A straight way of the driven corners.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Leg {
+    /// Shapes along the leg, with both ends.
+    pub samples: Vec<LegSample>,
+    /// Time in seconds from rest to rest, with the corners' limits.
+    pub seconds: f64,
+}
+
+impl Leg {
+    /// The shape at its end.
+    #[must_use]
+    pub fn end(&self) -> Option<&Corners> {
+        self.samples.last().map(|sample| &sample.shape)
+    }
+}
+
+/// Way of the corner that moves most.
+pub(super) fn longest(from: Driven, to: Driven) -> f64 {
+    from.iter().zip(to).map(|(one, other)| (one - other).abs()).fold(0.0, f64::max)
+}
+
+impl Space<'_> {
+    /// The leg from one place to another. `None` where it is not allowed: the loop must close and nothing touch all along it, and it
+    /// must have the wanted clearance but for a short passage at either end, along which the loop's reserve grows with the
+    /// distance from that end.
+    pub(super) fn leg(&self, from: Driven, to: Driven) -> Option<Leg> {
+        let way = longest(from, to);
+        let pieces = (way / SAMPLE).ceil().max(1.0) as u32;
+        let at = |piece: u32| {
+            let share = f64::from(piece) / f64::from(pieces);
+            let driven = std::array::from_fn(|corner| from[corner] + share * (to[corner] - from[corner]));
+            self.shape(driven).map(|(shape, room)| LegSample { share, shape, room })
+        };
+        let samples: Vec<LegSample> = (0..=pieces).map(at).collect::<Option<_>>()?;
+        let begins = self.passage(samples.iter(), way)?;
+        let ends = self.passage(samples.iter().rev(), way)?;
+        let inside = samples.get(begins..samples.len() - ends).unwrap_or_default();
+        let is_clear = inside.iter().all(|sample| sample.room.has(&self.wanted));
+        is_clear.then(|| Leg { seconds: duration(&samples, way, &self.trunk.limits), samples })
+    }
+
+    /// Number of samples at the beginning that have less room than wanted; `None` if they are too many, or the loop's reserve does
+    /// not grow along them.
+    fn passage<'s>(&self, samples: impl Iterator<Item = &'s LegSample> + Clone, way: f64) -> Option<usize> {
+        let tight = |sample: &&LegSample| !sample.room.has(&self.wanted);
+        let count = samples.clone().take_while(tight).count();
+        let mut passage = samples.take(count + 1);
+        let mut last = passage.next()?;
+        let begins = last.share;
+        for sample in passage {
+            let grows = sample.room.loop_reserve >= last.room.loop_reserve
+                && sample.room.gap.mm >= last.room.gap.mm.min(self.wanted.gap_mm);
+            if !grows || (sample.share - begins).abs() * way > LONGEST_PASSAGE {
+                return None;
+            }
+            last = sample;
+        }
+        Some(count)
+    }
+}
+
+/// Time from rest to rest with constant acceleration, constant speed and constant braking; longer where a passive corner would
+/// exceed its speed.
+fn duration(samples: &[LegSample], way: f64, limits: &CornerLimits) -> f64 {
+    let CornerLimits { speed, acceleration, passive_speed, .. } = *limits;
+    let rises = speed * speed / acceleration;
+    let alone = if way < rises { 2.0 * (way / acceleration).sqrt() } else { way / speed + speed / acceleration };
+    let fastest = samples.windows(2).map(|pair| {
+        let [from, to] = [pair[0], pair[1]];
+        let middle = f64::midpoint(from.share, to.share) * way;
+        let driven = speed.min((2.0 * acceleration * middle.min(way - middle)).sqrt());
+        let turned = (3..6).map(|corner| (to.shape.0[corner] - from.shape.0[corner]).abs()).fold(0.0, f64::max);
+        turned * driven / ((to.share - from.share) * way)
+    });
+    alone * (fastest.fold(0.0, f64::max) / passive_speed).max(1.0)
+}

@@ -1,0 +1,59 @@
+//! Why there is no path.
+
+use crate::linkage::{Gap, SixBarError};
+
+/// Why there is no path.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+pub enum NoPath {
+    /// The loop does not close with these corners.
+    #[error("the {end} is no shape of the trunk: {why}")]
+    NotClosed {
+        /// Which end of the path.
+        end: PathEnd,
+        /// Why.
+        why: SixBarError,
+    },
+    /// Bodies touch.
+    #[error("at the {end} {} and {} overlap by {:.1} mm", .gap.between[0], .gap.between[1], -.gap.mm)]
+    Collides {
+        /// Which end of the path.
+        end: PathEnd,
+        /// Where.
+        gap: Gap,
+    },
+    /// A joint is beyond its range.
+    #[error("at the {end} a joint is {:.1} degrees beyond its range", .by.to_degrees())]
+    BeyondRange {
+        /// Which end of the path.
+        end: PathEnd,
+        /// Angle in radians.
+        by: f64,
+    },
+    /// Corner E is outside at one end and inside at the other.
+    #[error(
+        "corner E would have to pass from one side of the line DF to the other, through a dead centre where it may go either way"
+    )]
+    OtherBranch,
+    /// The search found none.
+    #[error("no way was found along which the loop closes and nothing touches")]
+    NoWay,
+}
+
+/// An end of a path.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum PathEnd {
+    /// Where it begins.
+    Start,
+    /// Where it leads.
+    Goal,
+}
+
+impl core::fmt::Display for PathEnd {
+    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
+        f.write_str(match self {
+            Self::Start => "start",
+            Self::Goal => "goal",
+        })
+    }
+}
