@@ -8,7 +8,7 @@
 //! - [`pseudo_intersection`] makes a point of two rays, and [`covariance()`] gives its uncertainty;
 //! - [`PointUncertainty`] adds the uncertainty that all points of a pair share, from lenses and pose;
 //! - [`cloud()`] does all of this for many matches and counts the dropped ones by reason;
-//! - [`pose_drift`] tests the stated pose against the matches;
+//! - [`pose_drift`] tests the stated pose against the matches, and [`fuse_pose`] takes it from both;
 //! - [`BatchLens`], [`triangulate_batch`] and [`BatchPair`] do the same arithmetic for whole arrays.
 //!
 //! [`zones_exact`] and [`circle_zones`] compute how much of the surroundings both cameras, one, or none see.
@@ -30,6 +30,8 @@ mod import;
 mod kannala_brandt;
 mod lens_derivatives;
 mod pose_drift;
+mod pose_equation;
+mod pose_fusion;
 mod stereo_pair;
 mod triangulation;
 mod uncertainty;
@@ -46,6 +48,7 @@ pub use import::{OpenCvFisheye, largest_theta};
 pub use kannala_brandt::{ImageSize, InvalidLens, KannalaBrandt, OutsideField, Pixel};
 pub use lens_derivatives::LENS_PARAMETERS;
 pub use pose_drift::{PoseDrift, pose_drift};
+pub use pose_fusion::{FusedPose, fuse_pose};
 pub use stereo_pair::{PixelPair, StereoPair};
 pub use triangulation::{
     AngularNorm, Feet, Kernel, Rejection, Triangulated, UnknownKernel, angular, closest_approach, edge_plane, mid2,

@@ -10,11 +10,10 @@
 //!
 //! The pose is not corrected here: the result only says how far it is off.
 
-use nalgebra::{Matrix6, UnitQuaternion, Vector3, Vector6};
+use nalgebra::{Matrix6, Vector6};
 
-use crate::epipolar::ray_to_plane;
-use crate::uncertainty::ResidualUncertainty;
-use crate::{Angle, Left, PixelPair, Right, StereoPair, Transform};
+use crate::pose_equation::{Equation, SCALE_SIGMAS, difference, moved};
+use crate::{Angle, PixelPair, StereoPair};
 
 /// Smallest number of usable matches.
 const LEAST_PAIRS: usize = 20;
@@ -24,8 +23,6 @@ const ROUNDS: usize = 3;
 /// Scale of the first iterations, and prior standard deviation of ω and of the baseline's direction: images still match
 /// with a pose that is off by this much.
 const GROSS: Angle = Angle::from_deg(3.0);
-/// Residuals beyond this many standard deviations count as wrong matches.
-const SCALE_SIGMAS: f64 = 2.5;
 /// χ² of five unknowns with a probability of 1e-4. The sixth, the shift along the baseline, has no effect on the
 /// angles.
 const SIGNIFICANT: f64 = 25.7;
@@ -92,53 +89,8 @@ pub fn pose_drift(pixels: &[(PixelPair, f64)], pair: &StereoPair<'_>, pose: &Mat
     Some(PoseDrift { correction, covariance, angle, chi_squared, agreeing })
 }
 
-/// Applies a correction to a pose: R ← exp(ω) R, t ← t + δ.
-fn moved(pose: &Transform<Left, Right>, by: &Vector6<f64>) -> Transform<Left, Right> {
-    let turn = UnitQuaternion::from_scaled_axis(Vector3::new(by[0], by[1], by[2]));
-    Transform::new(turn * pose.rotation(), pose.origin().mm() + by.fixed_rows::<3>(3))
-}
-
-/// The correction with which [`moved`] makes `to` of `from`.
-fn difference(to: &Transform<Left, Right>, from: &Transform<Left, Right>) -> Vector6<f64> {
-    let turn = (to.rotation() * from.rotation().inverse()).scaled_axis();
-    let shift = to.origin().mm() - from.origin().mm();
-    Vector6::new(turn.x, turn.y, turn.z, shift.x, shift.y, shift.z)
-}
-
 /// Prior information, which fixes the shift along the baseline: matches cannot.
 fn weak_prior(baseline_mm: f64) -> Matrix6<f64> {
     let (turn, shift) = (GROSS.rad().powi(-2), (GROSS.rad() * baseline_mm).powi(-2));
     Matrix6::from_diagonal(&Vector6::new(turn, turn, turn, shift, shift, shift))
-}
-
-/// One match's equation: offset + slope · correction = 0 with standard deviation `sigma`, in radians.
-struct Equation {
-    offset: f64,
-    slope: Vector6<f64>,
-    sigma: f64,
-}
-
-impl Equation {
-    fn of((pixels, pixel_sigma): &(PixelPair, f64), pair: &StereoPair<'_>) -> Option<Self> {
-        let left = pair.left.unproject::<Left>(pixels.left).ok()?;
-        let right = pair.right.unproject::<Right>(pixels.right).ok()?;
-        let offset = ray_to_plane(&left, &(pair.left_from_right * right), &pair.left_from_right.origin())?;
-        let uncertainty = ResidualUncertainty::of(&left, &right, pair, *pixel_sigma)?;
-        let sigma = uncertainty.from_pixels.sqrt();
-        (sigma > 0.0).then(|| Self { offset: offset.rad(), slope: uncertainty.by_pose(), sigma })
-    }
-
-    fn residual(&self, correction: &Vector6<f64>) -> f64 {
-        self.offset + self.slope.dot(correction)
-    }
-
-    /// The weight 1/σ² times (1 + (residual / scale)²)⁻².
-    fn weight(&self, correction: &Vector6<f64>, scale: f64) -> f64 {
-        let relative = self.residual(correction) / scale;
-        (1.0 + relative * relative).powi(-2) / (self.sigma * self.sigma)
-    }
-
-    fn agrees(&self, correction: &Vector6<f64>) -> bool {
-        self.residual(correction).abs() <= 3.0 * self.sigma
-    }
 }

@@ -1,0 +1,60 @@
+//! What one match says of the relative pose, to first order.
+
+use nalgebra::{UnitQuaternion, Vector3, Vector6};
+
+use crate::epipolar::ray_to_plane;
+use crate::uncertainty::ResidualUncertainty;
+use crate::{Left, PixelPair, Right, StereoPair, Transform};
+
+/// Residuals beyond this many standard deviations count as wrong matches.
+pub const SCALE_SIGMAS: f64 = 2.5;
+
+/// Applies a correction to a pose: R ← exp(ω) R, t ← t + δ.
+pub fn moved(pose: &Transform<Left, Right>, by: &Vector6<f64>) -> Transform<Left, Right> {
+    let turn = UnitQuaternion::from_scaled_axis(Vector3::new(by[0], by[1], by[2]));
+    Transform::new(turn * pose.rotation(), pose.origin().mm() + by.fixed_rows::<3>(3))
+}
+
+/// The correction with which [`moved`] makes `to` of `from`.
+pub fn difference(to: &Transform<Left, Right>, from: &Transform<Left, Right>) -> Vector6<f64> {
+    let turn = (to.rotation() * from.rotation().inverse()).scaled_axis();
+    let shift = to.origin().mm() - from.origin().mm();
+    Vector6::new(turn.x, turn.y, turn.z, shift.x, shift.y, shift.z)
+}
+
+/// One match's equation: offset + slope · correction = 0 with standard deviation `sigma`, in radians.
+pub struct Equation {
+    pub offset: f64,
+    pub slope: Vector6<f64>,
+    pub sigma: f64,
+}
+
+impl Equation {
+    pub fn of((pixels, pixel_sigma): &(PixelPair, f64), pair: &StereoPair<'_>) -> Option<Self> {
+        let left = pair.left.unproject::<Left>(pixels.left).ok()?;
+        let right = pair.right.unproject::<Right>(pixels.right).ok()?;
+        let offset = ray_to_plane(&left, &(pair.left_from_right * right), &pair.left_from_right.origin())?;
+        let uncertainty = ResidualUncertainty::of(&left, &right, pair, *pixel_sigma)?;
+        let sigma = uncertainty.from_pixels.sqrt();
+        (sigma > 0.0).then(|| Self { offset: offset.rad(), slope: uncertainty.by_pose(), sigma })
+    }
+
+    pub fn residual(&self, correction: &Vector6<f64>) -> f64 {
+        self.offset + self.slope.dot(correction)
+    }
+
+    /// The weight 1/σ² times (1 + (residual / scale)²)⁻².
+    pub fn weight(&self, correction: &Vector6<f64>, scale: f64) -> f64 {
+        let relative = self.residual(correction) / scale;
+        (1.0 + relative * relative).powi(-2) / (self.sigma * self.sigma)
+    }
+
+    pub fn agrees(&self, correction: &Vector6<f64>) -> bool {
+        self.residual(correction).abs() <= 3.0 * self.sigma
+    }
+
+    /// 1/σ² for a match that agrees, else zero.
+    pub fn full_weight(&self, correction: &Vector6<f64>) -> f64 {
+        if self.agrees(correction) { (self.sigma * self.sigma).recip() } else { 0.0 }
+    }
+}
