@@ -5,7 +5,7 @@ use std::path::Path;
 use serde_json::{Map, Value, json};
 use vergence_pipeline::{Dropped, PairCloud};
 use vergence_rig::{Rig, rounded};
-use vergence_vision::PoseDrift;
+use vergence_vision::{FusedPose, PoseDrift};
 
 /// Where a pose comes from.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -45,6 +45,33 @@ pub fn drift_warning(cloud: &PairCloud, source: PoseSource) -> Option<String> {
     })
 }
 
+/// Where the pose of a cloud comes from, and how many of its six components the joints and the images told.
+#[must_use]
+pub fn pose_source_json(fused: Option<&FusedPose>) -> Value {
+    match fused {
+        None => json!({ "from": "joints" }),
+        Some(fused) => json!({
+            "from": "joints and images",
+            "told_by_joints": rounded(fused.told_by_joints()),
+            "told_by_images": rounded(fused.told_by_images),
+            "rotation_sigma_deg": rounded(fused.rotation_sigma().deg()),
+            "agreeing_matches": rounded(fused.agreeing),
+        }),
+    }
+}
+
+/// A line about the pose, where the images told a part of it.
+#[must_use]
+pub fn pose_source_line(fused: Option<&FusedPose>) -> Option<String> {
+    let fused = fused?;
+    Some(format!(
+        "  pose by joints and images: of its 6 components the images told {:.1}, the joints {:.1}; the rotation is known to {:.2}",
+        fused.told_by_images,
+        fused.told_by_joints(),
+        fused.rotation_sigma()
+    ))
+}
+
 /// `{"keypoints": {...}, "matches": {...}}`, each with a count for every reason that occurred.
 #[must_use]
 pub fn dropped_json(dropped: &Dropped) -> Value {
@@ -68,6 +95,7 @@ pub fn cloud_json(cloud: &PairCloud, out: &Path) -> Value {
         "matches": cloud.matches,
         "keypoints": cloud.keypoints,
         "dropped": dropped_json(&cloud.dropped),
+        "pose": pose_source_json(cloud.fused_pose.as_ref()),
         "pose_drift": drift,
         "out": out,
     })

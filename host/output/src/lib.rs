@@ -17,7 +17,9 @@ mod pictures;
 mod points;
 mod target_sheet;
 
-pub use cloud_report::{PoseSource, cloud_json, drift_warning, dropped_json, dropped_lines};
+pub use cloud_report::{
+    PoseSource, cloud_json, drift_warning, dropped_json, dropped_lines, pose_source_json, pose_source_line,
+};
 pub use dense_cloud::DenseCloud;
 pub use endings::{check_ending, check_folder};
 pub use error::OutputError;

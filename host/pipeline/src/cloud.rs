@@ -6,12 +6,13 @@ use image::RgbImage;
 use vergence_matching::{Match, MatchError, Matcher, Matches, UnmatchedReason};
 use vergence_rig::{Rig, TrackGap, moving_cloud};
 use vergence_vision::{
-    Cloud, CloudPoint, DropReason, Kernel, PixelPair, PoseDrift, StereoPair, cloud_of_each, pose_drift,
+    Cloud, CloudPoint, DropReason, FusedPose, Kernel, PixelPair, PoseDrift, StereoPair, cloud_of_each, pose_drift,
 };
 
 use crate::limits::{cloud_gates, matching_sigma};
 use crate::pair::{PairImages, colour_at};
 use crate::pose::PairPose;
+use crate::pose_source::{fused_pose, with_fused};
 use crate::stage::Stage;
 
 /// A point with its colour in the left image.
@@ -46,8 +47,10 @@ pub struct PairCloud {
     pub matches: usize,
     /// Why the others made no point.
     pub dropped: Dropped,
-    /// The correction of the pose that the matches ask for, where there are enough of them. It is not applied.
+    /// The correction of the pose by the joints that the matches ask for, where there are enough of them. It is not applied.
     pub pose_drift: Option<PoseDrift>,
+    /// The pose by which the points were made, where joints and matches told it together; else the joints told it alone.
+    pub fused_pose: Option<FusedPose>,
 }
 
 impl PairCloud {
@@ -135,15 +138,17 @@ pub fn cloud_of_pairs(
     kernel: Kernel,
 ) -> Result<PairCloud, TrackGap> {
     let middle = pose.at_middle();
-    let gates = cloud_gates(rig, middle, kernel);
-    let stereo =
+    let fused = fused_pose(rig, pose, pairs);
+    let used = fused.map_or_else(|| middle.clone(), |fused| with_fused(middle, &fused));
+    let gates = cloud_gates(rig, &used, kernel);
+    let by_joints =
         StereoPair { left: &rig.left_camera, right: &rig.right_camera, left_from_right: middle.left_from_right };
-    let Cloud { points, dropped } = match pose.rows() {
-        None => cloud_of_each(pairs, &stereo, &gates),
+    let Cloud { points, dropped } = match pose.rows().filter(|_| fused.is_none()) {
+        None => cloud_of_each(pairs, &StereoPair { left_from_right: used.left_from_right, ..by_joints }, &gates),
         Some((motion, exposure)) => moving_cloud(pairs, rig, motion, exposure, &gates)?,
     };
     // While the pose turns by more than it is uncertain, one correction for all rows means nothing.
-    let drift = pose.is_steady().then(|| pose_drift(pairs, &stereo, &middle.covariance)).flatten();
+    let drift = pose.is_steady().then(|| pose_drift(pairs, &by_joints, &middle.covariance)).flatten();
     let coloured = |point: CloudPoint| {
         let colour = colour_at(left, point.pixels.left);
         ColouredPoint { point, colour, score: 1.0 }
@@ -154,6 +159,7 @@ pub fn cloud_of_pairs(
         matches: pairs.len(),
         dropped: Dropped { matches: dropped, ..Dropped::default() },
         pose_drift: drift,
+        fused_pose: fused,
     })
 }
 

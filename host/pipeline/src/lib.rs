@@ -5,6 +5,7 @@
 //! - [`PairPose`] says where both cameras were while a pair was exposed: at rest, at a trigger pulse, or in motion;
 //! - [`pair_cloud`] matches a [`PairImages`] and triangulates what passes the gates, whose [`limits`] all verbs share; [`cloud_of_pairs`] triangulates given
 //!   correspondences;
+//! - where the joints alone tell the pose too badly, joints and matches tell it together ([`PairCloud::fused_pose`], [`pose_by_images`]);
 //! - [`dense_ranges`] measures every pixel of the left image;
 //! - [`bearings`] gives the directions that one camera alone can see;
 //! - [`observe_pair`] and [`observe_one`] make an [`Observation`] of what a live rig delivers;
@@ -21,6 +22,7 @@ pub mod limits;
 mod observation;
 mod pair;
 mod pose;
+mod pose_source;
 mod score;
 mod stage;
 mod zones;
@@ -32,6 +34,7 @@ pub use exposures::{Ambiguity, CameraGone, Exposed, ExposedImage, Exposures, Ski
 pub use observation::{Observation, observe_one, observe_pair};
 pub use pair::{PairImages, colour_at};
 pub use pose::{Motion, PairPose, TriggeredImage, UnpairedImage, pair_exposure};
+pub use pose_source::{pose_by_images, with_fused};
 pub use score::{Score, Spread, score};
 pub use stage::{Stage, StageTimes};
 pub use zones::{RigView, ZONE_RADIUS, rig_zones};

@@ -9,6 +9,7 @@ use crate::cloud::{Method, PairCloud, PairCloudError, pair_cloud};
 use crate::exposures::CameraGone;
 use crate::pair::PairImages;
 use crate::pose::PairPose;
+use crate::pose_source::with_fused;
 
 /// The measurement of one exposure. It holds nothing of any other.
 #[derive(Clone, Debug)]
@@ -44,7 +45,9 @@ pub fn observe_pair(
     method: Method<'_>,
 ) -> Result<Observation, PairCloudError> {
     let cloud = Box::new(pair_cloud(images, rig, pose, method, &mut |_| ())?);
-    Ok(Observation::Points { cloud, pose: Box::new(pose.at_middle().clone()), moving: pose.is_moving() })
+    let middle = pose.at_middle();
+    let used = cloud.fused_pose.as_ref().map_or_else(|| middle.clone(), |fused| with_fused(middle, fused));
+    Ok(Observation::Points { cloud, pose: Box::new(used), moving: pose.is_moving() })
 }
 
 /// The bearings of the image of one camera; `why` says why the other camera delivers nothing.

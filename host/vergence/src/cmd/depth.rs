@@ -10,13 +10,15 @@ use serde_json::{Value, json};
 use vergence_board::check_range;
 use vergence_camera::{Camera, CameraImage, FileCamera};
 use vergence_files::make_folder;
+use vergence_matching::GuidedMatcher;
 use vergence_output::{
     DenseCloud, PoseSource, TableFormat, check_ending, check_folder, cloud_json, drift_warning, dropped_lines,
-    match_svg, write_cloud, write_drawing,
+    match_svg, pose_source_json, pose_source_line, write_cloud, write_drawing,
 };
 use vergence_pipeline::limits::PIXEL_SIGMA;
 use vergence_pipeline::{
-    Method, PairCloud, PairImages, PairPose, StageTimes, cloud_of_pairs, dense_ranges, pair_cloud,
+    Method, PairCloud, PairImages, PairPose, StageTimes, cloud_of_pairs, dense_ranges, pair_cloud, pose_by_images,
+    with_fused,
 };
 use vergence_rig::{Rig, RigPose};
 use vergence_vision::{Kernel, Pixel, PixelPair, Side};
@@ -171,11 +173,16 @@ fn one_dense_pair(
     right.check_size(rig.right_camera.size(), Side::Right)?;
     let images = PairImages { left: &left.image, right: &right.image };
     let mut times = StageTimes::start(clock);
-    let depth = dense_ranges(images, rig, pose, &mut |stage| times.ended(stage))
-        .map_err(|error| Failure::usage(format!("{} and {}: {error}", left.name, right.name)))?;
+    let fail = |error: &dyn std::fmt::Display| Failure::usage(format!("{} and {}: {error}", left.name, right.name));
+    let fused = pose_by_images(images, rig, pose, &GuidedMatcher::default()).map_err(|error| fail(&error))?;
+    let pose = &fused.map_or_else(|| pose.clone(), |fused| with_fused(pose, &fused));
+    let depth = dense_ranges(images, rig, pose, &mut |stage| times.ended(stage)).map_err(|error| fail(&error))?;
     let written = DenseCloud::write(&depth, &times, images, (rig, pose), out)?;
     console.say(written.in_words())?;
-    Ok((written.json(), written.is_empty()))
+    pose_source_line(fused.as_ref()).iter().try_for_each(|line| console.say(line))?;
+    let mut result = written.json();
+    result["pose"] = pose_source_json(fused.as_ref());
+    Ok((result, written.is_empty()))
 }
 
 /// Refuses names of output files that say another format than the one written.
@@ -210,6 +217,7 @@ fn write(
     }
     console.say(format!("{} points of {} matches in {}", cloud.points.len(), cloud.matches, out.display()))?;
     dropped_lines(&cloud.dropped).iter().try_for_each(|line| console.say(line))?;
+    pose_source_line(cloud.fused_pose.as_ref()).iter().try_for_each(|line| console.say(line))?;
     if let Some(warning) = drift_warning(cloud, PoseSource::of_photographs(rig)) {
         console.warn(format!("{} and {}: {warning}", left.name, right.name));
     }

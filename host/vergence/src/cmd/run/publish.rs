@@ -10,7 +10,7 @@ use std::sync::Arc;
 use serde_json::{Value, json};
 use vergence_files::write_whole;
 use vergence_live::{LiveResult, Totals};
-use vergence_output::{PoseSource, Table, TableFormat, drift_warning, dropped_json, ply};
+use vergence_output::{PoseSource, Table, TableFormat, drift_warning, dropped_json, ply, pose_source_json};
 use vergence_pipeline::{Bearing, CameraGone, Observation, PairCloud};
 use vergence_rig::{Rig, RigPose, axes_json, rounded};
 use vergence_vision::Side;
@@ -105,6 +105,7 @@ impl Publisher {
             "origin_mm": placed.origin().mm().as_slice(),
             "rotation_vector": placed.rotation().scaled_axis().as_slice(),
         });
+        line["pose_source"] = pose_source_json(cloud.fused_pose.as_ref());
         line["warning"] = json!(drift_warning(cloud, self.pose_source()));
         line["cloud"] = Table::of_points(&cloud.points).json();
         line

@@ -1,0 +1,56 @@
+//! Whether the pose of a pair comes from the joints alone, or from joints and images together.
+
+use vergence_matching::{Match, MatchError, Matcher};
+use vergence_rig::{Rig, RigPose};
+use vergence_vision::{FusedPose, Length, PixelPair, StereoPair, fuse_pose};
+
+use crate::limits::{JOINTS_SUFFICE, matching_sigma};
+use crate::pair::PairImages;
+use crate::pose::PairPose;
+
+/// The pose that the joints and `matches` tell together, where the joints alone tell it too badly. `None` where they suffice, where
+/// the rig moved during the exposure, and where too few matches agree.
+pub(crate) fn fused_pose(rig: &Rig, pose: &PairPose, matches: &[(PixelPair, f64)]) -> Option<FusedPose> {
+    let middle = pose.at_middle();
+    if middle.rotation_sigma <= JOINTS_SUFFICE || !pose.is_steady() {
+        return None;
+    }
+    let stereo =
+        StereoPair { left: &rig.left_camera, right: &rig.right_camera, left_from_right: middle.left_from_right };
+    // The joints' errors move the pose far: matches that the covariance of the joints excludes are not looked at.
+    fuse_pose(matches, &stereo, &middle.covariance).filter(|fused| fused.rotation_sigma() < middle.rotation_sigma)
+}
+
+/// `pose` with the relative pose that joints and images tell together.
+#[must_use]
+pub fn with_fused(pose: &RigPose, fused: &FusedPose) -> RigPose {
+    let shift = fused.covariance.fixed_view::<3, 3>(3, 3).trace().max(0.0).sqrt();
+    RigPose {
+        left_from_right: fused.left_from_right,
+        covariance: fused.covariance,
+        rotation_sigma: fused.rotation_sigma(),
+        translation_sigma: Length::from_mm(shift),
+        ..pose.clone()
+    }
+}
+
+/// The pose of a standing rig for the dense search: by joints and the matches that `matcher` finds, where the joints alone tell it
+/// too badly. `None` where they suffice, or the images do not help.
+///
+/// # Errors
+/// Where the images do not belong to the cameras, or the cameras share no field.
+pub fn pose_by_images(
+    images: PairImages<'_>,
+    rig: &Rig,
+    pose: &RigPose,
+    matcher: &dyn Matcher,
+) -> Result<Option<FusedPose>, MatchError> {
+    if pose.rotation_sigma <= JOINTS_SUFFICE {
+        return Ok(None);
+    }
+    let standing = PairPose::standing(pose.clone());
+    let sigma = matching_sigma(pose, standing.sweep());
+    let found = images.with_grey(rig, pose, sigma, |pair| matcher.find(pair))?;
+    let pairs: Vec<_> = found.pairs.iter().map(Match::measured).collect();
+    Ok(fused_pose(rig, &standing, &pairs))
+}
