@@ -1,6 +1,7 @@
 //! Parsing of the rig file: TOML with units in the values, where an unknown key is an error.
 
 mod modes;
+mod trunk;
 
 use nalgebra::{Unit, UnitQuaternion, Vector3};
 use serde::Deserialize;
@@ -8,12 +9,14 @@ use vergence_protocol::{AxisKind, MAX_AXES};
 use vergence_vision::{Angle, Frame, InvalidLens, KannalaBrandt, Length, Point, Transform};
 
 use self::modes::ModesFile;
+pub(crate) use self::trunk::TrunkFile;
 use crate::axis::{AxisPosition, RigAxis};
 use crate::camera_file::{CameraTable, Provenance};
 use crate::chain::{Chain, Link, Screw};
 use crate::pitch::PitchTable;
 use crate::rig::Rig;
 use crate::text::{quantities, quantity};
+use crate::trunk::RigTrunk;
 
 /// The reason why a rig file is refused.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
@@ -48,6 +51,7 @@ struct RigFile {
     modes: ModesFile,
     left: SideFile,
     right: SideFile,
+    trunk: Option<TrunkFile>,
     #[serde(default)]
     calibration_sigma: SigmaFile,
     /// Information for people; nothing depends on it.
@@ -86,7 +90,7 @@ struct SideFile {
     screw: Vec<ScrewFile>,
 }
 
-#[derive(Default, Deserialize)]
+#[derive(Default, Deserialize, PartialEq)]
 #[serde(deny_unknown_fields, default)]
 struct PoseFile {
     #[serde(deserialize_with = "quantities")]
@@ -152,6 +156,7 @@ impl Rig {
                 modes::NUMBER
             )));
         }
+        let trunk = trunk(&file, &axes)?;
         Ok(Self {
             name: file.name,
             modes: modes::modes(&file.modes, &axes)?,
@@ -160,10 +165,24 @@ impl Rig {
             shutters: [&file.left, &file.right].map(|side| side.camera.shutter()),
             left_chain: chain("left", &file.left, &axes)?,
             right_chain: chain("right", &file.right, &axes)?,
+            trunk,
             calibration_sigma: (file.calibration_sigma.rotation, file.calibration_sigma.translation),
             axes,
         })
     }
+}
+
+/// The trunk, in place of screws and of poses at zero.
+fn trunk(file: &RigFile, axes: &[RigAxis]) -> Result<Option<Box<RigTrunk>>, RigError> {
+    let Some(table) = &file.trunk else { return Ok(None) };
+    for (name, side) in [("left", &file.left), ("right", &file.right)] {
+        if !side.screw.is_empty() || side.at_zero != PoseFile::default() {
+            return Err(contradiction(format!(
+                "[[{name}.screw]] or [{name}.at_zero] beside [trunk]: the trunk carries both cameras; leave these out"
+            )));
+        }
+    }
+    table.trunk(axes).map(Box::new).map(Some)
 }
 
 fn contradiction(text: String) -> RigError {

@@ -1,7 +1,7 @@
 //! The rig: its description, its kinematics, and the pose of its cameras at an exposure.
 //!
 //! A [`Rig`] is read from TOML ([`Rig::from_toml`]). Its axes convert encoder counts to positions, a screw chain per
-//! camera converts positions to `base_from_left` and `base_from_right`, a [`ClockMap`] converts the host's instants to
+//! camera, or a closed loop of links ([`linkage`]), converts positions to `base_from_left` and `base_from_right`, a [`ClockMap`] converts the host's instants to
 //! the board's clock, and a [`JointTrack`] interpolates the counts at that instant. Together they give a [`RigPose`],
 //! or one for every row of the images ([`moving_cloud`]). A [`DepthField`] predicts how well a pose will measure,
 //! before anything moves.
@@ -30,6 +30,7 @@ mod rig;
 mod text;
 mod to_toml;
 mod track;
+mod trunk;
 
 pub use axis::{AxisPosition, RigAxis, positions_in_words};
 pub use best_pose::RatedPose;
@@ -50,6 +51,7 @@ pub use pitch::{PitchTable, PitchTableError};
 pub use pose::RigPose;
 pub use rig::Rig;
 pub use track::{JointSample, JointTrack, Joints, JointsAt, SteadyMotion, TrackGap};
+pub use trunk::{RigTrunk, TRUNK_AXES};
 
 /// The rig file of the built-in bench, as a user would write it.
 pub const BENCH_TOML: &str = include_str!("bench.toml");

@@ -8,8 +8,9 @@ use crate::axis::{AxisPosition, RigAxis};
 use crate::chain::Chain;
 use crate::exposure::Shutter;
 use crate::mode::{Mode, ReportedMode};
+use crate::trunk::RigTrunk;
 
-/// A rig: its axes, modes and cameras, and the screw chains by which the axes move the cameras.
+/// A rig: its axes, modes and cameras, and the screw chains or the trunk by which the axes move the cameras.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Rig {
     /// Name of the rig in its file.
@@ -28,6 +29,8 @@ pub struct Rig {
     pub left_chain: Chain<Left>,
     /// The screw chain from the base to the right camera.
     pub right_chain: Chain<Right>,
+    /// The folding trunk that carries the cameras, in place of the screw chains, which then are empty.
+    pub trunk: Option<Box<RigTrunk>>,
     /// Standard deviations of the calibrated relative pose: rotation and translation.
     pub calibration_sigma: (Angle, Length),
 }
@@ -53,6 +56,7 @@ impl Rig {
             shutters: [Shutter::Global; 2],
             left_chain: Chain::new(Vec::new(), Transform::from_isometry(Isometry3::identity())),
             right_chain: Chain::new(Vec::new(), left_from_right.renamed()),
+            trunk: None,
             calibration_sigma: sigma,
         }
     }

@@ -10,6 +10,7 @@ use crate::axis::{AxisPosition, RigAxis};
 use crate::camera_file::{CameraTable, Provenance};
 use crate::chain::{Chain, Link, Screw};
 use crate::exposure::Shutter;
+use crate::file::TrunkFile;
 use crate::rig::Rig;
 
 #[derive(Serialize)]
@@ -18,6 +19,8 @@ struct File<'a> {
     axis: Vec<Axis<'a>>,
     modes: BTreeMap<&'a str, ModeTable<'a>>,
     calibration_sigma: Sigma,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    trunk: Option<TrunkFile>,
     left: Side<'a>,
     right: Side<'a>,
     provenance: &'a Provenance,
@@ -56,7 +59,9 @@ struct Sigma {
 #[derive(Serialize)]
 struct Side<'a> {
     camera: CameraTable,
-    at_zero: Pose,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    at_zero: Option<Pose>,
+    #[serde(skip_serializing_if = "Vec::is_empty")]
     screw: Vec<ScrewTable<'a>>,
 }
 
@@ -103,8 +108,9 @@ impl Rig {
                 rotation: angle(self.calibration_sigma.0),
                 translation: length(self.calibration_sigma.1),
             },
-            left: side(table(&self.left_camera, self.shutters[0]), &self.left_chain, &name),
-            right: side(table(&self.right_camera, self.shutters[1]), &self.right_chain, &name),
+            trunk: self.trunk.as_ref().map(|trunk| TrunkFile::of(trunk, trunk.axes.map(|axis| name(&axis)))),
+            left: side(table(&self.left_camera, self.shutters[0]), &self.left_chain, &name, self.trunk.is_none()),
+            right: side(table(&self.right_camera, self.shutters[1]), &self.right_chain, &name, self.trunk.is_none()),
             provenance,
         };
         toml::to_string(&file).map_err(|error| error.to_string())
@@ -134,7 +140,12 @@ fn axis(axis: &RigAxis) -> Axis<'_> {
     }
 }
 
-fn side<'a, C: Frame>(camera: CameraTable, chain: &Chain<C>, name: &impl Fn(&usize) -> &'a str) -> Side<'a> {
+fn side<'a, C: Frame>(
+    camera: CameraTable,
+    chain: &Chain<C>,
+    name: &impl Fn(&usize) -> &'a str,
+    is_placed: bool,
+) -> Side<'a> {
     let at_zero = chain.at_zero();
     let (origin, turn): ([f64; 3], [f64; 3]) = (at_zero.origin().mm().into(), at_zero.rotation().scaled_axis().into());
     let screw = |Link { axis, share, screw }: &Link| {
@@ -149,10 +160,10 @@ fn side<'a, C: Frame>(camera: CameraTable, chain: &Chain<C>, name: &impl Fn(&usi
     };
     Side {
         camera,
-        at_zero: Pose {
+        at_zero: is_placed.then(|| Pose {
             origin: origin.map(|mm| length(Length::from_mm(mm))),
             rotation_vector: turn.map(|rad| format!("{rad:?}rad")),
-        },
+        }),
         screw: chain.links().iter().map(screw).collect(),
     }
 }

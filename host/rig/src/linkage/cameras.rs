@@ -30,13 +30,13 @@ impl Default for TrunkCameras {
 
 impl TrunkCameras {
     /// The left camera in the frame of its link: x from corner A to B, z up, so that -y is outward.
-    fn link_from_left(&self) -> Isometry3<f64> {
+    pub(crate) fn link_from_left(&self) -> Isometry3<f64> {
         let axis = Vector3::new(-self.angle.cos(), -self.angle.sin(), 0.0);
         mounted(Vector3::new(self.along, -self.outward, 0.0), axis)
     }
 
     /// The right camera in the frame of its link: x from corner E to F.
-    fn link_from_right(&self) -> Isometry3<f64> {
+    pub(crate) fn link_from_right(&self) -> Isometry3<f64> {
         let axis = Vector3::new(self.angle.cos(), -self.angle.sin(), 0.0);
         mounted(Vector3::new(self.side - self.along, -self.outward, 0.0), axis)
     }

@@ -43,14 +43,8 @@ impl SixBar {
     /// # Errors
     /// [`SixBarError`] where there is none, or one for every place of E.
     pub fn shapes(&self, driven: [f64; 3]) -> Result<Vec<Corners>, SixBarError> {
-        let [a, b, c] = driven;
-        // Directions of the links, going round; CD lies along x, and the inside is to the left of each link.
-        let bc = c - PI;
-        let ab = bc - (PI - b);
-        let fa = ab - (PI - a);
-        let d = Vector2::new(self.end, 0.0);
-        let f = -self.side * (direction(bc) + direction(ab)) - self.end * direction(fa);
-        let (apart, reach) = ((f - d).norm(), 2.0 * self.side);
+        let half = HalfLoop::of(self, driven);
+        let (apart, reach) = (half.apart(), 2.0 * self.side);
         // What rounding leaves of links in line.
         let rounding = 1e-12 * reach;
         if apart > reach + rounding {
@@ -59,18 +53,59 @@ impl SixBar {
         if apart <= rounding {
             return Err(SixBarError::Undetermined);
         }
-        let middle = (d + f) / 2.0;
-        let beside = Rotation2::new(PI / 2.0) * (f - d) / apart;
-        let height = (self.side.powi(2) - (apart / 2.0).powi(2)).max(0.0).sqrt();
+        let height = self.height(apart);
         let heights = if apart >= reach - rounding { vec![0.0] } else { vec![-height, height] };
-        let shape = |height: f64| {
-            let e = middle + beside * height;
-            let (de, ef) = (heading(e - d), heading(f - e));
-            let interior = |turn: f64| (PI - turn).rem_euclid(TAU);
-            let [a, b, c] = driven.map(|angle| angle.rem_euclid(TAU));
-            Corners([a, b, c, interior(de), interior(ef - de), interior(fa - ef)])
-        };
-        Ok(heights.into_iter().map(shape).collect())
+        Ok(heights.into_iter().map(|height| half.closed_by(height)).collect())
+    }
+
+    /// The shape with corner E outward; where corners D and F are farther apart than both links between them reach, as by noise at a
+    /// dead centre, that with D, E and F in line.
+    #[must_use]
+    pub fn outward_or_straight(&self, driven: [f64; 3]) -> Corners {
+        let half = HalfLoop::of(self, driven);
+        half.closed_by(-self.height(half.apart()))
+    }
+
+    /// Distance of corner E from the line through D and F, which are `apart`.
+    fn height(&self, apart: f64) -> f64 {
+        (self.side.powi(2) - (apart / 2.0).powi(2)).max(0.0).sqrt()
+    }
+}
+
+/// The links from corner D over C, B and A to F, which the driven corners place.
+struct HalfLoop {
+    driven: [f64; 3],
+    d: Vector2<f64>,
+    f: Vector2<f64>,
+    /// Direction of link FA.
+    fa: f64,
+}
+
+impl HalfLoop {
+    fn of(links: &SixBar, driven: [f64; 3]) -> Self {
+        let [a, b, c] = driven;
+        // Directions of the links, going round; CD lies along x, and the inside is to the left of each link.
+        let bc = c - PI;
+        let ab = bc - (PI - b);
+        let fa = ab - (PI - a);
+        let d = Vector2::new(links.end, 0.0);
+        let f = -links.side * (direction(bc) + direction(ab)) - links.end * direction(fa);
+        Self { driven, d, f, fa }
+    }
+
+    fn apart(&self) -> f64 {
+        (self.f - self.d).norm()
+    }
+
+    /// The shape with corner E at `height` to the left of the line from D to F.
+    fn closed_by(&self, height: f64) -> Corners {
+        let way = self.f - self.d;
+        let beside = Rotation2::new(PI / 2.0) * way.try_normalize(0.0).unwrap_or_else(Vector2::x);
+        let e = (self.d + self.f) / 2.0 + beside * height;
+        let (de, ef) = (heading(e - self.d), heading(self.f - e));
+        let interior = |turn: f64| (PI - turn).rem_euclid(TAU);
+        let [a, b, c] = self.driven.map(|angle| angle.rem_euclid(TAU));
+        Corners([a, b, c, interior(de), interior(ef - de), interior(self.fa - ef)])
     }
 }
 

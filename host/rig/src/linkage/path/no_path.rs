@@ -30,6 +30,11 @@ pub enum NoPath {
         /// Angle in radians.
         by: f64,
     },
+    /// A fold is not flat at one end.
+    #[error(
+        "paths are planned for the flat trunk: move both folds to 180 degrees first, from a shape with both sides alike"
+    )]
+    Folded,
     /// Corner E is outside at one end and inside at the other.
     #[error(
         "corner E would have to pass from one side of the line DF to the other, through a dead centre where it may go either way"
