@@ -25,7 +25,7 @@ pub use endings::{check_ending, check_folder};
 pub use error::OutputError;
 pub use pictures::{
     ZonesOf, confidence_image, dense_svg, depth_field_svg, depth_svg, error_svg, match_svg, range_image, seen_by_cones,
-    sigma_image, write_drawing, write_scored_pair, zones_plot, zones_svg,
+    sigma_image, trunk_strip_svg, write_drawing, write_scored_pair, zones_plot, zones_svg,
 };
 pub use points::{DenseRow, Table, TableFormat, dense_ply, ply, write_cloud};
 pub use target_sheet::{Paper, Sheet};

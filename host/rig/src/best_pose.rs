@@ -7,6 +7,7 @@ use crate::axis::AxisPosition;
 use crate::depth_field::DepthField;
 use crate::goal::{DepthGoal, DepthSigma};
 use crate::in_json::{axes_json, rounded};
+use crate::linkage::Corners;
 use crate::rig::Rig;
 
 /// Step of the azimuths at which the goal is checked.
@@ -114,27 +115,58 @@ impl Rig {
     /// `pixel_sigma` is the standard deviation of matches in pixels.
     #[must_use]
     pub fn best_pose(&self, goal: &DepthGoal, pixel_sigma: f64) -> RatedPose {
-        let ranges: Vec<[f64; 2]> = self.axes.iter().map(|axis| axis.range.map(|end| end.value())).collect();
+        let space = SearchSpace::of(self);
+        let ranges = &space.ranges;
         let per_axis = FIRST_GRID.powf(1.0 / ranges.len().max(1) as f64).floor().max(3.0);
         let mut steps: Vec<f64> = ranges.iter().map(|[low, high]| (high - low) / (per_axis - 1.0)).collect();
         let first = |i: usize, k: i32| ranges[i][0] + f64::from(k) * steps[i];
         let mut best: Vec<RatedPose> = Vec::new();
-        for values in grid(ranges.len(), 0..per_axis as i32, first) {
-            keep(&mut best, self.rate_pose(&values, goal, pixel_sigma));
+        for place in grid(ranges.len(), 0..per_axis as i32, first) {
+            keep(&mut best, self.rate_pose(&space.values(&place), goal, pixel_sigma));
         }
         for _ in 0..REFINEMENTS {
             steps.iter_mut().for_each(|step| *step /= f64::from(FINER_GRID));
             for centre in best.clone() {
+                let centre = space.place(&centre.values);
                 let around = |i: usize, k: i32| {
                     let [low, high] = ranges[i];
-                    (centre.values[i] + f64::from(k) * steps[i]).clamp(low, high)
+                    (centre[i] + f64::from(k) * steps[i]).clamp(low, high)
                 };
-                for values in grid(ranges.len(), -FINER_GRID..FINER_GRID + 1, around) {
-                    keep(&mut best, self.rate_pose(&values, goal, pixel_sigma));
+                for place in grid(ranges.len(), -FINER_GRID..FINER_GRID + 1, around) {
+                    keep(&mut best, self.rate_pose(&space.values(&place), goal, pixel_sigma));
                 }
             }
         }
         best.into_iter().next().unwrap_or_else(|| self.rate_pose(&[], goal, pixel_sigma))
+    }
+}
+
+/// The poses among which the best one is searched: all of a rig with stages; of a trunk the flat ones with both sides alike, which its
+/// side joint tells.
+struct SearchSpace<'a> {
+    rig: &'a Rig,
+    /// Range of each coordinate.
+    ranges: Vec<[f64; 2]>,
+}
+
+impl<'a> SearchSpace<'a> {
+    fn of(rig: &'a Rig) -> Self {
+        let whole = || rig.axes.iter().map(|axis| axis.range.map(|end| end.value())).collect();
+        Self { rig, ranges: rig.trunk.as_ref().map_or_else(whole, |trunk| vec![trunk.side_joints_alike()]) }
+    }
+
+    /// Positions of all axes at a place of the space.
+    fn values(&self, place: &[f64]) -> Vec<f64> {
+        match (&self.rig.trunk, place) {
+            (Some(trunk), [side]) => trunk.values_of(&Corners::alike(*side), self.rig.axes.len()),
+            _ => place.to_vec(),
+        }
+    }
+
+    /// The place of the space with these positions of all axes.
+    fn place(&self, values: &[f64]) -> Vec<f64> {
+        let side = self.rig.trunk.as_ref().and_then(|trunk| values.get(trunk.axes[1]));
+        side.map_or_else(|| values.to_vec(), |&side| vec![side])
     }
 }
 

@@ -108,6 +108,18 @@ impl RigTrunk {
         FlatTrunk { links: self.links.six_bar(), cameras: self.cameras, bodies: self.bodies, limits: self.limits }
     }
 
+    /// Least and greatest angle of the side joints, both alike, in which nothing touches and no joint is beyond its range, in radians;
+    /// up to straight, where gecko is.
+    #[must_use]
+    pub fn side_joints_alike(&self) -> [f64; 2] {
+        const STEP: f64 = 1e-3;
+        let flat = self.flat();
+        let is_allowed = |side: &f64| !flat.clearance(&Corners::alike(*side)).is_forbidden();
+        let steps = (PI / STEP) as u32;
+        let least = (0..=steps).map(|step| f64::from(step) * STEP).find(is_allowed).unwrap_or(PI);
+        [least, PI]
+    }
+
     /// Whether both folds are flat with the axes at `values` in radians.
     #[must_use]
     pub fn is_flat(&self, values: &[f64]) -> bool {

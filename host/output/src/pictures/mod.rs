@@ -1,9 +1,11 @@
-//! Pictures as SVG and PNG: clouds, dense ranges, the predicted error of depth, zones.
+//! Pictures as SVG and PNG: clouds, dense ranges, the predicted error of depth, zones, a trunk on its
+//! path.
 
 mod cloud;
 mod dense;
 mod depth_field;
 mod panels;
+mod trunk_strip;
 mod zones_curves;
 mod zones_plan;
 
@@ -15,6 +17,7 @@ use vergence_files::{FileError, write_whole};
 pub use cloud::{depth_svg, error_svg, match_svg, write_scored_pair};
 pub use dense::{confidence_image, dense_svg, range_image, sigma_image};
 pub use depth_field::depth_field_svg;
+pub use trunk_strip::trunk_strip_svg;
 pub use zones_curves::{ZonesOf, zones_plot};
 pub use zones_plan::{seen_by_cones, zones_svg};
 

@@ -55,6 +55,21 @@ pub struct TrunkPath {
 }
 
 impl TrunkPath {
+    /// The shape at `seconds` after the start, and its clearance; those of the ends beyond them. `None` for a path without legs.
+    ///
+    /// Each leg takes constant acceleration, constant speed, and constant braking.
+    #[must_use]
+    pub fn at(&self, seconds: f64) -> Option<(Corners, Clearance)> {
+        let mut left = seconds.max(0.0);
+        for leg in &self.legs {
+            if left <= leg.seconds {
+                return leg.at(left).map(|sample| (sample.shape, sample.room));
+            }
+            left -= leg.seconds;
+        }
+        self.legs.last().and_then(|leg| leg.samples.last()).map(|sample| (sample.shape, sample.room))
+    }
+
     /// Time of the whole path in seconds, with a rest after each leg of no length.
     #[must_use]
     pub fn seconds(&self) -> f64 {

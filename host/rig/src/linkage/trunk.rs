@@ -87,6 +87,13 @@ impl TrunkLinks {
 }
 
 impl Corners {
+    /// The shape with both sides alike and this interior angle of the side joints, in radians.
+    #[must_use]
+    pub fn alike(side_joint: f64) -> Self {
+        let corner = PI - side_joint / 2.0;
+        Self([corner, side_joint, corner, corner, side_joint, corner])
+    }
+
     /// The angles of the trunk's joints with these corners and both folds flat.
     #[must_use]
     pub fn trunk_angles(&self) -> [f64; TrunkJoint::COUNT] {

@@ -1,6 +1,7 @@
 //! `vergence plan`: a move before it is made, and the pose that measures as asked.
 
 mod goal;
+mod trunk;
 
 use serde_json::json;
 use vergence_board::{Board, MovePlan, MoveStart, check_range};
@@ -15,7 +16,8 @@ use crate::failure::Failure;
 use crate::rig_file;
 
 /// Plans a move with the board's own planner and limits, and moves nothing. It begins where the stages stand, or at the
-/// low ends of their ranges, where homing leaves them. Without --port it plans for the stages of 'vergence sim'.
+/// low ends of their ranges, where homing leaves them. Without --port it plans for the stages of 'vergence sim'. For a rig
+/// with a trunk it finds a path on which the loop of links closes and nothing touches, from the mode of --from.
 #[derive(Debug, clap::Args)]
 pub struct Args {
     /// The mode to go to, such as herbivore.
@@ -26,9 +28,11 @@ pub struct Args {
     /// The mode to begin at.
     #[arg(long, value_name = "MODE")]
     from: Option<String>,
-    /// Prints every segment: time, position, velocity, acceleration, jerk.
+    /// Prints every segment: time, position, velocity, acceleration, jerk. Of a trunk, the shapes along the path.
     #[arg(long)]
     dump: bool,
+    #[command(flatten)]
+    trunk: trunk::TrunkOptions,
     #[command(flatten)]
     goal: goal::GoalOptions,
 }
@@ -38,6 +42,9 @@ pub async fn run(args: &Args, common: &CommonOptions, console: Console) -> Resul
         return goal::run(&args.goal, common, console);
     }
     let rig = rig_file::load(common.rig.as_deref())?;
+    if let Some(trunk) = &rig.trunk {
+        return trunk::run(args, &rig, trunk, console);
+    }
     let common = CommonOptions { port: common.port.clone().or_else(|| Some("sim".into())), ..common.clone() };
     let board = connect(&common, console, "planning").await?;
     let from = match &args.from {

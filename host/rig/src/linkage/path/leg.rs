@@ -27,9 +27,27 @@ pub struct Leg {
     pub samples: Vec<LegSample>,
     /// Time in seconds from rest to rest, with the corners' limits.
     pub seconds: f64,
+    /// The part of that time in which it speeds up, and as much in which it brakes.
+    rising: f64,
 }
 
 impl Leg {
+    /// The sample nearest to the place at `seconds` after its start.
+    pub(super) fn at(&self, seconds: f64) -> Option<&LegSample> {
+        let (rising, total) = (self.rising, self.seconds);
+        let whole = total - rising;
+        let from_end = (total - seconds).max(0.0);
+        let share = if seconds < rising {
+            seconds * seconds / (2.0 * rising * whole)
+        } else if from_end < rising {
+            1.0 - from_end * from_end / (2.0 * rising * whole)
+        } else {
+            (seconds - rising / 2.0) / whole
+        };
+        let last = self.samples.len().checked_sub(1)?;
+        self.samples.get((share.clamp(0.0, 1.0) * last as f64).round() as usize)
+    }
+
     /// The shape at its end.
     #[must_use]
     pub fn end(&self) -> Option<&Corners> {
@@ -59,7 +77,8 @@ impl Space<'_> {
         let ends = self.passage(samples.iter().rev(), way)?;
         let inside = samples.get(begins..samples.len() - ends).unwrap_or_default();
         let is_clear = inside.iter().all(|sample| sample.room.has(&self.wanted));
-        is_clear.then(|| Leg { seconds: duration(&samples, way, &self.trunk.limits), samples })
+        let [seconds, rising] = durations(&samples, way, &self.trunk.limits);
+        is_clear.then_some(Leg { seconds, rising, samples })
     }
 
     /// Number of samples at the beginning that have less room than wanted; `None` if they are too many, or the loop's reserve does
@@ -82,12 +101,13 @@ impl Space<'_> {
     }
 }
 
-/// Time from rest to rest with constant acceleration, constant speed and constant braking; longer where a passive corner would
-/// exceed its speed.
-fn duration(samples: &[LegSample], way: f64, limits: &CornerLimits) -> f64 {
+/// Time from rest to rest with constant acceleration, constant speed and constant braking, and the part in which it speeds up; longer
+/// where a passive corner would exceed its speed.
+fn durations(samples: &[LegSample], way: f64, limits: &CornerLimits) -> [f64; 2] {
     let CornerLimits { speed, acceleration, passive_speed, .. } = *limits;
     let rises = speed * speed / acceleration;
-    let alone = if way < rises { 2.0 * (way / acceleration).sqrt() } else { way / speed + speed / acceleration };
+    let rising = way.min(rises).max(0.0).sqrt() / acceleration.sqrt();
+    let alone = if way < rises { 2.0 * rising } else { way / speed + rising };
     let fastest = samples.windows(2).map(|pair| {
         let [from, to] = [pair[0], pair[1]];
         let middle = f64::midpoint(from.share, to.share) * way;
@@ -95,5 +115,6 @@ fn duration(samples: &[LegSample], way: f64, limits: &CornerLimits) -> f64 {
         let turned = (3..6).map(|corner| (to.shape.0[corner] - from.shape.0[corner]).abs()).fold(0.0, f64::max);
         turned * driven / ((to.share - from.share) * way)
     });
-    alone * (fastest.fold(0.0, f64::max) / passive_speed).max(1.0)
+    let slower = (fastest.fold(0.0, f64::max) / passive_speed).max(1.0);
+    [alone * slower, rising * slower]
 }

@@ -8,7 +8,7 @@ use vergence_files::write_whole;
 use vergence_output::{ZonesOf, write_drawing, zones_plot, zones_svg};
 use vergence_pipeline::RigView;
 use vergence_rig::{rounded, zones_json};
-use vergence_vision::{circle_zones, solid_zones};
+use vergence_vision::{PAPER_FIELD, PUBLISHED_MODES, circle_zones, paper_eq3, paper_eq3_applies, solid_zones};
 
 use super::{Args, in_words};
 use crate::cli::CommonOptions;
@@ -28,6 +28,33 @@ pub struct RigOptions {
     /// The same of the right image.
     #[arg(long, value_name = "IMAGE", requires = "mode")]
     right_mask: Option<PathBuf>,
+}
+
+/// What the paper prints for a mode of this name, beside the zones of this rig on the paper's circle.
+fn published(name: &str, view: &RigView<'_>) -> Result<Option<(String, serde_json::Value)>, Failure> {
+    let Some(mode) = PUBLISHED_MODES.iter().find(|mode| mode.name == name) else { return Ok(None) };
+    let exact = circle_zones(&view.cameras, &view.middle, mode.radius)
+        .map_err(|error| Failure::usage(format!("no zones: {error}")))?
+        .zones;
+    let by_eq3 = paper_eq3(PAPER_FIELD, mode.separation, mode.baseline, mode.radius);
+    let applies = paper_eq3_applies(PAPER_FIELD, mode.separation, mode.baseline, mode.radius);
+    let origin = match (mode.name, applies) {
+        ("stick-bug", _) => "no geometry gives both printed figures".to_owned(),
+        (_, true) => format!("its Eq. 3 gives {:.1} and {:.1} for its nominal pose", by_eq3.stereo, by_eq3.mono),
+        (_, false) => "its Eq. 3 does not apply".to_owned(),
+    };
+    let mono = mode.mono.map_or_else(|| "none".to_owned(), |mono| format!("{mono:.0}"));
+    let sentence = format!(
+        "the paper prints stereo {:.0}, mono {mono} on a circle of {:.0} ({origin}); this rig: stereo {:.2}, mono {:.2}, blind {:.2}",
+        mode.stereo, mode.radius, exact.stereo, exact.mono, exact.blind
+    );
+    let json = json!({
+        "stereo": rounded(mode.stereo.deg()),
+        "mono": mode.mono.map(|mono| rounded(mono.deg())),
+        "radius_mm": rounded(mode.radius.mm()),
+        "exact": zones_json(&exact),
+    });
+    Ok(Some((sentence, json)))
 }
 
 /// Right to 0.001 sr.
@@ -70,7 +97,12 @@ pub fn run(args: &Args, common: &CommonOptions, console: Console) -> Result<(), 
     if solid.rear_sr > 0.0 {
         console.say(format!("of the stereo zone, {:.3} sr lie behind the rig", solid.rear_sr))?;
     }
+    let printed = published(name, &view)?;
+    if let Some((sentence, _)) = &printed {
+        console.say(sentence)?;
+    }
     console.result(&json!({
+        "published": printed.map(|(_, json)| json),
         "exact": zones_json(&map.zones),
         "rear_overlap": rounded(map.rear_overlap().deg()),
         "solid_sr": {

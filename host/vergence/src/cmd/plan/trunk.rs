@@ -1,0 +1,148 @@
+//! `vergence plan` of a rig with a folding trunk: a path on which the loop closes and nothing touches.
+
+use std::path::PathBuf;
+
+use serde_json::{Value, json};
+use vergence_board::check_range;
+use vergence_files::write_whole;
+use vergence_output::{check_ending, trunk_strip_svg};
+use vergence_pipeline::{ZONE_RADIUS, rig_zones};
+use vergence_rig::linkage::{Corners, Leg, TrunkPath, WantedClearance};
+use vergence_rig::{Rig, RigTrunk, axes_json, rounded, zones_json};
+use vergence_vision::{Angle, Length};
+
+use super::super::stage_pose::named_mode;
+use super::Args;
+use crate::console::Console;
+use crate::failure::Failure;
+
+/// The room that a path of a trunk must have, and its picture.
+#[derive(Debug, clap::Args)]
+pub struct TrunkOptions {
+    /// Angle by which every driven joint of a trunk may be off along the path before its loop no longer closes.
+    #[arg(long, value_name = "ANGLE", default_value_t = Angle::from_deg(1.0))]
+    reserve: Angle,
+    /// Least distance of the bodies of a trunk along the path.
+    #[arg(long, value_name = "LENGTH", default_value_t = Length::from_mm(3.0))]
+    gap: Length,
+    /// Draws the trunk along the path, with the zones, to this file, as SVG.
+    #[arg(long, value_name = "FILE")]
+    strip: Option<PathBuf>,
+}
+
+pub fn run(args: &Args, rig: &Rig, trunk: &RigTrunk, console: Console) -> Result<(), Failure> {
+    let Some(goal) = &args.mode else {
+        return Err(Failure::usage(format!("rig '{}' has a trunk: name a mode to go to", rig.name)));
+    };
+    let Some(start) = &args.from else {
+        return Err(Failure::usage(format!(
+            "rig '{}' has a trunk: say with --from in which mode the path begins",
+            rig.name
+        )));
+    };
+    if let Some(path) = &args.trunk.strip {
+        check_ending(path, &["svg"])?;
+    }
+    let [from, to] = [start, goal].map(|name| named_mode(rig, name).map(|mode| &mode.targets));
+    let (from, to) = (from?, to?);
+    check_range(rig, to)?;
+    let values = |positions: &[vergence_rig::AxisPosition]| -> Vec<f64> {
+        positions.iter().map(|position| position.value()).collect()
+    };
+    let wanted = WantedClearance { loop_reserve: args.trunk.reserve.rad(), gap_mm: args.trunk.gap.mm() };
+    let path = trunk
+        .path(&values(from), &values(to), &wanted)
+        .map_err(|error| Failure::check(format!("no path from {start} to {goal}: {error}")))?;
+    tell(&path, &wanted, console)?;
+    if args.dump {
+        path.legs.iter().enumerate().try_for_each(|(number, leg)| console.say(table(number, leg)))?;
+    }
+    let zones = rig_zones(rig, &rig.pose_at_values(&values(to)))
+        .map_err(|error| Failure::check(format!("the zones of this pose: {error}")))?;
+    console.say(format!(
+        "then sees stereo {:.1}, mono {:.1}, blind {:.1} on a circle of {ZONE_RADIUS:.0}",
+        zones.stereo, zones.mono, zones.blind
+    ))?;
+    if let (Some(file), Some(svg)) = (&args.trunk.strip, trunk_strip_svg(rig, &path)) {
+        write_whole(file, svg.as_bytes())?;
+        console.say(format!("pictures in {}", file.display()))?;
+    }
+    console.result(&json!({
+        "duration_s": rounded(path.seconds()),
+        "from": axes_json(rig, from),
+        "to": axes_json(rig, to),
+        "kept": { "reserve_deg": rounded(path.kept.loop_reserve.to_degrees()), "gap_mm": rounded(path.kept.gap_mm) },
+        "zones_deg": zones_json(&zones),
+        "legs": path.legs.iter().map(|leg| leg_json(rig, trunk, leg)).collect::<Vec<_>>(),
+    }))
+}
+
+/// Legs and room of the path in words.
+fn tell(path: &TrunkPath, wanted: &WantedClearance, console: Console) -> Result<(), Failure> {
+    for (number, leg) in path.legs.iter().enumerate() {
+        let Some(end) = leg.end() else { continue };
+        console.say(format!("leg {}: {:.2} s to corners {}", number + 1, leg.seconds, degrees(end)))?;
+    }
+    let reserve = path.kept.loop_reserve.to_degrees();
+    console.say(format!(
+        "takes {:.2} s; every driven joint may be off by {reserve:.1} degrees, bodies stay {:.1} mm apart",
+        path.seconds(),
+        path.kept.gap_mm
+    ))?;
+    if path.kept != *wanted {
+        console.warn("no way has the clearance asked for: this one keeps less");
+    }
+    let tight = |leg: &Leg| leg.samples.iter().any(|sample| !sample.room.has(&path.kept));
+    if path.legs.iter().any(tight) {
+        console.say("one end is near a dead centre of the linkage: the path leaves or enters it where the reserve grows fastest")?;
+    }
+    Ok(())
+}
+
+fn degrees(shape: &Corners) -> String {
+    let text: Vec<_> = ["A", "B", "C", "D", "E", "F"]
+        .into_iter()
+        .zip(shape.0)
+        .map(|(name, angle)| format!("{name} {:.1}", angle.to_degrees()))
+        .collect();
+    text.join(", ")
+}
+
+/// Every tenth shape of a leg, and the last.
+fn table(number: usize, leg: &Leg) -> String {
+    let head = format!("leg {}   share   A       B       C       D       E       F     reserve  gap mm", number + 1);
+    let last = leg.samples.len().saturating_sub(1);
+    let rows =
+        leg.samples.iter().enumerate().filter(|(index, _)| index % 10 == 0 || *index == last).map(|(_, sample)| {
+            let angles: String = sample.shape.0.iter().map(|angle| format!(" {:7.2}", angle.to_degrees())).collect();
+            format!(
+                "        {:5.2} {angles} {:7.2} {:7.1}",
+                sample.share,
+                sample.room.loop_reserve.to_degrees(),
+                sample.room.gap.mm
+            )
+        });
+    std::iter::once(head).chain(rows).collect::<Vec<_>>().join("\n")
+}
+
+fn leg_json(rig: &Rig, trunk: &RigTrunk, leg: &Leg) -> Value {
+    let least = |value: fn(&vergence_rig::linkage::LegSample) -> f64| {
+        leg.samples.iter().map(value).fold(f64::INFINITY, f64::min)
+    };
+    let to = leg.end().map(|shape| {
+        let values = trunk.values_of(shape, rig.axes.len());
+        let positions: Vec<_> = rig
+            .axes
+            .iter()
+            .zip(values)
+            .map(|(axis, value)| vergence_rig::AxisPosition::from_value(axis.kind, value))
+            .collect();
+        axes_json(rig, &positions)
+    });
+    json!({
+        "duration_s": rounded(leg.seconds),
+        "to": to,
+        "least_reserve_deg": rounded(least(|sample| sample.room.loop_reserve).to_degrees()),
+        "least_gap_mm": rounded(least(|sample| sample.room.gap.mm)),
+    })
+}
