@@ -11,6 +11,7 @@
 //! threads: all randomness is a hash of the seed and of the pixel.
 
 mod blur;
+mod corridor;
 mod furnish;
 mod hierarchy;
 mod light;
