@@ -40,6 +40,9 @@ pub enum DemoError {
     /// The pose has no zones.
     #[error("the zones of this pose: {0}")]
     Zones(String),
+    /// A file cannot be written.
+    #[error("{0}")]
+    File(String),
     /// Pulse and images do not tell where the cameras were.
     #[error("the pose at the exposure is unknown: {0}")]
     UnknownPose(String),

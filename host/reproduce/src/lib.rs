@@ -8,14 +8,16 @@
 //!
 //! Beside it stand the zones of all modes ([`mode_zones`]), the methods of triangulation ([`study`]), and matches in the
 //! simulated room ([`matchings`]). [`experiments`] does all of it and puts it on one page ([`reproduction_page`]). The same
-//! seeds give the same bytes. [`demo`] measures every mode of a simulated rig in its room, scored against the truth.
+//! seeds give the same bytes. [`demo`] measures every mode of a simulated rig in its room, scored against the truth; [`corridor`] the
+//! robot's modes in a corridor.
 //!
 //! Nothing here runs another program or prints: the caller passes in what does, and the clock. Only [`demo::View::write`]
-//! writes files.
+//! and [`corridor`] write files.
 
 mod axes;
 mod bench;
 mod chain;
+pub mod corridor;
 pub mod demo;
 mod drive;
 mod error;

@@ -9,6 +9,7 @@ use serde_json::{Value, json};
 use vergence_files::make_folder;
 use vergence_output::check_folder;
 use vergence_protocol::SessionId;
+use vergence_reproduce::corridor::Corridor;
 use vergence_reproduce::demo::{Pulse, SimulatedPair};
 use vergence_rig::{Rig, rounded};
 
@@ -22,7 +23,8 @@ use crate::stopwatch::{Stopwatch, clock};
 
 /// Starts a simulated rig in a simulated room, homes it, and in every mode of the rig takes a pair of images, measures it and
 /// compares the points with the truth. Board, protocol, poses, matching and triangulation are the real ones; mechanics, room
-/// and cameras are simulated. The truth scores the points and is used for nothing else.
+/// and cameras are simulated. The truth scores the points and is used for nothing else. A rig with a trunk instead searches, passes
+/// and inspects in a simulated corridor.
 #[derive(Debug, clap::Args)]
 pub struct Args {
     /// Sets where the stages stand at first and the noise of the images. The same seed gives the same bytes.
@@ -38,6 +40,9 @@ pub async fn run(args: &Args, common: &CommonOptions, console: Console) -> Resul
     check_folder(&args.out)?;
     let rig = rig_file::load(common.rig.as_deref())?;
     make_folder(&args.out)?;
+    if rig.trunk.is_some() {
+        return corridor(args, rig, console, &whole).await;
+    }
     let (all, measured) = (rig.modes.len(), Cell::new(0));
     let modes = tokio::select! {
         // The simulated board ends with this process: nothing has to be disarmed.
@@ -51,6 +56,35 @@ pub async fn run(args: &Args, common: &CommonOptions, console: Console) -> Resul
     }?;
     console.say(format!("clouds and pictures are in {}; {:.1} s in all", args.out.display(), whole.seconds()))?;
     console.result(&json!({ "modes": modes, "seconds": rounded(whole.seconds()) }))
+}
+
+/// Plays the robot's story in a simulated corridor.
+async fn corridor(args: &Args, rig: Rig, console: Console, whole: &Stopwatch) -> Result<(), Failure> {
+    console.say("simulated: the corridor, the cameras, joints off by their play; where the robot stands is given, no controller runs")?;
+    let (out, seed) = (args.out.clone(), args.seed);
+    let progress = console.progress("the corridor");
+    let bar = progress.clone();
+    let played = on_own_thread(move || {
+        let mut lost = None;
+        let mut say = |line: &str| {
+            let said = bar.suspend(|| console.say(line));
+            lost = lost.take().or(said.err());
+        };
+        let story = Corridor::new(&rig, &out, seed, clock)?.play(&mut say)?;
+        lost.map_or(Ok(story), Err)
+    });
+    let story = tokio::select! {
+        biased;
+        () = interrupted() => Err(Failure::interrupted(format!("interrupted: finished files are in {}", args.out.display()))),
+        story = played => story,
+    }?;
+    progress.finish_and_clear();
+    console.say(format!(
+        "clouds, pictures and a map (corridor.svg) are in {}; {:.1} s in all",
+        args.out.display(),
+        whole.seconds()
+    ))?;
+    console.result(&json!({ "modes": story.modes, "found": story.found, "seconds": rounded(whole.seconds()) }))
 }
 
 /// Homes the rig and measures in every mode; counts them in `measured`.
