@@ -205,7 +205,7 @@ impl<'a> Instruction<'a> {
                 }
                 _ => Err(bad),
             },
-            0x92 | 0x9A if !all.is_empty() && all.len() % 5 == 0 => {
+            0x92 | 0x9A if !all.is_empty() && all.len().is_multiple_of(5) => {
                 Ok(Self::BulkRead { items: all, fast: code == 0x9A })
             }
             0x93 if !all.is_empty() && Writes(all).last_is_whole() => Ok(Self::BulkWrite { items: all }),
