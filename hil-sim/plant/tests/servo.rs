@@ -49,7 +49,7 @@ impl Bench {
 
     fn get(&mut self, of: Id, register: &Register) -> i64 {
         let heard = self.ask(&encode::read(of, register.address, register.width).unwrap());
-        let (_, _, error, data) = answers(&heard).pop().expect("an answer");
+        let (_, _, error, data) = answers(&heard).pop().unwrap();
         assert_eq!(error, None);
         let mut bytes = [if register.signed && data.last().is_some_and(|byte| byte & 0x80 != 0) { 0xFF } else { 0 }; 8];
         bytes[..data.len()].copy_from_slice(&data);

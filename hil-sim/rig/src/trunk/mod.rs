@@ -10,7 +10,7 @@ mod closing;
 mod collision;
 mod play;
 
-use std::f64::consts::PI;
+use std::f64::consts::{PI, TAU};
 
 use vergence_plant::servo::{Mechanism, ServoMoment};
 use vergence_rig::linkage::{Loop, TrunkCameras, TrunkJoint, TrunkLinks, trunk};
@@ -95,10 +95,10 @@ impl Trunk {
         &self.angles
     }
 
-    /// The true interior angles of the corners A to F, in radians.
+    /// The true interior angles of the corners A to F, in radians, from 0 to a whole turn.
     #[must_use]
     pub fn corners(&self) -> [f64; 6] {
-        TrunkJoint::CORNERS.map(|joint| PI - self.angles[joint.index()])
+        TrunkJoint::CORNERS.map(|joint| (PI - self.angles[joint.index()]).rem_euclid(TAU))
     }
 
     /// How far the loop is from closed: see [`Loop::closure_error`].
