@@ -1,7 +1,7 @@
 //! Exact bytes: the examples of the manual, and packets that the maker's own library makes.
 //!
 //! The manual is the ROBOTIS e-manual, *DYNAMIXEL Protocol 2.0*, "Instruction Details". The library is `dynamixel-sdk` 4.1.0
-//! (`pip install dynamixel-sdk`), whose port was replaced by one that keeps what is written; `tests/servo_bus.rs` of the
+//! (`pip install dynamixel-sdk`), whose port was replaced by one that keeps what is written; `tests/servo_sdk.rs` of the
 //! workspace runs it. The library forgets its stuffing when it sends (`txPacket` drops the list that `addStuffing` makes), so
 //! stuffed packets are checked by the manual's rule and by what the library makes of them when it receives.
 
