@@ -29,11 +29,11 @@ use walls::walls;
 /// Width of the images in pixels: half of the lens file's, which renders four times as fast.
 const WIDTH: u32 = 640;
 /// Places along the corridor, in millimetres, at which the robot searches.
-const SEARCHES: [f64; 3] = [0.0, 500.0, 1000.0];
+const SEARCHES: [f64; 3] = [0.0, 600.0, 1250.0];
 /// Places at which it passes.
 const PASSES: [f64; 3] = [0.0, 400.0, 800.0];
 /// Distance from the target at which it inspects, in millimetres.
-const NEAR: f64 = 450.0;
+const NEAR: f64 = 420.0;
 
 /// The demonstration so far.
 pub struct Corridor<'a> {
@@ -134,7 +134,8 @@ impl<'a> Corridor<'a> {
     /// The place from which the robot looks straight at the target from near, by the bearing alone and the corridor's width.
     fn facing(&self, target: &target::Found) -> Place {
         let [x, z] = target.beside_wall(Length::from_mm(Scene::CORRIDOR_HALF_WIDTH - 150.0));
-        let yaw = -0.6_f64;
+        // Nearly across the corridor: the parcel that hides the target from the start stays aside.
+        let yaw = 1.25_f64.copysign(x);
         Place { x: x - NEAR * yaw.sin(), along: z - NEAR * yaw.cos(), yaw: Angle::from_rad(yaw) }
     }
 
