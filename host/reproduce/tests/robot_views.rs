@@ -16,7 +16,7 @@ const ORIGAKER: &str = include_str!("../../../docs/rigs/origaker.toml");
 const WIDTH: u32 = 640;
 
 fn rig() -> Rig {
-    Rig::from_toml(ORIGAKER).and_then(|rig| Ok(rig.with_sensors(WIDTH).expect("a sensor"))).expect("the robot's file")
+    Rig::from_toml(ORIGAKER).expect("the robot's file").with_sensors(WIDTH).expect("a sensor")
 }
 
 fn values(rig: &Rig, mode: &str) -> Vec<f64> {
