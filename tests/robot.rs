@@ -46,3 +46,8 @@ fn a_goal_finds_a_shape_of_the_trunk() {
     let [side, corner] = ["side_joint_deg", "front_corner_deg"].map(|axis| number(&found["pose"][axis]));
     assert!((corner - (180.0 - side / 2.0)).abs() < 1e-6, "both sides are alike: {found}");
 }
+
+#[test]
+fn what_knows_no_trunk_says_so() {
+    fails_with(&["sim", "--rig", RIG], 2, &["has a trunk"]);
+}

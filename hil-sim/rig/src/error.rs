@@ -15,6 +15,11 @@ pub enum SimError {
         /// The reason why the controller refuses the settings.
         why: String,
     },
+    /// No simulated board drives the joints of a trunk.
+    #[error(
+        "rig '{0}' has a trunk: simulated boards drive stages only; 'vergence demo' shows its modes, 'vergence plan' its paths"
+    )]
+    Trunk(String),
     /// No wiring of the simulated chip has so many axes.
     #[error("rig '{rig}' has {axes} axes, and the wirings of the board have one to three")]
     OtherAxes {

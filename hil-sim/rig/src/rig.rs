@@ -56,8 +56,11 @@ impl SimulatedRig {
     /// Switches on a simulated rig with one stage for every axis; `seed` decides where they stand.
     ///
     /// # Errors
-    /// [`SimError::Axes`] where the rig has no axes, or one that no stage fits.
+    /// [`SimError::Axes`] where the rig has no axes, or one that no stage fits; [`SimError::Trunk`] where it has no stages.
     pub fn new(rig: &Rig, seed: u64) -> Result<Self, SimError> {
+        if rig.trunk.is_some() {
+            return Err(SimError::Trunk(rig.name.clone()));
+        }
         let stages: Vec<Stage> = rig.axes.iter().map(stage).collect();
         let settings: Vec<_> = stages.iter().map(|stage| stage.settings).collect();
         let mechanics: Vec<_> = stages.iter().map(|stage| stage.mechanics).collect();

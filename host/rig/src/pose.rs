@@ -84,7 +84,7 @@ impl Rig {
         self.pose(&JointsAt { counts, sigma: vec![UNIFORM; self.axes.len()], timing: vec![0.0; self.axes.len()] })
     }
 
-    /// The pose at `joints`, uncertain by the calibration and, to first order, by the joints.
+    /// The pose at `joints`, uncertain by the calibration and, to first order, by the joints; by those of a trunk beyond it.
     #[must_use]
     pub fn pose(&self, joints: &JointsAt) -> RigPose {
         self.pose_of_each(joints, joints)

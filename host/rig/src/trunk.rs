@@ -37,11 +37,11 @@ pub struct RigTrunk {
 }
 
 impl RigTrunk {
-    /// The angles of the joints of the loop with the axes at `values` in radians, and each passive corner D, E, F off by `off`.
+    /// The angles of the joints of the loop with the axes at `values` in radians.
     ///
     /// With flat folds corner E is outward. Angles for which the loop does not close, by play or noise at a dead centre, give the
     /// shape with D, E and F in line. A folded trunk has both sides alike: no other shape of it closes.
-    fn angles(&self, values: &[f64], off: [f64; 3]) -> [f64; TrunkJoint::COUNT] {
+    fn angles(&self, values: &[f64]) -> [f64; TrunkJoint::COUNT] {
         let value = |joint: usize| self.axes.get(joint).and_then(|&axis| values.get(axis)).copied().unwrap_or(PI);
         let [a, b, c, rear, front] = std::array::from_fn(value);
         let shape = if (rear - PI).abs() < FLAT && (front - PI).abs() < FLAT {
@@ -49,8 +49,7 @@ impl RigTrunk {
         } else {
             Corners([a, b, c, c, b, a])
         };
-        let Corners([.., d, e, f]) = shape;
-        let mut angles = Corners([a, b, c, d + off[0], e + off[1], f + off[2]]).trunk_angles();
+        let mut angles = shape.trunk_angles();
         angles[TrunkJoint::RearFold.index()] = PI - rear;
         angles[TrunkJoint::FrontFold.index()] = PI - front;
         angles
@@ -59,7 +58,7 @@ impl RigTrunk {
     /// The shape with the axes at `values` in radians.
     #[must_use]
     pub fn shape(&self, values: &[f64]) -> Corners {
-        let angles = self.angles(values, [0.0; 3]);
+        let angles = self.angles(values);
         Corners(TrunkJoint::CORNERS.map(|joint| PI - angles[joint.index()]))
     }
 
@@ -78,18 +77,8 @@ impl RigTrunk {
 
     /// The poses of both cameras with the axes at `left` for the left one and at `right` for the right one, in radians.
     pub(crate) fn cameras_at(&self, left: &[f64], right: &[f64]) -> (Transform<Base, Left>, Transform<Base, Right>) {
-        self.cameras_off(left, right, [0.0; 3])
-    }
-
-    /// The same with the passive corners off by `off`.
-    pub(crate) fn cameras_off(
-        &self,
-        left: &[f64],
-        right: &[f64],
-        off: [f64; 3],
-    ) -> (Transform<Base, Left>, Transform<Base, Right>) {
         let linkage: Loop<{ TrunkJoint::COUNT }> = trunk(&self.links);
-        let [left, right] = [left, right].map(|values| self.angles(values, off));
+        let [left, right] = [left, right].map(|values| self.angles(values));
         // After the front fold x points to corner A and z backward.
         let base =
             Isometry3::from_parts(Vector3::zeros().into(), UnitQuaternion::from_axis_angle(&Vector3::y_axis(), PI));

@@ -111,6 +111,7 @@ fn bad_trunks_are_refused_with_the_key() {
         ("side = \"140mm\"", "side = \"140\"", "[trunk] side"),
         ("camera_angle = \"60deg\"", "camera_angle = \"600deg\"", "[trunk] camera_angle"),
         ("passive_range = [\"8.1deg\"", "passive_range = [\"352deg\"", "[trunk] passive_range"),
+        ("passive_play = \"0.2deg\"", "passive_play = \"-0.2deg\"", "[trunk] passive_play"),
         ("speed = \"60deg\"", "speed = \"0deg\"", "[trunk] speed"),
         ("[trunk]\n", "[trunk]\nfront_fold = \"tail\"\n", "no rotary axis 'tail'"),
         ("[trunk]\n", "[trunk]\nfront_fold = \"rear_fold\"\n", "one for each driven joint"),

@@ -86,6 +86,9 @@ impl Default for StageOptions {
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum StageError {
+    /// The rig's cameras ride on a trunk, which has no screws to fit.
+    #[error("rig '{0}' has a trunk: its links and mounts cannot be calibrated yet, only rigs with screws")]
+    Trunk(String),
     /// Fewer stage poses than three.
     #[error("{0} stage poses; at least {FEWEST_STAGE_POSES} are needed, and 6 are better")]
     TooFewPoses(usize),
@@ -122,6 +125,9 @@ pub enum StageError {
 /// # Errors [`StageError`] if stage poses are too few, cannot be calibrated, do not fit the chains or do not determine
 /// them.
 pub fn calibrate_stage(rig: &Rig, poses: &[StagePose], options: &StageOptions) -> Result<StageCalibration, StageError> {
+    if rig.trunk.is_some() {
+        return Err(StageError::Trunk(rig.name.clone()));
+    }
     if poses.len() < FEWEST_STAGE_POSES {
         return Err(StageError::TooFewPoses(poses.len()));
     }

@@ -141,7 +141,7 @@ impl TrunkFile {
                 acceleration: positive("acceleration", &self.acceleration)?,
                 passive_speed: positive("passive_speed", &self.passive_speed)?,
             },
-            passive_play: angle("passive_play", &self.passive_play)?.abs(),
+            passive_play: not_negative("passive_play", &self.passive_play)?,
             axes: found,
         })
     }
@@ -170,6 +170,11 @@ fn angle(key: &str, text: &str) -> Result<f64, RigError> {
         return Ok(rad);
     }
     Err(contradiction(format!("[trunk] {key}: {text} is more than a turn")))
+}
+
+fn not_negative(key: &str, text: &str) -> Result<f64, RigError> {
+    let rad = angle(key, text)?;
+    if rad >= 0.0 { Ok(rad) } else { Err(contradiction(format!("[trunk] {key}: {text} is negative"))) }
 }
 
 fn positive(key: &str, text: &str) -> Result<f64, RigError> {
