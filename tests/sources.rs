@@ -10,6 +10,7 @@ use std::path::{Path, PathBuf};
 const PURE: &[&str] = &[
     "protocol",
     "firmware/control",
+    "firmware/dynamixel",
     "host/vision",
     "host/rig",
     "host/calibration",
