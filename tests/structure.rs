@@ -29,7 +29,7 @@ const ALLOWED: &[(&str, &[&str])] = &[
     ("vergence-scene", &["vergence-vision"]),
     ("vergence-cpu", &[]),
     ("vergence-mcu", &["vergence-cpu", "vergence-protocol", "vergence-control", "vergence-plant"]),
-    ("vergence-plant", &["vergence-protocol", "vergence-control"]),
+    ("vergence-plant", &["vergence-protocol", "vergence-control", "vergence-dynamixel"]),
     (
         "vergence-soak",
         &["vergence-protocol", "vergence-control", "vergence-image", "vergence-cpu", "vergence-mcu", "vergence-plant"],

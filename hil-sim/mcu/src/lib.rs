@@ -46,6 +46,7 @@ mod rtt;
 mod schedule;
 mod serial_device;
 mod service;
+mod servo_bus;
 mod spi;
 mod supply;
 mod syscfg;

@@ -13,6 +13,7 @@ mod ends;
 mod flash;
 mod plant;
 mod services;
+pub mod servo;
 mod stall_guard;
 mod switch;
 mod tmc2209;

@@ -5,6 +5,7 @@
 //! - [`RoomCamera`] and [`LiveCamera`]: cameras on the mechanics, in a furnished [`Room`]
 //! - [`TargetCamera`]: cameras before which a simulated person holds a calibration target ([`HeldTarget`])
 //! - [`flatten`] and [`FirmwareLog`]: what a linker makes, as the bytes in flash and as the texts of the firmware's log
+//! - [`Trunk`]: the robot's folding trunk, moved by simulated servos
 //! - [`built`]: a rig as it was really built, for a calibration to find; [`BentRail`]: a rail that is not straight
 //!
 //! ```
@@ -33,6 +34,7 @@ mod live_camera;
 mod random;
 mod rig;
 mod room;
+mod trunk;
 
 pub use application::{ApplicationError, build_of, check_boot_loader, flatten, is_elf};
 pub use bent_rail::BentRail;
@@ -46,3 +48,4 @@ pub use live_camera::{LiveCamera, Unplugged};
 pub use random::Random;
 pub use rig::{Pulse, SimulatedRig};
 pub use room::{Room, RoomCamera};
+pub use trunk::{Collision, Play, Trunk, TrunkMechanics};

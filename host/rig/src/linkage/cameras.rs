@@ -49,6 +49,12 @@ impl TrunkCameras {
         Transform::from_isometry(right_from_left.inverse())
     }
 
+    /// Pose of the left camera in the frame before joint A, that of the left half of the front end link.
+    #[must_use]
+    pub fn front_from_left(&self, trunk: &Loop<JOINTS>, angles: &[f64; JOINTS]) -> Isometry3<f64> {
+        trunk.between(TrunkJoint::A.index(), TrunkJoint::A.index(), angles) * self.link_from_left()
+    }
+
     /// Motion of the right camera in the left one's frame for each radian of a driven joint: turn in radians, shift of its centre in
     /// millimetres. Columns of joints that are not driven are zero.
     ///

@@ -1,0 +1,160 @@
+//! The maker's own library, `dynamixel-sdk` from PyPI, against this program's servos and packets.
+//!
+//! It talks over a pseudo-terminal to simulated servos, sends packets that must be ours byte for byte, and reads answers that
+//! ours encodes. The interpreter is `python3`, or that of `VERGENCE_PYTHON`. Without the library (`python3 -m pip install
+//! dynamixel-sdk`) the tests print `SKIPPED`; with `VERGENCE_REQUIRE_DATA=1` they fail.
+#![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic, reason = "a test fails by panic")]
+#![allow(clippy::disallowed_methods, clippy::disallowed_types, reason = "a peer talks in real time")]
+
+mod common;
+
+use std::io::{Read, Write};
+use std::path::Path;
+use std::process::Command;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::{Duration, Instant};
+
+use common::data::say_skipped;
+use serde_json::{Value, json};
+use serialport::{SerialPort, TTYPort};
+use vergence_dynamixel::units::Baud;
+use vergence_dynamixel::{BulkItem, Encoded, Id, ResetScope, answer, encode};
+use vergence_plant::servo::{Free, Master, Nanoseconds, Servo, ServoBus, ServoModel};
+
+/// The interpreter, if it has the library; else the test is skipped, or fails where data are required.
+fn python() -> Option<String> {
+    let python = std::env::var("VERGENCE_PYTHON").unwrap_or_else(|_| "python3".to_owned());
+    let asked = Command::new(&python).args(["-c", "import dynamixel_sdk.group_sync_read"]).output();
+    if asked.is_ok_and(|output| output.status.success()) {
+        return Some(python);
+    }
+    let why = format!("{python} has no module dynamixel_sdk: install it with '{python} -m pip install dynamixel-sdk'");
+    let required = std::env::var_os("VERGENCE_REQUIRE_DATA").is_some_and(|value| value == "1");
+    assert!(!required, "VERGENCE_REQUIRE_DATA=1, but {why}");
+    say_skipped(&why);
+    None
+}
+
+fn run(python: &str, script: &str, arguments: &[String]) -> Value {
+    let script = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../tests/servo_sdk").join(script);
+    let output = Command::new(python).arg(script).args(arguments).output().expect("python starts");
+    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+    serde_json::from_slice(&output.stdout).expect("JSON")
+}
+
+fn id(number: u8) -> Id {
+    Id::servo(number).unwrap()
+}
+
+fn hex(bytes: &[u8]) -> String {
+    bytes.iter().map(|byte| format!("{byte:02x}")).collect()
+}
+
+/// Serves servos 13 to 17 at 1 Mbit/s on `port` until told to stop. Simulated time follows the clock, and runs ahead while they
+/// answer.
+fn serve(mut port: TTYPort, stop: &AtomicBool) {
+    let half_turn = std::f64::consts::PI;
+    let servo = |number| Servo::new(ServoModel::XM430_W350, id(number), Baud::M1, half_turn);
+    let mut bus = ServoBus::new((13..18).map(servo).collect(), Free::default());
+    let mut master = Master::new(1_000_000);
+    let start = Instant::now();
+    let mut buffer = [0; 256];
+    while !stop.load(Ordering::Relaxed) {
+        let count = port.read(&mut buffer).unwrap_or(0);
+        let now = Nanoseconds(u64::try_from(start.elapsed().as_nanos()).unwrap());
+        master.now = master.now.max(now);
+        bus.advance(master.now);
+        if count > 0 {
+            // Long enough for the next servo of a read, and of a broadcast ping.
+            let heard = master.ask(&mut bus, &buffer[..count], Nanoseconds::microseconds(15_000));
+            port.write_all(&heard).unwrap();
+        }
+    }
+}
+
+fn near(value: &Value, expected: i64) {
+    let value = value.as_i64().unwrap();
+    assert!((value - expected).abs() <= 3, "{value} is not {expected}");
+}
+
+#[test]
+fn the_library_drives_simulated_servos() {
+    let Some(python) = python() else { return };
+    let (mut ours, theirs) = TTYPort::pair().unwrap();
+    ours.set_timeout(Duration::from_millis(2)).unwrap();
+    let name = theirs.name().unwrap();
+    let stop = Arc::new(AtomicBool::new(false));
+    let server = std::thread::spawn({
+        let stop = stop.clone();
+        move || serve(ours, &stop)
+    });
+    let said = run(&python, "talk.py", &[name, "1000000".to_owned()]);
+    stop.store(true, Ordering::Relaxed);
+    server.join().unwrap();
+
+    // The library's results: 0 is success, -3001 no answer.
+    let there = json!([1020, 0, 0]);
+    assert_eq!(said["ping"], json!([there, there, there, there, there, [0, -3001, 0]]));
+    assert_eq!(said["broadcast_ping"], json!([13, 14, 15, 16, 17].map(|id| [id, 1020, 46])));
+    assert_eq!(said["led"], json!([[0, 0], [1, 0, 0]]));
+    assert_eq!(said["read_only"], json!([0, 7]), "access error");
+    assert_eq!(said["range"], json!([0, 4]), "data range error");
+    assert_eq!(said["stuffed"], json!([[0, 0], [0xFFFD_FFFF_u32, 0, 0]]));
+    assert_eq!(said["registered"], json!([[0, 0], [0, 0, 0], [1, 0, 0]]), "{}", said["registered"]);
+    for name in ["sync", "fast_sync"] {
+        assert_eq!(said[name][0], 0, "{name}");
+        (13..18).zip(said[name][1].as_array().unwrap()).for_each(|(servo, at)| near(at, 1900 + 20 * servo));
+    }
+    for name in ["bulk", "fast_bulk"] {
+        assert_eq!(said[name][0], 0, "{name}");
+        near(&said[name][1], 1900 + 20 * 13);
+        assert_eq!((&said[name][2], &said[name][3]), (&json!(120), &json!(25)), "12 V and 25 degrees");
+    }
+    assert_eq!(said["bulk_write"], json!([[0, 0, 0], [1, 0, 0]]));
+    assert_eq!((&said["reboot"], &said["rebooted"]), (&json!([0, 0]), &json!([0, 0, 0])));
+    assert_eq!((&said["clear"], &said["reset"]), (&json!([0, 0]), &json!([0, 0])));
+    assert_eq!(said["after_reset"], json!([800, 0, 0]), "the position loop's gain");
+}
+
+#[test]
+fn the_library_sends_what_we_send_and_reads_what_we_answer() {
+    let Some(python) = python() else { return };
+    let trunk = [13, 14, 15, 16, 17].map(id);
+    let read = |id, address, length| BulkItem { id, address, length, data: &[] };
+    let write = |id, address, data| BulkItem { id, address, length: 0, data };
+    let reads = [read(13, 132, 4), read(14, 146, 1)];
+    let ours: [(&str, Result<Encoded, _>); 14] = [
+        ("ping", encode::ping(id(7))),
+        ("read", encode::read(id(200), 132, 4)),
+        ("write", encode::write(id(3), 116, &0x1234_5678_u32.to_le_bytes())),
+        ("reg_write", encode::reg_write(id(9), 102, &[0x12, 0x34])),
+        ("action", encode::action(Id::BROADCAST)),
+        ("factory_reset", encode::factory_reset(id(5), ResetScope::ExceptIdAndBaud)),
+        ("reboot", encode::reboot(id(252))),
+        ("clear", encode::clear_turns(id(1))),
+        ("sync_write", encode::sync_write(116, &trunk.map(|id| (id, [id.get(), 2, 3, 4])))),
+        ("sync_read", encode::sync_read(126, 10, &trunk)),
+        ("fast_sync_read", encode::fast_sync_read(126, 10, &trunk)),
+        ("bulk_read", encode::bulk_read(&reads)),
+        ("fast_bulk_read", encode::fast_bulk_read(&reads)),
+        ("bulk_write", encode::bulk_write(&[write(13, 116, &[1, 2, 3, 4][..]), write(14, 65, &[1])])),
+    ];
+    // Answers whose data need stuffing, in all the ways that the pattern can lie.
+    let data: [&[u8]; 5] = [
+        &[1, 2, 3, 4],
+        &[0xFF, 0xFF, 0xFD],
+        &[0xFF, 0xFF, 0xFD, 0xFD, 0xFF, 0xFF, 0xFD, 0x00],
+        &[0xFF, 0xFF, 0xFF, 0xFD, 0xFF, 0xFF, 0xFD],
+        &[0xFD; 9],
+    ];
+    let answers: Vec<String> = data.iter().map(|data| hex(&answer::status(id(42), 0, data).unwrap())).collect();
+    let said = run(&python, "packets.py", &answers);
+    for (name, packet) in ours {
+        assert_eq!(said["packets"][name], hex(&packet.unwrap()), "{name}");
+    }
+    for (data, read) in data.iter().zip(said["answers"].as_array().unwrap()) {
+        // An error byte of 0 comes before the data.
+        assert_eq!(read, &json!([0, 42, format!("00{}", hex(data))]));
+    }
+}
