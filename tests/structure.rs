@@ -15,7 +15,7 @@ use serde_json::Value;
 /// An arrow points to what is used. Tests may use more (dev-dependencies are not looked at).
 const ALLOWED: &[(&str, &[&str])] = &[
     ("vergence-protocol", &[]),
-    ("vergence-control", &["vergence-protocol"]),
+    ("vergence-control", &["vergence-protocol", "vergence-dynamixel"]),
     ("vergence-dynamixel", &[]),
     ("vergence-image", &["vergence-protocol"]),
     ("vergence-vision", &[]),

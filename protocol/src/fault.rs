@@ -66,6 +66,12 @@ pub enum FaultCode {
     EncoderGarbled,
     /// The magnet of an absolute encoder is too weak or too strong, or not above it.
     EncoderMagnet,
+    /// Another servo answers on the bus in place of the one that was asked.
+    JointWrongId,
+    /// The servo of a joint carried more than its largest load for long and has switched its torque off.
+    JointOverload,
+    /// The supply of a joint's servo is outside of its limits, or too weak for its motor; its torque is off.
+    JointSupply,
 }
 
 impl FaultCode {
@@ -138,6 +144,15 @@ impl FaultCode {
             Self::EncoderMagnet => {
                 "check the distance between magnet and encoder, and that it is centred, then 'vergence clear'"
             }
+            Self::JointWrongId => {
+                "give each servo a number of its own: connect them one at a time and set the number, then 'vergence clear'"
+            }
+            Self::JointOverload => {
+                "look for what blocks the joint or loads it, restart the servo's supply, then 'vergence clear'"
+            }
+            Self::JointSupply => {
+                "check the servos' supply and their cables, switch it off and on, then 'vergence clear'"
+            }
         }
     }
 }
@@ -174,6 +189,9 @@ impl fmt::Display for FaultCode {
             Self::IndexMissing => "the encoder's index pulse did not come",
             Self::EncoderGarbled => "what the absolute encoder answers is garbled",
             Self::EncoderMagnet => "the absolute encoder reads its magnet badly",
+            Self::JointWrongId => "another servo answers in place of the joint's",
+            Self::JointOverload => "the joint's servo was overloaded and switched its torque off",
+            Self::JointSupply => "the joint's servo has a supply outside of its limits",
         })
     }
 }

@@ -27,6 +27,7 @@ mod homing;
 mod homing_sequence;
 mod index;
 mod io;
+pub mod joints;
 mod latch;
 mod lease;
 mod line_speed;
