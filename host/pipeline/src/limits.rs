@@ -13,7 +13,7 @@ pub const GATE_SIGMAS: f64 = 3.0;
 pub const NEAREST: Length = Length::from_mm(200.0);
 /// Smallest rotation error that the matcher allows for, so that a pose which is off can be noticed.
 pub const LEAST_MATCHING_SIGMA: Angle = Angle::from_deg(0.15);
-/// Standard deviation of the relative rotation above which the images are asked for the pose as well: a calibrated bench tells it to
+/// Standard deviation of the relative rotation by the joints alone above which the images are asked for the pose as well: a calibrated bench tells it to
 /// some 0.02 degrees, and the matches of one pair to 0.02 to 0.1.
 pub const JOINTS_SUFFICE: Angle = Angle::from_deg(0.15);
 /// Largest standard deviation of a point's range from its own two pixels, as a part of the range.

@@ -12,13 +12,20 @@ use crate::pose::PairPose;
 /// the rig moved during the exposure, and where too few matches agree.
 pub(crate) fn fused_pose(rig: &Rig, pose: &PairPose, matches: &[(PixelPair, f64)]) -> Option<FusedPose> {
     let middle = pose.at_middle();
-    if middle.rotation_sigma <= JOINTS_SUFFICE || !pose.is_steady() {
+    if joints_suffice(rig, middle) || !pose.is_steady() {
         return None;
     }
     let stereo =
         StereoPair { left: &rig.left_camera, right: &rig.right_camera, left_from_right: middle.left_from_right };
     // The joints' errors move the pose far: matches that the covariance of the joints excludes are not looked at.
     fuse_pose(matches, &stereo, &middle.covariance).filter(|fused| fused.rotation_sigma() < middle.rotation_sigma)
+}
+
+/// Whether the joints tell the rotation of `pose` well enough. What the calibration leaves uncertain is no part of that: one pair of
+/// images knows it less well than the many of a calibration, and a misfit of the lens model would turn the pose.
+fn joints_suffice(rig: &Rig, pose: &RigPose) -> bool {
+    let (all, calibration) = (pose.rotation_sigma.rad(), rig.calibration_sigma.0.rad());
+    all.powi(2) - calibration.powi(2) <= JOINTS_SUFFICE.rad().powi(2)
 }
 
 /// `pose` with the relative pose that joints and images tell together.
@@ -45,7 +52,7 @@ pub fn pose_by_images(
     pose: &RigPose,
     matcher: &dyn Matcher,
 ) -> Result<Option<FusedPose>, MatchError> {
-    if pose.rotation_sigma <= JOINTS_SUFFICE {
+    if joints_suffice(rig, pose) {
         return Ok(None);
     }
     let standing = PairPose::standing(pose.clone());

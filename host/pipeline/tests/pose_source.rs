@@ -76,6 +76,20 @@ fn images_tell_the_pose_that_the_joints_do_not() {
     assert!(alone.points.is_empty() || off(&alone, &truth) > 0.05, "{}", off(&alone, &truth));
 }
 
+/// Regression: the pose of a calibrated pair without joints was taken from one pair of images, and a misfit of the lenses with it.
+#[test]
+fn what_the_calibration_leaves_uncertain_is_not_taken_from_one_pair() {
+    let (_, pairs) = seen(60.0);
+    let calibrated = rig().calibration_sigma.0;
+    let mut rig = rig();
+    rig.calibration_sigma.0 = Angle::from_deg(1.0);
+    let pose = rig.pose_read_at(&[145.0, 60f64.to_radians()]);
+    assert!(pose.rotation_sigma.deg() > 0.9 && calibrated.deg() < 0.1);
+    let image = RgbImage::new(1, 1);
+    let cloud = cloud_of_pairs(&pairs, &image, &rig, &PairPose::standing(pose), Kernel::default()).expect("a cloud");
+    assert_eq!(cloud.fused_pose, None);
+}
+
 #[test]
 fn joints_that_tell_the_pose_well_are_not_corrected() {
     let (_, pairs) = seen(60.3);
