@@ -17,7 +17,7 @@ pub struct ProtocolVersion {
 }
 
 /// The protocol version of this crate.
-pub const PROTOCOL: ProtocolVersion = ProtocolVersion { major: 1, minor: 6 };
+pub const PROTOCOL: ProtocolVersion = ProtocolVersion { major: 1, minor: 7 };
 
 /// Hash over names, order and types of all messages. Two sides with equal hashes mean the same by the same bytes.
 #[must_use]

@@ -58,7 +58,7 @@ pub enum Refusal {
     NoSetting,
     /// The settings could not be written to flash; the saved ones are unchanged.
     StorageFailed,
-    /// The board is set to drive a machine that its firmware cannot drive.
+    /// The board is set to drive another machine from its next start on.
     NoSuchMachine,
     /// The motor driver of an axis cannot be used.
     DriverNotReady {
@@ -108,7 +108,7 @@ impl fmt::Display for Refusal {
             Self::NoSetting => f.write_str("this board has no such setting"),
             Self::StorageFailed => f.write_str("the board could not write its flash: the old settings are still there"),
             Self::NoSuchMachine => f.write_str(
-                "the board is set to drive the robot, which its firmware cannot yet: run 'vergence config set machine bench'",
+                "the board is set to drive another machine from its next start on: run 'vergence config save', then restart it",
             ),
             Self::DriverNotReady { axis, why: Some(why) } => {
                 write!(f, "axis {axis} cannot be driven: {why}; 'vergence doctor' says what to do")

@@ -50,13 +50,15 @@ pub enum SettingItem {
     /// Speed of the board's serial line in baud. It changes once the answer has left, and returns to the one before unless
     /// a session is heard at the new one within five seconds; only then can it be saved.
     Baud,
-    /// Of the board: what it drives, 0 for the stages of the bench, 1 for the joints of the robot.
+    /// Of the board: what it drives, 0 for the stages of the bench, 1 for the joints of the robot. It takes effect at the next start,
+    /// with the settings of that machine as delivered.
     Machine,
-    /// Motor driver of the axis: 0 for step and direction only, 1 for a TMC2209 with its serial line.
+    /// Motor driver of the axis: 0 for step and direction only, 1 for a TMC2209 with its serial line, 2 for the servo of a robot's
+    /// joint. Servos belong to the machine: an axis cannot be changed from or to one.
     Driver,
     /// Resistors by which the driver measures the current, in milliohms.
     SenseResistor,
-    /// Effective current of the motor in motion, in milliamperes.
+    /// Effective current of the motor in motion, in milliamperes; of a servo its current limit.
     RunCurrent,
     /// Effective current of the motor at rest, in milliamperes.
     HoldCurrent,
@@ -83,15 +85,19 @@ pub enum SettingItem {
     StallWatch,
     /// Encoder counts from one index pulse to the next; 0 for an encoder without index.
     IndexEvery,
-    /// Encoder of the axis: 0 for two lines in quadrature, 1 for an AS5048A, which knows its angle.
+    /// Encoder of the axis: 0 for two lines in quadrature, 1 for an AS5048A, which knows its angle, 2 for that of a servo.
     Encoder,
     /// Reading of an absolute encoder at the axis zero, in counts within its turn.
     EncoderZero,
+    /// Number of the servo of a joint on its bus, 0 to 252.
+    ServoId,
+    /// Of the board: speed of the servos' bus in bits per second.
+    ServoBaud,
 }
 
 impl SettingItem {
     /// Every item, in wire order.
-    pub const ALL: [Self; 38] = [
+    pub const ALL: [Self; 40] = [
         Self::Min,
         Self::Max,
         Self::Speed,
@@ -130,12 +136,14 @@ impl SettingItem {
         Self::IndexEvery,
         Self::Encoder,
         Self::EncoderZero,
+        Self::ServoId,
+        Self::ServoBaud,
     ];
 
     /// Whether each axis has a setting of this kind; else the board has one.
     #[must_use]
     pub const fn is_of_axis(self) -> bool {
-        !matches!(self, Self::StreamPeriod | Self::Baud | Self::Machine | Self::HoldAfter)
+        !matches!(self, Self::StreamPeriod | Self::Baud | Self::Machine | Self::HoldAfter | Self::ServoBaud)
     }
 
     /// The name that people type and files hold.
@@ -180,6 +188,8 @@ impl SettingItem {
             Self::IndexEvery => "index_every",
             Self::Encoder => "encoder",
             Self::EncoderZero => "encoder_zero",
+            Self::ServoId => "servo_id",
+            Self::ServoBaud => "servo_baud",
         }
     }
 }

@@ -96,6 +96,6 @@ fn the_checksum_is_castagnoli() {
 
 /// A change here is a change of the messages: raise `PROTOCOL` and check that the old enum variants kept their places.
 #[test]
-fn the_messages_are_those_of_protocol_1_6() {
-    assert_eq!(schema_hash(), 0xf1ac_65d5_1209_82f9, "{:#x}", schema_hash());
+fn the_messages_are_those_of_protocol_1_7() {
+    assert_eq!(schema_hash(), 0x0b09_acb5_5604_1e0f, "{:#x}", schema_hash());
 }

@@ -3,7 +3,6 @@
 use vergence_protocol::{Counts, EncoderState, Micro, Microseconds};
 
 use crate::TICK_US;
-use crate::encoder::TURN;
 use crate::follow::{Following, Lost};
 use crate::hard_limit::HardLimit;
 use crate::index::IndexWatch;
@@ -15,6 +14,9 @@ use crate::settings::AxisSettings;
 use crate::steps::{Instants, StepCounter};
 use crate::switches::StallLine;
 use crate::trajectory::{FINE_BITS, Fine, MotionState, Trajectory};
+
+/// Largest change of a joint's lean in a tick, in micro-units: 11 degrees in a second.
+const LEAN_RATE: i32 = 200;
 
 #[derive(Clone, Debug)]
 pub struct Axis {
@@ -33,6 +35,9 @@ pub struct Axis {
     elapsed: u64,
     /// Whether the axis rests at its command with the play taken up from below.
     from_below: bool,
+    /// How far the goal of a joint's servo lies beyond the command, now and soon, in micro-units: its servo rests off its goal by
+    /// load and stiffness.
+    lean: [Micro; 2],
     /// Raw counts at the axis zero.
     zero_counts: i32,
     referenced: bool,
@@ -52,6 +57,7 @@ impl Axis {
             trajectory: None,
             elapsed: 0,
             from_below: false,
+            lean: [Micro(0); 2],
             zero_counts: 0,
             referenced: false,
         }
@@ -103,7 +109,7 @@ impl Axis {
 
     /// Sets the axis zero by an absolute encoder: of the places that read the same, the one nearest to the middle of the range.
     pub fn reference_absolutely(&mut self, io: &impl RigIo) {
-        let (settings, turn) = (&self.settings, TURN.cast_signed());
+        let (settings, turn) = (&self.settings, self.settings.feedback.turn().cast_signed());
         let middle = settings.encoder().counts_at(Micro(settings.min.0 / 2 + settings.max.0 / 2));
         let raw = self.raw_counts(io);
         let from_zero = raw.wrapping_sub(self.rising(settings.feedback.zero.cast_signed()));
@@ -160,6 +166,7 @@ impl Axis {
         let position = fine_from(self.position(io));
         self.trajectory = None;
         self.from_below = false;
+        self.lean = [Micro(0); 2];
         self.command = [position; 3];
         self.motor = StepCounter::new(self.settings.motor(), position);
         self.following = Following::default();
@@ -245,6 +252,9 @@ impl Axis {
     pub fn advance(&mut self, now: Microseconds, io: &mut impl RigIo) {
         let [_, running, ordered] = self.command;
         self.command = [running, ordered, ordered];
+        if self.settings.is_joint() {
+            return self.advance_joint(io);
+        }
         let Some(trajectory) = &self.trajectory else { return };
         let (from, to) = (Microseconds(self.elapsed), Microseconds(self.elapsed + TICK_US));
         let end = trajectory.state(to).position;
@@ -257,6 +267,30 @@ impl Axis {
         self.order(Microseconds(now.0 + TICK_US), forward, at_ns, io);
     }
 
+    /// A joint gets the place where it shall be at the end of the tick after this one, at rest too: its servo holds it there.
+    fn advance_joint(&mut self, io: &mut impl RigIo) {
+        if let Some(trajectory) = &self.trajectory {
+            let to = Microseconds(self.elapsed + TICK_US);
+            self.command[2] = trajectory.state(to).position;
+            self.elapsed = to.0;
+            if trajectory.is_over(to) {
+                self.trajectory = None;
+            }
+        }
+        let [now, soon] = self.lean.map(|lean| lean.0);
+        self.lean[0] = Micro(soon.clamp(now.saturating_sub(LEAN_RATE), now.saturating_add(LEAN_RATE)));
+        let goal = Micro(micro_from(self.command[2]).0.saturating_add(self.lean[0].0));
+        let counts = self.settings.encoder().counts_at(goal).wrapping_add(self.zero_counts);
+        io.set_goal(self.index, self.rising(counts));
+    }
+
+    /// Makes the servo of a joint at rest push against its load, so that it comes to rest at `target`.
+    pub fn lean_towards(&mut self, target: Micro, io: &impl RigIo) {
+        let most = self.settings.correction.0;
+        let lean = self.lean[1].0.saturating_add(self.error(target, io).0);
+        self.lean[1] = Micro(lean.clamp(-most, most));
+    }
+
     fn order(&self, start: Microseconds, forward: bool, at_ns: Instants, io: &mut impl RigIo) {
         if !at_ns.is_empty() {
             let forward = forward != self.settings.steps_reversed;
@@ -267,7 +301,11 @@ impl Axis {
     /// Compares encoder and command; call it once each tick. Returns the fault, if any.
     pub fn watch(&mut self, io: &impl RigIo) -> Option<Lost> {
         let (counts, position) = (self.counts(io), self.position(io));
-        self.following.watch(&self.settings, micro_from(self.command[0]), position, counts)
+        let command = micro_from(self.command[0]);
+        match self.settings.is_joint() {
+            true => self.following.watch_joint(&self.settings, command, position, counts),
+            false => self.following.watch(&self.settings, command, position, counts),
+        }
     }
 
     /// Commanded position, rounded to micro-units.
@@ -287,6 +325,10 @@ impl Axis {
 
     /// Reads the hard limit; call it once each tick.
     pub fn read_limit(&mut self, io: &impl RigIo) {
+        // A joint has no switches: the lines of their inputs are open.
+        if self.settings.is_joint() {
+            return;
+        }
         let motion = (self.command[2] - self.command[0]).signum();
         let is_reached = self.settings.switches.is_limit(io.hard_limit(self.index));
         self.limit.read(is_reached, self.raw_counts(io), motion);

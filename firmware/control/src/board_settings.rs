@@ -1,11 +1,12 @@
 //! The settings of a board: all axes, pose stream, serial line, machine and holding current, each readable as one number.
 
-use vergence_protocol::{AxisKind, AxisList, Micro, SettingItem, SettingKey};
+use vergence_dynamixel::Id;
+use vergence_dynamixel::units::{Baud, BusWatchdog, Current};
+use vergence_protocol::{AxisKind, AxisList, SettingItem, SettingKey};
 
-use crate::driver::{DriverKind, DriverSettings};
-use crate::encoder::{EncoderKind, EncoderSettings};
-use crate::settings::{AxisSettings, HomingSettings, SettingsError};
-use crate::switches::{HomeEnd, HomeSensor, SwitchSettings};
+use crate::axis_items::{flag, number};
+use crate::joints::{BusSettings, JointSettings, origaker};
+use crate::settings::{AxisSettings, SettingsError};
 
 /// Shortest period of the pose stream in microseconds: a pose of 45 bytes at 921 600 baud takes half of it.
 pub const SHORTEST_STREAM_US: u32 = 1_000;
@@ -23,14 +24,48 @@ const HOLD_AFTER_US: u32 = 5_000_000;
 /// Bounds of that time in microseconds: a stage has settled after the shortest, and the longest keeps no motor warm for hours.
 const HOLD_AFTER: core::ops::RangeInclusive<u32> = 100_000..=600_000_000;
 
+/// Default speed of the servos' bus in bits per second.
+const SERVO_BAUD: u32 = 1_000_000;
+/// Silence of 100 ms after which servos stop by themselves: some forty exchanges.
+const BOARD_DIED: BusWatchdog = BusWatchdog(5);
+
 /// The machine that a board drives.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Machine {
     /// The stages of the bench.
     #[default]
     Bench,
-    /// The joints of the robot, on its servo bus. No firmware drives them yet.
+    /// The joints of the robot, on its servo bus.
     Robot,
+}
+
+/// The settings with which a board was delivered, for each machine that it can drive.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Delivered {
+    /// The machine that the board drives where nothing else was saved.
+    pub machine: Machine,
+    /// Those of the bench.
+    pub bench: BoardSettings,
+    /// Those of the robot.
+    pub robot: BoardSettings,
+}
+
+impl Delivered {
+    /// A board of a bench, which can drive Origaker's joints as well.
+    #[must_use]
+    pub fn for_bench(bench: BoardSettings) -> Self {
+        let joints = origaker::joints().into_iter().collect();
+        Self { machine: Machine::Bench, bench, robot: BoardSettings::delivered(joints) }
+    }
+
+    /// Those of a machine.
+    #[must_use]
+    pub fn of(&self, machine: Machine) -> &BoardSettings {
+        match machine {
+            Machine::Bench => &self.bench,
+            Machine::Robot => &self.robot,
+        }
+    }
 }
 
 /// All settings of a board.
@@ -42,10 +77,12 @@ pub struct BoardSettings {
     pub stream_period_us: u32,
     /// Speed of the serial line in baud: on trial until a host is heard at it, and the speed at a start.
     pub baud: u32,
-    /// The machine that the board drives.
+    /// The machine that the board drives from its next start on.
     pub machine: Machine,
     /// Time in microseconds at rest after which the motors get their holding current; 0 for never.
     pub hold_after_us: u32,
+    /// Speed of the servos' bus in bits per second.
+    pub servo_baud: u32,
 }
 
 /// Why a setting was not changed.
@@ -74,13 +111,21 @@ impl BoardSettings {
 
     /// These axes, and everything else as delivered.
     fn delivered(axes: AxisList<AxisSettings>) -> Self {
-        Self {
+        let mut settings = Self {
             axes,
             stream_period_us: STREAM_US,
             baud: USUAL_BAUD,
             machine: Machine::Bench,
             hold_after_us: HOLD_AFTER_US,
-        }
+            servo_baud: SERVO_BAUD,
+        };
+        settings.machine = settings.machine_of_axes();
+        settings
+    }
+
+    /// The machine that has such axes.
+    pub(crate) fn machine_of_axes(&self) -> Machine {
+        if self.axes.first().is_some_and(AxisSettings::is_joint) { Machine::Robot } else { Machine::Bench }
     }
 
     /// Settings of a board whose axes are of these `kinds`, with the `values` given; others are zero, and those of motor
@@ -109,6 +154,7 @@ impl BoardSettings {
         for (index, axis) in self.axes.iter().enumerate() {
             axis.validate(index)?;
         }
+        self.validate_joints()?;
         let stream =
             self.stream_period_us == 0 || (SHORTEST_STREAM_US..=LONGEST_STREAM_US).contains(&self.stream_period_us);
         if !stream || !BAUD.contains(&self.baud) {
@@ -119,6 +165,29 @@ impl BoardSettings {
         } else {
             Err(SettingsError::Hold)
         }
+    }
+
+    fn validate_joints(&self) -> Result<(), SettingsError> {
+        let joints = self.axes.iter().filter(|axis| axis.is_joint());
+        let are_mixed = ![0, self.axes.len()].contains(&joints.clone().count());
+        let is_repeated = |id| joints.clone().filter(|joint| joint.driver.servo_id == id).count() > 1;
+        if are_mixed || joints.clone().any(|joint| is_repeated(joint.driver.servo_id)) {
+            return Err(SettingsError::Joints);
+        }
+        // At 9600 bit/s a move would be steered once in half a second.
+        let is_baud = |baud: &Baud| *baud != Baud::B9600 && baud.bits_per_second() == self.servo_baud;
+        if Baud::ALL.iter().any(is_baud) { Ok(()) } else { Err(SettingsError::Link) }
+    }
+
+    /// Settings of the joints' bus; `None` where the axes are no joints.
+    #[must_use]
+    pub fn joint_bus(&self) -> Option<BusSettings> {
+        let joints = self.axes.iter().filter(|axis| axis.is_joint()).filter_map(|axis| {
+            let id = Id::servo(u8::try_from(axis.driver.servo_id).ok()?).ok()?;
+            Some(JointSettings { id, current_limit: Current::of_milliamperes(axis.driver.run_ma).0.unsigned_abs() })
+        });
+        let joints: AxisList<JointSettings> = joints.collect();
+        (!joints.is_empty()).then_some(BusSettings { joints, baud: self.servo_baud, watchdog: BOARD_DIED })
     }
 
     /// The keys of all settings of this board.
@@ -138,6 +207,7 @@ impl BoardSettings {
             SettingKey { item: SettingItem::Baud, axis: 0 } => Some(self.baud.into()),
             SettingKey { item: SettingItem::Machine, axis: 0 } => Some((self.machine == Machine::Robot).into()),
             SettingKey { item: SettingItem::HoldAfter, axis: 0 } => Some(self.hold_after_us.into()),
+            SettingKey { item: SettingItem::ServoBaud, axis: 0 } => Some(self.servo_baud.into()),
             SettingKey { item, axis } => self.axes.get(usize::from(axis))?.item(item),
         }
     }
@@ -149,6 +219,10 @@ impl BoardSettings {
     pub fn with(&self, key: SettingKey, value: i64) -> Result<Self, SettingError> {
         let mut changed = self.clone();
         changed.put(key, value)?;
+        // Joints are the machine's.
+        if self.axes.iter().zip(&changed.axes).any(|(old, new)| old.is_joint() != new.is_joint()) {
+            return Err(SettingError::Value);
+        }
         changed.validate().map_err(|_| SettingError::Value)?;
         Ok(changed)
     }
@@ -160,6 +234,7 @@ impl BoardSettings {
             SettingItem::StreamPeriod => self.stream_period_us = number(value)?,
             SettingItem::Baud => self.baud = number(value)?,
             SettingItem::HoldAfter => self.hold_after_us = number(value)?,
+            SettingItem::ServoBaud => self.servo_baud = number(value)?,
             SettingItem::Machine => self.machine = if flag(value)? { Machine::Robot } else { Machine::Bench },
             item => {
                 let axis = self.axes.get_mut(usize::from(key.axis)).ok_or(SettingError::Unknown)?;
@@ -167,162 +242,5 @@ impl BoardSettings {
             }
         }
         Ok(())
-    }
-}
-
-impl AxisSettings {
-    /// Settings of an axis of this kind that are all zero, but for a plain motor driver.
-    fn blank(kind: AxisKind) -> Self {
-        let nothing = Micro(0);
-        let homing = HomingSettings {
-            switch_at: nothing,
-            seek_speed: 0,
-            approach_speed: 0,
-            retract: nothing,
-            travel: nothing,
-            repeatability: nothing,
-        };
-        Self {
-            kind,
-            min: nothing,
-            max: nothing,
-            speed: 0,
-            acceleration: 0,
-            jerk: 0,
-            steps_per_unit: 0,
-            counts_per_unit: 0,
-            steps_reversed: false,
-            counts_reversed: false,
-            following_error: nothing,
-            tolerance: nothing,
-            backlash: nothing,
-            correction: nothing,
-            homing,
-            driver: DriverSettings::default(),
-            switches: SwitchSettings::default(),
-            feedback: EncoderSettings::default(),
-        }
-    }
-
-    /// Value of an axis setting; `None` for settings of the board.
-    fn item(&self, item: SettingItem) -> Option<i64> {
-        let (homing, driver, switches, encoder) = (&self.homing, &self.driver, &self.switches, &self.feedback);
-        Some(match item {
-            SettingItem::Min => self.min.0.into(),
-            SettingItem::Max => self.max.0.into(),
-            SettingItem::Speed => self.speed.into(),
-            SettingItem::Acceleration => self.acceleration.into(),
-            SettingItem::Jerk => self.jerk.into(),
-            SettingItem::StepsPerUnit => self.steps_per_unit.into(),
-            SettingItem::CountsPerUnit => self.counts_per_unit.into(),
-            SettingItem::StepsReversed => self.steps_reversed.into(),
-            SettingItem::CountsReversed => self.counts_reversed.into(),
-            SettingItem::FollowingError => self.following_error.0.into(),
-            SettingItem::Tolerance => self.tolerance.0.into(),
-            SettingItem::Backlash => self.backlash.0.into(),
-            SettingItem::HomeSwitchAt => homing.switch_at.0.into(),
-            SettingItem::HomeSeekSpeed => homing.seek_speed.into(),
-            SettingItem::HomeApproachSpeed => homing.approach_speed.into(),
-            SettingItem::HomeRetract => homing.retract.0.into(),
-            SettingItem::HomeTravel => homing.travel.0.into(),
-            SettingItem::HomeRepeatability => homing.repeatability.0.into(),
-            SettingItem::Driver => (driver.kind == DriverKind::Tmc2209).into(),
-            SettingItem::SenseResistor => driver.sense_mohm.into(),
-            SettingItem::RunCurrent => driver.run_ma.into(),
-            SettingItem::HoldCurrent => driver.hold_ma.into(),
-            SettingItem::HoldDelay => driver.hold_delay_us.into(),
-            SettingItem::Microsteps => driver.microsteps.into(),
-            SettingItem::StealthChop => driver.stealth_chop.into(),
-            SettingItem::Correction => self.correction.0.into(),
-            SettingItem::HomeEnd => (switches.home_end == HomeEnd::High).into(),
-            SettingItem::HomeSwitch => switches.home as i64,
-            SettingItem::HardLimit => switches.limits_normally_open.into(),
-            SettingItem::StallThreshold => switches.stall_threshold.into(),
-            SettingItem::StallWatch => switches.stall_watch.into(),
-            SettingItem::IndexEvery => encoder.index_every.into(),
-            SettingItem::Encoder => encoder.is_absolute().into(),
-            SettingItem::EncoderZero => encoder.zero.into(),
-            _ => return None,
-        })
-    }
-
-    fn put(&mut self, item: SettingItem, value: i64) -> Result<(), SettingError> {
-        let (homing, driver) = (&mut self.homing, &mut self.driver);
-        let (switches, encoder) = (&mut self.switches, &mut self.feedback);
-        match item {
-            SettingItem::Min => self.min = micro(value)?,
-            SettingItem::Max => self.max = micro(value)?,
-            SettingItem::Speed => self.speed = number(value)?,
-            SettingItem::Acceleration => self.acceleration = number(value)?,
-            SettingItem::Jerk => self.jerk = number(value)?,
-            SettingItem::StepsPerUnit => self.steps_per_unit = number(value)?,
-            SettingItem::CountsPerUnit => self.counts_per_unit = number(value)?,
-            SettingItem::StepsReversed => self.steps_reversed = flag(value)?,
-            SettingItem::CountsReversed => self.counts_reversed = flag(value)?,
-            SettingItem::FollowingError => self.following_error = micro(value)?,
-            SettingItem::Tolerance => self.tolerance = micro(value)?,
-            SettingItem::Backlash => self.backlash = micro(value)?,
-            SettingItem::HomeSwitchAt => homing.switch_at = micro(value)?,
-            SettingItem::HomeSeekSpeed => homing.seek_speed = number(value)?,
-            SettingItem::HomeApproachSpeed => homing.approach_speed = number(value)?,
-            SettingItem::HomeRetract => homing.retract = micro(value)?,
-            SettingItem::HomeTravel => homing.travel = micro(value)?,
-            SettingItem::HomeRepeatability => homing.repeatability = micro(value)?,
-            SettingItem::Driver => driver.kind = if flag(value)? { DriverKind::Tmc2209 } else { DriverKind::Plain },
-            SettingItem::SenseResistor => driver.sense_mohm = number(value)?,
-            SettingItem::RunCurrent => driver.run_ma = number(value)?,
-            SettingItem::HoldCurrent => driver.hold_ma = number(value)?,
-            SettingItem::HoldDelay => driver.hold_delay_us = number(value)?,
-            SettingItem::Microsteps => driver.microsteps = number(value)?,
-            SettingItem::StealthChop => driver.stealth_chop = flag(value)?,
-            SettingItem::Correction => self.correction = micro(value)?,
-            SettingItem::HomeEnd => switches.home_end = if flag(value)? { HomeEnd::High } else { HomeEnd::Low },
-            SettingItem::HomeSwitch => switches.home = sensor(value)?,
-            SettingItem::HardLimit => switches.limits_normally_open = flag(value)?,
-            SettingItem::StallThreshold => switches.stall_threshold = number(value)?,
-            SettingItem::StallWatch => switches.stall_watch = flag(value)?,
-            SettingItem::IndexEvery => encoder.index_every = number(value)?,
-            SettingItem::Encoder => {
-                encoder.kind = if flag(value)? { EncoderKind::As5048a } else { EncoderKind::Quadrature };
-            }
-            SettingItem::EncoderZero => encoder.zero = number(value)?,
-            _ => return Err(SettingError::Unknown),
-        }
-        Ok(())
-    }
-
-    /// Whether a reference found with the settings `self` is still valid with `other`.
-    pub(crate) fn keeps_reference(&self, other: &Self) -> bool {
-        let scale = |axis: &Self| (axis.kind, axis.counts_per_unit, axis.counts_reversed);
-        let home = |axis: &Self| (axis.homing.switch_at, axis.switches.home_end, axis.switches.home);
-        // The range of an absolute encoder tells which of its turns is meant.
-        let range = |axis: &Self| axis.feedback.is_absolute().then_some((axis.min, axis.max));
-        let encoder = |axis: &Self| (axis.feedback, range(axis));
-        scale(self) == scale(other) && home(self) == home(other) && encoder(self) == encoder(other)
-    }
-}
-
-fn micro(value: i64) -> Result<Micro, SettingError> {
-    i32::try_from(value).map(Micro).map_err(|_| SettingError::Value)
-}
-
-fn number(value: i64) -> Result<u32, SettingError> {
-    u32::try_from(value).map_err(|_| SettingError::Value)
-}
-
-fn sensor(value: i64) -> Result<HomeSensor, SettingError> {
-    match value {
-        0 => Ok(HomeSensor::NormallyOpen),
-        1 => Ok(HomeSensor::NormallyClosed),
-        2 => Ok(HomeSensor::StallGuard),
-        _ => Err(SettingError::Value),
-    }
-}
-
-fn flag(value: i64) -> Result<bool, SettingError> {
-    match value {
-        0 => Ok(false),
-        1 => Ok(true),
-        _ => Err(SettingError::Value),
     }
 }

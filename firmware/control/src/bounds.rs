@@ -7,7 +7,7 @@
 use vergence_protocol::{AxisKind, SettingItem};
 
 use crate::driver::{ADDRESSES, DriverKind, DriverSettings, LEAST_FULL_STEPS};
-use crate::encoder::{ABSOLUTE_AXES, TURN};
+use crate::encoder::{ABSOLUTE_AXES, EncoderKind};
 use crate::settings::{AxisSettings, Scale, SettingsError};
 
 /// Longest time to brake from full speed, in milliseconds.
@@ -16,6 +16,9 @@ pub const LONGEST_BRAKING_MS: u32 = 2_000;
 const FASTEST_RISE: i64 = 500;
 /// Longest travel of an axis: two metres or two turns.
 const LONGEST_TRAVEL: [i64; 2] = [2_000_000, 12_566_371];
+
+/// Smallest and largest current limit of a servo of the X series, in milliamperes: 1193 units of 2.69 mA.
+const SERVO_MA: [u32; 2] = [100, 3_209];
 
 /// The values that a setting may have beside the others.
 struct Bound {
@@ -174,14 +177,15 @@ fn stall_bounds(settings: &AxisSettings) -> [Bound; 5] {
 
 /// Bounds of the settings of a motor driver, also of those that a plain driver does not use: then they hold when its kind
 /// is changed.
-fn driver_bounds(driver: &DriverSettings, axis: usize) -> [Bound; 5] {
-    let [least, most] = driver.currents().map(i64::from);
+fn driver_bounds(driver: &DriverSettings, axis: usize) -> [Bound; 6] {
+    let is_joint = driver.kind == DriverKind::Servo;
+    let [least, most] = if is_joint { SERVO_MA } else { driver.currents() }.map(i64::from);
     let run = i64::from(driver.run_ma);
+    let kind = driver.kind as u32;
+    let kinds = if is_joint { [kind.into(); 2] } else { [0, (axis < ADDRESSES).into()] };
     let bound = |item, value: u32, least: i64, most: i64, why| Bound { item, value: value.into(), least, most, why };
-    let kind = (driver.kind == DriverKind::Tmc2209).into();
-    let kinds = (axis < ADDRESSES).into();
     [
-        bound(SettingItem::Driver, kind, 0, kinds, "the drivers' line has four addresses"),
+        bound(SettingItem::Driver, kind, kinds[0], kinds[1], "the drivers' line has four addresses"),
         bound(SettingItem::SenseResistor, driver.sense_mohm, 50, 1_000, "with others the driver measures no current"),
         bound(
             SettingItem::RunCurrent,
@@ -198,6 +202,7 @@ fn driver_bounds(driver: &DriverSettings, axis: usize) -> [Bound; 5] {
             "the current at rest is a share of that in motion",
         ),
         bound(SettingItem::HoldDelay, driver.hold_delay_us, 50_000, 5_500_000, "the driver can count no other time"),
+        bound(SettingItem::ServoId, driver.servo_id, 0, 252, "a servo has no other number"),
     ]
 }
 
@@ -213,7 +218,14 @@ fn encoder_bounds(settings: &AxisSettings, axis: usize) -> [Bound; 3] {
         _ => (least, max - min),
     };
     // A sixteenth of the turn is left for the ways to the hard limits, so that no two places read the same.
-    let fits = axis < ABSOLUTE_AXES && max - min <= i64::from(TURN - TURN / 16);
+    let turn = i64::from(encoder.turn());
+    let fits = (axis < ABSOLUTE_AXES || settings.is_joint()) && max - min <= turn - turn / 16;
+    let kinds = match (settings.is_joint(), fits) {
+        (false, fits) => [0, fits.into()],
+        (true, true) => [EncoderKind::Servo as i64; 2],
+        // None.
+        (true, false) => [1, 0],
+    };
     let bound = |item, value: u32, least: i64, most: i64, why| Bound { item, value: value.into(), least, most, why };
     [
         bound(
@@ -225,12 +237,12 @@ fn encoder_bounds(settings: &AxisSettings, axis: usize) -> [Bound; 3] {
         ),
         bound(
             SettingItem::Encoder,
-            encoder.is_absolute().into(),
-            0,
-            fits.into(),
-            "the range must lie within 15/16 of a turn of an absolute encoder, on axis 0 or 1",
+            encoder.kind as u32,
+            kinds[0],
+            kinds[1],
+            "the range must lie within 15/16 of a turn of an absolute encoder, on axis 0 or 1; a joint has that of its servo",
         ),
-        bound(SettingItem::EncoderZero, encoder.zero, 0, i64::from(TURN) - 1, "the encoder reads 14 bits"),
+        bound(SettingItem::EncoderZero, encoder.zero, 0, turn - 1, "the encoder reads no more in a turn"),
     ]
 }
 

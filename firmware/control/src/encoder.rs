@@ -2,8 +2,10 @@
 
 use crate::settings::AxisSettings;
 
-/// Counts of an absolute encoder in one turn: 14 bits.
+/// Counts of an AS5048A in one turn: 14 bits.
 pub const TURN: u32 = 1 << 14;
+/// Counts of a servo in one turn: 12 bits.
+const SERVO_TURN: u32 = 1 << 12;
 /// Number of axes whose encoder may be absolute: their first ones, by the lines that boards have.
 pub(crate) const ABSOLUTE_AXES: usize = 2;
 /// Least drift in counts that an index pulse finds: encoders at rest flicker, and the pulse is read some microseconds late.
@@ -17,6 +19,8 @@ pub enum EncoderKind {
     Quadrature,
     /// An AS5048A of ams OSRAM: 14 bits, by SPI.
     As5048a,
+    /// That of a servo of the X series: 12 bits, by its bus.
+    Servo,
 }
 
 /// Settings of an encoder, apart from its counts.
@@ -26,7 +30,7 @@ pub struct EncoderSettings {
     pub kind: EncoderKind,
     /// Counts from one index pulse to the next; 0 for an encoder without index.
     pub index_every: u32,
-    /// Reading of an absolute encoder at the axis zero, below [`TURN`].
+    /// Reading of an absolute encoder at the axis zero, below [`Self::turn`].
     pub zero: u32,
 }
 
@@ -35,6 +39,12 @@ impl EncoderSettings {
     #[must_use]
     pub fn is_absolute(&self) -> bool {
         self.kind != EncoderKind::Quadrature
+    }
+
+    /// Counts of an absolute encoder in one turn.
+    #[must_use]
+    pub fn turn(&self) -> u32 {
+        if self.kind == EncoderKind::Servo { SERVO_TURN } else { TURN }
     }
 }
 

@@ -1,7 +1,8 @@
 //! Checks that the encoder follows the command, and tells which fault it is if it does not.
 //!
 //! Encoder and command are compared over a stretch of travel, not at one instant: the load always lags behind its motor,
-//! by an amount that depends on the speed but is far smaller than the error of a blocked motor.
+//! by an amount that depends on the speed but is far smaller than the error of a blocked motor. A joint is compared at each instant:
+//! its encoder closes the loop of its own servo, so that only the lag of that loop is to be told from a joint that is blocked.
 
 use vergence_protocol::{Counts, FaultCode, Micro};
 
@@ -11,6 +12,9 @@ use crate::settings::AxisSettings;
 const FLICKER: u32 = 2;
 /// Over a stretch, encoder and motor may differ by the travelled distance divided by this.
 const SLIP_SHARE: i64 = 8;
+
+/// Ticks without motion after which a joint that is behind its command counts as blocked.
+const STANDS_TICKS: u32 = 50;
 
 /// A disagreement of encoder and command that is too large for lag.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -42,9 +46,23 @@ pub struct Following {
     stretch: Place,
     /// Two places on the latest part of the stretch, the older one first.
     recent: [Place; 2],
+    /// Counts at which a joint stands, and for how many ticks.
+    stands_at: Counts,
+    stands_for: u32,
 }
 
 impl Following {
+    /// Checks one tick of a joint; returns the fault, if any.
+    pub fn watch_joint(&mut self, axis: &AxisSettings, command: Micro, encoder: Micro, counts: Counts) -> Option<Lost> {
+        if counts.0.wrapping_sub(self.stands_at.0).unsigned_abs() > FLICKER {
+            (self.stands_at, self.stands_for) = (counts, 0);
+        }
+        self.stands_for = self.stands_for.saturating_add(1);
+        let detail = command.0.saturating_sub(encoder.0);
+        let code = if self.stands_for > STANDS_TICKS { FaultCode::Stall } else { FaultCode::FollowingError };
+        (detail.unsigned_abs() > axis.following_error.0.unsigned_abs()).then_some(Lost { code, detail })
+    }
+
     /// Checks one tick; returns the fault, if any.
     pub fn watch(&mut self, axis: &AxisSettings, command: Micro, encoder: Micro, counts: Counts) -> Option<Lost> {
         let now = Place { command: command.0.into(), encoder: encoder.0.into() };

@@ -5,6 +5,7 @@ use vergence_protocol::{AxisList, DriverState, EncoderState, Microseconds};
 
 use crate::driver::DriverSettings;
 use crate::encoder::EncoderKind;
+use crate::joints::BusSettings;
 
 /// Largest number of steps of one axis in one tick: 100 at 100 kHz, and some slack.
 pub const MAX_STEPS_PER_TICK: usize = 104;
@@ -54,6 +55,11 @@ pub trait RigIo {
     }
     /// Orders steps of `axis` at their times, after those ordered before.
     fn schedule_steps(&mut self, axis: usize, steps: &StepSchedule);
+    /// Sets where the joint of `axis` shall be, in raw counts of its encoder. Its servo goes there and holds it while the drivers
+    /// are on. A board without such a joint does nothing.
+    fn set_goal(&mut self, axis: usize, counts: i32) {
+        let _ = (axis, counts);
+    }
     /// The raw count of steps made so far.
     fn steps(&self, axis: usize) -> i32;
     /// The raw encoder count.
@@ -95,6 +101,11 @@ pub trait RigIo {
     /// call them usable. A board without such a line does nothing.
     fn configure_drivers(&mut self, drivers: &AxisList<DriverSettings>) {
         let _ = drivers;
+    }
+    /// Sets the bus of the joints up, of which each is an axis, from now on; `None` for a machine without joints. A board without
+    /// such a bus does nothing.
+    fn configure_joints(&mut self, bus: Option<&BusSettings>) {
+        let _ = bus;
     }
     /// State of the motor driver of an axis.
     fn driver(&self, axis: usize) -> DriverState {

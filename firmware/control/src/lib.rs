@@ -14,6 +14,7 @@
 
 mod as5048a;
 mod axis;
+mod axis_items;
 mod board_settings;
 mod bounds;
 mod contact;
@@ -48,7 +49,7 @@ mod trigger;
 mod updater;
 
 pub use as5048a::As5048a;
-pub use board_settings::{BoardSettings, Machine, SettingError};
+pub use board_settings::{BoardSettings, Delivered, Machine, SettingError};
 pub use bounds::LONGEST_BRAKING_MS;
 pub use controller::{Controller, Event, plan_ticks};
 pub use driver::{DriverKind, DriverSettings};

@@ -7,7 +7,8 @@
 use vergence_protocol::{AxisList, Micro};
 
 use crate::plan::{AxisPlanner, PlanStart};
-use crate::trajectory::Trajectory;
+use crate::profile::Limits;
+use crate::trajectory::{FINE_BITS, Fine, Trajectory};
 
 /// Durations of axes agree when they differ by less than this share. From rest that takes two rounds.
 const AGREED: f32 = 1e-5;
@@ -23,6 +24,32 @@ pub struct PlanRequest {
     pub share: f32,
     /// The way of each axis.
     pub ways: AxisList<PlannedWay>,
+}
+
+impl PlanRequest {
+    /// Lowers the limits of a move from rest so that all axes are at the same share of their ways at every instant: the links of a
+    /// robot's trunk form a closed loop, which a straight way of its joints keeps closed. A move from mid-move stays as it is.
+    pub fn straighten(&mut self) {
+        let length = |way: &PlannedWay| {
+            let target = Fine::from(way.target.0) << FINE_BITS;
+            (target - way.start.motion.position).unsigned_abs() as f32
+        };
+        if !self.ways.iter().all(|way| way.start.motion.is_rest()) {
+            return;
+        }
+        let limits =
+            |way: &PlannedWay| [way.planner.limits.speed, way.planner.limits.acceleration, way.planner.limits.jerk];
+        let mut least = [f32::INFINITY; 3];
+        for way in self.ways.iter().filter(|way| length(way) > 0.0) {
+            for (least, limit) in least.iter_mut().zip(limits(way)) {
+                *least = least.min(limit / length(way));
+            }
+        }
+        for way in self.ways.iter_mut().filter(|way| length(way) > 0.0) {
+            let [speed, acceleration, jerk] = least.map(|least| least * length(way));
+            way.planner.limits = Limits { speed, acceleration, jerk };
+        }
+    }
 }
 
 /// The way of one axis: its limits, the state in which it will be when the plan begins, and its target.

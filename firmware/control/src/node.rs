@@ -9,7 +9,7 @@ use vergence_protocol::{
     BoardEvent, BoardSession, ControllerState, Happening, MAX_FRAME, Microseconds, ResetCause, Trigger,
 };
 
-use crate::board_settings::BoardSettings;
+use crate::board_settings::{BoardSettings, Delivered, Machine};
 use crate::controller::{Controller, Event};
 use crate::io::RigIo;
 use crate::line_speed::LineSpeed;
@@ -56,8 +56,10 @@ pub struct Node {
     controller: Controller,
     identity: NodeIdentity,
     settings: BoardSettings,
-    /// Default settings of the firmware.
-    defaults: BoardSettings,
+    /// Settings as delivered.
+    delivered: Delivered,
+    /// The machine that is driven since the start.
+    machine: Machine,
     recorder: Recorder,
     trigger: CameraTrigger,
     updater: Updater,
@@ -78,22 +80,23 @@ pub struct Node {
 }
 
 impl Node {
-    /// A node with the settings last saved, or with `defaults` if there are none. Saved settings that this firmware refuses,
-    /// or that are to be left aside, are replaced by `defaults` too, and a fault keeps the board from moving with them unnoticed. The number `boot` must
+    /// A node with the settings last saved, or with those `delivered` if there are none. Saved settings that this firmware
+    /// refuses, or that are to be left aside, are replaced by these too, and a fault keeps the board from moving with them unnoticed. The number `boot` must
     /// differ from that of the last start.
     ///
     /// # Errors
     /// [`SettingsError`] if an axis cannot work with the default settings.
     pub fn new(
-        defaults: &BoardSettings,
+        delivered: &Delivered,
         identity: NodeIdentity,
         boot: u32,
         services: &mut impl BoardServices,
     ) -> Result<Self, SettingsError> {
         let are_left = services.leaves_settings();
-        let saved = settings_store::load(services.settings_flash(), defaults);
+        let saved = settings_store::load(services.settings_flash(), delivered);
         let are_lost = saved.is_err() || are_left;
-        let settings = saved.ok().flatten().filter(|_| !are_left).unwrap_or_else(|| defaults.clone());
+        let settings =
+            saved.ok().flatten().filter(|_| !are_left).unwrap_or_else(|| delivered.of(delivered.machine).clone());
         let mut controller = Controller::new(&settings.axes)?;
         controller.hold_after(settings.hold_after_us.into());
         if are_lost {
@@ -109,9 +112,10 @@ impl Node {
             state: controller.state(),
             controller,
             identity,
-            line: LineSpeed::new(settings.baud, defaults.baud),
+            line: LineSpeed::new(settings.baud, delivered.of(settings.machine).baud),
+            machine: settings.machine,
             settings,
-            defaults: defaults.clone(),
+            delivered: delivered.clone(),
             recorder,
             trigger: CameraTrigger::default(),
             updater: Updater::default(),
@@ -241,6 +245,7 @@ impl Node {
             io.expect_counts(index, axis.count_rate());
             io.use_encoder(index, axis.feedback.kind);
         }
+        io.configure_joints(self.settings.joint_bus().as_ref());
         io.configure_drivers(&self.settings.axes.iter().map(AxisSettings::driver_settings).collect());
     }
 

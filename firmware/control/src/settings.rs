@@ -4,7 +4,7 @@ use vergence_protocol::{AxisInfo, AxisKind, Micro, SettingItem};
 
 use crate::TICK_US;
 use crate::bounds::{self, LONGEST_BRAKING_MS};
-use crate::driver::{DriverSettings, StallLimits};
+use crate::driver::{DriverKind, DriverSettings, StallLimits};
 use crate::encoder::EncoderSettings;
 use crate::profile::Limits;
 use crate::switches::{HomeEnd, SwitchSettings};
@@ -189,6 +189,9 @@ pub enum SettingsError {
     /// The serial line or the pose stream is too fast or too slow.
     #[error("the serial line or the pose stream cannot have that rate")]
     Link,
+    /// Two joints have servos of one number, or joints and stages are mixed.
+    #[error("the joints of a robot must have servos of different numbers, and no stages beside them")]
+    Joints,
     /// The time until the holding current is too short or too long.
     #[error("the time until the holding current must be 0 or lie between 100 ms and 10 min")]
     Hold,
@@ -244,6 +247,12 @@ impl AxisSettings {
             HomeEnd::Low => self.min,
             HomeEnd::High => self.max,
         }
+    }
+
+    /// Whether the axis is a joint, which a servo drives and measures.
+    #[must_use]
+    pub fn is_joint(&self) -> bool {
+        self.driver.kind == DriverKind::Servo
     }
 
     /// The settings for the motor driver, with those of StallGuard.

@@ -8,7 +8,7 @@
 use vergence_protocol::frame::checksum;
 use vergence_protocol::{SettingItem, SettingKey};
 
-use crate::board_settings::BoardSettings;
+use crate::board_settings::{BoardSettings, Delivered, Machine};
 use crate::services::{Flash, FlashError, PAGE, UNIT};
 
 const MAGIC: [u8; 4] = *b"VGS1";
@@ -25,17 +25,18 @@ type Page = [u8; PAGE];
 #[error("the saved settings are refused by this firmware")]
 pub struct SettingsRefused;
 
-/// Reads the settings last saved; `None` if none were saved. Items that the record does not hold are taken from `defaults`.
+/// Reads the settings last saved; `None` if none were saved. Items that the record does not hold are taken from `delivered`, for
+/// the machine that the record names.
 ///
 /// # Errors
 /// [`SettingsRefused`] if the board cannot work with what was saved.
-pub fn load(flash: &mut impl Flash, defaults: &BoardSettings) -> Result<Option<BoardSettings>, SettingsRefused> {
+pub fn load(flash: &mut impl Flash, delivered: &Delivered) -> Result<Option<BoardSettings>, SettingsRefused> {
     let mut page = [0; PAGE];
     let newest = newest(flash, &mut page);
     let Some(record) = newest.and_then(|(newest, _)| read_record(flash, newest, &mut page)) else { return Ok(None) };
-    let settings = decode(record.body, defaults).ok_or(SettingsRefused)?;
+    let settings = decode(record.body, delivered).ok_or(SettingsRefused)?;
     settings.validate().map_err(|_| SettingsRefused)?;
-    Ok(Some(settings))
+    if settings.machine == settings.machine_of_axes() { Ok(Some(settings)) } else { Err(SettingsRefused) }
 }
 
 /// Saves `settings` and reads them back.
@@ -108,16 +109,29 @@ fn encode(settings: &BoardSettings, sequence: u32, page: &mut Page) -> Option<us
 }
 
 /// Reads the items that this firmware knows; `None` if the body is no list of settings.
-fn decode(mut body: &[u8], defaults: &BoardSettings) -> Option<BoardSettings> {
-    let mut settings = defaults.clone();
+fn decode(body: &[u8], delivered: &Delivered) -> Option<BoardSettings> {
+    let mut machine = Machine::Bench;
+    read(body, |key, value| {
+        if key.item == SettingItem::Machine && value == Machine::Robot as i64 {
+            machine = Machine::Robot;
+        }
+    })?;
+    let mut settings = delivered.of(machine).clone();
+    // An axis that the board no longer has is ignored as well.
+    read(body, |key, value| {
+        let _ = settings.put(key, value);
+    })?;
+    Some(settings)
+}
+
+fn read(mut body: &[u8], mut take: impl FnMut(SettingKey, i64)) -> Option<()> {
     while !body.is_empty() {
         // The item by its number: newer firmware may have saved items that this one does not know.
         let ((item, axis, value), rest) = postcard::take_from_bytes::<(u32, u8, i64)>(body).ok()?;
         body = rest;
         if let Some(&item) = SettingItem::ALL.get(item as usize) {
-            // An axis that the board no longer has is ignored as well.
-            let _ = settings.put(SettingKey { item, axis }, value);
+            take(SettingKey { item, axis }, value);
         }
     }
-    Some(settings)
+    Some(())
 }

@@ -1,7 +1,7 @@
 //! The speed of the line: on trial until a host is heard at it, and looked for where nobody is heard.
 #![allow(clippy::unwrap_used, clippy::panic, reason = "a test fails by panic")]
 
-use vergence_control::{BoardSettings, Node, NodeIdentity, settings_store};
+use vergence_control::{BoardSettings, Delivered, Node, NodeIdentity, settings_store};
 use vergence_plant::{NativeServices, Plant, bench_mechanics, bench_settings};
 use vergence_protocol::{
     HostEvent, HostSession, MAX_FRAME, Microseconds, Refusal, Report, Request, ResetCause, SessionId, SettingItem,
@@ -40,7 +40,7 @@ impl Line {
             uid: [0; 12],
             reset: ResetCause::PowerOn,
         };
-        let node = Node::new(&defaults, identity, 1, &mut services).unwrap();
+        let node = Node::new(&Delivered::for_bench(defaults), identity, 1, &mut services).unwrap();
         let plant = Plant::new(&bench_mechanics(), &[100_000.0, 500_000.0]);
         let (host, answers) = (HostSession::new(SessionId(1)), Vec::new());
         Self { node, plant, services, host, host_baud: baud, is_deaf: false, now: 0, answers }
@@ -104,7 +104,7 @@ impl Line {
 
     fn saved(&mut self) -> u32 {
         let defaults = BoardSettings::new(&bench_settings()).unwrap();
-        settings_store::load(&mut self.services.settings, &defaults).unwrap().unwrap().baud
+        settings_store::load(&mut self.services.settings, &Delivered::for_bench(defaults)).unwrap().unwrap().baud
     }
 }
 

@@ -1,7 +1,7 @@
 //! A board with nothing to do ticks seldom, and is awake when somebody speaks.
 #![allow(clippy::unwrap_used, reason = "a test fails by panic")]
 
-use vergence_control::{BoardSettings, Node, NodeIdentity, REST_US, TICK_US};
+use vergence_control::{BoardSettings, Delivered, Node, NodeIdentity, REST_US, TICK_US};
 use vergence_plant::{NativeServices, Plant, bench_mechanics, bench_settings};
 use vergence_protocol::{
     AxisMask, ControllerState, HostSession, MAX_FRAME, Microseconds, Request, ResetCause, SessionId, Trigger,
@@ -32,7 +32,7 @@ impl Board {
             reset: ResetCause::PowerOn,
         };
         let mut services = NativeServices::default();
-        let node = Node::new(&settings, identity, 1, &mut services).unwrap();
+        let node = Node::new(&Delivered::for_bench(settings), identity, 1, &mut services).unwrap();
         let plant = Plant::new(&bench_mechanics(), &[100_000.0, 500_000.0]);
         let mut board = Self { node, plant, services, host: HostSession::new(HOST), now: 0, ticks: 0 };
         board.host.hello();

@@ -58,6 +58,13 @@ impl Acceleration {
 pub struct Current(pub i16);
 
 impl Current {
+    /// The largest current of no more than so many milliamperes, up to the greatest that a register holds.
+    #[must_use]
+    pub const fn of_milliamperes(milliamperes: u32) -> Self {
+        let units = milliamperes as u64 * 1_000 / 2_690;
+        Self(if units > i16::MAX as u64 { i16::MAX } else { units as i16 })
+    }
+
     /// Microamperes.
     #[must_use]
     pub const fn microamperes(self) -> i32 {

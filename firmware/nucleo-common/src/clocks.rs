@@ -23,7 +23,7 @@ pub enum Source {
 /// tests the boost bit at the wrong place (bit 0 of `PWR_CR5` in stm32-metapac 21; it is bit 8, RM0440, 6.4.22).
 ///
 /// The driver keeps to the state in between that a step to more than 80 MHz needs (RM0440, 7.2.7), and goes on believing in
-/// it: AHB and timers at 85 MHz. Its serial port is clocked by the undivided system clock, which it knows. A program with
+/// it: AHB and timers at 85 MHz. The link and the servo bus are clocked by the undivided system clock, which it knows. A program with
 /// its driver of time doubles the prescaler of that timer.
 pub fn start(source: Source) -> Peripherals {
     let mut p = embassy_stm32::init(Config::default());
@@ -50,6 +50,7 @@ fn speed_up(clocks: &mut Peri<'static, peripherals::RCC>, source: Source) {
     // embassy-stm32 0.6 takes this prescaler back in the same write that switches to the PLL.
     config.ahb_pre = AHBPrescaler::DIV2;
     config.mux.lpuart1sel = rcc::mux::Uartsel::SYS;
+    config.mux.usart3sel = rcc::mux::Uartsel::SYS;
     rcc::reinit(config, clocks);
     cortex_m::asm::delay(TRANSITION_CYCLES);
     FLASH.acr().modify(|w| w.set_latency(Latency::WS4));

@@ -64,7 +64,7 @@ impl AbsoluteEncoders {
     pub fn use_encoder(&mut self, axis: usize, kind: EncoderKind) {
         if let Some(known) = self.known.get_mut(axis) {
             *known = match kind {
-                EncoderKind::Quadrature => None,
+                EncoderKind::Quadrature | EncoderKind::Servo => None,
                 EncoderKind::As5048a => known.or(Some(As5048a::default())),
             };
         }

@@ -13,6 +13,7 @@ use crate::absolute::AbsoluteEncoders;
 use crate::drivers::DriverWire;
 use crate::encoder::Encoder;
 use crate::index_lines::IndexLines;
+use crate::joints::{BusPort, Joints};
 use crate::receiver::{Bell, Receiver};
 use crate::rig::{Latched, Rig, Stage};
 use crate::steps::StepPulses;
@@ -42,6 +43,8 @@ pub struct Board {
     pub line: SerialLine,
     /// Serial line of the motor drivers.
     pub driver_line: DriverWire,
+    /// Bus of a robot's servos, not started yet.
+    pub servo_bus: BusPort,
     /// Random number generator.
     pub random: Peri<'static, peripherals::RNG>,
     /// Flash controller.
@@ -73,10 +76,10 @@ impl Board {
             holding: Output::new(p.PB5, Level::Low, Speed::Low),
             trigger: Trigger::new(p.TIM4, p.PB6, counters),
             latched: None,
+            joints: Joints::default(),
             before: Latched::default(),
             latest: Latched::default(),
         };
-        reserve_servo_bus(&p.USART3, &p.PB10, &p.PB14);
         Self {
             rig,
             tick: p.TIM7,
@@ -84,18 +87,11 @@ impl Board {
             led: Output::new(p.PA5, Level::High, Speed::Low),
             line: SerialLine { port: p.LPUART1, tx: p.PA2, rx: p.PA3, tx_dma: p.DMA1_CH2, rx_dma: p.DMA1_CH1 },
             driver_line: DriverWire::new(p.UART4, p.PC10),
+            servo_bus: BusPort::new(p.USART3, p.PB10, p.PB14, p.DMA1_CH6, p.DMA1_CH7),
             random: p.RNG,
             flash: p.FLASH,
         }
     }
-}
-
-/// Reserves port and pins of the robot's servo bus (one wire in both directions), which no driver uses yet.
-fn reserve_servo_bus<T: usart::Instance>(
-    _port: &Peri<'static, T>,
-    _data: &Peri<'static, impl usart::TxPin<T>>,
-    _drive: &Peri<'static, impl usart::DePin<T>>,
-) {
 }
 
 impl SerialLine {

@@ -40,7 +40,7 @@ static HANDOVER: Mutex<RefCell<Option<&'static mut Control>>> = Mutex::new(RefCe
 
 /// The node, and the mechanics that it drives.
 pub struct Control {
-    node: Node,
+    node: &'static mut Node,
     rig: Rig,
     services: Services,
     /// Speed of the line as it was last passed on, in baud.
@@ -57,7 +57,7 @@ pub struct Control {
 }
 
 /// Starts the tick. From now on node, rig and services belong to the interrupt.
-pub fn start(node: Node, rig: Rig, services: Services, timer: Peri<'static, peripherals::TIM7>) {
+pub fn start(node: &'static mut Node, rig: Rig, services: Services, timer: Peri<'static, peripherals::TIM7>) {
     // Forgotten, because dropping it would stop the timer's clock.
     core::mem::forget(Timer::new(timer));
     TIM7.psc().write_value(PRESCALER);
@@ -77,7 +77,7 @@ pub fn start(node: Node, rig: Rig, services: Services, timer: Peri<'static, peri
     });
     TIM7.dier().write(|w| w.set_uie(true));
     TIM7.cr1().write(|w| w.set_cen(true));
-    // Not before the counter runs: moving the node to its place takes some 300 us.
+    // Not before the counter runs: moving everything to its place takes some time.
     control.tick = Microseconds(Instant::now().as_micros());
     critical_section::with(|cs| HANDOVER.borrow_ref_mut(cs).replace(control));
     interrupt::TIM7_DAC.set_priority(PRIORITY);
@@ -118,7 +118,7 @@ impl Control {
             self.begin_tick();
         }
         self.receive();
-        planning::exchange(&mut self.node, &mut self.plan);
+        planning::exchange(self.node, &mut self.plan);
         self.transmit();
         self.follow();
     }

@@ -86,7 +86,7 @@ pub fn configure(settings: &AxisList<DriverSettings>) {
     with_shared(|shared| {
         shared.settings = Some(settings);
         let state = |driver: DriverSettings| match driver.kind {
-            DriverKind::Plain => DriverState::Plain,
+            DriverKind::Plain | DriverKind::Servo => DriverState::Plain,
             DriverKind::Tmc2209 => DriverState::Starting,
         };
         shared.states = settings.map(state);

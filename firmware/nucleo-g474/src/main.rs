@@ -1,7 +1,7 @@
 //! The controller on a NUCLEO-G474RE: pins, timers, interrupts, link, flash and log around [`vergence_control::Node`].
 //!
-//! Three levels of urgency: the short interrupts of trigger edge, time, DMA and serial line; below them the node with its
-//! 1 kHz tick ([`control`]); below that the executor's tasks ([`link`], [`planning`], [`drivers`], [`watchdog`]).
+//! Four levels of urgency: the short interrupts of trigger edge, time, DMA and serial line; below them the node with its
+//! 1 kHz tick ([`control`]); below that the bus of a robot's servos ([`joints`]); below that the executor's tasks ([`link`], [`planning`], [`drivers`], [`watchdog`]).
 //!
 //! Imports go one way: this file starts everything; [`board`] hands out the pins; [`link`] and [`control`] exchange bytes
 //! through [`exchange`] and do not know each other; [`control`] gets its plans through [`planning`].
@@ -18,6 +18,7 @@ mod encoder;
 mod exchange;
 mod factory;
 mod index_lines;
+mod joints;
 mod link;
 mod log;
 mod memory;
@@ -40,12 +41,36 @@ mod wiring;
 use board::Board;
 use embassy_executor::Spawner;
 use embassy_stm32::pac::{TIM15, timer::vals::Urs};
-use vergence_control::{BoardSettings, Node, NodeIdentity};
+use static_cell::StaticCell;
+use vergence_control::{BoardSettings, Delivered, Node, NodeIdentity};
 use vergence_image::DeathKind;
 use vergence_image::layout::HARDWARE;
 use vergence_nucleo_common::Services;
 use vergence_nucleo_common::clocks::{self, Source};
 use vergence_nucleo_common::memory::survivor;
+
+/// Makes the settings that the board is delivered with in their place.
+#[inline(never)]
+fn placed_settings() -> &'static Delivered {
+    static PLACE: StaticCell<Delivered> = StaticCell::new();
+    let Ok(bench) = BoardSettings::new(&factory::axes()) else { dying::give_up(DeathKind::Settings) };
+    PLACE.init(Delivered::for_bench(bench))
+}
+
+/// Makes the node in the memory beside the stack's. Neither this nor the settings are parts of `main`, whose frame would hold several copies of both at a
+/// time: 64 kB of stack, more than there is.
+#[inline(never)]
+fn placed_node(
+    settings: &'static Delivered,
+    identity: NodeIdentity,
+    boot: u32,
+    services: &mut Services,
+) -> &'static mut Node {
+    match Node::new(settings, identity, boot, services) {
+        Ok(node) => memory::keep_node(node),
+        Err(_) => dying::give_up(DeathKind::Settings),
+    }
+}
 
 #[embassy_executor::main]
 async fn main(spawner: Spawner) {
@@ -64,25 +89,25 @@ async fn main(spawner: Spawner) {
     };
     log::greet(&identity);
     let mut services = Services::of_application(&board.flash, memory::take_defaults_wanted());
-    let Ok(defaults) = BoardSettings::new(&factory::axes()) else { dying::give_up(DeathKind::Settings) };
     let boot = board::random(board.random).unwrap_or_else(|| survivor().starts);
-    let Ok(node) = Node::new(&defaults, identity, boot, &mut services) else {
-        dying::give_up(DeathKind::Settings);
-    };
+    let node = placed_node(placed_settings(), identity, boot, &mut services);
     let Some((rx, tx)) = board.line.open(node.baud()) else { dying::give_up(DeathKind::SerialLine) };
+    board.servo_bus.start();
     control::start(node, board.rig, services, board.tick);
-    if let (Ok(receive), Ok(transmit), Ok(plan), Ok(watch), Ok(supervise)) = (
+    if let (Ok(receive), Ok(transmit), Ok(plan), Ok(watch), Ok(supervise), Ok(keep_going)) = (
         link::receive(rx),
         link::transmit(tx),
         planning::plan(planning::planner()),
         watchdog::watch(watchdog, board.led),
         drivers::supervise(board.driver_line),
+        joints::keep_going(),
     ) {
         spawner.spawn(receive);
         spawner.spawn(transmit);
         spawner.spawn(plan);
         spawner.spawn(watch);
         spawner.spawn(supervise);
+        spawner.spawn(keep_going);
     }
 }
 

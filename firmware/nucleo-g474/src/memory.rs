@@ -1,6 +1,10 @@
-//! The memory kept through a reset, and the cause of the last one.
+//! The memory kept through a reset, the cause of the last one, and the place of the node.
+
+use core::mem::MaybeUninit;
+use core::ptr::addr_of_mut;
 
 use embassy_stm32::pac;
+use vergence_control::Node;
 use vergence_image::Survivor;
 use vergence_nucleo_common::memory::{remember, survivor};
 use vergence_protocol::ResetCause;
@@ -37,4 +41,14 @@ pub fn reset_cause() -> ResetCause {
     } else {
         ResetCause::Pin
     }
+}
+
+/// Keeps the node for good, in a memory of its own, which nothing clears at a start. To be called once.
+#[allow(unsafe_code, reason = "a static that is written before it is read")]
+pub fn keep_node(node: Node) -> &'static mut Node {
+    #[unsafe(link_section = ".ccm")]
+    static mut PLACE: MaybeUninit<Node> = MaybeUninit::uninit();
+    // SAFETY: only `main` calls this, once in a start; nothing else can name the place, so the reference is the only one.
+    let place = unsafe { &mut *addr_of_mut!(PLACE) };
+    place.write(node)
 }

@@ -2,6 +2,7 @@
 
 use embassy_stm32::gpio::{Input, Output};
 use embassy_time::Instant;
+use vergence_control::joints::BusSettings;
 use vergence_control::{DriverSettings, EncoderKind, IndexEdges, RigIo, StepSchedule, TriggerEdge};
 use vergence_protocol::{AxisList, DriverState, EncoderState, Microseconds};
 
@@ -9,6 +10,7 @@ use crate::absolute::AbsoluteEncoders;
 use crate::drivers;
 use crate::encoder::Encoder;
 use crate::index_lines::IndexLines;
+use crate::joints::Joints;
 use crate::steps::StepPulses;
 use crate::trigger::Trigger;
 use crate::wiring;
@@ -45,6 +47,8 @@ pub struct Rig {
     pub holding: Output<'static>,
     /// Camera trigger.
     pub trigger: Trigger,
+    /// A robot's joints, which stand for the stages where the board drives them.
+    pub joints: Joints,
     /// The encoders as the running tick found them; `None` outside ticks.
     pub latched: Option<Latched>,
     /// The encoders as the latest two ticks found them, the older first.
@@ -75,11 +79,13 @@ impl Rig {
         }
         self.before = core::mem::replace(&mut self.latest, latched);
         self.latched = Some(latched);
+        self.joints.latch();
     }
 
     /// Ends the tick: from now on encoders are read when they are asked for.
     pub fn release_encoders(&mut self) {
         self.latched = None;
+        self.joints.release();
     }
 
     /// The count of an axis between the latest two ticks: an absolute encoder cannot be latched by an edge.
@@ -89,6 +95,11 @@ impl Rig {
         let between = (self.latest.at.0.saturating_sub(self.before.at.0) as i64).max(1);
         let way = i64::from(count(&self.latest).wrapping_sub(count(&self.before)));
         count(&self.before).wrapping_add((way * since.min(between) / between) as i32)
+    }
+
+    /// Whether the board drives a robot's joints, which have no switches: the lines of those are open.
+    fn has_joints(&self) -> bool {
+        self.joints.states().is_some()
     }
 
     /// Starts the steps ordered for the tick that has begun. Returns whether the steps of the tick before were made in time.
@@ -118,6 +129,7 @@ impl RigIo for Rig {
         }
         self.stages.iter_mut().for_each(|stage| stage.steps.abort());
         drivers::set_motors(on);
+        self.joints.set_torque(on);
     }
 
     fn set_holding(&mut self, holding: bool) {
@@ -130,6 +142,10 @@ impl RigIo for Rig {
         }
     }
 
+    fn set_goal(&mut self, axis: usize, counts: i32) {
+        self.joints.set_goal(axis, counts);
+    }
+
     fn steps(&self, axis: usize) -> i32 {
         self.stages.get(axis).map_or(0, |stage| stage.steps.count())
     }
@@ -137,6 +153,9 @@ impl RigIo for Rig {
     // Not inlined: copies of it in the controller would take 5 kB of flash.
     #[inline(never)]
     fn encoder(&self, axis: usize) -> i32 {
+        if let Some(states) = self.joints.states() {
+            return states.counts(axis);
+        }
         match &self.latched {
             Some(latched) => latched.counts.get(axis).copied().unwrap_or(0),
             None => self.absolute.count(axis).or(self.stages.get(axis).map(|stage| stage.encoder.count())).unwrap_or(0),
@@ -154,7 +173,7 @@ impl RigIo for Rig {
     }
 
     fn encoder_state(&self, axis: usize) -> EncoderState {
-        self.absolute.state(axis)
+        self.joints.states().map_or_else(|| self.absolute.state(axis), |states| states.encoder(axis))
     }
 
     fn take_index(&mut self, axis: usize) -> IndexEdges {
@@ -162,15 +181,18 @@ impl RigIo for Rig {
     }
 
     fn encoders_read_at(&self, now: Microseconds) -> Microseconds {
-        self.latched.map_or(now, |latched| latched.at)
+        match self.joints.states() {
+            Some(states) => states.read_at().unwrap_or(now),
+            None => self.latched.map_or(now, |latched| latched.at),
+        }
     }
 
     fn home_switch(&self, axis: usize) -> bool {
-        self.stages.get(axis).is_some_and(|stage| stage.home_switch.is_low())
+        !self.has_joints() && self.stages.get(axis).is_some_and(|stage| stage.home_switch.is_low())
     }
 
     fn hard_limit(&self, axis: usize) -> bool {
-        self.stages.get(axis).is_some_and(|stage| stage.hard_limit.is_high())
+        !self.has_joints() && self.stages.get(axis).is_some_and(|stage| stage.hard_limit.is_high())
     }
 
     fn emergency_stop(&self) -> bool {
@@ -181,8 +203,12 @@ impl RigIo for Rig {
         drivers::configure(settings);
     }
 
+    fn configure_joints(&mut self, bus: Option<&BusSettings>) {
+        self.joints.configure(bus);
+    }
+
     fn driver(&self, axis: usize) -> DriverState {
-        drivers::state(axis)
+        self.joints.states().map_or_else(|| drivers::state(axis), |states| states.driver(axis))
     }
 
     fn fire_trigger(&mut self, at: Microseconds) {
@@ -192,6 +218,10 @@ impl RigIo for Rig {
 
     fn take_trigger_edge(&mut self) -> Option<TriggerEdge> {
         let (at, raw) = self.trigger.take_edge()?;
+        if let Some(states) = self.joints.states() {
+            let counts = (0..states.0.len()).map(|joint| states.counts_at(joint, at)).collect();
+            return Some(TriggerEdge { at, counts });
+        }
         let counts =
             self.stages.iter().zip(raw).enumerate().map(|(axis, (stage, raw))| match self.absolute.count(axis) {
                 Some(_) => self.between_ticks(axis, at),

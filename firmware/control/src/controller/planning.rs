@@ -46,7 +46,11 @@ impl Controller {
         planning.is_taken = true;
         let Planning { number, left, share, ref targets, .. } = *planning;
         let ways = self.axes.iter().zip(targets).map(|(axis, &target)| axis.way(left, target));
-        Some(PlanRequest { number, share, ways: ways.collect() })
+        let mut request = PlanRequest { number, share, ways: ways.collect() };
+        if self.axes.iter().all(|axis| axis.settings.is_joint()) {
+            request.straighten();
+        }
+        Some(request)
     }
 
     /// Takes a plan, which begins with the next tick. Returns false where it begins later: then give it again after the

@@ -13,6 +13,8 @@ const SETTLE_TIMEOUT_US: u64 = 1_000_000;
 const LASTING_US: u64 = 100_000;
 /// Largest number of corrections: one for the error, one for play that the first took up, and as many again.
 const MOST_CORRECTIONS: u8 = 4;
+/// That of joints, which stick until they lean enough.
+const MOST_LEANS: u8 = 12;
 
 impl Controller {
     /// Runs one tick of a move.
@@ -49,7 +51,8 @@ impl Controller {
 
     /// Whether every axis that is off may correct that.
     fn may_correct(&self, io: &impl RigIo) -> bool {
-        self.active.corrections < MOST_CORRECTIONS
+        let most = if self.axes.iter().all(|axis| axis.settings.is_joint()) { MOST_LEANS } else { MOST_CORRECTIONS };
+        self.active.corrections < most
             && self.axes.iter().zip(&self.active.targets).all(|(axis, &target)| {
                 axis.is_at(target, io) || axis.error(target, io).0.abs() <= axis.settings.correction.0
             })
@@ -57,13 +60,17 @@ impl Controller {
 
     /// Moves to the targets again, from where the encoders are instead of from where the motors should have led.
     fn correct(&mut self, io: &impl RigIo) {
+        self.active.corrections += 1;
+        self.active.rests_since = None;
+        if self.axes.iter().all(|axis| axis.settings.is_joint()) {
+            let axes = self.axes.iter_mut().zip(&self.active.targets);
+            return axes.for_each(|(axis, &target)| axis.lean_towards(target, io));
+        }
         for (axis, &target) in self.axes.iter_mut().zip(&self.active.targets) {
             if !axis.is_at(target, io) {
                 axis.adopt_encoder(io);
             }
         }
-        self.active.corrections += 1;
-        self.active.rests_since = None;
         self.want_plan();
     }
 
@@ -71,7 +78,8 @@ impl Controller {
     /// supply, and nobody can say which of them.
     fn doubt_references(&mut self, io: &impl RigIo) {
         for (axis, &target) in self.axes.iter_mut().zip(&self.active.targets) {
-            if !axis.is_at(target, io) {
+            // A joint knows its angle whatever happens.
+            if !axis.settings.is_joint() && !axis.is_at(target, io) {
                 axis.forget_reference();
             }
         }

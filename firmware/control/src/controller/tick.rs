@@ -5,6 +5,7 @@ use vergence_protocol::{ControllerState, DriverState, EncoderState, FaultCode, M
 use super::Controller;
 use crate::TICK_US;
 use crate::axis::Axis;
+use crate::follow::Lost;
 use crate::homing_sequence::HomingFailure;
 use crate::io::RigIo;
 use crate::self_test::Verdict;
@@ -94,8 +95,7 @@ impl Controller {
         }
     }
 
-    /// A driver that is not usable any more cannot hold its axis, and without its encoder nobody knows where it is: it is cut,
-    /// and with it all others.
+    /// A driver that is not usable any more cannot hold its axis, and without its encoder nobody knows where it is.
     fn watch_drivers(&mut self, now: Microseconds, io: &mut impl RigIo) {
         let failed = (0..self.axes.len()).find_map(|axis| match io.driver(axis) {
             DriverState::Failed(code) => Some((axis, code)),
@@ -105,7 +105,19 @@ impl Controller {
             },
         });
         if let Some((axis, code)) = failed {
-            self.cut(now, code, Some(axis), 0, io);
+            self.cut_or_hold(now, axis, Lost { code, detail: 0 }, io);
+        }
+    }
+
+    /// Ends all motion after an axis was lost. Stages are cut: where they are is not known any more. Joints are held, because a robot
+    /// without torque would fall; each knows its angle, and the one that was lost rests where it is.
+    fn cut_or_hold(&mut self, now: Microseconds, index: usize, Lost { code, detail }: Lost, io: &mut impl RigIo) {
+        let Some(axis) = self.axes.get_mut(index).filter(|axis| axis.settings.is_joint()) else {
+            return self.cut(now, code, Some(index), detail, io);
+        };
+        if !matches!(self.state, ControllerState::LinkLost | ControllerState::Fault) {
+            axis.rest_at_encoder(io);
+            self.fail_softly(now, code, index, detail);
         }
     }
 
@@ -128,7 +140,7 @@ impl Controller {
             first = first.or(lost.map(|lost| (index, lost)));
         }
         if let Some((axis, lost)) = first {
-            self.cut(now, lost.code, Some(axis), lost.detail, io);
+            self.cut_or_hold(now, axis, lost, io);
         }
     }
 

@@ -81,7 +81,7 @@ pub(super) struct Channel {
 impl Channel {
     pub fn new(settings: DriverSettings) -> Self {
         let state = match settings.kind {
-            DriverKind::Plain => DriverState::Plain,
+            DriverKind::Plain | DriverKind::Servo => DriverState::Plain,
             DriverKind::Tmc2209 => DriverState::Starting,
         };
         Self { settings, phase: Phase::Identify, state, failed_tries: 0 }
@@ -106,7 +106,7 @@ impl Channel {
         match self.phase {
             Phase::Watch { .. } => self.state.is_usable(),
             Phase::Rest { .. } => true,
-            _ => self.settings.kind == DriverKind::Plain,
+            _ => self.settings.kind != DriverKind::Tmc2209,
         }
     }
 

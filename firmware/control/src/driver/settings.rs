@@ -8,6 +8,8 @@ pub enum DriverKind {
     Plain,
     /// A TMC2209 with its serial line; its address is the number of the axis.
     Tmc2209,
+    /// A servo on the bus of a robot's joints.
+    Servo,
 }
 
 /// Settings of a motor driver. A plain driver uses none of them but its kind.
@@ -17,7 +19,7 @@ pub struct DriverSettings {
     pub kind: DriverKind,
     /// Resistors that measure the current, in milliohms.
     pub sense_mohm: u32,
-    /// Current of the motor in motion: effective value, in milliamperes.
+    /// Current of the motor in motion: effective value, in milliamperes. Of a servo its largest current.
     pub run_ma: u32,
     /// Current of the motor at rest: effective value, in milliamperes.
     pub hold_ma: u32,
@@ -29,6 +31,8 @@ pub struct DriverSettings {
     pub stealth_chop: bool,
     /// When the driver reports a stall at its output DIAG; `None` for never.
     pub stall: Option<StallLimits>,
+    /// Number of a servo on its bus.
+    pub servo_id: u32,
 }
 
 /// Smallest rate of full steps a second at which StallGuard works: a turn a second of a motor with 200 full steps. Below,
@@ -68,6 +72,7 @@ impl Default for DriverSettings {
             microsteps: 8,
             stealth_chop: true,
             stall: None,
+            servo_id: 1,
         }
     }
 }

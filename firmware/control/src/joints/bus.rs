@@ -112,11 +112,13 @@ impl JointBus {
         }
     }
 
-    /// Sets those joints up again that have a fault, after its cause was seen to. Torque must be off.
+    /// Sets those joints up again that have a fault. A servo that has found errors of its hardware is started anew before, which
+    /// clears them. Torque must be off.
     pub fn recover(&mut self) {
         for joint in &mut self.master.joints {
-            if joint.fault.is_some() {
+            if let Some(fault) = joint.fault {
                 *joint = joint.clone().begin();
+                joint.reboots = matches!(fault, JointFault::Hardware(_));
             }
         }
     }
@@ -190,11 +192,21 @@ impl Master {
             Question::Fast => self.conclude_fast(is_answered),
             Question::Sync => {
                 self.asks_each = false;
-                self.alone = exchange.awaited;
+                self.alone = self.doubtful(exchange.awaited);
+                let doubtful = self.alone;
+                let joints = self.joints.iter_mut().enumerate();
+                joints.for_each(|(index, joint)| joint.settle_pending(!doubtful.contains(index)));
                 self.counters.cycles = self.counters.cycles.saturating_add(u32::from(is_answered));
             }
             _ => self.conclude_alone(&exchange, is_answered, garbled),
         }
+    }
+
+    /// The joints whose answers to a question to each are not to be believed where those `missing` have not answered. They answer
+    /// in their order, so that from the first missing one on an answer may be another's with a wrong number.
+    fn doubtful(&self, missing: AxisMask) -> AxisMask {
+        let first = (0..self.joints.len()).find(|&joint| missing.contains(joint)).unwrap_or(self.joints.len());
+        AxisMask(self.mask(Joint::is_read).0 & !AxisMask::first(first).0)
     }
 
     fn conclude_fast(&mut self, is_answered: bool) {
@@ -211,7 +223,9 @@ impl Master {
         let Some(index) = exchange.question.joint() else { return };
         let Some(joint) = self.joints.get_mut(index) else { return };
         self.alone.0 &= !AxisMask::default().with(index).0;
-        if is_answered {
+        // Its answer may be lost in its start; the ping that follows tells.
+        joint.reboots &= !matches!(exchange.question, Question::Reboot(_));
+        if is_answered || matches!(exchange.question, Question::Reboot(_)) {
             joint.failures = 0;
             return;
         }

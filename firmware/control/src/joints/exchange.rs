@@ -6,6 +6,8 @@ use vergence_protocol::{AxisMask, Microseconds};
 /// What was asked.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Question {
+    /// To start anew.
+    Reboot(usize),
     /// Whether a joint is there.
     Ping(usize),
     /// The register of a step of the set-up.
@@ -28,7 +30,8 @@ impl Question {
     /// The joint, where one alone is asked.
     pub fn joint(self) -> Option<usize> {
         match self {
-            Self::Ping(joint)
+            Self::Reboot(joint)
+            | Self::Ping(joint)
             | Self::Entry(joint)
             | Self::Write(joint)
             | Self::Motion(joint)

@@ -37,6 +37,8 @@ pub struct Joint {
     pub(super) step: Option<u8>,
     pub(super) goal: Position,
     pub(super) reading: Option<JointReading>,
+    /// What it has answered in an exchange in which each answers: taken when all are known to have spoken for themselves.
+    pub(super) pending: Option<JointReading>,
     pub(super) health: Option<JointHealth>,
     /// Whether torque is on, as read since it was last switched.
     pub(super) torque: Option<bool>,
@@ -50,6 +52,8 @@ pub struct Joint {
     pub(super) is_written: bool,
     /// Whether its answers carry the alert of a hardware error that was not looked at yet.
     pub(super) alert: bool,
+    /// Whether it is to be started anew.
+    pub(super) reboots: bool,
     pub(super) fault: Option<JointFault>,
 }
 
@@ -85,13 +89,14 @@ impl Block {
 impl Joint {
     pub(super) fn new(settings: JointSettings) -> Self {
         let goal = Position::default();
-        let (reading, health, torque, fault) = (None, None, None, None);
-        let (torque_tries, failures, differs, is_written, alert) = (0, 0, false, false, false);
+        let (reading, pending, health, torque, fault) = (None, None, None, None, None);
+        let (torque_tries, failures, differs, is_written, alert, reboots) = (0, 0, false, false, false, false);
         Self {
             settings,
             step: None,
             goal,
             reading,
+            pending,
             health,
             torque,
             torque_tries,
@@ -99,6 +104,7 @@ impl Joint {
             differs,
             is_written,
             alert,
+            reboots,
             fault,
         }
         .begin()
@@ -108,7 +114,7 @@ impl Joint {
     pub(super) fn begin(self) -> Self {
         let (torque_tries, failures, differs, is_written, alert) = (0, 0, false, false, false);
         let (step, torque, fault) = (Some(0), None, None);
-        Self { step, torque, torque_tries, failures, differs, is_written, alert, fault, ..self }
+        Self { step, torque, torque_tries, failures, differs, is_written, alert, reboots: false, fault, ..self }
     }
 
     /// Goes on to the next step of the set-up.
@@ -164,17 +170,20 @@ impl Joint {
 
     /// Takes the registers of [`MOTION`]; whether they were that.
     pub(super) fn take_motion(&mut self, at: Microseconds, data: &[u8]) -> bool {
-        let reading = || {
-            Some(JointReading {
-                at,
-                position: Position(i32::from_le_bytes(MOTION.bytes(data, &table::PRESENT_POSITION)?)),
-                velocity: Velocity(i32::from_le_bytes(MOTION.bytes(data, &table::PRESENT_VELOCITY)?)),
-                current: Current(i16::from_le_bytes(MOTION.bytes(data, &table::PRESENT_CURRENT)?)),
-            })
-        };
-        let reading = reading();
+        let reading = reading_of(at, data);
         self.reading = reading.or(self.reading);
         reading.is_some()
+    }
+
+    /// Keeps the registers of [`MOTION`] until [`Self::settle_pending`]; whether they were that.
+    pub(super) fn await_others(&mut self, at: Microseconds, data: &[u8]) -> bool {
+        self.pending = reading_of(at, data);
+        self.pending.is_some()
+    }
+
+    /// Takes what was kept, or drops it where another servo has answered under somebody's number.
+    pub(super) fn settle_pending(&mut self, is_sound: bool) {
+        self.reading = self.pending.take().filter(|_| is_sound).or(self.reading);
     }
 
     /// Takes the registers of [`STATE`]; whether they were that. `wanted` is whether torque should be on.
@@ -209,6 +218,16 @@ impl Joint {
         self.health = health.or(self.health);
         health.is_some()
     }
+}
+
+/// The registers of [`MOTION`] in these data; `None` where they are others.
+fn reading_of(at: Microseconds, data: &[u8]) -> Option<JointReading> {
+    Some(JointReading {
+        at,
+        position: Position(i32::from_le_bytes(MOTION.bytes(data, &table::PRESENT_POSITION)?)),
+        velocity: Velocity(i32::from_le_bytes(MOTION.bytes(data, &table::PRESENT_VELOCITY)?)),
+        current: Current(i16::from_le_bytes(MOTION.bytes(data, &table::PRESENT_CURRENT)?)),
+    })
 }
 
 /// How often torque is switched on before a joint counts as one that does not.

@@ -8,6 +8,10 @@ use vergence_dynamixel::units::OperatingMode;
 
 use super::settings::{BusSettings, JointSettings};
 
+/// Errors by which a servo ends its torque: overload, electrical shock, overheating as from the factory, and that of its encoder,
+/// without which its loop would turn it on and on.
+const ENDS_TORQUE: i32 = 0x3C;
+
 /// A register and what it is set to.
 pub(super) type Entry = (&'static Register, i32);
 
@@ -24,7 +28,10 @@ pub(super) fn entry(step: u8, joint: &JointSettings, bus: &BusSettings) -> Optio
         // Profiles are the board's, so that the servo shall follow at once.
         6 => (&table::PROFILE_VELOCITY, 0),
         7 => (&table::PROFILE_ACCELERATION, 0),
-        8 => (&table::BUS_WATCHDOG, bus.watchdog.0.into()),
+        // The board corrects what the proportional gain leaves, at rest: an integral would be wound up by the lag of each move.
+        8 => (&table::POSITION_I_GAIN, 0),
+        9 => (&table::SHUTDOWN, ENDS_TORQUE),
+        10 => (&table::BUS_WATCHDOG, bus.watchdog.0.into()),
         _ => return None,
     })
 }

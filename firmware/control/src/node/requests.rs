@@ -6,7 +6,7 @@ use vergence_protocol::{
 };
 
 use super::Node;
-use crate::board_settings::{BoardSettings, Machine, SHORTEST_STREAM_US, SettingError};
+use crate::board_settings::{BoardSettings, SHORTEST_STREAM_US, SettingError};
 use crate::io::RigIo;
 use crate::services::BoardServices;
 use crate::settings_store;
@@ -75,10 +75,10 @@ impl Node {
             }
             Request::SetTrigger(trigger) => self.trigger.set(now, *trigger, io),
             Request::SetSetting { key, value } => self.set_setting(now, *key, *value, io),
-            Request::RestoreSettings => self.apply(now, self.defaults.clone(), io),
+            Request::RestoreSettings => self.apply(now, self.delivered.of(self.machine).clone(), io),
             Request::SaveSettings => self.save_settings(now, services),
             // Checked when arming, because settings cannot change while armed.
-            Request::Arm { .. } if self.settings.machine == Machine::Robot => Err(Refusal::NoSuchMachine),
+            Request::Arm { .. } if self.settings.machine != self.machine => Err(Refusal::NoSuchMachine),
             motion => {
                 let session = self.session.session().unwrap_or(SessionId(0));
                 return self.controller.handle(now, session, motion, io);
@@ -129,9 +129,18 @@ impl Node {
         if self.line.is_on_trial() {
             return Err(Refusal::LineOnTrial);
         }
-        settings_store::save(services.settings_flash(), &self.settings).map_err(|_| Refusal::StorageFailed)?;
+        settings_store::save(services.settings_flash(), &self.next_settings()).map_err(|_| Refusal::StorageFailed)?;
         self.recorder.record(now, Happening::Settings);
         Ok(())
+    }
+
+    /// The settings of the next start: of another machine, those delivered, with the board's own line and stream.
+    fn next_settings(&self) -> BoardSettings {
+        let BoardSettings { machine, stream_period_us, baud, hold_after_us, .. } = self.settings;
+        if machine == self.machine {
+            return self.settings.clone();
+        }
+        BoardSettings { stream_period_us, baud, hold_after_us, ..self.delivered.of(machine).clone() }
     }
 
     fn must_be_idle(&self) -> Result<(), Refusal> {

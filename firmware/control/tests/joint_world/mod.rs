@@ -1,12 +1,10 @@
 //! Five simulated servos on one wire, and the master that a board ticks each millisecond.
 #![allow(dead_code, reason = "each test file uses its own part")]
 
-use std::collections::VecDeque;
-
 use vergence_control::joints::{BusSettings, JointBus, JointFault, JointSettings};
 use vergence_dynamixel::Id;
 use vergence_dynamixel::units::{Baud, BusWatchdog, Position};
-use vergence_plant::servo::{Free, Nanoseconds, Servo, ServoBus, ServoFaults, ServoModel};
+use vergence_plant::servo::{Free, Nanoseconds, Servo, ServoBus, ServoFaults, ServoModel, Wire};
 use vergence_protocol::Microseconds;
 
 pub const COUNT: f64 = std::f64::consts::TAU / 4096.0;
@@ -25,10 +23,7 @@ pub struct BusWorld {
     pub servos: ServoBus<Free>,
     /// Time in microseconds.
     pub now: u64,
-    /// Bytes that the board sends and the servos have not got, with the end of each.
-    sending: VecDeque<(Nanoseconds, u8)>,
-    /// Bytes that the board has got since its last tick, with the end of each.
-    heard: VecDeque<(Nanoseconds, u8)>,
+    wire: Wire,
     pub board_lives: bool,
     /// Whether questions for a combined answer reach the servos.
     pub passes_fast_reads: bool,
@@ -47,8 +42,7 @@ impl BusWorld {
             bus: JointBus::new(settings()),
             servos: ServoBus::new((13..18).map(servo).collect(), Free::default()),
             now: 0,
-            sending: VecDeque::new(),
-            heard: VecDeque::new(),
+            wire: Wire::new(BAUD),
             board_lives: true,
             passes_fast_reads: true,
         }
@@ -104,47 +98,21 @@ impl BusWorld {
     }
 
     fn tick(&mut self) {
-        while let Some((_, byte)) = self.heard.pop_front_if(|(end, _)| end.0 <= self.now * 1_000) {
+        while let Some(byte) = self.wire.take_heard(self.instant()) {
             self.bus.hear(&[byte]);
         }
         if self.board_lives
             && let Some(bytes) = self.bus.poll(Microseconds(self.now)).unwrap()
         {
-            assert!(self.sending.is_empty(), "it talks while it still talks");
+            assert!(!self.wire.is_sending(), "it talks while it still talks");
             let is_fast =
                 bytes.len() > 7 && bytes.windows(8).any(|window| window[..5] == FAST[..5] && window[7] == FAST[7]);
-            for (place, byte) in bytes.iter().enumerate().filter(|_| self.passes_fast_reads || !is_fast) {
-                let end = self.instant().plus(Nanoseconds::of_bytes(place as u64 + 1, BAUD));
-                self.sending.push_back((end, *byte));
+            if self.passes_fast_reads || !is_fast {
+                self.wire.send(&bytes, self.instant());
             }
         }
         self.now += 1_000;
-        self.wire();
-    }
-
-    /// Bytes of both sides in their order, until now.
-    fn wire(&mut self) {
-        loop {
-            let limit = self.instant();
-            let sent = self.sending.front().map(|(end, _)| *end).filter(|end| *end <= limit);
-            let spoken = self.servos.next_event().filter(|at| *at <= limit);
-            match (sent, spoken) {
-                (Some(end), spoken) if spoken.is_none_or(|at| end <= at) => {
-                    if let Some((end, byte)) = self.sending.pop_front() {
-                        self.servos.receive(end, byte, BAUD);
-                    }
-                }
-                (_, Some(at)) => {
-                    if let Some(byte) = self.servos.speak(at) {
-                        let end = at.plus(Nanoseconds::of_bytes(1, byte.baud));
-                        let heard = if byte.is_damaged || byte.baud != BAUD { !byte.byte } else { byte.byte };
-                        self.heard.push_back((end, heard));
-                    }
-                }
-                _ => break,
-            }
-        }
-        self.servos.advance(self.instant());
+        self.wire.run(&mut self.servos, Nanoseconds::microseconds(self.now));
     }
 }
 

@@ -58,9 +58,11 @@ impl Master {
             return;
         }
         let is_sound = match exchange.question {
-            Question::Fast | Question::Sync | Question::Motion(_) => joint.take_motion(exchange.asked_at, status.data),
+            Question::Sync => joint.await_others(exchange.asked_at, status.data),
+            Question::Fast | Question::Motion(_) => joint.take_motion(exchange.asked_at, status.data),
             Question::State(_) => joint.take_state(self.torque, status.data),
             Question::Health(_) => joint.take_health(status.data),
+            Question::Reboot(_) => true,
             Question::Ping(_) => {
                 joint.next_step(false);
                 status.ping_info().is_some()

@@ -76,6 +76,7 @@ impl Master {
         let index = self.joints.iter().position(is_due)?;
         let joint = self.joints.get(index)?;
         Some(match joint.step {
+            Some(0) if joint.reboots => Question::Reboot(index),
             Some(0) => Question::Ping(index),
             _ if joint.differs => Question::Write(index),
             _ => Question::Entry(index),
@@ -140,6 +141,7 @@ impl Master {
         let ids = || self.joints.iter().filter(|joint| joint.is_read()).map(|joint| joint.settings.id);
         let read = |joint: usize, block: Block| encode::read(id(joint), block.address, block.length);
         match question {
+            Question::Reboot(joint) => encode::reboot(id(joint)),
             Question::Ping(joint) => encode::ping(id(joint)),
             Question::Motion(joint) => read(joint, MOTION),
             Question::State(joint) => read(joint, STATE),
@@ -171,7 +173,9 @@ impl Master {
             Question::Motion(_) => (alone(motion), SLACK_US),
             Question::State(_) => (alone(STATE.length.into()), SLACK_US),
             Question::Health(_) => (alone(HEALTH.length.into()), SLACK_US),
-            Question::Ping(_) | Question::Entry(_) | Question::Write(_) => (alone(4), SLACK_OF_SET_UP_US),
+            Question::Reboot(_) | Question::Ping(_) | Question::Entry(_) | Question::Write(_) => {
+                (alone(4), SLACK_OF_SET_UP_US)
+            }
         };
         self.settings.time_of(bytes) + slack + SLACK_OF_EACH_US * joints as u64
     }
