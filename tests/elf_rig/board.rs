@@ -104,17 +104,24 @@ impl ElfBoard {
     }
 }
 
-impl Board for ElfBoard {
-    fn switched_on(standing: &Standing) -> Self {
+impl ElfBoard {
+    /// With these mechanics on its pins, before it gets power.
+    pub fn with_bench(bench: Bench) -> Self {
         let [application, boot_loader] = programs();
-        let plant = Plant::new(&standing.mechanics, &standing.at);
-        let mut machine = Machine::new(ChipConfig::default(), Bench::new(BenchWiring::nucleo_g474(), plant));
+        let mut machine = Machine::new(ChipConfig::default(), bench);
         machine.load(boot_loader.clone()).expect("it fits");
         let (_, seal) = sealed(application);
         assert!(machine.chip_mut().load_flash(ACTIVE.start as usize, &seal.to_bytes()));
         // Last, for the symbols.
         machine.load(application.clone()).expect("it fits");
         Self { machine, baud: BAUD, heard_baud: BAUD }
+    }
+}
+
+impl Board for ElfBoard {
+    fn switched_on(standing: &Standing) -> Self {
+        let plant = Plant::new(&standing.mechanics, &standing.at);
+        Self::with_bench(Bench::new(BenchWiring::nucleo_g474(), plant))
     }
 
     fn with_plant(&mut self, act: impl FnOnce(&mut Plant)) {

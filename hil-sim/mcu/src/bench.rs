@@ -9,6 +9,7 @@ use vergence_protocol::Microseconds;
 
 use crate::encoder_lines::{Lines, Selection, phases};
 use crate::pin::{Drive, Pin};
+use crate::serial_device::SerialDevice;
 use crate::spi::SpiFrame;
 use crate::time::Picoseconds;
 use crate::uart::{Frame, LineFault, SentByte};
@@ -64,6 +65,8 @@ pub struct BenchWiring {
     pub camera_trigger: Pin,
     /// Port of the one wire to TMC2209 drivers.
     pub driver_line: UartId,
+    /// Port of a robot's servos.
+    pub servo_bus: UartId,
     /// Bus of the absolute encoders.
     pub encoder_bus: SpiId,
 }
@@ -264,7 +267,9 @@ impl World for Bench {
 
     fn next_event(&self) -> Picoseconds {
         let replies = self.reply.map_or(Picoseconds::NEVER, |(at, ..)| at);
-        self.axes.iter().filter_map(|axis| axis.lines.next).fold(self.next_step.min(replies), Picoseconds::min)
+        let servos = SerialDevice::next_event(self.plant.joints().servos());
+        let others = self.next_step.min(replies).min(servos);
+        self.axes.iter().filter_map(|axis| axis.lines.next).fold(others, Picoseconds::min)
     }
 
     fn act(&mut self, now: Instant, terminals: &mut Terminals) {
@@ -277,6 +282,11 @@ impl World for Bench {
         if let Some((_, baud, reply)) = self.reply.take_if(|(at, ..)| *at <= now.time) {
             for byte in reply.bytes {
                 terminals.send(self.wiring.driver_line, Frame { byte, baud, fault: LineFault::None });
+            }
+        }
+        if SerialDevice::next_event(self.plant.joints().servos()) <= now.time {
+            for frame in SerialDevice::speak(self.plant.joints_mut().servos_mut(), now.time) {
+                terminals.send(self.wiring.servo_bus, frame);
             }
         }
         if self.next_step <= now.time {
@@ -294,6 +304,9 @@ impl World for Bench {
     }
 
     fn byte_sent(&mut self, port: UartId, sent: SentByte, _terminals: &mut Terminals) {
+        if port == self.wiring.servo_bus {
+            SerialDevice::receive(self.plant.joints_mut().servos_mut(), sent);
+        }
         if port != self.wiring.driver_line {
             return;
         }

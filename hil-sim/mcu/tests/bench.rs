@@ -30,6 +30,7 @@ fn rig(position: f64) -> Poked<Bench> {
         emergency_stop: switch("PA6", true),
         camera_trigger: pin("PA7"),
         driver_line: UartId::UART4,
+        servo_bus: UartId::USART3,
         encoder_bus: SpiId::SPI1,
     };
     let plant = Plant::new(&bench_mechanics()[..1], &[position]);

@@ -3,7 +3,7 @@
 
 mod common;
 
-use common::serial::{BAUD, BIT, BRR, CR1, CR3, FE, FIFOEN, FRAME, ISR, RDR, RE, RXNE, TDR, TE, UE};
+use common::serial::{BAUD, BIT, BRR, CR1, CR3, FE, FIFOEN, FRAME, ICR, IDLE, ISR, RDR, RE, RXNE, TDR, TE, UE};
 use common::{Bench, GPIOB, USART2, USART3, bench_with, frame, pin};
 use vergence_mcu::{Frame, Nothing, OnPort, Picoseconds, SentByte, SerialDevice, UartId};
 
@@ -91,6 +91,34 @@ fn a_servo_on_the_reserved_port_answers_after_its_delay() {
         bench.wait(4_000 + 2 * FRAME);
         assert_eq!(answers(bench), [ID, !ID, ID, 2], "a snapshot goes on like the original");
     }
+}
+
+/// On one wire the receiver finds the line idle after its own bytes as after those of others, and not between two bytes.
+#[test]
+fn the_line_is_idle_a_frame_after_the_last_byte_of_either_side() {
+    let mut bench = bus(BAUD);
+    ask(&mut bench, USART3);
+    assert_eq!(bench.read(USART3 + ISR) & IDLE, 0, "the second byte has just ended");
+    bench.wait(FRAME - 2);
+    assert_eq!(bench.read(USART3 + ISR) & IDLE, 0);
+    bench.wait(4);
+    assert_ne!(bench.read(USART3 + ISR) & IDLE, 0);
+    bench.write(USART3 + ICR, IDLE);
+    bench.wait(4_000 + FRAME);
+    assert_eq!(bench.read(USART3 + ISR) & IDLE, 0, "in the answer of two bytes");
+    bench.wait(FRAME);
+    assert_ne!(bench.read(USART3 + ISR) & IDLE, 0);
+}
+
+#[test]
+fn the_direction_of_the_buffer_is_that_of_the_board_while_it_speaks() {
+    let mut bench = bus(BAUD);
+    bench.write(USART3 + TDR, ID.into());
+    bench.write(USART3 + TDR, (!ID).into());
+    bench.wait(FRAME + BIT);
+    assert!(bench.chip.is_high(pin("PB14")), "in the second byte");
+    bench.wait(FRAME);
+    assert!(!bench.chip.is_high(pin("PB14")));
 }
 
 #[test]

@@ -2,19 +2,23 @@
 
 use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64Mcg;
-use vergence_control::{AxisSettings, BoardSettings, Node, NodeIdentity, SettingsError, TICK_US};
+use vergence_control::{
+    AxisSettings, BoardSettings, Controller, Delivered, Node, NodeIdentity, SettingsError, TICK_US,
+};
 use vergence_protocol::management::{NATIVE_HARDWARE, RebootTo};
 use vergence_protocol::{ControllerState, MAX_FRAME, Microseconds, PoseReport, ResetCause};
 
 use crate::axis::AxisMechanics;
+use crate::bench::bench_settings;
 use crate::plant::Plant;
 use crate::services::NativeServices;
+use crate::servo::{AnyMechanism, ServoBus};
 
 /// A board without hardware, in virtual time: nothing happens between two calls of [`Self::advance`].
 #[derive(Debug)]
 pub struct NativeBoard {
     node: Node,
-    settings: BoardSettings,
+    delivered: Delivered,
     services: NativeServices,
     plant: Plant,
     now: Microseconds,
@@ -46,13 +50,36 @@ impl NativeBoard {
         positions: &[f64],
         boot: u32,
     ) -> Result<Self, SettingsError> {
-        let settings = BoardSettings::new(settings)?;
+        let delivered = Delivered::for_bench(BoardSettings::new(settings)?);
         let mut services = NativeServices::default();
         Ok(Self {
-            node: start(&settings, ResetCause::PowerOn, boot, &mut services)?,
-            settings,
+            node: start(&delivered, ResetCause::PowerOn, boot, &mut services)?,
+            delivered,
             services,
             plant: Plant::new(mechanics, positions),
+            now: Microseconds(0),
+            held_until: Microseconds(0),
+        })
+    }
+
+    /// A robot's board that has just been switched on, with these joints as delivered. `boot` names this start.
+    ///
+    /// # Errors
+    /// [`SettingsError`] where a joint cannot work with its settings.
+    pub fn of_joints(
+        joints: &[AxisSettings],
+        servos: ServoBus<AnyMechanism>,
+        boot: u32,
+    ) -> Result<Self, SettingsError> {
+        let bench = BoardSettings::new(&bench_settings())?;
+        let robot = BoardSettings::new(joints)?;
+        let delivered = Delivered { machine: robot.machine, bench, robot };
+        let mut services = NativeServices::default();
+        Ok(Self {
+            node: start(&delivered, ResetCause::PowerOn, boot, &mut services)?,
+            delivered,
+            services,
+            plant: Plant::of_joints(servos),
             now: Microseconds(0),
             held_until: Microseconds(0),
         })
@@ -65,7 +92,7 @@ impl NativeBoard {
     /// [`SettingsError`], which cannot be where the settings were taken before.
     pub fn restart(&mut self, cause: ResetCause, boot: u32) -> Result<(), SettingsError> {
         self.services.boot();
-        self.node = start(&self.settings, cause, boot, &mut self.services)?;
+        self.node = start(&self.delivered, cause, boot, &mut self.services)?;
         self.plant.restart_clock();
         self.now = Microseconds(0);
         self.held_until = Microseconds(0);
@@ -142,6 +169,12 @@ impl NativeBoard {
         self.node.controller().state()
     }
 
+    /// The controller.
+    #[must_use]
+    pub fn controller(&self) -> &Controller {
+        self.node.controller()
+    }
+
     /// The pose that the board would report now, with number zero.
     #[must_use]
     pub fn pose(&self) -> PoseReport {
@@ -167,7 +200,7 @@ impl NativeBoard {
 
 /// The software as it starts.
 fn start(
-    settings: &BoardSettings,
+    delivered: &Delivered,
     reset: ResetCause,
     boot: u32,
     services: &mut NativeServices,
@@ -181,5 +214,5 @@ fn start(
         uid: *b"vergence-sim",
         reset,
     };
-    Node::new(settings, identity, boot, services)
+    Node::new(delivered, identity, boot, services)
 }

@@ -3,11 +3,14 @@
 use std::collections::VecDeque;
 
 use vergence_control::driver::DriverLine;
+use vergence_control::joints::{BusSettings, JointStates};
 use vergence_control::{DriverSettings, EncoderKind, IndexEdges, RigIo, StepSchedule, TriggerEdge};
 use vergence_protocol::{AxisList, DriverState, EncoderState, Microseconds};
 
 use crate::axis::{AxisMechanics, AxisPlant};
 use crate::drivers::Drivers;
+use crate::joints::Joints;
+use crate::servo::{AnyMechanism, Free, ServoBus};
 use crate::tmc2209::{Tmc2209, Turning};
 
 /// All axes, the driver enable and the emergency stop.
@@ -31,6 +34,8 @@ pub struct Plant {
     drivers: Drivers,
     /// The native board's end of the drivers' serial line.
     line: DriverLine,
+    /// The joints of a robot; without servos nobody answers on their bus.
+    joints: Joints,
 }
 
 impl Plant {
@@ -53,7 +58,25 @@ impl Plant {
             exposed: None,
             drivers: Drivers::default(),
             line: DriverLine::default(),
+            joints: Joints::new(ServoBus::new(Vec::new(), AnyMechanism::new(Free::default()))),
         }
+    }
+
+    /// A robot's joints, drivers off, and no stages.
+    #[must_use]
+    pub fn of_joints(servos: ServoBus<AnyMechanism>) -> Self {
+        Self { joints: Joints::new(servos), ..Self::new(&[], &[]) }
+    }
+
+    /// The joints.
+    #[must_use]
+    pub const fn joints(&self) -> &Joints {
+        &self.joints
+    }
+
+    /// The joints, to change them.
+    pub const fn joints_mut(&mut self) -> &mut Joints {
+        &mut self.joints
     }
 
     /// The true position of every load, in micro-units.
@@ -129,6 +152,7 @@ impl Plant {
         self.trigger_edges.clear();
         self.exposed = None;
         self.line = DriverLine::default();
+        self.joints.restart_clock(self.now);
         self.now = Microseconds(0);
     }
 
@@ -190,7 +214,10 @@ impl Plant {
     /// Makes the trigger's edge: hardware latches every encoder.
     fn latch(&mut self) {
         self.axes.iter_mut().for_each(AxisPlant::ask_magnet);
-        let counts = self.axes.iter().map(AxisPlant::encoder).collect();
+        let counts = match self.joints.states() {
+            Some(states) => (0..states.0.len()).map(|joint| states.counts_at(joint, self.now)).collect(),
+            None => self.axes.iter().map(AxisPlant::encoder).collect(),
+        };
         self.trigger_edges.push_back(TriggerEdge { at: self.now, counts });
         self.exposed = Some((self.now, self.loads()));
     }
@@ -204,6 +231,7 @@ impl Plant {
             let steps = axis.steps().abs_diff(before);
             self.drivers.advance(index, to, Turning { steps, last: axis.last_steps(), pressed: axis.pressed() });
         }
+        self.joints.advance(to);
         self.now = to;
     }
 
@@ -218,6 +246,9 @@ impl RigIo for Plant {
         self.drivers.enable(on);
         self.line.set_motors(on);
         self.axes.iter_mut().for_each(AxisPlant::drop_order);
+        if let Some(orders) = self.joints.orders() {
+            orders.set_torque(on);
+        }
     }
 
     fn set_holding(&mut self, holding: bool) {
@@ -232,11 +263,20 @@ impl RigIo for Plant {
         }
     }
 
+    fn set_goal(&mut self, axis: usize, counts: i32) {
+        if let Some(orders) = self.joints.orders() {
+            orders.set_goal(axis, counts);
+        }
+    }
+
     fn steps(&self, axis: usize) -> i32 {
         self.axes.get(axis).map_or(0, AxisPlant::steps)
     }
 
     fn encoder(&self, axis: usize) -> i32 {
+        if let Some(states) = self.joints.states() {
+            return states.counts(axis);
+        }
         self.axes.get(axis).map_or(0, AxisPlant::encoder)
     }
 
@@ -247,6 +287,9 @@ impl RigIo for Plant {
     }
 
     fn encoder_state(&self, axis: usize) -> EncoderState {
+        if let Some(states) = self.joints.states() {
+            return states.encoder(axis);
+        }
         self.axes.get(axis).map_or(EncoderState::Plain, AxisPlant::encoder_state)
     }
 
@@ -255,8 +298,8 @@ impl RigIo for Plant {
     }
 
     fn encoders_read_at(&self, _now: Microseconds) -> Microseconds {
-        // They read now whatever tick this is.
-        self.now
+        // Stages are read now whatever tick this is.
+        self.joints.states().and_then(JointStates::read_at).unwrap_or(self.now)
     }
 
     fn home_switch(&self, axis: usize) -> bool {
@@ -280,7 +323,14 @@ impl RigIo for Plant {
         self.line.configure(drivers.iter().copied());
     }
 
+    fn configure_joints(&mut self, bus: Option<&BusSettings>) {
+        self.joints.configure(bus, self.now);
+    }
+
     fn driver(&self, axis: usize) -> DriverState {
+        if let Some(states) = self.joints.states() {
+            return states.driver(axis);
+        }
         self.line.state(axis)
     }
 

@@ -94,17 +94,38 @@ fn a_setting_that_makes_no_sense_is_refused_with_its_reason() {
 }
 
 #[test]
-fn a_board_set_to_drive_the_robot_is_not_armed_and_says_why() {
+fn a_board_drives_another_machine_from_its_next_start_on() {
     let mut rigged = Rigged::off(3).open();
     let machine = SettingKey { item: SettingItem::Machine, axis: 0 };
     assert_eq!(get(&mut rigged, machine), 0, "the bench from the factory");
     assert_eq!(set(&mut rigged, machine, 2), Status::Refused(Refusal::BadSetting));
     assert_eq!(set(&mut rigged, machine, 1), Status::Accepted);
+    assert_eq!(rigged.info().axes, 2);
+    assert_eq!(rigged.arm(), Status::Refused(Refusal::NoSuchMachine));
+    assert_eq!(set(&mut rigged, machine, 0), Status::Accepted);
+    assert_eq!(rigged.arm(), Status::Accepted, "it was not saved");
+    assert_eq!(rigged.ask(Request::Disarm), Status::Accepted);
+
+    assert_eq!(set(&mut rigged, machine, 1), Status::Accepted);
     assert_eq!(rigged.ask(Request::SaveSettings), Status::Accepted);
     power_cycle(&mut rigged, 7);
-    assert_eq!(rigged.arm(), Status::Refused(Refusal::NoSuchMachine));
-    assert!(!rigged.board.plant().drivers_on());
+    assert_eq!((rigged.info().axes, get(&mut rigged, machine)), (5, 1));
+    let servo = |axis| SettingKey { item: SettingItem::ServoId, axis };
+    assert_eq!([0, 1, 2, 3, 4].map(|axis| get(&mut rigged, servo(axis))), [13, 14, 15, 16, 17]);
+    rigged.wait(1_000_000);
+    let why = Some(FaultCode::DriverSilent);
+    assert_eq!(rigged.arm(), Status::Refused(Refusal::DriverNotReady { axis: 0, why }), "no servo is there");
+    assert_eq!(set(&mut rigged, servo(1), 13), Status::Refused(Refusal::BadSetting), "two servos of one number");
+    let driver = SettingKey { item: SettingItem::Driver, axis: 0 };
+    assert_eq!(set(&mut rigged, driver, 0), Status::Refused(Refusal::BadSetting), "a joint stays one");
+
+    // Back, with the settings of the bench as delivered.
+    assert_eq!(rigged.ask(Request::RestoreSettings), Status::Accepted);
+    assert_eq!(get(&mut rigged, machine), 1);
     assert_eq!(set(&mut rigged, machine, 0), Status::Accepted);
+    assert_eq!(rigged.ask(Request::SaveSettings), Status::Accepted);
+    power_cycle(&mut rigged, 8);
+    assert_eq!(get(&mut rigged, SPEED), i64::from(bench_settings()[0].speed));
     assert_eq!(rigged.arm(), Status::Accepted);
 }
 

@@ -3,16 +3,20 @@
 use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64Mcg;
 use vergence_board::Served;
+use vergence_control::{BoardSettings, PAGE, settings_store};
 use vergence_image::ImageFile;
-use vergence_image::layout::{ACTIVE, CAPACITY, IMAGE};
+use vergence_image::layout::{ACTIVE, CAPACITY, IMAGE, SETTINGS};
 use vergence_mcu::{
     Bench, BenchWiring, ChipConfig, FLASH_BASE, Firmware, Frame, Halt, LineFault, Machine, Picoseconds, Pin, UartId,
 };
-use vergence_plant::{Plant, Stage};
+use vergence_plant::servo::{AnyMechanism, ServoBus};
+use vergence_plant::{Plant, RamFlash, Stage};
 use vergence_rig::Rig;
 
-use crate::SimError;
-use crate::rig::stage;
+use crate::error::refusal;
+use crate::rig::{stage, trunk_of};
+use crate::{SimError, Trunk};
+use crate::{TrunkMechanics, joint_settings, trunk_servos};
 
 /// The port that the on-board debugger passes on to the host.
 const LINK: UartId = UartId::LPUART1;
@@ -48,20 +52,32 @@ impl SimulatedChip {
     /// the start of flash, the last one starts without a boot loader. `seed` decides where the stages stand: at the same
     /// places as those of the native board.
     ///
+    /// For a rig with a trunk the servos are on their bus, and the settings flash holds those of a robot with the axes of the
+    /// rig file, as after `vergence config set machine robot` and a restart.
+    ///
     /// # Errors
     /// [`SimError::Program`] where a program is none for this chip, [`SimError::OtherAxes`] where the rig does not fit the
     /// board.
     pub fn new(programs: &[Program<'_>], rig: &Rig, seed: u64) -> Result<Self, SimError> {
         let axes = rig.axes.len();
         let unknown = || SimError::OtherAxes { rig: rig.name.clone(), axes };
-        let wiring = BenchWiring::nucleo_g474_of(axes).ok_or_else(unknown)?;
-        let bench = Bench::new(wiring.clone(), plant(rig, seed));
+        let (wiring, plant) = match &rig.trunk {
+            Some(_) => {
+                let servos = trunk_servos(rig, TrunkMechanics::default(), seed)?;
+                (BenchWiring::nucleo_g474_robot(), Plant::of_joints(servos))
+            }
+            None => (BenchWiring::nucleo_g474_of(axes).ok_or_else(unknown)?, plant(rig, seed)),
+        };
+        let bench = Bench::new(wiring.clone(), plant);
         let mut machine = Machine::new(ChipConfig::default(), bench);
         // Most of an update is waiting for the flash.
         machine.set_skips_waiting(true);
         let mut last = None;
         for program in programs {
             last = load(&mut machine, *program)?;
+        }
+        if rig.trunk.is_some() {
+            machine.chip_mut().load_flash(SETTINGS.start as usize, &robot_settings(rig)?);
         }
         start(&mut machine, last);
         Ok(Self {
@@ -100,6 +116,43 @@ impl SimulatedChip {
     /// The chip with its mechanics.
     pub fn machine(&mut self) -> &mut Machine<Bench> {
         &mut self.machine
+    }
+
+    /// The mechanics.
+    #[must_use]
+    pub fn plant(&self) -> &Plant {
+        self.machine.chip().world().plant()
+    }
+
+    /// The trunk of a robot, as it stands.
+    #[must_use]
+    pub fn trunk(&self) -> Option<&Trunk> {
+        trunk_of(self.plant())
+    }
+
+    /// Does something to a robot's servos: their supply, faults, motors, and what they move.
+    pub fn with_servos<R>(&mut self, act: impl FnOnce(&mut ServoBus<AnyMechanism>) -> R) -> R {
+        let chip = self.machine.chip_mut();
+        chip.with_world(|bench, _| act(bench.plant_mut().joints_mut().servos_mut()))
+    }
+
+    /// A robot's servos with what they move.
+    #[must_use]
+    pub fn servos(&self) -> &ServoBus<AnyMechanism> {
+        self.plant().joints().servos()
+    }
+
+    /// Presses or releases the emergency stop.
+    pub fn press_emergency_stop(&mut self, pressed: bool) {
+        let chip = self.machine.chip_mut();
+        chip.with_world(|bench, _| bench.plant_mut().press_emergency_stop(pressed));
+    }
+
+    /// Cuts the power of the board for an instant: it starts again with what is in its flash. Time goes on, as do the mechanics.
+    pub fn restart(&mut self) {
+        self.machine.power_on();
+        self.baud = BAUD;
+        self.halt = None;
     }
 
     /// Runs until `us` microseconds after power-on, unless the processor has stopped.
@@ -169,6 +222,18 @@ fn plant(rig: &Rig, seed: u64) -> Plant {
     let positions: Vec<f64> = stages.iter().map(place).collect();
     let mechanics: Vec<_> = stages.iter().map(|stage| stage.mechanics).collect();
     Plant::new(&mechanics, &positions)
+}
+
+/// The pages of the settings flash of a robot with the axes of the rig file, as after `vergence config set machine robot`.
+///
+/// # Errors
+/// [`SimError::Axes`] where no servo fits an axis.
+pub fn robot_settings(rig: &Rig) -> Result<Vec<u8>, SimError> {
+    let refused = |error| SimError::Axes { rig: rig.name.clone(), why: refusal(error, rig) };
+    let settings = BoardSettings::new(&joint_settings(rig)?).map_err(refused)?;
+    let mut flash = RamFlash::new(SETTINGS.length as usize / PAGE);
+    settings_store::save(&mut flash, &settings).map_err(|_| SimError::NotFlash)?;
+    Ok(flash.bytes().to_vec())
 }
 
 /// Puts a program into flash; returns the offset at which it begins.

@@ -15,11 +15,9 @@ pub enum SimError {
         /// The reason why the controller refuses the settings.
         why: String,
     },
-    /// No simulated board drives the joints of a trunk.
-    #[error(
-        "rig '{0}' has a trunk: simulated boards drive stages only; 'vergence demo' shows its modes, 'vergence plan' its paths"
-    )]
-    Trunk(String),
+    /// The rig has no trunk that servos could move.
+    #[error("rig '{0}' has no trunk: name the rig file of a robot with --rig")]
+    NoTrunk(String),
     /// No wiring of the simulated chip has so many axes.
     #[error("rig '{rig}' has {axes} axes, and the wirings of the board have one to three")]
     OtherAxes {

@@ -1,9 +1,12 @@
 //! True positions of simulated mechanics during the last second, for the cameras on them.
 
 use std::collections::VecDeque;
+use std::f64::consts::PI;
 
 use vergence_protocol::Microseconds;
-use vergence_rig::{Rig, RigPose};
+use vergence_rig::linkage::TrunkJoint;
+use vergence_rig::{AxisPosition, Rig, RigPose, RigTrunk};
+use vergence_vision::{Angle, Length, SharedCovariance};
 
 use crate::BentRail;
 
@@ -13,7 +16,8 @@ const KEPT: usize = 1_000;
 /// True positions of the mechanics, tick by tick.
 #[derive(Clone, Debug, Default)]
 pub struct LoadHistory {
-    /// Time on the board's clock in microseconds, and the load's position on every axis in micro-units.
+    /// Time on the board's clock in microseconds, and the load's position on every axis in micro-units, or the angle of each joint
+    /// of a trunk in radians.
     ticks: VecDeque<(f64, Vec<f64>)>,
     /// The rail, where it is not straight.
     pub(crate) rail: Option<BentRail>,
@@ -53,13 +57,39 @@ impl LoadHistory {
         Some(self.pose_of(rig, &loads))
     }
 
-    /// True pose of `rig` with its loads at these positions, in micro-units.
+    /// True pose of `rig` with its loads at these positions, in micro-units, or the joints of its trunk at these angles.
     pub(crate) fn pose_of(&self, rig: &Rig, loads: &[f64]) -> RigPose {
+        if let Some(trunk) = &rig.trunk {
+            return true_pose(rig, trunk, loads);
+        }
         let values: Vec<f64> = rig.axes.iter().zip(loads).map(|(axis, &load)| axis.value_from_micro(load)).collect();
         match self.rail {
             Some(rail) => rail.pose(rig, &values),
             None => rig.pose_at_values(&values),
         }
+    }
+}
+
+/// True pose of a trunk with the joints of its loop at these angles.
+fn true_pose(rig: &Rig, trunk: &RigTrunk, angles: &[f64]) -> RigPose {
+    let angles: [f64; TrunkJoint::COUNT] = std::array::from_fn(|joint| angles.get(joint).copied().unwrap_or_default());
+    let (base_from_left, base_from_right) = trunk.cameras_of(&angles);
+    let mut values = vec![PI; rig.axes.len()];
+    for (joint, axis) in TrunkJoint::DRIVEN.into_iter().zip(trunk.axes) {
+        if let Some(value) = values.get_mut(axis) {
+            *value = PI - angles[joint.index()];
+        }
+    }
+    RigPose {
+        base_from_left,
+        left_from_right: base_from_left.inverse() * base_from_right,
+        axes: rig.axes.iter().zip(values).map(|(axis, value)| AxisPosition::from_value(axis.kind, value)).collect(),
+        rotation_sigma: Angle::from_rad(0.0),
+        translation_sigma: Length::from_mm(0.0),
+        shared: SharedCovariance::exact(),
+        is_calibration_known: true,
+        // Nothing was read.
+        closure: None,
     }
 }
 

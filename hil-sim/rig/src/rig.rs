@@ -5,13 +5,13 @@ use std::collections::VecDeque;
 use vergence_board::Served;
 use vergence_control::{TICK_US, UNIT};
 use vergence_image::is_signed_by;
-use vergence_plant::{NativeBoard, Stage};
+use vergence_plant::{NativeBoard, Plant, Stage};
 use vergence_protocol::{AxisKind, Microseconds, ResetCause};
 use vergence_rig::{Rig, RigAxis, RigPose};
 
 use crate::error::refusal;
 use crate::history::LoadHistory;
-use crate::{BentRail, SimError};
+use crate::{BentRail, DrivenTrunk, SimError, Trunk, TrunkMechanics, joint_settings, trunk_servos};
 
 /// The board's clock when the simulation starts, in microseconds.
 const BOARD_START_US: u64 = 3_000_000;
@@ -53,19 +53,26 @@ pub struct Pulse {
 }
 
 impl SimulatedRig {
-    /// Switches on a simulated rig with one stage for every axis; `seed` decides where they stand.
+    /// Switches on a simulated rig with one stage for every axis; `seed` decides where they stand. A trunk stands in spider, and
+    /// `seed` decides the play of its joints.
     ///
     /// # Errors
-    /// [`SimError::Axes`] where the rig has no axes, or one that no stage fits; [`SimError::Trunk`] where it has no stages.
+    /// [`SimError::Axes`] where the rig has no axes, or one that no stage or servo fits.
     pub fn new(rig: &Rig, seed: u64) -> Result<Self, SimError> {
-        if rig.trunk.is_some() {
-            return Err(SimError::Trunk(rig.name.clone()));
-        }
-        let stages: Vec<Stage> = rig.axes.iter().map(stage).collect();
-        let settings: Vec<_> = stages.iter().map(|stage| stage.settings).collect();
-        let mechanics: Vec<_> = stages.iter().map(|stage| stage.mechanics).collect();
         let refused = |error| SimError::Axes { rig: rig.name.clone(), why: refusal(error, rig) };
-        let mut board = NativeBoard::new(&settings, &mechanics, seed).map_err(refused)?;
+        let mut board = match &rig.trunk {
+            Some(_) => {
+                let servos = trunk_servos(rig, TrunkMechanics::default(), seed)?;
+                NativeBoard::of_joints(&joint_settings(rig)?, servos, FIRST_BOOT)
+            }
+            None => {
+                let stages: Vec<Stage> = rig.axes.iter().map(stage).collect();
+                let settings: Vec<_> = stages.iter().map(|stage| stage.settings).collect();
+                let mechanics: Vec<_> = stages.iter().map(|stage| stage.mechanics).collect();
+                NativeBoard::new(&settings, &mechanics, seed)
+            }
+        }
+        .map_err(refused)?;
         board.services_mut().oldest = OLDEST;
         board.restart(ResetCause::PowerOn, FIRST_BOOT).map_err(refused)?;
         Ok(Self {
@@ -133,7 +140,7 @@ impl SimulatedRig {
     /// Keeps the positions and the trigger pulse of this tick for the cameras.
     fn remember(&mut self) {
         let plant = self.board.plant();
-        self.history.push(self.board.now(), plant.loads());
+        self.history.push(self.board.now(), loads(plant));
         let Some((at, _)) = plant.exposed() else { return };
         if self.pulses.back().is_some_and(|last| last.at == at) {
             return;
@@ -204,17 +211,23 @@ impl SimulatedRig {
     /// True pose of the cameras now: from the mechanics, not from the encoders.
     #[must_use]
     pub fn true_pose(&self) -> RigPose {
-        self.pose_of(&self.board.plant().loads())
+        self.history.pose_of(&self.rig, &loads(self.board.plant()))
     }
 
     /// True pose of the cameras when they were last triggered; `None` before the first pulse.
     #[must_use]
     pub fn exposed_pose(&self) -> Option<RigPose> {
-        self.board.plant().exposed().map(|(_, loads)| self.pose_of(loads))
+        let (at, loads) = self.board.plant().exposed()?;
+        match self.rig.trunk {
+            Some(_) => self.history.pose_at(&self.rig, at.0 as f64),
+            None => Some(self.history.pose_of(&self.rig, loads)),
+        }
     }
 
-    fn pose_of(&self, loads: &[f64]) -> RigPose {
-        self.history.pose_of(&self.rig, loads)
+    /// The trunk of a robot, as it stands.
+    #[must_use]
+    pub fn trunk(&self) -> Option<&Trunk> {
+        trunk_of(self.board.plant())
     }
 }
 
@@ -236,6 +249,16 @@ impl Served for SimulatedRig {
     fn settle(&mut self) -> Result<(), SimError> {
         Ok(())
     }
+}
+
+/// What a history keeps of the mechanics: the position of each load in micro-units, or the angle of each joint of a trunk in radians.
+fn loads(plant: &Plant) -> Vec<f64> {
+    trunk_of(plant).map_or_else(|| plant.loads(), |trunk| trunk.angles().to_vec())
+}
+
+/// The trunk that a board's servos hold, if they hold one.
+pub(crate) fn trunk_of(plant: &Plant) -> Option<&Trunk> {
+    Some(plant.joints().servos().mechanism().get::<DrivenTrunk>()?.trunk())
 }
 
 /// The simulated stage of an axis of the rig file.

@@ -26,6 +26,7 @@ mod target;
 mod texture;
 mod texture_noise;
 
+pub use corridor::CorridorPlan;
 pub use optics::Optics;
 pub use range_map::RangeMap;
 pub use render::{Photograph, View, render, render_rolling};

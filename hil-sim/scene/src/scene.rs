@@ -77,6 +77,12 @@ impl Scene {
         })
     }
 
+    /// Distance of the first surface along a ray: [`Self::cast`] without the colour, which takes most of its time.
+    #[must_use]
+    pub fn reach(&self, origin: &Point<World>, direction: &UnitRay<World>) -> Option<Length> {
+        self.encounter(origin.mm(), direction.vector()).map(|encounter| Length::from_mm(encounter.range()))
+    }
+
     /// The first surface on the ray from `origin` along the unit vector `direction`, both in the world.
     pub(crate) fn encounter(&self, origin: Vector3<f64>, direction: Vector3<f64>) -> Option<Encounter> {
         let mut first: Option<Encounter> = None;

@@ -47,8 +47,16 @@ impl ChipFlash {
     /// A board with this flash, just switched on, before these mechanics.
     #[must_use]
     pub fn board_before(&self, plant: Plant) -> ChipBoard {
-        let mut machine = Machine::new(ChipConfig::default(), Bench::new(BenchWiring::nucleo_g474(), plant));
+        self.board_with(BenchWiring::nucleo_g474(), plant, None)
+    }
+
+    /// The same with another wiring, and with these bytes at this place in flash.
+    pub(crate) fn board_with(&self, wiring: BenchWiring, plant: Plant, flash: Option<(usize, &[u8])>) -> ChipBoard {
+        let mut machine = Machine::new(ChipConfig::default(), Bench::new(wiring, plant));
         machine.chip_mut().set_flash_cells(&self.0);
+        if let Some((start, bytes)) = flash {
+            machine.chip_mut().load_flash(start, bytes);
+        }
         machine.power_on();
         ChipBoard { machine, began_us: 0, halted: None }
     }

@@ -41,6 +41,8 @@ mod line;
 pub mod power_cuts;
 mod promise;
 mod pulses;
+#[cfg(feature = "robot")]
+pub mod robot;
 mod scenario;
 mod settings_in_force;
 mod simulation;

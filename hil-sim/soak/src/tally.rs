@@ -1,5 +1,7 @@
 //! Counts of many scenarios, by kind.
 
+use std::fmt::Display;
+
 use rayon::prelude::*;
 use serde_json::{Map, Value, json};
 
@@ -107,13 +109,15 @@ impl Tally {
     /// The first broken promises with the seeds of their scenarios, and how to replay one; `None` where all were kept.
     #[must_use]
     pub fn accusation(&self) -> Option<String> {
-        let (first, _) = self.violations.first()?;
-        let listed = self.violations.iter().take(MOST_LISTED);
-        let lines: Vec<String> = listed.map(|(seed, violation)| format!("  seed {seed}: {violation}")).collect();
-        Some(format!(
-            "{} promises broken:\n{}\nreplay one: vergence soak --only {first}",
-            self.violations.len(),
-            lines.join("\n")
-        ))
+        accusation(&self.violations, "vergence soak --only")
     }
+}
+
+/// The first of broken promises with the seeds of their scenarios, and by which command to replay one; `None` where all were kept.
+pub(crate) fn accusation<V: Display>(violations: &[(u64, V)], replay: &str) -> Option<String> {
+    let (first, _) = violations.first()?;
+    let listed = violations.iter().take(MOST_LISTED);
+    let lines: Vec<String> = listed.map(|(seed, violation)| format!("  seed {seed}: {violation}")).collect();
+    let count = violations.len();
+    Some(format!("{count} promises broken:\n{}\nreplay one: {replay} {first}", lines.join("\n")))
 }

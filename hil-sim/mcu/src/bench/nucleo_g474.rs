@@ -27,6 +27,12 @@ impl BenchWiring {
         }))
     }
 
+    /// The wiring of a robot: servos on their bus, and none of the stages' lines.
+    #[must_use]
+    pub fn nucleo_g474_robot() -> Self {
+        Self::with(Vec::new())
+    }
+
     fn with(axes: Vec<AxisWiring>) -> Self {
         Self {
             axes,
@@ -35,6 +41,7 @@ impl BenchWiring {
             emergency_stop: switch(C + 4, true),
             camera_trigger: Pin::at(B + 6),
             driver_line: UartId::UART4,
+            servo_bus: UartId::USART3,
             encoder_bus: SpiId::SPI1,
         }
     }

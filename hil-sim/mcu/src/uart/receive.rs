@@ -30,9 +30,14 @@ impl Uart {
             let cycles =
                 u128::from(half_bits) * u128::from(moment.clocks.tree.hclk) / (2 * u128::from(frame.baud.max(1)));
             self.arriving = Some((frame, Shifting { byte: frame.byte, ends: now + cycles as Cycle }));
-            self.idle_at = None;
-            self.timeout_at = None;
+            self.line_is_busy();
         }
+    }
+
+    /// A frame begins: the line is not idle.
+    pub(super) fn line_is_busy(&mut self) {
+        self.idle_at = None;
+        self.timeout_at = None;
     }
 
     pub(super) fn advance_receiving(&mut self, moment: Moment) {
@@ -87,7 +92,8 @@ impl Uart {
         }
     }
 
-    fn expect_idle(&mut self, moment: Moment, sampled: Cycle) {
+    /// Expects silence after a frame whose stop bit was sampled at `sampled`.
+    pub(super) fn expect_idle(&mut self, moment: Moment, sampled: Cycle) {
         // From the middle of the stop bit: its second half, then a whole frame of ones.
         self.idle_at = Some(sampled + self.half_bits(moment, 1 + 2 * self.frame_bits()));
         let bits = u64::from(self.rtor & 0xFF_FFFF);

@@ -43,8 +43,16 @@ impl Uart {
             && let Some(byte) = self.outbox.pop_front()
         {
             let begins = now.max(self.idle_until);
+            if self.hears_itself() {
+                self.line_is_busy();
+            }
             self.sending = Some(Shifting { byte, ends: begins + self.half_bits(moment, 2 * self.frame_bits()) });
         }
+    }
+
+    /// Whether the receiver is on the one wire with the transmitter.
+    fn hears_itself(&self) -> bool {
+        self.cr3 & cr3::HDSEL != 0 && self.is_on(cr1::RE)
     }
 
     pub(super) fn advance_sending(&mut self, moment: Moment) {
@@ -54,8 +62,9 @@ impl Uart {
                 self.sent.push((ends, byte));
             }
             // On one wire the receiver receives from its own transmitter (§37.5.15).
-            if self.cr3 & cr3::HDSEL != 0 && self.is_on(cr1::RE) {
+            if self.hears_itself() {
                 self.take(moment, byte, 0);
+                self.expect_idle(moment, ends.saturating_sub(self.half_bits(moment, 1)));
             }
             self.send_next(moment, ends);
             if self.sending.is_none() {

@@ -31,7 +31,7 @@ impl AxisPlant {
     /// Reads this kind of encoder from now on, as the native board does.
     pub(crate) fn use_encoder(&mut self, kind: EncoderKind) {
         match kind {
-            EncoderKind::Quadrature => self.reader = None,
+            EncoderKind::Quadrature | EncoderKind::Servo => self.reader = None,
             EncoderKind::As5048a => self.reader = self.reader.or(Some(As5048a::default())),
         }
     }

@@ -109,6 +109,9 @@ impl<M: Mechanism> ServoBus<M> {
 
     /// Lets the mechanics move until `to`.
     pub fn advance(&mut self, to: Nanoseconds) {
+        if self.servos.is_empty() {
+            return;
+        }
         while self.stepped_to.plus(STEP) <= to {
             self.stepped_to = self.stepped_to.plus(STEP);
             self.steps += 1;
@@ -192,9 +195,11 @@ impl<M: Mechanism> ServoBus<M> {
         self.busy_until = end;
         let sender = (talkers == 1).then_some(place);
         // Before the others hear the end of the packet its sender has finished.
-        for speaking in &mut self.speaking {
+        for (servo, speaking) in self.servos.iter_mut().zip(&mut self.speaking) {
             if speaking.as_ref().is_some_and(|answer| answer.bytes.is_empty()) {
                 *speaking = None;
+                // It has not heard its own part of a combined answer, and waits for no rest of it.
+                servo.line_is_quiet();
             }
         }
         self.deliver(Heard { at: end, byte: byte.byte, baud: byte.baud, is_damaged: byte.is_damaged }, sender);

@@ -17,6 +17,7 @@ mod master;
 mod model;
 mod motor;
 mod registers;
+mod wire;
 
 pub use bus::{Free, Mechanism, ServoBus, ServoMoment};
 pub use device::{Answer, Heard, Servo};
@@ -27,3 +28,4 @@ pub use master::Master;
 pub use model::ServoModel;
 pub use motor::{Drive, Motor};
 pub use registers::Registers;
+pub use wire::Wire;

@@ -11,12 +11,17 @@ type Joints = SVector<f64, JOINTS>;
 const CLOSURE: f64 = 1e6;
 /// Weight that holds passive joints where they are, so that a singular shape has an answer.
 const HOLD: f64 = 1e-4;
-const MOST_STEPS: usize = 12;
+const MOST_STEPS: usize = 40;
 const SETTLED: f64 = 1e-10;
 /// A loop that is not closed so far, by [`Loop::closure_error`], is no answer.
 const CLOSED: f64 = 1e-9;
-/// Steps that close what the weights leave open.
-const CLOSING_STEPS: usize = 4;
+/// Steps that close what the weights leave open: a few, but at a dead centre each only quarters it.
+const CLOSING_STEPS: usize = 40;
+/// Keeps a singular shape solvable. Far below the square of what a joint is off a dead centre where the loop is closed to
+/// [`CLOSED`], lest the last steps crawl.
+const SINGULAR: f64 = 1e-13;
+/// What is closed well enough.
+const TIGHT: f64 = 1e-11;
 /// Joint E is kept this far, in radians, from a straight line on the outer side: at the dead centre the loop could turn in on
 /// itself as well. A stop of that joint, assumed, keeps it from going further.
 const CONVEX: f64 = 1e-3;
@@ -65,10 +70,14 @@ fn settle(linkage: &Loop<JOINTS>, start: &[f64; JOINTS], wanted: &[Option<f64>; 
 /// Closes what is left with the least motion of all joints.
 fn put_together(linkage: &Loop<JOINTS>, angles: &mut [f64; JOINTS]) {
     for _ in 0..CLOSING_STEPS {
+        let left = residual(linkage, angles);
+        if left.amax() < TIGHT {
+            break;
+        }
         let twists = linkage.twists(angles);
-        let gram = twists * twists.transpose() + SMatrix::<f64, 6, 6>::identity() * 1e-9;
+        let gram = twists * twists.transpose() + SMatrix::<f64, 6, 6>::identity() * SINGULAR;
         let Some(factors) = gram.cholesky() else { break };
-        let step = -twists.transpose() * factors.solve(&residual(linkage, angles));
+        let step = -twists.transpose() * factors.solve(&left);
         angles.iter_mut().zip(step.iter()).for_each(|(angle, by)| *angle += by);
     }
 }

@@ -9,6 +9,7 @@
 mod closing;
 mod collision;
 mod play;
+mod servos;
 
 use std::f64::consts::{PI, TAU};
 
@@ -19,6 +20,7 @@ use vergence_vision::{Base, Left, Right, Transform};
 use closing::close;
 pub use collision::Collision;
 pub use play::Play;
+pub use servos::{DrivenTrunk, FIRST_SERVO_ID, joint_settings, trunk_servos};
 
 const JOINTS: usize = TrunkJoint::COUNT;
 const DRIVEN: usize = TrunkJoint::DRIVEN.len();
@@ -61,26 +63,31 @@ impl Trunk {
     /// The paper's trunk at rest, flat with all corners at 120 degrees (spider). `seed` decides the play of its joints.
     #[must_use]
     pub fn new(mechanics: TrunkMechanics, seed: u64) -> Self {
-        let spider = [120_f64.to_radians(); 6];
-        Self::shaped(mechanics, Play::of_seed(seed), &vergence_rig::linkage::Corners(spider))
+        Self::built((TrunkLinks::default(), TrunkCameras::default()), mechanics, Play::of_seed(seed))
+    }
+
+    /// A trunk that was built otherwise than the paper's: its links and mounts, its mechanics, the play of its joints. At rest, flat
+    /// with all corners at 120 degrees.
+    #[must_use]
+    pub fn built(
+        (links, cameras): (TrunkLinks, TrunkCameras),
+        mechanics: TrunkMechanics,
+        play: [Play; DRIVEN],
+    ) -> Self {
+        let corners = vergence_rig::linkage::Corners([120_f64.to_radians(); 6]);
+        let (linkage, angles) = (trunk(&links), corners.trunk_angles());
+        Self { linkage, cameras, mechanics, play, angles, strain: [0.0; DRIVEN] }
     }
 
     /// A trunk without play, for tests.
     #[must_use]
     pub fn tight(mechanics: TrunkMechanics) -> Self {
-        let spider = [120_f64.to_radians(); 6];
-        Self::shaped(mechanics, [Play::NONE; DRIVEN], &vergence_rig::linkage::Corners(spider))
+        Self::built((TrunkLinks::default(), TrunkCameras::default()), mechanics, [Play::NONE; DRIVEN])
     }
 
-    fn shaped(mechanics: TrunkMechanics, play: [Play; DRIVEN], corners: &vergence_rig::linkage::Corners) -> Self {
-        Self {
-            linkage: trunk(&TrunkLinks::default()),
-            cameras: TrunkCameras::default(),
-            mechanics,
-            play,
-            angles: corners.trunk_angles(),
-            strain: [0.0; DRIVEN],
-        }
+    /// Loads the driven joints from now on, in newton metres towards larger joint angles.
+    pub fn set_loads(&mut self, loads: [f64; DRIVEN]) {
+        self.mechanics.loads = loads;
     }
 
     /// The servos' outputs, in radians, that hold the trunk as it stands without play.

@@ -191,7 +191,7 @@ pub const CAUGHT: &[Mutation] = &[
     planted(
         "settings are not saved",
         "node/requests.rs",
-        "settings_store::save(services.settings_flash(), &self.settings).map_err(|_| Refusal::StorageFailed)?;",
+        "settings_store::save(services.settings_flash(), &self.next_settings()).map_err(|_| Refusal::StorageFailed)?;",
         "let _ = services;",
     ),
     planted(

@@ -362,7 +362,7 @@ impl Servo {
 fn with_next_id(bytes: &[u8]) -> Vec<u8> {
     let mut bytes = bytes.to_vec();
     if let Some(id) = bytes.get_mut(4) {
-        *id = (*id + 1) % (Id::MAX + 1);
+        *id = id.wrapping_add(1) % (Id::MAX + 1);
     }
     let end = bytes.len().saturating_sub(2);
     bytes.truncate(end);
