@@ -24,6 +24,7 @@ mod ray_map;
 mod residuals;
 mod result;
 mod stage;
+mod trunk;
 mod verdict;
 
 use vergence_calibration::{TargetSpec, Validation};
@@ -36,10 +37,11 @@ pub use images::ReportImage;
 pub use intrinsics::{intrinsics_report, intrinsics_verdict};
 pub use result::{
     extrinsics_json, extrinsics_lines, fixed_pair, held_out_json, held_out_line, intrinsics_json, intrinsics_lines,
-    stage_json, stage_lines,
+    stage_json, stage_lines, trunk_json, trunk_lines,
 };
 pub use stage::stage_report;
-pub use verdict::{Verdict, stage_verdict};
+pub use trunk::trunk_report;
+pub use verdict::{Verdict, stage_verdict, trunk_verdict};
 
 /// Origin of a report, and what it shows besides the calibration. Texts may hold any characters: they are escaped.
 #[derive(Clone, Debug, Default, PartialEq)]

@@ -160,7 +160,7 @@ fn pose_table(poses: &[StagePoseFigures]) -> String {
     table(&["Encoders read", "rms (px)", "rotation (°)", "position (mm)"], &rows) + &note(explanation)
 }
 
-fn held_out_table(held_out: &[HeldOutPose]) -> String {
+pub(crate) fn held_out_table(held_out: &[HeldOutPose]) -> String {
     if held_out.is_empty() {
         return note("None: at least four stage poses are needed to leave one out.");
     }

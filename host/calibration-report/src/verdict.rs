@@ -2,7 +2,7 @@
 
 use vergence_calibration::StageCalibration;
 use vergence_page::{fixed, significant};
-use vergence_rig::Rig;
+use vergence_rig::{Mode, Rig};
 use vergence_vision::Length;
 
 use crate::depth::{DepthError, UncertainPair};
@@ -73,10 +73,53 @@ pub(crate) fn in_modes(stage: &StageCalibration, rig: &Rig) -> Vec<(String, Dept
     poses.into_iter().map(depth).collect()
 }
 
+/// The depth error of a calibrated `rig` with a trunk in each of its modes, by its joints alone.
+pub(crate) fn in_modes_of_rig(rig: &Rig) -> Vec<(String, DepthError)> {
+    let depth = |mode: &Mode| {
+        let values: Vec<f64> = mode.targets.iter().map(|target| target.value()).collect();
+        let pose = rig.pose_read_at(&values);
+        let pair = UncertainPair {
+            left: &rig.left_camera,
+            right: &rig.right_camera,
+            left_from_right: pose.left_from_right,
+            covariance: pose.covariance(),
+        };
+        (mode.name.clone(), DepthError::of(&pair, RANGE_MM))
+    };
+    rig.modes.iter().map(depth).collect()
+}
+
 /// Verdict of a calibrated stage in the modes of `rig`.
 #[must_use]
 pub fn stage_verdict(stage: &StageCalibration, rig: &Rig) -> Verdict {
-    let modes = in_modes(stage, rig);
+    let open = match stage.observability.weak.len() {
+        0 => String::new(),
+        1 => " One combination of the mechanism's unknowns is known from the drawing only.".into(),
+        more => format!(" {more} combinations of the mechanism's unknowns are known from the drawing only."),
+    };
+    of_modes(&in_modes(stage, rig), &open)
+}
+
+/// Verdict of a rig with a calibrated trunk in its modes.
+#[must_use]
+pub fn trunk_verdict(rig: &Rig) -> Verdict {
+    let near = |mode: &&Mode| {
+        let values: Vec<f64> = mode.targets.iter().map(|target| target.value()).collect();
+        rig.trunk.as_ref().is_some_and(|trunk| trunk.is_near_dead_centre(&values))
+    };
+    let names: Vec<&str> = rig.modes.iter().filter(near).map(|mode| mode.name.as_str()).collect();
+    let note = match names.as_slice() {
+        [] => String::new(),
+        names => format!(
+            " Near a dead centre ({}) joints tell little: there a cloud's pose comes from its images.",
+            names.join(", ")
+        ),
+    };
+    of_modes(&in_modes_of_rig(rig), &note)
+}
+
+/// Verdict of the depth errors of several modes, and what else is to say.
+fn of_modes(modes: &[(String, DepthError)], note: &str) -> Verdict {
     let ahead: Vec<(&str, f64)> =
         modes.iter().filter_map(|(name, depth)| Some((name.as_str(), depth.ahead()?.1))).collect();
     let weakest = modes
@@ -93,12 +136,7 @@ pub fn stage_verdict(stage: &StageCalibration, rig: &Rig) -> Verdict {
         let comma = if index == 0 { "" } else { ", " };
         sentence += &format!("{comma}{} mm{at} in {name}", significant(*mm, 2));
     }
-    let open = match stage.observability.weak.len() {
-        0 => String::new(),
-        1 => " One combination of the mechanism's unknowns is known from the drawing only.".into(),
-        more => format!(" {more} combinations of the mechanism's unknowns are known from the drawing only."),
-    };
-    sentence += &format!("; weakest: {mode}, {}, {} mm.{open}", to_the_side(worst_at), significant(worst, 2));
+    sentence += &format!("; weakest: {mode}, {}, {} mm.{note}", to_the_side(worst_at), significant(worst, 2));
     let typical = ahead.iter().map(|(_, mm)| *mm).fold(0.0, f64::max);
     Verdict { sentence, depth_sigma: Some(Length::from_mm(typical)), worst_sigma: Some(Length::from_mm(worst)) }
 }

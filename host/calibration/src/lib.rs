@@ -17,6 +17,7 @@ pub mod schur_lm;
 mod stage;
 mod stage_plan;
 mod target;
+mod trunk;
 mod uncertainty;
 mod validation;
 
@@ -40,5 +41,9 @@ pub use stage::{
 };
 pub use stage_plan::stage_plan;
 pub use target::{Corner, Target, TargetSpec, TargetView};
+pub use trunk::{
+    PlayFound, TrunkCalibration, TrunkParameterFigures, TrunkPoseFigures, calibrate_trunk, largest_trunk_sigma,
+    validate_trunk,
+};
 pub use uncertainty::{MapPoint, RayCovariance, RayUncertainty};
 pub use validation::{HeldOutPose, HeldOutView, Validation, validate_extrinsics, validate_intrinsics, validate_stage};

@@ -4,7 +4,7 @@ use std::path::Path;
 
 use serde_json::{Map, Value, json};
 use vergence_pipeline::{Dropped, PairCloud};
-use vergence_rig::{Rig, rounded};
+use vergence_rig::{Rig, RigPose, rounded};
 use vergence_vision::{FusedPose, PoseDrift};
 
 /// Where a pose comes from.
@@ -45,19 +45,28 @@ pub fn drift_warning(cloud: &PairCloud, source: PoseSource) -> Option<String> {
     })
 }
 
-/// Where the pose of a cloud comes from, and how many of its six components the joints and the images told.
+/// The relative pose of a cloud with its covariance, where it comes from, and how many of its six components the joints and the images
+/// told. `pose` is that by which the cloud was made.
 #[must_use]
-pub fn pose_source_json(fused: Option<&FusedPose>) -> Value {
-    match fused {
+pub fn pose_source_json(pose: &RigPose, fused: Option<&FusedPose>) -> Value {
+    let mut told = match fused {
         None => json!({ "from": "joints" }),
         Some(fused) => json!({
             "from": "joints and images",
             "told_by_joints": rounded(fused.told_by_joints()),
             "told_by_images": rounded(fused.told_by_images),
-            "rotation_sigma_deg": rounded(fused.rotation_sigma().deg()),
             "agreeing_matches": rounded(fused.agreeing),
+            "match_variance_factor": rounded(fused.variance_factor),
         }),
-    }
+    };
+    told["rotation_sigma_deg"] = rounded(pose.rotation_sigma.deg()).into();
+    told["left_from_right"] = json!({
+        "origin_mm": pose.left_from_right.origin().mm().as_slice(),
+        "rotation_vector": pose.left_from_right.rotation().scaled_axis().as_slice(),
+    });
+    let rows: Vec<Vec<f64>> = pose.covariance().row_iter().map(|row| row.iter().copied().collect()).collect();
+    told["covariance"] = json!(rows);
+    told
 }
 
 /// A line about the pose, where the images told a part of it.
@@ -72,6 +81,22 @@ pub fn pose_source_line(fused: Option<&FusedPose>) -> Option<String> {
     ))
 }
 
+/// A line where the uncertainty of the points lacks the part of the calibration.
+#[must_use]
+pub fn calibration_line(is_calibration_known: bool) -> Option<String> {
+    (!is_calibration_known).then(|| {
+        "  calibration uncertainty unknown: sigma tells of pixels and encoders alone; calibrate, or state [calibration_sigma] in \
+         the rig file"
+            .into()
+    })
+}
+
+/// Whether the uncertainty of the points has the part of the calibration.
+#[must_use]
+pub const fn calibration_json(is_calibration_known: bool) -> &'static str {
+    if is_calibration_known { "included" } else { "unknown" }
+}
+
 /// `{"keypoints": {...}, "matches": {...}}`, each with a count for every reason that occurred.
 #[must_use]
 pub fn dropped_json(dropped: &Dropped) -> Value {
@@ -80,9 +105,9 @@ pub fn dropped_json(dropped: &Dropped) -> Value {
     json!({ "keypoints": keypoints, "matches": matches })
 }
 
-/// What is counted of a cloud that was written to `out`, and its drift.
+/// What is counted of a cloud that was written to `out`, the `pose` by which it was made, and its drift.
 #[must_use]
-pub fn cloud_json(cloud: &PairCloud, out: &Path) -> Value {
+pub fn cloud_json(cloud: &PairCloud, pose: &RigPose, out: &Path) -> Value {
     let drift = cloud.pose_drift.as_ref().map(|drift| {
         json!({
             "deg": rounded(drift.angle.deg()),
@@ -95,8 +120,9 @@ pub fn cloud_json(cloud: &PairCloud, out: &Path) -> Value {
         "matches": cloud.matches,
         "keypoints": cloud.keypoints,
         "dropped": dropped_json(&cloud.dropped),
-        "pose": pose_source_json(cloud.fused_pose.as_ref()),
+        "pose": pose_source_json(pose, cloud.fused_pose.as_ref()),
         "pose_drift": drift,
+        "calibration_uncertainty": calibration_json(!cloud.lacks_calibration),
         "out": out,
     })
 }

@@ -18,7 +18,8 @@ mod points;
 mod target_sheet;
 
 pub use cloud_report::{
-    PoseSource, cloud_json, drift_warning, dropped_json, dropped_lines, pose_source_json, pose_source_line,
+    PoseSource, calibration_json, calibration_line, cloud_json, drift_warning, dropped_json, dropped_lines,
+    pose_source_json, pose_source_line,
 };
 pub use dense_cloud::DenseCloud;
 pub use endings::{check_ending, check_folder};
@@ -27,5 +28,5 @@ pub use pictures::{
     ZonesOf, confidence_image, dense_svg, depth_field_svg, depth_svg, error_svg, match_svg, range_image, seen_by_cones,
     sigma_image, trunk_strip_svg, write_drawing, write_scored_pair, zones_plot, zones_svg,
 };
-pub use points::{DenseRow, Table, TableFormat, dense_ply, ply, write_cloud};
+pub use points::{DenseRow, PlyEncoding, Table, TableFormat, dense_ply, ply, write_cloud};
 pub use target_sheet::{Paper, Sheet};

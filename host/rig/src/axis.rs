@@ -123,6 +123,10 @@ pub struct RigAxis {
     pub play: f64,
     /// Error of the encoder's scale over the travel.
     pub pitch: PitchTable,
+    /// The position where the encoder reads zero, in millimetres or radians.
+    pub zero: f64,
+    /// Whether the encoder counts down while the position rises, as a servo that is mounted upside down.
+    pub reversed: bool,
 }
 
 impl RigAxis {
@@ -146,12 +150,24 @@ impl RigAxis {
         unit / f64::from(self.counts_per_unit)
     }
 
-    /// The position in millimetres or radians at `counts`, which may be interpolated, corrected by the table of its pitch.
+    /// One where the encoder counts up while the position rises, otherwise minus one.
+    #[must_use]
+    pub const fn direction(&self) -> f64 {
+        if self.reversed { -1.0 } else { 1.0 }
+    }
+
+    /// The position in millimetres or radians at `counts`, which may be interpolated, corrected by the table of its pitch, the
+    /// direction and the zero of its encoder.
     ///
     /// The encoder changes to n when n is reached from below, so the middle of a count is half a count further.
     #[must_use]
     pub fn value_at(&self, counts: f64) -> f64 {
-        self.pitch.truth((counts + 0.5) * self.value_per_count())
+        self.zero + self.direction() * self.pitch.truth((counts + 0.5) * self.value_per_count())
+    }
+
+    /// What the encoder says, in millimetres or radians, at the position `value`.
+    fn encoder(&self, value: f64) -> f64 {
+        self.pitch.encoder(self.direction() * (value - self.zero))
     }
 
     /// Standard deviation in counts of the stage beside its encoder's reading, whose own is `reading` counts. A stage with play
@@ -164,7 +180,7 @@ impl RigAxis {
     /// The counts, with a fraction, at `value` in millimetres or radians: the inverse of [`Self::value_at`].
     #[must_use]
     pub fn counts_at(&self, value: f64) -> f64 {
-        self.pitch.encoder(value) / self.value_per_count() - 0.5
+        self.encoder(value) / self.value_per_count() - 0.5
     }
 
     /// The position in millimetres or radians at `micro` in micrometres or microradians, which may be a fraction.
@@ -179,7 +195,7 @@ impl RigAxis {
     /// The position that the board must be sent to, by its encoder, so that the stage is at `position`.
     #[must_use]
     pub fn wire_position(&self, position: AxisPosition) -> Micro {
-        AxisPosition::from_value(self.kind, self.pitch.encoder(position.value())).micro()
+        AxisPosition::from_value(self.kind, self.encoder(position.value())).micro()
     }
 
     /// The position at whole `counts`.

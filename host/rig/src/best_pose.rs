@@ -7,7 +7,7 @@ use crate::axis::AxisPosition;
 use crate::depth_field::DepthField;
 use crate::goal::{DepthGoal, DepthSigma};
 use crate::in_json::{axes_json, rounded};
-use crate::linkage::Corners;
+use crate::linkage::TrunkShape;
 use crate::rig::Rig;
 
 /// Step of the azimuths at which the goal is checked.
@@ -158,7 +158,9 @@ impl<'a> SearchSpace<'a> {
     /// Positions of all axes at a place of the space.
     fn values(&self, place: &[f64]) -> Vec<f64> {
         match (&self.rig.trunk, place) {
-            (Some(trunk), [side]) => trunk.values_of(&Corners::alike(*side), self.rig.axes.len()),
+            (Some(trunk), [side]) => {
+                trunk.values_of(&TrunkShape::alike(*side, std::f64::consts::PI), self.rig.axes.len())
+            }
             _ => place.to_vec(),
         }
     }

@@ -1,9 +1,7 @@
 //! Prediction of the uncertainty of depth, before anything moves.
 
 use nalgebra::{Matrix3, Vector3};
-use vergence_vision::{
-    Angle, Base, Left, Length, PlacedCamera, Point, PointUncertainty, SharedCovariance, StereoPair, Transform,
-};
+use vergence_vision::{Angle, Base, Left, Length, PlacedCamera, Point, PointUncertainty, StereoPair, Transform};
 
 use crate::pose::RigPose;
 use crate::rig::Rig;
@@ -13,7 +11,6 @@ use crate::rig::Rig;
 pub struct DepthField<'a> {
     rig: &'a Rig,
     pose: RigPose,
-    shared: SharedCovariance,
     pixel_sigma: f64,
 }
 
@@ -35,9 +32,13 @@ impl<'a> DepthField<'a> {
     /// deviation of `pixel_sigma` pixels in each coordinate of each image.
     #[must_use]
     pub fn new(rig: &'a Rig, values: &[f64], pixel_sigma: f64) -> Self {
-        let pose = rig.pose_read_at(values);
-        let shared = SharedCovariance::exact().with_pose(&pose.covariance);
-        Self { rig, pose, shared, pixel_sigma }
+        Self::of_pose(rig, rig.pose_read_at(values), pixel_sigma)
+    }
+
+    /// The same for cameras in `pose`, with its covariance.
+    #[must_use]
+    pub fn of_pose(rig: &'a Rig, pose: RigPose, pixel_sigma: f64) -> Self {
+        Self { rig, pose, pixel_sigma }
     }
 
     /// The pose of the prediction.
@@ -82,7 +83,7 @@ impl<'a> DepthField<'a> {
             right: &self.rig.right_camera,
             left_from_right: self.pose.left_from_right,
         };
-        let in_left = PointUncertainty::of(&point, &pair, self.pixel_sigma)?.covariance(&self.shared);
+        let in_left = PointUncertainty::of(&point, &pair, self.pixel_sigma)?.covariance(&self.pose.shared);
         let turn = self.pose.base_from_left.rotation().to_rotation_matrix();
         let covariance = turn * in_left * turn.transpose();
         let along = |axis: Vector3<f64>| Length::from_mm((axis.dot(&(covariance * axis))).max(0.0).sqrt());

@@ -2,6 +2,7 @@
 
 mod modes;
 mod trunk;
+mod trunk_values;
 
 use nalgebra::{Unit, UnitQuaternion, Vector3};
 use serde::Deserialize;
@@ -11,11 +12,12 @@ use vergence_vision::{Angle, Frame, InvalidLens, KannalaBrandt, Length, Point, T
 use self::modes::ModesFile;
 pub(crate) use self::trunk::TrunkFile;
 use crate::axis::{AxisPosition, RigAxis};
+use crate::calibration::{CalibrationTables, RigCalibration, SigmaFile};
 use crate::camera_file::{CameraTable, Provenance};
 use crate::chain::{Chain, Link, Screw};
 use crate::pitch::PitchTable;
 use crate::rig::Rig;
-use crate::text::{quantities, quantity};
+use crate::text::quantities;
 use crate::trunk::RigTrunk;
 
 /// The reason why a rig file is refused.
@@ -52,8 +54,8 @@ struct RigFile {
     left: SideFile,
     right: SideFile,
     trunk: Option<TrunkFile>,
-    #[serde(default)]
-    calibration_sigma: SigmaFile,
+    calibration_sigma: Option<SigmaFile>,
+    calibration: Option<CalibrationTables>,
     /// Information for people; nothing depends on it.
     #[serde(default)]
     #[allow(dead_code, reason = "checked for its form only")]
@@ -71,6 +73,9 @@ struct AxisFile {
     counts_per_revolution: Option<u32>,
     play: Option<String>,
     pitch_error: Option<Vec<[String; 2]>>,
+    zero: Option<String>,
+    #[serde(default)]
+    reversed: bool,
 }
 
 #[derive(Clone, Copy, Deserialize)]
@@ -110,22 +115,6 @@ struct ScrewFile {
     through: [Length; 3],
 }
 
-/// Standard deviations of the calibrated pose. The default is the bench's calibration goal.
-#[derive(Deserialize)]
-#[serde(deny_unknown_fields, default)]
-struct SigmaFile {
-    #[serde(deserialize_with = "quantity")]
-    rotation: Angle,
-    #[serde(deserialize_with = "quantity")]
-    translation: Length,
-}
-
-impl Default for SigmaFile {
-    fn default() -> Self {
-        Self { rotation: Angle::from_deg(0.02), translation: Length::from_mm(0.1) }
-    }
-}
-
 impl Rig {
     /// Parses and checks the content of a rig file.
     ///
@@ -157,7 +146,7 @@ impl Rig {
             )));
         }
         let trunk = trunk(&file, &axes)?;
-        Ok(Self {
+        let rig = Self {
             name: file.name,
             modes: modes::modes(&file.modes, &axes)?,
             left_camera: camera("left", &file.left.camera)?,
@@ -166,9 +155,18 @@ impl Rig {
             left_chain: chain("left", &file.left, &axes)?,
             right_chain: chain("right", &file.right, &axes)?,
             trunk,
-            calibration_sigma: (file.calibration_sigma.rotation, file.calibration_sigma.translation),
+            calibration: RigCalibration::Unknown,
             axes,
-        })
+        };
+        let calibration = match (&file.calibration, &file.calibration_sigma) {
+            (Some(_), Some(_)) => {
+                return Err(contradiction("[calibration] beside [calibration_sigma]: leave one of them out".into()));
+            }
+            (Some(table), None) => table.calibration(&rig)?,
+            (None, Some(sigma)) => sigma.calibration()?,
+            (None, None) => RigCalibration::Unknown,
+        };
+        Ok(Self { calibration, ..rig })
     }
 }
 
@@ -223,8 +221,24 @@ fn axis(file: &AxisFile) -> Result<RigAxis, RigError> {
     if !(0.0..=range[1].value() - range[0].value()).contains(&play) {
         return Err(contradiction(format!("{place} must not be negative, nor more than its range")));
     }
+    let place = format!("zero of axis '{name}'");
+    let zero = file.zero.as_ref().map(|zero| position(kind, zero, &place)).transpose()?;
+    if zero.is_some_and(|zero| zero.micro().0.unsigned_abs() > LONGEST) {
+        return Err(contradiction(format!("{place} is more than 100 m or 100 rad")));
+    }
+    let zero = zero.map_or(0.0, AxisPosition::value);
     let pitch = file.pitch_error.as_ref().map_or(Ok(PitchTable::default()), |entries| pitch(kind, entries, name))?;
-    Ok(RigAxis { name: name.clone(), kind, range, calibrated, counts_per_unit, play, pitch })
+    Ok(RigAxis {
+        name: name.clone(),
+        kind,
+        range,
+        calibrated,
+        counts_per_unit,
+        play,
+        pitch,
+        zero,
+        reversed: file.reversed,
+    })
 }
 
 /// Parses a table of pitch errors: positions by the encoder, and how much further the stage is.

@@ -69,6 +69,13 @@ impl fmt::Display for DepthGoal {
             DepthSigma::Forward => "sigma_z",
             DepthSigma::Range => "sigma_range",
         };
-        write!(f, "{name} <= {} at {} over ±{}", self.limit, self.range, self.half_width)
+        let [limit, range, half_width] = [self.limit.mm(), self.range.mm(), self.half_width.deg()].map(typed);
+        write!(f, "{name} <= {limit} mm at {range} mm over ±{half_width}°")
     }
+}
+
+/// A number as it was typed, without the last digits that the conversion of units has put behind it.
+fn typed(value: f64) -> f64 {
+    const DIGITS: f64 = 1e9;
+    (value * DIGITS).round() / DIGITS
 }

@@ -3,7 +3,7 @@
 use serde_json::{Map, Value, json};
 use vergence_vision::{KannalaBrandt, OpenCvFisheye, Zones};
 
-use crate::{AxisPosition, Rig};
+use crate::{AxisPosition, Rig, RigPose};
 
 /// Rounds for people and programs alike: a tenth of a micrometre or of a thousandth degree is below every encoder.
 #[must_use]
@@ -28,6 +28,46 @@ pub fn zones_json(zones: &Zones) -> Value {
         "stereo": rounded(zones.stereo.deg()),
         "mono": rounded(zones.mono.deg()),
         "blind": rounded(zones.blind.deg()),
+    })
+}
+
+/// What a person should know of a trunk at this pose: that it is near a dead centre, how far its joints' readings are from a closed
+/// loop. `None` where there is nothing to say, and of a rig without a trunk.
+#[must_use]
+pub fn closure_in_words(pose: &RigPose) -> Option<String> {
+    let closure = pose.closure.as_ref()?;
+    let near = closure.is_near_dead_centre.then(|| {
+        format!(
+            "near a dead centre of the trunk: its joints alone tell the pose to {:.2}° and {:.2} mm",
+            pose.rotation_sigma.deg(),
+            pose.translation_sigma.mm()
+        )
+    });
+    let missed = (closure.missed >= TOLD).then(|| {
+        format!(
+            "the joints' readings miss a closed loop by {:.1} of their standard deviations, within noise",
+            closure.missed
+        )
+    });
+    let sentences: Vec<String> = near.into_iter().chain(missed).collect();
+    (!sentences.is_empty()).then(|| sentences.join("; "))
+}
+
+/// A loop that is missed by less than this many standard deviations is not worth a word.
+const TOLD: f64 = 0.05;
+
+/// How the readings of a trunk fit its closed loop, for programs; null of a rig without a trunk.
+#[must_use]
+pub fn closure_json(pose: &RigPose) -> Value {
+    pose.closure.as_ref().map_or(Value::Null, |closure| {
+        json!({
+            "near_dead_centre": closure.is_near_dead_centre,
+            "missed_sigma": rounded(closure.missed),
+            "joints_tell": {
+                "rotation_deg": rounded(pose.rotation_sigma.deg()),
+                "translation_mm": rounded(pose.translation_sigma.mm()),
+            },
+        })
     })
 }
 

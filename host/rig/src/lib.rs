@@ -4,12 +4,13 @@
 //! camera, or a closed loop of links ([`linkage`]), converts positions to `base_from_left` and `base_from_right`, a [`ClockMap`] converts the host's instants to
 //! the board's clock, and a [`JointTrack`] interpolates the counts at that instant. Together they give a [`RigPose`],
 //! or one for every row of the images ([`moving_cloud`]). A [`DepthField`] predicts how well a pose will measure,
-//! before anything moves.
+//! before anything moves, and a [`ModePolicy`] chooses a mode by such predictions.
 //!
 //! Everything is a pure function of its arguments: no file is read here.
 
 mod axis;
 mod best_pose;
+mod calibration;
 mod camera_file;
 mod chain;
 mod clock;
@@ -23,6 +24,7 @@ mod in_json;
 mod interchange;
 pub mod linkage;
 mod mode;
+mod mode_policy;
 mod moving;
 mod pitch;
 mod pose;
@@ -34,6 +36,7 @@ mod trunk;
 
 pub use axis::{AxisPosition, RigAxis, positions_in_words};
 pub use best_pose::RatedPose;
+pub use calibration::{CalibratedNumbers, InvalidCovariance, RigCalibration, RigNumber};
 pub use camera_file::{CalibrationTable, CameraDocument, CameraTable, Provenance};
 pub use chain::{Chain, Link, Screw};
 pub use clock::{BoardInstant, ClockDrift, ClockMap, Exchange, HostInstant};
@@ -43,15 +46,19 @@ pub use exposure_timing::{ExposureTiming, MiddleOfExposure, SequenceWatch, Stamp
 pub use file::RigError;
 pub use goal::{DepthGoal, DepthSigma, InvalidGoal};
 pub use image_pairing::{ExposureDelay, ImagePairing, PairingOutcome, StampedImage, TimedEvent};
-pub use in_json::{axes_json, camera_in_words, camera_json, rounded, zones_json};
+pub use in_json::{axes_json, camera_in_words, camera_json, closure_in_words, closure_json, rounded, zones_json};
 pub use interchange::{Camchain, CameraFormat, InterchangeError, kalibr, opencv};
 pub use mode::{Mode, ReportedMode};
+pub use mode_policy::{ModeChoice, ModeFigures, ModePolicy, PolicyRule, TargetBelief, Task, TaskState};
 pub use moving::{MiddlePose, middle_pose, moving_cloud};
 pub use pitch::{PitchTable, PitchTableError};
 pub use pose::RigPose;
 pub use rig::Rig;
 pub use track::{JointSample, JointTrack, Joints, JointsAt, SteadyMotion, TrackGap};
-pub use trunk::{RigTrunk, TRUNK_AXES};
+pub use trunk::{
+    OpenLoop, RigTrunk, TRUNK_AXES, TRUNK_PARAMETER_NAMES, TRUNK_PARAMETERS, TrunkClosure, TrunkCovariance,
+    TrunkParameterKind, TrunkParameters, TrunkTolerance,
+};
 
 /// The rig file of the built-in bench, as a user would write it.
 pub const BENCH_TOML: &str = include_str!("bench.toml");

@@ -7,7 +7,7 @@ use vergence_vision::{
 use crate::exposure::PairExposure;
 use crate::pose::RigPose;
 use crate::rig::Rig;
-use crate::track::{Joints, JointsAt, TrackGap};
+use crate::track::{Joints, TrackGap};
 
 /// The pose of the cameras at the exposure of the middle rows of a pair.
 #[derive(Clone, Debug, PartialEq)]
@@ -37,7 +37,7 @@ pub fn middle_pose(rig: &Rig, joints: &impl Joints, exposure: &PairExposure) -> 
 /// Triangulates matches of two moving cameras, each with the poses of both cameras at the exposure of its own rows.
 ///
 /// Each match comes with the standard deviation of its positions in pixels. Points are in the frame of the left camera
-/// at its middle row. The covariance of the pose in `gates` is replaced by that of each point's own pose, which grows
+/// at its middle row. The shared covariance in `gates` is replaced by that of each point's own pose, which grows
 /// with the speed of the stages and the uncertainty of the exposure's instant.
 ///
 /// # Errors
@@ -50,12 +50,14 @@ pub fn moving_cloud(
     gates: &Gates,
 ) -> Result<Cloud, TrackGap> {
     let reference_from_base = rig.pose(&joints.at(exposure.left.middle)?).base_from_left.inverse();
+    let calibration = rig.calibration_at(&joints.at(exposure.left.middle)?, &joints.at(exposure.right.middle)?);
     let mut cloud = Cloud::default();
     for (pair_index, (pixels, pixel_sigma)) in pairs.iter().enumerate() {
         let gates = Gates { pixel_sigma: *pixel_sigma, ..*gates };
         let left = joints.at(exposure.left.at_row(pixels.left.v))?;
         let right = joints.at(exposure.right.at_row(pixels.right.v))?;
-        match point(pixels, rig, &reference_from_base, [&left, &right], &gates) {
+        let pose = rig.pose_of_rows(&left, &right, &calibration);
+        match point(pixels, rig, &reference_from_base, &pose, &gates) {
             Ok(point) => cloud.points.push(CloudPoint { pair_index, ..point }),
             Err(reason) => *cloud.dropped.entry(reason).or_default() += 1,
         }
@@ -67,18 +69,18 @@ fn point(
     pixels: &PixelPair,
     rig: &Rig,
     reference_from_base: &Transform<Left, Base>,
-    [left, right]: [&JointsAt; 2],
+    pose: &RigPose,
     gates: &Gates,
 ) -> Result<CloudPoint, DropReason> {
-    let pose = rig.pose_of_each(left, right);
     let pair = StereoPair { left: &rig.left_camera, right: &rig.right_camera, left_from_right: pose.left_from_right };
-    let gates = Gates { shared: gates.shared.with_pose(&pose.covariance), ..*gates };
+    let gates = Gates { shared: pose.shared, ..*gates };
     let point = cloud_point(pixels, &pair, &gates)?;
     let reference_from_left: Transform<Left, Left> = *reference_from_base * pose.base_from_left;
     let turn = reference_from_left.rotation().to_rotation_matrix();
     Ok(CloudPoint {
         point: reference_from_left * point.point,
         covariance: turn * point.covariance * turn.transpose(),
+        own_covariance: turn * point.own_covariance * turn.transpose(),
         ..point
     })
 }

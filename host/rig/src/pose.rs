@@ -1,12 +1,14 @@
 //! The pose of the rig's cameras with its covariance.
 
-use nalgebra::{Matrix6, Vector6};
-use vergence_vision::{Angle, Base, Left, Length, Right, Transform};
+mod trunk;
+
+use nalgebra::{Matrix3, Matrix6, Vector6};
+use vergence_vision::{Angle, Base, Left, Length, Right, SharedCovariance, Transform};
 
 use crate::axis::{AxisPosition, RigAxis};
 use crate::rig::Rig;
 use crate::track::{JointsAt, UNIFORM};
-use crate::trunk::RigTrunk;
+use crate::trunk::{OpenLoop, TrunkClosure};
 
 /// The pose of the rig at one instant, with its uncertainty.
 #[derive(Clone, Debug, PartialEq)]
@@ -21,11 +23,13 @@ pub struct RigPose {
     pub rotation_sigma: Angle,
     /// Standard deviation of the relative translation, from encoders and calibration.
     pub translation_sigma: Length,
-    /// Covariance (6 × 6) of the relative pose, from encoders, their timing and calibration.
-    ///
-    /// Its components are a turn ω about the left axes in radians and a shift δ of the right camera in the left frame
-    /// in millimetres. The calibration's standard deviations apply to each component.
-    pub covariance: Matrix6<f64>,
+    /// Covariance of both lenses and of the relative pose, which all points of a pair share: from calibration, encoders and their
+    /// timing.
+    pub shared: SharedCovariance,
+    /// Whether that has the calibration's part: a rig file may say nothing of it.
+    pub is_calibration_known: bool,
+    /// How the readings fit the closed loop of a trunk; `None` of a rig without one.
+    pub closure: Option<TrunkClosure>,
 }
 
 impl RigPose {
@@ -34,45 +38,66 @@ impl RigPose {
     pub fn right_from_left(&self) -> Transform<Right, Left> {
         self.left_from_right.inverse()
     }
-}
 
-impl RigPose {
+    /// Refuses the pose of a trunk whose loop does not close as its joints read, by more than their noise.
+    ///
+    /// # Errors
+    /// [`OpenLoop`], which names the readings most likely wrong.
+    pub fn check_closure(&self) -> Result<(), OpenLoop> {
+        self.closure.as_ref().map_or(Ok(()), TrunkClosure::check)
+    }
+
+    /// Covariance (6 × 6) of the relative pose: a turn ω about the left axes in radians and a shift δ of the right camera in the left
+    /// frame in millimetres.
+    #[must_use]
+    pub fn covariance(&self) -> Matrix6<f64> {
+        self.shared.pose()
+    }
+
     /// Adds a covariance that is independent of what the pose has.
     fn add_spread(&mut self, spread: &Matrix6<f64>) {
         let part = |first: usize| spread.fixed_view::<3, 3>(first, first).trace().max(0.0).sqrt();
         self.rotation_sigma = Angle::from_rad(self.rotation_sigma.rad().hypot(part(0)));
         self.translation_sigma = Length::from_mm(self.translation_sigma.mm().hypot(part(3)));
-        self.covariance += spread;
+        self.shared = self.shared.plus_pose(spread);
     }
 }
 
 impl Rig {
-    /// The pose with the axes at exactly `values` (millimetres or radians), uncertain by the calibration alone.
+    /// The pose with the axes at exactly `values` (millimetres or radians), uncertain by the calibration alone; of a trunk by the play
+    /// of its joints as well, which is larger than any reading's error.
     #[must_use]
     pub fn pose_at_values(&self, values: &[f64]) -> RigPose {
-        let mut pose = self.calibrated(values);
-        if let Some(trunk) = &self.trunk {
-            // The play of its joints is larger than any reading's error, and is no part of the values.
-            let exactly = vec![0.0; self.axes.len()];
-            let counts = self.axes.iter().zip(values).map(|(axis, &value)| axis.counts_at(value)).collect();
-            let joints = JointsAt { counts, sigma: exactly.clone(), timing: exactly };
-            let spread = self.trunk_spread(trunk, &joints, &joints, &pose.left_from_right);
-            pose.add_spread(&spread);
+        if self.trunk.is_none() {
+            return self.calibrated(values, values, &self.calibration_covariance(values, values));
         }
-        pose
+        let exactly = vec![0.0; self.axes.len()];
+        let counts = self.axes.iter().zip(values).map(|(axis, &value)| axis.counts_at(value)).collect();
+        self.pose(&JointsAt { counts, sigma: exactly.clone(), timing: exactly })
     }
 
-    /// The pose with the axes at exactly `values`, uncertain by the calibration's two numbers.
-    fn calibrated(&self, values: &[f64]) -> RigPose {
-        let (base_from_left, left_from_right) = self.transforms(values, values);
-        let (turn, shift) = (self.calibration_sigma.0.rad().powi(2), self.calibration_sigma.1.mm().powi(2));
+    /// The pose with the axes of the left and of the right camera at exactly these values, uncertain by the calibration; that of a
+    /// trunk's numbers is added with its joints.
+    fn calibrated(&self, left: &[f64], right: &[f64], calibration: &SharedCovariance) -> RigPose {
+        let (base_from_left, left_from_right) = self.transforms(left, right);
+        let mut shared = *calibration;
+        if self.calibrated_trunk().is_some() {
+            shared = shared.with_pose(&Matrix6::zeros());
+        }
+        let covariance = shared.pose();
+        let worst = |first: usize| {
+            let part: Matrix3<f64> = covariance.fixed_view::<3, 3>(first, first).into_owned();
+            part.symmetric_eigenvalues().max().max(0.0).sqrt()
+        };
         RigPose {
             base_from_left,
             left_from_right,
-            axes: self.positions(values),
-            rotation_sigma: self.calibration_sigma.0,
-            translation_sigma: self.calibration_sigma.1,
-            covariance: Matrix6::from_diagonal(&Vector6::new(turn, turn, turn, shift, shift, shift)),
+            axes: self.positions(left),
+            rotation_sigma: Angle::from_rad(worst(0)),
+            translation_sigma: Length::from_mm(worst(3)),
+            shared,
+            is_calibration_known: self.calibration.is_known() || self.calibrated_trunk().is_some(),
+            closure: None,
         }
     }
 
@@ -96,11 +121,25 @@ impl Rig {
     /// The errors of the readings count as common to both instants.
     #[must_use]
     pub fn pose_of_each(&self, left: &JointsAt, right: &JointsAt) -> RigPose {
+        self.pose_of_rows(left, right, &self.calibration_at(left, right))
+    }
+
+    /// What the calibration leaves uncertain with the left camera's axes at `left` and the right one's at `right`.
+    pub(crate) fn calibration_at(&self, left: &JointsAt, right: &JointsAt) -> SharedCovariance {
+        self.calibration_covariance(&self.values(left), &self.values(right))
+    }
+
+    /// [`Self::pose_of_each`], with the `calibration` part as given: it hardly changes from one row of an image to the next.
+    pub(crate) fn pose_of_rows(&self, left: &JointsAt, right: &JointsAt, calibration: &SharedCovariance) -> RigPose {
         let values = [left, right].map(|joints| self.values(joints));
         let exact = self.transforms(&values[0], &values[1]);
-        let mut pose = self.calibrated(&values[0]);
-        (pose.base_from_left, pose.left_from_right) = exact;
-        let corners: &[usize] = self.trunk.as_ref().map_or(&[], |trunk| &trunk.axes[..3]);
+        let mut pose = self.calibrated(&values[0], &values[1], calibration);
+        // Of a trunk the corners are no part of this, and none of its joints once it is calibrated.
+        let corners: &[usize] = match (self.calibrated_trunk(), &self.trunk) {
+            (Some((trunk, _)), _) => &trunk.axes,
+            (None, Some(trunk)) => &trunk.axes[..3],
+            (None, None) => &[],
+        };
         // First the errors of each axis by itself, then that of the instant, which moves all axes together.
         let alone = (0..self.axes.len()).filter(|index| !corners.contains(index)).map(|index| {
             [left, right].map(|joints| {
@@ -114,7 +153,10 @@ impl Rig {
         let (mut rotation, mut translation) = (pose.rotation_sigma.rad(), pose.translation_sigma.mm());
         for counts in alone.chain([together]) {
             let moved = [0, 1].map(|side| {
-                let steps = self.axes.iter().zip(&counts[side]).map(|(axis, counts)| counts * axis.value_per_count());
+                let steps = self.axes.iter().zip(&counts[side]).map(|(axis, counts)| {
+                    // The sign matters where all axes move together.
+                    counts * axis.direction() * axis.value_per_count()
+                });
                 values[side].iter().zip(steps).map(|(value, step)| value + step).collect::<Vec<f64>>()
             });
             let after = self.transforms(&moved[0], &moved[1]).1;
@@ -122,15 +164,41 @@ impl Rig {
             rotation = rotation.hypot(change.rotation().angle());
             translation = translation.hypot(change.origin().mm().norm());
             let twist = difference(&exact.1, &after);
-            pose.covariance += twist * twist.transpose();
+            pose.shared = pose.shared.plus_pose(&(twist * twist.transpose()));
         }
         pose.rotation_sigma = Angle::from_rad(rotation);
         pose.translation_sigma = Length::from_mm(translation);
         if let Some(trunk) = &self.trunk {
             let spread = self.trunk_spread(trunk, left, right, &exact.1);
             pose.add_spread(&spread);
+            let [at_left, at_right] = [left, right].map(|joints| self.closure(trunk, joints));
+            pose.closure = Some(if at_right.missed > at_left.missed { at_right } else { at_left });
         }
         pose
+    }
+
+    /// Standard deviation of the relative rotation at `pose` by its joints alone. That of a calibrated trunk has the part of its
+    /// numbers, which cannot be told apart from play.
+    #[must_use]
+    pub fn rotation_sigma_of_joints(&self, pose: &RigPose) -> Angle {
+        let values: Vec<f64> = pose.axes.iter().map(|axis| axis.value()).collect();
+        let calibration = self.calibrated(&values, &values, &self.calibration_covariance(&values, &values));
+        let (all, calibrated) = (pose.rotation_sigma.rad(), calibration.rotation_sigma.rad());
+        Angle::from_rad((all.powi(2) - calibrated.powi(2)).max(0.0).sqrt())
+    }
+
+    /// How the relative pose changes where the axis `index` is `counts` further than `joints` say: a turn ω and a shift δ as in
+    /// [`RigPose::covariance`], to first order.
+    #[must_use]
+    pub fn pose_change(&self, joints: &JointsAt, index: usize, counts: f64) -> Vector6<f64> {
+        let off = |by: f64| {
+            let mut moved = joints.clone();
+            moved.counts.iter_mut().skip(index).take(1).for_each(|at| *at += by);
+            let values = self.values(&moved);
+            self.transforms(&values, &values).1
+        };
+        let exact = off(0.0);
+        (difference(&exact, &off(counts)) - difference(&exact, &off(-counts))) / 2.0
     }
 
     fn values(&self, joints: &JointsAt) -> Vec<f64> {
@@ -149,46 +217,10 @@ impl Rig {
         };
         (base_from_left, base_from_left.inverse() * base_from_right)
     }
-
-    /// Mean square of the way from the `stated` relative pose to the true one by errors of a trunk's corners.
-    ///
-    /// Near a dead centre the pose is no linear function of them, and leaves the stated one to one side only. So it is taken by
-    /// Gauss-Hermite quadrature with three nodes for each driven corner, and around the stated pose, not around the mean.
-    fn trunk_spread(
-        &self,
-        trunk: &RigTrunk,
-        left: &JointsAt,
-        right: &JointsAt,
-        stated: &Transform<Left, Right>,
-    ) -> Matrix6<f64> {
-        const NODES: [(f64, f64); 3] =
-            [(0.0, 2.0 / 3.0), (1.732_050_807_568_877_2, 1.0 / 6.0), (-1.732_050_807_568_877_2, 1.0 / 6.0)];
-        let values = [left, right].map(|joints| self.values(joints));
-        // A passive joint with play turns the loop as an error of a driven one does.
-        let passive = 0.5 * trunk.passive_play;
-        let sigma = |corner: usize| {
-            let axis = trunk.axes[corner];
-            let reading = left.sigma.get(axis).copied().unwrap_or(0.0);
-            let driven = self.axes.get(axis).map_or(0.0, |axis| axis.sigma_with_play(reading) * axis.value_per_count());
-            driven.hypot(passive)
-        };
-        let sigmas = [0, 1, 2].map(sigma);
-        let mut spread = Matrix6::zeros();
-        for number in 0..27 {
-            let nodes = [number / 9, number / 3 % 3, number % 3].map(|node: usize| NODES[node]);
-            let mut moved = values.clone();
-            for ((&axis, sigma), (node, _)) in trunk.axes.iter().zip(sigmas).zip(nodes) {
-                moved.iter_mut().filter_map(|values| values.get_mut(axis)).for_each(|value| *value += node * sigma);
-            }
-            let twist = difference(stated, &self.transforms(&moved[0], &moved[1]).1);
-            spread += twist * twist.transpose() * nodes.iter().map(|(_, weight)| weight).product::<f64>();
-        }
-        spread
-    }
 }
 
 /// The turn ω and the shift δ from one pose to another.
-fn difference(from: &Transform<Left, Right>, to: &Transform<Left, Right>) -> Vector6<f64> {
+pub(crate) fn difference(from: &Transform<Left, Right>, to: &Transform<Left, Right>) -> Vector6<f64> {
     let turn = (to.rotation() * from.rotation().inverse()).scaled_axis();
     let shift = to.origin().mm() - from.origin().mm();
     Vector6::new(turn.x, turn.y, turn.z, shift.x, shift.y, shift.z)

@@ -2,9 +2,10 @@
 
 use nalgebra::Isometry3;
 use vergence_protocol::{AxisList, Micro, PoseReport};
-use vergence_vision::{Angle, InvalidLens, KannalaBrandt, Left, Length, Right, Side, Transform};
+use vergence_vision::{InvalidLens, KannalaBrandt, Left, Right, Side, Transform};
 
 use crate::axis::{AxisPosition, RigAxis};
+use crate::calibration::RigCalibration;
 use crate::chain::Chain;
 use crate::exposure::Shutter;
 use crate::mode::{Mode, ReportedMode};
@@ -31,21 +32,18 @@ pub struct Rig {
     pub right_chain: Chain<Right>,
     /// The folding trunk that carries the cameras, in place of the screw chains, which then are empty.
     pub trunk: Option<Box<RigTrunk>>,
-    /// Standard deviations of the calibrated relative pose: rotation and translation.
-    pub calibration_sigma: (Angle, Length),
+    /// How far its numbers may be off.
+    pub calibration: RigCalibration,
 }
 
 impl Rig {
     /// Makes a rig without axes, of two cameras whose relative pose is fixed. The base frame is that of the left
-    /// camera.
-    ///
-    /// `sigma` holds the standard deviations of rotation and translation of `left_from_right`.
+    /// camera. Nothing is known of its calibration.
     #[must_use]
     pub fn fixed_pair(
         name: &str,
         (left_camera, right_camera): (KannalaBrandt, KannalaBrandt),
         left_from_right: Transform<Left, Right>,
-        sigma: (Angle, Length),
     ) -> Self {
         Self {
             name: name.to_owned(),
@@ -57,7 +55,7 @@ impl Rig {
             left_chain: Chain::new(Vec::new(), Transform::from_isometry(Isometry3::identity())),
             right_chain: Chain::new(Vec::new(), left_from_right.renamed()),
             trunk: None,
-            calibration_sigma: sigma,
+            calibration: RigCalibration::Unknown,
         }
     }
 
@@ -67,7 +65,13 @@ impl Rig {
     /// Fails if `width` leaves no pixels.
     pub fn with_sensors(self, width: u32) -> Result<Self, InvalidLens> {
         let (left_camera, right_camera) = (self.left_camera.resampled(width)?, self.right_camera.resampled(width)?);
-        Ok(Self { left_camera, right_camera, ..self })
+        let factors = [(&self.left_camera, &left_camera), (&self.right_camera, &right_camera)]
+            .map(|(before, after)| f64::from(after.size().width) / f64::from(before.size().width));
+        let calibration = match self.calibration {
+            RigCalibration::Covariance(found) => RigCalibration::Covariance(found.resampled(factors)),
+            other => other,
+        };
+        Ok(Self { left_camera, right_camera, calibration, ..self })
     }
 
     /// The lens of the camera on `side`.
@@ -120,6 +124,11 @@ impl Rig {
     /// Converts distances to the wire's micrometres and microradians.
     #[must_use]
     pub fn wire_distances(&self, distances: &[AxisPosition]) -> AxisList<Micro> {
-        distances.iter().take(vergence_protocol::MAX_AXES).map(|distance| distance.micro()).collect()
+        let axes = self.axes.iter().take(vergence_protocol::MAX_AXES);
+        let by_encoder = |(axis, distance): (&RigAxis, &AxisPosition)| {
+            let Micro(micro) = distance.micro();
+            Micro(if axis.reversed { micro.saturating_neg() } else { micro })
+        };
+        axes.zip(distances).map(by_encoder).collect()
     }
 }

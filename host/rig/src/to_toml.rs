@@ -7,6 +7,7 @@ use vergence_protocol::AxisKind;
 use vergence_vision::{Angle, Frame, KannalaBrandt, Length};
 
 use crate::axis::{AxisPosition, RigAxis};
+use crate::calibration::{CalibrationTables, RigCalibration};
 use crate::camera_file::{CameraTable, Provenance};
 use crate::chain::{Chain, Link, Screw};
 use crate::exposure::Shutter;
@@ -18,7 +19,10 @@ struct File<'a> {
     name: &'a str,
     axis: Vec<Axis<'a>>,
     modes: BTreeMap<&'a str, ModeTable<'a>>,
-    calibration_sigma: Sigma,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    calibration_sigma: Option<Sigma>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    calibration: Option<CalibrationTables>,
     #[serde(skip_serializing_if = "Option::is_none")]
     trunk: Option<TrunkFile>,
     left: Side<'a>,
@@ -41,6 +45,10 @@ struct Axis<'a> {
     play: Option<String>,
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pitch_error: Vec<[String; 2]>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    zero: Option<String>,
+    #[serde(skip_serializing_if = "std::ops::Not::not")]
+    reversed: bool,
 }
 
 #[derive(Serialize)]
@@ -104,10 +112,13 @@ impl Rig {
                     (mode.name.as_str(), ModeTable { number: mode.number.0, positions })
                 })
                 .collect(),
-            calibration_sigma: Sigma {
-                rotation: angle(self.calibration_sigma.0),
-                translation: length(self.calibration_sigma.1),
+            calibration_sigma: match self.calibration {
+                RigCalibration::Sigmas { rotation, translation } => {
+                    Some(Sigma { rotation: angle(rotation), translation: length(translation) })
+                }
+                _ => None,
             },
+            calibration: CalibrationTables::of(self),
             trunk: self.trunk.as_ref().map(|trunk| TrunkFile::of(trunk, trunk.axes.map(|axis| name(&axis)))),
             left: side(table(&self.left_camera, self.shutters[0]), &self.left_chain, &name, self.trunk.is_none()),
             right: side(table(&self.right_camera, self.shutters[1]), &self.right_chain, &name, self.trunk.is_none()),
@@ -136,6 +147,8 @@ fn axis(axis: &RigAxis) -> Axis<'_> {
             .iter()
             .map(|entry| entry.map(|value| position(AxisPosition::from_value(axis.kind, value))))
             .collect(),
+        zero: (axis.zero != 0.0).then(|| position(AxisPosition::from_value(axis.kind, axis.zero))),
+        reversed: axis.reversed,
         play: (axis.play > 0.0).then(|| position(AxisPosition::from_value(axis.kind, axis.play))),
     }
 }

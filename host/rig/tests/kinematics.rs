@@ -3,8 +3,7 @@
 
 use nalgebra::{Matrix3, Matrix4, Vector3};
 use proptest::prelude::*;
-use vergence_rig::{BENCH_TOML, JointsAt, Rig};
-use vergence_vision::{Angle, Length};
+use vergence_rig::{BENCH_TOML, JointsAt, Rig, RigCalibration};
 
 fn bench() -> Rig {
     Rig::from_toml(BENCH_TOML).expect("the built-in rig is right")
@@ -84,7 +83,7 @@ proptest! {
     #[test]
     fn joint_sigma_becomes_pose_sigma(x in 120_000.0..440_000.0f64, s in 0.0..36_000.0f64, dx in 0.0..50.0f64, ds in 0.0..50.0f64) {
         let mut rig = bench();
-        rig.calibration_sigma = (Angle::from_rad(0.0), Length::from_mm(0.0));
+        rig.calibration = RigCalibration::exact();
         let pose = rig.pose(&JointsAt { counts: vec![x, s], sigma: vec![dx, ds], timing: vec![0.0; 2] });
         // The separation turns the relative pose one to one; both cameras sit on their pinions.
         let turned = ds * std::f64::consts::TAU / 100_000.0;

@@ -4,7 +4,7 @@
 use std::f64::consts::PI;
 
 use proptest::prelude::*;
-use vergence_rig::linkage::{Corners, Loop, SixBarError, TrunkCameras, TrunkJoint, TrunkLinks, trunk};
+use vergence_rig::linkage::{CameraMount, Corners, Loop, SixBarError, TrunkCameras, TrunkJoint, TrunkLinks, trunk};
 
 const FLAT: [TrunkJoint; 2] = [TrunkJoint::RearFold, TrunkJoint::FrontFold];
 
@@ -131,7 +131,7 @@ fn the_modes_have_their_separation_and_baseline() {
         (20.0, -40.0, [100.0, 139.4, 198.5, 207.2]),
     ] {
         let shape = Corners(symmetrical(b).map(f64::to_radians));
-        let bare = |along| TrunkCameras { along, outward: 0.0, ..TrunkCameras::default() };
+        let bare = |along| TrunkCameras::alike(140.0, CameraMount { along, outward: 0.0, ..CameraMount::default() });
         let mounts = [bare(0.0), bare(20.0), bare(50.0), TrunkCameras::default()];
         for (cameras, expected) in mounts.iter().zip(baselines) {
             let [found, baseline] = separation_and_baseline(cameras, &shape);

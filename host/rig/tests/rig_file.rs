@@ -3,7 +3,7 @@
 
 use nalgebra::{Isometry3, Unit, UnitQuaternion, Vector3};
 use proptest::prelude::*;
-use vergence_rig::{AxisPosition, BENCH_TOML, Chain, Link, Provenance, Rig, Screw, Shutter};
+use vergence_rig::{AxisPosition, BENCH_TOML, Chain, Link, Provenance, Rig, RigCalibration, Screw, Shutter};
 use vergence_vision::{Angle, Length, Point, Transform};
 
 fn provenance() -> Provenance {
@@ -20,7 +20,7 @@ fn the_bench_comes_back_as_it_was() {
     let read = read_back(&bench);
     assert_eq!(read.axes, bench.axes);
     assert_eq!(read.modes, bench.modes);
-    assert_eq!(read.calibration_sigma, bench.calibration_sigma);
+    assert_eq!(read.calibration, bench.calibration);
     assert!((read.left_camera.theta_max().rad() - bench.left_camera.theta_max().rad()).abs() < 1e-15);
     // The file is readable for people.
     let text = bench.to_toml(&provenance()).expect("TOML");
@@ -76,14 +76,21 @@ proptest! {
         let links = screws.map(|(axis, screw)| Link { axis, share, screw }).to_vec();
         let at_zero = Isometry3::from_parts(shift.into(), UnitQuaternion::from_scaled_axis(turn));
         rig.right_chain = Chain::new(links, Transform::from_isometry(at_zero));
-        rig.calibration_sigma = (Angle::from_rad(separation * 1e-4), Length::from_mm(share.abs()));
+        rig.calibration = RigCalibration::Sigmas {
+            rotation: Angle::from_rad(separation * 1e-4),
+            translation: Length::from_mm(share.abs()),
+        };
         rig.modes[0].targets = vec![
             AxisPosition::Linear(Length::from_mm(baseline)),
             AxisPosition::Rotary(Angle::from_rad(separation)),
         ];
         let read = read_back(&rig);
         prop_assert_eq!(&read.modes, &rig.modes);
-        prop_assert!((read.calibration_sigma.0.rad() - rig.calibration_sigma.0.rad()).abs() < 1e-15);
+        let sigma = |rig: &Rig| match rig.calibration {
+            RigCalibration::Sigmas { rotation, .. } => rotation.rad(),
+            _ => f64::NAN,
+        };
+        prop_assert!((sigma(&read) - sigma(&rig)).abs() < 1e-15);
         let values = [baseline, separation];
         let [before, after] = [&rig, &read].map(|rig| rig.pose_at_values(&values).left_from_right);
         prop_assert!((before.origin().mm() - after.origin().mm()).norm() < 1e-9);
@@ -97,8 +104,9 @@ fn a_fixed_pair_is_a_rig_without_axes() {
     let rotation = UnitQuaternion::from_scaled_axis(Vector3::new(0.01, 2.0, -0.005));
     let left_from_right: Transform<vergence_vision::Left, vergence_vision::Right> =
         Transform::new(rotation, Vector3::new(140.0, 3.0, -12.0));
-    let sigma = (Angle::from_deg(0.05), Length::from_mm(0.2));
-    let pair = Rig::fixed_pair("pair", (bench.left_camera, bench.right_camera), left_from_right, sigma);
+    let calibration = RigCalibration::Sigmas { rotation: Angle::from_deg(0.05), translation: Length::from_mm(0.2) };
+    let lenses = (bench.left_camera, bench.right_camera);
+    let pair = Rig { calibration, ..Rig::fixed_pair("pair", lenses, left_from_right) };
     let pose = read_back(&pair).pose_at_values(&[]);
     assert!((pose.left_from_right.origin().mm() - Vector3::new(140.0, 3.0, -12.0)).norm() < 1e-12);
     assert!(pose.left_from_right.rotation().angle_to(&rotation) < 1e-12);

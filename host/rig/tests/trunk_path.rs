@@ -40,10 +40,10 @@ fn every_mode_leads_to_every_other_with_a_degree_of_reserve() {
         for (to, goal) in MODES {
             let path = trunk().path(&symmetrical(start), &symmetrical(goal), &wanted).expect("a path");
             assert_eq!(path.kept, wanted, "{from} to {to}");
-            let last = path.legs.last().and_then(|leg| leg.end().copied());
+            let last = path.legs.last().and_then(|leg| leg.end()).map(|end| end.corners);
             assert!(from == to || close(&last.expect("an end"), &symmetrical(goal)), "{from} to {to}: {last:?}");
             let tight = samples(&path).filter(|sample| !sample.room.has(&wanted));
-            let near_gecko = |sample: &LegSample| sample.shape.0[1].to_degrees() > 168.0;
+            let near_gecko = |sample: &LegSample| sample.shape.corners.0[1].to_degrees() > 168.0;
             assert!(tight.clone().all(near_gecko), "{from} to {to}");
             assert_eq!(tight.count() > 0, (from == "gecko") != (to == "gecko"), "{from} to {to}");
         }
@@ -56,7 +56,7 @@ fn every_mode_leads_to_every_other_with_a_degree_of_reserve() {
 fn gecko_is_left_by_a_bend_of_one_side() {
     let path = trunk().path(&symmetrical(180.0), &symmetrical(120.0), &WantedClearance::default()).expect("a path");
     assert_eq!(path.legs.len(), 2);
-    let [a, b, c, _, e, _] = path.legs[0].end().expect("an end").0.map(f64::to_degrees);
+    let [a, b, c, _, e, _] = path.legs[0].end().expect("an end").corners.0.map(f64::to_degrees);
     assert!(a < 90.5 && b < 178.5 && c < 90.5, "{a} {b} {c}");
     assert!(e < b - 10.0, "the passive side opens far: {e}");
     // A path that has less time than the straight way would take does not exist.
@@ -143,21 +143,42 @@ proptest! {
         };
         let mut last = start;
         for sample in samples(&path) {
-            let moved = (0..3).map(|corner| (sample.shape.0[corner] - last.0[corner]).abs()).fold(0.0, f64::max);
+            let moved = (0..3).map(|corner| (sample.shape.corners.0[corner] - last.0[corner]).abs()).fold(0.0, f64::max);
             prop_assert!(moved < 0.01, "{} degrees at once", moved.to_degrees());
-            let closed = trunk().links.shapes([0, 1, 2].map(|corner: usize| sample.shape.0[corner])).expect("it closes");
-            prop_assert!(close(&closed[0], &sample.shape));
+            let closed = trunk().links.shapes([0, 1, 2].map(|corner: usize| sample.shape.corners.0[corner])).expect("it closes");
+            prop_assert!(close(&closed[0], &sample.shape.corners));
             prop_assert!(!sample.room.is_forbidden());
-            last = sample.shape;
+            last = sample.shape.corners;
         }
         prop_assert!(close(&last, &goal), "{:?}", last);
         // Tight shapes are only near the ends.
         let tight = samples(&path).filter(|sample| !sample.room.has(&path.kept));
         for sample in tight {
             let from = |end: &Corners| {
-                (0..3).map(|corner| (sample.shape.0[corner] - end.0[corner]).abs()).fold(0.0, f64::max)
+                (0..3).map(|corner| (sample.shape.corners.0[corner] - end.0[corner]).abs()).fold(0.0, f64::max)
             };
             prop_assert!(from(&start).min(from(&goal)) <= 10.1_f64.to_radians());
         }
     }
+}
+
+/// Regression: a trunk at its dead centre read a shape that no links can have, and had no way out.
+#[test]
+fn readings_beyond_the_dead_centre_begin_a_path_at_the_nearest_shape() {
+    let read = |degrees: [f64; 3]| {
+        let driven = degrees.map(f64::to_radians);
+        assert!(matches!(trunk().links.shapes(driven), Err(SixBarError::TooFar { .. })), "{degrees:?}");
+        trunk().links.outward_or_straight(driven)
+    };
+    for off in [0.2, 0.7, 1.5] {
+        let read = read([90.0 + off, 180.0 - off / 2.0, 90.0 + off]);
+        let path = trunk().path(&read, &symmetrical(120.0), &WantedClearance::default()).expect("a way out");
+        let start = path.legs[0].samples[0].shape.corners;
+        let apart = (0..3).map(|corner| (start.0[corner] - read.0[corner]).abs()).fold(0.0, f64::max);
+        assert!(apart < 2.5 * off.to_radians(), "{off}: {} degrees", apart.to_degrees());
+    }
+    // Ten degrees are no noise.
+    let wrong = read([100.0, 180.0, 100.0]);
+    let no_path = trunk().path(&wrong, &symmetrical(120.0), &WantedClearance::default());
+    assert!(matches!(no_path, Err(NoPath::NotClosed { end: PathEnd::Start, .. })), "{no_path:?}");
 }

@@ -23,6 +23,8 @@ pub struct CloudPoint {
     pub sigma_range: Length,
     /// Its covariance in mm², in the left frame, from its pixels and from the shared parameters.
     pub covariance: Matrix3<f64>,
+    /// The part of that from its own pixels alone; points of a pair share the errors behind the rest.
+    pub own_covariance: Matrix3<f64>,
     /// The angle of one ray to the epipolar plane of the other, with the sign of [`crate::dihedral`].
     pub residual: Angle,
     /// Standard deviation of that angle.
@@ -81,7 +83,8 @@ pub fn cloud_point(pixels: &PixelPair, rig: &StereoPair<'_>, gates: &Gates) -> R
     let residual_sigma = ResidualUncertainty::of(&left, &in_right, rig, gates.pixel_sigma)
         .map(|uncertainty| uncertainty.sigma(&gates.shared))
         .ok_or(DropReason::Uncertain)?;
-    require(residual.abs() <= residual_sigma * gates.epipolar_sigmas, DropReason::Epipolar)?;
+    let allowed = Angle::from_rad(residual_sigma.rad().hypot(gates.epipolar_allowance.rad()));
+    require(residual.abs() <= allowed * gates.epipolar_sigmas, DropReason::Epipolar)?;
 
     let Triangulated { point, left_range, parallax, .. } = gates.kernel.of_rays(pixels, &left, &in_right, rig)?;
     require(parallax >= gates.min_parallax, DropReason::Parallax)?;
@@ -93,7 +96,16 @@ pub fn cloud_point(pixels: &PixelPair, rig: &StereoPair<'_>, gates: &Gates) -> R
     require(own_sigma.mm() <= gates.max_relative_sigma * left_range.mm(), DropReason::Uncertain)?;
     let covariance = uncertainty.covariance(&gates.shared);
     let sigma_range = range_sigma(&covariance, &point).ok_or(DropReason::Uncertain)?;
-    Ok(CloudPoint { pair_index: 0, pixels: *pixels, point, sigma_range, covariance, residual, residual_sigma })
+    Ok(CloudPoint {
+        pair_index: 0,
+        pixels: *pixels,
+        point,
+        sigma_range,
+        covariance,
+        own_covariance: uncertainty.from_pixels,
+        residual,
+        residual_sigma,
+    })
 }
 
 /// Takes the condition that must hold, so that a comparison with NaN drops the match.

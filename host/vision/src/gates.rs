@@ -14,6 +14,8 @@ pub struct Gates {
     /// Largest angle of one ray to the epipolar plane of the other, in standard deviations of that angle, which come
     /// from pixel noise and from the shared parameters.
     pub epipolar_sigmas: f64,
+    /// Standard deviation of that angle by what [`Self::shared`] does not know, added for the gate alone.
+    pub epipolar_allowance: Angle,
     /// Smallest parallax: the angle that the baseline spans as seen from the point.
     pub min_parallax: Angle,
     /// Largest distance from the left optical centre; `None` for no limit.
@@ -35,6 +37,7 @@ impl Default for Gates {
     fn default() -> Self {
         Self {
             epipolar_sigmas: 3.0,
+            epipolar_allowance: Angle::from_rad(0.0),
             min_parallax: Angle::from_rad(0.0),
             max_range: None,
             pixel_sigma: 0.2,

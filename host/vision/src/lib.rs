@@ -32,6 +32,7 @@ mod lens_derivatives;
 mod pose_drift;
 mod pose_equation;
 mod pose_fusion;
+mod residual_spread;
 mod stereo_pair;
 mod triangulation;
 mod uncertainty;
@@ -48,7 +49,7 @@ pub use import::{OpenCvFisheye, largest_theta};
 pub use kannala_brandt::{ImageSize, InvalidLens, KannalaBrandt, OutsideField, Pixel};
 pub use lens_derivatives::LENS_PARAMETERS;
 pub use pose_drift::{PoseDrift, pose_drift};
-pub use pose_fusion::{FusedPose, fuse_pose};
+pub use pose_fusion::{FusedPose, MatchErrors, fuse_pose};
 pub use stereo_pair::{PixelPair, StereoPair};
 pub use triangulation::{
     AngularNorm, Feet, Kernel, Rejection, Triangulated, UnknownKernel, angular, closest_approach, edge_plane, mid2,

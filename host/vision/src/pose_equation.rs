@@ -3,6 +3,7 @@
 use nalgebra::{UnitQuaternion, Vector3, Vector6};
 
 use crate::epipolar::ray_to_plane;
+use crate::residual_spread::cell_of;
 use crate::uncertainty::ResidualUncertainty;
 use crate::{Left, PixelPair, Right, StereoPair, Transform};
 
@@ -27,6 +28,8 @@ pub struct Equation {
     pub offset: f64,
     pub slope: Vector6<f64>,
     pub sigma: f64,
+    /// The cell of the left image in which the match lies.
+    pub cell: [i32; 2],
 }
 
 impl Equation {
@@ -36,7 +39,8 @@ impl Equation {
         let offset = ray_to_plane(&left, &(pair.left_from_right * right), &pair.left_from_right.origin())?;
         let uncertainty = ResidualUncertainty::of(&left, &right, pair, *pixel_sigma)?;
         let sigma = uncertainty.from_pixels.sqrt();
-        (sigma > 0.0).then(|| Self { offset: offset.rad(), slope: uncertainty.by_pose(), sigma })
+        let cell = cell_of(pixels.left, pair.left.size().width);
+        (sigma > 0.0).then(|| Self { offset: offset.rad(), slope: uncertainty.by_pose(), sigma, cell })
     }
 
     pub fn residual(&self, correction: &Vector6<f64>) -> f64 {

@@ -9,7 +9,8 @@
 //!
 //! over the correction c of the stated pose, whose covariance P is that of the joints. Matches tell nothing of the length of the
 //! baseline, so that the joints always tell that. Wrong matches are faded out as in [`crate::pose_drift`]; at the end those beyond
-//! three standard deviations are left out and all others weigh fully, so that the covariance is that of least squares.
+//! three standard deviations are left out and all others weigh fully, so that the covariance is that of least squares. There the
+//! variance of all matches is that of their residuals, as [`crate::residual_spread`] finds it, in place of the one that is stated.
 //!
 //! How much each source told is counted by the degrees of freedom for signal (C. Rodgers, *Inverse Methods for Atmospheric
 //! Sounding*, 2000, eq. 2.56): of the six components of the pose the images told tr(1 - C P⁻¹), with C the covariance found.
@@ -17,6 +18,7 @@
 use nalgebra::{Matrix6, SymmetricEigen, Vector6};
 
 use crate::pose_equation::{Equation, SCALE_SIGMAS, difference, moved};
+use crate::residual_spread::variance_factor;
 use crate::{Angle, Left, PixelPair, Right, StereoPair, Transform};
 
 /// Smallest number of matches that agree with the pose found.
@@ -24,8 +26,8 @@ const LEAST_PAIRS: usize = 20;
 const ITERATIONS: usize = 30;
 /// Iterations with the scale of the measurement at the end of each fading.
 const SETTLING: usize = 8;
-/// Number of times the equations are linearised again.
-const ROUNDS: usize = 5;
+/// Number of times the equations are linearised again. Before the last one the errors of the matches are measured.
+const ROUNDS: usize = 6;
 /// Least scale of the first iterations, in radians: 3 degrees.
 const GROSS: f64 = 0.0524;
 
@@ -42,6 +44,17 @@ pub struct FusedPose {
     pub told_by_images: f64,
     /// The fraction of matches that agree with the pose.
     pub agreeing: f64,
+    /// Variance of what the matches say together, over the one that their standard deviations state.
+    pub variance_factor: f64,
+}
+
+/// The standard deviations of matches.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum MatchErrors {
+    /// They are measured: all are scaled by one factor to what the residuals of the matches show.
+    Measured,
+    /// They hold as they are stated: the matches are exact, and only what they would tell is asked for.
+    Stated,
 }
 
 impl FusedPose {
@@ -59,11 +72,16 @@ impl FusedPose {
 }
 
 /// The most probable pose of `pair`, whose stated pose has the covariance `joints`, given matches with their standard deviations
-/// in pixels; some may be wrong.
+/// in pixels; some may be wrong. `errors` says whether these deviations hold.
 ///
 /// `None` where fewer than 20 matches agree on one pose.
 #[must_use]
-pub fn fuse_pose(pixels: &[(PixelPair, f64)], pair: &StereoPair<'_>, joints: &Matrix6<f64>) -> Option<FusedPose> {
+pub fn fuse_pose(
+    pixels: &[(PixelPair, f64)],
+    pair: &StereoPair<'_>,
+    joints: &Matrix6<f64>,
+    errors: MatchErrors,
+) -> Option<FusedPose> {
     let spread = root(joints);
     let gross = joints.fixed_view::<3, 3>(0, 0).trace().max(0.0).sqrt().max(GROSS);
     let mut fused = FusedPose {
@@ -72,22 +90,31 @@ pub fn fuse_pose(pixels: &[(PixelPair, f64)], pair: &StereoPair<'_>, joints: &Ma
         correction: Vector6::zeros(),
         told_by_images: 0.0,
         agreeing: 0.0,
+        variance_factor: 1.0,
     };
     for round in 0..ROUNDS {
         let found = StereoPair { left_from_right: fused.left_from_right, ..*pair };
         let equations: Vec<Equation> = pixels.iter().filter_map(|pixels| Equation::of(pixels, &found)).collect();
         let mut step = Vector6::zeros();
+        let mut left = Matrix6::identity();
         for iteration in 0..ITERATIONS {
             let fade =
                 if round == 0 { (1.0 - iteration as f64 / (ITERATIONS - SETTLING) as f64).max(0.0) } else { 0.0 };
             let weight = |equation: &Equation| {
                 let scale = (SCALE_SIGMAS * equation.sigma).max(gross * fade * fade);
-                if round + 1 == ROUNDS { equation.full_weight(&step) } else { equation.weight(&step, scale) }
+                match round + 2 < ROUNDS {
+                    true => equation.weight(&step, scale),
+                    false => equation.full_weight(&step) / fused.variance_factor,
+                }
             };
             let posterior = Posterior::of(&equations, weight, &spread, &fused.correction)?;
             step = posterior.correction - fused.correction;
             fused.covariance = posterior.covariance;
-            fused.told_by_images = posterior.told_by_images;
+            left = posterior.left;
+        }
+        fused.told_by_images = 6.0 - left.trace();
+        if round + 2 == ROUNDS && errors == MatchErrors::Measured {
+            fused.variance_factor = variance_factor(&equations, &step, &spread, &left, fused.told_by_images);
         }
         let agreeing = equations.iter().filter(|equation| equation.agrees(&step)).count();
         if agreeing < LEAST_PAIRS {
@@ -104,7 +131,8 @@ pub fn fuse_pose(pixels: &[(PixelPair, f64)], pair: &StereoPair<'_>, joints: &Ma
 struct Posterior {
     correction: Vector6<f64>,
     covariance: Matrix6<f64>,
-    told_by_images: f64,
+    /// What is left of the prior, in the coordinates in which that is the identity.
+    left: Matrix6<f64>,
 }
 
 impl Posterior {
@@ -125,7 +153,7 @@ impl Posterior {
         let factor = normal.cholesky()?;
         let left = factor.inverse();
         let covariance = spread * left * spread.transpose();
-        Some(Self { correction: spread * factor.solve(&right_side), covariance, told_by_images: 6.0 - left.trace() })
+        Some(Self { correction: spread * factor.solve(&right_side), covariance, left })
     }
 }
 

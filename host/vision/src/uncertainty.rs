@@ -63,6 +63,20 @@ impl SharedCovariance {
         self
     }
 
+    /// Adds a covariance (6 × 6) to that of the pose, of errors that are independent of all others.
+    #[must_use]
+    pub fn plus_pose(mut self, covariance: &Matrix6<f64>) -> Self {
+        let mut pose = self.0.fixed_view_mut::<6, 6>(2 * LENS_PARAMETERS, 2 * LENS_PARAMETERS);
+        pose += covariance;
+        self
+    }
+
+    /// The covariance (6 × 6) of the pose: turn ω and shift δ.
+    #[must_use]
+    pub fn pose(&self) -> Matrix6<f64> {
+        self.0.fixed_view::<6, 6>(2 * LENS_PARAMETERS, 2 * LENS_PARAMETERS).into_owned()
+    }
+
     /// Replaces the covariances of both lenses (8 × 8) and removes their correlation with each other and with the pose.
     #[must_use]
     pub fn with_lenses(mut self, lenses: [&SMatrix<f64, LENS_PARAMETERS, LENS_PARAMETERS>; 2]) -> Self {

@@ -3,20 +3,15 @@
 use nalgebra::Matrix6;
 use serde_json::{Value, json};
 use vergence_calibration::{ExtrinsicsCalibration, RelativePose};
-use vergence_rig::Rig;
-use vergence_vision::{Angle, Length};
+use vergence_rig::{Rig, RigCalibration};
 
-/// The rig file's pair, called `name`, of a calibration; its uncertainty covers the scatter of the views.
+/// The rig file's pair, called `name`, of a calibration; its covariance covers the scatter of the views.
 #[must_use]
 pub fn fixed_pair(calibration: &ExtrinsicsCalibration, name: &str) -> Rig {
-    let sigma = sigma(&calibration.scattered_covariance);
-    let norm = |part: &[f64]| part.iter().map(|x| x * x).sum::<f64>().sqrt();
-    Rig::fixed_pair(
-        name,
-        (calibration.left, calibration.right),
-        calibration.joint.left_from_right,
-        (Angle::from_rad(norm(&sigma[..3])), Length::from_mm(norm(&sigma[3..]))),
-    )
+    let lenses = (calibration.left, calibration.right);
+    let pair = Rig::fixed_pair(name, lenses, calibration.joint.left_from_right);
+    // A covariance of the solver is one: only rounding could refuse it, and then nothing is known.
+    Rig { calibration: calibration.numbers().map_or(RigCalibration::Unknown, RigCalibration::Covariance), ..pair }
 }
 
 /// Of the rotation in radians about the left axes, and of the position in millimetres.

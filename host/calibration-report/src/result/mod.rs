@@ -3,6 +3,7 @@
 mod extrinsics;
 mod intrinsics;
 mod stage;
+mod trunk;
 
 use serde_json::{Value, json};
 use vergence_calibration::Validation;
@@ -10,6 +11,8 @@ use vergence_calibration::Validation;
 pub use self::extrinsics::{extrinsics_json, extrinsics_lines, fixed_pair};
 pub use self::intrinsics::{intrinsics_json, intrinsics_lines};
 pub use self::stage::{stage_json, stage_lines};
+pub(crate) use self::trunk::{in_unit, play_in_words, unit};
+pub use self::trunk::{trunk_json, trunk_lines};
 use crate::Verdict;
 
 /// A line that says how well held-out views are predicted; `None` where none were held out.

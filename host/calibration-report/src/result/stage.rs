@@ -104,6 +104,7 @@ pub fn stage_json(rig: &Rig, stage: &StageCalibration, held_out: &[HeldOutPose])
         .iter()
         .map(|weak| json!({ "unknowns": weak.unknowns, "sigma_in_tolerances": weak.sigma }))
         .collect();
+    let sigma = stage.largest_sigma();
     json!({
         "rms_px": stage.rms_px,
         "rms_inlier_px": stage.rms_inlier_px,
@@ -119,7 +120,7 @@ pub fn stage_json(rig: &Rig, stage: &StageCalibration, held_out: &[HeldOutPose])
             "sigma": stage.at_zero.covariance.diagonal().map(f64::sqrt).as_slice(),
         },
         "calibration_sigma": {
-            "rotation_deg": rig.calibration_sigma.0.deg(), "translation_mm": rig.calibration_sigma.1.mm(),
+            "rotation_deg": sigma.0.deg(), "translation_mm": sigma.1.mm(),
         },
         "observability": {
             "unknowns": stage.observability.unknowns,

@@ -12,11 +12,12 @@ mod report;
 mod scatter;
 mod stereo;
 
-use nalgebra::SMatrix;
+use nalgebra::{DMatrix, SMatrix};
+use vergence_rig::{CalibratedNumbers, InvalidCovariance, RigNumber};
 use vergence_vision::{InvalidLens, KannalaBrandt, Left, Pixel, Right, Transform};
 
 use crate::planar_pose::PoseError;
-use crate::reprojection::POSE;
+use crate::reprojection::{LENS, POSE};
 use crate::target::{Corner, Target, TargetView};
 
 pub(crate) use fit::{Fit, NoFit, Start, Task};
@@ -85,6 +86,8 @@ pub struct ExtrinsicsCalibration {
     pub view_scatter: f64,
     /// As `covariance`, with the noise of the corners multiplied by `view_scatter`: what the pair is worth.
     pub scattered_covariance: SMatrix<f64, POSE, POSE>,
+    /// The same with that of both lenses and all correlations, where the lenses were refined.
+    scattered: DMatrix<f64>,
     /// Root mean square distance per corner without outliers, in pixels.
     pub rms_inlier_px: f64,
     /// Standard deviation of one pixel coordinate, root mean square over the corners used.
@@ -103,6 +106,27 @@ pub struct ExtrinsicsCalibration {
     pub outliers: Vec<StereoOutlier>,
     /// The views that did not take part.
     pub skipped: Vec<SkippedView>,
+}
+
+impl ExtrinsicsCalibration {
+    /// The numbers of the pair's rig file with their covariance, which covers the scatter of the views.
+    ///
+    /// # Errors
+    /// [`InvalidCovariance`] where rounding made it none.
+    pub fn numbers(&self) -> Result<CalibratedNumbers, InvalidCovariance> {
+        let turn = (0..3).map(|component| RigNumber::RightTurn { component });
+        let shift = (0..3).map(|component| RigNumber::RightShift { component });
+        let refined = lens_numbers().take(self.scattered.nrows() - POSE);
+        let covariance = (&self.scattered + self.scattered.transpose()) * 0.5;
+        CalibratedNumbers::new(turn.chain(shift).chain(refined).collect(), covariance)
+    }
+}
+
+/// The parameters of the left and of the right lens, in the order of covariances.
+pub(crate) fn lens_numbers() -> impl Iterator<Item = RigNumber> {
+    [Side::Left, Side::Right]
+        .into_iter()
+        .flat_map(|side| (0..LENS).map(move |parameter| RigNumber::Lens { side, parameter }))
 }
 
 /// Residuals of one view.
@@ -287,7 +311,7 @@ pub fn calibrate_extrinsics(
     let pair = Pair { left_from_right: fit.shared.state, lenses: fit.shared.lenses };
     let view_scatter = scatter::view_scatter(&pair, &views, &fit.targets, &fit.inliers, fit.sigma);
     let lens_prior = LensPrior::new(lenses, &options.lenses, fit.sigma).ok_or(ExtrinsicsError::LensCovariance)?;
-    let scattered_covariance =
+    let scattered =
         scatter::scattered_covariance(&fit, &lens_prior, view_scatter).ok_or(ExtrinsicsError::NotDetermined)?;
     let relative = |pose, rms_px| RelativePose { left_from_right: Transform::from_isometry(pose), rms_px };
     let every = rms(&fit.errors_px, &usable).unwrap_or_default();
@@ -296,7 +320,8 @@ pub fn calibrate_extrinsics(
         joint: relative(fit.shared.state, every),
         covariance: covariance.fixed_view::<POSE, POSE>(0, 0).into_owned(),
         view_scatter,
-        scattered_covariance,
+        scattered_covariance: scattered.fixed_view::<POSE, POSE>(0, 0).into_owned(),
+        scattered,
         rms_inlier_px: rms(&fit.errors_px, &fit.inliers).unwrap_or_default(),
         sigma_px: fit.sigma_px(&views),
         left: refined(&fit.shared.lenses.left, left, Side::Left)?,

@@ -58,13 +58,9 @@ fn gain(pair: &Pair, view: &StereoView, left_from_target: &Isometry3<f64>, used:
     Some(gradient.dot(&unit.solve(&gradient)))
 }
 
-/// The covariance of the relative pose where the corners' noise counts `scatter` times as large; what is known of the
+/// The covariance of the relative pose, and of the lenses where they were refined, where the corners' noise counts `scatter` times as large; what is known of the
 /// lenses besides, `lens_prior` in units of the fit's sigma, counts as before. `None` where it is not determined.
-pub(crate) fn scattered_covariance<S>(
-    fit: &Fit<S>,
-    lens_prior: &LensPrior,
-    scatter: f64,
-) -> Option<SMatrix<f64, POSE, POSE>> {
+pub(crate) fn scattered_covariance<S>(fit: &Fit<S>, lens_prior: &LensPrior, scatter: f64) -> Option<DMatrix<f64>> {
     let (excess, mut information) = (scatter * scatter - 1.0, fit.information.clone());
     for (index, prior) in lens_prior.information().into_iter().flatten().enumerate() {
         let first = POSE + index * LENS;
@@ -75,5 +71,5 @@ pub(crate) fn scattered_covariance<S>(
     let unit = DMatrix::from_fn(n, n, |i, j| information[(i, j)] * scale[i] * scale[j]);
     let inverse = Cholesky::new(unit)?.inverse();
     let variance = (scatter * fit.sigma).powi(2);
-    Some(SMatrix::from_fn(|i, j| inverse[(i, j)] * scale[i] * scale[j] * variance))
+    Some(DMatrix::from_fn(n, n, |i, j| inverse[(i, j)] * scale[i] * scale[j] * variance))
 }

@@ -7,12 +7,13 @@
 //! The base frame is held by the left camera with all axes at zero, which stays where the drawing has it; the encoders'
 //! zeros are part of the right camera's pose there.
 
+mod covariance;
 mod figures;
 mod mechanism;
 mod model;
 mod observability;
 mod result;
-mod start;
+pub(crate) mod start;
 mod twist;
 mod unknowns;
 
@@ -87,8 +88,11 @@ impl Default for StageOptions {
 #[non_exhaustive]
 pub enum StageError {
     /// The rig's cameras ride on a trunk, which has no screws to fit.
-    #[error("rig '{0}' has a trunk: its links and mounts cannot be calibrated yet, only rigs with screws")]
+    #[error("rig '{0}' has a trunk and no screws: calibrate its links and mounts instead")]
     Trunk(String),
+    /// The rig has no trunk.
+    #[error("rig '{0}' has no trunk: calibrate its screws instead")]
+    NoTrunk(String),
     /// Fewer stage poses than three.
     #[error("{0} stage poses; at least {FEWEST_STAGE_POSES} are needed, and 6 are better")]
     TooFewPoses(usize),
@@ -134,7 +138,8 @@ pub fn calibrate_stage(rig: &Rig, poses: &[StagePose], options: &StageOptions) -
     let model = start::model(rig, poses, options)?;
     let alone = start::poses_alone(rig, poses, options.robust)?;
     let state = start::fitted_to_poses(&model, &alone).ok_or(StageError::Diverged)?;
-    let prepared = start::prepare(rig, &model, &state, poses, &alone)?;
+    let prepared =
+        start::prepare(rig, state, poses, |state, pose| state.left_from_right(&model.corrected(state, pose)))?;
     let model = Model { pose_of_view: prepared.pose_of_view, ..model };
     let task = Task {
         kinematics: &model,

@@ -1,7 +1,9 @@
 //! Result of a stage calibration, and the relative pose it predicts.
 
 use nalgebra::{DMatrix, Matrix6, SMatrix};
-use vergence_rig::{AxisPosition, Chain, Link, Rig, RigAxis, Screw};
+use vergence_rig::{
+    AxisPosition, CalibratedNumbers, Chain, InvalidCovariance, Link, Rig, RigAxis, RigCalibration, Screw,
+};
 use vergence_vision::{
     Angle, KannalaBrandt, LENS_PARAMETERS, Left, Length, Right, SHARED_PARAMETERS, SharedCovariance, Transform,
 };
@@ -10,6 +12,7 @@ use crate::extrinsics::{
     ExtrinsicsCalibration, Fit, Side, SkippedView, StereoOutlier, StereoView, outliers, refined, rms,
 };
 use crate::reprojection::POSE;
+use crate::stage::covariance::of_numbers;
 use crate::stage::figures::{pose_figures, screws, zero_offsets};
 use crate::stage::mechanism::State;
 use crate::stage::model::Model;
@@ -177,8 +180,15 @@ impl StageCalibration {
         Chain::new(self.scaled(&self.state.right), named(&self.state.right_at_zero))
     }
 
-    /// `drawn` with the chains and lenses calibrated. Its `calibration_sigma` is the largest over the corners and the
-    /// middle of the axes' ranges.
+    /// The numbers of the rig file with their covariance.
+    ///
+    /// # Errors
+    /// [`InvalidCovariance`] where rounding made it none.
+    pub fn numbers(&self) -> Result<CalibratedNumbers, InvalidCovariance> {
+        of_numbers(&self.state, &self.mechanism, &self.covariance)
+    }
+
+    /// `drawn` with the chains and lenses calibrated, and the covariance of its numbers.
     #[must_use]
     pub fn rig(&self, drawn: &Rig) -> Rig {
         Rig {
@@ -186,7 +196,8 @@ impl StageCalibration {
             right_camera: self.right,
             left_chain: self.left_chain(),
             right_chain: self.right_chain(),
-            calibration_sigma: self.largest_sigma(),
+            // A covariance of the solver is one: only rounding could refuse it, and then nothing is known.
+            calibration: self.numbers().map_or(RigCalibration::Unknown, RigCalibration::Covariance),
             axes: drawn.axes.iter().enumerate().map(|(index, axis)| self.calibrated(index, axis)).collect(),
             ..drawn.clone()
         }
@@ -200,8 +211,10 @@ impl StageCalibration {
         RigAxis { calibrated, ..axis.clone() }
     }
 
-    /// The largest standard deviations of rotation and translation, along the worst direction, over [`grid`].
-    fn largest_sigma(&self) -> (Angle, Length) {
+    /// The largest standard deviations of rotation and translation by the calibration, along the worst direction, over the corners
+    /// and the middle of the axes' ranges.
+    #[must_use]
+    pub fn largest_sigma(&self) -> (Angle, Length) {
         let worst = |matrix: SMatrix<f64, 3, 3>| matrix.symmetric_eigenvalues().max().max(0.0).sqrt();
         let (mut rotation, mut translation) = (0.0f64, 0.0f64);
         let of_mechanism = self.of_mechanism();

@@ -1,11 +1,13 @@
 //! A strip of pictures of the trunk along a path, from above, with what the cameras see.
 
+use std::f64::consts::PI;
 use std::fmt::Write;
 
+use nalgebra::{UnitQuaternion, Vector3};
 use vergence_pipeline::{RigView, ZONE_RADIUS};
-use vergence_rig::linkage::TrunkPath;
+use vergence_rig::linkage::{TrunkPath, TrunkShape};
 use vergence_rig::{Rig, RigTrunk};
-use vergence_vision::Coverage;
+use vergence_vision::{Base, Coverage, Transform};
 
 /// Number of pictures.
 const PICTURES: usize = 6;
@@ -18,7 +20,7 @@ const MIDDLE: [f64; 2] = [150.0, 150.0];
 const STEP: u32 = 3;
 
 /// Draws the trunk of `rig` at even times along `path`: links, cameras, and on a circle around them what both cameras, one or none
-/// see. Forward is up. Returns nothing for a rig without a trunk, or a path without legs.
+/// see. Forward is up. A folded trunk is seen with both halves sloping alike, and from its front in a corner of the picture. Returns nothing for a rig without a trunk, or a path without legs.
 #[must_use]
 pub fn trunk_strip_svg(rig: &Rig, path: &TrunkPath) -> Option<String> {
     let trunk = rig.trunk.as_deref()?;
@@ -29,20 +31,25 @@ pub fn trunk_strip_svg(rig: &Rig, path: &TrunkPath) -> Option<String> {
         SIZE[1] + 34.0
     );
     let seconds = path.seconds();
+    let is_folded = path.legs.iter().flat_map(|leg| &leg.samples).any(|sample| !sample.shape.is_flat());
     for picture in 0..PICTURES {
         let at = seconds * picture as f64 / (PICTURES - 1) as f64;
         let (shape, room) = path.at(at)?;
         let values = trunk.values_of(&shape, rig.axes.len());
         let _ = writeln!(svg, "<g transform=\"translate({} 0)\">", picture as f64 * SIZE[0]);
-        draw_zones(&mut svg, rig, &values);
-        draw_trunk(&mut svg, trunk, &values);
+        let drawn = Drawn::of(trunk, &shape);
+        draw_zones(&mut svg, rig, (&values, shape.fold), drawn.middle());
+        draw_trunk(&mut svg, trunk, &drawn);
+        if is_folded {
+            draw_front(&mut svg, &shape);
+        }
         let _ = writeln!(
             svg,
             "<text x=\"{0}\" y=\"{1}\" text-anchor=\"middle\">{at:.1} s, side joint {2:.0}°</text>\
              <text x=\"{0}\" y=\"{3}\" text-anchor=\"middle\" fill=\"#555\">reserve {4:.1}°, gap {5:.0} mm</text>\n</g>",
             MIDDLE[0],
             SIZE[1] - 34.0,
-            shape.0[1].to_degrees(),
+            shape.corners.0[1].to_degrees(),
             SIZE[1] - 14.0,
             room.loop_reserve.to_degrees(),
             room.gap.mm
@@ -51,6 +58,65 @@ pub fn trunk_strip_svg(rig: &Rig, path: &TrunkPath) -> Option<String> {
     draw_legend(&mut svg);
     svg.push_str("</svg>\n");
     Some(svg)
+}
+
+/// The trunk as it is seen from above: right and forward in millimetres.
+struct Drawn {
+    corners: [[f64; 2]; 6],
+    cameras: [[f64; 2]; 2],
+    /// Directions of the optical axes.
+    axes: [[f64; 2]; 2],
+}
+
+impl Drawn {
+    fn of(trunk: &RigTrunk, shape: &TrunkShape) -> Self {
+        let flat = trunk.flat();
+        let places = flat.links.places(&shape.corners);
+        // Each half slopes by half of the fold, about a hinge above it.
+        let (sine, cosine) = (0.5 * (PI - shape.fold)).sin_cos();
+        let hinge = trunk.links.fold_offset * sine;
+        let seen = |side: f64, [x, y]: [f64; 2]| [cosine * x - side * hinge, y];
+        let sides = [-1.0, 1.0];
+        let axis = |[corner, other]: [usize; 2], turn: f64, side: f64| {
+            // The optical axis points outward by the mount's angle from the link's front end.
+            let link = (places[corner] - places[other]).normalize();
+            let [x, y] = turned([link.x, link.y], -side * turn);
+            [cosine * x, y]
+        };
+        let centres = flat.cameras.centres(&places);
+        Self {
+            corners: std::array::from_fn(|corner| {
+                seen(if corner < 3 { -1.0 } else { 1.0 }, [places[corner].x, places[corner].y])
+            }),
+            cameras: [0, 1].map(|side: usize| seen(sides[side], [centres[side].x, centres[side].y])),
+            axes: [axis([0, 1], trunk.cameras.left.angle, sides[0]), axis([5, 4], trunk.cameras.right.angle, sides[1])],
+        }
+    }
+
+    /// The place midway between the cameras.
+    fn middle(&self) -> [f64; 2] {
+        let [left, right] = self.cameras;
+        [0, 1].map(|axis: usize| f64::midpoint(left[axis], right[axis]))
+    }
+}
+
+/// Both halves as they are seen from the front, with the hinge between them.
+fn draw_front(svg: &mut String, shape: &TrunkShape) {
+    const HINGE: [f64; 2] = [262.0, 26.0];
+    const HALF: f64 = 24.0;
+    let (sine, cosine) = (0.5 * (PI - shape.fold)).sin_cos();
+    let [x, y] = HINGE;
+    let _ = writeln!(
+        svg,
+        "<polyline points=\"{:.1},{:.1} {x},{y} {:.1},{:.1}\" fill=\"none\" stroke=\"#8d99ae\" stroke-width=\"6\"/>\
+         <text x=\"{x}\" y=\"{:.1}\" text-anchor=\"middle\" font-size=\"12\">folds {:.0}°</text>",
+        x - HALF * cosine,
+        y + HALF * sine,
+        x + HALF * cosine,
+        y + HALF * sine,
+        y - 12.0,
+        shape.fold.to_degrees()
+    );
 }
 
 fn draw_legend(svg: &mut String) {
@@ -70,8 +136,8 @@ fn draw_legend(svg: &mut String) {
     }
     let _ = writeln!(
         svg,
-        "<text x=\"320\" y=\"{}\" fill=\"#555\">see places on a circle of {ZONE_RADIUS:.0}; reserve: by how much every driven joint may \
-         be off before the loop no longer closes; gap: distance of the nearest bodies</text>",
+        "<text x=\"320\" y=\"{}\" fill=\"#555\">see places on a circle of {ZONE_RADIUS:.0}; reserve: by how much every driven joint \
+         may be off before the loop no longer closes; gap: distance of the nearest bodies</text>",
         SIZE[1] + 19.0
     );
 }
@@ -89,10 +155,14 @@ fn placed([right, forward]: [f64; 2]) -> [f64; 2] {
     [MIDDLE[0] + SCALE * right, MIDDLE[1] - SCALE * forward]
 }
 
-fn draw_zones(svg: &mut String, rig: &Rig, values: &[f64]) {
-    let view = RigView::new(rig, &rig.pose_at_values(values), [None, None]);
-    let centre = [view.middle.mm().x, view.middle.mm().z];
-    let [x, y] = placed(centre);
+/// The zones in the plane from which both halves of the trunk slope alike.
+fn draw_zones(svg: &mut String, rig: &Rig, (values, fold): (&[f64], f64), middle: [f64; 2]) {
+    let mut pose = rig.pose_at_values(values);
+    // The base is the left half, which slopes by half of the fold: z of the base points forward, and the right half lies deeper.
+    let slope = UnitQuaternion::from_axis_angle(&Vector3::z_axis(), -0.5 * (PI - fold));
+    pose.base_from_left = Transform::<Base, Base>::new(slope, Vector3::zeros()) * pose.base_from_left;
+    let view = RigView::new(rig, &pose, [None, None]);
+    let [x, y] = placed(middle);
     let radius = ZONE_RADIUS.mm();
     for step in 0..360 / STEP {
         let azimuth = |degrees: f64| degrees.to_radians().sin_cos();
@@ -118,10 +188,8 @@ fn draw_zones(svg: &mut String, rig: &Rig, values: &[f64]) {
     }
 }
 
-fn draw_trunk(svg: &mut String, trunk: &RigTrunk, values: &[f64]) {
-    let flat = trunk.flat();
-    let places = flat.links.places(&trunk.shape(values));
-    let points = places.map(|place| placed([place.x, place.y]));
+fn draw_trunk(svg: &mut String, trunk: &RigTrunk, drawn: &Drawn) {
+    let points = drawn.corners.map(placed);
     let corners: String = points.iter().map(|[x, y]| format!("{x:.1},{y:.1} ")).collect();
     let _ = writeln!(
         svg,
@@ -133,14 +201,9 @@ fn draw_trunk(svg: &mut String, trunk: &RigTrunk, values: &[f64]) {
         let fill = if matches!(name, "A" | "B" | "C") { "#d62828" } else { "white" };
         let _ = writeln!(svg, "<circle cx=\"{x:.1}\" cy=\"{y:.1}\" r=\"3.5\" fill=\"{fill}\" stroke=\"#222\"/>");
     }
-    for camera in flat.cameras.centres(&places).into_iter().zip([[0, 1], [5, 4]]) {
-        let (centre, [corner, other]) = camera;
-        // The optical axis points outward by the mount's angle from the link's front end.
-        let link = (places[corner] - places[other]).normalize();
-        let turn = if corner == 0 { trunk.cameras.angle } else { -trunk.cameras.angle };
-        let axis = turned([link.x, link.y], turn);
-        let [x, y] = placed([centre.x, centre.y]);
-        let [tip_x, tip_y] = placed([centre.x + 60.0 * axis[0], centre.y + 60.0 * axis[1]]);
+    for (centre, axis) in drawn.cameras.into_iter().zip(drawn.axes) {
+        let [x, y] = placed(centre);
+        let [tip_x, tip_y] = placed([centre[0] + 60.0 * axis[0], centre[1] + 60.0 * axis[1]]);
         let _ = writeln!(
             svg,
             "<circle cx=\"{x:.1}\" cy=\"{y:.1}\" r=\"{:.1}\" fill=\"#1d3557\"/>\

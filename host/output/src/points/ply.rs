@@ -1,47 +1,100 @@
-//! Clouds as PLY (G. Turk, Stanford, 1994): in ASCII, which any tool reads, for the thousands of points of a sparse cloud; in
-//! its binary form for dense clouds, because a million points in text would take a hundred megabytes.
+//! Clouds as PLY (G. Turk, Stanford, 1994), binary, or in ASCII for a person to read.
 
 use std::fmt::Write;
 
 use vergence_pipeline::ColouredPoint;
+use vergence_vision::CloudPoint;
+
+use super::table::upper_triangle;
 
 /// The line of every header that explains unit and frame.
 const COLUMNS_COMMENT: &str = "comment millimetres in the left camera's frame: x right, y down, z forward\n";
+/// The line that explains covariances.
+const COVARIANCE_COMMENT: &str =
+    "comment cov in mm^2: in all; own: of the point's own pixels, the rest is shared by all points\n";
+/// Names of the twelve columns of covariance in mm²: in all, and of the point's own pixels.
+const COVARIANCE_COLUMNS: [&str; 12] = [
+    "cov_xx", "cov_xy", "cov_xz", "cov_yy", "cov_yz", "cov_zz", "own_xx", "own_xy", "own_xz", "own_yy", "own_yz",
+    "own_zz",
+];
 
-/// The points in the left camera's frame, in millimetres, with colour, pixels in both images, sigma of the range, and the
-/// matcher's score.
+/// How the numbers of a PLY file are written.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum PlyEncoding {
+    /// Little-endian.
+    #[default]
+    Binary,
+    /// As text.
+    Ascii,
+}
+
+impl PlyEncoding {
+    /// Text where it `is_ascii`.
+    #[must_use]
+    pub const fn of(is_ascii: bool) -> Self {
+        if is_ascii { Self::Ascii } else { Self::Binary }
+    }
+}
+
+/// The points in the left camera's frame, in millimetres, with colour, pixels in both images, sigma of the range, the matcher's
+/// score, and the upper triangles of the covariance and of the part of it that comes from the point's own pixels.
 #[must_use]
-pub fn ply(points: &[ColouredPoint]) -> String {
-    let mut text = format!(
-        "ply\nformat ascii 1.0\n{COLUMNS_COMMENT}\
+pub fn ply(points: &[ColouredPoint], encoding: PlyEncoding) -> Vec<u8> {
+    let format = match encoding {
+        PlyEncoding::Binary => "binary_little_endian",
+        PlyEncoding::Ascii => "ascii",
+    };
+    let mut bytes = format!(
+        "ply\nformat {format} 1.0\n{COLUMNS_COMMENT}{COVARIANCE_COMMENT}\
          element vertex {}\n\
          property double x\nproperty double y\nproperty double z\n\
          property uchar red\nproperty uchar green\nproperty uchar blue\n\
          property double u_left\nproperty double v_left\nproperty double u_right\nproperty double v_right\n\
-         property double sigma_range\nproperty float score\nend_header\n",
-        points.len()
-    );
-    for ColouredPoint { point, colour: [red, green, blue], score } in points {
-        let p = point.point.mm();
-        let (left, right) = (point.pixels.left, point.pixels.right);
-        // Writing to a String does not fail.
-        let _ = writeln!(
-            text,
-            "{:.4} {:.4} {:.4} {red} {green} {blue} {:.4} {:.4} {:.4} {:.4} {:.4} {score:.4}",
-            p.x,
-            p.y,
-            p.z,
-            left.u,
-            left.v,
-            right.u,
-            right.v,
-            point.sigma_range.mm()
-        );
+         property double sigma_range\nproperty float score\n{}end_header\n",
+        points.len(),
+        COVARIANCE_COLUMNS.map(|name| format!("property float {name}\n")).concat()
+    )
+    .into_bytes();
+    for point in points {
+        match encoding {
+            PlyEncoding::Binary => binary_row(point, &mut bytes),
+            PlyEncoding::Ascii => bytes.extend_from_slice(text_row(point).as_bytes()),
+        }
     }
-    text
+    bytes
 }
 
-/// A row of a dense cloud: what [`ply`] writes, in the same columns.
+fn binary_row(ColouredPoint { point, colour, score }: &ColouredPoint, bytes: &mut Vec<u8>) {
+    let at = point.point.mm();
+    [at.x, at.y, at.z].iter().for_each(|value| bytes.extend_from_slice(&value.to_le_bytes()));
+    bytes.extend_from_slice(colour);
+    pixels_and_sigma(point).iter().for_each(|value| bytes.extend_from_slice(&value.to_le_bytes()));
+    bytes.extend_from_slice(&score.to_le_bytes());
+    covariances(point).iter().for_each(|value| bytes.extend_from_slice(&(*value as f32).to_le_bytes()));
+}
+
+fn text_row(ColouredPoint { point, colour: [red, green, blue], score }: &ColouredPoint) -> String {
+    let at = point.point.mm();
+    let mut row = format!("{:.4} {:.4} {:.4} {red} {green} {blue}", at.x, at.y, at.z);
+    // Writing to a String does not fail.
+    pixels_and_sigma(point).iter().for_each(|value| _ = write!(row, " {value:.4}"));
+    _ = write!(row, " {score:.4}");
+    covariances(point).iter().for_each(|value| _ = write!(row, " {value:.5e}"));
+    row + "\n"
+}
+
+fn pixels_and_sigma(point: &CloudPoint) -> [f64; 5] {
+    let (left, right) = (point.pixels.left, point.pixels.right);
+    [left.u, left.v, right.u, right.v, point.sigma_range.mm()]
+}
+
+fn covariances(point: &CloudPoint) -> [f64; 12] {
+    let [all, own] =
+        [&point.covariance, &point.own_covariance].map(|covariance| upper_triangle(|place| covariance[place]));
+    std::array::from_fn(|index| if index < 6 { all[index] } else { own[index - 6] })
+}
+
+/// A row of a dense cloud: the first columns of what [`ply`] writes.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct DenseRow {
     /// Millimetres in the left camera's frame.
@@ -75,4 +128,53 @@ pub fn dense_ply(rows: &[DenseRow]) -> Vec<u8> {
         row.pixels.iter().chain([&row.sigma]).for_each(|value| bytes.extend_from_slice(&value.to_le_bytes()));
     }
     bytes
+}
+
+#[cfg(test)]
+mod tests {
+    use nalgebra::{Matrix3, Vector3};
+    use vergence_vision::{Angle, Length, Pixel, PixelPair, Point};
+
+    use super::*;
+
+    fn body(file: &[u8]) -> &[u8] {
+        let mark = b"end_header\n";
+        let at = file.windows(mark.len()).position(|window| window == mark).expect("a header");
+        &file[at + mark.len()..]
+    }
+
+    #[test]
+    fn both_encodings_hold_the_same_numbers() {
+        let own = Matrix3::new(1.0, 0.1, 0.2, 0.1, 2.0, 0.3, 0.2, 0.3, 4.0);
+        let point = CloudPoint {
+            pair_index: 0,
+            pixels: PixelPair { left: Pixel { u: 10.5, v: 20.25 }, right: Pixel { u: 30.0, v: 40.0 } },
+            point: Point::from_mm(Vector3::new(1.5, -2.0, 350.0)),
+            sigma_range: Length::from_mm(0.75),
+            covariance: own * 3.0,
+            own_covariance: own,
+            residual: Angle::from_rad(0.0),
+            residual_sigma: Angle::from_rad(0.0),
+        };
+        let points = [ColouredPoint { point, colour: [1, 2, 3], score: 0.5 }];
+        let text = String::from_utf8(ply(&points, PlyEncoding::Ascii)).expect("text");
+        assert!(text.starts_with("ply\nformat ascii 1.0\n") && text.contains("element vertex 1\n"));
+        let numbers: Vec<f64> = String::from_utf8_lossy(body(text.as_bytes()))
+            .split_whitespace()
+            .map(|n| n.parse().expect("a number"))
+            .collect();
+        let file = ply(&points, PlyEncoding::Binary);
+        let bytes = body(&file);
+        let double = |at: usize| f64::from_le_bytes(bytes[at..at + 8].try_into().expect("eight"));
+        let float = |at: usize| f64::from(f32::from_le_bytes(bytes[at..at + 4].try_into().expect("four")));
+        let mut read: Vec<f64> = (0..3).map(|n| double(8 * n)).collect();
+        read.extend(bytes[24..27].iter().map(|&colour| f64::from(colour)));
+        read.extend((0..5).map(|n| double(27 + 8 * n)));
+        read.extend((0..13).map(|n| float(67 + 4 * n)));
+        assert_eq!((bytes.len(), read.len()), (67 + 4 * 13, numbers.len()));
+        for (one, other) in read.iter().zip(&numbers) {
+            assert!((one - other).abs() <= 1e-4 * other.abs().max(1.0), "{one} is not {other}");
+        }
+        assert_eq!((numbers[12], numbers[18]), (3.0, 1.0), "in all, and of its own pixels");
+    }
 }

@@ -32,9 +32,9 @@ pub struct Table {
     rows: Vec<Vec<f64>>,
 }
 
-const POINTS: &str =
-    "points in the left camera's frame (x right, y down, z forward), sigma of their distance and covariance";
-const POINT_COLUMNS: [&str; 18] = [
+const POINTS: &str = "points in the left camera's frame (x right, y down, z forward), sigma of their distance, covariance (cov), and the part of it from \
+     the point's own pixels (own); the rest is shared by all points of the pair: lenses, calibration and encoders";
+const POINT_COLUMNS: [&str; 24] = [
     "x_mm",
     "y_mm",
     "z_mm",
@@ -53,24 +53,34 @@ const POINT_COLUMNS: [&str; 18] = [
     "cov_yy_mm2",
     "cov_yz_mm2",
     "cov_zz_mm2",
+    "own_xx_mm2",
+    "own_xy_mm2",
+    "own_xz_mm2",
+    "own_yy_mm2",
+    "own_yz_mm2",
+    "own_zz_mm2",
 ];
 const BEARINGS: &str = "directions in the camera's own frame (x right, y down, z forward), of length one: not points";
 const BEARING_COLUMNS: [&str; 9] = ["x", "y", "z", "red", "green", "blue", "u", "v", "sigma_deg"];
+
+/// xx, xy, xz, yy, yz and zz of a symmetric matrix.
+pub(super) fn upper_triangle(at: impl Fn((usize, usize)) -> f64) -> [f64; 6] {
+    [(0, 0), (0, 1), (0, 2), (1, 1), (1, 2), (2, 2)].map(at)
+}
 
 impl Table {
     /// A row for each point of a cloud.
     #[must_use]
     pub fn of_points(points: &[ColouredPoint]) -> Self {
         let row = |ColouredPoint { point, colour, score }: &ColouredPoint| {
-            let (at, covariance) = (point.point.mm(), &point.covariance);
-            let (left, right) = (point.pixels.left, point.pixels.right);
-            let upper = [(0, 0), (0, 1), (0, 2), (1, 1), (1, 2), (2, 2)].map(|place| covariance[place]);
+            let (at, left, right) = (point.point.mm(), point.pixels.left, point.pixels.right);
             let colour = colour.map(f64::from);
             [
                 &[at.x, at.y, at.z][..],
                 &colour,
                 &[left.u, left.v, right.u, right.v, point.sigma_range.mm(), f64::from(*score)],
-                &upper,
+                &upper_triangle(|place| point.covariance[place]),
+                &upper_triangle(|place| point.own_covariance[place]),
             ]
             .concat()
         };

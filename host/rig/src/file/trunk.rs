@@ -1,18 +1,15 @@
 //! The `[trunk]` table of a rig file: a folding trunk that carries the cameras.
 
-use std::f64::consts::PI;
-
 use serde::{Deserialize, Serialize};
 use vergence_protocol::AxisKind;
-use vergence_vision::{Angle, Length};
 
+use super::trunk_values::{
+    LONGEST, MountFile, ToleranceFile, angle, angle_text, length, length_text, not_negative, positive,
+};
 use super::{RigError, contradiction};
 use crate::axis::RigAxis;
-use crate::linkage::{CornerLimits, TrunkBodies, TrunkCameras, TrunkLinks};
-use crate::trunk::{RigTrunk, TRUNK_AXES};
-
-/// Longest link or offset in millimetres.
-const LONGEST: f64 = 10_000.0;
+use crate::linkage::{CameraMount, CornerLimits, TrunkBodies, TrunkCameras, TrunkLinks};
+use crate::trunk::{RigTrunk, TRUNK_AXES, TRUNK_PARAMETERS, TrunkCovariance, TrunkTolerance};
 
 /// Keys of the table; each has the value of the paper's robot where it is left out.
 #[derive(Deserialize, Serialize)]
@@ -36,6 +33,21 @@ pub(crate) struct TrunkFile {
     camera_outward: String,
     camera_angle: String,
     camera_diameter: String,
+    #[serde(skip_serializing_if = "MountFile::is_empty")]
+    left_mount: MountFile,
+    #[serde(skip_serializing_if = "MountFile::is_empty")]
+    right_mount: MountFile,
+    tolerance: ToleranceFile,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    calibration: Option<CalibrationFile>,
+}
+
+/// The result of a calibration.
+#[derive(Deserialize, Serialize)]
+#[serde(deny_unknown_fields)]
+struct CalibrationFile {
+    /// Lower triangle of the covariance of the parameters, row by row, in radians and millimetres.
+    covariance: Vec<Vec<f64>>,
 }
 
 impl Default for TrunkFile {
@@ -48,6 +60,8 @@ impl Default for TrunkFile {
             limits: CornerLimits::default(),
             passive_play: 0.2_f64.to_radians(),
             axes: [0, 1, 2, 3, 4],
+            tolerance: TrunkTolerance::default(),
+            covariance: None,
         };
         Self::of(&trunk, names)
     }
@@ -57,17 +71,10 @@ impl TrunkFile {
     /// The table of `trunk`, whose driven joints have axes with these `names`.
     pub(crate) fn of(trunk: &RigTrunk, names: [&str; TRUNK_AXES]) -> Self {
         let [front_corner, side_joint, rear_corner, rear_fold, front_fold] = names.map(str::to_owned);
-        let length = |mm: f64| format!("{mm:?}mm");
-        // Degrees where they are the same angle, so that people can read them.
-        let angle = |rad: f64| {
-            let degrees = (rad.to_degrees() * 1e9).round() / 1e9;
-            if Angle::from_deg(degrees).rad().to_bits() == rad.to_bits() {
-                format!("{degrees:?}deg")
-            } else {
-                format!("{rad:?}rad")
-            }
-        };
+        let (length, angle) = (length_text, angle_text);
         let (links, cameras, limits) = (&trunk.links, &trunk.cameras, &trunk.limits);
+        // What both mounts have alike; each has a table for the rest.
+        let common = CameraMount { height: 0.0, tilt: 0.0, roll: 0.0, ..cameras.left };
         Self {
             front_corner,
             side_joint,
@@ -83,10 +90,18 @@ impl TrunkFile {
             speed: angle(limits.speed),
             acceleration: angle(limits.acceleration),
             passive_speed: angle(limits.passive_speed),
-            camera_along: length(cameras.along),
-            camera_outward: length(cameras.outward),
-            camera_angle: angle(cameras.angle),
+            camera_along: length(common.along),
+            camera_outward: length(common.outward),
+            camera_angle: angle(common.angle),
             camera_diameter: length(2.0 * trunk.bodies.camera),
+            left_mount: MountFile::beside(&common, &cameras.left),
+            right_mount: MountFile::beside(&common, &cameras.right),
+            tolerance: ToleranceFile::of(&trunk.tolerance),
+            calibration: trunk.covariance.as_ref().map(|covariance| CalibrationFile {
+                covariance: (0..TRUNK_PARAMETERS)
+                    .map(|row| (0..=row).map(|column| covariance[(row, column)]).collect())
+                    .collect(),
+            }),
         }
     }
 
@@ -116,7 +131,16 @@ impl TrunkFile {
             half_end: length("half_end", &self.half_end, 1.0)?,
             fold_offset: length("fold_offset", &self.fold_offset, -LONGEST)?,
         };
-        let driven = [found[0], found[1], found[2]].map(|axis| axes[axis].range.map(crate::AxisPosition::value));
+        let common = CameraMount {
+            along: length("camera_along", &self.camera_along, -LONGEST)?,
+            outward: length("camera_outward", &self.camera_outward, -LONGEST)?,
+            angle: angle("camera_angle", &self.camera_angle)?,
+            height: 0.0,
+            tilt: 0.0,
+            roll: 0.0,
+        };
+        let range = |axis: usize| axes[axis].range.map(crate::AxisPosition::value);
+        let driven = [found[0], found[1], found[2]].map(range);
         let passive =
             [angle("passive_range", &self.passive_range[0])?, angle("passive_range", &self.passive_range[1])?];
         if passive[0] >= passive[1] {
@@ -126,9 +150,8 @@ impl TrunkFile {
             links,
             cameras: TrunkCameras {
                 side,
-                along: length("camera_along", &self.camera_along, -LONGEST)?,
-                outward: length("camera_outward", &self.camera_outward, -LONGEST)?,
-                angle: angle("camera_angle", &self.camera_angle)?,
+                left: self.left_mount.mount("left_mount", &common)?,
+                right: self.right_mount.mount("right_mount", &common)?,
             },
             bodies: TrunkBodies {
                 link: length("link_width", &self.link_width, 0.0)? / 2.0,
@@ -137,13 +160,39 @@ impl TrunkFile {
             limits: CornerLimits {
                 driven,
                 passive,
+                folds: [found[3], found[4]].map(range),
                 speed: positive("speed", &self.speed)?,
                 acceleration: positive("acceleration", &self.acceleration)?,
                 passive_speed: positive("passive_speed", &self.passive_speed)?,
             },
             passive_play: not_negative("passive_play", &self.passive_play)?,
             axes: found,
+            tolerance: self.tolerance.tolerance()?,
+            covariance: self.calibration.as_ref().map(CalibrationFile::matrix).transpose()?.map(Box::new),
         })
+    }
+}
+
+impl CalibrationFile {
+    /// The covariance, which must be symmetric by its form and positive.
+    fn matrix(&self) -> Result<TrunkCovariance, RigError> {
+        let place = "[trunk.calibration] covariance";
+        let rows = &self.covariance;
+        if rows.len() != TRUNK_PARAMETERS || rows.iter().enumerate().any(|(row, numbers)| numbers.len() != row + 1) {
+            return Err(contradiction(format!(
+                "{place}: it must have {TRUNK_PARAMETERS} rows of 1 to {TRUNK_PARAMETERS} numbers, its lower triangle"
+            )));
+        }
+        let matrix = TrunkCovariance::from_fn(|row, column| rows[row.max(column)][row.min(column)]);
+        // Scaled to a unit diagonal first: radians and millimetres differ by orders of magnitude.
+        let scale = matrix.diagonal().map(|variance| 1.0 / variance.sqrt());
+        let scaled = TrunkCovariance::from_fn(|row, column| matrix[(row, column)] * scale[row] * scale[column]);
+        if scaled.iter().all(|value| value.is_finite()) && scaled.cholesky().is_some() {
+            return Ok(matrix);
+        }
+        Err(contradiction(format!(
+            "{place}: it is not positive definite; let 'vergence calibrate stage' write it anew"
+        )))
     }
 }
 
@@ -152,36 +201,4 @@ fn joint(key: &str, name: &str, axes: &[RigAxis]) -> Result<usize, RigError> {
     found.ok_or_else(|| {
         contradiction(format!("[trunk] {key}: the rig has no rotary axis '{name}'; name one of its axes"))
     })
-}
-
-fn length(key: &str, text: &str, least: f64) -> Result<f64, RigError> {
-    let parsed: Length = text.parse().map_err(|error| contradiction(format!("[trunk] {key}: {error}")))?;
-    let mm = parsed.mm();
-    if (least..=LONGEST).contains(&mm) {
-        return Ok(mm);
-    }
-    Err(contradiction(format!("[trunk] {key}: {mm} mm is not from {least} mm to {LONGEST} mm")))
-}
-
-fn angle(key: &str, text: &str) -> Result<f64, RigError> {
-    let parsed: Angle = text.parse().map_err(|error| contradiction(format!("[trunk] {key}: {error}")))?;
-    let rad = parsed.rad();
-    if rad.abs() <= 2.0 * PI {
-        return Ok(rad);
-    }
-    Err(contradiction(format!("[trunk] {key}: {text} is more than a turn")))
-}
-
-fn not_negative(key: &str, text: &str) -> Result<f64, RigError> {
-    let rad = angle(key, text)?;
-    if rad >= 0.0 { Ok(rad) } else { Err(contradiction(format!("[trunk] {key}: {text} is negative"))) }
-}
-
-fn positive(key: &str, text: &str) -> Result<f64, RigError> {
-    let rad = angle(key, text)?;
-    if rad > 0.0 {
-        Ok(rad)
-    } else {
-        Err(contradiction(format!("[trunk] {key}: {text} must be above zero, in angle per second")))
-    }
 }

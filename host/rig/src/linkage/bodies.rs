@@ -1,8 +1,8 @@
 //! The bodies of the trunk's links and cameras, and how far they are from each other while both folds are flat.
 
-use nalgebra::{Rotation2, Vector2};
+use nalgebra::{Rotation2, Vector2, Vector3};
 
-use super::{Corners, SixBar, TrunkCameras};
+use super::{CameraMount, Corners, SixBar, TrunkCameras};
 
 /// Number of links of the planar trunk.
 const LINKS: usize = 6;
@@ -57,10 +57,10 @@ pub struct Gap {
 
 /// A body as a line with a radius.
 #[derive(Clone, Copy, Debug)]
-struct Capsule {
-    body: TrunkBody,
-    ends: [Vector2<f64>; 2],
-    radius: f64,
+pub(super) struct Capsule {
+    pub body: TrunkBody,
+    pub ends: [Vector3<f64>; 2],
+    pub radius: f64,
 }
 
 impl SixBar {
@@ -87,12 +87,12 @@ impl TrunkCameras {
     #[must_use]
     pub fn centres(&self, places: &[Vector2<f64>; LINKS]) -> [Vector2<f64>; 2] {
         let [a, b, _, _, e, f] = *places;
-        let mounted = |corner: Vector2<f64>, other: Vector2<f64>, outward: f64| {
+        let mounted = |mount: &CameraMount, corner: Vector2<f64>, other: Vector2<f64>, outward: f64| {
             let along = (other - corner).normalize();
-            corner + self.along * along + self.outward * (Rotation2::new(outward) * along)
+            corner + mount.along * along + mount.outward * (Rotation2::new(outward) * along)
         };
         let quarter = std::f64::consts::FRAC_PI_2;
-        [mounted(a, b, -quarter), mounted(f, e, quarter)]
+        [mounted(&self.left, a, b, -quarter), mounted(&self.right, f, e, quarter)]
     }
 }
 
@@ -105,24 +105,32 @@ impl TrunkBodies {
         let [left, right] = cameras.centres(&places);
         let link = |first: usize| Capsule {
             body: TrunkBody::Link(first),
-            ends: [places[first], places[(first + 1) % LINKS]],
+            ends: [places[first], places[(first + 1) % LINKS]].map(|place| place.push(0.0)),
             radius: self.link,
         };
-        let camera = |body, centre| Capsule { body, ends: [centre; 2], radius: self.camera };
+        let camera = |body, centre| Capsule { body, ends: [Vector2::push(&centre, 0.0); 2], radius: self.camera };
         let cameras = [camera(TrunkBody::LeftCamera, left), camera(TrunkBody::RightCamera, right)];
         let bodies: [Capsule; LINKS + 2] =
             std::array::from_fn(|body| if body < LINKS { link(body) } else { cameras[body - LINKS] });
-        let mut nearest = Gap { mm: f64::INFINITY, between: [TrunkBody::LeftCamera, TrunkBody::RightCamera] };
-        for (index, one) in bodies.iter().enumerate() {
-            for other in bodies.iter().skip(index + 1).filter(|other| !are_joined(one.body, other.body)) {
-                let mm = distance(one.ends, other.ends) - one.radius - other.radius;
-                if mm < nearest.mm {
-                    nearest = Gap { mm, between: [one.body, other.body] };
-                }
+        nearest(&bodies, |one, other| are_joined(bodies[one].body, bodies[other].body))
+    }
+}
+
+/// The two of the `bodies` that are nearest to each other, those that `are_joined`, by their places in the list, left out.
+pub(super) fn nearest(bodies: &[Capsule], are_joined: impl Fn(usize, usize) -> bool) -> Gap {
+    let mut nearest = Gap { mm: f64::INFINITY, between: [TrunkBody::LeftCamera, TrunkBody::RightCamera] };
+    for (first, one) in bodies.iter().enumerate() {
+        for (second, other) in bodies.iter().enumerate().skip(first + 1) {
+            if are_joined(first, second) {
+                continue;
+            }
+            let mm = distance(one.ends, other.ends) - one.radius - other.radius;
+            if mm < nearest.mm {
+                nearest = Gap { mm, between: [one.body, other.body] };
             }
         }
-        nearest
     }
+    nearest
 }
 
 /// Whether two bodies share a corner, or one carries the other.
@@ -138,23 +146,30 @@ fn are_joined(one: TrunkBody, other: TrunkBody) -> bool {
     }
 }
 
-/// Distance of two line segments in a plane.
-fn distance(one: [Vector2<f64>; 2], other: [Vector2<f64>; 2]) -> f64 {
-    if cross(one, other) {
-        return 0.0;
-    }
+/// Distance of two line segments.
+fn distance(one: [Vector3<f64>; 2], other: [Vector3<f64>; 2]) -> f64 {
     let ends =
         [to_segment(one[0], other), to_segment(one[1], other), to_segment(other[0], one), to_segment(other[1], one)];
-    ends.into_iter().fold(f64::INFINITY, f64::min)
+    let nearest = ends.into_iter().fold(f64::INFINITY, f64::min);
+    between_insides(one, other).map_or(nearest, |inside| inside.min(nearest))
 }
 
-/// Whether two segments cross inside both.
-fn cross(one: [Vector2<f64>; 2], other: [Vector2<f64>; 2]) -> bool {
-    let side = |line: [Vector2<f64>; 2], point: Vector2<f64>| (line[1] - line[0]).perp(&(point - line[0]));
-    side(one, other[0]) * side(one, other[1]) < 0.0 && side(other, one[0]) * side(other, one[1]) < 0.0
+/// Distance of the lines through two segments, where it is that of places inside both.
+fn between_insides(one: [Vector3<f64>; 2], other: [Vector3<f64>; 2]) -> Option<f64> {
+    let [first, second] = [one, other].map(|ends| ends[1] - ends[0]);
+    let normal = first.cross(&second);
+    let squared = normal.norm_squared();
+    // Nearly parallel segments are nearest to each other at an end.
+    if squared <= 1e-12 * first.norm_squared() * second.norm_squared() {
+        return None;
+    }
+    let way = other[0] - one[0];
+    let shares = [way.cross(&second).dot(&normal) / squared, way.cross(&first).dot(&normal) / squared];
+    let are_inside = shares.iter().all(|share| (0.0..=1.0).contains(share));
+    are_inside.then(|| way.dot(&normal).abs() / squared.sqrt())
 }
 
-fn to_segment(point: Vector2<f64>, segment: [Vector2<f64>; 2]) -> f64 {
+fn to_segment(point: Vector3<f64>, segment: [Vector3<f64>; 2]) -> f64 {
     let way = segment[1] - segment[0];
     let squared = way.norm_squared();
     let share = if squared > 0.0 { ((point - segment[0]).dot(&way) / squared).clamp(0.0, 1.0) } else { 0.0 };

@@ -7,38 +7,79 @@ use super::{Loop, NotDriven, TrunkJoint, TrunkLinks};
 
 const JOINTS: usize = TrunkJoint::COUNT;
 
-/// Where the cameras sit on their links; both sides are mirror images.
+/// Where one camera sits on its link, seen from outside: the same numbers on both sides are mirror images.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct TrunkCameras {
-    /// Length of the side links in millimetres.
-    pub side: f64,
+pub struct CameraMount {
     /// Distance from the front corner along the link, in millimetres.
     pub along: f64,
     /// Distance outward from the link, in millimetres.
     pub outward: f64,
+    /// Height above the plane of the corners, in millimetres.
+    pub height: f64,
     /// Angle of the optical axis from the link's front end outward, in radians.
     pub angle: f64,
+    /// Angle by which the camera then looks up, about its own x axis, in radians.
+    pub tilt: f64,
+    /// Angle by which the camera is then turned about its optical axis, x towards y, in radians.
+    pub roll: f64,
+}
+
+impl Default for CameraMount {
+    /// 60 degrees outward, inferred from the published separations of the modes; 50 mm along the link and 25 mm outward, in the
+    /// corners' plane and upright, assumed.
+    fn default() -> Self {
+        Self { along: 50.0, outward: 25.0, height: 0.0, angle: 60_f64.to_radians(), tilt: 0.0, roll: 0.0 }
+    }
+}
+
+impl CameraMount {
+    /// A camera at `at`, in the frame of its link, whose axis lies in the corners' plane along `axis` before it is tilted and rolled,
+    /// and whose lower side then is that of the trunk (-z of the link).
+    fn placed(&self, at: Vector3<f64>, axis: Vector3<f64>) -> Isometry3<f64> {
+        let down = -Vector3::z();
+        let columns = Matrix3::from_columns(&[down.cross(&axis), down, axis]);
+        let level = UnitQuaternion::from_rotation_matrix(&Rotation3::from_matrix_unchecked(columns));
+        let tilt = UnitQuaternion::from_axis_angle(&Vector3::x_axis(), self.tilt);
+        let roll = UnitQuaternion::from_axis_angle(&Vector3::z_axis(), self.roll);
+        Isometry3::from_parts(Translation3::from(at), level * tilt * roll)
+    }
+}
+
+/// Where both cameras sit on their links.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct TrunkCameras {
+    /// Length of the side links in millimetres.
+    pub side: f64,
+    /// The left camera, on link AB.
+    pub left: CameraMount,
+    /// The right camera, on link FE.
+    pub right: CameraMount,
 }
 
 impl Default for TrunkCameras {
-    /// 60 degrees outward, inferred from the published separations of the modes; 50 mm along the link and 25 mm outward, assumed.
     fn default() -> Self {
-        let side = TrunkLinks::default().side;
-        Self { side, along: 50.0, outward: 25.0, angle: 60_f64.to_radians() }
+        Self::alike(TrunkLinks::default().side, CameraMount::default())
     }
 }
 
 impl TrunkCameras {
+    /// Both cameras mounted as mirror images, on side links of this length in millimetres.
+    #[must_use]
+    pub const fn alike(side: f64, mount: CameraMount) -> Self {
+        Self { side, left: mount, right: mount }
+    }
+
     /// The left camera in the frame of its link: x from corner A to B, z up, so that -y is outward.
     pub(crate) fn link_from_left(&self) -> Isometry3<f64> {
-        let axis = Vector3::new(-self.angle.cos(), -self.angle.sin(), 0.0);
-        mounted(Vector3::new(self.along, -self.outward, 0.0), axis)
+        let CameraMount { along, outward, height, angle, .. } = self.left;
+        self.left.placed(Vector3::new(along, -outward, height), Vector3::new(-angle.cos(), -angle.sin(), 0.0))
     }
 
     /// The right camera in the frame of its link: x from corner E to F.
     pub(crate) fn link_from_right(&self) -> Isometry3<f64> {
-        let axis = Vector3::new(self.angle.cos(), -self.angle.sin(), 0.0);
-        mounted(Vector3::new(self.side - self.along, -self.outward, 0.0), axis)
+        let CameraMount { along, outward, height, angle, .. } = self.right;
+        let at = Vector3::new(self.side - along, -outward, height);
+        self.right.placed(at, Vector3::new(angle.cos(), -angle.sin(), 0.0))
     }
 
     /// Pose of the right camera in the left one's frame, with the trunk's joints at `angles` in radians.
@@ -83,12 +124,4 @@ impl TrunkCameras {
         }
         Ok(slopes)
     }
-}
-
-/// A camera at `at` that looks along `axis` and whose lower side is that of the trunk (-z of the link).
-fn mounted(at: Vector3<f64>, axis: Vector3<f64>) -> Isometry3<f64> {
-    let down = -Vector3::z();
-    let columns = Matrix3::from_columns(&[down.cross(&axis), down, axis]);
-    let rotation = UnitQuaternion::from_rotation_matrix(&Rotation3::from_matrix_unchecked(columns));
-    Isometry3::from_parts(Translation3::from(at), rotation)
 }

@@ -1,4 +1,4 @@
-//! How far a shape of the flat trunk is from what must not happen: a loop that does not close, bodies that touch, joints at their
+//! How far a shape of the trunk is from what must not happen: a loop that does not close, bodies that touch, joints at their
 //! ends.
 
 use std::f64::consts::PI;
@@ -20,23 +20,41 @@ pub struct FlatTrunk {
     pub limits: CornerLimits,
 }
 
-/// Limits of the corners: angles in radians, per second, and per second squared.
+/// Limits of the joints: angles in radians, per second, and per second squared.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct CornerLimits {
     /// Smallest and largest interior angle of A, B and C.
     pub driven: [[f64; 2]; 3],
     /// Smallest and largest interior angle of D, E and F.
     pub passive: [f64; 2],
-    /// Greatest speed of a driven corner.
+    /// Smallest and largest interior angle of the rear and of the front fold.
+    pub folds: [[f64; 2]; 2],
+    /// Greatest speed of a driven joint.
     pub speed: f64,
-    /// Greatest acceleration of a driven corner.
+    /// Greatest acceleration of a driven joint.
     pub acceleration: f64,
     /// Greatest speed of a passive corner.
     pub passive_speed: f64,
 }
 
+impl CornerLimits {
+    /// Time in seconds of a way of the joint that moves most, in radians: from rest to rest with constant acceleration, constant speed
+    /// and constant braking.
+    pub(super) fn seconds(&self, way: f64) -> f64 {
+        let rises = self.speed * self.speed / self.acceleration;
+        let rising = self.rising_seconds(way);
+        if way < rises { 2.0 * rising } else { way / self.speed + rising }
+    }
+
+    /// The part of that time in which it speeds up.
+    pub(super) fn rising_seconds(&self, way: f64) -> f64 {
+        let rises = self.speed * self.speed / self.acceleration;
+        (way.min(rises).max(0.0) / self.acceleration).sqrt()
+    }
+}
+
 impl Default for CornerLimits {
-    /// Ranges of the robot's servos (20 to 290 degrees for A and C, up to 270 for B) and of the published model's joints (3 rad
+    /// Ranges of the robot's servos (20 to 290 degrees for A and C, up to 270 for B, 0 to 240 for the folds) and of the published model's joints (3 rad
     /// from straight, so that 8.1 degrees are left between links). Speeds are assumed: 60 degrees a second, reached in half a
     /// second, for a corner without motor three times as much.
     fn default() -> Self {
@@ -46,6 +64,7 @@ impl Default for CornerLimits {
         Self {
             driven: [end, [folded, 270_f64.to_radians()], end],
             passive: [folded, open],
+            folds: [[0.0, 240_f64.to_radians()]; 2],
             speed,
             acceleration: 2.0 * speed,
             passive_speed: 3.0 * speed,
@@ -111,7 +130,7 @@ impl FlatTrunk {
 
     /// Corners D and F must not be farther apart than both links between them reach, nor coincide. The distance changes with each
     /// driven corner by the lever of its axis.
-    fn loop_reserve(&self, shape: &Corners) -> f64 {
+    pub(crate) fn loop_reserve(&self, shape: &Corners) -> f64 {
         let places = self.links.places(shape);
         let [a, b, c, d, _, f] = places;
         let way = f - d;
@@ -124,7 +143,7 @@ impl FlatTrunk {
         room / (lever(a) + lever(b) + lever(c)).max(f64::MIN_POSITIVE)
     }
 
-    fn joint_range(&self, shape: &Corners) -> f64 {
+    pub(super) fn joint_range(&self, shape: &Corners) -> f64 {
         let Corners([a, b, c, d, e, f]) = *shape;
         let passive = self.limits.passive;
         let driven = [a, b, c].into_iter().zip(self.limits.driven);

@@ -1,23 +1,34 @@
-//! Paths of the flat trunk from one shape to another.
+//! Paths of the trunk from one shape to another.
 //!
-//! A path is a list of legs. In a leg every driven corner runs in a straight line, all at the same share of their way, as the
+//! A path is a list of legs. In a leg every driven joint runs in a straight line, all at the same share of their way, as the
 //! firmware moves its axes. The planner looks for the fastest list that keeps the wanted clearance. A shape may have less than
 //! that itself: gecko is a dead centre of the linkage. The planner then leaves or enters it by one short leg along which the
-//! loop's reserve only grows, and does not go along the edge of what the loop can reach.
+//! loop's reserve only grows, and does not go along the edge of what the loop can reach. What leads from flat to folded shapes is in
+//! `folded`.
 
+mod folded;
 mod lattice;
 mod leg;
 mod no_path;
 mod refine;
+mod shapes;
 
 pub use leg::{Leg, LegSample};
 pub use no_path::{NoPath, PathEnd};
 
-use super::{Clearance, Corners, FlatTrunk, WantedClearance};
+use super::{Clearance, Corners, FlatTrunk, TrunkShape, WantedClearance};
 use leg::Driven;
+use shapes::Shapes;
 
-/// Longest way of a driven corner with less clearance than wanted, at either end of a path: 10 degrees.
+/// Longest way of a driven joint with less clearance than wanted, at either end of a path: 10 degrees.
 const LONGEST_PASSAGE: f64 = 0.1745;
+/// How far readings may be from the nearest shape: 3 degrees.
+const CLOSED_WITHIN: f64 = 0.0524;
+/// How far within reach of each other corners D and F are put, in square millimetres: a twentieth of a millimetre at the paper's links.
+const CLOSED_BY: f64 = 28.0;
+const CLOSING_STEPS: usize = 8;
+/// Step for the slope of the reach, in radians.
+const SLOPE_STEP: f64 = 1e-6;
 /// Shapes are the same where no driven corner differs by more than this, in radians.
 const SAME: f64 = 1e-9;
 /// By how much each attempt without a way lowers the wanted clearance.
@@ -59,7 +70,7 @@ impl TrunkPath {
     ///
     /// Each leg takes constant acceleration, constant speed, and constant braking.
     #[must_use]
-    pub fn at(&self, seconds: f64) -> Option<(Corners, Clearance)> {
+    pub fn at(&self, seconds: f64) -> Option<(TrunkShape, Clearance)> {
         let mut left = seconds.max(0.0);
         for leg in &self.legs {
             if left <= leg.seconds {
@@ -84,7 +95,8 @@ impl FlatTrunk {
     /// # Errors
     /// [`NoPath`] if an end is forbidden, or no way was found.
     pub fn path(&self, start: &Corners, goal: &Corners, wanted: &WantedClearance) -> Result<TrunkPath, NoPath> {
-        let [start, goal] = [self.end(start, PathEnd::Start)?, self.end(goal, PathEnd::Goal)?];
+        let start = self.closed(start);
+        let [start, goal] = [self.end(&start, PathEnd::Start)?, self.end(goal, PathEnd::Goal)?];
         let branch = match (Branch::of(&start), Branch::of(&goal)) {
             (Some(one), Some(other)) if one != other => return Err(NoPath::OtherBranch),
             (one, other) => one.or(other).unwrap_or(Branch::Outward),
@@ -92,13 +104,37 @@ impl FlatTrunk {
         let ends = [start, goal].map(|shape| driven_of(&shape));
         for share in RELAXED {
             let kept = WantedClearance { loop_reserve: wanted.loop_reserve * share, gap_mm: wanted.gap_mm * share };
-            let space = Space { trunk: self, branch, wanted: kept };
+            let space = Space { shapes: Shapes::Flat(self, branch), wanted: kept };
             if let Some(places) = space.search(ends) {
-                let legs = places.windows(2).filter_map(|pair| space.leg(pair[0], pair[1])).collect();
-                return Ok(TrunkPath { legs, kept });
+                return Ok(TrunkPath { legs: space.legs(&places), kept });
             }
         }
         Err(NoPath::NoWay)
+    }
+
+    /// The nearest shape to readings that are beyond a dead centre, as by play and noise: a trunk stands where its loop is closed,
+    /// whatever its encoders say. Readings that are further off stay as they are.
+    fn closed(&self, read: &Corners) -> Corners {
+        let mut driven = driven_of(read);
+        if self.links.shapes(driven).is_ok() {
+            return *read;
+        }
+        for _ in 0..CLOSING_STEPS {
+            let beyond = self.links.beyond_reach(driven) + CLOSED_BY;
+            if beyond <= 0.0 {
+                break;
+            }
+            let slope: [f64; 3] = std::array::from_fn(|corner| {
+                let mut moved = driven;
+                moved[corner] += SLOPE_STEP;
+                (self.links.beyond_reach(moved) - self.links.beyond_reach(driven)) / SLOPE_STEP
+            });
+            let steepness: f64 = slope.iter().map(|slope| slope * slope).sum();
+            driven = std::array::from_fn(|corner| driven[corner] - slope[corner] * beyond / steepness);
+        }
+        let is_near =
+            leg::longest(driven_of(read), driven) < CLOSED_WITHIN && driven.iter().all(|angle| angle.is_finite());
+        if is_near { self.links.outward_or_straight(driven) } else { *read }
     }
 
     /// Checks an end of a path, and closes the loop with its driven corners.
@@ -118,25 +154,17 @@ fn driven_of(shape: &Corners) -> Driven {
     [a, b, c]
 }
 
-/// The shapes of one branch, and what paths among them must keep.
+/// Shapes, and what paths among them must keep.
 #[derive(Clone, Copy, Debug)]
 struct Space<'a> {
-    trunk: &'a FlatTrunk,
-    branch: Branch,
+    shapes: Shapes<'a>,
     wanted: WantedClearance,
 }
 
 impl Space<'_> {
-    /// The shape with these driven corners; `None` where the loop does not close, or something is forbidden.
-    fn shape(&self, driven: Driven) -> Option<(Corners, Clearance)> {
-        let shapes = self.trunk.links.shapes(driven).ok()?;
-        let shape = match self.branch {
-            Branch::Outward => shapes.first(),
-            Branch::Inward => shapes.last(),
-        };
-        let shape = *shape?;
-        let room = self.trunk.clearance(&shape);
-        (!room.is_forbidden()).then_some((shape, room))
+    /// The shape at this place; `None` where the loop does not close, or something is forbidden.
+    fn shape(&self, place: Driven) -> Option<(TrunkShape, Clearance)> {
+        self.shapes.at(place).filter(|(_, room)| !room.is_forbidden())
     }
 
     fn is_free(&self, driven: Driven) -> bool {
@@ -155,6 +183,11 @@ impl Space<'_> {
         let [leave, enter] = ends.map(|end| self.exits(end));
         let by_exits = self.between_exits(ends, &leave, &enter).or_else(|| self.by_lattice(ends, &leave, &enter))?;
         Some(self.refine(by_exits))
+    }
+
+    /// The legs of the path through `places`.
+    fn legs(&self, places: &[Driven]) -> Vec<Leg> {
+        places.windows(2).filter_map(|pair| self.leg(pair[0], pair[1])).collect()
     }
 
     /// Time in seconds of the path through `places`; `None` where a leg is not allowed.

@@ -66,6 +66,12 @@ impl SixBar {
         half.closed_by(-self.height(half.apart()))
     }
 
+    /// By how much the square of the distance of corners D and F, with A, B and C at these interior angles in radians, is more than that
+    /// which the links between them reach, in square millimetres: zero at the dead centre, and smooth there.
+    pub(crate) fn beyond_reach(&self, driven: [f64; 3]) -> f64 {
+        HalfLoop::of(self, driven).apart().powi(2) - (2.0 * self.side).powi(2)
+    }
+
     /// Distance of corner E from the line through D and F, which are `apart`.
     fn height(&self, apart: f64) -> f64 {
         (self.side.powi(2) - (apart / 2.0).powi(2)).max(0.0).sqrt()

@@ -1,12 +1,12 @@
-//! One leg of a path: all driven corners run in a straight line, from rest to rest.
+//! One leg of a path: all driven joints run in a straight line, from rest to rest.
 
 use super::{LONGEST_PASSAGE, Space};
-use crate::linkage::{Clearance, CornerLimits, Corners};
+use crate::linkage::{Clearance, CornerLimits, TrunkShape};
 
-/// Interior angles of the corners A, B and C in radians.
+/// Coordinates of a shape in radians: see [`super::Shapes`].
 pub(super) type Driven = [f64; 3];
 
-/// Distance of the samples along a leg, in radians of the corner that moves most: half a degree.
+/// Distance of the samples along a leg, in radians of the joint that moves most: half a degree.
 const SAMPLE: f64 = 8.73e-3;
 
 /// A shape along a leg.
@@ -15,18 +15,21 @@ pub struct LegSample {
     /// The share of the way, from 0 to 1.
     pub share: f64,
     /// The shape there.
-    pub shape: Corners,
+    pub shape: TrunkShape,
     /// Its clearance.
     pub room: Clearance,
 }
 
-/// A straight way of the driven corners.
+/// A straight way of the driven joints.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Leg {
     /// Shapes along the leg, with both ends.
     pub samples: Vec<LegSample>,
-    /// Time in seconds from rest to rest, with the corners' limits.
+    /// Time in seconds from rest to rest, with the joints' limits.
     pub seconds: f64,
+    /// Speed of the joint that moves most, in radians per second, which it does not exceed; lower than the joints' limit where a
+    /// passive corner would be too fast.
+    pub speed: f64,
     /// The part of that time in which it speeds up, and as much in which it brakes.
     rising: f64,
 }
@@ -50,12 +53,12 @@ impl Leg {
 
     /// The shape at its end.
     #[must_use]
-    pub fn end(&self) -> Option<&Corners> {
+    pub fn end(&self) -> Option<&TrunkShape> {
         self.samples.last().map(|sample| &sample.shape)
     }
 }
 
-/// Way of the corner that moves most.
+/// Way of the joint that moves most.
 pub(super) fn longest(from: Driven, to: Driven) -> f64 {
     from.iter().zip(to).map(|(one, other)| (one - other).abs()).fold(0.0, f64::max)
 }
@@ -65,20 +68,23 @@ impl Space<'_> {
     /// must have the wanted clearance but for a short passage at either end, along which the loop's reserve grows with the
     /// distance from that end.
     pub(super) fn leg(&self, from: Driven, to: Driven) -> Option<Leg> {
-        let way = longest(from, to);
+        let (way, limits) = (longest(from, to), self.shapes.limits());
         let pieces = (way / SAMPLE).ceil().max(1.0) as u32;
         let at = |piece: u32| {
             let share = f64::from(piece) / f64::from(pieces);
-            let driven = std::array::from_fn(|corner| from[corner] + share * (to[corner] - from[corner]));
-            self.shape(driven).map(|(shape, room)| LegSample { share, shape, room })
+            // The end is that asked for, to the last digit.
+            let along = |joint: usize| from[joint] + share * (to[joint] - from[joint]);
+            let place = if piece == pieces { to } else { std::array::from_fn(along) };
+            self.shape(place).map(|(shape, room)| LegSample { share, shape, room })
         };
         let samples: Vec<LegSample> = (0..=pieces).map(at).collect::<Option<_>>()?;
         let begins = self.passage(samples.iter(), way)?;
         let ends = self.passage(samples.iter().rev(), way)?;
         let inside = samples.get(begins..samples.len() - ends).unwrap_or_default();
         let is_clear = inside.iter().all(|sample| sample.room.has(&self.wanted));
-        let [seconds, rising] = durations(&samples, way, &self.trunk.limits);
-        is_clear.then_some(Leg { seconds, rising, samples })
+        let [seconds, rising, slower] = durations(&samples, way, limits);
+        let speed = limits.speed / slower;
+        is_clear.then_some(Leg { seconds, speed, rising, samples })
     }
 
     /// Number of samples at the beginning that have less room than wanted; `None` if they are too many, or the loop's reserve does
@@ -101,20 +107,19 @@ impl Space<'_> {
     }
 }
 
-/// Time from rest to rest with constant acceleration, constant speed and constant braking, and the part in which it speeds up; longer
-/// where a passive corner would exceed its speed.
-fn durations(samples: &[LegSample], way: f64, limits: &CornerLimits) -> [f64; 2] {
+/// Time from rest to rest with constant acceleration, constant speed and constant braking, the part in which it speeds up, and by how
+/// much both are longer because a passive corner would exceed its speed.
+fn durations(samples: &[LegSample], way: f64, limits: &CornerLimits) -> [f64; 3] {
     let CornerLimits { speed, acceleration, passive_speed, .. } = *limits;
-    let rises = speed * speed / acceleration;
-    let rising = way.min(rises).max(0.0).sqrt() / acceleration.sqrt();
-    let alone = if way < rises { 2.0 * rising } else { way / speed + rising };
+    let (alone, rising) = (limits.seconds(way), limits.rising_seconds(way));
     let fastest = samples.windows(2).map(|pair| {
         let [from, to] = [pair[0], pair[1]];
         let middle = f64::midpoint(from.share, to.share) * way;
         let driven = speed.min((2.0 * acceleration * middle.min(way - middle)).sqrt());
-        let turned = (3..6).map(|corner| (to.shape.0[corner] - from.shape.0[corner]).abs()).fold(0.0, f64::max);
+        let turned =
+            (3..6).map(|corner| (to.shape.corners.0[corner] - from.shape.corners.0[corner]).abs()).fold(0.0, f64::max);
         turned * driven / ((to.share - from.share) * way)
     });
     let slower = (fastest.fold(0.0, f64::max) / passive_speed).max(1.0);
-    [alone * slower, rising * slower]
+    [alone * slower, rising * slower, slower]
 }

@@ -30,11 +30,17 @@ pub enum NoPath {
         /// Angle in radians.
         by: f64,
     },
-    /// A fold is not flat at one end.
+    /// A folded end whose folds differ, or whose sides do.
     #[error(
-        "paths are planned for the flat trunk: move both folds to 180 degrees first, from a shape with both sides alike"
+        "folded, the loop closes only with both sides alike and both folds alike: at the {end} a joint is {:.1} degrees off that",
+        .by.to_degrees()
     )]
-    Folded,
+    NotAlike {
+        /// Which end of the path.
+        end: PathEnd,
+        /// Angle in radians.
+        by: f64,
+    },
     /// Corner E is outside at one end and inside at the other.
     #[error(
         "corner E would have to pass from one side of the line DF to the other, through a dead centre where it may go either way"
