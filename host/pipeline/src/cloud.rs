@@ -4,15 +4,17 @@ use std::collections::BTreeMap;
 
 use image::RgbImage;
 use vergence_matching::{Match, MatchError, Matcher, Matches, UnmatchedReason};
-use vergence_rig::{Rig, TrackGap, moving_cloud};
+use vergence_rig::{OpenLoop, Rig, RigPose, TrackGap, moving_cloud};
 use vergence_vision::{
-    Cloud, CloudPoint, DropReason, FusedPose, Kernel, PixelPair, PoseDrift, StereoPair, cloud_of_each, pose_drift,
+    Cloud, CloudPoint, DropReason, FusedPose, Kernel, Length, PixelPair, PoseDrift, StereoPair, cloud_of_each,
+    pose_drift,
 };
 
-use crate::limits::{cloud_gates, matching_sigma};
+use crate::limits::{cloud_gates, expected_drift, matching_sigma};
 use crate::pair::{PairImages, colour_at};
 use crate::pose::PairPose;
 use crate::pose_source::{fused_pose, with_fused};
+use crate::search::{EVERYWHERE, Search};
 use crate::stage::Stage;
 
 /// A point with its colour in the left image.
@@ -49,6 +51,8 @@ pub struct PairCloud {
     pub dropped: Dropped,
     /// The correction of the pose by the joints that the matches ask for, where there are enough of them. It is not applied.
     pub pose_drift: Option<PoseDrift>,
+    /// Whether nothing is known of the calibration: the covariances of the points then lack its part.
+    pub lacks_calibration: bool,
     /// The pose by which the points were made, where joints and matches told it together; else the joints told it alone.
     pub fused_pose: Option<FusedPose>,
 }
@@ -59,6 +63,12 @@ impl PairCloud {
     pub fn significant_drift(&self) -> Option<&PoseDrift> {
         self.pose_drift.as_ref().filter(|drift| drift.is_significant())
     }
+
+    /// The pose by which the points were made, given that by the joints alone.
+    #[must_use]
+    pub fn pose(&self, by_joints: &RigPose) -> RigPose {
+        self.fused_pose.as_ref().map_or_else(|| by_joints.clone(), |fused| with_fused(by_joints, fused))
+    }
 }
 
 /// Rules by which a pair becomes points.
@@ -68,12 +78,14 @@ pub struct Method<'a> {
     pub matcher: &'a dyn Matcher,
     /// Makes a point of two rays.
     pub kernel: Kernel,
+    /// Where points are sought.
+    pub search: &'a Search,
 }
 
 impl<'a> From<&'a dyn Matcher> for Method<'a> {
-    /// Pseudo-intersection of what `matcher` finds.
+    /// Pseudo-intersection of what `matcher` finds everywhere.
     fn from(matcher: &'a dyn Matcher) -> Self {
-        Self { matcher, kernel: Kernel::default() }
+        Self { matcher, kernel: Kernel::default(), search: &EVERYWHERE }
     }
 }
 
@@ -87,6 +99,9 @@ pub enum PairCloudError {
     /// The joints at the exposure are not known.
     #[error(transparent)]
     Joints(#[from] TrackGap),
+    /// The joints of a trunk cannot all stand where they read.
+    #[error(transparent)]
+    Trunk(#[from] OpenLoop),
 }
 
 /// Matches two images and triangulates the matches with the pose that the cameras had when each row was exposed. `ended`
@@ -108,7 +123,8 @@ pub enum PairCloudError {
 /// ```
 ///
 /// # Errors
-/// Where the images do not belong to the cameras, the cameras share no field, or the joints of a row are not known.
+/// Where the images do not belong to the cameras, the cameras share no field, the joints of a row are not known, or the loop of a
+/// trunk does not close as they read.
 pub fn pair_cloud(
     images: PairImages<'_>,
     rig: &Rig,
@@ -117,11 +133,12 @@ pub fn pair_cloud(
     ended: &mut dyn FnMut(Stage),
 ) -> Result<PairCloud, PairCloudError> {
     let middle = pose.at_middle();
+    middle.check_closure()?;
     let sigma = matching_sigma(middle, pose.sweep());
-    let found = images.with_grey(rig, middle, sigma, |pair| method.matcher.find(pair))?;
+    let found = images.with_grey((rig, method.search), middle, sigma, |pair| method.matcher.find(pair))?;
     ended(Stage::Match);
     let pairs: Vec<_> = found.pairs.iter().map(Match::measured).collect();
-    let cloud = cloud_of_pairs(&pairs, images.left, rig, pose, method.kernel)?;
+    let cloud = cloud_of(&pairs, images.left, (rig, pose), (method.kernel, method.search.farthest))?;
     ended(Stage::Triangulate);
     Ok(cloud.scored(found))
 }
@@ -137,10 +154,19 @@ pub fn cloud_of_pairs(
     pose: &PairPose,
     kernel: Kernel,
 ) -> Result<PairCloud, TrackGap> {
+    cloud_of(pairs, left, (rig, pose), (kernel, None))
+}
+
+fn cloud_of(
+    pairs: &[(PixelPair, f64)],
+    left: &RgbImage,
+    (rig, pose): (&Rig, &PairPose),
+    (kernel, farthest): (Kernel, Option<Length>),
+) -> Result<PairCloud, TrackGap> {
     let middle = pose.at_middle();
     let fused = fused_pose(rig, pose, pairs);
     let used = fused.map_or_else(|| middle.clone(), |fused| with_fused(middle, &fused));
-    let gates = cloud_gates(rig, &used, kernel);
+    let gates = cloud_gates(rig, &used, kernel, farthest);
     let by_joints =
         StereoPair { left: &rig.left_camera, right: &rig.right_camera, left_from_right: middle.left_from_right };
     let Cloud { points, dropped } = match pose.rows().filter(|_| fused.is_none()) {
@@ -148,7 +174,7 @@ pub fn cloud_of_pairs(
         Some((motion, exposure)) => moving_cloud(pairs, rig, motion, exposure, &gates)?,
     };
     // While the pose turns by more than it is uncertain, one correction for all rows means nothing.
-    let drift = pose.is_steady().then(|| pose_drift(pairs, &by_joints, &middle.covariance)).flatten();
+    let drift = pose.is_steady().then(|| pose_drift(pairs, &by_joints, &expected_drift(middle))).flatten();
     let coloured = |point: CloudPoint| {
         let colour = colour_at(left, point.pixels.left);
         ColouredPoint { point, colour, score: 1.0 }
@@ -159,6 +185,7 @@ pub fn cloud_of_pairs(
         matches: pairs.len(),
         dropped: Dropped { matches: dropped, ..Dropped::default() },
         pose_drift: drift,
+        lacks_calibration: !middle.is_calibration_known,
         fused_pose: fused,
     })
 }

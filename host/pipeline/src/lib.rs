@@ -6,35 +6,44 @@
 //! - [`pair_cloud`] matches a [`PairImages`] and triangulates what passes the gates, whose [`limits`] all verbs share; [`cloud_of_pairs`] triangulates given
 //!   correspondences;
 //! - where the joints alone tell the pose too badly, joints and matches tell it together ([`PairCloud::fused_pose`], [`pose_by_images`]);
+//! - a [`Search`] says between which ranges points are sought, and what masks hide;
+//! - [`axes_by_images`] finds where axes stand that no encoder tells;
 //! - [`dense_ranges`] measures every pixel of the left image;
 //! - [`bearings`] gives the directions that one camera alone can see;
 //! - [`observe_pair`] and [`observe_one`] make an [`Observation`] of what a live rig delivers;
+//! - [`ModeOutlook`] predicts what a mode would offer, for a choice of the mode;
 //! - [`rig_zones`] and [`RigView`] say what the cameras of a rig cover, [`score`] compares ranges with the truth.
 //!
 //! Everything here is a pure function of its arguments: no clock, no file, no thread, no sentence for people. Callers who want
 //! to know how long a [`Stage`] takes pass a callback, such as that of [`StageTimes`].
 
+mod axes_by_images;
 mod bearings;
 mod cloud;
 mod dense;
 mod exposures;
 pub mod limits;
+mod mode_outlook;
 mod observation;
 mod pair;
 mod pose;
 mod pose_source;
 mod score;
+mod search;
 mod stage;
 mod zones;
 
+pub use axes_by_images::{AxisEstimate, axes_by_images, axis_estimates};
 pub use bearings::{Bearing, bearings};
 pub use cloud::{ColouredPoint, Dropped, Method, PairCloud, PairCloudError, cloud_of_pairs, pair_cloud};
 pub use dense::dense_ranges;
 pub use exposures::{Ambiguity, CameraGone, Exposed, ExposedImage, Exposures, SkipReason, TimeBase};
+pub use mode_outlook::ModeOutlook;
 pub use observation::{Observation, observe_one, observe_pair};
 pub use pair::{PairImages, colour_at};
 pub use pose::{Motion, PairPose, TriggeredImage, UnpairedImage, pair_exposure};
 pub use pose_source::{pose_by_images, with_fused};
 pub use score::{Score, Spread, score};
+pub use search::Search;
 pub use stage::{Stage, StageTimes};
 pub use zones::{RigView, ZONE_RADIUS, rig_zones};

@@ -9,7 +9,7 @@ use crate::cloud::{Method, PairCloud, PairCloudError, pair_cloud};
 use crate::exposures::CameraGone;
 use crate::pair::PairImages;
 use crate::pose::PairPose;
-use crate::pose_source::with_fused;
+use crate::search::Search;
 
 /// The measurement of one exposure. It holds nothing of any other.
 #[derive(Clone, Debug)]
@@ -45,13 +45,44 @@ pub fn observe_pair(
     method: Method<'_>,
 ) -> Result<Observation, PairCloudError> {
     let cloud = Box::new(pair_cloud(images, rig, pose, method, &mut |_| ())?);
-    let middle = pose.at_middle();
-    let used = cloud.fused_pose.as_ref().map_or_else(|| middle.clone(), |fused| with_fused(middle, fused));
-    Ok(Observation::Points { cloud, pose: Box::new(used), moving: pose.is_moving() })
+    let used = Box::new(cloud.pose(pose.at_middle()));
+    Ok(Observation::Points { cloud, pose: used, moving: pose.is_moving() })
 }
 
-/// The bearings of the image of one camera; `why` says why the other camera delivers nothing.
+/// The bearings of the image of one camera, but where the mask of `search` hides them; `why` says why the other camera delivers
+/// nothing.
 #[must_use]
-pub fn observe_one(image: &RgbImage, rig: &Rig, side: Side, why: CameraGone) -> Observation {
-    Observation::Bearings { side, bearings: bearings(image, rig.camera(side)), why }
+pub fn observe_one(image: &RgbImage, (rig, search): (&Rig, &Search), side: Side, why: CameraGone) -> Observation {
+    let mut bearings = bearings(image, rig.camera(side));
+    bearings.retain(|bearing| !search.hides(side, bearing.pixel));
+    Observation::Bearings { side, bearings, why }
+}
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::expect_used, reason = "a test may fail")]
+
+    use image::Rgb;
+    use vergence_rig::BENCH_TOML;
+    use vergence_vision::BodyMask;
+
+    use super::*;
+
+    #[test]
+    fn no_bearing_lies_where_a_mask_hides_it() {
+        let rig = Rig::from_toml(BENCH_TOML).expect("the bench").with_sensors(200).expect("a size");
+        let image = RgbImage::from_fn(200, 200, |x, y| Rgb([if (x / 8 + y / 8) % 2 == 0 { 30 } else { 220 }; 3]));
+        let hidden = (0..200 * 200).map(|index| index % 200 < 100).collect();
+        let mask = BodyMask::new(rig.left_camera.size(), hidden).expect("as many pixels");
+        let search = Search { masks: [Some(mask), None], ..Search::default() };
+        let pixels = |side| match observe_one(&image, (&rig, &search), side, CameraGone::Unknown) {
+            Observation::Bearings { bearings, .. } => {
+                bearings.iter().map(|bearing| bearing.pixel.u).collect::<Vec<_>>()
+            }
+            Observation::Points { .. } => Vec::new(),
+        };
+        let (left, right) = (pixels(Side::Left), pixels(Side::Right));
+        assert!(left.len() > 20 && left.iter().all(|u| *u >= 99.5), "{left:?}");
+        assert!(right.iter().any(|u| *u < 99.5));
+    }
 }

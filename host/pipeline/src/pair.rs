@@ -6,7 +6,7 @@ use vergence_matching::ImagePair;
 use vergence_rig::{Rig, RigPose};
 use vergence_vision::{Angle, Pixel};
 
-use crate::limits::NEAREST;
+use crate::search::Search;
 
 /// The images that both cameras took at one instant.
 #[derive(Clone, Copy, Debug)]
@@ -18,11 +18,11 @@ pub struct PairImages<'a> {
 }
 
 impl PairImages<'_> {
-    /// Calls `work` with both images in grey and what is known of their cameras; `pose_sigma` is the standard deviation of the
-    /// relative rotation in `pose`.
+    /// Calls `work` with both images in grey, what is known of their cameras, and where points are sought; `pose_sigma` is the
+    /// standard deviation of the relative rotation in `pose`.
     pub(crate) fn with_grey<T>(
         self,
-        rig: &Rig,
+        (rig, search): (&Rig, &Search),
         pose: &RigPose,
         pose_sigma: Angle,
         work: impl FnOnce(&ImagePair<'_>) -> T,
@@ -35,7 +35,8 @@ impl PairImages<'_> {
             right_camera: &rig.right_camera,
             left_from_right: pose.left_from_right,
             pose_sigma,
-            nearest: NEAREST,
+            nearest: search.nearest_at(pose),
+            masks: search.masks.each_ref().map(Option::as_ref),
         })
     }
 }

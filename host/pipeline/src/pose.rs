@@ -98,7 +98,9 @@ impl PairPose {
     /// # Errors
     /// As [`Self::in_motion`].
     pub fn at_speed(rig: &Rig, positions: &[AxisPosition], speeds: &[f64]) -> Result<Self, TrackGap> {
-        let rates = rig.axes.iter().zip(speeds).map(|(axis, speed)| speed * 1e-6 / axis.value_per_count()).collect();
+        let rates =
+            rig.axes.iter().zip(speeds).map(|(axis, speed)| speed * 1e-6 / (axis.direction() * axis.value_per_count()));
+        let rates = rates.collect();
         let counts = rig.axes.iter().zip(positions).map(|(axis, at)| axis.counts_at(at.value())).collect();
         let known = vec![0.0; rig.axes.len()];
         let joints = JointsAt { counts, sigma: known.clone(), timing: known };

@@ -2,11 +2,12 @@
 
 use vergence_matching::{Match, MatchError, Matcher};
 use vergence_rig::{Rig, RigPose};
-use vergence_vision::{FusedPose, Length, PixelPair, StereoPair, fuse_pose};
+use vergence_vision::{FusedPose, Length, MatchErrors, PixelPair, StereoPair, fuse_pose};
 
 use crate::limits::{JOINTS_SUFFICE, matching_sigma};
 use crate::pair::PairImages;
 use crate::pose::PairPose;
+use crate::search::Search;
 
 /// The pose that the joints and `matches` tell together, where the joints alone tell it too badly. `None` where they suffice, where
 /// the rig moved during the exposure, and where too few matches agree.
@@ -18,14 +19,14 @@ pub(crate) fn fused_pose(rig: &Rig, pose: &PairPose, matches: &[(PixelPair, f64)
     let stereo =
         StereoPair { left: &rig.left_camera, right: &rig.right_camera, left_from_right: middle.left_from_right };
     // The joints' errors move the pose far: matches that the covariance of the joints excludes are not looked at.
-    fuse_pose(matches, &stereo, &middle.covariance).filter(|fused| fused.rotation_sigma() < middle.rotation_sigma)
+    fuse_pose(matches, &stereo, &middle.covariance(), MatchErrors::Measured)
+        .filter(|fused| fused.rotation_sigma() < middle.rotation_sigma)
 }
 
 /// Whether the joints tell the rotation of `pose` well enough. What the calibration leaves uncertain is no part of that: one pair of
 /// images knows it less well than the many of a calibration, and a misfit of the lens model would turn the pose.
-fn joints_suffice(rig: &Rig, pose: &RigPose) -> bool {
-    let (all, calibration) = (pose.rotation_sigma.rad(), rig.calibration_sigma.0.rad());
-    all.powi(2) - calibration.powi(2) <= JOINTS_SUFFICE.rad().powi(2)
+pub(crate) fn joints_suffice(rig: &Rig, pose: &RigPose) -> bool {
+    rig.rotation_sigma_of_joints(pose) <= JOINTS_SUFFICE
 }
 
 /// `pose` with the relative pose that joints and images tell together.
@@ -34,7 +35,7 @@ pub fn with_fused(pose: &RigPose, fused: &FusedPose) -> RigPose {
     let shift = fused.covariance.fixed_view::<3, 3>(3, 3).trace().max(0.0).sqrt();
     RigPose {
         left_from_right: fused.left_from_right,
-        covariance: fused.covariance,
+        shared: pose.shared.with_pose(&fused.covariance),
         rotation_sigma: fused.rotation_sigma(),
         translation_sigma: Length::from_mm(shift),
         ..pose.clone()
@@ -48,7 +49,7 @@ pub fn with_fused(pose: &RigPose, fused: &FusedPose) -> RigPose {
 /// Where the images do not belong to the cameras, or the cameras share no field.
 pub fn pose_by_images(
     images: PairImages<'_>,
-    rig: &Rig,
+    (rig, search): (&Rig, &Search),
     pose: &RigPose,
     matcher: &dyn Matcher,
 ) -> Result<Option<FusedPose>, MatchError> {
@@ -57,7 +58,7 @@ pub fn pose_by_images(
     }
     let standing = PairPose::standing(pose.clone());
     let sigma = matching_sigma(pose, standing.sweep());
-    let found = images.with_grey(rig, pose, sigma, |pair| matcher.find(pair))?;
+    let found = images.with_grey((rig, search), pose, sigma, |pair| matcher.find(pair))?;
     let pairs: Vec<_> = found.pairs.iter().map(Match::measured).collect();
     Ok(fused_pose(rig, &standing, &pairs))
 }

@@ -4,16 +4,17 @@
 use std::collections::BTreeMap;
 
 use image::RgbImage;
-use vergence_matching::{ImagePair, Match, MatchError, Matcher, Matches, UnmatchedReason};
+use vergence_matching::{GuidedMatcher, ImagePair, Match, MatchError, Matcher, Matches, UnmatchedReason};
 use vergence_pipeline::{
-    Method, Motion, PairCloud, PairImages, PairPose, Stage, TriggeredImage, UnpairedImage, pair_cloud, pair_exposure,
+    Method, Motion, PairCloud, PairCloudError, PairImages, PairPose, Stage, TriggeredImage, UnpairedImage, pair_cloud,
+    pair_exposure,
 };
 use vergence_protocol::Counts;
 use vergence_rig::{
     BENCH_TOML, BoardInstant, ExposureDelay, HostInstant, JointsAt, Rig, RigPose, StampedImage, SteadyMotion,
     TimedEvent,
 };
-use vergence_vision::{DropReason, Kernel, Left, Pixel, Point};
+use vergence_vision::{DropReason, Left, Pixel, Point};
 
 fn rig() -> Rig {
     Rig::from_toml(BENCH_TOML).expect("a rig")
@@ -58,7 +59,8 @@ fn cloud_in(pose: &PairPose, ended: &mut dyn FnMut(Stage)) -> PairCloud {
     let (rig, matcher) = (rig(), Known { rig: rig(), points });
     let image = RgbImage::new(1, 1);
     let images = PairImages { left: &image, right: &image };
-    let method = Method { matcher: &matcher, kernel: Kernel::default() };
+    let matcher: &dyn Matcher = &matcher;
+    let method = Method::from(matcher);
     pair_cloud(images, &rig, pose, method, ended).expect("a cloud")
 }
 
@@ -123,4 +125,21 @@ fn an_image_of_another_pulse_has_no_pose() {
     let pose = PairPose::at_pulse(&rig, &image(1.02e6)).expect("its own pulse");
     assert_eq!(pose.at_middle(), &rig.pose(&JointsAt::latched(&counts)));
     assert_eq!(PairPose::at_pulse(&rig, &image(0.9e6)).err(), Some(UnpairedImage));
+}
+
+/// A trunk whose joints read what its links cannot do is no pose to measure with.
+#[test]
+fn a_trunk_that_does_not_close_gives_no_cloud() {
+    let rig = Rig::from_toml(include_str!("../../../docs/rigs/origaker.toml")).expect("the robot's file");
+    let images = [(); 2].map(|()| RgbImage::new(1280, 1280));
+    let cloud = |front_corner: f64| {
+        let values = [front_corner, 90.0, 180.0, 180.0, 180.0].map(f64::to_radians);
+        let pose = PairPose::standing(rig.pose_read_at(&values));
+        let pair = PairImages { left: &images[0], right: &images[1] };
+        let matcher: &dyn Matcher = &GuidedMatcher::default();
+        pair_cloud(pair, &rig, &pose, Method::from(matcher), &mut |_| ()).err()
+    };
+    let refused = cloud(97.0);
+    assert!(matches!(&refused, Some(PairCloudError::Trunk(open)) if open.missed > 4.0), "{refused:?}");
+    assert!(!matches!(cloud(90.0), Some(PairCloudError::Trunk(_))));
 }

@@ -2,10 +2,10 @@
 #![allow(clippy::expect_used, reason = "a test fails loudly")]
 
 use image::RgbImage;
-use nalgebra::{Matrix6, Vector3, Vector6};
+use nalgebra::{Vector3, Vector6};
 use vergence_pipeline::{PairCloud, PairPose, cloud_of_pairs};
-use vergence_rig::{BENCH_TOML, Rig, RigPose};
-use vergence_vision::{Angle, Kernel, Left, PixelPair, Point};
+use vergence_rig::{BENCH_TOML, Rig, RigCalibration, RigPose};
+use vergence_vision::{Angle, Kernel, Left, Length, PixelPair, Point, SharedCovariance};
 
 fn rig() -> Rig {
     Rig::from_toml(BENCH_TOML).expect("a rig")
@@ -56,8 +56,11 @@ fn badly_known() -> RigPose {
     let turn = (other.left_from_right.rotation() * stated.left_from_right.rotation().inverse()).scaled_axis();
     let shift = other.left_from_right.origin().mm() - stated.left_from_right.origin().mm();
     let twist = Vector6::from_iterator(turn.iter().chain(shift.iter()).copied());
-    let covariance: Matrix6<f64> = stated.covariance + twist * twist.transpose();
-    RigPose { covariance, rotation_sigma: Angle::from_deg(5.0), ..stated }
+    RigPose {
+        shared: stated.shared.plus_pose(&(twist * twist.transpose())),
+        rotation_sigma: Angle::from_deg(5.0),
+        ..stated
+    }
 }
 
 #[test]
@@ -70,7 +73,7 @@ fn images_tell_the_pose_that_the_joints_do_not() {
     assert!(off(&found, &truth) < 0.01, "{}", off(&found, &truth));
     assert!(found.points.len() * 10 > pairs.len() * 9, "{} of {}", found.points.len(), pairs.len());
     // The joints alone, said to be sure of themselves.
-    let sure = RigPose { covariance: Matrix6::zeros(), rotation_sigma: Angle::from_deg(0.02), ..badly_known() };
+    let sure = RigPose { shared: SharedCovariance::exact(), rotation_sigma: Angle::from_deg(0.02), ..badly_known() };
     let alone = cloud(sure, &pairs);
     assert_eq!(alone.fused_pose, None);
     assert!(alone.points.is_empty() || off(&alone, &truth) > 0.05, "{}", off(&alone, &truth));
@@ -80,11 +83,10 @@ fn images_tell_the_pose_that_the_joints_do_not() {
 #[test]
 fn what_the_calibration_leaves_uncertain_is_not_taken_from_one_pair() {
     let (_, pairs) = seen(60.0);
-    let calibrated = rig().calibration_sigma.0;
-    let mut rig = rig();
-    rig.calibration_sigma.0 = Angle::from_deg(1.0);
+    let calibration = RigCalibration::Sigmas { rotation: Angle::from_deg(1.0), translation: Length::from_mm(0.1) };
+    let rig = Rig { calibration, ..rig() };
     let pose = rig.pose_read_at(&[145.0, 60f64.to_radians()]);
-    assert!(pose.rotation_sigma.deg() > 0.9 && calibrated.deg() < 0.1);
+    assert!(pose.rotation_sigma.deg() > 0.9);
     let image = RgbImage::new(1, 1);
     let cloud = cloud_of_pairs(&pairs, &image, &rig, &PairPose::standing(pose), Kernel::default()).expect("a cloud");
     assert_eq!(cloud.fused_pose, None);

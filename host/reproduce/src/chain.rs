@@ -7,7 +7,7 @@ use vergence_calibration::{
     IntrinsicsCalibration, IntrinsicsOptions, LensKnowledge, StageCalibration, StageOptions, StagePose, StereoView,
     TargetView, calibrate_intrinsics, calibrate_stage,
 };
-use vergence_rig::Rig;
+use vergence_rig::{Provenance, Rig};
 use vergence_scene::Target;
 use vergence_sim::{HeldTarget, Random};
 use vergence_vision::{Camera, ImageSize, KannalaBrandt, Left, Right, Transform};
@@ -26,6 +26,8 @@ const SHARED_VIEWS: u64 = 12;
 pub struct Calibrated {
     /// Lenses, mechanism, and how sure they are.
     pub stage: StageCalibration,
+    /// The rig as its written file describes it.
+    pub rig: Rig,
     /// How far corners were from where they truly are, in pixels.
     pub errors_px: Vec<f64>,
     /// Photographs taken, and those in which no target was found.
@@ -56,7 +58,15 @@ pub fn calibrate(
     let lenses = LensKnowledge::within(left.covariance, right.covariance);
     let stage = calibrate_stage(&rig, &poses, &StageOptions { lenses, ..StageOptions::default() })
         .map_err(|error| ReproduceError::Calibration(format!("the stage: {error}")))?;
-    Ok(Calibrated { stage, errors_px: tally.errors_px, photographs: [tally.taken, tally.missed] })
+    let rig = through_file(&stage.rig(&rig))?;
+    Ok(Calibrated { stage, rig, errors_px: tally.errors_px, photographs: [tally.taken, tally.missed] })
+}
+
+/// The rig as a user of its file has it.
+fn through_file(rig: &Rig) -> Result<Rig, ReproduceError> {
+    let provenance = Provenance { program: "vergence reproduce".into(), inputs_sha256: String::new(), date: None };
+    let written = rig.to_toml(&provenance).map_err(ReproduceError::Calibration)?;
+    Rig::from_toml(&written).map_err(|error| ReproduceError::Calibration(format!("the rig file: {error}")))
 }
 
 /// What photographs came to.

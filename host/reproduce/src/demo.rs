@@ -227,7 +227,7 @@ impl Pulse {
     }
 
     /// The rig's pose when the images were exposed: where the encoders were at the edge of the pulse.
-    fn pose(&self) -> Result<PairPose, DemoError> {
+    pub(crate) fn pose(&self) -> Result<PairPose, DemoError> {
         let image = TriggeredImage {
             pulse: TimedEvent { seq: self.mark.seq, at: self.at },
             counts: &self.mark.counts,

@@ -28,9 +28,12 @@ pub enum ReproduceError {
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum DemoError {
-    /// The board does not fire the cameras.
+    /// The board does not do what it is asked.
     #[error(transparent)]
     Board(#[from] BoardError),
+    /// The simulated robot cannot be started.
+    #[error(transparent)]
+    Sim(#[from] SimError),
     /// No pulse came to the simulated cameras.
     #[error("the simulated cameras were not triggered")]
     NotTriggered,

@@ -136,12 +136,17 @@ struct Match {
 
 impl<'a> View<'a> {
     fn new(mode: usize, stop: &Stop, calibrated: &'a Calibrated) -> Self {
-        let stage = &calibrated.stage;
-        let left_from_right = stage.predict(&stop.readings).left_from_right;
+        let Calibrated { stage, rig, .. } = calibrated;
+        let values: Vec<f64> = stop.readings.iter().map(|reading| reading.value()).collect();
+        let pose = rig.pose_read_at(&values);
         Self {
             mode,
-            pair: StereoPair { left: &stage.left, right: &stage.right, left_from_right },
-            shared: stage.shared(&stop.readings),
+            pair: StereoPair {
+                left: &rig.left_camera,
+                right: &rig.right_camera,
+                left_from_right: pose.left_from_right,
+            },
+            shared: pose.shared,
             unit_sigma_px: stage.unit_sigma_px,
             truth: Axes::of(&stop.truth),
         }

@@ -1,52 +1,13 @@
-//! The robot's story in the simulated corridor.
+//! What the robot's story needs; the story itself is played by the command (`tests/robot.rs` of the whole).
 #![allow(clippy::expect_used, reason = "a test fails loudly")]
+
+mod common;
 
 use std::time::Duration;
 
-use serde_json::Value;
-use vergence_reproduce::corridor::{Corridor, Story};
+use common::Robot;
+use vergence_reproduce::corridor::{Corridor, Joints, PlacedJoints};
 use vergence_rig::Rig;
-
-const ORIGAKER: &str = include_str!("../../../docs/rigs/origaker.toml");
-
-fn played(seed: u64) -> (Story, tempfile::TempDir) {
-    let rig = Rig::from_toml(ORIGAKER).expect("the robot's file");
-    let folder = tempfile::tempdir().expect("a folder");
-    let story = Corridor::new(&rig, folder.path(), seed, || Duration::ZERO).expect("the robot").play(&mut |_| ());
-    (story.expect("a story"), folder)
-}
-
-fn number(value: &Value) -> f64 {
-    value.as_f64().expect("a number")
-}
-
-#[test]
-fn the_robot_searches_passes_and_inspects() {
-    let (story, folder) = played(1);
-    let names: Vec<_> = story.modes.iter().map(|mode| mode["name"].as_str().expect("a name")).collect();
-    assert_eq!(names, ["gecko", "spider", "stick-bug"]);
-    for station in story.modes.iter().flat_map(|mode| mode["stations"].as_array().expect("stations")) {
-        let near = number(&station["depth_rel_err_within_1500mm"]["median"]);
-        assert!(near < 0.02 && number(&station["points"]) > 100.0, "{station}");
-        assert_eq!(station["pose"]["from"], "joints and images", "{station}");
-        for side in ["left", "right"] {
-            // Gecko and stick-bug have no walls.
-            if let Some(error) = station["walls_mm"][side]["error"].as_f64() {
-                assert!(error.abs() < 10.0, "{side} wall: {station}");
-            }
-        }
-    }
-    assert!(story.modes[1]["stations"][0]["walls_mm"]["left"]["measured"].is_number());
-    // One eye finds the target; both measure it.
-    assert_eq!(story.found["target_seen_by"], "left");
-    assert!(number(&story.found["target_bearing_error_deg"]).abs() < 0.5, "{}", story.found);
-    assert!(number(&story.found["target_range_error_mm"]).abs() < 3.0, "{}", story.found);
-    for file in
-        ["corridor.svg", "gecko-to-spider.svg", "spider-to-stick-bug.svg", "0-gecko.ply", "6-stick-bug-matches.svg"]
-    {
-        assert!(folder.path().join(file).is_file(), "{file}");
-    }
-}
 
 #[test]
 fn a_rig_without_a_trunk_has_no_such_story() {
@@ -55,4 +16,40 @@ fn a_rig_without_a_trunk_has_no_such_story() {
         .map(|_| ())
         .map_err(|error| error.to_string());
     assert!(refused.as_ref().is_err_and(|error| error.contains("gecko")), "{refused:?}");
+}
+
+/// The controller brings the trunk to a mode within what the planned way and the settling of the joints take; the pose read is that of the
+/// trunk but for play and springs, and at the dead centre for what these do there.
+#[test]
+fn the_controller_brings_the_trunk_to_its_modes() {
+    let rig = Rig::from_toml(include_str!("../../../docs/rigs/origaker.toml")).expect("the robot's file");
+    let mut robot = Robot::start(&rig, 3);
+    for (mode, planned, most_deg) in [("gecko", 1.75, 6.0), ("spider", 1.75, 0.5), ("stick-bug", 2.17, 0.5)] {
+        let took = robot.go_to(mode).expect("it goes there").expect("a controller takes time");
+        assert!((planned..planned + 0.6).contains(&took), "{mode}: {took}");
+        let standing = robot.standing().expect("a pose");
+        let [read, truth] = [&standing.by_joints, &standing.truth].map(|pose| pose.left_from_right.rotation());
+        let off = read.angle_to(&truth).to_degrees();
+        assert!(off > 0.0 && off < most_deg, "{mode}: {off}");
+        let targets = &rig.mode(mode).expect("a mode").targets;
+        let missed = standing.by_joints.axes.iter().zip(targets).map(|(read, to)| read.minus(*to).value().abs());
+        assert!(missed.fold(0.0, f64::max) < 0.5_f64.to_radians(), "{mode}: {:?}", standing.by_joints.axes);
+    }
+    let unknown = robot.go_to("dog").map_err(|error| error.to_string());
+    assert!(unknown.as_ref().is_err_and(|error| error.contains("no mode dog")), "{unknown:?}");
+}
+
+/// Time passes for the joints while the robot walks: their play wanders, so that no two stations are alike.
+#[test]
+fn the_play_of_the_joints_wanders_while_the_robot_walks() {
+    let rig = Rig::from_toml(include_str!("../../../docs/rigs/origaker.toml")).expect("the robot's file");
+    let mut robot = Robot::start(&rig, 1);
+    let mut truth = |seconds: f64| {
+        robot.walk(seconds).expect("it is held");
+        robot.standing().expect("a pose").truth.left_from_right.rotation()
+    };
+    let [first, at_once, later] = [0.0, 0.0, 8.0].map(&mut truth);
+    assert!(first.angle_to(&at_once) < 0.2 * first.angle_to(&later), "{first} {at_once} {later}");
+    let mut placed = PlacedJoints::new(&rig, 1);
+    assert_eq!(placed.go_to("spider").expect("placed"), None, "nothing moves them");
 }

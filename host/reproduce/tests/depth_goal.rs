@@ -5,7 +5,7 @@
 
 use nalgebra::{UnitQuaternion, Vector3};
 use vergence_reproduce::study::Gaussian;
-use vergence_rig::{BENCH_TOML, DepthField, DepthGoal, DepthSigma, Rig};
+use vergence_rig::{BENCH_TOML, DepthField, DepthGoal, DepthSigma, Rig, RigCalibration};
 use vergence_vision::{Angle, Kernel, Left, Length, PixelPair, Point, Right, StereoPair, Transform};
 
 const PIXEL_SIGMA: f64 = 0.1;
@@ -31,6 +31,8 @@ fn goals_are_parsed_and_printed() {
     let again: DepthGoal = "sigma_range<=0.5 mm at 0.4m over ±1rad".parse().expect("a goal");
     assert_eq!(again.sigma, DepthSigma::Range);
     assert!((again.half_width.rad() - 1.0).abs() < 1e-12);
+    let printed: DepthGoal = "sigma_z<=0.3mm at 35cm over +-30deg".parse().expect("a goal");
+    assert_eq!(printed.to_string(), "sigma_z <= 0.3 mm at 350 mm over ±30°");
     for bad in [
         "",
         "sigma_z < 1mm at 350mm over +-40deg",
@@ -63,7 +65,8 @@ fn sampled(rig: &Rig, values: &[f64; 2], azimuth: f64, range: f64, samples: u32)
             .map(|(axis, value)| value + (gaussian.uniform() - 0.5) * axis.value_per_count())
             .collect();
         let exact = rig.pose_at_values(&true_values).left_from_right;
-        let (turn, shift) = (rig.calibration_sigma.0.rad(), rig.calibration_sigma.1.mm());
+        let RigCalibration::Sigmas { rotation, translation } = &rig.calibration else { return None };
+        let (turn, shift) = (rotation.rad(), translation.mm());
         let mut three = |sigma: f64| Vector3::new(gaussian.normal(), gaussian.normal(), gaussian.normal()) * sigma;
         let truth: Transform<Left, Right> = Transform::new(
             UnitQuaternion::from_scaled_axis(three(turn)) * exact.rotation(),

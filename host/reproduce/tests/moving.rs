@@ -10,9 +10,10 @@ use vergence_plant::{AxisPlant, bench_mechanics, bench_settings};
 use vergence_protocol::{AxisList, Counts, Microseconds};
 use vergence_reproduce::study::Gaussian;
 use vergence_rig::{
-    BENCH_TOML, BoardInstant, Exposure, JointSample, JointTrack, Joints, PairExposure, Rig, Shutter, moving_cloud,
+    BENCH_TOML, BoardInstant, Exposure, JointSample, JointTrack, Joints, PairExposure, Rig, RigCalibration, Shutter,
+    moving_cloud,
 };
-use vergence_vision::{Base, Frame, Gates, KannalaBrandt, Left, Length, Pixel, PixelPair, Point, Transform};
+use vergence_vision::{Base, Frame, Gates, KannalaBrandt, Left, Pixel, PixelPair, Point, Transform};
 
 const PIXEL_SIGMA: f64 = 0.05;
 const TICK_US: u64 = 100;
@@ -28,7 +29,7 @@ const TO: [f64; 2] = [200_000.0, 1_800_000.0];
 /// The bench with an exact calibration: only pixels, encoders and the clock have errors.
 fn bench() -> Rig {
     let mut rig = Rig::from_toml(BENCH_TOML).expect("the bench is a rig");
-    rig.calibration_sigma = (vergence_vision::Angle::from_rad(0.0), Length::from_mm(0.0));
+    rig.calibration = RigCalibration::exact();
     rig
 }
 

@@ -6,8 +6,8 @@ mod common;
 use common::{Gaussian, around, left_from_middle, left_from_right, lens, see};
 use nalgebra::{Matrix3, Matrix6, SMatrix, UnitQuaternion, Vector3, Vector6};
 use vergence_vision::{
-    FusedPose, KannalaBrandt, Left, Pixel, PixelPair, Point, PointUncertainty, Right, SharedCovariance, StereoPair,
-    Transform, fuse_pose, pseudo_intersection,
+    FusedPose, KannalaBrandt, Left, MatchErrors, Pixel, PixelPair, Point, PointUncertainty, Right, SharedCovariance,
+    StereoPair, Transform, fuse_pose, pseudo_intersection,
 };
 
 const PIXEL_SIGMA: f64 = 0.2;
@@ -90,7 +90,8 @@ fn trial(lens: &KannalaBrandt, seed: u64, wrong_every: usize) -> (Transform<Left
     let stated = left_from_right(SEPARATION);
     let truth = moved(&stated, &normal(&mut Gaussian(7_000 + seed), &by_joints()));
     let pair = StereoPair { left: lens, right: lens, left_from_right: stated };
-    let found = fuse_pose(&matches(lens, truth, seed, wrong_every), &pair, &by_joints()).unwrap();
+    let found =
+        fuse_pose(&matches(lens, truth, seed, wrong_every), &pair, &by_joints(), MatchErrors::Measured).unwrap();
     (truth, found)
 }
 
@@ -165,10 +166,10 @@ fn a_pose_that_the_joints_tell_exactly_stays() {
     let stated = left_from_right(SEPARATION);
     let pair = StereoPair { left: &lens, right: &lens, left_from_right: stated };
     let pixels = matches(&lens, stated, 3, 4);
-    let found = fuse_pose(&pixels, &pair, &Matrix6::zeros()).unwrap();
+    let found = fuse_pose(&pixels, &pair, &Matrix6::zeros(), MatchErrors::Measured).unwrap();
     assert!(error(&found.left_from_right, &stated).norm() < 1e-12 && found.told_by_images.abs() < 1e-12, "{found:?}");
     let turn = 1e-7;
-    let found = fuse_pose(&pixels, &pair, &(Matrix6::identity() * turn * turn)).unwrap();
+    let found = fuse_pose(&pixels, &pair, &(Matrix6::identity() * turn * turn), MatchErrors::Measured).unwrap();
     assert!(found.told_by_images < 0.05, "{}", found.told_by_images);
 }
 
@@ -181,7 +182,7 @@ fn one_dead_encoder_is_replaced_by_the_images() {
     covariance[(1, 1)] = 10f64.to_radians().powi(2);
     let truth = moved(&stated, &Vector6::new(0.0, 8f64.to_radians(), 0.0, 0.0, 0.0, 0.0));
     let pair = StereoPair { left: &lens, right: &lens, left_from_right: stated };
-    let found = fuse_pose(&matches(&lens, truth, 5, 4), &pair, &covariance).unwrap();
+    let found = fuse_pose(&matches(&lens, truth, 5, 4), &pair, &covariance, MatchErrors::Measured).unwrap();
     let off = error(&found.left_from_right, &truth);
     let sigma = found.rotation_sigma();
     assert!(sigma.deg() < 0.02 && off.fixed_rows::<3>(0).norm() < 3.0 * sigma.rad(), "{off} {sigma}");
@@ -194,6 +195,6 @@ fn matches_that_agree_on_nothing_give_no_pose() {
     let stated = left_from_right(SEPARATION);
     let pair = StereoPair { left: &lens, right: &lens, left_from_right: stated };
     let few = matches(&lens, stated, 1, 1000);
-    assert_eq!(fuse_pose(&few[..19], &pair, &by_joints()), None);
-    assert_eq!(fuse_pose(&[], &pair, &by_joints()), None);
+    assert_eq!(fuse_pose(&few[..19], &pair, &by_joints(), MatchErrors::Measured), None);
+    assert_eq!(fuse_pose(&[], &pair, &by_joints(), MatchErrors::Measured), None);
 }

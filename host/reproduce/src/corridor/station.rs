@@ -5,46 +5,51 @@ use std::sync::Arc;
 use std::time::Duration;
 
 use image::RgbImage;
-use nalgebra::{UnitQuaternion, Vector3};
 use serde_json::{Value, json};
 use vergence_files::FileError;
-use vergence_matching::{GuidedMatcher, Matcher};
 use vergence_output::{pose_source_json, pose_source_line, write_scored_pair};
-use vergence_pipeline::{
-    Method, PairCloud, PairImages, PairPose, Score, Stage, StageTimes, pair_cloud, rig_zones, score, with_fused,
-};
+use vergence_pipeline::{PairCloud, PairImages, Score, rig_zones, score};
 use vergence_rig::{Rig, RigPose, rounded, zones_json};
-use vergence_scene::Scene;
-use vergence_sim::{Random, Room, RoomCamera};
-use vergence_vision::{Angle, Base, Left, Length, Pixel, Point, Side, Transform, World, Zones};
+use vergence_scene::{CorridorPlan, Scene};
+use vergence_vision::{Angle, Left, Length, Pixel, Point, Right, Transform, UnitRay, World, Zones};
 
+use super::eyes::{Eyes, Seen};
+use super::joints::Standing;
+use super::place::Place;
 use super::walls::Walls;
 use crate::error::DemoError;
 
-/// Where the robot stands in the corridor.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Place {
-    /// Millimetres to the right of the corridor's middle.
-    pub x: f64,
-    /// Millimetres along the corridor.
-    pub along: f64,
-    /// Turn to the right.
-    pub yaw: Angle,
+/// A corridor with its plan.
+#[derive(Clone)]
+pub struct Built {
+    /// Where everything stands.
+    pub plan: Arc<CorridorPlan>,
+    /// The same as surfaces.
+    pub scene: Arc<Scene>,
 }
 
-impl Place {
-    /// In the middle of the corridor, looking along it.
+impl Built {
+    /// The corridor of `plan`.
     #[must_use]
-    pub fn along(along: f64) -> Self {
-        Self { x: 0.0, along, yaw: Angle::from_rad(0.0) }
+    pub fn new(plan: CorridorPlan) -> Self {
+        Self { scene: Arc::new(Scene::of_corridor(&plan)), plan: Arc::new(plan) }
     }
 
-    /// The pose of the robot's front link.
-    #[must_use]
-    pub fn world_from_base(&self) -> Transform<World, Base> {
-        let turn = UnitQuaternion::from_axis_angle(&Vector3::y_axis(), self.yaw.rad());
-        Transform::new(turn, Vector3::new(self.x, 0.0, self.along))
+    /// Whether nothing stands between two places, but for the last `margin` millimetres.
+    pub(super) fn is_clear(&self, from: &Point<World>, to: &Point<World>, margin: f64) -> bool {
+        let way = to.mm() - from.mm();
+        let Some(ray) = UnitRay::new(way) else { return false };
+        self.scene.reach(from, &ray).is_none_or(|reach| reach.mm() > way.norm() - margin)
     }
+}
+
+/// How the cameras see the corridor.
+#[derive(Clone, Copy, Debug)]
+pub enum Sight {
+    /// Images are rendered and matched; the clock times that.
+    Rendered(fn() -> Duration),
+    /// Matches are drawn from the true geometry, with noise: quick, but without images and without the matcher.
+    Sampled,
 }
 
 /// A measurement and its truth.
@@ -55,6 +60,8 @@ pub struct Station {
     pub place: Place,
     /// The pose by which the cloud was made.
     pub pose: RigPose,
+    /// How far the right camera is off in the left one's frame: by the joints alone, and by that pose.
+    pub off: [PoseError; 2],
     /// The points, in the left camera's frame.
     pub cloud: PairCloud,
     /// Their errors.
@@ -63,14 +70,41 @@ pub struct Station {
     pub zones: Zones,
     /// Distances of the walls, where they were measured.
     pub walls: Option<Walls>,
-    /// The left and the right image.
+    /// Where the left and the right image show the target.
+    pub target: [Option<Pixel>; 2],
+    /// The left and the right image; of one pixel where none were rendered.
     pub images: [RgbImage; 2],
     /// True pose of the left camera.
     pub world_from_left: Transform<World, Left>,
+    /// True pose of the right camera.
+    pub world_from_right: Transform<World, Right>,
     /// Seconds for matching and triangulation.
     pub seconds: f64,
-    room: Arc<Room>,
+    corridor: Built,
     rig: Rig,
+}
+
+/// How far a pose is off.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct PoseError {
+    /// Angle between the stated and the true orientation of the right camera.
+    pub rotation: Angle,
+    /// Distance between its stated and its true place.
+    pub position: Length,
+}
+
+impl PoseError {
+    fn of(stated: &RigPose, truth: &RigPose) -> Self {
+        let [stated, truth] = [stated, truth].map(|pose| pose.left_from_right);
+        Self {
+            rotation: Angle::from_rad(stated.rotation().angle_to(&truth.rotation())),
+            position: Length::from_mm((stated.origin().mm() - truth.origin().mm()).norm()),
+        }
+    }
+
+    fn json(&self) -> Value {
+        json!({ "rotation_deg": rounded(self.rotation.deg()), "position_mm": rounded(self.position.mm()) })
+    }
 }
 
 /// Positions of the axes in a mode, in radians; none for a mode that the rig lacks.
@@ -79,50 +113,37 @@ pub fn values(rig: &Rig, mode: &str) -> Vec<f64> {
 }
 
 impl Station {
-    /// Photographs the corridor in `mode` at `place` with joints that are off by their play, and measures the pair by the pose that
-    /// the joints say and, where that is uncertain, the images.
+    /// Sees the corridor in `mode` at `place` with the cameras where they truly are, and measures the pair by the pose that the joints
+    /// say and, where that is uncertain, the images.
     pub(super) fn measure(
-        rig: &Rig,
-        scene: &Arc<Scene>,
-        mode: &str,
+        (rig, corridor): (&Rig, &Built),
+        (mode, standing): (&str, &Standing),
         place: Place,
         seed: u64,
-        clock: fn() -> Duration,
+        sight: Sight,
     ) -> Result<Self, DemoError> {
-        let said = values(rig, mode);
-        let mut random = Random::new(seed);
-        let off = |(axis, &value): (usize, &f64)| {
-            value + 0.5 * rig.axes.get(axis).map_or(0.0, |axis| axis.play) * random.normal()
+        let Standing { by_joints, truth: true_pose } = standing;
+        let eyes = Eyes { rig, corridor, world_from_base: place.world_from_base(), pose: true_pose, seed };
+        let Seen { images, target, cloud, seconds } = match sight {
+            Sight::Rendered(clock) => eyes.rendered(by_joints, clock)?,
+            Sight::Sampled => eyes.sampled(by_joints)?,
         };
-        let truth: Vec<f64> = said.iter().enumerate().map(off).collect();
-        let true_pose = rig.pose_at_values(&truth);
-        let room = Arc::new(Room { scene: scene.as_ref().clone(), world_from_base: place.world_from_base() });
-        let images = [Side::Left, Side::Right].map(|side| {
-            let camera = RoomCamera { side, lens: *rig.camera(side), room: Arc::clone(&room), seed };
-            camera.photograph(&true_pose, 0)
-        });
-        let begins = clock();
-        let by_joints = rig.pose_read_at(&said);
-        let matcher: &dyn Matcher = &GuidedMatcher::default();
-        let mut times = StageTimes::start(clock);
-        let pair = PairImages { left: &images[0], right: &images[1] };
-        let standing = PairPose::standing(by_joints.clone());
-        let cloud = pair_cloud(pair, rig, &standing, Method::from(matcher), &mut |stage: Stage| times.ended(stage))
-            .map_err(|error| DemoError::Matching(error.to_string()))?;
-        let seconds = clock().saturating_sub(begins).as_secs_f64();
-        let pose = cloud.fused_pose.as_ref().map_or_else(|| by_joints.clone(), |fused| with_fused(&by_joints, fused));
+        let pose = cloud.pose(by_joints);
         let mut station = Self {
             mode: mode.to_owned(),
             place,
             zones: rig_zones(rig, &pose).map_err(|error| DemoError::Zones(error.to_string()))?,
+            off: [by_joints, &pose].map(|pose| PoseError::of(pose, true_pose)),
             pose,
             cloud,
             score: Score::default(),
             walls: None,
+            target,
             images,
-            world_from_left: room.world_from_left(true_pose.base_from_left),
+            world_from_left: eyes.world_from_left(),
+            world_from_right: eyes.world_from_left() * true_pose.left_from_right,
             seconds,
-            room,
+            corridor: corridor.clone(),
             rig: rig.clone(),
         };
         let ranges: Vec<_> = station
@@ -135,11 +156,25 @@ impl Station {
         Ok(station)
     }
 
+    /// Whether one of the cameras sees a place in free space.
+    pub(super) fn sees(&self, point: &Point<World>) -> bool {
+        let in_left = self.rig.left_camera.project_point(&(self.world_from_left.inverse() * *point));
+        let in_right = self.rig.right_camera.project_point(&(self.world_from_right.inverse() * *point));
+        let is_clear = |from: Point<World>| self.corridor.is_clear(&from, point, 0.0);
+        (in_left.is_ok() && is_clear(self.world_from_left.origin()))
+            || (in_right.is_ok() && is_clear(self.world_from_right.origin()))
+    }
+
+    /// The plan of the corridor: the truth.
+    pub(super) fn plan(&self) -> &CorridorPlan {
+        &self.corridor.plan
+    }
+
     /// The true range at `pixel` of the left image.
     #[must_use]
     pub fn true_range(&self, pixel: Pixel) -> Option<Length> {
         let ray = self.world_from_left * self.rig.left_camera.unproject::<Left>(pixel).ok()?;
-        self.room.scene.cast(&self.world_from_left.origin(), &ray).map(|hit| hit.range)
+        self.corridor.scene.reach(&self.world_from_left.origin(), &ray)
     }
 
     /// The measured points in the corridor, in millimetres, by the pose that was measured with.
@@ -157,15 +192,21 @@ impl Station {
     /// What was measured, for people.
     pub(super) fn in_words(&self, task: &str) -> String {
         let told = pose_source_line(self.cloud.fused_pose.as_ref()).unwrap_or_else(|| "  pose by the joints".into());
+        let [joints, pose] = self.off;
         format!(
-            "  {task} at {:.0} mm: sees stereo {:.0}, mono {:.0}; {} points, median error {:.2} %, within 1.5 m {:.2} %; {:.1} s\n{told}",
+            "  {task} at {:.0} mm: sees stereo {:.0}, mono {:.0}; {} points, median error {:.2} %, within 1.5 m {:.2} %; {:.1} s\n{told}\n  \
+             that pose is off by {:.3} and {:.2}, by the joints alone {:.3} and {:.2}",
             self.place.along,
             self.zones.stereo,
             self.zones.mono,
             self.cloud.points.len(),
             100.0 * self.score.all.median,
             100.0 * self.score.near.median,
-            self.seconds
+            self.seconds,
+            pose.rotation,
+            pose.position,
+            joints.rotation,
+            joints.position
         )
     }
 
@@ -179,7 +220,9 @@ impl Station {
             "points": self.cloud.points.len(),
             "depth_rel_err": { "median": self.score.all.median, "p95": self.score.all.p95 },
             "depth_rel_err_within_1500mm": { "median": self.score.near.median, "p95": self.score.near.p95 },
-            "pose": pose_source_json(self.cloud.fused_pose.as_ref()),
+            "pose": pose_source_json(&self.pose, self.cloud.fused_pose.as_ref()),
+            "pose_off": self.off[1].json(),
+            "joints_off": self.off[0].json(),
             "walls_mm": self.walls.as_ref().map(Walls::json),
             "seconds": rounded(self.seconds),
         })

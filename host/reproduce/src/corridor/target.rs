@@ -3,13 +3,13 @@
 use image::RgbImage;
 use nalgebra::Vector3;
 use vergence_rig::Rig;
-use vergence_scene::Scene;
+use vergence_scene::CorridorPlan;
 use vergence_vision::{Angle, Left, Length, Pixel, Point, Right, Side, World};
 
 use super::Station;
 
 /// Least number of red pixels of a target.
-const LEAST: usize = 40;
+pub const LEAST_PIXELS: usize = 40;
 /// Radius in pixels around the densest place within which pixels belong to the target.
 const REACH: f64 = 40.0;
 
@@ -27,7 +27,7 @@ pub struct Found {
 
 /// Looks for the target in both images of a station.
 pub fn find_target(station: &Station, rig: &Rig) -> Option<Found> {
-    let seen = [Side::Left, Side::Right].map(|side| red_spot(&station.images[side.index()]).map(|pixel| (side, pixel)));
+    let seen = [Side::Left, Side::Right].map(|side| station.target[side.index()].map(|pixel| (side, pixel)));
     let (side, pixel) = seen.into_iter().flatten().next()?;
     let world_from_base = station.place.world_from_base();
     let world_from_left = world_from_base * station.pose.base_from_left;
@@ -44,16 +44,16 @@ pub fn find_target(station: &Station, rig: &Rig) -> Option<Found> {
         side: (seen[0].is_none() || seen[1].is_none()).then_some(side),
         azimuth: heading(direction),
         ray: [direction, centre.mm()],
-        true_azimuth: heading(truth().mm() - centre.mm()),
+        true_azimuth: heading(truth(station).mm() - centre.mm()),
     })
 }
 
-fn truth() -> Point<World> {
-    Point::from_mm(Vector3::from(Scene::CORRIDOR_TARGET))
+fn truth(station: &Station) -> Point<World> {
+    Point::from_mm(Vector3::from(station.plan().target))
 }
 
 /// The middle of the densest group of red pixels.
-fn red_spot(image: &RgbImage) -> Option<Pixel> {
+pub fn red_spot(image: &RgbImage) -> Option<Pixel> {
     let is_red = |[red, green, blue]: [u8; 3]| {
         let [red, green, blue] = [red, green, blue].map(f64::from);
         red > 70.0 && red > 2.2 * green && red > 2.2 * blue
@@ -67,7 +67,7 @@ fn red_spot(image: &RgbImage) -> Option<Pixel> {
     // Every tenth pixel is a candidate for the middle.
     let densest = red.iter().copied().step_by(10).max_by_key(|&at| near(at).count())?;
     let group: Vec<[f64; 2]> = near(densest).collect();
-    if group.len() < LEAST {
+    if group.len() < LEAST_PIXELS {
         return None;
     }
     let mean = |axis: usize| group.iter().map(|at| at[axis]).sum::<f64>() / group.len() as f64;
@@ -84,6 +84,11 @@ impl Found {
             self.azimuth,
             self.error()
         )
+    }
+
+    /// How far the direction points across the corridor, 0 to 1: the more, the better it tells where the target stands along it.
+    pub fn across(&self) -> f64 {
+        self.ray[0].x.abs()
     }
 
     /// Error of the direction.
@@ -117,9 +122,9 @@ pub fn inspect(station: &Station, rig: &Rig) -> Inspected {
         let ray = rig.left_camera.unproject::<Left>(pixel).ok().map(|ray| station.world_from_left * ray);
         // The pixels of the target are those whose true ray meets its globe.
         ray.is_some_and(|ray| {
-            let to_middle = truth().mm() - station.world_from_left.origin().mm();
+            let to_middle = truth(station).mm() - station.world_from_left.origin().mm();
             let along = to_middle.dot(&ray.vector());
-            along > 0.0 && (to_middle.norm_squared() - along * along).sqrt() < 0.9 * Scene::CORRIDOR_TARGET_RADIUS
+            along > 0.0 && (to_middle.norm_squared() - along * along).sqrt() < 0.9 * CorridorPlan::TARGET_RADIUS
         })
     };
     let points = || station.cloud.points.iter().filter(|found| on_target(found.point.pixels.left));

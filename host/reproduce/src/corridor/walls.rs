@@ -2,7 +2,6 @@
 
 use serde_json::{Value, json};
 use vergence_rig::rounded;
-use vergence_scene::Scene;
 
 use super::Station;
 
@@ -10,6 +9,9 @@ use super::Station;
 const BIN: f64 = 10.0;
 /// Least number of points of a wall.
 const LEAST: usize = 8;
+
+/// Part of the votes of the fullest bin that a bin farther away must have.
+const ABOUT_AS_FULL: f64 = 0.35;
 
 /// Distances from the robot's middle to the left and the right wall in millimetres; `None` where too few points tell.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -28,15 +30,21 @@ pub fn walls(station: &Station) -> Walls {
         distances.sort_by(f64::total_cmp);
         wall(&distances)
     });
-    let half = Scene::CORRIDOR_HALF_WIDTH;
+    let half = station.plan().half_width;
     Walls { measured, truth: [half + station.place.x, half - station.place.x] }
 }
 
-/// The median of the points around the fullest bin.
+/// The median of the points around the fullest bin near the farthest one that is about as full as any: a parcel's face may hold more
+/// points than the wall behind it, but stands before it.
 fn wall(distances: &[f64]) -> Option<f64> {
     let near = |centre: f64| distances.iter().copied().filter(move |distance| (distance - centre).abs() <= BIN);
-    let fullest = distances.iter().copied().max_by_key(|&centre| near(centre).count())?;
-    let votes: Vec<f64> = near(fullest).collect();
+    let votes: Vec<(f64, usize)> = distances.iter().map(|&centre| (centre, near(centre).count())).collect();
+    let most = votes.iter().map(|(_, count)| *count).max()?;
+    let full = |count: usize| count as f64 >= ABOUT_AS_FULL * most as f64;
+    let farthest = votes.iter().rev().find(|(_, count)| full(*count)).map(|(centre, _)| *centre)?;
+    let around = votes.iter().filter(|(centre, _)| (centre - farthest).abs() <= 3.0 * BIN);
+    let (fullest, _) = around.max_by_key(|(_, count)| *count)?;
+    let votes: Vec<f64> = near(*fullest).collect();
     (votes.len() >= LEAST).then(|| votes[votes.len() / 2])
 }
 

@@ -4,10 +4,13 @@
 #![allow(unused_imports, reason = "every test uses a part")]
 #![allow(clippy::unwrap_used, reason = "helpers of tests may panic as tests do")]
 
+mod robot;
+
 use nalgebra::Vector3;
 use vergence_reproduce::study;
 use vergence_vision::{Angle, Base, KannalaBrandt, Left, Length, Right, Transform};
 
+pub use robot::Robot;
 pub use vergence_reproduce::study::{Gaussian, see};
 
 pub fn lens(k1: f64) -> KannalaBrandt {
