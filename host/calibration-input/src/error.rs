@@ -34,17 +34,6 @@ pub enum InputError {
     /// A camera or an image file gives no image.
     #[error(transparent)]
     Camera(#[from] CameraError),
-    /// The images of two cameras cannot be paired.
-    #[error(
-        "{left} left images and {right} right ones: they must pair up. Number them alike, such as left000.png and \
-         right000.png, and those without a partner are left out"
-    )]
-    Unpaired {
-        /// Number of left images.
-        left: usize,
-        /// Number of right images.
-        right: usize,
-    },
     /// Every image is damaged.
     #[error("none of {images} images can be read{}", in_parentheses(first.as_deref()))]
     Damaged {

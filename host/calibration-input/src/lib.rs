@@ -36,7 +36,9 @@ pub use live::{LiveEvent, LiveSet, RigCameras, SimulatedTarget};
 pub use recorded::{RecordedSet, stage_poses_in_corners};
 pub use store::{Slot, SlotKind, Slots};
 pub use store_error::StoreError;
-pub use target_images::{Missed, MissedReason, TargetImages};
+pub use target_images::{Missed, MissedReason, Sought, TargetImages};
 pub use target_watch::{NAMES, TargetViews, TargetWatch, observe};
 pub use truth::TrueError;
-pub use views::{PairImages, PairLenses, PairViews, ViewEvent, pairs_in_corners, views_in_corners, views_in_images};
+pub use views::{
+    PairImages, PairLenses, PairMasks, PairViews, ViewEvent, pairs_in_corners, views_in_corners, views_in_images,
+};

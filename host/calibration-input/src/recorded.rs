@@ -10,7 +10,7 @@ use vergence_rig::{AxisPosition, Rig, RigAxis};
 use crate::InputError;
 use crate::csv_file::CsvFile;
 use crate::input_hash::InputHash;
-use crate::views::{PairImages, PairLenses, ViewEvent, pairs_in_corners};
+use crate::views::{PairImages, PairLenses, PairMasks, ViewEvent, pairs_in_corners};
 
 /// File of a set with the encoder readings.
 pub const POSES: &str = "poses.csv";
@@ -46,7 +46,7 @@ impl RecordedSet {
     pub fn stage_poses<E: From<InputError>>(
         self,
         target: &TargetSpec,
-        lenses: PairLenses<'_>,
+        seen: (PairLenses<'_>, PairMasks<'_>),
         hash: &mut InputHash,
         tell: &mut impl FnMut(ViewEvent<'_>) -> Result<(), E>,
     ) -> Result<Vec<StagePose>, E> {
@@ -54,7 +54,7 @@ impl RecordedSet {
         for (readings, folder) in self.0 {
             let images = |side: &str| [folder.join(format!("{side}*")).to_string_lossy().into_owned()];
             let (left, right) = (images("left"), images("right"));
-            let views = PairImages::named([&left, &right], tell)?.views(target, lenses, hash, tell)?.0;
+            let views = PairImages::named([&left, &right], tell)?.views(target, seen, hash, tell)?.0;
             poses.push(StagePose { readings, views });
         }
         Ok(poses)

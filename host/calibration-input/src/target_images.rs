@@ -8,8 +8,8 @@ use rayon::prelude::*;
 use vergence_calibration::detect::{DetectError, detect};
 use vergence_calibration::{TargetSpec, TargetView};
 use vergence_calibration_report::ReportImage;
-use vergence_camera::{CameraError, read_image};
-use vergence_vision::{ImageSize, KannalaBrandt};
+use vergence_camera::{CameraError, read_image, read_mask};
+use vergence_vision::{BodyMask, ImageSize, KannalaBrandt};
 
 use crate::InputError;
 use crate::image_files::name_of;
@@ -38,6 +38,8 @@ pub struct Missed {
 pub enum MissedReason {
     /// No target was found in the image.
     NoTarget(DetectError),
+    /// The mask hides every corner.
+    Hidden,
     /// The file is damaged.
     Damaged(String),
 }
@@ -46,6 +48,7 @@ impl fmt::Display for Missed {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match &self.reason {
             MissedReason::NoTarget(error) => write!(f, "{}: {error}", self.name),
+            MissedReason::Hidden => write!(f, "{}: the mask hides the whole target", self.name),
             MissedReason::Damaged(why) => write!(f, "{}: left out: {why}", self.name),
         }
     }
@@ -71,17 +74,23 @@ impl TargetImages {
     }
 }
 
-/// Looks for the target in every image. With a `hint`, a camera that is roughly right, more corners are found, and
-/// better. A damaged image gives no view.
+/// What is looked for in images of one camera.
+#[derive(Clone, Copy, Debug)]
+pub struct Sought<'a> {
+    /// The target.
+    pub target: &'a TargetSpec,
+    /// A camera that is roughly right: with it more corners are found, and better.
+    pub hint: Option<&'a KannalaBrandt>,
+    /// An image of what hides the view (see [`read_mask`]): no corner is taken there.
+    pub mask: Option<&'a Path>,
+}
+
+/// Looks for the target in every image. A damaged image gives no view.
 ///
 /// # Errors
 /// A file that cannot be opened, images of different sizes, or only damaged ones.
-pub fn detect_in(
-    files: &[PathBuf],
-    target: &TargetSpec,
-    hint: Option<&KannalaBrandt>,
-) -> Result<TargetImages, InputError> {
-    let looked: Vec<_> = files.par_iter().map(|path| look(path, target, hint)).collect::<Result<_, InputError>>()?;
+pub fn detect_in(files: &[PathBuf], sought: &Sought<'_>) -> Result<TargetImages, InputError> {
+    let looked: Vec<_> = files.par_iter().map(|path| look(path, sought)).collect::<Result<_, InputError>>()?;
     let Some((width, height)) = looked.iter().find_map(|looked| looked.size) else {
         let first = looked.iter().find_map(|looked| looked.view.as_ref().err()).map(ToString::to_string);
         return Err(InputError::Damaged { images: files.len(), first });
@@ -110,7 +119,7 @@ struct Looked {
     reduced: Option<ReportImage>,
 }
 
-fn look(path: &Path, target: &TargetSpec, hint: Option<&KannalaBrandt>) -> Result<Looked, InputError> {
+fn look(path: &Path, Sought { target, hint, mask }: &Sought<'_>) -> Result<Looked, InputError> {
     let name = name_of(path);
     let image = match read_image(path) {
         Ok(image) => image,
@@ -122,9 +131,17 @@ fn look(path: &Path, target: &TargetSpec, hint: Option<&KannalaBrandt>) -> Resul
     };
     let grey = grayscale(&image);
     let reduced = Some(ReportImage::new(&name, &grey));
-    let view = match detect(&grey, target, hint) {
-        Ok(detection) => Ok(detection.view(&name, target)),
+    let (width, height) = image.dimensions();
+    let mask = mask.map(|mask| read_mask(mask, ImageSize { width, height })).transpose()?;
+    let view = match detect(&grey, target, *hint) {
+        Ok(detection) => unhidden(detection.view(&name, target), mask.as_ref()),
         Err(error) => Err(Missed { name, reason: MissedReason::NoTarget(error) }),
     };
     Ok(Looked { size: Some(image.dimensions()), view, reduced })
+}
+
+/// The view without the corners that a mask hides; none where it hides all.
+fn unhidden(mut view: TargetView, mask: Option<&BodyMask>) -> Result<TargetView, Missed> {
+    view.corners.retain(|corner| !mask.is_some_and(|mask| mask.hides(corner.pixel)));
+    if view.corners.is_empty() { Err(Missed { name: view.name, reason: MissedReason::Hidden }) } else { Ok(view) }
 }

@@ -4,13 +4,14 @@ use std::path::{Path, PathBuf};
 
 use vergence_calibration::{IntrinsicsOptions, StereoView, TargetSpec, TargetView, calibrate_intrinsics};
 use vergence_calibration_report::ReportImage;
+use vergence_camera::{PairedFiles, paired};
 use vergence_vision::{KannalaBrandt, Side};
 
 use crate::InputError;
 use crate::corners::{FrameView, read_corners};
-use crate::image_files::{PairedFiles, named_images, paired};
+use crate::image_files::named_images;
 use crate::input_hash::InputHash;
-use crate::target_images::{Missed, TargetImages, detect_in};
+use crate::target_images::{Missed, Sought, TargetImages, detect_in};
 
 /// What happens while images are looked at.
 #[derive(Clone, Copy, Debug)]
@@ -21,31 +22,30 @@ pub enum ViewEvent<'a> {
     Looked,
     /// This image gives no view.
     Missed(&'a Missed),
-    /// This image is left out: the other camera has none of its number.
+    /// This image is left out: the other camera has none that belongs to it.
     Alone(&'a Path),
 }
 
-/// Looks for the target in images, and adds them to `hash`. Without a `hint`, a camera that is roughly right, it looks twice:
+/// Looks for the target in images, and adds them to `hash`. Without a hint it looks twice:
 /// the second time with the lens that the first look gives. `tell` is called with each event, and may end the work.
 ///
 /// # Errors
 /// [`InputError`] where images cannot be read or none shows the target; those of `tell`.
 pub fn views_in_images<E: From<InputError>>(
     files: &[PathBuf],
-    target: &TargetSpec,
-    hint: Option<&KannalaBrandt>,
+    sought: Sought<'_>,
     hash: &mut InputHash,
     tell: &mut impl FnMut(ViewEvent<'_>) -> Result<(), E>,
 ) -> Result<TargetImages, E> {
-    for file in files {
+    for file in files.iter().map(PathBuf::as_path).chain(sought.mask) {
         hash.add(file).map_err(InputError::from)?;
     }
     tell(ViewEvent::Looking(files.len()))?;
-    let mut targets = detect_in(files, target, hint)?;
-    if hint.is_none() {
+    let mut targets = detect_in(files, &sought)?;
+    if sought.hint.is_none() {
         // Where the views give no lens, the calibration that follows says why.
         if let Ok(rough) = calibrate_intrinsics(&targets.found(), targets.size, &IntrinsicsOptions::default()) {
-            targets = detect_in(files, target, Some(&rough.camera))?.or(targets);
+            targets = detect_in(files, &Sought { hint: Some(&rough.camera), ..sought })?.or(targets);
         }
     }
     tell(ViewEvent::Looked)?;
@@ -65,6 +65,9 @@ pub struct PairImages([Vec<PathBuf>; 2]);
 /// The two lenses of a pair, at least roughly: left, right.
 pub type PairLenses<'a> = [&'a KannalaBrandt; 2];
 
+/// Images of what hides the view of the left and of the right camera, by their files.
+pub type PairMasks<'a> = [Option<&'a Path>; 2];
+
 /// Views of a pair, and all images of the left and of the right camera, reduced for a report.
 pub type PairViews = (Vec<StereoView>, [Vec<ReportImage>; 2]);
 
@@ -77,11 +80,12 @@ impl PairImages {
         [left, right]: [&[String]; 2],
         tell: &mut impl FnMut(ViewEvent<'_>) -> Result<(), E>,
     ) -> Result<Self, E> {
-        let PairedFiles { pairs, alone } = paired([named_images(left)?, named_images(right)?])?;
+        let PairedFiles { pairs, alone } =
+            paired(&named_images(left)?, &named_images(right)?).map_err(InputError::from)?;
         for file in &alone {
             tell(ViewEvent::Alone(file))?;
         }
-        Ok(Self(pairs))
+        Ok(Self(pairs.into_iter().map(|[left, right]| (left, right)).unzip().into()))
     }
 
     /// The pairs in which both images show the target, and all images.
@@ -91,14 +95,15 @@ impl PairImages {
     pub fn views<E: From<InputError>>(
         &self,
         target: &TargetSpec,
-        lenses: PairLenses<'_>,
+        (lenses, masks): (PairLenses<'_>, PairMasks<'_>),
         hash: &mut InputHash,
         tell: &mut impl FnMut(ViewEvent<'_>) -> Result<(), E>,
     ) -> Result<PairViews, E> {
         let [left_files, right_files] = &self.0;
         let [left_lens, right_lens] = lenses;
-        let left = views_in_images(left_files, target, Some(left_lens), hash, tell)?;
-        let right = views_in_images(right_files, target, Some(right_lens), hash, tell)?;
+        let sought = |lens, mask| Sought { target, hint: Some(lens), mask };
+        let left = views_in_images(left_files, sought(left_lens, masks[0]), hash, tell)?;
+        let right = views_in_images(right_files, sought(right_lens, masks[1]), hash, tell)?;
         for (side, images, lens) in [(Side::Left, left.size, left_lens), (Side::Right, right.size, right_lens)] {
             if images != lens.size() {
                 return Err(InputError::OtherSize { side, images, camera: lens.size() }.into());

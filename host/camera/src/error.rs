@@ -32,11 +32,15 @@ pub enum CameraError {
         /// What is wrong with it.
         why: String,
     },
-    /// The images of both cameras do not pair up.
-    #[error("{} has {} images and {} has {}: they must pair up", paths[0].display(), counts[0], paths[1].display(), counts[1])]
-    Uneven {
-        /// File or folder of the left camera and of the right one.
-        paths: [PathBuf; 2],
+    /// Nothing says which images of both cameras were taken together.
+    #[error(
+        "nothing says which of {} left and {} right images belong together ({} and {} are the first): they must pair up by \
+         name, number or time stamp, such as left000.png and right000.png",
+        counts[0], counts[1], first[0].display(), first[1].display()
+    )]
+    Unpaired {
+        /// The first image of the left camera and of the right one.
+        first: [PathBuf; 2],
         /// Number of images of each.
         counts: [usize; 2],
     },

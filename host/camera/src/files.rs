@@ -6,7 +6,12 @@ use std::path::{Path, PathBuf};
 use image::RgbImage;
 use vergence_vision::{BodyMask, ImageSize};
 
+use crate::bit_depth::in_eight_bits;
+use crate::pairing::{PairedFiles, paired};
 use crate::{Camera, CameraError, CameraImage, jpeg};
+
+/// Folder with the images of one camera of an EuRoC or TUM-VI sequence.
+const SEQUENCE_IMAGES: &str = "data";
 
 /// Image files, one after the other.
 #[derive(Debug)]
@@ -29,17 +34,15 @@ impl FileCamera {
         self.files.len()
     }
 
-    /// Opens the images of the left and of the right camera: two files, or two folders with as many images.
+    /// Opens the images of the left and of the right camera, two files or two folders, so that both give the images of a pair in
+    /// turn. Returns the images without a partner too.
     ///
     /// # Errors
-    /// As [`Self::open`]; [`CameraError::Uneven`] where the images do not pair up.
-    pub fn open_pair(left: &Path, right: &Path) -> Result<[Self; 2], CameraError> {
-        let cameras = [Self::open(left)?, Self::open(right)?];
-        let counts = cameras.each_ref().map(Self::remaining);
-        if counts[0] == counts[1] {
-            return Ok(cameras);
-        }
-        Err(CameraError::Uneven { paths: [left.into(), right.into()], counts })
+    /// As [`Self::open`]; [`CameraError::Unpaired`] where nothing says which images belong together.
+    pub fn open_pair(left: &Path, right: &Path) -> Result<([Self; 2], Vec<PathBuf>), CameraError> {
+        let PairedFiles { pairs, alone } = paired(&image_files(left)?, &image_files(right)?)?;
+        let (left, right) = pairs.into_iter().map(|[left, right]| (left, right)).unzip();
+        Ok(([Self { files: left }, Self { files: right }], alone))
     }
 }
 
@@ -51,7 +54,8 @@ impl Camera for FileCamera {
     }
 }
 
-/// The file at `path`, or every JPEG and PNG in the folder at `path`, in the order of their names.
+/// The file at `path`, or every JPEG and PNG in the folder at `path`, in the order of their names. A folder without images is
+/// that of a camera in an EuRoC or TUM-VI sequence, such as mav0/cam0, if it has a folder `data`: then it is that one's images.
 ///
 /// # Errors
 /// [`CameraError::Unreadable`] where nothing is there, [`CameraError::NoImages`] for a folder without images.
@@ -60,22 +64,33 @@ pub fn image_files(path: &Path) -> Result<Vec<PathBuf>, CameraError> {
     if !path.metadata().map_err(unreadable)?.is_dir() {
         return Ok(vec![path.to_owned()]);
     }
+    let inner = path.join(SEQUENCE_IMAGES);
+    for folder in [path, &inner] {
+        let files = images_in(folder).unwrap_or_default();
+        if !files.is_empty() {
+            return Ok(files);
+        }
+    }
+    // An unreadable folder has its own reason.
+    images_in(path).map_err(unreadable)?;
+    Err(CameraError::NoImages(path.into()))
+}
+
+/// Every JPEG and PNG in `folder`, in the order of their names.
+fn images_in(folder: &Path) -> std::io::Result<Vec<PathBuf>> {
     let mut files = Vec::new();
-    for entry in path.read_dir().map_err(unreadable)? {
-        let file = entry.map_err(unreadable)?.path();
+    for entry in folder.read_dir()? {
+        let file = entry?.path();
         let extension = file.extension().map(|e| e.to_string_lossy().to_lowercase());
         if matches!(extension.as_deref(), Some("jpg" | "jpeg" | "png")) {
             files.push(file);
         }
     }
-    if files.is_empty() {
-        return Err(CameraError::NoImages(path.into()));
-    }
     files.sort();
     Ok(files)
 }
 
-/// Reads a JPEG or PNG image.
+/// Reads a JPEG or PNG image, of 16 bits per channel too: the upper 8 of those that it uses are kept.
 ///
 /// # Errors
 /// [`CameraError::Unreadable`] where the file cannot be read, [`CameraError::NotAnImage`] where it is damaged or truncated.
@@ -87,7 +102,7 @@ pub fn read_image(path: &Path) -> Result<RgbImage, CameraError> {
         return Err(not_an_image("the file ends before the picture does; copy it again".into()));
     }
     let image = image::load_from_memory(&bytes).map_err(|error| not_an_image(error.to_string()))?;
-    Ok(image.into_rgb8())
+    Ok(in_eight_bits(image))
 }
 
 /// Reads an image of a camera with images of `size` that is black where the robot itself hides the view.

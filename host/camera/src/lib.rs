@@ -5,10 +5,12 @@
 //! and reports what happens as [`CameraEvent`]s. Simulated cameras implement [`Camera`] too, in a crate of their own.
 
 mod attached;
+mod bit_depth;
 mod error;
 mod event;
 mod files;
 mod jpeg;
+mod pairing;
 mod pixel_format;
 mod set;
 mod v4l;
@@ -21,6 +23,7 @@ pub use attached::attach;
 pub use error::CameraError;
 pub use event::{CameraEvent, Develop, PendingImage};
 pub use files::{FileCamera, image_files, read_image, read_mask};
+pub use pairing::{PairedFiles, paired};
 pub use set::CameraSet;
 pub use v4l::{HostTime, V4lCamera, V4lSettings};
 

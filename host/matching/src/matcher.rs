@@ -3,7 +3,9 @@
 use std::collections::BTreeMap;
 
 use image::GrayImage;
-use vergence_vision::{Angle, ImageSize, KannalaBrandt, Left, Length, Pixel, PixelPair, Right, Side, Transform};
+use vergence_vision::{
+    Angle, BodyMask, ImageSize, KannalaBrandt, Left, Length, Pixel, PixelPair, Right, Side, Transform,
+};
 
 /// A matcher: finds the pixels of scene points that both images of a pair show.
 pub trait Matcher: Send + Sync {
@@ -35,6 +37,8 @@ pub struct ImagePair<'a> {
     pub pose_sigma: Angle,
     /// The smallest range from the left camera at which points are sought.
     pub nearest: Length,
+    /// What of the left and of the right image shows the robot itself: nothing is sought there.
+    pub masks: [Option<&'a BodyMask>; 2],
 }
 
 /// A match: the pixels of one scene point in both images.

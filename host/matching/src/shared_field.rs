@@ -14,10 +14,15 @@ const A_LIMIT: Angle = Angle::from_deg(75.0);
 const B_LIMIT: Angle = Angle::from_deg(105.0);
 /// Width of the outermost ring of the field, which is vignetted and least well calibrated, and left out.
 const RIM: Angle = Angle::from_deg(1.5);
-/// A direction is compared if the other camera sees it at infinity or at this range.
-pub(crate) const NEAR: Length = Length::from_mm(1000.0);
+/// A direction is compared if the other camera sees it at infinity or at so many baselines: 1 m for the bench's 145 mm.
+const NEAR_BASELINES: f64 = 1000.0 / 145.0;
 /// Largest widening of the field for an uncertain pose.
 const MOST_SLACK: Angle = Angle::from_deg(10.0);
+
+/// The range at which a direction is compared besides infinity, for cameras that are `baseline` apart.
+pub(crate) fn near(baseline: Length) -> Length {
+    Length::from_mm(NEAR_BASELINES * baseline.mm())
+}
 
 /// The directions of each view that are compared.
 #[derive(Clone, Copy, Debug)]
@@ -44,12 +49,12 @@ impl<'a> SharedField<'a> {
         Self { left: Field { slack, ..left }, right: Field { slack, ..right }, baseline }
     }
 
-    /// Whether the left camera sees a bearing and the right camera may see it at infinity or at 1 m.
+    /// Whether the left camera sees a bearing and the right camera may see it at infinity or near.
     pub(crate) fn seen_from_left(&self, bearing: &UnitRay<Shared>) -> bool {
         self.left.sees(bearing) && self.parallax_ends(bearing, -1.0).any(|other| self.right.may_see(&other))
     }
 
-    /// Whether the right camera sees a bearing and the left camera may see it at infinity or at 1 m.
+    /// Whether the right camera sees a bearing and the left camera may see it at infinity or near.
     pub(crate) fn seen_from_right(&self, bearing: &UnitRay<Shared>) -> bool {
         self.right.sees(bearing) && self.parallax_ends(bearing, 1.0).any(|other| self.left.may_see(&other))
     }
@@ -76,15 +81,15 @@ impl<'a> SharedField<'a> {
         })
     }
 
-    /// The bearings of the points at infinity and at 1 m, from a camera displaced by `side` baselines along x.
+    /// The bearings of the points at infinity and near, from a camera displaced by `side` baselines along x.
     fn parallax_ends(&self, bearing: &UnitRay<Shared>, side: f64) -> impl Iterator<Item = UnitRay<Shared>> {
         let offset = Vector3::x() * (side * self.baseline.mm());
-        [Some(*bearing), UnitRay::new(bearing.at(NEAR.mm()).mm() + offset)].into_iter().flatten()
+        [Some(*bearing), UnitRay::new(bearing.at(near(self.baseline).mm()).mm() + offset)].into_iter().flatten()
     }
 }
 
 impl Grid {
-    /// Makes the grid over the field that both cameras share (at infinity or 1 m), within ±75° of a and ±105° of b.
+    /// Makes the grid over the field that both cameras share (at infinity or 6.9 baselines), within ±75° of a and ±105° of b.
     ///
     /// Its density is that of the denser lens at its axis times `oversampling`, or less where a side would exceed 4096
     /// pixels. `None` where the fields do not overlap or `oversampling` is not positive.

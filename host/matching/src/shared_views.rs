@@ -39,8 +39,8 @@ impl<'a> SharedViews<'a> {
         Ok(Self {
             frame,
             grid,
-            left: View::new(pair.left, pair.left_camera, frame.shared_from_left(), grid),
-            right: View::new(pair.right, pair.right_camera, frame.shared_from_right(), grid),
+            left: View::masked((pair.left, pair.masks[0]), pair.left_camera, frame.shared_from_left(), grid),
+            right: View::masked((pair.right, pair.masks[1]), pair.right_camera, frame.shared_from_right(), grid),
             field,
             pair,
         })

@@ -4,7 +4,7 @@
 
 use image::GrayImage;
 use rayon::prelude::*;
-use vergence_vision::{Angle, BatchLens, Frame, KannalaBrandt, OutsideField, Pixel, Transform};
+use vergence_vision::{Angle, BatchLens, BodyMask, Frame, KannalaBrandt, OutsideField, Pixel, Transform};
 
 use crate::grid::direction_of;
 use crate::plane::{Plane, cubic_weights};
@@ -31,6 +31,17 @@ impl<F: Frame> View<F> {
         shared_from_camera: Transform<Shared, F>,
         grid: Grid,
     ) -> Self {
+        Self::masked((image, None), camera, shared_from_camera, grid)
+    }
+
+    /// The same, of an image of which `mask` hides a part: the camera does not see what is hidden.
+    #[must_use]
+    pub fn masked(
+        (image, mask): (&GrayImage, Option<&BodyMask>),
+        camera: &KannalaBrandt,
+        shared_from_camera: Transform<Shared, F>,
+        grid: Grid,
+    ) -> Self {
         let camera_from_shared = shared_from_camera.inverse().rotation().to_rotation_matrix().into_inner();
         let (lens, inside) = (BatchLens::new(camera), Inside::of(camera));
         let (width, height) = grid.size();
@@ -45,7 +56,8 @@ impl<F: Frame> View<F> {
             let pixels = lens.project(&rays);
             for (((&[_, _, z], [u, v]), value), seen) in rays.iter().zip(pixels).zip(values).zip(seen) {
                 let at = Pixel { u, v };
-                if let Some(sampled) = inside.contains(z, &at).then(|| sample_image(image, at)).flatten() {
+                let is_seen = inside.contains(z, &at) && !mask.is_some_and(|mask| mask.hides(at));
+                if let Some(sampled) = is_seen.then(|| sample_image(image, at)).flatten() {
                     (*value, *seen) = (sampled, true);
                 }
             }

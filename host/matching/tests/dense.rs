@@ -14,7 +14,9 @@ use image::{DynamicImage, GrayImage};
 use nalgebra::{Matrix6, UnitQuaternion, Vector3};
 use vergence_matching::{DenseDepth, DenseRange, DenseSample, DenseViews, ImagePair, MatchError, dense_depth};
 use vergence_scene::{Optics, Photograph, Scene, View, render};
-use vergence_vision::{Angle, Camera, ImageSize, KannalaBrandt, Left, Length, Pixel, Right, Transform, World};
+use vergence_vision::{
+    Angle, Camera, ImageSize, KannalaBrandt, Left, Length, Pixel, Right, SharedCovariance, Transform, World,
+};
 
 /// The bench's baseline in human mode.
 const BASELINE_MM: f64 = 145.0;
@@ -64,6 +66,7 @@ impl Human {
             left_from_right: self.left_from_right,
             pose_sigma: Angle::from_deg(0.0),
             nearest: Length::from_mm(200.0),
+            masks: [None; 2],
         }
     }
 
@@ -187,7 +190,7 @@ fn timed(pair: &ImagePair<'_>) -> (DenseDepth, String) {
     let sweep = seconds();
     let disparities = views.register(&swept);
     let registered = seconds();
-    let depth = views.ranges(&disparities, &Matrix6::zeros());
+    let depth = views.ranges(&disparities, &SharedCovariance::exact());
     let all = seconds();
     let text = format!(
         "turn {turned:.2} s, sweep {:.2} s, register {:.2} s, ranges {:.2} s, in all {all:.2} s",
@@ -203,7 +206,8 @@ fn identical_images_are_far_everywhere() {
     let pair = Pair::new(320, Angle::from_deg(0.0));
     let left_from_right = Transform::new(UnitQuaternion::identity(), Vector3::new(BASELINE_MM, 0.0, 0.0));
     let depth =
-        dense_depth(&ImagePair { right: &pair.left, left_from_right, ..pair.images() }, &Matrix6::zeros()).unwrap();
+        dense_depth(&ImagePair { right: &pair.left, left_from_right, ..pair.images() }, &SharedCovariance::exact())
+            .unwrap();
     let counts = depth.counts();
     println!("{counts:?}");
     assert!(counts.far > 20_000 && counts.measured * 1000 < counts.far, "{counts:?}");
@@ -217,7 +221,7 @@ fn swapped_and_mirrored_cameras_measure_the_same() {
     let straight = ImagePair { left_from_right, ..pair.images() };
     let (flipped_left, flipped_right) = (flip_horizontal(&pair.left), flip_horizontal(&pair.right));
     let mirrored = ImagePair { left: &flipped_right, right: &flipped_left, ..straight };
-    let [straight, mirrored] = [straight, mirrored].map(|pair| dense_depth(&pair, &Matrix6::zeros()).unwrap());
+    let [straight, mirrored] = [straight, mirrored].map(|pair| dense_depth(&pair, &SharedCovariance::exact()).unwrap());
     let mut same = Share::default();
     for (index, sample) in (0..320 * 320).zip(straight.samples()) {
         let DenseSample::Measured(by_left) = sample else { continue };
@@ -256,8 +260,9 @@ fn unrelated_images_have_no_ranges() {
             left_from_right,
             pose_sigma: Angle::from_deg(0.0),
             nearest: Length::from_mm(200.0),
+            masks: [None; 2],
         };
-        let counts = dense_depth(&pair, &Matrix6::zeros()).unwrap().counts();
+        let counts = dense_depth(&pair, &SharedCovariance::exact()).unwrap().counts();
         println!("{counts:?}");
         assert!((counts.measured + counts.far) * 50 < 320 * 320, "{counts:?}");
     }
@@ -268,7 +273,9 @@ fn any_number_of_threads_gives_the_same() {
     let pair = Pair::new(320, Angle::from_deg(30.0));
     let on = |threads: usize| {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
-        pool.install(|| dense_depth(&pair.images(), &Matrix6::identity()).unwrap())
+        pool.install(|| {
+            dense_depth(&pair.images(), &SharedCovariance::exact().with_pose(&Matrix6::identity())).unwrap()
+        })
     };
     // Bit for bit: a NaN would not equal itself.
     assert_eq!(on(1), on(3));
@@ -277,7 +284,7 @@ fn any_number_of_threads_gives_the_same() {
 #[test]
 fn a_pose_without_baseline_or_a_wrong_size_is_refused() {
     let pair = Pair::new(320, Angle::from_deg(0.0));
-    let refused = |pair: ImagePair<'_>| dense_depth(&pair, &Matrix6::zeros()).unwrap_err();
+    let refused = |pair: ImagePair<'_>| dense_depth(&pair, &SharedCovariance::exact()).unwrap_err();
     let here = Transform::new(UnitQuaternion::identity(), Vector3::zeros());
     assert_eq!(refused(ImagePair { left_from_right: here, ..pair.images() }), MatchError::NoBaseline);
     let small = GrayImage::new(300, 320);

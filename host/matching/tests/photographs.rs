@@ -68,6 +68,7 @@ fn an_office() {
         left_from_right: right_from_left.inverse(),
         pose_sigma: Angle::from_deg(0.5),
         nearest: Length::from_mm(250.0),
+        masks: [None; 2],
     };
     let matches = GuidedMatcher::default().find(&pair).unwrap();
     assert!(matches.pairs.len() >= 400, "{} matches, dropped {:?}", matches.pairs.len(), matches.dropped);

@@ -21,6 +21,7 @@ fn find_in(image: &GrayImage, change: impl Fn(&mut ImagePair<'_>)) -> Result<ver
         left_from_right: Transform::new(UnitQuaternion::identity(), Vector3::new(145.0, 0.0, 0.0)),
         pose_sigma: Angle::from_deg(0.1),
         nearest: Length::from_mm(300.0),
+        masks: [None; 2],
     };
     change(&mut pair);
     GuidedMatcher::default().find(&pair)
@@ -50,6 +51,7 @@ fn an_image_of_another_size_is_refused() {
             left_from_right: Transform::new(UnitQuaternion::identity(), Vector3::new(145.0, 0.0, 0.0)),
             pose_sigma: Angle::from_deg(0.0),
             nearest: Length::from_mm(300.0),
+            masks: [None; 2],
         };
         GuidedMatcher::default().find(&pair).unwrap_err()
     };
@@ -107,6 +109,7 @@ fn cameras_without_a_shared_field_are_refused() {
         left_from_right: Transform::new(back_to_back, Vector3::new(145.0, 0.0, 0.0)),
         pose_sigma: Angle::from_deg(0.0),
         nearest: Length::from_mm(300.0),
+        masks: [None; 2],
     };
     assert_eq!(GuidedMatcher::default().find(&pair), Err(MatchError::NoSharedField));
 }
@@ -125,6 +128,7 @@ fn tiny_and_extreme_pairs_do_not_panic() {
                 left_from_right: Transform::new(UnitQuaternion::identity(), Vector3::new(0.0, baseline, 0.0)),
                 pose_sigma: Angle::from_deg(sigma),
                 nearest: Length::from_mm(nearest),
+                masks: [None; 2],
             };
             for oversampling in [None, Some(f64::NAN), Some(-1.0), Some(1e9)] {
                 let matcher = GuidedMatcher { keypoints: 100, oversampling };

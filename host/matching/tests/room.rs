@@ -35,6 +35,7 @@ fn depth_errors(side: u32, separation: Angle) -> (Vec<f64>, f64) {
         left_from_right,
         pose_sigma: Angle::from_deg(0.0),
         nearest: Length::from_mm(300.0),
+        masks: [None; 2],
     };
     let matches = GuidedMatcher::default().find(&pair).unwrap();
     let judged: Vec<(f64, f64)> = matches

@@ -76,6 +76,17 @@ impl DenseDepth {
         &self.samples
     }
 
+    /// The same, with every range beyond `farthest` as far.
+    #[must_use]
+    pub fn up_to(mut self, farthest: Length) -> Self {
+        for sample in &mut self.samples {
+            if matches!(sample, DenseSample::Measured(range) if range.range() > farthest) {
+                *sample = DenseSample::Far;
+            }
+        }
+        self
+    }
+
     /// Counts the pixels by their result.
     #[must_use]
     pub fn counts(&self) -> DenseCounts {

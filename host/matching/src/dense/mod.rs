@@ -16,14 +16,14 @@ mod levels;
 mod paths;
 mod range;
 mod register;
+mod shared_spread;
 mod surface;
 mod volume;
 mod window;
 mod winner;
 
-use nalgebra::Matrix6;
 use rayon::prelude::*;
-use vergence_vision::{Angle, BatchLens, Left, Length, Right};
+use vergence_vision::{Angle, BatchLens, Left, Length, Right, SharedCovariance, StereoPair};
 
 pub use self::depth::{DenseCounts, DenseDepth, DenseRange, DenseSample, Gap};
 pub use self::fraction::Disparities;
@@ -32,7 +32,7 @@ use self::register::SampledView;
 use self::surface::SAME_SURFACE;
 use crate::epipolar_band::EpipolarBand;
 use crate::matcher::{ImagePair, MatchError};
-use crate::shared_field::NEAR;
+use crate::shared_field::near;
 use crate::{Grid, SharedFrame, View, ViewPixel};
 
 /// Smallest disparity in standard deviations that differs from zero.
@@ -57,14 +57,13 @@ pub struct WholeDisparities(Vec<f32>);
 
 /// Computes a range for every pixel of the left image of `pair`.
 ///
-/// `pose_covariance` (6 × 6) is that of the relative pose: a turn about the left axes in radians and a shift of the
-/// right camera in the left frame in millimetres.
+/// `shared` is the covariance of lenses and pose, which all pixels share.
 ///
 /// # Errors
 /// [`MatchError`] for a pair that cannot be matched, whatever its images show.
-pub fn dense_depth(pair: &ImagePair<'_>, pose_covariance: &Matrix6<f64>) -> Result<DenseDepth, MatchError> {
+pub fn dense_depth(pair: &ImagePair<'_>, shared: &SharedCovariance) -> Result<DenseDepth, MatchError> {
     let views = DenseViews::new(pair)?;
-    Ok(views.ranges(&views.register(&views.sweep()), pose_covariance))
+    Ok(views.ranges(&views.register(&views.sweep()), shared))
 }
 
 impl<'a> DenseViews<'a> {
@@ -76,8 +75,8 @@ impl<'a> DenseViews<'a> {
         pair.check()?;
         let frame = SharedFrame::new(&pair.left_from_right).ok_or(MatchError::NoBaseline)?;
         let grid = Grid::covering(&frame, pair.left_camera, pair.right_camera, 1.0).ok_or(MatchError::NoSharedField)?;
-        let left = View::new(pair.left, pair.left_camera, frame.shared_from_left(), grid);
-        let right = View::new(pair.right, pair.right_camera, frame.shared_from_right(), grid);
+        let left = View::masked((pair.left, pair.masks[0]), pair.left_camera, frame.shared_from_left(), grid);
+        let right = View::masked((pair.right, pair.masks[1]), pair.right_camera, frame.shared_from_right(), grid);
         Ok(Self { pair: *pair, frame, left, right })
     }
 
@@ -97,12 +96,14 @@ impl<'a> DenseViews<'a> {
 
     /// Converts disparities to ranges of the left image's pixels. The covariance is that of [`dense_depth`].
     #[must_use]
-    pub fn ranges(&self, disparities: &Disparities, pose_covariance: &Matrix6<f64>) -> DenseDepth {
+    pub fn ranges(&self, disparities: &Disparities, shared: &SharedCovariance) -> DenseDepth {
         let size = self.pair.left_camera.size();
         let lens = BatchLens::new(self.pair.left_camera);
         let turn = self.frame.shared_from_left().rotation().to_rotation_matrix().into_inner();
-        let finder = RangeFinder::new(&self.frame, pose_covariance);
-        let near = self.band(NEAR);
+        let (left, right) = (self.pair.left_camera, self.pair.right_camera);
+        let pair = StereoPair { left, right, left_from_right: self.pair.left_from_right };
+        let finder = RangeFinder::new(&self.frame, &pair, shared);
+        let near = self.band(near(self.frame.baseline()));
         let mut samples = vec![DenseSample::Gap(Gap::OutsideField); size.width as usize * size.height as usize];
         samples.par_chunks_mut((size.width as usize).max(1)).enumerate().for_each(|(v, samples)| {
             let pixels: Vec<[f64; 2]> = (0..size.width).map(|u| [f64::from(u), v as f64]).collect();

@@ -10,17 +10,21 @@
 //! A turn ω of the right camera acts as a disparity n·ω, its shift δ as (n × v)·δ / μ.
 
 use nalgebra::{Matrix6, Vector3, Vector6};
+use vergence_vision::{LENS_PARAMETERS, SharedCovariance, StereoPair};
 
+use super::shared_spread::SharedSpread;
 use crate::SharedFrame;
 
-/// Converts disparities to ranges, for one baseline and one covariance of the pose.
+/// Converts disparities to ranges, for one pair and one covariance of its lenses and pose.
 pub(super) struct RangeFinder {
     baseline_mm: f64,
     /// Covariance of turn and shift of the right camera, in the shared axes.
     pose: Matrix6<f64>,
+    /// With the lenses, where these are uncertain.
+    with_lenses: Option<SharedSpread>,
 }
 
-/// A range and its standard deviations, with and without the pose, in millimetres.
+/// A range and its standard deviations, with and without lenses and pose, in millimetres.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct RangeAt {
     pub mm: f64,
@@ -29,13 +33,19 @@ pub(super) struct RangeAt {
 }
 
 impl RangeFinder {
-    /// `pose` is the covariance of a turn in radians and a shift in millimetres of the right camera, in left axes.
-    pub(super) fn new(frame: &SharedFrame, pose: &Matrix6<f64>) -> Self {
+    /// `frame` is that of `pair`.
+    pub(super) fn new(frame: &SharedFrame, pair: &StereoPair<'_>, shared: &SharedCovariance) -> Self {
+        let lenses = 2 * LENS_PARAMETERS;
+        let has_lenses = shared.matrix().view((0, 0), (lenses, lenses)).amax() > 0.0;
         let turn = frame.shared_from_left().rotation().to_rotation_matrix();
         let mut both = Matrix6::zeros();
         both.fixed_view_mut::<3, 3>(0, 0).copy_from(turn.matrix());
         both.fixed_view_mut::<3, 3>(3, 3).copy_from(turn.matrix());
-        Self { baseline_mm: frame.baseline().mm(), pose: both * pose * both.transpose() }
+        Self {
+            baseline_mm: frame.baseline().mm(),
+            pose: both * shared.pose() * both.transpose(),
+            with_lenses: has_lenses.then(|| SharedSpread::new(frame, pair, shared)),
+        }
     }
 
     /// Converts the disparity `d` with standard deviation `sigma` at (a, b) of the left view, all in radians. The
@@ -43,7 +53,10 @@ impl RangeFinder {
     pub(super) fn at(&self, [a, b]: [f64; 2], d: f64, sigma: f64) -> RangeAt {
         let (right, sine) = (a - d, d.sin());
         let from_right = self.baseline_mm * a.cos() / sine;
-        let variance = sigma * sigma + self.disparity_variance(b, right, from_right);
+        let of_lenses =
+            self.with_lenses.as_ref().map_or(f64::NAN, |spread| spread.at([a, b], self.baseline_mm / from_right));
+        let of_shared = if of_lenses.is_nan() { self.disparity_variance(b, right, from_right) } else { of_lenses };
+        let variance = sigma * sigma + of_shared;
         let per_radian = from_right / sine;
         RangeAt {
             mm: self.baseline_mm * right.cos() / sine,
@@ -64,6 +77,7 @@ impl RangeFinder {
 
 #[cfg(test)]
 mod tests {
+    use nalgebra::SMatrix;
     use vergence_vision::{
         Angle, ImageSize, KannalaBrandt, Left, Pixel, PointUncertainty, SharedCovariance, StereoPair, Transform,
     };
@@ -81,9 +95,14 @@ mod tests {
         let frame = SharedFrame::new(&left_from_right).unwrap();
         let spread = Matrix6::from_fn(|i, j| ((3 * i + 5 * j) % 7) as f64 * if i < 3 { 1e-4 } else { 0.05 });
         let pose = spread * spread.transpose();
-        let finder = RangeFinder::new(&frame, &pose);
         let shared = SharedCovariance::exact().with_pose(&pose);
         let pair = StereoPair { left: &lens, right: &lens, left_from_right };
+        let finder = RangeFinder::new(&frame, &pair, &shared);
+        let by_lens = SMatrix::<f64, LENS_PARAMETERS, LENS_PARAMETERS>::from_diagonal(
+            &[0.3, 0.3, 0.2, 0.2, 1e-3, 1e-3, 1e-4, 1e-5].map(|sigma: f64| sigma.powi(2)).into(),
+        );
+        let uncertain = shared.with_lenses([&by_lens, &by_lens]);
+        let with_lenses = RangeFinder::new(&frame, &pair, &uncertain);
         for [x, y, z] in [[0.0, 0.0, 400.0], [300.0, -200.0, 900.0], [-500.0, 700.0, 300.0], [100.0, 900.0, -100.0]] {
             let point = vergence_vision::Point::<Left>::from_mm(Vector3::new(x, y, z));
             let angles = |mm: Vector3<f64>| [mm.x.atan2(mm.y.hypot(mm.z)), mm.y.atan2(mm.z)];
@@ -96,6 +115,11 @@ mod tests {
             let by_pose = PointUncertainty::of(&point, &pair, 0.0).unwrap().covariance(&shared);
             let expected = along.dot(&(by_pose * along)).sqrt();
             assert!((found.sigma_mm / expected - 1.0).abs() < 1e-9, "{} is not {expected}", found.sigma_mm);
+            // With uncertain lenses, by interpolation.
+            let by_all = PointUncertainty::of(&point, &pair, 0.0).unwrap().covariance(&uncertain);
+            let (stated, expected) =
+                (with_lenses.at([a, b], a - right, 0.0).sigma_mm, along.dot(&(by_all * along)).sqrt());
+            assert!((stated / expected - 1.0).abs() < 0.02, "{stated} is not {expected}");
             // The disparity's own share, by difference.
             let step = 1e-6;
             let moved = finder.at([a, b], a - right + step, 0.0).mm - found.mm;

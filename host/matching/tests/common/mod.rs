@@ -69,6 +69,7 @@ impl Pair {
             left_from_right: self.world_from_left.inverse() * self.world_from_right,
             pose_sigma: Angle::from_deg(0.0),
             nearest: Length::from_mm(300.0),
+            masks: [None; 2],
         }
     }
 
