@@ -180,8 +180,8 @@ fn damaged_images_and_gaps_in_folders_are_left_out_with_a_word() {
     let target = ["--corners", "9x6", "--square", "20mm"];
     let left = file("left");
     // Frontal views give no calibration, but the damaged one is no reason to stop.
-    let arguments = [&["calibrate", "intrinsics", "--images", &left], &target[..]].concat();
-    fails_with(&arguments, 2, &["left2.png: left out", "no calibration"]);
+    let arguments = [&["calibrate", "intrinsics", "--force", "--images", &left], &target[..]].concat();
+    fails_with(&arguments, 2, &["left2.png: left out", "the same photograph", "no calibration"]);
     std::fs::write(file("damaged.png"), &whole[..100]).expect("written");
     let damaged = file("damaged.png");
     let arguments = [&["calibrate", "intrinsics", "--images", &damaged], &target[..]].concat();
@@ -229,7 +229,8 @@ fn a_target_of_another_size_is_told() {
     let arguments = ["calibrate", "intrinsics", "--images", &pattern, "--square", "20mm", "--out", &out, "--corners"];
     fails_with(&[&arguments[..], &["7x5"]].concat(), 2, &["11 × 8", "7 × 5"]);
     // The right size, but the same frontal view twice.
-    fails_with(&[&arguments[..], &["11x8"]].concat(), 2, &["no calibration"]);
+    fails_with(&[&arguments[..], &["11x8"]].concat(), 2, &["a0.png", "a1.png", "the same photograph"]);
+    fails_with(&[&arguments[..], &["11x8", "--force"]].concat(), 2, &["the same photograph", "no calibration"]);
     assert!(!Path::new(&out).exists());
 }
 

@@ -35,6 +35,7 @@ const VERBS: &[&str] = &[
     "demo",
     "reproduce",
     "run",
+    "servo",
     "depth",
     "models",
     "zones",

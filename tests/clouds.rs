@@ -169,7 +169,8 @@ fn an_interrupted_depth_ends_within_a_second_and_says_what_is_left() {
         }
     }
     let [rig, left, right, out] = ["rig.toml", "left", "right", "clouds"].map(|path| name(&file(path)));
-    let depth = started(&["depth", "--dense", "--rig", &rig, "--left", &left, "--right", &right, "--out", &out]);
+    let depth =
+        started(&["depth", "--dense", "--force", "--rig", &rig, "--left", &left, "--right", &right, "--out", &out]);
     let (said, code, took) = interrupted_after(depth, &file("clouds").join("0-preview.svg"));
     assert!(said.contains("interrupted:") && said.contains("run the command again"), "{said}");
     assert_eq!(code, Some(3));

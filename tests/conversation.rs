@@ -271,7 +271,7 @@ impl<B: Wired> Conversation<B> {
         self.ask(Request::Home { axes: BOTH })
     }
 
-    pub fn move_to(&mut self, targets: [i32; 2], mode: u8) -> Status {
+    pub fn move_to<const AXES: usize>(&mut self, targets: [i32; AXES], mode: u8) -> Status {
         self.next_move += 1;
         self.ask(Request::MoveTo(Move {
             id: MoveId(self.next_move),
@@ -282,7 +282,7 @@ impl<B: Wired> Conversation<B> {
     }
 
     /// Moves by a distance, in micrometres and microradians.
-    pub fn jog(&mut self, by: [i32; 2]) -> Status {
+    pub fn jog<const AXES: usize>(&mut self, by: [i32; AXES]) -> Status {
         self.next_move += 1;
         let (id, by) = (MoveId(self.next_move), by.into_iter().map(Micro).collect());
         self.ask(Request::Jog(Jog { id, by, speed: Permille::FULL }))

@@ -22,7 +22,12 @@ fn path(folder: &tempfile::TempDir, name: &str) -> String {
 
 /// A small grey picture with some texture.
 fn picture(path: &str, width: u32, height: u32) {
-    image::RgbImage::from_fn(width, height, |x, y| image::Rgb([((x * 7 + y * 13) % 251) as u8; 3]))
+    picture_from(path, width, height, 0);
+}
+
+/// The same, of another place.
+fn picture_from(path: &str, width: u32, height: u32, shift: u32) {
+    image::RgbImage::from_fn(width, height, |x, y| image::Rgb([(((x + shift) * 7 + y * 13) % 251) as u8; 3]))
         .save(path)
         .expect("a picture is written");
 }
@@ -105,7 +110,7 @@ fn depth_of_given_correspondences() {
     let methods =
         ["pseudo-intersection", "midpoint", "mid2", "angular-l1", "angular-linf", "reprojection", "rectified"];
     for method in methods.into_iter().chain(["edge-plane:0,1,0"]) {
-        let result = run_json(&[&["depth", "--json", "--kernel", method], &options[..]].concat());
+        let result = run_json(&[&["depth", "--json", "--ascii", "--kernel", method], &options[..]].concat());
         assert_eq!(result["points"], 1, "{method}: {result}");
         assert_eq!(result["dropped"]["matches"]["diverging"], 1, "{method}: {result}");
         assert!(result["pose_drift"].is_null(), "two pairs say nothing of the pose");
@@ -127,7 +132,7 @@ fn depth_of_given_correspondences() {
     assert!(csv.starts_with("x_mm,y_mm,z_mm,red,green,blue,u_left") && csv.lines().count() == 2, "{csv}");
     assert_eq!(
         (json["columns"][10].as_str(), json["rows"][0].as_array().map(Vec::len)),
-        (Some("sigma_range_mm"), Some(18))
+        (Some("sigma_range_mm"), Some(24))
     );
     assert!((row[0] - 100.0).abs() < 0.01 && (row[2] - 100.0).abs() < 0.01, "{row:?}");
     // The variance of the range, along (1, 0, 1): half of xx and zz, and xz.
@@ -144,6 +149,7 @@ fn dense_depth_refuses_bad_input_and_says_where_nothing_is_seen() {
     std::fs::write(&together, SMALL_RIG.replace("\"100mm\"", "\"0mm\"")).expect("a rig file is written");
     picture(&file("good.png"), 64, 48);
     picture(&file("wide.png"), 65, 48);
+    picture_from(&file("other.png"), 64, 48, 5);
     image::RgbImage::new(64, 48).save(file("black.png")).expect("a picture is written");
     let (good, wide, black) = (file("good.png"), file("wide.png"), file("black.png"));
     let depth = |rig: &str, left: &str, right: &str, more: &[&str], code: i32, words: &[&str]| {
@@ -151,11 +157,11 @@ fn dense_depth_refuses_bad_input_and_says_where_nothing_is_seen() {
         fails_with(&[&pair, more].concat(), code, words);
     };
     depth(&rig, &good, &wide, &[], 2, &["wide", "65 x 48", "64 x 48"]);
-    depth(&together, &good, &good, &[], 2, &["no baseline"]);
+    depth(&together, &good, &file("other.png"), &[], 2, &["no baseline"]);
     depth(&rig, &good, &good, &["--points", "pairs.csv"], 2, &["--dense", "--points"]);
     depth(&rig, &good, &good, &["--matcher", "guided"], 2, &["--dense", "--matcher"]);
     assert!(!Path::new(&out).exists(), "an output file was left behind");
-    depth(&rig, &black, &black, &[], 1, &["no pixel of black has a range", "dark"]);
+    depth(&rig, &black, &black, &[], 1, &["nothing in black has a range", "dark"]);
     let ranges = image::open(file("cloud-range.png")).expect("the range image is written").into_luma16();
     assert!(ranges.dimensions() == (64, 48) && ranges.pixels().all(|range| range.0 == [0]));
     for name in ["cloud.ply", "cloud-sigma.png", "cloud-confidence.png", "cloud-preview.svg"] {

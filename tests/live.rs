@@ -78,6 +78,7 @@ impl Bench {
         let live = LiveLoop {
             rig: Arc::new(Rig { shutters: believed, ..rig.clone() }),
             matcher: Arc::new(GuidedMatcher::default()),
+            search: Arc::default(),
             events,
             marks: Some(board.client_mut().take_marks()),
             board: Some(board.client().knowledge()),
@@ -208,7 +209,8 @@ fn run_measures_the_newest_pair_while_the_stages_move() {
     let newer = end["skipped"]["newer_came"].as_u64().expect("counted");
     assert!((60..=95).contains(&newer), "{}", end["skipped"]);
     assert_eq!(end["clouds"], 6);
-    let ply = std::fs::read_to_string(out.join("cloud.ply")).expect("a cloud");
+    let ply = std::fs::read(out.join("cloud.ply")).expect("a cloud");
+    let ply = String::from_utf8_lossy(&ply);
     assert!(ply.contains("property uchar red") && ply.contains("sigma_range") && ply.contains("score"));
     let csv = std::fs::read_to_string(out.join("cloud.csv")).expect("a table");
     let points = clouds[5]["points"].as_u64().expect("a number") as usize;

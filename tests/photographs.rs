@@ -104,7 +104,7 @@ impl RealPair {
     fn depth(&self, options: &[&str]) -> Value {
         let image = |name: &str| self.set.join("images").join(name).to_string_lossy().into_owned();
         let (left, right) = (image("left10.jpg"), image("right10.jpg"));
-        let depth = ["depth", "--json", "--rig", &self.rig, "--left", &left, "--right", &right];
+        let depth = ["depth", "--ascii", "--json", "--rig", &self.rig, "--left", &left, "--right", &right];
         run_json(&[&depth[..], options].concat())
     }
 }

@@ -32,7 +32,18 @@ const ALLOWED: &[(&str, &[&str])] = &[
     ("vergence-plant", &["vergence-protocol", "vergence-control", "vergence-dynamixel"]),
     (
         "vergence-soak",
-        &["vergence-protocol", "vergence-control", "vergence-image", "vergence-cpu", "vergence-mcu", "vergence-plant"],
+        &[
+            "vergence-protocol",
+            "vergence-control",
+            "vergence-dynamixel",
+            "vergence-image",
+            "vergence-rig",
+            "vergence-board",
+            "vergence-cpu",
+            "vergence-mcu",
+            "vergence-plant",
+            "vergence-sim",
+        ],
     ),
     ("vergence-pipeline", &["vergence-protocol", "vergence-vision", "vergence-rig", "vergence-matching"]),
     (
@@ -51,6 +62,7 @@ const ALLOWED: &[(&str, &[&str])] = &[
         &[
             "vergence-protocol",
             "vergence-control",
+            "vergence-dynamixel",
             "vergence-image",
             "vergence-vision",
             "vergence-rig",
@@ -64,6 +76,7 @@ const ALLOWED: &[(&str, &[&str])] = &[
         &[
             "vergence-protocol",
             "vergence-control",
+            "vergence-dynamixel",
             "vergence-image",
             "vergence-vision",
             "vergence-rig",
@@ -141,6 +154,7 @@ const ALLOWED: &[(&str, &[&str])] = &[
     (
         "vergence",
         &[
+            "vergence-dynamixel",
             "vergence-protocol",
             "vergence-image",
             "vergence-vision",

@@ -4,6 +4,9 @@
 pub mod cameras;
 pub mod data;
 pub mod images;
+pub mod pairs;
+pub mod rendered;
+pub mod servo_line;
 
 use std::io::{BufRead, BufReader};
 use std::path::PathBuf;

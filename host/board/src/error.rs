@@ -57,6 +57,9 @@ pub enum BoardError {
         /// The ends of the range.
         range: [AxisPosition; 2],
     },
+    /// No path of the trunk leads to the target.
+    #[error("no path leads there: {0}")]
+    NoPath(#[from] vergence_rig::linkage::NoPath),
     /// The board refuses the request.
     #[error("the board refuses: {refusal}{more}")]
     Refused {

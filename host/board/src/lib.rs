@@ -17,14 +17,15 @@ mod listening;
 mod move_plan;
 mod plan_table;
 mod serve;
+pub mod servos;
 mod setting_check;
 mod setting_text;
 mod settings_file;
 mod update;
 
 pub use board::{
-    Board, RecordedEvents, check_range, clock_json, describe_clock, describe_fault, describe_pose, event_in_words,
-    pose_json, positions, staying,
+    Board, RecordedEvents, Way, check_range, clock_json, describe_clock, describe_fault, describe_pose, event_in_words,
+    pose_json, positions, staying, straight_ways,
 };
 pub use checks::{BoardChecks, Finding, Verdict, check_board, check_cameras, check_port};
 pub use error::BoardError;

@@ -78,8 +78,10 @@ fn form(item: SettingItem, kind: AxisKind) -> Form {
         | SettingItem::Microsteps
         | SettingItem::StallThreshold
         | SettingItem::IndexEvery
-        | SettingItem::EncoderZero => Form::Number,
-        SettingItem::Encoder => Form::Choice(&["quadrature", "as5048a"]),
+        | SettingItem::EncoderZero
+        | SettingItem::ServoId
+        | SettingItem::ServoBaud => Form::Number,
+        SettingItem::Encoder => Form::Choice(&["quadrature", "as5048a", "servo"]),
         SettingItem::StepsReversed
         | SettingItem::CountsReversed
         | SettingItem::StealthChop
@@ -87,7 +89,7 @@ fn form(item: SettingItem, kind: AxisKind) -> Form {
         SettingItem::StreamPeriod | SettingItem::HoldDelay | SettingItem::HoldAfter => Form::Period,
         SettingItem::SenseResistor => Form::Unit("mOhm"),
         SettingItem::RunCurrent | SettingItem::HoldCurrent => Form::Unit("mA"),
-        SettingItem::Driver => Form::Choice(&["plain", "tmc2209"]),
+        SettingItem::Driver => Form::Choice(&["plain", "tmc2209", "servo"]),
         SettingItem::HomeEnd => Form::Choice(&["low", "high"]),
         SettingItem::HomeSwitch => Form::Choice(&["normally_open", "normally_closed", "stallguard"]),
         SettingItem::HardLimit => Form::Choice(&["normally_closed", "normally_open"]),

@@ -11,7 +11,7 @@ use vergence_board::{BoardKnowledge, HostClock};
 use vergence_camera::{CameraEvent, PendingImage};
 use vergence_matching::Matcher;
 use vergence_pipeline::{
-    Ambiguity, Exposed, Exposures, Motion, Observation, PairPose, SkipReason, TimeBase, pair_exposure,
+    Ambiguity, Exposed, Exposures, Method, Motion, Observation, PairPose, Search, SkipReason, TimeBase, pair_exposure,
 };
 use vergence_protocol::TriggerMark;
 use vergence_rig::{Rig, StampedImage, TrackGap};
@@ -84,6 +84,8 @@ pub struct LiveLoop {
     pub rig: Arc<Rig>,
     /// Finds homologous points.
     pub matcher: Arc<dyn Matcher>,
+    /// Where it looks for them.
+    pub search: Arc<Search>,
     /// Events of both cameras.
     pub events: Receiver<(Side, CameraEvent)>,
     /// Pulses of the camera trigger; `None` where the cameras run freely.
@@ -229,13 +231,18 @@ impl LiveLoop {
     /// Begins to measure on a thread of its own: the link must not wait.
     fn start(&self, exposed: Exposed<PendingImage>) -> Work {
         let (rig, matcher, board) = (Arc::clone(&self.rig), Arc::clone(&self.matcher), self.board.clone());
+        let search = Arc::clone(&self.search);
         let (matching_time, stopwatch, exposed_at) = (self.matching_time, self.stopwatch, host_middle(&exposed));
         Box::pin(async move {
             let posed = match posed(exposed, &rig, board.as_ref()).await {
                 Ok(posed) => posed,
                 Err(gap) => return (exposed_at, Err(NoResult::Joints(gap))),
             };
-            let worked = tokio::task::spawn_blocking(move || measure(posed, &rig, matcher.as_ref(), stopwatch)).await;
+            let worked = tokio::task::spawn_blocking(move || {
+                let method = Method { search: &search, ..Method::from(matcher.as_ref()) };
+                measure(posed, &rig, method, stopwatch)
+            });
+            let worked = worked.await;
             let outcome = worked.unwrap_or_else(|error| Err(LiveError::Measuring(error.to_string())));
             if let Ok(measurement) = &outcome {
                 matching_time.pass(measurement).await;

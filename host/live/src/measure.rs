@@ -4,7 +4,6 @@ use std::time::Duration;
 
 use image::RgbImage;
 use vergence_camera::PendingImage;
-use vergence_matching::Matcher;
 use vergence_pipeline::{
     CameraGone, ExposedImage, Method, Observation, PairImages, PairPose, observe_one, observe_pair,
 };
@@ -53,12 +52,7 @@ impl Measurement {
 /// # Errors
 /// An image that cannot be decoded or is not of its camera's size, a row whose joints are not known, cameras that share no
 /// field.
-pub fn measure(
-    exposure: PosedExposure,
-    rig: &Rig,
-    matcher: &dyn Matcher,
-    clock: Clock,
-) -> Result<Measurement, LiveError> {
+pub fn measure(exposure: PosedExposure, rig: &Rig, method: Method<'_>, clock: Clock) -> Result<Measurement, LiveError> {
     let begun = clock();
     match exposure {
         PosedExposure::Pair(images, pose) => {
@@ -68,15 +62,15 @@ pub fn measure(
             let (left, right) = (left?, right?);
             let decoded = clock();
             let images = PairImages { left: &left, right: &right };
-            let observation = observe_pair(images, rig, &pose, Method::from(matcher))
-                .map_err(|error| LiveError::Unmeasurable(error.to_string()))?;
+            let observation =
+                observe_pair(images, rig, &pose, method).map_err(|error| LiveError::Unmeasurable(error.to_string()))?;
             Ok(Measurement::new(observation, middle, [begun, decoded, clock()]))
         }
         PosedExposure::One { side, image, why } => {
             let middle = image.middle;
             let image = decode(*image)?;
             let decoded = clock();
-            let observation = observe_one(&image, rig, side, why);
+            let observation = observe_one(&image, (rig, method.search), side, why);
             Ok(Measurement::new(observation, middle, [begun, decoded, clock()]))
         }
     }

@@ -66,6 +66,8 @@ enum Verb {
     Sim(With<RigFileOptions, cmd::sim::Args>),
     /// Updates the board's firmware over the link or a debug probe, or goes back.
     Flash(With<PortOptions, cmd::flash::Args>),
+    /// Makes the servos of a robot ready: finds, numbers and tests them over a USB adapter.
+    Servo(cmd::servo::Args),
     /// Makes keys, signs firmware images, prints what an image holds.
     Image(cmd::image::Args),
     /// Measures the speed of this program beside others on the same work.
@@ -99,7 +101,7 @@ enum Verb {
 /// The verbs by task, in the order of the help.
 pub const TASKS: &[(&str, &[&str])] = &[
     ("Try without hardware", &["demo", "sim", "reproduce"]),
-    ("Set up a board", &["devices", "doctor", "config", "flash", "image"]),
+    ("Set up a board", &["devices", "doctor", "config", "flash", "image", "servo"]),
     ("Calibrate", &["target", "capture", "calibrate", "camera"]),
     ("Move", &["home", "mode", "move", "plan", "stop", "arm", "disarm", "clear"]),
     ("Measure", &["run", "depth", "zones", "models"]),
@@ -251,6 +253,7 @@ fn execute(cli: Cli, virtual_time: bool) -> Result<(), Failure> {
             Verb::Config(verb) => cmd::config::run(&verb.args, &verb.options.chosen()?, console).await,
             Verb::Sim(verb) => cmd::sim::run(&verb.args, &verb.options.chosen()?, console).await,
             Verb::Flash(verb) => cmd::flash::run(&verb.args, &verb.options.given(), console).await,
+            Verb::Servo(args) => cmd::servo::run(args, console).await,
             Verb::Image(args) => cmd::image::run(&args, console),
             Verb::Bench(args) => cmd::bench::run(&args, console),
             Verb::Soak(args) => cmd::soak::run(&args, console),

@@ -1,7 +1,7 @@
 //! The bodies of the targets. Each takes any bytes; it must neither panic nor go on for ever.
 
 use serde::ser::{Serialize, SerializeTuple, Serializer};
-use vergence_control::{BoardSettings, settings_store};
+use vergence_control::{BoardSettings, Delivered, settings_store};
 use vergence_plant::{NATIVE_HARDWARE, NativeBoard, RamFlash, bench_mechanics, bench_settings};
 use vergence_protocol::frame::{Header, Kind, MAX_BODY, checksum, encode};
 use vergence_protocol::management::{CHUNK, ImageHeader, Management, ManagementReport, Signature};
@@ -259,10 +259,10 @@ pub fn settings_store(data: &[u8]) {
         record.extend(checksum(&record).to_le_bytes());
         flash.overwrite(0, &record);
     }
-    if let Ok(Some(settings)) = settings_store::load(&mut flash, &defaults) {
+    if let Ok(Some(settings)) = settings_store::load(&mut flash, &Delivered::for_bench(defaults.clone())) {
         assert!(settings.validate().is_ok());
         assert!(settings_store::save(&mut flash, &settings).is_ok());
-        assert_eq!(settings_store::load(&mut flash, &defaults), Ok(Some(settings)));
+        assert_eq!(settings_store::load(&mut flash, &Delivered::for_bench(defaults)), Ok(Some(settings)));
     }
 }
 

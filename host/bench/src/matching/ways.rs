@@ -5,7 +5,6 @@ use std::collections::BTreeMap;
 use nalgebra::{Matrix6, UnitQuaternion, Vector3, Vector6};
 use vergence_matching::learned::{GreyImage, LearnedMatcher};
 use vergence_matching::{GuidedMatcher, ImagePair, Match, MatchError, Matcher, Matches};
-use vergence_pipeline::limits::NEAREST;
 use vergence_vision::{
     Angle, Gates, Left, Length, Pixel, PoseDrift, Right, SharedCovariance, StereoPair, Transform, cloud_of_each,
     pose_drift,
@@ -18,6 +17,8 @@ use crate::matching::simulated_pair::SimulatedPair;
 
 /// Standard deviation of the pose that the matchers are given: the width of an encoder's count and the play of a pinion.
 const POSE_SIGMA: Angle = Angle::from_deg(0.15);
+/// The nearest range at which points are sought.
+const NEAREST: Length = Length::from_mm(200.0);
 /// Standard deviation of the pose in the cloud: of a rotation about each axis, and of a shift along it.
 const STATED: (Angle, Length) = (Angle::from_deg(0.02), Length::from_mm(0.1));
 /// Standard deviation of keypoints in whole images, which networks place on whole pixels.
@@ -89,6 +90,7 @@ impl<'a> Way<'a> {
             left_from_right: stated,
             pose_sigma: POSE_SIGMA,
             nearest: NEAREST,
+            masks: [None; 2],
         };
         let failed = |error: MatchError| BenchError::Work(error.to_string());
         let candidates = match self {

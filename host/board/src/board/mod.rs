@@ -4,6 +4,7 @@ mod motion;
 mod questions;
 mod report;
 mod stream;
+mod ways;
 mod words;
 
 use std::time::Duration;
@@ -17,6 +18,7 @@ use vergence_rig::{AxisPosition, HostInstant, Rig};
 
 pub use self::questions::RecordedEvents;
 pub use self::report::{clock_json, describe_clock, pose_json};
+pub use self::ways::{Way, straight_ways};
 pub use self::words::{check_range, describe_fault, describe_pose, event_in_words, positions, staying};
 
 use crate::error::BoardError;

@@ -8,6 +8,7 @@ use vergence_protocol::{
 use vergence_rig::AxisPosition;
 
 use super::Board;
+use super::ways::straight_ways;
 use super::words::check_range;
 use crate::error::BoardError;
 
@@ -22,8 +23,7 @@ impl Board {
         interruption: impl Future<Output = ()>,
         work: impl AsyncFnOnce(&mut Self) -> Result<T, E>,
     ) -> Result<T, E> {
-        self.client.hold_lease(self.lease_ms).await.map_err(BoardError::from)?;
-        self.ask(Request::Arm { session: self.client.session() }).await?;
+        self.begin_arming().await?;
         let outcome = tokio::select! {
             outcome = async { self.take_hold().await?; work(self).await } => Some(outcome),
             () = interruption => None,
@@ -37,6 +37,20 @@ impl Board {
         let value = outcome?;
         disarmed?;
         Ok(value)
+    }
+
+    /// Arms under a live lease, until [`Self::release`]. Whoever may be interrupted uses [`Self::armed`], which always disarms.
+    ///
+    /// # Errors
+    /// [`BoardError`]: a refusal to arm, or a link that ended.
+    pub async fn arm(&mut self) -> Result<(), BoardError> {
+        self.begin_arming().await?;
+        self.take_hold().await
+    }
+
+    async fn begin_arming(&mut self) -> Result<(), BoardError> {
+        self.client.hold_lease(self.lease_ms).await?;
+        self.ask(Request::Arm { session: self.client.session() }).await
     }
 
     /// Waits for a pose from after the arming. From then on nobody else can move the board, so its last move id is known.
@@ -77,15 +91,22 @@ impl Board {
         self.wait_until(|pose| pose.state != ControllerState::Homing && pose.referenced == axes).await
     }
 
-    /// Moves all axes to `targets` and waits until the encoders confirm them. The board must be armed.
+    /// Moves all axes to `targets` and waits until the encoders confirm them. A trunk goes by a path along which its loop closes and
+    /// nothing touches. The board must be armed.
     ///
     /// # Errors
-    /// [`BoardError`]: a target out of range, the fault that ended the move, a refusal, or a stop.
+    /// [`BoardError`]: a target out of range or to which no path leads, the fault that ended the move, a refusal, or a stop.
     pub async fn move_to(&mut self, mode: Mode, targets: &[AxisPosition]) -> Result<(), BoardError> {
         check_range(&self.rig, targets)?;
-        let (id, targets) = (self.next_move_id(), self.rig.wire_targets(targets));
-        self.ask(Request::MoveTo(Move { id, mode, targets, speed: Permille::FULL })).await?;
-        self.wait_for_move(id).await
+        let ways = straight_ways(&self.rig, &self.axes, &self.standing(), targets)?;
+        let last = ways.len().saturating_sub(1);
+        for (number, way) in ways.iter().enumerate() {
+            let mode = if number == last { mode } else { Mode(0) };
+            let (id, targets) = (self.next_move_id(), self.rig.wire_targets(&way.targets));
+            self.ask(Request::MoveTo(Move { id, mode, targets, speed: way.speed })).await?;
+            self.wait_for_move(id).await?;
+        }
+        Ok(())
     }
 
     /// Moves all axes by `distances` from where they stand, and waits until the encoders confirm it. Works without reference,

@@ -205,7 +205,9 @@ fn limits(board: &Board) -> Vec<Finding> {
         let [low, high] = axis.range;
         let [min, max] = [info.min, info.max].map(|end| AxisPosition::from_micro(axis.kind, end));
         let name = &axis.name;
-        if axis.wire_position(low) < info.min || axis.wire_position(high) > info.max {
+        // A reversed encoder reads its lowest at the upper end.
+        let [one, other] = [low, high].map(|end| axis.wire_position(end));
+        if one.min(other) < info.min || one.max(other) > info.max {
             return Finding::fail(
                 "limits",
                 format!("the rig file lets {name} go from {low} to {high}, the board from {min} to {max}"),

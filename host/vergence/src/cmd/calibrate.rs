@@ -66,11 +66,14 @@ fn print_views(console: Console) -> impl FnMut(ViewEvent<'_>) -> Result<(), Fail
             }
             ViewEvent::Looked => _ = progress.take().map(|progress| progress.finish_and_clear()),
             ViewEvent::Missed(missed) => match missed.reason {
-                MissedReason::NoTarget(_) => console.say(missed)?,
+                MissedReason::NoTarget(_) | MissedReason::Hidden => console.say(missed)?,
                 MissedReason::Damaged(_) => console.warn(missed.to_string()),
             },
             ViewEvent::Alone(file) => {
-                console.warn(format!("{}: left out: the other camera has no image of this number", file.display()));
+                console.warn(format!(
+                    "{}: left out: the other camera has no image of this name, number or time",
+                    file.display()
+                ));
             }
         }
         Ok(())

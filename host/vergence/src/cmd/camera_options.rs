@@ -6,6 +6,8 @@ use vergence_board::HostClock;
 use vergence_camera::{Camera, CameraError, V4lCamera, V4lSettings};
 use vergence_vision::ImageSize;
 
+use crate::failure::Failure;
+
 /// Settings of attached cameras; those that are not given stay as they are.
 #[derive(Clone, Copy, Debug, clap::Args)]
 pub struct CameraOptions {
@@ -31,6 +33,26 @@ impl CameraOptions {
     /// No such camera, or none of its pixel formats is understood.
     pub fn open(&self, device: &str, clock: HostClock) -> Result<Box<dyn Camera>, CameraError> {
         self.open_rolling(device, clock, Duration::ZERO)
+    }
+
+    /// Refuses settings beside simulated cameras, which take the images of the rig file's cameras.
+    ///
+    /// # Errors
+    /// Names the option that would do nothing.
+    pub fn none_for_simulated(&self) -> Result<(), Failure> {
+        let Self { size, exposure, gain, readout } = *self;
+        let given = [
+            ("--size", size.is_some()),
+            ("--exposure", exposure.is_some()),
+            ("--gain", gain.is_some()),
+            ("--readout", readout.is_some()),
+        ];
+        match given.iter().find(|(_, is_given)| *is_given) {
+            None => Ok(()),
+            Some((name, _)) => Err(Failure::usage(format!(
+                "{name} is for attached cameras: simulated ones take images of the size in the rig file (--rig)"
+            ))),
+        }
     }
 
     /// The same options, with images of `size` unless a size was given.

@@ -20,6 +20,7 @@ use crate::cli::CommonOptions;
 use crate::console::Console;
 use crate::failure::Failure;
 use crate::interrupt::interrupted;
+use crate::plausible::ForceOption;
 use crate::rig_file;
 
 /// Watches one camera or a pair, and keeps an image whenever a still target is seen where few views were. Every image is
@@ -48,10 +49,12 @@ pub struct Args {
     /// With simulated cameras: seed of the places where the target is held, and of the noise.
     #[arg(long, default_value_t = 1)]
     seed: u64,
+    #[command(flatten)]
+    force: ForceOption,
 }
 
 pub async fn run(args: &Args, common: &CommonOptions, console: Console) -> Result<(), Failure> {
-    let target = args.target.spec()?;
+    let target = args.target.checked_spec(args.force, console)?;
     let cameras = CameraSet::new(open(args, common, &target)?);
     capture(cameras, target, args, interrupted(), console).await
 }
@@ -165,6 +168,7 @@ fn first_free(folder: &Path) -> usize {
 
 fn open(args: &Args, common: &CommonOptions, target: &TargetSpec) -> Result<Vec<Box<dyn Camera>>, Failure> {
     if args.cameras == ["sim"] {
+        args.camera.none_for_simulated()?;
         return simulated(args, common, target);
     }
     let clock = HostClock::start();

@@ -9,7 +9,8 @@ use serde_json::{Value, json};
 use vergence_files::make_folder;
 use vergence_output::check_folder;
 use vergence_protocol::SessionId;
-use vergence_reproduce::corridor::Corridor;
+use vergence_reproduce::DemoError;
+use vergence_reproduce::corridor::{Comparison, Corridor, Sight, WIDTH, compare};
 use vergence_reproduce::demo::{Pulse, SimulatedPair};
 use vergence_rig::{Rig, rounded};
 
@@ -18,13 +19,13 @@ use crate::console::Console;
 use crate::failure::Failure;
 use crate::interrupt::{interrupted, on_own_thread};
 use crate::rig_file;
-use crate::sim::{SharedRig, SimulatedRig, board_of};
+use crate::sim::{SharedRig, SimulatedRig, SimulatedRobot, board_of};
 use crate::stopwatch::{Stopwatch, clock};
 
 /// Starts a simulated rig in a simulated room, homes it, and in every mode of the rig takes a pair of images, measures it and
 /// compares the points with the truth. Board, protocol, poses, matching and triangulation are the real ones; mechanics, room
 /// and cameras are simulated. The truth scores the points and is used for nothing else. A rig with a trunk instead searches, passes
-/// and inspects in a simulated corridor.
+/// and inspects in a simulated corridor: its controller moves the joints from mode to mode, and where the robot stands is given.
 #[derive(Debug, clap::Args)]
 pub struct Args {
     /// Sets where the stages stand at first and the noise of the images. The same seed gives the same bytes.
@@ -33,12 +34,30 @@ pub struct Args {
     /// The folder for clouds and pictures.
     #[arg(long, default_value = "vergence-demo", value_name = "DIR")]
     out: PathBuf,
+    /// A rig with a trunk chooses its modes itself, by task, predicted error, coverage and travel time, and says why.
+    #[arg(long, conflicts_with = "corridors")]
+    auto: bool,
+    /// A rig with a trunk instead runs its mission in so many random corridors, with modes by itself, by the paper's order, and in
+    /// each mode alone, and compares them. Joints are placed, off by their play, and matches drawn from the true geometry, with noise: no
+    /// controller runs, and nothing is rendered or written.
+    #[arg(long, value_name = "COUNT", value_parser = clap::value_parser!(u32).range(1..=10_000))]
+    corridors: Option<u32>,
 }
 
 pub async fn run(args: &Args, common: &CommonOptions, console: Console) -> Result<(), Failure> {
     let whole = Stopwatch::start();
     check_folder(&args.out)?;
     let rig = rig_file::load(common.rig.as_deref())?;
+    if rig.trunk.is_none() && (args.auto || args.corridors.is_some()) {
+        let why = format!(
+            "rig '{}' has no trunk: --auto and --corridors are for one, such as docs/rigs/origaker.toml",
+            rig.name
+        );
+        return Err(Failure::usage(why));
+    }
+    if let Some(count) = args.corridors {
+        return compared(count, rig, console, &whole).await;
+    }
     make_folder(&args.out)?;
     if rig.trunk.is_some() {
         return corridor(args, rig, console, &whole).await;
@@ -60,8 +79,10 @@ pub async fn run(args: &Args, common: &CommonOptions, console: Console) -> Resul
 
 /// Plays the robot's story in a simulated corridor.
 async fn corridor(args: &Args, rig: Rig, console: Console, whole: &Stopwatch) -> Result<(), Failure> {
-    console.say("simulated: the corridor, the cameras, joints off by their play; where the robot stands is given, no controller runs")?;
-    let (out, seed) = (args.out.clone(), args.seed);
+    console.say(
+        "simulated: the corridor, the cameras, the servos, the trunk with play and springs; where the robot stands is given",
+    )?;
+    let (out, seed, auto) = (args.out.clone(), args.seed, args.auto);
     let progress = console.progress("the corridor");
     let bar = progress.clone();
     let played = on_own_thread(move || {
@@ -70,7 +91,10 @@ async fn corridor(args: &Args, rig: Rig, console: Console, whole: &Stopwatch) ->
             let said = bar.suspend(|| console.say(line));
             lost = lost.take().or(said.err());
         };
-        let story = Corridor::new(&rig, &out, seed, clock)?.play(&mut say)?;
+        let corridor = Corridor::new(&rig, &out, seed, clock)?;
+        let mut robot = SimulatedRobot::start(&rig, seed)?;
+        let story = if auto { corridor.play_auto(&mut robot, &mut say) } else { corridor.play(&mut robot, &mut say) }?;
+        robot.release()?;
         lost.map_or(Ok(story), Err)
     });
     let story = tokio::select! {
@@ -84,7 +108,37 @@ async fn corridor(args: &Args, rig: Rig, console: Console, whole: &Stopwatch) ->
         args.out.display(),
         whole.seconds()
     ))?;
-    console.result(&json!({ "modes": story.modes, "found": story.found, "seconds": rounded(whole.seconds()) }))
+    let mut figures = json!({
+        "modes": story.modes, "changes": story.changes, "found": story.found, "seconds": rounded(whole.seconds()),
+    });
+    if args.auto {
+        figures["mission"] = story.mission;
+    }
+    console.result(&figures)
+}
+
+/// Compares orders of the modes in random corridors.
+async fn compared(count: u32, rig: Rig, console: Console, whole: &Stopwatch) -> Result<(), Failure> {
+    console.say(
+        "simulated: corridors, cameras, joints placed off by their play, matches with noise; times by a model of walking",
+    )?;
+    let progress = console.progress("corridors");
+    let bar = progress.clone();
+    let work = on_own_thread(move || {
+        let rig = rig.with_sensors(WIDTH).map_err(|error| DemoError::UnknownPose(error.to_string()))?;
+        Ok(compare(&rig, count, Sight::Sampled, &|| bar.inc(1))?)
+    });
+    let rows = tokio::select! {
+        biased;
+        () = interrupted() => Err(Failure::interrupted("interrupted: nothing was written".to_owned())),
+        rows = work => rows,
+    }?;
+    progress.finish_and_clear();
+    console.say(Comparison::HEAD)?;
+    rows.iter().try_for_each(|row| console.say(row.in_words()))?;
+    console.say(format!("{count} corridors; {:.1} s in all", whole.seconds()))?;
+    let rows: Vec<_> = rows.iter().map(Comparison::json).collect();
+    console.result(&json!({ "corridors": count, "modes_by": rows, "seconds": rounded(whole.seconds()) }))
 }
 
 /// Homes the rig and measures in every mode; counts them in `measured`.

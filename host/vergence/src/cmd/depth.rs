@@ -1,40 +1,45 @@
 //! `vergence depth`: a cloud from photographs.
 
+mod dense;
 mod motion;
+mod uncertain;
 
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
+use indicatif::ProgressBar;
 use serde_json::{Value, json};
 use vergence_board::check_range;
 use vergence_camera::{Camera, CameraImage, FileCamera};
 use vergence_files::make_folder;
-use vergence_matching::GuidedMatcher;
+use vergence_matching::{GuidedMatcher, Matcher};
 use vergence_output::{
-    DenseCloud, PoseSource, TableFormat, check_ending, check_folder, cloud_json, drift_warning, dropped_lines,
-    match_svg, pose_source_json, pose_source_line, write_cloud, write_drawing,
+    PlyEncoding, PoseSource, TableFormat, calibration_line, check_ending, check_folder, cloud_json, drift_warning,
+    dropped_lines, match_svg, pose_source_line, write_cloud, write_drawing,
 };
 use vergence_pipeline::limits::PIXEL_SIGMA;
-use vergence_pipeline::{
-    Method, PairCloud, PairImages, PairPose, StageTimes, cloud_of_pairs, dense_ranges, pair_cloud, pose_by_images,
-    with_fused,
-};
-use vergence_rig::{Rig, RigPose};
-use vergence_vision::{Kernel, Pixel, PixelPair, Side};
+use vergence_pipeline::{Method, PairCloud, PairImages, PairPose, cloud_of_pairs, pair_cloud};
+use vergence_rig::{JointsAt, Rig, RigPose, closure_in_words, closure_json};
+use vergence_vision::{FusedPose, Kernel, Pixel, PixelPair, Side};
 
+use self::dense::one_dense_pair;
 use self::motion::StageSpeed;
+use self::uncertain::Uncertain;
 use super::stage_pose::StagePose;
 use crate::cli::CommonOptions;
 use crate::cmd::model_options::MatcherOptions;
 use crate::cmd::options::TableOption;
+use crate::cmd::search_options::SearchOptions;
 use crate::console::Console;
-use crate::failure::Failure;
+use crate::failure::{Failure, FailureKind};
 use crate::interrupt::{interrupted, on_own_thread};
+use crate::plausible::ForceOption;
+use crate::plausible::images::{Taken, cloud_is_of_one_pair, images_differ, names_are_not_swapped};
+use crate::plausible::pose::cameras_are_near;
 use crate::rig_file;
-use crate::stopwatch::clock;
 
-/// Matches two photographs (or two folders of them, paired in the order of their names) taken by the cameras of the rig
+/// Matches two photographs (or two folders of them, paired by name, number or time stamp) taken by the cameras of the rig
 /// file, and writes the points as PLY in millimetres in the left camera's frame.
 #[derive(Debug, clap::Args)]
 pub struct Args {
@@ -68,12 +73,21 @@ pub struct Args {
     /// Writes the points as tables too, beside the cloud.
     #[arg(long, value_delimiter = ',', value_name = "FORMAT")]
     also: Vec<TableOption>,
+    /// Write the PLY file as text, for a person to read; the default is binary.
+    #[arg(long)]
+    ascii: bool,
     #[command(flatten)]
     stage: StagePose,
     #[command(flatten)]
     speed: StageSpeed,
     #[command(flatten)]
+    uncertain: Uncertain,
+    #[command(flatten)]
     matching: MatcherOptions,
+    #[command(flatten)]
+    search: SearchOptions,
+    #[command(flatten)]
+    force: ForceOption,
 }
 
 /// Pairs of images, for whoever interrupts.
@@ -113,7 +127,10 @@ impl Progress {
 fn every_pair(args: &Args, rig: Option<&Path>, console: Console, progress: &Progress) -> Result<(), Failure> {
     check_names(args)?;
     let rig = rig_file::load(rig)?;
-    let pose = pose(args, &rig)?;
+    let (pose, joints) = pose(args, &rig)?;
+    pose.check_closure().map_err(|error| Failure::check(error.to_string()))?;
+    args.force.unless_forced(cameras_are_near(&pose.left_from_right), console)?;
+    closure_in_words(&pose).iter().try_for_each(|line| console.say(line))?;
     for sentence in rig.extrapolations(&pose.axes) {
         console.warn(sentence);
     }
@@ -121,68 +138,149 @@ fn every_pair(args: &Args, rig: Option<&Path>, console: Console, progress: &Prog
         Some(moving) => moving,
         None => PairPose::standing(pose.clone()),
     };
-    let pairs = args.points.as_deref().map(read_pairs).transpose()?;
-    let [mut left, mut right] = FileCamera::open_pair(&args.left, &args.right)?;
+    let (pairs, search) = (args.points.as_deref().map(read_pairs).transpose()?, args.search.search(&rig)?);
+    if pairs.is_some() && args.search.is_given() {
+        return Err(Failure::usage(
+            "--nearest, --farthest and masks say where to look: nothing is sought beside --points",
+        ));
+    }
+    let ([mut left, mut right], alone) = FileCamera::open_pair(&args.left, &args.right)?;
+    for file in &alone {
+        console
+            .warn(format!("{}: left out: the other camera has no image of this name, number or time", file.display()));
+    }
     progress.all.store(left.remaining(), Ordering::Relaxed);
-    let matcher = if args.dense { None } else { Some(args.matching.matcher(console)?) };
     let several = args.left.is_dir();
-    let (mut results, mut empty) = (Vec::new(), Vec::new());
+    if !several {
+        args.force.unless_forced(names_are_not_swapped(&args.left, &args.right), console)?;
+    }
+    let matcher = if args.dense { None } else { Some(args.matching.matcher(console)?) };
+    let setting = Setting {
+        taken: Taken { rig: &rig, pose: &pair_pose, search: &search },
+        joints,
+        pairs: pairs.as_deref(),
+        matcher: matcher.as_deref(),
+    };
+    let (mut results, mut empty, mut refused) = (Vec::new(), Vec::new(), Vec::new());
     while let (Some(left), Some(right)) = (left.grab()?, right.grab()?) {
         let work = console.progress(&format!("{} and {}", left.name, right.name));
-        let out = out_of(args, &left)?;
-        let result = match &matcher {
-            None => {
-                let (result, is_empty) = one_dense_pair([&left, &right], &rig, &pose, &out, console)?;
-                empty.extend(is_empty.then(|| left.name.clone()));
-                result
-            }
-            Some(matcher) => {
-                let method = Method { matcher: matcher.as_ref(), kernel: args.kernel };
-                let cloud = one_pair([&left, &right], &rig, &pair_pose, pairs.as_deref(), method)?;
-                work.suspend(|| write(args, [&left, &right], &cloud, &rig, &out, console))?
-            }
-        };
+        let measured = one_pair(args, [&left, &right], &setting, (&work, console));
         work.finish_and_clear();
-        results.push(result);
         progress.measured.fetch_add(1, Ordering::Relaxed);
+        match measured {
+            Ok(Measured { result, is_empty, .. }) => {
+                empty.extend(is_empty.then(|| left.name.clone()));
+                results.push(result);
+            }
+            // The other pairs of the folders may be good.
+            Err(failure) if several && failure.kind() == FailureKind::CheckFailed => {
+                console.warn(failure);
+                refused.push(left.name);
+            }
+            Err(failure) => return Err(failure),
+        }
     }
     console.result(&match (several, results.pop()) {
         (false, Some(only)) => only,
-        (_, last) => json!({ "pairs": results.into_iter().chain(last).collect::<Vec<_>>() }),
+        (_, last) => json!({
+            "pairs": results.into_iter().chain(last).collect::<Vec<_>>(), "refused": refused, "left_out": alone,
+        }),
     })?;
+    if !refused.is_empty() {
+        return Err(Failure::check(format!("no cloud of {}: they are no pairs, as said above", refused.join(", "))));
+    }
     if empty.is_empty() {
         return Ok(());
     }
-    // Their files are written all the same: every pixel is a gap.
+    // Their files are written all the same: no point, or every pixel a gap.
     Err(Failure::check(format!(
-        "no pixel of {} has a range: the images are dark, without texture, or not of this pose",
+        "nothing in {} has a range: the images are dark, without texture, or not of this pose",
         empty.join(", ")
     )))
 }
 
-/// Measures one pair and writes the cloud to `out` and images beside it. Returns the result, and whether no pixel has a
-/// range or is known to be far.
-fn one_dense_pair(
-    [left, right]: [&CameraImage; 2],
-    rig: &Rig,
-    pose: &RigPose,
-    out: &Path,
-    console: Console,
-) -> Result<(Value, bool), Failure> {
+/// What holds for every pair.
+struct Setting<'a> {
+    taken: Taken<'a>,
+    /// The joints, where some are known badly: each pair of images tells them.
+    joints: Option<JointsAt>,
+    /// The correspondences that are given.
+    pairs: Option<&'a [(PixelPair, f64)]>,
+    /// `None` where every pixel is measured.
+    matcher: Option<&'a dyn Matcher>,
+}
+
+/// What became of a pair.
+struct Measured {
+    result: Value,
+    /// The pose that joints and images told together.
+    fused: Option<FusedPose>,
+    /// Whether nothing in it has a range.
+    is_empty: bool,
+}
+
+/// Checks, measures and writes one pair, with the joints as its images tell them.
+fn one_pair(
+    args: &Args,
+    images @ [left, right]: [&CameraImage; 2],
+    setting: &Setting<'_>,
+    said: (&ProgressBar, Console),
+) -> Result<Measured, Failure> {
+    let Taken { rig, search, .. } = setting.taken;
     left.check_size(rig.left_camera.size(), Side::Left)?;
     right.check_size(rig.right_camera.size(), Side::Right)?;
-    let images = PairImages { left: &left.image, right: &right.image };
-    let mut times = StageTimes::start(clock);
-    let fail = |error: &dyn std::fmt::Display| Failure::usage(format!("{} and {}: {error}", left.name, right.name));
-    let fused = pose_by_images(images, rig, pose, &GuidedMatcher::default()).map_err(|error| fail(&error))?;
-    let pose = &fused.map_or_else(|| pose.clone(), |fused| with_fused(pose, &fused));
-    let depth = dense_ranges(images, rig, pose, &mut |stage| times.ended(stage)).map_err(|error| fail(&error))?;
-    let written = DenseCloud::write(&depth, &times, images, (rig, pose), out)?;
-    console.say(written.in_words())?;
-    pose_source_line(fused.as_ref()).iter().try_for_each(|line| console.say(line))?;
-    let mut result = written.json();
-    result["pose"] = pose_source_json(fused.as_ref());
-    Ok((result, written.is_empty()))
+    if setting.pairs.is_none() {
+        args.force.unless_forced(images_differ(left, right), said.1)?;
+    }
+    let guided = GuidedMatcher::default();
+    let matcher = setting.matcher.unwrap_or(&guided);
+    let narrowed =
+        setting.joints.as_ref().map(|joints| args.uncertain.narrowed(images, (rig, search), joints, matcher));
+    let narrowed = narrowed.transpose()?;
+    let by_images = narrowed.as_ref().map(|joints| PairPose::standing(rig.pose(joints)));
+    let taken = Taken { pose: by_images.as_ref().unwrap_or(setting.taken.pose), ..setting.taken };
+    let mut measured = written_pair(
+        args,
+        images,
+        &Setting { taken, joints: None, pairs: setting.pairs, matcher: setting.matcher },
+        said,
+    )?;
+    if let Some(joints) = &narrowed {
+        let (lines, axes) = args.uncertain.told(rig, joints, measured.fused.as_ref());
+        lines.iter().try_for_each(|line| said.1.say(line))?;
+        measured.result["axes_by_images"] = axes;
+    }
+    measured.result = with_closure(measured.result, taken.pose.at_middle());
+    Ok(measured)
+}
+
+/// Measures and writes one pair.
+fn written_pair(
+    args: &Args,
+    images: [&CameraImage; 2],
+    Setting { taken, pairs, matcher, .. }: &Setting<'_>,
+    (work, console): (&ProgressBar, Console),
+) -> Result<Measured, Failure> {
+    let Taken { rig, pose, search } = *taken;
+    let out = out_of(args, images[0])?;
+    let Some(matcher) = matcher else {
+        return one_dense_pair(images, *taken, &out, args.force, console);
+    };
+    let method = Method { matcher: *matcher, kernel: args.kernel, search };
+    let cloud = cloud_of(images, rig, pose, *pairs, method)?;
+    if pairs.is_none() {
+        args.force.unless_forced(cloud_is_of_one_pair(&cloud, images, *taken), console)?;
+    }
+    let result = work.suspend(|| write(args, images, &cloud, (rig, pose.at_middle()), &out, console))?;
+    Ok(Measured { result, fused: cloud.fused_pose, is_empty: cloud.matches == 0 })
+}
+
+/// The result of a pair with how the trunk's joints fit its loop, where the rig has a trunk.
+fn with_closure(mut result: Value, pose: &RigPose) -> Value {
+    if pose.closure.is_some() {
+        result["trunk"] = closure_json(pose);
+    }
+    result
 }
 
 /// Refuses names of output files that say another format than the one written.
@@ -200,16 +298,16 @@ fn check_names(args: &Args) -> Result<(), Failure> {
     Ok(())
 }
 
-/// Writes and prints the cloud of one pair.
+/// Writes and prints the cloud of one pair, whose pose the joints alone tell to be `by_joints`.
 fn write(
     args: &Args,
     [left, right]: [&CameraImage; 2],
     cloud: &PairCloud,
-    rig: &Rig,
+    (rig, by_joints): (&Rig, &RigPose),
     out: &Path,
     console: Console,
 ) -> Result<Value, Failure> {
-    write_cloud(out, &cloud.points, args.also.iter().copied().map(TableFormat::from))?;
+    write_cloud(out, &cloud.points, PlyEncoding::of(args.ascii), args.also.iter().copied().map(TableFormat::from))?;
     if let Some(matches) = &args.matches {
         let path = if args.left.is_dir() { in_folder(matches, left, "svg")? } else { matches.clone() };
         let images = PairImages { left: &left.image, right: &right.image };
@@ -217,16 +315,17 @@ fn write(
     }
     console.say(format!("{} points of {} matches in {}", cloud.points.len(), cloud.matches, out.display()))?;
     dropped_lines(&cloud.dropped).iter().try_for_each(|line| console.say(line))?;
+    calibration_line(!cloud.lacks_calibration).iter().try_for_each(|line| console.say(line))?;
     pose_source_line(cloud.fused_pose.as_ref()).iter().try_for_each(|line| console.say(line))?;
     if let Some(warning) = drift_warning(cloud, PoseSource::of_photographs(rig)) {
         console.warn(format!("{} and {}: {warning}", left.name, right.name));
     }
-    Ok(cloud_json(cloud, out))
+    Ok(cloud_json(cloud, &cloud.pose(by_joints), out))
 }
 
-/// The pose of the cameras: fixed by the rig file, or given on the command line.
-fn pose(args: &Args, rig: &Rig) -> Result<RigPose, Failure> {
-    let positions = match &args.mode {
+/// The pose of the cameras: fixed by the rig file, or given on the command line; beside it the joints, where some are known badly.
+fn pose(args: &Args, rig: &Rig) -> Result<(RigPose, Option<JointsAt>), Failure> {
+    let mut positions = match &args.mode {
         Some(name) => {
             let mode =
                 rig.mode(name).ok_or_else(|| Failure::usage(format!("rig '{}' has no mode '{name}'", rig.name)))?;
@@ -234,13 +333,18 @@ fn pose(args: &Args, rig: &Rig) -> Result<RigPose, Failure> {
         }
         None => args.stage.of_axes(rig)?,
     };
+    args.uncertain.fill(rig, &mut positions);
     let positions: Option<Vec<_>> = positions.into_iter().collect();
     let positions = positions.ok_or_else(|| {
         Failure::usage(format!("rig '{}' moves: say its pose with --mode, or --baseline and --separation", rig.name))
     })?;
     check_range(rig, &positions)?;
     let values: Vec<f64> = positions.iter().map(|position| position.value()).collect();
-    Ok(rig.pose_at_values(&values))
+    if args.uncertain.is_empty() {
+        return Ok((rig.pose_at_values(&values), None));
+    }
+    let joints = args.uncertain.joints(rig, &values)?;
+    Ok((rig.pose(&joints), Some(joints)))
 }
 
 /// The file for the cloud; where folders are given, in the folder for clouds, which is made.
@@ -255,15 +359,13 @@ fn in_folder(folder: &Path, left: &CameraImage, ending: &str) -> Result<PathBuf,
 }
 
 /// The cloud of one pair: of the given correspondences, or of what the matcher finds.
-fn one_pair(
+fn cloud_of(
     [left, right]: [&CameraImage; 2],
     rig: &Rig,
     pose: &PairPose,
     pairs: Option<&[(PixelPair, f64)]>,
     method: Method<'_>,
 ) -> Result<PairCloud, Failure> {
-    left.check_size(rig.left_camera.size(), Side::Left)?;
-    right.check_size(rig.right_camera.size(), Side::Right)?;
     let images = PairImages { left: &left.image, right: &right.image };
     let fail = |error: &dyn std::fmt::Display| Failure::usage(format!("{} and {}: {error}", left.name, right.name));
     match pairs {

@@ -5,6 +5,7 @@ mod connect;
 mod model_options;
 pub mod options;
 mod reconnect;
+mod search_options;
 mod stage_pose;
 mod target_options;
 
@@ -29,6 +30,7 @@ pub mod orders;
 pub mod plan;
 pub mod reproduce;
 pub mod run;
+pub mod servo;
 pub mod sim;
 pub mod soak;
 pub mod status;

@@ -12,7 +12,7 @@ use tokio::sync::mpsc;
 use vergence_board::{Board, HostClock, Port, fresh_session};
 use vergence_files::make_folder;
 use vergence_live::{Ended, Limits, LiveLoop, MatchingTime, Totals, Tour};
-use vergence_output::{TableFormat, check_folder};
+use vergence_output::{PlyEncoding, TableFormat, check_folder};
 use vergence_pipeline::Exposures;
 use vergence_protocol::{Request, Trigger};
 use vergence_rig::Rig;
@@ -23,6 +23,7 @@ use crate::cli::CommonOptions;
 use crate::cmd::camera_options::CameraOptions;
 use crate::cmd::model_options::MatcherOptions;
 use crate::cmd::options::TableOption;
+use crate::cmd::search_options::SearchOptions;
 use crate::console::Console;
 use crate::failure::Failure;
 use crate::interrupt::interrupted;
@@ -60,6 +61,9 @@ pub struct Args {
     /// Write points and bearings as tables too.
     #[arg(long, requires = "out", value_delimiter = ',', value_name = "FORMAT")]
     also: Vec<TableOption>,
+    /// Write the PLY file as text, for a person to read; the default is binary.
+    #[arg(long)]
+    ascii: bool,
     /// End after this many results.
     #[arg(long, value_name = "COUNT")]
     frames: Option<u64>,
@@ -70,6 +74,8 @@ pub struct Args {
     tour: tour::Options,
     #[command(flatten)]
     matching: MatcherOptions,
+    #[command(flatten)]
+    search: SearchOptions,
     #[command(flatten)]
     camera: CameraOptions,
     /// With simulated cameras: sets where the stages stand at first and the noise of the images.
@@ -91,7 +97,7 @@ fn parse_time(text: &str) -> Result<Duration, String> {
 
 pub async fn run(args: &Args, common: &CommonOptions, console: Console) -> Result<(), Failure> {
     let rig = rig_file::load(common.rig.as_deref())?;
-    let tour = args.tour.tour(&rig)?;
+    let (tour, search) = (args.tour.tour(&rig)?, args.search.search(&rig)?);
     let matcher = Arc::from(args.matching.matcher(console)?);
     if let Some(folder) = &args.out {
         check_folder(folder)?;
@@ -121,6 +127,7 @@ pub async fn run(args: &Args, common: &CommonOptions, console: Console) -> Resul
     let mut live = LiveLoop {
         rig: Arc::clone(&rig),
         matcher,
+        search: Arc::new(search),
         events,
         marks: period.and(board.as_mut()).map(|board| board.client_mut().take_marks()),
         board: board.as_ref().map(|board| board.client().knowledge()),
@@ -139,6 +146,7 @@ pub async fn run(args: &Args, common: &CommonOptions, console: Console) -> Resul
         out: args.out.clone(),
         keep: args.keep,
         also: args.also.iter().copied().map(TableFormat::from).collect(),
+        encoding: PlyEncoding::of(args.ascii),
         number: 0,
     };
     let mut totals = Totals::default();
@@ -196,6 +204,9 @@ async fn connected(
     console: Console,
 ) -> Result<(Option<Board>, Option<SharedRig>), Failure> {
     let wants_simulated = args.cameras == ["sim"];
+    if wants_simulated {
+        args.camera.none_for_simulated()?;
+    }
     if rig.axes.is_empty() {
         return match wants_simulated {
             true => Err(Failure::usage(format!("rig '{}' has no axes to simulate", rig.name))),

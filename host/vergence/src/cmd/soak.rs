@@ -3,14 +3,19 @@
 mod differential;
 mod power_cuts;
 mod programs;
+mod robot;
 
+use std::path::PathBuf;
 use std::sync::atomic::{AtomicU64, Ordering};
 
-use vergence_rig::rounded;
+use vergence_rig::{Rig, rounded};
+use vergence_sim::SimError;
+use vergence_soak::robot::{RobotBoard, RobotScenario, native_robot};
 use vergence_soak::{Board, Scenario, native_board, run as play, soak};
 
 use crate::console::Console;
 use crate::failure::Failure;
+use crate::rig_file;
 use crate::stopwatch::Stopwatch;
 
 /// Scenarios, unless the command line names another number.
@@ -37,6 +42,12 @@ pub struct Args {
     /// what hil-sim/FIDELITY.md lists. Exit code 1 where they differ.
     #[arg(long)]
     differential: bool,
+    /// Plays scenarios of a robot instead, with the trunk of this rig file: its host goes through the modes by planned paths, while
+    /// servos, their bus, the supply, the host or the board fail. The checker looks at the simulated trunk: links never touch,
+    /// joints that are not concerned hold, positions are true, each harm is named, and the robot can be used again. 1 000 scenarios
+    /// unless --scenarios names another number.
+    #[arg(long, value_name = "RIG", conflicts_with = "differential")]
+    robot: Option<PathBuf>,
     #[command(flatten)]
     programs: programs::Options,
     #[command(flatten)]
@@ -44,6 +55,14 @@ pub struct Args {
 }
 
 pub fn run(args: &Args, console: Console) -> Result<(), Failure> {
+    if let Some(file) = &args.robot {
+        let rig = rig_file::load(Some(file))?;
+        if args.programs.on_chip() {
+            let flash = args.programs.flash()?;
+            return on_robots(args, &rig, |scenario| flash.robot(&rig, scenario), console);
+        }
+        return on_robots(args, &rig, |scenario| native_robot(&rig, scenario), console);
+    }
     if let Some(cuts) = args.power.cuts() {
         return power_cuts::run(&args.power, &args.programs, cuts, console);
     }
@@ -63,6 +82,18 @@ pub fn run(args: &Args, console: Console) -> Result<(), Failure> {
             .map_err(|error| Failure::check(format!("the controller refuses the simulated stages ({error})")))
     };
     on_boards(args, native, console)
+}
+
+fn on_robots<B: RobotBoard>(
+    args: &Args,
+    rig: &Rig,
+    board: impl Fn(&RobotScenario) -> Result<B, SimError> + Sync,
+    console: Console,
+) -> Result<(), Failure> {
+    match args.only {
+        Some(seed) => robot::replay(rig, seed, board, console),
+        None => robot::many(rig, args.seed, args.scenarios, board, console),
+    }
 }
 
 fn on_boards<B: Board>(

@@ -3,7 +3,10 @@
 use vergence_calibration::TargetSpec;
 use vergence_vision::Length;
 
+use crate::console::Console;
 use crate::failure::Failure;
+use crate::plausible::ForceOption;
+use crate::plausible::target::square_can_be_held;
 
 /// The chessboard.
 #[derive(Clone, Copy, Debug, clap::Args)]
@@ -18,6 +21,16 @@ pub struct TargetOptions {
 
 impl TargetOptions {
     /// The target.
+    ///
+    /// # Errors
+    /// Where an option is missing or the square is none, or none that a person can mean.
+    pub fn checked_spec(&self, force: ForceOption, console: Console) -> Result<TargetSpec, Failure> {
+        let spec = self.spec()?;
+        force.unless_forced(square_can_be_held(&spec), console)?;
+        Ok(spec)
+    }
+
+    /// The target, whatever its size.
     ///
     /// # Errors
     /// Where an option is missing or the square is none.

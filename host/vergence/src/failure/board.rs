@@ -2,6 +2,7 @@
 
 use std::fmt;
 
+use vergence_board::servos::ServoError;
 use vergence_board::{
     BoardError, KeyError, LinkError, ListenError, OpenError, ProbeError, ServeError, SettingsFileError, UpdateError,
 };
@@ -75,6 +76,16 @@ impl From<KeyError> for Failure {
         match error {
             KeyError::Random(_) => Self::device(error.to_string()),
             _ => Self::usage(error.to_string()),
+        }
+    }
+}
+
+impl From<ServoError> for Failure {
+    fn from(error: ServoError) -> Self {
+        match error {
+            ServoError::NoId(_) | ServoError::NoBaud(_) => Self::usage(error.to_string()),
+            ServoError::Taken(_) | ServoError::Torque(_) | ServoError::Garbled(_) => Self::check(error.to_string()),
+            _ => Self::device(error.to_string()),
         }
     }
 }

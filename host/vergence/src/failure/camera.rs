@@ -11,7 +11,7 @@ impl From<CameraError> for Failure {
             CameraError::Unreadable { .. }
             | CameraError::NotAnImage { .. }
             | CameraError::Mask { .. }
-            | CameraError::Uneven { .. }
+            | CameraError::Unpaired { .. }
             | CameraError::Size { .. }
             | CameraError::NoImages(_)
             | CameraError::Simulated(_) => Self::usage(message),

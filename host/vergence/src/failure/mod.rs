@@ -121,6 +121,12 @@ impl Failure {
         Self { kind, message: format!("cannot write to standard output: {error}") }
     }
 
+    /// The same with `more` to say.
+    #[must_use]
+    pub fn and(self, more: &str) -> Self {
+        Self { message: self.message + more, ..self }
+    }
+
     /// Which exit code it means.
     #[must_use]
     pub const fn kind(&self) -> FailureKind {

@@ -20,6 +20,7 @@ impl From<DemoError> for Failure {
         let message = error.to_string();
         match error {
             DemoError::Board(error) => error.into(),
+            DemoError::Sim(error) => error.into(),
             DemoError::Zones(_) => Self::check(message),
             _ => Self::device(message),
         }

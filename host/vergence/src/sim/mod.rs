@@ -1,6 +1,7 @@
 //! Simulated boards for the command: read from files, served, and driven in this process.
 
 mod files;
+mod robot;
 
 use indicatif::ProgressBar;
 use vergence_board::{Board, BoardError, Shared};
@@ -10,6 +11,7 @@ use vergence_rig::Rig;
 use crate::console::shown_on;
 
 pub use files::{KeptRig, simulated_chip};
+pub use robot::SimulatedRobot;
 pub use vergence_board::{Listener, Served, serve, spawn_in_process};
 pub use vergence_sim::{Random, SimulatedChip, SimulatedRig, built};
 

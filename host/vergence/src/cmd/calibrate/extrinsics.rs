@@ -10,11 +10,14 @@ use vergence_calibration_report::{
 };
 use vergence_rig::Rig;
 
-use super::options::{LensOptions, ResultOptions};
+use super::options::{LensOptions, MaskOptions, ResultOptions};
 use super::print_views;
 use crate::cmd::target_options::TargetOptions;
 use crate::console::Console;
 use crate::failure::Failure;
+use crate::plausible::pose::{cameras_are_near, right_is_on_the_right};
+use crate::plausible::target::corners_can_be_held;
+use crate::plausible::views::views_of_pair;
 use crate::stopwatch::Stopwatch;
 
 /// Calibrates a fixed pair: the pose of the right camera, from views of a target that both cameras see. The rig file that
@@ -25,13 +28,15 @@ pub struct Args {
     lenses: LensOptions,
     #[command(flatten)]
     target: TargetOptions,
-    /// Images of the left camera: files, patterns such as 'left*.jpg', or a folder. They pair with the right ones by the
-    /// last number in their names, or in the order of their names.
+    /// Images of the left camera: files, patterns such as 'left*.jpg', or a folder. They pair with the right ones by name
+    /// (left007.png with right007.png), number or time stamp.
     #[arg(long, num_args = 1.., required_unless_present = "csv", conflicts_with = "csv", requires = "right_images")]
     left_images: Vec<String>,
     /// Images of the right camera, as those of the left one.
     #[arg(long, num_args = 1.., requires = "left_images")]
     right_images: Vec<String>,
+    #[command(flatten)]
+    masks: MaskOptions,
     /// Corners instead of images: a CSV file with the columns camera,file,frame,idx,x,y,bx_mm,by_mm. Rows of both cameras
     /// with the same frame number are a pair.
     #[arg(long, value_name = "FILE")]
@@ -57,12 +62,17 @@ pub fn run(args: &Args, console: Console) -> Result<(), Failure> {
         Failure::usage("name the camera files with --left and --right: vergence calibrate intrinsics makes them")
     })?;
     let (views, images) = views(args, [&left, &right], &mut hash, console)?;
+    let force = args.result.force;
+    force.unless_forced(corners_can_be_held(views.iter().map(|view| &view.left)), console)?;
+    force.unless_forced(views_of_pair(&views, [&left, &right]), console)?;
     let options = ExtrinsicsOptions { lenses: knowledge, robust: !args.no_loss };
     let solving = Stopwatch::start();
     let calibration = calibrate_extrinsics(&left, &right, &views, &options)
         .map_err(|error| Failure::usage(format!("no calibration: {error}")))?;
     let seconds = solving.seconds();
     check_fit(calibration.rms_inlier_px, calibration.corners_inlier, calibration.corners_total)?;
+    force.unless_forced(cameras_are_near(&calibration.joint.left_from_right), console)?;
+    force.unless_forced(right_is_on_the_right(&calibration.joint.left_from_right), console)?;
     let held_out = args
         .holdout
         .map(|parts| validate_extrinsics((&left, &right), &views, &options, &calibration, parts.into()))
@@ -96,7 +106,12 @@ fn views(args: &Args, lenses: PairLenses<'_>, hash: &mut InputHash, console: Con
         None => {
             let mut print = print_views(console);
             let images = PairImages::named([&args.left_images, &args.right_images], &mut print)?;
-            images.views(&args.target.spec()?, lenses, hash, &mut print)
+            images.views(
+                &args.target.checked_spec(args.result.force, console)?,
+                (lenses, args.masks.files()),
+                hash,
+                &mut print,
+            )
         }
     }
 }

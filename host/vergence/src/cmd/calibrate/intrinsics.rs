@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use vergence_calibration::{IntrinsicsOptions, TargetView, calibrate_intrinsics, check_fit, validate_intrinsics};
 use vergence_calibration_input::{
-    InputHash, camera_toml, document_of, named_images, views_in_corners, views_in_images,
+    InputHash, Sought, camera_toml, document_of, named_images, views_in_corners, views_in_images,
 };
 use vergence_calibration_report::{
     ReportAbout, ReportImage, held_out_json, held_out_line, intrinsics_json, intrinsics_lines, intrinsics_report,
@@ -18,6 +18,8 @@ use crate::cmd::camera_options::parse_size;
 use crate::cmd::target_options::TargetOptions;
 use crate::console::Console;
 use crate::failure::Failure;
+use crate::plausible::target::corners_can_be_held;
+use crate::plausible::views::{axis_is_near_the_middle, corners_lie_in_image, views_differ};
 use crate::stopwatch::Stopwatch;
 
 /// Calibrates one camera from views of a target at different tilts, out to the rim of the image.
@@ -28,6 +30,10 @@ pub struct Args {
     /// Images of the target: files, patterns such as 'left*.jpg', or folders.
     #[arg(long, num_args = 1.., required_unless_present = "csv", conflicts_with = "csv")]
     images: Vec<String>,
+    /// What the images show of the robot itself, a hood or the mount: a PNG image of the same size, black there. No corner is
+    /// taken in it.
+    #[arg(long, value_name = "IMAGE", conflicts_with = "csv")]
+    mask: Option<PathBuf>,
     /// Corners instead of images: a CSV file with the columns camera,file,frame,idx,x,y,bx_mm,by_mm.
     #[arg(long, value_name = "FILE", requires = "size")]
     csv: Option<PathBuf>,
@@ -55,12 +61,17 @@ pub fn run(args: &Args, console: Console) -> Result<(), Failure> {
     args.result.check()?;
     let mut hash = InputHash::default();
     let Views { views, size, images } = views(args, &mut hash, console)?;
+    let force = args.result.force;
+    force.unless_forced(corners_can_be_held(&views), console)?;
+    force.unless_forced(corners_lie_in_image(&views, size, "the camera"), console)?;
+    force.unless_forced(views_differ(&views, "the camera"), console)?;
     let solving = Stopwatch::start();
     let options = IntrinsicsOptions { warp: args.warp, ..IntrinsicsOptions::default() };
     let calibration = calibrate_intrinsics(&views, size, &options)
         .map_err(|error| Failure::usage(format!("no calibration: {error}")))?;
     let seconds = solving.seconds();
     check_fit(calibration.rms_inlier_px, calibration.corners_inlier, calibration.corners_total)?;
+    force.unless_forced(axis_is_near_the_middle(&calibration.camera), console)?;
     let held_out = args
         .holdout
         .map(|parts| validate_intrinsics(&views, size, &options, &calibration, parts.into()))
@@ -103,7 +114,9 @@ fn views(args: &Args, hash: &mut InputHash, console: Console) -> Result<Views, F
         }
         _ => {
             let files = named_images(&args.images)?;
-            let targets = views_in_images(&files, &args.target.spec()?, None, hash, &mut print_views(console))?;
+            let target = args.target.checked_spec(args.result.force, console)?;
+            let sought = Sought { target: &target, hint: None, mask: args.mask.as_deref() };
+            let targets = views_in_images(&files, sought, hash, &mut print_views(console))?;
             Ok(Views { views: targets.found(), size: targets.size, images: targets.images })
         }
     }

@@ -3,13 +3,14 @@
 use std::path::PathBuf;
 
 use vergence_calibration::LensKnowledge;
-use vergence_calibration_input::{InputHash, KnownLenses, LensFiles, LensFreedom};
+use vergence_calibration_input::{InputHash, KnownLenses, LensFiles, LensFreedom, PairMasks};
 use vergence_files::write_whole;
 use vergence_rig::Provenance;
 
 use crate::cmd::options::StoreOptions;
 use crate::console::Console;
 use crate::failure::Failure;
+use crate::plausible::ForceOption;
 
 /// Two lenses that are known, and how well.
 #[derive(Debug, clap::Args)]
@@ -76,6 +77,25 @@ impl LensOptions {
     }
 }
 
+/// What of the images shows the robot itself, a hood or the mount.
+#[derive(Clone, Debug, clap::Args)]
+pub struct MaskOptions {
+    /// What the left images show of the robot itself, a hood or the mount: a PNG image of the same size, black there. No corner
+    /// is taken in it.
+    #[arg(long, value_name = "IMAGE", conflicts_with = "csv")]
+    left_mask: Option<PathBuf>,
+    /// The same of the right images.
+    #[arg(long, value_name = "IMAGE", conflicts_with = "csv")]
+    right_mask: Option<PathBuf>,
+}
+
+impl MaskOptions {
+    /// The files of both masks.
+    pub fn files(&self) -> PairMasks<'_> {
+        [self.left_mask.as_deref(), self.right_mask.as_deref()]
+    }
+}
+
 /// Where the result goes.
 #[derive(Debug, clap::Args)]
 pub struct ResultOptions {
@@ -93,6 +113,8 @@ pub struct ResultOptions {
     /// The date to keep with the calibration.
     #[arg(long)]
     date: Option<String>,
+    #[command(flatten)]
+    pub force: ForceOption,
 }
 
 impl ResultOptions {

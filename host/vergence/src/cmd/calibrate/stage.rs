@@ -1,6 +1,7 @@
 //! `vergence calibrate stage`: cameras that move.
 
 mod live;
+mod trunk;
 
 use std::path::PathBuf;
 
@@ -10,12 +11,15 @@ use vergence_calibration_input::{InputHash, KnownLenses, RecordedSet, TrueError,
 use vergence_calibration_report::{ReportAbout, stage_json, stage_lines, stage_report, stage_verdict};
 use vergence_rig::Rig;
 
-use super::options::{LensOptions, ResultOptions};
+use super::options::{LensOptions, MaskOptions, ResultOptions};
 use super::print_views;
 use crate::cli::CommonOptions;
 use crate::cmd::target_options::TargetOptions;
 use crate::console::Console;
 use crate::failure::Failure;
+use crate::plausible::pose::{cameras_are_near, right_is_on_the_right};
+use crate::plausible::target::corners_can_be_held;
+use crate::plausible::views::views_of_pair;
 use crate::rig_file;
 use crate::stopwatch::Stopwatch;
 
@@ -46,6 +50,8 @@ pub struct Args {
     #[arg(long, num_args = 1..=2, value_name = "CAMERA")]
     cameras: Vec<String>,
     #[command(flatten)]
+    masks: MaskOptions,
+    #[command(flatten)]
     live: live::Options,
     /// Fit all corners by least squares, without a search for outliers.
     #[arg(long)]
@@ -66,6 +72,12 @@ pub async fn run(args: &Args, common: &CommonOptions, console: Console) -> Resul
             drawn.name
         )));
     }
+    if drawn.trunk.is_some() && args.live.live {
+        return Err(Failure::usage(format!(
+            "rig '{}' has a trunk: no command drives it yet; record its views and readings, and name them with --set or --csv",
+            drawn.name
+        )));
+    }
     let mut hash = InputHash::default();
     if let Some(path) = &common.rig {
         hash.add(path)?;
@@ -78,7 +90,15 @@ pub async fn run(args: &Args, common: &CommonOptions, console: Console) -> Resul
     };
     let built = live(args, common, console).await?;
     let poses = poses(args, &drawn, &mut hash, console)?;
+    let force = args.result.force;
+    for pose in &poses {
+        force.unless_forced(corners_can_be_held(pose.views.iter().map(|view| &view.left)), console)?;
+        force.unless_forced(views_of_pair(&pose.views, [&drawn.left_camera, &drawn.right_camera]), console)?;
+    }
     let options = StageOptions { lenses: knowledge, robust: !args.no_loss, ..StageOptions::default() };
+    if drawn.trunk.is_some() {
+        return trunk::run(args, &trunk::Input { drawn: &drawn, poses: &poses, options: &options }, hash, console);
+    }
     let solving = Stopwatch::start();
     let stage = calibrate_stage(&drawn, &poses, &options).map_err(|error| no_calibration(&error))?;
     let seconds = solving.seconds();
@@ -92,6 +112,11 @@ pub async fn run(args: &Args, common: &CommonOptions, console: Console) -> Resul
         false => Vec::new(),
     };
     let rig = Rig { name: args.result.name(&drawn.name), ..stage.rig(&drawn) };
+    for pose in &poses {
+        let values: Vec<f64> = pose.readings.iter().map(|reading| reading.value()).collect();
+        let found = rig.pose_at_values(&values).left_from_right;
+        force.unless_forced(cameras_are_near(&found).and_then(|()| right_is_on_the_right(&found)), console)?;
+    }
     let verdict = stage_verdict(&stage, &rig);
     let provenance = args.result.provenance(hash);
     args.result.write(&rig.to_toml(&provenance).map_err(Failure::check)?, || {
@@ -118,7 +143,17 @@ pub async fn run(args: &Args, common: &CommonOptions, console: Console) -> Resul
 /// Takes the views of --live; returns the true rig where it is simulated.
 async fn live(args: &Args, common: &CommonOptions, console: Console) -> Result<Option<Rig>, Failure> {
     match (&args.set, args.live.live) {
-        (Some(set), true) => live::fill(set, &args.live, &args.cameras, args.target.spec()?, common, console).await,
+        (Some(set), true) => {
+            live::fill(
+                set,
+                &args.live,
+                &args.cameras,
+                args.target.checked_spec(args.result.force, console)?,
+                common,
+                console,
+            )
+            .await
+        }
         (None, true) => Err(Failure::usage("say where the images go: --live --set DIR")),
         (_, false) => Ok(None),
     }
@@ -128,7 +163,8 @@ fn poses(args: &Args, rig: &Rig, hash: &mut InputHash, console: Console) -> Resu
     match (&args.set, &args.csv) {
         (Some(set), _) => {
             let (set, lenses) = (RecordedSet::read(set, rig, hash)?, [&rig.left_camera, &rig.right_camera]);
-            set.stage_poses(&args.target.spec()?, lenses, hash, &mut print_views(console))
+            let target = args.target.checked_spec(args.result.force, console)?;
+            set.stage_poses(&target, (lenses, args.masks.files()), hash, &mut print_views(console))
         }
         (_, Some(csv)) => Ok(stage_poses_in_corners(csv, rig, &args.cameras, hash)?),
         _ => Err(Failure::usage("name the views: --set DIR or --csv FILE")),

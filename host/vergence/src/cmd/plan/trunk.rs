@@ -7,8 +7,8 @@ use vergence_board::check_range;
 use vergence_files::write_whole;
 use vergence_output::{check_ending, trunk_strip_svg};
 use vergence_pipeline::{ZONE_RADIUS, rig_zones};
-use vergence_rig::linkage::{Corners, Leg, TrunkPath, WantedClearance};
-use vergence_rig::{Rig, RigTrunk, axes_json, rounded, zones_json};
+use vergence_rig::linkage::{Leg, TrunkPath, TrunkShape, WantedClearance};
+use vergence_rig::{Rig, RigTrunk, axes_json, closure_in_words, closure_json, rounded, zones_json};
 use vergence_vision::{Angle, Length};
 
 use super::super::stage_pose::named_mode;
@@ -57,12 +57,16 @@ pub fn run(args: &Args, rig: &Rig, trunk: &RigTrunk, console: Console) -> Result
     if args.dump {
         path.legs.iter().enumerate().try_for_each(|(number, leg)| console.say(table(number, leg)))?;
     }
-    let zones = rig_zones(rig, &rig.pose_at_values(&values(to)))
-        .map_err(|error| Failure::check(format!("the zones of this pose: {error}")))?;
+    let pose = rig.pose_at_values(&values(to));
+    pose.check_closure().map_err(|error| Failure::check(error.to_string()))?;
+    let zones = rig_zones(rig, &pose).map_err(|error| Failure::check(format!("the zones of this pose: {error}")))?;
+    // The base is the left half of the front link.
+    let plane = if trunk.is_flat(&values(to)) { "" } else { " in the plane of the trunk's left half" };
     console.say(format!(
-        "then sees stereo {:.1}, mono {:.1}, blind {:.1} on a circle of {ZONE_RADIUS:.0}",
+        "then sees stereo {:.1}, mono {:.1}, blind {:.1} on a circle of {ZONE_RADIUS:.0}{plane}",
         zones.stereo, zones.mono, zones.blind
     ))?;
+    closure_in_words(&pose).iter().try_for_each(|line| console.say(line))?;
     if let (Some(file), Some(svg)) = (&args.trunk.strip, trunk_strip_svg(rig, &path)) {
         write_whole(file, svg.as_bytes())?;
         console.say(format!("pictures in {}", file.display()))?;
@@ -73,6 +77,7 @@ pub fn run(args: &Args, rig: &Rig, trunk: &RigTrunk, console: Console) -> Result
         "to": axes_json(rig, to),
         "kept": { "reserve_deg": rounded(path.kept.loop_reserve.to_degrees()), "gap_mm": rounded(path.kept.gap_mm) },
         "zones_deg": zones_json(&zones),
+        "trunk": closure_json(&pose),
         "legs": path.legs.iter().map(|leg| leg_json(rig, trunk, leg)).collect::<Vec<_>>(),
     }))
 }
@@ -99,22 +104,22 @@ fn tell(path: &TrunkPath, wanted: &WantedClearance, console: Console) -> Result<
     Ok(())
 }
 
-fn degrees(shape: &Corners) -> String {
-    let text: Vec<_> = ["A", "B", "C", "D", "E", "F"]
-        .into_iter()
-        .zip(shape.0)
-        .map(|(name, angle)| format!("{name} {:.1}", angle.to_degrees()))
-        .collect();
-    text.join(", ")
+fn degrees(shape: &TrunkShape) -> String {
+    let corners = ["A", "B", "C", "D", "E", "F"].into_iter().zip(shape.corners.0);
+    let text: Vec<_> = corners.map(|(name, angle)| format!("{name} {:.1}", angle.to_degrees())).collect();
+    let folds = if shape.is_flat() { String::new() } else { format!(", folds {:.1}", shape.fold.to_degrees()) };
+    text.join(", ") + &folds
 }
 
 /// Every tenth shape of a leg, and the last.
 fn table(number: usize, leg: &Leg) -> String {
-    let head = format!("leg {}   share   A       B       C       D       E       F     reserve  gap mm", number + 1);
+    let head =
+        format!("leg {}   share   A       B       C       D       E       F     folds reserve  gap mm", number + 1);
     let last = leg.samples.len().saturating_sub(1);
     let rows =
         leg.samples.iter().enumerate().filter(|(index, _)| index % 10 == 0 || *index == last).map(|(_, sample)| {
-            let angles: String = sample.shape.0.iter().map(|angle| format!(" {:7.2}", angle.to_degrees())).collect();
+            let all = sample.shape.corners.0.into_iter().chain([sample.shape.fold]);
+            let angles: String = all.map(|angle| format!(" {:7.2}", angle.to_degrees())).collect();
             format!(
                 "        {:5.2} {angles} {:7.2} {:7.1}",
                 sample.share,

@@ -10,7 +10,9 @@ use std::sync::Arc;
 use serde_json::{Value, json};
 use vergence_files::write_whole;
 use vergence_live::{LiveResult, Totals};
-use vergence_output::{PoseSource, Table, TableFormat, drift_warning, dropped_json, ply, pose_source_json};
+use vergence_output::{
+    PlyEncoding, PoseSource, Table, TableFormat, drift_warning, dropped_json, ply, pose_source_json,
+};
 use vergence_pipeline::{Bearing, CameraGone, Observation, PairCloud};
 use vergence_rig::{Rig, RigPose, axes_json, rounded};
 use vergence_vision::Side;
@@ -30,6 +32,8 @@ pub struct Publisher {
     pub keep: bool,
     /// Tables beside the PLY files.
     pub also: Vec<TableFormat>,
+    /// How clouds are written.
+    pub encoding: PlyEncoding,
     /// Number of results so far.
     pub number: u64,
 }
@@ -105,7 +109,7 @@ impl Publisher {
             "origin_mm": placed.origin().mm().as_slice(),
             "rotation_vector": placed.rotation().scaled_axis().as_slice(),
         });
-        line["pose_source"] = pose_source_json(cloud.fused_pose.as_ref());
+        line["pose_source"] = pose_source_json(pose, cloud.fused_pose.as_ref());
         line["warning"] = json!(drift_warning(cloud, self.pose_source()));
         line["cloud"] = Table::of_points(&cloud.points).json();
         line
@@ -134,7 +138,7 @@ impl Publisher {
     fn write_cloud(&self, cloud: &PairCloud) -> Result<(), Failure> {
         let Some(folder) = &self.out else { return Ok(()) };
         self.withdraw(folder, "bearings", &["csv", "json"])?;
-        write_whole(&self.file(folder, "cloud", "ply"), ply(&cloud.points).as_bytes())?;
+        write_whole(&self.file(folder, "cloud", "ply"), &ply(&cloud.points, self.encoding))?;
         let table = Table::of_points(&cloud.points);
         self.also.iter().try_for_each(|format| {
             Ok(write_whole(&self.file(folder, "cloud", format.extension()), table.text(*format).as_bytes())?)

@@ -7,7 +7,7 @@ use vergence_camera::read_mask;
 use vergence_files::write_whole;
 use vergence_output::{ZonesOf, write_drawing, zones_plot, zones_svg};
 use vergence_pipeline::RigView;
-use vergence_rig::{rounded, zones_json};
+use vergence_rig::{closure_in_words, closure_json, rounded, zones_json};
 use vergence_vision::{PAPER_FIELD, PUBLISHED_MODES, circle_zones, paper_eq3, paper_eq3_applies, solid_zones};
 
 use super::{Args, in_words};
@@ -67,6 +67,7 @@ pub fn run(args: &Args, common: &CommonOptions, console: Console) -> Result<(), 
     let mode = rig.mode(name).ok_or_else(|| Failure::usage(format!("rig '{}' has no mode '{name}'", rig.name)))?;
     let values: Vec<f64> = mode.targets.iter().map(|position| position.value()).collect();
     let pose = rig.pose_at_values(&values);
+    pose.check_closure().map_err(|error| Failure::check(error.to_string()))?;
     let masks = [(&options.left_mask, &rig.left_camera), (&options.right_mask, &rig.right_camera)]
         .map(|(path, lens)| path.as_deref().map(|path| read_mask(path, lens.size())).transpose());
     let [left_mask, right_mask] = masks;
@@ -97,6 +98,7 @@ pub fn run(args: &Args, common: &CommonOptions, console: Console) -> Result<(), 
     if solid.rear_sr > 0.0 {
         console.say(format!("of the stereo zone, {:.3} sr lie behind the rig", solid.rear_sr))?;
     }
+    closure_in_words(&pose).iter().try_for_each(|line| console.say(line))?;
     let printed = published(name, &view)?;
     if let Some((sentence, _)) = &printed {
         console.say(sentence)?;
@@ -111,5 +113,6 @@ pub fn run(args: &Args, common: &CommonOptions, console: Console) -> Result<(), 
             "blind": rounded(solid.blind_sr),
             "rear": rounded(solid.rear_sr),
         },
+        "trunk": closure_json(&pose),
     }))
 }

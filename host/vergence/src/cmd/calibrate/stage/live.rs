@@ -101,6 +101,7 @@ async fn open(
 ) -> Result<(Board, RigCameras), Failure> {
     match (port(common)?, cameras) {
         (Port::Simulated, [only]) if only == "sim" => {
+            options.camera.none_for_simulated()?;
             let (seed, built) = (options.seed, built(nominal, options.seed));
             let rig = SharedRig::new(SimulatedRig::new(&built, seed)?);
             let (session, progress) = (fresh_session()?, console.progress("homing"));

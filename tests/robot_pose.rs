@@ -1,0 +1,108 @@
+//! The robot's pose and points by the command line from rendered images, in each of its modes: as uncertain as stated, where each joint
+//! is off by the play that the rig file states. Corridor, joints and images are simulated; the lenses are known exactly.
+#![allow(
+    clippy::expect_used,
+    clippy::panic,
+    clippy::print_stdout,
+    reason = "a test fails loudly and shows its figures"
+)]
+
+mod common;
+
+use std::sync::Arc;
+
+use common::rendered::{Measurement, Truth, band, seeds};
+use nalgebra::{UnitQuaternion, Vector3};
+use vergence_rig::Rig;
+use vergence_scene::{CorridorPlan, Scene};
+use vergence_sim::{Random, Room};
+use vergence_vision::Transform;
+
+const ORIGAKER: &str = include_str!("../docs/rigs/origaker.toml");
+/// Width of the images: half of the real ones, which takes a quarter of the time.
+const WIDTH: u32 = 640;
+
+fn rig() -> Rig {
+    Rig::from_toml(ORIGAKER).expect("the robot's file").with_sensors(WIDTH).expect("a sensor")
+}
+
+/// Where the joints truly are when they read `mode`: off by the play of their axes, and corners by that of a passive joint too.
+fn truly_at(rig: &Rig, mode: &str, random: &mut Random) -> Vec<f64> {
+    let trunk = rig.trunk.as_ref().expect("a trunk");
+    let mut values: Vec<f64> = rig.mode(mode).expect("a mode").targets.iter().map(|target| target.value()).collect();
+    for (joint, &axis) in trunk.axes.iter().enumerate() {
+        let passive = if joint < 3 { trunk.passive_play } else { 0.0 };
+        values[axis] += 0.5 * rig.axes[axis].play.hypot(passive) * random.normal();
+    }
+    values
+}
+
+/// A random corridor, and the robot somewhere in it.
+fn room(seed: u64, random: &mut Random) -> Arc<Room> {
+    let scene = Scene::of_corridor(&CorridorPlan::random(40_000 + seed));
+    let turn = UnitQuaternion::from_axis_angle(&Vector3::y_axis(), random.between(-0.3, 0.3));
+    let place = Vector3::new(random.between(-80.0, 80.0), 0.0, random.between(-200.0, 900.0));
+    Arc::new(Room { scene, world_from_base: Transform::new(turn, place) })
+}
+
+/// The robot in `mode`, somewhere, measured by the pose that its joints state.
+fn trial(rig: &Rig, mode: &str, seed: u64) -> Measurement {
+    let mut random = Random::new(1_000 * seed + 7);
+    let pose = rig.pose_at_values(&truly_at(rig, mode, &mut random));
+    let room = room(seed, &mut random);
+    Truth { rig, room, pose, seed }.measure(&["--mode", mode])
+}
+
+fn mean(values: impl Iterator<Item = f64>) -> f64 {
+    let (sum, count) = values.fold((0.0, 0.0), |(sum, count), value| (sum + value, count + 1.0));
+    sum / count
+}
+
+/// One mode's figures over all trials.
+struct Figures {
+    of_pose: f64,
+    /// Of one point a trial: points of one pair share the error of the pose.
+    of_point: f64,
+    within_two_sigma: f64,
+}
+
+fn figures(rig: &Rig, mode: &str, trials: u64) -> Figures {
+    let measured: Vec<Measurement> = (0..trials).map(|seed| trial(rig, mode, seed)).collect();
+    for one in &measured {
+        assert_eq!(one.result["pose"]["from"], "joints and images");
+        assert!(one.points.len() > 200, "{mode}: {} points", one.points.len());
+    }
+    let point = |(number, one): (usize, &Measurement)| one.points[number * 7919 % one.points.len()].of_three();
+    let near = |one: &Measurement| {
+        one.points.iter().filter(|point| point.of_range() < 4.0).count() as f64 / one.points.len() as f64
+    };
+    let figures = Figures {
+        of_pose: mean(measured.iter().map(Measurement::of_pose)),
+        of_point: mean(measured.iter().enumerate().map(point)),
+        within_two_sigma: mean(measured.iter().map(near)),
+    };
+    let factor = mean(measured.iter().filter_map(|one| one.result["pose"]["match_variance_factor"].as_f64()));
+    println!(
+        "{mode}: NEES of {trials}: pose {:.2} of 6, a point {:.2} of 3; {:.1} % of the ranges within 2 sigma; variance of the matches \
+         {factor:.2} of the stated one",
+        figures.of_pose,
+        figures.of_point,
+        100.0 * figures.within_two_sigma
+    );
+    figures
+}
+
+/// Not less uncertain than stated; and not ten times as careful, which would hide an error of the estimate.
+#[test]
+fn pose_and_points_are_as_uncertain_as_stated_in_each_mode() {
+    let rig = rig();
+    let trials = seeds(3);
+    for mode in ["gecko", "spider", "stick-bug"] {
+        let Figures { of_pose, of_point, within_two_sigma } = figures(&rig, mode, trials);
+        let [_, most] = band(trials, 6.0, 2.39);
+        assert!((0.6..most).contains(&of_pose), "{mode}: {of_pose} is not within 0.6 to {most}");
+        let [_, most] = band(trials, 3.0, 2.39);
+        assert!(of_point < most, "{mode}: {of_point} is above {most}");
+        assert!(within_two_sigma > 0.95, "{mode}: {within_two_sigma}");
+    }
+}
