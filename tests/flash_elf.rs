@@ -171,6 +171,7 @@ async fn an_image_that_hangs_or_panics_on_trial_goes_back() {
         (Variant::HangsAtStart, ResetCause::Watchdog),
         (Variant::HangsWhenItRuns, ResetCause::Watchdog),
         (Variant::PanicsAtStart, ResetCause::Software),
+        (Variant::StackTooSmall, ResetCause::Watchdog),
     ] {
         let mut story = Story::of(Variant::Good).await;
         let failed = story.flash(variant, [2, 0, 0]).await.expect_err("it must not stay").to_string();

@@ -165,6 +165,8 @@ fn no_answer_is_lost_at_4_mbit_s() {
     let mut talk = Conversation::with_board(servos_on_a_board(Baud::M4), Microseconds(0));
     talk.connect();
     become_robot(&mut talk);
+    // The board tests itself.
+    talk.wait(500_000);
     let mut robot = Robot { talk };
     robot.talk.wait(200_000);
     let silent = DriverState::Failed(FaultCode::DriverSilent);
@@ -201,6 +203,20 @@ fn a_host_that_is_gone_makes_the_joints_stop_and_hold() {
     robot.talk.wait(500_000);
     assert!(robot.torques().into_iter().all(|on| on));
     assert!(robot.outputs().iter().zip(before).all(|(now, before)| (now - before).abs() < 0.2));
+}
+
+#[test]
+fn the_stack_suffices_for_five_joints() {
+    let mut talk = Conversation::with_board(servos_on_a_board(Baud::M1), Microseconds(0));
+    talk.connect();
+    become_robot(&mut talk);
+    let mut robot = Robot { talk };
+    assert_eq!(robot.talk.arm(), Status::Accepted);
+    robot.talk.wait_for(ControllerState::Ready);
+    robot.goes(spider());
+    let spare = robot.talk.board.stack_spare();
+    println!("{spare} bytes of the stack were never used");
+    assert!(spare >= 8 * 1024);
 }
 
 #[test]

@@ -27,6 +27,9 @@ const CYCLES_PER_US: f64 = 170.0;
 /// processor busy for less than half.
 const LEFT: f64 = 0.5;
 
+/// Bytes of the stack that must stay unused, for interrupts in the deepest call.
+const SPARE_STACK: u32 = 8 * 1024;
+
 /// A linear stage, then pinions: as the firmware is wired.
 fn stages(axes: usize) -> Vec<Stage> {
     let linear = Stage::linear(Micro(60_000), Micro(220_000), 2_000_000);
@@ -51,7 +54,8 @@ fn chip(axes: usize) -> Conversation<ElfBoard> {
     assert!(machine.chip_mut().load_flash(ACTIVE.start as usize, &seal));
     machine.load(application).expect("it fits");
     machine.power_on();
-    let board = ElfBoard { machine, baud: 921_600, heard_baud: 921_600 };
+    let mut board = ElfBoard { machine, baud: 921_600, heard_baud: 921_600 };
+    board.paint_stack();
     let mut talk = Conversation::with_board(board, Microseconds(0));
     talk.connect();
     homed(&mut talk, axes);
@@ -102,6 +106,9 @@ fn costs(axes: usize) -> [u64; 2] {
         turning = turning.max(tasks(&mut talk, |talk| move_to(talk, number, target.clone())));
         assert!(talk.faults.is_empty(), "{:?}", talk.faults);
     }
+    let spare = talk.board.stack_spare();
+    println!("{axes} axes: {spare} bytes of the stack were never used");
+    assert!(spare >= SPARE_STACK, "{axes} axes");
     [from_rest, turning].map(|cycles| cycles.saturating_sub(question))
 }
 

@@ -3,7 +3,7 @@
 use std::sync::OnceLock;
 
 use vergence_cpu::{Access, Bus};
-use vergence_image::layout::ACTIVE;
+use vergence_image::layout::{ACTIVE, STACK};
 use vergence_mcu::{Bench, BenchWiring, ChipConfig, Firmware, Frame, Halt, LineFault, Machine, Picoseconds, UartId};
 use vergence_plant::{AxisMechanics, NativeBoard, Plant, bench_mechanics, bench_settings};
 use vergence_protocol::Microseconds;
@@ -15,6 +15,8 @@ use super::program::sealed;
 /// Registers of the timer whose interrupt is the control tick (RM0440, 31.4): its interrupt enable and its microseconds.
 const TIM7_DIER: u32 = 0x4000_140C;
 const TIM7_CNT: u32 = 0x4000_1424;
+/// What an unused word of the stack holds.
+const PAINT: u32 = 0xA5A5_5A5A;
 /// The speed of the line from the factory.
 const BAUD: u32 = 921_600;
 
@@ -92,6 +94,19 @@ impl ElfBoard {
         self.register(TIM7_DIER, Some(0));
         self.machine.run_for(Picoseconds::microseconds(1_000 - passed + us));
         self.register(TIM7_DIER, Some(1));
+    }
+
+    /// Fills the stack with a pattern: to be called before the board starts.
+    pub fn paint_stack(&mut self) {
+        for address in (STACK.start..STACK.end()).step_by(4) {
+            self.register(address, Some(PAINT));
+        }
+    }
+
+    /// Bytes of the stack that nothing has written since it was painted.
+    pub fn stack_spare(&mut self) -> u32 {
+        let written = (STACK.start..STACK.end()).step_by(4).find(|&address| self.register(address, None) != PAINT);
+        written.unwrap_or(STACK.end()) - STACK.start
     }
 
     fn register(&mut self, address: u32, value: Option<u32>) -> u32 {

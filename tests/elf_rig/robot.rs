@@ -51,6 +51,7 @@ pub fn become_robot(talk: &mut Conversation<ElfBoard>) {
 pub fn restart(talk: &mut Conversation<ElfBoard>, session: u32) {
     let lost = talk.lost;
     talk.board.machine.power_on();
+    talk.board.paint_stack();
     talk.wait_until("the restart goes unnoticed", |talk| talk.lost > lost);
     talk.reconnect(session);
 }

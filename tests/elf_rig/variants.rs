@@ -2,7 +2,7 @@
 
 use std::sync::OnceLock;
 
-use vergence_image::layout::{FLASH_BASE, IMAGE};
+use vergence_image::layout::{FLASH_BASE, IMAGE, STACK};
 use vergence_image::notes::{VersionNote, build_at, version_of};
 use vergence_mcu::Firmware;
 
@@ -19,6 +19,8 @@ pub enum Variant {
     HangsWhenItRuns,
     /// `main` panics.
     PanicsAtStart,
+    /// The stack is too small for `main`.
+    StackTooSmall,
     /// The vector table holds no code's address but that of the entry, where there is no code either.
     BadVectors,
 }
@@ -58,6 +60,7 @@ pub fn image(variant: Variant, version: [u8; 3]) -> Vec<u8> {
             let [high, low] = branch(main + 6, panic);
             put(&mut image, main, &[0x2020, 0x0600, 0x30F0, high, low]);
         }
+        Variant::StackTooSmall => image[..4].copy_from_slice(&(STACK.start + 2048).to_le_bytes()),
         Variant::BadVectors => {
             // Undefined instructions, and for addresses far from any memory.
             image[8..0x1D8].fill(0xDE);

@@ -41,6 +41,9 @@ pub const fn pages_to_swap(one: u32, other: u32) -> u32 {
 
 /// RAM for variables and stack: SRAM1 and SRAM2 less [`SURVIVOR`].
 pub const RAM: Region = Region { start: 0x2000_0000, length: 95 * 1024 };
+/// The part of [`RAM`] for the stack. It ends where the SRAM begins, so that a stack that is too small is a bus fault and does
+/// not overwrite variables.
+pub const STACK: Region = Region { start: RAM.start, length: 64 * 1024 };
 /// RAM that no start-up code touches; [`crate::Survivor`] lies at its start.
 pub const SURVIVOR: Region = Region { start: 0x2001_7C00, length: 1024 };
 

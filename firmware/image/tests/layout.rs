@@ -8,7 +8,7 @@
 use std::path::Path;
 
 use vergence_image::layout::{
-    ACTIVE, BOOTLOADER, CAPACITY, DFU, FLASH_BASE, IMAGE, PAGE, RAM, Region, SETTINGS, STATE, SURVIVOR, WORD,
+    ACTIVE, BOOTLOADER, CAPACITY, DFU, FLASH_BASE, IMAGE, PAGE, RAM, Region, SETTINGS, STACK, STATE, SURVIVOR, WORD,
     pages_to_swap,
 };
 use vergence_image::{SEAL_LENGTH, SURVIVOR_WORDS};
@@ -70,7 +70,8 @@ fn the_linker_is_told_the_same() {
     let boot_loader = memory_x("bootloader");
     assert_eq!(boot_loader["FLASH"], Region { start: FLASH_BASE + BOOTLOADER.start, length: BOOTLOADER.length });
     for memory in [application, boot_loader] {
-        assert_eq!(memory["RAM"], RAM);
+        assert_eq!(memory["STACK"], STACK);
+        assert_eq!(memory["RAM"], Region { start: STACK.end(), length: RAM.length - STACK.length });
         assert_eq!(memory["SURVIVOR"], SURVIVOR);
     }
 }
