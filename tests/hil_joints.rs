@@ -165,8 +165,6 @@ fn no_answer_is_lost_at_4_mbit_s() {
     let mut talk = Conversation::with_board(servos_on_a_board(Baud::M4), Microseconds(0));
     talk.connect();
     become_robot(&mut talk);
-    // The board tests itself.
-    talk.wait(500_000);
     let mut robot = Robot { talk };
     robot.talk.wait(200_000);
     let silent = DriverState::Failed(FaultCode::DriverSilent);
@@ -210,6 +208,8 @@ fn the_stack_suffices_for_five_joints() {
     let mut talk = Conversation::with_board(servos_on_a_board(Baud::M1), Microseconds(0));
     talk.connect();
     become_robot(&mut talk);
+    // The board tests itself.
+    talk.wait(500_000);
     let mut robot = Robot { talk };
     assert_eq!(robot.talk.arm(), Status::Accepted);
     robot.talk.wait_for(ControllerState::Ready);

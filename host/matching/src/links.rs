@@ -36,9 +36,6 @@ pub(crate) struct Compared<'a> {
 
 /// Largest distance of a registered match from the epipolar curve of an exact pose, in pixels of the view.
 const REGISTERED_TOLERANCE: f64 = 1.2;
-/// Standard deviation of a registered match in pixels of the view. Measured on rendered pairs: see
-/// docs/measured/matching.md.
-pub(crate) const REGISTERED_SIGMA: f64 = 0.3;
 /// Smallest score of a match that is kept without registration.
 const LEAST_UNREGISTERED_SCORE: f64 = 0.5;
 /// Largest distance of a match from the epipolar curve in standard deviations, where that exceeds
@@ -75,7 +72,7 @@ pub(crate) fn registered(
     if !band.allows(left, found.right, REGISTERED_TOLERANCE) {
         return Err(UnmatchedReason::Epipolar);
     }
-    Ok(Link { right: found.right, score: found.correlation, sigma: REGISTERED_SIGMA })
+    Ok(Link { right: found.right, score: found.correlation, sigma: found.sigma })
 }
 
 /// Whether a match that could not be registered is kept. On rendered pairs 90 % of these are right, but little more

@@ -22,6 +22,8 @@ pub(crate) struct Registered {
     pub right: ViewPixel,
     /// Correlation of both windows.
     pub correlation: f64,
+    /// Standard deviation of each coordinate of `right`, in pixels of the view.
+    pub sigma: f64,
 }
 
 const ITERATIONS: usize = 20;
@@ -32,7 +34,13 @@ const FARTHEST: f64 = 3.0;
 /// Largest stretch or shear along the row.
 const STEEPEST: f64 = 0.6;
 const LEAST_CORRELATION: f64 = 0.9;
-/// Largest standard deviation of t_x in pixels.
+/// How much larger the real errors of t_x and t_y are than their standard deviations from the residuals: neighbouring pixels of a
+/// view show the same pixel of the image, and a window at the edge of an object shows two surfaces. With these factors 95 % of the
+/// errors on rendered pairs are within two standard deviations (docs/measured/matching.md).
+const ERROR_FACTORS: [f64; 2] = [2.8, 3.2];
+/// Smallest standard deviation of a registration in pixels: it ends with a step of up to [`CONVERGED`].
+const SMALLEST_SIGMA: f64 = 0.02;
+/// Largest standard deviation of t_x from the residuals, in pixels.
 const LARGEST_SIGMA: f64 = 0.15;
 /// Largest distance in pixels between a keypoint and the result of registering to the right view and back.
 const LARGEST_LOOP: f64 = 0.15;
@@ -49,7 +57,7 @@ pub(crate) fn register(
     level: usize,
 ) -> Result<Registered, UnmatchedReason> {
     let mut warp = Warp { tx: right.x - left.x, ty: right.y - left.y, ..Warp::default() };
-    let mut fit = Fit { warp, correlation: 0.0, sigma: f64::INFINITY };
+    let mut fit = Fit { warp, correlation: 0.0, sigmas: [f64::INFINITY; 2] };
     for level in (0..=level).rev() {
         let (Some(from), Some(to)) = (left_levels.levels().get(level), right_levels.levels().get(level)) else {
             return Err(UnmatchedReason::NotRefined);
@@ -62,7 +70,7 @@ pub(crate) fn register(
     if fit.correlation < LEAST_CORRELATION {
         return Err(UnmatchedReason::LowCorrelation);
     }
-    if fit.sigma > LARGEST_SIGMA {
+    if fit.sigmas[0] > LARGEST_SIGMA {
         return Err(UnmatchedReason::Uncertain);
     }
     let right = ViewPixel { x: left.x + warp.tx, y: left.y + warp.ty };
@@ -73,15 +81,23 @@ pub(crate) fn register(
     if (back.tx + warp.tx).hypot(back.ty + warp.ty) > LARGEST_LOOP {
         return Err(UnmatchedReason::NotReversible);
     }
-    Ok(Registered { right, correlation: fit.correlation })
+    Ok(Registered { right, correlation: fit.correlation, sigma: fit.sigma() })
 }
 
 /// The result of a registration in one level.
 struct Fit {
     warp: Warp,
     correlation: f64,
-    /// Standard deviation of tx from the residuals, in pixels of the level.
-    sigma: f64,
+    /// Standard deviations of tx and ty from the residuals, in pixels of the level.
+    sigmas: [f64; 2],
+}
+
+impl Fit {
+    /// The real standard deviation: the root mean square of both directions.
+    fn sigma(&self) -> f64 {
+        let [x, y] = [0, 1].map(|i| ERROR_FACTORS[i] * self.sigmas[i]);
+        (x.hypot(y) * std::f64::consts::FRAC_1_SQRT_2).max(SMALLEST_SIGMA)
+    }
 }
 
 /// Registers `image` to the window of `template` around `at`, starting with the warp `start`.
@@ -106,8 +122,8 @@ fn align(template: &Plane, image: &Plane, at: ViewPixel, start: Warp) -> Result<
         }
         if tx.hypot(ty) < CONVERGED {
             let (correlation, variance) = window.quality(&values, &solution);
-            let sigma = (variance * inverse[(0, 0)]).sqrt() / gain;
-            return Ok(Fit { warp, correlation, sigma });
+            let sigmas = [0, 1].map(|i| (variance * inverse[(i, i)]).sqrt() / gain);
+            return Ok(Fit { warp, correlation, sigmas });
         }
     }
     Err(UnmatchedReason::NotRefined)

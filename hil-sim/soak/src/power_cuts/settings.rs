@@ -1,8 +1,11 @@
 //! Settings that are saved, and those that a board has after a start.
 
-use vergence_protocol::{Report, Request, SettingItem, SettingKey, Status};
+use vergence_protocol::{Refusal, Report, Request, SettingItem, SettingKey, Status};
 
 use super::talk::Talk;
+
+/// Number of times that a request is made while the board tests itself. An answer takes milliseconds.
+const PATIENCE: usize = 1_000;
 
 /// Settings that change with each saving, from the first to the last of a record, and their values at saving 0. None of
 /// them is that of the factory.
@@ -42,10 +45,15 @@ impl Talk {
         }
     }
 
+    /// Asks again while the board tests itself.
     fn ask_done(&mut self, request: &Request) -> Result<(), String> {
-        match self.ask_session(request)? {
-            Report::Ack { status: Status::Accepted, .. } => Ok(()),
-            other => Err(format!("{request:?} is answered by {other:?}")),
+        for _ in 0..PATIENCE {
+            match self.ask_session(request)? {
+                Report::Ack { status: Status::Accepted, .. } => return Ok(()),
+                Report::Ack { status: Status::Refused(Refusal::NotIdle), .. } => {}
+                other => return Err(format!("{request:?} is answered by {other:?}")),
+            }
         }
+        Err(format!("{request:?} is refused, because the board does not become idle"))
     }
 }

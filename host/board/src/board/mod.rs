@@ -28,6 +28,9 @@ use crate::serve::{Served, Shared, spawn_in_process};
 /// Longest wait for the end of a motion. Homing and moves of a bench take seconds.
 const MOTION_TIMEOUT: Duration = Duration::from_secs(120);
 
+/// Longest self-test that is waited for, in microseconds of the board's clock. Boards take some 0.2 s.
+const LONGEST_SELF_TEST_US: u64 = 3_000_000;
+
 /// Called with every pose that arrives.
 type PoseObserver = Box<dyn FnMut(&Rig, &PoseReport) + Send>;
 
@@ -88,7 +91,18 @@ impl Board {
         let mut board =
             Self { client, rig, info, axes, pose, lease_ms, latest_move, observer: None, stream_note: None };
         board.follow_stream().await?;
+        board.wait_for_self_test().await?;
         Ok(board)
+    }
+
+    /// Waits until the board has tested itself: before, it refuses settings and motion.
+    async fn wait_for_self_test(&mut self) -> Result<(), BoardError> {
+        let begun = self.next_pose().await?.at.0;
+        let tests = |pose: &PoseReport| matches!(pose.state, ControllerState::Boot | ControllerState::SelfTest);
+        while tests(&self.pose) && self.pose.at.0.saturating_sub(begun) < LONGEST_SELF_TEST_US {
+            self.next_pose().await?;
+        }
+        Ok(())
     }
 
     /// Calls `observer` with every pose that arrives from now on, to show progress.
