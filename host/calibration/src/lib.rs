@@ -9,6 +9,7 @@ pub mod detect;
 mod extrinsics;
 mod fit_check;
 mod intrinsics;
+mod labelling;
 mod lens_difference;
 mod planar_pose;
 mod reprojection;
@@ -24,14 +25,16 @@ mod validation;
 pub use arun::{ArunError, fit_rotation_translation};
 pub use coverage::{Advice, Coverage};
 pub use extrinsics::{
-    ExtrinsicsCalibration, ExtrinsicsError, ExtrinsicsOptions, FEWEST_VIEWS, LensKnowledge, RelativePose, Side,
-    SkippedView, StereoOutlier, StereoOutlierReason, StereoView, StereoViewFigures, calibrate_extrinsics,
+    ExtrinsicsCalibration, ExtrinsicsError, ExtrinsicsOptions, FEWEST_VIEWS, LabelError, LensKnowledge, RelativePose,
+    Side, SkippedView, StereoOutlier, StereoOutlierReason, StereoView, StereoViewFigures, calibrate_extrinsics,
+    label_pairs,
 };
 pub use fit_check::{Unfit, check_fit};
 pub use intrinsics::{
     IntrinsicsCalibration, IntrinsicsError, IntrinsicsOptions, Outlier, OutlierReason, Parameter, Reprojection,
     TargetWarp, ViewFigures, ViewPose, calibrate_intrinsics, refine_intrinsics, reproject,
 };
+pub use labelling::{Relabelling, SeenTarget};
 pub use lens_difference::{LensDifference, LensDifferenceError};
 pub use planar_pose::{PoseError, TargetPose, target_pose};
 pub use robust::{Loss, median};

@@ -21,9 +21,9 @@ mod search;
 use image::GrayImage;
 use vergence_vision::{KannalaBrandt, Pixel};
 
-use crate::{Corner, TargetSpec, TargetView};
+use crate::{Corner, Relabelling, SeenTarget, TargetSpec, TargetView};
 use intensity::Intensity;
-use lattice::Lattice;
+use placement::Placed;
 pub use placement::Placement;
 
 /// Fewest corners taken for a target. Four determine a pose; a dozen in a grid are no coincidence.
@@ -41,6 +41,9 @@ pub struct Detection {
     pub complete: bool,
     /// Whether the labels hold beyond this image.
     pub placement: Placement,
+    /// All labellings that the image allows, as changes of the labels above. One of them changes nothing; it is the only one
+    /// where the placement is unique.
+    pub labellings: Vec<Relabelling>,
 }
 
 /// One corner of a target in an image.
@@ -135,13 +138,13 @@ pub fn detect(image: &GrayImage, target: &TargetSpec, hint: Option<&KannalaBrand
         refine::refine_all(&mut lattice, &intensity, hint);
     }
     blunders::flag(&mut lattice, hint);
-    let (turned, placement) = placement::place(&lattice, &intensity, hint, [columns, rows])?;
-    Ok(Detection::new(&turned, placement, target))
+    let placed = placement::place(&lattice, &intensity, hint, [columns, rows])?;
+    Ok(Detection::new(placed, target))
 }
 
 impl Detection {
     /// Detection from a lattice whose nodes are columns and rows of the target.
-    fn new(lattice: &Lattice, placement: Placement, target: &TargetSpec) -> Self {
+    fn new(Placed { lattice, placement, labellings }: Placed, target: &TargetSpec) -> Self {
         let mut corners: Vec<_> = lattice
             .iter()
             .map(|(&[column, row], found)| DetectedCorner {
@@ -154,7 +157,14 @@ impl Detection {
             .collect();
         corners.sort_by_key(|corner| corner.index);
         let good = corners.iter().filter(|corner| corner.quality == CornerQuality::Good).count();
-        Self { corners, complete: good as u64 == u64::from(target.columns) * u64::from(target.rows), placement }
+        let complete = good as u64 == u64::from(target.columns) * u64::from(target.rows);
+        Self { corners, complete, placement, labellings }
+    }
+
+    /// The good corners with all labellings that the image allows.
+    #[must_use]
+    pub fn seen(&self, name: &str, target: &TargetSpec) -> SeenTarget {
+        SeenTarget { view: self.view(name, target), labellings: self.labellings.clone(), pitch: target.square }
     }
 
     /// The good corners as a view for calibration.
