@@ -2,7 +2,7 @@
 
 use vergence_vision::Length;
 
-use crate::TargetView;
+use crate::{TargetKind, TargetSpec, TargetView};
 
 /// A change of labels: a turn of the target by quarters, which take its x axis to its y axis, then a shift by whole
 /// squares.
@@ -87,10 +87,11 @@ impl SeenTarget {
         self.labellings.len() == 1
     }
 
-    /// Whether the image tells where the corners lie on a target of these many columns and rows, but for a half turn of the
-    /// whole: enough where the target's shape counts, such as its bow.
+    /// Whether the image tells where the corners lie on `target`, but for a half turn of the whole: enough where the target's
+    /// shape counts, such as its bow.
     #[must_use]
-    pub fn is_placed(&self, columns: u32, rows: u32) -> bool {
+    pub fn is_placed(&self, target: &TargetKind) -> bool {
+        let TargetKind::Chessboard(TargetSpec { columns, rows, .. }) = target else { return self.is_certain() };
         let half_turn = Relabelling { quarters: 2, shift: [columns, rows].map(|corners| corners.cast_signed() - 1) };
         self.labellings.iter().all(|change| *change == Relabelling::SAME || *change == half_turn)
     }

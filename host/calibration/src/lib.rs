@@ -3,6 +3,7 @@
 //!
 //! Everything is a pure function of its arguments: images and corners in, calibrations with covariance out.
 
+mod april_grid;
 mod arun;
 mod coverage;
 pub mod detect;
@@ -22,6 +23,7 @@ mod trunk;
 mod uncertainty;
 mod validation;
 
+pub use april_grid::AprilGridSpec;
 pub use arun::{ArunError, fit_rotation_translation};
 pub use coverage::{Advice, Coverage};
 pub use extrinsics::{
@@ -43,7 +45,7 @@ pub use stage::{
     StageOptions, StagePose, StagePoseFigures, Tolerance, WeakDirection, ZeroOffset, calibrate_stage,
 };
 pub use stage_plan::stage_plan;
-pub use target::{Corner, Target, TargetSpec, TargetView};
+pub use target::{Corner, Target, TargetKind, TargetPrint, TargetSpec, TargetView};
 pub use trunk::{
     PlayFound, TrunkCalibration, TrunkParameterFigures, TrunkPoseFigures, calibrate_trunk, largest_trunk_sigma,
     validate_trunk,

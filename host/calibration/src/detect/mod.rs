@@ -7,24 +7,31 @@
 //! 3. if the camera is known, at least roughly, each corner is refined again along edges bent by its distortion;
 //! 4. corners that do not fit a smooth image of a target are flagged (`blunders`);
 //! 5. the patch is placed on the target: which corner is the first (`placement`).
+//!
+//! Grids of AprilTags have a search of their own ([`detect_april_grid`]), and the same refinement.
 
+mod april_grid;
 mod blunders;
 mod grow;
 mod intensity;
 mod lattice;
 mod placement;
+mod plane;
 mod predict;
 mod refine;
 mod saddle;
 mod search;
+mod tags;
 
 use image::GrayImage;
 use vergence_vision::{KannalaBrandt, Pixel};
 
-use crate::{Corner, Relabelling, SeenTarget, TargetSpec, TargetView};
+use crate::{Corner, Relabelling, SeenTarget, TargetKind, TargetSpec, TargetView};
+pub use april_grid::detect_april_grid;
 use intensity::Intensity;
 use placement::Placed;
 pub use placement::Placement;
+pub use tags::{BORDER as TAG_BORDER, ReadCode, TagFamily};
 
 /// Fewest corners taken for a target. Four determine a pose; a dozen in a grid are no coincidence.
 const FEWEST_CORNERS: usize = 12;
@@ -100,6 +107,24 @@ pub enum DetectError {
         /// Corners of the largest grid in the image.
         found: usize,
     },
+    /// Grids of so many tags cannot be detected.
+    #[error(
+        "a grid of {columns} × {rows} tags cannot be detected: it takes 1 to 587 tags, of a size, with gaps of up to a side"
+    )]
+    UnusableGrid {
+        /// Tags along x.
+        columns: u32,
+        /// Tags along y.
+        rows: u32,
+    },
+    /// The image shows too few tags of the grid.
+    #[error(
+        "no grid of tags found: {found} tags of it, at least 3 are needed; show more of the target, sharper or closer"
+    )]
+    NoTags {
+        /// Number of tags found.
+        found: usize,
+    },
     /// The image shows a chessboard of another size.
     #[error(
         "the chessboard in the image shows {} × {} inner corners, which does not fit one of {} × {}: \
@@ -140,6 +165,31 @@ pub fn detect(image: &GrayImage, target: &TargetSpec, hint: Option<&KannalaBrand
     blunders::flag(&mut lattice, hint);
     let placed = placement::place(&lattice, &intensity, hint, [columns, rows])?;
     Ok(Detection::new(placed, target))
+}
+
+/// The good corners of `target` in `image`, which is called `name`, with all labellings that the image allows. `hint` is a
+/// camera calibrated roughly, if there is one, as for [`detect`].
+///
+/// # Errors [`DetectError`] if the image shows no such target.
+pub fn see(
+    image: &GrayImage,
+    target: &TargetKind,
+    hint: Option<&KannalaBrandt>,
+    name: &str,
+) -> Result<SeenTarget, DetectError> {
+    match target {
+        TargetKind::Chessboard(board) => Ok(detect(image, board, hint)?.seen(name, board)),
+        TargetKind::AprilGrid(grid) => {
+            let corners = detect_april_grid(image, grid, hint)?;
+            let corner = |corner: DetectedCorner| Corner {
+                target_mm: grid.corner_mm(corner.index),
+                pixel: corner.pixel,
+                relative_sigma: corner.sigma_px,
+            };
+            let view = TargetView { name: name.to_owned(), corners: corners.into_iter().map(corner).collect() };
+            Ok(SeenTarget::certain(view, grid.tag))
+        }
+    }
 }
 
 impl Detection {
