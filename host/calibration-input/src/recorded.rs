@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
-use vergence_calibration::{StagePose, StereoView, TargetSpec};
+use vergence_calibration::{StagePose, StereoView, TargetKind};
 use vergence_calibration_report::LeftOut;
 use vergence_protocol::AxisKind;
 use vergence_rig::{AxisPosition, Rig, RigAxis};
@@ -21,6 +21,9 @@ pub const FOLDER: &str = "folder";
 const SAME_STEPS: f64 = 2.0;
 /// Part of the range by which a reading may lie outside it: stages stop near an end, not on it.
 const OVERSHOOT: f64 = 0.01;
+
+/// The views of stage poses, and those left out.
+pub type StageViews = (Vec<StagePose>, Vec<LeftOut>);
 
 /// The stage poses of a set folder: the encoder readings of each, and the folder of its images.
 pub struct RecordedSet(Vec<(Vec<AxisPosition>, PathBuf)>);
@@ -47,11 +50,11 @@ impl RecordedSet {
     /// [`InputError`] where images cannot be used; those of `tell`.
     pub fn stage_poses<E: From<InputError>>(
         self,
-        target: &TargetSpec,
+        target: &TargetKind,
         seen: (PairLenses<'_>, PairMasks<'_>),
         hash: &mut InputHash,
         tell: &mut impl FnMut(ViewEvent<'_>) -> Result<(), E>,
-    ) -> Result<(Vec<StagePose>, Vec<LeftOut>), E> {
+    ) -> Result<StageViews, E> {
         let (mut poses, mut left_out) = (Vec::new(), Vec::new());
         for (readings, folder) in self.0 {
             let images = |side: &str| [folder.join(format!("{side}*")).to_string_lossy().into_owned()];

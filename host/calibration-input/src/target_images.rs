@@ -5,8 +5,8 @@ use std::path::{Path, PathBuf};
 
 use image::imageops::grayscale;
 use rayon::prelude::*;
-use vergence_calibration::detect::{DetectError, detect};
-use vergence_calibration::{SeenTarget, TargetSpec, TargetView};
+use vergence_calibration::detect::{DetectError, see};
+use vergence_calibration::{SeenTarget, TargetKind, TargetView};
 use vergence_calibration_report::ReportImage;
 use vergence_camera::{CameraError, read_image, read_mask};
 use vergence_vision::{BodyMask, ImageSize, KannalaBrandt};
@@ -85,7 +85,7 @@ impl TargetImages {
 #[derive(Clone, Copy, Debug)]
 pub struct Sought<'a> {
     /// The target.
-    pub target: &'a TargetSpec,
+    pub target: &'a TargetKind,
     /// A camera that is roughly right: with it more corners are found, and better.
     pub hint: Option<&'a KannalaBrandt>,
     /// Whether it counts where on the target the corners lie, as for its bow; not only how they lie to one another.
@@ -142,13 +142,9 @@ fn look(path: &Path, Sought { target, hint, placed, mask }: &Sought<'_>) -> Resu
     let reduced = Some(ReportImage::new(&name, &grey));
     let (width, height) = image.dimensions();
     let mask = mask.map(|mask| read_mask(mask, ImageSize { width, height })).transpose()?;
-    let view = match detect(&grey, target, *hint) {
-        Ok(detection) => match detection.seen(&name, target) {
-            seen if *placed && !seen.is_placed(target.columns, target.rows) => {
-                Err(Missed { name, reason: MissedReason::Unplaced })
-            }
-            seen => unhidden(seen, mask.as_ref()),
-        },
+    let view = match see(&grey, target, *hint, &name) {
+        Ok(seen) if *placed && !seen.is_placed(target) => Err(Missed { name, reason: MissedReason::Unplaced }),
+        Ok(seen) => unhidden(seen, mask.as_ref()),
         Err(error) => Err(Missed { name, reason: MissedReason::NoTarget(error) }),
     };
     Ok(Looked { size: Some(image.dimensions()), view, reduced })

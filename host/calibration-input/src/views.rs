@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use vergence_calibration::{
-    IntrinsicsOptions, SeenTarget, StereoView, TargetSpec, TargetView, calibrate_intrinsics, label_pairs,
+    IntrinsicsOptions, SeenTarget, StereoView, TargetKind, TargetView, calibrate_intrinsics, label_pairs,
 };
 use vergence_calibration_report::{LeftOut, ReportImage};
 use vergence_camera::{PairedFiles, paired};
@@ -106,7 +106,7 @@ impl PairImages {
     /// As [`views_in_images`]; images that are not of the lenses' sizes.
     pub fn views<E: From<InputError>>(
         &self,
-        target: &TargetSpec,
+        target: &TargetKind,
         (lenses, masks): (PairLenses<'_>, PairMasks<'_>),
         hash: &mut InputHash,
         tell: &mut impl FnMut(ViewEvent<'_>) -> Result<(), E>,

@@ -27,7 +27,7 @@ mod stage;
 mod trunk;
 mod verdict;
 
-use vergence_calibration::{TargetSpec, Validation};
+use vergence_calibration::{TargetKind, Validation};
 use vergence_page::{Page, Row, escape, plain, section, table, text};
 use vergence_rig::Provenance;
 use vergence_vision::Angle;
@@ -70,11 +70,8 @@ impl ReportAbout {
     /// The heading of a report: title, origin and target; without a target the corners came from a file. `half_field` is half
     /// the field of the lens by its data sheet.
     #[must_use]
-    pub fn new(title: String, target: Option<&TargetSpec>, provenance: &Provenance, half_field: Option<Angle>) -> Self {
-        let target = target.map_or_else(
-            || "as in the corner file".into(),
-            |spec| format!("{} × {} inner corners, {}", spec.columns, spec.rows, spec.square),
-        );
+    pub fn new(title: String, target: Option<&TargetKind>, provenance: &Provenance, half_field: Option<Angle>) -> Self {
+        let target = target.map_or_else(|| "as in the corner file".into(), ToString::to_string);
         Self {
             title,
             program_version: provenance.program.clone(),

@@ -6,8 +6,8 @@ mod trunk;
 use std::path::PathBuf;
 
 use serde_json::json;
-use vergence_calibration::{StageError, StageOptions, StagePose, calibrate_stage, check_fit, validate_stage};
-use vergence_calibration_input::{InputHash, KnownLenses, RecordedSet, TrueError, stage_poses_in_corners};
+use vergence_calibration::{StageError, StageOptions, calibrate_stage, check_fit, validate_stage};
+use vergence_calibration_input::{InputHash, KnownLenses, RecordedSet, StageViews, TrueError, stage_poses_in_corners};
 use vergence_calibration_report::{
     LeftOut, ReportAbout, left_out_json, stage_json, stage_lines, stage_report, stage_verdict,
 };
@@ -167,13 +167,7 @@ async fn live(args: &Args, common: &CommonOptions, console: Console) -> Result<O
     }
 }
 
-/// The stage poses, and the views left out.
-fn poses(
-    args: &Args,
-    rig: &Rig,
-    hash: &mut InputHash,
-    console: Console,
-) -> Result<(Vec<StagePose>, Vec<LeftOut>), Failure> {
+fn poses(args: &Args, rig: &Rig, hash: &mut InputHash, console: Console) -> Result<StageViews, Failure> {
     match (&args.set, &args.csv) {
         (Some(set), _) => {
             let (set, lenses) = (RecordedSet::read(set, rig, hash)?, [&rig.left_camera, &rig.right_camera]);
