@@ -41,7 +41,8 @@ pub fn read_target(path: &Path) -> Result<TargetKind, InputError> {
         }
         File::Checkerboard { target_cols, target_rows, row_spacing_meters, col_spacing_meters } => {
             let square = Length::from_mm(1000.0 * row_spacing_meters);
-            if row_spacing_meters != col_spacing_meters || !(square.mm() > 0.0) {
+            let is_square = (row_spacing_meters - col_spacing_meters).abs() <= f64::EPSILON * row_spacing_meters;
+            if !is_square || square.mm().is_nan() || square.mm() <= 0.0 {
                 return Err(wrong(
                     "rowSpacingMeters and colSpacingMeters are the side of a square, and positive".into(),
                 ));
@@ -85,6 +86,7 @@ mod tests {
             (grid.replace("aprilgrid", "circlegrid"), "circlegrid"),
             (grid.replace("0.088", "-1"), "positive"),
             (grid.replace("0.088", ".nan"), "positive"),
+            (grid.replace("0.088", ".inf"), "positive"),
             (grid.replace("tagCols: 6", "tagCols: 100"), "587"),
             (grid.to_owned() + "low_id: 4\n", "low_id"),
             ("[camera]\nsize = [1, 2]\n".into(), "target_type"),

@@ -38,6 +38,7 @@ impl AprilGridSpec {
     pub fn is_usable(&self) -> bool {
         (1..=Self::FAMILY.codes.len()).contains(&(self.tags() as usize))
             && self.tag.mm() > 0.0
+            && self.tag.mm().is_finite()
             && self.spacing > 0.0
             && self.spacing <= 1.0
     }
@@ -124,8 +125,8 @@ mod tests {
     fn tags_are_numbered_from_the_lower_left_and_corners_against_the_clock() {
         let grid = AprilGridSpec { columns: 6, rows: 4, tag: Length::from_mm(40.0), spacing: 0.25 };
         assert_eq!((grid.place(0), grid.place(5), grid.place(6), grid.place(23)), ([0, 3], [5, 3], [0, 2], [5, 0]));
-        let corners = [0, 1, 2, 3].map(|corner| grid.corner_mm(4 * 7 + corner));
-        assert_eq!(corners, [[50.0, 140.0], [90.0, 140.0], [90.0, 100.0], [50.0, 100.0]]);
+        let corners = [0, 1, 2, 3].map(|corner| grid.corner_mm(4 * 7 + corner).map(|mm| mm.round() as i32));
+        assert_eq!(corners, [[50, 140], [90, 140], [90, 100], [50, 100]]);
         assert!(grid.is_usable() && !AprilGridSpec { columns: 147, ..grid }.is_usable());
         assert!(!AprilGridSpec { spacing: f64::NAN, ..grid }.is_usable());
     }

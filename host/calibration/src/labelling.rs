@@ -121,7 +121,8 @@ mod tests {
             assert_eq!(a.then(a.inverse()), Relabelling::SAME);
             assert_eq!(a.inverse().then(a), Relabelling::SAME);
             let [i, j] = a.node([4, 7]);
-            assert_eq!(a.target_mm([80.0, 140.0], 20.0), [f64::from(i) * 20.0, f64::from(j) * 20.0]);
+            let moved = a.target_mm([80.0, 140.0], 20.0).map(|mm| (mm / 20.0).round() as i32);
+            assert_eq!(moved, [i, j]);
             for &b in &changes {
                 assert_eq!(a.then(b).node([4, 7]), b.node(a.node([4, 7])));
             }

@@ -32,7 +32,7 @@ impl Sheet {
     /// [`OutputError::SmallSheet`] where the target does not fit.
     pub fn with_target(paper: Paper, black: &[[f64; 4]], needed: [f64; 2], label: String) -> Result<Self, OutputError> {
         let (width, height) = paper.size();
-        if !(needed[0] <= width && needed[1] <= height) {
+        if needed[0] > width || needed[1] > height {
             return Err(OutputError::SmallSheet { target: label, needed: needed.into(), paper, size: (width, height) });
         }
         let (left, top) = (0.5 * (width - needed[0]), 0.5 * (height - needed[1]));

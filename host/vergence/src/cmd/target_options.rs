@@ -70,8 +70,7 @@ impl TargetOptions {
             TargetKind::AprilGrid(grid) if grid.tag.mm() > 0.0 && !grid.is_usable() => {
                 Err(Failure::usage("a grid has 1 to 587 tags, and --tag-spacing is more than 0 and at most 1"))
             }
-            // Not a number is no length either.
-            spec if !(spec.side().mm() > 0.0) => Err(Failure::usage(format!(
+            spec if spec.side().mm().is_nan() || spec.side().mm() <= 0.0 => Err(Failure::usage(format!(
                 "squares and tags cannot have a side of {}: give a positive length",
                 spec.side()
             ))),
