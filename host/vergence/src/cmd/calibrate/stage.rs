@@ -8,9 +8,7 @@ use std::path::PathBuf;
 use serde_json::json;
 use vergence_calibration::{StageError, StageOptions, calibrate_stage, check_fit, validate_stage};
 use vergence_calibration_input::{InputHash, KnownLenses, RecordedSet, StageViews, TrueError, stage_poses_in_corners};
-use vergence_calibration_report::{
-    LeftOut, ReportAbout, left_out_json, stage_json, stage_lines, stage_report, stage_verdict,
-};
+use vergence_calibration_report::{ReportAbout, left_out_json, stage_json, stage_lines, stage_report, stage_verdict};
 use vergence_rig::Rig;
 
 use super::options::{LensOptions, MaskOptions, ResultOptions};
