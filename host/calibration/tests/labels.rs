@@ -6,7 +6,8 @@ mod simulated;
 use nalgebra::{Isometry3, UnitQuaternion, Vector3};
 use simulated::{COLUMNS, Dice, Pair, ROWS, SQUARE_MM, apart, lens, other_lens, pair_pose};
 use vergence_calibration::{
-    ExtrinsicsOptions, LabelError, Relabelling, SeenTarget, StereoView, TargetView, calibrate_extrinsics, label_pairs,
+    ExtrinsicsOptions, LabelError, Relabelling, SeenTarget, StereoView, TargetKind, TargetSpec, TargetView,
+    calibrate_extrinsics, label_pairs,
 };
 use vergence_vision::Length;
 
@@ -133,6 +134,17 @@ fn targets_that_were_all_held_alike_are_left_out() {
     for result in labelled(&pair, &few) {
         assert!(matches!(result, Err(LabelError::TooFewAgree { .. })), "{result:?}");
     }
+}
+
+/// The bow of a board is the same after half a turn, not after a shift.
+#[test]
+fn views_of_an_unknown_part_of_the_board_are_not_placed_on_it() {
+    let (mut dice, square) = (Dice::new(7), Length::from_mm(SQUARE_MM));
+    let view = pair().views(1, &mut dice).remove(0).left;
+    let board = TargetKind::Chessboard(TargetSpec { columns: COLUMNS, rows: ROWS, square });
+    assert!(SeenTarget::certain(view.clone(), square).is_placed(&board));
+    assert!(seen(&view, &[Relabelling::SAME, HALF_TURN], &mut dice).is_placed(&board));
+    assert!(!seen(&view, &shifts(1), &mut dice).is_placed(&board));
 }
 
 #[test]
