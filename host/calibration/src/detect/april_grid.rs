@@ -40,7 +40,7 @@ pub fn detect_april_grid(
     }
     let intensity = Intensity::new(image);
     let search = Search { image: &intensity, grid, hint };
-    let tags = search.beside_neighbours(search.tags(image));
+    let tags = search.beside_neighbours(&search.tags(image));
     let mut corners = search.refined(&tags);
     search.drop_unclear(&mut corners);
     search.drop_misplaced(&mut corners);
@@ -72,7 +72,7 @@ impl Search<'_> {
     }
 
     /// The tags that lie where most of their neighbours expect them; those without a neighbour are dropped.
-    fn beside_neighbours(&self, tags: BTreeMap<u32, Tag>) -> BTreeMap<u32, Tag> {
+    fn beside_neighbours(&self, tags: &BTreeMap<u32, Tag>) -> BTreeMap<u32, Tag> {
         /// In sides of the tag: a mean of two neighbours' steps bends less.
         const FARTHEST: f64 = 0.5;
         let pitch = 1.0 + self.grid.spacing;
@@ -131,7 +131,7 @@ impl Search<'_> {
         let found = refine(self.image, expected.position, expected)?;
         let quadrants = Quadrants::read(self.image, found.position, &expected.steps)?;
         // The tag lies to the right of and below its upper left corner, and the other way at the next one: dark there.
-        let colour = if index % 2 == 0 { 1.0 } else { -1.0 };
+        let colour = if index.is_multiple_of(2) { 1.0 } else { -1.0 };
         let clear = quadrants.is_corner(LEAST_CONTRAST) && quadrants.saddle() * colour > 0.0;
         let pixel = Pixel { u: found.position.x, v: found.position.y };
         let corner = DetectedCorner { index, pixel, sigma_px: found.sigma_px, filled, quality: CornerQuality::Good };
