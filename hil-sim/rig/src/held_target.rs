@@ -3,7 +3,7 @@
 use image::RgbImage;
 use nalgebra::{UnitQuaternion, Vector3};
 use vergence_camera::{Camera, CameraError, CameraImage};
-use vergence_scene::{Optics, Scene, Target, View, render};
+use vergence_scene::{Optics, Scene, Sheet, Target, View, render};
 use vergence_vision::{Camera as CameraFrame, Frame, KannalaBrandt, Left, Point, Right, Side, Transform, World};
 
 use crate::Random;
@@ -25,7 +25,7 @@ pub struct HeldTarget {
     /// Whether both cameras must see the target.
     pub both: bool,
     /// The target.
-    pub target: Target,
+    pub target: Sheet,
     /// Seed of the places and of the image noise.
     pub seed: u64,
 }
@@ -53,9 +53,10 @@ impl HeldTarget {
 
     fn is_in_sight(&self, left_from_target: &Transform<Left, Target>) -> bool {
         let right_from_target = self.right.1.inverse() * *left_from_target;
-        let (columns, rows) = (self.target.columns.saturating_sub(1), self.target.rows.saturating_sub(1));
-        let corners = [(0, 0), (columns, 0), (0, rows), (columns, rows)].map(|(x, y)| self.target.corner(x, y));
-        corners.iter().all(|&corner| {
+        let [[left, top], [right, bottom]] = self.target.outermost();
+        let corners = [(left, top), (right, top), (left, bottom), (right, bottom)];
+        corners.iter().all(|&(x, y)| {
+            let corner = Point::<Target>::from_mm(Vector3::new(x, y, 0.0));
             let left = on_sensor(&self.left, &(*left_from_target * corner));
             left && (!self.both || on_sensor(&self.right.0, &(right_from_target * corner)))
         })
@@ -106,7 +107,7 @@ impl Camera for TargetCamera {
 /// Image of a target alone before a grey background.
 #[must_use]
 pub fn photograph_target(
-    target: Target,
+    target: impl Into<Sheet>,
     world_from_target: Transform<World, Target>,
     lens: &KannalaBrandt,
     world_from_camera: Transform<World, CameraFrame>,

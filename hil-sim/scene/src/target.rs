@@ -3,15 +3,15 @@
 use nalgebra::{UnitQuaternion, Vector3};
 use vergence_vision::{Frame, Length, Point, Transform, World};
 
-use crate::Scene;
 use crate::scene::{Material, Solid};
 use crate::shape::{Shape, SurfacePoint};
 use crate::texture::{Pattern, Rgb};
+use crate::{Scene, Sheet};
 
 /// Reflectances of matte print: paper, toner, and the unprinted back.
-const WHITE: Rgb = [0.82, 0.82, 0.80];
-const BLACK: Rgb = [0.04, 0.04, 0.04];
-const BACK: Rgb = [0.30, 0.28, 0.26];
+pub(crate) const WHITE: Rgb = [0.82, 0.82, 0.80];
+pub(crate) const BLACK: Rgb = [0.04, 0.04, 0.04];
+pub(crate) const BACK: Rgb = [0.30, 0.28, 0.26];
 
 /// Width of the white border, as a share of the side of a square.
 const BORDER: f64 = 0.5;
@@ -84,20 +84,21 @@ impl Scene {
 
     /// A `target` alone in the [studio](Self::studio).
     #[must_use]
-    pub fn target_in_studio(target: Target, world_from_target: Transform<World, Target>) -> Self {
+    pub fn target_in_studio(target: impl Into<Sheet>, world_from_target: Transform<World, Target>) -> Self {
         Self::studio().with_target(target, world_from_target)
     }
 
     /// A `target` alone before an even grey, which renders quickest where only the target matters.
     #[must_use]
-    pub fn target_alone(target: Target, world_from_target: Transform<World, Target>) -> Self {
+    pub fn target_alone(target: impl Into<Sheet>, world_from_target: Transform<World, Target>) -> Self {
         const GREY: Rgb = [0.35; 3];
         Self::empty(GREY).with_target(target, world_from_target)
     }
 
     /// The scene with a `target` added. The target may intersect other solids.
     #[must_use]
-    pub fn with_target(self, target: Target, world_from_target: Transform<World, Target>) -> Self {
+    pub fn with_target(self, target: impl Into<Sheet>, world_from_target: Transform<World, Target>) -> Self {
+        let target = target.into();
         let half = target.size().map(|side| 0.5 * side.mm());
         let middle = world_from_target * target.centre();
         let material = Material { pattern: Pattern::Print(target), seed: 0, glow: None };

@@ -5,7 +5,7 @@
 
 use nalgebra::Vector3;
 
-use crate::Target;
+use crate::Sheet;
 use crate::shape::SurfacePoint;
 use crate::texture_noise::{cell_hash, fraction, octaves, smoothstep, split, survival};
 
@@ -33,8 +33,8 @@ pub enum Pattern {
     Leaf { light: Rgb, dark: Rgb },
     /// The garden seen through a window, `height` high.
     Garden { height: f64 },
-    /// A checkerboard.
-    Print(Target),
+    /// A calibration target.
+    Print(Sheet),
 }
 
 impl Pattern {
@@ -54,7 +54,7 @@ impl Pattern {
             Self::Book { cloth, ink } => book(at, cloth, ink, seed),
             Self::Leaf { light, dark } => leaf(at, light, dark, seed),
             Self::Garden { height } => garden(at, height, seed),
-            Self::Print(target) => target.ink(at),
+            Self::Print(sheet) => sheet.ink(at),
         }
     }
 }

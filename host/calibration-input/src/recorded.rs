@@ -3,7 +3,8 @@
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
-use vergence_calibration::{StagePose, StereoView, TargetSpec};
+use vergence_calibration::{StagePose, StereoView, TargetKind};
+use vergence_calibration_report::LeftOut;
 use vergence_protocol::AxisKind;
 use vergence_rig::{AxisPosition, Rig, RigAxis};
 
@@ -20,6 +21,9 @@ pub const FOLDER: &str = "folder";
 const SAME_STEPS: f64 = 2.0;
 /// Part of the range by which a reading may lie outside it: stages stop near an end, not on it.
 const OVERSHOOT: f64 = 0.01;
+
+/// The views of stage poses, and those left out.
+pub type StageViews = (Vec<StagePose>, Vec<LeftOut>);
 
 /// The stage poses of a set folder: the encoder readings of each, and the folder of its images.
 pub struct RecordedSet(Vec<(Vec<AxisPosition>, PathBuf)>);
@@ -39,25 +43,29 @@ impl RecordedSet {
         table.rows()?.into_iter().map(pose).collect::<Result<_, InputError>>().map(Self)
     }
 
-    /// Looks for the target in the images of each stage pose, and adds them to `hash`; `tell` is called with each event.
+    /// Looks for the target in the images of each stage pose, and adds them to `hash`; also returns the views left out. `tell` is
+    /// called with each event.
     ///
     /// # Errors
     /// [`InputError`] where images cannot be used; those of `tell`.
     pub fn stage_poses<E: From<InputError>>(
         self,
-        target: &TargetSpec,
+        target: &TargetKind,
         seen: (PairLenses<'_>, PairMasks<'_>),
         hash: &mut InputHash,
         tell: &mut impl FnMut(ViewEvent<'_>) -> Result<(), E>,
-    ) -> Result<Vec<StagePose>, E> {
-        let mut poses = Vec::new();
+    ) -> Result<StageViews, E> {
+        let (mut poses, mut left_out) = (Vec::new(), Vec::new());
         for (readings, folder) in self.0 {
             let images = |side: &str| [folder.join(format!("{side}*")).to_string_lossy().into_owned()];
             let (left, right) = (images("left"), images("right"));
-            let views = PairImages::named([&left, &right], tell)?.views(target, seen, hash, tell)?.0;
-            poses.push(StagePose { readings, views });
+            let found = PairImages::named([&left, &right], tell)?.views(target, seen, hash, tell)?;
+            poses.push(StagePose { readings, views: found.views });
+            let name = folder.file_name().unwrap_or_default().to_string_lossy().into_owned();
+            let of_folder = |one: LeftOut| LeftOut { view: format!("{name}/{}", one.view), ..one };
+            left_out.extend(found.left_out.into_iter().map(of_folder));
         }
-        Ok(poses)
+        Ok((poses, left_out))
     }
 }
 

@@ -5,8 +5,8 @@ use std::path::{Path, PathBuf};
 
 use image::imageops::grayscale;
 use rayon::prelude::*;
-use vergence_calibration::detect::{DetectError, detect};
-use vergence_calibration::{TargetSpec, TargetView};
+use vergence_calibration::detect::{DetectError, see};
+use vergence_calibration::{SeenTarget, TargetKind, TargetView};
 use vergence_calibration_report::ReportImage;
 use vergence_camera::{CameraError, read_image, read_mask};
 use vergence_vision::{BodyMask, ImageSize, KannalaBrandt};
@@ -18,8 +18,8 @@ use crate::image_files::name_of;
 pub struct TargetImages {
     /// Size of all images.
     pub size: ImageSize,
-    /// One entry for each image, in their order: the view, or why there is none.
-    pub views: Vec<Result<TargetView, Missed>>,
+    /// One entry for each image, in their order: the target as it is seen, or why it is not.
+    pub views: Vec<Result<SeenTarget, Missed>>,
     /// Every image that can be read, reduced for a report.
     pub images: Vec<ReportImage>,
 }
@@ -40,6 +40,8 @@ pub enum MissedReason {
     NoTarget(DetectError),
     /// The mask hides every corner.
     Hidden,
+    /// Part of the target is seen, and it is open which part.
+    Unplaced,
     /// The file is damaged.
     Damaged(String),
 }
@@ -48,6 +50,11 @@ impl fmt::Display for Missed {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match &self.reason {
             MissedReason::NoTarget(error) => write!(f, "{}: {error}", self.name),
+            MissedReason::Unplaced => write!(
+                f,
+                "{}: left out: part of the target is seen and may be any part of it, but a bow is one of the whole target",
+                self.name
+            ),
             MissedReason::Hidden => write!(f, "{}: the mask hides the whole target", self.name),
             MissedReason::Damaged(why) => write!(f, "{}: left out: {why}", self.name),
         }
@@ -58,7 +65,7 @@ impl TargetImages {
     /// The views in which a target was found.
     #[must_use]
     pub fn found(&self) -> Vec<TargetView> {
-        self.views.iter().flatten().cloned().collect()
+        self.views.iter().flatten().map(|seen| seen.view.clone()).collect()
     }
 
     /// These views; for images without one, the view of `other`, which is of the same images.
@@ -78,9 +85,11 @@ impl TargetImages {
 #[derive(Clone, Copy, Debug)]
 pub struct Sought<'a> {
     /// The target.
-    pub target: &'a TargetSpec,
+    pub target: &'a TargetKind,
     /// A camera that is roughly right: with it more corners are found, and better.
     pub hint: Option<&'a KannalaBrandt>,
+    /// Whether it counts where on the target the corners lie, as for its bow; not only how they lie to one another.
+    pub placed: bool,
     /// An image of what hides the view (see [`read_mask`]): no corner is taken there.
     pub mask: Option<&'a Path>,
 }
@@ -114,12 +123,12 @@ pub fn detect_in(files: &[PathBuf], sought: &Sought<'_>) -> Result<TargetImages,
 struct Looked {
     /// Width and height; `None` if the file is damaged.
     size: Option<(u32, u32)>,
-    view: Result<TargetView, Missed>,
+    view: Result<SeenTarget, Missed>,
     /// The image, reduced for a report; `None` if the file is damaged.
     reduced: Option<ReportImage>,
 }
 
-fn look(path: &Path, Sought { target, hint, mask }: &Sought<'_>) -> Result<Looked, InputError> {
+fn look(path: &Path, Sought { target, hint, placed, mask }: &Sought<'_>) -> Result<Looked, InputError> {
     let name = name_of(path);
     let image = match read_image(path) {
         Ok(image) => image,
@@ -133,15 +142,19 @@ fn look(path: &Path, Sought { target, hint, mask }: &Sought<'_>) -> Result<Looke
     let reduced = Some(ReportImage::new(&name, &grey));
     let (width, height) = image.dimensions();
     let mask = mask.map(|mask| read_mask(mask, ImageSize { width, height })).transpose()?;
-    let view = match detect(&grey, target, *hint) {
-        Ok(detection) => unhidden(detection.view(&name, target), mask.as_ref()),
+    let view = match see(&grey, target, *hint, &name) {
+        Ok(seen) if *placed && !seen.is_placed(target) => Err(Missed { name, reason: MissedReason::Unplaced }),
+        Ok(seen) => unhidden(seen, mask.as_ref()),
         Err(error) => Err(Missed { name, reason: MissedReason::NoTarget(error) }),
     };
     Ok(Looked { size: Some(image.dimensions()), view, reduced })
 }
 
 /// The view without the corners that a mask hides; none where it hides all.
-fn unhidden(mut view: TargetView, mask: Option<&BodyMask>) -> Result<TargetView, Missed> {
-    view.corners.retain(|corner| !mask.is_some_and(|mask| mask.hides(corner.pixel)));
-    if view.corners.is_empty() { Err(Missed { name: view.name, reason: MissedReason::Hidden }) } else { Ok(view) }
+fn unhidden(mut seen: SeenTarget, mask: Option<&BodyMask>) -> Result<SeenTarget, Missed> {
+    seen.view.corners.retain(|corner| !mask.is_some_and(|mask| mask.hides(corner.pixel)));
+    if seen.view.corners.is_empty() {
+        return Err(Missed { name: seen.view.name, reason: MissedReason::Hidden });
+    }
+    Ok(seen)
 }

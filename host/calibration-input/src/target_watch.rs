@@ -2,8 +2,8 @@
 
 use image::imageops::grayscale;
 use rayon::prelude::*;
-use vergence_calibration::detect::detect;
-use vergence_calibration::{Coverage, TargetSpec, TargetView};
+use vergence_calibration::detect::see;
+use vergence_calibration::{Coverage, TargetKind, TargetView};
 use vergence_camera::CameraImage;
 
 /// Largest motion of a corner between two images of a target that is held still, in pixels.
@@ -19,9 +19,8 @@ pub type TargetViews = Vec<TargetView>;
 
 /// Looks for the target in the images of one instant.
 #[must_use]
-pub fn observe(frames: &[CameraImage], target: &TargetSpec) -> TargetViews {
-    let view =
-        |frame: &CameraImage| Some(detect(&grayscale(&frame.image), target, None).ok()?.view(&frame.name, target));
+pub fn observe(frames: &[CameraImage], target: &TargetKind) -> TargetViews {
+    let view = |frame: &CameraImage| Some(see(&grayscale(&frame.image), target, None, &frame.name).ok()?.view);
     frames.par_iter().map(view).collect::<Option<_>>().unwrap_or_default()
 }
 

@@ -2,8 +2,10 @@
 
 use std::path::{Path, PathBuf};
 
-use vergence_calibration::{IntrinsicsOptions, StereoView, TargetSpec, TargetView, calibrate_intrinsics};
-use vergence_calibration_report::ReportImage;
+use vergence_calibration::{
+    IntrinsicsOptions, SeenTarget, StereoView, TargetKind, TargetView, calibrate_intrinsics, label_pairs,
+};
+use vergence_calibration_report::{LeftOut, ReportImage};
 use vergence_camera::{PairedFiles, paired};
 use vergence_vision::{KannalaBrandt, Side};
 
@@ -22,6 +24,8 @@ pub enum ViewEvent<'a> {
     Looked,
     /// This image gives no view.
     Missed(&'a Missed),
+    /// This pair of images is left out: its labels are open.
+    Unlabelled(&'a LeftOut),
     /// This image is left out: the other camera has none that belongs to it.
     Alone(&'a Path),
 }
@@ -68,8 +72,16 @@ pub type PairLenses<'a> = [&'a KannalaBrandt; 2];
 /// Images of what hides the view of the left and of the right camera, by their files.
 pub type PairMasks<'a> = [Option<&'a Path>; 2];
 
-/// Views of a pair, and all images of the left and of the right camera, reduced for a report.
-pub type PairViews = (Vec<StereoView>, [Vec<ReportImage>; 2]);
+/// Views of a pair.
+#[derive(Default)]
+pub struct PairViews {
+    /// The views in which both cameras see the target, under labels that agree.
+    pub views: Vec<StereoView>,
+    /// The views left out although both cameras see the target.
+    pub left_out: Vec<LeftOut>,
+    /// All images of the left and of the right camera, reduced for a report.
+    pub images: [Vec<ReportImage>; 2],
+}
 
 impl PairImages {
     /// The images that the patterns of the left and the right camera name, paired; `tell` hears of those without a partner.
@@ -94,14 +106,14 @@ impl PairImages {
     /// As [`views_in_images`]; images that are not of the lenses' sizes.
     pub fn views<E: From<InputError>>(
         &self,
-        target: &TargetSpec,
+        target: &TargetKind,
         (lenses, masks): (PairLenses<'_>, PairMasks<'_>),
         hash: &mut InputHash,
         tell: &mut impl FnMut(ViewEvent<'_>) -> Result<(), E>,
     ) -> Result<PairViews, E> {
         let [left_files, right_files] = &self.0;
         let [left_lens, right_lens] = lenses;
-        let sought = |lens, mask| Sought { target, hint: Some(lens), mask };
+        let sought = |lens, mask| Sought { target, hint: Some(lens), placed: false, mask };
         let left = views_in_images(left_files, sought(left_lens, masks[0]), hash, tell)?;
         let right = views_in_images(right_files, sought(right_lens, masks[1]), hash, tell)?;
         for (side, images, lens) in [(Side::Left, left.size, left_lens), (Side::Right, right.size, right_lens)] {
@@ -109,9 +121,21 @@ impl PairImages {
                 return Err(InputError::OtherSize { side, images, camera: lens.size() }.into());
             }
         }
-        let pairs = left.views.into_iter().zip(right.views);
-        let views = pairs.filter_map(|(left, right)| Some(stereo_view(left.ok()?, right.ok()?))).collect();
-        Ok((views, [left.images, right.images]))
+        let both = left.views.iter().zip(&right.views);
+        let seen: Vec<[&SeenTarget; 2]> =
+            both.filter_map(|(left, right)| left.as_ref().ok().zip(right.as_ref().ok())).map(Into::into).collect();
+        let mut found = PairViews::default();
+        for ([left, _], labelled) in seen.iter().zip(label_pairs(lenses, &seen)) {
+            match labelled {
+                Ok(view) => found.views.push(view),
+                Err(reason) => {
+                    let left_out = LeftOut { view: left.view.name.clone(), reason: reason.to_string() };
+                    tell(ViewEvent::Unlabelled(&left_out))?;
+                    found.left_out.push(left_out);
+                }
+            }
+        }
+        Ok(PairViews { images: [left.images, right.images], ..found })
     }
 }
 

@@ -27,8 +27,8 @@ mod stage;
 mod trunk;
 mod verdict;
 
-use vergence_calibration::{TargetSpec, Validation};
-use vergence_page::{Page, escape};
+use vergence_calibration::{TargetKind, Validation};
+use vergence_page::{Page, Row, escape, plain, section, table, text};
 use vergence_rig::Provenance;
 use vergence_vision::Angle;
 
@@ -37,7 +37,7 @@ pub use images::ReportImage;
 pub use intrinsics::{intrinsics_report, intrinsics_verdict};
 pub use result::{
     extrinsics_json, extrinsics_lines, fixed_pair, held_out_json, held_out_line, intrinsics_json, intrinsics_lines,
-    stage_json, stage_lines, trunk_json, trunk_lines,
+    left_out_json, stage_json, stage_lines, trunk_json, trunk_lines,
 };
 pub use stage::stage_report;
 pub use trunk::trunk_report;
@@ -58,6 +58,8 @@ pub struct ReportAbout {
     pub target: String,
     /// Half the field of the lens, if known. Coverage is measured against it, otherwise against the sensor's border.
     pub half_field: Option<Angle>,
+    /// Views that were left out before the calibration.
+    pub left_out: Vec<LeftOut>,
     /// Prediction error of held-out views, if that was tried.
     pub held_out: Option<Validation>,
     /// The images of the left or only camera, and of the right, in which the target was looked for; may be empty.
@@ -68,11 +70,8 @@ impl ReportAbout {
     /// The heading of a report: title, origin and target; without a target the corners came from a file. `half_field` is half
     /// the field of the lens by its data sheet.
     #[must_use]
-    pub fn new(title: String, target: Option<&TargetSpec>, provenance: &Provenance, half_field: Option<Angle>) -> Self {
-        let target = target.map_or_else(
-            || "as in the corner file".into(),
-            |spec| format!("{} × {} inner corners, {}", spec.columns, spec.rows, spec.square),
-        );
+    pub fn new(title: String, target: Option<&TargetKind>, provenance: &Provenance, half_field: Option<Angle>) -> Self {
+        let target = target.map_or_else(|| "as in the corner file".into(), ToString::to_string);
         Self {
             title,
             program_version: provenance.program.clone(),
@@ -85,8 +84,34 @@ impl ReportAbout {
     }
 }
 
+/// A view that was left out before the calibration.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct LeftOut {
+    /// Name of the view.
+    pub view: String,
+    /// Why it is left out, as the end of a sentence.
+    pub reason: String,
+}
+
+impl std::fmt::Display for LeftOut {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        write!(f, "{}: left out: {}", self.view, self.reason)
+    }
+}
+
+/// The views that were left out, for a report.
+fn left_out_section(left_out: &[LeftOut]) -> String {
+    if left_out.is_empty() {
+        return String::new();
+    }
+    let row = |left_out: &LeftOut| plain(vec![text(&left_out.view), text(&left_out.reason)]);
+    let rows: Vec<Row> = left_out.iter().map(row).collect();
+    section("Views left out before the calibration", &table(&["View", "Reason"], &rows))
+}
+
 /// Whole page of a report; `body` is HTML.
 fn page(kind: &'static str, about: &ReportAbout, body: String) -> String {
+    let body = body + &left_out_section(&about.left_out);
     let origin = vec![
         ("Made by", about.program_version.clone()),
         ("Date", about.date.clone()),

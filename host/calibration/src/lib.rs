@@ -3,12 +3,14 @@
 //!
 //! Everything is a pure function of its arguments: images and corners in, calibrations with covariance out.
 
+mod april_grid;
 mod arun;
 mod coverage;
 pub mod detect;
 mod extrinsics;
 mod fit_check;
 mod intrinsics;
+mod labelling;
 mod lens_difference;
 mod planar_pose;
 mod reprojection;
@@ -21,17 +23,20 @@ mod trunk;
 mod uncertainty;
 mod validation;
 
+pub use april_grid::AprilGridSpec;
 pub use arun::{ArunError, fit_rotation_translation};
 pub use coverage::{Advice, Coverage};
 pub use extrinsics::{
-    ExtrinsicsCalibration, ExtrinsicsError, ExtrinsicsOptions, FEWEST_VIEWS, LensKnowledge, RelativePose, Side,
-    SkippedView, StereoOutlier, StereoOutlierReason, StereoView, StereoViewFigures, calibrate_extrinsics,
+    ExtrinsicsCalibration, ExtrinsicsError, ExtrinsicsOptions, FEWEST_VIEWS, LabelError, LensKnowledge, RelativePose,
+    Side, SkippedView, StereoOutlier, StereoOutlierReason, StereoView, StereoViewFigures, calibrate_extrinsics,
+    label_pairs,
 };
 pub use fit_check::{Unfit, check_fit};
 pub use intrinsics::{
     IntrinsicsCalibration, IntrinsicsError, IntrinsicsOptions, Outlier, OutlierReason, Parameter, Reprojection,
     TargetWarp, ViewFigures, ViewPose, calibrate_intrinsics, refine_intrinsics, reproject,
 };
+pub use labelling::{Relabelling, SeenTarget};
 pub use lens_difference::{LensDifference, LensDifferenceError};
 pub use planar_pose::{PoseError, TargetPose, target_pose};
 pub use robust::{Loss, median};
@@ -40,7 +45,7 @@ pub use stage::{
     StageOptions, StagePose, StagePoseFigures, Tolerance, WeakDirection, ZeroOffset, calibrate_stage,
 };
 pub use stage_plan::stage_plan;
-pub use target::{Corner, Target, TargetSpec, TargetView};
+pub use target::{Corner, Target, TargetKind, TargetPrint, TargetSpec, TargetView};
 pub use trunk::{
     PlayFound, TrunkCalibration, TrunkParameterFigures, TrunkPoseFigures, calibrate_trunk, largest_trunk_sigma,
     validate_trunk,

@@ -1,6 +1,10 @@
 //! Calibration targets and their observed corners.
 
+use std::fmt;
+
 use vergence_vision::{Frame, Length, Pixel};
+
+use crate::AprilGridSpec;
 
 /// The frame of a target: x along its rows of corners, y along its columns, the target is the plane z = 0.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -17,6 +21,24 @@ pub struct TargetSpec {
     pub rows: u32,
     /// Side of a square.
     pub square: Length,
+}
+
+/// A calibration target of one of the kinds that are detected.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum TargetKind {
+    /// A chessboard.
+    Chessboard(TargetSpec),
+    /// A grid of AprilTags, as Kalibr prints it.
+    AprilGrid(AprilGridSpec),
+}
+
+/// A target as it is printed.
+#[derive(Clone, Debug, PartialEq)]
+pub struct TargetPrint {
+    /// Black rectangles: x, y, width and height in millimetres, from the upper left corner of the white border.
+    pub black: Vec<[f64; 4]>,
+    /// Width and height with the white border that the detector needs, in millimetres.
+    pub size_mm: [f64; 2],
 }
 
 /// One corner of a target, observed in an image.
@@ -66,5 +88,52 @@ impl TargetSpec {
     pub fn corner_mm(&self, index: u32) -> [f64; 2] {
         let columns = self.columns.max(1);
         [index % columns, index / columns].map(|n| f64::from(n) * self.square.mm())
+    }
+}
+
+impl fmt::Display for TargetKind {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Chessboard(TargetSpec { columns, rows, square }) => {
+                write!(f, "{columns} × {rows} inner corners, {square}")
+            }
+            Self::AprilGrid(AprilGridSpec { columns, rows, tag, spacing }) => {
+                write!(f, "{columns} × {rows} AprilTags of {tag}, spacing {spacing}")
+            }
+        }
+    }
+}
+
+impl TargetKind {
+    /// The length that a person measures: the side of a square or of a tag.
+    #[must_use]
+    pub const fn side(&self) -> Length {
+        match self {
+            Self::Chessboard(board) => board.square,
+            Self::AprilGrid(grid) => grid.tag,
+        }
+    }
+
+    /// The target as it is printed.
+    #[must_use]
+    pub fn print(&self) -> TargetPrint {
+        match self {
+            Self::Chessboard(board) => board.print(),
+            Self::AprilGrid(grid) => grid.print(),
+        }
+    }
+}
+
+impl TargetSpec {
+    /// Squares, the upper left one black, and white of half a square around them.
+    fn print(&self) -> TargetPrint {
+        let side = self.square.mm();
+        let squares = (0..=self.rows).flat_map(|row| (0..=self.columns).map(move |column| (column, row)));
+        let place = |squares: u32| side * (f64::from(squares) + 0.5);
+        let black = squares.filter(|(column, row)| (column + row).is_multiple_of(2));
+        TargetPrint {
+            black: black.map(|(column, row)| [place(column), place(row), side, side]).collect(),
+            size_mm: [self.columns, self.rows].map(|corners| side * (f64::from(corners) + 2.0)),
+        }
     }
 }

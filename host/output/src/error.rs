@@ -3,7 +3,6 @@
 use std::path::PathBuf;
 
 use vergence_files::FileError;
-use vergence_vision::Length;
 
 use crate::target_sheet::Paper;
 
@@ -35,23 +34,16 @@ pub enum OutputError {
     /// The name of a folder has the ending of a file.
     #[error("{}: a folder is written here, not a file: choose a name without an ending", .0.display())]
     NotAFolder(PathBuf),
-    /// A square of a chessboard has no size.
-    #[error("squares cannot have a side of {0}: give a positive length")]
-    Square(Length),
-    /// A chessboard does not fit on its sheet.
+    /// A target does not fit on its sheet.
     #[error(
-        "{columns}x{rows} corners of {side} mm need {:.0} x {:.0} mm with their border, and {paper} has {:.0} x {:.0} mm: \
-         choose smaller squares or a larger sheet",
+        "{target} need {:.0} x {:.0} mm with their border, and {paper} has {:.0} x {:.0} mm: choose a smaller target or a \
+         larger sheet",
         needed.0, needed.1, size.0, size.1
     )]
     SmallSheet {
-        /// Inner corners in a row.
-        columns: u32,
-        /// Rows of inner corners.
-        rows: u32,
-        /// Side of a square, in millimetres.
-        side: f64,
-        /// Width and height that the board needs with its border, in millimetres.
+        /// The target.
+        target: String,
+        /// Width and height that the target needs with its border, in millimetres.
         needed: (f64, f64),
         /// The sheet.
         paper: Paper,

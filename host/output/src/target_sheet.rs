@@ -1,20 +1,16 @@
-//! A sheet of paper with a chessboard, as SVG and as PDF: both in true size.
+//! A sheet of paper with a calibration target, as SVG and as PDF: both in true size.
 
 use std::fmt::Write;
 
-use vergence_vision::Length;
-
 use crate::error::OutputError;
 
-/// A chessboard in the middle of a sheet. All lengths are millimetres, from the top left corner of the sheet.
+/// A printed target in the middle of a sheet, and a ruler. All lengths are millimetres, from the top left corner of the sheet.
 #[derive(Clone, Debug)]
 pub struct Sheet {
     /// Width and height of the sheet.
     pub size: (f64, f64),
-    /// Squares side by side: columns and rows.
-    pub squares: (u32, u32),
-    /// Side of a square.
-    pub side: f64,
+    /// Black rectangles of the target: left, top, width, height.
+    pub black: Vec<[f64; 4]>,
     /// What is printed at the lower edge.
     pub label: String,
 }
@@ -22,30 +18,26 @@ pub struct Sheet {
 /// Height of the label's letters, and how far its base line is above the lower edge.
 const LETTERS: f64 = 3.0;
 const LABEL_ABOVE: f64 = 2.0;
+/// Distance of the label and the ruler from the sides of the sheet.
+const ASIDE: f64 = 10.0;
+/// Length of the ruler, and height and width of its marks, of which one is at every centimetre.
+const RULER: f64 = 100.0;
+const MARK: [f64; 2] = [2.0, 0.2];
 
 impl Sheet {
-    /// A chessboard with so many inner corners (columns, rows) and squares of the side `square` on `paper`, with the white
-    /// border that detectors need.
+    /// A target of the black rectangles `black` (left, top, width, height), which with its white border is `needed` wide and
+    /// high, on `paper`. `label` names it, in ASCII letters.
     ///
     /// # Errors
-    /// [`OutputError::Square`] where the square has no size, [`OutputError::SmallSheet`] where the board does not fit.
-    pub fn with_target(paper: Paper, (columns, rows): (u32, u32), square: Length) -> Result<Self, OutputError> {
+    /// [`OutputError::SmallSheet`] where the target does not fit.
+    pub fn with_target(paper: Paper, black: &[[f64; 4]], needed: [f64; 2], label: String) -> Result<Self, OutputError> {
         let (width, height) = paper.size();
-        let side = square.mm();
-        if side.is_nan() || side <= 0.0 {
-            return Err(OutputError::Square(square));
+        if needed[0] > width || needed[1] > height {
+            return Err(OutputError::SmallSheet { target: label, needed: needed.into(), paper, size: (width, height) });
         }
-        // The squares around the inner corners, and a white border of half a square.
-        let needed = (side * (f64::from(columns) + 2.0), side * (f64::from(rows) + 2.0));
-        if needed.0 > width || needed.1 > height {
-            return Err(OutputError::SmallSheet { columns, rows, side, needed, paper, size: (width, height) });
-        }
-        Ok(Self {
-            size: (width, height),
-            squares: (columns + 1, rows + 1),
-            side,
-            label: format!("{columns}x{rows} inner corners, {side} mm squares"),
-        })
+        let (left, top) = (0.5 * (width - needed[0]), 0.5 * (height - needed[1]));
+        let black = black.iter().map(|[x, y, width, height]| [left + x, top + y, *width, *height]).collect();
+        Ok(Self { size: (width, height), black, label })
     }
 
     /// The sheet as SVG.
@@ -56,16 +48,20 @@ impl Sheet {
             "<svg xmlns=\"http://www.w3.org/2000/svg\" width=\"{width}mm\" height=\"{height}mm\" viewBox=\"0 0 {width} {height}\">\n\
              <rect width=\"{width}\" height=\"{height}\" fill=\"white\"/>\n<g fill=\"black\" shape-rendering=\"crispEdges\">\n"
         );
-        let side = self.side;
-        for (x, y) in self.black() {
-            let _ = writeln!(text, "<rect x=\"{x}\" y=\"{y}\" width=\"{side}\" height=\"{side}\"/>");
-        }
+        let write = |text: &mut String, rectangles: &[[f64; 4]]| {
+            for rectangle in rectangles {
+                let [x, y, width, height] = rectangle.map(in_print);
+                let _ = writeln!(text, "<rect x=\"{x}\" y=\"{y}\" width=\"{width}\" height=\"{height}\"/>");
+            }
+        };
+        write(&mut text, &self.black);
+        text.push_str("</g>\n<g fill=\"#888\">\n");
+        write(&mut text, &self.ruler());
         let _ = writeln!(
             text,
-            "</g>\n<text x=\"{}\" y=\"{}\" font-family=\"sans-serif\" font-size=\"{LETTERS}\" fill=\"#888\">{}</text>\n</svg>",
-            self.left(),
+            "</g>\n<text x=\"{ASIDE}\" y=\"{}\" font-family=\"sans-serif\" font-size=\"{LETTERS}\" fill=\"#888\">{}</text>\n</svg>",
             height - LABEL_ABOVE,
-            self.label
+            self.text()
         );
         text
     }
@@ -78,16 +74,16 @@ impl Sheet {
         let (width, height) = self.size;
         // Millimetres from here on; y points upwards.
         let mut drawing = format!("{POINTS_PER_MM:.9} 0 0 {POINTS_PER_MM:.9} 0 0 cm\n0 g\n");
-        for (x, y) in self.black() {
-            let _ = writeln!(drawing, "{x:.3} {:.3} {side:.3} {side:.3} re", height - y - self.side, side = self.side);
-        }
+        let write = |drawing: &mut String, rectangles: &[[f64; 4]]| {
+            for [x, y, wide, high] in rectangles {
+                let _ = writeln!(drawing, "{x:.3} {:.3} {wide:.3} {high:.3} re", height - y - high);
+            }
+        };
+        write(&mut drawing, &self.black);
+        drawing.push_str("f\n0.53 g\n");
+        write(&mut drawing, &self.ruler());
         // A string holds no parentheses or backslashes unless escaped; the label has none.
-        let _ = write!(
-            drawing,
-            "f\n0.53 g\nBT /F1 {LETTERS} Tf {:.3} {LABEL_ABOVE} Td ({}) Tj ET",
-            self.left(),
-            self.label
-        );
+        let _ = write!(drawing, "f\nBT /F1 {LETTERS} Tf {ASIDE} {LABEL_ABOVE} Td ({}) Tj ET", self.text());
         let page = format!(
             "<< /Type /Page /Parent 2 0 R /MediaBox [0 0 {:.3} {:.3}] /Contents 4 0 R /Resources << /Font << /F1 5 0 R >> >> >>",
             width * POINTS_PER_MM,
@@ -102,19 +98,23 @@ impl Sheet {
         ])
     }
 
-    /// Top left corners of the black squares.
-    fn black(&self) -> impl Iterator<Item = (f64, f64)> {
-        let (columns, rows) = self.squares;
-        let (left, top, side) = (self.left(), (self.size.1 - self.side * f64::from(rows)) / 2.0, self.side);
-        let places = (0..rows).flat_map(move |row| (0..columns).map(move |column| (row, column)));
-        places
-            .filter(|(row, column)| (row + column).is_multiple_of(2))
-            .map(move |(row, column)| (left + side * f64::from(column), top + side * f64::from(row)))
+    fn text(&self) -> String {
+        format!("{}; the ruler is {RULER} mm long", self.label)
     }
 
-    fn left(&self) -> f64 {
-        (self.size.0 - self.side * f64::from(self.squares.0)) / 2.0
+    /// A line with marks at the lower edge, on the right.
+    fn ruler(&self) -> Vec<[f64; 4]> {
+        let [high, thick] = MARK;
+        let (left, bottom) = (self.size.0 - ASIDE - RULER, self.size.1 - LABEL_ABOVE);
+        // The marks' outer edges at both ends are the length apart.
+        let marks = (0..=10).map(|mark| [left + f64::from(mark) * (RULER - thick) / 10.0, bottom - high, thick, high]);
+        [[left, bottom - thick, RULER, thick]].into_iter().chain(marks).collect()
     }
+}
+
+/// A length as it is written: without the rounding of its last digits.
+fn in_print(mm: f64) -> f64 {
+    (mm * 1e6).round() / 1e6
 }
 
 /// A sheet of ISO 216 whose long side lies across.
@@ -195,13 +195,17 @@ mod tests {
     use super::*;
 
     fn sheet() -> Sheet {
-        Sheet { size: (297.0, 210.0), squares: (10, 7), side: 25.0, label: "9x6 inner corners".into() }
+        let squares = (0..7).flat_map(|row| (0..10).map(move |column| (column, row)));
+        let black = squares.filter(|(column, row)| (column + row) % 2 == 0);
+        let black: Vec<_> =
+            black.map(|(x, y)| [25.0 * f64::from(x) + 12.5, 25.0 * f64::from(y) + 12.5, 25.0, 25.0]).collect();
+        Sheet::with_target(Paper::A4, &black, [275.0, 200.0], "9x6 inner corners".into()).unwrap()
     }
 
     #[test]
     fn the_pdf_has_every_black_square_and_a_table_that_is_right() {
         let file = String::from_utf8(sheet().pdf()).unwrap();
-        let squares: Vec<&str> = file.lines().filter(|line| line.ends_with(" re")).collect();
+        let squares: Vec<&str> = file.lines().filter(|line| line.ends_with("25.000 re")).collect();
         assert_eq!(squares.len(), 35);
         // The first square: 23.5 mm from the left, 17.5 mm from the top.
         assert_eq!(squares[0], "23.500 167.500 25.000 25.000 re");
@@ -218,6 +222,8 @@ mod tests {
 
     #[test]
     fn both_formats_have_the_same_squares() {
-        assert_eq!(sheet().svg().matches("<rect x=").count(), 35);
+        let svg = sheet().svg();
+        assert_eq!(svg.matches("width=\"25\" height=\"25\"").count(), 35);
+        assert_eq!(svg.matches("width=\"100\"").count(), 1, "the ruler");
     }
 }

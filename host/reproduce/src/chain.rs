@@ -94,7 +94,7 @@ fn own_calibration(
     tally: &mut Tally,
 ) -> Result<IntrinsicsCalibration, ReproduceError> {
     let nowhere = Transform::<Left, Right>::new(UnitQuaternion::identity(), Vector3::zeros());
-    let held = HeldTarget { left: *lens, right: (*lens, nowhere), both: false, target: scene_target(), seed };
+    let held = HeldTarget { left: *lens, right: (*lens, nowhere), both: false, target: scene_target().into(), seed };
     let photos: Vec<Option<Photo>> = (0..OWN_VIEWS)
         .into_par_iter()
         .map(|index| {
@@ -127,7 +127,7 @@ fn shared_views(
     tally: &mut Tally,
 ) -> Vec<StereoView> {
     let (left, right) = (bench.built.left_camera, bench.built.right_camera);
-    let held = HeldTarget { left, right: (right, *left_from_right), both: true, target: scene_target(), seed };
+    let held = HeldTarget { left, right: (right, *left_from_right), both: true, target: scene_target().into(), seed };
     let seen: Vec<[Option<FoundCorners>; 2]> = (0..SHARED_VIEWS)
         .into_par_iter()
         .filter_map(|index| {

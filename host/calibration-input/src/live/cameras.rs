@@ -1,10 +1,11 @@
 //! The cameras of a rig that drives itself, attached or simulated.
 
 use vergence_board::Shared;
-use vergence_calibration::TargetSpec;
+use vergence_calibration::detect::TAG_BORDER;
+use vergence_calibration::{AprilGridSpec, TargetKind, TargetSpec};
 use vergence_camera::Camera;
 use vergence_rig::Rig;
-use vergence_scene::Target;
+use vergence_scene::{Sheet, TagGrid, TagPrint, Target};
 use vergence_sim::{HeldTarget, SimulatedRig, TargetCamera};
 use vergence_vision::Side;
 
@@ -23,9 +24,23 @@ pub struct SimulatedTarget {
     /// The rig as it was really built.
     pub built: Rig,
     /// The target that is held.
-    pub target: TargetSpec,
+    pub target: TargetKind,
     /// Seed of the places of the target, and of the noise.
     pub seed: u64,
+}
+
+/// The target as the simulated cameras see it.
+#[must_use]
+pub fn printed(target: &TargetKind) -> Sheet {
+    match *target {
+        TargetKind::AprilGrid(grid) => {
+            let family = AprilGridSpec::FAMILY;
+            let code = TagPrint { side: family.side, border: TAG_BORDER, codes: family.codes };
+            let gap = grid.tag * grid.spacing;
+            Sheet::Tags(TagGrid { columns: grid.columns, rows: grid.rows, tag: grid.tag, gap, code })
+        }
+        TargetKind::Chessboard(TargetSpec { columns, rows, square }) => Target { columns, rows, square }.into(),
+    }
 }
 
 impl RigCameras {
@@ -47,12 +62,11 @@ impl RigCameras {
 
 impl SimulatedTarget {
     fn cameras(&self, index: usize) -> Vec<Box<dyn Camera>> {
-        let TargetSpec { columns, rows, square } = self.target;
         let held = HeldTarget {
             left: self.built.left_camera,
             right: (self.built.right_camera, self.rig.lock().true_pose().left_from_right),
             both: true,
-            target: Target { columns, rows, square },
+            target: printed(&self.target),
             // Another seed for each stage pose, so that the target is held elsewhere.
             seed: self.seed.wrapping_mul(1009).wrapping_add(index as u64),
         };

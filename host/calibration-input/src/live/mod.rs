@@ -7,12 +7,12 @@ use std::cell::Cell;
 use std::path::Path;
 
 use vergence_board::{Board, BoardError};
-use vergence_calibration::TargetSpec;
+use vergence_calibration::TargetKind;
 use vergence_files::{FileError, make_folder, write_whole};
 use vergence_protocol::Mode;
 use vergence_rig::{AxisPosition, Rig, RigAxis, positions_in_words};
 
-pub use self::cameras::{RigCameras, SimulatedTarget};
+pub use self::cameras::{RigCameras, SimulatedTarget, printed};
 
 use crate::InputError;
 use crate::recorded::{FOLDER, POSES};
@@ -25,7 +25,7 @@ pub struct LiveSet<'a> {
     /// Folder of the set.
     pub folder: &'a Path,
     /// The target that is shown.
-    pub target: TargetSpec,
+    pub target: TargetKind,
     /// The nominal rig.
     pub nominal: &'a Rig,
     /// Number of views at each stage pose.

@@ -3,7 +3,7 @@
 use rayon::prelude::*;
 use tokio::task::spawn_blocking;
 use vergence_board::{Board, BoardError};
-use vergence_calibration::{Coverage, TargetSpec};
+use vergence_calibration::{Coverage, TargetKind};
 use vergence_camera::{Camera, CameraError, CameraImage};
 use vergence_files::{make_folder, write_png};
 use vergence_rig::AxisPosition;
@@ -100,7 +100,7 @@ impl LiveSet<'_> {
 /// Takes one image with each camera and looks for the target in them, on a thread of its own: the link must not wait.
 async fn look(
     mut cameras: Vec<Box<dyn Camera>>,
-    target: TargetSpec,
+    target: TargetKind,
 ) -> Result<(Vec<Box<dyn Camera>>, Vec<CameraImage>, TargetViews), InputError> {
     let looked = spawn_blocking(move || {
         let grab = |camera: &mut Box<dyn Camera>| camera.grab()?.ok_or(CameraError::Ended);

@@ -13,7 +13,7 @@ pub use self::intrinsics::{intrinsics_json, intrinsics_lines};
 pub use self::stage::{stage_json, stage_lines};
 pub(crate) use self::trunk::{in_unit, play_in_words, unit};
 pub use self::trunk::{trunk_json, trunk_lines};
-use crate::Verdict;
+use crate::{LeftOut, Verdict};
 
 /// A line that says how well held-out views are predicted; `None` where none were held out.
 #[must_use]
@@ -29,6 +29,12 @@ pub fn held_out_json(validation: Option<&Validation>) -> Value {
     let views: Vec<_> =
         views.iter().map(|view| json!({ "name": view.view, "corners": view.corners, "rms_px": view.rms_px })).collect();
     json!({ "folds": folds, "rms_px": rms_px, "views": views })
+}
+
+/// Views that were left out before a calibration, for programs.
+#[must_use]
+pub fn left_out_json(left_out: &[LeftOut]) -> Value {
+    left_out.iter().map(|left_out| json!({ "view": left_out.view, "reason": left_out.reason })).collect()
 }
 
 impl Verdict {

@@ -7,24 +7,31 @@
 //! 3. if the camera is known, at least roughly, each corner is refined again along edges bent by its distortion;
 //! 4. corners that do not fit a smooth image of a target are flagged (`blunders`);
 //! 5. the patch is placed on the target: which corner is the first (`placement`).
+//!
+//! Grids of AprilTags have a search of their own ([`detect_april_grid`]), and the same refinement.
 
+mod april_grid;
 mod blunders;
 mod grow;
 mod intensity;
 mod lattice;
 mod placement;
+mod plane;
 mod predict;
 mod refine;
 mod saddle;
 mod search;
+mod tags;
 
 use image::GrayImage;
 use vergence_vision::{KannalaBrandt, Pixel};
 
-use crate::{Corner, TargetSpec, TargetView};
+use crate::{Corner, Relabelling, SeenTarget, TargetKind, TargetSpec, TargetView};
+pub use april_grid::detect_april_grid;
 use intensity::Intensity;
-use lattice::Lattice;
+use placement::Placed;
 pub use placement::Placement;
+pub use tags::{BORDER as TAG_BORDER, ReadCode, TagFamily};
 
 /// Fewest corners taken for a target. Four determine a pose; a dozen in a grid are no coincidence.
 const FEWEST_CORNERS: usize = 12;
@@ -41,6 +48,9 @@ pub struct Detection {
     pub complete: bool,
     /// Whether the labels hold beyond this image.
     pub placement: Placement,
+    /// All labellings that the image allows, as changes of the labels above. One of them changes nothing; it is the only one
+    /// where the placement is unique.
+    pub labellings: Vec<Relabelling>,
 }
 
 /// One corner of a target in an image.
@@ -97,6 +107,24 @@ pub enum DetectError {
         /// Corners of the largest grid in the image.
         found: usize,
     },
+    /// Grids of so many tags cannot be detected.
+    #[error(
+        "a grid of {columns} × {rows} tags cannot be detected: it takes 1 to 587 tags, of a size, with gaps of up to a side"
+    )]
+    UnusableGrid {
+        /// Tags along x.
+        columns: u32,
+        /// Tags along y.
+        rows: u32,
+    },
+    /// The image shows too few tags of the grid.
+    #[error(
+        "no grid of tags found: {found} tags of it, at least 3 are needed; show more of the target, sharper or closer"
+    )]
+    NoTags {
+        /// Number of tags found.
+        found: usize,
+    },
     /// The image shows a chessboard of another size.
     #[error(
         "the chessboard in the image shows {} × {} inner corners, which does not fit one of {} × {}: \
@@ -135,13 +163,38 @@ pub fn detect(image: &GrayImage, target: &TargetSpec, hint: Option<&KannalaBrand
         refine::refine_all(&mut lattice, &intensity, hint);
     }
     blunders::flag(&mut lattice, hint);
-    let (turned, placement) = placement::place(&lattice, &intensity, hint, [columns, rows])?;
-    Ok(Detection::new(&turned, placement, target))
+    let placed = placement::place(&lattice, &intensity, hint, [columns, rows])?;
+    Ok(Detection::new(placed, target))
+}
+
+/// The good corners of `target` in `image`, which is called `name`, with all labellings that the image allows. `hint` is a
+/// camera calibrated roughly, if there is one, as for [`detect`].
+///
+/// # Errors [`DetectError`] if the image shows no such target.
+pub fn see(
+    image: &GrayImage,
+    target: &TargetKind,
+    hint: Option<&KannalaBrandt>,
+    name: &str,
+) -> Result<SeenTarget, DetectError> {
+    match target {
+        TargetKind::Chessboard(board) => Ok(detect(image, board, hint)?.seen(name, board)),
+        TargetKind::AprilGrid(grid) => {
+            let corners = detect_april_grid(image, grid, hint)?;
+            let corner = |corner: DetectedCorner| Corner {
+                target_mm: grid.corner_mm(corner.index),
+                pixel: corner.pixel,
+                relative_sigma: corner.sigma_px,
+            };
+            let view = TargetView { name: name.to_owned(), corners: corners.into_iter().map(corner).collect() };
+            Ok(SeenTarget::certain(view, grid.tag))
+        }
+    }
 }
 
 impl Detection {
     /// Detection from a lattice whose nodes are columns and rows of the target.
-    fn new(lattice: &Lattice, placement: Placement, target: &TargetSpec) -> Self {
+    fn new(Placed { lattice, placement, labellings }: Placed, target: &TargetSpec) -> Self {
         let mut corners: Vec<_> = lattice
             .iter()
             .map(|(&[column, row], found)| DetectedCorner {
@@ -154,7 +207,14 @@ impl Detection {
             .collect();
         corners.sort_by_key(|corner| corner.index);
         let good = corners.iter().filter(|corner| corner.quality == CornerQuality::Good).count();
-        Self { corners, complete: good as u64 == u64::from(target.columns) * u64::from(target.rows), placement }
+        let complete = good as u64 == u64::from(target.columns) * u64::from(target.rows);
+        Self { corners, complete, placement, labellings }
+    }
+
+    /// The good corners with all labellings that the image allows.
+    #[must_use]
+    pub fn seen(&self, name: &str, target: &TargetSpec) -> SeenTarget {
+        SeenTarget { view: self.view(name, target), labellings: self.labellings.clone(), pitch: target.square }
     }
 
     /// The good corners as a view for calibration.

@@ -11,6 +11,7 @@ use super::intensity::Intensity;
 use super::lattice::{Lattice, Node, SIDES};
 use super::predict::Predictor;
 use super::saddle::{Quadrants, polarity};
+use crate::labelling::{Relabelling, turned};
 
 /// How certain the corner labels of a detection are beyond its own image.
 ///
@@ -20,9 +21,8 @@ use super::saddle::{Quadrants, polarity};
 /// one whose x axis points most to the right in the image and whose y axis most down is taken.
 ///
 /// One image's corners agree among themselves in every case, which is all that intrinsics need. Two cameras' views of
-/// a target may be paired by index where both are [`Unique`](Self::Unique); where either is
-/// [`HalfTurn`](Self::HalfTurn), only if both cameras stand upright about the same way and the target is not near the
-/// quarter turn.
+/// a target may be paired by index where both are [`Unique`](Self::Unique) only; for the others
+/// [`label_pairs`](crate::label_pairs) compares all labellings that the images allow.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum Placement {
@@ -34,31 +34,16 @@ pub enum Placement {
     Shifted,
 }
 
-/// A placement of a patch on a target: turn by quarters, then shift.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-struct Way {
-    quarters: usize,
-    shift: Node,
+/// A patch placed on a target.
+pub struct Placed {
+    /// The patch with columns and rows of the target as nodes.
+    pub lattice: Lattice,
+    pub placement: Placement,
+    /// All labellings that the image allows, as changes of the labels in `lattice`; one of them changes nothing.
+    pub labellings: Vec<Relabelling>,
 }
 
-impl Way {
-    fn label(self, node: Node) -> Node {
-        let [i, j] = turned(node, self.quarters);
-        [i + self.shift[0], j + self.shift[1]]
-    }
-}
-
-/// `node` after `quarters` of a turn that takes the first axis to the second.
-fn turned([i, j]: Node, quarters: usize) -> Node {
-    match quarters % 4 {
-        0 => [i, j],
-        1 => [-j, i],
-        2 => [-i, -j],
-        _ => [j, -i],
-    }
-}
-
-/// The lattice with columns and rows of the target of `size` as nodes, and how certain they are.
+/// The lattice placed on the target of `size`.
 ///
 /// # Errors [`DetectError::WrongSize`] if it does not fit on the target.
 pub fn place(
@@ -66,7 +51,7 @@ pub fn place(
     image: &Intensity<'_>,
     hint: Option<&KannalaBrandt>,
     size: [u32; 2],
-) -> Result<(Lattice, Placement), DetectError> {
+) -> Result<Placed, DetectError> {
     let predictor = Predictor::new(lattice, hint);
     let [low, high] = lattice.bounds().ok_or(DetectError::NoTarget { found: 0 })?;
     let patch = Patch {
@@ -94,7 +79,8 @@ pub fn place(
         (_, true) => Placement::HalfTurn,
         _ => Placement::Shifted,
     };
-    Ok((lattice.relabelled(|node| best.label(node)), placement))
+    let labellings = ways.iter().map(|way| best.inverse().then(*way)).collect();
+    Ok(Placed { lattice: lattice.relabelled(|node| best.node(node)), placement, labellings })
 }
 
 /// Properties of a patch that determine its placement.
@@ -113,7 +99,7 @@ impl Patch {
         [0, 1].map(|axis| self.high[axis] - self.low[axis] + 1)
     }
 
-    fn ways(&self, size: [u32; 2]) -> Vec<Way> {
+    fn ways(&self, size: [u32; 2]) -> Vec<Relabelling> {
         let size = size.map(u32::cast_signed);
         let mut ways = Vec::new();
         for quarters in 0..4 {
@@ -122,7 +108,7 @@ impl Patch {
             let high = [a[0].max(b[0]), a[1].max(b[1])];
             for column in -low[0]..size[0] - high[0] {
                 for row in -low[1]..size[1] - high[1] {
-                    let way = Way { quarters, shift: [column, row] };
+                    let way = Relabelling { quarters, shift: [column, row] };
                     if self.ends_agree(way, size) && self.colours_agree(way, size) {
                         ways.push(way);
                     }
@@ -133,10 +119,10 @@ impl Patch {
     }
 
     /// Whether the target ends where its squares end along `way`.
-    fn ends_agree(&self, way: Way, size: [i32; 2]) -> bool {
+    fn ends_agree(&self, way: Relabelling, size: [i32; 2]) -> bool {
         SIDES.iter().zip(self.ends).filter(|(_, ends)| *ends).all(|(&side, _)| {
             let outward = turned(side, way.quarters);
-            let [a, b] = [self.low, self.high].map(|node| way.label(node));
+            let [a, b] = [self.low, self.high].map(|node| way.node(node));
             (0..2).all(|axis| match outward[axis] {
                 1 => a[axis].max(b[axis]) == size[axis] - 1,
                 -1 => a[axis].min(b[axis]) == 0,
@@ -147,10 +133,10 @@ impl Patch {
 
     /// Above and to the left of corner (0, 0) is black. That is a choice of labels where turning the target changes
     /// that colour; where it does not, targets are printed either way, and the colours tell nothing.
-    fn colours_agree(&self, way: Way, size: [i32; 2]) -> bool {
+    fn colours_agree(&self, way: Relabelling, size: [i32; 2]) -> bool {
         let [columns_odd, rows_odd] = size.map(|n| n % 2 != 0);
         let colours_tell = columns_odd != rows_odd || (size[0] == size[1] && columns_odd);
-        let [i, j] = way.label([0, 0]);
+        let [i, j] = way.node([0, 0]);
         // A quarter turn brings a square of the other colour above and to the left of the same corner.
         let black = self.black_first != (way.quarters % 2 == 1);
         !colours_tell || black == ((i + j).rem_euclid(2) == 0)

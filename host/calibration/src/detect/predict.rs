@@ -1,10 +1,11 @@
 //! Predicts the position of a corner from the others.
 
-use nalgebra::{Matrix2, Matrix3, OMatrix, OVector, SMatrix, SVector, U6, Vector2, Vector3};
-use vergence_vision::{Camera, KannalaBrandt, Pixel, UnitRay};
+use nalgebra::{Matrix2, OMatrix, SMatrix, SVector, U6, Vector2};
+use vergence_vision::KannalaBrandt;
 
 use super::CornerQuality;
 use super::lattice::{Found, Lattice, Node};
+use super::plane::TargetPlane;
 
 /// A predicted corner and the local shape of the target.
 #[derive(Clone, Copy, Debug)]
@@ -36,14 +37,14 @@ pub struct Predictor<'a> {
 impl<'a> Predictor<'a> {
     /// With `hint`, through that camera if it sees the corners as a plane to a tenth of a cell.
     pub fn new(lattice: &Lattice, hint: Option<&'a KannalaBrandt>) -> Self {
-        Self { plane: hint.and_then(|camera| TargetPlane::fit(camera, lattice)) }
+        Self { plane: hint.and_then(|camera| plane_of(camera, lattice)) }
     }
 
     /// Predicted corner at `node`; `None` if too few corners are near.
     pub fn predict(&self, lattice: &Lattice, node: Node) -> Option<Prediction> {
         let smooth = smooth_continuation(lattice, node)?;
         let Some(plane) = self.plane else { return Some(smooth) };
-        plane.predict(lattice, node).or(Some(smooth))
+        corrected(&plane, lattice, node).or(Some(smooth))
     }
 }
 
@@ -103,107 +104,32 @@ fn usable(lattice: &Lattice, node: Node, reach: i32) -> impl Iterator<Item = (No
     lattice.around(node, reach).filter(|(_, found)| found.quality != CornerQuality::Blunder)
 }
 
-/// A plane seen through a camera: rays are homogeneous coordinates of lattice nodes.
-#[derive(Clone, Copy, Debug)]
-struct TargetPlane<'a> {
-    camera: &'a KannalaBrandt,
-    ray_from_node: Matrix3<f64>,
+/// The plane of a lattice, whose nodes are its places.
+fn plane_of<'a>(camera: &'a KannalaBrandt, lattice: &Lattice) -> Option<TargetPlane<'a>> {
+    let usable = lattice.iter().filter(|(_, found)| found.quality != CornerQuality::Blunder);
+    let observed: Vec<_> = usable.map(|(&node, found)| (place(node), found.position)).collect();
+    TargetPlane::fit(camera, &observed)
 }
 
-impl<'a> TargetPlane<'a> {
-    /// The direct linear transformation on rays (R. Hartley and A. Zisserman, "Multiple View Geometry", 2nd ed.,
-    /// alg. 4.1): ray × (H node) = 0, which holds at any angle to the axis. Weights make the error an angle.
-    fn fit(camera: &'a KannalaBrandt, lattice: &Lattice) -> Option<Self> {
-        const FEWEST: usize = 8;
-        let usable = lattice.iter().filter(|(_, found)| found.quality != CornerQuality::Blunder);
-        let observed_views: Vec<(Node, Vector3<f64>)> =
-            usable.filter_map(|(&node, found)| Some((node, ray(camera, found.position)?))).collect();
-        if observed_views.len() < FEWEST {
-            return None;
+/// The projection of `node`, corrected by the mean residual of the nearest corners.
+fn corrected(plane: &TargetPlane<'_>, lattice: &Lattice, node: Node) -> Option<Prediction> {
+    const NEAR: i32 = 2;
+    let projected = plane.project(place(node))?;
+    let (mut shift, mut sum) = (Vector2::zeros(), 0.0);
+    for (at, found) in usable(lattice, node, NEAR) {
+        if let Some(expected) = plane.project(place(at)) {
+            let (di, dj) = (f64::from(at[0] - node[0]), f64::from(at[1] - node[1]));
+            let weight = 1.0 / (di * di + dj * dj);
+            shift += (found.position - expected.position) * weight;
+            sum += weight;
         }
-        let mut plane = Self { camera, ray_from_node: Matrix3::zeros() };
-        for _ in 0..3 {
-            plane.ray_from_node = plane.reweighted(&observed_views)?;
-        }
-        plane.explains(lattice).then_some(plane)
     }
-
-    fn reweighted(&self, observed_views: &[(Node, Vector3<f64>)]) -> Option<Matrix3<f64>> {
-        let mut normal = SMatrix::<f64, 9, 9>::zeros();
-        for (node, ray) in observed_views {
-            let node = homogeneous(*node);
-            let depth = (self.ray_from_node * node).norm();
-            let weight = if depth > 0.0 { depth.recip() } else { 1.0 };
-            // Rows of [ray]× (H node), with H row by row in a vector of nine.
-            let rows = ray.cross_matrix().kronecker(&node.transpose()) * weight;
-            normal += rows.transpose() * rows;
-        }
-        let eigen = normal.symmetric_eigen();
-        let least = eigen.eigenvalues.imin();
-        let h: OVector<f64, _> = eigen.eigenvectors.column(least).into_owned();
-        let matrix = Matrix3::from_row_iterator(h.iter().copied());
-        let towards: f64 =
-            observed_views.iter().map(|(node, ray)| ray.dot(&(matrix * homogeneous(*node))).signum()).sum();
-        towards.is_finite().then(|| matrix * towards.signum())
-    }
-
-    /// Whether the root mean square of the distances is below a tenth of the mean cell's side.
-    fn explains(&self, lattice: &Lattice) -> bool {
-        const PART_OF_CELL: f64 = 0.1;
-        let (mut squares, mut areas) = (0.0, 0.0);
-        for (&node, found) in lattice.iter().filter(|(_, found)| found.quality != CornerQuality::Blunder) {
-            let Some(expected) = self.project(node) else { return false };
-            squares += (expected.position - found.position).norm_squared();
-            areas += expected.steps[0].perp(&expected.steps[1]).abs();
-        }
-        squares < PART_OF_CELL * PART_OF_CELL * areas
-    }
-
-    /// Projection of the node, without the observations near it.
-    fn project(&self, node: Node) -> Option<Prediction> {
-        const HALF: f64 = 0.5;
-        let at = |di: f64, dj: f64| {
-            let ray = UnitRay::<Camera>::new(self.ray_from_node * (homogeneous(node) + Vector3::new(di, dj, 0.0)))?;
-            let pixel = self.camera.project(&ray).ok()?;
-            Some(Vector2::new(pixel.u, pixel.v))
-        };
-        let here = at(0.0, 0.0)?;
-        // One-sided, and without a bend, where the field ends within half a cell.
-        let step = |di: f64, dj: f64| match (at(di, dj), at(-di, -dj)) {
-            (Some(ahead), Some(behind)) => Some((ahead - behind, 2.0 * (ahead - 2.0 * here + behind))),
-            (Some(ahead), None) => Some((2.0 * (ahead - here), Vector2::zeros())),
-            (None, Some(behind)) => Some((2.0 * (here - behind), Vector2::zeros())),
-            (None, None) => None,
-        };
-        let ((along, along_bend), (across, across_bend)) = (step(HALF, 0.0)?, step(0.0, HALF)?);
-        Some(Prediction { position: here, steps: [along, across], bends: [along_bend, across_bend], variance: 0.0 })
-    }
-
-    /// The projection, corrected by the mean residual of the nearest corners.
-    fn predict(&self, lattice: &Lattice, node: Node) -> Option<Prediction> {
-        const NEAR: i32 = 2;
-        let projected = self.project(node)?;
-        let (mut shift, mut sum) = (Vector2::zeros(), 0.0);
-        for (at, found) in usable(lattice, node, NEAR) {
-            if let Some(expected) = self.project(at) {
-                let (di, dj) = (f64::from(at[0] - node[0]), f64::from(at[1] - node[1]));
-                let weight = 1.0 / (di * di + dj * dj);
-                shift += (found.position - expected.position) * weight;
-                sum += weight;
-            }
-        }
-        let position = projected.position + shift / sum;
-        (sum > 0.0).then(|| Prediction { position, variance: 1.0 / sum, ..projected })
-    }
+    let position = projected.position + shift / sum;
+    (sum > 0.0).then(|| Prediction { position, variance: 1.0 / sum, ..projected })
 }
 
-fn homogeneous(node: Node) -> Vector3<f64> {
-    Vector3::new(f64::from(node[0]), f64::from(node[1]), 1.0)
-}
-
-fn ray(camera: &KannalaBrandt, position: Vector2<f64>) -> Option<Vector3<f64>> {
-    let ray = camera.unproject::<Camera>(Pixel { u: position.x, v: position.y }).ok()?;
-    Some(ray.vector())
+fn place(node: Node) -> Vector2<f64> {
+    Vector2::new(f64::from(node[0]), f64::from(node[1]))
 }
 
 /// Turns offsets in cells into offsets in pixels.

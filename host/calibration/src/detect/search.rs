@@ -3,7 +3,7 @@
 //! S. Bennett and J. Lasenby, "ChESS: quick and robust detection of chess-target features", CVIU 118, 2014.
 
 use calib_targets_chessboard::{
-    ChessboardDetector, ChessboardParams, GrayImageView, default_chess_config, detect_corners,
+    ChessCorner, ChessboardDetector, ChessboardParams, GrayImageView, default_chess_config, detect_corners,
 };
 use image::GrayImage;
 use nalgebra::Vector2;
@@ -14,16 +14,21 @@ use super::lattice::{Found, Lattice};
 /// Standard deviation of a corner found by the search alone, in pixels.
 const SEARCH_SIGMA_PX: f64 = 1.0;
 
-/// The largest labelled patch in the image; empty where there is none. The first axis turns clockwise into the second
-/// as they are seen, as x into y on the printed side of a target.
-pub fn labelled_patch(image: &GrayImage) -> Lattice {
+/// Everything in the image that looks like a corner of squares, whatever it belongs to.
+pub fn features(image: &GrayImage) -> Vec<ChessCorner> {
     // The search itself panics on an empty image; nothing this small holds a dozen corners.
     const SMALLEST_PX: u32 = 16;
     if image.width().min(image.height()) < SMALLEST_PX {
-        return Lattice::default();
+        return Vec::new();
     }
     let view = GrayImageView { width: image.width() as usize, height: image.height() as usize, data: image.as_raw() };
-    let features = detect_corners(&view, &default_chess_config());
+    detect_corners(&view, &default_chess_config())
+}
+
+/// The largest labelled patch in the image; empty where there is none. The first axis turns clockwise into the second
+/// as they are seen, as x into y on the printed side of a target.
+pub fn labelled_patch(image: &GrayImage) -> Lattice {
+    let features = features(image);
     let patch = ChessboardDetector::new(ChessboardParams::default()).ok().and_then(|d| d.detect(&features));
     let mut lattice = Lattice::default();
     for corner in patch.iter().flat_map(|patch| &patch.corners) {

@@ -7,6 +7,7 @@
 mod fit;
 mod initial;
 mod joint;
+mod labels;
 mod outliers;
 mod report;
 mod scatter;
@@ -23,6 +24,7 @@ use crate::target::{Corner, Target, TargetView};
 pub(crate) use fit::{Fit, NoFit, Start, Task};
 pub(crate) use initial::{PlacedView, inside, nearer_targets, place};
 pub(crate) use joint::{FixedPose, Kinematics, Shared};
+pub use labels::{LabelError, label_pairs};
 pub(crate) use outliers::OwnPoses;
 pub(crate) use report::{outliers, refined, rms, view_figures};
 pub use stereo::LensKnowledge;

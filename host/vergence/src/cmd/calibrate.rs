@@ -66,9 +66,10 @@ fn print_views(console: Console) -> impl FnMut(ViewEvent<'_>) -> Result<(), Fail
             }
             ViewEvent::Looked => _ = progress.take().map(|progress| progress.finish_and_clear()),
             ViewEvent::Missed(missed) => match missed.reason {
-                MissedReason::NoTarget(_) | MissedReason::Hidden => console.say(missed)?,
+                MissedReason::NoTarget(_) | MissedReason::Hidden | MissedReason::Unplaced => console.say(missed)?,
                 MissedReason::Damaged(_) => console.warn(missed.to_string()),
             },
+            ViewEvent::Unlabelled(left_out) => console.warn(left_out.to_string()),
             ViewEvent::Alone(file) => {
                 console.warn(format!(
                     "{}: left out: the other camera has no image of this name, number or time",

@@ -6,11 +6,10 @@ use std::pin::pin;
 use serde_json::json;
 use tokio::task::spawn_blocking;
 use vergence_board::HostClock;
-use vergence_calibration::{Coverage, TargetSpec};
-use vergence_calibration_input::{NAMES, TargetViews, TargetWatch, observe};
+use vergence_calibration::{Coverage, TargetKind};
+use vergence_calibration_input::{NAMES, TargetViews, TargetWatch, observe, printed};
 use vergence_camera::{Camera, CameraError, CameraImage, CameraSet};
 use vergence_files::{make_folder, write_png};
-use vergence_scene::Target;
 use vergence_sim::{HeldTarget, TargetCamera};
 use vergence_vision::Side;
 
@@ -69,7 +68,7 @@ struct Counts {
 
 async fn capture(
     mut cameras: CameraSet,
-    target: TargetSpec,
+    target: TargetKind,
     args: &Args,
     interruption: impl Future<Output = ()>,
     console: Console,
@@ -115,7 +114,7 @@ async fn capture(
 /// Takes one image with each camera and looks for the target in them, on a thread of its own.
 async fn look(
     mut cameras: CameraSet,
-    target: TargetSpec,
+    target: TargetKind,
 ) -> Result<(CameraSet, Vec<CameraImage>, TargetViews), Failure> {
     let looked = spawn_blocking(move || {
         let images = cameras.grab()?;
@@ -166,7 +165,7 @@ fn first_free(folder: &Path) -> usize {
     (0..).find(is_free).unwrap_or_default()
 }
 
-fn open(args: &Args, common: &CommonOptions, target: &TargetSpec) -> Result<Vec<Box<dyn Camera>>, Failure> {
+fn open(args: &Args, common: &CommonOptions, target: &TargetKind) -> Result<Vec<Box<dyn Camera>>, Failure> {
     if args.cameras == ["sim"] {
         args.camera.none_for_simulated()?;
         return simulated(args, common, target);
@@ -175,7 +174,7 @@ fn open(args: &Args, common: &CommonOptions, target: &TargetSpec) -> Result<Vec<
     Ok(args.cameras.iter().map(|device| args.camera.open(device, clock)).collect::<Result<_, CameraError>>()?)
 }
 
-fn simulated(args: &Args, common: &CommonOptions, target: &TargetSpec) -> Result<Vec<Box<dyn Camera>>, Failure> {
+fn simulated(args: &Args, common: &CommonOptions, target: &TargetKind) -> Result<Vec<Box<dyn Camera>>, Failure> {
     let rig = rig_file::load(common.rig.as_deref())?;
     let targets = rig.mode("human").map(|mode| mode.targets.iter().map(|target| target.value()).collect::<Vec<_>>());
     let pose = rig.pose_at_values(&targets.unwrap_or_default());
@@ -183,7 +182,7 @@ fn simulated(args: &Args, common: &CommonOptions, target: &TargetSpec) -> Result
         left: rig.left_camera,
         right: (rig.right_camera, pose.left_from_right),
         both: !args.mono,
-        target: Target { columns: target.columns, rows: target.rows, square: target.square },
+        target: printed(target),
         seed: args.seed,
     };
     let sides = if args.mono { &[Side::Left][..] } else { &[Side::Left, Side::Right] };
@@ -251,7 +250,7 @@ mod tests {
             left: rig.left_camera,
             right: (rig.right_camera, nowhere),
             both: false,
-            target: Target { columns: target.columns, rows: target.rows, square: target.square },
+            target: printed(&target),
             seed: 1,
         };
         let image = TargetCamera::new(held, Side::Left).grab().unwrap().unwrap();

@@ -1,60 +1,99 @@
-//! How a chessboard is named on the command line.
+//! How a calibration target is named on the command line.
 
-use vergence_calibration::TargetSpec;
+use std::path::PathBuf;
+
+use vergence_calibration::{AprilGridSpec, TargetKind, TargetSpec};
+use vergence_calibration_input::read_target;
 use vergence_vision::Length;
 
 use crate::console::Console;
 use crate::failure::Failure;
 use crate::plausible::ForceOption;
-use crate::plausible::target::square_can_be_held;
+use crate::plausible::target::side_can_be_held;
 
-/// The chessboard.
-#[derive(Clone, Copy, Debug, clap::Args)]
+/// The target: a chessboard, a grid of AprilTags, or what a file says.
+#[derive(Clone, Debug, clap::Args)]
 pub struct TargetOptions {
-    /// Inner corners, such as 9x6.
+    /// A chessboard: its inner corners, such as 9x6.
     #[arg(long = "corners", alias = "board", value_parser = parse_inner_corners, value_name = "CxR")]
     pub inner_corners: Option<(u32, u32)>,
-    /// Side of a square, such as 24.23mm.
+    /// Side of a square of the chessboard, such as 24.23mm.
     #[arg(long, value_name = "LENGTH")]
     pub square: Option<Length>,
+    /// A grid of AprilTags 36h11 as Kalibr prints it: tags across and down, such as 6x6.
+    #[arg(long, value_parser = parse_tags, value_name = "CxR", conflicts_with_all = ["inner_corners", "square"])]
+    pub tags: Option<(u32, u32)>,
+    /// Side of a tag, its black border included, such as 24mm.
+    #[arg(long, value_name = "LENGTH", requires = "tags")]
+    pub tag: Option<Length>,
+    /// Space between tags as a part of their side.
+    #[arg(long, value_name = "RATIO", default_value_t = 0.3, requires = "tags")]
+    pub tag_spacing: f64,
+    /// Kalibr's target file (aprilgrid.yaml, checkerboard.yaml) in place of the options above.
+    #[arg(long, value_name = "FILE", conflicts_with_all = ["inner_corners", "square", "tags"])]
+    pub target: Option<PathBuf>,
 }
 
 impl TargetOptions {
     /// The target.
     ///
     /// # Errors
-    /// Where an option is missing or the square is none, or none that a person can mean.
-    pub fn checked_spec(&self, force: ForceOption, console: Console) -> Result<TargetSpec, Failure> {
+    /// Where an option is missing or a length is none, or none that a person can mean.
+    pub fn checked_spec(&self, force: ForceOption, console: Console) -> Result<TargetKind, Failure> {
         let spec = self.spec()?;
-        force.unless_forced(square_can_be_held(&spec), console)?;
+        force.unless_forced(side_can_be_held(&spec), console)?;
         Ok(spec)
     }
 
     /// The target, whatever its size.
     ///
     /// # Errors
-    /// Where an option is missing or the square is none.
-    pub fn spec(&self) -> Result<TargetSpec, Failure> {
-        let (Some((columns, rows)), Some(square)) = (self.inner_corners, self.square) else {
-            return Err(Failure::usage("describe the target: --corners 9x6 --square 24.23mm"));
-        };
-        if square.mm().is_nan() || square.mm() <= 0.0 {
-            return Err(Failure::usage(format!("squares cannot have a side of {square}: give a positive length")));
+    /// Where an option is missing, a length is none, or the file describes no target.
+    pub fn spec(&self) -> Result<TargetKind, Failure> {
+        if let Some(file) = &self.target {
+            return Ok(read_target(file)?);
         }
-        Ok(TargetSpec { columns, rows, square })
+        let spec = match (self.inner_corners, self.square, self.tags, self.tag) {
+            (_, _, Some((columns, rows)), Some(tag)) => {
+                TargetKind::AprilGrid(AprilGridSpec { columns, rows, tag, spacing: self.tag_spacing })
+            }
+            (Some((columns, rows)), Some(square), None, _) => {
+                TargetKind::Chessboard(TargetSpec { columns, rows, square })
+            }
+            _ => {
+                return Err(Failure::usage(
+                    "describe the target: --corners 9x6 --square 24.23mm, --tags 6x6 --tag 24mm, or --target aprilgrid.yaml",
+                ));
+            }
+        };
+        match spec {
+            TargetKind::AprilGrid(grid) if grid.tag.mm() > 0.0 && !grid.is_usable() => {
+                Err(Failure::usage("a grid has 1 to 587 tags, and --tag-spacing is more than 0 and at most 1"))
+            }
+            spec if spec.side().mm().is_nan() || spec.side().mm() <= 0.0 => Err(Failure::usage(format!(
+                "squares and tags cannot have a side of {}: give a positive length",
+                spec.side()
+            ))),
+            spec => Ok(spec),
+        }
     }
 }
 
 /// `9x6`: columns and rows of inner corners.
-///
-/// # Errors
-/// Says what is expected.
-pub fn parse_inner_corners(text: &str) -> Result<(u32, u32), String> {
-    const HINT: &str = "count the inner corners, such as 9x6, from 3x3 to 99x99";
+fn parse_inner_corners(text: &str) -> Result<(u32, u32), String> {
     if text.ends_with(".csv") {
         return Err("corners in a file are given with --csv".into());
     }
-    let (columns, rows) = text.split_once(['x', 'X', '×']).ok_or(HINT)?;
-    let count = |part: &str| part.trim().parse().ok().filter(|n| (3..=99).contains(n)).ok_or(HINT);
-    Ok((count(columns)?, count(rows)?))
+    parse_counts(text, 3).ok_or_else(|| "count the inner corners, such as 9x6, from 3x3 to 99x99".into())
+}
+
+/// `6x6`: columns and rows of tags.
+fn parse_tags(text: &str) -> Result<(u32, u32), String> {
+    parse_counts(text, 1).ok_or_else(|| "count the tags, such as 6x6, from 1x1 to 99x99".into())
+}
+
+fn parse_counts(text: &str, least: u32) -> Option<(u32, u32)> {
+    let (columns, rows) = text.split_once(['x', 'X', '×'])?;
+    let count = |part: &str| part.trim().parse().ok().filter(|n| (least..=99).contains(n));
+    Some((count(columns)?, count(rows)?))
 }

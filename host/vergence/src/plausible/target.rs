@@ -1,27 +1,31 @@
 //! Checks of the size of a target.
 
-use vergence_calibration::{TargetSpec, TargetView};
+use vergence_calibration::{TargetKind, TargetView};
 use vergence_vision::Length;
 
 use crate::failure::Failure;
 
-/// Sides of squares that can be printed and seen.
-const SQUARES: [Length; 2] = [Length::from_mm(0.5), Length::from_mm(1000.0)];
+/// Sides of squares and tags that can be printed and seen.
+const SIDES: [Length; 2] = [Length::from_mm(0.5), Length::from_mm(1000.0)];
 /// The longest target.
 const LONGEST: Length = Length::from_mm(20_000.0);
 
-/// A square of a target is half a millimetre to one metre long.
+/// A square or tag of a target is half a millimetre to one metre long.
 ///
 /// # Errors
 /// Exit code 2.
-pub fn square_can_be_held(target: &TargetSpec) -> Result<(), Failure> {
-    let [least, most] = SQUARES.map(Length::mm);
-    if (least..=most).contains(&target.square.mm()) {
+pub fn side_can_be_held(target: &TargetKind) -> Result<(), Failure> {
+    let [least, most] = SIDES.map(Length::mm);
+    if (least..=most).contains(&target.side().mm()) {
         return Ok(());
     }
+    let (part, option) = match target {
+        TargetKind::Chessboard(_) => ("square", "--square"),
+        TargetKind::AprilGrid(_) => ("tag", "--tag"),
+    };
     Err(Failure::usage(format!(
-        "a square of {} is not between {least} mm and {:.0} m: is --square in the wrong unit, such as m for mm?",
-        target.square,
+        "a {part} of {} is not between {least} mm and {:.0} m: is {option} in the wrong unit, such as m for mm?",
+        target.side(),
         most * 1e-3
     )))
 }

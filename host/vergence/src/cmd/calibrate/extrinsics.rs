@@ -6,7 +6,7 @@ use vergence_calibration::{ExtrinsicsOptions, calibrate_extrinsics, check_fit, v
 use vergence_calibration_input::{InputHash, KnownLenses, PairImages, PairLenses, PairViews, pairs_in_corners};
 use vergence_calibration_report::{
     ReportAbout, extrinsics_json, extrinsics_lines, extrinsics_report, extrinsics_verdict, fixed_pair, held_out_json,
-    held_out_line,
+    held_out_line, left_out_json,
 };
 use vergence_rig::Rig;
 
@@ -61,7 +61,7 @@ pub fn run(args: &Args, console: Console) -> Result<(), Failure> {
     let KnownLenses { left, right, shutters, knowledge } = args.lenses.read(&mut hash, console)?.ok_or_else(|| {
         Failure::usage("name the camera files with --left and --right: vergence calibrate intrinsics makes them")
     })?;
-    let (views, images) = views(args, [&left, &right], &mut hash, console)?;
+    let PairViews { views, left_out, images } = views(args, [&left, &right], &mut hash, console)?;
     let force = args.result.force;
     force.unless_forced(corners_can_be_held(views.iter().map(|view| &view.left)), console)?;
     force.unless_forced(views_of_pair(&views, [&left, &right]), console)?;
@@ -86,7 +86,11 @@ pub fn run(args: &Args, console: Console) -> Result<(), Failure> {
         .map_err(Failure::check)?;
     args.result.write(&rig, || {
         let about = ReportAbout::new(args.result.name("Pair"), args.target.spec().ok().as_ref(), &provenance, None);
-        extrinsics_report(&calibration, &views, &ReportAbout { held_out: held_out.clone(), images, ..about })
+        extrinsics_report(
+            &calibration,
+            &views,
+            &ReportAbout { held_out: held_out.clone(), images, left_out: left_out.clone(), ..about },
+        )
     })?;
     console.say_lines(extrinsics_lines(&calibration))?;
     console.say_lines(held_out_line(held_out.as_ref()))?;
@@ -94,6 +98,7 @@ pub fn run(args: &Args, console: Console) -> Result<(), Failure> {
     let mut result = extrinsics_json(&calibration, seconds);
     result["held_out"] = held_out_json(held_out.as_ref());
     result["verdict"] = verdict.json();
+    result["left_out"] = left_out_json(&left_out);
     console.result(&result)
 }
 
@@ -101,7 +106,7 @@ fn views(args: &Args, lenses: PairLenses<'_>, hash: &mut InputHash, console: Con
     match &args.csv {
         Some(path) => {
             let frames = pairs_in_corners(path, &args.cameras, hash)?;
-            Ok((frames.into_iter().map(|(_, view)| view).collect(), Default::default()))
+            Ok(PairViews { views: frames.into_iter().map(|(_, view)| view).collect(), ..PairViews::default() })
         }
         None => {
             let mut print = print_views(console);

@@ -115,7 +115,7 @@ fn views(args: &Args, hash: &mut InputHash, console: Console) -> Result<Views, F
         _ => {
             let files = named_images(&args.images)?;
             let target = args.target.checked_spec(args.result.force, console)?;
-            let sought = Sought { target: &target, hint: None, mask: args.mask.as_deref() };
+            let sought = Sought { target: &target, hint: None, placed: args.warp, mask: args.mask.as_deref() };
             let targets = views_in_images(&files, sought, hash, &mut print_views(console))?;
             Ok(Views { views: targets.found(), size: targets.size, images: targets.images })
         }

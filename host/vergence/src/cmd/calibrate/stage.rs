@@ -6,9 +6,9 @@ mod trunk;
 use std::path::PathBuf;
 
 use serde_json::json;
-use vergence_calibration::{StageError, StageOptions, StagePose, calibrate_stage, check_fit, validate_stage};
-use vergence_calibration_input::{InputHash, KnownLenses, RecordedSet, TrueError, stage_poses_in_corners};
-use vergence_calibration_report::{ReportAbout, stage_json, stage_lines, stage_report, stage_verdict};
+use vergence_calibration::{StageError, StageOptions, calibrate_stage, check_fit, validate_stage};
+use vergence_calibration_input::{InputHash, KnownLenses, RecordedSet, StageViews, TrueError, stage_poses_in_corners};
+use vergence_calibration_report::{ReportAbout, left_out_json, stage_json, stage_lines, stage_report, stage_verdict};
 use vergence_rig::Rig;
 
 use super::options::{LensOptions, MaskOptions, ResultOptions};
@@ -89,7 +89,7 @@ pub async fn run(args: &Args, common: &CommonOptions, console: Console) -> Resul
         None => (drawn, args.lenses.without_files()?),
     };
     let built = live(args, common, console).await?;
-    let poses = poses(args, &drawn, &mut hash, console)?;
+    let (poses, left_out) = poses(args, &drawn, &mut hash, console)?;
     let force = args.result.force;
     for pose in &poses {
         force.unless_forced(corners_can_be_held(pose.views.iter().map(|view| &view.left)), console)?;
@@ -97,7 +97,12 @@ pub async fn run(args: &Args, common: &CommonOptions, console: Console) -> Resul
     }
     let options = StageOptions { lenses: knowledge, robust: !args.no_loss, ..StageOptions::default() };
     if drawn.trunk.is_some() {
-        return trunk::run(args, &trunk::Input { drawn: &drawn, poses: &poses, options: &options }, hash, console);
+        return trunk::run(
+            args,
+            trunk::Input { drawn: &drawn, poses: &poses, left_out, options: &options },
+            hash,
+            console,
+        );
     }
     let solving = Stopwatch::start();
     let stage = calibrate_stage(&drawn, &poses, &options).map_err(|error| no_calibration(&error))?;
@@ -121,13 +126,14 @@ pub async fn run(args: &Args, common: &CommonOptions, console: Console) -> Resul
     let provenance = args.result.provenance(hash);
     args.result.write(&rig.to_toml(&provenance).map_err(Failure::check)?, || {
         let about = ReportAbout::new(rig.name.clone(), args.target.spec().ok().as_ref(), &provenance, None);
-        stage_report(&stage, &rig, &held_out, &about)
+        stage_report(&stage, &rig, &held_out, &ReportAbout { left_out: left_out.clone(), ..about })
     })?;
     console.say_lines(stage_lines(&stage, &held_out))?;
     console.say(&verdict.sentence)?;
     let mut result = stage_json(&rig, &stage, &held_out);
     result["seconds"] = seconds.into();
     result["verdict"] = verdict.json();
+    result["left_out"] = left_out_json(&left_out);
     if let Some(built) = built {
         let TrueError { poses, rotation, translation } = TrueError::of(&stage, &built, args.live.seed);
         let (rotation_deg, translation_mm) = (rotation.deg(), translation.mm());
@@ -159,14 +165,14 @@ async fn live(args: &Args, common: &CommonOptions, console: Console) -> Result<O
     }
 }
 
-fn poses(args: &Args, rig: &Rig, hash: &mut InputHash, console: Console) -> Result<Vec<StagePose>, Failure> {
+fn poses(args: &Args, rig: &Rig, hash: &mut InputHash, console: Console) -> Result<StageViews, Failure> {
     match (&args.set, &args.csv) {
         (Some(set), _) => {
             let (set, lenses) = (RecordedSet::read(set, rig, hash)?, [&rig.left_camera, &rig.right_camera]);
             let target = args.target.checked_spec(args.result.force, console)?;
             set.stage_poses(&target, (lenses, args.masks.files()), hash, &mut print_views(console))
         }
-        (_, Some(csv)) => Ok(stage_poses_in_corners(csv, rig, &args.cameras, hash)?),
+        (_, Some(csv)) => Ok((stage_poses_in_corners(csv, rig, &args.cameras, hash)?, Vec::new())),
         _ => Err(Failure::usage("name the views: --set DIR or --csv FILE")),
     }
 }

@@ -4,7 +4,7 @@ use std::path::Path;
 
 use indicatif::ProgressBar;
 use vergence_board::{Board, HostClock, Port, fresh_session};
-use vergence_calibration::{TargetSpec, stage_plan};
+use vergence_calibration::{TargetKind, stage_plan};
 use vergence_calibration_input::{LiveEvent, LiveSet, RigCameras, SimulatedTarget};
 use vergence_camera::CameraError;
 use vergence_rig::Rig;
@@ -51,7 +51,7 @@ pub async fn fill(
     folder: &Path,
     options: &Options,
     cameras: &[String],
-    target: TargetSpec,
+    target: TargetKind,
     common: &CommonOptions,
     console: Console,
 ) -> Result<Option<Rig>, Failure> {
@@ -95,7 +95,7 @@ async fn open(
     options: &Options,
     cameras: &[String],
     nominal: &Rig,
-    target: TargetSpec,
+    target: TargetKind,
     common: &CommonOptions,
     console: Console,
 ) -> Result<(Board, RigCameras), Failure> {

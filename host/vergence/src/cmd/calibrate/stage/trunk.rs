@@ -2,7 +2,9 @@
 
 use vergence_calibration::{StageOptions, StagePose, calibrate_trunk, check_fit, validate_trunk};
 use vergence_calibration_input::InputHash;
-use vergence_calibration_report::{ReportAbout, trunk_json, trunk_lines, trunk_report, trunk_verdict};
+use vergence_calibration_report::{
+    LeftOut, ReportAbout, left_out_json, trunk_json, trunk_lines, trunk_report, trunk_verdict,
+};
 use vergence_rig::Rig;
 
 use super::{Args, no_calibration};
@@ -16,6 +18,8 @@ pub struct Input<'a> {
     pub drawn: &'a Rig,
     /// The views at several shapes.
     pub poses: &'a [StagePose],
+    /// The views left out.
+    pub left_out: Vec<LeftOut>,
     /// What is known of the lenses, and whether outliers are left out.
     pub options: &'a StageOptions,
 }
@@ -24,8 +28,8 @@ pub struct Input<'a> {
 ///
 /// # Errors
 /// No calibration, one that fits badly, or a file that cannot be written.
-pub fn run(args: &Args, input: &Input<'_>, hash: InputHash, console: Console) -> Result<(), Failure> {
-    let Input { drawn, poses, options } = *input;
+pub fn run(args: &Args, input: Input<'_>, hash: InputHash, console: Console) -> Result<(), Failure> {
+    let Input { drawn, poses, left_out, options } = input;
     let solving = Stopwatch::start();
     let trunk = calibrate_trunk(drawn, poses, options).map_err(|error| no_calibration(&error))?;
     let seconds = solving.seconds();
@@ -40,12 +44,13 @@ pub fn run(args: &Args, input: &Input<'_>, hash: InputHash, console: Console) ->
     let provenance = args.result.provenance(hash);
     args.result.write(&rig.to_toml(&provenance).map_err(Failure::check)?, || {
         let about = ReportAbout::new(rig.name.clone(), args.target.spec().ok().as_ref(), &provenance, None);
-        trunk_report(&trunk, &rig, &held_out, &about)
+        trunk_report(&trunk, &rig, &held_out, &ReportAbout { left_out: left_out.clone(), ..about })
     })?;
     console.say_lines(trunk_lines(&trunk, &held_out))?;
     console.say(&verdict.sentence)?;
     let mut result = trunk_json(&rig, &trunk, &held_out);
     result["seconds"] = seconds.into();
     result["verdict"] = verdict.json();
+    result["left_out"] = left_out_json(&left_out);
     console.result(&result)
 }

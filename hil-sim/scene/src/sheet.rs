@@ -1,0 +1,146 @@
+//! Printed sheets: everything that may stand before a camera as a calibration target.
+
+use nalgebra::{UnitQuaternion, Vector3};
+use vergence_vision::{Frame, Length, Point, Transform};
+
+use crate::Target;
+use crate::shape::SurfacePoint;
+use crate::target::{BACK, BLACK, WHITE};
+use crate::texture::Rgb;
+
+/// A flat sheet of no thickness with a printed pattern. Its frame is that of [`Target`]: x to the right, y down, z into the
+/// sheet, which is printed on the side of negative z.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Sheet {
+    /// A checkerboard.
+    Checkerboard(Target),
+    /// A grid of coded tags.
+    Tags(TagGrid),
+}
+
+/// A grid of square tags with black borders and small black squares at their corners, which fill the gaps' crossings. The
+/// origin of its frame is the upper left corner of the upper left tag.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct TagGrid {
+    /// Tags along x.
+    pub columns: u32,
+    /// Tags along y.
+    pub rows: u32,
+    /// Side of a tag, its border included.
+    pub tag: Length,
+    /// Space between tags.
+    pub gap: Length,
+    /// What is printed in the tags.
+    pub code: TagPrint,
+}
+
+/// The inside of tags.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct TagPrint {
+    /// Cells along a side, without the border.
+    pub side: u32,
+    /// Cells of the black border.
+    pub border: u32,
+    /// The codes by number: cells row by row from the upper left, the first one the highest bit, 1 is white.
+    pub codes: &'static [u64],
+}
+
+impl TagPrint {
+    /// Whether tag `id` is black at (x, y), 0 to 1 from its upper left corner.
+    fn is_black(&self, id: usize, x: f64, y: f64) -> bool {
+        let across = f64::from(self.side + 2 * self.border);
+        let cell = |part: f64| ((part * across) as u32).checked_sub(self.border).filter(|cell| *cell < self.side);
+        let (Some(column), Some(row)) = (cell(x), cell(y)) else { return true };
+        let code = self.codes.get(id).copied().unwrap_or_default();
+        code >> (self.side * self.side - 1 - row * self.side - column) & 1 == 0
+    }
+}
+
+impl TagGrid {
+    /// Whether the place, in millimetres in the frame of the grid, is black.
+    fn is_black(&self, x: f64, y: f64) -> bool {
+        let (tag, gap) = (self.tag.mm(), self.gap.mm());
+        let pitch = tag + gap;
+        let inside = |at: f64, tags: u32| (-gap..f64::from(tags) * pitch).contains(&at);
+        if !inside(x, self.columns) || !inside(y, self.rows) {
+            return false;
+        }
+        let (column, row) = ((x / pitch).floor(), (y / pitch).floor());
+        let (right, down) = (x - column * pitch, y - row * pitch);
+        match (right < tag, down < tag) {
+            (false, false) => true,
+            (true, true) => {
+                // Tags are numbered row by row from the lower left.
+                let id = (f64::from(self.rows) - 1.0 - row) * f64::from(self.columns) + column;
+                self.code.is_black(id as usize, right / tag, down / tag)
+            }
+            _ => false,
+        }
+    }
+}
+
+impl From<Target> for Sheet {
+    fn from(target: Target) -> Self {
+        Self::Checkerboard(target)
+    }
+}
+
+impl Sheet {
+    /// The middle of the sheet.
+    #[must_use]
+    pub fn centre(&self) -> Point<Target> {
+        match self {
+            Self::Checkerboard(target) => target.centre(),
+            Self::Tags(_) => {
+                let [[left, top], [right, bottom]] = self.outermost();
+                Point::from_mm(Vector3::new(left + right, top + bottom, 0.0) * 0.5)
+            }
+        }
+    }
+
+    /// Width and height including the white border.
+    #[must_use]
+    pub fn size(&self) -> [Length; 2] {
+        match self {
+            Self::Checkerboard(target) => target.size(),
+            // The small squares, and white as wide around them.
+            Self::Tags(grid) => {
+                [grid.columns, grid.rows].map(|tags| (grid.tag + grid.gap) * f64::from(tags) + grid.gap * 3.0)
+            }
+        }
+    }
+
+    /// The upper left and the lower right corner that cameras measure, x and y in millimetres.
+    #[must_use]
+    pub fn outermost(&self) -> [[f64; 2]; 2] {
+        let far = match self {
+            Self::Checkerboard(target) => {
+                [target.columns, target.rows].map(|n| f64::from(n.saturating_sub(1)) * target.square.mm())
+            }
+            Self::Tags(grid) => {
+                [grid.columns, grid.rows].map(|n| f64::from(n) * (grid.tag + grid.gap).mm() - grid.gap.mm())
+            }
+        };
+        [[0.0, 0.0], far]
+    }
+
+    /// The pose of a sheet turned by `rotation` with its middle at `middle`, in millimetres.
+    #[must_use]
+    pub fn placed<F: Frame>(&self, rotation: UnitQuaternion<f64>, middle: Vector3<f64>) -> Transform<F, Target> {
+        Transform::new(rotation, middle - rotation * self.centre().mm())
+    }
+
+    /// The ink at `at`, a point on the sheet about its middle. Edges are sharp: the lens alone blurs them.
+    pub(crate) fn ink(&self, at: &SurfacePoint) -> Rgb {
+        if at.face == 1 {
+            return BACK;
+        }
+        let middle = self.centre().mm();
+        let (x, y) = (at.uv[0] + middle.x, at.uv[1] + middle.y);
+        let is_black = match self {
+            Self::Checkerboard(target) => return target.ink(at),
+            Self::Tags(grid) => grid.is_black(x, y),
+        };
+        if is_black { BLACK } else { WHITE }
+    }
+}

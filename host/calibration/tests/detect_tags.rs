@@ -1,0 +1,257 @@
+//! Grids of AprilTags in rendered fisheye images: near the axis and past 90° from it, partly hidden, blurred and noisy.
+#![allow(clippy::unwrap_used, clippy::print_stdout, reason = "a test may fail, and tells its figures")]
+
+mod simulated;
+
+use image::{DynamicImage, GrayImage};
+use nalgebra::{Isometry3, UnitQuaternion, Vector3};
+use simulated::Dice;
+use vergence_calibration::detect::{DetectError, DetectedCorner, Placement, TAG_BORDER, detect, detect_april_grid};
+use vergence_calibration::{AprilGridSpec, TargetSpec};
+use vergence_scene::{Optics, Scene, Sheet, TagGrid, TagPrint, Target, View, render};
+use vergence_vision::{Angle, Camera, ImageSize, KannalaBrandt, Length, Pixel, Point, Transform, World};
+
+const GRID: AprilGridSpec = AprilGridSpec { columns: 6, rows: 6, tag: Length::from_mm(24.0), spacing: 0.3 };
+
+fn sheet(grid: AprilGridSpec) -> Sheet {
+    let family = AprilGridSpec::FAMILY;
+    let code = TagPrint { side: family.side, border: TAG_BORDER, codes: family.codes };
+    Sheet::Tags(TagGrid { columns: grid.columns, rows: grid.rows, tag: grid.tag, gap: grid.tag * grid.spacing, code })
+}
+
+fn fisheye(side: u32) -> KannalaBrandt {
+    let scale = f64::from(side) / 1280.0;
+    let middle = 0.5 * (f64::from(side) - 1.0);
+    let k = [366.0, 4.0, -1.5, 0.4, -0.08].map(|k| k * scale);
+    let centre = Pixel { u: middle + 3.0, v: middle - 2.0 };
+    KannalaBrandt::new(k, 1.0003, centre, Angle::from_deg(98.0), ImageSize { width: side, height: side }).unwrap()
+}
+
+fn optics(blur_px: f64, noise: f64) -> Optics {
+    Optics { samples: 2, edge_samples: 40, blur_px, read_noise: noise, shot_noise: noise, ..Optics::default() }
+}
+
+/// The middle of the grid, `theta` from the axis towards `azimuth` (0° right, 90° down).
+#[derive(Clone, Copy)]
+struct Pose {
+    theta_deg: f64,
+    azimuth_deg: f64,
+    roll_deg: f64,
+    tilt_deg: f64,
+    distance_mm: f64,
+}
+
+impl Pose {
+    fn camera_from_target(self, sheet: &Sheet) -> Transform<Camera, Target> {
+        let [theta, azimuth, roll, tilt] =
+            [self.theta_deg, self.azimuth_deg, self.roll_deg, self.tilt_deg].map(f64::to_radians);
+        let turn = |axis: Vector3<f64>, angle: f64| UnitQuaternion::from_scaled_axis(axis * angle);
+        let towards = turn(Vector3::new(-azimuth.sin(), azimuth.cos(), 0.0), theta);
+        let rotation = towards * turn(Vector3::z(), roll) * turn(Vector3::y(), tilt);
+        sheet.placed(rotation, towards * Vector3::z() * self.distance_mm)
+    }
+}
+
+fn photograph(scene: &Scene, camera: &KannalaBrandt, optics: &Optics, seed: u64) -> GrayImage {
+    let world_from_camera = Transform::<World, Camera>::new(UnitQuaternion::identity(), Vector3::zeros());
+    DynamicImage::from(render(&View { scene, camera, world_from_camera, optics }, seed).image).to_luma8()
+}
+
+/// Pixel of a corner, and its angle from the axis, if the sensor sees it.
+fn truth(index: u32, place: &Transform<Camera, Target>, camera: &KannalaBrandt) -> Option<(Pixel, f64)> {
+    let [x, y] = GRID.corner_mm(index);
+    let at = *place * Point::<Target>::from_mm(Vector3::new(x, y, 0.0));
+    let pixel = camera.project_point(&at).ok().filter(|pixel| camera.on_sensor(*pixel))?;
+    Some((pixel, camera.unproject::<Camera>(pixel).ok()?.angle_to_axis().deg()))
+}
+
+/// Share of the corners in sight that are found, root mean square error per axis, largest error, largest angle found.
+struct Tally {
+    found: usize,
+    in_sight: usize,
+    rms_px: f64,
+    worst_px: f64,
+    farthest_deg: f64,
+}
+
+fn tally(corners: &[DetectedCorner], place: &Transform<Camera, Target>, camera: &KannalaBrandt) -> Tally {
+    let in_sight = (0..4 * GRID.tags()).filter(|index| truth(*index, place, camera).is_some()).count();
+    let (mut squares, mut worst_px, mut farthest_deg) = (0.0, 0f64, 0f64);
+    for corner in corners {
+        let (at, angle) = truth(corner.index, place, camera).unwrap();
+        let off = (corner.pixel.u - at.u).hypot(corner.pixel.v - at.v);
+        (squares, worst_px, farthest_deg) = (squares + 0.5 * off * off, worst_px.max(off), farthest_deg.max(angle));
+    }
+    let rms_px = (squares / corners.len() as f64).sqrt();
+    Tally { found: corners.len(), in_sight, rms_px, worst_px, farthest_deg }
+}
+
+/// Blur and noise as `optics` takes them, and the place of the grid.
+struct Shot {
+    pose: Pose,
+    blur: f64,
+    noise: f64,
+}
+
+fn shots() -> Vec<Shot> {
+    let shot = |[theta_deg, azimuth_deg, roll_deg, tilt_deg, distance_mm]: [f64; 5], blur: f64, noise: f64| Shot {
+        pose: Pose { theta_deg, azimuth_deg, roll_deg, tilt_deg, distance_mm },
+        blur,
+        noise,
+    };
+    vec![
+        shot([0.0, 0.0, 10.0, 20.0, 200.0], 0.5, 0.0),
+        shot([30.0, 140.0, 70.0, -30.0, 200.0], 0.8, 2.0),
+        shot([60.0, 80.0, 140.0, 25.0, 180.0], 0.8, 2.0),
+        shot([80.0, 20.0, 210.0, 0.0, 180.0], 0.8, 2.0),
+        shot([86.0, 320.0, 280.0, 0.0, 180.0], 0.5, 1.0),
+        shot([86.0, 260.0, 350.0, -20.0, 160.0], 1.0, 4.0),
+    ]
+}
+
+#[test]
+fn grids_are_found_from_the_axis_to_past_90_degrees() {
+    let (camera, sheet) = (fisheye(1280), sheet(GRID));
+    for (shot, seed) in shots().into_iter().zip(0..) {
+        let place = shot.pose.camera_from_target(&sheet);
+        let scene = Scene::studio().with_target(sheet, place.renamed());
+        let image = photograph(&scene, &camera, &optics(shot.blur, shot.noise), seed);
+        for (hint, share) in [(None, 0.85), (Some(&camera), 0.92)] {
+            let corners = detect_april_grid(&image, &GRID, hint).unwrap();
+            let Tally { found, in_sight, rms_px, worst_px, farthest_deg } = tally(&corners, &place, &camera);
+            println!(
+                "theta {}°, blur {}, noise {}, lens {}: {found} of {in_sight}, rms {rms_px:.4} px, worst {worst_px:.3} px, \
+                 to {farthest_deg:.1}°",
+                shot.pose.theta_deg,
+                shot.blur,
+                shot.noise,
+                if hint.is_some() { "known" } else { "unknown" },
+            );
+            assert!(found as f64 >= share * in_sight as f64, "{found} of {in_sight} found");
+            assert!(rms_px < 0.06 && worst_px < 0.3, "rms {rms_px} px, worst {worst_px} px");
+            assert!(shot.pose.theta_deg < 80.0 || farthest_deg > 94.0, "farthest at {farthest_deg}°");
+        }
+    }
+}
+
+/// A sheet lies over half of the grid; what is seen of it is found, and nothing else.
+#[test]
+fn a_grid_half_hidden_is_found_where_it_is_seen() {
+    let (camera, sheet) = (fisheye(1280), sheet(GRID));
+    for (theta_deg, seed) in [(10.0, 1), (75.0, 2)] {
+        let pose = Pose { theta_deg, azimuth_deg: 40.0, roll_deg: 30.0, tilt_deg: 10.0, distance_mm: 190.0 };
+        let place = pose.camera_from_target(&sheet);
+        // The unprinted back of a board, 10 mm before the left half, turned so that its edge cuts through tags.
+        let board = Target { columns: 9, rows: 9, square: Length::from_mm(24.0) };
+        let turn = UnitQuaternion::from_euler_angles(std::f64::consts::PI, 0.0, 0.2);
+        let cover = place.isometry() * Isometry3::from_parts(Vector3::new(-50.0, 80.0, -10.0).into(), turn);
+        let world_from_cover = board.placed::<World>(cover.rotation, cover.translation.vector);
+        let scene = Scene::studio().with_target(sheet, place.renamed()).with_target(board, world_from_cover);
+        let image = photograph(&scene, &camera, &optics(0.7, 2.0), seed);
+        for hint in [None, Some(&camera)] {
+            let corners = detect_april_grid(&image, &GRID, hint).unwrap();
+            let Tally { found, in_sight, rms_px, worst_px, .. } = tally(&corners, &place, &camera);
+            println!(
+                "theta {theta_deg}°, half hidden: {found} of {in_sight}, rms {rms_px:.4} px, worst {worst_px:.3} px"
+            );
+            assert!((24..in_sight).contains(&found) && worst_px < 0.3);
+        }
+    }
+}
+
+#[test]
+fn other_images_show_no_grid_and_other_grids_are_refused() {
+    let camera = fisheye(960);
+    for scene in [Scene::studio(), Scene::room()] {
+        let image = photograph(&scene, &camera, &optics(0.5, 1.0), 1);
+        assert!(matches!(detect_april_grid(&image, &GRID, None), Err(DetectError::NoTags { .. })));
+    }
+    for (width, height) in [(0, 0), (1, 1), (3, 200), (64, 48)] {
+        let blank = GrayImage::new(width, height);
+        assert_eq!(detect_april_grid(&blank, &GRID, None), Err(DetectError::NoTags { found: 0 }));
+    }
+    for unusable in [
+        AprilGridSpec { columns: 0, ..GRID },
+        AprilGridSpec { columns: 98, ..GRID },
+        AprilGridSpec { spacing: 0.0, ..GRID },
+        AprilGridSpec { tag: Length::from_mm(f64::NAN), ..GRID },
+    ] {
+        let refused = detect_april_grid(&GrayImage::new(64, 64), &unusable, None);
+        assert!(matches!(refused, Err(DetectError::UnusableGrid { .. })), "{unusable:?}");
+    }
+}
+
+/// A grid beyond the end of which the numbers go on: tags that the grid in use has not are not taken.
+#[test]
+fn tags_of_a_larger_grid_are_no_corners_of_a_smaller_one() {
+    let (camera, sheet) = (fisheye(1280), sheet(GRID));
+    let pose = Pose { theta_deg: 0.0, azimuth_deg: 0.0, roll_deg: 0.0, tilt_deg: 10.0, distance_mm: 200.0 };
+    let scene = Scene::target_alone(sheet, pose.camera_from_target(&sheet).renamed());
+    let image = photograph(&scene, &camera, &optics(0.5, 1.0), 1);
+    let smaller = AprilGridSpec { rows: 3, ..GRID };
+    let corners = detect_april_grid(&image, &smaller, Some(&camera)).unwrap();
+    assert_eq!(corners.len(), 72);
+    assert!(corners.iter().all(|corner| corner.index < 72));
+}
+
+/// Over many places: no corner is another one, and the error beside that of a chessboard's corners.
+#[test]
+fn no_number_is_wrong_in_many_images() {
+    let (camera, sheet) = (fisheye(960), sheet(GRID));
+    let board = Target { columns: 7, rows: 6, square: Length::from_mm(24.0) };
+    let spec = TargetSpec { columns: board.columns, rows: board.rows, square: board.square };
+    let (mut found, mut in_sight, mut squares) = (0, 0, 0.0);
+    let (mut squares_of_board, mut corners_of_board) = (0.0, 0_usize);
+    for seed in 0..simulated::seeds(6) {
+        let mut dice = Dice::new(seed);
+        let pose = Pose {
+            theta_deg: dice.between(0.0, 92.0),
+            azimuth_deg: dice.between(0.0, 360.0),
+            roll_deg: dice.between(0.0, 360.0),
+            tilt_deg: dice.between(-45.0, 45.0),
+            distance_mm: dice.between(140.0, 260.0),
+        };
+        let optics = Optics { samples: 1, ..optics(dice.between(0.4, 1.1), dice.between(0.0, 4.0)) };
+        let place = pose.camera_from_target(&sheet);
+        let image = photograph(&Scene::studio().with_target(sheet, place.renamed()), &camera, &optics, seed);
+        if let Ok(corners) = detect_april_grid(&image, &GRID, Some(&camera)) {
+            let tally = tally(&corners, &place, &camera);
+            assert!(tally.worst_px < 0.5, "seed {seed}: a corner is {} px off", tally.worst_px);
+            (found, in_sight) = (found + tally.found, in_sight + tally.in_sight);
+            squares += tally.rms_px.powi(2) * tally.found as f64;
+        } else {
+            let missed = (0..4 * GRID.tags()).filter(|index| truth(*index, &place, &camera).is_some()).count();
+            println!("seed {seed}: no grid, {missed} corners in sight at {:.0}°", pose.theta_deg);
+            in_sight += missed;
+        }
+        let place = pose.camera_from_target(&board.into());
+        let image = photograph(&Scene::studio().with_target(board, place.renamed()), &camera, &optics, seed);
+        let Ok(detection) = detect(&image, &spec, Some(&camera)) else { continue };
+        for corner in detection.corners.iter().filter(|_| detection.placement == Placement::Unique) {
+            let [x, y] = spec.corner_mm(corner.index);
+            let at = camera.project_point(&(place * Point::<Target>::from_mm(Vector3::new(x, y, 0.0)))).unwrap();
+            squares_of_board += 0.5 * ((corner.pixel.u - at.u).powi(2) + (corner.pixel.v - at.v).powi(2));
+            corners_of_board += 1;
+        }
+    }
+    let rms = (squares / found as f64).sqrt();
+    println!(
+        "tags: {found} of {in_sight} corners, rms {rms:.4} px; chessboard: {corners_of_board} corners, rms {:.4} px",
+        (squares_of_board / corners_of_board as f64).sqrt()
+    );
+    assert!(rms < 0.1 && found * 10 >= in_sight * 7, "rms {rms} px, {found} of {in_sight}");
+}
+
+/// How small tags may be: the figures of the page on calibrating.
+#[test]
+fn tags_are_read_down_to_18_pixels() {
+    let (camera, sheet) = (fisheye(1280), sheet(GRID));
+    for (distance_mm, least) in [(300.0, 144), (350.0, 144), (400.0, 144), (450.0, 140), (500.0, 130)] {
+        let pose = Pose { theta_deg: 20.0, azimuth_deg: 40.0, roll_deg: 25.0, tilt_deg: 15.0, distance_mm };
+        let scene = Scene::target_alone(sheet, pose.camera_from_target(&sheet).renamed());
+        let image = photograph(&scene, &camera, &optics(0.6, 1.5), 7);
+        let found = detect_april_grid(&image, &GRID, Some(&camera)).map_or(0, |corners| corners.len());
+        println!("tags of {:.0} px: {found} of 144 corners", 366.0 * GRID.tag.mm() / distance_mm);
+        assert!(found >= least);
+    }
+}
