@@ -46,6 +46,8 @@ pub struct VisionBench {
 pub struct VisionTimes {
     /// Projection of rays to pixels, into a new array.
     pub project_ns: f64,
+    /// Projection with the derivatives by the point and by the lens, into a new array.
+    pub derivatives_ns: f64,
     /// Unprojection of pixels to rays, into a new array.
     pub unproject_ns: f64,
     /// Triangulation with closed-form covariances, into arrays that exist.
@@ -59,8 +61,10 @@ pub struct VisionTimes {
 /// OpenCV's nanoseconds per point, the least of all runs.
 #[derive(Clone, Debug, PartialEq, serde::Deserialize)]
 pub struct OpenCvTimes {
-    /// `cv2.fisheye.projectPoints`.
+    /// `cv2.fisheye.distortPoints` of x / z and y / z, up to 88° from the axis.
     pub project_ns: f64,
+    /// `cv2.fisheye.projectPoints`, which computes the derivatives by lens and pose too, asked or not.
+    pub derivatives_ns: f64,
     /// `cv2.fisheye.undistortPoints`.
     pub unproject_ns: f64,
     /// OpenCV's version.
@@ -110,6 +114,7 @@ impl OpenCvTimes {
     fn least(self, other: &Self) -> Self {
         Self {
             project_ns: self.project_ns.min(other.project_ns),
+            derivatives_ns: self.derivatives_ns.min(other.derivatives_ns),
             unproject_ns: self.unproject_ns.min(other.unproject_ns),
             version: self.version,
         }
@@ -119,6 +124,7 @@ impl OpenCvTimes {
 impl VisionTimes {
     const NEVER: Self = Self {
         project_ns: f64::INFINITY,
+        derivatives_ns: f64::INFINITY,
         unproject_ns: f64::INFINITY,
         triangulate_ns: f64::INFINITY,
         triangulate_anew_ns: f64::INFINITY,
@@ -128,6 +134,7 @@ impl VisionTimes {
     fn least(&self, other: &Self) -> Self {
         Self {
             project_ns: self.project_ns.min(other.project_ns),
+            derivatives_ns: self.derivatives_ns.min(other.derivatives_ns),
             unproject_ns: self.unproject_ns.min(other.unproject_ns),
             triangulate_ns: self.triangulate_ns.min(other.triangulate_ns),
             triangulate_anew_ns: self.triangulate_anew_ns.min(other.triangulate_anew_ns),
@@ -152,6 +159,9 @@ fn measure(lens: &KannalaBrandt, points: u32, repeats: u32, instructions: Instru
     let per_point = |count: usize, work: &mut dyn FnMut()| least_seconds(repeats, clock, work) * 1e9 / count as f64;
     VisionTimes {
         project_ns: per_point(rays.len(), &mut || drop(black_box(batch.project(black_box(&rays))))),
+        derivatives_ns: per_point(rays.len(), &mut || {
+            drop(black_box(batch.project_with_derivatives(black_box(&rays))))
+        }),
         unproject_ns: per_point(pixels.len(), &mut || drop(black_box(batch.unproject(black_box(&pixels))))),
         triangulate_ns: per_point(left.len(), &mut || {
             triangulated.clear();

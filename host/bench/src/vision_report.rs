@@ -10,10 +10,17 @@ impl VisionTimes {
     pub fn in_words(&self, peer: Option<&OpenCvTimes>) -> String {
         let ratio = |ours: f64, theirs: f64| format!(" ({:.3})", ours / theirs);
         let project = peer.map_or(String::new(), |peer| ratio(self.project_ns, peer.project_ns));
+        let derivatives = peer.map_or(String::new(), |peer| ratio(self.derivatives_ns, peer.derivatives_ns));
         let unproject = peer.map_or(String::new(), |peer| ratio(self.unproject_ns, peer.unproject_ns));
         format!(
-            "project {:.1}{project}, unproject {:.1}{unproject}, triangulate {:.1} (anew {:.1}, with shared errors {:.0})",
-            self.project_ns, self.unproject_ns, self.triangulate_ns, self.triangulate_anew_ns, self.full_ns
+            "project {:.1}{project}, with derivatives {:.1}{derivatives}, unproject {:.1}{unproject}, triangulate {:.1} (anew {:.1}, with \
+             shared errors {:.0})",
+            self.project_ns,
+            self.derivatives_ns,
+            self.unproject_ns,
+            self.triangulate_ns,
+            self.triangulate_anew_ns,
+            self.full_ns
         )
     }
 
@@ -22,6 +29,7 @@ impl VisionTimes {
         json!({
             "points": points,
             "project_ns": self.project_ns,
+            "project_with_derivatives_ns": self.derivatives_ns,
             "unproject_ns": self.unproject_ns,
             "triangulate_ns": self.triangulate_ns,
             "triangulate_anew_ns": self.triangulate_anew_ns,
@@ -34,9 +42,10 @@ impl VisionBench {
     /// All figures for programs.
     #[must_use]
     pub fn json(&self) -> Value {
-        let opencv = |peer: &OpenCvTimes| json!({ "project_ns": peer.project_ns, "unproject_ns": peer.unproject_ns, "version": peer.version });
+        let opencv = |peer: &OpenCvTimes| json!({ "project_ns": peer.project_ns, "project_with_derivatives_ns": peer.derivatives_ns, "unproject_ns": peer.unproject_ns, "version": peer.version });
         json!({
             "project_ns": self.best.project_ns,
+            "project_with_derivatives_ns": self.best.derivatives_ns,
             "unproject_ns": self.best.unproject_ns,
             "max_ray_error_rad": self.max_ray_error,
             "triangulate_mpts_per_s": 1e3 / self.best.triangulate_ns,
@@ -45,6 +54,7 @@ impl VisionBench {
             "instructions": self.instructions,
             "baseline": {
                 "project_ns": self.baseline.project_ns,
+                "project_with_derivatives_ns": self.baseline.derivatives_ns,
                 "unproject_ns": self.baseline.unproject_ns,
                 "triangulate_mpts_per_s": 1e3 / self.baseline.triangulate_ns,
                 "triangulate_full_mpts_per_s": 1e3 / self.baseline.full_ns,

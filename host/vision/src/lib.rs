@@ -39,7 +39,9 @@ mod uncertainty;
 mod units;
 mod zones;
 
-pub use batch::{BatchLens, BatchPair, BatchPoints, BatchTriangulation, Instructions, triangulate_batch};
+pub use batch::{
+    BatchLens, BatchPair, BatchPoints, BatchTriangulation, Instructions, ProjectedPoints, triangulate_batch,
+};
 pub use cloud::{Cloud, CloudPoint, cloud, cloud_of_each, cloud_point};
 pub use covariance::{covariance, range_sigma};
 pub use epipolar::{dihedral, ray_to_plane};

@@ -71,6 +71,33 @@ fn pixels_agree_with_the_single_point_functions() {
 }
 
 #[test]
+fn derivatives_agree_with_the_single_point_functions() {
+    for (lens, _) in lenses() {
+        let rays = rays_over_field(&lens, 1_001);
+        let range = |i: usize| 0.3 * (i + 1) as f64;
+        let points: Vec<[f64; 3]> = rays.iter().enumerate().map(|(i, ray)| ray.at(range(i)).mm().into()).collect();
+        for instructions in BOTH {
+            let batch = BatchLens::new(&lens).with_instructions(instructions);
+            let found = batch.project_with_derivatives(&points);
+            assert_eq!(found.len(), points.len());
+            for (i, ray) in rays.iter().enumerate() {
+                let [at, expected] = [found.pixel(i).unwrap(), lens.project(ray).unwrap()];
+                assert!((at.u - expected.u).hypot(at.v - expected.v) / lens.k()[0] < LARGEST_ERROR);
+                let by_point = (found.by_point(i).unwrap() * range(i) - lens.pixel_by_ray(ray)).norm();
+                let by_lens = (found.by_lens(i).unwrap() - lens.pixel_by_lens(ray)).norm();
+                let largest = lens.pixel_by_lens(ray).norm().max(lens.k()[0]);
+                assert!(by_point.max(by_lens) < 1e-12 * largest, "{by_point} {by_lens} at {}", ray.angle_to_axis());
+            }
+            let outside = batch.project_with_derivatives(&[[0.0, 0.0, -1.0], [0.0; 3]]);
+            assert!(
+                (0..2).all(|i| outside.pixel(i).unwrap().u.is_nan() && outside.by_lens(i).unwrap()[(1, 1)].is_nan())
+            );
+            assert!(outside.pixel(2).is_none() && !outside.is_empty());
+        }
+    }
+}
+
+#[test]
 fn rays_agree_with_the_single_point_functions() {
     for (lens, _) in lenses() {
         let pixels: Vec<[f64; 2]> = rays_over_field(&lens, 10_001)

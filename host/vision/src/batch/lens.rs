@@ -1,6 +1,7 @@
 //! A lens prepared for whole arrays of points and pixels.
 
 use super::Instructions;
+use super::derivatives::{Derivatives, ProjectedPoints};
 use super::project::{Project, project_baseline, project_best};
 use super::unproject::{Unproject, unproject_baseline, unproject_best};
 use crate::{Camera, KannalaBrandt, Pixel};
@@ -12,6 +13,7 @@ use crate::{Camera, KannalaBrandt, Pixel};
 pub struct BatchLens {
     lens: KannalaBrandt,
     project: Project,
+    derivatives: Derivatives,
     unproject: Option<Unproject>,
     instructions: Instructions,
 }
@@ -23,6 +25,7 @@ impl BatchLens {
         Self {
             lens: *lens,
             project: Project::new(lens),
+            derivatives: Derivatives::new(lens),
             unproject: Unproject::new(lens),
             instructions: Instructions::Best,
         }
@@ -49,6 +52,12 @@ impl BatchLens {
             Instructions::Best => project_best(&self.project, points, pixels),
             Instructions::Baseline => project_baseline(&self.project, points, pixels),
         }
+    }
+
+    /// Projects points as [`Self::project`] does, with the derivatives of the pixels by the points and by the lens.
+    #[must_use]
+    pub fn project_with_derivatives(&self, points: &[[f64; 3]]) -> ProjectedPoints {
+        self.derivatives.of(points, self.instructions == Instructions::Best)
     }
 
     /// Unprojects pixels (N × 2) to rays (N × 3 in the camera frame), unit vectors to 1e-14. Rows are NaN beyond

@@ -9,6 +9,7 @@
 
 mod arc_tangent;
 mod chebyshev;
+mod derivatives;
 mod lanes;
 mod lens;
 mod pair;
@@ -19,6 +20,7 @@ mod triangulate;
 mod unproject;
 mod vectors;
 
+pub use derivatives::ProjectedPoints;
 pub use lens::BatchLens;
 pub use pair::{BatchPair, BatchPoints};
 pub use triangulate::{BatchTriangulation, triangulate_batch};

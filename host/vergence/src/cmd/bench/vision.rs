@@ -7,7 +7,8 @@ use crate::failure::Failure;
 use crate::stopwatch::clock;
 
 /// Measures arrays of N x 3 and N x 2 numbers, on one thread: nanoseconds per point, the least of several runs, with OpenCV
-/// and this program taking turns. Pixels, rays, and points with the errors they share go into new arrays; points with
+/// and this program taking turns. cv2.fisheye.projectPoints always computes derivatives: projection with derivatives by point and
+/// lens is compared with it, projection alone with distortPoints, which ends at 90 degrees. Pixels, rays, and points with the errors they share go into new arrays; points with
 /// their closed-form covariance, 56 bytes each, into arrays that exist ("anew": into new ones). Without OpenCV (python3 -m
 /// pip install opencv-python-headless numpy) its figures are null.
 #[derive(Debug, clap::Args)]
@@ -32,8 +33,8 @@ pub fn run(args: &Args, console: Console) -> Result<(), Failure> {
     }
     match opencv {
         Ok(peer) => console.say(format!(
-            "{:>10}: project {:.1}, unproject {:.1} (version {})",
-            "OpenCV", peer.project_ns, peer.unproject_ns, peer.version
+            "{:>10}: project {:.1} (distortPoints), with derivatives {:.1} (projectPoints), unproject {:.1} (version {})",
+            "OpenCV", peer.project_ns, peer.derivatives_ns, peer.unproject_ns, peer.version
         ))?,
         Err(why) => console.say(format!("OpenCV was not measured: {why}"))?,
     }
