@@ -160,7 +160,7 @@ fn measure(lens: &KannalaBrandt, points: u32, repeats: u32, instructions: Instru
     VisionTimes {
         project_ns: per_point(rays.len(), &mut || drop(black_box(batch.project(black_box(&rays))))),
         derivatives_ns: per_point(rays.len(), &mut || {
-            drop(black_box(batch.project_with_derivatives(black_box(&rays))))
+            drop(black_box(batch.project_with_derivatives(black_box(&rays))));
         }),
         unproject_ns: per_point(pixels.len(), &mut || drop(black_box(batch.unproject(black_box(&pixels))))),
         triangulate_ns: per_point(left.len(), &mut || {
