@@ -75,20 +75,30 @@ impl Local {
     }
 
     fn pixel_by_lens(&self, lens: &KannalaBrandt) -> SMatrix<f64, 2, LENS_PARAMETERS> {
-        let (theta, [radial, _]) = (self.theta, self.image);
-        let (fx, fy, squared) = (lens.k()[0], lens.k()[0] * lens.aspect(), theta * theta);
-        let distorted = lens.radius_at(theta) / fx;
-        let mut columns = SMatrix::zeros();
-        columns[(0, 0)] = distorted * radial.x;
-        columns[(1, 1)] = distorted * radial.y;
-        columns[(0, 2)] = 1.0;
-        columns[(1, 3)] = 1.0;
-        let mut power = theta;
-        for column in 4..LENS_PARAMETERS {
-            power *= squared;
-            columns[(0, column)] = fx * power * radial.x;
-            columns[(1, column)] = fy * power * radial.y;
-        }
-        columns
+        let [fx, fy] = [lens.k()[0], lens.k()[0] * lens.aspect()];
+        let [radial, _] = self.image;
+        pixel_by_lens([fx, fy], self.theta, lens.radius_at(self.theta) / fx, radial.into())
     }
+}
+
+/// The derivative of a pixel by the lens's parameters: focal lengths in pixels, the angle from the axis, the radius in focal lengths,
+/// and the direction from the axis in the image.
+pub(crate) fn pixel_by_lens(
+    [fx, fy]: [f64; 2],
+    theta: f64,
+    distorted: f64,
+    [cosine, sine]: [f64; 2],
+) -> SMatrix<f64, 2, LENS_PARAMETERS> {
+    let mut columns = SMatrix::zeros();
+    columns[(0, 0)] = distorted * cosine;
+    columns[(1, 1)] = distorted * sine;
+    columns[(0, 2)] = 1.0;
+    columns[(1, 3)] = 1.0;
+    let (mut power, squared) = (theta, theta * theta);
+    for column in 4..LENS_PARAMETERS {
+        power *= squared;
+        columns[(0, column)] = fx * power * cosine;
+        columns[(1, column)] = fy * power * sine;
+    }
+    columns
 }

@@ -6,6 +6,7 @@ use nalgebra::{Matrix2x3, SMatrix};
 
 use super::arc_tangent::angle_from_axis;
 use super::lanes::{ALWAYS_FUSED, Kernel, for_rows, polynomial};
+use crate::lens_derivatives::pixel_by_lens;
 use crate::{KannalaBrandt, LENS_PARAMETERS, Pixel};
 
 /// Numbers of a row: the pixel, its derivatives by the point, and what those by the lens consist of.
@@ -60,19 +61,7 @@ impl ProjectedPoints {
     #[must_use]
     pub fn by_lens(&self, index: usize) -> Option<SMatrix<f64, 2, LENS_PARAMETERS>> {
         let &[.., cosine, sine, theta, distorted] = self.rows.get(index)?;
-        let [fx, fy] = self.focal_lengths;
-        let mut columns = SMatrix::zeros();
-        columns[(0, 0)] = distorted * cosine;
-        columns[(1, 1)] = distorted * sine;
-        columns[(0, 2)] = 1.0;
-        columns[(1, 3)] = 1.0;
-        let mut power = theta;
-        for column in 4..LENS_PARAMETERS {
-            power *= theta * theta;
-            columns[(0, column)] = fx * power * cosine;
-            columns[(1, column)] = fy * power * sine;
-        }
-        Some(columns)
+        Some(pixel_by_lens(self.focal_lengths, theta, distorted, [cosine, sine]))
     }
 }
 

@@ -9,23 +9,23 @@ pub enum NoPath {
     /// The loop does not close with these corners.
     #[error("the {end} is no shape of the trunk: {why}")]
     NotClosed {
-        /// Which end of the path.
+        /// The end of the path that is refused.
         end: PathEnd,
-        /// Why.
+        /// The reason why the loop does not close there.
         why: SixBarError,
     },
     /// Bodies touch.
     #[error("at the {end} {} and {} overlap by {:.1} mm", .gap.between[0], .gap.between[1], -.gap.mm)]
     Collides {
-        /// Which end of the path.
+        /// The end of the path that is refused.
         end: PathEnd,
-        /// Where.
+        /// The bodies that overlap, and by how much.
         gap: Gap,
     },
     /// A joint is beyond its range.
     #[error("at the {end} a joint is {:.1} degrees beyond its range", .by.to_degrees())]
     BeyondRange {
-        /// Which end of the path.
+        /// The end of the path that is refused.
         end: PathEnd,
         /// Angle in radians.
         by: f64,
@@ -36,7 +36,7 @@ pub enum NoPath {
         .by.to_degrees()
     )]
     NotAlike {
-        /// Which end of the path.
+        /// The end of the path that is refused.
         end: PathEnd,
         /// Angle in radians.
         by: f64,
@@ -54,9 +54,9 @@ pub enum NoPath {
 /// An end of a path.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum PathEnd {
-    /// Where it begins.
+    /// The shape in which the path begins.
     Start,
-    /// Where it leads.
+    /// The shape to which the path leads.
     Goal,
 }
 
