@@ -18,6 +18,7 @@ const PURE: &[&str] = &[
     "host/pipeline",
     "host/page",
     "hil-sim/cpu",
+    "hil-sim/lens",
     "hil-sim/mcu",
     "hil-sim/plant",
     "hil-sim/rig",

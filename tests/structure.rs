@@ -27,6 +27,7 @@ const ALLOWED: &[(&str, &[&str])] = &[
     ("vergence-matching", &["vergence-vision"]),
     ("vergence-networks", &["vergence-matching"]),
     ("vergence-scene", &["vergence-vision"]),
+    ("vergence-lens", &["vergence-vision"]),
     ("vergence-cpu", &[]),
     ("vergence-mcu", &["vergence-cpu", "vergence-protocol", "vergence-control", "vergence-plant"]),
     ("vergence-plant", &["vergence-protocol", "vergence-control", "vergence-dynamixel"]),
