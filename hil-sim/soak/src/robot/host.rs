@@ -360,7 +360,8 @@ impl<'a, B: RobotBoard> RobotHost<'a, B> {
         let id = MoveId(self.next_move);
         let targets = self.rig.wire_targets(targets);
         match self.order(&Request::MoveTo(Move { id, mode, targets, speed }))? {
-            Status::Accepted => {}
+            // A fault latched on the way of the order: the next pose tells which.
+            Status::Accepted | Status::Refused(Refusal::Latched) => {}
             status => return Err(Trouble::Stuck(format!("the move is answered by {status:?}"))),
         }
         self.wait_until("the end of the move", MOVE_US, |host| {
