@@ -93,4 +93,5 @@ fn the_bench_of_the_kernels_does_without_opencv() {
     for figure in ["project_ns", "unproject_ns", "triangulate_mpts_per_s", "triangulate_full_mpts_per_s"] {
         assert!(figures[figure].as_f64().expect("a number") > 0.0, "{figures}");
     }
+    assert!(figures["anew"]["triangulate_full_ns"].as_f64().expect("a number") > 0.0, "{figures}");
 }

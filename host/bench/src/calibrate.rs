@@ -12,7 +12,7 @@ use vergence_rig::rounded;
 use vergence_vision::ImageSize;
 
 use crate::error::BenchError;
-use crate::peer::{PeerCalibration, PeerFit};
+use crate::peer::{Detector, OpenCvDetectors, PeerCalibration, PeerFit};
 use crate::{Clock, timed};
 
 /// A fit within this factor of the least-squares optimum has converged.
@@ -174,34 +174,38 @@ impl Detections {
         median(self.milliseconds.clone()).unwrap_or_default()
     }
 
-    /// Counts and time for people, beside those of the peer (boards, milliseconds) where it was asked; `name` is the set's.
+    /// Counts and time for people, beside those of OpenCV's detectors where they were asked; `name` is the set's.
     #[must_use]
-    pub fn in_words(&self, name: &str, peer: Option<(usize, f64)>) -> String {
-        let peer = peer.map(|(targets, theirs)| format!("; OpenCV SB found in {targets}, {:.1} ms", rounded(theirs)));
+    pub fn in_words(&self, name: &str, peer: Option<&OpenCvDetectors>) -> String {
+        let one = |name: &str, Detector { boards, median_ms }: Detector| {
+            format!("{name} found in {boards}, {:.1} ms", rounded(median_ms))
+        };
+        let all = |OpenCvDetectors { classic, sb, sb_thorough }: &OpenCvDetectors| {
+            let three = [one("classic", *classic), one("SB", *sb), one("SB, exhaustive and accurate,", *sb_thorough)];
+            format!("; OpenCV {}", three.join("; "))
+        };
         format!(
             "{name}: found in {} of {} images, {} of them complete, {:.1} ms an image{}",
             self.found,
             self.images(),
             self.complete,
             rounded(self.median_ms()),
-            peer.unwrap_or_default()
+            peer.map(all).unwrap_or_default()
         )
     }
 
     /// The same for programs.
     #[must_use]
-    pub fn json(&self, name: &str, peer: Option<(usize, f64)>) -> Value {
-        let ours = self.median_ms();
+    pub fn json(&self, name: &str, peer: Option<&OpenCvDetectors>) -> Value {
         let mut value = json!({
             "set": name,
             "images": self.images(),
             "boards": self.found,
             "complete": self.complete,
-            "median_ms": ours,
+            "median_ms": self.median_ms(),
         });
-        if let Some((targets, theirs)) = peer {
-            value["opencv_sb"] = json!({ "boards": targets, "median_ms": theirs });
-            value["no_slower_than_opencv"] = json!(ours <= theirs);
+        if let Some(peer) = peer {
+            value["opencv"] = json!(peer);
         }
         value
     }

@@ -7,6 +7,10 @@ use std::process::Command;
 use serde_json::Value;
 
 use crate::error::BenchError;
+use crate::python::ask_python;
+
+/// Script that times OpenCV's detectors of chessboards; it needs only OpenCV and numpy.
+const DETECTORS: &str = include_str!("opencv_detect.py");
 
 /// The fit of one peer.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -28,12 +32,32 @@ pub struct PeerCalibration {
     pub scipy: PeerFit,
 }
 
+/// What one of OpenCV's detectors found.
+#[derive(Clone, Copy, Debug, PartialEq, serde::Deserialize, serde::Serialize)]
+pub struct Detector {
+    /// Images in which it found the board.
+    pub boards: usize,
+    /// Median of the milliseconds for an image.
+    pub median_ms: f64,
+}
+
+/// OpenCV's detectors on the same images, one thread.
+#[derive(Clone, Copy, Debug, PartialEq, serde::Deserialize, serde::Serialize)]
+pub struct OpenCvDetectors {
+    /// `findChessboardCorners`, refined by `cornerSubPix`.
+    pub classic: Detector,
+    /// `findChessboardCornersSB` with `CALIB_CB_NORMALIZE_IMAGE` alone.
+    pub sb: Detector,
+    /// The same with `CALIB_CB_EXHAUSTIVE` and `CALIB_CB_ACCURACY`.
+    pub sb_thorough: Detector,
+}
+
 /// The peers on this machine.
 #[derive(Clone, Debug)]
 pub struct Peer<'a> {
     /// The Python interpreter that has OpenCV and SciPy.
     pub python: &'a str,
-    /// The folder of the scripts `peer_calib.py` and `peer_detect.py`.
+    /// The folder of the script `peer_calib.py`.
     pub scripts: PathBuf,
     /// Times each calibration is solved.
     pub runs: u16,
@@ -73,20 +97,14 @@ impl Peer<'_> {
         Ok(cameras.iter().map(of).collect())
     }
 
-    /// Runs OpenCV's SB detector on `images` of a chessboard: how many it finds, and the median milliseconds for an image.
+    /// Runs OpenCV's detectors on `images` of a chessboard with so many columns and rows of inner corners.
     ///
     /// # Errors
-    /// As [`Self::calibrate`].
-    pub fn detect(&self, images: &[PathBuf], [columns, rows]: [u32; 2]) -> Result<(usize, f64), BenchError> {
-        let folder = tempfile::tempdir().map_err(BenchError::temporary)?;
-        let out = folder.path().join("corners.csv");
-        let (columns, rows) = (columns.to_string(), rows.to_string());
-        let fixed: [&OsStr; 6] =
-            [out.as_os_str(), "cam".as_ref(), columns.as_ref(), rows.as_ref(), "1".as_ref(), "sb".as_ref()];
-        let arguments: Vec<&OsStr> = fixed.into_iter().chain(images.iter().map(|path| path.as_os_str())).collect();
-        let said = self.run("peer_detect.py", &arguments)?;
-        parse_detection(&said)
-            .ok_or_else(|| BenchError::Peer(format!("the answer of peer_detect.py is not understood: {}", said.trim())))
+    /// Where Python or OpenCV is missing.
+    pub fn detect(&self, images: &[PathBuf], [columns, rows]: [u32; 2]) -> Result<OpenCvDetectors, BenchError> {
+        let paths = images.iter().map(|path| path.to_string_lossy().into_owned());
+        ask_python(self.python, DETECTORS, [columns.to_string(), rows.to_string()].into_iter().chain(paths))
+            .map_err(BenchError::Peer)
     }
 
     fn run(&self, script: &str, arguments: &[&OsStr]) -> Result<String, BenchError> {
@@ -108,23 +126,4 @@ impl Peer<'_> {
 fn fit(of: &Value, seconds: &str) -> PeerFit {
     let error = of["error"].as_str().map(str::to_owned);
     PeerFit { seconds: of[seconds].as_f64(), rms_px: of["rms_px"].as_f64(), error }
-}
-
-/// `OpenCV 5.0.0 sb: 38/38 boards, median 63.1 ms`.
-fn parse_detection(said: &str) -> Option<(usize, f64)> {
-    let (_, rest) = said.split_once(" sb: ")?;
-    let (found, rest) = rest.split_once('/')?;
-    let (_, rest) = rest.split_once("median ")?;
-    Some((found.parse().ok()?, rest.trim().strip_suffix("ms")?.trim().parse().ok()?))
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn the_detector_line_is_read() {
-        assert_eq!(parse_detection("OpenCV 5.0.0 sb: 37/38 boards, median 63.1 ms\n"), Some((37, 63.1)));
-        assert_eq!(parse_detection("no boards"), None);
-    }
 }

@@ -13,26 +13,19 @@ impl VisionTimes {
         let derivatives = peer.map_or(String::new(), |peer| ratio(self.derivatives_ns, peer.derivatives_ns));
         let unproject = peer.map_or(String::new(), |peer| ratio(self.unproject_ns, peer.unproject_ns));
         format!(
-            "project {:.1}{project}, with derivatives {:.1}{derivatives}, unproject {:.1}{unproject}, triangulate {:.1} (anew {:.1}, with \
-             shared errors {:.0})",
-            self.project_ns,
-            self.derivatives_ns,
-            self.unproject_ns,
-            self.triangulate_ns,
-            self.triangulate_anew_ns,
-            self.full_ns
+            "project {:.1}{project}, with derivatives {:.1}{derivatives}, unproject {:.1}{unproject}, triangulate {:.1}, with shared \
+             errors {:.1}",
+            self.project_ns, self.derivatives_ns, self.unproject_ns, self.triangulate_ns, self.full_ns
         )
     }
 
-    /// The times of `points` points, for programs.
-    fn growth(&self, points: u32) -> Value {
+    /// The times, for programs.
+    fn json(&self) -> Value {
         json!({
-            "points": points,
             "project_ns": self.project_ns,
             "project_with_derivatives_ns": self.derivatives_ns,
             "unproject_ns": self.unproject_ns,
             "triangulate_ns": self.triangulate_ns,
-            "triangulate_anew_ns": self.triangulate_anew_ns,
             "triangulate_full_ns": self.full_ns,
         })
     }
@@ -43,15 +36,20 @@ impl VisionBench {
     #[must_use]
     pub fn json(&self) -> Value {
         let opencv = |peer: &OpenCvTimes| json!({ "project_ns": peer.project_ns, "project_with_derivatives_ns": peer.derivatives_ns, "unproject_ns": peer.unproject_ns, "version": peer.version });
+        let growth = |(points, times): &(u32, VisionTimes)| {
+            let mut row = times.json();
+            row["points"] = json!(points);
+            row
+        };
         json!({
             "project_ns": self.best.project_ns,
             "project_with_derivatives_ns": self.best.derivatives_ns,
             "unproject_ns": self.best.unproject_ns,
             "max_ray_error_rad": self.max_ray_error,
             "triangulate_mpts_per_s": 1e3 / self.best.triangulate_ns,
-            "triangulate_allocated_anew_mpts_per_s": 1e3 / self.best.triangulate_anew_ns,
             "triangulate_full_mpts_per_s": 1e3 / self.best.full_ns,
             "instructions": self.instructions,
+            "anew": self.anew.json(),
             "baseline": {
                 "project_ns": self.baseline.project_ns,
                 "project_with_derivatives_ns": self.baseline.derivatives_ns,
@@ -60,7 +58,7 @@ impl VisionBench {
                 "triangulate_full_mpts_per_s": 1e3 / self.baseline.full_ns,
             },
             "opencv": self.opencv.as_ref().map_or(Value::Null, opencv),
-            "growth": self.growth.iter().map(|(points, times)| times.growth(*points)).collect::<Vec<_>>(),
+            "growth": self.growth.iter().map(growth).collect::<Vec<_>>(),
         })
     }
 }

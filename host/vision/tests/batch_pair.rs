@@ -5,8 +5,8 @@
 use nalgebra::{SMatrix, UnitQuaternion, Vector3};
 use proptest::prelude::*;
 use vergence_vision::{
-    Angle, BatchPair, ImageSize, Instructions, KannalaBrandt, Left, OpenCvFisheye, PointUncertainty, Right,
-    SHARED_PARAMETERS, SharedCovariance, StereoPair, Transform, UnitRay, pseudo_intersection,
+    Angle, BatchPair, BatchPoints, ImageSize, Instructions, KannalaBrandt, Left, OpenCvFisheye, PointUncertainty,
+    Right, SHARED_PARAMETERS, SharedCovariance, StereoPair, Transform, UnitRay, pseudo_intersection,
 };
 
 const PIXEL_SIGMA: f64 = 0.3;
@@ -96,4 +96,60 @@ fn a_ray_along_the_axis_has_a_covariance_too() {
     let (_, covariance) = expected([&rays[0], &rays[1]], &pair, &shared).unwrap();
     assert!((found.covariances[0][0] - covariance[(0, 0)]).abs() < 1e-9 * covariance.trace());
     assert!((found.covariances[0][5] - covariance[(2, 2)]).abs() < 1e-9 * covariance.trace());
+}
+
+/// The covariance of a lens from 4000 pixels within 60° of the axis, each known to 0.1 px. The distortion coefficients are
+/// correlated almost entirely, and towards 95° their errors are large and cancel each other.
+fn calibrated(lens: &KannalaBrandt) -> SMatrix<f64, 8, 8> {
+    let mut information = SMatrix::<f64, 8, 8>::zeros();
+    for i in 0..4000 {
+        let (theta, phi) = (60f64.to_radians() * f64::from(i) / 4000.0, 2.4 * f64::from(i));
+        let ray = Vector3::new(theta.sin() * phi.cos(), theta.sin() * phi.sin(), theta.cos());
+        let by_lens = lens.pixel_by_lens(&UnitRay::<Left>::new(ray).unwrap());
+        information += by_lens.transpose() * by_lens / 0.01;
+    }
+    information.try_inverse().unwrap()
+}
+
+#[test]
+fn the_strong_correlations_of_a_calibration_cost_no_digits() {
+    let lenses = [lens(560.0, 571.0, [0.01, -0.004, 0.001, -0.0002]), lens(610.0, 598.0, [-0.02, 0.002, 0.0, 0.0])];
+    let turn = UnitQuaternion::from_scaled_axis(Vector3::new(0.02, 0.5, -0.03));
+    let left_from_right = Transform::<Left, Right>::new(turn, Vector3::new(140.0, 3.0, 30.0));
+    let pair = StereoPair { left: &lenses[0], right: &lenses[1], left_from_right };
+    let [left_lens, right_lens] = [calibrated(&lenses[0]), calibrated(&lenses[1])];
+    let pose = nalgebra::Matrix6::from_diagonal(&[1e-8, 1e-8, 1e-8, 1e-4, 1e-4, 1e-4].into());
+    let shared = SharedCovariance::exact().with_lenses([&left_lens, &right_lens]).with_pose(&pose);
+    let (mut left, mut right) = (Vec::new(), Vec::new());
+    for i in 0..1000 {
+        let (theta, phi) = (97f64.to_radians() * f64::from(i) / 1000.0, 2.4 * f64::from(i));
+        let point = Vector3::new(theta.sin() * phi.cos(), theta.sin() * phi.sin(), theta.cos()) * 1000.0;
+        let in_right = (turn.inverse() * (point - left_from_right.origin().mm())).normalize();
+        if in_right.z > 98f64.to_radians().cos() {
+            left.push(point.normalize().into());
+            right.push(in_right.into());
+        }
+    }
+    let mut found = BatchPair::new(&pair, PIXEL_SIGMA, &shared).triangulate(&left, &right);
+    let mut seen = 0;
+    for (row, &[xx, xy, xz, yy, yz, zz]) in found.covariances.iter().enumerate() {
+        let Some((_, covariance)) = expected([&left[row], &right[row]], &pair, &shared) else { continue };
+        let off = (nalgebra::Matrix3::new(xx, xy, xz, xy, yy, yz, xz, yz, zz) - covariance).amax();
+        assert!(off < 1e-8 * covariance.trace(), "row {row}: {off} of {covariance}");
+        seen += 1;
+    }
+    assert!(seen > 600 && seen + 20 > left.len(), "{seen} of {}", left.len());
+
+    // Into the same memory once more.
+    let first = found.clone();
+    let memory = found.covariances.as_ptr();
+    found.clear();
+    BatchPair::new(&pair, PIXEL_SIGMA, &shared).triangulate_into(&left[..301], &right, &mut found);
+    assert_eq!((found.covariances.len(), found.covariances.as_ptr()), (301, memory));
+    BatchPair::new(&pair, PIXEL_SIGMA, &shared).triangulate_into(&left[301..], &right[301..], &mut found);
+    let bits = |points: &BatchPoints| {
+        let bits = |c: &f64| if c.is_nan() { 0 } else { c.to_bits() };
+        points.covariances.iter().flatten().map(bits).collect::<Vec<_>>()
+    };
+    assert_eq!(bits(&found), bits(&first));
 }

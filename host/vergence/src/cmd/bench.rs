@@ -21,7 +21,7 @@ enum Task {
     /// Measures calibration and the detection of targets, beside OpenCV and SciPy.
     ///
     /// Solves every fisheye set and detects every chessboard, then lets OpenCV (cv2.fisheye.calibrate with its crude
-    /// guess, the SB detector) and SciPy's bundle adjustment do the same. Everything runs on one thread.
+    /// guess, the classic detector and the SB detector) and SciPy's bundle adjustment do the same. Everything runs on one thread.
     Calibrate(calibrate::Args),
     /// Counts right matches over the angle between the optical axes: whole images, views, and without networks.
     Matching(matching::Args),

@@ -26,7 +26,7 @@ pub(super) struct Derivatives {
 }
 
 /// Pixels of many points with their derivatives, by index of the point.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, Default, PartialEq)]
 pub struct ProjectedPoints {
     rows: Vec<[f64; NUMBERS]>,
     focal_lengths: [f64; 2],
@@ -75,14 +75,14 @@ impl Derivatives {
         Self { k, slope, aspect: lens.aspect(), centre: [centre.u, centre.v], theta_max: lens.theta_max().rad() }
     }
 
-    pub(super) fn of(&self, points: &[[f64; 3]], best: bool) -> ProjectedPoints {
-        let mut rows = Vec::new();
+    pub(super) fn of(&self, points: &[[f64; 3]], best: bool, out: &mut ProjectedPoints) {
+        out.rows.clear();
+        out.focal_lengths = [self.k[0], self.k[0] * self.aspect];
         if best {
-            derive_best(self, points, &mut rows);
+            derive_best(self, points, &mut out.rows);
         } else {
-            for_rows::<ALWAYS_FUSED, LANES, 3, NUMBERS>(self, points, &mut rows);
+            for_rows::<ALWAYS_FUSED, LANES, 3, NUMBERS>(self, points, &mut out.rows);
         }
-        ProjectedPoints { rows, focal_lengths: [self.k[0], self.k[0] * self.aspect] }
     }
 }
 

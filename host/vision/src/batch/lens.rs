@@ -57,7 +57,15 @@ impl BatchLens {
     /// Projects points as [`Self::project`] does, with the derivatives of the pixels by the points and by the lens.
     #[must_use]
     pub fn project_with_derivatives(&self, points: &[[f64; 3]]) -> ProjectedPoints {
-        self.derivatives.of(points, self.instructions == Instructions::Best)
+        let mut out = ProjectedPoints::default();
+        self.project_with_derivatives_into(points, &mut out);
+        out
+    }
+
+    /// Like [`Self::project_with_derivatives`], but replaces what is in `out` and keeps its memory. In memory that was used before,
+    /// a large array takes much less time than in new memory, whose pages the system must clear.
+    pub fn project_with_derivatives_into(&self, points: &[[f64; 3]], out: &mut ProjectedPoints) {
+        self.derivatives.of(points, self.instructions == Instructions::Best, out);
     }
 
     /// Unprojects pixels (N × 2) to rays (N × 3 in the camera frame), unit vectors to 1e-14. Rows are NaN beyond

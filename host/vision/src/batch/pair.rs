@@ -2,30 +2,28 @@
 //!
 //! The derivation is that of [`crate::PointUncertainty`], written along three directions: a turn of the left ray moves
 //! the point along the right ray v, a turn of the right ray moves it along the left ray u, and both move it along the
-//! normal n of their plane. A *gradient* is the movement of the point along one of the three per turn of a ray, in
-//! mm/rad:
+//! normal n of their plane. With P the point, Q = P - t, λ and μ their lengths and A = |t × P|, a turn in the plane by a
+//! radian moves the point by
 //!
 //! ```text
-//! along v: λ n × u / s by the left ray      along u: -μ n × v / s by the right ray      along n: λ n / 2 and μ n / 2
+//! λ v / s = λ² Q / A by the left ray      -μ u / s = -μ² P / A by the right ray      across it: λ n / 2 and μ n / 2
 //! ```
 //!
-//! Only these three rows of derivatives by the shared parameters are multiplied with the shared covariance.
+//! A turn ω of the right camera turns its ray by n·ω in the plane and by -w·ω across it, with w = n × v; a shift δ turns it by
+//! w·δ / μ and by n·δ / μ.
 
 use multiversion::multiversion;
 use multiversion::target::target_cfg_f;
-use nalgebra::{Matrix3, Vector3};
+use nalgebra::Matrix3;
 
 use super::Instructions;
-use super::lanes::{ALWAYS_FUSED, Kernel, multiply_add};
-use super::pairs::for_pairs;
-use super::slope::{Gradient, LensSlope};
+use super::lanes::{ALWAYS_FUSED, Kernel};
+use super::pairs::{NARROW, WIDE, for_pairs};
+use super::shared_errors::{ByPose, SharedErrors};
+use super::slope::LensSlope;
 use super::triangulate::Triangulate;
-use super::vectors::{Vectors, cross, dot, scaled, turned, unit};
-use crate::lens_derivatives::LENS_PARAMETERS;
-use crate::{Angle, SHARED_PARAMETERS, SharedCovariance, StereoPair};
-
-/// Rows per step: one vector of eight lanes, or two of four.
-const LANES: usize = 8;
+use super::vectors::{Vectors, cross, dot, scaled, turned};
+use crate::{Angle, SharedCovariance, StereoPair};
 
 /// A stereo pair prepared for whole arrays of rays: pseudo-intersections with the covariance of
 /// [`crate::PointUncertainty::covariance`], several times faster than one by one.
@@ -34,8 +32,8 @@ pub struct BatchPair {
     place: Triangulate,
     lenses: [LensSlope; 2],
     left_from_right: Matrix3<f64>,
-    shared: [[f64; SHARED_PARAMETERS]; SHARED_PARAMETERS],
-    pixel_variance: f64,
+    right_from_left: Matrix3<f64>,
+    shared: SharedErrors,
     instructions: Instructions,
 }
 
@@ -53,12 +51,14 @@ impl BatchPair {
     /// the covariance `shared` of lenses and pose.
     #[must_use]
     pub fn new(pair: &StereoPair<'_>, pixel_sigma: f64, shared: &SharedCovariance) -> Self {
+        let lenses = [pair.left, pair.right];
+        let left_from_right = pair.left_from_right.rotation().to_rotation_matrix().into_inner();
         Self {
             place: Triangulate::new(&pair.left_from_right.origin(), Angle::from_rad(0.0)),
-            lenses: [pair.left, pair.right].map(LensSlope::new),
-            left_from_right: pair.left_from_right.rotation().to_rotation_matrix().into_inner(),
-            shared: std::array::from_fn(|row| std::array::from_fn(|column| shared.matrix()[(row, column)])),
-            pixel_variance: pixel_sigma * pixel_sigma,
+            lenses: lenses.map(LensSlope::new),
+            left_from_right,
+            right_from_left: left_from_right.transpose(),
+            shared: SharedErrors::new(lenses, pixel_sigma * pixel_sigma, shared),
             instructions: Instructions::Best,
         }
     }
@@ -74,185 +74,153 @@ impl BatchPair {
     #[must_use]
     pub fn triangulate(&self, left: &[[f64; 3]], right: &[[f64; 3]]) -> BatchPoints {
         let mut out = BatchPoints::default();
+        self.triangulate_into(left, right, &mut out);
+        out
+    }
+
+    /// Like [`Self::triangulate`], but appends the results to `out`. In memory that was used before, a large array takes
+    /// much less time than in new memory, whose pages the system must clear.
+    pub fn triangulate_into(&self, left: &[[f64; 3]], right: &[[f64; 3]], out: &mut BatchPoints) {
         let count = left.len().min(right.len());
         let rays = [&left[..count], &right[..count]];
         match self.instructions {
-            Instructions::Best => best(self, rays, &mut out),
-            Instructions::Baseline => all::<ALWAYS_FUSED>(self, rays, &mut out),
+            Instructions::Best => best(self, rays, out),
+            Instructions::Baseline => all::<ALWAYS_FUSED, NARROW>(self, rays, out),
         }
-        out
+    }
+}
+
+impl BatchPoints {
+    /// Removes all rows and keeps their memory.
+    pub fn clear(&mut self) {
+        self.points.clear();
+        self.covariances.clear();
     }
 }
 
 #[multiversion(targets("x86_64+avx512f+avx512dq+avx512vl+avx2+fma", "x86_64+avx2+fma"))]
 fn best(pair: &BatchPair, rays: [&[[f64; 3]]; 2], out: &mut BatchPoints) {
-    if target_cfg_f!(target_feature = "fma") {
-        all::<true>(pair, rays, out);
+    if target_cfg_f!(target_feature = "avx512f") {
+        all::<true, WIDE>(pair, rays, out);
+    } else if target_cfg_f!(target_feature = "fma") {
+        all::<true, NARROW>(pair, rays, out);
     } else {
-        all::<ALWAYS_FUSED>(pair, rays, out);
+        all::<ALWAYS_FUSED, NARROW>(pair, rays, out);
     }
 }
 
 #[inline(always)]
-fn all<const FUSED: bool>(pair: &BatchPair, rays: [&[[f64; 3]]; 2], out: &mut BatchPoints) {
-    for_pairs::<FUSED, LANES, 9, 6>(pair, rays, &mut out.points, &mut out.covariances);
+fn all<const FUSED: bool, const W: usize>(pair: &BatchPair, rays: [&[[f64; 3]]; 2], out: &mut BatchPoints) {
+    for_pairs::<FUSED, W, 9, 6>(pair, rays, &mut out.points, &mut out.covariances);
 }
 
-/// The derivatives of one number by the shared parameters, for each lane.
-type Row<const W: usize> = [[f64; W]; SHARED_PARAMETERS];
-
-/// The rays to the point, the normal of their plane, both ranges in millimetres, and one over the sine of the parallax.
+/// A point P per lane, Q = P - t, the unit normal of the epipolar plane, and how far turns of the rays move the point.
 struct Geometry<const W: usize> {
-    left: Vectors<W>,
-    right: Vectors<W>,
+    point: Vectors<W>,
+    from_right: Vectors<W>,
     normal: Vectors<W>,
-    ranges: [[f64; W]; 2],
-    per_sine: [f64; W],
+    /// 1 / λ and 1 / μ, in 1/mm.
+    per_range: [[f64; W]; 2],
+    /// λ² / A and -μ² / A: movement along Q and P per turn in the plane.
+    in_plane: [[f64; W]; 2],
+    /// λ / 2 and μ / 2: movement along the normal, in mm, per turn across the plane.
+    across: [[f64; W]; 2],
 }
 
 impl Kernel<6, 9> for BatchPair {
     #[inline(always)]
     fn lanes<const FUSED: bool, const W: usize>(&self, [ux, uy, uz, vx, vy, vz]: [[f64; W]; 6]) -> [[f64; W]; 9] {
-        let [vx, vy, vz] = turned::<FUSED, W>(&self.left_from_right, &[vx, vy, vz]);
-        let [x, y, z, ..] = self.place.lanes::<FUSED, W>([ux, uy, uz, vx, vy, vz]);
-        let geometry = Geometry::of::<FUSED>(&self.place.t, &[x, y, z]);
-        let (rows, pixels) = self.rows::<FUSED, W>(&geometry);
-        let [v, u, n] = &rows;
-        let weighted = [self.weighted::<FUSED, W>(v), self.weighted::<FUSED, W>(u), self.weighted::<FUSED, W>(n)];
-        let mut moved = [[[0.0; W]; 3]; 3];
-        for (i, row) in rows.iter().enumerate() {
-            for (k, weighted) in weighted.iter().enumerate().skip(i) {
-                moved[i][k] = pixels[i][k];
-                for (a, b) in row.iter().zip(weighted) {
-                    for j in 0..W {
-                        moved[i][k][j] = multiply_add::<FUSED>(a[j], b[j], moved[i][k][j]);
-                    }
-                }
-                moved[k][i] = moved[i][k];
-            }
-        }
-        let [xx, xy, xz, yy, yz, zz] = in_space::<FUSED, W>(&moved, &[geometry.right, geometry.left, geometry.normal]);
+        let right = turned::<FUSED, W>(&self.left_from_right, &[vx, vy, vz]);
+        let at = Geometry::of::<FUSED>(&self.place, &[ux, uy, uz], &right);
+        let [left_lens, right_lens] = &self.lenses;
+        let mut left = left_lens.at::<FUSED, W>(&at.point, &at.per_range[0], &at.normal);
+        let from_right = turned::<FUSED, W>(&self.right_from_left, &at.from_right);
+        let normal = turned::<FUSED, W>(&self.right_from_left, &at.normal);
+        let mut right = right_lens.at::<FUSED, W>(&from_right, &at.per_range[1], &normal);
+        let mut pose = at.turns_by_pose::<FUSED>();
+        scale(&mut left.turns, [&at.in_plane[0], &at.across[0]]);
+        scale(&mut right.turns, [&at.in_plane[1], &at.across[1]]);
+        scale(&mut pose, [&at.in_plane[1], &at.across[1]]);
+        let moved = self.shared.moved::<FUSED, W>(&left, &right, &pose);
+        let [xx, xy, xz, yy, yz, zz] = in_space::<FUSED, W>(&moved, &[at.from_right, at.point, at.normal]);
+        let [x, y, z] = at.point;
         [x, y, z, xx, xy, xz, yy, yz, zz]
     }
 }
 
-impl BatchPair {
-    /// The derivatives of the point along v, u and n by the shared parameters, and their covariance from pixel noise.
+impl<const W: usize> Geometry<W> {
+    /// Everything is NaN where the rays make no point.
     #[inline(always)]
-    fn rows<const FUSED: bool, const W: usize>(&self, at: &Geometry<W>) -> ([Row<W>; 3], [[[f64; W]; 3]; 3]) {
-        let Geometry { left, right, normal, ranges: [left_range, right_range], per_sine } = at;
-        let (mut by_left, mut by_right) = ([0.0; W], [0.0; W]);
-        let (mut half_left, mut half_right) = ([0.0; W], [0.0; W]);
-        // A shift of the centre by δ acts as a turn of the ray by δ / μ.
-        let mut per_right_range = [0.0; W];
+    fn of<const FUSED: bool>(place: &Triangulate, u: &Vectors<W>, v: &Vectors<W>) -> Self {
+        let mut out = Self {
+            point: [[0.0; W]; 3],
+            from_right: [[0.0; W]; 3],
+            normal: [[0.0; W]; 3],
+            per_range: [[0.0; W]; 2],
+            in_plane: [[0.0; W]; 2],
+            across: [[0.0; W]; 2],
+        };
         for j in 0..W {
-            by_left[j] = left_range[j] * per_sine[j];
-            by_right[j] = -right_range[j] * per_sine[j];
-            half_left[j] = 0.5 * left_range[j];
-            half_right[j] = 0.5 * right_range[j];
-            per_right_range[j] = 1.0 / right_range[j];
-        }
-        let in_plane_left = scaled(&by_left, &cross::<FUSED, W>(normal, left));
-        let in_plane_right = scaled(&by_right, &cross::<FUSED, W>(normal, right));
-        let (across_left, across_right) = (scaled(&half_left, normal), scaled(&half_right, normal));
-
-        let back = self.left_from_right.transpose();
-        let [left_lens, right_lens] = &self.lenses;
-        let left_slope = left_lens.at::<FUSED, W>(left);
-        let right_slope = right_lens.at::<FUSED, W>(&turned::<FUSED, W>(&back, right));
-        let left_rows = [left_slope.along::<FUSED>(&in_plane_left), left_slope.along::<FUSED>(&across_left)];
-        let right_rows = [
-            right_slope.along::<FUSED>(&turned::<FUSED, W>(&back, &in_plane_right)),
-            right_slope.along::<FUSED>(&turned::<FUSED, W>(&back, &across_right)),
-        ];
-
-        let mut rows = [[[0.0; W]; SHARED_PARAMETERS]; 3];
-        for (row, found) in [(0, &left_rows[0]), (2, &left_rows[1])] {
-            rows[row][..LENS_PARAMETERS].copy_from_slice(&found.by_lens);
-        }
-        for (row, found, gradient) in [(1, &right_rows[0], &in_plane_right), (2, &right_rows[1], &across_right)] {
-            rows[row][LENS_PARAMETERS..][..LENS_PARAMETERS].copy_from_slice(&found.by_lens);
-            rows[row][2 * LENS_PARAMETERS..][..3].copy_from_slice(&cross::<FUSED, W>(right, gradient));
-            rows[row][2 * LENS_PARAMETERS + 3..].copy_from_slice(&scaled(&per_right_range, gradient));
-        }
-        (rows, self.pixel_noise::<FUSED, W>(&left_rows, &right_rows))
-    }
-
-    /// The covariance of the movements along v, u and n from pixel noise. `left` and `right` hold the gradients in the
-    /// epipolar plane and across it.
-    #[inline(always)]
-    fn pixel_noise<const FUSED: bool, const W: usize>(
-        &self,
-        left: &[Gradient<W>; 2],
-        right: &[Gradient<W>; 2],
-    ) -> [[[f64; W]; 3]; 3] {
-        let mut covariance = [[[0.0; W]; 3]; 3];
-        for j in 0..W {
-            let product = |a: &Gradient<W>, b: &Gradient<W>| {
-                let ([au, av], [bu, bv]) = (&a.by_pixel, &b.by_pixel);
-                multiply_add::<FUSED>(au[j], bu[j], av[j] * bv[j]) * self.pixel_variance
-            };
-            covariance[0][0][j] = product(&left[0], &left[0]);
-            covariance[0][2][j] = product(&left[0], &left[1]);
-            covariance[1][1][j] = product(&right[0], &right[0]);
-            covariance[1][2][j] = product(&right[0], &right[1]);
-            covariance[2][2][j] = product(&left[1], &left[1]) + product(&right[1], &right[1]);
-        }
-        covariance
-    }
-
-    /// The shared covariance times `row`.
-    #[inline(always)]
-    fn weighted<const FUSED: bool, const W: usize>(&self, row: &Row<W>) -> Row<W> {
-        let mut out = [[0.0; W]; SHARED_PARAMETERS];
-        for (sum, covariances) in out.iter_mut().zip(&self.shared) {
-            for (covariance, value) in covariances.iter().zip(row) {
-                for j in 0..W {
-                    sum[j] = multiply_add::<FUSED>(*covariance, value[j], sum[j]);
-                }
+            let (u, v) = ([u[0][j], u[1][j], u[2][j]].into(), [v[0][j], v[1][j], v[2][j]].into());
+            let place = place.place::<FUSED>(&u, &v);
+            let per_area = 1.0 / place.area_squared.sqrt() + place.valid;
+            for axis in 0..3 {
+                out.point[axis][j] = place.point[axis] + place.valid;
+                out.from_right[axis][j] = place.from_right[axis];
+                out.normal[axis][j] = place.area[axis] * per_area;
             }
+            let (left_range, right_range) = (place.left_squared.sqrt(), place.right_squared.sqrt());
+            (out.per_range[0][j], out.per_range[1][j]) = (1.0 / left_range, 1.0 / right_range);
+            out.in_plane[0][j] = place.left_squared * per_area;
+            out.in_plane[1][j] = -place.right_squared * per_area;
+            (out.across[0][j], out.across[1][j]) = (0.5 * left_range, 0.5 * right_range);
         }
         out
     }
-}
 
-impl<const W: usize> Geometry<W> {
+    /// The turn of the right ray in the epipolar plane, then across it, by the turn and the shift of the right camera.
     #[inline(always)]
-    fn of<const FUSED: bool>(t: &Vector3<f64>, point: &Vectors<W>) -> Self {
-        let centre = [[t.x; W], [t.y; W], [t.z; W]];
-        let mut from_right = *point;
-        for (from_right, centre) in from_right.iter_mut().zip(&centre) {
-            for j in 0..W {
-                from_right[j] -= centre[j];
-            }
-        }
-        let (left, left_range) = unit::<FUSED, W>(point);
-        let (right, right_range) = unit::<FUSED, W>(&from_right);
-        let (normal, _) = unit::<FUSED, W>(&cross::<FUSED, W>(&centre, point));
-        let mut per_sine = dot::<FUSED, W>(&cross::<FUSED, W>(&left, &right), &normal);
-        for sine in &mut per_sine {
-            *sine = 1.0 / *sine;
-        }
-        Self { left, right, normal, ranges: [left_range, right_range], per_sine }
+    fn turns_by_pose<const FUSED: bool>(&self) -> [ByPose<W>; 2] {
+        let per_range = &self.per_range[1];
+        let [nx, ny, nz] = self.normal;
+        let [wx, wy, wz] = scaled(per_range, &cross::<FUSED, W>(&self.normal, &self.from_right));
+        let [mx, my, mz] = scaled(&[-1.0; W], &[wx, wy, wz]);
+        let ([dx, dy, dz], [ex, ey, ez]) = (scaled(per_range, &[wx, wy, wz]), scaled(per_range, &self.normal));
+        [[nx, ny, nz, dx, dy, dz], [mx, my, mz, ex, ey, ez]]
     }
 }
 
-/// The upper triangle, by rows, of the covariance of a sum of `directions` whose factors have the covariance `moved`.
+/// Multiplies each row by a factor.
 #[inline(always)]
-fn in_space<const FUSED: bool, const W: usize>(
-    moved: &[[[f64; W]; 3]; 3],
-    directions: &[Vectors<W>; 3],
-) -> [[f64; W]; 6] {
-    let component = |axis: usize| [directions[0][axis], directions[1][axis], directions[2][axis]];
-    let mut out = [[0.0; W]; 6];
-    for (out, (row, column)) in out.iter_mut().zip([(0, 0), (0, 1), (0, 2), (1, 1), (1, 2), (2, 2)]) {
-        let (a, b) = (component(row), component(column));
-        for (a, moved) in a.iter().zip(moved) {
-            let inner = dot::<FUSED, W>(moved, &b);
+fn scale<const W: usize, const N: usize>(rows: &mut [[[f64; W]; N]; 2], factors: [&[f64; W]; 2]) {
+    for (row, factor) in rows.iter_mut().zip(factors) {
+        for value in row {
             for j in 0..W {
-                out[j] = multiply_add::<FUSED>(a[j], inner[j], out[j]);
+                value[j] *= factor[j];
             }
         }
+    }
+}
+
+/// The upper triangle, by rows, of the covariance of a sum of `directions` whose factors have the covariance `moved`, an
+/// upper triangle too.
+#[inline(always)]
+fn in_space<const FUSED: bool, const W: usize>(
+    [aa, ab, ac, bb, bc, cc]: &[[f64; W]; 6],
+    [a, b, c]: &[Vectors<W>; 3],
+) -> [[f64; W]; 6] {
+    let axes = [[a[0], b[0], c[0]], [a[1], b[1], c[1]], [a[2], b[2], c[2]]];
+    let mut inner = axes;
+    for (inner, axis) in inner.iter_mut().zip(&axes) {
+        *inner = [
+            dot::<FUSED, W>(&[*aa, *ab, *ac], axis),
+            dot::<FUSED, W>(&[*ab, *bb, *bc], axis),
+            dot::<FUSED, W>(&[*ac, *bc, *cc], axis),
+        ];
+    }
+    let mut out = [[0.0; W]; 6];
+    for (out, (row, column)) in out.iter_mut().zip([(0, 0), (0, 1), (0, 2), (1, 1), (1, 2), (2, 2)]) {
+        *out = dot::<FUSED, W>(&axes[row], &inner[column]);
     }
     out
 }

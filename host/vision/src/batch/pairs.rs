@@ -2,6 +2,12 @@
 
 use super::lanes::{Kernel, columns_of, padded, rows_of};
 
+/// Rows per step with AVX-512: one vector. The kernels hold some thirty values per row, for which the sixteen registers of other
+/// processors are too few: two vectors of four lanes at a time take half as long again.
+pub(super) const WIDE: usize = 8;
+/// Rows per step with other instructions.
+pub(super) const NARROW: usize = 4;
+
 /// Runs `kernel` on every pair of rays. The first three of its `OUT` columns are appended to `points`, the other `REST`
 /// to `covariances`. Both slices of rays have the same length.
 #[inline(always)]

@@ -6,11 +6,9 @@ use nalgebra::{Matrix3, Vector3};
 
 use super::Instructions;
 use super::lanes::{ALWAYS_FUSED, Kernel, multiply_add};
-use super::pairs::for_pairs;
+use super::pairs::{NARROW, WIDE, for_pairs};
 use crate::{Angle, Left, Point};
 
-/// Rows per step: one vector of eight lanes, or two of four. The kernel holds some thirty values per row.
-const LANES: usize = 8;
 /// Squared sine below which rays count as parallel, or a point as on the baseline.
 const VANISHING_SQUARED: f64 = 1e-18;
 
@@ -65,7 +63,7 @@ impl BatchTriangulation {
         let kernel = Triangulate::new(&self.right_centre, sigma);
         match instructions {
             Instructions::Best => triangulate_best(&kernel, rays, self),
-            Instructions::Baseline => triangulate_all::<ALWAYS_FUSED>(&kernel, rays, self),
+            Instructions::Baseline => triangulate_all::<ALWAYS_FUSED, NARROW>(&kernel, rays, self),
         }
     }
 
@@ -89,22 +87,28 @@ impl BatchTriangulation {
 
 #[multiversion(targets("x86_64+avx512f+avx512dq+avx512vl+avx2+fma", "x86_64+avx2+fma"))]
 fn triangulate_best(kernel: &Triangulate, rays: [&[[f64; 3]]; 2], out: &mut BatchTriangulation) {
-    if target_cfg_f!(target_feature = "fma") {
-        triangulate_all::<true>(kernel, rays, out);
+    if target_cfg_f!(target_feature = "avx512f") {
+        triangulate_all::<true, WIDE>(kernel, rays, out);
+    } else if target_cfg_f!(target_feature = "fma") {
+        triangulate_all::<true, NARROW>(kernel, rays, out);
     } else {
-        triangulate_all::<ALWAYS_FUSED>(kernel, rays, out);
+        triangulate_all::<ALWAYS_FUSED, NARROW>(kernel, rays, out);
     }
 }
 
 #[inline(always)]
-fn triangulate_all<const FUSED: bool>(kernel: &Triangulate, rays: [&[[f64; 3]]; 2], out: &mut BatchTriangulation) {
-    for_pairs::<FUSED, LANES, 7, 4>(kernel, rays, &mut out.points, &mut out.covariances);
+fn triangulate_all<const FUSED: bool, const W: usize>(
+    kernel: &Triangulate,
+    rays: [&[[f64; 3]]; 2],
+    out: &mut BatchTriangulation,
+) {
+    for_pairs::<FUSED, W, 7, 4>(kernel, rays, &mut out.points, &mut out.covariances);
 }
 
 /// The parameters of a pair that triangulation needs.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct Triangulate {
-    pub t: Vector3<f64>,
+    t: Vector3<f64>,
     /// One over the length of t.
     per_baseline: f64,
     variance: f64,
@@ -131,10 +135,26 @@ impl Triangulate {
         Self { t, per_baseline: 1.0 / t.norm(), variance: sigma.rad() * sigma.rad() }
     }
 
-    /// The formulas of the single-point functions without a square root: n enters only as w wᵀ / w·w, with w along t ×
-    /// S.
+    /// The point and its covariance, as in [`BatchTriangulation`].
     #[inline(always)]
     fn row<const FUSED: bool>(&self, u: &Vector3<f64>, v: &Vector3<f64>) -> [f64; 7] {
+        let place = self.place::<FUSED>(u, v);
+        let Place { point: p, left_squared, right_squared, valid, .. } = place;
+        let along = dot::<FUSED>(&p, &self.t) * self.per_baseline;
+        let beyond = dot::<FUSED>(&place.from_right, &self.t) * self.per_baseline;
+        let scale = self.variance * (self.per_baseline * self.per_baseline) + valid;
+        let (by_left, by_right) = (scale * left_squared * left_squared, scale * right_squared * right_squared);
+        let per_height = 1.0 / self.height_squared(&place).sqrt();
+        let (left_beyond, right_along) = (by_left * beyond * per_height, by_right * along * per_height);
+        let xx = multiply_add::<FUSED>(left_beyond, beyond, right_along * along) * per_height;
+        let across = self.variance * 0.25 * (left_squared + right_squared) + valid;
+        [p.x + valid, p.y + valid, p.z + valid, xx, left_beyond + right_along, by_left + by_right, across]
+    }
+
+    /// The pseudo-intersection by the formulas of the single-point functions without a square root: n enters only as w wᵀ /
+    /// w·w, with w along t × S.
+    #[inline(always)]
+    pub(super) fn place<const FUSED: bool>(&self, u: &Vector3<f64>, v: &Vector3<f64>) -> Place {
         let t = &self.t;
         let (cross, dot) = (cross::<FUSED>, dot::<FUSED>);
         let (tu, tv, uv) = (cross(t, u), cross(t, v), cross(u, v));
@@ -144,30 +164,50 @@ impl Triangulate {
         let per_determinant = 1.0 / determinant;
         let (left_range, right_range) = (dot(&tv, &w) * per_determinant, dot(&tu, &w) * per_determinant);
         let per_ww = 1.0 / ww;
-        let p = sum::<FUSED>(left_range, u, -left_range * dot(u, &w) * per_ww, &w);
-        let q = p - t;
-
-        let (pp, qq, along) = (dot(&p, &p), dot(&q, &q), dot(&p, t) * self.per_baseline);
-        let beyond = dot(&q, t) * self.per_baseline;
-        let area = cross(t, &p);
-        let height_squared = dot(&area, &area) * (self.per_baseline * self.per_baseline);
+        let point = sum::<FUSED>(left_range, u, -left_range * dot(u, &w) * per_ww, &w);
+        let from_right = point - t;
+        let area = cross(t, &point);
+        let mut place = Place {
+            point,
+            from_right,
+            left_squared: dot(&point, &point),
+            right_squared: dot(&from_right, &from_right),
+            area,
+            area_squared: dot(&area, &area),
+            valid: 0.0,
+        };
         let good = lambda > 0.0
             && mu > 0.0
             && left_range > 0.0
             && right_range > 0.0
             && dot(&uv, &uv) > VANISHING_SQUARED
             && determinant * determinant > VANISHING_SQUARED * ww
-            && height_squared > VANISHING_SQUARED * pp;
-        let valid = if good { 0.0 } else { f64::NAN };
-
-        let scale = self.variance * (self.per_baseline * self.per_baseline) + valid;
-        let (by_left, by_right) = (scale * pp * pp, scale * qq * qq);
-        let per_height = 1.0 / height_squared.sqrt();
-        let (left_beyond, right_along) = (by_left * beyond * per_height, by_right * along * per_height);
-        let xx = multiply_add::<FUSED>(left_beyond, beyond, right_along * along) * per_height;
-        let across = self.variance * 0.25 * (pp + qq) + valid;
-        [p.x + valid, p.y + valid, p.z + valid, xx, left_beyond + right_along, by_left + by_right, across]
+            && self.height_squared(&place) > VANISHING_SQUARED * place.left_squared;
+        place.valid = if good { 0.0 } else { f64::NAN };
+        place
     }
+
+    /// The square of the distance of the point from the baseline.
+    #[inline(always)]
+    fn height_squared(&self, place: &Place) -> f64 {
+        place.area_squared * (self.per_baseline * self.per_baseline)
+    }
+}
+
+/// A pseudo-intersection P, in mm.
+pub(super) struct Place {
+    pub point: Vector3<f64>,
+    /// P - t.
+    pub from_right: Vector3<f64>,
+    /// |P|².
+    pub left_squared: f64,
+    /// |P - t|².
+    pub right_squared: f64,
+    /// t × P.
+    pub area: Vector3<f64>,
+    pub area_squared: f64,
+    /// Zero, or NaN where the rays make no point.
+    pub valid: f64,
 }
 
 #[inline(always)]

@@ -38,17 +38,6 @@ pub(super) fn scaled<const W: usize>(factor: &[f64; W], vector: &Vectors<W>) -> 
     out
 }
 
-/// The unit vector along `vector`, and the length of `vector`.
-#[inline(always)]
-pub(super) fn unit<const FUSED: bool, const W: usize>(vector: &Vectors<W>) -> (Vectors<W>, [f64; W]) {
-    let (mut norm, mut per_norm) = (dot::<FUSED, W>(vector, vector), [0.0; W]);
-    for j in 0..W {
-        norm[j] = norm[j].sqrt();
-        per_norm[j] = 1.0 / norm[j];
-    }
-    (scaled(&per_norm, vector), norm)
-}
-
 #[inline(always)]
 pub(super) fn turned<const FUSED: bool, const W: usize>(turn: &Matrix3<f64>, vector: &Vectors<W>) -> Vectors<W> {
     let mut out = [[0.0; W]; 3];

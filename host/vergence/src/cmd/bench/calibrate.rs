@@ -15,8 +15,8 @@ use crate::failure::Failure;
 use crate::stopwatch::clock;
 
 /// Solves every fisheye set and detects every chessboard, then lets OpenCV (`cv2.fisheye.calibrate` with its crude guess,
-/// the SB detector) and SciPy's bundle adjustment do the same by the scripts in the folder `bench` beside the data.
-/// Everything runs on one thread; seconds are medians.
+/// the classic detector and the SB detector) and SciPy's bundle adjustment do the same, for the solutions by a script in the
+/// folder `bench` beside the data. Everything runs on one thread; seconds are medians.
 #[derive(Debug, clap::Args)]
 pub struct Args {
     /// The folder with `data` and `bench`; without it ../shared.
@@ -78,6 +78,6 @@ fn detection(
     let paths = named_images(&[set.join(pattern).to_string_lossy().into_owned()])?;
     let found = thread.detect_files(&paths, &target)?;
     let peer = peer.map(|peer| peer.detect(&paths, meta.board_inner_corners)).transpose()?;
-    console.say(found.in_words(name, peer))?;
-    Ok(found.json(name, peer))
+    console.say(found.in_words(name, peer.as_ref()))?;
+    Ok(found.json(name, peer.as_ref()))
 }

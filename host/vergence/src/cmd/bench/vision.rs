@@ -7,10 +7,10 @@ use crate::failure::Failure;
 use crate::stopwatch::clock;
 
 /// Measures arrays of N x 3 and N x 2 numbers, on one thread: nanoseconds per point, the least of several runs, with OpenCV
-/// and this program taking turns. cv2.fisheye.projectPoints always computes derivatives: projection with derivatives by point and
-/// lens is compared with it, projection alone with distortPoints, which ends at 90 degrees. Pixels, rays, and points with the errors they share go into new arrays; points with
-/// their closed-form covariance, 56 bytes each, into arrays that exist ("anew": into new ones). Without OpenCV (python3 -m
-/// pip install opencv-python-headless numpy) its figures are null.
+/// and this program taking turns. Results of both go into arrays that exist; "anew" is this program into new ones.
+/// cv2.fisheye.projectPoints always computes derivatives: projection with derivatives by point and lens is compared with it,
+/// projection alone with distortPoints, which ends at 90 degrees. Without OpenCV (python3 -m pip install
+/// opencv-python-headless numpy) its figures are null.
 #[derive(Debug, clap::Args)]
 pub struct Args {
     /// How many points.
@@ -31,6 +31,7 @@ pub fn run(args: &Args, console: Console) -> Result<(), Failure> {
     for (name, times) in [(bench.instructions, &bench.best), ("baseline", &bench.baseline)] {
         console.say(format!("{name:>10}: {}", times.in_words(opencv.ok())))?;
     }
+    console.say(format!("{:>10}: {}", "anew", bench.anew.in_words(None)))?;
     match opencv {
         Ok(peer) => console.say(format!(
             "{:>10}: project {:.1} (distortPoints), with derivatives {:.1} (projectPoints), unproject {:.1} (version {})",
