@@ -13,11 +13,10 @@ use common::data::say_skipped;
 use image::imageops::grayscale;
 use nalgebra::{UnitQuaternion, Vector3};
 use serde_json::Value;
-use vergence_calibration::detect::detect_april_grid;
-use vergence_calibration::{AprilGridSpec, TargetKind};
 use vergence_calibration_input::printed;
 use vergence_scene::{Optics, Target};
 use vergence_sim::photograph_target;
+use vergence_targets::{AprilGridSpec, TargetKind, detect_april_grid};
 use vergence_vision::{Angle, Camera, ImageSize, KannalaBrandt, Length, Pixel, Point, Transform, World};
 
 /// The interpreter, if it has the module; else the test is skipped, or fails where data are required.

@@ -1,12 +1,11 @@
 //! The cameras of a rig that drives itself, attached or simulated.
 
 use vergence_board::Shared;
-use vergence_calibration::detect::TAG_BORDER;
-use vergence_calibration::{AprilGridSpec, TargetKind, TargetSpec};
 use vergence_camera::Camera;
 use vergence_rig::Rig;
 use vergence_scene::{Sheet, TagGrid, TagPrint, Target};
 use vergence_sim::{HeldTarget, SimulatedRig, TargetCamera};
+use vergence_targets::{AprilGridSpec, TAG_BORDER, TargetKind, TargetSpec};
 use vergence_vision::Side;
 
 /// The cameras of a rig.

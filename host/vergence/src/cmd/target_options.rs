@@ -2,8 +2,8 @@
 
 use std::path::PathBuf;
 
-use vergence_calibration::{AprilGridSpec, TargetKind, TargetSpec};
 use vergence_calibration_input::read_target;
+use vergence_targets::{AprilGridSpec, TargetKind, TargetSpec};
 use vergence_vision::Length;
 
 use crate::console::Console;

@@ -1,6 +1,6 @@
 //! Checks of the size of a target.
 
-use vergence_calibration::{TargetKind, TargetView};
+use vergence_targets::{TargetKind, TargetView};
 use vergence_vision::Length;
 
 use crate::failure::Failure;

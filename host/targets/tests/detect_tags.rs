@@ -6,9 +6,10 @@ mod simulated;
 use image::{DynamicImage, GrayImage};
 use nalgebra::{Isometry3, UnitQuaternion, Vector3};
 use simulated::Dice;
-use vergence_calibration::detect::{DetectError, DetectedCorner, Placement, TAG_BORDER, detect, detect_april_grid};
-use vergence_calibration::{AprilGridSpec, TargetSpec};
 use vergence_scene::{Optics, Scene, Sheet, TagGrid, TagPrint, Target, View, render};
+use vergence_targets::{
+    AprilGridSpec, DetectError, DetectedCorner, Placement, TAG_BORDER, TargetSpec, detect, detect_april_grid,
+};
 use vergence_vision::{Angle, Camera, ImageSize, KannalaBrandt, Length, Pixel, Point, Transform, World};
 
 const GRID: AprilGridSpec = AprilGridSpec { columns: 6, rows: 6, tag: Length::from_mm(24.0), spacing: 0.3 };

@@ -70,12 +70,14 @@ impl Corner {
     }
 
     /// `error_px` divided by the corner's relative sigma.
-    pub(crate) fn deviation(&self, error_px: f64) -> f64 {
+    #[must_use]
+    pub fn deviation(&self, error_px: f64) -> f64 {
         error_px / self.relative_sigma
     }
 
     /// Whether all coordinates are finite and the relative sigma is finite and positive.
-    pub(crate) fn is_usable(&self) -> bool {
+    #[must_use]
+    pub fn is_usable(&self) -> bool {
         let [x, y] = self.target_mm;
         let numbers = [x, y, self.pixel.u, self.pixel.v, self.relative_sigma];
         numbers.iter().all(|number| number.is_finite()) && self.relative_sigma > 0.0

@@ -11,7 +11,7 @@ use std::collections::BTreeMap;
 
 use image::GrayImage;
 use nalgebra::Vector2;
-use vergence_vision::{KannalaBrandt, Pixel};
+use vergence_vision::{KannalaBrandt, Pixel, median};
 
 use super::intensity::Intensity;
 use super::plane::TargetPlane;
@@ -20,7 +20,7 @@ use super::refine::refine;
 use super::saddle::Quadrants;
 use super::tags::{TagFamily, dark_quads, read_tag};
 use super::{CornerQuality, DetectError, DetectedCorner, FEWEST_CORNERS};
-use crate::{AprilGridSpec, median};
+use crate::AprilGridSpec;
 
 /// A tag in the image: its corners, clockwise from its upper left one.
 type Tag = [Vector2<f64>; 4];
