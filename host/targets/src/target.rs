@@ -4,7 +4,7 @@ use std::fmt;
 
 use vergence_vision::{Frame, Length, Pixel};
 
-use crate::AprilGridSpec;
+use crate::{AprilGridSpec, CharucoSpec};
 
 /// The frame of a target: x along its rows of corners, y along its columns, the target is the plane z = 0.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -30,6 +30,8 @@ pub enum TargetKind {
     Chessboard(TargetSpec),
     /// A grid of AprilTags, as Kalibr prints it.
     AprilGrid(AprilGridSpec),
+    /// A chessboard with markers, as OpenCV prints it.
+    Charuco(CharucoSpec),
 }
 
 /// A target as it is printed.
@@ -102,6 +104,11 @@ impl fmt::Display for TargetKind {
             Self::AprilGrid(AprilGridSpec { columns, rows, tag, spacing }) => {
                 write!(f, "{columns} × {rows} AprilTags of {tag}, spacing {spacing}")
             }
+            Self::Charuco(CharucoSpec { columns, rows, square, marker, dictionary, legacy }) => {
+                let pattern = if *legacy { ", legacy pattern" } else { "" };
+                let name = dictionary.name;
+                write!(f, "ChArUco board of {columns} × {rows} squares, {square}, markers {name} of {marker}{pattern}")
+            }
         }
     }
 }
@@ -113,6 +120,7 @@ impl TargetKind {
         match self {
             Self::Chessboard(board) => board.square,
             Self::AprilGrid(grid) => grid.tag,
+            Self::Charuco(board) => board.square,
         }
     }
 
@@ -122,6 +130,7 @@ impl TargetKind {
         match self {
             Self::Chessboard(board) => board.print(),
             Self::AprilGrid(grid) => grid.print(),
+            Self::Charuco(board) => board.print(),
         }
     }
 }

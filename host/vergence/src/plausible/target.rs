@@ -20,7 +20,7 @@ pub fn side_can_be_held(target: &TargetKind) -> Result<(), Failure> {
         return Ok(());
     }
     let (part, option) = match target {
-        TargetKind::Chessboard(_) => ("square", "--square"),
+        TargetKind::Chessboard(_) | TargetKind::Charuco(_) => ("square", "--square"),
         TargetKind::AprilGrid(_) => ("tag", "--tag"),
     };
     Err(Failure::usage(format!(
