@@ -1,4 +1,5 @@
-//! A camera and a pair calibrated by the command line from a grid of AprilTags that a file of Kalibr's describes.
+//! A camera and a pair calibrated by the command line from targets that say which corner is which: a grid of AprilTags that a file
+//! of Kalibr's describes, and a ChArUco board.
 #![allow(clippy::expect_used, clippy::print_stdout, reason = "a test fails loudly and shows its figures")]
 
 mod common;
@@ -23,32 +24,28 @@ fn number(value: &Value) -> f64 {
     value.as_f64().expect("a number")
 }
 
+const BOARD: [&str; 8] = ["--charuco", "6x5", "--square", "50mm", "--marker", "34mm", "--dictionary", "DICT_5X5_50"];
+
 #[test]
 fn a_simulated_lens_comes_back_within_its_stated_sigma() {
     let work = tempfile::tempdir().expect("a folder");
-    let file = |name: &str| work.path().join(name).to_string_lossy().into_owned();
-    let (rig, grid, set, page) = (file("rig.toml"), file("aprilgrid.yaml"), file("set"), file("report.html"));
-    std::fs::write(&rig, small_rig()).expect("a rig file");
+    let grid = work.path().join("aprilgrid.yaml").to_string_lossy().into_owned();
     std::fs::write(&grid, GRID).expect("a target file");
-    let taken = run_json(&[
-        "capture",
-        "--json",
-        "--rig",
-        &rig,
-        "--cameras",
-        "sim",
-        "--mono",
-        "--out",
-        &set,
-        "--frames",
-        "120",
-        "--target",
-        &grid,
-    ]);
+    lens_comes_back(&["--target", &grid], "4 × 3 AprilTags of 45 mm, spacing 0.3");
+    lens_comes_back(&BOARD, "ChArUco board of 6 × 5 squares, 50 mm, markers DICT_5X5_50 of 34 mm");
+}
+
+fn lens_comes_back(target: &[&str], described: &str) {
+    let work = tempfile::tempdir().expect("a folder");
+    let file = |name: &str| work.path().join(name).to_string_lossy().into_owned();
+    let (rig, set, page) = (file("rig.toml"), file("set"), file("report.html"));
+    std::fs::write(&rig, small_rig()).expect("a rig file");
+    let capture = ["capture", "--json", "--rig", &rig, "--cameras", "sim", "--mono", "--out", &set, "--frames", "120"];
+    let taken = run_json(&[&capture[..], target].concat());
     assert_eq!(taken["complete"], true, "{taken}");
     let images = format!("{set}/left*.png");
-    let found =
-        run_json(&["calibrate", "intrinsics", "--json", "--images", &images, "--target", &grid, "--report", &page]);
+    let calibrate = ["calibrate", "intrinsics", "--json", "--images", &images, "--report", &page];
+    let found = run_json(&[&calibrate[..], target].concat());
     let truth = Rig::from_toml(&small_rig()).expect("a rig").left_camera.to_opencv();
     let truth = [truth.fx, truth.fy, truth.cx, truth.cy, truth.k[0], truth.k[1], truth.k[2], truth.k[3]];
     println!("{} views, {} px rms, valid to {}°", taken["views"], found["rms_inlier_px"], found["theta_max_deg"]);
@@ -59,24 +56,28 @@ fn a_simulated_lens_comes_back_within_its_stated_sigma() {
     }
     assert!(number(&found["rms_inlier_px"]) < 0.1 && number(&found["theta_max_deg"]) > 92.0, "{found}");
     let html = std::fs::read_to_string(&page).expect("a report");
-    assert!(html.contains("4 × 3 AprilTags of 45 mm, spacing 0.3"));
+    assert!(html.contains(described));
 }
 
 #[test]
 fn a_simulated_pair_comes_back_within_its_stated_sigma() {
+    pair_comes_back(&["--tags", "4x3", "--tag", "45mm"]);
+    pair_comes_back(&BOARD);
+}
+
+fn pair_comes_back(target: &[&str]) {
     let work = tempfile::tempdir().expect("a folder");
     let file = |name: &str| work.path().join(name).to_string_lossy().into_owned();
     let (rig, set, lens) = (file("rig.toml"), file("set"), file("lens.toml"));
     std::fs::write(&rig, small_rig()).expect("a rig file");
-    let target = ["--tags", "4x3", "--tag", "45mm"];
     let capture = ["capture", "--json", "--rig", &rig, "--cameras", "sim", "--out", &set, "--views", "12"];
-    run_json(&[&capture[..], &target].concat());
+    run_json(&[&capture[..], target].concat());
     let rig = Rig::from_toml(&small_rig()).expect("a rig");
     let camera = CameraDocument { camera: CameraTable::of(&rig.left_camera), calibration: None, provenance: None };
     std::fs::write(&lens, toml::to_string(&camera).expect("TOML")).expect("written");
     let (left, right) = (format!("{set}/left*.png"), format!("{set}/right*.png"));
     let pair = ["calibrate", "extrinsics", "--json", "--left", &lens, "--right", &lens, "--left-images", &left];
-    let found = run_json(&[&pair[..], &["--right-images", &right], &target].concat());
+    let found = run_json(&[&pair[..], &["--right-images", &right], target].concat());
     let human: Vec<f64> = rig.mode("human").expect("a mode").targets.iter().map(|target| target.value()).collect();
     let truth = rig.pose_at_values(&human).left_from_right;
     let joint = &found["joint"];
@@ -135,4 +136,37 @@ fn a_grid_is_drawn_in_true_size_or_refused() {
     fails_with(&["target", "--target", &svg, "--out", &pdf], 2, &["grid.svg", "target_type"]);
     let nothing = ["calibrate", "intrinsics", "--images", &svg, "--target", &file("none.yaml")];
     fails_with(&nothing, 2, &["none.yaml"]);
+}
+
+#[test]
+fn a_charuco_board_is_drawn_in_true_size_or_refused() {
+    let work = tempfile::tempdir().expect("a folder");
+    let file = |name: &str| work.path().join(name).to_string_lossy().into_owned();
+    let (svg, pdf) = (file("board.svg"), file("board.pdf"));
+    let board = ["target", "--json", "--charuco", "9x6", "--square", "24mm"];
+    let drawn = |more: &[&str]| run_json(&[&board[..], more].concat());
+    drawn(&["--marker", "18mm", "--out", &svg]);
+    let drawing = std::fs::read_to_string(&svg).expect("a drawing");
+    // 27 of the 54 squares are black, and the upper and lower border of each of 27 markers of six cells.
+    assert_eq!(drawing.matches("width=\"24\" height=\"24\"").count(), 27);
+    assert!(drawing.matches("width=\"18\" height=\"3\"").count() >= 54);
+    assert!(drawing.contains("ChArUco board of 9 x 6 squares, 24 mm, markers DICT_4X4_50 of 18 mm;"));
+    let sheet = drawn(&["--marker", "18mm", "--dictionary", "DICT_7X7_1000", "--legacy-pattern", "--out", &pdf]);
+    assert!(sheet["target"].as_str().is_some_and(|target| target.ends_with("DICT_7X7_1000 of 18 mm, legacy pattern")));
+    assert!(std::fs::read(&pdf).expect("a drawing").starts_with(b"%PDF-1.4"));
+    let refused = |more: &[&str], words: &[&str]| {
+        let words_of_it = [&["target", "--out", &svg][..], more].concat();
+        fails_with(&words_of_it, 2, words);
+    };
+    refused(&["--charuco", "9x6", "--square", "24mm"], &["--marker"]);
+    refused(&["--charuco", "9x6", "--square", "24mm", "--marker", "24mm"], &["less than --square"]);
+    refused(&["--charuco", "9x6", "--square", "0mm", "--marker", "0mm"], &["positive"]);
+    refused(&["--charuco", "11x10", "--square", "20mm", "--marker", "9mm"], &["DICT_4X4_50 has 50", "this board 55"]);
+    refused(&["--charuco", "2x6", "--square", "20mm", "--marker", "9mm"], &["3x3"]);
+    refused(
+        &["--charuco", "9x6", "--square", "20mm", "--marker", "9mm", "--dictionary", "DICT_3X3_50"],
+        &["DICT_4X4_50", "6X6"],
+    );
+    refused(&["--charuco", "9x6", "--square", "24mm", "--marker", "18mm", "--corners", "9x6"], &["cannot be used"]);
+    refused(&["--corners", "9x6", "--square", "24mm", "--marker", "18mm"], &["--charuco"]);
 }

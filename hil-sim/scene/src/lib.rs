@@ -32,5 +32,5 @@ pub use optics::Optics;
 pub use range_map::RangeMap;
 pub use render::{Photograph, View, render, render_rolling};
 pub use scene::{Hit, Scene, SurfaceId};
-pub use sheet::{Sheet, TagGrid, TagPrint};
+pub use sheet::{MarkerBoard, Sheet, TagGrid, TagPrint};
 pub use target::Target;

@@ -16,6 +16,8 @@ pub enum Sheet {
     Checkerboard(Target),
     /// A grid of coded tags.
     Tags(TagGrid),
+    /// A checkerboard with coded markers.
+    Markers(MarkerBoard),
 }
 
 /// A grid of square tags with black borders and small black squares at their corners, which fill the gaps' crossings. The
@@ -31,6 +33,24 @@ pub struct TagGrid {
     /// Space between tags.
     pub gap: Length,
     /// What is printed in the tags.
+    pub code: TagPrint,
+}
+
+/// A checkerboard with coded markers in the middle of its white squares, numbered row by row from the upper left, and a white
+/// border of half a square. The origin of its frame is the first inner corner, as on a checkerboard.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct MarkerBoard {
+    /// Squares along x.
+    pub columns: u32,
+    /// Squares along y.
+    pub rows: u32,
+    /// Side of a square.
+    pub square: Length,
+    /// Side of a marker, its border included.
+    pub marker: Length,
+    /// Whether the square at the upper left is white.
+    pub white_first: bool,
+    /// What is printed in the markers.
     pub code: TagPrint,
 }
 
@@ -79,6 +99,27 @@ impl TagGrid {
     }
 }
 
+impl MarkerBoard {
+    /// Whether the place, in millimetres in the frame of the board, is black.
+    fn is_black(&self, x: f64, y: f64) -> bool {
+        let (column, row) = (x / self.square.mm() + 1.0, y / self.square.mm() + 1.0);
+        let printed = (0.0..f64::from(self.columns)).contains(&column) && (0.0..f64::from(self.rows)).contains(&row);
+        let is_white = |column: u32, row: u32| (column + row).is_multiple_of(2) == self.white_first;
+        if !printed || !is_white(column as u32, row as u32) {
+            return printed;
+        }
+        let part = self.marker.mm() / self.square.mm();
+        let [right, down] = [column, row].map(|at| (at.fract() - 0.5) / part + 0.5);
+        if !(0.0..1.0).contains(&right) || !(0.0..1.0).contains(&down) {
+            return false;
+        }
+        // The white squares before this one: those of full rows, then those in its row.
+        let before = |row: u32, columns: u32| (0..columns).filter(|column| is_white(*column, row)).count();
+        let full: usize = (0..row as u32).map(|row| before(row, self.columns)).sum();
+        self.code.is_black(full + before(row as u32, column as u32), right, down)
+    }
+}
+
 impl From<Target> for Sheet {
     fn from(target: Target) -> Self {
         Self::Checkerboard(target)
@@ -91,7 +132,7 @@ impl Sheet {
     pub fn centre(&self) -> Point<Target> {
         match self {
             Self::Checkerboard(target) => target.centre(),
-            Self::Tags(_) => {
+            Self::Tags(_) | Self::Markers(_) => {
                 let [[left, top], [right, bottom]] = self.outermost();
                 Point::from_mm(Vector3::new(left + right, top + bottom, 0.0) * 0.5)
             }
@@ -107,6 +148,9 @@ impl Sheet {
             Self::Tags(grid) => {
                 [grid.columns, grid.rows].map(|tags| (grid.tag + grid.gap) * f64::from(tags) + grid.gap * 3.0)
             }
+            Self::Markers(board) => {
+                [board.columns, board.rows].map(|squares| board.square * (f64::from(squares) + 1.0))
+            }
         }
     }
 
@@ -120,6 +164,7 @@ impl Sheet {
             Self::Tags(grid) => {
                 [grid.columns, grid.rows].map(|n| f64::from(n) * (grid.tag + grid.gap).mm() - grid.gap.mm())
             }
+            Self::Markers(board) => [board.columns, board.rows].map(|n| (f64::from(n) - 2.0) * board.square.mm()),
         };
         [[0.0, 0.0], far]
     }
@@ -140,6 +185,7 @@ impl Sheet {
         let is_black = match self {
             Self::Checkerboard(target) => return target.ink(at),
             Self::Tags(grid) => grid.is_black(x, y),
+            Self::Markers(board) => board.is_black(x, y),
         };
         if is_black { BLACK } else { WHITE }
     }

@@ -5,11 +5,12 @@ use std::path::PathBuf;
 use image::GrayImage;
 use image::imageops::grayscale;
 use serde_json::{Value, json};
-use vergence_calibration::detect::detect;
-use vergence_calibration::{IntrinsicsOptions, TargetSpec, TargetView, calibrate_intrinsics, median};
+use vergence_calibration::{IntrinsicsOptions, calibrate_intrinsics};
 use vergence_camera::read_image;
 use vergence_rig::rounded;
+use vergence_targets::{TargetSpec, TargetView, detect};
 use vergence_vision::ImageSize;
+use vergence_vision::median;
 
 use crate::error::BenchError;
 use crate::peer::{Detector, OpenCvDetectors, PeerCalibration, PeerFit};

@@ -3,10 +3,10 @@
 use std::path::{Path, PathBuf};
 
 use serde_json::{Value, json};
-use vergence_calibration::median;
 use vergence_matching::learned::{Manifest, Model};
 use vergence_models::{ModelsError, Pattern, Runtime, load, read_manifest, threads};
 use vergence_rig::rounded;
+use vergence_vision::median;
 
 use crate::error::BenchError;
 use crate::python::ask_python;

@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use serde::Deserialize;
-use vergence_calibration::{Corner, TargetView};
+use vergence_targets::{Corner, TargetView};
 use vergence_vision::Pixel;
 
 use crate::InputError;

@@ -3,10 +3,11 @@
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
-use vergence_calibration::{StagePose, StereoView, TargetKind};
+use vergence_calibration::{StagePose, StereoView};
 use vergence_calibration_report::LeftOut;
 use vergence_protocol::AxisKind;
 use vergence_rig::{AxisPosition, Rig, RigAxis};
+use vergence_targets::TargetKind;
 
 use crate::InputError;
 use crate::csv_file::CsvFile;

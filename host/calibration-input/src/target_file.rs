@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use serde::Deserialize;
-use vergence_calibration::{AprilGridSpec, TargetKind, TargetSpec};
+use vergence_targets::{AprilGridSpec, TargetKind, TargetSpec};
 use vergence_vision::Length;
 
 use crate::InputError;

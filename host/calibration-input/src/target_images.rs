@@ -5,10 +5,9 @@ use std::path::{Path, PathBuf};
 
 use image::imageops::grayscale;
 use rayon::prelude::*;
-use vergence_calibration::detect::{DetectError, see};
-use vergence_calibration::{SeenTarget, TargetKind, TargetView};
 use vergence_calibration_report::ReportImage;
 use vergence_camera::{CameraError, read_image, read_mask};
+use vergence_targets::{DetectError, SeenTarget, TargetKind, TargetView, see};
 use vergence_vision::{BodyMask, ImageSize, KannalaBrandt};
 
 use crate::InputError;

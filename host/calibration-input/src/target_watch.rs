@@ -2,9 +2,9 @@
 
 use image::imageops::grayscale;
 use rayon::prelude::*;
-use vergence_calibration::detect::see;
-use vergence_calibration::{Coverage, TargetKind, TargetView};
+use vergence_calibration::Coverage;
 use vergence_camera::CameraImage;
+use vergence_targets::{TargetKind, TargetView, see};
 
 /// Largest motion of a corner between two images of a target that is held still, in pixels.
 const STILL_PX: f64 = 1.0;

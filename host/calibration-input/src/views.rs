@@ -2,11 +2,10 @@
 
 use std::path::{Path, PathBuf};
 
-use vergence_calibration::{
-    IntrinsicsOptions, SeenTarget, StereoView, TargetKind, TargetView, calibrate_intrinsics, label_pairs,
-};
+use vergence_calibration::{IntrinsicsOptions, StereoView, calibrate_intrinsics, label_pairs};
 use vergence_calibration_report::{LeftOut, ReportImage};
 use vergence_camera::{PairedFiles, paired};
+use vergence_targets::{SeenTarget, TargetKind, TargetView};
 use vergence_vision::{KannalaBrandt, Side};
 
 use crate::InputError;

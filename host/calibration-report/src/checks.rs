@@ -56,7 +56,7 @@ pub(crate) fn outliers(left_out: usize, total: usize) -> Check {
 
 /// Whether the residual of each view stands out.
 pub(crate) fn suspects(rms_px: &[Option<f64>]) -> Vec<bool> {
-    let median = vergence_calibration::median(rms_px.iter().flatten().copied().collect());
+    let median = vergence_vision::median(rms_px.iter().flatten().copied().collect());
     rms_px.iter().map(|rms| rms.zip(median).is_some_and(|(rms, median)| rms > SUSPECT * median)).collect()
 }
 

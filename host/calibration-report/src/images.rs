@@ -2,8 +2,8 @@
 
 use image::codecs::jpeg::JpegEncoder;
 use image::{ExtendedColorType, GrayImage, imageops};
-use vergence_calibration::TargetView;
 use vergence_page::{Drawing, Path, counted, data_url, gallery};
+use vergence_targets::TargetView;
 use vergence_vision::{ImageSize, Pixel};
 
 use crate::residuals::Observation;

@@ -1,11 +1,12 @@
 //! The report of one lens.
 
 use nalgebra::{Point3, Vector3};
-use vergence_calibration::{IntrinsicsCalibration, Outlier, OutlierReason, TargetView};
+use vergence_calibration::{IntrinsicsCalibration, Outlier, OutlierReason};
 use vergence_page::{
     Cell, Row, count, counted, figure, figures, fixed, note, number, panel, plain, section, significant, table, text,
     with_sigma,
 };
+use vergence_targets::TargetView;
 use vergence_vision::{KannalaBrandt, Length};
 
 use crate::ReportAbout;

@@ -27,9 +27,10 @@ mod stage;
 mod trunk;
 mod verdict;
 
-use vergence_calibration::{TargetKind, Validation};
+use vergence_calibration::Validation;
 use vergence_page::{Page, Row, escape, plain, section, table, text};
 use vergence_rig::Provenance;
+use vergence_targets::TargetKind;
 use vergence_vision::Angle;
 
 pub use extrinsics::{extrinsics_report, extrinsics_verdict};

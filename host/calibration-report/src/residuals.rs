@@ -3,9 +3,8 @@
 use std::collections::BTreeSet;
 
 use nalgebra::{Isometry3, Point3, Vector3};
-use vergence_calibration::{
-    Corner, ExtrinsicsCalibration, IntrinsicsCalibration, Side, StereoView, TargetView, reproject,
-};
+use vergence_calibration::{ExtrinsicsCalibration, IntrinsicsCalibration, Side, StereoView, reproject};
+use vergence_targets::{Corner, TargetView};
 use vergence_vision::{Camera, KannalaBrandt, OpenCvFisheye, Pixel, Point, UnitRay};
 
 /// One observed corner.

@@ -6,10 +6,9 @@ mod simulated;
 
 use image::{GrayImage, Luma};
 use simulated::{Dice, Pair, lens, other_lens, own_views, pair_pose};
-use vergence_calibration::{
-    ExtrinsicsOptions, IntrinsicsOptions, TargetView, calibrate_extrinsics, calibrate_intrinsics,
-};
+use vergence_calibration::{ExtrinsicsOptions, IntrinsicsOptions, calibrate_extrinsics, calibrate_intrinsics};
 use vergence_calibration_report::{ReportAbout, ReportImage, extrinsics_report, intrinsics_report};
+use vergence_targets::TargetView;
 
 fn page(views: &[TargetView], about: &ReportAbout) -> String {
     let found = calibrate_intrinsics(views, lens().size(), &IntrinsicsOptions::default()).unwrap();

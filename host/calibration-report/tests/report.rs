@@ -11,14 +11,15 @@ use simulated::stage::{Bench, SIX_POSES};
 use simulated::{Dice, Pair, lens, other_lens, own_views, pair_pose};
 use vergence_calibration::{
     ExtrinsicsCalibration, ExtrinsicsOptions, HeldOutPose, IntrinsicsCalibration, IntrinsicsOptions, RayUncertainty,
-    StageCalibration, StageOptions, StereoView, TargetView, calibrate_extrinsics, calibrate_intrinsics,
-    calibrate_stage, validate_stage,
+    StageCalibration, StageOptions, StereoView, calibrate_extrinsics, calibrate_intrinsics, calibrate_stage,
+    validate_stage,
 };
 use vergence_calibration_report::{
     ReportAbout, extrinsics_report, extrinsics_verdict, intrinsics_report, intrinsics_verdict, stage_report,
     stage_verdict,
 };
 use vergence_rig::Rig;
+use vergence_targets::TargetView;
 use vergence_vision::Angle;
 
 /// A name that would break a page that does not escape it.

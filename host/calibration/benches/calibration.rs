@@ -17,12 +17,11 @@ use image::{DynamicImage, GrayImage};
 use nalgebra::{UnitQuaternion, Vector3};
 use simulated::stage::{Bench, SIX_POSES};
 use simulated::{Dice, Pair, lens, other_lens, own_views, pair_pose};
-use vergence_calibration::detect::detect;
 use vergence_calibration::{
-    ExtrinsicsOptions, IntrinsicsOptions, StageOptions, TargetSpec, calibrate_extrinsics, calibrate_intrinsics,
-    calibrate_stage,
+    ExtrinsicsOptions, IntrinsicsOptions, StageOptions, calibrate_extrinsics, calibrate_intrinsics, calibrate_stage,
 };
 use vergence_scene::{Optics, Scene, Target, View, render};
+use vergence_targets::{TargetSpec, detect};
 use vergence_vision::{Angle, Camera, ImageSize, KannalaBrandt, Length, Pixel, Transform, World};
 
 fn solvers(criterion: &mut Criterion) {

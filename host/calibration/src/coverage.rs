@@ -2,9 +2,8 @@
 
 use std::fmt;
 
+use vergence_targets::TargetView;
 use vergence_vision::{ImageSize, Pixel};
-
-use crate::target::TargetView;
 
 /// Columns and rows of cells that the image is divided into.
 const CELLS: usize = 3;

@@ -1,16 +1,12 @@
-//! Calibration without an initial guess: target detection, lens intrinsics, pair extrinsics, the moving stage, and the
-//! covariance of each.
+//! Calibration without an initial guess: lens intrinsics, pair extrinsics, the moving stage, and the covariance of each.
 //!
-//! Everything is a pure function of its arguments: images and corners in, calibrations with covariance out.
+//! Everything is a pure function of its arguments: corners in, calibrations with covariance out.
 
-mod april_grid;
 mod arun;
 mod coverage;
-pub mod detect;
 mod extrinsics;
 mod fit_check;
 mod intrinsics;
-mod labelling;
 mod lens_difference;
 mod planar_pose;
 mod reprojection;
@@ -18,12 +14,10 @@ mod robust;
 pub mod schur_lm;
 mod stage;
 mod stage_plan;
-mod target;
 mod trunk;
 mod uncertainty;
 mod validation;
 
-pub use april_grid::AprilGridSpec;
 pub use arun::{ArunError, fit_rotation_translation};
 pub use coverage::{Advice, Coverage};
 pub use extrinsics::{
@@ -36,16 +30,14 @@ pub use intrinsics::{
     IntrinsicsCalibration, IntrinsicsError, IntrinsicsOptions, Outlier, OutlierReason, Parameter, Reprojection,
     TargetWarp, ViewFigures, ViewPose, calibrate_intrinsics, refine_intrinsics, reproject,
 };
-pub use labelling::{Relabelling, SeenTarget};
 pub use lens_difference::{LensDifference, LensDifferenceError};
 pub use planar_pose::{PoseError, TargetPose, target_pose};
-pub use robust::{Loss, median};
+pub use robust::Loss;
 pub use stage::{
     EncoderScale, FEWEST_STAGE_POSES, FittedScrew, Observability, PredictedPose, StageCalibration, StageError,
     StageOptions, StagePose, StagePoseFigures, Tolerance, WeakDirection, ZeroOffset, calibrate_stage,
 };
 pub use stage_plan::stage_plan;
-pub use target::{Corner, Target, TargetKind, TargetPrint, TargetSpec, TargetView};
 pub use trunk::{
     PlayFound, TrunkCalibration, TrunkParameterFigures, TrunkPoseFigures, calibrate_trunk, largest_trunk_sigma,
     validate_trunk,

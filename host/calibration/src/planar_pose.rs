@@ -12,13 +12,13 @@ use std::cmp::Ordering;
 use nalgebra::{
     Isometry3, Matrix3, Point3, Rotation3, SMatrix, SVector, Translation3, UnitQuaternion, Vector2, Vector3,
 };
+use vergence_targets::{Corner, Target, TargetView};
 use vergence_vision::{Camera, KannalaBrandt, Transform};
 
 use crate::Loss;
 use crate::arun::nearest_rotation;
 use crate::reprojection::{Lens, POSE, moved, point_by_move};
 use crate::schur_lm::{self, Equations, SchurOptions, SchurProblem};
-use crate::target::{Corner, Target, TargetView};
 
 /// Four points in general position determine the pose.
 const FEWEST_CORNERS: usize = 4;

@@ -1,4 +1,4 @@
-//! Robust losses and the median.
+//! Robust losses.
 
 /// Loss function of a residual. `scale` is in the residual's unit; s is the squared norm of one residual (both
 /// components of a pixel together).
@@ -41,12 +41,4 @@ impl Loss {
             Self::GemanMcClure(scale) => (1.0 + s / (scale * scale)).powi(-2),
         }
     }
-}
-
-/// The median of `values`, the lower middle one where their number is even; `None` of none. NaN sorts last.
-#[must_use]
-pub fn median(mut values: Vec<f64>) -> Option<f64> {
-    let middle = values.len().checked_sub(1)? / 2;
-    let (_, median, _) = values.select_nth_unstable_by(middle, f64::total_cmp);
-    Some(*median)
 }

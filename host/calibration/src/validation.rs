@@ -7,6 +7,7 @@
 use nalgebra::{Isometry3, SVector};
 use rayon::prelude::*;
 use vergence_rig::{AxisPosition, Rig};
+use vergence_targets::TargetView;
 use vergence_vision::{Angle, ImageSize, KannalaBrandt, Length};
 
 use crate::extrinsics::{Lenses, Pair, StereoView, inside, rms};
@@ -15,7 +16,7 @@ use crate::reprojection::{POSE, difference, moved};
 use crate::schur_lm::{self, Equations, SchurOptions, SchurProblem};
 use crate::{
     ExtrinsicsCalibration, ExtrinsicsError, ExtrinsicsOptions, FEWEST_STAGE_POSES, IntrinsicsCalibration,
-    IntrinsicsError, IntrinsicsOptions, Side, StageError, StageOptions, StagePose, TargetView, calibrate_extrinsics,
+    IntrinsicsError, IntrinsicsOptions, Side, StageError, StageOptions, StagePose, calibrate_extrinsics,
     calibrate_intrinsics, calibrate_stage,
 };
 

@@ -5,9 +5,10 @@ mod simulated;
 
 use simulated::{Dice, Pair, error, lens, other_lens, own_views, pair_pose, seeds};
 use vergence_calibration::{
-    Corner, ExtrinsicsCalibration, ExtrinsicsOptions, IntrinsicsError, IntrinsicsOptions, StereoView, TargetView,
-    calibrate_extrinsics, calibrate_intrinsics,
+    ExtrinsicsCalibration, ExtrinsicsOptions, IntrinsicsError, IntrinsicsOptions, StereoView, calibrate_extrinsics,
+    calibrate_intrinsics,
 };
+use vergence_targets::{Corner, TargetView};
 use vergence_vision::ImageSize;
 
 /// Every third corner is so much worse than the others.

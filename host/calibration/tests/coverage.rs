@@ -1,7 +1,8 @@
 //! Advice for the person who holds the target.
 #![allow(clippy::expect_used, clippy::panic, reason = "a test fails loudly")]
 
-use vergence_calibration::{Corner, Coverage, TargetView};
+use vergence_calibration::Coverage;
+use vergence_targets::{Corner, TargetView};
 use vergence_vision::{ImageSize, Pixel};
 
 const SIZE: ImageSize = ImageSize { width: 900, height: 600 };

@@ -16,8 +16,8 @@ use std::time::Instant;
 
 use data::real_data;
 use image::GrayImage;
-use vergence_calibration::detect::{Detection, detect};
-use vergence_calibration::{Corner, IntrinsicsOptions, TargetSpec, TargetView, calibrate_intrinsics};
+use vergence_calibration::{IntrinsicsOptions, calibrate_intrinsics};
+use vergence_targets::{Corner, Detection, TargetSpec, TargetView, detect};
 use vergence_vision::{ImageSize, Length, Pixel};
 
 /// Furthest that two detectors' corners may lie apart to count as the same.

@@ -7,9 +7,10 @@ use nalgebra::{Isometry3, Vector3};
 use proptest::prelude::*;
 use simulated::{Dice, Pair, apart, facing_target, lens, other_lens, pair_pose};
 use vergence_calibration::{
-    ExtrinsicsError, ExtrinsicsOptions, LensKnowledge, PoseError, Side, StereoOutlierReason, StereoView, TargetView,
+    ExtrinsicsError, ExtrinsicsOptions, LensKnowledge, PoseError, Side, StereoOutlierReason, StereoView,
     calibrate_extrinsics,
 };
+use vergence_targets::TargetView;
 use vergence_vision::Pixel;
 
 fn pair(separation_deg: f64, noise_px: f64) -> Pair {

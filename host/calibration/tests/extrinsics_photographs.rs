@@ -13,9 +13,8 @@ mod data;
 use data::real_data;
 use nalgebra::{Matrix3, Rotation3, UnitQuaternion, Vector3};
 use serde_json::Value;
-use vergence_calibration::{
-    Corner, ExtrinsicsCalibration, ExtrinsicsOptions, LensKnowledge, StereoView, TargetView, calibrate_extrinsics,
-};
+use vergence_calibration::{ExtrinsicsCalibration, ExtrinsicsOptions, LensKnowledge, StereoView, calibrate_extrinsics};
+use vergence_targets::{Corner, TargetView};
 use vergence_vision::{ImageSize, KannalaBrandt, OpenCvFisheye, Pixel, Transform};
 
 const SIZE: ImageSize = ImageSize { width: 960, height: 600 };

@@ -6,7 +6,8 @@ mod simulated;
 use nalgebra::{Isometry3, Translation3, UnitQuaternion, Vector3};
 use proptest::prelude::*;
 use simulated::{Dice, facing_target, median, photograph};
-use vergence_calibration::{Corner, PoseError, TargetView, target_pose};
+use vergence_calibration::{PoseError, target_pose};
+use vergence_targets::{Corner, TargetView};
 use vergence_vision::{Angle, ImageSize, KannalaBrandt, Pixel};
 
 /// An equidistant lens of 560 px/rad up to `theta_max_deg`, on a sensor large enough for all of it.

@@ -13,12 +13,12 @@ use simulated::{
     COLUMNS, Dice, Pair, ROWS, SQUARE_MM, apart, error, facing_target, first_seed, lens, median, other_lens, pair_pose,
     photograph, seeds,
 };
-use vergence_calibration::detect::detect;
 use vergence_calibration::{
-    Corner, ExtrinsicsOptions, IntrinsicsCalibration, IntrinsicsOptions, LensKnowledge, StereoView, TargetSpec,
-    TargetView, calibrate_extrinsics, calibrate_intrinsics,
+    ExtrinsicsOptions, IntrinsicsCalibration, IntrinsicsOptions, LensKnowledge, StereoView, calibrate_extrinsics,
+    calibrate_intrinsics,
 };
 use vergence_scene::{Optics, Scene, Target, View, render};
+use vergence_targets::{Corner, TargetSpec, TargetView, detect};
 use vergence_vision::{Camera, ImageSize, KannalaBrandt, Length, OpenCvFisheye, Pixel, Transform, World};
 
 const SPEC: TargetSpec = TargetSpec { columns: COLUMNS, rows: ROWS, square: Length::from_mm(SQUARE_MM) };

@@ -8,9 +8,8 @@ mod intrinsics_sets;
 use intrinsics_sets::{RealSet, largest_difference, real_sets};
 use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64Mcg;
-use vergence_calibration::{
-    IntrinsicsCalibration, IntrinsicsOptions, TargetView, calibrate_intrinsics, refine_intrinsics,
-};
+use vergence_calibration::{IntrinsicsCalibration, IntrinsicsOptions, calibrate_intrinsics, refine_intrinsics};
+use vergence_targets::TargetView;
 use vergence_vision::Pixel;
 
 fn calibrate(set: &RealSet, views: &[TargetView]) -> IntrinsicsCalibration {

@@ -4,8 +4,9 @@
 
 use nalgebra::{DMatrix, DVector, SVector};
 use proptest::prelude::*;
+use vergence_calibration::Loss;
 use vergence_calibration::schur_lm::{Ending, Equations, SchurOptions, SchurProblem, linearise, solve};
-use vergence_calibration::{Loss, median};
+use vergence_vision::median;
 
 const SHARED: usize = 4;
 const BLOCK: usize = 3;

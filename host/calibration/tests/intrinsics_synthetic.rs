@@ -7,9 +7,10 @@ use proptest::prelude::*;
 use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64Mcg;
 use vergence_calibration::{
-    Corner, IntrinsicsCalibration, IntrinsicsError, IntrinsicsOptions, OutlierReason, RayUncertainty, TargetView,
-    calibrate_intrinsics, reproject,
+    IntrinsicsCalibration, IntrinsicsError, IntrinsicsOptions, OutlierReason, RayUncertainty, calibrate_intrinsics,
+    reproject,
 };
+use vergence_targets::{Corner, TargetView};
 use vergence_vision::{Camera, ImageSize, OpenCvFisheye, Pixel, Point, UnitRay};
 
 const SIZE: ImageSize = ImageSize { width: 1200, height: 1100 };

@@ -5,10 +5,8 @@ mod simulated;
 
 use nalgebra::{Isometry3, UnitQuaternion, Vector3};
 use simulated::{COLUMNS, Dice, Pair, ROWS, SQUARE_MM, apart, lens, other_lens, pair_pose};
-use vergence_calibration::{
-    ExtrinsicsOptions, LabelError, Relabelling, SeenTarget, StereoView, TargetKind, TargetSpec, TargetView,
-    calibrate_extrinsics, label_pairs,
-};
+use vergence_calibration::{ExtrinsicsOptions, LabelError, StereoView, calibrate_extrinsics, label_pairs};
+use vergence_targets::{Relabelling, SeenTarget, TargetKind, TargetSpec, TargetView};
 use vergence_vision::Length;
 
 const HALF_TURN: Relabelling = Relabelling { quarters: 2, shift: [COLUMNS as i32 - 1, ROWS as i32 - 1] };

@@ -1,13 +1,13 @@
 //! The precision bench of the paper in simulation: the target, the drawing of the rig, and the rig as it was really
 //! built.
 
-use vergence_calibration::TargetSpec;
 use vergence_rig::{BENCH_TOML, Rig};
 use vergence_scene::Target;
 use vergence_vision::{ImageSize, KannalaBrandt, Length, OpenCvFisheye};
 
 use crate::error::ReproduceError;
 use vergence_sim::{Random, built};
+use vergence_targets::TargetSpec;
 
 /// 9 x 6 corners of 20 mm, as in the paper.
 pub const TARGET: TargetSpec = TargetSpec { columns: 9, rows: 6, square: Length::from_mm(20.0) };

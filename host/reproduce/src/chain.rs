@@ -5,11 +5,12 @@ use nalgebra::{UnitQuaternion, Vector3};
 use rayon::prelude::*;
 use vergence_calibration::{
     IntrinsicsCalibration, IntrinsicsOptions, LensKnowledge, StageCalibration, StageOptions, StagePose, StereoView,
-    TargetView, calibrate_intrinsics, calibrate_stage,
+    calibrate_intrinsics, calibrate_stage,
 };
 use vergence_rig::{Provenance, Rig};
 use vergence_scene::Target;
 use vergence_sim::{HeldTarget, Random};
+use vergence_targets::TargetView;
 use vergence_vision::{Camera, ImageSize, KannalaBrandt, Left, Right, Transform};
 
 use crate::bench::{Bench, scene_target};

@@ -3,7 +3,6 @@
 
 use nalgebra::{UnitQuaternion, Vector3};
 use rayon::prelude::*;
-use vergence_calibration::Corner;
 use vergence_scene::Target;
 use vergence_vision::{
     Kernel, Left, Length, PixelPair, Point, PointUncertainty, ResidualUncertainty, Right, SharedCovariance, StereoPair,
@@ -16,6 +15,7 @@ use crate::chain::{Calibrated, both};
 use crate::drive::Stop;
 use crate::target_shot::{CornerSource, FoundCorners, same_place};
 use vergence_sim::Random;
+use vergence_targets::Corner;
 
 /// The methods that stand side by side: of the rectified pair, the midpoint, and ours.
 pub const METHODS: [Kernel; 3] = [Kernel::Rectified, Kernel::Midpoint, Kernel::PseudoIntersection];

@@ -3,10 +3,9 @@
 use image::GrayImage;
 use image::imageops::grayscale;
 use nalgebra::{UnitQuaternion, Vector3};
-use vergence_calibration::detect::{Placement, detect};
-use vergence_calibration::{Corner, TargetView};
 use vergence_scene::{Optics, Target};
 use vergence_sim::{Random, photograph_target};
+use vergence_targets::{Corner, Placement, TargetView, detect};
 use vergence_vision::{Camera, ImageSize, KannalaBrandt, Pixel, Point, Transform, World};
 
 use crate::bench::{TARGET, scene_target};

@@ -1,8 +1,8 @@
 //! Comparison of matches with the truth.
 
 use nalgebra::Vector3;
-use vergence_calibration::median;
 use vergence_matching::Match;
+use vergence_vision::median;
 use vergence_vision::{Angle, CloudPoint, Pixel, Right, UnitRay};
 
 use crate::matching::simulated_pair::SimulatedPair;

@@ -1,12 +1,11 @@
 //! The cameras of a rig that drives itself, attached or simulated.
 
 use vergence_board::Shared;
-use vergence_calibration::detect::TAG_BORDER;
-use vergence_calibration::{AprilGridSpec, TargetKind, TargetSpec};
 use vergence_camera::Camera;
 use vergence_rig::Rig;
-use vergence_scene::{Sheet, TagGrid, TagPrint, Target};
+use vergence_scene::{MarkerBoard, Sheet, TagGrid, TagPrint, Target};
 use vergence_sim::{HeldTarget, SimulatedRig, TargetCamera};
+use vergence_targets::{AprilGridSpec, MARKER_BORDER, TAG_BORDER, TagFamily, TargetKind, TargetSpec};
 use vergence_vision::Side;
 
 /// The cameras of a rig.
@@ -34,13 +33,25 @@ pub struct SimulatedTarget {
 pub fn printed(target: &TargetKind) -> Sheet {
     match *target {
         TargetKind::AprilGrid(grid) => {
-            let family = AprilGridSpec::FAMILY;
-            let code = TagPrint { side: family.side, border: TAG_BORDER, codes: family.codes };
+            let code = code(&AprilGridSpec::FAMILY, TAG_BORDER);
             let gap = grid.tag * grid.spacing;
             Sheet::Tags(TagGrid { columns: grid.columns, rows: grid.rows, tag: grid.tag, gap, code })
         }
         TargetKind::Chessboard(TargetSpec { columns, rows, square }) => Target { columns, rows, square }.into(),
+        TargetKind::Charuco(board) => Sheet::Markers(MarkerBoard {
+            columns: board.columns,
+            rows: board.rows,
+            square: board.square,
+            marker: board.marker,
+            white_first: board.is_white_first(),
+            code: code(&board.dictionary, MARKER_BORDER),
+        }),
     }
+}
+
+/// What is printed in tags, as the simulated cameras see it.
+const fn code(family: &TagFamily, border: u32) -> TagPrint {
+    TagPrint { side: family.side, border, codes: family.codes }
 }
 
 impl RigCameras {

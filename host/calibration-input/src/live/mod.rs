@@ -7,10 +7,10 @@ use std::cell::Cell;
 use std::path::Path;
 
 use vergence_board::{Board, BoardError};
-use vergence_calibration::TargetKind;
 use vergence_files::{FileError, make_folder, write_whole};
 use vergence_protocol::Mode;
 use vergence_rig::{AxisPosition, Rig, RigAxis, positions_in_words};
+use vergence_targets::TargetKind;
 
 pub use self::cameras::{RigCameras, SimulatedTarget, printed};
 

@@ -3,10 +3,11 @@
 use rayon::prelude::*;
 use tokio::task::spawn_blocking;
 use vergence_board::{Board, BoardError};
-use vergence_calibration::{Coverage, TargetKind};
+use vergence_calibration::Coverage;
 use vergence_camera::{Camera, CameraError, CameraImage};
 use vergence_files::{make_folder, write_png};
 use vergence_rig::AxisPosition;
+use vergence_targets::TargetKind;
 use vergence_vision::{Camera as CameraFrame, Pixel, Right, UnitRay};
 
 use super::cameras::RigCameras;

@@ -1,7 +1,8 @@
 //! The result of the calibration of a camera as lines of text and as JSON.
 
 use serde_json::{Value, json};
-use vergence_calibration::{IntrinsicsCalibration, TargetView};
+use vergence_calibration::IntrinsicsCalibration;
+use vergence_targets::TargetView;
 use vergence_vision::OpenCvFisheye;
 
 const NAMES: [&str; 8] = ["fx", "fy", "cx", "cy", "k1", "k2", "k3", "k4"];

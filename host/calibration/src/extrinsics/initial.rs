@@ -2,6 +2,7 @@
 //! other.
 
 use nalgebra::{Isometry3, Point3, Vector2};
+use vergence_targets::TargetView;
 use vergence_vision::{Camera, KannalaBrandt, Left, Point, Right};
 
 use crate::arun::fit_rotation_translation;
@@ -10,7 +11,6 @@ use crate::extrinsics::outliers::OwnPoses;
 use crate::extrinsics::stereo::{Lenses, Pair};
 use crate::extrinsics::{ExtrinsicsError, SkippedView, StereoView};
 use crate::planar_pose::{PoseError, target_pose};
-use crate::target::TargetView;
 
 /// A view whose target both cameras place.
 pub(crate) struct PlacedView {

@@ -8,11 +8,11 @@
 use std::collections::BTreeSet;
 
 use nalgebra::{Isometry3, Point3, Translation3, UnitQuaternion, Vector2, Vector3};
+use vergence_targets::{Relabelling, SeenTarget};
 use vergence_vision::{KannalaBrandt, Left, Point, Right};
 
 use super::{FEWEST_VIEWS, StereoView};
 use crate::arun::fit_rotation_translation;
-use crate::labelling::{Relabelling, SeenTarget};
 use crate::planar_pose::target_pose;
 
 /// A pair of labels fits a relative pose if the corners of both cameras are this near, in squares, root mean square. A

@@ -15,11 +15,11 @@ mod stereo;
 
 use nalgebra::{DMatrix, SMatrix};
 use vergence_rig::{CalibratedNumbers, InvalidCovariance, RigNumber};
+use vergence_targets::{Corner, Target, TargetView};
 use vergence_vision::{InvalidLens, KannalaBrandt, Left, Pixel, Right, Transform};
 
 use crate::planar_pose::PoseError;
 use crate::reprojection::{LENS, POSE};
-use crate::target::{Corner, Target, TargetView};
 
 pub(crate) use fit::{Fit, NoFit, Start, Task};
 pub(crate) use initial::{PlacedView, inside, nearer_targets, place};

@@ -5,11 +5,13 @@
 //! the two cameras disagree altogether, such as a target counted from another end.
 
 use nalgebra::Isometry3;
+use vergence_targets::Corner;
+use vergence_vision::median;
 
+use crate::Loss;
 use crate::extrinsics::StereoView;
 use crate::extrinsics::stereo::Lenses;
 use crate::planar_pose::{errors_px, refined};
-use crate::{Corner, Loss, median};
 
 /// A corner further off than this many medians is gross: 7 standard deviations of a Gaussian error.
 const GROSS_CORNER: f64 = 6.0;

@@ -1,12 +1,12 @@
 //! Residuals of one target seen by two cameras, with derivatives.
 
 use nalgebra::{Isometry3, Matrix3x6, SMatrix, SVector, Vector2};
+use vergence_targets::Corner;
 use vergence_vision::{KannalaBrandt, Side};
 
 use crate::extrinsics::StereoView;
 use crate::reprojection::{LENS, Lens, POSE, point_by_move};
 use crate::schur_lm::Equations;
-use crate::target::Corner;
 
 /// Prior knowledge of the two lenses.
 ///

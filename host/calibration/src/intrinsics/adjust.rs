@@ -2,15 +2,16 @@
 
 use nalgebra::{Isometry3, Translation3, UnitQuaternion, Vector3};
 use rayon::prelude::*;
+use vergence_vision::median;
 
 use super::bundle::{Bundle, SHARED, Shared};
 use super::lens::LENS;
 use super::observations::{FEWEST_CORNERS, FEWEST_VIEWS, Observation, ObservedView};
 use super::start::Start;
 use super::{IntrinsicsError, IntrinsicsOptions, Outlier, OutlierReason};
+use crate::Loss;
 use crate::reprojection::POSE;
 use crate::schur_lm::{Ending, SchurNormal, SchurOptions, solve};
-use crate::{Loss, median};
 
 /// Lens and target poses during the adjustment.
 #[derive(Clone, Debug)]

@@ -20,11 +20,11 @@ pub use result::{
     IntrinsicsCalibration, IntrinsicsError, Outlier, OutlierReason, Parameter, TargetWarp, ViewFigures, ViewPose,
 };
 
-use crate::TargetView;
 use adjust::{inlier_fit, robust_fit};
 use observations::{ObservedView, observed_views};
 use report::report;
 use start::{start_from, starts};
+use vergence_targets::TargetView;
 
 /// Options of [`calibrate_intrinsics`]. The default suits every lens and any flat target.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -1,9 +1,9 @@
 //! Observed corners, checked and sorted so that results do not depend on the caller's order.
 
 use std::cmp::Ordering;
+use vergence_targets::{Corner, TargetView};
 
 use super::{IntrinsicsError, Outlier, OutlierReason};
-use crate::{Corner, TargetView};
 
 /// Least number of corners in a view: fewer leave little redundancy over its six unknowns.
 pub(super) const FEWEST_CORNERS: usize = 8;

@@ -1,6 +1,7 @@
 //! Result of a calibration from the optimum: covariance, residuals, and checks that the views determine the lens.
 
 use nalgebra::{DMatrix, SMatrix, Vector3};
+use vergence_targets::TargetView;
 use vergence_vision::{Angle, Camera, ImageSize, Point, Transform};
 
 use super::adjust::Adjusted;
@@ -10,7 +11,6 @@ use super::observations::{Observation, ObservedView};
 use super::{
     IntrinsicsCalibration, IntrinsicsError, Outlier, OutlierReason, Parameter, TargetWarp, ViewFigures, ViewPose,
 };
-use crate::TargetView;
 
 /// Assembles the result; `left_out` are the corners of views that were too poor to use.
 pub(super) fn report(

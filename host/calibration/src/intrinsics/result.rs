@@ -3,10 +3,10 @@
 use std::fmt;
 
 use nalgebra::SMatrix;
+use vergence_targets::Target;
 use vergence_vision::{Camera, InvalidLens, KannalaBrandt, OpenCvFisheye, Transform};
 
 use super::lens::LENS;
-use crate::Target;
 
 /// A calibrated lens.
 #[derive(Clone, Debug, PartialEq)]

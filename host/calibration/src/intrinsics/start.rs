@@ -6,12 +6,12 @@
 
 use nalgebra::{Cholesky, Isometry3, Matrix3, SMatrix, SVector, Translation3, Vector2, Vector3};
 use rayon::prelude::*;
+use vergence_vision::median;
 use vergence_vision::{Camera, ImageSize, KannalaBrandt, OpenCvFisheye, Pixel};
 
 use super::bundle::Shared;
 use super::observations::{Observation, ObservedView};
 use crate::arun::nearest_rotation;
-use crate::median;
 
 /// Angles to the axis, in radians, tried for the outermost corner: from a telephoto lens to the widest fisheye, in
 /// ratios small enough for the adjustment to bridge.

@@ -9,9 +9,9 @@ use std::ops::Range;
 use nalgebra::DMatrix;
 use vergence_rig::TRUNK_AXES;
 use vergence_rig::linkage::TrunkJoint;
+use vergence_vision::median;
 
 use crate::extrinsics::ExtrinsicsCalibration;
-use crate::median;
 use crate::schur_lm::{self, SchurOptions};
 use crate::stage::start::{ToPoses, measured};
 use crate::trunk::model::{Model, State, first_joint};

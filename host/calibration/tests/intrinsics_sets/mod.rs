@@ -9,7 +9,7 @@ mod data;
 use std::path::Path;
 
 use serde_json::Value;
-use vergence_calibration::{Corner, TargetView};
+use vergence_targets::{Corner, TargetView};
 use vergence_vision::{ImageSize, OpenCvFisheye, Pixel};
 
 /// One camera's corners and reference.

@@ -6,11 +6,12 @@ use std::pin::pin;
 use serde_json::json;
 use tokio::task::spawn_blocking;
 use vergence_board::HostClock;
-use vergence_calibration::{Coverage, TargetKind};
+use vergence_calibration::Coverage;
 use vergence_calibration_input::{NAMES, TargetViews, TargetWatch, observe, printed};
 use vergence_camera::{Camera, CameraError, CameraImage, CameraSet};
 use vergence_files::{make_folder, write_png};
 use vergence_sim::{HeldTarget, TargetCamera};
+use vergence_targets::TargetKind;
 use vergence_vision::Side;
 
 use super::camera_options::CameraOptions;

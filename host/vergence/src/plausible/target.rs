@@ -1,6 +1,6 @@
 //! Checks of the size of a target.
 
-use vergence_calibration::{TargetKind, TargetView};
+use vergence_targets::{TargetKind, TargetView};
 use vergence_vision::Length;
 
 use crate::failure::Failure;
@@ -20,7 +20,7 @@ pub fn side_can_be_held(target: &TargetKind) -> Result<(), Failure> {
         return Ok(());
     }
     let (part, option) = match target {
-        TargetKind::Chessboard(_) => ("square", "--square"),
+        TargetKind::Chessboard(_) | TargetKind::Charuco(_) => ("square", "--square"),
         TargetKind::AprilGrid(_) => ("tag", "--tag"),
     };
     Err(Failure::usage(format!(

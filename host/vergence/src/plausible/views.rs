@@ -1,6 +1,7 @@
 //! Checks of the views that a calibration is made from, and of the lens that it gives.
 
-use vergence_calibration::{StereoView, TargetView};
+use vergence_calibration::StereoView;
+use vergence_targets::TargetView;
 use vergence_vision::{ImageSize, KannalaBrandt, Pixel, Side};
 
 use crate::failure::Failure;

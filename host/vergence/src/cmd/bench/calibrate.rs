@@ -6,8 +6,8 @@ use serde_json::{Value, json};
 use vergence_bench::calibrate::OneThread;
 use vergence_bench::peer::Peer;
 use vergence_bench::sets::{CORNER_SETS, IMAGE_SETS, meta, shared};
-use vergence_calibration::TargetSpec;
 use vergence_calibration_input::{named_images, read_corners};
+use vergence_targets::TargetSpec;
 use vergence_vision::Length;
 
 use crate::console::Console;

@@ -2,7 +2,7 @@
 
 use std::path::PathBuf;
 
-use vergence_calibration::{IntrinsicsOptions, TargetView, calibrate_intrinsics, check_fit, validate_intrinsics};
+use vergence_calibration::{IntrinsicsOptions, calibrate_intrinsics, check_fit, validate_intrinsics};
 use vergence_calibration_input::{
     InputHash, Sought, camera_toml, document_of, named_images, views_in_corners, views_in_images,
 };
@@ -10,6 +10,7 @@ use vergence_calibration_report::{
     ReportAbout, ReportImage, held_out_json, held_out_line, intrinsics_json, intrinsics_lines, intrinsics_report,
     intrinsics_verdict,
 };
+use vergence_targets::TargetView;
 use vergence_vision::{Angle, ImageSize};
 
 use super::options::ResultOptions;

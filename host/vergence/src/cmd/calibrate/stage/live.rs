@@ -4,10 +4,11 @@ use std::path::Path;
 
 use indicatif::ProgressBar;
 use vergence_board::{Board, HostClock, Port, fresh_session};
-use vergence_calibration::{TargetKind, stage_plan};
+use vergence_calibration::stage_plan;
 use vergence_calibration_input::{LiveEvent, LiveSet, RigCameras, SimulatedTarget};
 use vergence_camera::CameraError;
 use vergence_rig::Rig;
+use vergence_targets::TargetKind;
 
 use crate::cli::CommonOptions;
 use crate::cmd::camera_options::CameraOptions;

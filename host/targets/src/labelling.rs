@@ -97,7 +97,8 @@ impl SeenTarget {
     }
 
     /// The view under another labelling.
-    pub(crate) fn relabelled(&self, change: Relabelling) -> TargetView {
+    #[must_use]
+    pub fn relabelled(&self, change: Relabelling) -> TargetView {
         let mut view = self.view.clone();
         if change != Relabelling::SAME {
             for corner in &mut view.corners {

@@ -74,7 +74,7 @@ pub fn parity(node: Node) -> f64 {
 /// Saddle at node (0, 0), averaged over all corners: positive if the square ahead along both axes is white.
 pub fn polarity(lattice: &Lattice, image: &Intensity<'_>, predictor: &Predictor<'_>) -> f64 {
     let saddles = lattice.iter().filter_map(|(&node, found)| {
-        let prediction = predictor.predict(lattice, node)?;
+        let prediction = predictor.predict(lattice, node)?.within(lattice.clear);
         Some(parity(node) * Quadrants::read(image, found.position, &prediction.steps)?.saddle())
     });
     saddles.sum()
@@ -94,7 +94,7 @@ pub fn keep_corners(lattice: &mut Lattice, image: &Intensity<'_>, hint: Option<&
     let predictor = Predictor::new(lattice, hint);
     let polarity = polarity(lattice, image, &predictor).signum();
     let fits = |node: Node, position: Vector2<f64>, expected: &Prediction| {
-        Quadrants::read(image, position, &expected.steps)
+        Quadrants::read(image, position, &expected.within(lattice.clear).steps)
             .is_some_and(|quadrants| quadrants.is_corner(0.0) && quadrants.saddle() * parity(node) * polarity > 0.0)
     };
     let wrong: Vec<Node> = lattice

@@ -7,9 +7,8 @@ use std::collections::BTreeMap;
 
 use image::{DynamicImage, GrayImage, Luma};
 use nalgebra::{UnitQuaternion, Vector3};
-use vergence_calibration::TargetSpec;
-use vergence_calibration::detect::{CornerQuality, DetectError, Detection, Placement, detect};
 use vergence_scene::{Optics, Scene, Target, View, render};
+use vergence_targets::{CornerQuality, DetectError, Detection, Placement, TargetSpec, detect};
 use vergence_vision::{Angle, Camera, ImageSize, KannalaBrandt, Length, Pixel, Point, Transform, World};
 
 const TARGET: Target = Target { columns: 9, rows: 6, square: Length::from_mm(24.0) };

@@ -145,7 +145,7 @@ pub fn refine_all(lattice: &mut Lattice, image: &Intensity<'_>, hint: Option<&Ka
         .iter()
         .map(|(&node, found)| {
             let expected = predictor.predict(lattice, node);
-            (node, expected.and_then(|expected| refine(image, found.position, &expected)))
+            (node, expected.and_then(|expected| refine(image, found.position, &expected.within(lattice.clear))))
         })
         .collect();
     for (node, refined) in refined {

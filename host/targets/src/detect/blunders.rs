@@ -1,11 +1,10 @@
 //! Outliers among the corners: unlike the others, or not where a smooth image of a target has them.
 
-use vergence_vision::KannalaBrandt;
+use vergence_vision::{KannalaBrandt, median};
 
 use super::CornerQuality;
 use super::lattice::{Lattice, Node};
 use super::predict::Predictor;
-use crate::median;
 
 /// Flags bad corners, by their grey levels and by their position.
 pub fn flag(lattice: &mut Lattice, hint: Option<&KannalaBrandt>) {

@@ -3,7 +3,8 @@
 //! S. Bennett and J. Lasenby, "ChESS: quick and robust detection of chess-target features", CVIU 118, 2014.
 
 use calib_targets_chessboard::{
-    ChessCorner, ChessboardDetector, ChessboardParams, GrayImageView, default_chess_config, detect_corners,
+    ChessCorner, ChessboardDetection, ChessboardDetector, ChessboardParams, GrayImageView, default_chess_config,
+    detect_corners,
 };
 use image::GrayImage;
 use nalgebra::Vector2;
@@ -25,18 +26,22 @@ pub fn features(image: &GrayImage) -> Vec<ChessCorner> {
     detect_corners(&view, &default_chess_config())
 }
 
-/// The largest labelled patch in the image; empty where there is none. The first axis turns clockwise into the second
-/// as they are seen, as x into y on the printed side of a target.
-pub fn labelled_patch(image: &GrayImage) -> Lattice {
+/// The labelled patches in the image, the largest first. The first axis turns clockwise into the second as they are seen, as x
+/// into y on the printed side of a target.
+pub fn labelled_patches(image: &GrayImage) -> Vec<Lattice> {
     let features = features(image);
-    let patch = ChessboardDetector::new(ChessboardParams::default()).ok().and_then(|d| d.detect(&features));
-    let mut lattice = Lattice::default();
-    for corner in patch.iter().flat_map(|patch| &patch.corners) {
-        let position = Vector2::new(f64::from(corner.position.x), f64::from(corner.position.y));
-        let found = Found { position, sigma_px: SEARCH_SIGMA_PX, filled: false, quality: CornerQuality::Unrefined };
-        lattice.insert([corner.grid.u, corner.grid.v], found);
-    }
-    if winding(&lattice) < 0.0 { lattice.relabelled(|[i, j]| [j, i]) } else { lattice }
+    let detector = ChessboardDetector::new(ChessboardParams::default());
+    let patches = detector.map(|detector| detector.detect_all(&features)).unwrap_or_default();
+    let lattice = |patch: &ChessboardDetection| {
+        let mut lattice = Lattice::default();
+        for corner in &patch.corners {
+            let position = Vector2::new(f64::from(corner.position.x), f64::from(corner.position.y));
+            let found = Found { position, sigma_px: SEARCH_SIGMA_PX, filled: false, quality: CornerQuality::Unrefined };
+            lattice.insert([corner.grid.u, corner.grid.v], found);
+        }
+        if winding(&lattice) < 0.0 { lattice.relabelled(|[i, j]| [j, i]) } else { lattice }
+    };
+    patches.iter().map(lattice).collect()
 }
 
 /// Sum of the signed areas of the cells.

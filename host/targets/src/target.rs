@@ -4,7 +4,7 @@ use std::fmt;
 
 use vergence_vision::{Frame, Length, Pixel};
 
-use crate::AprilGridSpec;
+use crate::{AprilGridSpec, CharucoSpec};
 
 /// The frame of a target: x along its rows of corners, y along its columns, the target is the plane z = 0.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -30,6 +30,8 @@ pub enum TargetKind {
     Chessboard(TargetSpec),
     /// A grid of AprilTags, as Kalibr prints it.
     AprilGrid(AprilGridSpec),
+    /// A chessboard with markers, as OpenCV prints it.
+    Charuco(CharucoSpec),
 }
 
 /// A target as it is printed.
@@ -70,12 +72,14 @@ impl Corner {
     }
 
     /// `error_px` divided by the corner's relative sigma.
-    pub(crate) fn deviation(&self, error_px: f64) -> f64 {
+    #[must_use]
+    pub fn deviation(&self, error_px: f64) -> f64 {
         error_px / self.relative_sigma
     }
 
     /// Whether all coordinates are finite and the relative sigma is finite and positive.
-    pub(crate) fn is_usable(&self) -> bool {
+    #[must_use]
+    pub fn is_usable(&self) -> bool {
         let [x, y] = self.target_mm;
         let numbers = [x, y, self.pixel.u, self.pixel.v, self.relative_sigma];
         numbers.iter().all(|number| number.is_finite()) && self.relative_sigma > 0.0
@@ -100,6 +104,11 @@ impl fmt::Display for TargetKind {
             Self::AprilGrid(AprilGridSpec { columns, rows, tag, spacing }) => {
                 write!(f, "{columns} × {rows} AprilTags of {tag}, spacing {spacing}")
             }
+            Self::Charuco(CharucoSpec { columns, rows, square, marker, dictionary, legacy }) => {
+                let pattern = if *legacy { ", legacy pattern" } else { "" };
+                let name = dictionary.name;
+                write!(f, "ChArUco board of {columns} × {rows} squares, {square}, markers {name} of {marker}{pattern}")
+            }
         }
     }
 }
@@ -111,6 +120,7 @@ impl TargetKind {
         match self {
             Self::Chessboard(board) => board.square,
             Self::AprilGrid(grid) => grid.tag,
+            Self::Charuco(board) => board.square,
         }
     }
 
@@ -120,6 +130,7 @@ impl TargetKind {
         match self {
             Self::Chessboard(board) => board.print(),
             Self::AprilGrid(grid) => grid.print(),
+            Self::Charuco(board) => board.print(),
         }
     }
 }

@@ -9,9 +9,8 @@ mod simulated;
 use image::{DynamicImage, GrayImage};
 use nalgebra::{Isometry3, UnitQuaternion, Vector3};
 use simulated::{COLUMNS, Dice, ROWS, SQUARE_MM, facing_target, photograph};
-use vergence_calibration::detect::detect;
-use vergence_calibration::{TargetSpec, TargetView};
 use vergence_scene::{Optics, Scene, Target, View, render};
+use vergence_targets::{TargetSpec, TargetView, detect};
 use vergence_vision::{Angle, Camera, ImageSize, KannalaBrandt, Length, Pixel, Transform, World};
 
 const SPEC: TargetSpec = TargetSpec { columns: COLUMNS, rows: ROWS, square: Length::from_mm(SQUARE_MM) };
@@ -40,7 +39,7 @@ fn picture(camera_from_target: Isometry3<f64>, seed: u64) -> GrayImage {
 fn outward(found: &TargetView, truth: &TargetView) -> Vec<f64> {
     let centre = lens(1.0).centre();
     let near = |a: [f64; 2], b: [f64; 2]| (a[0] - b[0]).hypot(a[1] - b[1]) < 1e-6;
-    let of = |truth: &vergence_calibration::Corner| {
+    let of = |truth: &vergence_targets::Corner| {
         let found = found.corners.iter().find(|found| near(found.target_mm, truth.target_mm))?;
         let [u, v] = [truth.pixel.u - centre.u, truth.pixel.v - centre.v];
         Some(((found.pixel.u - truth.pixel.u) * u + (found.pixel.v - truth.pixel.v) * v) / u.hypot(v))

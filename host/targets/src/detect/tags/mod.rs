@@ -1,15 +1,18 @@
 //! Square tags with a code of black and white cells.
 
 mod codes;
+mod dictionaries;
 mod quads;
 mod read;
 
-pub use quads::dark_quads;
-pub use read::{BORDER, read_tag};
+pub use quads::{Quad, dark_quads};
+pub use read::{TagPlace, read_tag};
 
 /// A family of tags: square codes with a black border.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct TagFamily {
+    /// Name: OpenCV's, such as `DICT_4X4_50`, or `tag36h11`.
+    pub name: &'static str,
     /// Cells along a side of the code, without its border.
     pub side: u32,
     /// The codes by number: cells row by row from the upper left, the first one the highest bit, 1 is white.
@@ -29,7 +32,7 @@ pub struct ReadCode {
 
 impl TagFamily {
     /// Kalibr's: AprilTag's 36h11, whose codes differ in 11 cells at least however they are turned.
-    pub const TAG_36H11: Self = Self { side: 6, codes: &codes::TAG_36H11, correctable: 3 };
+    pub const TAG_36H11: Self = Self { name: "tag36h11", side: 6, codes: &codes::TAG_36H11, correctable: 3 };
 
     /// The code with number below `most` that differs in the fewest cells from `seen`, if these are few enough.
     #[must_use]
@@ -49,6 +52,29 @@ impl TagFamily {
     #[must_use]
     pub fn is_white(&self, code: u64, column: u32, row: u32) -> bool {
         code >> (self.side * self.side - 1 - row * self.side - column) & 1 == 1
+    }
+
+    /// The black cells of a tag with a border of so many cells: x, y, width and height in cells from its upper left corner.
+    /// Neighbouring cells of a row make one rectangle: no seams in print.
+    pub(crate) fn black_cells(&self, code: u64, border: u32) -> Vec<[f64; 4]> {
+        let across = self.side + 2 * border;
+        let inner = border..across - border;
+        let is_black = |column: u32, row: u32| {
+            let inside = inner.contains(&column) && inner.contains(&row);
+            !inside || !self.is_white(code, column - border, row - border)
+        };
+        let mut black = Vec::new();
+        for row in 0..across {
+            let mut column = 0;
+            while column < across {
+                let run = (column..across).take_while(|column| is_black(*column, row)).count() as u32;
+                if run > 0 {
+                    black.push([f64::from(column), f64::from(row), f64::from(run), 1.0]);
+                }
+                column += run.max(1);
+            }
+        }
+        black
     }
 
     /// `code` after a quarter turn against the clock.

@@ -8,13 +8,17 @@
 //! 4. corners that do not fit a smooth image of a target are flagged (`blunders`);
 //! 5. the patch is placed on the target: which corner is the first (`placement`).
 //!
-//! Grids of AprilTags have a search of their own ([`detect_april_grid`]), and the same refinement.
+//! A ChArUco board is found as a chessboard, and placed by its markers ([`detect_charuco`]). Grids of AprilTags have a search
+//! of their own ([`detect_april_grid`]), and the same refinement.
 
 mod april_grid;
 mod blunders;
+mod charuco;
 mod grow;
 mod intensity;
+mod labelled;
 mod lattice;
+mod markers;
 mod placement;
 mod plane;
 mod predict;
@@ -28,10 +32,11 @@ use vergence_vision::{KannalaBrandt, Pixel};
 
 use crate::{Corner, Relabelling, SeenTarget, TargetKind, TargetSpec, TargetView};
 pub use april_grid::detect_april_grid;
+pub use charuco::detect_charuco;
 use intensity::Intensity;
 use placement::Placed;
 pub use placement::Placement;
-pub use tags::{BORDER as TAG_BORDER, ReadCode, TagFamily};
+pub use tags::{ReadCode, TagFamily};
 
 /// Fewest corners taken for a target. Four determine a pose; a dozen in a grid are no coincidence.
 const FEWEST_CORNERS: usize = 12;
@@ -125,6 +130,34 @@ pub enum DetectError {
         /// Number of tags found.
         found: usize,
     },
+    /// Boards with so many markers cannot be detected.
+    #[error(
+        "a ChArUco board of {columns} × {rows} squares cannot be detected: it takes 3 squares along a side at least, markers \
+         smaller than the squares, and at most the {most} markers of {dictionary}"
+    )]
+    UnusableBoard {
+        /// Squares along x.
+        columns: u32,
+        /// Squares along y.
+        rows: u32,
+        /// Name of the dictionary.
+        dictionary: &'static str,
+        /// Number of its markers.
+        most: usize,
+    },
+    /// The markers do not tell which corners of the board are seen.
+    #[error(
+        "{corners} corners of a board are seen, but its markers do not tell which: {read} of {dictionary} are read, and 2 at least \
+         and most of them must agree; show more of the board, sharper or closer, and check size, dictionary and pattern"
+    )]
+    NoMarkers {
+        /// Number of corners found.
+        corners: usize,
+        /// Number of markers read.
+        read: usize,
+        /// Name of the dictionary.
+        dictionary: &'static str,
+    },
     /// The image shows a chessboard of another size.
     #[error(
         "the chessboard in the image shows {} × {} inner corners, which does not fit one of {} × {}: \
@@ -152,7 +185,7 @@ pub fn detect(image: &GrayImage, target: &TargetSpec, hint: Option<&KannalaBrand
         return Err(DetectError::UnusableTarget { columns, rows });
     }
     let intensity = Intensity::new(image);
-    let mut lattice = search::labelled_patch(image);
+    let mut lattice = search::labelled_patches(image).into_iter().next().unwrap_or_default();
     saddle::keep_corners(&mut lattice, &intensity, hint);
     refine::refine_all(&mut lattice, &intensity, None);
     grow::grow(&mut lattice, &intensity, hint, [columns, rows]);
@@ -180,16 +213,24 @@ pub fn see(
     match target {
         TargetKind::Chessboard(board) => Ok(detect(image, board, hint)?.seen(name, board)),
         TargetKind::AprilGrid(grid) => {
-            let corners = detect_april_grid(image, grid, hint)?;
-            let corner = |corner: DetectedCorner| Corner {
-                target_mm: grid.corner_mm(corner.index),
-                pixel: corner.pixel,
-                relative_sigma: corner.sigma_px,
-            };
-            let view = TargetView { name: name.to_owned(), corners: corners.into_iter().map(corner).collect() };
+            let view = labelled_view(name, detect_april_grid(image, grid, hint)?, |index| grid.corner_mm(index));
             Ok(SeenTarget::certain(view, grid.tag))
         }
+        TargetKind::Charuco(board) => {
+            let view = labelled_view(name, detect_charuco(image, board, hint)?, |index| board.corner_mm(index));
+            Ok(SeenTarget::certain(view, board.square))
+        }
     }
+}
+
+/// Corners whose labels are certain as a view for calibration.
+fn labelled_view(name: &str, corners: Vec<DetectedCorner>, target_mm: impl Fn(u32) -> [f64; 2]) -> TargetView {
+    let corner = |corner: DetectedCorner| Corner {
+        target_mm: target_mm(corner.index),
+        pixel: corner.pixel,
+        relative_sigma: corner.sigma_px,
+    };
+    TargetView { name: name.to_owned(), corners: corners.into_iter().map(corner).collect() }
 }
 
 impl Detection {

@@ -2,12 +2,18 @@
 
 use nalgebra::{Matrix3, SMatrix, SVector, Vector2, Vector3};
 
-use super::TagFamily;
 use super::quads::Quad;
+use super::{ReadCode, TagFamily};
 use crate::detect::intensity::Intensity;
 
-/// Width of the black border in cells, as Kalibr prints it.
-pub const BORDER: u32 = 2;
+/// Where in a quad its tag is.
+#[derive(Clone, Copy, Debug)]
+pub struct TagPlace {
+    /// Width of the black border in cells.
+    pub border: u32,
+    /// White around the tag as a part of the quad's side.
+    pub margin: f64,
+}
 
 /// Where the inside of a quad lies in the image: the homography of its corners, moved by the bows of its edges.
 struct Inside<'a> {
@@ -40,34 +46,43 @@ impl<'a> Inside<'a> {
     }
 }
 
-/// The number of the tag in `quad`, below `most`, and its corners clockwise from its own upper left one.
-pub fn read_tag(image: &Intensity<'_>, quad: &Quad, family: &TagFamily, most: u32) -> Option<(u32, [Vector2<f64>; 4])> {
+/// The tag in `quad` with a number below `most`. Its own upper left corner is that corner of the quad whose index is the number
+/// of quarters.
+pub fn read_tag(
+    image: &Intensity<'_>,
+    quad: &Quad,
+    family: &TagFamily,
+    place: TagPlace,
+    most: u32,
+) -> Option<ReadCode> {
     let inside = Inside::of(quad)?;
-    let code = Cells { inside: &inside, across: family.side + 2 * BORDER, border: BORDER }.code(image)?;
-    let read = family.read(code, most)?;
-    let mut corners = quad.corners;
-    corners.rotate_left(read.quarters);
-    Some((read.id, corners))
+    let code = Cells { inside: &inside, across: family.side + 2 * place.border, place }.code(image)?;
+    family.read(code, most)
 }
 
-/// The cells of a tag in a quad, its border of so many cells included.
+/// The cells of a tag in a quad, its border included.
 struct Cells<'a> {
     inside: &'a Inside<'a>,
     across: u32,
-    border: u32,
+    place: TagPlace,
 }
 
 impl Cells<'_> {
+    /// Side of the tag as a part of the quad's.
+    fn part(&self) -> f64 {
+        1.0 - 2.0 * self.place.margin
+    }
+
     /// The code, without the border; `None` where the border is not black.
     fn code(&self, image: &Intensity<'_>) -> Option<u64> {
         const LEAST_SIDE_PX: f64 = 1.5;
         let side = self.inside.quad.corners.iter().zip(self.inside.quad.corners.iter().cycle().skip(1));
         let shortest = side.map(|(a, b)| (a - b).norm()).fold(f64::INFINITY, f64::min);
-        if shortest < LEAST_SIDE_PX * f64::from(self.across) {
+        if shortest * self.part() < LEAST_SIDE_PX * f64::from(self.across) {
             return None;
         }
         let cells = (0..self.across).flat_map(|row| (0..self.across).map(move |column| (column, row)));
-        let inner = self.border..self.across - self.border;
+        let inner = self.place.border..self.across - self.place.border;
         let (mut border, mut code) = (Vec::new(), Vec::new());
         for (column, row) in cells {
             let level = self.level(image, column, row)?;
@@ -91,7 +106,8 @@ impl Cells<'_> {
     /// Mean grey level in the middle of a cell.
     fn level(&self, image: &Intensity<'_>, column: u32, row: u32) -> Option<f64> {
         const ASIDE: [f64; 3] = [0.3, 0.5, 0.7];
-        let place = |cell: u32, part: f64| (f64::from(cell) + part) / f64::from(self.across);
+        let place =
+            |cell: u32, part: f64| self.place.margin + self.part() * (f64::from(cell) + part) / f64::from(self.across);
         let mut sum = 0.0;
         for x in ASIDE {
             for y in ASIDE {

@@ -2,8 +2,7 @@
 
 use vergence_vision::Length;
 
-use crate::TargetPrint;
-use crate::detect::{TAG_BORDER, TagFamily};
+use crate::{TagFamily, TargetPrint};
 
 /// A grid of AprilTags with small black squares at the corners of the tags, as `kalibr_create_target_pdf` draws it and
 /// Kalibr's `aprilgrid.yaml` describes it.
@@ -22,6 +21,9 @@ pub struct AprilGridSpec {
     /// Space between tags as a part of their side: `tagSpacing`.
     pub spacing: f64,
 }
+
+/// Width of the black border of a tag in cells, as Kalibr prints it.
+pub const TAG_BORDER: u32 = 2;
 
 impl AprilGridSpec {
     /// The family of the tags.
@@ -74,28 +76,14 @@ impl AprilGridSpec {
     /// The black rectangles: x, y, width and height in millimetres in the target's frame.
     fn black(&self) -> Vec<[f64; 4]> {
         let (family, tag, gap) = (Self::FAMILY, self.tag.mm(), self.tag.mm() * self.spacing);
-        let across = family.side + 2 * TAG_BORDER;
-        let cell = tag / f64::from(across);
-        let code = TAG_BORDER..across - TAG_BORDER;
+        let cell = tag / f64::from(family.side + 2 * TAG_BORDER);
         let mut black = Vec::new();
         for (id, &bits) in (0..self.tags()).zip(family.codes) {
             let [left, top] = self.corner_mm(4 * id + 3);
-            let is_black = |column: u32, row: u32| {
-                let inside = code.contains(&column) && code.contains(&row);
-                !inside || !family.is_white(bits, column - TAG_BORDER, row - TAG_BORDER)
-            };
-            for row in 0..across {
-                // Neighbouring cells of a row make one rectangle: no seams in print.
-                let mut column = 0;
-                while column < across {
-                    let run = (column..across).take_while(|column| is_black(*column, row)).count() as u32;
-                    if run > 0 {
-                        let [x, y] = [(left, column), (top, row)].map(|(start, cells)| start + f64::from(cells) * cell);
-                        black.push([x, y, f64::from(run) * cell, cell]);
-                    }
-                    column += run.max(1);
-                }
-            }
+            let cells = family.black_cells(bits, TAG_BORDER).into_iter();
+            black.extend(
+                cells.map(|[x, y, width, height]| [left + x * cell, top + y * cell, width * cell, height * cell]),
+            );
         }
         // The small squares lie between the tags and outside the outermost.
         for row in 0..=self.rows {

@@ -4,20 +4,19 @@
 //! which Kalibr prints them. The bits are those that OpenCV 5.0 prints (Apache-2.0, `cv2.aruco.generateImageMarker`), whose
 //! tags stand on their heads; they are those of Kalibr bit for bit.
 
-/// Decodes hexadecimal digits, `digits` for each code.
-const fn decode<const N: usize>(text: &str, digits: usize) -> [u64; N] {
-    let (bytes, mut codes, mut index) = (text.as_bytes(), [0; N], 0);
-    assert!(bytes.len() == N * digits, "digits are missing");
-    while index < N {
-        let mut digit = 0;
-        while digit < digits {
-            let byte = bytes[index * digits + digit];
+/// Decodes hexadecimal digits, `digits` for each code; line ends are skipped.
+pub const fn decode<const N: usize>(text: &str, digits: usize) -> [u64; N] {
+    let (bytes, mut codes, mut index, mut at) = (text.as_bytes(), [0; N], 0, 0);
+    while at < bytes.len() {
+        let byte = bytes[at];
+        if byte != b'\n' {
             let value = if byte <= b'9' { byte - b'0' } else { byte - b'a' + 10 };
-            codes[index] = codes[index] * 16 + value as u64;
-            digit += 1;
+            codes[index / digits] = codes[index / digits] * 16 + value as u64;
+            index += 1;
         }
-        index += 1;
+        at += 1;
     }
+    assert!(index == N * digits, "digits are missing");
     codes
 }
 

@@ -26,6 +26,11 @@ impl Prediction {
         let [along, across] = self.steps;
         along.perp(&across).abs() / along.norm().max(across.norm())
     }
+
+    /// The same in steps that are `part` of these.
+    pub fn within(self, part: f64) -> Self {
+        Self { steps: self.steps.map(|step| step * part), bends: self.bends.map(|bend| bend * (part * part)), ..self }
+    }
 }
 
 /// Predicts corners of a lattice from the corners about them, never from the corner itself.

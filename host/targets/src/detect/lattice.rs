@@ -23,12 +23,26 @@ pub struct Found {
 }
 
 /// Corners by node, in the order of columns, then rows: that order makes every sum over them reproducible.
-#[derive(Clone, Debug, Default)]
+#[derive(Clone, Debug)]
 pub struct Lattice {
     nodes: BTreeMap<Node, Found>,
+    /// Part of a step in which a corner's surroundings are as on a chessboard: less than 1 where something is printed in the
+    /// squares.
+    pub clear: f64,
+}
+
+impl Default for Lattice {
+    fn default() -> Self {
+        Self { nodes: BTreeMap::new(), clear: 1.0 }
+    }
 }
 
 impl Lattice {
+    /// The lattice of a target on which surroundings are clear in this part of a step.
+    pub fn looked_at_within(self, clear: f64) -> Self {
+        Self { clear, ..self }
+    }
+
     pub fn len(&self) -> usize {
         self.nodes.len()
     }
@@ -88,6 +102,6 @@ impl Lattice {
 
     /// A lattice of the same corners with every node renamed by `label`.
     pub fn relabelled(&self, label: impl Fn(Node) -> Node) -> Self {
-        Self { nodes: self.nodes.iter().map(|(&node, &found)| (label(node), found)).collect() }
+        Self { nodes: self.nodes.iter().map(|(&node, &found)| (label(node), found)).collect(), ..*self }
     }
 }

@@ -32,10 +32,11 @@ pub fn grow(lattice: &mut Lattice, image: &Intensity<'_>, hint: Option<&KannalaB
             .into_iter()
             .filter_map(|node| {
                 let expected = predictor.predict(lattice, node)?;
-                let contrast = contrast_near(lattice, image, node, &expected.steps);
+                let close = expected.within(lattice.clear);
+                let contrast = contrast_near(lattice, image, node, &close.steps);
                 let colour = polarity * parity(node);
-                let corner = find(image, &expected, colour, contrast)?;
-                edges_reach(lattice, image, node, corner.position, &expected.steps, colour * contrast)
+                let corner = find(image, &close, colour, contrast)?;
+                edges_reach(lattice, image, node, corner.position, &close.steps, colour * contrast)
                     .then_some((node, corner))
             })
             .collect();

@@ -1,0 +1,22 @@
+//! Calibration targets: what they are, how they are printed, and where an image shows their corners.
+//!
+//! - [`TargetKind`] is a chessboard ([`TargetSpec`]), a ChArUco board ([`CharucoSpec`]) or a grid of AprilTags ([`AprilGridSpec`]); [`TargetKind::print`] draws it
+//! - [`see`] finds a target of any kind in a fisheye image, whole or in part, past 90° from the axis
+//! - [`SeenTarget`] holds its corners with all labellings that the image allows
+//!
+//! Everything is a pure function of its arguments.
+
+mod april_grid;
+mod charuco;
+mod detect;
+mod labelling;
+mod target;
+
+pub use april_grid::{AprilGridSpec, TAG_BORDER};
+pub use charuco::{CharucoSpec, MARKER_BORDER};
+pub use detect::{
+    CornerQuality, DetectError, DetectedCorner, Detection, Placement, ReadCode, TagFamily, detect, detect_april_grid,
+    detect_charuco, see,
+};
+pub use labelling::{Relabelling, SeenTarget};
+pub use target::{Corner, Target, TargetKind, TargetPrint, TargetSpec, TargetView};
