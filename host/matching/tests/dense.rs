@@ -16,7 +16,7 @@ use image::imageops::flip_horizontal;
 use nalgebra::{Matrix6, Vector3};
 use rendered::{BASELINE_MM, HUMAN, Rendered};
 use vergence_matching::{DenseDepth, DenseRange, DenseSample, DenseViews, ImagePair, MatchError, dense_depth};
-use vergence_vision::{Angle, Left, Length, Pixel, SharedCovariance, Transform};
+use vergence_vision::{Angle, Left, Length, Pixel, Right, SharedCovariance, Transform};
 
 /// Smallest standard deviation of grey levels in a textured window: some four times the sensor's noise.
 const TEXTURED: f64 = 4.0;
@@ -164,14 +164,26 @@ fn identical_images_are_far_everywhere() {
     assert!(counts.far > 20_000 && counts.measured * 1000 < counts.far, "{counts:?}");
 }
 
+/// The pose of the mirrored and swapped cameras: the plane x = 0 mirrors axes and shifts.
+fn across_x(right_from_left: &Transform<Right, Left>) -> Transform<Left, Right> {
+    let (turn, shift) = (right_from_left.rotation().scaled_axis(), right_from_left.origin().mm());
+    let turn = nalgebra::UnitQuaternion::from_scaled_axis(Vector3::new(turn.x, -turn.y, -turn.z));
+    Transform::new(turn, Vector3::new(-shift.x, shift.y, shift.z))
+}
+
 /// Mirrored images of swapped cameras show the mirrored scene.
 #[test]
 fn swapped_and_mirrored_cameras_measure_the_same() {
     let pair = Pair::new(320, Angle::from_deg(0.0));
-    let left_from_right = Transform::new(nalgebra::UnitQuaternion::identity(), Vector3::new(BASELINE_MM, 0.0, 0.0));
-    let straight = ImagePair { left_from_right, ..pair.images() };
+    let straight = pair.images();
+    let left_from_right = straight.left_from_right;
     let (flipped_left, flipped_right) = (flip_horizontal(&pair.left), flip_horizontal(&pair.right));
-    let mirrored = ImagePair { left: &flipped_right, right: &flipped_left, ..straight };
+    let mirrored = ImagePair {
+        left: &flipped_right,
+        right: &flipped_left,
+        left_from_right: across_x(&left_from_right.inverse()),
+        ..straight
+    };
     let [straight, mirrored] = [straight, mirrored].map(|pair| dense_depth(&pair, &SharedCovariance::exact()).unwrap());
     let mut same = Share::default();
     for (index, sample) in (0..320 * 320).zip(straight.samples()) {
