@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use serde_json::{Map, Value, json};
-use vergence_pipeline::{Dropped, PairCloud};
+use vergence_pipeline::{DenseRanges, Dropped, PairCloud};
 use vergence_rig::{Rig, RigPose, rounded};
 use vergence_vision::{FusedPose, PoseDrift};
 
@@ -24,25 +24,43 @@ impl PoseSource {
     pub fn of_photographs(rig: &Rig) -> Self {
         if rig.axes.is_empty() { Self::RigFile } else { Self::CommandLine }
     }
+
+    const fn name(self) -> &'static str {
+        match self {
+            Self::Encoders => "the encoders",
+            Self::CommandLine => "the pose on the command line",
+            Self::RigFile => "the pose in the rig file",
+        }
+    }
+
+    const fn remedy(self) -> &'static str {
+        match self {
+            Self::Encoders => "calibrate again or check the mounts",
+            Self::CommandLine => "check --mode, --baseline and --separation, or calibrate again",
+            Self::RigFile => "calibrate again, or check that the images belong to this rig",
+        }
+    }
 }
 
 /// A sentence where the images disagree with the pose by more than its stated uncertainty.
 #[must_use]
 pub fn drift_warning(cloud: &PairCloud, source: PoseSource) -> Option<String> {
     let PoseDrift { angle, .. } = cloud.significant_drift()?;
-    Some(match source {
-        PoseSource::Encoders => format!(
-            "the encoders and the images disagree by {angle:.2}: nothing was corrected; calibrate again or check the mounts"
-        ),
-        PoseSource::CommandLine => format!(
-            "the pose on the command line and the images disagree by {angle:.2}: nothing was corrected; check --mode, \
-             --baseline and --separation, or calibrate again"
-        ),
-        PoseSource::RigFile => format!(
-            "the pose in the rig file and the images disagree by {angle:.2}: nothing was corrected; calibrate again, or check \
-             that the images belong to this rig"
-        ),
-    })
+    Some(format!("{} and the images disagree by {angle:.2}: nothing was corrected; {}", source.name(), source.remedy()))
+}
+
+/// The same for ranges of every pixel, with what the disagreement may mean for them.
+#[must_use]
+pub fn dense_drift_warning(ranges: &DenseRanges, pose: &RigPose, source: PoseSource) -> Option<String> {
+    let PoseDrift { angle, .. } = ranges.significant_drift()?;
+    // A turn by δ across the rows moves the parallax of about B / r by up to δ.
+    let per_metre = 100.0 * angle.rad() * 1000.0 / pose.left_from_right.origin().mm().norm();
+    Some(format!(
+        "{} and the images disagree by {angle:.2}: partners were sought where the images show them, but ranges are by that pose; \
+         beyond their sigma they may be wrong by up to {per_metre:.1} % for each metre of range; {}",
+        source.name(),
+        source.remedy()
+    ))
 }
 
 /// The relative pose of a cloud with its covariance, where it comes from, and how many of its six components the joints and the images
@@ -105,23 +123,27 @@ pub fn dropped_json(dropped: &Dropped) -> Value {
     json!({ "keypoints": keypoints, "matches": matches })
 }
 
-/// What is counted of a cloud that was written to `out`, the `pose` by which it was made, and its drift.
-#[must_use]
-pub fn cloud_json(cloud: &PairCloud, pose: &RigPose, out: &Path) -> Value {
-    let drift = cloud.pose_drift.as_ref().map(|drift| {
+/// How far the images say that the pose is off.
+pub(crate) fn drift_json(drift: Option<&PoseDrift>) -> Option<Value> {
+    drift.map(|drift| {
         json!({
             "deg": rounded(drift.angle.deg()),
             "chi_squared": rounded(drift.chi_squared),
             "significant": drift.is_significant(),
         })
-    });
+    })
+}
+
+/// What is counted of a cloud that was written to `out`, the `pose` by which it was made, and its drift.
+#[must_use]
+pub fn cloud_json(cloud: &PairCloud, pose: &RigPose, out: &Path) -> Value {
     json!({
         "points": cloud.points.len(),
         "matches": cloud.matches,
         "keypoints": cloud.keypoints,
         "dropped": dropped_json(&cloud.dropped),
         "pose": pose_source_json(pose, cloud.fused_pose.as_ref()),
-        "pose_drift": drift,
+        "pose_drift": drift_json(cloud.pose_drift.as_ref()),
         "calibration_uncertainty": calibration_json(!cloud.lacks_calibration),
         "out": out,
     })

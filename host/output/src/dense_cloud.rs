@@ -6,16 +6,17 @@ use serde_json::{Map, Value, json};
 use vergence_files::{FileError, write_png, write_whole};
 use vergence_matching::{DenseDepth, DenseSample};
 use vergence_pipeline::limits::MAX_RELATIVE_SIGMA;
-use vergence_pipeline::{PairImages, StageTimes, colour_at};
+use vergence_pipeline::{DenseRanges, PairImages, StageTimes, colour_at};
 use vergence_rig::{Rig, RigPose, rounded};
 use vergence_vision::{Left, Pixel};
 
+use crate::cloud_report::drift_json;
 use crate::pictures::{confidence_image, dense_svg, range_image, sigma_image, write_drawing};
 use crate::points::{DenseRow, dense_ply};
 
 /// A range for every pixel of a left image, written as a cloud with images beside it.
 pub struct DenseCloud<'a> {
-    depth: &'a DenseDepth,
+    ranges: &'a DenseRanges,
     times: &'a StageTimes,
     points: usize,
     /// The file of the cloud.
@@ -23,39 +24,40 @@ pub struct DenseCloud<'a> {
 }
 
 impl<'a> DenseCloud<'a> {
-    /// Writes `depth`, which was measured in `images` taken at `pose`: the cloud to `out`, and beside it PNG images of range,
+    /// Writes `ranges`, which were measured in `images` taken at `pose`: the cloud to `out`, and beside it PNG images of range,
     /// sigma and confidence, and a preview as SVG.
     ///
     /// # Errors
     /// [`FileError::Write`].
     pub fn write(
-        depth: &'a DenseDepth,
+        ranges: &'a DenseRanges,
         times: &'a StageTimes,
         images: PairImages<'_>,
         (rig, pose): (&Rig, &RigPose),
         out: &'a Path,
     ) -> Result<Self, FileError> {
+        let depth = &ranges.depth;
         let rows = rows(depth, images, rig, pose);
         write_whole(out, &dense_ply(&rows))?;
         write_png(&beside(out, "range", "png"), &range_image(depth))?;
         write_png(&beside(out, "sigma", "png"), &sigma_image(depth))?;
         write_png(&beside(out, "confidence", "png"), &confidence_image(depth))?;
         write_drawing(&beside(out, "preview", "svg"), dense_svg(images.left, depth))?;
-        Ok(Self { depth, times, points: rows.len(), out })
+        Ok(Self { ranges, times, points: rows.len(), out })
     }
 
     /// Whether no pixel has a range or is known to be far.
     #[must_use]
     pub fn is_empty(&self) -> bool {
-        let counts = self.depth.counts();
+        let counts = self.ranges.depth.counts();
         counts.measured == 0 && counts.far == 0
     }
 
     /// Counts, gaps by reason, and times, for people.
     #[must_use]
     pub fn in_words(&self) -> String {
-        let counts = self.depth.counts();
-        let pixels = self.depth.samples().len();
+        let counts = self.ranges.depth.counts();
+        let pixels = self.ranges.depth.samples().len();
         let percent = |count: usize| 100.0 * count as f64 / pixels.max(1) as f64;
         let gaps: Vec<_> = counts.gaps.iter().map(|(gap, &count)| format!("{gap} {:.1} %", percent(count))).collect();
         let seconds = self.times.seconds();
@@ -77,8 +79,8 @@ impl<'a> DenseCloud<'a> {
     /// The same for programs, with the names of all files.
     #[must_use]
     pub fn json(&self) -> Value {
-        let counts = self.depth.counts();
-        let pixels = self.depth.samples().len();
+        let counts = self.ranges.depth.counts();
+        let pixels = self.ranges.depth.samples().len();
         let gaps: Map<_, _> = counts.gaps.iter().map(|(gap, &count)| (gap.to_string(), json!(count))).collect();
         let seconds = self.times.seconds().iter();
         let seconds: Map<_, _> =
@@ -90,6 +92,7 @@ impl<'a> DenseCloud<'a> {
             "measured_share": rounded(counts.measured as f64 / pixels.max(1) as f64),
             "far": counts.far,
             "gaps": gaps,
+            "pose_drift": drift_json(self.ranges.pose_drift.as_ref()),
             "stage_seconds": seconds,
             "out": self.out,
             "range_png": beside(self.out, "range", "png"),

@@ -3,7 +3,7 @@
 //! - [`match_svg`], [`depth_svg`], [`error_svg`] and [`dense_svg`] draw what was measured on the images; [`zones_svg`],
 //!   [`zones_plot`] and [`depth_field_svg`] what a rig can see and how well;
 //! - [`ply`], [`dense_ply`] and [`Table`] are clouds for other programs; [`DenseCloud`] writes all files of a dense one;
-//! - [`drift_warning`], [`dropped_lines`] and [`cloud_json`] say what became of a pair;
+//! - [`drift_warning`], [`dense_drift_warning`], [`dropped_lines`] and [`cloud_json`] say what became of a pair;
 //! - [`Sheet`] is a chessboard to print;
 //! - [`check_ending`] refuses a file name whose ending says another format.
 //!
@@ -18,8 +18,8 @@ mod points;
 mod target_sheet;
 
 pub use cloud_report::{
-    PoseSource, calibration_json, calibration_line, cloud_json, drift_warning, dropped_json, dropped_lines,
-    pose_source_json, pose_source_line,
+    PoseSource, calibration_json, calibration_line, cloud_json, dense_drift_warning, drift_warning, dropped_json,
+    dropped_lines, pose_source_json, pose_source_line,
 };
 pub use dense_cloud::DenseCloud;
 pub use endings::{check_ending, check_folder};

@@ -2,10 +2,29 @@
 
 use vergence_matching::{DenseDepth, DenseViews, MatchError};
 use vergence_rig::{Rig, RigPose};
+use vergence_vision::{PoseDrift, StereoPair, pose_drift};
 
+use crate::limits::expected_drift;
 use crate::pair::PairImages;
 use crate::search::Search;
 use crate::stage::Stage;
+
+/// The dense result of one pair.
+#[derive(Clone, Debug, PartialEq)]
+pub struct DenseRanges {
+    /// A range, or the reason for none, for every pixel of the left image.
+    pub depth: DenseDepth,
+    /// The correction of the pose that the images ask for, where they show enough. The search follows it, ranges do not.
+    pub pose_drift: Option<PoseDrift>,
+}
+
+impl DenseRanges {
+    /// The drift, where the images disagree with the pose by more than its stated uncertainty.
+    #[must_use]
+    pub fn significant_drift(&self) -> Option<&PoseDrift> {
+        self.pose_drift.as_ref().filter(|drift| drift.is_significant())
+    }
+}
 
 /// Measures the range of every pixel of the left image. `ended` hears of the end of each stage.
 ///
@@ -16,19 +35,25 @@ pub fn dense_ranges(
     (rig, search): (&Rig, &Search),
     pose: &RigPose,
     ended: &mut dyn FnMut(Stage),
-) -> Result<DenseDepth, MatchError> {
+) -> Result<DenseRanges, MatchError> {
     images.with_grey((rig, search), pose, pose.rotation_sigma, |pair| {
         let views = DenseViews::new(pair)?;
         ended(Stage::Turn);
+        let views = views.aligned();
+        let stated =
+            StereoPair { left: &rig.left_camera, right: &rig.right_camera, left_from_right: pose.left_from_right };
+        let pose_drift = pose_drift(views.row_matches(), &stated, &expected_drift(pose));
+        ended(Stage::Align);
         let swept = views.sweep();
         ended(Stage::Sweep);
         let disparities = views.register(&swept);
         ended(Stage::Register);
         let depth = views.ranges(&disparities, &pose.shared);
         ended(Stage::Range);
-        Ok(match search.farthest {
+        let depth = match search.farthest {
             Some(farthest) => depth.up_to(farthest),
             None => depth,
-        })
+        };
+        Ok(DenseRanges { depth, pose_drift })
     })
 }

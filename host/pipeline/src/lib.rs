@@ -36,7 +36,7 @@ mod zones;
 pub use axes_by_images::{AxisEstimate, axes_by_images, axis_estimates};
 pub use bearings::{Bearing, bearings};
 pub use cloud::{ColouredPoint, Dropped, Method, PairCloud, PairCloudError, cloud_of_pairs, pair_cloud};
-pub use dense::dense_ranges;
+pub use dense::{DenseRanges, dense_ranges};
 pub use exposures::{Ambiguity, CameraGone, Exposed, ExposedImage, Exposures, SkipReason, TimeBase};
 pub use mode_outlook::ModeOutlook;
 pub use observation::{Observation, observe_one, observe_pair};

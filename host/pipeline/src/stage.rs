@@ -24,6 +24,8 @@ pub enum Stage {
     Triangulate,
     /// Dense: resampling both images onto views with common rows.
     Turn,
+    /// Dense: finding where the images show the rows of these views.
+    Align,
     /// Dense: comparing every pixel over all disparities.
     Sweep,
     /// Dense: registering the best disparity to a part of a pixel.
@@ -40,6 +42,7 @@ impl Stage {
             Self::Match => "match",
             Self::Triangulate => "triangulate",
             Self::Turn => "turn",
+            Self::Align => "align",
             Self::Sweep => "sweep",
             Self::Register => "register",
             Self::Range => "range",

@@ -45,6 +45,10 @@ pub enum Gap {
     Inconsistent,
     /// The texture is too weak.
     Untextured,
+    /// No neighbours on the same surface: a patch too small for a surface.
+    Isolated,
+    /// Beside an edge: it may belong to the surface behind, or two surfaces cannot be told apart.
+    Edge,
 }
 
 /// Numbers of pixels by their result.
@@ -136,6 +140,8 @@ impl fmt::Display for Gap {
             Self::NotShared => "not_shared",
             Self::Inconsistent => "inconsistent",
             Self::Untextured => "untextured",
+            Self::Isolated => "isolated",
+            Self::Edge => "edge",
         })
     }
 }

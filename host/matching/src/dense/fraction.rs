@@ -1,42 +1,96 @@
-//! Refinement of whole disparities to fractions of a pixel, with their standard deviation.
+//! Refinement of whole disparities to fractions of a pixel, with their standard deviation, and what is wrong with them.
 
+use rayon::prelude::*;
+
+use super::Gap;
+use super::edges::{Beside, beside};
 use super::register::{Registration, SampledView, register};
+use super::support::isolated;
 use super::surface::{Surface, surface};
 
 /// Reach of the windows for smoothing and registration, in pixels of the view.
 const REACH: usize = 4;
 /// Largest shift of a registration in pixels; a larger one did not converge.
 const MOST: f32 = 1.0;
-/// Number of pixels that count as one observation: residuals of neighbours are correlated, because views are
-/// interpolated.
-const ALIKE: f32 = 4.0;
+/// Largest standard deviation of a registration that is used, in pixels.
+const LARGEST_SIGMA: f32 = 1.0;
+/// Smallest fraction of contrast that two windows of one surface have in common.
+const LEAST_LIKENESS: f32 = 0.4;
+/// Largest roughness of one surface in pixels. A rougher one is a mixture of two.
+const ROUGHEST: f32 = 0.4;
+/// Smallest surface, in pixels of the coarsest level of the search: smaller patches are mostly wrong.
+const SMALLEST: usize = 100;
+/// Standard deviation of a disparity, in pixels, from the roughness of its surface: the factor, and its growth per
+/// pixel. Chosen, with the constants beside it, so that 68 and 95 % of the errors are within one and two standard
+/// deviations in rendered scenes (docs/measured/dense.md).
+const BY_ROUGHNESS: [f32; 2] = [1.2, 2.0];
 /// Standard deviation in pixels that interpolation leaves at any contrast.
-const INTERPOLATION: f32 = 0.05;
+const INTERPOLATION: f32 = 0.02;
+/// How much larger errors are with another surface close, and in the window.
+const CLOSE_TO_EDGES: f32 = 3.0;
+const NEAR_EDGES: f32 = 1.3;
 
 /// The disparities of a left view with their standard deviations, in pixels of the view; NaN where there are none.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Disparities {
     pub(super) disparity: Vec<f32>,
-    /// Standard deviation from noise, contrast and the roughness of the surface.
+    /// Standard deviation from noise, contrast, the roughness of the surface and near edges.
     pub(super) sigma: Vec<f32>,
-    /// Standard deviation from another surface within the window.
-    pub(super) edge: Vec<f32>,
     /// Fraction of the left window's contrast that the right one explains, 0 to 1.
     pub(super) likeness: Vec<f32>,
+    /// Why a disparity is not used.
+    pub(super) doubt: Vec<Option<Gap>>,
 }
 
-/// Smooths and registers twice. The first pass brings slanted surfaces within the reach of the second.
-pub(super) fn registered(views: [SampledView<'_>; 2], whole: &[f32]) -> Disparities {
+/// Smooths and registers twice. The first pass brings slanted surfaces within the reach of the second. `area` is that of
+/// a pixel of the coarsest level of the search.
+pub(super) fn registered(views: [SampledView<'_>; 2], whole: &[f32], area: usize) -> Disparities {
     let width = views[0].plane.width();
     let smooth = surface(whole, width, REACH);
     let moved = moved(&smooth, &register(views, &smooth.disparity, REACH));
     let smooth = surface(&moved, width, REACH);
     let registration = register(views, &smooth.disparity, REACH);
     let disparity = self::moved(&smooth, &registration);
-    let sigma = registration.sigma.iter().zip(&smooth.roughness);
-    let sigma =
-        sigma.map(|(own, rough)| (ALIKE * own * own + 0.25 * rough * rough + INTERPOLATION * INTERPOLATION).sqrt());
-    Disparities { disparity, sigma: sigma.collect(), edge: smooth.edge, likeness: registration.likeness }
+    let mut doubt: Vec<Option<Gap>> = registration.sigma.iter().zip(&registration.likeness).map(by_window).collect();
+    let small = isolated(&trusted(&disparity, &doubt), width, (SMALLEST * area) as u32);
+    for (doubt, _) in doubt.iter_mut().zip(&small).filter(|(doubt, small)| doubt.is_none() && **small) {
+        *doubt = Some(Gap::Isolated);
+    }
+    let beside = beside(&trusted(&disparity, &doubt), views[0].seen, width);
+    doubt.par_iter_mut().zip(&beside).zip(&smooth.roughness).for_each(|((doubt, beside), roughness)| {
+        *doubt = doubt.or((*beside == Beside::Edge || *roughness > ROUGHEST).then_some(Gap::Edge));
+    });
+    let sigma = registration.sigma.par_iter().zip(&smooth.roughness).zip(&beside);
+    let sigma = sigma.map(|((own, roughness), beside)| sigma_of(*own, *roughness, *beside)).collect();
+    Disparities { disparity, sigma, likeness: registration.likeness, doubt }
+}
+
+/// What the registration of a window says against its result.
+fn by_window((sigma, likeness): (&f32, &f32)) -> Option<Gap> {
+    if !sigma.is_finite() || *sigma > LARGEST_SIGMA {
+        Some(Gap::Untextured)
+    } else if *likeness < LEAST_LIKENESS {
+        Some(Gap::Inconsistent)
+    } else {
+        None
+    }
+}
+
+/// The standard deviation of a disparity from that of its registration and from the roughness of its surface.
+fn sigma_of(own: f32, roughness: f32, beside: Beside) -> f32 {
+    let rough = (BY_ROUGHNESS[0] + BY_ROUGHNESS[1] * roughness) * roughness;
+    let factor = match beside {
+        Beside::Edge | Beside::Close => CLOSE_TO_EDGES,
+        Beside::Near => NEAR_EDGES,
+        Beside::Nothing => 1.0,
+    };
+    factor * (own * own + rough * rough + INTERPOLATION * INTERPOLATION).sqrt()
+}
+
+/// The disparities of which nothing is wrong; NaN elsewhere.
+fn trusted(disparities: &[f32], doubt: &[Option<Gap>]) -> Vec<f32> {
+    let trusted = disparities.par_iter().zip(doubt);
+    trusted.map(|(disparity, doubt)| if doubt.is_none() { *disparity } else { f32::NAN }).collect()
 }
 
 /// The disparities of the surface, shifted where registration converged.

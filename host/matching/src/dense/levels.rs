@@ -19,26 +19,85 @@ const BEYOND_INFINITY: i32 = 3;
 /// Number of hypotheses at the finer levels.
 const REFINED: usize = LANES;
 
-/// Finds disparities of the left view's pixels, up to those that `band` allows, in pixels; NaN where there is none.
-pub(super) fn swept<L: Frame, R: Frame>(left: &View<L>, right: &View<R>, band: &EpipolarBand) -> Vec<f32> {
-    let pixels = left.plane().values().len();
-    let count = (0..).find(|level| pixels >> (2 * level) <= COARSEST).unwrap_or(0) + 1;
-    let [left_levels, right_levels] = [left.plane(), right.plane()].map(|plane| Pyramid::new(plane, count));
-    let [left_seen, right_seen] = [left.seen(), right.seen()].map(|seen| SeenTable::new(seen, left.grid().size().0));
-    let largest = (0..left.grid().size().0).map(|x| band.largest_disparity(x as f64)).fold(0.0, f64::max);
-    let mut coarser: Option<Vec<f32>> = None;
-    for (level, (plane, right_plane)) in left_levels.levels().iter().zip(right_levels.levels()).enumerate().rev() {
-        let scale = 1 << level;
-        let hypotheses = match &coarser {
-            None => all(plane, (largest / scale as f64).ceil() as usize),
-            Some(disparities) => near(plane, disparities),
-        };
-        let left_view = CensusView { words: census(plane), seen: left_seen.level(plane, scale) };
-        let right_view = CensusView { words: census(right_plane), seen: right_seen.level(right_plane, scale) };
-        let sums = gathered(&costs([&left_view, &right_view], &hypotheses), &hypotheses);
-        coarser = Some(winners(&sums, [&left_view.seen, &right_view.seen], &hypotheses));
+/// Both views at several resolutions, finest first, with the pixels that each camera sees.
+#[derive(Clone, Debug)]
+pub(super) struct Levels {
+    planes: [Pyramid; 2],
+    seen: [SeenTable; 2],
+    /// Largest disparity that is sought, in pixels of the finest level.
+    largest: f64,
+}
+
+impl Levels {
+    /// Makes the levels of both views, with disparities up to those that `band` allows.
+    pub(super) fn new<L: Frame, R: Frame>(left: &View<L>, right: &View<R>, band: &EpipolarBand) -> Self {
+        let width = left.grid().size().0;
+        let count = searched(left.plane()) + 1;
+        Self {
+            planes: [left.plane(), right.plane()].map(|plane| Pyramid::new(plane, count)),
+            seen: [left.seen(), right.seen()].map(|seen| SeenTable::new(seen, width)),
+            largest: (0..width).map(|x| band.largest_disparity(x as f64)).fold(0.0, f64::max),
+        }
     }
-    coarser.unwrap_or_default()
+
+    /// Both views at all levels.
+    pub(super) fn planes(&self) -> [&Pyramid; 2] {
+        self.planes.each_ref()
+    }
+
+    /// Finds disparities of the left view's pixels, in pixels; NaN where there is none.
+    pub(super) fn swept(&self) -> Vec<f32> {
+        let levels = self.count().min(self.planes[0].levels().first().map_or(0, searched));
+        let mut coarser: Option<Vec<f32>> = None;
+        for level in (0..levels).rev() {
+            let plane = &self.planes[0].levels()[level];
+            let hypotheses = match &coarser {
+                None => self.all(level),
+                Some(disparities) => near(plane, disparities),
+            };
+            coarser = Some(self.winners(level, &hypotheses));
+        }
+        coarser.unwrap_or_default()
+    }
+
+    /// Finds disparities at the coarsest level, one coarser than the search begins with, in its pixels. The number of
+    /// the level comes first.
+    pub(super) fn swept_coarsely(&self) -> (usize, Vec<f32>) {
+        match self.count().checked_sub(1) {
+            Some(level) => (level, self.winners(level, &self.all(level))),
+            None => (0, Vec::new()),
+        }
+    }
+
+    /// The number of pixels of the finest level in one of the coarsest level that is searched.
+    pub(super) fn coarsest_area(&self) -> usize {
+        let searched = self.planes[0].levels().first().map_or(1, searched);
+        1 << (2 * (self.count().clamp(1, searched) - 1))
+    }
+
+    fn count(&self) -> usize {
+        self.planes[0].levels().len()
+    }
+
+    /// Every disparity at every pixel of a level.
+    fn all(&self, level: usize) -> Hypotheses {
+        all(&self.planes[0].levels()[level], (self.largest / (1_usize << level) as f64).ceil() as usize)
+    }
+
+    /// The disparities among `hypotheses` on which both views agree.
+    fn winners(&self, level: usize, hypotheses: &Hypotheses) -> Vec<f32> {
+        let [left, right] = [0, 1].map(|side| {
+            let plane: &Plane = &self.planes[side].levels()[level];
+            CensusView { words: census(plane), seen: self.seen[side].level(plane, 1 << level) }
+        });
+        let sums = gathered(&costs([&left, &right], hypotheses), hypotheses);
+        winners(&sums, [&left.seen, &right.seen], hypotheses)
+    }
+}
+
+/// The number of levels that are searched for the disparities of a plane.
+fn searched(plane: &Plane) -> usize {
+    (0..).find(|level| plane.values().len() >> (2 * level) <= COARSEST).unwrap_or(0) + 1
 }
 
 /// The hypotheses of the coarsest level: every disparity up to `largest` at every pixel.
@@ -64,7 +123,7 @@ fn near(plane: &Plane, coarser: &[f32]) -> Hypotheses {
 
 /// Fills the gaps of a row with the smaller of the disparities beside them, because surfaces that only one camera sees
 /// are behind.
-fn filled(row: &[f32]) -> Vec<f32> {
+pub(super) fn filled(row: &[f32]) -> Vec<f32> {
     let mut filled = row.to_vec();
     let mut last = f32::INFINITY;
     for value in filled.iter_mut() {
@@ -82,6 +141,7 @@ fn filled(row: &[f32]) -> Vec<f32> {
 }
 
 /// A summed-area table of the pixels that a camera sees.
+#[derive(Clone, Debug)]
 struct SeenTable {
     counts: Vec<u32>,
     stride: usize,

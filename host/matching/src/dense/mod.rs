@@ -11,44 +11,60 @@
 
 mod census;
 mod depth;
+mod edges;
 mod fraction;
 mod levels;
 mod paths;
 mod range;
 mod register;
+mod rows;
 mod shared_spread;
+mod support;
 mod surface;
 mod volume;
 mod window;
 mod winner;
 
+use nalgebra::Matrix3;
 use rayon::prelude::*;
-use vergence_vision::{Angle, BatchLens, Left, Length, Right, SharedCovariance, StereoPair};
+use vergence_vision::{
+    Angle, BatchLens, Frame, Left, Length, PixelPair, Right, SharedCovariance, StereoPair, Transform,
+};
 
 pub use self::depth::{DenseCounts, DenseDepth, DenseRange, DenseSample, Gap};
 pub use self::fraction::Disparities;
+use self::levels::Levels;
 use self::range::RangeFinder;
 use self::register::SampledView;
+use self::rows::{Sighting, pose_of_rows, sightings};
 use self::surface::SAME_SURFACE;
 use crate::epipolar_band::EpipolarBand;
+use crate::grid::direction;
 use crate::matcher::{ImagePair, MatchError};
 use crate::shared_field::near;
 use crate::{Grid, SharedFrame, View, ViewPixel};
 
-/// Smallest disparity in standard deviations that differs from zero.
-const SIGNIFICANT: f32 = 3.0;
-/// Largest standard deviation of a disparity that is used, in pixels.
-const LARGEST_SIGMA: f32 = 2.0;
-/// Smallest fraction of contrast that two windows of one surface have in common.
-const LEAST_LIKENESS: f32 = 0.4;
+/// Smallest disparity in standard deviations, lenses and pose included, that differs from zero.
+const SIGNIFICANT: f64 = 3.0;
+
+/// Largest number of times that the rows are moved.
+const ROUNDS: usize = 3;
 
 /// A pair of images resampled so that epipolar curves are rows.
 #[derive(Clone, Debug)]
 pub struct DenseViews<'a> {
     pair: ImagePair<'a>,
+    /// The shared axes of the pair's pose.
     frame: SharedFrame,
+    /// The pose whose epipolar curves are the rows.
+    rows: Transform<Left, Right>,
+    /// The shared axes of that pose.
+    rows_frame: SharedFrame,
     left: View<Left>,
     right: View<Right>,
+    levels: Levels,
+    /// The matches that show where the rows lie.
+    row_matches: Vec<(PixelPair, f64)>,
 }
 
 /// Disparities of the left view in whole pixels, refined by a parabola through their costs.
@@ -62,7 +78,7 @@ pub struct WholeDisparities(Vec<f32>);
 /// # Errors
 /// [`MatchError`] for a pair that cannot be matched, whatever its images show.
 pub fn dense_depth(pair: &ImagePair<'_>, shared: &SharedCovariance) -> Result<DenseDepth, MatchError> {
-    let views = DenseViews::new(pair)?;
+    let views = DenseViews::new(pair)?.aligned();
     Ok(views.ranges(&views.register(&views.sweep()), shared))
 }
 
@@ -74,16 +90,54 @@ impl<'a> DenseViews<'a> {
     pub fn new(pair: &ImagePair<'a>) -> Result<Self, MatchError> {
         pair.check()?;
         let frame = SharedFrame::new(&pair.left_from_right).ok_or(MatchError::NoBaseline)?;
-        let grid = Grid::covering(&frame, pair.left_camera, pair.right_camera, 1.0).ok_or(MatchError::NoSharedField)?;
-        let left = View::masked((pair.left, pair.masks[0]), pair.left_camera, frame.shared_from_left(), grid);
-        let right = View::masked((pair.right, pair.masks[1]), pair.right_camera, frame.shared_from_right(), grid);
-        Ok(Self { pair: *pair, frame, left, right })
+        Self::turned(pair, frame, pair.left_from_right)
+    }
+
+    /// Resamples both images so that the epipolar curves of the pose `rows` are rows.
+    fn turned(pair: &ImagePair<'a>, frame: SharedFrame, rows: Transform<Left, Right>) -> Result<Self, MatchError> {
+        let axes = SharedFrame::new(&rows).ok_or(MatchError::NoBaseline)?;
+        let grid = Grid::covering(&axes, pair.left_camera, pair.right_camera, 1.0).ok_or(MatchError::NoSharedField)?;
+        let left = View::masked((pair.left, pair.masks[0]), pair.left_camera, axes.shared_from_left(), grid);
+        let right = View::masked((pair.right, pair.masks[1]), pair.right_camera, axes.shared_from_right(), grid);
+        let levels = Levels::new(&left, &right, &band(&grid, &axes, pair.nearest));
+        Ok(Self { pair: *pair, frame, rows, rows_frame: axes, left, right, levels, row_matches: Vec::new() })
+    }
+
+    /// The same with the rows where the images show them, if the pose is so wrong that partners lie off their rows.
+    ///
+    /// That mends the search. Ranges remain those of the stated pose: how far it is off *along* the rows is part of
+    /// their error, and the images alone tell it badly.
+    #[must_use]
+    pub fn aligned(self) -> Self {
+        let mut views = self;
+        for _ in 0..ROUNDS {
+            let sightings = sightings(&views.levels);
+            views.row_matches = sightings.iter().filter_map(|it| views.in_originals(it)).collect();
+            let pose = pose_of_rows(&sightings, views.left.grid(), &views.rows_frame, &views.rows);
+            let Some(moved) = pose.and_then(|pose| Self::turned(&views.pair, views.frame, pose).ok()) else { break };
+            views = Self { row_matches: views.row_matches, ..moved };
+        }
+        views
+    }
+
+    /// The matches by which [`Self::aligned`] found the rows, each with its standard deviation in pixels. They do not
+    /// depend on the stated pose, and tell how far it is off ([`vergence_vision::pose_drift`]).
+    #[must_use]
+    pub fn row_matches(&self) -> &[(PixelPair, f64)] {
+        &self.row_matches
+    }
+
+    fn in_originals(&self, it: &Sighting) -> Option<(PixelPair, f64)> {
+        let (left, right) = (self.left.original(it.left).ok()?, self.right.original(it.right).ok()?);
+        // The error of the right position, shared equally by both, is smaller by √2.
+        let sigma = it.sigma * self.right.shrinking(right) * std::f64::consts::FRAC_1_SQRT_2;
+        Some((PixelPair { left, right }, sigma))
     }
 
     /// Finds the disparities of the left view on which both views agree.
     #[must_use]
     pub fn sweep(&self) -> WholeDisparities {
-        WholeDisparities(levels::swept(&self.left, &self.right, &self.band(self.pair.nearest)))
+        WholeDisparities(self.levels.swept())
     }
 
     /// Refines disparities to a fraction of a pixel, with their standard deviations.
@@ -91,7 +145,7 @@ impl<'a> DenseViews<'a> {
     pub fn register(&self, swept: &WholeDisparities) -> Disparities {
         let left = SampledView { plane: self.left.plane(), seen: self.left.seen() };
         let right = SampledView { plane: self.right.plane(), seen: self.right.seen() };
-        fraction::registered([left, right], &swept.0)
+        fraction::registered([left, right], &swept.0, self.levels.coarsest_area())
     }
 
     /// Converts disparities to ranges of the left image's pixels. The covariance is that of [`dense_depth`].
@@ -99,19 +153,19 @@ impl<'a> DenseViews<'a> {
     pub fn ranges(&self, disparities: &Disparities, shared: &SharedCovariance) -> DenseDepth {
         let size = self.pair.left_camera.size();
         let lens = BatchLens::new(self.pair.left_camera);
-        let turn = self.frame.shared_from_left().rotation().to_rotation_matrix().into_inner();
+        let turn = rotation(&self.rows_frame.shared_from_left());
+        let restated = self.restated();
         let (left, right) = (self.pair.left_camera, self.pair.right_camera);
         let pair = StereoPair { left, right, left_from_right: self.pair.left_from_right };
         let finder = RangeFinder::new(&self.frame, &pair, shared);
-        let near = self.band(near(self.frame.baseline()));
+        let near = band(self.left.grid(), &self.rows_frame, near(self.rows_frame.baseline()));
         let mut samples = vec![DenseSample::Gap(Gap::OutsideField); size.width as usize * size.height as usize];
         samples.par_chunks_mut((size.width as usize).max(1)).enumerate().for_each(|(v, samples)| {
             let pixels: Vec<[f64; 2]> = (0..size.width).map(|u| [f64::from(u), v as f64]).collect();
             for (sample, ray) in samples.iter_mut().zip(lens.unproject(&pixels)) {
-                let [x, y, z]: [f64; 3] = (turn * nalgebra::Vector3::from(ray)).into();
-                let direction = [x.atan2(y.hypot(z)), y.atan2(z)];
+                let direction = angles(turn * nalgebra::Vector3::from(ray));
                 if direction[0].is_finite() {
-                    *sample = self.sample(direction, disparities, &finder, &near);
+                    *sample = self.sample(direction, disparities, (&finder, restated.as_ref()), &near);
                 }
             }
         });
@@ -123,7 +177,7 @@ impl<'a> DenseViews<'a> {
         &self,
         [a, b]: [f64; 2],
         disparities: &Disparities,
-        finder: &RangeFinder,
+        (finder, restated): (&RangeFinder, Option<&Restated>),
         near: &EpipolarBand,
     ) -> DenseSample {
         let grid = self.left.grid();
@@ -134,17 +188,16 @@ impl<'a> DenseViews<'a> {
         if disparity.is_nan() {
             return DenseSample::Gap(self.why_none(at, near));
         }
-        if own.is_nan() || own > LARGEST_SIGMA {
-            return DenseSample::Gap(Gap::Untextured);
-        }
-        if disparities.likeness[index] < LEAST_LIKENESS {
-            return DenseSample::Gap(Gap::Inconsistent);
-        }
-        if disparity <= SIGNIFICANT * own {
-            return DenseSample::Far;
+        if let Some(gap) = disparities.doubt[index] {
+            return DenseSample::Gap(gap);
         }
         let radians = |pixels: f32| f64::from(pixels) / grid.pixels_per_radian();
-        let range = finder.at([a, b], radians(disparity), radians(own.hypot(disparities.edge[index])));
+        let seen = ([a, b], radians(disparity));
+        let (direction, parallax) = restated.map_or(seen, |restated| restated.of(seen));
+        let range = finder.at(direction, parallax, radians(own));
+        if parallax <= SIGNIFICANT * range.disparity_sigma {
+            return DenseSample::Far;
+        }
         DenseSample::Measured(DenseRange {
             range_mm: range.mm as f32,
             sigma_mm: range.sigma_mm as f32,
@@ -165,10 +218,43 @@ impl<'a> DenseViews<'a> {
         }
     }
 
-    /// The epipolar band of disparities up to that of the range `nearest`, for a pose known exactly.
-    fn band(&self, nearest: Length) -> EpipolarBand {
-        EpipolarBand::new(*self.left.grid(), self.frame.baseline(), nearest, Angle::from_rad(0.0))
+    /// What converts positions in the views to the axes of the stated pose; `None` where the rows are that pose's.
+    fn restated(&self) -> Option<Restated> {
+        (self.rows != self.pair.left_from_right).then(|| Restated {
+            left: rotation(&(self.frame.shared_from_left() * self.rows_frame.shared_from_left().inverse())),
+            right: rotation(&(self.frame.shared_from_right() * self.rows_frame.shared_from_right().inverse())),
+        })
     }
+}
+
+/// Rotations of both cameras' rays from the axes of the views to those of the stated pose.
+struct Restated {
+    left: Matrix3<f64>,
+    right: Matrix3<f64>,
+}
+
+impl Restated {
+    /// The left direction and the parallax, both in radians, that the stated pose gives to those of the views.
+    fn of(&self, ([a, b], parallax): ([f64; 2], f64)) -> ([f64; 2], f64) {
+        let [left, right] =
+            [(self.left, a), (self.right, a - parallax)].map(|(turn, a)| angles(turn * direction(a, b)));
+        (left, left[0] - right[0])
+    }
+}
+
+/// The angles a and b of a direction.
+fn angles(direction: nalgebra::Vector3<f64>) -> [f64; 2] {
+    let [x, y, z]: [f64; 3] = direction.into();
+    [x.atan2(y.hypot(z)), y.atan2(z)]
+}
+
+fn rotation<T: Frame, F: Frame>(transform: &Transform<T, F>) -> Matrix3<f64> {
+    transform.rotation().to_rotation_matrix().into_inner()
+}
+
+/// The epipolar band of disparities up to that of the range `nearest`, for a pose known exactly.
+fn band(grid: &Grid, frame: &SharedFrame, nearest: Length) -> EpipolarBand {
+    EpipolarBand::new(*grid, frame.baseline(), nearest, Angle::from_rad(0.0))
 }
 
 /// Interpolates the disparity between the four pixels around a position, or takes the nearest one where they are not of

@@ -24,12 +24,14 @@ pub(super) struct RangeFinder {
     with_lenses: Option<SharedSpread>,
 }
 
-/// A range and its standard deviations, with and without lenses and pose, in millimetres.
+/// A range and its standard deviations, with and without lenses and pose, in millimetres, and that of its disparity.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct RangeAt {
     pub mm: f64,
     pub sigma_mm: f64,
     pub own_sigma_mm: f64,
+    /// With lenses and pose, in radians.
+    pub disparity_sigma: f64,
 }
 
 impl RangeFinder {
@@ -49,7 +51,7 @@ impl RangeFinder {
     }
 
     /// Converts the disparity `d` with standard deviation `sigma` at (a, b) of the left view, all in radians. The
-    /// result is meaningless or NaN where d is not positive.
+    /// range is meaningless or NaN where d is not positive.
     pub(super) fn at(&self, [a, b]: [f64; 2], d: f64, sigma: f64) -> RangeAt {
         let (right, sine) = (a - d, d.sin());
         let from_right = self.baseline_mm * a.cos() / sine;
@@ -61,6 +63,7 @@ impl RangeFinder {
         RangeAt {
             mm: self.baseline_mm * right.cos() / sine,
             sigma_mm: per_radian * variance.sqrt(),
+            disparity_sigma: variance.sqrt(),
             own_sigma_mm: per_radian * sigma,
         }
     }

@@ -18,29 +18,27 @@ pub(super) struct Surface {
     pub disparity: Vec<f32>,
     /// RMS distance of the disparities from the plane.
     pub roughness: Vec<f32>,
-    /// RMS over the window of the distance of other surfaces from the pixel. Near an edge a pixel may belong to either
-    /// side; this is the resulting standard deviation.
-    pub edge: Vec<f32>,
 }
 
 /// Fits planes in windows that extend `reach` pixels in each direction. `disparities` are NaN where there are none.
 pub(super) fn surface(disparities: &[f32], width: usize, reach: usize) -> Surface {
     let field = Padded::new(disparities, width, reach);
     let empty = vec![f32::NAN; disparities.len()];
-    let mut out = Surface { disparity: empty.clone(), roughness: empty.clone(), edge: empty };
-    let Surface { disparity, roughness, edge } = &mut out;
-    (disparity.par_chunks_mut(width), roughness.par_chunks_mut(width), edge.par_chunks_mut(width))
-        .into_par_iter()
+    let mut out = Surface { disparity: empty.clone(), roughness: empty };
+    let Surface { disparity, roughness } = &mut out;
+    disparity
+        .par_chunks_mut(width)
+        .zip(roughness.par_chunks_mut(width))
         .enumerate()
-        .for_each(|(y, (disparity, roughness, edge))| fit_row(&field, y, reach, [disparity, roughness, edge]));
+        .for_each(|(y, (disparity, roughness))| fit_row(&field, y, reach, [disparity, roughness]));
     out
 }
 
 #[multiversion(targets("x86_64+avx512f+avx512dq+avx512vl+avx2+fma", "x86_64+avx2+fma"))]
-fn fit_row(field: &Padded, y: usize, reach: usize, [disparity, roughness, edge]: [&mut [f32]; 3]) {
+fn fit_row(field: &Padded, y: usize, reach: usize, [disparity, roughness]: [&mut [f32]; 2]) {
     for_blocks(disparity.len(), |x, lanes| {
         let centre = field.lanes(x, y, [0, 0]);
-        let mut sums = [[0.0; LANES]; 12];
+        let mut sums = [[0.0; LANES]; 10];
         for [i, j] in offsets(reach) {
             gather(&mut sums, centre, field.lanes(x, y, [i, j]), [i as f32, j as f32]);
         }
@@ -48,7 +46,6 @@ fn fit_row(field: &Padded, y: usize, reach: usize, [disparity, roughness, edge]:
             let Some(plane) = solve(std::array::from_fn(|sum| sums[sum][k])) else { continue };
             disparity[x + k] = centre[k] + plane.above_centre;
             roughness[x + k] = plane.roughness;
-            edge[x + k] = plane.edge;
         }
     });
 }
@@ -60,15 +57,13 @@ pub(super) fn offsets(reach: usize) -> impl Iterator<Item = [isize; 2]> {
     (-reach..=reach).flat_map(move |j| (-reach..=reach).map(move |i| [i, j]))
 }
 
-/// Adds a neighbour at (i, j): 1, i, j, i², ij, j², d, id, jd, d² if it is on the same surface, d² if not, and 1 in any
-/// case.
+/// Adds a neighbour at (i, j) on the same surface: 1, i, j, i², ij, j², d, id, jd, d².
 #[inline(always)]
-fn gather(sums: &mut [Lanes; 12], centre: &Lanes, near: &Lanes, [i, j]: [f32; 2]) {
-    let [n, i1, j1, ii, ij, jj, d1, id, jd, dd, all, others] = sums;
+fn gather(sums: &mut [Lanes; 10], centre: &Lanes, near: &Lanes, [i, j]: [f32; 2]) {
+    let [n, i1, j1, ii, ij, jj, d1, id, jd, dd] = sums;
     for k in 0..LANES {
         let off = near[k] - centre[k];
         let same = off.abs() <= SAME_SURFACE;
-        let (known, other) = if off.abs() < f32::INFINITY { (1.0, if same { 0.0 } else { off }) } else { (0.0, 0.0) };
         let (one, d) = if same { (1.0, off) } else { (0.0, 0.0) };
         n[k] += one;
         i1[k] += one * i;
@@ -80,20 +75,17 @@ fn gather(sums: &mut [Lanes; 12], centre: &Lanes, near: &Lanes, [i, j]: [f32; 2]
         id[k] += d * i;
         jd[k] += d * j;
         dd[k] += d * d;
-        all[k] += known;
-        others[k] += other * other;
     }
 }
 
 struct Plane {
     above_centre: f32,
     roughness: f32,
-    edge: f32,
 }
 
 /// Solves for the least-squares plane from the sums, by the normal equations about the mean.
 #[inline(always)]
-fn solve([n, i, j, ii, ij, jj, d, id, jd, dd, known, other]: [f32; 12]) -> Option<Plane> {
+fn solve([n, i, j, ii, ij, jj, d, id, jd, dd]: [f32; 10]) -> Option<Plane> {
     if n < LEAST {
         return None;
     }
@@ -108,6 +100,5 @@ fn solve([n, i, j, ii, ij, jj, d, id, jd, dd, known, other]: [f32; 12]) -> Optio
     Some(Plane {
         above_centre: mean_d - by_i * mean_i - by_j * mean_j,
         roughness: ((dd - by_i * id - by_j * jd).max(0.0) / n).sqrt(),
-        edge: (other / known).sqrt(),
     })
 }

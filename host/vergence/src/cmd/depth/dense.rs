@@ -5,7 +5,9 @@ use std::path::Path;
 use serde_json::Value;
 use vergence_camera::CameraImage;
 use vergence_matching::{DenseCounts, Gap, GuidedMatcher};
-use vergence_output::{DenseCloud, calibration_json, calibration_line, pose_source_json, pose_source_line};
+use vergence_output::{
+    DenseCloud, PoseSource, calibration_json, calibration_line, dense_drift_warning, pose_source_json, pose_source_line,
+};
 use vergence_pipeline::{PairImages, StageTimes, dense_ranges, pose_by_images, with_fused};
 
 use super::Measured;
@@ -34,16 +36,19 @@ pub fn one_dense_pair(
     let fail = |error: &dyn std::fmt::Display| Failure::usage(format!("{} and {}: {error}", left.name, right.name));
     let fused = pose_by_images(images, (rig, search), pose, &GuidedMatcher::default()).map_err(|error| fail(&error))?;
     let used = &fused.map_or_else(|| pose.clone(), |fused| with_fused(pose, &fused));
-    let depth =
+    let ranges =
         dense_ranges(images, (rig, search), used, &mut |stage| times.ended(stage)).map_err(|error| fail(&error))?;
-    if is_suspicious(&depth.counts()) {
+    if is_suspicious(&ranges.depth.counts()) {
         let found = images_are_one_pair([left, right], taken);
         force.unless_forced(found, console)?;
     }
-    let written = DenseCloud::write(&depth, &times, images, (rig, used), out)?;
+    let written = DenseCloud::write(&ranges, &times, images, (rig, used), out)?;
     console.say(written.in_words())?;
     calibration_line(used.is_calibration_known).iter().try_for_each(|line| console.say(line))?;
     pose_source_line(fused.as_ref()).iter().try_for_each(|line| console.say(line))?;
+    if let Some(warning) = dense_drift_warning(&ranges, used, PoseSource::of_photographs(rig)) {
+        console.warn(format!("{} and {}: {warning}", left.name, right.name));
+    }
     let mut result: Value = written.json();
     result["calibration_uncertainty"] = calibration_json(used.is_calibration_known).into();
     result["pose"] = pose_source_json(used, fused.as_ref());
