@@ -86,6 +86,7 @@ impl Bench {
             exposures: Exposures::new(Some(f64::from(PERIOD_US))),
             matching_time: MatchingTime::Fixed(Duration::from_millis(50)),
             stopwatch: || Duration::ZERO,
+            memory: Arc::default(),
         };
         Self { simulated, room, board, live, rig }
     }

@@ -35,6 +35,7 @@ mod random;
 mod rig;
 mod room;
 mod trunk;
+mod unplugged;
 
 pub use application::{ApplicationError, build_of, check_boot_loader, flatten, is_elf};
 pub use bent_rail::BentRail;
@@ -44,8 +45,9 @@ pub use error::SimError;
 pub use firmware_log::{FirmwareLog, PlacedEntry};
 pub use held_target::{HeldTarget, TargetCamera, photograph_target};
 pub use history::LoadHistory;
-pub use live_camera::{LiveCamera, Unplugged};
+pub use live_camera::LiveCamera;
 pub use random::Random;
 pub use rig::{Pulse, SimulatedRig};
 pub use room::{Room, RoomCamera};
 pub use trunk::{Collision, DrivenTrunk, FIRST_SERVO_ID, Play, Trunk, TrunkMechanics, joint_settings, trunk_servos};
+pub use unplugged::{Unplug, Unplugged};

@@ -9,7 +9,7 @@ use vergence_protocol::Microseconds;
 use vergence_rig::{ExposureTiming, Shutter, StampedAt};
 use vergence_vision::Side;
 
-use crate::{Pulse, RoomCamera, SimulatedRig};
+use crate::{Pulse, RoomCamera, SimulatedRig, Unplugged};
 
 /// Exposure time of one row.
 const EXPOSURE: Duration = Duration::from_millis(4);
@@ -17,17 +17,6 @@ const EXPOSURE: Duration = Duration::from_millis(4);
 const TRANSFER: Duration = Duration::from_millis(6);
 /// Time from one image to the next: the camera takes no more than 30 a second.
 const PERIOD: Duration = Duration::from_micros(33_333);
-
-/// A time span during which a simulated camera is unplugged.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Unplugged {
-    /// Side of the camera.
-    pub side: Side,
-    /// Age of the camera at which it is unplugged.
-    pub from: Duration,
-    /// Age of the camera at which it is plugged in again.
-    pub until: Duration,
-}
 
 /// A simulated camera fired by the board's trigger.
 #[derive(Clone, Debug)]

@@ -1,11 +1,12 @@
 //! The native board and its mechanics as one simulated rig.
 
 use std::collections::VecDeque;
+use std::time::Duration;
 
 use vergence_board::Served;
 use vergence_control::{TICK_US, UNIT};
 use vergence_image::is_signed_by;
-use vergence_plant::{NativeBoard, Plant, Stage};
+use vergence_plant::{AxisPlant, EncoderFault, NativeBoard, Plant, Stage};
 use vergence_protocol::{AxisKind, Microseconds, ResetCause};
 use vergence_rig::{Rig, RigAxis, RigPose};
 
@@ -41,6 +42,15 @@ pub struct SimulatedRig {
     saved_operations: usize,
     history: LoadHistory,
     pulses: VecDeque<Pulse>,
+    loose: Vec<LoosePlug>,
+}
+
+/// The plug of an encoder that is out for a while, in microseconds of the board's clock.
+#[derive(Debug)]
+struct LoosePlug {
+    axis: usize,
+    times: [u64; 2],
+    is_out: bool,
 }
 
 /// A pulse of the camera trigger.
@@ -86,6 +96,7 @@ impl SimulatedRig {
             saved_operations: 0,
             history: LoadHistory::default(),
             pulses: VecDeque::new(),
+            loose: Vec::new(),
         })
     }
 
@@ -131,6 +142,7 @@ impl SimulatedRig {
         let until = self.started_us + drifted as u64;
         // A UART sends while the board runs, not after: a pose must not wait for the next one and be replaced by it.
         while self.board.now().0 < until {
+            self.pull_plugs();
             self.board.advance(Microseconds(until.min(self.board.now().0 + TICK_US)));
             self.output.append(&mut self.board.transmit());
             self.remember();
@@ -206,6 +218,27 @@ impl SimulatedRig {
     /// Bends a rail from now on: the cameras move as it takes them, and neither board nor rig file knows.
     pub fn bend_rail(&mut self, rail: BentRail) {
         self.history.rail = Some(rail);
+    }
+
+    /// Unplugs the encoder of the stage `axis`, and plugs it in again, at these times from now.
+    pub fn unplug_encoder(&mut self, axis: usize, times: [Duration; 2]) {
+        let times = times.map(|time| self.board.now().0 + time.as_micros() as u64);
+        self.loose.push(LoosePlug { axis, times, is_out: false });
+    }
+
+    fn pull_plugs(&mut self) {
+        let now = self.board.now().0;
+        for plug in &mut self.loose {
+            let is_out = (plug.times[0]..plug.times[1]).contains(&now);
+            if std::mem::replace(&mut plug.is_out, is_out) == is_out {
+                continue;
+            }
+            let axis = self.board.plant_mut().axis_mut(plug.axis);
+            axis.into_iter().for_each(|axis| match is_out {
+                true => axis.fail_encoder(Some(EncoderFault::Stuck)),
+                false => AxisPlant::mend_encoder(axis),
+            });
+        }
     }
 
     /// True pose of the cameras now: from the mechanics, not from the encoders.

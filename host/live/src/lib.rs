@@ -3,21 +3,26 @@
 //!
 //! The cameras send [`vergence_camera::CameraEvent`]s; [`vergence_pipeline::Exposures`] finds which of their images belong
 //! together and when they were exposed; [`measure()`] turns that into a [`Measurement`]; [`LiveLoop`] keeps them going.
-//! Nothing queues: what the matcher has no time for is counted and dropped, and no cloud holds anything of another.
+//! Nothing queues: what the matcher has no time for is counted and dropped. No cloud holds a point of another; only their pose is told
+//! by all pairs since the axes last moved, where the joints alone do not tell it.
 
 mod blindness;
 mod cameras;
 mod error;
+mod kept_poses;
 mod live_loop;
 mod measure;
+mod orders;
 mod tour;
 
 use std::time::Duration;
 
 pub use cameras::{attach_both, drive, simulate_both};
 pub use error::LiveError;
+pub use kept_poses::{KeptPoses, KeptPosesError};
 pub use live_loop::{Ended, Limits, LiveLoop, LiveResult, MatchingTime, Totals};
 pub use measure::{Measurement, PosedExposure, measure};
+pub use orders::{HOME, homing_orders};
 pub use tour::Tour;
 
 /// Returns the time since some fixed instant, always the real one: by it the loop tells how long matching takes.

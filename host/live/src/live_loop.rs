@@ -2,19 +2,20 @@
 
 use std::collections::BTreeMap;
 use std::pin::Pin;
-use std::sync::Arc;
+use std::sync::{Arc, Mutex, PoisonError};
 use std::time::Duration;
 
 use tokio::sync::mpsc::Receiver;
 use tokio::time::{Instant, interval, sleep, sleep_until};
-use vergence_board::{BoardKnowledge, HostClock};
+use vergence_board::{BoardKnowledge, HostClock, LostAxis, Told};
 use vergence_camera::{CameraEvent, PendingImage};
 use vergence_matching::Matcher;
 use vergence_pipeline::{
-    Ambiguity, Exposed, Exposures, Method, Motion, Observation, PairPose, Search, SkipReason, TimeBase, pair_exposure,
+    Ambiguity, Exposed, ExposedImage, Exposures, Method, Motion, Observation, PairPose, PoseMemory, Search, SkipReason,
+    TimeBase, UntoldAxes, pair_exposure,
 };
 use vergence_protocol::TriggerMark;
-use vergence_rig::{Rig, StampedImage, TrackGap};
+use vergence_rig::{BoardInstant, JointTrack, Joints, Rig, StampedImage, TrackGap};
 use vergence_vision::Side;
 
 use crate::blindness::Blindness;
@@ -100,6 +101,8 @@ pub struct LiveLoop {
     pub matching_time: MatchingTime,
     /// Tells how long matching really takes.
     pub stopwatch: Clock,
+    /// What images told of the pose while the axes stand.
+    pub memory: Arc<Mutex<PoseMemory>>,
 }
 
 impl MatchingTime {
@@ -119,8 +122,17 @@ type Work = Pin<Box<dyn Future<Output = (f64, Result<Measurement, NoResult>)>>>;
 
 /// Why an exposure gave no result.
 enum NoResult {
-    Joints(TrackGap),
+    Skipped(SkipReason),
     Failed(LiveError),
+}
+
+impl From<TrackGap> for NoResult {
+    fn from(gap: TrackGap) -> Self {
+        Self::Skipped(match gap {
+            TrackGap::NotYet => SkipReason::EncodersSilent,
+            _ => SkipReason::EncodersUnknown,
+        })
+    }
 }
 
 impl LiveLoop {
@@ -193,11 +205,8 @@ impl LiveLoop {
     ) -> Result<(), E> {
         let measurement = match done {
             Ok(measurement) => measurement,
-            Err(NoResult::Joints(gap)) => {
-                self.exposures.skip(match gap {
-                    TrackGap::NotYet => SkipReason::EncodersSilent,
-                    _ => SkipReason::EncodersUnknown,
-                });
+            Err(NoResult::Skipped(reason)) => {
+                self.exposures.skip(reason);
                 return Ok(());
             }
             Err(NoResult::Failed(error)) => return Err(error.into()),
@@ -231,23 +240,30 @@ impl LiveLoop {
     /// Begins to measure on a thread of its own: the link must not wait.
     fn start(&self, exposed: Exposed<PendingImage>) -> Work {
         let (rig, matcher, board) = (Arc::clone(&self.rig), Arc::clone(&self.matcher), self.board.clone());
-        let search = Arc::clone(&self.search);
+        let (search, memory) = (Arc::clone(&self.search), Arc::clone(&self.memory));
         let (matching_time, stopwatch, exposed_at) = (self.matching_time, self.stopwatch, host_middle(&exposed));
         Box::pin(async move {
             let posed = match posed(exposed, &rig, board.as_ref()).await {
                 Ok(posed) => posed,
-                Err(gap) => return (exposed_at, Err(NoResult::Joints(gap))),
+                Err(why) => return (exposed_at, Err(why)),
             };
             let worked = tokio::task::spawn_blocking(move || {
                 let method = Method { search: &search, ..Method::from(matcher.as_ref()) };
-                measure(posed, &rig, method, stopwatch)
+                // A poisoned lock only means that another thread panicked; the memory is replaced whole.
+                let mut memory = memory.lock().unwrap_or_else(PoisonError::into_inner);
+                measure(posed, &rig, method, &mut memory, stopwatch)
             });
             let worked = worked.await;
             let outcome = worked.unwrap_or_else(|error| Err(LiveError::Measuring(error.to_string())));
+            let outcome = match outcome {
+                Ok(Some(measurement)) => Ok(measurement),
+                Ok(None) => Err(NoResult::Skipped(SkipReason::AxesUntold)),
+                Err(error) => Err(NoResult::Failed(error)),
+            };
             if let Ok(measurement) = &outcome {
                 matching_time.pass(measurement).await;
             }
-            (exposed_at, outcome.map_err(NoResult::Failed))
+            (exposed_at, outcome)
         })
     }
 }
@@ -289,7 +305,7 @@ async fn posed(
     exposed: Exposed<PendingImage>,
     rig: &Rig,
     board: Option<&BoardKnowledge>,
-) -> Result<PosedExposure, TrackGap> {
+) -> Result<PosedExposure, NoResult> {
     let images = match exposed {
         Exposed::Pair(images) => images,
         Exposed::One { side, image, why } => return Ok(PosedExposure::One { side, image, why }),
@@ -304,12 +320,42 @@ async fn posed(
     let patience = Instant::now() + READINGS;
     loop {
         let track = board.track_between(first - MARGIN_US, last + MARGIN_US);
-        match PairPose::in_motion(rig, Motion::Read(track), exposure) {
-            Ok(pose) => return Ok(PosedExposure::Pair(images, Box::new(pose))),
+        match PairPose::in_motion(rig, Motion::Read(track.clone()), exposure) {
+            Ok(pose) => {
+                return match board.told_at(first) {
+                    Told::All => Ok(PosedExposure::Pair(images, Box::new(pose))),
+                    Told::AllBut(lost) => untold(images, &track, &lost),
+                    Told::Nothing => Err(NoResult::Skipped(SkipReason::EncodersUnknown)),
+                };
+            }
             Err(TrackGap::NotYet) if Instant::now() < patience => {
                 sleep_until(Instant::now() + Duration::from_millis(2)).await;
             }
-            Err(gap) => return Err(gap),
+            Err(gap) => return Err(gap.into()),
         }
     }
+}
+
+/// The exposure of a rig that stands, with the last readings of the axes that no encoder tells.
+fn untold(
+    images: Box<[ExposedImage<PendingImage>; 2]>,
+    track: &JointTrack,
+    lost: &[LostAxis],
+) -> Result<PosedExposure, NoResult> {
+    /// An axis that reads more counts further than this before has moved.
+    const FLICKER: f64 = 2.0;
+    const BEFORE_US: f64 = 5_000.0;
+    let middle = images[0].middle;
+    let before = track.at(BoardInstant { us: middle.us - BEFORE_US, ..middle })?;
+    let mut joints = track.at(middle)?;
+    let axes: Vec<usize> = lost.iter().map(|lost| lost.axis).collect();
+    let readings = before.counts.iter().zip(&joints.counts).enumerate();
+    let mut told = readings.filter(|(index, _)| !axes.contains(index));
+    if told.any(|(_, (before, now))| (now - before).abs() > FLICKER) {
+        return Err(NoResult::Skipped(SkipReason::EncodersUnknown));
+    }
+    for lost in lost {
+        joints.counts.iter_mut().skip(lost.axis).take(1).for_each(|counts| *counts = f64::from(lost.last.0));
+    }
+    Ok(PosedExposure::Untold(images, UntoldAxes { joints, axes }))
 }

@@ -5,7 +5,8 @@ use std::time::Duration;
 use image::RgbImage;
 use vergence_camera::PendingImage;
 use vergence_pipeline::{
-    CameraGone, ExposedImage, Method, Observation, PairImages, PairPose, observe_one, observe_pair,
+    CameraGone, ExposedImage, Method, Observation, PairImages, PairPose, PoseMemory, UntoldAxes, observe_one,
+    observe_pair, observe_untold,
 };
 use vergence_rig::{BoardInstant, Rig};
 use vergence_vision::Side;
@@ -16,6 +17,8 @@ use crate::{Clock, LiveError};
 pub enum PosedExposure {
     /// The images of both cameras, exposed together.
     Pair(Box<[ExposedImage<PendingImage>; 2]>, Box<PairPose>),
+    /// The images of both cameras of a rig that stands, some of whose axes are told by no encoder.
+    Untold(Box<[ExposedImage<PendingImage>; 2]>, UntoldAxes),
     /// One camera, because the other is gone: its bearings need no pose.
     One {
         /// The camera that delivered.
@@ -27,7 +30,7 @@ pub enum PosedExposure {
     },
 }
 
-/// The measurement of one exposure. It holds nothing of any other.
+/// The measurement of one exposure. It holds nothing of any other but, while the axes stand, of their pose.
 pub struct Measurement {
     /// Points or bearings.
     pub observation: Observation,
@@ -47,33 +50,46 @@ impl Measurement {
     }
 }
 
-/// Decodes and measures `exposure`; `clock` says how long both take.
+/// Decodes and measures `exposure`; `memory` is of the exposures before it, `clock` says how long both take. `None` where neither
+/// encoders nor images tell where the axes are.
 ///
 /// # Errors
 /// An image that cannot be decoded or is not of its camera's size, a row whose joints are not known, cameras that share no
 /// field.
-pub fn measure(exposure: PosedExposure, rig: &Rig, method: Method<'_>, clock: Clock) -> Result<Measurement, LiveError> {
+pub fn measure(
+    exposure: PosedExposure,
+    rig: &Rig,
+    method: Method<'_>,
+    memory: &mut PoseMemory,
+    clock: Clock,
+) -> Result<Option<Measurement>, LiveError> {
     let begun = clock();
-    match exposure {
-        PosedExposure::Pair(images, pose) => {
-            let [left, right] = *images;
-            let middle = left.middle;
-            let (left, right) = rayon::join(|| decode(left), || decode(right));
-            let (left, right) = (left?, right?);
-            let decoded = clock();
-            let images = PairImages { left: &left, right: &right };
-            let observation =
-                observe_pair(images, rig, &pose, method).map_err(|error| LiveError::Unmeasurable(error.to_string()))?;
-            Ok(Measurement::new(observation, middle, [begun, decoded, clock()]))
-        }
+    let (images, pose) = match exposure {
         PosedExposure::One { side, image, why } => {
             let middle = image.middle;
             let image = decode(*image)?;
             let decoded = clock();
             let observation = observe_one(&image, (rig, method.search), side, why);
-            Ok(Measurement::new(observation, middle, [begun, decoded, clock()]))
+            return Ok(Some(Measurement::new(observation, middle, [begun, decoded, clock()])));
         }
-    }
+        PosedExposure::Pair(images, pose) => (images, Ok(pose)),
+        PosedExposure::Untold(images, untold) => (images, Err(untold)),
+    };
+    let (middle, [left, right]) = both(*images)?;
+    let (images, decoded) = (PairImages { left: &left, right: &right }, clock());
+    let observed = match pose {
+        Ok(pose) => observe_pair(images, rig, &pose, method, memory).map(Some),
+        Err(untold) => observe_untold(images, rig, &untold, method, memory),
+    };
+    let observed = observed.map_err(|error| LiveError::Unmeasurable(error.to_string()))?;
+    Ok(observed.map(|observation| Measurement::new(observation, middle, [begun, decoded, clock()])))
+}
+
+/// Both images, and the middle of the exposure of the left one.
+fn both([left, right]: [ExposedImage<PendingImage>; 2]) -> Result<(BoardInstant, [RgbImage; 2]), LiveError> {
+    let middle = left.middle;
+    let (left, right) = rayon::join(|| decode(left), || decode(right));
+    Ok((middle, [left?, right?]))
 }
 
 fn decode(exposed: ExposedImage<PendingImage>) -> Result<RgbImage, LiveError> {

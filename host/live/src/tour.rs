@@ -1,10 +1,13 @@
 //! Where the stages go while the live loop measures.
 
 use std::future::pending;
+use std::pin::pin;
 use std::time::Duration;
 
 use vergence_board::{Board, BoardError};
 use vergence_rig::Mode;
+
+use crate::orders::HOME;
 
 /// Modes that the rig visits in turn, while the live loop measures.
 #[derive(Clone, Debug)]
@@ -23,19 +26,55 @@ impl Tour {
     }
 
     /// Goes from mode to mode, and then stays disarmed in the last one for ever. It ends only with an error; `interruption`
-    /// is one.
-    pub async fn drive(&self, board: Option<&mut Board>, interruption: impl Future<Output = ()>) -> BoardError {
+    /// is one. A fault that leaves an axis without its encoder is none: `warn` hears of it, and each time that `order` returns the fault
+    /// is cleared and the axes are homed, after which the tour goes on.
+    pub async fn drive(
+        &self,
+        board: Option<&mut Board>,
+        interruption: impl Future<Output = ()>,
+        mut order: impl AsyncFnMut(),
+        mut warn: impl FnMut(String),
+    ) -> BoardError {
         let Some(board) = board.filter(|_| self.moves()) else { return pending().await };
-        let driven = board.armed(interruption, async |board| -> Result<(), BoardError> {
-            for mode in &self.modes {
-                board.move_to(mode.number, &mode.targets).await?;
-                board.hold(Some(self.stay)).await?;
+        let mut interruption = pin!(interruption);
+        let (mut remaining, mut is_lost) = (&self.modes[..], false);
+        loop {
+            let driven = board.armed(interruption.as_mut(), async |board| -> Result<(), BoardError> {
+                if is_lost {
+                    board.home().await?;
+                }
+                while let Some((mode, later)) = remaining.split_first() {
+                    board.move_to(mode.number, &mode.targets).await?;
+                    board.hold(Some(self.stay)).await?;
+                    remaining = later;
+                }
+                Ok(())
+            });
+            let outcome = driven.await;
+            match outcome {
+                Ok(()) => return pending().await,
+                Err(BoardError::Fault(said)) if !board.client().knowledge().lost_axes().is_empty() => {
+                    is_lost = true;
+                    warn(format!(
+                        "{said}. Nothing moves, and the images tell where it stands; a line '{HOME}' clears the fault and homes"
+                    ));
+                }
+                Err(error) => return error,
             }
-            Ok(())
-        });
-        match driven.await {
-            Err(error) => error,
-            Ok(()) => pending().await,
+            loop {
+                order().await;
+                match cleared(board).await {
+                    Ok(()) => break,
+                    Err(refusal @ BoardError::Refused { .. }) => warn(refusal.to_string()),
+                    Err(error) => return error,
+                }
+            }
         }
     }
+}
+
+/// Clears the latched fault, as the latest pose names it.
+async fn cleared(board: &mut Board) -> Result<(), BoardError> {
+    board.next_pose().await?;
+    board.clear().await.map(drop)
 }

@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use serde_json::{Map, Value, json};
-use vergence_pipeline::{DenseRanges, Dropped, PairCloud};
+use vergence_pipeline::{AxisByImages, DenseRanges, Dropped, PairCloud};
 use vergence_rig::{Rig, RigPose, rounded};
 use vergence_vision::{FusedPose, PoseDrift};
 
@@ -85,6 +85,59 @@ pub fn pose_source_json(pose: &RigPose, fused: Option<&FusedPose>) -> Value {
     let rows: Vec<Vec<f64>> = pose.covariance().row_iter().map(|row| row.iter().copied().collect()).collect();
     told["covariance"] = json!(rows);
     told
+}
+
+/// [`pose_source_json`] with what pairs and visits before this pair told.
+#[must_use]
+pub fn pose_told_json(pose: &RigPose, cloud: &PairCloud) -> Value {
+    let mut told = pose_source_json(pose, cloud.fused_pose.as_ref());
+    if let Some(fused) = &cloud.fused_pose {
+        told["pairs"] = cloud.told_by_pairs.into();
+        if cloud.told_by_stored > 0.0 {
+            told["from"] = "joints, stored pose and images".into();
+            told["told_by_joints"] = rounded(fused.told_by_joints() - cloud.told_by_stored).into();
+            told["told_by_stored"] = rounded(cloud.told_by_stored).into();
+        }
+    }
+    told
+}
+
+/// Who told the pose, such as "pose by joints 2.1, images 3.9 of 6, 3 pairs"; `None` where the joints told it alone.
+#[must_use]
+pub fn pose_told_words(cloud: &PairCloud) -> Option<String> {
+    let fused = cloud.fused_pose.as_ref()?;
+    let joints = fused.told_by_joints() - cloud.told_by_stored;
+    let stored = match cloud.told_by_stored {
+        none if none <= 0.0 => String::new(),
+        stored => format!(", stored {stored:.1}"),
+    };
+    let pairs = if cloud.told_by_pairs == 1 { "pair" } else { "pairs" };
+    Some(format!(
+        "pose by joints {joints:.1}{stored}, images {:.1} of 6, {} {pairs}, ± {:.2}",
+        fused.told_by_images,
+        cloud.told_by_pairs,
+        fused.rotation_sigma()
+    ))
+}
+
+/// Where the images say that axes stand, such as "separation 60.02° ± 0.02°"; `None` where encoders tell all of them.
+#[must_use]
+pub fn axes_by_images_words(rig: &Rig, axes: &[AxisByImages]) -> Option<String> {
+    let named = axes.iter().filter_map(|told| Some((rig.axes.get(told.axis)?, told)));
+    let words: Vec<_> = named.map(|(axis, told)| format!("{} {} ± {}", axis.name, told.at, told.sigma)).collect();
+    (!words.is_empty()).then(|| words.join(", "))
+}
+
+/// The same for programs: `{"separation": {"at": 60.02, "sigma": 0.02, "unit": "deg"}}`.
+#[must_use]
+pub fn axes_by_images_json(rig: &Rig, axes: &[AxisByImages]) -> Value {
+    let entry = |told: &AxisByImages| {
+        let axis = rig.axes.get(told.axis)?;
+        let unit = if axis.column().ends_with("_mm") { "mm" } else { "deg" };
+        let [at, sigma] = [told.at, told.sigma].map(|position| rounded(position.mm_or_deg()));
+        Some((axis.name.clone(), json!({ "at": at, "sigma": sigma, "unit": unit })))
+    };
+    Value::Object(axes.iter().filter_map(entry).collect())
 }
 
 /// A line about the pose, where the images told a part of it.

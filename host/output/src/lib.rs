@@ -18,8 +18,9 @@ mod points;
 mod target_sheet;
 
 pub use cloud_report::{
-    PoseSource, calibration_json, calibration_line, cloud_json, dense_drift_warning, drift_warning, dropped_json,
-    dropped_lines, pose_source_json, pose_source_line,
+    PoseSource, axes_by_images_json, axes_by_images_words, calibration_json, calibration_line, cloud_json,
+    dense_drift_warning, drift_warning, dropped_json, dropped_lines, pose_source_json, pose_source_line,
+    pose_told_json, pose_told_words,
 };
 pub use dense_cloud::DenseCloud;
 pub use endings::{check_ending, check_folder};

@@ -48,6 +48,24 @@ pub fn axes_by_images(
     joints: &JointsAt,
     matcher: &dyn Matcher,
 ) -> Result<Option<JointsAt>, MatchError> {
+    Ok(best_look(images, (rig, search), joints, matcher)?.map(|look| look.joints))
+}
+
+/// What the images told from the position with which most of their matches agree.
+pub(crate) struct Look {
+    /// The joints, narrowed to it.
+    pub joints: JointsAt,
+    /// The pose by the matches from there.
+    pub fused: FusedPose,
+}
+
+/// Looks at the images from all positions that `joints` allow.
+pub(crate) fn best_look(
+    images: PairImages<'_>,
+    (rig, search): (&Rig, &Search),
+    joints: &JointsAt,
+    matcher: &dyn Matcher,
+) -> Result<Option<Look>, MatchError> {
     let mut best: Option<(usize, JointsAt, FusedPose)> = None;
     for look in looks(rig, joints) {
         let pose = rig.pose(&look);
@@ -67,7 +85,7 @@ pub fn axes_by_images(
             best = Some((agreeing, look, fused));
         }
     }
-    Ok(best.map(|(_, look, fused)| narrowed(rig, joints, &look, &fused)))
+    Ok(best.map(|(_, look, fused)| Look { joints: narrowed(rig, joints, &look, &fused), fused }))
 }
 
 /// Where each axis stands by the pose that joints and images tell together.

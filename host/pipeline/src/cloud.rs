@@ -13,9 +13,10 @@ use vergence_vision::{
 use crate::limits::{cloud_gates, expected_drift, matching_sigma};
 use crate::pair::{PairImages, colour_at};
 use crate::pose::PairPose;
-use crate::pose_source::{fused_pose, with_fused};
+use crate::pose_source::with_fused;
 use crate::search::{EVERYWHERE, Search};
 use crate::stage::Stage;
+use crate::standing::StandingPose;
 
 /// A point with its colour in the left image.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -55,6 +56,10 @@ pub struct PairCloud {
     pub lacks_calibration: bool,
     /// The pose by which the points were made, where joints and matches told it together; else the joints told it alone.
     pub fused_pose: Option<FusedPose>,
+    /// Number of pairs, this one included, whose matches told that pose.
+    pub told_by_pairs: usize,
+    /// How many of its six components earlier visits of the mode told.
+    pub told_by_stored: f64,
 }
 
 impl PairCloud {
@@ -132,13 +137,39 @@ pub fn pair_cloud(
     method: Method<'_>,
     ended: &mut dyn FnMut(Stage),
 ) -> Result<PairCloud, PairCloudError> {
+    refined_cloud(images, rig, pose, method, &mut StandingPose::default(), ended)
+}
+
+/// [`pair_cloud`] of a rig that may have stood for some pairs: the pose is told by their matches too, and `standing` keeps those of
+/// this pair for the next one. Where the rig has moved, `standing` begins anew.
+///
+/// # Errors
+/// As [`pair_cloud`].
+pub fn refined_cloud(
+    images: PairImages<'_>,
+    rig: &Rig,
+    pose: &PairPose,
+    method: Method<'_>,
+    standing: &mut StandingPose,
+    ended: &mut dyn FnMut(Stage),
+) -> Result<PairCloud, PairCloudError> {
     let middle = pose.at_middle();
     middle.check_closure()?;
-    let sigma = matching_sigma(middle, pose.sweep());
-    let found = images.with_grey((rig, method.search), middle, sigma, |pair| method.matcher.find(pair))?;
+    standing.forget_if_moved(rig, pose);
+    let matched = |at: &RigPose| -> Result<_, MatchError> {
+        let sigma = matching_sigma(at, pose.sweep());
+        let found = images.with_grey((rig, method.search), at, sigma, |pair| method.matcher.find(pair))?;
+        let pairs: Vec<_> = found.pairs.iter().map(Match::measured).collect();
+        Ok((found, pairs))
+    };
+    let (mut found, mut pairs) = matched(&standing.best(rig, middle))?;
+    if !standing.take(rig, pose, &pairs) {
+        // It was looked for around a pose that the cameras have left.
+        (found, pairs) = matched(&standing.best(rig, middle))?;
+        standing.take(rig, pose, &pairs);
+    }
     ended(Stage::Match);
-    let pairs: Vec<_> = found.pairs.iter().map(Match::measured).collect();
-    let cloud = cloud_of(&pairs, images.left, (rig, pose), (method.kernel, method.search.farthest))?;
+    let cloud = cloud_of(&pairs, images.left, (rig, pose), standing, (method.kernel, method.search.farthest))?;
     ended(Stage::Triangulate);
     Ok(cloud.scored(found))
 }
@@ -154,17 +185,21 @@ pub fn cloud_of_pairs(
     pose: &PairPose,
     kernel: Kernel,
 ) -> Result<PairCloud, TrackGap> {
-    cloud_of(pairs, left, (rig, pose), (kernel, None))
+    let mut standing = StandingPose::default();
+    standing.take(rig, pose, pairs);
+    cloud_of(pairs, left, (rig, pose), &standing, (kernel, None))
 }
 
+/// The cloud of `pairs`, which `standing` has taken.
 fn cloud_of(
     pairs: &[(PixelPair, f64)],
     left: &RgbImage,
     (rig, pose): (&Rig, &PairPose),
+    standing: &StandingPose,
     (kernel, farthest): (Kernel, Option<Length>),
 ) -> Result<PairCloud, TrackGap> {
     let middle = pose.at_middle();
-    let fused = fused_pose(rig, pose, pairs);
+    let fused = standing.refined().copied();
     let used = fused.map_or_else(|| middle.clone(), |fused| with_fused(middle, &fused));
     let gates = cloud_gates(rig, &used, kernel, farthest);
     let by_joints =
@@ -187,6 +222,8 @@ fn cloud_of(
         pose_drift: drift,
         lacks_calibration: !middle.is_calibration_known,
         fused_pose: fused,
+        told_by_pairs: standing.pairs(),
+        told_by_stored: standing.told_by_stored(rig, middle),
     })
 }
 

@@ -6,8 +6,10 @@
 //! - [`pair_cloud`] matches a [`PairImages`] and triangulates what passes the gates, whose [`limits`] all verbs share; [`cloud_of_pairs`] triangulates given
 //!   correspondences;
 //! - where the joints alone tell the pose too badly, joints and matches tell it together ([`PairCloud::fused_pose`], [`pose_by_images`]);
+//! - while the rig stands, each pair adds to that pose ([`StandingPose`], [`refined_cloud`]), and what lasts of it serves the next
+//!   visit of the mode ([`PoseMemory`]);
 //! - a [`Search`] says between which ranges points are sought, and what masks hide;
-//! - [`axes_by_images`] finds where axes stand that no encoder tells;
+//! - [`axes_by_images`] finds where axes stand that no encoder tells, [`observe_untold`] measures by them as long as they stand;
 //! - [`dense_ranges`] measures every pixel of the left image;
 //! - [`bearings`] gives the directions that one camera alone can see;
 //! - [`observe_pair`] and [`observe_one`] make an [`Observation`] of what a live rig delivers;
@@ -23,6 +25,7 @@ mod cloud;
 mod dense;
 mod exposures;
 pub mod limits;
+mod memory;
 mod mode_outlook;
 mod observation;
 mod pair;
@@ -31,13 +34,16 @@ mod pose_source;
 mod score;
 mod search;
 mod stage;
+mod standing;
+mod untold_axes;
 mod zones;
 
-pub use axes_by_images::{AxisEstimate, axes_by_images, axis_estimates};
+pub use axes_by_images::axes_by_images;
 pub use bearings::{Bearing, bearings};
-pub use cloud::{ColouredPoint, Dropped, Method, PairCloud, PairCloudError, cloud_of_pairs, pair_cloud};
+pub use cloud::{ColouredPoint, Dropped, Method, PairCloud, PairCloudError, cloud_of_pairs, pair_cloud, refined_cloud};
 pub use dense::{DenseRanges, dense_ranges};
 pub use exposures::{Ambiguity, CameraGone, Exposed, ExposedImage, Exposures, SkipReason, TimeBase};
+pub use memory::PoseMemory;
 pub use mode_outlook::ModeOutlook;
 pub use observation::{Observation, observe_one, observe_pair};
 pub use pair::{PairImages, colour_at};
@@ -46,4 +52,6 @@ pub use pose_source::{pose_by_images, with_fused};
 pub use score::{Score, Spread, score};
 pub use search::Search;
 pub use stage::{Stage, StageTimes};
+pub use standing::StandingPose;
+pub use untold_axes::{AxisByImages, UntoldAxes, axes_told, observe_untold};
 pub use zones::{RigView, ZONE_RADIUS, rig_zones};

@@ -5,13 +5,15 @@ use vergence_rig::{Rig, RigPose};
 use vergence_vision::Side;
 
 use crate::bearings::{Bearing, bearings};
-use crate::cloud::{Method, PairCloud, PairCloudError, pair_cloud};
+use crate::cloud::{Method, PairCloud, PairCloudError, refined_cloud};
 use crate::exposures::CameraGone;
+use crate::memory::PoseMemory;
 use crate::pair::PairImages;
 use crate::pose::PairPose;
 use crate::search::Search;
+use crate::untold_axes::AxisByImages;
 
-/// The measurement of one exposure. It holds nothing of any other.
+/// The measurement of one exposure. It holds nothing of any other but, while the axes stand, of their pose.
 #[derive(Clone, Debug)]
 pub enum Observation {
     /// Both cameras delivered an image.
@@ -22,6 +24,8 @@ pub enum Observation {
         pose: Box<RigPose>,
         /// Whether the stages moved.
         moving: bool,
+        /// The axes that no encoder told.
+        by_images: Vec<AxisByImages>,
     },
     /// One camera delivered an image, because the other is gone.
     Bearings {
@@ -34,19 +38,22 @@ pub enum Observation {
     },
 }
 
-/// The points of a pair.
+/// The points of a pair; `memory` is of the pairs before it.
 ///
 /// # Errors
-/// The same errors as [`pair_cloud`].
+/// The same errors as [`refined_cloud`].
 pub fn observe_pair(
     images: PairImages<'_>,
     rig: &Rig,
     pose: &PairPose,
     method: Method<'_>,
+    memory: &mut PoseMemory,
 ) -> Result<Observation, PairCloudError> {
-    let cloud = Box::new(pair_cloud(images, rig, pose, method, &mut |_| ())?);
+    memory.arrive(rig, pose);
+    let cloud = Box::new(refined_cloud(images, rig, pose, method, &mut memory.standing, &mut |_| ())?);
+    memory.keep(rig, pose, &cloud);
     let used = Box::new(cloud.pose(pose.at_middle()));
-    Ok(Observation::Points { cloud, pose: used, moving: pose.is_moving() })
+    Ok(Observation::Points { cloud, pose: used, moving: pose.is_moving(), by_images: Vec::new() })
 }
 
 /// The bearings of the image of one camera, but where the mask of `search` hides them; `why` says why the other camera delivers

@@ -9,18 +9,13 @@ use crate::pair::PairImages;
 use crate::pose::PairPose;
 use crate::search::Search;
 
-/// The pose that the joints and `matches` tell together, where the joints alone tell it too badly. `None` where they suffice, where
-/// the rig moved during the exposure, and where too few matches agree.
-pub(crate) fn fused_pose(rig: &Rig, pose: &PairPose, matches: &[(PixelPair, f64)]) -> Option<FusedPose> {
-    let middle = pose.at_middle();
-    if joints_suffice(rig, middle) || !pose.is_steady() {
-        return None;
-    }
+/// The pose that joints and `matches` tell together; `None` where too few agree, or they do not help.
+pub(crate) fn fused(rig: &Rig, by_joints: &RigPose, matches: &[(PixelPair, f64)]) -> Option<FusedPose> {
     let stereo =
-        StereoPair { left: &rig.left_camera, right: &rig.right_camera, left_from_right: middle.left_from_right };
+        StereoPair { left: &rig.left_camera, right: &rig.right_camera, left_from_right: by_joints.left_from_right };
     // The joints' errors move the pose far: matches that the covariance of the joints excludes are not looked at.
-    fuse_pose(matches, &stereo, &middle.covariance(), MatchErrors::Measured)
-        .filter(|fused| fused.rotation_sigma() < middle.rotation_sigma)
+    fuse_pose(matches, &stereo, &by_joints.covariance(), MatchErrors::Measured)
+        .filter(|fused| fused.rotation_sigma() < by_joints.rotation_sigma)
 }
 
 /// Whether the joints tell the rotation of `pose` well enough. What the calibration leaves uncertain is no part of that: one pair of
@@ -60,5 +55,5 @@ pub fn pose_by_images(
     let sigma = matching_sigma(pose, standing.sweep());
     let found = images.with_grey((rig, search), pose, sigma, |pair| matcher.find(pair))?;
     let pairs: Vec<_> = found.pairs.iter().map(Match::measured).collect();
-    Ok(fused_pose(rig, &standing, &pairs))
+    Ok(fused(rig, pose, &pairs))
 }

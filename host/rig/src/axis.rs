@@ -177,6 +177,13 @@ impl RigAxis {
         reading.hypot(0.5 * self.play / self.value_per_count())
     }
 
+    /// Standard deviation in counts of an axis that may stand anywhere in its range.
+    #[must_use]
+    pub fn sigma_of_range(&self) -> f64 {
+        let [low, high] = self.range.map(AxisPosition::value);
+        (high - low) / 12f64.sqrt() / self.value_per_count()
+    }
+
     /// The counts, with a fraction, at `value` in millimetres or radians: the inverse of [`Self::value_at`].
     #[must_use]
     pub fn counts_at(&self, value: f64) -> f64 {

@@ -64,6 +64,12 @@ impl FusedPose {
         6.0 - self.told_by_images
     }
 
+    /// The way from this pose to another, in the coordinates of `covariance`.
+    #[must_use]
+    pub fn way_to(&self, to: &Transform<Left, Right>) -> Vector6<f64> {
+        difference(to, &self.left_from_right)
+    }
+
     /// Standard deviation of the rotation: the root of the sum of squares over three axes.
     #[must_use]
     pub fn rotation_sigma(&self) -> Angle {

@@ -2,8 +2,10 @@
 
 use std::sync::{Arc, Mutex, MutexGuard};
 
-use vergence_protocol::HostStatistics;
+use vergence_protocol::{HostStatistics, PoseReport};
 use vergence_rig::{ClockMap, Exchange, JointSample, JointTrack};
+
+use super::lost_encoders::{LostAxis, LostEncoders, Told};
 
 /// Poses that are kept: half a minute at the board's usual rate.
 const TRACK_LENGTH: usize = 16_000;
@@ -16,6 +18,7 @@ pub struct BoardKnowledge(Arc<Mutex<Measured>>);
 struct Measured {
     clock_map: ClockMap,
     track: JointTrack,
+    encoders: LostEncoders,
     statistics: HostStatistics,
 }
 
@@ -25,6 +28,7 @@ impl BoardKnowledge {
         Self(Arc::new(Mutex::new(Measured {
             clock_map: baud.map_or_else(ClockMap::default, ClockMap::at_baud),
             track: JointTrack::new(TRACK_LENGTH),
+            encoders: LostEncoders::default(),
             statistics: HostStatistics::default(),
         })))
     }
@@ -41,6 +45,18 @@ impl BoardKnowledge {
         self.lock().track.between(from_us, to_us)
     }
 
+    /// What the encoders tell of an instant in microseconds of the board's clock, by what is known now.
+    #[must_use]
+    pub fn told_at(&self, us: f64) -> Told {
+        self.lock().encoders.told_at(us)
+    }
+
+    /// The axes that no encoder tells now.
+    #[must_use]
+    pub fn lost_axes(&self) -> Vec<LostAxis> {
+        self.lock().encoders.lost().to_vec()
+    }
+
     /// Counts of frames, retransmissions and poses since the link was opened.
     #[must_use]
     pub fn statistics(&self) -> HostStatistics {
@@ -51,8 +67,10 @@ impl BoardKnowledge {
         self.lock().statistics = statistics;
     }
 
-    pub(super) fn note_joints(&self, sample: JointSample) {
-        self.lock().track.push(sample);
+    pub(super) fn note_pose(&self, pose: &PoseReport) {
+        let mut measured = self.lock();
+        measured.track.push(JointSample { at: pose.at, counts: pose.counts.clone() });
+        measured.encoders.note(pose);
     }
 
     pub(super) fn probe_sent(&self) {

@@ -11,7 +11,7 @@ use vergence_protocol::{
     Compatibility, ControllerState, HostEvent, HostSession, MAX_FRAME, Microseconds, PoseReport, Report, Request,
     SessionId, Ticket, TriggerMark,
 };
-use vergence_rig::{Exchange, JointSample};
+use vergence_rig::Exchange;
 
 use super::attention::Attention;
 use super::clock::HostClock;
@@ -267,7 +267,7 @@ impl LinkTask {
         match report {
             Report::Pose(pose) => {
                 self.state = pose.state;
-                self.knowledge.note_joints(JointSample { at: pose.at, counts: pose.counts.clone() });
+                self.knowledge.note_pose(&pose);
                 self.pass_on(|| Followed::Pose(pose.clone()));
                 self.outlets.poses.send_replace(Some(pose));
             }

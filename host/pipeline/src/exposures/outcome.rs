@@ -71,8 +71,10 @@ pub enum SkipReason {
     NewerCame,
     /// The encoder readings for the exposure did not arrive in time.
     EncodersSilent,
-    /// The encoder readings do not cover the exposure.
+    /// The encoder readings do not cover the exposure, or an axis moved that no encoder tells.
     EncodersUnknown,
+    /// No encoder tells an axis, and the images do not tell it either.
+    AxesUntold,
 }
 
 impl SkipReason {
@@ -98,6 +100,7 @@ impl SkipReason {
             Self::NewerCame => "newer_came",
             Self::EncodersSilent => "encoders_silent",
             Self::EncodersUnknown => "encoders_unknown",
+            Self::AxesUntold => "axes_untold",
         }
     }
 }

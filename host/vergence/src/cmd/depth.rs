@@ -15,8 +15,8 @@ use vergence_camera::{Camera, CameraImage, FileCamera};
 use vergence_files::make_folder;
 use vergence_matching::{GuidedMatcher, Matcher};
 use vergence_output::{
-    PlyEncoding, PoseSource, TableFormat, calibration_line, check_ending, check_folder, cloud_json, drift_warning,
-    dropped_lines, match_svg, pose_source_line, write_cloud, write_drawing,
+    PlyEncoding, PoseSource, TableFormat, axes_by_images_json, axes_by_images_words, calibration_line, check_ending,
+    check_folder, cloud_json, drift_warning, dropped_lines, match_svg, pose_source_line, write_cloud, write_drawing,
 };
 use vergence_pipeline::limits::PIXEL_SIGMA;
 use vergence_pipeline::{Method, PairCloud, PairImages, PairPose, cloud_of_pairs, pair_cloud};
@@ -246,9 +246,10 @@ fn one_pair(
         said,
     )?;
     if let Some(joints) = &narrowed {
-        let (lines, axes) = args.uncertain.told(rig, joints, measured.fused.as_ref());
-        lines.iter().try_for_each(|line| said.1.say(line))?;
-        measured.result["axes_by_images"] = axes;
+        let axes = args.uncertain.told(rig, joints, measured.fused.as_ref());
+        let told = axes_by_images_words(rig, &axes);
+        told.iter().try_for_each(|told| said.1.say(format!("  pose by images: {told}")))?;
+        measured.result["axes_by_images"] = axes_by_images_json(rig, &axes);
     }
     measured.result = with_closure(measured.result, taken.pose.at_middle());
     Ok(measured)

@@ -11,7 +11,7 @@ use std::time::Duration;
 use tokio::sync::mpsc;
 use vergence_board::{Board, HostClock, Port, fresh_session};
 use vergence_files::make_folder;
-use vergence_live::{Ended, Limits, LiveLoop, MatchingTime, Totals, Tour};
+use vergence_live::{Ended, KeptPoses, Limits, LiveLoop, MatchingTime, Totals, Tour};
 use vergence_output::{PlyEncoding, TableFormat, check_folder};
 use vergence_pipeline::Exposures;
 use vergence_protocol::{Request, Trigger};
@@ -39,7 +39,8 @@ const EVENTS_KEPT: usize = 16;
 /// exposures are counted by reason.
 ///
 /// The board fires the cameras (--rate). Every row is measured with the pose at its own exposure, so the stages may move: with
-/// --mode they do. When a camera dies, the corners of the other are written as bearings, without range, until it is back.
+/// --mode they do. When a camera dies, the corners of the other are written as bearings, without range, until it is back. When an
+/// encoder is lost, the board stops and the images tell that axis, until a line `home` on standard input clears the fault and homes.
 /// Ctrl-C brakes, disarms and ends.
 #[derive(Debug, clap::Args)]
 pub struct Args {
@@ -64,6 +65,9 @@ pub struct Args {
     /// Write the PLY file as text, for a person to read; the default is binary.
     #[arg(long)]
     ascii: bool,
+    /// Keep what images tell of the pose in each mode in this file, for the next visit; of the rig file that is used.
+    #[arg(long, value_name = "FILE")]
+    poses: Option<PathBuf>,
     /// End after this many results.
     #[arg(long, value_name = "COUNT")]
     frames: Option<u64>,
@@ -81,9 +85,9 @@ pub struct Args {
     /// With simulated cameras: sets where the stages stand at first and the noise of the images.
     #[arg(long, default_value_t = 1)]
     seed: u64,
-    /// With simulated cameras: unplugs one for a while, such as left@2s..4s after the start.
-    #[arg(long, value_name = "WHEN", value_parser = cameras::parse_unplugged)]
-    unplug: Vec<vergence_sim::Unplugged>,
+    /// With simulated cameras: unplugs one, or the encoder of an axis, for a while, such as left@2s..4s after the start.
+    #[arg(long, value_name = "WHEN")]
+    unplug: Vec<vergence_sim::Unplug>,
     /// On a simulated rig: how long matching takes on its clock. Without it, as long as it really takes.
     #[arg(long, value_name = "TIME", value_parser = humantime::parse_duration)]
     match_time: Option<Duration>,
@@ -99,6 +103,7 @@ pub async fn run(args: &Args, common: &CommonOptions, console: Console) -> Resul
     let rig = rig_file::load(common.rig.as_deref())?;
     let (tour, search) = (args.tour.tour(&rig)?, args.search.search(&rig)?);
     let matcher = Arc::from(args.matching.matcher(console)?);
+    let poses = args.poses.as_deref().map(|file| KeptPoses::open(file, &rig)).transpose()?;
     if let Some(folder) = &args.out {
         check_folder(folder)?;
         make_folder(folder)?;
@@ -139,6 +144,7 @@ pub async fn run(args: &Args, common: &CommonOptions, console: Console) -> Resul
             (Some(_), Some(time)) => MatchingTime::Fixed(time),
         },
         stopwatch,
+        memory: poses.as_ref().map(KeptPoses::memory).unwrap_or_default(),
     };
     let mut publisher = Publisher {
         console,
@@ -160,6 +166,7 @@ pub async fn run(args: &Args, common: &CommonOptions, console: Console) -> Resul
         _ => settle(&mut board, &tour).await,
     };
     publisher.end(&totals)?;
+    poses.map_or(Ok(()), |poses| poses.write())?;
     let ended = ended?;
     settled?;
     match ended {
@@ -179,10 +186,11 @@ async fn both(
 ) -> Result<Option<Ended>, Failure> {
     let console = publisher.console;
     let limits = Limits { results: args.frames, time: args.duration };
-    let measuring = live.run(limits, totals, |result| publisher.publish(&result), |warning| console.warn(warning));
+    let warn = |warning: String| console.warn(warning);
+    let measuring = live.run(limits, totals, |result| publisher.publish(&result), warn);
     tokio::select! {
         ended = measuring => ended.map(Some),
-        error = tour.drive(board.as_mut(), interrupted()) => Err(error.into()),
+        error = tour.drive(board.as_mut(), interrupted(), tour::order(), warn) => Err(error.into()),
         () = interrupted() => Ok(None),
     }
 }
@@ -190,7 +198,8 @@ async fn both(
 /// Leaves the board at rest, disarmed, with the camera trigger off.
 async fn settle(board: &mut Option<Board>, tour: &Tour) -> Result<(), Failure> {
     let Some(board) = board else { return Ok(()) };
-    if tour.moves() {
+    // A latched fault stays for whoever clears it; nothing moves, and the board cannot be disarmed.
+    if tour.moves() && board.pose().fault.is_none() {
         board.release().await?;
     }
     Ok(board.ask(Request::SetTrigger(Trigger::Off)).await?)

@@ -2,11 +2,10 @@
 
 use std::str::FromStr;
 
-use serde_json::{Value, json};
 use vergence_camera::CameraImage;
 use vergence_matching::Matcher;
-use vergence_pipeline::{AxisEstimate, PairImages, Search, axes_by_images, axis_estimates};
-use vergence_rig::{AxisPosition, JointsAt, Rig, RigAxis, rounded};
+use vergence_pipeline::{AxisByImages, PairImages, Search, axes_by_images, axes_told};
+use vergence_rig::{AxisPosition, JointsAt, Rig};
 use vergence_vision::{FusedPose, Length};
 
 use crate::failure::Failure;
@@ -72,14 +71,14 @@ impl Uncertain {
                 let names = names.join(", ");
                 return Err(Failure::usage(format!("rig '{}' has no axis '{name}', but {names}", rig.name)));
             };
-            let value = match sigma {
+            let counts = match sigma {
                 Some(sigma) if !sigma.is_of(axis.kind) => {
                     return Err(Failure::usage(format!("axis '{name}' of rig '{}' is of another kind", rig.name)));
                 }
-                Some(sigma) => sigma.value(),
-                None => anywhere(axis),
+                Some(sigma) => sigma.value() / axis.value_per_count(),
+                None => axis.sigma_of_range(),
             };
-            *of_axis = value / axis.value_per_count();
+            *of_axis = counts;
         }
         Ok(joints)
     }
@@ -110,38 +109,12 @@ impl Uncertain {
         })
     }
 
-    /// Where the uncertain axes stand by joints and images together: lines for people, and for programs.
-    pub fn told(&self, rig: &Rig, joints: &JointsAt, fused: Option<&FusedPose>) -> (Vec<String>, Value) {
-        let estimates = fused.map_or_else(
-            || {
-                let pairs = joints.counts.iter().zip(&joints.sigma);
-                pairs.map(|(&counts, &sigma)| AxisEstimate { counts, sigma }).collect()
-            },
-            |fused| axis_estimates(rig, joints, fused),
-        );
-        let each = || {
-            let named = rig.axes.iter().zip(&estimates);
-            let named = named.filter(|(axis, _)| self.uncertain.iter().any(|of| of.name == axis.name));
-            named.map(|(axis, found)| {
-                let position = |value| AxisPosition::from_value(axis.kind, value);
-                (axis, position(axis.value_at(found.counts)), position(found.sigma * axis.value_per_count()))
-            })
-        };
-        let lines = each().map(|(axis, at, sigma)| format!("  {} {at} ± {sigma} by the images", axis.name)).collect();
-        let unit = |axis: &RigAxis| if axis.column().ends_with("_mm") { "mm" } else { "deg" };
-        let json = each().map(|(axis, at, sigma)| {
-            let entry =
-                json!({ "at": rounded(at.mm_or_deg()), "sigma": rounded(sigma.mm_or_deg()), "unit": unit(axis) });
-            (axis.name.clone(), entry)
-        });
-        (lines, Value::Object(json.collect()))
+    /// Where the uncertain axes stand by joints and images together.
+    pub fn told(&self, rig: &Rig, joints: &JointsAt, fused: Option<&FusedPose>) -> Vec<AxisByImages> {
+        let is_named = |&index: &usize| self.uncertain.iter().any(|of| of.name == rig.axes[index].name);
+        let axes: Vec<_> = (0..rig.axes.len()).filter(is_named).collect();
+        axes_told(rig, joints, fused, &axes)
     }
-}
-
-/// Standard deviation of a position that is uniform over the range of an axis.
-fn anywhere(axis: &RigAxis) -> f64 {
-    let [low, high] = axis.range.map(AxisPosition::value);
-    (high - low) / 12f64.sqrt()
 }
 
 #[cfg(test)]

@@ -5,36 +5,17 @@ use vergence_board::HostClock;
 use vergence_camera::CameraEvent;
 use vergence_live::{attach_both, simulate_both};
 use vergence_rig::{Rig, Shutter};
-use vergence_sim::Unplugged;
+use vergence_sim::Unplug;
 use vergence_vision::{KannalaBrandt, Side};
 
 use super::Args;
 use crate::failure::Failure;
 use crate::sim::SharedRig;
 
-/// Reads when a simulated camera is unplugged, in time since its start: `left@2s..4s`.
+/// Starts both cameras, and unplugs what shall be unplugged; their events go to `listener`.
 ///
 /// # Errors
-/// Says how it is written.
-pub fn parse_unplugged(text: &str) -> Result<Unplugged, String> {
-    let read = || {
-        let (side, times) = text.split_once('@')?;
-        let (from, until) = times.split_once("..")?;
-        let side = match side {
-            "left" => Side::Left,
-            "right" => Side::Right,
-            _ => return None,
-        };
-        let time = |text| humantime::parse_duration(text).ok();
-        Some(Unplugged { side, from: time(from)?, until: time(until)? })
-    };
-    read().ok_or_else(|| format!("'{text}' does not say when a camera is unplugged: write it like left@2s..4s"))
-}
-
-/// Starts both cameras; their events go to `listener`.
-///
-/// # Errors
-/// Where neither camera is there.
+/// Where neither camera is there, or nothing that can be unplugged has this name.
 pub fn start(
     args: &Args,
     rig: &Rig,
@@ -44,7 +25,18 @@ pub fn start(
 ) -> Result<(), Failure> {
     match (simulated, args.cameras.as_slice()) {
         (Some(mechanics), _) => {
-            simulate_both(rig, mechanics, (args.seed, &args.unplug), clock, listener);
+            let mut cameras = Vec::new();
+            for unplug in &args.unplug {
+                match unplug {
+                    Unplug::Camera(camera) => cameras.push(*camera),
+                    Unplug::Encoder { axis: name, times } => {
+                        let axis = rig.axes.iter().position(|axis| axis.name == *name).filter(|_| rig.trunk.is_none());
+                        let no = || Failure::usage(format!("rig '{}' has no stage '{name}' to unplug", rig.name));
+                        mechanics.lock().unplug_encoder(axis.ok_or_else(no)?, *times);
+                    }
+                }
+            }
+            simulate_both(rig, mechanics, (args.seed, &cameras), clock, listener);
             Ok(())
         }
         (None, [left, right]) => {
@@ -58,21 +50,5 @@ pub fn start(
             Ok(attach_both([left, opener(right, rig.right_camera, right_shutter)], listener)?)
         }
         _ => Err(Failure::usage("name the left and the right camera: --cameras /dev/video0 /dev/video2")),
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use std::time::Duration;
-
-    use super::*;
-
-    #[test]
-    fn the_time_of_unplugging_is_parsed() {
-        let out = parse_unplugged("left@2s..3500ms").expect("it is well formed");
-        assert_eq!((out.side, out.from, out.until.as_millis()), (Side::Left, Duration::from_secs(2), 3500));
-        for wrong in ["left", "left@2s", "top@1s..2s", "left@1..2"] {
-            assert!(parse_unplugged(wrong).is_err_and(|error| error.contains("left@2s..4s")), "{wrong}");
-        }
     }
 }

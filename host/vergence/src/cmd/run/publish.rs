@@ -11,7 +11,8 @@ use serde_json::{Value, json};
 use vergence_files::write_whole;
 use vergence_live::{LiveResult, Totals};
 use vergence_output::{
-    PlyEncoding, PoseSource, Table, TableFormat, drift_warning, dropped_json, ply, pose_source_json,
+    PlyEncoding, PoseSource, Table, TableFormat, axes_by_images_json, axes_by_images_words, drift_warning,
+    dropped_json, ply, pose_told_json, pose_told_words,
 };
 use vergence_pipeline::{Bearing, CameraGone, Observation, PairCloud};
 use vergence_rig::{Rig, RigPose, axes_json, rounded};
@@ -46,13 +47,22 @@ impl Publisher {
     pub fn publish(&mut self, result: &LiveResult<'_>) -> Result<(), Failure> {
         self.number += 1;
         match &result.measurement.observation {
-            Observation::Points { cloud, pose, moving } => {
+            Observation::Points { cloud, pose, moving, by_images } => {
                 self.write_cloud(cloud)?;
-                self.console.say(self.points_line(result, cloud, pose, *moving))?;
-                if let Some(warning) = drift_warning(cloud, self.pose_source()) {
+                let by_axes = axes_by_images_words(&self.rig, by_images).map(|told| format!("pose by images: {told}"));
+                let told = by_axes.or_else(|| pose_told_words(cloud)).map(|told| format!("; {told}"));
+                self.console.say(self.points_line(result, cloud, pose, *moving) + &told.unwrap_or_default())?;
+                // Where no encoder tells an axis, nothing is left for the images to disagree with.
+                let warning = drift_warning(cloud, self.pose_source()).filter(|_| by_images.is_empty());
+                if let Some(warning) = &warning {
                     self.console.warn(format!("cloud {}: {warning}", self.number));
                 }
-                self.print_json(|| self.points_json(result, cloud, pose, *moving))
+                self.print_json(|| {
+                    let mut line = self.points_json(result, cloud, pose, *moving);
+                    line["axes_by_images"] = axes_by_images_json(&self.rig, by_images);
+                    line["warning"] = json!(warning);
+                    line
+                })
             }
             Observation::Bearings { side, bearings, why } => {
                 self.write_bearings(bearings)?;
@@ -109,8 +119,7 @@ impl Publisher {
             "origin_mm": placed.origin().mm().as_slice(),
             "rotation_vector": placed.rotation().scaled_axis().as_slice(),
         });
-        line["pose_source"] = pose_source_json(pose, cloud.fused_pose.as_ref());
-        line["warning"] = json!(drift_warning(cloud, self.pose_source()));
+        line["pose_source"] = pose_told_json(pose, cloud);
         line["cloud"] = Table::of_points(&cloud.points).json();
         line
     }

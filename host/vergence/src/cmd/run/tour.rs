@@ -1,9 +1,10 @@
 //! Options for where the stages go while the live loop measures.
 
+use std::io::BufReader;
 use std::time::Duration;
 
 use vergence_board::Board;
-use vergence_live::Tour;
+use vergence_live::{Tour, homing_orders};
 use vergence_rig::Rig;
 
 use crate::cmd::stage_pose::named_mode;
@@ -40,5 +41,16 @@ impl Options {
     /// Those of the board.
     pub async fn home(&self, board: &mut Board) -> Result<(), Failure> {
         if self.home { armed(board, async |board| Ok(board.home().await?)).await } else { Ok(()) }
+    }
+}
+
+/// Waits for a person who orders the axes to be homed. Standard input is read only then: a job in the background must not read it.
+pub fn order() -> impl AsyncFnMut() {
+    let mut orders = None;
+    async move || {
+        let orders = orders.get_or_insert_with(|| homing_orders(BufReader::new(std::io::stdin())));
+        if orders.recv().await.is_none() {
+            std::future::pending().await
+        }
     }
 }

@@ -1,0 +1,133 @@
+//! The pose of a rig that stands, told better by each pair of images.
+//!
+//! Matches of earlier pairs stay true as long as the axes stand, also where the scene moves: a match tells of its epipolar plane alone.
+//! So the pose is found anew from the matches of the latest pairs together, with what was known of it before any image counted once.
+//! Pairs of the same view share their keypoints, and with them errors of registration and of the lens: they are not independent.
+//! [`vergence_vision::fuse_pose`] measures that: it takes the variance from sums over cells of the image, and what is alike in all pairs adds up within a
+//! cell in full, so that it does not vanish by repetition.
+
+use std::collections::VecDeque;
+
+use vergence_rig::{LastingError, Rig, RigAxis, RigPose};
+use vergence_vision::{FusedPose, PixelPair};
+
+use crate::pose::PairPose;
+use crate::pose_source::{fused, joints_suffice, with_fused};
+
+/// Number of pairs whose matches are kept. What more pairs of one view would add is lost in what they have in common.
+const PAIRS: usize = 10;
+/// An axis whose reading differs by more counts than this has moved.
+const FLICKER: f64 = 2.0;
+/// χ² of six components with a probability of 1e-4: two poses that differ by more are two poses.
+const DIFFERENT: f64 = 27.86;
+
+/// What is known of the pose of a rig as long as it stands.
+#[derive(Clone, Debug, Default)]
+pub struct StandingPose {
+    /// Where the axes stand, in millimetres or radians.
+    axes: Vec<f64>,
+    /// Matches of the latest pairs, each with its standard deviation in pixels.
+    pairs: VecDeque<Vec<(PixelPair, f64)>>,
+    /// The pose by joints and all these matches.
+    refined: Option<FusedPose>,
+    /// What earlier visits of the mode left.
+    lasting: Option<LastingError>,
+}
+
+impl StandingPose {
+    /// The number of pairs that tell the pose; 0 where the joints tell it alone.
+    #[must_use]
+    pub fn pairs(&self) -> usize {
+        self.pairs.len()
+    }
+
+    /// The pose by joints and images; `None` where the joints suffice, or the images do not help.
+    #[must_use]
+    pub const fn refined(&self) -> Option<&FusedPose> {
+        self.refined.as_ref()
+    }
+
+    /// Forgets what images told: the axes have moved.
+    pub fn forget(&mut self) {
+        *self = Self { lasting: self.lasting, ..Self::default() };
+    }
+
+    /// Takes what earlier visits of the mode left as known before any image, until the axes stand elsewhere.
+    pub fn begin(&mut self, lasting: Option<LastingError>) {
+        *self = Self { lasting, ..Self::default() };
+    }
+
+    /// Of the six components of the pose, how many earlier visits told.
+    pub(crate) fn told_by_stored(&self, rig: &Rig, by_joints: &RigPose) -> f64 {
+        let told = || {
+            let [stored, joints] =
+                [self.before_images(rig, by_joints), by_joints.clone()].map(|pose| pose.covariance());
+            let more = stored.cholesky()?.inverse() - joints.cholesky()?.inverse();
+            Some((self.refined?.covariance * more).trace())
+        };
+        self.lasting.and_then(|_| told()).map_or(0.0, |told| told.max(0.0))
+    }
+
+    /// The pose before any image.
+    fn before_images(&self, rig: &Rig, by_joints: &RigPose) -> RigPose {
+        self.lasting.map_or_else(|| by_joints.clone(), |lasting| lasting.before_images(rig, by_joints))
+    }
+
+    /// Forgets what images told, where the axes of `rig` read another position at `pose` or move.
+    pub(crate) fn forget_if_moved(&mut self, rig: &Rig, pose: &PairPose) {
+        let at = pose.at_middle().axes.iter().map(|axis| axis.value());
+        let moved = |((axis, before), now): ((&RigAxis, &f64), f64)| {
+            (now - before).abs() > FLICKER * axis.value_per_count().abs()
+        };
+        if !pose.is_steady() || rig.axes.iter().zip(&self.axes).zip(at).any(moved) {
+            self.forget();
+        }
+    }
+
+    /// The pose that is known best, by joints or by joints and images.
+    pub(crate) fn best(&self, rig: &Rig, by_joints: &RigPose) -> RigPose {
+        match &self.refined {
+            Some(fused) => with_fused(by_joints, fused),
+            None => self.before_images(rig, by_joints),
+        }
+    }
+
+    /// Takes the matches of one more pair. `false` where they contradict the pairs before, which are then forgotten: the cameras have
+    /// moved and no encoder told it.
+    pub(crate) fn take(&mut self, rig: &Rig, pose: &PairPose, matches: &[(PixelPair, f64)]) -> bool {
+        let by_joints = pose.at_middle();
+        if joints_suffice(rig, by_joints) || !pose.is_steady() {
+            self.forget();
+            return true;
+        }
+        let before = self.before_images(rig, by_joints);
+        let alone = fused(rig, &before, matches);
+        if let Some(refined) = &self.refined
+            && alone.as_ref().is_none_or(|alone| are_different(refined, alone))
+        {
+            self.forget();
+            return false;
+        }
+        if alone.is_none() {
+            return true;
+        }
+        if self.pairs.is_empty() {
+            self.axes = by_joints.axes.iter().map(|axis| axis.value()).collect();
+        }
+        if self.pairs.len() == PAIRS {
+            self.pairs.pop_front();
+        }
+        self.pairs.push_back(matches.to_vec());
+        let all: Vec<_> = self.pairs.iter().flatten().copied().collect();
+        self.refined = if self.pairs.len() == 1 { alone } else { fused(rig, &before, &all).or(alone) };
+        true
+    }
+}
+
+/// Whether two poses of the same joints differ by more than both are uncertain. They share what the joints tell, so that the sum of
+/// their covariances is more than their difference has.
+fn are_different(one: &FusedPose, other: &FusedPose) -> bool {
+    let way = one.way_to(&other.left_from_right);
+    let both = one.covariance + other.covariance;
+    both.cholesky().is_some_and(|factors| way.dot(&factors.solve(&way)) > DIFFERENT)
+}
