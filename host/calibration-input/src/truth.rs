@@ -2,6 +2,7 @@
 
 use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64Mcg;
+use serde_json::{Value, json};
 use vergence_calibration::StageCalibration;
 use vergence_rig::{AxisPosition, Rig};
 use vergence_vision::{Angle, Length};
@@ -20,7 +21,22 @@ pub struct TrueError {
     pub translation: Length,
 }
 
+impl std::fmt::Display for TrueError {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        let Self { poses, rotation, translation } = self;
+        let (turn, shift) = (rotation.deg(), translation.mm());
+        write!(f, "against the simulated truth at {poses} unseen poses: {turn:.4}° and {shift:.4} mm rms")
+    }
+}
+
 impl TrueError {
+    /// The difference for programs.
+    #[must_use]
+    pub fn json(&self) -> Value {
+        let Self { poses, rotation, translation } = self;
+        json!({ "poses": poses, "rotation_rms_deg": rotation.deg(), "translation_rms_mm": translation.mm() })
+    }
+
     /// Compares `stage` with the rig as it was really `built`, at poses drawn with `seed`. The truth is used for this score
     /// alone.
     #[must_use]

@@ -143,7 +143,7 @@ pub(crate) fn coverage(coverage: &FieldCoverage, circle_known: bool) -> Check {
     ))
 }
 
-/// Whether the scatter of the views' own relative poses is more than chance: the ratio of ten views varies by 0.1.
+/// Whether the views of a pair disagree more than by chance: the ratio of ten views varies by 0.1.
 pub(crate) fn is_scatter(view_scatter: f64) -> bool {
     view_scatter > 1.3
 }
@@ -155,7 +155,7 @@ pub(crate) fn scatter(view_scatter: f64) -> Check {
         Check::attention(format!(
             "The views disagree on the relative pose {times} times as much as the noise of their corners explains: \
              the lenses are not as given (let them move: --lenses known or free), the images of a pair were not taken \
-             at the same instant, or the target bends. Standard deviations are multiplied by it."
+             at the same instant, or the target bends. Standard deviations count it."
         ))
     } else {
         Check::good("The views agree on the relative pose as well as the noise of their corners explains.".to_owned())

@@ -8,18 +8,17 @@ use vergence_page::{
 };
 use vergence_vision::{Angle, KannalaBrandt};
 
-use crate::ReportAbout;
 use crate::arrows::arrows;
 use crate::checks::{self, Check, verdict};
-use crate::depth::{DepthError, UncertainPair};
 use crate::field_angle::field_angles;
 use crate::images::thumbnails;
 use crate::intrinsics::IMAGES;
 use crate::page;
 use crate::pattern::{Neighbours, patches, pattern_px, target_shift_px};
-use crate::ray_field::RANGE_MM;
 use crate::residuals::{Observation, of_extrinsics};
-use crate::verdict::{Verdict, of_depth};
+use crate::result::fixed_pair;
+use crate::verdict::{Verdict, in_modes, of_rig};
+use crate::{ReportAbout, VerdictPlaces};
 
 /// Most outliers listed one by one.
 const MOST_LISTED: usize = 60;
@@ -41,45 +40,33 @@ pub fn extrinsics_report(calibration: &ExtrinsicsCalibration, views: &[StereoVie
     page("Extrinsics calibration", about, body.concat())
 }
 
-/// Verdict of the pair of `calibration`, made from `views`.
+/// Verdict of the pair of `calibration`, at `places`.
 #[must_use]
-pub fn extrinsics_verdict(calibration: &ExtrinsicsCalibration, views: &[StereoView]) -> Verdict {
-    Report::new(calibration, views, &ReportAbout::default()).verdict()
+pub fn extrinsics_verdict(calibration: &ExtrinsicsCalibration, places: &VerdictPlaces) -> Verdict {
+    let scatter = calibration.view_scatter;
+    let warning = if checks::is_scatter(scatter) {
+        let times = significant(scatter, 2);
+        format!(" The views disagree {times} times as much as noise explains; this counts it.")
+    } else {
+        String::new()
+    };
+    of_rig(&fixed_pair(calibration, ""), places, &warning)
 }
 
 struct Report<'a> {
     calibration: &'a ExtrinsicsCalibration,
     about: &'a ReportAbout,
     observations: [Vec<Observation>; 2],
-    depth: DepthError,
 }
 
 impl<'a> Report<'a> {
     fn new(calibration: &'a ExtrinsicsCalibration, views: &[StereoView], about: &'a ReportAbout) -> Self {
         let observations = [Side::Left, Side::Right].map(|side| of_extrinsics(calibration, views, side));
-        let pair = UncertainPair {
-            left: &calibration.left,
-            right: &calibration.right,
-            left_from_right: calibration.joint.left_from_right,
-            covariance: calibration.scattered_covariance,
-        };
-        Self { calibration, about, observations, depth: DepthError::of(&pair, RANGE_MM) }
+        Self { calibration, about, observations }
     }
 
     fn cameras(&self) -> [&KannalaBrandt; 2] {
         [&self.calibration.left, &self.calibration.right]
-    }
-
-    fn verdict(&self) -> Verdict {
-        let verdict = of_depth(&self.depth);
-        let scatter = self.calibration.view_scatter;
-        let warning = if checks::is_scatter(scatter) {
-            let times = significant(scatter, 2);
-            format!(" The views disagree on the relative pose {times} times as much as noise explains; this counts it.")
-        } else {
-            String::new()
-        };
-        Verdict { sentence: verdict.sentence + &warning, ..verdict }
     }
 
     fn verdict_html(&self) -> String {
@@ -87,13 +74,12 @@ impl<'a> Report<'a> {
         let [length, sigma] = baseline(found);
         let [length, sigma] = with_sigma(length, sigma);
         let explanation = format!(
-            "The cameras are {length} ± {sigma} mm apart and their axes {}° from each other. The error of a distance is \
-             one standard deviation. It counts the uncertainty of the relative pose, multiplied where the views \
-             disagree more than noise explains. Noise of a matched pixel comes on top, and so do the lenses' own \
-             errors where the lenses were held exact.",
+            "The cameras are {length} ± {sigma} mm apart and their axes {}° from each other. Errors are one standard \
+             deviation. They count the relative pose, the lenses unless these were held exact, how far the views \
+             disagree, and the noise of a matched pixel.",
             fixed(axes_angle(&found.joint).deg(), 2)
         );
-        verdict(&self.verdict().sentence, &explanation, &self.facts(), &self.checks())
+        verdict(&extrinsics_verdict(found, &self.about.places).sentence, &explanation, &self.facts(), &self.checks())
     }
 
     /// Common shift of whole targets, of the camera where it is larger.
@@ -140,6 +126,15 @@ impl<'a> Report<'a> {
     fn figures(&self) -> String {
         let [left, right] = self.cameras();
         let sigma = self.calibration.sigma_px;
+        let rig = fixed_pair(self.calibration, "");
+        let depth = in_modes(&rig, &self.about.places).into_iter().map(|mode| mode.depth).map(|depth| {
+            figure(
+                "Error of a distance",
+                &depth.draw(depth.high()),
+                "One standard deviation along the line of sight, for points at this distance from the middle of the \
+                 baseline, in its plane with straight ahead. Towards the baseline no pair measures depth.",
+            )
+        });
         let caption = "From where the calibration shows a corner to where it was seen, enlarged as the scale says. The \
                        arrows of one target that all turn one way mean that the cameras did not see it at the same \
                        instant.";
@@ -155,12 +150,7 @@ impl<'a> Report<'a> {
             figure("Residual arrows, right camera", &right_arrows, caption),
             figure("Residual over field angle, left camera", &left_field, angle),
             figure("Residual over field angle, right camera", &right_field, angle),
-            figure(
-                "Depth error from the relative pose",
-                &self.depth.draw(self.depth.high()),
-                "One standard deviation of the distance from the left camera, for points at this distance from the \
-                 middle of the baseline, in its plane with straight ahead. Towards the baseline no pair measures depth.",
-            ),
+            depth.collect::<String>(),
             panel(&[("Relative pose", self.pose_table())]),
         ])
     }
@@ -177,7 +167,7 @@ impl<'a> Report<'a> {
 
     fn pose_table(&self) -> String {
         let found = self.calibration;
-        let sigma = found.scattered_covariance.diagonal().map(f64::sqrt);
+        let sigma = found.covariance.diagonal().map(f64::sqrt);
         let degrees = |pose: &RelativePose| pose.left_from_right.rotation().scaled_axis().map(f64::to_degrees);
         let millimetres = |pose: &RelativePose| pose.left_from_right.origin().mm();
         let vector = |name: &str, [arun, joint]: [Vector3<f64>; 2], sigmas: Vector3<f64>, unit: &str| {
@@ -326,7 +316,7 @@ fn view_number(found: &ExtrinsicsCalibration) -> Check {
 fn baseline(found: &ExtrinsicsCalibration) -> [f64; 2] {
     let origin = found.joint.left_from_right.origin().mm();
     let along = origin.try_normalize(0.0).unwrap_or_else(Vector3::x);
-    let shift = found.scattered_covariance.fixed_view::<3, 3>(3, 3);
+    let shift = found.covariance.fixed_view::<3, 3>(3, 3);
     [origin.norm(), along.dot(&(shift * along)).max(0.0).sqrt()]
 }
 
@@ -339,7 +329,7 @@ fn axes_angle(pose: &RelativePose) -> Angle {
 /// worst counts.
 fn axes_sigma(found: &ExtrinsicsCalibration) -> Angle {
     let right = found.joint.left_from_right.rotation() * Vector3::z();
-    let turn = found.scattered_covariance.fixed_view::<3, 3>(0, 0);
+    let turn = found.covariance.fixed_view::<3, 3>(0, 0);
     let variance = match Vector3::z().cross(&right).try_normalize(1e-6) {
         Some(normal) => normal.dot(&(turn * normal)),
         None => turn.fixed_view::<2, 2>(0, 0).into_owned().symmetric_eigenvalues().max(),

@@ -7,7 +7,7 @@ use vergence_page::{
     with_sigma,
 };
 use vergence_targets::TargetView;
-use vergence_vision::{KannalaBrandt, Length};
+use vergence_vision::KannalaBrandt;
 
 use crate::ReportAbout;
 use crate::arrows::{arrows, mean_arrows};
@@ -80,7 +80,8 @@ impl<'a> Report<'a> {
 
     fn verdict(&self) -> Verdict {
         let Some((median, worst)) = self.rays.median().zip(self.rays.worst()) else {
-            return Verdict::useless("No ray of this lens reaches the sensor: it is not usable.".to_owned());
+            let nothing = "No ray of this lens reaches the sensor: it is not usable.".to_owned();
+            return Verdict::new(nothing, None, RANGE_MM);
         };
         let [typical, worst] = [median, worst].map(|sample| depth_mm(sample.sigma_rad));
         let mm = |depth: f64| significant(depth, 2);
@@ -97,7 +98,7 @@ impl<'a> Report<'a> {
             mm(typical),
             mm(worst)
         );
-        Verdict { sentence, depth_sigma: Some(Length::from_mm(typical)), worst_sigma: Some(Length::from_mm(worst)) }
+        Verdict::new(sentence, Some([typical, worst]), RANGE_MM)
     }
 
     fn verdict_html(&self) -> String {
@@ -109,7 +110,8 @@ impl<'a> Report<'a> {
         let explanation = format!(
             "A ray is known to {}° ({} px) in the median over the valid cone and to {}° ({} px) at worst, one standard \
              deviation. Two such lenses {} mm apart measure the distance Z of a point straight ahead to \
-             dZ = Z²·σ·√2 / B. Noise of the corners is counted, a common turn of all rays is not: the poses take it up.",
+             dZ = Z²·σ·√2 / B. Noise of the corners and the scatter of the views are counted, a common turn of all rays \
+             is not: the poses take it up.",
             degrees(median.sigma_rad),
             significant(median.sigma_px, 2),
             degrees(worst.sigma_rad),
@@ -133,6 +135,7 @@ impl<'a> Report<'a> {
             ("Residual, corners used", format!("{} px rms", significant(found.rms_inlier_px, 3))),
             ("Residual, all corners", format!("{} px rms", significant(found.rms_px, 3))),
             ("Noise of a corner", format!("{} px per axis", significant(found.sigma0_px, 3))),
+            ("Scatter of the views", format!("{} times what noise explains", significant(found.view_scatter, 2))),
             ("Views", format!("{} of {} used", found.views_used, self.views.len())),
             ("Corners", format!("{} of {} used", found.corners_inlier, found.corners_total)),
             ("Valid cone", format!("±{}°", fixed(found.camera.theta_max().deg(), 1))),

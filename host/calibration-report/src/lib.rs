@@ -1,8 +1,8 @@
 //! Reports: one self-contained HTML page that tells a person how good a calibration is and what would make it better.
 //!
 //! A page holds its style and its figures (SVG) itself, runs no script and loads nothing. It begins with a verdict in
-//! millimetres, for parallel cameras with baseline B that see a point at the distance Z with rays of standard deviation
-//! σ:
+//! millimetres. That of a pair or a rig is the covariance of a point by lenses, pose, encoders and pixels. That of one lens
+//! holds for parallel cameras with baseline B that see a point at the distance Z with rays of standard deviation σ:
 //!
 //! ```text
 //! dZ = Z² σ √2 / B        Z = 350 mm, B = 145 mm
@@ -19,6 +19,7 @@ mod image_frame;
 mod images;
 mod intrinsics;
 mod pattern;
+mod places;
 mod ray_field;
 mod ray_map;
 mod residuals;
@@ -36,13 +37,14 @@ use vergence_vision::Angle;
 pub use extrinsics::{extrinsics_report, extrinsics_verdict};
 pub use images::ReportImage;
 pub use intrinsics::{intrinsics_report, intrinsics_verdict};
+pub use places::{InvalidPlaces, VerdictPlaces};
 pub use result::{
     extrinsics_json, extrinsics_lines, fixed_pair, held_out_json, held_out_line, intrinsics_json, intrinsics_lines,
     left_out_json, stage_json, stage_lines, trunk_json, trunk_lines,
 };
-pub use stage::stage_report;
+pub use stage::{stage_report, stage_verdict};
 pub use trunk::trunk_report;
-pub use verdict::{Verdict, stage_verdict, trunk_verdict};
+pub use verdict::{PlaceVerdict, Verdict, trunk_verdict};
 
 /// Origin of a report, and what it shows besides the calibration. Texts may hold any characters: they are escaped.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -61,6 +63,8 @@ pub struct ReportAbout {
     pub half_field: Option<Angle>,
     /// Views that were left out before the calibration.
     pub left_out: Vec<LeftOut>,
+    /// Where the verdict of a pair or a rig is told.
+    pub places: VerdictPlaces,
     /// Prediction error of held-out views, if that was tried.
     pub held_out: Option<Validation>,
     /// The images of the left or only camera, and of the right, in which the target was looked for; may be empty.
@@ -82,6 +86,12 @@ impl ReportAbout {
             half_field,
             ..Self::default()
         }
+    }
+
+    /// The same for a pair or a rig: where its verdict is told, and the views left out before the calibration.
+    #[must_use]
+    pub fn of_rig(self, places: &VerdictPlaces, left_out: &[LeftOut]) -> Self {
+        Self { places: places.clone(), left_out: left_out.to_vec(), ..self }
     }
 }
 

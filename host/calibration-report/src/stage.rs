@@ -7,10 +7,10 @@ use vergence_page::{
 };
 use vergence_rig::{AxisPosition, Rig, Screw};
 
-use crate::ReportAbout;
 use crate::checks::{self, Check, verdict};
 use crate::page;
-use crate::verdict::{in_modes, stage_verdict};
+use crate::verdict::{Verdict, in_modes, of_rig};
+use crate::{ReportAbout, VerdictPlaces};
 
 /// Number of stage poses from which one bad one is harmless.
 const ENOUGH_POSES: usize = 6;
@@ -24,22 +24,33 @@ const CHI_SQUARE_999: f64 = 22.458;
 #[must_use]
 pub fn stage_report(stage: &StageCalibration, rig: &Rig, held_out: &[HeldOutPose], about: &ReportAbout) -> String {
     let body = [
-        top(stage, rig, held_out),
-        depth_figures(stage, rig),
+        top(stage, rig, held_out, &about.places),
+        depth_figures(stage, rig, &about.places),
         section("Stage poses", &pose_table(&stage.poses)),
         section("Stage poses held out", &held_out_table(held_out)),
     ];
     page("Stage calibration", about, body.concat())
 }
 
-fn top(stage: &StageCalibration, rig: &Rig, held_out: &[HeldOutPose]) -> String {
-    let explanation = "One standard deviation of the distance, from the uncertainty of the relative pose that the stage \
-                       predicts. Noise of a matched pixel comes on top, and so do the lenses' own errors where the \
-                       lenses were held.";
+/// Verdict of a calibrated stage in the modes of `rig`, at `places`.
+#[must_use]
+pub fn stage_verdict(stage: &StageCalibration, rig: &Rig, places: &VerdictPlaces) -> Verdict {
+    let open = match stage.observability.weak.len() {
+        0 => String::new(),
+        1 => " One combination of the mechanism's unknowns is known from the drawing only.".into(),
+        more => format!(" {more} combinations of the mechanism's unknowns are known from the drawing only."),
+    };
+    of_rig(&stage.rig(rig), places, &open)
+}
+
+fn top(stage: &StageCalibration, rig: &Rig, held_out: &[HeldOutPose], places: &VerdictPlaces) -> String {
+    let explanation = "One standard deviation. It counts the relative pose that the stage predicts, the encoders, the \
+                       lenses unless these were held, how far the views disagree, and the noise of a matched pixel.";
     let facts = [
         ("Residual, corners used", format!("{} px rms", significant(stage.rms_inlier_px, 3))),
         ("Residual, all corners", format!("{} px rms", significant(stage.rms_px, 3))),
         ("Noise of a corner", format!("{} px per axis", significant(stage.sigma_px, 3))),
+        ("Scatter of the views", format!("{} times what noise explains", significant(stage.view_scatter, 2))),
         ("Stage poses", stage.poses.len().to_string()),
         ("Corners", format!("{} of {} used", stage.corners_inlier, stage.corners_total)),
         ("Unknowns", format!("{} of {} determined", stage.observability.determined, stage.observability.unknowns)),
@@ -50,7 +61,7 @@ fn top(stage: &StageCalibration, rig: &Rig, held_out: &[HeldOutPose]) -> String 
         checks::outliers(stage.corners_total.saturating_sub(stage.corners_inlier), stage.corners_total),
     ];
     list.extend(predicted(held_out));
-    verdict(&stage_verdict(stage, rig).sentence, explanation, &facts, &list)
+    verdict(&stage_verdict(stage, rig, places).sentence, explanation, &facts, &list)
 }
 
 fn number_of_poses(poses: usize) -> Check {
@@ -89,15 +100,16 @@ fn predicted(held_out: &[HeldOutPose]) -> Option<Check> {
     })
 }
 
-fn depth_figures(stage: &StageCalibration, rig: &Rig) -> String {
-    let caption = "One standard deviation of the distance from the left camera, for points at this distance from the middle \
+fn depth_figures(stage: &StageCalibration, rig: &Rig, places: &VerdictPlaces) -> String {
+    let caption = "One standard deviation along the line of sight, for points at this distance from the middle \
                    of the baseline, in its plane with straight ahead. Towards the baseline no pair measures depth.";
-    let modes = in_modes(stage, rig);
+    let calibrated = stage.rig(rig);
+    let modes = in_modes(&calibrated, places);
     // One scale for all modes, so that the figures compare.
-    let high = modes.iter().map(|(_, depth)| depth.high()).fold(0.0, f64::max);
+    let high = modes.iter().map(|mode| mode.depth.high()).fold(0.0, f64::max);
     let mut list: Vec<String> = modes
         .iter()
-        .map(|(mode, depth)| figure(&format!("Depth error from the relative pose, {mode}"), &depth.draw(high), caption))
+        .map(|mode| figure(&format!("Error of a distance, {}", mode.name), &mode.depth.draw(high), caption))
         .collect();
     list.push(panel(&[("Screws", screw_table(&stage.screws)), ("Encoders", encoder_table(stage))]));
     figures(&list)

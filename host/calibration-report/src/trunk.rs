@@ -6,12 +6,12 @@ use vergence_page::{
 };
 use vergence_rig::{Rig, positions_in_words};
 
-use crate::ReportAbout;
 use crate::checks::{self, Check, verdict};
 use crate::page;
 use crate::result::{in_unit, play_in_words, unit};
 use crate::stage::held_out_table;
-use crate::verdict::{in_modes_of_rig, trunk_verdict};
+use crate::verdict::{in_modes, trunk_verdict};
+use crate::{ReportAbout, VerdictPlaces};
 
 /// Number of stage poses from which play and numbers part well: three readings of corners at each, of which the images need two.
 const ENOUGH_POSES: usize = 10;
@@ -21,8 +21,8 @@ const ENOUGH_POSES: usize = 10;
 #[must_use]
 pub fn trunk_report(trunk: &TrunkCalibration, rig: &Rig, held_out: &[HeldOutPose], about: &ReportAbout) -> String {
     let body = [
-        top(trunk, rig),
-        depth_figures(rig),
+        top(trunk, rig, &about.places),
+        depth_figures(rig, &about.places),
         section("Numbers of the trunk", &parameter_table(&trunk.parameters)),
         section("Stage poses", &pose_table(trunk)),
         section("Stage poses held out", &held_out_table(held_out)),
@@ -30,10 +30,9 @@ pub fn trunk_report(trunk: &TrunkCalibration, rig: &Rig, held_out: &[HeldOutPose
     page("Trunk calibration", about, body.concat())
 }
 
-fn top(trunk: &TrunkCalibration, rig: &Rig) -> String {
-    let explanation = "One standard deviation of the distance, from the uncertainty of the relative pose by the joints alone, \
-                       their play included. Noise of a matched pixel comes on top, and so do the lenses' own errors where the \
-                       lenses were held.";
+fn top(trunk: &TrunkCalibration, rig: &Rig, places: &VerdictPlaces) -> String {
+    let explanation = "One standard deviation. It counts the relative pose by the joints alone, their play included, the lenses \
+                       unless these were held, and the noise of a matched pixel.";
     let [corners, folds] = [0, 1].map(|group: usize| trunk.play.get(group).map(play_in_words).unwrap_or_default());
     let facts = [
         ("Residual, corners used", format!("{} px rms", significant(trunk.rms_inlier_px, 3))),
@@ -53,17 +52,17 @@ fn top(trunk: &TrunkCalibration, rig: &Rig) -> String {
     };
     let list =
         [number, checks::outliers(trunk.corners_total.saturating_sub(trunk.corners_inlier), trunk.corners_total)];
-    verdict(&trunk_verdict(rig).sentence, explanation, &facts, &list)
+    verdict(&trunk_verdict(rig, places).sentence, explanation, &facts, &list)
 }
 
-fn depth_figures(rig: &Rig) -> String {
-    let caption = "One standard deviation of the distance from the left camera by the joints alone, for points at this distance from \
+fn depth_figures(rig: &Rig, places: &VerdictPlaces) -> String {
+    let caption = "One standard deviation along the line of sight by the joints alone, for points at this distance from \
                    the middle of the baseline, in its plane with straight ahead.";
-    let modes = in_modes_of_rig(rig);
+    let modes = in_modes(rig, places);
     let list: Vec<String> = modes
         .iter()
-        .map(|(mode, depth)| {
-            figure(&format!("Depth error from the relative pose, {mode}"), &depth.draw(depth.high()), caption)
+        .map(|mode| {
+            figure(&format!("Error of a distance, {}", mode.name), &mode.depth.draw(mode.depth.high()), caption)
         })
         .collect();
     figures(&list)

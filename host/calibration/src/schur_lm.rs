@@ -6,11 +6,13 @@
 //! Synthesis", 1999, section 6; damping by K. Madsen, H. Nielsen and O. Tingleff, "Methods for Non-Linear Least Squares
 //! Problems", 2004, section 3.2.
 
+mod clustered;
 mod normal;
 
 use nalgebra::{DVector, SVector};
 use rayon::prelude::*;
 
+pub use clustered::Clustered;
 pub use normal::{Equations, SchurNormal};
 
 use crate::Loss;

@@ -26,7 +26,7 @@ fn real_sets_reach_the_stored_optimum_without_a_hint() {
         let difference = largest_difference(&found.opencv, &reference.lens, &reference.sigma);
         assert!(difference <= 0.5, "{}: {difference} sigma", set.name);
         for (i, sigma) in reference.sigma.iter().enumerate() {
-            let ratio = found.covariance[(i, i)].sqrt() / sigma;
+            let ratio = found.noise_covariance[(i, i)].sqrt() / sigma;
             assert!((0.95..1.05).contains(&ratio), "{}: sigma of parameter {i} is {ratio} of the stored one", set.name);
         }
     }
@@ -72,7 +72,7 @@ fn gross_errors_do_not_move_the_lens() {
     let (mut runs, mut near, mut nearest) = (0, 0, 0);
     for set in real_sets() {
         let clean = calibrate(&set, &set.views);
-        let sigma: [f64; 8] = std::array::from_fn(|i| clean.covariance[(i, i)].sqrt());
+        let sigma: [f64; 8] = std::array::from_fn(|i| clean.noise_covariance[(i, i)].sqrt());
         for seed in 0..seeds(4) {
             let (spoilt, untouched) = spoil(&set, seed);
             let found = calibrate(&set, &spoilt);

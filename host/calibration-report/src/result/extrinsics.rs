@@ -32,7 +32,7 @@ pub fn extrinsics_lines(calibration: &ExtrinsicsCalibration) -> Vec<String> {
         )
     };
     let mut lines = vec![line("each camera alone", &calibration.arun), line("joint            ", &calibration.joint)];
-    let sigma = sigma(&calibration.scattered_covariance);
+    let sigma = sigma(&calibration.covariance);
     let degrees: Vec<_> = sigma[..3].iter().map(|rad| format!("{:.4}", rad.to_degrees())).collect();
     let mm: Vec<_> = sigma[3..].iter().map(|mm| format!("{mm:.3}")).collect();
     lines.push(format!("  sigma: rotation {} °, position {} mm", degrees.join(" "), mm.join(" ")));

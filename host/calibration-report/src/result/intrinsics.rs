@@ -72,6 +72,7 @@ pub fn intrinsics_json(calibration: &IntrinsicsCalibration, seconds: f64) -> Val
         "views_used": calibration.views_used,
         "theta_max_deg": calibration.camera.theta_max().deg(),
         "pixel_sigma": calibration.sigma0_px,
+        "view_scatter": calibration.view_scatter,
         "opencv": named(parameters(calibration)),
         "sigma": named(sigma(calibration)),
         "seconds": seconds,

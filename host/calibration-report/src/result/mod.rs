@@ -13,7 +13,7 @@ pub use self::intrinsics::{intrinsics_json, intrinsics_lines};
 pub use self::stage::{stage_json, stage_lines};
 pub(crate) use self::trunk::{in_unit, play_in_words, unit};
 pub use self::trunk::{trunk_json, trunk_lines};
-use crate::{LeftOut, Verdict};
+use crate::{LeftOut, PlaceVerdict, Verdict};
 
 /// A line that says how well held-out views are predicted; `None` where none were held out.
 #[must_use]
@@ -41,11 +41,19 @@ impl Verdict {
     /// The verdict for programs.
     #[must_use]
     pub fn json(&self) -> Value {
+        let place = |place: &PlaceVerdict| {
+            let [along, across] = [0, 1].map(|index: usize| place.sigma.map(|sigma| sigma[index].mm()));
+            json!({
+                "mode": place.mode, "range_mm": place.range.mm(), "angle_deg": place.angle.deg(),
+                "along_sigma_mm": along, "across_sigma_mm": across,
+            })
+        };
         json!({
             "text": self.sentence,
             "depth_sigma_mm": self.depth_sigma.map(|sigma| sigma.mm()),
             "worst_sigma_mm": self.worst_sigma.map(|sigma| sigma.mm()),
-            "range_mm": 350.0,
+            "range_mm": self.range.mm(),
+            "places": self.places.iter().map(place).collect::<Vec<_>>(),
         })
     }
 }

@@ -107,6 +107,7 @@ pub fn stage_json(rig: &Rig, stage: &StageCalibration, held_out: &[HeldOutPose])
     let sigma = stage.largest_sigma();
     json!({
         "rms_px": stage.rms_px,
+        "view_scatter": stage.view_scatter,
         "rms_inlier_px": stage.rms_inlier_px,
         "corners_total": stage.corners_total,
         "corners_inlier": stage.corners_inlier,

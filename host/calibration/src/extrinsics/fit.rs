@@ -9,7 +9,7 @@ use crate::extrinsics::joint::{Joint, Kinematics, Shared};
 use crate::extrinsics::outliers::{OwnPoses, inliers, median_of};
 use crate::extrinsics::report::rms;
 use crate::extrinsics::stereo::{LensKnowledge, LensPrior, Lenses, Pair};
-use crate::schur_lm::{self, SchurOptions};
+use crate::schur_lm::{self, Clustered, SchurOptions};
 
 /// The median length of a two-dimensional Gaussian error of unit standard deviation per coordinate: √(2 ln 2).
 const RAYLEIGH_MEDIAN: f64 = 1.177_410_022_515_474_7;
@@ -38,8 +38,10 @@ pub(crate) struct Fit<S> {
     pub errors_px: Vec<Vec<f64>>,
     /// Standard deviation of a pixel coordinate in units of the corner's relative sigma.
     pub sigma: f64,
-    /// Covariance of the shared unknowns' step; `None` if the corners do not determine it.
-    pub covariance: Option<DMatrix<f64>>,
+    /// Covariance of the shared unknowns' step as the views scatter; `None` if the corners do not determine it.
+    pub covariance: Option<Clustered>,
+    /// The same by independent noise of the corners alone.
+    pub noise_covariance: Option<DMatrix<f64>>,
     /// Information of the shared unknowns, in units of `sigma`².
     pub information: DMatrix<f64>,
 }
@@ -104,8 +106,18 @@ impl<K: Kinematics> Task<'_, K> {
             sigma = next_sigma;
             if settled || round == MOST_ROUNDS {
                 let information = solution.normal.shared_information().ok_or(NoFit::NotDetermined)?;
-                let covariance = solution.normal.shared_covariance().map(|covariance| covariance * (sigma * sigma));
-                return Ok(Fit { shared, targets, inliers, errors_px, sigma, covariance, information });
+                let covariance = solution.normal.clustered(sigma * sigma);
+                let noise_covariance = solution.normal.shared_covariance().map(|unit| unit * (sigma * sigma));
+                return Ok(Fit {
+                    shared,
+                    targets,
+                    inliers,
+                    errors_px,
+                    sigma,
+                    covariance,
+                    noise_covariance,
+                    information,
+                });
             }
             inliers = next;
         }

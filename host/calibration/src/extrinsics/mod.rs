@@ -10,7 +10,6 @@ mod joint;
 mod labels;
 mod outliers;
 mod report;
-mod scatter;
 mod stereo;
 
 use nalgebra::{DMatrix, SMatrix};
@@ -20,6 +19,7 @@ use vergence_vision::{InvalidLens, KannalaBrandt, Left, Pixel, Right, Transform}
 
 use crate::planar_pose::PoseError;
 use crate::reprojection::{LENS, POSE};
+use crate::schur_lm::Clustered;
 
 pub(crate) use fit::{Fit, NoFit, Start, Task};
 pub(crate) use initial::{PlacedView, inside, nearer_targets, place};
@@ -28,7 +28,6 @@ pub use labels::{LabelError, label_pairs};
 pub(crate) use outliers::OwnPoses;
 pub(crate) use report::{outliers, refined, rms, view_figures};
 pub use stereo::LensKnowledge;
-use stereo::LensPrior;
 pub(crate) use stereo::{Lenses, Pair};
 pub use vergence_vision::Side;
 
@@ -80,16 +79,17 @@ pub struct ExtrinsicsCalibration {
     /// Optimum of the joint fit; its `rms_px` is over all corners, outliers included.
     pub joint: RelativePose,
     /// Covariance of `joint` in local coordinates `[ω, δ]`: rotation vector about the left axes in radians, then the
-    /// position of the right camera in the left frame in millimetres.
+    /// position of the right camera in the left frame in millimetres. It counts that the corners of a view err together
+    /// ([`crate::schur_lm::SchurNormal::clustered`]).
     pub covariance: SMatrix<f64, POSE, POSE>,
-    /// How much more the relative poses of single views scatter about `joint` than the noise of their corners explains:
-    /// a ratio of standard deviations, at least 1. More means wrong lenses, images taken at different instants, or a
-    /// target that bends.
+    /// The same if the errors of all corners were independent of each other: noise alone.
+    pub noise_covariance: SMatrix<f64, POSE, POSE>,
+    /// How much more the views pull pose and lenses to and fro than independent noise of their corners explains: a ratio
+    /// of standard deviations, at least 1. More means wrong lenses, images taken at different instants, or a target that
+    /// bends.
     pub view_scatter: f64,
-    /// As `covariance`, with the noise of the corners multiplied by `view_scatter`: what the pair is worth.
-    pub scattered_covariance: SMatrix<f64, POSE, POSE>,
-    /// The same with that of both lenses and all correlations, where the lenses were refined.
-    scattered: DMatrix<f64>,
+    /// As `covariance`, with that of both lenses and all correlations behind it where the lenses were refined.
+    pub full_covariance: DMatrix<f64>,
     /// Root mean square distance per corner without outliers, in pixels.
     pub rms_inlier_px: f64,
     /// Standard deviation of one pixel coordinate, root mean square over the corners used.
@@ -118,9 +118,8 @@ impl ExtrinsicsCalibration {
     pub fn numbers(&self) -> Result<CalibratedNumbers, InvalidCovariance> {
         let turn = (0..3).map(|component| RigNumber::RightTurn { component });
         let shift = (0..3).map(|component| RigNumber::RightShift { component });
-        let refined = lens_numbers().take(self.scattered.nrows() - POSE);
-        let covariance = (&self.scattered + self.scattered.transpose()) * 0.5;
-        CalibratedNumbers::new(turn.chain(shift).chain(refined).collect(), covariance)
+        let refined = lens_numbers().take(self.full_covariance.nrows().saturating_sub(POSE));
+        CalibratedNumbers::new(turn.chain(shift).chain(refined).collect(), self.full_covariance.clone())
     }
 }
 
@@ -309,21 +308,17 @@ pub fn calibrate_extrinsics(
     let arun_errors = task.errors_px(&Shared { state: arun, lenses }, &targets);
     let fit = task.fit(Start { shared: Shared { state: arun, lenses }, targets, usable: usable.clone() })?;
 
-    let covariance = fit.covariance.as_ref().ok_or(ExtrinsicsError::NotDetermined)?;
-    let pair = Pair { left_from_right: fit.shared.state, lenses: fit.shared.lenses };
-    let view_scatter = scatter::view_scatter(&pair, &views, &fit.targets, &fit.inliers, fit.sigma);
-    let lens_prior = LensPrior::new(lenses, &options.lenses, fit.sigma).ok_or(ExtrinsicsError::LensCovariance)?;
-    let scattered =
-        scatter::scattered_covariance(&fit, &lens_prior, view_scatter).ok_or(ExtrinsicsError::NotDetermined)?;
+    let Clustered { covariance, scatter } = fit.covariance.as_ref().ok_or(ExtrinsicsError::NotDetermined)?;
+    let noise = fit.noise_covariance.as_ref().ok_or(ExtrinsicsError::NotDetermined)?;
     let relative = |pose, rms_px| RelativePose { left_from_right: Transform::from_isometry(pose), rms_px };
     let every = rms(&fit.errors_px, &usable).unwrap_or_default();
     Ok(ExtrinsicsCalibration {
         arun: relative(arun, rms(&arun_errors, &usable).unwrap_or_default()),
         joint: relative(fit.shared.state, every),
         covariance: covariance.fixed_view::<POSE, POSE>(0, 0).into_owned(),
-        view_scatter,
-        scattered_covariance: scattered.fixed_view::<POSE, POSE>(0, 0).into_owned(),
-        scattered,
+        noise_covariance: noise.fixed_view::<POSE, POSE>(0, 0).into_owned(),
+        view_scatter: *scatter,
+        full_covariance: covariance.clone(),
         rms_inlier_px: rms(&fit.errors_px, &fit.inliers).unwrap_or_default(),
         sigma_px: fit.sigma_px(&views),
         left: refined(&fit.shared.lenses.left, left, Side::Left)?,

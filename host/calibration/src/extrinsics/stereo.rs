@@ -102,11 +102,6 @@ impl LensPrior {
         Some(Self { start, pull, dimension })
     }
 
-    /// Information of the left and the right lens's own calibration, times `sigma`²; `None` where it does not count.
-    pub fn information(&self) -> Option<[SMatrix<f64, LENS, LENS>; 2]> {
-        self.pull.as_ref().map(|pull| [0, 1].map(|side: usize| pull[side].transpose() * pull[side]))
-    }
-
     /// Adds the pull of the lenses' own calibration; their columns begin at `column` of the shared block.
     pub fn add_to(&self, lenses: &Lenses, column: usize, equations: &mut Equations<POSE>) {
         let Some(pull) = &self.pull else { return };

@@ -11,6 +11,7 @@ use super::observations::{Observation, ObservedView};
 use super::{
     IntrinsicsCalibration, IntrinsicsError, Outlier, OutlierReason, Parameter, TargetWarp, ViewFigures, ViewPose,
 };
+use crate::schur_lm::Clustered;
 
 /// Assembles the result; `left_out` are the corners of views that were too poor to use.
 pub(super) fn report(
@@ -46,7 +47,9 @@ pub(super) fn report(
     Ok(IntrinsicsCalibration {
         camera,
         opencv: lens,
-        covariance: covariances.lens(),
+        covariance: lens_part(&covariances.shared.covariance),
+        noise_covariance: lens_part(&covariances.noise),
+        view_scatter: covariances.shared.scatter,
         warp: covariances.warp(adjusted),
         rms_px: all.rms(),
         rms_inlier_px: inlier.rms(),
@@ -89,15 +92,22 @@ fn outermost(adjusted: &Adjusted) -> Angle {
 struct Covariances {
     /// Variance of one component of a residual.
     variance: f64,
-    /// Covariance of lens and bow for unit variance of a residual.
-    shared: DMatrix<f64>,
+    /// Of lens and bow.
+    shared: Clustered,
+    /// Of lens and bow, by independent noise alone.
+    noise: DMatrix<f64>,
+}
+
+fn lens_part(covariance: &DMatrix<f64>) -> SMatrix<f64, LENS, LENS> {
+    covariance.fixed_view::<LENS, LENS>(0, 0).into_owned()
 }
 
 impl Covariances {
     fn of(adjusted: &Adjusted) -> Result<Self, IntrinsicsError> {
         let variance = adjusted.normal.variance().ok_or(IntrinsicsError::Singular)?;
-        let shared = adjusted.normal.shared_covariance().ok_or(IntrinsicsError::Singular)?;
-        Ok(Self { variance, shared })
+        let shared = adjusted.normal.clustered(variance).ok_or(IntrinsicsError::Singular)?;
+        let noise = adjusted.normal.shared_covariance().ok_or(IntrinsicsError::Singular)? * variance;
+        Ok(Self { variance, shared, noise })
     }
 
     /// Refuses a calibration that is too uncertain to use.
@@ -106,7 +116,7 @@ impl Covariances {
         const FOCAL_SHARE: f64 = 0.1;
         /// Largest standard deviation of the principal point, as a share of the image's longer side.
         const CENTRE_SHARE: f64 = 0.1;
-        let sigma = |i: usize| (self.variance * self.shared[(i, i)]).sqrt();
+        let sigma = |i: usize| self.shared.covariance[(i, i)].sqrt();
         let lens = &adjusted.shared.lens;
         let longer = f64::from(size.width.max(size.height));
         let limits = [
@@ -121,14 +131,10 @@ impl Covariances {
         }
     }
 
-    fn lens(&self) -> SMatrix<f64, LENS, LENS> {
-        self.shared.fixed_view::<LENS, LENS>(0, 0) * self.variance
-    }
-
     fn warp(&self, adjusted: &Adjusted) -> Option<TargetWarp> {
-        let sigma = |i: usize| (self.variance * self.shared[(i, i)]).sqrt();
+        let sigma = |i: usize| self.shared.covariance[(i, i)].sqrt();
         let [along_x_mm, along_y_mm] = adjusted.shared.warp_mm;
-        (self.shared.nrows() > LENS).then(|| TargetWarp {
+        (self.noise.nrows() > LENS).then(|| TargetWarp {
             along_x_mm,
             along_y_mm,
             sigma_mm: [sigma(LENS), sigma(LENS + 1)],
@@ -148,13 +154,14 @@ fn view_figures(given: &[TargetView], adjusted: &Adjusted, covariances: &Covaria
             pose: None,
         })
         .collect();
+    let unit = &covariances.shared.covariance / covariances.variance;
     for (block, (view, pose)) in adjusted.views.iter().zip(&adjusted.poses).enumerate() {
         let Some(entry) = figures.get_mut(view.index) else { continue };
         let inlier = view_squares(adjusted, block, true);
         entry.corners_inlier = inlier.count;
         entry.rms_inlier_px = Some(inlier.rms());
         entry.rms_px = Some(view_squares(adjusted, block, false).rms());
-        entry.pose = adjusted.normal.block_covariance(block, &covariances.shared).map(|covariance| ViewPose {
+        entry.pose = adjusted.normal.block_covariance(block, &unit).map(|covariance| ViewPose {
             camera_from_target: Transform::from_isometry(*pose),
             covariance: covariance * covariances.variance,
         });

@@ -17,8 +17,15 @@ pub struct IntrinsicsCalibration {
     /// The same lens in the parameters that were estimated. [`KannalaBrandt`] holds them rescaled: its five
     /// coefficients are fx (1, k1, k2, k3, k4) in pixels, its aspect is fy / fx.
     pub opencv: OpenCvFisheye,
-    /// Covariance of fx, fy, cx, cy (pixels) and k1 to k4 from the noise of the corners, target poses marginalised.
+    /// Covariance of fx, fy, cx, cy (pixels) and k1 to k4, target poses marginalised, as the views scatter: it counts that the
+    /// corners of a view err together, because the lens is not quite of the model's family or the target bends
+    /// ([`crate::schur_lm::SchurNormal::clustered`]).
     pub covariance: SMatrix<f64, LENS, LENS>,
+    /// The same if the errors of all corners were independent of each other: noise alone.
+    pub noise_covariance: SMatrix<f64, LENS, LENS>,
+    /// How much more the views pull the lens to and fro than independent noise of their corners explains: a ratio of standard
+    /// deviations, at least 1.
+    pub view_scatter: f64,
     /// Bow of the target, if [`crate::IntrinsicsOptions::warp`] asked for it.
     pub warp: Option<TargetWarp>,
     /// Root mean square distance √(mean(dx² + dy²)) between corners and reprojections over all corners of the views

@@ -84,9 +84,25 @@ pub struct SchurNormal<const B: usize> {
 
 #[derive(Clone, Debug)]
 struct SmallBlock<const B: usize> {
+    /// What the block's residuals add to the shared block and its gradient.
+    shared: DMatrix<f64>,
+    shared_gradient: DVector<f64>,
     matrix: SMatrix<f64, B, B>,
     gradient: SVector<f64, B>,
     coupling: Coupling<B>,
+}
+
+impl<const B: usize> SmallBlock<B> {
+    fn of(part: &Equations<B>, n: usize) -> Self {
+        let last = n + B;
+        Self {
+            shared: DMatrix::from_fn(n, n, |i, j| part.at(i, j)),
+            shared_gradient: DVector::from_fn(n, |i, _| part.at(i, last)),
+            matrix: SMatrix::from_fn(|i, j| part.at(n + i, n + j)),
+            gradient: SVector::from_fn(|i, _| part.at(n + i, last)),
+            coupling: Coupling::from_fn_generic(Dyn(n), nalgebra::Const::<B>, |i, j| part.at(i, n + j)),
+        }
+    }
 }
 
 impl<const B: usize> SchurNormal<B> {
@@ -100,19 +116,32 @@ impl<const B: usize> SchurNormal<B> {
             residuals: 0,
             squares: 0.0,
         };
+        normal.blocks.extend(parts.iter().map(|part| SmallBlock::of(part, n)));
+        normal.shared += DMatrix::from_fn(n, n, |i, j| common.at(i, j));
+        normal.shared_gradient += DVector::from_fn(n, |i, _| common.at(i, last));
+        for block in &normal.blocks {
+            normal.shared += &block.shared;
+            normal.shared_gradient += &block.shared_gradient;
+        }
         for part in std::iter::once(common).chain(parts) {
-            normal.shared += DMatrix::from_fn(n, n, |i, j| part.at(i, j));
-            normal.shared_gradient += DVector::from_fn(n, |i, _| part.at(i, last));
             normal.cost += part.cost;
             normal.residuals += part.residuals;
             normal.squares += part.at(last, last);
         }
-        normal.blocks.extend(parts.iter().map(|part| SmallBlock {
-            matrix: SMatrix::from_fn(|i, j| part.at(n + i, n + j)),
-            gradient: SVector::from_fn(|i, _| part.at(n + i, last)),
-            coupling: Coupling::from_fn_generic(Dyn(n), nalgebra::Const::<B>, |i, j| part.at(i, n + j)),
-        }));
         normal
+    }
+
+    pub(super) const fn block_count(&self) -> usize {
+        self.blocks.len()
+    }
+
+    /// The information and the gradient of the shared unknowns by small block `index` alone, its own unknowns eliminated. `None`
+    /// where it is singular.
+    pub(super) fn eliminated(&self, index: usize) -> Option<(DMatrix<f64>, DVector<f64>)> {
+        let block = self.blocks.get(index)?;
+        let factor = Cholesky::new(block.matrix)?;
+        let information = &block.shared - &block.coupling * factor.solve(&block.coupling.transpose());
+        Some((information, &block.shared_gradient - &block.coupling * factor.solve(&block.gradient)))
     }
 
     /// ½ Σ ρ(‖r‖²).

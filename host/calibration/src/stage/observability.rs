@@ -170,7 +170,7 @@ fn next_pose(
     alone: &[ExtrinsicsCalibration],
 ) -> Vec<AxisPosition> {
     let alone_information: Matrix6<f64> =
-        alone.iter().filter_map(|pose| pose.covariance.try_inverse()).sum::<Matrix6<f64>>()
+        alone.iter().filter_map(|pose| pose.noise_covariance.try_inverse()).sum::<Matrix6<f64>>()
             / (alone.len().max(1) as f64);
     let gain = |values: &Vec<f64>| {
         let derivative = state.derivative(values, mechanism, None) * DMatrix::from_diagonal(units);

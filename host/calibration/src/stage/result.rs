@@ -12,6 +12,7 @@ use crate::extrinsics::{
     ExtrinsicsCalibration, Fit, Side, SkippedView, StereoOutlier, StereoView, outliers, refined, rms,
 };
 use crate::reprojection::POSE;
+use crate::schur_lm::Clustered;
 use crate::stage::covariance::of_numbers;
 use crate::stage::figures::{pose_figures, screws, zero_offsets};
 use crate::stage::mechanism::State;
@@ -36,6 +37,9 @@ pub struct StageCalibration {
     pub poses: Vec<StagePoseFigures>,
     /// The unknowns that the stage poses determine.
     pub observability: Observability,
+    /// How much more the views pull the mechanism and the lenses to and fro than independent noise of their corners
+    /// explains: a ratio of standard deviations, at least 1. All standard deviations count it.
+    pub view_scatter: f64,
     /// Root mean square distance between corners and reprojections, outliers included, in pixels.
     pub rms_px: f64,
     /// Root mean square distance over the corners used, in pixels.
@@ -158,16 +162,6 @@ impl StageCalibration {
         SharedCovariance::joint(SMatrix::from_fn(|row, column| total[(row, column)]))
     }
 
-    /// All axes in the middle of their ranges.
-    #[must_use]
-    pub fn middle(&self) -> Vec<AxisPosition> {
-        let middle = |axis: &RigAxis| {
-            let [low, high] = axis.range.map(AxisPosition::value);
-            AxisPosition::from_value(axis.kind, 0.5 * (low + high))
-        };
-        self.axes.iter().map(middle).collect()
-    }
-
     /// The left camera's chain: the scales of the encoders are in the shares.
     #[must_use]
     pub fn left_chain(&self) -> Chain<Left> {
@@ -287,7 +281,8 @@ pub(crate) struct Material<'a> {
 
 pub(crate) fn calibration(material: Material<'_>) -> Result<StageCalibration, StageError> {
     let Material { rig, model, fit, observability, alone, views, usable } = material;
-    let covariance = fit.covariance.as_ref().ok_or_else(|| StageError::Unobservable(observability.clone()))?;
+    let Clustered { covariance, scatter } =
+        fit.covariance.as_ref().ok_or_else(|| StageError::Unobservable(observability.clone()))?;
     // The mechanism's unknowns come first.
     let mechanism: Vec<Unknown> = model.unknowns.iter().copied().filter(|unknown| unknown.is_mechanical()).collect();
     let covariance = without_readings(covariance, mechanism.len(), model.unknowns.len());
@@ -308,6 +303,7 @@ pub(crate) fn calibration(material: Material<'_>) -> Result<StageCalibration, St
         at_zero: predict(state, &mechanism, &of_mechanism, &model.reading_sigma, &vec![0.0; rig.axes.len()]),
         poses: pose_figures(rig, &model, &fit, alone),
         observability,
+        view_scatter: *scatter,
         rms_px: rms(&fit.errors_px, usable).unwrap_or_default(),
         rms_inlier_px: rms(&fit.errors_px, &fit.inliers).unwrap_or_default(),
         sigma_px: fit.sigma_px(views),

@@ -119,7 +119,7 @@ pub(crate) type Measured = (Isometry3<f64>, Matrix6<f64>);
 /// The stage poses as each was calibrated by itself. `None` where a covariance is singular.
 pub(crate) fn measured(alone: &[ExtrinsicsCalibration]) -> Option<Vec<Measured>> {
     let whitened = |pose: &ExtrinsicsCalibration| {
-        let whitening = pose.covariance.cholesky()?.l().try_inverse()?;
+        let whitening = pose.noise_covariance.cholesky()?.l().try_inverse()?;
         Some((*pose.joint.left_from_right.isometry(), whitening))
     };
     alone.iter().map(whitened).collect()

@@ -192,7 +192,7 @@ pub(crate) struct Material<'a> {
 pub(crate) fn calibration(material: &Material<'_>) -> Result<TrunkCalibration, StageError> {
     let Material { rig, model, fit, views, usable, .. } = material;
     // The drawing's tolerances determine every number, so that there is a covariance wherever there is a fit.
-    let all = fit.covariance.as_ref().ok_or(StageError::Diverged)?;
+    let all = &fit.covariance.as_ref().ok_or(StageError::Diverged)?.covariance;
     let covariance = all.fixed_view::<TRUNK_PARAMETERS, TRUNK_PARAMETERS>(0, 0).into_owned();
     let state = &fit.shared.state;
     let parameters = TRUNK_PARAMETER_NAMES.iter().enumerate().map(|(index, &(name, kind))| TrunkParameterFigures {

@@ -2,6 +2,7 @@
 //! `tests/common/data.rs`.
 
 #![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
+#![allow(dead_code, reason = "each test file uses its share")]
 
 #[path = "../../../../tests/common/data.rs"]
 mod data;
@@ -45,10 +46,42 @@ pub fn real_sets() -> Vec<RealSet> {
     SETS.iter().map(|set| read_set(&folder, set)).collect()
 }
 
+/// One camera's corners.
+pub struct CornerSet {
+    /// Folder and camera.
+    pub name: String,
+    pub size: ImageSize,
+    pub views: Vec<TargetView>,
+}
+
+/// The corners of every real lens, with all views that were taken of it; none if the data are missing.
+pub fn corner_sets() -> Vec<CornerSet> {
+    let Some(folder) = data::real_data("data") else { return Vec::new() };
+    let sets: [(&str, &str, &[&str]); 6] = [
+        ("sourishg_stereo", "left", &["corners_opencv_classic.csv"]),
+        ("sourishg_stereo", "right", &["corners_opencv_classic.csv"]),
+        ("ocam_fisheye1", "cam", &["corners_opencv_classic.csv"]),
+        ("ov_plane", "cam", &["corners_babelcalib_train.csv", "corners_babelcalib_test.csv"]),
+        ("opencv_pinhole_stereo", "left", &["corners_opencv_classic.csv"]),
+        ("opencv_pinhole_stereo", "right", &["corners_opencv_classic.csv"]),
+    ];
+    let read = |(set, camera, files): &(&str, &str, &[&str])| CornerSet {
+        name: format!("{set} {camera}"),
+        size: image_size(&folder.join(set)),
+        views: files.iter().flat_map(|file| read_views(&folder.join(set).join(file), camera)).collect(),
+    };
+    sets.iter().map(read).collect()
+}
+
+fn image_size(folder: &Path) -> ImageSize {
+    let meta: Value = serde_json::from_slice(&std::fs::read(folder.join("meta.json")).unwrap()).unwrap();
+    let [width, height] = [0, 1].map(|i: usize| meta["size"][i].as_u64().unwrap() as u32);
+    ImageSize { width, height }
+}
+
 fn read_set(folder: &Path, [set, corners, reference, camera]: &[&str; 4]) -> RealSet {
     let folder = folder.join(set);
     let json = |name: &str| -> Value { serde_json::from_slice(&std::fs::read(folder.join(name)).unwrap()).unwrap() };
-    let length = |i: usize| json("meta.json")["size"][i].as_u64().unwrap() as u32;
     let views = read_views(&folder.join(corners), camera);
     let given: usize = views.iter().map(|v| v.corners.len()).sum();
     let trimmed = &json(reference)["mono"][camera]["kb4_scipy_ba_trimmed"];
@@ -56,7 +89,7 @@ fn read_set(folder: &Path, [set, corners, reference, camera]: &[&str; 4]) -> Rea
     let [fx, fy, cx, cy, k1, k2, k3, k4] = eight("fx_fy_cx_cy_k1_k2_k3_k4");
     RealSet {
         name: format!("{set} {corners} {camera}"),
-        size: ImageSize { width: length(0), height: length(1) },
+        size: image_size(&folder),
         views,
         reference: Reference {
             lens: OpenCvFisheye { fx, fy, cx, cy, k: [k1, k2, k3, k4] },

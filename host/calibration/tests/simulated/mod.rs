@@ -1,6 +1,7 @@
 //! Pairs of cameras before simulated targets.
 #![allow(dead_code, reason = "each test file uses its share")]
 
+pub mod band;
 pub mod stage;
 #[path = "../../../targets/tests/simulated/mod.rs"]
 mod targets;

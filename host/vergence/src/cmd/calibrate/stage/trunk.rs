@@ -40,14 +40,14 @@ pub fn run(args: &Args, input: Input<'_>, hash: InputHash, console: Console) -> 
         false => Vec::new(),
     };
     let rig = Rig { name: args.result.name(&drawn.name), ..trunk.rig(drawn) };
-    let verdict = trunk_verdict(&rig);
+    let verdict = trunk_verdict(&rig, &args.verdict);
     let provenance = args.result.provenance(hash);
     args.result.write(&rig.to_toml(&provenance).map_err(Failure::check)?, || {
         let about = ReportAbout::new(rig.name.clone(), args.target.spec().ok().as_ref(), &provenance, None);
-        trunk_report(&trunk, &rig, &held_out, &ReportAbout { left_out: left_out.clone(), ..about })
+        trunk_report(&trunk, &rig, &held_out, &about.of_rig(&args.verdict, &left_out))
     })?;
     console.say_lines(trunk_lines(&trunk, &held_out))?;
-    console.say(&verdict.sentence)?;
+    console.say_lines(verdict.lines())?;
     let mut result = trunk_json(&rig, &trunk, &held_out);
     result["seconds"] = seconds.into();
     result["verdict"] = verdict.json();
