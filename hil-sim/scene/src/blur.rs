@@ -2,17 +2,15 @@
 
 use rayon::prelude::*;
 
-use crate::texture::Rgb;
-
 /// Widest point spread of a lens, in pixels.
 const MAX_SIGMA_PX: f64 = 5.0;
 
-/// Convolves an image of rows of `width` pixels with the discrete Gaussian of deviation `sigma` px. Beyond the image
-/// there is no light.
-pub fn blurred(image: &[Rgb], width: usize, sigma: f64) -> Vec<Rgb> {
+/// Convolves an image of rows of `width` pixels of `N` channels with the discrete Gaussian of deviation `sigma` px. Beyond
+/// the image there is no light.
+pub fn blurred<const N: usize>(image: &[[f32; N]], width: usize, sigma: f64) -> Vec<[f32; N]> {
     let weights = discrete_gaussian(sigma);
     let (width, height) = (width.max(1), image.len() / width.max(1));
-    let mut across = vec![[0.0; 3]; image.len()];
+    let mut across = vec![[0.0; N]; image.len()];
     across.par_chunks_exact_mut(width).zip(image.par_chunks_exact(width)).for_each(|(out, row)| {
         add(out, weights[0], row);
         for (distance, &weight) in weights.iter().enumerate().take(width).skip(1) {
@@ -20,7 +18,7 @@ pub fn blurred(image: &[Rgb], width: usize, sigma: f64) -> Vec<Rgb> {
             add(out, weight, &row[distance..]);
         }
     });
-    let mut both = vec![[0.0; 3]; image.len()];
+    let mut both = vec![[0.0; N]; image.len()];
     both.par_chunks_exact_mut(width).enumerate().for_each(|(y, out)| {
         let row = |y: usize| &across[y * width..(y + 1) * width];
         add(out, weights[0], row(y));
@@ -33,7 +31,7 @@ pub fn blurred(image: &[Rgb], width: usize, sigma: f64) -> Vec<Rgb> {
 }
 
 /// Adds `row` times `weight` as far as both reach. Whole rows let the compiler use vector instructions.
-fn add(sum: &mut [Rgb], weight: f32, row: &[Rgb]) {
+fn add<const N: usize>(sum: &mut [[f32; N]], weight: f32, row: &[[f32; N]]) {
     sum.as_flattened_mut().iter_mut().zip(row.as_flattened()).for_each(|(sum, c)| *sum += weight * c);
 }
 
@@ -83,7 +81,7 @@ mod tests {
         let soft = blurred(&image, 11, 0.7);
         for (i, pixel) in soft.iter().enumerate() {
             let (x, y) = (i % 11, i / 11);
-            let same = |other: Rgb| pixel.iter().zip(other).all(|(a, b)| (a - b).abs() < 1e-6);
+            let same = |other: [f32; 3]| pixel.iter().zip(other).all(|(a, b)| (a - b).abs() < 1e-6);
             assert!(same(soft[y * 11 + (10 - x)]) && same(soft[(8 - y) * 11 + x]), "({x}, {y})");
         }
         assert!((soft.iter().map(|pixel| pixel[1]).sum::<f32>() - 2.0).abs() < 1e-4);

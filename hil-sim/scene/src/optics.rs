@@ -52,13 +52,15 @@ impl Optics {
 
     /// The 8-bit pixel of linear light `colour`, with the noise that the hash `noise` gives.
     pub(crate) fn expose(&self, colour: Rgb, noise: u64) -> [u8; 3] {
+        std::array::from_fn(|channel| self.level(f64::from(colour[channel]), normals(mix64(noise ^ channel as u64))[0]))
+    }
+
+    /// The 8-bit level of linear `light`, with noise of `normal` standard deviations.
+    pub(crate) fn level(&self, light: f64, normal: f64) -> u8 {
         let (read, shot, gain) = (self.read_noise.max(0.0), self.shot_noise.max(0.0), self.gain.max(0.0));
-        std::array::from_fn(|channel| {
-            let level = 255.0 * encoded(gain * f64::from(colour[channel]));
-            let sigma = (read * read + shot * shot * level / 255.0).sqrt();
-            let noisy = level + sigma * normal(mix64(noise ^ channel as u64));
-            noisy.round().clamp(0.0, 255.0) as u8
-        })
+        let level = 255.0 * encoded(gain * light);
+        let sigma = (read * read + shot * shot * level / 255.0).sqrt();
+        (level + sigma * normal).round().clamp(0.0, 255.0) as u8
     }
 }
 
@@ -68,10 +70,12 @@ fn encoded(linear: f64) -> f64 {
     if x <= 0.003_130_8 { 12.92 * x } else { 1.055 * x.powf(1.0 / 2.4) - 0.055 }
 }
 
-/// A standard normal number from a hash (G. Box and M. Muller, Ann. Math. Stat. 29, 1958).
-fn normal(hash: u64) -> f64 {
+/// Two standard normal numbers from a hash (G. Box and M. Muller, Ann. Math. Stat. 29, 1958).
+pub fn normals(hash: u64) -> [f64; 2] {
     let (a, b) = unit_pair(hash);
-    (-2.0 * (1.0 - a).ln()).sqrt() * (std::f64::consts::TAU * b).cos()
+    let radius = (-2.0 * (1.0 - a).ln()).sqrt();
+    let (sine, cosine) = (std::f64::consts::TAU * b).sin_cos();
+    [radius * cosine, radius * sine]
 }
 
 /// Two numbers in [0, 1) from a hash.

@@ -247,7 +247,7 @@ impl View<'_> {
 /// `count` places on a pixel's square, in pixels from its centre, as a golden-ratio lattice turned about the square by
 /// a random offset (R. Cranley and T. Patterson, SIAM J. Numer. Anal. 13, 1976): unbiased, and far less grainy than
 /// independent places.
-fn lattice(count: u32, hash: u64) -> impl Iterator<Item = [f64; 2]> {
+pub fn lattice(count: u32, hash: u64) -> impl Iterator<Item = [f64; 2]> {
     const GOLDEN: f64 = 0.618_033_988_749_894_9;
     let (a, b) = unit_pair(hash);
     (0..count).map(move |i| {

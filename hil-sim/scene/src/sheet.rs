@@ -4,7 +4,6 @@ use nalgebra::{UnitQuaternion, Vector3};
 use vergence_vision::{Frame, Length, Point, Transform};
 
 use crate::Target;
-use crate::shape::SurfacePoint;
 use crate::target::{BACK, BLACK, WHITE};
 use crate::texture::Rgb;
 
@@ -175,15 +174,16 @@ impl Sheet {
         Transform::new(rotation, middle - rotation * self.centre().mm())
     }
 
-    /// The ink at `at`, a point on the sheet about its middle. Edges are sharp: the lens alone blurs them.
-    pub(crate) fn ink(&self, at: &SurfacePoint) -> Rgb {
-        if at.face == 1 {
+    /// The ink at a place in millimetres about the middle of the sheet, seen from before or from behind. Edges are sharp:
+    /// the lens alone blurs them.
+    pub(crate) fn ink(&self, place: [f64; 2], from_behind: bool) -> Rgb {
+        if from_behind {
             return BACK;
         }
         let middle = self.centre().mm();
-        let (x, y) = (at.uv[0] + middle.x, at.uv[1] + middle.y);
+        let (x, y) = (place[0] + middle.x, place[1] + middle.y);
         let is_black = match self {
-            Self::Checkerboard(target) => return target.ink(at),
+            Self::Checkerboard(target) => target.is_black(place),
             Self::Tags(grid) => grid.is_black(x, y),
             Self::Markers(board) => board.is_black(x, y),
         };

@@ -4,7 +4,7 @@ use nalgebra::{UnitQuaternion, Vector3};
 use vergence_vision::{Frame, Length, Point, Transform, World};
 
 use crate::scene::{Material, Solid};
-use crate::shape::{Shape, SurfacePoint};
+use crate::shape::Shape;
 use crate::texture::{Pattern, Rgb};
 use crate::{Scene, Sheet};
 
@@ -12,6 +12,8 @@ use crate::{Scene, Sheet};
 pub(crate) const WHITE: Rgb = [0.82, 0.82, 0.80];
 pub(crate) const BLACK: Rgb = [0.04, 0.04, 0.04];
 pub(crate) const BACK: Rgb = [0.30, 0.28, 0.26];
+/// The even grey behind a target alone.
+pub(crate) const BACKDROP: Rgb = [0.35; 3];
 
 /// Width of the white border, as a share of the side of a square.
 const BORDER: f64 = 0.5;
@@ -58,18 +60,13 @@ impl Target {
         [self.columns, self.rows].map(|corners| self.square * (f64::from(corners) + 1.0 + 2.0 * BORDER))
     }
 
-    /// The ink at `at`, a point on the sheet about its middle. Edges are sharp: the lens alone blurs them.
-    pub(crate) fn ink(&self, at: &SurfacePoint) -> Rgb {
-        if at.face == 1 {
-            return BACK;
-        }
-        let [x, y] = at.uv;
+    /// Whether the place, in millimetres about the middle of the target, is black.
+    pub(crate) fn is_black(&self, [x, y]: [f64; 2]) -> bool {
         let (columns, rows) = (f64::from(self.columns) + 1.0, f64::from(self.rows) + 1.0);
         let (column, row) = (x / self.square.mm() + 0.5 * columns, y / self.square.mm() + 0.5 * rows);
         let printed = (0.0..columns).contains(&column) && (0.0..rows).contains(&row);
         // The square up and left of corner (0, 0) is black.
-        let black = (column.floor() + row.floor()).rem_euclid(2.0) < 0.5;
-        if printed && black { BLACK } else { WHITE }
+        printed && (column as u32 + row as u32).is_multiple_of(2)
     }
 }
 
@@ -91,8 +88,7 @@ impl Scene {
     /// A `target` alone before an even grey, which renders quickest where only the target matters.
     #[must_use]
     pub fn target_alone(target: impl Into<Sheet>, world_from_target: Transform<World, Target>) -> Self {
-        const GREY: Rgb = [0.35; 3];
-        Self::empty(GREY).with_target(target, world_from_target)
+        Self::empty(BACKDROP).with_target(target, world_from_target)
     }
 
     /// The scene with a `target` added. The target may intersect other solids.

@@ -54,7 +54,7 @@ impl Pattern {
             Self::Book { cloth, ink } => book(at, cloth, ink, seed),
             Self::Leaf { light, dark } => leaf(at, light, dark, seed),
             Self::Garden { height } => garden(at, height, seed),
-            Self::Print(sheet) => sheet.ink(at),
+            Self::Print(sheet) => sheet.ink(at.uv, at.face == 1),
         }
     }
 }

@@ -1,5 +1,5 @@
-//! The rig's own calibration, from photographs alone: both lenses from targets all over their fields, then the stage
-//! from targets that both cameras see at six stage poses.
+//! Calibration from photographs alone: both lenses from targets all over their fields, then the stage from targets that both
+//! cameras see at six stage poses; and for the paper's methods the pair at each mode.
 
 use nalgebra::{UnitQuaternion, Vector3};
 use rayon::prelude::*;
@@ -14,9 +14,11 @@ use vergence_targets::TargetView;
 use vergence_vision::{Camera, ImageSize, KannalaBrandt, Left, Right, Transform};
 
 use crate::bench::{Bench, scene_target};
-use crate::drive::Stop;
+use crate::conditions::Conditions;
+use crate::drive::{Drive, Stop};
 use crate::error::ReproduceError;
-use crate::target_shot::{CornerSource, FoundCorners, Photo, TargetShot};
+use crate::pair::Pair;
+use crate::target_shot::{FoundCorners, Photo, TargetShot};
 
 /// Views of each lens's own calibration.
 const OWN_VIEWS: u64 = 30;
@@ -29,38 +31,46 @@ pub struct Calibrated {
     pub stage: StageCalibration,
     /// The rig as its written file describes it.
     pub rig: Rig,
+    /// The left and the right lens by their own targets.
+    pub own: [KannalaBrandt; 2],
+    /// The pair of each mode, calibrated there.
+    pub pairs: Vec<Pair>,
     /// How far corners were from where they truly are, in pixels.
     pub errors_px: Vec<f64>,
     /// Photographs taken, and those in which no target was found.
     pub photographs: [usize; 2],
 }
 
-/// Calibrates the bench from targets held at `stops`.
+/// Calibrates the bench from targets held where it was driven. `returns` draws how far the stage misses its poses.
 ///
 /// # Errors
 /// Where the views give no calibration.
 pub fn calibrate(
     bench: &Bench,
-    stops: &[Stop],
-    corner_source: &CornerSource,
+    drive: &Drive,
+    conditions: &Conditions,
     random: &mut Random,
+    returns: &mut Random,
 ) -> Result<Calibrated, ReproduceError> {
     let mut tally = Tally::default();
     let lenses = [&bench.built.left_camera, &bench.built.right_camera];
-    let [left, right] = lenses.map(|lens| own_calibration(lens, corner_source, random.seed(), &mut tally));
+    let [left, right] = lenses.map(|lens| own_calibration(lens, conditions, random.seed(), &mut tally));
     let (left, right) = (left?, right?);
+    let own = [left.camera, right.camera];
     let mut poses = Vec::new();
-    for stop in stops {
-        let views =
-            shared_views(bench, &stop.truth, [&left.camera, &right.camera], corner_source, random.seed(), &mut tally);
+    for stop in &drive.calibration {
+        let standing = conditions.returned(&stop.truth, returns);
+        let views = shared_views(bench, &standing, &own, conditions, random.seed(), &mut tally);
         poses.push(StagePose { readings: stop.readings.clone(), views });
     }
+    let pair = |mode: &Stop| Pair::calibrated(bench, &mode.truth, &own, conditions, returns);
+    let pairs = drive.modes.iter().map(pair).collect();
     let rig = Rig { left_camera: left.camera, right_camera: right.camera, ..bench.drawn.clone() };
     let lenses = LensKnowledge::within(left.covariance, right.covariance);
     let stage = calibrate_stage(&rig, &poses, &StageOptions { lenses, ..StageOptions::default() })
         .map_err(|error| ReproduceError::Calibration(format!("the stage: {error}")))?;
     let rig = through_file(&stage.rig(&rig))?;
-    Ok(Calibrated { stage, rig, errors_px: tally.errors_px, photographs: [tally.taken, tally.missed] })
+    Ok(Calibrated { stage, rig, own, pairs, errors_px: tally.errors_px, photographs: [tally.taken, tally.missed] })
 }
 
 /// The rig as a user of its file has it.
@@ -90,7 +100,7 @@ impl Tally {
 
 fn own_calibration(
     lens: &KannalaBrandt,
-    corner_source: &CornerSource,
+    conditions: &Conditions,
     seed: u64,
     tally: &mut Tally,
 ) -> Result<IntrinsicsCalibration, ReproduceError> {
@@ -100,7 +110,8 @@ fn own_calibration(
         .into_par_iter()
         .map(|index| {
             let place = held.left_from_target(index)?;
-            TargetShot { lens, camera_from_target: place.renamed(), seed: seed ^ index }.photograph(corner_source)
+            let camera_from_target = place.renamed();
+            TargetShot { lens, pupil: conditions.pupil, camera_from_target, seed: seed ^ index }.photograph(conditions)
         })
         .collect();
     let seen = |known: Option<&KannalaBrandt>| -> Vec<Option<FoundCorners>> {
@@ -122,8 +133,8 @@ fn calibrated(seen: &[Option<FoundCorners>], size: ImageSize) -> Result<Intrinsi
 fn shared_views(
     bench: &Bench,
     left_from_right: &Transform<Left, Right>,
-    known: [&KannalaBrandt; 2],
-    corner_source: &CornerSource,
+    known: &[KannalaBrandt; 2],
+    conditions: &Conditions,
     seed: u64,
     tally: &mut Tally,
 ) -> Vec<StereoView> {
@@ -133,7 +144,8 @@ fn shared_views(
         .into_par_iter()
         .filter_map(|index| {
             let left_from_target = held.left_from_target(index)?;
-            Some(both(bench, left_from_right, &left_from_target, known, corner_source, seed ^ index))
+            let photos = photographs(bench, left_from_right, &left_from_target, conditions, seed ^ index);
+            Some([0, 1].map(|side| photos[side].as_ref()?.found(Some(&known[side]))))
         })
         .collect();
     seen.iter().flatten().for_each(|seen| tally.count(seen));
@@ -149,21 +161,20 @@ fn shared_views(
         .collect()
 }
 
-/// What both cameras, of which `known` is known, make of a target at `left_from_target`.
-pub fn both(
+/// What both cameras photograph of a target at `left_from_target`.
+pub fn photographs(
     bench: &Bench,
     left_from_right: &Transform<Left, Right>,
     left_from_target: &Transform<Left, Target>,
-    known: [&KannalaBrandt; 2],
-    corner_source: &CornerSource,
+    conditions: &Conditions,
     seed: u64,
-) -> [Option<FoundCorners>; 2] {
+) -> [Option<Photo>; 2] {
     let in_right: Transform<Camera, Target> = (left_from_right.inverse() * *left_from_target).renamed();
-    let shot = |lens, camera_from_target, known, seed| {
-        TargetShot { lens, camera_from_target, seed }.photograph(corner_source)?.found(Some(known))
+    let shot = |lens, camera_from_target, seed| {
+        TargetShot { lens, pupil: conditions.pupil, camera_from_target, seed }.photograph(conditions)
     };
     [
-        shot(&bench.built.left_camera, left_from_target.renamed(), known[0], seed.wrapping_mul(2)),
-        shot(&bench.built.right_camera, in_right, known[1], seed.wrapping_mul(2).wrapping_add(1)),
+        shot(&bench.built.left_camera, left_from_target.renamed(), seed.wrapping_mul(2)),
+        shot(&bench.built.right_camera, in_right, seed.wrapping_mul(2).wrapping_add(1)),
     ]
 }

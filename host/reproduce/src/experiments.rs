@@ -9,19 +9,19 @@ use vergence_output::{ZonesOf, zones_plot};
 use vergence_vision::PAPER_FIELD;
 
 use crate::bench::Bench;
+use crate::causes::Column;
+use crate::conditions::{Cause, Conditions, NOISE_PX};
 use crate::drive::Drive;
 use crate::error::ReproduceError;
 use crate::matching::{Matching, MatchingTools, matchings};
-use crate::one_seed::one_seed;
+use crate::one_seed::{SeedResult, one_seed};
 use crate::page::{Findings, reproduction_page};
 use crate::report;
 use crate::tally::Table;
 use crate::target_images::target_images;
-use crate::target_shot::{CornerSource, Corners};
+use crate::target_shot::Corners;
 use crate::zones::{ModeZones, mode_zones};
 
-/// Noise of the corners in pixels: of the class that the goals are for, and twice that.
-const NOISE_PX: [f64; 2] = [0.1, 0.2];
 /// Seed of the simulated room and of the pictures.
 const PICTURE_SEED: u64 = 1;
 
@@ -30,7 +30,8 @@ const PICTURE_SEED: u64 = 1;
 pub struct Plan {
     /// Number of rigs.
     pub seeds: u32,
-    /// Number of rigs that are also measured with twice the noise; `None` for a fifth of them.
+    /// Number of rigs that are also measured with twice the noise and with each kind of error alone; `None` for a fifth of
+    /// them.
     pub noisy_seeds: Option<u32>,
     /// Where the corners come from.
     pub corners: Corners,
@@ -57,8 +58,8 @@ pub enum Progress {
     Matching,
     /// Calibrations and measurements.
     Measuring {
-        /// Noise of the corners, in pixels.
-        noise_px: f64,
+        /// What they suffer from.
+        errors: &'static str,
         /// Number of rigs that are measured.
         done: usize,
         /// Number of all rigs.
@@ -72,6 +73,8 @@ pub enum Progress {
 pub struct Results {
     /// The bench with corners of the class that the goals are for, and with twice the noise.
     pub tables: [Table; 2],
+    /// Each kind of error alone, and all together.
+    pub columns: Vec<Column>,
     /// Zones of all modes.
     pub zones: Vec<ModeZones>,
     /// Results of all matchers in all modes.
@@ -81,7 +84,7 @@ pub struct Results {
 }
 
 impl Plan {
-    /// Number of rigs that are measured with twice the noise.
+    /// Number of rigs that are measured with more than the noise of the corners.
     fn noisy(&self) -> usize {
         self.noisy_seeds.unwrap_or(self.seeds.div_ceil(5)).min(self.seeds) as usize
     }
@@ -103,8 +106,8 @@ impl fmt::Display for Progress {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::Matching => f.write_str("matching in the simulated room"),
-            Self::Measuring { noise_px, done, rigs } => {
-                write!(f, "measuring with corners of {noise_px} px, {done} of {rigs} rigs done")
+            Self::Measuring { errors, done, rigs } => {
+                write!(f, "measuring with {errors}, {done} of {rigs} rigs done")
             }
             Self::Drawing => f.write_str("drawing the page"),
         }
@@ -129,15 +132,23 @@ pub fn experiments(
             matchings(tools, PICTURE_SEED)?
         }
     };
-    let [table, noisier] = [(NOISE_PX[0], rigs.len()), (NOISE_PX[1], plan.noisy())].map(|(noise_px, seeds)| {
-        let source = CornerSource { corners: plan.corners, noise_px };
-        all_seeds(rigs.get(..seeds).unwrap_or_default(), &source, progress)
-    });
-    let tables = [table?, noisier?];
+    let few = rigs.get(..plan.noisy()).unwrap_or_default();
+    let ordinary = all_seeds(rigs, Cause::Corners.as_str(), &Cause::Corners.alone(plan.corners), progress)?;
+    let twice = all_seeds(few, "twice the noise", &Conditions::noise(plan.corners, 2.0 * NOISE_PX), progress)?;
+    let column = |cause: Cause| {
+        let table = match cause {
+            Cause::Corners => Table::of(ordinary.iter().take(few.len())),
+            _ => Table::of(&all_seeds(few, cause.as_str(), &cause.alone(plan.corners), progress)?),
+        };
+        Ok(Column { cause, table })
+    };
+    let columns = Cause::ALL.into_iter().map(column).collect::<Result<Vec<_>, ReproduceError>>()?;
+    let tables = [Table::of(&ordinary), Table::of(&twice)];
     progress(Progress::Drawing);
     let zones = mode_zones();
     let html = reproduction_page(&Findings {
         tables: tables.each_ref(),
+        columns: &columns,
         rendered: plan.corners == Corners::Rendered,
         zones: &zones,
         zones_svg: &zones_of_herbivore(&zones),
@@ -146,27 +157,26 @@ pub fn experiments(
         samples: plan.samples,
         command: plan.command(),
     })?;
-    Ok(Results { tables, zones, matchings, html })
+    Ok(Results { tables, columns, zones, matchings, html })
 }
 
-/// Computes all seeds in parallel; their order decides the order of the results.
+/// Computes all seeds in parallel, in the order of the rigs.
 fn all_seeds(
     rigs: &[DrivenRig],
-    source: &CornerSource,
+    errors: &'static str,
+    conditions: &Conditions,
     progress: &(dyn Fn(Progress) + Sync),
-) -> Result<Table, ReproduceError> {
-    let measuring = |done| Progress::Measuring { noise_px: source.noise_px, done, rigs: rigs.len() };
+) -> Result<Vec<SeedResult>, ReproduceError> {
+    let measuring = |done| Progress::Measuring { errors, done, rigs: rigs.len() };
     progress(measuring(0));
     let done = AtomicUsize::new(0);
-    let results: Result<Vec<_>, _> = rigs
-        .par_iter()
+    rigs.par_iter()
         .map(|DrivenRig { seed, bench, drive }| {
-            let result = one_seed(bench, drive, source, *seed);
+            let result = one_seed(bench, drive, conditions, *seed);
             progress(measuring(done.fetch_add(1, Ordering::Relaxed) + 1));
             result
         })
-        .collect();
-    Ok(Table::of(&results?))
+        .collect()
 }
 
 /// Curves of the zones of the herbivore mode, as SVG.
@@ -186,7 +196,12 @@ impl Results {
     /// Bench and matches for people, a line for each figure.
     #[must_use]
     pub fn lines(&self) -> Vec<String> {
-        [report::bench_lines(self.tables.each_ref()), report::matching_lines(&self.matchings)].concat()
+        [
+            report::bench_lines(self.tables.each_ref()),
+            report::cause_lines(&self.columns),
+            report::matching_lines(&self.matchings),
+        ]
+        .concat()
     }
 
     /// All figures for programs.
@@ -197,6 +212,7 @@ impl Results {
             "bench": report::rows(table),
             "zones": report::zones(&self.zones),
             "corners": report::corners(table),
+            "causes": report::causes(&self.columns),
             "noisier": { "bench": report::rows(noisier), "corners": report::corners(noisier) },
             "matching": report::matchings(&self.matchings),
         })

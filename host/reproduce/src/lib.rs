@@ -3,8 +3,8 @@
 //!
 //! The precision bench is another rig for every seed ([`Bench`]). [`drive()`] moves its stage along a [`Route`] over the real
 //! protocol and returns a [`Drive`]. [`one_seed`] then calibrates both lenses and the stage from photographs of a target, and
-//! measures corners of targets 350 mm away by every method; [`Table`] sums up all seeds. Only the renderer and the score know
-//! the truth.
+//! measures corners of targets 350 mm away by every [`Method`]; [`Table`] sums up all seeds. Each [`Cause`] of errors is also
+//! tried alone, beside the figures that the paper [published](PUBLISHED). Only the renderer and the score know the truth.
 //!
 //! Beside it stand the zones of all modes ([`mode_zones`]), the methods of triangulation ([`study`]), and matches in the
 //! simulated room ([`matchings`]). [`experiments`] does all of it and puts it on one page ([`reproduction_page`]). The same
@@ -16,7 +16,9 @@
 
 mod axes;
 mod bench;
+mod causes;
 mod chain;
+mod conditions;
 pub mod corridor;
 pub mod demo;
 mod drive;
@@ -24,26 +26,36 @@ mod error;
 mod experiments;
 mod matching;
 mod measure;
+mod method;
 mod one_seed;
 mod page;
+mod pair;
+mod pinhole_pair;
 mod report;
 mod sgbm;
 pub mod study;
 mod tally;
 mod target_images;
 mod target_shot;
+mod targets;
+mod undistort;
+mod undistorted;
 mod zones;
 
 pub use bench::{Bench, MODES};
+pub use causes::{Closest, Column, PUBLISHED, Published};
+pub use conditions::{Cause, Conditions, Repeatability};
 pub use drive::{Drive, Route, Stop, drive};
 pub use error::{DemoError, ReproduceError};
 pub use experiments::{DrivenRig, Plan, Progress, Results, experiments};
 pub use matching::{Matching, MatchingTools, Outcome, Picture, matchings};
-pub use measure::{METHODS, Measured, Sample};
+pub use measure::{Measured, Sample};
+pub use method::{METHODS, Method};
 pub use one_seed::{SeedResult, one_seed};
 pub use page::{Findings, reproduction_page};
 pub use sgbm::{SgbmAnswer, SgbmTask};
 pub use tally::{Figures, Row, Table};
 pub use target_images::target_images;
-pub use target_shot::{CornerSource, Corners};
+pub use target_shot::Corners;
+pub use undistorted::Undistorted;
 pub use zones::{ModeZones, mode_zones};

@@ -2,10 +2,10 @@
 
 use crate::bench::Bench;
 use crate::chain::calibrate;
+use crate::conditions::Conditions;
 use crate::drive::Drive;
 use crate::error::ReproduceError;
 use crate::measure::{Measured, measure};
-use crate::target_shot::CornerSource;
 use vergence_sim::Random;
 
 /// What one seed came to.
@@ -28,12 +28,13 @@ pub struct SeedResult {
 pub fn one_seed(
     bench: &Bench,
     drive: &Drive,
-    corner_source: &CornerSource,
+    conditions: &Conditions,
     seed: u64,
 ) -> Result<SeedResult, ReproduceError> {
-    let mut random = Random::new(seed);
-    let calibrated = calibrate(bench, &drive.calibration, corner_source, &mut random)?;
-    let measured = measure(bench, &drive.modes, &calibrated, corner_source, &mut random);
+    // Streams of their own: the same targets stand before the rig in all conditions.
+    let (mut random, mut returns) = (Random::new(seed), Random::new(seed ^ 0x7265_7475_726e));
+    let calibrated = calibrate(bench, drive, conditions, &mut random, &mut returns)?;
+    let measured = measure(bench, &drive.modes, &calibrated, conditions, &mut random, &mut returns);
     Ok(SeedResult {
         measured,
         stated_px: calibrated.stage.sigma_px,

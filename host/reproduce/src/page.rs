@@ -1,6 +1,7 @@
 //! All of it on one self-contained page.
 
 mod bench;
+mod causes;
 mod matching;
 mod triangulation;
 mod zones;
@@ -14,12 +15,15 @@ use vergence_page::{Page, data_url, note, page, section};
 use super::matching::Matching;
 use super::tally::Table;
 use super::zones::ModeZones;
+use crate::causes::Column;
 use crate::error::ReproduceError;
 
 /// Everything that the page shows.
 pub struct Findings<'a> {
     /// The bench with corners of the class that the goals are for, and with twice the noise.
     pub tables: [&'a Table; 2],
+    /// Each kind of error alone, and all together.
+    pub columns: &'a [Column],
     /// Whether photographs were rendered, or corners only projected.
     pub rendered: bool,
     /// Zones of all modes.
@@ -44,6 +48,7 @@ pub fn reproduction_page(findings: &Findings<'_>) -> Result<String, ReproduceErr
     let body = [
         bench::verdict(findings),
         section("Precision bench", &bench::body(findings)?),
+        section("The methods by the cause of their errors", &causes::body(findings.columns)),
         section("Zones", &zones::body(findings)),
         section("Methods of triangulation", &triangulation::body(findings.samples)),
         section("Matches in the simulated room", &matching::body(findings.matchings)?),

@@ -4,8 +4,12 @@ use serde_json::{Value, json};
 
 use vergence_rig::{rounded, zones_json};
 
+use crate::bench::MODES;
+use crate::causes::Column;
 use crate::matching::Matching;
+use crate::method::METHODS;
 use crate::tally::{Figures, Row, Table};
+use crate::undistorted::Undistorted;
 use crate::zones::ModeZones;
 
 /// One for each method in each mode.
@@ -34,8 +38,8 @@ fn figures(figures: &Figures) -> Value {
         "rel_percent": rounded(figures.rel_percent),
         "std_mm": rounded(figures.std_mm),
         "bias_mm": rounded(figures.bias_mm),
-        "crb_mm": rounded(figures.crb_mm),
-        "crb_pixels_mm": rounded(figures.crb_pixels_mm),
+        "crb_mm": figures.crb_mm.map(rounded),
+        "crb_pixels_mm": figures.crb_pixels_mm.map(rounded),
     })
 }
 
@@ -107,20 +111,60 @@ pub fn bench_lines(tables: [&Table; 2]) -> Vec<String> {
         ));
         for row in &table.rows {
             let figures = &row.figures;
+            let bounds = figures.crb_mm.zip(figures.crb_pixels_mm);
+            let bound = bounds.map_or(String::new(), |(all, pixels)| format!(", bound {all:.3} (pixels {pixels:.3})"));
             let nees = row.nees.map_or(String::new(), |nees| format!(", NEES {nees:.2}"));
             lines.push(format!(
-                "  {:<10} {:<20} {:.3} mm = {:.3} %, std {:.3}, bias {:+.3}, bound {:.3} (pixels {:.3}){nees}",
-                row.mode,
-                row.method,
-                figures.mean_abs_mm,
-                figures.rel_percent,
-                figures.std_mm,
-                figures.bias_mm,
-                figures.crb_mm,
-                figures.crb_pixels_mm,
+                "  {:<10} {:<20} {:.3} mm = {:.3} %, std {:.3}, bias {:+.3}{bound}{nees}",
+                row.mode, row.method, figures.mean_abs_mm, figures.rel_percent, figures.std_mm, figures.bias_mm,
             ));
         }
     }
+    lines
+}
+
+/// Each kind of error: its size, every method under it, and how it compares with the paper.
+pub fn causes(columns: &[Column]) -> Vec<Value> {
+    let undistorted = |(mode, seen): (&&str, &Undistorted)| {
+        json!({
+            "mode": mode,
+            "corners": seen.corners,
+            "inside": seen.inside,
+            "found": seen.found,
+            "stretch": rounded(seen.mean_stretch()),
+            "off_px": rounded(seen.off_px()),
+            "views": seen.views,
+        })
+    };
+    let of = |column: &Column| {
+        json!({
+            "cause": column.cause.as_str(),
+            "size": column.cause.size(),
+            "bench": rows(&column.table),
+            "corners": corners(&column.table),
+            "times_for_paper": column.times().map(|times| times.map(rounded)),
+            "closest_times": column.closest().map(|closest| rounded(closest.times)),
+            "closest_off_by": column.closest().map(|closest| rounded(closest.worst)),
+            "undistorted": MODES.iter().zip(&column.table.undistorted).map(undistorted).collect::<Vec<_>>(),
+        })
+    };
+    columns.iter().map(of).collect()
+}
+
+/// A line for each method in each mode, with the error by each cause, and one for the paper's pattern.
+pub fn cause_lines(columns: &[Column]) -> Vec<String> {
+    let line = |name: &str, cell: &dyn Fn(&Column) -> String| {
+        let cells: String = columns.iter().map(|column| format!("{:>16}", cell(column))).collect();
+        format!("  {name:<31}{cells}")
+    };
+    let number = |value: Option<f64>| value.map_or("-".into(), |value| format!("{value:.3}"));
+    let mut lines = vec![line("mean error in mm by cause", &|column| column.cause.as_str().into())];
+    for (mode, method) in MODES.iter().flat_map(|mode| METHODS.map(|method| (mode, method))) {
+        lines.push(line(&format!("{mode:<10} {}", method.as_str()), &|column| {
+            number(column.table.row(mode, method.as_str()).map(|row| row.figures.mean_abs_mm))
+        }));
+    }
+    lines.push(line("off from the paper by a factor", &|column| number(column.closest().map(|closest| closest.worst))));
     lines
 }
 

@@ -1,8 +1,10 @@
 //! From samples to the table of the bench.
 
 use crate::bench::MODES;
-use crate::measure::{METHODS, Sample};
+use crate::measure::Sample;
+use crate::method::{METHODS, Method};
 use crate::one_seed::SeedResult;
+use crate::undistorted::Undistorted;
 
 /// The mean of |x| of a normal distribution of unit standard deviation: √(2 / π).
 const MEAN_ABSOLUTE: f64 = 0.797_884_560_802_865_4;
@@ -39,10 +41,10 @@ pub struct Figures {
     /// Mean of the error.
     pub bias_mm: f64,
     /// What the mean of the absolute error would be at the Cramér-Rao bound: √(2/π) √(mean variance), from pixels and
-    /// calibration.
-    pub crb_mm: f64,
+    /// calibration; only our method states a variance.
+    pub crb_mm: Option<f64>,
     /// The same from pixels alone.
-    pub crb_pixels_mm: f64,
+    pub crb_pixels_mm: Option<f64>,
 }
 
 /// Results over all seeds.
@@ -58,30 +60,39 @@ pub struct Table {
     pub stated_px: f64,
     /// Photographs, and those in which no target was found.
     pub photographs: [usize; 2],
-    /// Corners that both cameras saw on the bench, and those that the epipolar gate refused.
+    /// Corners that both cameras saw on the bench, and those that the epipolar gate of our method refused.
     pub corners: [usize; 2],
+    /// What the undistorted pictures show, for each of [`MODES`].
+    pub undistorted: Vec<Undistorted>,
 }
 
 impl Table {
     /// Over all seeds.
     #[must_use]
-    pub fn of(seeds: &[SeedResult]) -> Self {
+    pub fn of<'a>(seeds: impl IntoIterator<Item = &'a SeedResult>) -> Self {
+        let seeds: Vec<&SeedResult> = seeds.into_iter().collect();
         let (mut squares, mut errors) = (0.0, 0usize);
         for error in seeds.iter().flat_map(|seed| seed.calibration_errors_px.iter().chain(&seed.measured.errors_px)) {
             squares += error * error;
             errors += 1;
         }
-        let pairs = (0..MODES.len()).flat_map(|mode| (0..METHODS.len()).map(move |method| (mode, method)));
+        let pairs = (0..MODES.len()).flat_map(|mode| METHODS.map(|method| (mode, method)));
         let sum = |of: fn(&SeedResult) -> [usize; 2]| {
-            seeds.iter().map(of).fold([0, 0], |sum, next| [sum[0] + next[0], sum[1] + next[1]])
+            seeds.iter().map(|seed| of(seed)).fold([0, 0], |sum, next| [sum[0] + next[0], sum[1] + next[1]])
         };
         Self {
-            rows: pairs.filter_map(|(mode, method)| row(seeds, mode, method)).collect(),
+            rows: pairs.filter_map(|(mode, method)| row(&seeds, mode, method)).collect(),
             seeds: seeds.len(),
             corner_px: (squares / errors.max(1) as f64).sqrt(),
             stated_px: seeds.iter().map(|seed| seed.stated_px).sum::<f64>() / seeds.len().max(1) as f64,
             photographs: sum(|seed| seed.photographs),
             corners: sum(|seed| seed.measured.corners),
+            undistorted: (0..MODES.len())
+                .map(|mode| {
+                    let of_mode = seeds.iter().filter_map(|seed| seed.measured.undistorted.get(mode));
+                    of_mode.fold(Undistorted::default(), Undistorted::and)
+                })
+                .collect(),
         }
     }
 
@@ -102,7 +113,7 @@ impl Table {
     }
 }
 
-fn row(seeds: &[SeedResult], mode: usize, method: usize) -> Option<Row> {
+fn row(seeds: &[&SeedResult], mode: usize, method: Method) -> Option<Row> {
     let samples: Vec<&Sample> = seeds
         .iter()
         .flat_map(|seed| &seed.measured.samples)
@@ -114,14 +125,13 @@ fn row(seeds: &[SeedResult], mode: usize, method: usize) -> Option<Row> {
         let inside = |sample: &&&Sample| (from..from + FIELD_STEP_DEG).contains(&sample.field_deg);
         Some((from, Figures::of(&samples.iter().filter(inside).copied().collect::<Vec<_>>())?))
     });
-    let kernel = METHODS[method];
     let squares: Vec<f64> = seeds.iter().filter_map(|seed| seed.measured.nees.get(mode).copied().flatten()).collect();
-    let is_ours = kernel == vergence_vision::Kernel::PseudoIntersection;
     Some(Row {
         mode: MODES[mode],
-        method: kernel.as_str(),
+        method: method.as_str(),
         figures,
-        nees: (is_ours && !squares.is_empty()).then(|| squares.iter().sum::<f64>() / squares.len() as f64),
+        nees: (method == Method::Ours && !squares.is_empty())
+            .then(|| squares.iter().sum::<f64>() / squares.len() as f64),
         field: field.collect(),
     })
 }
@@ -140,10 +150,17 @@ impl Figures {
             rel_percent: 100.0 * mean(&|sample| (sample.error_mm / sample.depth_mm).abs()),
             std_mm: mean(&|sample| (sample.error_mm - bias_mm).powi(2)).sqrt(),
             bias_mm,
-            crb_mm: MEAN_ABSOLUTE * mean(&|sample| sample.variance_mm2.iter().sum()).sqrt(),
-            crb_pixels_mm: MEAN_ABSOLUTE * mean(&|sample| sample.variance_mm2[0]).sqrt(),
+            crb_mm: bound(samples, |variance| variance.iter().sum()),
+            crb_pixels_mm: bound(samples, |variance| variance[0]),
         })
     }
+}
+
+/// The mean of the absolute error by the mean variance, where all samples state one.
+fn bound(samples: &[&Sample], of: impl Fn(&[f64; 2]) -> f64) -> Option<f64> {
+    let variances: Option<Vec<f64>> = samples.iter().map(|sample| sample.variance_mm2.as_ref().map(&of)).collect();
+    let variances = variances?;
+    Some(MEAN_ABSOLUTE * (variances.iter().sum::<f64>() / variances.len().max(1) as f64).sqrt())
 }
 
 #[cfg(test)]
@@ -156,17 +173,18 @@ mod tests {
     fn seed(errors: &[f64], nees: f64) -> SeedResult {
         let sample = |&error_mm| Sample {
             mode: 0,
-            method: 2,
+            method: Method::Ours,
             error_mm,
             depth_mm: 350.0,
             field_deg: 5.0,
-            variance_mm2: [0.03, 0.01],
+            variance_mm2: Some([0.03, 0.01]),
         };
         let measured = Measured {
             samples: errors.iter().map(sample).collect(),
             nees: vec![Some(nees), None],
             errors_px: vec![0.3, -0.4],
             corners: [2, 0],
+            undistorted: Vec::new(),
         };
         SeedResult { measured, calibration_errors_px: Vec::new(), photographs: [1, 0], stated_px: 0.1 }
     }
@@ -174,11 +192,11 @@ mod tests {
     #[test]
     fn figures_are_those_of_the_samples() {
         let table = Table::of(&[seed(&[0.1, -0.3], 2.0), seed(&[0.5], 5.0)]);
-        let row = table.row("human", "pseudo-intersection").unwrap();
+        let row = table.row("human", "ours").unwrap();
         assert!((row.figures.mean_abs_mm - 0.3).abs() < 1e-12 && (row.figures.bias_mm - 0.1).abs() < 1e-12);
         assert!((row.figures.rel_percent - 100.0 * 0.3 / 350.0).abs() < 1e-12);
         // √(2/π · 0.04)
-        assert!((row.figures.crb_mm - 0.159_576_9).abs() < 1e-6);
+        assert!((row.figures.crb_mm.unwrap() - 0.159_576_9).abs() < 1e-6);
         assert_eq!(row.nees, Some(3.5));
         assert!((table.corner_px - 0.125f64.sqrt()).abs() < 1e-12);
         assert_eq!(row.field.len(), 1);

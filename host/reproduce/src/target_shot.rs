@@ -1,21 +1,25 @@
-//! One target before one camera: photographed and found, or, where that is asked for, its corners projected.
+//! One target before one camera: photographed and found, in the fisheye or in an undistorted picture, or, where that is asked
+//! for, its corners projected.
 
 use image::GrayImage;
-use image::imageops::grayscale;
-use nalgebra::{UnitQuaternion, Vector3};
-use vergence_scene::{Optics, Target};
-use vergence_sim::{Random, photograph_target};
+use nalgebra::Vector3;
+use vergence_scene::{EntrancePupil, Optics, SheetView, Target, photograph_sheet};
+use vergence_sim::Random;
 use vergence_targets::{Corner, Placement, TargetView, detect};
-use vergence_vision::{Camera, ImageSize, KannalaBrandt, Pixel, Point, Transform, World};
+use vergence_vision::{Camera, ImageSize, KannalaBrandt, Pixel, Point, Transform};
 
 use crate::bench::{TARGET, scene_target};
+use crate::conditions::Conditions;
+use crate::undistort::Pinhole;
 
-/// Margin around the corners of a target, for its outer squares and the paper around them.
-const MARGIN_PX: f64 = 90.0;
+/// Margin around a sheet in its part of the photograph.
+const MARGIN_PX: f64 = 16.0;
 /// Grey levels of noise that move a corner of the bench's targets by about one pixel.
-const GREY_PER_PX: f64 = 100.0;
+const GREY_PER_PX: f64 = 75.0;
 /// Rays for a pixel at an edge of the target. Their sampling error is part of the noise that is measured.
 const EDGE_SAMPLES: u32 = 48;
+/// Noise of projected corners at least: about what whole grey levels leave of a rendered one.
+const ROUNDING_PX: f64 = 0.01;
 /// Standard deviation of the blur of the lens, in pixels.
 const BLUR_PX: f64 = 0.8;
 
@@ -28,20 +32,13 @@ pub enum Corners {
     Projected,
 }
 
-/// Where corners come from, and how noisy they are.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct CornerSource {
-    /// Kind of the source.
-    pub corners: Corners,
-    /// Intended standard deviation of a corner's u or v, in pixels; the real one is measured.
-    pub noise_px: f64,
-}
-
 /// A target before a camera.
 #[derive(Clone, Copy, Debug)]
 pub struct TargetShot<'a> {
     /// The true lens.
     pub lens: &'a KannalaBrandt,
+    /// Its entrance pupil.
+    pub pupil: EntrancePupil,
     /// Pose of the target.
     pub camera_from_target: Transform<Camera, Target>,
     /// Seed of the noise.
@@ -77,46 +74,95 @@ impl Photo {
             Shown::Corners(view) => (view.clone(), true),
             Shown::Picture(window, image) => {
                 let hint = known.and_then(|lens| window.part_of(lens));
-                let found = detect(image, &TARGET, hint.as_ref()).ok()?;
-                let mut view = found.view("", &TARGET);
-                for Corner { pixel, .. } in &mut view.corners {
-                    *pixel = Pixel { u: pixel.u + f64::from(window.left), v: pixel.v + f64::from(window.top) };
-                }
-                (view, found.placement == Placement::Unique)
+                let on_sensor = |at: Pixel| Pixel { u: at.u + f64::from(window.left), v: at.v + f64::from(window.top) };
+                target_in(image, hint.as_ref(), on_sensor)?
             }
         };
         let errors_px = errors(&view, &self.truth);
         Some(FoundCorners { view, labelled, errors_px })
     }
+
+    /// The corners that the detector finds in the undistorted picture, as places of that picture; `None` where it finds no
+    /// target or none is in the picture.
+    pub fn undistorted(&self, pinhole: &Pinhole<'_>) -> Option<FoundCorners> {
+        let truth = placed(&self.truth, pinhole);
+        let (view, labelled) = match &self.shown {
+            Shown::Corners(view) => (placed(view, pinhole), true),
+            Shown::Picture(window, image) => {
+                let places: Vec<Pixel> = truth.corners.iter().map(|corner| corner.pixel).collect();
+                let patch = pinhole.patch(&places)?;
+                let picture = pinhole.picture(&patch, image, [window.left, window.top]);
+                target_in(&picture, None, |at| patch.place(at))?
+            }
+        };
+        let errors_px = errors(&view, &truth);
+        Some(FoundCorners { view, labelled, errors_px })
+    }
+
+    /// Where the corners that are in the undistorted picture truly are, as far as what is known of the lens is true.
+    pub fn undistorted_truth(&self, pinhole: &Pinhole<'_>) -> TargetView {
+        placed(&self.truth, pinhole)
+    }
+}
+
+/// The good corners of the target in a picture, moved by `place`, and whether their labels are certain.
+fn target_in(
+    picture: &GrayImage,
+    hint: Option<&KannalaBrandt>,
+    place: impl Fn(Pixel) -> Pixel,
+) -> Option<(TargetView, bool)> {
+    let found = detect(picture, &TARGET, hint).ok()?;
+    let mut view = found.view("", &TARGET);
+    view.corners.iter_mut().for_each(|corner| corner.pixel = place(corner.pixel));
+    Some((view, found.placement == Placement::Unique))
+}
+
+/// The corners that are in the undistorted picture, where they are there.
+fn placed(view: &TargetView, pinhole: &Pinhole<'_>) -> TargetView {
+    let corner = |corner: &Corner| Some(Corner { pixel: pinhole.place(corner.pixel)?, ..*corner });
+    TargetView { name: String::new(), corners: view.corners.iter().filter_map(corner).collect() }
 }
 
 impl TargetShot<'_> {
     /// Its photograph; `None` where no corner is in sight.
-    pub fn photograph(self, corner_source: &CornerSource) -> Option<Photo> {
+    pub fn photograph(self, conditions: &Conditions) -> Option<Photo> {
         let truth = self.truth();
         if truth.corners.is_empty() {
             return None;
         }
-        let shown = match corner_source.corners {
-            Corners::Projected => Shown::Corners(self.moved(&truth, corner_source.noise_px)),
+        let shown = match conditions.corners {
+            Corners::Projected => Shown::Corners(self.moved(&truth, conditions.noise_px.max(ROUNDING_PX))),
             Corners::Rendered => {
-                let window = Window::about(&truth, self.lens.size());
-                let image = self.picture(&window, corner_source.noise_px)?;
+                let window = Window::about(&self.outline(), self.lens.size());
+                let image = self.picture(&window, conditions.noise_px)?;
                 Shown::Picture(window, image)
             }
         };
         Some(Photo { truth, shown })
     }
 
+    /// Where a point of the target truly is in the picture; `None` outside the field.
+    fn pixel(&self, [x, y]: [f64; 2]) -> Option<Pixel> {
+        let at = self.camera_from_target * Point::from_mm(Vector3::new(x, y, 0.0));
+        self.lens.project(&self.pupil.direction(&at)?).ok()
+    }
+
     /// The corners where they truly are.
     fn truth(&self) -> TargetView {
         let place = |index: u32| {
             let target_mm = TARGET.corner_mm(index);
-            let at = self.camera_from_target * Point::from_mm(Vector3::new(target_mm[0], target_mm[1], 0.0));
-            let pixel = self.lens.project_point(&at).ok().filter(|pixel| self.lens.on_sensor(*pixel))?;
-            Some(Corner::new(target_mm, pixel))
+            Some(Corner::new(target_mm, self.pixel(target_mm).filter(|pixel| self.lens.on_sensor(*pixel))?))
         };
         TargetView { name: String::new(), corners: (0..TARGET.columns * TARGET.rows).filter_map(place).collect() }
+    }
+
+    /// Points along the edge of the sheet, as far as they are in the field.
+    fn outline(&self) -> Vec<Pixel> {
+        const ALONG_SIDE: u32 = 12;
+        let (middle, half) = (scene_target().centre().mm(), scene_target().size().map(|side| 0.5 * side.mm()));
+        let along = (0..=ALONG_SIDE).map(|step| 2.0 * f64::from(step) / f64::from(ALONG_SIDE) - 1.0);
+        let sides = along.flat_map(|at| [[at, -1.0], [at, 1.0], [-1.0, at], [1.0, at]]);
+        sides.filter_map(|[x, y]| self.pixel([middle.x + half[0] * x, middle.y + half[1] * y])).collect()
     }
 
     fn moved(&self, truth: &TargetView, sigma_px: f64) -> TargetView {
@@ -131,19 +177,22 @@ impl TargetShot<'_> {
     /// The part of the photograph in the window.
     fn picture(&self, window: &Window, noise_px: f64) -> Option<GrayImage> {
         let camera = window.part_of(self.lens)?;
-        let world_from_camera = Transform::<World, Camera>::new(UnitQuaternion::identity(), Vector3::zeros());
         let grey = noise_px * GREY_PER_PX;
         let optics = Optics {
-            samples: 1,
             edge_samples: EDGE_SAMPLES,
             blur_px: BLUR_PX,
             read_noise: grey,
             shot_noise: grey,
             ..Optics::default()
         };
-        let place = self.camera_from_target.renamed();
-        let image = photograph_target(scene_target(), place, &camera, world_from_camera, &optics, self.seed);
-        Some(grayscale(&image))
+        let view = SheetView {
+            sheet: scene_target().into(),
+            camera_from_sheet: self.camera_from_target,
+            camera: &camera,
+            pupil: self.pupil,
+            optics: &optics,
+        };
+        Some(photograph_sheet(&view, self.seed))
     }
 }
 
@@ -155,9 +204,9 @@ struct Window {
 }
 
 impl Window {
-    fn about(truth: &TargetView, size: ImageSize) -> Self {
+    fn about(outline: &[Pixel], size: ImageSize) -> Self {
         let extent = |value: fn(Pixel) -> f64, size: u32| {
-            let values = truth.corners.iter().map(|corner| value(corner.pixel));
+            let values = outline.iter().map(|pixel| value(*pixel));
             let (low, high) = values.fold((f64::INFINITY, 0.0f64), |(low, high), x| (low.min(x), high.max(x)));
             let low = (low - MARGIN_PX).max(0.0) as u32;
             (low, ((high + MARGIN_PX) as u32).min(size).saturating_sub(low).max(1))

@@ -21,8 +21,8 @@ use crate::stopwatch::Stopwatch;
 /// Repeats the paper's experiments on the simulated rig and writes them to one page.
 ///
 /// The precision bench: for every seed another rig is driven, calibrated from photographs of a 20 mm checkerboard, and
-/// measures targets 350 mm away in human and herbivore mode by every method. Rendering the photographs takes most of the
-/// time. Beside it stand the zones of all modes, the methods of triangulation, and matches in the simulated room by this
+/// measures targets 350 mm away in human and herbivore mode by every method of the paper and by ours; on some rigs with each
+/// kind of error alone. Detecting the corners takes most of the time. Beside it stand the zones of all modes, the methods of triangulation, and matches in the simulated room by this
 /// program's matchers and by OpenCV's semi-global matching (python3 -m pip install opencv-python-headless numpy). The same
 /// seeds give the same bytes.
 #[derive(Clone, Debug, clap::Args)]
@@ -33,7 +33,7 @@ pub struct Args {
     /// How many rigs.
     #[arg(long, default_value_t = 5, value_parser = clap::value_parser!(u32).range(1..=10_000))]
     seeds: u32,
-    /// How many of them are also measured with twice the noise; without it, a fifth.
+    /// How many of them are also measured with twice the noise and with each kind of error alone; without it, a fifth.
     #[arg(long, value_name = "SEEDS", value_parser = clap::value_parser!(u32).range(1..=10_000))]
     noisy_seeds: Option<u32>,
     /// Render photographs and find the corners, or only project the corners and add noise: quick, but not the whole
@@ -143,9 +143,7 @@ impl Shown {
         let Ok(mut bar) = self.bar.lock() else { return };
         let next = match progress {
             Progress::Measuring { done: 1.., .. } => return bar.inc(1),
-            Progress::Measuring { noise_px, rigs, .. } => {
-                self.console.count_bar(&format!("rigs, corners of {noise_px} px"), rigs as u64)
-            }
+            Progress::Measuring { errors, rigs, .. } => self.console.count_bar(&format!("rigs, {errors}"), rigs as u64),
             Progress::Matching => self.console.progress(&progress.to_string()),
             Progress::Drawing => ProgressBar::hidden(),
         };

@@ -1,0 +1,223 @@
+//! Pictures of one printed sheet before an even grey, by a monochrome camera: quick, since nothing else is met.
+//!
+//! The same optics and sensor as of [`render`](crate::render). Rays are solved once for a small square of pixels and
+//! developed to the second order about its middle; the rest of a ray's way is one division.
+
+use image::{GrayImage, Luma};
+use nalgebra::{Matrix3, SVector, Vector3};
+use vergence_vision::{Angle, BatchLens, Camera, KannalaBrandt, Transform};
+
+use crate::blur::blurred;
+use crate::optics::{normals, unit_pair};
+use crate::rays::lens_of;
+use crate::render::lattice;
+use crate::target::BACKDROP;
+use crate::texture::Rgb;
+use crate::texture_noise::mix64;
+use crate::{EntrancePupil, Optics, Sheet, Target};
+
+/// Pixels along a side of the squares whose rays are developed together. Beyond the second order a ray changes there by
+/// less than (2 / pixels per radian)³.
+const CELL: u32 = 4;
+
+/// A sheet before a camera.
+#[derive(Clone, Copy, Debug)]
+pub struct SheetView<'a> {
+    /// What is printed.
+    pub sheet: Sheet,
+    /// Pose of the sheet.
+    pub camera_from_sheet: Transform<Camera, Target>,
+    /// The lens, and the size of the image.
+    pub camera: &'a KannalaBrandt,
+    /// Where the rays of the lens start.
+    pub pupil: EntrancePupil,
+    /// Imperfections of its lens and sensor. Of the rays of a pixel, `samples` counts as 1: only edges take more.
+    pub optics: &'a Optics,
+}
+
+/// A picture of the sheet: 8-bit grey levels of the sRGB curve, black outside the field. `seed` drives the noise and the
+/// choice of rays.
+#[must_use]
+pub fn photograph_sheet(view: &SheetView<'_>, seed: u64) -> GrayImage {
+    let size = view.camera.size();
+    let plane = Plane::of(view);
+    let cells = Cells::of(view, &plane);
+    let (width, height) = (size.width as usize, size.height as usize);
+    let tones: Vec<Tone> =
+        (0..size.height).flat_map(|y| (0..size.width).map(move |x| [x, y])).map(|at| cells.tone(&plane, at)).collect();
+    let places: Vec<[f64; 2]> = Lattice::places(view.optics.edge_samples);
+    let mut light: Vec<[f32; 1]> = tones.iter().map(|tone| [tone.light * tone.exposure]).collect();
+    for (y, x) in (0..height).flat_map(|y| (0..width).map(move |x| (y, x))) {
+        let tone = tones[y * width + x];
+        if is_edge(&tones, width, x, y) && tone.exposure > 0.0 {
+            let lattice = Lattice { places: &places, hash: mix64(mix64(seed) ^ (y * width + x) as u64) };
+            let sum = lattice.offsets().map(|offset| cells.light(&plane, [x as u32, y as u32], offset)).sum::<f32>();
+            light[y * width + x] = [(sum + tone.light) / (places.len() + 1) as f32 * tone.exposure];
+        }
+    }
+    let light = blurred(&light, width, view.optics.blur_px);
+    let mut picture = GrayImage::new(size.width, size.height);
+    let pairs = picture.pixels_mut().zip(light.iter().zip(&tones));
+    let mut noise = [0.0; 2];
+    for (index, (Luma([level]), ([light], tone))) in pairs.enumerate() {
+        // One hash makes the noise of two pixels.
+        if index % 2 == 0 {
+            noise = normals(mix64(mix64(!seed) ^ index as u64));
+        }
+        if tone.exposure > 0.0 {
+            *level = view.optics.level(f64::from(*light), noise[index % 2]);
+        }
+    }
+    picture
+}
+
+/// The luminance of linear light by the primaries of sRGB (IEC 61966-2-1).
+fn luminance([red, green, blue]: Rgb) -> f32 {
+    0.2126 * red + 0.7152 * green + 0.0722 * blue
+}
+
+/// What the ray through the centre of a pixel meets; no exposure outside the field.
+#[derive(Clone, Copy)]
+struct Tone {
+    light: f32,
+    exposure: f32,
+}
+
+/// Whether a pixel or a neighbour meets something else than the others.
+fn is_edge(tones: &[Tone], width: usize, x: usize, y: usize) -> bool {
+    let here = tones[y * width + x].light.to_bits();
+    let rows = y.saturating_sub(1)..(y + 2).min(tones.len() / width);
+    let columns = x.saturating_sub(1)..(x + 2).min(width);
+    rows.flat_map(|y| &tones[y * width..][columns.clone()]).any(|tone| tone.light.to_bits() != here)
+}
+
+/// The sheet as rays in its own frame meet it.
+struct Plane {
+    sheet: Sheet,
+    half: [f64; 2],
+    middle: [f64; 2],
+    sheet_from_camera: Matrix3<f64>,
+    camera_at: Vector3<f64>,
+}
+
+impl Plane {
+    fn of(view: &SheetView<'_>) -> Self {
+        let sheet_from_camera = view.camera_from_sheet.inverse();
+        let middle = view.sheet.centre().mm();
+        Self {
+            sheet: view.sheet,
+            half: view.sheet.size().map(|side| 0.5 * side.mm()),
+            middle: [middle.x, middle.y],
+            sheet_from_camera: sheet_from_camera.rotation().to_rotation_matrix().into_inner(),
+            camera_at: sheet_from_camera.origin().mm(),
+        }
+    }
+
+    /// The light that comes along a ray, `ray` in the frame of the sheet, from the pupil at `shift_mm` on the axis.
+    fn light(&self, ray: [f64; 3], shift_mm: f64) -> f32 {
+        let from = self.camera_at + self.sheet_from_camera.column(2) * shift_mm;
+        let range = -from.z / ray[2];
+        let [x, y] = [from.x + range * ray[0] - self.middle[0], from.y + range * ray[1] - self.middle[1]];
+        // A ray within the plane divides by zero; it fails this test, infinite or not a number.
+        let met = range > 0.0 && x.abs() <= self.half[0] && y.abs() <= self.half[1];
+        luminance(if met { self.sheet.ink([x, y], ray[2] < 0.0) } else { BACKDROP })
+    }
+}
+
+/// Ray in the frame of the sheet, shift of the pupil, exposure.
+type Node = SVector<f64, 5>;
+
+/// The middles of the squares of pixels, with those around the image.
+struct Cells<'a> {
+    view: SheetView<'a>,
+    lens: BatchLens,
+    across: usize,
+    /// Value and derivatives per pixel (u, v, uu, uv, vv) at every square's middle; `None` at the edge of the field.
+    series: Vec<Option<[Node; 6]>>,
+}
+
+impl<'a> Cells<'a> {
+    fn of(view: &SheetView<'a>, plane: &Plane) -> Self {
+        let size = view.camera.size();
+        let [across, down] = [size.width, size.height].map(|pixels| pixels.div_ceil(CELL) as usize);
+        let middle = |index: usize| f64::from(CELL) * (index as f64 - 1.0) + 0.5 * f64::from(CELL - 1);
+        let pixels: Vec<[f64; 2]> =
+            (0..down + 2).flat_map(|row| (0..across + 2).map(move |column| [middle(column), middle(row)])).collect();
+        let lens = lens_of(view.camera);
+        let nodes: Vec<Node> = lens.unproject(&pixels).iter().map(|ray| node(view, plane, ray)).collect();
+        let series = (0..down)
+            .flat_map(|row| (0..across).map(move |column| [row + 1, column + 1]))
+            .map(|[row, column]| series(&nodes, across + 2, row, column))
+            .collect();
+        Self { view: *view, lens, across, series }
+    }
+
+    /// The ray through a place `offset` pixels from the centre of a pixel; `None` outside the field.
+    fn at(&self, plane: &Plane, [x, y]: [u32; 2], offset: [f64; 2]) -> Option<Node> {
+        let index = (y / CELL) as usize * self.across + (x / CELL) as usize;
+        let Some([value, du, dv, duu, duv, dvv]) = &self.series[index] else {
+            let exact = self.lens.unproject(&[[f64::from(x) + offset[0], f64::from(y) + offset[1]]]);
+            return exact.first().map(|ray| node(&self.view, plane, ray)).filter(|node| !node.z.is_nan());
+        };
+        let from_middle = |pixel: u32, offset: f64| f64::from(pixel % CELL) - 0.5 * f64::from(CELL - 1) + offset;
+        let (u, v) = (from_middle(x, offset[0]), from_middle(y, offset[1]));
+        Some(value + du * u + dv * v + duu * (0.5 * u * u) + duv * (u * v) + dvv * (0.5 * v * v))
+    }
+
+    fn tone(&self, plane: &Plane, at: [u32; 2]) -> Tone {
+        self.at(plane, at, [0.0; 2]).map_or(Tone { light: 0.0, exposure: 0.0 }, |node| Tone {
+            light: plane.light([node[0], node[1], node[2]], node[3]),
+            exposure: node[4] as f32,
+        })
+    }
+
+    /// The light of one ray through a pixel; none comes from outside the field.
+    fn light(&self, plane: &Plane, at: [u32; 2], offset: [f64; 2]) -> f32 {
+        self.at(plane, at, offset).map_or(0.0, |node| plane.light([node[0], node[1], node[2]], node[3]))
+    }
+}
+
+fn node(view: &SheetView<'_>, plane: &Plane, ray: &[f64; 3]) -> Node {
+    let theta = Angle::from_rad(ray[2].clamp(-1.0, 1.0).acos());
+    let [x, y, z] = <[f64; 3]>::from(plane.sheet_from_camera * Vector3::from(*ray));
+    let exposure = view.optics.falloff(theta, view.camera.theta_max());
+    Node::from([x, y, z, view.pupil.shift_mm(theta), exposure])
+}
+
+fn series(nodes: &[Node], stride: usize, row: usize, column: usize) -> Option<[Node; 6]> {
+    let step = f64::from(CELL);
+    let near = |down: usize, right: usize| {
+        Some(nodes[(row + down - 1) * stride + column + right - 1]).filter(|node| !node.z.is_nan())
+    };
+    let here = near(1, 1)?;
+    let (west, east, north, south) = (near(1, 0)?, near(1, 2)?, near(0, 1)?, near(2, 1)?);
+    let twist = near(2, 2)? - near(2, 0)? - near(0, 2)? + near(0, 0)?;
+    let slope = |from: Node, to: Node| (to - from) / (2.0 * step);
+    let bend = |from: Node, to: Node| (from + to - here * 2.0) / (step * step);
+    Some([
+        here,
+        slope(west, east),
+        slope(north, south),
+        bend(west, east),
+        twist / (4.0 * step * step),
+        bend(north, south),
+    ])
+}
+
+/// Places on a pixel's square as in [`render`](crate::render), turned about it by the hash.
+struct Lattice<'a> {
+    places: &'a [[f64; 2]],
+    hash: u64,
+}
+
+impl Lattice<'_> {
+    fn places(count: u32) -> Vec<[f64; 2]> {
+        lattice(count, 0).map(|[u, v]| [u + 0.5, v + 0.5]).collect()
+    }
+
+    fn offsets(&self) -> impl Iterator<Item = [f64; 2]> {
+        let (a, b) = unit_pair(self.hash);
+        let within = |place: f64| if place < 1.0 { place - 0.5 } else { place - 1.5 };
+        self.places.iter().map(move |[u, v]| [within(u + a), within(v + b)])
+    }
+}

@@ -1,0 +1,110 @@
+//! The quick picture of a sheet is the picture that the renderer makes of it.
+
+#![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
+
+use image::GrayImage;
+use image::imageops::grayscale;
+use nalgebra::{UnitQuaternion, Vector3};
+use vergence_scene::{EntrancePupil, Optics, Scene, SheetView, Target, View, photograph_sheet, render};
+use vergence_vision::{Angle, Camera, ImageSize, KannalaBrandt, Length, Pixel, Point, Transform};
+
+const TARGET: Target = Target { columns: 7, rows: 5, square: Length::from_mm(30.0) };
+/// Without noise, so that pictures can be compared.
+const OPTICS: Optics = Optics { samples: 1, edge_samples: 200, blur_px: 0.8, vignette: 0.4, ..Optics::ideal() };
+
+fn lens() -> KannalaBrandt {
+    let size = ImageSize { width: 640, height: 640 };
+    let centre = Pixel { u: 321.3, v: 318.2 };
+    KannalaBrandt::new([187.0, -3.0, 0.4, 0.0, 0.0], 1.002, centre, Angle::from_deg(98.0), size).unwrap()
+}
+
+/// A target seen at `theta` from the axis, tilted.
+fn place(theta: f64, distance: f64, tilt: [f64; 3]) -> Transform<Camera, Target> {
+    let direction = Vector3::new(theta.to_radians().sin(), 0.1, theta.to_radians().cos()).normalize();
+    let turn = UnitQuaternion::rotation_between(&Vector3::z(), &direction).unwrap();
+    TARGET.placed(turn * UnitQuaternion::from_euler_angles(tilt[0], tilt[1], tilt[2]), direction * distance)
+}
+
+fn quick(place: Transform<Camera, Target>, pupil: EntrancePupil, optics: &Optics, seed: u64) -> GrayImage {
+    let camera = lens();
+    photograph_sheet(
+        &SheetView { sheet: TARGET.into(), camera_from_sheet: place, camera: &camera, pupil, optics },
+        seed,
+    )
+}
+
+/// Before the camera, at its side, beyond 90°, at the edge of the field, and from behind.
+#[test]
+fn it_is_that_of_the_renderer() {
+    let tilts = [[0.3, -0.4, 0.2], [0.5, 0.2, -0.7], [-0.3, 0.6, 0.1], [0.1, 0.1, 0.4], [0.2, 3.0, 0.1]];
+    for (theta, tilt) in [5.0, 60.0, 88.0, 96.0, 30.0].into_iter().zip(tilts) {
+        let (place, camera) = (place(theta, 320.0, tilt), lens());
+        let scene = Scene::target_alone(TARGET, place.renamed());
+        let world_from_camera = Transform::new(UnitQuaternion::identity(), Vector3::zeros());
+        let whole = render(&View { scene: &scene, camera: &camera, world_from_camera, optics: &OPTICS }, 1).image;
+        let (whole, quick) = (grayscale(&whole), quick(place, EntrancePupil::default(), &OPTICS, 1));
+        let differences: Vec<f64> =
+            whole.pixels().zip(quick.pixels()).map(|(a, b)| f64::from(a.0[0].abs_diff(b.0[0]))).collect();
+        let largest = differences.iter().copied().fold(0.0, f64::max);
+        let mean = differences.iter().sum::<f64>() / differences.len() as f64;
+        // Luma of the sRGB levels is not quite the level of the luminance; edges are sampled by other rays.
+        assert!(largest <= 6.0 && mean < 0.6, "at {theta}°: {largest} levels, {mean} on average");
+        let dark = quick.pixels().filter(|level| (1..90).contains(&level.0[0])).count();
+        assert!(dark > 200 || theta == 30.0, "at {theta}°: {dark} dark pixels");
+    }
+}
+
+#[test]
+fn noise_has_the_stated_size_and_differs_by_seed() {
+    let optics = Optics { read_noise: 5.0, shot_noise: 0.0, ..OPTICS };
+    let place = place(10.0, 320.0, [0.1, 0.2, 0.3]);
+    let [plain, noisy, other] = [(OPTICS, 1), (optics, 1), (optics, 2)]
+        .map(|(optics, seed)| quick(place, EntrancePupil::default(), &optics, seed));
+    let of = |a: &GrayImage, b: &GrayImage, lag: usize| {
+        let noise: Vec<f64> = a.pixels().zip(b.pixels()).map(|(a, b)| f64::from(a.0[0]) - f64::from(b.0[0])).collect();
+        let count = (noise.len() - lag) as f64;
+        noise.iter().zip(&noise[lag..]).map(|(a, b)| a * b).sum::<f64>() / count
+    };
+    // Black outside the field has no noise: 187 px/rad times 98° fill most of the picture. Rounding adds 1/12.
+    let inside =
+        plain.pixels().filter(|level| level.0[0] > 0).count() as f64 / f64::from(plain.width() * plain.height());
+    let variance = of(&noisy, &plain, 0) / inside;
+    assert!((variance / 25.1 - 1.0).abs() < 0.02, "{variance}");
+    assert!(of(&noisy, &plain, 1).abs() < 0.2 && of(&noisy, &plain, 640).abs() < 0.2);
+    assert!((of(&noisy, &other, 0) / inside / 50.0 - 1.0).abs() < 0.02);
+}
+
+/// The pupil of a wide lens moves: the same target at two distances in one direction is seen in two, as the formula says.
+#[test]
+fn a_moving_pupil_moves_what_is_near() {
+    let pupil = EntrancePupil { e0_mm: 2.9 };
+    for (theta, distance) in [(20.0, 300.0), (70.0, 300.0), (70.0, 900.0), (90.0, 200.0)] {
+        let (camera, place) = (lens(), place(theta, distance, [0.0; 3]));
+        // The rays of the picture start at the pupil: a point is where the direction from its pupil is projected.
+        let at: Point<Camera> = place * TARGET.corner(3, 2);
+        let direction = pupil.direction(&at).unwrap();
+        let seen_at = Angle::from_rad(direction.vector().z.acos());
+        let from_pupil = at.mm() - Vector3::z() * pupil.shift_mm(seen_at);
+        assert!(direction.vector().cross(&from_pupil).norm() < 1e-9, "{theta}° {distance}");
+        let [still, moved] = [EntrancePupil::default(), pupil].map(|pupil| {
+            saddle(&quick(place, pupil, &OPTICS, 3), &{ camera.project(&pupil.direction(&at).unwrap()).unwrap() })
+        });
+        assert!(still < 0.08 && moved < 0.08, "at {theta}°, {distance} mm: {still} and {moved} px");
+    }
+}
+
+/// How far the corner by its gradients (W. Förstner and E. Gülch, 1987) lies from `expected`.
+fn saddle(image: &GrayImage, expected: &Pixel) -> f64 {
+    let grey = |x: i32, y: i32| f64::from(image.get_pixel(x.cast_unsigned(), y.cast_unsigned()).0[0]);
+    let (column, row) = (expected.u.round() as i32, expected.v.round() as i32);
+    let (mut squares, mut moments) = (nalgebra::Matrix2::zeros(), nalgebra::Vector2::zeros());
+    for (x, y) in (row - 4..=row + 4).flat_map(|y| (column - 4..=column + 4).map(move |x| (x, y))) {
+        let place = nalgebra::Vector2::new(f64::from(x) - expected.u, f64::from(y) - expected.v);
+        let weight = (-0.25 * place.norm_squared()).exp();
+        let gradient = nalgebra::Vector2::new(grey(x + 1, y) - grey(x - 1, y), grey(x, y + 1) - grey(x, y - 1));
+        let square = gradient * gradient.transpose() * weight;
+        squares += square;
+        moments += square * place;
+    }
+    (squares.try_inverse().unwrap() * moments).norm()
+}
