@@ -70,7 +70,7 @@ fn a_depth_goal_finds_its_pose_before_anything_moves() {
     let folder = temporary();
     let svg = path(&folder, "field.svg");
     let goal = "sigma_z <= 1mm at 350mm over +-40deg";
-    let best = run_json(&["plan", "--goal", goal, "--field", &svg, "--json"]);
+    let best = run_json(&["plan", "--goal", goal, "--depth-field", &svg, "--json"]);
     assert_eq!(best["meets_goal"], true);
     assert!(best["worst_sigma_mm"].as_f64().expect("mm") <= 1.0, "{best}");
     assert!(best["stereo_deg"].as_f64().expect("degrees") >= 80.0, "{best}");

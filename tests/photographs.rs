@@ -186,8 +186,8 @@ fn dense_ranges_of_a_real_pair_hold_the_target() {
         "{alike} of {} corners lie where the dense ranges have them",
         corners.len()
     );
-    // Its header is text, its rows 35 bytes each.
+    // Its header is text, its rows 36 bytes each.
     let bytes = std::fs::read(&cloud).expect("a dense cloud");
     let end = bytes.windows(11).position(|window| window == b"end_header\n").expect("a header") + 11;
-    assert_eq!((bytes.len() - end) as u64, 35 * result["points"].as_u64().expect("a count"));
+    assert_eq!((bytes.len() - end) as u64, 36 * result["points"].as_u64().expect("a count"));
 }

@@ -1,7 +1,9 @@
 //! Running the binary and reading what it says.
 #![allow(dead_code, unused_imports, reason = "each test file uses its own part")]
 
+pub mod built_bench;
 pub mod cameras;
+pub mod corner_files;
 pub mod data;
 pub mod images;
 pub mod pairs;

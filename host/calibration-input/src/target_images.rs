@@ -89,7 +89,7 @@ pub struct Sought<'a> {
     pub hint: Option<&'a KannalaBrandt>,
     /// Whether it counts where on the target the corners lie, as for its bow; not only how they lie to one another.
     pub placed: bool,
-    /// An image of what hides the view (see [`read_mask`]): no corner is taken there.
+    /// A file of what is left out of the images (see [`read_mask`]): no corner is taken there.
     pub mask: Option<&'a Path>,
 }
 
@@ -149,9 +149,14 @@ fn look(path: &Path, Sought { target, hint, placed, mask }: &Sought<'_>) -> Resu
     Ok(Looked { size: Some(image.dimensions()), view, reduced })
 }
 
+/// Drops the corners that a mask hides.
+pub(crate) fn without_hidden(view: &mut TargetView, mask: Option<&BodyMask>) {
+    view.corners.retain(|corner| !mask.is_some_and(|mask| mask.hides(corner.pixel)));
+}
+
 /// The view without the corners that a mask hides; none where it hides all.
 fn unhidden(mut seen: SeenTarget, mask: Option<&BodyMask>) -> Result<SeenTarget, Missed> {
-    seen.view.corners.retain(|corner| !mask.is_some_and(|mask| mask.hides(corner.pixel)));
+    without_hidden(&mut seen.view, mask);
     if seen.view.corners.is_empty() {
         return Err(Missed { name: seen.view.name, reason: MissedReason::Hidden });
     }

@@ -1,10 +1,12 @@
 //! Watches a target before cameras: whether it is seen, held still, and worth a view.
 
+use crate::target_images::without_hidden;
 use image::imageops::grayscale;
 use rayon::prelude::*;
 use vergence_calibration::Coverage;
 use vergence_camera::CameraImage;
 use vergence_targets::{TargetKind, TargetView, see};
+use vergence_vision::BodyMask;
 
 /// Largest motion of a corner between two images of a target that is held still, in pixels.
 const STILL_PX: f64 = 1.0;
@@ -27,6 +29,7 @@ pub fn observe(frames: &[CameraImage], target: &TargetKind) -> TargetViews {
 /// A set of views being taken: its coverage, its views, and the last observation.
 pub struct TargetWatch {
     coverage: Vec<Coverage>,
+    masks: Vec<Option<BodyMask>>,
     last: TargetViews,
     views: Vec<TargetViews>,
 }
@@ -35,11 +38,32 @@ impl TargetWatch {
     /// An empty set with a coverage for each camera.
     #[must_use]
     pub fn new(coverage: Vec<Coverage>) -> Self {
-        Self { coverage, last: TargetViews::new(), views: Vec::new() }
+        Self { coverage, masks: Vec::new(), last: TargetViews::new(), views: Vec::new() }
+    }
+
+    /// An empty set of one or two cameras with these first images, of which `masks` hide parts: nothing is asked for there.
+    #[must_use]
+    pub fn of_cameras(images: &[CameraImage], masks: [Option<BodyMask>; 2]) -> Self {
+        let coverage = |(image, mask): (&CameraImage, &Option<BodyMask>)| {
+            Coverage::within(image.size(), |pixel| !mask.as_ref().is_some_and(|mask| mask.hides(pixel)))
+        };
+        Self::new(images.iter().zip(&masks).map(coverage).collect()).masked(masks)
+    }
+
+    /// The same, for cameras of whose images `masks` hide parts: corners there do not count.
+    #[must_use]
+    pub fn masked(self, masks: impl Into<Vec<Option<BodyMask>>>) -> Self {
+        Self { masks: masks.into(), ..self }
     }
 
     /// Takes the views of now; returns whether all cameras see the target held still.
-    pub fn observe(&mut self, now: TargetViews) -> bool {
+    pub fn observe(&mut self, mut now: TargetViews) -> bool {
+        for (view, mask) in now.iter_mut().zip(&self.masks) {
+            without_hidden(view, mask.as_ref());
+        }
+        if now.iter().any(|view| view.corners.is_empty()) {
+            now.clear();
+        }
         let before = std::mem::replace(&mut self.last, now);
         !before.is_empty()
             && before.len() == self.last.len()

@@ -68,7 +68,7 @@ pub struct PairImages([Vec<PathBuf>; 2]);
 /// The two lenses of a pair, at least roughly: left, right.
 pub type PairLenses<'a> = [&'a KannalaBrandt; 2];
 
-/// Images of what hides the view of the left and of the right camera, by their files.
+/// Files of what is left out of the images of the left and of the right camera.
 pub type PairMasks<'a> = [Option<&'a Path>; 2];
 
 /// Views of a pair.

@@ -24,7 +24,7 @@ pub enum CameraError {
         /// The reason why the contents are refused.
         why: String,
     },
-    /// An image is no mask of its camera.
+    /// A file is no mask of its camera.
     #[error("{}: {why}", path.display())]
     Mask {
         /// The file.

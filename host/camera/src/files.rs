@@ -4,7 +4,6 @@ use std::collections::VecDeque;
 use std::path::{Path, PathBuf};
 
 use image::RgbImage;
-use vergence_vision::{BodyMask, ImageSize};
 
 use crate::bit_depth::in_eight_bits;
 use crate::pairing::{PairedFiles, paired};
@@ -103,24 +102,4 @@ pub fn read_image(path: &Path) -> Result<RgbImage, CameraError> {
     }
     let image = image::load_from_memory(&bytes).map_err(|error| not_an_image(error.to_string()))?;
     Ok(in_eight_bits(image))
-}
-
-/// Reads an image of a camera with images of `size` that is black where the robot itself hides the view.
-///
-/// # Errors
-/// [`CameraError::Unreadable`] where the file is no image, [`CameraError::Mask`] where it is of another size.
-pub fn read_mask(path: &Path, size: ImageSize) -> Result<BodyMask, CameraError> {
-    let unreadable = |error: image::ImageError| CameraError::Unreadable { path: path.into(), why: error.to_string() };
-    let picture = image::open(path).map_err(unreadable)?.into_luma8();
-    let wrong = |why: String| CameraError::Mask { path: path.into(), why };
-    let given = ImageSize { width: picture.width(), height: picture.height() };
-    if given != size {
-        let (given, wanted) = ([given.width, given.height], [size.width, size.height]);
-        return Err(wrong(format!(
-            "the mask is {} x {}, its camera {} x {}",
-            given[0], given[1], wanted[0], wanted[1]
-        )));
-    }
-    let hidden = picture.pixels().map(|pixel| pixel.0[0] < 128).collect();
-    BodyMask::new(size, hidden).ok_or_else(|| wrong("the mask has no pixels".into()))
 }

@@ -162,6 +162,16 @@ pub fn calibration_line(is_calibration_known: bool) -> Option<String> {
     })
 }
 
+/// A line where points lie beyond the field in which a lens was measured.
+#[must_use]
+pub fn extrapolated_line(count: usize) -> Option<String> {
+    (count > 0).then(|| {
+        format!(
+            "  {count} of them lie where a lens was not measured but extrapolated: their column 'extrapolated' is 1"
+        )
+    })
+}
+
 /// Whether the uncertainty of the points has the part of the calibration.
 #[must_use]
 pub const fn calibration_json(is_calibration_known: bool) -> &'static str {
@@ -192,6 +202,7 @@ pub(crate) fn drift_json(drift: Option<&PoseDrift>) -> Option<Value> {
 pub fn cloud_json(cloud: &PairCloud, pose: &RigPose, out: &Path) -> Value {
     json!({
         "points": cloud.points.len(),
+        "extrapolated": cloud.extrapolated(),
         "matches": cloud.matches,
         "keypoints": cloud.keypoints,
         "dropped": dropped_json(&cloud.dropped),
@@ -200,6 +211,16 @@ pub fn cloud_json(cloud: &PairCloud, pose: &RigPose, out: &Path) -> Value {
         "calibration_uncertainty": calibration_json(!cloud.lacks_calibration),
         "out": out,
     })
+}
+
+/// What is said of a cloud beside its number of points: extrapolated ones, what was dropped, and what is known of calibration and pose.
+#[must_use]
+pub fn cloud_lines(cloud: &PairCloud) -> Vec<String> {
+    let mut lines: Vec<String> = extrapolated_line(cloud.extrapolated()).into_iter().collect();
+    lines.extend(dropped_lines(&cloud.dropped));
+    lines.extend(calibration_line(!cloud.lacks_calibration));
+    lines.extend(pose_source_line(cloud.fused_pose.as_ref()));
+    lines
 }
 
 /// One line for the keypoints without a match and one for the matches without a point, where there are any.

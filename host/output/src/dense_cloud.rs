@@ -10,7 +10,7 @@ use vergence_pipeline::{DenseRanges, PairImages, StageTimes, colour_at};
 use vergence_rig::{Rig, RigPose, rounded};
 use vergence_vision::{Left, Pixel};
 
-use crate::cloud_report::drift_json;
+use crate::cloud_report::{drift_json, extrapolated_line};
 use crate::pictures::{confidence_image, dense_svg, range_image, sigma_image, write_drawing};
 use crate::points::{DenseRow, dense_ply};
 
@@ -19,6 +19,8 @@ pub struct DenseCloud<'a> {
     ranges: &'a DenseRanges,
     times: &'a StageTimes,
     points: usize,
+    /// Those of them where a lens is extrapolated.
+    extrapolated: usize,
     /// The file of the cloud.
     out: &'a Path,
 }
@@ -43,7 +45,8 @@ impl<'a> DenseCloud<'a> {
         write_png(&beside(out, "sigma", "png"), &sigma_image(depth))?;
         write_png(&beside(out, "confidence", "png"), &confidence_image(depth))?;
         write_drawing(&beside(out, "preview", "svg"), dense_svg(images.left, depth))?;
-        Ok(Self { ranges, times, points: rows.len(), out })
+        let extrapolated = rows.iter().filter(|row| row.extrapolated).count();
+        Ok(Self { ranges, times, points: rows.len(), extrapolated, out })
     }
 
     /// Whether no pixel has a range or is known to be far.
@@ -64,10 +67,11 @@ impl<'a> DenseCloud<'a> {
         let stages: Vec<_> =
             seconds.iter().map(|(stage, seconds)| format!("{} {seconds:.2}", stage.as_str())).collect();
         format!(
-            "{} points in {}\n  pixels   {pixels}: {:.1} % have a range, {:.1} % are farther than measurable\n  \
+            "{} points in {}{}\n  pixels   {pixels}: {:.1} % have a range, {:.1} % are farther than measurable\n  \
              none     {}\n  seconds  {}, in all {:.2}",
             self.points,
             self.out.display(),
+            extrapolated_line(self.extrapolated).map_or_else(String::new, |line| format!("\n{line}")),
             percent(counts.measured),
             percent(counts.far),
             if gaps.is_empty() { "nowhere".into() } else { gaps.join(", ") },
@@ -87,6 +91,7 @@ impl<'a> DenseCloud<'a> {
             seconds.map(|&(stage, seconds)| (stage.as_str().to_owned(), json!(rounded(seconds)))).collect();
         json!({
             "points": self.points,
+            "extrapolated": self.extrapolated,
             "pixels": pixels,
             "measured": counts.measured,
             "measured_share": rounded(counts.measured as f64 / pixels.max(1) as f64),
@@ -119,13 +124,16 @@ fn rows(depth: &DenseDepth, images: PairImages<'_>, rig: &Rig, pose: &RigPose) -
             return None;
         }
         let pixel = Pixel { u: f64::from(index % width), v: f64::from(index / width) };
-        let point = rig.left_camera.unproject::<Left>(pixel).ok()?.at(measured.range().mm());
-        let in_right = rig.right_camera.project_point(&(right_from_left * point)).ok()?;
+        let ray = rig.left_camera.unproject::<Left>(pixel).ok()?;
+        let point = ray.at(measured.range().mm());
+        let right_ray = (right_from_left * point).direction()?;
+        let in_right = rig.right_camera.project(&right_ray).ok()?;
         Some(DenseRow {
             point: point.mm().map(|mm| mm as f32).into(),
             colour: colour_at(images.left, pixel),
             pixels: [pixel.u, pixel.v, in_right.u, in_right.v].map(|value| value as f32),
             sigma: measured.sigma().mm() as f32,
+            extrapolated: !(rig.left_camera.is_measured(&ray) && rig.right_camera.is_measured(&right_ray)),
         })
     };
     (0..).zip(depth.samples()).filter_map(row).collect()

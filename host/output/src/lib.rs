@@ -15,10 +15,11 @@ mod endings;
 mod error;
 mod pictures;
 mod points;
+mod published_zones;
 mod target_sheet;
 
 pub use cloud_report::{
-    PoseSource, axes_by_images_json, axes_by_images_words, calibration_json, calibration_line, cloud_json,
+    PoseSource, axes_by_images_json, axes_by_images_words, calibration_json, calibration_line, cloud_json, cloud_lines,
     dense_drift_warning, drift_warning, dropped_json, dropped_lines, pose_source_json, pose_source_line,
     pose_told_json, pose_told_words,
 };
@@ -30,4 +31,5 @@ pub use pictures::{
     sigma_image, trunk_strip_svg, write_drawing, write_scored_pair, zones_plot, zones_svg,
 };
 pub use points::{DenseRow, PlyEncoding, Table, TableFormat, dense_ply, ply, write_cloud};
+pub use published_zones::published_zones;
 pub use target_sheet::{Paper, Sheet};

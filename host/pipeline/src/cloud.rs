@@ -69,6 +69,12 @@ impl PairCloud {
         self.pose_drift.as_ref().filter(|drift| drift.is_significant())
     }
 
+    /// Number of points where a lens is extrapolated.
+    #[must_use]
+    pub fn extrapolated(&self) -> usize {
+        self.points.iter().filter(|point| point.point.extrapolated).count()
+    }
+
     /// The pose by which the points were made, given that by the joints alone.
     #[must_use]
     pub fn pose(&self, by_joints: &RigPose) -> RigPose {

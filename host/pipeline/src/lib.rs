@@ -50,7 +50,7 @@ pub use pair::{PairImages, colour_at};
 pub use pose::{Motion, PairPose, TriggeredImage, UnpairedImage, pair_exposure};
 pub use pose_source::{pose_by_images, with_fused};
 pub use score::{Score, Spread, score};
-pub use search::Search;
+pub use search::{InvalidSearch, Search};
 pub use stage::{Stage, StageTimes};
 pub use standing::StandingPose;
 pub use untold_axes::{AxisByImages, UntoldAxes, axes_told, observe_untold};

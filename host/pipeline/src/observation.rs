@@ -60,7 +60,8 @@ pub fn observe_pair(
 /// nothing.
 #[must_use]
 pub fn observe_one(image: &RgbImage, (rig, search): (&Rig, &Search), side: Side, why: CameraGone) -> Observation {
-    let mut bearings = bearings(image, rig.camera(side));
+    let errors = rig.lens_covariance(side).unwrap_or_default();
+    let mut bearings = bearings(image, rig.camera(side), &errors);
     bearings.retain(|bearing| !search.hides(side, bearing.pixel));
     Observation::Bearings { side, bearings, why }
 }
@@ -70,8 +71,9 @@ mod tests {
     #![allow(clippy::expect_used, reason = "a test may fail")]
 
     use image::Rgb;
-    use vergence_rig::BENCH_TOML;
-    use vergence_vision::BodyMask;
+    use nalgebra::DMatrix;
+    use vergence_rig::{BENCH_TOML, CalibratedNumbers, RigCalibration, RigNumber};
+    use vergence_vision::{Angle, BodyMask, LensField};
 
     use super::*;
 
@@ -91,5 +93,32 @@ mod tests {
         let (left, right) = (pixels(Side::Left), pixels(Side::Right));
         assert!(left.len() > 20 && left.iter().all(|u| *u >= 99.5), "{left:?}");
         assert!(right.iter().any(|u| *u < 99.5));
+    }
+
+    /// The corners of the image lie beyond the field in which the lens was measured: they are no bearings, or marked and less sure.
+    #[test]
+    fn bearings_of_an_extrapolated_lens_are_marked_and_less_sure() {
+        let rig = Rig::from_toml(BENCH_TOML).expect("the bench").with_sensors(200).expect("a size");
+        let numbers = [Side::Left, Side::Right].map(|side| RigNumber::Lens { side, parameter: 7 }).to_vec();
+        let covariance = DMatrix::from_diagonal_element(2, 2, 1e-6);
+        let known = CalibratedNumbers::new(numbers, covariance).expect("a covariance");
+        let rig = Rig { calibration: RigCalibration::Covariance(known), ..rig };
+        let image = RgbImage::from_fn(200, 200, |x, y| Rgb([if (x / 8 + y / 8) % 2 == 0 { 30 } else { 220 }; 3]));
+        let seen = |field| {
+            let rig = rig.clone().measuring_in(field).expect("the lenses' errors are known");
+            match observe_one(&image, (&rig, &Search::default()), Side::Left, CameraGone::Unknown) {
+                Observation::Bearings { bearings, .. } => bearings,
+                Observation::Points { .. } => Vec::new(),
+            }
+        };
+        let (measured, all) = (seen(LensField::Measured), seen(LensField::Extrapolated));
+        assert!(measured.len() > 100 && measured.iter().all(|bearing| !bearing.extrapolated));
+        let beyond: Vec<_> = all.iter().filter(|bearing| bearing.extrapolated).collect();
+        assert!(beyond.len() > 20, "{}", beyond.len());
+        let largest =
+            measured.iter().map(|bearing| bearing.sigma).fold(Angle::default(), |a, b| if b > a { b } else { a });
+        assert!(beyond.iter().filter(|bearing| bearing.sigma > largest).count() * 2 > beyond.len());
+        let unknown = Rig { calibration: RigCalibration::exact(), ..rig.clone() };
+        assert!(unknown.measuring_in(LensField::Extrapolated).is_err());
     }
 }

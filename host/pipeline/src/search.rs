@@ -20,7 +20,49 @@ pub struct Search {
 /// Everywhere within the default ranges.
 pub(crate) static EVERYWHERE: Search = Search { nearest: None, farthest: None, masks: [None, None] };
 
+/// Ranges between which nothing can be sought. The message names the options of the command line.
+#[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+pub enum InvalidSearch {
+    /// A range is none.
+    #[error("--{name} {range}: a range is positive, such as 150mm")]
+    Range {
+        /// Which.
+        name: &'static str,
+        /// The range.
+        range: Length,
+    },
+    /// The nearest range is not nearer than the farthest.
+    #[error("--nearest {nearest} leaves nothing before --farthest {farthest}")]
+    Empty {
+        /// The nearest range.
+        nearest: Length,
+        /// The farthest range.
+        farthest: Length,
+    },
+}
+
 impl Search {
+    /// Points are sought between these ranges, but not where the `masks` of the left and the right camera hide them.
+    ///
+    /// # Errors
+    /// [`InvalidSearch`] where a range is not positive, or nothing lies between them.
+    pub fn between(
+        nearest: Option<Length>,
+        farthest: Option<Length>,
+        masks: [Option<BodyMask>; 2],
+    ) -> Result<Self, InvalidSearch> {
+        for (name, range) in [("nearest", nearest), ("farthest", farthest)] {
+            if let Some(range) = range.filter(|range| range.mm().is_nan() || range.mm() <= 0.0) {
+                return Err(InvalidSearch::Range { name, range });
+            }
+        }
+        match (nearest, farthest) {
+            (Some(nearest), Some(farthest)) if nearest >= farthest => Err(InvalidSearch::Empty { nearest, farthest }),
+            _ => Ok(Self { nearest, farthest, masks }),
+        }
+    }
+
     /// The nearest range that is sought with the cameras at `pose`.
     pub(crate) fn nearest_at(&self, pose: &RigPose) -> Length {
         let baseline = pose.left_from_right.origin().mm().norm();

@@ -53,7 +53,7 @@ impl CameraTable {
     pub fn of(camera: &KannalaBrandt) -> Self {
         let OpenCvFisheye { fx, fy, cx, cy, k: [opencv_k1, opencv_k2, opencv_k3, opencv_k4] } = camera.to_opencv();
         let ImageSize { width, height } = camera.size();
-        let theta_max = Some(camera.theta_max());
+        let theta_max = Some(camera.measured_field());
         let (size, line_time) = ([width, height], None);
         Self { size, theta_max, line_time, fx, fy, cx, cy, opencv_k1, opencv_k2, opencv_k3, opencv_k4 }
     }

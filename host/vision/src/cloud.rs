@@ -29,6 +29,8 @@ pub struct CloudPoint {
     pub residual: Angle,
     /// Standard deviation of that angle.
     pub residual_sigma: Angle,
+    /// Whether one of its rays lies where its lens was not measured, and is extrapolated.
+    pub extrapolated: bool,
 }
 
 /// The points of one stereo pair, and the number of matches dropped for each reason.
@@ -105,6 +107,7 @@ pub fn cloud_point(pixels: &PixelPair, rig: &StereoPair<'_>, gates: &Gates) -> R
         own_covariance: uncertainty.from_pixels,
         residual,
         residual_sigma,
+        extrapolated: !(rig.left.is_measured(&left) && rig.right.is_measured(&in_right)),
     })
 }
 

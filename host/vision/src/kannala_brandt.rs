@@ -11,7 +11,7 @@
 
 use nalgebra::Vector3;
 
-use crate::{Angle, Frame, Point, UnitRay};
+use crate::{Angle, Frame, Point, UnitRay, largest_theta};
 
 /// An image position in pixels. (0, 0) is the centre of the top-left pixel, u to the right, v down.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -51,6 +51,8 @@ pub struct KannalaBrandt {
     centre: Pixel,
     theta_max: f64,
     r_max: f64,
+    /// The largest angle to the axis at which the lens was measured, in radians.
+    measured: f64,
     size: ImageSize,
 }
 
@@ -110,7 +112,7 @@ impl KannalaBrandt {
         if let Some(turn) = first_turn(&k, stated) {
             return Err(InvalidLens::TurnsOver { turn: Angle::from_rad(turn), stated: theta_max });
         }
-        Ok(Self { k, aspect, centre, theta_max: stated, r_max: radius(&k, stated), size })
+        Ok(Self { k, aspect, centre, theta_max: stated, r_max: radius(&k, stated), measured: stated, size })
     }
 
     /// Returns this lens on a sensor of the same size in millimetres with `width` pixel columns, and rows in
@@ -125,7 +127,32 @@ impl KannalaBrandt {
         let scaled = |coordinate: f64| (coordinate + 0.5) * scale - 0.5;
         let centre = Pixel { u: scaled(self.centre.u), v: scaled(self.centre.v) };
         let size = ImageSize { width, height };
-        Self::new(self.k.map(|k| k * scale), self.aspect, centre, Angle::from_rad(self.theta_max), size)
+        let lens = Self::new(self.k.map(|k| k * scale), self.aspect, centre, Angle::from_rad(self.theta_max), size)?;
+        Ok(Self { measured: self.measured, ..lens })
+    }
+
+    /// The same lens beyond the field in which it was measured: as far as [`largest_theta()`] says that its polynomial is of use.
+    /// [`Self::is_measured`] still tells the field in which it was measured.
+    #[must_use]
+    pub fn extrapolated(&self) -> Self {
+        let wider = largest_theta(self.k, self.aspect, self.centre, self.size)
+            .and_then(|limit| Self::new(self.k, self.aspect, self.centre, limit, self.size));
+        match wider {
+            Ok(wider) if wider.theta_max > self.theta_max => Self { measured: self.measured, ..wider },
+            _ => *self,
+        }
+    }
+
+    /// Whether the lens was measured in the direction of `ray`, and is not extrapolated there.
+    #[must_use]
+    pub fn is_measured<F: Frame>(&self, ray: &UnitRay<F>) -> bool {
+        ray.angle_to_axis().rad() <= self.measured
+    }
+
+    /// Half of the field in which the lens was measured; [`Self::theta_max`] is more where it is [extrapolated](Self::extrapolated).
+    #[must_use]
+    pub const fn measured_field(&self) -> Angle {
+        Angle::from_rad(self.measured)
     }
 
     /// Projects `ray` to its pixel.

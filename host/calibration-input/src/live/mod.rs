@@ -11,6 +11,7 @@ use vergence_files::{FileError, make_folder, write_whole};
 use vergence_protocol::Mode;
 use vergence_rig::{AxisPosition, Rig, RigAxis, positions_in_words};
 use vergence_targets::TargetKind;
+use vergence_vision::BodyMask;
 
 pub use self::cameras::{RigCameras, SimulatedTarget, printed};
 
@@ -32,6 +33,8 @@ pub struct LiveSet<'a> {
     pub views: usize,
     /// Largest number of images of each camera at one stage pose.
     pub images: u64,
+    /// What is left out of the images of the left and of the right camera.
+    pub masks: [Option<BodyMask>; 2],
 }
 
 /// What happens while a set is taken; the texts are for people.

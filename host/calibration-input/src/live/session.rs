@@ -8,7 +8,7 @@ use vergence_camera::{Camera, CameraError, CameraImage};
 use vergence_files::{make_folder, write_png};
 use vergence_rig::AxisPosition;
 use vergence_targets::TargetKind;
-use vergence_vision::{Camera as CameraFrame, Pixel, Right, UnitRay};
+use vergence_vision::{BodyMask, Camera as CameraFrame, Pixel, Right, UnitRay};
 
 use super::cameras::RigCameras;
 use super::{LiveEvent, LiveSet};
@@ -38,7 +38,7 @@ impl LiveSet<'_> {
         make_folder(&folder).map_err(InputError::from)?;
         rig_board.next_pose().await?;
         let readings = rig_board.positions();
-        let mut watch = TargetWatch::new(vec![self.coverage(&readings)]);
+        let mut watch = TargetWatch::new(vec![self.coverage(&readings)]).masked(self.masks.clone());
         let mut cameras = rig_cameras.here(index);
         tell(LiveEvent::Begins(heading))?;
         let wanted = self.views;
@@ -88,12 +88,17 @@ impl LiveSet<'_> {
         let (left, right) = (&self.nominal.left_camera, &self.nominal.right_camera);
         let values: Vec<f64> = readings.iter().map(|reading| reading.value()).collect();
         let right_from_left = self.nominal.pose_at_values(&values).right_from_left();
+        let [left_mask, right_mask] = self.masks.each_ref().map(Option::as_ref);
+        let hides = |mask: Option<&BodyMask>, pixel| mask.is_some_and(|mask| mask.hides(pixel));
         Coverage::within(left.size(), |pixel: Pixel| {
+            if hides(left_mask, pixel) {
+                return false;
+            }
             let Ok(ray) = left.unproject::<CameraFrame>(pixel) else { return false };
             let point = right_from_left * ray.renamed().at(TARGET_MM);
             UnitRay::<Right>::new(point.mm())
                 .and_then(|ray| right.project(&ray).ok())
-                .is_some_and(|p| right.on_sensor(p))
+                .is_some_and(|p| right.on_sensor(p) && !hides(right_mask, p))
         })
     }
 }

@@ -18,6 +18,9 @@ const COVARIANCE_COLUMNS: [&str; 12] = [
     "own_zz",
 ];
 
+/// The last column: 1 where a lens is extrapolated.
+const EXTRAPOLATED_PROPERTY: &str = "property uchar extrapolated\n";
+
 /// How the numbers of a PLY file are written.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum PlyEncoding {
@@ -37,7 +40,8 @@ impl PlyEncoding {
 }
 
 /// The points in the left camera's frame, in millimetres, with colour, pixels in both images, sigma of the range, the matcher's
-/// score, and the upper triangles of the covariance and of the part of it that comes from the point's own pixels.
+/// score, the upper triangles of the covariance and of the part of it that comes from the point's own pixels, and whether a lens is
+/// extrapolated there.
 #[must_use]
 pub fn ply(points: &[ColouredPoint], encoding: PlyEncoding) -> Vec<u8> {
     let format = match encoding {
@@ -50,7 +54,7 @@ pub fn ply(points: &[ColouredPoint], encoding: PlyEncoding) -> Vec<u8> {
          property double x\nproperty double y\nproperty double z\n\
          property uchar red\nproperty uchar green\nproperty uchar blue\n\
          property double u_left\nproperty double v_left\nproperty double u_right\nproperty double v_right\n\
-         property double sigma_range\nproperty float score\n{}end_header\n",
+         property double sigma_range\nproperty float score\n{}{EXTRAPOLATED_PROPERTY}end_header\n",
         points.len(),
         COVARIANCE_COLUMNS.map(|name| format!("property float {name}\n")).concat()
     )
@@ -71,6 +75,7 @@ fn binary_row(ColouredPoint { point, colour, score }: &ColouredPoint, bytes: &mu
     pixels_and_sigma(point).iter().for_each(|value| bytes.extend_from_slice(&value.to_le_bytes()));
     bytes.extend_from_slice(&score.to_le_bytes());
     covariances(point).iter().for_each(|value| bytes.extend_from_slice(&(*value as f32).to_le_bytes()));
+    bytes.push(point.extrapolated.into());
 }
 
 fn text_row(ColouredPoint { point, colour: [red, green, blue], score }: &ColouredPoint) -> String {
@@ -80,7 +85,8 @@ fn text_row(ColouredPoint { point, colour: [red, green, blue], score }: &Coloure
     pixels_and_sigma(point).iter().for_each(|value| _ = write!(row, " {value:.4}"));
     _ = write!(row, " {score:.4}");
     covariances(point).iter().for_each(|value| _ = write!(row, " {value:.5e}"));
-    row + "\n"
+    _ = writeln!(row, " {}", u8::from(point.extrapolated));
+    row
 }
 
 fn pixels_and_sigma(point: &CloudPoint) -> [f64; 5] {
@@ -94,7 +100,7 @@ fn covariances(point: &CloudPoint) -> [f64; 12] {
     std::array::from_fn(|index| if index < 6 { all[index] } else { own[index - 6] })
 }
 
-/// A row of a dense cloud: the first columns of what [`ply`] writes.
+/// A row of a dense cloud: the first columns of what [`ply`] writes, and its last.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct DenseRow {
     /// Millimetres in the left camera's frame.
@@ -105,19 +111,21 @@ pub struct DenseRow {
     pub pixels: [f32; 4],
     /// Of the range, in millimetres.
     pub sigma: f32,
+    /// Whether a lens is extrapolated there.
+    pub extrapolated: bool,
 }
 
 /// Rows with the columns of the sparse cloud, little-endian, in single precision.
 #[must_use]
 pub fn dense_ply(rows: &[DenseRow]) -> Vec<u8> {
-    const ROW_BYTES: usize = 35;
+    const ROW_BYTES: usize = 36;
     let header = format!(
         "ply\nformat binary_little_endian 1.0\n{COLUMNS_COMMENT}\
          element vertex {}\n\
          property float x\nproperty float y\nproperty float z\n\
          property uchar red\nproperty uchar green\nproperty uchar blue\n\
          property float u_left\nproperty float v_left\nproperty float u_right\nproperty float v_right\n\
-         property float sigma_range\nend_header\n",
+         property float sigma_range\n{EXTRAPOLATED_PROPERTY}end_header\n",
         rows.len()
     );
     let mut bytes = Vec::with_capacity(header.len() + rows.len() * ROW_BYTES);
@@ -126,6 +134,7 @@ pub fn dense_ply(rows: &[DenseRow]) -> Vec<u8> {
         row.point.iter().for_each(|value| bytes.extend_from_slice(&value.to_le_bytes()));
         bytes.extend_from_slice(&row.colour);
         row.pixels.iter().chain([&row.sigma]).for_each(|value| bytes.extend_from_slice(&value.to_le_bytes()));
+        bytes.push(row.extrapolated.into());
     }
     bytes
 }
@@ -155,6 +164,7 @@ mod tests {
             own_covariance: own,
             residual: Angle::from_rad(0.0),
             residual_sigma: Angle::from_rad(0.0),
+            extrapolated: true,
         };
         let points = [ColouredPoint { point, colour: [1, 2, 3], score: 0.5 }];
         let text = String::from_utf8(ply(&points, PlyEncoding::Ascii)).expect("text");
@@ -171,10 +181,11 @@ mod tests {
         read.extend(bytes[24..27].iter().map(|&colour| f64::from(colour)));
         read.extend((0..5).map(|n| double(27 + 8 * n)));
         read.extend((0..13).map(|n| float(67 + 4 * n)));
-        assert_eq!((bytes.len(), read.len()), (67 + 4 * 13, numbers.len()));
+        read.extend(bytes.last().map(|&flag| f64::from(flag)));
+        assert_eq!((bytes.len(), read.len()), (67 + 4 * 13 + 1, numbers.len()));
         for (one, other) in read.iter().zip(&numbers) {
             assert!((one - other).abs() <= 1e-4 * other.abs().max(1.0), "{one} is not {other}");
         }
-        assert_eq!((numbers[12], numbers[18]), (3.0, 1.0), "in all, and of its own pixels");
+        assert_eq!((numbers[12], numbers[18], numbers[24]), (3.0, 1.0, 1.0), "in all, of its own pixels, extrapolated");
     }
 }

@@ -33,8 +33,8 @@ pub struct Table {
 }
 
 const POINTS: &str = "points in the left camera's frame (x right, y down, z forward), sigma of their distance, covariance (cov), and the part of it from \
-     the point's own pixels (own); the rest is shared by all points of the pair: lenses, calibration and encoders";
-const POINT_COLUMNS: [&str; 24] = [
+     the point's own pixels (own); the rest is shared by all points of the pair: lenses, calibration and encoders; extrapolated is 1 where a lens was not measured";
+const POINT_COLUMNS: [&str; 25] = [
     "x_mm",
     "y_mm",
     "z_mm",
@@ -59,9 +59,11 @@ const POINT_COLUMNS: [&str; 24] = [
     "own_yy_mm2",
     "own_yz_mm2",
     "own_zz_mm2",
+    "extrapolated",
 ];
-const BEARINGS: &str = "directions in the camera's own frame (x right, y down, z forward), of length one: not points";
-const BEARING_COLUMNS: [&str; 9] = ["x", "y", "z", "red", "green", "blue", "u", "v", "sigma_deg"];
+const BEARINGS: &str = "directions in the camera's own frame (x right, y down, z forward), of length one: not points; extrapolated is 1 where the \
+     lens was not measured";
+const BEARING_COLUMNS: [&str; 10] = ["x", "y", "z", "red", "green", "blue", "u", "v", "sigma_deg", "extrapolated"];
 
 /// xx, xy, xz, yy, yz and zz of a symmetric matrix.
 pub(super) fn upper_triangle(at: impl Fn((usize, usize)) -> f64) -> [f64; 6] {
@@ -81,6 +83,7 @@ impl Table {
                 &[left.u, left.v, right.u, right.v, point.sigma_range.mm(), f64::from(*score)],
                 &upper_triangle(|place| point.covariance[place]),
                 &upper_triangle(|place| point.own_covariance[place]),
+                &[f64::from(u8::from(point.extrapolated))],
             ]
             .concat()
         };
@@ -94,7 +97,8 @@ impl Table {
             let direction = bearing.direction.vector();
             let [red, green, blue] = bearing.colour.map(f64::from);
             let pixel = bearing.pixel;
-            vec![direction.x, direction.y, direction.z, red, green, blue, pixel.u, pixel.v, bearing.sigma.deg()]
+            let [sigma, extrapolated] = [bearing.sigma.deg(), f64::from(u8::from(bearing.extrapolated))];
+            vec![direction.x, direction.y, direction.z, red, green, blue, pixel.u, pixel.v, sigma, extrapolated]
         };
         Self { about: BEARINGS, columns: &BEARING_COLUMNS, rows: bearings.iter().map(row).collect() }
     }

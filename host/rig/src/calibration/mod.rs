@@ -1,11 +1,13 @@
 //! What a calibration leaves uncertain of a rig, and the covariance that all points of a pair share by it.
 
+mod lenses;
 mod number;
 mod table;
 
 use nalgebra::{DMatrix, Matrix6, Matrix6xX, SMatrix};
 use vergence_vision::{Angle, LENS_PARAMETERS, Length, SHARED_PARAMETERS, SharedCovariance, Side};
 
+pub use self::lenses::UnknownLensErrors;
 pub use self::number::RigNumber;
 pub(crate) use self::table::{CalibrationTables, SigmaFile};
 use crate::rig::Rig;

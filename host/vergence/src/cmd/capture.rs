@@ -15,6 +15,7 @@ use vergence_targets::TargetKind;
 use vergence_vision::Side;
 
 use super::camera_options::CameraOptions;
+use super::mask_options::MaskOptions;
 use super::target_options::TargetOptions;
 use crate::cli::CommonOptions;
 use crate::console::Console;
@@ -41,6 +42,8 @@ pub struct Args {
     /// Give up after this many images of each camera.
     #[arg(long, default_value_t = 100_000)]
     frames: u64,
+    #[command(flatten)]
+    masks: MaskOptions,
     #[command(flatten)]
     camera: CameraOptions,
     /// With simulated cameras: one camera instead of the pair in its human pose.
@@ -91,8 +94,8 @@ async fn capture(
                 break;
             }
         };
-        if counts.images == 0 {
-            watch = TargetWatch::new(images.iter().map(|image| Coverage::new(image.size())).collect());
+        if let (0, Some(left), Some(right)) = (counts.images, images.first(), images.last()) {
+            watch = TargetWatch::of_cameras(&images, args.masks.read([left.size(), right.size()])?);
         }
         counts = Counts { images: counts.images + 1, alone: cameras.alone(), missed: cameras.missed() };
         let is_wanted = watch.observe(views) && watch.is_news();

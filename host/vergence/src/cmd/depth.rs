@@ -16,7 +16,8 @@ use vergence_files::make_folder;
 use vergence_matching::{GuidedMatcher, Matcher};
 use vergence_output::{
     PlyEncoding, PoseSource, TableFormat, axes_by_images_json, axes_by_images_words, calibration_line, check_ending,
-    check_folder, cloud_json, drift_warning, dropped_lines, match_svg, pose_source_line, write_cloud, write_drawing,
+    check_folder, cloud_json, cloud_lines, drift_warning, dropped_lines, match_svg, pose_source_line, write_cloud,
+    write_drawing,
 };
 use vergence_pipeline::limits::PIXEL_SIGMA;
 use vergence_pipeline::{Method, PairCloud, PairImages, PairPose, cloud_of_pairs, pair_cloud};
@@ -126,7 +127,7 @@ impl Progress {
 /// Measures every pair, one after the other.
 fn every_pair(args: &Args, rig: Option<&Path>, console: Console, progress: &Progress) -> Result<(), Failure> {
     check_names(args)?;
-    let rig = rig_file::load(rig)?;
+    let rig = args.search.measuring(rig_file::load(rig)?)?;
     let (pose, joints) = pose(args, &rig)?;
     pose.check_closure().map_err(|error| Failure::check(error.to_string()))?;
     args.force.unless_forced(cameras_are_near(&pose.left_from_right), console)?;
@@ -315,9 +316,7 @@ fn write(
         write_drawing(&path, match_svg(images, cloud))?;
     }
     console.say(format!("{} points of {} matches in {}", cloud.points.len(), cloud.matches, out.display()))?;
-    dropped_lines(&cloud.dropped).iter().try_for_each(|line| console.say(line))?;
-    calibration_line(!cloud.lacks_calibration).iter().try_for_each(|line| console.say(line))?;
-    pose_source_line(cloud.fused_pose.as_ref()).iter().try_for_each(|line| console.say(line))?;
+    console.say_lines(cloud_lines(cloud))?;
     if let Some(warning) = drift_warning(cloud, PoseSource::of_photographs(rig)) {
         console.warn(format!("{} and {}: {warning}", left.name, right.name));
     }

@@ -2,6 +2,7 @@
 
 mod camera_options;
 mod connect;
+mod mask_options;
 mod model_options;
 pub mod options;
 mod reconnect;

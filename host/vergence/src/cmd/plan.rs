@@ -9,6 +9,7 @@ use vergence_pipeline::{ZONE_RADIUS, rig_zones};
 use vergence_rig::{AxisPosition, Rig, axes_json, rounded, zones_json};
 
 use super::connect::connect;
+use super::search_options::FieldOption;
 use super::stage_pose::{StagePose, named_mode};
 use crate::cli::CommonOptions;
 use crate::console::Console;
@@ -32,6 +33,8 @@ pub struct Args {
     #[arg(long)]
     dump: bool,
     #[command(flatten)]
+    field: FieldOption,
+    #[command(flatten)]
     trunk: trunk::TrunkOptions,
     #[command(flatten)]
     goal: goal::GoalOptions,
@@ -39,9 +42,9 @@ pub struct Args {
 
 pub async fn run(args: &Args, common: &CommonOptions, console: Console) -> Result<(), Failure> {
     if args.goal.is_given() {
-        return goal::run(&args.goal, common, console);
+        return goal::run(&args.goal, args.field, common, console);
     }
-    let rig = rig_file::load(common.rig.as_deref())?;
+    let rig = args.field.seeing(rig_file::load(common.rig.as_deref())?);
     if let Some(trunk) = &rig.trunk {
         return trunk::run(args, &rig, trunk, console);
     }

@@ -102,6 +102,8 @@ fn parse_time(text: &str) -> Result<Duration, String> {
 pub async fn run(args: &Args, common: &CommonOptions, console: Console) -> Result<(), Failure> {
     let rig = rig_file::load(common.rig.as_deref())?;
     let (tour, search) = (args.tour.tour(&rig)?, args.search.search(&rig)?);
+    // A simulated camera shows nothing beyond the field in which it is known.
+    let measuring = Arc::new(args.search.measuring(rig.clone())?);
     let matcher = Arc::from(args.matching.matcher(console)?);
     let poses = args.poses.as_deref().map(|file| KeptPoses::open(file, &rig)).transpose()?;
     if let Some(folder) = &args.out {
@@ -128,9 +130,8 @@ pub async fn run(args: &Args, common: &CommonOptions, console: Console) -> Resul
     cameras::start(args, &rig, simulated.as_ref(), clock, &listener)?;
     // The loop ends when no sender is left.
     drop(listener);
-    let rig = Arc::new(rig);
     let mut live = LiveLoop {
-        rig: Arc::clone(&rig),
+        rig: Arc::clone(&measuring),
         matcher,
         search: Arc::new(search),
         events,
@@ -148,7 +149,7 @@ pub async fn run(args: &Args, common: &CommonOptions, console: Console) -> Resul
     };
     let mut publisher = Publisher {
         console,
-        rig,
+        rig: measuring,
         out: args.out.clone(),
         keep: args.keep,
         also: args.also.iter().copied().map(TableFormat::from).collect(),

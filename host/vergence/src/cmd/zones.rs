@@ -20,7 +20,7 @@ use crate::failure::Failure;
 #[derive(Debug, clap::Args)]
 pub struct Args {
     /// Distance of the cameras.
-    #[arg(long, value_name = "LENGTH", required_unless_present = "mode", conflicts_with = "mode")]
+    #[arg(long, value_name = "LENGTH", required_unless_present = "mode", conflicts_with_all = ["mode", "left_mask", "right_mask", "field"])]
     baseline: Option<Length>,
     /// Angle between the optical axes; positive is outward, negative crossed.
     #[arg(

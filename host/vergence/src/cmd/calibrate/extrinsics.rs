@@ -10,8 +10,9 @@ use vergence_calibration_report::{
 };
 use vergence_rig::Rig;
 
-use super::options::{LensOptions, MaskOptions, ResultOptions, VerdictPlaces};
+use super::options::{LensOptions, ResultOptions, VerdictPlaces};
 use super::print_views;
+use crate::cmd::mask_options::MaskOptions;
 use crate::cmd::target_options::TargetOptions;
 use crate::console::Console;
 use crate::failure::Failure;
@@ -39,7 +40,7 @@ pub struct Args {
     masks: MaskOptions,
     /// Corners instead of images: a CSV file with the columns camera,file,frame,idx,x,y,bx_mm,by_mm. Rows of both cameras
     /// with the same frame number are a pair.
-    #[arg(long, value_name = "FILE")]
+    #[arg(long, value_name = "FILE", conflicts_with_all = ["left_mask", "right_mask"])]
     csv: Option<PathBuf>,
     /// Names of the left and the right camera in the CSV file.
     #[arg(long, num_args = 2, value_names = ["LEFT", "RIGHT"], default_values = ["left", "right"])]

@@ -31,9 +31,9 @@ pub struct Args {
     /// Images of the target: files, patterns such as 'left*.jpg', or folders.
     #[arg(long, num_args = 1.., required_unless_present = "csv", conflicts_with = "csv")]
     images: Vec<String>,
-    /// What the images show of the robot itself, a hood or the mount: a PNG image of the same size, black there. No corner is
-    /// taken in it.
-    #[arg(long, value_name = "IMAGE", conflicts_with = "csv")]
+    /// What is left out of the images, as the robot's body, a hood, or all outside the image circle: a PNG image of the same size,
+    /// black there, or a TOML file of polygons and circles. No corner is taken there.
+    #[arg(long, value_name = "FILE", conflicts_with = "csv")]
     mask: Option<PathBuf>,
     /// Corners instead of images: a CSV file with the columns camera,file,frame,idx,x,y,bx_mm,by_mm.
     #[arg(long, value_name = "FILE", requires = "size")]

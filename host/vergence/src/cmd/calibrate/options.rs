@@ -78,25 +78,6 @@ impl LensOptions {
     }
 }
 
-/// What of the images shows the robot itself, a hood or the mount.
-#[derive(Clone, Debug, clap::Args)]
-pub struct MaskOptions {
-    /// What the left images show of the robot itself, a hood or the mount: a PNG image of the same size, black there. No corner
-    /// is taken in it.
-    #[arg(long, value_name = "IMAGE", conflicts_with = "csv")]
-    left_mask: Option<PathBuf>,
-    /// The same of the right images.
-    #[arg(long, value_name = "IMAGE", conflicts_with = "csv")]
-    right_mask: Option<PathBuf>,
-}
-
-impl MaskOptions {
-    /// The files of both masks.
-    pub fn files(&self) -> PairMasks<'_> {
-        [self.left_mask.as_deref(), self.right_mask.as_deref()]
-    }
-}
-
 /// Where the result goes.
 #[derive(Debug, clap::Args)]
 pub struct ResultOptions {

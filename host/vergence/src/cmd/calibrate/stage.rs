@@ -10,9 +10,10 @@ use vergence_calibration_input::{InputHash, KnownLenses, RecordedSet, StageViews
 use vergence_calibration_report::{ReportAbout, left_out_json, stage_json, stage_lines, stage_report, stage_verdict};
 use vergence_rig::Rig;
 
-use super::options::{LensOptions, MaskOptions, ResultOptions, VerdictPlaces};
+use super::options::{LensOptions, ResultOptions, VerdictPlaces};
 use super::print_views;
 use crate::cli::CommonOptions;
+use crate::cmd::mask_options::MaskOptions;
 use crate::cmd::target_options::TargetOptions;
 use crate::console::Console;
 use crate::failure::Failure;
@@ -42,7 +43,7 @@ pub struct Args {
     /// The columns are camera,file,frame,idx,x,y,bx_mm,by_mm and, for every axis of the rig, its encoder reading, named
     /// after the axis: baseline_mm, separation_deg. Frame numbers count through the whole file. Rows of both cameras with
     /// the same number are a pair; pairs with the same readings are one stage pose.
-    #[arg(long, value_name = "FILE")]
+    #[arg(long, value_name = "FILE", conflicts_with_all = ["left_mask", "right_mask"])]
     csv: Option<PathBuf>,
     /// The left and the right camera: their names in the CSV file (left right unless given), or with --live their devices,
     /// or sim.
@@ -149,7 +150,7 @@ async fn live(args: &Args, common: &CommonOptions, console: Console) -> Result<O
         (Some(set), true) => {
             live::fill(
                 set,
-                &args.live,
+                (&args.live, &args.masks),
                 &args.cameras,
                 args.target.checked_spec(args.result.force, console)?,
                 common,

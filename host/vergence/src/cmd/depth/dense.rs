@@ -44,8 +44,8 @@ pub fn one_dense_pair(
     }
     let written = DenseCloud::write(&ranges, &times, images, (rig, used), out)?;
     console.say(written.in_words())?;
-    calibration_line(used.is_calibration_known).iter().try_for_each(|line| console.say(line))?;
-    pose_source_line(fused.as_ref()).iter().try_for_each(|line| console.say(line))?;
+    console
+        .say_lines(calibration_line(used.is_calibration_known).into_iter().chain(pose_source_line(fused.as_ref())))?;
     if let Some(warning) = dense_drift_warning(&ranges, used, PoseSource::of_photographs(rig)) {
         console.warn(format!("{} and {}: {warning}", left.name, right.name));
     }

@@ -7,6 +7,7 @@ use vergence_output::{check_ending, depth_field_svg};
 use vergence_rig::{DepthField, DepthGoal};
 
 use crate::cli::CommonOptions;
+use crate::cmd::search_options::FieldOption;
 use crate::console::Console;
 use crate::failure::Failure;
 use crate::rig_file;
@@ -24,7 +25,7 @@ pub struct GoalOptions {
     pixel_sigma: f64,
     /// Draws the predicted standard deviation over directions and distances to this file, as SVG.
     #[arg(long, value_name = "FILE", requires = "goal")]
-    field: Option<PathBuf>,
+    depth_field: Option<PathBuf>,
 }
 
 impl GoalOptions {
@@ -43,14 +44,14 @@ fn positive(text: &str) -> Result<f64, String> {
 ///
 /// # Errors
 /// Exit code 1 where no pose meets the goal; the nearest pose is printed.
-pub fn run(options: &GoalOptions, common: &CommonOptions, console: Console) -> Result<(), Failure> {
+pub fn run(options: &GoalOptions, field: FieldOption, common: &CommonOptions, console: Console) -> Result<(), Failure> {
     let goal = options.goal.ok_or_else(|| Failure::usage("say a --goal"))?;
-    let rig = rig_file::load(common.rig.as_deref())?;
+    let rig = field.seeing(rig_file::load(common.rig.as_deref())?);
     let best = rig.best_pose(&goal, options.pixel_sigma);
     let positions = best.positions(&rig);
     let place: Vec<_> =
         rig.axes.iter().zip(&positions).map(|(axis, position)| format!("{} {position}", axis.name)).collect();
-    if let Some(path) = &options.field {
+    if let Some(path) = &options.depth_field {
         check_ending(path, &["svg"])?;
         let field = DepthField::new(&rig, &best.values, options.pixel_sigma);
         let title = format!("Predicted depth error at {}", place.join(", "));

@@ -103,13 +103,18 @@ impl Publisher {
         let axes = axes.collect::<Vec<_>>().join(", ");
         let moving = if moving { ", moving" } else { "" };
         let place = if axes.is_empty() { String::new() } else { format!(" at {axes}{moving}") };
-        format!("{:5}  {} points{place}; {}", self.number, cloud.points.len(), timing(result))
+        let extrapolated = match cloud.extrapolated() {
+            0 => String::new(),
+            count => format!(", {count} of them extrapolated"),
+        };
+        format!("{:5}  {} points{extrapolated}{place}; {}", self.number, cloud.points.len(), timing(result))
     }
 
     fn points_json(&self, result: &LiveResult<'_>, cloud: &PairCloud, pose: &RigPose, moving: bool) -> Value {
         let placed = pose.base_from_left;
         let mut line = self.head_json("cloud", result);
         line["points"] = cloud.points.len().into();
+        line["extrapolated"] = cloud.extrapolated().into();
         line["matches"] = cloud.matches.into();
         line["dropped"] = dropped_json(&cloud.dropped);
         line["axes"] = axes_json(&self.rig, &pose.axes);

@@ -1,17 +1,16 @@
 //! The zones of a rig file's own cameras: real lenses, any pose, and what the robot's body hides.
 
-use std::path::PathBuf;
-
 use serde_json::json;
-use vergence_camera::read_mask;
 use vergence_files::write_whole;
-use vergence_output::{ZonesOf, write_drawing, zones_plot, zones_svg};
+use vergence_output::{ZonesOf, published_zones, write_drawing, zones_plot, zones_svg};
 use vergence_pipeline::RigView;
 use vergence_rig::{closure_in_words, closure_json, rounded, zones_json};
-use vergence_vision::{PAPER_FIELD, PUBLISHED_MODES, circle_zones, paper_eq3, paper_eq3_applies, solid_zones};
+use vergence_vision::{circle_zones, solid_zones};
 
 use super::{Args, in_words};
 use crate::cli::CommonOptions;
+use crate::cmd::mask_options::MaskOptions;
+use crate::cmd::search_options::FieldOption;
 use crate::console::Console;
 use crate::failure::Failure;
 use crate::rig_file;
@@ -22,39 +21,10 @@ pub struct RigOptions {
     /// A mode of the rig file.
     #[arg(long, value_name = "MODE")]
     mode: Option<String>,
-    /// Where the left image shows the robot itself: an image of the camera's size, black where the body is.
-    #[arg(long, value_name = "IMAGE", requires = "mode")]
-    left_mask: Option<PathBuf>,
-    /// The same of the right image.
-    #[arg(long, value_name = "IMAGE", requires = "mode")]
-    right_mask: Option<PathBuf>,
-}
-
-/// What the paper prints for a mode of this name, beside the zones of this rig on the paper's circle.
-fn published(name: &str, view: &RigView<'_>) -> Result<Option<(String, serde_json::Value)>, Failure> {
-    let Some(mode) = PUBLISHED_MODES.iter().find(|mode| mode.name == name) else { return Ok(None) };
-    let exact = circle_zones(&view.cameras, &view.middle, mode.radius)
-        .map_err(|error| Failure::usage(format!("no zones: {error}")))?
-        .zones;
-    let by_eq3 = paper_eq3(PAPER_FIELD, mode.separation, mode.baseline, mode.radius);
-    let applies = paper_eq3_applies(PAPER_FIELD, mode.separation, mode.baseline, mode.radius);
-    let origin = match (mode.name, applies) {
-        ("stick-bug", _) => "no geometry gives both printed figures".to_owned(),
-        (_, true) => format!("its Eq. 3 gives {:.1} and {:.1} for its nominal pose", by_eq3.stereo, by_eq3.mono),
-        (_, false) => "its Eq. 3 does not apply".to_owned(),
-    };
-    let mono = mode.mono.map_or_else(|| "none".to_owned(), |mono| format!("{mono:.0}"));
-    let sentence = format!(
-        "the paper prints stereo {:.0}, mono {mono} on a circle of {:.0} ({origin}); this rig: stereo {:.2}, mono {:.2}, blind {:.2}",
-        mode.stereo, mode.radius, exact.stereo, exact.mono, exact.blind
-    );
-    let json = json!({
-        "stereo": rounded(mode.stereo.deg()),
-        "mono": mode.mono.map(|mono| rounded(mono.deg())),
-        "radius_mm": rounded(mode.radius.mm()),
-        "exact": zones_json(&exact),
-    });
-    Ok(Some((sentence, json)))
+    #[command(flatten)]
+    masks: MaskOptions,
+    #[command(flatten)]
+    field: FieldOption,
 }
 
 /// Right to 0.001 sr.
@@ -62,16 +32,13 @@ const DIRECTIONS: u32 = 200_000;
 
 pub fn run(args: &Args, common: &CommonOptions, console: Console) -> Result<(), Failure> {
     let (options, radius) = (&args.rig, args.radius);
-    let rig = rig_file::load(common.rig.as_deref())?;
+    let rig = options.field.seeing(rig_file::load(common.rig.as_deref())?);
     let name = options.mode.as_deref().unwrap_or_default();
     let mode = rig.mode(name).ok_or_else(|| Failure::usage(format!("rig '{}' has no mode '{name}'", rig.name)))?;
     let values: Vec<f64> = mode.targets.iter().map(|position| position.value()).collect();
     let pose = rig.pose_at_values(&values);
     pose.check_closure().map_err(|error| Failure::check(error.to_string()))?;
-    let masks = [(&options.left_mask, &rig.left_camera), (&options.right_mask, &rig.right_camera)]
-        .map(|(path, lens)| path.as_deref().map(|path| read_mask(path, lens.size())).transpose());
-    let [left_mask, right_mask] = masks;
-    let (left_mask, right_mask) = (left_mask?, right_mask?);
+    let [left_mask, right_mask] = options.masks.read([rig.left_camera.size(), rig.right_camera.size()])?;
     let view = RigView::new(&rig, &pose, [left_mask.as_ref(), right_mask.as_ref()]);
 
     let fail = |error| Failure::usage(format!("no zones: {error}"));
@@ -99,7 +66,7 @@ pub fn run(args: &Args, common: &CommonOptions, console: Console) -> Result<(), 
         console.say(format!("of the stereo zone, {:.3} sr lie behind the rig", solid.rear_sr))?;
     }
     closure_in_words(&pose).iter().try_for_each(|line| console.say(line))?;
-    let printed = published(name, &view)?;
+    let printed = published_zones(name, &view).map_err(fail)?;
     if let Some((sentence, _)) = &printed {
         console.say(sentence)?;
     }

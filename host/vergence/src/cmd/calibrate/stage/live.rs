@@ -13,6 +13,7 @@ use vergence_targets::TargetKind;
 use crate::cli::CommonOptions;
 use crate::cmd::camera_options::CameraOptions;
 use crate::cmd::connect::{connect, port};
+use crate::cmd::mask_options::MaskOptions;
 use crate::console::Console;
 use crate::failure::Failure;
 use crate::interrupt::interrupted;
@@ -50,7 +51,7 @@ pub struct Options {
 /// Those of the board and the cameras; a stage that does not stand still; an interruption.
 pub async fn fill(
     folder: &Path,
-    options: &Options,
+    (options, masks): (&Options, &MaskOptions),
     cameras: &[String],
     target: TargetKind,
     common: &CommonOptions,
@@ -58,8 +59,9 @@ pub async fn fill(
 ) -> Result<Option<Rig>, Failure> {
     LiveSet::check_free(folder)?;
     let nominal = rig_file::load(common.rig.as_deref())?;
+    let masks = masks.read([nominal.left_camera.size(), nominal.right_camera.size()])?;
     let (mut rig_board, mut rig_cameras) = open(options, cameras, &nominal, target, common, console).await?;
-    let set = LiveSet { folder, target, nominal: &nominal, views: options.views.into(), images: options.frames };
+    let set = LiveSet { folder, target, nominal: &nominal, views: options.views.into(), images: options.frames, masks };
     let plan = stage_plan(&nominal.axes, options.poses.into());
     set.fill(&plan, &mut rig_board, &mut rig_cameras, interrupted(), print_events(console)).await?;
     Ok(match rig_cameras {
