@@ -3,7 +3,7 @@
 use std::path::Path;
 use std::sync::Arc;
 
-use nalgebra::{Matrix3, Matrix6, UnitQuaternion, Vector3, Vector6};
+use nalgebra::{Matrix3, Matrix3x2, Matrix6, UnitQuaternion, Vector3, Vector6};
 use serde_json::Value;
 use vergence_rig::{Provenance, Rig, RigPose};
 use vergence_sim::{Room, RoomCamera};
@@ -29,12 +29,15 @@ pub struct Measurement {
     pub points: Vec<PointError>,
 }
 
-/// A point: its error, its covariance, and the direction in which the left camera sees it.
+/// A point: its error, its covariance, the direction in which the left camera sees it, the normal of its epipolar plane, and the stated
+/// probability that its match is right.
 pub struct PointError {
     pub off: Vector3<f64>,
     pub covariance: Matrix3<f64>,
     pub towards: Vector3<f64>,
+    pub normal: Vector3<f64>,
     pub true_range: f64,
+    pub score: f64,
 }
 
 impl Truth<'_> {
@@ -76,7 +79,9 @@ impl Truth<'_> {
             let range: Length = self.room.scene.cast(&world_from_left.origin(), &(world_from_left * ray))?.range;
             let (towards, at) = (ray.vector(), Vector3::new(n[0], n[1], n[2]));
             let covariance = Matrix3::new(n[12], n[13], n[14], n[13], n[15], n[16], n[14], n[16], n[17]);
-            Some(PointError { off: at - towards * range.mm(), covariance, towards, true_range: range.mm() })
+            let normal = self.pose.left_from_right.origin().mm().cross(&towards).normalize();
+            let (off, true_range) = (at - towards * range.mm(), range.mm());
+            Some(PointError { off, covariance, towards, normal, true_range, score: n[11] })
         };
         text.lines().skip(1).filter_map(row).collect()
     }
@@ -90,9 +95,12 @@ impl Measurement {
 }
 
 impl PointError {
-    /// Squared error over the covariance: of three.
-    pub fn of_three(&self) -> f64 {
-        self.off.dot(&self.covariance.cholesky().expect("a covariance").solve(&self.off))
+    /// Squared error along the ray and across the epipolar plane over the covariance of these: of two. The truth is what the left pixel
+    /// shows, so that there is no error at right angles to both.
+    pub fn of_two(&self) -> f64 {
+        let across = Matrix3x2::from_columns(&[self.towards, self.normal]).transpose();
+        let (off, covariance) = (across * self.off, across * self.covariance * across.transpose());
+        off.dot(&covariance.cholesky().expect("a covariance").solve(&off))
     }
 
     /// The same of the range alone: of one.

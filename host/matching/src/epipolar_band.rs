@@ -25,10 +25,14 @@ impl EpipolarBand {
     /// Whether two positions, each known to `tolerance` pixels, may be of one point.
     pub(crate) fn allows(&self, left: ViewPixel, right: ViewPixel, tolerance: f64) -> bool {
         let slack = tolerance + self.pose_px;
-        // A row is an angle about the baseline; off the axis its arc is shorter by cos a.
-        let off_row = (left.y - right.y).abs() * self.grid.a(left.x).cos();
+        let off_row = (left.y - right.y).abs() * self.shortening(left);
         let disparity = left.x - right.x;
         off_row <= slack && disparity >= -slack && disparity <= self.largest_disparity(left.x) + slack
+    }
+
+    /// Length of the arc of one row at `at`, relative to that on the axis: a row is an angle about the baseline.
+    pub(crate) fn shortening(&self, at: ViewPixel) -> f64 {
+        self.grid.a(at.x).cos()
     }
 
     /// The largest distance of an allowed partner in rows.

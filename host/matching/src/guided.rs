@@ -8,6 +8,7 @@ use crate::corners::{self, Keypoint};
 use crate::descriptor::Descriptor;
 use crate::epipolar_band::EpipolarBand;
 use crate::links::{Compared, Link, Links, Rows, agree_on_pose, bearing_pair, in_originals, register, thin};
+use crate::match_errors::state_errors;
 use crate::matcher::{ImagePair, Match, MatchError, Matcher, Matches, UnmatchedReason};
 use crate::plane::Pyramid;
 use crate::shared_views::SharedViews;
@@ -94,12 +95,18 @@ impl GuidedMatcher {
 /// Matches the features of both views and applies all tests.
 fn matched(views: &SharedViews<'_>, [left, right]: &[Features; 2], pose_sigma: Angle) -> Matches {
     let band = views.band();
-    let compared = Compared { left: &left.pyramid, right: &right.pyramid, keypoints: &left.keypoints };
+    let compared = Compared {
+        left: &left.pyramid,
+        right: &right.pyramid,
+        keypoints: &left.keypoints,
+        oversampling: views.oversampling(),
+    };
     let mut links = compare(left, right, &band);
     register(&mut links, &compared, &band, None);
     agree_on_pose(&mut links, &left.keypoints, &views.grid, pose_sigma);
     Rows::of(&compared).drop_repeated(&mut links, &left.keypoints, &band);
     thin(&mut links, &left.keypoints);
+    state_errors(&mut links, &left.keypoints);
     in_originals(&links, views, &left.keypoints, right.keypoints.len())
 }
 
@@ -173,7 +180,7 @@ fn compare(left: &Features, right: &Features, band: &EpipolarBand) -> Links {
         let j = (*partner)?;
         let (from, to) = (&left.keypoints[i], &right.keypoints[j]);
         let sigma = CORNER_SIGMA * (1_usize << from.level) as f64;
-        if back[j] == Ok(i) { Ok(Link { right: to.at, score: 0.0, sigma }) } else { Err(UnmatchedReason::NotMutual) }
+        if back[j] == Ok(i) { Ok(Link::of_keypoints(to.at, 0.0, [sigma; 2])) } else { Err(UnmatchedReason::NotMutual) }
     };
     forth.iter().enumerate().map(link).collect()
 }

@@ -26,6 +26,7 @@ mod grid;
 mod guided;
 pub mod learned;
 mod links;
+mod match_errors;
 mod matcher;
 mod neighbours;
 mod plane;

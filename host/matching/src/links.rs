@@ -1,26 +1,41 @@
 //! Links: the partners of the left keypoints in the right view, and the tests that drop them.
 
 use rayon::prelude::*;
-use vergence_vision::{Angle, Left, Right};
+use vergence_vision::Angle;
 
 use crate::consensus::{BearingPair, Consensus};
 use crate::corners::Keypoint;
 use crate::distinct::Surroundings;
 use crate::epipolar_band::EpipolarBand;
+use crate::match_errors::Evidence;
 use crate::matcher::{Match, Matches, UnmatchedReason};
 use crate::neighbours::{self, PlacedMatch};
 use crate::plane::Pyramid;
 use crate::refine;
 use crate::shared_views::SharedViews;
-use crate::{Grid, View, ViewPixel};
+use crate::{Grid, ViewPixel};
 
 /// A left keypoint's partner in the right view.
 #[derive(Clone, Copy)]
 pub(crate) struct Link {
     pub right: ViewPixel,
     pub score: f64,
-    /// Standard deviation of each coordinate of `right` as the place of the left keypoint, in pixels of the view.
-    pub sigma: f64,
+    /// Standard deviations of `right` as the place of the left keypoint, along the row and across it, in pixels of the
+    /// view on the axis: a pixel across is shorter elsewhere, as its angle is.
+    pub sigma: [f64; 2],
+    /// What its registration showed; `None` without one.
+    pub evidence: Option<Evidence>,
+    /// Distance from the epipolar plane of the pose on which the matches agree, in standard deviations.
+    pub off_plane: f64,
+    /// Probability that the link is right.
+    pub right_probability: f64,
+}
+
+impl Link {
+    /// A link whose right position is a keypoint.
+    pub(crate) const fn of_keypoints(right: ViewPixel, score: f64, sigma: [f64; 2]) -> Self {
+        Self { right, score, sigma, evidence: None, off_plane: 0.0, right_probability: score }
+    }
 }
 
 /// One entry for every left keypoint: its partner, or why it has none.
@@ -32,6 +47,8 @@ pub(crate) struct Compared<'a> {
     pub left: &'a Pyramid,
     pub right: &'a Pyramid,
     pub keypoints: &'a [Keypoint],
+    /// Pixels of a view per pixel of an image.
+    pub oversampling: f64,
 }
 
 /// Largest distance of a registered match from the epipolar curve of an exact pose, in pixels of the view.
@@ -44,9 +61,14 @@ const EPIPOLAR_SIGMAS: f64 = 3.0;
 
 /// Replaces the right position of every link by the registered one, and drops links that the pose does not allow.
 ///
-/// A link that cannot be registered is dropped, or with `unregistered` given, kept with that standard deviation in
+/// A link that cannot be registered is dropped, or with `unregistered` given, kept with these standard deviations in
 /// pixels of the view if its score is high enough.
-pub(crate) fn register(links: &mut Links, compared: &Compared<'_>, band: &EpipolarBand, unregistered: Option<f64>) {
+pub(crate) fn register(
+    links: &mut Links,
+    compared: &Compared<'_>,
+    band: &EpipolarBand,
+    unregistered: Option<[f64; 2]>,
+) {
     links.par_iter_mut().zip(compared.keypoints).for_each(|(link, keypoint)| {
         *link = link.and_then(|start| {
             match (registered(compared, keypoint.at, start.right, keypoint.level, band), unregistered) {
@@ -72,7 +94,11 @@ pub(crate) fn registered(
     if !band.allows(left, found.right, REGISTERED_TOLERANCE) {
         return Err(UnmatchedReason::Epipolar);
     }
-    Ok(Link { right: found.right, score: found.correlation, sigma: found.sigma })
+    let [along, across] = found.evidence.sigma(compared.oversampling);
+    Ok(Link {
+        evidence: Some(found.evidence),
+        ..Link::of_keypoints(found.right, found.correlation, [along, across * band.shortening(left)])
+    })
 }
 
 /// Whether a match that could not be registered is kept. On rendered pairs 90 % of these are right, but little more
@@ -92,15 +118,20 @@ pub(crate) fn agree_on_pose(links: &mut Links, keypoints: &[Keypoint], grid: &Gr
         *link = link.and_then(|link| {
             let off = bearing_pair(grid, keypoint, &link).and_then(|bearing_pair| consensus.off_plane(&bearing_pair));
             let (off, sigma) = off.ok_or(UnmatchedReason::Epipolar)?;
-            let tolerance = pixel * (EPIPOLAR_SIGMAS * link.sigma).max(REGISTERED_TOLERANCE);
-            if off > tolerance + sigma * EpipolarBand::SIGMAS { Err(UnmatchedReason::Epipolar) } else { Ok(link) }
+            let tolerance = pixel * (EPIPOLAR_SIGMAS * link.sigma[1]).max(REGISTERED_TOLERANCE);
+            let off_plane = off.rad() / (pixel * link.sigma[1]).rad().hypot(sigma.rad());
+            if off > tolerance + sigma * EpipolarBand::SIGMAS {
+                Err(UnmatchedReason::Epipolar)
+            } else {
+                Ok(Link { off_plane, ..link })
+            }
         });
     }
 }
 
 /// The bearings of a link in the shared axes.
 pub(crate) fn bearing_pair(grid: &Grid, keypoint: &Keypoint, link: &Link) -> Option<BearingPair> {
-    let sigma = Angle::from_rad(link.sigma / grid.pixels_per_radian());
+    let sigma = Angle::from_rad(link.sigma[1] / grid.pixels_per_radian());
     Some(BearingPair { left: grid.bearing(keypoint.at)?, right: grid.bearing(link.right)?, sigma })
 }
 
@@ -145,18 +176,22 @@ fn keep(
     judge: impl Fn(&[PlacedMatch]) -> Vec<bool>,
     reason: UnmatchedReason,
 ) {
-    let place = |(link, keypoint): (&Result<Link, UnmatchedReason>, &Keypoint)| {
-        let link = link.as_ref().ok()?;
-        let disparity = keypoint.at.x - link.right.x;
-        Some(PlacedMatch { left: keypoint.at, disparity, score: link.score, sigma: link.sigma })
-    };
-    let placed: Vec<PlacedMatch> = links.iter().zip(keypoints).filter_map(place).collect();
-    let verdicts = judge(&placed);
+    let verdicts = judge(&placed(links, keypoints));
     for (link, kept) in links.iter_mut().filter(|link| link.is_ok()).zip(verdicts) {
         if !kept {
             *link = Err(reason);
         }
     }
+}
+
+/// The links that are matches, in their order.
+pub(crate) fn placed(links: &Links, keypoints: &[Keypoint]) -> Vec<PlacedMatch> {
+    let place = |(link, keypoint): (&Result<Link, UnmatchedReason>, &Keypoint)| {
+        let link = link.as_ref().ok()?;
+        let disparity = keypoint.at.x - link.right.x;
+        Some(PlacedMatch { left: keypoint.at, disparity, score: link.score, sigma: link.sigma[0] })
+    };
+    links.iter().zip(keypoints).filter_map(place).collect()
 }
 
 /// Converts the links to matches in pixels of the original images.
@@ -168,7 +203,7 @@ pub(crate) fn in_originals(
 ) -> Matches {
     let mut matches = Matches { left_keypoints: keypoints.len(), right_keypoints, ..Matches::default() };
     for (keypoint, link) in keypoints.iter().zip(links) {
-        match link.and_then(|link| original(&views.left, &views.right, keypoint, &link)) {
+        match link.and_then(|link| original(views, keypoint, &link)) {
             Ok(found) => matches.pairs.push(found),
             Err(reason) => *matches.dropped.entry(reason).or_default() += 1,
         }
@@ -176,15 +211,11 @@ pub(crate) fn in_originals(
     matches
 }
 
-fn original(
-    left_view: &View<Left>,
-    right_view: &View<Right>,
-    keypoint: &Keypoint,
-    link: &Link,
-) -> Result<Match, UnmatchedReason> {
+fn original(views: &SharedViews<'_>, keypoint: &Keypoint, link: &Link) -> Result<Match, UnmatchedReason> {
+    let (left_view, right_view) = (&views.left, &views.right);
     let left = left_view.original(keypoint.at).map_err(|_| UnmatchedReason::NotRefined)?;
     let right = right_view.original(link.right).map_err(|_| UnmatchedReason::NotRefined)?;
-    // The link's error counts for the right position alone; shared equally by both positions it is smaller by √2.
-    let sigma = link.sigma * right_view.shrinking(right) * std::f64::consts::FRAC_1_SQRT_2;
-    Ok(Match { left, right, sigma, score: link.score as f32 })
+    let turns = link.sigma.map(|sigma| Angle::from_rad(sigma / left_view.grid().pixels_per_radian()));
+    let sigma = views.pixel_sigma(turns, [left, right]).ok_or(UnmatchedReason::NotRefined)?;
+    Ok(Match { left, right, sigma, score: link.right_probability as f32, registered: link.evidence.is_some() })
 }

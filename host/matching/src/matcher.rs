@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 use image::GrayImage;
 use vergence_vision::{
-    Angle, BodyMask, ImageSize, KannalaBrandt, Left, Length, Pixel, PixelPair, Right, Side, Transform,
+    Angle, BodyMask, ImageSize, KannalaBrandt, Left, Length, MatchSigma, Pixel, PixelPair, Right, Side, Transform,
 };
 
 /// A matcher: finds the pixels of scene points that both images of a pair show.
@@ -48,16 +48,18 @@ pub struct Match {
     pub left: Pixel,
     /// Pixel of the match in the right image.
     pub right: Pixel,
-    /// Standard deviation of each coordinate of both pixels, in pixels of the images; it counts as equal for both.
-    pub sigma: f64,
-    /// Similarity from 0 to 1, comparable within one matcher only.
+    /// Standard deviations of both pixels where the match is right, along the epipolar curve and across it.
+    pub sigma: MatchSigma,
+    /// Probability from 0 to 1 that the match is right: that its parallax is off by at most three of its standard deviations.
     pub score: f32,
+    /// Whether the position was registered, to a small part of a pixel; else it is that of a keypoint.
+    pub registered: bool,
 }
 
 impl Match {
-    /// The pair of pixels and its standard deviation, as [`vergence_vision::cloud_of_each`] takes them.
+    /// The pair of pixels and its standard deviations, as [`vergence_vision::cloud_of_each`] takes them.
     #[must_use]
-    pub const fn measured(&self) -> (PixelPair, f64) {
+    pub const fn measured(&self) -> (PixelPair, MatchSigma) {
         (PixelPair { left: self.left, right: self.right }, self.sigma)
     }
 }

@@ -5,6 +5,7 @@
 //! gradient limit", Perception 14, 1985). A wrong match rarely has neighbours within this limit; a point of a thin
 //! object has some.
 
+use nalgebra::{Matrix3, Vector3};
 use rayon::prelude::*;
 
 use crate::ViewPixel;
@@ -43,6 +44,46 @@ pub(crate) fn duplicated(matches: &[PlacedMatch]) -> Vec<bool> {
             && p.sigma.total_cmp(&q.sigma).then(q.score.total_cmp(&p.score)).then(i.cmp(&j)).is_gt()
     };
     (0..matches.len()).into_par_iter().map(|i| (0..matches.len()).any(|j| better(i, j))).collect()
+}
+
+/// Distance of the disparity of each match from the plane through those of its nearest matches, in pixels of the view;
+/// infinite with no other matches. Matches of another surface weigh less (P. Holland and R. Welsch, Commun. Stat. A6, 1977).
+pub(crate) fn off_surface(matches: &[PlacedMatch]) -> Vec<f64> {
+    (0..matches.len()).into_par_iter().map(|i| off_plane(i, matches).unwrap_or(f64::INFINITY)).collect()
+}
+
+fn off_plane(i: usize, matches: &[PlacedMatch]) -> Option<f64> {
+    const ROUNDS: usize = 3;
+    /// Distance from the plane at which the weight is halved, in pixels.
+    const SCALE: f64 = 0.5;
+    /// Information that keeps the slope of a plane through matches on one line small.
+    const FLATNESS: f64 = 1e-3;
+    let one = matches.get(i)?;
+    let mut near: Vec<(f64, usize)> =
+        (0..matches.len()).filter(|&j| j != i).map(|j| (distance_squared(one, &matches[j]), j)).collect();
+    if near.len() > NEAREST {
+        near.select_nth_unstable_by(NEAREST, |p, q| p.0.total_cmp(&q.0).then(p.1.cmp(&q.1)));
+        near.truncate(NEAREST);
+    }
+    let row = |&(_, j): &(f64, usize)| {
+        let (dx, dy) = (matches[j].left.x - one.left.x, matches[j].left.y - one.left.y);
+        (Vector3::new(1.0, dx, dy), matches[j].disparity - one.disparity)
+    };
+    near.sort_by_key(|&(_, j)| j);
+    let rows: Vec<(Vector3<f64>, f64)> = near.iter().map(row).collect();
+    let mut plane = Vector3::zeros();
+    for round in 0..ROUNDS {
+        let (mut normal, mut right_side) =
+            (Matrix3::from_diagonal(&Vector3::new(0.0, FLATNESS, FLATNESS)), Vector3::zeros());
+        for (place, change) in &rows {
+            let off = if round == 0 { 0.0 } else { (change - place.dot(&plane)) / SCALE };
+            let weight = 1.0 / (1.0 + off * off);
+            normal += place * place.transpose() * weight;
+            right_side += place * (weight * change);
+        }
+        plane = normal.cholesky()?.solve(&right_side);
+    }
+    Some(plane.x.abs())
 }
 
 fn support(one: &PlacedMatch, matches: &[PlacedMatch]) -> usize {

@@ -141,10 +141,10 @@ mod tests {
         let at = |i: usize, j: usize| ViewPixel { x: 56.0 + 20.0 * i as f64, y: 40.0 + 21.0 * j as f64 };
         let keypoints: Vec<Keypoint> =
             (0..9).flat_map(|j| (0..9).map(move |i| Keypoint { at: at(i, j), level: 0 })).collect();
-        let compared = Compared { left: &left, right: &right, keypoints: &keypoints };
+        let compared = Compared { left: &left, right: &right, keypoints: &keypoints, oversampling: 1.0 };
         let mut links: Links = vec![Err(UnmatchedReason::NoCandidate); keypoints.len()];
         let first = keypoints[12].at;
-        links[12] = Ok(Link { right: ViewPixel { x: first.x - disparity + 1.0, y: first.y }, score: 1.0, sigma: 0.3 });
+        links[12] = Ok(Link::of_keypoints(ViewPixel { x: first.x - disparity + 1.0, y: first.y }, 1.0, [0.3; 2]));
         propagate(&mut links, &compared, &Rows::of(&compared), &band());
 
         // Rows whose window of the coarsest level shows the same surface in both views.

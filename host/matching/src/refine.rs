@@ -12,6 +12,7 @@ use multiversion::multiversion;
 
 use self::warp::Warp;
 use self::window::{HALF, Window, surroundings, warped};
+use crate::match_errors::Evidence;
 use crate::plane::{Plane, Pyramid};
 use crate::{UnmatchedReason, ViewPixel};
 
@@ -22,8 +23,8 @@ pub(crate) struct Registered {
     pub right: ViewPixel,
     /// Correlation of both windows.
     pub correlation: f64,
-    /// Standard deviation of each coordinate of `right`, in pixels of the view.
-    pub sigma: f64,
+    /// What the registration shows of its error.
+    pub evidence: Evidence,
 }
 
 const ITERATIONS: usize = 20;
@@ -34,12 +35,6 @@ const FARTHEST: f64 = 3.0;
 /// Largest stretch or shear along the row.
 const STEEPEST: f64 = 0.6;
 const LEAST_CORRELATION: f64 = 0.9;
-/// How much larger the real errors of t_x and t_y are than their standard deviations from the residuals: neighbouring pixels of a
-/// view show the same pixel of the image, and a window at the edge of an object shows two surfaces. The errors have long tails.
-/// With these factors 95 % of them are within two standard deviations in the worst of the rendered scenes (docs/measured/matching.md).
-const ERROR_FACTORS: [f64; 2] = [3.9, 4.5];
-/// Smallest standard deviation of a registration in pixels: it ends with a step of up to [`CONVERGED`].
-const SMALLEST_SIGMA: f64 = 0.02;
 /// Largest standard deviation of t_x from the residuals, in pixels.
 const LARGEST_SIGMA: f64 = 0.15;
 /// Largest distance in pixels between a keypoint and the result of registering to the right view and back.
@@ -57,7 +52,7 @@ pub(crate) fn register(
     level: usize,
 ) -> Result<Registered, UnmatchedReason> {
     let mut warp = Warp { tx: right.x - left.x, ty: right.y - left.y, ..Warp::default() };
-    let mut fit = Fit { warp, correlation: 0.0, sigmas: [f64::INFINITY; 2] };
+    let mut fit = Fit { warp, correlation: 0.0, sigmas: [f64::INFINITY; 2], residual: f64::INFINITY };
     for level in (0..=level).rev() {
         let (Some(from), Some(to)) = (left_levels.levels().get(level), right_levels.levels().get(level)) else {
             return Err(UnmatchedReason::NotRefined);
@@ -81,7 +76,9 @@ pub(crate) fn register(
     if (back.tx + warp.tx).hypot(back.ty + warp.ty) > LARGEST_LOOP {
         return Err(UnmatchedReason::NotReversible);
     }
-    Ok(Registered { right, correlation: fit.correlation, sigma: fit.sigma() })
+    let steepness = warp.sx.abs().max(warp.sy.abs());
+    let evidence = Evidence { from_residuals: fit.sigmas, residual: fit.residual, steepness };
+    Ok(Registered { right, correlation: fit.correlation, evidence })
 }
 
 /// The result of a registration in one level.
@@ -90,14 +87,8 @@ struct Fit {
     correlation: f64,
     /// Standard deviations of tx and ty from the residuals, in pixels of the level.
     sigmas: [f64; 2],
-}
-
-impl Fit {
-    /// The real standard deviation: the root mean square of both directions.
-    fn sigma(&self) -> f64 {
-        let [x, y] = [0, 1].map(|i| ERROR_FACTORS[i] * self.sigmas[i]);
-        (x.hypot(y) * std::f64::consts::FRAC_1_SQRT_2).max(SMALLEST_SIGMA)
-    }
+    /// Root mean square of the residuals, in grey levels.
+    residual: f64,
 }
 
 /// Registers `image` to the window of `template` around `at`, starting with the warp `start`.
@@ -123,7 +114,7 @@ fn align(template: &Plane, image: &Plane, at: ViewPixel, start: Warp) -> Result<
         if tx.hypot(ty) < CONVERGED {
             let (correlation, variance) = window.quality(&values, &solution);
             let sigmas = [0, 1].map(|i| (variance * inverse[(i, i)]).sqrt() / gain);
-            return Ok(Fit { warp, correlation, sigmas });
+            return Ok(Fit { warp, correlation, sigmas, residual: variance.sqrt() });
         }
     }
     Err(UnmatchedReason::NotRefined)

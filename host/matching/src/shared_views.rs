@@ -1,6 +1,6 @@
 //! Both images of a pair, resampled on one grid in the shared axes.
 
-use vergence_vision::{Angle, Frame, Left, Right};
+use vergence_vision::{Angle, Frame, Left, MatchSigma, Pixel, Right, StereoPair};
 
 use crate::corners::Keypoint;
 use crate::epipolar_band::EpipolarBand;
@@ -54,6 +54,20 @@ impl<'a> SharedViews<'a> {
     /// The epipolar band for a standard deviation `pose_sigma` of the pose.
     pub(crate) fn band_for(&self, pose_sigma: Angle) -> EpipolarBand {
         EpipolarBand::new(self.grid, self.frame.baseline(), self.pair.nearest, pose_sigma)
+    }
+
+    /// Pixels of a view per pixel at the centre of the denser image.
+    pub(crate) fn oversampling(&self) -> f64 {
+        self.grid.pixels_per_radian() / self.pair.left_camera.k()[0].max(self.pair.right_camera.k()[0])
+    }
+
+    /// The standard deviations in pixels of the images of a match whose parallax has the standard deviation `turns[0]`, and whose
+    /// angle between the epipolar planes `turns[1]`. `None` beyond a lens's field, and for a bearing along the baseline.
+    pub(crate) fn pixel_sigma(&self, turns: [Angle; 2], [left, right]: [Pixel; 2]) -> Option<MatchSigma> {
+        let ImagePair { left_camera, right_camera, left_from_right, .. } = *self.pair;
+        let stereo = StereoPair { left: left_camera, right: right_camera, left_from_right };
+        let (left, right) = (left_camera.unproject(left).ok()?, right_camera.unproject(right).ok()?);
+        MatchSigma::of_turns(turns, &left, &right, &stereo)
     }
 
     /// Whether a keypoint of the left view is compared: the left camera sees its surroundings, and the right camera may

@@ -100,8 +100,7 @@ impl<F: Frame> View<F> {
         Ok(self.grid.position(&(self.shared_from_camera * self.camera.unproject(original)?)))
     }
 
-    /// Number of pixels of the original image per pixel of the view, along the radius, at a pixel of the original
-    /// image.
+    /// Pixels of the image per pixel of the view where the image shows `original`.
     pub(crate) fn shrinking(&self, original: Pixel) -> f64 {
         let theta = self.camera.unproject::<F>(original).map_or(0.0, |ray| ray.vector().z.clamp(-1.0, 1.0).acos());
         self.camera.pixels_per_radian(Angle::from_rad(theta)) / self.grid.pixels_per_radian()

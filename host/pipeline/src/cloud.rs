@@ -6,8 +6,8 @@ use image::RgbImage;
 use vergence_matching::{Match, MatchError, Matcher, Matches, UnmatchedReason};
 use vergence_rig::{OpenLoop, Rig, RigPose, TrackGap, moving_cloud};
 use vergence_vision::{
-    Cloud, CloudPoint, DropReason, FusedPose, Kernel, Length, PixelPair, PoseDrift, StereoPair, cloud_of_each,
-    pose_drift,
+    Cloud, CloudPoint, DropReason, FusedPose, Kernel, Length, MatchSigma, PixelPair, PoseDrift, StereoPair,
+    cloud_of_each, pose_drift,
 };
 
 use crate::limits::{cloud_gates, expected_drift, matching_sigma};
@@ -25,7 +25,7 @@ pub struct ColouredPoint {
     pub point: CloudPoint,
     /// sRGB.
     pub colour: [u8; 3],
-    /// The matcher's similarity of both places, 0 to 1; 1 where the correspondences were given.
+    /// The probability that the match is right, 0 to 1; 1 where the correspondences were given.
     pub score: f32,
 }
 
@@ -180,25 +180,27 @@ pub fn refined_cloud(
     Ok(cloud.scored(found))
 }
 
-/// Triangulates given correspondences, each with the standard deviation of its positions in pixels; `left` colours the points.
+/// Triangulates given correspondences, each with the standard deviations of its positions in pixels (one number, or [`MatchSigma`]);
+/// `left` colours the points.
 ///
 /// # Errors
 /// [`TrackGap`] where the joints of a row are not known.
-pub fn cloud_of_pairs(
-    pairs: &[(PixelPair, f64)],
+pub fn cloud_of_pairs<S: Copy + Into<MatchSigma>>(
+    pairs: &[(PixelPair, S)],
     left: &RgbImage,
     rig: &Rig,
     pose: &PairPose,
     kernel: Kernel,
 ) -> Result<PairCloud, TrackGap> {
+    let pairs: Vec<_> = pairs.iter().map(|(pixels, sigma)| (*pixels, (*sigma).into())).collect();
     let mut standing = StandingPose::default();
-    standing.take(rig, pose, pairs);
-    cloud_of(pairs, left, (rig, pose), &standing, (kernel, None))
+    standing.take(rig, pose, &pairs);
+    cloud_of(&pairs, left, (rig, pose), &standing, (kernel, None))
 }
 
 /// The cloud of `pairs`, which `standing` has taken.
 fn cloud_of(
-    pairs: &[(PixelPair, f64)],
+    pairs: &[(PixelPair, MatchSigma)],
     left: &RgbImage,
     (rig, pose): (&Rig, &PairPose),
     standing: &StandingPose,

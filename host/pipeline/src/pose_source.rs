@@ -2,7 +2,7 @@
 
 use vergence_matching::{Match, MatchError, Matcher};
 use vergence_rig::{Rig, RigPose};
-use vergence_vision::{FusedPose, Length, MatchErrors, PixelPair, StereoPair, fuse_pose};
+use vergence_vision::{FusedPose, Length, MatchErrors, MatchSigma, PixelPair, StereoPair, fuse_pose};
 
 use crate::limits::{JOINTS_SUFFICE, matching_sigma};
 use crate::pair::PairImages;
@@ -10,7 +10,7 @@ use crate::pose::PairPose;
 use crate::search::Search;
 
 /// The pose that joints and `matches` tell together; `None` where too few agree, or they do not help.
-pub(crate) fn fused(rig: &Rig, by_joints: &RigPose, matches: &[(PixelPair, f64)]) -> Option<FusedPose> {
+pub(crate) fn fused(rig: &Rig, by_joints: &RigPose, matches: &[(PixelPair, MatchSigma)]) -> Option<FusedPose> {
     let stereo =
         StereoPair { left: &rig.left_camera, right: &rig.right_camera, left_from_right: by_joints.left_from_right };
     // The joints' errors move the pose far: matches that the covariance of the joints excludes are not looked at.

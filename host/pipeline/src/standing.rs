@@ -9,7 +9,7 @@
 use std::collections::VecDeque;
 
 use vergence_rig::{LastingError, Rig, RigAxis, RigPose};
-use vergence_vision::{FusedPose, PixelPair};
+use vergence_vision::{FusedPose, MatchSigma, PixelPair};
 
 use crate::pose::PairPose;
 use crate::pose_source::{fused, joints_suffice, with_fused};
@@ -26,8 +26,8 @@ const DIFFERENT: f64 = 27.86;
 pub struct StandingPose {
     /// Where the axes stand, in millimetres or radians.
     axes: Vec<f64>,
-    /// Matches of the latest pairs, each with its standard deviation in pixels.
-    pairs: VecDeque<Vec<(PixelPair, f64)>>,
+    /// Matches of the latest pairs, each with its standard deviations in pixels.
+    pairs: VecDeque<Vec<(PixelPair, MatchSigma)>>,
     /// The pose by joints and all these matches.
     refined: Option<FusedPose>,
     /// What earlier visits of the mode left.
@@ -94,7 +94,7 @@ impl StandingPose {
 
     /// Takes the matches of one more pair. `false` where they contradict the pairs before, which are then forgotten: the cameras have
     /// moved and no encoder told it.
-    pub(crate) fn take(&mut self, rig: &Rig, pose: &PairPose, matches: &[(PixelPair, f64)]) -> bool {
+    pub(crate) fn take(&mut self, rig: &Rig, pose: &PairPose, matches: &[(PixelPair, MatchSigma)]) -> bool {
         let by_joints = pose.at_middle();
         if joints_suffice(rig, by_joints) || !pose.is_steady() {
             self.forget();

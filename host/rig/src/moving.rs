@@ -1,7 +1,7 @@
 //! Measurement while the stages move, where every row of both images has its own pose.
 
 use vergence_vision::{
-    Angle, Base, Cloud, CloudPoint, DropReason, Gates, Left, PixelPair, StereoPair, Transform, cloud_point,
+    Angle, Base, Cloud, CloudPoint, DropReason, Gates, Left, MatchSigma, PixelPair, StereoPair, Transform, cloud_point,
 };
 
 use crate::exposure::PairExposure;
@@ -36,14 +36,14 @@ pub fn middle_pose(rig: &Rig, joints: &impl Joints, exposure: &PairExposure) -> 
 
 /// Triangulates matches of two moving cameras, each with the poses of both cameras at the exposure of its own rows.
 ///
-/// Each match comes with the standard deviation of its positions in pixels. Points are in the frame of the left camera
+/// Each match comes with the standard deviations of its positions in pixels (one number, or [`MatchSigma`]). Points are in the frame of the left camera
 /// at its middle row. The shared covariance in `gates` is replaced by that of each point's own pose, which grows
 /// with the speed of the stages and the uncertainty of the exposure's instant.
 ///
 /// # Errors
 /// [`TrackGap`] where the encoder readings do not cover an exposure.
-pub fn moving_cloud(
-    pairs: &[(PixelPair, f64)],
+pub fn moving_cloud<S: Copy + Into<MatchSigma>>(
+    pairs: &[(PixelPair, S)],
     rig: &Rig,
     joints: &impl Joints,
     exposure: &PairExposure,
@@ -52,12 +52,11 @@ pub fn moving_cloud(
     let reference_from_base = rig.pose(&joints.at(exposure.left.middle)?).base_from_left.inverse();
     let calibration = rig.calibration_at(&joints.at(exposure.left.middle)?, &joints.at(exposure.right.middle)?);
     let mut cloud = Cloud::default();
-    for (pair_index, (pixels, pixel_sigma)) in pairs.iter().enumerate() {
-        let gates = Gates { pixel_sigma: *pixel_sigma, ..*gates };
+    for (pair_index, (pixels, sigma)) in pairs.iter().enumerate() {
         let left = joints.at(exposure.left.at_row(pixels.left.v))?;
         let right = joints.at(exposure.right.at_row(pixels.right.v))?;
         let pose = rig.pose_of_rows(&left, &right, &calibration);
-        match point(pixels, rig, &reference_from_base, &pose, &gates) {
+        match point((pixels, (*sigma).into()), rig, &reference_from_base, &pose, gates) {
             Ok(point) => cloud.points.push(CloudPoint { pair_index, ..point }),
             Err(reason) => *cloud.dropped.entry(reason).or_default() += 1,
         }
@@ -66,7 +65,7 @@ pub fn moving_cloud(
 }
 
 fn point(
-    pixels: &PixelPair,
+    (pixels, sigma): (&PixelPair, MatchSigma),
     rig: &Rig,
     reference_from_base: &Transform<Left, Base>,
     pose: &RigPose,
@@ -74,7 +73,7 @@ fn point(
 ) -> Result<CloudPoint, DropReason> {
     let pair = StereoPair { left: &rig.left_camera, right: &rig.right_camera, left_from_right: pose.left_from_right };
     let gates = Gates { shared: pose.shared, ..*gates };
-    let point = cloud_point(pixels, &pair, &gates)?;
+    let point = cloud_point(pixels, sigma, &pair, &gates)?;
     let reference_from_left: Transform<Left, Left> = *reference_from_base * pose.base_from_left;
     let turn = reference_from_left.rotation().to_rotation_matrix();
     Ok(CloudPoint {

@@ -8,7 +8,7 @@ use crate::covariance::range_sigma;
 use crate::epipolar::ray_to_plane;
 use crate::triangulation::Triangulated;
 use crate::uncertainty::{PointUncertainty, ResidualUncertainty};
-use crate::{Angle, DropReason, Gates, Left, Length, PixelPair, Point, Right, StereoPair};
+use crate::{Angle, DropReason, Gates, Left, Length, MatchSigma, PixelPair, Point, Right, StereoPair};
 
 /// A triangulated point with its match and its uncertainty.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -47,18 +47,20 @@ pub struct Cloud {
 /// Points and dropped matches add up to the number of matches.
 #[must_use]
 pub fn cloud(pairs: &[PixelPair], rig: &StereoPair<'_>, gates: &Gates) -> Cloud {
-    collect(pairs.iter().map(|pixels| cloud_point(pixels, rig, gates)))
+    collect(pairs.iter().map(|pixels| cloud_point(pixels, gates.pixel_sigma, rig, gates)))
 }
 
-/// Triangulates matches that each carry their own standard deviation in pixels, instead of [`Gates::pixel_sigma`].
+/// Triangulates matches that each carry their own standard deviations in pixels, instead of [`Gates::pixel_sigma`]: one
+/// number, or [`MatchSigma`].
 ///
 /// Otherwise the same as [`cloud()`].
 #[must_use]
-pub fn cloud_of_each(pairs: &[(PixelPair, f64)], rig: &StereoPair<'_>, gates: &Gates) -> Cloud {
-    let of = |(pixels, pixel_sigma): &(PixelPair, f64)| {
-        cloud_point(pixels, rig, &Gates { pixel_sigma: *pixel_sigma, ..*gates })
-    };
-    collect(pairs.iter().map(of))
+pub fn cloud_of_each<S: Copy + Into<MatchSigma>>(
+    pairs: &[(PixelPair, S)],
+    rig: &StereoPair<'_>,
+    gates: &Gates,
+) -> Cloud {
+    collect(pairs.iter().map(|(pixels, sigma)| cloud_point(pixels, *sigma, rig, gates)))
 }
 
 fn collect(fates: impl Iterator<Item = Result<CloudPoint, DropReason>>) -> Cloud {
@@ -72,17 +74,24 @@ fn collect(fates: impl Iterator<Item = Result<CloudPoint, DropReason>>) -> Cloud
     cloud
 }
 
-/// Triangulates one match; the `pair_index` of the point is 0.
+/// Triangulates one match whose pixels have the standard deviations `sigma`, instead of [`Gates::pixel_sigma`]; the
+/// `pair_index` of the point is 0.
 ///
 /// # Errors
 /// The reason of the first gate that the match fails.
-pub fn cloud_point(pixels: &PixelPair, rig: &StereoPair<'_>, gates: &Gates) -> Result<CloudPoint, DropReason> {
+pub fn cloud_point(
+    pixels: &PixelPair,
+    sigma: impl Into<MatchSigma>,
+    rig: &StereoPair<'_>,
+    gates: &Gates,
+) -> Result<CloudPoint, DropReason> {
+    let sigma = sigma.into();
     let left = rig.left.unproject::<Left>(pixels.left).map_err(|_| DropReason::OutsideLeftField)?;
     let in_right = rig.right.unproject::<Right>(pixels.right).map_err(|_| DropReason::OutsideRightField)?;
     let (right, right_centre) = (rig.left_from_right * in_right, rig.left_from_right.origin());
 
     let residual = ray_to_plane(&left, &right, &right_centre).ok_or(DropReason::OnBaseline)?;
-    let residual_sigma = ResidualUncertainty::of(&left, &in_right, rig, gates.pixel_sigma)
+    let residual_sigma = ResidualUncertainty::of(&left, &in_right, rig, sigma)
         .map(|uncertainty| uncertainty.sigma(&gates.shared))
         .ok_or(DropReason::Uncertain)?;
     let allowed = Angle::from_rad(residual_sigma.rad().hypot(gates.epipolar_allowance.rad()));
@@ -92,8 +101,7 @@ pub fn cloud_point(pixels: &PixelPair, rig: &StereoPair<'_>, gates: &Gates) -> R
     require(parallax >= gates.min_parallax, DropReason::Parallax)?;
     require(gates.max_range.is_none_or(|limit| left_range <= limit), DropReason::TooFar)?;
 
-    let uncertainty =
-        PointUncertainty::by(&gates.kernel, &point, rig, gates.pixel_sigma).ok_or(DropReason::Uncertain)?;
+    let uncertainty = PointUncertainty::by(&gates.kernel, &point, rig, sigma).ok_or(DropReason::Uncertain)?;
     let own_sigma = range_sigma(&uncertainty.from_pixels, &point).ok_or(DropReason::Uncertain)?;
     require(own_sigma.mm() <= gates.max_relative_sigma * left_range.mm(), DropReason::Uncertain)?;
     let covariance = uncertainty.covariance(&gates.shared);

@@ -13,7 +13,7 @@
 use nalgebra::{Matrix6, Vector6};
 
 use crate::pose_equation::{Equation, SCALE_SIGMAS, difference, moved};
-use crate::{Angle, PixelPair, StereoPair};
+use crate::{Angle, MatchSigma, PixelPair, StereoPair};
 
 /// Smallest number of usable matches.
 const LEAST_PAIRS: usize = 20;
@@ -52,17 +52,22 @@ impl PoseDrift {
     }
 }
 
-/// Compares the pose of `pair` with matches, each given with its standard deviation in pixels; some may be wrong.
+/// Compares the pose of `pair` with matches, each given with its standard deviations in pixels (one number, or [`MatchSigma`]); some may be wrong.
 ///
 /// `pose` is the stated covariance of the pose, in the coordinates of [`crate::SharedCovariance`]. Returns `None` with
 /// fewer than 20 usable matches.
 #[must_use]
-pub fn pose_drift(pixels: &[(PixelPair, f64)], pair: &StereoPair<'_>, pose: &Matrix6<f64>) -> Option<PoseDrift> {
+pub fn pose_drift<S: Copy + Into<MatchSigma>>(
+    pixels: &[(PixelPair, S)],
+    pair: &StereoPair<'_>,
+    pose: &Matrix6<f64>,
+) -> Option<PoseDrift> {
     let prior = weak_prior(pair.left_from_right.origin().mm().norm());
     let (mut found, mut correction, mut covariance) = (*pair, Vector6::zeros(), Matrix6::zeros());
     let mut agreeing = 0.0;
     for round in 0..ROUNDS {
-        let equations: Vec<Equation> = pixels.iter().filter_map(|pixels| Equation::of(pixels, &found)).collect();
+        let equations: Vec<Equation> =
+            pixels.iter().filter_map(|(pixels, sigma)| Equation::of(pixels, (*sigma).into(), &found)).collect();
         if equations.len() < LEAST_PAIRS {
             return None;
         }

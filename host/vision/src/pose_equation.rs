@@ -5,7 +5,7 @@ use nalgebra::{UnitQuaternion, Vector3, Vector6};
 use crate::epipolar::ray_to_plane;
 use crate::residual_spread::cell_of;
 use crate::uncertainty::ResidualUncertainty;
-use crate::{Left, PixelPair, Right, StereoPair, Transform};
+use crate::{Left, MatchSigma, PixelPair, Right, StereoPair, Transform};
 
 /// Residuals beyond this many standard deviations count as wrong matches.
 pub const SCALE_SIGMAS: f64 = 2.5;
@@ -33,11 +33,11 @@ pub struct Equation {
 }
 
 impl Equation {
-    pub fn of((pixels, pixel_sigma): &(PixelPair, f64), pair: &StereoPair<'_>) -> Option<Self> {
+    pub fn of(pixels: &PixelPair, sigma: MatchSigma, pair: &StereoPair<'_>) -> Option<Self> {
         let left = pair.left.unproject::<Left>(pixels.left).ok()?;
         let right = pair.right.unproject::<Right>(pixels.right).ok()?;
         let offset = ray_to_plane(&left, &(pair.left_from_right * right), &pair.left_from_right.origin())?;
-        let uncertainty = ResidualUncertainty::of(&left, &right, pair, *pixel_sigma)?;
+        let uncertainty = ResidualUncertainty::of(&left, &right, pair, sigma)?;
         let sigma = uncertainty.from_pixels.sqrt();
         let cell = cell_of(pixels.left, pair.left.size().width);
         (sigma > 0.0).then(|| Self { offset: offset.rad(), slope: uncertainty.by_pose(), sigma, cell })

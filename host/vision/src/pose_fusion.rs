@@ -19,7 +19,7 @@ use nalgebra::{Matrix6, SymmetricEigen, Vector6};
 
 use crate::pose_equation::{Equation, SCALE_SIGMAS, difference, moved};
 use crate::residual_spread::variance_factor;
-use crate::{Angle, Left, PixelPair, Right, StereoPair, Transform};
+use crate::{Angle, Left, MatchSigma, PixelPair, Right, StereoPair, Transform};
 
 /// Smallest number of matches that agree with the pose found.
 const LEAST_PAIRS: usize = 20;
@@ -28,6 +28,9 @@ const ITERATIONS: usize = 30;
 const SETTLING: usize = 8;
 /// Number of times the equations are linearised again. Before the last one the errors of the matches are measured.
 const ROUNDS: usize = 6;
+/// Standard deviation of an error that all registered matches of an image have in common, in pixels: interpolation shifts them alike, which
+/// no cell shows beside another. It turns the pose.
+const COMMON_PX: f64 = 0.004;
 /// Least scale of the first iterations, in radians: 3 degrees.
 const GROSS: f64 = 0.0524;
 
@@ -78,12 +81,12 @@ impl FusedPose {
 }
 
 /// The most probable pose of `pair`, whose stated pose has the covariance `joints`, given matches with their standard deviations
-/// in pixels; some may be wrong. `errors` says whether these deviations hold.
+/// in pixels (one number, or [`MatchSigma`]); some may be wrong. `errors` says whether these deviations hold.
 ///
 /// `None` where fewer than 20 matches agree on one pose.
 #[must_use]
-pub fn fuse_pose(
-    pixels: &[(PixelPair, f64)],
+pub fn fuse_pose<S: Copy + Into<MatchSigma>>(
+    pixels: &[(PixelPair, S)],
     pair: &StereoPair<'_>,
     joints: &Matrix6<f64>,
     errors: MatchErrors,
@@ -100,7 +103,8 @@ pub fn fuse_pose(
     };
     for round in 0..ROUNDS {
         let found = StereoPair { left_from_right: fused.left_from_right, ..*pair };
-        let equations: Vec<Equation> = pixels.iter().filter_map(|pixels| Equation::of(pixels, &found)).collect();
+        let equations: Vec<Equation> =
+            pixels.iter().filter_map(|(pixels, sigma)| Equation::of(pixels, (*sigma).into(), &found)).collect();
         let mut step = Vector6::zeros();
         let mut left = Matrix6::identity();
         for iteration in 0..ITERATIONS {
@@ -129,6 +133,10 @@ pub fn fuse_pose(
         fused.agreeing = agreeing as f64 / equations.len() as f64;
         fused.left_from_right = moved(&found.left_from_right, &step);
         fused.correction = difference(&fused.left_from_right, &pair.left_from_right);
+    }
+    if errors == MatchErrors::Measured {
+        let common = (COMMON_PX / pair.left.k()[0]).powi(2);
+        (0..3).for_each(|axis| fused.covariance[(axis, axis)] += common);
     }
     Some(fused)
 }

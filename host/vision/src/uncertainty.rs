@@ -27,7 +27,7 @@
 use nalgebra::{Matrix3, Matrix6, RowSVector, SMatrix, Vector3, Vector6};
 
 use crate::lens_derivatives::LENS_PARAMETERS;
-use crate::{Angle, Kernel, Left, Point, Right, StereoPair, UnitRay};
+use crate::{Angle, Kernel, Left, MatchSigma, Point, Right, StereoPair, UnitRay};
 
 /// Number of parameters that all points of a pair share: those of both lenses and the six of the pose.
 pub const SHARED_PARAMETERS: usize = 2 * LENS_PARAMETERS + 6;
@@ -105,13 +105,13 @@ pub struct PointUncertainty {
 }
 
 impl PointUncertainty {
-    /// The uncertainty of a pseudo-intersected `point` of `pair`, for noise of `pixel_sigma` pixels in each coordinate
-    /// of each image.
+    /// The uncertainty of a pseudo-intersected `point` of `pair`, for pixels with the standard deviations `sigma`: one
+    /// number for each coordinate of each image, or [`MatchSigma`].
     ///
     /// `None` for a point on the line through both centres, and where an argument is not finite.
     #[must_use]
-    pub fn of(point: &Point<Left>, pair: &StereoPair<'_>, pixel_sigma: f64) -> Option<Self> {
-        Self::by(&Kernel::default(), point, pair, pixel_sigma)
+    pub fn of(point: &Point<Left>, pair: &StereoPair<'_>, sigma: impl Into<MatchSigma>) -> Option<Self> {
+        Self::by(&Kernel::default(), point, pair, sigma)
     }
 
     /// The uncertainty of a point triangulated by `kernel`; the other arguments are those of [`Self::of`].
@@ -120,7 +120,13 @@ impl PointUncertainty {
     /// other methods the covariance is that of the pseudo-intersection, to which they agree to first order in the
     /// epipolar plane.
     #[must_use]
-    pub fn by(kernel: &Kernel, point: &Point<Left>, pair: &StereoPair<'_>, pixel_sigma: f64) -> Option<Self> {
+    pub fn by(
+        kernel: &Kernel,
+        point: &Point<Left>,
+        pair: &StereoPair<'_>,
+        sigma: impl Into<MatchSigma>,
+    ) -> Option<Self> {
+        let sigma = sigma.into();
         let edge = match kernel {
             Kernel::EdgePlane(edge) => Some(edge.vector()),
             _ => None,
@@ -134,8 +140,11 @@ impl PointUncertainty {
         let (right_by_pixel, right_by_lens) = pair.right.ray_by_pixel_and_pixel_by_lens(&in_right);
         let left_pixel = by_left * left_by_pixel;
         let right_pixel = by_right * turn * right_by_pixel;
-        let from_pixels =
-            (left_pixel * left_pixel.transpose() + right_pixel * right_pixel.transpose()) * (pixel_sigma * pixel_sigma);
+        let baseline = pair.left_from_right.origin().mm();
+        let back = turn.transpose() * baseline;
+        let left_noise = by_left * sigma.of_ray(&left_by_pixel, &left.vector(), &baseline);
+        let right_noise = by_right * turn * sigma.of_ray(&right_by_pixel, &in_right.vector(), &back);
+        let from_pixels = left_noise * left_noise.transpose() + right_noise * right_noise.transpose();
 
         // At a fixed pixel, a change of the lens turns the ray the other way than it moves the pixel.
         let mut by_shared = SMatrix::<f64, 3, SHARED_PARAMETERS>::zeros();
@@ -180,7 +189,13 @@ impl ResidualUncertainty {
     /// With t of unit length, the angle is [t, u, v] over the larger of |t × u| and |t × v|; it depends on all three
     /// vectors. `None` where both rays lie along the baseline.
     #[must_use]
-    pub fn of(left: &UnitRay<Left>, right: &UnitRay<Right>, pair: &StereoPair<'_>, pixel_sigma: f64) -> Option<Self> {
+    pub fn of(
+        left: &UnitRay<Left>,
+        right: &UnitRay<Right>,
+        pair: &StereoPair<'_>,
+        sigma: impl Into<MatchSigma>,
+    ) -> Option<Self> {
+        let sigma = sigma.into();
         let turn = pair.left_from_right.rotation().to_rotation_matrix().into_inner();
         let centre = pair.left_from_right.origin();
         let (u, v, t) = (left.vector(), turn * right.vector(), centre.direction()?.vector());
@@ -188,8 +203,11 @@ impl ResidualUncertainty {
         let sine = from_u.norm().max(from_v.norm());
         let (left_by_pixel, left_by_lens) = pair.left.ray_by_pixel_and_pixel_by_lens(left);
         let (right_by_pixel, right_by_lens) = pair.right.ray_by_pixel_and_pixel_by_lens(right);
-        let by_left = v.cross(&t).transpose() / sine * left_by_pixel;
-        let by_right = from_u.transpose() / sine * turn * right_by_pixel;
+        let by_left_ray = v.cross(&t).transpose() / sine;
+        let by_right_ray = from_u.transpose() / sine * turn;
+        let (by_left, by_right) = (by_left_ray * left_by_pixel, by_right_ray * right_by_pixel);
+        let left_noise = by_left_ray * sigma.of_ray(&left_by_pixel, &left.vector(), &t);
+        let right_noise = by_right_ray * sigma.of_ray(&right_by_pixel, &right.vector(), &(turn.transpose() * t));
         // A shift along the baseline does not change the angle.
         let across = u.cross(&v) / (sine * centre.mm().norm());
         let by_shift = (across - t * t.dot(&across)).transpose();
@@ -200,7 +218,7 @@ impl ResidualUncertainty {
         by_shared.fixed_columns_mut::<LENS_PARAMETERS>(LENS_PARAMETERS).copy_from(&(-by_right * right_by_lens));
         by_shared.fixed_columns_mut::<3>(2 * LENS_PARAMETERS).copy_from(&by_turn);
         by_shared.fixed_columns_mut::<3>(2 * LENS_PARAMETERS + 3).copy_from(&by_shift);
-        let from_pixels = (by_left.norm_squared() + by_right.norm_squared()) * pixel_sigma * pixel_sigma;
+        let from_pixels = left_noise.norm_squared() + right_noise.norm_squared();
         let finite = from_pixels.is_finite() && by_shared.iter().all(|value| value.is_finite());
         finite.then_some(Self { from_pixels, by_shared })
     }

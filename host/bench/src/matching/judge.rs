@@ -5,6 +5,7 @@ use vergence_matching::Match;
 use vergence_vision::median;
 use vergence_vision::{Angle, CloudPoint, Pixel, Right, UnitRay};
 
+use crate::matching::reliability::Reliability;
 use crate::matching::simulated_pair::SimulatedPair;
 
 /// Largest distance of a right match from the truth, in pixels.
@@ -12,6 +13,9 @@ const RIGHT_PX: f64 = 2.5;
 /// At the edge of an object a keypoint belongs to the object or to its background: the truth is the nearest surface at this
 /// distance around the keypoint, in pixels.
 const AROUND_PX: f64 = 0.8;
+
+/// A point whose range is off by more than this many standard deviations is an outlier: its score is the probability that it is none.
+const OUTLIER_SIGMAS: f64 = 3.0;
 
 /// Matches of a pair, and how many are right.
 #[derive(Clone, Debug, Default)]
@@ -22,25 +26,23 @@ pub struct Tally {
     pub correct: usize,
     /// Median error of the right bearing, over the right matches.
     pub median_bearing_error: Angle,
-    /// Points with the smaller half of the stated position errors.
-    pub sharp: Class,
-    /// The other points.
-    pub coarse: Class,
+    /// Points of registered matches.
+    pub registered: Class,
+    /// Points of the other matches.
+    pub unregistered: Class,
+    /// Scores of the points, and how many of them hold.
+    pub reliability: Reliability,
 }
 
 /// Stated and real uncertainty of some points.
 #[derive(Clone, Debug, Default)]
 pub struct Class {
-    /// Points.
-    pub count: usize,
-    /// Median of the stated standard deviations, in pixels.
-    pub sigma_px: f64,
-    /// Real standard deviation in pixels: 1.48 times the median error in each direction, shared by both images.
-    pub spread_px: f64,
-    /// Mean squared error of the range in stated standard deviations, over the right points: 1 where the statement is right.
-    pub nees: f64,
-    /// Part of all points whose range is off by at most two standard deviations: 0.95 where the statement is right.
-    pub within_two_sigma: f64,
+    /// Stated standard deviation of each point's match, in pixels.
+    sigmas_px: Vec<f64>,
+    /// Errors of the right matches in each direction, in pixels.
+    errors_px: Vec<f64>,
+    /// Absolute errors of the ranges in stated standard deviations.
+    off_sigmas: Vec<f64>,
 }
 
 impl Tally {
@@ -62,16 +64,19 @@ impl Tally {
     #[must_use]
     pub fn of_points(points: &[CloudPoint], matches: &[Match], pair: &SimulatedPair) -> Self {
         let kept: Vec<Match> = points.iter().filter_map(|point| matches.get(point.pair_index).copied()).collect();
-        let sigmas = || kept.iter().map(|found| found.sigma);
-        let middle = (sigmas().fold(f64::INFINITY, f64::min) + sigmas().fold(0.0, f64::max)) / 2.0;
         let both: Vec<(&CloudPoint, &Match)> = points.iter().zip(&kept).collect();
-        let class = |sharp: bool| {
+        let class = |registered: bool| {
             Class::of(
-                &both.iter().filter(|(_, found)| (found.sigma <= middle) == sharp).copied().collect::<Vec<_>>(),
+                &both.iter().filter(|(_, found)| found.registered == registered).copied().collect::<Vec<_>>(),
                 pair,
             )
         };
-        Self { sharp: class(true), coarse: class(false), ..Self::of(&kept, pair) }
+        let mut reliability = Reliability::default();
+        for (point, found) in &both {
+            let off = Verdict::of(found.left, found.right, pair).off_sigmas(point);
+            off.into_iter().for_each(|off| reliability.add(found.score, off.abs() <= OUTLIER_SIGMAS));
+        }
+        Self { registered: class(true), unregistered: class(false), reliability, ..Self::of(&kept, pair) }
     }
 
     /// Part of the matches that is right.
@@ -82,37 +87,57 @@ impl Tally {
 }
 
 impl Class {
-    /// Largest relative standard deviation of a range that takes part in the statistics.
-    const USEFUL: f64 = 0.05;
-
     fn of(points: &[(&CloudPoint, &Match)], pair: &SimulatedPair) -> Self {
-        let mut errors_px = Vec::new();
-        let (mut squares, mut within, mut useful) = (Vec::new(), 0_usize, 0_usize);
+        let mut class = Self::default();
         for (point, found) in points {
             let verdict = Verdict::of(found.left, found.right, pair);
+            class.sigmas_px.push(found.sigma.mean());
             if verdict.is_right() {
-                errors_px.extend(verdict.offset_px.map(f64::abs));
+                class.errors_px.extend(verdict.offset_px.map(f64::abs));
             }
-            let range = point.point.mm().norm();
-            let sigma = point.sigma_range.mm();
-            if sigma > Self::USEFUL * range || !verdict.range_mm.is_finite() {
-                continue;
-            }
-            let off = (range - verdict.range_mm) / sigma;
-            useful += 1;
-            within += usize::from(off.abs() <= 2.0);
-            if verdict.is_right() {
-                squares.push(off * off);
-            }
+            class.off_sigmas.extend(verdict.off_sigmas(point).map(f64::abs));
         }
-        let mean = squares.iter().sum::<f64>() / squares.len().max(1) as f64;
-        Self {
-            count: points.len(),
-            sigma_px: median(points.iter().map(|(_, found)| found.sigma).collect()).unwrap_or_default(),
-            spread_px: 1.483 * std::f64::consts::FRAC_1_SQRT_2 * median(errors_px).unwrap_or_default(),
-            nees: mean,
-            within_two_sigma: within as f64 / useful.max(1) as f64,
-        }
+        class
+    }
+
+    /// Adds the points of another pair.
+    pub fn merge(&mut self, other: &Self) {
+        self.sigmas_px.extend(&other.sigmas_px);
+        self.errors_px.extend(&other.errors_px);
+        self.off_sigmas.extend(&other.off_sigmas);
+    }
+
+    /// Number of points.
+    #[must_use]
+    pub const fn count(&self) -> usize {
+        self.sigmas_px.len()
+    }
+
+    /// Median of the stated standard deviations, in pixels.
+    #[must_use]
+    pub fn sigma_px(&self) -> f64 {
+        median(self.sigmas_px.clone()).unwrap_or_default()
+    }
+
+    /// Real standard deviation in pixels: 1.48 times the median error in each direction, shared by both images.
+    #[must_use]
+    pub fn spread_px(&self) -> f64 {
+        1.483 * std::f64::consts::FRAC_1_SQRT_2 * median(self.errors_px.clone()).unwrap_or_default()
+    }
+
+    /// Part of all points whose range is off by at most so many standard deviations.
+    #[must_use]
+    pub fn within(&self, sigmas: f64) -> f64 {
+        let within = self.off_sigmas.iter().filter(|off| **off <= sigmas).count();
+        within as f64 / self.off_sigmas.len().max(1) as f64
+    }
+
+    /// Mean squared error of the range in stated standard deviations, over the points whose range is off by at most three: 0.97
+    /// where the statement is right.
+    #[must_use]
+    pub fn nees(&self) -> f64 {
+        let kept = || self.off_sigmas.iter().filter(|off| **off <= OUTLIER_SIGMAS);
+        kept().map(|off| off * off).sum::<f64>() / kept().count().max(1) as f64
     }
 }
 
@@ -120,7 +145,7 @@ impl Class {
 struct Verdict {
     offset_px: [f64; 2],
     bearing_rad: f64,
-    /// True range from the left camera.
+    /// Range of what the left pixel itself shows, from the left camera.
     range_mm: f64,
 }
 
@@ -137,7 +162,8 @@ impl Verdict {
             let bearing_rad = angle(&found.vector(), &there.vector());
             Some(Self { offset_px: [right.u - shown.u, right.v - shown.v], bearing_rad, range_mm: beside.mm() })
         };
-        let verdicts = places.into_iter().filter_map(truth);
+        let range_mm = pair.range(left).map_or(f64::NAN, |range| range.mm());
+        let verdicts = places.into_iter().filter_map(truth).map(|verdict| Self { range_mm, ..verdict });
         verdicts.min_by(|a, b| a.error_px().total_cmp(&b.error_px())).unwrap_or(Self {
             offset_px: [f64::INFINITY; 2],
             bearing_rad: f64::INFINITY,
@@ -151,6 +177,14 @@ impl Verdict {
 
     fn is_right(&self) -> bool {
         self.error_px() <= RIGHT_PX
+    }
+
+    /// Error of the range of `point` in its standard deviations; `None` where the range is too uncertain for a linear statement.
+    fn off_sigmas(&self, point: &CloudPoint) -> Option<f64> {
+        /// Largest relative standard deviation of a range that takes part in the statistics.
+        const USEFUL: f64 = 0.05;
+        let (range, sigma) = (point.point.mm().norm(), point.sigma_range.mm());
+        (sigma <= USEFUL * range && self.range_mm.is_finite()).then(|| (range - self.range_mm) / sigma)
     }
 }
 

@@ -5,6 +5,8 @@ use std::fmt;
 use serde_json::{Value, json};
 use vergence_rig::rounded;
 
+use crate::matching::judge::Class;
+use crate::matching::reliability::Reliability;
 use crate::matching::ways::Outcome;
 
 /// Counts before and after the gates, and times.
@@ -12,6 +14,9 @@ use crate::matching::ways::Outcome;
 pub struct Means {
     before: Counts,
     after: Counts,
+    registered: Class,
+    unregistered: Class,
+    reliability: Reliability,
     seconds: f64,
     network_seconds: f64,
 }
@@ -29,8 +34,21 @@ impl Means {
             counts.matches += tally.count;
             counts.correct.push(tally.correct);
         }
+        self.registered.merge(&outcome.after.registered);
+        self.unregistered.merge(&outcome.after.unregistered);
+        self.reliability.merge(&outcome.after.reliability);
         self.seconds += outcome.seconds;
         self.network_seconds += outcome.network_seconds;
+    }
+
+    /// Stated and real uncertainty of all points, for people; empty without points.
+    #[must_use]
+    pub fn honesty(&self) -> Vec<String> {
+        let classes = [("registered", &self.registered), ("unregistered", &self.unregistered)];
+        let filled = classes.into_iter().filter(|(_, class)| class.count() > 0);
+        let lines: Vec<String> = filled.map(|(name, class)| format!("{name} {class}")).collect();
+        let scores = (!lines.is_empty()).then(|| format!("score, found (stated): {}", self.reliability));
+        lines.into_iter().chain(scores).collect()
     }
 
     /// The figures as JSON.
@@ -40,6 +58,9 @@ impl Means {
         json!({
             "before": self.before.json(),
             "after": self.after.json(),
+            "registered": self.registered.json(),
+            "unregistered": self.unregistered.json(),
+            "reliability": self.reliability.json(),
             "seconds": mean(self.seconds),
             "network_seconds": mean(self.network_seconds),
         })

@@ -1,5 +1,7 @@
 //! The outcome of a way of matching for people and for programs.
 
+use std::fmt;
+
 use serde_json::{Value, json};
 use vergence_rig::rounded;
 
@@ -20,16 +22,9 @@ impl Outcome {
             self.seconds,
             self.network_seconds
         );
-        for (name, class) in [("sharp", &after.sharp), ("coarse", &after.coarse)] {
-            if class.count > 0 {
-                line += &format!(
-                    "; {name} {} sigma {:.2} px, spread {:.2} px, NEES {:.2}, {:.0} % within 2 sigma",
-                    class.count,
-                    class.sigma_px,
-                    class.spread_px,
-                    class.nees,
-                    100.0 * class.within_two_sigma
-                );
+        for (name, class) in [("registered", &after.registered), ("unregistered", &after.unregistered)] {
+            if class.count() > 0 {
+                line += &format!("; {name} {class}");
             }
         }
         if let Some(drift) = &self.drift {
@@ -43,21 +38,13 @@ impl Outcome {
     #[must_use]
     pub fn json(&self) -> Value {
         let counts = |tally: &Tally| json!({ "matches": tally.count, "correct": tally.correct, "precision": rounded(tally.precision()) });
-        let class = |class: &Class| {
-            json!({
-                "count": class.count,
-                "sigma_px": rounded(class.sigma_px),
-                "spread_px": rounded(class.spread_px),
-                "range_nees": rounded(class.nees),
-                "within_two_sigma": rounded(class.within_two_sigma),
-            })
-        };
         json!({
             "before": counts(&self.before),
             "after": counts(&self.after),
             "median_bearing_error_deg": rounded(self.after.median_bearing_error.deg()),
-            "sharp": class(&self.after.sharp),
-            "coarse": class(&self.after.coarse),
+            "registered": self.after.registered.json(),
+            "unregistered": self.after.unregistered.json(),
+            "reliability": self.after.reliability.json(),
             "drift": self.drift.as_ref().map(|drift| json!({
                 "deg": rounded(drift.angle.deg()), "significant": drift.is_significant()
             })),
@@ -65,5 +52,37 @@ impl Outcome {
             "seconds": rounded(self.seconds),
             "network_seconds": rounded(self.network_seconds),
         })
+    }
+}
+
+impl Class {
+    /// The figures as JSON.
+    #[must_use]
+    pub fn json(&self) -> Value {
+        json!({
+            "count": self.count(),
+            "sigma_px": rounded(self.sigma_px()),
+            "spread_px": rounded(self.spread_px()),
+            "range_nees": rounded(self.nees()),
+            "within_one_sigma": rounded(self.within(1.0)),
+            "within_two_sigma": rounded(self.within(2.0)),
+            "within_three_sigma": rounded(self.within(3.0)),
+        })
+    }
+}
+
+impl fmt::Display for Class {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(
+            f,
+            "{} sigma {:.2} px, spread {:.2} px, NEES {:.2}, {:.1}, {:.1} and {:.1} % within 1, 2 and 3 sigma",
+            self.count(),
+            self.sigma_px(),
+            self.spread_px(),
+            self.nees(),
+            100.0 * self.within(1.0),
+            100.0 * self.within(2.0),
+            100.0 * self.within(3.0)
+        )
     }
 }

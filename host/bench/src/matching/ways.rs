@@ -145,8 +145,9 @@ fn whole(matcher: &LearnedMatcher, images: &ImagePair<'_>) -> Result<Vec<Match>,
     let pair = |&(i, j, score): &(usize, usize, f32)| Match {
         left: pixel(found.keypoints[0][i]),
         right: pixel(found.keypoints[1][j]),
-        sigma: RAW_SIGMA_PX,
+        sigma: RAW_SIGMA_PX.into(),
         score,
+        registered: false,
     };
     Ok(found.matches.iter().map(pair).collect())
 }

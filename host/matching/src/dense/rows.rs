@@ -28,9 +28,12 @@ const BETTER: f64 = 0.7;
 pub(super) struct Sighting {
     pub left: ViewPixel,
     pub right: ViewPixel,
-    /// Standard deviation of each coordinate of `right`, in pixels of the view.
+    /// Standard deviation of `right` across its row, in pixels of the view.
     pub sigma: f64,
 }
+
+/// Pixels of a view of the dense search per pixel of the image.
+const OVERSAMPLING: f64 = 1.0;
 
 /// Finds places of the left view in the right one, on their row or a few pixels off it.
 pub(super) fn sightings(levels: &Levels) -> Vec<Sighting> {
@@ -46,7 +49,8 @@ pub(super) fn sightings(levels: &Levels) -> Vec<Sighting> {
         let left = ViewPixel { x: x as f64 * scale, y: y as f64 * scale };
         let start = ViewPixel { x: left.x - f64::from(disparities[y * width + x]) * scale, y: left.y };
         let found = refine::register(levels.planes(), left, start, level).ok()?;
-        Some(Sighting { left, right: found.right, sigma: found.sigma })
+        let [_, sigma] = found.evidence.sigma(OVERSAMPLING);
+        Some(Sighting { left, right: found.right, sigma })
     };
     places.par_iter().filter_map(sighted).collect()
 }

@@ -18,6 +18,7 @@ use crate::ViewPixel;
 use crate::corners::Keypoint;
 use crate::guided::{KEYPOINT_TOLERANCE, LEVELS};
 use crate::links::{Compared, Link, Links, Rows, agree_on_pose, bearing_pair, in_originals, register, thin};
+use crate::match_errors::{UNREGISTERED_SIGMA, state_errors};
 use crate::matcher::{ImagePair, Match, MatchError, Matcher, Matches, UnmatchedReason};
 use crate::plane::{Plane, Pyramid};
 use crate::propagate::propagate;
@@ -27,10 +28,6 @@ use crate::wrong_pose::pose_instead;
 pub use manifest::{Coordinates, Extractor, Glue, ImageInput, Manifest, MatchForm, MatchOutput, Networks, Pipeline};
 pub use model::{GreyImage, KeypointFilters, KeypointMatches, Model, Position};
 pub use network::{Elements, Network, NetworkError, Outlet, Signature, Tensor};
-
-/// Standard deviation of a match without registration, in pixels of the view in each direction: networks place
-/// keypoints on whole pixels of both views. Measured on rendered pairs: see docs/measured/matching.md.
-const UNREGISTERED_SIGMA: f64 = 0.8;
 
 /// A matcher that uses pre-trained networks.
 pub struct LearnedMatcher {
@@ -82,7 +79,7 @@ impl LearnedMatcher {
         let [left, right] = found.keypoints;
         let mut links: Links = vec![Err(UnmatchedReason::NoCandidate); left.len()];
         for (i, j, score) in found.matches {
-            links[i] = Ok(Link { right: view_pixel(right[j]), score: f64::from(score), sigma: UNREGISTERED_SIGMA });
+            links[i] = Ok(Link::of_keypoints(view_pixel(right[j]), f64::from(score), UNREGISTERED_SIGMA));
         }
         Ok(NetworkMatches { keypoints: left.into_iter().map(keypoint).collect(), right_keypoints: right.len(), links })
     }
@@ -124,7 +121,8 @@ impl NetworkMatches {
             *link = link.and_then(|link| if allowed(&link) { Ok(link) } else { Err(UnmatchedReason::Epipolar) });
         }
         let (left, right) = (Pyramid::new(views.left.plane(), LEVELS), Pyramid::new(views.right.plane(), LEVELS));
-        let compared = Compared { left: &left, right: &right, keypoints: &keypoints };
+        let oversampling = views.oversampling();
+        let compared = Compared { left: &left, right: &right, keypoints: &keypoints, oversampling };
         register(&mut links, &compared, &band, Some(UNREGISTERED_SIGMA));
         agree_on_pose(&mut links, &keypoints, &views.grid, pair.pose_sigma);
         let rows = Rows::of(&compared);
@@ -133,6 +131,7 @@ impl NetworkMatches {
         propagate(&mut links, &compared, &rows, &band);
         agree_on_pose(&mut links, &keypoints, &views.grid, pair.pose_sigma);
         thin(&mut links, &keypoints);
+        state_errors(&mut links, &keypoints);
         in_originals(&links, views, &keypoints, right_keypoints)
     }
 }

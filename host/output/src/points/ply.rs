@@ -9,9 +9,9 @@ use super::table::upper_triangle;
 
 /// The line of every header that explains unit and frame.
 const COLUMNS_COMMENT: &str = "comment millimetres in the left camera's frame: x right, y down, z forward\n";
-/// The line that explains covariances.
-const COVARIANCE_COMMENT: &str =
-    "comment cov in mm^2: in all; own: of the point's own pixels, the rest is shared by all points\n";
+/// The lines that explain score and covariances.
+const COVARIANCE_COMMENT: &str = "comment score: probability that the match is right, its range off by at most three sigma_range\n\
+     comment cov in mm^2: in all; own: of the point's own pixels, the rest is shared by all points\n";
 /// Names of the twelve columns of covariance in mm²: in all, and of the point's own pixels.
 const COVARIANCE_COLUMNS: [&str; 12] = [
     "cov_xx", "cov_xy", "cov_xz", "cov_yy", "cov_yz", "cov_zz", "own_xx", "own_xy", "own_xz", "own_yy", "own_yz",
@@ -39,9 +39,9 @@ impl PlyEncoding {
     }
 }
 
-/// The points in the left camera's frame, in millimetres, with colour, pixels in both images, sigma of the range, the matcher's
-/// score, the upper triangles of the covariance and of the part of it that comes from the point's own pixels, and whether a lens is
-/// extrapolated there.
+/// The points in the left camera's frame, in millimetres, with colour, pixels in both images, sigma of the range, the probability that
+/// the match is right (score), the upper triangles of the covariance and of the part of it that comes from the point's own pixels, and
+/// whether a lens is extrapolated there.
 #[must_use]
 pub fn ply(points: &[ColouredPoint], encoding: PlyEncoding) -> Vec<u8> {
     let format = match encoding {

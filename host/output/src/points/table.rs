@@ -32,8 +32,9 @@ pub struct Table {
     rows: Vec<Vec<f64>>,
 }
 
-const POINTS: &str = "points in the left camera's frame (x right, y down, z forward), sigma of their distance, covariance (cov), and the part of it from \
-     the point's own pixels (own); the rest is shared by all points of the pair: lenses, calibration and encoders; extrapolated is 1 where a lens was not measured";
+const POINTS: &str = "points in the left camera's frame (x right, y down, z forward), sigma of their distance, score (probability that the \
+     match is right: that the distance is off by at most three sigma), covariance (cov), and the part of it from the point's own pixels (own); \
+     the rest is shared by all points of the pair: lenses, calibration and encoders; extrapolated is 1 where a lens was not measured";
 const POINT_COLUMNS: [&str; 25] = [
     "x_mm",
     "y_mm",

@@ -57,7 +57,7 @@ pub fn run(args: &Args, console: Console) -> Result<(), Failure> {
         "{} x {} pixels; matches that are right (share of all), before and after the gates",
         args.side, args.side
     ))?;
-    let (mut rows, mut means) = (Vec::new(), Vec::new());
+    let (mut rows, mut means, mut all) = (Vec::new(), Vec::new(), vec![Means::default(); ways.len()]);
     for separation in separations {
         let mut of_ways = vec![Means::default(); ways.len()];
         for seed in args.first_seed..args.first_seed + args.seeds {
@@ -66,11 +66,12 @@ pub fn run(args: &Args, console: Console) -> Result<(), Failure> {
             // About an axis between all of them.
             let error = Vector3::new(1.0, -1.0, 1.0).normalize() * args.pose_error.rad();
             let (mut found, mut lines) = (serde_json::Map::new(), Vec::new());
-            for (way, means) in ways.iter().zip(&mut of_ways) {
+            for ((way, means), all) in ways.iter().zip(&mut of_ways).zip(&mut all) {
                 let outcome = way.find(&pair, error, &networks)?;
                 lines.push(format!("  {:>9}: {}", way.name(), outcome.in_words()));
                 found.insert(way.name().into(), outcome.json());
                 means.add(&outcome);
+                all.add(&outcome);
             }
             work.finish_and_clear();
             console.say(format!("{separation:.0}, seed {seed}"))?;
@@ -89,7 +90,13 @@ pub fn run(args: &Args, console: Console) -> Result<(), Failure> {
         }
         means.push(json!({ "separation_deg": rounded(separation.deg()), "ways": mean }));
     }
+    console.say("all points together")?;
+    let mut together = serde_json::Map::new();
+    for (way, all) in ways.iter().zip(&all) {
+        all.honesty().iter().try_for_each(|line| console.say(format!("  {:>9}: {line}", way.name())))?;
+        together.insert(way.name().into(), all.json());
+    }
     console.result(&json!({
-        "side": args.side, "pose_error_deg": rounded(args.pose_error.deg()), "rows": rows, "means": means
+        "side": args.side, "pose_error_deg": rounded(args.pose_error.deg()), "rows": rows, "means": means, "all": together
     }))
 }
