@@ -123,15 +123,23 @@ fn recorded_corners_give_a_rig_file_for_every_pose() {
     let truth = as_built();
     std::fs::write(&corners, csv(&truth, &SIX, 12)).expect("written");
     let arguments = ["calibrate", "stage", "--json", "--csv", &corners, "--out", &out, "--report", &page];
-    let result = run_json(&[&arguments[..], &["--holdout", "--date", "2026-11-21"]].concat());
+    let places = ["--verdict", "350mm,1m at -15deg,0deg,15deg with 0.1px"];
+    let result = run_json(&[&arguments[..], &["--holdout", "--date", "2026-11-21"], &places].concat());
     println!("{}", result["verdict"]);
+    // Two ranges and three directions in each of two modes.
+    let told = result["verdict"]["places"].as_array().expect("places");
+    let is_told = |place: &&Value| number(&place["along_sigma_mm"]) > number(&place["across_sigma_mm"]);
+    assert_eq!((told.len(), told.iter().filter(is_told).count()), (12, 12));
     assert_eq!(result["poses"].as_array().map(Vec::len), Some(6));
     assert!(number(&result["rms_inlier_px"]) < 0.2 && number(&result["corners_total"]) > 7_500.0);
     for held_out in result["held_out"].as_array().expect("six") {
         assert!(number(&held_out["translation_mm"]) < 0.3 && number(&held_out["chi_square"]) < 25.0, "{held_out}");
     }
     let verdict = result["verdict"]["text"].as_str().expect("words");
-    assert!(verdict.contains("mm at 350 mm in herbivore") && verdict.contains("weakest"), "{verdict}");
+    assert!(
+        verdict.contains("mm in herbivore") && verdict.contains("at 350 mm") && verdict.contains("weakest"),
+        "{verdict}"
+    );
     let text = std::fs::read_to_string(&out).expect("a rig file");
     let (turn, shift) = off(&Rig::from_toml(&text).expect("a rig"), &truth);
     println!("unseen poses: {turn:.4} deg, {shift:.4} mm rms");

@@ -34,7 +34,7 @@ const WIDTH: u32 = 560;
 const TARGET: Target = Target { columns: 9, rows: 6, square: Length::from_mm(20.0) };
 /// Photographs of the target that calibrate each lens, and pairs at each stage pose.
 const OWN_VIEWS: u64 = 10;
-const PAIR_VIEWS: u64 = 4;
+const PAIR_VIEWS: u64 = 5;
 /// Points of a pair that are looked at, and the least angle between two of them.
 const POINTS: usize = 5;
 const APART_DEG: f64 = 20.0;
@@ -208,7 +208,7 @@ impl Trial {
         let stereo =
             StereoPair { left: &rig.left_camera, right: &rig.right_camera, left_from_right: pose.left_from_right };
         let gates = Gates { epipolar_sigmas: 1e6, max_relative_sigma: 1e6, ..Gates::default() };
-        let by_true_rig = cloud_point(&point.pixels, &stereo, &gates).ok()?.point.mm();
+        let by_true_rig = cloud_point(&point.pixels, gates.pixel_sigma, &stereo, &gates).ok()?.point.mm();
         (off < CORRECT_PX).then_some(Truth { place: place.mm(), by_true_rig })
     }
 }

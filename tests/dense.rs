@@ -39,13 +39,15 @@ fn dense_files_state_honest_sigma_and_a_wrong_pose_costs_a_warning_and_few_pixel
     let [one, two] = within(&work);
     println!("{one:.1} % within 1 sigma, {two:.1} % within 2; {honest}");
     assert_eq!(honest["pose_drift"]["significant"], false, "{honest}");
-    assert!((65.0..76.0).contains(&one) && (90.0..98.0).contains(&two), "{one} {two}");
+    // The pose is exact; its stated uncertainty makes sigma larger than the errors.
+    assert!((65.0..78.0).contains(&one) && (90.0..98.0).contains(&two), "{one} {two}");
 
     let rig = std::fs::read_to_string(work.file("rig.toml")).expect("the rig file");
-    assert!(!rig.contains("[right.at_zero]"), "{rig}");
+    let (before, place) = rig.split_once("[right.at_zero]").expect("the right camera has a place");
+    let after = place.find("\n[").map_or("", |at| &place[at..]);
     let turned =
-        "\n[right.at_zero]\norigin = [\"0mm\", \"0mm\", \"0mm\"]\nrotation_vector = [\"0.3deg\", \"0deg\", \"0deg\"]\n";
-    std::fs::write(work.file("rig.toml"), rig + turned).expect("it is written");
+        "[right.at_zero]\norigin = [\"0mm\", \"0mm\", \"0mm\"]\nrotation_vector = [\"0.3deg\", \"0deg\", \"0deg\"]\n";
+    std::fs::write(work.file("rig.toml"), format!("{before}{turned}{after}")).expect("it is written");
     let output = run(&refs(&command));
     let warned = text(&output.stderr);
     assert!(output.status.success(), "{warned}");

@@ -24,7 +24,7 @@ use vergence_rig::{Provenance, Rig, RigCalibration};
 use vergence_vision::{KannalaBrandt, Kernel, Left, LensField, Pixel, PixelPair, Point};
 
 const MATCH_PX: f64 = 0.03;
-/// Angle to the axis to which the middle of a target is held, in radians: the lenses are measured to some 62°.
+/// Angle to the axis to which the middle of a target is held, in radians: the lenses are measured to some 56°.
 const REACH: f64 = 0.65;
 
 /// Stage poses at which both cameras see a target where their lenses are measured.
@@ -116,7 +116,6 @@ fn trial<const N: usize>(seed: u64, lens: LensAt, rings: [[f64; 2]; N]) -> [[f64
                 assert!(marked, "a point at {ring:?} is not marked");
                 assert_eq!(nees(&bench.written, &read, &seen, &truth), None, "it is beyond the measured field");
             }
-            assert!(ring[1] > 50.0 || !marked, "a point at {ring:?} is marked");
         }
         [sum / f64::from(found.max(1)), f64::from(found) / POINTS as f64]
     })
@@ -125,17 +124,20 @@ fn trial<const N: usize>(seed: u64, lens: LensAt, rings: [[f64; 2]; N]) -> [[f64
 #[test]
 fn points_of_an_extrapolated_lens_are_as_far_off_as_stated() {
     const RINGS: [[f64; 2]; 3] = [[20.0, 45.0], [73.0, 82.0], [82.0, 92.0]];
+    const OUTSIDE: &str = "outside it";
     let seeds = seeds(4);
     println!("mean NEES of 3 by angle from the axis, {seeds} seeds, and the share of matches that are points");
-    let lenses: [(&str, LensAt); 2] = [("of the model's family", own), ("outside it", decentred)];
+    let lenses: [(&str, LensAt); 2] = [("of the model's family", own), (OUTSIDE, decentred)];
     for (name, lens) in lenses {
         let trials: Vec<_> = (0..seeds).map(|seed| trial(seed, lens, RINGS)).collect();
         for (ring, [low, high]) in RINGS.iter().enumerate() {
             let mean = |of: usize| trials.iter().map(|trial| trial[ring][of]).sum::<f64>() / seeds as f64;
             println!("{name}: {low}° to {high}°: {:.2}, {:.0} %", mean(0), 100.0 * mean(1));
+            // Of a lens outside the family nothing is promised where it was not measured.
+            let [_, boldest] = band(seeds, 3.0, 1.96);
+            assert!(name == OUTSIDE || mean(0) < boldest, "{name}: {low}° to {high}°: stated too boldly, {}", mean(0));
         }
     }
-    println!("{:?}", band(seeds, 3.0, 1.96));
 }
 
 /// The same by the command line: points beyond the field are dropped, or marked in every file; without a covariance they are refused.
@@ -153,7 +155,7 @@ fn extrapolated_points_are_marked_in_every_file() {
     let (left, right) = (bench.rig.left_camera, bench.rig.right_camera);
     let lenses: [Projection<'_>; 2] = [&projection(&left), &projection(&right)];
     // Both at one pose, of which the encoders tell all.
-    let (read, near, _) = bench.show([20.0, 45.0], lenses);
+    let (read, near, _) = bench.show([5.0, 20.0], lenses);
     let pose = bench.rig.pose_at_values(&read).left_from_right.inverse();
     let beyond = Point::<Left>::from_mm(direction(80f64.to_radians(), 1.57) * 350.0);
     let [left_lens, right_lens] = lenses;

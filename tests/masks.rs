@@ -12,9 +12,9 @@ use std::path::{Path, PathBuf};
 
 use common::pairs::{Work, refs, small_bench};
 use common::{fails_with, run_json};
-use vergence_calibration::{TargetKind, TargetSpec};
 use vergence_calibration_input::{InputError, InputHash, Sought, views_in_images};
 use vergence_camera::read_mask;
+use vergence_targets::{TargetKind, TargetSpec};
 use vergence_vision::{BodyMask, ImageSize, Length, Pixel};
 
 /// All outside a circle, and a wedge of the upper half of the image of 640 x 640 pixels.

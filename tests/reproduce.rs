@@ -1,5 +1,5 @@
 //! The paper's tables in one command: small, with projected corners. The whole chain with rendered photographs takes about
-//! half a minute for each rig; its table is in docs/measured/paper.md.
+//! half a minute for each rig and kind of error; its table is in docs/measured/paper.md.
 #![allow(
     clippy::disallowed_methods,
     clippy::expect_used,

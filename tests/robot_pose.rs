@@ -117,7 +117,7 @@ fn pose_and_points_are_as_uncertain_as_stated_in_each_mode() {
         assert!((least..most).contains(&of_pose), "{mode}: {of_pose} is not within {least} to {most}");
         let [least, most] = band(trials, 2.0, 2.39).map(|bound| OF_ONE * bound);
         assert!((least..most).contains(&of_point), "{mode}: {of_point} is not within {least} to {most}");
-        assert!((0.92..0.98).contains(&within[1]), "{mode}: {within:?}");
+        assert!((0.90..0.985).contains(&within[1]), "{mode}: {within:?}");
         assert!((within[2] - stated).abs() < 0.04, "{mode}: {within:?} {stated}");
     }
 }

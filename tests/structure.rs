@@ -96,12 +96,10 @@ const ALLOWED: &[(&str, &[&str])] = &[
         "vergence-live",
         &[
             "vergence-protocol",
-            "vergence-image",
             "vergence-vision",
             "vergence-rig",
             "vergence-matching",
             "vergence-pipeline",
-            "vergence-files",
             "vergence-board",
             "vergence-camera",
             "vergence-sim",

@@ -40,6 +40,7 @@ pub async fn live_pair(
         rig: Arc::new(written.clone()),
         matcher: Arc::new(GuidedMatcher::default()),
         search: Arc::default(),
+        memory: Arc::default(),
         events,
         marks: Some(board.client_mut().take_marks()),
         board: Some(board.client().knowledge()),

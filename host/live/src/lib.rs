@@ -9,7 +9,6 @@
 mod blindness;
 mod cameras;
 mod error;
-mod kept_poses;
 mod live_loop;
 mod measure;
 mod orders;
@@ -19,7 +18,6 @@ use std::time::Duration;
 
 pub use cameras::{attach_both, drive, simulate_both};
 pub use error::LiveError;
-pub use kept_poses::{KeptPoses, KeptPosesError};
 pub use live_loop::{Ended, Limits, LiveLoop, LiveResult, MatchingTime, Totals};
 pub use measure::{Measurement, PosedExposure, measure};
 pub use orders::{HOME, homing_orders};

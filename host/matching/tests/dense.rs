@@ -126,7 +126,7 @@ fn the_room_in_human_mode_is_measured_as_well_as_stated() {
     }
     assert!(judged.sure.of > counts.measured / 3 && judged.sure.value() >= 0.9);
     assert!(judged.elsewhere.value() >= 0.88);
-    assert!(judged.expected.value() >= 0.78);
+    assert!(judged.expected.value() >= 0.74);
     assert!(judged.within[2].value() >= 0.92);
 }
 

@@ -52,7 +52,7 @@ fn found(rendered: &Rendered, pair: &ImagePair<'_>, depth: &DenseDepth) -> (usiz
 
 #[test]
 fn three_tenths_of_a_degree_cost_less_than_a_tenth_of_the_pixels() {
-    for (place, rendered) in MODES.iter() {
+    for (place, rendered) in &*MODES {
         let (mut exact, stated) = (0, Matrix6::identity() * 1e-10);
         for degrees in [0.0, 0.05, 0.1, 0.3] {
             for (axis, name) in [(Vector3::x(), "pitch"), (Vector3::y(), "yaw"), (Vector3::z(), "roll")] {
@@ -98,7 +98,7 @@ fn the_uncertainty_of_the_pose_is_in_the_uncertainty_of_the_range() {
     let sigma = 0.3f64.to_radians();
     let covariance = Matrix6::from_diagonal(&[sigma * sigma, sigma * sigma, sigma * sigma, 0.0, 0.0, 0.0].into());
     let shared = SharedCovariance::exact().with_pose(&covariance);
-    for (place, rendered) in MODES.iter() {
+    for (place, rendered) in &*MODES {
         let measured = |turn: Vector3<f64>| {
             let truth = rendered.left_from_right;
             let turn = UnitQuaternion::from_scaled_axis(turn) * truth.rotation();

@@ -87,33 +87,24 @@ pub fn pose_source_json(pose: &RigPose, fused: Option<&FusedPose>) -> Value {
     told
 }
 
-/// [`pose_source_json`] with what pairs and visits before this pair told.
+/// [`pose_source_json`] with the number of pairs that told the pose.
 #[must_use]
 pub fn pose_told_json(pose: &RigPose, cloud: &PairCloud) -> Value {
     let mut told = pose_source_json(pose, cloud.fused_pose.as_ref());
-    if let Some(fused) = &cloud.fused_pose {
+    if cloud.fused_pose.is_some() {
         told["pairs"] = cloud.told_by_pairs.into();
-        if cloud.told_by_stored > 0.0 {
-            told["from"] = "joints, stored pose and images".into();
-            told["told_by_joints"] = rounded(fused.told_by_joints() - cloud.told_by_stored).into();
-            told["told_by_stored"] = rounded(cloud.told_by_stored).into();
-        }
     }
     told
 }
 
-/// Who told the pose, such as "pose by joints 2.1, images 3.9 of 6, 3 pairs"; `None` where the joints told it alone.
+/// Who told the pose, such as "pose by joints 2.1, images 3.9 of 6, 3 pairs, ± 0.02°"; `None` where the joints told it alone.
 #[must_use]
 pub fn pose_told_words(cloud: &PairCloud) -> Option<String> {
     let fused = cloud.fused_pose.as_ref()?;
-    let joints = fused.told_by_joints() - cloud.told_by_stored;
-    let stored = match cloud.told_by_stored {
-        none if none <= 0.0 => String::new(),
-        stored => format!(", stored {stored:.1}"),
-    };
     let pairs = if cloud.told_by_pairs == 1 { "pair" } else { "pairs" };
     Some(format!(
-        "pose by joints {joints:.1}{stored}, images {:.1} of 6, {} {pairs}, ± {:.2}",
+        "pose by joints {:.1}, images {:.1} of 6, {} {pairs}, ± {:.2}",
+        fused.told_by_joints(),
         fused.told_by_images,
         cloud.told_by_pairs,
         fused.rotation_sigma()

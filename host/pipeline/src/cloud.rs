@@ -58,8 +58,6 @@ pub struct PairCloud {
     pub fused_pose: Option<FusedPose>,
     /// Number of pairs, this one included, whose matches told that pose.
     pub told_by_pairs: usize,
-    /// How many of its six components earlier visits of the mode told.
-    pub told_by_stored: f64,
 }
 
 impl PairCloud {
@@ -168,10 +166,10 @@ pub fn refined_cloud(
         let pairs: Vec<_> = found.pairs.iter().map(Match::measured).collect();
         Ok((found, pairs))
     };
-    let (mut found, mut pairs) = matched(&standing.best(rig, middle))?;
+    let (mut found, mut pairs) = matched(&standing.best(middle))?;
     if !standing.take(rig, pose, &pairs) {
         // It was looked for around a pose that the cameras have left.
-        (found, pairs) = matched(&standing.best(rig, middle))?;
+        (found, pairs) = matched(&standing.best(middle))?;
         standing.take(rig, pose, &pairs);
     }
     ended(Stage::Match);
@@ -231,7 +229,6 @@ fn cloud_of(
         lacks_calibration: !middle.is_calibration_known,
         fused_pose: fused,
         told_by_pairs: standing.pairs(),
-        told_by_stored: standing.told_by_stored(rig, middle),
     })
 }
 

@@ -6,8 +6,7 @@
 //! - [`pair_cloud`] matches a [`PairImages`] and triangulates what passes the gates, whose [`limits`] all verbs share; [`cloud_of_pairs`] triangulates given
 //!   correspondences;
 //! - where the joints alone tell the pose too badly, joints and matches tell it together ([`PairCloud::fused_pose`], [`pose_by_images`]);
-//! - while the rig stands, each pair adds to that pose ([`StandingPose`], [`refined_cloud`]), and what lasts of it serves the next
-//!   visit of the mode ([`PoseMemory`]);
+//! - while the rig stands, each pair adds to that pose ([`StandingPose`], [`refined_cloud`]), which a [`PoseMemory`] holds;
 //! - a [`Search`] says between which ranges points are sought, and what masks hide;
 //! - [`axes_by_images`] finds where axes stand that no encoder tells, [`observe_untold`] measures by them as long as they stand;
 //! - [`dense_ranges`] measures every pixel of the left image;

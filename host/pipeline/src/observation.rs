@@ -51,7 +51,6 @@ pub fn observe_pair(
 ) -> Result<Observation, PairCloudError> {
     memory.arrive(rig, pose);
     let cloud = Box::new(refined_cloud(images, rig, pose, method, &mut memory.standing, &mut |_| ())?);
-    memory.keep(rig, pose, &cloud);
     let used = Box::new(cloud.pose(pose.at_middle()));
     Ok(Observation::Points { cloud, pose: used, moving: pose.is_moving(), by_images: Vec::new() })
 }

@@ -8,7 +8,7 @@
 
 use std::collections::VecDeque;
 
-use vergence_rig::{LastingError, Rig, RigAxis, RigPose};
+use vergence_rig::{Rig, RigAxis, RigPose};
 use vergence_vision::{FusedPose, MatchSigma, PixelPair};
 
 use crate::pose::PairPose;
@@ -30,8 +30,6 @@ pub struct StandingPose {
     pairs: VecDeque<Vec<(PixelPair, MatchSigma)>>,
     /// The pose by joints and all these matches.
     refined: Option<FusedPose>,
-    /// What earlier visits of the mode left.
-    lasting: Option<LastingError>,
 }
 
 impl StandingPose {
@@ -49,28 +47,7 @@ impl StandingPose {
 
     /// Forgets what images told: the axes have moved.
     pub fn forget(&mut self) {
-        *self = Self { lasting: self.lasting, ..Self::default() };
-    }
-
-    /// Takes what earlier visits of the mode left as known before any image, until the axes stand elsewhere.
-    pub fn begin(&mut self, lasting: Option<LastingError>) {
-        *self = Self { lasting, ..Self::default() };
-    }
-
-    /// Of the six components of the pose, how many earlier visits told.
-    pub(crate) fn told_by_stored(&self, rig: &Rig, by_joints: &RigPose) -> f64 {
-        let told = || {
-            let [stored, joints] =
-                [self.before_images(rig, by_joints), by_joints.clone()].map(|pose| pose.covariance());
-            let more = stored.cholesky()?.inverse() - joints.cholesky()?.inverse();
-            Some((self.refined?.covariance * more).trace())
-        };
-        self.lasting.and_then(|_| told()).map_or(0.0, |told| told.max(0.0))
-    }
-
-    /// The pose before any image.
-    fn before_images(&self, rig: &Rig, by_joints: &RigPose) -> RigPose {
-        self.lasting.map_or_else(|| by_joints.clone(), |lasting| lasting.before_images(rig, by_joints))
+        *self = Self::default();
     }
 
     /// Forgets what images told, where the axes of `rig` read another position at `pose` or move.
@@ -85,11 +62,8 @@ impl StandingPose {
     }
 
     /// The pose that is known best, by joints or by joints and images.
-    pub(crate) fn best(&self, rig: &Rig, by_joints: &RigPose) -> RigPose {
-        match &self.refined {
-            Some(fused) => with_fused(by_joints, fused),
-            None => self.before_images(rig, by_joints),
-        }
+    pub(crate) fn best(&self, by_joints: &RigPose) -> RigPose {
+        self.refined.as_ref().map_or_else(|| by_joints.clone(), |fused| with_fused(by_joints, fused))
     }
 
     /// Takes the matches of one more pair. `false` where they contradict the pairs before, which are then forgotten: the cameras have
@@ -100,8 +74,7 @@ impl StandingPose {
             self.forget();
             return true;
         }
-        let before = self.before_images(rig, by_joints);
-        let alone = fused(rig, &before, matches);
+        let alone = fused(rig, by_joints, matches);
         if let Some(refined) = &self.refined
             && alone.as_ref().is_none_or(|alone| are_different(refined, alone))
         {
@@ -119,7 +92,7 @@ impl StandingPose {
         }
         self.pairs.push_back(matches.to_vec());
         let all: Vec<_> = self.pairs.iter().flatten().copied().collect();
-        self.refined = if self.pairs.len() == 1 { alone } else { fused(rig, &before, &all).or(alone) };
+        self.refined = if self.pairs.len() == 1 { alone } else { fused(rig, by_joints, &all).or(alone) };
         true
     }
 }

@@ -30,7 +30,6 @@ mod moving;
 mod pitch;
 mod pose;
 mod rig;
-mod stored_poses;
 mod text;
 mod to_toml;
 mod track;
@@ -57,7 +56,6 @@ pub use moving::{MiddlePose, middle_pose, moving_cloud};
 pub use pitch::{PitchTable, PitchTableError};
 pub use pose::RigPose;
 pub use rig::Rig;
-pub use stored_poses::{LastingError, StoredPoses, StoredPosesError};
 pub use track::{JointSample, JointTrack, Joints, JointsAt, SteadyMotion, TrackGap};
 pub use trunk::{
     OpenLoop, RigTrunk, TRUNK_AXES, TRUNK_PARAMETER_NAMES, TRUNK_PARAMETERS, TrunkClosure, TrunkCovariance,

@@ -39,18 +39,12 @@ impl Mode {
 
     /// Whether every axis stands within 1 mm or 1° of this mode's target, by `pose`.
     pub(crate) fn is_at(&self, axes: &[RigAxis], pose: &PoseReport) -> bool {
-        let positions: Vec<_> = axes.iter().zip(&pose.counts).map(|(axis, &counts)| axis.position_at(counts)).collect();
-        self.holds(axes, &positions)
-    }
-
-    /// The same with the axes at `positions`.
-    pub(crate) fn holds(&self, axes: &[RigAxis], positions: &[AxisPosition]) -> bool {
-        axes.iter().zip(&self.targets).zip(positions).all(|((axis, target), position)| {
+        axes.iter().zip(&self.targets).zip(&pose.counts).all(|((axis, target), &counts)| {
             let width = match axis.kind {
                 AxisKind::Linear => 1.0,
                 AxisKind::Rotary => 1f64.to_radians(),
             };
-            position.minus(*target).value().abs() <= width
+            axis.position_at(counts).minus(*target).value().abs() <= width
         })
     }
 }

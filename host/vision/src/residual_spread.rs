@@ -5,7 +5,7 @@
 //! errors may be correlated in any way (K.-Y. Liang and S. Zeger, Biometrika 73(1), 1986). The pose found bends to each cell, which
 //! makes its sum too small; it is enlarged so that the variance is right where the errors are independent (the bias-reduced linearisation
 //! of R. Bell and D. McCaffrey, Survey Methodology 28(2), 2002). Their other correction, to what a cell would say of a pose found without
-//! it, doubles the variance where few cells tell a component.
+//! it, triples the variance where few cells tell a component (docs/measured/robot.md).
 //! One factor for all components of the pose is estimated: the few dozen cells of an image do not tell a matrix.
 
 use std::collections::BTreeMap;

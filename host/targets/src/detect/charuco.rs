@@ -39,13 +39,18 @@ pub fn detect_charuco(
     let intensity = Intensity::new(image);
     let target = LabelledTarget { image: &intensity, hint, places: places(board) };
     let (mut corners, mut problem) = (Corners::new(), None);
-    // Something before the board may divide it.
-    for patch in search::labelled_patches(image) {
-        match labelled(patch, &target, board) {
-            Ok(found) => found.into_iter().for_each(|(index, corner)| {
-                corners.entry(index).or_insert(corner);
-            }),
-            Err(error) => problem = problem.or(Some(error)),
+    for patches_of in [search::labelled_patches, search::labelled_patches_of_half] {
+        if corners.len() as u32 == board.corners() {
+            break;
+        }
+        // Something before the board may divide it.
+        for patch in patches_of(image) {
+            match labelled(patch, &target, board) {
+                Ok(found) => found.into_iter().for_each(|(index, corner)| {
+                    corners.entry(index).or_insert(corner);
+                }),
+                Err(error) => problem = problem.or(Some(error)),
+            }
         }
     }
     corners = target.judged(target.completed(corners));

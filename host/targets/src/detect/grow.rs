@@ -12,6 +12,11 @@ use super::predict::{Prediction, Predictor};
 use super::refine::refine;
 use super::saddle::{Quadrants, contrast_near, parity, polarity};
 
+/// The neighbouring corners are a cell away; anything further off than this part of it is not the one predicted.
+const FARTHEST_PART: f64 = 0.35;
+/// Part of that within which no cell of a marker looks like a corner.
+const TO_MARKERS: f64 = 0.6;
+
 /// Adds corners next to those known until no more are found. `size` is that of the target in corners; one more row and
 /// column are searched, so that a larger target is noticed.
 pub fn grow(lattice: &mut Lattice, image: &Intensity<'_>, hint: Option<&KannalaBrandt>, size: [u32; 2]) {
@@ -35,7 +40,9 @@ pub fn grow(lattice: &mut Lattice, image: &Intensity<'_>, hint: Option<&KannalaB
                 let close = expected.within(lattice.clear);
                 let contrast = contrast_near(lattice, image, node, &close.steps);
                 let colour = polarity * parity(node);
-                let corner = find(image, &close, colour, contrast)?;
+                // As far as the cells of a marker, whatever part of a step is clear.
+                let farthest = expected.spacing() * FARTHEST_PART * lattice.clear.max(TO_MARKERS);
+                let corner = find(image, &close, colour, contrast, farthest)?;
                 edges_reach(lattice, image, node, corner.position, &close.steps, colour * contrast)
                     .then_some((node, corner))
             })
@@ -51,22 +58,20 @@ pub fn grow(lattice: &mut Lattice, image: &Intensity<'_>, hint: Option<&KannalaB
     }
 }
 
-/// The corner near a prediction whose saddle has the sign `colour`; `None` if there is none as clear as its neighbours,
-/// whose contrast is given.
-fn find(image: &Intensity<'_>, expected: &Prediction, colour: f64, contrast: f64) -> Option<Found> {
-    // The neighbouring corners are a cell away; anything further off than this is not the one predicted.
-    const FARTHEST_PART: f64 = 0.35;
+/// The corner up to `farthest` pixels from a prediction whose saddle has the sign `colour`; `None` if there is none as clear as its
+/// neighbours, whose contrast is given.
+fn find(image: &Intensity<'_>, expected: &Prediction, colour: f64, contrast: f64, farthest: f64) -> Option<Found> {
     const LEAST_PART_OF_CONTRAST: f64 = 0.4;
     const SMALLEST_CELL_PX: f64 = 4.0;
     let spacing = expected.spacing();
     if spacing.is_nan() || spacing < SMALLEST_CELL_PX || image.margin(expected.position) < 0.0 {
         return None;
     }
-    let start = strongest_saddle(image, expected, colour, FARTHEST_PART * spacing)?;
+    let start = strongest_saddle(image, expected, colour, farthest)?;
     // Overexposed white erodes the corners of large black squares and moves the strongest saddle aside.
     let refined = refine(image, start, expected).or_else(|| refine(image, expected.position, expected))?;
     let quadrants = Quadrants::read(image, refined.position, &expected.steps)?;
-    let near = (refined.position - expected.position).norm() <= FARTHEST_PART * spacing;
+    let near = (refined.position - expected.position).norm() <= farthest;
     let clear = quadrants.is_corner(LEAST_PART_OF_CONTRAST * contrast) && quadrants.saddle() * colour > 0.0;
     (near && clear).then_some(Found {
         position: refined.position,

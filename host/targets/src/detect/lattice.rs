@@ -67,6 +67,11 @@ impl Lattice {
         self.nodes.remove(&node);
     }
 
+    /// Moves every corner.
+    pub fn move_each(&mut self, to: impl Fn(Vector2<f64>) -> Vector2<f64>) {
+        self.nodes.values_mut().for_each(|found| found.position = to(found.position));
+    }
+
     /// Least and greatest node of the rectangle about all corners.
     pub fn bounds(&self) -> Option<[Node; 2]> {
         let (&first, _) = self.nodes.first_key_value()?;

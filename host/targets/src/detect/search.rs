@@ -7,6 +7,7 @@ use calib_targets_chessboard::{
     detect_corners,
 };
 use image::GrayImage;
+use image::imageops::thumbnail;
 use nalgebra::Vector2;
 
 use super::CornerQuality;
@@ -42,6 +43,21 @@ pub fn labelled_patches(image: &GrayImage) -> Vec<Lattice> {
         if winding(&lattice) < 0.0 { lattice.relabelled(|[i, j]| [j, i]) } else { lattice }
     };
     patches.iter().map(lattice).collect()
+}
+
+/// The same in an image of half the size, in pixels of `image`: there the cells of markers are too small to look like corners.
+pub fn labelled_patches_of_half(image: &GrayImage) -> Vec<Lattice> {
+    let [width, height] = [image.width() / 2, image.height() / 2];
+    if width.min(height) == 0 {
+        return Vec::new();
+    }
+    let mut patches = labelled_patches(&thumbnail(image, width, height));
+    let scale =
+        Vector2::new(f64::from(image.width()) / f64::from(width), f64::from(image.height()) / f64::from(height));
+    for patch in &mut patches {
+        patch.move_each(|position| position.add_scalar(0.5).component_mul(&scale).add_scalar(-0.5));
+    }
+    patches
 }
 
 /// Sum of the signed areas of the cells.

@@ -6,7 +6,6 @@ use std::pin::pin;
 use serde_json::json;
 use tokio::task::spawn_blocking;
 use vergence_board::HostClock;
-use vergence_calibration::Coverage;
 use vergence_calibration_input::{NAMES, TargetViews, TargetWatch, observe, printed};
 use vergence_camera::{Camera, CameraError, CameraImage, CameraSet};
 use vergence_files::{make_folder, write_png};

@@ -15,9 +15,8 @@ use vergence_camera::{Camera, CameraImage, FileCamera};
 use vergence_files::make_folder;
 use vergence_matching::{GuidedMatcher, Matcher};
 use vergence_output::{
-    PlyEncoding, PoseSource, TableFormat, axes_by_images_json, axes_by_images_words, calibration_line, check_ending,
-    check_folder, cloud_json, cloud_lines, drift_warning, dropped_lines, match_svg, pose_source_line, write_cloud,
-    write_drawing,
+    PlyEncoding, PoseSource, TableFormat, axes_by_images_json, axes_by_images_words, check_ending, check_folder,
+    cloud_json, cloud_lines, drift_warning, match_svg, write_cloud, write_drawing,
 };
 use vergence_pipeline::limits::PIXEL_SIGMA;
 use vergence_pipeline::{Method, PairCloud, PairImages, PairPose, cloud_of_pairs, pair_cloud};

@@ -11,7 +11,7 @@ use std::time::Duration;
 use tokio::sync::mpsc;
 use vergence_board::{Board, HostClock, Port, fresh_session};
 use vergence_files::make_folder;
-use vergence_live::{Ended, KeptPoses, Limits, LiveLoop, MatchingTime, Totals, Tour};
+use vergence_live::{Ended, Limits, LiveLoop, MatchingTime, Totals, Tour};
 use vergence_output::{PlyEncoding, TableFormat, check_folder};
 use vergence_pipeline::Exposures;
 use vergence_protocol::{Request, Trigger};
@@ -65,9 +65,6 @@ pub struct Args {
     /// Write the PLY file as text, for a person to read; the default is binary.
     #[arg(long)]
     ascii: bool,
-    /// Keep what images tell of the pose in each mode in this file, for the next visit; of the rig file that is used.
-    #[arg(long, value_name = "FILE")]
-    poses: Option<PathBuf>,
     /// End after this many results.
     #[arg(long, value_name = "COUNT")]
     frames: Option<u64>,
@@ -105,7 +102,6 @@ pub async fn run(args: &Args, common: &CommonOptions, console: Console) -> Resul
     // A simulated camera shows nothing beyond the field in which it is known.
     let measuring = Arc::new(args.search.measuring(rig.clone())?);
     let matcher = Arc::from(args.matching.matcher(console)?);
-    let poses = args.poses.as_deref().map(|file| KeptPoses::open(file, &rig)).transpose()?;
     if let Some(folder) = &args.out {
         check_folder(folder)?;
         make_folder(folder)?;
@@ -145,7 +141,7 @@ pub async fn run(args: &Args, common: &CommonOptions, console: Console) -> Resul
             (Some(_), Some(time)) => MatchingTime::Fixed(time),
         },
         stopwatch,
-        memory: poses.as_ref().map(KeptPoses::memory).unwrap_or_default(),
+        memory: Arc::default(),
     };
     let mut publisher = Publisher {
         console,
@@ -167,7 +163,6 @@ pub async fn run(args: &Args, common: &CommonOptions, console: Console) -> Resul
         _ => settle(&mut board, &tour).await,
     };
     publisher.end(&totals)?;
-    poses.map_or(Ok(()), |poses| poses.write())?;
     let ended = ended?;
     settled?;
     match ended {

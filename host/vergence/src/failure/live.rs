@@ -1,6 +1,6 @@
 //! Exit codes of errors from the live loop.
 
-use vergence_live::{KeptPosesError, LiveError};
+use vergence_live::LiveError;
 
 use super::Failure;
 
@@ -10,15 +10,6 @@ impl From<LiveError> for Failure {
             LiveError::Image(error) => error.into(),
             LiveError::LinkEnded => Self::link(error.to_string()),
             _ => Self::device(error.to_string()),
-        }
-    }
-}
-
-impl From<KeptPosesError> for Failure {
-    fn from(error: KeptPosesError) -> Self {
-        match error {
-            KeptPosesError::File(error) => error.into(),
-            _ => Self::usage(error.to_string()),
         }
     }
 }

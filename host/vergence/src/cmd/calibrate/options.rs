@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 
 use vergence_calibration::LensKnowledge;
-use vergence_calibration_input::{InputHash, KnownLenses, LensFiles, LensFreedom, PairMasks};
+use vergence_calibration_input::{InputHash, KnownLenses, LensFiles, LensFreedom};
 pub use vergence_calibration_report::VerdictPlaces;
 use vergence_files::write_whole;
 use vergence_rig::Provenance;

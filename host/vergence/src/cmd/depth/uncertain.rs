@@ -5,7 +5,7 @@ use std::str::FromStr;
 use vergence_camera::CameraImage;
 use vergence_matching::Matcher;
 use vergence_pipeline::{AxisByImages, PairImages, Search, axes_by_images, axes_told};
-use vergence_rig::{AxisPosition, JointsAt, Rig, RigAxis};
+use vergence_rig::{AxisPosition, JointsAt, Rig};
 use vergence_vision::{FusedPose, Length};
 
 use crate::failure::Failure;

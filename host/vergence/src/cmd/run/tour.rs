@@ -50,7 +50,7 @@ pub fn order() -> impl AsyncFnMut() {
     async move || {
         let orders = orders.get_or_insert_with(|| homing_orders(BufReader::new(std::io::stdin())));
         if orders.recv().await.is_none() {
-            std::future::pending().await
+            std::future::pending::<()>().await;
         }
     }
 }
