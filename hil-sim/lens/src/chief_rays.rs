@@ -166,10 +166,11 @@ impl ChiefRay {
         let (mut last, mut next) = (guess, guess + 1e-4 * size);
         let (mut off_last, mut off_next) = (off_centre(last)?, off_centre(next)?);
         for _ in 0..SEARCH_STEPS {
-            if off_next.abs() < AT_CENTRE * size || off_next == off_last {
+            let change = off_next - off_last;
+            if off_next.abs() < AT_CENTRE * size || change.abs() < f64::MIN_POSITIVE {
                 break;
             }
-            let better = next - off_next * (next - last) / (off_next - off_last);
+            let better = next - off_next * (next - last) / change;
             (last, off_last) = (next, off_next);
             (next, off_next) = (better, off_centre(better)?);
         }

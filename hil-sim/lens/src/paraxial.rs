@@ -13,13 +13,13 @@ impl Design {
     /// The focal length in millimetres.
     #[must_use]
     pub fn focal_length(&self) -> f64 {
-        -1.0 / self.from_infinity().slope
+        -1.0 / self.parallel_to_axis().slope
     }
 
     /// The distance from the last surface to the focus of light from infinity, in millimetres.
     #[must_use]
     pub fn back_focus(&self) -> f64 {
-        let last = self.from_infinity();
+        let last = self.parallel_to_axis();
         -last.height / last.slope
     }
 
@@ -40,7 +40,7 @@ impl Design {
     }
 
     /// The ray behind the last surface of one that comes parallel to the axis at a height of one.
-    fn from_infinity(&self) -> NearAxis {
+    fn parallel_to_axis(&self) -> NearAxis {
         let mut ray = NearAxis { height: 1.0, slope: 0.0 };
         let mut at = 0.0;
         for surface in &self.surfaces {

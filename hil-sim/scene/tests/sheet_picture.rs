@@ -1,6 +1,6 @@
 //! The quick picture of a sheet is the picture that the renderer makes of it.
 
-#![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
+#![allow(clippy::unwrap_used, clippy::print_stdout, reason = "a test fails by panicking, and shows its figures")]
 
 use image::GrayImage;
 use image::imageops::grayscale;
@@ -43,14 +43,17 @@ fn it_is_that_of_the_renderer() {
         let world_from_camera = Transform::new(UnitQuaternion::identity(), Vector3::zeros());
         let whole = render(&View { scene: &scene, camera: &camera, world_from_camera, optics: &OPTICS }, 1).image;
         let (whole, quick) = (grayscale(&whole), quick(place, EntrancePupil::default(), &OPTICS, 1));
-        let differences: Vec<f64> =
-            whole.pixels().zip(quick.pixels()).map(|(a, b)| f64::from(a.0[0].abs_diff(b.0[0]))).collect();
+        // Of linear light: near black a level of the picture is a thousandth of white, and luma is not quite the level of the luminance.
+        let linear = |level: u8| (f64::from(level) / 255.0).powf(2.2);
+        let pairs = whole.pixels().zip(quick.pixels());
+        let differences: Vec<f64> = pairs.map(|(a, b)| (linear(a.0[0]) - linear(b.0[0])).abs()).collect();
         let largest = differences.iter().copied().fold(0.0, f64::max);
         let mean = differences.iter().sum::<f64>() / differences.len() as f64;
-        // Luma of the sRGB levels is not quite the level of the luminance; edges are sampled by other rays.
-        assert!(largest <= 6.0 && mean < 0.6, "at {theta}°: {largest} levels, {mean} on average");
+        println!("at {theta}°: {largest:.4} of white at most, {mean:.5} on average");
+        // Edges are sampled by other rays, and the renderer casts a single one where an edge crosses only the corner of a pixel.
+        assert!(largest <= 0.2 && mean < 0.0005, "at {theta}°: {largest} of white, {mean} on average");
         let dark = quick.pixels().filter(|level| (1..90).contains(&level.0[0])).count();
-        assert!(dark > 200 || theta == 30.0, "at {theta}°: {dark} dark pixels");
+        assert!(dark > 200 || (theta - 30.0).abs() < 0.5, "at {theta}°: {dark} dark pixels");
     }
 }
 

@@ -2,7 +2,12 @@
 //!
 //! `VERGENCE_SIDE=1280 cargo test --release -p vergence-matching --test dense_pose -- --nocapture` prints the figures of
 //! docs/measured/dense.md.
-#![allow(clippy::unwrap_used, clippy::print_stdout, reason = "a test fails loudly and shows its figures")]
+#![allow(
+    clippy::unwrap_used,
+    clippy::expect_used,
+    clippy::print_stdout,
+    reason = "a test fails loudly and shows its figures"
+)]
 
 #[path = "common/rendered.rs"]
 mod rendered;

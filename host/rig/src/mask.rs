@@ -160,7 +160,7 @@ fn check_polygon(corners: &[[f64; 2]]) -> Result<(), String> {
     }
     let sides: Vec<_> = edges(corners).collect();
     let told = |[u, v]: [f64; 2]| format!("[{u}, {v}]");
-    if let Some([corner, _]) = sides.iter().find(|[from, to]| from == to) {
+    if let Some([corner, _]) = sides.iter().find(|[from, to]| from.map(f64::to_bits) == to.map(f64::to_bits)) {
         return Err(format!("its corner {} is given twice in a row", told(*corner)));
     }
     for (index, &[from, to]) in sides.iter().enumerate() {

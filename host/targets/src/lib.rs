@@ -10,6 +10,7 @@ mod april_grid;
 mod charuco;
 mod detect;
 mod labelling;
+mod plausible;
 mod target;
 
 pub use april_grid::{AprilGridSpec, TAG_BORDER};
@@ -19,4 +20,5 @@ pub use detect::{
     detect_charuco, see,
 };
 pub use labelling::{Relabelling, SeenTarget};
+pub use plausible::{ImplausibleTarget, corners_can_be_held};
 pub use target::{Corner, Target, TargetKind, TargetPrint, TargetSpec, TargetView};

@@ -116,7 +116,8 @@ impl Covariances {
         const FOCAL_SHARE: f64 = 0.1;
         /// Largest standard deviation of the principal point, as a share of the image's longer side.
         const CENTRE_SHARE: f64 = 0.1;
-        let sigma = |i: usize| self.shared.covariance[(i, i)].sqrt();
+        // By noise alone: whether the views determine the lens is a matter of where they are, not of how they scatter.
+        let sigma = |i: usize| self.noise[(i, i)].sqrt();
         let lens = &adjusted.shared.lens;
         let longer = f64::from(size.width.max(size.height));
         let limits = [

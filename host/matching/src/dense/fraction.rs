@@ -19,7 +19,7 @@ const LEAST_LIKENESS: f32 = 0.4;
 /// Largest roughness of one surface in pixels. A rougher one is a mixture of two.
 const ROUGHEST: f32 = 0.4;
 /// Smallest surface, in pixels of the coarsest level of the search: smaller patches are mostly wrong.
-const SMALLEST: usize = 200;
+const SMALLEST: usize = 100;
 /// Standard deviation of a disparity, in pixels, from the roughness of its surface: the factor, and its growth per
 /// pixel. Chosen, with the constants beside it, so that 68 and 95 % of the errors are within one and two standard
 /// deviations in rendered scenes (docs/measured/dense.md).

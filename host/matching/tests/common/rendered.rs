@@ -142,9 +142,9 @@ impl Rendered {
         }
         for round in 0..most {
             let before = distances.clone();
-            for index in 0..ranges.len() {
+            for (index, distance) in before.iter().enumerate() {
                 let (x, y) = (index % side, index / side);
-                if before[index] == round {
+                if *distance == round {
                     for j in y.saturating_sub(1)..(y + 2).min(side) {
                         for i in x.saturating_sub(1)..(x + 2).min(side) {
                             distances[j * side + i] = distances[j * side + i].min(round + 1);

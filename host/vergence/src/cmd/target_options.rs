@@ -9,7 +9,6 @@ use vergence_vision::Length;
 use crate::console::Console;
 use crate::failure::Failure;
 use crate::plausible::ForceOption;
-use crate::plausible::target::side_can_be_held;
 
 /// The target: a chessboard, a ChArUco board, a grid of AprilTags, or what a file says.
 #[derive(Clone, Debug, clap::Args)]
@@ -53,7 +52,7 @@ impl TargetOptions {
     /// Where an option is missing or a length is none, or none that a person can mean.
     pub fn checked_spec(&self, force: ForceOption, console: Console) -> Result<TargetKind, Failure> {
         let spec = self.spec()?;
-        force.unless_forced(side_can_be_held(&spec), console)?;
+        force.unless_forced(spec.can_be_held().map_err(Failure::from), console)?;
         Ok(spec)
     }
 
@@ -96,6 +95,10 @@ impl TargetOptions {
         if let (Some((columns, rows)), Some(square), Some(marker)) = (self.charuco, self.square, self.marker) {
             let (dictionary, legacy) = (self.dictionary, self.legacy_pattern);
             return Ok(TargetKind::Charuco(CharucoSpec { columns, rows, square, marker, dictionary, legacy }));
+        }
+        // clap lets an option pass without the one that it requires, where that one conflicts with a third.
+        if self.marker.is_some() || self.legacy_pattern {
+            return Err(Failure::usage("markers are on a ChArUco board: --charuco 9x6 --square 24mm --marker 18mm"));
         }
         if let (Some((columns, rows)), Some(square)) = (self.inner_corners, self.square) {
             return Ok(TargetKind::Chessboard(TargetSpec { columns, rows, square }));

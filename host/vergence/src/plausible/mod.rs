@@ -3,7 +3,6 @@
 
 pub mod images;
 pub mod pose;
-pub mod target;
 pub mod views;
 
 use crate::console::Console;

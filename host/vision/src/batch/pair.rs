@@ -100,12 +100,11 @@ impl BatchPoints {
 
 #[multiversion(targets("x86_64+avx512f+avx512dq+avx512vl+avx2+fma", "x86_64+avx2+fma"))]
 fn best(pair: &BatchPair, rays: [&[[f64; 3]]; 2], out: &mut BatchPoints) {
-    if target_cfg_f!(target_feature = "avx512f") {
-        all::<true, WIDE>(pair, rays, out);
-    } else if target_cfg_f!(target_feature = "fma") {
-        all::<true, NARROW>(pair, rays, out);
-    } else {
-        all::<ALWAYS_FUSED, NARROW>(pair, rays, out);
+    let (is_wide, is_fused) = (target_cfg_f!(target_feature = "avx512f"), target_cfg_f!(target_feature = "fma"));
+    match (is_wide, is_fused) {
+        (true, _) => all::<true, WIDE>(pair, rays, out),
+        (false, true) => all::<true, NARROW>(pair, rays, out),
+        (false, false) => all::<ALWAYS_FUSED, NARROW>(pair, rays, out),
     }
 }
 

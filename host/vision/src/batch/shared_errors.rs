@@ -247,11 +247,7 @@ fn through<const FUSED: bool, const W: usize>([uu, uv, vv]: &[[f64; W]; 3], [u, 
 #[inline(always)]
 fn twice<const W: usize>(vector: &InImage<W>) -> InImage<W> {
     let mut out = *vector;
-    for component in &mut out {
-        for j in 0..W {
-            component[j] *= 2.0;
-        }
-    }
+    out.iter_mut().flatten().for_each(|value| *value *= 2.0);
     out
 }
 

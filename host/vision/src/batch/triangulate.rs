@@ -87,12 +87,11 @@ impl BatchTriangulation {
 
 #[multiversion(targets("x86_64+avx512f+avx512dq+avx512vl+avx2+fma", "x86_64+avx2+fma"))]
 fn triangulate_best(kernel: &Triangulate, rays: [&[[f64; 3]]; 2], out: &mut BatchTriangulation) {
-    if target_cfg_f!(target_feature = "avx512f") {
-        triangulate_all::<true, WIDE>(kernel, rays, out);
-    } else if target_cfg_f!(target_feature = "fma") {
-        triangulate_all::<true, NARROW>(kernel, rays, out);
-    } else {
-        triangulate_all::<ALWAYS_FUSED, NARROW>(kernel, rays, out);
+    let (is_wide, is_fused) = (target_cfg_f!(target_feature = "avx512f"), target_cfg_f!(target_feature = "fma"));
+    match (is_wide, is_fused) {
+        (true, _) => triangulate_all::<true, WIDE>(kernel, rays, out),
+        (false, true) => triangulate_all::<true, NARROW>(kernel, rays, out),
+        (false, false) => triangulate_all::<ALWAYS_FUSED, NARROW>(kernel, rays, out),
     }
 }
 

@@ -9,6 +9,7 @@ use vergence_calibration_report::{
     held_out_line, left_out_json,
 };
 use vergence_rig::Rig;
+use vergence_targets::corners_can_be_held;
 
 use super::options::{LensOptions, ResultOptions, VerdictPlaces};
 use super::print_views;
@@ -17,7 +18,6 @@ use crate::cmd::target_options::TargetOptions;
 use crate::console::Console;
 use crate::failure::Failure;
 use crate::plausible::pose::{cameras_are_near, right_is_on_the_right};
-use crate::plausible::target::corners_can_be_held;
 use crate::plausible::views::views_of_pair;
 use crate::stopwatch::Stopwatch;
 
@@ -68,7 +68,7 @@ pub fn run(args: &Args, console: Console) -> Result<(), Failure> {
     })?;
     let PairViews { views, left_out, images } = views(args, [&left, &right], &mut hash, console)?;
     let force = args.result.force;
-    force.unless_forced(corners_can_be_held(views.iter().map(|view| &view.left)), console)?;
+    force.unless_forced(corners_can_be_held(views.iter().map(|view| &view.left)).map_err(Failure::from), console)?;
     force.unless_forced(views_of_pair(&views, [&left, &right]), console)?;
     let options = ExtrinsicsOptions { lenses: knowledge, robust: !args.no_loss };
     let solving = Stopwatch::start();

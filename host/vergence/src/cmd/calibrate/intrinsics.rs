@@ -10,7 +10,7 @@ use vergence_calibration_report::{
     ReportAbout, ReportImage, held_out_json, held_out_line, intrinsics_json, intrinsics_lines, intrinsics_report,
     intrinsics_verdict,
 };
-use vergence_targets::TargetView;
+use vergence_targets::{TargetView, corners_can_be_held};
 use vergence_vision::{Angle, ImageSize};
 
 use super::options::ResultOptions;
@@ -19,7 +19,6 @@ use crate::cmd::camera_options::parse_size;
 use crate::cmd::target_options::TargetOptions;
 use crate::console::Console;
 use crate::failure::Failure;
-use crate::plausible::target::corners_can_be_held;
 use crate::plausible::views::{axis_is_near_the_middle, corners_lie_in_image, views_differ};
 use crate::stopwatch::Stopwatch;
 
@@ -63,7 +62,7 @@ pub fn run(args: &Args, console: Console) -> Result<(), Failure> {
     let mut hash = InputHash::default();
     let Views { views, size, images } = views(args, &mut hash, console)?;
     let force = args.result.force;
-    force.unless_forced(corners_can_be_held(&views), console)?;
+    force.unless_forced(corners_can_be_held(&views).map_err(Failure::from), console)?;
     force.unless_forced(corners_lie_in_image(&views, size, "the camera"), console)?;
     force.unless_forced(views_differ(&views, "the camera"), console)?;
     let solving = Stopwatch::start();

@@ -9,6 +9,7 @@ use vergence_calibration::{StageError, StageOptions, calibrate_stage, check_fit,
 use vergence_calibration_input::{InputHash, KnownLenses, RecordedSet, StageViews, TrueError, stage_poses_in_corners};
 use vergence_calibration_report::{ReportAbout, left_out_json, stage_json, stage_lines, stage_report, stage_verdict};
 use vergence_rig::Rig;
+use vergence_targets::corners_can_be_held;
 
 use super::options::{LensOptions, ResultOptions, VerdictPlaces};
 use super::print_views;
@@ -18,7 +19,6 @@ use crate::cmd::target_options::TargetOptions;
 use crate::console::Console;
 use crate::failure::Failure;
 use crate::plausible::pose::{cameras_are_near, right_is_on_the_right};
-use crate::plausible::target::corners_can_be_held;
 use crate::plausible::views::views_of_pair;
 use crate::rig_file;
 use crate::stopwatch::Stopwatch;
@@ -94,7 +94,10 @@ pub async fn run(args: &Args, common: &CommonOptions, console: Console) -> Resul
     let (poses, left_out) = poses(args, &drawn, &mut hash, console)?;
     let force = args.result.force;
     for pose in &poses {
-        force.unless_forced(corners_can_be_held(pose.views.iter().map(|view| &view.left)), console)?;
+        force.unless_forced(
+            corners_can_be_held(pose.views.iter().map(|view| &view.left)).map_err(Failure::from),
+            console,
+        )?;
         force.unless_forced(views_of_pair(&pose.views, [&drawn.left_camera, &drawn.right_camera]), console)?;
     }
     let options = StageOptions { lenses: knowledge, robust: !args.no_loss, ..StageOptions::default() };
