@@ -60,7 +60,7 @@ fn boards_are_found_from_the_axis_to_past_90_degrees() {
         let place = pose.camera_from_target(&sheet(&board));
         let scene = Scene::studio().with_target(sheet(&board), place.renamed());
         let image = photograph(&scene, &camera, &optics(blur, noise), seed);
-        for (hint, share) in [(None, 0.3), (Some(&camera), 0.8)] {
+        for (hint, share) in [(None, 0.9), (Some(&camera), 0.95)] {
             let Tally { found, in_sight, rms_px, worst_px, farthest_deg } = tally(&board, place, &camera, &image, hint);
             println!(
                 "theta {theta_deg}°, {name}, blur {blur}, noise {noise}, lens {}: {found} of {in_sight}, rms {rms_px:.4} px, \
@@ -68,8 +68,8 @@ fn boards_are_found_from_the_axis_to_past_90_degrees() {
                 if hint.is_some() { "known" } else { "unknown" },
             );
             assert!(found as f64 >= share * in_sight as f64, "{found} of {in_sight} found");
-            assert!(rms_px < 0.1 && worst_px < 0.6, "rms {rms_px} px, worst {worst_px} px");
-            assert!(hint.is_none() || theta_deg < 86.0 || farthest_deg > 92.0, "farthest at {farthest_deg}°");
+            assert!(rms_px < 0.1 && worst_px < 0.4, "rms {rms_px} px, worst {worst_px} px");
+            assert!(theta_deg < 86.0 || farthest_deg > 94.0, "farthest at {farthest_deg}°");
         }
     }
 }
@@ -183,7 +183,7 @@ fn no_label_is_wrong_in_many_images() {
         rings.add(&truth.in_sight(), &errors);
     }
     let (share, rms) = rings.print("ChArUco");
-    assert!(rms < 0.1 && share > 0.7, "rms {rms} px, {share} of the corners");
+    assert!(rms < 0.1 && share > 0.85, "rms {rms} px, {share} of the corners");
 }
 
 /// How small squares may be: the figures of the page on calibrating.

@@ -22,7 +22,7 @@ use crate::labelling::{Relabelling, turned};
 ///
 /// One image's corners agree among themselves in every case, which is all that intrinsics need. Two cameras' views of
 /// a target may be paired by index where both are [`Unique`](Self::Unique) only; for the others
-/// [`label_pairs`](crate::label_pairs) compares all labellings that the images allow.
+/// `vergence_calibration::label_pairs` compares all labellings that the images allow.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum Placement {
