@@ -9,6 +9,8 @@
 )]
 
 mod common;
+#[path = "common/live_bench.rs"]
+mod live_bench;
 #[path = "common/live_pair.rs"]
 mod live_pair;
 

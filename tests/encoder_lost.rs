@@ -9,6 +9,8 @@
 )]
 
 mod common;
+#[path = "common/live_bench.rs"]
+mod live_bench;
 
 use std::future::pending;
 use std::io::{BufRead, BufReader, Write};
@@ -18,19 +20,19 @@ use std::time::Duration;
 
 use common::rendered::{band, seeds};
 use common::vergence;
+use live_bench::{LiveBench, Setting};
 use nalgebra::{Isometry3, UnitQuaternion};
 use serde_json::Value;
-use tokio::sync::{Notify, mpsc};
+use tokio::sync::Notify;
 use vergence::failure::Failure;
-use vergence::sim::{SharedRig, SimulatedRig, board_of};
+use vergence::sim::SharedRig;
 use vergence_board::{Board, BoardError};
-use vergence_live::{Limits, LiveLoop, LiveResult, MatchingTime, Measurement, Totals, Tour, drive};
-use vergence_matching::GuidedMatcher;
-use vergence_pipeline::{AxisByImages, Exposures, Observation, PairCloud};
-use vergence_protocol::{Mode as ModeNumber, Refusal, Request, SessionId, Trigger};
+use vergence_live::{Limits, LiveLoop, LiveResult, Measurement, Totals, Tour};
+use vergence_pipeline::{AxisByImages, Observation, PairCloud};
+use vergence_protocol::{Mode as ModeNumber, Refusal, Request, Trigger};
 use vergence_rig::{AxisPosition, BENCH_TOML, Chain, Mode, Rig, RigCalibration, RigPose};
-use vergence_sim::{LiveCamera, Random, Room, RoomCamera};
-use vergence_vision::{Angle, FusedPose, Length, Side, Transform};
+use vergence_sim::{Random, Room};
+use vergence_vision::{Angle, FusedPose, Length, Transform};
 
 /// Width of the images: three eighths of the real ones, where the pose is judged; a quarter of them elsewhere.
 const WIDTH: u32 = 480;
@@ -73,33 +75,10 @@ impl Bench {
     async fn new(seed: u64, width: u32) -> Self {
         let drawn = drawn(width);
         let built = as_built(&drawn, &mut Random::new(500 + seed));
-        let simulated = SharedRig::new(SimulatedRig::new(&built, 1 + seed).expect("a simulated rig"));
-        let hidden = indicatif::ProgressBar::hidden();
-        let mut board = board_of(&simulated, drawn.clone(), SessionId(7), 1000, hidden).await.expect("a board");
-        board.compare_clocks().await.expect("the link holds");
-        board.armed(pending(), async |board| board.home().await).await.expect("homed");
-        let (listener, events) = mpsc::channel(16);
-        let clock = board.client().clock();
-        let room = Arc::new(Room::with_rig());
-        for (side, lens, shutter) in
-            [(Side::Left, built.left_camera, built.shutters[0]), (Side::Right, built.right_camera, built.shutters[1])]
-        {
-            let camera = RoomCamera { side, lens, room: Arc::clone(&room), seed };
-            tokio::spawn(drive(LiveCamera::new(camera, shutter, &[]), simulated.clone(), clock, listener.clone()));
-        }
-        let live = LiveLoop {
-            rig: Arc::new(drawn),
-            matcher: Arc::new(GuidedMatcher::default()),
-            search: Arc::default(),
-            events,
-            marks: Some(board.client_mut().take_marks()),
-            board: Some(board.client().knowledge()),
-            clock,
-            exposures: Exposures::new(Some(f64::from(PERIOD_US))),
-            matching_time: MatchingTime::Fixed(Duration::from_millis(150)),
-            stopwatch: || Duration::ZERO,
-            memory: Arc::default(),
-        };
+        let (room, matching) = (Arc::new(Room::with_rig()), Duration::from_millis(150));
+        let setting =
+            Setting { rigs: [&built, &drawn], room: &room, seeds: [1 + seed, seed], period_us: PERIOD_US, matching };
+        let LiveBench { simulated, board, live } = LiveBench::homed(setting).await;
         Self { simulated, built, board, live }
     }
 

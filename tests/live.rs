@@ -7,6 +7,8 @@
 )]
 
 mod common;
+#[path = "common/live_bench.rs"]
+mod live_bench;
 
 use std::future::pending;
 use std::io::{BufRead, BufReader, Read};
@@ -16,18 +18,17 @@ use std::sync::Arc;
 use std::time::Duration;
 
 use common::{fails_with, run, text, vergence};
+use live_bench::{LiveBench, Setting};
 use serde_json::Value;
-use tokio::sync::mpsc;
 use vergence::failure::Failure;
-use vergence::sim::{SharedRig, SimulatedRig, board_of};
+use vergence::sim::SharedRig;
 use vergence_board::Board;
-use vergence_live::{Limits, LiveLoop, LiveResult, MatchingTime, Measurement, Totals, drive};
-use vergence_matching::GuidedMatcher;
-use vergence_pipeline::{ColouredPoint, Exposures, Observation};
-use vergence_protocol::{Mode, Request, SessionId, Trigger};
+use vergence_live::{Limits, LiveLoop, LiveResult, Measurement, Totals};
+use vergence_pipeline::{ColouredPoint, Observation};
+use vergence_protocol::{Mode, Request, Trigger};
 use vergence_rig::{AxisPosition, BENCH_TOML, Rig, Shutter};
-use vergence_sim::{LiveCamera, Room, RoomCamera};
-use vergence_vision::{Angle, Left, Length, Side};
+use vergence_sim::Room;
+use vergence_vision::{Angle, Left, Length};
 
 /// The bench with small cameras whose rows are exposed one after the other, 20 ms from the first to the last.
 fn small_bench() -> String {
@@ -60,34 +61,11 @@ const PERIOD_US: u32 = 100_000;
 impl Bench {
     async fn new(believed: [Shutter; 2]) -> Self {
         let rig = rig();
-        let simulated = SharedRig::new(SimulatedRig::new(&rig, 1).expect("a simulated rig"));
-        let hidden = indicatif::ProgressBar::hidden();
-        let mut board = board_of(&simulated, rig.clone(), SessionId(7), 1000, hidden).await.expect("a board");
-        board.compare_clocks().await.expect("the link holds");
-        board.armed(pending(), async |board| board.home().await).await.expect("homed");
-        let (listener, events) = mpsc::channel(16);
-        let clock = board.client().clock();
         let room = Arc::new(Room::with_rig());
-        for (side, lens, shutter) in
-            [(Side::Left, rig.left_camera, rig.shutters[0]), (Side::Right, rig.right_camera, rig.shutters[1])]
-        {
-            let camera = RoomCamera { side, lens, room: Arc::clone(&room), seed: 3 };
-            let camera = LiveCamera::new(camera, shutter, &[]);
-            tokio::spawn(drive(camera, simulated.clone(), clock, listener.clone()));
-        }
-        let live = LiveLoop {
-            rig: Arc::new(Rig { shutters: believed, ..rig.clone() }),
-            matcher: Arc::new(GuidedMatcher::default()),
-            search: Arc::default(),
-            events,
-            marks: Some(board.client_mut().take_marks()),
-            board: Some(board.client().knowledge()),
-            clock,
-            exposures: Exposures::new(Some(f64::from(PERIOD_US))),
-            matching_time: MatchingTime::Fixed(Duration::from_millis(50)),
-            stopwatch: || Duration::ZERO,
-            memory: Arc::default(),
-        };
+        let believed = Rig { shutters: believed, ..rig.clone() };
+        let matching = Duration::from_millis(50);
+        let setting = Setting { rigs: [&rig, &believed], room: &room, seeds: [1, 3], period_us: PERIOD_US, matching };
+        let LiveBench { simulated, board, live } = LiveBench::homed(setting).await;
         Self { simulated, room, board, live, rig }
     }
 

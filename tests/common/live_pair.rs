@@ -4,16 +4,14 @@ use std::future::pending;
 use std::sync::Arc;
 use std::time::Duration;
 
-use tokio::sync::mpsc;
 use vergence::failure::Failure;
-use vergence::sim::{SharedRig, SimulatedRig, board_of};
-use vergence_live::{Limits, LiveLoop, LiveResult, MatchingTime, Totals, drive};
-use vergence_matching::GuidedMatcher;
-use vergence_pipeline::{Exposures, Observation, PairCloud};
-use vergence_protocol::{Mode, Request, SessionId, Trigger};
+use vergence_live::{Limits, LiveResult, Totals};
+use vergence_pipeline::{Observation, PairCloud};
+use vergence_protocol::{Mode, Request, Trigger};
 use vergence_rig::{AxisPosition, Rig, RigPose};
-use vergence_sim::{LiveCamera, Room, RoomCamera};
-use vergence_vision::Side;
+use vergence_sim::Room;
+
+use crate::live_bench::{LiveBench, Setting};
 
 const PERIOD_US: u32 = 100_000;
 
@@ -25,30 +23,9 @@ pub async fn live_pair(
     targets: &[AxisPosition],
     seed: u64,
 ) -> (PairCloud, RigPose) {
-    let simulated = SharedRig::new(SimulatedRig::new(built, seed).expect("a simulated rig"));
-    let hidden = indicatif::ProgressBar::hidden();
-    let mut board = board_of(&simulated, written.clone(), SessionId(7), 1000, hidden).await.expect("a board");
-    board.compare_clocks().await.expect("the link holds");
-    board.armed(pending(), async |board| board.home().await).await.expect("homed");
-    let (listener, events) = mpsc::channel(16);
-    let clock = board.client().clock();
-    for (side, shutter) in [Side::Left, Side::Right].into_iter().zip(built.shutters) {
-        let camera = RoomCamera { side, lens: *built.camera(side), room: Arc::clone(room), seed };
-        tokio::spawn(drive(LiveCamera::new(camera, shutter, &[]), simulated.clone(), clock, listener.clone()));
-    }
-    let mut live = LiveLoop {
-        rig: Arc::new(written.clone()),
-        matcher: Arc::new(GuidedMatcher::default()),
-        search: Arc::default(),
-        memory: Arc::default(),
-        events,
-        marks: Some(board.client_mut().take_marks()),
-        board: Some(board.client().knowledge()),
-        clock,
-        exposures: Exposures::new(Some(f64::from(PERIOD_US))),
-        matching_time: MatchingTime::Fixed(Duration::from_millis(50)),
-        stopwatch: || Duration::ZERO,
-    };
+    let (rigs, matching) = ([built, written], Duration::from_millis(50));
+    let setting = Setting { rigs, room, seeds: [seed; 2], period_us: PERIOD_US, matching };
+    let LiveBench { simulated, mut board, mut live } = LiveBench::homed(setting).await;
     let (mut found, mut totals) = (None, Totals::default());
     board
         .armed(pending(), async |board| -> Result<_, Failure> {

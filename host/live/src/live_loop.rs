@@ -10,6 +10,7 @@ use tokio::time::{Instant, interval, sleep, sleep_until};
 use vergence_board::{BoardKnowledge, HostClock, LostAxis, Told};
 use vergence_camera::{CameraEvent, PendingImage};
 use vergence_matching::Matcher;
+use vergence_pipeline::limits::FLICKER_COUNTS;
 use vergence_pipeline::{
     Ambiguity, Exposed, ExposedImage, Exposures, Method, Motion, Observation, PairPose, PoseMemory, Search, SkipReason,
     TimeBase, UntoldAxes, pair_exposure,
@@ -342,8 +343,6 @@ fn untold(
     track: &JointTrack,
     lost: &[LostAxis],
 ) -> Result<PosedExposure, NoResult> {
-    /// An axis that reads more counts further than this before has moved.
-    const FLICKER: f64 = 2.0;
     const BEFORE_US: f64 = 5_000.0;
     let middle = images[0].middle;
     let before = track.at(BoardInstant { us: middle.us - BEFORE_US, ..middle })?;
@@ -351,7 +350,7 @@ fn untold(
     let axes: Vec<usize> = lost.iter().map(|lost| lost.axis).collect();
     let readings = before.counts.iter().zip(&joints.counts).enumerate();
     let mut told = readings.filter(|(index, _)| !axes.contains(index));
-    if told.any(|(_, (before, now))| (now - before).abs() > FLICKER) {
+    if told.any(|(_, (before, now))| (now - before).abs() > FLICKER_COUNTS) {
         return Err(NoResult::Skipped(SkipReason::EncodersUnknown));
     }
     for lost in lost {

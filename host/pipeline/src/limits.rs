@@ -23,6 +23,9 @@ const ASSUMED_SHIFT: Length = Length::from_mm(0.1);
 /// Largest standard deviation of a point's range from its own two pixels, as a part of the range.
 pub const MAX_RELATIVE_SIGMA: f64 = 0.05;
 
+/// An axis whose reading differs by more counts than this has moved.
+pub const FLICKER_COUNTS: f64 = 2.0;
+
 /// The gates for clouds of `rig` in `pose`, with points up to the range `farthest`: as wide as pixels and pose are uncertain.
 #[must_use]
 pub fn cloud_gates(rig: &Rig, pose: &RigPose, kernel: Kernel, farthest: Option<Length>) -> Gates {

@@ -1,8 +1,7 @@
 //! What a live rig remembers of its pose from pair to pair.
 
-use vergence_rig::{JointsAt, Rig};
+use vergence_rig::JointsAt;
 
-use crate::pose::PairPose;
 use crate::standing::StandingPose;
 
 /// What images told of the pose while the rig stands.
@@ -20,12 +19,10 @@ impl PoseMemory {
         *self = Self::default();
     }
 
-    /// Notes where the encoders say that the rig stands, before a pair is measured.
-    pub(crate) fn arrive(&mut self, rig: &Rig, pose: &PairPose) {
-        // What was found without an encoder is no pose by encoders.
+    /// Forgets what images told while no encoder told some axes: that is no pose by encoders.
+    pub(crate) fn forget_untold(&mut self) {
         if self.found.is_some() {
             self.forget();
         }
-        self.standing.forget_if_moved(rig, pose);
     }
 }

@@ -49,7 +49,7 @@ pub fn observe_pair(
     method: Method<'_>,
     memory: &mut PoseMemory,
 ) -> Result<Observation, PairCloudError> {
-    memory.arrive(rig, pose);
+    memory.forget_untold();
     let cloud = Box::new(refined_cloud(images, rig, pose, method, &mut memory.standing, &mut |_| ())?);
     let used = Box::new(cloud.pose(pose.at_middle()));
     Ok(Observation::Points { cloud, pose: used, moving: pose.is_moving(), by_images: Vec::new() })

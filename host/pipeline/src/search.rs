@@ -27,7 +27,7 @@ pub enum InvalidSearch {
     /// A range is none.
     #[error("--{name} {range}: a range is positive, such as 150mm")]
     Range {
-        /// Which.
+        /// The name of its option: `nearest` or `farthest`.
         name: &'static str,
         /// The range.
         range: Length,

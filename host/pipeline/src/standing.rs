@@ -11,13 +11,12 @@ use std::collections::VecDeque;
 use vergence_rig::{Rig, RigAxis, RigPose};
 use vergence_vision::{FusedPose, MatchSigma, PixelPair};
 
+use crate::limits::FLICKER_COUNTS;
 use crate::pose::PairPose;
 use crate::pose_source::{fused, joints_suffice, with_fused};
 
 /// Number of pairs whose matches are kept. What more pairs of one view would add is lost in what they have in common.
 const PAIRS: usize = 10;
-/// An axis whose reading differs by more counts than this has moved.
-const FLICKER: f64 = 2.0;
 /// χ² of six components with a probability of 1e-4: two poses that differ by more are two poses.
 const DIFFERENT: f64 = 27.86;
 
@@ -54,7 +53,7 @@ impl StandingPose {
     pub(crate) fn forget_if_moved(&mut self, rig: &Rig, pose: &PairPose) {
         let at = pose.at_middle().axes.iter().map(|axis| axis.value());
         let moved = |((axis, before), now): ((&RigAxis, &f64), f64)| {
-            (now - before).abs() > FLICKER * axis.value_per_count().abs()
+            (now - before).abs() > FLICKER_COUNTS * axis.value_per_count().abs()
         };
         if !pose.is_steady() || rig.axes.iter().zip(&self.axes).zip(at).any(moved) {
             self.forget();

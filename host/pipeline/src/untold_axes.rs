@@ -9,6 +9,7 @@ use vergence_vision::{Angle, FusedPose};
 
 use crate::axes_by_images::{axes_by_images, axis_estimates, best_look};
 use crate::cloud::{Method, PairCloudError, refined_cloud};
+use crate::limits::FLICKER_COUNTS;
 use crate::memory::PoseMemory;
 use crate::observation::Observation;
 use crate::pair::PairImages;
@@ -21,8 +22,6 @@ const NEAR: Angle = Angle::from_deg(1.5);
 const AGREEING: f64 = 0.5;
 /// An axis that turns the cameras by less than this with a count, in radians, does not turn them at all.
 const SLIDES: f64 = 1e-12;
-/// An encoder that tells its axis has moved where it reads more counts than this beside its last reading.
-const FLICKER: f64 = 2.0;
 
 /// The readings of a rig that stands, some of which tell nothing.
 #[derive(Clone, Debug, PartialEq)]
@@ -84,7 +83,7 @@ impl UntoldAxes {
     fn stand_at(&self, found: &JointsAt) -> bool {
         let readings = self.joints.counts.iter().zip(&found.counts).enumerate();
         let mut told = readings.filter(|(index, _)| !self.axes.contains(index));
-        told.all(|(_, (now, then))| (now - then).abs() <= FLICKER)
+        told.all(|(_, (now, then))| (now - then).abs() <= FLICKER_COUNTS)
     }
 }
 
