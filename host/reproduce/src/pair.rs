@@ -4,14 +4,14 @@
 use rayon::prelude::*;
 use vergence_calibration::{ExtrinsicsOptions, FEWEST_VIEWS, StereoView, calibrate_extrinsics, target_pose};
 use vergence_sim::Random;
-use vergence_targets::{Corner, TargetView};
+use vergence_targets::TargetView;
 use vergence_vision::{KannalaBrandt, Left, Right, Transform};
 
 use crate::bench::Bench;
 use crate::chain::photographs;
 use crate::conditions::Conditions;
 use crate::pinhole_pair::{PinholePair, PinholeView};
-use crate::target_shot::{FoundCorners, same_place};
+use crate::target_shot::{FoundCorners, in_both};
 use crate::targets::{Spread, targets};
 use crate::undistort::Pinhole;
 
@@ -99,10 +99,7 @@ fn on_undistorted(
 ) -> (usize, Option<PinholePair>) {
     let view = |seen: &Seen| {
         let corners = both(&seen.undistorted)?.map(|view| view.corners.clone());
-        let common = |of: &[Corner], other: &[Corner]| {
-            of.iter().filter(|corner| other.iter().any(|twin| same_place(corner, twin))).count()
-        };
-        if common(&corners[0], &corners[1]) < FEWEST_CORNERS {
+        if in_both(&corners[0], &corners[1]).count() < FEWEST_CORNERS {
             return None;
         }
         let left_from_target = target_pose(&known[0], &seen.fisheye[0].as_ref()?.view).ok()?.camera_from_target;

@@ -231,6 +231,11 @@ fn errors(view: &TargetView, truth: &TargetView) -> Vec<f64> {
     view.corners.iter().filter_map(of).flatten().collect()
 }
 
+/// The corners of `of` that `other` has too.
+pub fn in_both<'a>(of: &'a [Corner], other: &'a [Corner]) -> impl Iterator<Item = &'a Corner> {
+    of.iter().filter(|corner| other.iter().any(|twin| same_place(corner, twin)))
+}
+
 /// Whether both are the same corner of the target.
 pub fn same_place(a: &Corner, b: &Corner) -> bool {
     /// Labels are exact; this is rounding.

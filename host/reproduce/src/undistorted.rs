@@ -1,9 +1,9 @@
 //! What of the bench is in undistorted pictures.
 
-use vergence_targets::{Corner, TargetView};
+use vergence_targets::TargetView;
 
 use crate::bench::scene_target;
-use crate::target_shot::{FoundCorners, same_place};
+use crate::target_shot::{FoundCorners, in_both};
 use crate::undistort::Pinhole;
 
 /// A target in one undistorted picture.
@@ -43,13 +43,12 @@ impl Undistorted {
     pub fn count(&mut self, seen: &[Option<InPicture>; 2], left_camera: &Pinhole<'_>) {
         self.corners += (scene_target().columns * scene_target().rows) as usize;
         let [Some(left), Some(right)] = seen else { return };
-        let is_in = |view: &TargetView, corner: &Corner| view.corners.iter().any(|other| same_place(other, corner));
-        for corner in left.truth.corners.iter().filter(|corner| is_in(&right.truth, corner)) {
+        for corner in in_both(&left.truth.corners, &right.truth.corners) {
             self.inside += 1;
             self.stretch += left_camera.stretch(corner.pixel);
         }
         let (Some(left), Some(right)) = (left.labelled(), right.labelled()) else { return };
-        self.found += left.view.corners.iter().filter(|corner| is_in(&right.view, corner)).count();
+        self.found += in_both(&left.view.corners, &right.view.corners).count();
         for error in left.errors_px.iter().chain(&right.errors_px) {
             self.squares_px2.0 += error * error;
             self.squares_px2.1 += 1;

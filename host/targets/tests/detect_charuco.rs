@@ -5,7 +5,7 @@ mod rendered;
 mod simulated;
 
 use image::GrayImage;
-use rendered::{ByAngle, Pose, Tally, Truth, fisheye, half_hidden, optics, photograph};
+use rendered::{ByAngle, Pose, Tally, Truth, fisheye, half_hidden_shots, optics, photograph};
 use simulated::Dice;
 use vergence_scene::{MarkerBoard, Optics, Scene, Sheet, TagPrint, Target};
 use vergence_targets::{CharucoSpec, DetectError, MARKER_BORDER, TagFamily, detect_charuco};
@@ -78,11 +78,7 @@ fn boards_are_found_from_the_axis_to_past_90_degrees() {
 #[test]
 fn a_board_half_hidden_is_found_where_it_is_seen() {
     let (camera, board) = (fisheye(1280), board("DICT_4X4_50"));
-    for (theta_deg, seed) in [(10.0, 1), (75.0, 2)] {
-        let pose = Pose { theta_deg, azimuth_deg: 40.0, roll_deg: 30.0, tilt_deg: 10.0, distance_mm: 190.0 };
-        let place = pose.camera_from_target(&sheet(&board));
-        let scene = half_hidden(Scene::studio().with_target(sheet(&board), place.renamed()), &place);
-        let image = photograph(&scene, &camera, &optics(0.7, 2.0), seed);
+    for (theta_deg, place, image) in half_hidden_shots(sheet(&board), &camera) {
         for hint in [None, Some(&camera)] {
             let Tally { found, in_sight, rms_px, worst_px, .. } = tally(&board, place, &camera, &image, hint);
             println!(

@@ -5,7 +5,7 @@ mod rendered;
 mod simulated;
 
 use image::GrayImage;
-use rendered::{ByAngle, Pose, Tally, Truth, fisheye, half_hidden, optics, photograph};
+use rendered::{ByAngle, Pose, Tally, Truth, fisheye, half_hidden_shots, optics, photograph};
 use simulated::Dice;
 use vergence_scene::{Optics, Scene, Sheet, TagGrid, TagPrint, Target};
 use vergence_targets::{AprilGridSpec, DetectError, Placement, TAG_BORDER, TargetSpec, detect, detect_april_grid};
@@ -75,11 +75,7 @@ fn grids_are_found_from_the_axis_to_past_90_degrees() {
 #[test]
 fn a_grid_half_hidden_is_found_where_it_is_seen() {
     let (camera, sheet) = (fisheye(1280), sheet(GRID));
-    for (theta_deg, seed) in [(10.0, 1), (75.0, 2)] {
-        let pose = Pose { theta_deg, azimuth_deg: 40.0, roll_deg: 30.0, tilt_deg: 10.0, distance_mm: 190.0 };
-        let place = pose.camera_from_target(&sheet);
-        let scene = half_hidden(Scene::studio().with_target(sheet, place.renamed()), &place);
-        let image = photograph(&scene, &camera, &optics(0.7, 2.0), seed);
+    for (theta_deg, place, image) in half_hidden_shots(sheet, &camera) {
         for hint in [None, Some(&camera)] {
             let corners = detect_april_grid(&image, &GRID, hint).unwrap();
             let Tally { found, in_sight, rms_px, worst_px, .. } = truth(place, &camera).tally(&corners);

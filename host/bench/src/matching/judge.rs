@@ -50,10 +50,14 @@ impl Tally {
     #[must_use]
     pub fn of(matches: &[Match], pair: &SimulatedPair) -> Self {
         let verdicts: Vec<Verdict> = matches.iter().map(|found| Verdict::of(found.left, found.right, pair)).collect();
+        Self::of_verdicts(&verdicts)
+    }
+
+    fn of_verdicts(verdicts: &[Verdict]) -> Self {
         let correct: Vec<&Verdict> = verdicts.iter().filter(|verdict| verdict.is_right()).collect();
         let bearing = median(correct.iter().map(|verdict| verdict.bearing_rad).collect()).unwrap_or_default();
         Self {
-            count: matches.len(),
+            count: verdicts.len(),
             correct: correct.len(),
             median_bearing_error: Angle::from_rad(bearing),
             ..Self::default()
@@ -63,20 +67,18 @@ impl Tally {
     /// Tallies the points that `matches` made.
     #[must_use]
     pub fn of_points(points: &[CloudPoint], matches: &[Match], pair: &SimulatedPair) -> Self {
-        let kept: Vec<Match> = points.iter().filter_map(|point| matches.get(point.pair_index).copied()).collect();
-        let both: Vec<(&CloudPoint, &Match)> = points.iter().zip(&kept).collect();
-        let class = |registered: bool| {
-            Class::of(
-                &both.iter().filter(|(_, found)| found.registered == registered).copied().collect::<Vec<_>>(),
-                pair,
-            )
-        };
+        let judged = points.iter().filter_map(|point| Some((point, matches.get(point.pair_index)?)));
+        let judged: Vec<Judged<'_>> = judged
+            .map(|(point, found)| Judged { point, found, verdict: Verdict::of(found.left, found.right, pair) })
+            .collect();
+        let class = |registered: bool| Class::of(judged.iter().filter(|of| of.found.registered == registered));
         let mut reliability = Reliability::default();
-        for (point, found) in &both {
-            let off = Verdict::of(found.left, found.right, pair).off_sigmas(point);
-            off.into_iter().for_each(|off| reliability.add(found.score, off.abs() <= OUTLIER_SIGMAS));
+        for of in &judged {
+            let off = of.verdict.off_sigmas(of.point);
+            off.into_iter().for_each(|off| reliability.add(of.found.score, off.abs() <= OUTLIER_SIGMAS));
         }
-        Self { registered: class(true), unregistered: class(false), reliability, ..Self::of(&kept, pair) }
+        let verdicts: Vec<Verdict> = judged.iter().map(|of| of.verdict).collect();
+        Self { registered: class(true), unregistered: class(false), reliability, ..Self::of_verdicts(&verdicts) }
     }
 
     /// Part of the matches that is right.
@@ -87,10 +89,9 @@ impl Tally {
 }
 
 impl Class {
-    fn of(points: &[(&CloudPoint, &Match)], pair: &SimulatedPair) -> Self {
+    fn of<'a>(points: impl Iterator<Item = &'a Judged<'a>>) -> Self {
         let mut class = Self::default();
-        for (point, found) in points {
-            let verdict = Verdict::of(found.left, found.right, pair);
+        for Judged { point, found, verdict } in points {
             class.sigmas_px.push(found.sigma.mean());
             if verdict.is_right() {
                 class.errors_px.extend(verdict.offset_px.map(f64::abs));
@@ -141,7 +142,15 @@ impl Class {
     }
 }
 
+/// A point, the match that made it, and the error of that match.
+struct Judged<'a> {
+    point: &'a CloudPoint,
+    found: &'a Match,
+    verdict: Verdict,
+}
+
 /// Error of a match.
+#[derive(Clone, Copy)]
 struct Verdict {
     offset_px: [f64; 2],
     bearing_rad: f64,

@@ -47,11 +47,24 @@ pub fn photograph(scene: &Scene, camera: &KannalaBrandt, optics: &Optics, seed: 
 
 /// The scene with the unprinted back of a board 10 mm before the left half of a target, turned so that its edge cuts through
 /// squares.
-pub fn half_hidden(scene: Scene, place: &Transform<Camera, Target>) -> Scene {
+fn half_hidden(scene: Scene, place: &Transform<Camera, Target>) -> Scene {
     let board = Target { columns: 9, rows: 9, square: Length::from_mm(24.0) };
     let turn = UnitQuaternion::from_euler_angles(std::f64::consts::PI, 0.0, 0.2);
     let cover = place.isometry() * Isometry3::from_parts(Vector3::new(-50.0, 80.0, -10.0).into(), turn);
     scene.with_target(board, board.placed::<World>(cover.rotation, cover.translation.vector))
+}
+
+/// Pictures of a sheet that is half hidden, one near the axis and one far from it: the angle, the place of the sheet, and the picture.
+pub fn half_hidden_shots(
+    sheet: Sheet,
+    camera: &KannalaBrandt,
+) -> impl Iterator<Item = (f64, Transform<Camera, Target>, GrayImage)> {
+    [(10.0, 1), (75.0, 2)].into_iter().map(move |(theta_deg, seed)| {
+        let pose = Pose { theta_deg, azimuth_deg: 40.0, roll_deg: 30.0, tilt_deg: 10.0, distance_mm: 190.0 };
+        let place = pose.camera_from_target(&sheet);
+        let scene = half_hidden(Scene::studio().with_target(sheet, place.renamed()), &place);
+        (theta_deg, place, photograph(&scene, camera, &optics(0.7, 2.0), seed))
+    })
 }
 
 /// A target before a camera.
