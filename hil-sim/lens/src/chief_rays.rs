@@ -27,7 +27,7 @@ const SEARCH_STEPS: usize = 40;
 #[derive(Clone, Debug)]
 pub struct ChiefRays {
     /// Distance of the image from the axis, mm.
-    height: Curve,
+    pub(crate) height: Curve,
     /// How far the place where the ray crosses the axis lies in front of the paraxial entrance pupil, mm.
     pupil: Curve,
     /// Light on the image as a share of that on the axis.
@@ -179,15 +179,23 @@ impl ChiefRay {
 }
 
 impl Design {
+    /// The chief ray at `theta` to the axis, in the plane of x and z of the design.
+    ///
+    /// # Errors
+    /// Where no light passes the centre of the stop at this angle.
+    pub fn chief_ray(&self, theta: Angle) -> Result<Ray, DesignError> {
+        let near = chief_rays(self, theta)?;
+        let guess = near.last().map_or(self.entrance_pupil(), |chief| chief.crossing);
+        let chief = ChiefRay::near(guess, theta, self);
+        chief.map(|chief| chief.ray).map_err(|lost| DesignError::NoChiefRay { angle: theta, lost })
+    }
+
     /// The spot of a far point at `theta` to the axis, by the light that `limits` let pass, in the plane of the paraxial image.
     ///
     /// # Errors
     /// Where no light arrives at this angle.
     pub fn spot(&self, theta: Angle, limits: Limits) -> Result<Spot, DesignError> {
-        let near = chief_rays(self, theta)?;
-        let guess = near.last().map_or(self.entrance_pupil(), |chief| chief.crossing);
-        let no_light = |lost| DesignError::NoChiefRay { angle: theta, lost };
-        let chief = ChiefRay::near(guess, theta, self).map_err(no_light)?;
-        beam::spot(self, &chief.ray, limits).map_err(no_light)
+        let chief = self.chief_ray(theta)?;
+        beam::spot(self, &chief, limits).map_err(|lost| DesignError::NoChiefRay { angle: theta, lost })
     }
 }

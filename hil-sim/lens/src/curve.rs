@@ -40,6 +40,12 @@ impl Curve {
         Self { step, values, slopes }
     }
 
+    /// The curve through other values at the same steps: `change` is given an argument and the value there.
+    pub fn mapped(&self, change: impl Fn(f64, f64) -> f64, symmetry: Symmetry) -> Self {
+        let value = |(index, value): (usize, &f64)| change(self.step * index as f64, *value);
+        Self::new(self.step, self.values.iter().enumerate().map(value).collect(), symmetry)
+    }
+
     /// The largest argument.
     pub fn end(&self) -> f64 {
         self.step * (self.values.len() - 1) as f64

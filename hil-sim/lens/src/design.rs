@@ -33,6 +33,15 @@ impl BuiltIn {
     /// All of them.
     pub const ALL: [Self; 2] = [Self::Sigma8, Self::Nikkor6];
 
+    /// The design's name.
+    #[must_use]
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Sigma8 => "sigma8_f18",
+            Self::Nikkor6 => "nikkor6_f28",
+        }
+    }
+
     /// The design's file.
     #[must_use]
     pub const fn toml(self) -> &'static str {

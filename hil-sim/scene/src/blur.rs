@@ -30,6 +30,32 @@ pub fn blurred<const N: usize>(image: &[[f32; N]], width: usize, sigma: f64) -> 
     both
 }
 
+/// Steps from the narrowest to the widest spot of an image; between them it is interpolated, which is exact in the variance.
+const SPOT_STEPS: usize = 4;
+
+/// Convolves an image as [`blurred`] does, with a Gaussian whose variance in square pixels is that of `sigma` plus that of the pixel's spot.
+pub fn spread<const N: usize>(image: &[[f32; N]], width: usize, sigma: f64, spots: &[f32]) -> Vec<[f32; N]> {
+    let lit = spots.iter().copied().filter(|spot| *spot > 0.0);
+    let (low, high) = lit.fold((f32::INFINITY, 0.0), |(low, high): (f32, f32), spot| (low.min(spot), high.max(spot)));
+    if high == 0.0 {
+        return blurred(image, width, sigma);
+    }
+    let step = (high - low) / SPOT_STEPS as f32;
+    let mut sum = vec![[0.0; N]; image.len()];
+    for number in 0..=SPOT_STEPS {
+        let at = low + step * number as f32;
+        let of_step = blurred(image, width, sigma.mul_add(sigma, f64::from(at)).sqrt());
+        sum.par_iter_mut().zip(of_step.par_iter().zip(spots)).for_each(|(sum, (light, spot))| {
+            let steps_off = if step > 0.0 { (spot.clamp(low, high) - at).abs() / step } else { number as f32 };
+            let weight = (1.0 - steps_off).max(0.0);
+            for (sum, light) in sum.iter_mut().zip(light) {
+                *sum += weight * light;
+            }
+        });
+    }
+    sum
+}
+
 /// Adds `row` times `weight` as far as both reach. Whole rows let the compiler use vector instructions.
 fn add<const N: usize>(sum: &mut [[f32; N]], weight: f32, row: &[[f32; N]]) {
     sum.as_flattened_mut().iter_mut().zip(row.as_flattened()).for_each(|(sum, c)| *sum += weight * c);
@@ -71,6 +97,32 @@ mod tests {
             };
             assert!((f64::from(weights[0]) + moment(0) - 1.0).abs() < 1e-6);
             assert!((moment(2) - sigma * sigma).abs() < 2e-3 * sigma * sigma + 1e-9, "{} at {sigma}", moment(2));
+        }
+    }
+
+    /// Points whose spots differ, each far from the next: each is as wide as stated, and keeps its light.
+    #[test]
+    fn a_spot_has_the_variance_of_its_place() {
+        const SIDE: usize = 61;
+        for (column, spot) in [(10, 0.1_f32), (30, 0.35), (50, 0.93)] {
+            let mut image = vec![[0.0]; SIDE * SIDE];
+            image[30 * SIDE + column] = [1.0];
+            let spots: Vec<f32> = (0..SIDE * SIDE)
+                .map(|i| match i % SIDE {
+                    ..20 => 0.1,
+                    20..40 => 0.35,
+                    _ => 0.93,
+                })
+                .collect();
+            let soft = spread(&image, SIDE, 0.5, &spots);
+            let moment = |power: i32| {
+                let along = |(i, [light]): (usize, &[f32; 1])| {
+                    ((i % SIDE) as f64 - column as f64).powi(power) * f64::from(*light)
+                };
+                soft.iter().enumerate().map(along).sum::<f64>()
+            };
+            assert!((moment(0) - 1.0).abs() < 1e-3 && moment(1).abs() < 1e-3, "{}", moment(0));
+            assert!((moment(2) - 0.25 - f64::from(spot)).abs() < 0.01, "{} at {spot}", moment(2));
         }
     }
 

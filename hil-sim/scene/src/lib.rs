@@ -1,7 +1,7 @@
 //! Simulated fisheye images with exact ground truth.
 //!
 //! A [`Scene`] is a closed room of analytic shapes with procedural textures. [`render`] takes an image of it through a
-//! Kannala-Brandt lens by casting rays: each pixel is the mean of rays spread over its square, then blurred by the
+//! [`Lens`], an ideal Kannala-Brandt one or a published design that was traced, by casting rays: each pixel is the mean of rays spread over its square, then blurred by the
 //! lens, exposed, made noisy and quantised as a sensor does. The range stored with each pixel is that of the ray
 //! through its centre, solved in closed form. A [`Target`] alone before an even grey ([`Scene::target_alone`]) renders
 //! quickly, by a monochrome camera ([`photograph_sheet`]) ten times as quickly.
@@ -14,9 +14,9 @@ mod blur;
 mod corridor;
 mod furnish;
 mod hierarchy;
+mod lens;
 mod light;
 mod optics;
-mod pupil;
 mod range_map;
 mod rays;
 mod render;
@@ -30,8 +30,8 @@ mod texture;
 mod texture_noise;
 
 pub use corridor::CorridorPlan;
+pub use lens::{Lens, LensChoice, LensRays, TrueLens, UnknownLens};
 pub use optics::Optics;
-pub use pupil::EntrancePupil;
 pub use range_map::RangeMap;
 pub use render::{Photograph, View, render, render_rolling};
 pub use scene::{Hit, Scene, SurfaceId};

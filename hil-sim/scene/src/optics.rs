@@ -2,6 +2,7 @@
 
 use vergence_vision::Angle;
 
+use crate::lens::Lens;
 use crate::texture::Rgb;
 use crate::texture_noise::mix64;
 
@@ -22,7 +23,8 @@ pub struct Optics {
     /// Additional standard deviation of a white pixel, in grey levels of 255. Its variance is proportional to the
     /// grey level: that of level g is `read_noise² + shot_noise² g / 255`.
     pub shot_noise: f64,
-    /// Part of the light that is lost at the edge of the field, 0 to 1. See [`Optics::falloff`].
+    /// Part of the light that is lost at the edge of the field of an ideal lens, 0 to 1. See [`Optics::falloff`]. A traced lens
+    /// has its own light.
     pub vignette: f64,
     /// Factor on the light: exposure and analogue gain. At 1 a white sheet in full light is white.
     pub gain: f64,
@@ -48,6 +50,11 @@ impl Optics {
     pub fn falloff(&self, theta: Angle, theta_max: Angle) -> f64 {
         let part = (theta.rad() / theta_max.rad()).clamp(0.0, 1.0);
         1.0 - self.vignette.clamp(0.0, 1.0) * (std::f64::consts::FRAC_PI_2 * part).sin().powi(2)
+    }
+
+    /// The part of the light that arrives at `theta` from the axis of a lens: by its design, or by [`Self::falloff`].
+    pub(crate) fn light_at(&self, theta: Angle, lens: &dyn Lens) -> f64 {
+        lens.illumination(theta).unwrap_or_else(|| self.falloff(theta, lens.theta_max()))
     }
 
     /// The 8-bit pixel of linear light `colour`, with the noise that the hash `noise` gives.

@@ -2,7 +2,7 @@
 
 use vergence_vision::{ImageSize, Length};
 
-/// For each pixel of an image the distance from the optical centre along the ray through the pixel's centre.
+/// For each pixel of an image the distance from the optical centre, of a lens without one from where the ray crosses the axis, along the ray through the pixel's centre.
 #[derive(Clone, Debug)]
 pub struct RangeMap {
     size: ImageSize,

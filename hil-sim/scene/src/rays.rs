@@ -1,12 +1,18 @@
 //! The rays of pixels and of points between them, without solving the lens equation for each.
 
 use nalgebra::{Matrix3, Vector3};
-use vergence_vision::{BatchLens, Camera, Instructions, KannalaBrandt, Pixel, Transform, World};
+use vergence_vision::{Angle, Camera, Pixel, Transform, World};
+
+use crate::lens::{Lens, LensRays};
 
 /// A lens with its pose.
 pub struct PosedLens<'a> {
-    lens: &'a BatchLens,
+    lens: &'a dyn Lens,
+    rays: &'a LensRays<'a>,
+    /// Whether all light goes through the origin.
+    is_central: bool,
     world_from_camera: Matrix3<f64>,
+    origin: Vector3<f64>,
 }
 
 /// The rays of the pixel centres of a rectangle and of their neighbours, in the world.
@@ -37,19 +43,31 @@ pub struct Nearby<'a> {
     derivatives: Option<[Vector3<f64>; 5]>,
 }
 
-/// The lens of a camera, evaluated for many rays; it gives the same image on every machine.
-pub fn lens_of(camera: &KannalaBrandt) -> BatchLens {
-    BatchLens::new(camera).with_instructions(Instructions::Baseline)
-}
-
 impl<'a> PosedLens<'a> {
-    pub fn new(lens: &'a BatchLens, world_from_camera: &Transform<World, Camera>) -> Self {
-        Self { lens, world_from_camera: world_from_camera.rotation().to_rotation_matrix().into_inner() }
+    /// `rays` are those of `lens`.
+    pub fn new(lens: &'a dyn Lens, rays: &'a LensRays<'a>, world_from_camera: &Transform<World, Camera>) -> Self {
+        Self {
+            lens,
+            rays,
+            is_central: lens.pupil(Angle::from_rad(0.0)).is_none(),
+            world_from_camera: world_from_camera.rotation().to_rotation_matrix().into_inner(),
+            origin: world_from_camera.origin().mm(),
+        }
+    }
+
+    /// Where light from a direction of the world crosses the axis: the camera's origin, or the pupil of that angle.
+    pub fn start(&self, direction: &Vector3<f64>) -> Vector3<f64> {
+        if self.is_central {
+            return self.origin;
+        }
+        let axis = self.world_from_camera.column(2);
+        let theta = Angle::from_rad(axis.dot(direction).clamp(-1.0, 1.0).acos());
+        self.lens.pupil(theta).map_or(self.origin, |shift| self.origin + axis * shift.mm())
     }
 
     /// The ray of one point; `None` outside the field.
     fn ray(&self, pixel: Pixel) -> Option<Vector3<f64>> {
-        self.in_world(self.lens.unproject(&[[pixel.u, pixel.v]]).first()?)
+        self.in_world(self.rays.directions(&[[pixel.u, pixel.v]]).first()?)
     }
 
     fn in_world(&self, ray: &[f64; 3]) -> Option<Vector3<f64>> {
@@ -64,7 +82,7 @@ impl<'a> RayGrid<'a> {
             .flat_map(|row| (0..columns + 2).map(move |column| (column, row)))
             .map(|(column, row)| [f64::from(left) + f64::from(column) - 1.0, f64::from(top) + f64::from(row) - 1.0])
             .collect();
-        Self { posed, left, top, stride: columns as usize + 2, rays: posed.lens.unproject(&pixels) }
+        Self { posed, left, top, stride: columns as usize + 2, rays: posed.rays.directions(&pixels) }
     }
 
     /// The ray of a pixel of the rectangle; `None` outside the field.
@@ -79,6 +97,11 @@ impl<'a> Around<'a> {
     /// The ray through the pixel's centre, exactly.
     pub const fn centre(&self) -> Vector3<f64> {
         self.centre
+    }
+
+    /// Where light from a direction of the world crosses the axis of the lens, in the world.
+    pub fn start(&self, direction: &Vector3<f64>) -> Vector3<f64> {
+        self.grid.posed.start(direction)
     }
 
     /// The rays about the pixel's centre.
@@ -115,7 +138,7 @@ impl Nearby<'_> {
 mod tests {
     use super::*;
     use nalgebra::UnitQuaternion;
-    use vergence_vision::{Angle, ImageSize};
+    use vergence_vision::{ImageSize, KannalaBrandt};
 
     #[test]
     fn the_series_agrees_with_the_lens_equation() {
@@ -124,8 +147,8 @@ mod tests {
         let k = [187.0, -3.0, 0.4, 0.0, 0.0];
         let camera = KannalaBrandt::new(k, 1.002, centre, Angle::from_deg(98.0), size).unwrap();
         let pose = Transform::new(UnitQuaternion::from_euler_angles(0.3, -1.1, 0.2), Vector3::zeros());
-        let lens = lens_of(&camera);
-        let posed = PosedLens::new(&lens, &pose);
+        let rays = camera.rays();
+        let posed = PosedLens::new(&camera, &rays, &pose);
         let grid = RayGrid::new(&posed, [0, 300], [640, 40]);
         for (x, y) in [(321, 318), (100, 320), (15, 310), (620, 339), (400, 300)] {
             let nearby = grid.around(x, y).unwrap().nearby();

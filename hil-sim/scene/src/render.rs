@@ -3,11 +3,12 @@
 use image::RgbImage;
 use nalgebra::Vector3;
 use rayon::prelude::*;
-use vergence_vision::{Angle, BatchLens, Camera, KannalaBrandt, Transform, World};
+use vergence_vision::{Angle, Camera, Transform, World};
 
-use crate::blur::blurred;
+use crate::blur::spread;
+use crate::lens::{Lens, LensRays};
 use crate::optics::unit_pair;
-use crate::rays::{Around, PosedLens, RayGrid, lens_of};
+use crate::rays::{Around, PosedLens, RayGrid};
 use crate::texture::Rgb;
 use crate::texture_noise::mix64;
 use crate::{Optics, RangeMap, Scene};
@@ -27,7 +28,7 @@ pub struct View<'a> {
     /// The scene.
     pub scene: &'a Scene,
     /// The lens, and the size of the image.
-    pub camera: &'a KannalaBrandt,
+    pub camera: &'a dyn Lens,
     /// The pose of the camera.
     pub world_from_camera: Transform<World, Camera>,
     /// Imperfections of its lens and sensor.
@@ -85,9 +86,9 @@ fn photograph(view: &View<'_>, seed: u64, rows: Rows<'_>) -> Photograph {
     let seed_of = |x: usize, y: usize| mix64(mix64(seed) ^ (y * width + x) as u64);
     let pixels = size.width as usize * size.height as usize;
 
-    let lens = lens_of(view.camera);
+    let rays = view.camera.rays();
     let mut firsts = vec![First::default(); pixels];
-    for_each_in_field(view, rows, &lens, &mut firsts, |first, here, around, x, y| {
+    for_each_in_field(view, rows, &rays, &mut firsts, |first, here, around, x, y| {
         *first = here.first(around, seed_of(x, y));
     });
 
@@ -98,7 +99,7 @@ fn photograph(view: &View<'_>, seed: u64, rows: Rows<'_>) -> Photograph {
         if is_edge(&firsts, width, x, y) {
             let pixel = [x, y].map(|n| n as u32);
             let here = rows.view(view, pixel[1]);
-            let posed = PosedLens::new(&lens, &here.world_from_camera);
+            let posed = PosedLens::new(view.camera, &rays, &here.world_from_camera);
             if let Some(around) = RayGrid::new(&posed, pixel, [1, 1]).around(pixel[0], pixel[1]) {
                 samples = samples.joined(here.samples(&around, view.optics.edge_samples, mix64(seed_of(x, y))));
             }
@@ -107,7 +108,8 @@ fn photograph(view: &View<'_>, seed: u64, rows: Rows<'_>) -> Photograph {
         *light = samples.sum.map(|c| c * exposure);
     });
 
-    let light = blurred(&light, width, view.optics.blur_px);
+    let spots: Vec<f32> = firsts.iter().map(|first| first.spot).collect();
+    let light = spread(&light, width, view.optics.blur_px, &spots);
     let mut image = RgbImage::new(size.width, size.height);
     image.par_chunks_exact_mut(3).zip(&light).zip(&firsts).enumerate().for_each(|(i, ((pixel, light), first))| {
         if first.samples.count > 0 {
@@ -135,11 +137,13 @@ struct First {
     range_mm: f32,
     /// The share of the light that passes the lens.
     exposure: f32,
+    /// Variance of the lens's own spot, in square pixels.
+    spot: f32,
 }
 
 impl Default for First {
     fn default() -> Self {
-        Self { samples: LightSamples::default(), range_mm: f32::NAN, exposure: 0.0 }
+        Self { samples: LightSamples::default(), range_mm: f32::NAN, exposure: 0.0, spot: 0.0 }
     }
 }
 
@@ -187,7 +191,7 @@ impl LightSamples {
 fn for_each_in_field<T: Send>(
     view: &View<'_>,
     rows: Rows<'_>,
-    lens: &BatchLens,
+    lens: &LensRays<'_>,
     items: &mut [T],
     visit: impl Fn(&mut T, &View<'_>, &Around<'_>, usize, usize) + Sync,
 ) {
@@ -195,7 +199,7 @@ fn for_each_in_field<T: Send>(
     items.par_chunks_mut(width * rows.at_once).enumerate().for_each(|(number, items)| {
         let top = number * rows.at_once;
         let here = rows.view(view, top as u32);
-        let posed = PosedLens::new(lens, &here.world_from_camera);
+        let posed = PosedLens::new(view.camera, lens, &here.world_from_camera);
         let rays = RayGrid::new(&posed, [0, top as u32], [width, items.len() / width].map(|n| n as u32));
         for (i, item) in items.iter_mut().enumerate() {
             let (x, y) = (i % width, top + i / width);
@@ -209,7 +213,7 @@ fn for_each_in_field<T: Send>(
 impl View<'_> {
     /// Casts the first rays of a pixel.
     fn first(&self, around: &Around<'_>, hash: u64) -> First {
-        let origin = self.world_from_camera.origin().mm();
+        let origin = around.start(&around.centre());
         let theta = self.theta(around);
         let met = self.scene.encounter(origin, around.centre());
         let samples = if self.optics.samples <= 1 {
@@ -218,17 +222,18 @@ impl View<'_> {
         } else {
             self.samples(around, self.optics.samples, hash)
         };
-        let exposure = self.optics.falloff(theta, self.camera.theta_max()) as f32;
-        First { samples, range_mm: met.map_or(f32::NAN, |met| met.range() as f32), exposure }
+        let exposure = self.optics.light_at(theta, self.camera) as f32;
+        let spot = self.camera.spot_variance(theta) as f32;
+        First { samples, range_mm: met.map_or(f32::NAN, |met| met.range() as f32), exposure, spot }
     }
 
     /// The light of `count` rays through the square of a pixel.
     fn samples(&self, around: &Around<'_>, count: u32, hash: u64) -> LightSamples {
-        let origin = self.world_from_camera.origin().mm();
         let finest = 1.0 / self.camera.pixels_per_radian(self.theta(around));
         let nearby = around.nearby();
         lattice(count, hash).fold(LightSamples::default(), |samples, offset| {
             let light = |direction| {
+                let origin = around.start(&direction);
                 let met = self.scene.encounter(origin, direction);
                 self.scene.light(origin, direction, met.as_ref(), finest)
             };

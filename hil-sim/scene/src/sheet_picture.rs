@@ -5,16 +5,16 @@
 
 use image::{GrayImage, Luma};
 use nalgebra::{Matrix3, SVector, Vector3};
-use vergence_vision::{Angle, BatchLens, Camera, KannalaBrandt, Transform};
+use vergence_vision::{Angle, Camera, Length, Transform};
 
-use crate::blur::blurred;
+use crate::blur::spread;
+use crate::lens::{Lens, LensRays};
 use crate::optics::{normals, unit_pair};
-use crate::rays::lens_of;
 use crate::render::lattice;
 use crate::target::BACKDROP;
 use crate::texture::Rgb;
 use crate::texture_noise::mix64;
-use crate::{EntrancePupil, Optics, Sheet, Target};
+use crate::{Optics, Sheet, Target};
 
 /// Pixels along a side of the squares whose rays are developed together. Beyond the second order a ray changes there by
 /// less than (2 / pixels per radian)³.
@@ -28,9 +28,7 @@ pub struct SheetView<'a> {
     /// Pose of the sheet.
     pub camera_from_sheet: Transform<Camera, Target>,
     /// The lens, and the size of the image.
-    pub camera: &'a KannalaBrandt,
-    /// Where the rays of the lens start.
-    pub pupil: EntrancePupil,
+    pub camera: &'a dyn Lens,
     /// Imperfections of its lens and sensor. Of the rays of a pixel, `samples` counts as 1: only edges take more.
     pub optics: &'a Optics,
 }
@@ -55,7 +53,8 @@ pub fn photograph_sheet(view: &SheetView<'_>, seed: u64) -> GrayImage {
             light[y * width + x] = [(sum + tone.light) / (places.len() + 1) as f32 * tone.exposure];
         }
     }
-    let light = blurred(&light, width, view.optics.blur_px);
+    let spots: Vec<f32> = tones.iter().map(|tone| tone.spot).collect();
+    let light = spread(&light, width, view.optics.blur_px, &spots);
     let mut picture = GrayImage::new(size.width, size.height);
     let pairs = picture.pixels_mut().zip(light.iter().zip(&tones));
     let mut noise = [0.0; 2];
@@ -81,6 +80,7 @@ fn luminance([red, green, blue]: Rgb) -> f32 {
 struct Tone {
     light: f32,
     exposure: f32,
+    spot: f32,
 }
 
 /// Whether a pixel or a neighbour meets something else than the others.
@@ -124,13 +124,13 @@ impl Plane {
     }
 }
 
-/// Ray in the frame of the sheet, shift of the pupil, exposure.
-type Node = SVector<f64, 5>;
+/// Ray in the frame of the sheet, shift of the pupil, exposure, variance of the spot.
+type Node = SVector<f64, 6>;
 
 /// The middles of the squares of pixels, with those around the image.
 struct Cells<'a> {
     view: SheetView<'a>,
-    lens: BatchLens,
+    lens: LensRays<'a>,
     across: usize,
     /// Value and derivatives per pixel (u, v, uu, uv, vv) at every square's middle; `None` at the edge of the field.
     series: Vec<Option<[Node; 6]>>,
@@ -143,8 +143,8 @@ impl<'a> Cells<'a> {
         let middle = |index: usize| f64::from(CELL) * (index as f64 - 1.0) + 0.5 * f64::from(CELL - 1);
         let pixels: Vec<[f64; 2]> =
             (0..down + 2).flat_map(|row| (0..across + 2).map(move |column| [middle(column), middle(row)])).collect();
-        let lens = lens_of(view.camera);
-        let nodes: Vec<Node> = lens.unproject(&pixels).iter().map(|ray| node(view, plane, ray)).collect();
+        let lens = view.camera.rays();
+        let nodes: Vec<Node> = lens.directions(&pixels).iter().map(|ray| node(view, plane, ray)).collect();
         let series = (0..down)
             .flat_map(|row| (0..across).map(move |column| [row + 1, column + 1]))
             .map(|[row, column]| series(&nodes, across + 2, row, column))
@@ -156,7 +156,7 @@ impl<'a> Cells<'a> {
     fn at(&self, plane: &Plane, [x, y]: [u32; 2], offset: [f64; 2]) -> Option<Node> {
         let index = (y / CELL) as usize * self.across + (x / CELL) as usize;
         let Some([value, du, dv, duu, duv, dvv]) = &self.series[index] else {
-            let exact = self.lens.unproject(&[[f64::from(x) + offset[0], f64::from(y) + offset[1]]]);
+            let exact = self.lens.directions(&[[f64::from(x) + offset[0], f64::from(y) + offset[1]]]);
             return exact.first().map(|ray| node(&self.view, plane, ray)).filter(|node| !node.z.is_nan());
         };
         let from_middle = |pixel: u32, offset: f64| f64::from(pixel % CELL) - 0.5 * f64::from(CELL - 1) + offset;
@@ -165,9 +165,10 @@ impl<'a> Cells<'a> {
     }
 
     fn tone(&self, plane: &Plane, at: [u32; 2]) -> Tone {
-        self.at(plane, at, [0.0; 2]).map_or(Tone { light: 0.0, exposure: 0.0 }, |node| Tone {
+        self.at(plane, at, [0.0; 2]).map_or(Tone { light: 0.0, exposure: 0.0, spot: 0.0 }, |node| Tone {
             light: plane.light([node[0], node[1], node[2]], node[3]),
             exposure: node[4] as f32,
+            spot: node[5] as f32,
         })
     }
 
@@ -180,8 +181,8 @@ impl<'a> Cells<'a> {
 fn node(view: &SheetView<'_>, plane: &Plane, ray: &[f64; 3]) -> Node {
     let theta = Angle::from_rad(ray[2].clamp(-1.0, 1.0).acos());
     let [x, y, z] = <[f64; 3]>::from(plane.sheet_from_camera * Vector3::from(*ray));
-    let exposure = view.optics.falloff(theta, view.camera.theta_max());
-    Node::from([x, y, z, view.pupil.shift_mm(theta), exposure])
+    let pupil_mm = view.camera.pupil(theta).map_or(0.0, Length::mm);
+    Node::from([x, y, z, pupil_mm, view.optics.light_at(theta, view.camera), view.camera.spot_variance(theta)])
 }
 
 fn series(nodes: &[Node], stride: usize, row: usize, column: usize) -> Option<[Node; 6]> {

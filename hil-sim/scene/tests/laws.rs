@@ -11,13 +11,33 @@ use nalgebra::Vector3;
 use proptest::prelude::*;
 use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64Mcg;
-use vergence_scene::{Optics, Scene, View, render, render_rolling};
-use vergence_vision::{Angle, Camera, Pixel, Point, UnitRay, World};
+use vergence_scene::{Lens, LensChoice, Optics, Scene, TrueLens, View, render, render_rolling};
+use vergence_vision::{Angle, Camera, Length, Pixel, Point, UnitRay, World};
 
 static ROOM: LazyLock<Scene> = LazyLock::new(Scene::room);
 
 fn point(mm: [f64; 3]) -> Point<World> {
     Point::from_mm(Vector3::from(mm))
+}
+
+/// A rig file may hold a lens whose pupil moves: its simulated cameras must see as that lens does, in whole pictures and in parts of them.
+#[test]
+fn a_pupil_of_the_rig_file_is_rendered() {
+    let camera = fisheye(128).with_pupil(Length::from_mm(2.8)).unwrap();
+    let world_from_camera = pose([-72.0, 0.0, 0.0], 20.0);
+    let photo = render(&View { scene: &ROOM, camera: &camera, world_from_camera, optics: &Optics::default() }, 1);
+    let mut farthest = 0.0_f64;
+    for (x, y) in pixels(128) {
+        let pixel = Pixel { u: f64::from(x), v: f64::from(y) };
+        let Ok(ray) = camera.unproject::<Camera>(pixel) else { continue };
+        let cast = |start| ROOM.cast(&start, &(world_from_camera * ray)).unwrap().range.mm();
+        let expected = cast(world_from_camera * camera.origin_of(&ray));
+        assert!((photo.range.at(x, y).unwrap().mm() - expected).abs() < 1e-3, "at {x}, {y}");
+        farthest = farthest.max((cast(world_from_camera.origin()) - expected).abs());
+    }
+    assert!(farthest > 1.0, "{farthest} mm");
+    let TrueLens::Ideal(part) = camera.before_part([20, 30], camera.size()).unwrap() else { panic!("another lens") };
+    assert_eq!(part.pupil(), camera.pupil());
 }
 
 proptest! {
@@ -102,6 +122,28 @@ fn ranges_agree_with_casting_the_ray_again() {
         let Ok(ray) = camera.unproject::<Camera>(Pixel { u: f64::from(x), v: f64::from(y) }) else { continue };
         let hit = ROOM.cast(&world_from_camera.origin(), &(world_from_camera * ray)).unwrap();
         assert!((photo.range.at(x, y).unwrap().mm() - hit.range.mm()).abs() < 1e-3);
+    }
+}
+
+/// The room and its ranges by a traced lens: every ray starts where it crosses the axis, which is millimetres from one angle to the next.
+#[test]
+fn ranges_through_a_traced_lens_agree_with_casting_its_rays() {
+    let world_from_camera = pose([-72.0, 0.0, 0.0], 20.0);
+    for choice in LensChoice::ALL {
+        let TrueLens::Traced(camera) = choice.in_place_of(&fisheye(128)).unwrap() else { continue };
+        let view = View { scene: &ROOM, camera: &camera, world_from_camera, optics: &Optics::default() };
+        let photo = render(&view, 1);
+        let (mut seen, mut farthest) = (0, 0.0_f64);
+        for (x, y) in pixels(128) {
+            let Some(ray) = camera.ray(Pixel { u: f64::from(x), v: f64::from(y) }) else { continue };
+            let start = world_from_camera * ray.origin;
+            let hit = ROOM.cast(&start, &(world_from_camera * ray.direction)).unwrap();
+            let by_centre = ROOM.cast(&world_from_camera.origin(), &(world_from_camera * ray.direction)).unwrap();
+            assert!((photo.range.at(x, y).unwrap().mm() - hit.range.mm()).abs() < 1e-3, "{choice} at {x}, {y}");
+            farthest = farthest.max((by_centre.range.mm() - hit.range.mm()).abs());
+            seen += 1;
+        }
+        assert!(seen > 5000 && farthest > 1.0, "{choice}: {seen} pixels, {farthest} mm");
     }
 }
 

@@ -6,7 +6,7 @@ use vergence_calibration::IntrinsicsCalibration;
 use vergence_rig::{
     CalibrationTable, Camchain, CameraDocument, CameraFormat, CameraTable, Provenance, Shutter, kalibr, opencv,
 };
-use vergence_vision::KannalaBrandt;
+use vergence_vision::{KannalaBrandt, Length};
 
 use crate::InputError;
 
@@ -27,14 +27,29 @@ impl CameraFile {
         self.document.as_ref().map_or(Shutter::Global, |document| document.camera.shutter())
     }
 
-    /// The same in the text of `format`. Other programs' files say less than ours.
+    /// The same in the text of `format`. Other programs' files say less than ours: a lens whose pupil moves becomes the central one that
+    /// images points 500 mm away alike, with a comment that says how much they differ elsewhere.
     ///
     /// # Errors
-    /// Where TOML cannot say it.
+    /// Where TOML cannot say it, and where no central lens comes near.
     pub fn text(&self, format: CameraFormat) -> Result<String, InputError> {
         match (format, &self.document) {
-            (CameraFormat::Kalibr, _) => Ok(kalibr::write(&self.cameras)),
-            (CameraFormat::OpenCv, _) => Ok(opencv::write(&self.cameras.left)),
+            (CameraFormat::Kalibr, _) => {
+                let (left, mut remarks) = central(&self.cameras.left)?;
+                let right = match &self.cameras.right {
+                    Some((right, left_from_right)) => {
+                        let (right, remark) = central(right)?;
+                        remarks += &remark;
+                        Some((right, *left_from_right))
+                    }
+                    None => None,
+                };
+                Ok(kalibr::write(&Camchain { left, right }) + &remarks)
+            }
+            (CameraFormat::OpenCv, _) => {
+                let (left, remark) = central(&self.cameras.left)?;
+                Ok(opencv::write(&left) + &remark)
+            }
             (CameraFormat::Toml, Some(document)) => camera_toml(document),
             (CameraFormat::Toml, None) => {
                 let camera = CameraTable::of(&self.cameras.left);
@@ -42,6 +57,24 @@ impl CameraFile {
             }
         }
     }
+}
+
+/// A central lens in place of `camera`, and a comment for the file where it is another.
+fn central(camera: &KannalaBrandt) -> Result<(KannalaBrandt, String), InputError> {
+    if camera.is_central() {
+        return Ok((*camera, String::new()));
+    }
+    let central = camera.central_at(Length::from_mm(500.0)).map_err(|error| InputError::Untold(error.to_string()))?;
+    let off = |mm: f64| camera.largest_difference(&central, Length::from_mm(mm));
+    let remark = format!(
+        "# The pupil of this lens moves (e0 = {:.3} mm), which this format cannot say. The lens above images points 500 mm away as it \
+         does to {:.3} px; points 200 mm away are up to {:.2} px off, points 2 m away {:.2} px.\n",
+        camera.pupil().mm(),
+        off(500.0),
+        off(200.0),
+        off(2000.0)
+    );
+    Ok((central, remark))
 }
 
 /// Reads a camera file: ours, OpenCV's or Kalibr's, told apart by their contents.
@@ -82,7 +115,7 @@ pub fn document_of(calibration: &IntrinsicsCalibration, provenance: Provenance) 
             rms_inlier_px: calibration.rms_inlier_px,
             corners: calibration.corners_inlier,
             views: calibration.views_used,
-            covariance: std::array::from_fn(|row| std::array::from_fn(|column| covariance[(row, column)])),
+            covariance: *covariance,
         }),
         provenance: Some(provenance),
     }

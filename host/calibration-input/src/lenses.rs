@@ -5,7 +5,7 @@ use std::path::Path;
 use nalgebra::SMatrix;
 use vergence_calibration::LensKnowledge;
 use vergence_rig::{CalibrationTable, Shutter};
-use vergence_vision::KannalaBrandt;
+use vergence_vision::{KannalaBrandt, LENS_PARAMETERS};
 
 use crate::InputError;
 use crate::camera_files::{CameraFile, read_camera_file};
@@ -79,8 +79,8 @@ fn calibration_table(file: &CameraFile) -> Option<&CalibrationTable> {
     file.document.as_ref().and_then(|document| document.calibration.as_ref())
 }
 
-fn covariance(path: &Path, file: &CameraFile) -> Result<SMatrix<f64, 8, 8>, InputError> {
+fn covariance(path: &Path, file: &CameraFile) -> Result<SMatrix<f64, LENS_PARAMETERS, LENS_PARAMETERS>, InputError> {
     let table = calibration_table(file)
         .ok_or_else(|| InputError::wrong(path, "it has no covariance: calibrate it here, or use --lenses exact"))?;
-    Ok(SMatrix::from_fn(|row, column| table.covariance[row][column]))
+    Ok(table.covariance)
 }

@@ -3,7 +3,7 @@
 use nalgebra::{Matrix3, Vector3};
 use vergence_page::{Anchor, Axes, Drawing, Path};
 use vergence_rig::{Rig, RigPose};
-use vergence_vision::{Left, Point, PointUncertainty, Right, SharedCovariance, StereoPair, UnitRay};
+use vergence_vision::{Left, Point, PointUncertainty, Right, SharedCovariance, StereoPair};
 
 use crate::image_frame::WIDTH;
 
@@ -44,12 +44,11 @@ impl<'a> UncertainPair<'a> {
 
     fn error(&self, point: &Vector3<f64>, sight: &Vector3<f64>) -> Option<PointError> {
         let StereoPair { left, right, left_from_right } = &self.cameras;
-        let in_left = UnitRay::<Left>::new(*point)?;
-        left.project(&in_left).ok().filter(|pixel| left.on_sensor(*pixel))?;
-        let arm = UnitRay::<Left>::new(point - left_from_right.origin().mm())?;
-        let in_right: UnitRay<Right> = left_from_right.inverse() * arm;
-        right.project(&in_right).ok().filter(|pixel| right.on_sensor(*pixel))?;
-        let uncertainty = PointUncertainty::of(&Point::from_mm(*point), &self.cameras, self.pixel_sigma)?;
+        let point = Point::<Left>::from_mm(*point);
+        left.project_point(&point).ok().filter(|pixel| left.on_sensor(*pixel))?;
+        let in_right: Point<Right> = left_from_right.inverse() * point;
+        right.project_point(&in_right).ok().filter(|pixel| right.on_sensor(*pixel))?;
+        let uncertainty = PointUncertainty::of(&point, &self.cameras, self.pixel_sigma)?;
         let covariance = uncertainty.covariance(&self.shared);
         let flat = Matrix3::identity() - sight * sight.transpose();
         let across = (flat * covariance * flat).symmetric_eigenvalues().max();

@@ -7,7 +7,7 @@ use vergence_page::{
     with_sigma,
 };
 use vergence_targets::TargetView;
-use vergence_vision::KannalaBrandt;
+use vergence_vision::{KannalaBrandt, LENS_PARAMETERS};
 
 use crate::ReportAbout;
 use crate::arrows::{arrows, mean_arrows};
@@ -20,6 +20,7 @@ use crate::pattern::{Neighbours, Patch, patches, pattern_px};
 use crate::ray_field::{BASELINE_MM, RANGE_MM, RayField, Ring, depth_mm};
 use crate::ray_map::ray_map;
 use crate::residuals::{Observation, of_intrinsics};
+use crate::result::pupil_in_words;
 use crate::verdict::Verdict;
 
 /// Most outliers listed one by one.
@@ -253,14 +254,20 @@ impl<'a> Report<'a> {
             .zip(found.covariance.diagonal().iter())
             .map(|((name, value, unit), variance)| row(name, *value, variance.sqrt(), unit))
             .collect();
+        if !found.camera.is_central() {
+            let pupil = LENS_PARAMETERS - 1;
+            rows.push(row("pupil e0", found.camera.pupil().mm(), found.covariance[(pupil, pupil)].sqrt(), "mm"));
+        }
         if let Some(warp) = &found.warp {
             rows.push(row("target bow along x", warp.along_x_mm, warp.sigma_mm[0], "mm"));
             rows.push(row("target bow along y", warp.along_y_mm, warp.sigma_mm[1], "mm"));
         }
         let explanation = "r = f·θ·(1 + k1·θ² + k2·θ⁴ + k3·θ⁶ + k4·θ⁸), as cv::fisheye and Kalibr's equidistant model. \
                            σ comes from the noise of the corners, with target poses free. k1 to k4 depend on each \
-                           other: two calibrations may differ in them and agree in every ray. Compare rays, not coefficients.";
-        table(&["Parameter", "Value", "± σ", ""], &rows) + &note(explanation)
+                           other: two calibrations may differ in them and agree in every ray. Compare rays, not coefficients. \
+                           The ray at θ starts e0·(θ / sin θ − 1) ahead of the origin.";
+        let pupil = format!("By the views {}.", pupil_in_words(&found.pupil));
+        table(&["Parameter", "Value", "± σ", ""], &rows) + &note(explanation) + &note(&pupil)
     }
 
     fn view_table(&self) -> String {

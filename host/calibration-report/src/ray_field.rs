@@ -113,7 +113,7 @@ fn sample(
     phi: f64,
 ) -> Option<RaySample> {
     let ray = uncertainty.at(pixel).ok()?;
-    let projected = reproject(&calibration.opencv, &Point::from_mm(UnitRay::vector(&ray.ray)))?;
+    let projected = reproject(calibration.opencv, &Point::from_mm(UnitRay::vector(&ray.ray)))?;
     let by_point = Matrix2x3::from_fn(|row, axis| projected.by_point[axis][row]);
     let by_angle = by_point * Matrix3x2::from_columns(&ray.tangents);
     let in_pixels = by_angle * ray.covariance * by_angle.transpose();

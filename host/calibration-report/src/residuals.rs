@@ -3,7 +3,7 @@
 use std::collections::BTreeSet;
 
 use nalgebra::{Isometry3, Point3, Vector3};
-use vergence_calibration::{ExtrinsicsCalibration, IntrinsicsCalibration, Side, StereoView, reproject};
+use vergence_calibration::{ExtrinsicsCalibration, IntrinsicsCalibration, LensParameters, Side, StereoView, reproject};
 use vergence_targets::{Corner, TargetView};
 use vergence_vision::{Camera, KannalaBrandt, OpenCvFisheye, Pixel, Point, UnitRay};
 
@@ -25,12 +25,13 @@ pub(crate) struct Observation {
 }
 
 impl Observation {
-    fn new(lens: &OpenCvFisheye, view: usize, observed: Pixel, point: Option<Vector3<f64>>, used: bool) -> Self {
+    fn new(lens: LensParameters, view: usize, observed: Pixel, point: Option<Vector3<f64>>, used: bool) -> Self {
         let reprojected = point.and_then(|point| reproject(lens, &Point::<Camera>::from_mm(point)));
         let error = reprojected.map(|r| [observed.u - r.pixel[0], observed.v - r.pixel[1]]);
         let ray = point.and_then(UnitRay::<Camera>::new);
         let theta = ray.map_or(0.0, |ray| ray.angle_to_axis().rad());
-        let phi = ((observed.v - lens.cy) / lens.fy).atan2((observed.u - lens.cx) / lens.fx);
+        let OpenCvFisheye { fx, fy, cx, cy, .. } = lens.central;
+        let phi = ((observed.v - cy) / fy).atan2((observed.u - cx) / fx);
         Self { view, observed, error: error.filter(|e| e.iter().all(|x| x.is_finite())), theta, phi, used }
     }
 
@@ -54,7 +55,7 @@ pub(crate) fn of_intrinsics(calibration: &IntrinsicsCalibration, views: &[Target
                 let [x, y] = corner.target_mm;
                 let point = (pose * Point3::new(x, y, height([x, y]))).coords;
                 let used = !left_out.contains(&(index, place));
-                Observation::new(&calibration.opencv, index, corner.pixel, Some(point), used)
+                Observation::new(calibration.lens(), index, corner.pixel, Some(point), used)
             })
         })
         .collect()
@@ -86,7 +87,7 @@ pub(crate) fn of_extrinsics(calibration: &ExtrinsicsCalibration, views: &[Stereo
         .map(|outlier| key(&outlier.view, outlier.target_mm, outlier.pixel))
         .collect();
     let camera: &KannalaBrandt = if side == Side::Left { &calibration.left } else { &calibration.right };
-    let lens = camera.to_opencv();
+    let lens = LensParameters::of(camera);
     let camera_from_left = match side {
         Side::Left => Isometry3::identity(),
         Side::Right => calibration.joint.left_from_right.isometry().inverse(),
@@ -99,7 +100,7 @@ pub(crate) fn of_extrinsics(calibration: &ExtrinsicsCalibration, views: &[Stereo
             let [x, y] = corner.target_mm;
             let point = (camera_from_target * Point3::new(x, y, 0.0)).coords;
             let used = !left_out.contains(&key(&view.name, corner.target_mm, corner.pixel));
-            Observation::new(&lens, index, corner.pixel, Some(point), used)
+            Observation::new(lens, index, corner.pixel, Some(point), used)
         }));
     }
     observations

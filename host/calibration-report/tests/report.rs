@@ -18,9 +18,9 @@ use vergence_calibration_report::{
     ReportAbout, VerdictPlaces, extrinsics_report, extrinsics_verdict, intrinsics_report, intrinsics_verdict,
     stage_report, stage_verdict,
 };
-use vergence_rig::Rig;
+use vergence_rig::{Rig, RigNumber};
 use vergence_targets::TargetView;
-use vergence_vision::Angle;
+use vergence_vision::{Angle, Side};
 
 /// A name that would break a page that does not escape it.
 const HOSTILE: &str = "</td><script>alert('a' & \"b\")</script>\u{1}";
@@ -277,9 +277,10 @@ fn verdicts_count_lenses_pose_and_pixels_along_and_across() {
     let baseline = pair.joint.left_from_right.origin().mm().norm();
     let expected = 1000.0 * 1000.0 * 0.1 * 2f64.sqrt() / (600.0 * baseline);
     assert!((pixels[4][0] / expected - 1.0).abs() < 0.15, "{} mm, expected {expected} mm", pixels[4][0]);
-    // An uncertain lens counts where it was refined: eight numbers of each behind the six of the pose.
+    // An uncertain lens counts where it was refined, behind the six numbers of the pose.
     let mut lenses = exact.clone();
-    lenses.full_covariance = nalgebra::DMatrix::zeros(22, 22);
+    lenses.full_covariance = nalgebra::DMatrix::zeros(7, 7);
+    lenses.lens_numbers = vec![RigNumber::Lens { side: Side::Left, parameter: 0 }];
     lenses.full_covariance[(6, 6)] = 1.0;
     let centre = at("350mm at 0deg with 0px", &lenses)[0];
     assert!(centre[0] + centre[1] > 0.01, "{centre:?}");

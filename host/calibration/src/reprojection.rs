@@ -4,17 +4,17 @@
 //! axes of the frame it maps to.
 
 use nalgebra::{Isometry3, Matrix2x3, Matrix3, SMatrix, SVector, Translation3, UnitQuaternion, Vector2, Vector3};
-use vergence_vision::{InvalidLens, KannalaBrandt, OpenCvFisheye, Point};
+use vergence_vision::{InvalidLens, KannalaBrandt, Point};
 
-pub(crate) use crate::intrinsics::LENS;
-use crate::intrinsics::reproject;
+pub(crate) use crate::intrinsics::{CENTRAL, LENS};
+use crate::intrinsics::{LensParameters, reproject};
 
 /// Number of local coordinates of a pose.
 pub(crate) const POSE: usize = 6;
 
-/// A lens as a point of the parameter space: fx, fy, cx, cy, k1 to k4.
+/// A lens as a point of the parameter space: fx, fy, cx, cy, k1 to k4, e0.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(crate) struct Lens(OpenCvFisheye);
+pub(crate) struct Lens(LensParameters);
 
 /// A pixel and its derivatives by the point (in the camera frame) and by the lens.
 pub(crate) struct Projection {
@@ -25,24 +25,22 @@ pub(crate) struct Projection {
 
 impl Lens {
     pub fn of(camera: &KannalaBrandt) -> Self {
-        Self(camera.to_opencv())
+        Self(LensParameters::of(camera))
     }
 
     pub fn parameters(&self) -> SVector<f64, LENS> {
-        let OpenCvFisheye { fx, fy, cx, cy, k: [k1, k2, k3, k4] } = self.0;
-        SVector::from([fx, fy, cx, cy, k1, k2, k3, k4])
+        SVector::from(self.0.to_array())
     }
 
     pub fn moved(&self, delta: &SVector<f64, LENS>) -> Self {
-        let [fx, fy, cx, cy, k1, k2, k3, k4] = (self.parameters() + delta).into();
-        Self(OpenCvFisheye { fx, fy, cx, cy, k: [k1, k2, k3, k4] })
+        Self(LensParameters::from_array((self.parameters() + delta).into()))
     }
 
     /// The camera with these parameters, its field cut to where they are still a lens.
     pub fn camera(&self, like: &KannalaBrandt) -> Result<KannalaBrandt, InvalidLens> {
-        match KannalaBrandt::from_opencv(self.0, like.theta_max(), like.size()) {
+        match self.0.camera(like.theta_max(), like.size()) {
             Err(InvalidLens::TurnsOver { .. }) => {
-                KannalaBrandt::from_opencv(self.0, self.0.largest_theta(like.size())?, like.size())
+                self.0.camera(self.0.central.largest_theta(like.size())?, like.size())
             }
             made => made,
         }
@@ -51,7 +49,7 @@ impl Lens {
     /// Image of `point`, also outside the field, so that an iteration which strays there can return. `None` at the
     /// optical centre and straight behind it.
     pub fn project(&self, point: &Vector3<f64>) -> Option<Projection> {
-        let projected = reproject(&self.0, &Point::from_mm(*point))?;
+        let projected = reproject(self.0, &Point::from_mm(*point))?;
         Some(Projection {
             pixel: projected.pixel.into(),
             by_point: projected.by_point.into(),

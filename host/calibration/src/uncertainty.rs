@@ -109,7 +109,7 @@ impl RayUncertainty {
 
     /// Derivative of the ray behind a fixed pixel with respect to the lens, from ∂u/∂d δd + ∂u/∂lens δlens = 0.
     fn ray_by_lens(&self, ray: &UnitRay<Camera>) -> Option<SMatrix<f64, 3, LENS>> {
-        let projected = reproject(&self.lens, &Point::from_mm(ray.vector()))?;
+        let projected = reproject(self.lens, &Point::from_mm(ray.vector()))?;
         let basis = tangents(&ray.vector());
         let by_point = Matrix2x3::from_fn(|row, axis| projected.by_point[axis][row]);
         let by_lens = SMatrix::<f64, 2, LENS>::from_fn(|row, parameter| projected.by_lens[parameter][row]);

@@ -18,11 +18,11 @@ fn calibrate(views: &[TargetView]) -> IntrinsicsCalibration {
 }
 
 /// The square of the difference of two lenses in units of `covariance`.
-fn square(a: &OpenCvFisheye, b: &OpenCvFisheye, covariance: &SMatrix<f64, 8, 8>) -> f64 {
+fn square(a: &OpenCvFisheye, b: &OpenCvFisheye, covariance: &SMatrix<f64, 9, 9>) -> f64 {
     let off = DVector::from_row_slice(&parameters(a)) - DVector::from_row_slice(&parameters(b));
     let scale = DMatrix::from_diagonal(&DVector::from_fn(8, |i, _| 1.0 / covariance[(i, i)].sqrt()));
     let scaled = &scale * off;
-    let unit = &scale * DMatrix::from_column_slice(8, 8, covariance.as_slice()) * &scale;
+    let unit = &scale * covariance.view((0, 0), (8, 8)).into_owned() * &scale;
     scaled.dot(&unit.cholesky().unwrap().solve(&scaled))
 }
 
@@ -39,7 +39,8 @@ fn white_noise_is_stated_as_it_is() {
         let truth = lens().to_opencv();
         let nees = mean(found.iter().map(|lens| square(&lens.opencv, &truth, &lens.covariance)), seeds);
         let growth = |lens: &IntrinsicsCalibration| {
-            lens.covariance.diagonal().component_div(&lens.noise_covariance.diagonal()).map(f64::sqrt).mean()
+            let ratio = |i: usize| (lens.covariance[(i, i)] / lens.noise_covariance[(i, i)]).sqrt();
+            (0..8).map(ratio).sum::<f64>() / 8.0
         };
         let growth = mean(found.iter().map(growth), seeds);
         println!("{views} views: NEES {nees:.2} of 8, standard deviations {growth:.3} times those by noise");

@@ -160,7 +160,7 @@ fn refusals_are_named() {
     assert_eq!((found.skipped[0].view.as_str(), found.skipped[0].side), ("view 1", Side::Left));
     assert_eq!(found.skipped[0].reason, PoseError::Degenerate);
 
-    let singular = nalgebra::SMatrix::<f64, 8, 8>::zeros();
+    let singular = nalgebra::SMatrix::<f64, 9, 9>::zeros();
     let lenses = LensKnowledge::within(singular, singular);
     let options = ExtrinsicsOptions { lenses, robust: true };
     let refused = calibrate_extrinsics(&pair.left, &pair.right, &views, &options);

@@ -191,7 +191,8 @@ fn lens_nees(found: &IntrinsicsCalibration, truth: &KannalaBrandt) -> f64 {
         SVector::from([lens.fx, lens.fy, lens.cx, lens.cy, lens.k[0], lens.k[1], lens.k[2], lens.k[3]])
     };
     let off = numbers(found.opencv) - numbers(truth.to_opencv());
-    (off.transpose() * found.covariance.try_inverse().unwrap() * off)[(0, 0)]
+    let covariance = found.covariance.fixed_view::<8, 8>(0, 0).into_owned();
+    (off.transpose() * covariance.try_inverse().unwrap() * off)[(0, 0)]
 }
 
 /// Mean NEES of χ² variables with 6 degrees of freedom: the band that holds 99 % of all cases (E. Wilson and M.

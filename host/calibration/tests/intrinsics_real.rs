@@ -13,7 +13,7 @@ use vergence_targets::TargetView;
 use vergence_vision::Pixel;
 
 fn calibrate(set: &RealSet, views: &[TargetView]) -> IntrinsicsCalibration {
-    calibrate_intrinsics(views, set.size, &IntrinsicsOptions::default()).unwrap_or_else(|e| panic!("{}: {e}", set.name))
+    calibrate_intrinsics(views, set.size, &IntrinsicsOptions::central()).unwrap_or_else(|e| panic!("{}: {e}", set.name))
 }
 
 #[test]
@@ -51,7 +51,7 @@ fn kept(views: &[TargetView], calibration: &IntrinsicsCalibration) -> Vec<Target
 
 #[test]
 fn few_views_reach_the_optimum_that_a_good_start_reaches() {
-    let plain = IntrinsicsOptions { outlier_factor: None, ..IntrinsicsOptions::default() };
+    let plain = IntrinsicsOptions { outlier_factor: None, ..IntrinsicsOptions::central() };
     for set in real_sets() {
         for seed in 0..seeds(6) {
             let views = five(&set, seed);

@@ -8,7 +8,7 @@ use vergence_matching::{DenseDepth, DenseSample};
 use vergence_pipeline::limits::MAX_RELATIVE_SIGMA;
 use vergence_pipeline::{DenseRanges, PairImages, StageTimes, colour_at};
 use vergence_rig::{Rig, RigPose, rounded};
-use vergence_vision::{Left, Pixel};
+use vergence_vision::{Left, Pixel, Point};
 
 use crate::cloud_report::{drift_json, extrapolated_line};
 use crate::pictures::{confidence_image, dense_svg, range_image, sigma_image, write_drawing};
@@ -125,8 +125,9 @@ fn rows(depth: &DenseDepth, images: PairImages<'_>, rig: &Rig, pose: &RigPose) -
         }
         let pixel = Pixel { u: f64::from(index % width), v: f64::from(index / width) };
         let ray = rig.left_camera.unproject::<Left>(pixel).ok()?;
-        let point = ray.at(measured.range().mm());
-        let right_ray = (right_from_left * point).direction()?;
+        let start = rig.left_camera.origin_of(&ray);
+        let point = Point::<Left>::from_mm(start.mm() + ray.at(measured.range().mm()).mm());
+        let right_ray = rig.right_camera.ray_to(&(right_from_left * point))?;
         let in_right = rig.right_camera.project(&right_ray).ok()?;
         Some(DenseRow {
             point: point.mm().map(|mm| mm as f32).into(),

@@ -1,7 +1,9 @@
 //! Cameras as TOML: the table that rig files and camera files share.
 
-use serde::{Deserialize, Serialize};
-use vergence_vision::{Angle, ImageSize, InvalidLens, KannalaBrandt, OpenCvFisheye, Time};
+use nalgebra::SMatrix;
+use serde::de::Error;
+use serde::{Deserialize, Deserializer, Serialize, Serializer};
+use vergence_vision::{Angle, ImageSize, InvalidLens, KannalaBrandt, LENS_PARAMETERS, Length, OpenCvFisheye, Time};
 
 use crate::exposure::Shutter;
 use crate::text::{angle_text, optional_quantity, time_text};
@@ -45,6 +47,14 @@ pub struct CameraTable {
     pub opencv_k3: f64,
     /// Coefficient of θ⁹ relative to that of θ.
     pub opencv_k4: f64,
+    /// Coefficient e0 of the pupil's shift θ / sin θ - 1, in millimetres. If absent, zero: the lens is central.
+    #[serde(default, skip_serializing_if = "is_zero")]
+    pub pupil_e0_mm: f64,
+}
+
+#[expect(clippy::trivially_copy_pass_by_ref, reason = "serde asks for a reference")]
+fn is_zero(value: &f64) -> bool {
+    *value == 0.0
 }
 
 impl CameraTable {
@@ -54,8 +64,8 @@ impl CameraTable {
         let OpenCvFisheye { fx, fy, cx, cy, k: [opencv_k1, opencv_k2, opencv_k3, opencv_k4] } = camera.to_opencv();
         let ImageSize { width, height } = camera.size();
         let theta_max = Some(camera.measured_field());
-        let (size, line_time) = ([width, height], None);
-        Self { size, theta_max, line_time, fx, fy, cx, cy, opencv_k1, opencv_k2, opencv_k3, opencv_k4 }
+        let (size, line_time, pupil_e0_mm) = ([width, height], None, camera.pupil().mm());
+        Self { size, theta_max, line_time, fx, fy, cx, cy, opencv_k1, opencv_k2, opencv_k3, opencv_k4, pupil_e0_mm }
     }
 
     /// Replaces the shutter.
@@ -87,7 +97,7 @@ impl CameraTable {
             Some(stated) => stated,
             None => lens.largest_theta(size)?,
         };
-        KannalaBrandt::from_opencv(lens, theta_max, size)
+        KannalaBrandt::from_opencv(lens, theta_max, size)?.with_pupil(Length::from_mm(self.pupil_e0_mm))
     }
 }
 
@@ -115,8 +125,37 @@ pub struct CalibrationTable {
     pub corners: usize,
     /// Number of views of the target.
     pub views: usize,
-    /// Covariance of fx, fy, cx, cy in pixels and opencv_k1 to opencv_k4, row by row.
-    pub covariance: [[f64; 8]; 8],
+    /// Covariance of fx, fy, cx, cy in pixels, opencv_k1 to opencv_k4, and pupil_e0_mm, row by row. A central lens has no row for the last.
+    #[serde(deserialize_with = "square", serialize_with = "rows")]
+    pub covariance: SMatrix<f64, LENS_PARAMETERS, LENS_PARAMETERS>,
+}
+
+/// Reads a covariance of 8 or 9 rows.
+fn square<'de, D: Deserializer<'de>>(file: D) -> Result<SMatrix<f64, LENS_PARAMETERS, LENS_PARAMETERS>, D::Error> {
+    let rows = Vec::<Vec<f64>>::deserialize(file)?;
+    let n = rows.len();
+    if !(LENS_PARAMETERS - 1..=LENS_PARAMETERS).contains(&n) || rows.iter().any(|row| row.len() != n) {
+        return Err(D::Error::custom(
+            "the covariance of a lens has 8 rows of 8 values, or 9 of 9 with that of pupil_e0_mm",
+        ));
+    }
+    let mut covariance = SMatrix::zeros();
+    for (row, values) in rows.iter().enumerate() {
+        for (column, value) in values.iter().enumerate() {
+            covariance[(row, column)] = *value;
+        }
+    }
+    Ok(covariance)
+}
+
+fn rows<S: Serializer>(
+    covariance: &SMatrix<f64, LENS_PARAMETERS, LENS_PARAMETERS>,
+    file: S,
+) -> Result<S::Ok, S::Error> {
+    let last = LENS_PARAMETERS - 1;
+    let n = if covariance[(last, last)] > 0.0 { LENS_PARAMETERS } else { last };
+    let rows: Vec<Vec<f64>> = (0..n).map(|row| covariance.row(row).iter().take(n).copied().collect()).collect();
+    rows.serialize(file)
 }
 
 /// Provenance of a calibration.

@@ -76,9 +76,10 @@ pub fn closure_json(pose: &RigPose) -> Value {
 pub fn camera_in_words(camera: &KannalaBrandt) -> String {
     let OpenCvFisheye { fx, fy, cx, cy, k: [k1, k2, k3, k4] } = camera.to_opencv();
     let size = camera.size();
+    let pupil = if camera.is_central() { String::new() } else { format!("\npupil_e0_mm {:.4}", camera.pupil().mm()) };
     format!(
         "{} x {} px, valid to {:.2} from the axis\nfx {fx:.4}  fy {fy:.4}  cx {cx:.4}  cy {cy:.4}\n\
-         opencv_k1 {k1:.6}  opencv_k2 {k2:.6}  opencv_k3 {k3:.6}  opencv_k4 {k4:.6}",
+         opencv_k1 {k1:.6}  opencv_k2 {k2:.6}  opencv_k3 {k3:.6}  opencv_k4 {k4:.6}{pupil}",
         size.width,
         size.height,
         camera.theta_max()
@@ -94,5 +95,6 @@ pub fn camera_json(camera: &KannalaBrandt) -> Value {
         "size": [size.width, size.height],
         "theta_max_deg": camera.theta_max().deg(),
         "opencv": {"fx": fx, "fy": fy, "cx": cx, "cy": cy, "k1": k1, "k2": k2, "k3": k3, "k4": k4},
+        "pupil_e0_mm": camera.pupil().mm(),
     })
 }

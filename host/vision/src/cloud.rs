@@ -88,7 +88,8 @@ pub fn cloud_point(
     let sigma = sigma.into();
     let left = rig.left.unproject::<Left>(pixels.left).map_err(|_| DropReason::OutsideLeftField)?;
     let in_right = rig.right.unproject::<Right>(pixels.right).map_err(|_| DropReason::OutsideRightField)?;
-    let (right, right_centre) = (rig.left_from_right * in_right, rig.left_from_right.origin());
+    let (between, _) = rig.at_origins(&left, &in_right);
+    let (right, right_centre) = (between.left_from_right * in_right, between.left_from_right.origin());
 
     let residual = ray_to_plane(&left, &right, &right_centre).ok_or(DropReason::OnBaseline)?;
     let residual_sigma = ResidualUncertainty::of(&left, &in_right, rig, sigma)

@@ -9,6 +9,8 @@
 //!
 //! θ is the angle to the optical axis, from 0 to beyond 90°; φ runs from x (right) to y (down). `k` is in pixels.
 
+use std::str::FromStr;
+
 use nalgebra::Vector3;
 
 use crate::{Angle, Frame, Point, UnitRay, largest_theta};
@@ -29,6 +31,31 @@ pub struct ImageSize {
     pub width: u32,
     /// Number of pixel rows.
     pub height: u32,
+}
+
+impl ImageSize {
+    /// Whether `pixel` lies on a sensor of this size, which extends half a pixel beyond the outermost pixel centres.
+    #[must_use]
+    pub fn contains(self, pixel: Pixel) -> bool {
+        let inside = |x: f64, n: u32| x >= -0.5 && x <= f64::from(n) - 0.5;
+        inside(pixel.u, self.width) && inside(pixel.v, self.height)
+    }
+}
+
+/// A text that is no image size.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[error("write width x height in pixels, such as 960x600")]
+pub struct InvalidImageSize;
+
+impl FromStr for ImageSize {
+    type Err = InvalidImageSize;
+
+    /// Parses `960x600`.
+    fn from_str(text: &str) -> Result<Self, Self::Err> {
+        let (width, height) = text.split_once(['x', 'X', '×']).ok_or(InvalidImageSize)?;
+        let count = |part: &str| part.trim().parse().ok().filter(|n| (1..=100_000).contains(n)).ok_or(InvalidImageSize);
+        Ok(Self { width: count(width)?, height: count(height)? })
+    }
 }
 
 /// A fisheye lens with its sensor: projects rays to pixels and unprojects pixels to rays.
@@ -54,6 +81,8 @@ pub struct KannalaBrandt {
     /// The largest angle to the axis at which the lens was measured, in radians.
     measured: f64,
     size: ImageSize,
+    /// Coefficient e0 of the pupil's shift, in millimetres: see [`crate::pupil_shift`].
+    pupil_mm: f64,
 }
 
 /// Why a set of parameters describes no lens.
@@ -112,7 +141,16 @@ impl KannalaBrandt {
         if let Some(turn) = first_turn(&k, stated) {
             return Err(InvalidLens::TurnsOver { turn: Angle::from_rad(turn), stated: theta_max });
         }
-        Ok(Self { k, aspect, centre, theta_max: stated, r_max: radius(&k, stated), measured: stated, size })
+        Ok(Self {
+            k,
+            aspect,
+            centre,
+            theta_max: stated,
+            r_max: radius(&k, stated),
+            measured: stated,
+            size,
+            pupil_mm: 0.0,
+        })
     }
 
     /// Returns this lens on a sensor of the same size in millimetres with `width` pixel columns, and rows in
@@ -128,7 +166,7 @@ impl KannalaBrandt {
         let centre = Pixel { u: scaled(self.centre.u), v: scaled(self.centre.v) };
         let size = ImageSize { width, height };
         let lens = Self::new(self.k.map(|k| k * scale), self.aspect, centre, Angle::from_rad(self.theta_max), size)?;
-        Ok(Self { measured: self.measured, ..lens })
+        Ok(Self { measured: self.measured, pupil_mm: self.pupil_mm, ..lens })
     }
 
     /// The same lens beyond the field in which it was measured: as far as [`largest_theta()`] says that its polynomial is of use.
@@ -138,7 +176,9 @@ impl KannalaBrandt {
         let wider = largest_theta(self.k, self.aspect, self.centre, self.size)
             .and_then(|limit| Self::new(self.k, self.aspect, self.centre, limit, self.size));
         match wider {
-            Ok(wider) if wider.theta_max > self.theta_max => Self { measured: self.measured, ..wider },
+            Ok(wider) if wider.theta_max > self.theta_max => {
+                Self { measured: self.measured, pupil_mm: self.pupil_mm, ..wider }
+            }
             _ => *self,
         }
     }
@@ -155,7 +195,7 @@ impl KannalaBrandt {
         Angle::from_rad(self.measured)
     }
 
-    /// Projects `ray` to its pixel.
+    /// Projects the direction of `ray` to its pixel. A point at a finite distance is seen by [`Self::ray_to`] it.
     ///
     /// # Errors
     /// [`OutsideField`] beyond `theta_max`. The pixel may still lie outside the sensor: see [`Self::on_sensor`].
@@ -174,12 +214,13 @@ impl KannalaBrandt {
     /// Projects `point` to its pixel.
     ///
     /// # Errors
-    /// [`OutsideField`] beyond `theta_max` and for a point at the optical centre.
+    /// [`OutsideField`] beyond `theta_max` and for a point that [`Self::ray_to`] has no ray to.
     pub fn project_point<F: Frame>(&self, point: &Point<F>) -> Result<Pixel, OutsideField> {
-        self.project(&point.direction().ok_or(OutsideField)?)
+        self.project(&self.ray_to(point).ok_or(OutsideField)?)
     }
 
-    /// Unprojects `pixel` to its ray, in the camera frame `F` that the caller names.
+    /// Unprojects `pixel` to the direction of its ray, in the camera frame `F` that the caller names. The ray starts at
+    /// [`Self::origin_of`].
     ///
     /// # Errors
     /// [`OutsideField`] beyond `theta_max`; the ray is never clamped.
@@ -219,8 +260,15 @@ impl KannalaBrandt {
     /// Whether `pixel` lies on the sensor. The sensor extends half a pixel beyond the outermost pixel centres.
     #[must_use]
     pub fn on_sensor(&self, pixel: Pixel) -> bool {
-        let inside = |x: f64, n: u32| x >= -0.5 && x <= f64::from(n) - 0.5;
-        inside(pixel.u, self.size.width) && inside(pixel.v, self.size.height)
+        self.size.contains(pixel)
+    }
+
+    pub(crate) const fn pupil_mm(&self) -> f64 {
+        self.pupil_mm
+    }
+
+    pub(crate) const fn moved_pupil(self, pupil_mm: f64) -> Self {
+        Self { pupil_mm, ..self }
     }
 
     /// The five coefficients k1 to k5 in pixels.

@@ -2,12 +2,17 @@
 //!
 //! A turn of the ray by one radian moves the pixel by dr/dθ along the radius, and by r / sin θ across it.
 
-use nalgebra::{Matrix2x3, Matrix3x2, SMatrix, Vector2, Vector3};
+use nalgebra::{Matrix2x3, Matrix3x2, RowVector3, SMatrix, Vector2, Vector3};
 
-use crate::{Frame, KannalaBrandt, UnitRay};
+use crate::{Frame, KannalaBrandt, UnitRay, pupil_shift, pupil_shift_slope};
 
-/// Number of lens parameters. Their order is fx, fy, cx, cy in pixels, then k1 to k4 as defined by OpenCV fisheye.
-pub const LENS_PARAMETERS: usize = 8;
+/// Number of lens parameters. Their order is fx, fy, cx, cy in pixels, then k1 to k4 as defined by OpenCV fisheye, then the pupil's
+/// coefficient e0 in millimetres, which moves the origin of a ray and not its direction.
+pub const LENS_PARAMETERS: usize = 9;
+/// Number of the parameters before e0: those of a central lens.
+pub(crate) const CENTRAL_PARAMETERS: usize = 8;
+/// Index of e0.
+pub(crate) const PUPIL: usize = 8;
 
 /// A lens's local geometry at a ray: the angle θ, the radial and tangential directions in space and in the image, and
 /// the resolution along each.
@@ -16,6 +21,18 @@ struct Local {
     space: [Vector3<f64>; 2],
     image: [Vector2<f64>; 2],
     pixels_per_radian: [f64; 2],
+}
+
+/// What changes with a ray, its pixel and its lens.
+pub(crate) struct RayDerivatives {
+    /// As [`KannalaBrandt::ray_by_pixel`].
+    pub ray_by_pixel: Matrix3x2<f64>,
+    /// As [`KannalaBrandt::pixel_by_lens`].
+    pub pixel_by_lens: SMatrix<f64, 2, LENS_PARAMETERS>,
+    /// Movement of the ray's origin along the axis by its unit vector, in mm.
+    pub origin_by_ray: RowVector3<f64>,
+    /// The same by the lens's e0.
+    pub origin_by_pupil: f64,
 }
 
 impl KannalaBrandt {
@@ -35,19 +52,21 @@ impl KannalaBrandt {
         self.local(ray).ray_by_pixel(self)
     }
 
-    /// The derivative of the pixel of `ray` by the lens's parameters, in the order of [`LENS_PARAMETERS`].
+    /// The derivative of the pixel of `ray`, whose direction stays, by the lens's parameters, in the order of [`LENS_PARAMETERS`].
     #[must_use]
     pub fn pixel_by_lens<F: Frame>(&self, ray: &UnitRay<F>) -> SMatrix<f64, 2, LENS_PARAMETERS> {
         self.local(ray).pixel_by_lens(self)
     }
 
-    /// Both [`Self::ray_by_pixel`] and [`Self::pixel_by_lens`], at little more than the cost of one.
-    pub(crate) fn ray_by_pixel_and_pixel_by_lens<F: Frame>(
-        &self,
-        ray: &UnitRay<F>,
-    ) -> (Matrix3x2<f64>, SMatrix<f64, 2, LENS_PARAMETERS>) {
+    /// All derivatives at `ray`, at little more than the cost of one.
+    pub(crate) fn derivatives<F: Frame>(&self, ray: &UnitRay<F>) -> RayDerivatives {
         let local = self.local(ray);
-        (local.ray_by_pixel(self), local.pixel_by_lens(self))
+        RayDerivatives {
+            ray_by_pixel: local.ray_by_pixel(self),
+            pixel_by_lens: local.pixel_by_lens(self),
+            origin_by_ray: local.space[0].transpose() * (self.pupil_mm() * pupil_shift_slope(local.theta)),
+            origin_by_pupil: pupil_shift(local.theta),
+        }
     }
 
     fn local<F: Frame>(&self, ray: &UnitRay<F>) -> Local {
@@ -95,7 +114,7 @@ pub(crate) fn pixel_by_lens(
     columns[(0, 2)] = 1.0;
     columns[(1, 3)] = 1.0;
     let (mut power, squared) = (theta, theta * theta);
-    for column in 4..LENS_PARAMETERS {
+    for column in 4..CENTRAL_PARAMETERS {
         power *= squared;
         columns[(0, column)] = fx * power * cosine;
         columns[(1, column)] = fy * power * sine;

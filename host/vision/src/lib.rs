@@ -2,7 +2,7 @@
 //!
 //! From pixels to points:
 //!
-//! - [`KannalaBrandt`] unprojects pixels to rays and projects rays to pixels, past 90°; [`OpenCvFisheye`] holds the
+//! - [`KannalaBrandt`] unprojects pixels to rays and projects rays to pixels, past 90°, with a pupil that moves; [`OpenCvFisheye`] holds the
 //!   parameters of other programs;
 //! - [`ray_to_plane`] and [`dihedral`] measure how well two rays agree with the cameras' relative pose;
 //! - [`pseudo_intersection`] makes a point of two rays, and [`covariance()`] gives its uncertainty;
@@ -35,6 +35,7 @@ mod median;
 mod pose_drift;
 mod pose_equation;
 mod pose_fusion;
+mod pupil;
 mod residual_spread;
 mod stereo_pair;
 mod triangulation;
@@ -51,13 +52,14 @@ pub use epipolar::{dihedral, ray_to_plane};
 pub use frames::{Base, Camera, Frame, Left, Point, Right, Side, Transform, UnitRay, World};
 pub use gates::{DropReason, Gates};
 pub use import::{OpenCvFisheye, largest_theta};
-pub use kannala_brandt::{ImageSize, InvalidLens, KannalaBrandt, OutsideField, Pixel};
+pub use kannala_brandt::{ImageSize, InvalidImageSize, InvalidLens, KannalaBrandt, OutsideField, Pixel};
 pub use lens_derivatives::LENS_PARAMETERS;
 pub use lens_field::{LensField, UnknownField};
 pub use match_sigma::MatchSigma;
 pub use median::median;
 pub use pose_drift::{PoseDrift, pose_drift};
 pub use pose_fusion::{FusedPose, MatchErrors, fuse_pose};
+pub use pupil::{angle_of_point, pupil_shift, pupil_shift_slope};
 pub use stereo_pair::{PixelPair, StereoPair};
 pub use triangulation::{
     AngularNorm, Feet, Kernel, Rejection, Triangulated, UnknownKernel, angular, closest_approach, edge_plane, mid2,

@@ -3,7 +3,7 @@
 use nalgebra::{UnitQuaternion, Vector3, Vector6};
 
 use crate::epipolar::ray_to_plane;
-use crate::residual_spread::cell_of;
+use crate::residual_spread::Place;
 use crate::uncertainty::ResidualUncertainty;
 use crate::{Left, MatchSigma, PixelPair, Right, StereoPair, Transform};
 
@@ -28,19 +28,20 @@ pub struct Equation {
     pub offset: f64,
     pub slope: Vector6<f64>,
     pub sigma: f64,
-    /// The cell of the left image in which the match lies.
-    pub cell: [i32; 2],
+    /// Where the match lies in the left image.
+    pub place: Place,
 }
 
 impl Equation {
     pub fn of(pixels: &PixelPair, sigma: MatchSigma, pair: &StereoPair<'_>) -> Option<Self> {
         let left = pair.left.unproject::<Left>(pixels.left).ok()?;
         let right = pair.right.unproject::<Right>(pixels.right).ok()?;
-        let offset = ray_to_plane(&left, &(pair.left_from_right * right), &pair.left_from_right.origin())?;
+        let (StereoPair { left_from_right, .. }, _) = pair.at_origins(&left, &right);
+        let offset = ray_to_plane(&left, &(left_from_right * right), &left_from_right.origin())?;
         let uncertainty = ResidualUncertainty::of(&left, &right, pair, sigma)?;
         let sigma = uncertainty.from_pixels.sqrt();
-        let cell = cell_of(pixels.left, pair.left.size().width);
-        (sigma > 0.0).then(|| Self { offset: offset.rad(), slope: uncertainty.by_pose(), sigma, cell })
+        let place = Place::of(pixels.left, pair.left.size().width);
+        (sigma > 0.0).then(|| Self { offset: offset.rad(), slope: uncertainty.by_pose(), sigma, place })
     }
 
     pub fn residual(&self, correction: &Vector6<f64>) -> f64 {

@@ -10,7 +10,8 @@
 //! over the correction c of the stated pose, whose covariance P is that of the joints. Matches tell nothing of the length of the
 //! baseline, so that the joints always tell that. Wrong matches are faded out as in [`crate::pose_drift`]; at the end those beyond
 //! three standard deviations are left out and all others weigh fully, so that the covariance is that of least squares. There the
-//! variance of all matches is that of their residuals, as [`crate::residual_spread`] finds it, in place of the one that is stated.
+//! variance of all matches is that of their residuals, as [`crate::residual_spread`] finds it, in place of the one that is stated, and
+//! what matches have in common is added.
 //!
 //! How much each source told is counted by the degrees of freedom for signal (C. Rodgers, *Inverse Methods for Atmospheric
 //! Sounding*, 2000, eq. 2.56): of the six components of the pose the images told tr(1 - C P⁻¹), with C the covariance found.
@@ -18,7 +19,7 @@
 use nalgebra::{Matrix6, SymmetricEigen, Vector6};
 
 use crate::pose_equation::{Equation, SCALE_SIGMAS, difference, moved};
-use crate::residual_spread::variance_factor;
+use crate::residual_spread::{shared_covariance, variance_factor};
 use crate::{Angle, Left, MatchSigma, PixelPair, Right, StereoPair, Transform};
 
 /// Smallest number of matches that agree with the pose found.
@@ -28,9 +29,6 @@ const ITERATIONS: usize = 30;
 const SETTLING: usize = 8;
 /// Number of times the equations are linearised again. Before the last one the errors of the matches are measured.
 const ROUNDS: usize = 6;
-/// Standard deviation of an error that all matches of an image have in common, in pixels, which no cell shows beside another: without it a
-/// pose that the images tell to some microradians is stated too well (docs/measured/robot.md). It turns the pose.
-const COMMON_PX: f64 = 0.002;
 /// Least scale of the first iterations, in radians: 3 degrees.
 const GROSS: f64 = 0.0524;
 
@@ -126,6 +124,11 @@ pub fn fuse_pose<S: Copy + Into<MatchSigma>>(
         if round + 2 == ROUNDS && errors == MatchErrors::Measured {
             fused.variance_factor = variance_factor(&equations, &step, &spread, &left, fused.told_by_images);
         }
+        if round + 1 == ROUNDS && errors == MatchErrors::Measured {
+            let scale = (fused.variance_factor, pair.left.k()[0]);
+            let shared = shared_covariance(&equations, &step, &spread, &left, scale);
+            fused.covariance += spread * shared * spread.transpose();
+        }
         let agreeing = equations.iter().filter(|equation| equation.agrees(&step)).count();
         if agreeing < LEAST_PAIRS {
             return None;
@@ -133,10 +136,6 @@ pub fn fuse_pose<S: Copy + Into<MatchSigma>>(
         fused.agreeing = agreeing as f64 / equations.len() as f64;
         fused.left_from_right = moved(&found.left_from_right, &step);
         fused.correction = difference(&fused.left_from_right, &pair.left_from_right);
-    }
-    if errors == MatchErrors::Measured {
-        let common = (COMMON_PX / pair.left.k()[0]).powi(2);
-        (0..3).for_each(|axis| fused.covariance[(axis, axis)] += common);
     }
     Some(fused)
 }

@@ -1,6 +1,6 @@
 //! Stereo pairs, and matches between their images.
 
-use crate::{KannalaBrandt, Left, Pixel, Right, Transform};
+use crate::{KannalaBrandt, Left, Pixel, Point, Right, Transform, UnitRay};
 
 /// A match: the pixels where both images show the same scene point.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -20,4 +20,27 @@ pub struct StereoPair<'a> {
     pub right: &'a KannalaBrandt,
     /// The pose of the right camera in the left frame.
     pub left_from_right: Transform<Left, Right>,
+}
+
+impl<'a> StereoPair<'a> {
+    /// Whether all rays of each lens go through one point.
+    #[must_use]
+    pub fn is_central(&self) -> bool {
+        self.left.is_central() && self.right.is_central()
+    }
+
+    /// This pair with the points where two rays start in place of the cameras' origins, and where the left ray starts in the left frame.
+    /// `right` is in the right camera's own frame.
+    ///
+    /// Central lenses leave the pair as it is. In general the right centre moves from t to t + R o_right - o_left.
+    #[must_use]
+    pub fn at_origins(&self, left: &UnitRay<Left>, right: &UnitRay<Right>) -> (StereoPair<'a>, Point<Left>) {
+        let left_origin = self.left.origin_of(left);
+        if self.is_central() {
+            return (*self, left_origin);
+        }
+        let rotation = self.left_from_right.rotation();
+        let centre = (self.left_from_right * self.right.origin_of(right)).mm() - left_origin.mm();
+        (StereoPair { left_from_right: Transform::new(rotation, centre), ..*self }, left_origin)
+    }
 }

@@ -20,22 +20,29 @@
 //! G_u = λ [v (e × u)ᵀ + e (u × v)ᵀ / 2] / D        G_v = μ [-u (e × v)ᵀ + e (u × v)ᵀ / 2] / D
 //! ```
 //!
+//! A ray of a lens with a moving pupil starts at o = (0, 0, e(θ)) of its camera. The point is then that of the two origins, with t = t + R
+//! o_right - o_left, moved by o_left; and with G_v / μ the movement per shift of the right origin, it moves by
+//!
+//! ```text
+//! (1 - G_v / μ) ∂o_left + (G_v / μ) R ∂o_right        ∂o = z (e' ∂θ + (θ / sin θ - 1) ∂e0)
+//! ```
+//!
 //! The first pair of formulas is the case e = n. An error of e itself does not move the point to first order, because
 //! the rays meet; where a match slipped by h along the edge, an edge direction wrong by an angle ε moves it by about h
 //! ε.
 
 use nalgebra::{Matrix3, Matrix6, RowSVector, SMatrix, Vector3, Vector6};
 
-use crate::lens_derivatives::LENS_PARAMETERS;
+use crate::lens_derivatives::{LENS_PARAMETERS, PUPIL};
 use crate::{Angle, Kernel, Left, MatchSigma, Point, Right, StereoPair, UnitRay};
 
 /// Number of parameters that all points of a pair share: those of both lenses and the six of the pose.
 pub const SHARED_PARAMETERS: usize = 2 * LENS_PARAMETERS + 6;
 
-/// The covariance (22 × 22) of the parameters that all points of a pair share.
+/// The covariance (24 × 24) of the parameters that all points of a pair share.
 ///
-/// Their order is: left lens, right lens (each fx, fy, cx, cy in pixels and k1 to k4 as defined by OpenCV fisheye),
-/// then the relative pose as a turn ω about the left axes in radians and a shift δ of the right camera in the left
+/// Their order is: left lens, right lens (each fx, fy, cx, cy in pixels, k1 to k4 as defined by OpenCV fisheye, and the pupil's e0 in
+/// millimetres), then the relative pose as a turn ω about the left axes in radians and a shift δ of the right camera in the left
 /// frame in millimetres: R ← exp(ω) R, t ← t + δ.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SharedCovariance(SMatrix<f64, SHARED_PARAMETERS, SHARED_PARAMETERS>);
@@ -77,7 +84,7 @@ impl SharedCovariance {
         self.0.fixed_view::<6, 6>(2 * LENS_PARAMETERS, 2 * LENS_PARAMETERS).into_owned()
     }
 
-    /// Replaces the covariances of both lenses (8 × 8) and removes their correlation with each other and with the pose.
+    /// Replaces the covariances of both lenses (9 × 9) and removes their correlation with each other and with the pose.
     #[must_use]
     pub fn with_lenses(mut self, lenses: [&SMatrix<f64, LENS_PARAMETERS, LENS_PARAMETERS>; 2]) -> Self {
         for (lens, first) in lenses.into_iter().zip([0, LENS_PARAMETERS]) {
@@ -132,27 +139,39 @@ impl PointUncertainty {
             _ => None,
         };
         let turn = pair.left_from_right.rotation().to_rotation_matrix().into_inner();
-        let (left, in_right) = (point.direction()?, (pair.left_from_right.inverse() * *point).direction()?);
-        let (by_left, by_right) = by_rays(&point.mm(), &pair.left_from_right.origin().mm(), edge)?;
-        let right_range = (point.mm() - pair.left_from_right.origin().mm()).norm();
+        let (left, in_right) =
+            (pair.left.ray_to(point)?, pair.right.ray_to(&(pair.left_from_right.inverse() * *point))?);
+        let (between, origin) = pair.at_origins(&left, &in_right);
+        let (seen, centre) = (point.mm() - origin.mm(), between.left_from_right.origin().mm());
+        let (mut by_left, mut by_right) = by_rays(&seen, &centre, edge)?;
+        let by_shift = by_right / (seen - centre).norm();
+        let right = turn * in_right.vector();
+        let right_origin = turn * pair.right.origin_of(&in_right).mm();
+        let by_turn = -by_right * right.cross_matrix() - by_shift * right_origin.cross_matrix();
+        by_right *= turn;
+        let by_left_origin = (Matrix3::identity() - by_shift).column(2).into_owned();
+        let by_right_origin = by_shift * turn.column(2);
+        let (at_left, at_right) = (pair.left.derivatives(&left), pair.right.derivatives(&in_right));
+        by_left += by_left_origin * at_left.origin_by_ray;
+        by_right += by_right_origin * at_right.origin_by_ray;
 
-        let (left_by_pixel, left_by_lens) = pair.left.ray_by_pixel_and_pixel_by_lens(&left);
-        let (right_by_pixel, right_by_lens) = pair.right.ray_by_pixel_and_pixel_by_lens(&in_right);
-        let left_pixel = by_left * left_by_pixel;
-        let right_pixel = by_right * turn * right_by_pixel;
-        let baseline = pair.left_from_right.origin().mm();
-        let back = turn.transpose() * baseline;
-        let left_noise = by_left * sigma.of_ray(&left_by_pixel, &left.vector(), &baseline);
-        let right_noise = by_right * turn * sigma.of_ray(&right_by_pixel, &in_right.vector(), &back);
+        let left_pixel = by_left * at_left.ray_by_pixel;
+        let right_pixel = by_right * at_right.ray_by_pixel;
+        let back = turn.transpose() * centre;
+        let left_noise = by_left * sigma.of_ray(&at_left.ray_by_pixel, &left.vector(), &centre);
+        let right_noise = by_right * sigma.of_ray(&at_right.ray_by_pixel, &in_right.vector(), &back);
         let from_pixels = left_noise * left_noise.transpose() + right_noise * right_noise.transpose();
 
         // At a fixed pixel, a change of the lens turns the ray the other way than it moves the pixel.
         let mut by_shared = SMatrix::<f64, 3, SHARED_PARAMETERS>::zeros();
-        by_shared.fixed_columns_mut::<LENS_PARAMETERS>(0).copy_from(&(-left_pixel * left_by_lens));
-        by_shared.fixed_columns_mut::<LENS_PARAMETERS>(LENS_PARAMETERS).copy_from(&(-right_pixel * right_by_lens));
-        let right = turn * in_right.vector();
-        by_shared.fixed_columns_mut::<3>(2 * LENS_PARAMETERS).copy_from(&(-by_right * right.cross_matrix()));
-        by_shared.fixed_columns_mut::<3>(2 * LENS_PARAMETERS + 3).copy_from(&(by_right / right_range));
+        by_shared.fixed_columns_mut::<LENS_PARAMETERS>(0).copy_from(&(-left_pixel * at_left.pixel_by_lens));
+        by_shared
+            .fixed_columns_mut::<LENS_PARAMETERS>(LENS_PARAMETERS)
+            .copy_from(&(-right_pixel * at_right.pixel_by_lens));
+        by_shared.set_column(PUPIL, &(by_left_origin * at_left.origin_by_pupil));
+        by_shared.set_column(LENS_PARAMETERS + PUPIL, &(by_right_origin * at_right.origin_by_pupil));
+        by_shared.fixed_columns_mut::<3>(2 * LENS_PARAMETERS).copy_from(&by_turn);
+        by_shared.fixed_columns_mut::<3>(2 * LENS_PARAMETERS + 3).copy_from(&by_shift);
         let finite = from_pixels.iter().chain(by_shared.iter()).all(|value| value.is_finite());
         finite.then_some(Self { from_pixels, by_shared })
     }
@@ -197,25 +216,30 @@ impl ResidualUncertainty {
     ) -> Option<Self> {
         let sigma = sigma.into();
         let turn = pair.left_from_right.rotation().to_rotation_matrix().into_inner();
-        let centre = pair.left_from_right.origin();
+        let centre = pair.at_origins(left, right).0.left_from_right.origin();
         let (u, v, t) = (left.vector(), turn * right.vector(), centre.direction()?.vector());
         let (from_u, from_v) = (t.cross(&u), t.cross(&v));
         let sine = from_u.norm().max(from_v.norm());
-        let (left_by_pixel, left_by_lens) = pair.left.ray_by_pixel_and_pixel_by_lens(left);
-        let (right_by_pixel, right_by_lens) = pair.right.ray_by_pixel_and_pixel_by_lens(right);
-        let by_left_ray = v.cross(&t).transpose() / sine;
-        let by_right_ray = from_u.transpose() / sine * turn;
-        let (by_left, by_right) = (by_left_ray * left_by_pixel, by_right_ray * right_by_pixel);
-        let left_noise = by_left_ray * sigma.of_ray(&left_by_pixel, &left.vector(), &t);
-        let right_noise = by_right_ray * sigma.of_ray(&right_by_pixel, &right.vector(), &(turn.transpose() * t));
+        let (at_left, at_right) = (pair.left.derivatives(left), pair.right.derivatives(right));
         // A shift along the baseline does not change the angle.
         let across = u.cross(&v) / (sine * centre.mm().norm());
         let by_shift = (across - t * t.dot(&across)).transpose();
-        let by_turn = v.cross(&(from_u / sine)).transpose();
+        let (by_left_origin, by_right_origin) = (-by_shift.z, (by_shift * turn).z);
+        let by_left_ray = v.cross(&t).transpose() / sine + at_left.origin_by_ray * by_left_origin;
+        let by_right_ray = from_u.transpose() / sine * turn + at_right.origin_by_ray * by_right_origin;
+        let (by_left, by_right) = (by_left_ray * at_left.ray_by_pixel, by_right_ray * at_right.ray_by_pixel);
+        let left_noise = by_left_ray * sigma.of_ray(&at_left.ray_by_pixel, &left.vector(), &t);
+        let right_noise = by_right_ray * sigma.of_ray(&at_right.ray_by_pixel, &right.vector(), &(turn.transpose() * t));
+        let right_origin = turn * pair.right.origin_of(right).mm();
+        let by_turn = v.cross(&(from_u / sine)).transpose() - by_shift * right_origin.cross_matrix();
 
         let mut by_shared = RowSVector::<f64, SHARED_PARAMETERS>::zeros();
-        by_shared.fixed_columns_mut::<LENS_PARAMETERS>(0).copy_from(&(-by_left * left_by_lens));
-        by_shared.fixed_columns_mut::<LENS_PARAMETERS>(LENS_PARAMETERS).copy_from(&(-by_right * right_by_lens));
+        by_shared.fixed_columns_mut::<LENS_PARAMETERS>(0).copy_from(&(-by_left * at_left.pixel_by_lens));
+        by_shared
+            .fixed_columns_mut::<LENS_PARAMETERS>(LENS_PARAMETERS)
+            .copy_from(&(-by_right * at_right.pixel_by_lens));
+        by_shared[PUPIL] = by_left_origin * at_left.origin_by_pupil;
+        by_shared[LENS_PARAMETERS + PUPIL] = by_right_origin * at_right.origin_by_pupil;
         by_shared.fixed_columns_mut::<3>(2 * LENS_PARAMETERS).copy_from(&by_turn);
         by_shared.fixed_columns_mut::<3>(2 * LENS_PARAMETERS + 3).copy_from(&by_shift);
         let from_pixels = left_noise.norm_squared() + right_noise.norm_squared();

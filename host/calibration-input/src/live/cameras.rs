@@ -3,7 +3,7 @@
 use vergence_board::Shared;
 use vergence_camera::Camera;
 use vergence_rig::Rig;
-use vergence_scene::{MarkerBoard, Sheet, TagGrid, TagPrint, Target};
+use vergence_scene::{LensChoice, MarkerBoard, Sheet, TagGrid, TagPrint, Target};
 use vergence_sim::{HeldTarget, SimulatedRig, TargetCamera};
 use vergence_targets::{AprilGridSpec, MARKER_BORDER, TAG_BORDER, TagFamily, TargetKind, TargetSpec};
 use vergence_vision::Side;
@@ -24,6 +24,8 @@ pub struct SimulatedTarget {
     pub built: Rig,
     /// The target that is held.
     pub target: TargetKind,
+    /// The lenses of the cameras, in the place of those that the rig was built with.
+    pub lens: LensChoice,
     /// Seed of the places of the target, and of the noise.
     pub seed: u64,
 }
@@ -81,7 +83,7 @@ impl SimulatedTarget {
             // Another seed for each stage pose, so that the target is held elsewhere.
             seed: self.seed.wrapping_mul(1009).wrapping_add(index as u64),
         };
-        let camera = |side| Box::new(TargetCamera::new(held, side)) as Box<dyn Camera>;
+        let camera = |side| Box::new(TargetCamera::new(held, side).with_lens(self.lens)) as Box<dyn Camera>;
         vec![camera(Side::Left), camera(Side::Right)]
     }
 }

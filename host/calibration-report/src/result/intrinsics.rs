@@ -1,18 +1,51 @@
 //! The result of the calibration of a camera as lines of text and as JSON.
 
 use serde_json::{Value, json};
-use vergence_calibration::IntrinsicsCalibration;
+use vergence_calibration::{IntrinsicsCalibration, PupilEvidence};
 use vergence_targets::TargetView;
-use vergence_vision::OpenCvFisheye;
+use vergence_vision::LENS_PARAMETERS;
 
-const NAMES: [&str; 8] = ["fx", "fy", "cx", "cy", "k1", "k2", "k3", "k4"];
+const NAMES: [&str; LENS_PARAMETERS] = ["fx", "fy", "cx", "cy", "k1", "k2", "k3", "k4", "pupil_e0_mm"];
 
-fn parameters(calibration: &IntrinsicsCalibration) -> [f64; 8] {
-    let OpenCvFisheye { fx, fy, cx, cy, k: [k1, k2, k3, k4] } = calibration.opencv;
-    [fx, fy, cx, cy, k1, k2, k3, k4]
+/// What the views say of the pupil.
+#[must_use]
+pub fn pupil_in_words(pupil: &PupilEvidence) -> String {
+    match pupil {
+        PupilEvidence::NotAsked => "nothing was asked of the pupil, and the lens counts as central".to_owned(),
+        PupilEvidence::Central { gain, sigma_mm } => format!(
+            "the lens is central: a pupil that moves would lower chi-squared by {gain:.1} only (30 are asked for; e0 is known to \
+             {sigma_mm:.2} mm)"
+        ),
+        PupilEvidence::Moves { gain, held_out_px: [central, moving] } => format!(
+            "the pupil moves with the angle: chi-squared falls by {gain:.0}, and views held out from {central:.4} to {moving:.4} px"
+        ),
+        PupilEvidence::CannotTell { sigma_mm, .. } => format!(
+            "the views cannot tell whether the pupil moves (e0 ± {sigma_mm:.2} mm by them), so that depths are less certain: take a third of \
+             the views at 200 to 300 mm, at all angles to the axis"
+        ),
+    }
 }
 
-fn sigma(calibration: &IntrinsicsCalibration) -> [f64; 8] {
+fn pupil_json(pupil: &PupilEvidence) -> Value {
+    match pupil {
+        PupilEvidence::NotAsked => json!({"verdict": "not_asked"}),
+        PupilEvidence::Central { gain, sigma_mm } => {
+            json!({"verdict": "central", "chi_squared_gain": gain, "sigma_mm": sigma_mm})
+        }
+        PupilEvidence::Moves { gain, held_out_px: [central, moving] } => {
+            json!({"verdict": "moves", "chi_squared_gain": gain, "held_out_px": {"central": central, "moving": moving}})
+        }
+        PupilEvidence::CannotTell { gain, sigma_mm } => {
+            json!({"verdict": "cannot_tell", "chi_squared_gain": gain, "sigma_mm": sigma_mm})
+        }
+    }
+}
+
+fn parameters(calibration: &IntrinsicsCalibration) -> [f64; LENS_PARAMETERS] {
+    calibration.lens().to_array()
+}
+
+fn sigma(calibration: &IntrinsicsCalibration) -> [f64; LENS_PARAMETERS] {
     std::array::from_fn(|index| calibration.covariance[(index, index)].max(0.0).sqrt())
 }
 
@@ -32,6 +65,7 @@ pub fn intrinsics_lines(calibration: &IntrinsicsCalibration, views: &[TargetView
     for ((name, value), sigma) in NAMES.iter().zip(parameters(calibration)).zip(sigma(calibration)) {
         lines.push(format!("  {name} {value:12.5} ± {sigma:.5}"));
     }
+    lines.push(format!("  {}", pupil_in_words(&calibration.pupil)));
     for outlier in &calibration.outliers {
         let name = views.get(outlier.view).map_or("", |view| &view.name);
         let residual = outlier.residual_px.map(|px| format!(" ({px:.2} px)")).unwrap_or_default();
@@ -43,7 +77,7 @@ pub fn intrinsics_lines(calibration: &IntrinsicsCalibration, views: &[TargetView
 /// The result of the calibration of a camera for programs; `seconds` is how long it took.
 #[must_use]
 pub fn intrinsics_json(calibration: &IntrinsicsCalibration, seconds: f64) -> Value {
-    let named = |values: [f64; 8]| -> Value {
+    let named = |values: [f64; LENS_PARAMETERS]| -> Value {
         NAMES
             .iter()
             .zip(values)
@@ -75,6 +109,7 @@ pub fn intrinsics_json(calibration: &IntrinsicsCalibration, seconds: f64) -> Val
         "view_scatter": calibration.view_scatter,
         "opencv": named(parameters(calibration)),
         "sigma": named(sigma(calibration)),
+        "pupil": pupil_json(&calibration.pupil),
         "seconds": seconds,
         "views": views,
     })

@@ -2,6 +2,7 @@
 //! covariance.
 
 use nalgebra::{DMatrix, Isometry3};
+use vergence_rig::RigNumber;
 
 use crate::Loss;
 use crate::extrinsics::StereoView;
@@ -42,6 +43,8 @@ pub(crate) struct Fit<S> {
     pub covariance: Option<Clustered>,
     /// The same by independent noise of the corners alone.
     pub noise_covariance: Option<DMatrix<f64>>,
+    /// The lens parameters among the shared unknowns; they come last.
+    pub lens_numbers: Vec<RigNumber>,
     /// Information of the shared unknowns, in units of `sigma`².
     pub information: DMatrix<f64>,
 }
@@ -109,6 +112,7 @@ impl<K: Kinematics> Task<'_, K> {
                 let covariance = solution.normal.clustered(sigma * sigma);
                 let noise_covariance = solution.normal.shared_covariance().map(|unit| unit * (sigma * sigma));
                 return Ok(Fit {
+                    lens_numbers: problem.lens_prior.numbers(),
                     shared,
                     targets,
                     inliers,

@@ -5,7 +5,7 @@ use nalgebra::{Isometry3, Matrix6xX, SVector};
 use crate::extrinsics::Side;
 use crate::extrinsics::StereoView;
 use crate::extrinsics::stereo::{LensPrior, Lenses, Pair};
-use crate::reprojection::{LENS, POSE, moved};
+use crate::reprojection::{POSE, moved};
 use crate::schur_lm::{Equations, SchurProblem};
 
 /// Model of the relative pose: one pose for all views, or the axes of a stage.
@@ -77,7 +77,7 @@ impl<K: Kinematics> SchurProblem<POSE> for Joint<'_, K> {
     type Block = Isometry3<f64>;
 
     fn shared_dimension(&self) -> usize {
-        self.kinematics.dimension() + self.lens_prior.dimension
+        self.kinematics.dimension() + self.lens_prior.dimension()
     }
 
     fn block_residuals(
@@ -108,8 +108,13 @@ impl<K: Kinematics> SchurProblem<POSE> for Joint<'_, K> {
                 let by_state = residual.by_relative_pose * &by_step;
                 columns.iter_mut().zip(by_state.column_iter()).for_each(|(slot, c)| *slot = [c[0], c[1]]);
             }
-            let own = if side == Side::Left { lens_column } else { lens_column + LENS };
-            columns.iter_mut().skip(own).zip(residual.by_lens.column_iter()).for_each(|(slot, c)| *slot = [c[0], c[1]]);
+            let [left, right] = self.lens_prior.unknown;
+            let (own, count) = if side == Side::Left { (lens_column, left) } else { (lens_column + left, right) };
+            columns
+                .iter_mut()
+                .skip(own)
+                .zip(residual.by_lens.column_iter().take(count))
+                .for_each(|(slot, c)| *slot = [c[0], c[1]]);
             equations.add(&residual.error.into(), corner.relative_sigma, &columns, &residual.by_target.into());
         }
     }
@@ -121,7 +126,10 @@ impl<K: Kinematics> SchurProblem<POSE> for Joint<'_, K> {
 
     fn shared_plus(&self, shared: &Self::Shared, step: &[f64]) -> Self::Shared {
         let (state, lenses) = step.split_at(self.kinematics.dimension().min(step.len()));
-        Shared { state: self.kinematics.plus(&shared.state, state), lenses: shared.lenses.moved(lenses) }
+        Shared {
+            state: self.kinematics.plus(&shared.state, state),
+            lenses: self.lens_prior.moved(&shared.lenses, lenses),
+        }
     }
 
     fn block_plus(&self, pose: &Isometry3<f64>, step: &SVector<f64, POSE>) -> Isometry3<f64> {

@@ -18,7 +18,7 @@ use vergence_targets::{Corner, Target, TargetView};
 use vergence_vision::{InvalidLens, KannalaBrandt, Left, Pixel, Right, Transform};
 
 use crate::planar_pose::PoseError;
-use crate::reprojection::{LENS, POSE};
+use crate::reprojection::POSE;
 use crate::schur_lm::Clustered;
 
 pub(crate) use fit::{Fit, NoFit, Start, Task};
@@ -90,6 +90,8 @@ pub struct ExtrinsicsCalibration {
     pub view_scatter: f64,
     /// As `covariance`, with that of both lenses and all correlations behind it where the lenses were refined.
     pub full_covariance: DMatrix<f64>,
+    /// The lens parameters in the last rows of `full_covariance`; none where the lenses were held exact.
+    pub lens_numbers: Vec<RigNumber>,
     /// Root mean square distance per corner without outliers, in pixels.
     pub rms_inlier_px: f64,
     /// Standard deviation of one pixel coordinate, root mean square over the corners used.
@@ -118,16 +120,9 @@ impl ExtrinsicsCalibration {
     pub fn numbers(&self) -> Result<CalibratedNumbers, InvalidCovariance> {
         let turn = (0..3).map(|component| RigNumber::RightTurn { component });
         let shift = (0..3).map(|component| RigNumber::RightShift { component });
-        let refined = lens_numbers().take(self.full_covariance.nrows().saturating_sub(POSE));
+        let refined = self.lens_numbers.iter().copied();
         CalibratedNumbers::new(turn.chain(shift).chain(refined).collect(), self.full_covariance.clone())
     }
-}
-
-/// The parameters of the left and of the right lens, in the order of covariances.
-pub(crate) fn lens_numbers() -> impl Iterator<Item = RigNumber> {
-    [Side::Left, Side::Right]
-        .into_iter()
-        .flat_map(|side| (0..LENS).map(move |parameter| RigNumber::Lens { side, parameter }))
 }
 
 /// Residuals of one view.
@@ -319,6 +314,7 @@ pub fn calibrate_extrinsics(
         noise_covariance: noise.fixed_view::<POSE, POSE>(0, 0).into_owned(),
         view_scatter: *scatter,
         full_covariance: covariance.clone(),
+        lens_numbers: fit.lens_numbers.clone(),
         rms_inlier_px: rms(&fit.errors_px, &fit.inliers).unwrap_or_default(),
         sigma_px: fit.sigma_px(&views),
         left: refined(&fit.shared.lenses.left, left, Side::Left)?,

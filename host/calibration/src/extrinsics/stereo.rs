@@ -1,17 +1,19 @@
 //! Residuals of one target seen by two cameras, with derivatives.
 
-use nalgebra::{Isometry3, Matrix3x6, SMatrix, SVector, Vector2};
+use nalgebra::{DMatrix, Isometry3, Matrix3x6, SMatrix, SVector, Vector2};
+use vergence_rig::RigNumber;
 use vergence_targets::Corner;
 use vergence_vision::{KannalaBrandt, Side};
 
 use crate::extrinsics::StereoView;
-use crate::reprojection::{LENS, Lens, POSE, point_by_move};
+use crate::reprojection::{CENTRAL, LENS, Lens, POSE, point_by_move};
 use crate::schur_lm::Equations;
 
 /// Prior knowledge of the two lenses.
 ///
-/// A lens's parameters are fx, fy, cx, cy and k1 to k4 of [`OpenCvFisheye`](vergence_vision::OpenCvFisheye), in this
-/// order, as in [`IntrinsicsCalibration::covariance`](crate::IntrinsicsCalibration::covariance).
+/// A lens's parameters are fx, fy, cx, cy and k1 to k4 of [`OpenCvFisheye`](vergence_vision::OpenCvFisheye) and the pupil's e0, in this
+/// order, as in [`IntrinsicsCalibration::covariance`](crate::IntrinsicsCalibration::covariance). Where the variance of e0 is zero, and where
+/// a free lens is central, e0 is no unknown.
 #[derive(Clone, Debug, PartialEq)]
 pub enum LensKnowledge {
     /// The lenses are exactly as given.
@@ -46,8 +48,9 @@ pub(crate) struct Lenses {
 pub(crate) struct LensPrior {
     pub start: Lenses,
     /// Square roots of the information, times `sigma`; `None` for free lenses.
-    pull: Option<[SMatrix<f64, LENS, LENS>; 2]>,
-    pub dimension: usize,
+    pull: Option<[DMatrix<f64>; 2]>,
+    /// How many of the parameters of each lens are unknown, left and right: none, all, or all but the pupil's.
+    pub unknown: [usize; 2],
 }
 
 /// Relative pose and lenses: all that the residuals of a view depend on besides the target's pose.
@@ -69,18 +72,6 @@ impl Lenses {
     pub fn of(left: &KannalaBrandt, right: &KannalaBrandt) -> Self {
         Self { left: Lens::of(left), right: Lens::of(right) }
     }
-
-    /// Moved by a step of no components, or of the left lens's and then the right lens's.
-    pub fn moved(&self, step: &[f64]) -> Self {
-        let part = |from: usize| {
-            let part = step.get(from..from + LENS)?;
-            Some(SVector::<f64, LENS>::from_column_slice(part))
-        };
-        match (part(0), part(LENS)) {
-            (Some(left), Some(right)) => Self { left: self.left.moved(&left), right: self.right.moved(&right) },
-            _ => *self,
-        }
-    }
 }
 
 impl LensPrior {
@@ -88,18 +79,47 @@ impl LensPrior {
     /// covariance is not positive definite.
     pub fn new(start: Lenses, knowledge: &LensKnowledge, sigma: f64) -> Option<Self> {
         let root = |covariance: &SMatrix<f64, LENS, LENS>| {
+            let unknown = unknown_within(covariance);
+            let covariance = covariance.view((0, 0), (unknown, unknown));
             // Scaled to unit diagonal first: the parameters differ by many orders of magnitude.
-            let scale = covariance.diagonal().map(|variance| 1.0 / variance.sqrt());
-            let scaled = SMatrix::from_diagonal(&scale);
-            let factor = (scaled * covariance * scaled).cholesky()?;
+            let scaled = DMatrix::from_diagonal(&covariance.diagonal().map(|variance| 1.0 / variance.sqrt()));
+            let factor = (&scaled * covariance * &scaled).cholesky()?;
             Some(factor.l().try_inverse()? * scaled * sigma)
         };
-        let (pull, dimension) = match knowledge {
-            LensKnowledge::Exact => (None, 0),
-            LensKnowledge::Free => (None, 2 * LENS),
-            LensKnowledge::Within { left, right } => (Some([root(left)?, root(right)?]), 2 * LENS),
+        let free = |lens: &Lens| if lens.parameters()[CENTRAL] == 0.0 { CENTRAL } else { LENS };
+        let (pull, unknown) = match knowledge {
+            LensKnowledge::Exact => (None, [0, 0]),
+            LensKnowledge::Free => (None, [free(&start.left), free(&start.right)]),
+            LensKnowledge::Within { left, right } => {
+                (Some([root(left)?, root(right)?]), [unknown_within(left), unknown_within(right)])
+            }
         };
-        Some(Self { start, pull, dimension })
+        Some(Self { start, pull, unknown })
+    }
+
+    /// The unknowns of the left lens and of the right one.
+    pub fn numbers(&self) -> Vec<RigNumber> {
+        let of = |(side, unknown)| (0..unknown).map(move |parameter| RigNumber::Lens { side, parameter });
+        [Side::Left, Side::Right].into_iter().zip(self.unknown).flat_map(of).collect()
+    }
+
+    /// Number of unknowns of both lenses.
+    pub fn dimension(&self) -> usize {
+        self.unknown.iter().sum()
+    }
+
+    /// `lenses` moved by a step of the left lens's unknowns and then the right lens's.
+    pub fn moved(&self, lenses: &Lenses, step: &[f64]) -> Lenses {
+        let [left, right] = self.unknown;
+        let part = |from: usize, count: usize| {
+            SVector::<f64, LENS>::from_fn(
+                |i, _| if i < count { step.get(from + i).copied().unwrap_or(0.0) } else { 0.0 },
+            )
+        };
+        if left + right == 0 {
+            return *lenses;
+        }
+        Lenses { left: lenses.left.moved(&part(0, left)), right: lenses.right.moved(&part(left, right)) }
     }
 
     /// Adds the pull of the lenses' own calibration; their columns begin at `column` of the shared block.
@@ -110,16 +130,22 @@ impl LensPrior {
             lenses.right.parameters() - self.start.right.parameters(),
         ];
         for (side, (pull, lens_move)) in pull.iter().zip(&moves).enumerate() {
-            let residual = pull * lens_move;
-            for row in 0..LENS {
-                let mut shared = vec![[0.0]; column + (side + 1) * LENS];
-                for (slot, derivative) in shared.iter_mut().skip(column + side * LENS).zip(pull.row(row).iter()) {
+            let (unknown, first) = (self.unknown[side], column + if side == 0 { 0 } else { self.unknown[0] });
+            let residual = pull * lens_move.rows(0, unknown);
+            for row in 0..unknown {
+                let mut shared = vec![[0.0]; first + unknown];
+                for (slot, derivative) in shared.iter_mut().skip(first).zip(pull.row(row).iter()) {
                     *slot = [*derivative];
                 }
                 equations.add_plain(&[residual[row]], &shared, &[[0.0]; POSE]);
             }
         }
     }
+}
+
+/// How many parameters of a lens are unknown by this covariance.
+fn unknown_within(covariance: &SMatrix<f64, LENS, LENS>) -> usize {
+    if covariance[(CENTRAL, CENTRAL)] > 0.0 { LENS } else { CENTRAL }
 }
 
 impl Pair {

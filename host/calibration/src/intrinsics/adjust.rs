@@ -5,7 +5,7 @@ use rayon::prelude::*;
 use vergence_vision::median;
 
 use super::bundle::{Bundle, SHARED, Shared};
-use super::lens::LENS;
+use super::lens::{CENTRAL, LENS};
 use super::observations::{FEWEST_CORNERS, FEWEST_VIEWS, Observation, ObservedView};
 use super::start::Start;
 use super::{IntrinsicsError, IntrinsicsOptions, Outlier, OutlierReason};
@@ -16,8 +16,8 @@ use crate::schur_lm::{Ending, SchurNormal, SchurOptions, solve};
 /// Lens and target poses during the adjustment.
 #[derive(Clone, Debug)]
 pub(super) struct State {
-    shared: Shared,
-    poses: Vec<Isometry3<f64>>,
+    pub shared: Shared,
+    pub poses: Vec<Isometry3<f64>>,
 }
 
 /// The optimum: lens, target poses, and which corners were used.
@@ -26,16 +26,32 @@ pub(super) struct Adjusted {
     /// The views used, with a flag for each corner.
     pub views: Vec<ObservedView>,
     pub poses: Vec<Isometry3<f64>>,
-    /// Over fx, fy, cx, cy, k1 to k4, the warp where it was asked for, and the poses.
+    /// The parameters adjusted (indices into fx, fy, cx, cy, k1 to k4, e0, warp), in the order of the normal matrix.
+    pub free: &'static [usize],
+    /// Over the parameters adjusted and the poses.
     pub normal: SchurNormal<POSE>,
+    /// Variance by which the prior of e0 was weighted, over that of the residuals.
+    pub prior_factor: f64,
     pub outliers: Vec<Outlier>,
 }
 
-/// The parameters adjusted at each stage (indices into fx, fy, cx, cy, k1 to k4, warp). The coefficients of higher
+/// The parameters adjusted at each stage (indices into fx, fy, cx, cy, k1 to k4, e0, warp). The coefficients of higher
 /// powers of θ follow once the lower ones are right.
 const FEW: [usize; 5] = [0, 1, 2, 3, 4];
-const LENS_ONLY: [usize; LENS] = [0, 1, 2, 3, 4, 5, 6, 7];
-const WITH_WARP: [usize; SHARED] = [0, 1, 2, 3, 4, 5, 6, 7, 8, 9];
+const CENTRAL_LENS: [usize; CENTRAL] = [0, 1, 2, 3, 4, 5, 6, 7];
+const CENTRAL_WITH_WARP: [usize; CENTRAL + 2] = [0, 1, 2, 3, 4, 5, 6, 7, 9, 10];
+const WITH_PUPIL: [usize; LENS] = [0, 1, 2, 3, 4, 5, 6, 7, 8];
+const WITH_PUPIL_AND_WARP: [usize; SHARED] = [0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10];
+
+/// The parameters adjusted at the end.
+pub(super) const fn free_parameters(pupil: bool, warp: bool) -> &'static [usize] {
+    match (pupil, warp) {
+        (false, false) => &CENTRAL_LENS,
+        (false, true) => &CENTRAL_WITH_WARP,
+        (true, false) => &WITH_PUPIL,
+        (true, true) => &WITH_PUPIL_AND_WARP,
+    }
+}
 
 /// Robust adjustment from the best of `starts` (ordered best first): each is tried with few parameters, and the one of
 /// least cost is refined.
@@ -50,8 +66,8 @@ pub(super) fn robust_fit(views: &[ObservedView], starts: &[Start]) -> Option<Sta
         cost.is_finite().then_some((cost, state))
     });
     let (_, state) = tried.min_by(|a, b| a.0.total_cmp(&b.0))?;
-    let state = robust_stage(views, state, &LENS_ONLY, 10)?;
-    robust_stage(views, state, &LENS_ONLY, 30)
+    let state = robust_stage(views, state, &CENTRAL_LENS, 10)?;
+    robust_stage(views, state, &CENTRAL_LENS, 30)
 }
 
 /// Loss for comparing starts: the cost of an outlier grows only logarithmically.
@@ -64,7 +80,7 @@ fn robust_stage(views: &[ObservedView], state: State, free: &[usize], iterations
     let loss = Loss::Cauchy(MEDIANS * scale(views, &state)?);
     let references: Vec<_> = views.iter().collect();
     let options = SchurOptions { loss, iterations, relative_cost: 1e-5, ..SchurOptions::default() };
-    let solution = solve(&Bundle { views: &references, free }, state.shared, state.poses, &options);
+    let solution = solve(&Bundle::of(&references, free), state.shared, state.poses, &options);
     let mut state = State { shared: solution.shared, poses: solution.blocks };
     reconsider_poses(views, &mut state, loss);
     Some(state)
@@ -93,6 +109,14 @@ fn scale(views: &[ObservedView], state: &State) -> Option<f64> {
     Some(median(of_corners(views, state, Shared::deviation).collect())?.max(FINEST)).filter(|scale| scale.is_finite())
 }
 
+/// Standard deviation of a coordinate over the corners used, in units of their relative sigmas: the median length of a two-dimensional
+/// Gaussian error is 1.18 of it.
+fn noise(views: &[ObservedView], state: &State) -> Option<f64> {
+    const RAYLEIGH_MEDIAN: f64 = 1.177_410_022_515_474_7;
+    let used = views.iter().zip(&state.poses).flat_map(|(v, p)| v.used().map(|s| state.shared.deviation(p, s)));
+    Some(median(used.collect())?.max(FINEST) / RAYLEIGH_MEDIAN)
+}
+
 /// Least scale of noise: below it residuals are rounding errors, in pixels.
 const FINEST: f64 = 1e-4;
 
@@ -109,7 +133,7 @@ fn better_pose(shared: &Shared, view: &ObservedView, pose: &Isometry3<f64>, loss
         view.observations.iter().map(|s| 0.5 * loss.cost(shared.deviation(pose, s).powi(2))).sum::<f64>()
     };
     let options = SchurOptions { loss, iterations: 15, relative_cost: 1e-4, ..SchurOptions::default() };
-    let other = solve(&Bundle { views: &[view], free: &[] }, *shared, vec![mirrored(pose, view)], &options);
+    let other = solve(&Bundle::of(&[view], &[]), *shared, vec![mirrored(pose, view)], &options);
     match other.blocks.first() {
         Some(other_pose) if other.cost < cost(pose) => *other_pose,
         _ => *pose,
@@ -130,14 +154,39 @@ fn mirrored(pose: &Isometry3<f64>, view: &ObservedView) -> Isometry3<f64> {
     Isometry3::from_parts(Translation3::from(seen - rotation * middle), rotation)
 }
 
-/// Plain least squares over the corners near their reprojections, repeated until the set of corners stays the same.
+/// What is known of e0 before the views say anything: it is zero within `sigma_mm`.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct PupilPrior {
+    pub sigma_mm: f64,
+    /// How much more the views pull than the noise of their corners explains, see [`crate::schur_lm::Clustered::scatter`]. A view weighs
+    /// less against the prior by that.
+    pub scatter: f64,
+}
+
+impl PupilPrior {
+    /// The pull of e0 towards zero, in units of residuals per millimetre: residuals weigh by their scale, so that the prior must be scaled too.
+    pub fn pull(&self, views: &[ObservedView], state: &State) -> Option<f64> {
+        Some(self.scatter * noise(views, state)? / self.sigma_mm)
+    }
+}
+
+impl Adjusted {
+    /// Where another adjustment of the same views may start.
+    pub fn state(&self) -> State {
+        State { shared: self.shared, poses: self.poses.clone() }
+    }
+}
+
+/// Plain least squares over the corners near their reprojections, repeated until the set of corners stays the same. `free` are the
+/// parameters adjusted; `prior` is what is known of e0 before the views say anything.
 pub(super) fn inlier_fit(
     mut views: Vec<ObservedView>,
     mut state: State,
+    free: &'static [usize],
+    prior: Option<PupilPrior>,
     options: &IntrinsicsOptions,
 ) -> Result<Adjusted, IntrinsicsError> {
     const ROUNDS: usize = 10;
-    let free: &[usize] = if options.warp { &WITH_WARP } else { &LENS_ONLY };
     let mut left_out = Vec::new();
     let mut normal = None;
     for _ in 0..ROUNDS {
@@ -148,7 +197,9 @@ pub(super) fn inlier_fit(
         drop_views(&mut views, &mut state, &mut left_out)?;
         let references: Vec<_> = views.iter().collect();
         let arrow = SchurOptions { iterations: 200, ..SchurOptions::default() };
-        let solution = solve(&Bundle { views: &references, free }, state.shared, state.poses, &arrow);
+        let pupil_pull = prior.and_then(|prior| prior.pull(&views, &state));
+        let problem = Bundle { pupil_pull, ..Bundle::of(&references, free) };
+        let solution = solve(&problem, state.shared, state.poses, &arrow);
         if matches!(solution.ending, Ending::Iterations | Ending::NotFinite) {
             return Err(IntrinsicsError::NotConverged);
         }
@@ -156,7 +207,8 @@ pub(super) fn inlier_fit(
         normal = Some(solution.normal);
     }
     let normal = normal.ok_or(IntrinsicsError::NotConverged)?;
-    Ok(Adjusted { shared: state.shared, views, poses: state.poses, normal, outliers: left_out })
+    let prior_factor = prior.map_or(1.0, |prior| prior.scatter * prior.scatter);
+    Ok(Adjusted { shared: state.shared, views, poses: state.poses, free, normal, prior_factor, outliers: left_out })
 }
 
 /// Flags the corners to use: those within `factor` median deviations of the used ones. Returns whether any flag

@@ -1,9 +1,9 @@
 //! The joint least-squares problem: one lens, an optional bow of the target, and the target's pose in every view.
 
 use nalgebra::{Isometry3, Point3, SVector, Vector3};
-use vergence_vision::{OpenCvFisheye, Point};
+use vergence_vision::Point;
 
-use super::lens::{LENS, from_array, reproject, to_array};
+use super::lens::{CENTRAL, LENS, LensParameters, reproject};
 use super::observations::{Observation, ObservedView};
 use crate::reprojection::{POSE, moved};
 use crate::schur_lm::{Equations, SchurProblem};
@@ -11,7 +11,7 @@ use crate::schur_lm::{Equations, SchurProblem};
 /// Unknowns that all views share.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Shared {
-    pub lens: OpenCvFisheye,
+    pub lens: LensParameters,
     /// Height of the target's middle towards +z of its frame, from bows along x and along y, in millimetres.
     pub warp_mm: [f64; 2],
 }
@@ -20,14 +20,14 @@ pub(super) struct Shared {
 pub(super) const SHARED: usize = LENS + 2;
 
 impl Shared {
-    pub const fn flat(lens: OpenCvFisheye) -> Self {
-        Self { lens, warp_mm: [0.0; 2] }
+    pub fn flat(lens: impl Into<LensParameters>) -> Self {
+        Self { lens: lens.into(), warp_mm: [0.0; 2] }
     }
 
     /// Distance in pixels between `observation` and its reprojection; NaN where there is none.
     pub fn residual_px(&self, pose: &Isometry3<f64>, observation: &Observation) -> f64 {
         let point = pose * self.on_target(observation);
-        let Some(projected) = reproject(&self.lens, &Point::from_mm(point.coords)) else { return f64::NAN };
+        let Some(projected) = reproject(self.lens, &Point::from_mm(point.coords)) else { return f64::NAN };
         let [du, dv] = [projected.pixel[0] - observation.pixel[0], projected.pixel[1] - observation.pixel[1]];
         (du * du + dv * dv).sqrt()
     }
@@ -53,28 +53,37 @@ struct Row {
 impl Row {
     fn of(shared: &Shared, pose: &Isometry3<f64>, observation: &Observation) -> Option<Self> {
         let turned = pose.rotation * shared.on_target(observation).coords;
-        let projected = reproject(&shared.lens, &Point::from_mm(turned + pose.translation.vector))?;
+        let projected = reproject(shared.lens, &Point::from_mm(turned + pose.translation.vector))?;
         let [dx, dy, dz] = projected.by_point;
         let along = |d: &Vector3<f64>| [0, 1].map(|row| dx[row] * d.x + dy[row] * d.y + dz[row] * d.z);
         let by_height = along(&(pose.rotation * Vector3::z()));
-        let [fx, fy, cx, cy, k1, k2, k3, k4] = projected.by_lens;
+        let [fx, fy, cx, cy, k1, k2, k3, k4, e0] = projected.by_lens;
         let [warp_x, warp_y] = observation.bow.map(|bow| by_height.map(|d| bow * d));
         // ∂(exp(ω) p)/∂ωᵢ = eᵢ × p.
         let [turn_x, turn_y, turn_z] =
             [Vector3::x(), Vector3::y(), Vector3::z()].map(|axis: Vector3<f64>| along(&axis.cross(&turned)));
         Some(Self {
             residual: [projected.pixel[0] - observation.pixel[0], projected.pixel[1] - observation.pixel[1]],
-            by_shared: [fx, fy, cx, cy, k1, k2, k3, k4, warp_x, warp_y],
+            by_shared: [fx, fy, cx, cy, k1, k2, k3, k4, e0, warp_x, warp_y],
             by_pose: [turn_x, turn_y, turn_z, dx, dy, dz],
         })
     }
 }
 
 /// The problem over the used corners of `views`, with only the parameters in `free` (indices into fx, fy, cx, cy, k1 to
-/// k4, warp) adjusted.
+/// k4, e0, warp) adjusted.
 pub(super) struct Bundle<'a> {
     pub views: &'a [&'a ObservedView],
     pub free: &'a [usize],
+    /// The pull of e0 towards zero, in units of residuals per millimetre.
+    pub pupil_pull: Option<f64>,
+}
+
+impl<'a> Bundle<'a> {
+    /// The problem without a prior.
+    pub const fn of(views: &'a [&'a ObservedView], free: &'a [usize]) -> Self {
+        Self { views, free, pupil_pull: None }
+    }
 }
 
 impl SchurProblem<POSE> for Bundle<'_> {
@@ -100,15 +109,22 @@ impl SchurProblem<POSE> for Bundle<'_> {
         }
     }
 
+    fn shared_residuals(&self, shared: &Shared, equations: &mut Equations<POSE>) {
+        let Some(pull) = self.pupil_pull else { return };
+        let columns: Vec<[f64; 1]> =
+            self.free.iter().map(|&parameter| [if parameter == CENTRAL { pull } else { 0.0 }]).collect();
+        equations.add_plain(&[pull * shared.lens.pupil_mm], &columns, &[[0.0]; POSE]);
+    }
+
     fn shared_plus(&self, shared: &Shared, step: &[f64]) -> Shared {
-        let mut lens = to_array(&shared.lens);
+        let mut lens = shared.lens.to_array();
         let mut warp_mm = shared.warp_mm;
         for (&parameter, delta) in self.free.iter().zip(step) {
             if let Some(value) = lens.iter_mut().chain(&mut warp_mm).nth(parameter) {
                 *value += delta;
             }
         }
-        Shared { lens: from_array(lens), warp_mm }
+        Shared { lens: LensParameters::from_array(lens), warp_mm }
     }
 
     fn block_plus(&self, pose: &Isometry3<f64>, step: &SVector<f64, POSE>) -> Isometry3<f64> {
@@ -139,7 +155,7 @@ mod tests {
 
     /// The reprojection with its unknowns (lens, warp, turn, shift) as dual numbers.
     fn reprojected(unknowns: [Dual64; SHARED + POSE], pose: &Isometry3<f64>, observation: &Observation) -> [Dual64; 2] {
-        let [fx, fy, cx, cy, k1, k2, k3, k4, warp_x, warp_y, a, b, c, dx, dy, dz] = unknowns;
+        let [fx, fy, cx, cy, k1, k2, k3, k4, e0, warp_x, warp_y, a, b, c, dx, dy, dz] = unknowns;
         let height = warp_x * observation.bow[0] + warp_y * observation.bow[1];
         let axes = pose.rotation.to_rotation_matrix().into_inner();
         let flat: Dual3 = std::array::from_fn(|i| {
@@ -149,7 +165,13 @@ mod tests {
         let t = pose.translation.vector;
         let (x, y, z) = (x + dx + t.x, y + dy + t.y, z + dz + t.z);
         let rho = (x * x + y * y).sqrt();
-        let theta = rho.atan2(z);
+        let mut theta = rho.atan2(z);
+        for _ in 0..8 {
+            // Newton's steps on ρ cos θ - (z - e) sin θ; near the root the slope's own derivative does not matter.
+            let (sine, cosine) = theta.sin_cos();
+            let (e, slope) = ((theta / sine - 1.0) * e0, (sine - theta * cosine) / (sine * sine) * e0);
+            theta += (rho * cosine - (z - e) * sine) / (rho * sine + (z - e) * cosine - slope * sine);
+        }
         let s = theta * theta;
         let scale = theta * ((((k4 * s + k3) * s + k2) * s + k1) * s + 1.0) / rho;
         [cx + fx * scale * x, cy + fy * scale * y]
@@ -163,16 +185,19 @@ mod tests {
             target in prop::array::uniform2(-100.0..100.0),
             bow in prop::array::uniform2(0.0..1.0),
             warp_mm in prop::array::uniform2(-3.0..3.0),
+            pupil_mm in prop_oneof![Just(0.0), -1.0..3.0],
         ) {
             let pose = Isometry3::new(Vector3::new(x, y, z), Vector3::from(turn));
             let observation = Observation { target, bow, pixel: [0.0; 2], relative_sigma: 1.0, index: 0, used: true };
-            let lens = OpenCvFisheye { fx: 300.0, fy: 310.0, cx: 600.0, cy: 500.0, k: [0.02, -0.01, 0.004, -0.001] };
+            let lens = LensParameters::from_array([300.0, 310.0, 600.0, 500.0, 0.02, -0.01, 0.004, -0.001, pupil_mm]);
             let shared = Shared { lens, warp_mm };
             let projected = pose * shared.on_target(&observation);
             // Where the derivatives are not huge: away from the camera and from the direction straight behind it.
             prop_assume!(projected.coords.norm() > 50.0 && projected.x.hypot(projected.y) > 5.0);
+            // Where the pupil stays far in front of the point.
+            prop_assume!(projected.coords.angle(&Vector3::z()) < 2.0);
             let row = Row::of(&shared, &pose, &observation).unwrap();
-            let values = to_array(&lens).into_iter().chain(warp_mm).chain([0.0; POSE]);
+            let values = lens.to_array().into_iter().chain(warp_mm).chain([0.0; POSE]);
             let values: Vec<f64> = values.collect();
             for (index, column) in row.by_shared.iter().chain(&row.by_pose).enumerate() {
                 let unknowns = std::array::from_fn(|i| Dual64::new(values[i], if i == index { 1.0 } else { 0.0 }));

@@ -3,24 +3,27 @@
 //! 1. A linear start on bearings (`start`).
 //! 2. A robust joint adjustment of lens and target poses that finds outliers (`adjust`).
 //! 3. Plain least squares on the remaining corners: the result and its covariance.
+//! 4. The same with a pupil that moves (`pupil`), where the views ask for one.
 
 mod adjust;
 mod bundle;
 mod lens;
 mod observations;
+mod pupil;
 mod report;
 mod result;
 mod start;
 
 use vergence_vision::{ImageSize, OpenCvFisheye};
 
-pub(crate) use lens::LENS;
-pub use lens::{Reprojection, reproject};
+pub(crate) use lens::{CENTRAL, LENS};
+pub use lens::{LensParameters, Reprojection, reproject};
+pub use pupil::{LensModel, PupilEvidence, UnknownLensModel};
 pub use result::{
     IntrinsicsCalibration, IntrinsicsError, Outlier, OutlierReason, Parameter, TargetWarp, ViewFigures, ViewPose,
 };
 
-use adjust::{inlier_fit, robust_fit};
+use adjust::robust_fit;
 use observations::{ObservedView, observed_views};
 use report::report;
 use start::{start_from, starts};
@@ -34,13 +37,23 @@ pub struct IntrinsicsOptions {
     /// A corner farther from its reprojection than this many times the median distance, both in units of their relative
     /// sigmas, is left out. `None` keeps every corner: plain least squares over all.
     pub outlier_factor: Option<f64>,
+    /// Whether the lens has a pupil that moves.
+    pub model: LensModel,
 }
 
 impl Default for IntrinsicsOptions {
     /// A flat target and 6 median distances: for Gaussian noise of standard deviation σ per axis the median distance is
-    /// 1.18 σ, so the limit is 7 σ and noise is never left out.
+    /// 1.18 σ, so the limit is 7 σ and noise is never left out. The views decide whether the pupil moves.
     fn default() -> Self {
-        Self { warp: false, outlier_factor: Some(6.0) }
+        Self { warp: false, outlier_factor: Some(6.0), model: LensModel::ByEvidence }
+    }
+}
+
+impl IntrinsicsOptions {
+    /// The default with a central lens, as other programs calibrate one.
+    #[must_use]
+    pub fn central() -> Self {
+        Self { model: LensModel::Central, ..Self::default() }
     }
 }
 
@@ -58,11 +71,11 @@ pub fn calibrate_intrinsics(
     let (observed_views, left_out) = observed_views(views)?;
     let thinned: Vec<_> = observed_views.iter().map(ObservedView::thinned).collect();
     let state = robust_fit(&thinned, &starts(&thinned, size)).ok_or(IntrinsicsError::NoStart)?;
-    let adjusted = inlier_fit(observed_views, state, options)?;
-    report(views, size, &adjusted, left_out)
+    let (adjusted, pupil) = pupil::fit(observed_views, state, options)?;
+    report(views, size, &adjusted, pupil, left_out)
 }
 
-/// As [`calibrate_intrinsics`], but starts at the lens `start`: to update an old calibration.
+/// As [`calibrate_intrinsics`], but starts at the central lens `start`: to update an old calibration.
 ///
 /// # Errors As [`calibrate_intrinsics`], and [`IntrinsicsError::NoStart`] if `start` is not a lens or explains no view.
 pub fn refine_intrinsics(
@@ -75,6 +88,6 @@ pub fn refine_intrinsics(
     let thinned: Vec<_> = observed_views.iter().map(ObservedView::thinned).collect();
     let start = start_from(start, &thinned, size).ok_or(IntrinsicsError::NoStart)?;
     let state = robust_fit(&thinned, &[start]).ok_or(IntrinsicsError::NoStart)?;
-    let adjusted = inlier_fit(observed_views, state, options)?;
-    report(views, size, &adjusted, left_out)
+    let (adjusted, pupil) = pupil::fit(observed_views, state, options)?;
+    report(views, size, &adjusted, pupil, left_out)
 }

@@ -9,7 +9,8 @@ use super::lens::LENS;
 use super::lens::with_valid_cone;
 use super::observations::{Observation, ObservedView};
 use super::{
-    IntrinsicsCalibration, IntrinsicsError, Outlier, OutlierReason, Parameter, TargetWarp, ViewFigures, ViewPose,
+    IntrinsicsCalibration, IntrinsicsError, Outlier, OutlierReason, Parameter, PupilEvidence, TargetWarp, ViewFigures,
+    ViewPose,
 };
 use crate::schur_lm::Clustered;
 
@@ -18,6 +19,7 @@ pub(super) fn report(
     given: &[TargetView],
     size: ImageSize,
     adjusted: &Adjusted,
+    pupil: PupilEvidence,
     mut outliers: Vec<Outlier>,
 ) -> Result<IntrinsicsCalibration, IntrinsicsError> {
     let tilt_spread = check_tilts(adjusted)?;
@@ -46,9 +48,10 @@ pub(super) fn report(
         adjusted.views.iter().flat_map(ObservedView::used).map(|observation| Squares::of(observation.relative_sigma));
     Ok(IntrinsicsCalibration {
         camera,
-        opencv: lens,
-        covariance: lens_part(&covariances.shared.covariance),
-        noise_covariance: lens_part(&covariances.noise),
+        opencv: lens.central,
+        pupil,
+        covariance: lens_part(adjusted, &covariances.shared.covariance),
+        noise_covariance: lens_part(adjusted, &covariances.noise),
         view_scatter: covariances.shared.scatter,
         warp: covariances.warp(adjusted),
         rms_px: all.rms(),
@@ -98,14 +101,25 @@ struct Covariances {
     noise: DMatrix<f64>,
 }
 
-fn lens_part(covariance: &DMatrix<f64>) -> SMatrix<f64, LENS, LENS> {
-    covariance.fixed_view::<LENS, LENS>(0, 0).into_owned()
+/// The part of the lens; zero for parameters that were not adjusted.
+fn lens_part(adjusted: &Adjusted, covariance: &DMatrix<f64>) -> SMatrix<f64, LENS, LENS> {
+    let mut part = SMatrix::zeros();
+    let of_lens = || adjusted.free.iter().copied().enumerate().filter(|&(_, parameter)| parameter < LENS);
+    for (row, of_row) in of_lens() {
+        for (column, of_column) in of_lens() {
+            part[(of_row, of_column)] = covariance[(row, column)];
+        }
+    }
+    part
 }
 
 impl Covariances {
     fn of(adjusted: &Adjusted) -> Result<Self, IntrinsicsError> {
         let variance = adjusted.normal.variance().ok_or(IntrinsicsError::Singular)?;
-        let shared = adjusted.normal.clustered(variance).ok_or(IntrinsicsError::Singular)?;
+        let shared = adjusted
+            .normal
+            .clustered_with_priors(variance, variance * adjusted.prior_factor)
+            .ok_or(IntrinsicsError::Singular)?;
         let noise = adjusted.normal.shared_covariance().ok_or(IntrinsicsError::Singular)? * variance;
         Ok(Self { variance, shared, noise })
     }
@@ -118,7 +132,7 @@ impl Covariances {
         const CENTRE_SHARE: f64 = 0.1;
         // By noise alone: whether the views determine the lens is a matter of where they are, not of how they scatter.
         let sigma = |i: usize| self.noise[(i, i)].sqrt();
-        let lens = &adjusted.shared.lens;
+        let lens = &adjusted.shared.lens.central;
         let longer = f64::from(size.width.max(size.height));
         let limits = [
             (Parameter::FocalLength, sigma(0), FOCAL_SHARE * lens.fx.abs()),
@@ -135,11 +149,8 @@ impl Covariances {
     fn warp(&self, adjusted: &Adjusted) -> Option<TargetWarp> {
         let sigma = |i: usize| self.shared.covariance[(i, i)].sqrt();
         let [along_x_mm, along_y_mm] = adjusted.shared.warp_mm;
-        (self.noise.nrows() > LENS).then(|| TargetWarp {
-            along_x_mm,
-            along_y_mm,
-            sigma_mm: [sigma(LENS), sigma(LENS + 1)],
-        })
+        let first = adjusted.free.iter().position(|&parameter| parameter >= LENS)?;
+        Some(TargetWarp { along_x_mm, along_y_mm, sigma_mm: [sigma(first), sigma(first + 1)] })
     }
 }
 

@@ -6,7 +6,8 @@ use nalgebra::SMatrix;
 use vergence_targets::Target;
 use vergence_vision::{Camera, InvalidLens, KannalaBrandt, OpenCvFisheye, Transform};
 
-use super::lens::LENS;
+use super::PupilEvidence;
+use super::lens::{LENS, LensParameters};
 
 /// A calibrated lens.
 #[derive(Clone, Debug, PartialEq)]
@@ -14,10 +15,12 @@ pub struct IntrinsicsCalibration {
     /// The lens with its valid cone: the angle to the axis of the outermost corner used and 5 % more, but less than the
     /// angle where r(θ) stops growing.
     pub camera: KannalaBrandt,
-    /// The same lens in the parameters that were estimated. [`KannalaBrandt`] holds them rescaled: its five
+    /// The same lens in the parameters that were estimated, without its pupil. [`KannalaBrandt`] holds them rescaled: its five
     /// coefficients are fx (1, k1, k2, k3, k4) in pixels, its aspect is fy / fx.
     pub opencv: OpenCvFisheye,
-    /// Covariance of fx, fy, cx, cy (pixels) and k1 to k4, target poses marginalised, as the views scatter: it counts that the
+    /// What the views say of the pupil; its e0 is that of `camera`.
+    pub pupil: PupilEvidence,
+    /// Covariance of fx, fy, cx, cy (pixels), k1 to k4 and e0 (mm; zero of a central lens), target poses marginalised, as the views scatter: it counts that the
     /// corners of a view err together, because the lens is not quite of the model's family or the target bends
     /// ([`crate::schur_lm::SchurNormal::clustered`]).
     pub covariance: SMatrix<f64, LENS, LENS>,
@@ -50,6 +53,14 @@ pub struct IntrinsicsCalibration {
     pub views: Vec<ViewFigures>,
     /// Every corner left out, by view and corner.
     pub outliers: Vec<Outlier>,
+}
+
+impl IntrinsicsCalibration {
+    /// The parameters that were estimated, in the order of the covariance.
+    #[must_use]
+    pub const fn lens(&self) -> LensParameters {
+        LensParameters { central: self.opencv, pupil_mm: self.camera.pupil().mm() }
+    }
 }
 
 /// The target's height over its plane, towards +z of its frame: along_x (1 − x̂²) + along_y (1 − ŷ²) millimetres, with

@@ -47,6 +47,12 @@ impl<const B: usize> SchurNormal<B> {
     /// residual component, by which priors are weighted. `None` where the unknowns are not determined.
     #[must_use]
     pub fn clustered(&self, variance: f64) -> Option<Clustered> {
+        self.clustered_with_priors(variance, variance)
+    }
+
+    /// The same where priors were weighted by another variance than that of the residuals.
+    #[must_use]
+    pub fn clustered_with_priors(&self, variance: f64, of_priors: f64) -> Option<Clustered> {
         let information = self.shared_information()?;
         let n = information.nrows();
         let scale = DMatrix::from_diagonal(&information.diagonal().map(|d| 1.0 / d.sqrt()));
@@ -56,7 +62,7 @@ impl<const B: usize> SchurNormal<B> {
             (0..self.block_count()).into_par_iter().map(|block| self.pull(block, &whiten)).collect::<Option<_>>()?;
         let by_views = pulls.iter().fold(DMatrix::zeros(n, n), |sum, pull| sum + &pull.information);
         let (meat, factor) = meat(&pulls, &by_views, variance);
-        let prior = (DMatrix::identity(n, n) - by_views) * variance;
+        let prior = (DMatrix::identity(n, n) - by_views) * of_priors;
         let covariance = whiten.transpose() * (meat + prior) * &whiten;
         Some(Clustered { covariance: (&covariance + covariance.transpose()) * 0.5, scatter: factor.sqrt() })
     }

@@ -6,7 +6,7 @@
 use nalgebra::{DMatrix, Vector3};
 use vergence_rig::{CalibratedNumbers, InvalidCovariance, RigNumber};
 
-use crate::extrinsics::{Side, lens_numbers};
+use crate::extrinsics::Side;
 use crate::stage::mechanism::{State, direction};
 use crate::stage::twist::across;
 use crate::stage::unknowns::{Ordinal, Unknown};
@@ -15,6 +15,7 @@ use crate::stage::unknowns::{Ordinal, Unknown};
 pub(super) fn of_numbers(
     state: &State,
     mechanism: &[Unknown],
+    lens_numbers: &[RigNumber],
     covariance: &DMatrix<f64>,
 ) -> Result<CalibratedNumbers, InvalidCovariance> {
     let mut numbers = Vec::new();
@@ -31,8 +32,8 @@ pub(super) fn of_numbers(
             rows[row].push((unknown_index, by));
         }
     }
-    for (lens, column) in lens_numbers().zip(mechanism.len()..covariance.nrows()) {
-        numbers.push(lens);
+    for (lens, column) in lens_numbers.iter().zip(mechanism.len()..) {
+        numbers.push(*lens);
         rows.push(vec![(column, 1.0)]);
     }
     let mut by_unknowns = DMatrix::zeros(numbers.len(), covariance.nrows());

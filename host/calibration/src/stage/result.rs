@@ -2,7 +2,7 @@
 
 use nalgebra::{DMatrix, Matrix6, SMatrix};
 use vergence_rig::{
-    AxisPosition, CalibratedNumbers, Chain, InvalidCovariance, Link, Rig, RigAxis, RigCalibration, Screw,
+    AxisPosition, CalibratedNumbers, Chain, InvalidCovariance, Link, Rig, RigAxis, RigCalibration, RigNumber, Screw,
 };
 use vergence_vision::{
     Angle, KannalaBrandt, LENS_PARAMETERS, Left, Length, Right, SHARED_PARAMETERS, SharedCovariance, Transform,
@@ -64,6 +64,8 @@ pub struct StageCalibration {
     axes: Vec<RigAxis>,
     state: State,
     mechanism: Vec<Unknown>,
+    /// The lens parameters in the last rows of `covariance`.
+    lens_numbers: Vec<RigNumber>,
     /// Of the mechanism's unknowns, then the left and the right lens's where they were refined.
     covariance: DMatrix<f64>,
     reading_sigma: Vec<f64>,
@@ -146,19 +148,22 @@ impl StageCalibration {
     #[must_use]
     pub fn shared(&self, readings: &[AxisPosition]) -> SharedCovariance {
         let values: Vec<f64> = readings.iter().map(|reading| reading.value()).collect();
-        let (unknowns, lenses) = (self.mechanism.len(), 2 * LENS_PARAMETERS);
+        let (unknowns, pose) = (self.mechanism.len(), 2 * LENS_PARAMETERS);
         // The shared parameters by the unknowns: lenses are themselves, the pose is what the mechanism makes of its own.
         let mut by_unknowns = DMatrix::zeros(SHARED_PARAMETERS, self.covariance.nrows());
-        let refined = self.covariance.nrows() - unknowns;
-        by_unknowns.view_mut((0, unknowns), (refined, refined)).fill_with_identity();
-        by_unknowns.rows_mut(lenses, POSE).columns_mut(0, unknowns).copy_from(&self.state.derivative(
+        for (column, number) in (unknowns..).zip(&self.lens_numbers) {
+            if let Some(row) = number.shared_row() {
+                by_unknowns[(row, column)] = 1.0;
+            }
+        }
+        by_unknowns.rows_mut(pose, POSE).columns_mut(0, unknowns).copy_from(&self.state.derivative(
             &values,
             &self.mechanism,
             None,
         ));
         let mut total = &by_unknowns * &self.covariance * by_unknowns.transpose();
-        let mut pose = total.view_mut((lenses, lenses), (POSE, POSE));
-        pose += of_readings(&self.state, &self.reading_sigma, &values);
+        let mut of_pose = total.view_mut((pose, pose), (POSE, POSE));
+        of_pose += of_readings(&self.state, &self.reading_sigma, &values);
         SharedCovariance::joint(SMatrix::from_fn(|row, column| total[(row, column)]))
     }
 
@@ -179,7 +184,7 @@ impl StageCalibration {
     /// # Errors
     /// [`InvalidCovariance`] where rounding made it none.
     pub fn numbers(&self) -> Result<CalibratedNumbers, InvalidCovariance> {
-        of_numbers(&self.state, &self.mechanism, &self.covariance)
+        of_numbers(&self.state, &self.mechanism, &self.lens_numbers, &self.covariance)
     }
 
     /// `drawn` with the chains and lenses calibrated, and the covariance of its numbers.
@@ -317,6 +322,7 @@ pub(crate) fn calibration(material: Material<'_>) -> Result<StageCalibration, St
         axes: rig.axes.clone(),
         state: state.clone(),
         mechanism,
+        lens_numbers: fit.lens_numbers.clone(),
         covariance,
         reading_sigma: model.reading_sigma,
     })

@@ -2,14 +2,13 @@
 
 use nalgebra::{DMatrix, Matrix3, Matrix6};
 use vergence_rig::{
-    AxisPosition, CalibratedNumbers, Rig, RigAxis, RigCalibration, RigTrunk, TRUNK_AXES, TRUNK_PARAMETER_NAMES,
-    TRUNK_PARAMETERS, TrunkCovariance, TrunkParameterKind, TrunkParameters,
+    AxisPosition, CalibratedNumbers, Rig, RigAxis, RigCalibration, RigNumber, RigTrunk, TRUNK_AXES,
+    TRUNK_PARAMETER_NAMES, TRUNK_PARAMETERS, TrunkCovariance, TrunkParameterKind, TrunkParameters,
 };
 use vergence_vision::{Angle, KannalaBrandt, Left, Length, Right, Transform};
 
 use crate::extrinsics::{
-    ExtrinsicsCalibration, Fit, Kinematics, Side, SkippedView, StereoOutlier, StereoView, lens_numbers, outliers,
-    refined, rms,
+    ExtrinsicsCalibration, Fit, Kinematics, Side, SkippedView, StereoOutlier, StereoView, outliers, refined, rms,
 };
 use crate::stage::{StageError, StagePose};
 use crate::trunk::model::{Model, State};
@@ -217,15 +216,15 @@ pub(crate) fn calibration(material: &Material<'_>) -> Result<TrunkCalibration, S
         left: refined(&fit.shared.lenses.left, &rig.left_camera, Side::Left).map_err(StageError::Joint)?,
         right: refined(&fit.shared.lenses.right, &rig.right_camera, Side::Right).map_err(StageError::Joint)?,
         covariance,
-        lenses: refined_lenses(all, model.dimension()),
+        lenses: refined_lenses(&fit.lens_numbers, all, model.dimension()),
         found: TrunkParameters::from_array(&state.parameters),
     })
 }
 
 /// The part of the lenses in the covariance of a fit, which begins with `others` unknowns.
-fn refined_lenses(all: &DMatrix<f64>, others: usize) -> Option<CalibratedNumbers> {
-    let refined = all.nrows().checked_sub(others).filter(|&refined| refined == lens_numbers().count())?;
-    CalibratedNumbers::new(lens_numbers().collect(), all.view((others, others), (refined, refined)).into_owned()).ok()
+fn refined_lenses(numbers: &[RigNumber], all: &DMatrix<f64>, others: usize) -> Option<CalibratedNumbers> {
+    let refined = all.nrows().checked_sub(others).filter(|&refined| refined > 0 && refined == numbers.len())?;
+    CalibratedNumbers::new(numbers.to_vec(), all.view((others, others), (refined, refined)).into_owned()).ok()
 }
 
 fn pose_figures(material: &Material<'_>) -> Vec<TrunkPoseFigures> {

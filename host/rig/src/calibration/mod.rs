@@ -154,9 +154,8 @@ impl Rig {
         let pose: Matrix6xX<f64> = self.pose_by_numbers(numbers, left, right);
         derivative.rows_mut(POSE, 6).copy_from(&pose);
         for (column, number) in numbers.iter().enumerate() {
-            if let RigNumber::Lens { side, parameter } = number {
-                let first = if *side == Side::Left { 0 } else { LENS_PARAMETERS };
-                derivative[(first + parameter, column)] = 1.0;
+            if let Some(row) = number.shared_row() {
+                derivative[(row, column)] = 1.0;
             }
         }
         derivative

@@ -10,7 +10,7 @@ use crate::rig::Rig;
 /// A number of a rig. `component` is 0, 1 or 2: along x, y or z of the base frame.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum RigNumber {
-    /// A lens parameter, numbered as fx, fy, cx, cy in pixels and k1 to k4 as defined by OpenCV fisheye.
+    /// A lens parameter, numbered as fx, fy, cx, cy in pixels, k1 to k4 as defined by OpenCV fisheye, and the pupil's e0 in mm.
     Lens {
         /// The camera.
         side: Side,
@@ -53,7 +53,8 @@ pub enum RigNumber {
 }
 
 /// Names of the lens parameters in files.
-const LENS: [&str; LENS_PARAMETERS] = ["fx", "fy", "cx", "cy", "opencv_k1", "opencv_k2", "opencv_k3", "opencv_k4"];
+const LENS: [&str; LENS_PARAMETERS] =
+    ["fx", "fy", "cx", "cy", "opencv_k1", "opencv_k2", "opencv_k3", "opencv_k4", "pupil_e0_mm"];
 /// Names of the components in files.
 const COMPONENTS: [&str; 3] = ["x", "y", "z"];
 
@@ -99,6 +100,16 @@ impl RigNumber {
     /// The number called `name` in the file of `rig`.
     pub(super) fn named(name: &str, rig: &Rig) -> Option<Self> {
         Self::all(rig).into_iter().find(|number| number.name(rig) == name)
+    }
+
+    /// The row of a lens parameter in [`vergence_vision::SharedCovariance`]; `None` for all others.
+    #[must_use]
+    pub const fn shared_row(self) -> Option<usize> {
+        match self {
+            Self::Lens { side: Side::Left, parameter } => Some(parameter),
+            Self::Lens { side: Side::Right, parameter } => Some(LENS_PARAMETERS + parameter),
+            _ => None,
+        }
     }
 
     /// A step for differences: small against the curvature of the kinematics, large against rounding.

@@ -8,7 +8,8 @@ use crate::{Camera, KannalaBrandt, Pixel};
 
 /// A [`KannalaBrandt`] lens prepared for whole arrays of points and pixels, about ten times faster.
 ///
-/// Preparation takes about a millisecond, once per lens. Rays agree with the single-point functions to 1e-14 rad.
+/// Preparation takes about a millisecond, once per lens. Rays agree with the single-point functions to 1e-14 rad. Points stand for
+/// directions: where the pupil moves, a point at a finite distance is seen by [`KannalaBrandt::ray_to`] it.
 #[derive(Clone, Debug, PartialEq)]
 pub struct BatchLens {
     lens: KannalaBrandt,

@@ -23,7 +23,11 @@ use super::shared_errors::{ByPose, SharedErrors};
 use super::slope::LensSlope;
 use super::triangulate::Triangulate;
 use super::vectors::{Vectors, cross, dot, scaled, turned};
-use crate::{Angle, SharedCovariance, StereoPair};
+use crate::lens_derivatives::{LENS_PARAMETERS, PUPIL};
+use crate::{
+    Angle, KannalaBrandt, Left, Point, PointUncertainty, Right, SharedCovariance, StereoPair, Transform, UnitRay,
+    pseudo_intersection,
+};
 
 /// A stereo pair prepared for whole arrays of rays: pseudo-intersections with the covariance of
 /// [`crate::PointUncertainty::covariance`], several times faster than one by one.
@@ -34,7 +38,17 @@ pub struct BatchPair {
     left_from_right: Matrix3<f64>,
     right_from_left: Matrix3<f64>,
     shared: SharedErrors,
+    one_by_one: Option<OneByOne>,
     instructions: Instructions,
+}
+
+/// A pair of which a lens is not central, or not known to be: its points are made one by one.
+#[derive(Clone, Debug, PartialEq)]
+struct OneByOne {
+    lenses: [KannalaBrandt; 2],
+    left_from_right: Transform<Left, Right>,
+    pixel_sigma: f64,
+    shared: SharedCovariance,
 }
 
 /// Points and covariances of [`BatchPair`], in the rows of their rays. Rows are NaN where the rays make no point.
@@ -59,6 +73,7 @@ impl BatchPair {
             left_from_right,
             right_from_left: left_from_right.transpose(),
             shared: SharedErrors::new(lenses, pixel_sigma * pixel_sigma, shared),
+            one_by_one: OneByOne::of(pair, pixel_sigma, shared),
             instructions: Instructions::Best,
         }
     }
@@ -83,10 +98,41 @@ impl BatchPair {
     pub fn triangulate_into(&self, left: &[[f64; 3]], right: &[[f64; 3]], out: &mut BatchPoints) {
         let count = left.len().min(right.len());
         let rays = [&left[..count], &right[..count]];
+        if let Some(pair) = &self.one_by_one {
+            return rays[0].iter().zip(rays[1]).for_each(|(left, right)| pair.add(left, right, out));
+        }
         match self.instructions {
             Instructions::Best => best(self, rays, out),
             Instructions::Baseline => all::<ALWAYS_FUSED, NARROW>(self, rays, out),
         }
+    }
+}
+
+impl OneByOne {
+    fn of(pair: &StereoPair<'_>, pixel_sigma: f64, shared: &SharedCovariance) -> Option<Self> {
+        let lenses = [*pair.left, *pair.right];
+        let known = |first: usize| shared.matrix()[(first + PUPIL, first + PUPIL)] == 0.0;
+        let is_central = pair.is_central() && known(0) && known(LENS_PARAMETERS);
+        (!is_central).then_some(Self { lenses, left_from_right: pair.left_from_right, pixel_sigma, shared: *shared })
+    }
+
+    fn add(&self, left: &[f64; 3], right: &[f64; 3], out: &mut BatchPoints) {
+        let (point, [xx, xy, xz, _, yy, yz, _, _, zz]) =
+            self.point(left, right).unwrap_or(([f64::NAN; 3], [f64::NAN; 9]));
+        out.points.push(point);
+        out.covariances.push([xx, xy, xz, yy, yz, zz]);
+    }
+
+    fn point(&self, left: &[f64; 3], right: &[f64; 3]) -> Option<([f64; 3], [f64; 9])> {
+        let [left_lens, right_lens] = &self.lenses;
+        let pair = StereoPair { left: left_lens, right: right_lens, left_from_right: self.left_from_right };
+        let (left, right) = (UnitRay::new((*left).into())?, UnitRay::new((*right).into())?);
+        let (between, origin) = pair.at_origins(&left, &right);
+        let turned = between.left_from_right * right;
+        let made = pseudo_intersection(&left, &turned, &between.left_from_right.origin()).ok()?;
+        let point = Point::from_mm(made.point.mm() + origin.mm());
+        let covariance = PointUncertainty::of(&point, &pair, self.pixel_sigma)?.covariance(&self.shared);
+        Some((point.mm().into(), covariance.as_slice().try_into().ok()?))
     }
 }
 

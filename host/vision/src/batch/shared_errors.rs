@@ -14,7 +14,7 @@ use nalgebra::SMatrix;
 
 use super::lanes::{multiply_add, polynomial};
 use super::slope::{InImage, View};
-use crate::lens_derivatives::LENS_PARAMETERS;
+use crate::lens_derivatives::{CENTRAL_PARAMETERS, LENS_PARAMETERS};
 use crate::{KannalaBrandt, SHARED_PARAMETERS, SharedCovariance};
 
 /// Number of parameters of the pose.
@@ -26,7 +26,7 @@ const POSE: usize = 2 * LENS_PARAMETERS;
 const TERMS: usize = 5;
 
 /// Covariances of one number with the parameters of a lens.
-type WithLens = [f64; LENS_PARAMETERS];
+type WithLens = [f64; CENTRAL_PARAMETERS];
 /// The derivatives of one number by the pose, for each lane.
 pub(super) type ByPose<const W: usize> = [[f64; W]; POSE_PARAMETERS];
 
@@ -35,7 +35,7 @@ pub(super) type ByPose<const W: usize> = [[f64; W]; POSE_PARAMETERS];
 pub(super) struct SharedErrors {
     lenses: [LensErrors; 2],
     /// For each parameter of the right lens, the covariances with the left one.
-    left_with_right: [WithLens; LENS_PARAMETERS],
+    left_with_right: [WithLens; CENTRAL_PARAMETERS],
     /// For each parameter of the pose, the covariances with the left lens and with the right one.
     lenses_with_pose: [[WithLens; 2]; POSE_PARAMETERS],
     pose: [[f64; POSE_PARAMETERS]; POSE_PARAMETERS],
@@ -59,7 +59,7 @@ impl SharedErrors {
             let (f, aspect) = (lens.k()[0], lens.aspect());
             // At a fixed pixel the ray turns the other way than the pixel of a fixed ray moves: hence the sign.
             let lens = [1.0 / f, 1.0 / (f * aspect), 1.0, 1.0 / aspect, f, f, f, f].map(|scale| -scale);
-            scales[first..][..LENS_PARAMETERS].copy_from_slice(&lens);
+            scales[first..][..CENTRAL_PARAMETERS].copy_from_slice(&lens);
         }
         let covariance = |row: usize, column: usize| scales[row] * shared.matrix()[(row, column)] * scales[column];
         let with_lens = |first: usize, column: usize| std::array::from_fn(|i| covariance(first + i, column));
@@ -120,7 +120,7 @@ impl SharedErrors {
     /// The covariance of the left pixel with each of both movements by the right pixel, as far as the lenses are correlated.
     #[inline(always)]
     fn left_with_right<const FUSED: bool, const W: usize>(&self, left: &View<W>, right: &View<W>) -> [InImage<W>; 2] {
-        let mut with_lens = [[[0.0; W]; LENS_PARAMETERS]; 2];
+        let mut with_lens = [[[0.0; W]; CENTRAL_PARAMETERS]; 2];
         for (k, covariances) in self.left_with_right.iter().enumerate() {
             [with_lens[0][k], with_lens[1][k]] = shift::<FUSED, W>(left, &spread(covariances));
         }
@@ -155,12 +155,12 @@ impl SharedErrors {
 impl LensErrors {
     fn new(
         k: &[f64; TERMS],
-        covariance: &SMatrix<f64, LENS_PARAMETERS, LENS_PARAMETERS>,
+        covariance: &SMatrix<f64, CENTRAL_PARAMETERS, CENTRAL_PARAMETERS>,
         [noise_u, noise_v]: [f64; 2],
     ) -> Self {
         // Row i holds the coefficient of θ²ⁱ in the factor of θ cos φ or θ sin φ, by the parameters.
         let factor = |focal: usize| {
-            SMatrix::<f64, TERMS, LENS_PARAMETERS>::from_fn(|i, parameter| {
+            SMatrix::<f64, TERMS, CENTRAL_PARAMETERS>::from_fn(|i, parameter| {
                 let distortion = if i > 0 && parameter == 3 + i { 1.0 } else { 0.0 };
                 if parameter == focal { k[i] } else { distortion }
             })
@@ -209,7 +209,7 @@ impl LensErrors {
 #[inline(always)]
 fn shift<const FUSED: bool, const W: usize>(
     View { place: [x, y], squared, growth, .. }: &View<W>,
-    [focal_u, focal_v, centre_u, centre_v, k1, k2, k3, k4]: &[[f64; W]; LENS_PARAMETERS],
+    [focal_u, focal_v, centre_u, centre_v, k1, k2, k3, k4]: &[[f64; W]; CENTRAL_PARAMETERS],
 ) -> InImage<W> {
     let mut out = [[0.0; W]; 2];
     for j in 0..W {
@@ -225,8 +225,8 @@ fn shift<const FUSED: bool, const W: usize>(
 
 /// The same numbers in all lanes.
 #[inline(always)]
-fn spread<const W: usize>(numbers: &WithLens) -> [[f64; W]; LENS_PARAMETERS] {
-    let mut out = [[0.0; W]; LENS_PARAMETERS];
+fn spread<const W: usize>(numbers: &WithLens) -> [[f64; W]; CENTRAL_PARAMETERS] {
+    let mut out = [[0.0; W]; CENTRAL_PARAMETERS];
     for (out, number) in out.iter_mut().zip(numbers) {
         *out = [*number; W];
     }

@@ -9,7 +9,7 @@ use super::{
     AngularNorm, Rejection, Triangulated, angular, edge_plane, mid2, midpoint, pseudo_intersection, rectified,
     reprojection,
 };
-use crate::{DropReason, Left, PixelPair, Right, StereoPair, UnitRay};
+use crate::{DropReason, Left, Length, PixelPair, Point, Right, StereoPair, UnitRay};
 
 /// A method of triangulation.
 ///
@@ -70,6 +70,8 @@ impl Kernel {
     }
 
     /// Triangulates `pixels` whose rays are known; `right` is in the right camera's own frame.
+    ///
+    /// The rays are intersected between their origins, which the points are then moved from.
     pub(crate) fn of_rays(
         &self,
         pixels: &PixelPair,
@@ -77,7 +79,8 @@ impl Kernel {
         right: &UnitRay<Right>,
         pair: &StereoPair<'_>,
     ) -> Result<Triangulated, DropReason> {
-        let (turned, centre) = (pair.left_from_right * *right, pair.left_from_right.origin());
+        let (between, origin) = pair.at_origins(left, right);
+        let (turned, centre) = (between.left_from_right * *right, between.left_from_right.origin());
         let made = match self {
             Self::PseudoIntersection => pseudo_intersection(left, &turned, &centre),
             Self::Midpoint => midpoint(left, &turned, &centre),
@@ -85,11 +88,21 @@ impl Kernel {
             Self::AngularL1 => angular(AngularNorm::L1, left, &turned, &centre),
             Self::AngularL2 => angular(AngularNorm::L2, left, &turned, &centre),
             Self::AngularLinf => angular(AngularNorm::Linf, left, &turned, &centre),
-            Self::Reprojection => reprojection(pixels, left, right, pair),
+            Self::Reprojection => reprojection(pixels, left, right, &between),
             Self::EdgePlane(edge) => edge_plane(edge, left, &turned, &centre),
-            Self::Rectified => rectified(left, right, &pair.left_from_right),
-        };
-        Ok(made?)
+            Self::Rectified => rectified(left, right, &between.left_from_right),
+        }?;
+        if pair.is_central() {
+            return Ok(made);
+        }
+        let point = made.point.mm() + origin.mm();
+        let right_range = Length::from_mm((point - pair.left_from_right.origin().mm()).norm());
+        Ok(Triangulated {
+            point: Point::from_mm(point),
+            left_range: Length::from_mm(point.norm()),
+            right_range,
+            ..made
+        })
     }
 
     /// The stable name for the command line and for reports.
