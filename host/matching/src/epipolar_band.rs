@@ -11,6 +11,8 @@ pub(crate) struct EpipolarBand {
     baseline_mm: f64,
     nearest_mm: f64,
     pose_px: f64,
+    /// How far rows may differ at the nearest range, because rays do not start at the cameras' origins.
+    pupil_px: f64,
 }
 
 impl EpipolarBand {
@@ -19,7 +21,14 @@ impl EpipolarBand {
 
     pub(crate) fn new(grid: Grid, baseline: Length, nearest: Length, pose_sigma: Angle) -> Self {
         let pose_px = Self::SIGMAS * pose_sigma.rad() * grid.pixels_per_radian();
-        Self { grid, baseline_mm: baseline.mm(), nearest_mm: nearest.mm(), pose_px }
+        Self { grid, baseline_mm: baseline.mm(), nearest_mm: nearest.mm(), pose_px, pupil_px: 0.0 }
+    }
+
+    /// The band for lenses whose rays start as much as `shift` from their cameras' origins: it is wider by the angle of that at the range of a
+    /// partner, which its disparity tells.
+    pub(crate) fn with_pupils(self, shift: Length) -> Self {
+        let pupil_px = (shift.mm() / self.nearest_mm).atan() * self.grid.pixels_per_radian();
+        Self { pupil_px, ..self }
     }
 
     /// Whether two positions, each known to `tolerance` pixels, may be of one point.
@@ -27,7 +36,11 @@ impl EpipolarBand {
         let slack = tolerance + self.pose_px;
         let off_row = (left.y - right.y).abs() * self.shortening(left);
         let disparity = left.x - right.x;
-        off_row <= slack && disparity >= -slack && disparity <= self.largest_disparity(left.x) + slack
+        let nearness = (disparity / self.largest_disparity(left.x)).clamp(0.0, 1.0);
+        let nearness = if nearness.is_finite() { nearness } else { 1.0 };
+        off_row <= slack + self.pupil_px * nearness
+            && disparity >= -slack
+            && disparity <= self.largest_disparity(left.x) + slack
     }
 
     /// Length of the arc of one row at `at`, relative to that on the axis: a row is an angle about the baseline.
@@ -39,7 +52,7 @@ impl EpipolarBand {
     pub(crate) fn reach(&self, tolerance: f64) -> f64 {
         let (last, _) = self.grid.size();
         let least_cos = self.grid.a(0.0).cos().min(self.grid.a(last as f64).cos());
-        (tolerance + self.pose_px) / least_cos.max(f64::MIN_POSITIVE)
+        (tolerance + self.pose_px + self.pupil_px) / least_cos.max(f64::MIN_POSITIVE)
     }
 
     /// The disparity in pixels of the nearest range at column x of the left view. The right camera at (B, 0) sees the

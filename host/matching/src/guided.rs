@@ -106,7 +106,7 @@ fn matched(views: &SharedViews<'_>, [left, right]: &[Features; 2], pose_sigma: A
     agree_on_pose(&mut links, &left.keypoints, &views.grid, pose_sigma);
     Rows::of(&compared).drop_repeated(&mut links, &left.keypoints, &band);
     thin(&mut links, &left.keypoints);
-    state_errors(&mut links, &left.keypoints);
+    state_errors(&mut links, &compared, &band);
     in_originals(&links, views, &left.keypoints, right.keypoints.len())
 }
 

@@ -94,10 +94,11 @@ pub(crate) fn registered(
     if !band.allows(left, found.right, REGISTERED_TOLERANCE) {
         return Err(UnmatchedReason::Epipolar);
     }
-    let [along, across] = found.evidence.sigma(compared.oversampling);
+    let shortening = band.shortening(left);
+    let [along, across] = found.evidence.sigma(compared.oversampling, shortening);
     Ok(Link {
         evidence: Some(found.evidence),
-        ..Link::of_keypoints(found.right, found.correlation, [along, across * band.shortening(left)])
+        ..Link::of_keypoints(found.right, found.correlation, [along, across * shortening])
     })
 }
 

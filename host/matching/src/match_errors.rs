@@ -2,11 +2,17 @@
 //!
 //! The errors of matches have a core and tails. The standard deviations are those of the core; a few per cent of the matches are off by
 //! more than three of them: windows that show two surfaces. What shows these is counted into a probability by logistic regression (D.
-//! Cox, J. R. Stat. Soc. B 20(2), 1958). All numbers were fitted to rendered pairs, see docs/measured/matching.md.
+//! Cox, J. R. Stat. Soc. B 20(2), 1958), and the least probable matches are dropped. All numbers were fitted to rendered pairs, see
+//! docs/measured/matching.md.
 
-use crate::corners::Keypoint;
-use crate::links::{Link, Links, placed};
+use rayon::prelude::*;
+use vergence_vision::median;
+
+use crate::UnmatchedReason;
+use crate::epipolar_band::EpipolarBand;
+use crate::links::{Compared, Link, Links, placed};
 use crate::neighbours::off_surface;
+use crate::refine::{Warp, departures};
 
 /// What a registration shows of its own error.
 #[derive(Clone, Copy, Debug)]
@@ -17,30 +23,51 @@ pub(crate) struct Evidence {
     pub residual: f64,
     /// Stretch or shear along the row, the larger of both.
     pub steepness: f64,
+    /// Distance between the keypoint and the result of registering to the right view and back, in pixels of the view.
+    pub way_back: f64,
+    /// The warp that was found.
+    pub warp: Warp,
 }
 
 impl Evidence {
     /// Standard deviations along the row and across it, in pixels of the view, by the registration alone. `oversampling` is the number of
-    /// pixels of the view per pixel of the image.
-    pub(crate) fn sigma(&self, oversampling: f64) -> [f64; 2] {
+    /// pixels of the view per pixel of the image, `shortening` the length of an arc of a row relative to that on the axis: where it is
+    /// short, more rows of the view show the same pixel.
+    pub(crate) fn sigma(&self, oversampling: f64, shortening: f64) -> [f64; 2] {
+        let repeated = (oversampling / shortening.max(SHORTEST)).sqrt();
         [0, 1].map(|i| {
-            let from_residuals = ERROR_FACTORS[i] * oversampling.sqrt() * self.from_residuals[i];
-            from_residuals.hypot(SMALLEST_SIGMAS[i] * oversampling)
+            let noise = self.residual.hypot(SMALLEST_RESIDUALS[i]) / self.residual.max(f64::MIN_POSITIVE);
+            let from_residuals = ERROR_FACTORS[i] * repeated * noise * self.from_residuals[i];
+            from_residuals.hypot(SMALLEST_SIGMAS[i] * oversampling).hypot(BY_WAY_BACK[i] * self.way_back)
         })
     }
 }
 
 /// How much larger the errors along the row and across it are than from independent residuals, in a view as dense as the image. They grow
 /// with the root of the density of the view, whose neighbouring pixels then show the same pixel of the image.
-const ERROR_FACTORS: [f64; 2] = [1.75, 1.65];
+const ERROR_FACTORS: [f64; 2] = [1.3, 1.41];
+/// Residuals that two views have at least, in grey levels: where both images are sampled alike, as with parallel axes, the noise that
+/// they share hides in no residual.
+const SMALLEST_RESIDUALS: [f64; 2] = [0.43, 0.78];
 /// Smallest standard deviations of a registration, in pixels of the image: it ends with a step of up to a hundredth of a pixel of the view.
-const SMALLEST_SIGMAS: [f64; 2] = [0.01, 0.02];
+const SMALLEST_SIGMAS: [f64; 2] = [0.003, 0.004];
+/// Parts of the distance of the way back that are errors along the row and across it.
+const BY_WAY_BACK: [f64; 2] = [0.97, 0.7];
+/// Smallest shortening that was fitted: 75 degrees from the axis it is 0.26.
+const SHORTEST: f64 = 0.2;
 /// Part of the distance from the surface of the matches around a match that its error along the row makes, and the largest distance
 /// that counts: beyond it, the surface is another one.
-const OFF_SURFACE: (f64, f64) = (0.6, 0.4);
+const OFF_SURFACE: (f64, f64) = (0.31, 0.4);
+/// Parts of the departure of the windows beside a match, the third in size of the four, that are errors along the row and across it.
+const BY_DEPARTURE: [f64; 2] = [0.54, 0.15];
+/// The largest departure that counts, in pixels of the view.
+const FARTHEST_DEPARTURE: f64 = 1.0;
 /// Logistic regression of the probability that a registered match is right: constant, logarithm of its residual over the median one,
-/// steepness, squared distance from the epipolar plane in standard deviations, of which up to four count.
-const REGISTERED: [f64; 4] = [4.7, -1.15, -5.5, -0.24];
+/// steepness, squared distance from the epipolar plane in standard deviations, of which up to four count, and logarithm of the sum of the
+/// departures and 0.05.
+const REGISTERED: [f64; 5] = [4.43, -0.86, -1.7, -0.18, -0.53];
+/// Matches that are more probably wrong than right are dropped. On real photographs many that are right have less than 0.9.
+const LEAST_PROBABILITY: f64 = 0.5;
 
 /// Standard deviations of the position of an unregistered match along the row and across it, in pixels of the view: networks place
 /// keypoints on whole pixels of both views.
@@ -50,27 +77,44 @@ const UNREGISTERED_OFF: (f64, f64) = (0.7, 20.0);
 /// The probability that an unregistered match is right: constant, and factor of the logarithm of the odds that the networks state.
 const UNREGISTERED: [f64; 2] = [2.0, 0.4];
 
-/// Completes the standard deviations and states the probability of each link, from the links around it.
-pub(crate) fn state_errors(links: &mut Links, keypoints: &[Keypoint]) {
-    let surface = off_surface(&placed(links, keypoints));
-    let mut residuals: Vec<f64> = links.iter().flatten().filter_map(|link| Some(link.evidence?.residual)).collect();
-    residuals.sort_by(f64::total_cmp);
-    let usual = residuals.get(residuals.len() / 2).copied().unwrap_or_default();
-    for (link, off) in links.iter_mut().flatten().zip(surface) {
-        let part = |(factor, farthest): (f64, f64)| factor * off.min(farthest);
-        let along = link.sigma[0];
-        (link.sigma[0], link.right_probability) = match link.evidence {
-            Some(evidence) => (along.hypot(part(OFF_SURFACE)), registered_probability(link, &evidence, usual)),
-            None => (along.hypot(part(UNREGISTERED_OFF)), unregistered_probability(link)),
-        };
-    }
+/// Completes the standard deviations and states the probability of each link, from the links and the windows around it. Registered links
+/// that are probably wrong are dropped.
+pub(crate) fn state_errors(links: &mut Links, compared: &Compared<'_>, band: &EpipolarBand) {
+    let mut off = vec![0.0; links.len()];
+    let linked = off.iter_mut().zip(links.iter()).filter(|(_, link)| link.is_ok());
+    linked.zip(off_surface(&placed(links, compared.keypoints))).for_each(|((off, _), found)| *off = found);
+    let residuals = links.iter().flatten().filter_map(|link| Some(link.evidence?.residual)).collect();
+    let usual = median(residuals).unwrap_or_default();
+    links.par_iter_mut().zip(compared.keypoints).zip(off).for_each(|((link, keypoint), off)| {
+        *link = link.and_then(|mut link| {
+            let part = |(factor, farthest): (f64, f64)| factor * off.min(farthest);
+            let Some(evidence) = link.evidence else {
+                link.sigma[0] = link.sigma[0].hypot(part(UNREGISTERED_OFF));
+                link.right_probability = unregistered_probability(&link);
+                return Ok(link);
+            };
+            let mut departures = departures([compared.left, compared.right], keypoint.at, &evidence.warp)
+                .map(|departure| departure.min(FARTHEST_DEPARTURE));
+            departures.sort_by(f64::total_cmp);
+            link.right_probability = registered_probability(&link, &evidence, usual, departures.iter().sum());
+            if link.right_probability < LEAST_PROBABILITY {
+                return Err(UnmatchedReason::TwoSurfaces);
+            }
+            let [along, across] = BY_DEPARTURE.map(|part| part * departures[2]);
+            link.sigma[0] = link.sigma[0].hypot(part(OFF_SURFACE)).hypot(along);
+            link.sigma[1] = link.sigma[1].hypot(across * band.shortening(keypoint.at));
+            Ok(link)
+        });
+    });
 }
 
-fn registered_probability(link: &Link, evidence: &Evidence, usual: f64) -> f64 {
-    let [constant, by_residual, by_steepness, by_distance] = REGISTERED;
+fn registered_probability(link: &Link, evidence: &Evidence, usual: f64, departures: f64) -> f64 {
+    let [constant, by_residual, by_steepness, by_distance, by_departures] = REGISTERED;
     let residual = (evidence.residual / usual.max(f64::MIN_POSITIVE)).max(0.1).ln();
     let distance = link.off_plane.min(4.0).powi(2);
-    logistic(constant + by_residual * residual + by_steepness * evidence.steepness + by_distance * distance)
+    let departed = (departures + 0.05).ln();
+    let shown = by_residual * residual + by_steepness * evidence.steepness + by_distance * distance;
+    logistic(constant + shown + by_departures * departed)
 }
 
 fn unregistered_probability(link: &Link) -> f64 {

@@ -103,6 +103,8 @@ pub enum UnmatchedReason {
     Isolated,
     /// A better match is at the same position.
     Duplicate,
+    /// The windows in which it was registered probably show two surfaces: residuals, neighbouring windows and epipolar plane disagree.
+    TwoSurfaces,
 }
 
 impl UnmatchedReason {
@@ -121,6 +123,7 @@ impl UnmatchedReason {
             Self::Repeated => "repeated",
             Self::Isolated => "isolated",
             Self::Duplicate => "duplicate",
+            Self::TwoSurfaces => "two_surfaces",
         }
     }
 }

@@ -1,7 +1,7 @@
 //! Least-squares registration of the windows around a match, to a few hundredths of a pixel.
 //!
 //! The method is inverse compositional Gauss-Newton (S. Baker and I. Matthews, "Lucas-Kanade 20 years on", IJCV 56(3),
-//! 2004) with gain and bias as linear unknowns. Between two views with epipolar rows a plane maps by
+//! 2004) with gain, bias and the slope of the gain as linear unknowns. Between two views with epipolar rows a plane maps by
 //! x' = x + t_x + s_x x + s_y y, y' = y, so rows stay rows. The unknown t_y absorbs the error of the pose; it is the
 //! distance of the match from its epipolar curve.
 
@@ -10,7 +10,7 @@ mod window;
 
 use multiversion::multiversion;
 
-use self::warp::Warp;
+pub(crate) use self::warp::Warp;
 use self::window::{HALF, Window, surroundings, warped};
 use crate::match_errors::Evidence;
 use crate::plane::{Plane, Pyramid};
@@ -73,12 +73,30 @@ pub(crate) fn register(
         return Err(UnmatchedReason::NotRefined);
     };
     let back = align(from, to, right, warp.inverse()).map_err(|_| UnmatchedReason::NotReversible)?.warp;
-    if (back.tx + warp.tx).hypot(back.ty + warp.ty) > LARGEST_LOOP {
+    let way_back = (back.tx + warp.tx).hypot(back.ty + warp.ty);
+    if way_back > LARGEST_LOOP {
         return Err(UnmatchedReason::NotReversible);
     }
     let steepness = warp.sx.abs().max(warp.sy.abs());
-    let evidence = Evidence { from_residuals: fit.sigmas, residual: fit.residual, steepness };
+    let evidence = Evidence { from_residuals: fit.sigmas, residual: fit.residual, steepness, way_back, warp };
     Ok(Registered { right, correlation: fit.correlation, evidence })
+}
+
+/// Distance of the windows beside a match from its own, in pixels of the view: most of what they show is the same surface.
+const BESIDE: f64 = 7.0;
+/// The departure of a window that cannot be registered.
+const LOST: f64 = f64::INFINITY;
+
+/// How far the disparities to the left, to the right, above and below the match `left` depart from the plane that its registration found,
+/// in pixels of the view. A window that shows two surfaces finds a plane between them that the windows beside it do not.
+pub(crate) fn departures([left_levels, right_levels]: [&Pyramid; 2], left: ViewPixel, warp: &Warp) -> [f64; 4] {
+    let planes = left_levels.levels().first().zip(right_levels.levels().first());
+    [(-BESIDE, 0.0), (BESIDE, 0.0), (0.0, -BESIDE), (0.0, BESIDE)].map(|(dx, dy)| {
+        let there = ViewPixel { x: left.x + dx, y: left.y + dy };
+        let on_plane = Warp { tx: warp.tx + warp.sx * dx + warp.sy * dy, ..*warp };
+        let found = planes.and_then(|(from, to)| align(from, to, there, on_plane).ok());
+        found.map_or(LOST, |found| (found.warp.tx - on_plane.tx).abs())
+    })
 }
 
 /// The result of a registration in one level.
@@ -154,6 +172,27 @@ mod tests {
             prop_assert!((fit.warp.tx - tx).abs() < 0.02 && (fit.warp.ty - ty).abs() < 0.02, "{:?}", fit.warp);
             prop_assert!((fit.warp.sx - sx).abs() < 0.01 && (fit.warp.sy - sy).abs() < 0.01, "{:?}", fit.warp);
             prop_assert!(fit.correlation > 0.99);
+        }
+    }
+
+    /// `plane` under light that grows by these parts per pixel; levels are 14 more than the light of sRGB is proportional to.
+    fn under_falloff(plane: &Plane, [by_x, by_y]: [f64; 2]) -> Plane {
+        let middle = (SIZE / 2) as f64;
+        let darkened = |(i, value): (usize, &f32)| {
+            let (x, y) = ((i % SIZE) as f64 - middle, (i / SIZE) as f64 - middle);
+            ((f64::from(*value) + 14.0) * (1.0 + by_x * x + by_y * y) - 14.0) as f32
+        };
+        Plane::new(SIZE, SIZE, plane.values().iter().enumerate().map(darkened).collect())
+    }
+
+    proptest! {
+        #[test]
+        fn a_lens_that_darkens_towards_its_edge_displaces_nothing(by_x in -2e-3..2e-3, by_y in -2e-3..2e-3) {
+            let template = textured(&Warp::default(), 1.0, 0.0);
+            let image = under_falloff(&template, [by_x, by_y]);
+            let middle = ViewPixel { x: (SIZE / 2) as f64, y: (SIZE / 2) as f64 };
+            let fit = align(&template, &image, middle, Warp::default()).unwrap();
+            prop_assert!(fit.warp.tx.hypot(fit.warp.ty) < 1e-4, "{:?}", fit.warp);
         }
     }
 

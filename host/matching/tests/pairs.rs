@@ -57,7 +57,7 @@ fn assert_honest(pair: &Pair, matches: &Matches) {
     let [one, two, three] = [1.0, 2.0, 3.0].map(within);
     println!("{one:.3}, {two:.3} and {three:.3} of the ranges within 1, 2 and 3 sigma, the last stated as {score:.3}");
     assert!((0.58..0.82).contains(&one), "{one:.3} of the ranges are within one sigma");
-    assert!((0.90..0.985).contains(&two), "{two:.3} of the ranges are within two sigma");
+    assert!((0.90..0.99).contains(&two), "{two:.3} of the ranges are within two sigma");
     assert!((three - score).abs() < 0.03, "{three:.3} of the ranges are within three sigma, stated are {score:.3}");
 }
 

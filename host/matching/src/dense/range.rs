@@ -9,11 +9,14 @@
 //!
 //! A turn ω of the right camera acts as a disparity n·ω, its shift δ as (n × v)·δ / μ.
 
-use nalgebra::{Matrix6, Vector3, Vector6};
-use vergence_vision::{LENS_PARAMETERS, SharedCovariance, StereoPair};
+use nalgebra::{Matrix6, Rotation3, Vector3, Vector6};
+use vergence_vision::{
+    KannalaBrandt, LENS_PARAMETERS, Left, Right, SharedCovariance, StereoPair, Transform, UnitRay, pseudo_intersection,
+};
 
 use super::shared_spread::SharedSpread;
 use crate::SharedFrame;
+use crate::grid::direction;
 
 /// Converts disparities to ranges, for one pair and one covariance of its lenses and pose.
 pub(super) struct RangeFinder {
@@ -22,6 +25,15 @@ pub(super) struct RangeFinder {
     pose: Matrix6<f64>,
     /// With the lenses, where these are uncertain.
     with_lenses: Option<SharedSpread>,
+    /// Where the lenses are not central.
+    origins: Option<Origins>,
+}
+
+/// Two lenses whose rays do not all start at one point.
+struct Origins {
+    lenses: [KannalaBrandt; 2],
+    left_from_right: Transform<Left, Right>,
+    left_from_shared: Rotation3<f64>,
 }
 
 /// A range and its standard deviations, with and without lenses and pose, in millimetres, and that of its disparity.
@@ -47,6 +59,7 @@ impl RangeFinder {
             baseline_mm: frame.baseline().mm(),
             pose: both * shared.pose() * both.transpose(),
             with_lenses: has_lenses.then(|| SharedSpread::new(frame, pair, shared)),
+            origins: Origins::of(frame, pair),
         }
     }
 
@@ -60,8 +73,12 @@ impl RangeFinder {
         let of_shared = if of_lenses.is_nan() { self.disparity_variance(b, right, from_right) } else { of_lenses };
         let variance = sigma * sigma + of_shared;
         let per_radian = from_right / sine;
+        let mm = match &self.origins {
+            None => self.baseline_mm * right.cos() / sine,
+            Some(origins) => origins.range_mm([a, b], d).unwrap_or(f64::NAN),
+        };
         RangeAt {
-            mm: self.baseline_mm * right.cos() / sine,
+            mm,
             sigma_mm: per_radian * variance.sqrt(),
             disparity_sigma: variance.sqrt(),
             own_sigma_mm: per_radian * sigma,
@@ -75,6 +92,27 @@ impl RangeFinder {
         let across = Vector3::new(-right.cos(), right.sin() * b.sin(), right.sin() * b.cos()) / from_right;
         let by_pose = Vector6::new(normal.x, normal.y, normal.z, across.x, across.y, across.z);
         by_pose.dot(&(self.pose * by_pose)).max(0.0)
+    }
+}
+
+impl Origins {
+    fn of(frame: &SharedFrame, pair: &StereoPair<'_>) -> Option<Self> {
+        let left_from_shared = frame.shared_from_left().rotation().to_rotation_matrix().inverse();
+        let lenses = [*pair.left, *pair.right];
+        (!pair.is_central()).then_some(Self { lenses, left_from_right: pair.left_from_right, left_from_shared })
+    }
+
+    /// The range from where the left ray starts to the pseudo-intersection with the right ray, which lies in its epipolar plane of the
+    /// cameras' origins.
+    fn range_mm(&self, [a, b]: [f64; 2], d: f64) -> Option<f64> {
+        let [left, right] = &self.lenses;
+        let pair = StereoPair { left, right, left_from_right: self.left_from_right };
+        let ray = |a: f64| UnitRay::<Left>::new(self.left_from_shared * direction(a, b));
+        let (left, turned) = (ray(a)?, ray(a - d)?);
+        let in_right = self.left_from_right.inverse() * turned;
+        let (between, _) = pair.at_origins(&left, &in_right);
+        let made = pseudo_intersection(&left, &turned, &between.left_from_right.origin()).ok()?;
+        Some(made.left_range.mm())
     }
 }
 
@@ -102,7 +140,7 @@ mod tests {
         let pair = StereoPair { left: &lens, right: &lens, left_from_right };
         let finder = RangeFinder::new(&frame, &pair, &shared);
         let by_lens = SMatrix::<f64, LENS_PARAMETERS, LENS_PARAMETERS>::from_diagonal(
-            &[0.3, 0.3, 0.2, 0.2, 1e-3, 1e-3, 1e-4, 1e-5].map(|sigma: f64| sigma.powi(2)).into(),
+            &[0.3, 0.3, 0.2, 0.2, 1e-3, 1e-3, 1e-4, 1e-5, 0.0].map(|sigma: f64| sigma.powi(2)).into(),
         );
         let uncertain = shared.with_lenses([&by_lens, &by_lens]);
         let with_lenses = RangeFinder::new(&frame, &pair, &uncertain);

@@ -6,7 +6,7 @@
 //! at a coarse level, where the movement is a part of a pixel, and registered in both directions up to the finest one.
 
 use rayon::prelude::*;
-use vergence_vision::{Angle, Left, Right, Transform};
+use vergence_vision::{Angle, Left, Right, Transform, median};
 
 use super::levels::Levels;
 use crate::consensus::{BearingPair, Consensus};
@@ -49,7 +49,7 @@ pub(super) fn sightings(levels: &Levels) -> Vec<Sighting> {
         let left = ViewPixel { x: x as f64 * scale, y: y as f64 * scale };
         let start = ViewPixel { x: left.x - f64::from(disparities[y * width + x]) * scale, y: left.y };
         let found = refine::register(levels.planes(), left, start, level).ok()?;
-        let [_, sigma] = found.evidence.sigma(OVERSAMPLING);
+        let [_, sigma] = found.evidence.sigma(OVERSAMPLING, 1.0);
         Some(Sighting { left, right: found.right, sigma })
     };
     places.par_iter().filter_map(sighted).collect()
@@ -70,16 +70,14 @@ pub(super) fn pose_of_rows(
     if pairs.len() < LEAST {
         return None;
     }
-    let median = |consensus: &Consensus| {
-        let mut off: Vec<f64> =
-            pairs.iter().filter_map(|pair| consensus.off_plane(pair)).map(|(off, _)| off.rad()).collect();
-        off.sort_by(f64::total_cmp);
-        off.get(off.len() / 2).map_or(f64::INFINITY, |median| median * grid.pixels_per_radian())
+    let distance = |consensus: &Consensus| {
+        let off = pairs.iter().filter_map(|pair| consensus.off_plane(pair)).map(|(off, _)| off.rad()).collect();
+        median(off).map_or(f64::INFINITY, |median| median * grid.pixels_per_radian())
     };
-    let stated = median(&Consensus::of(&pairs, Angle::from_rad(0.0)));
+    let stated = distance(&Consensus::of(&pairs, Angle::from_rad(0.0)));
     if stated <= BEARABLE {
         return None;
     }
     let seen = Consensus::of(&pairs, ANY_POSE);
-    (median(&seen) < BETTER * stated).then(|| seen.pose(frame, pose))
+    (distance(&seen) < BETTER * stated).then(|| seen.pose(frame, pose))
 }

@@ -131,7 +131,7 @@ impl NetworkMatches {
         propagate(&mut links, &compared, &rows, &band);
         agree_on_pose(&mut links, &keypoints, &views.grid, pair.pose_sigma);
         thin(&mut links, &keypoints);
-        state_errors(&mut links, &keypoints);
+        state_errors(&mut links, &compared, &band);
         in_originals(&links, views, &keypoints, right_keypoints)
     }
 }

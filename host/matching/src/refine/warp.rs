@@ -2,7 +2,7 @@
 
 /// The warp x' = x + tx + sx x + sy y, y' = y + ty, about the centre of the window, in pixels of a level.
 #[derive(Clone, Copy, Debug, Default)]
-pub(super) struct Warp {
+pub(crate) struct Warp {
     pub tx: f64,
     pub ty: f64,
     pub sx: f64,

@@ -13,8 +13,11 @@ pub(super) const HALF: usize = 8;
 const SIDE: usize = 2 * HALF + 1;
 /// Standard deviation of the Gaussian weights of the window, in pixels.
 const WEIGHT_SIGMA: f64 = 4.5;
-/// Number of unknowns: four of the warp, gain and bias.
-const UNKNOWNS: usize = 6;
+/// Number of unknowns: four of the warp, gain, bias, and how the gain grows along and across the row.
+const UNKNOWNS: usize = 8;
+/// Grey level below black at which sRGB, 1.055 L^(1/2.4) - 0.055 of the light L, would begin without its straight part (IEC 61966-2-1):
+/// above it levels grow in proportion where the light does.
+const BELOW_BLACK: f64 = 255.0 * 0.055;
 
 /// One value for each pixel of the window, by rows.
 pub(super) type Patch = [[f64; SIDE]; SIDE];
@@ -34,7 +37,11 @@ pub(super) fn surroundings(template: &Plane, at: ViewPixel) -> Option<Padded> {
 }
 
 /// The template's window as the columns of a linear model of the other image's window:
-/// I ≈ gain (T + ∇T · step) + bias.
+/// I ≈ gain (T + ∇T · step) + bias + slope · (x, y) (T + 14).
+///
+/// The slope is that of the falloff of a lens: towards the edge of its field it darkens, in the two images of a point in different
+/// directions. Without it the window seems displaced towards the brighter side by some thousandths of a pixel, all windows of a region alike
+/// (docs/measured/robot.md).
 pub(super) struct Window([Patch; UNKNOWNS]);
 
 impl Window {
@@ -54,6 +61,9 @@ impl Window {
                 columns[3][j][i] = v * gx;
                 columns[4][j][i] = values[j + 1][i + 1] - mean;
                 columns[5][j][i] = 1.0;
+                let level = values[j + 1][i + 1] + BELOW_BLACK;
+                columns[6][j][i] = u * level;
+                columns[7][j][i] = v * level;
             }
         }
         Self(columns)

@@ -78,6 +78,12 @@ impl Place {
         }
     }
 
+    /// The pose of the left camera in the scene.
+    pub fn world_from_left(&self) -> Transform<World, Left> {
+        let [left, _] = self.poses();
+        left.renamed()
+    }
+
     pub fn left_from_right(&self) -> Transform<Left, Right> {
         let [left, right] = self.poses();
         left.renamed::<World, Left>().inverse() * right.renamed::<World, Right>()
