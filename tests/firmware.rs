@@ -6,26 +6,16 @@
     reason = "a test fails loudly and shows its figures"
 )]
 
-use std::path::{Path, PathBuf};
-use std::process::Command;
+#[path = "elf_rig/build.rs"]
+mod elf_build;
 
+use std::path::Path;
+
+use elf_build::build;
 use vergence_image::layout::{BOOTLOADER, CAPACITY, FLASH_BASE, IMAGE, RAM};
 
 /// What the stack may need at least: interrupts upon a task that plans a move.
 const STACK: u32 = 16 * 1024;
-
-/// Builds a package of the firmware's workspace as the documentation says; returns its ELF.
-fn build(package: &str) -> PathBuf {
-    let target = Path::new(env!("CARGO_TARGET_TMPDIR")).join("firmware");
-    let output = Command::new(env!("CARGO"))
-        .args(["build", "--release", "--locked", "-p", package, "--target-dir"])
-        .arg(&target)
-        .current_dir(Path::new(env!("CARGO_MANIFEST_DIR")).join("../../firmware/nucleo-g474"))
-        .output()
-        .expect("cargo runs");
-    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
-    target.join("thumbv7em-none-eabihf/release").join(package)
-}
 
 /// A section that takes memory on the board.
 struct Section {

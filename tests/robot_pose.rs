@@ -1,5 +1,5 @@
 //! The robot's pose and points by the command line from rendered images, in each of its modes: as uncertain as stated, where each joint
-//! is off by the play that the rig file states. Corridor, joints and images are simulated; the lenses are known exactly.
+//! is off by the play that the rig file states and the cameras by what it leaves to a calibration. Corridor, joints and images are simulated; the lenses are known exactly.
 #![allow(
     clippy::expect_used,
     clippy::panic,
@@ -13,7 +13,7 @@ use std::sync::Arc;
 
 use common::rendered::{Measurement, PointError, Truth, band, seeds};
 use nalgebra::{UnitQuaternion, Vector3};
-use vergence_rig::Rig;
+use vergence_rig::{Rig, RigCalibration, RigPose};
 use vergence_scene::{CorridorPlan, Scene};
 use vergence_sim::{Random, Room};
 use vergence_vision::Transform;
@@ -37,6 +37,20 @@ fn truly_at(rig: &Rig, mode: &str, random: &mut Random) -> Vec<f64> {
     values
 }
 
+/// The pose with the joints there and the cameras off by what the calibration states: what it leaves uncertain is drawn too, or every
+/// covariance would be right that is large.
+fn true_pose(rig: &Rig, mode: &str, random: &mut Random) -> RigPose {
+    let mut pose = rig.pose_at_values(&truly_at(rig, mode, random));
+    let RigCalibration::Sigmas { rotation, translation } = rig.calibration else {
+        panic!("the robot's file states its calibration goal");
+    };
+    let turn = UnitQuaternion::from_scaled_axis(random.vector(rotation.rad()));
+    let shift = random.vector(translation.mm());
+    let by_joints = pose.left_from_right;
+    pose.left_from_right = Transform::new(turn * by_joints.rotation(), by_joints.origin().mm() + shift);
+    pose
+}
+
 /// A random corridor, and the robot somewhere in it.
 fn room(seed: u64, random: &mut Random) -> Arc<Room> {
     let scene = Scene::of_corridor(&CorridorPlan::random(40_000 + seed));
@@ -48,7 +62,7 @@ fn room(seed: u64, random: &mut Random) -> Arc<Room> {
 /// The robot in `mode`, somewhere, measured by the pose that its joints state.
 fn trial(rig: &Rig, mode: &str, seed: u64) -> Measurement {
     let mut random = Random::new(1_000 * seed + 7);
-    let pose = rig.pose_at_values(&truly_at(rig, mode, &mut random));
+    let pose = true_pose(rig, mode, &mut random);
     let room = room(seed, &mut random);
     Truth { rig, room, pose, seed }.measure(&["--mode", mode])
 }
@@ -58,6 +72,8 @@ fn mean(values: impl Iterator<Item = f64>) -> f64 {
     sum / count
 }
 
+/// The first trial. What matches share was chosen on trials before it (`vergence_vision`'s `residual_spread`).
+const FIRST: u64 = 100;
 /// A point whose range is off by more than this many standard deviations is an outlier: its score is the probability that it is none.
 const OUTLIER: f64 = 3.0;
 /// Mean squared error of a component over its variance, without its outliers.
@@ -66,7 +82,8 @@ const OF_ONE: f64 = 0.973;
 /// One mode's figures over all trials.
 struct Figures {
     of_pose: f64,
-    /// Of one point a trial that is no outlier: points of one pair share the error of the pose.
+    /// Of a point that is no outlier. Points of one pair share the error of the pose: their mean counts as one point, which varies at least
+    /// as much.
     of_point: f64,
     /// Parts of the ranges within one, two and three standard deviations, wrong matches included.
     within: [f64; 3],
@@ -75,14 +92,14 @@ struct Figures {
 }
 
 fn figures(rig: &Rig, mode: &str, trials: u64) -> Figures {
-    let measured: Vec<Measurement> = (0..trials).map(|seed| trial(rig, mode, seed)).collect();
+    let measured: Vec<Measurement> = (FIRST..FIRST + trials).map(|seed| trial(rig, mode, seed)).collect();
     for one in &measured {
         assert_eq!(one.result["pose"]["from"], "joints and images");
         assert!(one.points.len() > 200, "{mode}: {} points", one.points.len());
     }
-    let point = |(number, one): (usize, &Measurement)| {
-        let usual: Vec<&PointError> = one.points.iter().filter(|point| point.of_range() < OUTLIER * OUTLIER).collect();
-        usual[number * 7919 % usual.len()].of_two()
+    let point = |one: &Measurement| {
+        let usual = one.points.iter().filter(|point| point.of_range() < OUTLIER * OUTLIER);
+        mean(usual.map(PointError::of_two))
     };
     let part = |one: &Measurement, sigmas: f64| {
         let near = one.points.iter().filter(|point| point.of_range() < sigmas * sigmas).count();
@@ -90,7 +107,7 @@ fn figures(rig: &Rig, mode: &str, trials: u64) -> Figures {
     };
     let figures = Figures {
         of_pose: mean(measured.iter().map(Measurement::of_pose)),
-        of_point: mean(measured.iter().enumerate().map(point)),
+        of_point: mean(measured.iter().map(point)),
         within: [1.0, 2.0, OUTLIER].map(|sigmas| mean(measured.iter().map(|one| part(one, sigmas)))),
         stated: mean(measured.iter().map(|one| mean(one.points.iter().map(|point| point.score)))),
     };
@@ -111,13 +128,13 @@ fn figures(rig: &Rig, mode: &str, trials: u64) -> Figures {
 fn pose_and_points_are_as_uncertain_as_stated_in_each_mode() {
     let rig = rig();
     let trials = seeds(3);
-    for mode in ["gecko", "spider", "stick-bug"] {
-        let Figures { of_pose, of_point, within, stated } = figures(&rig, mode, trials);
+    let measured = ["gecko", "spider", "stick-bug"].map(|mode| (mode, figures(&rig, mode, trials)));
+    for (mode, Figures { of_pose, of_point, within, stated }) in measured {
         let [least, most] = band(trials, 6.0, 2.39);
         assert!((least..most).contains(&of_pose), "{mode}: {of_pose} is not within {least} to {most}");
         let [least, most] = band(trials, 2.0, 2.39).map(|bound| OF_ONE * bound);
         assert!((least..most).contains(&of_point), "{mode}: {of_point} is not within {least} to {most}");
-        assert!((0.90..0.985).contains(&within[1]), "{mode}: {within:?}");
+        assert!((0.90..0.996).contains(&within[1]), "{mode}: {within:?}");
         assert!((within[2] - stated).abs() < 0.04, "{mode}: {within:?} {stated}");
     }
 }

@@ -112,13 +112,19 @@ fn shared_corners(rig: &Rig, lenses: Lenses<'_>, dice: &mut Dice) -> String {
 
 /// Calibrates by the command line; returns the text of the rig file.
 pub fn calibrated(rig: &Rig, lenses: Lenses<'_>, work: &Path, dice: &mut Dice) -> String {
+    calibrated_as(rig, lenses, work, &[], dice)
+}
+
+/// As [`calibrated`], with more options for the calibration of the lenses.
+pub fn calibrated_as(rig: &Rig, lenses: Lenses<'_>, work: &Path, options: &[&str], dice: &mut Dice) -> String {
     let file = |name: &str| work.join(name).to_string_lossy().into_owned();
     let size = rig.left_camera.size();
     let size = format!("{}x{}", size.width, size.height);
     for (name, lens) in [("left", lenses.left), ("right", lenses.right)] {
         let (corners, out) = (file(&format!("{name}.csv")), file(&format!("{name}.toml")));
         std::fs::write(&corners, own_corners(lens, lenses.reach, dice)).expect("written");
-        run_json(&["calibrate", "intrinsics", "--json", "--csv", &corners, "--size", &size, "--out", &out]);
+        let command = ["calibrate", "intrinsics", "--json", "--csv", &corners, "--size", &size, "--out", &out];
+        run_json(&[&command[..], options].concat());
     }
     let (corners, out) = (file("corners.csv"), file("rig.toml"));
     std::fs::write(&corners, shared_corners(rig, lenses, dice)).expect("written");

@@ -3,7 +3,7 @@
 use image::RgbImage;
 use nalgebra::{UnitQuaternion, Vector3};
 use vergence_camera::{Camera, CameraError, CameraImage};
-use vergence_scene::{Optics, Scene, Sheet, Target, View, render};
+use vergence_scene::{Lens, LensChoice, Optics, Scene, Sheet, Target, View, render};
 use vergence_vision::{Camera as CameraFrame, Frame, KannalaBrandt, Left, Point, Right, Side, Transform, World};
 
 use crate::Random;
@@ -72,6 +72,7 @@ fn on_sensor<F: Frame>(lens: &KannalaBrandt, point: &Point<F>) -> bool {
 pub struct TargetCamera {
     held: HeldTarget,
     side: Side,
+    lens: LensChoice,
     images: u64,
 }
 
@@ -79,7 +80,13 @@ impl TargetCamera {
     /// The camera on `side` of those before which the target is held.
     #[must_use]
     pub const fn new(held: HeldTarget, side: Side) -> Self {
-        Self { held, side, images: 0 }
+        Self { held, side, lens: LensChoice::Ideal, images: 0 }
+    }
+
+    /// The same camera with another lens in the place of the ideal one, by which the target is still held.
+    #[must_use]
+    pub const fn with_lens(self, lens: LensChoice) -> Self {
+        Self { lens, ..self }
     }
 }
 
@@ -91,14 +98,15 @@ impl Camera for TargetCamera {
             )
         })?;
         // The left camera's frame is the world of this image.
-        let (lens, world_from_camera): (_, Transform<World, CameraFrame>) = match self.side {
+        let (ideal, world_from_camera): (_, Transform<World, CameraFrame>) = match self.side {
             Side::Left => (&self.held.left, Transform::new(UnitQuaternion::identity(), Vector3::zeros())),
             Side::Right => (&self.held.right.0, self.held.right.1.renamed()),
         };
+        let lens = self.lens.in_place_of(ideal).map_err(|error| CameraError::Simulated(error.to_string()))?;
         // Corners lie on edges, which need many rays to be placed exactly. The rest of the image is plain.
         let optics = Optics { samples: 1, edge_samples: 100, ..Optics::default() };
         let seed = self.held.seed.wrapping_mul(4).wrapping_add(self.images * 2 + self.side.index() as u64);
-        let image = photograph_target(self.held.target, place.renamed(), lens, world_from_camera, &optics, seed);
+        let image = photograph_target(self.held.target, place.renamed(), &lens, world_from_camera, &optics, seed);
         self.images += 1;
         Ok(Some(CameraImage { image, name: format!("image{:06}", self.images), seq: None, exposed_at: None }))
     }
@@ -109,7 +117,7 @@ impl Camera for TargetCamera {
 pub fn photograph_target(
     target: impl Into<Sheet>,
     world_from_target: Transform<World, Target>,
-    lens: &KannalaBrandt,
+    lens: &dyn Lens,
     world_from_camera: Transform<World, CameraFrame>,
     optics: &Optics,
     seed: u64,

@@ -7,6 +7,7 @@ use std::time::Duration;
 use vergence_camera::{CameraEvent, Develop, PendingImage};
 use vergence_protocol::Microseconds;
 use vergence_rig::{ExposureTiming, Shutter, StampedAt};
+use vergence_scene::{Lens, TrueLens};
 use vergence_vision::Side;
 
 use crate::{Pulse, RoomCamera, SimulatedRig, Unplugged};
@@ -21,7 +22,7 @@ const PERIOD: Duration = Duration::from_micros(33_333);
 /// A simulated camera fired by the board's trigger.
 #[derive(Clone, Debug)]
 pub struct LiveCamera {
-    camera: RoomCamera,
+    camera: RoomCamera<TrueLens>,
     shutter: Shutter,
     unplugged: Vec<Unplugged>,
     plugged: Option<bool>,
@@ -37,7 +38,9 @@ impl LiveCamera {
 
     /// The `camera` with this shutter, unplugged as listed; entries of the other side are ignored.
     #[must_use]
-    pub fn new(camera: RoomCamera, shutter: Shutter, unplugged: &[Unplugged]) -> Self {
+    pub fn new<L: Lens + Into<TrueLens>>(camera: RoomCamera<L>, shutter: Shutter, unplugged: &[Unplugged]) -> Self {
+        let RoomCamera { side, lens, room, seed } = camera;
+        let camera = RoomCamera { side, lens: lens.into(), room, seed };
         let unplugged = unplugged.iter().filter(|out| out.side == camera.side).copied().collect();
         Self { camera, shutter, unplugged, plugged: None, next_pulse: 0, ready_us: 0.0, seq: 0 }
     }

@@ -5,7 +5,7 @@ use std::sync::Arc;
 use image::RgbImage;
 use nalgebra::{UnitQuaternion, Vector3};
 use vergence_rig::RigPose;
-use vergence_scene::{Optics, Scene, View, render, render_rolling};
+use vergence_scene::{Lens, Optics, Scene, View, render, render_rolling};
 use vergence_vision::{Base, Camera, KannalaBrandt, Left, Side, Transform, World};
 
 /// A furnished room with the rig in it.
@@ -44,18 +44,18 @@ impl Room {
 
 /// A camera on the mechanics that photographs the room.
 #[derive(Clone, Debug)]
-pub struct RoomCamera {
+pub struct RoomCamera<L: Lens = KannalaBrandt> {
     /// Side of the rig.
     pub side: Side,
-    /// Lens and sensor geometry.
-    pub lens: KannalaBrandt,
+    /// Lens and sensor geometry: an ideal lens, or a traced one.
+    pub lens: L,
     /// The room.
     pub room: Arc<Room>,
     /// Seed of the image noise.
     pub seed: u64,
 }
 
-impl RoomCamera {
+impl<L: Lens> RoomCamera<L> {
     /// Image from a rig pose, the `number`th of this camera, all rows exposed at once.
     #[must_use]
     pub fn photograph(&self, pose: &RigPose, number: u32) -> RgbImage {

@@ -8,17 +8,16 @@ use vergence_calibration::{
     calibrate_intrinsics, calibrate_stage,
 };
 use vergence_rig::{Provenance, Rig};
-use vergence_scene::Target;
 use vergence_sim::{HeldTarget, Random};
 use vergence_targets::TargetView;
-use vergence_vision::{Camera, ImageSize, KannalaBrandt, Left, Right, Transform};
+use vergence_vision::{ImageSize, KannalaBrandt, Left, Right, Transform};
 
 use crate::bench::{Bench, scene_target};
-use crate::conditions::Conditions;
 use crate::drive::{Drive, Stop};
 use crate::error::ReproduceError;
+use crate::eyes::Eyes;
 use crate::pair::Pair;
-use crate::target_shot::{FoundCorners, Photo, TargetShot};
+use crate::target_shot::{FoundCorners, Photo};
 
 /// Views of each lens's own calibration.
 const OWN_VIEWS: u64 = 30;
@@ -41,29 +40,29 @@ pub struct Calibrated {
     pub photographs: [usize; 2],
 }
 
-/// Calibrates the bench from targets held where it was driven. `returns` draws how far the stage misses its poses.
+/// Calibrates the bench from targets that its `eyes` see held where it was driven. `returns` draws how far the stage misses its poses.
 ///
 /// # Errors
 /// Where the views give no calibration.
 pub fn calibrate(
     bench: &Bench,
     drive: &Drive,
-    conditions: &Conditions,
+    eyes: &Eyes<'_>,
     random: &mut Random,
     returns: &mut Random,
 ) -> Result<Calibrated, ReproduceError> {
     let mut tally = Tally::default();
-    let lenses = [&bench.built.left_camera, &bench.built.right_camera];
-    let [left, right] = lenses.map(|lens| own_calibration(lens, conditions, random.seed(), &mut tally));
-    let (left, right) = (left?, right?);
-    let own = [left.camera, right.camera];
+    let lenses = [(0, &bench.built.left_camera), (1, &bench.built.right_camera)];
+    let [left, right] = lenses.map(|(side, lens)| own_calibration(lens, (eyes, side), random.seed(), &mut tally));
+    let (Own { lens: left, central: central_left }, Own { lens: right, central: central_right }) = (left?, right?);
+    let own = [central_left, central_right];
     let mut poses = Vec::new();
     for stop in &drive.calibration {
-        let standing = conditions.returned(&stop.truth, returns);
-        let views = shared_views(bench, &standing, &own, conditions, random.seed(), &mut tally);
+        let standing = eyes.conditions.returned(&stop.truth, returns);
+        let views = shared_views(bench, &standing, &own, eyes, random.seed(), &mut tally);
         poses.push(StagePose { readings: stop.readings.clone(), views });
     }
-    let pair = |mode: &Stop| Pair::calibrated(bench, &mode.truth, &own, conditions, returns);
+    let pair = |mode: &Stop| Pair::calibrated(eyes, &mode.truth, &own, returns);
     let pairs = drive.modes.iter().map(pair).collect();
     let rig = Rig { left_camera: left.camera, right_camera: right.camera, ..bench.drawn.clone() };
     let lenses = LensKnowledge::within(left.covariance, right.covariance);
@@ -98,43 +97,56 @@ impl Tally {
     }
 }
 
+/// The calibration of a lens by itself.
+struct Own {
+    /// As the views ask for it.
+    lens: IntrinsicsCalibration,
+    /// With one centre, as the paper's methods know lenses.
+    central: KannalaBrandt,
+}
+
 fn own_calibration(
     lens: &KannalaBrandt,
-    conditions: &Conditions,
+    (eyes, side): (&Eyes<'_>, usize),
     seed: u64,
     tally: &mut Tally,
-) -> Result<IntrinsicsCalibration, ReproduceError> {
+) -> Result<Own, ReproduceError> {
     let nowhere = Transform::<Left, Right>::new(UnitQuaternion::identity(), Vector3::zeros());
     let held = HeldTarget { left: *lens, right: (*lens, nowhere), both: false, target: scene_target().into(), seed };
     let photos: Vec<Option<Photo>> = (0..OWN_VIEWS)
         .into_par_iter()
-        .map(|index| {
-            let place = held.left_from_target(index)?;
-            let camera_from_target = place.renamed();
-            TargetShot { lens, pupil: conditions.pupil, camera_from_target, seed: seed ^ index }.photograph(conditions)
-        })
+        .map(|index| eyes.photograph(side, held.left_from_target(index)?.renamed(), seed ^ index))
         .collect();
     let seen = |known: Option<&KannalaBrandt>| -> Vec<Option<FoundCorners>> {
         photos.par_iter().map(|photo| photo.as_ref()?.found(known)).collect()
     };
     // As 'calibrate intrinsics' does: the corners again with the lens that they give.
-    let rough = calibrated(&seen(None), lens.size())?;
+    let central = IntrinsicsOptions::central();
+    let rough = calibrated(&seen(None), lens.size(), &central)?;
     let seen = seen(Some(&rough.camera));
     seen.iter().for_each(|seen| tally.count(seen));
-    calibrated(&seen, lens.size())
+    let found = calibrated(&seen, lens.size(), &IntrinsicsOptions::default())?;
+    let central = match found.camera.is_central() {
+        true => found.camera,
+        false => calibrated(&seen, lens.size(), &central)?.camera,
+    };
+    Ok(Own { lens: found, central })
 }
 
-fn calibrated(seen: &[Option<FoundCorners>], size: ImageSize) -> Result<IntrinsicsCalibration, ReproduceError> {
+fn calibrated(
+    seen: &[Option<FoundCorners>],
+    size: ImageSize,
+    options: &IntrinsicsOptions,
+) -> Result<IntrinsicsCalibration, ReproduceError> {
     let views: Vec<TargetView> = seen.iter().flatten().map(|seen| seen.view.clone()).collect();
-    calibrate_intrinsics(&views, size, &IntrinsicsOptions::default())
-        .map_err(|error| ReproduceError::Calibration(format!("a lens: {error}")))
+    calibrate_intrinsics(&views, size, options).map_err(|error| ReproduceError::Calibration(format!("a lens: {error}")))
 }
 
 fn shared_views(
     bench: &Bench,
     left_from_right: &Transform<Left, Right>,
     known: &[KannalaBrandt; 2],
-    conditions: &Conditions,
+    eyes: &Eyes<'_>,
     seed: u64,
     tally: &mut Tally,
 ) -> Vec<StereoView> {
@@ -144,7 +156,7 @@ fn shared_views(
         .into_par_iter()
         .filter_map(|index| {
             let left_from_target = held.left_from_target(index)?;
-            let photos = photographs(bench, left_from_right, &left_from_target, conditions, seed ^ index);
+            let photos = eyes.photographs(left_from_right, &left_from_target, seed ^ index);
             Some([0, 1].map(|side| photos[side].as_ref()?.found(Some(&known[side]))))
         })
         .collect();
@@ -159,22 +171,4 @@ fn shared_views(
             right: right.view,
         })
         .collect()
-}
-
-/// What both cameras photograph of a target at `left_from_target`.
-pub fn photographs(
-    bench: &Bench,
-    left_from_right: &Transform<Left, Right>,
-    left_from_target: &Transform<Left, Target>,
-    conditions: &Conditions,
-    seed: u64,
-) -> [Option<Photo>; 2] {
-    let in_right: Transform<Camera, Target> = (left_from_right.inverse() * *left_from_target).renamed();
-    let shot = |lens, camera_from_target, seed| {
-        TargetShot { lens, pupil: conditions.pupil, camera_from_target, seed }.photograph(conditions)
-    };
-    [
-        shot(&bench.built.left_camera, left_from_target.renamed(), seed.wrapping_mul(2)),
-        shot(&bench.built.right_camera, in_right, seed.wrapping_mul(2).wrapping_add(1)),
-    ]
 }

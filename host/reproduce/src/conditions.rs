@@ -1,7 +1,8 @@
 //! The errors under which the bench is calibrated and measures, together and each alone.
 
 use nalgebra::UnitQuaternion;
-use vergence_scene::EntrancePupil;
+use vergence_lens::BuiltIn;
+use vergence_scene::LensChoice;
 use vergence_sim::Random;
 use vergence_vision::{Angle, Left, Length, Right, Transform};
 
@@ -9,9 +10,8 @@ use crate::target_shot::Corners;
 
 /// Noise of a corner's u or v in pixels, of the class that the goals are for.
 pub const NOISE_PX: f64 = 0.1;
-/// Entrance pupil of a fisheye lens of 197° that has 599 px/rad on pixels of 2.4 µm: twice its focal length. The calibration
-/// knows only lenses whose pupil stands still.
-const PUPIL: EntrancePupil = EntrancePupil { e0_mm: 2.9 };
+/// The lens of a kind that the calibration does not know: a published fisheye of 197°.
+const MISFIT: LensChoice = LensChoice::Traced(BuiltIn::Sigma8);
 /// How far the right camera returns from where it stood before, unseen by the encoders.
 const RETURN: Repeatability = Repeatability { shift: Length::from_mm(0.05), turn: Angle::from_deg(0.05) };
 
@@ -22,8 +22,8 @@ pub struct Conditions {
     pub corners: Corners,
     /// Intended standard deviation of a corner's u or v, in pixels; the real one is measured.
     pub noise_px: f64,
-    /// Of both lenses.
-    pub pupil: EntrancePupil,
+    /// Of both cameras.
+    pub lens: LensChoice,
     /// Of the right camera.
     pub repeatability: Repeatability,
 }
@@ -54,7 +54,7 @@ impl Conditions {
     /// Noise of the corners alone.
     #[must_use]
     pub fn noise(corners: Corners, noise_px: f64) -> Self {
-        Self { corners, noise_px, pupil: EntrancePupil::default(), repeatability: Repeatability::default() }
+        Self { corners, noise_px, lens: LensChoice::Ideal, repeatability: Repeatability::default() }
     }
 
     /// Where the right camera comes to stand when it returns to a pose.
@@ -85,7 +85,7 @@ impl Cause {
     pub fn size(self) -> String {
         match self {
             Self::Corners => format!("{NOISE_PX} px in u and v"),
-            Self::Lens => format!("entrance pupils with e0 = {} mm", PUPIL.e0_mm),
+            Self::Lens => format!("lenses traced from a published design, {MISFIT} in the place of ideal ones"),
             Self::Pose => format!(
                 "{:.2} mm and {:.2}° along and about each axis of the right camera, anew at every return",
                 RETURN.shift.mm(),
@@ -95,15 +95,15 @@ impl Cause {
         }
     }
 
-    /// The conditions in which it alone is present.
+    /// The conditions in which it alone is present, on a bench with such lenses. Traced lenses are a misfit by themselves.
     #[must_use]
-    pub fn alone(self, corners: Corners) -> Conditions {
-        let mut conditions = Conditions::noise(corners, 0.0);
+    pub fn alone(self, corners: Corners, lens: LensChoice) -> Conditions {
+        let mut conditions = Conditions { lens, ..Conditions::noise(corners, 0.0) };
         if matches!(self, Self::Corners | Self::All) {
             conditions.noise_px = NOISE_PX;
         }
-        if matches!(self, Self::Lens | Self::All) {
-            conditions.pupil = PUPIL;
+        if matches!(self, Self::Lens | Self::All) && lens == LensChoice::Ideal {
+            conditions.lens = MISFIT;
         }
         if matches!(self, Self::Pose | Self::All) {
             conditions.repeatability = RETURN;

@@ -6,6 +6,7 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 use rayon::prelude::*;
 use serde_json::{Value, json};
 use vergence_output::{ZonesOf, zones_plot};
+use vergence_scene::LensChoice;
 use vergence_vision::PAPER_FIELD;
 
 use crate::bench::Bench;
@@ -35,6 +36,8 @@ pub struct Plan {
     pub noisy_seeds: Option<u32>,
     /// Where the corners come from.
     pub corners: Corners,
+    /// The true lenses of the bench, which photograph the targets.
+    pub lens: LensChoice,
     /// Samples for each point of the study of triangulation.
     pub samples: u32,
     /// Whether the simulated room is matched.
@@ -71,6 +74,8 @@ pub enum Progress {
 
 /// Results of all experiments.
 pub struct Results {
+    /// The lenses that photographed the targets.
+    pub lens: LensChoice,
     /// The bench with corners of the class that the goals are for, and with twice the noise.
     pub tables: [Table; 2],
     /// Each kind of error alone, and all together.
@@ -93,8 +98,9 @@ impl Plan {
     fn command(&self) -> String {
         let corners = if self.corners == Corners::Rendered { "" } else { " --corners projected" };
         let matching = if self.matching { "" } else { " --no-matching" };
+        let lens = if self.lens == LensChoice::Ideal { String::new() } else { format!(" --lens {}", self.lens) };
         format!(
-            "vergence reproduce --seeds {} --noisy-seeds {} --samples {}{corners}{matching}",
+            "vergence reproduce --seeds {} --noisy-seeds {} --samples {}{corners}{lens}{matching}",
             self.seeds,
             self.noisy(),
             self.samples
@@ -133,12 +139,13 @@ pub fn experiments(
         }
     };
     let few = rigs.get(..plan.noisy()).unwrap_or_default();
-    let ordinary = all_seeds(rigs, Cause::Corners.as_str(), &Cause::Corners.alone(plan.corners), progress)?;
-    let twice = all_seeds(few, "twice the noise", &Conditions::noise(plan.corners, 2.0 * NOISE_PX), progress)?;
+    let ordinary = all_seeds(rigs, Cause::Corners.as_str(), &Cause::Corners.alone(plan.corners, plan.lens), progress)?;
+    let noisier = Conditions { lens: plan.lens, ..Conditions::noise(plan.corners, 2.0 * NOISE_PX) };
+    let twice = all_seeds(few, "twice the noise", &noisier, progress)?;
     let column = |cause: Cause| {
         let table = match cause {
             Cause::Corners => Table::of(ordinary.iter().take(few.len())),
-            _ => Table::of(&all_seeds(few, cause.as_str(), &cause.alone(plan.corners), progress)?),
+            _ => Table::of(&all_seeds(few, cause.as_str(), &cause.alone(plan.corners, plan.lens), progress)?),
         };
         Ok(Column { cause, table })
     };
@@ -153,11 +160,12 @@ pub fn experiments(
         zones: &zones,
         zones_svg: &zones_of_herbivore(&zones),
         matchings: &matchings,
-        targets: &target_images(PICTURE_SEED)?,
+        targets: &target_images(PICTURE_SEED, plan.lens)?,
+        lens: plan.lens,
         samples: plan.samples,
         command: plan.command(),
     })?;
-    Ok(Results { tables, columns, zones, matchings, html })
+    Ok(Results { lens: plan.lens, tables, columns, zones, matchings, html })
 }
 
 /// Computes all seeds in parallel, in the order of the rigs.
@@ -197,6 +205,7 @@ impl Results {
     #[must_use]
     pub fn lines(&self) -> Vec<String> {
         [
+            vec![format!("lenses of the bench: {}; of the matches in the room: ideal", self.lens)],
             report::bench_lines(self.tables.each_ref()),
             report::cause_lines(&self.columns),
             report::matching_lines(&self.matchings),
@@ -209,6 +218,7 @@ impl Results {
     pub fn json(&self) -> Value {
         let [table, noisier] = &self.tables;
         json!({
+            "lens": self.lens.to_string(),
             "bench": report::rows(table),
             "zones": report::zones(&self.zones),
             "corners": report::corners(table),

@@ -24,6 +24,7 @@ pub mod demo;
 mod drive;
 mod error;
 mod experiments;
+mod eyes;
 mod matching;
 mod measure;
 mod method;

@@ -9,10 +9,10 @@ use vergence_vision::{
 };
 
 use crate::axes::Axes;
-use crate::bench::{Bench, MODES};
-use crate::chain::{Calibrated, photographs};
-use crate::conditions::Conditions;
+use crate::bench::MODES;
+use crate::chain::Calibrated;
 use crate::drive::Stop;
+use crate::eyes::Eyes;
 use crate::method::Method;
 use crate::pair::{PAIR_VIEWS, Pair};
 use crate::target_shot::{FoundCorners, Photo, same_place};
@@ -71,10 +71,9 @@ struct Seen {
 /// Measures targets in every mode; `stops` are where the stage stood, and `returns` draws how far it misses them before each
 /// target.
 pub fn measure(
-    bench: &Bench,
+    eyes: &Eyes<'_>,
     stops: &[Stop],
     calibrated: &Calibrated,
-    conditions: &Conditions,
     random: &mut Random,
     returns: &mut Random,
 ) -> Measured {
@@ -82,13 +81,13 @@ pub fn measure(
     for (mode, (stop, pair)) in stops.iter().zip(&calibrated.pairs).enumerate().take(MODES.len()) {
         let targets = targets(&stop.truth, &MEASURED, random);
         let seed = random.seed();
-        let standing: Vec<_> = targets.iter().map(|_| conditions.returned(&stop.truth, returns)).collect();
+        let standing: Vec<_> = targets.iter().map(|_| eyes.conditions.returned(&stop.truth, returns)).collect();
         let seen: Vec<Seen> = targets
             .par_iter()
             .zip(&standing)
             .enumerate()
             .map(|(index, (target, standing))| {
-                Seen::of(&photographs(bench, standing, target, conditions, seed ^ index as u64), calibrated)
+                Seen::of(&eyes.photographs(standing, target, seed ^ index as u64), calibrated)
             })
             .collect();
         let view = View::new(mode, stop, calibrated, pair);

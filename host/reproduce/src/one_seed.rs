@@ -5,6 +5,7 @@ use crate::chain::calibrate;
 use crate::conditions::Conditions;
 use crate::drive::Drive;
 use crate::error::ReproduceError;
+use crate::eyes::Eyes;
 use crate::measure::{Measured, measure};
 use vergence_sim::Random;
 
@@ -24,17 +25,18 @@ pub struct SeedResult {
 /// Calibrates the bench where it was driven, and measures with it. The same arguments give the same result.
 ///
 /// # Errors
-/// Where the views give no calibration.
+/// Where the views give no calibration, or a design of a lens cannot be traced.
 pub fn one_seed(
     bench: &Bench,
     drive: &Drive,
     conditions: &Conditions,
     seed: u64,
 ) -> Result<SeedResult, ReproduceError> {
+    let eyes = Eyes::of(bench, conditions)?;
     // Streams of their own: the same targets stand before the rig in all conditions.
     let (mut random, mut returns) = (Random::new(seed), Random::new(seed ^ 0x7265_7475_726e));
-    let calibrated = calibrate(bench, drive, conditions, &mut random, &mut returns)?;
-    let measured = measure(bench, &drive.modes, &calibrated, conditions, &mut random, &mut returns);
+    let calibrated = calibrate(bench, drive, &eyes, &mut random, &mut returns)?;
+    let measured = measure(&eyes, &drive.modes, &calibrated, &mut random, &mut returns);
     Ok(SeedResult {
         measured,
         stated_px: calibrated.stage.sigma_px,

@@ -11,6 +11,7 @@ use std::io::Cursor;
 use image::RgbImage;
 use image::codecs::jpeg::JpegEncoder;
 use vergence_page::{Page, data_url, note, page, section};
+use vergence_scene::LensChoice;
 
 use super::matching::Matching;
 use super::tally::Table;
@@ -26,6 +27,8 @@ pub struct Findings<'a> {
     pub columns: &'a [Column],
     /// Whether photographs were rendered, or corners only projected.
     pub rendered: bool,
+    /// The lenses that photographed the targets.
+    pub lens: LensChoice,
     /// Zones of all modes.
     pub zones: &'a [ModeZones],
     /// Curves of the zones of the herbivore mode over separation and over radius, as SVG.
@@ -59,6 +62,7 @@ pub fn reproduction_page(findings: &Findings<'_>) -> Result<String, ReproduceErr
         origin: vec![
             ("Made by", concat!("vergence ", env!("CARGO_PKG_VERSION")).into()),
             ("Command", findings.command.clone()),
+            ("Lenses", format!("{} on the bench, ideal ones in the simulated room", findings.lens)),
         ],
         body: body.concat(),
         footer: note(

@@ -7,9 +7,7 @@ use vergence_sim::Random;
 use vergence_targets::TargetView;
 use vergence_vision::{KannalaBrandt, Left, Right, Transform};
 
-use crate::bench::Bench;
-use crate::chain::photographs;
-use crate::conditions::Conditions;
+use crate::eyes::Eyes;
 use crate::pinhole_pair::{PinholePair, PinholeView};
 use crate::target_shot::{FoundCorners, in_both};
 use crate::targets::{Spread, targets};
@@ -43,19 +41,18 @@ struct Seen {
 impl Pair {
     /// Calibrates the pair where the stage stands, with the lenses that are `known`.
     pub fn calibrated(
-        bench: &Bench,
+        eyes: &Eyes<'_>,
         left_from_right: &Transform<Left, Right>,
         known: &[KannalaBrandt; 2],
-        conditions: &Conditions,
         random: &mut Random,
     ) -> Self {
-        let standing = conditions.returned(left_from_right, random);
+        let standing = eyes.conditions.returned(left_from_right, random);
         let seed = random.seed();
         let seen: Vec<Seen> = targets(left_from_right, &SPREAD, random)
             .par_iter()
             .enumerate()
             .map(|(index, target)| {
-                let photos = photographs(bench, &standing, target, conditions, seed ^ index as u64);
+                let photos = eyes.photographs(&standing, target, seed ^ index as u64);
                 let photo = |side: usize| photos[side].as_ref();
                 Seen {
                     fisheye: [0, 1].map(|side| photo(side)?.found(Some(&known[side]))),

@@ -2,7 +2,7 @@
 
 use image::RgbImage;
 use nalgebra::{UnitQuaternion, Vector3};
-use vergence_scene::{Optics, Scene, View, render};
+use vergence_scene::{LensChoice, Optics, Scene, View, render};
 use vergence_vision::{Camera, Transform, World};
 
 use crate::axes::Axes;
@@ -13,13 +13,13 @@ use crate::measure::DEPTH;
 /// Pixels on a side.
 const SIDE: u32 = 640;
 
-/// A mode's name and what the left and the right camera see of a target straight ahead, side by side.
+/// A mode's name and what the left and the right camera see of a target straight ahead, side by side, through such lenses.
 ///
 /// # Errors
-/// Where the built-in bench does not read.
-pub fn target_images(seed: u64) -> Result<Vec<(&'static str, RgbImage)>, ReproduceError> {
+/// Where the built-in bench does not read, or a design of a lens cannot be traced.
+pub fn target_images(seed: u64, lens: LensChoice) -> Result<Vec<(&'static str, RgbImage)>, ReproduceError> {
     let rig = bench_with_sensors(SIDE)?;
-    let lens = rig.left_camera;
+    let lens = lens.in_place_of(&rig.left_camera).map_err(|error| ReproduceError::Rig(error.to_string()))?;
     let picture = |name: &'static str| {
         let values: Vec<f64> = rig.mode(name)?.targets.iter().map(|target| target.value()).collect();
         let left_from_right = rig.pose_at_values(&values).left_from_right;

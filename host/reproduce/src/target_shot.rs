@@ -1,9 +1,11 @@
 //! One target before one camera: photographed and found, in the fisheye or in an undistorted picture, or, where that is asked
 //! for, its corners projected.
 
+use std::str::FromStr;
+
 use image::GrayImage;
 use nalgebra::Vector3;
-use vergence_scene::{EntrancePupil, Optics, SheetView, Target, photograph_sheet};
+use vergence_scene::{Lens, Optics, SheetView, Target, TrueLens, photograph_sheet};
 use vergence_sim::Random;
 use vergence_targets::{Corner, Placement, TargetView, detect};
 use vergence_vision::{Camera, ImageSize, KannalaBrandt, Pixel, Point, Transform};
@@ -36,9 +38,7 @@ pub enum Corners {
 #[derive(Clone, Copy, Debug)]
 pub struct TargetShot<'a> {
     /// The true lens.
-    pub lens: &'a KannalaBrandt,
-    /// Its entrance pupil.
-    pub pupil: EntrancePupil,
+    pub lens: &'a TrueLens,
     /// Pose of the target.
     pub camera_from_target: Transform<Camera, Target>,
     /// Seed of the noise.
@@ -65,6 +65,18 @@ pub struct Photo {
 enum Shown {
     Picture(Window, GrayImage),
     Corners(TargetView),
+}
+
+impl FromStr for Corners {
+    type Err = &'static str;
+
+    fn from_str(name: &str) -> Result<Self, Self::Err> {
+        match name {
+            "rendered" => Ok(Self::Rendered),
+            "projected" => Ok(Self::Projected),
+            _ => Err("corners are rendered or projected"),
+        }
+    }
 }
 
 impl Photo {
@@ -144,14 +156,14 @@ impl TargetShot<'_> {
     /// Where a point of the target truly is in the picture; `None` outside the field.
     fn pixel(&self, [x, y]: [f64; 2]) -> Option<Pixel> {
         let at = self.camera_from_target * Point::from_mm(Vector3::new(x, y, 0.0));
-        self.lens.project(&self.pupil.direction(&at)?).ok()
+        self.lens.image_of(&at)
     }
 
     /// The corners where they truly are.
     fn truth(&self) -> TargetView {
         let place = |index: u32| {
             let target_mm = TARGET.corner_mm(index);
-            Some(Corner::new(target_mm, self.pixel(target_mm).filter(|pixel| self.lens.on_sensor(*pixel))?))
+            Some(Corner::new(target_mm, self.pixel(target_mm).filter(|pixel| self.lens.size().contains(*pixel))?))
         };
         TargetView { name: String::new(), corners: (0..TARGET.columns * TARGET.rows).filter_map(place).collect() }
     }
@@ -176,7 +188,7 @@ impl TargetShot<'_> {
 
     /// The part of the photograph in the window.
     fn picture(&self, window: &Window, noise_px: f64) -> Option<GrayImage> {
-        let camera = window.part_of(self.lens)?;
+        let camera = self.lens.before_part([window.left, window.top], window.size)?;
         let grey = noise_px * GREY_PER_PX;
         let optics = Optics {
             edge_samples: EDGE_SAMPLES,
@@ -189,7 +201,6 @@ impl TargetShot<'_> {
             sheet: scene_target().into(),
             camera_from_sheet: self.camera_from_target,
             camera: &camera,
-            pupil: self.pupil,
             optics: &optics,
         };
         Some(photograph_sheet(&view, self.seed))
@@ -217,9 +228,10 @@ impl Window {
 
     /// The same lens before this part of its sensor: its centre moves.
     fn part_of(&self, lens: &KannalaBrandt) -> Option<KannalaBrandt> {
-        let mut part = lens.to_opencv();
-        (part.cx, part.cy) = (part.cx - f64::from(self.left), part.cy - f64::from(self.top));
-        KannalaBrandt::from_opencv(part, lens.theta_max(), self.size).ok()
+        match lens.before_part([self.left, self.top], self.size)? {
+            TrueLens::Ideal(part) => Some(part),
+            TrueLens::Traced(_) => None,
+        }
     }
 }
 

@@ -7,31 +7,35 @@ mod common;
 use common::{Gaussian, around, left_from_middle, left_from_right, lens, see};
 use nalgebra::{Matrix3, Matrix3x2, Matrix6, SMatrix, SVector, UnitQuaternion, Vector3};
 use vergence_vision::{
-    Angle, Camera, ImageSize, KannalaBrandt, Kernel, LENS_PARAMETERS, Left, OpenCvFisheye, Pixel, PixelPair, Point,
-    PointUncertainty, Right, SHARED_PARAMETERS, SharedCovariance, StereoPair, Transform, UnitRay, covariance,
+    Angle, Camera, ImageSize, KannalaBrandt, Kernel, LENS_PARAMETERS, Left, Length, OpenCvFisheye, Pixel, PixelPair,
+    Point, PointUncertainty, Right, SHARED_PARAMETERS, SharedCovariance, StereoPair, Transform, UnitRay, covariance,
 };
 
 const SIZE: ImageSize = ImageSize { width: 2080, height: 2080 };
+/// Index of the first parameter of the pose.
+const POSE: usize = 2 * LENS_PARAMETERS;
+
 type Shared = SVector<f64, SHARED_PARAMETERS>;
 
 /// Lens parameters in the order of calibrations, and the error of each in pixels or without unit.
-const LENS: [f64; LENS_PARAMETERS] = [560.0, 561.0, 1039.5, 1039.5, 0.01, -0.004, 0.001, -0.0002];
-const LENS_SIGMA: [f64; LENS_PARAMETERS] = [0.05, 0.05, 0.04, 0.04, 2e-4, 3e-4, 2e-4, 5e-5];
+const LENS: [f64; LENS_PARAMETERS] = [560.0, 561.0, 1039.5, 1039.5, 0.01, -0.004, 0.001, -0.0002, 2.0];
+const LENS_SIGMA: [f64; LENS_PARAMETERS] = [0.05, 0.05, 0.04, 0.04, 2e-4, 3e-4, 2e-4, 5e-5, 0.02];
 const POSE_SIGMA: [f64; 6] = [2e-4, 2e-4, 2e-4, 0.05, 0.05, 0.05];
 
 fn lens_of(parameters: &[f64]) -> KannalaBrandt {
-    let [fx, fy, cx, cy, k1, k2, k3, k4] = parameters.try_into().unwrap();
+    let [fx, fy, cx, cy, k1, k2, k3, k4, e0] = parameters.try_into().unwrap();
     let camera = OpenCvFisheye { fx, fy, cx, cy, k: [k1, k2, k3, k4] };
-    KannalaBrandt::from_opencv(camera, Angle::from_deg(99.0), SIZE).unwrap()
+    let central = KannalaBrandt::from_opencv(camera, Angle::from_deg(99.0), SIZE).unwrap();
+    central.with_pupil(Length::from_mm(e0)).unwrap()
 }
 
 /// Lenses and pose with `error` added to all shared parameters.
 fn disturbed(separation: f64, error: &Shared) -> (KannalaBrandt, KannalaBrandt, Transform<Left, Right>) {
-    let lens = |first: usize| lens_of(&std::array::from_fn::<_, 8, _>(|i| LENS[i] + error[first + i]));
+    let lens = |first: usize| lens_of(&std::array::from_fn::<_, LENS_PARAMETERS, _>(|i| LENS[i] + error[first + i]));
     let exact = left_from_right(separation);
-    let turn = UnitQuaternion::from_scaled_axis(error.fixed_rows::<3>(16).into_owned());
-    let shift = error.fixed_rows::<3>(19).into_owned();
-    (lens(0), lens(8), Transform::new(turn * exact.rotation(), exact.origin().mm() + shift))
+    let turn = UnitQuaternion::from_scaled_axis(error.fixed_rows::<3>(POSE).into_owned());
+    let shift = error.fixed_rows::<3>(POSE + 3).into_owned();
+    (lens(0), lens(LENS_PARAMETERS), Transform::new(turn * exact.rotation(), exact.origin().mm() + shift))
 }
 
 fn triangulated(kernel: &Kernel, pixels: &PixelPair, separation: f64, error: &Shared) -> Vector3<f64> {
@@ -92,7 +96,7 @@ fn the_derivative_by_shared_errors_agrees_with_differences() {
         let pixels = see(&pair, &truth).unwrap();
         let uncertainty = PointUncertainty::by(&kernel, &truth, &pair, 0.1).unwrap();
         for i in 0..SHARED_PARAMETERS {
-            let step = 1e-2 * if i < 16 { LENS_SIGMA[i % 8] } else { POSE_SIGMA[i - 16] };
+            let step = 1e-2 * if i < POSE { LENS_SIGMA[i % LENS_PARAMETERS] } else { POSE_SIGMA[i - POSE] };
             let error = |sign: f64| Shared::from_fn(|row, _| if row == i { sign * step } else { 0.0 });
             let [above, below] = [1.0, -1.0].map(|sign| triangulated(&kernel, &pixels, separation, &error(sign)));
             let expected = (above - below) / (2.0 * step);
@@ -126,13 +130,13 @@ fn there_is_no_uncertainty_on_the_baseline() {
     assert_eq!(PointUncertainty::of(&Point::from_mm(Vector3::z()), &pair, f64::NAN), None);
 }
 
-/// A correlated covariance of all 22 shared parameters.
+/// A correlated covariance of all shared parameters.
 fn shared_covariance() -> SharedCovariance {
     let mut gaussian = Gaussian(99);
     let mixed = SMatrix::<f64, SHARED_PARAMETERS, SHARED_PARAMETERS>::from_fn(|i, j| {
         if i == j { 1.0 } else { 0.15 * gaussian.normal() }
     });
-    let sigma = Shared::from_fn(|i, _| if i < 16 { LENS_SIGMA[i % 8] } else { POSE_SIGMA[i - 16] });
+    let sigma = Shared::from_fn(|i, _| if i < POSE { LENS_SIGMA[i % LENS_PARAMETERS] } else { POSE_SIGMA[i - POSE] });
     let factor = SMatrix::from_diagonal(&sigma) * mixed;
     SharedCovariance::joint(factor * factor.transpose())
 }

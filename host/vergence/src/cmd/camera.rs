@@ -84,6 +84,9 @@ pub fn run(args: &Args, console: Console) -> Result<(), Failure> {
             if file.cameras.right.is_some() && format != CameraFormat::Kalibr {
                 return Err(Failure::usage("the camchain holds a pair; only --to kalibr can hold one"));
             }
+            if format != CameraFormat::Toml && !file.cameras.left.is_central() {
+                console.warn("the pupil of the lens moves, which the format cannot say: see the comment in the file that is written");
+            }
             if format != CameraFormat::Toml && file.shutter() != Shutter::Global {
                 console.warn("the file that is written says nothing of the rolling shutter (line_time)");
             }
@@ -110,14 +113,16 @@ fn project(camera: &KannalaBrandt, rays: &[[f64; 3]], console: Console) -> Resul
 }
 
 fn unproject(camera: &KannalaBrandt, pixels: &[[f64; 2]], console: Console) -> Result<(), Failure> {
-    let mut rays = Vec::new();
+    let (mut rays, mut origins) = (Vec::new(), Vec::new());
     for &[u, v] in pixels {
-        let ray = camera.unproject::<Camera>(Pixel { u, v }).ok().map(|ray| ray.vector());
+        let ray = camera.unproject::<Camera>(Pixel { u, v }).ok();
+        origins.push(ray.map(|ray| camera.origin_of(&ray).mm().as_slice().to_vec()));
+        let ray = ray.map(|ray| ray.vector());
         console
             .say(ray.map_or("outside the lens's valid cone".into(), |d| format!("{:.9} {:.9} {:.9}", d.x, d.y, d.z)))?;
         rays.push(ray.map(|d| [d.x, d.y, d.z]));
     }
-    console.result(&json!({ "rays": rays }))
+    console.result(&json!({ "rays": rays, "origins_mm": origins }))
 }
 
 /// `N` numbers between commas.

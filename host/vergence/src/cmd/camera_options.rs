@@ -12,7 +12,7 @@ use crate::failure::Failure;
 #[derive(Clone, Copy, Debug, clap::Args)]
 pub struct CameraOptions {
     /// Image size of the cameras.
-    #[arg(long, value_parser = parse_size, value_name = "WxH")]
+    #[arg(long, value_name = "WxH")]
     size: Option<ImageSize>,
     /// Exposure time, such as 5ms.
     #[arg(long, value_parser = humantime::parse_duration)]
@@ -76,17 +76,6 @@ impl CameraOptions {
         let now = Box::new(move || Duration::from_micros(clock.now().0));
         Ok(Box::new(V4lCamera::open(device.as_ref(), &settings, now)?))
     }
-}
-
-/// Reads an image size such as 960x600.
-///
-/// # Errors
-/// Says how it is written.
-pub fn parse_size(text: &str) -> Result<ImageSize, String> {
-    const HINT: &str = "write width x height in pixels, such as 960x600";
-    let (width, height) = text.split_once(['x', 'X', '×']).ok_or(HINT)?;
-    let count = |part: &str| part.trim().parse().ok().filter(|n| (1..=100_000).contains(n)).ok_or(HINT);
-    Ok(ImageSize { width: count(width)?, height: count(height)? })
 }
 
 /// Parses a rate of the camera trigger, in pulses per second.

@@ -9,6 +9,7 @@ use vergence_board::HostClock;
 use vergence_calibration_input::{NAMES, TargetViews, TargetWatch, observe, printed};
 use vergence_camera::{Camera, CameraError, CameraImage, CameraSet};
 use vergence_files::{make_folder, write_png};
+use vergence_scene::LensChoice;
 use vergence_sim::{HeldTarget, TargetCamera};
 use vergence_targets::TargetKind;
 use vergence_vision::Side;
@@ -51,6 +52,9 @@ pub struct Args {
     /// With simulated cameras: seed of the places where the target is held, and of the noise.
     #[arg(long, default_value_t = 1)]
     seed: u64,
+    /// With simulated cameras: their lenses, ideal, sigma8_f18 or nikkor6_f28.
+    #[arg(long, default_value_t)]
+    lens: LensChoice,
     #[command(flatten)]
     force: ForceOption,
 }
@@ -58,6 +62,9 @@ pub struct Args {
 pub async fn run(args: &Args, common: &CommonOptions, console: Console) -> Result<(), Failure> {
     let target = args.target.checked_spec(args.force, console)?;
     let cameras = CameraSet::new(open(args, common, &target)?);
+    if args.cameras == ["sim"] {
+        console.say(format!("simulated cameras, lens: {}", args.lens))?;
+    }
     capture(cameras, target, args, interrupted(), console).await
 }
 
@@ -152,6 +159,7 @@ fn report(
         "frames": counts.images,
         "frames_alone": counts.alone,
         "frames_missed": counts.missed,
+        "lens": (args.cameras == ["sim"]).then(|| args.lens.to_string()),
         "complete": complete,
         "interrupted": was_interrupted,
         "out": args.out,
@@ -189,7 +197,10 @@ fn simulated(args: &Args, common: &CommonOptions, target: &TargetKind) -> Result
         seed: args.seed,
     };
     let sides = if args.mono { &[Side::Left][..] } else { &[Side::Left, Side::Right] };
-    Ok(sides.iter().map(|&side| Box::new(TargetCamera::new(held, side)) as Box<dyn Camera>).collect())
+    Ok(sides
+        .iter()
+        .map(|&side| Box::new(TargetCamera::new(held, side).with_lens(args.lens)) as Box<dyn Camera>)
+        .collect())
 }
 
 #[cfg(test)]

@@ -11,6 +11,7 @@ use vergence_reproduce::{
     Bench, Corners, DrivenRig, MatchingTools, Plan, Progress, SgbmAnswer, SgbmTask, drive, experiments,
 };
 use vergence_rig::rounded;
+use vergence_scene::LensChoice;
 
 use super::model_options::MatcherOptions;
 use crate::console::{Console, shown_on};
@@ -36,10 +37,12 @@ pub struct Args {
     /// How many of them are also measured with twice the noise and with each kind of error alone; without it, a fifth.
     #[arg(long, value_name = "SEEDS", value_parser = clap::value_parser!(u32).range(1..=10_000))]
     noisy_seeds: Option<u32>,
-    /// Render photographs and find the corners, or only project the corners and add noise: quick, but not the whole
-    /// chain.
-    #[arg(long, value_enum, default_value = "rendered")]
-    corners: CornersOption,
+    /// `rendered` photographs, where the detector finds the corners, or only corners that are `projected`, with noise: quick.
+    #[arg(long, default_value = "rendered")]
+    corners: Corners,
+    /// The true lenses of the bench: ideal, or a published design that is traced, sigma8_f18 or nikkor6_f28.
+    #[arg(long, default_value_t)]
+    lens: LensChoice,
     /// Samples for each point of the study of triangulation.
     #[arg(long, default_value_t = 20_000, value_parser = clap::value_parser!(u32).range(100..=10_000_000))]
     samples: u32,
@@ -54,14 +57,6 @@ pub struct Args {
     matching: MatcherOptions,
 }
 
-#[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
-enum CornersOption {
-    /// Photographs are rendered, and the detector finds the corners.
-    Rendered,
-    /// The corners are projected, and Gaussian noise is added.
-    Projected,
-}
-
 /// What the command is at, for people and for the last words of an interrupted one.
 #[derive(Clone)]
 struct Stage(Arc<Mutex<String>>);
@@ -74,7 +69,8 @@ pub async fn run(args: &Args, console: Console) -> Result<(), Failure> {
     let plan = Plan {
         seeds: args.seeds,
         noisy_seeds: args.noisy_seeds,
-        corners: args.corners.into(),
+        corners: args.corners,
+        lens: args.lens,
         samples: args.samples,
         matching: !args.no_matching,
     };
@@ -181,13 +177,4 @@ fn semi_global_matching(python: &str, folder: &Path, task: &SgbmTask<'_>) -> Res
     let figures = ask_python(python, task.script, [argument.to_string()])?;
     let picture = image::open(&picture).map_err(|error| format!("{}: {error}", picture.display()))?.to_rgb8();
     Ok(SgbmAnswer { figures, picture })
-}
-
-impl From<CornersOption> for Corners {
-    fn from(option: CornersOption) -> Self {
-        match option {
-            CornersOption::Rendered => Self::Rendered,
-            CornersOption::Projected => Self::Projected,
-        }
-    }
 }

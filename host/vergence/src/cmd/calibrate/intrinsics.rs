@@ -2,7 +2,7 @@
 
 use std::path::PathBuf;
 
-use vergence_calibration::{IntrinsicsOptions, calibrate_intrinsics, check_fit, validate_intrinsics};
+use vergence_calibration::{IntrinsicsOptions, LensModel, calibrate_intrinsics, check_fit, validate_intrinsics};
 use vergence_calibration_input::{
     InputHash, Sought, camera_toml, document_of, named_images, views_in_corners, views_in_images,
 };
@@ -15,7 +15,6 @@ use vergence_vision::{Angle, ImageSize};
 
 use super::options::ResultOptions;
 use super::print_views;
-use crate::cmd::camera_options::parse_size;
 use crate::cmd::target_options::TargetOptions;
 use crate::console::Console;
 use crate::failure::Failure;
@@ -41,11 +40,14 @@ pub struct Args {
     #[arg(long, requires = "csv")]
     camera: Option<String>,
     /// Size of the images of the CSV file, such as 960x600.
-    #[arg(long, value_parser = parse_size, requires = "csv")]
+    #[arg(long, requires = "csv")]
     size: Option<ImageSize>,
     /// Also estimate how the target bows out of its plane.
     #[arg(long)]
     warp: bool,
+    /// The lens: central, moving-pupil, or by-evidence of the views.
+    #[arg(long, value_name = "MODEL", default_value = "by-evidence")]
+    lens_model: LensModel,
     /// Full field of view of the lens by its data sheet, such as 195.95deg: the report then measures coverage against it.
     #[arg(long, value_name = "ANGLE")]
     fov: Option<Angle>,
@@ -66,7 +68,7 @@ pub fn run(args: &Args, console: Console) -> Result<(), Failure> {
     force.unless_forced(corners_lie_in_image(&views, size, "the camera"), console)?;
     force.unless_forced(views_differ(&views, "the camera"), console)?;
     let solving = Stopwatch::start();
-    let options = IntrinsicsOptions { warp: args.warp, ..IntrinsicsOptions::default() };
+    let options = IntrinsicsOptions { warp: args.warp, model: args.lens_model, ..IntrinsicsOptions::default() };
     let calibration = calibrate_intrinsics(&views, size, &options)
         .map_err(|error| Failure::usage(format!("no calibration: {error}")))?;
     let seconds = solving.seconds();

@@ -8,6 +8,7 @@ use vergence_calibration::stage_plan;
 use vergence_calibration_input::{LiveEvent, LiveSet, RigCameras, SimulatedTarget};
 use vergence_camera::CameraError;
 use vergence_rig::Rig;
+use vergence_scene::LensChoice;
 use vergence_targets::TargetKind;
 
 use crate::cli::CommonOptions;
@@ -41,6 +42,9 @@ pub struct Options {
     /// With a simulated rig: seed of how it was really built, of the places of the target, and of the noise.
     #[arg(long, default_value_t = 1)]
     pub seed: u64,
+    /// With simulated cameras: their lenses, ideal, sigma8_f18 or nikkor6_f28.
+    #[arg(long, default_value_t)]
+    lens: LensChoice,
     #[command(flatten)]
     camera: CameraOptions,
 }
@@ -105,11 +109,12 @@ async fn open(
     match (port(common)?, cameras) {
         (Port::Simulated, [only]) if only == "sim" => {
             options.camera.none_for_simulated()?;
-            let (seed, built) = (options.seed, built(nominal, options.seed));
+            let (seed, built, lens) = (options.seed, built(nominal, options.seed), options.lens);
             let rig = SharedRig::new(SimulatedRig::new(&built, seed)?);
             let (session, progress) = (fresh_session()?, console.progress("homing"));
             let board_of_rig = board_of(&rig, nominal.clone(), session, common.lease, progress).await?;
-            Ok((board_of_rig, RigCameras::Simulated(Box::new(SimulatedTarget { rig, built, target, seed }))))
+            console.say(format!("simulated cameras, lens: {}", options.lens))?;
+            Ok((board_of_rig, RigCameras::Simulated(Box::new(SimulatedTarget { rig, built, target, lens, seed }))))
         }
         (Port::Simulated, _) => {
             Err(Failure::usage("a simulated rig has simulated cameras: use --port sim with --cameras sim"))
