@@ -17,6 +17,7 @@ const PURE: &[&str] = &[
     "host/calibration",
     "host/matching",
     "host/pipeline",
+    "host/plausibility",
     "host/page",
     "hil-sim/cpu",
     "hil-sim/lens",

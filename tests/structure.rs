@@ -75,6 +75,18 @@ const ALLOWED: &[(&str, &[&str])] = &[
         ],
     ),
     ("vergence-camera", &["vergence-vision", "vergence-rig"]),
+    (
+        "vergence-plausibility",
+        &[
+            "vergence-vision",
+            "vergence-rig",
+            "vergence-targets",
+            "vergence-calibration",
+            "vergence-matching",
+            "vergence-pipeline",
+            "vergence-camera",
+        ],
+    ),
     ("vergence-models", &["vergence-matching", "vergence-networks"]),
     (
         "vergence-sim",
@@ -182,6 +194,7 @@ const ALLOWED: &[(&str, &[&str])] = &[
             "vergence-plant",
             "vergence-soak",
             "vergence-pipeline",
+            "vergence-plausibility",
             "vergence-board",
             "vergence-camera",
             "vergence-models",

@@ -93,6 +93,7 @@ pub fn pose_told_json(pose: &RigPose, cloud: &PairCloud) -> Value {
     let mut told = pose_source_json(pose, cloud.fused_pose.as_ref());
     if cloud.fused_pose.is_some() {
         told["pairs"] = cloud.told_by_pairs.into();
+        told["earlier_visits"] = cloud.told_by_visits.into();
     }
     told
 }
@@ -101,12 +102,17 @@ pub fn pose_told_json(pose: &RigPose, cloud: &PairCloud) -> Value {
 #[must_use]
 pub fn pose_told_words(cloud: &PairCloud) -> Option<String> {
     let fused = cloud.fused_pose.as_ref()?;
-    let pairs = if cloud.told_by_pairs == 1 { "pair" } else { "pairs" };
+    let counted = |count: usize, what: &str| format!("{count} {what}{}", if count == 1 { "" } else { "s" });
+    let before = if cloud.told_by_visits > 0 {
+        format!(" and {}", counted(cloud.told_by_visits, "earlier visit"))
+    } else {
+        String::new()
+    };
     Some(format!(
-        "pose by joints {:.1}, images {:.1} of 6, {} {pairs}, ± {:.2}",
+        "pose by joints{before} {:.1}, images {:.1} of 6, {}, ± {:.2}",
         fused.told_by_joints(),
         fused.told_by_images,
-        cloud.told_by_pairs,
+        counted(cloud.told_by_pairs, "pair"),
         fused.rotation_sigma()
     ))
 }

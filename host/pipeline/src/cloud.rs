@@ -58,6 +58,8 @@ pub struct PairCloud {
     pub fused_pose: Option<FusedPose>,
     /// Number of pairs, this one included, whose matches told that pose.
     pub told_by_pairs: usize,
+    /// Number of earlier visits to this position of the axes that told it.
+    pub told_by_visits: usize,
 }
 
 impl PairCloud {
@@ -145,7 +147,7 @@ pub fn pair_cloud(
 }
 
 /// [`pair_cloud`] of a rig that may have stood for some pairs: the pose is told by their matches too, and `standing` keeps those of
-/// this pair for the next one. Where the rig has moved, `standing` begins anew.
+/// this pair for the next one. Where the rig has moved, `standing` begins anew, with what it knows of earlier visits to the new place.
 ///
 /// # Errors
 /// As [`pair_cloud`].
@@ -166,10 +168,10 @@ pub fn refined_cloud(
         let pairs: Vec<_> = found.pairs.iter().map(Match::measured).collect();
         Ok((found, pairs))
     };
-    let (mut found, mut pairs) = matched(&standing.best(middle))?;
+    let (mut found, mut pairs) = matched(&standing.best(rig, middle))?;
     if !standing.take(rig, pose, &pairs) {
         // It was looked for around a pose that the cameras have left.
-        (found, pairs) = matched(&standing.best(middle))?;
+        (found, pairs) = matched(&standing.best(rig, middle))?;
         standing.take(rig, pose, &pairs);
     }
     ended(Stage::Match);
@@ -229,6 +231,7 @@ fn cloud_of(
         lacks_calibration: !middle.is_calibration_known,
         fused_pose: fused,
         told_by_pairs: standing.pairs(),
+        told_by_visits: if fused.is_some() { standing.visits(rig, middle) } else { 0 },
     })
 }
 

@@ -6,7 +6,8 @@
 //! - [`pair_cloud`] matches a [`PairImages`] and triangulates what passes the gates, whose [`limits`] all verbs share; [`cloud_of_pairs`] triangulates given
 //!   correspondences;
 //! - where the joints alone tell the pose too badly, joints and matches tell it together ([`PairCloud::fused_pose`], [`pose_by_images`]);
-//! - while the rig stands, each pair adds to that pose ([`StandingPose`], [`refined_cloud`]), which a [`PoseMemory`] holds;
+//! - while the rig stands, each pair adds to that pose ([`StandingPose`], [`refined_cloud`]), which a [`PoseMemory`] holds; what it tells of the
+//!   calibration is kept for the next time that the rig stands there ([`Visits`]);
 //! - a [`Search`] says between which ranges points are sought, and what masks hide;
 //! - [`axes_by_images`] finds where axes stand that no encoder tells, [`observe_untold`] measures by them as long as they stand;
 //! - [`dense_ranges`] measures every pixel of the left image;
@@ -35,6 +36,7 @@ mod search;
 mod stage;
 mod standing;
 mod untold_axes;
+mod visits;
 mod zones;
 
 pub use axes_by_images::axes_by_images;
@@ -53,4 +55,5 @@ pub use search::{InvalidSearch, Search};
 pub use stage::{Stage, StageTimes};
 pub use standing::StandingPose;
 pub use untold_axes::{AxisByImages, UntoldAxes, axes_told, observe_untold};
+pub use visits::Visits;
 pub use zones::{RigView, ZONE_RADIUS, rig_zones};

@@ -1,8 +1,11 @@
 //! Whether the pose of a pair comes from the joints alone, or from joints and images together.
 
+use nalgebra::Matrix6;
 use vergence_matching::{Match, MatchError, Matcher};
 use vergence_rig::{Rig, RigPose};
-use vergence_vision::{FusedPose, Length, MatchErrors, MatchSigma, PixelPair, StereoPair, fuse_pose};
+use vergence_vision::{
+    Angle, FusedPose, Left, Length, MatchErrors, MatchSigma, PixelPair, Right, StereoPair, Transform, fuse_pose,
+};
 
 use crate::limits::{JOINTS_SUFFICE, matching_sigma};
 use crate::pair::PairImages;
@@ -27,12 +30,21 @@ pub(crate) fn joints_suffice(rig: &Rig, pose: &RigPose) -> bool {
 /// `pose` with the relative pose that joints and images tell together.
 #[must_use]
 pub fn with_fused(pose: &RigPose, fused: &FusedPose) -> RigPose {
-    let shift = fused.covariance.fixed_view::<3, 3>(3, 3).trace().max(0.0).sqrt();
+    told_otherwise(pose, fused.left_from_right, &fused.covariance)
+}
+
+/// `pose` with another relative pose of this covariance.
+pub(crate) fn told_otherwise(
+    pose: &RigPose,
+    left_from_right: Transform<Left, Right>,
+    covariance: &Matrix6<f64>,
+) -> RigPose {
+    let sigma = |first: usize| covariance.fixed_view::<3, 3>(first, first).trace().max(0.0).sqrt();
     RigPose {
-        left_from_right: fused.left_from_right,
-        shared: pose.shared.with_pose(&fused.covariance),
-        rotation_sigma: fused.rotation_sigma(),
-        translation_sigma: Length::from_mm(shift),
+        left_from_right,
+        shared: pose.shared.with_pose(covariance),
+        rotation_sigma: Angle::from_rad(sigma(0)),
+        translation_sigma: Length::from_mm(sigma(3)),
         ..pose.clone()
     }
 }

@@ -14,6 +14,7 @@ use vergence_vision::{FusedPose, MatchSigma, PixelPair};
 use crate::limits::FLICKER_COUNTS;
 use crate::pose::PairPose;
 use crate::pose_source::{fused, joints_suffice, with_fused};
+use crate::visits::Visits;
 
 /// Number of pairs whose matches are kept. What more pairs of one view would add is lost in what they have in common.
 const PAIRS: usize = 10;
@@ -29,6 +30,10 @@ pub struct StandingPose {
     pairs: VecDeque<Vec<(PixelPair, MatchSigma)>>,
     /// The pose by joints and all these matches.
     refined: Option<FusedPose>,
+    /// The pose by the joints, where the rig stands.
+    by_joints: Option<RigPose>,
+    /// What images told where the rig stood before.
+    visits: Visits,
 }
 
 impl StandingPose {
@@ -44,39 +49,62 @@ impl StandingPose {
         self.refined.as_ref()
     }
 
-    /// Forgets what images told: the axes have moved.
+    /// Forgets what images told of this place and of all others.
     pub fn forget(&mut self) {
         *self = Self::default();
     }
 
-    /// Forgets what images told, where the axes of `rig` read another position at `pose` or move.
+    /// The number of earlier visits to the place of `by_joints` that told its pose.
+    #[must_use]
+    pub fn visits(&self, rig: &Rig, by_joints: &RigPose) -> usize {
+        self.visits.count(rig, by_joints)
+    }
+
+    /// Begins anew, and knows at the next visit what this one told.
+    fn leave(&mut self, rig: &Rig) {
+        let mut visits = std::mem::take(&mut self.visits);
+        if let (Some(by_joints), Some(told)) = (&self.by_joints, &self.refined) {
+            visits.keep(rig, by_joints, told);
+        }
+        *self = Self { visits, ..Self::default() };
+    }
+
+    /// Leaves the place where the axes of `rig` read another position at `pose`, or move.
     pub(crate) fn forget_if_moved(&mut self, rig: &Rig, pose: &PairPose) {
         let at = pose.at_middle().axes.iter().map(|axis| axis.value());
         let moved = |((axis, before), now): ((&RigAxis, &f64), f64)| {
             (now - before).abs() > FLICKER_COUNTS * axis.value_per_count().abs()
         };
         if !pose.is_steady() || rig.axes.iter().zip(&self.axes).zip(at).any(moved) {
-            self.forget();
+            self.leave(rig);
         }
     }
 
-    /// The pose that is known best, by joints or by joints and images.
-    pub(crate) fn best(&self, by_joints: &RigPose) -> RigPose {
-        self.refined.as_ref().map_or_else(|| by_joints.clone(), |fused| with_fused(by_joints, fused))
+    /// The pose that is known best, by joints, earlier visits and images.
+    pub(crate) fn best(&self, rig: &Rig, by_joints: &RigPose) -> RigPose {
+        match &self.refined {
+            Some(fused) => with_fused(by_joints, fused),
+            None => self.visits.corrected(rig, by_joints),
+        }
     }
 
-    /// Takes the matches of one more pair. `false` where they contradict the pairs before, which are then forgotten: the cameras have
-    /// moved and no encoder told it.
+    /// Takes the matches of one more pair. `false` where they contradict the pairs before, or earlier visits, which are then forgotten: the
+    /// cameras have moved and no encoder told it.
     pub(crate) fn take(&mut self, rig: &Rig, pose: &PairPose, matches: &[(PixelPair, MatchSigma)]) -> bool {
-        let by_joints = pose.at_middle();
-        if joints_suffice(rig, by_joints) || !pose.is_steady() {
-            self.forget();
+        let middle = pose.at_middle();
+        if joints_suffice(rig, middle) || !pose.is_steady() {
+            self.leave(rig);
             return true;
         }
-        let alone = fused(rig, by_joints, matches);
-        if let Some(refined) = &self.refined
-            && alone.as_ref().is_none_or(|alone| are_different(refined, alone))
-        {
+        let known = self.visits.corrected(rig, middle);
+        let alone = fused(rig, &known, matches);
+        let contradicts = match (&self.refined, &alone) {
+            (Some(refined), Some(alone)) => are_different(refined, alone),
+            (Some(_), None) => true,
+            (None, Some(alone)) => self.visits.count(rig, middle) > 0 && is_excluded(&known, alone),
+            (None, None) => false,
+        };
+        if contradicts {
             self.forget();
             return false;
         }
@@ -84,16 +112,23 @@ impl StandingPose {
             return true;
         }
         if self.pairs.is_empty() {
-            self.axes = by_joints.axes.iter().map(|axis| axis.value()).collect();
+            self.axes = middle.axes.iter().map(|axis| axis.value()).collect();
+            self.by_joints = Some(middle.clone());
         }
         if self.pairs.len() == PAIRS {
             self.pairs.pop_front();
         }
         self.pairs.push_back(matches.to_vec());
         let all: Vec<_> = self.pairs.iter().flatten().copied().collect();
-        self.refined = if self.pairs.len() == 1 { alone } else { fused(rig, by_joints, &all).or(alone) };
+        self.refined = if self.pairs.len() == 1 { alone } else { fused(rig, &known, &all).or(alone) };
         true
     }
+}
+
+/// Whether images say that the pose is not the `known` one, by more than that is uncertain.
+fn is_excluded(known: &RigPose, found: &FusedPose) -> bool {
+    let factors = known.covariance().cholesky();
+    factors.is_some_and(|factors| found.correction.dot(&factors.solve(&found.correction)) > DIFFERENT)
 }
 
 /// Whether two poses of the same joints differ by more than both are uncertain. They share what the joints tell, so that the sum of

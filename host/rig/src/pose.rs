@@ -187,6 +187,14 @@ impl Rig {
         Angle::from_rad((all.powi(2) - calibrated.powi(2)).max(0.0).sqrt())
     }
 
+    /// The part of the covariance of `pose` that is the calibration's: its errors are the same each time that the axes stand there.
+    #[must_use]
+    pub fn lasting_covariance(&self, pose: &RigPose) -> Matrix6<f64> {
+        let values: Vec<f64> = pose.axes.iter().map(|axis| axis.value()).collect();
+        let of_trunk = self.trunk_calibration_covariance(&values);
+        of_trunk.unwrap_or_else(|| self.calibration_covariance(&values, &values).pose())
+    }
+
     /// How the relative pose changes where the axis `index` is `counts` further than `joints` say: a turn ω and a shift δ as in
     /// [`RigPose::covariance`], to first order.
     #[must_use]

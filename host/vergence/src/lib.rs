@@ -1,6 +1,6 @@
 //! The vergence command: moves the rig, sees, and measures.
 //!
-//! `cmd` holds one module per verb and what verbs share; `plausible` refuses what cannot be meant; `sim` reads, serves and drives simulated boards. Only this crate
+//! `cmd` holds one module per verb and what verbs share; `sim` reads, serves and drives simulated boards. Only this crate
 //! touches the terminal.
 //!
 //! Exit codes: 0 ok, 1 check failed, 2 usage or bad input, 3 device, 4 protocol mismatch.
@@ -11,7 +11,6 @@ mod console;
 pub mod failure;
 mod firmware;
 mod interrupt;
-mod plausible;
 mod rig_file;
 pub mod sim;
 mod stopwatch;

@@ -58,6 +58,7 @@ pub use lens_field::{LensField, UnknownField};
 pub use match_sigma::MatchSigma;
 pub use median::median;
 pub use pose_drift::{PoseDrift, pose_drift};
+pub use pose_equation::moved as moved_pose;
 pub use pose_fusion::{FusedPose, MatchErrors, fuse_pose};
 pub use pupil::{angle_of_point, pupil_shift, pupil_shift_slope};
 pub use stereo_pair::{PixelPair, StereoPair};

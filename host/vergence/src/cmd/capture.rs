@@ -18,10 +18,10 @@ use super::camera_options::CameraOptions;
 use super::mask_options::MaskOptions;
 use super::target_options::TargetOptions;
 use crate::cli::CommonOptions;
+use crate::cmd::force_option::ForceOption;
 use crate::console::Console;
 use crate::failure::Failure;
 use crate::interrupt::interrupted;
-use crate::plausible::ForceOption;
 use crate::rig_file;
 
 /// Watches one camera or a pair, and keeps an image whenever a still target is seen where few views were. Every image is

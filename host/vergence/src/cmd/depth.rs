@@ -28,16 +28,16 @@ use self::motion::StageSpeed;
 use self::uncertain::Uncertain;
 use super::stage_pose::StagePose;
 use crate::cli::CommonOptions;
+use crate::cmd::force_option::ForceOption;
 use crate::cmd::model_options::MatcherOptions;
 use crate::cmd::options::TableOption;
 use crate::cmd::search_options::SearchOptions;
 use crate::console::Console;
 use crate::failure::{Failure, FailureKind};
 use crate::interrupt::{interrupted, on_own_thread};
-use crate::plausible::ForceOption;
-use crate::plausible::images::{Taken, cloud_is_of_one_pair, images_differ, names_are_not_swapped};
-use crate::plausible::pose::cameras_are_near;
 use crate::rig_file;
+use vergence_plausibility::images::{Taken, cloud_is_of_one_pair, images_differ, names_are_not_swapped};
+use vergence_plausibility::pose::cameras_are_near;
 
 /// Matches two photographs (or two folders of them, paired by name, number or time stamp) taken by the cameras of the rig
 /// file, and writes the points as PLY in millimetres in the left camera's frame.

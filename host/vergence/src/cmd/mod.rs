@@ -2,6 +2,7 @@
 
 mod camera_options;
 mod connect;
+mod force_option;
 mod mask_options;
 mod model_options;
 pub mod options;

@@ -6,9 +6,9 @@ use vergence_calibration_input::read_target;
 use vergence_targets::{AprilGridSpec, CharucoSpec, TagFamily, TargetKind, TargetSpec};
 use vergence_vision::Length;
 
+use crate::cmd::force_option::ForceOption;
 use crate::console::Console;
 use crate::failure::Failure;
-use crate::plausible::ForceOption;
 
 /// The target: a chessboard, a ChArUco board, a grid of AprilTags, or what a file says.
 #[derive(Clone, Debug, clap::Args)]

@@ -17,9 +17,9 @@ use crate::cmd::mask_options::MaskOptions;
 use crate::cmd::target_options::TargetOptions;
 use crate::console::Console;
 use crate::failure::Failure;
-use crate::plausible::pose::{cameras_are_near, right_is_on_the_right};
-use crate::plausible::views::views_of_pair;
 use crate::stopwatch::Stopwatch;
+use vergence_plausibility::pose::{cameras_are_near, right_is_on_the_right};
+use vergence_plausibility::views::views_of_pair;
 
 /// Calibrates a fixed pair: the pose of the right camera, from views of a target that both cameras see. The rig file that
 /// it writes is for `vergence depth --rig`.

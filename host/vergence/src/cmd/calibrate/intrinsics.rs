@@ -18,8 +18,8 @@ use super::print_views;
 use crate::cmd::target_options::TargetOptions;
 use crate::console::Console;
 use crate::failure::Failure;
-use crate::plausible::views::{axis_is_near_the_middle, corners_lie_in_image, views_differ};
 use crate::stopwatch::Stopwatch;
+use vergence_plausibility::views::{axis_is_near_the_middle, corners_lie_in_image, views_differ};
 
 /// Calibrates one camera from views of a target at different tilts, out to the rim of the image.
 #[derive(Debug, clap::Args)]

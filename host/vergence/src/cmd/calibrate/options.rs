@@ -8,10 +8,10 @@ pub use vergence_calibration_report::VerdictPlaces;
 use vergence_files::write_whole;
 use vergence_rig::Provenance;
 
+use crate::cmd::force_option::ForceOption;
 use crate::cmd::options::StoreOptions;
 use crate::console::Console;
 use crate::failure::Failure;
-use crate::plausible::ForceOption;
 
 /// Two lenses that are known, and how well.
 #[derive(Debug, clap::Args)]

@@ -18,10 +18,10 @@ use crate::cmd::mask_options::MaskOptions;
 use crate::cmd::target_options::TargetOptions;
 use crate::console::Console;
 use crate::failure::Failure;
-use crate::plausible::pose::{cameras_are_near, right_is_on_the_right};
-use crate::plausible::views::views_of_pair;
 use crate::rig_file;
 use crate::stopwatch::Stopwatch;
+use vergence_plausibility::pose::{cameras_are_near, right_is_on_the_right};
+use vergence_plausibility::views::views_of_pair;
 
 /// Calibrates how the axes carry the cameras, from views at several stage poses; --rig names the nominal rig.
 #[derive(Debug, clap::Args)]

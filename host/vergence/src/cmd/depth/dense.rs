@@ -11,11 +11,11 @@ use vergence_output::{
 use vergence_pipeline::{PairImages, StageTimes, dense_ranges, pose_by_images, with_fused};
 
 use super::Measured;
+use crate::cmd::force_option::ForceOption;
 use crate::console::Console;
 use crate::failure::Failure;
-use crate::plausible::ForceOption;
-use crate::plausible::images::{Taken, images_are_one_pair};
 use crate::stopwatch::clock;
+use vergence_plausibility::images::{Taken, images_are_one_pair};
 
 /// Where a smaller part of the pixels that both cameras see has a range, the keypoints are asked whether the images are a pair.
 /// Pairs that were taken together have 49 % to 82 % (a photographed pair, two simulated ones), swapped or unrelated ones at most 19 %.

@@ -9,7 +9,7 @@ use vergence_pipeline::{Method, PairCloud, PairImages, PairPose, Search, pair_cl
 use vergence_rig::Rig;
 use vergence_vision::{DropReason, Kernel};
 
-use crate::failure::Failure;
+use crate::Implausible;
 
 /// With fewer keypoints an image has hardly any texture, and matches tell nothing of the pair.
 const FEWEST_KEYPOINTS: usize = 50;
@@ -20,13 +20,13 @@ const LEAST_SHARE: f64 = 0.03;
 /// Two photographs of two cameras are not the same.
 ///
 /// # Errors
-/// Exit code 2.
-pub fn images_differ(left: &CameraImage, right: &CameraImage) -> Result<(), Failure> {
+/// [`Implausible::Input`].
+pub fn images_differ(left: &CameraImage, right: &CameraImage) -> Result<(), Implausible> {
     let has_texture = left.image.pixels().any(|pixel| pixel != left.image.get_pixel(0, 0));
     if left.image != right.image || !has_texture {
         return Ok(());
     }
-    Err(Failure::usage(format!(
+    Err(Implausible::Input(format!(
         "the left image {} and the right image {} are the same photograph: name one of each camera",
         left.name, right.name
     )))
@@ -35,8 +35,8 @@ pub fn images_differ(left: &CameraImage, right: &CameraImage) -> Result<(), Fail
 /// The names of the files do not call the left one right and the right one left.
 ///
 /// # Errors
-/// Exit code 1.
-pub fn names_are_not_swapped(left: &Path, right: &Path) -> Result<(), Failure> {
+/// [`Implausible::Result`].
+pub fn names_are_not_swapped(left: &Path, right: &Path) -> Result<(), Implausible> {
     let says = |path: &Path, word: &str| {
         path.file_name().is_some_and(|name| name.to_string_lossy().to_lowercase().contains(word))
     };
@@ -44,7 +44,7 @@ pub fn names_are_not_swapped(left: &Path, right: &Path) -> Result<(), Failure> {
     if !(only(left, "right", "left") && only(right, "left", "right")) {
         return Ok(());
     }
-    Err(Failure::check(format!(
+    Err(Implausible::Result(format!(
         "--left names {} and --right names {}: are they swapped?",
         left.display(),
         right.display()
@@ -92,22 +92,22 @@ impl Agreement {
 /// agrees with the pose, the classical matcher looks again, with the images as they are and swapped.
 ///
 /// # Errors
-/// Exit code 1.
-pub fn cloud_is_of_one_pair(cloud: &PairCloud, images: [&CameraImage; 2], taken: Taken<'_>) -> Result<(), Failure> {
+/// [`Implausible::Result`].
+pub fn cloud_is_of_one_pair(cloud: &PairCloud, images: [&CameraImage; 2], taken: Taken<'_>) -> Result<(), Implausible> {
     if Agreement::of(cloud).says_enough() { Ok(()) } else { images_are_one_pair(images, taken) }
 }
 
 /// Two photographs show the same things from the places of the two cameras, as far as the classical matcher tells.
 ///
 /// # Errors
-/// Exit code 1.
-pub fn images_are_one_pair([left, right]: [&CameraImage; 2], taken: Taken<'_>) -> Result<(), Failure> {
+/// [`Implausible::Result`].
+pub fn images_are_one_pair([left, right]: [&CameraImage; 2], taken: Taken<'_>) -> Result<(), Implausible> {
     let found = |left: &RgbImage, right: &RgbImage| Agreement::found(PairImages { left, right }, taken);
     let Some(stated) = found(&left.image, &right.image).filter(|found| !found.says_enough()) else { return Ok(()) };
     let names = format!("{} and {}", left.name, right.name);
     let of = format!("{} of {} keypoints", stated.matches, stated.keypoints);
     let swapped = found(&right.image, &left.image).filter(|found| found.keypoints >= FEWEST_KEYPOINTS);
-    Err(Failure::check(match swapped.filter(|found| found.says_enough()) {
+    Err(Implausible::Result(match swapped.filter(|found| found.says_enough()) {
         Some(swapped) => format!(
             "{names}: only {of} have a partner at this pose, and {} of {} with the images the other way round: are left and right \
              swapped?",

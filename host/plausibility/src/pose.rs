@@ -3,7 +3,7 @@
 use nalgebra::Vector3;
 use vergence_vision::{Left, Length, Right, Transform};
 
-use crate::failure::Failure;
+use crate::Implausible;
 
 /// The largest distance of two cameras.
 const WIDEST: Length = Length::from_mm(10_000.0);
@@ -13,13 +13,13 @@ const CLEARLY_LEFT: f64 = 0.5;
 /// Cameras of one rig stand within 10 m of each other.
 ///
 /// # Errors
-/// Exit code 2.
-pub fn cameras_are_near(left_from_right: &Transform<Left, Right>) -> Result<(), Failure> {
+/// [`Implausible::Input`].
+pub fn cameras_are_near(left_from_right: &Transform<Left, Right>) -> Result<(), Implausible> {
     let metres = left_from_right.origin().mm().norm() * 1e-3;
     if metres <= WIDEST.mm() * 1e-3 {
         return Ok(());
     }
-    Err(Failure::usage(format!(
+    Err(Implausible::Input(format!(
         "the cameras stand {metres:.1} m apart, and those of a rig at most {:.0} m: is a length in the wrong unit, such as m for mm?",
         WIDEST.mm() * 1e-3
     )))
@@ -28,8 +28,8 @@ pub fn cameras_are_near(left_from_right: &Transform<Left, Right>) -> Result<(), 
 /// A right camera stands right of the left one, seen along the direction between both axes.
 ///
 /// # Errors
-/// Exit code 1.
-pub fn right_is_on_the_right(left_from_right: &Transform<Left, Right>) -> Result<(), Failure> {
+/// [`Implausible::Result`].
+pub fn right_is_on_the_right(left_from_right: &Transform<Left, Right>) -> Result<(), Implausible> {
     let turn = left_from_right.rotation();
     let middle = |axis: Vector3<f64>| (axis + turn * axis).try_normalize(1e-6);
     let (Some(forward), Some(down)) = (middle(Vector3::z()), middle(Vector3::y())) else { return Ok(()) };
@@ -39,7 +39,7 @@ pub fn right_is_on_the_right(left_from_right: &Transform<Left, Right>) -> Result
     if across >= -CLEARLY_LEFT * baseline.norm() {
         return Ok(());
     }
-    Err(Failure::check(format!(
+    Err(Implausible::Result(format!(
         "the right camera stands {:.1} mm to the left of the left one: are left and right swapped?",
         -across
     )))
@@ -70,7 +70,7 @@ mod tests {
             assert!(right_is_on_the_right(&placed(separation, origin)).is_ok(), "{separation} {origin:?}");
         }
         let swapped = placed(-4.0, [-145.0, 3.0, 2.0]);
-        assert!(right_is_on_the_right(&swapped).is_err_and(|failure| failure.to_string().contains("swapped?")));
+        assert!(right_is_on_the_right(&swapped).is_err_and(|found| found.to_string().contains("swapped?")));
         let herbivore = placed(120.0, [145.0 * cosine, 0.0, -145.0 * sine]).inverse();
         let mirrored = Transform::<Left, Right>::new(herbivore.rotation(), herbivore.origin().mm());
         assert!(right_is_on_the_right(&mirrored).is_err());

@@ -1,9 +1,4 @@
-//! Checks of input and results that are well formed and still cannot be meant. One function is one check with its sentence; it
-//! refuses with exit code 2 what is read, and with exit code 1 what is found. With `--force` the sentence is a warning.
-
-pub mod images;
-pub mod pose;
-pub mod views;
+//! The option that goes on where a plausibility check refuses.
 
 use crate::console::Console;
 use crate::failure::Failure;
@@ -22,8 +17,8 @@ impl ForceOption {
     ///
     /// # Errors
     /// The check's failure, unless a person insists.
-    pub fn unless_forced(self, found: Result<(), Failure>, console: Console) -> Result<(), Failure> {
-        match found {
+    pub fn unless_forced(self, found: Result<(), impl Into<Failure>>, console: Console) -> Result<(), Failure> {
+        match found.map_err(Into::into) {
             Err(failure) if self.force => {
                 console.warn(failure);
                 Ok(())

@@ -4,7 +4,7 @@ use vergence_calibration::StereoView;
 use vergence_targets::TargetView;
 use vergence_vision::{ImageSize, KannalaBrandt, Pixel, Side};
 
-use crate::failure::Failure;
+use crate::Implausible;
 
 /// Two photographs of a target differ by more than this at some corner, in pixels: by their noise alone.
 const SAME_PX: f64 = 1e-3;
@@ -14,12 +14,12 @@ const OFF_MIDDLE: f64 = 0.25;
 /// Every corner lies in the image.
 ///
 /// # Errors
-/// Exit code 2.
+/// [`Implausible::Input`].
 pub fn corners_lie_in_image<'a>(
     views: impl IntoIterator<Item = &'a TargetView>,
     size: ImageSize,
     camera: &str,
-) -> Result<(), Failure> {
+) -> Result<(), Implausible> {
     // Positions are those of pixel centres: the border is half a pixel further out.
     let inside = |x: f64, pixels: u32| (-0.5..=f64::from(pixels) - 0.5).contains(&x);
     let (mut all, mut outside) = (0_usize, Vec::new());
@@ -34,7 +34,7 @@ pub fn corners_lie_in_image<'a>(
         }
     }
     let Some(first) = outside.first() else { return Ok(()) };
-    Err(Failure::usage(format!(
+    Err(Implausible::Input(format!(
         "{} of {all} corners lie outside the images of {camera}, which are {} x {}, such as {first}: are width and height swapped, or \
          the corners another camera's?",
         outside.len(),
@@ -46,11 +46,11 @@ pub fn corners_lie_in_image<'a>(
 /// No view of one camera is another one again.
 ///
 /// # Errors
-/// Exit code 2.
-pub fn views_differ(views: &[TargetView], camera: &str) -> Result<(), Failure> {
+/// [`Implausible::Input`].
+pub fn views_differ(views: &[TargetView], camera: &str) -> Result<(), Implausible> {
     for (index, view) in views.iter().enumerate() {
         if let Some(other) = views.iter().take(index).find(|other| is_same(view, other)) {
-            return Err(Failure::usage(format!(
+            return Err(Implausible::Input(format!(
                 "{} and {} of {camera} are the same photograph: name each image once",
                 other.name, view.name
             )));
@@ -62,11 +62,11 @@ pub fn views_differ(views: &[TargetView], camera: &str) -> Result<(), Failure> {
 /// The left and the right camera of a pair took different photographs.
 ///
 /// # Errors
-/// Exit code 2.
-pub fn sides_differ(views: &[StereoView]) -> Result<(), Failure> {
+/// [`Implausible::Input`].
+pub fn sides_differ(views: &[StereoView]) -> Result<(), Implausible> {
     match views.iter().find(|view| is_same(&view.left, &view.right)) {
         None => Ok(()),
-        Some(view) => Err(Failure::usage(format!(
+        Some(view) => Err(Implausible::Input(format!(
             "{} of the left camera and {} of the right one are the same photograph: name the images of both cameras",
             view.left.name, view.right.name
         ))),
@@ -77,7 +77,7 @@ pub fn sides_differ(views: &[StereoView]) -> Result<(), Failure> {
 ///
 /// # Errors
 /// Those of the checks in this module.
-pub fn views_of_pair(views: &[StereoView], lenses: [&KannalaBrandt; 2]) -> Result<(), Failure> {
+pub fn views_of_pair(views: &[StereoView], lenses: [&KannalaBrandt; 2]) -> Result<(), Implausible> {
     let [left, right] = lenses;
     sides_differ(views)?;
     for (side, lens) in [(Side::Left, left), (Side::Right, right)] {
@@ -96,14 +96,14 @@ pub fn views_of_pair(views: &[StereoView], lenses: [&KannalaBrandt; 2]) -> Resul
 /// The principal point of a lens lies near the middle of its images.
 ///
 /// # Errors
-/// Exit code 1.
-pub fn axis_is_near_the_middle(lens: &KannalaBrandt) -> Result<(), Failure> {
+/// [`Implausible::Result`].
+pub fn axis_is_near_the_middle(lens: &KannalaBrandt) -> Result<(), Implausible> {
     let (size, centre) = (lens.size(), lens.centre());
     let off = |at: f64, pixels: u32| (at - 0.5 * f64::from(pixels - 1)).abs() / f64::from(pixels);
     if off(centre.u, size.width) <= OFF_MIDDLE && off(centre.v, size.height) <= OFF_MIDDLE {
         return Ok(());
     }
-    Err(Failure::check(format!(
+    Err(Implausible::Result(format!(
         "the lens's axis meets the image at ({:.0}, {:.0}), far from the middle of {} x {}: are width and height swapped, or are \
          the images cut out of larger ones?",
         centre.u, centre.v, size.width, size.height
