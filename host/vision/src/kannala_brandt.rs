@@ -108,6 +108,19 @@ pub enum InvalidLens {
         /// The stated limit of the field.
         stated: Angle,
     },
+    /// A parameter of another program's model breaks a rule.
+    #[error("{name} is {value}, it must {rule}")]
+    OutOfRange {
+        /// Name of the parameter.
+        name: &'static str,
+        /// Its value.
+        value: f64,
+        /// What it must do.
+        rule: &'static str,
+    },
+    /// The image of another program's model folds over at its axis.
+    #[error("the image folds over at the optical axis: the parameters are those of no camera")]
+    Folded,
 }
 
 /// A ray or pixel outside the lens's valid cone.
