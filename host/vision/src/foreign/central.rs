@@ -129,8 +129,9 @@ impl<F: Formula> CameraModel for Central<F> {
     }
 
     fn unproject(&self, pixel: Pixel) -> Result<Sight, OutsideField> {
-        /// Newton's method ends within this distance of the pixel, and with this step in radians.
+        /// Newton's method ends within this distance of the pixel, or this share of its own from zero, and with this step in radians.
         const NEAR_PX: f64 = 1e-6;
+        const NEAR_SHARE: f64 = 1e-12;
         const SMALLEST: f64 = 1e-15;
         const LONGEST: f64 = 0.1;
         let wanted = Vector2::new(pixel.u, pixel.v);
@@ -148,7 +149,8 @@ impl<F: Formula> CameraModel for Central<F> {
             }
         }
         let off = (wanted - self.image(&direction).ok_or(OutsideField)?).norm();
-        let ray = UnitRay::new(direction).filter(|ray| off <= NEAR_PX && ray.angle_to_axis().rad() <= self.half_field);
+        let near = NEAR_PX + NEAR_SHARE * wanted.norm();
+        let ray = UnitRay::new(direction).filter(|ray| off <= near && ray.angle_to_axis().rad() <= self.half_field);
         Ok(Sight { origin: Point::from_mm(Vector3::zeros()), ray: ray.ok_or(OutsideField)? })
     }
 

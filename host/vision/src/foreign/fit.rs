@@ -164,7 +164,7 @@ fn rows(sample: &Sample, unknowns: &Unknowns, largest: f64) -> [(Unknowns, f64);
     let share = sample.theta / largest;
     let powers: [f64; 5] = std::array::from_fn(|i| share.powi(2 * i as i32 + 1));
     let radius: f64 = powers.iter().zip(unknowns.iter()).map(|(power, k)| power * k).sum();
-    let (aspect, Vector2 { x: cosine, y: sine, .. }) = (unknowns[5], sample.radial.xy());
+    let (aspect, cosine, sine) = (unknowns[5], sample.radial.x, sample.radial.y);
     let [mut across, mut down] = [Unknowns::zeros(); 2];
     for (i, power) in powers.iter().enumerate() {
         across[i] = power * cosine;
