@@ -21,10 +21,12 @@ mod pose;
 mod real_sense;
 mod rig;
 mod ros;
+mod write;
 
 pub use self::error::ExchangeError;
 pub use self::format::{Format, Recognised};
 pub use self::rig::{ForeignCamera, ForeignPair, ForeignRig};
+pub use self::write::{Cameras, WriteFormat, Written, WrittenFile, write};
 
 /// Reads the cameras of a file of another program.
 ///

@@ -10,7 +10,8 @@ pub fn read(text: &str) -> Result<Vec<ForeignCamera>, ExchangeError> {
     let wrong = |problem: &str| ExchangeError::Wrong { format: Format::OCam, problem: problem.to_owned() };
     let is_said = |line: &&str| !line.trim().is_empty() && !line.trim_start().starts_with('#');
     let numbers = |line: &str| {
-        let numbers: Option<Vec<f64>> = line.split_whitespace().map(|word| word.parse().ok().filter(|n: &f64| n.is_finite())).collect();
+        let numbers: Option<Vec<f64>> =
+            line.split_whitespace().map(|word| word.parse().ok().filter(|n: &f64| n.is_finite())).collect();
         numbers.ok_or_else(|| wrong(&format!("'{line}' are no numbers")))
     };
     let lines = text.lines().filter(is_said).map(numbers).collect::<Result<Vec<Vec<f64>>, _>>()?;

@@ -32,6 +32,9 @@ pub struct ForeignRig {
     pub cameras: Vec<ForeignCamera>,
 }
 
+/// A lens in place of another that is off by more than this, in pixels, is told to be bad.
+const TOLERABLE_PX: f64 = 1.0;
+
 /// Two cameras and where one is relative to the other.
 #[derive(Debug)]
 pub struct ForeignPair<'a> {
@@ -60,6 +63,22 @@ impl ForeignCamera {
     pub fn lens(&self) -> Result<LensFit, ExchangeError> {
         let region = SightRegion { size: self.size, outline: &self.outline };
         fit_lens(self.model.as_ref(), region, None).map_err(|fit| ExchangeError::Fit { camera: self.name.clone(), fit })
+    }
+
+    /// How far the lens in place of the camera is off, in words; `None` where it is the camera itself.
+    #[must_use]
+    pub fn remark(&self, fit: &LensFit) -> Option<String> {
+        let LensFit { rms_px, largest_px, largest_at, .. } = *fit;
+        let bad =
+            if largest_px > TOLERABLE_PX { "; that is much: calibrate it with this program for better" } else { "" };
+        self.model.as_kannala_brandt().is_none().then(|| {
+            format!(
+                "{} has the {} model: the lens in its place is {rms_px:.3} px rms off it, {largest_px:.3} px at most, at {largest_at:.1} \
+                 from the axis{bad}",
+                self.name,
+                self.model.name()
+            )
+        })
     }
 }
 
@@ -113,6 +132,10 @@ impl<'a> ForeignPair<'a> {
             camera.base_from_camera.ok_or_else(|| ExchangeError::NoPose { camera: camera.name.clone() })
         };
         let left_from_right = (place(left)?.inverse() * place(right)?).renamed();
+        if left_from_right.origin().mm().norm() == 0.0 {
+            // Files of single cameras put each at its own origin.
+            return Err(ExchangeError::NoPose { camera: right.name.clone() });
+        }
         Ok(Self { left, right, left_from_right })
     }
 }

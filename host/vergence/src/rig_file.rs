@@ -2,18 +2,37 @@
 
 use std::path::Path;
 
+use vergence_calibration_input::{FileLens, ImportedRig, read_camera, read_rig};
 use vergence_rig::{BENCH_TOML, Rig};
+use vergence_vision::KannalaBrandt;
 
+use crate::console::Console;
 use crate::failure::Failure;
 
-/// Reads and checks the rig file at `path`; without one, the bench.
+/// Reads and checks the rig file at `path`, ours or another program's; without one, the bench. Says on standard error how far lenses are off
+/// the cameras of another program's file.
 ///
 /// # Errors
 /// Says which file and what is wrong with it.
 pub fn load(path: Option<&Path>) -> Result<Rig, Failure> {
     let Some(path) = path else { return bench() };
-    let text = std::fs::read_to_string(path).map_err(|error| Failure::input(path, error))?;
-    Rig::from_toml(&text).map_err(|error| Failure::input(path, error))
+    let ImportedRig { rig, remarks } = read_rig(path)?;
+    for remark in remarks {
+        Console::new(false).warn(format!("{}: {remark}", path.display()));
+    }
+    Ok(rig)
+}
+
+/// The lens of the camera file at `path`, ours or another program's. Says on standard error how far it is off the file's camera.
+///
+/// # Errors
+/// Says which file and what is wrong with it.
+pub fn read_lens(path: &Path, console: Console) -> Result<KannalaBrandt, Failure> {
+    let FileLens { lens, remark, .. } = read_camera(path)?;
+    if let Some(remark) = remark {
+        console.warn(remark);
+    }
+    Ok(lens)
 }
 
 /// The built-in bench with sensors of the same size that have `width` pixels across.

@@ -53,7 +53,8 @@ pub use covariance::{covariance, range_sigma};
 pub use epipolar::{dihedral, ray_to_plane};
 pub use foreign::{
     CameraModel, Central, DoubleSphere, Eucm, Fisheye624, Formula, LensFit, Mei, ModelParameter, NoFit, OCam,
-    ParameterUnit, Pinhole, Radtan, Sight, SightRegion, SplineGrid, SplinedStereographic, fit_lens,
+    ParameterUnit, Pinhole, Radtan, Sight, SightRegion, SplineFit, SplineGrid, SplinedStereographic, compare_lens,
+    fit_lens, fit_spline,
 };
 pub use frames::{Base, Camera, Frame, Left, Point, Right, Side, Transform, UnitRay, World};
 pub use gates::{DropReason, Gates};

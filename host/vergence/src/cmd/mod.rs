@@ -3,6 +3,7 @@
 mod camera_options;
 mod connect;
 mod force_option;
+mod foreign_files;
 mod mask_options;
 mod model_options;
 pub mod options;
@@ -31,6 +32,7 @@ pub mod move_to;
 pub mod orders;
 pub mod plan;
 pub mod reproduce;
+pub mod rig;
 pub mod run;
 pub mod servo;
 pub mod sim;

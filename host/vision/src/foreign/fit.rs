@@ -50,6 +50,8 @@ struct Sample {
 /// Number of samples across, and around the rim of the field.
 const ACROSS: u32 = 80;
 const AROUND: u32 = 144;
+/// The fewest samples that tell a lens.
+const FEWEST: usize = 100;
 /// Five radial coefficients, the aspect ratio, and the centre.
 const UNKNOWNS: usize = 8;
 type Unknowns = SVector<f64, UNKNOWNS>;
@@ -67,15 +69,37 @@ pub fn fit_lens(model: &dyn CameraModel, region: SightRegion<'_>, distance: Opti
         return Ok(LensFit { lens, rms_px: 0.0, largest_px: 0.0, largest_at: Angle::default() });
     }
     let samples = samples(model, region, distance);
-    if samples.len() < 100 {
+    if samples.len() < FEWEST {
         return Err(NoFit::Unseen(samples.len()));
     }
     let lens = fitted(&samples, region.size).map_err(NoFit::Lens)?;
+    compared(lens, &samples)
+}
+
+/// How far `lens` is off in place of `model`: over the image, for points at `distance` from the origin, or far away without one.
+///
+/// # Errors
+/// [`NoFit::Unseen`].
+pub fn compare_lens(
+    model: &dyn CameraModel,
+    lens: KannalaBrandt,
+    region: SightRegion<'_>,
+    distance: Option<Length>,
+) -> Result<LensFit, NoFit> {
+    let samples = samples(model, region, distance);
+    compared(lens, &samples)
+}
+
+fn compared(lens: KannalaBrandt, samples: &[Sample]) -> Result<LensFit, NoFit> {
     let off = |sample: &Sample| {
-        let pixel = lens.project(&sample.ray).map_err(|_| NoFit::Lens(InvalidLens::NotFinite))?;
-        Ok(((pixel.u - sample.pixel.u).hypot(pixel.v - sample.pixel.v), sample.theta))
+        let pixel = lens.project(&sample.ray).ok()?;
+        Some(((pixel.u - sample.pixel.u).hypot(pixel.v - sample.pixel.v), sample.theta))
     };
-    let off = samples.iter().map(off).collect::<Result<Vec<_>, NoFit>>()?;
+    // Where the points are nearer or farther than those of the fit, the rim of the field is seen by one of both only.
+    let off: Vec<_> = samples.iter().filter_map(off).collect();
+    if off.len() < FEWEST {
+        return Err(NoFit::Unseen(off.len()));
+    }
     let (largest_px, at) = off.iter().copied().fold((0.0, 0.0), |most, one| if one.0 > most.0 { one } else { most });
     let rms_px = (off.iter().map(|(off, _)| off * off).sum::<f64>() / off.len() as f64).sqrt();
     Ok(LensFit { lens, rms_px, largest_px, largest_at: Angle::from_rad(at) })

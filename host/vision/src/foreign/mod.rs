@@ -14,6 +14,7 @@ mod mei;
 mod ocam;
 mod pinhole;
 mod splined;
+mod splined_fit;
 
 use std::fmt::Debug;
 
@@ -23,11 +24,12 @@ pub use self::central::{Central, Formula};
 pub use self::double_sphere::DoubleSphere;
 pub use self::eucm::Eucm;
 pub use self::fisheye624::Fisheye624;
-pub use self::fit::{LensFit, NoFit, SightRegion, fit_lens};
+pub use self::fit::{LensFit, NoFit, SightRegion, compare_lens, fit_lens};
 pub use self::mei::Mei;
 pub use self::ocam::OCam;
 pub use self::pinhole::{Pinhole, Radtan};
 pub use self::splined::{SplineGrid, SplinedStereographic};
+pub use self::splined_fit::{SplineFit, fit_spline};
 use crate::{Angle, Camera, KannalaBrandt, OutsideField, Pixel, Point, UnitRay};
 
 /// A parameter of a camera model.

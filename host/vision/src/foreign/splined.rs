@@ -68,18 +68,22 @@ pub struct SplinedStereographic {
 }
 
 impl SplinedStereographic {
-    /// What the surface adds at u; `None` beyond its edge.
-    fn shift(&self, u: [f64; 2]) -> Option<[f64; 2]> {
-        let SplineGrid { columns, rows, .. } = self.grid;
+    /// The control points that act at u, by their index, and the weight of each; `None` beyond the edge.
+    pub(super) fn weights(&self, u: [f64; 2]) -> Option<Vec<(usize, f64)>> {
+        let SplineGrid { columns, rows, order, .. } = self.grid;
         let place = |u: f64, points: usize| u * self.grid.intervals_per_unit() + (points as f64 - 1.0) / 2.0;
         let (left, across) = self.grid.weights(place(u[0], columns), columns)?;
         let (top, down) = self.grid.weights(place(u[1], rows), rows)?;
+        let used = || (0..=order).flat_map(|row| (0..=order).map(move |column| (row, column)));
+        Some(used().map(|(row, column)| ((top + row) * columns + left + column, down[row] * across[column])).collect())
+    }
+
+    /// What the surface adds at u; `None` beyond its edge.
+    fn shift(&self, u: [f64; 2]) -> Option<[f64; 2]> {
         let mut sum = [0.0; 2];
-        for (row, by_row) in down.iter().enumerate().take(self.grid.order + 1) {
-            for (column, by_column) in across.iter().enumerate().take(self.grid.order + 1) {
-                let point = self.control.get((top + row) * columns + left + column)?;
-                sum = [sum[0] + by_row * by_column * point[0], sum[1] + by_row * by_column * point[1]];
-            }
+        for (index, weight) in self.weights(u)? {
+            let [x, y] = self.control.get(index)?;
+            sum = [sum[0] + weight * x, sum[1] + weight * y];
         }
         Some(sum)
     }
