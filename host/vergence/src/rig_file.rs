@@ -1,8 +1,11 @@
-//! The rig that a command works with: a file, or the built-in bench.
+//! The rig and the lenses that a command works with: files of this program or of others, or the built-in bench.
 
 use std::path::Path;
 
+use serde_json::json;
 use vergence_calibration_input::{FileLens, ImportedRig, read_camera, read_rig};
+use vergence_exchange::{Cameras, WriteFormat};
+use vergence_files::write_whole;
 use vergence_rig::{BENCH_TOML, Rig};
 use vergence_vision::KannalaBrandt;
 
@@ -46,4 +49,19 @@ pub fn bench_with_sensors(width: u32) -> Result<Rig, Failure> {
 
 fn bench() -> Result<Rig, Failure> {
     Rig::from_toml(BENCH_TOML).map_err(|error| Failure::usage(format!("the built-in rig: {error}")))
+}
+
+/// Writes cameras for another program to `out`, or to a file beside it for each camera, and says what the format cannot hold.
+///
+/// # Errors
+/// A lens that the format cannot hold, or a file that cannot be written.
+pub fn write_foreign(format: WriteFormat, cameras: &Cameras, out: &Path, console: Console) -> Result<(), Failure> {
+    let written = vergence_exchange::write(format, cameras).map_err(|error| Failure::usage(error.to_string()))?;
+    written.remarks.iter().for_each(|remark| console.warn(remark));
+    let paths: Vec<_> = written.files.iter().map(|file| file.path(out)).collect();
+    for (path, file) in paths.iter().zip(&written.files) {
+        write_whole(path, file.text.as_bytes())?;
+        console.say(format!("wrote {}", path.display()))?;
+    }
+    console.result(&json!({ "out": paths, "remarks": written.remarks }))
 }

@@ -7,6 +7,9 @@ mod mrcal;
 mod opencv;
 mod ros;
 
+use std::path::{Path, PathBuf};
+use std::str::FromStr;
+
 use vergence_vision::{KannalaBrandt, Left, Length, Right, SightRegion, Transform, compare_lens, fit_lens};
 
 use crate::ExchangeError;
@@ -28,6 +31,27 @@ pub enum WriteFormat {
     Mrcal,
 }
 
+/// A word that names no format.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[error("'{0}' is not written: opencv, kalibr, basalt, ros, colmap or mrcal")]
+pub struct UnknownFormat(String);
+
+impl FromStr for WriteFormat {
+    type Err = UnknownFormat;
+
+    fn from_str(text: &str) -> Result<Self, UnknownFormat> {
+        Ok(match text {
+            "opencv" => Self::OpenCv,
+            "kalibr" => Self::Kalibr,
+            "basalt" => Self::Basalt,
+            "ros" => Self::Ros,
+            "colmap" => Self::Colmap,
+            "mrcal" => Self::Mrcal,
+            _ => return Err(UnknownFormat(text.to_owned())),
+        })
+    }
+}
+
 /// What is written: one camera, or a pair.
 #[derive(Clone, Copy, Debug)]
 pub struct Cameras {
@@ -44,6 +68,17 @@ pub struct WrittenFile {
     pub side: Option<&'static str>,
     /// Its text.
     pub text: String,
+}
+
+impl WrittenFile {
+    /// The path of the file where the user named `out`: that, or `calib-left.yaml` for `calib.yaml` where each camera has its own.
+    #[must_use]
+    pub fn path(&self, out: &Path) -> PathBuf {
+        let Some(side) = self.side else { return out.to_owned() };
+        let stem = out.file_stem().unwrap_or_default().to_string_lossy();
+        let ending = out.extension().map(|ending| format!(".{}", ending.to_string_lossy())).unwrap_or_default();
+        out.with_file_name(format!("{stem}-{side}{ending}"))
+    }
 }
 
 /// Files to write, and what they do not say.

@@ -1,18 +1,19 @@
 //! `vergence camera`: camera files shown, converted, and used for single points.
 
 use std::path::{Path, PathBuf};
+use std::str::FromStr;
 
 use nalgebra::Vector3;
 use serde_json::json;
 use vergence_calibration_input::{FileLens, bare_document, camera_toml, read_camera_file};
+use vergence_exchange::{UnknownFormat, WriteFormat};
 use vergence_files::write_whole;
 use vergence_rig::{Shutter, camera_in_words, camera_json};
 use vergence_vision::{Camera, KannalaBrandt, Pixel, UnitRay};
 
-use crate::cmd::foreign_files::{self, CameraFormat};
 use crate::console::Console;
 use crate::failure::Failure;
-use crate::rig_file::read_lens;
+use crate::rig_file::{read_lens, write_foreign};
 
 /// Works on camera files: this program's and those of OpenCV, Kalibr, Basalt, EuRoC, ROS, mrcal, COLMAP, ORB-SLAM, OCamCalib and librealsense.
 /// One camera of several is FILE#NAME.
@@ -33,9 +34,10 @@ enum Task {
     Convert {
         /// The camera file.
         file: PathBuf,
-        /// The format to write.
-        #[arg(long)]
-        to: CameraFormat,
+        /// The format to write: toml, opencv, kalibr, basalt, ros, colmap or mrcal. mrcal gets a splined model, and a lens with a
+        /// moving pupil a central one for points 500 mm away: how far these are off is said.
+        #[arg(long, value_name = "FORMAT")]
+        to: Target,
         /// The file to write. ROS and mrcal have one for each camera of a pair: FILE-left and FILE-right.
         #[arg(long, short, value_name = "FILE")]
         out: PathBuf,
@@ -56,6 +58,18 @@ enum Task {
         #[arg(required = true, allow_hyphen_values = true, value_parser = parse_numbers::<2>)]
         pixels: Vec<[f64; 2]>,
     },
+}
+
+/// The format to write; `None` for ours.
+#[derive(Clone, Copy, Debug)]
+struct Target(Option<WriteFormat>);
+
+impl FromStr for Target {
+    type Err = UnknownFormat;
+
+    fn from_str(text: &str) -> Result<Self, UnknownFormat> {
+        if text == "toml" { Ok(Self(None)) } else { text.parse().map(|format| Self(Some(format))) }
+    }
 }
 
 pub fn run(args: &Args, console: Console) -> Result<(), Failure> {
@@ -85,12 +99,12 @@ pub fn run(args: &Args, console: Console) -> Result<(), Failure> {
     }
 }
 
-fn convert(path: &Path, to: CameraFormat, out: &Path, console: Console) -> Result<(), Failure> {
+fn convert(path: &Path, Target(to): Target, out: &Path, console: Console) -> Result<(), Failure> {
     let file = read_camera_file(path)?;
     for remark in file.cameras.iter().filter_map(|camera| camera.remark.as_ref()) {
         console.warn(remark);
     }
-    let Some(format) = to.foreign() else {
+    let Some(format) = to else {
         let camera = file.only(path)?;
         let remark = camera.remark.iter().map(|remark| format!("# {remark}\n")).collect::<String>();
         let document = file.document.clone().unwrap_or_else(|| bare_document(&camera.lens));
@@ -101,7 +115,7 @@ fn convert(path: &Path, to: CameraFormat, out: &Path, console: Console) -> Resul
     if file.shutter() != Shutter::Global {
         console.warn("the file that is written says nothing of the rolling shutter (line_time)");
     }
-    foreign_files::write(format, &file.to_write(path)?, out, console)
+    write_foreign(format, &file.to_write(path)?, out, console)
 }
 
 fn project(camera: &KannalaBrandt, rays: &[[f64; 3]], console: Console) -> Result<(), Failure> {

@@ -3,7 +3,6 @@
 mod camera_options;
 mod connect;
 mod force_option;
-mod foreign_files;
 mod mask_options;
 mod model_options;
 pub mod options;

@@ -4,10 +4,9 @@ use std::path::{Path, PathBuf};
 
 use serde_json::json;
 use vergence_calibration_input::{ImportedRig, InputHash, import_rig};
-use vergence_exchange::Cameras;
+use vergence_exchange::{Cameras, WriteFormat};
 use vergence_files::write_whole;
 
-use crate::cmd::foreign_files::{self, CameraFormat};
 use crate::cmd::options::{Choice, RigFileOptions, With};
 use crate::cmd::stage_pose::named_mode;
 use crate::console::Console;
@@ -47,9 +46,10 @@ struct Import {
 
 #[derive(Debug, clap::Args)]
 struct Export {
-    /// The program to write for.
-    #[arg(long, visible_alias = "format")]
-    to: CameraFormat,
+    /// The program to write for: opencv, kalibr, basalt, ros, colmap or mrcal. mrcal gets a splined model, and a lens with a moving pupil a
+    /// central one for points 500 mm away: how far these are off is said.
+    #[arg(long, visible_alias = "format", value_name = "FORMAT")]
+    to: WriteFormat,
     /// The mode of a rig whose cameras move.
     #[arg(long, value_name = "MODE")]
     mode: Option<String>,
@@ -67,10 +67,8 @@ pub fn run(args: &Args, console: Console) -> Result<(), Failure> {
 
 fn import(args: &Import, console: Console) -> Result<(), Failure> {
     let files: Vec<&Path> = args.files.iter().map(PathBuf::as_path).collect();
-    let cameras = match args.cameras.as_slice() {
-        [left, right] => Some([left.as_str(), right.as_str()]),
-        _ => None,
-    };
+    let names: Vec<&str> = args.cameras.iter().map(String::as_str).collect();
+    let cameras = <[&str; 2]>::try_from(names).ok();
     if cameras.is_some() && files.len() == 2 {
         return Err(Failure::usage("--cameras chooses two cameras of one file: two files have one each"));
     }
@@ -80,9 +78,7 @@ fn import(args: &Import, console: Console) -> Result<(), Failure> {
     let toml = rig.to_toml(&hash.provenance(None)).map_err(Failure::check)?;
     let comments: String = remarks.iter().map(|remark| format!("# {remark}\n")).collect();
     write_whole(&args.out, (comments + &toml).as_bytes())?;
-    for remark in &remarks {
-        console.warn(remark);
-    }
+    remarks.iter().for_each(|remark| console.warn(remark));
     let baseline = rig.pose_at_values(&[]).left_from_right.origin().mm().norm();
     console.say(format!("{}: baseline {baseline:.3} mm\nwrote {}", rig.name, args.out.display()))?;
     console.result(&json!({ "name": rig.name, "baseline_mm": baseline, "remarks": remarks, "out": args.out }))
@@ -90,9 +86,6 @@ fn import(args: &Import, console: Console) -> Result<(), Failure> {
 
 fn export(args: &Export, rig: Option<&Path>, console: Console) -> Result<(), Failure> {
     let rig = rig_file::load(rig)?;
-    let Some(format) = args.to.foreign() else {
-        return Err(Failure::usage("a rig file is this program's own format already: choose another one with --to"));
-    };
     let values = match &args.mode {
         Some(mode) => named_mode(&rig, mode)?.targets.iter().map(|position| position.value()).collect(),
         None if rig.axes.is_empty() => Vec::new(),
@@ -101,5 +94,5 @@ fn export(args: &Export, rig: Option<&Path>, console: Console) -> Result<(), Fai
     let pose = rig.pose_at_values(&values);
     pose.check_closure().map_err(|error| Failure::check(error.to_string()))?;
     let cameras = Cameras { left: rig.left_camera, right: Some((rig.right_camera, pose.left_from_right)) };
-    foreign_files::write(format, &cameras, &args.out, console)
+    rig_file::write_foreign(args.to, &cameras, &args.out, console)
 }
