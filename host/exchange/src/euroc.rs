@@ -11,7 +11,7 @@ pub fn read(text: &str) -> Result<Vec<ForeignCamera>, ExchangeError> {
     let root = parse(Format::Euroc, text)?;
     let kind = root.get(&["sensor_type"]).map_or(Ok("camera".to_owned()), |node| node.text())?;
     if kind != "camera" {
-        return Err(root.wrong(format!("of a sensor '{kind}': name that of a camera")));
+        return Err(root.wrong(format!("is of a sensor '{kind}': name that of a camera")));
     }
     let size = root.need(&["resolution"])?.size()?;
     let place = root.get(&["T_BS"]).map(|matrix| pose::of_matrix(&matrix)).transpose()?;

@@ -62,7 +62,8 @@ pub enum Recognised {
     Unknown,
 }
 
-const UNREAD: [(&[&str], &str, &str); 7] = [
+const UNREAD: [(&[&str], &str, &str); 8] = [
+    (&["\n[LEFT_CAM_"], "a calibration of a ZED camera", "write its parameters as an OpenCV camera file"),
     (&["<opencv_storage"], "OpenCV's FileStorage as XML", "write it as YAML: name the file .yaml"),
     (&["type_id\": \"opencv-matrix"], "OpenCV's FileStorage as JSON", "write it as YAML: name the file .yaml"),
     (&["<calibration", "<projection>"], "a camera file of Agisoft Metashape", "export it as OpenCV YAML"),
@@ -87,7 +88,9 @@ impl Recognised {
         }
         let is_toml = |line: &str| {
             let line = line.trim();
-            (line.starts_with('[') && line.ends_with(']')) || line.split_once(" = ").is_some()
+            let is_table = line.starts_with('[') && line.ends_with(']');
+            let is_key = |key: &str| key.trim().chars().all(|c| c.is_alphanumeric() || "_-.".contains(c));
+            is_table || line.split_once('=').is_some_and(|(key, _)| is_key(key))
         };
         if text.lines().any(is_toml) { Self::Ours } else { Self::Unknown }
     }

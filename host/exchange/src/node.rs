@@ -32,9 +32,14 @@ pub fn parse(format: Format, text: &str) -> Result<Node, ExchangeError> {
 }
 
 impl Node {
-    /// An error about this value.
+    /// A node that holds nothing, for errors of formats that are no YAML.
+    pub fn nothing(format: Format) -> Self {
+        Self { value: Value::Null, place: String::new(), format }
+    }
+
+    /// An error about this value: `problem` goes on after its place or after "it".
     pub fn wrong(&self, problem: impl std::fmt::Display) -> ExchangeError {
-        let problem = if self.place.is_empty() { problem.to_string() } else { format!("{} {problem}", self.place) };
+        let problem = format!("{} {problem}", if self.place.is_empty() { "it" } else { &self.place });
         ExchangeError::Wrong { format: self.format, problem }
     }
 
@@ -52,7 +57,7 @@ impl Node {
 
     /// The same where one must be there.
     pub fn need(&self, keys: &[&str]) -> Result<Self, ExchangeError> {
-        self.get(keys).ok_or_else(|| self.wrong(format!("has no {}", keys.join(" or ")).trim_start()))
+        self.get(keys).ok_or_else(|| self.wrong(format!("has no {}", keys.join(" or "))))
     }
 
     /// The keys of a mapping.

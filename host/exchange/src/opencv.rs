@@ -66,7 +66,7 @@ fn size(root: &Node) -> Result<ImageSize, ExchangeError> {
     }
     root.get(&["image_size", "imageSize", "resolution"])
         .ok_or_else(|| {
-            root.wrong("it does not say the size of images: add the lines 'image_width: 960' and 'image_height: 600'")
+            root.wrong("does not say the size of images: add the lines 'image_width: 960' and 'image_height: 600'")
         })?
         .size()
 }
@@ -85,7 +85,7 @@ fn model(root: &Node, keys: &Keys, size: ImageSize) -> Result<Box<dyn CameraMode
         return Err(matrix.wrong(format!("has a skew of {skew}, which only the model of omnidir has")));
     }
     let pinhole = [fx, fy, cx, cy];
-    let count = || root.wrong(format!("{} distortion coefficients are not those of its model", distortion.len()));
+    let count = || root.wrong(format!("has {} distortion coefficients, which are not those of its model", distortion.len()));
     match model {
         Model::Fisheye => {
             let k = <[f64; 4]>::try_from(&distortion[..]).map_err(|_| count())?;
@@ -125,7 +125,7 @@ fn kind(root: &Node, has_xi: bool, coefficients: usize) -> Result<Model, Exchang
     match (has_xi, coefficients) {
         (true, _) => Ok(Model::Omnidir),
         (false, 4) => Err(root.wrong(
-            "it has four distortion coefficients and does not say its model: add the line 'model: fisheye' (cv::fisheye) or \
+            "has four distortion coefficients and does not say its model: add the line 'model: fisheye' (cv::fisheye) or \
              'model: pinhole' (cv::calibrateCamera)",
         )),
         (false, _) => Ok(Model::Pinhole),
@@ -142,7 +142,7 @@ fn left_from_right(root: &Node) -> Result<Option<Transform<Base, Camera>>, Excha
         "m" => pose::METRE,
         _ => {
             return Err(root.wrong(
-                "it has T in the unit of the squares of a target, and does not say which: add the line 'translation_unit: mm', cm or m",
+                "has T in the unit of the squares of a target, and does not say which: add the line 'translation_unit: mm', cm or m",
             ));
         }
     };

@@ -3,7 +3,7 @@
 use nalgebra::{Matrix3, Vector3};
 use vergence_vision::{Base, Camera, CameraModel, ImageSize, Pinhole, Radtan, Transform};
 
-use crate::node::{Node, parse};
+use crate::node::Node;
 use crate::rig::Place;
 use crate::{ExchangeError, ForeignCamera, Format, pose};
 
@@ -42,8 +42,7 @@ fn model(block: &str, name: &str) -> Result<(Box<dyn CameraModel>, ImageSize), E
         number.ok_or_else(|| wrong(format!("{key} of \"{name}\" is no number")))
     };
     let pinhole = [number("Fx:")?, number("Fy:")?, number("PPX:")?, number("PPY:")?];
-    let node: Node = parse(Format::RealSense, "{}")?;
-    let size = node.image_size(number("Width:")?, number("Height:")?)?;
+    let size = Node::nothing(Format::RealSense).image_size(number("Width:")?, number("Height:")?)?;
     let coefficients: Option<Vec<f64>> = field("Coeffs:")?.split_whitespace().map(|word| word.parse().ok()).collect();
     let coefficients: [f64; 5] = coefficients
         .and_then(|list| list.try_into().ok())
@@ -88,8 +87,7 @@ fn first_from(text: &str, first: &str, other: &str) -> Result<Option<Transform<B
             numbers.len()
         )));
     }
-    let node = parse(Format::RealSense, "{}")?;
-    let rotation = pose::rotation(&node, Matrix3::from_row_slice(turn))?;
+    let rotation = pose::rotation(&Node::nothing(Format::RealSense), Matrix3::from_row_slice(turn))?;
     let other_from_first = Transform::<Camera, Base>::new(rotation, Vector3::new(*x, *y, *z) * pose::METRE);
     Ok(Some(other_from_first.inverse()))
 }

@@ -97,10 +97,11 @@ fn a_chain_of_kalibr_is_followed_to_its_end() {
     assert!(matches!(rig.camera(None), Err(ExchangeError::Several { .. })));
     // Without the chain, by the IMU; without both, not at all.
     let text = kalibr_chain();
-    let by_imu = text.replace("T_cn_cnm1", "T_cam_imu");
+    let by_imu = text.replace("T_cn_cnm1", "T_cam_imu").replacen("[1.0, 0.0, 0.0, -0.1]", "[1.0, 0.0, 0.0, -0.2]", 1);
     let rig = read(Format::Kalibr, &by_imu);
     assert!(matches!(rig.pair(Some(["0", "1"])), Err(ExchangeError::NoPose { .. })));
     let pair = rig.pair(Some(["1", "2"])).expect("both have a pose by the IMU");
+    near(pair.left_from_right.origin().mm(), [0.0, 0.0, -100.0]);
     near(pair.left_from_right.rotation() * Vector3::z(), [0.0, 0.0, 1.0]);
     refused(&text.replace("cam1:", "cam7:"), &["cam2", "before it"]);
     refused(&text.replacen("[0.0, 1.0, 0.0, 0.0]", "[0.0, 2.0, 0.0, 0.0]", 1), &["cam1.T_cn_cnm1", "rigid"]);
@@ -264,6 +265,8 @@ fn what_is_not_read_is_named() {
     assert!(unread("# Image list with two lines of data per image:\n").contains("COLMAP"));
     assert!(unread("target_type: 'aprilgrid'\ntagCols: 6\n").contains("target"));
     assert!(unread("{\"fl_x\": 3}").contains("radiance"));
+    assert!(unread("[LEFT_CAM_HD]\nfx=700.1\n").contains("ZED"));
+    assert_eq!(Recognised::of("# a comment = no key\nwords\n"), Recognised::Unknown);
     assert_eq!(Recognised::of("name = \"rig\"\n"), Recognised::Ours);
     assert_eq!(Recognised::of("[left.camera]\n"), Recognised::Ours);
     assert_eq!(Recognised::of("words\n"), Recognised::Unknown);

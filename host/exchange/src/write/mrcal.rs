@@ -1,6 +1,7 @@
 //! A `.cameramodel` of mrcal for each camera. mrcal has no polynomial fisheye model: a splined stereographic one is fitted.
 
-use vergence_vision::{ImageSize, KannalaBrandt, SplineFit, fit_spline};
+use nalgebra::Vector3;
+use vergence_vision::{Camera, ImageSize, KannalaBrandt, SplineFit, UnitRay, fit_spline};
 
 use super::{Cameras, WrittenFile, each};
 use crate::ExchangeError;
@@ -34,7 +35,30 @@ fn model(cameras: &Cameras, index: usize, lens: &KannalaBrandt, fit: &SplineFit)
     let ImageSize { width, height } = lens.size();
     format!(
         "{{\n    'lensmodel':  'LENSMODEL_SPLINED_STEREOGRAPHIC_order={}_Nx={}_Ny={}_fov_x_deg={:.0}',\n    \
-         'intrinsics': {numbers:?},\n    'extrinsics': {extrinsics:?},\n    'imagersize': [ {width}, {height} ]\n}}\n",
-        grid.order, grid.columns, grid.rows, grid.field_deg
+         'intrinsics': {numbers:?},\n    'extrinsics': {extrinsics:?},\n    'imagersize': [ {width}, {height} ],\n    'valid_intrinsics_region': {:?}\n}}\n",
+        grid.order,
+        grid.columns,
+        grid.rows,
+        grid.field_deg,
+        outline(lens)
     )
+}
+
+/// A closed polygon around the part of the image that the lens shows. Beyond it the control points say nothing.
+fn outline(lens: &KannalaBrandt) -> Vec<[f64; 2]> {
+    const CORNERS: u32 = 144;
+    let corner = |index: u32| {
+        let phi = std::f64::consts::TAU * f64::from(index % CORNERS) / f64::from(CORNERS);
+        let pixel = |theta: f64| {
+            let ray = UnitRay::<Camera>::new(Vector3::new(theta.sin() * phi.cos(), theta.sin() * phi.sin(), theta.cos()))?;
+            lens.project(&ray).ok().filter(|pixel| lens.on_sensor(*pixel))
+        };
+        let (mut low, mut high) = (0.0, lens.theta_max().rad());
+        for _ in 0..40 {
+            let middle = 0.5 * (low + high);
+            if pixel(middle).is_some() { low = middle } else { high = middle }
+        }
+        pixel(low).map(|pixel| [pixel.u, pixel.v])
+    };
+    (0..=CORNERS).filter_map(corner).collect()
 }

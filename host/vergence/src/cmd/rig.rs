@@ -37,8 +37,8 @@ struct Import {
     #[arg(required = true, num_args = 1..=2)]
     files: Vec<PathBuf>,
     /// The left and the right camera of a file that has several: names, or numbers from zero.
-    #[arg(long, value_name = "LEFT,RIGHT", value_delimiter = ',', num_args = 2)]
-    cameras: Vec<String>,
+    #[arg(long, value_name = "LEFT,RIGHT")]
+    cameras: Option<String>,
     /// The rig file to write.
     #[arg(long, short, value_name = "FILE")]
     out: PathBuf,
@@ -67,11 +67,13 @@ pub fn run(args: &Args, console: Console) -> Result<(), Failure> {
 
 fn import(args: &Import, console: Console) -> Result<(), Failure> {
     let files: Vec<&Path> = args.files.iter().map(PathBuf::as_path).collect();
-    let names: Vec<&str> = args.cameras.iter().map(String::as_str).collect();
-    let cameras = <[&str; 2]>::try_from(names).ok();
-    if cameras.is_some() && files.len() == 2 {
+    if args.cameras.is_some() && files.len() == 2 {
         return Err(Failure::usage("--cameras chooses two cameras of one file: two files have one each"));
     }
+    let cameras = args.cameras.as_deref().map(|names| {
+        names.split_once(',').ok_or_else(|| Failure::usage(format!("--cameras {names}: write two names, LEFT,RIGHT")))
+    });
+    let cameras = cameras.transpose()?.map(|(left, right)| [left, right]);
     let ImportedRig { rig, remarks } = import_rig(&files, cameras)?;
     let mut hash = InputHash::default();
     files.iter().try_for_each(|file| hash.add(file))?;
