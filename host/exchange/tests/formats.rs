@@ -3,7 +3,7 @@
 
 mod samples;
 
-use nalgebra::{Matrix3, Rotation3, UnitQuaternion, Vector3};
+use nalgebra::Vector3;
 use samples::*;
 use vergence_exchange::{ExchangeError, ForeignCamera, ForeignPair, ForeignRig, Format, Recognised};
 use vergence_vision::{Angle, Camera, ImageSize, KannalaBrandt, OpenCvFisheye, Pixel, UnitRay};
@@ -287,13 +287,4 @@ fn damaged_files_are_refused_or_read_but_never_panic() {
         }
     }
     assert!(refused > 500, "{refused}");
-}
-
-/// The samples' rotations are rotations.
-#[test]
-fn quaternions_of_the_samples_turn_as_their_matrices() {
-    let half = std::f64::consts::FRAC_1_SQRT_2;
-    let turn = UnitQuaternion::from_quaternion(nalgebra::Quaternion::new(half, 0.0, half, 0.0));
-    let matrix = Matrix3::new(0.0, 0.0, 1.0, 0.0, 1.0, 0.0, -1.0, 0.0, 0.0);
-    assert!(turn.angle_to(&UnitQuaternion::from_rotation_matrix(&Rotation3::from_matrix_unchecked(matrix))) < 1e-12);
 }
