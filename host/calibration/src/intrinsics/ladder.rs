@@ -25,7 +25,7 @@ pub enum LensStep {
 pub struct StepEvidence {
     /// The step.
     pub step: LensStep,
-    /// By how much chi-squared falls with it, in units of the scatter of the views.
+    /// By how much chi-squared falls with it, in units of the scatter of the views that is left.
     pub gain: f64,
     /// Root mean square residual of the corners used, in pixels: without and with it.
     pub rms_px: [f64; 2],
@@ -87,7 +87,9 @@ fn tried(
     options: &IntrinsicsOptions,
 ) -> (Adjusted, Option<StepEvidence>) {
     let Some(trial) = Trial::of(&adjusted, richer.free(options.warp), prior) else { return (adjusted, None) };
-    let (gain, rms_px, is_asked_for) = (trial.gain, trial.rms_px(&adjusted), options.model == LensModel::Full);
+    // By the scatter that the richer lens leaves: what it explains is no scatter.
+    let Some(gain) = trial.scatter().map(|scatter| trial.gain(scatter)) else { return (adjusted, None) };
+    let (rms_px, is_asked_for) = (trial.rms_px(&adjusted), options.model == LensModel::Full);
     let held_out_px = (gain > LEAST_GAIN || is_asked_for).then(|| trial.held_out(&adjusted));
     let evidence = |is_kept: bool| Some(StepEvidence { step, gain, rms_px, held_out_px, is_kept });
     let is_better = held_out_px.is_some_and(|[without, with]| with <= without);

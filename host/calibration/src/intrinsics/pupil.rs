@@ -58,16 +58,17 @@ pub(super) fn fit(
     if options.model == LensModel::Central {
         return Ok((central, PupilEvidence::NotAsked, None));
     }
-    let prior = scatter(&central).map(|scatter| PupilPrior { sigma_mm: PRIOR_MM, scatter });
-    let tried = prior.and_then(|prior| {
+    let tried = scatter(&central.normal, central.prior_factor).and_then(|scatter| {
+        let prior = PupilPrior { sigma_mm: PRIOR_MM, scatter };
         let trial = Trial::of(&central, free(true), Some(prior))?;
-        Some((prior, trial.sigma(E0)?, trial))
+        Some((prior, trial.sigma(E0, scatter)?, trial))
     });
     let Some((prior, sigma_mm, trial)) = tried else {
         // With its prior e0 is always determined: the views do not determine the lens, which the report of it will say.
         return Ok((central, PupilEvidence::NotAsked, None));
     };
-    let (gain, is_wanted) = (trial.gain, matches!(options.model, LensModel::MovingPupil | LensModel::Full));
+    let (gain, is_wanted) =
+        (trial.gain(prior.scatter), matches!(options.model, LensModel::MovingPupil | LensModel::Full));
     let cannot_tell = sigma_mm * LEAST_GAIN.sqrt() > SMALL_PUPIL_MM;
     let evidence = if gain > LEAST_GAIN || is_wanted {
         let held_out_px = trial.held_out(&central);

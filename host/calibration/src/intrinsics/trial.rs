@@ -13,20 +13,20 @@ pub(super) const LEAST_GAIN: f64 = 30.0;
 
 /// A fit of more parameters to the corners that a simpler lens used.
 pub(super) struct Trial {
-    /// By how much chi-squared falls, in units of the scatter of the views, which a lens of another family makes larger than noise.
-    pub gain: f64,
     /// The parameters adjusted.
     free: Vec<usize>,
     state: State,
     normal: SchurNormal<POSE>,
-    /// The unit of chi-squared.
+    /// By how much the sum of squares falls, in units of the variance of a residual that this lens leaves.
+    fall: f64,
     variance: f64,
+    prior_factor: f64,
 }
 
 /// How much more the views pull the lens to and fro than noise explains; `None` where they do not determine it.
-pub(super) fn scatter(adjusted: &Adjusted) -> Option<f64> {
-    let variance = adjusted.normal.variance()?;
-    Some(adjusted.normal.clustered_with_priors(variance, variance * adjusted.prior_factor)?.scatter)
+pub(super) fn scatter(normal: &SchurNormal<POSE>, prior_factor: f64) -> Option<f64> {
+    let variance = normal.variance()?;
+    Some(normal.clustered_with_priors(variance, variance * prior_factor)?.scatter)
 }
 
 impl Trial {
@@ -37,16 +37,27 @@ impl Trial {
         let pupil_pull = prior.and_then(|prior| prior.pull(&simpler.views, &start));
         let problem = Bundle { pupil_pull, ..Bundle::of(&references, &free) };
         let solution = solve(&problem, start.shared, start.poses, &SchurOptions::default());
-        let variance = solution.normal.variance()? * scatter(simpler)?.powi(2);
-        let gain = 2.0 * (simpler.normal.cost() - solution.cost) / variance;
+        let variance = solution.normal.variance()?;
+        let fall = 2.0 * (simpler.normal.cost() - solution.cost) / variance;
         let state = State { shared: solution.shared, poses: solution.blocks };
-        gain.is_finite().then_some(Self { gain, free, state, normal: solution.normal, variance })
+        let prior_factor = prior.map_or(1.0, |prior| prior.scatter * prior.scatter);
+        fall.is_finite().then_some(Self { free, state, normal: solution.normal, fall, variance, prior_factor })
     }
 
-    /// Standard deviation of a parameter, in the units of the gain.
-    pub fn sigma(&self, parameter: usize) -> Option<f64> {
+    /// How much more the views pull this lens to and fro than noise explains.
+    pub fn scatter(&self) -> Option<f64> {
+        scatter(&self.normal, self.prior_factor)
+    }
+
+    /// By how much chi-squared falls where views scatter by `scatter` times what noise explains.
+    pub fn gain(&self, scatter: f64) -> f64 {
+        self.fall / (scatter * scatter)
+    }
+
+    /// Standard deviation of a parameter where views scatter so.
+    pub fn sigma(&self, parameter: usize, scatter: f64) -> Option<f64> {
         let index = self.free.iter().position(|&free| free == parameter)?;
-        let sigma = (self.normal.shared_covariance()?[(index, index)] * self.variance).sqrt();
+        let sigma = (self.normal.shared_covariance()?[(index, index)] * self.variance).sqrt() * scatter;
         Some(sigma).filter(|sigma| sigma.is_finite())
     }
 
