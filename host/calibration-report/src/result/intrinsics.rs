@@ -99,9 +99,11 @@ pub fn intrinsics_lines(calibration: &IntrinsicsCalibration, views: &[TargetView
         calibration.rms_px,
         calibration.camera.theta_max()
     )];
-    let found = NAMES.iter().zip(parameters(calibration)).zip(sigma(calibration)).enumerate();
-    for (_, ((name, value), sigma)) in found.filter(|(index, (_, sigma))| *index < CENTRAL_PARAMETERS || *sigma > 0.0) {
-        lines.push(format!("  {name} {value:12.5} ± {sigma:.5}"));
+    let named = NAMES.iter().zip(parameters(calibration)).zip(sigma(calibration)).enumerate();
+    for (index, ((name, value), sigma)) in named {
+        if index < CENTRAL_PARAMETERS || sigma > 0.0 {
+            lines.push(format!("  {name} {value:12.5} ± {sigma:.5}"));
+        }
     }
     lines.push(format!("  {}", pupil_in_words(&calibration.pupil)));
     lines.extend(calibration.steps.iter().map(|step| format!("  {}", step_in_words(step))));

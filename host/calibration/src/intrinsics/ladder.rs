@@ -5,9 +5,13 @@
 //! together, because one displaced element makes both. What a lens is not symmetric by can hide how its pupil moves, so the pupil gets a
 //! second trial.
 
+use vergence_vision::ImageSize;
+
 use super::adjust::{Adjusted, PupilPrior, State, Terms};
+use super::lens::with_valid_cone;
 use super::observations::ObservedView;
 use super::pupil;
+use super::report::outermost;
 use super::trial::{LEAST_GAIN, Trial};
 use super::{IntrinsicsError, IntrinsicsOptions, LensModel, PupilEvidence};
 
@@ -45,6 +49,7 @@ pub(super) struct Evidence {
 pub(super) fn fit(
     views: Vec<ObservedView>,
     state: State,
+    size: ImageSize,
     options: &IntrinsicsOptions,
 ) -> Result<(Adjusted, Evidence), IntrinsicsError> {
     let (mut adjusted, pupil, prior) = pupil::fit(views, state, options)?;
@@ -54,10 +59,12 @@ pub(super) fn fit(
         for step in [LensStep::PupilGrowth, LensStep::Asymmetry, LensStep::PupilGrowth] {
             let Some(richer) = step.next(terms, &steps) else { continue };
             let evidence;
-            (adjusted, evidence) = tried(adjusted, step, richer, prior, options);
+            (adjusted, evidence) = Attempt { step, richer, prior, size, options }.made(adjusted);
             if evidence.is_some_and(|evidence| evidence.is_kept) {
                 terms = richer;
             }
+            // A second trial says more than the first.
+            steps.retain(|earlier: &StepEvidence| earlier.step != step);
             steps.extend(evidence);
         }
     }
@@ -78,27 +85,40 @@ impl LensStep {
     }
 }
 
-/// The adjustment with the `richer` lens if the step is kept, else as it was. There is no evidence where the views do not determine it.
-fn tried(
-    adjusted: Adjusted,
+/// A step that may be taken.
+struct Attempt<'a> {
     step: LensStep,
+    /// The lens after it.
     richer: Terms,
+    /// That of e0.
     prior: Option<PupilPrior>,
-    options: &IntrinsicsOptions,
-) -> (Adjusted, Option<StepEvidence>) {
-    let Some(trial) = Trial::of(&adjusted, richer.free(options.warp), prior) else { return (adjusted, None) };
-    // By the scatter that the richer lens leaves: what it explains is no scatter.
-    let Some(gain) = trial.scatter().map(|scatter| trial.gain(scatter)) else { return (adjusted, None) };
-    let (rms_px, is_asked_for) = (trial.rms_px(&adjusted), options.model == LensModel::Full);
-    let held_out_px = (gain > LEAST_GAIN || is_asked_for).then(|| trial.held_out(&adjusted));
-    let evidence = |is_kept: bool| Some(StepEvidence { step, gain, rms_px, held_out_px, is_kept });
-    let is_better = held_out_px.is_some_and(|[without, with]| with <= without);
-    if !is_better && !is_asked_for {
-        return (adjusted, evidence(false));
+    size: ImageSize,
+    options: &'a IntrinsicsOptions,
+}
+
+impl Attempt<'_> {
+    /// The adjustment with the richer lens if the step is kept, else as it was. There is no evidence where the views do not determine it.
+    fn made(&self, adjusted: Adjusted) -> (Adjusted, Option<StepEvidence>) {
+        let Some(trial) = Trial::of(&adjusted, self.richer.free(self.options.warp), self.prior) else {
+            return (adjusted, None);
+        };
+        // By the scatter that the richer lens leaves: what it explains is no scatter.
+        let Some(gain) = trial.scatter().map(|scatter| trial.gain(scatter)) else { return (adjusted, None) };
+        let (rms_px, is_asked_for) = (trial.rms_px(&adjusted), self.options.model == LensModel::Full);
+        let held_out_px = (gain > LEAST_GAIN || is_asked_for).then(|| trial.held_out(&adjusted));
+        let evidence = |is_kept: bool| Some(StepEvidence { step: self.step, gain, rms_px, held_out_px, is_kept });
+        let is_better = held_out_px.is_some_and(|[without, with]| with <= without);
+        if !is_better && !is_asked_for {
+            return (adjusted, evidence(false));
+        }
+        match trial.kept(adjusted.clone(), self.prior, self.options) {
+            Ok(kept) if self.is_a_lens(&kept) => (kept, evidence(true)),
+            // A richer lens may be one too many for the corners that are left.
+            _ => (adjusted, evidence(false)),
+        }
     }
-    match trial.kept(adjusted.clone(), prior, options) {
-        Ok(kept) => (kept, evidence(true)),
-        // A richer lens may be one too many for the corners that are left.
-        Err(_) => (adjusted, evidence(false)),
+
+    fn is_a_lens(&self, adjusted: &Adjusted) -> bool {
+        with_valid_cone(adjusted.shared.lens, outermost(adjusted), self.size).is_ok()
     }
 }

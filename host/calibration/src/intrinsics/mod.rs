@@ -76,7 +76,7 @@ pub fn calibrate_intrinsics(
     let (observed_views, left_out) = observed_views(views)?;
     let thinned: Vec<_> = observed_views.iter().map(ObservedView::thinned).collect();
     let state = robust_fit(&thinned, &starts(&thinned, size)).ok_or(IntrinsicsError::NoStart)?;
-    let (adjusted, evidence) = ladder::fit(observed_views, state, options)?;
+    let (adjusted, evidence) = ladder::fit(observed_views, state, size, options)?;
     report(views, size, &adjusted, evidence, left_out)
 }
 
@@ -93,6 +93,6 @@ pub fn refine_intrinsics(
     let thinned: Vec<_> = observed_views.iter().map(ObservedView::thinned).collect();
     let start = start_from(start, &thinned, size).ok_or(IntrinsicsError::NoStart)?;
     let state = robust_fit(&thinned, &[start]).ok_or(IntrinsicsError::NoStart)?;
-    let (adjusted, evidence) = ladder::fit(observed_views, state, options)?;
+    let (adjusted, evidence) = ladder::fit(observed_views, state, size, options)?;
     report(views, size, &adjusted, evidence, left_out)
 }

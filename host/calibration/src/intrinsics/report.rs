@@ -81,7 +81,8 @@ fn between(a: &Vector3<f64>, b: &Vector3<f64>) -> f64 {
     a.cross(b).norm().atan2(a.dot(b).abs())
 }
 
-fn outermost(adjusted: &Adjusted) -> Angle {
+/// The angle to the axis of the outermost corner used.
+pub(super) fn outermost(adjusted: &Adjusted) -> Angle {
     let angle = |pose: &nalgebra::Isometry3<f64>, observation: &Observation| {
         let point: Point<Camera> = Point::from_mm((pose * adjusted.shared.on_target(observation)).coords);
         point.direction().map_or(0.0, |ray| ray.angle_to_axis().rad())
