@@ -85,7 +85,8 @@ fn model(root: &Node, keys: &Keys, size: ImageSize) -> Result<Box<dyn CameraMode
         return Err(matrix.wrong(format!("has a skew of {skew}, which only the model of omnidir has")));
     }
     let pinhole = [fx, fy, cx, cy];
-    let count = || root.wrong(format!("has {} distortion coefficients, which are not those of its model", distortion.len()));
+    let count =
+        || root.wrong(format!("has {} distortion coefficients, which are not those of its model", distortion.len()));
     match model {
         Model::Fisheye => {
             let k = <[f64; 4]>::try_from(&distortion[..]).map_err(|_| count())?;

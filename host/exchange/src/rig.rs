@@ -62,7 +62,7 @@ impl ForeignCamera {
     /// [`ExchangeError::Fit`].
     pub fn lens(&self) -> Result<LensFit, ExchangeError> {
         let region = SightRegion { size: self.size, outline: &self.outline };
-        fit_lens(self.model.as_ref(), region, None).map_err(|fit| ExchangeError::Fit { camera: self.name.clone(), fit })
+        fit_lens(self.model.as_ref(), region).map_err(|fit| ExchangeError::Fit { camera: self.name.clone(), fit })
     }
 
     /// How far the lens in place of the camera is off, in words; `None` where it is the camera itself.

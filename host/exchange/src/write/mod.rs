@@ -10,7 +10,7 @@ mod ros;
 use std::path::{Path, PathBuf};
 use std::str::FromStr;
 
-use vergence_vision::{KannalaBrandt, Left, Length, Right, SightRegion, Transform, compare_lens, fit_lens};
+use vergence_vision::{KannalaBrandt, Left, Length, NoFit, Right, Transform};
 
 use crate::ExchangeError;
 
@@ -99,8 +99,9 @@ const LIKE_AT: Length = Length::from_mm(500.0);
 /// [`ExchangeError::Fit`] where the format cannot hold a lens, not even nearly.
 pub fn write(format: WriteFormat, cameras: &Cameras) -> Result<Written, ExchangeError> {
     let mut remarks = Vec::new();
-    let left = central(&cameras.left, "left", &mut remarks)?;
-    let right = cameras.right.map(|(lens, pose)| Ok((central(&lens, "right", &mut remarks)?, pose))).transpose()?;
+    let left = holdable(format, &cameras.left, "left", &mut remarks)?;
+    let right =
+        cameras.right.map(|(lens, pose)| Ok((holdable(format, &lens, "right", &mut remarks)?, pose))).transpose()?;
     let cameras = Cameras { left, right };
     let whole = |text: String| vec![WrittenFile { side: None, text }];
     let mut files = match format {
@@ -119,28 +120,30 @@ pub fn write(format: WriteFormat, cameras: &Cameras) -> Result<Written, Exchange
     Ok(Written { files, remarks })
 }
 
-/// A central lens in place of `lens`.
-fn central(lens: &KannalaBrandt, side: &str, remarks: &mut Vec<String>) -> Result<KannalaBrandt, ExchangeError> {
-    if lens.is_central() {
+/// A central and symmetric lens in place of `lens`, if the format can hold no other. mrcal's splines hold one that is not symmetric.
+fn holdable(
+    format: WriteFormat,
+    lens: &KannalaBrandt,
+    side: &str,
+    remarks: &mut Vec<String>,
+) -> Result<KannalaBrandt, ExchangeError> {
+    if lens.fits_opencv() || (format == WriteFormat::Mrcal && lens.is_central()) {
         return Ok(*lens);
     }
-    let region = SightRegion { size: lens.size(), outline: &[] };
-    let fail = |fit| ExchangeError::Fit { camera: side.to_owned(), fit };
-    let fit = fit_lens(lens, region, Some(LIKE_AT)).map_err(fail)?;
-    let off = |mm: f64| {
-        let compared = compare_lens(lens, fit.lens, region, Some(Length::from_mm(mm))).map_err(fail)?;
-        Ok(compared.largest_px)
-    };
+    let fail = |lens| ExchangeError::Fit { camera: side.to_owned(), fit: NoFit::Lens(lens) };
+    let central = lens.central_at(LIKE_AT).map_err(fail)?;
+    let off = |mm: f64| lens.largest_difference(&central, Length::from_mm(mm));
     remarks.push(format!(
-        "The pupil of the {side} lens moves (e0 = {:.3} mm), which this format cannot say. The lens that is written images points {:.0} \
-         mm away as it does to {:.3} px; points 200 mm away are up to {:.2} px off, points 2 m away {:.2} px.",
-        lens.pupil().mm(),
+        "The pupil of the {side} lens moves (e0 = {:.3} mm), or it is not symmetric about its axis, which this format cannot say. The lens \
+         that is written images points {:.0} mm away as it does to {:.3} px; points 200 mm away are up to {:.2} px off, points 2 m away \
+         {:.2} px.",
+        lens.pupil().e0.mm(),
         LIKE_AT.mm(),
-        fit.largest_px,
-        off(200.0)?,
-        off(2000.0)?
+        off(LIKE_AT.mm()),
+        off(200.0),
+        off(2000.0)
     ));
-    Ok(fit.lens)
+    Ok(central)
 }
 
 /// The files of both cameras, each by `print` with its side.

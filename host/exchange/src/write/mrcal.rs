@@ -50,7 +50,8 @@ fn outline(lens: &KannalaBrandt) -> Vec<[f64; 2]> {
     let corner = |index: u32| {
         let phi = std::f64::consts::TAU * f64::from(index % CORNERS) / f64::from(CORNERS);
         let pixel = |theta: f64| {
-            let ray = UnitRay::<Camera>::new(Vector3::new(theta.sin() * phi.cos(), theta.sin() * phi.sin(), theta.cos()))?;
+            let ray =
+                UnitRay::<Camera>::new(Vector3::new(theta.sin() * phi.cos(), theta.sin() * phi.sin(), theta.cos()))?;
             lens.project(&ray).ok().filter(|pixel| lens.on_sensor(*pixel))
         };
         let (mut low, mut high) = (0.0, lens.theta_max().rad());

@@ -57,9 +57,9 @@ impl<F: Formula> Central<F> {
             return Err(InvalidLens::NotFinite);
         }
         formula.check()?;
-        let axis = formula.image(&Vector3::z()).ok_or(InvalidLens::Folded)?;
+        let axis = formula.image(&Vector3::z()).ok_or(InvalidLens::FoldsAtAxis)?;
         let half_field = USED * unfolded(&formula, axis);
-        if half_field > 0.0 { Ok(Self { formula, half_field, axis }) } else { Err(InvalidLens::Folded) }
+        if half_field > 0.0 { Ok(Self { formula, half_field, axis }) } else { Err(InvalidLens::FoldsAtAxis) }
     }
 
     /// The formula.

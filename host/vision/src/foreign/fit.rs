@@ -3,7 +3,7 @@
 use nalgebra::{SMatrix, SVector, Vector2};
 
 use super::CameraModel;
-use crate::{Angle, Camera, ImageSize, InvalidLens, KannalaBrandt, Length, Pixel, UnitRay};
+use crate::{Angle, Asymmetry, Camera, ImageSize, InvalidLens, KannalaBrandt, OpenCvFisheye, Pixel, UnitRay};
 
 /// The part of an image in which a camera model counts.
 #[derive(Clone, Copy, Debug)]
@@ -56,57 +56,76 @@ const FEWEST: usize = 100;
 const UNKNOWNS: usize = 8;
 type Unknowns = SVector<f64, UNKNOWNS>;
 
-/// Fits the five radial coefficients, the aspect ratio and the centre of a [`KannalaBrandt`] lens to `model` by least squares over the image.
-///
-/// With `distance`, the lens images points at that distance from the origin as the model does, so that a model whose rays do not go through
-/// one point has a central one in its place. Without it, equal directions have equal pixels, and a model that is a `KannalaBrandt` lens
+/// Fits the five radial coefficients, the aspect ratio and the centre of a [`KannalaBrandt`] lens to `model` by least squares over the image,
+/// so that equal directions have equal pixels; where that comes nearer, decentring and thin prism too. A model that is a `KannalaBrandt` lens
 /// stays what it is.
 ///
 /// # Errors
 /// [`NoFit`].
-pub fn fit_lens(model: &dyn CameraModel, region: SightRegion<'_>, distance: Option<Length>) -> Result<LensFit, NoFit> {
-    if let (Some(lens), None) = (model.as_kannala_brandt(), distance) {
+pub fn fit_lens(model: &dyn CameraModel, region: SightRegion<'_>) -> Result<LensFit, NoFit> {
+    /// An asymmetry is kept that leaves less than this share of the distances.
+    const WORTH: f64 = 0.9;
+    if let Some(lens) = model.as_kannala_brandt() {
         return Ok(LensFit { lens, rms_px: 0.0, largest_px: 0.0, largest_at: Angle::default() });
     }
-    let samples = samples(model, region, distance);
+    let samples = samples(model, region);
     if samples.len() < FEWEST {
         return Err(NoFit::Unseen(samples.len()));
     }
-    let lens = fitted(&samples, region.size).map_err(NoFit::Lens)?;
-    compared(lens, &samples)
+    let symmetric = compared(fitted(&samples, region.size).map_err(NoFit::Lens)?, &samples);
+    let bent = asymmetric(&symmetric.lens, &samples).map(|lens| compared(lens, &samples));
+    Ok(bent.filter(|bent| bent.rms_px < WORTH * symmetric.rms_px).unwrap_or(symmetric))
 }
 
-/// How far `lens` is off in place of `model`: over the image, for points at `distance` from the origin, or far away without one.
-///
-/// # Errors
-/// [`NoFit::Unseen`].
-pub fn compare_lens(
-    model: &dyn CameraModel,
-    lens: KannalaBrandt,
-    region: SightRegion<'_>,
-    distance: Option<Length>,
-) -> Result<LensFit, NoFit> {
-    let samples = samples(model, region, distance);
-    compared(lens, &samples)
-}
-
-fn compared(lens: KannalaBrandt, samples: &[Sample]) -> Result<LensFit, NoFit> {
+/// How far `lens` is off the samples.
+fn compared(lens: KannalaBrandt, samples: &[Sample]) -> LensFit {
     let off = |sample: &Sample| {
-        let pixel = lens.project(&sample.ray).ok()?;
-        Some(((pixel.u - sample.pixel.u).hypot(pixel.v - sample.pixel.v), sample.theta))
+        let pixel = lens.project(&sample.ray).map_or(f64::INFINITY, |at| apart(at, sample.pixel));
+        (pixel, sample.theta)
     };
-    // Where the points are nearer or farther than those of the fit, the rim of the field is seen by one of both only.
-    let off: Vec<_> = samples.iter().filter_map(off).collect();
-    if off.len() < FEWEST {
-        return Err(NoFit::Unseen(off.len()));
-    }
+    let off: Vec<_> = samples.iter().map(off).collect();
     let (largest_px, at) = off.iter().copied().fold((0.0, 0.0), |most, one| if one.0 > most.0 { one } else { most });
     let rms_px = (off.iter().map(|(off, _)| off * off).sum::<f64>() / off.len() as f64).sqrt();
-    Ok(LensFit { lens, rms_px, largest_px, largest_at: Angle::from_rad(at) })
+    LensFit { lens, rms_px, largest_px, largest_at: Angle::from_rad(at) }
+}
+
+fn apart(a: Pixel, b: Pixel) -> f64 {
+    (a.u - b.u).hypot(a.v - b.v)
+}
+
+/// The lens with decentring and thin prism, by Gauss-Newton steps over all but the pupil's parameters. `None` where the samples do not
+/// determine them, or the image would fold.
+fn asymmetric(symmetric: &KannalaBrandt, samples: &[Sample]) -> Option<KannalaBrandt> {
+    const STEPS: usize = 8;
+    /// Columns of the derivatives: those before the pupil's and those after it.
+    const COLUMNS: [usize; 14] = [0, 1, 2, 3, 4, 5, 6, 7, 10, 11, 12, 13, 14, 15];
+    let mut lens = *symmetric;
+    for _ in 0..STEPS {
+        let (mut normal, mut right) = (SMatrix::<f64, 14, 14>::zeros(), SVector::<f64, 14>::zeros());
+        for sample in samples {
+            let by_all = lens.pixel_by_lens(&sample.ray);
+            let by_lens = SMatrix::<f64, 2, 14>::from_fn(|row, column| by_all[(row, COLUMNS[column])]);
+            let at = lens.project(&sample.ray).ok()?;
+            normal += by_lens.transpose() * by_lens;
+            right += by_lens.transpose() * Vector2::new(sample.pixel.u - at.u, sample.pixel.v - at.v);
+        }
+        // Scaled to unit diagonal: the parameters differ by many orders of magnitude.
+        let scale = normal.diagonal().map(|value| 1.0 / value.sqrt());
+        let scaled = SMatrix::<f64, 14, 14>::from_fn(|i, k| scale[i] * normal[(i, k)] * scale[k]);
+        let step = scaled.cholesky()?.solve(&right.component_mul(&scale)).component_mul(&scale);
+        let OpenCvFisheye { fx, fy, cx, cy, k } = lens.to_opencv();
+        let k = std::array::from_fn(|i| k[i] + step[4 + i]);
+        let moved = OpenCvFisheye { fx: fx + step[0], fy: fy + step[1], cx: cx + step[2], cy: cy + step[3], k };
+        let before = lens.asymmetry().to_array();
+        let asymmetry = Asymmetry::from_array(std::array::from_fn(|i| before[i] + step[8 + i]));
+        let bare = KannalaBrandt::from_opencv(moved, symmetric.theta_max(), symmetric.size()).ok()?;
+        lens = bare.with_asymmetry(asymmetry).ok()?;
+    }
+    Some(lens)
 }
 
 /// Rays of pixels all over the region, and rays around the rim of the model's field.
-fn samples(model: &dyn CameraModel, region: SightRegion<'_>, distance: Option<Length>) -> Vec<Sample> {
+fn samples(model: &dyn CameraModel, region: SightRegion<'_>) -> Vec<Sample> {
     let ImageSize { width, height } = region.size;
     let step = f64::from(width.max(height)) / f64::from(ACROSS);
     let along = |pixels: u32| {
@@ -120,7 +139,7 @@ fn samples(model: &dyn CameraModel, region: SightRegion<'_>, distance: Option<Le
         let ray = UnitRay::new(nalgebra::Vector3::new(sine * phi.cos(), sine * phi.sin(), cosine * (1.0 + 1e-12)))?;
         model.project(&ray).ok()
     });
-    grid.chain(rim).filter(|pixel| region.contains(*pixel)).filter_map(|pixel| sample(model, pixel, distance)).collect()
+    grid.chain(rim).filter(|pixel| region.contains(*pixel)).filter_map(|pixel| sample(model, pixel)).collect()
 }
 
 impl SightRegion<'_> {
@@ -138,18 +157,8 @@ fn inside(outline: &[Pixel], pixel: Pixel) -> bool {
     crossed.count() % 2 == 1
 }
 
-fn sample(model: &dyn CameraModel, pixel: Pixel, distance: Option<Length>) -> Option<Sample> {
-    let seen = model.unproject(pixel).ok()?;
-    let ray = match distance {
-        None => seen.ray,
-        Some(distance) => {
-            // The point on the ray that is that far from the origin of the frame.
-            let (start, along) = (seen.origin.mm(), seen.ray.vector());
-            let (ahead, mm) = (start.dot(&along), distance.mm());
-            let rest = ahead * ahead + mm * mm - start.norm_squared();
-            UnitRay::new(start + along * (rest.sqrt() - ahead))?
-        }
-    };
+fn sample(model: &dyn CameraModel, pixel: Pixel) -> Option<Sample> {
+    let ray = model.unproject(pixel).ok()?.ray;
     let d = ray.vector();
     let rho = d.x.hypot(d.y);
     let radial = if rho > 0.0 { Vector2::new(d.x / rho, d.y / rho) } else { Vector2::zeros() };

@@ -3,7 +3,7 @@
 use nalgebra::Matrix2x3;
 
 use super::{CameraModel, ModelParameter, ParameterUnit, Sight};
-use crate::{Angle, Camera, KannalaBrandt, OpenCvFisheye, OutsideField, Pixel, Point, UnitRay};
+use crate::{Angle, Camera, KannalaBrandt, LENS_PARAMETER_NAMES, OpenCvFisheye, OutsideField, Pixel, Point, UnitRay};
 
 impl CameraModel for KannalaBrandt {
     fn name(&self) -> &'static str {
@@ -12,9 +12,14 @@ impl CameraModel for KannalaBrandt {
 
     fn parameters(&self) -> Vec<ModelParameter> {
         let OpenCvFisheye { fx, fy, cx, cy, k } = self.to_opencv();
-        let radial = ModelParameter::named(&["k1", "k2", "k3", "k4"], ParameterUnit::One, &k);
-        let pupil = ModelParameter::new("e0", ParameterUnit::Millimetres, self.pupil().mm());
-        [ModelParameter::pinhole([fx, fy, cx, cy]), radial, vec![pupil]].concat()
+        let values = [&[fx, fy, cx, cy][..], &k, &self.pupil().mm(), &self.asymmetry().to_array()].concat();
+        let unit = |index| match index {
+            0..4 => ParameterUnit::Pixels,
+            8 | 9 => ParameterUnit::Millimetres,
+            _ => ParameterUnit::One,
+        };
+        let named = LENS_PARAMETER_NAMES.iter().zip(values).enumerate();
+        named.map(|(index, (name, value))| ModelParameter::new(name, unit(index), value)).collect()
     }
 
     fn half_field(&self) -> Angle {

@@ -24,7 +24,7 @@ pub use self::central::{Central, Formula};
 pub use self::double_sphere::DoubleSphere;
 pub use self::eucm::Eucm;
 pub use self::fisheye624::Fisheye624;
-pub use self::fit::{LensFit, NoFit, SightRegion, compare_lens, fit_lens};
+pub use self::fit::{LensFit, NoFit, SightRegion, fit_lens};
 pub use self::mei::Mei;
 pub use self::ocam::OCam;
 pub use self::pinhole::{Pinhole, Radtan};
