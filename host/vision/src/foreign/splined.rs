@@ -34,10 +34,11 @@ impl SplineGrid {
     /// The first control point that acts at the place `at` of `points` along an axis, and the weights of it and those that follow.
     /// `None` beyond the edge.
     fn weights(&self, at: f64, points: usize) -> Option<(usize, [f64; 4])> {
-        let (start, x) = if self.order == 3 { (at.floor(), at - at.floor()) } else { (at.round(), at - at.round()) };
         let last = points as f64 - if self.order == 3 { 3.0 } else { 2.0 };
-        // At the far edge itself the last interval ends.
-        let (start, x) = if self.order == 3 && start == last + 1.0 && x == 0.0 { (last, 1.0) } else { (start, x) };
+        let nearest = if self.order == 3 { at.floor() } else { at.round() };
+        // At the far edge itself the last interval of a cubic spline ends.
+        let start = if self.order == 3 && at <= last + 1.0 { nearest.min(last) } else { nearest };
+        let x = at - start;
         if !(1.0..=last).contains(&start) {
             return None;
         }
