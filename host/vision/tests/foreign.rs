@@ -127,7 +127,7 @@ fn what_is_outside_has_no_pixel_and_no_ray() {
     for (name, model) in models() {
         let field = model.half_field().rad();
         for phi in [0.0, 1.0, 2.5, 4.0, 5.5] {
-            for beyond in [field + 1e-6, 0.5 * (field + std::f64::consts::PI), 3.14] {
+            for beyond in [field + 1e-6, 0.5 * (field + std::f64::consts::PI), 3.1] {
                 assert!(model.project(&at(beyond, phi)).is_err(), "{name}: {beyond} of {field}");
             }
         }
@@ -217,7 +217,7 @@ fn parameters_of_no_camera_are_refused() {
 #[test]
 fn golden_pixels() {
     let rays = [[0.3, -0.2, 0.9], [-0.7, 0.4, -0.1]];
-    let cases: [(Box<dyn CameraModel>, [[f64; 2]; 2]); 4] = [
+    let cases = [
         (
             central(DoubleSphere { pinhole: PINHOLE, xi: -0.2, alpha: 0.6 }),
             [[1_261.426_159_289, 863.452_086_964], [-16.288_498_838, 1_617.441_321_716]],
