@@ -26,6 +26,9 @@ pub struct Conditions {
     pub lens: LensChoice,
     /// Of the right camera.
     pub repeatability: Repeatability,
+    /// How far the middle line of a target stands out of the plane of its short sides, towards its back: it is bent about a line across its long
+    /// side. Photographs that are rendered show flat targets alone: none where it is not zero.
+    pub bow: Length,
 }
 
 /// How much a pose differs each time the stage returns to it: standard deviations along and about each axis of the camera.
@@ -54,7 +57,13 @@ impl Conditions {
     /// Noise of the corners alone.
     #[must_use]
     pub fn noise(corners: Corners, noise_px: f64) -> Self {
-        Self { corners, noise_px, lens: LensChoice::Ideal, repeatability: Repeatability::default() }
+        Self {
+            corners,
+            noise_px,
+            lens: LensChoice::Ideal,
+            repeatability: Repeatability::default(),
+            bow: Length::from_mm(0.0),
+        }
     }
 
     /// Where the right camera comes to stand when it returns to a pose.

@@ -9,17 +9,18 @@ use serde_json::{Value, json};
 use vergence_files::make_folder;
 use vergence_output::check_folder;
 use vergence_protocol::SessionId;
-use vergence_reproduce::DemoError;
 use vergence_reproduce::corridor::{Comparison, Corridor, Sight, WIDTH, compare};
 use vergence_reproduce::demo::{Pulse, SimulatedPair};
+use vergence_reproduce::{DemoError, LensedRig};
 use vergence_rig::{Rig, rounded};
+use vergence_scene::LensChoice;
 
 use crate::cli::CommonOptions;
 use crate::console::Console;
 use crate::failure::Failure;
 use crate::interrupt::{interrupted, on_own_thread};
 use crate::rig_file;
-use crate::sim::{SharedRig, SimulatedRig, SimulatedRobot, board_of};
+use crate::sim::{SharedRig, SimulatedRig, SimulatedRobot, board_of, lensed};
 use crate::stopwatch::{Stopwatch, clock};
 
 /// Starts a simulated rig in a simulated room, homes it, and in every mode of the rig takes a pair of images, measures it and
@@ -31,6 +32,10 @@ pub struct Args {
     /// Sets where the stages stand at first and the noise of the images. The same seed gives the same bytes.
     #[arg(long, default_value_t = 1)]
     seed: u64,
+    /// The lenses of the simulated cameras: ideal, as the rig's file has them, or a published design that is traced, sigma8_f18 or
+    /// nikkor6_f28. A rig with traced lenses is calibrated first, from simulated targets, and measured by the file that this gives, rig.toml.
+    #[arg(long, default_value_t, conflicts_with = "corridors")]
+    lens: LensChoice,
     /// The folder for clouds and pictures.
     #[arg(long, default_value = "vergence-demo", value_name = "DIR")]
     out: PathBuf,
@@ -59,9 +64,11 @@ pub async fn run(args: &Args, common: &CommonOptions, console: Console) -> Resul
         return compared(count, rig, console, &whole).await;
     }
     make_folder(&args.out)?;
-    if rig.trunk.is_some() {
+    // Other lenses of a trunk are refused below.
+    if rig.trunk.is_some() && args.lens == LensChoice::Ideal {
         return corridor(args, rig, console, &whole).await;
     }
+    let lensed = lensed(&rig, (args.lens, args.seed), Some(&args.out), console).await?;
     let (all, measured) = (rig.modes.len(), Cell::new(0));
     let modes = tokio::select! {
         // The simulated board ends with this process: nothing has to be disarmed.
@@ -71,10 +78,10 @@ pub async fn run(args: &Args, common: &CommonOptions, console: Console) -> Resul
             measured.get(),
             args.out.display()
         ))),
-        modes = every_mode(args, common, rig, &measured, console) => modes,
+        modes = every_mode(args, common, (rig, lensed), &measured, console) => modes,
     }?;
     console.say(format!("clouds and pictures are in {}; {:.1} s in all", args.out.display(), whole.seconds()))?;
-    console.result(&json!({ "modes": modes, "seconds": rounded(whole.seconds()) }))
+    console.result(&json!({ "lens": args.lens.to_string(), "modes": modes, "seconds": rounded(whole.seconds()) }))
 }
 
 /// Plays the robot's story in a simulated corridor.
@@ -145,14 +152,14 @@ async fn compared(count: u32, rig: Rig, console: Console, whole: &Stopwatch) -> 
 async fn every_mode(
     args: &Args,
     common: &CommonOptions,
-    rig: Rig,
+    (drawn, lensed): (Rig, LensedRig),
     measured: &Cell<usize>,
     console: Console,
 ) -> Result<Vec<Value>, Failure> {
-    let simulated = SharedRig::new(SimulatedRig::new(&rig, args.seed)?);
+    let simulated = SharedRig::new(SimulatedRig::new(&drawn, args.seed)?);
     let (session, progress) = (SessionId((args.seed as u32).max(1)), console.progress("homing"));
-    let mut board = board_of(&simulated, rig, session, common.lease, progress.clone()).await?;
-    let cameras = Arc::new(SimulatedPair::new(board.rig(), &simulated, args.seed));
+    let mut board = board_of(&simulated, lensed.known, session, common.lease, progress.clone()).await?;
+    let cameras = Arc::new(SimulatedPair::new(lensed.lenses, &simulated, args.seed));
     let modes = board.armed(pending(), async |board| -> Result<_, Failure> {
         board.home().await?;
         let mut modes = Vec::new();
