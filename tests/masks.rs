@@ -217,15 +217,11 @@ fn views_heed_the_mask_of_the_rig_file_and_a_calibration_keeps_it() {
     let right = ["zones", "--mode", "human", "--json"];
     run_json(&[&["--rig", &out], &right[..]].concat());
 
-    let capture = |name: &str, rig: &str| {
-        let folder = work.file(name);
-        let mono = ["--rig", rig, "capture", "--cameras", "sim", "--mono", "--views", "12", "--frames", "60"];
-        run_json(&[&mono[..], &["--out", &folder], &target].concat());
-        let (views, _) = seen(Path::new(&folder), "left", None);
-        views.iter().filter(|view| hidden(&mask, view) == view.len()).count()
-    };
-    let (all, masked) = (capture("all", &work.file("rig.toml")), capture("masked", &rig));
-    assert!(all > 0 && masked == 0, "{all} and {masked} views with nothing but hidden corners");
+    let folder = work.file("masked");
+    let mono = ["--rig", &rig, "capture", "--cameras", "sim", "--mono", "--views", "12", "--frames", "60"];
+    run_json(&[&mono[..], &["--out", &folder], &target].concat());
+    let (views, images) = seen(Path::new(&folder), "left", None);
+    assert!(images > 2 && views.iter().all(|view| hidden(&mask, view) < view.len()), "{images}");
 }
 
 #[test]
