@@ -23,7 +23,9 @@ pub fn load(path: Option<&Path>) -> Result<Rig, Failure> {
     for remark in remarks {
         Console::new(false).warn(format!("{}: {remark}", path.display()));
     }
-    Ok(rig)
+    // Whole names, so that they stay right in the files that calibrations write elsewhere.
+    let whole = std::path::absolute(path).map_err(|error| Failure::input(path, error))?;
+    Ok(rig.with_masks_from(whole.parent().unwrap_or(&whole)))
 }
 
 /// The lens of the camera file at `path`, ours or another program's. Says on standard error how far it is off the file's camera.
