@@ -48,7 +48,7 @@ struct Import {
 struct Export {
     /// The program to write for: opencv, kalibr, basalt, ros, colmap or mrcal. mrcal gets a splined model, and a lens with a moving pupil a
     /// central one for points 500 mm away: how far these are off is said.
-    #[arg(long, visible_alias = "format", value_name = "FORMAT")]
+    #[arg(long, alias = "format", value_name = "FORMAT")]
     to: WriteFormat,
     /// The mode of a rig whose cameras move.
     #[arg(long, value_name = "MODE")]
