@@ -72,7 +72,7 @@ impl CameraFile {
         let [left, right] = self.cameras.as_slice() else {
             return Ok(Cameras { left: self.only(path)?.lens, right: None });
         };
-        let pair = self.foreign.iter().find_map(|foreign| Some(foreign.pair(None)));
+        let pair = self.foreign.as_ref().map(|foreign| foreign.pair(None));
         let pair = pair.transpose().map_err(|error| InputError::wrong(path, error))?;
         Ok(Cameras { left: left.lens, right: pair.map(|pair| (right.lens, pair.left_from_right)) })
     }

@@ -18,7 +18,9 @@ pub fn read(text: &str) -> Result<Vec<ForeignCamera>, ExchangeError> {
     let [direct, _, centre, affine, size] = &lines[..] else {
         return Err(wrong(&format!("it has {} lines of numbers, not five", lines.len())));
     };
-    let Some((count, polynomial)) = direct.split_first().filter(|(count, rest)| **count == rest.len() as f64) else {
+    let Some((count, polynomial)) =
+        direct.split_first().filter(|(count, rest)| (*count - rest.len() as f64).abs() < 0.5)
+    else {
         return Err(wrong("the polynomial has not as many coefficients as its line says"));
     };
     let (&[row, column], &[c, d, e], &[height, width]) = (&centre[..], &affine[..], &size[..]) else {

@@ -75,7 +75,8 @@ fn model(root: &Node, keys: &Keys, size: ImageSize) -> Result<Box<dyn CameraMode
     let place = Place { format: Format::OpenCv, camera: keys.name };
     let matrix = root.need(keys.matrix)?;
     let [fx, skew, cx, below, fy, cy, rest @ ..] = matrix.array::<9>()?;
-    if below != 0.0 || rest != [0.0, 0.0, 1.0] {
+    let off = [below, rest[0], rest[1], rest[2] - 1.0];
+    if off.iter().any(|off| off.abs() > 1e-9) {
         return Err(matrix.wrong("is no camera matrix: fx s cx, 0 fy cy, 0 0 1"));
     }
     let distortion = root.get(keys.distortion).map_or(Ok(Vec::new()), |node| node.numbers())?;

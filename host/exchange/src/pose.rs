@@ -14,7 +14,13 @@ pub fn of_matrix<To: Frame, From: Frame>(node: &Node) -> Result<Transform<To, Fr
     let numbers = node.numbers()?;
     let rows = match numbers.len() {
         12 => &numbers[..],
-        16 if numbers[12..15].iter().all(|zero| *zero == 0.0) && numbers[15] == 1.0 => &numbers[..12],
+        16 if numbers[12..]
+            .iter()
+            .zip([0.0, 0.0, 0.0, 1.0])
+            .all(|(got, row): (&f64, f64)| (got - row).abs() < 1e-9) =>
+        {
+            &numbers[..12]
+        }
         16 => return Err(node.wrong("is no rigid transform: its last row must be 0 0 0 1")),
         other => return Err(node.wrong(format!("has {other} numbers, not the 16 of a transform"))),
     };
