@@ -4,7 +4,9 @@ use std::fmt::{self, Debug};
 use std::str::FromStr;
 
 use vergence_lens::{BuiltIn, DesignError, TracedLens};
-use vergence_vision::{Angle, BatchLens, Camera, ImageSize, Instructions, KannalaBrandt, Length, Pixel, Point};
+use vergence_vision::{
+    Angle, BatchLens, Camera, ImageSize, Instructions, KannalaBrandt, Length, Pixel, Point, UnitRay,
+};
 
 /// A lens before a sensor, as the renderer needs it. The camera's frame has its origin at the paraxial entrance pupil.
 pub trait Lens: Debug + Sync {
@@ -19,6 +21,9 @@ pub trait Lens: Debug + Sync {
 
     /// Where a point of the camera's frame is imaged, on the sensor or beside it; `None` outside the field.
     fn image_of(&self, point: &Point<Camera>) -> Option<Pixel>;
+
+    /// The light of a pixel: where it crosses the axis, and the direction it comes from; `None` outside the field.
+    fn light_of(&self, pixel: Pixel) -> Option<(Point<Camera>, UnitRay<Camera>)>;
 
     /// The lens made ready for the rays of many pixels.
     fn rays(&self) -> LensRays<'_>;
@@ -89,6 +94,11 @@ impl Lens for KannalaBrandt {
         self.project_point(point).ok()
     }
 
+    fn light_of(&self, pixel: Pixel) -> Option<(Point<Camera>, UnitRay<Camera>)> {
+        let ray = self.unproject(pixel).ok()?;
+        Some((self.origin_of(&ray), ray))
+    }
+
     /// Without the instructions of this very processor: the same image on every machine.
     fn rays(&self) -> LensRays<'_> {
         LensRays::Ideal(Box::new(BatchLens::new(self).with_instructions(Instructions::Baseline)))
@@ -125,6 +135,10 @@ impl Lens for TracedLens {
 
     fn image_of(&self, point: &Point<Camera>) -> Option<Pixel> {
         self.project(point)
+    }
+
+    fn light_of(&self, pixel: Pixel) -> Option<(Point<Camera>, UnitRay<Camera>)> {
+        self.ray(pixel).map(|ray| (ray.origin, ray.direction))
     }
 
     fn rays(&self) -> LensRays<'_> {
@@ -245,6 +259,10 @@ impl Lens for TrueLens {
 
     fn image_of(&self, point: &Point<Camera>) -> Option<Pixel> {
         self.inner().image_of(point)
+    }
+
+    fn light_of(&self, pixel: Pixel) -> Option<(Point<Camera>, UnitRay<Camera>)> {
+        self.inner().light_of(pixel)
     }
 
     fn rays(&self) -> LensRays<'_> {

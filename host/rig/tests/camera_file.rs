@@ -63,7 +63,7 @@ fn a_covariance_that_is_none_is_refused() {
     };
     refused(&whole.replacen("1.001", "-1.001", 1), "negative variance");
     refused(&whole.replacen("1.001", "nan", 1), "no number");
-    let seven = format!("covariance = [{}]", vec![format!("[{}]", vec!["0.0"; 7].join(", ")); 7].join(", "));
+    let seven = format!("covariance = [{}]", vec![format!("[{}]", ["0.0"; 7].join(", ")); 7].join(", "));
     let head = whole.split("covariance").next().expect("a head");
     refused(&format!("{head}{seven}\n"), "8 rows of 8 values");
 }

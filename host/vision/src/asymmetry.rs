@@ -43,7 +43,7 @@ impl Asymmetry {
     /// Whether all coefficients are zero.
     #[must_use]
     pub fn is_zero(&self) -> bool {
-        self.to_array() == [0.0; ASYMMETRY]
+        self.to_array().iter().all(|coefficient| *coefficient == 0.0)
     }
 
     /// m' of the module's head.

@@ -74,7 +74,7 @@ impl Pupil {
     /// Whether all rays go through the origin.
     #[must_use]
     pub fn is_fixed(&self) -> bool {
-        self.mm() == [0.0; 2]
+        self.mm().iter().all(|coefficient| *coefficient == 0.0)
     }
 
     /// The place of the pupil ahead of the origin, for a ray at the angle `theta` to the axis.
