@@ -17,6 +17,7 @@ mod hierarchy;
 mod lens;
 mod light;
 mod optics;
+mod outlook;
 mod range_map;
 mod rays;
 mod render;
