@@ -87,8 +87,9 @@ impl Outlook {
         let axis = if size.x >= size.y && size.x >= size.z { 0 } else { 1 + usize::from(size.z > size.y) };
         let (along, face) = (size[axis], 2 * axis + usize::from(direction[axis] < 0.0));
         let cell = |other: usize| {
-            let across = direction[(axis + other) % 3] / along;
-            (((across + 1.0) * (0.5 * CELLS as f64)) as usize).min(CELLS - 1)
+            // Rounded to single precision by far less than the padding.
+            let across = (direction[(axis + other) % 3] / along) as f32;
+            (((across + 1.0) * (0.5 * CELLS as f32)) as u32 as usize).min(CELLS - 1)
         };
         let cell = (face * CELLS + cell(2)) * CELLS + cell(1);
         &self.candidates[self.begins[cell] as usize..self.begins[cell + 1] as usize]

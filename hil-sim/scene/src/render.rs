@@ -69,9 +69,9 @@ pub fn render_rolling(
 
 /// The number of neighbouring rows that are exposed at once, and the pose of the camera then.
 #[derive(Clone, Copy)]
-struct Rows<'a> {
-    at_once: usize,
-    world_from_camera: &'a (dyn Fn(u32) -> Transform<World, Camera> + Sync),
+pub struct Rows<'a> {
+    pub at_once: usize,
+    pub world_from_camera: &'a (dyn Fn(u32) -> Transform<World, Camera> + Sync),
 }
 
 impl Rows<'_> {
@@ -81,7 +81,7 @@ impl Rows<'_> {
     }
 
     /// What the camera may see while it takes the image: from about the middle of its way.
-    fn outlook(&self, view: &View<'_>) -> Outlook {
+    pub fn outlook(&self, view: &View<'_>) -> Outlook {
         const PUPILS: u32 = 32;
         const MARGIN_MM: f64 = 0.1;
         let height = view.camera.size().height;
@@ -111,17 +111,11 @@ fn photograph(view: &View<'_>, seed: u64, rows: Rows<'_>) -> Photograph {
     });
 
     let mut light = vec![[0.0; 3]; pixels];
-    light.par_iter_mut().enumerate().for_each(|(i, light)| {
-        let First { mut samples, exposure, .. } = firsts[i];
-        let (x, y) = (i % width, i / width);
+    for_each_in_field(view, rows, &rays, &mut light, |light, here, around, x, y| {
+        let First { mut samples, exposure, .. } = firsts[y * width + x];
         if is_edge(&firsts, width, x, y) {
-            let pixel = [x, y].map(|n| n as u32);
-            let here = rows.view(view, pixel[1]);
-            let posed = PosedLens::new(view.camera, &rays, &here.world_from_camera);
-            if let Some(around) = RayGrid::new(&posed, pixel, [1, 1]).around(pixel[0], pixel[1]) {
-                let places = lattice(view.optics.edge_samples, mix64(seed_of(x, y)));
-                samples = samples.joined(here.samples(&around, &outlook, places));
-            }
+            let places = lattice(view.optics.edge_samples, mix64(seed_of(x, y)));
+            samples = samples.joined(here.samples(around, &outlook, places));
         }
         let exposure = exposure / samples.count.max(1) as f32;
         *light = samples.sum.map(|c| c * exposure);
@@ -257,12 +251,7 @@ impl View<'_> {
     }
 
     /// The light of rays through these places on the square of a pixel.
-    fn samples(
-        &self,
-        around: &Around<'_>,
-        outlook: &Outlook,
-        places: impl Iterator<Item = [f64; 2]>,
-    ) -> LightSamples {
+    fn samples(&self, around: &Around<'_>, outlook: &Outlook, places: impl Iterator<Item = [f64; 2]>) -> LightSamples {
         let finest = 1.0 / self.camera.pixels_per_radian(self.theta(around));
         let nearby = around.nearby();
         places.fold(LightSamples::default(), |samples, offset| {

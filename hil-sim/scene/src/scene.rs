@@ -9,6 +9,9 @@ use crate::outlook::{Outlook, TurnedBox};
 use crate::shape::{Contact, Shape};
 use crate::texture::{Pattern, Rgb};
 
+/// Added to the radius of the sphere about a shape: far more than double precision loses over a room.
+const REACH_MARGIN_MM: f64 = 1e-3;
+
 /// The material of a surface.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Material {
@@ -27,6 +30,8 @@ pub struct Solid {
     centre: Vector3<f64>,
     world_from_shape: Matrix3<f64>,
     shape_from_world: Matrix3<f64>,
+    /// Square of the radius of the sphere about the shape, mm², with a little more than rounding takes.
+    reach_squared: f64,
     material: Material,
 }
 
@@ -231,7 +236,9 @@ impl Solid {
     /// `shape` turned by `rotation` with its origin at `centre`, both in the world, mm.
     pub fn new(shape: Shape, centre: Vector3<f64>, rotation: UnitQuaternion<f64>, material: Material) -> Self {
         let world_from_shape = rotation.to_rotation_matrix().into_inner();
-        Self { shape, centre, world_from_shape, shape_from_world: world_from_shape.transpose(), material }
+        let shape_from_world = world_from_shape.transpose();
+        let reach_squared = (shape.half_size().norm() + REACH_MARGIN_MM).powi(2);
+        Self { shape, centre, world_from_shape, shape_from_world, reach_squared, material }
     }
 
     fn bounds(&self) -> Bounds {
@@ -243,11 +250,22 @@ impl Solid {
     }
 
     fn meet(&self, origin: Vector3<f64>, direction: Vector3<f64>, limit: f64) -> Option<Contact> {
-        self.shape.meet(self.shape_from_world * (origin - self.centre), self.shape_from_world * direction, limit)
+        // A line that passes the sphere about the shape misses it.
+        let from_centre = origin - self.centre;
+        let (along, length) = (from_centre.dot(&direction), direction.norm_squared());
+        if from_centre.norm_squared() * length - along * along > self.reach_squared * length {
+            return None;
+        }
+        self.shape.meet(self.shape_from_world * from_centre, self.shape_from_world * direction, limit)
     }
 }
 
 impl Encounter {
+    /// Number of the surface.
+    pub const fn surface(&self) -> usize {
+        self.surface
+    }
+
     /// Distance along the ray, mm.
     pub fn range(&self) -> f64 {
         self.contact.range
