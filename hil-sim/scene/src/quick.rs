@@ -1,6 +1,6 @@
 //! Images in real time, for cameras that run live.
 //!
-//! Of each pixel one ray is cast, through its centre, and a texture is faded to the size of the pixel; six more rays are cast where that
+//! Of each pixel one ray is cast, through its centre, and a texture is faded to the size of the pixel; some more rays are cast where that
 //! ray or a neighbour's meets something else, or another light. A ray that meets what a neighbour shows takes the neighbour's light. What depends on lens and pixel alone is computed once, in a [`RayTable`].
 //! Nothing is displaced from where [`render`](crate::render) shows it: places on a pixel's square are symmetric about its centre.
 
@@ -20,8 +20,8 @@ use crate::scene::Encounter;
 use crate::texture::Rgb;
 use crate::texture_noise::mix64;
 
-/// Further rays of a pixel at an edge.
-const EDGE_RAYS: u32 = 6;
+/// Further rays of a pixel at an edge between surfaces, and at one within a surface: those of prints are measured.
+const EDGE_RAYS: [u32; 2] = [6, 16];
 
 /// Difference of the square roots of the light of neighbours above which more rays are cast.
 const EDGE: f32 = 0.4;
@@ -123,17 +123,19 @@ pub fn render_quick(
             let mut sum = glance.light;
             let mut count = 1.0;
             let edge = edge(&glances, width, x, y);
-            if let Some(around) = edge.is_some().then(|| grid.around(x as u32, y as u32)).flatten() {
+            let around = edge.is_some().then(|| grid.around(x as u32, y as u32)).flatten();
+            if let (Some(edge), Some(around)) = (edge, around) {
                 let nearby = around.nearby();
+                let rays = EDGE_RAYS[usize::from(edge.within)];
                 // A ray outside the field brings no light.
-                for ray in lattice(EDGE_RAYS, mix64(seed ^ at as u64)).filter_map(|place| nearby.at(place)) {
+                for ray in lattice(rays, mix64(seed ^ at as u64)).filter_map(|place| nearby.at(place)) {
                     let origin = around.start(&ray);
                     let met = meet(origin, ray);
-                    let known = edge.as_ref().and_then(|edge| edge.light_of(surface(met.as_ref())));
+                    let known = edge.light_of(surface(met.as_ref()));
                     let light = known.unwrap_or_else(|| light(origin, ray, met.as_ref(), optics));
                     sum = std::array::from_fn(|i| sum[i] + light[i]);
                 }
-                count += EDGE_RAYS as f32;
+                count += rays as f32;
             }
             *pixel = sum.map(|c| c * optics.exposure / count);
         }
