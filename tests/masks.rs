@@ -14,6 +14,7 @@ use common::pairs::{Work, refs, small_bench};
 use common::{fails_with, run_json};
 use vergence_calibration_input::{InputError, InputHash, Sought, views_in_images};
 use vergence_camera::read_mask;
+use vergence_rig::CameraMask;
 use vergence_targets::{TargetKind, TargetSpec};
 use vergence_vision::{BodyMask, ImageSize, Length, Pixel};
 
@@ -82,7 +83,8 @@ fn seen(folder: &Path, side: &str, mask: Option<&Path>) -> (Vec<Vec<Pixel>>, usi
     let entries = std::fs::read_dir(folder).expect("a folder").map(|entry| entry.expect("an entry").path());
     let is_of_side = |file: &PathBuf| file.file_name().is_some_and(|name| name.to_string_lossy().starts_with(side));
     let files: Vec<PathBuf> = entries.filter(is_of_side).collect();
-    let sought = Sought { target: &BOARD, hint: None, placed: false, mask };
+    let mask = mask.map(|mask| CameraMask::File(mask.into()));
+    let sought = Sought { target: &BOARD, hint: None, placed: false, mask: mask.as_ref() };
     let found =
         views_in_images::<InputError>(&files, sought, &mut InputHash::default(), &mut |_| Ok(())).expect("images");
     let corners = found.found().into_iter().map(|view| view.corners.iter().map(|corner| corner.pixel).collect());
@@ -150,4 +152,96 @@ fn a_bad_mask_is_told_before_anything_is_measured() {
     let share = |value: &serde_json::Value| value["solid_sr"]["stereo"].as_f64().expect("a solid angle");
     assert!(share(&zones(&["--left-mask", &shapes])) < 0.8 * share(&zones(&[])));
     assert_eq!(small_bench().left_camera.size(), SIZE);
+}
+
+/// The rig file of the bench with these keys of its left camera, next to `rig.toml` or in a folder of its own.
+fn rig_with(work: &Work, name: &str, keys: &str) -> String {
+    let (plain, path) = (std::fs::read_to_string(work.file("rig.toml")).expect("a rig file"), work.file(name));
+    std::fs::create_dir_all(Path::new(&path).parent().expect("a folder")).expect("it is made");
+    let at = plain.find("[left.camera]").expect("the left camera");
+    std::fs::write(&path, [&plain[..at], keys, &plain[at..]].concat()).expect("written");
+    path
+}
+
+/// A mask in the rig file is as good as the option: by its name from the file's folder, or with its shapes in the file.
+#[test]
+fn a_rig_file_names_masks_and_an_option_overrides_them() {
+    let work = Work::new();
+    work.photograph(20.0, 3, ["left.png", "right.png"]);
+    let (shapes, cloud) = (work.file("mask.toml"), work.file("out.ply"));
+    std::fs::write(&shapes, SHAPES).expect("written");
+    let named = rig_with(&work, "rigs/named.toml", "[left]\nmask = \"../mask.toml\"\n");
+    let inline = rig_with(&work, "inline.toml", &SHAPES.replace("[[shape]]", "[[left.mask]]"));
+    let plain = work.file("rig.toml");
+    let measured = |rig: &str, more: &[&str]| {
+        let (left, right) = (work.file("left.png"), work.file("right.png"));
+        let depth = ["--rig", rig, "depth", "--mode", "human", "--left", &left, "--right", &right, "--out", &cloud];
+        run_json(&[&depth[..], &["--json"], more].concat());
+        std::fs::read(&cloud).expect("a cloud")
+    };
+    let (unmasked, by_option) = (measured(&plain, &[]), measured(&plain, &["--left-mask", &shapes]));
+    assert!(by_option.len() < unmasked.len());
+    assert!(measured(&named, &[]) == by_option, "the mask by name");
+    assert!(measured(&inline, &[]) == by_option, "the shapes");
+    let nothing = work.file("nothing.png");
+    image::GrayImage::from_pixel(640, 640, image::Luma([255])).save(&nothing).expect("written");
+    assert!(measured(&inline, &["--left-mask", &nothing]) == unmasked, "the option hides nothing");
+
+    let stereo = |rig: &str, more: &[&str]| {
+        let value = run_json(&[&["--rig", rig, "zones", "--mode", "human", "--json"], more].concat());
+        value["solid_sr"]["stereo"].as_f64().expect("a solid angle")
+    };
+    let by_option = stereo(&plain, &["--left-mask", &shapes]);
+    for rig in [&named, &inline] {
+        assert!((stereo(rig, &[]) - by_option).abs() < 1e-12 && by_option < 0.8 * stereo(&plain, &[]));
+    }
+}
+
+/// `calibrate stage` takes no corner where the mask of its rig file hides it, and what it writes names the same mask.
+#[test]
+fn views_heed_the_mask_of_the_rig_file_and_a_calibration_keeps_it() {
+    let work = Work::new();
+    std::fs::write(work.file("mask.toml"), SHAPES).expect("written");
+    let rig = rig_with(&work, "rig2.toml", "[left]\nmask = \"mask.toml\"\n");
+    let target = ["--corners", "7x5", "--square", "30mm", "--json"];
+    let (set, out) = (work.file("set"), work.file("found/stage.toml"));
+    std::fs::create_dir_all(work.file("found")).expect("a folder");
+    let live = ["--rig", &rig, "--port", "sim", "calibrate", "stage", "--live", "--cameras", "sim", "--set", &set];
+    run_json(&[&live[..], &["--poses", "4", "--views", "4", "--seed", "3", "--out", &out], &target].concat());
+    let mask = read_mask(Path::new(&work.file("mask.toml")), SIZE).expect("a mask");
+    let (views, images) = seen(&Path::new(&set).join("pose01"), "left", None);
+    assert!(images == 4 && views.iter().all(|view| hidden(&mask, view) < view.len()), "{images}");
+    let written = std::fs::read_to_string(&out).expect("a rig file");
+    let whole = std::path::absolute(work.file("mask.toml")).expect("a name");
+    assert!(written.contains(&format!("mask = \"{}\"", whole.display())), "{written}");
+    let right = ["zones", "--mode", "human", "--json"];
+    run_json(&[&["--rig", &out], &right[..]].concat());
+
+    let folder = work.file("masked");
+    let mono = ["--rig", &rig, "capture", "--cameras", "sim", "--mono", "--views", "12", "--frames", "60"];
+    run_json(&[&mono[..], &["--out", &folder], &target].concat());
+    let (views, images) = seen(Path::new(&folder), "left", None);
+    assert!(images > 2 && views.iter().all(|view| hidden(&mask, view) < view.len()), "{images}");
+}
+
+#[test]
+fn a_bad_mask_in_a_rig_file_is_told() {
+    let work = Work::new();
+    work.photograph(0.0, 1, ["left.png", "right.png"]);
+    image::GrayImage::new(320, 640).save(work.file("narrow.png")).expect("written");
+    let bad_shape = "[[left.mask]]\nhides = \"inside\"\npolygon = [[0, 0], [100, 0]]\n";
+    let unknown = "[[left.mask]]\nhides = \"inside\"\nsquare = [1, 2, 3]\n";
+    for (keys, words) in [
+        ("[left]\nmask = \"missing.png\"\n", &["missing.png"][..]),
+        ("[left]\nmask = \"narrow.png\"\n", &["narrow.png", "320 x 640", "640 x 640"]),
+        ("[left]\nmask = 3\n", &["bad.toml", "mask = 3", "name of a mask's file, or shapes"]),
+        (bad_shape, &["bad.toml", "[[left.mask]]", "shape 1", "3 corners"]),
+        (unknown, &["bad.toml", "unknown field `square`"]),
+    ] {
+        let rig = rig_with(&work, "bad.toml", keys);
+        fails_with(&["--rig", &rig, "zones", "--mode", "human"], 2, words);
+        let (left, right, out) = (work.file("left.png"), work.file("right.png"), work.file("out.ply"));
+        let depth = ["--rig", &rig, "depth", "--mode", "human", "--left", &left, "--right", &right, "--out", &out];
+        fails_with(&depth, 2, words);
+    }
 }

@@ -5,7 +5,7 @@ use std::str::FromStr;
 
 use vergence_lens::{BuiltIn, DesignError, TracedLens};
 use vergence_vision::{
-    Angle, BatchLens, Camera, ImageSize, Instructions, KannalaBrandt, Length, Pixel, Point, UnitRay, pupil_shift,
+    Angle, BatchLens, Camera, ImageSize, Instructions, KannalaBrandt, Length, Pixel, Point, UnitRay,
 };
 
 /// A lens before a sensor, as the renderer needs it. The camera's frame has its origin at the paraxial entrance pupil.
@@ -105,7 +105,7 @@ impl Lens for KannalaBrandt {
     }
 
     fn pupil(&self, theta: Angle) -> Option<Length> {
-        (!self.is_central()).then(|| Length::from_mm(self.pupil().mm() * pupil_shift(theta.rad())))
+        (!self.is_central()).then(|| self.pupil().shift(theta))
     }
 
     fn describe(&self) -> String {
@@ -116,7 +116,7 @@ impl Lens for KannalaBrandt {
         let mut part = self.to_opencv();
         (part.cx, part.cy) = (part.cx - f64::from(left), part.cy - f64::from(top));
         let part = Self::from_opencv(part, self.theta_max(), size).ok()?;
-        part.with_pupil(self.pupil()).ok().map(TrueLens::Ideal)
+        part.with_pupil(self.pupil()).ok()?.with_asymmetry(self.asymmetry()).ok().map(TrueLens::Ideal)
     }
 }
 

@@ -6,7 +6,8 @@ use std::path::{Path, PathBuf};
 use image::imageops::grayscale;
 use rayon::prelude::*;
 use vergence_calibration_report::ReportImage;
-use vergence_camera::{CameraError, read_image, read_mask};
+use vergence_camera::{CameraError, camera_mask, read_image};
+use vergence_rig::CameraMask;
 use vergence_targets::{DetectError, SeenTarget, TargetKind, TargetView, see};
 use vergence_vision::{BodyMask, ImageSize, KannalaBrandt};
 
@@ -89,8 +90,8 @@ pub struct Sought<'a> {
     pub hint: Option<&'a KannalaBrandt>,
     /// Whether it counts where on the target the corners lie, as for its bow; not only how they lie to one another.
     pub placed: bool,
-    /// A file of what is left out of the images (see [`read_mask`]): no corner is taken there.
-    pub mask: Option<&'a Path>,
+    /// What is left out of the images: no corner is taken there.
+    pub mask: Option<&'a CameraMask>,
 }
 
 /// Looks for the target in every image. A damaged image gives no view.
@@ -140,7 +141,7 @@ fn look(path: &Path, Sought { target, hint, placed, mask }: &Sought<'_>) -> Resu
     let grey = grayscale(&image);
     let reduced = Some(ReportImage::new(&name, &grey));
     let (width, height) = image.dimensions();
-    let mask = mask.map(|mask| read_mask(mask, ImageSize { width, height })).transpose()?;
+    let mask = mask.map(|mask| camera_mask(mask, ImageSize { width, height })).transpose()?;
     let view = match see(&grey, target, *hint, &name) {
         Ok(seen) if *placed && !seen.is_placed(target) => Err(Missed { name, reason: MissedReason::Unplaced }),
         Ok(seen) => unhidden(seen, mask.as_ref()),

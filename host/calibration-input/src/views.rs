@@ -5,6 +5,7 @@ use std::path::{Path, PathBuf};
 use vergence_calibration::{IntrinsicsOptions, StereoView, calibrate_intrinsics, label_pairs};
 use vergence_calibration_report::{LeftOut, ReportImage};
 use vergence_camera::{PairedFiles, paired};
+use vergence_rig::CameraMask;
 use vergence_targets::{SeenTarget, TargetKind, TargetView};
 use vergence_vision::{KannalaBrandt, Side};
 
@@ -40,7 +41,7 @@ pub fn views_in_images<E: From<InputError>>(
     hash: &mut InputHash,
     tell: &mut impl FnMut(ViewEvent<'_>) -> Result<(), E>,
 ) -> Result<TargetImages, E> {
-    for file in files.iter().map(PathBuf::as_path).chain(sought.mask) {
+    for file in files.iter().map(PathBuf::as_path).chain(sought.mask.and_then(CameraMask::file)) {
         hash.add(file).map_err(InputError::from)?;
     }
     tell(ViewEvent::Looking(files.len()))?;
@@ -68,8 +69,8 @@ pub struct PairImages([Vec<PathBuf>; 2]);
 /// The two lenses of a pair, at least roughly: left, right.
 pub type PairLenses<'a> = [&'a KannalaBrandt; 2];
 
-/// Files of what is left out of the images of the left and of the right camera.
-pub type PairMasks<'a> = [Option<&'a Path>; 2];
+/// What is left out of the images of the left and of the right camera.
+pub type PairMasks<'a> = [Option<&'a CameraMask>; 2];
 
 /// Views of a pair.
 #[derive(Default)]

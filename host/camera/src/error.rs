@@ -2,6 +2,7 @@
 
 use std::path::PathBuf;
 
+use vergence_rig::MaskError;
 use vergence_vision::{ImageSize, Side};
 
 /// Why a camera or an image file gives no image.
@@ -32,6 +33,9 @@ pub enum CameraError {
         /// What is wrong with it.
         why: String,
     },
+    /// Shapes of a rig file are no mask of a camera's images.
+    #[error("the mask in the rig file: {0}")]
+    Shapes(MaskError),
     /// Nothing says which images of both cameras were taken together.
     #[error(
         "nothing says which of {} left and {} right images belong together ({} and {} are the first): they must pair up by \

@@ -24,7 +24,7 @@ pub use attached::attach;
 pub use error::CameraError;
 pub use event::{CameraEvent, Develop, PendingImage};
 pub use files::{FileCamera, image_files, read_image};
-pub use mask::read_mask;
+pub use mask::{camera_mask, read_mask};
 pub use pairing::{PairedFiles, paired};
 pub use set::CameraSet;
 pub use v4l::{HostTime, V4lCamera, V4lSettings};

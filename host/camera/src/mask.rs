@@ -2,10 +2,21 @@
 
 use std::path::Path;
 
-use vergence_rig::mask_of_shapes;
+use vergence_rig::{CameraMask, mask_of, mask_of_shapes};
 use vergence_vision::{BodyMask, ImageSize};
 
 use crate::CameraError;
+
+/// The mask of a camera whose images are of `size`, read where it is a file.
+///
+/// # Errors
+/// Those of [`read_mask`]; [`CameraError::Shapes`] where shapes are bad for this size.
+pub fn camera_mask(mask: &CameraMask, size: ImageSize) -> Result<BodyMask, CameraError> {
+    match mask {
+        CameraMask::File(path) => read_mask(path, size),
+        CameraMask::Shapes(shapes) => mask_of(shapes, size).map_err(CameraError::Shapes),
+    }
+}
 
 /// Reads what is left out of the images of a camera, which are of `size`: a TOML file of shapes (see [`mask_of_shapes`]), or a picture of
 /// that size that is black there.

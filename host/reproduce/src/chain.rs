@@ -141,7 +141,7 @@ fn own_calibration(
     let seen = seen(Some(&rough.camera));
     seen.iter().for_each(|seen| tally.count(seen));
     let found = calibrated(&seen, lens.size(), &IntrinsicsOptions { model, ..IntrinsicsOptions::default() })?;
-    let central = match found.camera.is_central() {
+    let central = match found.camera.fits_opencv() {
         true => found.camera,
         false => calibrated(&seen, lens.size(), &central)?.camera,
     };

@@ -10,8 +10,8 @@ use crate::target_shot::Corners;
 
 /// Noise of a corner's u or v in pixels, of the class that the goals are for.
 pub const NOISE_PX: f64 = 0.1;
-/// The lens of a kind that the calibration does not know: a published fisheye of 197°.
-const MISFIT: LensChoice = LensChoice::Traced(BuiltIn::Sigma8);
+/// The lens of the simulation that no calibration knows: a published fisheye of 197°.
+pub const TRUE_LENS: LensChoice = LensChoice::Traced(BuiltIn::Sigma8);
 /// How far the right camera returns from where it stood before, unseen by the encoders.
 const RETURN: Repeatability = Repeatability { shift: Length::from_mm(0.05), turn: Angle::from_deg(0.05) };
 
@@ -94,7 +94,7 @@ impl Cause {
     pub fn size(self) -> String {
         match self {
             Self::Corners => format!("{NOISE_PX} px in u and v"),
-            Self::Lens => format!("lenses traced from a published design, {MISFIT} in the place of ideal ones"),
+            Self::Lens => format!("lenses traced from a published design, {TRUE_LENS} in the place of ideal ones"),
             Self::Pose => format!(
                 "{:.2} mm and {:.2}° along and about each axis of the right camera, anew at every return",
                 RETURN.shift.mm(),
@@ -112,7 +112,7 @@ impl Cause {
             conditions.noise_px = NOISE_PX;
         }
         if matches!(self, Self::Lens | Self::All) && lens == LensChoice::Ideal {
-            conditions.lens = MISFIT;
+            conditions.lens = TRUE_LENS;
         }
         if matches!(self, Self::Pose | Self::All) {
             conditions.repeatability = RETURN;

@@ -50,7 +50,7 @@ mod zones;
 
 pub use bench::{Bench, MODES};
 pub use causes::{Closest, Column, PUBLISHED, Published};
-pub use conditions::{Cause, Conditions, Repeatability};
+pub use conditions::{Cause, Conditions, Repeatability, TRUE_LENS};
 pub use drive::{Drive, Route, Stop, drive};
 pub use error::{DemoError, ReproduceError};
 pub use experiments::{DrivenRig, Plan, Progress, Results, experiments};

@@ -3,15 +3,15 @@
 #![allow(clippy::expect_used, clippy::print_stdout, reason = "a test fails loudly and shows its figures")]
 
 use vergence_calibration::LensModel;
-use vergence_reproduce::MODES;
 use vergence_reproduce::mismatch::{Mismatch, MismatchPlan, MismatchTable, RANGES_MM, Trial, Verdict, mismatches};
+use vergence_reproduce::{MODES, TRUE_LENS};
 
 const VIEWS_ASK: LensModel = LensModel::ByEvidence;
 
 /// The tables of docs/measured/mismatch.md: as many rigs as VERGENCE_SEEDS says, all mismatches; otherwise one rig and the worlds whose verdict is clear.
 fn table() -> MismatchTable {
     let seeds = std::env::var("VERGENCE_SEEDS").ok().and_then(|text| text.parse().ok());
-    let plan = MismatchPlan::new(seeds.unwrap_or(1), None).expect("traced lenses");
+    let plan = MismatchPlan::new(seeds.unwrap_or(1), TRUE_LENS).expect("traced lenses");
     if seeds.is_some() {
         return mismatches(&plan, &|_, _| ()).expect("a table");
     }

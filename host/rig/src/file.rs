@@ -7,7 +7,7 @@ mod trunk_values;
 use nalgebra::{Unit, UnitQuaternion, Vector3};
 use serde::Deserialize;
 use vergence_protocol::{AxisKind, MAX_AXES};
-use vergence_vision::{Angle, Frame, InvalidLens, KannalaBrandt, Length, Point, Transform};
+use vergence_vision::{Angle, Frame, ImageSize, InvalidLens, KannalaBrandt, Length, Point, Transform};
 
 use self::modes::ModesFile;
 pub(crate) use self::trunk::TrunkFile;
@@ -15,6 +15,7 @@ use crate::axis::{AxisPosition, RigAxis};
 use crate::calibration::{CalibrationTables, RigCalibration, SigmaFile};
 use crate::camera_file::{CameraTable, Provenance};
 use crate::chain::{Chain, Link, Screw};
+use crate::mask::{CameraMask, mask_of};
 use crate::pitch::PitchTable;
 use crate::rig::Rig;
 use crate::text::quantities;
@@ -89,6 +90,7 @@ enum KindFile {
 #[serde(deny_unknown_fields)]
 struct SideFile {
     camera: CameraTable,
+    mask: Option<CameraMask>,
     #[serde(default)]
     at_zero: PoseFile,
     #[serde(default)]
@@ -152,6 +154,7 @@ impl Rig {
             left_camera: camera("left", &file.left.camera)?,
             right_camera: camera("right", &file.right.camera)?,
             shutters: [&file.left, &file.right].map(|side| side.camera.shutter()),
+            masks: [mask("left", &file.left)?, mask("right", &file.right)?],
             left_chain: chain("left", &file.left, &axes)?,
             right_chain: chain("right", &file.right, &axes)?,
             trunk,
@@ -260,6 +263,16 @@ fn interval(kind: AxisKind, [low, high]: &[String; 2], place: &str) -> Result<[A
 
 fn camera(side: &'static str, table: &CameraTable) -> Result<KannalaBrandt, RigError> {
     table.camera().map_err(|lens| RigError::Camera { camera: side, lens })
+}
+
+/// The mask of a camera. Its shapes are checked here, a file when it is read.
+fn mask(side: &str, SideFile { mask, camera, .. }: &SideFile) -> Result<Option<CameraMask>, RigError> {
+    let [width, height] = camera.size;
+    if let Some(CameraMask::Shapes(shapes)) = mask {
+        let wrong = |error| contradiction(format!("[[{side}.mask]]: {error}"));
+        mask_of(shapes, ImageSize { width, height }).map_err(wrong)?;
+    }
+    Ok(mask.clone())
 }
 
 fn chain<C: Frame>(side: &str, file: &SideFile, axes: &[RigAxis]) -> Result<Chain<C>, RigError> {

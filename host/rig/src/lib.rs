@@ -49,7 +49,7 @@ pub use goal::{DepthGoal, DepthSigma, InvalidGoal};
 pub use image_pairing::{ExposureDelay, ImagePairing, PairingOutcome, StampedImage, TimedEvent};
 pub use in_json::{axes_json, camera_in_words, camera_json, closure_in_words, closure_json, rounded, zones_json};
 pub use interchange::{Camchain, CameraFormat, InterchangeError, kalibr, opencv};
-pub use mask::{MaskError, mask_of_shapes};
+pub use mask::{CameraMask, MaskError, MaskShape, mask_of, mask_of_shapes};
 pub use mode::{Mode, ReportedMode};
 pub use mode_policy::{ModeChoice, ModeFigures, ModePolicy, PolicyRule, TargetBelief, Task, TaskState};
 pub use moving::{MiddlePose, middle_pose, moving_cloud};

@@ -1,10 +1,14 @@
 //! Parts of an image that are left out, as shapes in a text: the robot's body, a hood, all outside the image circle.
 
-use serde::Deserialize;
+use std::path::{Path, PathBuf};
+
+use serde::de::value::SeqAccessDeserializer;
+use serde::de::{SeqAccess, Visitor};
+use serde::{Deserialize, Deserializer, Serialize};
 use vergence_vision::{BodyMask, ImageSize};
 
 /// Why a text describes no mask.
-#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[non_exhaustive]
 pub enum MaskError {
     /// The text is not TOML, or a key is missing or unknown. The message names the line.
@@ -23,23 +27,70 @@ pub enum MaskError {
     HidesAll,
 }
 
+/// What is left out of the images of a camera, as a rig file or an option says it.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+#[serde(untagged)]
+pub enum CameraMask {
+    /// The name of a file: a picture of the camera's size that is black there, or TOML with shapes (see [`mask_of_shapes`]).
+    File(PathBuf),
+    /// Shapes.
+    Shapes(Vec<MaskShape>),
+}
+
+impl CameraMask {
+    /// The file, where it is one.
+    #[must_use]
+    pub fn file(&self) -> Option<&Path> {
+        match self {
+            Self::File(file) => Some(file),
+            Self::Shapes(_) => None,
+        }
+    }
+}
+
+/// Reads a text as the name of a file, and a list as shapes, so that a fault in a shape is told by its key and line.
+impl<'de> Deserialize<'de> for CameraMask {
+    fn deserialize<D: Deserializer<'de>>(file: D) -> Result<Self, D::Error> {
+        struct FileOrShapes;
+        impl<'de> Visitor<'de> for FileOrShapes {
+            type Value = CameraMask;
+
+            fn expecting(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+                f.write_str("the name of a mask's file, or shapes")
+            }
+
+            fn visit_str<E>(self, name: &str) -> Result<CameraMask, E> {
+                Ok(CameraMask::File(name.into()))
+            }
+
+            fn visit_seq<A: SeqAccess<'de>>(self, shapes: A) -> Result<CameraMask, A::Error> {
+                Vec::deserialize(SeqAccessDeserializer::new(shapes)).map(CameraMask::Shapes)
+            }
+        }
+        file.deserialize_any(FileOrShapes)
+    }
+}
+
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 struct MaskFile {
-    shape: Vec<Shape>,
+    shape: Vec<MaskShape>,
 }
 
-#[derive(Deserialize)]
+/// A polygon or a circle that hides a part of an image.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-struct Shape {
+pub struct MaskShape {
     hides: Part,
     /// Corners (u, v) in pixels.
+    #[serde(skip_serializing_if = "Option::is_none")]
     polygon: Option<Vec<[f64; 2]>>,
     /// Centre (u, v) and radius in pixels.
+    #[serde(skip_serializing_if = "Option::is_none")]
     circle: Option<[f64; 3]>,
 }
 
-#[derive(Clone, Copy, Deserialize, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Serialize, Deserialize, PartialEq, Eq)]
 #[serde(rename_all = "lowercase")]
 enum Part {
     Inside,
@@ -69,9 +120,17 @@ enum Part {
 /// [`MaskError`] for a text that is no TOML, a shape that is none or hides nothing of the image, and shapes that hide all of it.
 pub fn mask_of_shapes(text: &str, size: ImageSize) -> Result<BodyMask, MaskError> {
     let file: MaskFile = toml::from_str(text).map_err(|error| MaskError::Syntax(error.to_string()))?;
+    mask_of(&file.shape, size)
+}
+
+/// The mask of an image of `size` in which these shapes hide parts.
+///
+/// # Errors
+/// [`MaskError`] for a shape that is none or hides nothing of the image, and shapes that hide all of it.
+pub fn mask_of(shapes: &[MaskShape], size: ImageSize) -> Result<BodyMask, MaskError> {
     let width = size.width as usize;
     let mut hidden = vec![false; width * size.height as usize];
-    for (number, shape) in (1..).zip(&file.shape) {
+    for (number, shape) in (1..).zip(shapes) {
         let fail = |why: String| MaskError::Shape { number, why };
         let area = shape.area().map_err(fail)?;
         let mut hides_any = false;
@@ -103,7 +162,7 @@ enum Area<'a> {
     Circle([f64; 3]),
 }
 
-impl Shape {
+impl MaskShape {
     fn area(&self) -> Result<Area<'_>, String> {
         match (&self.polygon, self.circle) {
             (Some(corners), None) => check_polygon(corners).map(|()| Area::Polygon(corners)),

@@ -1,5 +1,7 @@
 //! The rig's description after its checks.
 
+use std::path::Path;
+
 use nalgebra::Isometry3;
 use vergence_protocol::{AxisList, Micro, PoseReport};
 use vergence_vision::{InvalidLens, KannalaBrandt, Left, Right, Side, Transform};
@@ -8,6 +10,7 @@ use crate::axis::{AxisPosition, RigAxis};
 use crate::calibration::RigCalibration;
 use crate::chain::Chain;
 use crate::exposure::Shutter;
+use crate::mask::CameraMask;
 use crate::mode::{Mode, ReportedMode};
 use crate::trunk::RigTrunk;
 
@@ -26,6 +29,8 @@ pub struct Rig {
     pub right_camera: KannalaBrandt,
     /// The shutters of the left and the right camera.
     pub shutters: [Shutter; 2],
+    /// What is left out of the images of the left and the right camera. Names of files are as the rig file states them.
+    pub masks: [Option<CameraMask>; 2],
     /// The screw chain from the base to the left camera.
     pub left_chain: Chain<Left>,
     /// The screw chain from the base to the right camera.
@@ -52,6 +57,7 @@ impl Rig {
             left_camera,
             right_camera,
             shutters: [Shutter::Global; 2],
+            masks: [None, None],
             left_chain: Chain::new(Vec::new(), Transform::from_isometry(Isometry3::identity())),
             right_chain: Chain::new(Vec::new(), left_from_right.renamed()),
             trunk: None,
@@ -59,7 +65,7 @@ impl Rig {
         }
     }
 
-    /// The rig with sensors of the same size that have `width` pixels across.
+    /// The rig with sensors of the same size that have `width` pixels across, without masks: those are drawn in pixels of its own.
     ///
     /// # Errors
     /// Fails if `width` leaves no pixels.
@@ -71,7 +77,17 @@ impl Rig {
             RigCalibration::Covariance(found) => RigCalibration::Covariance(found.resampled(factors)),
             other => other,
         };
-        Ok(Self { left_camera, right_camera, calibration, ..self })
+        Ok(Self { left_camera, right_camera, masks: [None, None], calibration, ..self })
+    }
+
+    /// The rig whose masks, where they are files, have their names from `folder`.
+    #[must_use]
+    pub fn with_masks_from(self, folder: &Path) -> Self {
+        let from_folder = |mask| match mask {
+            CameraMask::File(file) => CameraMask::File(folder.join(file)),
+            shapes @ CameraMask::Shapes(_) => shapes,
+        };
+        Self { masks: self.masks.map(|mask| mask.map(from_folder)), ..self }
     }
 
     /// The lens of the camera on `side`.

@@ -12,6 +12,7 @@ use crate::camera_file::{CameraTable, Provenance};
 use crate::chain::{Chain, Link, Screw};
 use crate::exposure::Shutter;
 use crate::file::TrunkFile;
+use crate::mask::CameraMask;
 use crate::rig::Rig;
 
 #[derive(Serialize)]
@@ -66,6 +67,8 @@ struct Sigma {
 
 #[derive(Serialize)]
 struct Side<'a> {
+    #[serde(skip_serializing_if = "Option::is_none")]
+    mask: Option<&'a CameraMask>,
     camera: CameraTable,
     #[serde(skip_serializing_if = "Option::is_none")]
     at_zero: Option<Pose>,
@@ -120,8 +123,14 @@ impl Rig {
             },
             calibration: CalibrationTables::of(self),
             trunk: self.trunk.as_ref().map(|trunk| TrunkFile::of(trunk, trunk.axes.map(|axis| name(&axis)))),
-            left: side(table(&self.left_camera, self.shutters[0]), &self.left_chain, &name, self.trunk.is_none()),
-            right: side(table(&self.right_camera, self.shutters[1]), &self.right_chain, &name, self.trunk.is_none()),
+            left: Side {
+                mask: self.masks[0].as_ref(),
+                ..side(table(&self.left_camera, self.shutters[0]), &self.left_chain, &name, self.trunk.is_none())
+            },
+            right: Side {
+                mask: self.masks[1].as_ref(),
+                ..side(table(&self.right_camera, self.shutters[1]), &self.right_chain, &name, self.trunk.is_none())
+            },
             provenance,
         };
         toml::to_string(&file).map_err(|error| error.to_string())
@@ -172,6 +181,7 @@ fn side<'a, C: Frame>(
         ScrewTable { axis: name(axis), share: *share, slide_along, turn_about, through }
     };
     Side {
+        mask: None,
         camera,
         at_zero: is_placed.then(|| Pose {
             origin: origin.map(|mm| length(Length::from_mm(mm))),

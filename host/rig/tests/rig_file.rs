@@ -3,7 +3,9 @@
 
 use nalgebra::{Isometry3, Unit, UnitQuaternion, Vector3};
 use proptest::prelude::*;
-use vergence_rig::{AxisPosition, BENCH_TOML, Chain, Link, Provenance, Rig, RigCalibration, Screw, Shutter};
+use vergence_rig::{
+    AxisPosition, BENCH_TOML, CameraMask, Chain, Link, Provenance, Rig, RigCalibration, Screw, Shutter,
+};
 use vergence_vision::{Angle, Length, Point, Transform};
 
 fn provenance() -> Provenance {
@@ -41,6 +43,21 @@ fn a_rolling_shutter_comes_back_as_it_was() {
     assert_eq!(rolling.span(1280).as_micros(), 18_929);
     let wrong = with("line_time = \"14.8\"", "theta_max").expect_err("it has no unit");
     assert!(wrong.to_string().contains("15us"), "{wrong}");
+}
+
+#[test]
+fn masks_come_back_as_they_were() {
+    let shape = |side: &str| format!("[[{side}.mask]]\nhides = \"outside\"\ncircle = [639.5, 639.5, 620.0]\n");
+    let polygon = "[[left.mask]]\nhides = \"inside\"\npolygon = [[500, 1279], [560, 1100], [720, 1100.5]]\n";
+    let file = "[right]\nmask = \"masks/right.png\"\n";
+    let rig = with(&[&shape("left"), polygon, file].concat(), "[left.camera]").expect("a rig");
+    assert!(matches!(&rig.masks[0], Some(CameraMask::Shapes(shapes)) if shapes.len() == 2), "{:?}", rig.masks);
+    assert_eq!(rig.masks[1].as_ref().and_then(CameraMask::file), Some("masks/right.png".as_ref()));
+    assert_eq!(read_back(&rig).masks, rig.masks);
+    let from_folder = rig.with_masks_from("/rigs".as_ref());
+    assert_eq!(from_folder.masks[1].as_ref().and_then(CameraMask::file), Some("/rigs/masks/right.png".as_ref()));
+    let wrong = with(&shape("right").replace("620.0", "2000"), "[left.camera]").expect_err("it hides nothing");
+    assert!(wrong.to_string().contains("[[right.mask]]: shape 1: it hides no pixel"), "{wrong}");
 }
 
 #[test]

@@ -13,7 +13,10 @@ use crate::failure::Failure;
 pub fn load(path: Option<&Path>) -> Result<Rig, Failure> {
     let Some(path) = path else { return bench() };
     let text = std::fs::read_to_string(path).map_err(|error| Failure::input(path, error))?;
-    Rig::from_toml(&text).map_err(|error| Failure::input(path, error))
+    let rig = Rig::from_toml(&text).map_err(|error| Failure::input(path, error))?;
+    // Whole names, so that they stay right in the files that calibrations write elsewhere.
+    let whole = std::path::absolute(path).map_err(|error| Failure::input(path, error))?;
+    Ok(rig.with_masks_from(whole.parent().unwrap_or(&whole)))
 }
 
 /// The built-in bench with sensors of the same size that have `width` pixels across.

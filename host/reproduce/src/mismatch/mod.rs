@@ -66,13 +66,12 @@ pub struct MismatchPlan {
 }
 
 impl MismatchPlan {
-    /// So many rigs with traced lenses of this kind, of `sigma8_f18` where none is named; `None` for ideal lenses, which have no elements to displace.
+    /// So many rigs with traced lenses of this kind; `None` for ideal lenses, which have no elements to displace.
     #[must_use]
-    pub const fn new(seeds: u32, lens: Option<LensChoice>) -> Option<Self> {
+    pub const fn new(seeds: u32, lens: LensChoice) -> Option<Self> {
         match lens {
-            None => Some(Self { seeds, lens: BuiltIn::Sigma8 }),
-            Some(LensChoice::Traced(lens)) => Some(Self { seeds, lens }),
-            Some(LensChoice::Ideal) => None,
+            LensChoice::Traced(lens) => Some(Self { seeds, lens }),
+            LensChoice::Ideal => None,
         }
     }
 

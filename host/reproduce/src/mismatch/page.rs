@@ -97,10 +97,16 @@ fn said(findings: &MismatchTable) -> String {
             text(model_words(note.model)),
             Cell::Number(fixed(note.corner_px, 3)),
             Cell::Number(format!("{} of {}", note.warned[0], note.warned[1])),
+            Cell::Number(format!("{} of {}", note.refused[0], note.refused[1])),
         ])
     };
-    let heads =
-        ["mismatch", "lens calibrated with", "corners off by, as calibrations find (px)", "clouds with a warning"];
+    let heads = [
+        "mismatch",
+        "lens calibrated with",
+        "corners off by, as calibrations find (px)",
+        "clouds with a warning",
+        "matches refused",
+    ];
     table(&heads, &findings.notes.iter().map(row).collect::<Vec<_>>())
         + &note(&format!(
             "Corners are off by {NOISE_PX} px: a model that does not fit makes them seem worse. The warning is that images and encoders \

@@ -91,6 +91,8 @@ pub fn json(table: &MismatchTable) -> Value {
             "corner_sigma_px": rounded(note.corner_px),
             "clouds_warned": note.warned[0],
             "clouds": note.warned[1],
+            "matches_refused": note.refused[0],
+            "matches": note.refused[1],
         })
     });
     let paper = table.paper();

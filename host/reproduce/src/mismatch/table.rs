@@ -47,6 +47,8 @@ pub struct RowNote {
     pub corner_px: f64,
     /// In how many clouds of how many they warned that images and encoders disagree.
     pub warned: [usize; 2],
+    /// Matches that made no point, of how many.
+    pub refused: [usize; 2],
 }
 
 /// What becomes of a mismatch, where the views choose the model of the lens.
@@ -122,7 +124,10 @@ impl MismatchTable {
             let warned = of_row().flat_map(|trial| trial.warned).filter(|warned| *warned).count();
             let count = of_row().count();
             let corner_px = of_row().map(|trial| trial.corner_px).sum::<f64>() / count.max(1) as f64;
-            notes.push(RowNote { mismatch, model, corner_px, warned: [warned, count * MODES.len()] });
+            let seen: usize = of_row().flat_map(|trial| trial.seen).sum();
+            let made: usize = of_row().map(|trial| trial.sightings.len()).sum();
+            let (warned, refused) = ([warned, count * MODES.len()], [seen.saturating_sub(made), seen]);
+            notes.push(RowNote { mismatch, model, corner_px, warned, refused });
         }
         Self { plan, cells, notes, band: band(plan.seeds) }
     }
@@ -277,6 +282,8 @@ mod tests {
         let sentence = verdict.sentence();
         assert!(sentence.contains("in human mode at 200 mm (depth error 1.0 times as stated, NEES 40)"), "{sentence}");
         assert!(sentence.contains("1 of 2 clouds warn"), "{sentence}");
+        let all = MODES.len() * RANGES_MM.len();
+        assert!(table.notes.iter().all(|note| note.refused[0] == 0 && [0, all].contains(&note.refused[1])));
         let cell = table.cell(Mismatch::Nothing, chosen, 0, 0).unwrap();
         assert!((cell.stated_mm - 0.25 * 0.797_884_560_8).abs() < 1e-9, "{cell:?}");
     }

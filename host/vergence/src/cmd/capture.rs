@@ -9,6 +9,7 @@ use vergence_board::HostClock;
 use vergence_calibration_input::{NAMES, TargetViews, TargetWatch, observe, printed};
 use vergence_camera::{Camera, CameraError, CameraImage, CameraSet};
 use vergence_files::{make_folder, write_png};
+use vergence_rig::Rig;
 use vergence_scene::LensChoice;
 use vergence_sim::{HeldTarget, TargetCamera};
 use vergence_targets::TargetKind;
@@ -61,11 +62,12 @@ pub struct Args {
 
 pub async fn run(args: &Args, common: &CommonOptions, console: Console) -> Result<(), Failure> {
     let target = args.target.checked_spec(args.force, console)?;
-    let cameras = CameraSet::new(open(args, common, &target)?);
+    let rig = rig_file::load(common.rig.as_deref())?;
+    let cameras = CameraSet::new(open(args, &rig, &target)?);
     if args.cameras == ["sim"] {
         console.say(format!("simulated cameras, lens: {}", args.lens))?;
     }
-    capture(cameras, target, args, interrupted(), console).await
+    capture(cameras, target, (args, &rig), interrupted(), console).await
 }
 
 /// Counts of a capture.
@@ -79,7 +81,7 @@ struct Counts {
 async fn capture(
     mut cameras: CameraSet,
     target: TargetKind,
-    args: &Args,
+    (args, rig): (&Args, &Rig),
     interruption: impl Future<Output = ()>,
     console: Console,
 ) -> Result<(), Failure> {
@@ -101,7 +103,7 @@ async fn capture(
             }
         };
         if let (0, Some(left), Some(right)) = (counts.images, images.first(), images.last()) {
-            watch = TargetWatch::of_cameras(&images, args.masks.read([left.size(), right.size()])?);
+            watch = TargetWatch::of_cameras(&images, args.masks.read_for(rig, [left.size(), right.size()])?);
         }
         counts = Counts { images: counts.images + 1, alone: cameras.alone(), missed: cameras.missed() };
         let is_wanted = watch.observe(views) && watch.is_news();
@@ -176,17 +178,16 @@ fn first_free(folder: &Path) -> usize {
     (0..).find(is_free).unwrap_or_default()
 }
 
-fn open(args: &Args, common: &CommonOptions, target: &TargetKind) -> Result<Vec<Box<dyn Camera>>, Failure> {
+fn open(args: &Args, rig: &Rig, target: &TargetKind) -> Result<Vec<Box<dyn Camera>>, Failure> {
     if args.cameras == ["sim"] {
         args.camera.none_for_simulated()?;
-        return simulated(args, common, target);
+        return Ok(simulated(args, rig, target));
     }
     let clock = HostClock::start();
     Ok(args.cameras.iter().map(|device| args.camera.open(device, clock)).collect::<Result<_, CameraError>>()?)
 }
 
-fn simulated(args: &Args, common: &CommonOptions, target: &TargetKind) -> Result<Vec<Box<dyn Camera>>, Failure> {
-    let rig = rig_file::load(common.rig.as_deref())?;
+fn simulated(args: &Args, rig: &Rig, target: &TargetKind) -> Vec<Box<dyn Camera>> {
     let targets = rig.mode("human").map(|mode| mode.targets.iter().map(|target| target.value()).collect::<Vec<_>>());
     let pose = rig.pose_at_values(&targets.unwrap_or_default());
     let held = HeldTarget {
@@ -197,10 +198,7 @@ fn simulated(args: &Args, common: &CommonOptions, target: &TargetKind) -> Result
         seed: args.seed,
     };
     let sides = if args.mono { &[Side::Left][..] } else { &[Side::Left, Side::Right] };
-    Ok(sides
-        .iter()
-        .map(|&side| Box::new(TargetCamera::new(held, side).with_lens(args.lens)) as Box<dyn Camera>)
-        .collect())
+    sides.iter().map(|&side| Box::new(TargetCamera::new(held, side).with_lens(args.lens)) as Box<dyn Camera>).collect()
 }
 
 #[cfg(test)]
@@ -276,7 +274,7 @@ mod tests {
             }
         };
         let cameras = CameraSet::new(vec![Box::new(camera)]);
-        (image, capture(cameras, target, &args, interruption, Console::new(true)).await)
+        (image, capture(cameras, target, (&args, &rig), interruption, Console::new(true)).await)
     }
 
     #[tokio::test]

@@ -11,7 +11,7 @@ use vergence_output::check_folder;
 use vergence_protocol::SessionId;
 use vergence_reproduce::corridor::{Comparison, Corridor, Sight, WIDTH, compare};
 use vergence_reproduce::demo::{Pulse, SimulatedPair};
-use vergence_reproduce::{DemoError, LensedRig};
+use vergence_reproduce::{DemoError, LensedRig, TRUE_LENS};
 use vergence_rig::{Rig, rounded};
 use vergence_scene::LensChoice;
 
@@ -32,10 +32,11 @@ pub struct Args {
     /// Sets where the stages stand at first and the noise of the images. The same seed gives the same bytes.
     #[arg(long, default_value_t = 1)]
     seed: u64,
-    /// The lenses of the simulated cameras: ideal, as the rig's file has them, or a published design that is traced, sigma8_f18 or
-    /// nikkor6_f28. A rig with traced lenses is calibrated first, from simulated targets, and measured by the file that this gives, rig.toml.
-    #[arg(long, default_value_t, conflicts_with = "corridors")]
-    lens: LensChoice,
+    /// The lenses of the simulated cameras: a published design that is traced, sigma8_f18 or nikkor6_f28, or ideal, as the rig's file has
+    /// them. Without it sigma8_f18, and ideal ones of a rig with a trunk. A rig with traced lenses is calibrated first, from simulated targets,
+    /// and measured by the file that this gives, rig.toml.
+    #[arg(long, conflicts_with = "corridors")]
+    lens: Option<LensChoice>,
     /// The folder for clouds and pictures.
     #[arg(long, default_value = "vergence-demo", value_name = "DIR")]
     out: PathBuf,
@@ -64,11 +65,11 @@ pub async fn run(args: &Args, common: &CommonOptions, console: Console) -> Resul
         return compared(count, rig, console, &whole).await;
     }
     make_folder(&args.out)?;
+    let lens = args.lens.unwrap_or(if rig.trunk.is_some() { LensChoice::Ideal } else { TRUE_LENS });
     // Other lenses of a trunk are refused below.
-    if rig.trunk.is_some() && args.lens == LensChoice::Ideal {
+    if rig.trunk.is_some() && lens == LensChoice::Ideal {
         return corridor(args, rig, console, &whole).await;
     }
-    let lensed = lensed(&rig, (args.lens, args.seed), Some(&args.out), console).await?;
     let (all, measured) = (rig.modes.len(), Cell::new(0));
     let modes = tokio::select! {
         // The simulated board ends with this process: nothing has to be disarmed.
@@ -78,10 +79,10 @@ pub async fn run(args: &Args, common: &CommonOptions, console: Console) -> Resul
             measured.get(),
             args.out.display()
         ))),
-        modes = every_mode(args, common, (rig, lensed), &measured, console) => modes,
+        modes = every_mode(args, lens, common, rig, &measured, console) => modes,
     }?;
     console.say(format!("clouds and pictures are in {}; {:.1} s in all", args.out.display(), whole.seconds()))?;
-    console.result(&json!({ "lens": args.lens.to_string(), "modes": modes, "seconds": rounded(whole.seconds()) }))
+    console.result(&json!({ "lens": lens.to_string(), "modes": modes, "seconds": rounded(whole.seconds()) }))
 }
 
 /// Plays the robot's story in a simulated corridor.
@@ -151,15 +152,17 @@ async fn compared(count: u32, rig: Rig, console: Console, whole: &Stopwatch) -> 
 /// Homes the rig and measures in every mode; counts them in `measured`.
 async fn every_mode(
     args: &Args,
+    lens: LensChoice,
     common: &CommonOptions,
-    (drawn, lensed): (Rig, LensedRig),
+    drawn: Rig,
     measured: &Cell<usize>,
     console: Console,
 ) -> Result<Vec<Value>, Failure> {
+    let LensedRig { lenses, known, .. } = lensed(&drawn, (lens, args.seed), Some(&args.out), console).await?;
     let simulated = SharedRig::new(SimulatedRig::new(&drawn, args.seed)?);
     let (session, progress) = (SessionId((args.seed as u32).max(1)), console.progress("homing"));
-    let mut board = board_of(&simulated, lensed.known, session, common.lease, progress.clone()).await?;
-    let cameras = Arc::new(SimulatedPair::new(lensed.lenses, &simulated, args.seed));
+    let mut board = board_of(&simulated, known, session, common.lease, progress.clone()).await?;
+    let cameras = Arc::new(SimulatedPair::new(lenses, &simulated, args.seed));
     let modes = board.armed(pending(), async |board| -> Result<_, Failure> {
         board.home().await?;
         let mut modes = Vec::new();

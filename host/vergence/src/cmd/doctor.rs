@@ -6,6 +6,7 @@ use serde_json::json;
 use vergence_board::{BoardChecks, Finding, Verdict, check_board, check_cameras, check_port};
 
 use super::connect::{connect, is_wire, port};
+use super::mask_options::MaskOptions;
 use super::options::active_rig;
 use crate::cli::CommonOptions;
 use crate::console::Console;
@@ -58,7 +59,8 @@ fn check_rig(common: &CommonOptions) -> (Option<PathBuf>, Finding) {
         (None, Ok(active)) => (active, true),
         (None, Err(failure)) => return (None, Finding::fail("rig", failure.to_string(), MEND)),
     };
-    let finding = match (rig_file::load(path.as_deref()), &path) {
+    let rig = rig_file::load(path.as_deref()).and_then(|rig| MaskOptions::default().read(&rig).map(|_| rig));
+    let finding = match (rig, &path) {
         (Err(failure), _) => Finding::fail("rig", failure.to_string(), MEND),
         (Ok(rig), Some(path)) => {
             let active = if is_active { "the active calibration, " } else { "" };

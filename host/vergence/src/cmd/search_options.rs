@@ -63,7 +63,7 @@ impl SearchOptions {
     /// # Errors
     /// Ranges that are none or leave nothing between them; files that are no masks of these cameras.
     pub fn search(&self, rig: &Rig) -> Result<Search, Failure> {
-        let masks = self.masks.read([rig.left_camera.size(), rig.right_camera.size()])?;
-        Search::between(self.nearest, self.farthest, masks).map_err(|error| Failure::usage(error.to_string()))
+        Search::between(self.nearest, self.farthest, self.masks.read(rig)?)
+            .map_err(|error| Failure::usage(error.to_string()))
     }
 }

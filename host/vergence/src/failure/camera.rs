@@ -11,6 +11,7 @@ impl From<CameraError> for Failure {
             CameraError::Unreadable { .. }
             | CameraError::NotAnImage { .. }
             | CameraError::Mask { .. }
+            | CameraError::Shapes(_)
             | CameraError::Unpaired { .. }
             | CameraError::Size { .. }
             | CameraError::NoImages(_)

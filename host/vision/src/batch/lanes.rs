@@ -30,6 +30,13 @@ pub(super) fn polynomial<const FUSED: bool, const W: usize>(coefficients: &[f64]
     sum
 }
 
+/// The same for one number.
+#[inline(always)]
+pub(super) fn polynomial_at<const FUSED: bool>(coefficients: &[f64], t: f64) -> f64 {
+    let [sum] = polynomial::<FUSED, 1>(coefficients, &[t]);
+    sum
+}
+
 /// Appends the kernel's results for all `rows` to `out`, `W` rows at a time, so that reading, computing and writing
 /// overlap.
 #[inline(always)]

@@ -1,6 +1,6 @@
 //! Batch kernels: many points at once, on one thread, in plain arrays.
 //!
-//! The kernels are branch-free functions on arrays of lanes, which the compiler turns into vector instructions: the
+//! The kernels are branch-free functions on arrays of lanes, or of one row in long loops, which the compiler turns into vector instructions: the
 //! best ones found at run time (AVX-512, or AVX2 and FMA), or those that every processor of the target has. The two
 //! differ in the last bits, so results that must repeat to the bit on any machine come from the single-point functions.
 //!

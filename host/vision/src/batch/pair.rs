@@ -14,16 +14,16 @@
 
 use multiversion::multiversion;
 use multiversion::target::target_cfg_f;
-use nalgebra::Matrix3;
+use nalgebra::{Matrix3, Vector3};
 
 use super::Instructions;
-use super::lanes::{ALWAYS_FUSED, Kernel};
-use super::pairs::{NARROW, WIDE, for_pairs};
+use super::lanes::ALWAYS_FUSED;
+use super::pairs::{Rows, for_pairs};
 use super::shared_errors::{ByPose, SharedErrors};
 use super::slope::LensSlope;
 use super::triangulate::Triangulate;
-use super::vectors::{Vectors, cross, dot, scaled, turned};
-use crate::lens_derivatives::{LENS_PARAMETERS, PUPIL};
+use super::vectors::{cross, dot, turned};
+use crate::lens_derivatives::{CENTRAL_PARAMETERS, LENS_PARAMETERS};
 use crate::{
     Angle, KannalaBrandt, Left, Point, PointUncertainty, Right, SharedCovariance, StereoPair, Transform, UnitRay,
     pseudo_intersection,
@@ -42,7 +42,7 @@ pub struct BatchPair {
     instructions: Instructions,
 }
 
-/// A pair of which a lens is not central, or not known to be: its points are made one by one.
+/// A pair of which a lens is not central and symmetric, or not known to be: its points are made one by one.
 #[derive(Clone, Debug, PartialEq)]
 struct OneByOne {
     lenses: [KannalaBrandt; 2],
@@ -103,7 +103,7 @@ impl BatchPair {
         }
         match self.instructions {
             Instructions::Best => best(self, rays, out),
-            Instructions::Baseline => all::<ALWAYS_FUSED, NARROW>(self, rays, out),
+            Instructions::Baseline => all::<ALWAYS_FUSED>(self, rays, out),
         }
     }
 }
@@ -111,9 +111,11 @@ impl BatchPair {
 impl OneByOne {
     fn of(pair: &StereoPair<'_>, pixel_sigma: f64, shared: &SharedCovariance) -> Option<Self> {
         let lenses = [*pair.left, *pair.right];
-        let known = |first: usize| shared.matrix()[(first + PUPIL, first + PUPIL)] == 0.0;
-        let is_central = pair.is_central() && known(0) && known(LENS_PARAMETERS);
-        (!is_central).then_some(Self { lenses, left_from_right: pair.left_from_right, pixel_sigma, shared: *shared })
+        let is_known = |parameter: usize| shared.matrix()[(parameter, parameter)] == 0.0;
+        let is_plain = lenses.iter().zip([0, LENS_PARAMETERS]).all(|(lens, first)| {
+            lens.fits_opencv() && (first + CENTRAL_PARAMETERS..first + LENS_PARAMETERS).all(is_known)
+        });
+        (!is_plain).then_some(Self { lenses, left_from_right: pair.left_from_right, pixel_sigma, shared: *shared })
     }
 
     fn add(&self, left: &[f64; 3], right: &[f64; 3], out: &mut BatchPoints) {
@@ -146,103 +148,106 @@ impl BatchPoints {
 
 #[multiversion(targets("x86_64+avx512f+avx512dq+avx512vl+avx2+fma", "x86_64+avx2+fma"))]
 fn best(pair: &BatchPair, rays: [&[[f64; 3]]; 2], out: &mut BatchPoints) {
-    let (is_wide, is_fused) = (target_cfg_f!(target_feature = "avx512f"), target_cfg_f!(target_feature = "fma"));
-    match (is_wide, is_fused) {
-        (true, _) => all::<true, WIDE>(pair, rays, out),
-        (false, true) => all::<true, NARROW>(pair, rays, out),
-        (false, false) => all::<ALWAYS_FUSED, NARROW>(pair, rays, out),
+    if target_cfg_f!(target_feature = "fma") {
+        all::<true>(pair, rays, out);
+    } else {
+        all::<ALWAYS_FUSED>(pair, rays, out);
     }
 }
 
 #[inline(always)]
-fn all<const FUSED: bool, const W: usize>(pair: &BatchPair, rays: [&[[f64; 3]]; 2], out: &mut BatchPoints) {
-    for_pairs::<FUSED, W, 9, 6>(pair, rays, &mut out.points, &mut out.covariances);
+fn all<const FUSED: bool>(pair: &BatchPair, rays: [&[[f64; 3]]; 2], out: &mut BatchPoints) {
+    for_pairs::<FUSED, ROWS, 6>(pair, rays, &mut out.points, &mut out.covariances);
 }
 
-/// A point P per lane, Q = P - t, the unit normal of the epipolar plane, and how far turns of the rays move the point.
-struct Geometry<const W: usize> {
-    point: Vectors<W>,
-    from_right: Vectors<W>,
-    normal: Vectors<W>,
+/// Rows per step. The loop over them is so long that the compiler makes vectors of its rounds: shorter ones it unrolls, and then finds half of
+/// the arithmetic of the lenses' geometry one row at a time. The loops within a row must be short enough to be unrolled, some 300 instructions
+/// each; one that stays a loop keeps all from becoming vectors, and costs three times the time.
+const ROWS: usize = 64;
+
+/// A point P, Q = P - t, the unit normal of the epipolar plane, and how far turns of the rays move the point.
+struct Geometry {
+    point: Vector3<f64>,
+    from_right: Vector3<f64>,
+    normal: Vector3<f64>,
     /// 1 / λ and 1 / μ, in 1/mm.
-    per_range: [[f64; W]; 2],
+    per_range: [f64; 2],
     /// λ² / A and -μ² / A: movement along Q and P per turn in the plane.
-    in_plane: [[f64; W]; 2],
+    in_plane: [f64; 2],
     /// λ / 2 and μ / 2: movement along the normal, in mm, per turn across the plane.
-    across: [[f64; W]; 2],
+    across: [f64; 2],
 }
 
-impl Kernel<6, 9> for BatchPair {
+impl Rows<ROWS, 6> for BatchPair {
     #[inline(always)]
-    fn lanes<const FUSED: bool, const W: usize>(&self, [ux, uy, uz, vx, vy, vz]: [[f64; W]; 6]) -> [[f64; W]; 9] {
-        let right = turned::<FUSED, W>(&self.left_from_right, &[vx, vy, vz]);
-        let at = Geometry::of::<FUSED>(&self.place, &[ux, uy, uz], &right);
-        let [left_lens, right_lens] = &self.lenses;
-        let mut left = left_lens.at::<FUSED, W>(&at.point, &at.per_range[0], &at.normal);
-        let from_right = turned::<FUSED, W>(&self.right_from_left, &at.from_right);
-        let normal = turned::<FUSED, W>(&self.right_from_left, &at.normal);
-        let mut right = right_lens.at::<FUSED, W>(&from_right, &at.per_range[1], &normal);
-        let mut pose = at.turns_by_pose::<FUSED>();
-        scale(&mut left.turns, [&at.in_plane[0], &at.across[0]]);
-        scale(&mut right.turns, [&at.in_plane[1], &at.across[1]]);
-        scale(&mut pose, [&at.in_plane[1], &at.across[1]]);
-        let moved = self.shared.moved::<FUSED, W>(&left, &right, &pose);
-        let [xx, xy, xz, yy, yz, zz] = in_space::<FUSED, W>(&moved, &[at.from_right, at.point, at.normal]);
-        let [x, y, z] = at.point;
-        [x, y, z, xx, xy, xz, yy, yz, zz]
+    fn rows<const FUSED: bool>(
+        &self,
+        left: &[[f64; 3]; ROWS],
+        right: &[[f64; 3]; ROWS],
+    ) -> ([[f64; 3]; ROWS], [[f64; 6]; ROWS]) {
+        let (mut points, mut covariances) = ([[0.0; 3]; ROWS], [[0.0; 6]; ROWS]);
+        for j in 0..ROWS {
+            (points[j], covariances[j]) = self.row::<FUSED>(&left[j].into(), &right[j].into());
+        }
+        (points, covariances)
     }
 }
 
-impl<const W: usize> Geometry<W> {
+impl BatchPair {
+    /// The point of two rays, each in its own camera's frame, and its covariance.
+    #[inline(always)]
+    fn row<const FUSED: bool>(&self, left: &Vector3<f64>, right: &Vector3<f64>) -> ([f64; 3], [f64; 6]) {
+        let at = Geometry::of::<FUSED>(&self.place, left, &turned::<FUSED>(&self.left_from_right, right));
+        let [left_lens, right_lens] = &self.lenses;
+        let mut left = left_lens.at::<FUSED>(&at.point, at.per_range[0], &at.normal);
+        let from_right = turned::<FUSED>(&self.right_from_left, &at.from_right);
+        let normal = turned::<FUSED>(&self.right_from_left, &at.normal);
+        let mut right = right_lens.at::<FUSED>(&from_right, at.per_range[1], &normal);
+        let mut pose = at.turns_by_pose::<FUSED>();
+        scale(&mut left.turns, [at.in_plane[0], at.across[0]]);
+        scale(&mut right.turns, [at.in_plane[1], at.across[1]]);
+        scale(&mut pose, [at.in_plane[1], at.across[1]]);
+        let moved = self.shared.moved::<FUSED>(&left, &right, &pose);
+        (at.point.into(), in_space::<FUSED>(&moved, [&at.from_right, &at.point, &at.normal]))
+    }
+}
+
+impl Geometry {
     /// Everything is NaN where the rays make no point.
     #[inline(always)]
-    fn of<const FUSED: bool>(place: &Triangulate, u: &Vectors<W>, v: &Vectors<W>) -> Self {
-        let mut out = Self {
-            point: [[0.0; W]; 3],
-            from_right: [[0.0; W]; 3],
-            normal: [[0.0; W]; 3],
-            per_range: [[0.0; W]; 2],
-            in_plane: [[0.0; W]; 2],
-            across: [[0.0; W]; 2],
-        };
-        for j in 0..W {
-            let (u, v) = ([u[0][j], u[1][j], u[2][j]].into(), [v[0][j], v[1][j], v[2][j]].into());
-            let place = place.place::<FUSED>(&u, &v);
-            let per_area = 1.0 / place.area_squared.sqrt() + place.valid;
-            for axis in 0..3 {
-                out.point[axis][j] = place.point[axis] + place.valid;
-                out.from_right[axis][j] = place.from_right[axis];
-                out.normal[axis][j] = place.area[axis] * per_area;
-            }
-            let (left_range, right_range) = (place.left_squared.sqrt(), place.right_squared.sqrt());
-            (out.per_range[0][j], out.per_range[1][j]) = (1.0 / left_range, 1.0 / right_range);
-            out.in_plane[0][j] = place.left_squared * per_area;
-            out.in_plane[1][j] = -place.right_squared * per_area;
-            (out.across[0][j], out.across[1][j]) = (0.5 * left_range, 0.5 * right_range);
+    fn of<const FUSED: bool>(place: &Triangulate, u: &Vector3<f64>, v: &Vector3<f64>) -> Self {
+        let place = place.place::<FUSED>(u, v);
+        let area = place.area_squared.sqrt();
+        let (left_range, right_range) = (place.left_squared.sqrt(), place.right_squared.sqrt());
+        // The three inverses by one division.
+        let per_ranges = 1.0 / (area * (left_range * right_range)) + place.valid;
+        let per_area = left_range * right_range * per_ranges;
+        Self {
+            point: place.point.add_scalar(place.valid),
+            from_right: place.from_right,
+            normal: place.area * per_area,
+            per_range: [area * right_range * per_ranges, area * left_range * per_ranges],
+            in_plane: [place.left_squared * per_area, -place.right_squared * per_area],
+            across: [0.5 * left_range, 0.5 * right_range],
         }
-        out
     }
 
     /// The turn of the right ray in the epipolar plane, then across it, by the turn and the shift of the right camera.
     #[inline(always)]
-    fn turns_by_pose<const FUSED: bool>(&self) -> [ByPose<W>; 2] {
-        let per_range = &self.per_range[1];
-        let [nx, ny, nz] = self.normal;
-        let [wx, wy, wz] = scaled(per_range, &cross::<FUSED, W>(&self.normal, &self.from_right));
-        let [mx, my, mz] = scaled(&[-1.0; W], &[wx, wy, wz]);
-        let ([dx, dy, dz], [ex, ey, ez]) = (scaled(per_range, &[wx, wy, wz]), scaled(per_range, &self.normal));
-        [[nx, ny, nz, dx, dy, dz], [mx, my, mz, ex, ey, ez]]
+    fn turns_by_pose<const FUSED: bool>(&self) -> [ByPose; 2] {
+        let per_range = self.per_range[1];
+        let (n, w) = (&self.normal, cross::<FUSED>(&self.normal, &self.from_right) * per_range);
+        let (d, e) = (w * per_range, n * per_range);
+        [[n.x, n.y, n.z, d.x, d.y, d.z], [-w.x, -w.y, -w.z, e.x, e.y, e.z]]
     }
 }
 
 /// Multiplies each row by a factor.
 #[inline(always)]
-fn scale<const W: usize, const N: usize>(rows: &mut [[[f64; W]; N]; 2], factors: [&[f64; W]; 2]) {
+fn scale<const N: usize>(rows: &mut [[f64; N]; 2], factors: [f64; 2]) {
     for (row, factor) in rows.iter_mut().zip(factors) {
         for value in row {
-            for j in 0..W {
-                value[j] *= factor[j];
-            }
+            *value *= factor;
         }
     }
 }
@@ -250,22 +255,10 @@ fn scale<const W: usize, const N: usize>(rows: &mut [[[f64; W]; N]; 2], factors:
 /// The upper triangle, by rows, of the covariance of a sum of `directions` whose factors have the covariance `moved`, an
 /// upper triangle too.
 #[inline(always)]
-fn in_space<const FUSED: bool, const W: usize>(
-    [aa, ab, ac, bb, bc, cc]: &[[f64; W]; 6],
-    [a, b, c]: &[Vectors<W>; 3],
-) -> [[f64; W]; 6] {
-    let axes = [[a[0], b[0], c[0]], [a[1], b[1], c[1]], [a[2], b[2], c[2]]];
-    let mut inner = axes;
-    for (inner, axis) in inner.iter_mut().zip(&axes) {
-        *inner = [
-            dot::<FUSED, W>(&[*aa, *ab, *ac], axis),
-            dot::<FUSED, W>(&[*ab, *bb, *bc], axis),
-            dot::<FUSED, W>(&[*ac, *bc, *cc], axis),
-        ];
-    }
-    let mut out = [[0.0; W]; 6];
-    for (out, (row, column)) in out.iter_mut().zip([(0, 0), (0, 1), (0, 2), (1, 1), (1, 2), (2, 2)]) {
-        *out = dot::<FUSED, W>(&axes[row], &inner[column]);
-    }
-    out
+fn in_space<const FUSED: bool>(&[aa, ab, ac, bb, bc, cc]: &[f64; 6], [a, b, c]: [&Vector3<f64>; 3]) -> [f64; 6] {
+    let (axis, dot) = (|i: usize| Vector3::new(a[i], b[i], c[i]), dot::<FUSED>);
+    let [from_a, from_b, from_c] = [Vector3::new(aa, ab, ac), Vector3::new(ab, bb, bc), Vector3::new(ac, bc, cc)];
+    let inner = |i: usize| Vector3::new(dot(&from_a, &axis(i)), dot(&from_b, &axis(i)), dot(&from_c, &axis(i)));
+    let [x, y, z] = [inner(0), inner(1), inner(2)];
+    [dot(&axis(0), &x), dot(&axis(0), &y), dot(&axis(0), &z), dot(&axis(1), &y), dot(&axis(1), &z), dot(&axis(2), &z)]
 }

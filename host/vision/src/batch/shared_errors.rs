@@ -1,4 +1,4 @@
-//! What errors of lenses, pose and pixels do to points, for every lane.
+//! What errors of lenses, pose and pixels do to a point.
 //!
 //! With φ the relative errors of the focal lengths, c those of the centre, κᵢ = f δkᵢ, and v divided by the lens's aspect, a wrong lens
 //! moves the pixel of a ray by
@@ -12,7 +12,7 @@
 
 use nalgebra::SMatrix;
 
-use super::lanes::{multiply_add, polynomial};
+use super::lanes::{multiply_add, polynomial_at};
 use super::slope::{InImage, View};
 use crate::lens_derivatives::{CENTRAL_PARAMETERS, LENS_PARAMETERS};
 use crate::{KannalaBrandt, SHARED_PARAMETERS, SharedCovariance};
@@ -27,8 +27,8 @@ const TERMS: usize = 5;
 
 /// Covariances of one number with the parameters of a lens.
 type WithLens = [f64; CENTRAL_PARAMETERS];
-/// The derivatives of one number by the pose, for each lane.
-pub(super) type ByPose<const W: usize> = [[f64; W]; POSE_PARAMETERS];
+/// The derivatives of one number by the pose.
+pub(super) type ByPose = [f64; POSE_PARAMETERS];
 
 /// The covariance of all that a pair shares, in the parameters above, and of the noise of its pixels.
 #[derive(Clone, Debug, PartialEq)]
@@ -36,8 +36,8 @@ pub(super) struct SharedErrors {
     lenses: [LensErrors; 2],
     /// For each parameter of the right lens, the covariances with the left one.
     left_with_right: [WithLens; CENTRAL_PARAMETERS],
-    /// For each parameter of the pose, the covariances with the left lens and with the right one.
-    lenses_with_pose: [[WithLens; 2]; POSE_PARAMETERS],
+    /// Of the left and of the right lens, for each parameter of the pose, the covariances with it.
+    lenses_with_pose: [[WithLens; POSE_PARAMETERS]; 2],
     pose: [[f64; POSE_PARAMETERS]; POSE_PARAMETERS],
 }
 
@@ -70,7 +70,7 @@ impl SharedErrors {
         Self {
             lenses: [own(lenses[0], 0), own(lenses[1], RIGHT)],
             left_with_right: std::array::from_fn(|k| with_lens(0, RIGHT + k)),
-            lenses_with_pose: std::array::from_fn(|k| [with_lens(0, POSE + k), with_lens(RIGHT, POSE + k)]),
+            lenses_with_pose: [0, RIGHT].map(|first| std::array::from_fn(|k| with_lens(first, POSE + k))),
             pose: std::array::from_fn(|i| std::array::from_fn(|k| covariance(POSE + i, POSE + k))),
         }
     }
@@ -78,77 +78,54 @@ impl SharedErrors {
     /// The covariance of three movements of a point, as upper triangle by rows. The first is by the left pixel, the second by the
     /// right pixel and the pose, the third by all: `left` and `right` hold the movements per pixel, `pose` those of the second and third.
     #[inline(always)]
-    pub(super) fn moved<const FUSED: bool, const W: usize>(
-        &self,
-        left: &View<W>,
-        right: &View<W>,
-        pose: &[ByPose<W>; 2],
-    ) -> [[f64; W]; 6] {
+    pub(super) fn moved<const FUSED: bool>(&self, left: &View, right: &View, pose: &[ByPose; 2]) -> [f64; 6] {
         let ([by_left, all_left], [by_right, all_right]) = (&left.turns, &right.turns);
-        let (noise_left, noise_right) = (self.lenses[0].of::<FUSED, W>(left), self.lenses[1].of::<FUSED, W>(right));
+        let (noise_left, noise_right) = (self.lenses[0].of::<FUSED>(left), self.lenses[1].of::<FUSED>(right));
         // The covariance of a pixel with the second and with the third movement.
-        let (mut left_with, mut right_with) = (self.left_with_right::<FUSED, W>(left, right), [[[0.0; W]; 2]; 2]);
-        for (k, [with_left, with_right]) in self.lenses_with_pose.iter().enumerate() {
-            let left_shift = shift::<FUSED, W>(left, &spread(with_left));
-            let right_shift = shift::<FUSED, W>(right, &spread(with_right));
-            for (row, by_pose) in pose.iter().enumerate() {
-                add_scaled::<FUSED, W>(&mut left_with[row], &left_shift, &by_pose[k]);
-                add_scaled::<FUSED, W>(&mut right_with[row], &right_shift, &by_pose[k]);
-            }
-        }
-        let [mut uu, mut un, mut nn] = self.by_pose::<FUSED, W>(pose);
-        let (mut vv, mut vu, mut vn) = ([0.0; W], [0.0; W], [0.0; W]);
-        let left_own = through::<FUSED, W>(&noise_left, by_left);
-        add_dot::<FUSED, W>(&mut vv, by_left, &left_own);
-        add_dot::<FUSED, W>(&mut vn, all_left, &left_own);
-        add_dot::<FUSED, W>(&mut nn, all_left, &through::<FUSED, W>(&noise_left, all_left));
-        add_dot::<FUSED, W>(&mut vu, by_left, &left_with[0]);
-        add_dot::<FUSED, W>(&mut vn, by_left, &left_with[1]);
-        add_dot::<FUSED, W>(&mut un, all_left, &left_with[0]);
-        add_dot::<FUSED, W>(&mut nn, all_left, &twice(&left_with[1]));
-        let right_own = through::<FUSED, W>(&noise_right, by_right);
-        add_dot::<FUSED, W>(&mut uu, by_right, &right_own);
-        add_dot::<FUSED, W>(&mut un, all_right, &right_own);
-        add_dot::<FUSED, W>(&mut nn, all_right, &through::<FUSED, W>(&noise_right, all_right));
-        add_dot::<FUSED, W>(&mut uu, by_right, &twice(&right_with[0]));
-        add_dot::<FUSED, W>(&mut un, all_right, &right_with[0]);
-        add_dot::<FUSED, W>(&mut un, by_right, &right_with[1]);
-        add_dot::<FUSED, W>(&mut nn, all_right, &twice(&right_with[1]));
+        let (mut left_with, mut right_with) = (self.left_with_right::<FUSED>(left, right), [[0.0; 2]; 2]);
+        add_with_pose::<FUSED>(&mut left_with, left, &self.lenses_with_pose[0], pose);
+        add_with_pose::<FUSED>(&mut right_with, right, &self.lenses_with_pose[1], pose);
+        let dot = dot::<FUSED>;
+        let [pose_uu, pose_un, pose_nn] = self.by_pose::<FUSED>(pose);
+        let left_own = through::<FUSED>(&noise_left, by_left);
+        let left_all = sum(&through::<FUSED>(&noise_left, all_left), &twice(&left_with[1]));
+        let right_own = sum(&through::<FUSED>(&noise_right, by_right), &twice(&right_with[0]));
+        let right_all = sum(&through::<FUSED>(&noise_right, all_right), &twice(&right_with[1]));
+        let right_both = sum(&through::<FUSED>(&noise_right, by_right), &right_with[0]);
+        let vv = dot(by_left, &left_own, 0.0);
+        let vu = dot(by_left, &left_with[0], 0.0);
+        let vn = dot(all_left, &left_own, dot(by_left, &left_with[1], 0.0));
+        let uu = dot(by_right, &right_own, pose_uu);
+        let un = dot(all_left, &left_with[0], dot(all_right, &right_both, dot(by_right, &right_with[1], pose_un)));
+        let nn = dot(all_left, &left_all, dot(all_right, &right_all, pose_nn));
         [vv, vu, vn, uu, un, nn]
     }
 
     /// The covariance of the left pixel with each of both movements by the right pixel, as far as the lenses are correlated.
     #[inline(always)]
-    fn left_with_right<const FUSED: bool, const W: usize>(&self, left: &View<W>, right: &View<W>) -> [InImage<W>; 2] {
-        let mut with_lens = [[[0.0; W]; CENTRAL_PARAMETERS]; 2];
+    fn left_with_right<const FUSED: bool>(&self, left: &View, right: &View) -> [InImage; 2] {
+        let mut with_lens = [[0.0; CENTRAL_PARAMETERS]; 2];
         for (k, covariances) in self.left_with_right.iter().enumerate() {
-            [with_lens[0][k], with_lens[1][k]] = shift::<FUSED, W>(left, &spread(covariances));
+            [with_lens[0][k], with_lens[1][k]] = shift::<FUSED>(left, covariances);
         }
-        let mut out = [[[0.0; W]; 2]; 2];
-        for (axis, with_lens) in with_lens.iter().enumerate() {
-            let shifted = shift::<FUSED, W>(right, with_lens);
-            for (out, by_right) in out.iter_mut().zip(&right.turns) {
-                add_dot::<FUSED, W>(&mut out[axis], &shifted, by_right);
-            }
-        }
-        out
+        let [of_u, of_v] = with_lens.map(|with_lens| shift::<FUSED>(right, &with_lens));
+        right.turns.map(|by_right| [dot::<FUSED>(&of_u, &by_right, 0.0), dot::<FUSED>(&of_v, &by_right, 0.0)])
     }
 
     /// The covariance of two movements by the pose: variance of the first, covariance, variance of the second.
     #[inline(always)]
-    fn by_pose<const FUSED: bool, const W: usize>(&self, [first, second]: &[ByPose<W>; 2]) -> [[f64; W]; 3] {
-        let mut out = [[0.0; W]; 3];
-        for (i, covariances) in self.pose.iter().enumerate() {
-            let (mut with_first, mut with_second) = ([0.0; W], [0.0; W]);
-            for (k, covariance) in covariances.iter().enumerate() {
-                add_product::<FUSED, W>(&mut with_first, &[*covariance; W], &first[k]);
-                add_product::<FUSED, W>(&mut with_second, &[*covariance; W], &second[k]);
-            }
-            add_product::<FUSED, W>(&mut out[0], &with_first, &first[i]);
-            add_product::<FUSED, W>(&mut out[1], &with_first, &second[i]);
-            add_product::<FUSED, W>(&mut out[2], &with_second, &second[i]);
-        }
-        out
+    fn by_pose<const FUSED: bool>(&self, [first, second]: &[ByPose; 2]) -> [f64; 3] {
+        let (with_first, with_second) = (self.with_pose::<FUSED>(first), self.with_pose::<FUSED>(second));
+        let dot = product::<FUSED, POSE_PARAMETERS>;
+        [dot(&with_first, first), dot(&with_first, second), dot(&with_second, second)]
+    }
+
+    /// The covariances of the pose's parameters with one movement by the pose.
+    #[inline(always)]
+    fn with_pose<const FUSED: bool>(&self, movement: &ByPose) -> ByPose {
+        let [a, b, c, d, e, f] = &self.pose;
+        let dot = product::<FUSED, POSE_PARAMETERS>;
+        [dot(a, movement), dot(b, movement), dot(c, movement), dot(d, movement), dot(e, movement), dot(f, movement)]
     }
 }
 
@@ -182,92 +159,73 @@ impl LensErrors {
 
     /// The covariance of the pixel: variance of u, covariance, variance of v.
     #[inline(always)]
-    fn of<const FUSED: bool, const W: usize>(&self, view: &View<W>) -> [[f64; W]; 3] {
-        let View { place: [x, y], squared, .. } = view;
-        let [factor_uu, factor_uv, factor_vv] = &self.factors;
+    fn of<const FUSED: bool>(&self, &View { place: [x, y], squared, .. }: &View) -> [f64; 3] {
+        let (fused, at) = (multiply_add::<FUSED>, |terms: &[f64]| polynomial_at::<FUSED>(terms, squared));
+        let [squares_u, products, squares_v] = &self.factors;
         let [u_with_u, u_with_v, v_with_u, v_with_v] = &self.with_centre;
-        let [mut uu, mut uv, mut vv] = [[0.0; W]; 3];
-        let (squares, once) = (polynomial::<FUSED, W>(factor_uu, squared), polynomial::<FUSED, W>(u_with_u, squared));
-        for j in 0..W {
-            uu[j] = multiply_add::<FUSED>(x[j], multiply_add::<FUSED>(x[j], squares[j], once[j]), self.centre[0]);
-        }
-        let (squares, once) = (polynomial::<FUSED, W>(factor_vv, squared), polynomial::<FUSED, W>(v_with_v, squared));
-        for j in 0..W {
-            vv[j] = multiply_add::<FUSED>(y[j], multiply_add::<FUSED>(y[j], squares[j], once[j]), self.centre[2]);
-        }
-        let products = polynomial::<FUSED, W>(factor_uv, squared);
-        let (along_u, along_v) = (polynomial::<FUSED, W>(u_with_v, squared), polynomial::<FUSED, W>(v_with_u, squared));
-        for j in 0..W {
-            let rest = multiply_add::<FUSED>(y[j], along_v[j], self.centre[1]);
-            uv[j] = multiply_add::<FUSED>(x[j], multiply_add::<FUSED>(y[j], products[j], along_u[j]), rest);
-        }
-        [uu, uv, vv]
+        let [centre_uu, centre_uv, centre_vv] = self.centre;
+        let uu = fused(x, fused(x, at(squares_u), at(u_with_u)), centre_uu);
+        let vv = fused(y, fused(y, at(squares_v), at(v_with_v)), centre_vv);
+        let rest = fused(y, at(v_with_u), centre_uv);
+        [uu, fused(x, fused(y, at(products), at(u_with_v)), rest), vv]
     }
 }
 
 /// The shift of the pixel by errors of the lens, by the formulas above.
 #[inline(always)]
-fn shift<const FUSED: bool, const W: usize>(
-    View { place: [x, y], squared, growth, .. }: &View<W>,
-    [focal_u, focal_v, centre_u, centre_v, k1, k2, k3, k4]: &[[f64; W]; CENTRAL_PARAMETERS],
-) -> InImage<W> {
-    let mut out = [[0.0; W]; 2];
-    for j in 0..W {
-        let inner = multiply_add::<FUSED>(squared[j], multiply_add::<FUSED>(squared[j], k4[j], k3[j]), k2[j]);
-        let rho = squared[j] * multiply_add::<FUSED>(squared[j], inner, k1[j]);
-        let (along_u, along_v) =
-            (multiply_add::<FUSED>(growth[j], focal_u[j], rho), multiply_add::<FUSED>(growth[j], focal_v[j], rho));
-        out[0][j] = multiply_add::<FUSED>(x[j], along_u, centre_u[j]);
-        out[1][j] = multiply_add::<FUSED>(y[j], along_v, centre_v[j]);
-    }
-    out
-}
-
-/// The same numbers in all lanes.
-#[inline(always)]
-fn spread<const W: usize>(numbers: &WithLens) -> [[f64; W]; CENTRAL_PARAMETERS] {
-    let mut out = [[0.0; W]; CENTRAL_PARAMETERS];
-    for (out, number) in out.iter_mut().zip(numbers) {
-        *out = [*number; W];
-    }
-    out
+fn shift<const FUSED: bool>(
+    &View { place: [x, y], squared, growth, .. }: &View,
+    &[focal_u, focal_v, centre_u, centre_v, k1, k2, k3, k4]: &WithLens,
+) -> InImage {
+    let fused = multiply_add::<FUSED>;
+    let rho = squared * fused(squared, fused(squared, fused(squared, k4, k3), k2), k1);
+    [fused(x, fused(growth, focal_u, rho), centre_u), fused(y, fused(growth, focal_v, rho), centre_v)]
 }
 
 /// A covariance (variance of u, covariance, variance of v) times a vector.
 #[inline(always)]
-fn through<const FUSED: bool, const W: usize>([uu, uv, vv]: &[[f64; W]; 3], [u, v]: &InImage<W>) -> InImage<W> {
-    let mut out = [[0.0; W]; 2];
-    for j in 0..W {
-        out[0][j] = multiply_add::<FUSED>(uu[j], u[j], uv[j] * v[j]);
-        out[1][j] = multiply_add::<FUSED>(uv[j], u[j], vv[j] * v[j]);
+fn through<const FUSED: bool>(&[uu, uv, vv]: &[f64; 3], &[u, v]: &InImage) -> InImage {
+    [multiply_add::<FUSED>(uu, u, uv * v), multiply_add::<FUSED>(uv, u, vv * v)]
+}
+
+#[inline(always)]
+fn twice(vector: &InImage) -> InImage {
+    vector.map(|value| 2.0 * value)
+}
+
+#[inline(always)]
+fn sum(a: &InImage, b: &InImage) -> InImage {
+    [a[0] + b[0], a[1] + b[1]]
+}
+
+/// Returns a · b + `rest`.
+#[inline(always)]
+fn dot<const FUSED: bool>(a: &InImage, b: &InImage, rest: f64) -> f64 {
+    multiply_add::<FUSED>(a[0], b[0], multiply_add::<FUSED>(a[1], b[1], rest))
+}
+
+#[inline(always)]
+fn product<const FUSED: bool, const N: usize>(a: &[f64; N], b: &[f64; N]) -> f64 {
+    let mut sum = 0.0;
+    for k in 0..N {
+        sum = multiply_add::<FUSED>(a[k], b[k], sum);
     }
-    out
+    sum
 }
 
+/// Adds to `with` the covariance of a pixel with each of two movements by the pose.
 #[inline(always)]
-fn twice<const W: usize>(vector: &InImage<W>) -> InImage<W> {
-    let mut out = *vector;
-    out.iter_mut().flatten().for_each(|value| *value *= 2.0);
-    out
-}
-
-#[inline(always)]
-fn add_dot<const FUSED: bool, const W: usize>(sum: &mut [f64; W], a: &InImage<W>, b: &InImage<W>) {
-    for (a, b) in a.iter().zip(b) {
-        add_product::<FUSED, W>(sum, a, b);
-    }
-}
-
-#[inline(always)]
-fn add_scaled<const FUSED: bool, const W: usize>(sum: &mut InImage<W>, vector: &InImage<W>, factor: &[f64; W]) {
-    for (sum, component) in sum.iter_mut().zip(vector) {
-        add_product::<FUSED, W>(sum, component, factor);
-    }
-}
-
-#[inline(always)]
-fn add_product<const FUSED: bool, const W: usize>(sum: &mut [f64; W], a: &[f64; W], b: &[f64; W]) {
-    for j in 0..W {
-        sum[j] = multiply_add::<FUSED>(a[j], b[j], sum[j]);
+fn add_with_pose<const FUSED: bool>(
+    [with_first, with_second]: &mut [InImage; 2],
+    view: &View,
+    covariances: &[WithLens; POSE_PARAMETERS],
+    [first, second]: &[ByPose; 2],
+) {
+    for (k, covariances) in covariances.iter().enumerate() {
+        let [u, v] = shift::<FUSED>(view, covariances);
+        *with_first =
+            [multiply_add::<FUSED>(u, first[k], with_first[0]), multiply_add::<FUSED>(v, first[k], with_first[1])];
+        *with_second =
+            [multiply_add::<FUSED>(u, second[k], with_second[0]), multiply_add::<FUSED>(v, second[k], with_second[1])];
     }
 }

@@ -5,10 +5,13 @@ use multiversion::target::target_cfg_f;
 use nalgebra::{Matrix3, Vector3};
 
 use super::Instructions;
-use super::lanes::{ALWAYS_FUSED, Kernel, multiply_add};
-use super::pairs::{NARROW, WIDE, for_pairs};
+use super::lanes::{ALWAYS_FUSED, multiply_add};
+use super::pairs::{Rows, for_pairs};
+use super::vectors::{cross, dot, sum};
 use crate::{Angle, Left, Point};
 
+/// Rows per step. The loop over them is so long that the compiler makes vectors of its rounds.
+const ROWS: usize = 64;
 /// Squared sine below which rays count as parallel, or a point as on the baseline.
 const VANISHING_SQUARED: f64 = 1e-18;
 
@@ -63,7 +66,7 @@ impl BatchTriangulation {
         let kernel = Triangulate::new(&self.right_centre, sigma);
         match instructions {
             Instructions::Best => triangulate_best(&kernel, rays, self),
-            Instructions::Baseline => triangulate_all::<ALWAYS_FUSED, NARROW>(&kernel, rays, self),
+            Instructions::Baseline => triangulate_all::<ALWAYS_FUSED>(&kernel, rays, self),
         }
     }
 
@@ -87,21 +90,16 @@ impl BatchTriangulation {
 
 #[multiversion(targets("x86_64+avx512f+avx512dq+avx512vl+avx2+fma", "x86_64+avx2+fma"))]
 fn triangulate_best(kernel: &Triangulate, rays: [&[[f64; 3]]; 2], out: &mut BatchTriangulation) {
-    let (is_wide, is_fused) = (target_cfg_f!(target_feature = "avx512f"), target_cfg_f!(target_feature = "fma"));
-    match (is_wide, is_fused) {
-        (true, _) => triangulate_all::<true, WIDE>(kernel, rays, out),
-        (false, true) => triangulate_all::<true, NARROW>(kernel, rays, out),
-        (false, false) => triangulate_all::<ALWAYS_FUSED, NARROW>(kernel, rays, out),
+    if target_cfg_f!(target_feature = "fma") {
+        triangulate_all::<true>(kernel, rays, out);
+    } else {
+        triangulate_all::<ALWAYS_FUSED>(kernel, rays, out);
     }
 }
 
 #[inline(always)]
-fn triangulate_all<const FUSED: bool, const W: usize>(
-    kernel: &Triangulate,
-    rays: [&[[f64; 3]]; 2],
-    out: &mut BatchTriangulation,
-) {
-    for_pairs::<FUSED, W, 7, 4>(kernel, rays, &mut out.points, &mut out.covariances);
+fn triangulate_all<const FUSED: bool>(kernel: &Triangulate, rays: [&[[f64; 3]]; 2], out: &mut BatchTriangulation) {
+    for_pairs::<FUSED, ROWS, 4>(kernel, rays, &mut out.points, &mut out.covariances);
 }
 
 /// The parameters of a pair that triangulation needs.
@@ -113,18 +111,14 @@ pub(super) struct Triangulate {
     variance: f64,
 }
 
-impl Kernel<6, 7> for Triangulate {
+impl<const W: usize> Rows<W, 4> for Triangulate {
     #[inline(always)]
-    fn lanes<const FUSED: bool, const W: usize>(&self, columns: [[f64; W]; 6]) -> [[f64; W]; 7] {
-        let mut out = [[0.0; W]; 7];
+    fn rows<const FUSED: bool>(&self, left: &[[f64; 3]; W], right: &[[f64; 3]; W]) -> ([[f64; 3]; W], [[f64; 4]; W]) {
+        let (mut points, mut covariances) = ([[0.0; 3]; W], [[0.0; 4]; W]);
         for j in 0..W {
-            let at = |column: usize| columns[column][j];
-            let (u, v) = (Vector3::new(at(0), at(1), at(2)), Vector3::new(at(3), at(4), at(5)));
-            for (column, value) in out.iter_mut().zip(self.row::<FUSED>(&u, &v)) {
-                column[j] = value;
-            }
+            (points[j], covariances[j]) = self.row::<FUSED>(&left[j].into(), &right[j].into());
         }
-        out
+        (points, covariances)
     }
 }
 
@@ -136,7 +130,7 @@ impl Triangulate {
 
     /// The point and its covariance, as in [`BatchTriangulation`].
     #[inline(always)]
-    fn row<const FUSED: bool>(&self, u: &Vector3<f64>, v: &Vector3<f64>) -> [f64; 7] {
+    fn row<const FUSED: bool>(&self, u: &Vector3<f64>, v: &Vector3<f64>) -> ([f64; 3], [f64; 4]) {
         let place = self.place::<FUSED>(u, v);
         let Place { point: p, left_squared, right_squared, valid, .. } = place;
         let along = dot::<FUSED>(&p, &self.t) * self.per_baseline;
@@ -147,7 +141,7 @@ impl Triangulate {
         let (left_beyond, right_along) = (by_left * beyond * per_height, by_right * along * per_height);
         let xx = multiply_add::<FUSED>(left_beyond, beyond, right_along * along) * per_height;
         let across = self.variance * 0.25 * (left_squared + right_squared) + valid;
-        [p.x + valid, p.y + valid, p.z + valid, xx, left_beyond + right_along, by_left + by_right, across]
+        (p.add_scalar(valid).into(), [xx, left_beyond + right_along, by_left + by_right, across])
     }
 
     /// The pseudo-intersection by the formulas of the single-point functions without a square root: n enters only as w wᵀ /
@@ -207,22 +201,4 @@ pub(super) struct Place {
     pub area_squared: f64,
     /// Zero, or NaN where the rays make no point.
     pub valid: f64,
-}
-
-#[inline(always)]
-fn cross<const FUSED: bool>(a: &Vector3<f64>, b: &Vector3<f64>) -> Vector3<f64> {
-    let minor = |i: usize, j: usize| multiply_add::<FUSED>(a[i], b[j], -(a[j] * b[i]));
-    Vector3::new(minor(1, 2), minor(2, 0), minor(0, 1))
-}
-
-#[inline(always)]
-fn dot<const FUSED: bool>(a: &Vector3<f64>, b: &Vector3<f64>) -> f64 {
-    multiply_add::<FUSED>(a.x, b.x, multiply_add::<FUSED>(a.y, b.y, a.z * b.z))
-}
-
-/// Returns α a + β b.
-#[inline(always)]
-fn sum<const FUSED: bool>(alpha: f64, a: &Vector3<f64>, beta: f64, b: &Vector3<f64>) -> Vector3<f64> {
-    let component = |i: usize| multiply_add::<FUSED>(alpha, a[i], beta * b[i]);
-    Vector3::new(component(0), component(1), component(2))
 }

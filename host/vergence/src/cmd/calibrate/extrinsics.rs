@@ -118,7 +118,7 @@ fn views(args: &Args, lenses: PairLenses<'_>, hash: &mut InputHash, console: Con
             let images = PairImages::named([&args.left_images, &args.right_images], &mut print)?;
             images.views(
                 &args.target.checked_spec(args.result.force, console)?,
-                (lenses, args.masks.files()),
+                (lenses, args.masks.given()),
                 hash,
                 &mut print,
             )

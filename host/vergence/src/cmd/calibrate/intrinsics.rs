@@ -10,6 +10,7 @@ use vergence_calibration_report::{
     ReportAbout, ReportImage, held_out_json, held_out_line, intrinsics_json, intrinsics_lines, intrinsics_report,
     intrinsics_verdict,
 };
+use vergence_rig::CameraMask;
 use vergence_targets::{TargetView, corners_can_be_held};
 use vergence_vision::{Angle, ImageSize};
 
@@ -45,7 +46,7 @@ pub struct Args {
     /// Also estimate how the target bows out of its plane.
     #[arg(long)]
     warp: bool,
-    /// The lens: central, moving-pupil, or by-evidence of the views.
+    /// The lens: central, moving-pupil, full (with a pupil of two coefficients, decentring and thin prism), or by-evidence of the views.
     #[arg(long, value_name = "MODEL", default_value = "by-evidence")]
     lens_model: LensModel,
     /// Full field of view of the lens by its data sheet, such as 195.95deg: the report then measures coverage against it.
@@ -117,7 +118,8 @@ fn views(args: &Args, hash: &mut InputHash, console: Console) -> Result<Views, F
         _ => {
             let files = named_images(&args.images)?;
             let target = args.target.checked_spec(args.result.force, console)?;
-            let sought = Sought { target: &target, hint: None, placed: args.warp, mask: args.mask.as_deref() };
+            let mask = args.mask.clone().map(CameraMask::File);
+            let sought = Sought { target: &target, hint: None, placed: args.warp, mask: mask.as_ref() };
             let targets = views_in_images(&files, sought, hash, &mut print_views(console))?;
             Ok(Views { views: targets.found(), size: targets.size, images: targets.images })
         }

@@ -171,7 +171,7 @@ fn poses(args: &Args, rig: &Rig, hash: &mut InputHash, console: Console) -> Resu
         (Some(set), _) => {
             let (set, lenses) = (RecordedSet::read(set, rig, hash)?, [&rig.left_camera, &rig.right_camera]);
             let target = args.target.checked_spec(args.result.force, console)?;
-            set.stage_poses(&target, (lenses, args.masks.files()), hash, &mut print_views(console))
+            set.stage_poses(&target, (lenses, args.masks.of(rig)), hash, &mut print_views(console))
         }
         (_, Some(csv)) => Ok((stage_poses_in_corners(csv, rig, &args.cameras, hash)?, Vec::new())),
         _ => Err(Failure::usage("name the views: --set DIR or --csv FILE")),

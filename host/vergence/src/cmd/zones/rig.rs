@@ -38,7 +38,7 @@ pub fn run(args: &Args, common: &CommonOptions, console: Console) -> Result<(), 
     let values: Vec<f64> = mode.targets.iter().map(|position| position.value()).collect();
     let pose = rig.pose_at_values(&values);
     pose.check_closure().map_err(|error| Failure::check(error.to_string()))?;
-    let [left_mask, right_mask] = options.masks.read([rig.left_camera.size(), rig.right_camera.size()])?;
+    let [left_mask, right_mask] = options.masks.read(&rig)?;
     let view = RigView::new(&rig, &pose, [left_mask.as_ref(), right_mask.as_ref()]);
 
     let fail = |error| Failure::usage(format!("no zones: {error}"));

@@ -63,7 +63,7 @@ pub async fn fill(
 ) -> Result<Option<Rig>, Failure> {
     LiveSet::check_free(folder)?;
     let nominal = rig_file::load(common.rig.as_deref())?;
-    let masks = masks.read([nominal.left_camera.size(), nominal.right_camera.size()])?;
+    let masks = masks.read(&nominal)?;
     let (mut rig_board, mut rig_cameras) = open(options, cameras, &nominal, target, common, console).await?;
     let set = LiveSet { folder, target, nominal: &nominal, views: options.views.into(), images: options.frames, masks };
     let plan = stage_plan(&nominal.axes, options.poses.into());
