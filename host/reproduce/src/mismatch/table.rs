@@ -54,9 +54,9 @@ pub struct RowNote {
 /// What becomes of a mismatch, where the views choose the model of the lens.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Verdict {
-    /// The points are as good as without it, and their covariance holds.
+    /// The points are as good as without it, and as far as so many rigs tell their covariance holds.
     Harmless,
-    /// The points are worse, by this factor at worst, and their covariance says so.
+    /// The points are worse, by this factor at worst, and as far as so many rigs tell their covariance says so.
     Stated(f64),
     /// The covariance does not hold.
     NotCaught {
@@ -201,9 +201,13 @@ impl Verdict {
     #[must_use]
     pub fn sentence(&self) -> String {
         match self {
-            Self::Harmless => "harmless: points are as good as without it, and their covariance holds.".into(),
+            Self::Harmless => {
+                "harmless: points are as good as without it, and the NEES of so many rigs is as an honest one.".into()
+            }
             Self::Stated(factor) => {
-                format!("costs accuracy, up to {factor:.1} times the error without it, and the covariance says so.")
+                format!(
+                    "costs accuracy, up to {factor:.1} times the error without it; the NEES of so many rigs is as an honest one."
+                )
             }
             Self::NotCaught { at, warned: [warned, clouds] } => {
                 let place = |cell: &Cell| {
