@@ -27,27 +27,30 @@ pub fn read_rig(path: &Path) -> Result<ImportedRig, InputError> {
         let rig = Rig::from_toml(&text).map_err(|error| InputError::wrong(&file, error))?;
         return Ok(ImportedRig { rig, remarks: Vec::new() });
     }
-    let cameras = cameras.as_deref().map(|names| {
-        names
-            .split_once(',')
-            .ok_or_else(|| InputError::wrong(&file, format!("'#{names}' names no two cameras: write #LEFT,RIGHT")))
-    });
-    import_rig(&[&file], cameras.transpose()?.map(|(left, right)| [left, right]))
+    import_rig(&[&file], cameras.as_deref())
 }
 
-/// Makes a rig of two cameras: of one file, the two that `cameras` names, left and right, or the only two; of two files, the only one of
+/// Makes a rig of two cameras: of one file, the two that `cameras` names as LEFT,RIGHT, or the only two; of two files, the only one of
 /// each.
 ///
 /// # Errors
 /// Says which file and what is wrong.
-pub fn import_rig(files: &[&Path], cameras: Option<[&str; 2]>) -> Result<ImportedRig, InputError> {
+pub fn import_rig(files: &[&Path], cameras: Option<&str>) -> Result<ImportedRig, InputError> {
     let read = |file: &&Path| {
         let text = vergence_files::read_text(file)?;
         vergence_exchange::read(&text).map_err(|error| InputError::wrong(file, error))
     };
     let rigs = files.iter().map(read).collect::<Result<Vec<ForeignRig>, InputError>>()?;
     let (pair, at) = match (rigs.as_slice(), files) {
-        ([rig], [file]) => (rig.pair(cameras), *file),
+        ([rig], [file]) => {
+            let two =
+                |names: &str| InputError::wrong(file, format!("'{names}' names no two cameras: write LEFT,RIGHT"));
+            let names = cameras.map(|names| names.split_once(',').ok_or_else(|| two(names))).transpose()?;
+            (rig.pair(names.map(|(left, right)| [left, right])), *file)
+        }
+        ([_, _], [_, file]) if cameras.is_some() => {
+            return Err(InputError::wrong(file, "two files have one camera each: name no cameras beside them"));
+        }
         ([left, right], [_, file]) => {
             let both = left.camera(None).and_then(|left| Ok((left, right.camera(None)?)));
             (both.and_then(|(left, right)| ForeignPair::new(left, right)), *file)

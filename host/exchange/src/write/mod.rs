@@ -52,6 +52,18 @@ impl FromStr for WriteFormat {
     }
 }
 
+/// The format of a camera file to write: `toml`, which is ours and no [`WriteFormat`], or another program's.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct OursOrTheirs(pub Option<WriteFormat>);
+
+impl FromStr for OursOrTheirs {
+    type Err = UnknownFormat;
+
+    fn from_str(text: &str) -> Result<Self, UnknownFormat> {
+        if text == "toml" { Ok(Self(None)) } else { text.parse().map(|format| Self(Some(format))) }
+    }
+}
+
 /// What is written: one camera, or a pair.
 #[derive(Clone, Copy, Debug)]
 pub struct Cameras {

@@ -1,12 +1,11 @@
 //! `vergence camera`: camera files shown, converted, and used for single points.
 
 use std::path::{Path, PathBuf};
-use std::str::FromStr;
 
 use nalgebra::Vector3;
 use serde_json::json;
 use vergence_calibration_input::{FileLens, bare_document, camera_toml, read_camera_file};
-use vergence_exchange::{UnknownFormat, WriteFormat};
+use vergence_exchange::OursOrTheirs;
 use vergence_files::write_whole;
 use vergence_rig::{Shutter, camera_in_words, camera_json};
 use vergence_vision::{Camera, KannalaBrandt, Pixel, UnitRay};
@@ -37,7 +36,7 @@ enum Task {
         /// The format to write: toml, opencv, kalibr, basalt, ros, colmap or mrcal. mrcal gets a splined model, and a lens with a
         /// moving pupil a central one for points 500 mm away: how far these are off is said.
         #[arg(long, value_name = "FORMAT")]
-        to: Target,
+        to: OursOrTheirs,
         /// The file to write. ROS and mrcal have one for each camera of a pair: FILE-left and FILE-right.
         #[arg(long, short, value_name = "FILE")]
         out: PathBuf,
@@ -58,18 +57,6 @@ enum Task {
         #[arg(required = true, allow_hyphen_values = true, value_parser = parse_numbers::<2>)]
         pixels: Vec<[f64; 2]>,
     },
-}
-
-/// The format to write; `None` for ours.
-#[derive(Clone, Copy, Debug)]
-struct Target(Option<WriteFormat>);
-
-impl FromStr for Target {
-    type Err = UnknownFormat;
-
-    fn from_str(text: &str) -> Result<Self, UnknownFormat> {
-        if text == "toml" { Ok(Self(None)) } else { text.parse().map(|format| Self(Some(format))) }
-    }
 }
 
 pub fn run(args: &Args, console: Console) -> Result<(), Failure> {
@@ -99,7 +86,7 @@ pub fn run(args: &Args, console: Console) -> Result<(), Failure> {
     }
 }
 
-fn convert(path: &Path, Target(to): Target, out: &Path, console: Console) -> Result<(), Failure> {
+fn convert(path: &Path, OursOrTheirs(to): OursOrTheirs, out: &Path, console: Console) -> Result<(), Failure> {
     let file = read_camera_file(path)?;
     for remark in file.cameras.iter().filter_map(|camera| camera.remark.as_ref()) {
         console.warn(remark);

@@ -67,14 +67,7 @@ pub fn run(args: &Args, console: Console) -> Result<(), Failure> {
 
 fn import(args: &Import, console: Console) -> Result<(), Failure> {
     let files: Vec<&Path> = args.files.iter().map(PathBuf::as_path).collect();
-    if args.cameras.is_some() && files.len() == 2 {
-        return Err(Failure::usage("--cameras chooses two cameras of one file: two files have one each"));
-    }
-    let cameras = args.cameras.as_deref().map(|names| {
-        names.split_once(',').ok_or_else(|| Failure::usage(format!("--cameras {names}: write two names, LEFT,RIGHT")))
-    });
-    let cameras = cameras.transpose()?.map(|(left, right)| [left, right]);
-    let ImportedRig { rig, remarks } = import_rig(&files, cameras)?;
+    let ImportedRig { rig, remarks } = import_rig(&files, args.cameras.as_deref())?;
     let mut hash = InputHash::default();
     files.iter().try_for_each(|file| hash.add(file))?;
     let toml = rig.to_toml(&hash.provenance(None)).map_err(Failure::check)?;
