@@ -69,6 +69,8 @@ fn figures(rig: &Rig, file: &Rig, lenses: [&dyn Lens; 2], separations: [f64; 2],
 struct Optics {
     design: &'static str,
     mounted: Option<Mounting>,
+    /// Number of views of each lens alone.
+    views: usize,
 }
 
 /// In micrometres and degrees.
@@ -99,7 +101,7 @@ const MODES: [(&str, [f64; 2]); 3] =
     [("human", [0.0, 10.0]), ("50 to 90 degrees", [50.0, 90.0]), ("herbivore", [110.0, 125.0])];
 
 /// By the files that each model of a lens gives: a figure for each mode.
-fn trial(seed: u64, optics: Optics, models: [&str; 3]) -> [[Figures; 3]; 3] {
+fn trial<const N: usize>(seed: u64, optics: Optics, models: [&str; N]) -> [[Figures; 3]; N] {
     let mut dice = Dice::new(seed);
     let rig = as_built(&mut dice);
     let (left, right) = (optics.before(&rig.left_camera, 2 * seed), optics.before(&rig.right_camera, 2 * seed + 1));
@@ -107,7 +109,14 @@ fn trial(seed: u64, optics: Optics, models: [&str; 3]) -> [[Figures; 3]; 3] {
         lens.image_of(&Point::from_mm(*at)).filter(|at| lens.size().contains(*at))
     };
     let (left_lens, right_lens) = (|at: &Vector3<f64>| through(&left, at), |at: &Vector3<f64>| through(&right, at));
-    let lenses = Lenses { left: &left_lens, right: &right_lens, reach: 1.45, poses: POSES, spread: 0.5 };
+    let lenses = Lenses {
+        left: &left_lens,
+        right: &right_lens,
+        reach: 1.45,
+        poses: POSES,
+        spread: 0.5,
+        own_views: optics.views,
+    };
     models.map(|model| {
         let mut dice = Dice::new(seed + 1000);
         let work = tempfile::tempdir().expect("a temporary folder");
@@ -119,7 +128,7 @@ fn trial(seed: u64, optics: Optics, models: [&str; 3]) -> [[Figures; 3]; 3] {
 
 /// The mean over the seeds, for each model and mode. Points of one seed share its calibration, so a seed counts as one draw of three squared
 /// errors.
-fn measured(optics: Optics, models: [&str; 3], seeds: u64) -> [[Figures; 3]; 3] {
+fn measured<const N: usize>(optics: Optics, models: [&str; N], seeds: u64) -> [[Figures; 3]; N] {
     let trials: Vec<_> = (0..seeds).map(|seed| trial(seed, optics, models)).collect();
     let mean = |model: usize, mode: usize| {
         let mean = |value: fn(&Figures) -> f64| {
@@ -151,10 +160,10 @@ fn is_honest(lens: &str, found: &[Figures; 3], seeds: u64) {
 
 fn check(design: &'static str) {
     let seeds = seeds(3);
-    let found = measured(Optics { design, mounted: None }, ["by-evidence", "moving-pupil", "central"], seeds);
+    let found = measured(Optics { design, mounted: None, views: 20 }, ["by-evidence", "central"], seeds);
     is_honest(design, &found[0], seeds);
     let [_, high] = band(seeds, 3.0, 1.96);
-    for ((mode, _), central) in MODES.iter().zip(&found[2]) {
+    for ((mode, _), central) in MODES.iter().zip(&found[1]) {
         assert!(central.nees > 1.5 * high, "{design}, {mode}: one centre is as good: {}", central.nees);
     }
 }
@@ -171,12 +180,16 @@ fn clouds_through_a_nikkor_lens_are_as_far_off_as_the_rig_file_states() {
 }
 
 /// Elements 10 micrometres off the axis and tilted, a sensor that is not square to it: without decentring and thin prism the errors are larger,
-/// and larger than the file states.
+/// and larger than the file states. 20 views do not tell of every such lens that it is not symmetric; 60 do.
 #[test]
 fn clouds_through_displaced_lenses_are_as_far_off_as_the_rig_file_states() {
     let seeds = seeds(3);
     let mounted = Some(Mounting { decentre_um: 10.0, tilt_deg: 0.05, sensor_tilt_deg: 0.4 });
-    let found = measured(Optics { design: "sigma8_f18", mounted }, ["by-evidence", "moving-pupil", "central"], seeds);
+    let found = measured(
+        Optics { design: "sigma8_f18", mounted, views: 60 },
+        ["by-evidence", "moving-pupil", "central"],
+        seeds,
+    );
     is_honest("displaced", &found[0], seeds);
     let sum = |model: usize| found[model].iter().map(|found| found.error_mm).sum::<f64>();
     assert!(sum(1) > 1.3 * sum(0), "a symmetric lens is as good: {} and {} mm", sum(1) / 3.0, sum(0) / 3.0);

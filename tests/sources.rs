@@ -13,6 +13,7 @@ const PURE: &[&str] = &[
     "firmware/dynamixel",
     "host/vision",
     "host/rig",
+    "host/exchange",
     "host/targets",
     "host/calibration",
     "host/matching",

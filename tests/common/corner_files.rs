@@ -26,6 +26,8 @@ pub struct Lenses<'a> {
     pub poses: [[f64; 2]; 6],
     /// How far from the middle between the axes a target is held for both cameras, one standard deviation of the sine.
     pub spread: f64,
+    /// Number of targets held before each camera alone.
+    pub own_views: usize,
 }
 
 /// The projection of a lens of the model's family onto its sensor.
@@ -72,11 +74,11 @@ fn rows(text: &mut String, (camera, frame): (&str, usize), pixels: &[Pixel], rea
     }
 }
 
-/// Corners of 20 targets all over the field of one lens, or that part of it.
-fn own_corners(lens: Projection<'_>, reach: f64, dice: &mut Dice) -> String {
+/// Corners of `views` targets all over the field of one lens, or that part of it.
+fn own_corners(lens: Projection<'_>, reach: f64, views: usize, dice: &mut Dice) -> String {
     let mut text = String::from("camera,file,frame,idx,x,y,bx_mm,by_mm\n");
     let mut frame = 0;
-    while frame < 20 {
+    while frame < views {
         let towards = direction(reach * (0.5 + 0.5 * dice.uniform()).sqrt(), 3.2 * dice.uniform());
         let target = target(&towards, 260.0 + 80.0 * dice.uniform(), dice);
         let Some(pixels) = seen(lens, &Isometry3::identity(), &target, dice) else { continue };
@@ -122,7 +124,7 @@ pub fn calibrated_as(rig: &Rig, lenses: Lenses<'_>, work: &Path, options: &[&str
     let size = format!("{}x{}", size.width, size.height);
     for (name, lens) in [("left", lenses.left), ("right", lenses.right)] {
         let (corners, out) = (file(&format!("{name}.csv")), file(&format!("{name}.toml")));
-        std::fs::write(&corners, own_corners(lens, lenses.reach, dice)).expect("written");
+        std::fs::write(&corners, own_corners(lens, lenses.reach, lenses.own_views, dice)).expect("written");
         let command = ["calibrate", "intrinsics", "--json", "--csv", &corners, "--size", &size, "--out", &out];
         run_json(&[&command[..], options].concat());
     }

@@ -45,7 +45,7 @@ pub use error::SimError;
 pub use firmware_log::{FirmwareLog, PlacedEntry};
 pub use held_target::{HeldTarget, TargetCamera, photograph_target};
 pub use history::LoadHistory;
-pub use live_camera::LiveCamera;
+pub use live_camera::{LiveCamera, Rendering};
 pub use random::Random;
 pub use rig::{Pulse, SimulatedRig};
 pub use room::{Room, RoomCamera};

@@ -2,12 +2,13 @@
 //! and it may be unplugged for a while. Its images are rendered when they are wanted, from the true positions of the
 //! mechanics. Motion within one row's exposure does not blur.
 
+use std::sync::{Arc, OnceLock};
 use std::time::Duration;
 
 use vergence_camera::{CameraEvent, Develop, PendingImage};
 use vergence_protocol::Microseconds;
 use vergence_rig::{ExposureTiming, Shutter, StampedAt};
-use vergence_scene::{Lens, TrueLens};
+use vergence_scene::{Lens, RayTable, TrueLens};
 use vergence_vision::Side;
 
 use crate::{Pulse, RoomCamera, SimulatedRig, Unplugged};
@@ -19,10 +20,23 @@ const TRANSFER: Duration = Duration::from_millis(6);
 /// Time from one image to the next: the camera takes no more than 30 a second.
 const PERIOD: Duration = Duration::from_micros(33_333);
 
+/// How the images of a simulated camera are made.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Rendering {
+    /// With many rays, for figures of accuracy.
+    #[default]
+    Exact,
+    /// In real time, with one ray for most pixels.
+    Quick,
+}
+
 /// A simulated camera fired by the board's trigger.
 #[derive(Clone, Debug)]
 pub struct LiveCamera {
     camera: RoomCamera<TrueLens>,
+    rendering: Rendering,
+    /// Made with the first quick image, and shared by all.
+    table: Arc<OnceLock<RayTable>>,
     shutter: Shutter,
     unplugged: Vec<Unplugged>,
     plugged: Option<bool>,
@@ -42,7 +56,23 @@ impl LiveCamera {
         let RoomCamera { side, lens, room, seed } = camera;
         let camera = RoomCamera { side, lens: lens.into(), room, seed };
         let unplugged = unplugged.iter().filter(|out| out.side == camera.side).copied().collect();
-        Self { camera, shutter, unplugged, plugged: None, next_pulse: 0, ready_us: 0.0, seq: 0 }
+        Self {
+            camera,
+            rendering: Rendering::Exact,
+            table: Arc::default(),
+            shutter,
+            unplugged,
+            plugged: None,
+            next_pulse: 0,
+            ready_us: 0.0,
+            seq: 0,
+        }
+    }
+
+    /// The same camera with images made in this way.
+    #[must_use]
+    pub fn with_rendering(self, rendering: Rendering) -> Self {
+        Self { rendering, ..self }
     }
 
     /// Side of the camera.
@@ -99,6 +129,7 @@ impl LiveCamera {
         let middle = start + 0.5 * exposed_us;
         let (rows, line_us) = (f64::from(self.camera.lens.size().height), self.shutter.line_us());
         let (camera, number) = (self.camera.clone(), pulse.number);
+        let (rendering, table) = (self.rendering, Arc::clone(&self.table));
         Box::new(move || {
             let at_row = |row: u32| {
                 let at = middle + (f64::from(row) - 0.5 * (rows - 1.0)) * line_us;
@@ -107,7 +138,10 @@ impl LiveCamera {
                     |pose| camera.room.world_from_camera(camera.side, &pose),
                 )
             };
-            Ok(camera.photograph_rows(number, &at_row))
+            Ok(match rendering {
+                Rendering::Exact => camera.photograph_rows(number, &at_row),
+                Rendering::Quick => camera.photograph_quick(table.get_or_init(|| camera.ray_table()), number, &at_row),
+            })
         })
     }
 }

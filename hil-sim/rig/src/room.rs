@@ -5,7 +5,7 @@ use std::sync::Arc;
 use image::RgbImage;
 use nalgebra::{UnitQuaternion, Vector3};
 use vergence_rig::RigPose;
-use vergence_scene::{Lens, Optics, Scene, View, render, render_rolling};
+use vergence_scene::{Lens, Optics, RayTable, Scene, View, render, render_quick, render_rolling};
 use vergence_vision::{Base, Camera, KannalaBrandt, Left, Length, Pixel, Side, Transform, World};
 
 /// A furnished room with the rig in it.
@@ -71,6 +71,23 @@ impl<L: Lens> RoomCamera<L> {
         world_from_row: &(dyn Fn(u32) -> Transform<World, Camera> + Sync),
     ) -> RgbImage {
         render_rolling(&self.view(world_from_row(0), &Optics::default()), self.noise(number), world_from_row).image
+    }
+
+    /// What [`Self::photograph_quick`] needs of the lens.
+    #[must_use]
+    pub fn ray_table(&self) -> RayTable {
+        RayTable::new(&self.lens, &Optics::default())
+    }
+
+    /// As [`Self::photograph_rows`], in real time: fewer rays, `table` is the camera's.
+    #[must_use]
+    pub fn photograph_quick(
+        &self,
+        table: &RayTable,
+        number: u32,
+        world_from_row: &(dyn Fn(u32) -> Transform<World, Camera> + Sync),
+    ) -> RgbImage {
+        render_quick(&self.view(world_from_row(0), &Optics::default()), table, self.noise(number), world_from_row)
     }
 
     /// How far from the camera's origin the place is that a pixel shows from a rig pose; `None` outside the field and where nothing is met.

@@ -32,17 +32,17 @@ pub struct Lighting {
 }
 
 impl Lighting {
-    /// Irradiance at `point` on a surface with `normal`, both in the world; `visible` tells whether a lamp's position
-    /// can be seen from the point.
-    pub fn irradiance(&self, point: Vector3<f64>, normal: Vector3<f64>, visible: impl Fn(Vector3<f64>) -> bool) -> Rgb {
+    /// Irradiance at `point` on a surface with `normal`, both in the world; `visible` tells whether the lamp of a
+    /// number can be seen from the point.
+    pub fn irradiance(&self, point: Vector3<f64>, normal: Vector3<f64>, visible: impl Fn(usize) -> bool) -> Rgb {
         // y is down.
         let above = 1.0 - self.from_above * normal.y;
         let mut sum = self.ambient.map(|c| c * (above * self.openness(point, normal)) as f32);
-        for lamp in &self.lamps {
+        for (number, lamp) in self.lamps.iter().enumerate() {
             let to_lamp = lamp.position - point;
             let distance = to_lamp.norm();
             let cosine = normal.dot(&to_lamp) / distance.max(1.0);
-            if cosine > 0.0 && visible(lamp.position) {
+            if cosine > 0.0 && visible(number) {
                 let fall = 1.0 / (1.0 + (distance / lamp.half_distance).powi(2));
                 sum = std::array::from_fn(|i| sum[i] + lamp.power[i] * (cosine * fall) as f32);
             }

@@ -72,7 +72,7 @@ impl Optics {
 }
 
 /// The sRGB transfer function (IEC 61966-2-1): linear to encoded, both 0 to 1.
-fn encoded(linear: f64) -> f64 {
+pub fn encoded(linear: f64) -> f64 {
     let x = linear.clamp(0.0, 1.0);
     if x <= 0.003_130_8 { 12.92 * x } else { 1.055 * x.powf(1.0 / 2.4) - 0.055 }
 }

@@ -1,5 +1,7 @@
 //! The rays of pixels and of points between them, without solving the lens equation for each.
 
+use std::borrow::Cow;
+
 use nalgebra::{Matrix3, Vector3};
 use vergence_vision::{Angle, Camera, Pixel, Transform, World};
 
@@ -22,7 +24,7 @@ pub struct RayGrid<'a> {
     top: u32,
     stride: usize,
     /// One row above to one row below; each from one column left to one column right. NaN outside the field.
-    rays: Vec<[f64; 3]>,
+    rays: Cow<'a, [[f64; 3]]>,
 }
 
 /// A pixel's ray and its neighbours'.
@@ -82,7 +84,12 @@ impl<'a> RayGrid<'a> {
             .flat_map(|row| (0..columns + 2).map(move |column| (column, row)))
             .map(|(column, row)| [f64::from(left) + f64::from(column) - 1.0, f64::from(top) + f64::from(row) - 1.0])
             .collect();
-        Self { posed, left, top, stride: columns as usize + 2, rays: posed.rays.directions(&pixels) }
+        Self { posed, left, top, stride: columns as usize + 2, rays: Cow::Owned(posed.rays.directions(&pixels)) }
+    }
+
+    /// For the whole image of `columns`, whose rays in the camera's frame were computed before, with one pixel more on every side.
+    pub const fn of_table(posed: &'a PosedLens<'a>, rays: &'a [[f64; 3]], columns: u32) -> Self {
+        Self { posed, left: 0, top: 0, stride: columns as usize + 2, rays: Cow::Borrowed(rays) }
     }
 
     /// The ray of a pixel of the rectangle; `None` outside the field.

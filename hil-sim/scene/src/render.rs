@@ -8,6 +8,7 @@ use vergence_vision::{Angle, Camera, Length, Pixel, Transform, World};
 use crate::blur::spread;
 use crate::lens::{Lens, LensRays};
 use crate::optics::unit_pair;
+use crate::outlook::Outlook;
 use crate::rays::{Around, PosedLens, RayGrid};
 use crate::texture::Rgb;
 use crate::texture_noise::mix64;
@@ -68,15 +69,31 @@ pub fn render_rolling(
 
 /// The number of neighbouring rows that are exposed at once, and the pose of the camera then.
 #[derive(Clone, Copy)]
-struct Rows<'a> {
-    at_once: usize,
-    world_from_camera: &'a (dyn Fn(u32) -> Transform<World, Camera> + Sync),
+pub struct Rows<'a> {
+    pub at_once: usize,
+    pub world_from_camera: &'a (dyn Fn(u32) -> Transform<World, Camera> + Sync),
 }
 
 impl Rows<'_> {
     /// The view at the exposure of a row.
     fn view<'v>(&self, view: &View<'v>, row: u32) -> View<'v> {
         View { world_from_camera: (self.world_from_camera)(row), ..*view }
+    }
+
+    /// What the camera may see while it takes the image: from about the middle of its way.
+    pub fn outlook(&self, view: &View<'_>) -> Outlook {
+        const PUPILS: u32 = 32;
+        const MARGIN_MM: f64 = 0.1;
+        let height = view.camera.size().height;
+        let at = |row: u32| (self.world_from_camera)(row).origin().mm();
+        let place = at(height / 2);
+        let moved = [0, height.saturating_sub(1)].map(|row| (at(row) - place).norm());
+        let pupils = (0..=PUPILS).filter_map(|step| {
+            let theta = view.camera.theta_max().rad() * f64::from(step) / f64::from(PUPILS);
+            view.camera.pupil(Angle::from_rad(theta))
+        });
+        let shift = pupils.map(|shift| shift.mm().abs()).fold(0.0, f64::max);
+        view.scene.outlook(place, moved[0].max(moved[1]) + shift + MARGIN_MM)
     }
 }
 
@@ -87,22 +104,18 @@ fn photograph(view: &View<'_>, seed: u64, rows: Rows<'_>) -> Photograph {
     let pixels = size.width as usize * size.height as usize;
 
     let rays = view.camera.rays();
+    let outlook = rows.outlook(view);
     let mut firsts = vec![First::default(); pixels];
     for_each_in_field(view, rows, &rays, &mut firsts, |first, here, around, x, y| {
-        *first = here.first(around, seed_of(x, y));
+        *first = here.first(around, &outlook, seed_of(x, y));
     });
 
     let mut light = vec![[0.0; 3]; pixels];
-    light.par_iter_mut().enumerate().for_each(|(i, light)| {
-        let First { mut samples, exposure, .. } = firsts[i];
-        let (x, y) = (i % width, i / width);
+    for_each_in_field(view, rows, &rays, &mut light, |light, here, around, x, y| {
+        let First { mut samples, exposure, .. } = firsts[y * width + x];
         if is_edge(&firsts, width, x, y) {
-            let pixel = [x, y].map(|n| n as u32);
-            let here = rows.view(view, pixel[1]);
-            let posed = PosedLens::new(view.camera, &rays, &here.world_from_camera);
-            if let Some(around) = RayGrid::new(&posed, pixel, [1, 1]).around(pixel[0], pixel[1]) {
-                samples = samples.joined(here.samples(&around, view.optics.edge_samples, mix64(seed_of(x, y))));
-            }
+            let places = lattice(view.optics.edge_samples, mix64(seed_of(x, y)));
+            samples = samples.joined(here.samples(around, &outlook, places));
         }
         let exposure = exposure / samples.count.max(1) as f32;
         *light = samples.sum.map(|c| c * exposure);
@@ -222,29 +235,29 @@ impl View<'_> {
     }
 
     /// Casts the first rays of a pixel.
-    fn first(&self, around: &Around<'_>, hash: u64) -> First {
+    fn first(&self, around: &Around<'_>, outlook: &Outlook, hash: u64) -> First {
         let origin = around.start(&around.centre());
         let theta = self.theta(around);
-        let met = self.scene.encounter(origin, around.centre());
+        let met = self.scene.encounter_from(outlook, origin, around.centre());
         let samples = if self.optics.samples <= 1 {
             let finest = 1.0 / self.camera.pixels_per_radian(theta);
             LightSamples::default().with(self.scene.light(origin, around.centre(), met.as_ref(), finest))
         } else {
-            self.samples(around, self.optics.samples, hash)
+            self.samples(around, outlook, lattice(self.optics.samples, hash))
         };
         let exposure = self.optics.light_at(theta, self.camera) as f32;
         let spot = self.camera.spot_variance(theta) as f32;
         First { samples, range_mm: met.map_or(f32::NAN, |met| met.range() as f32), exposure, spot }
     }
 
-    /// The light of `count` rays through the square of a pixel.
-    fn samples(&self, around: &Around<'_>, count: u32, hash: u64) -> LightSamples {
+    /// The light of rays through these places on the square of a pixel.
+    fn samples(&self, around: &Around<'_>, outlook: &Outlook, places: impl Iterator<Item = [f64; 2]>) -> LightSamples {
         let finest = 1.0 / self.camera.pixels_per_radian(self.theta(around));
         let nearby = around.nearby();
-        lattice(count, hash).fold(LightSamples::default(), |samples, offset| {
+        places.fold(LightSamples::default(), |samples, offset| {
             let light = |direction| {
                 let origin = around.start(&direction);
-                let met = self.scene.encounter(origin, direction);
+                let met = self.scene.encounter_from(outlook, origin, direction);
                 self.scene.light(origin, direction, met.as_ref(), finest)
             };
             // A ray outside the field brings no light.

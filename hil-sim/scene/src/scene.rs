@@ -4,9 +4,13 @@ use nalgebra::{Matrix3, UnitQuaternion, Vector3};
 use vergence_vision::{Length, Point, UnitRay, World};
 
 use crate::hierarchy::{Bounds, Hierarchy};
-use crate::light::Lighting;
+use crate::light::{Lamp, Lighting};
+use crate::outlook::{Outlook, TurnedBox};
 use crate::shape::{Contact, Shape};
 use crate::texture::{Pattern, Rgb};
+
+/// Added to the radius of the sphere about a shape: far more than double precision loses over a room.
+const REACH_MARGIN_MM: f64 = 1e-3;
 
 /// The material of a surface.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -26,6 +30,8 @@ pub struct Solid {
     centre: Vector3<f64>,
     world_from_shape: Matrix3<f64>,
     shape_from_world: Matrix3<f64>,
+    /// Square of the radius of the sphere about the shape, mm², with a little more than rounding takes.
+    reach_squared: f64,
     material: Material,
 }
 
@@ -35,6 +41,8 @@ pub struct Scene {
     solids: Vec<Solid>,
     hierarchy: Hierarchy,
     lighting: Lighting,
+    /// What may shade places from each lamp.
+    shades: Vec<Outlook>,
     /// The background between and beyond the solids.
     backdrop: Rgb,
 }
@@ -94,6 +102,35 @@ impl Scene {
         first
     }
 
+    /// What rays from within `slack` mm of `place` may meet.
+    pub(crate) fn outlook(&self, place: Vector3<f64>, slack: f64) -> Outlook {
+        Outlook::new(self.solids.iter().map(Solid::turned_box).enumerate(), place, slack)
+    }
+
+    /// The same as [`Self::encounter`], sooner for a ray from a place of this outlook.
+    pub(crate) fn encounter_from(
+        &self,
+        outlook: &Outlook,
+        origin: Vector3<f64>,
+        direction: Vector3<f64>,
+    ) -> Option<Encounter> {
+        if !outlook.holds(&origin) {
+            return self.encounter(origin, direction);
+        }
+        let (mut first, mut limit): (Option<Encounter>, _) = (None, f64::INFINITY);
+        for candidate in outlook.along(&direction) {
+            if f64::from(candidate.from_mm) > limit {
+                break;
+            }
+            let surface = candidate.shape as usize;
+            if let Some(contact) = self.solids[surface].meet(origin, direction, limit) {
+                limit = contact.range;
+                first = Some(Encounter { surface, contact });
+            }
+        }
+        first
+    }
+
     /// The light along a ray with this first encounter.
     pub(crate) fn light(
         &self,
@@ -129,20 +166,15 @@ impl Scene {
         std::array::from_fn(|i| reflectance[i] * light[i])
     }
 
-    /// Whether nothing stands between `point`, on a surface with `normal`, and `lamp`.
-    fn sees(&self, point: Vector3<f64>, normal: Vector3<f64>, lamp: Vector3<f64>) -> bool {
+    /// Whether nothing stands between `point`, on a surface with `normal`, and the lamp of this number.
+    fn sees(&self, point: Vector3<f64>, normal: Vector3<f64>, lamp: usize) -> bool {
         const CLEARANCE_MM: f64 = 1e-3;
         let start = point + normal * CLEARANCE_MM;
-        let to_lamp = lamp - start;
-        let mut clear = true;
-        self.hierarchy.visit(start, to_lamp, 1.0, |surface, limit| {
-            let solid = &self.solids[surface];
-            let blocked = solid.material.glow.is_none() && solid.meet(start, to_lamp, limit).is_some();
-            clear &= !blocked;
-            // A limit before the start ends the search.
-            blocked.then_some(f64::NEG_INFINITY)
-        });
-        clear
+        let to_lamp = self.lighting.lamps[lamp].position - start;
+        let distance = to_lamp.norm();
+        let candidates = self.shades[lamp].along(&-to_lamp).iter();
+        let mut nearer = candidates.take_while(|candidate| f64::from(candidate.from_mm) <= distance);
+        !nearer.any(|candidate| self.solids[candidate.shape as usize].meet(start, to_lamp, 1.0).is_some())
     }
 
     /// A room from corner `low` to corner `high` with walls, in order: left, right, ceiling, floor, back, front. The
@@ -172,7 +204,7 @@ impl Scene {
     pub(crate) fn empty(backdrop: Rgb) -> Self {
         let room = [Vector3::repeat(f64::NEG_INFINITY), Vector3::repeat(f64::INFINITY)];
         let lighting = Lighting { ambient: [1.0; 3], from_above: 0.0, occlusion: 0.0, room, lamps: Vec::new() };
-        Self { solids: Vec::new(), hierarchy: Hierarchy::default(), lighting, backdrop }
+        Self { solids: Vec::new(), hierarchy: Hierarchy::default(), lighting, shades: Vec::new(), backdrop }
     }
 
     /// The scene with more solids.
@@ -180,12 +212,22 @@ impl Scene {
         self.solids.extend(solids);
         let bounds: Vec<Bounds> = self.solids.iter().map(Solid::bounds).collect();
         self.hierarchy = Hierarchy::new(&bounds);
-        self
+        self.shaded()
     }
 
     /// The scene in another light.
     pub(crate) fn lit(mut self, relight: impl FnOnce(&mut Lighting)) -> Self {
         relight(&mut self.lighting);
+        self.shaded()
+    }
+
+    /// The scene with its shades as of its solids and lamps.
+    fn shaded(mut self) -> Self {
+        let shades = |lamp: &Lamp| {
+            let dark = self.solids.iter().enumerate().filter(|(_, solid)| solid.material.glow.is_none());
+            Outlook::new(dark.map(|(number, solid)| (number, solid.turned_box())), lamp.position, 0.0)
+        };
+        self.shades = self.lighting.lamps.iter().map(shades).collect();
         self
     }
 }
@@ -194,19 +236,36 @@ impl Solid {
     /// `shape` turned by `rotation` with its origin at `centre`, both in the world, mm.
     pub fn new(shape: Shape, centre: Vector3<f64>, rotation: UnitQuaternion<f64>, material: Material) -> Self {
         let world_from_shape = rotation.to_rotation_matrix().into_inner();
-        Self { shape, centre, world_from_shape, shape_from_world: world_from_shape.transpose(), material }
+        let shape_from_world = world_from_shape.transpose();
+        let reach_squared = (shape.half_size().norm() + REACH_MARGIN_MM).powi(2);
+        Self { shape, centre, world_from_shape, shape_from_world, reach_squared, material }
     }
 
     fn bounds(&self) -> Bounds {
         Bounds::new(self.centre, self.shape.half_extent(&self.world_from_shape))
     }
 
+    fn turned_box(&self) -> TurnedBox {
+        TurnedBox { centre: self.centre, world_from_box: self.world_from_shape, half: self.shape.half_size() }
+    }
+
     fn meet(&self, origin: Vector3<f64>, direction: Vector3<f64>, limit: f64) -> Option<Contact> {
-        self.shape.meet(self.shape_from_world * (origin - self.centre), self.shape_from_world * direction, limit)
+        // A line that passes the sphere about the shape misses it.
+        let from_centre = origin - self.centre;
+        let (along, length) = (from_centre.dot(&direction), direction.norm_squared());
+        if from_centre.norm_squared() * length - along * along > self.reach_squared * length {
+            return None;
+        }
+        self.shape.meet(self.shape_from_world * from_centre, self.shape_from_world * direction, limit)
     }
 }
 
 impl Encounter {
+    /// Number of the surface.
+    pub const fn surface(&self) -> usize {
+        self.surface
+    }
+
     /// Distance along the ray, mm.
     pub fn range(&self) -> f64 {
         self.contact.range

@@ -60,13 +60,20 @@ impl Shape {
 
     /// Half the size of the axis-aligned box about the shape after `rotation`.
     pub fn half_extent(&self, rotation: &Matrix3<f64>) -> Vector3<f64> {
-        let half = match *self {
+        match *self {
+            Self::Sphere { radius } => Vector3::repeat(radius),
+            _ => rotation.abs() * self.half_size(),
+        }
+    }
+
+    /// Half the size of the box about the shape in its own frame.
+    pub const fn half_size(&self) -> Vector3<f64> {
+        match *self {
             Self::Rectangle { half } | Self::Ellipse { half } => Vector3::new(half[0], half[1], 0.0),
             Self::Block { half } => half,
-            Self::Sphere { radius } => return Vector3::repeat(radius),
+            Self::Sphere { radius } => Vector3::new(radius, radius, radius),
             Self::Cylinder { radius, half_height } => Vector3::new(radius, half_height, radius),
-        };
-        rotation.abs() * half
+        }
     }
 
     /// The texture coordinates of `position`, a point on the surface where `normal` stands out.

@@ -1,23 +1,35 @@
 //! Camera files of any format that is read.
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use vergence_calibration::IntrinsicsCalibration;
-use vergence_rig::{
-    CalibrationTable, Camchain, CameraDocument, CameraFormat, CameraTable, Provenance, Shutter, kalibr, opencv,
-};
-use vergence_vision::{KannalaBrandt, Length};
+use vergence_exchange::{Cameras, ExchangeError, ForeignCamera, ForeignRig, Format, Recognised};
+use vergence_rig::{CalibrationTable, CameraDocument, CameraTable, Provenance, Shutter};
+use vergence_vision::{KannalaBrandt, Side};
 
 use crate::InputError;
 
 /// A camera file that has been read.
 pub struct CameraFile {
-    /// Whose format it is.
-    pub format: CameraFormat,
-    /// The camera, or a pair from a camchain.
-    pub cameras: Camchain,
+    /// The other program's format; `None` for a file of this one.
+    pub format: Option<Format>,
+    /// The cameras in the order of the file, at least one.
+    pub cameras: Vec<FileLens>,
     /// How sure the camera is, where the file says so.
     pub document: Option<CameraDocument>,
+    /// The cameras as they stand in the other program's file.
+    foreign: Option<ForeignRig>,
+}
+
+/// A camera of a file.
+#[derive(Clone, Debug, PartialEq)]
+pub struct FileLens {
+    /// Its name in the file.
+    pub name: String,
+    /// Its lens.
+    pub lens: KannalaBrandt,
+    /// How far the lens is off the camera of the file, in words; `None` where it is the same.
+    pub remark: Option<String>,
 }
 
 impl CameraFile {
@@ -27,74 +39,82 @@ impl CameraFile {
         self.document.as_ref().map_or(Shutter::Global, |document| document.camera.shutter())
     }
 
-    /// The same in the text of `format`. Other programs' files say less than ours: a lens whose pupil moves becomes the central one that
-    /// images points 500 mm away alike, with a comment that says how much they differ elsewhere.
+    /// The only camera of the file at `path`.
     ///
     /// # Errors
-    /// Where TOML cannot say it, and where no central lens comes near.
-    pub fn text(&self, format: CameraFormat) -> Result<String, InputError> {
-        match (format, &self.document) {
-            (CameraFormat::Kalibr, _) => {
-                let (left, mut remarks) = central(&self.cameras.left)?;
-                let right = match &self.cameras.right {
-                    Some((right, left_from_right)) => {
-                        let (right, remark) = central(right)?;
-                        remarks += &remark;
-                        Some((right, *left_from_right))
-                    }
-                    None => None,
-                };
-                Ok(kalibr::write(&Camchain { left, right }) + &remarks)
-            }
-            (CameraFormat::OpenCv, _) => {
-                let (left, remark) = central(&self.cameras.left)?;
-                Ok(opencv::write(&left) + &remark)
-            }
-            (CameraFormat::Toml, Some(document)) => camera_toml(document),
-            (CameraFormat::Toml, None) => {
-                let camera = CameraTable::of(&self.cameras.left);
-                camera_toml(&CameraDocument { camera, calibration: None, provenance: None })
+    /// [`InputError::Wrong`] names the cameras of a file that has several.
+    pub fn only(&self, path: &Path) -> Result<&FileLens, InputError> {
+        match self.cameras.as_slice() {
+            [only] => Ok(only),
+            several => {
+                let names = several.iter().map(|camera| camera.name.clone()).collect();
+                Err(InputError::wrong(path, ExchangeError::Several { names }))
             }
         }
     }
-}
 
-/// A central and symmetric lens in place of `camera`, and a comment for the file where it is another.
-fn central(camera: &KannalaBrandt) -> Result<(KannalaBrandt, String), InputError> {
-    if camera.fits_opencv() {
-        return Ok((*camera, String::new()));
+    /// The camera on `side` of a pair: the only one of the file, or the first for the left and the second for the right side of two.
+    ///
+    /// # Errors
+    /// As [`Self::only`].
+    pub fn on(&self, side: Side, path: &Path) -> Result<&FileLens, InputError> {
+        match self.cameras.as_slice() {
+            pair @ [_, _] => Ok(&pair[side.index()]),
+            _ => self.only(path),
+        }
     }
-    let central = camera.central_at(Length::from_mm(500.0)).map_err(|error| InputError::Untold(error.to_string()))?;
-    let off = |mm: f64| camera.largest_difference(&central, Length::from_mm(mm));
-    let remark = format!(
-        "# The pupil of this lens moves (e0 = {:.3} mm), or it is not symmetric about its axis, which this format cannot say. The lens \
-         above images points 500 mm away as it does to {:.3} px; points 200 mm away are up to {:.2} px off, points 2 m away {:.2} px.\n",
-        camera.pupil().e0.mm(),
-        off(500.0),
-        off(200.0),
-        off(2000.0)
-    );
-    Ok((central, remark))
+
+    /// The camera, or the pair, to be written in another format.
+    ///
+    /// # Errors
+    /// [`InputError::Wrong`] where there are more than two cameras, or two without a pose.
+    pub fn to_write(&self, path: &Path) -> Result<Cameras, InputError> {
+        let [left, right] = self.cameras.as_slice() else {
+            return Ok(Cameras { left: self.only(path)?.lens, right: None });
+        };
+        let pair = self.foreign.iter().find_map(|foreign| Some(foreign.pair(None)));
+        let pair = pair.transpose().map_err(|error| InputError::wrong(path, error))?;
+        Ok(Cameras { left: left.lens, right: pair.map(|pair| (right.lens, pair.left_from_right)) })
+    }
 }
 
-/// Reads a camera file: ours, OpenCV's or Kalibr's, told apart by their contents.
+/// A path, and the camera that is named after it as in `chain.yaml#cam1`. A file whose own name has that sign is taken as it is.
+pub(crate) fn named_camera(path: &Path) -> (PathBuf, Option<String>) {
+    let text = path.to_string_lossy();
+    match text.rsplit_once('#') {
+        Some((file, camera)) if !path.exists() => (PathBuf::from(file), Some(camera.to_owned())),
+        _ => (path.to_owned(), None),
+    }
+}
+
+/// Reads a camera file: ours or another program's, told apart by their contents. `FILE#NAME` is one camera of a file of several, by its
+/// name or its number from zero.
 ///
 /// # Errors
 /// Says which file and what is wrong.
 pub fn read_camera_file(path: &Path) -> Result<CameraFile, InputError> {
-    let text = vergence_files::read_text(path)?;
-    let fail = |error: &dyn std::fmt::Display| InputError::wrong(path, error);
-    let single = |left| Camchain { left, right: None };
-    let format = CameraFormat::of(&text);
-    let (cameras, document) = match format {
-        CameraFormat::Kalibr => (kalibr::read(&text).map_err(|error| fail(&error))?, None),
-        CameraFormat::OpenCv => (single(opencv::read(&text).map_err(|error| fail(&error))?), None),
-        CameraFormat::Toml => {
-            let document: CameraDocument = toml::from_str(&text).map_err(|error| fail(&error))?;
-            (single(document.camera.camera().map_err(|error| fail(&error))?), Some(document))
-        }
+    let (path, camera) = named_camera(path);
+    let text = vergence_files::read_text(&path)?;
+    let fail = |error: &dyn std::fmt::Display| InputError::wrong(&path, error);
+    if Recognised::of(&text) == Recognised::Ours {
+        let document: CameraDocument = toml::from_str(&text).map_err(|error| fail(&error))?;
+        let lens = document.camera.camera().map_err(|error| fail(&error))?;
+        let cameras = vec![FileLens { name: "camera".to_owned(), lens, remark: None }];
+        return Ok(CameraFile { format: None, cameras, document: Some(document), foreign: None });
+    }
+    let foreign = vergence_exchange::read(&text).map_err(|error| fail(&error))?;
+    let chosen: Vec<&ForeignCamera> = match &camera {
+        Some(name) => vec![foreign.camera(Some(name)).map_err(|error| fail(&error))?],
+        None => foreign.cameras.iter().collect(),
     };
-    Ok(CameraFile { format, cameras, document })
+    let cameras = chosen.into_iter().map(file_lens).collect::<Result<Vec<_>, _>>().map_err(|error| fail(&error))?;
+    Ok(CameraFile { format: Some(foreign.format), cameras, document: None, foreign: Some(foreign) })
+}
+
+/// The lens in place of a camera of another program.
+pub(crate) fn file_lens(camera: &ForeignCamera) -> Result<FileLens, ExchangeError> {
+    let fit = camera.lens()?;
+    Ok(FileLens { name: camera.name.clone(), lens: fit.lens, remark: camera.remark(&fit) })
 }
 
 /// The text of a camera file of our own.
@@ -103,6 +123,12 @@ pub fn read_camera_file(path: &Path) -> Result<CameraFile, InputError> {
 /// Where TOML cannot say it.
 pub fn camera_toml(document: &CameraDocument) -> Result<String, InputError> {
     toml::to_string(document).map_err(|error| InputError::Untold(error.to_string()))
+}
+
+/// The camera file of our own for a lens of which only the parameters are known.
+#[must_use]
+pub fn bare_document(lens: &KannalaBrandt) -> CameraDocument {
+    CameraDocument { camera: CameraTable::of(lens), calibration: None, provenance: None }
 }
 
 /// The camera file of our own for a calibrated camera.
@@ -121,10 +147,10 @@ pub fn document_of(calibration: &IntrinsicsCalibration, provenance: Provenance) 
     }
 }
 
-/// The camera of a file that holds one.
+/// The camera of a file that holds one, or of `FILE#NAME`.
 ///
 /// # Errors
-/// As [`read_camera_file`].
-pub fn read_camera(path: &Path) -> Result<KannalaBrandt, InputError> {
-    Ok(read_camera_file(path)?.cameras.left)
+/// As [`read_camera_file`], and where the file has several cameras and none is named.
+pub fn read_camera(path: &Path) -> Result<FileLens, InputError> {
+    read_camera_file(path)?.only(path).cloned()
 }

@@ -5,10 +5,10 @@ use std::path::Path;
 use nalgebra::SMatrix;
 use vergence_calibration::LensKnowledge;
 use vergence_rig::{CalibrationTable, Shutter};
-use vergence_vision::{KannalaBrandt, LENS_PARAMETERS};
+use vergence_vision::{KannalaBrandt, LENS_PARAMETERS, Side};
 
 use crate::InputError;
-use crate::camera_files::{CameraFile, read_camera_file};
+use crate::camera_files::{CameraFile, named_camera, read_camera_file};
 use crate::input_hash::InputHash;
 
 /// What a calibration may change of the lenses.
@@ -38,6 +38,8 @@ pub struct KnownLenses {
     pub shutters: [Shutter; 2],
     /// How well the lenses are known.
     pub knowledge: LensKnowledge,
+    /// How far they are off the cameras of other programs' files, and which of a file's cameras they are, in words.
+    pub remarks: Vec<String>,
 }
 
 impl<'a> LensFiles<'a> {
@@ -47,8 +49,8 @@ impl<'a> LensFiles<'a> {
     /// [`InputError`], which names the file that cannot be used.
     pub fn read(paths: [&'a Path; 2], hash: &mut InputHash) -> Result<Self, InputError> {
         let [left, right] = paths;
-        hash.add(left)?;
-        hash.add(right)?;
+        hash.add(&named_camera(left).0)?;
+        hash.add(&named_camera(right).0)?;
         Ok(Self { paths, files: [read_camera_file(left)?, read_camera_file(right)?] })
     }
 
@@ -62,7 +64,7 @@ impl<'a> LensFiles<'a> {
     ///
     /// # Errors
     /// [`InputError::Wrong`] where [`LensFreedom::Known`] is asked for and a file carries no covariance.
-    pub fn lenses(self, freedom: LensFreedom) -> Result<KnownLenses, InputError> {
+    pub fn lenses(&self, freedom: LensFreedom) -> Result<KnownLenses, InputError> {
         let ([left, right], [left_path, right_path]) = (&self.files, self.paths);
         let knowledge = match freedom {
             LensFreedom::Exact => LensKnowledge::Exact,
@@ -70,8 +72,14 @@ impl<'a> LensFiles<'a> {
             LensFreedom::Known => LensKnowledge::within(covariance(left_path, left)?, covariance(right_path, right)?),
         };
         let shutters = self.files.each_ref().map(CameraFile::shutter);
-        let [left, right] = self.files;
-        Ok(KnownLenses { left: left.cameras.left, right: right.cameras.left, shutters, knowledge })
+        let (left_lens, right_lens) = (left.on(Side::Left, left_path)?, right.on(Side::Right, right_path)?);
+        let remarks =
+            [(left, left_lens, "left"), (right, right_lens, "right")].into_iter().flat_map(|(file, lens, side)| {
+                let chosen = (file.cameras.len() > 1).then(|| format!("{} is taken as the {side} camera", lens.name));
+                [chosen, lens.remark.clone()].into_iter().flatten()
+            });
+        let remarks = remarks.collect();
+        Ok(KnownLenses { left: left_lens.lens, right: right_lens.lens, shutters, knowledge, remarks })
     }
 }
 

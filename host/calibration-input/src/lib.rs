@@ -5,6 +5,7 @@
 //! - [`RecordedSet`], [`LiveSet`]: a set folder of stage poses, read or taken while the rig drives itself
 //! - [`TargetWatch`]: whether a target before live cameras is seen, held still, and worth a view
 //! - [`CameraFile`], [`LensFiles`]: camera files of any format that is read
+//! - [`read_rig`], [`import_rig`]: rig files, and rigs of other programs' cameras
 //! - [`Slots`]: calibrations kept under names, one of them active
 //!
 //! Nothing is printed: functions return values and call back with events. The computations are those of
@@ -14,6 +15,7 @@ mod camera_files;
 mod corners;
 mod csv_file;
 mod error;
+mod foreign_rig;
 mod image_files;
 mod input_hash;
 mod lenses;
@@ -27,9 +29,10 @@ mod target_watch;
 mod truth;
 mod views;
 
-pub use camera_files::{CameraFile, camera_toml, document_of, read_camera, read_camera_file};
+pub use camera_files::{CameraFile, FileLens, bare_document, camera_toml, document_of, read_camera, read_camera_file};
 pub use corners::{FrameView, read_corners};
 pub use error::InputError;
+pub use foreign_rig::{ImportedRig, import_rig, read_rig};
 pub use image_files::named_images;
 pub use input_hash::InputHash;
 pub use lenses::{KnownLenses, LensFiles, LensFreedom};

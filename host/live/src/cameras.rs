@@ -8,7 +8,7 @@ use vergence_board::{HostClock, Shared};
 use vergence_camera::{Camera, CameraError, CameraEvent, attach};
 use vergence_rig::Shutter;
 use vergence_scene::TrueLens;
-use vergence_sim::{LiveCamera, Room, RoomCamera, SimulatedRig, Unplugged};
+use vergence_sim::{LiveCamera, Rendering, Room, RoomCamera, SimulatedRig, Unplugged};
 use vergence_vision::Side;
 
 use crate::LiveError;
@@ -34,7 +34,7 @@ where
 }
 
 /// Starts two simulated cameras, left and right with these lenses and shutters, on `mechanics` in the furnished room, and unplugs them as
-/// `unplugged` says; `seed` is that of the noise of their images. Their events go to `listener`.
+/// `unplugged` says; `seed` is that of the noise of their images, which are rendered in real time. Their events go to `listener`.
 pub fn simulate_both(
     cameras: [(TrueLens, Shutter); 2],
     mechanics: &Shared<SimulatedRig>,
@@ -45,7 +45,7 @@ pub fn simulate_both(
     let room = Arc::new(Room::with_rig());
     for (side, (lens, shutter)) in [Side::Left, Side::Right].into_iter().zip(cameras) {
         let camera = RoomCamera { side, lens, room: Arc::clone(&room), seed };
-        let camera = LiveCamera::new(camera, shutter, unplugged);
+        let camera = LiveCamera::new(camera, shutter, unplugged).with_rendering(Rendering::Quick);
         tokio::spawn(drive(camera, mechanics.clone(), clock, listener.clone()));
     }
 }

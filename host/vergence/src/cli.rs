@@ -92,6 +92,8 @@ enum Verb {
     Calibrate(cmd::calibrate::Args),
     /// Prints and converts camera files, and uses them for single points.
     Camera(cmd::camera::Args),
+    /// Makes rig files of other programs' cameras, and other programs' files of rigs.
+    Rig(cmd::rig::Args),
     /// Draws a calibration target to print.
     Target(cmd::target::Args),
     /// Prints a script that lets a shell complete this command.
@@ -102,7 +104,7 @@ enum Verb {
 pub const TASKS: &[(&str, &[&str])] = &[
     ("Try without hardware", &["demo", "sim", "reproduce"]),
     ("Set up a board", &["devices", "doctor", "config", "flash", "image", "servo"]),
-    ("Calibrate", &["target", "capture", "calibrate", "camera"]),
+    ("Calibrate", &["target", "capture", "calibrate", "camera", "rig"]),
     ("Move", &["home", "mode", "move", "plan", "stop", "arm", "disarm", "clear"]),
     ("Measure", &["run", "depth", "zones", "models"]),
     ("Watch a board", &["status", "monitor", "trigger", "log", "link-test"]),
@@ -266,6 +268,7 @@ fn execute(cli: Cli, virtual_time: bool) -> Result<(), Failure> {
             Verb::Capture(verb) => cmd::capture::run(&verb.args, &verb.options.chosen()?, console).await,
             Verb::Calibrate(args) => cmd::calibrate::run(&args, console).await,
             Verb::Camera(args) => cmd::camera::run(&args, console),
+            Verb::Rig(args) => cmd::rig::run(&args, console),
             Verb::Target(args) => cmd::target::run(&args, console),
             Verb::Completions(args) => cmd::completions::run(&args, console),
         }

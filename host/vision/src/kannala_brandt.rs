@@ -109,6 +109,19 @@ pub enum InvalidLens {
         /// The stated limit of the field.
         stated: Angle,
     },
+    /// A parameter of another program's model breaks a rule.
+    #[error("{name} is {value}, it must {rule}")]
+    OutOfRange {
+        /// Name of the parameter.
+        name: &'static str,
+        /// Its value.
+        value: f64,
+        /// What it must do.
+        rule: &'static str,
+    },
+    /// The image of another program's model folds over at its axis.
+    #[error("the image folds over at the optical axis: the parameters are those of no camera")]
+    FoldsAtAxis,
     /// Decentring and thin prism are so large that two rays of the field share a pixel.
     #[error("the tangential and prism coefficients fold the image inside theta_max: reduce theta_max or recalibrate")]
     Folds,

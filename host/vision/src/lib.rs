@@ -5,6 +5,7 @@
 //! - [`KannalaBrandt`] unprojects pixels to rays and projects rays to pixels, past 90°, with a pupil that moves and elements
 //!   off the axis; [`OpenCvFisheye`] holds the
 //!   parameters of other programs;
+//! - [`CameraModel`] is what the camera models of other programs have in common with it, and [`fit_lens`] makes a lens of any of them;
 //! - [`ray_to_plane`] and [`dihedral`] measure how well two rays agree with the cameras' relative pose;
 //! - [`pseudo_intersection`] makes a point of two rays, and [`covariance()`] gives its uncertainty;
 //! - [`PointUncertainty`] adds the uncertainty that all points of a pair share, from lenses and pose;
@@ -26,6 +27,7 @@ mod batch;
 mod cloud;
 mod covariance;
 mod epipolar;
+mod foreign;
 mod frames;
 mod gates;
 mod import;
@@ -53,6 +55,11 @@ pub use batch::{
 pub use cloud::{Cloud, CloudPoint, cloud, cloud_of_each, cloud_point};
 pub use covariance::{covariance, range_sigma};
 pub use epipolar::{dihedral, ray_to_plane};
+pub use foreign::{
+    CameraModel, Central, DoubleSphere, Eucm, Fisheye624, Formula, LensFit, Mei, ModelParameter, NoFit, OCam,
+    ParameterUnit, Pinhole, Radtan, Sight, SightRegion, SplineFit, SplineGrid, SplinedStereographic, fit_lens,
+    fit_spline,
+};
 pub use frames::{Base, Camera, Frame, Left, Point, Right, Side, Transform, UnitRay, World};
 pub use gates::{DropReason, Gates};
 pub use import::{OpenCvFisheye, largest_theta};

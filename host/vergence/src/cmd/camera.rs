@@ -1,18 +1,22 @@
 //! `vergence camera`: camera files shown, converted, and used for single points.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
+use std::str::FromStr;
 
 use nalgebra::Vector3;
 use serde_json::json;
-use vergence_calibration_input::{read_camera, read_camera_file};
+use vergence_calibration_input::{FileLens, bare_document, camera_toml, read_camera_file};
+use vergence_exchange::{UnknownFormat, WriteFormat};
 use vergence_files::write_whole;
-use vergence_rig::{CameraFormat, Shutter, camera_in_words, camera_json};
+use vergence_rig::{Shutter, camera_in_words, camera_json};
 use vergence_vision::{Camera, KannalaBrandt, Pixel, UnitRay};
 
 use crate::console::Console;
 use crate::failure::Failure;
+use crate::rig_file::{read_lens, write_foreign};
 
-/// Works on camera files: this program's TOML, OpenCV's YAML (fisheye), Kalibr's camchain (pinhole-equidistant).
+/// Works on camera files: this program's and those of OpenCV, Kalibr, Basalt, EuRoC, ROS, mrcal, COLMAP, ORB-SLAM, OCamCalib and librealsense.
+/// One camera of several is FILE#NAME.
 #[derive(Debug, clap::Args)]
 pub struct Args {
     #[command(subcommand)]
@@ -30,10 +34,11 @@ enum Task {
     Convert {
         /// The camera file.
         file: PathBuf,
-        /// The format to write.
-        #[arg(long)]
-        to: Format,
-        /// The file to write.
+        /// The format to write: toml, opencv, kalibr, basalt, ros, colmap or mrcal. mrcal gets a splined model, and a lens with a
+        /// moving pupil a central one for points 500 mm away: how far these are off is said.
+        #[arg(long, value_name = "FORMAT")]
+        to: Target,
+        /// The file to write. ROS and mrcal have one for each camera of a pair: FILE-left and FILE-right.
         #[arg(long, short, value_name = "FILE")]
         out: PathBuf,
     },
@@ -55,50 +60,62 @@ enum Task {
     },
 }
 
-#[derive(Clone, Copy, Debug, clap::ValueEnum)]
-enum Format {
-    Toml,
-    Opencv,
-    Kalibr,
+/// The format to write; `None` for ours.
+#[derive(Clone, Copy, Debug)]
+struct Target(Option<WriteFormat>);
+
+impl FromStr for Target {
+    type Err = UnknownFormat;
+
+    fn from_str(text: &str) -> Result<Self, UnknownFormat> {
+        if text == "toml" { Ok(Self(None)) } else { text.parse().map(|format| Self(Some(format))) }
+    }
 }
 
 pub fn run(args: &Args, console: Console) -> Result<(), Failure> {
     match &args.task {
         Task::Show { file } => {
             let file = read_camera_file(file)?;
-            let right = file.cameras.right.map(|(camera, _)| camera);
-            for camera in [Some(file.cameras.left), right].into_iter().flatten() {
-                console.say(camera_in_words(&camera))?;
+            for camera in &file.cameras {
+                if file.cameras.len() > 1 {
+                    console.say(format!("{}:", camera.name))?;
+                }
+                console.say(camera_in_words(&camera.lens))?;
+                console.say_lines(camera.remark.clone())?;
             }
-            let cameras: Vec<_> =
-                [Some(file.cameras.left), right].into_iter().flatten().map(|c| camera_json(&c)).collect();
-            console.result(&json!({"format": format!("{:?}", file.format).to_lowercase(), "cameras": cameras}))
-        }
-        Task::Convert { file, to, out } => {
-            let file = read_camera_file(file)?;
-            let format = match to {
-                Format::Toml => CameraFormat::Toml,
-                Format::Opencv => CameraFormat::OpenCv,
-                Format::Kalibr => CameraFormat::Kalibr,
+            let json = |camera: &FileLens| {
+                let mut json = camera_json(&camera.lens);
+                json["name"] = json!(camera.name);
+                json["remark"] = json!(camera.remark);
+                json
             };
-            if file.cameras.right.is_some() && format != CameraFormat::Kalibr {
-                return Err(Failure::usage("the camchain holds a pair; only --to kalibr can hold one"));
-            }
-            if format != CameraFormat::Toml && !file.cameras.left.fits_opencv() {
-                console.warn(
-                    "the pupil of the lens moves or it is not symmetric, which the format cannot say: see the comment in the file that is written",
-                );
-            }
-            if format != CameraFormat::Toml && file.shutter() != Shutter::Global {
-                console.warn("the file that is written says nothing of the rolling shutter (line_time)");
-            }
-            write_whole(out, file.text(format)?.as_bytes())?;
-            console.say(format!("wrote {}", out.display()))?;
-            console.result(&json!({ "out": out }))
+            let cameras: Vec<_> = file.cameras.iter().map(json).collect();
+            let format = file.format.map_or("toml".to_owned(), |format| format!("{format:?}").to_lowercase());
+            console.result(&json!({ "format": format, "cameras": cameras }))
         }
-        Task::Project { file, rays } => project(&read_camera(file)?, rays, console),
-        Task::Unproject { file, pixels } => unproject(&read_camera(file)?, pixels, console),
+        Task::Convert { file, to, out } => convert(file, *to, out, console),
+        Task::Project { file, rays } => project(&read_lens(file, console)?, rays, console),
+        Task::Unproject { file, pixels } => unproject(&read_lens(file, console)?, pixels, console),
     }
+}
+
+fn convert(path: &Path, Target(to): Target, out: &Path, console: Console) -> Result<(), Failure> {
+    let file = read_camera_file(path)?;
+    for remark in file.cameras.iter().filter_map(|camera| camera.remark.as_ref()) {
+        console.warn(remark);
+    }
+    let Some(format) = to else {
+        let camera = file.only(path)?;
+        let remark = camera.remark.iter().map(|remark| format!("# {remark}\n")).collect::<String>();
+        let document = file.document.clone().unwrap_or_else(|| bare_document(&camera.lens));
+        write_whole(out, (remark + &camera_toml(&document)?).as_bytes())?;
+        console.say(format!("wrote {}", out.display()))?;
+        return console.result(&json!({ "out": out }));
+    };
+    if file.shutter() != Shutter::Global {
+        console.warn("the file that is written says nothing of the rolling shutter (line_time)");
+    }
+    write_foreign(format, &file.to_write(path)?, out, console)
 }
 
 fn project(camera: &KannalaBrandt, rays: &[[f64; 3]], console: Console) -> Result<(), Failure> {

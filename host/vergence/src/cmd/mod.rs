@@ -31,6 +31,7 @@ pub mod move_to;
 pub mod orders;
 pub mod plan;
 pub mod reproduce;
+pub mod rig;
 pub mod run;
 pub mod servo;
 pub mod sim;

@@ -4,11 +4,11 @@ use std::path::PathBuf;
 
 use serde_json::json;
 use vergence_calibration::LensDifference;
-use vergence_calibration_input::read_camera;
 use vergence_vision::Angle;
 
 use crate::console::Console;
 use crate::failure::Failure;
+use crate::rig_file::read_lens;
 
 /// Compares the rays of two camera files over the image. The rotation that fits them best is removed first: it is a
 /// difference of pose, not of the lens.
@@ -27,7 +27,7 @@ pub struct Args {
 }
 
 pub fn run(args: &Args, console: Console) -> Result<(), Failure> {
-    let (a, b) = (read_camera(&args.a)?, read_camera(&args.b)?);
+    let (a, b) = (read_lens(&args.a, console)?, read_lens(&args.b, console)?);
     let LensDifference { median, p95, worst, turn, places } = LensDifference::between(&a, &b, args.field)?;
     let [median, p95, worst, turned] = [median, p95, worst, turn].map(Angle::deg);
     console.say(format!(

@@ -63,9 +63,10 @@ pub struct Args {
 pub fn run(args: &Args, console: Console) -> Result<(), Failure> {
     args.result.check()?;
     let mut hash = InputHash::default();
-    let KnownLenses { left, right, shutters, knowledge } = args.lenses.read(&mut hash, console)?.ok_or_else(|| {
-        Failure::usage("name the camera files with --left and --right: vergence calibrate intrinsics makes them")
-    })?;
+    let KnownLenses { left, right, shutters, knowledge, .. } =
+        args.lenses.read(&mut hash, console)?.ok_or_else(|| {
+            Failure::usage("name the camera files with --left and --right: vergence calibrate intrinsics makes them")
+        })?;
     let PairViews { views, left_out, images } = views(args, [&left, &right], &mut hash, console)?;
     let force = args.result.force;
     force.unless_forced(corners_can_be_held(views.iter().map(|view| &view.left)).map_err(Failure::from), console)?;

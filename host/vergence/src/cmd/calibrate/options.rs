@@ -60,7 +60,11 @@ impl LensOptions {
             )?;
         }
         let lenses = self.lenses.unwrap_or(if sure { Lenses::Known } else { Lenses::Exact });
-        Ok(Some(files.lenses(lenses.freedom())?))
+        let known = files.lenses(lenses.freedom())?;
+        for remark in &known.remarks {
+            console.warn(remark);
+        }
+        Ok(Some(known))
     }
 
     /// What is known of lenses that come from elsewhere than camera files.

@@ -85,7 +85,7 @@ pub async fn run(args: &Args, common: &CommonOptions, console: Console) -> Resul
     let mut hash = InputHash::default();
     common.rig.iter().try_for_each(|path| hash.add(path))?;
     let (drawn, knowledge) = match args.lenses.read(&mut hash, console)? {
-        Some(KnownLenses { left, right, shutters, knowledge }) => {
+        Some(KnownLenses { left, right, shutters, knowledge, .. }) => {
             (Rig { left_camera: left, right_camera: right, shutters, ..drawn }, knowledge)
         }
         None => (drawn, args.lenses.without_files()?),

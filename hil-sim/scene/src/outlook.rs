@@ -1,0 +1,159 @@
+//! What stands in each direction from a place, so that a ray from there is tested against few of the shapes.
+//!
+//! The directions are the cells of a cube about the place, each with the shapes that it may show, nearest first: the light
+//! buffer of E. Haines and D. Greenberg ("The light buffer", IEEE CG&A 6(9), 1986), here for lamps and for cameras.
+
+use nalgebra::{Matrix3, Vector3};
+
+/// Cells along the edge of a face of the cube.
+const CELLS: usize = 64;
+const FACES: usize = 6;
+
+/// A shape nearer than this (mm) is listed in every direction; nearer than this before a face of the cube nothing is projected.
+const NEAR_MM: f64 = 1.0;
+
+/// Added around each box (mm), and to each cell's edges as a share of a cell, against rounding.
+const PADDING_MM: f64 = 0.02;
+const PADDING_CELLS: f64 = 0.01;
+
+/// A box of half size `half` about `centre`, turned by `world_from_box`.
+#[derive(Clone, Copy, Debug)]
+pub struct TurnedBox {
+    /// Middle in the world, mm.
+    pub centre: Vector3<f64>,
+    /// Axes of the box as columns.
+    pub world_from_box: Matrix3<f64>,
+    /// Half of its size along its axes, mm.
+    pub half: Vector3<f64>,
+}
+
+/// A shape that may be met, and the least distance from the place at which that can be.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Candidate {
+    /// Index of the shape.
+    pub shape: u32,
+    /// In mm, rounded down.
+    pub from_mm: f32,
+}
+
+/// The shapes in each direction from a place.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Outlook {
+    place: Vector3<f64>,
+    slack: f64,
+    /// Where the candidates of a cell begin; those of the next one are their end.
+    begins: Vec<u32>,
+    candidates: Vec<Candidate>,
+}
+
+impl Outlook {
+    /// From `place`, for all rays that start within `slack` mm of it.
+    pub fn new(shapes: impl Iterator<Item = (usize, TurnedBox)>, place: Vector3<f64>, slack: f64) -> Self {
+        let mut shapes: Vec<(Candidate, TurnedBox)> = shapes
+            .map(|(shape, mut of_shape)| {
+                of_shape.half.add_scalar_mut(slack + PADDING_MM);
+                let from_mm = (of_shape.distance(place) * (1.0 - f64::from(f32::EPSILON))) as f32;
+                (Candidate { shape: shape as u32, from_mm }, of_shape)
+            })
+            .collect();
+        shapes.sort_by(|a, b| a.0.from_mm.total_cmp(&b.0.from_mm).then(a.0.shape.cmp(&b.0.shape)));
+        let listed: Vec<(Candidate, [Option<Part>; FACES])> =
+            shapes.into_iter().map(|(candidate, of_shape)| (candidate, of_shape.parts(place))).collect();
+        let mut begins = vec![0; FACES * CELLS * CELLS + 1];
+        for_each_cell(&listed, |cell, _| begins[cell + 1] += 1);
+        for cell in 1..begins.len() {
+            begins[cell] += begins[cell - 1];
+        }
+        let total = begins.last().copied().unwrap_or_default();
+        let mut candidates = vec![Candidate { shape: 0, from_mm: 0.0 }; total as usize];
+        let mut next = begins.clone();
+        for_each_cell(&listed, |cell, candidate| {
+            candidates[next[cell] as usize] = candidate;
+            next[cell] += 1;
+        });
+        Self { place, slack, begins, candidates }
+    }
+
+    /// Whether rays from `origin` are of this outlook.
+    #[inline]
+    pub fn holds(&self, origin: &Vector3<f64>) -> bool {
+        (origin - self.place).norm_squared() <= self.slack * self.slack
+    }
+
+    /// The shapes that a ray along `direction`, of any length, may meet: nearest first.
+    #[inline]
+    pub fn along(&self, direction: &Vector3<f64>) -> &[Candidate] {
+        let size = direction.abs();
+        let axis = if size.x >= size.y && size.x >= size.z { 0 } else { 1 + usize::from(size.z > size.y) };
+        let (along, face) = (size[axis], 2 * axis + usize::from(direction[axis] < 0.0));
+        let cell = |other: usize| {
+            // Rounded to single precision by far less than the padding.
+            let across = (direction[(axis + other) % 3] / along) as f32;
+            (((across + 1.0) * (0.5 * CELLS as f32)) as u32 as usize).min(CELLS - 1)
+        };
+        let cell = (face * CELLS + cell(2)) * CELLS + cell(1);
+        &self.candidates[self.begins[cell] as usize..self.begins[cell + 1] as usize]
+    }
+}
+
+/// A rectangle of cells of a face: first and last column, first and last row.
+type Part = [[usize; 2]; 2];
+
+fn for_each_cell(listed: &[(Candidate, [Option<Part>; FACES])], mut visit: impl FnMut(usize, Candidate)) {
+    for (candidate, parts) in listed {
+        for (face, part) in parts.iter().enumerate() {
+            let Some([columns, rows]) = part else { continue };
+            for row in rows[0]..=rows[1] {
+                (columns[0]..=columns[1]).for_each(|column| visit((face * CELLS + row) * CELLS + column, *candidate));
+            }
+        }
+    }
+}
+
+impl TurnedBox {
+    /// How far `place` is from the box.
+    fn distance(&self, place: Vector3<f64>) -> f64 {
+        let own = self.world_from_box.tr_mul(&(place - self.centre));
+        own.zip_map(&self.half, |at, half| (at.abs() - half).max(0.0)).norm()
+    }
+
+    /// The cells of each face of the cube about `place` that the box covers: those of the rectangle about its corners' projections.
+    fn parts(&self, place: Vector3<f64>) -> [Option<Part>; FACES] {
+        if self.distance(place) < 2.0 * NEAR_MM {
+            return [Some([[0, CELLS - 1]; 2]); FACES];
+        }
+        let corners: [Vector3<f64>; 8] = std::array::from_fn(|corner| {
+            let sign = Vector3::from_fn(|axis, _| if corner >> axis & 1 == 0 { -1.0 } else { 1.0 });
+            self.centre - place + self.world_from_box * self.half.component_mul(&sign)
+        });
+        std::array::from_fn(|face| part(&corners, face / 2, if face % 2 == 0 { 1.0 } else { -1.0 }))
+    }
+}
+
+/// The cells that a box with these corners covers on the face of the cube at `sign` along `axis`. What is before the face is convex: its
+/// projection lies between those of its corners, which are the box's own and those where its edges come before the face.
+fn part(corners: &[Vector3<f64>; 8], axis: usize, sign: f64) -> Option<Part> {
+    let (mut low, mut high) = ([f64::INFINITY; 2], [f64::NEG_INFINITY; 2]);
+    let mut cover = |point: Vector3<f64>| {
+        for (other, (low, high)) in low.iter_mut().zip(&mut high).enumerate() {
+            let across = point[(axis + 1 + other) % 3] / (sign * point[axis]);
+            (*low, *high) = (low.min(across), high.max(across));
+        }
+    };
+    let before = |corner: usize| sign * corners[corner][axis] - NEAR_MM;
+    for corner in (0..8).filter(|&corner| before(corner) >= 0.0) {
+        cover(corners[corner]);
+        for other in [1, 2, 4].map(|edge| corner ^ edge).into_iter().filter(|&other| before(other) < 0.0) {
+            let share = before(corner) / (before(corner) - before(other));
+            cover(corners[corner] + (corners[other] - corners[corner]) * share);
+        }
+    }
+    let cells = |axis: usize| {
+        let at = |across: f64, padding: f64| (across + 1.0) * (0.5 * CELLS as f64) + padding;
+        let (first, last) = (at(low[axis], -PADDING_CELLS), at(high[axis], PADDING_CELLS));
+        // Also where nothing is before the face: from infinity to minus infinity.
+        let covered = first < CELLS as f64 && last >= 0.0;
+        covered.then(|| [first.max(0.0) as usize, (last as usize).min(CELLS - 1)])
+    };
+    Some([cells(0)?, cells(1)?])
+}

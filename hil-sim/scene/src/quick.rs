@@ -1,0 +1,224 @@
+//! Images in real time, for cameras that run live.
+//!
+//! Of each pixel one ray is cast, through its centre, and a texture is faded to the size of the pixel; some more rays are cast where that
+//! ray or a neighbour's meets something else, or another light. A ray that meets what a neighbour shows takes the neighbour's light. What depends on lens and pixel alone is computed once, in a [`RayTable`].
+//! Nothing is displaced from where [`render`](crate::render) shows it: places on a pixel's square are symmetric about its centre.
+
+use std::sync::LazyLock;
+
+use image::RgbImage;
+use rayon::prelude::*;
+use vergence_vision::{Angle, Camera, Transform, World};
+
+use crate::Optics;
+use crate::blur::spread;
+use crate::lens::Lens;
+use crate::optics::encoded;
+use crate::rays::{PosedLens, RayGrid};
+use crate::render::{Rows, View, lattice};
+use crate::scene::Encounter;
+use crate::texture::Rgb;
+use crate::texture_noise::mix64;
+
+/// Further rays of a pixel at an edge between surfaces, and at one within a surface: those of prints are measured.
+const EDGE_RAYS: [u32; 2] = [6, 16];
+
+/// Difference of the square roots of the light of neighbours above which more rays are cast.
+const EDGE: f32 = 0.4;
+
+/// What a lens does with each pixel: computed once for all images of the size of its sensor.
+#[derive(Clone, Debug)]
+pub struct RayTable {
+    /// Of the pixels and one more on every side, row by row, in the camera's frame. Not numbers outside the field.
+    rays: Vec<[f64; 3]>,
+    pixels: Vec<PixelOptics>,
+}
+
+/// What light goes through on its way to a pixel.
+#[derive(Clone, Copy, Debug)]
+struct PixelOptics {
+    /// Radians from one pixel to the next.
+    pitch: f32,
+    /// The share of the light that passes the lens.
+    exposure: f32,
+    /// Variance of the lens's own spot, in square pixels.
+    spot: f32,
+}
+
+impl RayTable {
+    /// Of a camera with this lens.
+    #[must_use]
+    pub fn new(lens: &dyn Lens, optics: &Optics) -> Self {
+        let (size, lens_rays) = (lens.size(), lens.rays());
+        let row = |y: u32| -> Vec<[f64; 2]> {
+            (0..size.width + 2).map(|x| [f64::from(x) - 1.0, f64::from(y) - 1.0]).collect()
+        };
+        let rays: Vec<_> =
+            (0..size.height + 2).into_par_iter().flat_map_iter(|y| lens_rays.directions(&row(y))).collect();
+        let of_ray = |ray: &[f64; 3]| {
+            let theta = Angle::from_rad(ray[2].clamp(-1.0, 1.0).acos());
+            PixelOptics {
+                pitch: (1.0 / lens.pixels_per_radian(theta)) as f32,
+                exposure: optics.light_at(theta, lens) as f32,
+                spot: if ray[2].is_nan() { 0.0 } else { lens.spot_variance(theta) as f32 },
+            }
+        };
+        let (width, stride) = (size.width as usize, size.width as usize + 2);
+        let inner = rays.par_chunks(stride).skip(1).take(size.height as usize);
+        let pixels = inner.flat_map_iter(|row| row[1..=width].iter().map(of_ray)).collect();
+        Self { rays, pixels }
+    }
+}
+
+/// What the ray through the centre of a pixel meets.
+#[derive(Clone, Copy, Default)]
+struct Glance {
+    light: Rgb,
+    /// The square root of the mean of its colours.
+    level: f32,
+    /// One more than the number of the surface; 0 where nothing is met, or outside the field.
+    surface: u32,
+}
+
+/// Renders a view in real time, every row from the pose that `world_from_camera` gives for it. `table` is of the lens and the optics of the
+/// view, whose numbers of samples do not matter. The same `seed` gives the same bytes on any number of threads.
+#[must_use]
+pub fn render_quick(
+    view: &View<'_>,
+    table: &RayTable,
+    seed: u64,
+    world_from_camera: &(dyn Fn(u32) -> Transform<World, Camera> + Sync),
+) -> RgbImage {
+    let (size, rows) = (view.camera.size(), Rows { at_once: 1, world_from_camera });
+    let width = (size.width as usize).max(1);
+    let (outlook, lens_rays) = (rows.outlook(view), view.camera.rays());
+    let eye = |y: usize| PosedLens::new(view.camera, &lens_rays, &world_from_camera(y as u32));
+    let meet = |origin, ray| view.scene.encounter_from(&outlook, origin, ray);
+    let light = |origin, ray, met: Option<&Encounter>, optics: &PixelOptics| {
+        view.scene.light(origin, ray, met, f64::from(optics.pitch))
+    };
+
+    let mut glances = vec![Glance::default(); table.pixels.len()];
+    glances.par_chunks_mut(width).zip(table.pixels.par_chunks(width)).enumerate().for_each(|(y, (row, optics))| {
+        let eye = eye(y);
+        let grid = RayGrid::of_table(&eye, &table.rays, size.width);
+        for (x, (glance, optics)) in row.iter_mut().zip(optics).enumerate() {
+            if let Some(around) = grid.around(x as u32, y as u32) {
+                let (origin, ray) = (around.start(&around.centre()), around.centre());
+                let met = meet(origin, ray);
+                let light = light(origin, ray, met.as_ref(), optics);
+                *glance =
+                    Glance { light, level: (light.iter().sum::<f32>() / 3.0).sqrt(), surface: surface(met.as_ref()) };
+            }
+        }
+    });
+
+    let mut image = vec![[0.0; 3]; glances.len()];
+    image.par_chunks_mut(width).enumerate().for_each(|(y, row)| {
+        let eye = eye(y);
+        let grid = RayGrid::of_table(&eye, &table.rays, size.width);
+        for (x, pixel) in row.iter_mut().enumerate() {
+            let at = y * width + x;
+            let (glance, optics) = (glances[at], &table.pixels[at]);
+            let mut sum = glance.light;
+            let mut count = 1.0;
+            let edge = edge(&glances, width, x, y);
+            let around = edge.is_some().then(|| grid.around(x as u32, y as u32)).flatten();
+            if let (Some(edge), Some(around)) = (edge, around) {
+                let nearby = around.nearby();
+                let rays = EDGE_RAYS[usize::from(edge.within)];
+                // A ray outside the field brings no light.
+                for ray in lattice(rays, mix64(seed ^ at as u64)).filter_map(|place| nearby.at(place)) {
+                    let origin = around.start(&ray);
+                    let met = meet(origin, ray);
+                    let known = edge.light_of(surface(met.as_ref()));
+                    let light = known.unwrap_or_else(|| light(origin, ray, met.as_ref(), optics));
+                    sum = std::array::from_fn(|i| sum[i] + light[i]);
+                }
+                count += rays as f32;
+            }
+            *pixel = sum.map(|c| c * optics.exposure / count);
+        }
+    });
+    let spots: Vec<f32> = table.pixels.iter().map(|pixel| pixel.spot).collect();
+    develop(&spread(&image, width, view.optics.blur_px, &spots), &table.rays, view, !mix64(seed))
+}
+
+/// One more than the number of the surface met; 0 where none is.
+fn surface(met: Option<&Encounter>) -> u32 {
+    met.map_or(0, |met| met.surface() as u32 + 1)
+}
+
+/// A pixel, then those left, right, above and below of it, one of which shows something else; itself again in place of those beside the image.
+struct Edge {
+    glances: [Glance; 5],
+    /// Whether the light differs much within one surface, which the rays then must see for themselves.
+    within: bool,
+}
+
+impl Edge {
+    /// The light of a surface that one of the pixels shows.
+    fn light_of(&self, surface: u32) -> Option<Rgb> {
+        let shown = self.glances.iter().find(|glance| glance.surface == surface)?;
+        (!self.within).then_some(shown.light)
+    }
+}
+
+/// The edge at a pixel, if it shows something else than one beside, above or below it.
+fn edge(glances: &[Glance], width: usize, x: usize, y: usize) -> Option<Edge> {
+    let at = y * width + x;
+    let here = glances[at];
+    let beside = |is_there: bool, at: usize| if is_there { glances[at] } else { here };
+    let glances = [
+        here,
+        beside(x > 0, at.saturating_sub(1)),
+        beside(x + 1 < width, at + 1),
+        beside(y > 0, at.saturating_sub(width)),
+        beside(at + width < glances.len(), at + width),
+    ];
+    let within = glances.iter().any(|other| other.surface == here.surface && (other.level - here.level).abs() > EDGE);
+    let differs = within || glances.iter().any(|other| other.surface != here.surface);
+    differs.then_some(Edge { glances, within })
+}
+
+/// The grey level of light, 0 to 1, before noise, at steps of its square root.
+static LEVELS: LazyLock<Vec<f32>> = LazyLock::new(|| {
+    (0..=LEVEL_STEPS).map(|step| (255.0 * encoded((step as f64 / LEVEL_STEPS as f64).powi(2))) as f32).collect()
+});
+const LEVEL_STEPS: usize = 4096;
+
+/// The image that the sensor makes of light; black outside the field.
+fn develop(light: &[Rgb], rays: &[[f64; 3]], view: &View<'_>, noise: u64) -> RgbImage {
+    let (size, optics) = (view.camera.size(), view.optics);
+    let width = (size.width as usize).max(1);
+    let [read, shot, gain] = [optics.read_noise, optics.shot_noise, optics.gain].map(|value| value.max(0.0) as f32);
+    let levels: &[f32] = &LEVELS;
+    let mut image = RgbImage::new(size.width, size.height);
+    image.par_chunks_exact_mut(3 * width).zip(light.par_chunks(width)).enumerate().for_each(|(y, (row, light))| {
+        let in_field = &rays[(y + 1) * (width + 2) + 1..];
+        for (x, (pixel, light)) in
+            row.chunks_exact_mut(3).zip(light).enumerate().filter(|(x, _)| !in_field[*x][2].is_nan())
+        {
+            let mut hash = mix64(noise ^ (y * width + x) as u64);
+            for (byte, light) in pixel.iter_mut().zip(light) {
+                hash = mix64(hash);
+                let root = (gain * light).clamp(0.0, 1.0).sqrt();
+                let level = levels[(root * LEVEL_STEPS as f32 + 0.5) as usize];
+                let sigma = (read * read + shot * shot * level * (1.0 / 255.0)).sqrt();
+                // Adding a half and cutting rounds; below 0 it is 0.
+                *byte = (level + sigma * normal(hash) + 0.5) as u8;
+            }
+        }
+    });
+    image
+}
+
+/// A number of mean 0 and variance 1 from a hash: how many of its bits are set, with a uniform number between two such counts. Its excess
+/// kurtosis is -1/32.
+fn normal(hash: u64) -> f32 {
+    const BITS_MEAN: f32 = 32.0;
+    // The variance of 64 fair bits, and that of the uniform number.
+    const VARIANCE: f32 = 16.0 + 1.0 / 12.0;
+    let between = (mix64(!hash) >> 40) as f32 / 16_777_216.0 - 0.5;
+    (hash.count_ones() as f32 - BITS_MEAN + between) / VARIANCE.sqrt()
+}

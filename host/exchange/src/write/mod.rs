@@ -1,0 +1,156 @@
+//! Files for other programs: a camera, or a pair with its pose.
+
+mod basalt;
+mod colmap;
+mod kalibr;
+mod mrcal;
+mod opencv;
+mod ros;
+
+use std::path::{Path, PathBuf};
+use std::str::FromStr;
+
+use vergence_vision::{KannalaBrandt, Left, Length, NoFit, Right, Transform};
+
+use crate::ExchangeError;
+
+/// A format that is written.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum WriteFormat {
+    /// The FileStorage YAML of OpenCV: `cv::fisheye`.
+    OpenCv,
+    /// The camchain of Kalibr: pinhole-equidistant.
+    Kalibr,
+    /// The calibration JSON of Basalt: kb4.
+    Basalt,
+    /// A `camera_info` of ROS for each camera: equidistant.
+    Ros,
+    /// The `cameras.txt` of COLMAP: `OPENCV_FISHEYE`.
+    Colmap,
+    /// A `.cameramodel` of mrcal for each camera: splined stereographic.
+    Mrcal,
+}
+
+/// A word that names no format.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[error("'{0}' is not written: opencv, kalibr, basalt, ros, colmap or mrcal")]
+pub struct UnknownFormat(String);
+
+impl FromStr for WriteFormat {
+    type Err = UnknownFormat;
+
+    fn from_str(text: &str) -> Result<Self, UnknownFormat> {
+        Ok(match text {
+            "opencv" => Self::OpenCv,
+            "kalibr" => Self::Kalibr,
+            "basalt" => Self::Basalt,
+            "ros" => Self::Ros,
+            "colmap" => Self::Colmap,
+            "mrcal" => Self::Mrcal,
+            _ => return Err(UnknownFormat(text.to_owned())),
+        })
+    }
+}
+
+/// What is written: one camera, or a pair.
+#[derive(Clone, Copy, Debug)]
+pub struct Cameras {
+    /// The camera, or the left one.
+    pub left: KannalaBrandt,
+    /// The right camera and its pose.
+    pub right: Option<(KannalaBrandt, Transform<Left, Right>)>,
+}
+
+/// A file to write.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct WrittenFile {
+    /// `left` or `right` where each camera of a pair has a file of its own.
+    pub side: Option<&'static str>,
+    /// Its text.
+    pub text: String,
+}
+
+impl WrittenFile {
+    /// The path of the file where the user named `out`: that, or `calib-left.yaml` for `calib.yaml` where each camera has its own.
+    #[must_use]
+    pub fn path(&self, out: &Path) -> PathBuf {
+        let Some(side) = self.side else { return out.to_owned() };
+        let stem = out.file_stem().unwrap_or_default().to_string_lossy();
+        let ending = out.extension().map(|ending| format!(".{}", ending.to_string_lossy())).unwrap_or_default();
+        out.with_file_name(format!("{stem}-{side}{ending}"))
+    }
+}
+
+/// Files to write, and what they do not say.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Written {
+    /// The files.
+    pub files: Vec<WrittenFile>,
+    /// Sentences on what the format cannot hold; they stand in the files too, where the format has comments.
+    pub remarks: Vec<String>,
+}
+
+/// The distance at which points are imaged alike by a lens whose rays do not go through one point, and by the central one in its place.
+const LIKE_AT: Length = Length::from_mm(500.0);
+
+/// Prints cameras in another program's format.
+///
+/// # Errors
+/// [`ExchangeError::Fit`] where the format cannot hold a lens, not even nearly.
+pub fn write(format: WriteFormat, cameras: &Cameras) -> Result<Written, ExchangeError> {
+    let mut remarks = Vec::new();
+    let left = holdable(format, &cameras.left, "left", &mut remarks)?;
+    let right =
+        cameras.right.map(|(lens, pose)| Ok((holdable(format, &lens, "right", &mut remarks)?, pose))).transpose()?;
+    let cameras = Cameras { left, right };
+    let whole = |text: String| vec![WrittenFile { side: None, text }];
+    let mut files = match format {
+        WriteFormat::OpenCv => whole(opencv::write(&cameras)),
+        WriteFormat::Kalibr => whole(kalibr::write(&cameras)),
+        WriteFormat::Basalt => whole(basalt::write(&cameras)),
+        WriteFormat::Ros => ros::write(&cameras),
+        WriteFormat::Colmap => whole(colmap::write(&cameras, &mut remarks)),
+        WriteFormat::Mrcal => mrcal::write(&cameras, &mut remarks)?,
+    };
+    if format != WriteFormat::Basalt {
+        for file in &mut files {
+            file.text.extend(remarks.iter().map(|remark| format!("# {remark}\n")));
+        }
+    }
+    Ok(Written { files, remarks })
+}
+
+/// A central and symmetric lens in place of `lens`, if the format can hold no other. mrcal's splines hold one that is not symmetric.
+fn holdable(
+    format: WriteFormat,
+    lens: &KannalaBrandt,
+    side: &str,
+    remarks: &mut Vec<String>,
+) -> Result<KannalaBrandt, ExchangeError> {
+    if lens.fits_opencv() || (format == WriteFormat::Mrcal && lens.is_central()) {
+        return Ok(*lens);
+    }
+    let fail = |lens| ExchangeError::Fit { camera: side.to_owned(), fit: NoFit::Lens(lens) };
+    let central = lens.central_at(LIKE_AT).map_err(fail)?;
+    let off = |mm: f64| lens.largest_difference(&central, Length::from_mm(mm));
+    remarks.push(format!(
+        "The pupil of the {side} lens moves (e0 = {:.3} mm), or it is not symmetric about its axis, which this format cannot say. The lens \
+         that is written images points {:.0} mm away as it does to {:.3} px; points 200 mm away are up to {:.2} px off, points 2 m away \
+         {:.2} px.",
+        lens.pupil().e0.mm(),
+        LIKE_AT.mm(),
+        off(LIKE_AT.mm()),
+        off(200.0),
+        off(2000.0)
+    ));
+    Ok(central)
+}
+
+/// The files of both cameras, each by `print` with its side.
+fn each(cameras: &Cameras, mut print: impl FnMut(usize, &KannalaBrandt) -> String) -> Vec<WrittenFile> {
+    let Some((right, _)) = &cameras.right else {
+        return vec![WrittenFile { side: None, text: print(0, &cameras.left) }];
+    };
+    let left = WrittenFile { side: Some("left"), text: print(0, &cameras.left) };
+    vec![left, WrittenFile { side: Some("right"), text: print(1, right) }]
+}
