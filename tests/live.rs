@@ -27,8 +27,9 @@ use vergence_live::{Limits, LiveLoop, LiveResult, Measurement, Totals};
 use vergence_pipeline::{ColouredPoint, Observation};
 use vergence_protocol::{Mode, Request, Trigger};
 use vergence_rig::{AxisPosition, BENCH_TOML, Rig, Shutter};
-use vergence_sim::Room;
-use vergence_vision::{Angle, Left, Length};
+use vergence_scene::LensChoice;
+use vergence_sim::{Room, RoomCamera};
+use vergence_vision::{Angle, Left, Length, Pixel, Side};
 
 /// The bench with small cameras whose rows are exposed one after the other, 20 ms from the first to the last.
 fn small_bench() -> String {
@@ -198,6 +199,35 @@ fn run_measures_the_newest_pair_while_the_stages_move() {
     let json: Value =
         serde_json::from_str(&std::fs::read_to_string(out.join("cloud.json")).expect("a table")).expect("JSON");
     assert_eq!(json["rows"].as_array().map(Vec::len), Some(points));
+}
+
+/// A rig with traced lenses is calibrated first; clouds by the file that is written agree with the room as those lenses show it.
+#[test]
+fn traced_lenses_are_measured_live_by_their_calibration() {
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    let out = folder.path().join("out");
+    let pace = ["--match-time", "100ms", "--frames", "2", "--out", out.to_str().expect("a name")];
+    let (lines, _) = live(folder.path(), &[&["--lens", "sigma8_f18"], &pace[..]].concat());
+    let file = std::fs::read_to_string(out.join("rig.toml")).expect("the calibrated rig");
+    let known = Rig::from_toml(&file).expect("a rig");
+    assert!(!known.left_camera.is_central() && !known.right_camera.is_central(), "its pupils move");
+    let rig = rig();
+    let lens = "sigma8_f18".parse::<LensChoice>().expect("a lens").in_place_of(&rig.left_camera).expect("a lens");
+    let camera = RoomCamera { side: Side::Left, lens, room: Arc::new(Room::with_rig()), seed: 0 };
+    let cloud = &lines[1];
+    assert_eq!(cloud["simulated_lens"], "sigma8_f18");
+    let at = |axis: &str| cloud["axes"][axis].as_f64().expect("a number");
+    let pose = rig.pose_at_values(&[at("baseline_mm"), at("separation_deg").to_radians()]);
+    let error = |row: &Value| {
+        let n: Vec<f64> = (0..11).map(|column| row[column].as_f64().expect("a number")).collect();
+        let truth = camera.true_range(&pose, Pixel { u: n[6], v: n[7] })?.mm();
+        Some(((n[0] * n[0] + n[1] * n[1] + n[2] * n[2]).sqrt() - truth) / n[10])
+    };
+    let errors: Vec<f64> = cloud["cloud"]["rows"].as_array().expect("rows").iter().filter_map(error).collect();
+    println!("{} points, median |z| {:.2}", errors.len(), median(&errors));
+    assert!(errors.len() > 50 && median(&errors) < 1.2, "{} {}", errors.len(), median(&errors));
+    let attached = ["--port", "sim", "run", "--cameras", "/dev/video0", "/dev/video1", "--lens", "sigma8_f18"];
+    fails_with(&attached, 2, &["--lens is for simulated cameras"]);
 }
 
 /// Ctrl-C in mid-move: the stages brake, the board is disarmed, what became of everything is told, and that is no failure.

@@ -160,6 +160,34 @@ fn zones_and_matches_stand_beside_the_published() {
 }
 
 #[test]
+fn mismatches_stand_on_a_page_with_what_becomes_of_each() {
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    let out = folder.path().to_str().expect("a name");
+    let result = run_json(&["reproduce", "--mismatch", "--seeds", "1", "--out", out, "--json"]);
+    assert_eq!(result["lens"], "sigma8_f18");
+    let cells = result["cells"].as_array().expect("cells");
+    assert_eq!(cells.len(), 10 * 2 * 2 * 4, "mismatches, models of the lens, modes, ranges");
+    let nees = |model: &str| {
+        let of = |cell: &&Value| cell["mismatch"] == "traced lens" && cell["lens_model"] == model;
+        cells.iter().filter(of).map(|cell| number(&cell["nees"])).sum::<f64>()
+    };
+    assert!(nees("central") > 3.0 * nees("by-evidence"), "{} {}", nees("central"), nees("by-evidence"));
+    let page = std::fs::read_to_string(folder.path().join("mismatch.html")).expect("a page");
+    is_self_contained(&page);
+    assert!(page.contains("vergence reproduce --mismatch --seeds 1 --lens sigma8_f18"));
+    for verdict in result["verdicts"].as_array().expect("verdicts") {
+        let sentence = verdict["sentence"].as_str().expect("a sentence");
+        assert_eq!(verdict["caught"] == false, sentence.starts_with("NOT caught"), "{verdict}");
+        assert!(page.contains(sentence), "the page lacks: {sentence}");
+    }
+    let unseen =
+        result["verdicts"].as_array().and_then(|all| all.iter().find(|one| one["mismatch"] == "focus breathing"));
+    assert_eq!(unseen.expect("a verdict")["caught"], false, "no residual shows a lens that has grown since");
+    fails_with(&["reproduce", "--mismatch", "--lens", "ideal", "--out", out], 2, &["traced lenses"]);
+    fails_with(&["reproduce", "--mismatch", "--samples", "500", "--out", out], 2, &["--samples"]);
+}
+
+#[test]
 fn bad_input_is_refused_in_a_sentence() {
     fails_with(&["reproduce", "--seeds", "0"], 2, &["--seeds"]);
     fails_with(&["reproduce", "--seeds", "1", "--out", "/dev/null/page"], 2, &["/dev/null/page"]);

@@ -114,6 +114,7 @@ const ALLOWED: &[(&str, &[&str])] = &[
             "vergence-pipeline",
             "vergence-board",
             "vergence-camera",
+            "vergence-scene",
             "vergence-sim",
         ],
     ),

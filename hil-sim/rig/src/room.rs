@@ -6,7 +6,7 @@ use image::RgbImage;
 use nalgebra::{UnitQuaternion, Vector3};
 use vergence_rig::RigPose;
 use vergence_scene::{Lens, Optics, Scene, View, render, render_rolling};
-use vergence_vision::{Base, Camera, KannalaBrandt, Left, Side, Transform, World};
+use vergence_vision::{Base, Camera, KannalaBrandt, Left, Length, Pixel, Side, Transform, World};
 
 /// A furnished room with the rig in it.
 #[derive(Clone, Debug)]
@@ -71,6 +71,12 @@ impl<L: Lens> RoomCamera<L> {
         world_from_row: &(dyn Fn(u32) -> Transform<World, Camera> + Sync),
     ) -> RgbImage {
         render_rolling(&self.view(world_from_row(0), &Optics::default()), self.noise(number), world_from_row).image
+    }
+
+    /// How far from the camera's origin the place is that a pixel shows from a rig pose; `None` outside the field and where nothing is met.
+    #[must_use]
+    pub fn true_range(&self, pose: &RigPose, pixel: Pixel) -> Option<Length> {
+        self.view(self.room.world_from_camera(self.side, pose), &Optics::default()).true_range(pixel)
     }
 
     fn view<'a>(&'a self, world_from_camera: Transform<World, Camera>, optics: &'a Optics) -> View<'a> {

@@ -5,7 +5,7 @@ use std::str::FromStr;
 
 use vergence_lens::{BuiltIn, DesignError, TracedLens};
 use vergence_vision::{
-    Angle, BatchLens, Camera, ImageSize, Instructions, KannalaBrandt, Length, Pixel, Point, pupil_shift,
+    Angle, BatchLens, Camera, ImageSize, Instructions, KannalaBrandt, Length, Pixel, Point, UnitRay,
 };
 
 /// A lens before a sensor, as the renderer needs it. The camera's frame has its origin at the paraxial entrance pupil.
@@ -21,6 +21,9 @@ pub trait Lens: Debug + Sync {
 
     /// Where a point of the camera's frame is imaged, on the sensor or beside it; `None` outside the field.
     fn image_of(&self, point: &Point<Camera>) -> Option<Pixel>;
+
+    /// The light of a pixel: where it crosses the axis, and the direction it comes from; `None` outside the field.
+    fn light_of(&self, pixel: Pixel) -> Option<(Point<Camera>, UnitRay<Camera>)>;
 
     /// The lens made ready for the rays of many pixels.
     fn rays(&self) -> LensRays<'_>;
@@ -91,13 +94,18 @@ impl Lens for KannalaBrandt {
         self.project_point(point).ok()
     }
 
+    fn light_of(&self, pixel: Pixel) -> Option<(Point<Camera>, UnitRay<Camera>)> {
+        let ray = self.unproject(pixel).ok()?;
+        Some((self.origin_of(&ray), ray))
+    }
+
     /// Without the instructions of this very processor: the same image on every machine.
     fn rays(&self) -> LensRays<'_> {
         LensRays::Ideal(Box::new(BatchLens::new(self).with_instructions(Instructions::Baseline)))
     }
 
     fn pupil(&self, theta: Angle) -> Option<Length> {
-        (!self.is_central()).then(|| Length::from_mm(self.pupil().mm() * pupil_shift(theta.rad())))
+        (!self.is_central()).then(|| self.pupil().shift(theta))
     }
 
     fn describe(&self) -> String {
@@ -108,7 +116,7 @@ impl Lens for KannalaBrandt {
         let mut part = self.to_opencv();
         (part.cx, part.cy) = (part.cx - f64::from(left), part.cy - f64::from(top));
         let part = Self::from_opencv(part, self.theta_max(), size).ok()?;
-        part.with_pupil(self.pupil()).ok().map(TrueLens::Ideal)
+        part.with_pupil(self.pupil()).ok()?.with_asymmetry(self.asymmetry()).ok().map(TrueLens::Ideal)
     }
 }
 
@@ -127,6 +135,10 @@ impl Lens for TracedLens {
 
     fn image_of(&self, point: &Point<Camera>) -> Option<Pixel> {
         self.project(point)
+    }
+
+    fn light_of(&self, pixel: Pixel) -> Option<(Point<Camera>, UnitRay<Camera>)> {
+        self.ray(pixel).map(|ray| (ray.origin, ray.direction))
     }
 
     fn rays(&self) -> LensRays<'_> {
@@ -247,6 +259,10 @@ impl Lens for TrueLens {
 
     fn image_of(&self, point: &Point<Camera>) -> Option<Pixel> {
         self.inner().image_of(point)
+    }
+
+    fn light_of(&self, pixel: Pixel) -> Option<(Point<Camera>, UnitRay<Camera>)> {
+        self.inner().light_of(pixel)
     }
 
     fn rays(&self) -> LensRays<'_> {

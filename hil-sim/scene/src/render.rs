@@ -3,7 +3,7 @@
 use image::RgbImage;
 use nalgebra::Vector3;
 use rayon::prelude::*;
-use vergence_vision::{Angle, Camera, Transform, World};
+use vergence_vision::{Angle, Camera, Length, Pixel, Transform, World};
 
 use crate::blur::spread;
 use crate::lens::{Lens, LensRays};
@@ -211,6 +211,16 @@ fn for_each_in_field<T: Send>(
 }
 
 impl View<'_> {
+    /// How far from the origin of the camera's frame the place is that a pixel shows; `None` outside the field and where nothing is met. The
+    /// light of a lens without one centre starts from the pupil of its angle, while ranges count from the origin.
+    #[must_use]
+    pub fn true_range(&self, pixel: Pixel) -> Option<Length> {
+        let (start, ray) = self.camera.light_of(pixel)?;
+        let (start, ray) = (self.world_from_camera * start, self.world_from_camera * ray);
+        let place = start.mm() + ray.vector() * self.scene.reach(&start, &ray)?.mm();
+        Some(Length::from_mm((place - self.world_from_camera.origin().mm()).norm()))
+    }
+
     /// Casts the first rays of a pixel.
     fn first(&self, around: &Around<'_>, hash: u64) -> First {
         let origin = around.start(&around.centre());

@@ -40,6 +40,34 @@ fn a_pupil_of_the_rig_file_is_rendered() {
     assert_eq!(part.pupil(), camera.pupil());
 }
 
+/// Clouds are judged from the camera's origin, while the light of a pixel starts from a pupil before it: the place at the true range is where the
+/// lens images it, and where the renderer met it.
+#[test]
+fn a_true_range_counts_from_the_origin_to_the_place_that_the_pixel_shows() {
+    let ideal = fisheye(128);
+    let pupil = ideal.with_pupil(Length::from_mm(2.8)).unwrap();
+    let traced = "sigma8_f18".parse::<LensChoice>().unwrap().in_place_of(&ideal).unwrap();
+    let world_from_camera = pose([-72.0, 0.0, 0.0], 20.0);
+    let cameras: [(&dyn Lens, f64); 3] = [(&ideal, 0.0), (&pupil, 1.0), (&traced, 1.0)];
+    for (camera, differs) in cameras {
+        let view = View { scene: &ROOM, camera, world_from_camera, optics: &Optics::default() };
+        let photo = render(&view, 1);
+        let (mut farthest, mut seen) = (0.0_f64, 0);
+        for (x, y) in pixels(128) {
+            let pixel = Pixel { u: f64::from(x), v: f64::from(y) };
+            let (Some((start, ray)), Some(along)) = (camera.light_of(pixel), photo.range.at(x, y)) else { continue };
+            let place = Point::<Camera>::from_mm(start.mm() + ray.vector() * along.mm());
+            let range = view.true_range(pixel).unwrap().mm();
+            assert!((range - place.mm().norm()).abs() < 1e-3, "{range} mm at {x}, {y}");
+            let Pixel { u, v } = camera.image_of(&place).unwrap();
+            assert!((u - pixel.u).hypot(v - pixel.v) < 1e-5, "{u}, {v} at {x}, {y}");
+            farthest = farthest.max((range - along.mm()).abs());
+            seen += 1;
+        }
+        assert!(seen > 1000 && (differs == 0.0 || farthest > differs), "{} pixels, {farthest} mm", seen);
+    }
+}
+
 proptest! {
     #[test]
     fn every_ray_in_the_room_hits_something(

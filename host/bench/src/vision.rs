@@ -4,9 +4,9 @@ use std::hint::black_box;
 
 use nalgebra::{SMatrix, UnitQuaternion, Vector3};
 use vergence_vision::{
-    Angle, BatchLens, BatchPair, BatchPoints, BatchTriangulation, Camera, ImageSize, Instructions, KannalaBrandt,
-    LENS_PARAMETERS, Left, OpenCvFisheye, Pixel, ProjectedPoints, Right, SHARED_PARAMETERS, SharedCovariance,
-    StereoPair, Transform, UnitRay,
+    Angle, BatchLens, BatchPair, BatchPoints, BatchTriangulation, CENTRAL_PARAMETERS, Camera, ImageSize, Instructions,
+    KannalaBrandt, LENS_PARAMETERS, Left, OpenCvFisheye, Pixel, ProjectedPoints, Right, SHARED_PARAMETERS,
+    SharedCovariance, StereoPair, Transform, UnitRay,
 };
 
 use crate::error::BenchError;
@@ -23,7 +23,7 @@ const SIZE: ImageSize = ImageSize { width: 1920, height: 1536 };
 const PIXEL_SIGMA: f64 = 0.1;
 const RAY_SIGMA: Angle = Angle::from_rad(PIXEL_SIGMA / 599.0);
 /// Standard deviations of what a pair shares, about those of a calibration: of each lens, which is central, then of the pose.
-const LENS_SIGMAS: [f64; LENS_PARAMETERS] = [0.05, 0.05, 0.04, 0.04, 2e-4, 3e-4, 2e-4, 5e-5, 0.0];
+const LENS_SIGMAS: [f64; CENTRAL_PARAMETERS] = [0.05, 0.05, 0.04, 0.04, 2e-4, 3e-4, 2e-4, 5e-5];
 const POSE_SIGMAS: [f64; 6] = [1e-4, 1e-4, 1e-4, 1e-2, 1e-2, 1e-2];
 /// Script that times OpenCV; it needs only OpenCV and numpy.
 const OPENCV: &str = include_str!("opencv_fisheye.py");
@@ -228,7 +228,8 @@ impl Run {
 
 /// A covariance of lenses and pose in which every parameter is correlated with all others.
 fn shared() -> SharedCovariance {
-    let sigmas: Vec<f64> = [&LENS_SIGMAS[..], &LENS_SIGMAS, &POSE_SIGMAS].concat();
+    let absent = [0.0; LENS_PARAMETERS - CENTRAL_PARAMETERS];
+    let sigmas: Vec<f64> = [&LENS_SIGMAS[..], &absent, &LENS_SIGMAS, &absent, &POSE_SIGMAS].concat();
     let mixed = SMatrix::<f64, SHARED_PARAMETERS, SHARED_PARAMETERS>::from_fn(|row, column| {
         sigmas[row] * if row == column { 1.0 } else { 0.2 * (7.0 * row as f64 + 3.0 * column as f64).sin() }
     });

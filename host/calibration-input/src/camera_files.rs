@@ -59,17 +59,17 @@ impl CameraFile {
     }
 }
 
-/// A central lens in place of `camera`, and a comment for the file where it is another.
+/// A central and symmetric lens in place of `camera`, and a comment for the file where it is another.
 fn central(camera: &KannalaBrandt) -> Result<(KannalaBrandt, String), InputError> {
-    if camera.is_central() {
+    if camera.fits_opencv() {
         return Ok((*camera, String::new()));
     }
     let central = camera.central_at(Length::from_mm(500.0)).map_err(|error| InputError::Untold(error.to_string()))?;
     let off = |mm: f64| camera.largest_difference(&central, Length::from_mm(mm));
     let remark = format!(
-        "# The pupil of this lens moves (e0 = {:.3} mm), which this format cannot say. The lens above images points 500 mm away as it \
-         does to {:.3} px; points 200 mm away are up to {:.2} px off, points 2 m away {:.2} px.\n",
-        camera.pupil().mm(),
+        "# The pupil of this lens moves (e0 = {:.3} mm), or it is not symmetric about its axis, which this format cannot say. The lens \
+         above images points 500 mm away as it does to {:.3} px; points 200 mm away are up to {:.2} px off, points 2 m away {:.2} px.\n",
+        camera.pupil().e0.mm(),
         off(500.0),
         off(200.0),
         off(2000.0)

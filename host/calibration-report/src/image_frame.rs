@@ -30,11 +30,8 @@ impl ImageFrame {
         let size = camera.size();
         let (width, height) = (f64::from(size.width.max(1)), f64::from(size.height.max(1)));
         let scale = ((WIDTH - 2.0 * MARGIN) / width).min(HIGHEST / height);
-        let opencv = camera.to_opencv();
-        let widest = opencv.largest_theta(size).and_then(|theta| KannalaBrandt::from_opencv(opencv, theta, size));
-        let wider = widest.ok().filter(|wide| wide.theta_max() > camera.theta_max());
         let left = 0.5 * (WIDTH - scale * width);
-        Self { scale, left, size, lens: wider.unwrap_or(*camera), valid: camera.theta_max() }
+        Self { scale, left, size, lens: camera.extrapolated(), valid: camera.theta_max() }
     }
 
     /// An empty drawing with room for the image and a legend.

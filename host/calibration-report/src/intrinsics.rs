@@ -7,7 +7,7 @@ use vergence_page::{
     with_sigma,
 };
 use vergence_targets::TargetView;
-use vergence_vision::{KannalaBrandt, LENS_PARAMETERS};
+use vergence_vision::{CENTRAL_PARAMETERS, KannalaBrandt};
 
 use crate::ReportAbout;
 use crate::arrows::{arrows, mean_arrows};
@@ -20,7 +20,7 @@ use crate::pattern::{Neighbours, Patch, patches, pattern_px};
 use crate::ray_field::{BASELINE_MM, RANGE_MM, RayField, Ring, depth_mm};
 use crate::ray_map::ray_map;
 use crate::residuals::{Observation, of_intrinsics};
-use crate::result::pupil_in_words;
+use crate::result::{pupil_in_words, step_in_words};
 use crate::verdict::Verdict;
 
 /// Most outliers listed one by one.
@@ -233,31 +233,25 @@ impl<'a> Report<'a> {
 
     fn parameter_table(&self) -> String {
         let found = self.calibration;
-        let lens = &found.opencv;
-        let [k1, k2, k3, k4] = lens.k;
-        let values = [
-            ("fx", lens.fx, "px"),
-            ("fy", lens.fy, "px"),
-            ("cx", lens.cx, "px"),
-            ("cy", lens.cy, "px"),
-            ("k1", k1, ""),
-            ("k2", k2, ""),
-            ("k3", k3, ""),
-            ("k4", k4, ""),
+        let names = [
+            ["fx", "fy", "cx", "cy"].map(|name| (name, "px")),
+            ["k1", "k2", "k3", "k4"].map(|name| (name, "")),
+            [("pupil e0", "mm"), ("pupil e1", "mm"), ("p1", ""), ("p2", "")],
+            ["s0", "s1", "s2", "s3"].map(|name| (name, "")),
         ];
         let row = |name: &str, value: f64, sigma: f64, unit: &str| {
             let [value, sigma] = with_sigma(value, sigma);
             plain(vec![text(name), Cell::Number(value), Cell::Number(sigma), text(unit)])
         };
-        let mut rows: Vec<Row> = values
+        let estimated = |index: usize| index < CENTRAL_PARAMETERS || found.covariance[(index, index)] > 0.0;
+        let mut rows: Vec<Row> = names
             .iter()
-            .zip(found.covariance.diagonal().iter())
-            .map(|((name, value, unit), variance)| row(name, *value, variance.sqrt(), unit))
+            .flatten()
+            .zip(found.lens().to_array())
+            .enumerate()
+            .filter(|(index, _)| estimated(*index))
+            .map(|(index, ((name, unit), value))| row(name, value, found.covariance[(index, index)].sqrt(), unit))
             .collect();
-        if !found.camera.is_central() {
-            let pupil = LENS_PARAMETERS - 1;
-            rows.push(row("pupil e0", found.camera.pupil().mm(), found.covariance[(pupil, pupil)].sqrt(), "mm"));
-        }
         if let Some(warp) = &found.warp {
             rows.push(row("target bow along x", warp.along_x_mm, warp.sigma_mm[0], "mm"));
             rows.push(row("target bow along y", warp.along_y_mm, warp.sigma_mm[1], "mm"));
@@ -265,9 +259,12 @@ impl<'a> Report<'a> {
         let explanation = "r = f·θ·(1 + k1·θ² + k2·θ⁴ + k3·θ⁶ + k4·θ⁸), as cv::fisheye and Kalibr's equidistant model. \
                            σ comes from the noise of the corners, with target poses free. k1 to k4 depend on each \
                            other: two calibrations may differ in them and agree in every ray. Compare rays, not coefficients. \
-                           The ray at θ starts e0·(θ / sin θ − 1) ahead of the origin.";
+                           The ray at θ starts (e0 + e1·θ²)·(θ / sin θ − 1) ahead of the origin. p and s move its image m, in focal \
+                           lengths from the principal point, by 2 (m·p) m + |m|² p + (s0 |m|² + s1 |m|⁴, s2 |m|² + s3 |m|⁴).";
         let pupil = format!("By the views {}.", pupil_in_words(&found.pupil));
-        table(&["Parameter", "Value", "± σ", ""], &rows) + &note(explanation) + &note(&pupil)
+        let steps: String =
+            found.steps.iter().map(|step| note(&format!("By the views {}.", step_in_words(step)))).collect();
+        table(&["Parameter", "Value", "± σ", ""], &rows) + &note(explanation) + &note(&pupil) + &steps
     }
 
     fn view_table(&self) -> String {

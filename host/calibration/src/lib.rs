@@ -27,9 +27,9 @@ pub use extrinsics::{
 };
 pub use fit_check::{Unfit, check_fit};
 pub use intrinsics::{
-    IntrinsicsCalibration, IntrinsicsError, IntrinsicsOptions, LensModel, LensParameters, Outlier, OutlierReason,
-    Parameter, PupilEvidence, Reprojection, TargetWarp, UnknownLensModel, ViewFigures, ViewPose, calibrate_intrinsics,
-    refine_intrinsics, reproject,
+    IntrinsicsCalibration, IntrinsicsError, IntrinsicsOptions, LensModel, LensParameters, LensStep, Outlier,
+    OutlierReason, Parameter, PupilEvidence, Reprojection, StepEvidence, TargetWarp, UnknownLensModel, ViewFigures,
+    ViewPose, calibrate_intrinsics, refine_intrinsics, reproject,
 };
 pub use lens_difference::{LensDifference, LensDifferenceError};
 pub use planar_pose::{PoseError, TargetPose, target_pose};

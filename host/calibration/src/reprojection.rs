@@ -12,7 +12,7 @@ use crate::intrinsics::{LensParameters, reproject};
 /// Number of local coordinates of a pose.
 pub(crate) const POSE: usize = 6;
 
-/// A lens as a point of the parameter space: fx, fy, cx, cy, k1 to k4, e0.
+/// A lens as a point of the parameter space, in the order of [`LENS_PARAMETERS`](vergence_vision::LENS_PARAMETERS).
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Lens(LensParameters);
 

@@ -2,11 +2,11 @@
 
 use std::f64::consts::PI;
 
-use nalgebra::{Matrix2, Matrix2x3, Matrix3, Matrix3x2, SMatrix, Vector3};
-use vergence_vision::{Angle, Camera, KannalaBrandt, OpenCvFisheye, OutsideField, Pixel, Point, UnitRay};
+use nalgebra::{Matrix2, Matrix3, Matrix3x2, SMatrix, Vector3};
+use vergence_vision::{Angle, Camera, KannalaBrandt, OutsideField, Pixel, UnitRay};
 
 use crate::IntrinsicsCalibration;
-use crate::intrinsics::{LENS, reproject};
+use crate::intrinsics::LENS;
 
 /// Uncertainty of rays over the field of a lens.
 ///
@@ -18,7 +18,6 @@ use crate::intrinsics::{LENS, reproject};
 #[derive(Clone, Debug, PartialEq)]
 pub struct RayUncertainty {
     camera: KannalaBrandt,
-    lens: OpenCvFisheye,
     covariance: SMatrix<f64, LENS, LENS>,
     /// Common rotation (radians about the camera's axes) per change of each lens parameter.
     rotation_by_lens: SMatrix<f64, 3, LENS>,
@@ -57,12 +56,8 @@ impl RayUncertainty {
     /// The ray uncertainty of a calibrated lens.
     #[must_use]
     pub fn of(calibration: &IntrinsicsCalibration) -> Self {
-        let mut uncertainty = Self {
-            camera: calibration.camera,
-            lens: calibration.opencv,
-            covariance: calibration.covariance,
-            rotation_by_lens: SMatrix::zeros(),
-        };
+        let mut uncertainty =
+            Self { camera: calibration.camera, covariance: calibration.covariance, rotation_by_lens: SMatrix::zeros() };
         uncertainty.rotation_by_lens = uncertainty.common_rotation();
         uncertainty
     }
@@ -101,19 +96,15 @@ impl RayUncertainty {
     fn with(&self, pixel: Pixel, rotation: &SMatrix<f64, 3, LENS>) -> Result<RayCovariance, OutsideField> {
         let ray = self.camera.unproject::<Camera>(pixel)?;
         let basis = tangents(&ray.vector());
-        let by_lens = self.ray_by_lens(&ray).ok_or(OutsideField)?;
+        let by_lens = self.ray_by_lens(&ray);
         let left = basis.transpose() * (by_lens - ray.vector().cross_matrix() * rotation);
         let tangents = [basis.column(0).into_owned(), basis.column(1).into_owned()];
         Ok(RayCovariance { ray, tangents, covariance: left * self.covariance * left.transpose() })
     }
 
-    /// Derivative of the ray behind a fixed pixel with respect to the lens, from ∂u/∂d δd + ∂u/∂lens δlens = 0.
-    fn ray_by_lens(&self, ray: &UnitRay<Camera>) -> Option<SMatrix<f64, 3, LENS>> {
-        let projected = reproject(self.lens, &Point::from_mm(ray.vector()))?;
-        let basis = tangents(&ray.vector());
-        let by_point = Matrix2x3::from_fn(|row, axis| projected.by_point[axis][row]);
-        let by_lens = SMatrix::<f64, 2, LENS>::from_fn(|row, parameter| projected.by_lens[parameter][row]);
-        Some(-(basis * (by_point * basis).try_inverse()? * by_lens))
+    /// Derivative of the direction of the ray behind a fixed pixel with respect to the lens, from ∂u/∂d δd + ∂u/∂lens δlens = 0.
+    fn ray_by_lens(&self, ray: &UnitRay<Camera>) -> SMatrix<f64, 3, LENS> {
+        -(self.camera.ray_by_pixel(ray) * self.camera.pixel_by_lens(ray))
     }
 
     /// The ω that minimises Σ ‖δd + ω × d‖² over directions d that fill the valid cone evenly (a Fibonacci lattice; R.
@@ -128,9 +119,8 @@ impl RayUncertainty {
             let (sin, cos) = (GOLDEN * f64::from(i)).sin_cos();
             let across = (1.0 - z * z).sqrt();
             let ray = UnitRay::new(Vector3::new(across * cos, across * sin, z));
-            let Some((ray, by_lens)) = ray.and_then(|ray| self.ray_by_lens(&ray).map(|by_lens| (ray, by_lens))) else {
-                continue;
-            };
+            let Some(ray) = ray else { continue };
+            let by_lens = self.ray_by_lens(&ray);
             let cross = ray.vector().cross_matrix();
             normal += cross.transpose() * cross;
             right += cross.transpose() * by_lens;

@@ -11,14 +11,14 @@ use simulated::band::{nees_band, notices};
 use simulated::{Dice, lens, own_views, seeds};
 use vergence_calibration::{IntrinsicsCalibration, IntrinsicsOptions, calibrate_intrinsics};
 use vergence_targets::TargetView;
-use vergence_vision::OpenCvFisheye;
+use vergence_vision::{LENS_PARAMETERS, OpenCvFisheye};
 
 fn calibrate(views: &[TargetView]) -> IntrinsicsCalibration {
     calibrate_intrinsics(views, lens().size(), &IntrinsicsOptions::default()).unwrap()
 }
 
 /// The square of the difference of two lenses in units of `covariance`.
-fn square(a: &OpenCvFisheye, b: &OpenCvFisheye, covariance: &SMatrix<f64, 9, 9>) -> f64 {
+fn square(a: &OpenCvFisheye, b: &OpenCvFisheye, covariance: &SMatrix<f64, LENS_PARAMETERS, LENS_PARAMETERS>) -> f64 {
     let off = DVector::from_row_slice(&parameters(a)) - DVector::from_row_slice(&parameters(b));
     let scale = DMatrix::from_diagonal(&DVector::from_fn(8, |i, _| 1.0 / covariance[(i, i)].sqrt()));
     let scaled = &scale * off;

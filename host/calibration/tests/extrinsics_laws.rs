@@ -11,7 +11,7 @@ use vergence_calibration::{
     calibrate_extrinsics,
 };
 use vergence_targets::TargetView;
-use vergence_vision::Pixel;
+use vergence_vision::{LENS_PARAMETERS, Pixel};
 
 fn pair(separation_deg: f64, noise_px: f64) -> Pair {
     Pair { left: lens(), right: other_lens(), left_from_right: pair_pose(separation_deg), noise_px }
@@ -160,7 +160,7 @@ fn refusals_are_named() {
     assert_eq!((found.skipped[0].view.as_str(), found.skipped[0].side), ("view 1", Side::Left));
     assert_eq!(found.skipped[0].reason, PoseError::Degenerate);
 
-    let singular = nalgebra::SMatrix::<f64, 9, 9>::zeros();
+    let singular = nalgebra::SMatrix::<f64, LENS_PARAMETERS, LENS_PARAMETERS>::zeros();
     let lenses = LensKnowledge::within(singular, singular);
     let options = ExtrinsicsOptions { lenses, robust: true };
     let refused = calibrate_extrinsics(&pair.left, &pair.right, &views, &options);

@@ -17,7 +17,7 @@ use vergence_calibration::{
     ExtrinsicsCalibration, ExtrinsicsOptions, IntrinsicsCalibration, IntrinsicsOptions, LensKnowledge, RayUncertainty,
     StereoView, calibrate_extrinsics, calibrate_intrinsics,
 };
-use vergence_vision::{Camera, KannalaBrandt, UnitRay};
+use vergence_vision::{Camera, KannalaBrandt, LENS_PARAMETERS, UnitRay};
 
 /// Both halves of `views` under the split `seed`.
 fn halves<V: Clone>(views: &[V], seed: u64) -> [Vec<V>; 2] {
@@ -53,7 +53,7 @@ fn mean(of: &[Compared]) -> Compared {
 
 fn of_lenses(a: &IntrinsicsCalibration, b: &IntrinsicsCalibration) -> Compared {
     let difference = DVector::from_row_slice(&parameters(&a.opencv)) - DVector::from_row_slice(&parameters(&b.opencv));
-    let by = |covariance: nalgebra::SMatrix<f64, 9, 9>| {
+    let by = |covariance: nalgebra::SMatrix<f64, LENS_PARAMETERS, LENS_PARAMETERS>| {
         chi_square(&difference, &covariance.view((0, 0), (8, 8)).into_owned())
     };
     Compared { noise: by(a.noise_covariance + b.noise_covariance), stated: by(a.covariance + b.covariance) }

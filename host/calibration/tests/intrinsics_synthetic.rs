@@ -167,6 +167,18 @@ fn the_uncertainty_map_is_least_inside_the_targets_and_excludes_a_common_rotatio
     assert!(without < 0.8 * with, "{without} {with}");
 }
 
+/// The pupil moves the origin of a ray and does not turn it; its variance once counted as that of a point one millimetre away.
+#[test]
+fn directions_are_as_certain_whatever_is_known_of_the_pupil() {
+    let calibration = calibrate(&good_views(0.1, 7)).unwrap();
+    let mut covariance = calibration.covariance;
+    (covariance[(8, 8)], covariance[(9, 9)]) = (9.0, 9.0);
+    let ignorant = IntrinsicsCalibration { covariance, ..calibration.clone() };
+    let pixel = Pixel { u: 250.0, v: 320.0 };
+    let [known, unknown] = [&calibration, &ignorant].map(|of| RayUncertainty::of(of).at(pixel).unwrap().covariance);
+    assert!((known - unknown).amax() < 1e-12 * known.amax(), "{known} {unknown}");
+}
+
 #[test]
 fn a_bowed_target_is_found_out() {
     let warped = views(&poses(), 0.05, [0.8, -0.4], 3);

@@ -6,7 +6,8 @@ use tokio::sync::mpsc::Sender;
 use tokio::time::{Instant, sleep};
 use vergence_board::{HostClock, Shared};
 use vergence_camera::{Camera, CameraError, CameraEvent, attach};
-use vergence_rig::Rig;
+use vergence_rig::Shutter;
+use vergence_scene::TrueLens;
 use vergence_sim::{LiveCamera, Room, RoomCamera, SimulatedRig, Unplugged};
 use vergence_vision::Side;
 
@@ -32,18 +33,17 @@ where
     Ok(())
 }
 
-/// Starts two simulated cameras on `mechanics` in the furnished room, and unplugs them as `unplugged` says; `seed` is that of
-/// the noise of their images. Their events go to `listener`.
+/// Starts two simulated cameras, left and right with these lenses and shutters, on `mechanics` in the furnished room, and unplugs them as
+/// `unplugged` says; `seed` is that of the noise of their images. Their events go to `listener`.
 pub fn simulate_both(
-    rig: &Rig,
+    cameras: [(TrueLens, Shutter); 2],
     mechanics: &Shared<SimulatedRig>,
     (seed, unplugged): (u64, &[Unplugged]),
     clock: HostClock,
     listener: &Sender<(Side, CameraEvent)>,
 ) {
     let room = Arc::new(Room::with_rig());
-    let lenses = [(Side::Left, rig.left_camera), (Side::Right, rig.right_camera)];
-    for ((side, lens), shutter) in lenses.into_iter().zip(rig.shutters) {
+    for (side, (lens, shutter)) in [Side::Left, Side::Right].into_iter().zip(cameras) {
         let camera = RoomCamera { side, lens, room: Arc::clone(&room), seed };
         let camera = LiveCamera::new(camera, shutter, unplugged);
         tokio::spawn(drive(camera, mechanics.clone(), clock, listener.clone()));

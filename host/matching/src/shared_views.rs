@@ -1,6 +1,6 @@
 //! Both images of a pair, resampled on one grid in the shared axes.
 
-use vergence_vision::{Angle, Frame, KannalaBrandt, Left, Length, MatchSigma, Pixel, Right, StereoPair, pupil_shift};
+use vergence_vision::{Angle, Frame, KannalaBrandt, Left, Length, MatchSigma, Pixel, Right, StereoPair};
 
 use crate::corners::Keypoint;
 use crate::epipolar_band::EpipolarBand;
@@ -53,7 +53,7 @@ impl<'a> SharedViews<'a> {
 
     /// The epipolar band for a standard deviation `pose_sigma` of the pose.
     pub(crate) fn band_for(&self, pose_sigma: Angle) -> EpipolarBand {
-        let shift = |lens: &KannalaBrandt| lens.pupil().mm().abs() * pupil_shift(lens.measured_field().rad());
+        let shift = |lens: &KannalaBrandt| lens.pupil().shift(lens.measured_field()).mm().abs();
         let [left, right] = [self.pair.left_camera, self.pair.right_camera].map(shift);
         EpipolarBand::new(self.grid, self.frame.baseline(), self.pair.nearest, pose_sigma)
             .with_pupils(Length::from_mm(left.max(right)))

@@ -4,8 +4,8 @@
 use nalgebra::{UnitQuaternion, Vector3};
 use rayon::prelude::*;
 use vergence_calibration::{
-    IntrinsicsCalibration, IntrinsicsOptions, LensKnowledge, StageCalibration, StageOptions, StagePose, StereoView,
-    calibrate_intrinsics, calibrate_stage,
+    IntrinsicsCalibration, IntrinsicsOptions, LensKnowledge, LensModel, StageCalibration, StageOptions, StagePose,
+    StereoView, calibrate_intrinsics, calibrate_stage,
 };
 use vergence_rig::{Provenance, Rig};
 use vergence_sim::{HeldTarget, Random};
@@ -28,7 +28,9 @@ const SHARED_VIEWS: u64 = 12;
 pub struct Calibrated {
     /// Lenses, mechanism, and how sure they are.
     pub stage: StageCalibration,
-    /// The rig as its written file describes it.
+    /// The rig file that is written.
+    pub file: String,
+    /// The rig as that file describes it.
     pub rig: Rig,
     /// The left and the right lens by their own targets.
     pub own: [KannalaBrandt; 2],
@@ -40,7 +42,8 @@ pub struct Calibrated {
     pub photographs: [usize; 2],
 }
 
-/// Calibrates the bench from targets that its `eyes` see held where it was driven. `returns` draws how far the stage misses its poses.
+/// Calibrates the bench from targets that its `eyes` see held where it was driven, with lenses of this `model`. `returns` draws how far
+/// the stage misses its poses.
 ///
 /// # Errors
 /// Where the views give no calibration.
@@ -48,12 +51,14 @@ pub fn calibrate(
     bench: &Bench,
     drive: &Drive,
     eyes: &Eyes<'_>,
+    model: LensModel,
     random: &mut Random,
     returns: &mut Random,
 ) -> Result<Calibrated, ReproduceError> {
     let mut tally = Tally::default();
     let lenses = [(0, &bench.built.left_camera), (1, &bench.built.right_camera)];
-    let [left, right] = lenses.map(|(side, lens)| own_calibration(lens, (eyes, side), random.seed(), &mut tally));
+    let [left, right] =
+        lenses.map(|(side, lens)| own_calibration(lens, (eyes, side), model, random.seed(), &mut tally));
     let (Own { lens: left, central: central_left }, Own { lens: right, central: central_right }) = (left?, right?);
     let own = [central_left, central_right];
     let mut poses = Vec::new();
@@ -68,15 +73,24 @@ pub fn calibrate(
     let lenses = LensKnowledge::within(left.covariance, right.covariance);
     let stage = calibrate_stage(&rig, &poses, &StageOptions { lenses, ..StageOptions::default() })
         .map_err(|error| ReproduceError::Calibration(format!("the stage: {error}")))?;
-    let rig = through_file(&stage.rig(&rig))?;
-    Ok(Calibrated { stage, rig, own, pairs, errors_px: tally.errors_px, photographs: [tally.taken, tally.missed] })
+    let file = written(&stage.rig(&rig))?;
+    let rig = Rig::from_toml(&file).map_err(|error| ReproduceError::Calibration(format!("the rig file: {error}")))?;
+    Ok(Calibrated {
+        stage,
+        file,
+        rig,
+        own,
+        pairs,
+        errors_px: tally.errors_px,
+        photographs: [tally.taken, tally.missed],
+    })
 }
 
-/// The rig as a user of its file has it.
-fn through_file(rig: &Rig) -> Result<Rig, ReproduceError> {
-    let provenance = Provenance { program: "vergence reproduce".into(), inputs_sha256: String::new(), date: None };
-    let written = rig.to_toml(&provenance).map_err(ReproduceError::Calibration)?;
-    Rig::from_toml(&written).map_err(|error| ReproduceError::Calibration(format!("the rig file: {error}")))
+/// The file of a calibrated rig.
+fn written(rig: &Rig) -> Result<String, ReproduceError> {
+    let program = concat!("vergence ", env!("CARGO_PKG_VERSION"), ", from simulated targets").to_owned();
+    let provenance = Provenance { program, inputs_sha256: String::new(), date: None };
+    rig.to_toml(&provenance).map_err(ReproduceError::Calibration)
 }
 
 /// What photographs came to.
@@ -108,6 +122,7 @@ struct Own {
 fn own_calibration(
     lens: &KannalaBrandt,
     (eyes, side): (&Eyes<'_>, usize),
+    model: LensModel,
     seed: u64,
     tally: &mut Tally,
 ) -> Result<Own, ReproduceError> {
@@ -125,8 +140,8 @@ fn own_calibration(
     let rough = calibrated(&seen(None), lens.size(), &central)?;
     let seen = seen(Some(&rough.camera));
     seen.iter().for_each(|seen| tally.count(seen));
-    let found = calibrated(&seen, lens.size(), &IntrinsicsOptions::default())?;
-    let central = match found.camera.is_central() {
+    let found = calibrated(&seen, lens.size(), &IntrinsicsOptions { model, ..IntrinsicsOptions::default() })?;
+    let central = match found.camera.fits_opencv() {
         true => found.camera,
         false => calibrated(&seen, lens.size(), &central)?.camera,
     };

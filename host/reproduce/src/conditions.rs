@@ -10,8 +10,8 @@ use crate::target_shot::Corners;
 
 /// Noise of a corner's u or v in pixels, of the class that the goals are for.
 pub const NOISE_PX: f64 = 0.1;
-/// The lens of a kind that the calibration does not know: a published fisheye of 197°.
-const MISFIT: LensChoice = LensChoice::Traced(BuiltIn::Sigma8);
+/// The lens of the simulation that no calibration knows: a published fisheye of 197°.
+pub const TRUE_LENS: LensChoice = LensChoice::Traced(BuiltIn::Sigma8);
 /// How far the right camera returns from where it stood before, unseen by the encoders.
 const RETURN: Repeatability = Repeatability { shift: Length::from_mm(0.05), turn: Angle::from_deg(0.05) };
 
@@ -26,6 +26,9 @@ pub struct Conditions {
     pub lens: LensChoice,
     /// Of the right camera.
     pub repeatability: Repeatability,
+    /// How far the middle line of a target stands out of the plane of its short sides, towards its back: it is bent about a line across its long
+    /// side. Photographs that are rendered show flat targets alone: none where it is not zero.
+    pub bow: Length,
 }
 
 /// How much a pose differs each time the stage returns to it: standard deviations along and about each axis of the camera.
@@ -54,7 +57,13 @@ impl Conditions {
     /// Noise of the corners alone.
     #[must_use]
     pub fn noise(corners: Corners, noise_px: f64) -> Self {
-        Self { corners, noise_px, lens: LensChoice::Ideal, repeatability: Repeatability::default() }
+        Self {
+            corners,
+            noise_px,
+            lens: LensChoice::Ideal,
+            repeatability: Repeatability::default(),
+            bow: Length::from_mm(0.0),
+        }
     }
 
     /// Where the right camera comes to stand when it returns to a pose.
@@ -85,7 +94,7 @@ impl Cause {
     pub fn size(self) -> String {
         match self {
             Self::Corners => format!("{NOISE_PX} px in u and v"),
-            Self::Lens => format!("lenses traced from a published design, {MISFIT} in the place of ideal ones"),
+            Self::Lens => format!("lenses traced from a published design, {TRUE_LENS} in the place of ideal ones"),
             Self::Pose => format!(
                 "{:.2} mm and {:.2}° along and about each axis of the right camera, anew at every return",
                 RETURN.shift.mm(),
@@ -103,7 +112,7 @@ impl Cause {
             conditions.noise_px = NOISE_PX;
         }
         if matches!(self, Self::Lens | Self::All) && lens == LensChoice::Ideal {
-            conditions.lens = MISFIT;
+            conditions.lens = TRUE_LENS;
         }
         if matches!(self, Self::Pose | Self::All) {
             conditions.repeatability = RETURN;

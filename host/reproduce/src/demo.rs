@@ -18,8 +18,9 @@ use vergence_protocol::TriggerMark;
 use vergence_rig::{
     ExposureDelay, HostInstant, Mode, Rig, RigPose, StampedImage, TimedEvent, axes_json, rounded, zones_json,
 };
+use vergence_scene::TrueLens;
 use vergence_sim::{Room, RoomCamera, SimulatedRig};
-use vergence_vision::{KannalaBrandt, Left, Length, Pixel, Side, Transform, World, Zones};
+use vergence_vision::{Length, Pixel, Side, Zones};
 
 use crate::error::DemoError;
 
@@ -31,10 +32,9 @@ const DELAY: ExposureDelay = ExposureDelay { least_us: 0.0, most_us: 50_000.0 };
 
 /// The two simulated cameras in their room.
 pub struct SimulatedPair {
-    left: RoomCamera,
-    right: RoomCamera,
+    left: RoomCamera<TrueLens>,
+    right: RoomCamera<TrueLens>,
     mechanics: SharedRig,
-    room: Arc<Room>,
 }
 
 /// A pair of images and its cloud, with the truth to compare.
@@ -53,23 +53,18 @@ pub struct View {
     pub expose_seconds: f64,
     /// How long matching and triangulation took.
     pub times: StageTimes,
-    world_from_left: Transform<World, Left>,
-    lens: KannalaBrandt,
-    room: Arc<Room>,
+    /// The left camera and where it truly was.
+    camera: RoomCamera<TrueLens>,
+    true_pose: RigPose,
 }
 
 impl SimulatedPair {
-    /// Two cameras that ride on `simulated`, in the fixed room.
+    /// Two cameras with these lenses, left and right, that ride on `simulated`, in the fixed room.
     #[must_use]
-    pub fn new(rig: &Rig, simulated: &SharedRig, seed: u64) -> Self {
+    pub fn new([left, right]: [TrueLens; 2], simulated: &SharedRig, seed: u64) -> Self {
         let room = Arc::new(Room::with_rig());
         let camera = |side, lens| RoomCamera { side, lens, room: Arc::clone(&room), seed };
-        Self {
-            left: camera(Side::Left, rig.left_camera),
-            right: camera(Side::Right, rig.right_camera),
-            mechanics: simulated.clone(),
-            room,
-        }
+        Self { left: camera(Side::Left, left), right: camera(Side::Right, right), mechanics: simulated.clone() }
     }
 
     /// Renders the images of both cameras at `pulse` and measures the pair; `clock` times the work.
@@ -83,7 +78,6 @@ impl SimulatedPair {
         let left = self.left.photograph(&true_pose, pulse.number);
         let right = self.right.photograph(&true_pose, pulse.number);
         let expose_seconds = clock().saturating_sub(exposing).as_secs_f64();
-        let world_from_left = self.room.world_from_left(true_pose.base_from_left);
         let (rig, pose) = (&pulse.rig, pulse.pose()?);
         let images = PairImages { left: &left, right: &right };
         let matcher: &dyn Matcher = &GuidedMatcher::default();
@@ -97,9 +91,8 @@ impl SimulatedPair {
             times,
             score: Score::default(),
             expose_seconds,
-            world_from_left,
-            lens: rig.left_camera,
-            room: Arc::clone(&self.room),
+            camera: self.left.clone(),
+            true_pose,
             left,
             right,
         };
@@ -115,11 +108,10 @@ impl View {
         PairImages { left: &self.left, right: &self.right }
     }
 
-    /// The true range at `pixel` of the left image.
+    /// The true range at `pixel` of the left image, by the light of the true lens.
     #[must_use]
     pub fn true_range(&self, pixel: Pixel) -> Option<Length> {
-        let ray = self.world_from_left * self.lens.unproject::<Left>(pixel).ok()?;
-        self.room.scene.cast(&self.world_from_left.origin(), &ray).map(|hit| hit.range)
+        self.camera.true_range(&self.true_pose, pixel)
     }
 
     /// Writes the cloud, the images that it was measured from, and pictures of matches, ranges and errors to the folder `out`,

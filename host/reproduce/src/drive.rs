@@ -14,7 +14,7 @@ use crate::error::ReproduceError;
 /// Lease of the simulated boards, in milliseconds.
 const LEASE_MS: u16 = 100;
 /// Stage poses of a calibration.
-const STAGE_POSES: usize = 6;
+pub const STAGE_POSES: usize = 6;
 
 /// Where the stage came to stand.
 #[derive(Clone, Debug)]

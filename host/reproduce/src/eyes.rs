@@ -33,7 +33,8 @@ impl<'a> Eyes<'a> {
 
     /// What one of them photographs; `None` where no corner is in sight.
     pub fn photograph(&self, side: usize, camera_from_target: Transform<Camera, Target>, seed: u64) -> Option<Photo> {
-        TargetShot { lens: &self.lenses[side], camera_from_target, seed }.photograph(self.conditions)
+        TargetShot { lens: &self.lenses[side], camera_from_target, bow: self.conditions.bow, seed }
+            .photograph(self.conditions)
     }
 
     /// What both photograph of a target at `left_from_target`.

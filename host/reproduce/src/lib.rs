@@ -11,6 +11,9 @@
 //! seeds give the same bytes. [`demo`] measures every mode of a simulated rig in its room, scored against the truth; [`corridor`] the
 //! robot's modes in a corridor.
 //!
+//! [`mismatch`] tries worlds that are not as the calibration assumes. [`LensedRig`] is a rig to simulate with other lenses than its file
+//! states, and the file that a calibration of them gives.
+//!
 //! Nothing here runs another program or prints: the caller passes in what does, and the clock. Only [`demo::View::write`]
 //! and [`corridor`] write files.
 
@@ -25,9 +28,11 @@ mod drive;
 mod error;
 mod experiments;
 mod eyes;
+mod lensed;
 mod matching;
 mod measure;
 mod method;
+pub mod mismatch;
 mod one_seed;
 mod page;
 mod pair;
@@ -45,10 +50,11 @@ mod zones;
 
 pub use bench::{Bench, MODES};
 pub use causes::{Closest, Column, PUBLISHED, Published};
-pub use conditions::{Cause, Conditions, Repeatability};
+pub use conditions::{Cause, Conditions, Repeatability, TRUE_LENS};
 pub use drive::{Drive, Route, Stop, drive};
 pub use error::{DemoError, ReproduceError};
 pub use experiments::{DrivenRig, Plan, Progress, Results, experiments};
+pub use lensed::LensedRig;
 pub use matching::{Matching, MatchingTools, Outcome, Picture, matchings};
 pub use measure::{Measured, Sample};
 pub use method::{METHODS, Method};

@@ -1,5 +1,7 @@
 //! One seed: another rig, driven, calibrated and used.
 
+use vergence_calibration::LensModel;
+
 use crate::bench::Bench;
 use crate::chain::calibrate;
 use crate::conditions::Conditions;
@@ -35,7 +37,7 @@ pub fn one_seed(
     let eyes = Eyes::of(bench, conditions)?;
     // Streams of their own: the same targets stand before the rig in all conditions.
     let (mut random, mut returns) = (Random::new(seed), Random::new(seed ^ 0x7265_7475_726e));
-    let calibrated = calibrate(bench, drive, &eyes, &mut random, &mut returns)?;
+    let calibrated = calibrate(bench, drive, &eyes, LensModel::default(), &mut random, &mut returns)?;
     let measured = measure(&eyes, &drive.modes, &calibrated, &mut random, &mut returns);
     Ok(SeedResult {
         measured,

@@ -8,7 +8,7 @@ use nalgebra::Vector3;
 use vergence_scene::{Lens, Optics, SheetView, Target, TrueLens, photograph_sheet};
 use vergence_sim::Random;
 use vergence_targets::{Corner, Placement, TargetView, detect};
-use vergence_vision::{Camera, ImageSize, KannalaBrandt, Pixel, Point, Transform};
+use vergence_vision::{Camera, ImageSize, KannalaBrandt, Length, Pixel, Point, Transform};
 
 use crate::bench::{TARGET, scene_target};
 use crate::conditions::Conditions;
@@ -41,6 +41,8 @@ pub struct TargetShot<'a> {
     pub lens: &'a TrueLens,
     /// Pose of the target.
     pub camera_from_target: Transform<Camera, Target>,
+    /// How far it is bent: [`Conditions::bow`].
+    pub bow: Length,
     /// Seed of the noise.
     pub seed: u64,
 }
@@ -144,6 +146,7 @@ impl TargetShot<'_> {
         }
         let shown = match conditions.corners {
             Corners::Projected => Shown::Corners(self.moved(&truth, conditions.noise_px.max(ROUNDING_PX))),
+            Corners::Rendered if self.bow.mm() != 0.0 => return None,
             Corners::Rendered => {
                 let window = Window::about(&self.outline(), self.lens.size());
                 let image = self.picture(&window, conditions.noise_px)?;
@@ -155,7 +158,9 @@ impl TargetShot<'_> {
 
     /// Where a point of the target truly is in the picture; `None` outside the field.
     fn pixel(&self, [x, y]: [f64; 2]) -> Option<Pixel> {
-        let at = self.camera_from_target * Point::from_mm(Vector3::new(x, y, 0.0));
+        let (middle, half) = (scene_target().centre().mm().x, 0.5 * scene_target().size()[0].mm());
+        let behind = self.bow.mm() * (1.0 - ((x - middle) / half).powi(2));
+        let at = self.camera_from_target * Point::from_mm(Vector3::new(x, y, behind));
         self.lens.image_of(&at)
     }
 

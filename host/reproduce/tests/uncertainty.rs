@@ -7,8 +7,9 @@ mod common;
 use common::{Gaussian, around, left_from_middle, left_from_right, lens, see};
 use nalgebra::{Matrix3, Matrix3x2, Matrix6, SMatrix, SVector, UnitQuaternion, Vector3};
 use vergence_vision::{
-    Angle, Camera, ImageSize, KannalaBrandt, Kernel, LENS_PARAMETERS, Left, Length, OpenCvFisheye, Pixel, PixelPair,
-    Point, PointUncertainty, Right, SHARED_PARAMETERS, SharedCovariance, StereoPair, Transform, UnitRay, covariance,
+    Angle, Asymmetry, Camera, ImageSize, KannalaBrandt, Kernel, LENS_PARAMETERS, Left, OpenCvFisheye, Pixel, PixelPair,
+    Point, PointUncertainty, Pupil, Right, SHARED_PARAMETERS, SharedCovariance, StereoPair, Transform, UnitRay,
+    covariance,
 };
 
 const SIZE: ImageSize = ImageSize { width: 2080, height: 2080 };
@@ -18,15 +19,19 @@ const POSE: usize = 2 * LENS_PARAMETERS;
 type Shared = SVector<f64, SHARED_PARAMETERS>;
 
 /// Lens parameters in the order of calibrations, and the error of each in pixels or without unit.
-const LENS: [f64; LENS_PARAMETERS] = [560.0, 561.0, 1039.5, 1039.5, 0.01, -0.004, 0.001, -0.0002, 2.0];
-const LENS_SIGMA: [f64; LENS_PARAMETERS] = [0.05, 0.05, 0.04, 0.04, 2e-4, 3e-4, 2e-4, 5e-5, 0.02];
+const LENS: [f64; LENS_PARAMETERS] =
+    [560.0, 561.0, 1039.5, 1039.5, 0.01, -0.004, 0.001, -0.0002, 2.0, 0.3, 4e-4, -7e-4, 5e-4, -2e-4, 8e-4, 1e-4];
+const LENS_SIGMA: [f64; LENS_PARAMETERS] =
+    [0.05, 0.05, 0.04, 0.04, 2e-4, 3e-4, 2e-4, 5e-5, 0.02, 0.02, 2e-5, 2e-5, 2e-5, 1e-5, 2e-5, 1e-5];
 const POSE_SIGMA: [f64; 6] = [2e-4, 2e-4, 2e-4, 0.05, 0.05, 0.05];
 
 fn lens_of(parameters: &[f64]) -> KannalaBrandt {
-    let [fx, fy, cx, cy, k1, k2, k3, k4, e0] = parameters.try_into().unwrap();
+    let [fx, fy, cx, cy, k1, k2, k3, k4, e0, e1, asymmetry @ ..]: [f64; LENS_PARAMETERS] =
+        parameters.try_into().unwrap();
     let camera = OpenCvFisheye { fx, fy, cx, cy, k: [k1, k2, k3, k4] };
     let central = KannalaBrandt::from_opencv(camera, Angle::from_deg(99.0), SIZE).unwrap();
-    central.with_pupil(Length::from_mm(e0)).unwrap()
+    let moving = central.with_pupil(Pupil::from_mm([e0, e1])).unwrap();
+    moving.with_asymmetry(Asymmetry::from_array(asymmetry)).unwrap()
 }
 
 /// Lenses and pose with `error` added to all shared parameters.

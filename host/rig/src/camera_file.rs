@@ -3,7 +3,10 @@
 use nalgebra::SMatrix;
 use serde::de::Error;
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
-use vergence_vision::{Angle, ImageSize, InvalidLens, KannalaBrandt, LENS_PARAMETERS, Length, OpenCvFisheye, Time};
+use vergence_vision::{
+    Angle, Asymmetry, CENTRAL_PARAMETERS, ImageSize, InvalidLens, KannalaBrandt, LENS_PARAMETERS, OpenCvFisheye, Pupil,
+    Time,
+};
 
 use crate::exposure::Shutter;
 use crate::text::{angle_text, optional_quantity, time_text};
@@ -47,9 +50,30 @@ pub struct CameraTable {
     pub opencv_k3: f64,
     /// Coefficient of θ⁹ relative to that of θ.
     pub opencv_k4: f64,
-    /// Coefficient e0 of the pupil's shift θ / sin θ - 1, in millimetres. If absent, zero: the lens is central.
+    /// Coefficient e0 of the pupil's shift (θ / sin θ - 1) (e0 + e1 θ²), in millimetres. Absent is zero, here and below: the lens is central.
     #[serde(default, skip_serializing_if = "is_zero")]
     pub pupil_e0_mm: f64,
+    /// Coefficient e1, in millimetres.
+    #[serde(default, skip_serializing_if = "is_zero")]
+    pub pupil_e1_mm: f64,
+    /// Decentring p1, in the order of FISHEYE624: OpenCV calls it p2.
+    #[serde(default, skip_serializing_if = "is_zero")]
+    pub tangential_p1: f64,
+    /// Decentring p2; OpenCV's p1.
+    #[serde(default, skip_serializing_if = "is_zero")]
+    pub tangential_p2: f64,
+    /// Thin prism along u, of the square of the radius in focal lengths.
+    #[serde(default, skip_serializing_if = "is_zero")]
+    pub prism_s0: f64,
+    /// Thin prism along u, of its fourth power.
+    #[serde(default, skip_serializing_if = "is_zero")]
+    pub prism_s1: f64,
+    /// Thin prism along v, of the square.
+    #[serde(default, skip_serializing_if = "is_zero")]
+    pub prism_s2: f64,
+    /// Thin prism along v, of the fourth power.
+    #[serde(default, skip_serializing_if = "is_zero")]
+    pub prism_s3: f64,
 }
 
 #[expect(clippy::trivially_copy_pass_by_ref, reason = "serde asks for a reference")]
@@ -63,9 +87,30 @@ impl CameraTable {
     pub fn of(camera: &KannalaBrandt) -> Self {
         let OpenCvFisheye { fx, fy, cx, cy, k: [opencv_k1, opencv_k2, opencv_k3, opencv_k4] } = camera.to_opencv();
         let ImageSize { width, height } = camera.size();
-        let theta_max = Some(camera.measured_field());
-        let (size, line_time, pupil_e0_mm) = ([width, height], None, camera.pupil().mm());
-        Self { size, theta_max, line_time, fx, fy, cx, cy, opencv_k1, opencv_k2, opencv_k3, opencv_k4, pupil_e0_mm }
+        let [pupil_e0_mm, pupil_e1_mm] = camera.pupil().mm();
+        let Asymmetry { tangential: [tangential_p1, tangential_p2], prism } = camera.asymmetry();
+        let [prism_s0, prism_s1, prism_s2, prism_s3] = prism;
+        Self {
+            size: [width, height],
+            theta_max: Some(camera.measured_field()),
+            line_time: None,
+            fx,
+            fy,
+            cx,
+            cy,
+            opencv_k1,
+            opencv_k2,
+            opencv_k3,
+            opencv_k4,
+            pupil_e0_mm,
+            pupil_e1_mm,
+            tangential_p1,
+            tangential_p2,
+            prism_s0,
+            prism_s1,
+            prism_s2,
+            prism_s3,
+        }
     }
 
     /// Replaces the shutter.
@@ -97,7 +142,12 @@ impl CameraTable {
             Some(stated) => stated,
             None => lens.largest_theta(size)?,
         };
-        KannalaBrandt::from_opencv(lens, theta_max, size)?.with_pupil(Length::from_mm(self.pupil_e0_mm))
+        KannalaBrandt::from_opencv(lens, theta_max, size)?
+            .with_pupil(Pupil::from_mm([self.pupil_e0_mm, self.pupil_e1_mm]))?
+            .with_asymmetry(Asymmetry {
+                tangential: [self.tangential_p1, self.tangential_p2],
+                prism: [self.prism_s0, self.prism_s1, self.prism_s2, self.prism_s3],
+            })
     }
 }
 
@@ -125,18 +175,24 @@ pub struct CalibrationTable {
     pub corners: usize,
     /// Number of views of the target.
     pub views: usize,
-    /// Covariance of fx, fy, cx, cy in pixels, opencv_k1 to opencv_k4, and pupil_e0_mm, row by row. A central lens has no row for the last.
+    /// Covariance of the parameters in the order of [`LENS_PARAMETER_NAMES`](vergence_vision::LENS_PARAMETER_NAMES), row by row, zero of
+    /// parameters that the lens does not have. Rows of zeros at the end may be absent: a central and symmetric lens has eight.
     #[serde(deserialize_with = "square", serialize_with = "rows")]
     pub covariance: SMatrix<f64, LENS_PARAMETERS, LENS_PARAMETERS>,
 }
 
-/// Reads a covariance of 8 or 9 rows.
+/// Reads a covariance of 8 to 16 rows.
 fn square<'de, D: Deserializer<'de>>(file: D) -> Result<SMatrix<f64, LENS_PARAMETERS, LENS_PARAMETERS>, D::Error> {
     let rows = Vec::<Vec<f64>>::deserialize(file)?;
     let n = rows.len();
-    if !(LENS_PARAMETERS - 1..=LENS_PARAMETERS).contains(&n) || rows.iter().any(|row| row.len() != n) {
+    if !(CENTRAL_PARAMETERS..=LENS_PARAMETERS).contains(&n) || rows.iter().any(|row| row.len() != n) {
         return Err(D::Error::custom(
-            "the covariance of a lens has 8 rows of 8 values, or 9 of 9 with that of pupil_e0_mm",
+            "the covariance of a lens has 8 rows of 8 values, and as many more of each as it has parameters beyond opencv_k4: up to 16",
+        ));
+    }
+    if rows.iter().flatten().any(|value| !value.is_finite()) || (0..n).any(|i| rows[i][i] < 0.0) {
+        return Err(D::Error::custom(
+            "the covariance of a lens holds a value that is no number, or a negative variance",
         ));
     }
     let mut covariance = SMatrix::zeros();
@@ -152,8 +208,8 @@ fn rows<S: Serializer>(
     covariance: &SMatrix<f64, LENS_PARAMETERS, LENS_PARAMETERS>,
     file: S,
 ) -> Result<S::Ok, S::Error> {
-    let last = LENS_PARAMETERS - 1;
-    let n = if covariance[(last, last)] > 0.0 { LENS_PARAMETERS } else { last };
+    let last = (CENTRAL_PARAMETERS..LENS_PARAMETERS).rev().find(|&i| covariance[(i, i)] > 0.0);
+    let n = last.map_or(CENTRAL_PARAMETERS, |last| last + 1);
     let rows: Vec<Vec<f64>> = (0..n).map(|row| covariance.row(row).iter().take(n).copied().collect()).collect();
     rows.serialize(file)
 }

@@ -76,10 +76,17 @@ pub fn closure_json(pose: &RigPose) -> Value {
 pub fn camera_in_words(camera: &KannalaBrandt) -> String {
     let OpenCvFisheye { fx, fy, cx, cy, k: [k1, k2, k3, k4] } = camera.to_opencv();
     let size = camera.size();
-    let pupil = if camera.is_central() { String::new() } else { format!("\npupil_e0_mm {:.4}", camera.pupil().mm()) };
+    let [e0, e1] = camera.pupil().mm();
+    let pupil = if camera.is_central() { String::new() } else { format!("\npupil_e0_mm {e0:.4}  pupil_e1_mm {e1:.4}") };
+    let asymmetry = if camera.is_symmetric() {
+        String::new()
+    } else {
+        let [p1, p2, s0, s1, s2, s3] = camera.asymmetry().to_array();
+        format!("\ntangential {p1:.6} {p2:.6}  prism {s0:.6} {s1:.6} {s2:.6} {s3:.6}")
+    };
     format!(
         "{} x {} px, valid to {:.2} from the axis\nfx {fx:.4}  fy {fy:.4}  cx {cx:.4}  cy {cy:.4}\n\
-         opencv_k1 {k1:.6}  opencv_k2 {k2:.6}  opencv_k3 {k3:.6}  opencv_k4 {k4:.6}{pupil}",
+         opencv_k1 {k1:.6}  opencv_k2 {k2:.6}  opencv_k3 {k3:.6}  opencv_k4 {k4:.6}{pupil}{asymmetry}",
         size.width,
         size.height,
         camera.theta_max()
@@ -95,6 +102,9 @@ pub fn camera_json(camera: &KannalaBrandt) -> Value {
         "size": [size.width, size.height],
         "theta_max_deg": camera.theta_max().deg(),
         "opencv": {"fx": fx, "fy": fy, "cx": cx, "cy": cy, "k1": k1, "k2": k2, "k3": k3, "k4": k4},
-        "pupil_e0_mm": camera.pupil().mm(),
+        "pupil_e0_mm": camera.pupil().e0.mm(),
+        "pupil_e1_mm": camera.pupil().e1.mm(),
+        "tangential": camera.asymmetry().tangential,
+        "prism": camera.asymmetry().prism,
     })
 }

@@ -7,13 +7,14 @@
 //! r(θ) = k1 θ + k2 θ³ + k3 θ⁵ + k4 θ⁷ + k5 θ⁹        u = cx + r cos φ        v = cy + aspect · r sin φ
 //! ```
 //!
-//! θ is the angle to the optical axis, from 0 to beyond 90°; φ runs from x (right) to y (down). `k` is in pixels.
+//! θ is the angle to the optical axis, from 0 to beyond 90°; φ runs from x (right) to y (down). `k` is in pixels. To this come a pupil that
+//! moves ([`crate::Pupil`]) and elements off the axis ([`crate::Asymmetry`]), where a lens has them.
 
 use std::str::FromStr;
 
 use nalgebra::Vector3;
 
-use crate::{Angle, Frame, Point, UnitRay, largest_theta};
+use crate::{Angle, Asymmetry, Frame, Point, Pupil, UnitRay, largest_theta};
 
 /// An image position in pixels. (0, 0) is the centre of the top-left pixel, u to the right, v down.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -81,8 +82,8 @@ pub struct KannalaBrandt {
     /// The largest angle to the axis at which the lens was measured, in radians.
     measured: f64,
     size: ImageSize,
-    /// Coefficient e0 of the pupil's shift, in millimetres: see [`crate::pupil_shift`].
-    pupil_mm: f64,
+    pupil: Pupil,
+    asymmetry: Asymmetry,
 }
 
 /// Why a set of parameters describes no lens.
@@ -108,6 +109,9 @@ pub enum InvalidLens {
         /// The stated limit of the field.
         stated: Angle,
     },
+    /// Decentring and thin prism are so large that two rays of the field share a pixel.
+    #[error("the tangential and prism coefficients fold the image inside theta_max: reduce theta_max or recalibrate")]
+    Folds,
 }
 
 /// A ray or pixel outside the lens's valid cone.
@@ -149,7 +153,8 @@ impl KannalaBrandt {
             r_max: radius(&k, stated),
             measured: stated,
             size,
-            pupil_mm: 0.0,
+            pupil: Pupil::default(),
+            asymmetry: Asymmetry::default(),
         })
     }
 
@@ -166,7 +171,7 @@ impl KannalaBrandt {
         let centre = Pixel { u: scaled(self.centre.u), v: scaled(self.centre.v) };
         let size = ImageSize { width, height };
         let lens = Self::new(self.k.map(|k| k * scale), self.aspect, centre, Angle::from_rad(self.theta_max), size)?;
-        Ok(Self { measured: self.measured, pupil_mm: self.pupil_mm, ..lens })
+        Ok(Self { measured: self.measured, pupil: self.pupil, asymmetry: self.asymmetry, ..lens })
     }
 
     /// The same lens beyond the field in which it was measured: as far as [`largest_theta()`] says that its polynomial is of use.
@@ -174,10 +179,11 @@ impl KannalaBrandt {
     #[must_use]
     pub fn extrapolated(&self) -> Self {
         let wider = largest_theta(self.k, self.aspect, self.centre, self.size)
-            .and_then(|limit| Self::new(self.k, self.aspect, self.centre, limit, self.size));
+            .and_then(|limit| Self::new(self.k, self.aspect, self.centre, limit, self.size))
+            .and_then(|wider| wider.with_asymmetry(self.asymmetry));
         match wider {
             Ok(wider) if wider.theta_max > self.theta_max => {
-                Self { measured: self.measured, pupil_mm: self.pupil_mm, ..wider }
+                Self { measured: self.measured, pupil: self.pupil, ..wider }
             }
             _ => *self,
         }
@@ -208,7 +214,8 @@ impl KannalaBrandt {
         }
         // At the axis r/rho tends to k1.
         let scale = if rho > 0.0 { radius(&self.k, theta) / rho } else { self.k[0] };
-        Ok(Pixel { u: self.centre.u + scale * d.x, v: self.centre.v + self.aspect * scale * d.y })
+        let symmetric = Pixel { u: self.centre.u + scale * d.x, v: self.centre.v + self.aspect * scale * d.y };
+        Ok(self.with_displacement(symmetric))
     }
 
     /// Projects `point` to its pixel.
@@ -225,6 +232,7 @@ impl KannalaBrandt {
     /// # Errors
     /// [`OutsideField`] beyond `theta_max`; the ray is never clamped.
     pub fn unproject<F: Frame>(&self, pixel: Pixel) -> Result<UnitRay<F>, OutsideField> {
+        let pixel = self.without_displacement(pixel).ok_or(OutsideField)?;
         let (x, y) = (pixel.u - self.centre.u, (pixel.v - self.centre.v) / self.aspect);
         let r = x.hypot(y);
         if r.is_nan() || r > self.r_max {
@@ -263,12 +271,24 @@ impl KannalaBrandt {
         self.size.contains(pixel)
     }
 
-    pub(crate) const fn pupil_mm(&self) -> f64 {
-        self.pupil_mm
+    pub(crate) const fn moved_pupil(self, pupil: Pupil) -> Self {
+        Self { pupil, ..self }
     }
 
-    pub(crate) const fn moved_pupil(self, pupil_mm: f64) -> Self {
-        Self { pupil_mm, ..self }
+    pub(crate) const fn made_asymmetric(self, asymmetry: Asymmetry) -> Self {
+        Self { asymmetry, ..self }
+    }
+
+    /// How the pupil moves; the default of a central lens.
+    #[must_use]
+    pub const fn pupil(&self) -> Pupil {
+        self.pupil
+    }
+
+    /// By how much the lens is not symmetric about its axis.
+    #[must_use]
+    pub const fn asymmetry(&self) -> Asymmetry {
+        self.asymmetry
     }
 
     /// The five coefficients k1 to k5 in pixels.

@@ -2,7 +2,8 @@
 //!
 //! From pixels to points:
 //!
-//! - [`KannalaBrandt`] unprojects pixels to rays and projects rays to pixels, past 90°, with a pupil that moves; [`OpenCvFisheye`] holds the
+//! - [`KannalaBrandt`] unprojects pixels to rays and projects rays to pixels, past 90°, with a pupil that moves and elements
+//!   off the axis; [`OpenCvFisheye`] holds the
 //!   parameters of other programs;
 //! - [`ray_to_plane`] and [`dihedral`] measure how well two rays agree with the cameras' relative pose;
 //! - [`pseudo_intersection`] makes a point of two rays, and [`covariance()`] gives its uncertainty;
@@ -20,6 +21,7 @@
 //!
 //! Everything is a pure function of its arguments.
 
+mod asymmetry;
 mod batch;
 mod cloud;
 mod covariance;
@@ -37,12 +39,14 @@ mod pose_equation;
 mod pose_fusion;
 mod pupil;
 mod residual_spread;
+mod stand_in;
 mod stereo_pair;
 mod triangulation;
 mod uncertainty;
 mod units;
 mod zones;
 
+pub use asymmetry::Asymmetry;
 pub use batch::{
     BatchLens, BatchPair, BatchPoints, BatchTriangulation, Instructions, ProjectedPoints, triangulate_batch,
 };
@@ -53,14 +57,14 @@ pub use frames::{Base, Camera, Frame, Left, Point, Right, Side, Transform, UnitR
 pub use gates::{DropReason, Gates};
 pub use import::{OpenCvFisheye, largest_theta};
 pub use kannala_brandt::{ImageSize, InvalidImageSize, InvalidLens, KannalaBrandt, OutsideField, Pixel};
-pub use lens_derivatives::LENS_PARAMETERS;
+pub use lens_derivatives::{CENTRAL_PARAMETERS, LENS_PARAMETER_NAMES, LENS_PARAMETERS};
 pub use lens_field::{LensField, UnknownField};
 pub use match_sigma::MatchSigma;
 pub use median::median;
 pub use pose_drift::{PoseDrift, pose_drift};
 pub use pose_equation::moved as moved_pose;
 pub use pose_fusion::{FusedPose, MatchErrors, fuse_pose};
-pub use pupil::{angle_of_point, pupil_shift, pupil_shift_slope};
+pub use pupil::{Pupil, pupil_shift, pupil_shift_slope};
 pub use stereo_pair::{PixelPair, StereoPair};
 pub use triangulation::{
     AngularNorm, Feet, Kernel, Rejection, Triangulated, UnknownKernel, angular, closest_approach, edge_plane, mid2,

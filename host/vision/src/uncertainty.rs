@@ -24,7 +24,7 @@
 //! o_right - o_left, moved by o_left; and with G_v / μ the movement per shift of the right origin, it moves by
 //!
 //! ```text
-//! (1 - G_v / μ) ∂o_left + (G_v / μ) R ∂o_right        ∂o = z (e' ∂θ + (θ / sin θ - 1) ∂e0)
+//! (1 - G_v / μ) ∂o_left + (G_v / μ) R ∂o_right        ∂o = z (e' ∂θ + (θ / sin θ - 1) (∂e0 + θ² ∂e1))
 //! ```
 //!
 //! The first pair of formulas is the case e = n. An error of e itself does not move the point to first order, because
@@ -39,11 +39,11 @@ use crate::{Angle, Kernel, Left, MatchSigma, Point, Right, StereoPair, UnitRay};
 /// Number of parameters that all points of a pair share: those of both lenses and the six of the pose.
 pub const SHARED_PARAMETERS: usize = 2 * LENS_PARAMETERS + 6;
 
-/// The covariance (24 × 24) of the parameters that all points of a pair share.
+/// The covariance (38 × 38) of the parameters that all points of a pair share.
 ///
-/// Their order is: left lens, right lens (each fx, fy, cx, cy in pixels, k1 to k4 as defined by OpenCV fisheye, and the pupil's e0 in
-/// millimetres), then the relative pose as a turn ω about the left axes in radians and a shift δ of the right camera in the left
-/// frame in millimetres: R ← exp(ω) R, t ← t + δ.
+/// Their order is: left lens, right lens (each in the order of [`LENS_PARAMETERS`]), then the relative pose as a turn ω about the left axes
+/// in radians and a shift δ of the right camera in the left frame in millimetres: R ← exp(ω) R, t ← t + δ. Rows and columns of parameters
+/// that are exact, such as those that a lens does not have, are zero.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SharedCovariance(SMatrix<f64, SHARED_PARAMETERS, SHARED_PARAMETERS>);
 
@@ -84,7 +84,7 @@ impl SharedCovariance {
         self.0.fixed_view::<6, 6>(2 * LENS_PARAMETERS, 2 * LENS_PARAMETERS).into_owned()
     }
 
-    /// Replaces the covariances of both lenses (9 × 9) and removes their correlation with each other and with the pose.
+    /// Replaces the covariances of both lenses (16 × 16) and removes their correlation with each other and with the pose.
     #[must_use]
     pub fn with_lenses(mut self, lenses: [&SMatrix<f64, LENS_PARAMETERS, LENS_PARAMETERS>; 2]) -> Self {
         for (lens, first) in lenses.into_iter().zip([0, LENS_PARAMETERS]) {
@@ -93,6 +93,28 @@ impl SharedCovariance {
             self.0.fixed_view_mut::<LENS_PARAMETERS, LENS_PARAMETERS>(first, first).copy_from(lens);
         }
         self
+    }
+
+    /// The covariance of numbers (rows) with others (columns), by the derivatives of both. Exact parameters cost nothing.
+    fn between<const N: usize>(
+        &self,
+        by_shared: &SMatrix<f64, N, SHARED_PARAMETERS>,
+        other: &SMatrix<f64, N, SHARED_PARAMETERS>,
+    ) -> SMatrix<f64, N, N> {
+        let (mut unknown, mut count) = ([0; SHARED_PARAMETERS], 0);
+        for parameter in (0..SHARED_PARAMETERS).filter(|&i| self.0[(i, i)] != 0.0) {
+            unknown[count] = parameter;
+            count += 1;
+        }
+        let mut sum = SMatrix::zeros();
+        for &column in &unknown[..count] {
+            let mut with_column = SMatrix::<f64, N, 1>::zeros();
+            for &row in &unknown[..count] {
+                with_column += by_shared.column(row) * self.0[(row, column)];
+            }
+            sum += with_column * other.column(column).transpose();
+        }
+        sum
     }
 
     /// The covariance matrix, in the order stated at the type.
@@ -168,8 +190,10 @@ impl PointUncertainty {
         by_shared
             .fixed_columns_mut::<LENS_PARAMETERS>(LENS_PARAMETERS)
             .copy_from(&(-right_pixel * at_right.pixel_by_lens));
-        by_shared.set_column(PUPIL, &(by_left_origin * at_left.origin_by_pupil));
-        by_shared.set_column(LENS_PARAMETERS + PUPIL, &(by_right_origin * at_right.origin_by_pupil));
+        for (j, column) in PUPIL.into_iter().enumerate() {
+            by_shared.set_column(column, &(by_left_origin * at_left.origin_by_pupil[j]));
+            by_shared.set_column(LENS_PARAMETERS + column, &(by_right_origin * at_right.origin_by_pupil[j]));
+        }
         by_shared.fixed_columns_mut::<3>(2 * LENS_PARAMETERS).copy_from(&by_turn);
         by_shared.fixed_columns_mut::<3>(2 * LENS_PARAMETERS + 3).copy_from(&by_shift);
         let finite = from_pixels.iter().chain(by_shared.iter()).all(|value| value.is_finite());
@@ -188,7 +212,7 @@ impl PointUncertainty {
     /// than either.
     #[must_use]
     pub fn covariance_with(&self, other: &Self, shared: &SharedCovariance) -> Matrix3<f64> {
-        self.by_shared * shared.0 * other.by_shared.transpose()
+        shared.between(&self.by_shared, &other.by_shared)
     }
 }
 
@@ -238,8 +262,10 @@ impl ResidualUncertainty {
         by_shared
             .fixed_columns_mut::<LENS_PARAMETERS>(LENS_PARAMETERS)
             .copy_from(&(-by_right * at_right.pixel_by_lens));
-        by_shared[PUPIL] = by_left_origin * at_left.origin_by_pupil;
-        by_shared[LENS_PARAMETERS + PUPIL] = by_right_origin * at_right.origin_by_pupil;
+        for (j, column) in PUPIL.into_iter().enumerate() {
+            by_shared[column] = by_left_origin * at_left.origin_by_pupil[j];
+            by_shared[LENS_PARAMETERS + column] = by_right_origin * at_right.origin_by_pupil[j];
+        }
         by_shared.fixed_columns_mut::<3>(2 * LENS_PARAMETERS).copy_from(&by_turn);
         by_shared.fixed_columns_mut::<3>(2 * LENS_PARAMETERS + 3).copy_from(&by_shift);
         let from_pixels = left_noise.norm_squared() + right_noise.norm_squared();
@@ -250,7 +276,7 @@ impl ResidualUncertainty {
     /// The standard deviation of the angle.
     #[must_use]
     pub fn sigma(&self, shared: &SharedCovariance) -> Angle {
-        let from_shared = (self.by_shared * shared.0 * self.by_shared.transpose()).x.max(0.0);
+        let from_shared = shared.between(&self.by_shared, &self.by_shared).x.max(0.0);
         Angle::from_rad((self.from_pixels + from_shared).sqrt())
     }
 

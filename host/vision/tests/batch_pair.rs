@@ -5,16 +5,20 @@
 use nalgebra::{SMatrix, UnitQuaternion, Vector3};
 use proptest::prelude::*;
 use vergence_vision::{
-    Angle, BatchPair, BatchPoints, ImageSize, Instructions, KannalaBrandt, LENS_PARAMETERS, Left, OpenCvFisheye,
-    PointUncertainty, Right, SHARED_PARAMETERS, SharedCovariance, StereoPair, Transform, UnitRay, pseudo_intersection,
+    Angle, BatchPair, BatchPoints, CENTRAL_PARAMETERS, ImageSize, Instructions, KannalaBrandt, LENS_PARAMETERS, Left,
+    OpenCvFisheye, PointUncertainty, Right, SHARED_PARAMETERS, SharedCovariance, StereoPair, Transform, UnitRay,
+    pseudo_intersection,
 };
 
 const PIXEL_SIGMA: f64 = 0.3;
 /// Standard deviations of both lenses, which are central, and the pose, about those of a calibration.
-const SIGMAS: [f64; SHARED_PARAMETERS] = [
-    0.05, 0.05, 0.04, 0.04, 2e-4, 3e-4, 2e-4, 5e-5, 0.0, 0.05, 0.05, 0.04, 0.04, 2e-4, 3e-4, 2e-4, 5e-5, 0.0, 2e-4,
-    2e-4, 2e-4, 0.05, 0.05, 0.05,
-];
+const LENS_SIGMAS: [f64; CENTRAL_PARAMETERS] = [0.05, 0.05, 0.04, 0.04, 2e-4, 3e-4, 2e-4, 5e-5];
+const POSE_SIGMAS: [f64; 6] = [2e-4, 2e-4, 2e-4, 0.05, 0.05, 0.05];
+
+fn sigma(parameter: usize) -> f64 {
+    let of_lens = || LENS_SIGMAS.get(parameter % LENS_PARAMETERS).copied().unwrap_or(0.0);
+    parameter.checked_sub(2 * LENS_PARAMETERS).map_or_else(of_lens, |pose| POSE_SIGMAS[pose])
+}
 
 fn lens(fx: f64, fy: f64, k: [f64; 4]) -> KannalaBrandt {
     let camera = OpenCvFisheye { fx, fy, cx: 1039.5, cy: 1031.5, k };
@@ -24,7 +28,7 @@ fn lens(fx: f64, fy: f64, k: [f64; 4]) -> KannalaBrandt {
 /// A covariance in which every parameter is correlated with all others.
 fn shared(mixing: &[f64]) -> SharedCovariance {
     let mixed = SMatrix::<f64, SHARED_PARAMETERS, SHARED_PARAMETERS>::from_fn(|row, column| {
-        SIGMAS[row] * if row == column { 1.0 } else { 0.3 * mixing[(row * 7 + column * 3) % mixing.len()] }
+        sigma(row) * if row == column { 1.0 } else { 0.3 * mixing[(row * 7 + column * 3) % mixing.len()] }
     });
     SharedCovariance::joint(mixed * mixed.transpose())
 }

@@ -5,9 +5,10 @@
 use nalgebra::{SVector, UnitQuaternion, Vector3};
 use proptest::prelude::*;
 use vergence_vision::{
-    Angle, BatchPair, BatchPoints, Camera, Gates, ImageSize, KannalaBrandt, Kernel, LENS_PARAMETERS, Left, Length,
-    OpenCvFisheye, Pixel, PixelPair, Point, PointUncertainty, ResidualUncertainty, Right, SHARED_PARAMETERS,
-    SharedCovariance, StereoPair, Transform, UnitRay, cloud_point, pupil_shift, pupil_shift_slope, ray_to_plane,
+    Angle, Asymmetry, BatchPair, BatchPoints, Camera, Gates, ImageSize, KannalaBrandt, Kernel, LENS_PARAMETERS, Left,
+    Length, OpenCvFisheye, Pixel, PixelPair, Point, PointUncertainty, Pupil, ResidualUncertainty, Right,
+    SHARED_PARAMETERS, SharedCovariance, StereoPair, Transform, UnitRay, cloud_point, pupil_shift, pupil_shift_slope,
+    ray_to_plane,
 };
 
 const SIZE: ImageSize = ImageSize { width: 2048, height: 2048 };
@@ -16,6 +17,12 @@ fn lens(e0: f64) -> KannalaBrandt {
     let opencv = OpenCvFisheye { fx: 599.1, fy: 599.1, cx: 1024.0, cy: 1024.0, k: [-0.052, 0.0041, -0.0019, 0.0002] };
     let central = KannalaBrandt::from_opencv(opencv, Angle::from_deg(105.0), SIZE).unwrap();
     central.with_pupil(Length::from_mm(e0)).unwrap()
+}
+
+/// A lens with all other parameters that a lens can have.
+fn displaced(lens: KannalaBrandt) -> KannalaBrandt {
+    let growing = lens.with_pupil(Pupil { e1: Length::from_mm(0.2), ..lens.pupil() }).unwrap();
+    growing.with_asymmetry(Asymmetry::from_array([0.0012, -0.0007, 0.0009, -0.0002, -0.0011, 0.0003])).unwrap()
 }
 
 fn direction(theta: f64, phi: f64) -> Vector3<f64> {
@@ -31,12 +38,24 @@ const VECTORS: [([f64; 3], f64, f64, f64); 5] = [
     ([1.0, 2.0, 500.0], 0.00447210622370053, 1025.19819078812, 1026.39638157624),
 ];
 
+/// The same with e1 = 0.056 mm.
+const WITH_GROWTH: [([f64; 3], f64, f64, f64); 5] = [
+    ([200.0, 0.0, 100.0], 1.10986863096052, 1648.41277928926, 1024.0),
+    ([0.0, -350.0, -40.0], 1.69038997789981, 1024.0, 159.24941505633),
+    ([150.0, 100.0, 300.0], 0.541306917650729, 1289.8025412376, 1201.2016941584),
+    ([30.0, 0.0, -5.0], 1.81854003291822, 1926.17621659321, 1024.0),
+    ([1.0, 2.0, 500.0], 0.00447210622370057, 1025.19819078812, 1026.39638157624),
+];
+
 /// The formulas of D. Gennery (2006) evaluated with 50 digits (mpmath), for e0 = 2.77 mm.
 #[test]
 fn points_are_seen_where_the_formulas_say() {
-    for ([x, y, z], theta, u, v) in VECTORS {
+    let growing = lens(2.77).with_pupil(Pupil::from_mm([2.77, 0.056])).unwrap();
+    let vectors =
+        VECTORS.map(|vector| (lens(2.77), vector)).into_iter().chain(WITH_GROWTH.map(|vector| (growing, vector)));
+    for (lens, ([x, y, z], theta, u, v)) in vectors {
         let point = Point::<Camera>::from_mm(Vector3::new(x, y, z));
-        let (lens, ray) = (lens(2.77), lens(2.77).ray_to(&point).unwrap());
+        let ray = lens.ray_to(&point).unwrap();
         let pixel = lens.project_point(&point).unwrap();
         assert!((ray.angle_to_axis().rad() - theta).abs() < 1e-12, "{point:?}: {}", ray.angle_to_axis().rad());
         assert!((pixel.u - u).abs() < 1e-9 && (pixel.v - v).abs() < 1e-9, "{point:?}: {pixel:?}");
@@ -110,7 +129,10 @@ impl Pair {
                 k: std::array::from_fn(|i| k[i] + by[4 + i]),
             };
             let central = KannalaBrandt::from_opencv(opencv, lens.theta_max(), SIZE).unwrap();
-            central.with_pupil(Length::from_mm(lens.pupil().mm() + by[8])).unwrap()
+            let [e0, e1] = lens.pupil().mm();
+            let moving = central.with_pupil(Pupil::from_mm([e0 + by[8], e1 + by[9]])).unwrap();
+            let asymmetry = lens.asymmetry().to_array();
+            moving.with_asymmetry(Asymmetry::from_array(std::array::from_fn(|i| asymmetry[i] + by[10 + i]))).unwrap()
         };
         let (left, rest) = by.as_slice().split_at(LENS_PARAMETERS);
         let (right, pose) = rest.split_at(LENS_PARAMETERS);
@@ -130,12 +152,16 @@ fn shifted(pixels: &PixelPair, [a, b, c, d]: [f64; 4]) -> PixelPair {
 
 proptest! {
     #[test]
-    fn pixel_and_ray_return_to_each_other(theta in 0.0..1.71f64, phi in -3.2..3.2f64, log in 1.7..6.0f64, e0 in -1.0..3.5f64) {
-        let lens = lens(e0);
+    fn pixel_and_ray_return_to_each_other(
+        theta in 0.0..1.71f64, phi in -3.2..3.2f64, log in 1.7..6.0f64, e0 in -1.0..3.5f64, is_symmetric: bool,
+    ) {
+        let lens = if is_symmetric { lens(e0) } else { displaced(lens(e0)) };
         let ray = UnitRay::<Camera>::new(direction(theta, phi)).unwrap();
         let pixel = lens.project(&ray).unwrap();
         let point = Point::<Camera>::from_mm(lens.origin_of(&ray).mm() + ray.vector() * 10f64.powf(log));
         let back = lens.project_point(&point).unwrap();
+        let again = lens.unproject::<Camera>(pixel).unwrap();
+        prop_assert!((again.vector() - ray.vector()).norm() < 1e-12, "{again:?}");
         prop_assert!((pixel.u - back.u).hypot(pixel.v - back.v) < 1e-9, "{pixel:?} became {back:?}");
     }
 
@@ -160,8 +186,11 @@ proptest! {
 
     /// First derivatives by central differences, of pixels, lenses with their pupils, and pose.
     #[test]
-    fn covariance_follows_the_derivatives(separation in 0.0..120.0f64, theta in 0.3..1.2f64, phi in -3.1..3.1f64, range in 150.0..800.0f64) {
-        let pair = Pair::new(separation, [2.77, 2.1]);
+    fn covariance_follows_the_derivatives(separation in 0.0..120.0f64, theta in 0.3..1.2f64, phi in -3.1..3.1f64, range in 150.0..800.0f64, is_symmetric: bool) {
+        let mut pair = Pair::new(separation, [2.77, 2.1]);
+        if !is_symmetric {
+            pair.lenses = pair.lenses.map(displaced);
+        }
         let middle = UnitQuaternion::from_euler_angles(0.0, separation.to_radians() / 2.0, 0.0);
         let point = Point::<Left>::from_mm(middle * direction(theta * (1.0 - separation / 180.0), phi) * range);
         let Some(pixels) = pair.see(&point) else { return Ok(()) };
@@ -182,7 +211,8 @@ proptest! {
         prop_assert!((from_pixels - stated.from_pixels).norm() < 1e-3 * scale * scale, "{from_pixels} {}", stated.from_pixels);
         prop_assert!((variance - off_plane.from_pixels).abs() < 1e-4 * variance, "{variance} {}", off_plane.from_pixels);
         for i in 0..SHARED_PARAMETERS {
-            let step = if i < 2 * LENS_PARAMETERS && (4..8).contains(&(i % LENS_PARAMETERS)) { 1e-6 } else { 1e-4 };
+            let has_no_unit = i < 2 * LENS_PARAMETERS && (4..8).chain(10..LENS_PARAMETERS).any(|at| at == i % LENS_PARAMETERS);
+            let step = if has_no_unit { 1e-6 } else { 1e-4 };
             let step = if (2 * LENS_PARAMETERS..2 * LENS_PARAMETERS + 3).contains(&i) { 1e-6 } else { step };
             let [less, more] = [-step, step].map(|by| pair.changed(&SVector::from_fn(|k, _| if k == i { by } else { 0.0 })));
             let by = (more.place(&pixels).unwrap() - less.place(&pixels).unwrap()) / (2.0 * step);
@@ -214,10 +244,11 @@ fn a_central_lens_stands_in_at_one_distance() {
     assert_eq!(central.central_at(Length::from_mm(500.0)).unwrap(), central);
 }
 
-/// Batches of a lens that is not central give what single points give.
+/// Batches of lenses that are not central and symmetric give what single points give.
 #[test]
 fn batches_take_the_pupil() {
-    let pair = Pair::new(60.0, [2.77, 2.1]);
+    let mut pair = Pair::new(60.0, [2.77, 2.1]);
+    pair.lenses[1] = displaced(pair.lenses[1]);
     let shared = SharedCovariance::joint(nalgebra::SMatrix::from_diagonal_element(1e-6));
     let point = Point::<Left>::from_mm(Vector3::new(200.0, 30.0, 300.0));
     let pixels = pair.see(&point).unwrap();

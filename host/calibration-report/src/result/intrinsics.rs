@@ -1,11 +1,12 @@
 //! The result of the calibration of a camera as lines of text and as JSON.
 
 use serde_json::{Value, json};
-use vergence_calibration::{IntrinsicsCalibration, PupilEvidence};
+use vergence_calibration::{IntrinsicsCalibration, LensStep, PupilEvidence, StepEvidence};
 use vergence_targets::TargetView;
-use vergence_vision::LENS_PARAMETERS;
+use vergence_vision::{CENTRAL_PARAMETERS, LENS_PARAMETERS};
 
-const NAMES: [&str; LENS_PARAMETERS] = ["fx", "fy", "cx", "cy", "k1", "k2", "k3", "k4", "pupil_e0_mm"];
+const NAMES: [&str; LENS_PARAMETERS] =
+    ["fx", "fy", "cx", "cy", "k1", "k2", "k3", "k4", "pupil_e0_mm", "pupil_e1_mm", "p1", "p2", "s0", "s1", "s2", "s3"];
 
 /// What the views say of the pupil.
 #[must_use]
@@ -41,6 +42,42 @@ fn pupil_json(pupil: &PupilEvidence) -> Value {
     }
 }
 
+/// What the views say of a step to a richer lens.
+#[must_use]
+pub fn step_in_words(evidence: &StepEvidence) -> String {
+    let StepEvidence { step, gain, rms_px, held_out_px, is_kept } = evidence;
+    let what = match step {
+        LensStep::PupilGrowth => "a pupil with e1",
+        LensStep::Asymmetry => "decentring p and thin prism s",
+    };
+    let held_out = held_out_px
+        .map(|[without, with]| format!(", those of views held out {with:.4} instead of {without:.4} px"))
+        .unwrap_or_default();
+    let verdict = if *is_kept { "the lens has" } else { "the lens is not known to have" };
+    let [without, with] = rms_px;
+    format!(
+        "{verdict} {what}: chi-squared falls by {gain:.1} (30 are asked for), residuals are {with:.4} instead of {without:.4} px{held_out}"
+    )
+}
+
+fn steps_json(steps: &[StepEvidence]) -> Value {
+    let one = |evidence: &StepEvidence| {
+        let terms = match evidence.step {
+            LensStep::PupilGrowth => "pupil_e1",
+            LensStep::Asymmetry => "tangential_and_prism",
+        };
+        let [without, with] = evidence.rms_px;
+        json!({
+            "terms": terms,
+            "chi_squared_gain": evidence.gain,
+            "rms_px": {"without": without, "with": with},
+            "held_out_px": evidence.held_out_px.map(|[without, with]| json!({"without": without, "with": with})),
+            "kept": evidence.is_kept,
+        })
+    };
+    steps.iter().map(one).collect()
+}
+
 fn parameters(calibration: &IntrinsicsCalibration) -> [f64; LENS_PARAMETERS] {
     calibration.lens().to_array()
 }
@@ -62,10 +99,14 @@ pub fn intrinsics_lines(calibration: &IntrinsicsCalibration, views: &[TargetView
         calibration.rms_px,
         calibration.camera.theta_max()
     )];
-    for ((name, value), sigma) in NAMES.iter().zip(parameters(calibration)).zip(sigma(calibration)) {
-        lines.push(format!("  {name} {value:12.5} ± {sigma:.5}"));
+    let named = NAMES.iter().zip(parameters(calibration)).zip(sigma(calibration)).enumerate();
+    for (index, ((name, value), sigma)) in named {
+        if index < CENTRAL_PARAMETERS || sigma > 0.0 {
+            lines.push(format!("  {name} {value:12.5} ± {sigma:.5}"));
+        }
     }
     lines.push(format!("  {}", pupil_in_words(&calibration.pupil)));
+    lines.extend(calibration.steps.iter().map(|step| format!("  {}", step_in_words(step))));
     for outlier in &calibration.outliers {
         let name = views.get(outlier.view).map_or("", |view| &view.name);
         let residual = outlier.residual_px.map(|px| format!(" ({px:.2} px)")).unwrap_or_default();
@@ -110,6 +151,7 @@ pub fn intrinsics_json(calibration: &IntrinsicsCalibration, seconds: f64) -> Val
         "opencv": named(parameters(calibration)),
         "sigma": named(sigma(calibration)),
         "pupil": pupil_json(&calibration.pupil),
+        "steps": steps_json(&calibration.steps),
         "seconds": seconds,
         "views": views,
     })

@@ -9,7 +9,7 @@ use serde_json::{Value, json};
 use vergence_calibration::Validation;
 
 pub use self::extrinsics::{extrinsics_json, extrinsics_lines, fixed_pair};
-pub use self::intrinsics::{intrinsics_json, intrinsics_lines, pupil_in_words};
+pub use self::intrinsics::{intrinsics_json, intrinsics_lines, pupil_in_words, step_in_words};
 pub use self::stage::{stage_json, stage_lines};
 pub(crate) use self::trunk::{in_unit, play_in_words, unit};
 pub use self::trunk::{trunk_json, trunk_lines};

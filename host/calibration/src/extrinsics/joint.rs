@@ -108,13 +108,12 @@ impl<K: Kinematics> SchurProblem<POSE> for Joint<'_, K> {
                 let by_state = residual.by_relative_pose * &by_step;
                 columns.iter_mut().zip(by_state.column_iter()).for_each(|(slot, c)| *slot = [c[0], c[1]]);
             }
-            let [left, right] = self.lens_prior.unknown;
-            let (own, count) = if side == Side::Left { (lens_column, left) } else { (lens_column + left, right) };
-            columns
-                .iter_mut()
-                .skip(own)
-                .zip(residual.by_lens.column_iter().take(count))
-                .for_each(|(slot, c)| *slot = [c[0], c[1]]);
+            let [left, right] = &self.lens_prior.unknown;
+            let (own, unknown) =
+                if side == Side::Left { (lens_column, left) } else { (lens_column + left.len(), right) };
+            for (slot, &parameter) in columns.iter_mut().skip(own).zip(unknown) {
+                *slot = residual.by_lens.column(parameter).into_owned().into();
+            }
             equations.add(&residual.error.into(), corner.relative_sigma, &columns, &residual.by_target.into());
         }
     }

@@ -1,6 +1,6 @@
 //! Residuals of one target seen by two cameras, with derivatives.
 
-use nalgebra::{DMatrix, Isometry3, Matrix3x6, SMatrix, SVector, Vector2};
+use nalgebra::{DMatrix, DVector, Isometry3, Matrix3x6, SMatrix, SVector, Vector2};
 use vergence_rig::RigNumber;
 use vergence_targets::Corner;
 use vergence_vision::{KannalaBrandt, Side};
@@ -11,9 +11,9 @@ use crate::schur_lm::Equations;
 
 /// Prior knowledge of the two lenses.
 ///
-/// A lens's parameters are fx, fy, cx, cy and k1 to k4 of [`OpenCvFisheye`](vergence_vision::OpenCvFisheye) and the pupil's e0, in this
-/// order, as in [`IntrinsicsCalibration::covariance`](crate::IntrinsicsCalibration::covariance). Where the variance of e0 is zero, and where
-/// a free lens is central, e0 is no unknown.
+/// A lens's parameters are in the order of [`LENS_PARAMETERS`](vergence_vision::LENS_PARAMETERS), as in
+/// [`IntrinsicsCalibration::covariance`](crate::IntrinsicsCalibration::covariance). Parameters of the pupil and of the asymmetry are no
+/// unknowns where their variance is zero, and in a free lens where they are zero.
 #[derive(Clone, Debug, PartialEq)]
 pub enum LensKnowledge {
     /// The lenses are exactly as given.
@@ -49,8 +49,8 @@ pub(crate) struct LensPrior {
     pub start: Lenses,
     /// Square roots of the information, times `sigma`; `None` for free lenses.
     pull: Option<[DMatrix<f64>; 2]>,
-    /// How many of the parameters of each lens are unknown, left and right: none, all, or all but the pupil's.
-    pub unknown: [usize; 2],
+    /// Which parameters of each lens are unknown, left and right.
+    pub unknown: [Vec<usize>; 2],
 }
 
 /// Relative pose and lenses: all that the residuals of a view depend on besides the target's pose.
@@ -80,15 +80,16 @@ impl LensPrior {
     pub fn new(start: Lenses, knowledge: &LensKnowledge, sigma: f64) -> Option<Self> {
         let root = |covariance: &SMatrix<f64, LENS, LENS>| {
             let unknown = unknown_within(covariance);
-            let covariance = covariance.view((0, 0), (unknown, unknown));
+            let covariance =
+                DMatrix::from_fn(unknown.len(), unknown.len(), |i, k| covariance[(unknown[i], unknown[k])]);
             // Scaled to unit diagonal first: the parameters differ by many orders of magnitude.
             let scaled = DMatrix::from_diagonal(&covariance.diagonal().map(|variance| 1.0 / variance.sqrt()));
-            let factor = (&scaled * covariance * &scaled).cholesky()?;
+            let factor = (&scaled * &covariance * &scaled).cholesky()?;
             Some(factor.l().try_inverse()? * scaled * sigma)
         };
-        let free = |lens: &Lens| if lens.parameters()[CENTRAL] == 0.0 { CENTRAL } else { LENS };
+        let free = |lens: &Lens| unknown_by(|parameter| lens.parameters()[parameter] != 0.0);
         let (pull, unknown) = match knowledge {
-            LensKnowledge::Exact => (None, [0, 0]),
+            LensKnowledge::Exact => (None, [Vec::new(), Vec::new()]),
             LensKnowledge::Free => (None, [free(&start.left), free(&start.right)]),
             LensKnowledge::Within { left, right } => {
                 (Some([root(left)?, root(right)?]), [unknown_within(left), unknown_within(right)])
@@ -99,27 +100,29 @@ impl LensPrior {
 
     /// The unknowns of the left lens and of the right one.
     pub fn numbers(&self) -> Vec<RigNumber> {
-        let of = |(side, unknown)| (0..unknown).map(move |parameter| RigNumber::Lens { side, parameter });
-        [Side::Left, Side::Right].into_iter().zip(self.unknown).flat_map(of).collect()
+        let of = |(side, unknown): (Side, &Vec<usize>)| -> Vec<RigNumber> {
+            unknown.iter().map(|&parameter| RigNumber::Lens { side, parameter }).collect()
+        };
+        [Side::Left, Side::Right].into_iter().zip(&self.unknown).flat_map(of).collect()
     }
 
     /// Number of unknowns of both lenses.
     pub fn dimension(&self) -> usize {
-        self.unknown.iter().sum()
+        self.unknown.iter().map(Vec::len).sum()
     }
 
     /// `lenses` moved by a step of the left lens's unknowns and then the right lens's.
     pub fn moved(&self, lenses: &Lenses, step: &[f64]) -> Lenses {
-        let [left, right] = self.unknown;
-        let part = |from: usize, count: usize| {
-            SVector::<f64, LENS>::from_fn(
-                |i, _| if i < count { step.get(from + i).copied().unwrap_or(0.0) } else { 0.0 },
-            )
+        let [left, right] = &self.unknown;
+        let part = |first: usize, unknown: &[usize]| {
+            let mut delta = SVector::<f64, LENS>::zeros();
+            unknown.iter().zip(step.iter().skip(first)).for_each(|(&parameter, by)| delta[parameter] = *by);
+            delta
         };
-        if left + right == 0 {
+        if self.dimension() == 0 {
             return *lenses;
         }
-        Lenses { left: lenses.left.moved(&part(0, left)), right: lenses.right.moved(&part(left, right)) }
+        Lenses { left: lenses.left.moved(&part(0, left)), right: lenses.right.moved(&part(left.len(), right)) }
     }
 
     /// Adds the pull of the lenses' own calibration; their columns begin at `column` of the shared block.
@@ -129,23 +132,29 @@ impl LensPrior {
             lenses.left.parameters() - self.start.left.parameters(),
             lenses.right.parameters() - self.start.right.parameters(),
         ];
-        for (side, (pull, lens_move)) in pull.iter().zip(&moves).enumerate() {
-            let (unknown, first) = (self.unknown[side], column + if side == 0 { 0 } else { self.unknown[0] });
-            let residual = pull * lens_move.rows(0, unknown);
-            for row in 0..unknown {
-                let mut shared = vec![[0.0]; first + unknown];
+        let mut first = column;
+        for ((pull, lens_move), unknown) in pull.iter().zip(&moves).zip(&self.unknown) {
+            let residual = pull * DVector::from_iterator(unknown.len(), unknown.iter().map(|&i| lens_move[i]));
+            for row in 0..unknown.len() {
+                let mut shared = vec![[0.0]; first + unknown.len()];
                 for (slot, derivative) in shared.iter_mut().skip(first).zip(pull.row(row).iter()) {
                     *slot = [*derivative];
                 }
                 equations.add_plain(&[residual[row]], &shared, &[[0.0]; POSE]);
             }
+            first += unknown.len();
         }
     }
 }
 
-/// How many parameters of a lens are unknown by this covariance.
-fn unknown_within(covariance: &SMatrix<f64, LENS, LENS>) -> usize {
-    if covariance[(CENTRAL, CENTRAL)] > 0.0 { LENS } else { CENTRAL }
+/// The parameters of a lens that are unknown by this covariance.
+fn unknown_within(covariance: &SMatrix<f64, LENS, LENS>) -> Vec<usize> {
+    unknown_by(|parameter| covariance[(parameter, parameter)] > 0.0)
+}
+
+/// The parameters of a central and symmetric lens, and of the others those that the lens `has`.
+fn unknown_by(has: impl Fn(usize) -> bool) -> Vec<usize> {
+    (0..LENS).filter(|&parameter| parameter < CENTRAL || has(parameter)).collect()
 }
 
 impl Pair {

@@ -5,7 +5,7 @@ use rayon::prelude::*;
 use vergence_vision::median;
 
 use super::bundle::{Bundle, SHARED, Shared};
-use super::lens::{CENTRAL, LENS};
+use super::lens::{CENTRAL, E0, E1, LENS};
 use super::observations::{FEWEST_CORNERS, FEWEST_VIEWS, Observation, ObservedView};
 use super::start::Start;
 use super::{IntrinsicsError, IntrinsicsOptions, Outlier, OutlierReason};
@@ -21,13 +21,14 @@ pub(super) struct State {
 }
 
 /// The optimum: lens, target poses, and which corners were used.
+#[derive(Clone)]
 pub(super) struct Adjusted {
     pub shared: Shared,
     /// The views used, with a flag for each corner.
     pub views: Vec<ObservedView>,
     pub poses: Vec<Isometry3<f64>>,
-    /// The parameters adjusted (indices into fx, fy, cx, cy, k1 to k4, e0, warp), in the order of the normal matrix.
-    pub free: &'static [usize],
+    /// The parameters adjusted (indices into those of the lens, then the warp), in the order of the normal matrix.
+    pub free: Vec<usize>,
     /// Over the parameters adjusted and the poses.
     pub normal: SchurNormal<POSE>,
     /// Variance by which the prior of e0 was weighted, over that of the residuals.
@@ -35,21 +36,29 @@ pub(super) struct Adjusted {
     pub outliers: Vec<Outlier>,
 }
 
-/// The parameters adjusted at each stage (indices into fx, fy, cx, cy, k1 to k4, e0, warp). The coefficients of higher
+/// The parameters adjusted at each stage (indices into those of the lens, then the warp). The coefficients of higher
 /// powers of θ follow once the lower ones are right.
 const FEW: [usize; 5] = [0, 1, 2, 3, 4];
 const CENTRAL_LENS: [usize; CENTRAL] = [0, 1, 2, 3, 4, 5, 6, 7];
-const CENTRAL_WITH_WARP: [usize; CENTRAL + 2] = [0, 1, 2, 3, 4, 5, 6, 7, 9, 10];
-const WITH_PUPIL: [usize; LENS] = [0, 1, 2, 3, 4, 5, 6, 7, 8];
-const WITH_PUPIL_AND_WARP: [usize; SHARED] = [0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10];
 
-/// The parameters adjusted at the end.
-pub(super) const fn free_parameters(pupil: bool, warp: bool) -> &'static [usize] {
-    match (pupil, warp) {
-        (false, false) => &CENTRAL_LENS,
-        (false, true) => &CENTRAL_WITH_WARP,
-        (true, false) => &WITH_PUPIL,
-        (true, true) => &WITH_PUPIL_AND_WARP,
+/// What a lens has besides the parameters of a central and symmetric one.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub(super) struct Terms {
+    pub e0: bool,
+    pub e1: bool,
+    pub asymmetry: bool,
+}
+
+impl Terms {
+    /// The parameters adjusted at the end.
+    pub fn free(self, warp: bool) -> Vec<usize> {
+        let has = |parameter: usize| match parameter {
+            E0 => self.e0,
+            E1 => self.e1,
+            LENS.. => warp,
+            other => other < CENTRAL || self.asymmetry,
+        };
+        (0..SHARED).filter(|&parameter| has(parameter)).collect()
     }
 }
 
@@ -182,7 +191,7 @@ impl Adjusted {
 pub(super) fn inlier_fit(
     mut views: Vec<ObservedView>,
     mut state: State,
-    free: &'static [usize],
+    free: Vec<usize>,
     prior: Option<PupilPrior>,
     options: &IntrinsicsOptions,
 ) -> Result<Adjusted, IntrinsicsError> {
@@ -198,7 +207,7 @@ pub(super) fn inlier_fit(
         let references: Vec<_> = views.iter().collect();
         let arrow = SchurOptions { iterations: 200, ..SchurOptions::default() };
         let pupil_pull = prior.and_then(|prior| prior.pull(&views, &state));
-        let problem = Bundle { pupil_pull, ..Bundle::of(&references, free) };
+        let problem = Bundle { pupil_pull, ..Bundle::of(&references, &free) };
         let solution = solve(&problem, state.shared, state.poses, &arrow);
         if matches!(solution.ending, Ending::Iterations | Ending::NotFinite) {
             return Err(IntrinsicsError::NotConverged);

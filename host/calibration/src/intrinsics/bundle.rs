@@ -3,7 +3,7 @@
 use nalgebra::{Isometry3, Point3, SVector, Vector3};
 use vergence_vision::Point;
 
-use super::lens::{CENTRAL, LENS, LensParameters, reproject};
+use super::lens::{E0, LENS, LensParameters, reproject};
 use super::observations::{Observation, ObservedView};
 use crate::reprojection::{POSE, moved};
 use crate::schur_lm::{Equations, SchurProblem};
@@ -57,21 +57,22 @@ impl Row {
         let [dx, dy, dz] = projected.by_point;
         let along = |d: &Vector3<f64>| [0, 1].map(|row| dx[row] * d.x + dy[row] * d.y + dz[row] * d.z);
         let by_height = along(&(pose.rotation * Vector3::z()));
-        let [fx, fy, cx, cy, k1, k2, k3, k4, e0] = projected.by_lens;
-        let [warp_x, warp_y] = observation.bow.map(|bow| by_height.map(|d| bow * d));
+        let mut by_shared = [[0.0; 2]; SHARED];
+        by_shared[..LENS].copy_from_slice(&projected.by_lens);
+        by_shared[LENS..].copy_from_slice(&observation.bow.map(|bow| by_height.map(|d| bow * d)));
         // ∂(exp(ω) p)/∂ωᵢ = eᵢ × p.
         let [turn_x, turn_y, turn_z] =
             [Vector3::x(), Vector3::y(), Vector3::z()].map(|axis: Vector3<f64>| along(&axis.cross(&turned)));
         Some(Self {
             residual: [projected.pixel[0] - observation.pixel[0], projected.pixel[1] - observation.pixel[1]],
-            by_shared: [fx, fy, cx, cy, k1, k2, k3, k4, e0, warp_x, warp_y],
+            by_shared,
             by_pose: [turn_x, turn_y, turn_z, dx, dy, dz],
         })
     }
 }
 
-/// The problem over the used corners of `views`, with only the parameters in `free` (indices into fx, fy, cx, cy, k1 to
-/// k4, e0, warp) adjusted.
+/// The problem over the used corners of `views`, with only the parameters in `free` (indices into those of the lens, then the warp)
+/// adjusted.
 pub(super) struct Bundle<'a> {
     pub views: &'a [&'a ObservedView],
     pub free: &'a [usize],
@@ -112,8 +113,8 @@ impl SchurProblem<POSE> for Bundle<'_> {
     fn shared_residuals(&self, shared: &Shared, equations: &mut Equations<POSE>) {
         let Some(pull) = self.pupil_pull else { return };
         let columns: Vec<[f64; 1]> =
-            self.free.iter().map(|&parameter| [if parameter == CENTRAL { pull } else { 0.0 }]).collect();
-        equations.add_plain(&[pull * shared.lens.pupil_mm], &columns, &[[0.0]; POSE]);
+            self.free.iter().map(|&parameter| [if parameter == E0 { pull } else { 0.0 }]).collect();
+        equations.add_plain(&[pull * shared.lens.pupil.e0.mm()], &columns, &[[0.0]; POSE]);
     }
 
     fn shared_plus(&self, shared: &Shared, step: &[f64]) -> Shared {
@@ -155,7 +156,8 @@ mod tests {
 
     /// The reprojection with its unknowns (lens, warp, turn, shift) as dual numbers.
     fn reprojected(unknowns: [Dual64; SHARED + POSE], pose: &Isometry3<f64>, observation: &Observation) -> [Dual64; 2] {
-        let [fx, fy, cx, cy, k1, k2, k3, k4, e0, warp_x, warp_y, a, b, c, dx, dy, dz] = unknowns;
+        let [fx, fy, cx, cy, k1, k2, k3, k4, e0, e1, p1, p2, s0, s1, s2, s3, warp_x, warp_y, a, b, c, dx, dy, dz] =
+            unknowns;
         let height = warp_x * observation.bow[0] + warp_y * observation.bow[1];
         let axes = pose.rotation.to_rotation_matrix().into_inner();
         let flat: Dual3 = std::array::from_fn(|i| {
@@ -169,12 +171,17 @@ mod tests {
         for _ in 0..8 {
             // Newton's steps on ρ cos θ - (z - e) sin θ; near the root the slope's own derivative does not matter.
             let (sine, cosine) = theta.sin_cos();
-            let (e, slope) = ((theta / sine - 1.0) * e0, (sine - theta * cosine) / (sine * sine) * e0);
+            let growth = e0 + e1 * theta * theta;
+            let slope = (sine - theta * cosine) / (sine * sine) * growth + (theta / sine - 1.0) * e1 * theta * 2.0;
+            let e = (theta / sine - 1.0) * growth;
             theta += (rho * cosine - (z - e) * sine) / (rho * sine + (z - e) * cosine - slope * sine);
         }
         let s = theta * theta;
         let scale = theta * ((((k4 * s + k3) * s + k2) * s + k1) * s + 1.0) / rho;
-        [cx + fx * scale * x, cy + fy * scale * y]
+        let (m, n) = (scale * x, scale * y);
+        let (square, along) = (m * m + n * n, (m * p1 + n * p2) * 2.0);
+        let (u, v) = (s0 + s1 * square + p1, s2 + s3 * square + p2);
+        [cx + fx * (m + along * m + u * square), cy + fy * (n + along * n + v * square)]
     }
 
     proptest! {
@@ -186,10 +193,13 @@ mod tests {
             bow in prop::array::uniform2(0.0..1.0),
             warp_mm in prop::array::uniform2(-3.0..3.0),
             pupil_mm in prop_oneof![Just(0.0), -1.0..3.0],
+            [e1, p1, p2, s0, s1, s2, s3] in prop_oneof![Just([0.0; 7]), prop::array::uniform7(-0.01..0.01)],
         ) {
             let pose = Isometry3::new(Vector3::new(x, y, z), Vector3::from(turn));
             let observation = Observation { target, bow, pixel: [0.0; 2], relative_sigma: 1.0, index: 0, used: true };
-            let lens = LensParameters::from_array([300.0, 310.0, 600.0, 500.0, 0.02, -0.01, 0.004, -0.001, pupil_mm]);
+            let central = [300.0, 310.0, 600.0, 500.0, 0.02, -0.01, 0.004, -0.001];
+            let [fx, fy, cx, cy, k1, k2, k3, k4] = central;
+            let lens = LensParameters::from_array([fx, fy, cx, cy, k1, k2, k3, k4, pupil_mm, 10.0 * e1, p1, p2, s0, s1, s2, s3]);
             let shared = Shared { lens, warp_mm };
             let projected = pose * shared.on_target(&observation);
             // Where the derivatives are not huge: away from the camera and from the direction straight behind it.

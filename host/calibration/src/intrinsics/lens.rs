@@ -1,15 +1,19 @@
 //! The lens as calibration sees it: a projection without limits of the field, its derivatives, and the valid cone of the
 //! result.
 
+use nalgebra::Vector2;
 use vergence_vision::{
-    Angle, Camera, ImageSize, InvalidLens, KannalaBrandt, LENS_PARAMETERS, Length, OpenCvFisheye, Point,
-    angle_of_point, pupil_shift,
+    Angle, Asymmetry, CENTRAL_PARAMETERS, Camera, ImageSize, InvalidLens, KannalaBrandt, LENS_PARAMETERS,
+    OpenCvFisheye, Point, Pupil,
 };
 
-/// fx, fy, cx, cy, k1 to k4, and the pupil's e0.
+/// The parameters of a lens, in the order of [`LENS_PARAMETERS`].
 pub(crate) const LENS: usize = LENS_PARAMETERS;
-/// The parameters of a central lens: those before e0.
-pub(crate) const CENTRAL: usize = LENS - 1;
+/// The parameters of a central and symmetric lens: those before e0.
+pub(crate) const CENTRAL: usize = CENTRAL_PARAMETERS;
+/// Index of the pupil's e0, and of e1.
+pub(crate) const E0: usize = CENTRAL;
+pub(crate) const E1: usize = CENTRAL + 1;
 
 /// Below this angle to the axis the series of the projection replaces quotients of small numbers.
 const PARAXIAL: f64 = 1e-4;
@@ -19,8 +23,10 @@ const PARAXIAL: f64 = 1e-4;
 pub struct LensParameters {
     /// fx, fy, cx, cy, k1 to k4.
     pub central: OpenCvFisheye,
-    /// The coefficient e0 of the pupil's shift in millimetres; zero of a central lens.
-    pub pupil_mm: f64,
+    /// How the pupil moves.
+    pub pupil: Pupil,
+    /// Decentring and thin prism.
+    pub asymmetry: Asymmetry,
 }
 
 /// A projected pixel and its derivatives, column by column: `by_lens[i]` is the derivative of (u, v) by parameter i.
@@ -28,7 +34,7 @@ pub struct LensParameters {
 pub struct Reprojection {
     /// u and v, in pixels.
     pub pixel: [f64; 2],
-    /// Derivatives by fx, fy, cx, cy, k1, k2, k3, k4 and the pupil's e0.
+    /// Derivatives by the parameters, in the order of [`LENS_PARAMETERS`].
     pub by_lens: [[f64; 2]; LENS],
     /// Derivatives by the point's x, y and z in the camera frame, in pixels per millimetre.
     pub by_point: [[f64; 2]; 3],
@@ -39,17 +45,17 @@ pub struct Reprojection {
 /// The four free ratios k1 to k4 over fx, fy are the five-coefficient form of [`vergence_vision::KannalaBrandt`]
 /// rescaled: its coefficients in pixels are fx (1, k1, k2, k3, k4), and its aspect is fy / fx. `None` at the optical
 /// centre and straight behind it, where the direction of the image radius is not defined, and for a point nearer to a moving pupil than
-/// [`angle_of_point`] allows.
+/// [`Pupil::angle_of_point`] allows.
 #[must_use]
 pub fn reproject(lens: impl Into<LensParameters>, point: &Point<Camera>) -> Option<Reprojection> {
-    let LensParameters { central: lens, pupil_mm } = lens.into();
+    let LensParameters { central: lens, pupil, asymmetry } = lens.into();
     let [x, y, z]: [f64; 3] = point.mm().into();
     let across = x * x + y * y;
     let (rho, square) = (across.sqrt(), across + z * z);
     if !square.is_normal() || (rho == 0.0 && z < 0.0) {
         return None;
     }
-    let seen = if pupil_mm == 0.0 { None } else { Some(Seen::by_pupil(pupil_mm, rho, z)?) };
+    let seen = if pupil.is_fixed() { None } else { Some(Seen::by_pupil(&pupil, rho, z)?) };
     let theta = seen.as_ref().map_or_else(|| rho.atan2(z), |seen| seen.theta);
     let [k1, k2, k3, k4] = lens.k;
     let t = theta * theta;
@@ -69,13 +75,19 @@ pub fn reproject(lens: impl Into<LensParameters>, point: &Point<Camera>) -> Opti
         (scale, (outward - scale) / across, theta / rho)
     };
     let (fx, fy) = (lens.fx, lens.fy);
-    // ∂θ/∂e0 = (θ / sin θ - 1) sin θ / D.
-    let pupil = along * pupil_shift(theta);
+    // ∂θ/∂ej = Ej sin θ / D.
+    let by_pupil = Pupil::by_coefficients(Angle::from_rad(theta)).map(|by| {
+        let pupil = along * by;
+        [fx * x * pupil, fy * y * pupil]
+    });
     let power = |exponent: i32| {
         let share = angle_scale * t.powi(exponent);
         [fx * x * share, fy * y * share]
     };
-    Some(Reprojection {
+    let place = Vector2::new(scale * x, scale * y);
+    let by_asymmetry = Asymmetry::by_coefficients(place);
+    let [p1, p2, s0, s1, s2, s3] = std::array::from_fn(|i| [fx * by_asymmetry[(0, i)], fy * by_asymmetry[(1, i)]]);
+    let symmetric = Reprojection {
         pixel: [lens.cx + fx * scale * x, lens.cy + fy * scale * y],
         by_lens: [
             [scale * x, 0.0],
@@ -86,14 +98,37 @@ pub fn reproject(lens: impl Into<LensParameters>, point: &Point<Camera>) -> Opti
             power(2),
             power(3),
             power(4),
-            [fx * x * pupil, fy * y * pupil],
+            by_pupil[0],
+            by_pupil[1],
+            p1,
+            p2,
+            s0,
+            s1,
+            s2,
+            s3,
         ],
         by_point: [
             [fx * (scale + x * x * bend), fy * x * y * bend],
             [fx * x * y * bend, fy * (scale + y * y * bend)],
             [-fx * x * along, -fy * y * along],
         ],
-    })
+    };
+    Some(if asymmetry.is_zero() { symmetric } else { symmetric.displaced(&lens, &asymmetry, place) })
+}
+
+impl Reprojection {
+    /// The reprojection by a symmetric lens, which images the point at `place` in focal lengths, made that of one which is not.
+    fn displaced(mut self, lens: &OpenCvFisheye, asymmetry: &Asymmetry, place: Vector2<f64>) -> Self {
+        let OpenCvFisheye { fx, fy, cx, cy, .. } = *lens;
+        let (arrived, bend) = (asymmetry.moved(place), asymmetry.by_place(place));
+        self.pixel = [cx + fx * arrived.x, cy + fy * arrived.y];
+        (self.by_lens[0], self.by_lens[1]) = ([arrived.x, 0.0], [0.0, arrived.y]);
+        for column in self.by_lens[4..=E1].iter_mut().chain(&mut self.by_point) {
+            let by = bend * Vector2::new(column[0] / fx, column[1] / fy);
+            *column = [fx * by.x, fy * by.y];
+        }
+        self
+    }
 }
 
 /// How a point is seen by a lens whose pupil moves: the angle θ to the axis and its derivatives.
@@ -106,8 +141,8 @@ struct Seen {
 }
 
 impl Seen {
-    fn by_pupil(pupil_mm: f64, rho: f64, z: f64) -> Option<Self> {
-        let (theta, slope) = angle_of_point(pupil_mm, rho, z)?;
+    fn by_pupil(pupil: &Pupil, rho: f64, z: f64) -> Option<Self> {
+        let (theta, slope) = pupil.angle_of_point(rho, z)?;
         if theta < PARAXIAL {
             // The pupil is at the origin there.
             let square = rho * rho + z * z;
@@ -122,20 +157,26 @@ impl LensParameters {
     /// The parameters of `camera`.
     #[must_use]
     pub fn of(camera: &KannalaBrandt) -> Self {
-        Self { central: camera.to_opencv(), pupil_mm: camera.pupil().mm() }
+        Self { central: camera.to_opencv(), pupil: camera.pupil(), asymmetry: camera.asymmetry() }
     }
 
-    /// The parameters as one array: fx, fy, cx, cy, k1 to k4, e0.
+    /// The parameters as one array, in the order of [`LENS_PARAMETERS`].
     #[must_use]
     pub const fn to_array(&self) -> [f64; LENS_PARAMETERS] {
         let OpenCvFisheye { fx, fy, cx, cy, k: [k1, k2, k3, k4] } = self.central;
-        [fx, fy, cx, cy, k1, k2, k3, k4, self.pupil_mm]
+        let ([e0, e1], [p1, p2, s0, s1, s2, s3]) = (self.pupil.mm(), self.asymmetry.to_array());
+        [fx, fy, cx, cy, k1, k2, k3, k4, e0, e1, p1, p2, s0, s1, s2, s3]
     }
 
     /// The lens of [`Self::to_array`].
     #[must_use]
-    pub const fn from_array([fx, fy, cx, cy, k1, k2, k3, k4, pupil_mm]: [f64; LENS_PARAMETERS]) -> Self {
-        Self { central: OpenCvFisheye { fx, fy, cx, cy, k: [k1, k2, k3, k4] }, pupil_mm }
+    pub const fn from_array(parameters: [f64; LENS_PARAMETERS]) -> Self {
+        let [fx, fy, cx, cy, k1, k2, k3, k4, e0, e1, asymmetry @ ..] = parameters;
+        Self {
+            central: OpenCvFisheye { fx, fy, cx, cy, k: [k1, k2, k3, k4] },
+            pupil: Pupil::from_mm([e0, e1]),
+            asymmetry: Asymmetry::from_array(asymmetry),
+        }
     }
 
     /// The lens with the field up to `theta_max` on a sensor of `size`.
@@ -143,13 +184,14 @@ impl LensParameters {
     /// # Errors
     /// [`InvalidLens`] where no lens has these parameters.
     pub fn camera(&self, theta_max: Angle, size: ImageSize) -> Result<KannalaBrandt, InvalidLens> {
-        KannalaBrandt::from_opencv(self.central, theta_max, size)?.with_pupil(Length::from_mm(self.pupil_mm))
+        let symmetric = KannalaBrandt::from_opencv(self.central, theta_max, size)?.with_pupil(self.pupil)?;
+        symmetric.with_asymmetry(self.asymmetry)
     }
 }
 
 impl From<OpenCvFisheye> for LensParameters {
     fn from(central: OpenCvFisheye) -> Self {
-        Self { central, pupil_mm: 0.0 }
+        Self { central, pupil: Pupil::default(), asymmetry: Asymmetry::default() }
     }
 }
 

@@ -3,22 +3,27 @@
 //! 1. A linear start on bearings (`start`).
 //! 2. A robust joint adjustment of lens and target poses that finds outliers (`adjust`).
 //! 3. Plain least squares on the remaining corners: the result and its covariance.
-//! 4. The same with a pupil that moves (`pupil`), where the views ask for one.
+//! 4. The same with a pupil that moves (`pupil`), and with elements off the axis (`ladder`), where the views ask for them.
 
 mod adjust;
 mod bundle;
+mod ladder;
 mod lens;
+mod model;
 mod observations;
 mod pupil;
 mod report;
 mod result;
 mod start;
+mod trial;
 
 use vergence_vision::{ImageSize, OpenCvFisheye};
 
+pub use ladder::{LensStep, StepEvidence};
 pub(crate) use lens::{CENTRAL, LENS};
 pub use lens::{LensParameters, Reprojection, reproject};
-pub use pupil::{LensModel, PupilEvidence, UnknownLensModel};
+pub use model::{LensModel, UnknownLensModel};
+pub use pupil::PupilEvidence;
 pub use result::{
     IntrinsicsCalibration, IntrinsicsError, Outlier, OutlierReason, Parameter, TargetWarp, ViewFigures, ViewPose,
 };
@@ -37,13 +42,13 @@ pub struct IntrinsicsOptions {
     /// A corner farther from its reprojection than this many times the median distance, both in units of their relative
     /// sigmas, is left out. `None` keeps every corner: plain least squares over all.
     pub outlier_factor: Option<f64>,
-    /// Whether the lens has a pupil that moves.
+    /// Which parameters the lens has besides those of a central and symmetric one.
     pub model: LensModel,
 }
 
 impl Default for IntrinsicsOptions {
     /// A flat target and 6 median distances: for Gaussian noise of standard deviation σ per axis the median distance is
-    /// 1.18 σ, so the limit is 7 σ and noise is never left out. The views decide whether the pupil moves.
+    /// 1.18 σ, so the limit is 7 σ and noise is never left out. The views decide on the lens.
     fn default() -> Self {
         Self { warp: false, outlier_factor: Some(6.0), model: LensModel::ByEvidence }
     }
@@ -71,8 +76,8 @@ pub fn calibrate_intrinsics(
     let (observed_views, left_out) = observed_views(views)?;
     let thinned: Vec<_> = observed_views.iter().map(ObservedView::thinned).collect();
     let state = robust_fit(&thinned, &starts(&thinned, size)).ok_or(IntrinsicsError::NoStart)?;
-    let (adjusted, pupil) = pupil::fit(observed_views, state, options)?;
-    report(views, size, &adjusted, pupil, left_out)
+    let (adjusted, evidence) = ladder::fit(observed_views, state, size, options)?;
+    report(views, size, &adjusted, evidence, left_out)
 }
 
 /// As [`calibrate_intrinsics`], but starts at the central lens `start`: to update an old calibration.
@@ -88,6 +93,6 @@ pub fn refine_intrinsics(
     let thinned: Vec<_> = observed_views.iter().map(ObservedView::thinned).collect();
     let start = start_from(start, &thinned, size).ok_or(IntrinsicsError::NoStart)?;
     let state = robust_fit(&thinned, &[start]).ok_or(IntrinsicsError::NoStart)?;
-    let (adjusted, pupil) = pupil::fit(observed_views, state, options)?;
-    report(views, size, &adjusted, pupil, left_out)
+    let (adjusted, evidence) = ladder::fit(observed_views, state, size, options)?;
+    report(views, size, &adjusted, evidence, left_out)
 }

@@ -5,12 +5,11 @@ use vergence_targets::TargetView;
 use vergence_vision::{Angle, Camera, ImageSize, Point, Transform};
 
 use super::adjust::Adjusted;
-use super::lens::LENS;
-use super::lens::with_valid_cone;
+use super::ladder::Evidence;
+use super::lens::{LENS, with_valid_cone};
 use super::observations::{Observation, ObservedView};
 use super::{
-    IntrinsicsCalibration, IntrinsicsError, Outlier, OutlierReason, Parameter, PupilEvidence, TargetWarp, ViewFigures,
-    ViewPose,
+    IntrinsicsCalibration, IntrinsicsError, Outlier, OutlierReason, Parameter, TargetWarp, ViewFigures, ViewPose,
 };
 use crate::schur_lm::Clustered;
 
@@ -19,7 +18,7 @@ pub(super) fn report(
     given: &[TargetView],
     size: ImageSize,
     adjusted: &Adjusted,
-    pupil: PupilEvidence,
+    evidence: Evidence,
     mut outliers: Vec<Outlier>,
 ) -> Result<IntrinsicsCalibration, IntrinsicsError> {
     let tilt_spread = check_tilts(adjusted)?;
@@ -49,7 +48,8 @@ pub(super) fn report(
     Ok(IntrinsicsCalibration {
         camera,
         opencv: lens.central,
-        pupil,
+        pupil: evidence.pupil,
+        steps: evidence.steps,
         covariance: lens_part(adjusted, &covariances.shared.covariance),
         noise_covariance: lens_part(adjusted, &covariances.noise),
         view_scatter: covariances.shared.scatter,
@@ -81,7 +81,8 @@ fn between(a: &Vector3<f64>, b: &Vector3<f64>) -> f64 {
     a.cross(b).norm().atan2(a.dot(b).abs())
 }
 
-fn outermost(adjusted: &Adjusted) -> Angle {
+/// The angle to the axis of the outermost corner used.
+pub(super) fn outermost(adjusted: &Adjusted) -> Angle {
     let angle = |pose: &nalgebra::Isometry3<f64>, observation: &Observation| {
         let point: Point<Camera> = Point::from_mm((pose * adjusted.shared.on_target(observation)).coords);
         point.direction().map_or(0.0, |ray| ray.angle_to_axis().rad())

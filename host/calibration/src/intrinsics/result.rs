@@ -6,8 +6,8 @@ use nalgebra::SMatrix;
 use vergence_targets::Target;
 use vergence_vision::{Camera, InvalidLens, KannalaBrandt, OpenCvFisheye, Transform};
 
-use super::PupilEvidence;
 use super::lens::{LENS, LensParameters};
+use super::{PupilEvidence, StepEvidence};
 
 /// A calibrated lens.
 #[derive(Clone, Debug, PartialEq)]
@@ -15,13 +15,16 @@ pub struct IntrinsicsCalibration {
     /// The lens with its valid cone: the angle to the axis of the outermost corner used and 5 % more, but less than the
     /// angle where r(θ) stops growing.
     pub camera: KannalaBrandt,
-    /// The same lens in the parameters that were estimated, without its pupil. [`KannalaBrandt`] holds them rescaled: its five
+    /// The same lens in the parameters that were estimated, without its pupil and its asymmetry. [`KannalaBrandt`] holds them rescaled: its five
     /// coefficients are fx (1, k1, k2, k3, k4) in pixels, its aspect is fy / fx.
     pub opencv: OpenCvFisheye,
-    /// What the views say of the pupil; its e0 is that of `camera`.
+    /// What the views say of the pupil; its coefficients are those of `camera`.
     pub pupil: PupilEvidence,
-    /// Covariance of fx, fy, cx, cy (pixels), k1 to k4 and e0 (mm; zero of a central lens), target poses marginalised, as the views scatter: it counts that the
-    /// corners of a view err together, because the lens is not quite of the model's family or the target bends
+    /// What the views say of richer lenses, in the order of the trials.
+    pub steps: Vec<StepEvidence>,
+    /// Covariance of the parameters in the order of [`LENS_PARAMETERS`](vergence_vision::LENS_PARAMETERS), zero of those that the lens does not
+    /// have, target poses marginalised, as the views scatter: it counts that the corners of a view err together, because the lens is not
+    /// quite of the model's family or the target bends
     /// ([`crate::schur_lm::SchurNormal::clustered`]).
     pub covariance: SMatrix<f64, LENS, LENS>,
     /// The same if the errors of all corners were independent of each other: noise alone.
@@ -59,7 +62,7 @@ impl IntrinsicsCalibration {
     /// The parameters that were estimated, in the order of the covariance.
     #[must_use]
     pub const fn lens(&self) -> LensParameters {
-        LensParameters { central: self.opencv, pupil_mm: self.camera.pupil().mm() }
+        LensParameters { central: self.opencv, pupil: self.camera.pupil(), asymmetry: self.camera.asymmetry() }
     }
 }
 

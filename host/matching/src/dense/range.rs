@@ -125,6 +125,9 @@ mod tests {
 
     use super::*;
 
+    /// Of fx, fy, cx, cy and k1 to k4.
+    const SIGMAS: [f64; 8] = [0.3, 0.3, 0.2, 0.2, 1e-3, 1e-3, 1e-4, 1e-5];
+
     /// Compares ranges, and the part of their variance from the pose, with those of single points in `vergence_vision`.
     #[test]
     fn ranges_and_their_sigma_agree_with_single_points() {
@@ -139,9 +142,10 @@ mod tests {
         let shared = SharedCovariance::exact().with_pose(&pose);
         let pair = StereoPair { left: &lens, right: &lens, left_from_right };
         let finder = RangeFinder::new(&frame, &pair, &shared);
-        let by_lens = SMatrix::<f64, LENS_PARAMETERS, LENS_PARAMETERS>::from_diagonal(
-            &[0.3, 0.3, 0.2, 0.2, 1e-3, 1e-3, 1e-4, 1e-5, 0.0].map(|sigma: f64| sigma.powi(2)).into(),
-        );
+        let by_lens =
+            SMatrix::<f64, LENS_PARAMETERS, LENS_PARAMETERS>::from_diagonal(&nalgebra::SVector::from_fn(|i, _| {
+                SIGMAS.get(i).map_or(0.0, |sigma: &f64| sigma.powi(2))
+            }));
         let uncertain = shared.with_lenses([&by_lens, &by_lens]);
         let with_lenses = RangeFinder::new(&frame, &pair, &uncertain);
         for [x, y, z] in [[0.0, 0.0, 400.0], [300.0, -200.0, 900.0], [-500.0, 700.0, 300.0], [100.0, 900.0, -100.0]] {

@@ -4,6 +4,8 @@ use vergence_page::{
     Anchor, Axes, Cell, Drawing, Path, Row, count, escape, figure, figures, fixed, note, picture, table, text,
 };
 
+use vergence_scene::LensChoice;
+
 use super::{Findings, jpeg};
 use crate::error::ReproduceError;
 use crate::method::Method;
@@ -74,9 +76,14 @@ fn circumstances(findings: &Findings<'_>) -> String {
     } else {
         "NOT the whole chain: corners are projected and moved by Gaussian noise, nothing is rendered or detected"
     };
+    let cameras = match findings.lens {
+        LensChoice::Ideal => "the simulated cameras are exactly of the kind that the calibration assumes".to_owned(),
+        lens => {
+            format!("the simulated cameras look through {lens}, a published design that the calibration does not know")
+        }
+    };
     format!(
-        "No hardware was used: everything here is simulated, and the simulated cameras are exactly of the kind that \
-         the calibration assumes. {corners}; they are off by {} px in u and v (root mean square, against the truth; \
+        "No hardware was used: everything here is simulated, and {cameras}. {corners}; they are off by {} px in u and v (root mean square, against the truth; \
          the rigs themselves say {}). Each of {} rigs has its own lenses and its own imperfect mechanism, and is \
          calibrated from such views alone. The paper's figures come from its hardware, with lenses, noise and a \
          calibration that we do not know: they stand beside ours for orientation, not as a comparison of methods.",

@@ -1,7 +1,7 @@
 //! The numbers of a rig with screw chains that a calibration determines, and how the relative pose follows them.
 
 use nalgebra::{Isometry3, Matrix6xX, Translation3, UnitQuaternion, Vector3, Vector6};
-use vergence_vision::{Frame, LENS_PARAMETERS, Left, Point, Right, Side, Transform};
+use vergence_vision::{Frame, LENS_PARAMETER_NAMES, LENS_PARAMETERS, Left, Point, Right, Side, Transform};
 
 use crate::chain::{Chain, Screw};
 use crate::pose::difference;
@@ -10,7 +10,7 @@ use crate::rig::Rig;
 /// A number of a rig. `component` is 0, 1 or 2: along x, y or z of the base frame.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum RigNumber {
-    /// A lens parameter, numbered as fx, fy, cx, cy in pixels, k1 to k4 as defined by OpenCV fisheye, and the pupil's e0 in mm.
+    /// A lens parameter, numbered as in [`LENS_PARAMETER_NAMES`].
     Lens {
         /// The camera.
         side: Side,
@@ -52,9 +52,6 @@ pub enum RigNumber {
     },
 }
 
-/// Names of the lens parameters in files.
-const LENS: [&str; LENS_PARAMETERS] =
-    ["fx", "fy", "cx", "cy", "opencv_k1", "opencv_k2", "opencv_k3", "opencv_k4", "pupil_e0_mm"];
 /// Names of the components in files.
 const COMPONENTS: [&str; 3] = ["x", "y", "z"];
 
@@ -83,7 +80,7 @@ impl RigNumber {
         let of = |component: usize| COMPONENTS.get(component).copied().unwrap_or("?");
         match self {
             Self::Lens { side, parameter } => {
-                format!("{side}.camera.{}", LENS.get(parameter).copied().unwrap_or("?"))
+                format!("{side}.camera.{}", LENS_PARAMETER_NAMES.get(parameter).copied().unwrap_or("?"))
             }
             Self::ScrewDirection { side, screw, component } => {
                 format!("{side}.screw.{screw}.direction.{}", of(component))

@@ -84,8 +84,10 @@ pub fn run(args: &Args, console: Console) -> Result<(), Failure> {
             if file.cameras.right.is_some() && format != CameraFormat::Kalibr {
                 return Err(Failure::usage("the camchain holds a pair; only --to kalibr can hold one"));
             }
-            if format != CameraFormat::Toml && !file.cameras.left.is_central() {
-                console.warn("the pupil of the lens moves, which the format cannot say: see the comment in the file that is written");
+            if format != CameraFormat::Toml && !file.cameras.left.fits_opencv() {
+                console.warn(
+                    "the pupil of the lens moves or it is not symmetric, which the format cannot say: see the comment in the file that is written",
+                );
             }
             if format != CameraFormat::Toml && file.shutter() != Shutter::Global {
                 console.warn("the file that is written says nothing of the rolling shutter (line_time)");

@@ -9,17 +9,18 @@ use serde_json::{Value, json};
 use vergence_files::make_folder;
 use vergence_output::check_folder;
 use vergence_protocol::SessionId;
-use vergence_reproduce::DemoError;
 use vergence_reproduce::corridor::{Comparison, Corridor, Sight, WIDTH, compare};
 use vergence_reproduce::demo::{Pulse, SimulatedPair};
+use vergence_reproduce::{DemoError, LensedRig, TRUE_LENS};
 use vergence_rig::{Rig, rounded};
+use vergence_scene::LensChoice;
 
 use crate::cli::CommonOptions;
 use crate::console::Console;
 use crate::failure::Failure;
 use crate::interrupt::{interrupted, on_own_thread};
 use crate::rig_file;
-use crate::sim::{SharedRig, SimulatedRig, SimulatedRobot, board_of};
+use crate::sim::{SharedRig, SimulatedRig, SimulatedRobot, board_of, lensed};
 use crate::stopwatch::{Stopwatch, clock};
 
 /// Starts a simulated rig in a simulated room, homes it, and in every mode of the rig takes a pair of images, measures it and
@@ -31,6 +32,11 @@ pub struct Args {
     /// Sets where the stages stand at first and the noise of the images. The same seed gives the same bytes.
     #[arg(long, default_value_t = 1)]
     seed: u64,
+    /// The lenses of the simulated cameras: a published design that is traced, sigma8_f18 or nikkor6_f28, or ideal, as the rig's file has
+    /// them. Without it sigma8_f18, and ideal ones of a rig with a trunk. A rig with traced lenses is calibrated first, from simulated targets,
+    /// and measured by the file that this gives, rig.toml.
+    #[arg(long, conflicts_with = "corridors")]
+    lens: Option<LensChoice>,
     /// The folder for clouds and pictures.
     #[arg(long, default_value = "vergence-demo", value_name = "DIR")]
     out: PathBuf,
@@ -59,7 +65,9 @@ pub async fn run(args: &Args, common: &CommonOptions, console: Console) -> Resul
         return compared(count, rig, console, &whole).await;
     }
     make_folder(&args.out)?;
-    if rig.trunk.is_some() {
+    let lens = args.lens.unwrap_or(if rig.trunk.is_some() { LensChoice::Ideal } else { TRUE_LENS });
+    // Other lenses of a trunk are refused below.
+    if rig.trunk.is_some() && lens == LensChoice::Ideal {
         return corridor(args, rig, console, &whole).await;
     }
     let (all, measured) = (rig.modes.len(), Cell::new(0));
@@ -71,10 +79,10 @@ pub async fn run(args: &Args, common: &CommonOptions, console: Console) -> Resul
             measured.get(),
             args.out.display()
         ))),
-        modes = every_mode(args, common, rig, &measured, console) => modes,
+        modes = every_mode(args, lens, common, rig, &measured, console) => modes,
     }?;
     console.say(format!("clouds and pictures are in {}; {:.1} s in all", args.out.display(), whole.seconds()))?;
-    console.result(&json!({ "modes": modes, "seconds": rounded(whole.seconds()) }))
+    console.result(&json!({ "lens": lens.to_string(), "modes": modes, "seconds": rounded(whole.seconds()) }))
 }
 
 /// Plays the robot's story in a simulated corridor.
@@ -144,15 +152,17 @@ async fn compared(count: u32, rig: Rig, console: Console, whole: &Stopwatch) -> 
 /// Homes the rig and measures in every mode; counts them in `measured`.
 async fn every_mode(
     args: &Args,
+    lens: LensChoice,
     common: &CommonOptions,
-    rig: Rig,
+    drawn: Rig,
     measured: &Cell<usize>,
     console: Console,
 ) -> Result<Vec<Value>, Failure> {
-    let simulated = SharedRig::new(SimulatedRig::new(&rig, args.seed)?);
+    let LensedRig { lenses, known, .. } = lensed(&drawn, (lens, args.seed), Some(&args.out), console).await?;
+    let simulated = SharedRig::new(SimulatedRig::new(&drawn, args.seed)?);
     let (session, progress) = (SessionId((args.seed as u32).max(1)), console.progress("homing"));
-    let mut board = board_of(&simulated, rig, session, common.lease, progress.clone()).await?;
-    let cameras = Arc::new(SimulatedPair::new(board.rig(), &simulated, args.seed));
+    let mut board = board_of(&simulated, known, session, common.lease, progress.clone()).await?;
+    let cameras = Arc::new(SimulatedPair::new(lenses, &simulated, args.seed));
     let modes = board.armed(pending(), async |board| -> Result<_, Failure> {
         board.home().await?;
         let mut modes = Vec::new();

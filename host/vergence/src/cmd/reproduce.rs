@@ -1,5 +1,7 @@
 //! `vergence reproduce`: the paper's tables in one command.
 
+mod mismatch;
+
 use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex};
 
@@ -40,9 +42,14 @@ pub struct Args {
     /// `rendered` photographs, where the detector finds the corners, or only corners that are `projected`, with noise: quick.
     #[arg(long, default_value = "rendered")]
     corners: Corners,
-    /// The true lenses of the bench: ideal, or a published design that is traced, sigma8_f18 or nikkor6_f28.
-    #[arg(long, default_value_t)]
-    lens: LensChoice,
+    /// The true lenses of the bench: ideal, or a published design that is traced, sigma8_f18 or nikkor6_f28. Without it ideal, with
+    /// --mismatch sigma8_f18.
+    #[arg(long)]
+    lens: Option<LensChoice>,
+    /// Instead tries worlds that are not as the calibration assumes: traced lenses, displaced elements, a bent target, uneven mechanics and
+    /// others, each by itself, and writes what each costs, and whether the rig's own statement says so, to mismatch.html. Corners are projected.
+    #[arg(long, conflicts_with_all = ["noisy_seeds", "corners", "samples", "no_matching"])]
+    mismatch: bool,
     /// Samples for each point of the study of triangulation.
     #[arg(long, default_value_t = 20_000, value_parser = clap::value_parser!(u32).range(100..=10_000_000))]
     samples: u32,
@@ -64,13 +71,16 @@ struct Stage(Arc<Mutex<String>>);
 pub async fn run(args: &Args, console: Console) -> Result<(), Failure> {
     let whole = Stopwatch::start();
     make_folder(&args.out)?;
+    if args.mismatch {
+        return mismatch::run(args, console, &whole).await;
+    }
     let learned = if args.no_matching { None } else { args.matching.learned(console)? };
     let stage = Stage::new("driving the rigs");
     let plan = Plan {
         seeds: args.seeds,
         noisy_seeds: args.noisy_seeds,
         corners: args.corners,
-        lens: args.lens,
+        lens: args.lens.unwrap_or_default(),
         samples: args.samples,
         matching: !args.no_matching,
     };

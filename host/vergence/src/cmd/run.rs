@@ -16,6 +16,7 @@ use vergence_output::{PlyEncoding, TableFormat, check_folder};
 use vergence_pipeline::Exposures;
 use vergence_protocol::{Request, Trigger};
 use vergence_rig::Rig;
+use vergence_scene::LensChoice;
 
 use self::publish::Publisher;
 use super::connect::{connect, port};
@@ -28,7 +29,7 @@ use crate::console::Console;
 use crate::failure::Failure;
 use crate::interrupt::interrupted;
 use crate::rig_file;
-use crate::sim::{SharedRig, SimulatedRig, board_of};
+use crate::sim::{SharedRig, SimulatedRig, board_of, lensed};
 use crate::stopwatch::clock as stopwatch;
 
 /// Number of camera events that may wait; images beyond it are lost, which the gap in their numbers shows.
@@ -82,6 +83,10 @@ pub struct Args {
     /// With simulated cameras: sets where the stages stand at first and the noise of the images.
     #[arg(long, default_value_t = 1)]
     seed: u64,
+    /// With simulated cameras: their lenses, ideal, as the rig's file has them, or a published design that is traced, sigma8_f18 or nikkor6_f28. A
+    /// rig with traced lenses is calibrated first, from simulated targets, and measured by the file that this gives, `rig.toml` in --out.
+    #[arg(long, default_value_t)]
+    lens: LensChoice,
     /// With simulated cameras: unplugs one, or the encoder of an axis, for a while, such as left@2s..4s after the start.
     #[arg(long, value_name = "WHEN")]
     unplug: Vec<vergence_sim::Unplug>,
@@ -97,16 +102,27 @@ fn parse_time(text: &str) -> Result<Duration, String> {
 }
 
 pub async fn run(args: &Args, common: &CommonOptions, console: Console) -> Result<(), Failure> {
-    let rig = rig_file::load(common.rig.as_deref())?;
-    let (tour, search) = (args.tour.tour(&rig)?, args.search.search(&rig)?);
-    // A simulated camera shows nothing beyond the field in which it is known.
-    let measuring = Arc::new(args.search.measuring(rig.clone())?);
-    let matcher = Arc::from(args.matching.matcher(console)?);
+    let drawn = rig_file::load(common.rig.as_deref())?;
+    let is_simulated = args.cameras == ["sim"];
+    if args.lens != LensChoice::Ideal && !is_simulated {
+        return Err(Failure::usage("--lens is for simulated cameras: --port sim --cameras sim"));
+    }
     if let Some(folder) = &args.out {
         check_folder(folder)?;
         make_folder(folder)?;
     }
-    let (mut board, simulated) = connected(args, common, &rig, console).await?;
+    let (rig, lenses) = match is_simulated {
+        true => {
+            let lensed = lensed(&drawn, (args.lens, args.seed), args.out.as_deref(), console).await?;
+            (lensed.known, Some(lensed.lenses))
+        }
+        false => (drawn.clone(), None),
+    };
+    let (tour, search) = (args.tour.tour(&rig)?, args.search.search(&rig)?);
+    // A simulated camera shows nothing beyond the field in which it is known.
+    let measuring = Arc::new(args.search.measuring(rig.clone())?);
+    let matcher = Arc::from(args.matching.matcher(console)?);
+    let (mut board, simulated) = connected(args, common, [&drawn, &rig], console).await?;
     // Images and pulses are stamped on the clock of the link.
     let clock = board.as_ref().map_or_else(HostClock::start, |board| board.client().clock());
     if let Some(board) = &mut board {
@@ -123,7 +139,7 @@ pub async fn run(args: &Args, common: &CommonOptions, console: Console) -> Resul
     }
     let period = (board.is_some() && !args.free).then_some(1e6 / args.rate);
     let (listener, events) = mpsc::channel(EVENTS_KEPT);
-    cameras::start(args, &rig, simulated.as_ref(), clock, &listener)?;
+    cameras::start(args, &rig, simulated.as_ref().zip(lenses), clock, &listener)?;
     // The loop ends when no sender is left.
     drop(listener);
     let mut live = LiveLoop {
@@ -146,6 +162,7 @@ pub async fn run(args: &Args, common: &CommonOptions, console: Console) -> Resul
     let mut publisher = Publisher {
         console,
         rig: measuring,
+        lens: is_simulated.then_some(args.lens),
         out: args.out.clone(),
         keep: args.keep,
         also: args.also.iter().copied().map(TableFormat::from).collect(),
@@ -201,11 +218,11 @@ async fn settle(board: &mut Option<Board>, tour: &Tour) -> Result<(), Failure> {
     Ok(board.ask(Request::SetTrigger(Trigger::Off)).await?)
 }
 
-/// The board, where the rig has axes; beside it the mechanics, where they are simulated.
+/// The board, where the rig has axes; beside it the mechanics, where they are simulated: of the rig as drawn, while the board's is as known.
 async fn connected(
     args: &Args,
     common: &CommonOptions,
-    rig: &Rig,
+    [drawn, rig]: [&Rig; 2],
     console: Console,
 ) -> Result<(Option<Board>, Option<SharedRig>), Failure> {
     let wants_simulated = args.cameras == ["sim"];
@@ -220,7 +237,7 @@ async fn connected(
     }
     match (port(common)?, wants_simulated) {
         (Port::Simulated, true) => {
-            let simulated = SharedRig::new(SimulatedRig::new(rig, args.seed)?);
+            let simulated = SharedRig::new(SimulatedRig::new(drawn, args.seed)?);
             let (session, progress) = (fresh_session()?, console.progress("live"));
             let board = board_of(&simulated, rig.clone(), session, common.lease, progress).await?;
             Ok((Some(board), Some(simulated)))

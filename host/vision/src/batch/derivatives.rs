@@ -2,12 +2,12 @@
 
 use multiversion::multiversion;
 use multiversion::target::target_cfg_f;
-use nalgebra::{Matrix2x3, SMatrix};
+use nalgebra::{Matrix2x3, SMatrix, Vector2};
 
 use super::arc_tangent::angle_from_axis;
 use super::lanes::{ALWAYS_FUSED, Kernel, for_rows, polynomial};
 use crate::lens_derivatives::pixel_by_lens;
-use crate::{KannalaBrandt, LENS_PARAMETERS, Pixel};
+use crate::{Asymmetry, KannalaBrandt, LENS_PARAMETERS, Pixel};
 
 /// Numbers of a row: the pixel, its derivatives by the point, and what those by the lens consist of.
 const NUMBERS: usize = 12;
@@ -23,6 +23,7 @@ pub(super) struct Derivatives {
     aspect: f64,
     centre: [f64; 2],
     theta_max: f64,
+    asymmetry: Asymmetry,
 }
 
 /// Pixels of many points with their derivatives, by index of the point.
@@ -30,6 +31,7 @@ pub(super) struct Derivatives {
 pub struct ProjectedPoints {
     rows: Vec<[f64; NUMBERS]>,
     focal_lengths: [f64; 2],
+    asymmetry: Asymmetry,
 }
 
 impl ProjectedPoints {
@@ -61,7 +63,7 @@ impl ProjectedPoints {
     #[must_use]
     pub fn by_lens(&self, index: usize) -> Option<SMatrix<f64, 2, LENS_PARAMETERS>> {
         let &[.., cosine, sine, theta, distorted] = self.rows.get(index)?;
-        Some(pixel_by_lens(self.focal_lengths, theta, distorted, [cosine, sine]))
+        Some(pixel_by_lens(self.focal_lengths, theta, distorted, [cosine, sine], &self.asymmetry))
     }
 }
 
@@ -72,16 +74,34 @@ impl Derivatives {
         for (i, factor) in slope.iter_mut().enumerate() {
             *factor *= (2 * i + 1) as f64;
         }
-        Self { k, slope, aspect: lens.aspect(), centre: [centre.u, centre.v], theta_max: lens.theta_max().rad() }
+        let (centre, theta_max) = ([centre.u, centre.v], lens.theta_max().rad());
+        Self { k, slope, aspect: lens.aspect(), centre, theta_max, asymmetry: lens.asymmetry() }
     }
 
     pub(super) fn of(&self, points: &[[f64; 3]], best: bool, out: &mut ProjectedPoints) {
         out.rows.clear();
         out.focal_lengths = [self.k[0], self.k[0] * self.aspect];
+        out.asymmetry = self.asymmetry;
         if best {
             derive_best(self, points, &mut out.rows);
         } else {
             for_rows::<ALWAYS_FUSED, LANES, 3, NUMBERS>(self, points, &mut out.rows);
+        }
+        if !self.asymmetry.is_zero() {
+            out.rows.iter_mut().for_each(|row| self.displace(row));
+        }
+    }
+
+    /// Makes the row of a symmetric lens that of this one.
+    fn displace(&self, row: &mut [f64; NUMBERS]) {
+        let [f, aspect] = [self.k[0], self.aspect];
+        let [.., cosine, sine, _, distorted] = *row;
+        let place = Vector2::new(distorted * cosine, distorted * sine);
+        let (arrived, bend) = (self.asymmetry.moved(place) * f, self.asymmetry.by_place(place));
+        (row[0], row[1]) = (self.centre[0] + arrived.x, self.centre[1] + aspect * arrived.y);
+        for axis in 2..5 {
+            let by = bend * Vector2::new(row[axis], row[axis + 3] / aspect);
+            (row[axis], row[axis + 3]) = (by.x, by.y * aspect);
         }
     }
 }

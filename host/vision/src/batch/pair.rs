@@ -23,7 +23,7 @@ use super::shared_errors::{ByPose, SharedErrors};
 use super::slope::LensSlope;
 use super::triangulate::Triangulate;
 use super::vectors::{cross, dot, turned};
-use crate::lens_derivatives::{LENS_PARAMETERS, PUPIL};
+use crate::lens_derivatives::{CENTRAL_PARAMETERS, LENS_PARAMETERS};
 use crate::{
     Angle, KannalaBrandt, Left, Point, PointUncertainty, Right, SharedCovariance, StereoPair, Transform, UnitRay,
     pseudo_intersection,
@@ -42,7 +42,7 @@ pub struct BatchPair {
     instructions: Instructions,
 }
 
-/// A pair of which a lens is not central, or not known to be: its points are made one by one.
+/// A pair of which a lens is not central and symmetric, or not known to be: its points are made one by one.
 #[derive(Clone, Debug, PartialEq)]
 struct OneByOne {
     lenses: [KannalaBrandt; 2],
@@ -111,9 +111,11 @@ impl BatchPair {
 impl OneByOne {
     fn of(pair: &StereoPair<'_>, pixel_sigma: f64, shared: &SharedCovariance) -> Option<Self> {
         let lenses = [*pair.left, *pair.right];
-        let known = |first: usize| shared.matrix()[(first + PUPIL, first + PUPIL)] == 0.0;
-        let is_central = pair.is_central() && known(0) && known(LENS_PARAMETERS);
-        (!is_central).then_some(Self { lenses, left_from_right: pair.left_from_right, pixel_sigma, shared: *shared })
+        let is_known = |parameter: usize| shared.matrix()[(parameter, parameter)] == 0.0;
+        let is_plain = lenses.iter().zip([0, LENS_PARAMETERS]).all(|(lens, first)| {
+            lens.fits_opencv() && (first + CENTRAL_PARAMETERS..first + LENS_PARAMETERS).all(is_known)
+        });
+        (!is_plain).then_some(Self { lenses, left_from_right: pair.left_from_right, pixel_sigma, shared: *shared })
     }
 
     fn add(&self, left: &[f64; 3], right: &[f64; 3], out: &mut BatchPoints) {

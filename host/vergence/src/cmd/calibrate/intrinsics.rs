@@ -46,7 +46,7 @@ pub struct Args {
     /// Also estimate how the target bows out of its plane.
     #[arg(long)]
     warp: bool,
-    /// The lens: central, moving-pupil, or by-evidence of the views.
+    /// The lens: central, moving-pupil, full (with a pupil of two coefficients, decentring and thin prism), or by-evidence of the views.
     #[arg(long, value_name = "MODEL", default_value = "by-evidence")]
     lens_model: LensModel,
     /// Full field of view of the lens by its data sheet, such as 195.95deg: the report then measures coverage against it.

@@ -5,6 +5,7 @@ use vergence_board::HostClock;
 use vergence_camera::CameraEvent;
 use vergence_live::{attach_both, simulate_both};
 use vergence_rig::{Rig, Shutter};
+use vergence_scene::TrueLens;
 use vergence_sim::Unplug;
 use vergence_vision::{KannalaBrandt, Side};
 
@@ -12,23 +13,23 @@ use super::Args;
 use crate::failure::Failure;
 use crate::sim::SharedRig;
 
-/// Starts both cameras, and unplugs what shall be unplugged; their events go to `listener`.
+/// Starts both cameras, simulated ones on these mechanics with these lenses, and unplugs what shall be unplugged; their events go to `listener`.
 ///
 /// # Errors
 /// Where neither camera is there, or nothing that can be unplugged has this name.
 pub fn start(
     args: &Args,
     rig: &Rig,
-    simulated: Option<&SharedRig>,
+    simulated: Option<(&SharedRig, [TrueLens; 2])>,
     clock: HostClock,
     listener: &Sender<(Side, CameraEvent)>,
 ) -> Result<(), Failure> {
     match (simulated, args.cameras.as_slice()) {
-        (Some(mechanics), _) => {
-            let mut cameras = Vec::new();
+        (Some((mechanics, [left, right])), _) => {
+            let mut unplugged = Vec::new();
             for unplug in &args.unplug {
                 match unplug {
-                    Unplug::Camera(camera) => cameras.push(*camera),
+                    Unplug::Camera(camera) => unplugged.push(*camera),
                     Unplug::Encoder { axis: name, times } => {
                         let axis = rig.axes.iter().position(|axis| axis.name == *name).filter(|_| rig.trunk.is_none());
                         let no = || Failure::usage(format!("rig '{}' has no stage '{name}' to unplug", rig.name));
@@ -36,7 +37,9 @@ pub fn start(
                     }
                 }
             }
-            simulate_both(rig, mechanics, (args.seed, &cameras), clock, listener);
+            let [left_shutter, right_shutter] = rig.shutters;
+            let cameras = [(left, left_shutter), (right, right_shutter)];
+            simulate_both(cameras, mechanics, (args.seed, &unplugged), clock, listener);
             Ok(())
         }
         (None, [left, right]) => {

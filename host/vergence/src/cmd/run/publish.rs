@@ -16,6 +16,7 @@ use vergence_output::{
 };
 use vergence_pipeline::{Bearing, CameraGone, Observation, PairCloud};
 use vergence_rig::{Rig, RigPose, axes_json, rounded};
+use vergence_scene::LensChoice;
 use vergence_vision::Side;
 
 use crate::console::Console;
@@ -27,6 +28,8 @@ pub struct Publisher {
     pub console: Console,
     /// The rig that measures.
     pub rig: Arc<Rig>,
+    /// The lenses of simulated cameras; `None` of attached ones.
+    pub lens: Option<LensChoice>,
     /// A folder for files; `None` writes none.
     pub out: Option<PathBuf>,
     /// Write a numbered file for every result, instead of one file with the newest.
@@ -140,6 +143,7 @@ impl Publisher {
     fn head_json(&self, kind: &str, result: &LiveResult<'_>) -> Value {
         json!({
             "kind": kind,
+            "simulated_lens": self.lens.map(|lens| lens.to_string()),
             "number": self.number,
             "exposed_us": rounded(result.measurement.middle.us),
             "exposed_error_us": rounded(result.measurement.middle.error_us),

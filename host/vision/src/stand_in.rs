@@ -1,0 +1,76 @@
+//! A central and symmetric lens in place of one that is not, for programs that know of no other.
+
+use nalgebra::{SMatrix, SVector, Vector2, Vector3};
+
+use crate::lens_derivatives::CENTRAL_PARAMETERS;
+use crate::{Angle, Camera, InvalidLens, KannalaBrandt, Length, OpenCvFisheye, Pixel, Point, UnitRay};
+
+/// Directions of points and their images.
+type Images = Vec<(UnitRay<Camera>, Pixel)>;
+
+impl KannalaBrandt {
+    /// The central and symmetric lens that images points at `distance` from the origin as this one does, by least squares over the field.
+    ///
+    /// # Errors
+    /// [`InvalidLens`] where no lens fits, as for points nearer than the pupil moves.
+    pub fn central_at(&self, distance: Length) -> Result<Self, InvalidLens> {
+        /// The image is linear in all but the products of focal lengths with k.
+        const STEPS: usize = 5;
+        if self.fits_opencv() {
+            return Ok(*self);
+        }
+        let seen = self.images_at(distance);
+        let outermost = Angle::from_rad(seen.iter().map(|(ray, _)| ray.angle_to_axis().rad()).fold(0.0, f64::max));
+        let mut found = Self::from_opencv(self.to_opencv(), outermost, self.size())?;
+        for _ in 0..STEPS {
+            let stepped = found.towards(&seen).ok_or(InvalidLens::NotFinite)?;
+            found = Self::from_opencv(stepped, outermost, self.size())?;
+        }
+        Ok(found)
+    }
+
+    /// The largest distance in pixels between the images of points at `distance` by this lens and by `central`, over the field of both.
+    #[must_use]
+    pub fn largest_difference(&self, central: &Self, distance: Length) -> f64 {
+        let off = |(ray, pixel): &(UnitRay<Camera>, Pixel)| {
+            central.project(ray).map_or(0.0, |at| (at.u - pixel.u).hypot(at.v - pixel.v))
+        };
+        self.images_at(distance).iter().map(off).fold(0.0, f64::max)
+    }
+
+    /// Directions of points at `distance` as seen from the origin, over the field, and their images.
+    fn images_at(&self, distance: Length) -> Images {
+        const RINGS: usize = 100;
+        const AROUND: usize = 24;
+        let seen = |place: usize| {
+            let theta = self.theta_max().rad() * (place / AROUND + 1) as f64 / RINGS as f64;
+            let (y, x) = (std::f64::consts::TAU * (place % AROUND) as f64 / AROUND as f64).sin_cos();
+            let (sine, cosine) = theta.sin_cos();
+            let ray = UnitRay::<Camera>::new(Vector3::new(x * sine, y * sine, cosine))?;
+            Some((ray, self.project_point(&Point::<Camera>::from_mm(ray.vector() * distance.mm())).ok()?))
+        };
+        (0..RINGS * AROUND).filter_map(seen).collect()
+    }
+
+    /// The parameters after a Gauss-Newton step towards the images; `None` where they do not determine it.
+    fn towards(&self, seen: &Images) -> Option<OpenCvFisheye> {
+        let mut normal = SMatrix::<f64, CENTRAL_PARAMETERS, CENTRAL_PARAMETERS>::zeros();
+        let mut right = SVector::<f64, CENTRAL_PARAMETERS>::zeros();
+        for (ray, pixel) in seen {
+            let Ok(at) = self.project(ray) else { continue };
+            let by_lens = self.pixel_by_lens(ray).fixed_columns::<CENTRAL_PARAMETERS>(0).into_owned();
+            normal += by_lens.transpose() * by_lens;
+            right += by_lens.transpose() * Vector2::new(pixel.u - at.u, pixel.v - at.v);
+        }
+        // Scaled to unit diagonal: the parameters differ by many orders of magnitude.
+        let scale = normal.diagonal().map(|value| 1.0 / value.sqrt());
+        let scaled = SMatrix::<f64, CENTRAL_PARAMETERS, CENTRAL_PARAMETERS>::from_fn(|i, k| {
+            scale[i] * normal[(i, k)] * scale[k]
+        });
+        let step = scaled.cholesky()?.solve(&right.component_mul(&scale)).component_mul(&scale);
+        let OpenCvFisheye { fx, fy, cx, cy, k } = self.to_opencv();
+        let [dfx, dfy, dcx, dcy, changes @ ..]: [f64; CENTRAL_PARAMETERS] = step.into();
+        let k = std::array::from_fn(|i| k[i] + changes[i]);
+        Some(OpenCvFisheye { fx: fx + dfx, fy: fy + dfy, cx: cx + dcx, cy: cy + dcy, k })
+    }
+}
