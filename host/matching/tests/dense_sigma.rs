@@ -93,7 +93,10 @@ fn sixty_eight_and_ninety_five_per_cent_are_within_one_and_two_sigma() {
         println!("{name} px from an edge: {one:.1} % within 1 sigma, {two:.1} % within 2, of {}", within.all);
     }
     let [one, two] = all.percent();
-    assert!((65.0..=74.0).contains(&one) && (90.5..=98.0).contains(&two), "{one} {two}");
+    assert!((65.0..=75.0).contains(&one) && (92.0..=98.0).contains(&two), "{one} {two}");
+    // Beside edges a pixel may be the other surface's; without that in sigma, 77 % were within two.
+    let [_, two] = classes[0].plus(classes[1]).percent();
+    assert!(two > 79.0, "{two}");
     // Farther than the search's windows reach from any edge.
     let [one, two] = classes[4].plus(classes[5]).percent();
     assert!((65.0..=76.0).contains(&one) && (92.0..=98.0).contains(&two), "{one} {two}");

@@ -14,6 +14,19 @@ const CLOSE: [usize; 2] = [2, 1];
 /// The reach of the windows in pixels.
 const WINDOW: usize = 4;
 
+/// Difference in disparity, in pixels, from which a pixel with another surface in its window may be that surface's: of smaller steps the
+/// registration makes a mixture, whose error is within its standard deviation.
+const WIDE_STEP: f32 = 5.0;
+
+/// The other surfaces around a pixel.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Around {
+    /// How near they are.
+    pub beside: Beside,
+    /// The disparity of the surface in the window that the pixel may belong to, the farther one where there are two; NaN where there is none.
+    pub other: f32,
+}
+
 /// How near another surface is to a pixel.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Beside {
@@ -29,7 +42,7 @@ pub(super) enum Beside {
 
 /// Finds the other surfaces around each pixel. Disparities are NaN where there are none; gaps that the left camera sees
 /// count as the farther of the surfaces beside them on their row.
-pub(super) fn beside(disparities: &[f32], seen: &[bool], width: usize) -> Vec<Beside> {
+pub(super) fn beside(disparities: &[f32], seen: &[bool], width: usize) -> Vec<Around> {
     let mut surfaces = vec![f32::NAN; disparities.len()];
     surfaces.par_chunks_mut(width).zip(disparities.par_chunks(width)).zip(seen.par_chunks(width)).for_each(
         |((surfaces, disparities), seen)| {
@@ -50,7 +63,7 @@ pub(super) fn beside(disparities: &[f32], seen: &[bool], width: usize) -> Vec<Be
             let own = disparities[index];
             let is_behind = |surfaces: &[f32]| surfaces[index] < own - STEP;
             let is_other = |i: usize| is_behind(&behind[i]) || before[i][index] > own + STEP;
-            if is_behind(&adjacent) {
+            let beside = if is_behind(&adjacent) {
                 Beside::Edge
             } else if is_other(0) {
                 Beside::Close
@@ -58,7 +71,16 @@ pub(super) fn beside(disparities: &[f32], seen: &[bool], width: usize) -> Vec<Be
                 Beside::Near
             } else {
                 Beside::Nothing
-            }
+            };
+            let [farthest, nearest] = [behind[1][index], before[1][index]];
+            let other = if farthest < own - WIDE_STEP {
+                farthest
+            } else if nearest > own + WIDE_STEP {
+                nearest
+            } else {
+                f32::NAN
+            };
+            Around { beside, other }
         })
         .collect()
 }
@@ -98,15 +120,16 @@ mod tests {
         };
         let disparities: Vec<f32> = (0..5 * 24).map(|index| row(index % 24)).collect();
         let found = beside(&disparities, &[true; 5 * 24], 24);
-        for (index, beside) in found.iter().enumerate() {
-            let expected = match index % 24 {
-                9 => Beside::Edge,
-                8 => Beside::Close,
-                6 | 7 => Beside::Near,
+        for (index, around) in found.iter().enumerate() {
+            let (expected, other) = match index % 24 {
+                9 => (Beside::Edge, 5.0),
+                8 => (Beside::Close, 5.0),
+                6 | 7 => (Beside::Near, 5.0),
                 10..14 => continue,
-                _ => Beside::Nothing,
+                _ => (Beside::Nothing, f32::NAN),
             };
-            assert_eq!(*beside, expected, "column {}", index % 24);
+            assert_eq!(around.beside, expected, "column {}", index % 24);
+            assert_eq!(around.other.to_bits(), other.to_bits(), "column {}", index % 24);
         }
     }
 }

@@ -38,6 +38,8 @@ pub struct Disparities {
     pub(super) sigma: Vec<f32>,
     /// Fraction of the left window's contrast that the right one explains, 0 to 1.
     pub(super) likeness: Vec<f32>,
+    /// The disparity of another surface that the pixel may belong to; NaN where there is none.
+    pub(super) other: Vec<f32>,
     /// Why a disparity is not used.
     pub(super) doubt: Vec<Option<Gap>>,
 }
@@ -56,13 +58,14 @@ pub(super) fn registered(views: [SampledView<'_>; 2], whole: &[f32], area: usize
     for (doubt, _) in doubt.iter_mut().zip(&small).filter(|(doubt, small)| doubt.is_none() && **small) {
         *doubt = Some(Gap::Isolated);
     }
-    let beside = beside(&trusted(&disparity, &doubt), views[0].seen, width);
-    doubt.par_iter_mut().zip(&beside).zip(&smooth.roughness).for_each(|((doubt, beside), roughness)| {
-        *doubt = doubt.or((*beside == Beside::Edge || *roughness > ROUGHEST).then_some(Gap::Edge));
+    let around = beside(&trusted(&disparity, &doubt), views[0].seen, width);
+    doubt.par_iter_mut().zip(&around).zip(&smooth.roughness).for_each(|((doubt, around), roughness)| {
+        *doubt = doubt.or((around.beside == Beside::Edge || *roughness > ROUGHEST).then_some(Gap::Edge));
     });
-    let sigma = registration.sigma.par_iter().zip(&smooth.roughness).zip(&beside);
-    let sigma = sigma.map(|((own, roughness), beside)| sigma_of(*own, *roughness, *beside)).collect();
-    Disparities { disparity, sigma, likeness: registration.likeness, doubt }
+    let sigma = registration.sigma.par_iter().zip(&smooth.roughness).zip(&around);
+    let sigma = sigma.map(|((own, roughness), around)| sigma_of(*own, *roughness, around.beside)).collect();
+    let other = around.par_iter().map(|around| around.other).collect();
+    Disparities { disparity, sigma, likeness: registration.likeness, other, doubt }
 }
 
 /// What the registration of a window says against its result.

@@ -47,6 +47,10 @@ use crate::{Grid, SharedFrame, View, ViewPixel};
 /// Smallest disparity in standard deviations, lenses and pose included, that differs from zero.
 const SIGNIFICANT: f64 = 3.0;
 
+/// Standard deviation of the range of a pixel with another surface in its window, as a part of the difference of both ranges. One in five is
+/// the other surface's in rendered scenes: those are then within two standard deviations.
+const BETWEEN_SURFACES: f64 = 0.6;
+
 /// Largest number of times that the rows are moved.
 const ROUNDS: usize = 3;
 
@@ -192,16 +196,27 @@ impl<'a> DenseViews<'a> {
             return DenseSample::Gap(gap);
         }
         let radians = |pixels: f32| f64::from(pixels) / grid.pixels_per_radian();
-        let seen = ([a, b], radians(disparity));
-        let (direction, parallax) = restated.map_or(seen, |restated| restated.of(seen));
-        let range = finder.at(direction, parallax, radians(own));
-        if parallax <= SIGNIFICANT * range.disparity_sigma {
+        let at = |disparity: f32| {
+            let seen = ([a, b], radians(disparity));
+            let (direction, parallax) = restated.map_or(seen, |restated| restated.of(seen));
+            let range = finder.at(direction, parallax, radians(own));
+            (range, parallax > SIGNIFICANT * range.disparity_sigma)
+        };
+        let (range, is_significant) = at(disparity);
+        if !is_significant {
             return DenseSample::Far;
         }
+        let other = disparities.other[index];
+        let between_surfaces = match at(other) {
+            _ if other.is_nan() => 0.0,
+            (other, true) => BETWEEN_SURFACES * (other.mm - range.mm),
+            // The other surface may be anywhere far away.
+            (_, false) => return DenseSample::Gap(Gap::Edge),
+        };
         DenseSample::Measured(DenseRange {
             range_mm: range.mm as f32,
-            sigma_mm: range.sigma_mm as f32,
-            own_sigma_mm: range.own_sigma_mm as f32,
+            sigma_mm: range.sigma_mm.hypot(between_surfaces) as f32,
+            own_sigma_mm: range.own_sigma_mm.hypot(between_surfaces) as f32,
             confidence: disparities.likeness[index],
         })
     }

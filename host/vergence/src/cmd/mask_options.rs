@@ -1,5 +1,6 @@
 //! What is left out of the images of both cameras.
 
+use clap::builder::{PathBufValueParser, TypedValueParser};
 use vergence_calibration_input::PairMasks;
 use vergence_camera::camera_mask;
 use vergence_rig::{CameraMask, Rig};
@@ -12,16 +13,11 @@ use crate::failure::Failure;
 pub struct MaskOptions {
     /// What is left out of the left images, as the robot's body, a hood, or all outside the image circle: a PNG image of the camera's
     /// size, black there, or a TOML file of polygons and circles. Nothing is taken there. Unless given, the mask in the rig file.
-    #[arg(long, value_name = "FILE", value_parser = mask_file)]
+    #[arg(long, value_name = "FILE", value_parser = PathBufValueParser::new().map(CameraMask::File))]
     left_mask: Option<CameraMask>,
     /// The same of the right images.
-    #[arg(long, value_name = "FILE", value_parser = mask_file)]
+    #[arg(long, value_name = "FILE", value_parser = PathBufValueParser::new().map(CameraMask::File))]
     right_mask: Option<CameraMask>,
-}
-
-#[expect(clippy::unnecessary_wraps, reason = "a parser of options returns a result")]
-fn mask_file(name: &str) -> Result<CameraMask, String> {
-    Ok(CameraMask::File(name.into()))
 }
 
 impl MaskOptions {
