@@ -14,6 +14,7 @@ use common::{fails_with, run, run_json, text};
 
 const VERBS: &[&str] = &[
     "devices",
+    "rig",
     "status",
     "doctor",
     "arm",
