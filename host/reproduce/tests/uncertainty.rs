@@ -101,7 +101,7 @@ fn the_derivative_by_shared_errors_agrees_with_differences() {
         let pixels = see(&pair, &truth).unwrap();
         let uncertainty = PointUncertainty::by(&kernel, &truth, &pair, 0.1).unwrap();
         for i in 0..SHARED_PARAMETERS {
-            let step = 1e-2 * if i < POSE { LENS_SIGMA[i % LENS_PARAMETERS] } else { POSE_SIGMA[i - POSE] };
+            let step = 0.1 * if i < POSE { LENS_SIGMA[i % LENS_PARAMETERS] } else { POSE_SIGMA[i - POSE] };
             let error = |sign: f64| Shared::from_fn(|row, _| if row == i { sign * step } else { 0.0 });
             let [above, below] = [1.0, -1.0].map(|sign| triangulated(&kernel, &pixels, separation, &error(sign)));
             let expected = (above - below) / (2.0 * step);
