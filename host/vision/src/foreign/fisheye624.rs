@@ -2,11 +2,11 @@
 //!
 //! Project Aria Tools, "Camera intrinsic models", FisheyeRadTanThinPrism. The angle is taken by `atan2`, so that the model goes on past 90°.
 
-use nalgebra::Vector3;
+use nalgebra::{Vector2, Vector3};
 
 use super::double_sphere::positive;
 use super::{Formula, ModelParameter, ParameterUnit};
-use crate::{InvalidLens, Pixel};
+use crate::{Asymmetry, InvalidLens, Pixel};
 
 /// FISHEYE624.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -46,12 +46,9 @@ impl Formula for Fisheye624 {
         let squared = theta * theta;
         let series = self.radial.iter().rev().fold(0.0, |sum, k| (sum + k) * squared);
         let scale = if rho > 0.0 { theta * (1.0 + series) / rho } else { 1.0 };
-        let (x, y) = (scale * d.x, scale * d.y);
-        let r2 = x * x + y * y;
-        let ([p0, p1], [s0, s1, s2, s3]) = (self.tangential, self.prism);
-        let along = 2.0 * (x * p0 + y * p1);
-        let (x, y) = (x + along * x + r2 * p0 + r2 * (s0 + r2 * s1), y + along * y + r2 * p1 + r2 * (s2 + r2 * s3));
+        let displaced = Asymmetry { tangential: self.tangential, prism: self.prism };
+        let at = displaced.moved(Vector2::new(scale * d.x, scale * d.y));
         let [fx, fy, cx, cy] = self.pinhole;
-        Some(Pixel { u: fx * x + cx, v: fy * y + cy })
+        Some(Pixel { u: fx * at.x + cx, v: fy * at.y + cy })
     }
 }
