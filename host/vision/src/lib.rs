@@ -34,6 +34,7 @@ mod import;
 mod kannala_brandt;
 mod lens_derivatives;
 mod lens_field;
+mod lens_step;
 mod match_sigma;
 mod median;
 mod pose_drift;

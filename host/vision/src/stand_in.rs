@@ -1,8 +1,9 @@
 //! A central and symmetric lens in place of one that is not, for programs that know of no other.
 
-use nalgebra::{SMatrix, SVector, Vector2, Vector3};
+use nalgebra::{Vector2, Vector3};
 
 use crate::lens_derivatives::CENTRAL_PARAMETERS;
+use crate::lens_step::lens_step;
 use crate::{Angle, Camera, InvalidLens, KannalaBrandt, Length, OpenCvFisheye, Pixel, Point, UnitRay};
 
 /// Directions of points and their images.
@@ -52,25 +53,14 @@ impl KannalaBrandt {
         (0..RINGS * AROUND).filter_map(seen).collect()
     }
 
-    /// The parameters after a Gauss-Newton step towards the images; `None` where they do not determine it.
+    /// The parameters after a step towards the images; `None` where they do not determine it.
     fn towards(&self, seen: &Images) -> Option<OpenCvFisheye> {
-        let mut normal = SMatrix::<f64, CENTRAL_PARAMETERS, CENTRAL_PARAMETERS>::zeros();
-        let mut right = SVector::<f64, CENTRAL_PARAMETERS>::zeros();
-        for (ray, pixel) in seen {
-            let Ok(at) = self.project(ray) else { continue };
-            let by_lens = self.pixel_by_lens(ray).fixed_columns::<CENTRAL_PARAMETERS>(0).into_owned();
-            normal += by_lens.transpose() * by_lens;
-            right += by_lens.transpose() * Vector2::new(pixel.u - at.u, pixel.v - at.v);
-        }
-        // Scaled to unit diagonal: the parameters differ by many orders of magnitude.
-        let scale = normal.diagonal().map(|value| 1.0 / value.sqrt());
-        let scaled = SMatrix::<f64, CENTRAL_PARAMETERS, CENTRAL_PARAMETERS>::from_fn(|i, k| {
-            scale[i] * normal[(i, k)] * scale[k]
-        });
-        let step = scaled.cholesky()?.solve(&right.component_mul(&scale)).component_mul(&scale);
-        let OpenCvFisheye { fx, fy, cx, cy, k } = self.to_opencv();
-        let [dfx, dfy, dcx, dcy, changes @ ..]: [f64; CENTRAL_PARAMETERS] = step.into();
-        let k = std::array::from_fn(|i| k[i] + changes[i]);
-        Some(OpenCvFisheye { fx: fx + dfx, fy: fy + dfy, cx: cx + dcx, cy: cy + dcy, k })
+        let missing = |(ray, pixel): &(UnitRay<Camera>, Pixel)| {
+            let at = self.project(ray).ok()?;
+            Some((*ray, Vector2::new(pixel.u - at.u, pixel.v - at.v)))
+        };
+        let columns: [usize; CENTRAL_PARAMETERS] = std::array::from_fn(|column| column);
+        let step = lens_step(self, &columns, seen.iter().filter_map(missing))?;
+        Some(self.to_opencv().stepped(step.as_slice()))
     }
 }

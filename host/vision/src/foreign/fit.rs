@@ -3,7 +3,8 @@
 use nalgebra::{SMatrix, SVector, Vector2};
 
 use super::CameraModel;
-use crate::{Angle, Asymmetry, Camera, ImageSize, InvalidLens, KannalaBrandt, OpenCvFisheye, Pixel, UnitRay};
+use crate::lens_step::lens_step;
+use crate::{Angle, Asymmetry, Camera, ImageSize, InvalidLens, KannalaBrandt, Pixel, UnitRay};
 
 /// The part of an image in which a camera model counts.
 #[derive(Clone, Copy, Debug)]
@@ -101,21 +102,13 @@ fn asymmetric(symmetric: &KannalaBrandt, samples: &[Sample]) -> Option<KannalaBr
     const COLUMNS: [usize; 14] = [0, 1, 2, 3, 4, 5, 6, 7, 10, 11, 12, 13, 14, 15];
     let mut lens = *symmetric;
     for _ in 0..STEPS {
-        let (mut normal, mut right) = (SMatrix::<f64, 14, 14>::zeros(), SVector::<f64, 14>::zeros());
-        for sample in samples {
-            let by_all = lens.pixel_by_lens(&sample.ray);
-            let by_lens = SMatrix::<f64, 2, 14>::from_fn(|row, column| by_all[(row, COLUMNS[column])]);
+        let missing = |sample: &Sample| {
             let at = lens.project(&sample.ray).ok()?;
-            normal += by_lens.transpose() * by_lens;
-            right += by_lens.transpose() * Vector2::new(sample.pixel.u - at.u, sample.pixel.v - at.v);
-        }
-        // Scaled to unit diagonal: the parameters differ by many orders of magnitude.
-        let scale = normal.diagonal().map(|value| 1.0 / value.sqrt());
-        let scaled = SMatrix::<f64, 14, 14>::from_fn(|i, k| scale[i] * normal[(i, k)] * scale[k]);
-        let step = scaled.cholesky()?.solve(&right.component_mul(&scale)).component_mul(&scale);
-        let OpenCvFisheye { fx, fy, cx, cy, k } = lens.to_opencv();
-        let k = std::array::from_fn(|i| k[i] + step[4 + i]);
-        let moved = OpenCvFisheye { fx: fx + step[0], fy: fy + step[1], cx: cx + step[2], cy: cy + step[3], k };
+            Some((sample.ray, Vector2::new(sample.pixel.u - at.u, sample.pixel.v - at.v)))
+        };
+        let missing: Vec<_> = samples.iter().map(missing).collect::<Option<_>>()?;
+        let step = lens_step(&lens, &COLUMNS, missing)?;
+        let moved = lens.to_opencv().stepped(step.as_slice());
         let before = lens.asymmetry().to_array();
         let asymmetry = Asymmetry::from_array(std::array::from_fn(|i| before[i] + step[8 + i]));
         let bare = KannalaBrandt::from_opencv(moved, symmetric.theta_max(), symmetric.size()).ok()?;
