@@ -4,8 +4,8 @@
 use vergence_board::{Board, Shared};
 use vergence_calibration::stage_plan;
 use vergence_protocol::{Mode, PoseReport, SessionId};
-use vergence_rig::{AxisPosition, Rig};
-use vergence_sim::SimulatedRig;
+use vergence_rig::{AxisPosition, Rig, RigAxis};
+use vergence_sim::{Random, SimulatedRig};
 use vergence_vision::{Left, Right, Transform};
 
 use crate::bench::{Bench, MODES};
@@ -23,6 +23,27 @@ pub struct Stop {
     pub readings: Vec<AxisPosition>,
     /// Where the right camera really is.
     pub truth: Transform<Left, Right>,
+}
+
+/// Where axes stand that were sent somewhere without a board.
+pub struct Standing {
+    /// What the encoders read.
+    pub readings: Vec<AxisPosition>,
+    /// Where the axes truly are, in millimetres or radians.
+    pub values: Vec<f64>,
+}
+
+impl Standing {
+    /// At the counts nearest to `targets`, and anywhere within them.
+    pub fn sent_to(axes: &[RigAxis], targets: &[AxisPosition], random: &mut Random) -> Self {
+        let read = |(axis, to): (&RigAxis, &AxisPosition)| axis.value_at(axis.counts_at(to.value()).round());
+        let read: Vec<f64> = axes.iter().zip(targets).map(read).collect();
+        let within =
+            axes.iter().zip(&read).map(|(axis, read)| read + random.between(-0.5, 0.5) * axis.value_per_count());
+        let values = within.collect();
+        let position = |(axis, value): (&RigAxis, &f64)| AxisPosition::from_value(axis.kind, *value);
+        Self { readings: axes.iter().zip(&read).map(position).collect(), values }
+    }
 }
 
 /// All stops of one seed.

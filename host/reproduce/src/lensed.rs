@@ -8,7 +8,7 @@ use vergence_sim::Random;
 use crate::bench::Bench;
 use crate::chain::calibrate;
 use crate::conditions::{Conditions, NOISE_PX};
-use crate::drive::{Drive, STAGE_POSES, Stop};
+use crate::drive::{Drive, STAGE_POSES, Standing, Stop};
 use crate::error::ReproduceError;
 use crate::eyes::Eyes;
 use crate::target_shot::Corners;
@@ -38,24 +38,12 @@ impl LensedRig {
         }
         let [mut random, mut returns] = [seed, seed ^ 0x7265_7475_726e].map(Random::new);
         let plan = stage_plan(&drawn.axes, STAGE_POSES);
-        let drive = Drive {
-            calibration: plan.iter().map(|targets| stop(drawn, targets, &mut random)).collect(),
-            modes: Vec::new(),
+        let stop = |targets: &Vec<AxisPosition>| {
+            let Standing { readings, values } = Standing::sent_to(&drawn.axes, targets, &mut random);
+            Stop { readings, truth: drawn.pose_at_values(&values).left_from_right }
         };
+        let drive = Drive { calibration: plan.iter().map(stop).collect(), modes: Vec::new() };
         let calibrated = calibrate(&bench, &drive, &eyes, LensModel::default(), &mut random, &mut returns)?;
         Ok(Self { lenses: eyes.lenses, known: calibrated.rig, file: Some(calibrated.file) })
-    }
-}
-
-/// Where axes stand that were sent to `targets`: at the count that their encoders read, and anywhere within it.
-fn stop(rig: &Rig, targets: &[AxisPosition], random: &mut Random) -> Stop {
-    let read: Vec<f64> =
-        rig.axes.iter().zip(targets).map(|(axis, to)| axis.value_at(axis.counts_at(to.value()).round())).collect();
-    let mut within = |read: f64, count: f64| read + random.between(-0.5, 0.5) * count;
-    let truth: Vec<f64> =
-        rig.axes.iter().zip(&read).map(|(axis, &read)| within(read, axis.value_per_count())).collect();
-    Stop {
-        readings: rig.axes.iter().zip(&read).map(|(axis, &read)| AxisPosition::from_value(axis.kind, read)).collect(),
-        truth: rig.pose_at_values(&truth).left_from_right,
     }
 }

@@ -13,13 +13,13 @@ use vergence_scene::Lens;
 use vergence_sim::Random;
 use vergence_vision::{Kernel, Left, Pixel, PixelPair, Point, Side};
 
-use super::world::{Standing, World};
+use super::world::World;
 use super::{Mismatch, RANGES_MM};
 use crate::axes::Axes;
 use crate::bench::MODES;
 use crate::chain::calibrate;
 use crate::conditions::{Conditions, NOISE_PX};
-use crate::drive::Drive;
+use crate::drive::{Drive, Standing};
 use crate::error::ReproduceError;
 use crate::eyes::Eyes;
 use crate::target_shot::Corners;

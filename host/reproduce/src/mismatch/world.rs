@@ -10,7 +10,7 @@ use vergence_vision::{Angle, KannalaBrandt, Length};
 
 use super::Mismatch;
 use crate::bench::Bench;
-use crate::drive::{STAGE_POSES, Stop};
+use crate::drive::{STAGE_POSES, Standing, Stop};
 use crate::error::ReproduceError;
 
 /// Axes of the bench.
@@ -99,14 +99,6 @@ pub struct World {
     mismatch: Mismatch,
 }
 
-/// Where the axes of a bench came to stand.
-pub struct Standing {
-    /// What the encoders read.
-    pub readings: Vec<AxisPosition>,
-    /// Where the axes truly are, in millimetres or radians.
-    values: Vec<f64>,
-}
-
 impl World {
     /// The bench of a seed, with this mismatch.
     ///
@@ -136,25 +128,16 @@ impl World {
 
     /// Sends the axes to `targets`.
     pub fn stand(&self, targets: &[AxisPosition], random: &mut Random) -> Standing {
-        let axes = &self.bench.drawn.axes;
-        let read: Vec<f64> = axes
-            .iter()
-            .zip(targets)
-            .map(|(axis, target)| axis.value_at(axis.counts_at(target.value()).round()))
-            .collect();
-        let position = |(axis, value): (&vergence_rig::RigAxis, &f64)| AxisPosition::from_value(axis.kind, *value);
-        let within =
-            axes.iter().zip(&read).map(|(axis, read)| read + random.between(-0.5, 0.5) * axis.value_per_count());
-        let mut values: Vec<f64> = within.collect();
+        let mut standing = Standing::sent_to(&self.bench.drawn.axes, targets, random);
         let slack = random.between(-0.5, 0.5);
-        match (self.mismatch, values.as_mut_slice()) {
+        match (self.mismatch, standing.values.as_mut_slice()) {
             (Mismatch::ScrewPitch, [baseline, ..]) => {
                 *baseline += PITCH_SCALE * *baseline + PITCH_MM * (std::f64::consts::TAU * *baseline / TURN_MM).sin();
             }
             (Mismatch::Play, [_, separation, ..]) => *separation += slack * PLAY.rad(),
             _ => {}
         }
-        Standing { readings: axes.iter().zip(&read).map(position).collect(), values }
+        standing
     }
 
     /// The stops of a calibration of the stage.
