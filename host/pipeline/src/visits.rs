@@ -3,7 +3,7 @@
 //! The error of a pose by the joints has a part c that lasts, that of the calibration, and a part p that is new at each visit: play,
 //! readings. Images tell their sum. With C and P the covariances of both before the visit, and m and T the mean of the sum and its covariance
 //! after it, the lasting part is (H. Rauch, F. Tung and C. Striebel, "Maximum likelihood estimates of linear dynamic systems", AIAA
-//! Journal 3(8), 1965, eq. 3.28 with 3.29):
+//! Journal 3(8), 1965, the smoother's gain):
 //!
 //! ```text
 //! G = C (C + P)⁻¹        c = G m        C' = C - G C + G T Gᵀ
