@@ -169,10 +169,10 @@ pub fn refined_cloud(
         Ok((found, pairs))
     };
     let (mut found, mut pairs) = matched(&standing.best(rig, middle))?;
-    if !standing.take(rig, pose, &pairs) {
+    // Each time less is left of what was known of the pose, and in the end the joints alone.
+    while !standing.take(rig, pose, &pairs) {
         // It was looked for around a pose that the cameras have left.
         (found, pairs) = matched(&standing.best(rig, middle))?;
-        standing.take(rig, pose, &pairs);
     }
     ended(Stage::Match);
     let cloud = cloud_of(&pairs, images.left, (rig, pose), standing, (method.kernel, method.search.farthest))?;

@@ -88,8 +88,8 @@ impl StandingPose {
         }
     }
 
-    /// Takes the matches of one more pair. `false` where they contradict the pairs before, or earlier visits, which are then forgotten: the
-    /// cameras have moved and no encoder told it.
+    /// Takes the matches of one more pair. `false` where they contradict the pairs before, which are then forgotten: the cameras have moved
+    /// and no encoder told it. Earlier visits are forgotten too where they exclude what the matches say: a mount has moved.
     pub(crate) fn take(&mut self, rig: &Rig, pose: &PairPose, matches: &[(PixelPair, MatchSigma)]) -> bool {
         let middle = pose.at_middle();
         if joints_suffice(rig, middle) || !pose.is_steady() {
@@ -98,13 +98,17 @@ impl StandingPose {
         }
         let known = self.visits.corrected(rig, middle);
         let alone = fused(rig, &known, matches);
-        let contradicts = match (&self.refined, &alone) {
+        let has_moved = match (&self.refined, &alone) {
             (Some(refined), Some(alone)) => are_different(refined, alone),
             (Some(_), None) => true,
-            (None, Some(alone)) => self.visits.count(rig, middle) > 0 && is_excluded(&known, alone),
-            (None, None) => false,
+            (None, _) => false,
         };
-        if contradicts {
+        if has_moved {
+            // Within their play and counts the joints creep, which says nothing of the calibration.
+            *self = Self { visits: std::mem::take(&mut self.visits), ..Self::default() };
+            return false;
+        }
+        if self.visits.count(rig, middle) > 0 && alone.as_ref().is_some_and(|alone| is_excluded(&known, alone)) {
             self.forget();
             return false;
         }
