@@ -176,8 +176,39 @@ const ALLOWED: &[(&str, &[&str])] = &[
         ],
     ),
     (
+        "vergence-panel",
+        &[
+            "vergence-protocol",
+            "vergence-vision",
+            "vergence-rig",
+            "vergence-pipeline",
+            "vergence-board",
+            "vergence-live",
+        ],
+    ),
+    (
+        "vergence-failure",
+        &[
+            "vergence-protocol",
+            "vergence-targets",
+            "vergence-calibration",
+            "vergence-calibration-input",
+            "vergence-camera",
+            "vergence-files",
+            "vergence-live",
+            "vergence-models",
+            "vergence-output",
+            "vergence-plausibility",
+            "vergence-board",
+            "vergence-sim",
+            "vergence-reproduce",
+            "vergence-bench",
+        ],
+    ),
+    (
         "vergence",
         &[
+            "vergence-failure",
             "vergence-dynamixel",
             "vergence-protocol",
             "vergence-image",
@@ -211,7 +242,17 @@ const ALLOWED: &[(&str, &[&str])] = &[
 
 /// Libraries that touch devices, files, sockets, clocks or the terminal, and the crates that may use each.
 const ONLY_FOR: &[(&str, &[&str])] = &[
-    ("tokio", &["vergence-board", "vergence-camera", "vergence-live", "vergence-calibration-input", "vergence"]),
+    (
+        "tokio",
+        &[
+            "vergence-board",
+            "vergence-camera",
+            "vergence-live",
+            "vergence-calibration-input",
+            "vergence-panel",
+            "vergence",
+        ],
+    ),
     ("tokio-serial", &["vergence-board", "vergence"]),
     ("serialport", &["vergence-board", "vergence"]),
     ("moq-v4l", &["vergence-camera"]),

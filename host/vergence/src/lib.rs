@@ -8,7 +8,7 @@
 pub mod cli;
 mod cmd;
 mod console;
-pub mod failure;
+pub use vergence_failure as failure;
 mod firmware;
 mod interrupt;
 mod rig_file;

@@ -2,7 +2,7 @@
 
 use vergence_calibration_input::{InputError, StoreError};
 
-use super::Failure;
+use crate::Failure;
 
 impl From<InputError> for Failure {
     fn from(error: InputError) -> Self {

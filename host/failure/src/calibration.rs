@@ -3,7 +3,7 @@
 use vergence_calibration::{LensDifferenceError, Unfit};
 use vergence_targets::ImplausibleTarget;
 
-use super::Failure;
+use crate::Failure;
 
 impl From<Unfit> for Failure {
     fn from(unfit: Unfit) -> Self {

@@ -2,7 +2,7 @@
 
 use vergence_plausibility::Implausible;
 
-use super::Failure;
+use crate::Failure;
 
 impl From<Implausible> for Failure {
     fn from(found: Implausible) -> Self {

@@ -2,7 +2,7 @@
 
 use vergence_live::LiveError;
 
-use super::Failure;
+use crate::Failure;
 
 impl From<LiveError> for Failure {
     fn from(error: LiveError) -> Self {

@@ -9,7 +9,7 @@ use vergence_board::{
 use vergence_protocol::Refusal;
 use vergence_protocol::management::Outcome;
 
-use super::Failure;
+use crate::Failure;
 
 impl From<LinkError> for Failure {
     fn from(error: LinkError) -> Self {

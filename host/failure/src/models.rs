@@ -2,7 +2,7 @@
 
 use vergence_models::ModelsError;
 
-use super::Failure;
+use crate::Failure;
 
 impl From<ModelsError> for Failure {
     fn from(error: ModelsError) -> Self {

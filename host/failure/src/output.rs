@@ -2,7 +2,7 @@
 
 use vergence_output::OutputError;
 
-use super::Failure;
+use crate::Failure;
 
 impl From<OutputError> for Failure {
     fn from(error: OutputError) -> Self {

@@ -2,7 +2,7 @@
 
 use vergence_bench::BenchError;
 
-use super::Failure;
+use crate::Failure;
 
 impl From<BenchError> for Failure {
     fn from(error: BenchError) -> Self {

@@ -2,7 +2,7 @@
 
 use vergence_sim::SimError;
 
-use super::Failure;
+use crate::Failure;
 
 impl From<SimError> for Failure {
     fn from(error: SimError) -> Self {

@@ -2,7 +2,7 @@
 
 use vergence_reproduce::{DemoError, ReproduceError};
 
-use super::Failure;
+use crate::Failure;
 
 impl From<ReproduceError> for Failure {
     fn from(error: ReproduceError) -> Self {

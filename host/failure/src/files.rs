@@ -2,7 +2,7 @@
 
 use vergence_files::FileError;
 
-use super::Failure;
+use crate::Failure;
 
 impl From<FileError> for Failure {
     fn from(error: FileError) -> Self {

@@ -2,7 +2,7 @@
 
 use vergence_camera::CameraError;
 
-use super::Failure;
+use crate::Failure;
 
 impl From<CameraError> for Failure {
     fn from(error: CameraError) -> Self {
