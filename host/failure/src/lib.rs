@@ -11,6 +11,7 @@ mod live;
 mod models;
 mod output;
 mod plausibility;
+mod recording;
 mod reproduce;
 mod sim;
 

@@ -1,7 +1,7 @@
 //! `vergence run`: measures live, while the stages stand still or move.
 
 mod cameras;
-mod publish;
+mod record;
 mod tour;
 
 use std::path::PathBuf;
@@ -15,15 +15,17 @@ use vergence_live::{Ended, Limits, LiveLoop, MatchingTime, Totals, Tour};
 use vergence_output::{PlyEncoding, TableFormat, check_folder};
 use vergence_pipeline::Exposures;
 use vergence_protocol::{Request, Trigger};
+use vergence_recording::{recorded_events, recorded_marks};
 use vergence_rig::Rig;
 use vergence_scene::LensChoice;
 
-use self::publish::Publisher;
+use self::record::Recording;
 use super::connect::{connect, port};
 use crate::cli::CommonOptions;
 use crate::cmd::camera_options::CameraOptions;
 use crate::cmd::model_options::MatcherOptions;
 use crate::cmd::options::TableOption;
+use crate::cmd::publish::Publisher;
 use crate::cmd::search_options::SearchOptions;
 use crate::console::Console;
 use crate::failure::Failure;
@@ -60,6 +62,9 @@ pub struct Args {
     /// Keep every cloud, in files with numbers.
     #[arg(long, requires = "out")]
     keep: bool,
+    /// Record images, encoders, clouds and warnings in this folder, as a ROS 2 bag that `vergence replay` measures again.
+    #[arg(long, value_name = "DIR")]
+    record: Option<PathBuf>,
     /// Write points and bearings as tables too.
     #[arg(long, requires = "out", value_delimiter = ',', value_name = "FORMAT")]
     also: Vec<TableOption>,
@@ -125,6 +130,9 @@ pub async fn run(args: &Args, common: &CommonOptions, console: Console) -> Resul
     let (mut board, simulated) = connected(args, common, [&drawn, &rig], console).await?;
     // Images and pulses are stamped on the clock of the link.
     let clock = board.as_ref().map_or_else(HostClock::start, |board| board.client().clock());
+    let period = (board.is_some() && !args.free).then_some(1e6 / args.rate);
+    let begin = |folder: &PathBuf| Recording::start(folder, &rig, board.as_ref(), clock, period);
+    let recording = args.record.as_ref().map(begin).transpose()?;
     if let Some(board) = &mut board {
         board.compare_clocks().await?;
         args.tour.home(board).await?;
@@ -137,17 +145,25 @@ pub async fn run(args: &Args, common: &CommonOptions, console: Console) -> Resul
             console.warn(sentence);
         }
     }
-    let period = (board.is_some() && !args.free).then_some(1e6 / args.rate);
     let (listener, events) = mpsc::channel(EVENTS_KEPT);
     cameras::start(args, &rig, simulated.as_ref().zip(lenses), clock, &listener)?;
     // The loop ends when no sender is left.
     drop(listener);
+    let recorder = recording.as_ref().map(|recording| recording.recorder.clone());
+    let marks = period.and(board.as_mut()).map(|board| board.client_mut().take_marks());
+    let (events, marks) = match &recorder {
+        Some(recorder) => (
+            recorded_events(events, recorder.clone(), clock),
+            marks.map(|marks| recorded_marks(marks, recorder.clone(), clock)),
+        ),
+        None => (events, marks),
+    };
     let mut live = LiveLoop {
         rig: Arc::clone(&measuring),
         matcher,
         search: Arc::new(search),
         events,
-        marks: period.and(board.as_mut()).map(|board| board.client_mut().take_marks()),
+        marks,
         board: board.as_ref().map(|board| board.client().knowledge()),
         clock,
         exposures: Exposures::new(period),
@@ -168,6 +184,7 @@ pub async fn run(args: &Args, common: &CommonOptions, console: Console) -> Resul
         also: args.also.iter().copied().map(TableFormat::from).collect(),
         encoding: PlyEncoding::of(args.ascii),
         number: 0,
+        recorder: recorder.map(|recorder| (recorder, clock)),
     };
     let mut totals = Totals::default();
     if let (Some(board), Some(period)) = (&board, period) {
@@ -180,6 +197,9 @@ pub async fn run(args: &Args, common: &CommonOptions, console: Console) -> Resul
         _ => settle(&mut board, &tour).await,
     };
     publisher.end(&totals)?;
+    if let (Some(recording), Some(folder)) = (recording, &args.record) {
+        recording.finish(folder, console).await?;
+    }
     let ended = ended?;
     settled?;
     match ended {

@@ -1,0 +1,61 @@
+//! What `vergence run --record` adds: a recording beside the measuring.
+
+use std::path::Path;
+
+use vergence_board::{Board, HostClock};
+use vergence_recording::{Beginning, Recorder, Writing};
+use vergence_rig::{Provenance, Rig};
+
+use crate::console::Console;
+use crate::failure::Failure;
+use crate::stopwatch::started_us;
+
+/// A recording under way.
+pub struct Recording {
+    /// Takes what is heard and found.
+    pub recorder: Recorder,
+    writing: Writing,
+}
+
+impl Recording {
+    /// Begins a recording in `folder`, and listens to `board`; `period_us` is the time between pulses of the trigger.
+    ///
+    /// # Errors
+    /// A folder that holds something, a file that cannot be written.
+    pub fn start(
+        folder: &Path,
+        rig: &Rig,
+        board: Option<&Board>,
+        clock: HostClock,
+        period_us: Option<f64>,
+    ) -> Result<Self, Failure> {
+        let program = concat!("vergence ", env!("CARGO_PKG_VERSION")).to_owned();
+        let provenance = Provenance { program, inputs_sha256: String::new(), date: None };
+        let file = rig.to_toml(&provenance).map_err(Failure::usage)?;
+        let (recorder, writing) = Recorder::start(folder, rig, &file, started_us(clock))?;
+        let knowledge = board.map(|board| board.client().knowledge());
+        let baud = knowledge.as_ref().and_then(vergence_board::BoardKnowledge::baud);
+        recorder.begin(clock.now(), Beginning { has_board: board.is_some(), baud, period_us });
+        if let Some(knowledge) = knowledge {
+            let recorder = recorder.clone();
+            knowledge.listen(move |news| recorder.news(clock.now(), news));
+        }
+        Ok(Self { recorder, writing })
+    }
+
+    /// Ends the recording, and says what is in it.
+    ///
+    /// # Errors
+    /// A file that cannot be written.
+    pub async fn finish(self, folder: &Path, console: Console) -> Result<(), Failure> {
+        let recorded = self.writing.finish(self.recorder).await?;
+        console.say(format!("recorded {} images in {}", recorded.images, folder.display()))?;
+        if recorded.left_out > 0 {
+            console.warn(format!(
+                "the disk had no time for {} images, readings or clouds: record fewer frames (--rate), or on a faster disk",
+                recorded.left_out
+            ));
+        }
+        Ok(())
+    }
+}
