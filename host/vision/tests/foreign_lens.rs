@@ -14,8 +14,8 @@ use std::sync::LazyLock;
 use foreign_models::*;
 use nalgebra::{UnitQuaternion, Vector2, Vector3};
 use vergence_vision::{
-    BatchLens, Camera, CameraModel, Gates, ImageSize, InvalidLens, KannalaBrandt, Left, LensFit, Pixel, PixelPair,
-    Point, Right, SightRegion, StereoPair, Transform, cloud, fit_lens, model_of,
+    BatchLens, Camera, CameraModel, Gates, ImageSize, InvalidLens, KannalaBrandt, Left, Pixel, PixelPair, Point, Right,
+    SightRegion, StereoPair, Transform, cloud, fit_lens, model_of,
 };
 
 fn values(model: &dyn CameraModel) -> BTreeMap<String, f64> {
