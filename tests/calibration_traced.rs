@@ -141,7 +141,10 @@ fn measured<const N: usize>(optics: Optics, models: [&str; N], seeds: u64) -> [[
         optics.design, optics.views
     );
     let found = std::array::from_fn(|model| std::array::from_fn(|mode| mean(model, mode)));
-    for (model, of_model) in models.iter().zip(&found) {
+    for (index, (model, of_model)) in models.iter().zip(&found).enumerate() {
+        let of_seed = |trial: &[[Figures; 3]; N]| trial[index].iter().map(|mode| mode.nees).sum::<f64>() / 3.0;
+        let by_seed: Vec<_> = trials.iter().map(|trial| format!("{:.1}", of_seed(trial))).collect();
+        println!("  {model}, NEES over the modes by seed: {}", by_seed.join(" "));
         for ((mode, _), found) in MODES.iter().zip(of_model) {
             let Figures { nees, error_mm, stated_mm } = found;
             println!("  {model}, {mode}: {nees:.2}, {error_mm:.3} ({stated_mm:.3})");

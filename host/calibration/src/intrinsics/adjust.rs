@@ -205,8 +205,8 @@ pub(super) fn inlier_fit(
         drop_views(&mut views, &mut state, &mut left_out)?;
         let references: Vec<_> = views.iter().collect();
         let arrow = SchurOptions { iterations: 200, ..SchurOptions::default() };
-        let pulls = prior.and_then(|prior| prior.pulls(&views, &state));
-        let problem = Bundle { pulls, ..Bundle::of(&references, &free) };
+        let strength = prior.and_then(|prior| prior.strength(&views, &state));
+        let problem = Bundle { prior: strength, ..Bundle::of(&references, &free) };
         let solution = solve(&problem, state.shared, state.poses, &arrow);
         if matches!(solution.ending, Ending::Iterations | Ending::NotFinite) {
             return Err(IntrinsicsError::NotConverged);

@@ -5,7 +5,7 @@ use vergence_vision::Point;
 
 use super::lens::{LENS, LensParameters, reproject};
 use super::observations::{Observation, ObservedView};
-use super::prior::Pulls;
+use super::prior::{KNOWN, Known};
 use crate::reprojection::{POSE, moved};
 use crate::schur_lm::{Equations, SchurProblem};
 
@@ -77,14 +77,14 @@ impl Row {
 pub(super) struct Bundle<'a> {
     pub views: &'a [&'a ObservedView],
     pub free: &'a [usize],
-    /// What is known of the lens before any view.
-    pub pulls: Option<Pulls>,
+    /// How strongly what is known of lenses before any view counts, see [`super::prior::Prior::strength`].
+    pub prior: Option<f64>,
 }
 
 impl<'a> Bundle<'a> {
     /// The problem without a prior.
     pub const fn of(views: &'a [&'a ObservedView], free: &'a [usize]) -> Self {
-        Self { views, free, pulls: None }
+        Self { views, free, prior: None }
     }
 }
 
@@ -112,14 +112,19 @@ impl SchurProblem<POSE> for Bundle<'_> {
     }
 
     fn shared_residuals(&self, shared: &Shared, equations: &mut Equations<POSE>) {
-        let Some(pulls) = self.pulls else { return };
+        let Some(strength) = self.prior else { return };
         let values = shared.lens.to_array();
-        for (column, &parameter) in self.free.iter().enumerate() {
-            let Some((&pull, value)) = pulls.get(parameter).zip(values.get(parameter)) else { continue };
-            if pull > 0.0 {
-                let mut columns = vec![[0.0]; column + 1];
-                columns[column] = [pull];
-                equations.add_plain(&[pull * value], &columns, &[[0.0]; POSE]);
+        let place = |parameter: usize| self.free.iter().position(|&free| free == parameter);
+        for Known { sum, sigma } in &KNOWN {
+            let mut columns = vec![[0.0]; self.free.len()];
+            let mut off = 0.0;
+            for &(parameter, weight) in *sum {
+                let Some(column) = place(parameter) else { continue };
+                columns[column] = [strength * weight / sigma];
+                off += columns[column][0] * values[parameter];
+            }
+            if sum.first().is_some_and(|&(own, _)| place(own).is_some()) {
+                equations.add_plain(&[off], &columns, &[[0.0]; POSE]);
             }
         }
     }

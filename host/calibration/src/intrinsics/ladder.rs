@@ -10,12 +10,12 @@
 use vergence_vision::ImageSize;
 
 use super::adjust::{Adjusted, Terms, inlier_fit};
-use super::lens::{E1, LENS, with_valid_cone};
+use super::lens::with_valid_cone;
 use super::observations::ObservedView;
-use super::prior::Prior;
+use super::prior::{Prior, narrowest};
 use super::pupil;
 use super::report::outermost;
-use super::trial::{Trial, narrowing, scatter};
+use super::trial::{Trial, scatter};
 use super::{IntrinsicsError, IntrinsicsOptions, LensModel, PupilEvidence};
 
 /// Chi-squared by which the fit must get worse without parameters that count as found: of one unknown 5.5 standard deviations; of six unknowns
@@ -23,8 +23,6 @@ use super::{IntrinsicsError, IntrinsicsOptions, LensModel, PupilEvidence};
 pub(super) const LEAST_GAIN: f64 = 30.0;
 /// Chi-squared of the six unknowns of an asymmetry that chance exceeds once in 100 calibrations of a symmetric lens.
 const CHANCE_GAIN: f64 = 16.8;
-/// Odds for a symmetric lens, against one that is as badly mounted as the prior says, at which it counts as one.
-const ODDS: f64 = 20.0;
 
 /// Parameters that a lens gets together.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -170,11 +168,10 @@ impl<'a> Richest<'a> {
         }
     }
 
-    /// Whether views that narrow an asymmetry so much, and gain so little by it, tell that there is none: by the odds of both lenses where both
-    /// were as likely before (R. Kass and A. Raftery, "Bayes factors", J. American Statistical Association 90, 1995).
+    /// Whether the views tell that there is no asymmetry: one as large as badly mounted lenses have would have been found, whatever its
+    /// direction, and no more is there than chance gives.
     fn is_symmetric(&self, gain: f64) -> bool {
-        let narrowing = narrowing(&self.adjusted, |parameter| (E1 + 1..LENS).contains(&parameter), self.variance);
-        let is_asked_for = self.options.model == LensModel::Full;
-        !is_asked_for && gain <= CHANCE_GAIN && narrowing.is_some_and(|narrowing| narrowing - 0.5 * gain >= ODDS.ln())
+        let is_told = narrowest(&self.adjusted, self.variance).is_some_and(|left| left * LEAST_GAIN.sqrt() <= 1.0);
+        self.options.model != LensModel::Full && gain <= CHANCE_GAIN && is_told
     }
 }

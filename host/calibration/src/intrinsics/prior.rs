@@ -4,22 +4,66 @@
 //! covariance as large as that ignorance is. Without it a lens that is not of the model's family borrows a pupil of centimetres from views
 //! that hardly determine one.
 
-use vergence_vision::{LENS_PARAMETERS, median};
+use nalgebra::{DMatrix, SymmetricEigen};
+use vergence_vision::median;
 
-use super::adjust::State;
+use super::adjust::{Adjusted, State};
 use super::lens::{E0, E1};
 use super::observations::ObservedView;
 
-/// Standard deviation of e0 in millimetres: twice the focal length of common lenses.
-const E0_MM: f64 = 3.0;
-/// Of e1 in millimetres: the traced designs have 0.06 and 0.36 (`sigma8_f18`, `nikkor6_f28`).
-const E1_MM: f64 = 0.5;
-/// Of p1 and p2, of s0 and s2, of s1 and s3: those of `sigma8_f18` traced with every element 10 micrometres off the axis and tilted by 0.05
-/// degrees, and a sensor tilted by 0.4 degrees, which is a badly mounted lens (docs/measured/lenses.md).
-const ASYMMETRY: [f64; 6] = [P, P, S_SQUARE, S_FOURTH, S_SQUARE, S_FOURTH];
+/// A sum of parameters with weights, the first of them 1, that is zero within a standard deviation.
+pub(super) struct Known {
+    pub sum: &'static [(usize, f64)],
+    pub sigma: f64,
+}
+
+/// All that is known, each independent of the others.
+pub(super) const KNOWN: [Known; 8] = [
+    // e0 in millimetres: twice the focal length of common lenses.
+    Known { sum: &[(E0, 1.0)], sigma: 3.0 },
+    // e1 in millimetres: the traced designs have 0.06 and 0.36 (sigma8_f18, nikkor6_f28).
+    Known { sum: &[(E1, 1.0)], sigma: 0.5 },
+    Known { sum: &[(P1, 1.0)], sigma: P },
+    Known { sum: &[(P2, 1.0)], sigma: P },
+    Known { sum: &[(S0, 1.0), (P1, SQUARE_BY_P)], sigma: SQUARE },
+    Known { sum: &[(S2, 1.0), (P2, SQUARE_BY_P)], sigma: SQUARE },
+    Known { sum: &[(S1, 1.0), (P1, FOURTH_BY_P), (S0, FOURTH_BY_SQUARE)], sigma: FOURTH },
+    Known { sum: &[(S3, 1.0), (P2, FOURTH_BY_P), (S2, FOURTH_BY_SQUARE)], sigma: FOURTH },
+];
+
+// Indices of the parameters, in the order of `LENS_PARAMETERS`.
+const P1: usize = E1 + 1;
+const P2: usize = E1 + 2;
+const S0: usize = E1 + 3;
+const S1: usize = E1 + 4;
+const S2: usize = E1 + 5;
+const S3: usize = E1 + 6;
+
+// Decentring and thin prism of badly mounted lenses, which go together: `sigma8_f18` traced with every element 10 micrometres off the axis and
+// tilted by 0.05 degrees, and a sensor tilted by 0.4 degrees, has standard deviations of 7e-4 of p, 1.4e-3 of s0 and s2, 7e-4 of s1 and s3, and
+// correlations of -0.81 of the first two, -0.50 of the first and the last, 0.81 of the last two (docs/measured/lenses.md). Below, s0 beside
+// what p lets expect, and s1 beside what both do.
 const P: f64 = 7e-4;
-const S_SQUARE: f64 = 1.4e-3;
-const S_FOURTH: f64 = 7e-4;
+const SQUARE: f64 = 8.2e-4;
+const SQUARE_BY_P: f64 = 1.62;
+const FOURTH: f64 = 3.7e-4;
+const FOURTH_BY_P: f64 = -0.454;
+const FOURTH_BY_SQUARE: f64 = -0.589;
+
+/// By how much the views narrow what was known of decentring and thin prism, in the direction of them of which they say least: the standard
+/// deviation that is left, in parts of that before, where the variance of a residual is `variance`. `None` where that is not known.
+pub(super) fn narrowest(adjusted: &Adjusted, variance: f64) -> Option<f64> {
+    let covariance = adjusted.normal.shared_covariance()?;
+    let known = KNOWN.get(2..)?;
+    let mut by_free = DMatrix::zeros(known.len(), adjusted.free.len());
+    for (row, Known { sum, sigma }) in known.iter().enumerate() {
+        for (parameter, weight) in *sum {
+            by_free[(row, adjusted.free.iter().position(|free| free == parameter)?)] = weight / sigma;
+        }
+    }
+    let left = &by_free * covariance * by_free.transpose() * variance;
+    Some(SymmetricEigen::new(left).eigenvalues.max().max(0.0).sqrt())
+}
 
 /// How the prior weighs against the views.
 #[derive(Clone, Copy, Debug)]
@@ -29,28 +73,15 @@ pub(super) struct Prior {
     pub scatter: f64,
 }
 
-/// The pull of every parameter of the lens towards zero, in units of residuals per unit of the parameter.
-pub(super) type Pulls = [f64; LENS_PARAMETERS];
-
-/// Standard deviation of a parameter before anything is known of the lens; `None` for one of a central and symmetric lens, of which nothing is.
-pub(super) fn prior_sigma(parameter: usize) -> Option<f64> {
-    match parameter {
-        E0 => Some(E0_MM),
-        E1 => Some(E1_MM),
-        other => ASYMMETRY.get(other.checked_sub(E1 + 1)?).copied(),
-    }
-}
-
 impl Prior {
     /// Variance by which the prior is weighted, over that of the residuals.
     pub fn factor(self) -> f64 {
         self.scatter * self.scatter
     }
 
-    /// The pulls. Residuals weigh by their scale, so that the prior must be scaled too.
-    pub fn pulls(self, views: &[ObservedView], state: &State) -> Option<Pulls> {
-        let strength = self.scatter * noise(views, state)?;
-        Some(std::array::from_fn(|parameter| prior_sigma(parameter).map_or(0.0, |sigma| strength / sigma)))
+    /// By what to multiply what is known, in its standard deviations, to have it in units of residuals: these weigh by their scale.
+    pub fn strength(self, views: &[ObservedView], state: &State) -> Option<f64> {
+        Some(self.scatter * noise(views, state)?)
     }
 }
 

@@ -1,11 +1,11 @@
 //! A lens on trial: the fit of some of its parameters to corners that another fit used.
 
-use nalgebra::{Cholesky, DMatrix, Isometry3};
+use nalgebra::Isometry3;
 
 use super::adjust::{Adjusted, State, Terms};
 use super::bundle::{Bundle, Shared};
 use super::observations::ObservedView;
-use super::prior::{Prior, Pulls, prior_sigma};
+use super::prior::Prior;
 use crate::reprojection::POSE;
 use crate::schur_lm::{SchurNormal, SchurOptions, solve};
 
@@ -13,7 +13,8 @@ use crate::schur_lm::{SchurNormal, SchurOptions, solve};
 pub(super) struct Trial {
     /// The parameters adjusted.
     free: Vec<usize>,
-    pulls: Option<Pulls>,
+    /// How strongly the prior counts.
+    prior: Option<f64>,
     pub state: State,
     pub normal: SchurNormal<POSE>,
 }
@@ -30,11 +31,11 @@ impl Trial {
         let (free, start) = (terms.free(warp), adjusted.state().with_only(terms));
         let references: Vec<_> = adjusted.views.iter().collect();
         // By the noise of the richer fit, which is nearer to that of the corners.
-        let pulls = prior.pulls(&adjusted.views, &adjusted.state());
-        let problem = Bundle { pulls, ..Bundle::of(&references, &free) };
+        let prior = prior.strength(&adjusted.views, &adjusted.state());
+        let problem = Bundle { prior, ..Bundle::of(&references, &free) };
         let solution = solve(&problem, start.shared, start.poses, &SchurOptions::default());
         let state = State { shared: solution.shared, poses: solution.blocks };
-        Self { free, pulls, state, normal: solution.normal }
+        Self { free, prior, state, normal: solution.normal }
     }
 
     /// Standard deviation of a parameter where the variance of a residual is `variance`.
@@ -60,7 +61,7 @@ impl Trial {
         let (mut squares, mut count) = (0.0, 0);
         for (fitted, judged) in [(0, 1), (1, 0)] {
             let [(views, poses), (others, other_poses)] = [&halves[fitted], &halves[judged]];
-            let problem = Bundle { pulls: self.pulls, ..Bundle::of(views, &self.free) };
+            let problem = Bundle { prior: self.prior, ..Bundle::of(views, &self.free) };
             let lens = solve(&problem, self.state.shared, poses.clone(), &SchurOptions::default()).shared;
             let seen = solve(&Bundle::of(others, &[]), lens, other_poses.clone(), &SchurOptions::default());
             squares += 2.0 * seen.cost;
@@ -76,18 +77,4 @@ fn rms_px(views: &[ObservedView], shared: &Shared, poses: &[Isometry3<f64>]) -> 
     };
     let squares: f64 = views.iter().zip(poses).map(of_view).sum();
     (squares / views.iter().map(|view| view.used().count()).sum::<usize>() as f64).sqrt()
-}
-
-/// By how much views narrow what is known of the parameters in `group` before them: the logarithm of the ratio of both volumes, where the
-/// variance of a residual is `variance`. `None` where that is not known.
-pub(super) fn narrowing(adjusted: &Adjusted, group: impl Fn(usize) -> bool, variance: f64) -> Option<f64> {
-    let covariance = adjusted.normal.shared_covariance()?;
-    let found = adjusted.free.iter().enumerate().filter(|(_, parameter)| group(**parameter));
-    let chosen: Vec<(usize, f64)> =
-        found.map(|(index, &parameter)| Some((index, prior_sigma(parameter)?))).collect::<Option<_>>()?;
-    let scaled = DMatrix::from_fn(chosen.len(), chosen.len(), |row, column| {
-        let ((i, of_row), (k, of_column)) = (chosen[row], chosen[column]);
-        covariance[(i, k)] * variance / (of_row * of_column)
-    });
-    Some(-Cholesky::new(scaled)?.l().diagonal().map(f64::ln).sum())
 }

@@ -19,8 +19,8 @@ use crate::stage::mechanism::State;
 use crate::stage::model::Model;
 use crate::stage::unknowns::Unknown;
 
-/// Least fall of -2 ln L: readings that are as good as their encoder show it once in a thousand calibrations.
-const LEAST_FALL: f64 = 10.0;
+/// Least fall of -2 ln L: readings that are as good as their encoder show it once in a hundred calibrations.
+const LEAST_FALL: f64 = 6.0;
 /// From one σ tried to the next.
 const STEP: f64 = 1.25;
 /// Values of σ tried: up to four orders of magnitude above the stated one.
