@@ -39,6 +39,8 @@ pub(crate) struct Fit<S> {
     pub errors_px: Vec<Vec<f64>>,
     /// Standard deviation of a pixel coordinate in units of the corner's relative sigma.
     pub sigma: f64,
+    /// The same, by which what is known besides the corners was weighted.
+    pub sigma_of_priors: f64,
     /// Covariance of the shared unknowns' step as the views scatter; `None` if the corners do not determine it.
     pub covariance: Option<Clustered>,
     /// The same by independent noise of the corners alone.
@@ -109,6 +111,7 @@ impl<K: Kinematics> Task<'_, K> {
             // Priors are weighted by the corners' standard deviation, so that must settle too.
             let next_sigma = variance.sqrt().max(FINEST);
             let settled = next == inliers && (next_sigma - sigma).abs() <= 1e-3 * sigma;
+            let sigma_of_priors = sigma;
             sigma = next_sigma;
             if settled || round == MOST_ROUNDS {
                 let information = solution.normal.shared_information().ok_or(NoFit::NotDetermined)?;
@@ -121,6 +124,7 @@ impl<K: Kinematics> Task<'_, K> {
                     inliers,
                     errors_px,
                     sigma,
+                    sigma_of_priors,
                     covariance,
                     noise_covariance,
                     information,
