@@ -48,9 +48,10 @@ pub struct Match {
     pub left: Pixel,
     /// Pixel of the match in the right image.
     pub right: Pixel,
-    /// Standard deviations of both pixels where the match is right, along the epipolar curve and across it.
+    /// Standard deviations of both pixels, along the epipolar curve and across it. A match that is less probably right states larger ones.
     pub sigma: MatchSigma,
-    /// Probability from 0 to 1 that the match is right: that its parallax is off by at most three of its standard deviations.
+    /// Probability from 0 to 1 that the match is right: that its parallax is off by at most three standard deviations of such matches,
+    /// which are smaller than the stated ones of a match that may be wrong.
     pub score: f32,
     /// Whether the position was registered, to a small part of a pixel; else it is that of a keypoint.
     pub registered: bool,

@@ -102,8 +102,9 @@ fn parse_time(text: &str) -> Result<Duration, String> {
 }
 
 pub async fn run(args: &Args, common: &CommonOptions, console: Console) -> Result<(), Failure> {
-    let drawn = rig_file::load(common.rig.as_deref())?;
     let is_simulated = args.cameras == ["sim"];
+    let drawn = rig_file::load(common.rig.as_deref())?;
+    let drawn = if is_simulated { args.camera.simulated(drawn)? } else { drawn };
     if args.lens != LensChoice::Ideal && !is_simulated {
         return Err(Failure::usage("--lens is for simulated cameras: --port sim --cameras sim"));
     }
@@ -226,9 +227,6 @@ async fn connected(
     console: Console,
 ) -> Result<(Option<Board>, Option<SharedRig>), Failure> {
     let wants_simulated = args.cameras == ["sim"];
-    if wants_simulated {
-        args.camera.none_for_simulated()?;
-    }
     if rig.axes.is_empty() {
         return match wants_simulated {
             true => Err(Failure::usage(format!("rig '{}' has no axes to simulate", rig.name))),
