@@ -52,7 +52,7 @@ pub struct Match {
     pub sigma: MatchSigma,
     /// Probability from 0 to 1 that the match is right: that its parallax is off by at most three of its standard deviations.
     pub score: f32,
-    /// Whether the position was registered, to a small part of a pixel; else it is that of a keypoint.
+    /// Whether the position was registered, to a small part of a pixel; else its standard deviation is larger.
     pub registered: bool,
 }
 
@@ -105,6 +105,8 @@ pub enum UnmatchedReason {
     Duplicate,
     /// The windows in which it was registered probably show two surfaces: residuals, neighbouring windows and epipolar plane disagree.
     TwoSurfaces,
+    /// A match of a network that could not be registered, and is wrong with a probability of 7 % or more.
+    Doubtful,
 }
 
 impl UnmatchedReason {
@@ -124,6 +126,7 @@ impl UnmatchedReason {
             Self::Isolated => "isolated",
             Self::Duplicate => "duplicate",
             Self::TwoSurfaces => "two_surfaces",
+            Self::Doubtful => "doubtful",
         }
     }
 }
