@@ -53,7 +53,7 @@ pub struct Match {
     /// Probability from 0 to 1 that the match is right: that its parallax is off by at most three standard deviations of such matches,
     /// which are smaller than the stated ones of a match that may be wrong.
     pub score: f32,
-    /// Whether the position was registered, to a small part of a pixel; else it is that of a keypoint.
+    /// Whether the position was registered, to a small part of a pixel; else its standard deviation is larger.
     pub registered: bool,
 }
 
@@ -106,6 +106,8 @@ pub enum UnmatchedReason {
     Duplicate,
     /// The windows in which it was registered probably show two surfaces: residuals, neighbouring windows and epipolar plane disagree.
     TwoSurfaces,
+    /// A match of a network that could not be registered, and is wrong with a probability of 7 % or more.
+    Doubtful,
 }
 
 impl UnmatchedReason {
@@ -125,6 +127,7 @@ impl UnmatchedReason {
             Self::Isolated => "isolated",
             Self::Duplicate => "duplicate",
             Self::TwoSurfaces => "two_surfaces",
+            Self::Doubtful => "doubtful",
         }
     }
 }
