@@ -65,8 +65,10 @@ pub(crate) fn detect_within(
     let mut keypoints = Vec::with_capacity(budget);
     for (level, plane) in levels.iter().enumerate() {
         let share = budget >> (level + 1).min(levels.len() - 1);
-        let found: Vec<Corner> =
-            maxima(plane, rows.start >> level..(rows.end >> level) + 1, level).into_par_iter().filter(|corner| compared(&corner.keypoint)).collect();
+        let found: Vec<Corner> = maxima(plane, rows.start >> level..(rows.end >> level) + 1, level)
+            .into_par_iter()
+            .filter(|corner| compared(&corner.keypoint))
+            .collect();
         keypoints.extend(spread(found, share).iter().map(|corner| corner.keypoint));
     }
     keypoints.sort_by(|p, q| p.at.y.total_cmp(&q.at.y).then(p.at.x.total_cmp(&q.at.x)).then(p.level.cmp(&q.level)));
@@ -141,13 +143,19 @@ fn maxima(plane: &Plane, rows: Range<usize>, level: usize) -> Vec<Corner> {
     const R: usize = SUPPRESSION_RADIUS;
     let around = rows.start.saturating_sub(R)..(rows.end + R).min(plane.height());
     let (top, response) = (around.start, response(plane, around));
-    (R..response.height().saturating_sub(R))
-        .into_par_iter()
-        .flat_map_iter(|y| (R..response.width() - R).filter_map({
-            let response = &response;
-            move |x| maximum_at(response, (x, y), level, top)
-        }))
-        .collect()
+    let inner = R..response.width().saturating_sub(R);
+    let in_row = |y: usize| {
+        let (above, here, below) = (response.row(y - 1), response.row(y), response.row(y + 1));
+        // Most pixels are no maximum already beside these.
+        let is_candidate = |x: &usize| {
+            let (x, centre) = (*x, here[*x]);
+            let beside = here[x + 1] <= centre && here[x - 1] < centre;
+            beside && centre >= LEAST_STRENGTH && below[x] <= centre && above[x] < centre
+        };
+        let found = inner.clone().filter(is_candidate);
+        found.filter_map(|x| maximum_at(&response, (x, y), level, top)).collect::<Vec<_>>()
+    };
+    (R..response.height().saturating_sub(R)).into_par_iter().flat_map_iter(in_row).collect()
 }
 
 /// The corner at (x, y), if the response is largest there and the quadratic through its neighbours peaks nearby. The first row of the
@@ -155,13 +163,6 @@ fn maxima(plane: &Plane, rows: Range<usize>, level: usize) -> Vec<Corner> {
 fn maximum_at(response: &Plane, (x, y): (usize, usize), level: usize, top: usize) -> Option<Corner> {
     const R: usize = SUPPRESSION_RADIUS;
     let centre = response.at(x, y);
-    if centre < LEAST_STRENGTH {
-        return None;
-    }
-    // Most pixels are no maximum already beside these.
-    if response.at(x + 1, y) > centre || response.at(x - 1, y) >= centre || response.at(x, y + 1) > centre {
-        return None;
-    }
     // Of equal neighbours the first by rows counts as the maximum.
     let beaten = (y - R..=y + R).flat_map(|j| (x - R..=x + R).map(move |i| (i, j))).any(|(i, j)| {
         let other = response.at(i, j);

@@ -95,7 +95,9 @@ fn add(
     (row, past, weight): (usize, f32, f32),
 ) {
     for i in 0..SIDE {
-        let (direction, beyond) = (turn[i] as usize % DIRECTIONS, turn[i].fract());
+        // Turns are not negative, and a conversion to few bits is quick.
+        let whole = turn[i] as u8;
+        let (direction, beyond) = (usize::from(whole) % DIRECTIONS, turn[i] - f32::from(whole));
         let next = (direction + 1) % DIRECTIONS;
         let magnitude = magnitude[i] * weight;
         for (j, wj) in [(row, 1.0 - past), (row + 1, past)] {

@@ -51,7 +51,11 @@ impl<'a> Surroundings<'a> {
     pub(crate) fn within(pyramid: &'a Pyramid, rows: Range<usize>) -> Option<Self> {
         let plane = pyramid.levels().get(LEVEL)?;
         let rows = (rows.start >> LEVEL).saturating_sub(BESIDE)..(rows.end >> LEVEL).saturating_add(BESIDE);
-        let prepare = |y: usize, out: &mut [f32]| if rows.contains(&y) { inverse_norms(plane, y, out) };
+        let prepare = |y: usize, out: &mut [f32]| {
+            if rows.contains(&y) {
+                inverse_norms(plane, y, out)
+            }
+        };
         Some(Self { plane, inverse_norm: plane.like(prepare) })
     }
 

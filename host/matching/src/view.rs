@@ -229,17 +229,28 @@ impl Line {
     }
 }
 
-/// Pixels between the second and the third of four knots, by Lagrange's cubic.
+/// Weights of four knots at each column from the second to the third, by Lagrange's cubic.
+const BETWEEN: [[f64; 4]; KNOT] = {
+    let mut weights = [[0.0; 4]; KNOT];
+    let mut i = 0;
+    while i < KNOT {
+        let t = i as f64 / KNOT as f64;
+        let (before, after, beyond) = (t + 1.0, t - 1.0, t - 2.0);
+        weights[i] = [
+            -t * after * beyond / 6.0,
+            before * after * beyond / 2.0,
+            -before * t * beyond / 2.0,
+            before * t * after / 6.0,
+        ];
+        i += 1;
+    }
+    weights
+};
+
+/// Pixels between the second and the third of four knots.
 fn interpolate(knots: &[[f64; 2]], pixels: &mut [[f64; 2]]) {
     let &[p, q, r, s] = knots else { return };
-    for (i, pixel) in pixels.iter_mut().enumerate() {
-        let t = i as f64 / KNOT as f64;
-        let weights = [
-            -t * (t - 1.0) * (t - 2.0) / 6.0,
-            (t + 1.0) * (t - 1.0) * (t - 2.0) / 2.0,
-            -(t + 1.0) * t * (t - 2.0) / 2.0,
-            (t + 1.0) * t * (t - 1.0) / 6.0,
-        ];
+    for (pixel, weights) in pixels.iter_mut().zip(&BETWEEN) {
         *pixel = std::array::from_fn(|k| weights[0] * p[k] + weights[1] * q[k] + weights[2] * r[k] + weights[3] * s[k]);
     }
 }
@@ -247,29 +258,38 @@ fn interpolate(knots: &[[f64; 2]], pixels: &mut [[f64; 2]]) {
 /// Samples an image at the pixels of a row that are `seen`; what the image's border leaves out is not seen. Unseen pixels are black.
 #[multiversion(targets("x86_64+avx2"))]
 fn sample_line(image: &[u8], width: usize, pixels: &[[f64; 2]], seen: &mut [bool], values: &mut [f32]) {
-    for ((&[u, v], seen), value) in pixels.iter().zip(seen).zip(values) {
-        let sampled = if *seen { sample_image(image, width, Pixel { u, v }) } else { None };
-        *seen = sampled.is_some();
-        *value = sampled.unwrap_or_default();
+    const TOGETHER: usize = 32;
+    let chunks = pixels.chunks(TOGETHER).zip(seen.chunks_mut(TOGETHER)).zip(values.chunks_mut(TOGETHER));
+    for ((pixels, seen), values) in chunks {
+        let (mut firsts, mut across, mut down) =
+            ([0_u32; TOGETHER], [[0.0_f32; 4]; TOGETHER], [[0.0_f32; 4]; TOGETHER]);
+        for (i, (&[u, v], seen)) in pixels.iter().zip(seen.iter()).enumerate() {
+            // Pixels that are seen are at least one pixel inside the image.
+            let (u, v) = if *seen { (u, v) } else { (1.0, 1.0) };
+            let (column, row) = (u as u32, v as u32);
+            across[i] = cubic_weights((u - f64::from(column)) as f32);
+            down[i] = cubic_weights((v - f64::from(row)) as f32);
+            firsts[i] = row.saturating_sub(1) * width as u32 + column.saturating_sub(1);
+        }
+        for (i, (seen, value)) in seen.iter_mut().zip(values).enumerate() {
+            let sampled =
+                if *seen { sample_image(image, width, firsts[i] as usize, [&across[i], &down[i]]) } else { None };
+            *seen = sampled.is_some();
+            *value = sampled.unwrap_or_default();
+        }
     }
 }
 
-/// Interpolates the brightness of an 8-bit image; `None` where the 4 × 4 pixels around are not all inside.
+/// Interpolates the brightness of an 8-bit image in the 4 × 4 pixels from `first` on; `None` where they are not all inside.
 #[inline(always)]
-fn sample_image(pixels: &[u8], width: usize, at: Pixel) -> Option<f32> {
-    let (column, row) = (at.u as u32, at.v as u32);
-    let wu = cubic_weights((at.u - f64::from(column)) as f32);
-    let wv = cubic_weights((at.v - f64::from(row)) as f32);
-    let first = (row.checked_sub(1)? as usize) * width + column.checked_sub(1)? as usize;
-    if column as usize + 3 > width {
-        return None;
-    }
+fn sample_image(pixels: &[u8], width: usize, first: usize, [across, down]: [&[f32; 4]; 2]) -> Option<f32> {
+    let around = pixels.get(first..first + 3 * width + 4)?;
     let mut mixed = [0.0_f32; 4];
-    for (j, weight) in wv.iter().enumerate() {
-        let taps: &[u8; 4] = pixels.get(first + j * width..)?.first_chunk()?;
+    for (j, weight) in down.iter().enumerate() {
+        let taps: &[u8; 4] = around.get(j * width..)?.first_chunk()?;
         for (sum, tap) in mixed.iter_mut().zip(taps) {
             *sum += weight * f32::from(*tap);
         }
     }
-    Some(wu[0] * mixed[0] + wu[1] * mixed[1] + wu[2] * mixed[2] + wu[3] * mixed[3])
+    Some(across[0] * mixed[0] + across[1] * mixed[1] + across[2] * mixed[2] + across[3] * mixed[3])
 }

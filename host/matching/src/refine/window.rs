@@ -54,11 +54,17 @@ pub(super) struct Window {
 }
 
 impl Window {
+    /// A window without content, to be filled in place: it is too large to be moved about.
     #[inline(always)]
-    pub(super) fn new(values: &Padded) -> Self {
+    pub(super) const fn empty() -> Self {
+        Self { columns: [EMPTY; UNKNOWNS], weighted: [EMPTY; UNKNOWNS] }
+    }
+
+    #[inline(always)]
+    pub(super) fn fill(&mut self, values: &Padded) {
         let mean = values[HALF + 1][HALF + 1];
-        let mut columns = [EMPTY; UNKNOWNS];
-        let [by_x, by_y, by_ux, by_vx, level, one, by_u, by_v] = columns.each_mut().map(|it| it.as_flattened_mut());
+        let [by_x, by_y, by_ux, by_vx, level, one, by_u, by_v] =
+            self.columns.each_mut().map(|it| it.as_flattened_mut());
         for j in 0..SIDE {
             let v = offset(j) / HALF as f32;
             let row = SIDE * j..SIDE * (j + 1);
@@ -78,13 +84,13 @@ impl Window {
             }
         }
         let weights: &Patch = &WEIGHTS;
-        let mut weighted = columns;
-        for column in &mut weighted {
-            for (values, weights) in column.iter_mut().zip(weights) {
-                values.iter_mut().zip(weights).for_each(|(value, weight)| *value *= weight);
+        for (weighted, column) in self.weighted.iter_mut().zip(&self.columns) {
+            for c in 0..weights.len() {
+                for l in 0..LANES {
+                    weighted[c][l] = column[c][l] * weights[c][l];
+                }
             }
         }
-        Self { columns, weighted }
     }
 
     #[inline(always)]

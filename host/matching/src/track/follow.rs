@@ -18,7 +18,8 @@ pub(super) fn followed(before: &Before, seen: &Seen<'_>) -> Vec<Track> {
     let follow = |track: &Track| {
         let predicted = new.position_of(old.a(track.at.x), old.b(track.at.y));
         let planes = [&before.left, &seen.left];
-        let found = register(planes, track.at, predicted, 0).or_else(|_| register(planes, track.at, predicted, LEVELS - 1));
+        let found =
+            register(planes, track.at, predicted, 0).or_else(|_| register(planes, track.at, predicted, LEVELS - 1));
         let at = found.ok()?.right;
         let moved = moved(before, seen, track, at);
         seen.views.shared_from_left(&Keypoint { at, level: 0 }).then_some(Track { at, moved, ..*track })

@@ -12,7 +12,6 @@
 mod follow;
 mod search;
 
-use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::{Mutex, PoisonError};
 
 use rayon::prelude::*;
@@ -35,15 +34,13 @@ use crate::{Grid, GuidedMatcher, ImagePair, MatchError, Matcher, Matches, Unmatc
 pub struct TrackingMatcher {
     /// Searches whole pairs.
     whole: GuidedMatcher,
-    /// Largest number of tracks.
-    most: AtomicUsize,
     state: Mutex<State>,
 }
 
 /// Keypoints of each view when a whole pair is searched: about half of them become tracks.
 const KEYPOINTS: usize = 2000;
-/// Default of the largest number of tracks.
-const MOST: usize = 800;
+/// Largest number of tracks.
+const MOST: usize = 700;
 /// Density of the views in pixels per pixel of the images: registration needs no more.
 const OVERSAMPLING: f64 = 1.0;
 /// Pairs in which a track may fail a test one after the other before it ends.
@@ -53,20 +50,21 @@ const FEW: f64 = 0.5;
 
 impl Default for TrackingMatcher {
     fn default() -> Self {
-        Self::new(GuidedMatcher { keypoints: KEYPOINTS, oversampling: Some(OVERSAMPLING) })
+        Self::with_keypoints(KEYPOINTS)
     }
 }
 
 impl TrackingMatcher {
-    /// Finds new tracks as `whole` would find matches.
+    /// Searches a whole pair as `whole` does.
     #[must_use]
     pub fn new(whole: GuidedMatcher) -> Self {
-        Self { whole, most: AtomicUsize::new(MOST), state: Mutex::default() }
+        Self { whole, state: Mutex::default() }
     }
 
-    /// Follows at most `most` points from the next pair on; the youngest tracks end first.
-    pub fn limit(&self, most: usize) {
-        self.most.store(most, Ordering::Relaxed);
+    /// The same with so many keypoints of each view when a whole pair is searched.
+    #[must_use]
+    pub fn with_keypoints(keypoints: usize) -> Self {
+        Self::new(GuidedMatcher { keypoints, oversampling: Some(OVERSAMPLING) })
     }
 }
 
@@ -80,7 +78,7 @@ impl Matcher for TrackingMatcher {
         pair.check()?;
         // A poisoned lock only means that another thread panicked; the tracks are replaced whole.
         let mut state = self.state.lock().unwrap_or_else(PoisonError::into_inner);
-        state.find(pair, &self.whole, self.most.load(Ordering::Relaxed))
+        state.find(pair, &self.whole)
     }
 }
 
@@ -130,19 +128,19 @@ struct Seen<'a> {
 }
 
 impl State {
-    fn find(&mut self, pair: &ImagePair<'_>, whole: &GuidedMatcher, most: usize) -> Result<Matches, MatchError> {
+    fn find(&mut self, pair: &ImagePair<'_>, whole: &GuidedMatcher) -> Result<Matches, MatchError> {
         let cameras = [*pair.left_camera, *pair.right_camera];
         let before = self.before.take().filter(|before| before.cameras == cameras);
         let kept = before.as_ref().filter(|before| is_near(&before.pose, &pair.left_from_right));
         let grid = kept.map(|before| before.grid);
         let views = SharedViews::in_buffers(pair, whole.oversampling, grid, &mut self.buffers)?;
-        let [left, right] =
-            [&views.left.plane(), &views.right.plane()].map(|plane| Pyramid::in_buffers(plane, LEVELS, &mut self.buffers.values));
+        let [left, right] = [&views.left.plane(), &views.right.plane()]
+            .map(|plane| Pyramid::in_buffers(plane, LEVELS, &mut self.buffers.values));
         let seen = Seen { band: views.band(), views, left, right };
-        let mut tracks = before.as_ref().map_or_else(Vec::new, |before| followed(before, &seen));
-        tracks.truncate(most);
-        let strip = self.next_strip(&seen.views.grid, before.is_none() || (tracks.len() as f64) < FEW * self.at_first as f64);
-        let (matches, tracks) = self.matched(&seen, tracks, &strip, (whole, most));
+        let tracks = before.as_ref().map_or_else(Vec::new, |before| followed(before, &seen));
+        let strip =
+            self.next_strip(&seen.views.grid, before.is_none() || (tracks.len() as f64) < FEW * self.at_first as f64);
+        let (matches, tracks) = self.matched(&seen, tracks, &strip, whole.keypoints);
         if strip.is_whole {
             self.at_first = tracks.len();
         }
@@ -173,10 +171,10 @@ impl State {
         seen: &Seen<'_>,
         mut tracks: Vec<Track>,
         strip: &Strip,
-        (whole, most): (&GuidedMatcher, usize),
+        budget: usize,
     ) -> (Matches, Vec<Track>) {
         let (new, right_keypoints) =
-            if tracks.len() < most { newly_found(seen, &tracks, strip, whole.keypoints) } else { (Vec::new(), 0) };
+            if tracks.len() < MOST { newly_found(seen, &tracks, strip, budget) } else { (Vec::new(), 0) };
         let known = tracks.len();
         let followed = tracks.iter().map(|track| Keypoint { at: track.at, level: 0 });
         let keypoints: Vec<Keypoint> = followed.chain(new.iter().map(|(keypoint, _)| *keypoint)).collect();
@@ -205,17 +203,17 @@ impl State {
         let ended = |reason: &UnmatchedReason| matches!(reason, UnmatchedReason::Duplicate | UnmatchedReason::Repeated);
         let mut ends = links.iter().map(|link| link.as_ref().err().is_some_and(ended));
         tracks.retain(|track| !ends.next().unwrap_or_default() && track.missed < PATIENCE);
-        self.begin(&mut tracks, &keypoints[known..], &mut links[known..], most);
+        self.begin(&mut tracks, &keypoints[known..], &mut links[known..]);
         let right_keypoints = right_keypoints + known;
         (in_originals(&links, &seen.views, &keypoints, right_keypoints), tracks)
     }
 
     /// Begins tracks with the new links, the most probable first, as long as there is room.
-    fn begin(&mut self, tracks: &mut Vec<Track>, keypoints: &[Keypoint], links: &mut [Result<Link, UnmatchedReason>], most: usize) {
+    fn begin(&mut self, tracks: &mut Vec<Track>, keypoints: &[Keypoint], links: &mut [Result<Link, UnmatchedReason>]) {
         let mut found: Vec<(&Keypoint, &mut Link)> =
             keypoints.iter().zip(links).filter_map(|(keypoint, link)| Some((keypoint, link.as_mut().ok()?))).collect();
         found.sort_by(|(_, one), (_, other)| other.right_probability.total_cmp(&one.right_probability));
-        for (keypoint, link) in found.into_iter().take(most.saturating_sub(tracks.len())) {
+        for (keypoint, link) in found.into_iter().take(MOST.saturating_sub(tracks.len())) {
             let moved = [link.right.x - keypoint.at.x, link.right.y - keypoint.at.y];
             link.track = Some(self.next);
             tracks.push(Track { number: self.next, at: keypoint.at, moved, missed: 0 });
