@@ -8,11 +8,13 @@ use vergence_vision::{
 };
 
 /// A matcher: finds the pixels of scene points that both images of a pair show.
+///
+/// What it finds depends on the pair alone, but for [`crate::TrackingMatcher`], which follows what it found in the pairs before.
 pub trait Matcher: Send + Sync {
     /// A short name for logs and reports.
     fn name(&self) -> &str;
 
-    /// Finds the matches of `pair`, in an order that depends on the pair alone. Images without texture give no matches,
+    /// Finds the matches of `pair`, in an order that depends on the input alone. Images without texture give no matches,
     /// which is not an error.
     ///
     /// # Errors
@@ -55,6 +57,8 @@ pub struct Match {
     pub score: f32,
     /// Whether the position was registered, to a small part of a pixel; else its standard deviation is larger.
     pub registered: bool,
+    /// The number of the track that shows the same place in the pairs before; `None` by a matcher that does not follow places.
+    pub track: Option<u64>,
 }
 
 impl Match {

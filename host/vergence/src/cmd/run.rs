@@ -11,7 +11,7 @@ use std::time::Duration;
 use tokio::sync::mpsc;
 use vergence_board::{Board, HostClock, Port, fresh_session};
 use vergence_files::make_folder;
-use vergence_live::{Ended, Limits, LiveLoop, MatchingTime, Totals, Tour};
+use vergence_live::{Ended, Limits, LiveLoop, MatchingTime, Pace, Totals, Tour};
 use vergence_output::{PlyEncoding, TableFormat, check_folder};
 use vergence_pipeline::Exposures;
 use vergence_protocol::{Request, Trigger};
@@ -122,7 +122,7 @@ pub async fn run(args: &Args, common: &CommonOptions, console: Console) -> Resul
     let (tour, search) = (args.tour.tour(&rig)?, args.search.search(&rig)?);
     // A simulated camera shows nothing beyond the field in which it is known.
     let measuring = Arc::new(args.search.measuring(rig.clone())?);
-    let matcher = Arc::from(args.matching.matcher(console)?);
+    let matcher = Arc::from(args.matching.live(console)?);
     let (mut board, simulated) = connected(args, common, [&drawn, &rig], console).await?;
     // Images and pulses are stamped on the clock of the link.
     let clock = board.as_ref().map_or_else(HostClock::start, |board| board.client().clock());
@@ -169,6 +169,7 @@ pub async fn run(args: &Args, common: &CommonOptions, console: Console) -> Resul
         also: args.also.iter().copied().map(TableFormat::from).collect(),
         encoding: PlyEncoding::of(args.ascii),
         number: 0,
+        pace: Pace::default(),
     };
     let mut totals = Totals::default();
     if let (Some(board), Some(period)) = (&board, period) {
