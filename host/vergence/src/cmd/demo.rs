@@ -2,6 +2,7 @@
 
 use std::cell::Cell;
 use std::future::pending;
+use std::net::SocketAddr;
 use std::path::PathBuf;
 use std::sync::Arc;
 
@@ -15,6 +16,7 @@ use vergence_reproduce::{DemoError, LensedRig, TRUE_LENS};
 use vergence_rig::{Rig, rounded};
 use vergence_scene::LensChoice;
 
+use super::panel;
 use crate::cli::CommonOptions;
 use crate::console::Console;
 use crate::failure::Failure;
@@ -48,9 +50,17 @@ pub struct Args {
     /// controller runs, and nothing is rendered or written.
     #[arg(long, value_name = "COUNT", value_parser = clap::value_parser!(u32).range(1..=10_000))]
     corridors: Option<u32>,
+    /// Shows the rig on a page instead, on which it is driven: 'vergence panel' of a simulated rig, with ideal lenses unless --lens says
+    /// otherwise. Nothing is written.
+    #[arg(long, value_name = "ADDRESS", num_args = 0..=1, default_missing_value = "127.0.0.1:8088", conflicts_with_all = ["corridors", "auto", "out"])]
+    panel: Option<SocketAddr>,
 }
 
 pub async fn run(args: &Args, common: &CommonOptions, console: Console) -> Result<(), Failure> {
+    if let Some(listen) = args.panel {
+        let lens = args.lens.unwrap_or(LensChoice::Ideal);
+        return panel::demonstrate(listen, (lens, args.seed), common, console).await;
+    }
     let whole = Stopwatch::start();
     check_folder(&args.out)?;
     let rig = rig_file::load(common.rig.as_deref())?;

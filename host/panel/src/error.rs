@@ -1,0 +1,20 @@
+//! Why the panel cannot be shown.
+
+use std::net::SocketAddr;
+
+/// Why the panel cannot be shown. The text is a sentence.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[non_exhaustive]
+pub enum PanelError {
+    /// The address cannot be listened on.
+    #[error("the panel cannot listen on {address}: {why}; choose another with --listen, port 0 takes a free one")]
+    Listen {
+        /// The address.
+        address: SocketAddr,
+        /// What the operating system says.
+        why: String,
+    },
+    /// The server cannot begin.
+    #[error("the server of the panel does not start: {0}")]
+    Server(String),
+}
