@@ -1,13 +1,19 @@
 // A slider and a number for every axis. The rig moves when the slider is let go or the number is entered.
+// Arrow keys step a slider again and again: the rig goes where they have ended.
+const PAUSE_MS = 250;
 const byId = (id) => document.getElementById(id);
 
 export function showAxes(link) {
   let rows = [];
   // Sliders follow the axes unless somebody holds them.
   let held = false;
+  let waiting = 0;
   const go = () => {
-    held = false;
-    link.send({ do: 'move', to: rows.map(({ slider }) => Number(slider.value)) });
+    clearTimeout(waiting);
+    waiting = setTimeout(() => {
+      held = false;
+      link.send({ do: 'move', to: rows.map(({ slider }) => Number(slider.value)) });
+    }, PAUSE_MS);
   };
   link.on('hello', ({ axes }) => {
     rows = axes.map((axis) => row(axis));

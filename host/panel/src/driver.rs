@@ -9,13 +9,12 @@ use std::time::Duration;
 use tokio::sync::mpsc::Receiver;
 use tokio::time::{MissedTickBehavior, interval};
 use vergence_board::{Board, BoardError, describe_fault};
-use vergence_protocol::Request;
+use vergence_protocol::{Request, Trigger};
 
 use crate::board_log::read_recorder;
 use crate::hub::{Given, Hub, Task};
 use crate::log::Level;
 use crate::message::Order;
-use crate::panel::Pulses;
 
 /// How often the flight recorder is read while nothing moves.
 const RECORDER: Duration = Duration::from_secs(1);
@@ -31,25 +30,26 @@ impl Driver {
         Self { hub, orders }
     }
 
-    /// Follows `board`, and carries orders out until the link ends. Once all axes have their reference, the board is asked for `pulses`.
+    /// Follows `board`, and carries orders out until the link ends. Once all axes have their reference, the camera
+    /// trigger does what `trigger` says.
     ///
     /// A stop, an order that replaces another, and a page that drove and is gone or silent end a motion: the stages brake, and the board is
     /// disarmed. A fault ends it too; it stays latched until a page clears it.
-    pub async fn drive(mut self, board: &mut Board, pulses: Pulses) -> BoardError {
-        match self.follow(board, pulses).await {
+    pub async fn drive(mut self, board: &mut Board, trigger: Option<Trigger>) -> BoardError {
+        match self.follow(board, trigger).await {
             Ok(never) => match never {},
             Err(error) => error,
         }
     }
 
-    async fn follow(&mut self, board: &mut Board, mut pulses: Pulses) -> Result<Infallible, BoardError> {
+    async fn follow(&mut self, board: &mut Board, mut trigger: Option<Trigger>) -> Result<Infallible, BoardError> {
         let mut recorder = interval(RECORDER);
         recorder.set_missed_tick_behavior(MissedTickBehavior::Skip);
         let mut next_event = 0;
         loop {
             if board.is_referenced() {
-                if let Some(pulses) = pulses.take() {
-                    board.ask(Request::SetTrigger(pulses)).await?;
+                if let Some(trigger) = trigger.take() {
+                    board.ask(Request::SetTrigger(trigger)).await?;
                 }
                 self.hub.referenced.send_if_modified(|known| !std::mem::replace(known, true));
             }

@@ -1,9 +1,12 @@
-//! Why the panel cannot be shown.
+//! Why the panel cannot be shown, or ended.
 
 use std::net::SocketAddr;
 
-/// Why the panel cannot be shown. The text is a sentence.
-#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+use vergence_board::BoardError;
+use vergence_live::LiveError;
+
+/// Why the panel cannot be shown, or ended. The text is a sentence.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum PanelError {
     /// The address cannot be listened on.
@@ -17,4 +20,10 @@ pub enum PanelError {
     /// The server cannot begin.
     #[error("the server of the panel does not start: {0}")]
     Server(String),
+    /// The board or its link failed.
+    #[error(transparent)]
+    Board(#[from] BoardError),
+    /// The live loop failed.
+    #[error(transparent)]
+    Live(#[from] LiveError),
 }

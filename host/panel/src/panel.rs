@@ -7,7 +7,6 @@ use tokio::sync::mpsc::{Receiver, channel};
 use vergence_board::Board;
 use vergence_camera::CameraEvent;
 use vergence_live::LiveResult;
-use vergence_protocol::Trigger;
 use vergence_vision::Side;
 
 use crate::cloud::cloud_message;
@@ -93,6 +92,3 @@ impl Panel {
         }
     }
 }
-
-/// The pulses of the camera trigger that the board is asked for once its axes have their reference; `None` asks for none.
-pub type Pulses = Option<Trigger>;

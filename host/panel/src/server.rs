@@ -29,6 +29,7 @@ const CHECK: Duration = Duration::from_millis(100);
 /// A panel that is served; dropping it closes all pages.
 pub struct Serving {
     address: SocketAddr,
+    url: String,
     end: Option<oneshot::Sender<()>>,
     thread: Option<JoinHandle<()>>,
 }
@@ -38,6 +39,12 @@ impl Serving {
     #[must_use]
     pub const fn address(&self) -> SocketAddr {
         self.address
+    }
+
+    /// The address to open in a browser, with the token where one is needed.
+    #[must_use]
+    pub fn url(&self) -> &str {
+        &self.url
     }
 }
 
@@ -66,6 +73,10 @@ pub fn serve(hub: Arc<Hub>, listener: TcpListener, access: Access) -> Result<Ser
     listener.set_nonblocking(true).map_err(failed)?;
     let runtime = tokio::runtime::Builder::new_current_thread().enable_all().build().map_err(failed)?;
     let (end, ended) = oneshot::channel::<()>();
+    let url = match &access {
+        Access::Token(token) => format!("http://{address}/?token={token}"),
+        Access::ThisComputer => format!("http://{address}/"),
+    };
     let served = Served { hub: Arc::clone(&hub), access: Arc::new(access) };
     let router = Router::new()
         .route("/socket", any(socket))
@@ -87,7 +98,7 @@ pub fn serve(hub: Arc<Hub>, listener: TcpListener, access: Access) -> Result<Ser
         // A computation that a page asked for must not hold up the end.
         runtime.shutdown_background();
     });
-    Ok(Serving { address, end: Some(end), thread: Some(thread.map_err(failed)?) })
+    Ok(Serving { address, url, end: Some(end), thread: Some(thread.map_err(failed)?) })
 }
 
 async fn watch_driver(hub: &Hub) {

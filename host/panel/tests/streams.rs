@@ -3,10 +3,11 @@
 
 mod common;
 
-use std::time::{Duration, Instant};
+use std::time::Duration;
 
 use common::{Bench, open, show_cloud};
 use serde_json::json;
+use tokio::time::Instant;
 use tokio_tungstenite::tungstenite::Error;
 use vergence_panel::Access;
 

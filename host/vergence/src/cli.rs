@@ -265,7 +265,10 @@ fn execute(cli: Cli, virtual_time: bool) -> Result<(), Failure> {
             Verb::Image(args) => cmd::image::run(&args, console),
             Verb::Bench(args) => cmd::bench::run(&args, console),
             Verb::Soak(args) => cmd::soak::run(&args, console),
-            Verb::Demo(verb) => cmd::demo::run(&verb.args, &verb.options.given(), console).await,
+            Verb::Demo(verb) => match verb.args.on_a_page() {
+                Some(shown) => cmd::panel::demonstrate(shown, &verb.options.given(), console).await,
+                None => cmd::demo::run(&verb.args, &verb.options.given(), console).await,
+            },
             Verb::Run(verb) => cmd::run::run(&verb.args, &verb.options.chosen()?, console).await,
             Verb::Panel(verb) => cmd::panel::run(&verb.args, &verb.options.chosen()?, console).await,
             Verb::Reproduce(args) => cmd::reproduce::run(&args, console).await,

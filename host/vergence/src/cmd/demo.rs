@@ -16,7 +16,6 @@ use vergence_reproduce::{DemoError, LensedRig, TRUE_LENS};
 use vergence_rig::{Rig, rounded};
 use vergence_scene::LensChoice;
 
-use super::panel;
 use crate::cli::CommonOptions;
 use crate::console::Console;
 use crate::failure::Failure;
@@ -56,11 +55,14 @@ pub struct Args {
     panel: Option<SocketAddr>,
 }
 
-pub async fn run(args: &Args, common: &CommonOptions, console: Console) -> Result<(), Failure> {
-    if let Some(listen) = args.panel {
-        let lens = args.lens.unwrap_or(LensChoice::Ideal);
-        return panel::demonstrate(listen, (lens, args.seed), common, console).await;
+impl Args {
+    /// Where the rig is shown on a page instead, with which lenses and seed.
+    pub fn on_a_page(&self) -> Option<(SocketAddr, LensChoice, u64)> {
+        Some((self.panel?, self.lens.unwrap_or(LensChoice::Ideal), self.seed))
     }
+}
+
+pub async fn run(args: &Args, common: &CommonOptions, console: Console) -> Result<(), Failure> {
     let whole = Stopwatch::start();
     check_folder(&args.out)?;
     let rig = rig_file::load(common.rig.as_deref())?;

@@ -5,10 +5,9 @@ use std::sync::Arc;
 
 use clap::{Args as _, FromArgMatches};
 use serde_json::json;
-use vergence_board::{Board, fresh_secret, hex};
-use vergence_live::{Ended, Limits, LiveLoop, LiveResult, MatchingTime, Totals};
-use vergence_panel::{Access, Driver, Panel, PanelError, Serving, Setting};
-use vergence_protocol::{Request, Trigger};
+use vergence_board::{fresh_secret, hex};
+use vergence_live::{Ended, MatchingTime};
+use vergence_panel::{Access, Panel, PanelError, Session, Setting};
 use vergence_scene::LensChoice;
 
 use super::connect::connect;
@@ -51,8 +50,7 @@ pub struct Args {
 /// # Errors
 /// As [`run`].
 pub async fn demonstrate(
-    listen: SocketAddr,
-    (lens, seed): (LensChoice, u64),
+    (listen, lens, seed): (SocketAddr, LensChoice, u64),
     common: &CommonOptions,
     console: Console,
 ) -> Result<(), Failure> {
@@ -68,23 +66,35 @@ pub async fn run(args: &Args, common: &CommonOptions, console: Console) -> Resul
     let access = args.access()?;
     let listen = |error: std::io::Error| PanelError::Listen { address: args.listen, why: error.to_string() };
     let listener = TcpListener::bind(args.listen).map_err(listen)?;
-    if args.cameras.is_empty() {
-        let board = connect(common, console, "panel").await?;
-        let rig = Arc::new(rig_file::load(common.rig.as_deref())?);
-        let (panel, driver) = Panel::new(Setting { rig, simulated: None, has_cameras: false });
-        let _serving = args.serve(&panel, listener, access, console)?;
-        return conduct(args, &panel, driver, (Some(panel.watching(board)), None), None).await;
-    }
     let is_simulated = args.cameras == ["sim"];
-    let lease = if is_simulated { SIMULATED_LEASE_MS } else { common.lease };
-    let mut rig = args.live.connect(&args.cameras, &CommonOptions { lease, ..common.clone() }, None, console).await?;
-    let simulated = is_simulated.then(|| format!("mechanics, room and cameras, lenses {}", args.live.lens));
-    let (panel, driver) = Panel::new(Setting { rig: Arc::clone(&rig.measuring), simulated, has_cameras: true });
-    rig.board = rig.board.map(|board| panel.watching(board));
-    let events = panel.tap(args.live.start_cameras(&args.cameras, &rig)?);
-    let live = args.live.live_loop(&mut rig, events, MatchingTime::Real);
-    let _serving = args.serve(&panel, listener, access, console)?;
-    conduct(args, &panel, driver, (rig.board, rig.trigger), Some(live)).await
+    let (panel, session) = match args.cameras.as_slice() {
+        [] => {
+            let rig = Arc::new(rig_file::load(common.rig.as_deref())?);
+            let (panel, driver) = Panel::new(Setting { rig, simulated: None, has_cameras: false });
+            let board = Some(panel.watching(connect(common, console, "panel").await?));
+            (panel, Session { driver, board, trigger: None, live: None })
+        }
+        cameras => {
+            let lease = if is_simulated { SIMULATED_LEASE_MS } else { common.lease };
+            let mut rig = args.live.connect(cameras, &CommonOptions { lease, ..common.clone() }, None, console).await?;
+            let simulated = is_simulated.then(|| format!("mechanics, room and cameras, lenses {}", args.live.lens));
+            let (panel, driver) = Panel::new(Setting { rig: Arc::clone(&rig.measuring), simulated, has_cameras: true });
+            rig.board = rig.board.map(|board| panel.watching(board));
+            let events = panel.tap(args.live.start_cameras(cameras, &rig)?);
+            let live = Some(args.live.live_loop(&mut rig, events, MatchingTime::Real));
+            (panel, Session { driver, board: rig.board, trigger: rig.trigger, live })
+        }
+    };
+    let serving = panel.serve(listener, access)?;
+    console.say(format!("the panel is at {}; Ctrl-C ends it", serving.url()))?;
+    console.result(&json!({ "url": serving.url() }))?;
+    if args.home {
+        panel.home();
+    }
+    match session.run(&panel, interrupted()).await? {
+        Ended::Done => Ok(()),
+        Ended::Blind => Err(Failure::device("both cameras are dead: the log of the panel said why")),
+    }
 }
 
 impl Args {
@@ -102,73 +112,4 @@ impl Args {
             ))),
         }
     }
-
-    /// Serves the page, and says where.
-    fn serve(
-        &self,
-        panel: &Panel,
-        listener: TcpListener,
-        access: Access,
-        console: Console,
-    ) -> Result<Serving, Failure> {
-        let query = match &access {
-            Access::Token(token) => format!("?token={token}"),
-            Access::ThisComputer => String::new(),
-        };
-        let serving = panel.serve(listener, access)?;
-        let url = format!("http://{}/{query}", serving.address());
-        let elsewhere =
-            if serving.address().ip().is_unspecified() { " (with the name of this computer in its place)" } else { "" };
-        console.say(format!("the panel is at {url}{elsewhere}; Ctrl-C ends it"))?;
-        console.result(&json!({ "url": url }))?;
-        Ok(serving)
-    }
-}
-
-/// Drives and measures until the link ends, the cameras are dead, or the program is asked to end.
-async fn conduct(
-    args: &Args,
-    panel: &Panel,
-    driver: Driver,
-    (mut board, trigger): (Option<Board>, Option<Trigger>),
-    live: Option<LiveLoop>,
-) -> Result<(), Failure> {
-    if args.home {
-        panel.home();
-    }
-    let ended = {
-        let driving = async {
-            match &mut board {
-                Some(board) => Err(driver.drive(board, trigger).await.into()),
-                None => std::future::pending().await,
-            }
-        };
-        tokio::select! {
-            ended = measured(panel, live) => ended,
-            error = driving => error,
-            () = interrupted() => Ok(Ended::Done),
-        }
-    };
-    if let Some(board) = &mut board {
-        // A latched fault stays for whoever clears it; nothing moves, and the board cannot be disarmed.
-        if board.pose().fault.is_none() {
-            board.release().await?;
-        }
-        if trigger.is_some() {
-            board.ask(Request::SetTrigger(Trigger::Off)).await?;
-        }
-    }
-    match ended? {
-        Ended::Done => Ok(()),
-        Ended::Blind => Err(Failure::device("both cameras are dead: the log of the panel said why")),
-    }
-}
-
-async fn measured(panel: &Panel, live: Option<LiveLoop>) -> Result<Ended, Failure> {
-    let Some(mut live) = live else { return std::future::pending().await };
-    let show = |result: LiveResult<'_>| {
-        panel.show(&result);
-        Ok(())
-    };
-    live.run(Limits::default(), &mut Totals::default(), show, |warning| panel.warn(&warning)).await
 }
