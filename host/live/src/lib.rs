@@ -12,6 +12,7 @@ mod error;
 mod live_loop;
 mod measure;
 mod orders;
+mod pace;
 mod posed;
 mod tour;
 
@@ -22,6 +23,7 @@ pub use error::LiveError;
 pub use live_loop::{Ended, Limits, LiveLoop, LiveResult, MatchingTime, Totals};
 pub use measure::{Measurement, PosedExposure, measure};
 pub use orders::{HOME, homing_orders};
+pub use pace::{Limit, Pace};
 pub use posed::{Posed, READINGS, pose};
 pub use tour::Tour;
 

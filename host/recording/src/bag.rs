@@ -109,7 +109,10 @@ impl<W: Write + Seek> Bag<W> {
     pub fn on(writer: W, file: &Path, rig: &str) -> Result<Self, RecordingError> {
         let fail = |error| RecordingError::write(file, &error);
         // Each chunk is written at once, so that a program that dies leaves whole ones.
-        let options = WriteOptions::new().disable_seeking(true).profile("ros2").library(concat!("vergence ", env!("CARGO_PKG_VERSION")));
+        let options = WriteOptions::new()
+            .disable_seeking(true)
+            .profile("ros2")
+            .library(concat!("vergence ", env!("CARGO_PKG_VERSION")));
         let mut writer = options.compression(None).chunk_size(Some(CHUNK)).create(writer).map_err(fail)?;
         let data = rig.as_bytes().into();
         let attachment = Attachment {

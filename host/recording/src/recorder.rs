@@ -137,7 +137,9 @@ impl Writing {
         let _ = recorder.entries.send(Entry::End).await;
         let images = match self.0.await {
             Ok(images) => images?,
-            Err(error) => return Err(RecordingError::Write { file: Path::new(bag::FILE).to_owned(), why: error.to_string() }),
+            Err(error) => {
+                return Err(RecordingError::Write { file: Path::new(bag::FILE).to_owned(), why: error.to_string() });
+            }
         };
         Ok(Recorded { images, left_out: *recorder.left_out.lock().unwrap_or_else(PoisonError::into_inner) })
     }

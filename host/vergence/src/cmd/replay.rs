@@ -5,7 +5,7 @@ use std::sync::Arc;
 use std::time::Duration;
 
 use vergence_files::make_folder;
-use vergence_live::{LiveError, LiveResult, Measurement, Totals};
+use vergence_live::{LiveError, LiveResult, Measurement, Pace, Totals};
 use vergence_output::{PlyEncoding, TableFormat, check_folder};
 use vergence_pipeline::{Method, Observation};
 use vergence_recording::{Event, Reader, Replay};
@@ -64,7 +64,7 @@ pub fn run(args: &Args, console: Console) -> Result<(), Failure> {
     let rig = args.rig(&reader)?;
     let search = args.search.search(&rig)?;
     let measuring = Arc::new(args.search.measuring(rig)?);
-    let matcher = args.matching.matcher(console)?;
+    let matcher = args.matching.live(console)?;
     let mut publisher = Publisher {
         console,
         rig: Arc::clone(&measuring),
@@ -75,6 +75,7 @@ pub fn run(args: &Args, console: Console) -> Result<(), Failure> {
         encoding: PlyEncoding::of(args.ascii),
         number: 0,
         recorder: None,
+        pace: Pace::default(),
     };
     let mut replay = Replay::new(&measuring, Method { search: &search, ..Method::from(matcher.as_ref()) }, clock);
     let mut totals = Totals::default();

@@ -2,10 +2,12 @@
 
 use std::path::Path;
 
-use vergence_board::{Board, HostClock};
-use vergence_recording::{Beginning, Recorder, Writing};
-use vergence_rig::{Provenance, Rig};
+use vergence_board::BoardKnowledge;
+use vergence_live::LiveLoop;
+use vergence_recording::{Beginning, Recorder, Writing, recorded_events, recorded_marks};
+use vergence_rig::Provenance;
 
+use crate::cmd::live_options::LiveRig;
 use crate::console::Console;
 use crate::failure::Failure;
 use crate::stopwatch::started_us;
@@ -18,29 +20,34 @@ pub struct Recording {
 }
 
 impl Recording {
-    /// Begins a recording in `folder`, and listens to `board`; `period_us` is the time between pulses of the trigger.
+    /// Begins a recording of `rig` in `folder`, and listens to its board.
     ///
     /// # Errors
     /// A folder that holds something, a file that cannot be written.
-    pub fn start(
-        folder: &Path,
-        rig: &Rig,
-        board: Option<&Board>,
-        clock: HostClock,
-        period_us: Option<f64>,
-    ) -> Result<Self, Failure> {
+    pub fn start(folder: &Path, rig: &LiveRig) -> Result<Self, Failure> {
         let program = concat!("vergence ", env!("CARGO_PKG_VERSION")).to_owned();
         let provenance = Provenance { program, inputs_sha256: String::new(), date: None };
-        let file = rig.to_toml(&provenance).map_err(Failure::usage)?;
-        let (recorder, writing) = Recorder::start(folder, rig, &file, started_us(clock))?;
-        let knowledge = board.map(|board| board.client().knowledge());
-        let baud = knowledge.as_ref().and_then(vergence_board::BoardKnowledge::baud);
-        recorder.begin(clock.now(), Beginning { has_board: board.is_some(), baud, period_us });
+        let (known, clock) = (&rig.known, rig.clock);
+        let file = known.to_toml(&provenance).map_err(Failure::usage)?;
+        let (recorder, writing) = Recorder::start(folder, known, &file, started_us(clock))?;
+        let knowledge = rig.board.as_ref().map(|board| board.client().knowledge());
+        let baud = knowledge.as_ref().and_then(BoardKnowledge::baud);
+        recorder.begin(clock.now(), Beginning { has_board: knowledge.is_some(), baud, period_us: rig.period_us });
         if let Some(knowledge) = knowledge {
             let recorder = recorder.clone();
             knowledge.listen(move |news| recorder.news(clock.now(), news));
         }
         Ok(Self { recorder, writing })
+    }
+
+    /// The live loop `live`, recorded.
+    pub fn of(&self, live: LiveLoop) -> LiveLoop {
+        let clock = live.clock;
+        LiveLoop {
+            events: recorded_events(live.events, self.recorder.clone(), clock),
+            marks: live.marks.map(|marks| recorded_marks(marks, self.recorder.clone(), clock)),
+            ..live
+        }
     }
 
     /// Ends the recording, and says what is in it.
