@@ -47,6 +47,8 @@ const OVERSAMPLING: f64 = 1.0;
 const PATIENCE: u32 = 3;
 /// A pair is searched as a whole where less than this part of the tracks is left that the last such search gave.
 const FEW: f64 = 0.5;
+/// So few tracks are no base for another pair: where a pose was tried that is wrong, the next one may be right.
+const FEWEST: usize = 40;
 
 impl Default for TrackingMatcher {
     fn default() -> Self {
@@ -138,8 +140,8 @@ impl State {
             .map(|plane| Pyramid::in_buffers(plane, LEVELS, &mut self.buffers.values));
         let seen = Seen { band: views.band(), views, left, right };
         let tracks = before.as_ref().map_or_else(Vec::new, |before| followed(before, &seen));
-        let strip =
-            self.next_strip(&seen.views.grid, before.is_none() || (tracks.len() as f64) < FEW * self.at_first as f64);
+        let are_too_few = (tracks.len() as f64) < (FEW * self.at_first as f64).max(FEWEST as f64);
+        let strip = self.next_strip(&seen.views.grid, are_too_few);
         let (matches, tracks) = self.matched(&seen, tracks, &strip, whole.keypoints);
         if strip.is_whole {
             self.at_first = tracks.len();
