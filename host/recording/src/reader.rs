@@ -23,7 +23,7 @@ pub struct Reader {
     topics: BTreeMap<u16, String>,
     rig: Option<String>,
     images: [Option<Vec<u8>>; 2],
-    is_cut: bool,
+    is_finished: bool,
 }
 
 /// An event of a recording with the time at which it was heard.
@@ -55,7 +55,7 @@ impl Reader {
         let options = LinearReaderOptions::default().with_skip_end_magic(true).with_validate_chunk_crcs(true);
         let records = LinearReader::new_with_options(options);
         let bytes = BufReader::new(bytes);
-        Ok(Self { file, bytes, records, topics: BTreeMap::new(), rig: None, images: [None, None], is_cut: false })
+        Ok(Self { file, bytes, records, topics: BTreeMap::new(), rig: None, images: [None, None], is_finished: false })
     }
 
     /// The rig file that is attached; it precedes all events.
@@ -64,10 +64,10 @@ impl Reader {
         self.rig.as_deref()
     }
 
-    /// Whether the recording ends in the middle of a chunk. The last events are lost.
+    /// Whether the end of the recording was read. That of a program that was killed has none: its last events are lost.
     #[must_use]
-    pub const fn is_cut(&self) -> bool {
-        self.is_cut
+    pub const fn is_finished(&self) -> bool {
+        self.is_finished
     }
 
     /// The file that is read.
@@ -96,19 +96,12 @@ impl Reader {
             match self.records.next_event() {
                 None => return Ok(None),
                 Some(Ok(LinearReadEvent::Record { opcode, data })) => return Ok(Some((opcode, data.to_vec()))),
-                Some(Ok(LinearReadEvent::ReadRequest(_))) if is_at_end => {
-                    self.is_cut = true;
-                    return Ok(None);
-                }
+                Some(Ok(LinearReadEvent::ReadRequest(_)) | Err(_)) if is_at_end => return Ok(None),
                 Some(Ok(LinearReadEvent::ReadRequest(count))) => {
                     let room = self.records.insert(count);
                     let read = self.bytes.read(room).map_err(|error| RecordingError::read(&self.file, error))?;
                     self.records.notify_read(read);
                     is_at_end = read == 0;
-                }
-                Some(Err(_)) if is_at_end => {
-                    self.is_cut = true;
-                    return Ok(None);
                 }
                 Some(Err(error)) => return Err(RecordingError::read(&self.file, error)),
             }
@@ -116,6 +109,7 @@ impl Reader {
     }
 
     fn understand(&mut self, opcode: u8, body: &[u8]) -> Result<Meaning, RecordingError> {
+        self.is_finished |= opcode == op::DATA_END;
         if !matches!(opcode, op::CHANNEL | op::MESSAGE | op::ATTACHMENT) {
             return Ok(Meaning::Nothing);
         }

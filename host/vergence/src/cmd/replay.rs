@@ -90,12 +90,14 @@ pub fn run(args: &Args, console: Console) -> Result<(), Failure> {
         }
         next = reader.next_event()?;
     };
-    if let Err(End::Failed(failure)) = replayed {
-        return Err(failure);
-    }
+    let is_enough = match replayed {
+        Ok(()) => false,
+        Err(End::Enough) => true,
+        Err(End::Failed(failure)) => return Err(failure),
+    };
     totals.skipped.clone_from(replay.skipped());
-    if reader.is_cut() {
-        console.warn(format!("{} ends within a chunk: what came after is lost", reader.file().display()));
+    if !is_enough && !reader.is_finished() {
+        console.warn(format!("{} was not finished: what came after its last chunk is lost", reader.file().display()));
     }
     publisher.end(&totals)
 }
