@@ -185,6 +185,7 @@ const ALLOWED: &[(&str, &[&str])] = &[
             "vergence-vision",
             "vergence-rig",
             "vergence-pipeline",
+            "vergence-camera",
             "vergence-board",
             "vergence-live",
         ],

@@ -10,6 +10,7 @@ mod files;
 mod live;
 mod models;
 mod output;
+mod panel;
 mod plausibility;
 mod reproduce;
 mod sim;

@@ -12,6 +12,7 @@ mod error;
 mod live_loop;
 mod measure;
 mod orders;
+mod pace;
 mod tour;
 
 use std::time::Duration;
@@ -21,6 +22,7 @@ pub use error::LiveError;
 pub use live_loop::{Ended, Limits, LiveLoop, LiveResult, MatchingTime, Totals};
 pub use measure::{Measurement, PosedExposure, measure};
 pub use orders::{HOME, homing_orders};
+pub use pace::{Limit, Pace};
 pub use tour::Tour;
 
 /// Returns the time since some fixed instant, always the real one: by it the loop tells how long matching takes.

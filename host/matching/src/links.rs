@@ -1,5 +1,7 @@
 //! Links: the partners of the left keypoints in the right view, and the tests that drop them.
 
+use std::ops::Range;
+
 use rayon::prelude::*;
 use vergence_vision::Angle;
 
@@ -31,12 +33,23 @@ pub(crate) struct Link {
     pub off_plane: f64,
     /// Probability that the link is right.
     pub right_probability: f64,
+    /// The track that it continues or begins.
+    pub track: Option<u64>,
 }
 
 impl Link {
     /// A link whose right position is a keypoint.
     pub(crate) const fn of_keypoints(right: ViewPixel, score: f64, sigma: [f64; 2]) -> Self {
-        Self { right, score, sigma, evidence: None, registered: false, off_plane: 0.0, right_probability: score }
+        Self {
+            right,
+            score,
+            sigma,
+            evidence: None,
+            registered: false,
+            off_plane: 0.0,
+            right_probability: score,
+            track: None,
+        }
     }
 }
 
@@ -161,6 +174,12 @@ impl<'a> Rows<'a> {
         Self(Surroundings::of(compared.left).zip(Surroundings::of(compared.right)).map(<[_; 2]>::from))
     }
 
+    /// Both views prepared in some of their rows.
+    pub(crate) fn within(compared: &Compared<'a>, rows: &Range<usize>) -> Self {
+        let [left, right] = [compared.left, compared.right].map(|view| Surroundings::within(view, rows.clone()));
+        Self(left.zip(right).map(<[_; 2]>::from))
+    }
+
     /// Drops links whose pattern a view repeats within the range of possible partners.
     pub(crate) fn drop_repeated(&self, links: &mut Links, keypoints: &[Keypoint], band: &EpipolarBand) {
         let Some([in_left, in_right]) = &self.0 else { return };
@@ -235,5 +254,6 @@ fn original(views: &SharedViews<'_>, keypoint: &Keypoint, link: &Link) -> Result
     let right = right_view.original(link.right).map_err(|_| UnmatchedReason::NotRefined)?;
     let turns = link.sigma.map(|sigma| Angle::from_rad(sigma / left_view.grid().pixels_per_radian()));
     let sigma = views.pixel_sigma(turns, [left, right]).ok_or(UnmatchedReason::NotRefined)?;
-    Ok(Match { left, right, sigma, score: link.right_probability as f32, registered: link.registered })
+    let (score, registered) = (link.right_probability as f32, link.registered);
+    Ok(Match { left, right, sigma, score, registered, track: link.track })
 }

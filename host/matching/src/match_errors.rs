@@ -1,9 +1,9 @@
 //! How far a match may be off, and how probably it is wrong, from what its registration and the matches around it show.
 //!
-//! The errors of matches have a core and tails. The standard deviations are those of the core; a few per cent of the matches are off by
-//! more than three of them: windows that show two surfaces. What shows these is counted into a probability by logistic regression (D.
-//! Cox, J. R. Stat. Soc. B 20(2), 1958), and the least probable matches are dropped. All numbers were fitted to rendered pairs, see
-//! docs/measured/matching.md.
+//! The errors of matches have a core and tails: a few per cent of the matches are off by more than three standard deviations of the core,
+//! windows that show two surfaces. What shows these is counted into a probability by logistic regression (D. Cox, J. R. Stat. Soc. B
+//! 20(2), 1958), and the least probable matches are dropped. The others state the standard deviation of the mixture of core and tail, so
+//! that it is larger where a match is less probably right. All numbers were fitted to rendered pairs, see docs/measured/matching.md.
 
 use rayon::prelude::*;
 use vergence_vision::median;
@@ -73,6 +73,11 @@ const FARTHEST_DEPARTURE: f64 = 1.0;
 /// steepness, squared distance from the epipolar plane in standard deviations, of which up to four count, and logarithm of the sum of the
 /// departures and 0.05.
 const REGISTERED: [f64; 5] = [4.43, -0.86, -1.7, -0.18, -0.53];
+/// Squared errors of matches that are wrong, over the variances of the core: those of the fit that were within a pixel of the image, without
+/// which a match would state nothing of its tail.
+const WRONG: f64 = 28.0;
+/// What is left of the core's standard deviations along the row and across it where [`WRONG`] counts as well.
+const CORE: [f64; 2] = [0.92, 0.8];
 /// Matches that are more probably wrong than right are dropped. On real photographs many that are right have less than 0.9.
 const LEAST_PROBABILITY: f64 = 0.5;
 
@@ -125,6 +130,8 @@ pub(crate) fn state_errors(links: &mut Links, compared: &Compared<'_>, band: &Ep
             let [along, across] = BY_DEPARTURE.map(|part| part * departures[2]);
             link.sigma[0] = link.sigma[0].hypot(OFF_SURFACE.0 * off.min(OFF_SURFACE.1)).hypot(along);
             link.sigma[1] = link.sigma[1].hypot(across * band.shortening(keypoint.at));
+            let with_tail = with_tail(link.right_probability);
+            link.sigma = [0, 1].map(|i| CORE[i] * with_tail * link.sigma[i]);
             Ok(link)
         });
     });
@@ -158,6 +165,12 @@ fn registered_probability(link: &Link, evidence: &Evidence, usual: f64, departur
     let departed = (departures + 0.05).ln();
     let shown = by_residual * residual + by_steepness * evidence.steepness + by_distance * distance;
     logistic(constant + shown + by_departures * departed)
+}
+
+/// How much larger the standard deviation of a match is than that of its core, by the probability that it is right: that of the mixture
+/// of both.
+fn with_tail(right: f64) -> f64 {
+    (right + (1.0 - right) * WRONG).sqrt()
 }
 
 fn unregistered_probability(link: &Link, usual: f64, off_plane: f64) -> f64 {

@@ -130,7 +130,8 @@ struct Fit {
 /// Registers `image` to the window of `template` around `at`, starting with the warp `start`.
 #[multiversion(targets("x86_64+avx2"))]
 fn align(template: &Plane, image: &Plane, at: ViewPixel, start: Warp) -> Result<Fit, UnmatchedReason> {
-    let window = Window::new(&surroundings(template, at).ok_or(UnmatchedReason::NotRefined)?);
+    let mut window = Window::empty();
+    window.fill(&surroundings(template, at).ok_or(UnmatchedReason::NotRefined)?);
     let inverse = window.normal_matrix().cholesky().ok_or(UnmatchedReason::Uncertain)?.inverse();
     let mut warp = start;
     for _ in 0..ITERATIONS {

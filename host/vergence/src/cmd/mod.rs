@@ -3,6 +3,7 @@
 mod camera_options;
 mod connect;
 mod force_option;
+mod live_options;
 mod mask_options;
 mod model_options;
 pub mod options;
@@ -29,6 +30,7 @@ pub mod models;
 pub mod monitor;
 pub mod move_to;
 pub mod orders;
+pub mod panel;
 pub mod plan;
 pub mod reproduce;
 pub mod rig;
