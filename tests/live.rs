@@ -10,6 +10,7 @@ mod common;
 #[path = "common/live_bench.rs"]
 mod live_bench;
 
+use std::collections::BTreeMap;
 use std::future::pending;
 use std::io::{BufRead, BufReader, Read};
 use std::path::Path;
@@ -217,6 +218,9 @@ fn run_measures_the_newest_pair_while_the_stages_move() {
         // One frame of 20 ms, its way to the host, at most one waiting for the next pulse, and matching.
         assert!(line["latency_ms"].as_f64().is_some_and(|ms| (700.0..900.0).contains(&ms)), "{}", line["latency_ms"]);
     }
+    assert!(clouds[0]["rate_hz"].is_null(), "one result has no rate");
+    assert!(clouds[5]["rate_hz"].as_f64().is_some_and(|rate| (1.2..1.5).contains(&rate)), "{}", clouds[5]["rate_hz"]);
+    assert_eq!(clouds[5]["limited_by"], "matching");
     // Twenty pairs each second, one of which is measured each 0.7 s: the rest is counted, not queued.
     let newer = end["skipped"]["newer_came"].as_u64().expect("counted");
     assert!((60..=95).contains(&newer), "{}", end["skipped"]);
@@ -227,6 +231,7 @@ fn run_measures_the_newest_pair_while_the_stages_move() {
     let csv = std::fs::read_to_string(out.join("cloud.csv")).expect("a table");
     let points = clouds[5]["points"].as_u64().expect("a number") as usize;
     assert_eq!(csv.lines().count(), points + 1);
+    assert!(csv.lines().next().is_some_and(|header| header.ends_with(",track")));
     let json: Value =
         serde_json::from_str(&std::fs::read_to_string(out.join("cloud.json")).expect("a table")).expect("JSON");
     assert_eq!(json["rows"].as_array().map(Vec::len), Some(points));
@@ -316,6 +321,43 @@ fn a_dead_camera_leaves_bearings_and_its_return_clouds() {
         names.filter(|name| name.to_string_lossy().starts_with(stem)).count() as u64
     };
     assert_eq!((Some(files("cloud")), Some(files("bearings"))), (end["clouds"].as_u64(), end["bearings"].as_u64()));
+}
+
+/// Of a rig that stands, most points have the number that they had in the cloud before, and still show the same place.
+#[test]
+fn places_keep_their_numbers_from_cloud_to_cloud() {
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    let (lines, _) = live(folder.path(), &["--rate", "10", "--match-time", "50ms", "--frames", "3"]);
+    let places = |cloud: &Value| -> BTreeMap<i64, [f64; 2]> {
+        let rows = cloud["cloud"]["rows"].as_array().expect("rows").iter();
+        let of = |row: &Value| {
+            (row[25].as_f64().expect("a track") as i64, [6, 7].map(|i| row[i].as_f64().expect("a pixel")))
+        };
+        rows.map(of).filter(|(track, _)| *track >= 0).collect()
+    };
+    let (first, last) = (places(&lines[0]), places(&lines[2]));
+    let kept: Vec<_> = first.iter().filter_map(|(track, at)| Some((at, last.get(track)?))).collect();
+    println!("{} of {} kept", kept.len(), first.len());
+    assert!(first.len() > 50 && kept.len() * 10 > first.len() * 8, "{} of {}", kept.len(), first.len());
+    assert!(kept.iter().all(|(one, other)| (one[0] - other[0]).hypot(one[1] - other[1]) < 0.5));
+}
+
+#[test]
+fn bench_live_accounts_for_every_pair() {
+    let output = run(&["bench", "live", "--sides", "240", "--pairs", "8", "--rate", "30", "--no-peer", "--json"]);
+    assert!(output.status.success(), "{}", text(&output.stderr));
+    let lines = lines(&output.stdout);
+    let rows = lines.last().expect("a result")["rows"].as_array().expect("rows");
+    assert_eq!(
+        rows.iter().map(|row| row["way"].as_str()).collect::<Vec<_>>(),
+        [Some("human"), Some("herbivore"), Some("turning")]
+    );
+    for row in rows {
+        let number = |key: &str| row["live"][key].as_f64().expect("a number");
+        assert!((number("measured") + number("skipped") - 8.0).abs() < 0.5 && number("measured") > 0.5, "{row}");
+        assert!(number("precision") > 0.97 && number("right_points") > 20.0, "{row}");
+        assert!(number("latency_99_ms") >= number("latency_median_ms") && number("rate_hz") > 0.0, "{row}");
+    }
 }
 
 #[test]

@@ -13,14 +13,14 @@ use rendered::{CORRIDOR_HUMAN, HUMAN, Place, Rendered};
 use vergence_matching::{GuidedMatcher, ImagePair, Match, Matcher, TrackingMatcher};
 use vergence_vision::{Angle, Left, Point, World};
 
-const SIDE: u32 = 400;
+const SIDE: u32 = 320;
 /// Largest error of a right match, in pixels.
 const RIGHT_PX: f64 = 2.5;
 /// Largest distance of a place from where a track showed it first, as a part of the range: a few pixels on a slanted surface.
 const SAME_PLACE: f64 = 0.03;
 
 fn seeds() -> u64 {
-    std::env::var("VERGENCE_SEEDS").map_or(2, |seeds| seeds.parse().unwrap())
+    std::env::var("VERGENCE_SEEDS").map_or(1, |seeds| seeds.parse().unwrap())
 }
 
 /// Every seed stands and looks elsewhere; every fourth stands in the corridor.
@@ -117,12 +117,12 @@ fn sees(truth: &Rendered, point: &Point<Left>) -> bool {
     in_left && in_right && truth.is_seen_by_right(point)
 }
 
-/// From nearly parallel axes to 104 degrees and back a little, by 4 degrees from pair to pair: 60 degrees a second at 15 Hz, more than the
+/// From nearly parallel axes to 103 degrees and back a little, by 5 degrees from pair to pair: 75 degrees a second at 15 Hz, more than the
 /// bench's stage can do.
 #[test]
 fn tracks_keep_their_places_through_a_change_of_the_mode() {
-    let there = (0..25).map(|step| 8.0 + 4.0 * f64::from(step));
-    let separations: Vec<f64> = there.chain([100.0, 96.0, 92.0]).collect();
+    let there = (0..20).map(|step| 8.0 + 5.0 * f64::from(step));
+    let separations: Vec<f64> = there.chain([98.0, 93.0]).collect();
     let mut counts = Counts::default();
     (0..seeds()).for_each(|seed| counts.add(300 + seed, &separations));
     let part = |some: usize, all: usize| some as f64 / all as f64;

@@ -17,6 +17,7 @@ use vergence_rig::Rig;
 use vergence_vision::median;
 
 pub use self::memory::Memory;
+use self::memory::computed_seconds;
 pub use self::peer::{PeerMatches, PeerMatching};
 pub use self::rendered::{LiveFrame, LiveFrames, Way};
 use crate::error::BenchError;
@@ -35,6 +36,8 @@ pub struct LiveFigures {
     pub latency: Vec<f64>,
     /// Seconds that each of [`STAGES`] took, over all pairs.
     pub stages: [f64; 2],
+    /// Seconds that all threads together computed for the measured pairs.
+    pub computed: f64,
     /// Points of each pair that are right, and all.
     pub points: Vec<[usize; 2]>,
     /// Right points and all of the single-pair matcher on some of the pairs.
@@ -62,9 +65,10 @@ impl LiveFigures {
             // The newest pair that has come, or the next one.
             let newest = ((now * rate) as usize).clamp(next, count - 1);
             let (frame, exposed) = (frames.at(newest), newest as f64 / rate);
-            let mut times = StageTimes::start(clock);
+            let (before, mut times) = (computed_seconds(), StageTimes::start(clock));
             let (points, seconds) =
                 timed(clock, || points(&frames.rig, frame, &tracking, &mut |stage| times.ended(stage)));
+            figures.computed += computed_seconds() - before;
             now = now.max(exposed) + seconds;
             figures.latency.push(now - exposed);
             figures.stages.iter_mut().zip(STAGES).for_each(|(sum, stage)| *sum += times.of(stage));

@@ -47,6 +47,8 @@ const OVERSAMPLING: f64 = 1.0;
 const PATIENCE: u32 = 3;
 /// A pair is searched as a whole where less than this part of the tracks is left that the last such search gave.
 const FEW: f64 = 0.5;
+/// So few tracks are no base for another pair: where a pose was tried that is wrong, the next one may be right.
+const FEWEST: usize = 40;
 
 impl Default for TrackingMatcher {
     fn default() -> Self {
@@ -138,8 +140,8 @@ impl State {
             .map(|plane| Pyramid::in_buffers(plane, LEVELS, &mut self.buffers.values));
         let seen = Seen { band: views.band(), views, left, right };
         let tracks = before.as_ref().map_or_else(Vec::new, |before| followed(before, &seen));
-        let strip =
-            self.next_strip(&seen.views.grid, before.is_none() || (tracks.len() as f64) < FEW * self.at_first as f64);
+        let are_too_few = (tracks.len() as f64) < (FEW * self.at_first as f64).max(FEWEST as f64);
+        let strip = self.next_strip(&seen.views.grid, are_too_few);
         let (matches, tracks) = self.matched(&seen, tracks, &strip, whole.keypoints);
         if strip.is_whole {
             self.at_first = tracks.len();
@@ -186,7 +188,8 @@ impl State {
         };
         let of_tracks = tracks.par_iter().map(|track| refound(&compared, track, &seen.band));
         let of_new = new.par_iter().map(|(keypoint, link)| {
-            link.and_then(|link| registered(&compared, keypoint.at, link.right, keypoint.level, &seen.band))
+            let from = |link: Link| registered(&compared, keypoint.at, link.right, keypoint.level, &seen.band);
+            link.and_then(|link| from(link).map_err(|failed| failed.reason))
         });
         let mut links: Links = of_tracks.chain(of_new).collect();
         agree_on_pose(&mut links, &keypoints, &seen.views.grid, seen.views.pose_sigma());
@@ -226,7 +229,7 @@ impl State {
 fn refound(compared: &Compared<'_>, track: &Track, band: &EpipolarBand) -> Result<Link, UnmatchedReason> {
     let start = ViewPixel { x: track.at.x + track.moved[0], y: track.at.y + track.moved[1] };
     let from = |level: usize| registered(compared, track.at, start, level, band);
-    from(0).or_else(|reason| from(LEVELS - 1).map_err(|_| reason))
+    from(0).or_else(|failed| from(LEVELS - 1).map_err(|_| failed.reason))
 }
 
 /// Whether the grid of one pose serves another: it is a degree wider than the field.

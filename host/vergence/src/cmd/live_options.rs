@@ -68,8 +68,10 @@ pub struct LiveRig {
     pub simulated: Option<(SharedRig, [TrueLens; 2])>,
     /// What the camera trigger shall do; `None` where the cameras run freely.
     pub trigger: Option<Trigger>,
-    clock: HostClock,
-    period_us: Option<f64>,
+    /// The clock of images and pulses.
+    pub clock: HostClock,
+    /// Time between pulses of the trigger in microseconds; `None` where the cameras run freely.
+    pub period_us: Option<f64>,
     matcher: Arc<dyn Matcher>,
     search: Arc<Search>,
 }
