@@ -132,7 +132,8 @@ fn points_that_nothing_registers_are_as_far_off_as_stated_wrong_ones_included() 
         judged_all.len()
     );
     assert!(judged_all.len() >= 60 * seeds as usize, "{} points", judged_all.len());
-    // 95 % would be honest, and corridors come near. In the furnished room more keypoints lie beside edges, and their pixel shows what is behind.
-    assert!((0.88..=0.98).contains(&two), "{two:.3} of {} within two sigma", judged_all.len());
-    assert!((three - stated).abs() < 0.06, "scores state {stated:.3}, found {three:.3}");
+    // Of a hundred points three standard deviations of a share of 0.95 are seven per cent. Most of what is wrong lies beside edges in the room.
+    let slack = if seeds < 4 { 0.03 } else { 0.0 };
+    assert!((0.92 - slack..=0.98 + slack).contains(&two), "{two:.3} of {} within two sigma", judged_all.len());
+    assert!((three - stated).abs() < 0.03 + slack, "scores state {stated:.3}, found {three:.3}");
 }
