@@ -238,7 +238,7 @@ impl PoseOf {
 }
 
 /// Largest rms in millimetres by the pose of each pair, and by that from the other half.
-const MOST_WITHOUT_MOTION: [f64; 2] = [0.21, 0.35];
+const MOST_WITHOUT_MOTION: [f64; 2] = [0.21, 0.24];
 
 /// What the spacings of all boards show.
 struct Row {

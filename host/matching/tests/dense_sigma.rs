@@ -93,7 +93,8 @@ fn sixty_eight_and_ninety_five_per_cent_are_within_one_and_two_sigma() {
         println!("{name} px from an edge: {one:.1} % within 1 sigma, {two:.1} % within 2, of {}", within.all);
     }
     let [one, two] = all.percent();
-    assert!((65.0..=75.0).contains(&one) && (92.0..=98.0).contains(&two), "{one} {two}");
+    // Pixels beside edges count as well; single places scatter by a per cent.
+    assert!((65.0..=75.0).contains(&one) && (91.0..=98.0).contains(&two), "{one} {two}");
     // Beside edges a pixel may be the other surface's, and where the ranges found show no other surface nothing tells.
     let [_, two] = classes[0].plus(classes[1]).percent();
     assert!(two > 79.0, "{two}");

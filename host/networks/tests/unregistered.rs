@@ -20,7 +20,7 @@ use std::path::Path;
 
 use data::real_data;
 use nalgebra::Vector3;
-use rendered::{HUMAN, Place};
+use rendered::Place;
 use vergence_matching::learned::{LearnedMatcher, Manifest, Model};
 use vergence_matching::{ImagePair, Match, Matcher};
 use vergence_networks::load_rten;
@@ -43,6 +43,8 @@ fn lens() -> KannalaBrandt {
     let size = ImageSize { width: SIDE, height: SIDE };
     KannalaBrandt::new(k, 1.0, Pixel { u: centre + 5.0, v: centre - 3.0 }, Angle::from_deg(96.0), size).unwrap()
 }
+
+type NamedScene = (&'static str, fn() -> Scene);
 
 fn corridor<const SEED: u64>() -> Scene {
     Scene::of_corridor(&CorridorPlan::random(SEED))
@@ -106,7 +108,7 @@ fn points_that_nothing_registers_are_as_far_off_as_stated_wrong_ones_included() 
     let Some(models) = real_data("models") else { return };
     let matcher = matcher(&models);
     let seeds: u64 = std::env::var("VERGENCE_SEEDS").map_or(1, |seeds| seeds.parse().unwrap());
-    let scenes: [(&str, fn() -> Scene); 4] = [
+    let scenes: [NamedScene; 4] = [
         ("room", Scene::room),
         ("corridor 21", corridor::<21>),
         ("room", Scene::room),
@@ -119,7 +121,7 @@ fn points_that_nothing_registers_are_as_far_off_as_stated_wrong_ones_included() 
             let (name, scene) = scenes[(index + seed as usize) % scenes.len()];
             let step = (4 * seed + index as u64) as f64;
             let at = [29.0 * step % 130.0 - 65.0, 40.0 - 19.0 * step % 80.0, 75.0 - 41.0 * step % 150.0];
-            let place = Place { name, scene, at, heading_deg: 110.0 + 71.0 * step, separation_deg, ..HUMAN };
+            let place = Place { name, scene, at, heading_deg: 110.0 + 71.0 * step, separation_deg };
             judged_all.extend(judged(&matcher, &place, 4000 + step as u64));
         }
     }
@@ -130,7 +132,7 @@ fn points_that_nothing_registers_are_as_far_off_as_stated_wrong_ones_included() 
         judged_all.len()
     );
     assert!(judged_all.len() >= 60 * seeds as usize, "{} points", judged_all.len());
-    // With few points three standard deviations of a share of 0.95 are seven per cent.
+    // Of a hundred points three standard deviations of a share of 0.95 are seven per cent. Most of what is wrong lies beside edges in the room.
     let slack = if seeds < 4 { 0.03 } else { 0.0 };
     assert!((0.92 - slack..=0.98 + slack).contains(&two), "{two:.3} of {} within two sigma", judged_all.len());
     assert!((three - stated).abs() < 0.03 + slack, "scores state {stated:.3}, found {three:.3}");
