@@ -9,7 +9,7 @@
 
 use vergence_vision::ImageSize;
 
-use super::adjust::{Adjusted, Terms, inlier_fit};
+use super::adjust::{Adjusted, State, Terms, inlier_fit};
 use super::lens::with_valid_cone;
 use super::observations::ObservedView;
 use super::prior::{Prior, narrowest};
@@ -68,7 +68,7 @@ pub(super) struct Evidence {
 /// The adjustment with the lens that the options or the views ask for.
 pub(super) fn fit(
     views: Vec<ObservedView>,
-    state: super::adjust::State,
+    state: State,
     size: ImageSize,
     options: &IntrinsicsOptions,
 ) -> Result<(Adjusted, Evidence), IntrinsicsError> {
