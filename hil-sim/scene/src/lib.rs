@@ -28,6 +28,7 @@ mod room;
 mod scene;
 mod shape;
 mod sheet;
+mod sheet_edges;
 mod sheet_picture;
 mod target;
 mod texture;

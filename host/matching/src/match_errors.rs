@@ -77,7 +77,7 @@ const REGISTERED: [f64; 5] = [4.43, -0.86, -1.7, -0.18, -0.53];
 /// which a match would state nothing of its tail.
 const WRONG: f64 = 28.0;
 /// What is left of the core's standard deviations along the row and across it where [`WRONG`] counts as well.
-const CORE: [f64; 2] = [0.92, 0.8];
+const CORE: [f64; 2] = [0.85, 0.8];
 /// Matches that are more probably wrong than right are dropped. On real photographs many that are right have less than 0.9.
 const LEAST_PROBABILITY: f64 = 0.5;
 
