@@ -11,7 +11,7 @@ use vergence_calibration::{
     IntrinsicsOptions, LensModel, LensParameters, TargetWarp, calibrate_intrinsics, reproject, target_pose,
 };
 use vergence_targets::TargetView;
-use vergence_vision::{KannalaBrandt, Point};
+use vergence_vision::{Camera, KannalaBrandt, Point};
 
 const FOLDS: usize = 5;
 
@@ -131,17 +131,32 @@ fn splined(name: &str) -> Option<KannalaBrandt> {
     Some(vergence_exchange::read(&text).unwrap().cameras[0].lens().unwrap().lens)
 }
 
+/// A view without the corners beyond the field of `lens`.
+fn within(lens: &KannalaBrandt, view: &TargetView) -> TargetView {
+    let corners =
+        view.corners.iter().filter(|corner| lens.unproject::<Camera>(corner.pixel).is_ok()).copied().collect();
+    TargetView { name: view.name.clone(), corners }
+}
+
 /// The views of a set that a lens with one centre was not fitted to are predicted no worse by the lens that the views ask for.
 #[test]
 fn held_out_views_are_predicted_no_worse_than_by_one_centre() {
-    for set in corner_sets().into_iter().map(cleaned) {
+    // The largest set takes most of the time.
+    let is_asked_for = |set: &CornerSet| std::env::var_os("VERGENCE_SEEDS").is_some() || set.name != "ov_plane cam";
+    for set in corner_sets().into_iter().filter(is_asked_for).map(cleaned) {
         let by = |model, warp| held_out(&set, &IntrinsicsOptions { model, warp, outlier_factor: None });
         let [flat, bowed] =
             [false, true].map(|warp| [LensModel::Central, LensModel::ByEvidence].map(|model| by(model, warp)));
         let spline = splined(&set.name).map_or_else(String::new, |lens| {
-            let flat = Bow::of(&set.views, None);
-            let all = rms_px(set.views.iter().map(|view| (view, predicted(&lens, &flat, view))));
-            format!("; mrcal's spline, which saw all: {all:.4}")
+            let plane = Bow::of(&set.views, None);
+            // Its field ends where mrcal's valid region does.
+            let seen: Vec<TargetView> = set.views.iter().map(|view| within(&lens, view)).collect();
+            let all = rms_px(seen.iter().map(|view| (view, predicted(&lens, &plane, view))));
+            assert!(all < flat[0], "{}: {all} px, {flat:?}", set.name);
+            format!(
+                "; mrcal's spline, which saw all: {all:.4} at {} corners",
+                seen.iter().map(|view| view.corners.len()).sum::<usize>()
+            )
         });
         println!(
             "{}: central {:.4} px, by evidence {:.4}; with a bow of the target {:.4} and {:.4}{spline}",

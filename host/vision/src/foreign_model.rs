@@ -95,6 +95,8 @@ impl ForeignModel {
         const STEPS: usize = 16;
         /// After a step of this many radians the error is below rounding.
         const SMALLEST: f64 = 1e-8;
+        /// What the pixel may then be short of, in pixels, and as a share of its own coordinates: far away rays are dense.
+        const NEAR: f64 = 1e-6;
         let short_of = |ray: &UnitRay<Camera>| {
             let seen = self.project(ray).ok()?;
             Some(Vector2::new(pixel.u - seen.u, pixel.v - seen.v))
@@ -115,7 +117,8 @@ impl ForeignModel {
             }
             (ray, missing) = (next, left);
             if step.norm() <= SMALLEST {
-                return UnitRay::new(ray.vector() + by_pixel * missing);
+                let is_there = missing.norm() <= NEAR * (1.0 + pixel.u.abs().max(pixel.v.abs()));
+                return UnitRay::new(ray.vector() + by_pixel * missing).filter(|_| is_there);
             }
         }
         None
