@@ -176,6 +176,25 @@ fn live(folder: &Path, arguments: &[&str]) -> (Vec<Value>, String) {
     (lines(&output.stdout), text(&output.stderr))
 }
 
+/// Images smaller than the rig file's: no pixel of a cloud lies beyond them, and the lens shows the same field in them.
+#[test]
+fn simulated_cameras_take_images_of_the_size_that_is_asked_for() {
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    let name = folder.path().join("out");
+    let files = ["--out", name.to_str().expect("a name"), "--also", "csv"];
+    let arguments = ["--size", "280x280", "--mode", "human", "--stay", "1s", "--match-time", "10ms", "--frames", "1"];
+    let (lines, _) = live(folder.path(), &[&arguments[..], &files].concat());
+    assert!(lines[0]["points"].as_u64().is_some_and(|points| points > 20), "{}", lines[0]["points"]);
+    let csv = std::fs::read_to_string(name.join("cloud.csv")).expect("a table");
+    let columns = |line: &str| -> Vec<f64> { line.split(',').filter_map(|number| number.parse().ok()).collect() };
+    let rows: Vec<Vec<f64>> = csv.lines().skip(1).map(columns).collect();
+    let pixels = rows.iter().flat_map(|row| &row[6..10]);
+    let (low, high) = pixels.fold((f64::INFINITY, 0.0_f64), |(low, high), pixel| (low.min(*pixel), high.max(*pixel)));
+    assert!(low >= 0.0 && (200.0..280.0).contains(&high), "{low} to {high}");
+    // All points lie in the room of 4 by 2.6 by 5 m.
+    assert!(rows.iter().all(|row| row[2] < 4000.0), "a lens of another scale puts them elsewhere");
+}
+
 #[test]
 fn run_measures_the_newest_pair_while_the_stages_move() {
     let folder = tempfile::tempdir().expect("a temporary folder");

@@ -117,7 +117,7 @@ fn matched(
         oversampling: views.oversampling(),
     };
     let mut links = compare(left, right, &band);
-    register(&mut links, &compared, &band, None);
+    register(&mut links, &compared, &band, false);
     agree_on_pose(&mut links, &left.keypoints, &views.grid, pose_sigma);
     Rows::of(&compared).drop_repeated(&mut links, &left.keypoints, &band);
     thin(&mut links, &left.keypoints);

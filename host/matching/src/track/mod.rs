@@ -188,7 +188,8 @@ impl State {
         };
         let of_tracks = tracks.par_iter().map(|track| refound(&compared, track, &seen.band));
         let of_new = new.par_iter().map(|(keypoint, link)| {
-            link.and_then(|link| registered(&compared, keypoint.at, link.right, keypoint.level, &seen.band))
+            let from = |link: Link| registered(&compared, keypoint.at, link.right, keypoint.level, &seen.band);
+            link.and_then(|link| from(link).map_err(|failed| failed.reason))
         });
         let mut links: Links = of_tracks.chain(of_new).collect();
         agree_on_pose(&mut links, &keypoints, &seen.views.grid, seen.views.pose_sigma());
@@ -228,7 +229,7 @@ impl State {
 fn refound(compared: &Compared<'_>, track: &Track, band: &EpipolarBand) -> Result<Link, UnmatchedReason> {
     let start = ViewPixel { x: track.at.x + track.moved[0], y: track.at.y + track.moved[1] };
     let from = |level: usize| registered(compared, track.at, start, level, band);
-    from(0).or_else(|reason| from(LEVELS - 1).map_err(|_| reason))
+    from(0).or_else(|failed| from(LEVELS - 1).map_err(|_| failed.reason))
 }
 
 /// Whether the grid of one pose serves another: it is a degree wider than the field.

@@ -8,6 +8,7 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use serde_json::{Value, json};
+use vergence_board::HostClock;
 use vergence_files::write_whole;
 use vergence_live::{Limit, LiveResult, Pace, Totals};
 use vergence_output::{
@@ -15,6 +16,8 @@ use vergence_output::{
     dropped_json, ply, pose_told_json, pose_told_words,
 };
 use vergence_pipeline::{Bearing, CameraGone, Observation, PairCloud};
+use vergence_protocol::Microseconds;
+use vergence_recording::Recorder;
 use vergence_rig::{Rig, RigPose, axes_json, rounded};
 use vergence_scene::LensChoice;
 use vergence_vision::{Side, median};
@@ -40,6 +43,8 @@ pub struct Publisher {
     pub encoding: PlyEncoding,
     /// Number of results so far.
     pub number: u64,
+    /// Where clouds are recorded too, and the clock of their exposures.
+    pub recorder: Option<(Recorder, HostClock)>,
     /// How often they come.
     pub pace: Pace,
 }
@@ -55,6 +60,11 @@ impl Publisher {
         match &result.measurement.observation {
             Observation::Points { cloud, pose, moving, by_images } => {
                 self.write_cloud(cloud)?;
+                if let Some((recorder, clock)) = &self.recorder {
+                    let exposed =
+                        clock.now().0.saturating_sub(u64::try_from(result.latency.as_micros()).unwrap_or(u64::MAX));
+                    recorder.cloud(Microseconds(exposed), cloud, pose);
+                }
                 let by_axes = axes_by_images_words(&self.rig, by_images).map(|told| format!("pose by images: {told}"));
                 let told = by_axes.or_else(|| pose_told_words(cloud)).map(|told| format!("; {told}"));
                 self.console.say(self.points_line(result, cloud, pose, (*moving, pace)) + &told.unwrap_or_default())?;
@@ -62,6 +72,9 @@ impl Publisher {
                 let warning = drift_warning(cloud, self.pose_source()).filter(|_| by_images.is_empty());
                 if let Some(warning) = &warning {
                     self.console.warn(format!("cloud {}: {warning}", self.number));
+                    if let Some((recorder, clock)) = &self.recorder {
+                        recorder.warning(clock.now(), warning);
+                    }
                 }
                 self.print_json(|| {
                     let mut line = self.points_json(result, cloud, pose, *moving);
