@@ -41,8 +41,9 @@ pub struct TrackingMatcher {
 const KEYPOINTS: usize = 2000;
 /// Largest number of tracks.
 const MOST: usize = 700;
-/// Density of the views in pixels per pixel of the images: registration needs no more.
-const OVERSAMPLING: f64 = 1.0;
+/// Pixels of a view per radian, unless the images have more: in views of less corners of wide axes are no longer alike. Denser views than the images
+/// cost more than they find.
+const DENSITY: f64 = 183.0;
 /// Pairs in which a track may fail a test one after the other before it ends.
 const PATIENCE: u32 = 3;
 /// A pair is searched as a whole where less than this part of the tracks is left that the last such search gave.
@@ -57,7 +58,7 @@ impl Default for TrackingMatcher {
 }
 
 impl TrackingMatcher {
-    /// Searches a whole pair as `whole` does.
+    /// Searches a whole pair as `whole` does; without its oversampling in views that are as dense as the images, or small images enlarged.
     #[must_use]
     pub fn new(whole: GuidedMatcher) -> Self {
         Self { whole, state: Mutex::default() }
@@ -66,7 +67,7 @@ impl TrackingMatcher {
     /// The same with so many keypoints of each view when a whole pair is searched.
     #[must_use]
     pub fn with_keypoints(keypoints: usize) -> Self {
-        Self::new(GuidedMatcher { keypoints, oversampling: Some(OVERSAMPLING) })
+        Self::new(GuidedMatcher { keypoints, oversampling: None })
     }
 }
 
@@ -80,7 +81,9 @@ impl Matcher for TrackingMatcher {
         pair.check()?;
         // A poisoned lock only means that another thread panicked; the tracks are replaced whole.
         let mut state = self.state.lock().unwrap_or_else(PoisonError::into_inner);
-        state.find(pair, &self.whole)
+        let density = pair.left_camera.k()[0].max(pair.right_camera.k()[0]);
+        let oversampling = self.whole.oversampling.unwrap_or(DENSITY / density).clamp(1.0, 2.0);
+        state.find(pair, &GuidedMatcher { oversampling: Some(oversampling), ..self.whole })
     }
 }
 
