@@ -190,6 +190,18 @@ const ALLOWED: &[(&str, &[&str])] = &[
             "vergence-live",
         ],
     ),
+    (
+        "vergence-recording",
+        &[
+            "vergence-protocol",
+            "vergence-vision",
+            "vergence-rig",
+            "vergence-camera",
+            "vergence-board",
+            "vergence-pipeline",
+            "vergence-live",
+        ],
+    ),
     ("vergence-failure", EVERYTHING),
     ("vergence", EVERYTHING),
 ];

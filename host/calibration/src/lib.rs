@@ -28,8 +28,8 @@ pub use extrinsics::{
 pub use fit_check::{Unfit, check_fit};
 pub use intrinsics::{
     IntrinsicsCalibration, IntrinsicsError, IntrinsicsOptions, LensModel, LensParameters, LensStep, Outlier,
-    OutlierReason, Parameter, PupilEvidence, Reprojection, StepEvidence, TargetWarp, UnknownLensModel, ViewFigures,
-    ViewPose, calibrate_intrinsics, refine_intrinsics, reproject,
+    OutlierReason, Parameter, PupilEvidence, Reprojection, StepEvidence, StepVerdict, TargetWarp, UnknownLensModel,
+    ViewFigures, ViewPose, calibrate_intrinsics, refine_intrinsics, reproject,
 };
 pub use lens_difference::{LensDifference, LensDifferenceError};
 pub use planar_pose::{PoseError, TargetPose, target_pose};

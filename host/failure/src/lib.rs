@@ -12,6 +12,7 @@ mod models;
 mod output;
 mod panel;
 mod plausibility;
+mod recording;
 mod reproduce;
 mod sim;
 

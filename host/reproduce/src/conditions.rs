@@ -89,12 +89,14 @@ impl Cause {
         }
     }
 
-    /// How large it is here.
+    /// How large it is here, on a bench with such lenses.
     #[must_use]
-    pub fn size(self) -> String {
+    pub fn size(self, lens: LensChoice) -> String {
         match self {
             Self::Corners => format!("{NOISE_PX} px in u and v"),
-            Self::Lens => format!("lenses traced from a published design, {TRUE_LENS} in the place of ideal ones"),
+            Self::Lens => {
+                format!("lenses traced from a published design, {} in the place of ideal ones", traced(lens))
+            }
             Self::Pose => format!(
                 "{:.2} mm and {:.2}° along and about each axis of the right camera, anew at every return",
                 RETURN.shift.mm(),
@@ -104,19 +106,24 @@ impl Cause {
         }
     }
 
-    /// The conditions in which it alone is present, on a bench with such lenses. Traced lenses are a misfit by themselves.
+    /// The conditions in which it alone is present, on a bench with such lenses: only where it is the cause are they other than ideal.
     #[must_use]
     pub fn alone(self, corners: Corners, lens: LensChoice) -> Conditions {
-        let mut conditions = Conditions { lens, ..Conditions::noise(corners, 0.0) };
+        let mut conditions = Conditions::noise(corners, 0.0);
         if matches!(self, Self::Corners | Self::All) {
             conditions.noise_px = NOISE_PX;
         }
-        if matches!(self, Self::Lens | Self::All) && lens == LensChoice::Ideal {
-            conditions.lens = TRUE_LENS;
+        if matches!(self, Self::Lens | Self::All) {
+            conditions.lens = traced(lens);
         }
         if matches!(self, Self::Pose | Self::All) {
             conditions.repeatability = RETURN;
         }
         conditions
     }
+}
+
+/// The lens of a bench where it is a misfit: that of the paper's experiments where the bench's are ideal.
+fn traced(lens: LensChoice) -> LensChoice {
+    if lens == LensChoice::Ideal { TRUE_LENS } else { lens }
 }

@@ -98,12 +98,12 @@ impl Plan {
     fn command(&self) -> String {
         let corners = if self.corners == Corners::Rendered { "" } else { " --corners projected" };
         let matching = if self.matching { "" } else { " --no-matching" };
-        let lens = if self.lens == LensChoice::Ideal { String::new() } else { format!(" --lens {}", self.lens) };
         format!(
-            "vergence reproduce --seeds {} --noisy-seeds {} --samples {}{corners}{lens}{matching}",
+            "vergence reproduce --seeds {} --noisy-seeds {} --samples {}{corners} --lens {}{matching}",
             self.seeds,
             self.noisy(),
-            self.samples
+            self.samples,
+            self.lens
         )
     }
 }
@@ -139,12 +139,12 @@ pub fn experiments(
         }
     };
     let few = rigs.get(..plan.noisy()).unwrap_or_default();
-    let ordinary = all_seeds(rigs, Cause::Corners.as_str(), &Cause::Corners.alone(plan.corners, plan.lens), progress)?;
-    let noisier = Conditions { lens: plan.lens, ..Conditions::noise(plan.corners, 2.0 * NOISE_PX) };
-    let twice = all_seeds(few, "twice the noise", &noisier, progress)?;
+    let bench = |noise_px| Conditions { lens: plan.lens, ..Conditions::noise(plan.corners, noise_px) };
+    let ordinary = all_seeds(rigs, "the usual noise", &bench(NOISE_PX), progress)?;
+    let twice = all_seeds(few, "twice the noise", &bench(2.0 * NOISE_PX), progress)?;
     let column = |cause: Cause| {
         let table = match cause {
-            Cause::Corners => Table::of(ordinary.iter().take(few.len())),
+            Cause::Corners if plan.lens == LensChoice::Ideal => Table::of(ordinary.iter().take(few.len())),
             _ => Table::of(&all_seeds(few, cause.as_str(), &cause.alone(plan.corners, plan.lens), progress)?),
         };
         Ok(Column { cause, table })
@@ -222,7 +222,7 @@ impl Results {
             "bench": report::rows(table),
             "zones": report::zones(&self.zones),
             "corners": report::corners(table),
-            "causes": report::causes(&self.columns),
+            "causes": report::causes(&self.columns, self.lens),
             "noisier": { "bench": report::rows(noisier), "corners": report::corners(noisier) },
             "matching": report::matchings(&self.matchings),
         })

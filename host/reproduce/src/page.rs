@@ -51,7 +51,7 @@ pub fn reproduction_page(findings: &Findings<'_>) -> Result<String, ReproduceErr
     let body = [
         bench::verdict(findings),
         section("Precision bench", &bench::body(findings)?),
-        section("The methods by the cause of their errors", &causes::body(findings.columns)),
+        section("The methods by the cause of their errors", &causes::body(findings.columns, findings.lens)),
         section("Zones", &zones::body(findings)),
         section("Methods of triangulation", &triangulation::body(findings.samples)),
         section("Matches in the simulated room", &matching::body(findings.matchings)?),

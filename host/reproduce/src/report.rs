@@ -3,6 +3,7 @@
 use serde_json::{Value, json};
 
 use vergence_rig::{rounded, zones_json};
+use vergence_scene::LensChoice;
 
 use crate::bench::MODES;
 use crate::causes::Column;
@@ -124,7 +125,7 @@ pub fn bench_lines(tables: [&Table; 2]) -> Vec<String> {
 }
 
 /// Each kind of error: its size, every method under it, and how it compares with the paper.
-pub fn causes(columns: &[Column]) -> Vec<Value> {
+pub fn causes(columns: &[Column], lens: LensChoice) -> Vec<Value> {
     let undistorted = |(mode, seen): (&&str, &Undistorted)| {
         json!({
             "mode": mode,
@@ -139,7 +140,7 @@ pub fn causes(columns: &[Column]) -> Vec<Value> {
     let of = |column: &Column| {
         json!({
             "cause": column.cause.as_str(),
-            "size": column.cause.size(),
+            "size": column.cause.size(lens),
             "bench": rows(&column.table),
             "corners": corners(&column.table),
             "times_for_paper": column.times().map(|times| times.map(rounded)),

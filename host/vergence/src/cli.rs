@@ -82,6 +82,8 @@ enum Verb {
     Depth(With<RigFileOptions, cmd::depth::Args>),
     /// Measures live: a cloud of the newest pair, again and again, at rest or in motion.
     Run(With<BoardOptions, cmd::run::Args>),
+    /// Measures a recording as `run` measured while it recorded.
+    Replay(cmd::replay::Args),
     /// Serves a page on which people see and drive the rig.
     Panel(With<BoardOptions, cmd::panel::Args>),
     /// Keeps pre-trained networks for matching.
@@ -108,7 +110,7 @@ pub const TASKS: &[(&str, &[&str])] = &[
     ("Set up a board", &["devices", "doctor", "config", "flash", "image", "servo"]),
     ("Calibrate", &["target", "capture", "calibrate", "camera", "rig"]),
     ("Move", &["home", "mode", "move", "plan", "stop", "arm", "disarm", "clear"]),
-    ("Measure", &["run", "panel", "depth", "zones", "models"]),
+    ("Measure", &["run", "replay", "panel", "depth", "zones", "models"]),
     ("Watch a board", &["status", "monitor", "trigger", "log", "link-test"]),
     ("Check this program", &["bench", "soak"]),
     ("Shell", &["completions", "help"]),
@@ -270,6 +272,7 @@ fn execute(cli: Cli, virtual_time: bool) -> Result<(), Failure> {
                 None => cmd::demo::run(&verb.args, &verb.options.given(), console).await,
             },
             Verb::Run(verb) => cmd::run::run(&verb.args, &verb.options.chosen()?, console).await,
+            Verb::Replay(args) => cmd::replay::run(&args, console),
             Verb::Panel(verb) => cmd::panel::run(&verb.args, &verb.options.chosen()?, console).await,
             Verb::Reproduce(args) => cmd::reproduce::run(&args, console).await,
             Verb::Depth(verb) => cmd::depth::run(verb.args, &verb.options.chosen()?, console).await,

@@ -1,7 +1,7 @@
 //! The result of the calibration of a camera as lines of text and as JSON.
 
 use serde_json::{Value, json};
-use vergence_calibration::{IntrinsicsCalibration, LensStep, PupilEvidence, StepEvidence};
+use vergence_calibration::{IntrinsicsCalibration, LensStep, PupilEvidence, StepEvidence, StepVerdict};
 use vergence_targets::TargetView;
 use vergence_vision::{CENTRAL_PARAMETERS, LENS_PARAMETERS};
 
@@ -42,10 +42,10 @@ fn pupil_json(pupil: &PupilEvidence) -> Value {
     }
 }
 
-/// What the views say of a step to a richer lens.
+/// What the views say of parameters that a lens may have.
 #[must_use]
 pub fn step_in_words(evidence: &StepEvidence) -> String {
-    let StepEvidence { step, gain, rms_px, held_out_px, is_kept } = evidence;
+    let StepEvidence { step, gain, rms_px: [without, with], held_out_px, verdict } = evidence;
     let what = match step {
         LensStep::PupilGrowth => "a pupil with e1",
         LensStep::Asymmetry => "decentring p and thin prism s",
@@ -53,11 +53,19 @@ pub fn step_in_words(evidence: &StepEvidence) -> String {
     let held_out = held_out_px
         .map(|[without, with]| format!(", those of views held out {with:.4} instead of {without:.4} px"))
         .unwrap_or_default();
-    let verdict = if *is_kept { "the lens has" } else { "the lens is not known to have" };
-    let [without, with] = rms_px;
-    format!(
-        "{verdict} {what}: chi-squared falls by {gain:.1} (30 are asked for), residuals are {with:.4} instead of {without:.4} px{held_out}"
-    )
+    let figures = format!("residuals are {with:.4} instead of {without:.4} px{held_out}");
+    match verdict {
+        StepVerdict::Found => {
+            format!("the lens has {what}: chi-squared falls by {gain:.1} (30 are asked for), {figures}")
+        }
+        StepVerdict::NotTold => format!(
+            "the views do not tell {what}: chi-squared falls by {gain:.1} (30 are asked for), {figures}. It counts as unknown within what \
+             lenses have, and makes the lens less certain by that"
+        ),
+        StepVerdict::Absent => format!(
+            "the lens has no {what}: chi-squared would fall by {gain:.1} only, and the views would show that of a badly mounted lens"
+        ),
+    }
 }
 
 fn steps_json(steps: &[StepEvidence]) -> Value {
@@ -72,7 +80,11 @@ fn steps_json(steps: &[StepEvidence]) -> Value {
             "chi_squared_gain": evidence.gain,
             "rms_px": {"without": without, "with": with},
             "held_out_px": evidence.held_out_px.map(|[without, with]| json!({"without": without, "with": with})),
-            "kept": evidence.is_kept,
+            "verdict": match evidence.verdict {
+                StepVerdict::Found => "found",
+                StepVerdict::NotTold => "not_told",
+                StepVerdict::Absent => "absent",
+            },
         })
     };
     steps.iter().map(one).collect()

@@ -35,6 +35,11 @@ pub fn stage_lines(stage: &StageCalibration, held_out: &[HeldOutPose]) -> Vec<St
     for zero in &stage.zero_offsets {
         lines.push(format!("  zero of {}: {} ± {}", zero.axis, zero.offset, zero.sigma));
     }
+    for (axis, play) in stage.plays() {
+        lines.push(format!(
+            "  play of {axis}: {play}. The images put it so far beside its readings: it has play, or its screw or rail is not straight or even"
+        ));
+    }
     for skipped in &stage.skipped {
         lines.push(format!("  view not used: {} ({} camera: {})", skipped.view, skipped.side, skipped.reason));
     }
@@ -89,6 +94,8 @@ pub fn stage_json(rig: &Rig, stage: &StageCalibration, held_out: &[HeldOutPose])
         .iter()
         .map(|zero| json!({ "axis": zero.axis, "offset": zero.offset.mm_or_deg(), "sigma": zero.sigma.mm_or_deg() }))
         .collect();
+    let plays: Vec<_> =
+        stage.plays().iter().map(|(axis, play)| json!({ "axis": axis, "play": play.mm_or_deg() })).collect();
     let held_out: Vec<_> = held_out
         .iter()
         .map(|pose| {
@@ -115,6 +122,7 @@ pub fn stage_json(rig: &Rig, stage: &StageCalibration, held_out: &[HeldOutPose])
         "screws": screws,
         "scales": scales,
         "zero_offsets": zeros,
+        "plays": plays,
         "at_zero": {
             "translation_mm": stage.at_zero.left_from_right.origin().mm().as_slice(),
             "rotation_vector": stage.at_zero.left_from_right.rotation().scaled_axis().as_slice(),

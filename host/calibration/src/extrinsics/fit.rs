@@ -39,6 +39,8 @@ pub(crate) struct Fit<S> {
     pub errors_px: Vec<Vec<f64>>,
     /// Standard deviation of a pixel coordinate in units of the corner's relative sigma.
     pub sigma: f64,
+    /// The same, by which what is known besides the corners was weighted.
+    pub sigma_of_priors: f64,
     /// Covariance of the shared unknowns' step as the views scatter; `None` if the corners do not determine it.
     pub covariance: Option<Clustered>,
     /// The same by independent noise of the corners alone.
@@ -86,6 +88,9 @@ impl<K: Kinematics> Task<'_, K> {
     /// The optimum near `start`.
     pub fn fit(&self, start: Start<K::State>) -> Result<Fit<K::State>, NoFit> {
         let Start { mut shared, mut targets, usable } = start;
+        if *self.knowledge != LensKnowledge::Exact {
+            shared.lenses = shared.lenses.polynomial();
+        }
         let mut sigma = self.settle(&mut shared, &mut targets, &usable)?;
         let mut inliers = self.inliers(&shared, &self.errors_px(&shared, &targets), &usable);
         let mut round = 0;
@@ -106,6 +111,7 @@ impl<K: Kinematics> Task<'_, K> {
             // Priors are weighted by the corners' standard deviation, so that must settle too.
             let next_sigma = variance.sqrt().max(FINEST);
             let settled = next == inliers && (next_sigma - sigma).abs() <= 1e-3 * sigma;
+            let sigma_of_priors = sigma;
             sigma = next_sigma;
             if settled || round == MOST_ROUNDS {
                 let information = solution.normal.shared_information().ok_or(NoFit::NotDetermined)?;
@@ -118,6 +124,7 @@ impl<K: Kinematics> Task<'_, K> {
                     inliers,
                     errors_px,
                     sigma,
+                    sigma_of_priors,
                     covariance,
                     noise_covariance,
                     information,

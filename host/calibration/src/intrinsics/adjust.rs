@@ -5,8 +5,9 @@ use rayon::prelude::*;
 use vergence_vision::median;
 
 use super::bundle::{Bundle, SHARED, Shared};
-use super::lens::{CENTRAL, E0, E1, LENS};
+use super::lens::{CENTRAL, E0, E1, LENS, LensParameters};
 use super::observations::{FEWEST_CORNERS, FEWEST_VIEWS, Observation, ObservedView};
+use super::prior::{FINEST, Prior};
 use super::start::Start;
 use super::{IntrinsicsError, IntrinsicsOptions, Outlier, OutlierReason};
 use crate::Loss;
@@ -31,7 +32,7 @@ pub(super) struct Adjusted {
     pub free: Vec<usize>,
     /// Over the parameters adjusted and the poses.
     pub normal: SchurNormal<POSE>,
-    /// Variance by which the prior of e0 was weighted, over that of the residuals.
+    /// Variance by which the prior was weighted, over that of the residuals.
     pub prior_factor: f64,
     pub outliers: Vec<Outlier>,
 }
@@ -50,6 +51,11 @@ pub(super) struct Terms {
 }
 
 impl Terms {
+    /// A pupil of one coefficient.
+    pub const PUPIL: Self = Self { e0: true, e1: false, asymmetry: false };
+    /// Everything that a lens may have.
+    pub const WHOLE: Self = Self { e0: true, e1: true, asymmetry: true };
+
     /// The parameters adjusted at the end.
     pub fn free(self, warp: bool) -> Vec<usize> {
         let has = |parameter: usize| match parameter {
@@ -118,17 +124,6 @@ fn scale(views: &[ObservedView], state: &State) -> Option<f64> {
     Some(median(of_corners(views, state, Shared::deviation).collect())?.max(FINEST)).filter(|scale| scale.is_finite())
 }
 
-/// Standard deviation of a coordinate over the corners used, in units of their relative sigmas: the median length of a two-dimensional
-/// Gaussian error is 1.18 of it.
-fn noise(views: &[ObservedView], state: &State) -> Option<f64> {
-    const RAYLEIGH_MEDIAN: f64 = 1.177_410_022_515_474_7;
-    let used = views.iter().zip(&state.poses).flat_map(|(v, p)| v.used().map(|s| state.shared.deviation(p, s)));
-    Some(median(used.collect())?.max(FINEST) / RAYLEIGH_MEDIAN)
-}
-
-/// Least scale of noise: below it residuals are rounding errors, in pixels.
-const FINEST: f64 = 1e-4;
-
 /// Gives each target the mirrored tilt if that fits better: it is another local optimum of a plane's pose (D.
 /// Oberkampf, D. DeMenthon and L. Davis, CVIU 63(3), 1996).
 fn reconsider_poses(views: &[ObservedView], state: &mut State, loss: Loss) {
@@ -163,19 +158,17 @@ fn mirrored(pose: &Isometry3<f64>, view: &ObservedView) -> Isometry3<f64> {
     Isometry3::from_parts(Translation3::from(seen - rotation * middle), rotation)
 }
 
-/// What is known of e0 before the views say anything: it is zero within `sigma_mm`.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct PupilPrior {
-    pub sigma_mm: f64,
-    /// How much more the views pull than the noise of their corners explains, see [`crate::schur_lm::Clustered::scatter`]. A view weighs
-    /// less against the prior by that.
-    pub scatter: f64,
-}
-
-impl PupilPrior {
-    /// The pull of e0 towards zero, in units of residuals per millimetre: residuals weigh by their scale, so that the prior must be scaled too.
-    pub fn pull(&self, views: &[ObservedView], state: &State) -> Option<f64> {
-        Some(self.scatter * noise(views, state)? / self.sigma_mm)
+impl State {
+    /// With zero for what a lens with these terms does not have.
+    pub fn with_only(mut self, terms: Terms) -> Self {
+        let free = terms.free(true);
+        let mut lens = self.shared.lens.to_array();
+        lens.iter_mut()
+            .enumerate()
+            .filter(|(parameter, _)| !free.contains(parameter))
+            .for_each(|(_, value)| *value = 0.0);
+        self.shared.lens = LensParameters::from_array(lens);
+        self
     }
 }
 
@@ -184,15 +177,21 @@ impl Adjusted {
     pub fn state(&self) -> State {
         State { shared: self.shared, poses: self.poses.clone() }
     }
+
+    /// This adjustment of views that an `earlier` one left: what that one dropped stays dropped.
+    pub fn after(self, earlier: &Self) -> Self {
+        let outliers = earlier.outliers.iter().copied().chain(self.outliers).collect();
+        Self { outliers, ..self }
+    }
 }
 
 /// Plain least squares over the corners near their reprojections, repeated until the set of corners stays the same. `free` are the
-/// parameters adjusted; `prior` is what is known of e0 before the views say anything.
+/// parameters adjusted; `prior` is how what is known of lenses before any view weighs.
 pub(super) fn inlier_fit(
     mut views: Vec<ObservedView>,
     mut state: State,
     free: Vec<usize>,
-    prior: Option<PupilPrior>,
+    prior: Option<Prior>,
     options: &IntrinsicsOptions,
 ) -> Result<Adjusted, IntrinsicsError> {
     const ROUNDS: usize = 10;
@@ -206,8 +205,8 @@ pub(super) fn inlier_fit(
         drop_views(&mut views, &mut state, &mut left_out)?;
         let references: Vec<_> = views.iter().collect();
         let arrow = SchurOptions { iterations: 200, ..SchurOptions::default() };
-        let pupil_pull = prior.and_then(|prior| prior.pull(&views, &state));
-        let problem = Bundle { pupil_pull, ..Bundle::of(&references, &free) };
+        let strength = prior.and_then(|prior| prior.strength(&views, &state));
+        let problem = Bundle { prior: strength, ..Bundle::of(&references, &free) };
         let solution = solve(&problem, state.shared, state.poses, &arrow);
         if matches!(solution.ending, Ending::Iterations | Ending::NotFinite) {
             return Err(IntrinsicsError::NotConverged);
@@ -216,7 +215,7 @@ pub(super) fn inlier_fit(
         normal = Some(solution.normal);
     }
     let normal = normal.ok_or(IntrinsicsError::NotConverged)?;
-    let prior_factor = prior.map_or(1.0, |prior| prior.scatter * prior.scatter);
+    let prior_factor = prior.map_or(1.0, Prior::factor);
     Ok(Adjusted { shared: state.shared, views, poses: state.poses, free, normal, prior_factor, outliers: left_out })
 }
 

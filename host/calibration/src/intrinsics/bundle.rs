@@ -3,8 +3,9 @@
 use nalgebra::{Isometry3, Point3, SVector, Vector3};
 use vergence_vision::Point;
 
-use super::lens::{E0, LENS, LensParameters, reproject};
+use super::lens::{LENS, LensParameters, reproject};
 use super::observations::{Observation, ObservedView};
+use super::prior::{KNOWN, Known};
 use crate::reprojection::{POSE, moved};
 use crate::schur_lm::{Equations, SchurProblem};
 
@@ -76,14 +77,14 @@ impl Row {
 pub(super) struct Bundle<'a> {
     pub views: &'a [&'a ObservedView],
     pub free: &'a [usize],
-    /// The pull of e0 towards zero, in units of residuals per millimetre.
-    pub pupil_pull: Option<f64>,
+    /// How strongly what is known of lenses before any view counts, see [`super::prior::Prior::strength`].
+    pub prior: Option<f64>,
 }
 
 impl<'a> Bundle<'a> {
     /// The problem without a prior.
     pub const fn of(views: &'a [&'a ObservedView], free: &'a [usize]) -> Self {
-        Self { views, free, pupil_pull: None }
+        Self { views, free, prior: None }
     }
 }
 
@@ -111,10 +112,21 @@ impl SchurProblem<POSE> for Bundle<'_> {
     }
 
     fn shared_residuals(&self, shared: &Shared, equations: &mut Equations<POSE>) {
-        let Some(pull) = self.pupil_pull else { return };
-        let columns: Vec<[f64; 1]> =
-            self.free.iter().map(|&parameter| [if parameter == E0 { pull } else { 0.0 }]).collect();
-        equations.add_plain(&[pull * shared.lens.pupil.e0.mm()], &columns, &[[0.0]; POSE]);
+        let Some(strength) = self.prior else { return };
+        let values = shared.lens.to_array();
+        let place = |parameter: usize| self.free.iter().position(|&free| free == parameter);
+        for Known { sum, sigma } in &KNOWN {
+            let mut columns = vec![[0.0]; self.free.len()];
+            let mut off = 0.0;
+            for &(parameter, weight) in *sum {
+                let Some(column) = place(parameter) else { continue };
+                columns[column] = [strength * weight / sigma];
+                off += columns[column][0] * values[parameter];
+            }
+            if sum.first().is_some_and(|&(own, _)| place(own).is_some()) {
+                equations.add_plain(&[off], &columns, &[[0.0]; POSE]);
+            }
+        }
     }
 
     fn shared_plus(&self, shared: &Shared, step: &[f64]) -> Shared {

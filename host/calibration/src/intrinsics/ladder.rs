@@ -1,19 +1,28 @@
-//! Steps from a lens with a pupil of one coefficient to richer ones, each taken where the views ask for it.
+//! Which lens the views ask for.
 //!
-//! A richer lens than needed makes depths less certain for nothing, so a step is kept only where chi-squared falls by more than noise
-//! explains and views that were held out do not get worse. The pupil's second coefficient comes first, then decentring and thin prism
-//! together, because one displaced element makes both. What a lens is not symmetric by can hide how its pupil moves, so the pupil gets a
-//! second trial.
+//! The richest lens is fitted with what is known of lenses before any view (`prior`), and each group of its parameters is judged by what the fit
+//! loses without it: the pupil's e0, its growth e1, and decentring with thin prism, which go together because one displaced element makes
+//! both. All are judged by the scatter that the richest lens leaves, since what it explains is no scatter.
+//!
+//! A group stays out only where the views tell that the lens has none of it. What they leave open stays an unknown with its prior: a lens
+//! that passed as symmetric because few views did not show otherwise would be stated far more certain than it is.
 
 use vergence_vision::ImageSize;
 
-use super::adjust::{Adjusted, PupilPrior, State, Terms};
+use super::adjust::{Adjusted, Terms, inlier_fit};
 use super::lens::with_valid_cone;
 use super::observations::ObservedView;
+use super::prior::{Prior, narrowest};
 use super::pupil;
 use super::report::outermost;
-use super::trial::{LEAST_GAIN, Trial};
+use super::trial::{Trial, scatter};
 use super::{IntrinsicsError, IntrinsicsOptions, LensModel, PupilEvidence};
+
+/// Chi-squared by which the fit must get worse without parameters that count as found: of one unknown 5.5 standard deviations; of six unknowns
+/// chance gives it once in 25,000 calibrations.
+pub(super) const LEAST_GAIN: f64 = 30.0;
+/// Chi-squared of the six unknowns of an asymmetry that chance exceeds once in 100 calibrations of a symmetric lens.
+const CHANCE_GAIN: f64 = 16.8;
 
 /// Parameters that a lens gets together.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -24,19 +33,30 @@ pub enum LensStep {
     Asymmetry,
 }
 
-/// What the views say of a step.
+/// What becomes of parameters.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum StepVerdict {
+    /// The views show them.
+    Found,
+    /// The views do not tell: they are unknowns of the lens with what is known of any lens.
+    NotTold,
+    /// The views tell that the lens does not have them.
+    Absent,
+}
+
+/// What the views say of parameters.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct StepEvidence {
-    /// The step.
+    /// The parameters.
     pub step: LensStep,
-    /// By how much chi-squared falls with it, in units of the scatter of the views that is left.
+    /// By how much chi-squared falls with them, in units of the scatter of the views that is left.
     pub gain: f64,
-    /// Root mean square residual of the corners used, in pixels: without and with it.
+    /// Root mean square residual of the corners used, in pixels: without and with them.
     pub rms_px: [f64; 2],
-    /// The same of views held out; `None` where the gain alone decides against the step.
+    /// The same of views held out; `None` where the gain alone decides that they are not found.
     pub held_out_px: Option<[f64; 2]>,
-    /// Whether the lens got it.
-    pub is_kept: bool,
+    /// What becomes of them.
+    pub verdict: StepVerdict,
 }
 
 /// What the views say of the lens.
@@ -48,77 +68,110 @@ pub(super) struct Evidence {
 /// The adjustment with the lens that the options or the views ask for.
 pub(super) fn fit(
     views: Vec<ObservedView>,
-    state: State,
+    state: super::adjust::State,
     size: ImageSize,
     options: &IntrinsicsOptions,
 ) -> Result<(Adjusted, Evidence), IntrinsicsError> {
-    let (mut adjusted, pupil, prior) = pupil::fit(views, state, options)?;
-    let mut steps = Vec::new();
-    let mut terms = Terms { e0: prior.is_some(), ..Terms::default() };
-    if matches!(options.model, LensModel::Full | LensModel::ByEvidence) {
-        for step in [LensStep::PupilGrowth, LensStep::Asymmetry, LensStep::PupilGrowth] {
-            let Some(richer) = step.next(terms, &steps) else { continue };
-            let evidence;
-            (adjusted, evidence) = Attempt { step, richer, prior, size, options }.made(adjusted);
-            if evidence.is_some_and(|evidence| evidence.is_kept) {
-                terms = richer;
-            }
-            // A second trial says more than the first.
-            steps.retain(|earlier: &StepEvidence| earlier.step != step);
-            steps.extend(evidence);
-        }
-    }
-    Ok((adjusted, Evidence { pupil, steps }))
-}
-
-impl LensStep {
-    /// The lens with `terms` after this step; `None` where there is no trial to make: the lens has it, its pupil stays, or nothing changed
-    /// since the last trial.
-    fn next(self, terms: Terms, steps: &[StepEvidence]) -> Option<Terms> {
-        match self {
-            Self::PupilGrowth => {
-                let is_news = steps.is_empty() || terms.asymmetry;
-                (terms.e0 && !terms.e1 && is_news).then_some(Terms { e1: true, ..terms })
-            }
-            Self::Asymmetry => Some(Terms { asymmetry: true, ..terms }),
-        }
+    let central = inlier_fit(views, state, Terms::default().free(options.warp), None, options)?;
+    let candidates: &[Terms] = match options.model {
+        LensModel::Central => &[],
+        LensModel::MovingPupil => &[Terms::PUPIL],
+        LensModel::Full | LensModel::ByEvidence => &[Terms::WHOLE, Terms::PUPIL],
+    };
+    // The richest lens may be one too many for a handful of corners.
+    let richest = candidates.iter().find_map(|terms| Richest::of(&central, *terms, size, options));
+    match richest {
+        Some(richest) => richest.judged(central),
+        None => Ok((central, Evidence { pupil: PupilEvidence::NotAsked, steps: Vec::new() })),
     }
 }
 
-/// A step that may be taken.
-struct Attempt<'a> {
-    step: LensStep,
-    /// The lens after it.
-    richer: Terms,
-    /// That of e0.
-    prior: Option<PupilPrior>,
-    size: ImageSize,
-    options: &'a IntrinsicsOptions,
+/// The fit of the richest lens.
+pub(super) struct Richest<'a> {
+    adjusted: Adjusted,
+    pub terms: Terms,
+    prior: Prior,
+    /// Variance of a residual, as the views scatter with this lens.
+    pub variance: f64,
+    pub options: &'a IntrinsicsOptions,
 }
 
-impl Attempt<'_> {
-    /// The adjustment with the richer lens if the step is kept, else as it was. There is no evidence where the views do not determine it.
-    fn made(&self, adjusted: Adjusted) -> (Adjusted, Option<StepEvidence>) {
-        let Some(trial) = Trial::of(&adjusted, self.richer.free(self.options.warp), self.prior) else {
-            return (adjusted, None);
+impl<'a> Richest<'a> {
+    /// `None` where the corners do not give one.
+    fn of(central: &Adjusted, terms: Terms, size: ImageSize, options: &'a IntrinsicsOptions) -> Option<Self> {
+        let rough = Prior { scatter: 1.0 };
+        let first = Trial::of(central, terms, rough, options.warp);
+        let prior = Prior { scatter: scatter(&first.normal, rough)? };
+        let adjusted = inlier_fit(central.views.clone(), first.state, terms.free(options.warp), Some(prior), options);
+        let adjusted = adjusted.ok()?.after(central);
+        with_valid_cone(adjusted.shared.lens, outermost(&adjusted), size).ok()?;
+        let variance = adjusted.normal.variance()? * scatter(&adjusted.normal, prior)?.powi(2);
+        (variance > 0.0).then_some(Self { adjusted, terms, prior, variance, options })
+    }
+
+    /// The fit of a lens to the corners that this one used.
+    pub fn trial(&self, terms: Terms) -> Trial {
+        Trial::of(&self.adjusted, terms, self.prior, self.options.warp)
+    }
+
+    /// By how much chi-squared falls from one lens to the other.
+    pub fn gain(&self, without: &Trial, with: &Trial) -> f64 {
+        2.0 * (without.normal.cost() - with.normal.cost()) / self.variance
+    }
+
+    /// The residuals of views held out, without and with the parameters in question.
+    pub fn held_out_px(&self, without: &Trial, with: &Trial) -> [f64; 2] {
+        [without, with].map(|lens| lens.held_out_px(&self.adjusted))
+    }
+
+    /// The adjustment with the lens that is left, and the evidence.
+    fn judged(self, central: Adjusted) -> Result<(Adjusted, Evidence), IntrinsicsError> {
+        let pupil = pupil::evidence(&self);
+        let has_pupil = !matches!(pupil, PupilEvidence::Central { .. });
+        let (mut terms, mut steps) =
+            (Terms { e0: has_pupil, e1: has_pupil && self.terms.e1, ..self.terms }, Vec::new());
+        if terms.e1 {
+            steps.push(self.step(LensStep::PupilGrowth, Terms { e1: false, ..self.terms }));
+        }
+        if terms.asymmetry {
+            let evidence = self.step(LensStep::Asymmetry, Terms { asymmetry: false, ..self.terms });
+            terms.asymmetry = evidence.verdict != StepVerdict::Absent;
+            steps.push(evidence);
+        }
+        let adjusted = if terms == self.terms {
+            self.adjusted
+        } else if terms == Terms::default() {
+            central
+        } else {
+            let start = self.adjusted.state().with_only(terms);
+            let free = terms.free(self.options.warp);
+            inlier_fit(self.adjusted.views.clone(), start, free, Some(self.prior), self.options)?.after(&self.adjusted)
         };
-        // By the scatter that the richer lens leaves: what it explains is no scatter.
-        let Some(gain) = trial.scatter().map(|scatter| trial.gain(scatter)) else { return (adjusted, None) };
-        let (rms_px, is_asked_for) = (trial.rms_px(&adjusted), self.options.model == LensModel::Full);
-        let held_out_px = (gain > LEAST_GAIN || is_asked_for).then(|| trial.held_out(&adjusted));
-        let evidence = |is_kept: bool| Some(StepEvidence { step: self.step, gain, rms_px, held_out_px, is_kept });
-        let is_better = held_out_px.is_some_and(|[without, with]| with <= without);
-        if !is_better && !is_asked_for {
-            return (adjusted, evidence(false));
-        }
-        match trial.kept(adjusted.clone(), self.prior, self.options) {
-            Ok(kept) if self.is_a_lens(&kept) => (kept, evidence(true)),
-            // A richer lens may be one too many for the corners that are left.
-            _ => (adjusted, evidence(false)),
+        Ok((adjusted, Evidence { pupil, steps }))
+    }
+
+    fn step(&self, step: LensStep, without: Terms) -> StepEvidence {
+        let [without, with] = [without, self.terms].map(|terms| self.trial(terms));
+        let gain = self.gain(&without, &with);
+        let held_out_px = (gain > LEAST_GAIN).then(|| self.held_out_px(&without, &with));
+        let verdict = match held_out_px {
+            Some([without, with]) if with <= without => StepVerdict::Found,
+            None if step == LensStep::Asymmetry && self.is_symmetric(gain) => StepVerdict::Absent,
+            _ => StepVerdict::NotTold,
+        };
+        StepEvidence {
+            step,
+            gain,
+            rms_px: [without, with].map(|lens| lens.rms_px(&self.adjusted)),
+            held_out_px,
+            verdict,
         }
     }
 
-    fn is_a_lens(&self, adjusted: &Adjusted) -> bool {
-        with_valid_cone(adjusted.shared.lens, outermost(adjusted), self.size).is_ok()
+    /// Whether the views tell that there is no asymmetry: one as large as badly mounted lenses have would have been found, whatever its
+    /// direction, and no more is there than chance gives.
+    fn is_symmetric(&self, gain: f64) -> bool {
+        let is_told = narrowest(&self.adjusted, self.variance).is_some_and(|left| left * LEAST_GAIN.sqrt() <= 1.0);
+        self.options.model != LensModel::Full && gain <= CHANCE_GAIN && is_told
     }
 }

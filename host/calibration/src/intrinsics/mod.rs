@@ -3,7 +3,8 @@
 //! 1. A linear start on bearings (`start`).
 //! 2. A robust joint adjustment of lens and target poses that finds outliers (`adjust`).
 //! 3. Plain least squares on the remaining corners: the result and its covariance.
-//! 4. The same with a pupil that moves (`pupil`), and with elements off the axis (`ladder`), where the views ask for them.
+//! 4. The same with all that a lens may have besides, within what is known of lenses (`prior`): a pupil that moves (`pupil`), elements off
+//!    the axis. What the views tell to be absent is left out again (`ladder`).
 
 mod adjust;
 mod bundle;
@@ -11,6 +12,7 @@ mod ladder;
 mod lens;
 mod model;
 mod observations;
+mod prior;
 mod pupil;
 mod report;
 mod result;
@@ -19,7 +21,7 @@ mod trial;
 
 use vergence_vision::{ImageSize, OpenCvFisheye};
 
-pub use ladder::{LensStep, StepEvidence};
+pub use ladder::{LensStep, StepEvidence, StepVerdict};
 pub(crate) use lens::{CENTRAL, LENS};
 pub use lens::{LensParameters, Reprojection, reproject};
 pub use model::{LensModel, UnknownLensModel};

@@ -1,23 +1,19 @@
-//! Whether the pupil of the lens moves, as the views tell: the first step up the ladder of lenses.
+//! Whether the pupil of the lens moves, as the views tell.
 //!
 //! A lens whose pupil moves ([`vergence_vision::pupil_shift`]) leaves a central fit with residuals that hardly grow, and with poses of the
-//! targets and a baseline that are wrong. Therefore the fit is made with and without the pupil's coefficient e0, and e0 is kept where
+//! targets and a baseline that are wrong. Therefore the fit is made with and without the pupil's coefficient e0, and e0 counts as found where
 //! chi-squared falls by more than noise explains and views that were held out do not get worse.
 //!
-//! The prior of any lens goes with e0. Without it a lens that is not of the model's family borrows a pupil of centimetres from views that
-//! hardly determine one. Targets that are all far away, or near the axis, show no pupil of ordinary size; then e0 is kept as an unknown
-//! with that prior, so that it makes the covariance as large as the ignorance is.
+//! Targets that are all far away, or near the axis, show no pupil of ordinary size; then e0 is kept as an unknown with its prior, so that it
+//! makes the covariance as large as the ignorance is.
 
-use super::adjust::{Adjusted, PupilPrior, State, Terms, inlier_fit};
+use super::LensModel;
+use super::adjust::Terms;
+use super::ladder::{LEAST_GAIN, Richest};
 use super::lens::E0;
-use super::observations::ObservedView;
-use super::trial::{LEAST_GAIN, Trial, scatter};
-use super::{IntrinsicsError, IntrinsicsOptions, LensModel};
 
 /// A pupil with this e0 in millimetres is as small as one gets in lenses for cameras: twice a focal length of half a millimetre.
 const SMALL_PUPIL_MM: f64 = 1.0;
-/// Standard deviation of e0 before anything is known of the lens, in millimetres: twice the focal length of common lenses.
-const PRIOR_MM: f64 = 3.0;
 
 /// What the views say of the pupil.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -47,37 +43,23 @@ pub enum PupilEvidence {
     },
 }
 
-/// The adjustment with the pupil that the options or the views ask for, what was found of it, and the prior of e0 if that is an unknown.
-pub(super) fn fit(
-    views: Vec<ObservedView>,
-    state: State,
-    options: &IntrinsicsOptions,
-) -> Result<(Adjusted, PupilEvidence, Option<PupilPrior>), IntrinsicsError> {
-    let free = |e0: bool| Terms { e0, ..Terms::default() }.free(options.warp);
-    let central = inlier_fit(views, state, free(false), None, options)?;
-    if options.model == LensModel::Central {
-        return Ok((central, PupilEvidence::NotAsked, None));
+/// What the views say of e0. Its growth e1 is left out of both fits: it would make e0 uncertain by as much as it is unknown.
+pub(super) fn evidence(richest: &Richest<'_>) -> PupilEvidence {
+    let is_wanted = matches!(richest.options.model, LensModel::MovingPupil | LensModel::Full);
+    let [without, with] =
+        [false, true].map(|e0| richest.trial(Terms { e0, e1: false, asymmetry: richest.terms.asymmetry }));
+    let gain = richest.gain(&without, &with);
+    // With its prior e0 is always determined.
+    let sigma_mm = with.sigma(E0, richest.variance).unwrap_or(f64::INFINITY);
+    if gain > LEAST_GAIN || is_wanted {
+        let held_out_px = richest.held_out_px(&without, &with);
+        if held_out_px[1] <= held_out_px[0] || is_wanted {
+            return PupilEvidence::Moves { gain, held_out_px };
+        }
+        return PupilEvidence::CannotTell { gain, sigma_mm };
     }
-    let tried = scatter(&central.normal, central.prior_factor).and_then(|scatter| {
-        let prior = PupilPrior { sigma_mm: PRIOR_MM, scatter };
-        let trial = Trial::of(&central, free(true), Some(prior))?;
-        Some((prior, trial.sigma(E0, scatter)?, trial))
-    });
-    let Some((prior, sigma_mm, trial)) = tried else {
-        // With its prior e0 is always determined: the views do not determine the lens, which the report of it will say.
-        return Ok((central, PupilEvidence::NotAsked, None));
-    };
-    let (gain, is_wanted) =
-        (trial.gain(prior.scatter), matches!(options.model, LensModel::MovingPupil | LensModel::Full));
-    let cannot_tell = sigma_mm * LEAST_GAIN.sqrt() > SMALL_PUPIL_MM;
-    let evidence = if gain > LEAST_GAIN || is_wanted {
-        let held_out_px = trial.held_out(&central);
-        let is_kept = held_out_px[1] <= held_out_px[0] || is_wanted;
-        is_kept.then_some(PupilEvidence::Moves { gain, held_out_px })
-    } else {
-        cannot_tell.then_some(PupilEvidence::CannotTell { gain, sigma_mm })
-    };
-    let Some(evidence) = evidence else { return Ok((central, PupilEvidence::Central { gain, sigma_mm }, None)) };
-    let adjusted = trial.kept(central, Some(prior), options)?;
-    Ok((adjusted, evidence, Some(prior)))
+    match sigma_mm * LEAST_GAIN.sqrt() > SMALL_PUPIL_MM {
+        true => PupilEvidence::CannotTell { gain, sigma_mm },
+        false => PupilEvidence::Central { gain, sigma_mm },
+    }
 }

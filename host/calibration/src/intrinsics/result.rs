@@ -20,7 +20,7 @@ pub struct IntrinsicsCalibration {
     pub opencv: OpenCvFisheye,
     /// What the views say of the pupil; its coefficients are those of `camera`.
     pub pupil: PupilEvidence,
-    /// What the views say of richer lenses, in the order of the trials.
+    /// What the views say of the parameters that the lens may have besides.
     pub steps: Vec<StepEvidence>,
     /// Covariance of the parameters in the order of [`LENS_PARAMETERS`](vergence_vision::LENS_PARAMETERS), zero of those that the lens does not
     /// have, target poses marginalised, as the views scatter: it counts that the corners of a view err together, because the lens is not
@@ -62,7 +62,12 @@ impl IntrinsicsCalibration {
     /// The parameters that were estimated, in the order of the covariance.
     #[must_use]
     pub const fn lens(&self) -> LensParameters {
-        LensParameters { central: self.opencv, pupil: self.camera.pupil(), asymmetry: self.camera.asymmetry() }
+        LensParameters {
+            central: self.opencv,
+            pupil: self.camera.pupil(),
+            asymmetry: self.camera.asymmetry(),
+            foreign: None,
+        }
     }
 }
 

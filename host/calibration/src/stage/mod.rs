@@ -4,6 +4,9 @@
 //! The model is the rig's own screw chain. Each stage pose is calibrated by itself first; then everything is refined
 //! jointly on all corners. Afterwards the relative pose is known wherever the axes stand, with its covariance.
 //!
+//! Readings that are off by more than a step of the encoder show play, or a mechanism that is not one of screws: their standard deviation is
+//! estimated, and the file states it as the play of the axis.
+//!
 //! The base frame is held by the left camera with all axes at zero, which stays where the drawing has it; the encoders'
 //! zeros are part of the right camera's pose there.
 
@@ -12,6 +15,7 @@ mod figures;
 mod mechanism;
 mod model;
 mod observability;
+mod play;
 mod result;
 pub(crate) mod start;
 mod twist;
@@ -67,7 +71,8 @@ pub struct StageOptions {
     pub free_scales: bool,
     /// How far the mechanism may be from the rig's chains; `None`: they are only where to start.
     pub tolerance: Option<Tolerance>,
-    /// Standard deviation of a reading of each axis. Empty: that of a step of its encoder.
+    /// Standard deviation of a reading of each axis. Empty: that of a step of its encoder and of the play that the rig states. It is
+    /// estimated where the images ask for more.
     pub reading_sigma: Vec<AxisPosition>,
 }
 
@@ -140,18 +145,26 @@ pub fn calibrate_stage(rig: &Rig, poses: &[StagePose], options: &StageOptions) -
     let state = start::fitted_to_poses(&model, &alone).ok_or(StageError::Diverged)?;
     let prepared =
         start::prepare(rig, state, poses, |state, pose| state.left_from_right(&model.corrected(state, pose)))?;
-    let model = Model { pose_of_view: prepared.pose_of_view, ..model };
-    let task = Task {
-        kinematics: &model,
-        views: &prepared.views,
-        own_poses: &prepared.own_poses,
-        lenses: prepared.shared.lenses,
-        knowledge: &options.lenses,
-        robust: options.robust,
+    let mut model = Model { pose_of_view: prepared.pose_of_view, ..model };
+    let lenses = prepared.shared.lenses;
+    let usable = || prepared.usable.clone();
+    let fitted = |model: &Model, start| {
+        let task = Task {
+            kinematics: model,
+            views: &prepared.views,
+            own_poses: &prepared.own_poses,
+            lenses,
+            knowledge: &options.lenses,
+            robust: options.robust,
+        };
+        task.fit(start).map_err(|reason| StageError::Joint(reason.into()))
     };
-    let fit = task
-        .fit(Start { shared: prepared.shared, targets: prepared.targets, usable: prepared.usable.clone() })
-        .map_err(|reason| StageError::Joint(reason.into()))?;
+    let start = Start { shared: prepared.shared, targets: prepared.targets, usable: usable() };
+    let mut fit = fitted(&model, start)?;
+    if let Some(reading_sigma) = play::reading_sigma(&model, &fit) {
+        model.reading_sigma = reading_sigma;
+        fit = fitted(&model, Start { shared: fit.shared, targets: fit.targets, usable: usable() })?;
+    }
     let observability = observability::observability(rig, &model, &fit, &alone);
     result::calibration(result::Material {
         rig,

@@ -21,6 +21,7 @@ use crate::stage::start::named;
 use crate::stage::twist::Twist;
 use crate::stage::unknowns::Unknown;
 use crate::stage::{Observability, StageError};
+use crate::trunk::play_of;
 
 /// A calibrated stage.
 #[derive(Clone, Debug)]
@@ -202,12 +203,26 @@ impl StageCalibration {
         }
     }
 
-    /// The axis, calibrated between the lowest and the highest reading of all stage poses.
+    /// The play of each axis whose readings are off by more than a step of its encoder, as it is stated in the file.
+    #[must_use]
+    pub fn plays(&self) -> Vec<(String, AxisPosition)> {
+        let play = |(axis, sigma): (&RigAxis, &f64)| {
+            let play = play_of(axis, *sigma, 0.0);
+            // Rounding leaves less.
+            (play > 1e-3 * axis.value_per_count())
+                .then(|| (axis.name.clone(), AxisPosition::from_value(axis.kind, play)))
+        };
+        self.axes.iter().zip(&self.reading_sigma).filter_map(play).collect()
+    }
+
+    /// The axis with its play, calibrated between the lowest and the highest reading of all stage poses.
     fn calibrated(&self, index: usize, axis: &RigAxis) -> RigAxis {
+        let found = self.plays().into_iter().find(|(name, _)| *name == axis.name);
+        let play = found.map_or(axis.play, |(_, play)| play.value());
         let readings = self.poses.iter().filter_map(|pose| pose.readings.get(index)).map(|reading| reading.value());
         let (low, high) = readings.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), x| (low.min(x), high.max(x)));
         let calibrated = (low < high).then(|| [low, high].map(|value| AxisPosition::from_value(axis.kind, value)));
-        RigAxis { calibrated, ..axis.clone() }
+        RigAxis { calibrated, play, ..axis.clone() }
     }
 
     /// The largest standard deviations of rotation and translation by the calibration, along the worst direction, over the corners

@@ -20,8 +20,8 @@ pub(crate) fn model(rig: &Rig, poses: &[StagePose], options: &StageOptions) -> R
     let axes = &rig.axes;
     check_readings(rig, poses)?;
     let reading_sigma: Vec<f64> = if options.reading_sigma.is_empty() {
-        // Standard deviation of a uniform error of one encoder step.
-        axes.iter().map(|axis| axis.value_per_count() / 12f64.sqrt()).collect()
+        // Standard deviation of a uniform error of one encoder step, and of the play that is known.
+        axes.iter().map(|axis| axis.sigma_with_play(1.0 / 12f64.sqrt()) * axis.value_per_count()).collect()
     } else if belong(axes, &options.reading_sigma) {
         options.reading_sigma.iter().map(|sigma| sigma.value()).collect()
     } else {

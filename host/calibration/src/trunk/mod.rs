@@ -18,6 +18,7 @@ use crate::trunk::model::Model;
 
 pub use holdout::validate_trunk;
 pub use play::PlayFound;
+pub(crate) use result::play_of;
 pub use result::{TrunkCalibration, TrunkParameterFigures, TrunkPoseFigures, largest_trunk_sigma};
 
 /// Calibrates the trunk of `rig` on targets seen at `poses`. Of the options, those of lenses and outliers count; tolerances and play

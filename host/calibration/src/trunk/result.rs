@@ -147,8 +147,8 @@ impl TrunkCalibration {
     }
 }
 
-/// The play with which a reading of `axis` has this standard deviation in radians, beside that of passive joints and of its step.
-fn play_of(axis: &RigAxis, sigma: f64, passive: f64) -> f64 {
+/// The play with which a reading of `axis` has this standard deviation in millimetres or radians, beside that of passive joints and of its step.
+pub(crate) fn play_of(axis: &RigAxis, sigma: f64, passive: f64) -> f64 {
     let step = axis.value_per_count() / 12f64.sqrt();
     2.0 * (sigma.powi(2) - step.powi(2) - passive.powi(2)).max(0.0).sqrt()
 }

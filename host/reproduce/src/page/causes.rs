@@ -1,6 +1,7 @@
 //! The errors of each method by their cause, beside the paper.
 
 use vergence_page::{Cell, Row, fixed, note, plain, table, text};
+use vergence_scene::LensChoice;
 
 use crate::bench::MODES;
 use crate::causes::{Column, PUBLISHED, Published, miss_for_published_midpoint};
@@ -10,14 +11,14 @@ use crate::pair::PAIR_VIEWS;
 use crate::undistorted::Undistorted;
 
 /// Both tables and what follows from them.
-pub fn body(columns: &[Column]) -> String {
+pub fn body(columns: &[Column], lens: LensChoice) -> String {
     let seeds = columns.first().map_or(0, |column| column.table.seeds);
-    let sizes = Cause::ALL.map(|cause| format!("{}: {}", cause.as_str(), cause.size())).join("; ");
+    let sizes = Cause::ALL.map(|cause| format!("{}: {}", cause.as_str(), cause.size(lens))).join("; ");
     [
         note(&format!(
             "Mean absolute error of the depth at 350 mm in millimetres, {seeds} rigs; the same rigs and targets in every column. \
-             {sizes}. An error that a column does not name is absent from it: there pictures have no noise but the rounding to \
-             whole grey levels."
+             {sizes}. An error that a column does not name is absent from it: there lenses are ideal, and pictures have no \
+             noise but the rounding to whole grey levels."
         )),
         by_cause(columns),
         note(&what_the_methods_are()),

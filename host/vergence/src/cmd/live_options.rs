@@ -68,8 +68,10 @@ pub struct LiveRig {
     pub simulated: Option<(SharedRig, [TrueLens; 2])>,
     /// What the camera trigger shall do; `None` where the cameras run freely.
     pub trigger: Option<Trigger>,
-    clock: HostClock,
-    period_us: Option<f64>,
+    /// The clock of images and pulses.
+    pub clock: HostClock,
+    /// Time between pulses of the trigger in microseconds; `None` where the cameras run freely.
+    pub period_us: Option<f64>,
     matcher: Arc<dyn Matcher>,
     search: Arc<Search>,
 }
@@ -86,8 +88,9 @@ impl LiveOptions {
         out: Option<&Path>,
         console: Console,
     ) -> Result<LiveRig, Failure> {
-        let drawn = rig_file::load(common.rig.as_deref())?;
         let is_simulated = cameras == ["sim"];
+        let drawn = rig_file::load(common.rig.as_deref())?;
+        let drawn = if is_simulated { self.camera.simulated(drawn)? } else { drawn };
         if self.lens != LensChoice::Ideal && !is_simulated {
             return Err(Failure::usage("--lens is for simulated cameras: --port sim --cameras sim"));
         }
@@ -101,7 +104,7 @@ impl LiveOptions {
         let search = Arc::new(self.search.search(&known)?);
         // A simulated camera shows nothing beyond the field in which it is known.
         let measuring = Arc::new(self.search.measuring(known.clone())?);
-        let matcher = Arc::from(self.matching.matcher(console)?);
+        let matcher = Arc::from(self.matching.live(console)?);
         let (board, mechanics) = self.connected(is_simulated, common, [&drawn, &known], console).await?;
         // Images and pulses are stamped on the clock of the link.
         let clock = board.as_ref().map_or_else(HostClock::start, |board| board.client().clock());
@@ -185,9 +188,6 @@ impl LiveOptions {
         [drawn, rig]: [&Rig; 2],
         console: Console,
     ) -> Result<(Option<Board>, Option<SharedRig>), Failure> {
-        if is_simulated {
-            self.camera.none_for_simulated()?;
-        }
         if rig.axes.is_empty() {
             return match is_simulated {
                 true => Err(Failure::usage(format!("rig '{}' has no axes to simulate", rig.name))),

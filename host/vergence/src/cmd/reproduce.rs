@@ -10,7 +10,7 @@ use serde_json::json;
 use vergence_bench::ask_python;
 use vergence_files::{make_folder, write_png, write_whole};
 use vergence_reproduce::{
-    Bench, Corners, DrivenRig, MatchingTools, Plan, Progress, SgbmAnswer, SgbmTask, drive, experiments,
+    Bench, Corners, DrivenRig, MatchingTools, Plan, Progress, SgbmAnswer, SgbmTask, TRUE_LENS, drive, experiments,
 };
 use vergence_rig::rounded;
 use vergence_scene::LensChoice;
@@ -42,10 +42,10 @@ pub struct Args {
     /// `rendered` photographs, where the detector finds the corners, or only corners that are `projected`, with noise: quick.
     #[arg(long, default_value = "rendered")]
     corners: Corners,
-    /// The true lenses of the bench: ideal, or a published design that is traced, sigma8_f18 or nikkor6_f28. Without it ideal, with
-    /// --mismatch sigma8_f18.
-    #[arg(long)]
-    lens: Option<LensChoice>,
+    /// The true lenses of the bench: a published design that is traced, sigma8_f18 or nikkor6_f28, or ideal ones, which are of the
+    /// calibration's own family.
+    #[arg(long, default_value_t = TRUE_LENS)]
+    lens: LensChoice,
     /// Instead tries worlds that are not as the calibration assumes: traced lenses, displaced elements, a bent target, uneven mechanics and
     /// others, each by itself, and writes what each costs, and whether the rig's own statement says so, to mismatch.html. Corners are projected.
     #[arg(long, conflicts_with_all = ["noisy_seeds", "corners", "samples", "no_matching"])]
@@ -80,7 +80,7 @@ pub async fn run(args: &Args, console: Console) -> Result<(), Failure> {
         seeds: args.seeds,
         noisy_seeds: args.noisy_seeds,
         corners: args.corners,
-        lens: args.lens.unwrap_or_default(),
+        lens: args.lens,
         samples: args.samples,
         matching: !args.no_matching,
     };

@@ -1,6 +1,6 @@
 //! `vergence run`: measures live, while the stages stand still or move.
 
-mod publish;
+mod record;
 mod tour;
 
 use std::path::PathBuf;
@@ -8,14 +8,15 @@ use std::time::Duration;
 
 use vergence_board::Board;
 use vergence_files::make_folder;
-use vergence_live::{Ended, Limits, LiveLoop, MatchingTime, Totals, Tour};
+use vergence_live::{Ended, Limits, LiveLoop, MatchingTime, Pace, Totals, Tour};
 use vergence_output::{PlyEncoding, TableFormat, check_folder};
 use vergence_protocol::{Request, Trigger};
 
-use self::publish::Publisher;
+use self::record::Recording;
 use super::live_options::LiveOptions;
 use crate::cli::CommonOptions;
 use crate::cmd::options::TableOption;
+use crate::cmd::publish::Publisher;
 use crate::console::Console;
 use crate::failure::Failure;
 use crate::interrupt::interrupted;
@@ -39,6 +40,9 @@ pub struct Args {
     /// Keep every cloud, in files with numbers.
     #[arg(long, requires = "out")]
     keep: bool,
+    /// Record images, encoders, clouds and warnings in this folder, as a ROS 2 bag that `vergence replay` measures again.
+    #[arg(long, value_name = "DIR")]
+    record: Option<PathBuf>,
     /// Write points and bearings as tables too.
     #[arg(long, requires = "out", value_delimiter = ',', value_name = "FORMAT")]
     also: Vec<TableOption>,
@@ -73,6 +77,8 @@ pub async fn run(args: &Args, common: &CommonOptions, console: Console) -> Resul
     }
     let mut rig = args.live.connect(&args.cameras, common, args.out.as_deref(), console).await?;
     let tour = args.tour.tour(&rig.known)?;
+    let begin = |folder: &PathBuf| Recording::start(folder, &rig);
+    let recording = args.record.as_ref().map(begin).transpose()?;
     if let Some(board) = &mut rig.board {
         board.compare_clocks().await?;
         args.tour.home(board).await?;
@@ -93,6 +99,9 @@ pub async fn run(args: &Args, common: &CommonOptions, console: Console) -> Resul
     };
     let events = args.live.start_cameras(&args.cameras, &rig)?;
     let mut live = args.live.live_loop(&mut rig, events, matching_time);
+    if let Some(recording) = &recording {
+        live = recording.of(live);
+    }
     let (mut board, trigger) = (rig.board, rig.trigger);
     let mut publisher = Publisher {
         console,
@@ -103,6 +112,8 @@ pub async fn run(args: &Args, common: &CommonOptions, console: Console) -> Resul
         also: args.also.iter().copied().map(TableFormat::from).collect(),
         encoding: PlyEncoding::of(args.ascii),
         number: 0,
+        pace: Pace::default(),
+        recorder: recording.as_ref().map(|recording| (recording.recorder.clone(), live.clock)),
     };
     let mut totals = Totals::default();
     if let (Some(board), Some(trigger)) = (&board, trigger) {
@@ -115,6 +126,9 @@ pub async fn run(args: &Args, common: &CommonOptions, console: Console) -> Resul
         _ => settle(&mut board, &tour).await,
     };
     publisher.end(&totals)?;
+    if let (Some(recording), Some(folder)) = (recording, &args.record) {
+        recording.finish(folder, console).await?;
+    }
     let ended = ended?;
     settled?;
     match ended {

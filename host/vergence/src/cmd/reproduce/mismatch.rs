@@ -2,7 +2,6 @@
 
 use serde_json::json;
 use vergence_files::write_whole;
-use vergence_reproduce::TRUE_LENS;
 use vergence_reproduce::mismatch::{MismatchPlan, mismatch_page, mismatches};
 use vergence_rig::rounded;
 
@@ -13,7 +12,7 @@ use crate::interrupt::{interrupted, on_own_thread};
 use crate::stopwatch::Stopwatch;
 
 pub async fn run(args: &Args, console: Console, whole: &Stopwatch) -> Result<(), Failure> {
-    let plan = MismatchPlan::new(args.seeds, args.lens.unwrap_or(TRUE_LENS)).ok_or_else(|| {
+    let plan = MismatchPlan::new(args.seeds, args.lens).ok_or_else(|| {
         Failure::usage("--mismatch displaces the elements of traced lenses: name such with --lens; a rig with ideal ones stands beside it anyway")
     })?;
     let bar = console.count_bar("rigs, each with one mismatch", 1);

@@ -8,16 +8,19 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use serde_json::{Value, json};
+use vergence_board::HostClock;
 use vergence_files::write_whole;
-use vergence_live::{LiveResult, Totals};
+use vergence_live::{Limit, LiveResult, Pace, Totals};
 use vergence_output::{
     PlyEncoding, PoseSource, Table, TableFormat, axes_by_images_json, axes_by_images_words, drift_warning,
     dropped_json, ply, pose_told_json, pose_told_words,
 };
 use vergence_pipeline::{Bearing, CameraGone, Observation, PairCloud};
+use vergence_protocol::Microseconds;
+use vergence_recording::Recorder;
 use vergence_rig::{Rig, RigPose, axes_json, rounded};
 use vergence_scene::LensChoice;
-use vergence_vision::Side;
+use vergence_vision::{Side, median};
 
 use crate::console::Console;
 use crate::failure::Failure;
@@ -40,6 +43,10 @@ pub struct Publisher {
     pub encoding: PlyEncoding,
     /// Number of results so far.
     pub number: u64,
+    /// Where clouds are recorded too, and the clock of their exposures.
+    pub recorder: Option<(Recorder, HostClock)>,
+    /// How often they come.
+    pub pace: Pace,
 }
 
 impl Publisher {
@@ -49,19 +56,30 @@ impl Publisher {
     /// Where a file or standard output cannot be written.
     pub fn publish(&mut self, result: &LiveResult<'_>) -> Result<(), Failure> {
         self.number += 1;
+        let pace = self.pace.note(result);
         match &result.measurement.observation {
             Observation::Points { cloud, pose, moving, by_images } => {
                 self.write_cloud(cloud)?;
+                if let Some((recorder, clock)) = &self.recorder {
+                    let exposed =
+                        clock.now().0.saturating_sub(u64::try_from(result.latency.as_micros()).unwrap_or(u64::MAX));
+                    recorder.cloud(Microseconds(exposed), cloud, pose);
+                }
                 let by_axes = axes_by_images_words(&self.rig, by_images).map(|told| format!("pose by images: {told}"));
                 let told = by_axes.or_else(|| pose_told_words(cloud)).map(|told| format!("; {told}"));
-                self.console.say(self.points_line(result, cloud, pose, *moving) + &told.unwrap_or_default())?;
+                self.console.say(self.points_line(result, cloud, pose, (*moving, pace)) + &told.unwrap_or_default())?;
                 // Where no encoder tells an axis, nothing is left for the images to disagree with.
                 let warning = drift_warning(cloud, self.pose_source()).filter(|_| by_images.is_empty());
                 if let Some(warning) = &warning {
                     self.console.warn(format!("cloud {}: {warning}", self.number));
+                    if let Some((recorder, clock)) = &self.recorder {
+                        recorder.warning(clock.now(), warning);
+                    }
                 }
                 self.print_json(|| {
                     let mut line = self.points_json(result, cloud, pose, *moving);
+                    line["rate_hz"] = json!(pace.map(|(rate, _)| rounded(rate)));
+                    line["limited_by"] = json!(pace.map(|(_, limit)| limit.as_str()));
                     line["axes_by_images"] = axes_by_images_json(&self.rig, by_images);
                     line["warning"] = json!(warning);
                     line
@@ -101,7 +119,13 @@ impl Publisher {
         if self.console.is_json() { self.console.result(&json()) } else { Ok(()) }
     }
 
-    fn points_line(&self, result: &LiveResult<'_>, cloud: &PairCloud, pose: &RigPose, moving: bool) -> String {
+    fn points_line(
+        &self,
+        result: &LiveResult<'_>,
+        cloud: &PairCloud,
+        pose: &RigPose,
+        (moving, pace): (bool, Option<(f64, Limit)>),
+    ) -> String {
         let axes = self.rig.axes.iter().zip(&pose.axes).map(|(axis, at)| format!("{} {at:.2}", axis.name));
         let axes = axes.collect::<Vec<_>>().join(", ");
         let moving = if moving { ", moving" } else { "" };
@@ -110,7 +134,17 @@ impl Publisher {
             0 => String::new(),
             count => format!(", {count} of them extrapolated"),
         };
-        format!("{:5}  {} points{extrapolated}{place}; {}", self.number, cloud.points.len(), timing(result))
+        let parts = cloud.points.iter().map(|point| point.point.sigma_range.mm() / point.point.point.mm().norm());
+        let sigma =
+            median(parts.collect()).map_or_else(String::new, |part| format!(", ranges to {:.1} %", 100.0 * part));
+        let pace =
+            pace.map(|(rate, limit)| format!("{rate:.1} Hz, limited by {}, ", limit.as_str())).unwrap_or_default();
+        format!(
+            "{:5}  {} points{extrapolated}{sigma}{place}; {pace}{}",
+            self.number,
+            cloud.points.len(),
+            timing(result)
+        )
     }
 
     fn points_json(&self, result: &LiveResult<'_>, cloud: &PairCloud, pose: &RigPose, moving: bool) -> Value {

@@ -1,0 +1,97 @@
+//! What is known of a lens before any view: how far the parameters that a lens has besides those of a central and symmetric one are from zero.
+//!
+//! They are adjusted with this prior, so that what few views do not tell of them stays unknown within what lenses have, and makes the
+//! covariance as large as that ignorance is. Without it a lens that is not of the model's family borrows a pupil of centimetres from views
+//! that hardly determine one.
+
+use nalgebra::{DMatrix, SymmetricEigen};
+use vergence_vision::median;
+
+use super::adjust::{Adjusted, State};
+use super::lens::{E0, E1};
+use super::observations::ObservedView;
+
+/// A sum of parameters with weights, the first of them 1, that is zero within a standard deviation.
+pub(super) struct Known {
+    pub sum: &'static [(usize, f64)],
+    pub sigma: f64,
+}
+
+/// All that is known, each independent of the others.
+pub(super) const KNOWN: [Known; 8] = [
+    // e0 in millimetres: twice the focal length of common lenses.
+    Known { sum: &[(E0, 1.0)], sigma: 3.0 },
+    // e1 in millimetres: the traced designs have 0.06 and 0.36 (sigma8_f18, nikkor6_f28).
+    Known { sum: &[(E1, 1.0)], sigma: 0.5 },
+    Known { sum: &[(P1, 1.0)], sigma: P },
+    Known { sum: &[(P2, 1.0)], sigma: P },
+    Known { sum: &[(S0, 1.0), (P1, SQUARE_BY_P)], sigma: SQUARE },
+    Known { sum: &[(S2, 1.0), (P2, SQUARE_BY_P)], sigma: SQUARE },
+    Known { sum: &[(S1, 1.0), (P1, FOURTH_BY_P), (S0, FOURTH_BY_SQUARE)], sigma: FOURTH },
+    Known { sum: &[(S3, 1.0), (P2, FOURTH_BY_P), (S2, FOURTH_BY_SQUARE)], sigma: FOURTH },
+];
+
+// Indices of the parameters, in the order of `LENS_PARAMETERS`.
+const P1: usize = E1 + 1;
+const P2: usize = E1 + 2;
+const S0: usize = E1 + 3;
+const S1: usize = E1 + 4;
+const S2: usize = E1 + 5;
+const S3: usize = E1 + 6;
+
+// Decentring and thin prism of badly mounted lenses, which go together: `sigma8_f18` traced with every element 10 micrometres off the axis and
+// tilted by 0.05 degrees, and a sensor tilted by 0.4 degrees, has standard deviations of 7e-4 of p, 1.4e-3 of s0 and s2, 7e-4 of s1 and s3, and
+// correlations of -0.81 of the first two, -0.50 of the first and the last, 0.81 of the last two (docs/measured/lenses.md). Below, s0 beside
+// what p lets expect, and s1 beside what both do.
+const P: f64 = 7e-4;
+const SQUARE: f64 = 8.2e-4;
+const SQUARE_BY_P: f64 = 1.62;
+const FOURTH: f64 = 3.7e-4;
+const FOURTH_BY_P: f64 = -0.454;
+const FOURTH_BY_SQUARE: f64 = -0.589;
+
+/// By how much the views narrow what was known of decentring and thin prism, in the direction of them of which they say least: the standard
+/// deviation that is left, in parts of that before, where the variance of a residual is `variance`. `None` where that is not known.
+pub(super) fn narrowest(adjusted: &Adjusted, variance: f64) -> Option<f64> {
+    let covariance = adjusted.normal.shared_covariance()?;
+    let known = KNOWN.get(2..)?;
+    let mut by_free = DMatrix::zeros(known.len(), adjusted.free.len());
+    for (row, Known { sum, sigma }) in known.iter().enumerate() {
+        for (parameter, weight) in *sum {
+            by_free[(row, adjusted.free.iter().position(|free| free == parameter)?)] = weight / sigma;
+        }
+    }
+    let left = &by_free * covariance * by_free.transpose() * variance;
+    Some(SymmetricEigen::new(left).eigenvalues.max().max(0.0).sqrt())
+}
+
+/// How the prior weighs against the views.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Prior {
+    /// How much more the views pull than the noise of their corners explains, see [`crate::schur_lm::Clustered::scatter`]. A view weighs
+    /// less against the prior by that.
+    pub scatter: f64,
+}
+
+impl Prior {
+    /// Variance by which the prior is weighted, over that of the residuals.
+    pub fn factor(self) -> f64 {
+        self.scatter * self.scatter
+    }
+
+    /// By what to multiply what is known, in its standard deviations, to have it in units of residuals: these weigh by their scale.
+    pub fn strength(self, views: &[ObservedView], state: &State) -> Option<f64> {
+        Some(self.scatter * noise(views, state)?)
+    }
+}
+
+/// Least scale of noise: below it residuals are rounding errors, in pixels.
+pub(super) const FINEST: f64 = 1e-4;
+
+/// Standard deviation of a coordinate over the corners used, in units of their relative sigmas: the median length of a two-dimensional
+/// Gaussian error is 1.18 of it.
+fn noise(views: &[ObservedView], state: &State) -> Option<f64> {
+    const RAYLEIGH_MEDIAN: f64 = 1.177_410_022_515_474_7;
+    let used = views.iter().zip(&state.poses).flat_map(|(v, p)| v.used().map(|s| state.shared.deviation(p, s)));
+    Some(median(used.collect())?.max(FINEST) / RAYLEIGH_MEDIAN)
+}
