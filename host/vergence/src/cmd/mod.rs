@@ -9,6 +9,7 @@ mod model_options;
 pub mod options;
 mod publish;
 mod reconnect;
+mod result_options;
 mod search_options;
 mod stage_pose;
 mod target_options;

@@ -4,16 +4,14 @@ use std::path::PathBuf;
 use std::sync::Arc;
 use std::time::Duration;
 
-use vergence_files::make_folder;
 use vergence_live::{LiveError, LiveResult, Measurement, Pace, Totals};
-use vergence_output::{PlyEncoding, TableFormat, check_folder};
 use vergence_pipeline::{Method, Observation};
 use vergence_recording::{Event, Reader, Replay};
 use vergence_rig::Rig;
 
 use super::model_options::MatcherOptions;
-use super::options::TableOption;
 use super::publish::Publisher;
+use super::result_options::ResultOptions;
 use super::search_options::SearchOptions;
 use crate::console::Console;
 use crate::failure::Failure;
@@ -35,18 +33,8 @@ pub struct Args {
     /// End after this many results.
     #[arg(long, value_name = "COUNT")]
     frames: Option<u64>,
-    /// The folder for `cloud.ply`, always the newest cloud.
-    #[arg(long, value_name = "DIR")]
-    out: Option<PathBuf>,
-    /// Keep every cloud, in files with numbers.
-    #[arg(long, requires = "out")]
-    keep: bool,
-    /// Write points and bearings as tables too.
-    #[arg(long, requires = "out", value_delimiter = ',', value_name = "FORMAT")]
-    also: Vec<TableOption>,
-    /// Write the PLY file as text, for a person to read; the default is binary.
-    #[arg(long)]
-    ascii: bool,
+    #[command(flatten)]
+    results: ResultOptions,
     #[command(flatten)]
     matching: MatcherOptions,
     #[command(flatten)]
@@ -54,10 +42,7 @@ pub struct Args {
 }
 
 pub fn run(args: &Args, console: Console) -> Result<(), Failure> {
-    if let Some(folder) = &args.out {
-        check_folder(folder)?;
-        make_folder(folder)?;
-    }
+    let files = args.results.files()?;
     let mut reader = Reader::open(&args.recording)?;
     // The rig file precedes the first event.
     let mut next = reader.next_event()?;
@@ -69,10 +54,7 @@ pub fn run(args: &Args, console: Console) -> Result<(), Failure> {
         console,
         rig: Arc::clone(&measuring),
         lens: None,
-        out: args.out.clone(),
-        keep: args.keep,
-        also: args.also.iter().copied().map(TableFormat::from).collect(),
-        encoding: PlyEncoding::of(args.ascii),
+        files,
         number: 0,
         recorder: None,
         pace: Pace::default(),

@@ -7,16 +7,14 @@ use std::path::PathBuf;
 use std::time::Duration;
 
 use vergence_board::Board;
-use vergence_files::make_folder;
 use vergence_live::{Ended, Limits, LiveLoop, MatchingTime, Pace, Totals, Tour};
-use vergence_output::{PlyEncoding, TableFormat, check_folder};
 use vergence_protocol::{Request, Trigger};
 
 use self::record::Recording;
 use super::live_options::LiveOptions;
 use crate::cli::CommonOptions;
-use crate::cmd::options::TableOption;
 use crate::cmd::publish::Publisher;
+use crate::cmd::result_options::ResultOptions;
 use crate::console::Console;
 use crate::failure::Failure;
 use crate::interrupt::interrupted;
@@ -34,21 +32,11 @@ pub struct Args {
     /// The left and the right camera, such as /dev/video0 /dev/video2; or `sim` on a simulated rig.
     #[arg(long, num_args = 1..=2, required = true, value_name = "DEVICE")]
     cameras: Vec<String>,
-    /// The folder for `cloud.ply`, always the newest cloud.
-    #[arg(long, value_name = "DIR")]
-    out: Option<PathBuf>,
-    /// Keep every cloud, in files with numbers.
-    #[arg(long, requires = "out")]
-    keep: bool,
+    #[command(flatten)]
+    results: ResultOptions,
     /// Record images, encoders, clouds and warnings in this folder, as a ROS 2 bag that `vergence replay` measures again.
     #[arg(long, value_name = "DIR")]
     record: Option<PathBuf>,
-    /// Write points and bearings as tables too.
-    #[arg(long, requires = "out", value_delimiter = ',', value_name = "FORMAT")]
-    also: Vec<TableOption>,
-    /// Write the PLY file as text, for a person to read; the default is binary.
-    #[arg(long)]
-    ascii: bool,
     /// End after this many results.
     #[arg(long, value_name = "COUNT")]
     frames: Option<u64>,
@@ -71,11 +59,8 @@ fn parse_time(text: &str) -> Result<Duration, String> {
 }
 
 pub async fn run(args: &Args, common: &CommonOptions, console: Console) -> Result<(), Failure> {
-    if let Some(folder) = &args.out {
-        check_folder(folder)?;
-        make_folder(folder)?;
-    }
-    let mut rig = args.live.connect(&args.cameras, common, args.out.as_deref(), console).await?;
+    let files = args.results.files()?;
+    let mut rig = args.live.connect(&args.cameras, common, args.results.out.as_deref(), console).await?;
     let tour = args.tour.tour(&rig.known)?;
     let begin = |folder: &PathBuf| Recording::start(folder, &rig);
     let recording = args.record.as_ref().map(begin).transpose()?;
@@ -107,10 +92,7 @@ pub async fn run(args: &Args, common: &CommonOptions, console: Console) -> Resul
         console,
         rig: rig.measuring,
         lens: is_simulated.then_some(args.live.lens),
-        out: args.out.clone(),
-        keep: args.keep,
-        also: args.also.iter().copied().map(TableFormat::from).collect(),
-        encoding: PlyEncoding::of(args.ascii),
+        files,
         number: 0,
         pace: Pace::default(),
         recorder: recording.as_ref().map(|recording| (recording.recorder.clone(), live.clock)),
