@@ -52,6 +52,16 @@ pub struct Totals {
     pub skipped: BTreeMap<SkipReason, u64>,
 }
 
+impl Totals {
+    /// What was skipped, for people; nothing where nothing was.
+    #[must_use]
+    pub fn skipped_in_words(&self) -> String {
+        let reason = |(reason, count): (&SkipReason, &u64)| format!("{} {count}", reason.as_str());
+        let reasons: Vec<_> = self.skipped.iter().map(reason).collect();
+        if reasons.is_empty() { String::new() } else { format!("; skipped: {}", reasons.join(", ")) }
+    }
+}
+
 /// A result of the loop.
 pub struct LiveResult<'a> {
     /// Points or bearings.

@@ -1,9 +1,9 @@
 //! What a cloud of the live loop says, in one line for people and as JSON.
 
 use serde_json::{Value, json};
-use vergence_pipeline::PairCloud;
+use vergence_pipeline::{Bearing, CameraGone, PairCloud};
 use vergence_rig::{Rig, RigPose, axes_json};
-use vergence_vision::median;
+use vergence_vision::{Side, median};
 
 use crate::{Table, dropped_json, pose_told_json};
 
@@ -41,5 +41,15 @@ pub fn live_cloud_json(rig: &Rig, cloud: &PairCloud, pose: &RigPose, moving: boo
         },
         "pose_source": pose_told_json(pose, cloud),
         "cloud": Table::of_points(&cloud.points).json(),
+    })
+}
+
+/// The bearings of the camera at `side`, and why the other camera gives nothing.
+#[must_use]
+pub fn live_bearings_json(side: Side, bearings: &[Bearing], why: &CameraGone) -> Value {
+    json!({
+        "camera": side.to_string(),
+        "dead": { "camera": side.other().to_string(), "why": why.to_string() },
+        "bearings": Table::of_bearings(bearings).json(),
     })
 }

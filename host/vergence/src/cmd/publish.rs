@@ -6,13 +6,13 @@ use serde_json::{Value, json};
 use vergence_board::HostClock;
 use vergence_live::{Limit, LiveResult, Pace, Totals};
 use vergence_output::{
-    LatestFiles, PoseSource, Table, axes_by_images_json, axes_by_images_words, drift_warning, live_cloud_json,
-    live_cloud_words, pose_told_words,
+    LatestFiles, PoseSource, axes_by_images_json, axes_by_images_words, drift_warning, live_bearings_json,
+    live_cloud_json, live_cloud_words, pose_told_words,
 };
-use vergence_pipeline::{Bearing, CameraGone, Observation, PairCloud};
+use vergence_pipeline::Observation;
 use vergence_protocol::Microseconds;
 use vergence_recording::Recorder;
-use vergence_rig::{Rig, RigPose, rounded};
+use vergence_rig::{Rig, rounded};
 use vergence_scene::LensChoice;
 use vergence_vision::Side;
 
@@ -66,7 +66,8 @@ impl Publisher {
                     }
                 }
                 self.print_json(|| {
-                    let mut line = self.points_json(result, cloud, pose, *moving);
+                    let told = live_cloud_json(&self.rig, cloud, pose, *moving);
+                    let mut line = self.result_json("cloud", result, told);
                     line["rate_hz"] = json!(pace.map(|(rate, _)| rounded(rate)));
                     line["limited_by"] = json!(pace.map(|(_, limit)| limit.as_str()));
                     line["axes_by_images"] = axes_by_images_json(&self.rig, by_images);
@@ -83,7 +84,7 @@ impl Publisher {
                     side.other(),
                     timing(result)
                 ))?;
-                self.print_json(|| self.bearings_json(result, *side, bearings, why))
+                self.print_json(|| self.result_json("bearings", result, live_bearings_json(*side, bearings, why)))
             }
         }
     }
@@ -93,7 +94,7 @@ impl Publisher {
     /// # Errors
     /// Where standard output cannot be written.
     pub fn end(&self, totals: &Totals) -> Result<(), Failure> {
-        let skipped = in_words(totals);
+        let skipped = totals.skipped_in_words();
         self.console.say(format!("{} clouds, {} sets of bearings{skipped}", totals.clouds, totals.bearings))?;
         self.console.result(&json!({
             "kind": "end",
@@ -114,21 +115,12 @@ impl Publisher {
         format!("{:5}  {points}; {pace}{}", self.number, timing(result))
     }
 
-    fn points_json(&self, result: &LiveResult<'_>, cloud: &PairCloud, pose: &RigPose, moving: bool) -> Value {
-        let mut line = self.head_json("cloud", result);
-        if let (Some(line), Value::Object(points)) =
-            (line.as_object_mut(), live_cloud_json(&self.rig, cloud, pose, moving))
-        {
-            line.extend(points);
+    /// What all results say, and `more` of this one.
+    fn result_json(&self, kind: &str, result: &LiveResult<'_>, more: Value) -> Value {
+        let mut line = self.head_json(kind, result);
+        if let (Some(line), Value::Object(more)) = (line.as_object_mut(), more) {
+            line.extend(more);
         }
-        line
-    }
-
-    fn bearings_json(&self, result: &LiveResult<'_>, side: Side, bearings: &[Bearing], why: &CameraGone) -> Value {
-        let mut line = self.head_json("bearings", result);
-        line["camera"] = side.to_string().into();
-        line["dead"] = json!({ "camera": side.other().to_string(), "why": why.to_string() });
-        line["bearings"] = Table::of_bearings(bearings).json();
         line
     }
 
@@ -157,9 +149,4 @@ fn timing(result: &LiveResult<'_>) -> String {
 
 fn skipped_json(totals: &Totals) -> Value {
     totals.skipped.iter().map(|(reason, count)| (reason.as_str().to_owned(), json!(count))).collect()
-}
-
-fn in_words(totals: &Totals) -> String {
-    let reasons: Vec<_> = totals.skipped.iter().map(|(reason, count)| format!("{} {count}", reason.as_str())).collect();
-    if reasons.is_empty() { String::new() } else { format!("; skipped: {}", reasons.join(", ")) }
 }
