@@ -176,7 +176,7 @@ pub fn show_cloud(panel: &Panel, rig: &Rig, number: u64) {
         residual_sigma: Angle::from_rad(1e-4),
         extrapolated: false,
     };
-    let coloured = ColouredPoint { point, colour: [1, 2, 3], score: 0.9 };
+    let coloured = ColouredPoint { point, colour: [1, 2, 3], score: 0.9, track: None };
     let cloud = Box::new(PairCloud { points: vec![coloured], matches: 1, ..PairCloud::default() });
     let pose = Box::new(rig.pose_read_at(&[145.0, 0.0]));
     let observation = Observation::Points { cloud, pose, moving: false, by_images: Vec::new() };

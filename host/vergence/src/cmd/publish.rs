@@ -14,7 +14,6 @@ use vergence_protocol::Microseconds;
 use vergence_recording::Recorder;
 use vergence_rig::{Rig, rounded};
 use vergence_scene::LensChoice;
-use vergence_vision::Side;
 
 use crate::console::Console;
 use crate::failure::Failure;
