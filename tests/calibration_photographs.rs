@@ -362,8 +362,10 @@ async fn clouds_of_photographs_are_as_far_off_as_the_rig_file_of_photographs_sta
             all[0], all[1], all[2], all[3]
         );
         println!("{name}, range {:.2}; own pixels {:.2} of 3", mean(|f| f.range), mean(|f| f.own_part));
-        for (way, stated) in [("depth", shared[0]), ("run", shared[1])] {
-            assert!((low..high).contains(&stated), "{name}, {way}: {stated} is not within {low} to {high}");
+        for (way, found) in [("depth", [shared[0], all[0]]), ("run", [shared[1], all[3]])] {
+            for (part, found) in ["part of the calibration", "in all"].into_iter().zip(found) {
+                assert!((low..high).contains(&found), "{name}, {way}, {part}: {found} is not within {low} to {high}");
+            }
         }
         assert!(all[2] > all[0], "{name}: without its covariance a file is as good: {all:?}");
     }

@@ -143,11 +143,9 @@ fn settings_of_attached_cameras_are_refused_beside_simulated_ones() {
     fails_with(&capture, 2, &["--size is for attached cameras"]);
     let exposure = [&["capture", "--cameras", "sim", "--out", &out][..], &target, &["--exposure", "5ms"]].concat();
     fails_with(&exposure, 2, &["--exposure is for attached cameras"]);
-    fails_with(
-        &[&["run", "--port", "sim", "--cameras", "sim", "--home"][..], &size].concat(),
-        2,
-        &["--size is for attached"],
-    );
+    let run = ["run", "--port", "sim", "--cameras", "sim", "--home"];
+    fails_with(&[&run[..], &["--gain", "2"]].concat(), 2, &["--gain is for attached"]);
+    fails_with(&[&run[..], &size].concat(), 2, &["another shape", "320x320"]);
     let stage = ["calibrate", "stage", "--live", "--port", "sim", "--cameras", "sim", "--set", &out];
     fails_with(&[&stage[..], &target, &size].concat(), 2, &["--size is for attached"]);
     assert!(!Path::new(&out).exists());

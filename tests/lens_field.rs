@@ -177,10 +177,10 @@ fn extrapolated_points_are_marked_in_every_file() {
     let all = measure(&rig, "extrapolated");
     assert!(all["points"] == 2 && all["extrapolated"] == 1, "{all}");
     let flags = |text: &str, separator: char| -> Vec<String> {
-        text.lines().rev().take(2).filter_map(|line| line.rsplit(separator).next()).map(str::to_owned).collect()
+        text.lines().rev().take(2).filter_map(|line| line.rsplit(separator).nth(1)).map(str::to_owned).collect()
     };
     let read = |name: &str| std::fs::read_to_string(file(name)).expect("written");
-    assert!(read("cloud.ply").contains("property uchar extrapolated\nend_header"));
+    assert!(read("cloud.ply").contains("property uchar extrapolated\nproperty int track\nend_header"));
     assert_eq!(flags(&read("cloud.ply"), ' '), ["1", "0"]);
     assert_eq!(flags(&read("cloud.csv"), ','), ["1", "0"]);
     let table: Value = serde_json::from_str(&read("cloud.json")).expect("JSON");
@@ -224,7 +224,7 @@ fn more_of_a_real_pair_gives_points() {
         assert!(number(&all, "extrapolated") > 0.3 * added);
     }
     let table = std::fs::read_to_string(Path::new(&file("extrapolated.csv"))).expect("a table");
-    let (marked, others): (Vec<_>, Vec<_>) = table.lines().skip(1).partition(|line| line.ends_with(",1"));
+    let (marked, others): (Vec<_>, Vec<_>) = table.lines().skip(1).partition(|line| line.ends_with(",1,-1"));
     let relative = |lines: &[&str]| {
         let mut values: Vec<f64> = lines
             .iter()

@@ -10,6 +10,7 @@ mod common;
 #[path = "common/live_bench.rs"]
 mod live_bench;
 
+use std::collections::BTreeMap;
 use std::future::pending;
 use std::io::{BufRead, BufReader, Read};
 use std::path::Path;
@@ -60,12 +61,13 @@ struct Bench {
 const PERIOD_US: u32 = 100_000;
 
 impl Bench {
-    async fn new(believed: [Shutter; 2]) -> Self {
+    async fn new(believed: [Shutter; 2], seed: u64) -> Self {
         let rig = rig();
         let room = Arc::new(Room::with_rig());
         let believed = Rig { shutters: believed, ..rig.clone() };
         let matching = Duration::from_millis(50);
-        let setting = Setting { rigs: [&rig, &believed], room: &room, seeds: [1, 3], period_us: PERIOD_US, matching };
+        let setting =
+            Setting { rigs: [&rig, &believed], room: &room, seeds: [seed, seed + 2], period_us: PERIOD_US, matching };
         let LiveBench { simulated, board, live } = LiveBench::homed(setting).await;
         Self { simulated, room, board, live, rig }
     }
@@ -137,16 +139,27 @@ fn median(errors: &[f64]) -> f64 {
 #[tokio::test(start_paused = true)]
 async fn static_and_moving_clouds_agree_within_what_they_state() {
     let (far, near) = (pose(90.0, 17.0), pose(200.0, 103.0));
-    let standing = Bench::new(rig().shutters).await.errors_on_the_way([pose(145.0, 60.0); 2], 2).await;
-    let moving = Bench::new(rig().shutters).await.errors_on_the_way([far, near], 2).await;
+    let seeds = std::env::var("VERGENCE_SEEDS").map_or(2, |seeds| seeds.parse().expect("a number"));
+    let (mut standing, mut moving) = (Vec::new(), Vec::new());
+    for seed in 1..=seeds {
+        standing.extend(Bench::new(rig().shutters, seed).await.errors_on_the_way([pose(145.0, 60.0); 2], 2).await);
+        moving.extend(Bench::new(rig().shutters, seed).await.errors_on_the_way([far, near], 4).await);
+    }
     assert!(standing.len() > 100 && moving.len() > 100, "{} {}", standing.len(), moving.len());
     let within = |errors: &[f64]| errors.iter().filter(|z| z.abs() < 3.0).count() as f64 / errors.len() as f64;
+    let nees = |errors: &[f64]| {
+        let core: Vec<f64> = errors.iter().filter(|z| z.abs() < 3.0).map(|z| z * z).collect();
+        core.iter().sum::<f64>() / core.len() as f64
+    };
     println!("within 3 sigma: standing {:.3}, moving {:.3}", within(&standing), within(&moving));
+    println!("NEES within 3 sigma, {seeds} seeds: standing {:.2}, moving {:.2}", nees(&standing), nees(&moving));
     // Errors of matches have longer tails than a Gaussian.
     assert!(within(&standing) > 0.94 && within(&moving) > 0.94);
     assert!(median(&moving) < 1.0 && median(&standing) < 1.0);
+    // Of a Gaussian cut off at three sigma it is 0.97.
+    assert!((0.5..=1.4).contains(&nees(&standing)) && (0.5..=1.4).contains(&nees(&moving)));
     // The check notices a shutter that the rig file does not tell.
-    let wrong = Bench::new([Shutter::Global; 2]).await.errors_on_the_way([far, near], 1).await;
+    let wrong = Bench::new([Shutter::Global; 2], 1).await.errors_on_the_way([far, near], 1).await;
     assert!(wrong.is_empty() || median(&wrong) > 2.0 * median(&moving), "{}", median(&wrong));
 }
 
@@ -161,6 +174,25 @@ fn live(folder: &Path, arguments: &[&str]) -> (Vec<Value>, String) {
     let output = run(&[&all, arguments].concat());
     assert!(output.status.success(), "{}", text(&output.stderr));
     (lines(&output.stdout), text(&output.stderr))
+}
+
+/// Images smaller than the rig file's: no pixel of a cloud lies beyond them, and the lens shows the same field in them.
+#[test]
+fn simulated_cameras_take_images_of_the_size_that_is_asked_for() {
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    let name = folder.path().join("out");
+    let files = ["--out", name.to_str().expect("a name"), "--also", "csv"];
+    let arguments = ["--size", "280x280", "--mode", "human", "--stay", "1s", "--match-time", "10ms", "--frames", "1"];
+    let (lines, _) = live(folder.path(), &[&arguments[..], &files].concat());
+    assert!(lines[0]["points"].as_u64().is_some_and(|points| points > 20), "{}", lines[0]["points"]);
+    let csv = std::fs::read_to_string(name.join("cloud.csv")).expect("a table");
+    let columns = |line: &str| -> Vec<f64> { line.split(',').filter_map(|number| number.parse().ok()).collect() };
+    let rows: Vec<Vec<f64>> = csv.lines().skip(1).map(columns).collect();
+    let pixels = rows.iter().flat_map(|row| &row[6..10]);
+    let (low, high) = pixels.fold((f64::INFINITY, 0.0_f64), |(low, high), pixel| (low.min(*pixel), high.max(*pixel)));
+    assert!(low >= 0.0 && (200.0..280.0).contains(&high), "{low} to {high}");
+    // All points lie in the room of 4 by 2.6 by 5 m.
+    assert!(rows.iter().all(|row| row[2] < 4000.0), "a lens of another scale puts them elsewhere");
 }
 
 #[test]
@@ -186,6 +218,9 @@ fn run_measures_the_newest_pair_while_the_stages_move() {
         // One frame of 20 ms, its way to the host, at most one waiting for the next pulse, and matching.
         assert!(line["latency_ms"].as_f64().is_some_and(|ms| (700.0..900.0).contains(&ms)), "{}", line["latency_ms"]);
     }
+    assert!(clouds[0]["rate_hz"].is_null(), "one result has no rate");
+    assert!(clouds[5]["rate_hz"].as_f64().is_some_and(|rate| (1.2..1.5).contains(&rate)), "{}", clouds[5]["rate_hz"]);
+    assert_eq!(clouds[5]["limited_by"], "matching");
     // Twenty pairs each second, one of which is measured each 0.7 s: the rest is counted, not queued.
     let newer = end["skipped"]["newer_came"].as_u64().expect("counted");
     assert!((60..=95).contains(&newer), "{}", end["skipped"]);
@@ -196,6 +231,7 @@ fn run_measures_the_newest_pair_while_the_stages_move() {
     let csv = std::fs::read_to_string(out.join("cloud.csv")).expect("a table");
     let points = clouds[5]["points"].as_u64().expect("a number") as usize;
     assert_eq!(csv.lines().count(), points + 1);
+    assert!(csv.lines().next().is_some_and(|header| header.ends_with(",track")));
     let json: Value =
         serde_json::from_str(&std::fs::read_to_string(out.join("cloud.json")).expect("a table")).expect("JSON");
     assert_eq!(json["rows"].as_array().map(Vec::len), Some(points));
@@ -285,6 +321,43 @@ fn a_dead_camera_leaves_bearings_and_its_return_clouds() {
         names.filter(|name| name.to_string_lossy().starts_with(stem)).count() as u64
     };
     assert_eq!((Some(files("cloud")), Some(files("bearings"))), (end["clouds"].as_u64(), end["bearings"].as_u64()));
+}
+
+/// Of a rig that stands, most points have the number that they had in the cloud before, and still show the same place.
+#[test]
+fn places_keep_their_numbers_from_cloud_to_cloud() {
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    let (lines, _) = live(folder.path(), &["--rate", "10", "--match-time", "50ms", "--frames", "3"]);
+    let places = |cloud: &Value| -> BTreeMap<i64, [f64; 2]> {
+        let rows = cloud["cloud"]["rows"].as_array().expect("rows").iter();
+        let of = |row: &Value| {
+            (row[25].as_f64().expect("a track") as i64, [6, 7].map(|i| row[i].as_f64().expect("a pixel")))
+        };
+        rows.map(of).filter(|(track, _)| *track >= 0).collect()
+    };
+    let (first, last) = (places(&lines[0]), places(&lines[2]));
+    let kept: Vec<_> = first.iter().filter_map(|(track, at)| Some((at, last.get(track)?))).collect();
+    println!("{} of {} kept", kept.len(), first.len());
+    assert!(first.len() > 50 && kept.len() * 10 > first.len() * 8, "{} of {}", kept.len(), first.len());
+    assert!(kept.iter().all(|(one, other)| (one[0] - other[0]).hypot(one[1] - other[1]) < 0.5));
+}
+
+#[test]
+fn bench_live_accounts_for_every_pair() {
+    let output = run(&["bench", "live", "--sides", "240", "--pairs", "8", "--rate", "30", "--no-peer", "--json"]);
+    assert!(output.status.success(), "{}", text(&output.stderr));
+    let lines = lines(&output.stdout);
+    let rows = lines.last().expect("a result")["rows"].as_array().expect("rows");
+    assert_eq!(
+        rows.iter().map(|row| row["way"].as_str()).collect::<Vec<_>>(),
+        [Some("human"), Some("herbivore"), Some("turning")]
+    );
+    for row in rows {
+        let number = |key: &str| row["live"][key].as_f64().expect("a number");
+        assert!((number("measured") + number("skipped") - 8.0).abs() < 0.5 && number("measured") > 0.5, "{row}");
+        assert!(number("precision") > 0.97 && number("right_points") > 20.0, "{row}");
+        assert!(number("latency_99_ms") >= number("latency_median_ms") && number("rate_hz") > 0.0, "{row}");
+    }
 }
 
 #[test]

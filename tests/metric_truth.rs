@@ -9,6 +9,7 @@
 
 mod common;
 
+use std::ops::Range;
 use std::path::{Path, PathBuf};
 
 use common::{real_data, run_json};
@@ -95,12 +96,21 @@ impl Board {
         (0..COLUMNS * ROWS).map(pair).collect()
     }
 
-    /// How the right camera stands to the left one in this pair by its board alone.
-    fn own_pose(&self, rig: &Rig) -> Transform<Left, Right> {
-        let left = target_pose(&rig.left_camera, &self.views[0]).expect("a pose").camera_from_target;
-        let right = target_pose(&rig.right_camera, &self.views[1]).expect("a pose").camera_from_target;
+    /// How the right camera stands to the left one in this pair by these columns of its board alone.
+    fn own_pose(&self, rig: &Rig, columns: &Range<usize>) -> Transform<Left, Right> {
+        let in_columns = |view: &TargetView| TargetView {
+            name: view.name.clone(),
+            corners: view.corners.iter().filter(|corner| columns.contains(&column(corner))).copied().collect(),
+        };
+        let [left, right] = [(&rig.left_camera, 0), (&rig.right_camera, 1)]
+            .map(|(lens, side)| target_pose(lens, &in_columns(&self.views[side])).expect("a pose").camera_from_target);
         (left * right.inverse()).renamed()
     }
+}
+
+/// The column of the board in which a corner lies.
+fn column(corner: &Corner) -> usize {
+    (corner.target_mm[0] / SQUARE_MM).round() as usize
 }
 
 /// A measured corner.
@@ -124,26 +134,33 @@ fn spacing(a: &Measured, b: &Measured, shared: &SharedCovariance) -> (f64, f64) 
     (between.norm() - SQUARE_MM, variance)
 }
 
-/// The errors of all spacings of a board in millimetres, and their variances.
-fn spacings(
-    board: &Board,
-    kernel: &Kernel,
-    pair: &StereoPair<'_>,
+/// How spacings are measured: by which method, with which pose, and what is known about them.
+struct Measurement<'a> {
+    kernel: Kernel,
+    pair: StereoPair<'a>,
     sigma_px: f64,
-    shared: &SharedCovariance,
-) -> Vec<(f64, f64)> {
-    let points: Vec<_> =
-        board.pixels().iter().map(|pixels| measured(kernel, pixels.as_ref()?, pair, sigma_px)).collect();
-    let mut found = Vec::new();
-    for place in 0..points.len() {
-        let neighbours = [(place % COLUMNS + 1 < COLUMNS).then_some(place + 1), Some(place + COLUMNS)];
-        for other in neighbours.into_iter().flatten() {
-            if let (Some(a), Some(Some(b))) = (&points[place], points.get(other)) {
-                found.push(spacing(a, b, shared));
+    shared: &'a SharedCovariance,
+}
+
+impl Measurement<'_> {
+    /// The errors of all spacings between these columns of a board in millimetres, and their variances.
+    fn spacings(&self, board: &Board, columns: &Range<usize>) -> Vec<(f64, f64)> {
+        let points: Vec<_> = board
+            .pixels()
+            .iter()
+            .map(|pixels| measured(&self.kernel, pixels.as_ref()?, &self.pair, self.sigma_px))
+            .collect();
+        let mut found = Vec::new();
+        for place in (0..points.len()).filter(|place| columns.contains(&(place % COLUMNS))) {
+            let neighbours = [columns.contains(&(place % COLUMNS + 1)).then_some(place + 1), Some(place + COLUMNS)];
+            for other in neighbours.into_iter().flatten() {
+                if let (Some(a), Some(Some(b))) = (&points[place], points.get(other)) {
+                    found.push(spacing(a, b, self.shared));
+                }
             }
         }
+        found
     }
-    found
 }
 
 fn mean<T>(found: &[T], of: impl Fn(&T) -> f64) -> f64 {
@@ -161,55 +178,102 @@ fn neighbouring_corners_of_a_real_board_are_as_far_apart_as_they_are() {
     let work = tempfile::tempdir().expect("a temporary folder");
     let Calibrated { rig, sigma_px } = calibrated(&set, work.path());
     let boards: Vec<Board> = MEASURED.map(|number| Board::seen(&set, number, &rig)).collect();
-    by_the_pose_of_the_rig(&boards, &rig, sigma_px);
-    by_the_poses_of_the_pairs(&boards, &rig, sigma_px);
+    println!("corners good to {sigma_px:.3} px");
+    println!("method               pose of          spacings   bias mm    rms mm   NEES");
+    for kernel in Kernel::ALL {
+        let [by_rig, by_pairs, by_halves] = POSES.map(|(pose, name)| {
+            let found = pose.spacings(&boards, kernel, &rig, sigma_px);
+            let (bias, rms) = bias_and_rms(&found);
+            let nees = mean(&found, |(error, variance)| error * error / variance);
+            println!("{:20} {name:15} {:9} {bias:9.3} {rms:9.3} {nees:6.2}", format!("{kernel:?}"), found.len());
+            Row { count: found.len(), bias, rms, nees }
+        });
+        by_rig.check(kernel);
+        // What is left where nothing moves between the photographs is the error of lenses and corners.
+        let [most_by_pairs, most_by_halves] = MOST_WITHOUT_MOTION;
+        assert!(by_pairs.rms < most_by_pairs, "{kernel:?}: {} mm rms by the pairs' own poses", by_pairs.rms);
+        assert!(by_halves.rms < most_by_halves, "{kernel:?}: {} mm rms by poses from the other half", by_halves.rms);
+    }
+    by_pairs(&boards, &rig, sigma_px);
 }
 
-/// What a user of the rig file measures, by each method.
-fn by_the_pose_of_the_rig(boards: &[Board], rig: &Rig, sigma_px: f64) {
-    let pose = rig.pose_read_at(&[]);
-    let pair = StereoPair { left: &rig.left_camera, right: &rig.right_camera, left_from_right: pose.left_from_right };
-    println!("corners good to {sigma_px:.3} px\n{:20} spacings   bias mm    rms mm   NEES", "method");
-    for kernel in Kernel::ALL {
-        let of = |board: &Board| spacings(board, &kernel, &pair, sigma_px, &pose.shared);
-        let found: Vec<(f64, f64)> = boards.iter().flat_map(of).collect();
-        let (bias, rms) = bias_and_rms(&found);
-        let nees = mean(&found, |(error, variance)| error * error / variance);
-        println!("{:20} {:8} {bias:9.3} {rms:9.3} {nees:6.2}", format!("{kernel:?}"), found.len());
-        assert!(found.len() >= 550, "{kernel:?}: {} spacings", found.len());
-        let [most_bias, most] = if kernel == Kernel::Rectified { [0.15, 0.6] } else { [0.1, 0.42] };
-        assert!(rms < most && bias.abs() < most_bias, "{kernel:?}: bias {bias} mm, rms {rms} mm");
-        // Of the other methods the covariance is that of the pseudo-intersection, to which they agree in the epipolar plane only.
-        // It counts the whole residual of the lens fits as noise of single corners. Most of that residual is misfit, which
-        // neighbours share, so that spacings are better than is stated.
-        if kernel == Kernel::PseudoIntersection {
-            assert!((0.2..1.0).contains(&nees), "NEES {nees:.2} of 1");
+/// Whose pose of the right camera measures.
+#[derive(Clone, Copy)]
+enum PoseOf {
+    /// That of the rig file: what a user measures.
+    Rig,
+    /// That which the board of each pair tells: hands held the cameras, and one photograph was taken after the other. It knows the size of
+    /// the board, so the mean of these errors tells nothing.
+    Pair,
+    /// The same from one half of the board, for the spacings of the other half, which had no part in it.
+    OtherHalf,
+}
+
+const POSES: [(PoseOf, &str); 3] =
+    [(PoseOf::Rig, "the rig"), (PoseOf::Pair, "each pair"), (PoseOf::OtherHalf, "the other half")];
+/// Each half of the board, by columns: the one that tells the pose, and the one that is measured.
+const HALVES: [[Range<usize>; 2]; 2] = [[0..5, 5..COLUMNS], [4..COLUMNS, 0..4]];
+
+impl PoseOf {
+    /// The errors of the spacings of all boards, and their variances.
+    fn spacings(self, boards: &[Board], kernel: Kernel, rig: &Rig, sigma_px: f64) -> Vec<(f64, f64)> {
+        boards.iter().flat_map(|board| self.spacings_of(board, kernel, rig, sigma_px)).collect()
+    }
+
+    fn spacings_of(self, board: &Board, kernel: Kernel, rig: &Rig, sigma_px: f64) -> Vec<(f64, f64)> {
+        let stated = rig.pose_read_at(&[]);
+        let by = |left_from_right, columns: &Range<usize>| {
+            let pair = StereoPair { left: &rig.left_camera, right: &rig.right_camera, left_from_right };
+            Measurement { kernel, pair, sigma_px, shared: &stated.shared }.spacings(board, columns)
+        };
+        let all = 0..COLUMNS;
+        match self {
+            Self::Rig => by(stated.left_from_right, &all),
+            Self::Pair => by(board.own_pose(rig, &all), &all),
+            Self::OtherHalf => {
+                HALVES.iter().flat_map(|[tells, is_measured]| by(board.own_pose(rig, tells), is_measured)).collect()
+            }
         }
     }
 }
 
-/// Hands held the cameras, and one photograph was taken after the other. What is left where each pair has the pose that its board
-/// tells is the error of lenses and corners. That pose knows the size of the board, so the mean of these errors tells nothing.
-fn by_the_poses_of_the_pairs(boards: &[Board], rig: &Rig, sigma_px: f64) {
-    let pose = rig.pose_read_at(&[]);
-    let (mut by_rig, mut by_pairs) = (Vec::new(), Vec::new());
-    println!("pair  its pose is off by deg, mm   rms mm by the rig's pose   by its own");
-    for board in boards {
-        let own = board.own_pose(rig);
-        let errors = |left_from_right| {
-            let pair = StereoPair { left: &rig.left_camera, right: &rig.right_camera, left_from_right };
-            spacings(board, &Kernel::PseudoIntersection, &pair, sigma_px, &pose.shared)
-        };
-        let turn = (own.rotation() * pose.left_from_right.rotation().inverse()).angle().to_degrees();
-        let shift = (own.origin().mm() - pose.left_from_right.origin().mm()).norm();
-        let (one, other) = (errors(pose.left_from_right), errors(own));
-        let rms = [&one, &other].map(|found| bias_and_rms(found).1);
-        println!("{:4} {turn:21.2} {shift:7.2} {:24.3} {:12.3}", board.number, rms[0], rms[1]);
-        by_rig.extend(one);
-        by_pairs.extend(other);
+/// Largest rms in millimetres by the pose of each pair, and by that from the other half.
+const MOST_WITHOUT_MOTION: [f64; 2] = [0.21, 0.24];
+
+/// What the spacings of all boards show.
+struct Row {
+    count: usize,
+    bias: f64,
+    rms: f64,
+    nees: f64,
+}
+
+impl Row {
+    /// Asserts what a user of the rig file measures.
+    fn check(&self, kernel: Kernel) {
+        let Self { count, bias, rms, nees } = self;
+        assert!(*count >= 550, "{kernel:?}: {count} spacings");
+        let [most_bias, most] = if kernel == Kernel::Rectified { [0.15, 0.6] } else { [0.1, 0.42] };
+        assert!(*rms < most && bias.abs() < most_bias, "{kernel:?}: bias {bias} mm, rms {rms} mm");
+        // Of the other methods the covariance is that of the pseudo-intersection, to which they agree in the epipolar plane only.
+        // It counts the whole residual of the lens fits as noise of single corners. Most of that residual is misfit, which
+        // neighbours share, so that spacings are better than is stated.
+        if kernel == Kernel::PseudoIntersection {
+            assert!((0.2..1.0).contains(nees), "NEES {nees:.2} of 1");
+        }
     }
-    let [by_rig, by_pairs] = [by_rig, by_pairs].map(|found| bias_and_rms(&found).1);
-    println!(" all {by_rig:54.3} {by_pairs:12.3}");
-    assert!(by_pairs < 0.21, "{by_pairs:.3} mm rms by the poses of the pairs themselves");
-    assert!(by_pairs < 0.6 * by_rig, "{by_pairs:.3} mm against {by_rig:.3} mm");
+}
+
+/// Prints how far each pair's own pose is from that of the rig, and what that does to its spacings.
+fn by_pairs(boards: &[Board], rig: &Rig, sigma_px: f64) {
+    let stated = rig.pose_read_at(&[]).left_from_right;
+    println!("pair  its pose is off by deg, mm   rms mm by the pose of {}, {}, {}", POSES[0].1, POSES[1].1, POSES[2].1);
+    for board in boards {
+        let own = board.own_pose(rig, &(0..COLUMNS));
+        let turn = (own.rotation() * stated.rotation().inverse()).angle().to_degrees();
+        let shift = (own.origin().mm() - stated.origin().mm()).norm();
+        let [by_rig, by_pair, by_half] =
+            POSES.map(|(pose, _)| bias_and_rms(&pose.spacings_of(board, Kernel::PseudoIntersection, rig, sigma_px)).1);
+        println!("{:4} {turn:21.2} {shift:7.2} {by_rig:24.3} {by_pair:9.3} {by_half:9.3}", board.number);
+    }
 }

@@ -10,7 +10,7 @@ use std::collections::BTreeMap;
 use std::path::Path;
 use std::process::Command;
 
-use common::data::say_skipped;
+use common::python;
 use common::{run_json, text};
 use image::imageops::grayscale;
 use image::{GrayImage, Luma};
@@ -21,22 +21,6 @@ use vergence_scene::{Optics, Target};
 use vergence_sim::photograph_target;
 use vergence_targets::{AprilGridSpec, CharucoSpec, TagFamily, TargetKind, detect_april_grid, detect_charuco};
 use vergence_vision::{Angle, Camera, ImageSize, KannalaBrandt, Length, Pixel, Point, Transform, World};
-
-/// The interpreter, if it has the module; else the test is skipped, or fails where data are required.
-fn python() -> Option<String> {
-    let python = std::env::var("VERGENCE_PYTHON").unwrap_or_else(|_| "python3".to_owned());
-    let asked = Command::new(&python).args(["-c", "import cv2; cv2.aruco.ArucoDetector"]).output();
-    if asked.is_ok_and(|output| output.status.success()) {
-        return Some(python);
-    }
-    let why = format!(
-        "{python} has no module cv2 with aruco: install it with '{python} -m pip install opencv-contrib-python-headless'"
-    );
-    let required = std::env::var_os("VERGENCE_REQUIRE_DATA").is_some_and(|value| value == "1");
-    assert!(!required, "VERGENCE_REQUIRE_DATA=1, but {why}");
-    say_skipped(&why);
-    None
-}
 
 /// What a script says.
 fn output(python: &str, script: &str, arguments: &[&str]) -> String {
@@ -72,7 +56,7 @@ fn photograph(target: &TargetKind) -> image::GrayImage {
 
 #[test]
 fn tags_are_the_same_and_their_corners_near() {
-    let Some(python) = python() else { return };
+    let Some(python) = python("import cv2; cv2.aruco.ArucoDetector", "opencv-contrib-python-headless") else { return };
     let grid = AprilGridSpec { columns: 6, rows: 5, tag: Length::from_mm(24.0), spacing: 0.3 };
     let image = photograph(&TargetKind::AprilGrid(grid));
     let folder = tempfile::tempdir().expect("a folder");
@@ -165,7 +149,7 @@ fn apart(a: &BTreeMap<u32, Pixel>, b: &BTreeMap<u32, Pixel>) -> f64 {
 
 #[test]
 fn every_dictionary_is_opencvs() {
-    let Some(python) = python() else { return };
+    let Some(python) = python("import cv2; cv2.aruco.ArucoDetector", "opencv-contrib-python-headless") else { return };
     let names: Vec<&str> = TagFamily::dictionaries().iter().map(|dictionary| dictionary.name).collect();
     let theirs = output(&python, "dictionaries.py", &names);
     let theirs = theirs.lines().map(|code| u64::from_str_radix(code, 16).expect("a code"));
@@ -174,7 +158,7 @@ fn every_dictionary_is_opencvs() {
 
 #[test]
 fn boards_in_our_photographs_have_the_same_corners_for_opencv() {
-    let Some(python) = python() else { return };
+    let Some(python) = python("import cv2; cv2.aruco.ArucoDetector", "opencv-contrib-python-headless") else { return };
     let folder = tempfile::tempdir().expect("a folder");
     for board in boards() {
         let target = TargetKind::Charuco(board.spec);
@@ -197,7 +181,7 @@ fn boards_in_our_photographs_have_the_same_corners_for_opencv() {
 
 #[test]
 fn boards_that_opencv_draws_are_found_with_its_numbers() {
-    let Some(python) = python() else { return };
+    let Some(python) = python("import cv2; cv2.aruco.ArucoDetector", "opencv-contrib-python-headless") else { return };
     let folder = tempfile::tempdir().expect("a folder");
     for board in boards() {
         let file = folder.path().join("board.png");
@@ -213,7 +197,7 @@ fn boards_that_opencv_draws_are_found_with_its_numbers() {
 #[test]
 fn sheets_that_we_draw_are_boards_for_opencv() {
     const PX_PER_MM: f64 = 6.0;
-    let Some(python) = python() else { return };
+    let Some(python) = python("import cv2; cv2.aruco.ArucoDetector", "opencv-contrib-python-headless") else { return };
     let folder = tempfile::tempdir().expect("a folder");
     let (svg, png) = (folder.path().join("board.svg"), folder.path().join("board.png"));
     for board in boards() {

@@ -180,10 +180,9 @@ fn dense_ranges_of_a_real_pair_hold_the_target() {
     });
     let alike = alike.count();
     println!("{result}; {alike} of {} corners alike", corners.len());
-    // What the search finds, and what is left of it where patches without neighbours and pixels beside edges are gaps.
+    // Pixels beside edges are measured, with the step in their sigma; where they were gaps, 17.5 % were left.
     let share = result["measured_share"].as_f64().expect("a share");
-    let dropped = ["isolated", "edge"].iter().filter_map(|gap| result["gaps"][gap].as_f64()).sum::<f64>();
-    assert!(share > 0.17 && share + dropped / f64::from(960 * 600) > 0.2, "{result}");
+    assert!(share > 0.195, "{result}");
     assert!(
         alike * 10 >= corners.len() * 9,
         "{alike} of {} corners lie where the dense ranges have them",

@@ -15,7 +15,7 @@ use std::io::Write;
 use std::path::Path;
 use std::process::{Command, Stdio};
 
-use common::data::say_skipped;
+use common::python;
 use common::servo_line::ServoLine;
 use conversation::{Conversation, Wired};
 use serde_json::{Value, json};
@@ -27,20 +27,6 @@ use vergence_mcu::UartId;
 use vergence_plant::Plant;
 use vergence_plant::servo::{Free, Servo, ServoBus, ServoModel};
 use vergence_protocol::{ControllerState, Microseconds, Status};
-
-/// The interpreter, if it has the library; else the test is skipped, or fails where data are required.
-fn python() -> Option<String> {
-    let python = std::env::var("VERGENCE_PYTHON").unwrap_or_else(|_| "python3".to_owned());
-    let asked = Command::new(&python).args(["-c", "import dynamixel_sdk.group_sync_read"]).output();
-    if asked.is_ok_and(|output| output.status.success()) {
-        return Some(python);
-    }
-    let why = format!("{python} has no module dynamixel_sdk: install it with '{python} -m pip install dynamixel-sdk'");
-    let required = std::env::var_os("VERGENCE_REQUIRE_DATA").is_some_and(|value| value == "1");
-    assert!(!required, "VERGENCE_REQUIRE_DATA=1, but {why}");
-    say_skipped(&why);
-    None
-}
 
 fn run(python: &str, script: &str, arguments: &[String]) -> Value {
     let script = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../tests/servo_sdk").join(script);
@@ -64,7 +50,7 @@ fn near(value: &Value, expected: i64) {
 
 #[test]
 fn the_library_drives_simulated_servos() {
-    let Some(python) = python() else { return };
+    let Some(python) = python("import dynamixel_sdk.group_sync_read", "dynamixel-sdk") else { return };
     let servo = |number| Servo::new(ServoModel::XM430_W350, id(number), Baud::M1, std::f64::consts::PI);
     let line = ServoLine::serve(ServoBus::new((13..18).map(servo).collect(), Free::default()));
     let said = run(&python, "talk.py", &[line.name.clone(), "1000000".to_owned()]);
@@ -96,7 +82,7 @@ fn the_library_drives_simulated_servos() {
 
 #[test]
 fn the_library_sends_what_we_send_and_reads_what_we_answer() {
-    let Some(python) = python() else { return };
+    let Some(python) = python("import dynamixel_sdk.group_sync_read", "dynamixel-sdk") else { return };
     let trunk = [13, 14, 15, 16, 17].map(id);
     let read = |id, address, length| BulkItem { id, address, length, data: &[] };
     let write = |id, address, data| BulkItem { id, address, length: 0, data };
@@ -162,7 +148,7 @@ impl Wired for Chip {
 /// sends the same bytes for the same contents.
 #[test]
 fn the_library_understands_the_firmware() {
-    let Some(python) = python() else { return };
+    let Some(python) = python("import dynamixel_sdk.group_sync_read", "dynamixel-sdk") else { return };
     let rig = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../docs/rigs/origaker.toml");
     let rig = vergence_rig::Rig::from_toml(&std::fs::read_to_string(rig).unwrap()).unwrap();
     let chip = simulated_chip(&[build::build("vergence-nucleo-g474")], &rig, 1).unwrap();

@@ -8,7 +8,7 @@ use tokio::sync::mpsc;
 use vergence::sim::{SharedRig, SimulatedRig, board_of};
 use vergence_board::Board;
 use vergence_live::{LiveLoop, MatchingTime, drive};
-use vergence_matching::GuidedMatcher;
+use vergence_matching::TrackingMatcher;
 use vergence_pipeline::Exposures;
 use vergence_protocol::SessionId;
 use vergence_rig::Rig;
@@ -50,7 +50,7 @@ impl LiveBench {
         }
         let live = LiveLoop {
             rig: Arc::new(believed.clone()),
-            matcher: Arc::new(GuidedMatcher::default()),
+            matcher: Arc::new(TrackingMatcher::default()),
             search: Arc::default(),
             memory: Arc::default(),
             events,

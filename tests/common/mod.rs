@@ -7,6 +7,7 @@ pub mod corner_files;
 pub mod data;
 pub mod images;
 pub mod pairs;
+pub mod python;
 pub mod rendered;
 pub mod servo_line;
 
@@ -15,6 +16,7 @@ use std::path::PathBuf;
 use std::process::{Child, Command, Output, Stdio};
 
 pub use data::real_data;
+pub use python::python;
 use serde_json::Value;
 
 /// The binary with `arguments`, and none of the caller's own settings.

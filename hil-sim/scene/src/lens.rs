@@ -113,6 +113,9 @@ impl Lens for KannalaBrandt {
     }
 
     fn before_part(&self, [left, top]: [u32; 2], size: ImageSize) -> Option<TrueLens> {
+        if self.foreign_model().is_some() {
+            return None;
+        }
         let mut part = self.to_opencv();
         (part.cx, part.cy) = (part.cx - f64::from(left), part.cy - f64::from(top));
         let part = Self::from_opencv(part, self.theta_max(), size).ok()?;

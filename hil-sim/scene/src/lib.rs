@@ -11,6 +11,7 @@
 //! threads: all randomness is a hash of the seed and of the pixel.
 
 mod blur;
+mod bundle;
 mod corridor;
 mod furnish;
 mod hierarchy;
@@ -18,6 +19,7 @@ mod lens;
 mod light;
 mod optics;
 mod outlook;
+mod packet;
 mod quick;
 mod range_map;
 mod rays;
@@ -26,10 +28,12 @@ mod room;
 mod scene;
 mod shape;
 mod sheet;
+mod sheet_edges;
 mod sheet_picture;
 mod target;
 mod texture;
 mod texture_noise;
+mod trace;
 
 pub use corridor::CorridorPlan;
 pub use lens::{Lens, LensChoice, LensRays, TrueLens, UnknownLens};
@@ -37,7 +41,8 @@ pub use optics::Optics;
 pub use quick::{RayTable, render_quick};
 pub use range_map::RangeMap;
 pub use render::{Photograph, View, render, render_rolling};
-pub use scene::{Hit, Scene, SurfaceId};
+pub use scene::Scene;
 pub use sheet::{MarkerBoard, Sheet, TagGrid, TagPrint};
 pub use sheet_picture::{SheetView, photograph_sheet};
 pub use target::Target;
+pub use trace::{Hit, SurfaceId};

@@ -2,6 +2,7 @@
 
 use nalgebra::Vector3;
 
+use crate::packet::Triples;
 use crate::texture::Rgb;
 
 /// A lamp as a point, whose light falls off with the distance.
@@ -31,36 +32,55 @@ pub struct Lighting {
     pub lamps: Vec<Lamp>,
 }
 
-impl Lighting {
-    /// Irradiance at `point` on a surface with `normal`, both in the world; `visible` tells whether the lamp of a
-    /// number can be seen from the point.
-    pub fn irradiance(&self, point: Vector3<f64>, normal: Vector3<f64>, visible: impl Fn(usize) -> bool) -> Rgb {
-        // y is down.
-        let above = 1.0 - self.from_above * normal.y;
-        let mut sum = self.ambient.map(|c| c * (above * self.openness(point, normal)) as f32);
-        for (number, lamp) in self.lamps.iter().enumerate() {
-            let to_lamp = lamp.position - point;
-            let distance = to_lamp.norm();
-            let cosine = normal.dot(&to_lamp) / distance.max(1.0);
-            if cosine > 0.0 && visible(number) {
-                let fall = 1.0 / (1.0 + (distance / lamp.half_distance).powi(2));
-                sum = std::array::from_fn(|i| sum[i] + lamp.power[i] * (cosine * fall) as f32);
-            }
+impl Lamp {
+    /// The parts of the lamp's power that arrive at `points` on a surface with `normals` where nothing is between; from behind not above 0.
+    #[inline(always)]
+    pub fn shares<const N: usize>(&self, points: &Triples<N>, normals: &Triples<N>) -> [f32; N] {
+        let mut shares = [0.0; N];
+        for i in 0..N {
+            let [x, y, z] =
+                [self.position.x - points[0][i], self.position.y - points[1][i], self.position.z - points[2][i]];
+            let distance = (x * x + y * y + z * z).sqrt();
+            let cosine = (normals[0][i] * x + normals[1][i] * y + normals[2][i] * z) / distance.max(1.0);
+            let reach = distance / self.half_distance;
+            shares[i] = (cosine * (1.0 / (1.0 + reach * reach))) as f32;
         }
-        sum
+        shares
+    }
+}
+
+impl Lighting {
+    /// Irradiance by ambient light at `points` on a surface with `normals`, both in the world.
+    #[inline(always)]
+    pub fn ambients<const N: usize>(&self, points: &Triples<N>, normals: &Triples<N>) -> [Rgb; N] {
+        let opennesses = self.opennesses(points, normals);
+        let mut sums = [[0.0; 3]; N];
+        for i in 0..N {
+            // y is down.
+            let above = 1.0 - self.from_above * normals[1][i];
+            let part = (above * opennesses[i]) as f32;
+            sums[i] = [self.ambient[0] * part, self.ambient[1] * part, self.ambient[2] * part];
+        }
+        sums
     }
 
-    /// The part of ambient light that reaches a point near the room's sides; a side does not shade itself.
-    fn openness(&self, point: Vector3<f64>, normal: Vector3<f64>) -> f64 {
+    /// The part of ambient light that reaches points near the room's sides; a side does not shade itself.
+    #[inline(always)]
+    fn opennesses<const N: usize>(&self, points: &Triples<N>, normals: &Triples<N>) -> [f64; N] {
         const REACH_MM: f64 = 220.0;
+        let mut open = [1.0; N];
         if self.occlusion == 0.0 {
-            return 1.0;
+            return open;
         }
         let [low, high] = self.room;
-        (0..3).fold(1.0, |open, axis| {
-            let nearest = (point[axis] - low[axis]).min(high[axis] - point[axis]).max(0.0);
-            let near = (1.0 + nearest / REACH_MM).powi(-2);
-            open * (1.0 - self.occlusion * near * (1.0 - normal[axis].abs()))
-        })
+        for axis in 0..3 {
+            for i in 0..N {
+                let nearest = (points[axis][i] - low[axis]).min(high[axis] - points[axis][i]).max(0.0);
+                let away = 1.0 + nearest * (1.0 / REACH_MM);
+                let near = 1.0 / (away * away);
+                open[i] *= 1.0 - self.occlusion * near * (1.0 - normals[axis][i].abs());
+            }
+        }
+        open
     }
 }

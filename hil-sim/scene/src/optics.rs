@@ -67,7 +67,8 @@ impl Optics {
         let (read, shot, gain) = (self.read_noise.max(0.0), self.shot_noise.max(0.0), self.gain.max(0.0));
         let level = 255.0 * encoded(gain * light);
         let sigma = (read * read + shot * shot * level / 255.0).sqrt();
-        (level + sigma * normal).round().clamp(0.0, 255.0) as u8
+        // Adding a half and cutting rounds; below 0 it is 0, and above 255 it is 255.
+        (level + sigma * normal + 0.5) as u8
     }
 }
 

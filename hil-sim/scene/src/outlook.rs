@@ -5,6 +5,8 @@
 
 use nalgebra::{Matrix3, Vector3};
 
+use crate::packet::{Triples, next_value};
+
 /// Cells along the edge of a face of the cube.
 const CELLS: usize = 64;
 const FACES: usize = 6;
@@ -56,7 +58,7 @@ impl Outlook {
                 (Candidate { shape: shape as u32, from_mm }, of_shape)
             })
             .collect();
-        shapes.sort_by(|a, b| a.0.from_mm.total_cmp(&b.0.from_mm).then(a.0.shape.cmp(&b.0.shape)));
+        shapes.sort_by(|a, b| a.0.order(&b.0));
         let listed: Vec<(Candidate, [Option<Part>; FACES])> =
             shapes.into_iter().map(|(candidate, of_shape)| (candidate, of_shape.parts(place))).collect();
         let mut begins = vec![0; FACES * CELLS * CELLS + 1];
@@ -80,19 +82,72 @@ impl Outlook {
         (origin - self.place).norm_squared() <= self.slack * self.slack
     }
 
-    /// The shapes that a ray along `direction`, of any length, may meet: nearest first.
-    #[inline]
-    pub fn along(&self, direction: &Vector3<f64>) -> &[Candidate] {
-        let size = direction.abs();
-        let axis = if size.x >= size.y && size.x >= size.z { 0 } else { 1 + usize::from(size.z > size.y) };
-        let (along, face) = (size[axis], 2 * axis + usize::from(direction[axis] < 0.0));
-        let cell = |other: usize| {
-            // Rounded to single precision by far less than the padding.
-            let across = (direction[(axis + other) % 3] / along) as f32;
-            (((across + 1.0) * (0.5 * CELLS as f32)) as u32 as usize).min(CELLS - 1)
-        };
-        let cell = (face * CELLS + cell(2)) * CELLS + cell(1);
-        &self.candidates[self.begins[cell] as usize..self.begins[cell + 1] as usize]
+    /// The numbers of the cells of `directions` of any length.
+    #[inline(always)]
+    pub fn cells<const N: usize>(&self, directions: &Triples<N>) -> [usize; N] {
+        let [x, y, z] = directions;
+        let mut cells = [0; N];
+        for i in 0..N {
+            let size = [x[i].abs(), y[i].abs(), z[i].abs()];
+            let (is_x, is_z) = ((size[0] >= size[1]) & (size[0] >= size[2]), size[2] > size[1]);
+            // Along the largest component, and across it the other two in their cyclic order.
+            let (along, first, second, axis) = if is_x {
+                (x[i], y[i], z[i], 0.0)
+            } else if is_z {
+                (z[i], x[i], y[i], 2.0)
+            } else {
+                (y[i], z[i], x[i], 1.0)
+            };
+            // Rounded by far less than the padding.
+            let scale = (0.5 * CELLS as f64) / along.abs();
+            let [column, row] = [first, second].map(|across| {
+                let at = (across * scale + 0.5 * CELLS as f64) as f32;
+                at.clamp(0.0, CELLS as f32 - 1.0).trunc()
+            });
+            let face = 2.0 * axis + if along < 0.0 { 1.0 } else { 0.0 };
+            cells[i] = ((face * CELLS as f32 + row) * CELLS as f32 + column) as u32 as usize;
+        }
+        cells
+    }
+
+    /// The shapes that the rays which count may meet, nearest first; `cells` are those of their directions.
+    #[inline(always)]
+    pub fn candidates<const N: usize>(&self, counts: &[bool; N], cells: &[usize; N]) -> Candidates<'_, N> {
+        let (mut left, mut lists, mut count) = (*counts, [[].as_slice(); N], 0);
+        while let Some((cell, _)) = next_value(&mut left, cells) {
+            lists[count] = &self.candidates[self.begins[cell] as usize..self.begins[cell + 1] as usize];
+            count += 1;
+        }
+        Candidates { lists, count }
+    }
+}
+
+/// What stands in some cells, each shape once.
+pub struct Candidates<'a, const N: usize> {
+    /// What is left of each cell's shapes.
+    lists: [&'a [Candidate]; N],
+    count: usize,
+}
+
+impl<const N: usize> Candidates<'_, N> {
+    /// The nearest of those that are left.
+    #[inline(always)]
+    pub fn next(&mut self) -> Option<Candidate> {
+        let lists = &mut self.lists[..self.count];
+        let nearest = lists.iter().filter_map(|list| list.first()).copied().min_by(Candidate::order)?;
+        for list in lists {
+            if let Some((_, rest)) = list.split_first().filter(|(first, _)| first.shape == nearest.shape) {
+                *list = rest;
+            }
+        }
+        Some(nearest)
+    }
+}
+
+impl Candidate {
+    /// Nearest first.
+    fn order(&self, other: &Self) -> std::cmp::Ordering {
+        self.from_mm.total_cmp(&other.from_mm).then(self.shape.cmp(&other.shape))
     }
 }
 

@@ -12,13 +12,14 @@ use vergence_vision::{Angle, Camera, Transform, World};
 
 use crate::Optics;
 use crate::blur::spread;
+use crate::bundle::{Bundle, Found};
 use crate::lens::Lens;
 use crate::optics::encoded;
 use crate::rays::{PosedLens, RayGrid};
 use crate::render::{Rows, View, lattice};
-use crate::scene::Encounter;
 use crate::texture::Rgb;
 use crate::texture_noise::mix64;
+use crate::trace::NOTHING;
 
 /// Further rays of a pixel at an edge between surfaces, and at one within a surface: those of prints are measured.
 const EDGE_RAYS: [u32; 2] = [6, 16];
@@ -71,13 +72,19 @@ impl RayTable {
 }
 
 /// What the ray through the centre of a pixel meets.
-#[derive(Clone, Copy, Default)]
+#[derive(Clone, Copy)]
 struct Glance {
     light: Rgb,
     /// The square root of the mean of its colours.
     level: f32,
-    /// One more than the number of the surface; 0 where nothing is met, or outside the field.
+    /// Number of the surface; [`NOTHING`] where nothing is met, and outside the field.
     surface: u32,
+}
+
+impl Default for Glance {
+    fn default() -> Self {
+        Self { light: [0.0; 3], level: 0.0, surface: NOTHING }
+    }
 }
 
 /// Renders a view in real time, every row from the pose that `world_from_camera` gives for it. `table` is of the lens and the optics of the
@@ -93,60 +100,62 @@ pub fn render_quick(
     let width = (size.width as usize).max(1);
     let (outlook, lens_rays) = (rows.outlook(view), view.camera.rays());
     let eye = |y: usize| PosedLens::new(view.camera, &lens_rays, &world_from_camera(y as u32));
-    let meet = |origin, ray| view.scene.encounter_from(&outlook, origin, ray);
-    let light = |origin, ray, met: Option<&Encounter>, optics: &PixelOptics| {
-        view.scene.light(origin, ray, met, f64::from(optics.pitch))
-    };
 
     let mut glances = vec![Glance::default(); table.pixels.len()];
     glances.par_chunks_mut(width).zip(table.pixels.par_chunks(width)).enumerate().for_each(|(y, (row, optics))| {
         let eye = eye(y);
         let grid = RayGrid::of_table(&eye, &table.rays, size.width);
-        for (x, (glance, optics)) in row.iter_mut().zip(optics).enumerate() {
+        let mut centres = Bundle::default();
+        for (x, optics) in optics.iter().enumerate() {
             if let Some(around) = grid.around(x as u32, y as u32) {
-                let (origin, ray) = (around.start(&around.centre()), around.centre());
-                let met = meet(origin, ray);
-                let light = light(origin, ray, met.as_ref(), optics);
-                *glance =
-                    Glance { light, level: (light.iter().sum::<f32>() / 3.0).sqrt(), surface: surface(met.as_ref()) };
+                centres.push(x, around.start(&around.centre()), around.centre(), f64::from(optics.pitch));
             }
         }
+        centres.follow(
+            view.scene,
+            &outlook,
+            |_, _| true,
+            |x, Found { surface, light, .. }| {
+                row[x] = Glance { light, level: (light.iter().sum::<f32>() / 3.0).sqrt(), surface };
+            },
+        );
     });
 
     let mut image = vec![[0.0; 3]; glances.len()];
     image.par_chunks_mut(width).enumerate().for_each(|(y, row)| {
         let eye = eye(y);
         let grid = RayGrid::of_table(&eye, &table.rays, size.width);
-        for (x, pixel) in row.iter_mut().enumerate() {
-            let at = y * width + x;
-            let (glance, optics) = (glances[at], &table.pixels[at]);
-            let mut sum = glance.light;
-            let mut count = 1.0;
-            let edge = edge(&glances, width, x, y);
-            let around = edge.is_some().then(|| grid.around(x as u32, y as u32)).flatten();
-            if let (Some(edge), Some(around)) = (edge, around) {
+        let edges: Vec<Option<Edge>> = (0..width).map(|x| edge(&glances, width, x, y)).collect();
+        let (mut rays, mut counts) = (Bundle::default(), vec![1.0; width]);
+        for (x, (pixel, edge)) in row.iter_mut().zip(&edges).enumerate() {
+            let (at, optics) = (y * width + x, &table.pixels[y * width + x]);
+            if let Some((edge, around)) = edge.as_ref().zip(grid.around(x as u32, y as u32)) {
                 let nearby = around.nearby();
-                let rays = EDGE_RAYS[usize::from(edge.within)];
+                let places = EDGE_RAYS[usize::from(edge.within)];
                 // A ray outside the field brings no light.
-                for ray in lattice(rays, mix64(seed ^ at as u64)).filter_map(|place| nearby.at(place)) {
-                    let origin = around.start(&ray);
-                    let met = meet(origin, ray);
-                    let known = edge.light_of(surface(met.as_ref()));
-                    let light = known.unwrap_or_else(|| light(origin, ray, met.as_ref(), optics));
-                    sum = std::array::from_fn(|i| sum[i] + light[i]);
+                for ray in lattice(places, mix64(seed ^ at as u64)).filter_map(|place| nearby.at(place)) {
+                    rays.push(x, around.start(&ray), ray, f64::from(optics.pitch));
                 }
-                count += rays as f32;
+                counts[x] += places as f32;
             }
-            *pixel = sum.map(|c| c * optics.exposure / count);
+            *pixel = glances[at].light;
+        }
+        let light_of = |x: usize, surface: u32| edges[x].as_ref().and_then(|edge| edge.light_of(surface));
+        rays.follow(
+            view.scene,
+            &outlook,
+            |x, surface| light_of(x, surface).is_none(),
+            |x, found| {
+                let light = light_of(x, found.surface).unwrap_or(found.light);
+                row[x] = [0, 1, 2].map(|i| row[x][i] + light[i]);
+            },
+        );
+        for ((pixel, optics), count) in row.iter_mut().zip(&table.pixels[y * width..]).zip(counts) {
+            *pixel = pixel.map(|c| c * optics.exposure / count);
         }
     });
     let spots: Vec<f32> = table.pixels.iter().map(|pixel| pixel.spot).collect();
     develop(&spread(&image, width, view.optics.blur_px, &spots), &table.rays, view, !mix64(seed))
-}
-
-/// One more than the number of the surface met; 0 where none is.
-fn surface(met: Option<&Encounter>) -> u32 {
-    met.map_or(0, |met| met.surface() as u32 + 1)
 }
 
 /// A pixel, then those left, right, above and below of it, one of which shows something else; itself again in place of those beside the image.

@@ -137,7 +137,7 @@ impl Nearby<'_> {
             return self.posed.ray(Pixel { u: self.pixel.u + u, v: self.pixel.v + v });
         };
         let ray = self.centre + du * u + dv * v + duu * (0.5 * u * u) + duv * (u * v) + dvv * (0.5 * v * v);
-        Some(ray / ray.norm())
+        Some(ray * (1.0 / ray.norm()))
     }
 }
 

@@ -6,12 +6,14 @@ use rayon::prelude::*;
 use vergence_vision::{Angle, Camera, Length, Pixel, Transform, World};
 
 use crate::blur::spread;
+use crate::bundle::Bundle;
 use crate::lens::{Lens, LensRays};
 use crate::optics::unit_pair;
 use crate::outlook::Outlook;
 use crate::rays::{Around, PosedLens, RayGrid};
 use crate::texture::Rgb;
 use crate::texture_noise::mix64;
+use crate::trace::NOTHING;
 use crate::{Optics, RangeMap, Scene};
 
 /// Number of rows that one task renders.
@@ -105,20 +107,56 @@ fn photograph(view: &View<'_>, seed: u64, rows: Rows<'_>) -> Photograph {
 
     let rays = view.camera.rays();
     let outlook = rows.outlook(view);
+    let samples = view.optics.samples;
     let mut firsts = vec![First::default(); pixels];
-    for_each_in_field(view, rows, &rays, &mut firsts, |first, here, around, x, y| {
-        *first = here.first(around, &outlook, seed_of(x, y));
+    for_each_row(view, rows, &rays, &mut firsts, |firsts, here, grid, y| {
+        let (mut centres, mut around_them) = (Bundle::default(), Bundle::default());
+        for (x, first) in firsts.iter_mut().enumerate() {
+            let Some(around) = grid.around(x as u32, y as u32) else { continue };
+            *first = here.first(&around);
+            centres.push(x, around.start(&around.centre()), around.centre(), first.pitch);
+            if samples > 1 {
+                let places = lattice(samples, seed_of(x, y));
+                first.samples = gather(&mut around_them, x, &around, first.pitch, places);
+            }
+        }
+        let is_enough = samples <= 1;
+        centres.follow(
+            view.scene,
+            &outlook,
+            |_, _| is_enough,
+            |x, found| {
+                firsts[x].range_mm = if found.surface == NOTHING { f32::NAN } else { found.range_mm as f32 };
+                if is_enough {
+                    firsts[x].samples = firsts[x].samples.with(found.light);
+                }
+            },
+        );
+        around_them.follow(
+            view.scene,
+            &outlook,
+            |_, _| true,
+            |x, found| {
+                firsts[x].samples = firsts[x].samples.with(found.light);
+            },
+        );
     });
 
     let mut light = vec![[0.0; 3]; pixels];
-    for_each_in_field(view, rows, &rays, &mut light, |light, here, around, x, y| {
-        let First { mut samples, exposure, .. } = firsts[y * width + x];
-        if is_edge(&firsts, width, x, y) {
+    for_each_row(view, rows, &rays, &mut light, |light, _, grid, y| {
+        let mut edges = Bundle::default();
+        let mut more = vec![LightSamples::default(); width];
+        for (x, more) in more.iter_mut().enumerate().filter(|(x, _)| is_edge(&firsts, width, *x, y)) {
+            let Some(around) = grid.around(x as u32, y as u32) else { continue };
             let places = lattice(view.optics.edge_samples, mix64(seed_of(x, y)));
-            samples = samples.joined(here.samples(around, &outlook, places));
+            *more = gather(&mut edges, x, &around, firsts[y * width + x].pitch, places);
         }
-        let exposure = exposure / samples.count.max(1) as f32;
-        *light = samples.sum.map(|c| c * exposure);
+        edges.follow(view.scene, &outlook, |_, _| true, |x, found| more[x] = more[x].with(found.light));
+        for ((light, first), more) in light.iter_mut().zip(&firsts[y * width..]).zip(more) {
+            let samples = first.samples.joined(more);
+            let exposure = first.exposure / samples.count.max(1) as f32;
+            *light = samples.sum.map(|c| c * exposure);
+        }
     });
 
     let spots: Vec<f32> = firsts.iter().map(|first| first.spot).collect();
@@ -152,11 +190,13 @@ struct First {
     exposure: f32,
     /// Variance of the lens's own spot, in square pixels.
     spot: f32,
+    /// Radians from one pixel to the next.
+    pitch: f64,
 }
 
 impl Default for First {
     fn default() -> Self {
-        Self { samples: LightSamples::default(), range_mm: f32::NAN, exposure: 0.0, spot: 0.0 }
+        Self { samples: LightSamples::default(), range_mm: f32::NAN, exposure: 0.0, spot: 0.0, pitch: 0.0 }
     }
 }
 
@@ -199,14 +239,13 @@ impl LightSamples {
     }
 }
 
-/// Calls `visit(item, view, rays, x, y)`, the view as at that row, for the pixels of the view inside the lens's field,
-/// in parallel.
-fn for_each_in_field<T: Send>(
+/// Calls `visit(row of items, view, rays, y)`, the view as at that row, for the rows of the view, in parallel.
+fn for_each_row<T: Send>(
     view: &View<'_>,
     rows: Rows<'_>,
     lens: &LensRays<'_>,
     items: &mut [T],
-    visit: impl Fn(&mut T, &View<'_>, &Around<'_>, usize, usize) + Sync,
+    visit: impl Fn(&mut [T], &View<'_>, &RayGrid<'_>, usize) + Sync,
 ) {
     let width = (view.camera.size().width as usize).max(1);
     items.par_chunks_mut(width * rows.at_once).enumerate().for_each(|(number, items)| {
@@ -214,13 +253,26 @@ fn for_each_in_field<T: Send>(
         let here = rows.view(view, top as u32);
         let posed = PosedLens::new(view.camera, lens, &here.world_from_camera);
         let rays = RayGrid::new(&posed, [0, top as u32], [width, items.len() / width].map(|n| n as u32));
-        for (i, item) in items.iter_mut().enumerate() {
-            let (x, y) = (i % width, top + i / width);
-            if let Some(around) = rays.around(x as u32, y as u32) {
-                visit(item, &here, &around, x, y);
-            }
-        }
+        items.chunks_mut(width).enumerate().for_each(|(row, items)| visit(items, &here, &rays, top + row));
     });
+}
+
+/// Adds the rays through these `places` on the square of a pixel, and returns the light of those outside the field: none.
+fn gather(
+    bundle: &mut Bundle,
+    owner: usize,
+    around: &Around<'_>,
+    pitch: f64,
+    places: impl Iterator<Item = [f64; 2]>,
+) -> LightSamples {
+    let nearby = around.nearby();
+    places.fold(LightSamples::default(), |dark, place| match nearby.at(place) {
+        Some(ray) => {
+            bundle.push(owner, around.start(&ray), ray, pitch);
+            dark
+        }
+        None => dark.with([0.0; 3]),
+    })
 }
 
 impl View<'_> {
@@ -234,35 +286,15 @@ impl View<'_> {
         Some(Length::from_mm((place - self.world_from_camera.origin().mm()).norm()))
     }
 
-    /// Casts the first rays of a pixel.
-    fn first(&self, around: &Around<'_>, outlook: &Outlook, hash: u64) -> First {
-        let origin = around.start(&around.centre());
+    /// What the lens does with a pixel.
+    fn first(&self, around: &Around<'_>) -> First {
         let theta = self.theta(around);
-        let met = self.scene.encounter_from(outlook, origin, around.centre());
-        let samples = if self.optics.samples <= 1 {
-            let finest = 1.0 / self.camera.pixels_per_radian(theta);
-            LightSamples::default().with(self.scene.light(origin, around.centre(), met.as_ref(), finest))
-        } else {
-            self.samples(around, outlook, lattice(self.optics.samples, hash))
-        };
-        let exposure = self.optics.light_at(theta, self.camera) as f32;
-        let spot = self.camera.spot_variance(theta) as f32;
-        First { samples, range_mm: met.map_or(f32::NAN, |met| met.range() as f32), exposure, spot }
-    }
-
-    /// The light of rays through these places on the square of a pixel.
-    fn samples(&self, around: &Around<'_>, outlook: &Outlook, places: impl Iterator<Item = [f64; 2]>) -> LightSamples {
-        let finest = 1.0 / self.camera.pixels_per_radian(self.theta(around));
-        let nearby = around.nearby();
-        places.fold(LightSamples::default(), |samples, offset| {
-            let light = |direction| {
-                let origin = around.start(&direction);
-                let met = self.scene.encounter_from(outlook, origin, direction);
-                self.scene.light(origin, direction, met.as_ref(), finest)
-            };
-            // A ray outside the field brings no light.
-            samples.with(nearby.at(offset).map_or([0.0; 3], light))
-        })
+        First {
+            exposure: self.optics.light_at(theta, self.camera) as f32,
+            spot: self.camera.spot_variance(theta) as f32,
+            pitch: 1.0 / self.camera.pixels_per_radian(theta),
+            ..First::default()
+        }
     }
 
     /// The angle of a pixel's centre to the optical axis.

@@ -2,6 +2,8 @@
 
 use nalgebra::{Matrix3, Vector3};
 
+use crate::packet::{Triples, at_ranges, dots};
+
 /// A contact nearer than this (mm) is taken for the surface that the ray starts from.
 pub const NEAREST_MM: f64 = 1e-6;
 
@@ -20,42 +22,93 @@ pub enum Shape {
     Cylinder { radius: f64, half_height: f64 },
 }
 
-/// The contact of a ray with a shape, in the frame of the shape.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Contact {
-    /// Distance along the ray in units of its direction's length.
-    pub range: f64,
-    /// Unit normal out of the solid; for a rectangle towards the ray's origin, for an ellipse always z.
-    pub normal: Vector3<f64>,
+/// Where rays meet a shape.
+#[derive(Clone, Copy, Debug)]
+pub struct Meetings<const N: usize> {
+    /// Distance along each ray in units of its direction's length; infinite where it misses.
+    pub ranges: [f64; N],
+    /// Which part of the shape is met, where there are several.
+    parts: [u64; N],
 }
 
-/// A point on a shape, with coordinates for textures.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct SurfacePoint {
+/// Of the parts of a block, the axis of a face; this is added where the ray comes from outside.
+const OUTSIDE: u64 = 4;
+/// Parts of a cylinder.
+const SIDE: u64 = 0;
+const LOW_CAP: u64 = 1;
+const HIGH_CAP: u64 = 2;
+
+/// Points on a shape, with coordinates for textures.
+#[derive(Clone, Copy, Debug)]
+pub struct SurfacePoints<const N: usize> {
     /// In the shape's frame, mm.
-    pub position: Vector3<f64>,
+    pub position: Triples<N>,
     /// Coordinates in mm along the surface (spheres: the position's x and y).
-    pub uv: [f64; 2],
+    pub uv: [[f64; N]; 2],
     /// Number of the face of the shape.
-    pub face: u32,
+    pub face: [u32; N],
     /// Extent of a pixel at the point, mm.
-    pub footprint: f64,
+    pub footprint: [f64; N],
 }
 
 impl Shape {
-    /// The nearest contact ahead of `origin`, short of `limit`.
-    pub fn meet(&self, origin: Vector3<f64>, direction: Vector3<f64>, limit: f64) -> Option<Contact> {
-        let contact = match *self {
-            Self::Rectangle { half } => meet_plane(origin, direction, |x, y| x.abs() <= half[0] && y.abs() <= half[1])?,
-            Self::Ellipse { half } => {
-                let inside = |x: f64, y: f64| (x / half[0]).powi(2) + (y / half[1]).powi(2) <= 1.0;
-                Contact { normal: Vector3::z(), ..meet_plane(origin, direction, inside)? }
+    /// The nearest contacts ahead of the `origin`s of rays in the frame of the shape.
+    #[inline(always)]
+    pub fn meet<const N: usize>(&self, origin: &Triples<N>, direction: &Triples<N>) -> Meetings<N> {
+        match *self {
+            Self::Rectangle { half } => {
+                meet_plane(origin, direction, |x, y| (x.abs() <= half[0]) & (y.abs() <= half[1]))
             }
-            Self::Block { half } => meet_block(origin, direction, half)?,
-            Self::Sphere { radius } => meet_sphere(origin, direction, radius)?,
-            Self::Cylinder { radius, half_height } => meet_cylinder(origin, direction, radius, half_height)?,
-        };
-        (contact.range < limit).then_some(contact)
+            Self::Ellipse { half } => {
+                meet_plane(origin, direction, |x, y| (x / half[0]).powi(2) + (y / half[1]).powi(2) <= 1.0)
+            }
+            Self::Block { half } => meet_block(origin, direction, half),
+            Self::Sphere { radius } => meet_sphere(origin, direction, radius),
+            Self::Cylinder { radius, half_height } => meet_cylinder(origin, direction, radius, half_height),
+        }
+    }
+
+    /// Unit normals out of the solid where it is met; for a rectangle towards the ray's origin, for an ellipse always z.
+    #[inline(always)]
+    pub fn normals<const N: usize>(
+        &self,
+        origin: &Triples<N>,
+        direction: &Triples<N>,
+        met: &Meetings<N>,
+    ) -> Triples<N> {
+        let mut normals = [[0.0; N]; 3];
+        match *self {
+            Self::Rectangle { .. } => {
+                for i in 0..N {
+                    normals[2][i] = -direction[2][i].signum();
+                }
+            }
+            Self::Ellipse { .. } => normals[2] = [1.0; N],
+            Self::Block { .. } => {
+                for (axis, normals) in normals.iter_mut().enumerate() {
+                    for i in 0..N {
+                        let sign = direction[axis][i].signum();
+                        let sign = if met.parts[i] & OUTSIDE == 0 { sign } else { -sign };
+                        normals[i] = if met.parts[i] & (OUTSIDE - 1) == axis as u64 { sign } else { 0.0 };
+                    }
+                }
+            }
+            Self::Sphere { radius } => {
+                normals = at_ranges(origin, direction, &met.ranges);
+                normals.as_flattened_mut().iter_mut().for_each(|component| *component /= radius);
+            }
+            Self::Cylinder { radius, .. } => {
+                let places = at_ranges(origin, direction, &met.ranges);
+                for i in 0..N {
+                    let on_side = met.parts[i] == SIDE;
+                    normals[0][i] = if on_side { places[0][i] / radius } else { 0.0 };
+                    normals[2][i] = if on_side { places[2][i] / radius } else { 0.0 };
+                    let cap = if met.parts[i] == LOW_CAP { -1.0 } else { 1.0 };
+                    normals[1][i] = if on_side { 0.0 } else { cap };
+                }
+            }
+        }
+        normals
     }
 
     /// Half the size of the axis-aligned box about the shape after `rotation`.
@@ -76,85 +129,123 @@ impl Shape {
         }
     }
 
-    /// The texture coordinates of `position`, a point on the surface where `normal` stands out.
-    pub fn surface_point(&self, position: Vector3<f64>, normal: Vector3<f64>, footprint: f64) -> SurfacePoint {
-        let p = position;
-        let (uv, face) = match *self {
-            Self::Rectangle { .. } | Self::Ellipse { .. } => ([p.x, p.y], u32::from(normal.z > 0.0)),
+    /// The texture coordinates of `position`s, points on the surface where `normal`s stand out.
+    #[inline(always)]
+    pub fn surface_points<const N: usize>(
+        &self,
+        position: Triples<N>,
+        normal: &Triples<N>,
+        footprint: [f64; N],
+    ) -> SurfacePoints<N> {
+        let p = &position;
+        let (mut uv, mut face) = ([p[0], p[1]], [0; N]);
+        match *self {
+            Self::Rectangle { .. } | Self::Ellipse { .. } => face = normal[2].map(|z| u32::from(z > 0.0)),
+            Self::Sphere { .. } => face = p[2].map(|z| u32::from(z > 0.0)),
             Self::Block { .. } => {
-                let axis = normal.iamax();
-                let uv = [[p.z, p.y], [p.x, p.z], [p.x, p.y]];
-                (uv[axis], 2 * axis as u32 + u32::from(normal[axis] > 0.0))
+                for i in 0..N {
+                    let sizes = [normal[0][i].abs(), normal[1][i].abs(), normal[2][i].abs()];
+                    let axis =
+                        if sizes[0] >= sizes[1].max(sizes[2]) { 0 } else { 1 + usize::from(sizes[2] > sizes[1]) };
+                    let (across, along) = [(2, 1), (0, 2), (0, 1)][axis];
+                    (uv[0][i], uv[1][i]) = (p[across][i], p[along][i]);
+                    face[i] = 2 * axis as u32 + u32::from(normal[axis][i] > 0.0);
+                }
             }
-            Self::Sphere { .. } => ([p.x, p.y], u32::from(p.z > 0.0)),
-            Self::Cylinder { .. } if normal.y.abs() > 0.5 => ([p.x, p.z], 1 + u32::from(normal.y > 0.0)),
-            Self::Cylinder { radius, .. } => ([radius * p.x.atan2(p.z), p.y], 0),
-        };
-        SurfacePoint { position, uv, face, footprint }
+            Self::Cylinder { radius, .. } => {
+                for i in 0..N {
+                    if normal[1][i].abs() > 0.5 {
+                        (uv[0][i], uv[1][i]) = (p[0][i], p[2][i]);
+                        face[i] = 1 + u32::from(normal[1][i] > 0.0);
+                    } else {
+                        uv[0][i] = radius * p[0][i].atan2(p[2][i]);
+                    }
+                }
+            }
+        }
+        SurfacePoints { position, uv, face, footprint }
     }
 }
 
-fn meet_plane(o: Vector3<f64>, d: Vector3<f64>, inside: impl Fn(f64, f64) -> bool) -> Option<Contact> {
-    let range = -o.z / d.z;
-    // A ray within the plane divides by zero; it fails this test, infinite or not a number.
-    let met = range > NEAREST_MM && range < f64::INFINITY && inside(o.x + range * d.x, o.y + range * d.y);
-    met.then(|| Contact { range, normal: Vector3::new(0.0, 0.0, -d.z.signum()) })
+#[inline(always)]
+fn meet_plane<const N: usize>(o: &Triples<N>, d: &Triples<N>, inside: impl Fn(f64, f64) -> bool) -> Meetings<N> {
+    let mut ranges = [f64::INFINITY; N];
+    for i in 0..N {
+        let range = -o[2][i] / d[2][i];
+        // A ray within the plane divides by zero; it fails this test, infinite or not a number.
+        let ahead = (range > NEAREST_MM) & (range < f64::INFINITY);
+        let met = ahead & inside(o[0][i] + range * d[0][i], o[1][i] + range * d[1][i]);
+        ranges[i] = if met { range } else { f64::INFINITY };
+    }
+    Meetings { ranges, parts: [0; N] }
 }
 
 /// By slabs: T. Kay and J. Kajiya, "Ray tracing complex scenes", SIGGRAPH 1986.
-fn meet_block(o: Vector3<f64>, d: Vector3<f64>, half: Vector3<f64>) -> Option<Contact> {
-    let (mut enter, mut leave) = ((f64::NEG_INFINITY, 0), (f64::INFINITY, 0));
+#[inline(always)]
+fn meet_block<const N: usize>(o: &Triples<N>, d: &Triples<N>, half: Vector3<f64>) -> Meetings<N> {
+    let (mut enter, mut leave) = ([f64::NEG_INFINITY; N], [f64::INFINITY; N]);
+    let (mut enter_axis, mut leave_axis) = ([0_u64; N], [0_u64; N]);
     for axis in 0..3 {
-        if d[axis] == 0.0 {
-            if o[axis].abs() > half[axis] {
-                return None;
-            }
-            continue;
-        }
-        let to_middle = -o[axis] / d[axis];
-        let reach = (half[axis] / d[axis]).abs();
-        if to_middle - reach > enter.0 {
-            enter = (to_middle - reach, axis);
-        }
-        if to_middle + reach < leave.0 {
-            leave = (to_middle + reach, axis);
+        for i in 0..N {
+            let inverse = 1.0 / d[axis][i];
+            let (to_middle, reach) = (-o[axis][i] * inverse, (half[axis] * inverse).abs());
+            // Along the slab a ray is inside it from ever to ever, or never.
+            let is_along = d[axis][i] == 0.0;
+            let beside = if o[axis][i].abs() > half[axis] { f64::INFINITY } else { f64::NEG_INFINITY };
+            let near = if is_along { beside } else { to_middle - reach };
+            let far = if is_along { f64::INFINITY } else { to_middle + reach };
+            enter_axis[i] = if near > enter[i] { axis as u64 } else { enter_axis[i] };
+            leave_axis[i] = if far < leave[i] { axis as u64 } else { leave_axis[i] };
+            enter[i] = if near > enter[i] { near } else { enter[i] };
+            leave[i] = if far < leave[i] { far } else { leave[i] };
         }
     }
-    if enter.0 > leave.0 || leave.0 <= NEAREST_MM {
-        return None;
+    let (mut ranges, mut parts) = ([f64::INFINITY; N], [0; N]);
+    for i in 0..N {
+        let from_outside = enter[i] > NEAREST_MM;
+        let met = (enter[i] <= leave[i]) & (leave[i] > NEAREST_MM);
+        let range = if from_outside { enter[i] } else { leave[i] };
+        ranges[i] = if met { range } else { f64::INFINITY };
+        parts[i] = if from_outside { enter_axis[i] + OUTSIDE } else { leave_axis[i] };
     }
-    let (outside, (range, axis)) = if enter.0 > NEAREST_MM { (true, enter) } else { (false, leave) };
-    let mut normal = Vector3::zeros();
-    normal[axis] = if outside { -d[axis].signum() } else { d[axis].signum() };
-    Some(Contact { range, normal })
+    Meetings { ranges, parts }
 }
 
-fn meet_sphere(o: Vector3<f64>, d: Vector3<f64>, radius: f64) -> Option<Contact> {
-    let range = nearest_root(d.norm_squared(), o.dot(&d), o.norm_squared() - radius * radius, |_| true)?;
-    Some(Contact { range, normal: (o + d * range) / radius })
-}
-
-fn meet_cylinder(o: Vector3<f64>, d: Vector3<f64>, radius: f64, half_height: f64) -> Option<Contact> {
-    let side =
-        nearest_root(d.x * d.x + d.z * d.z, o.x * d.x + o.z * d.z, o.x * o.x + o.z * o.z - radius * radius, |range| {
-            (o.y + range * d.y).abs() <= half_height
-        })
-        .map(|range| Contact { range, normal: Vector3::new(o.x + range * d.x, 0.0, o.z + range * d.z) / radius });
-    let cap = |y: f64| {
-        let range = (y - o.y) / d.y;
-        let (x, z) = (o.x + range * d.x, o.z + range * d.z);
-        let inside = range > NEAREST_MM && x * x + z * z <= radius * radius;
-        inside.then_some(Contact { range, normal: Vector3::new(0.0, y.signum(), 0.0) })
-    };
-    [side, cap(half_height), cap(-half_height)].into_iter().flatten().min_by(|a, b| a.range.total_cmp(&b.range))
-}
-
-/// The least root of a x² + 2 b x + c ahead of the origin that is `valid`.
-fn nearest_root(a: f64, b: f64, c: f64, valid: impl Fn(f64) -> bool) -> Option<f64> {
-    let discriminant = b * b - a * c;
-    if discriminant.is_nan() || discriminant < 0.0 || a <= 0.0 {
-        return None;
+#[inline(always)]
+fn meet_sphere<const N: usize>(o: &Triples<N>, d: &Triples<N>, radius: f64) -> Meetings<N> {
+    let (a, b, c) = (dots(d, d), dots(o, d), dots(o, o));
+    let mut ranges = [f64::INFINITY; N];
+    for i in 0..N {
+        ranges[i] = nearest_root(a[i], b[i], c[i] - radius * radius, |_| true);
     }
-    let root = discriminant.sqrt();
-    [(-b - root) / a, (-b + root) / a].into_iter().find(|&x| x > NEAREST_MM && valid(x))
+    Meetings { ranges, parts: [0; N] }
+}
+
+#[inline(always)]
+fn meet_cylinder<const N: usize>(o: &Triples<N>, d: &Triples<N>, radius: f64, half_height: f64) -> Meetings<N> {
+    let (mut ranges, mut parts) = ([f64::INFINITY; N], [SIDE; N]);
+    for i in 0..N {
+        let ([ox, oy, oz], [dx, dy, dz]) = ([o[0][i], o[1][i], o[2][i]], [d[0][i], d[1][i], d[2][i]]);
+        let beside = |range: f64| (oy + range * dy).abs() <= half_height;
+        ranges[i] = nearest_root(dx * dx + dz * dz, ox * dx + oz * dz, ox * ox + oz * oz - radius * radius, beside);
+        for (part, y) in [(HIGH_CAP, half_height), (LOW_CAP, -half_height)] {
+            let range = (y - oy) / dy;
+            let (x, z) = (ox + range * dx, oz + range * dz);
+            let nearer = (range > NEAREST_MM) & (x * x + z * z <= radius * radius) & (range < ranges[i]);
+            ranges[i] = if nearer { range } else { ranges[i] };
+            parts[i] = if nearer { part } else { parts[i] };
+        }
+    }
+    Meetings { ranges, parts }
+}
+
+/// The least root of a x² + 2 b x + c ahead of the origin that is `valid`; infinite where there is none.
+#[inline(always)]
+fn nearest_root(a: f64, b: f64, c: f64, valid: impl Fn(f64) -> bool) -> f64 {
+    // Of a negative number the root is none, and fails every comparison.
+    let root = (b * b - a * c).sqrt();
+    let [first, second] = [(-b - root) / a, (-b + root) / a];
+    let holds = |range: f64| (a > 0.0) & (range > NEAREST_MM) & valid(range);
+    let second = if holds(second) { second } else { f64::INFINITY };
+    if holds(first) { first } else { second }
 }

@@ -180,12 +180,20 @@ impl Sheet {
         if from_behind {
             return BACK;
         }
-        let middle = self.centre().mm();
-        let (x, y) = (place[0] + middle.x, place[1] + middle.y);
+        let from_origin = || {
+            let middle = self.centre().mm();
+            (place[0] + middle.x, place[1] + middle.y)
+        };
         let is_black = match self {
             Self::Checkerboard(target) => target.is_black(place),
-            Self::Tags(grid) => grid.is_black(x, y),
-            Self::Markers(board) => board.is_black(x, y),
+            Self::Tags(grid) => {
+                let (x, y) = from_origin();
+                grid.is_black(x, y)
+            }
+            Self::Markers(board) => {
+                let (x, y) = from_origin();
+                board.is_black(x, y)
+            }
         };
         if is_black { BLACK } else { WHITE }
     }

@@ -10,8 +10,10 @@ use vergence_vision::{Angle, Camera, Length, Transform};
 use crate::blur::spread;
 use crate::lens::{Lens, LensRays};
 use crate::optics::{normals, unit_pair};
+use crate::packet::LANES;
 use crate::render::lattice;
-use crate::target::BACKDROP;
+use crate::sheet_edges::{Board, lights};
+use crate::target::{BACK, BACKDROP, BLACK, WHITE};
 use crate::texture::Rgb;
 use crate::texture_noise::mix64;
 use crate::{Optics, Sheet, Target};
@@ -49,7 +51,7 @@ pub fn photograph_sheet(view: &SheetView<'_>, seed: u64) -> GrayImage {
         let tone = tones[y * width + x];
         if is_edge(&tones, width, x, y) && tone.exposure > 0.0 {
             let lattice = Lattice { places: &places, hash: mix64(mix64(seed) ^ (y * width + x) as u64) };
-            let sum = lattice.offsets().map(|offset| cells.light(&plane, [x as u32, y as u32], offset)).sum::<f32>();
+            let sum = cells.sum(&plane, [x as u32, y as u32], &lattice);
             light[y * width + x] = [(sum + tone.light) / (places.len() + 1) as f32 * tone.exposure];
         }
     }
@@ -98,19 +100,27 @@ struct Plane {
     middle: [f64; 2],
     sheet_from_camera: Matrix3<f64>,
     camera_at: Vector3<f64>,
+    /// Where it is a chessboard.
+    board: Option<Board>,
 }
 
 impl Plane {
     fn of(view: &SheetView<'_>) -> Self {
         let sheet_from_camera = view.camera_from_sheet.inverse();
-        let middle = view.sheet.centre().mm();
-        Self {
-            sheet: view.sheet,
-            half: view.sheet.size().map(|side| 0.5 * side.mm()),
-            middle: [middle.x, middle.y],
-            sheet_from_camera: sheet_from_camera.rotation().to_rotation_matrix().into_inner(),
-            camera_at: sheet_from_camera.origin().mm(),
-        }
+        let (centre, camera_at) = (view.sheet.centre().mm(), sheet_from_camera.origin().mm());
+        let (middle, half) = ([centre.x, centre.y], view.sheet.size().map(|side| 0.5 * side.mm()));
+        let sheet_from_camera = sheet_from_camera.rotation().to_rotation_matrix().into_inner();
+        let board = match view.sheet {
+            Sheet::Checkerboard(target) => Some(Board {
+                target,
+                half,
+                middle,
+                from: [camera_at, sheet_from_camera.column(2).into()],
+                lights: [BACKDROP, BACK, BLACK, WHITE].map(luminance),
+            }),
+            Sheet::Tags(_) | Sheet::Markers(_) => None,
+        };
+        Self { sheet: view.sheet, half, middle, sheet_from_camera, camera_at, board }
     }
 
     /// The light that comes along a ray, `ray` in the frame of the sheet, from the pupil at `shift_mm` on the axis.
@@ -170,6 +180,26 @@ impl<'a> Cells<'a> {
             exposure: node[4] as f32,
             spot: node[5] as f32,
         })
+    }
+
+    /// The sum of the light of some rays through a pixel.
+    fn sum(&self, plane: &Plane, at: [u32; 2], lattice: &Lattice<'_>) -> f32 {
+        let index = (at[1] / CELL) as usize * self.across + (at[0] / CELL) as usize;
+        let (Some(board), Some(series)) = (&plane.board, &self.series[index]) else {
+            return lattice.offsets().map(|offset| self.light(plane, at, offset)).sum();
+        };
+        let series = series.map(|node| [node[0], node[1], node[2], node[3]]);
+        let [left, top] = at.map(|pixel| f64::from(pixel % CELL) - 0.5 * f64::from(CELL - 1));
+        let (mut sum, mut count, mut places) = (0.0, 0, [[0.0; LANES]; 2]);
+        for [u, v] in lattice.offsets() {
+            (places[0][count], places[1][count]) = (left + u, top + v);
+            count += 1;
+            if count == LANES {
+                sum = lights(board, &series, &places).iter().fold(sum, |sum, light| sum + light);
+                count = 0;
+            }
+        }
+        lights(board, &series, &places).iter().take(count).fold(sum, |sum, light| sum + light)
     }
 
     /// The light of one ray through a pixel; none comes from outside the field.

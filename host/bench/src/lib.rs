@@ -1,7 +1,7 @@
 //! Measures this program beside others (OpenCV, SciPy, ONNX Runtime, QEMU) on the same work.
 //!
 //! Each kind of work has a module: [`busy`] code and the [`firmware`] on the simulated chip, [`calibrate`] with chessboards,
-//! right matches of simulated pairs ([`matching`]), [`networks`] for a pair of images, and [`vision`] for arrays of points.
+//! right matches of simulated pairs ([`matching`]), pairs that follow one another ([`live`]), [`networks`] for a pair of images, and [`vision`] for arrays of points.
 //! Functions return figures, which also say themselves in words and as JSON, and print nothing; the caller passes the clock
 //! in. A peer that is missing on this machine is a sentence in the result, not an error.
 
@@ -9,6 +9,7 @@ pub mod busy;
 pub mod calibrate;
 mod error;
 pub mod firmware;
+pub mod live;
 pub mod matching;
 pub mod networks;
 pub mod peer;

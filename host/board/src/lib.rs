@@ -35,9 +35,9 @@ pub use firmware::{
 };
 pub use line_speed::{SpeedChange, change_line_speed};
 pub use link::{
-    BoardKnowledge, Client, Followed, Follower, HostClock, LinkError, LostAxis, ManagementLink, OpenError, OpenWire,
-    Port, PortLock, ReaderMark, RepeatedStop, Told, Wire, describe_port, fresh_session, is_candidate, is_held,
-    is_st_link, is_wanted, open, send_stop, serial_ports, stop_beside,
+    BoardKnowledge, BoardNews, Client, Followed, Follower, HostClock, LinkError, LostAxis, ManagementLink, OpenError,
+    OpenWire, Port, PortLock, ReaderMark, RepeatedStop, Told, Wire, describe_port, fresh_session, is_candidate,
+    is_held, is_st_link, is_wanted, open, send_stop, serial_ports, stop_beside,
 };
 pub use link_figures::{LinkFigures, LinkLosses};
 pub use listening::{Listening, Source, reach_again};

@@ -36,6 +36,11 @@ impl Lens {
         Self(LensParameters::from_array((self.parameters() + delta).into()))
     }
 
+    /// The lens of the parameters alone: see [`LensParameters::polynomial`].
+    pub fn polynomial(&self) -> Self {
+        Self(self.0.polynomial())
+    }
+
     /// The camera with these parameters, its field cut to where they are still a lens.
     pub fn camera(&self, like: &KannalaBrandt) -> Result<KannalaBrandt, InvalidLens> {
         match self.0.camera(like.theta_max(), like.size()) {

@@ -1,7 +1,7 @@
 //! Camera and rig files of other programs: text in, cameras out, and back.
 //!
 //! [`Recognised::of`] names the format of a text, [`read`] makes a [`ForeignRig`] of it: cameras with their models, and where they are if the
-//! file says so. [`ForeignCamera::lens`] gives the lens that this program computes with, and how far it is off; [`ForeignRig::pair`] two
+//! file says so. [`ForeignCamera::lens`] gives the lens that this program computes with; [`ForeignRig::pair`] two
 //! cameras with `left_from_right`. [`write()`] prints a camera or a pair in another program's format.
 //!
 //! What is understood only in part is refused with the reason. A model is taken from what the file states, never from what would fit.

@@ -1,8 +1,8 @@
 //! Cameras read from a file of another program, and the choice of one or two of them.
 
 use vergence_vision::{
-    Base, Camera, CameraModel, Central, Formula, ImageSize, InvalidLens, KannalaBrandt, Left, LensFit, OpenCvFisheye,
-    Pixel, Right, SightRegion, Transform, fit_lens,
+    Base, Camera, CameraModel, Central, Formula, ImageSize, InvalidLens, KannalaBrandt, Left, LensFit, NoFit,
+    OpenCvFisheye, Pixel, Right, SightRegion, Transform, fit_lens, model_of,
 };
 
 use crate::{ExchangeError, Format};
@@ -32,9 +32,6 @@ pub struct ForeignRig {
     pub cameras: Vec<ForeignCamera>,
 }
 
-/// A lens in place of another that is off by more than this, in pixels, is told to be bad.
-const TOLERABLE_PX: f64 = 1.0;
-
 /// Two cameras and where one is relative to the other.
 #[derive(Debug)]
 pub struct ForeignPair<'a> {
@@ -56,25 +53,31 @@ impl ForeignCamera {
         Self { base_from_camera, ..self }
     }
 
-    /// The lens that this program computes with in its place, and how far it is off.
+    /// The lens of this camera, computed by its own model, and how far the polynomial that comes nearest is off that.
     ///
     /// # Errors
-    /// [`ExchangeError::Fit`].
+    /// [`ExchangeError::Fit`] where no polynomial comes near.
     pub fn lens(&self) -> Result<LensFit, ExchangeError> {
         let region = SightRegion { size: self.size, outline: &self.outline };
-        fit_lens(self.model.as_ref(), region).map_err(|fit| ExchangeError::Fit { camera: self.name.clone(), fit })
+        let fail = |fit| ExchangeError::Fit { camera: self.name.clone(), fit };
+        let fit = fit_lens(self.model.as_ref(), region).map_err(fail)?;
+        if self.model.as_kannala_brandt().is_some() {
+            return Ok(fit);
+        }
+        let values = self.model.parameters().into_iter().map(|parameter| (parameter.name, parameter.value)).collect();
+        let model = model_of(self.model.name(), &values).map_err(|lens| fail(NoFit::Lens(lens)))?;
+        Ok(LensFit { lens: fit.lens.computed_by(model, 1.0), ..fit })
     }
 
-    /// How far the lens in place of the camera is off, in words; `None` where it is the camera itself.
+    /// By which model the camera is computed, and how far the nearest polynomial is off that, in words; `None` of a camera of this program's
+    /// own model.
     #[must_use]
     pub fn remark(&self, fit: &LensFit) -> Option<String> {
         let LensFit { rms_px, largest_px, largest_at, .. } = *fit;
-        let bad =
-            if largest_px > TOLERABLE_PX { "; that is much: calibrate it with this program for better" } else { "" };
         self.model.as_kannala_brandt().is_none().then(|| {
             format!(
-                "{} has the {} model: the lens in its place is {rms_px:.3} px rms off it, {largest_px:.3} px at most, at {largest_at:.1} \
-                 from the axis{bad}",
+                "{} has the {} model and is computed by it; the polynomial lens that stands for it where other programs or a calibration \
+                 change it is {rms_px:.3} px rms off it, {largest_px:.3} px at most, at {largest_at:.1} from the axis",
                 self.name,
                 self.model.name()
             )

@@ -128,9 +128,23 @@ fn cameras_that_mrcal_solved_are_read() {
             let seen = camera.model.project(&sight.ray).expect("a ray of the camera");
             Some((seen.u - pixel.u).hypot(seen.v - pixel.v))
         };
-        let off: Vec<f64> = pixels.filter_map(back).collect();
+        let off: Vec<f64> = pixels.clone().filter_map(back).collect();
         let fit = camera.lens().expect("a lens");
-        println!("{name}: {} pixels; our lens {:.2} px rms, {:.2} px at most", off.len(), fit.rms_px, fit.largest_px);
+        // The lens is that spline itself, in its field, and no polynomial in its place.
+        let apart = pixels.filter_map(|pixel| {
+            let ours = fit.lens.unproject::<Camera>(pixel).ok()?;
+            Some((ours.vector() - camera.model.unproject(pixel).expect("a ray of the camera").ray.vector()).norm())
+        });
+        let apart: Vec<f64> = apart.collect();
+        let most = apart.iter().copied().fold(0.0, f64::max);
+        println!(
+            "{name}: {} pixels; our lens {most:.1e} rad off at {}; a polynomial {:.2} px rms, {:.2} px at most",
+            off.len(),
+            apart.len(),
+            fit.rms_px,
+            fit.largest_px
+        );
+        assert!(apart.len() > 200 && most < 1e-9, "{name}: {most} rad at {}", apart.len());
         assert!(off.len() > 200 && off.iter().all(|off| *off < 1e-6), "{name}: {off:?}");
     }
 }

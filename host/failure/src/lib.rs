@@ -10,7 +10,9 @@ mod files;
 mod live;
 mod models;
 mod output;
+mod panel;
 mod plausibility;
+mod recording;
 mod reproduce;
 mod sim;
 

@@ -12,6 +12,8 @@ mod error;
 mod live_loop;
 mod measure;
 mod orders;
+mod pace;
+mod posed;
 mod tour;
 
 use std::time::Duration;
@@ -21,6 +23,8 @@ pub use error::LiveError;
 pub use live_loop::{Ended, Limits, LiveLoop, LiveResult, MatchingTime, Totals};
 pub use measure::{Measurement, PosedExposure, measure};
 pub use orders::{HOME, homing_orders};
+pub use pace::{Limit, Pace};
+pub use posed::{Posed, READINGS, pose};
 pub use tour::Tour;
 
 /// Returns the time since some fixed instant, always the real one: by it the loop tells how long matching takes.

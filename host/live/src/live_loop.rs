@@ -7,28 +7,21 @@ use std::time::Duration;
 
 use tokio::sync::mpsc::Receiver;
 use tokio::time::{Instant, interval, sleep, sleep_until};
-use vergence_board::{BoardKnowledge, HostClock, LostAxis, Told};
+use vergence_board::{BoardKnowledge, HostClock};
 use vergence_camera::{CameraEvent, PendingImage};
 use vergence_matching::Matcher;
-use vergence_pipeline::limits::FLICKER_COUNTS;
-use vergence_pipeline::{
-    Ambiguity, Exposed, ExposedImage, Exposures, Method, Motion, Observation, PairPose, PoseMemory, Search, SkipReason,
-    TimeBase, UntoldAxes, pair_exposure,
-};
+use vergence_pipeline::{Ambiguity, Exposed, Exposures, Method, Observation, PoseMemory, Search, SkipReason, TimeBase};
 use vergence_protocol::TriggerMark;
-use vergence_rig::{BoardInstant, JointTrack, Joints, Rig, StampedImage, TrackGap};
+use vergence_rig::{Rig, StampedImage};
 use vergence_vision::Side;
 
 use crate::blindness::Blindness;
 use crate::measure::{Measurement, PosedExposure, measure};
+use crate::posed::{Posed, READINGS, pose};
 use crate::{Clock, LiveError};
 
 /// How often overdue images and pulses are given up.
 const SETTLE: Duration = Duration::from_millis(20);
-/// Longest wait for the encoder readings of an exposure.
-const READINGS: Duration = Duration::from_millis(300);
-/// Encoder readings this long before and after an exposure are kept with it, in microseconds.
-const MARGIN_US: f64 = 250_000.0;
 
 /// When the loop ends without being interrupted.
 #[derive(Clone, Copy, Debug, Default)]
@@ -125,15 +118,6 @@ type Work = Pin<Box<dyn Future<Output = (f64, Result<Measurement, NoResult>)>>>;
 enum NoResult {
     Skipped(SkipReason),
     Failed(LiveError),
-}
-
-impl From<TrackGap> for NoResult {
-    fn from(gap: TrackGap) -> Self {
-        Self::Skipped(match gap {
-            TrackGap::NotYet => SkipReason::EncodersSilent,
-            _ => SkipReason::EncodersUnknown,
-        })
-    }
 }
 
 impl LiveLoop {
@@ -303,58 +287,18 @@ fn host_middle(exposed: &Exposed<PendingImage>) -> f64 {
 
 /// The exposure with its pose, as soon as the encoder readings that cover it have come.
 async fn posed(
-    exposed: Exposed<PendingImage>,
+    mut exposed: Exposed<PendingImage>,
     rig: &Rig,
     board: Option<&BoardKnowledge>,
 ) -> Result<PosedExposure, NoResult> {
-    let images = match exposed {
-        Exposed::Pair(images) => images,
-        Exposed::One { side, image, why } => return Ok(PosedExposure::One { side, image, why }),
-    };
-    let middles = images.each_ref().map(|image| image.middle);
-    let exposure = pair_exposure(rig, middles);
-    let Some(board) = board else {
-        let pose = PairPose::in_motion(rig, Motion::Fixed, exposure)?;
-        return Ok(PosedExposure::Pair(images, Box::new(pose)));
-    };
-    let (first, last) = (middles[0].us.min(middles[1].us), middles[0].us.max(middles[1].us));
     let patience = Instant::now() + READINGS;
     loop {
-        let track = board.track_between(first - MARGIN_US, last + MARGIN_US);
-        match PairPose::in_motion(rig, Motion::Read(track.clone()), exposure) {
-            Ok(pose) => {
-                return match board.told_at(first) {
-                    Told::All => Ok(PosedExposure::Pair(images, Box::new(pose))),
-                    Told::AllBut(lost) => untold(images, &track, &lost),
-                    Told::Nothing => Err(NoResult::Skipped(SkipReason::EncodersUnknown)),
-                };
-            }
-            Err(TrackGap::NotYet) if Instant::now() < patience => {
-                sleep_until(Instant::now() + Duration::from_millis(2)).await;
-            }
-            Err(gap) => return Err(gap.into()),
-        }
+        exposed = match pose(exposed, rig, board) {
+            Posed::Ready(posed) => return Ok(posed),
+            Posed::Skipped(reason) => return Err(NoResult::Skipped(reason)),
+            Posed::NotYet(exposed) if Instant::now() < patience => exposed,
+            Posed::NotYet(_) => return Err(NoResult::Skipped(SkipReason::EncodersSilent)),
+        };
+        sleep_until(Instant::now() + Duration::from_millis(2)).await;
     }
-}
-
-/// The exposure of a rig that stands, with the last readings of the axes that no encoder tells.
-fn untold(
-    images: Box<[ExposedImage<PendingImage>; 2]>,
-    track: &JointTrack,
-    lost: &[LostAxis],
-) -> Result<PosedExposure, NoResult> {
-    const BEFORE_US: f64 = 5_000.0;
-    let middle = images[0].middle;
-    let before = track.at(BoardInstant { us: middle.us - BEFORE_US, ..middle })?;
-    let mut joints = track.at(middle)?;
-    let axes: Vec<usize> = lost.iter().map(|lost| lost.axis).collect();
-    let readings = before.counts.iter().zip(&joints.counts).enumerate();
-    let mut told = readings.filter(|(index, _)| !axes.contains(index));
-    if told.any(|(_, (before, now))| (now - before).abs() > FLICKER_COUNTS) {
-        return Err(NoResult::Skipped(SkipReason::EncodersUnknown));
-    }
-    for lost in lost {
-        joints.counts.iter_mut().skip(lost.axis).take(1).for_each(|counts| *counts = f64::from(lost.last.0));
-    }
-    Ok(PosedExposure::Untold(images, UntoldAxes { joints, axes }))
 }

@@ -5,12 +5,16 @@
 //! a quadratic fit. To spread them, the strongest corner of every cell of the view is taken first, then the second, and
 //! so on.
 
+use std::ops::Range;
+
 use image::GrayImage;
+use multiversion::multiversion;
 use rayon::prelude::*;
 use vergence_vision::{Camera, KannalaBrandt, Pixel};
 
 use crate::ViewPixel;
 use crate::plane::{Plane, Pyramid};
+use crate::smoothing::Gaussian;
 
 /// A position that is compared.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -46,12 +50,25 @@ const FIELD_MARGIN: f64 = 8.0;
 /// Detects at most `budget` corners that `compared` accepts, sorted by rows. Half of the budget is for the finest
 /// level, a quarter for the next, and so on.
 pub(crate) fn detect(pyramid: &Pyramid, budget: usize, compared: impl Fn(&Keypoint) -> bool + Sync) -> Vec<Keypoint> {
+    let height = pyramid.levels().first().map_or(0, Plane::height);
+    detect_within(pyramid, 0..height, budget, compared)
+}
+
+/// The same within some rows of the view.
+pub(crate) fn detect_within(
+    pyramid: &Pyramid,
+    rows: Range<usize>,
+    budget: usize,
+    compared: impl Fn(&Keypoint) -> bool + Sync,
+) -> Vec<Keypoint> {
     let levels = pyramid.levels();
     let mut keypoints = Vec::with_capacity(budget);
     for (level, plane) in levels.iter().enumerate() {
         let share = budget >> (level + 1).min(levels.len() - 1);
-        let found: Vec<Corner> =
-            maxima(&response(plane), level).into_par_iter().filter(|corner| compared(&corner.keypoint)).collect();
+        let found: Vec<Corner> = maxima(plane, rows.start >> level..(rows.end >> level) + 1, level)
+            .into_par_iter()
+            .filter(|corner| compared(&corner.keypoint))
+            .collect();
         keypoints.extend(spread(found, share).iter().map(|corner| corner.keypoint));
     }
     keypoints.sort_by(|p, q| p.at.y.total_cmp(&q.at.y).then(p.at.x.total_cmp(&q.at.x)).then(p.level.cmp(&q.level)));
@@ -82,47 +99,70 @@ pub fn image_corners(image: &GrayImage, camera: &KannalaBrandt, most: usize) -> 
         .collect()
 }
 
-/// The harmonic mean det/trace of the structure tensor at each pixel.
-fn response(plane: &Plane) -> Plane {
+/// The harmonic mean det/trace of the structure tensor at each pixel of some rows.
+fn response(plane: &Plane, rows: Range<usize>) -> Plane {
     let (width, height) = (plane.width(), plane.height());
-    let product = |of: fn(f32, f32) -> f32| {
-        plane
-            .like(|y, out| {
-                if y == 0 || y + 1 == height {
-                    return;
-                }
-                let (above, row, below) = (plane.row(y - 1), plane.row(y), plane.row(y + 1));
-                for x in 1..width - 1 {
-                    out[x] = of(0.5 * (row[x + 1] - row[x - 1]), 0.5 * (below[x] - above[x]));
-                }
-            })
-            .blurred(INTEGRATION_SIGMA)
+    let mut values = vec![0.0; width * rows.len()];
+    let products = |y: usize, rows: [&mut [f32]; 3]| match (1..height.saturating_sub(1)).contains(&y) {
+        true => gradient_products([plane.row(y - 1), plane.row(y), plane.row(y + 1)], rows),
+        false => rows.into_iter().for_each(|row| row.fill(0.0)),
     };
-    let (xx, xy, yy) = (product(|gx, _| gx * gx), product(|gx, gy| gx * gy), product(|_, gy| gy * gy));
-    plane.like(|y, out| {
-        for (x, o) in out.iter_mut().enumerate() {
-            let (a, b, c) = (xx.at(x, y), xy.at(x, y), yy.at(x, y));
-            *o = (a * c - b * b) / (a + c).max(f32::MIN_POSITIVE);
-        }
-    })
+    let smoothing = Gaussian::new(INTEGRATION_SIGMA);
+    let count = rows.len();
+    smoothing.smooth([width, height], rows, &mut values, products, harmonic_means);
+    Plane::new(width, count, values)
 }
 
-/// Finds the maxima of a response within [`SUPPRESSION_RADIUS`], sorted by rows.
-fn maxima(response: &Plane, level: usize) -> Vec<Corner> {
+/// The products of the central differences in a row, by columns first, by rows, and both; 0 at the ends.
+#[multiversion(targets("x86_64+avx2"))]
+fn gradient_products([above, row, below]: [&[f32]; 3], [xx, xy, yy]: [&mut [f32]; 3]) {
+    for products in [&mut *xx, &mut *xy, &mut *yy] {
+        products.first_mut().into_iter().for_each(|first| *first = 0.0);
+        products.last_mut().into_iter().for_each(|last| *last = 0.0);
+    }
+    let inner = row.len().saturating_sub(2);
+    let (above, below, left, right) = (&above[1..][..inner], &below[1..][..inner], &row[..inner], &row[2..][..inner]);
+    let (xx, xy, yy) = (&mut xx[1..][..inner], &mut xy[1..][..inner], &mut yy[1..][..inner]);
+    for x in 0..inner {
+        let (gx, gy) = (0.5 * (right[x] - left[x]), 0.5 * (below[x] - above[x]));
+        (xx[x], xy[x], yy[x]) = (gx * gx, gx * gy, gy * gy);
+    }
+}
+
+#[multiversion(targets("x86_64+avx2"))]
+fn harmonic_means([xx, xy, yy]: [&[f32]; 3], out: &mut [f32]) {
+    let (xx, xy, yy) = (&xx[..out.len()], &xy[..out.len()], &yy[..out.len()]);
+    for x in 0..out.len() {
+        let (a, b, c) = (xx[x], xy[x], yy[x]);
+        out[x] = (a * c - b * b) / (a + c).max(f32::MIN_POSITIVE);
+    }
+}
+
+/// Finds the maxima of the response within [`SUPPRESSION_RADIUS`] in `rows` of a level, sorted by rows. The outermost rows have none.
+fn maxima(plane: &Plane, rows: Range<usize>, level: usize) -> Vec<Corner> {
     const R: usize = SUPPRESSION_RADIUS;
-    let rows = R..response.height().saturating_sub(R);
-    rows.into_par_iter()
-        .flat_map_iter(|y| (R..response.width() - R).filter_map(move |x| maximum_at(response, x, y, level)))
-        .collect()
+    let around = rows.start.saturating_sub(R)..(rows.end + R).min(plane.height());
+    let (top, response) = (around.start, response(plane, around));
+    let inner = R..response.width().saturating_sub(R);
+    let in_row = |y: usize| {
+        let (above, here, below) = (response.row(y - 1), response.row(y), response.row(y + 1));
+        // Most pixels are no maximum already beside these.
+        let is_candidate = |x: &usize| {
+            let (x, centre) = (*x, here[*x]);
+            let beside = here[x + 1] <= centre && here[x - 1] < centre;
+            beside && centre >= LEAST_STRENGTH && below[x] <= centre && above[x] < centre
+        };
+        let found = inner.clone().filter(is_candidate);
+        found.filter_map(|x| maximum_at(&response, (x, y), level, top)).collect::<Vec<_>>()
+    };
+    (R..response.height().saturating_sub(R)).into_par_iter().flat_map_iter(in_row).collect()
 }
 
-/// The corner at (x, y), if the response is largest there and the quadratic through its neighbours peaks nearby.
-fn maximum_at(response: &Plane, x: usize, y: usize, level: usize) -> Option<Corner> {
+/// The corner at (x, y), if the response is largest there and the quadratic through its neighbours peaks nearby. The first row of the
+/// response is row `top` of the level.
+fn maximum_at(response: &Plane, (x, y): (usize, usize), level: usize, top: usize) -> Option<Corner> {
     const R: usize = SUPPRESSION_RADIUS;
     let centre = response.at(x, y);
-    if centre < LEAST_STRENGTH {
-        return None;
-    }
     // Of equal neighbours the first by rows counts as the maximum.
     let beaten = (y - R..=y + R).flat_map(|j| (x - R..=x + R).map(move |i| (i, j))).any(|(i, j)| {
         let other = response.at(i, j);
@@ -139,7 +179,7 @@ fn maximum_at(response: &Plane, x: usize, y: usize, level: usize) -> Option<Corn
     let (dx, dy) = ((hxy * gy - hyy * gx) / det, (hxy * gx - hxx * gy) / det);
     let scale = (1_usize << level) as f64;
     (det > 0.0 && dx.abs() <= 1.0 && dy.abs() <= 1.0).then_some(Corner {
-        keypoint: Keypoint { at: ViewPixel { x: (x as f64 + dx) * scale, y: (y as f64 + dy) * scale }, level },
+        keypoint: Keypoint { at: ViewPixel { x: (x as f64 + dx) * scale, y: ((top + y) as f64 + dy) * scale }, level },
         strength: centre,
     })
 }

@@ -27,6 +27,8 @@ const TOGETHER: usize = 16;
 const SAME_PLACE: usize = 5;
 /// Largest distance of a repetition from the row, in pixels of the level.
 const ROWS: usize = 1;
+/// Rows of the level that are prepared beside those that are asked for: partners lie that far off the row.
+const BESIDE: usize = 16;
 
 /// The values of the window around a pixel, by rows.
 type Window = [f32; SIDE * SIDE];
@@ -42,8 +44,19 @@ pub(crate) struct Surroundings<'a> {
 impl<'a> Surroundings<'a> {
     /// Prepares a view; `None` where it is too small to have the level.
     pub(crate) fn of(pyramid: &'a Pyramid) -> Option<Self> {
+        Self::within(pyramid, 0..usize::MAX)
+    }
+
+    /// Prepares some rows of a view. In the others nothing is found to repeat.
+    pub(crate) fn within(pyramid: &'a Pyramid, rows: Range<usize>) -> Option<Self> {
         let plane = pyramid.levels().get(LEVEL)?;
-        Some(Self { plane, inverse_norm: plane.like(|y, out| inverse_norms(plane, y, out)) })
+        let rows = (rows.start >> LEVEL).saturating_sub(BESIDE)..(rows.end >> LEVEL).saturating_add(BESIDE);
+        let prepare = |y: usize, out: &mut [f32]| {
+            if rows.contains(&y) {
+                inverse_norms(plane, y, out)
+            }
+        };
+        Some(Self { plane, inverse_norm: plane.like(prepare) })
     }
 
     /// Whether no other position between the columns `from` and `to`, in the row of `at`, shows the same pattern as

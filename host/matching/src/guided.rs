@@ -1,9 +1,8 @@
 //! The classical matcher: corners, gradient histograms compared inside the epipolar band, and registration.
 
 use rayon::prelude::*;
-use vergence_vision::{Angle, Frame};
+use vergence_vision::Angle;
 
-use crate::View;
 use crate::corners::{self, Keypoint};
 use crate::descriptor::Descriptor;
 use crate::epipolar_band::EpipolarBand;
@@ -53,10 +52,9 @@ impl Matcher for GuidedMatcher {
     fn find(&self, pair: &ImagePair<'_>) -> Result<Matches, MatchError> {
         pair.check()?;
         let views = SharedViews::of(pair, self.oversampling)?;
-        let seen = self.features(&views);
-        let matches = matched(&views, &seen, pair.pose_sigma);
-        let fewer = seen[0].keypoints.len().min(seen[1].keypoints.len()) as f64;
-        if matches.pairs.len() as f64 >= SUSPICIOUSLY_FEW * fewer {
+        let (pyramids, seen) = self.features(&views);
+        let matches = matched(&views, &pyramids, &seen, pair.pose_sigma);
+        if !are_suspiciously_few(&matches) {
             return Ok(matches);
         }
         let links = compare(&seen[0], &seen[1], &views.band_for(ANY_POSE));
@@ -67,7 +65,8 @@ impl Matcher for GuidedMatcher {
         let Some(pose) = pose_instead(&candidates, &views, pair) else { return Ok(matches) };
         let turned = ImagePair { left_from_right: pose, ..*pair };
         let views = SharedViews::of(&turned, self.oversampling)?;
-        Ok(matched(&views, &self.features(&views), pair.pose_sigma))
+        let (pyramids, seen) = self.features(&views);
+        Ok(matched(&views, &pyramids, &seen, pair.pose_sigma))
     }
 }
 
@@ -79,30 +78,46 @@ impl GuidedMatcher {
     pub fn candidates(&self, pair: &ImagePair<'_>) -> Result<Vec<Match>, MatchError> {
         pair.check()?;
         let views = SharedViews::of(pair, self.oversampling)?;
-        let [left, right] = self.features(&views);
+        let (_, [left, right]) = self.features(&views);
         let links = compare(&left, &right, &views.band());
         Ok(in_originals(&links, &views, &left.keypoints, right.keypoints.len()).pairs)
     }
 
-    fn features(&self, views: &SharedViews<'_>) -> [Features; 2] {
-        [
-            Features::of(&views.left, self.keypoints, |keypoint| views.shared_from_left(keypoint)),
-            Features::of(&views.right, self.keypoints, |keypoint| views.shared_from_right(keypoint)),
-        ]
+    fn features(&self, views: &SharedViews<'_>) -> ([Pyramid; 2], [Features; 2]) {
+        let pyramids = [views.left.plane(), views.right.plane()].map(|plane| Pyramid::new(plane, LEVELS));
+        let [left, right] = &pyramids;
+        let seen = [
+            corners::detect(left, self.keypoints, |keypoint| views.shared_from_left(keypoint)),
+            corners::detect(right, self.keypoints, |keypoint| views.shared_from_right(keypoint)),
+        ];
+        let [in_left, in_right] = seen;
+        let features = [Features::of(left, in_left), Features::of(right, in_right)];
+        (pyramids, features)
     }
 }
 
+/// Whether so few keypoints found a partner that the stated pose may be wrong by degrees.
+pub(crate) fn are_suspiciously_few(matches: &Matches) -> bool {
+    let fewer = matches.left_keypoints.min(matches.right_keypoints) as f64;
+    (matches.pairs.len() as f64) < SUSPICIOUSLY_FEW * fewer
+}
+
 /// Matches the features of both views and applies all tests.
-fn matched(views: &SharedViews<'_>, [left, right]: &[Features; 2], pose_sigma: Angle) -> Matches {
+fn matched(
+    views: &SharedViews<'_>,
+    pyramids: &[Pyramid; 2],
+    [left, right]: &[Features; 2],
+    pose_sigma: Angle,
+) -> Matches {
     let band = views.band();
     let compared = Compared {
-        left: &left.pyramid,
-        right: &right.pyramid,
+        left: &pyramids[0],
+        right: &pyramids[1],
         keypoints: &left.keypoints,
         oversampling: views.oversampling(),
     };
     let mut links = compare(left, right, &band);
-    register(&mut links, &compared, &band, None);
+    register(&mut links, &compared, &band, false);
     agree_on_pose(&mut links, &left.keypoints, &views.grid, pose_sigma);
     Rows::of(&compared).drop_repeated(&mut links, &left.keypoints, &band);
     thin(&mut links, &left.keypoints);
@@ -111,23 +126,21 @@ fn matched(views: &SharedViews<'_>, [left, right]: &[Features; 2], pose_sigma: A
 }
 
 /// The keypoints of one view with their descriptors.
-struct Features {
-    pyramid: Pyramid,
+pub(crate) struct Features {
     /// Sorted by rows.
-    keypoints: Vec<Keypoint>,
+    pub keypoints: Vec<Keypoint>,
     descriptors: Vec<Descriptor>,
 }
 
 impl Features {
-    fn of<F: Frame>(view: &View<F>, budget: usize, shared: impl Fn(&Keypoint) -> bool + Sync) -> Self {
-        let pyramid = Pyramid::new(view.plane(), LEVELS);
-        let keypoints = corners::detect(&pyramid, budget, shared);
+    /// Describes keypoints that are sorted by rows.
+    pub(crate) fn of(pyramid: &Pyramid, keypoints: Vec<Keypoint>) -> Self {
         let describe = |keypoint: &Keypoint| {
             let scale = (1_usize << keypoint.level) as f64;
             Descriptor::at(&pyramid.levels()[keypoint.level], keypoint.at.x / scale, keypoint.at.y / scale)
         };
         let descriptors = keypoints.par_iter().map(describe).collect();
-        Self { pyramid, keypoints, descriptors }
+        Self { keypoints, descriptors }
     }
 
     /// Indices of the keypoints within `reach` rows of y.
@@ -170,7 +183,7 @@ fn nearest(
 }
 
 /// Links every left keypoint to its most similar right one, if the choice is mutual.
-fn compare(left: &Features, right: &Features, band: &EpipolarBand) -> Links {
+pub(crate) fn compare(left: &Features, right: &Features, band: &EpipolarBand) -> Links {
     let tolerance = |keypoint: &Keypoint| KEYPOINT_TOLERANCE * (1_usize << keypoint.level) as f64;
     let allowed = |l: &Keypoint, r: &Keypoint| band.allows(l.at, r.at, tolerance(l));
     let reach = band.reach(KEYPOINT_TOLERANCE);

@@ -6,7 +6,8 @@
 //!
 //! A [`Matcher`] takes an [`ImagePair`] and returns [`Matches`], with a reason for every dropped keypoint.
 //! [`GuidedMatcher`] is the classical one: corners, gradient histograms compared inside the epipolar band, then
-//! least-squares registration. [`learned::LearnedMatcher`] uses pre-trained networks of the LightGlue family instead.
+//! least-squares registration. [`learned::LearnedMatcher`] uses pre-trained networks of the LightGlue family instead, and
+//! [`TrackingMatcher`] follows what it found in the pairs before, for a live rig.
 //!
 //! Terms: a *keypoint* is a position that is compared; a *descriptor* is a vector that describes its surroundings; the
 //! *disparity* a_L − a_R is the parallax along a row; the *level* counts halvings of a view's resolution.
@@ -35,6 +36,8 @@ mod refine;
 mod shared_field;
 mod shared_frame;
 mod shared_views;
+mod smoothing;
+mod track;
 mod view;
 mod wrong_pose;
 
@@ -46,5 +49,6 @@ pub use grid::{Grid, ViewPixel};
 pub use guided::GuidedMatcher;
 pub use matcher::{ImagePair, Match, MatchError, Matcher, Matches, UnmatchedReason};
 pub use shared_frame::{Shared, SharedFrame};
+pub use track::TrackingMatcher;
 pub use vergence_vision::Side;
 pub use view::View;

@@ -1,5 +1,7 @@
 //! Links: the partners of the left keypoints in the right view, and the tests that drop them.
 
+use std::ops::Range;
+
 use rayon::prelude::*;
 use vergence_vision::Angle;
 
@@ -11,7 +13,7 @@ use crate::match_errors::Evidence;
 use crate::matcher::{Match, Matches, UnmatchedReason};
 use crate::neighbours::{self, PlacedMatch};
 use crate::plane::Pyramid;
-use crate::refine;
+use crate::refine::{self, Unregistered};
 use crate::shared_views::SharedViews;
 use crate::{Grid, ViewPixel};
 
@@ -25,16 +27,29 @@ pub(crate) struct Link {
     pub sigma: [f64; 2],
     /// What its registration showed; `None` without one.
     pub evidence: Option<Evidence>,
+    /// Whether the registration is good to a small part of a pixel.
+    pub registered: bool,
     /// Distance from the epipolar plane of the pose on which the matches agree, in standard deviations.
     pub off_plane: f64,
     /// Probability that the link is right.
     pub right_probability: f64,
+    /// The track that it continues or begins.
+    pub track: Option<u64>,
 }
 
 impl Link {
     /// A link whose right position is a keypoint.
     pub(crate) const fn of_keypoints(right: ViewPixel, score: f64, sigma: [f64; 2]) -> Self {
-        Self { right, score, sigma, evidence: None, off_plane: 0.0, right_probability: score }
+        Self {
+            right,
+            score,
+            sigma,
+            evidence: None,
+            registered: false,
+            off_plane: 0.0,
+            right_probability: score,
+            track: None,
+        }
     }
 }
 
@@ -61,20 +76,13 @@ const EPIPOLAR_SIGMAS: f64 = 3.0;
 
 /// Replaces the right position of every link by the registered one, and drops links that the pose does not allow.
 ///
-/// A link that cannot be registered is dropped, or with `unregistered` given, kept with these standard deviations in
-/// pixels of the view if its score is high enough.
-pub(crate) fn register(
-    links: &mut Links,
-    compared: &Compared<'_>,
-    band: &EpipolarBand,
-    unregistered: Option<[f64; 2]>,
-) {
+/// A link that cannot be registered is dropped, or with `keep_unregistered` kept if its score is high enough: where its registration ended, or
+/// where it was.
+pub(crate) fn register(links: &mut Links, compared: &Compared<'_>, band: &EpipolarBand, keep_unregistered: bool) {
     links.par_iter_mut().zip(compared.keypoints).for_each(|(link, keypoint)| {
-        *link = link.and_then(|start| {
-            match (registered(compared, keypoint.at, start.right, keypoint.level, band), unregistered) {
-                (Err(reason), Some(sigma)) if stays(reason, &start) => Ok(Link { sigma, ..start }),
-                (outcome, _) => outcome,
-            }
+        *link = link.and_then(|start| match registered(compared, keypoint.at, start.right, keypoint.level, band) {
+            Err(failed) if keep_unregistered => unregistered(&start, keypoint.at, &failed, compared, band),
+            outcome => outcome.map_err(|failed| failed.reason),
         });
     });
 }
@@ -82,30 +90,52 @@ pub(crate) fn register(
 /// Registers the right view around `start` to the left view at `left`, from `level` down to the finest.
 ///
 /// # Errors
-/// The reason why the result is dropped.
+/// Why the result is not good to a small part of a pixel, with the result where there is one.
 pub(crate) fn registered(
     compared: &Compared<'_>,
     left: ViewPixel,
     start: ViewPixel,
     level: usize,
     band: &EpipolarBand,
-) -> Result<Link, UnmatchedReason> {
+) -> Result<Link, Unregistered> {
     let found = refine::register([compared.left, compared.right], left, start, level)?;
     if !band.allows(left, found.right, REGISTERED_TOLERANCE) {
-        return Err(UnmatchedReason::Epipolar);
+        return Err(UnmatchedReason::Epipolar.into());
     }
     let shortening = band.shortening(left);
     let [along, across] = found.evidence.sigma(compared.oversampling, shortening);
     Ok(Link {
         evidence: Some(found.evidence),
+        registered: true,
         ..Link::of_keypoints(found.right, found.correlation, [along, across * shortening])
     })
 }
 
-/// Whether a match that could not be registered is kept. On rendered pairs 90 % of these are right, but little more
-/// than half of those where registration diverges or leaves the epipolar band.
-fn stays(reason: UnmatchedReason, link: &Link) -> bool {
-    !matches!(reason, UnmatchedReason::NotRefined | UnmatchedReason::Epipolar) && link.score >= LEAST_UNREGISTERED_SCORE
+/// The link of a network whose registration `failed`, if its score is high enough: where that ended, which is nearer to the truth than the
+/// keypoints that networks place on whole pixels, or where it was. On rendered pairs little more than half of those are right where
+/// registration diverges or leaves the epipolar band: they are dropped.
+///
+/// # Errors
+/// Why it is dropped.
+fn unregistered(
+    start: &Link,
+    left: ViewPixel,
+    failed: &Unregistered,
+    compared: &Compared<'_>,
+    band: &EpipolarBand,
+) -> Result<Link, UnmatchedReason> {
+    let Unregistered { reason, ended } = *failed;
+    let is_hopeless = matches!(reason, UnmatchedReason::NotRefined | UnmatchedReason::Epipolar);
+    if is_hopeless || start.score < LEAST_UNREGISTERED_SCORE {
+        return Err(reason);
+    }
+    let Some(ended) = ended else { return Ok(*start) };
+    if !band.allows(left, ended.right, REGISTERED_TOLERANCE) {
+        return Err(UnmatchedReason::Epipolar);
+    }
+    let shortening = band.shortening(left);
+    let [along, across] = ended.evidence.unregistered_sigma(compared.oversampling, shortening);
+    Ok(Link { right: ended.right, evidence: Some(ended.evidence), sigma: [along, across * shortening], ..*start })
 }
 
 /// Drops links off the epipolar planes of the pose on which most links agree.
@@ -142,6 +172,12 @@ pub(crate) struct Rows<'a>(Option<[Surroundings<'a>; 2]>);
 impl<'a> Rows<'a> {
     pub(crate) fn of(compared: &Compared<'a>) -> Self {
         Self(Surroundings::of(compared.left).zip(Surroundings::of(compared.right)).map(<[_; 2]>::from))
+    }
+
+    /// Both views prepared in some of their rows.
+    pub(crate) fn within(compared: &Compared<'a>, rows: &Range<usize>) -> Self {
+        let [left, right] = [compared.left, compared.right].map(|view| Surroundings::within(view, rows.clone()));
+        Self(left.zip(right).map(<[_; 2]>::from))
     }
 
     /// Drops links whose pattern a view repeats within the range of possible partners.
@@ -218,5 +254,6 @@ fn original(views: &SharedViews<'_>, keypoint: &Keypoint, link: &Link) -> Result
     let right = right_view.original(link.right).map_err(|_| UnmatchedReason::NotRefined)?;
     let turns = link.sigma.map(|sigma| Angle::from_rad(sigma / left_view.grid().pixels_per_radian()));
     let sigma = views.pixel_sigma(turns, [left, right]).ok_or(UnmatchedReason::NotRefined)?;
-    Ok(Match { left, right, sigma, score: link.right_probability as f32, registered: link.evidence.is_some() })
+    let (score, registered) = (link.right_probability as f32, link.registered);
+    Ok(Match { left, right, sigma, score, registered, track: link.track })
 }

@@ -1,9 +1,9 @@
 //! How far a match may be off, and how probably it is wrong, from what its registration and the matches around it show.
 //!
-//! The errors of matches have a core and tails. The standard deviations are those of the core; a few per cent of the matches are off by
-//! more than three of them: windows that show two surfaces. What shows these is counted into a probability by logistic regression (D.
-//! Cox, J. R. Stat. Soc. B 20(2), 1958), and the least probable matches are dropped. All numbers were fitted to rendered pairs, see
-//! docs/measured/matching.md.
+//! The errors of matches have a core and tails: a few per cent of the matches are off by more than three standard deviations of the core,
+//! windows that show two surfaces. What shows these is counted into a probability by logistic regression (D. Cox, J. R. Stat. Soc. B
+//! 20(2), 1958), and the least probable matches are dropped. The others state the standard deviation of the mixture of core and tail, so
+//! that it is larger where a match is less probably right. All numbers were fitted to rendered pairs, see docs/measured/matching.md.
 
 use rayon::prelude::*;
 use vergence_vision::median;
@@ -23,7 +23,8 @@ pub(crate) struct Evidence {
     pub residual: f64,
     /// Stretch or shear along the row, the larger of both.
     pub steepness: f64,
-    /// Distance between the keypoint and the result of registering to the right view and back, in pixels of the view.
+    /// Distance between the keypoint and the result of registering to the right view and back, in pixels of the view; infinite where the way back
+    /// was not found.
     pub way_back: f64,
     /// The warp that was found.
     pub warp: Warp,
@@ -40,6 +41,12 @@ impl Evidence {
             let from_residuals = ERROR_FACTORS[i] * repeated * noise * self.from_residuals[i];
             from_residuals.hypot(SMALLEST_SIGMAS[i] * oversampling).hypot(BY_WAY_BACK[i] * self.way_back)
         })
+    }
+
+    /// The same for a registration that is not good to a small part of a pixel.
+    pub(crate) fn unregistered_sigma(&self, oversampling: f64, shortening: f64) -> [f64; 2] {
+        let repeated = (oversampling / shortening.max(SHORTEST)).sqrt();
+        [0, 1].map(|i| (UNREGISTERED_FACTORS[i] * repeated * self.from_residuals[i]).hypot(SMALLEST_UNREGISTERED[i]))
     }
 }
 
@@ -66,46 +73,89 @@ const FARTHEST_DEPARTURE: f64 = 1.0;
 /// steepness, squared distance from the epipolar plane in standard deviations, of which up to four count, and logarithm of the sum of the
 /// departures and 0.05.
 const REGISTERED: [f64; 5] = [4.43, -0.86, -1.7, -0.18, -0.53];
+/// Squared errors of matches that are wrong, over the variances of the core: those of the fit that were within a pixel of the image, without
+/// which a match would state nothing of its tail.
+const WRONG: f64 = 28.0;
+/// What is left of the core's standard deviations along the row and across it where [`WRONG`] counts as well.
+const CORE: [f64; 2] = [0.85, 0.8];
 /// Matches that are more probably wrong than right are dropped. On real photographs many that are right have less than 0.9.
 const LEAST_PROBABILITY: f64 = 0.5;
 
-/// Standard deviations of the position of an unregistered match along the row and across it, in pixels of the view: networks place
-/// keypoints on whole pixels of both views.
-pub(crate) const UNREGISTERED_SIGMA: [f64; 2] = [0.8, 0.8];
-/// As [`OFF_SURFACE`], for unregistered matches, of which some are wrong.
-const UNREGISTERED_OFF: (f64, f64) = (0.7, 20.0);
-/// The probability that an unregistered match is right: constant, and factor of the logarithm of the odds that the networks state.
-const UNREGISTERED: [f64; 2] = [2.0, 0.4];
+/// Standard deviations of the position of an unregistered match whose registration did not converge, along the row and across it, in pixels
+/// of the view: networks place keypoints on whole pixels of both views.
+pub(crate) const UNREGISTERED_SIGMA: [f64; 2] = [1.2, 0.8];
+/// As [`ERROR_FACTORS`], where a registration ended that is not good to a small part of a pixel, and the smallest standard deviations there, in
+/// pixels of the view. These errors have long tails: the standard deviations are such that 95 % are within two.
+const UNREGISTERED_FACTORS: [f64; 2] = [3.4, 1.7];
+const SMALLEST_UNREGISTERED: [f64; 2] = [0.15, 0.1];
+/// As [`OFF_SURFACE`], for matches where their registration ended, and at keypoints.
+const ENDED_OFF: (f64, f64) = (0.18, 3.0);
+const KEYPOINTS_OFF: (f64, f64) = (0.7, 20.0);
+/// As [`FARTHEST_DEPARTURE`], for unregistered matches.
+const FARTHEST_UNREGISTERED_DEPARTURE: f64 = 2.0;
+/// Logistic regression of the probability that a match is right where its registration ended: constant, logarithm of the odds that the
+/// networks state, distance from the epipolar plane in pixels of the view, and logarithm of its residual over the median one.
+const WHERE_ENDED: [f64; 4] = [4.1, 0.11, -1.3, -1.34];
+/// The largest such distance that counts.
+const FARTHEST_OFF_PLANE: f64 = 1.5;
+/// The same at keypoints: constant, and factor of the logarithm of the odds.
+const AT_KEYPOINTS: [f64; 2] = [1.2, 0.4];
+/// Less probable unregistered matches are dropped: they are off by so much that no standard deviation for all of them would hold.
+const LEAST_UNREGISTERED_PROBABILITY: f64 = 0.93;
 
-/// Completes the standard deviations and states the probability of each link, from the links and the windows around it. Registered links
-/// that are probably wrong are dropped.
+/// Completes the standard deviations and states the probability of each link, from the links and the windows around it. Links
+/// that are too probably wrong are dropped.
 pub(crate) fn state_errors(links: &mut Links, compared: &Compared<'_>, band: &EpipolarBand) {
     let mut off = vec![0.0; links.len()];
     let linked = off.iter_mut().zip(links.iter()).filter(|(_, link)| link.is_ok());
     linked.zip(off_surface(&placed(links, compared.keypoints))).for_each(|((off, _), found)| *off = found);
-    let residuals = links.iter().flatten().filter_map(|link| Some(link.evidence?.residual)).collect();
-    let usual = median(residuals).unwrap_or_default();
+    let residuals = |links: &[&Link]| median(links.iter().filter_map(|link| Some(link.evidence?.residual)).collect());
+    let all: Vec<&Link> = links.iter().flatten().collect();
+    let registered: Vec<&Link> = all.iter().copied().filter(|link| link.registered).collect();
+    let usual = residuals(&registered).or_else(|| residuals(&all)).unwrap_or_default();
     links.par_iter_mut().zip(compared.keypoints).zip(off).for_each(|((link, keypoint), off)| {
         *link = link.and_then(|mut link| {
-            let part = |(factor, farthest): (f64, f64)| factor * off.min(farthest);
-            let Some(evidence) = link.evidence else {
-                link.sigma[0] = link.sigma[0].hypot(part(UNREGISTERED_OFF));
-                link.right_probability = unregistered_probability(&link);
-                return Ok(link);
-            };
-            let mut departures = departures([compared.left, compared.right], keypoint.at, &evidence.warp)
-                .map(|departure| departure.min(FARTHEST_DEPARTURE));
+            let evidence = link.evidence;
+            let mut departures = evidence
+                .map_or([0.0; 4], |evidence| departures([compared.left, compared.right], keypoint.at, &evidence.warp));
             departures.sort_by(f64::total_cmp);
+            let Some(evidence) = evidence.filter(|_| link.registered) else {
+                return state_unregistered(link, usual, off, departures[2], band.shortening(keypoint.at));
+            };
+            let departures = departures.map(|departure| departure.min(FARTHEST_DEPARTURE));
             link.right_probability = registered_probability(&link, &evidence, usual, departures.iter().sum());
             if link.right_probability < LEAST_PROBABILITY {
                 return Err(UnmatchedReason::TwoSurfaces);
             }
             let [along, across] = BY_DEPARTURE.map(|part| part * departures[2]);
-            link.sigma[0] = link.sigma[0].hypot(part(OFF_SURFACE)).hypot(along);
+            link.sigma[0] = link.sigma[0].hypot(OFF_SURFACE.0 * off.min(OFF_SURFACE.1)).hypot(along);
             link.sigma[1] = link.sigma[1].hypot(across * band.shortening(keypoint.at));
+            let with_tail = with_tail(link.right_probability);
+            link.sigma = [0, 1].map(|i| CORE[i] * with_tail * link.sigma[i]);
             Ok(link)
         });
     });
+}
+
+/// The standard deviations and the probability of a link without registration, `off` the surface around it, whose windows beside it depart by
+/// `departure`.
+fn state_unregistered(
+    mut link: Link,
+    usual: f64,
+    off: f64,
+    departure: f64,
+    shortening: f64,
+) -> Result<Link, UnmatchedReason> {
+    let off_plane = (link.off_plane * link.sigma[1]).min(FARTHEST_OFF_PLANE);
+    link.right_probability = unregistered_probability(&link, usual, off_plane);
+    if link.right_probability < LEAST_UNREGISTERED_PROBABILITY {
+        return Err(UnmatchedReason::Doubtful);
+    }
+    let (factor, farthest) = if link.evidence.is_some() { ENDED_OFF } else { KEYPOINTS_OFF };
+    let [along, across] = BY_DEPARTURE.map(|part| part * departure.min(FARTHEST_UNREGISTERED_DEPARTURE));
+    link.sigma[0] = link.sigma[0].hypot(factor * off.min(farthest)).hypot(along);
+    link.sigma[1] = link.sigma[1].hypot(across * shortening);
+    Ok(link)
 }
 
 fn registered_probability(link: &Link, evidence: &Evidence, usual: f64, departures: f64) -> f64 {
@@ -117,10 +167,22 @@ fn registered_probability(link: &Link, evidence: &Evidence, usual: f64, departur
     logistic(constant + shown + by_departures * departed)
 }
 
-fn unregistered_probability(link: &Link) -> f64 {
-    let [constant, by_odds] = UNREGISTERED;
+/// How much larger the standard deviation of a match is than that of its core, by the probability that it is right: that of the mixture
+/// of both.
+fn with_tail(right: f64) -> f64 {
+    (right + (1.0 - right) * WRONG).sqrt()
+}
+
+fn unregistered_probability(link: &Link, usual: f64, off_plane: f64) -> f64 {
     let score = link.score.clamp(1e-6, 1.0 - 1e-6);
-    logistic(constant + by_odds * (score / (1.0 - score)).ln())
+    let odds = (score / (1.0 - score)).ln();
+    let Some(evidence) = link.evidence else {
+        let [constant, by_odds] = AT_KEYPOINTS;
+        return logistic(constant + by_odds * odds);
+    };
+    let [constant, by_odds, by_distance, by_residual] = WHERE_ENDED;
+    let residual = (evidence.residual / usual.max(f64::MIN_POSITIVE)).max(0.1).ln();
+    logistic(constant + by_odds * odds + by_distance * off_plane + by_residual * residual)
 }
 
 fn logistic(x: f64) -> f64 {

@@ -8,11 +8,13 @@ use vergence_vision::{
 };
 
 /// A matcher: finds the pixels of scene points that both images of a pair show.
+///
+/// What it finds depends on the pair alone, but for [`crate::TrackingMatcher`], which follows what it found in the pairs before.
 pub trait Matcher: Send + Sync {
     /// A short name for logs and reports.
     fn name(&self) -> &str;
 
-    /// Finds the matches of `pair`, in an order that depends on the pair alone. Images without texture give no matches,
+    /// Finds the matches of `pair`, in an order that depends on the input alone. Images without texture give no matches,
     /// which is not an error.
     ///
     /// # Errors
@@ -48,12 +50,15 @@ pub struct Match {
     pub left: Pixel,
     /// Pixel of the match in the right image.
     pub right: Pixel,
-    /// Standard deviations of both pixels where the match is right, along the epipolar curve and across it.
+    /// Standard deviations of both pixels, along the epipolar curve and across it. A match that is less probably right states larger ones.
     pub sigma: MatchSigma,
-    /// Probability from 0 to 1 that the match is right: that its parallax is off by at most three of its standard deviations.
+    /// Probability from 0 to 1 that the match is right: that its parallax is off by at most three standard deviations of such matches,
+    /// which are smaller than the stated ones of a match that may be wrong.
     pub score: f32,
-    /// Whether the position was registered, to a small part of a pixel; else it is that of a keypoint.
+    /// Whether the position was registered, to a small part of a pixel; else its standard deviation is larger.
     pub registered: bool,
+    /// The number of the track that shows the same place in the pairs before; `None` by a matcher that does not follow places.
+    pub track: Option<u64>,
 }
 
 impl Match {
@@ -105,6 +110,8 @@ pub enum UnmatchedReason {
     Duplicate,
     /// The windows in which it was registered probably show two surfaces: residuals, neighbouring windows and epipolar plane disagree.
     TwoSurfaces,
+    /// A match of a network that could not be registered, and is wrong with a probability of 7 % or more.
+    Doubtful,
 }
 
 impl UnmatchedReason {
@@ -124,6 +131,7 @@ impl UnmatchedReason {
             Self::Isolated => "isolated",
             Self::Duplicate => "duplicate",
             Self::TwoSurfaces => "two_surfaces",
+            Self::Doubtful => "doubtful",
         }
     }
 }

@@ -2,6 +2,8 @@
 
 use rayon::prelude::*;
 
+use crate::smoothing::Gaussian;
+
 /// An image of one floating-point value per pixel, by rows.
 #[derive(Clone, Debug)]
 pub(crate) struct Plane {
@@ -44,30 +46,31 @@ impl Plane {
     }
 
     /// Convolves with a Gaussian of `sigma` pixels; the border is repeated outwards.
+    #[cfg(test)]
     pub(crate) fn blurred(&self, sigma: f32) -> Self {
-        let kernel = gaussian(sigma);
-        let radius = kernel.len() / 2;
-        let across = self.like(|y, out| {
-            let row = self.row(y);
-            let padded: Vec<f32> =
-                (0..self.width + 2 * radius).map(|i| row[i.saturating_sub(radius).min(self.width - 1)]).collect();
-            for (k, weight) in kernel.iter().enumerate() {
-                out.iter_mut().zip(&padded[k..]).for_each(|(o, v)| *o += weight * v);
-            }
-        });
-        across.like(|y, out| {
-            for (k, weight) in kernel.iter().enumerate() {
-                let from = across.row((y + k).saturating_sub(radius).min(self.height - 1));
-                out.iter_mut().zip(from).for_each(|(o, v)| *o += weight * v);
-            }
-        })
+        self.smoothed(&Gaussian::new(sigma), 1, Vec::new())
     }
 
-    /// Takes every second pixel of every second row: position (x, y) comes from (2x, 2y).
-    fn decimated(&self) -> Self {
-        let (width, height) = (self.width.div_ceil(2), self.height.div_ceil(2));
-        let values = (0..height).flat_map(|y| self.row(2 * y).iter().step_by(2).copied()).collect();
-        Self { width, height, values }
+    /// Takes every pixel of every row that `step` divides, smoothed as they are beside each other: position (x, y) comes from (step x,
+    /// step y). The values go to `buffer`.
+    fn smoothed(&self, gaussian: &Gaussian, step: usize, mut buffer: Vec<f32>) -> Self {
+        let (width, height) = (self.width.div_ceil(step), self.height.div_ceil(step));
+        buffer.resize(width * height, 0.0);
+        let source = |y: usize, [row]: [&mut [f32]; 1]| {
+            let from = self.row(step * y);
+            match step {
+                1 => row.copy_from_slice(from),
+                _ => row.iter_mut().zip(from.iter().step_by(step)).for_each(|(to, from)| *to = *from),
+            }
+        };
+        let finish = |[row]: [&[f32]; 1], out: &mut [f32]| out.copy_from_slice(row);
+        gaussian.smooth([width, height], 0..height, &mut buffer, source, finish);
+        Self { width, height, values: buffer }
+    }
+
+    /// The memory of the values, to be used again.
+    pub(crate) fn into_values(self) -> Vec<f32> {
+        self.values
     }
 
     /// Interpolates `N` values in row y, at the columns x, x + step and so on, by cubic convolution. The step is
@@ -146,16 +149,27 @@ impl Pyramid {
 
     /// Makes at most `levels` levels of `plane`, fewer where it is small.
     pub(crate) fn new(plane: &Plane, levels: usize) -> Self {
+        Self::in_buffers(plane, levels, &mut Vec::new())
+    }
+
+    /// The same in memory that is taken from `buffers`.
+    pub(crate) fn in_buffers(plane: &Plane, levels: usize, buffers: &mut Vec<Vec<f32>>) -> Self {
+        let gaussian = Gaussian::new(Self::SIGMA);
         let mut pyramid: Vec<Plane> = Vec::with_capacity(levels);
         while pyramid.len() < levels {
-            let coarser = pyramid.last().map(Plane::decimated);
-            let next = coarser.as_ref().unwrap_or(plane);
-            if next.width.min(next.height) < Self::SMALLEST {
+            let (finer, step) = pyramid.last().map_or((plane, 1), |finer| (finer, 2));
+            if finer.width.min(finer.height).div_ceil(step) < Self::SMALLEST {
                 break;
             }
-            pyramid.push(next.blurred(Self::SIGMA));
+            pyramid.push(finer.smoothed(&gaussian, step, buffers.pop().unwrap_or_default()));
         }
         Self { levels: pyramid }
+    }
+
+    /// Gives the memory of all levels back.
+    pub(crate) fn recycle(self, buffers: &mut Vec<Vec<f32>>) {
+        // The largest is taken first again.
+        buffers.extend(self.levels.into_iter().rev().map(Plane::into_values));
     }
 
     /// The levels, finest first.
@@ -170,14 +184,6 @@ impl Pyramid {
 pub(crate) fn cubic_weights(t: f32) -> [f32; 4] {
     let (t2, t3) = (t * t, t * t * t);
     [0.5 * (2.0 * t2 - t3 - t), 0.5 * (3.0 * t3 - 5.0 * t2 + 2.0), 0.5 * (4.0 * t2 - 3.0 * t3 + t), 0.5 * (t3 - t2)]
-}
-
-/// The weights of a normalised Gaussian, cut off at three sigma.
-fn gaussian(sigma: f32) -> Vec<f32> {
-    let radius = (3.0 * sigma).ceil() as i32;
-    let weights: Vec<f32> = (-radius..=radius).map(|i| (-0.5 * (i as f32 / sigma).powi(2)).exp()).collect();
-    let sum: f32 = weights.iter().sum();
-    weights.iter().map(|w| w / sum).collect()
 }
 
 #[cfg(test)]

@@ -27,6 +27,21 @@ pub(crate) struct Registered {
     pub evidence: Evidence,
 }
 
+/// A registration that is not good to a small part of a pixel.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Unregistered {
+    /// Why it is not.
+    pub reason: UnmatchedReason,
+    /// Where it ended all the same; `None` where it did not converge.
+    pub ended: Option<Registered>,
+}
+
+impl From<UnmatchedReason> for Unregistered {
+    fn from(reason: UnmatchedReason) -> Self {
+        Self { reason, ended: None }
+    }
+}
+
 const ITERATIONS: usize = 20;
 /// Length of a step, in pixels, that ends the iteration.
 const CONVERGED: f64 = 0.01;
@@ -44,18 +59,18 @@ const LARGEST_LOOP: f64 = 0.15;
 /// finest.
 ///
 /// # Errors
-/// The reason why the result is dropped.
+/// Why the result is not good to a small part of a pixel, with the result where there is one.
 pub(crate) fn register(
     [left_levels, right_levels]: [&Pyramid; 2],
     left: ViewPixel,
     right: ViewPixel,
     level: usize,
-) -> Result<Registered, UnmatchedReason> {
+) -> Result<Registered, Unregistered> {
     let mut warp = Warp { tx: right.x - left.x, ty: right.y - left.y, ..Warp::default() };
     let mut fit = Fit { warp, correlation: 0.0, sigmas: [f64::INFINITY; 2], residual: f64::INFINITY };
     for level in (0..=level).rev() {
         let (Some(from), Some(to)) = (left_levels.levels().get(level), right_levels.levels().get(level)) else {
-            return Err(UnmatchedReason::NotRefined);
+            return Err(UnmatchedReason::NotRefined.into());
         };
         let scale = (1_usize << level) as f64;
         let at = ViewPixel { x: left.x / scale, y: left.y / scale };
@@ -63,23 +78,26 @@ pub(crate) fn register(
         warp = fit.warp.scaled(scale);
     }
     if fit.correlation < LEAST_CORRELATION {
-        return Err(UnmatchedReason::LowCorrelation);
-    }
-    if fit.sigmas[0] > LARGEST_SIGMA {
-        return Err(UnmatchedReason::Uncertain);
+        return Err(UnmatchedReason::LowCorrelation.into());
     }
     let right = ViewPixel { x: left.x + warp.tx, y: left.y + warp.ty };
     let (Some(from), Some(to)) = (right_levels.levels().first(), left_levels.levels().first()) else {
-        return Err(UnmatchedReason::NotRefined);
+        return Err(UnmatchedReason::NotRefined.into());
     };
-    let back = align(from, to, right, warp.inverse()).map_err(|_| UnmatchedReason::NotReversible)?.warp;
-    let way_back = (back.tx + warp.tx).hypot(back.ty + warp.ty);
-    if way_back > LARGEST_LOOP {
-        return Err(UnmatchedReason::NotReversible);
-    }
     let steepness = warp.sx.abs().max(warp.sy.abs());
-    let evidence = Evidence { from_residuals: fit.sigmas, residual: fit.residual, steepness, way_back, warp };
-    Ok(Registered { right, correlation: fit.correlation, evidence })
+    let ended = |way_back: f64| {
+        let evidence = Evidence { from_residuals: fit.sigmas, residual: fit.residual, steepness, way_back, warp };
+        Registered { right, correlation: fit.correlation, evidence }
+    };
+    if fit.sigmas[0] > LARGEST_SIGMA {
+        return Err(Unregistered { reason: UnmatchedReason::Uncertain, ended: Some(ended(f64::INFINITY)) });
+    }
+    let way_back = align(from, to, right, warp.inverse())
+        .map_or(f64::INFINITY, |back| (back.warp.tx + warp.tx).hypot(back.warp.ty + warp.ty));
+    if way_back > LARGEST_LOOP {
+        return Err(Unregistered { reason: UnmatchedReason::NotReversible, ended: Some(ended(way_back)) });
+    }
+    Ok(ended(way_back))
 }
 
 /// Distance of the windows beside a match from its own, in pixels of the view: most of what they show is the same surface.
@@ -112,7 +130,8 @@ struct Fit {
 /// Registers `image` to the window of `template` around `at`, starting with the warp `start`.
 #[multiversion(targets("x86_64+avx2"))]
 fn align(template: &Plane, image: &Plane, at: ViewPixel, start: Warp) -> Result<Fit, UnmatchedReason> {
-    let window = Window::new(&surroundings(template, at).ok_or(UnmatchedReason::NotRefined)?);
+    let mut window = Window::empty();
+    window.fill(&surroundings(template, at).ok_or(UnmatchedReason::NotRefined)?);
     let inverse = window.normal_matrix().cholesky().ok_or(UnmatchedReason::Uncertain)?.inverse();
     let mut warp = start;
     for _ in 0..ITERATIONS {

@@ -6,6 +6,7 @@ use crate::corners::Keypoint;
 use crate::epipolar_band::EpipolarBand;
 use crate::matcher::{ImagePair, MatchError};
 use crate::shared_field::SharedField;
+use crate::view::Buffers;
 use crate::{Grid, SharedFrame, View, ViewPixel};
 
 /// Default density of a view in pixels per radian: small images are enlarged to it.
@@ -28,22 +29,38 @@ impl<'a> SharedViews<'a> {
     /// # Errors
     /// [`MatchError::NoBaseline`] or [`MatchError::NoSharedField`].
     pub(crate) fn of(pair: &'a ImagePair<'a>, oversampling: Option<f64>) -> Result<Self, MatchError> {
+        Self::in_buffers(pair, oversampling, None, &mut Buffers::default())
+    }
+
+    /// The same in memory that is taken from `buffers`, and on the grid of an earlier pair, if its pose was nearly this one.
+    pub(crate) fn in_buffers(
+        pair: &'a ImagePair<'a>,
+        oversampling: Option<f64>,
+        kept: Option<Grid>,
+        buffers: &mut Buffers,
+    ) -> Result<Self, MatchError> {
         let frame = SharedFrame::new(&pair.left_from_right).ok_or(MatchError::NoBaseline)?;
         let density = pair.left_camera.k()[0].max(pair.right_camera.k()[0]);
         let oversampling = oversampling.filter(|o| o.is_finite()).unwrap_or(DENSITY / density).clamp(1.0, 2.0);
         let field = SharedField::of(&frame, pair);
-        let grid = field
-            .extent()
-            .and_then(|extent| Grid::over(&extent, density * oversampling))
+        let grid = kept
+            .or_else(|| field.extent().and_then(|extent| Grid::over(&extent, density * oversampling)))
             .ok_or(MatchError::NoSharedField)?;
+        let [left, right] = [(pair.left, pair.masks[0]), (pair.right, pair.masks[1])];
         Ok(Self {
             frame,
             grid,
-            left: View::masked((pair.left, pair.masks[0]), pair.left_camera, frame.shared_from_left(), grid),
-            right: View::masked((pair.right, pair.masks[1]), pair.right_camera, frame.shared_from_right(), grid),
+            left: View::in_buffers(left, pair.left_camera, frame.shared_from_left(), grid, buffers),
+            right: View::in_buffers(right, pair.right_camera, frame.shared_from_right(), grid, buffers),
             field,
             pair,
         })
+    }
+
+    /// Gives the memory back.
+    pub(crate) fn recycle(self, buffers: &mut Buffers) {
+        self.left.recycle(buffers);
+        self.right.recycle(buffers);
     }
 
     /// The epipolar band for the uncertainty of the pair's pose.
@@ -57,6 +74,11 @@ impl<'a> SharedViews<'a> {
         let [left, right] = [self.pair.left_camera, self.pair.right_camera].map(shift);
         EpipolarBand::new(self.grid, self.frame.baseline(), self.pair.nearest, pose_sigma)
             .with_pupils(Length::from_mm(left.max(right)))
+    }
+
+    /// The uncertainty of the pair's pose.
+    pub(crate) const fn pose_sigma(&self) -> Angle {
+        self.pair.pose_sigma
     }
 
     /// Pixels of a view per pixel at the centre of the denser image.

@@ -2,7 +2,8 @@
 //!
 //! - [`match_svg`], [`depth_svg`], [`error_svg`] and [`dense_svg`] draw what was measured on the images; [`zones_svg`],
 //!   [`zones_plot`] and [`depth_field_svg`] what a rig can see and how well;
-//! - [`ply`], [`dense_ply`] and [`Table`] are clouds for other programs; [`DenseCloud`] writes all files of a dense one;
+//! - [`ply`], [`dense_ply`] and [`Table`] are clouds for other programs; [`DenseCloud`] writes all files of a dense one, [`LatestFiles`] those of
+//!   the live loop;
 //! - [`drift_warning`], [`dense_drift_warning`], [`dropped_lines`] and [`cloud_json`] say what became of a pair;
 //! - [`Sheet`] is a chessboard to print;
 //! - [`check_ending`] refuses a file name whose ending says another format.
@@ -13,6 +14,8 @@ mod cloud_report;
 mod dense_cloud;
 mod endings;
 mod error;
+mod latest_files;
+mod live_report;
 mod pictures;
 mod points;
 mod published_zones;
@@ -26,6 +29,8 @@ pub use cloud_report::{
 pub use dense_cloud::DenseCloud;
 pub use endings::{check_ending, check_folder};
 pub use error::OutputError;
+pub use latest_files::LatestFiles;
+pub use live_report::{live_cloud_json, live_cloud_words};
 pub use pictures::{
     ZonesOf, confidence_image, dense_svg, depth_field_svg, depth_svg, error_svg, match_svg, range_image, seen_by_cones,
     sigma_image, trunk_strip_svg, write_drawing, write_scored_pair, zones_plot, zones_svg,

@@ -27,6 +27,8 @@ pub struct ColouredPoint {
     pub colour: [u8; 3],
     /// The probability that the match is right, 0 to 1; 1 where the correspondences were given.
     pub score: f32,
+    /// The number of the track of this place in the pairs before, where the matcher follows places.
+    pub track: Option<u64>,
 }
 
 /// Candidates that made no point, counted by reason. The counts have different units and are never added: a left keypoint
@@ -220,7 +222,7 @@ fn cloud_of(
     let drift = pose.is_steady().then(|| pose_drift(pairs, &by_joints, &expected_drift(middle))).flatten();
     let coloured = |point: CloudPoint| {
         let colour = colour_at(left, point.pixels.left);
-        ColouredPoint { point, colour, score: 1.0 }
+        ColouredPoint { point, colour, score: 1.0, track: None }
     };
     Ok(PairCloud {
         points: points.into_iter().map(coloured).collect(),
@@ -236,10 +238,12 @@ fn cloud_of(
 }
 
 impl PairCloud {
-    /// Adds what only the matcher knows: scores, and keypoints without a match.
+    /// Adds what only the matcher knows: scores, tracks, and keypoints without a match.
     fn scored(mut self, found: Matches) -> Self {
         for point in &mut self.points {
-            point.score = found.pairs.get(point.point.pair_index).map_or(0.0, |found| found.score);
+            let found = found.pairs.get(point.point.pair_index);
+            point.score = found.map_or(0.0, |found| found.score);
+            point.track = found.and_then(|found| found.track);
         }
         self.keypoints = found.left_keypoints;
         self.dropped.keypoints = found.dropped;

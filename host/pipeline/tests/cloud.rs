@@ -42,7 +42,7 @@ impl Matcher for Known {
             let point = Point::<Left>::from_mm(nalgebra::Vector3::new(x, y, z));
             let left = self.rig.left_camera.project_point(&point).expect("in the left field");
             let right = self.rig.right_camera.project_point(&(right_from_left * point)).expect("in the right field");
-            Match { left, right, sigma: 0.2.into(), score: 0.9, registered: true }
+            Match { left, right, sigma: 0.2.into(), score: 0.9, registered: true, track: None }
         };
         let mut pairs: Vec<Match> = self.points.iter().map(placed).collect();
         if let Some(wrong) = pairs.last_mut() {

@@ -1,11 +1,13 @@
 //! Cameras as TOML: the table that rig files and camera files share.
 
+use std::collections::BTreeMap;
+
 use nalgebra::SMatrix;
 use serde::de::Error;
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
 use vergence_vision::{
-    Angle, Asymmetry, CENTRAL_PARAMETERS, ImageSize, InvalidLens, KannalaBrandt, LENS_PARAMETERS, OpenCvFisheye, Pupil,
-    Time,
+    Angle, Asymmetry, CENTRAL_PARAMETERS, ForeignModel, ImageSize, InvalidLens, KannalaBrandt, LENS_PARAMETERS,
+    OpenCvFisheye, Pupil, Time, model_of,
 };
 
 use crate::exposure::Shutter;
@@ -74,6 +76,41 @@ pub struct CameraTable {
     /// Thin prism along v, of the fourth power.
     #[serde(default, skip_serializing_if = "is_zero")]
     pub prism_s3: f64,
+    /// The model of another program by which the camera is computed. The keys above are then those of the polynomial that comes nearest,
+    /// which other programs get, and from which a calibration goes on.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub model: Option<ModelTable>,
+}
+
+/// A camera model of another program.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct ModelTable {
+    /// Its name.
+    pub name: String,
+    /// Pixels of the camera for each of the model's. If absent, 1.
+    #[serde(default = "one", skip_serializing_if = "is_one")]
+    pub scale: f64,
+    /// Its parameters, by their names in the program that it comes from.
+    pub values: BTreeMap<String, f64>,
+}
+
+const fn one() -> f64 {
+    1.0
+}
+
+#[expect(clippy::trivially_copy_pass_by_ref, reason = "serde asks for a reference")]
+fn is_one(value: &f64) -> bool {
+    *value == 1.0
+}
+
+impl ModelTable {
+    /// The table of `model`.
+    #[must_use]
+    pub fn of(model: &ForeignModel) -> Self {
+        let values = model.parameters().into_iter().map(|parameter| (parameter.name, parameter.value)).collect();
+        Self { name: model.name().to_owned(), scale: model.scale(), values }
+    }
 }
 
 #[expect(clippy::trivially_copy_pass_by_ref, reason = "serde asks for a reference")]
@@ -110,6 +147,7 @@ impl CameraTable {
             prism_s1,
             prism_s2,
             prism_s3,
+            model: camera.foreign_model().map(ModelTable::of),
         }
     }
 
@@ -142,12 +180,17 @@ impl CameraTable {
             Some(stated) => stated,
             None => lens.largest_theta(size)?,
         };
-        KannalaBrandt::from_opencv(lens, theta_max, size)?
+        let lens = KannalaBrandt::from_opencv(lens, theta_max, size)?
             .with_pupil(Pupil::from_mm([self.pupil_e0_mm, self.pupil_e1_mm]))?
             .with_asymmetry(Asymmetry {
                 tangential: [self.tangential_p1, self.tangential_p2],
                 prism: [self.prism_s0, self.prism_s1, self.prism_s2, self.prism_s3],
-            })
+            })?;
+        let Some(ModelTable { name, scale, values }) = &self.model else { return Ok(lens) };
+        if !scale.is_finite() || *scale <= 0.0 {
+            return Err(InvalidLens::OutOfRange { name: "scale", value: *scale, rule: "be positive" });
+        }
+        Ok(lens.computed_by(model_of(name, values)?, *scale))
     }
 }
 

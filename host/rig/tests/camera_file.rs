@@ -1,10 +1,11 @@
 //! Camera files of our own: every parameter of a lens survives, older files are read, and a covariance that is none is refused.
 #![allow(clippy::expect_used, reason = "a test fails loudly")]
 
-use nalgebra::SMatrix;
+use nalgebra::{SMatrix, Vector3};
 use vergence_rig::{BENCH_TOML, CalibrationTable, CameraDocument, CameraTable, Rig};
 use vergence_vision::{
-    Angle, Asymmetry, ImageSize, KannalaBrandt, LENS_PARAMETER_NAMES, LENS_PARAMETERS, OpenCvFisheye, Pupil,
+    Angle, Asymmetry, Camera, CameraModel, Central, DoubleSphere, Fisheye624, ImageSize, KannalaBrandt,
+    LENS_PARAMETER_NAMES, LENS_PARAMETERS, OpenCvFisheye, Pupil, SplineGrid, SplinedStereographic, UnitRay,
 };
 
 type Covariance = SMatrix<f64, LENS_PARAMETERS, LENS_PARAMETERS>;
@@ -52,6 +53,46 @@ fn files_without_the_new_keys_are_read() {
     let read: CameraTable = toml::from_str(&(text + "pupil_e0_mm = 2.77\n")).expect("an older file");
     assert_eq!(read.camera().expect("a lens").pupil(), Pupil::from_mm([2.77, 0.0]));
     assert!(read.camera().expect("a lens").is_symmetric());
+}
+
+/// Double sphere, FISHEYE624 and a spline: numbers that no decimal fraction is, and a table of hundreds.
+#[test]
+fn a_camera_of_another_model_is_read_as_it_was_written() {
+    let pinhole = [227.64, 226.81, 471.41, 305.55].map(|value: f64| value * (1.0 + 1e-15));
+    let grid = SplineGrid { order: 3, columns: 12, rows: 9, field_deg: 170.0 };
+    let control = (0..108).map(|index| [0.01 * f64::from(index).sin(), 0.01 * f64::from(index).cos()]).collect();
+    let fisheye = Fisheye624 { pinhole, radial: [0.1 / 3.0; 6], tangential: [1e-3 / 3.0; 2], prism: [1e-4 / 3.0; 4] };
+    let models: [Box<dyn CameraModel>; 3] = [
+        Box::new(Central::new(DoubleSphere { pinhole, xi: -0.2 / 3.0, alpha: 1.7 / 3.0 }).expect("a camera")),
+        Box::new(Central::new(fisheye).expect("a camera")),
+        Box::new(Central::new(SplinedStereographic { pinhole, grid, control }).expect("a camera")),
+    ];
+    for model in models {
+        let name = model.name();
+        let lens = lens().with_pupil(Pupil::default()).expect("no pupil").computed_by(model, 1.0);
+        let text = toml::to_string(&CameraTable::of(&lens)).expect("TOML");
+        assert!(text.contains(&format!("[model]\nname = \"{name}\"\n\n[model.values]\n")), "{text}");
+        let read = toml::from_str::<CameraTable>(&text).expect("what we wrote");
+        let back = read.camera().expect("a lens");
+        assert_eq!((back.foreign_model(), &read), (lens.foreign_model(), &CameraTable::of(&lens)), "{name}");
+        for step in 0..100 {
+            let (theta, phi) = (0.8 * f64::from(step) / 100.0, 2.4 * f64::from(step));
+            let ray = Vector3::new(theta.sin() * phi.cos(), theta.sin() * phi.sin(), theta.cos());
+            let ray = UnitRay::<Camera>::new(ray).expect("a direction");
+            assert_eq!(back.project(&ray), lens.project(&ray), "{name}");
+        }
+        let refused = |text: String, words: &str| {
+            let error = toml::from_str::<CameraTable>(&text).expect("TOML").camera().expect_err(words).to_string();
+            assert!(error.contains(words), "{error}");
+        };
+        let (camera, values) = text.split_once("[model.values]").expect("values");
+        refused(
+            camera.to_owned() + "[model.values]" + &values.replace("\ncx = ", "\ncxx = "),
+            &format!("'{name}' are not its parameters"),
+        );
+        refused(text.replace(name, "triple sphere"), "double sphere, enhanced unified");
+        refused(text.replace("[model.values]", "scale = 0.0\n[model.values]"), "scale is 0");
+    }
 }
 
 #[test]

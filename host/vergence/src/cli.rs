@@ -82,6 +82,10 @@ enum Verb {
     Depth(With<RigFileOptions, cmd::depth::Args>),
     /// Measures live: a cloud of the newest pair, again and again, at rest or in motion.
     Run(With<BoardOptions, cmd::run::Args>),
+    /// Measures a recording as `run` measured while it recorded.
+    Replay(cmd::replay::Args),
+    /// Serves a page on which people see and drive the rig.
+    Panel(With<BoardOptions, cmd::panel::Args>),
     /// Keeps pre-trained networks for matching.
     Models(cmd::models::Args),
     /// Computes how much of the surroundings both cameras, one, or none see.
@@ -106,7 +110,7 @@ pub const TASKS: &[(&str, &[&str])] = &[
     ("Set up a board", &["devices", "doctor", "config", "flash", "image", "servo"]),
     ("Calibrate", &["target", "capture", "calibrate", "camera", "rig"]),
     ("Move", &["home", "mode", "move", "plan", "stop", "arm", "disarm", "clear"]),
-    ("Measure", &["run", "depth", "zones", "models"]),
+    ("Measure", &["run", "replay", "panel", "depth", "zones", "models"]),
     ("Watch a board", &["status", "monitor", "trigger", "log", "link-test"]),
     ("Check this program", &["bench", "soak"]),
     ("Shell", &["completions", "help"]),
@@ -208,6 +212,10 @@ fn has_virtual_time(matches: &ArgMatches) -> bool {
     while let Some((_, deeper)) = inner.subcommand() {
         inner = deeper;
     }
+    // People look at a panel, and the clock of people runs.
+    if verb == "panel" || inner.try_contains_id("panel").is_ok_and(|given| given) {
+        return false;
+    }
     let port = inner.try_get_one::<String>("port").ok().flatten();
     matches!(verb, "demo" | "reproduce") || port.is_some_and(|port| port == "sim")
 }
@@ -259,8 +267,13 @@ fn execute(cli: Cli, virtual_time: bool) -> Result<(), Failure> {
             Verb::Image(args) => cmd::image::run(&args, console),
             Verb::Bench(args) => cmd::bench::run(&args, console),
             Verb::Soak(args) => cmd::soak::run(&args, console),
-            Verb::Demo(verb) => cmd::demo::run(&verb.args, &verb.options.given(), console).await,
+            Verb::Demo(verb) => match verb.args.on_a_page() {
+                Some(shown) => cmd::panel::demonstrate(shown, &verb.options.given(), console).await,
+                None => cmd::demo::run(&verb.args, &verb.options.given(), console).await,
+            },
             Verb::Run(verb) => cmd::run::run(&verb.args, &verb.options.chosen()?, console).await,
+            Verb::Replay(args) => cmd::replay::run(&args, console),
+            Verb::Panel(verb) => cmd::panel::run(&verb.args, &verb.options.chosen()?, console).await,
             Verb::Reproduce(args) => cmd::reproduce::run(&args, console).await,
             Verb::Depth(verb) => cmd::depth::run(verb.args, &verb.options.chosen()?, console).await,
             Verb::Models(args) => cmd::models::run(&args, console),

@@ -8,13 +8,14 @@
 //! ```
 //!
 //! θ is the angle to the optical axis, from 0 to beyond 90°; φ runs from x (right) to y (down). `k` is in pixels. To this come a pupil that
-//! moves ([`crate::Pupil`]) and elements off the axis ([`crate::Asymmetry`]), where a lens has them.
+//! moves ([`crate::Pupil`]) and elements off the axis ([`crate::Asymmetry`]), where a lens has them. A lens of another program's file is
+//! computed by that program's own model ([`ForeignModel`]).
 
 use std::str::FromStr;
 
 use nalgebra::Vector3;
 
-use crate::{Angle, Asymmetry, Frame, Point, Pupil, UnitRay, largest_theta};
+use crate::{Angle, Asymmetry, ForeignModel, Frame, InvalidLens, Point, Pupil, UnitRay, largest_theta};
 
 /// An image position in pixels. (0, 0) is the centre of the top-left pixel, u to the right, v down.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -84,47 +85,7 @@ pub struct KannalaBrandt {
     size: ImageSize,
     pupil: Pupil,
     asymmetry: Asymmetry,
-}
-
-/// Why a set of parameters describes no lens.
-#[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
-#[non_exhaustive]
-pub enum InvalidLens {
-    /// A parameter is infinite or not a number.
-    #[error("a camera parameter is not a finite number")]
-    NotFinite,
-    /// k1 (the focal length in pixels) or the aspect ratio is not positive.
-    #[error("focal lengths must be positive")]
-    FocalLength,
-    /// theta_max is not in (0°, 180°).
-    #[error("theta_max is {0:.2}, it must lie between 0° and 180°")]
-    ThetaMax(Angle),
-    /// The radius stops growing inside the stated field, so that a pixel there would have two rays.
-    #[error(
-        "the lens polynomial turns over at {turn:.2}, inside theta_max = {stated:.2}: reduce theta_max or recalibrate"
-    )]
-    TurnsOver {
-        /// Field angle at which dr/dθ first reaches zero.
-        turn: Angle,
-        /// The stated limit of the field.
-        stated: Angle,
-    },
-    /// A parameter of another program's model breaks a rule.
-    #[error("{name} is {value}, it must {rule}")]
-    OutOfRange {
-        /// Name of the parameter.
-        name: &'static str,
-        /// Its value.
-        value: f64,
-        /// What it must do.
-        rule: &'static str,
-    },
-    /// The image of another program's model folds over at its axis.
-    #[error("the image folds over at the optical axis: the parameters are those of no camera")]
-    FoldsAtAxis,
-    /// Decentring and thin prism are so large that two rays of the field share a pixel.
-    #[error("the tangential and prism coefficients fold the image inside theta_max: reduce theta_max or recalibrate")]
-    Folds,
+    foreign: Option<ForeignModel>,
 }
 
 /// A ray or pixel outside the lens's valid cone.
@@ -168,6 +129,7 @@ impl KannalaBrandt {
             size,
             pupil: Pupil::default(),
             asymmetry: Asymmetry::default(),
+            foreign: None,
         })
     }
 
@@ -184,13 +146,17 @@ impl KannalaBrandt {
         let centre = Pixel { u: scaled(self.centre.u), v: scaled(self.centre.v) };
         let size = ImageSize { width, height };
         let lens = Self::new(self.k.map(|k| k * scale), self.aspect, centre, Angle::from_rad(self.theta_max), size)?;
-        Ok(Self { measured: self.measured, pupil: self.pupil, asymmetry: self.asymmetry, ..lens })
+        let foreign = self.foreign.map(|model| model.scaled(scale));
+        Ok(Self { measured: self.measured, pupil: self.pupil, asymmetry: self.asymmetry, foreign, ..lens })
     }
 
     /// The same lens beyond the field in which it was measured: as far as [`largest_theta()`] says that its polynomial is of use.
-    /// [`Self::is_measured`] still tells the field in which it was measured.
+    /// [`Self::is_measured`] still tells the field in which it was measured. A lens of another program's model stays as it is.
     #[must_use]
     pub fn extrapolated(&self) -> Self {
+        if self.foreign.is_some() {
+            return *self;
+        }
         let wider = largest_theta(self.k, self.aspect, self.centre, self.size)
             .and_then(|limit| Self::new(self.k, self.aspect, self.centre, limit, self.size))
             .and_then(|wider| wider.with_asymmetry(self.asymmetry));
@@ -225,6 +191,9 @@ impl KannalaBrandt {
         if theta > self.theta_max {
             return Err(OutsideField);
         }
+        if let Some(model) = &self.foreign {
+            return model.project(ray);
+        }
         // At the axis r/rho tends to k1.
         let scale = if rho > 0.0 { radius(&self.k, theta) / rho } else { self.k[0] };
         let symmetric = Pixel { u: self.centre.u + scale * d.x, v: self.centre.v + self.aspect * scale * d.y };
@@ -245,6 +214,9 @@ impl KannalaBrandt {
     /// # Errors
     /// [`OutsideField`] beyond `theta_max`; the ray is never clamped.
     pub fn unproject<F: Frame>(&self, pixel: Pixel) -> Result<UnitRay<F>, OutsideField> {
+        if let Some(model) = &self.foreign {
+            return self.foreign_ray(model, pixel).map(|ray| ray.renamed());
+        }
         let pixel = self.without_displacement(pixel).ok_or(OutsideField)?;
         let (x, y) = (pixel.u - self.centre.u, (pixel.v - self.centre.v) / self.aspect);
         let r = x.hypot(y);
@@ -288,6 +260,10 @@ impl KannalaBrandt {
         Self { pupil, ..self }
     }
 
+    pub(crate) const fn made_foreign(self, model: Option<ForeignModel>) -> Self {
+        Self { foreign: model, ..self }
+    }
+
     pub(crate) const fn made_asymmetric(self, asymmetry: Asymmetry) -> Self {
         Self { asymmetry, ..self }
     }
@@ -296,6 +272,12 @@ impl KannalaBrandt {
     #[must_use]
     pub const fn pupil(&self) -> Pupil {
         self.pupil
+    }
+
+    /// The model of another program by which the lens is computed; `None` where it is computed by its polynomial.
+    #[must_use]
+    pub const fn foreign_model(&self) -> Option<&ForeignModel> {
+        self.foreign.as_ref()
     }
 
     /// By how much the lens is not symmetric about its axis.

@@ -64,6 +64,9 @@ impl KannalaBrandt {
     /// The derivative of the pixel by the unit vector of `ray`, in pixels per radian.
     #[must_use]
     pub fn pixel_by_ray<F: Frame>(&self, ray: &UnitRay<F>) -> Matrix2x3<f64> {
+        if let Some(derivative) = self.foreign_model().and_then(|model| model.pixel_by_ray(ray)) {
+            return derivative;
+        }
         let Local { space, image, pixels_per_radian, bend, .. } = self.local(ray);
         let along = |i: usize| image[i] * space[i].transpose() * pixels_per_radian[i];
         let mut derivative = along(0) + along(1);
@@ -77,10 +80,20 @@ impl KannalaBrandt {
     /// The derivative of the unit vector of `ray` by its pixel, in radians per pixel.
     #[must_use]
     pub fn ray_by_pixel<F: Frame>(&self, ray: &UnitRay<F>) -> Matrix3x2<f64> {
+        self.foreign_ray_by_pixel(ray).unwrap_or_else(|| self.polynomial_ray_by_pixel(ray))
+    }
+
+    /// [`Self::ray_by_pixel`] of the polynomial, of a lens that is computed by another model too.
+    pub(crate) fn polynomial_ray_by_pixel<F: Frame>(&self, ray: &UnitRay<F>) -> Matrix3x2<f64> {
         self.local(ray).ray_by_pixel(self)
     }
 
-    /// The derivative of the pixel of `ray`, whose direction stays, by the lens's parameters, in the order of [`LENS_PARAMETERS`].
+    fn foreign_ray_by_pixel<F: Frame>(&self, ray: &UnitRay<F>) -> Option<Matrix3x2<f64>> {
+        self.foreign_model().and_then(|model| model.ray_by_pixel(ray))
+    }
+
+    /// The derivative of the pixel of `ray`, whose direction stays, by the lens's parameters, in the order of [`LENS_PARAMETERS`]: those of
+    /// the polynomial, of a lens that is computed by another model too.
     #[must_use]
     pub fn pixel_by_lens<F: Frame>(&self, ray: &UnitRay<F>) -> SMatrix<f64, 2, LENS_PARAMETERS> {
         self.local(ray).pixel_by_lens(self)
@@ -90,7 +103,7 @@ impl KannalaBrandt {
     pub(crate) fn derivatives<F: Frame>(&self, ray: &UnitRay<F>) -> RayDerivatives {
         let local = self.local(ray);
         RayDerivatives {
-            ray_by_pixel: local.ray_by_pixel(self),
+            ray_by_pixel: self.foreign_ray_by_pixel(ray).unwrap_or_else(|| local.ray_by_pixel(self)),
             pixel_by_lens: local.pixel_by_lens(self),
             origin_by_ray: local.space[0].transpose() * self.pupil().slope_mm(local.theta),
             origin_by_pupil: Pupil::by_coefficients(Angle::from_rad(local.theta)),

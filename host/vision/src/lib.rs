@@ -5,7 +5,8 @@
 //! - [`KannalaBrandt`] unprojects pixels to rays and projects rays to pixels, past 90°, with a pupil that moves and elements
 //!   off the axis; [`OpenCvFisheye`] holds the
 //!   parameters of other programs;
-//! - [`CameraModel`] is what the camera models of other programs have in common with it, and [`fit_lens`] makes a lens of any of them;
+//! - [`CameraModel`] is what the camera models of other programs have in common with it; [`fit_lens`] makes a lens that comes near any of
+//!   them, and [`KannalaBrandt::computed_by`] one that is computed by the model itself;
 //! - [`ray_to_plane`] and [`dihedral`] measure how well two rays agree with the cameras' relative pose;
 //! - [`pseudo_intersection`] makes a point of two rays, and [`covariance()`] gives its uncertainty;
 //! - [`PointUncertainty`] adds the uncertainty that all points of a pair share, from lenses and pose;
@@ -28,9 +29,11 @@ mod cloud;
 mod covariance;
 mod epipolar;
 mod foreign;
+mod foreign_model;
 mod frames;
 mod gates;
 mod import;
+mod invalid_lens;
 mod kannala_brandt;
 mod lens_derivatives;
 mod lens_field;
@@ -59,12 +62,14 @@ pub use epipolar::{dihedral, ray_to_plane};
 pub use foreign::{
     CameraModel, Central, DoubleSphere, Eucm, Fisheye624, Formula, LensFit, Mei, ModelParameter, NoFit, OCam,
     ParameterUnit, Pinhole, Radtan, Sight, SightRegion, SplineFit, SplineGrid, SplinedStereographic, fit_lens,
-    fit_spline,
+    fit_spline, model_of,
 };
+pub use foreign_model::ForeignModel;
 pub use frames::{Base, Camera, Frame, Left, Point, Right, Side, Transform, UnitRay, World};
 pub use gates::{DropReason, Gates};
 pub use import::{OpenCvFisheye, largest_theta};
-pub use kannala_brandt::{ImageSize, InvalidImageSize, InvalidLens, KannalaBrandt, OutsideField, Pixel};
+pub use invalid_lens::InvalidLens;
+pub use kannala_brandt::{ImageSize, InvalidImageSize, KannalaBrandt, OutsideField, Pixel};
 pub use lens_derivatives::{CENTRAL_PARAMETERS, LENS_PARAMETER_NAMES, LENS_PARAMETERS};
 pub use lens_field::{LensField, UnknownField};
 pub use match_sigma::MatchSigma;

@@ -148,6 +148,7 @@ fn whole(matcher: &LearnedMatcher, images: &ImagePair<'_>) -> Result<Vec<Match>,
         sigma: RAW_SIGMA_PX.into(),
         score,
         registered: false,
+        track: None,
     };
     Ok(found.matches.iter().map(pair).collect())
 }

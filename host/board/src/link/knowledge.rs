@@ -1,6 +1,7 @@
 //! What a link measures while it is open: the board's clock, the axes' positions, and its own statistics.
 
-use std::sync::{Arc, Mutex, MutexGuard};
+use std::fmt;
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 use vergence_protocol::{HostStatistics, PoseReport};
 use vergence_rig::{ClockMap, Exchange, JointSample, JointTrack};
@@ -11,8 +12,25 @@ use super::lost_encoders::{LostAxis, LostEncoders, Told};
 const TRACK_LENGTH: usize = 16_000;
 
 /// What a link has measured so far. Clones share the data; the link's task writes it, everybody else reads.
-#[derive(Clone, Debug)]
-pub struct BoardKnowledge(Arc<Mutex<Measured>>);
+#[derive(Clone)]
+pub struct BoardKnowledge {
+    measured: Arc<Mutex<Measured>>,
+    listener: Arc<Mutex<Option<Listener>>>,
+    baud: Option<u32>,
+}
+
+type Listener = Box<dyn FnMut(&BoardNews) + Send>;
+
+/// What the board says that is kept.
+#[derive(Clone, Debug, PartialEq)]
+pub enum BoardNews {
+    /// Where its encoders are.
+    Pose(PoseReport),
+    /// The host asked it for its time.
+    ProbeSent,
+    /// It told its time.
+    Exchange(Exchange),
+}
 
 #[derive(Debug)]
 struct Measured {
@@ -24,13 +42,15 @@ struct Measured {
 
 impl BoardKnowledge {
     /// Empty, for a wire of `baud` bits per second; `None` where bytes take no time.
-    pub(super) fn new(baud: Option<u32>) -> Self {
-        Self(Arc::new(Mutex::new(Measured {
+    #[must_use]
+    pub fn new(baud: Option<u32>) -> Self {
+        let measured = Measured {
             clock_map: baud.map_or_else(ClockMap::default, ClockMap::at_baud),
             track: JointTrack::new(TRACK_LENGTH),
             encoders: LostEncoders::default(),
             statistics: HostStatistics::default(),
-        })))
+        };
+        Self { measured: Arc::new(Mutex::new(measured)), listener: Arc::default(), baud }
     }
 
     /// The latest clock map.
@@ -67,22 +87,41 @@ impl BoardKnowledge {
         self.lock().statistics = statistics;
     }
 
-    pub(super) fn note_pose(&self, pose: &PoseReport) {
+    /// Takes what the board said. A replay does it with what was recorded.
+    pub fn note(&self, news: &BoardNews) {
+        if let Some(listener) = self.listener.lock().unwrap_or_else(PoisonError::into_inner).as_mut() {
+            listener(news);
+        }
         let mut measured = self.lock();
-        measured.track.push(JointSample { at: pose.at, counts: pose.counts.clone() });
-        measured.encoders.note(pose);
+        match news {
+            BoardNews::Pose(pose) => {
+                measured.track.push(JointSample { at: pose.at, counts: pose.counts.clone() });
+                measured.encoders.note(pose);
+            }
+            BoardNews::ProbeSent => measured.clock_map.probe_sent(),
+            BoardNews::Exchange(exchange) => measured.clock_map.observe(*exchange),
+        }
     }
 
-    pub(super) fn probe_sent(&self) {
-        self.lock().clock_map.probe_sent();
+    /// Calls `listener` with all that the board says from now on, on the link's task: it must be quick.
+    pub fn listen(&self, listener: impl FnMut(&BoardNews) + Send + 'static) {
+        *self.listener.lock().unwrap_or_else(PoisonError::into_inner) = Some(Box::new(listener));
     }
 
-    pub(super) fn note_exchange(&self, exchange: Exchange) {
-        self.lock().clock_map.observe(exchange);
+    /// The speed of the wire in bits per second; `None` where bytes take no time.
+    #[must_use]
+    pub const fn baud(&self) -> Option<u32> {
+        self.baud
     }
 
     /// A poisoned lock only means that another thread panicked; no update leaves the data half written.
     fn lock(&self) -> MutexGuard<'_, Measured> {
-        self.0.lock().unwrap_or_else(std::sync::PoisonError::into_inner)
+        self.measured.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+}
+
+impl fmt::Debug for BoardKnowledge {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.debug_struct("BoardKnowledge").field("measured", &self.measured).finish_non_exhaustive()
     }
 }

@@ -20,7 +20,7 @@ pub use client::Client;
 pub use clock::HostClock;
 pub use error::{LinkError, OpenError};
 pub use follow::{Followed, Follower};
-pub use knowledge::BoardKnowledge;
+pub use knowledge::{BoardKnowledge, BoardNews};
 pub use lost_encoders::{LostAxis, Told};
 pub use management::ManagementLink;
 pub use open::{OpenWire, Port, Wire, open};

@@ -17,7 +17,7 @@ use super::attention::Attention;
 use super::clock::HostClock;
 use super::error::LinkError;
 use super::follow::{Broadcaster, Followed};
-use super::knowledge::BoardKnowledge;
+use super::knowledge::{BoardKnowledge, BoardNews};
 use super::open::OpenWire;
 use super::repeated_stop::RepeatedStop;
 
@@ -198,7 +198,7 @@ impl LinkTask {
             self.probes = self.probes.saturating_add(1);
             self.next_probe = Microseconds(now.0 + period);
             if self.session.send_now(Request::TimeProbe { t0: now }).is_ok() {
-                self.knowledge.probe_sent();
+                self.knowledge.note(&BoardNews::ProbeSent);
             }
         }
     }
@@ -267,12 +267,12 @@ impl LinkTask {
         match report {
             Report::Pose(pose) => {
                 self.state = pose.state;
-                self.knowledge.note_pose(&pose);
+                self.knowledge.note(&BoardNews::Pose(pose.clone()));
                 self.pass_on(|| Followed::Pose(pose.clone()));
                 self.outlets.poses.send_replace(Some(pose));
             }
             Report::TimeReply { t0, t1, t2 } => {
-                self.knowledge.note_exchange(Exchange { t0, t1, t2, t3: now });
+                self.knowledge.note(&BoardNews::Exchange(Exchange { t0, t1, t2, t3: now }));
             }
             // Marks are numbered: a reader that is too slow sees which are missing.
             Report::TriggerMark(mark) => drop(self.outlets.marks.try_send(mark)),

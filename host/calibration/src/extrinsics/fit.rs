@@ -88,6 +88,9 @@ impl<K: Kinematics> Task<'_, K> {
     /// The optimum near `start`.
     pub fn fit(&self, start: Start<K::State>) -> Result<Fit<K::State>, NoFit> {
         let Start { mut shared, mut targets, usable } = start;
+        if *self.knowledge != LensKnowledge::Exact {
+            shared.lenses = shared.lenses.polynomial();
+        }
         let mut sigma = self.settle(&mut shared, &mut targets, &usable)?;
         let mut inliers = self.inliers(&shared, &self.errors_px(&shared, &targets), &usable);
         let mut round = 0;

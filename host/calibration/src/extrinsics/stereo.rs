@@ -72,6 +72,11 @@ impl Lenses {
     pub fn of(left: &KannalaBrandt, right: &KannalaBrandt) -> Self {
         Self { left: Lens::of(left), right: Lens::of(right) }
     }
+
+    /// The lenses by their parameters alone, as unknowns are.
+    pub fn polynomial(&self) -> Self {
+        Self { left: self.left.polynomial(), right: self.right.polynomial() }
+    }
 }
 
 impl LensPrior {

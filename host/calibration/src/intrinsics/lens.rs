@@ -27,6 +27,8 @@ pub struct LensParameters {
     pub pupil: Pupil,
     /// Decentring and thin prism.
     pub asymmetry: Asymmetry,
+    /// A lens that is computed by another program's model, whose images count in place of those by the parameters above.
+    pub foreign: Option<KannalaBrandt>,
 }
 
 /// A projected pixel and its derivatives, column by column: `by_lens[i]` is the derivative of (u, v) by parameter i.
@@ -48,7 +50,7 @@ pub struct Reprojection {
 /// [`Pupil::angle_of_point`] allows.
 #[must_use]
 pub fn reproject(lens: impl Into<LensParameters>, point: &Point<Camera>) -> Option<Reprojection> {
-    let LensParameters { central: lens, pupil, asymmetry } = lens.into();
+    let LensParameters { central: lens, pupil, asymmetry, foreign } = lens.into();
     let [x, y, z]: [f64; 3] = point.mm().into();
     let across = x * x + y * y;
     let (rho, square) = (across.sqrt(), across + z * z);
@@ -113,10 +115,19 @@ pub fn reproject(lens: impl Into<LensParameters>, point: &Point<Camera>) -> Opti
             [-fx * x * along, -fy * y * along],
         ],
     };
-    Some(if asymmetry.is_zero() { symmetric } else { symmetric.displaced(&lens, &asymmetry, place) })
+    let by_polynomial = if asymmetry.is_zero() { symmetric } else { symmetric.displaced(&lens, &asymmetry, place) };
+    Some(foreign.and_then(|camera| by_polynomial.by_model_of(&camera, point)).unwrap_or(by_polynomial))
 }
 
 impl Reprojection {
+    /// The same by the model of another program, but for the derivatives by the parameters of the polynomial; `None` beyond its field.
+    fn by_model_of(&self, camera: &KannalaBrandt, point: &Point<Camera>) -> Option<Self> {
+        let ray = point.direction()?;
+        let pixel = camera.project(&ray).ok()?;
+        let by_point = camera.pixel_by_ray(&ray) / point.mm().norm();
+        Some(Self { pixel: [pixel.u, pixel.v], by_point: by_point.into(), ..*self })
+    }
+
     /// The reprojection by a symmetric lens, which images the point at `place` in focal lengths, made that of one which is not.
     fn displaced(mut self, lens: &OpenCvFisheye, asymmetry: &Asymmetry, place: Vector2<f64>) -> Self {
         let OpenCvFisheye { fx, fy, cx, cy, .. } = *lens;
@@ -157,7 +168,14 @@ impl LensParameters {
     /// The parameters of `camera`.
     #[must_use]
     pub fn of(camera: &KannalaBrandt) -> Self {
-        Self { central: camera.to_opencv(), pupil: camera.pupil(), asymmetry: camera.asymmetry() }
+        let foreign = camera.foreign_model().map(|_| *camera);
+        Self { central: camera.to_opencv(), pupil: camera.pupil(), asymmetry: camera.asymmetry(), foreign }
+    }
+
+    /// The lens of the parameters alone: where these are unknowns, the images of another program's model are left.
+    #[must_use]
+    pub const fn polynomial(self) -> Self {
+        Self { foreign: None, ..self }
     }
 
     /// The parameters as one array, in the order of [`LENS_PARAMETERS`].
@@ -176,14 +194,18 @@ impl LensParameters {
             central: OpenCvFisheye { fx, fy, cx, cy, k: [k1, k2, k3, k4] },
             pupil: Pupil::from_mm([e0, e1]),
             asymmetry: Asymmetry::from_array(asymmetry),
+            foreign: None,
         }
     }
 
-    /// The lens with the field up to `theta_max` on a sensor of `size`.
+    /// The lens with the field up to `theta_max` on a sensor of `size`; one of another program's model as it is.
     ///
     /// # Errors
     /// [`InvalidLens`] where no lens has these parameters.
     pub fn camera(&self, theta_max: Angle, size: ImageSize) -> Result<KannalaBrandt, InvalidLens> {
+        if let Some(camera) = self.foreign {
+            return Ok(camera);
+        }
         let symmetric = KannalaBrandt::from_opencv(self.central, theta_max, size)?.with_pupil(self.pupil)?;
         symmetric.with_asymmetry(self.asymmetry)
     }
@@ -191,7 +213,7 @@ impl LensParameters {
 
 impl From<OpenCvFisheye> for LensParameters {
     fn from(central: OpenCvFisheye) -> Self {
-        Self { central, pupil: Pupil::default(), asymmetry: Asymmetry::default() }
+        Self { central, pupil: Pupil::default(), asymmetry: Asymmetry::default(), foreign: None }
     }
 }
 

@@ -62,7 +62,12 @@ impl IntrinsicsCalibration {
     /// The parameters that were estimated, in the order of the covariance.
     #[must_use]
     pub const fn lens(&self) -> LensParameters {
-        LensParameters { central: self.opencv, pupil: self.camera.pupil(), asymmetry: self.camera.asymmetry() }
+        LensParameters {
+            central: self.opencv,
+            pupil: self.camera.pupil(),
+            asymmetry: self.camera.asymmetry(),
+            foreign: None,
+        }
     }
 }
 

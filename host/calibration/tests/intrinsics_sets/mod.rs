@@ -5,7 +5,7 @@
 #![allow(dead_code, reason = "each test file uses its share")]
 
 #[path = "../../../../tests/common/data.rs"]
-mod data;
+pub mod data;
 
 use std::path::Path;
 

@@ -145,6 +145,14 @@ fn holdable(
     let fail = |lens| ExchangeError::Fit { camera: side.to_owned(), fit: NoFit::Lens(lens) };
     let central = lens.central_at(LIKE_AT).map_err(fail)?;
     let off = |mm: f64| lens.largest_difference(&central, Length::from_mm(mm));
+    if let Some(model) = lens.foreign_model() {
+        remarks.push(format!(
+            "The {side} lens has the {} model, which this format cannot say. The lens that is written is up to {:.3} px off it.",
+            model.name(),
+            off(LIKE_AT.mm())
+        ));
+        return Ok(central);
+    }
     remarks.push(format!(
         "The pupil of the {side} lens moves (e0 = {:.3} mm), or it is not symmetric about its axis, which this format cannot say. The lens \
          that is written images points {:.0} mm away as it does to {:.3} px; points 200 mm away are up to {:.2} px off, points 2 m away \

@@ -47,7 +47,7 @@ pub enum Gap {
     Untextured,
     /// No neighbours on the same surface: a patch too small for a surface.
     Isolated,
-    /// Beside an edge: it may belong to the surface behind, or two surfaces cannot be told apart.
+    /// Beside an edge: it may belong to a surface that is too far to be measured.
     Edge,
 }
 

@@ -3,10 +3,10 @@
 use rayon::prelude::*;
 
 use super::Gap;
-use super::edges::{Beside, beside};
+use super::edges::steps;
 use super::register::{Registration, SampledView, register};
 use super::support::isolated;
-use super::surface::{Surface, surface};
+use super::surface::{SAME_SURFACE, Surface, surface};
 
 /// Reach of the windows for smoothing and registration, in pixels of the view.
 const REACH: usize = 4;
@@ -16,19 +16,17 @@ const MOST: f32 = 1.0;
 const LARGEST_SIGMA: f32 = 1.0;
 /// Smallest fraction of contrast that two windows of one surface have in common.
 const LEAST_LIKENESS: f32 = 0.4;
-/// Largest roughness of one surface in pixels. A rougher one is a mixture of two.
-const ROUGHEST: f32 = 0.4;
 /// Smallest surface, in pixels of the coarsest level of the search: smaller patches are mostly wrong.
 const SMALLEST: usize = 100;
 /// Standard deviation of a disparity, in pixels, from the roughness of its surface: the factor, and its growth per
 /// pixel. Chosen, with the constants beside it, so that 68 and 95 % of the errors are within one and two standard
 /// deviations in rendered scenes (docs/measured/dense.md).
-const BY_ROUGHNESS: [f32; 2] = [1.2, 2.0];
+const BY_ROUGHNESS: [f32; 2] = [1.1, 1.5];
 /// Standard deviation in pixels that interpolation leaves at any contrast.
 const INTERPOLATION: f32 = 0.02;
-/// How much larger errors are with another surface close, and in the window.
-const CLOSE_TO_EDGES: f32 = 3.0;
-const NEAR_EDGES: f32 = 1.3;
+/// Standard deviation of the range of a pixel with another surface in its window, as a part of the difference of both ranges: a part of these
+/// pixels is the other surface's, and those are then within two standard deviations.
+pub(super) const BETWEEN_SURFACES: f32 = 0.6;
 
 /// The disparities of a left view with their standard deviations, in pixels of the view; NaN where there are none.
 #[derive(Clone, Debug, PartialEq)]
@@ -38,7 +36,7 @@ pub struct Disparities {
     pub(super) sigma: Vec<f32>,
     /// Fraction of the left window's contrast that the right one explains, 0 to 1.
     pub(super) likeness: Vec<f32>,
-    /// The disparity of another surface that the pixel may belong to; NaN where there is none.
+    /// The disparity of another surface that the pixel may belong to; NaN where there is none but small steps.
     pub(super) other: Vec<f32>,
     /// Why a disparity is not used.
     pub(super) doubt: Vec<Option<Gap>>,
@@ -58,13 +56,11 @@ pub(super) fn registered(views: [SampledView<'_>; 2], whole: &[f32], area: usize
     for (doubt, _) in doubt.iter_mut().zip(&small).filter(|(doubt, small)| doubt.is_none() && **small) {
         *doubt = Some(Gap::Isolated);
     }
-    let around = beside(&trusted(&disparity, &doubt), views[0].seen, width);
-    doubt.par_iter_mut().zip(&around).zip(&smooth.roughness).for_each(|((doubt, around), roughness)| {
-        *doubt = doubt.or((around.beside == Beside::Edge || *roughness > ROUGHEST).then_some(Gap::Edge));
-    });
-    let sigma = registration.sigma.par_iter().zip(&smooth.roughness).zip(&around);
-    let sigma = sigma.map(|((own, roughness), around)| sigma_of(*own, *roughness, around.beside)).collect();
-    let other = around.par_iter().map(|around| around.other).collect();
+    let steps = steps(&trusted(&disparity, &doubt), views[0].seen, width);
+    let own = registration.sigma.par_iter().zip(&smooth.roughness).zip(&steps);
+    let sigma = own.map(|((own, roughness), step)| sigma_of(*own, *roughness, *step)).collect();
+    let others = disparity.par_iter().zip(&steps);
+    let other = others.map(|(own, step)| if step.abs() > SAME_SURFACE { own + step } else { f32::NAN }).collect();
     Disparities { disparity, sigma, likeness: registration.likeness, other, doubt }
 }
 
@@ -79,15 +75,11 @@ fn by_window((sigma, likeness): (&f32, &f32)) -> Option<Gap> {
     }
 }
 
-/// The standard deviation of a disparity from that of its registration and from the roughness of its surface.
-fn sigma_of(own: f32, roughness: f32, beside: Beside) -> f32 {
+/// The standard deviation of a disparity from that of its registration, from the roughness of its surface, and from a small `step` in its window.
+fn sigma_of(own: f32, roughness: f32, step: f32) -> f32 {
     let rough = (BY_ROUGHNESS[0] + BY_ROUGHNESS[1] * roughness) * roughness;
-    let factor = match beside {
-        Beside::Edge | Beside::Close => CLOSE_TO_EDGES,
-        Beside::Near => NEAR_EDGES,
-        Beside::Nothing => 1.0,
-    };
-    factor * (own * own + rough * rough + INTERPOLATION * INTERPOLATION).sqrt()
+    let mixed = if step.abs() <= SAME_SURFACE { BETWEEN_SURFACES * step } else { 0.0 };
+    (own * own + rough * rough + INTERPOLATION * INTERPOLATION + mixed * mixed).sqrt()
 }
 
 /// The disparities of which nothing is wrong; NaN elsewhere.

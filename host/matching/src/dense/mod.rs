@@ -32,6 +32,7 @@ use vergence_vision::{
 };
 
 pub use self::depth::{DenseCounts, DenseDepth, DenseRange, DenseSample, Gap};
+use self::fraction::BETWEEN_SURFACES;
 pub use self::fraction::Disparities;
 use self::levels::Levels;
 use self::range::RangeFinder;
@@ -46,10 +47,6 @@ use crate::{Grid, SharedFrame, View, ViewPixel};
 
 /// Smallest disparity in standard deviations, lenses and pose included, that differs from zero.
 const SIGNIFICANT: f64 = 3.0;
-
-/// Standard deviation of the range of a pixel with another surface in its window, as a part of the difference of both ranges. One in five is
-/// the other surface's in rendered scenes: those are then within two standard deviations.
-const BETWEEN_SURFACES: f64 = 0.6;
 
 /// Largest number of times that the rows are moved.
 const ROUNDS: usize = 3;
@@ -209,7 +206,7 @@ impl<'a> DenseViews<'a> {
         let other = disparities.other[index];
         let between_surfaces = match at(other) {
             _ if other.is_nan() => 0.0,
-            (other, true) => BETWEEN_SURFACES * (other.mm - range.mm),
+            (other, true) => f64::from(BETWEEN_SURFACES) * (other.mm - range.mm),
             // The other surface may be anywhere far away.
             (_, false) => return DenseSample::Gap(Gap::Edge),
         };

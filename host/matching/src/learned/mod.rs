@@ -123,7 +123,7 @@ impl NetworkMatches {
         let (left, right) = (Pyramid::new(views.left.plane(), LEVELS), Pyramid::new(views.right.plane(), LEVELS));
         let oversampling = views.oversampling();
         let compared = Compared { left: &left, right: &right, keypoints: &keypoints, oversampling };
-        register(&mut links, &compared, &band, Some(UNREGISTERED_SIGMA));
+        register(&mut links, &compared, &band, true);
         agree_on_pose(&mut links, &keypoints, &views.grid, pair.pose_sigma);
         let rows = Rows::of(&compared);
         rows.drop_repeated(&mut links, &keypoints, &band);

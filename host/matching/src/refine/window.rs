@@ -12,26 +12,31 @@ use crate::plane::Plane;
 pub(super) const HALF: usize = 8;
 const SIDE: usize = 2 * HALF + 1;
 /// Standard deviation of the Gaussian weights of the window, in pixels.
-const WEIGHT_SIGMA: f64 = 4.5;
+const WEIGHT_SIGMA: f32 = 4.5;
 /// Number of unknowns: four of the warp, gain, bias, and how the gain grows along and across the row.
 const UNKNOWNS: usize = 8;
 /// Grey level below black at which sRGB, 1.055 L^(1/2.4) - 0.055 of the light L, would begin without its straight part (IEC 61966-2-1):
 /// above it levels grow in proportion where the light does.
-const BELOW_BLACK: f64 = 255.0 * 0.055;
+const BELOW_BLACK: f32 = 255.0 * 0.055;
+/// Pixels that are summed at once.
+const LANES: usize = 8;
 
-/// One value for each pixel of the window, by rows.
-pub(super) type Patch = [[f64; SIDE]; SIDE];
+/// One value for each pixel of the window, by rows, and some of weight zero.
+///
+/// Values are grey levels from that of the middle on: single precision then keeps sums of their products to a millionth.
+pub(super) type Patch = [[f32; LANES]; (SIDE * SIDE).div_ceil(LANES)];
+const EMPTY: Patch = [[0.0; LANES]; (SIDE * SIDE).div_ceil(LANES)];
 
 /// The values of the window with one more pixel on each side, for gradients.
-pub(super) type Padded = [[f64; SIDE + 2]; SIDE + 2];
+pub(super) type Padded = [[f32; SIDE + 2]; SIDE + 2];
 
 /// Samples `template` around `at`; `None` where the window is not all inside.
 #[inline(always)]
 pub(super) fn surroundings(template: &Plane, at: ViewPixel) -> Option<Padded> {
     let mut values = [[0.0; SIDE + 2]; SIDE + 2];
     for (j, row) in values.iter_mut().enumerate() {
-        let found = template.sample_row::<{ SIDE + 2 }>(at.x + offset(0) - 1.0, 1.0, at.y + offset(j) - 1.0)?;
-        row.iter_mut().zip(found).for_each(|(value, found)| *value = f64::from(found));
+        let (x, y) = (f64::from(offset(0)) - 1.0, f64::from(offset(j)) - 1.0);
+        *row = template.sample_row::<{ SIDE + 2 }>(at.x + x, 1.0, at.y + y)?;
     }
     Some(values)
 }
@@ -42,41 +47,58 @@ pub(super) fn surroundings(template: &Plane, at: ViewPixel) -> Option<Padded> {
 /// The slope is that of the falloff of a lens: towards the edge of its field it darkens, in the two images of a point in different
 /// directions. Without it the window seems displaced towards the brighter side by some thousandths of a pixel, all windows of a region alike
 /// (docs/measured/robot.md).
-pub(super) struct Window([Patch; UNKNOWNS]);
+pub(super) struct Window {
+    columns: [Patch; UNKNOWNS],
+    /// The same times the weights.
+    weighted: [Patch; UNKNOWNS],
+}
 
 impl Window {
+    /// A window without content, to be filled in place: it is too large to be moved about.
     #[inline(always)]
-    pub(super) fn new(values: &Padded) -> Self {
+    pub(super) const fn empty() -> Self {
+        Self { columns: [EMPTY; UNKNOWNS], weighted: [EMPTY; UNKNOWNS] }
+    }
+
+    #[inline(always)]
+    pub(super) fn fill(&mut self, values: &Padded) {
         let mean = values[HALF + 1][HALF + 1];
-        let mut columns = [[[0.0; SIDE]; SIDE]; UNKNOWNS];
+        let [by_x, by_y, by_ux, by_vx, level, one, by_u, by_v] =
+            self.columns.each_mut().map(|it| it.as_flattened_mut());
         for j in 0..SIDE {
-            let v = offset(j) / HALF as f64;
+            let v = offset(j) / HALF as f32;
+            let row = SIDE * j..SIDE * (j + 1);
+            let (by_x, by_y) = (&mut by_x[row.clone()], &mut by_y[row.clone()]);
+            let (by_ux, by_vx) = (&mut by_ux[row.clone()], &mut by_vx[row.clone()]);
+            let (level, one) = (&mut level[row.clone()], &mut one[row.clone()]);
+            let (by_u, by_v) = (&mut by_u[row.clone()], &mut by_v[row]);
+            let (above, here, below) = (&values[j], &values[j + 1], &values[j + 2]);
             for i in 0..SIDE {
-                let u = offset(i) / HALF as f64;
-                let gx = 0.5 * (values[j + 1][i + 2] - values[j + 1][i]);
-                let gy = 0.5 * (values[j + 2][i + 1] - values[j][i + 1]);
-                columns[0][j][i] = gx;
-                columns[1][j][i] = gy;
-                columns[2][j][i] = u * gx;
-                columns[3][j][i] = v * gx;
-                columns[4][j][i] = values[j + 1][i + 1] - mean;
-                columns[5][j][i] = 1.0;
-                let level = values[j + 1][i + 1] + BELOW_BLACK;
-                columns[6][j][i] = u * level;
-                columns[7][j][i] = v * level;
+                let u = offset(i) / HALF as f32;
+                let gx = 0.5 * (here[i + 2] - here[i]);
+                (by_x[i], by_y[i]) = (gx, 0.5 * (below[i + 1] - above[i + 1]));
+                (by_ux[i], by_vx[i]) = (u * gx, v * gx);
+                (level[i], one[i]) = (here[i + 1] - mean, 1.0);
+                let light = here[i + 1] + BELOW_BLACK;
+                (by_u[i], by_v[i]) = (u * light, v * light);
             }
         }
-        Self(columns)
+        let weights: &Patch = &WEIGHTS;
+        for (weighted, column) in self.weighted.iter_mut().zip(&self.columns) {
+            for c in 0..weights.len() {
+                for l in 0..LANES {
+                    weighted[c][l] = column[c][l] * weights[c][l];
+                }
+            }
+        }
     }
 
     #[inline(always)]
     pub(super) fn normal_matrix(&self) -> SMatrix<f64, UNKNOWNS, UNKNOWNS> {
         let mut normal = SMatrix::zeros();
-        for (i, column) in self.0.iter().enumerate() {
-            let weighted = weighted(column);
-            for (k, other) in self.0.iter().enumerate().skip(i) {
-                let product = dot(&weighted, other);
-                (normal[(i, k)], normal[(k, i)]) = (product, product);
+        for (i, column) in self.columns.iter().enumerate() {
+            for (k, product) in self.products(column).into_iter().enumerate() {
+                normal[(i, k)] = product;
             }
         }
         normal
@@ -84,74 +106,93 @@ impl Window {
 
     #[inline(always)]
     pub(super) fn project(&self, values: &Patch) -> SVector<f64, UNKNOWNS> {
-        let mut projected = SVector::<f64, UNKNOWNS>::zeros();
-        let weighted = weighted(values);
-        for (projected, column) in projected.iter_mut().zip(&self.0) {
-            *projected = dot(&weighted, column);
+        SVector::from(self.products(values))
+    }
+
+    /// The sums of products of `values` with the weighted columns, all at once.
+    #[inline(always)]
+    fn products(&self, values: &Patch) -> [f64; UNKNOWNS] {
+        let mut sums = [[0.0_f32; LANES]; UNKNOWNS];
+        for (c, values) in values.iter().enumerate() {
+            for (sums, column) in sums.iter_mut().zip(&self.weighted) {
+                for l in 0..LANES {
+                    sums[l] += column[c][l] * values[l];
+                }
+            }
         }
-        projected
+        sums.map(|lanes| lanes.into_iter().map(f64::from).sum())
     }
 
     /// Correlation of the model with `values`, and the variance of the residuals.
     #[inline(always)]
     pub(super) fn quality(&self, values: &Patch, solution: &SVector<f64, UNKNOWNS>) -> (f64, f64) {
-        let total: f64 = WEIGHTS.iter().flatten().sum();
-        let mean = dot(&WEIGHTS, values) / total;
-        let (mut left_over, mut spread) = (0.0, 0.0);
-        for (j, (values, weights)) in values.iter().zip(&*WEIGHTS).enumerate() {
-            for (i, (value, weight)) in values.iter().zip(weights).enumerate() {
-                let model: f64 = self.0.iter().zip(solution).map(|(column, factor)| column[j][i] * factor).sum();
-                left_over += weight * (value - model).powi(2);
-                spread += weight * (value - mean).powi(2);
+        let weights: &Patch = &WEIGHTS;
+        let [_, sum, total] = sums(weights, values);
+        let mean = (sum / total) as f32;
+        let mut left = EMPTY;
+        for c in 0..left.len() {
+            let mut model = [0.0_f32; LANES];
+            for (column, factor) in self.columns.iter().zip(solution) {
+                let factor = *factor as f32;
+                for l in 0..LANES {
+                    model[l] += column[c][l] * factor;
+                }
+            }
+            for l in 0..LANES {
+                left[c][l] = values[c][l] - model[l];
             }
         }
+        let mut centred = *values;
+        centred.as_flattened_mut().iter_mut().for_each(|value| *value -= mean);
+        let ([left_over, ..], [spread, ..]) = (sums(weights, &left), sums(weights, &centred));
         let correlation = (1.0 - left_over / spread.max(f64::MIN_POSITIVE)).max(0.0).sqrt();
         (correlation, left_over / total)
     }
 }
 
+/// The weighted sums of the squares of `values`, of `values`, and of one.
+#[inline(always)]
+fn sums(weights: &Patch, values: &Patch) -> [f64; 3] {
+    let mut sums = [[0.0_f32; LANES]; 3];
+    for (weights, values) in weights.iter().zip(values) {
+        for l in 0..LANES {
+            let weighted = weights[l] * values[l];
+            sums[0][l] += weighted * values[l];
+            sums[1][l] += weighted;
+            sums[2][l] += weights[l];
+        }
+    }
+    sums.map(|lanes| lanes.into_iter().map(f64::from).sum())
+}
+
 /// The window's Gaussian weights.
 static WEIGHTS: LazyLock<Patch> = LazyLock::new(|| {
-    let weight = |x: f64, y: f64| (-0.5 * (x * x + y * y) / (WEIGHT_SIGMA * WEIGHT_SIGMA)).exp();
-    std::array::from_fn(|j| std::array::from_fn(|i| weight(offset(i), offset(j))))
+    let mut weights = EMPTY;
+    for (index, weight) in weights.as_flattened_mut().iter_mut().take(SIDE * SIDE).enumerate() {
+        let (x, y) = (offset(index % SIDE), offset(index / SIDE));
+        *weight = (-0.5 * (x * x + y * y) / (WEIGHT_SIGMA * WEIGHT_SIGMA)).exp();
+    }
+    weights
 });
 
 /// Samples `image` at the warped window around `at`; `None` where it is not all inside.
 #[inline(always)]
 pub(super) fn warped(image: &Plane, at: ViewPixel, warp: &Warp) -> Option<Patch> {
-    let mut values = [[0.0; SIDE]; SIDE];
-    for (j, row) in values.iter_mut().enumerate() {
+    let mut patch = EMPTY;
+    let values = patch.as_flattened_mut();
+    for j in 0..SIDE {
         // A row of the window stays a row, because y' does not depend on x.
-        let (x, y) = warp.apply(offset(0), offset(j));
+        let (x, y) = warp.apply(f64::from(offset(0)), f64::from(offset(j)));
         let found = image.sample_row::<SIDE>(at.x + x, 1.0 + warp.sx, at.y + y)?;
-        row.iter_mut().zip(found).for_each(|(value, found)| *value = f64::from(found));
+        values[SIDE * j..][..SIDE].copy_from_slice(&found);
     }
-    Some(values)
-}
-
-#[inline(always)]
-fn weighted(values: &Patch) -> Patch {
-    let mut weighted = *values;
-    for (row, weights) in weighted.iter_mut().zip(&*WEIGHTS) {
-        row.iter_mut().zip(weights).for_each(|(value, weight)| *value *= weight);
-    }
-    weighted
-}
-
-/// The sum of products, by columns first, so that the compiler can vectorise it.
-#[inline(always)]
-fn dot(a: &Patch, b: &Patch) -> f64 {
-    let mut sums = [0.0; SIDE];
-    for (a, b) in a.iter().zip(b) {
-        for i in 0..SIDE {
-            sums[i] += a[i] * b[i];
-        }
-    }
-    sums.iter().sum()
+    let middle = values[SIDE * HALF + HALF];
+    values[..SIDE * SIDE].iter_mut().for_each(|value| *value -= middle);
+    Some(patch)
 }
 
 /// The offset of a row or column of the window from its centre.
 #[inline(always)]
-const fn offset(k: usize) -> f64 {
-    k as f64 - HALF as f64
+const fn offset(k: usize) -> f32 {
+    k as f32 - HALF as f32
 }

@@ -65,7 +65,12 @@ impl Place {
 
     /// Renders images of `side` pixels; the noise follows `seed`.
     pub fn rendered(&self, side: u32, seed: u64) -> Rendered {
-        let (scene, optics, camera, poses) = ((self.scene)(), Optics::default(), lens(side), self.poses());
+        self.rendered_by(lens(side), seed)
+    }
+
+    /// Renders the images of two cameras with this lens; the noise follows `seed`.
+    pub fn rendered_by(&self, camera: KannalaBrandt, seed: u64) -> Rendered {
+        let (scene, optics, poses) = ((self.scene)(), Optics::default(), self.poses());
         let photographs = [0, 1].map(|i| {
             let view = View { scene: &scene, camera: &camera, world_from_camera: poses[i], optics: &optics };
             render(&view, 2 * seed + i as u64)

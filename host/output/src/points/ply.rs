@@ -18,8 +18,10 @@ const COVARIANCE_COLUMNS: [&str; 12] = [
     "own_zz",
 ];
 
-/// The last column: 1 where a lens is extrapolated.
+/// The column that is 1 where a lens is extrapolated.
 const EXTRAPOLATED_PROPERTY: &str = "property uchar extrapolated\n";
+/// The last column: the number of the track, -1 without one. After 2^31 tracks the numbers begin anew.
+const TRACK_PROPERTY: &str = "property int track\n";
 
 /// How the numbers of a PLY file are written.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -41,7 +43,7 @@ impl PlyEncoding {
 
 /// The points in the left camera's frame, in millimetres, with colour, pixels in both images, sigma of the range, the probability that
 /// the match is right (score), the upper triangles of the covariance and of the part of it that comes from the point's own pixels, and
-/// whether a lens is extrapolated there.
+/// whether a lens is extrapolated there, and the number of the track.
 #[must_use]
 pub fn ply(points: &[ColouredPoint], encoding: PlyEncoding) -> Vec<u8> {
     let format = match encoding {
@@ -54,7 +56,7 @@ pub fn ply(points: &[ColouredPoint], encoding: PlyEncoding) -> Vec<u8> {
          property double x\nproperty double y\nproperty double z\n\
          property uchar red\nproperty uchar green\nproperty uchar blue\n\
          property double u_left\nproperty double v_left\nproperty double u_right\nproperty double v_right\n\
-         property double sigma_range\nproperty float score\n{}{EXTRAPOLATED_PROPERTY}end_header\n",
+         property double sigma_range\nproperty float score\n{}{EXTRAPOLATED_PROPERTY}{TRACK_PROPERTY}end_header\n",
         points.len(),
         COVARIANCE_COLUMNS.map(|name| format!("property float {name}\n")).concat()
     )
@@ -68,7 +70,7 @@ pub fn ply(points: &[ColouredPoint], encoding: PlyEncoding) -> Vec<u8> {
     bytes
 }
 
-fn binary_row(ColouredPoint { point, colour, score }: &ColouredPoint, bytes: &mut Vec<u8>) {
+fn binary_row(ColouredPoint { point, colour, score, track }: &ColouredPoint, bytes: &mut Vec<u8>) {
     let at = point.point.mm();
     [at.x, at.y, at.z].iter().for_each(|value| bytes.extend_from_slice(&value.to_le_bytes()));
     bytes.extend_from_slice(colour);
@@ -76,16 +78,21 @@ fn binary_row(ColouredPoint { point, colour, score }: &ColouredPoint, bytes: &mu
     bytes.extend_from_slice(&score.to_le_bytes());
     covariances(point).iter().for_each(|value| bytes.extend_from_slice(&(*value as f32).to_le_bytes()));
     bytes.push(point.extrapolated.into());
+    bytes.extend_from_slice(&number(*track).to_le_bytes());
 }
 
-fn text_row(ColouredPoint { point, colour: [red, green, blue], score }: &ColouredPoint) -> String {
+fn number(track: Option<u64>) -> i32 {
+    track.map_or(-1, |track| (track & 0x7fff_ffff) as i32)
+}
+
+fn text_row(ColouredPoint { point, colour: [red, green, blue], score, track }: &ColouredPoint) -> String {
     let at = point.point.mm();
     let mut row = format!("{:.4} {:.4} {:.4} {red} {green} {blue}", at.x, at.y, at.z);
     // Writing to a String does not fail.
     pixels_and_sigma(point).iter().for_each(|value| _ = write!(row, " {value:.4}"));
     _ = write!(row, " {score:.4}");
     covariances(point).iter().for_each(|value| _ = write!(row, " {value:.5e}"));
-    _ = writeln!(row, " {}", u8::from(point.extrapolated));
+    _ = writeln!(row, " {} {}", u8::from(point.extrapolated), number(*track));
     row
 }
 
@@ -100,7 +107,7 @@ fn covariances(point: &CloudPoint) -> [f64; 12] {
     std::array::from_fn(|index| if index < 6 { all[index] } else { own[index - 6] })
 }
 
-/// A row of a dense cloud: the first columns of what [`ply`] writes, and its last.
+/// A row of a dense cloud: the first columns of what [`ply`] writes, and whether a lens is extrapolated.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct DenseRow {
     /// Millimetres in the left camera's frame.
@@ -166,7 +173,7 @@ mod tests {
             residual_sigma: Angle::from_rad(0.0),
             extrapolated: true,
         };
-        let points = [ColouredPoint { point, colour: [1, 2, 3], score: 0.5 }];
+        let points = [ColouredPoint { point, colour: [1, 2, 3], score: 0.5, track: Some(70_000) }];
         let text = String::from_utf8(ply(&points, PlyEncoding::Ascii)).expect("text");
         assert!(text.starts_with("ply\nformat ascii 1.0\n") && text.contains("element vertex 1\n"));
         let numbers: Vec<f64> = String::from_utf8_lossy(body(text.as_bytes()))
@@ -181,11 +188,13 @@ mod tests {
         read.extend(bytes[24..27].iter().map(|&colour| f64::from(colour)));
         read.extend((0..5).map(|n| double(27 + 8 * n)));
         read.extend((0..13).map(|n| float(67 + 4 * n)));
-        read.extend(bytes.last().map(|&flag| f64::from(flag)));
-        assert_eq!((bytes.len(), read.len()), (67 + 4 * 13 + 1, numbers.len()));
+        let [flag, track @ ..] = &bytes[67 + 4 * 13..] else { panic!("a flag") };
+        read.extend([f64::from(*flag), f64::from(i32::from_le_bytes(track.try_into().expect("four")))]);
+        assert_eq!((bytes.len(), read.len()), (67 + 4 * 13 + 5, numbers.len()));
         for (one, other) in read.iter().zip(&numbers) {
             assert!((one - other).abs() <= 1e-4 * other.abs().max(1.0), "{one} is not {other}");
         }
         assert_eq!((numbers[12], numbers[18], numbers[24]), (3.0, 1.0, 1.0), "in all, of its own pixels, extrapolated");
+        assert!((numbers[25] - 70_000.0).abs() < 0.5, "its track");
     }
 }

@@ -34,8 +34,9 @@ pub struct Table {
 
 const POINTS: &str = "points in the left camera's frame (x right, y down, z forward), sigma of their distance, score (probability that the \
      match is right: that the distance is off by at most three sigma), covariance (cov), and the part of it from the point's own pixels (own); \
-     the rest is shared by all points of the pair: lenses, calibration and encoders; extrapolated is 1 where a lens was not measured";
-const POINT_COLUMNS: [&str; 25] = [
+     the rest is shared by all points of the pair: lenses, calibration and encoders; extrapolated is 1 where a lens was not measured; \
+     track is the number of a place that is followed from pair to pair, -1 where none is";
+const POINT_COLUMNS: [&str; 26] = [
     "x_mm",
     "y_mm",
     "z_mm",
@@ -61,6 +62,7 @@ const POINT_COLUMNS: [&str; 25] = [
     "own_yz_mm2",
     "own_zz_mm2",
     "extrapolated",
+    "track",
 ];
 const BEARINGS: &str = "directions in the camera's own frame (x right, y down, z forward), of length one: not points; extrapolated is 1 where the \
      lens was not measured";
@@ -75,7 +77,7 @@ impl Table {
     /// A row for each point of a cloud.
     #[must_use]
     pub fn of_points(points: &[ColouredPoint]) -> Self {
-        let row = |ColouredPoint { point, colour, score }: &ColouredPoint| {
+        let row = |ColouredPoint { point, colour, score, track }: &ColouredPoint| {
             let (at, left, right) = (point.point.mm(), point.pixels.left, point.pixels.right);
             let colour = colour.map(f64::from);
             [
@@ -84,7 +86,7 @@ impl Table {
                 &[left.u, left.v, right.u, right.v, point.sigma_range.mm(), f64::from(*score)],
                 &upper_triangle(|place| point.covariance[place]),
                 &upper_triangle(|place| point.own_covariance[place]),
-                &[f64::from(u8::from(point.extrapolated))],
+                &[f64::from(u8::from(point.extrapolated)), track.map_or(-1.0, |track| track as f64)],
             ]
             .concat()
         };

@@ -27,12 +27,17 @@ impl<'a> Intensity<'a> {
 
     /// The grey level at `position`, bilinear between the four pixels about it.
     pub fn between(&self, position: Vector2<f64>) -> Option<f64> {
-        let (left, top) = (position.x.floor(), position.y.floor());
-        let (right, below) = (position.x - left, position.y - top);
-        let (x, y) = (left as i64, top as i64);
-        let upper = self.at(x, y)? * (1.0 - right) + self.at(x + 1, y)? * right;
-        let lower = self.at(x, y + 1)? * (1.0 - right) + self.at(x + 1, y + 1)? * right;
-        Some(upper * (1.0 - below) + lower * below)
+        let (x, y) = (whole(position.x), whole(position.y));
+        let (right, below) = (position.x - x as f64, position.y - y as f64);
+        let (x, y) = (usize::try_from(x).ok()?, usize::try_from(y).ok()?);
+        if x + 1 >= self.width || y + 1 >= self.height {
+            return None;
+        }
+        let row = |y: usize| {
+            let pixels = self.levels.get(y * self.width + x..)?.first_chunk::<2>()?;
+            Some(f64::from(pixels[0]) * (1.0 - right) + f64::from(pixels[1]) * right)
+        };
+        Some(row(y)? * (1.0 - below) + row(y + 1)? * below)
     }
 
     /// Central differences, in grey levels per pixel.
@@ -47,4 +52,10 @@ impl<'a> Intensity<'a> {
         let (right, bottom) = (self.width as f64 - 1.0 - position.x, self.height as f64 - 1.0 - position.y);
         position.x.min(position.y).min(right).min(bottom)
     }
+}
+
+/// The largest whole number that is not above `x`. Much quicker than [`f64::floor`] where processors of all ages are served.
+fn whole(x: f64) -> i64 {
+    let towards_zero = x as i64;
+    towards_zero.saturating_sub(i64::from(towards_zero as f64 > x))
 }

@@ -1,6 +1,7 @@
 //! `vergence bench`: the speed of this program beside others on the same work.
 
 mod calibrate;
+mod live;
 mod matching;
 mod mcu;
 mod networks;
@@ -23,6 +24,8 @@ enum Task {
     /// Solves every fisheye set and detects every chessboard, then lets OpenCV (cv2.fisheye.calibrate with its crude
     /// guess, the classic detector and the SB detector) and SciPy's bundle adjustment do the same. Everything runs on one thread.
     Calibrate(calibrate::Args),
+    /// Measures the live matcher on pairs that follow one another: rate, delay, right points, beside OpenCV.
+    Live(live::Args),
     /// Counts right matches over the angle between the optical axes: whole images, views, and without networks.
     Matching(matching::Args),
     /// Measures the simulated chip: busy code beside QEMU, and the firmware disarmed and armed beside real time.
@@ -36,6 +39,7 @@ enum Task {
 pub fn run(args: &Args, console: Console) -> Result<(), Failure> {
     match &args.task {
         Task::Calibrate(args) => calibrate::run(args, console),
+        Task::Live(args) => live::run(args, console),
         Task::Matching(args) => matching::run(args, console),
         Task::Mcu(args) => mcu::run(args, console),
         Task::Networks(args) => networks::run(args, console),

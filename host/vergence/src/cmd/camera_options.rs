@@ -4,14 +4,15 @@ use std::time::Duration;
 
 use vergence_board::HostClock;
 use vergence_camera::{Camera, CameraError, V4lCamera, V4lSettings};
-use vergence_vision::ImageSize;
+use vergence_rig::Rig;
+use vergence_vision::{ImageSize, Side};
 
 use crate::failure::Failure;
 
 /// Settings of attached cameras; those that are not given stay as they are.
 #[derive(Clone, Copy, Debug, clap::Args)]
 pub struct CameraOptions {
-    /// Image size of the cameras.
+    /// Image size of the cameras. With simulated ones of `vergence run` it scales the lenses of the rig file.
     #[arg(long, value_name = "WxH")]
     size: Option<ImageSize>,
     /// Exposure time, such as 5ms.
@@ -33,6 +34,30 @@ impl CameraOptions {
     /// No such camera, or none of its pixel formats is understood.
     pub fn open(&self, device: &str, clock: HostClock) -> Result<Box<dyn Camera>, CameraError> {
         self.open_rolling(device, clock, Duration::ZERO)
+    }
+
+    /// The rig whose simulated cameras take images of the size that was asked for: the same lenses before sensors of the same millimetres.
+    ///
+    /// # Errors
+    /// Names an option that would do nothing, a size of another shape than the rig file's, and masks, which are of the file's pixels.
+    pub fn simulated(&self, rig: Rig) -> Result<Rig, Failure> {
+        Self { size: None, ..*self }.none_for_simulated()?;
+        let Some(size) = self.size else { return Ok(rig) };
+        if rig.masks.iter().any(Option::is_some) {
+            return Err(Failure::usage("--size does not scale masks: leave it out, or take a rig file without them"));
+        }
+        let sized = rig
+            .with_sensors(size.width)
+            .map_err(|error| Failure::usage(format!("no lens has {} columns: {error}", size.width)))?;
+        for side in [Side::Left, Side::Right] {
+            let ImageSize { width, height } = sized.camera(side).size();
+            if height != size.height {
+                return Err(Failure::usage(format!(
+                    "--size has another shape than the images of the {side} camera in the rig file: choose {width}x{height}"
+                )));
+            }
+        }
+        Ok(sized)
     }
 
     /// Refuses settings beside simulated cameras, which take the images of the rig file's cameras.

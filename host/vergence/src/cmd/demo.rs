@@ -2,6 +2,7 @@
 
 use std::cell::Cell;
 use std::future::pending;
+use std::net::SocketAddr;
 use std::path::PathBuf;
 use std::sync::Arc;
 
@@ -48,6 +49,17 @@ pub struct Args {
     /// controller runs, and nothing is rendered or written.
     #[arg(long, value_name = "COUNT", value_parser = clap::value_parser!(u32).range(1..=10_000))]
     corridors: Option<u32>,
+    /// Shows the rig on a page instead, on which it is driven: 'vergence panel' of a simulated rig, with ideal lenses unless --lens says
+    /// otherwise. Nothing is written.
+    #[arg(long, value_name = "ADDRESS", num_args = 0..=1, default_missing_value = "127.0.0.1:8088", conflicts_with_all = ["corridors", "auto", "out"])]
+    panel: Option<SocketAddr>,
+}
+
+impl Args {
+    /// Where the rig is shown on a page instead, with which lenses and seed.
+    pub fn on_a_page(&self) -> Option<(SocketAddr, LensChoice, u64)> {
+        Some((self.panel?, self.lens.unwrap_or(LensChoice::Ideal), self.seed))
+    }
 }
 
 pub async fn run(args: &Args, common: &CommonOptions, console: Console) -> Result<(), Failure> {

@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 
 use vergence_matching::learned::LearnedMatcher;
-use vergence_matching::{GuidedMatcher, Matcher};
+use vergence_matching::{GuidedMatcher, Matcher, TrackingMatcher};
 use vergence_models::{ModelName, ModelStore, ModelsError, Runtime, RuntimeKind, Runtimes, choose};
 
 use crate::console::Console;
@@ -73,7 +73,7 @@ const LEARNED: &str = "learned";
 #[derive(Clone, Debug, Default, clap::Args)]
 pub struct MatcherOptions {
     /// `guided` (classical), the name of a model (see `vergence models list`), or `learned` for the only one that is kept.
-    /// Without it the classical matcher serves.
+    /// Without it the classical matcher serves; `run` then follows its points from pair to pair.
     #[arg(long, value_name = "NAME")]
     matcher: Option<String>,
     /// Most keypoints per view.
@@ -94,6 +94,18 @@ impl MatcherOptions {
         Ok(match self.matcher.as_deref() {
             None | Some(GUIDED) => Box::new(self.guided()),
             Some(name) => Box::new(self.model(&self.store.store()?, name, console)?),
+        })
+    }
+
+    /// The matcher for pairs that follow one another: the one that the options name, or one that follows points from pair to pair.
+    ///
+    /// # Errors
+    /// As [`Self::matcher`].
+    pub fn live(&self, console: Console) -> Result<Box<dyn Matcher>, Failure> {
+        Ok(match (&self.matcher, self.keypoints) {
+            (Some(_), _) => self.matcher(console)?,
+            (None, Some(keypoints)) => Box::new(TrackingMatcher::with_keypoints(keypoints as usize)),
+            (None, None) => Box::new(TrackingMatcher::default()),
         })
     }
 

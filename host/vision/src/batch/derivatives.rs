@@ -2,12 +2,12 @@
 
 use multiversion::multiversion;
 use multiversion::target::target_cfg_f;
-use nalgebra::{Matrix2x3, SMatrix, Vector2};
+use nalgebra::{Matrix2x3, SMatrix, Vector2, Vector3};
 
 use super::arc_tangent::angle_from_axis;
 use super::lanes::{ALWAYS_FUSED, Kernel, for_rows, polynomial};
 use crate::lens_derivatives::pixel_by_lens;
-use crate::{Asymmetry, KannalaBrandt, LENS_PARAMETERS, Pixel};
+use crate::{Asymmetry, Camera, KannalaBrandt, LENS_PARAMETERS, Pixel, UnitRay};
 
 /// Numbers of a row: the pixel, its derivatives by the point, and what those by the lens consist of.
 const NUMBERS: usize = 12;
@@ -35,6 +35,24 @@ pub struct ProjectedPoints {
 }
 
 impl ProjectedPoints {
+    /// Puts pixels and derivatives by the points of a lens of another model in the place of those of its polynomial.
+    pub(super) fn make_foreign(&mut self, lens: &KannalaBrandt, points: &[[f64; 3]]) {
+        for (row, point) in self.rows.iter_mut().zip(points) {
+            let at = Vector3::from(*point);
+            let seen =
+                UnitRay::<Camera>::new(at).and_then(|ray| Some((lens.project(&ray).ok()?, lens.pixel_by_ray(&ray))));
+            let Some((pixel, by_ray)) = seen else {
+                row.fill(f64::NAN);
+                continue;
+            };
+            let by_point = by_ray / at.norm();
+            (row[0], row[1]) = (pixel.u, pixel.v);
+            for axis in 0..3 {
+                (row[2 + axis], row[5 + axis]) = (by_point[(0, axis)], by_point[(1, axis)]);
+            }
+        }
+    }
+
     /// Number of points.
     #[must_use]
     pub const fn len(&self) -> usize {

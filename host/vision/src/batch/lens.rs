@@ -3,18 +3,22 @@
 use super::Instructions;
 use super::derivatives::{Derivatives, ProjectedPoints};
 use super::project::{Project, project_baseline, project_best};
+use super::radial::{ForeignRadial, ProjectRadial, radial_baseline, radial_best};
 use super::unproject::{Unproject, unproject_baseline, unproject_best};
-use crate::{Asymmetry, Camera, KannalaBrandt, Pixel};
+use crate::{Asymmetry, Camera, KannalaBrandt, Pixel, UnitRay};
 
 /// A [`KannalaBrandt`] lens prepared for whole arrays of points and pixels, about ten times faster.
 ///
 /// Preparation takes about a millisecond, once per lens. Rays agree with the single-point functions to 1e-14 rad. Points stand for
 /// directions: where the pupil moves, a point at a finite distance is seen by [`KannalaBrandt::ray_to`] it. A lens that is not symmetric
-/// takes longer.
+/// takes longer, and one of another program's model that is not symmetric the time of single points; a model that is symmetric is tabulated as
+/// polynomials to 3e-10 rad.
 #[derive(Clone, Debug, PartialEq)]
 pub struct BatchLens {
     lens: KannalaBrandt,
     project: Project,
+    /// Of a symmetric lens of another model.
+    radial: Option<ProjectRadial>,
     derivatives: Derivatives,
     unproject: Option<Unproject>,
     instructions: Instructions,
@@ -24,11 +28,17 @@ impl BatchLens {
     /// Prepares `lens`.
     #[must_use]
     pub fn new(lens: &KannalaBrandt) -> Self {
+        let radial = ForeignRadial::of(lens);
+        let unproject = match lens.foreign_model() {
+            Some(_) => radial.as_ref().and_then(Unproject::new),
+            None => Unproject::new(lens),
+        };
         Self {
             lens: *lens,
             project: Project::new(lens),
+            radial: radial.as_ref().and_then(ProjectRadial::new),
             derivatives: Derivatives::new(lens),
-            unproject: Unproject::new(lens),
+            unproject,
             instructions: Instructions::Best,
         }
     }
@@ -50,6 +60,13 @@ impl BatchLens {
 
     /// Like [`Self::project`], but appends the results to `pixels`.
     pub fn project_into(&self, points: &[[f64; 3]], pixels: &mut Vec<[f64; 2]>) {
+        if self.lens.foreign_model().is_some() {
+            return match (&self.radial, self.instructions) {
+                (Some(fit), Instructions::Best) => radial_best(fit, points, pixels),
+                (Some(fit), Instructions::Baseline) => radial_baseline(fit, points, pixels),
+                (None, _) => pixels.extend(points.iter().map(|point| self.project_one(point))),
+            };
+        }
         let first = pixels.len();
         match self.instructions {
             Instructions::Best => project_best(&self.project, points, pixels),
@@ -75,6 +92,9 @@ impl BatchLens {
     /// a large array takes much less time than in new memory, whose pages the system must clear.
     pub fn project_with_derivatives_into(&self, points: &[[f64; 3]], out: &mut ProjectedPoints) {
         self.derivatives.of(points, self.instructions == Instructions::Best, out);
+        if self.lens.foreign_model().is_some() {
+            out.make_foreign(&self.lens, points);
+        }
     }
 
     /// Unprojects pixels (N × 2) to rays (N × 3 in the camera frame), unit vectors to 1e-14. Rows are NaN beyond
@@ -88,7 +108,8 @@ impl BatchLens {
 
     /// Like [`Self::unproject`], but appends the results to `rays`.
     pub fn unproject_into(&self, pixels: &[[f64; 2]], rays: &mut Vec<[f64; 3]>) {
-        if self.lens.is_symmetric() {
+        // What the polynomial of a lens of another model has of asymmetry is none of that model.
+        if self.lens.is_symmetric() || self.lens.foreign_model().is_some() {
             return self.unproject_symmetric(pixels, rays);
         }
         let symmetric = |&[u, v]: &[f64; 2]| {
@@ -106,13 +127,22 @@ impl BatchLens {
         }
     }
 
-    /// The ray of a pixel of the symmetric lens.
+    /// The ray of a pixel of the symmetric lens, or of that of another model.
     fn unproject_one(&self, pixel: Pixel) -> [f64; 3] {
-        let symmetric = self.lens.made_asymmetric(Asymmetry::default());
+        let symmetric = match self.lens.foreign_model() {
+            Some(_) => self.lens,
+            None => self.lens.made_asymmetric(Asymmetry::default()),
+        };
         symmetric.unproject::<Camera>(pixel).map_or([f64::NAN; 3], |ray| ray.vector().into())
     }
 
-    /// Whether [`Self::unproject`] is fast for this lens: false where dr/dθ comes close to zero inside the field.
+    fn project_one(&self, point: &[f64; 3]) -> [f64; 2] {
+        let ray = UnitRay::<Camera>::new((*point).into());
+        ray.and_then(|ray| self.lens.project(&ray).ok()).map_or([f64::NAN; 2], |pixel| [pixel.u, pixel.v])
+    }
+
+    /// Whether [`Self::unproject`] is fast for this lens: false where dr/dθ comes close to zero inside the field, and of another program's
+    /// model that is not symmetric about its axis.
     #[must_use]
     pub const fn is_fitted(&self) -> bool {
         self.unproject.is_some()

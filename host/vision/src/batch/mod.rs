@@ -15,6 +15,7 @@ mod lens;
 mod pair;
 mod pairs;
 mod project;
+mod radial;
 mod shared_errors;
 mod slope;
 mod triangulate;

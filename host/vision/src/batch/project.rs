@@ -39,17 +39,38 @@ impl Kernel<3, 2> for Project {
             squared[j] = theta[j] * theta[j];
         }
         let growth = polynomial::<FUSED, W>(&self.k, &squared);
-        let (mut u, mut v) = ([0.0; W], [0.0; W]);
-        for j in 0..W {
-            // On the axis x and y are zero, whatever the scale.
-            let scale = theta[j] * growth[j] / if rho[j] > 0.0 { rho[j] } else { 1.0 };
-            let seen = theta[j] <= self.theta_max && rho[j] < f64::INFINITY;
-            let scale = if seen { scale } else { f64::NAN };
-            u[j] = self.centre[0] + scale * x[j];
-            v[j] = self.centre[1] + self.aspect * scale * y[j];
-        }
-        [u, v]
+        let scale = scales(&rho, &theta, &growth, self.theta_max);
+        pixels([x, y], scale, self.centre, self.aspect)
     }
+}
+
+/// Pixels over the distance from the axis, for the angles to it and the radii over the angles; not numbers beyond the field.
+#[inline(always)]
+pub(super) fn scales<const W: usize>(rho: &[f64; W], theta: &[f64; W], growth: &[f64; W], theta_max: f64) -> [f64; W] {
+    let mut scales = [0.0; W];
+    for j in 0..W {
+        // On the axis x and y are zero, whatever the scale.
+        let scale = theta[j] * growth[j] / if rho[j] > 0.0 { rho[j] } else { 1.0 };
+        let seen = theta[j] <= theta_max && rho[j] < f64::INFINITY;
+        scales[j] = if seen { scale } else { f64::NAN };
+    }
+    scales
+}
+
+/// The pixels of places across the axis.
+#[inline(always)]
+pub(super) fn pixels<const W: usize>(
+    [x, y]: [[f64; W]; 2],
+    scale: [f64; W],
+    centre: [f64; 2],
+    aspect: f64,
+) -> [[f64; W]; 2] {
+    let (mut u, mut v) = ([0.0; W], [0.0; W]);
+    for j in 0..W {
+        u[j] = centre[0] + scale[j] * x[j];
+        v[j] = centre[1] + aspect * scale[j] * y[j];
+    }
+    [u, v]
 }
 
 pub(super) fn project_baseline(lens: &Project, points: &[[f64; 3]], pixels: &mut Vec<[f64; 2]>) {

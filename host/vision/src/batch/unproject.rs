@@ -8,14 +8,13 @@ use multiversion::target::target_cfg_f;
 
 use super::chebyshev::fit;
 use super::lanes::{ALWAYS_FUSED, Kernel, for_rows, polynomial};
-use crate::KannalaBrandt;
+use super::radial::Radial;
+use crate::Pixel;
 
 /// Rows per step: one vector of eight lanes for each polynomial.
 const LANES: usize = 8;
 /// Numbers of polynomial terms that are tried, fewest first.
 const TERMS: std::ops::RangeInclusive<usize> = 12..=48;
-/// Largest allowed error of a component of the ray.
-const LARGEST_ERROR: f64 = 7e-15;
 
 /// The polynomials and parameters of a lens that unprojection needs.
 #[derive(Clone, Debug, PartialEq)]
@@ -31,35 +30,35 @@ pub(super) struct Unproject {
 
 impl Unproject {
     /// `None` for a lens that no polynomial of 48 terms approximates closely enough, because dr/dθ comes close to zero.
-    pub(super) fn new(lens: &KannalaBrandt) -> Option<Self> {
-        TERMS.map(|terms| Self::of_terms(lens, terms)).find(|fit| fit.error(lens) <= LARGEST_ERROR)
+    pub(super) fn new<L: Radial>(lens: &L) -> Option<Self> {
+        TERMS.map(|terms| Self::of_terms(lens, terms)).find(|fit| fit.error(lens) <= L::LARGEST_ERROR)
     }
 
-    fn of_terms(lens: &KannalaBrandt, terms: usize) -> Self {
-        let largest = lens.radius_max();
+    fn of_terms(lens: &impl Radial, terms: usize) -> Self {
+        let largest = lens.largest_radius();
         let radius = |t: f64| largest * (0.5 * (t + 1.0)).sqrt();
         let sine_over_radius = fit(terms, |t| {
             let r = radius(t);
-            if r > 0.0 { lens.angle_at_radius(r).sin() / r } else { 1.0 / lens.k()[0] }
+            if r > 0.0 { lens.angle(r).sin() / r } else { 1.0 / lens.on_axis() }
         });
-        let cosine = fit(terms, |t| lens.angle_at_radius(radius(t)).cos());
-        let centre = lens.centre();
+        let cosine = fit(terms, |t| lens.angle(radius(t)).cos());
+        let Pixel { u, v } = lens.middle();
         Self {
             sine_over_radius,
             cosine,
-            centre: [centre.u, centre.v],
-            per_aspect: 1.0 / lens.aspect(),
+            centre: [u, v],
+            per_aspect: 1.0 / lens.stretch(),
             slope: 2.0 / (largest * largest),
             largest_squared: largest * largest,
         }
     }
 
     /// The largest error of a component of the ray, on a grid of radii.
-    fn error(&self, lens: &KannalaBrandt) -> f64 {
+    fn error(&self, lens: &impl Radial) -> f64 {
         const RADII: u32 = 500;
         let error = |i: u32| {
-            let r = lens.radius_max() * f64::from(i) / f64::from(RADII);
-            let theta = lens.angle_at_radius(r);
+            let r = lens.largest_radius() * f64::from(i) / f64::from(RADII);
+            let theta = lens.angle(r);
             let t = [self.slope * r * r - 1.0];
             let [sine] = polynomial::<false, 1>(&self.sine_over_radius, &t);
             let [cosine] = polynomial::<false, 1>(&self.cosine, &t);

@@ -1,7 +1,7 @@
 //! The camera models of other programs, behind one trait.
 //!
 //! A [`CameraModel`] maps rays to pixels and pixels to rays, inside its valid cone. [`KannalaBrandt`], the lens that this program computes
-//! with, is one of them; [`fit_lens`] makes it of any other. The other models are a [`Formula`] each: what it gives for one direction, and
+//! with, is one of them; [`fit_lens`] makes it of any other, and [`model_of`] any of them of its name and parameters. The other models are a [`Formula`] each: what it gives for one direction, and
 //! where it ends. [`Central`] adds what all of them share: the cone in which no pixel has two rays, and the way back from a pixel.
 
 mod central;
@@ -11,6 +11,7 @@ mod fisheye624;
 mod fit;
 mod kannala_brandt;
 mod mei;
+mod named;
 mod ocam;
 mod pinhole;
 mod splined;
@@ -26,6 +27,7 @@ pub use self::eucm::Eucm;
 pub use self::fisheye624::Fisheye624;
 pub use self::fit::{LensFit, NoFit, SightRegion, fit_lens};
 pub use self::mei::Mei;
+pub use self::named::model_of;
 pub use self::ocam::OCam;
 pub use self::pinhole::{Pinhole, Radtan};
 pub use self::splined::{SplineGrid, SplinedStereographic};

@@ -60,13 +60,34 @@ impl OCam {
         radius.atan2(-backwards)
     }
 
+    /// The same with its derivative by the radius.
+    fn angle_and_slope(&self, radius: f64) -> (f64, f64) {
+        let (backwards, slope) =
+            self.polynomial.iter().rev().fold((0.0, 0.0), |(sum, slope), a| (sum * radius + a, slope * radius + sum));
+        (radius.atan2(-backwards), (radius * slope - backwards) / (radius * radius + backwards * backwards))
+    }
+
+    /// The radius at the angle to the axis, by Newton's method kept inside a shrinking bracket.
     fn radius(&self, angle: f64) -> f64 {
+        const STEPS: usize = 60;
         let [mut low, mut high] = [0.0, self.reach[0]];
-        while high - low > 4.0 * f64::EPSILON * high {
-            let middle = 0.5 * (low + high);
-            if self.angle(middle) < angle { low = middle } else { high = middle }
+        let mut radius = high * (angle / self.reach[1]).clamp(0.0, 1.0);
+        for _ in 0..STEPS {
+            let (seen, slope) = self.angle_and_slope(radius);
+            if seen < angle {
+                low = radius
+            } else {
+                high = radius
+            }
+            let newton = radius + (angle - seen) / slope;
+            let next = if newton >= low && newton <= high { newton } else { 0.5 * (low + high) };
+            let step = (next - radius).abs();
+            radius = next;
+            if step <= 2.0 * f64::EPSILON * high {
+                break;
+            }
         }
-        0.5 * (low + high)
+        radius
     }
 }
 

@@ -17,7 +17,8 @@ pub struct Radtan {
     tilt: Matrix3<f64>,
 }
 
-const NAMES: [&str; 14] = ["k1", "k2", "p1", "p2", "k3", "k4", "k5", "k6", "s1", "s2", "s3", "s4", "tau_x", "tau_y"];
+pub(super) const NAMES: [&str; 14] =
+    ["k1", "k2", "p1", "p2", "k3", "k4", "k5", "k6", "s1", "s2", "s3", "s4", "tau_x", "tau_y"];
 
 impl Radtan {
     /// The distortion with the first `coefficients`, of which OpenCV knows 4, 5, 8, 12 and 14, and none. `None` for another number.

@@ -102,8 +102,11 @@ impl Formula for SplinedStereographic {
                 ModelParameter::new(&format!("d{axis}_{row}_{column}"), ParameterUnit::One, *value)
             })
         };
-        ModelParameter::pinhole(self.pinhole)
+        let SplineGrid { order, columns, rows, field_deg } = self.grid;
+        let grid = [order as f64, columns as f64, rows as f64, field_deg];
+        ModelParameter::named(&["order", "Nx", "Ny", "fov_x_deg"], ParameterUnit::One, &grid)
             .into_iter()
+            .chain(ModelParameter::pinhole(self.pinhole))
             .chain(self.control.iter().enumerate().flat_map(point))
             .collect()
     }

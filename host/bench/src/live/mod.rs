@@ -1,0 +1,120 @@
+//! The live matcher on rendered pairs that follow one another: its rate, its delay, and how many of its points are right.
+//!
+//! Pairs come as often as cameras deliver them; while one is measured, those that come are skipped but for the newest, as in the live loop. When they
+//! come is reckoned, and what measuring takes is measured, so that nobody waits. The single-pair matcher measures some of the same pairs, and
+//! OpenCV matches them by ORB and by pyramidal Lucas-Kanade, without any knowledge of the pose.
+
+mod memory;
+mod peer;
+mod rendered;
+mod report;
+
+use std::time::Duration;
+
+use vergence_matching::{GuidedMatcher, Matcher, TrackingMatcher};
+use vergence_pipeline::{Method, PairPose, Stage, StageTimes, StandingPose, refined_cloud};
+use vergence_rig::Rig;
+use vergence_vision::median;
+
+pub use self::memory::Memory;
+use self::memory::computed_seconds;
+pub use self::peer::{PeerMatches, PeerMatching};
+pub use self::rendered::{LiveFrame, LiveFrames, Way};
+use crate::error::BenchError;
+use crate::{Clock, timed};
+
+/// What the live matcher made of the pairs of one way.
+#[derive(Clone, Debug, Default)]
+pub struct LiveFigures {
+    /// Pairs that came.
+    pub came: usize,
+    /// Pairs that were measured.
+    pub measured: usize,
+    /// Seconds from the first pair to the last result.
+    pub seconds: f64,
+    /// Seconds from the exposure of each measured pair to its points.
+    pub latency: Vec<f64>,
+    /// Seconds that each of [`STAGES`] took, over all pairs.
+    pub stages: [f64; 2],
+    /// Seconds that all threads together computed for the measured pairs.
+    pub computed: f64,
+    /// Points of each pair that are right, and all.
+    pub points: Vec<[usize; 2]>,
+    /// Right points and all of the single-pair matcher on some of the pairs.
+    pub single: Vec<[usize; 2]>,
+    /// Seconds that the single-pair matcher took for each.
+    pub single_seconds: Vec<f64>,
+    /// Memory after a quarter of the pairs and at the end.
+    pub memory: [Memory; 2],
+}
+
+/// The stages of a pair.
+pub const STAGES: [Stage; 2] = [Stage::Match, Stage::Triangulate];
+/// How often the single-pair matcher measures: every so many pairs.
+const SINGLE_EVERY: usize = 10;
+
+impl LiveFigures {
+    /// Measures `count` pairs of `frames`, of which `rate` come in a second.
+    ///
+    /// # Errors
+    /// Where a pair cannot be measured.
+    pub fn of(frames: &LiveFrames, rate: f64, count: usize, clock: Clock) -> Result<Self, BenchError> {
+        let (tracking, single) = (TrackingMatcher::default(), GuidedMatcher::default());
+        let (mut figures, mut now, mut next) = (Self { came: count, ..Self::default() }, 0.0_f64, 0);
+        while next < count {
+            // The newest pair that has come, or the next one.
+            let newest = ((now * rate) as usize).clamp(next, count - 1);
+            let (frame, exposed) = (frames.at(newest), newest as f64 / rate);
+            let (before, mut times) = (computed_seconds(), StageTimes::start(clock));
+            let (points, seconds) =
+                timed(clock, || points(&frames.rig, frame, &tracking, &mut |stage| times.ended(stage)));
+            figures.computed += computed_seconds() - before;
+            now = now.max(exposed) + seconds;
+            figures.latency.push(now - exposed);
+            figures.stages.iter_mut().zip(STAGES).for_each(|(sum, stage)| *sum += times.of(stage));
+            figures.points.push(frames.judge(frame, &points?));
+            if figures.measured % SINGLE_EVERY == 0 {
+                let (alone, seconds) = timed(clock, || points_alone(&frames.rig, frame, &single));
+                figures.single.push(frames.judge(frame, &alone?));
+                figures.single_seconds.push(seconds);
+            }
+            if next <= count / 4 {
+                figures.memory = [Memory::now(); 2];
+            }
+            figures.measured += 1;
+            next = newest + 1;
+        }
+        (figures.seconds, figures.memory[1]) = (now, Memory::now());
+        Ok(figures)
+    }
+
+    /// Median and 99th percentile of the delay.
+    #[must_use]
+    pub fn delay(&self) -> [Duration; 2] {
+        let mut sorted = self.latency.clone();
+        sorted.sort_by(f64::total_cmp);
+        let last = sorted.get((sorted.len() * 99).div_ceil(100).saturating_sub(1)).copied().unwrap_or_default();
+        [median(sorted).unwrap_or_default(), last]
+            .map(|seconds| Duration::try_from_secs_f64(seconds).unwrap_or_default())
+    }
+}
+
+fn points_alone(
+    rig: &Rig,
+    frame: &LiveFrame,
+    matcher: &dyn Matcher,
+) -> Result<Vec<vergence_vision::CloudPoint>, BenchError> {
+    points(rig, frame, matcher, &mut |_| ())
+}
+
+fn points(
+    rig: &Rig,
+    frame: &LiveFrame,
+    matcher: &dyn Matcher,
+    ended: &mut dyn FnMut(Stage),
+) -> Result<Vec<vergence_vision::CloudPoint>, BenchError> {
+    let (pose, mut standing) = (PairPose::standing(frame.pose.clone()), StandingPose::default());
+    let cloud = refined_cloud(frame.images(), rig, &pose, Method::from(matcher), &mut standing, ended);
+    let cloud = cloud.map_err(|error| BenchError::Work(error.to_string()))?;
+    Ok(cloud.points.into_iter().map(|point| point.point).collect())
+}

@@ -1,0 +1,244 @@
+//! Live matching: points that were matched in one pair are followed to the next.
+//!
+//! Of a live rig each pair shows nearly what the one before showed. A track is a matched point that is found again: first in the left view,
+//! by registration of the left view before (`follow`), then in the right view, from where pose and range predict it. Only where tracks are
+//! missing are corners sought and compared (`search`), strip by strip of the views, a strip in each pair; a first pair, or one in which most tracks
+//! are lost, is searched as a whole at once.
+//!
+//! What is found this way passes the same tests as what [`GuidedMatcher`] finds in a single pair, and states its errors by the same rules. A track
+//! that fails a test makes no point of that pair; after a few such pairs it ends. Both images of a pair are exposed together, so that a point that
+//! moves in the scene may be followed like any other.
+
+mod follow;
+mod search;
+
+use std::sync::{Mutex, PoisonError};
+
+use rayon::prelude::*;
+use vergence_vision::{KannalaBrandt, Left, Right, Transform};
+
+use self::follow::followed;
+use self::search::{Strip, newly_found};
+use crate::corners::Keypoint;
+use crate::epipolar_band::EpipolarBand;
+use crate::guided::{LEVELS, are_suspiciously_few};
+use crate::links::{Compared, Link, Links, agree_on_pose, in_originals, registered, thin};
+use crate::match_errors::state_errors;
+use crate::plane::Pyramid;
+use crate::shared_views::SharedViews;
+use crate::view::Buffers;
+use crate::{Grid, GuidedMatcher, ImagePair, MatchError, Matcher, Matches, UnmatchedReason, ViewPixel};
+
+/// A matcher for pairs that follow one another.
+#[derive(Debug)]
+pub struct TrackingMatcher {
+    /// Searches whole pairs.
+    whole: GuidedMatcher,
+    state: Mutex<State>,
+}
+
+/// Keypoints of each view when a whole pair is searched: about half of them become tracks.
+const KEYPOINTS: usize = 2000;
+/// Largest number of tracks.
+const MOST: usize = 700;
+/// Pixels of a view per radian, unless the images have more: in views of less corners of wide axes are no longer alike. Denser views than the images
+/// cost more than they find.
+const DENSITY: f64 = 183.0;
+/// Pairs in which a track may fail a test one after the other before it ends.
+const PATIENCE: u32 = 3;
+/// A pair is searched as a whole where less than this part of the tracks is left that the last such search gave.
+const FEW: f64 = 0.5;
+/// So few tracks are no base for another pair: where a pose was tried that is wrong, the next one may be right.
+const FEWEST: usize = 40;
+
+impl Default for TrackingMatcher {
+    fn default() -> Self {
+        Self::with_keypoints(KEYPOINTS)
+    }
+}
+
+impl TrackingMatcher {
+    /// Searches a whole pair as `whole` does; without its oversampling in views that are as dense as the images, or small images enlarged.
+    #[must_use]
+    pub fn new(whole: GuidedMatcher) -> Self {
+        Self { whole, state: Mutex::default() }
+    }
+
+    /// The same with so many keypoints of each view when a whole pair is searched.
+    #[must_use]
+    pub fn with_keypoints(keypoints: usize) -> Self {
+        Self::new(GuidedMatcher { keypoints, oversampling: None })
+    }
+}
+
+impl Matcher for TrackingMatcher {
+    fn name(&self) -> &'static str {
+        "tracking"
+    }
+
+    /// Finds the matches of a pair that was exposed after those before it. A pair of other cameras begins anew.
+    fn find(&self, pair: &ImagePair<'_>) -> Result<Matches, MatchError> {
+        pair.check()?;
+        // A poisoned lock only means that another thread panicked; the tracks are replaced whole.
+        let mut state = self.state.lock().unwrap_or_else(PoisonError::into_inner);
+        let density = pair.left_camera.k()[0].max(pair.right_camera.k()[0]);
+        let oversampling = self.whole.oversampling.unwrap_or(DENSITY / density).clamp(1.0, 2.0);
+        state.find(pair, &GuidedMatcher { oversampling: Some(oversampling), ..self.whole })
+    }
+}
+
+/// What is kept from pair to pair.
+#[derive(Debug, Default)]
+struct State {
+    before: Option<Before>,
+    /// Number of the next track.
+    next: u64,
+    /// Number of the next strip to be searched.
+    strip: usize,
+    /// Number of tracks that the last search of a whole pair gave.
+    at_first: usize,
+    buffers: Buffers,
+}
+
+/// The pair before.
+#[derive(Debug)]
+struct Before {
+    cameras: [KannalaBrandt; 2],
+    pose: Transform<Left, Right>,
+    grid: Grid,
+    baseline_mm: f64,
+    left: Pyramid,
+    /// In the order of their numbers.
+    tracks: Vec<Track>,
+}
+
+/// A point that is followed.
+#[derive(Clone, Copy, Debug)]
+struct Track {
+    number: u64,
+    /// Its place in the left view.
+    at: ViewPixel,
+    /// From there to its place in the right view.
+    moved: [f64; 2],
+    /// Pairs in which it failed a test since it last passed them all.
+    missed: u32,
+}
+
+/// The views of a pair, smoothed.
+struct Seen<'a> {
+    views: SharedViews<'a>,
+    left: Pyramid,
+    right: Pyramid,
+    band: EpipolarBand,
+}
+
+impl State {
+    fn find(&mut self, pair: &ImagePair<'_>, whole: &GuidedMatcher) -> Result<Matches, MatchError> {
+        let cameras = [*pair.left_camera, *pair.right_camera];
+        let before = self.before.take().filter(|before| before.cameras == cameras);
+        let kept = before.as_ref().filter(|before| is_near(&before.pose, &pair.left_from_right));
+        let grid = kept.map(|before| before.grid);
+        let views = SharedViews::in_buffers(pair, whole.oversampling, grid, &mut self.buffers)?;
+        let [left, right] = [&views.left.plane(), &views.right.plane()]
+            .map(|plane| Pyramid::in_buffers(plane, LEVELS, &mut self.buffers.values));
+        let seen = Seen { band: views.band(), views, left, right };
+        let tracks = before.as_ref().map_or_else(Vec::new, |before| followed(before, &seen));
+        let are_too_few = (tracks.len() as f64) < (FEW * self.at_first as f64).max(FEWEST as f64);
+        let strip = self.next_strip(&seen.views.grid, are_too_few);
+        let (matches, tracks) = self.matched(&seen, tracks, &strip, whole.keypoints);
+        if strip.is_whole {
+            self.at_first = tracks.len();
+        }
+        before.into_iter().for_each(|before| before.left.recycle(&mut self.buffers.values));
+        let Seen { views, left, right, .. } = seen;
+        let (grid, baseline_mm) = (views.grid, views.frame.baseline().mm());
+        right.recycle(&mut self.buffers.values);
+        views.recycle(&mut self.buffers);
+        if strip.is_whole && are_suspiciously_few(&matches) {
+            left.recycle(&mut self.buffers.values);
+            return whole.find(pair);
+        }
+        self.before = Some(Before { cameras, pose: pair.left_from_right, grid, baseline_mm, left, tracks });
+        Ok(matches)
+    }
+
+    /// The rows in which new tracks are sought.
+    fn next_strip(&mut self, grid: &Grid, is_whole: bool) -> Strip {
+        let height = grid.size().1;
+        let strip = if is_whole { Strip::whole(height) } else { Strip::new(self.strip, height) };
+        self.strip = if is_whole { 0 } else { (self.strip + 1) % Strip::COUNT };
+        strip
+    }
+
+    /// Matches what tracks and what is newly found predict, and applies all tests. The tracks that go on are returned too.
+    fn matched(
+        &mut self,
+        seen: &Seen<'_>,
+        mut tracks: Vec<Track>,
+        strip: &Strip,
+        budget: usize,
+    ) -> (Matches, Vec<Track>) {
+        let (new, right_keypoints) =
+            if tracks.len() < MOST { newly_found(seen, &tracks, strip, budget) } else { (Vec::new(), 0) };
+        let known = tracks.len();
+        let followed = tracks.iter().map(|track| Keypoint { at: track.at, level: 0 });
+        let keypoints: Vec<Keypoint> = followed.chain(new.iter().map(|(keypoint, _)| *keypoint)).collect();
+        let compared = Compared {
+            left: &seen.left,
+            right: &seen.right,
+            keypoints: &keypoints,
+            oversampling: seen.views.oversampling(),
+        };
+        let of_tracks = tracks.par_iter().map(|track| refound(&compared, track, &seen.band));
+        let of_new = new.par_iter().map(|(keypoint, link)| {
+            let from = |link: Link| registered(&compared, keypoint.at, link.right, keypoint.level, &seen.band);
+            link.and_then(|link| from(link).map_err(|failed| failed.reason))
+        });
+        let mut links: Links = of_tracks.chain(of_new).collect();
+        agree_on_pose(&mut links, &keypoints, &seen.views.grid, seen.views.pose_sigma());
+        strip.drop_repeated(&mut links, &compared, &seen.band);
+        thin(&mut links, &keypoints);
+        state_errors(&mut links, &compared, &seen.band);
+        for (track, link) in tracks.iter_mut().zip(&mut links) {
+            track.missed = if link.is_ok() { 0 } else { track.missed + 1 };
+            if let Ok(link) = link {
+                track.moved = [link.right.x - track.at.x, link.right.y - track.at.y];
+                link.track = Some(track.number);
+            }
+        }
+        let ended = |reason: &UnmatchedReason| matches!(reason, UnmatchedReason::Duplicate | UnmatchedReason::Repeated);
+        let mut ends = links.iter().map(|link| link.as_ref().err().is_some_and(ended));
+        tracks.retain(|track| !ends.next().unwrap_or_default() && track.missed < PATIENCE);
+        self.begin(&mut tracks, &keypoints[known..], &mut links[known..]);
+        let right_keypoints = right_keypoints + known;
+        (in_originals(&links, &seen.views, &keypoints, right_keypoints), tracks)
+    }
+
+    /// Begins tracks with the new links, the most probable first, as long as there is room.
+    fn begin(&mut self, tracks: &mut Vec<Track>, keypoints: &[Keypoint], links: &mut [Result<Link, UnmatchedReason>]) {
+        let mut found: Vec<(&Keypoint, &mut Link)> =
+            keypoints.iter().zip(links).filter_map(|(keypoint, link)| Some((keypoint, link.as_mut().ok()?))).collect();
+        found.sort_by(|(_, one), (_, other)| other.right_probability.total_cmp(&one.right_probability));
+        for (keypoint, link) in found.into_iter().take(MOST.saturating_sub(tracks.len())) {
+            let moved = [link.right.x - keypoint.at.x, link.right.y - keypoint.at.y];
+            link.track = Some(self.next);
+            tracks.push(Track { number: self.next, at: keypoint.at, moved, missed: 0 });
+            self.next += 1;
+        }
+    }
+}
+
+/// The right place of a track, from where it is predicted; where that is too far off, by the coarser levels.
+fn refound(compared: &Compared<'_>, track: &Track, band: &EpipolarBand) -> Result<Link, UnmatchedReason> {
+    let start = ViewPixel { x: track.at.x + track.moved[0], y: track.at.y + track.moved[1] };
+    let from = |level: usize| registered(compared, track.at, start, level, band);
+    from(0).or_else(|failed| from(LEVELS - 1).map_err(|_| failed.reason))
+}
+
+/// Whether the grid of one pose serves another: it is a degree wider than the field.
+fn is_near(one: &Transform<Left, Right>, other: &Transform<Left, Right>) -> bool {
+    /// In radians, and as a part of the baseline.
+    const NEAR: f64 = 0.004;
+    let (there, here) = (one.origin().mm(), other.origin().mm());
+    one.rotation().angle_to(&other.rotation()) < NEAR && (there - here).norm() < NEAR * there.norm()
+}

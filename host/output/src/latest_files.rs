@@ -1,0 +1,83 @@
+//! The files of the live loop: always the newest result, or one for every result.
+
+use std::io::ErrorKind;
+use std::path::{Path, PathBuf};
+
+use vergence_files::{FileError, write_whole};
+use vergence_pipeline::{Bearing, ColouredPoint};
+
+use crate::{OutputError, PlyEncoding, Table, TableFormat, ply};
+
+/// Where results go as files.
+///
+/// In a folder, `cloud.ply` is always the newest cloud, written whole; it is removed while one camera is dead, so that nobody takes an old cloud for a
+/// new one, and `bearings.csv` is written instead.
+#[derive(Clone, Debug)]
+pub struct LatestFiles {
+    /// The folder; `None` writes nothing.
+    pub folder: Option<PathBuf>,
+    /// Write a numbered file for every result, instead of one file with the newest.
+    pub keep: bool,
+    /// Tables beside the PLY files.
+    pub also: Vec<TableFormat>,
+    /// How clouds are written.
+    pub encoding: PlyEncoding,
+}
+
+impl LatestFiles {
+    /// Writes the cloud of result `number`.
+    ///
+    /// # Errors
+    /// A file that cannot be written.
+    pub fn write_cloud(&self, number: u64, points: &[ColouredPoint]) -> Result<(), OutputError> {
+        let Some(folder) = &self.folder else { return Ok(()) };
+        self.withdraw(folder, "bearings", &["csv", "json"])?;
+        write_whole(&self.file(folder, ("cloud", number), "ply"), &ply(points, self.encoding))?;
+        self.write_tables(folder, ("cloud", number), &Table::of_points(points), &self.also)
+    }
+
+    /// Writes the bearings of result `number`.
+    ///
+    /// # Errors
+    /// A file that cannot be written.
+    pub fn write_bearings(&self, number: u64, bearings: &[Bearing]) -> Result<(), OutputError> {
+        let Some(folder) = &self.folder else { return Ok(()) };
+        self.withdraw(folder, "cloud", &["ply", "csv", "json"])?;
+        let formats = if self.also.is_empty() { &[TableFormat::Csv][..] } else { &self.also };
+        self.write_tables(folder, ("bearings", number), &Table::of_bearings(bearings), formats)
+    }
+
+    fn write_tables(
+        &self,
+        folder: &Path,
+        name: (&str, u64),
+        table: &Table,
+        formats: &[TableFormat],
+    ) -> Result<(), OutputError> {
+        formats.iter().try_for_each(|&format| {
+            Ok(write_whole(&self.file(folder, name, format.extension()), table.text(format).as_bytes())?)
+        })
+    }
+
+    fn file(&self, folder: &Path, (stem, number): (&str, u64), extension: &str) -> PathBuf {
+        match self.keep {
+            true => folder.join(format!("{stem}{number:06}.{extension}")),
+            false => folder.join(format!("{stem}.{extension}")),
+        }
+    }
+
+    /// Removes files that are no longer the newest result.
+    fn withdraw(&self, folder: &Path, stem: &str, extensions: &[&str]) -> Result<(), OutputError> {
+        if self.keep {
+            return Ok(());
+        }
+        for extension in extensions {
+            let path = folder.join(format!("{stem}.{extension}"));
+            match std::fs::remove_file(&path) {
+                Err(error) if error.kind() != ErrorKind::NotFound => return Err(FileError::write(&path, error).into()),
+                _ => {}
+            }
+        }
+        Ok(())
+    }
+}

@@ -1,0 +1,57 @@
+// State, link, clock, cloud, and the fault with its remedy.
+const byId = (id) => document.getElementById(id);
+const MOVES = ['moving', 'homing', 'stopping'];
+
+export function showHealth(link) {
+  let [fault, refusal, closed, extrapolations] = [null, null, true, []];
+  let forget = 0;
+  const banner = () => {
+    const text = closed ? 'The panel does not answer: waiting for it to come back. If it was closed, start it again.'
+      : fault ? `Fault: ${fault}` : refusal;
+    if (byId('banner').textContent !== (text ?? '')) byId('banner').textContent = text ?? '';
+    byId('banner').hidden = !text;
+  };
+  const state = (text, kind) => {
+    byId('state').textContent = text;
+    byId('state').className = `chip strong ${kind}`;
+  };
+  link.on('open', () => { closed = false; banner(); });
+  link.on('closed', () => { closed = true; state('no panel', 'bad'); banner(); });
+  link.on('refused', ({ text }) => {
+    refusal = text;
+    banner();
+    clearTimeout(forget);
+    forget = setTimeout(() => { refusal = null; banner(); }, 6000);
+  });
+  link.on('hello', ({ rig, simulated, version }) => {
+    byId('rig-name').textContent = `${rig}${simulated ? ' (simulated)' : ''}`;
+    byId('rig-name').title = `vergence ${version}${simulated ? `; simulated: ${simulated}` : ''}`;
+    document.title = `${rig} · vergence`;
+  });
+  link.on('status', (status) => {
+    fault = status.fault?.text ?? null;
+    state(status.state, fault ? 'bad' : MOVES.includes(status.state) ? 'moves' : 'good');
+    byId('mode').hidden = !status.mode;
+    byId('mode').textContent = status.mode ?? '';
+    const { round_trip_us: trip, poses_lost: lost, retransmitted } = status.link;
+    byId('link-chip').textContent = `link ${trip === null ? 'not measured' : `${(trip / 1000).toFixed(1)} ms`}${lost + retransmitted ? `, lost ${lost}, repeated ${retransmitted}` : ''}`;
+    const { error_us: error, lost: clockLost } = status.clock;
+    byId('clock-chip').textContent = clockLost ? 'clock lost' : error === null ? 'clock not compared' : `clock ±${error.toFixed(0)} µs`;
+    byId('clock-chip').classList.toggle('bad', clockLost);
+    banner();
+  });
+  link.on('view', (view) => { extrapolations = view.extrapolations; });
+  link.on('cloud', (cloud) => {
+    const what = cloud.bearings
+      ? `${cloud.bearings.count} bearings of the ${cloud.bearings.camera} camera, no range: ${cloud.bearings.why}`
+      : `${cloud.count} points of ${cloud.matches} matches`;
+    const remarks = [
+      cloud.drifted ? 'pose drifted' : null,
+      cloud.calibration_known === false ? 'calibration unknown' : null,
+      extrapolations.length ? 'beyond the calibrated range' : null,
+    ].filter(Boolean);
+    byId('cloud-chip').textContent = [what, `${cloud.latency_ms.toFixed(0)} ms`, ...remarks].join(' · ');
+    byId('cloud-chip').title = extrapolations.join(' ');
+    byId('cloud-chip').classList.toggle('bad', Boolean(cloud.bearings) || cloud.drifted === true);
+  });
+}

@@ -1,0 +1,29 @@
+//! Why the panel cannot be shown, or ended.
+
+use std::net::SocketAddr;
+
+use vergence_board::BoardError;
+use vergence_live::LiveError;
+
+/// Why the panel cannot be shown, or ended. The text is a sentence.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+pub enum PanelError {
+    /// The address cannot be listened on.
+    #[error("the panel cannot listen on {address}: {why}; choose another with --listen, port 0 takes a free one")]
+    Listen {
+        /// The address.
+        address: SocketAddr,
+        /// What the operating system says.
+        why: String,
+    },
+    /// The server cannot begin.
+    #[error("the server of the panel does not start: {0}")]
+    Server(String),
+    /// The board or its link failed.
+    #[error(transparent)]
+    Board(#[from] BoardError),
+    /// The live loop failed.
+    #[error(transparent)]
+    Live(#[from] LiveError),
+}

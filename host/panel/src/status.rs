@@ -1,0 +1,75 @@
+//! The board as pages see it: pose, state, fault with its remedy, clock, link.
+
+use std::sync::Arc;
+use std::time::Duration;
+
+use serde_json::{Value, json};
+use vergence_board::{BoardKnowledge, Client, HostClock, pose_json, positions};
+use vergence_protocol::{ControllerState, Microseconds, PoseReport};
+use vergence_rig::{AxisPosition, Rig, rounded};
+
+use crate::hub::{Hub, Task, text_message};
+use crate::streams::Stream;
+
+/// Shortest time between two messages, unless the state changes or a fault comes or goes.
+const PACE: Duration = Duration::from_millis(50);
+
+/// Tells the pages of every pose, as often as they have use for it.
+pub struct Reporter {
+    hub: Arc<Hub>,
+    knowledge: BoardKnowledge,
+    clock: HostClock,
+    told: Option<(Microseconds, ControllerState, bool)>,
+}
+
+impl Reporter {
+    /// Reports of the board behind `client`.
+    pub fn new(hub: Arc<Hub>, client: &Client) -> Self {
+        Self { hub, knowledge: client.knowledge(), clock: client.clock(), told: None }
+    }
+
+    /// Tells of a pose.
+    pub fn report(&mut self, rig: &Rig, pose: &PoseReport) {
+        let (now, state) = (self.clock.now(), (pose.state, pose.fault.is_some()));
+        let early = |then: Microseconds| u128::from(now.0.saturating_sub(then.0)) < PACE.as_micros();
+        if self.told.is_some_and(|(then, before, fault)| early(then) && (before, fault) == state) {
+            return;
+        }
+        self.told = Some((now, state.0, state.1));
+        let values = positions(rig, pose);
+        self.hub.put(Stream::Status, text_message(&self.json(rig, pose, &values)));
+        self.hub.place.send_replace(Some(values.iter().map(|position| position.value()).collect()));
+    }
+
+    fn json(&self, rig: &Rig, pose: &PoseReport, values: &[AxisPosition]) -> Value {
+        let Task { text, targets } = self.hub.task();
+        let in_units = |all: &[AxisPosition]| -> Vec<f64> { all.iter().map(|at| rounded(at.mm_or_deg())).collect() };
+        let (map, statistics) = (self.knowledge.clock_map(), self.knowledge.statistics());
+        let error = map.board_at(self.clock.now()).map(|now| rounded(now.error_us));
+        let mut status = pose_json(rig, pose);
+        for (name, value) in [
+            ("kind", json!("status")),
+            ("values", json!(in_units(values))),
+            ("targets", json!(targets.as_deref().map(in_units))),
+            ("doing", json!(text)),
+            (
+                "clock",
+                json!({
+                    "error_us": error, "drift_ppm": map.drift().map(|drift| rounded(drift.ppm)), "lost": map.is_lost(),
+                }),
+            ),
+            (
+                "link",
+                json!({
+                    "round_trip_us": statistics.round_trip.map(|time| time.0),
+                    "poses_lost": statistics.poses_lost,
+                    "retransmitted": statistics.retransmitted,
+                    "dropped": statistics.link.dropped(),
+                }),
+            ),
+        ] {
+            status[name] = value;
+        }
+        status
+    }
+}

@@ -1,0 +1,159 @@
+//! Reads a recording from its beginning to its end, or to where the program that wrote it died.
+
+use std::collections::BTreeMap;
+use std::fs::File;
+use std::io::{BufReader, Read};
+use std::path::{Path, PathBuf};
+
+use image::{ImageFormat, RgbImage};
+use mcap::records::{Record, op};
+use mcap::sans_io::{LinearReadEvent, LinearReader, LinearReaderOptions};
+
+use crate::RecordingError;
+use crate::bag::{EVENTS, FILE, LEFT_IMAGE, RIG, RIGHT_IMAGE};
+use crate::cdr::{image_bytes, number_and_bytes};
+use crate::event::{Event, Eye};
+
+/// A recording that is being read.
+pub struct Reader {
+    file: PathBuf,
+    bytes: BufReader<File>,
+    records: LinearReader,
+    /// Topics by the number of their channel.
+    topics: BTreeMap<u16, String>,
+    rig: Option<String>,
+    images: [Option<Vec<u8>>; 2],
+    is_finished: bool,
+}
+
+/// An event of a recording with the time at which it was heard.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Heard {
+    /// The time on the host's clock in microseconds.
+    pub host_us: u64,
+    /// The event.
+    pub event: Event,
+    /// The image of [`Event::Image`].
+    pub image: Option<RgbImage>,
+}
+
+/// What a record means.
+enum Meaning {
+    Nothing,
+    Heard(Box<Heard>),
+}
+
+impl Reader {
+    /// Opens the recording in `folder`, or the MCAP file of that name.
+    ///
+    /// # Errors
+    /// [`RecordingError::Read`]
+    pub fn open(path: &Path) -> Result<Self, RecordingError> {
+        let file = if path.is_dir() { path.join(FILE) } else { path.to_owned() };
+        let bytes = File::open(&file).map_err(|error| RecordingError::read(&file, error))?;
+        // The end is missing where the program that wrote it died.
+        let options = LinearReaderOptions::default().with_skip_end_magic(true).with_validate_chunk_crcs(true);
+        let records = LinearReader::new_with_options(options);
+        let bytes = BufReader::new(bytes);
+        Ok(Self { file, bytes, records, topics: BTreeMap::new(), rig: None, images: [None, None], is_finished: false })
+    }
+
+    /// The rig file that is attached; it precedes all events.
+    #[must_use]
+    pub fn rig(&self) -> Option<&str> {
+        self.rig.as_deref()
+    }
+
+    /// Whether the end of the recording was read. That of a program that was killed has none: its last events are lost.
+    #[must_use]
+    pub const fn is_finished(&self) -> bool {
+        self.is_finished
+    }
+
+    /// The file that is read.
+    #[must_use]
+    pub fn file(&self) -> &Path {
+        &self.file
+    }
+
+    /// The next event; `None` after the last.
+    ///
+    /// # Errors
+    /// [`RecordingError::Read`], [`RecordingError::Foreign`]
+    pub fn next_event(&mut self) -> Result<Option<Heard>, RecordingError> {
+        loop {
+            let Some((opcode, body)) = self.record()? else { return Ok(None) };
+            if let Meaning::Heard(heard) = self.understand(opcode, &body)? {
+                return Ok(Some(*heard));
+            }
+        }
+    }
+
+    /// The next record of the file.
+    fn record(&mut self) -> Result<Option<(u8, Vec<u8>)>, RecordingError> {
+        let mut is_at_end = false;
+        loop {
+            match self.records.next_event() {
+                None => return Ok(None),
+                Some(Ok(LinearReadEvent::Record { opcode, data })) => return Ok(Some((opcode, data.to_vec()))),
+                Some(Ok(LinearReadEvent::ReadRequest(_)) | Err(_)) if is_at_end => return Ok(None),
+                Some(Ok(LinearReadEvent::ReadRequest(count))) => {
+                    let room = self.records.insert(count);
+                    let read = self.bytes.read(room).map_err(|error| RecordingError::read(&self.file, error))?;
+                    self.records.notify_read(read);
+                    is_at_end = read == 0;
+                }
+                Some(Err(error)) => return Err(RecordingError::read(&self.file, error)),
+            }
+        }
+    }
+
+    fn understand(&mut self, opcode: u8, body: &[u8]) -> Result<Meaning, RecordingError> {
+        self.is_finished |= opcode == op::DATA_END;
+        if !matches!(opcode, op::CHANNEL | op::MESSAGE | op::ATTACHMENT) {
+            return Ok(Meaning::Nothing);
+        }
+        match mcap::parse_record(opcode, body).map_err(|error| RecordingError::read(&self.file, error))? {
+            Record::Channel(channel) => _ = self.topics.insert(channel.id, channel.topic),
+            Record::Attachment { header, data, .. } if header.name == RIG => {
+                let text = String::from_utf8(data.into_owned());
+                self.rig = Some(text.map_err(|_| self.foreign("the attached rig file"))?);
+            }
+            Record::Message { header, data } => match self.topics.get(&header.channel_id).map(String::as_str) {
+                Some(topic) if topic == EVENTS.name => {
+                    return self.event(&data).map(|heard| Meaning::Heard(Box::new(heard)));
+                }
+                Some(topic) if topic == LEFT_IMAGE.name => self.images[0] = Some(self.image(&data)?),
+                Some(topic) if topic == RIGHT_IMAGE.name => self.images[1] = Some(self.image(&data)?),
+                _ => {}
+            },
+            _ => {}
+        }
+        Ok(Meaning::Nothing)
+    }
+
+    fn image(&self, message: &[u8]) -> Result<Vec<u8>, RecordingError> {
+        image_bytes(message).map(<[u8]>::to_vec).ok_or_else(|| self.foreign("an image"))
+    }
+
+    fn event(&mut self, message: &[u8]) -> Result<Heard, RecordingError> {
+        let (host_us, postcard) = number_and_bytes(message).ok_or_else(|| self.foreign("an event"))?;
+        let event: Event = postcard::from_bytes(postcard).map_err(|_| self.foreign("an event"))?;
+        let image = match event {
+            Event::Image(eye, _) => Some(self.decoded(eye)?),
+            _ => None,
+        };
+        Ok(Heard { host_us, event, image })
+    }
+
+    /// The image that was written just before its event.
+    fn decoded(&mut self, eye: Eye) -> Result<RgbImage, RecordingError> {
+        let png = self.images[eye.side().index()].take().ok_or_else(|| self.foreign("an event without its image"))?;
+        let image = image::load_from_memory_with_format(&png, ImageFormat::Png);
+        Ok(image.map_err(|error| self.foreign(format!("an image ({error})")))?.into_rgb8())
+    }
+
+    fn foreign(&self, what: impl Into<String>) -> RecordingError {
+        RecordingError::foreign(&self.file, what)
+    }
+}

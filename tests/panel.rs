@@ -1,0 +1,109 @@
+//! The panel as people use it: `vergence demo --panel` in a real browser, which clicks, watches and looks.
+//!
+//! It needs node, and Chromium (`VERGENCE_CHROMIUM`, or `chromium` in the path), and what `npm ci` fetches in `tests/panel`. Without them the
+//! test prints `SKIPPED`; with `VERGENCE_REQUIRE_DATA=1` it fails. Its pictures are kept in `target/tmp/panel`.
+#![allow(
+    clippy::expect_used,
+    clippy::panic,
+    clippy::print_stdout,
+    reason = "a test fails loudly and shows its figures"
+)]
+
+mod common;
+
+use std::io::{BufRead, BufReader, Write};
+use std::path::{Path, PathBuf};
+use std::process::{Child, Command, Stdio};
+
+use common::data::say_skipped;
+use common::{fails_with, vergence};
+use serde_json::Value;
+
+/// A panel in its own process; ends with the value.
+struct Served {
+    process: Child,
+    url: String,
+}
+
+impl Served {
+    fn start(arguments: &[&str]) -> Self {
+        let mut process = vergence(arguments).arg("--json").stdout(Stdio::piped()).spawn().expect("the panel starts");
+        let mut out = BufReader::new(process.stdout.take().expect("piped"));
+        let mut line = String::new();
+        out.read_line(&mut line).expect("it says where it is");
+        let said: Value = serde_json::from_str(&line).expect("JSON");
+        Self { process, url: said["url"].as_str().expect("an address").to_owned() }
+    }
+
+    /// Ends as by Ctrl-C, in order.
+    fn terminate(&mut self) {
+        let asked = Command::new("kill").arg(self.process.id().to_string()).status().expect("kill runs");
+        assert!(asked.success() && self.process.wait().expect("it was started").success());
+    }
+}
+
+impl Drop for Served {
+    fn drop(&mut self) {
+        // A process that has ended already is what we want.
+        let _ = self.process.kill();
+        let _ = self.process.wait();
+    }
+}
+
+/// The browser and the folder with the script, if everything is there; else the test is skipped, or fails where data are required.
+fn browser() -> Option<(String, PathBuf)> {
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../tests/panel");
+    let chromium = std::env::var("VERGENCE_CHROMIUM").unwrap_or_else(|_| "chromium".to_owned());
+    let path = std::env::var_os("PATH").unwrap_or_default();
+    let program = |name: &str| std::env::split_paths(&path).map(|folder| folder.join(name)).find(|file| file.exists());
+    let why = match (program(&chromium), program("node"), folder.join("node_modules/playwright-core").exists()) {
+        (None, ..) => format!("there is no {chromium}: install Chromium, or name it by VERGENCE_CHROMIUM"),
+        (_, None, _) => "there is no node: install Node.js".to_owned(),
+        (.., false) => "tests/panel lacks its packages: run 'npm ci' there".to_owned(),
+        (Some(chromium), ..) => return Some((chromium.display().to_string(), folder)),
+    };
+    let required = std::env::var_os("VERGENCE_REQUIRE_DATA").is_some_and(|value| value == "1");
+    assert!(!required, "VERGENCE_REQUIRE_DATA=1, but {why}");
+    say_skipped(&why);
+    None
+}
+
+#[test]
+fn people_see_and_drive_the_rig_in_a_browser() {
+    let Some((chromium, folder)) = browser() else { return };
+    let pictures = Path::new(env!("CARGO_TARGET_TMPDIR")).join("panel");
+    std::fs::create_dir_all(&pictures).expect("a folder");
+    let mut served = Served::start(&["demo", "--panel", "127.0.0.1:0"]);
+    let address = served.url.trim_start_matches("http://").trim_end_matches('/').to_owned();
+    let mut script = Command::new("node")
+        .arg(folder.join("browse.mjs"))
+        .args([&chromium, &served.url])
+        .arg(&pictures)
+        .stdin(Stdio::piped())
+        .stdout(Stdio::piped())
+        .spawn()
+        .expect("node starts");
+    let mut answer = script.stdin.take().expect("piped");
+    for asked in BufReader::new(script.stdout.take().expect("piped")).lines() {
+        match asked.expect("text").as_str() {
+            "kill" => served.terminate(),
+            "start" => served = Served::start(&["demo", "--panel", &address]),
+            other => panic!("the script asks for '{other}'"),
+        }
+        writeln!(answer, "done").expect("the script listens");
+    }
+    assert!(script.wait().expect("it was started").success(), "the browser found a fault: see above");
+    for name in ["desktop", "phone", "light"] {
+        assert!(pictures.join(format!("{name}.png")).exists());
+    }
+}
+
+#[test]
+fn other_computers_need_a_flag_and_get_a_token() {
+    fails_with(&["--port", "sim", "panel", "--listen", "0.0.0.0:0"], 2, &["--network", "token"]);
+    let served = Served::start(&["--port", "sim", "panel", "--cameras", "sim", "--listen", "0.0.0.0:0", "--network"]);
+    let token = served.url.split("?token=").nth(1).expect("a token");
+    assert!(token.len() == 32 && token.bytes().all(|byte| byte.is_ascii_hexdigit()), "{token}");
+    let again = Served::start(&["--port", "sim", "panel", "--cameras", "sim", "--listen", "0.0.0.0:0", "--network"]);
+    assert!(!again.url.contains(token), "each run has a token of its own");
+}

@@ -1,0 +1,155 @@
+//! Recordings: what other programs read in them, what a replay makes of them, and what is left when the program dies. Board, stages and cameras are
+//! simulated; the live loop, the recording and the readers are the real ones.
+#![allow(
+    clippy::expect_used,
+    clippy::panic,
+    clippy::print_stdout,
+    reason = "a test fails loudly and shows its figures"
+)]
+
+mod common;
+
+use std::path::{Path, PathBuf};
+use std::process::{Command, Stdio};
+use std::time::Duration;
+
+use common::{fails_with, python, run, text, vergence};
+use vergence_rig::BENCH_TOML;
+
+/// The bench with small cameras.
+fn small_bench(folder: &Path) -> PathBuf {
+    let rig = BENCH_TOML.replace("[1280, 1280]", "[320, 320]").replace("366.0", "91.5").replace("639.5", "159.5");
+    let path = folder.join("small.toml");
+    std::fs::write(&path, rig).expect("a file");
+    path
+}
+
+fn path_of(folder: &Path, name: &str) -> String {
+    folder.join(name).to_str().expect("a name").to_owned()
+}
+
+/// The arguments that measure on the simulated bench and record it in `recording`.
+fn recorded<'a>(rig: &'a str, recording: &'a str) -> Vec<&'a str> {
+    let board = ["--port", "sim", "--rig", rig, "run", "--cameras", "sim", "--home", "--match-time", "100ms"];
+    [&board[..], &["--rate", "5", "--record", recording]].concat()
+}
+
+/// What the command says, which succeeds.
+fn succeeds(arguments: &[&str]) -> String {
+    let output = run(arguments);
+    assert!(output.status.success(), "{arguments:?}: {}", text(&output.stderr));
+    text(&output.stdout)
+}
+
+/// The clouds in a folder, in their order.
+fn clouds(folder: &str) -> Vec<Vec<u8>> {
+    let entries = std::fs::read_dir(folder).expect("a folder").map(|entry| entry.expect("an entry").path());
+    let mut files: Vec<_> =
+        entries.filter(|path| path.extension().is_some_and(|extension| extension == "ply")).collect();
+    files.sort();
+    files.iter().map(|file| std::fs::read(file).expect("a file")).collect()
+}
+
+#[test]
+fn a_recording_is_read_by_other_programs_and_replays_to_the_same_clouds() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let folder = folder.path();
+    let rig = small_bench(folder);
+    let (recording, live) = (path_of(folder, "recording"), path_of(folder, "live"));
+    let arguments = recorded(rig.to_str().expect("a name"), &recording);
+    let said = succeeds(&[&arguments[..], &["--frames", "4", "--out", &live, "--keep"]].concat());
+    assert!(said.contains("recorded "), "{said}");
+
+    let replays = ["first", "second"].map(|name| {
+        let out = path_of(folder, name);
+        succeeds(&["replay", &recording, "--out", &out, "--keep"]);
+        clouds(&out)
+    });
+    let live = clouds(&live);
+    assert_eq!(live.len(), 4);
+    assert_eq!(replays[0], replays[1], "two replays differ");
+    assert!(replays[0].len() >= live.len(), "{} clouds replayed, {} live", replays[0].len(), live.len());
+    assert_eq!(replays[0][..4], live[..], "a replay differs from what was measured live");
+
+    fails_with(&recorded(rig.to_str().expect("a name"), &recording), 2, &["there is something already"]);
+    readable_by_others(Path::new(&recording));
+}
+
+/// Two readers of other projects decode every message; written again by one of them, each is the same bytes.
+fn readable_by_others(recording: &Path) {
+    const READ: &str = r#"
+import sys
+from pathlib import Path
+from rosbags.highlevel import AnyReader
+from rosbags.typesys import Stores, get_typestore, get_types_from_msg
+from mcap_ros2.reader import read_ros2_messages
+bag = Path(sys.argv[1])
+from mcap.reader import make_reader
+store = get_typestore(Stores.EMPTY)
+seen = {}
+with open(bag / "recording_0.mcap", "rb") as file:
+    reader = make_reader(file)
+    for schema in reader.get_summary().schemas.values():
+        store.register(get_types_from_msg(schema.data.decode(), schema.name))
+    assert [a.name for a in reader.iter_attachments()] == ["rig.toml"]
+with AnyReader([bag], default_typestore=store) as reader:
+    assert len(reader.connections) >= 8, reader.connections
+    for connection, stamp, raw in reader.messages():
+        message = store.deserialize_cdr(raw, connection.msgtype)
+        again = bytes(store.serialize_cdr(message, connection.msgtype))
+        assert again == bytes(raw), (connection.topic, len(again), len(raw))
+        seen[connection.topic] = seen.get(connection.topic, 0) + 1
+    assert reader.message_count == sum(seen.values())
+other = sum(1 for _ in read_ros2_messages(str(bag / "recording_0.mcap")))
+assert other == sum(seen.values()), (other, seen)
+print(seen)
+"#;
+    let Some(python) = python("import rosbags, mcap_ros2", "rosbags mcap-ros2-support") else { return };
+    let output = Command::new(python).args(["-c", READ]).arg(recording).output().expect("python runs");
+    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+    let seen = String::from_utf8_lossy(&output.stdout).into_owned();
+    println!("read by rosbags and mcap-ros2-support: {}", seen.trim());
+    let topics = [
+        "/left/image/compressed",
+        "/right/image/compressed",
+        "/left/camera_info",
+        "/joint_states",
+        "/tf",
+        "/points",
+        "/vergence/events",
+    ];
+    assert!(topics.iter().all(|topic| seen.contains(topic)), "{seen}");
+}
+
+#[test]
+fn a_recording_that_was_killed_replays_up_to_its_last_whole_chunk() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let folder = folder.path();
+    let rig = small_bench(folder);
+    let recording = path_of(folder, "recording");
+    let mut child = vergence(&recorded(rig.to_str().expect("a name"), &recording))
+        .stdout(Stdio::null())
+        .stderr(Stdio::null())
+        .spawn()
+        .expect("it starts");
+    let file = Path::new(&recording).join("recording_0.mcap");
+    let size = || std::fs::metadata(&file).map_or(0, |metadata| metadata.len());
+    for _ in 0..1200 {
+        if size() > 2_500_000 {
+            break;
+        }
+        std::thread::sleep(Duration::from_millis(50));
+    }
+    child.kill().expect("it can be killed");
+    child.wait().expect("it ends");
+    println!("killed with {} bytes on the disk", size());
+    assert!(size() > 2_500_000, "it recorded nothing");
+
+    let out = path_of(folder, "replayed");
+    succeeds(&["replay", &recording, "--out", &out, "--keep", "--frames", "3"]);
+    assert_eq!(clouds(&out).len(), 3);
+    // The whole of it.
+    let whole = vergence(&["replay", &recording, "--from", "1h"]).output().expect("it runs");
+    assert!(whole.status.success());
+    assert!(text(&whole.stderr).contains("was not finished"), "{}", text(&whole.stderr));
+}
