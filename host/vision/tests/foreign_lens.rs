@@ -10,7 +10,6 @@ mod foreign_models;
 
 use std::collections::BTreeMap;
 use std::sync::LazyLock;
-use std::time::Instant;
 
 use foreign_models::*;
 use nalgebra::{UnitQuaternion, Vector2, Vector3};
@@ -195,42 +194,9 @@ fn points_of_such_a_pair_are_where_they_are() {
     assert!(by_polynomial > 0.1, "{by_polynomial} mm");
 }
 
-/// Nanoseconds per point, the least of many rounds in which all examples take turns, over those of a polynomial lens in the same rounds.
 #[test]
-#[expect(clippy::disallowed_methods, reason = "what is measured here is time")]
-fn symmetric_models_take_at_most_three_times_the_time_of_a_polynomial() {
-    const POINTS: u32 = 4096;
-    let rounds = if std::env::var_os("VERGENCE_SEEDS").is_some() { 200 } else { 20 };
-    let own = ("polynomial", kannala_brandt());
-    let lenses: Vec<_> =
-        std::iter::once(own).chain(EXAMPLES.iter().map(|example| (example.name, example.lens))).collect();
-    let work = |(name, lens): &(&'static str, KannalaBrandt)| {
-        let field = lens.theta_max().rad().min(1.5);
-        let sent =
-            (0..POINTS).map(|n| at(field * f64::from(n) / f64::from(POINTS), 2.4 * f64::from(n)).vector().into());
-        let (batch, sent) = (BatchLens::new(lens), sent.collect::<Vec<[f64; 3]>>());
-        let pixels = batch.project(&sent);
-        (*name, batch, sent, pixels, [f64::INFINITY; 2])
-    };
-    let mut works: Vec<_> = lenses.iter().map(work).collect();
-    let (mut seen, mut rays) = (Vec::new(), Vec::new());
-    for _ in 0..rounds {
-        for (_, batch, sent, pixels, least) in &mut works {
-            seen.clear();
-            rays.clear();
-            let start = Instant::now();
-            batch.project_into(sent, &mut seen);
-            let middle = Instant::now();
-            batch.unproject_into(pixels, &mut rays);
-            let ends = [middle - start, middle.elapsed()].map(|time| time.as_secs_f64() * 1e9 / f64::from(POINTS));
-            *least = [least[0].min(ends[0]), least[1].min(ends[1])];
-        }
-    }
-    let polynomial = works[0].4;
-    for (name, batch, .., least) in &works {
-        let times = [least[0] / polynomial[0], least[1] / polynomial[1]];
-        println!("{name}: {:.1} ns and {:.1} ns, {:.1} and {:.1} times", least[0], least[1], times[0], times[1]);
-        assert!(!batch.is_fitted() || times.iter().all(|times| *times <= 3.0), "{name}: {times:?}");
-    }
-    assert!(works.iter().filter(|(_, batch, ..)| batch.is_fitted()).count() > 4, "symmetric models are tabulated");
+fn symmetric_models_are_tabulated_for_arrays() {
+    let tabulated = |example: &&Example| BatchLens::new(&example.lens).is_fitted();
+    let names: Vec<_> = EXAMPLES.iter().filter(tabulated).map(|example| example.name).collect();
+    assert!(names.len() > 4, "{names:?}");
 }
