@@ -48,6 +48,7 @@ const VERBS: &[&str] = &[
     "bench",
     "soak",
     "completions",
+    "panel",
 ];
 
 fn temporary() -> tempfile::TempDir {

@@ -132,7 +132,7 @@ fn depth_of_given_correspondences() {
     assert!(csv.starts_with("x_mm,y_mm,z_mm,red,green,blue,u_left") && csv.lines().count() == 2, "{csv}");
     assert_eq!(
         (json["columns"][10].as_str(), json["rows"][0].as_array().map(Vec::len)),
-        (Some("sigma_range_mm"), Some(25))
+        (Some("sigma_range_mm"), Some(26))
     );
     assert!((row[0] - 100.0).abs() < 0.01 && (row[2] - 100.0).abs() < 0.01, "{row:?}");
     // The variance of the range, along (1, 0, 1): half of xx and zz, and xz.
