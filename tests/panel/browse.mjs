@@ -104,12 +104,12 @@ try {
   // A second page, a phone, watches, asks, and takes over.
   const second = await open({ viewport: { width: 390, height: 844 }, isMobile: true, hasTouch: true, colorScheme: 'light' });
   await holds(second, () => /page \d+ drives, you watch/.test(document.querySelector('#who').textContent));
-  assert.ok(await second.isDisabled('#home'), 'who watches does not drive');
+  await holds(second, () => document.querySelector('#home').disabled); // Who watches does not drive.
   assert.ok(await second.isEnabled('#stop'), 'everybody may stop');
   await second.click('#take');
   await first.click('#take:has-text("Hand over")');
   await drives(second);
-  assert.ok(await first.isDisabled('#home'));
+  await holds(first, () => document.querySelector('#home').disabled);
   await holds(second, () => !document.querySelector('#cloud-chip').textContent.startsWith('no cloud'));
   const wide = await second.evaluate(() => document.documentElement.scrollWidth);
   assert.ok(wide <= 390, `the page is ${wide} pixels wide on a phone of 390`);
