@@ -216,6 +216,7 @@ const ONLY_FOR: &[(&str, &[&str])] = &[
             "vergence-live",
             "vergence-calibration-input",
             "vergence-panel",
+            "vergence-recording",
             "vergence",
         ],
     ),

@@ -14,7 +14,7 @@ use vergence_targets::TargetView;
 use vergence_vision::{LENS_PARAMETERS, OpenCvFisheye};
 
 fn calibrate(views: &[TargetView]) -> IntrinsicsCalibration {
-    calibrate_intrinsics(views, lens().size(), &IntrinsicsOptions::default()).unwrap()
+    calibrate_intrinsics(views, lens().size(), &IntrinsicsOptions::central()).unwrap()
 }
 
 /// The square of the difference of two lenses in units of `covariance`.

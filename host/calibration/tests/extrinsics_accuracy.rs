@@ -19,9 +19,19 @@ struct Study {
     nees: f64,
 }
 
-/// A pair and its calibration from `views` targets that both cameras see; the lenses exact, or from 30 views of their
-/// own.
-fn calibrated(seed: u64, separation_deg: f64, views: usize, own_calibration: bool) -> (Pair, ExtrinsicsCalibration) {
+/// Where the lenses come from.
+#[derive(Clone, Copy, Debug, PartialEq)]
+enum Own {
+    /// They are known exactly.
+    Exact,
+    /// From 30 views of their own, and they are known to be central and symmetric, as they are.
+    Central,
+    /// From 30 views of their own alone.
+    ByEvidence,
+}
+
+/// A pair and its calibration from `views` targets that both cameras see.
+fn calibrated(seed: u64, separation_deg: f64, views: usize, own_calibration: Own) -> (Pair, ExtrinsicsCalibration) {
     let mut dice = Dice::new(1000 + seed);
     let pair =
         Pair { left: lens(), right: other_lens(), left_from_right: pair_pose(separation_deg), noise_px: NOISE_PX };
@@ -29,9 +39,13 @@ fn calibrated(seed: u64, separation_deg: f64, views: usize, own_calibration: boo
     let mut own = |camera: &KannalaBrandt| {
         let size = ImageSize { width: 2048, height: 2048 };
         let views = own_views(camera, 30, NOISE_PX, &mut dice);
-        calibrate_intrinsics(&views, size, &IntrinsicsOptions::default()).unwrap()
+        let options = match own_calibration {
+            Own::Central => IntrinsicsOptions::central(),
+            _ => IntrinsicsOptions::default(),
+        };
+        calibrate_intrinsics(&views, size, &options).unwrap()
     };
-    let (left, right, lenses) = if own_calibration {
+    let (left, right, lenses) = if own_calibration != Own::Exact {
         let (left, right) = (own(&pair.left), own(&pair.right));
         let knowledge = LensKnowledge::within(left.covariance, right.covariance);
         (left.camera, right.camera, knowledge)
@@ -42,7 +56,7 @@ fn calibrated(seed: u64, separation_deg: f64, views: usize, own_calibration: boo
     (pair, found)
 }
 
-fn study(separation_deg: f64, views: usize, own_calibration: bool, seeds: u64) -> Study {
+fn study(separation_deg: f64, views: usize, own_calibration: Own, seeds: u64) -> Study {
     let (mut arun, mut joint, mut nees) = (Vec::new(), Vec::new(), 0.0);
     for seed in 0..seeds {
         let (pair, found) = calibrated(seed, separation_deg, views, own_calibration);
@@ -56,7 +70,7 @@ fn study(separation_deg: f64, views: usize, own_calibration: bool, seeds: u64) -
     };
     let study = Study { arun: medians(&arun), joint: medians(&joint), nees };
     println!(
-        "{separation_deg}°, {views} views, own calibration {own_calibration}, {seeds} seeds: Arun {:.4}° {:.4} mm, \
+        "{separation_deg}°, {views} views, lenses {own_calibration:?}, {seeds} seeds: Arun {:.4}° {:.4} mm, \
          joint {:.4}° {:.4} mm, NEES {:.2}",
         study.arun.0, study.arun.1, study.joint.0, study.joint.1, study.nees
     );
@@ -73,16 +87,19 @@ fn nees_band(seeds: u64) -> std::ops::Range<f64> {
 #[test]
 fn herbivore_pose_with_lenses_from_their_own_calibration() {
     let seeds = seeds(6);
-    let study = study(120.0, 12, true, seeds);
-    assert!(study.joint.0 <= 0.02 && study.joint.1 <= 0.12);
-    assert!(nees_band(seeds).contains(&study.nees), "{}", study.nees);
+    // Not knowing that the lens has no decentring and no thin prism costs three times the accuracy, and is stated.
+    for (own, degrees, mm) in [(Own::Central, 0.02, 0.12), (Own::ByEvidence, 0.08, 0.2)] {
+        let study = study(120.0, 12, own, seeds);
+        assert!(study.joint.0 <= degrees && study.joint.1 <= mm);
+        assert!(nees_band(seeds).contains(&study.nees), "{}", study.nees);
+    }
 }
 
 #[test]
 fn exact_lenses_in_human_and_herbivore_pose() {
     let seeds = seeds(10);
     for separation in [0.0, 120.0] {
-        let five = study(separation, 5, false, seeds);
+        let five = study(separation, 5, Own::Exact, seeds);
         assert!(five.joint.0 <= 0.015 && five.joint.1 <= 0.12);
         assert!(five.joint.0 < five.arun.0 && five.joint.1 < five.arun.1, "the joint fit must be the better one");
         assert!(nees_band(seeds).contains(&five.nees), "{}", five.nees);
@@ -92,8 +109,8 @@ fn exact_lenses_in_human_and_herbivore_pose() {
 /// The covariance of the lenses is what keeps the pose honest: without it, lenses that are a little off go unnoticed.
 #[test]
 fn lenses_taken_for_exact_make_the_covariance_too_small() {
-    let (pair, found) = calibrated(1, 120.0, 12, true);
+    let (pair, found) = calibrated(1, 120.0, 12, Own::Central);
     assert!(found.left != pair.left, "the refined lens is not the true one to the last digit");
-    let exact = calibrated(1, 120.0, 12, false).1;
+    let exact = calibrated(1, 120.0, 12, Own::Exact).1;
     assert!(found.covariance[(1, 1)] > 1.5 * exact.covariance[(1, 1)]);
 }

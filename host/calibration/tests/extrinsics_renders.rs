@@ -175,12 +175,13 @@ fn own_shots(camera: &KannalaBrandt, dice: &mut Dice) -> Vec<Shot> {
     shots
 }
 
-/// A lens from photographs alone: calibrated roughly, then again from corners found with what is known by then.
+/// A lens from photographs alone: calibrated roughly, then again from corners found with what is known by then. It is known to be central and
+/// symmetric: `extrinsics_accuracy` says what not knowing it costs.
 fn own_calibration(camera: &KannalaBrandt, dice: &mut Dice) -> IntrinsicsCalibration {
     let photos: Vec<Photo> = own_shots(camera, dice).into_par_iter().map(Shot::photo).collect();
     let calibrated = |lens: Option<&KannalaBrandt>| {
         let views: Vec<_> = photos.par_iter().filter_map(|photo| photo.detected(lens)).collect();
-        calibrate_intrinsics(&views, camera.size(), &IntrinsicsOptions::default()).unwrap()
+        calibrate_intrinsics(&views, camera.size(), &IntrinsicsOptions::central()).unwrap()
     };
     calibrated(Some(&calibrated(None).camera))
 }

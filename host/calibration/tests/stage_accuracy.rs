@@ -39,11 +39,9 @@ impl Tally {
 }
 
 /// Seeds are independent of each other and are run side by side; their tallies are summed in order.
-fn study(stage_poses: &[[f64; 2]], own_calibration: bool, first_seed: u64, seeds: u64) -> Tally {
-    let tallies: Vec<Tally> = (first_seed..first_seed + seeds)
-        .into_par_iter()
-        .map(|seed| study_of(stage_poses, own_calibration, seed))
-        .collect();
+fn study(stage_poses: &[[f64; 2]], own: Option<&IntrinsicsOptions>, first_seed: u64, seeds: u64) -> Tally {
+    let tallies: Vec<Tally> =
+        (first_seed..first_seed + seeds).into_par_iter().map(|seed| study_of(stage_poses, own, seed)).collect();
     tallies.iter().fold(Tally::default(), |sum, tally| Tally {
         rotation_squares: sum.rotation_squares + tally.rotation_squares,
         translation_squares: sum.translation_squares + tally.translation_squares,
@@ -53,13 +51,13 @@ fn study(stage_poses: &[[f64; 2]], own_calibration: bool, first_seed: u64, seeds
     })
 }
 
-fn study_of(stage_poses: &[[f64; 2]], own_calibration: bool, seed: u64) -> Tally {
+fn study_of(stage_poses: &[[f64; 2]], own: Option<&IntrinsicsOptions>, seed: u64) -> Tally {
     let mut tally = Tally::default();
     let mut dice = Dice::new(seed);
     let bench = Bench::built(&mut dice);
     let poses: Vec<StagePose> = stage_poses.iter().map(|&at| bench.pose(at, 12, 0.1, &mut dice)).collect();
-    let (rig, lenses) =
-        if own_calibration { own_lenses(&bench, &mut dice) } else { (bench.drawn.clone(), LensKnowledge::Exact) };
+    let exact = || (bench.drawn.clone(), LensKnowledge::Exact);
+    let (rig, lenses) = own.map_or_else(exact, |options| own_lenses(&bench, options, &mut dice));
     let options = StageOptions { lenses, ..StageOptions::default() };
     let stage = calibrate_stage(&rig, &poses, &options).unwrap();
     for _ in 0..30 {
@@ -77,11 +75,11 @@ fn study_of(stage_poses: &[[f64; 2]], own_calibration: bool, seed: u64) -> Tally
     tally
 }
 
-fn own_lenses(bench: &Bench, dice: &mut Dice) -> (Rig, LensKnowledge) {
+fn own_lenses(bench: &Bench, options: &IntrinsicsOptions, dice: &mut Dice) -> (Rig, LensKnowledge) {
     let size = ImageSize { width: 2048, height: 2048 };
     let [left, right] = [0, 1].map(|side| {
         let views = own_views(&bench.lenses[side], 30, 0.1, dice);
-        calibrate_intrinsics(&views, size, &IntrinsicsOptions::default()).unwrap()
+        calibrate_intrinsics(&views, size, options).unwrap()
     });
     let rig = Rig { left_camera: left.camera, right_camera: right.camera, ..bench.drawn.clone() };
     (rig, LensKnowledge::within(left.covariance, right.covariance))
@@ -106,10 +104,16 @@ fn summary(what: &str, tally: &Tally) -> (f64, f64) {
 #[test]
 fn six_poses_predict_the_whole_range() {
     let seeds = seeds(FEWEST_SEEDS);
-    for (what, own) in [("exact lenses", false), ("lenses of their own calibration", true)] {
+    let (central, by_evidence) = (IntrinsicsOptions::central(), IntrinsicsOptions::default());
+    for (what, own, degrees) in [
+        ("exact lenses", None, 0.02),
+        ("lenses of their own calibration, known to be central", Some(&central), 0.02),
+        // Decentring and thin prism that 30 views leave open turn the optical axes.
+        ("lenses of their own calibration", Some(&by_evidence), 0.08),
+    ] {
         let tally = study(&SIX_POSES, own, 100, seeds);
         let (rotation, translation) = summary(what, &tally);
-        assert!(rotation <= 0.02 && translation <= 0.1);
+        assert!(rotation <= degrees && translation <= 0.1);
         assert_honest(&tally, seeds);
     }
 }
@@ -119,7 +123,7 @@ fn six_poses_predict_the_whole_range() {
 #[test]
 fn three_poses_suffice() {
     let seeds = seeds(FEWEST_SEEDS);
-    let tally = study(&[[60.0, 0.0], [220.0, 1.1], [100.0, 2.27]], false, 300, seeds);
+    let tally = study(&[[60.0, 0.0], [220.0, 1.1], [100.0, 2.27]], None, 300, seeds);
     let (rotation, translation) = summary("three poses", &tally);
     assert!(rotation <= 0.02 && translation <= 1.0);
     assert_honest(&tally, seeds);

@@ -31,7 +31,8 @@ fn lenses() -> Vec<(&'static str, KannalaBrandt)> {
 fn arrays(criterion: &mut Criterion) {
     for (name, lens) in lenses() {
         let field = lens.theta_max().rad().min(1.5);
-        let rays = (0..POINTS).map(|n| at(field * f64::from(n) / f64::from(POINTS), 2.4 * f64::from(n)).vector().into());
+        let rays =
+            (0..POINTS).map(|n| at(field * f64::from(n) / f64::from(POINTS), 2.4 * f64::from(n)).vector().into());
         let (batch, rays) = (BatchLens::new(&lens), rays.collect::<Vec<[f64; 3]>>());
         let pixels = batch.project(&rays);
         let mut group = criterion.benchmark_group(name);
