@@ -51,7 +51,8 @@ fn calibrated(set: &Path, work: &Path) -> Calibrated {
     let corner_px = ["left", "right"].map(|side| {
         let (out, images) = (file(&format!("{side}.toml")), photographs(side));
         let images: Vec<&str> = images.iter().map(String::as_str).collect();
-        let verb = ["calibrate", "intrinsics", "--json", "--out", &out, "--images"];
+        let model = std::env::var("MT_MODEL").unwrap_or("by-evidence".to_owned());
+        let verb = ["calibrate", "intrinsics", "--json", "--lens-model", &model, "--out", &out, "--images"];
         let found = run_json(&[&verb[..], &images, &board].concat());
         found["pixel_sigma"].as_f64().expect("a number")
     });

@@ -1,4 +1,4 @@
-//! The panel as people use it: `vergence demo --panel` in a real browser, which clicks, watches and looks.
+//! The panel as people use it: `vergence panel` of a simulated rig in a real browser, which clicks, watches and looks.
 //!
 //! It needs node, and Chromium (`VERGENCE_CHROMIUM`, or `chromium` in the path), and what `npm ci` fetches in `tests/panel`. Without them the
 //! test prints `SKIPPED`; with `VERGENCE_REQUIRE_DATA=1` it fails. Its pictures are kept in `target/tmp/panel`.
@@ -50,6 +50,13 @@ impl Drop for Served {
     }
 }
 
+/// The panel of a simulated rig at `address`, whose cameras are small and slow: the browser needs the computer too.
+fn small(address: &str) -> [&str; 12] {
+    let cameras = ["--cameras", "sim", "--size", "320x320", "--rate", "2"];
+    let [a, b, c, d, e, f] = cameras;
+    ["panel", "--port", "sim", "--home", "--listen", address, a, b, c, d, e, f]
+}
+
 /// The browser and the folder with the script, if everything is there; else the test is skipped, or fails where data are required.
 fn browser() -> Option<(String, PathBuf)> {
     let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../tests/panel");
@@ -73,7 +80,7 @@ fn people_see_and_drive_the_rig_in_a_browser() {
     let Some((chromium, folder)) = browser() else { return };
     let pictures = Path::new(env!("CARGO_TARGET_TMPDIR")).join("panel");
     std::fs::create_dir_all(&pictures).expect("a folder");
-    let mut served = Served::start(&["demo", "--panel", "127.0.0.1:0"]);
+    let mut served = Served::start(&small("127.0.0.1:0"));
     let address = served.url.trim_start_matches("http://").trim_end_matches('/').to_owned();
     let mut script = Command::new("node")
         .arg(folder.join("browse.mjs"))
@@ -87,7 +94,7 @@ fn people_see_and_drive_the_rig_in_a_browser() {
     for asked in BufReader::new(script.stdout.take().expect("piped")).lines() {
         match asked.expect("text").as_str() {
             "kill" => served.terminate(),
-            "start" => served = Served::start(&["demo", "--panel", &address]),
+            "start" => served = Served::start(&small(&address)),
             other => panic!("the script asks for '{other}'"),
         }
         writeln!(answer, "done").expect("the script listens");

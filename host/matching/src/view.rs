@@ -263,8 +263,9 @@ fn sample_line(image: &[u8], width: usize, pixels: &[[f64; 2]], seen: &mut [bool
     for ((pixels, seen), values) in chunks {
         let (mut firsts, mut across, mut down) =
             ([0_u32; TOGETHER], [[0.0_f32; 4]; TOGETHER], [[0.0_f32; 4]; TOGETHER]);
-        for (i, (&[u, v], seen)) in pixels.iter().zip(seen.iter()).enumerate() {
-            // Pixels that are seen are at least one pixel inside the image.
+        for (i, (&[u, v], seen)) in pixels.iter().zip(seen.iter_mut()).enumerate() {
+            // Pixels that are seen are at least one pixel inside the camera's images; this image may be narrower.
+            *seen &= u as usize + 3 <= width;
             let (u, v) = if *seen { (u, v) } else { (1.0, 1.0) };
             let (column, row) = (u as u32, v as u32);
             across[i] = cubic_weights((u - f64::from(column)) as f32);
