@@ -28,9 +28,6 @@ pub(crate) struct Start<S> {
     pub usable: Vec<Vec<bool>>,
 }
 
-/// The share by which the scatter of views may still change.
-const SCATTER_SETTLED: f64 = 0.02;
-
 /// The result of a fit.
 pub(crate) struct Fit<S> {
     pub shared: Shared<S>,
@@ -42,8 +39,7 @@ pub(crate) struct Fit<S> {
     pub errors_px: Vec<Vec<f64>>,
     /// Standard deviation of a pixel coordinate in units of the corner's relative sigma.
     pub sigma: f64,
-    /// The same, by which what is known besides the corners was weighted: larger where views scatter by more than their noise explains,
-    /// as when both images were not taken at one instant, because they then tell as much less of the lenses.
+    /// The same, by which what is known besides the corners was weighted.
     pub sigma_of_priors: f64,
     /// Covariance of the shared unknowns' step as the views scatter; `None` if the corners do not determine it.
     pub covariance: Option<Clustered>,
@@ -97,12 +93,11 @@ impl<K: Kinematics> Task<'_, K> {
         }
         let mut sigma = self.settle(&mut shared, &mut targets, &usable)?;
         let mut inliers = self.inliers(&shared, &self.errors_px(&shared, &targets), &usable);
-        let (mut round, mut scatter) = (0, 1.0);
+        let mut round = 0;
         loop {
             round += 1;
             let kept: Vec<usize> = (0..inliers.len()).filter(|&view| inliers[view].contains(&true)).collect();
-            let sigma_of_priors = sigma * scatter;
-            let problem = self.problem(self.knowledge, sigma_of_priors, &kept, &inliers)?;
+            let problem = self.problem(self.knowledge, sigma, &kept, &inliers)?;
             let kept_targets = kept.iter().map(|&view| targets[view]).collect();
             let solution = schur_lm::solve(&problem, shared, kept_targets, &SchurOptions::default());
             if !solution.cost.is_finite() {
@@ -110,24 +105,17 @@ impl<K: Kinematics> Task<'_, K> {
             }
             shared = solution.shared;
             kept.iter().zip(&solution.blocks).for_each(|(&view, target)| targets[view] = *target);
-            // The part of the priors counts as if it were weighted by the noise.
-            let excess = problem.lens_prior.squares(&shared.lenses) * (1.0 - 1.0 / (scatter * scatter));
-            let variance = solution.normal.variance_without(excess).ok_or(NoFit::NotDetermined)?;
+            let variance = solution.normal.variance().ok_or(NoFit::NotDetermined)?;
             let errors_px = self.errors_px(&shared, &targets);
             let next = self.inliers(&shared, &errors_px, &usable);
             // Priors are weighted by the corners' standard deviation, so that must settle too.
             let next_sigma = variance.sqrt().max(FINEST);
-            let covariance = solution.normal.clustered_with_priors(variance, sigma_of_priors * sigma_of_priors);
-            let next_scatter = match &covariance {
-                Some(covariance) if self.kinematics.has_no_prior() => covariance.scatter,
-                _ => 1.0,
-            };
-            let is_near = |now: f64, before: f64, share: f64| (now - before).abs() <= share * before;
-            let settled =
-                next == inliers && is_near(next_sigma, sigma, 1e-3) && is_near(next_scatter, scatter, SCATTER_SETTLED);
+            let settled = next == inliers && (next_sigma - sigma).abs() <= 1e-3 * sigma;
+            let sigma_of_priors = sigma;
             sigma = next_sigma;
             if settled || round == MOST_ROUNDS {
                 let information = solution.normal.shared_information().ok_or(NoFit::NotDetermined)?;
+                let covariance = solution.normal.clustered(sigma * sigma);
                 let noise_covariance = solution.normal.shared_covariance().map(|unit| unit * (sigma * sigma));
                 return Ok(Fit {
                     lens_numbers: problem.lens_prior.numbers(),
@@ -142,7 +130,7 @@ impl<K: Kinematics> Task<'_, K> {
                     information,
                 });
             }
-            (inliers, scatter) = (next, next_scatter);
+            inliers = next;
         }
     }
 

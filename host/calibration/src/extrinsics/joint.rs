@@ -28,11 +28,6 @@ pub(crate) trait Kinematics: Sync {
     /// Adds what is known of `state` besides the views, in units of `sigma`, the standard deviation of a
     /// pixel coordinate in those of the corner's relative sigma.
     fn add_prior(&self, _state: &Self::State, _sigma: f64, _equations: &mut Equations<POSE>) {}
-
-    /// Whether nothing is known of it besides the views.
-    fn has_no_prior(&self) -> bool {
-        false
-    }
 }
 
 /// One relative pose for all views.
@@ -40,10 +35,6 @@ pub(crate) struct FixedPose;
 
 impl Kinematics for FixedPose {
     type State = Isometry3<f64>;
-
-    fn has_no_prior(&self) -> bool {
-        true
-    }
 
     fn dimension(&self) -> usize {
         POSE

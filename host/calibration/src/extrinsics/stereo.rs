@@ -130,28 +130,16 @@ impl LensPrior {
         Lenses { left: lenses.left.moved(&part(0, left)), right: lenses.right.moved(&part(left.len(), right)) }
     }
 
-    /// How far each lens is from where it began, in its own standard deviations times `sigma`; nothing of lenses without a prior.
-    fn residuals(&self, lenses: &Lenses) -> Vec<DVector<f64>> {
+    /// Adds the pull of the lenses' own calibration; their columns begin at `column` of the shared block.
+    pub fn add_to(&self, lenses: &Lenses, column: usize, equations: &mut Equations<POSE>) {
+        let Some(pull) = &self.pull else { return };
         let moves = [
             lenses.left.parameters() - self.start.left.parameters(),
             lenses.right.parameters() - self.start.right.parameters(),
         ];
-        let of = |((pull, lens_move), unknown): ((&DMatrix<f64>, &SVector<f64, LENS>), &Vec<usize>)| {
-            pull * DVector::from_iterator(unknown.len(), unknown.iter().map(|&i| lens_move[i]))
-        };
-        self.pull.iter().flatten().zip(&moves).zip(&self.unknown).map(of).collect()
-    }
-
-    /// The sum of their squares.
-    pub fn squares(&self, lenses: &Lenses) -> f64 {
-        self.residuals(lenses).iter().map(DVector::norm_squared).sum()
-    }
-
-    /// Adds the pull of the lenses' own calibration; their columns begin at `column` of the shared block.
-    pub fn add_to(&self, lenses: &Lenses, column: usize, equations: &mut Equations<POSE>) {
-        let Some(pull) = &self.pull else { return };
         let mut first = column;
-        for ((pull, residual), unknown) in pull.iter().zip(self.residuals(lenses)).zip(&self.unknown) {
+        for ((pull, lens_move), unknown) in pull.iter().zip(&moves).zip(&self.unknown) {
+            let residual = pull * DVector::from_iterator(unknown.len(), unknown.iter().map(|&i| lens_move[i]));
             for row in 0..unknown.len() {
                 let mut shared = vec![[0.0]; first + unknown.len()];
                 for (slot, derivative) in shared.iter_mut().skip(first).zip(pull.row(row).iter()) {

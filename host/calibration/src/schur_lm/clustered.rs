@@ -27,7 +27,7 @@ use super::SchurNormal;
 /// How much of the estimate a single view may determine in some direction before its pull there no longer counts as known.
 const MOST_LEVERAGE: f64 = 0.99;
 
-/// The covariance of the shared unknowns by [`SchurNormal::clustered_with_priors`].
+/// The covariance of the shared unknowns by [`SchurNormal::clustered`].
 pub struct Clustered {
     /// The covariance.
     pub covariance: DMatrix<f64>,
@@ -44,7 +44,13 @@ struct Pull {
 
 impl<const B: usize> SchurNormal<B> {
     /// The marginal covariance of the shared step where the residuals of a block may err together, for `variance`, that of one
-    /// residual component, and `of_priors`, by which priors are weighted. `None` where the unknowns are not determined.
+    /// residual component, by which priors are weighted. `None` where the unknowns are not determined.
+    #[must_use]
+    pub fn clustered(&self, variance: f64) -> Option<Clustered> {
+        self.clustered_with_priors(variance, variance)
+    }
+
+    /// The same where priors were weighted by another variance than that of the residuals.
     #[must_use]
     pub fn clustered_with_priors(&self, variance: f64, of_priors: f64) -> Option<Clustered> {
         let information = self.shared_information()?;

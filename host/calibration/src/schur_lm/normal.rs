@@ -160,15 +160,9 @@ impl<const B: usize> SchurNormal<B> {
     /// after the robust weights; `None` without redundancy.
     #[must_use]
     pub fn variance(&self) -> Option<f64> {
-        self.variance_without(0.0)
-    }
-
-    /// The same without a part of Σ r².
-    #[must_use]
-    pub fn variance_without(&self, part: f64) -> Option<f64> {
         let unknowns = self.shared.nrows() + B * self.blocks.len();
         let freedom = self.residuals.checked_sub(unknowns).filter(|&f| f > 0)?;
-        Some((self.squares - part) / freedom as f64)
+        Some(self.squares / freedom as f64)
     }
 
     /// The largest cosine between a column of the Jacobian and the residuals: zero at a minimum.
