@@ -122,6 +122,7 @@ print(seen)
 }
 
 #[test]
+#[expect(clippy::disallowed_methods, reason = "another process is waited for")]
 fn a_recording_that_was_killed_replays_up_to_its_last_whole_chunk() {
     let folder = tempfile::tempdir().expect("a folder");
     let folder = folder.path();

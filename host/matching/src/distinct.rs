@@ -53,7 +53,7 @@ impl<'a> Surroundings<'a> {
         let rows = (rows.start >> LEVEL).saturating_sub(BESIDE)..(rows.end >> LEVEL).saturating_add(BESIDE);
         let prepare = |y: usize, out: &mut [f32]| {
             if rows.contains(&y) {
-                inverse_norms(plane, y, out)
+                inverse_norms(plane, y, out);
             }
         };
         Some(Self { plane, inverse_norm: plane.like(prepare) })

@@ -54,7 +54,7 @@ impl RecordingError {
         }
     }
 
-    pub(crate) fn read(file: &Path, why: impl ToString) -> Self {
+    pub(crate) fn read(file: &Path, why: impl std::fmt::Display) -> Self {
         Self::Read { file: file.to_owned(), why: why.to_string() }
     }
 

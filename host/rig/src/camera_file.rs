@@ -100,6 +100,7 @@ const fn one() -> f64 {
 }
 
 #[expect(clippy::trivially_copy_pass_by_ref, reason = "serde asks for a reference")]
+#[expect(clippy::float_cmp, reason = "exactly one is the default")]
 fn is_one(value: &f64) -> bool {
     *value == 1.0
 }

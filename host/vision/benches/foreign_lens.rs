@@ -8,7 +8,6 @@
 )]
 
 #[path = "../tests/foreign_models/mod.rs"]
-#[allow(dead_code, reason = "the tests use more of it")]
 mod foreign_models;
 
 use std::hint::black_box;

@@ -49,11 +49,13 @@ impl ForeignModel {
     }
 
     /// A pixel of the model as one of the lens. Pixel centres are whole numbers, so the sensor's corner is at (-1/2, -1/2).
+    #[expect(clippy::float_cmp, reason = "exactly one, unless the sensor was resampled")]
     fn of_lens(&self, pixel: Pixel) -> Pixel {
         let along = |coordinate: f64| (coordinate + 0.5) * self.scale - 0.5;
         if self.scale == 1.0 { pixel } else { Pixel { u: along(pixel.u), v: along(pixel.v) } }
     }
 
+    #[expect(clippy::float_cmp, reason = "exactly one, unless the sensor was resampled")]
     fn of_model(&self, pixel: Pixel) -> Pixel {
         let along = |coordinate: f64| (coordinate + 0.5) / self.scale - 0.5;
         if self.scale == 1.0 { pixel } else { Pixel { u: along(pixel.u), v: along(pixel.v) } }

@@ -11,9 +11,8 @@ mod foreign_models;
 use foreign_models::*;
 use nalgebra::Vector3;
 use vergence_vision::{
-    Angle, Camera, CameraModel, Central, DoubleSphere, Eucm, Fisheye624, Formula, ImageSize, InvalidLens,
-    KannalaBrandt, Mei, OCam, Pinhole, Pixel, Pupil, Radtan, SightRegion, SplineGrid, SplinedStereographic, UnitRay,
-    fit_lens,
+    CameraModel, Central, DoubleSphere, Eucm, Fisheye624, ImageSize, InvalidLens, Mei, OCam, Pinhole, Pixel, Pupil,
+    Radtan, SightRegion, SplineGrid, SplinedStereographic, fit_lens,
 };
 
 #[test]

@@ -55,14 +55,12 @@ impl Strip {
     }
 }
 
+/// A new keypoint, and its partner or why it has none.
+type Sought = (Keypoint, Result<Link, UnmatchedReason>);
+
 /// The corners of a strip that are no tracks yet, each with its candidate, and the number of corners of the right view. A whole view has at
 /// most `budget` corners.
-pub(super) fn newly_found(
-    seen: &Seen<'_>,
-    tracks: &[Track],
-    strip: &Strip,
-    budget: usize,
-) -> (Vec<(Keypoint, Result<Link, UnmatchedReason>)>, usize) {
+pub(super) fn newly_found(seen: &Seen<'_>, tracks: &[Track], strip: &Strip, budget: usize) -> (Vec<Sought>, usize) {
     let rows = strip.with_surroundings();
     let share = budget * rows.len() / strip.height.max(1);
     let left = detect_within(&seen.left, rows.clone(), share, |keypoint| seen.views.shared_from_left(keypoint));

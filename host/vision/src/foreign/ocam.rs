@@ -75,9 +75,9 @@ impl OCam {
         for _ in 0..STEPS {
             let (seen, slope) = self.angle_and_slope(radius);
             if seen < angle {
-                low = radius
+                low = radius;
             } else {
-                high = radius
+                high = radius;
             }
             let newton = radius + (angle - seen) / slope;
             let next = if newton >= low && newton <= high { newton } else { 0.5 * (low + high) };
