@@ -3,7 +3,7 @@
 //!
 //! [`Panel`] takes what the rig and the live loop tell and keeps the latest of every stream ([`Streams`]); a server on a thread of its own
 //! sends it to every page ([`Panel::serve`]). A page that is slow skips what it has no time for, and nothing that the server does delays the
-//! rig. Orders go the other way: one page drives, the others watch ([`Operators`]), and [`Panel::drive`] carries the orders out as the
+//! rig. Orders go the other way: one page drives, the others watch ([`Operators`]), and [`Session::run`] carries the orders out as the
 //! verbs of the command line do. When the page that drives is closed or silent, the rig stops.
 //!
 //! State, messages and the rules of who drives are pure; sockets are in `server` and `connection`.
