@@ -53,6 +53,14 @@ pub struct Totals {
 }
 
 impl Totals {
+    /// Counts one more result.
+    pub fn count(&mut self, observation: &Observation) {
+        match observation {
+            Observation::Points { .. } => self.clouds += 1,
+            Observation::Bearings { .. } => self.bearings += 1,
+        }
+    }
+
     /// What was skipped, for people; nothing where nothing was.
     #[must_use]
     pub fn skipped_in_words(&self) -> String {
@@ -206,10 +214,7 @@ impl LiveLoop {
             }
             Err(NoResult::Failed(error)) => return Err(error.into()),
         };
-        match measurement.observation {
-            Observation::Points { .. } => totals.clouds += 1,
-            Observation::Bearings { .. } => totals.bearings += 1,
-        }
+        totals.count(&measurement.observation);
         totals.skipped.clone_from(self.exposures.skipped());
         let latency = (self.clock.now().0 as f64 - exposed_at).max(0.0);
         publish(LiveResult { measurement: &measurement, latency: Duration::from_micros(latency as u64), totals })

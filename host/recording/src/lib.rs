@@ -9,12 +9,12 @@ mod error;
 mod event;
 mod messages;
 mod metadata;
+mod png;
 mod reader;
 mod recorder;
 mod replay;
 mod tap;
 
-pub use bag::{Bag, Topic};
 pub use error::RecordingError;
 pub use event::{Beginning, Event, Eye, Stamp, Timing};
 pub use reader::{Heard, Reader};

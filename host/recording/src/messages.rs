@@ -2,7 +2,6 @@
 //!
 //! Frames: `base` carries `left` and `right`, the optical frames of both cameras (x right, y down, z forward).
 
-use image::RgbImage;
 use nalgebra::{Matrix3, UnitQuaternion, Vector3};
 use vergence_pipeline::{ColouredPoint, PairCloud};
 use vergence_protocol::PoseReport;
@@ -11,6 +10,7 @@ use vergence_vision::{KannalaBrandt, OpenCvFisheye};
 
 use crate::cdr::Cdr;
 use crate::event::Eye;
+use crate::png::Png;
 
 /// Metres in a millimetre.
 const MM: f64 = 1e-3;
@@ -56,14 +56,9 @@ pub fn event(host_us: u64, postcard: &[u8]) -> Vec<u8> {
 }
 
 /// A `sensor_msgs/CompressedImage` with a PNG file.
-pub fn image(stamp_ns: u64, eye: Eye, image: &RgbImage, png: &[u8]) -> Vec<u8> {
-    let format = if is_grey(image) { "mono8; png compressed mono8" } else { "rgb8; png compressed rgb8" };
-    header(stamp_ns, eye.name()).text(format).bytes(png).finish()
-}
-
-/// Whether all channels are the same.
-pub fn is_grey(image: &RgbImage) -> bool {
-    image.pixels().all(|pixel| pixel.0[0] == pixel.0[1] && pixel.0[1] == pixel.0[2])
+pub fn image(stamp_ns: u64, eye: Eye, png: &Png) -> Vec<u8> {
+    let format = if png.is_grey { "mono8; png compressed mono8" } else { "rgb8; png compressed rgb8" };
+    header(stamp_ns, eye.name()).text(format).bytes(&png.bytes).finish()
 }
 
 /// A `sensor_msgs/CameraInfo` with the model `equidistant`, which ROS shares with OpenCV's fisheye model and Kalibr: r = f (θ + d1 θ³ + d2 θ⁵ +

@@ -37,12 +37,6 @@ pub struct Heard {
     pub image: Option<RgbImage>,
 }
 
-/// What a record means.
-enum Meaning {
-    Nothing,
-    Heard(Box<Heard>),
-}
-
 impl Reader {
     /// Opens the recording in `folder`, or the MCAP file of that name.
     ///
@@ -83,8 +77,8 @@ impl Reader {
     pub fn next_event(&mut self) -> Result<Option<Heard>, RecordingError> {
         loop {
             let Some((opcode, body)) = self.record()? else { return Ok(None) };
-            if let Meaning::Heard(heard) = self.understand(opcode, &body)? {
-                return Ok(Some(*heard));
+            if let Some(heard) = self.understand(opcode, &body)? {
+                return Ok(Some(heard));
             }
         }
     }
@@ -108,10 +102,11 @@ impl Reader {
         }
     }
 
-    fn understand(&mut self, opcode: u8, body: &[u8]) -> Result<Meaning, RecordingError> {
+    /// Keeps what a record says; returns its event, if it is one.
+    fn understand(&mut self, opcode: u8, body: &[u8]) -> Result<Option<Heard>, RecordingError> {
         self.is_finished |= opcode == op::DATA_END;
         if !matches!(opcode, op::CHANNEL | op::MESSAGE | op::ATTACHMENT) {
-            return Ok(Meaning::Nothing);
+            return Ok(None);
         }
         match mcap::parse_record(opcode, body).map_err(|error| RecordingError::read(&self.file, error))? {
             Record::Channel(channel) => _ = self.topics.insert(channel.id, channel.topic),
@@ -120,16 +115,14 @@ impl Reader {
                 self.rig = Some(text.map_err(|_| self.foreign("the attached rig file"))?);
             }
             Record::Message { header, data } => match self.topics.get(&header.channel_id).map(String::as_str) {
-                Some(topic) if topic == EVENTS.name => {
-                    return self.event(&data).map(|heard| Meaning::Heard(Box::new(heard)));
-                }
+                Some(topic) if topic == EVENTS.name => return self.event(&data).map(Some),
                 Some(topic) if topic == LEFT_IMAGE.name => self.images[0] = Some(self.image(&data)?),
                 Some(topic) if topic == RIGHT_IMAGE.name => self.images[1] = Some(self.image(&data)?),
                 _ => {}
             },
             _ => {}
         }
-        Ok(Meaning::Nothing)
+        Ok(None)
     }
 
     fn image(&self, message: &[u8]) -> Result<Vec<u8>, RecordingError> {

@@ -1,31 +1,30 @@
 //! What the rig says while it is recorded, turned into messages and written by a thread of its own.
 
-use std::io::Cursor;
 use std::path::Path;
-use std::sync::{Arc, Mutex, OnceLock, PoisonError};
+use std::sync::atomic::{AtomicU64, Ordering};
+use std::sync::{Arc, LazyLock};
 
-use image::codecs::png::{CompressionType, FilterType, PngEncoder};
-use image::{ExtendedColorType, ImageEncoder, RgbImage};
+use image::RgbImage;
 use tokio::sync::mpsc::{Receiver, Sender, channel, error::TrySendError};
 use tokio::task::spawn_blocking;
 use vergence_board::BoardNews;
-use vergence_camera::{CameraError, CameraEvent, PendingImage};
+use vergence_camera::{CameraError, CameraEvent, Develop, PendingImage};
 use vergence_pipeline::PairCloud;
 use vergence_protocol::{Microseconds, TriggerMark};
 use vergence_rig::{Rig, RigPose};
 use vergence_vision::Side;
 
 use crate::RecordingError;
-use crate::bag::{self, Bag, Topic};
+use crate::bag::{self, Bag};
 use crate::event::{Beginning, Event, Eye, Stamp};
 use crate::messages;
+use crate::png::Png;
 
 /// Number of entries that may wait for the disk: about a second of a bench with its poses.
 const WAITING: usize = 1024;
 
 /// An image that is made once, by whoever wants it first.
-type Shared = Arc<OnceLock<Result<RgbImage, CameraError>>>;
-type Developed = Arc<dyn Fn() -> Result<RgbImage, CameraError> + Send + Sync>;
+type Developed = Arc<LazyLock<Result<RgbImage, CameraError>, Develop>>;
 
 /// An entry on its way to the disk.
 enum Entry {
@@ -41,7 +40,7 @@ enum Entry {
 #[derive(Clone)]
 pub struct Recorder {
     entries: Sender<Entry>,
-    left_out: Arc<Mutex<u64>>,
+    left_out: Arc<AtomicU64>,
 }
 
 /// What became of a recording.
@@ -102,10 +101,10 @@ impl Recorder {
                 CameraEvent::Lost(why)
             }
             CameraEvent::Image(PendingImage { seq, middle, develop }) => {
-                let developed = once(develop);
+                let developed: Developed = Arc::new(LazyLock::new(develop));
                 let stamp = Stamp { seq, middle_us: middle.us, error_us: middle.error_us };
                 self.put(Entry::Image(now, eye, stamp, Arc::clone(&developed)));
-                CameraEvent::Image(PendingImage { seq, middle, develop: Box::new(move || developed()) })
+                CameraEvent::Image(PendingImage { seq, middle, develop: Box::new(move || (**developed).clone()) })
             }
         }
     }
@@ -122,7 +121,7 @@ impl Recorder {
 
     fn put(&self, entry: Entry) {
         if let Err(TrySendError::Full(_)) = self.entries.try_send(entry) {
-            *self.left_out.lock().unwrap_or_else(PoisonError::into_inner) += 1;
+            self.left_out.fetch_add(1, Ordering::Relaxed);
         }
     }
 }
@@ -135,27 +134,14 @@ impl Writing {
     pub async fn finish(self, recorder: Recorder) -> Result<Recorded, RecordingError> {
         // Nobody listens where writing has failed; its error follows.
         let _ = recorder.entries.send(Entry::End).await;
-        let images = match self.0.await {
-            Ok(images) => images?,
-            Err(error) => {
-                return Err(RecordingError::Write { file: Path::new(bag::FILE).to_owned(), why: error.to_string() });
-            }
-        };
-        Ok(Recorded { images, left_out: *recorder.left_out.lock().unwrap_or_else(PoisonError::into_inner) })
+        let images = self.0.await.map_err(unwritten)??;
+        Ok(Recorded { images, left_out: recorder.left_out.load(Ordering::Relaxed) })
     }
 }
 
-/// `develop`, which may be called once, as a function that may be called often.
-fn once(develop: vergence_camera::Develop) -> Developed {
-    let (develop, image) = (Mutex::new(Some(develop)), Shared::default());
-    Arc::new(move || {
-        let made = image.get_or_init(|| {
-            let develop = develop.lock().unwrap_or_else(PoisonError::into_inner).take();
-            // It is taken once, because the cell is filled once.
-            develop.map_or_else(|| Ok(RgbImage::default()), |develop| develop())
-        });
-        made.clone()
-    })
+/// What cannot become bytes, whatever the disk.
+fn unwritten(error: impl std::fmt::Display) -> RecordingError {
+    RecordingError::Write { file: Path::new(bag::FILE).to_owned(), why: error.to_string() }
 }
 
 /// Writes until the end.
@@ -167,7 +153,7 @@ async fn write(mut scribe: Scribe, mut waiting: Receiver<Entry>) -> Result<u64, 
             (scribe, outcome)
         })
         .await
-        .map_err(|error| RecordingError::Write { file: Path::new(bag::FILE).to_owned(), why: error.to_string() })?;
+        .map_err(unwritten)?;
         scribe = back;
         outcome?;
     }
@@ -198,8 +184,8 @@ impl Scribe {
                 }
                 self.event(now, &event)
             }
-            Entry::Image(now, eye, stamp, developed) => match developed() {
-                Ok(image) => self.image(now, eye, stamp, &image),
+            Entry::Image(now, eye, stamp, developed) => match &**developed {
+                Ok(image) => self.image(now, eye, stamp, image),
                 // The live loop names it too.
                 Err(error) => self.warning(now, &error.to_string()),
             },
@@ -220,13 +206,12 @@ impl Scribe {
 
     fn event(&mut self, now: Microseconds, event: &Event) -> Result<(), RecordingError> {
         // Memory is the only limit of an event's encoding.
-        let postcard = postcard::to_allocvec(event)
-            .map_err(|error| RecordingError::Write { file: Path::new(bag::FILE).to_owned(), why: error.to_string() })?;
+        let postcard = postcard::to_allocvec(event).map_err(unwritten)?;
         self.bag.write(bag::EVENTS, self.ns(now), &messages::event(now.0, &postcard))
     }
 
     fn image(&mut self, now: Microseconds, eye: Eye, stamp: Stamp, image: &RgbImage) -> Result<(), RecordingError> {
-        let (image_topic, info_topic, lens): (Topic, Topic, _) = match eye {
+        let (image_topic, info_topic, lens) = match eye {
             Eye::Left => (bag::LEFT_IMAGE, bag::LEFT_INFO, &self.rig.left_camera),
             Eye::Right => (bag::RIGHT_IMAGE, bag::RIGHT_INFO, &self.rig.right_camera),
         };
@@ -234,27 +219,8 @@ impl Scribe {
         let exposed = (self.epoch_us * 1000).saturating_add((stamp.middle_us.max(0.0) * 1000.0) as u64);
         let info = messages::camera_info(exposed, eye, lens);
         self.bag.write(info_topic, at, &info)?;
-        self.bag.write(image_topic, at, &messages::image(exposed, eye, image, &png(image)?))?;
+        self.bag.write(image_topic, at, &messages::image(exposed, eye, &Png::of(image).map_err(unwritten)?))?;
         self.images += 1;
         self.event(now, &Event::Image(eye, stamp))
     }
-}
-
-/// The image as a PNG file, quickly rather than small; grey where it is.
-fn png(image: &RgbImage) -> Result<Vec<u8>, RecordingError> {
-    let mut file = Cursor::new(Vec::new());
-    let encoder = PngEncoder::new_with_quality(&mut file, CompressionType::Fast, FilterType::Up);
-    let (width, height) = image.dimensions();
-    let written = if messages::is_grey(image) {
-        let grey: Vec<u8> = image.pixels().map(|pixel| pixel.0[0]).collect();
-        encoder.write_image(&grey, width, height, ExtendedColorType::L8)
-    } else {
-        encoder.write_image(image.as_raw(), width, height, ExtendedColorType::Rgb8)
-    };
-    let why = |error: image::ImageError| RecordingError::Write {
-        file: Path::new(bag::FILE).to_owned(),
-        why: error.to_string(),
-    };
-    written.map_err(why)?;
-    Ok(file.into_inner())
 }

@@ -125,7 +125,7 @@ impl<'a> Replay<'a> {
                     self.exposures.skip(reason);
                     continue;
                 }
-                Posed::NotYet(exposed) if now - since < patience => {
+                Posed::NotYet(exposed) if now.saturating_sub(since) < patience => {
                     self.waiting.push_front((since, exposed));
                     return Ok(());
                 }

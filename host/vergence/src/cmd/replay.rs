@@ -5,7 +5,7 @@ use std::sync::Arc;
 use std::time::Duration;
 
 use vergence_live::{LiveError, LiveResult, Measurement, Pace, Totals};
-use vergence_pipeline::{Method, Observation};
+use vergence_pipeline::Method;
 use vergence_recording::{Event, Reader, Replay};
 use vergence_rig::Rig;
 
@@ -104,10 +104,7 @@ fn publish(
     measurement: &Measurement,
     most: Option<u64>,
 ) -> Result<(), End> {
-    match measurement.observation {
-        Observation::Points { .. } => totals.clouds += 1,
-        Observation::Bearings { .. } => totals.bearings += 1,
-    }
+    totals.count(&measurement.observation);
     let latency = Duration::from_secs_f64(measurement.seconds);
     publisher.publish(&LiveResult { measurement, latency, totals }).map_err(End::Failed)?;
     if most.is_some_and(|most| publisher.number >= most) { Err(End::Enough) } else { Ok(()) }
