@@ -24,10 +24,18 @@ pub fn real_data(inside: &str) -> Option<PathBuf> {
         return Some(found);
     }
     let why = format!("{} is missing; set VERGENCE_SHARED to the folder that has it", found.display());
+    skip(&why);
+    None
+}
+
+/// Skips the calling test, because of what is missing.
+///
+/// # Panics
+/// If `VERGENCE_REQUIRE_DATA=1`.
+pub fn skip(why: &str) {
     let required = std::env::var_os("VERGENCE_REQUIRE_DATA").is_some_and(|value| value == "1");
     assert!(!required, "VERGENCE_REQUIRE_DATA=1, but {why}");
-    say_skipped(&why);
-    None
+    say_skipped(why);
 }
 
 /// Prints the line of a skipped test.

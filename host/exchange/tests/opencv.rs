@@ -11,6 +11,8 @@
 
 #[path = "../../../tests/common/data.rs"]
 mod data;
+#[path = "../../../tests/common/python.rs"]
+mod python;
 
 use std::path::Path;
 use std::process::Command;
@@ -22,17 +24,7 @@ use vergence_vision::{Point, Right, UnitRay};
 
 /// What the script says after it has written its files to `folder`; `None` without OpenCV.
 fn said(folder: &Path) -> Option<Value> {
-    let python = std::env::var("VERGENCE_PYTHON").unwrap_or_else(|_| "python3".to_owned());
-    let asked = Command::new(&python).args(["-c", "import cv2; cv2.omnidir.projectPoints"]).output();
-    if !asked.is_ok_and(|output| output.status.success()) {
-        let why = format!(
-            "{python} has no module cv2 with omnidir: install it with '{python} -m pip install opencv-contrib-python-headless'"
-        );
-        let required = std::env::var_os("VERGENCE_REQUIRE_DATA").is_some_and(|value| value == "1");
-        assert!(!required, "VERGENCE_REQUIRE_DATA=1, but {why}");
-        data::say_skipped(&why);
-        return None;
-    }
+    let python = python::python("import cv2; cv2.omnidir.projectPoints", "opencv-contrib-python-headless")?;
     let script = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/opencv.py");
     let output = Command::new(python).arg(script).arg(folder).output().expect("python starts");
     assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
