@@ -1,5 +1,7 @@
 //! Decodes the images of an exposure and measures them, and how long both take.
 
+use std::panic::resume_unwind;
+use std::thread;
 use std::time::Duration;
 
 use image::RgbImage;
@@ -88,10 +90,36 @@ pub fn measure(
 /// Both images, and the middle of the exposure of the left one.
 fn both([left, right]: [ExposedImage<PendingImage>; 2]) -> Result<(BoardInstant, [RgbImage; 2]), LiveError> {
     let middle = left.middle;
-    let (left, right) = rayon::join(|| decode(left), || decode(right));
+    // On threads outside of rayon's pool: a recorder may be developing the same image, and a worker of the pool that waits for it may have begun
+    // a part of that very work.
+    let (left, right) = thread::scope(|scope| {
+        let right = scope.spawn(|| decode(right));
+        (decode(left), right.join().unwrap_or_else(|panic| resume_unwind(panic)))
+    });
     Ok((middle, [left?, right?]))
 }
 
 fn decode(exposed: ExposedImage<PendingImage>) -> Result<RgbImage, LiveError> {
     Ok((exposed.image.develop)()?)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Regression: a recorded run stood still for ever, because a worker of rayon's pool waited for an image that the recorder was developing, and
+    /// the recorder for a part of its rendering that lay on the stack of that worker.
+    #[test]
+    fn images_are_developed_outside_of_rayons_pool() {
+        let pending = || {
+            let develop = Box::new(|| {
+                assert_eq!(rayon::current_thread_index(), None, "a worker of the pool develops");
+                Ok(RgbImage::new(1, 1))
+            });
+            let middle = BoardInstant { us: 0.0, error_us: 0.0 };
+            let seen = vergence_rig::HostInstant { us: 0.0, error_us: 0.0 };
+            ExposedImage { image: PendingImage { seq: 0, middle: seen, develop }, middle }
+        };
+        both([pending(), pending()]).expect("two images");
+    }
 }
