@@ -3,6 +3,7 @@
 //! - [`views_in_images`], [`PairImages`]: targets in image files, of one camera or of a pair
 //! - [`views_in_corners`], [`pairs_in_corners`], [`stage_poses_in_corners`]: CSV files of corners
 //! - [`RecordedSet`], [`LiveSet`]: a set folder of stage poses, read or taken while the rig drives itself
+//! - [`TargetCapture`]: a set of views of cameras that stand still
 //! - [`TargetWatch`]: whether a target before live cameras is seen, held still, and worth a view
 //! - [`CameraFile`], [`LensFiles`]: camera files of any format that is read
 //! - [`read_rig`], [`import_rig`]: rig files, and rigs of other programs' cameras
@@ -12,6 +13,7 @@
 //! `vergence-calibration`, which reads no file.
 
 mod camera_files;
+mod capture;
 mod corners;
 mod csv_file;
 mod error;
@@ -30,6 +32,7 @@ mod truth;
 mod views;
 
 pub use camera_files::{CameraFile, FileLens, bare_document, camera_toml, document_of, read_camera, read_camera_file};
+pub use capture::{Captured, Looked, TargetCapture};
 pub use corners::{FrameView, read_corners};
 pub use error::InputError;
 pub use foreign_rig::{ImportedRig, import_rig, read_rig};

@@ -90,6 +90,23 @@ impl TargetWatch {
         self.views.push(self.last.clone());
     }
 
+    /// What each camera's set covers.
+    #[must_use]
+    pub fn coverage(&self) -> &[Coverage] {
+        &self.coverage
+    }
+
+    /// The views of now, one for each camera; none where one of them does not see the target.
+    #[must_use]
+    pub fn seen(&self) -> &[TargetView] {
+        &self.last
+    }
+
+    /// The views of the set that the camera `number` has, 0 for the left one.
+    pub fn views_of(&self, number: usize) -> impl Iterator<Item = &TargetView> {
+        self.views.iter().filter_map(move |views| views.get(number))
+    }
+
     /// Number of views in the set.
     #[must_use]
     pub fn taken(&self) -> usize {

@@ -67,6 +67,16 @@ impl Coverage {
         self.views
     }
 
+    /// How far each cell is covered, by rows from the upper left: the share of the views that it needs, 1 where it has them; `None` where no target can
+    /// be shown.
+    #[must_use]
+    pub fn cells(&self) -> [[Option<f64>; CELLS]; CELLS] {
+        let share = |views: usize| (views as f64 / VIEWS_PER_CELL as f64).min(1.0);
+        std::array::from_fn(|row| {
+            std::array::from_fn(|column| self.within_reach[row][column].then(|| share(self.cells[row][column])))
+        })
+    }
+
     /// Whether `view` shows the target at a place or tilt of which more views are needed.
     #[must_use]
     pub fn is_news(&self, view: &TargetView) -> bool {

@@ -10,6 +10,7 @@ import { showSphere } from './sphere.js';
 import { showTopView } from './top_view.js';
 import { showPlots } from './plots.js';
 import { showPlan } from './plan.js';
+import { showCapture } from './capture.js';
 import { showLog } from './log.js';
 
 const link = connect();
@@ -23,5 +24,6 @@ showSphere(link);
 showTopView(link);
 showPlots(link);
 showPlan(link);
+showCapture(link, pictures);
 showLog(link);
 link.open();

@@ -8,6 +8,7 @@ export function showPictures(link) {
   const images = { left: null, right: null };
   let cloud = null;
   let picked = null;
+  let overlay = null;
   const draws = SIDES.map((side, index) => {
     const canvas = document.getElementById(side);
     return fitted(canvas, (dots) => draw(canvas, side, index, dots));
@@ -28,6 +29,7 @@ export function showPictures(link) {
     const zoom = Math.min(canvas.width / image.width, canvas.height / image.height);
     const [left, top] = [(canvas.width - zoom * image.width) / 2, (canvas.height - zoom * image.height) / 2];
     context.drawImage(image, left, top, zoom * image.width, zoom * image.height);
+    overlay?.(context, index, { zoom, left, top, dots });
     if (!cloud) return;
     const place = (point) => [0, 1].map((axis) => [left, top][axis] + zoom * (cloud.detail(point, 6 + 2 * index + axis) + 0.5));
     for (let point = 0; point < cloud.count; point += 1) {
@@ -64,5 +66,7 @@ export function showPictures(link) {
   return {
     images,
     mark(point) { picked = point; all(); },
+    // `paint` draws over the image of a side: context, number of the side, and where the image lies.
+    cover(paint) { overlay = paint; all(); },
   };
 }

@@ -20,6 +20,7 @@ const FILES: &[(&str, &str, &str)] = &[
     ("/sphere.js", JAVASCRIPT, include_str!("../page/sphere.js")),
     ("/top_view.js", JAVASCRIPT, include_str!("../page/top_view.js")),
     ("/plots.js", JAVASCRIPT, include_str!("../page/plots.js")),
+    ("/capture.js", JAVASCRIPT, include_str!("../page/capture.js")),
     ("/plan.js", JAVASCRIPT, include_str!("../page/plan.js")),
     ("/log.js", JAVASCRIPT, include_str!("../page/log.js")),
 ];

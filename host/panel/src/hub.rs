@@ -5,6 +5,7 @@ use std::time::Duration;
 
 use image::RgbImage;
 use serde_json::{Value, json};
+use tokio::sync::mpsc::error::TrySendError;
 use tokio::sync::{Semaphore, mpsc, watch};
 use vergence_board::HostClock;
 use vergence_rig::{AxisPosition, Rig};
@@ -236,10 +237,13 @@ impl Hub {
     /// Gives an order to the rig.
     ///
     /// # Errors
-    /// A sentence where too many wait.
+    /// A sentence where too many wait, and where nothing carries orders out.
     pub fn order(&self, order: Order) -> Result<(), String> {
         let given = Given { order, halts: *self.halts.borrow() };
-        self.orders.try_send(given).map_err(|_| "the rig is busy with earlier orders: stop it, or wait".to_owned())
+        self.orders.try_send(given).map_err(|refused| match refused {
+            TrySendError::Full(_) => "the rig is busy with earlier orders: stop it, or wait".to_owned(),
+            TrySendError::Closed(_) => "nothing here drives a rig".to_owned(),
+        })
     }
 
     /// The first message to a page: its number, and what does not change.

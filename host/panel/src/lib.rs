@@ -10,6 +10,7 @@
 
 mod assets;
 mod board_log;
+mod capture;
 mod cloud;
 mod connection;
 mod driver;
@@ -27,6 +28,7 @@ mod status;
 mod streams;
 mod view;
 
+pub use capture::{CaptureCamera, CaptureProgress};
 pub use cloud::cloud_message;
 pub use driver::Driver;
 pub use error::PanelError;

@@ -20,12 +20,14 @@ pub enum Stream {
     Right,
     /// What is seen and how well, over all directions.
     Sphere,
+    /// How far a set of target views has come.
+    Capture,
     /// The last lines of the log.
     Log,
 }
 
 /// Number of streams.
-const COUNT: usize = 8;
+const COUNT: usize = 9;
 
 /// A message to a page; a clone shares its bytes.
 #[derive(Clone, Debug, PartialEq, Eq)]

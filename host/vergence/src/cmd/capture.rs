@@ -1,14 +1,14 @@
 //! `vergence capture`: a set of target views, with advice on what to show.
 
-use std::path::{Path, PathBuf};
-use std::pin::pin;
+use std::net::SocketAddr;
+use std::path::PathBuf;
+use std::sync::Arc;
 
 use serde_json::json;
-use tokio::task::spawn_blocking;
 use vergence_board::HostClock;
-use vergence_calibration_input::{NAMES, TargetViews, TargetWatch, observe, printed};
-use vergence_camera::{Camera, CameraError, CameraImage, CameraSet};
-use vergence_files::{make_folder, write_png};
+use vergence_calibration_input::{Captured, Looked, TargetCapture, printed};
+use vergence_camera::{Camera, CameraError, CameraSet};
+use vergence_panel::Setting;
 use vergence_rig::Rig;
 use vergence_scene::LensChoice;
 use vergence_sim::{HeldTarget, TargetCamera};
@@ -16,6 +16,7 @@ use vergence_targets::TargetKind;
 use vergence_vision::Side;
 
 use super::camera_options::CameraOptions;
+use super::capture_panel::CapturePanel;
 use super::mask_options::MaskOptions;
 use super::target_options::TargetOptions;
 use crate::cli::CommonOptions;
@@ -56,93 +57,66 @@ pub struct Args {
     /// With simulated cameras: their lenses, ideal, sigma8_f18 or nikkor6_f28.
     #[arg(long, default_value_t)]
     lens: LensChoice,
+    /// Serves a page that shows what the views cover, what to show next, and at the end how well they calibrate each lens; until Ctrl-C.
+    #[arg(long, value_name = "ADDRESS", num_args = 0..=1, default_missing_value = "127.0.0.1:8088")]
+    panel: Option<SocketAddr>,
+    /// Lets other computers see that page, such as the telephone of who holds the target; they need the token in the address that is printed:
+    /// --panel 0.0.0.0:8088 --network.
+    #[arg(long, requires = "panel")]
+    network: bool,
     #[command(flatten)]
     force: ForceOption,
 }
 
 pub async fn run(args: &Args, common: &CommonOptions, console: Console) -> Result<(), Failure> {
     let target = args.target.checked_spec(args.force, console)?;
-    let rig = rig_file::load(common.rig.as_deref())?;
+    let rig = Arc::new(rig_file::load(common.rig.as_deref())?);
     let cameras = CameraSet::new(open(args, &rig, &target)?);
-    if args.cameras == ["sim"] {
+    let is_simulated = args.cameras == ["sim"];
+    if is_simulated {
         console.say(format!("simulated cameras, lens: {}", args.lens))?;
     }
-    capture(cameras, target, (args, &rig), interrupted(), console).await
+    let simulated = is_simulated.then(|| format!("target and cameras, lenses {}", args.lens));
+    let setting = Setting { rig: Arc::clone(&rig), simulated, has_cameras: true };
+    let serve = |address| CapturePanel::serve(setting, (address, args.network), console);
+    let panel = args.panel.map(serve).transpose()?;
+    capture(cameras, target, (args, &rig), panel, interrupted, console).await
 }
 
-/// Counts of a capture.
-#[derive(Default)]
-struct Counts {
-    images: u64,
-    alone: u64,
-    missed: u64,
-}
-
-async fn capture(
-    mut cameras: CameraSet,
+async fn capture<I: Future<Output = ()>>(
+    cameras: CameraSet,
     target: TargetKind,
     (args, rig): (&Args, &Rig),
-    interruption: impl Future<Output = ()>,
+    mut panel: Option<CapturePanel>,
+    interruption: impl Fn() -> I,
     console: Console,
 ) -> Result<(), Failure> {
-    make_folder(&args.out)?;
-    let first = first_free(&args.out);
-    let mut interruption = pin!(interruption);
-    let mut watch = TargetWatch::new(Vec::new());
     let progress = console.progress("show the target");
-    let advice = |watch: &TargetWatch| watch.advice().unwrap_or_else(|| "the set is complete".into());
-    let mut counts = Counts::default();
-    let mut was_interrupted = false;
-    while watch.taken() < args.views && counts.images < args.frames && !watch.is_complete() {
-        let (images, views);
-        (cameras, images, views) = tokio::select! {
-            looked = look(cameras, target) => looked?,
-            () = &mut interruption => {
-                was_interrupted = true;
-                break;
-            }
-        };
-        if let (0, Some(left), Some(right)) = (counts.images, images.first(), images.last()) {
-            watch = TargetWatch::of_cameras(&images, args.masks.read_for(rig, [left.size(), right.size()])?);
-        }
-        counts = Counts { images: counts.images + 1, alone: cameras.alone(), missed: cameras.missed() };
-        let is_wanted = watch.observe(views) && watch.is_news();
-        if is_wanted {
-            for (image, name) in images.iter().zip(NAMES) {
-                write_png(&args.out.join(file_name(name, first + watch.taken())), &image.image)?;
-            }
-            watch.take();
-        }
-        progress.set_message(format!("{} views; {}", watch.taken(), advice(&watch)));
+    let wanted = TargetCapture { folder: &args.out, target, views: args.views, images: args.frames };
+    let tell = |looked: &Looked<'_>| {
+        let advice = looked.watch.advice().unwrap_or_else(|| "the set is complete".into());
+        let taken = looked.watch.taken();
+        progress.set_message(format!("{taken} views; {advice}"));
         progress.tick();
-        if is_wanted {
-            progress.suspend(|| console.say(format!("view {} taken; {}", watch.taken(), advice(&watch))))?;
+        if let Some(panel) = &mut panel {
+            panel.show(looked, args.views);
         }
-    }
+        match looked.is_taken {
+            true => progress.suspend(|| console.say(format!("view {taken} taken; {advice}"))),
+            false => Ok(()),
+        }
+    };
+    let captured = wanted.fill(cameras, |sizes| args.masks.read_for(rig, sizes), interruption(), tell).await?;
     progress.finish_and_clear();
-    report(&watch, &counts, was_interrupted, args, console)
+    report(&captured, args, console)?;
+    match panel {
+        Some(panel) if !captured.was_interrupted => panel.conclude(captured, interruption(), console).await,
+        _ => Ok(()),
+    }
 }
 
-/// Takes one image with each camera and looks for the target in them, on a thread of its own.
-async fn look(
-    mut cameras: CameraSet,
-    target: TargetKind,
-) -> Result<(CameraSet, Vec<CameraImage>, TargetViews), Failure> {
-    let looked = spawn_blocking(move || {
-        let images = cameras.grab()?;
-        let views = observe(&images, &target);
-        Ok((cameras, images, views))
-    });
-    looked.await.map_err(|error| Failure::device(format!("looking through the cameras failed: {error}")))?
-}
-
-fn report(
-    watch: &TargetWatch,
-    counts: &Counts,
-    was_interrupted: bool,
-    args: &Args,
-    console: Console,
-) -> Result<(), Failure> {
+fn report(captured: &Captured, args: &Args, console: Console) -> Result<(), Failure> {
+    let Captured { watch, images, alone, missed, was_interrupted, .. } = captured;
     let complete = watch.is_complete();
     let state = match (complete, was_interrupted) {
         (true, _) => "the set is complete",
@@ -150,32 +124,22 @@ fn report(
         (false, false) => "the set is not complete",
     };
     console.say(format!("{} views in {}; {state}", watch.taken(), args.out.display()))?;
-    if counts.alone > 0 {
-        console.say(format!("{} images had no partner of the other camera taken at the same time", counts.alone))?;
+    if *alone > 0 {
+        console.say(format!("{alone} images had no partner of the other camera taken at the same time"))?;
     }
-    if counts.missed > 0 {
-        console.say(format!("{} images were lost between the cameras and this program", counts.missed))?;
+    if *missed > 0 {
+        console.say(format!("{missed} images were lost between the cameras and this program"))?;
     }
     console.result(&json!({
         "views": watch.taken(),
-        "frames": counts.images,
-        "frames_alone": counts.alone,
-        "frames_missed": counts.missed,
+        "frames": images,
+        "frames_alone": alone,
+        "frames_missed": missed,
         "lens": (args.cameras == ["sim"]).then(|| args.lens.to_string()),
         "complete": complete,
         "interrupted": was_interrupted,
         "out": args.out,
     }))
-}
-
-fn file_name(camera: &str, number: usize) -> String {
-    format!("{camera}{number:03}.png")
-}
-
-/// The first number that no image in `folder` has.
-fn first_free(folder: &Path) -> usize {
-    let is_free = |number: &usize| NAMES.iter().all(|name| !folder.join(file_name(name, *number)).exists());
-    (0..).find(is_free).unwrap_or_default()
 }
 
 fn open(args: &Args, rig: &Rig, target: &TargetKind) -> Result<Vec<Box<dyn Camera>>, Failure> {
@@ -205,12 +169,13 @@ fn simulated(args: &Args, rig: &Rig, target: &TargetKind) -> Vec<Box<dyn Camera>
 mod tests {
     #![allow(clippy::unwrap_used, reason = "a test may fail")]
 
-    use std::sync::Arc;
+    use std::path::Path;
     use std::sync::atomic::{AtomicBool, Ordering};
     use std::time::Duration;
 
     use clap::Parser;
     use tokio::sync::Notify;
+    use vergence_camera::CameraImage;
 
     use super::*;
     use crate::rig_file::bench_with_sensors;
@@ -267,14 +232,14 @@ mod tests {
         };
         let image = TargetCamera::new(held, Side::Left).grab().unwrap().unwrap();
         let camera = Ending { image: image.clone(), images_left: 3, silence: silence.clone() };
-        let interruption = async {
-            match silence {
+        let interruption = || async {
+            match &silence {
                 Some(silence) => silence.begun.notified().await,
                 None => std::future::pending().await,
             }
         };
         let cameras = CameraSet::new(vec![Box::new(camera)]);
-        (image, capture(cameras, target, (&args, &rig), interruption, Console::new(true)).await)
+        (image, capture(cameras, target, (&args, &rig), None, interruption, Console::new(true)).await)
     }
 
     #[tokio::test]

@@ -63,9 +63,8 @@ pub async fn demonstrate(
 }
 
 pub async fn run(args: &Args, common: &CommonOptions, console: Console) -> Result<(), Failure> {
-    let access = args.access()?;
-    let listen = |error: std::io::Error| PanelError::Listen { address: args.listen, why: error.to_string() };
-    let listener = TcpListener::bind(args.listen).map_err(listen)?;
+    let access = access(args.listen, args.network)?;
+    let listener = listen(args.listen)?;
     let is_simulated = args.cameras == ["sim"];
     let (panel, session) = match args.cameras.as_slice() {
         [] => {
@@ -97,19 +96,21 @@ pub async fn run(args: &Args, common: &CommonOptions, console: Console) -> Resul
     }
 }
 
-impl Args {
-    /// Who may connect: on a network, who knows a token that is new each time.
-    fn access(&self) -> Result<Access, Failure> {
-        match (self.network, self.listen.ip().is_loopback()) {
-            (true, _) => {
-                let secret = fresh_secret().map_err(|error| Failure::device(error.to_string()))?;
-                Ok(Access::Token(hex(&secret.public().0[..16])))
-            }
-            (false, true) => Ok(Access::ThisComputer),
-            (false, false) => Err(Failure::usage(format!(
-                "{} lets other computers in: add --network, which makes a token that they need",
-                self.listen
-            ))),
+/// What accepts connections at `address`.
+pub fn listen(address: SocketAddr) -> Result<TcpListener, PanelError> {
+    TcpListener::bind(address).map_err(|error| PanelError::Listen { address, why: error.to_string() })
+}
+
+/// Who may connect to `address`: on a network, who knows a token that is new each time.
+pub fn access(address: SocketAddr, network: bool) -> Result<Access, Failure> {
+    match (network, address.ip().is_loopback()) {
+        (true, _) => {
+            let secret = fresh_secret().map_err(|error| Failure::device(error.to_string()))?;
+            Ok(Access::Token(hex(&secret.public().0[..16])))
         }
+        (false, true) => Ok(Access::ThisComputer),
+        (false, false) => Err(Failure::usage(format!(
+            "{address} lets other computers in: add --network, which makes a token that they need"
+        ))),
     }
 }

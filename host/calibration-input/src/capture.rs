@@ -1,0 +1,158 @@
+//! Takes a set of target views with one camera or a pair, and says what it has and still needs.
+
+use std::path::{Path, PathBuf};
+use std::pin::pin;
+
+use tokio::task::spawn_blocking;
+use vergence_calibration::{IntrinsicsOptions, calibrate_intrinsics, check_fit};
+use vergence_calibration_report::intrinsics_verdict;
+use vergence_camera::{CameraError, CameraImage, CameraSet};
+use vergence_files::{make_folder, write_png};
+use vergence_targets::{TargetKind, TargetView};
+use vergence_vision::{BodyMask, ImageSize};
+
+use crate::InputError;
+use crate::target_watch::{NAMES, TargetViews, TargetWatch, observe};
+
+/// A set of target views that is taken.
+pub struct TargetCapture<'a> {
+    /// Folder of the images. In a folder that has views already, more are added.
+    pub folder: &'a Path,
+    /// The target that is shown.
+    pub target: TargetKind,
+    /// Ends after this many views, complete or not.
+    pub views: usize,
+    /// Ends after this many images of each camera.
+    pub images: u64,
+}
+
+/// What was seen at one instant.
+pub struct Looked<'a> {
+    /// The images, left before right.
+    pub images: &'a [CameraImage],
+    /// The set, with the views of these images.
+    pub watch: &'a TargetWatch,
+    /// Whether the target is held still.
+    pub is_still: bool,
+    /// Whether the images were added to the set.
+    pub is_taken: bool,
+}
+
+/// What became of a set.
+pub struct Captured {
+    /// The set.
+    pub watch: TargetWatch,
+    /// Sizes of the images, left before right.
+    pub sizes: Vec<ImageSize>,
+    /// Number of images of each camera.
+    pub images: u64,
+    /// Number of images without a partner of the other camera.
+    pub alone: u64,
+    /// Number of images that were lost between the cameras and this program.
+    pub missed: u64,
+    /// Whether it was interrupted before it was complete.
+    pub was_interrupted: bool,
+}
+
+impl TargetCapture<'_> {
+    /// Takes images until the set is complete, has its views, or is interrupted. Every image of the set is written at once: whatever ends the
+    /// capture, the views are kept. `masks` says what is left out of images of these sizes; `tell` is called with all that was seen.
+    ///
+    /// # Errors
+    /// Those of the cameras and of the folder, of `masks` and of `tell`.
+    pub async fn fill<E>(
+        &self,
+        mut cameras: CameraSet,
+        masks: impl Fn([ImageSize; 2]) -> Result<[Option<BodyMask>; 2], E>,
+        interruption: impl Future<Output = ()>,
+        mut tell: impl FnMut(&Looked<'_>) -> Result<(), E>,
+    ) -> Result<Captured, E>
+    where
+        E: From<InputError>,
+    {
+        make_folder(self.folder).map_err(InputError::from)?;
+        let first = first_free(self.folder);
+        let mut interruption = pin!(interruption);
+        let watch = TargetWatch::new(Vec::new());
+        let mut captured =
+            Captured { watch, sizes: Vec::new(), images: 0, alone: 0, missed: 0, was_interrupted: false };
+        while captured.watch.taken() < self.views && captured.images < self.images && !captured.watch.is_complete() {
+            let (images, views);
+            (cameras, images, views) = tokio::select! {
+                looked = look(cameras, self.target) => looked?,
+                () = &mut interruption => {
+                    captured.was_interrupted = true;
+                    break;
+                }
+            };
+            if let (0, Some(left), Some(right)) = (captured.images, images.first(), images.last()) {
+                captured.watch = TargetWatch::of_cameras(&images, masks([left.size(), right.size()])?);
+                captured.sizes = images.iter().map(CameraImage::size).collect();
+            }
+            captured.images += 1;
+            (captured.alone, captured.missed) = (cameras.alone(), cameras.missed());
+            let watch = &mut captured.watch;
+            let is_still = watch.observe(views);
+            let is_taken = is_still && watch.is_news();
+            if is_taken {
+                for (image, name) in images.iter().zip(NAMES) {
+                    write_png(&file_of(self.folder, name, first + watch.taken()), &image.image)
+                        .map_err(InputError::from)?;
+                }
+                watch.take();
+            }
+            tell(&Looked { images: &images, watch, is_still, is_taken })?;
+        }
+        Ok(captured)
+    }
+}
+
+impl Captured {
+    /// A sentence for each camera: how well the views of this set calibrate its lens, or why they do not.
+    #[must_use]
+    pub fn verdicts(&self) -> Vec<String> {
+        let verdict = |(number, size): (usize, &ImageSize)| {
+            let views: Vec<TargetView> = self.watch.views_of(number).cloned().collect();
+            let said = lens_verdict(&views, *size);
+            match self.sizes.len() {
+                0 | 1 => said,
+                _ => format!("{} camera: {said}", NAMES[number.min(1)]),
+            }
+        };
+        self.sizes.iter().enumerate().map(verdict).collect()
+    }
+}
+
+fn lens_verdict(views: &[TargetView], size: ImageSize) -> String {
+    let calibration = match calibrate_intrinsics(views, size, &IntrinsicsOptions::default()) {
+        Ok(calibration) => calibration,
+        Err(error) => return format!("no calibration: {error}"),
+    };
+    match check_fit(calibration.rms_inlier_px, calibration.corners_inlier, calibration.corners_total) {
+        Ok(()) => intrinsics_verdict(&calibration, views).sentence,
+        Err(error) => error.to_string(),
+    }
+}
+
+/// Takes one image with each camera and looks for the target in them, on a thread of its own.
+async fn look(
+    mut cameras: CameraSet,
+    target: TargetKind,
+) -> Result<(CameraSet, Vec<CameraImage>, TargetViews), InputError> {
+    let looked = spawn_blocking(move || {
+        let images = cameras.grab()?;
+        let views = observe(&images, &target);
+        Ok::<_, CameraError>((cameras, images, views))
+    });
+    Ok(looked.await.map_err(|error| InputError::Looking(error.to_string()))??)
+}
+
+fn file_of(folder: &Path, camera: &str, number: usize) -> PathBuf {
+    folder.join(format!("{camera}{number:03}.png"))
+}
+
+/// The first number that no image in `folder` has.
+fn first_free(folder: &Path) -> usize {
+    let is_free = |number: &usize| NAMES.iter().all(|name| !file_of(folder, name, *number).exists());
+    (0..).find(is_free).unwrap_or_default()
+}
