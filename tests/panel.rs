@@ -13,15 +13,18 @@ mod common;
 
 use std::io::{BufRead, BufReader, Write};
 use std::path::{Path, PathBuf};
-use std::process::{Child, Command, Stdio};
+use std::process::{Child, ChildStdout, Command, Stdio};
 
 use common::data::skip;
 use common::{fails_with, vergence};
 use serde_json::Value;
+use vergence_rig::BENCH_TOML;
 
 /// A panel in its own process; ends with the value.
 struct Served {
     process: Child,
+    /// Where it goes on to write.
+    _out: BufReader<ChildStdout>,
     url: String,
 }
 
@@ -32,7 +35,7 @@ impl Served {
         let mut line = String::new();
         out.read_line(&mut line).expect("it says where it is");
         let said: Value = serde_json::from_str(&line).expect("JSON");
-        Self { process, url: said["url"].as_str().expect("an address").to_owned() }
+        Self { process, _out: out, url: said["url"].as_str().expect("an address").to_owned() }
     }
 
     /// Ends as by Ctrl-C, in order.
@@ -57,6 +60,13 @@ fn small(address: &str) -> [&str; 12] {
     ["panel", "--port", "sim", "--home", "--listen", address, a, b, c, d, e, f]
 }
 
+/// The folder where pictures are kept.
+fn pictures() -> PathBuf {
+    let pictures = Path::new(env!("CARGO_TARGET_TMPDIR")).join("panel");
+    std::fs::create_dir_all(&pictures).expect("a folder");
+    pictures
+}
+
 /// The browser and the folder with the script, if everything is there; else the test is skipped, or fails where data are required.
 fn browser() -> Option<(String, PathBuf)> {
     let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../tests/panel");
@@ -76,8 +86,7 @@ fn browser() -> Option<(String, PathBuf)> {
 #[test]
 fn people_see_and_drive_the_rig_in_a_browser() {
     let Some((chromium, folder)) = browser() else { return };
-    let pictures = Path::new(env!("CARGO_TARGET_TMPDIR")).join("panel");
-    std::fs::create_dir_all(&pictures).expect("a folder");
+    let pictures = pictures();
     let mut served = Served::start(&small("127.0.0.1:0"));
     let address = served.url.trim_start_matches("http://").trim_end_matches('/').to_owned();
     let mut script = Command::new("node")
@@ -101,6 +110,29 @@ fn people_see_and_drive_the_rig_in_a_browser() {
     for name in ["desktop", "phone", "light"] {
         assert!(pictures.join(format!("{name}.png")).exists());
     }
+}
+
+#[test]
+fn people_watch_in_a_browser_how_a_calibration_fills() {
+    let Some((chromium, folder)) = browser() else { return };
+    let pictures = pictures();
+    let set = tempfile::tempdir().expect("a folder");
+    let rig = set.path().join("small.toml");
+    let small = BENCH_TOML.replace("[1280, 1280]", "[320, 320]").replace("366.0", "91.5").replace("639.5", "159.5");
+    std::fs::write(&rig, small).expect("a file");
+    let (rig, out) = (rig.to_str().expect("a name"), set.path().join("set"));
+    let target = ["--corners", "9x6", "--square", "20mm", "--frames", "60"];
+    let capture = ["--rig", rig, "capture", "--cameras", "sim", "--panel", "127.0.0.1:0", "--out"];
+    let mut served = Served::start(&[&capture[..], &[out.to_str().expect("a name")], &target].concat());
+    let status = Command::new("node")
+        .arg(folder.join("capture.mjs"))
+        .args([&chromium, &served.url])
+        .arg(&pictures)
+        .status()
+        .expect("node starts");
+    assert!(status.success(), "the browser found a fault: see above");
+    served.terminate();
+    assert!(out.join("right000.png").exists());
 }
 
 #[test]

@@ -19,7 +19,7 @@ export function showCapture(link, pictures) {
     const seen = cameras.some(({ corners }) => corners.length > 0);
     const target = isOver ? '' : !seen ? '; no target seen' : isStill ? '; the target is held still' : '; the target moves: hold it still';
     byId('capture-count').textContent = `${views} views (${wanted} at most)${target}`;
-    const said = isOver ? 'The views are taken.' : advice ?? 'The set is complete.';
+    const said = advice === null ? 'The set is complete.' : isOver ? 'The views are taken, but not all that are needed.' : advice;
     // Set only when it changes: a screen reader says it again otherwise.
     if (byId('capture-advice').textContent !== said) byId('capture-advice').textContent = said;
     if (byId('capture-verdicts').childElementCount !== verdicts.length) {
