@@ -53,6 +53,17 @@ pub(super) fn angle_from_axis<const FUSED: bool, const W: usize>(rho: &[f64; W],
     angle
 }
 
+/// The distance of each point from the z axis, and the angle between its direction and that axis.
+#[inline(always)]
+pub(super) fn distance_and_angle<const FUSED: bool, const W: usize>([x, y, z]: &[[f64; W]; 3]) -> ([f64; W], [f64; W]) {
+    let mut rho = [0.0; W];
+    for j in 0..W {
+        rho[j] = (x[j] * x[j] + y[j] * y[j]).sqrt();
+    }
+    let theta = angle_from_axis::<FUSED, W>(&rho, z);
+    (rho, theta)
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

@@ -3,7 +3,7 @@
 use multiversion::multiversion;
 use multiversion::target::target_cfg_f;
 
-use super::arc_tangent::angle_from_axis;
+use super::arc_tangent::distance_and_angle;
 use super::lanes::{ALWAYS_FUSED, Kernel, for_rows, polynomial};
 use crate::KannalaBrandt;
 
@@ -29,11 +29,7 @@ impl Project {
 impl Kernel<3, 2> for Project {
     #[inline(always)]
     fn lanes<const FUSED: bool, const W: usize>(&self, [x, y, z]: [[f64; W]; 3]) -> [[f64; W]; 2] {
-        let mut rho = [0.0; W];
-        for j in 0..W {
-            rho[j] = (x[j] * x[j] + y[j] * y[j]).sqrt();
-        }
-        let theta = angle_from_axis::<FUSED, W>(&rho, &z);
+        let (rho, theta) = distance_and_angle::<FUSED, W>(&[x, y, z]);
         let mut squared = [0.0; W];
         for j in 0..W {
             squared[j] = theta[j] * theta[j];

@@ -4,7 +4,7 @@ use multiversion::multiversion;
 use multiversion::target::target_cfg_f;
 use nalgebra::Vector3;
 
-use super::arc_tangent::angle_from_axis;
+use super::arc_tangent::distance_and_angle;
 use super::chebyshev::fit;
 use super::lanes::{ALWAYS_FUSED, Kernel, for_rows, polynomial};
 use super::project::{pixels, scales};
@@ -165,11 +165,7 @@ impl ProjectRadial {
 impl Kernel<3, 2> for ProjectRadial {
     #[inline(always)]
     fn lanes<const FUSED: bool, const W: usize>(&self, [x, y, z]: [[f64; W]; 3]) -> [[f64; W]; 2] {
-        let mut rho = [0.0; W];
-        for j in 0..W {
-            rho[j] = (x[j] * x[j] + y[j] * y[j]).sqrt();
-        }
-        let theta = angle_from_axis::<FUSED, W>(&rho, &z);
+        let (rho, theta) = distance_and_angle::<FUSED, W>(&[x, y, z]);
         let mut t = [0.0; W];
         for j in 0..W {
             t[j] = self.slope * (theta[j] * theta[j]) - 1.0;
