@@ -156,3 +156,104 @@ fn first_free(folder: &Path) -> usize {
     let is_free = |number: &usize| NAMES.iter().all(|name| !file_of(folder, name, *number).exists());
     (0..).find(is_free).unwrap_or_default()
 }
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used, reason = "a test may fail")]
+
+    use std::sync::Arc;
+    use std::sync::atomic::{AtomicBool, Ordering};
+    use std::time::Duration;
+
+    use tokio::sync::Notify;
+    use vergence_camera::Camera;
+    use vergence_rig::{BENCH_TOML, Rig};
+    use vergence_sim::{HeldTarget, TargetCamera};
+    use vergence_targets::TargetSpec;
+    use vergence_vision::{Length, Side};
+
+    use super::*;
+    use crate::printed;
+
+    /// A time in which a camera sends nothing.
+    #[derive(Default)]
+    struct Silence {
+        begun: Notify,
+        is_over: AtomicBool,
+    }
+
+    /// Shows the same target some times, then is gone, after a silence where there is one.
+    struct Ending {
+        image: CameraImage,
+        images_left: u32,
+        silence: Option<Arc<Silence>>,
+    }
+
+    impl Camera for Ending {
+        fn grab(&mut self) -> Result<Option<CameraImage>, CameraError> {
+            if let Some(left) = self.images_left.checked_sub(1) {
+                self.images_left = left;
+                return Ok(Some(self.image.clone()));
+            }
+            if let Some(silence) = &self.silence {
+                silence.begun.notify_one();
+                std::thread::park_timeout(Duration::from_secs(3));
+                silence.is_over.store(true, Ordering::SeqCst);
+            }
+            Err(CameraError::Vanished { device: "/dev/video0".into(), why: "no such device".into() })
+        }
+    }
+
+    /// Captures into `folder` with a camera that ends after three images, and is interrupted in its silence. Returns the image that the camera
+    /// shows, and the outcome.
+    async fn capture_until_the_end(
+        folder: &Path,
+        silence: Option<Arc<Silence>>,
+    ) -> (CameraImage, Result<Captured, InputError>) {
+        let rig = Rig::from_toml(BENCH_TOML).unwrap().with_sensors(640).unwrap();
+        let target = TargetKind::Chessboard(TargetSpec { columns: 9, rows: 6, square: Length::from_mm(20.0) });
+        let nowhere = rig.pose_at_values(&[0.0, 0.0]).left_from_right;
+        let held = HeldTarget {
+            left: rig.left_camera,
+            right: (rig.right_camera, nowhere),
+            both: false,
+            target: printed(&target),
+            seed: 1,
+        };
+        let image = TargetCamera::new(held, Side::Left).grab().unwrap().unwrap();
+        let camera = Ending { image: image.clone(), images_left: 3, silence: silence.clone() };
+        let interruption = async {
+            match silence {
+                Some(silence) => silence.begun.notified().await,
+                None => std::future::pending().await,
+            }
+        };
+        let capture = TargetCapture { folder, target, views: 40, images: 100 };
+        let cameras = CameraSet::new(vec![Box::new(camera)]);
+        (image, capture.fill(cameras, |_| Ok([None, None]), interruption, |_| Ok(())).await)
+    }
+
+    #[tokio::test]
+    async fn views_taken_before_a_camera_vanished_are_kept() {
+        let folder = tempfile::tempdir().unwrap();
+        let set = folder.path().join("set");
+        let (image, outcome) = capture_until_the_end(&set, None).await;
+        assert!(matches!(outcome, Err(InputError::Camera(CameraError::Vanished { .. }))));
+        assert_eq!(image::open(set.join("left000.png")).unwrap().to_rgb8(), image.image);
+    }
+
+    /// An interruption does not wait for a camera that sends nothing, and the next capture overwrites nothing.
+    #[tokio::test]
+    async fn an_interrupted_capture_ends_at_once_and_goes_on_later() {
+        let folder = tempfile::tempdir().unwrap();
+        let set = folder.path().join("set");
+        let silence = Arc::new(Silence::default());
+        let (_, interrupted) = capture_until_the_end(&set, Some(Arc::clone(&silence))).await;
+        assert!(interrupted.is_ok_and(|captured| captured.was_interrupted));
+        assert!(!silence.is_over.load(Ordering::SeqCst));
+        let first = std::fs::read(set.join("left000.png")).unwrap();
+        assert!(capture_until_the_end(&set, None).await.1.is_err());
+        assert_eq!(std::fs::read(set.join("left000.png")).unwrap(), first);
+        assert!(set.join("left001.png").exists());
+    }
+}

@@ -51,7 +51,7 @@ export function showSphere(link) {
     context.stroke();
     context.font = `${11 * dots}px system-ui`;
     context.textAlign = 'center';
-    for (const [text, part] of [['behind', 0.045], ['left', 0.25], ['forward', 0.5], ['right', 0.75]]) {
+    for (const [text, part] of [['behind', 0.07], ['left', 0.25], ['forward', 0.5], ['right', 0.75]]) {
       const [x, y] = [left + width * part, width / 2 - 5 * dots];
       context.lineWidth = 3 * dots;
       context.strokeStyle = '#000a';
