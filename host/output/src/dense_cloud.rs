@@ -12,7 +12,7 @@ use vergence_vision::{Left, Pixel, Point};
 
 use crate::cloud_report::{drift_json, extrapolated_line};
 use crate::pictures::{confidence_image, dense_svg, range_image, sigma_image, write_drawing};
-use crate::points::{DenseRow, dense_ply};
+use crate::points::{CloudFormat, DenseRow};
 
 /// A range for every pixel of a left image, written as a cloud with images beside it.
 pub struct DenseCloud<'a> {
@@ -26,7 +26,7 @@ pub struct DenseCloud<'a> {
 }
 
 impl<'a> DenseCloud<'a> {
-    /// Writes `ranges`, which were measured in `images` taken at `pose`: the cloud to `out`, and beside it PNG images of range,
+    /// Writes `ranges`, which were measured in `images` taken at `pose`: the cloud to `out` in the format of its ending, and beside it PNG images of range,
     /// sigma and confidence, and a preview as SVG.
     ///
     /// # Errors
@@ -40,7 +40,7 @@ impl<'a> DenseCloud<'a> {
     ) -> Result<Self, FileError> {
         let depth = &ranges.depth;
         let rows = rows(depth, images, rig, pose);
-        write_whole(out, &dense_ply(&rows))?;
+        write_whole(out, &CloudFormat::of_file(out).dense_cloud(&rows))?;
         write_png(&beside(out, "range", "png"), &range_image(depth))?;
         write_png(&beside(out, "sigma", "png"), &sigma_image(depth))?;
         write_png(&beside(out, "confidence", "png"), &confidence_image(depth))?;

@@ -6,11 +6,11 @@ use std::path::{Path, PathBuf};
 use vergence_files::{FileError, write_whole};
 use vergence_pipeline::{Bearing, ColouredPoint};
 
-use crate::{OutputError, PlyEncoding, Table, TableFormat, ply};
+use crate::{CloudEncoding, CloudFormat, OutputError, Table, TableFormat};
 
 /// Where results go as files.
 ///
-/// In a folder, `cloud.ply` is always the newest cloud, written whole; it is removed while one camera is dead, so that nobody takes an old cloud for a
+/// In a folder, `cloud.ply` or `cloud.pcd` is always the newest cloud, written whole; it is removed while one camera is dead, so that nobody takes an old cloud for a
 /// new one, and `bearings.csv` is written instead.
 #[derive(Clone, Debug)]
 pub struct LatestFiles {
@@ -18,10 +18,12 @@ pub struct LatestFiles {
     pub folder: Option<PathBuf>,
     /// Write a numbered file for every result, instead of one file with the newest.
     pub keep: bool,
-    /// Tables beside the PLY files.
+    /// The format of clouds.
+    pub format: CloudFormat,
+    /// Tables beside the clouds.
     pub also: Vec<TableFormat>,
     /// How clouds are written.
-    pub encoding: PlyEncoding,
+    pub encoding: CloudEncoding,
 }
 
 impl LatestFiles {
@@ -32,7 +34,11 @@ impl LatestFiles {
     pub fn write_cloud(&self, number: u64, points: &[ColouredPoint]) -> Result<(), OutputError> {
         let Some(folder) = &self.folder else { return Ok(()) };
         self.withdraw(folder, "bearings", &["csv", "json"])?;
-        write_whole(&self.file(folder, ("cloud", number), "ply"), &ply(points, self.encoding))?;
+        let others: Vec<_> =
+            CloudFormat::ENDINGS.into_iter().filter(|&ending| ending != self.format.ending()).collect();
+        self.withdraw(folder, "cloud", &others)?;
+        let file = self.file(folder, ("cloud", number), self.format.ending());
+        write_whole(&file, &self.format.cloud(points, self.encoding))?;
         self.write_tables(folder, ("cloud", number), &Table::of_points(points), &self.also)
     }
 
@@ -42,7 +48,8 @@ impl LatestFiles {
     /// A file that cannot be written.
     pub fn write_bearings(&self, number: u64, bearings: &[Bearing]) -> Result<(), OutputError> {
         let Some(folder) = &self.folder else { return Ok(()) };
-        self.withdraw(folder, "cloud", &["ply", "csv", "json"])?;
+        self.withdraw(folder, "cloud", &CloudFormat::ENDINGS)?;
+        self.withdraw(folder, "cloud", &["csv", "json"])?;
         let formats = if self.also.is_empty() { &[TableFormat::Csv][..] } else { &self.also };
         self.write_tables(folder, ("bearings", number), &Table::of_bearings(bearings), formats)
     }

@@ -2,7 +2,7 @@
 //!
 //! - [`match_svg`], [`depth_svg`], [`error_svg`] and [`dense_svg`] draw what was measured on the images; [`zones_svg`],
 //!   [`zones_plot`] and [`depth_field_svg`] what a rig can see and how well;
-//! - [`ply`], [`dense_ply`] and [`Table`] are clouds for other programs; [`DenseCloud`] writes all files of a dense one, [`LatestFiles`] those of
+//! - [`CloudFormat`] and [`Table`] are clouds for other programs; [`DenseCloud`] writes all files of a dense one, [`LatestFiles`] those of
 //!   the live loop;
 //! - [`drift_warning`], [`dense_drift_warning`], [`dropped_lines`] and [`cloud_json`] say what became of a pair;
 //! - [`Sheet`] is a chessboard to print;
@@ -35,6 +35,6 @@ pub use pictures::{
     ZonesOf, confidence_image, dense_svg, depth_field_svg, depth_svg, error_svg, match_svg, range_image, seen_by_cones,
     sigma_image, trunk_strip_svg, write_drawing, write_scored_pair, zones_plot, zones_svg,
 };
-pub use points::{DenseRow, PlyEncoding, Table, TableFormat, dense_ply, ply, write_cloud};
+pub use points::{CloudEncoding, CloudFormat, DenseRow, Table, TableFormat, write_cloud};
 pub use published_zones::published_zones;
 pub use target_sheet::{Paper, Sheet};

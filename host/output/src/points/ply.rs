@@ -3,55 +3,29 @@
 use std::fmt::Write;
 
 use vergence_pipeline::ColouredPoint;
-use vergence_vision::CloudPoint;
 
-use super::table::upper_triangle;
-
-/// The line of every header that explains unit and frame.
-const COLUMNS_COMMENT: &str = "comment millimetres in the left camera's frame: x right, y down, z forward\n";
-/// The lines that explain score and covariances.
-const COVARIANCE_COMMENT: &str = "comment score: probability that the match is right, its range off by at most three sigma_range\n\
-     comment cov in mm^2: in all; own: of the point's own pixels, the rest is shared by all points\n";
-/// Names of the twelve columns of covariance in mm²: in all, and of the point's own pixels.
-const COVARIANCE_COLUMNS: [&str; 12] = [
-    "cov_xx", "cov_xy", "cov_xz", "cov_yy", "cov_yz", "cov_zz", "own_xx", "own_xy", "own_xz", "own_yy", "own_yz",
-    "own_zz",
-];
+use super::columns::{
+    ABOUT_COVARIANCES, ABOUT_FRAME, ABOUT_SCORE, COVARIANCE_COLUMNS, DenseRow, covariances, pixels_and_sigma,
+    track_number,
+};
+use super::format::CloudEncoding;
 
 /// The column that is 1 where a lens is extrapolated.
 const EXTRAPOLATED_PROPERTY: &str = "property uchar extrapolated\n";
 /// The last column: the number of the track, -1 without one. After 2^31 tracks the numbers begin anew.
 const TRACK_PROPERTY: &str = "property int track\n";
 
-/// How the numbers of a PLY file are written.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub enum PlyEncoding {
-    /// Little-endian.
-    #[default]
-    Binary,
-    /// As text.
-    Ascii,
-}
-
-impl PlyEncoding {
-    /// Text where it `is_ascii`.
-    #[must_use]
-    pub const fn of(is_ascii: bool) -> Self {
-        if is_ascii { Self::Ascii } else { Self::Binary }
-    }
-}
-
 /// The points in the left camera's frame, in millimetres, with colour, pixels in both images, sigma of the range, the probability that
 /// the match is right (score), the upper triangles of the covariance and of the part of it that comes from the point's own pixels, and
 /// whether a lens is extrapolated there, and the number of the track.
 #[must_use]
-pub fn ply(points: &[ColouredPoint], encoding: PlyEncoding) -> Vec<u8> {
+pub fn ply(points: &[ColouredPoint], encoding: CloudEncoding) -> Vec<u8> {
     let format = match encoding {
-        PlyEncoding::Binary => "binary_little_endian",
-        PlyEncoding::Ascii => "ascii",
+        CloudEncoding::Binary => "binary_little_endian",
+        CloudEncoding::Ascii => "ascii",
     };
     let mut bytes = format!(
-        "ply\nformat {format} 1.0\n{COLUMNS_COMMENT}{COVARIANCE_COMMENT}\
+        "ply\nformat {format} 1.0\ncomment {ABOUT_FRAME}\ncomment {ABOUT_SCORE}\ncomment {ABOUT_COVARIANCES}\n\
          element vertex {}\n\
          property double x\nproperty double y\nproperty double z\n\
          property uchar red\nproperty uchar green\nproperty uchar blue\n\
@@ -63,8 +37,8 @@ pub fn ply(points: &[ColouredPoint], encoding: PlyEncoding) -> Vec<u8> {
     .into_bytes();
     for point in points {
         match encoding {
-            PlyEncoding::Binary => binary_row(point, &mut bytes),
-            PlyEncoding::Ascii => bytes.extend_from_slice(text_row(point).as_bytes()),
+            CloudEncoding::Binary => binary_row(point, &mut bytes),
+            CloudEncoding::Ascii => bytes.extend_from_slice(text_row(point).as_bytes()),
         }
     }
     bytes
@@ -78,11 +52,7 @@ fn binary_row(ColouredPoint { point, colour, score, track }: &ColouredPoint, byt
     bytes.extend_from_slice(&score.to_le_bytes());
     covariances(point).iter().for_each(|value| bytes.extend_from_slice(&(*value as f32).to_le_bytes()));
     bytes.push(point.extrapolated.into());
-    bytes.extend_from_slice(&number(*track).to_le_bytes());
-}
-
-fn number(track: Option<u64>) -> i32 {
-    track.map_or(-1, |track| (track & 0x7fff_ffff) as i32)
+    bytes.extend_from_slice(&track_number(*track).to_le_bytes());
 }
 
 fn text_row(ColouredPoint { point, colour: [red, green, blue], score, track }: &ColouredPoint) -> String {
@@ -92,34 +62,8 @@ fn text_row(ColouredPoint { point, colour: [red, green, blue], score, track }: &
     pixels_and_sigma(point).iter().for_each(|value| _ = write!(row, " {value:.4}"));
     _ = write!(row, " {score:.4}");
     covariances(point).iter().for_each(|value| _ = write!(row, " {value:.5e}"));
-    _ = writeln!(row, " {} {}", u8::from(point.extrapolated), number(*track));
+    _ = writeln!(row, " {} {}", u8::from(point.extrapolated), track_number(*track));
     row
-}
-
-fn pixels_and_sigma(point: &CloudPoint) -> [f64; 5] {
-    let (left, right) = (point.pixels.left, point.pixels.right);
-    [left.u, left.v, right.u, right.v, point.sigma_range.mm()]
-}
-
-fn covariances(point: &CloudPoint) -> [f64; 12] {
-    let [all, own] =
-        [&point.covariance, &point.own_covariance].map(|covariance| upper_triangle(|place| covariance[place]));
-    std::array::from_fn(|index| if index < 6 { all[index] } else { own[index - 6] })
-}
-
-/// A row of a dense cloud: the first columns of what [`ply`] writes, and whether a lens is extrapolated.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct DenseRow {
-    /// Millimetres in the left camera's frame.
-    pub point: [f32; 3],
-    /// sRGB.
-    pub colour: [u8; 3],
-    /// u and v in the left and the right image.
-    pub pixels: [f32; 4],
-    /// Of the range, in millimetres.
-    pub sigma: f32,
-    /// Whether a lens is extrapolated there.
-    pub extrapolated: bool,
 }
 
 /// Rows with the columns of the sparse cloud, little-endian, in single precision.
@@ -127,7 +71,7 @@ pub struct DenseRow {
 pub fn dense_ply(rows: &[DenseRow]) -> Vec<u8> {
     const ROW_BYTES: usize = 36;
     let header = format!(
-        "ply\nformat binary_little_endian 1.0\n{COLUMNS_COMMENT}\
+        "ply\nformat binary_little_endian 1.0\ncomment {ABOUT_FRAME}\n\
          element vertex {}\n\
          property float x\nproperty float y\nproperty float z\n\
          property uchar red\nproperty uchar green\nproperty uchar blue\n\
@@ -149,7 +93,7 @@ pub fn dense_ply(rows: &[DenseRow]) -> Vec<u8> {
 #[cfg(test)]
 mod tests {
     use nalgebra::{Matrix3, Vector3};
-    use vergence_vision::{Angle, Length, Pixel, PixelPair, Point};
+    use vergence_vision::{Angle, CloudPoint, Length, Pixel, PixelPair, Point};
 
     use super::*;
 
@@ -174,13 +118,13 @@ mod tests {
             extrapolated: true,
         };
         let points = [ColouredPoint { point, colour: [1, 2, 3], score: 0.5, track: Some(70_000) }];
-        let text = String::from_utf8(ply(&points, PlyEncoding::Ascii)).expect("text");
+        let text = String::from_utf8(ply(&points, CloudEncoding::Ascii)).expect("text");
         assert!(text.starts_with("ply\nformat ascii 1.0\n") && text.contains("element vertex 1\n"));
         let numbers: Vec<f64> = String::from_utf8_lossy(body(text.as_bytes()))
             .split_whitespace()
             .map(|n| n.parse().expect("a number"))
             .collect();
-        let file = ply(&points, PlyEncoding::Binary);
+        let file = ply(&points, CloudEncoding::Binary);
         let bytes = body(&file);
         let double = |at: usize| f64::from_le_bytes(bytes[at..at + 8].try_into().expect("eight"));
         let float = |at: usize| f64::from(f32::from_le_bytes(bytes[at..at + 4].try_into().expect("four")));

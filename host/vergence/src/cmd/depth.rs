@@ -15,8 +15,8 @@ use vergence_camera::{Camera, CameraImage, FileCamera};
 use vergence_files::make_folder;
 use vergence_matching::{GuidedMatcher, Matcher};
 use vergence_output::{
-    PlyEncoding, PoseSource, TableFormat, axes_by_images_json, axes_by_images_words, check_ending, check_folder,
-    cloud_json, cloud_lines, drift_warning, match_svg, write_cloud, write_drawing,
+    CloudEncoding, CloudFormat, PoseSource, TableFormat, axes_by_images_json, axes_by_images_words, check_ending,
+    check_folder, cloud_json, cloud_lines, drift_warning, match_svg, write_cloud, write_drawing,
 };
 use vergence_pipeline::limits::PIXEL_SIGMA;
 use vergence_pipeline::{Method, PairCloud, PairImages, PairPose, cloud_of_pairs, pair_cloud};
@@ -40,7 +40,7 @@ use vergence_plausibility::images::{Taken, cloud_is_of_one_pair, images_differ, 
 use vergence_plausibility::pose::cameras_are_near;
 
 /// Matches two photographs (or two folders of them, paired by name, number or time stamp) taken by the cameras of the rig
-/// file, and writes the points as PLY in millimetres in the left camera's frame.
+/// file, and writes the points as PLY or PCD in millimetres in the left camera's frame.
 #[derive(Debug, clap::Args)]
 pub struct Args {
     /// The left image, or a folder.
@@ -49,9 +49,12 @@ pub struct Args {
     /// The right image, or a folder.
     #[arg(long, value_name = "IMAGE")]
     right: PathBuf,
-    /// The cloud to write, a name that ends in .ply; for folders, the folder for one cloud per pair.
+    /// The cloud to write, a name that ends in .ply or .pcd; for folders, the folder for one cloud per pair.
     #[arg(long, value_name = "FILE")]
     out: PathBuf,
+    /// For folders, the format of the clouds; ply without it.
+    #[arg(long, value_parser = CloudFormat::ENDINGS, value_name = "FORMAT")]
+    format: Option<String>,
     /// Correspondences to triangulate instead of matching: CSV with columns u_left,v_left,u_right,v_right in pixels.
     #[arg(long, value_name = "CSV")]
     points: Option<PathBuf>,
@@ -73,7 +76,7 @@ pub struct Args {
     /// Writes the points as tables too, beside the cloud.
     #[arg(long, value_delimiter = ',', value_name = "FORMAT")]
     also: Vec<TableOption>,
-    /// Write the PLY file as text, for a person to read; the default is binary.
+    /// Write the cloud as text, for a person to read; the default is binary.
     #[arg(long)]
     ascii: bool,
     #[command(flatten)]
@@ -289,7 +292,10 @@ fn check_names(args: &Args) -> Result<(), Failure> {
     let several = args.left.is_dir();
     match several {
         true => check_folder(&args.out)?,
-        false => _ = check_ending(&args.out, &["ply"])?,
+        false if args.format.is_some() => {
+            return Err(Failure::usage("--format is for folders: of a pair, the ending of --out says it"));
+        }
+        false => _ = check_ending(&args.out, &CloudFormat::ENDINGS)?,
     }
     match &args.matches {
         Some(folder) if several => check_folder(folder)?,
@@ -308,7 +314,7 @@ fn write(
     out: &Path,
     console: Console,
 ) -> Result<Value, Failure> {
-    write_cloud(out, &cloud.points, PlyEncoding::of(args.ascii), args.also.iter().copied().map(TableFormat::from))?;
+    write_cloud(out, &cloud.points, CloudEncoding::of(args.ascii), args.also.iter().copied().map(TableFormat::from))?;
     if let Some(matches) = &args.matches {
         let path = if args.left.is_dir() { in_folder(matches, left, "svg")? } else { matches.clone() };
         let images = PairImages { left: &left.image, right: &right.image };
@@ -348,7 +354,8 @@ fn pose(args: &Args, rig: &Rig) -> Result<(RigPose, Option<JointsAt>), Failure> 
 
 /// The file for the cloud; where folders are given, in the folder for clouds, which is made.
 fn out_of(args: &Args, left: &CameraImage) -> Result<PathBuf, Failure> {
-    if args.left.is_dir() { in_folder(&args.out, left, "ply") } else { Ok(args.out.clone()) }
+    let ending = args.format.as_deref().unwrap_or(CloudFormat::default().ending());
+    if args.left.is_dir() { in_folder(&args.out, left, ending) } else { Ok(args.out.clone()) }
 }
 
 /// The file of a pair in `folder`, which is made.

@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 
 use vergence_files::make_folder;
-use vergence_output::{LatestFiles, PlyEncoding, TableFormat, check_folder};
+use vergence_output::{CloudEncoding, CloudFormat, LatestFiles, TableFormat, check_folder};
 
 use super::options::TableOption;
 use crate::failure::Failure;
@@ -11,16 +11,19 @@ use crate::failure::Failure;
 /// Where results go as files.
 #[derive(Debug, clap::Args)]
 pub struct ResultOptions {
-    /// The folder for `cloud.ply`, always the newest cloud.
+    /// The folder for `cloud.ply` or `cloud.pcd`, always the newest cloud.
     #[arg(long, value_name = "DIR")]
     pub out: Option<PathBuf>,
     /// Keep every cloud, in files with numbers.
     #[arg(long, requires = "out")]
     keep: bool,
+    /// The format of clouds.
+    #[arg(long, requires = "out", default_value = "ply", value_parser = CloudFormat::ENDINGS, value_name = "FORMAT")]
+    format: String,
     /// Write points and bearings as tables too.
     #[arg(long, requires = "out", value_delimiter = ',', value_name = "FORMAT")]
     also: Vec<TableOption>,
-    /// Write the PLY file as text, for a person to read; the default is binary.
+    /// Write clouds as text, for a person to read; the default is binary.
     #[arg(long)]
     ascii: bool,
 }
@@ -39,7 +42,8 @@ impl ResultOptions {
             folder: self.out.clone(),
             keep: self.keep,
             also: self.also.iter().copied().map(TableFormat::from).collect(),
-            encoding: PlyEncoding::of(self.ascii),
+            format: CloudFormat::of_ending(&self.format),
+            encoding: CloudEncoding::of(self.ascii),
         })
     }
 }
