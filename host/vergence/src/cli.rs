@@ -272,7 +272,7 @@ fn execute(cli: Cli, virtual_time: bool) -> Result<(), Failure> {
                 None => cmd::demo::run(&verb.args, &verb.options.given(), console).await,
             },
             Verb::Run(verb) => cmd::run::run(&verb.args, &verb.options.chosen()?, console).await,
-            Verb::Replay(args) => cmd::replay::run(&args, console),
+            Verb::Replay(args) => cmd::replay::run(&args, console).await,
             Verb::Panel(verb) => cmd::panel::run(&verb.args, &verb.options.chosen()?, console).await,
             Verb::Reproduce(args) => cmd::reproduce::run(&args, console).await,
             Verb::Depth(verb) => cmd::depth::run(verb.args, &verb.options.chosen()?, console).await,

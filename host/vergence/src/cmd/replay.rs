@@ -1,12 +1,13 @@
 //! `vergence replay`: measures a recording.
 
 use std::path::PathBuf;
+use std::pin::pin;
 use std::sync::Arc;
 use std::time::Duration;
 
 use vergence_live::{LiveError, LiveResult, Measurement, Pace, Totals};
 use vergence_pipeline::Method;
-use vergence_recording::{Event, Reader, Replay};
+use vergence_recording::{Pacing, Reader, RecordingError, Replay, play};
 use vergence_rig::Rig;
 
 use super::model_options::MatcherOptions;
@@ -15,11 +16,13 @@ use super::result_options::ResultOptions;
 use super::search_options::SearchOptions;
 use crate::console::Console;
 use crate::failure::Failure;
+use crate::interrupt::interrupted;
 use crate::rig_file;
 use crate::stopwatch::clock;
 
 /// Measures a recording of `vergence run --record` as the live loop measures, every pair of it. The clouds depend on the recording alone: two
-/// replays by one program give the same files. A recording whose program was killed ends with its last whole chunk.
+/// replays by one program give the same files. A recording whose program was killed ends with its last whole chunk. Ctrl-C ends after the pair that is
+/// being measured.
 #[derive(Debug, clap::Args)]
 pub struct Args {
     /// The folder of the recording.
@@ -33,6 +36,13 @@ pub struct Args {
     /// End after this many results.
     #[arg(long, value_name = "COUNT")]
     frames: Option<u64>,
+    /// Replay so many times as fast as it was recorded, 0.01 to 1000; 1 is as recorded. Every pair is still measured: where matching takes longer,
+    /// the replay is slower. Without it, as fast as matching goes.
+    #[arg(long, value_name = "FACTOR", value_parser = parse_factor)]
+    rate: Option<f64>,
+    /// Begin again after the end, until Ctrl-C or --frames, at any --rate or none. Each time gives the same clouds.
+    #[arg(long = "loop")]
+    is_endless: bool,
     #[command(flatten)]
     results: ResultOptions,
     #[command(flatten)]
@@ -41,7 +51,7 @@ pub struct Args {
     search: SearchOptions,
 }
 
-pub fn run(args: &Args, console: Console) -> Result<(), Failure> {
+pub async fn run(args: &Args, console: Console) -> Result<(), Failure> {
     let files = args.results.files()?;
     let mut reader = Reader::open(&args.recording)?;
     // The rig file precedes the first event.
@@ -59,36 +69,53 @@ pub fn run(args: &Args, console: Console) -> Result<(), Failure> {
         recorder: None,
         pace: Pace::default(),
     };
-    let mut replay = Replay::new(&measuring, Method { search: &search, ..Method::from(matcher.as_ref()) }, clock);
-    let mut totals = Totals::default();
-    let begun = next.as_ref().map_or(0, |heard| heard.host_us);
-    let from = begun.saturating_add(u64::try_from(args.from.as_micros()).unwrap_or(u64::MAX));
-    let mut publish = |measurement: Measurement| publish(&mut publisher, &mut totals, &measurement, args.frames);
-    let replayed = loop {
-        let Some(heard) = next else { break replay.finish(&mut publish) };
-        let is_left_out = heard.host_us < from && matches!(heard.event, Event::Image(..) | Event::Pulse(_));
-        if !is_left_out && let Err(end) = replay.take(heard, &mut publish) {
-            break Err(end);
+    let (mut totals, pacing) = (Totals::default(), Pacing { from: args.from, rate: args.rate });
+    let mut interrupted = pin!(interrupted());
+    loop {
+        let before = publisher.number;
+        let mut replay = Replay::new(&measuring, Method { search: &search, ..Method::from(matcher.as_ref()) }, clock);
+        let mut publish = |measurement: Measurement| publish(&mut publisher, &mut totals, &measurement, args.frames);
+        let played = tokio::select! {
+            played = play(&mut reader, next, &mut replay, pacing, &mut publish) => played,
+            () = &mut interrupted => Err(End::Enough),
+        };
+        for (reason, count) in replay.skipped() {
+            *totals.skipped.entry(*reason).or_default() += count;
         }
+        match played {
+            Err(End::Failed(failure)) => return Err(failure),
+            Err(End::Enough) => break,
+            Ok(()) if before == 0 && !reader.is_finished() => console
+                .warn(format!("{} was not finished: what came after its last chunk is lost", reader.file().display())),
+            Ok(()) => {}
+        }
+        // A recording without a result gives none the next time either.
+        if !args.is_endless || publisher.number == before {
+            break;
+        }
+        reader = Reader::open(&args.recording)?;
         next = reader.next_event()?;
-    };
-    let is_enough = match replayed {
-        Ok(()) => false,
-        Err(End::Enough) => true,
-        Err(End::Failed(failure)) => return Err(failure),
-    };
-    totals.skipped.clone_from(replay.skipped());
-    if !is_enough && !reader.is_finished() {
-        console.warn(format!("{} was not finished: what came after its last chunk is lost", reader.file().display()));
     }
     publisher.end(&totals)
 }
 
+/// Parses how many times as fast as recorded.
+fn parse_factor(text: &str) -> Result<f64, String> {
+    let factor = text.parse().ok().filter(|factor| (0.01..=1000.0).contains(factor));
+    factor.ok_or_else(|| format!("'{text}' is no factor: choose 0.01 to 1000 times as fast as recorded"))
+}
+
 /// Why a replay ends before the recording.
 enum End {
-    /// There are as many results as were asked for.
+    /// There are as many results as were asked for, or the program is asked to end.
     Enough,
     Failed(Failure),
+}
+
+impl From<RecordingError> for End {
+    fn from(error: RecordingError) -> Self {
+        Self::Failed(error.into())
+    }
 }
 
 impl From<LiveError> for End {

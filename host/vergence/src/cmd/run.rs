@@ -1,23 +1,23 @@
 //! `vergence run`: measures live, while the stages stand still or move.
 
-mod record;
 mod tour;
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::time::Duration;
 
 use vergence_board::Board;
 use vergence_live::{Ended, Limits, LiveLoop, MatchingTime, Pace, Totals, Tour};
 use vergence_protocol::{Request, Trigger};
+use vergence_recording::{Recordable, Recorded, Recording};
 
-use self::record::Recording;
-use super::live_options::LiveOptions;
+use super::live_options::{LiveOptions, LiveRig};
 use crate::cli::CommonOptions;
 use crate::cmd::publish::Publisher;
 use crate::cmd::result_options::ResultOptions;
 use crate::console::Console;
 use crate::failure::Failure;
 use crate::interrupt::interrupted;
+use crate::stopwatch::started_us;
 
 /// Pairs the images of both cameras, matches and triangulates them, again and again: a cloud of the newest pair whenever the
 /// matcher is free, in the frame of the left camera. Nothing queues, and no cloud holds anything of an older one; skipped
@@ -62,8 +62,7 @@ pub async fn run(args: &Args, common: &CommonOptions, console: Console) -> Resul
     let files = args.results.files()?;
     let mut rig = args.live.connect(&args.cameras, common, args.results.out.as_deref(), console).await?;
     let tour = args.tour.tour(&rig.known)?;
-    let begin = |folder: &PathBuf| Recording::start(folder, &rig);
-    let recording = args.record.as_ref().map(begin).transpose()?;
+    let recording = args.record.as_deref().map(|folder| begin_recording(folder, &rig)).transpose()?;
     if let Some(board) = &mut rig.board {
         board.compare_clocks().await?;
         args.tour.home(board).await?;
@@ -109,7 +108,7 @@ pub async fn run(args: &Args, common: &CommonOptions, console: Console) -> Resul
     };
     publisher.end(&totals)?;
     if let (Some(recording), Some(folder)) = (recording, &args.record) {
-        recording.finish(folder, console).await?;
+        tell_recorded(recording.finish().await?, folder, console)?;
     }
     let ended = ended?;
     settled?;
@@ -117,6 +116,26 @@ pub async fn run(args: &Args, common: &CommonOptions, console: Console) -> Resul
         Some(Ended::Done) | None => Ok(()),
         Some(Ended::Blind) => Err(Failure::device("both cameras are dead: see what was said of each above")),
     }
+}
+
+/// Begins a recording of `rig` in `folder`.
+fn begin_recording(folder: &Path, rig: &LiveRig) -> Result<Recording, Failure> {
+    let board = rig.board.as_ref().map(|board| board.client().knowledge());
+    let (clock, period_us) = (rig.clock, rig.period_us);
+    let recordable = Recordable { rig: &rig.known, board, clock, epoch_us: started_us(clock), period_us };
+    Ok(Recording::start(folder, recordable)?)
+}
+
+/// Says what is in a recording.
+fn tell_recorded(recorded: Recorded, folder: &Path, console: Console) -> Result<(), Failure> {
+    console.say(format!("recorded {} images in {}", recorded.images, folder.display()))?;
+    if recorded.left_out > 0 {
+        console.warn(format!(
+            "the disk had no time for {} images, readings or clouds: record fewer frames (--rate), or on a faster disk",
+            recorded.left_out
+        ));
+    }
+    Ok(())
 }
 
 /// Measures while the stages go where they are sent, until either ends; `None` where the program is asked to end.

@@ -1,0 +1,78 @@
+//! Plays a recording from its beginning to its end, as fast as it can be measured or at the pace at which it was recorded.
+
+use std::time::Duration;
+
+use tokio::task::yield_now;
+use tokio::time::{Instant, sleep_until};
+use vergence_live::{LiveError, Measurement};
+
+use crate::RecordingError;
+use crate::event::Event;
+use crate::reader::{Heard, Reader};
+use crate::replay::Replay;
+
+/// When the events of a recording are played.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Pacing {
+    /// Exposures of this time after the first event are left out, and nothing of it is waited for.
+    pub from: Duration,
+    /// How many times as fast as it was recorded, more than zero; `None` for as fast as it can be measured.
+    pub rate: Option<f64>,
+}
+
+impl Pacing {
+    /// Microseconds that are left out.
+    fn from_us(self) -> u64 {
+        u64::try_from(self.from.as_micros()).unwrap_or(u64::MAX)
+    }
+
+    /// Time from the beginning of the replay to an event so many microseconds after the first one; `None` where nothing is waited for.
+    fn due(self, since_first_us: u64) -> Option<Duration> {
+        let played_us = since_first_us.checked_sub(self.from_us())?;
+        Duration::try_from_secs_f64(played_us as f64 * 1e-6 / self.rate?).ok()
+    }
+}
+
+/// Plays the event `first` and all that `reader` has after it, and calls `publish` with each measurement. Measuring blocks the caller's thread; between two
+/// events other tasks have their turn.
+///
+/// # Errors
+/// Those of [`Reader::next_event`], [`Replay::take`] and `publish`.
+pub async fn play<E: From<LiveError> + From<RecordingError>>(
+    reader: &mut Reader,
+    first: Option<Heard>,
+    replay: &mut Replay<'_>,
+    pacing: Pacing,
+    publish: &mut impl FnMut(Measurement) -> Result<(), E>,
+) -> Result<(), E> {
+    let (begun, first_us) = (Instant::now(), first.as_ref().map_or(0, |heard| heard.host_us));
+    let mut next = first;
+    while let Some(heard) = next {
+        let since_first_us = heard.host_us.saturating_sub(first_us);
+        match pacing.due(since_first_us).and_then(|due| begun.checked_add(due)) {
+            Some(due) => sleep_until(due).await,
+            None => yield_now().await,
+        }
+        let is_left_out =
+            since_first_us < pacing.from_us() && matches!(heard.event, Event::Image(..) | Event::Pulse(_));
+        if !is_left_out {
+            replay.take(heard, publish)?;
+        }
+        next = reader.next_event()?;
+    }
+    replay.finish(publish)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn events_are_due_after_what_is_left_out_divided_by_the_rate() {
+        let pacing = Pacing { from: Duration::from_secs(2), rate: Some(4.0) };
+        assert_eq!(pacing.due(1_999_999), None);
+        assert_eq!(pacing.due(2_000_000), Some(Duration::ZERO));
+        assert_eq!(pacing.due(3_000_000), Some(Duration::from_millis(250)));
+        assert_eq!(Pacing { rate: None, ..pacing }.due(3_000_000), None);
+    }
+}

@@ -1,0 +1,74 @@
+//! A recording of a whole rig: its board, its cameras and its trigger pulses.
+
+use std::path::Path;
+
+use vergence_board::{BoardKnowledge, HostClock};
+use vergence_live::LiveLoop;
+use vergence_rig::{Provenance, Rig};
+
+use crate::RecordingError;
+use crate::event::Beginning;
+use crate::recorder::{Recorded, Recorder, Writing};
+use crate::tap::{recorded_events, recorded_marks};
+
+/// What is recorded.
+pub struct Recordable<'a> {
+    /// The rig, whose file is attached.
+    pub rig: &'a Rig,
+    /// Its board; `None` of a rig without axes.
+    pub board: Option<BoardKnowledge>,
+    /// The clock of images and pulses.
+    pub clock: HostClock,
+    /// The time at which that clock started, in microseconds since 1970.
+    pub epoch_us: u64,
+    /// Time between pulses of the trigger in microseconds; `None` where the cameras run freely.
+    pub period_us: Option<f64>,
+}
+
+/// A recording under way.
+pub struct Recording {
+    /// Takes what is heard and found.
+    pub recorder: Recorder,
+    writing: Writing,
+}
+
+impl Recording {
+    /// Begins a recording in `folder`, and listens to the board. Call within a tokio runtime.
+    ///
+    /// # Errors
+    /// A folder that holds something, a file that cannot be written, a rig that no file can hold.
+    pub fn start(folder: &Path, recordable: Recordable<'_>) -> Result<Self, RecordingError> {
+        let Recordable { rig, board, clock, epoch_us, period_us } = recordable;
+        let program = concat!("vergence ", env!("CARGO_PKG_VERSION")).to_owned();
+        let provenance = Provenance { program, inputs_sha256: String::new(), date: None };
+        let unwritten = |error: String| RecordingError::Write { file: folder.to_owned(), why: error };
+        let file = rig.to_toml(&provenance).map_err(|error| unwritten(error.to_string()))?;
+        let (recorder, writing) = Recorder::start(folder, rig, &file, epoch_us)?;
+        let baud = board.as_ref().and_then(BoardKnowledge::baud);
+        recorder.begin(clock.now(), Beginning { has_board: board.is_some(), baud, period_us });
+        if let Some(board) = board {
+            let recorder = recorder.clone();
+            board.listen(move |news| recorder.news(clock.now(), news));
+        }
+        Ok(Self { recorder, writing })
+    }
+
+    /// The live loop `live`, recorded. Call within a tokio runtime.
+    #[must_use]
+    pub fn of(&self, live: LiveLoop) -> LiveLoop {
+        let clock = live.clock;
+        LiveLoop {
+            events: recorded_events(live.events, self.recorder.clone(), clock),
+            marks: live.marks.map(|marks| recorded_marks(marks, self.recorder.clone(), clock)),
+            ..live
+        }
+    }
+
+    /// Ends the recording, and says what is in it.
+    ///
+    /// # Errors
+    /// As [`Writing::finish`].
+    pub async fn finish(self) -> Result<Recorded, RecordingError> {
+        self.writing.finish(self.recorder).await
+    }
+}
