@@ -9,10 +9,11 @@
 mod common;
 
 use std::fmt::Write as _;
+use std::process::Command;
 
 use common::built_bench::Dice;
 use common::pairs::Work;
-use common::{fails_with, run, run_json, text};
+use common::{fails_with, python, run, run_json, text};
 use nalgebra::{UnitQuaternion, Vector3};
 use serde_json::{Value, json};
 use vergence_exchange::{Cameras, WriteFormat};
@@ -250,6 +251,49 @@ fn a_rig_goes_out_and_comes_back() {
     let pixel = run_json(&["camera", "project", "--json", &format!("{file}#2"), "0.5,-0.4,0.1"]);
     assert!((pixel["pixels"][0][0].as_f64().expect("a pixel") - expected.u).abs() < 1e-6, "{pixel}");
     fails_with(&["rig", "export", "--to", "kalibr", "--out", &file], 2, &["cameras of this rig move", "--mode"]);
+}
+
+#[test]
+fn colmap_reads_the_pair_and_its_pose() {
+    const READ: &str = r#"
+import json, sys
+import numpy, pycolmap
+model = pycolmap.Reconstruction(sys.argv[1])
+place = numpy.array(json.loads(sys.argv[2]))
+pixels = {image.name: image.camera.img_from_cam(image.cam_from_world() * place).tolist() for image in model.images.values()}
+print(json.dumps({"pixels": pixels, "points": len(model.points3D)}))
+"#;
+    let folder = temporary();
+    let file = path(&folder, "cameras.txt");
+    let export = ["rig", "export", "--json", "--mode", "herbivore", "--to", "colmap", "--out", &file];
+    let sent = run_json(&export);
+    assert_eq!(sent["out"].as_array().map(Vec::len), Some(3), "{sent}");
+    fails_with(&export, 2, &["images.txt", "is there already"]);
+    let images = std::fs::read_to_string(path(&folder, "images.txt")).expect("the poses");
+    let lines: Vec<&str> = images.lines().filter(|line| !line.starts_with('#')).collect();
+    assert_eq!(lines.len(), 4, "{images}");
+    assert_eq!((lines[0], lines[1], lines[3]), ("1 1.0 0.0 0.0 0.0 0.0 0.0 0.0 1 left.png", "", ""));
+
+    let Some(python) = python("import pycolmap", "pycolmap") else { return };
+    // A place between the axes of the cameras, which are turned by 120 degrees.
+    let bench = Rig::from_toml(BENCH_TOML).expect("the bench");
+    let left_from_right = bench.pose_at_values(&[145.0, 120_f64.to_radians()]).left_from_right;
+    let between = left_from_right.rotation().powf(0.5) * Vector3::new(-60.0, 80.0, 900.0);
+    let in_left = Point::<Left>::from_mm(left_from_right.origin().mm() / 2.0 + between);
+    let in_right = left_from_right.inverse() * in_left;
+    let pixel = |lens: &KannalaBrandt, ray: Option<UnitRay<Camera>>| lens.project(&ray.expect("a direction"));
+    let place = json!((in_left.mm() / 1000.0).as_slice()).to_string();
+    let output = Command::new(python).args(["-c", READ]).arg(folder.path()).arg(place).output().expect("python runs");
+    assert!(output.status.success(), "{}", text(&output.stderr));
+    let seen: Value = serde_json::from_slice(&output.stdout).expect("JSON");
+    println!("{seen}");
+    for (name, lens, at) in
+        [("left.png", &bench.left_camera, in_left.mm()), ("right.png", &bench.right_camera, in_right.mm())]
+    {
+        let expected = pixel(lens, UnitRay::new(at)).expect("in the field");
+        let [u, v] = [0, 1].map(|axis| seen["pixels"][name][axis].as_f64().expect("a pixel") - 0.5);
+        assert!((u - expected.u).hypot(v - expected.v) < 1e-6, "{name}: {u} {v} is not {expected:?}");
+    }
 }
 
 #[test]

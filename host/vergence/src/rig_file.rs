@@ -4,7 +4,7 @@ use std::path::Path;
 
 use serde_json::json;
 use vergence_calibration_input::{FileLens, ImportedRig, read_camera, read_rig};
-use vergence_exchange::{Cameras, WriteFormat};
+use vergence_exchange::{Cameras, FileName, WriteFormat};
 use vergence_files::write_whole;
 use vergence_rig::{BENCH_TOML, Rig};
 use vergence_vision::KannalaBrandt;
@@ -56,11 +56,15 @@ fn bench() -> Result<Rig, Failure> {
 /// Writes cameras for another program to `out`, or to a file beside it for each camera, and says what the format cannot hold.
 ///
 /// # Errors
-/// A lens that the format cannot hold, or a file that cannot be written.
+/// A lens that the format cannot hold, a file that cannot be written, or one that the user did not name and that is there.
 pub fn write_foreign(format: WriteFormat, cameras: &Cameras, out: &Path, console: Console) -> Result<(), Failure> {
     let written = vergence_exchange::write(format, cameras).map_err(|error| Failure::usage(error.to_string()))?;
     written.remarks.iter().for_each(|remark| console.warn(remark));
     let paths: Vec<_> = written.files.iter().map(|file| file.path(out)).collect();
+    let unnamed = paths.iter().zip(&written.files).filter(|(_, file)| matches!(file.name, FileName::Beside(_)));
+    if let Some((path, _)) = unnamed.into_iter().find(|(path, _)| path.exists()) {
+        return Err(Failure::output(path, "it is there already: name a file in another folder, or remove this one"));
+    }
     for (path, file) in paths.iter().zip(&written.files) {
         write_whole(path, file.text.as_bytes())?;
         console.say(format!("wrote {}", path.display()))?;

@@ -25,7 +25,7 @@ pub enum WriteFormat {
     Basalt,
     /// A `camera_info` of ROS for each camera: equidistant.
     Ros,
-    /// The `cameras.txt` of COLMAP: `OPENCV_FISHEYE`.
+    /// A model of COLMAP: `cameras.txt` with `OPENCV_FISHEYE`, and of a pair `images.txt` and an empty `points3D.txt`.
     Colmap,
     /// A `.cameramodel` of mrcal for each camera: splined stereographic.
     Mrcal,
@@ -73,20 +73,35 @@ pub struct Cameras {
     pub right: Option<(KannalaBrandt, Transform<Left, Right>)>,
 }
 
+/// The name of a file to write.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum FileName {
+    /// As the user names it.
+    Named,
+    /// The file of one camera, `left` or `right`: `calib-left.yaml` where the user named `calib.yaml`.
+    Side(&'static str),
+    /// A name that the other program expects, beside the file that the user named.
+    Beside(&'static str),
+}
+
 /// A file to write.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct WrittenFile {
-    /// `left` or `right` where each camera of a pair has a file of its own.
-    pub side: Option<&'static str>,
+    /// Its name.
+    pub name: FileName,
     /// Its text.
     pub text: String,
 }
 
 impl WrittenFile {
-    /// The path of the file where the user named `out`: that, or `calib-left.yaml` for `calib.yaml` where each camera has its own.
+    /// The path of the file where the user named `out`.
     #[must_use]
     pub fn path(&self, out: &Path) -> PathBuf {
-        let Some(side) = self.side else { return out.to_owned() };
+        let side = match self.name {
+            FileName::Named => return out.to_owned(),
+            FileName::Beside(name) => return out.with_file_name(name),
+            FileName::Side(side) => side,
+        };
         let stem = out.file_stem().unwrap_or_default().to_string_lossy();
         let ending = out.extension().map(|ending| format!(".{}", ending.to_string_lossy())).unwrap_or_default();
         out.with_file_name(format!("{stem}-{side}{ending}"))
@@ -115,13 +130,13 @@ pub fn write(format: WriteFormat, cameras: &Cameras) -> Result<Written, Exchange
     let right =
         cameras.right.map(|(lens, pose)| Ok((holdable(format, &lens, "right", &mut remarks)?, pose))).transpose()?;
     let cameras = Cameras { left, right };
-    let whole = |text: String| vec![WrittenFile { side: None, text }];
+    let whole = |text: String| vec![WrittenFile { name: FileName::Named, text }];
     let mut files = match format {
         WriteFormat::OpenCv => whole(opencv::write(&cameras)),
         WriteFormat::Kalibr => whole(kalibr::write(&cameras)),
         WriteFormat::Basalt => whole(basalt::write(&cameras)),
         WriteFormat::Ros => ros::write(&cameras),
-        WriteFormat::Colmap => whole(colmap::write(&cameras, &mut remarks)),
+        WriteFormat::Colmap => colmap::write(&cameras, &mut remarks),
         WriteFormat::Mrcal => mrcal::write(&cameras, &mut remarks)?,
     };
     if format != WriteFormat::Basalt {
@@ -169,8 +184,8 @@ fn holdable(
 /// The files of both cameras, each by `print` with its side.
 fn each(cameras: &Cameras, mut print: impl FnMut(usize, &KannalaBrandt) -> String) -> Vec<WrittenFile> {
     let Some((right, _)) = &cameras.right else {
-        return vec![WrittenFile { side: None, text: print(0, &cameras.left) }];
+        return vec![WrittenFile { name: FileName::Named, text: print(0, &cameras.left) }];
     };
-    let left = WrittenFile { side: Some("left"), text: print(0, &cameras.left) };
-    vec![left, WrittenFile { side: Some("right"), text: print(1, right) }]
+    let left = WrittenFile { name: FileName::Side("left"), text: print(0, &cameras.left) };
+    vec![left, WrittenFile { name: FileName::Side("right"), text: print(1, right) }]
 }

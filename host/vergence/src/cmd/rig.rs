@@ -53,7 +53,8 @@ struct Export {
     /// The mode of a rig whose cameras move.
     #[arg(long, value_name = "MODE")]
     mode: Option<String>,
-    /// The file to write. ROS and mrcal have one for each camera: FILE-left and FILE-right.
+    /// The file to write. ROS and mrcal have one for each camera: FILE-left and FILE-right; COLMAP has images.txt and points3D.txt beside FILE,
+    /// which must not be there.
     #[arg(long, short, value_name = "FILE")]
     out: PathBuf,
 }
