@@ -35,6 +35,7 @@ const VERBS: &[&str] = &[
     "sim",
     "demo",
     "reproduce",
+    "record",
     "replay",
     "run",
     "servo",

@@ -9,11 +9,14 @@
 
 mod common;
 
+use std::io::{BufRead, BufReader, Read};
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 use common::{fails_with, python, run, text, vergence};
+use serde_json::Value;
+use vergence_recording::{Event, Reader};
 use vergence_rig::BENCH_TOML;
 
 /// The bench with small cameras.
@@ -153,4 +156,145 @@ fn a_recording_that_was_killed_replays_up_to_its_last_whole_chunk() {
     let whole = vergence(&["replay", &recording, "--from", "1h"]).output().expect("it runs");
     assert!(whole.status.success());
     assert!(text(&whole.stderr).contains("was not finished"), "{}", text(&whole.stderr));
+}
+
+/// A recording of four clouds in `folder`.
+fn of_four_clouds(folder: &Path) -> String {
+    let rig = small_bench(folder);
+    let recording = path_of(folder, "recording");
+    let arguments = recorded(rig.to_str().expect("a name"), &recording);
+    succeeds(&[&arguments[..], &["--frames", "4"]].concat());
+    recording
+}
+
+/// The times from the first event to the first and to the last image of a recording.
+fn images_within(recording: &str) -> [Duration; 2] {
+    let mut reader = Reader::open(Path::new(recording)).expect("a recording");
+    let mut events = Vec::new();
+    while let Some(heard) = reader.next_event().expect("an event") {
+        events.push((heard.host_us, matches!(heard.event, Event::Image(..))));
+    }
+    let images: Vec<u64> = events.iter().filter(|(_, is_image)| *is_image).map(|(at, _)| *at).collect();
+    [images.first(), images.last()].map(|at| Duration::from_micros(at.expect("an image") - events[0].0))
+}
+
+/// A replay at a tenth of the pace takes ten times as long as the recording, less what `--from` leaves out, and gives the same clouds.
+#[test]
+#[expect(clippy::disallowed_methods, reason = "another process is timed")]
+fn a_replay_keeps_the_pace_that_it_is_given() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let folder = folder.path();
+    let recording = of_four_clouds(folder);
+    let [first, last] = images_within(&recording);
+    // The homing before the first image is not waited for.
+    let from = first - Duration::from_millis(100);
+    let from_text = format!("{}us", from.as_micros());
+    let timed = |out: &str, rate: &[&str]| {
+        let begun = Instant::now();
+        succeeds(&[&["replay", &recording, "--from", &from_text, "--keep", "--out", out], rate].concat());
+        begun.elapsed()
+    };
+    let [fast_out, slow_out] = ["fast", "slow"].map(|name| path_of(folder, name));
+    let (fast, slow) = (timed(&fast_out, &[]), timed(&slow_out, &["--rate", "0.1"]));
+    println!("images for {:?}; replayed in {fast:?}, at a tenth of the pace in {slow:?}", last - from);
+    let expected = (last - from) * 10;
+    assert!(slow >= expected, "{slow:?} for {expected:?}");
+    // What follows the last image is played at the same pace; it is less than a second.
+    assert!(slow < expected + Duration::from_secs(12) + fast, "{slow:?} for {expected:?}");
+    assert!(clouds(&slow_out).len() >= 4);
+    assert!(clouds(&fast_out) == clouds(&slow_out), "the pace changes the clouds");
+    for factor in ["0", "-1", "nan", "fast"] {
+        fails_with(&["replay", &recording, &format!("--rate={factor}")], 2, &["is no factor"]);
+    }
+}
+
+#[test]
+fn a_looped_replay_gives_the_same_clouds_until_it_is_interrupted() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let folder = folder.path();
+    let recording = of_four_clouds(folder);
+    let [once, twice] = ["once", "twice"].map(|name| path_of(folder, name));
+    succeeds(&["replay", &recording, "--out", &once, "--keep"]);
+    let once = clouds(&once);
+    let count = (2 * once.len()).to_string();
+    succeeds(&["replay", &recording, "--out", &twice, "--keep", "--loop", "--frames", &count]);
+    // Not by assert_eq, which would print all bytes.
+    assert!(clouds(&twice) == [once.clone(), once.clone()].concat(), "the second time gives other clouds");
+    // A recording without a result ends.
+    succeeds(&["replay", &recording, "--loop", "--from", "1h"]);
+
+    let mut command = vergence(&["--json", "replay", &recording, "--loop"]);
+    let mut process = command.stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().expect("it starts");
+    let mut said = BufReader::new(process.stdout.take().expect("piped"));
+    for _ in 0..=once.len() {
+        let mut line = String::new();
+        said.read_line(&mut line).expect("a cloud");
+        assert!(line.contains("\"cloud\""), "{line}");
+    }
+    interrupt(process.id());
+    let mut rest = String::new();
+    said.read_to_string(&mut rest).expect("it ends");
+    let ended = process.wait_with_output().expect("it ends");
+    assert!(ended.status.success(), "{}", text(&ended.stderr));
+    let last: Value = serde_json::from_str(rest.lines().last().expect("a last line")).expect("JSON");
+    assert_eq!(last["kind"], "end");
+    assert!(last["clouds"].as_u64().is_some_and(|clouds| clouds > once.len() as u64), "{last}");
+}
+
+/// What is recorded without measuring replays to the clouds that were not measured; nothing of them is in the recording.
+#[test]
+fn what_is_recorded_without_measuring_can_be_measured_later() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let folder = folder.path();
+    let rig = small_bench(folder);
+    let rig = rig.to_str().expect("a name");
+    let [recording, out, timed] = ["recording", "replayed", "timed"].map(|name| path_of(folder, name));
+    let record = ["--port", "sim", "--rig", rig, "record", "--cameras", "sim", "--home", "--rate", "5"];
+    let said = succeeds(&[&record[..], &["--frames", "3", "--out", &recording]].concat());
+    assert!(said.contains("recorded 6 images"), "{said}");
+    let bytes = std::fs::read(Path::new(&recording).join("recording_0.mcap")).expect("a file");
+    let holds = |topic: &str| bytes.windows(topic.len()).any(|window| window == topic.as_bytes());
+    assert!(holds("/joint_states") && !holds("/points"));
+    succeeds(&["replay", &recording, "--out", &out, "--keep"]);
+    assert_eq!(clouds(&out).len(), 3, "not every pair has its readings");
+
+    // Two seconds at five images each.
+    succeeds(&[&record[..], &["--seconds", "2", "--out", &timed]].concat());
+    let [first, last] = images_within(&timed);
+    assert!((1500..2000).contains(&(last - first).as_millis()), "{first:?} to {last:?}");
+    fails_with(&[&record[..], &["--out", &timed]].concat(), 2, &["there is something already"]);
+    fails_with(&["record", "--cameras", "sim"], 2, &["--out"]);
+}
+
+#[test]
+#[expect(clippy::disallowed_methods, reason = "another process is waited for")]
+fn an_interrupted_recording_ends_in_order() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let folder = folder.path();
+    let rig = small_bench(folder);
+    let recording = path_of(folder, "recording");
+    let mut command =
+        vergence(&["--port", "sim", "--rig", rig.to_str().expect("a name"), "record", "--cameras", "sim"]);
+    command.args(["--home", "--json", "--out", &recording]).stdout(Stdio::piped()).stderr(Stdio::piped());
+    let process = command.spawn().expect("it starts");
+    let file = Path::new(&recording).join("recording_0.mcap");
+    for _ in 0..1200 {
+        if std::fs::metadata(&file).is_ok_and(|metadata| metadata.len() > 2_500_000) {
+            break;
+        }
+        std::thread::sleep(Duration::from_millis(50));
+    }
+    interrupt(process.id());
+    let ended = process.wait_with_output().expect("it ends");
+    assert!(ended.status.success(), "{}", text(&ended.stderr));
+    let last: Value = serde_json::from_str(text(&ended.stdout).lines().last().expect("a last line")).expect("JSON");
+    assert!(last["images"].as_u64().is_some_and(|images| images > 2), "{last}");
+    let replayed = vergence(&["replay", &recording, "--from", "1h"]).output().expect("it runs");
+    assert!(replayed.status.success() && !text(&replayed.stderr).contains("was not finished"));
+}
+
+/// Sends Ctrl-C.
+fn interrupt(process: u32) {
+    let sent = Command::new("kill").args(["-INT", &process.to_string()]).status().expect("kill runs");
+    assert!(sent.success());
 }

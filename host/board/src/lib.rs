@@ -21,6 +21,7 @@ pub mod servos;
 mod setting_check;
 mod setting_text;
 mod settings_file;
+mod story;
 mod update;
 
 pub use board::{
@@ -46,6 +47,7 @@ pub use serve::{BoardGuard, ListenError, Listener, ServeError, Served, Shared, s
 pub use setting_check::why_refused;
 pub use setting_text::{NamedSetting, settings};
 pub use settings_file::{SettingsChanged, SettingsFileError};
+pub use story::Story;
 pub use update::{
     FirmwareImage, ImageFileError, UpdateError, UpdateEvent, Updated, confirm, hardware_name, restart, roll_back,
     update, version_text,

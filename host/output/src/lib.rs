@@ -20,6 +20,7 @@ mod pictures;
 mod points;
 mod published_zones;
 mod target_sheet;
+mod trunk_report;
 
 pub use cloud_report::{
     PoseSource, axes_by_images_json, axes_by_images_words, calibration_json, calibration_line, cloud_json, cloud_lines,
@@ -38,3 +39,4 @@ pub use pictures::{
 pub use points::{CloudEncoding, CloudFormat, DenseRow, Table, TableFormat, write_cloud};
 pub use published_zones::published_zones;
 pub use target_sheet::{Paper, Sheet};
+pub use trunk_report::{trunk_leg_json, trunk_leg_table, trunk_path_lines};

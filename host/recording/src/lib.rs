@@ -7,6 +7,7 @@ mod bag;
 mod cdr;
 mod error;
 mod event;
+mod keep;
 mod messages;
 mod metadata;
 mod play;

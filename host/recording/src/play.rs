@@ -22,13 +22,13 @@ pub struct Pacing {
 
 impl Pacing {
     /// Microseconds that are left out.
-    fn from_us(self) -> u64 {
+    fn left_out_us(self) -> u64 {
         u64::try_from(self.from.as_micros()).unwrap_or(u64::MAX)
     }
 
     /// Time from the beginning of the replay to an event so many microseconds after the first one; `None` where nothing is waited for.
     fn due(self, since_first_us: u64) -> Option<Duration> {
-        let played_us = since_first_us.checked_sub(self.from_us())?;
+        let played_us = since_first_us.checked_sub(self.left_out_us())?;
         Duration::try_from_secs_f64(played_us as f64 * 1e-6 / self.rate?).ok()
     }
 }
@@ -54,7 +54,7 @@ pub async fn play<E: From<LiveError> + From<RecordingError>>(
             None => yield_now().await,
         }
         let is_left_out =
-            since_first_us < pacing.from_us() && matches!(heard.event, Event::Image(..) | Event::Pulse(_));
+            since_first_us < pacing.left_out_us() && matches!(heard.event, Event::Image(..) | Event::Pulse(_));
         if !is_left_out {
             replay.take(heard, publish)?;
         }

@@ -29,6 +29,7 @@ pub struct Recordable<'a> {
 pub struct Recording {
     /// Takes what is heard and found.
     pub recorder: Recorder,
+    pub(crate) clock: HostClock,
     writing: Writing,
 }
 
@@ -41,8 +42,8 @@ impl Recording {
         let Recordable { rig, board, clock, epoch_us, period_us } = recordable;
         let program = concat!("vergence ", env!("CARGO_PKG_VERSION")).to_owned();
         let provenance = Provenance { program, inputs_sha256: String::new(), date: None };
-        let unwritten = |error: String| RecordingError::Write { file: folder.to_owned(), why: error };
-        let file = rig.to_toml(&provenance).map_err(|error| unwritten(error.to_string()))?;
+        let unwritten = |why| RecordingError::Write { file: folder.to_owned(), why };
+        let file = rig.to_toml(&provenance).map_err(unwritten)?;
         let (recorder, writing) = Recorder::start(folder, rig, &file, epoch_us)?;
         let baud = board.as_ref().and_then(BoardKnowledge::baud);
         recorder.begin(clock.now(), Beginning { has_board: board.is_some(), baud, period_us });
@@ -50,7 +51,7 @@ impl Recording {
             let recorder = recorder.clone();
             board.listen(move |news| recorder.news(clock.now(), news));
         }
-        Ok(Self { recorder, writing })
+        Ok(Self { recorder, clock, writing })
     }
 
     /// The live loop `live`, recorded. Call within a tokio runtime.

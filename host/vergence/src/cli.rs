@@ -82,6 +82,8 @@ enum Verb {
     Depth(With<RigFileOptions, cmd::depth::Args>),
     /// Measures live: a cloud of the newest pair, again and again, at rest or in motion.
     Run(With<BoardOptions, cmd::run::Args>),
+    /// Records images, encoders and events without measuring.
+    Record(With<BoardOptions, cmd::run::record::Args>),
     /// Measures a recording as `run` measured while it recorded.
     Replay(cmd::replay::Args),
     /// Serves a page on which people see and drive the rig.
@@ -110,7 +112,7 @@ pub const TASKS: &[(&str, &[&str])] = &[
     ("Set up a board", &["devices", "doctor", "config", "flash", "image", "servo"]),
     ("Calibrate", &["target", "capture", "calibrate", "camera", "rig"]),
     ("Move", &["home", "mode", "move", "plan", "stop", "arm", "disarm", "clear"]),
-    ("Measure", &["run", "replay", "panel", "depth", "zones", "models"]),
+    ("Measure", &["run", "record", "replay", "panel", "depth", "zones", "models"]),
     ("Watch a board", &["status", "monitor", "trigger", "log", "link-test"]),
     ("Check this program", &["bench", "soak"]),
     ("Shell", &["completions", "help"]),
@@ -272,6 +274,7 @@ fn execute(cli: Cli, virtual_time: bool) -> Result<(), Failure> {
                 None => cmd::demo::run(&verb.args, &verb.options.given(), console).await,
             },
             Verb::Run(verb) => cmd::run::run(&verb.args, &verb.options.chosen()?, console).await,
+            Verb::Record(verb) => cmd::run::record::record(&verb.args, &verb.options.chosen()?, console).await,
             Verb::Replay(args) => cmd::replay::run(&args, console).await,
             Verb::Panel(verb) => cmd::panel::run(&verb.args, &verb.options.chosen()?, console).await,
             Verb::Reproduce(args) => cmd::reproduce::run(&args, console).await,

@@ -12,6 +12,7 @@ mod reconnect;
 mod result_options;
 mod search_options;
 mod stage_pose;
+mod taking_options;
 mod target_options;
 
 pub mod bench;

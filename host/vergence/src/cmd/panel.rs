@@ -75,12 +75,15 @@ pub async fn run(args: &Args, common: &CommonOptions, console: Console) -> Resul
         }
         cameras => {
             let lease = if is_simulated { SIMULATED_LEASE_MS } else { common.lease };
-            let mut rig = args.live.connect(cameras, &CommonOptions { lease, ..common.clone() }, None, console).await?;
-            let simulated = is_simulated.then(|| format!("mechanics, room and cameras, lenses {}", args.live.lens));
-            let (panel, driver) = Panel::new(Setting { rig: Arc::clone(&rig.measuring), simulated, has_cameras: true });
+            let (mut rig, method) =
+                args.live.connect(cameras, &CommonOptions { lease, ..common.clone() }, None, console).await?;
+            let simulated =
+                is_simulated.then(|| format!("mechanics, room and cameras, lenses {}", args.live.taking.lens));
+            let (panel, driver) =
+                Panel::new(Setting { rig: Arc::clone(&method.measuring), simulated, has_cameras: true });
             rig.board = rig.board.map(|board| panel.watching(board));
-            let events = panel.tap(args.live.start_cameras(cameras, &rig)?);
-            let live = Some(args.live.live_loop(&mut rig, events, MatchingTime::Real));
+            let events = panel.tap(args.live.taking.start_cameras(cameras, &rig)?);
+            let live = Some(method.live_loop(&mut rig, events, MatchingTime::Real));
             (panel, Session { driver, board: rig.board, trigger: rig.trigger, live })
         }
     };

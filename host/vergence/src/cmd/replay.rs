@@ -59,7 +59,6 @@ pub async fn run(args: &Args, console: Console) -> Result<(), Failure> {
     let rig = args.rig(&reader)?;
     let search = args.search.search(&rig)?;
     let measuring = Arc::new(args.search.measuring(rig)?);
-    let matcher = args.matching.live(console)?;
     let mut publisher = Publisher {
         console,
         rig: Arc::clone(&measuring),
@@ -73,6 +72,8 @@ pub async fn run(args: &Args, console: Console) -> Result<(), Failure> {
     let mut interrupted = pin!(interrupted());
     loop {
         let before = publisher.number;
+        // Made anew each time: the matcher follows points from pair to pair.
+        let matcher = args.matching.live(console)?;
         let mut replay = Replay::new(&measuring, Method { search: &search, ..Method::from(matcher.as_ref()) }, clock);
         let mut publish = |measurement: Measurement| publish(&mut publisher, &mut totals, &measurement, args.frames);
         let played = tokio::select! {

@@ -1,5 +1,6 @@
-//! `vergence run`: measures live, while the stages stand still or move.
+//! `vergence run` measures live, while the stages stand still or move; `vergence record` keeps the same without measuring.
 
+pub mod record;
 mod tour;
 
 use std::path::{Path, PathBuf};
@@ -10,7 +11,8 @@ use vergence_live::{Ended, Limits, LiveLoop, MatchingTime, Pace, Totals, Tour};
 use vergence_protocol::{Request, Trigger};
 use vergence_recording::{Recordable, Recorded, Recording};
 
-use super::live_options::{LiveOptions, LiveRig};
+use super::live_options::LiveOptions;
+use super::taking_options::LiveRig;
 use crate::cli::CommonOptions;
 use crate::cmd::publish::Publisher;
 use crate::cmd::result_options::ResultOptions;
@@ -60,37 +62,26 @@ fn parse_time(text: &str) -> Result<Duration, String> {
 
 pub async fn run(args: &Args, common: &CommonOptions, console: Console) -> Result<(), Failure> {
     let files = args.results.files()?;
-    let mut rig = args.live.connect(&args.cameras, common, args.results.out.as_deref(), console).await?;
+    let (mut rig, method) = args.live.connect(&args.cameras, common, args.results.out.as_deref(), console).await?;
     let tour = args.tour.tour(&rig.known)?;
     let recording = args.record.as_deref().map(|folder| begin_recording(folder, &rig)).transpose()?;
-    if let Some(board) = &mut rig.board {
-        board.compare_clocks().await?;
-        args.tour.home(board).await?;
-        if !board.is_referenced() {
-            return Err(Failure::device(
-                "the axes have no reference, so nobody knows where the cameras are: run 'vergence home', or add --home",
-            ));
-        }
-        for sentence in rig.known.extrapolations(&board.positions()) {
-            console.warn(sentence);
-        }
-    }
+    make_ready(&mut rig, &args.tour, console).await?;
     let is_simulated = rig.simulated.is_some();
     let matching_time = match (is_simulated, args.match_time) {
         (false, _) => MatchingTime::Real,
         (true, None) => MatchingTime::Measured,
         (true, Some(time)) => MatchingTime::Fixed(time),
     };
-    let events = args.live.start_cameras(&args.cameras, &rig)?;
-    let mut live = args.live.live_loop(&mut rig, events, matching_time);
+    let events = args.live.taking.start_cameras(&args.cameras, &rig)?;
+    let mut live = method.live_loop(&mut rig, events, matching_time);
     if let Some(recording) = &recording {
         live = recording.of(live);
     }
     let (mut board, trigger) = (rig.board, rig.trigger);
     let mut publisher = Publisher {
         console,
-        rig: rig.measuring,
-        lens: is_simulated.then_some(args.live.lens),
+        rig: method.measuring,
+        lens: is_simulated.then_some(args.live.taking.lens),
         files,
         number: 0,
         pace: Pace::default(),
@@ -112,6 +103,25 @@ pub async fn run(args: &Args, common: &CommonOptions, console: Console) -> Resul
     }
     let ended = ended?;
     settled?;
+    seen_to_the_end(ended)
+}
+
+/// Compares the clocks, homes where that is asked for, and says where calibration reaches no pose.
+async fn make_ready(rig: &mut LiveRig, tour: &tour::Options, console: Console) -> Result<(), Failure> {
+    let Some(board) = &mut rig.board else { return Ok(()) };
+    board.compare_clocks().await?;
+    tour.home(board).await?;
+    if !board.is_referenced() {
+        return Err(Failure::device(
+            "the axes have no reference, so nobody knows where the cameras are: run 'vergence home', or add --home",
+        ));
+    }
+    rig.known.extrapolations(&board.positions()).iter().for_each(|sentence| console.warn(sentence));
+    Ok(())
+}
+
+/// Whether a camera was alive at the end.
+fn seen_to_the_end(ended: Option<Ended>) -> Result<(), Failure> {
     match ended {
         Some(Ended::Done) | None => Ok(()),
         Some(Ended::Blind) => Err(Failure::device("both cameras are dead: see what was said of each above")),

@@ -1,11 +1,8 @@
 //! `vergence status`: what the board is doing, and why it stopped.
 
-mod why;
-
 use serde_json::json;
-use vergence_board::{Followed, Follower, clock_json, describe_clock, hex, pose_json};
+use vergence_board::{Followed, Follower, Story, clock_json, describe_clock, hex, pose_json};
 
-use self::why::Story;
 use super::connect::{connect, port};
 use crate::cli::CommonOptions;
 use crate::console::Console;
@@ -69,10 +66,7 @@ pub async fn run(args: &Args, common: &CommonOptions, console: Console) -> Resul
     for (axis, state) in encoders {
         console.say(format!("encoder of {axis}: {state}"))?;
     }
-    match story {
-        Some(story) => story.print(board.rig(), console),
-        None => Ok(()),
-    }
+    console.say_lines(story.iter().flat_map(|story| story.lines(board.rig())))
 }
 
 /// Says where the board is by what its driver passes on; nothing is asked of the board.

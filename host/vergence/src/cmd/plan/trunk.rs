@@ -2,12 +2,12 @@
 
 use std::path::PathBuf;
 
-use serde_json::{Value, json};
+use serde_json::json;
 use vergence_board::check_range;
 use vergence_files::write_whole;
-use vergence_output::{check_ending, trunk_strip_svg};
+use vergence_output::{check_ending, trunk_leg_json, trunk_leg_table, trunk_path_lines, trunk_strip_svg};
 use vergence_pipeline::{ZONE_RADIUS, rig_zones};
-use vergence_rig::linkage::{Leg, TrunkPath, TrunkShape, WantedClearance};
+use vergence_rig::linkage::WantedClearance;
 use vergence_rig::{Rig, RigTrunk, axes_json, closure_in_words, closure_json, rounded, zones_json};
 use vergence_vision::{Angle, Length};
 
@@ -53,9 +53,12 @@ pub fn run(args: &Args, rig: &Rig, trunk: &RigTrunk, console: Console) -> Result
     let path = trunk
         .path(&values(from), &values(to), &wanted)
         .map_err(|error| Failure::check(format!("no path from {start} to {goal}: {error}")))?;
-    tell(&path, &wanted, console)?;
+    console.say_lines(trunk_path_lines(&path))?;
+    if path.kept != wanted {
+        console.warn("no way has the clearance asked for: this one keeps less");
+    }
     if args.dump {
-        path.legs.iter().enumerate().try_for_each(|(number, leg)| console.say(table(number, leg)))?;
+        console.say_lines(path.legs.iter().enumerate().map(|(number, leg)| trunk_leg_table(number, leg)))?;
     }
     let pose = rig.pose_at_values(&values(to));
     pose.check_closure().map_err(|error| Failure::check(error.to_string()))?;
@@ -78,76 +81,6 @@ pub fn run(args: &Args, rig: &Rig, trunk: &RigTrunk, console: Console) -> Result
         "kept": { "reserve_deg": rounded(path.kept.loop_reserve.to_degrees()), "gap_mm": rounded(path.kept.gap_mm) },
         "zones_deg": zones_json(&zones),
         "trunk": closure_json(&pose),
-        "legs": path.legs.iter().map(|leg| leg_json(rig, trunk, leg)).collect::<Vec<_>>(),
+        "legs": path.legs.iter().map(|leg| trunk_leg_json(rig, trunk, leg)).collect::<Vec<_>>(),
     }))
-}
-
-/// Legs and room of the path in words.
-fn tell(path: &TrunkPath, wanted: &WantedClearance, console: Console) -> Result<(), Failure> {
-    for (number, leg) in path.legs.iter().enumerate() {
-        let Some(end) = leg.end() else { continue };
-        console.say(format!("leg {}: {:.2} s to corners {}", number + 1, leg.seconds, degrees(end)))?;
-    }
-    let reserve = path.kept.loop_reserve.to_degrees();
-    console.say(format!(
-        "takes {:.2} s; every driven joint may be off by {reserve:.1} degrees, bodies stay {:.1} mm apart",
-        path.seconds(),
-        path.kept.gap_mm
-    ))?;
-    if path.kept != *wanted {
-        console.warn("no way has the clearance asked for: this one keeps less");
-    }
-    let tight = |leg: &Leg| leg.samples.iter().any(|sample| !sample.room.has(&path.kept));
-    if path.legs.iter().any(tight) {
-        console.say("one end is near a dead centre of the linkage: the path leaves or enters it where the reserve grows fastest")?;
-    }
-    Ok(())
-}
-
-fn degrees(shape: &TrunkShape) -> String {
-    let corners = ["A", "B", "C", "D", "E", "F"].into_iter().zip(shape.corners.0);
-    let text: Vec<_> = corners.map(|(name, angle)| format!("{name} {:.1}", angle.to_degrees())).collect();
-    let folds = if shape.is_flat() { String::new() } else { format!(", folds {:.1}", shape.fold.to_degrees()) };
-    text.join(", ") + &folds
-}
-
-/// Every tenth shape of a leg, and the last.
-fn table(number: usize, leg: &Leg) -> String {
-    let head =
-        format!("leg {}   share   A       B       C       D       E       F     folds reserve  gap mm", number + 1);
-    let last = leg.samples.len().saturating_sub(1);
-    let rows =
-        leg.samples.iter().enumerate().filter(|(index, _)| index % 10 == 0 || *index == last).map(|(_, sample)| {
-            let all = sample.shape.corners.0.into_iter().chain([sample.shape.fold]);
-            let angles: String = all.map(|angle| format!(" {:7.2}", angle.to_degrees())).collect();
-            format!(
-                "        {:5.2} {angles} {:7.2} {:7.1}",
-                sample.share,
-                sample.room.loop_reserve.to_degrees(),
-                sample.room.gap.mm
-            )
-        });
-    std::iter::once(head).chain(rows).collect::<Vec<_>>().join("\n")
-}
-
-fn leg_json(rig: &Rig, trunk: &RigTrunk, leg: &Leg) -> Value {
-    let least = |value: fn(&vergence_rig::linkage::LegSample) -> f64| {
-        leg.samples.iter().map(value).fold(f64::INFINITY, f64::min)
-    };
-    let to = leg.end().map(|shape| {
-        let values = trunk.values_of(shape, rig.axes.len());
-        let positions: Vec<_> = rig
-            .axes
-            .iter()
-            .zip(values)
-            .map(|(axis, value)| vergence_rig::AxisPosition::from_value(axis.kind, value))
-            .collect();
-        axes_json(rig, &positions)
-    });
-    json!({
-        "duration_s": rounded(leg.seconds),
-        "to": to,
-        "least_reserve_deg": rounded(least(|sample| sample.room.loop_reserve).to_degrees()),
-        "least_gap_mm": rounded(least(|sample| sample.room.gap.mm)),
-    })
 }

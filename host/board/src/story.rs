@@ -1,12 +1,10 @@
 //! The flight recorder as a story: what happened, and how long before or after the fault.
 
 use serde_json::{Value, json};
-use vergence_board::{Board, RecordedEvents, event_in_words};
 use vergence_protocol::{FaultCode, Happening, Microseconds, RecordedEvent};
 use vergence_rig::Rig;
 
-use crate::console::Console;
-use crate::failure::Failure;
+use crate::{Board, BoardError, RecordedEvents, event_in_words};
 
 /// What the board's recorder kept.
 pub struct Story {
@@ -23,7 +21,7 @@ impl Story {
     ///
     /// # Errors
     /// A firmware without recorder, or a link that ended.
-    pub async fn read(board: &Board) -> Result<Self, Failure> {
+    pub async fn read(board: &Board) -> Result<Self, BoardError> {
         let RecordedEvents { events, lost: gone, .. } = board.events().await?;
         let is_fault = |event: &&RecordedEvent| matches!(event.what, Happening::Fault { .. });
         let recorded = events.iter().rev().find(is_fault).map(|event| event.at);
@@ -35,14 +33,12 @@ impl Story {
         Ok(Self { events, gone, origin, since })
     }
 
-    /// One line for each event.
-    ///
-    /// # Errors
-    /// Where standard output cannot be written.
-    pub fn print(&self, rig: &Rig, console: Console) -> Result<(), Failure> {
-        console.say(format!("what happened, in seconds from {}", self.since))?;
+    /// A heading, and one line for each event.
+    #[must_use]
+    pub fn lines(&self, rig: &Rig) -> Vec<String> {
+        let mut lines = vec![format!("what happened, in seconds from {}", self.since)];
         if self.gone > 0 {
-            console.say(format!("              ({} earlier events are gone)", self.gone))?;
+            lines.push(format!("              ({} earlier events are gone)", self.gone));
         }
         // Every verb opens a session: of several in a row only the last is shown.
         let mut sessions = 0;
@@ -55,12 +51,13 @@ impl Story {
             let before = if sessions > 0 { format!(" (and {sessions} before it)") } else { String::new() };
             sessions = 0;
             let seconds = self.relative_us(event) as f64 * 1e-6;
-            console.say(format!("  {seconds:+11.6}  {}{before}", event_in_words(rig, &event.what)))?;
+            lines.push(format!("  {seconds:+11.6}  {}{before}", event_in_words(rig, &event.what)));
         }
-        Ok(())
+        lines
     }
 
-    /// For programs.
+    /// The same for programs: `times_from`, `gone` and `events`, with times in microseconds.
+    #[must_use]
     pub fn json(&self, rig: &Rig) -> Value {
         let events = self.events.iter().map(|event| {
             json!({

@@ -1,0 +1,64 @@
+//! `vergence record`: keeps what the rig sees and says, without measuring.
+
+use std::path::PathBuf;
+use std::time::Duration;
+
+use serde_json::json;
+use vergence_live::Limits;
+use vergence_protocol::Request;
+
+use super::{begin_recording, make_ready, parse_time, seen_to_the_end, settle, tell_recorded, tour};
+use crate::cli::CommonOptions;
+use crate::cmd::taking_options::TakingOptions;
+use crate::console::Console;
+use crate::failure::Failure;
+use crate::interrupt::interrupted;
+
+/// Records the images of both cameras, the readings of the encoders and all events, without measuring: the ROS 2 bag of `vergence run --record`
+/// without clouds. `vergence replay` measures it.
+///
+/// The board fires the cameras (--rate); with --mode the stages move meanwhile. Ctrl-C brakes, disarms and ends the recording in order.
+#[derive(Debug, clap::Args)]
+pub struct Args {
+    /// The left and the right camera, such as /dev/video0 /dev/video2; or `sim` on a simulated rig.
+    #[arg(long, num_args = 1..=2, required = true, value_name = "DEVICE")]
+    cameras: Vec<String>,
+    /// The folder of the recording, which must be empty or not there.
+    #[arg(long, value_name = "DIR")]
+    out: PathBuf,
+    /// End after this many images of each camera.
+    #[arg(long, value_name = "COUNT")]
+    frames: Option<u64>,
+    /// End after this time.
+    #[arg(long = "for", value_name = "TIME", value_parser = parse_time, alias = "seconds")]
+    duration: Option<Duration>,
+    #[command(flatten)]
+    tour: tour::Options,
+    #[command(flatten)]
+    taking: TakingOptions,
+}
+
+pub async fn record(args: &Args, common: &CommonOptions, console: Console) -> Result<(), Failure> {
+    let (mut rig, ()) = args.taking.connect(&args.cameras, common, None, console, |_| Ok(())).await?;
+    let tour = args.tour.tour(&rig.known)?;
+    let recording = begin_recording(&args.out, &rig)?;
+    make_ready(&mut rig, &args.tour, console).await?;
+    let heard = (args.taking.start_cameras(&args.cameras, &rig)?, rig.take_marks());
+    if let (Some(board), Some(trigger)) = (&rig.board, rig.trigger) {
+        board.ask(Request::SetTrigger(trigger)).await?;
+    }
+    let limits = Limits { results: args.frames, time: args.duration };
+    let warn = |warning: String| console.warn(warning);
+    let ended = tokio::select! {
+        ended = recording.keep(heard, limits, warn) => ended.map(Some).map_err(Failure::from),
+        error = tour.drive(rig.board.as_mut(), interrupted(), tour::order(), warn) => Err(error.into()),
+        () = interrupted() => Ok(None),
+    };
+    let settled = settle(&mut rig.board, &tour).await;
+    let recorded = recording.finish().await?;
+    tell_recorded(recorded, &args.out, console)?;
+    console.result(&json!({ "kind": "end", "images": recorded.images, "left_out": recorded.left_out }))?;
+    let ended = ended?;
+    settled?;
+    seen_to_the_end(ended)
+}
