@@ -88,7 +88,7 @@ fn with<'a>(arguments: &'a [String], more: &[&'a str]) -> Vec<&'a str> {
 #[test]
 fn a_name_that_says_another_format_is_refused() {
     let shop = Workshop::new(0.0);
-    fails_with(&with(&shop.depth("cloud.pcd"), &[]), 2, &["cloud.pcd", "'.pcd' is not written", ".ply"]);
+    fails_with(&with(&shop.depth("cloud.las"), &[]), 2, &["cloud.las", "'.las' is not written", ".ply"]);
     fails_with(&with(&shop.depth("cloud"), &[]), 2, &["has no ending", ".ply"]);
     let matches = shop.file("matches.pdf");
     fails_with(&with(&shop.depth("cloud.ply"), &["--matches", &matches]), 2, &["'.pdf' is not written", ".svg"]);
