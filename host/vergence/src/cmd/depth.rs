@@ -290,12 +290,10 @@ fn with_closure(mut result: Value, pose: &RigPose) -> Value {
 /// Refuses names of output files that say another format than the one written.
 fn check_names(args: &Args) -> Result<(), Failure> {
     let several = args.left.is_dir();
-    match several {
-        true => check_folder(&args.out)?,
-        false if args.format.is_some() => {
-            return Err(Failure::usage("--format is for folders: of a pair, the ending of --out says it"));
-        }
-        false => _ = check_ending(&args.out, &CloudFormat::ENDINGS)?,
+    match (several, &args.format) {
+        (true, _) => check_folder(&args.out)?,
+        (false, None) => _ = check_ending(&args.out, &CloudFormat::ENDINGS)?,
+        _ => return Err(Failure::usage("--format is for folders: of a pair, the ending of --out says it")),
     }
     match &args.matches {
         Some(folder) if several => check_folder(folder)?,
