@@ -53,7 +53,7 @@ function paint(context, { size, cells, corners }, isStill, { zoom, left, top, do
     context.strokeRect(x, y, width, height);
     const [label, colour] = share < 1 ? [`${Math.round(100 * share)} %`, '#ffffff'] : ['✓', style('stereo')];
     // The target is seen in the middle of a cell: the label keeps to its corner.
-    const [labelX, labelY] = [x + width - 24 * dots, y + height - 15 * dots];
+    const [labelX, labelY] = [x + width - 30 * dots, y + height - 15 * dots];
     context.lineWidth = 4 * dots;
     context.strokeStyle = '#000';
     context.strokeText(label, labelX, labelY);
