@@ -121,7 +121,7 @@ fn people_watch_in_a_browser_how_a_calibration_fills() {
     let small = BENCH_TOML.replace("[1280, 1280]", "[320, 320]").replace("366.0", "91.5").replace("639.5", "159.5");
     std::fs::write(&rig, small).expect("a file");
     let (rig, out) = (rig.to_str().expect("a name"), set.path().join("set"));
-    let target = ["--corners", "9x6", "--square", "20mm", "--frames", "60"];
+    let target = ["--corners", "9x6", "--square", "20mm", "--frames", "120"];
     let capture = ["--rig", rig, "capture", "--cameras", "sim", "--panel", "127.0.0.1:0", "--out"];
     let mut served = Served::start(&[&capture[..], &[out.to_str().expect("a name")], &target].concat());
     let status = Command::new("node")

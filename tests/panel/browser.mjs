@@ -6,7 +6,7 @@ import { chromium } from 'playwright-core';
 
 const axe = readFileSync(createRequire(import.meta.url).resolve('axe-core/axe.min.js'), 'utf8');
 // The machine that runs the tests may be busy.
-const timeout = 45000;
+const timeout = 120000;
 
 // Lets `story` use the browser at `executablePath`. Pages must not complain. Pictures go to the folder in the last argument of the command line.
 export async function browse(executablePath, story) {
