@@ -9,9 +9,9 @@
 mod common;
 
 use std::io::{BufRead, BufReader};
-use std::process::{Child, Command, Output, Stdio};
+use std::process::{Child, Output, Stdio};
 
-use common::{Simulator, text};
+use common::{Simulator, signal, text};
 use serde_json::Value;
 
 fn fails(output: &Output, code: i32, words: &[&str]) -> String {
@@ -32,17 +32,12 @@ fn armed(simulator: &Simulator) -> Child {
     child
 }
 
-fn signal(child: &Child, name: &str) {
-    let sent = Command::new("kill").args([name, &child.id().to_string()]).status().expect("kill runs");
-    assert!(sent.success());
-}
-
 #[test]
 fn an_interruption_of_arm_disarms_and_is_success() {
     let simulator = Simulator::start(&["--pty"]);
     for name in ["-INT", "-TERM"] {
         let child = armed(&simulator);
-        signal(&child, name);
+        signal(child.id(), name);
         let output = child.wait_with_output().expect("it ends");
         assert_eq!(output.status.code(), Some(0), "{}", text(&output.stderr));
         assert!(text(&output.stdout).contains("idle"), "{}", text(&output.stdout));
@@ -58,7 +53,7 @@ fn an_interrupted_move_brakes_and_disarms() {
     while simulator_is_idle(&child) {
         std::hint::spin_loop();
     }
-    signal(&child, "-INT");
+    signal(child.id(), "-INT");
     let output = child.wait_with_output().expect("it ends");
     fails(&output, 3, &["braked", "disarmed"]);
     let status = simulator.json(&["status"]);
@@ -187,7 +182,7 @@ fn a_port_in_use_is_not_taken_for_a_board_without_power() {
         let said = fails(&simulator.run(verb), 3, &["in use by another vergence"]);
         assert!(!said.contains("powered"), "{said}");
     }
-    signal(&child, "-INT");
+    signal(child.id(), "-INT");
     child.wait().expect("it ends");
 }
 
@@ -221,7 +216,7 @@ fn a_move_is_watched_by_a_monitor_that_was_there_before() {
     assert!(lines.any(|line| line["state"] == "idle"), "and that it is over");
     // With the port to itself again, it compares the clocks.
     assert!(lines.any(|line| !line["clock"]["error_us"].is_null()), "it reads the board itself again");
-    signal(&monitor, "-INT");
+    signal(monitor.id(), "-INT");
     // A full pipe would hold the monitor up.
     lines.for_each(drop);
     assert!(monitor.wait().expect("it ends").success());
@@ -238,6 +233,6 @@ fn several_read_a_board_that_one_drives() {
     }
     assert_eq!(simulator.json(&["status"])["state"], "ready");
     fails(&simulator.run(&["home"]), 3, &["in use by another vergence"]);
-    signal(&driver, "-INT");
+    signal(driver.id(), "-INT");
     assert!(driver.wait_with_output().expect("it ends").status.success());
 }

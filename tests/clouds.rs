@@ -11,10 +11,10 @@ mod common;
 
 use std::io::Read;
 use std::path::Path;
-use std::process::{Child, Command, Stdio};
+use std::process::{Child, Stdio};
 use std::time::{Duration, Instant};
 
-use common::{fails_with, run, run_json, text, vergence};
+use common::{fails_with, run, run_json, signal, text, vergence};
 use nalgebra::{Rotation3, Vector3};
 
 /// Two equal cameras with an equidistant lens of `focal` pixels per radian, 100 mm apart.
@@ -131,8 +131,7 @@ fn interrupted_after(mut process: Child, file: &Path) -> (String, Option<i32>, D
         std::thread::sleep(Duration::from_millis(5));
     }
     let asked = Instant::now();
-    let killed = Command::new("kill").args(["-INT", &process.id().to_string()]).status().expect("kill runs");
-    assert!(killed.success());
+    signal(process.id(), "-INT");
     let ended = process.wait().expect("it ends");
     let took = asked.elapsed();
     let mut said = String::new();

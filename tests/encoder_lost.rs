@@ -19,7 +19,7 @@ use std::sync::Arc;
 use std::time::Duration;
 
 use common::rendered::{band, seeds};
-use common::vergence;
+use common::{small_bench_toml, vergence};
 use live_bench::{LiveBench, Setting};
 use nalgebra::{Isometry3, UnitQuaternion};
 use serde_json::Value;
@@ -229,8 +229,7 @@ async fn an_axis_without_encoder_is_not_moved() {
 fn run_goes_on_by_images_and_comes_back_when_told_to_home() {
     let folder = tempfile::tempdir().expect("a folder");
     let rig = folder.path().join("rig.toml");
-    let small = BENCH_TOML.replace("[1280, 1280]", "[320, 320]").replace("366.0", "91.5").replace("639.5", "159.5");
-    std::fs::write(&rig, small).expect("written");
+    std::fs::write(&rig, small_bench_toml()).expect("written");
     let tour =
         ["--home", "--mode", "human", "--mode", "herbivore", "--stay", "900ms", "--unplug", "separation@3500ms..6s"];
     let pace = ["--rate", "2", "--match-time", "150ms", "--for", "60s"];

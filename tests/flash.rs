@@ -16,7 +16,7 @@ use std::sync::mpsc;
 use std::thread::spawn;
 
 use common::images::{ARM, START, Workshop, application, elf};
-use common::{Simulator, text, vergence};
+use common::{Simulator, signal, text, vergence};
 use serde_json::Value;
 
 /// So many bytes without a pattern, different for each `seed` (Knuth's MMIX generator).
@@ -202,8 +202,7 @@ fn an_interrupted_update_says_what_is_left_and_how_to_go_on() {
     let wire = held.recv().expect("the line is held up");
     #[allow(clippy::disallowed_methods, reason = "how long a process takes to end")]
     let asked = std::time::Instant::now();
-    let sent = Command::new("kill").args(["-INT", &host.id().to_string()]).status().expect("kill runs");
-    assert!(sent.success());
+    signal(host.id(), "-INT");
     let output = host.wait_with_output().expect("it ends");
     assert!(asked.elapsed().as_secs_f64() < 1.0, "it took {:?}", asked.elapsed());
     fails(&output, 3, &["of 60000 bytes", "old image", "same command again", "flash --restart"]);

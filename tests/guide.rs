@@ -13,7 +13,7 @@ use std::os::unix::fs::PermissionsExt;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 
-use common::{Simulator, text};
+use common::{Simulator, small_bench_toml, text};
 
 /// The port that the guide names; the test puts the simulated board's in its place.
 const GUIDES_PORT: &str = "/dev/ttyACM0";
@@ -41,11 +41,6 @@ fn commands(page: &str, fence: &str) -> Vec<String> {
     commands
 }
 
-/// The bench with small cameras: a pair is rendered and matched in a second.
-fn small_bench() -> String {
-    vergence_rig::BENCH_TOML.replace("[1280, 1280]", "[320, 320]").replace("366.0", "91.5").replace("639.5", "159.5")
-}
-
 /// A `vergence` for the shell, which adds the long lease.
 fn install(folder: &Path) {
     let wrapper = folder.join("vergence");
@@ -63,7 +58,7 @@ fn the_guide_runs_on_a_simulated_board() {
     let (bin, work) = (folder.path().join("bin"), folder.path().join("work"));
     fs::create_dir_all(work.join("host/rig/src")).expect("a folder");
     fs::create_dir_all(&bin).expect("a folder");
-    fs::write(work.join("host/rig/src/bench.toml"), small_bench()).expect("the drawing is written");
+    fs::write(work.join("host/rig/src/bench.toml"), small_bench_toml()).expect("the drawing is written");
     install(&bin);
     let board = Simulator::start(&[]);
     let commands = commands(&guide(), "sh");

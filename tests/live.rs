@@ -14,11 +14,11 @@ use std::collections::BTreeMap;
 use std::future::pending;
 use std::io::{BufRead, BufReader, Read};
 use std::path::Path;
-use std::process::{Command, Stdio};
+use std::process::Stdio;
 use std::sync::Arc;
 use std::time::Duration;
 
-use common::{fails_with, run, text, vergence};
+use common::{fails_with, run, signal, small_bench_toml, text, vergence};
 use live_bench::{LiveBench, Setting};
 use serde_json::Value;
 use vergence::failure::Failure;
@@ -27,18 +27,14 @@ use vergence_board::Board;
 use vergence_live::{Limits, LiveLoop, LiveResult, Measurement, Totals};
 use vergence_pipeline::{ColouredPoint, Observation};
 use vergence_protocol::{Mode, Request, Trigger};
-use vergence_rig::{AxisPosition, BENCH_TOML, Rig, Shutter};
+use vergence_rig::{AxisPosition, Rig, Shutter};
 use vergence_scene::LensChoice;
 use vergence_sim::{Room, RoomCamera};
 use vergence_vision::{Angle, Left, Length, Pixel, Side};
 
 /// The bench with small cameras whose rows are exposed one after the other, 20 ms from the first to the last.
 fn small_bench() -> String {
-    BENCH_TOML
-        .replace("[1280, 1280]", "[320, 320]")
-        .replace("366.0", "91.5")
-        .replace("639.5", "159.5")
-        .replace("theta_max", "line_time = \"62.5us\"\ntheta_max")
+    small_bench_toml().replace("theta_max", "line_time = \"62.5us\"\ntheta_max")
 }
 
 fn rig() -> Rig {
@@ -280,8 +276,7 @@ fn an_interrupted_run_ends_cleanly() {
     let mut first = String::new();
     said.read_line(&mut first).expect("a cloud");
     assert!(first.contains("\"cloud\""), "{first}");
-    let interrupted = Command::new("kill").args(["-INT", &process.id().to_string()]).status().expect("kill runs");
-    assert!(interrupted.success());
+    signal(process.id(), "-INT");
     let mut rest = String::new();
     said.read_to_string(&mut rest).expect("it ends");
     let ended = process.wait_with_output().expect("it ends");

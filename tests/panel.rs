@@ -16,9 +16,8 @@ use std::path::{Path, PathBuf};
 use std::process::{Child, ChildStdout, Command, Stdio};
 
 use common::data::skip;
-use common::{fails_with, vergence};
+use common::{fails_with, signal, small_bench_toml, vergence};
 use serde_json::Value;
-use vergence_rig::BENCH_TOML;
 
 /// A panel in its own process; ends with the value.
 struct Served {
@@ -40,8 +39,8 @@ impl Served {
 
     /// Ends as by Ctrl-C, in order.
     fn terminate(&mut self) {
-        let asked = Command::new("kill").arg(self.process.id().to_string()).status().expect("kill runs");
-        assert!(asked.success() && self.process.wait().expect("it was started").success());
+        signal(self.process.id(), "-TERM");
+        assert!(self.process.wait().expect("it was started").success());
     }
 }
 
@@ -118,8 +117,7 @@ fn people_watch_in_a_browser_how_a_calibration_fills() {
     let pictures = pictures();
     let set = tempfile::tempdir().expect("a folder");
     let rig = set.path().join("small.toml");
-    let small = BENCH_TOML.replace("[1280, 1280]", "[320, 320]").replace("366.0", "91.5").replace("639.5", "159.5");
-    std::fs::write(&rig, small).expect("a file");
+    std::fs::write(&rig, small_bench_toml()).expect("a file");
     let (rig, out) = (rig.to_str().expect("a name"), set.path().join("set"));
     let target = ["--corners", "9x6", "--square", "20mm", "--frames", "120"];
     let capture = ["--rig", rig, "capture", "--cameras", "sim", "--panel", "127.0.0.1:0", "--out"];

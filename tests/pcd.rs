@@ -7,9 +7,8 @@ use std::path::Path;
 use std::process::Command;
 
 use common::pairs::{Work, refs};
-use common::{fails_with, python, run_json, text};
+use common::{fails_with, python, run_json, small_bench_toml, text};
 use serde_json::Value;
-use vergence_rig::BENCH_TOML;
 
 /// Prints a PCD file as JSON: the encoding, the type of each column, and its rows, each with red, green and blue for `rgb`.
 const READ: &str = r#"
@@ -158,8 +157,7 @@ fn folders_and_the_live_loop_take_the_format_as_an_option() {
 
     // An old cloud in the other format is not left beside the newest one.
     let (small, live) = (file("small.toml"), file("live"));
-    let bench = BENCH_TOML.replace("[1280, 1280]", "[320, 320]").replace("366.0", "91.5").replace("639.5", "159.5");
-    std::fs::write(&small, bench).expect("a rig file");
+    std::fs::write(&small, small_bench_toml()).expect("a rig file");
     for (format, other) in [("ply", "pcd"), ("pcd", "ply")] {
         let board = ["--port", "sim", "--rig", &small, "run", "--cameras", "sim", "--home", "--match-time", "100ms"];
         let frames = ["--frames", "1", "--out", &live, "--also", "csv", "--format", format];

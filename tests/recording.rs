@@ -14,16 +14,14 @@ use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 use std::time::{Duration, Instant};
 
-use common::{fails_with, python, run, text, vergence};
+use common::{fails_with, python, run, signal, small_bench_toml, text, vergence};
 use serde_json::Value;
 use vergence_recording::{Event, Reader};
-use vergence_rig::BENCH_TOML;
 
 /// The bench with small cameras.
 fn small_bench(folder: &Path) -> PathBuf {
-    let rig = BENCH_TOML.replace("[1280, 1280]", "[320, 320]").replace("366.0", "91.5").replace("639.5", "159.5");
     let path = folder.join("small.toml");
-    std::fs::write(&path, rig).expect("a file");
+    std::fs::write(&path, small_bench_toml()).expect("a file");
     path
 }
 
@@ -42,6 +40,25 @@ fn succeeds(arguments: &[&str]) -> String {
     let output = run(arguments);
     assert!(output.status.success(), "{arguments:?}: {}", text(&output.stderr));
     text(&output.stdout)
+}
+
+/// The size of a recording with two chunks and more, in bytes.
+const SOME_CHUNKS: u64 = 2_500_000;
+
+/// How many bytes of a recording are on the disk.
+fn size(recording: &str) -> u64 {
+    std::fs::metadata(Path::new(recording).join("recording_0.mcap")).map_or(0, |metadata| metadata.len())
+}
+
+/// Waits until there are some chunks of a recording, a minute at most.
+#[expect(clippy::disallowed_methods, reason = "another process is waited for")]
+fn wait_for_chunks(recording: &str) {
+    for _ in 0..1200 {
+        if size(recording) > SOME_CHUNKS {
+            return;
+        }
+        std::thread::sleep(Duration::from_millis(50));
+    }
 }
 
 /// The clouds in a folder, in their order.
@@ -125,7 +142,6 @@ print(seen)
 }
 
 #[test]
-#[expect(clippy::disallowed_methods, reason = "another process is waited for")]
 fn a_recording_that_was_killed_replays_up_to_its_last_whole_chunk() {
     let folder = tempfile::tempdir().expect("a folder");
     let folder = folder.path();
@@ -136,18 +152,11 @@ fn a_recording_that_was_killed_replays_up_to_its_last_whole_chunk() {
         .stderr(Stdio::null())
         .spawn()
         .expect("it starts");
-    let file = Path::new(&recording).join("recording_0.mcap");
-    let size = || std::fs::metadata(&file).map_or(0, |metadata| metadata.len());
-    for _ in 0..1200 {
-        if size() > 2_500_000 {
-            break;
-        }
-        std::thread::sleep(Duration::from_millis(50));
-    }
+    wait_for_chunks(&recording);
     child.kill().expect("it can be killed");
     child.wait().expect("it ends");
-    println!("killed with {} bytes on the disk", size());
-    assert!(size() > 2_500_000, "it recorded nothing");
+    println!("killed with {} bytes on the disk", size(&recording));
+    assert!(size(&recording) > SOME_CHUNKS, "it recorded nothing");
 
     let out = path_of(folder, "replayed");
     succeeds(&["replay", &recording, "--out", &out, "--keep", "--frames", "3"]);
@@ -231,7 +240,7 @@ fn a_looped_replay_gives_the_same_clouds_until_it_is_interrupted() {
         said.read_line(&mut line).expect("a cloud");
         assert!(line.contains("\"cloud\""), "{line}");
     }
-    interrupt(process.id());
+    signal(process.id(), "-INT");
     let mut rest = String::new();
     said.read_to_string(&mut rest).expect("it ends");
     let ended = process.wait_with_output().expect("it ends");
@@ -267,7 +276,6 @@ fn what_is_recorded_without_measuring_can_be_measured_later() {
 }
 
 #[test]
-#[expect(clippy::disallowed_methods, reason = "another process is waited for")]
 fn an_interrupted_recording_ends_in_order() {
     let folder = tempfile::tempdir().expect("a folder");
     let folder = folder.path();
@@ -277,24 +285,12 @@ fn an_interrupted_recording_ends_in_order() {
         vergence(&["--port", "sim", "--rig", rig.to_str().expect("a name"), "record", "--cameras", "sim"]);
     command.args(["--home", "--json", "--out", &recording]).stdout(Stdio::piped()).stderr(Stdio::piped());
     let process = command.spawn().expect("it starts");
-    let file = Path::new(&recording).join("recording_0.mcap");
-    for _ in 0..1200 {
-        if std::fs::metadata(&file).is_ok_and(|metadata| metadata.len() > 2_500_000) {
-            break;
-        }
-        std::thread::sleep(Duration::from_millis(50));
-    }
-    interrupt(process.id());
+    wait_for_chunks(&recording);
+    signal(process.id(), "-INT");
     let ended = process.wait_with_output().expect("it ends");
     assert!(ended.status.success(), "{}", text(&ended.stderr));
     let last: Value = serde_json::from_str(text(&ended.stdout).lines().last().expect("a last line")).expect("JSON");
     assert!(last["images"].as_u64().is_some_and(|images| images > 2), "{last}");
     let replayed = vergence(&["replay", &recording, "--from", "1h"]).output().expect("it runs");
     assert!(replayed.status.success() && !text(&replayed.stderr).contains("was not finished"));
-}
-
-/// Sends Ctrl-C.
-fn interrupt(process: u32) {
-    let sent = Command::new("kill").args(["-INT", &process.to_string()]).status().expect("kill runs");
-    assert!(sent.success());
 }

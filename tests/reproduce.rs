@@ -204,10 +204,8 @@ fn an_interruption_ends_it_at_once_and_says_how_to_go_on() {
         let child = vergence(&arguments).stderr(std::process::Stdio::piped()).spawn().expect("the binary runs");
         // Long enough to be at the photographs on an idle machine, and before them on a busy one.
         std::thread::sleep(std::time::Duration::from_secs(3));
-        let kill =
-            std::process::Command::new("kill").args([signal, &child.id().to_string()]).status().expect("kill runs");
+        common::signal(child.id(), signal);
         let asked = std::time::Instant::now();
-        assert!(kill.success());
         let output = child.wait_with_output().expect("it ends");
         // A second on an idle machine; other tests may keep this one busy, and the whole takes minutes.
         assert!(asked.elapsed().as_secs_f64() < 10.0, "{signal}: {:.1} s", asked.elapsed().as_secs_f64());

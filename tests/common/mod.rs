@@ -18,6 +18,7 @@ use std::process::{Child, Command, Output, Stdio};
 pub use data::real_data;
 pub use python::python;
 use serde_json::Value;
+use vergence_rig::BENCH_TOML;
 
 /// The binary with `arguments`, and none of the caller's own settings.
 pub fn vergence(arguments: &[&str]) -> Command {
@@ -53,6 +54,17 @@ pub fn fails_with(arguments: &[&str], code: i32, words: &[&str]) {
         assert!(said.contains(word), "{arguments:?} should mention '{word}', said: {said}");
     }
     assert!(!said.contains("panicked"), "{said}");
+}
+
+/// Sends a signal such as `-INT`, which is Ctrl-C.
+pub fn signal(process: u32, name: &str) {
+    let sent = Command::new("kill").args([name, &process.to_string()]).status().expect("kill runs");
+    assert!(sent.success());
+}
+
+/// The rig file of the bench with images of 320 x 320 pixels.
+pub fn small_bench_toml() -> String {
+    BENCH_TOML.replace("[1280, 1280]", "[320, 320]").replace("366.0", "91.5").replace("639.5", "159.5")
 }
 
 pub fn text(bytes: &[u8]) -> String {

@@ -60,7 +60,7 @@ impl Recorder {
     /// tokio runtime.
     ///
     /// # Errors
-    /// A folder that exists or cannot be written; a rig that no file can hold.
+    /// A folder that holds something, a file that cannot be written; a rig that no file can hold.
     pub fn start(folder: &Path, rig: &Rig, rig_file: &str, epoch_us: u64) -> Result<(Self, Writing), RecordingError> {
         let bag = Bag::create(folder, rig_file)?;
         let (entries, waiting) = channel(WAITING);
