@@ -28,6 +28,8 @@ pub enum Unplug {
         /// When it is unplugged, and plugged in again.
         times: [Duration; 2],
     },
+    /// The cable between host and board.
+    Link([Duration; 2]),
 }
 
 impl FromStr for Unplug {
@@ -43,11 +45,12 @@ impl FromStr for Unplug {
                 "" => return None,
                 "left" => camera(Side::Left),
                 "right" => camera(Side::Right),
+                "link" => Self::Link(times),
                 axis => Self::Encoder { axis: axis.to_owned(), times },
             })
         };
         read().ok_or_else(|| {
-            format!("'{text}' does not say what is unplugged and when: write it like left@2s..4s or separation@2s..4s")
+            format!("'{text}' does not say what is unplugged and when: write it like left@2s..4s, separation@2s..4s or link@2s..4s")
         })
     }
 }
@@ -63,6 +66,7 @@ mod tests {
         let times = [Duration::from_secs(2), Duration::from_millis(3500)];
         let camera = Unplug::Camera(Unplugged { side: Side::Left, from: times[0], until: times[1] });
         assert_eq!("left@2s..3500ms".parse(), Ok(camera));
+        assert_eq!("link@2s..3500ms".parse(), Ok(Unplug::Link(times)));
         assert_eq!("elbow@2s..3500ms".parse(), Ok(Unplug::Encoder { axis: "elbow".into(), times }));
         for wrong in ["left", "left@2s", "@1s..2s", "left@1..2"] {
             assert!(wrong.parse::<Unplug>().is_err_and(|error| error.contains("left@2s..4s")), "{wrong}");

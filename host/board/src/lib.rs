@@ -36,14 +36,14 @@ pub use firmware::{
 };
 pub use line_speed::{SpeedChange, change_line_speed};
 pub use link::{
-    BoardKnowledge, BoardNews, Client, Followed, Follower, HostClock, LinkError, LostAxis, ManagementLink, OpenError,
-    OpenWire, Port, PortLock, ReaderMark, RepeatedStop, Told, Wire, describe_port, fresh_session, is_candidate,
-    is_held, is_st_link, is_wanted, open, send_stop, serial_ports, stop_beside,
+    BoardKnowledge, BoardNews, Client, Continuity, Followed, Follower, HostClock, LastReading, LinkError, LostAxis,
+    ManagementLink, OpenError, OpenWire, Port, PortLock, ReaderMark, RepeatedStop, Told, Wire, describe_port,
+    fresh_session, is_candidate, is_held, is_st_link, is_wanted, open, send_stop, serial_ports, stop_beside,
 };
 pub use link_figures::{LinkFigures, LinkLosses};
 pub use listening::{Listening, Source, reach_again};
 pub use move_plan::{AxisLimits, AxisPlan, Knot, MovePlan, MoveStart};
-pub use serve::{BoardGuard, ListenError, Listener, ServeError, Served, Shared, serve, spawn_in_process};
+pub use serve::{BoardGuard, ListenError, Listener, ServeError, Served, Shared, serve, spawn_in_process, spawn_until};
 pub use setting_check::why_refused;
 pub use setting_text::{NamedSetting, settings};
 pub use settings_file::{SettingsChanged, SettingsFileError};

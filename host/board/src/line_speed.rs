@@ -8,7 +8,7 @@ use vergence_protocol::{Refusal, Report, Request, SettingItem, SettingKey, Statu
 
 use crate::board::Board;
 use crate::error::BoardError;
-use crate::link::{Client, HostClock, LinkError, OpenError, Port, fresh_session, open};
+use crate::link::{Client, Continuity, LinkError, OpenError, Port, fresh_session, open};
 
 /// Longest time until a board is back at the speed before: its trial takes five seconds, and a host is heard within two.
 const RETURN: Duration = Duration::from_secs(12);
@@ -73,7 +73,8 @@ pub async fn change_line_speed(
 
 async fn connect(port: &Port, baud: u32) -> Result<Client, OpenError> {
     let wire = open(port, baud, false).await?;
-    Client::at(port, wire, fresh_session()?, HostClock::start()).await
+    let continuity = Continuity::begin(wire.baud);
+    Client::at(port, wire, fresh_session()?, continuity).await
 }
 
 /// Whether the board has saved its settings; false where nothing is heard of it.

@@ -7,7 +7,7 @@ use std::future::pending;
 use proptest::prelude::*;
 use proptest::test_runner::RngSeed;
 use vergence_board::{
-    AxisPlan, Board, BoardError, Client, HostClock, MovePlan, MoveStart, OpenWire, Served, Shared, spawn_in_process,
+    AxisPlan, Board, BoardError, Client, Continuity, MovePlan, MoveStart, OpenWire, Served, Shared, spawn_in_process,
 };
 use vergence_control::{RigIo, TICK_US};
 use vergence_plant::{NativeBoard, bench_mechanics, bench_settings};
@@ -120,7 +120,7 @@ async fn compare(seed: u64, backlash: [i32; 2], moves: Vec<Step>) {
     board.advance(Microseconds(STARTED_US));
     let traced = Shared::new(Traced { board, output: Vec::new(), steps: Vec::new() });
     let wire = OpenWire::in_process(spawn_in_process(traced.clone()));
-    let client = Client::connect(wire, SessionId(7), HostClock::start()).await.expect("a session");
+    let client = Client::connect(wire, SessionId(7), Continuity::begin(None)).await.expect("a session");
     let mut board = Board::new(client, rig.clone(), 100).await.expect("the bench's board");
     let limits = board.limits().await.expect("limits");
 

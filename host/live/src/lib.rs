@@ -24,7 +24,7 @@ pub use live_loop::{Ended, Limits, LiveLoop, LiveResult, MatchingTime, Totals};
 pub use measure::{Measurement, PosedExposure, measure};
 pub use orders::{HOME, homing_orders};
 pub use pace::{Limit, Pace};
-pub use posed::{Posed, READINGS, pose};
+pub use posed::{AT_REST, LONGEST_UNSEEN, Posed, READINGS, pose};
 pub use tour::Tour;
 
 /// Returns the time since some fixed instant, always the real one: by it the loop tells how long matching takes.

@@ -17,7 +17,7 @@ use vergence_vision::Side;
 
 use crate::blindness::Blindness;
 use crate::measure::{Measurement, PosedExposure, measure};
-use crate::posed::{Posed, READINGS, pose};
+use crate::posed::{LONGEST_UNSEEN, Posed, READINGS, pose};
 use crate::{Clock, LiveError};
 
 /// How often overdue images and pulses are given up.
@@ -154,7 +154,7 @@ impl LiveLoop {
         let deadline = limits.time.map(|time| Instant::now() + time);
         let mut settle = interval(SETTLE);
         let (mut work, mut newest): (Option<Work>, Option<Exposed<PendingImage>>) = (None, None);
-        let mut blindness = Blindness::default();
+        let (mut blindness, mut had_ended) = (Blindness::default(), false);
         loop {
             if work.is_none() {
                 work = newest.take().map(|exposed| self.start(exposed));
@@ -185,6 +185,10 @@ impl LiveLoop {
                         return Ok(Ended::Done);
                     }
                 }
+            }
+            if self.has_ended() != had_ended {
+                had_ended = !had_ended;
+                self.note_link(had_ended, &mut warn);
             }
             while let Some(exposed) = self.exposures.take() {
                 if newest.replace(exposed).is_some() {
@@ -230,6 +234,25 @@ impl LiveLoop {
                 let stamp = StampedImage { seq: image.seq, middle: image.middle };
                 self.exposures.image(side, stamp, image, &base);
             }
+        }
+    }
+
+    /// Whether the link to the board ended.
+    fn has_ended(&self) -> bool {
+        self.board.as_ref().is_some_and(BoardKnowledge::has_ended)
+    }
+
+    /// Pairs images without pulses as long as nobody reports them.
+    fn note_link(&mut self, has_ended: bool, warn: &mut impl FnMut(String)) {
+        if has_ended {
+            self.exposures.link_ended();
+            warn(format!(
+                "the link to the board ended: for {} s the last pose is used, less and less surely",
+                LONGEST_UNSEEN.as_secs()
+            ));
+        } else {
+            self.exposures.link_back();
+            warn("the link to the board is back: its readings tell the pose again".into());
         }
     }
 

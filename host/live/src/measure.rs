@@ -19,6 +19,8 @@ use crate::{Clock, LiveError};
 pub enum PosedExposure {
     /// The images of both cameras, exposed together.
     Pair(Box<[ExposedImage<PendingImage>; 2]>, Box<PairPose>),
+    /// The images of both cameras of a rig that stood so long ago when its board last told where, because the link ended.
+    Unseen(Box<[ExposedImage<PendingImage>; 2]>, Box<PairPose>, Duration),
     /// The images of both cameras of a rig that stands, some of whose axes are told by no encoder.
     Untold(Box<[ExposedImage<PendingImage>; 2]>, UntoldAxes),
     /// One camera, because the other is gone: its bearings need no pose.
@@ -38,6 +40,8 @@ pub struct Measurement {
     pub observation: Observation,
     /// The middle of the exposure.
     pub middle: BoardInstant,
+    /// How long before it the last encoder readings came, where the link to the board ended.
+    pub unseen: Option<Duration>,
     /// How long decoding the images took: rendering, where they are simulated.
     pub decode_seconds: f64,
     /// How long matching and triangulation took.
@@ -48,7 +52,13 @@ impl Measurement {
     /// A measurement by its times: when decoding began, when matching began, and the end.
     fn new(observation: Observation, middle: BoardInstant, [begun, decoded, done]: [Duration; 3]) -> Self {
         let seconds = |from: Duration, to: Duration| to.saturating_sub(from).as_secs_f64();
-        Self { observation, middle, decode_seconds: seconds(begun, decoded), seconds: seconds(decoded, done) }
+        Self {
+            observation,
+            middle,
+            unseen: None,
+            decode_seconds: seconds(begun, decoded),
+            seconds: seconds(decoded, done),
+        }
     }
 }
 
@@ -66,6 +76,7 @@ pub fn measure(
     clock: Clock,
 ) -> Result<Option<Measurement>, LiveError> {
     let begun = clock();
+    let mut unseen = None;
     let (images, pose) = match exposure {
         PosedExposure::One { side, image, why } => {
             let middle = image.middle;
@@ -75,6 +86,10 @@ pub fn measure(
             return Ok(Some(Measurement::new(observation, middle, [begun, decoded, clock()])));
         }
         PosedExposure::Pair(images, pose) => (images, Ok(pose)),
+        PosedExposure::Unseen(images, pose, since) => {
+            unseen = Some(since);
+            (images, Ok(pose))
+        }
         PosedExposure::Untold(images, untold) => (images, Err(untold)),
     };
     let (middle, [left, right]) = both(*images)?;
@@ -84,7 +99,8 @@ pub fn measure(
         Err(untold) => observe_untold(images, rig, &untold, method, memory),
     };
     let observed = observed.map_err(|error| LiveError::Unmeasurable(error.to_string()))?;
-    Ok(observed.map(|observation| Measurement::new(observation, middle, [begun, decoded, clock()])))
+    let measurement = |observation| Measurement::new(observation, middle, [begun, decoded, clock()]);
+    Ok(observed.map(|observation| Measurement { unseen, ..measurement(observation) }))
 }
 
 /// Both images, and the middle of the exposure of the left one.

@@ -1,8 +1,8 @@
-//! Where the cameras were at an exposure, by the encoder readings that have come so far.
+//! Where the cameras were at an exposure, by the encoder readings that have come so far, or by the last ones where the link to the board ended.
 
 use std::time::Duration;
 
-use vergence_board::{BoardKnowledge, LostAxis, Told};
+use vergence_board::{BoardKnowledge, LastReading, LostAxis, Told};
 use vergence_camera::PendingImage;
 use vergence_pipeline::limits::FLICKER_COUNTS;
 use vergence_pipeline::{Exposed, ExposedImage, Motion, PairPose, SkipReason, UntoldAxes, pair_exposure};
@@ -12,6 +12,10 @@ use crate::measure::PosedExposure;
 
 /// Longest wait for the encoder readings of an exposure.
 pub const READINGS: Duration = Duration::from_millis(300);
+/// Longest time for which the last readings are used after the link ended.
+pub const LONGEST_UNSEEN: Duration = Duration::from_secs(10);
+/// A board that was moving when the link ended has come to rest after this time: its lease has run out, and it has braked.
+pub const AT_REST: Duration = Duration::from_secs(3);
 /// Encoder readings this long before and after an exposure are kept with it, in microseconds.
 const MARGIN_US: f64 = 250_000.0;
 
@@ -48,9 +52,37 @@ pub fn pose(exposed: Exposed<PendingImage>, rig: &Rig, board: Option<&BoardKnowl
             Told::AllBut(lost) => untold(images, &track, &lost),
             Told::Nothing => Posed::Skipped(SkipReason::EncodersUnknown),
         },
-        Err(TrackGap::NotYet) => Posed::NotYet(Exposed::Pair(images)),
+        Err(TrackGap::NotYet) => match board.last_reading() {
+            Some(last) => unseen(images, rig, board, last),
+            None => Posed::NotYet(Exposed::Pair(images)),
+        },
         Err(_) => Posed::Skipped(SkipReason::EncodersUnknown),
     }
+}
+
+/// The exposure of a rig whose board says nothing any more: where the axes stood at the `last` reading, less and less surely. Axes that moved
+/// then came to rest somewhere, which the images must tell.
+fn unseen(images: Box<[ExposedImage<PendingImage>; 2]>, rig: &Rig, board: &BoardKnowledge, last: LastReading) -> Posed {
+    let LastReading { mut joints, at, moving } = last;
+    let middle = images[0].middle;
+    let unseen = Duration::from_secs_f64(((middle.us - at.0 as f64) * 1e-6).max(0.0));
+    let lost = match board.told_at(middle.us) {
+        Told::All => Vec::new(),
+        Told::AllBut(lost) => lost.iter().map(|lost| lost.axis).collect(),
+        Told::Nothing => return Posed::Skipped(SkipReason::LinkEnded),
+    };
+    if unseen > LONGEST_UNSEEN || moving && unseen < AT_REST {
+        return Posed::Skipped(SkipReason::LinkEnded);
+    }
+    for (sigma, axis) in joints.sigma.iter_mut().zip(&rig.axes) {
+        *sigma = axis.sigma_unseen(unseen);
+    }
+    let untold = if moving { (0..rig.axes.len()).collect() } else { lost };
+    if untold.is_empty() {
+        let pose = Box::new(PairPose::standing(rig.pose(&joints)));
+        return Posed::Ready(PosedExposure::Unseen(images, pose, unseen));
+    }
+    Posed::Ready(PosedExposure::Untold(images, UntoldAxes { joints, axes: untold }))
 }
 
 /// The exposure of a rig that stands, with the last readings of the axes that no encoder tells.

@@ -1,16 +1,16 @@
 //! Where the stages go while the live loop measures.
 
 use std::future::pending;
-use std::pin::pin;
+use std::pin::{Pin, pin};
 use std::time::Duration;
 
-use vergence_board::{Board, BoardError};
+use vergence_board::{Board, BoardError, LinkError};
 use vergence_rig::Mode;
 
 use crate::orders::HOME;
 
 /// Modes that the rig visits in turn, while the live loop measures.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Default)]
 pub struct Tour {
     /// The modes; without any, nothing moves.
     pub modes: Vec<Mode>,
@@ -26,7 +26,7 @@ impl Tour {
     }
 
     /// Goes from mode to mode, and then stays disarmed in the last one for ever. It ends only with an error; `interruption`
-    /// is one. A fault that leaves an axis without its encoder is none: `warn` hears of it, and each time that `order` returns the fault
+    /// is one, and so is a link that ended, also after the last mode. A fault that leaves an axis without its encoder is none: `warn` hears of it, and each time that `order` returns the fault
     /// is cleared and the axes are homed, after which the tour goes on.
     pub async fn drive(
         &self,
@@ -35,8 +35,11 @@ impl Tour {
         mut order: impl AsyncFnMut(),
         mut warn: impl FnMut(String),
     ) -> BoardError {
-        let Some(board) = board.filter(|_| self.moves()) else { return pending().await };
+        let Some(board) = board else { return pending().await };
         let mut interruption = pin!(interruption);
+        if !self.moves() {
+            return stay(board, interruption, order).await;
+        }
         let (mut remaining, mut is_lost) = (&self.modes[..], false);
         loop {
             let driven = board.armed(interruption.as_mut(), async |board| -> Result<(), BoardError> {
@@ -52,7 +55,7 @@ impl Tour {
             });
             let outcome = driven.await;
             match outcome {
-                Ok(()) => return pending().await,
+                Ok(()) => return watch(board).await,
                 Err(BoardError::Fault(said)) if !board.client().knowledge().lost_axes().is_empty() => {
                     is_lost = true;
                     warn(format!(
@@ -69,6 +72,35 @@ impl Tour {
                     Err(error) => return error,
                 }
             }
+        }
+    }
+}
+
+/// Stays where the axes are. Where they have no reference, they are homed each time that `order` returns.
+async fn stay(
+    board: &mut Board,
+    mut interruption: Pin<&mut impl Future<Output = ()>>,
+    mut order: impl AsyncFnMut(),
+) -> BoardError {
+    loop {
+        let may_home = !board.is_referenced();
+        tokio::select! {
+            error = watch(board) => return error,
+            () = order(), if may_home => {}
+        }
+        let homed: Result<(), BoardError> = board.armed(interruption.as_mut(), async |board| board.home().await).await;
+        if let Err(error) = homed {
+            return error;
+        }
+    }
+}
+
+/// Waits for the end of the link. A board that is silent for a while is still there.
+async fn watch(board: &mut Board) -> BoardError {
+    loop {
+        match board.next_pose().await {
+            Ok(_) | Err(BoardError::Link(LinkError::Silent(_))) => {}
+            Err(error) => return error,
         }
     }
 }

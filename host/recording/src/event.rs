@@ -26,6 +26,10 @@ pub enum Event {
     Image(Eye, Stamp),
     /// A camera is gone, and why.
     Lost(Eye, String),
+    /// The link to the board ended.
+    LinkEnded,
+    /// The link to the board is there again.
+    LinkBack,
 }
 
 /// What a replay must know before the first event.

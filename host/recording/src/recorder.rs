@@ -79,6 +79,8 @@ impl Recorder {
             BoardNews::Pose(pose) => Event::Pose(pose.clone()),
             BoardNews::ProbeSent => Event::ProbeSent,
             BoardNews::Exchange(exchange) => (*exchange).into(),
+            BoardNews::LinkEnded => Event::LinkEnded,
+            BoardNews::LinkBack => Event::LinkBack,
         };
         self.put(Entry::Event(now, event));
     }

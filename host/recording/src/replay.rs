@@ -89,6 +89,14 @@ impl<'a> Replay<'a> {
             (Event::Pose(pose), _) => self.note(&BoardNews::Pose(pose)),
             (Event::ProbeSent, _) => self.note(&BoardNews::ProbeSent),
             (Event::Exchange(stamps), _) => self.note(&BoardNews::Exchange(exchange_of(stamps))),
+            (Event::LinkEnded, _) => {
+                self.note(&BoardNews::LinkEnded);
+                self.exposures.link_ended();
+            }
+            (Event::LinkBack, _) => {
+                self.note(&BoardNews::LinkBack);
+                self.exposures.link_back();
+            }
             (Event::Pulse(mark), _) => self.exposures.pulse(&mark, &base),
             (Event::Attached(eye, timing), _) => self.exposures.camera_ready(eye.side(), timing.into(), &base),
             (Event::Lost(eye, why), _) => self.exposures.camera_failed(eye.side(), why, &base),

@@ -1,9 +1,15 @@
 //! One axis of the rig on the host's side: its name, range and encoder scale.
 
+use std::time::Duration;
+
 use vergence_protocol::{AxisInfo, AxisKind, Counts, Micro};
 use vergence_vision::{Angle, Length};
 
 use crate::pitch::PitchTable;
+use crate::track::UNIFORM;
+
+/// Standard deviation of what may push an axis that nobody watches, as a part of its range per second.
+pub const CREEP: f64 = 1e-3;
 
 /// A position of an axis: a length or an angle, by the kind of the axis.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -175,6 +181,14 @@ impl RigAxis {
     #[must_use]
     pub fn sigma_with_play(&self, reading: f64) -> f64 {
         reading.hypot(0.5 * self.play / self.value_per_count())
+    }
+
+    /// Standard deviation in counts of an axis that stood when it was read, `unseen` ago: nobody tells what has pushed it since. It grows by
+    /// [`CREEP`], which is an assumption.
+    #[must_use]
+    pub fn sigma_unseen(&self, unseen: Duration) -> f64 {
+        let [low, high] = self.range.map(AxisPosition::value);
+        UNIFORM.hypot(CREEP * unseen.as_secs_f64() * (high - low) / self.value_per_count())
     }
 
     /// Standard deviation in counts of an axis that may stand anywhere in its range.

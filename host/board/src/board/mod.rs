@@ -22,7 +22,7 @@ pub use self::ways::{Way, straight_ways};
 pub use self::words::{check_range, describe_fault, describe_pose, event_in_words, positions, staying};
 
 use crate::error::BoardError;
-use crate::link::{Client, HostClock, OpenWire};
+use crate::link::{Client, Continuity, OpenWire};
 use crate::serve::{Served, Shared, spawn_in_process};
 
 /// Longest wait for the end of a motion. Homing and moves of a bench take seconds.
@@ -72,7 +72,7 @@ impl Board {
         lease_ms: u16,
     ) -> Result<Self, BoardError> {
         let wire = OpenWire::in_process(spawn_in_process(simulated));
-        Self::new(Client::connect(wire, session, HostClock::start()).await?, drawn, lease_ms).await
+        Self::new(Client::connect(wire, session, Continuity::begin(None)).await?, drawn, lease_ms).await
     }
 
     /// Takes over a client of a board that may not fit the rig: the board can be asked and set, and must not be moved.

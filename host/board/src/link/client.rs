@@ -36,19 +36,36 @@ pub struct Client {
     compatibility: Compatibility,
 }
 
+/// What outlives a link, so that the link after it goes on: the host's clock, and what the board told.
+#[derive(Clone, Debug)]
+pub struct Continuity {
+    /// The host's clock.
+    pub clock: HostClock,
+    /// What the board told.
+    pub knowledge: BoardKnowledge,
+}
+
+impl Continuity {
+    /// Of a first link, by a wire of `baud` bits per second; `None` where bytes take no time.
+    #[must_use]
+    pub fn begin(baud: Option<u32>) -> Self {
+        Self { clock: HostClock::start(), knowledge: BoardKnowledge::new(baud) }
+    }
+}
+
 impl Client {
-    /// Opens session `session` over `wire`. Must be called inside a tokio runtime: it starts a task that owns the wire.
+    /// Opens session `session` over `wire`; `continuity` is that of the link before it, where there was one. Must be called inside a tokio runtime: it starts a task that owns the wire.
     ///
     /// # Errors
     /// [`LinkError`] where the board does not answer within two seconds.
-    pub async fn connect(wire: OpenWire, session: SessionId, clock: HostClock) -> Result<Self, LinkError> {
+    pub async fn connect(wire: OpenWire, session: SessionId, continuity: Continuity) -> Result<Self, LinkError> {
+        let Continuity { clock, knowledge } = continuity;
         let (commands, inbox) = mpsc::channel(16);
         let (pose_sender, poses) = watch::channel(None);
         let (mark_sender, marks) = mpsc::channel(MARKS_KEPT);
         let (log_sender, logs) = mpsc::channel(LOGS_KEPT);
         let (end_sender, end) = watch::channel(None);
         let (opened_sender, opened) = oneshot::channel();
-        let knowledge = BoardKnowledge::new(wire.baud);
         // Without a socket nobody can follow; the board can still be driven.
         let followers = wire.lock.as_ref().and_then(|lock| Broadcaster::start(lock).ok());
         let outlets = Outlets { poses: pose_sender, marks: mark_sender, logs: log_sender, followers };
@@ -63,12 +80,17 @@ impl Client {
         Ok(Self { commands, poses, marks, logs, end, knowledge, attention, clock, session, compatibility })
     }
 
-    /// Opens session `session` over `wire`, which leads to `port`.
+    /// As [`Self::connect`], over a wire that leads to `port`.
     ///
     /// # Errors
     /// [`OpenError::Unanswered`] where the board does not answer within two seconds.
-    pub async fn at(port: &Port, wire: OpenWire, session: SessionId, clock: HostClock) -> Result<Self, OpenError> {
-        let opened = Self::connect(wire, session, clock).await;
+    pub async fn at(
+        port: &Port,
+        wire: OpenWire,
+        session: SessionId,
+        continuity: Continuity,
+    ) -> Result<Self, OpenError> {
+        let opened = Self::connect(wire, session, continuity).await;
         opened.map_err(|error| OpenError::Unanswered { port: port.clone(), why: error.behind(port).to_string() })
     }
 
@@ -88,6 +110,12 @@ impl Client {
     #[must_use]
     pub fn clock(&self) -> HostClock {
         self.clock
+    }
+
+    /// What the next link to this board goes on with.
+    #[must_use]
+    pub fn continuity(&self) -> Continuity {
+        Continuity { clock: self.clock, knowledge: self.knowledge.clone() }
     }
 
     /// Sends a request and waits for the board's reply, for at most two seconds.

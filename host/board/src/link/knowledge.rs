@@ -3,10 +3,10 @@
 use std::fmt;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
-use vergence_protocol::{HostStatistics, PoseReport};
-use vergence_rig::{ClockMap, Exchange, JointSample, JointTrack};
+use vergence_protocol::{HostStatistics, Microseconds, PoseReport};
+use vergence_rig::{ClockMap, Exchange, JointSample, JointTrack, JointsAt};
 
-use super::lost_encoders::{LostAxis, LostEncoders, Told};
+use super::lost_encoders::{LostAxis, LostEncoders, Told, is_moving};
 
 /// Poses that are kept: half a minute at the board's usual rate.
 const TRACK_LENGTH: usize = 16_000;
@@ -30,6 +30,21 @@ pub enum BoardNews {
     ProbeSent,
     /// It told its time.
     Exchange(Exchange),
+    /// The link ended: it says nothing more.
+    LinkEnded,
+    /// A link is there again: to the same board, which may have restarted meanwhile.
+    LinkBack,
+}
+
+/// The last reading before the link ended.
+#[derive(Clone, Debug, PartialEq)]
+pub struct LastReading {
+    /// The readings of all axes.
+    pub joints: JointsAt,
+    /// The instant of the reading, on the board's clock.
+    pub at: Microseconds,
+    /// Whether the board was moving the axes.
+    pub moving: bool,
 }
 
 #[derive(Debug)]
@@ -37,19 +52,29 @@ struct Measured {
     clock_map: ClockMap,
     track: JointTrack,
     encoders: LostEncoders,
+    last: Option<LastReading>,
+    has_ended: bool,
     statistics: HostStatistics,
+}
+
+impl Measured {
+    fn new(baud: Option<u32>, encoders: LostEncoders) -> Self {
+        Self {
+            clock_map: baud.map_or_else(ClockMap::default, ClockMap::at_baud),
+            track: JointTrack::new(TRACK_LENGTH),
+            encoders,
+            last: None,
+            has_ended: false,
+            statistics: HostStatistics::default(),
+        }
+    }
 }
 
 impl BoardKnowledge {
     /// Empty, for a wire of `baud` bits per second; `None` where bytes take no time.
     #[must_use]
     pub fn new(baud: Option<u32>) -> Self {
-        let measured = Measured {
-            clock_map: baud.map_or_else(ClockMap::default, ClockMap::at_baud),
-            track: JointTrack::new(TRACK_LENGTH),
-            encoders: LostEncoders::default(),
-            statistics: HostStatistics::default(),
-        };
+        let measured = Measured::new(baud, LostEncoders::default());
         Self { measured: Arc::new(Mutex::new(measured)), listener: Arc::default(), baud }
     }
 
@@ -77,6 +102,19 @@ impl BoardKnowledge {
         self.lock().encoders.lost().to_vec()
     }
 
+    /// Whether the link ended, and none has come back.
+    #[must_use]
+    pub fn has_ended(&self) -> bool {
+        self.lock().has_ended
+    }
+
+    /// The last reading of a link that ended; `None` of one that is there, or told nothing.
+    #[must_use]
+    pub fn last_reading(&self) -> Option<LastReading> {
+        let measured = self.lock();
+        measured.last.clone().filter(|_| measured.has_ended)
+    }
+
     /// Counts of frames, retransmissions and poses since the link was opened.
     #[must_use]
     pub fn statistics(&self) -> HostStatistics {
@@ -97,9 +135,14 @@ impl BoardKnowledge {
             BoardNews::Pose(pose) => {
                 measured.track.push(JointSample { at: pose.at, counts: pose.counts.clone() });
                 measured.encoders.note(pose);
+                let (joints, moving) = (JointsAt::latched(&pose.counts), is_moving(pose.state));
+                measured.last = Some(LastReading { joints, at: pose.at, moving });
             }
             BoardNews::ProbeSent => measured.clock_map.probe_sent(),
             BoardNews::Exchange(exchange) => measured.clock_map.observe(*exchange),
+            BoardNews::LinkEnded => measured.has_ended = true,
+            // The board's clock may have begun anew.
+            BoardNews::LinkBack => *measured = Measured::new(self.baud, LostEncoders::after_restart()),
         }
     }
 

@@ -38,9 +38,16 @@ pub(super) struct LostEncoders {
     referenced: AxisMask,
     /// Nothing is told of instants up to this, in microseconds of the board's clock.
     untold_until: u64,
+    /// Nothing is told before every axis has its reference.
+    awaits_reference: bool,
 }
 
 impl LostEncoders {
+    /// Of a board that may have restarted: readings without a reference tell nothing.
+    pub fn after_restart() -> Self {
+        Self { awaits_reference: true, ..Self::default() }
+    }
+
     /// Takes the next pose that the board reports.
     pub fn note(&mut self, pose: &PoseReport) {
         let before = self.lost.len();
@@ -53,8 +60,9 @@ impl LostEncoders {
         if pose.fault.is_none() {
             self.lost.retain(|lost| !pose.referenced.contains(lost.axis));
         }
-        let moves = matches!(pose.state, ControllerState::Homing | ControllerState::Moving | ControllerState::Stopping);
-        if self.lost.len() != before || moves && !self.lost.is_empty() {
+        self.awaits_reference &= (0..pose.counts.len()).any(|axis| !pose.referenced.contains(axis));
+        let moves_untold = is_moving(pose.state) && !self.lost.is_empty();
+        if self.lost.len() != before || moves_untold || self.awaits_reference {
             self.untold_until = pose.at.0;
         }
         self.counts.clone_from(&pose.counts);
@@ -72,7 +80,7 @@ impl LostEncoders {
     /// What the encoders tell of an instant in microseconds of the board's clock.
     pub fn told_at(&self, us: f64) -> Told {
         match &self.lost[..] {
-            _ if us <= self.untold_until as f64 => Told::Nothing,
+            _ if self.awaits_reference || us <= self.untold_until as f64 => Told::Nothing,
             [] => Told::All,
             lost => Told::AllBut(lost.to_vec()),
         }
@@ -82,6 +90,11 @@ impl LostEncoders {
     pub fn lost(&self) -> &[LostAxis] {
         &self.lost
     }
+}
+
+/// Whether the board moves axes in this state.
+pub(super) const fn is_moving(state: ControllerState) -> bool {
+    matches!(state, ControllerState::Homing | ControllerState::Moving | ControllerState::Stopping)
 }
 
 /// Whether after this fault the encoder of its axis may tell less than before. `keeps_reference`: a joint keeps it, because its servo
@@ -148,6 +161,16 @@ mod tests {
         assert_eq!(encoders.told_at(3500.0), Told::Nothing);
         encoders.note(&pose(5, [0, 0], 3, ControllerState::Ready));
         assert_eq!((encoders.told_at(5000.0), encoders.told_at(5001.0)), (Told::Nothing, Told::All));
+    }
+
+    #[test]
+    fn a_board_that_may_have_restarted_tells_nothing_before_it_has_its_references() {
+        let mut encoders = LostEncoders::after_restart();
+        assert_eq!(encoders.told_at(0.0), Told::Nothing);
+        encoders.note(&pose(1, [5, 7], 1, ControllerState::Idle));
+        assert_eq!(encoders.told_at(2000.0), Told::Nothing);
+        encoders.note(&pose(2, [100, 200], 3, ControllerState::Ready));
+        assert_eq!((encoders.told_at(1000.0), encoders.told_at(1500.0)), (Told::Nothing, Told::All));
     }
 
     #[test]

@@ -16,11 +16,11 @@ mod session_id;
 mod stop_beside;
 mod task;
 
-pub use client::Client;
+pub use client::{Client, Continuity};
 pub use clock::HostClock;
 pub use error::{LinkError, OpenError};
 pub use follow::{Followed, Follower};
-pub use knowledge::{BoardKnowledge, BoardNews};
+pub use knowledge::{BoardKnowledge, BoardNews, LastReading};
 pub use lost_encoders::{LostAxis, Told};
 pub use management::ManagementLink;
 pub use open::{OpenWire, Port, Wire, open};

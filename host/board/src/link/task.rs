@@ -102,18 +102,18 @@ impl LinkTask {
         let mut input = [0; 1024];
         loop {
             if let Err(error) = self.flush(&mut wire).await {
-                return self.finish(LinkError::Closed(error.to_string()));
+                return self.lose(LinkError::Closed(error.to_string()));
             }
             let wake = self.next_wake(hello_deadline);
             tokio::select! {
                 read = wire.stream.read(&mut input) => {
                     let bytes = match read {
-                        Ok(0) => return self.finish(LinkError::Closed("end of stream".into())),
+                        Ok(0) => return self.lose(LinkError::Closed("end of stream".into())),
                         Ok(length) => input.get(..length).unwrap_or_default(),
-                        Err(error) => return self.finish(LinkError::Closed(error.to_string())),
+                        Err(error) => return self.lose(LinkError::Closed(error.to_string())),
                     };
                     if let Err(error) = self.receive(bytes) {
-                        return self.finish(error);
+                        return self.lose(error);
                     }
                 }
                 command = self.inbox.recv() => match command {
@@ -128,9 +128,17 @@ impl LinkTask {
             if self.opened.is_some() && self.clock.now() >= hello_deadline {
                 let error =
                     if self.received > 0 { LinkError::Noise(self.received) } else { LinkError::Silent(HELLO_TIMEOUT) };
-                return self.finish(error);
+                return self.lose(error);
             }
         }
+    }
+
+    /// The link ended, and not because this program closed it.
+    fn lose(self, error: LinkError) -> LinkError {
+        if self.opened.is_none() {
+            self.knowledge.note(&BoardNews::LinkEnded);
+        }
+        self.finish(error)
     }
 
     /// Ends every waiting request with the reason for which the link ended.
@@ -233,6 +241,9 @@ impl LinkTask {
             match event {
                 HostEvent::Opened { compatibility, .. } => {
                     if let Some(opened) = self.opened.take() {
+                        if self.knowledge.has_ended() {
+                            self.knowledge.note(&BoardNews::LinkBack);
+                        }
                         let _ = opened.send(Ok(compatibility));
                     }
                 }

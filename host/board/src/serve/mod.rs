@@ -4,7 +4,7 @@
 mod pace;
 mod served;
 
-use std::future::poll_fn;
+use std::future::{pending, poll_fn};
 use std::io;
 use std::path::PathBuf;
 use std::pin::Pin;
@@ -137,10 +137,24 @@ pub async fn serve<B: Served>(board: Shared<B>, listener: Listener) -> Result<()
 /// Starts the board inside this process and returns the host's end of its wire.
 #[must_use]
 pub fn spawn_in_process<B: Served + Send + 'static>(board: Shared<B>) -> DuplexStream {
+    spawn_until(board, pending())
+}
+
+/// As [`spawn_in_process`], on a wire that is pulled out when `pulled` completes. Then nobody runs the board but who else shares it.
+#[must_use]
+pub fn spawn_until<B: Served + Send + 'static>(
+    board: Shared<B>,
+    pulled: impl Future<Output = ()> + Send + 'static,
+) -> DuplexStream {
     let (host_end, mut board_end) = tokio::io::duplex(1 << 16);
     tokio::spawn(async move {
-        // Ends when the host drops its end of the pipe.
-        let _ = run_board(&board, &mut board_end, |_| None).await;
+        // What the board said while no host was there to read it.
+        board.lock().take_output();
+        tokio::select! {
+            // Ends when the host drops its end of the pipe.
+            _ = run_board(&board, &mut board_end, |_| None) => {}
+            () = pulled => {}
+        }
     });
     host_end
 }

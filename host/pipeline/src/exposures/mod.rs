@@ -45,6 +45,8 @@ impl TimeBase {
 /// Pairs the images of both cameras: by the pulses that fired them, or by their time stamps.
 pub struct Exposures<T> {
     cameras: [CameraQueue<T>; 2],
+    /// Time between pulses of the trigger in microseconds; `None` where the cameras run freely.
+    period_us: Option<f64>,
     pairing: Pairing<T>,
     results: Results<T>,
 }
@@ -98,7 +100,7 @@ impl<T> Exposures<T> {
         };
         let results =
             Results { ready: VecDeque::new(), skipped: BTreeMap::new(), ambiguity: None, ambiguity_taken: false };
-        Self { cameras: [CameraQueue::empty(), CameraQueue::empty()], pairing, results }
+        Self { cameras: [CameraQueue::empty(), CameraQueue::empty()], period_us, pairing, results }
     }
 
     /// Why each camera (left, right) delivers nothing; `None` for one that delivers.
@@ -180,6 +182,35 @@ impl<T> Exposures<T> {
             triggered.pulse(mark, at);
         }
         self.decide(base);
+    }
+
+    /// The link to the board ended, so that no pulses are reported: images are paired by their time stamps, like those of cameras that run
+    /// freely.
+    pub fn link_ended(&mut self) {
+        if matches!(self.pairing, Pairing::Triggered(_)) {
+            self.give_up_waiting();
+            let mut free = FreeRunning::default();
+            free.set_periods(self.cameras.each_ref().map(|camera| camera.timing.map(|timing| timing.period)));
+            self.pairing = Pairing::FreeRunning(free);
+        }
+    }
+
+    /// The link to the board is back, and reports pulses again.
+    pub fn link_back(&mut self) {
+        let Some(period_us) = self.period_us else { return };
+        self.give_up_waiting();
+        let mut triggered = Triggered::new(period_us);
+        for (side, camera) in [Side::Left, Side::Right].into_iter().zip(&self.cameras) {
+            camera.timing.into_iter().for_each(|timing| triggered.camera_ready(side, timing));
+        }
+        self.pairing = Pairing::Triggered(triggered);
+    }
+
+    /// Counts the images that wait for a pulse or a partner, which they will not get.
+    fn give_up_waiting(&mut self) {
+        for _ in self.cameras.iter_mut().flat_map(|camera| std::mem::take(&mut camera.images)) {
+            self.results.skip(SkipReason::ImageWithoutPulse);
+        }
     }
 
     /// Gives up what should have arrived half a second before `now`, on the host's clock.

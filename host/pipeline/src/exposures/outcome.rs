@@ -71,6 +71,8 @@ pub enum SkipReason {
     NewerCame,
     /// The encoder readings for the exposure did not arrive in time.
     EncodersSilent,
+    /// The link to the board ended too long ago, or while the axes moved: nobody knows where they are.
+    LinkEnded,
     /// The encoder readings do not cover the exposure, or an axis moved that no encoder tells.
     EncodersUnknown,
     /// No encoder tells an axis, and the images do not tell it either.
@@ -99,6 +101,7 @@ impl SkipReason {
             Self::OutOfStep => "out_of_step",
             Self::NewerCame => "newer_came",
             Self::EncodersSilent => "encoders_silent",
+            Self::LinkEnded => "link_ended",
             Self::EncodersUnknown => "encoders_unknown",
             Self::AxesUntold => "axes_untold",
         }

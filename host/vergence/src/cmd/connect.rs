@@ -1,7 +1,7 @@
 //! From the command line's options to a connected board.
 
 use indicatif::ProgressBar;
-use vergence_board::{Board, Client, HostClock, OpenWire, Port, fresh_session, open};
+use vergence_board::{Board, Client, Continuity, OpenWire, Port, fresh_session, open};
 use vergence_rig::Rig;
 
 use crate::cli::CommonOptions;
@@ -35,9 +35,18 @@ fn noted(board: Board, console: Console) -> Board {
 /// # Errors
 /// As of [`connect`].
 pub async fn connect_with(common: &CommonOptions, progress: ProgressBar) -> Result<Board, Failure> {
-    let (client, rig) = client(common).await?;
+    let (client, rig) = client(common, None).await?;
     let board = Board::new(client, rig, common.lease).await?;
     Ok(board.observed(shown_on(progress)))
+}
+
+/// Connects to a board again, after a link of this continuity.
+///
+/// # Errors
+/// As of [`connect`].
+pub async fn connect_again(common: &CommonOptions, continuity: Continuity) -> Result<Board, Failure> {
+    let (client, rig) = client(common, Some(continuity)).await?;
+    Ok(Board::new(client, rig, common.lease).await?)
 }
 
 /// Connects to a board that may not fit the rig file.
@@ -45,7 +54,7 @@ pub async fn connect_with(common: &CommonOptions, progress: ProgressBar) -> Resu
 /// # Errors
 /// No board, a board of another protocol, a bad rig file.
 pub async fn connect_any(common: &CommonOptions, console: Console, what: &str) -> Result<Board, Failure> {
-    let (client, rig) = client(common).await?;
+    let (client, rig) = client(common, None).await?;
     let board = Board::open(client, rig, common.lease).await?;
     Ok(noted(board.observed(shown_on(console.progress(what))), console))
 }
@@ -55,15 +64,16 @@ pub async fn connect_any(common: &CommonOptions, console: Console, what: &str) -
 /// # Errors
 /// No board, a board of another protocol, a bad rig file.
 pub async fn connect_quietly(common: &CommonOptions, console: Console) -> Result<Board, Failure> {
-    let (client, rig) = client(common).await?;
+    let (client, rig) = client(common, None).await?;
     Ok(noted(Board::open(client, rig, common.lease).await?, console))
 }
 
-async fn client(common: &CommonOptions) -> Result<(Client, Rig), Failure> {
+async fn client(common: &CommonOptions, continuity: Option<Continuity>) -> Result<(Client, Rig), Failure> {
     let rig = rig_file::load(common.rig.as_deref())?;
     let port = port(common)?;
     let wire = wire(&port, common.baud, &rig).await?;
-    Ok((Client::at(&port, wire, fresh_session()?, HostClock::start()).await?, rig))
+    let continuity = continuity.unwrap_or_else(|| Continuity::begin(wire.baud));
+    Ok((Client::at(&port, wire, fresh_session()?, continuity).await?, rig))
 }
 
 /// The port that the options name, or the only one there is.

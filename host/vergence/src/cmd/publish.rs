@@ -54,8 +54,14 @@ impl Publisher {
                 }
                 let by_axes = axes_by_images_words(&self.rig, by_images).map(|told| format!("pose by images: {told}"));
                 let told = by_axes.or_else(|| pose_told_words(cloud)).map(|told| format!("; {told}"));
+                let unseen = result.measurement.unseen.map(|time| time.as_secs_f64());
+                let unseen_words = unseen.map(|time| format!("; no link, last readings {time:.1} s before"));
                 let points = live_cloud_words(&self.rig, cloud, pose, *moving);
-                self.console.say(self.points_line(result, &points, pace) + &told.unwrap_or_default())?;
+                self.console.say(
+                    self.points_line(result, &points, pace)
+                        + &told.unwrap_or_default()
+                        + &unseen_words.unwrap_or_default(),
+                )?;
                 // Where no encoder tells an axis, nothing is left for the images to disagree with.
                 let warning = drift_warning(cloud, self.pose_source()).filter(|_| by_images.is_empty());
                 if let Some(warning) = &warning {
@@ -70,6 +76,7 @@ impl Publisher {
                     line["rate_hz"] = json!(pace.map(|(rate, _)| rounded(rate)));
                     line["limited_by"] = json!(pace.map(|(_, limit)| limit.as_str()));
                     line["axes_by_images"] = axes_by_images_json(&self.rig, by_images);
+                    line["link_lost_s"] = json!(unseen.map(rounded));
                     line["warning"] = json!(warning);
                     line
                 })

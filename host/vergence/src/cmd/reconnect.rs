@@ -22,9 +22,14 @@ pub struct Persistence {
 }
 
 impl Persistence {
+    /// Whether to try again when the link ends.
+    pub const fn persists(self) -> bool {
+        !self.no_reconnect
+    }
+
     /// Whether to try again after `failure`.
     pub fn survives(self, failure: &Failure) -> bool {
-        !self.no_reconnect && failure.kind() == FailureKind::Link
+        self.persists() && failure.kind() == FailureKind::Link
     }
 }
 
@@ -69,7 +74,7 @@ impl Listening {
         let listening = vergence_board::Listening {
             port: &port(common)?,
             rig: &rig,
-            persists: !self.persistence.no_reconnect,
+            persists: self.persistence.persists(),
             is_end_of_link: |failure: &Failure| failure.kind() == FailureKind::Link,
         };
         let connect = async |lost| match lost {

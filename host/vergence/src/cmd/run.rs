@@ -1,6 +1,7 @@
 //! `vergence run` measures live, while the stages stand still or move; `vergence record` keeps the same without measuring.
 
 pub mod record;
+mod relink;
 mod tour;
 
 use std::path::{Path, PathBuf};
@@ -11,13 +12,15 @@ use vergence_live::{Ended, Limits, LiveLoop, MatchingTime, Pace, Totals, Tour};
 use vergence_protocol::{Request, Trigger};
 use vergence_recording::{Recordable, Recorded, Recording};
 
+use self::relink::Relink;
 use super::live_options::LiveOptions;
 use super::taking_options::LiveRig;
 use crate::cli::CommonOptions;
 use crate::cmd::publish::Publisher;
+use crate::cmd::reconnect::Persistence;
 use crate::cmd::result_options::ResultOptions;
 use crate::console::Console;
-use crate::failure::Failure;
+use crate::failure::{Failure, FailureKind};
 use crate::interrupt::interrupted;
 use crate::stopwatch::started_us;
 
@@ -27,7 +30,8 @@ use crate::stopwatch::started_us;
 ///
 /// The board fires the cameras (--rate). Every row is measured with the pose at its own exposure, so the stages may move: with
 /// --mode they do. When a camera dies, the corners of the other are written as bearings, without range, until it is back. When an
-/// encoder is lost, the board stops and the images tell that axis, until a line `home` on standard input clears the fault and homes.
+/// encoder is lost, the board stops and the images tell that axis, until a line `home` on standard input clears the fault and homes. When
+/// the link to the board ends, the last pose is used for ten seconds, less and less surely, and the board is reached again; nothing moves then.
 /// Ctrl-C brakes, disarms and ends.
 #[derive(Debug, clap::Args)]
 pub struct Args {
@@ -49,6 +53,8 @@ pub struct Args {
     tour: tour::Options,
     #[command(flatten)]
     live: LiveOptions,
+    #[command(flatten)]
+    persistence: Persistence,
     /// On a simulated rig: how long matching takes on its clock. Without it, as long as it really takes.
     #[arg(long, value_name = "TIME", value_parser = humantime::parse_duration)]
     match_time: Option<Duration>,
@@ -73,7 +79,9 @@ pub async fn run(args: &Args, common: &CommonOptions, console: Console) -> Resul
         (true, Some(time)) => MatchingTime::Fixed(time),
     };
     let events = args.live.taking.start_cameras(&args.cameras, &rig)?;
+    let (relink, marks) = if args.persistence.persists() { Relink::of(&mut rig, common) } else { None }.unzip();
     let mut live = method.live_loop(&mut rig, events, matching_time);
+    live.marks = marks.flatten().or(live.marks);
     if let Some(recording) = &recording {
         live = recording.of(live);
     }
@@ -91,7 +99,8 @@ pub async fn run(args: &Args, common: &CommonOptions, console: Console) -> Resul
     if let (Some(board), Some(trigger)) = (&board, trigger) {
         board.ask(Request::SetTrigger(trigger)).await?;
     }
-    let ended = both(args, &mut live, &tour, &mut board, &mut publisher, &mut totals).await;
+    let driven = drive(&tour, &mut board, relink.as_ref(), console);
+    let ended = both(args, &mut live, driven, &mut publisher, &mut totals).await;
     // A simulated board ends with this process, and its time stands still as long as the matcher works.
     let settled = match (&ended, is_simulated) {
         (Ok(None), true) => Ok(()),
@@ -152,8 +161,7 @@ fn tell_recorded(recorded: Recorded, folder: &Path, console: Console) -> Result<
 async fn both(
     args: &Args,
     live: &mut LiveLoop,
-    tour: &Tour,
-    board: &mut Option<Board>,
+    driven: impl Future<Output = Failure>,
     publisher: &mut Publisher,
     totals: &mut Totals,
 ) -> Result<Option<Ended>, Failure> {
@@ -163,8 +171,25 @@ async fn both(
     let measuring = live.run(limits, totals, |result| publisher.publish(&result), warn);
     tokio::select! {
         ended = measuring => ended.map(Some),
-        error = tour.drive(board.as_mut(), interrupted(), tour::order(), warn) => Err(error.into()),
+        failure = driven => Err(failure),
         () = interrupted() => Ok(None),
+    }
+}
+
+/// Sends the stages where `tour` goes, until something fails. After a link that ended, the board is reached again, and nothing moves any more.
+async fn drive(tour: &Tour, board: &mut Option<Board>, relink: Option<&Relink>, console: Console) -> Failure {
+    let (mut tour, still) = (tour, Tour::default());
+    let warn = |warning: String| console.warn(warning);
+    loop {
+        let failure = Failure::from(tour.drive(board.as_mut(), interrupted(), tour::order(), warn).await);
+        let Some(relink) = relink.filter(|_| failure.kind() == FailureKind::Link) else { return failure };
+        // Its port is free only without it.
+        *board = None;
+        match relink.reach(failure, console).await {
+            Ok(reached) => *board = Some(reached),
+            Err(failure) => return failure,
+        }
+        tour = &still;
     }
 }
 

@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use tokio::sync::mpsc::{Receiver, Sender, channel};
-use vergence_board::{Board, HostClock, Port, fresh_session};
+use vergence_board::{Board, Continuity, HostClock, Port};
 use vergence_camera::CameraEvent;
 use vergence_live::{attach_both, simulate_both};
 use vergence_protocol::{Trigger, TriggerMark};
@@ -15,10 +15,10 @@ use vergence_vision::{KannalaBrandt, Side};
 use super::camera_options::CameraOptions;
 use super::connect::{connect, port};
 use crate::cli::CommonOptions;
-use crate::console::Console;
+use crate::console::{Console, shown_on};
 use crate::failure::Failure;
 use crate::rig_file;
-use crate::sim::{SharedRig, SimulatedRig, board_of, lensed};
+use crate::sim::{Plug, SharedRig, SimulatedRig, lensed};
 
 /// Number of camera events that may wait; images beyond it are lost, which the gap in their numbers shows.
 const EVENTS_KEPT: usize = 16;
@@ -41,7 +41,7 @@ pub struct TakingOptions {
     /// rig with traced lenses is calibrated first, from simulated targets, and measured by the file that this gives, `rig.toml` in --out.
     #[arg(long, default_value_t)]
     pub lens: LensChoice,
-    /// With simulated cameras: unplugs one, or the encoder of an axis, for a while, such as left@2s..4s after the start.
+    /// With simulated cameras: unplugs one, the encoder of an axis, or the link to the board for a while, such as left@2s..4s after the start.
     #[arg(long, value_name = "WHEN")]
     pub unplug: Vec<vergence_sim::Unplug>,
 }
@@ -52,6 +52,8 @@ pub struct LiveRig {
     pub known: Rig,
     /// The board; `None` of a rig without axes.
     pub board: Option<Board>,
+    /// The cable to a simulated board.
+    pub plug: Option<Plug>,
     /// The mechanics and the lenses, left and right, where they are simulated.
     pub simulated: Option<(SharedRig, [TrueLens; 2])>,
     /// What the camera trigger shall do; `None` where the cameras run freely.
@@ -102,8 +104,9 @@ impl TakingOptions {
         let clock = board.as_ref().map_or_else(HostClock::start, |board| board.client().clock());
         let period_us = (board.is_some() && !self.free).then_some(1e6 / self.rate);
         let trigger = period_us.map(|period| Trigger::Every { period_us: period.round() as u32 });
+        let (mechanics, plug) = mechanics.unzip();
         let simulated = mechanics.zip(lenses);
-        Ok((LiveRig { known, board, simulated, trigger, clock, period_us }, prepared))
+        Ok((LiveRig { known, board, plug, simulated, trigger, clock, period_us }, prepared))
     }
 
     /// Starts both cameras, and unplugs simulated ones as the options say. Their events arrive at the result.
@@ -147,6 +150,8 @@ impl TakingOptions {
                     let no = || Failure::usage(format!("rig '{}' has no stage '{name}' to unplug", known.name));
                     mechanics.lock().unplug_encoder(axis.ok_or_else(no)?, *times);
                 }
+                // The cable knows it already.
+                Unplug::Link(_) => {}
             }
         }
         let [left_shutter, right_shutter] = known.shutters;
@@ -162,7 +167,7 @@ impl TakingOptions {
         common: &CommonOptions,
         [drawn, rig]: [&Rig; 2],
         console: Console,
-    ) -> Result<(Option<Board>, Option<SharedRig>), Failure> {
+    ) -> Result<(Option<Board>, Option<(SharedRig, Plug)>), Failure> {
         if rig.axes.is_empty() {
             return match is_simulated {
                 true => Err(Failure::usage(format!("rig '{}' has no axes to simulate", rig.name))),
@@ -172,9 +177,13 @@ impl TakingOptions {
         match (port(common)?, is_simulated) {
             (Port::Simulated, true) => {
                 let simulated = SharedRig::new(SimulatedRig::new(drawn, self.seed)?);
-                let (session, progress) = (fresh_session()?, console.progress("live"));
-                let board = board_of(&simulated, rig.clone(), session, common.lease, progress).await?;
-                Ok((Some(board), Some(simulated)))
+                let unplugged = self.unplug.iter().filter_map(|unplug| match unplug {
+                    Unplug::Link(times) => Some(*times),
+                    _ => None,
+                });
+                let plug = Plug::new(simulated.clone(), unplugged.collect());
+                let board = plug.connect(rig.clone(), common.lease, Continuity::begin(None)).await?;
+                Ok((Some(board.observed(shown_on(console.progress("live")))), Some((simulated, plug))))
             }
             (_, false) if common.port.as_deref() != Some("sim") => {
                 Ok((Some(connect(common, console, "live").await?), None))

@@ -1,6 +1,7 @@
 //! Simulated boards for the command: read from files, served, and driven in this process.
 
 mod files;
+mod plug;
 mod robot;
 
 use std::path::Path;
@@ -18,6 +19,7 @@ use crate::failure::Failure;
 use crate::interrupt::on_own_thread;
 
 pub use files::{KeptRig, simulated_chip};
+pub use plug::Plug;
 pub use robot::SimulatedRobot;
 pub use vergence_board::{Listener, Served, serve, spawn_in_process};
 pub use vergence_sim::{Random, SimulatedChip, SimulatedRig, built};
