@@ -7,7 +7,7 @@ use vergence_matching::{MatchError, Matcher};
 use vergence_rig::{AxisPosition, JointsAt, Rig};
 use vergence_vision::{Angle, FusedPose};
 
-use crate::axes_by_images::{axes_by_images, axis_estimates, best_look};
+use crate::axes_by_images::{Look, axes_by_images, axis_estimates, best_look};
 use crate::cloud::{Method, PairCloudError, refined_cloud};
 use crate::limits::FLICKER_COUNTS;
 use crate::memory::PoseMemory;
@@ -18,6 +18,9 @@ use crate::search::Search;
 
 /// Standard deviation of the rotation with which the images are first looked at, around the last reading of an axis.
 const NEAR: Angle = Angle::from_deg(1.5);
+/// What lies further from the last readings than so many of these standard deviations is not near: matches that agree half on the way draw the
+/// axis away from where it is.
+const MOST_OFF: f64 = 2.0;
 /// Part of the matches that must agree there. Where an axis is elsewhere, matches agree by chance.
 const AGREEING: f64 = 0.5;
 /// An axis that turns the cameras by less than this with a count, in radians, does not turn them at all.
@@ -72,8 +75,13 @@ impl UntoldAxes {
         (rig, search): (&Rig, &Search),
         matcher: &dyn Matcher,
     ) -> Result<Option<JointsAt>, MatchError> {
-        let near = best_look(images, (rig, search), &self.within(rig, Some(NEAR)), matcher)?;
-        match near.filter(|look| look.fused.agreeing >= AGREEING) {
+        let readings = self.within(rig, Some(NEAR));
+        let near = best_look(images, (rig, search), &readings, matcher)?;
+        let is_near = |look: &Look| {
+            let off = |&axis: &usize| (look.joints.counts[axis] - readings.counts[axis]).abs();
+            self.axes.iter().all(|axis| off(axis) <= MOST_OFF * readings.sigma[*axis])
+        };
+        match near.filter(|look| look.fused.agreeing >= AGREEING && is_near(look)) {
             Some(look) => Ok(Some(look.joints)),
             None => axes_by_images(images, (rig, search), &self.within(rig, None), matcher),
         }

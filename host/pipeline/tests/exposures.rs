@@ -119,3 +119,37 @@ fn free_running_images_are_paired_by_their_stamps() {
     exposures.image(Side::Left, stamp_of(3, 3), 3, &base);
     assert!(matches!(exposures.take(), Some(Exposed::One { side: Side::Left, .. })));
 }
+
+/// Where the link to the board ended, images of triggered cameras are paired by their stamps, and by pulses again when it is back.
+#[test]
+fn images_are_paired_without_a_link_and_with_it_again() {
+    let base = board(0);
+    let timing = ExposureTiming { period: ms(33), exposure: Some(ms(4)), rolling: ms(0), readout: ms(8) };
+    let mut exposures = Exposures::new(Some(1e5));
+    for side in [Side::Left, Side::Right] {
+        exposures.camera_ready(side, timing, &base);
+    }
+    exposures.image(Side::Left, stamp_of(0, 0), 0, &base);
+    exposures.link_ended();
+    assert_eq!(exposures.skipped().get(&SkipReason::ImageWithoutPulse), Some(&1), "its pulse was not reported");
+    for number in 1..4 {
+        exposures.image(Side::Left, stamp_of(number, number), number, &base);
+        exposures.image(Side::Right, stamp_of(number, number), number + 40, &base);
+    }
+    // Like those of free-running cameras, the last ones wait for what may come.
+    for expected in 1..3 {
+        let Some(Exposed::Pair(images)) = exposures.take() else { panic!("pair {expected}") };
+        assert_eq!((images[0].image, images[1].image), (expected, expected + 40));
+        assert_eq!(images[0].middle.error_us, 1_000.0, "as well as the stamps are known");
+    }
+    exposures.settle(Microseconds(2_000_000), &base);
+    assert!(matches!(exposures.take(), Some(Exposed::Pair(_))));
+    exposures.link_back();
+    exposures.pulse(&mark(0), &base);
+    exposures.image(Side::Left, stamp_of(0, 4), 4, &base);
+    assert!(exposures.take().is_none());
+    exposures.image(Side::Right, stamp_of(0, 4), 44, &base);
+    let Some(Exposed::Pair(images)) = exposures.take() else { panic!("a pair") };
+    assert_eq!((images[0].image, images[0].middle.error_us), (4, 500.0), "by its pulse");
+    assert_eq!(exposures.gone(), [None, None]);
+}

@@ -115,6 +115,7 @@ impl TakingOptions {
     /// Where neither camera is there, or nothing that can be unplugged has this name.
     pub fn start_cameras(&self, cameras: &[String], rig: &LiveRig) -> Result<Receiver<(Side, CameraEvent)>, Failure> {
         let (listener, events) = channel(EVENTS_KEPT);
+        rig.plug.iter().for_each(Plug::begin);
         match (&rig.simulated, cameras) {
             (Some((mechanics, lenses)), _) => self.simulate(rig, mechanics, lenses.clone(), &listener)?,
             (None, [left, right]) => {

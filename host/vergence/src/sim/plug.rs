@@ -1,8 +1,10 @@
 //! The cable to a simulated board in this process, which can be unplugged for a while.
 
 use std::future::pending;
+use std::sync::Arc;
 use std::time::Duration;
 
+use tokio::sync::watch;
 use tokio::time::{Instant, sleep_until};
 use vergence_board::{Board, BoardError, Client, Continuity, LinkError, OpenWire, fresh_session, spawn_until};
 use vergence_rig::Rig;
@@ -13,15 +15,21 @@ use super::SharedRig;
 #[derive(Clone)]
 pub struct Plug {
     board: SharedRig,
-    since: Instant,
     unplugged: Vec<[Duration; 2]>,
+    /// From when on the times count; `None` before that.
+    begun: Arc<watch::Sender<Option<Instant>>>,
 }
 
 impl Plug {
-    /// The cable of `board`, which is unplugged at these times, counted from now.
+    /// The cable of `board`, which is unplugged at these times after [`Self::begin`].
     #[must_use]
     pub fn new(board: SharedRig, unplugged: Vec<[Duration; 2]>) -> Self {
-        Self { board, since: Instant::now(), unplugged }
+        Self { board, unplugged, begun: Arc::new(watch::Sender::new(None)) }
+    }
+
+    /// The times count from now on.
+    pub fn begin(&self) {
+        self.begun.send_replace(Some(Instant::now()));
     }
 
     /// Connects; `drawn` is what the host believes of the rig.
@@ -29,19 +37,21 @@ impl Plug {
     /// # Errors
     /// As [`Board::new`]; an unplugged cable.
     pub async fn connect(&self, drawn: Rig, lease_ms: u16, continuity: Continuity) -> Result<Board, BoardError> {
-        let age = self.since.elapsed();
+        let age = self.begun.borrow().map_or(Duration::ZERO, |begun| begun.elapsed());
         if self.unplugged.iter().any(|[from, until]| (*from..*until).contains(&age)) {
             return Err(LinkError::Closed("the simulated cable is unplugged".into()).into());
         }
         let next = self.unplugged.iter().map(|[from, _]| *from).filter(|from| *from > age).min();
-        let since = self.since;
-        let pulled = async move {
-            match next {
-                Some(from) => sleep_until(since + from).await,
-                None => pending().await,
-            }
-        };
-        let wire = OpenWire::in_process(spawn_until(self.board.clone(), pulled));
+        let wire = OpenWire::in_process(spawn_until(self.board.clone(), pulled(self.begun.subscribe(), next)));
         Board::new(Client::connect(wire, fresh_session()?, continuity).await?, drawn, lease_ms).await
+    }
+}
+
+/// Completes at the time `from` after the beginning; never without one.
+async fn pulled(mut begun: watch::Receiver<Option<Instant>>, from: Option<Duration>) {
+    let begun = begun.wait_for(Option::is_some).await.ok().and_then(|begun| *begun);
+    match begun.zip(from) {
+        Some((begun, from)) => sleep_until(begun + from).await,
+        None => pending().await,
     }
 }
