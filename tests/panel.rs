@@ -13,44 +13,11 @@ mod common;
 
 use std::io::{BufRead, BufReader, Write};
 use std::path::{Path, PathBuf};
-use std::process::{Child, ChildStdout, Command, Stdio};
+use std::process::{Command, Stdio};
 
 use common::data::skip;
-use common::{fails_with, signal, small_bench_toml, vergence};
-use serde_json::Value;
-
-/// A panel in its own process; ends with the value.
-struct Served {
-    process: Child,
-    /// Where it goes on to write.
-    _out: BufReader<ChildStdout>,
-    url: String,
-}
-
-impl Served {
-    fn start(arguments: &[&str]) -> Self {
-        let mut process = vergence(arguments).arg("--json").stdout(Stdio::piped()).spawn().expect("the panel starts");
-        let mut out = BufReader::new(process.stdout.take().expect("piped"));
-        let mut line = String::new();
-        out.read_line(&mut line).expect("it says where it is");
-        let said: Value = serde_json::from_str(&line).expect("JSON");
-        Self { process, _out: out, url: said["url"].as_str().expect("an address").to_owned() }
-    }
-
-    /// Ends as by Ctrl-C, in order.
-    fn terminate(&mut self) {
-        signal(self.process.id(), "-TERM");
-        assert!(self.process.wait().expect("it was started").success());
-    }
-}
-
-impl Drop for Served {
-    fn drop(&mut self) {
-        // A process that has ended already is what we want.
-        let _ = self.process.kill();
-        let _ = self.process.wait();
-    }
-}
+use common::served::Served;
+use common::{fails_with, small_bench_toml};
 
 /// The panel of a simulated rig at `address`, whose cameras are small and slow: the browser needs the computer too.
 fn small(address: &str) -> [&str; 12] {

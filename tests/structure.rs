@@ -188,6 +188,8 @@ const ALLOWED: &[(&str, &[&str])] = &[
             "vergence-camera",
             "vergence-board",
             "vergence-live",
+            "vergence-recording",
+            "vergence-calibration-input",
         ],
     ),
     (

@@ -10,6 +10,7 @@ impl From<PanelError> for Failure {
             PanelError::Listen { .. } => Self::usage(error.to_string()),
             PanelError::Board(error) => error.into(),
             PanelError::Live(error) => error.into(),
+            PanelError::Recording(error) => error.into(),
             _ => Self::device(error.to_string()),
         }
     }

@@ -4,6 +4,7 @@ use std::net::SocketAddr;
 
 use vergence_board::BoardError;
 use vergence_live::LiveError;
+use vergence_recording::RecordingError;
 
 /// Why the panel cannot be shown, or ended. The text is a sentence.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
@@ -26,4 +27,7 @@ pub enum PanelError {
     /// The live loop failed.
     #[error(transparent)]
     Live(#[from] LiveError),
+    /// The recording failed.
+    #[error(transparent)]
+    Recording(#[from] RecordingError),
 }

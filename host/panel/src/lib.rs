@@ -39,6 +39,6 @@ pub use message::{GoalOrder, Order, PageMessage, packed};
 pub use operators::{ClientId, Control, LATEST_BEAT, Operators};
 pub use panel::Panel;
 pub use server::Serving;
-pub use session::Session;
+pub use session::{Session, Shown};
 pub use streams::{Outgoing, Seen, Stream, Streams};
 pub use view::{SPHERE_COLUMNS, SPHERE_ROWS, sphere_message, view_json};

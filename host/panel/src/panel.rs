@@ -8,6 +8,7 @@ use tokio::sync::mpsc::{Receiver, channel};
 use vergence_board::Board;
 use vergence_camera::CameraEvent;
 use vergence_live::LiveResult;
+use vergence_recording::Recording;
 use vergence_vision::Side;
 
 use crate::capture::{CaptureProgress, capture_message};
@@ -57,17 +58,26 @@ impl Panel {
         board.observed(move |rig, pose| reporter.report(rig, pose))
     }
 
-    /// Passes camera events on and keeps each image that is developed. Images from before the axes have their reference are left out:
-    /// nobody knows where they were taken.
+    /// Passes camera events on and keeps each image that is developed for what comes after it. Images from before the axes have their
+    /// reference are left out: nobody knows where they were taken. `recording` has the others first.
     #[must_use]
-    pub fn tap(&self, mut events: Receiver<(Side, CameraEvent)>) -> Receiver<(Side, CameraEvent)> {
+    pub fn tap(
+        &self,
+        mut events: Receiver<(Side, CameraEvent)>,
+        recording: Option<&Recording>,
+    ) -> Receiver<(Side, CameraEvent)> {
         let (sender, out) = channel(EVENTS_KEPT);
         let (darkroom, referenced) = (self.darkroom.clone(), self.hub.referenced.subscribe());
+        let mut recorded = recording.map(Recording::cameras);
         tokio::spawn(async move {
             while let Some((side, event)) = events.recv().await {
                 if matches!(event, CameraEvent::Image(_)) && !*referenced.borrow() {
                     continue;
                 }
+                let event = match &mut recorded {
+                    Some(record) => record(side, event),
+                    None => event,
+                };
                 if sender.send((side, tapped(event, side, &darkroom))).await.is_err() {
                     return;
                 }

@@ -23,6 +23,8 @@ use crate::streams::{Outgoing, Stream};
 
 /// Largest message of a page, in bytes.
 const LARGEST_MESSAGE: usize = 16 * 1024;
+/// The name of the threads that serve pages, as `/proc/PID/task/TID/comm` tells it.
+const THREADS: &str = "panel";
 /// How often it is checked whether the page that drives is silent.
 const CHECK: Duration = Duration::from_millis(100);
 
@@ -71,7 +73,9 @@ pub fn serve(hub: Arc<Hub>, listener: TcpListener, access: Access) -> Result<Ser
     let failed = |error: std::io::Error| PanelError::Server(error.to_string());
     let address = listener.local_addr().map_err(failed)?;
     listener.set_nonblocking(true).map_err(failed)?;
-    let runtime = tokio::runtime::Builder::new_current_thread().enable_all().build().map_err(failed)?;
+    // What pages cost is what the threads of this name take.
+    let runtime = tokio::runtime::Builder::new_current_thread().thread_name(THREADS).enable_all().build();
+    let runtime = runtime.map_err(failed)?;
     let (end, ended) = oneshot::channel::<()>();
     let url = match &access {
         Access::Token(token) => format!("http://{address}/?token={token}"),
@@ -83,7 +87,7 @@ pub fn serve(hub: Arc<Hub>, listener: TcpListener, access: Access) -> Result<Ser
         .route("/status", get(status))
         .fallback(get(file))
         .with_state(served);
-    let thread = std::thread::Builder::new().name("panel".to_owned()).spawn(move || {
+    let thread = std::thread::Builder::new().name(THREADS.to_owned()).spawn(move || {
         runtime.block_on(async {
             // Only a listener whose descriptor is closed is refused here, and it is open.
             let Ok(listener) = tokio::net::TcpListener::from_std(listener) else { return };

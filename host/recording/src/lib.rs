@@ -12,15 +12,18 @@ mod messages;
 mod metadata;
 mod play;
 mod png;
+mod queue;
 mod reader;
 mod recorder;
 mod recording;
 mod replay;
+mod scribe;
 mod tap;
 
 pub use error::RecordingError;
 pub use event::{Beginning, Event, Eye, Stamp, Timing};
 pub use play::{Pacing, play};
+pub use queue::LeftOut;
 pub use reader::{Heard, Reader};
 pub use recorder::{Recorded, Recorder, Writing};
 pub use recording::{Recordable, Recording};

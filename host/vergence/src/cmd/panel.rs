@@ -1,17 +1,20 @@
 //! `vergence panel`: the page on which people see and drive the rig.
 
 use std::net::{SocketAddr, TcpListener};
+use std::path::PathBuf;
 use std::sync::Arc;
 
 use clap::{Args as _, FromArgMatches};
 use serde_json::json;
 use vergence_board::{fresh_secret, hex};
-use vergence_live::{Ended, MatchingTime};
-use vergence_panel::{Access, Panel, PanelError, Session, Setting};
+use vergence_live::MatchingTime;
+use vergence_panel::{Access, Panel, PanelError, Session, Setting, Shown};
 use vergence_scene::LensChoice;
 
 use super::connect::connect;
 use super::live_options::LiveOptions;
+use super::publish::tell;
+use super::run::{begin_recording, seen_to_the_end, tell_recorded};
 use crate::cli::CommonOptions;
 use crate::console::Console;
 use crate::failure::Failure;
@@ -41,6 +44,10 @@ pub struct Args {
     /// Finds the reference of all axes first.
     #[arg(long)]
     home: bool,
+    /// With cameras: record images, encoders and clouds in this folder from when the axes have their reference, as a ROS 2 bag that
+    /// `vergence replay` measures and shows again.
+    #[arg(long, value_name = "DIR", requires = "cameras")]
+    record: Option<PathBuf>,
     #[command(flatten)]
     live: LiveOptions,
 }
@@ -71,7 +78,7 @@ pub async fn run(args: &Args, common: &CommonOptions, console: Console) -> Resul
             let rig = Arc::new(rig_file::load(common.rig.as_deref())?);
             let (panel, driver) = Panel::new(Setting { rig, simulated: None, has_cameras: false });
             let board = Some(panel.watching(connect(common, console, "panel").await?));
-            (panel, Session { driver, board, trigger: None, live: None })
+            (panel, Session { driver, board, trigger: None, live: None, recording: None })
         }
         cameras => {
             let lease = if is_simulated { SIMULATED_LEASE_MS } else { common.lease };
@@ -82,9 +89,10 @@ pub async fn run(args: &Args, common: &CommonOptions, console: Console) -> Resul
             let (panel, driver) =
                 Panel::new(Setting { rig: Arc::clone(&method.measuring), simulated, has_cameras: true });
             rig.board = rig.board.map(|board| panel.watching(board));
-            let events = panel.tap(args.live.taking.start_cameras(cameras, &rig)?);
+            let recording = args.record.as_deref().map(|folder| begin_recording(folder, &rig)).transpose()?;
+            let events = panel.tap(args.live.taking.start_cameras(cameras, &rig)?, recording.as_ref());
             let live = Some(method.live_loop(&mut rig, events, MatchingTime::Real));
-            (panel, Session { driver, board: rig.board, trigger: rig.trigger, live })
+            (panel, Session { driver, board: rig.board, trigger: rig.trigger, live, recording })
         }
     };
     let serving = panel.serve(listener, access)?;
@@ -93,10 +101,14 @@ pub async fn run(args: &Args, common: &CommonOptions, console: Console) -> Resul
     if args.home {
         panel.home();
     }
-    match session.run(&panel, interrupted()).await? {
-        Ended::Done => Ok(()),
-        Ended::Blind => Err(Failure::device("both cameras are dead: the log of the panel said why")),
+    let Shown { ended, totals, recorded } = session.run(&panel, interrupted()).await?;
+    if !args.cameras.is_empty() {
+        tell(&totals, console)?;
     }
+    if let (Some(recorded), Some(folder)) = (recorded, &args.record) {
+        tell_recorded(recorded, folder, console)?;
+    }
+    seen_to_the_end(Some(ended))
 }
 
 /// What accepts connections at `address`.
