@@ -6,7 +6,7 @@ const CELLS = 3;
 
 export function showCapture(link, pictures) {
   link.on('capture', (progress) => {
-    const { views, wanted, advice, cameras, verdicts, is_still: isStill } = progress;
+    const { views, wanted, advice, cameras, poses, verdicts, is_still: isStill } = progress;
     document.body.classList.add('captures');
     document.body.classList.toggle('mono', cameras.length === 1);
     byId('capture').hidden = false;
@@ -22,6 +22,11 @@ export function showCapture(link, pictures) {
     const said = advice === null ? 'The set is complete.' : isOver ? 'The views are taken, but not all that are needed.' : advice;
     // Set only when it changes: a screen reader says it again otherwise.
     if (byId('capture-advice').textContent !== said) byId('capture-advice').textContent = said;
+    byId('capture-poses').replaceChildren(...poses.map(({ name, views: taken }) => {
+      const item = document.createElement('li');
+      item.textContent = `${name}: ${taken} of ${wanted} views${taken >= wanted ? ' ✓' : ''}`;
+      return item;
+    }));
     if (byId('capture-verdicts').childElementCount !== verdicts.length) {
       byId('capture-verdicts').replaceChildren(...verdicts.map((verdict) => {
         const item = document.createElement('li');

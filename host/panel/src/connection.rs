@@ -101,11 +101,12 @@ fn plan(hub: &Arc<Hub>, order: GoalOrder, answer: &Sender<Outgoing>) -> Result<(
     Ok(())
 }
 
-/// Computes what the cameras see each time that the stages are elsewhere.
+/// Computes what the cameras see each time that the stages are elsewhere, while pages are open.
 pub async fn follow_view(hub: Arc<Hub>) {
-    let (mut places, mut shown) = (hub.place.subscribe(), None::<Vec<f64>>);
+    let (mut places, mut pages, mut shown) = (hub.place.subscribe(), hub.pages.subscribe(), None::<Vec<f64>>);
     places.mark_changed();
-    while places.changed().await.is_ok() {
+    // The hub keeps both senders: they are not closed.
+    while pages.wait_for(|count| *count > 0).await.is_ok() && places.changed().await.is_ok() {
         let Some(values) = places.borrow_and_update().clone() else { continue };
         let near = |(a, b): (&f64, &f64)| (a - b).abs() < SMALL_STEP;
         if shown.as_ref().is_some_and(|shown| shown.iter().zip(&values).all(near)) {

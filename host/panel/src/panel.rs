@@ -30,8 +30,8 @@ const EVENTS_KEPT: usize = 16;
 /// Shows a rig to pages. A clone shows the same.
 #[derive(Clone)]
 pub struct Panel {
-    hub: Arc<Hub>,
-    darkroom: Darkroom,
+    pub(crate) hub: Arc<Hub>,
+    pub(crate) darkroom: Darkroom,
 }
 
 impl Panel {
@@ -54,8 +54,9 @@ impl Panel {
     /// The board, whose poses the panel shows from now on.
     #[must_use]
     pub fn watching(&self, board: Board) -> Board {
-        let mut reporter = Reporter::new(Arc::clone(&self.hub), board.client());
-        board.observed(move |rig, pose| reporter.report(rig, pose))
+        let mut reporter = Reporter::new(Arc::clone(&self.hub));
+        let (knowledge, clock) = (board.client().knowledge(), board.client().clock());
+        board.observed(move |rig, pose| reporter.report(rig, pose, &knowledge, clock.now()))
     }
 
     /// Passes camera events on and keeps each image that is developed for what comes after it. Images from before the axes have their

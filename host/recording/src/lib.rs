@@ -22,7 +22,7 @@ mod tap;
 
 pub use error::RecordingError;
 pub use event::{Beginning, Event, Eye, Stamp, Timing};
-pub use play::{Pacing, play};
+pub use play::{Audience, Jump, Pacing, play};
 pub use queue::LeftOut;
 pub use reader::{Heard, Reader};
 pub use recorder::{Recorded, Recorder, Writing};

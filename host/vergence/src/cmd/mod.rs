@@ -7,6 +7,7 @@ mod live_options;
 mod mask_options;
 mod model_options;
 pub mod options;
+mod panel_options;
 mod publish;
 mod reconnect;
 mod result_options;

@@ -76,7 +76,7 @@ pub async fn run(args: &Args, common: &CommonOptions, console: Console) -> Resul
     let (panel, session) = match args.cameras.as_slice() {
         [] => {
             let rig = Arc::new(rig_file::load(common.rig.as_deref())?);
-            let (panel, driver) = Panel::new(Setting { rig, simulated: None, has_cameras: false });
+            let (panel, driver) = Panel::new(Setting { rig, simulated: None, has_cameras: false, recorded_ms: None });
             let board = Some(panel.watching(connect(common, console, "panel").await?));
             (panel, Session { driver, board, trigger: None, live: None, recording: None })
         }
@@ -86,8 +86,8 @@ pub async fn run(args: &Args, common: &CommonOptions, console: Console) -> Resul
                 args.live.connect(cameras, &CommonOptions { lease, ..common.clone() }, None, console).await?;
             let simulated =
                 is_simulated.then(|| format!("mechanics, room and cameras, lenses {}", args.live.taking.lens));
-            let (panel, driver) =
-                Panel::new(Setting { rig: Arc::clone(&method.measuring), simulated, has_cameras: true });
+            let shown = Arc::clone(&method.measuring);
+            let (panel, driver) = Panel::new(Setting { rig: shown, simulated, has_cameras: true, recorded_ms: None });
             rig.board = rig.board.map(|board| panel.watching(board));
             let recording = args.record.as_deref().map(|folder| begin_recording(folder, &rig)).transpose()?;
             let events = panel.tap(args.live.taking.start_cameras(cameras, &rig)?, recording.as_ref());

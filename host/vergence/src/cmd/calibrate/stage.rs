@@ -14,10 +14,12 @@ use vergence_targets::corners_can_be_held;
 use super::options::{LensOptions, ResultOptions, VerdictPlaces};
 use super::print_views;
 use crate::cli::CommonOptions;
+use crate::cmd::capture_panel::CapturePanel;
 use crate::cmd::mask_options::MaskOptions;
 use crate::cmd::target_options::TargetOptions;
 use crate::console::Console;
 use crate::failure::Failure;
+use crate::interrupt::interrupted;
 use crate::rig_file;
 use crate::stopwatch::Stopwatch;
 use vergence_plausibility::pose::{cameras_are_near, right_is_on_the_right};
@@ -68,6 +70,22 @@ pub struct Args {
 }
 
 pub async fn run(args: &Args, common: &CommonOptions, console: Console) -> Result<(), Failure> {
+    let drawn = rig_file::load(common.rig.as_deref())?;
+    let mut panel = args.live.panel(&drawn, args.cameras == ["sim"], console)?;
+    let calibrated = calibrate(args, common, panel.as_mut(), console).await;
+    match (panel, calibrated) {
+        (Some(panel), Ok(verdict)) => panel.conclude(verdict, interrupted(), console).await,
+        (_, calibrated) => calibrated.map(drop),
+    }
+}
+
+/// Returns the verdict.
+async fn calibrate(
+    args: &Args,
+    common: &CommonOptions,
+    panel: Option<&mut CapturePanel>,
+    console: Console,
+) -> Result<Vec<String>, Failure> {
     args.result.check()?;
     let drawn = rig_file::load(common.rig.as_deref())?;
     if drawn.axes.is_empty() {
@@ -90,7 +108,7 @@ pub async fn run(args: &Args, common: &CommonOptions, console: Console) -> Resul
         }
         None => (drawn, args.lenses.without_files()?),
     };
-    let built = live(args, common, console).await?;
+    let built = live(args, common, (panel, console)).await?;
     let (poses, left_out) = poses(args, &drawn, &mut hash, console)?;
     let force = args.result.force;
     for pose in &poses {
@@ -107,7 +125,8 @@ pub async fn run(args: &Args, common: &CommonOptions, console: Console) -> Resul
             trunk::Input { drawn: &drawn, poses: &poses, left_out, options: &options },
             hash,
             console,
-        );
+        )
+        .map(|()| Vec::new());
     }
     let solving = Stopwatch::start();
     let stage = calibrate_stage(&drawn, &poses, &options).map_err(|error| no_calibration(&error))?;
@@ -144,11 +163,16 @@ pub async fn run(args: &Args, common: &CommonOptions, console: Console) -> Resul
         console.say(truth)?;
         result["truth"] = truth.json();
     }
-    console.result(&result)
+    console.result(&result)?;
+    Ok(verdict.lines())
 }
 
 /// Takes the views of --live; returns the true rig where it is simulated.
-async fn live(args: &Args, common: &CommonOptions, console: Console) -> Result<Option<Rig>, Failure> {
+async fn live(
+    args: &Args,
+    common: &CommonOptions,
+    (panel, console): (Option<&mut CapturePanel>, Console),
+) -> Result<Option<Rig>, Failure> {
     match (&args.set, args.live.live) {
         (Some(set), true) => {
             live::fill(
@@ -157,7 +181,7 @@ async fn live(args: &Args, common: &CommonOptions, console: Console) -> Result<O
                 &args.cameras,
                 args.target.checked_spec(args.result.force, console)?,
                 common,
-                console,
+                (panel, console),
             )
             .await
         }
