@@ -3,7 +3,8 @@
 #![allow(clippy::expect_used, reason = "a test fails loudly")]
 
 use std::io::{BufRead, BufReader, Read};
-use std::process::{Child, ChildStdout, Stdio};
+use std::process::{Child, Stdio};
+use std::thread::{JoinHandle, spawn};
 
 use serde_json::Value;
 
@@ -12,7 +13,8 @@ use super::{signal, vergence};
 /// A panel in its own process; ends with the value.
 pub struct Served {
     process: Child,
-    out: BufReader<ChildStdout>,
+    /// Reads on what it says: a pipe that is full would stop it.
+    rest: Option<JoinHandle<String>>,
     /// The address of the page.
     pub url: String,
 }
@@ -25,7 +27,12 @@ impl Served {
         let mut line = String::new();
         out.read_line(&mut line).expect("it says where it is");
         let said: Value = serde_json::from_str(&line).expect("JSON");
-        Self { process, out, url: said["url"].as_str().expect("an address").to_owned() }
+        let rest = spawn(move || {
+            let mut rest = String::new();
+            out.read_to_string(&mut rest).expect("text");
+            rest
+        });
+        Self { process, rest: Some(rest), url: said["url"].as_str().expect("an address").to_owned() }
     }
 
     /// The number of the process.
@@ -41,13 +48,7 @@ impl Served {
     /// Ends as by Ctrl-C, in order; returns what it said after its address.
     pub fn terminate(&mut self) -> String {
         signal(self.process.id(), "-TERM");
-        self.wait()
-    }
-
-    /// Waits for the end by itself; returns what it said after its address.
-    pub fn wait(&mut self) -> String {
-        let mut said = String::new();
-        self.out.read_to_string(&mut said).expect("text");
+        let said = self.rest.take().map(|rest| rest.join().expect("text")).unwrap_or_default();
         assert!(self.process.wait().expect("it was started").success(), "{said}");
         said
     }
