@@ -18,8 +18,12 @@ export function showCapture(link, pictures) {
     byId('capture-progress').value = shares.reduce((sum, share) => sum + share, 0);
     const seen = cameras.some(({ corners }) => corners.length > 0);
     const target = isOver ? '' : !seen ? '; no target seen' : isStill ? '; the target is held still' : '; the target moves: hold it still';
-    byId('capture-count').textContent = `${views} views (${wanted} at most)${target}`;
-    const said = advice === null ? 'The set is complete.' : isOver ? 'The views are taken, but not all that are needed.' : advice;
+    // At each pose of a stage there are so many views, whatever they cover.
+    const drives = poses.length > 0;
+    const most = drives ? `${views} of ${wanted} views at this pose` : `${views} views (${wanted} at most)`;
+    byId('capture-count').textContent = cameras.length ? `${most}${target}` : '';
+    const complete = drives ? isOver ? 'The views are taken.' : 'show the target elsewhere, or tilted' : 'The set is complete.';
+    const said = advice === null || (drives && isOver) ? complete : isOver ? 'The views are taken, but not all that are needed.' : advice;
     // Set only when it changes: a screen reader says it again otherwise.
     if (byId('capture-advice').textContent !== said) byId('capture-advice').textContent = said;
     byId('capture-poses').replaceChildren(...poses.map(({ name, views: taken }) => {

@@ -18,6 +18,9 @@ pub enum PanelError {
         /// What the operating system says.
         why: String,
     },
+    /// The address lets other computers in, and nobody said so.
+    #[error("{0} lets other computers in: add --network, which makes a token that they need")]
+    OtherComputers(SocketAddr),
     /// The server cannot begin.
     #[error("the server of the panel does not start: {0}")]
     Server(String),

@@ -29,7 +29,7 @@ mod status;
 mod streams;
 mod view;
 
-pub use capture::{CaptureCamera, CapturePose, CaptureProgress};
+pub use capture::{CaptureCamera, CapturePanel, CapturePose, CaptureProgress};
 pub use cloud::cloud_message;
 pub use driver::Driver;
 pub use error::PanelError;
@@ -40,7 +40,7 @@ pub use message::{GoalOrder, Order, PageMessage, packed};
 pub use operators::{ClientId, Control, LATEST_BEAT, Operators};
 pub use panel::Panel;
 pub use screen::Screen;
-pub use server::Serving;
+pub use server::{Serving, listen};
 pub use session::{Session, Shown};
 pub use streams::{Outgoing, Seen, Stream, Streams};
 pub use view::{SPHERE_COLUMNS, SPHERE_ROWS, sphere_message, view_json};

@@ -3,7 +3,6 @@
 use std::net::TcpListener;
 use std::sync::Arc;
 
-use image::RgbImage;
 use tokio::sync::mpsc::{Receiver, channel};
 use vergence_board::Board;
 use vergence_camera::CameraEvent;
@@ -11,7 +10,6 @@ use vergence_live::LiveResult;
 use vergence_recording::Recording;
 use vergence_vision::Side;
 
-use crate::capture::{CaptureProgress, capture_message};
 use crate::cloud::cloud_message;
 use crate::driver::Driver;
 use crate::error::PanelError;
@@ -91,12 +89,6 @@ impl Panel {
     pub fn show(&self, result: &LiveResult<'_>) {
         self.hub.put(Stream::Cloud, cloud_message(result));
         self.hub.images.send_replace(self.darkroom.images());
-    }
-
-    /// Shows how far a set of target views has come, with the images of now.
-    pub fn show_capture(&self, progress: &CaptureProgress, images: [Option<Arc<RgbImage>>; 2]) {
-        self.hub.put(Stream::Capture, capture_message(progress));
-        self.hub.images.send_replace(images);
     }
 
     /// Adds a line to the log.

@@ -71,6 +71,7 @@ impl Screen {
             return Ok(wish.is_paused);
         }
         self.told_us = None;
+        self.panel.note(&format!("goes on from {:.1} s", wish.jump_to.as_secs_f64()));
         Err(Jump(wish.jump_to))
     }
 

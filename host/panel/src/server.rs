@@ -12,6 +12,7 @@ use axum::response::{IntoResponse, Response};
 use axum::routing::{any, get};
 use tokio::sync::oneshot;
 use tokio::time::{MissedTickBehavior, interval};
+use vergence_board::{fresh_secret, hex};
 
 use crate::assets::{asset, secured};
 use crate::connection::{follow_view, serve_page};
@@ -59,6 +60,24 @@ impl Drop for Serving {
             let _ = thread.join();
         }
     }
+}
+
+/// What accepts connections at `address`, and who may connect: this computer alone, or on a `network` who knows a token that is new each time.
+///
+/// # Errors
+/// [`PanelError::Listen`], [`PanelError::OtherComputers`]
+pub fn listen(address: SocketAddr, network: bool) -> Result<(TcpListener, Access), PanelError> {
+    let access = match (network, address.ip().is_loopback()) {
+        (true, _) => {
+            let secret = fresh_secret().map_err(|error| PanelError::Server(error.to_string()))?;
+            Access::Token(hex(&secret.public().0[..16]))
+        }
+        (false, true) => Access::ThisComputer,
+        (false, false) => return Err(PanelError::OtherComputers(address)),
+    };
+    let listener = TcpListener::bind(address);
+    let listener = listener.map_err(|error| PanelError::Listen { address, why: error.to_string() })?;
+    Ok((listener, access))
 }
 
 /// What every request needs.

@@ -7,7 +7,7 @@ use serde_json::json;
 use vergence_board::HostClock;
 use vergence_calibration_input::{Captured, Looked, TargetCapture, printed};
 use vergence_camera::{Camera, CameraError, CameraSet};
-use vergence_panel::Setting;
+use vergence_panel::{CapturePanel, Setting};
 use vergence_rig::Rig;
 use vergence_scene::LensChoice;
 use vergence_sim::{HeldTarget, TargetCamera};
@@ -15,9 +15,8 @@ use vergence_targets::TargetKind;
 use vergence_vision::Side;
 
 use super::camera_options::CameraOptions;
-use super::capture_panel::CapturePanel;
 use super::mask_options::MaskOptions;
-use super::panel_options::PanelOptions;
+use super::panel_options::{GOES_ON, PanelOptions};
 use super::target_options::TargetOptions;
 use crate::cli::CommonOptions;
 use crate::cmd::force_option::ForceOption;
@@ -93,7 +92,7 @@ async fn capture<I: Future<Output = ()>>(
         progress.set_message(format!("{taken} views; {advice}"));
         progress.tick();
         if let Some(panel) = &mut panel {
-            panel.show(looked, args.views);
+            panel.look(looked, args.views);
         }
         match looked.is_taken {
             true => progress.suspend(|| console.say(format!("view {taken} taken; {advice}"))),
@@ -104,10 +103,13 @@ async fn capture<I: Future<Output = ()>>(
     progress.finish_and_clear();
     report(&captured, args, console)?;
     match panel {
-        Some(panel) if !captured.was_interrupted => {
+        Some(mut panel) if !captured.was_interrupted => {
             let verdicts = on_own_thread(move || Ok(captured.verdicts())).await?;
             console.say_lines(verdicts.clone())?;
-            panel.conclude(verdicts, interruption(), console).await
+            panel.conclude(verdicts);
+            console.say(GOES_ON)?;
+            interruption().await;
+            Ok(())
         }
         _ => Ok(()),
     }

@@ -20,7 +20,6 @@ pub mod bench;
 pub mod calibrate;
 pub mod camera;
 pub mod capture;
-mod capture_panel;
 pub mod completions;
 pub mod config;
 pub mod demo;

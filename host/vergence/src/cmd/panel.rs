@@ -1,14 +1,13 @@
 //! `vergence panel`: the page on which people see and drive the rig.
 
-use std::net::{SocketAddr, TcpListener};
+use std::net::SocketAddr;
 use std::path::PathBuf;
 use std::sync::Arc;
 
 use clap::{Args as _, FromArgMatches};
 use serde_json::json;
-use vergence_board::{fresh_secret, hex};
 use vergence_live::MatchingTime;
-use vergence_panel::{Access, Panel, PanelError, Session, Setting, Shown};
+use vergence_panel::{Panel, Session, Setting, Shown, listen};
 use vergence_scene::LensChoice;
 
 use super::connect::connect;
@@ -70,8 +69,7 @@ pub async fn demonstrate(
 }
 
 pub async fn run(args: &Args, common: &CommonOptions, console: Console) -> Result<(), Failure> {
-    let access = access(args.listen, args.network)?;
-    let listener = listen(args.listen)?;
+    let (listener, access) = listen(args.listen, args.network)?;
     let is_simulated = args.cameras == ["sim"];
     let (panel, session) = match args.cameras.as_slice() {
         [] => {
@@ -109,23 +107,4 @@ pub async fn run(args: &Args, common: &CommonOptions, console: Console) -> Resul
         tell_recorded(recorded, folder, console)?;
     }
     seen_to_the_end(Some(ended))
-}
-
-/// What accepts connections at `address`.
-pub fn listen(address: SocketAddr) -> Result<TcpListener, PanelError> {
-    TcpListener::bind(address).map_err(|error| PanelError::Listen { address, why: error.to_string() })
-}
-
-/// Who may connect to `address`: on a network, who knows a token that is new each time.
-pub fn access(address: SocketAddr, network: bool) -> Result<Access, Failure> {
-    match (network, address.ip().is_loopback()) {
-        (true, _) => {
-            let secret = fresh_secret().map_err(|error| Failure::device(error.to_string()))?;
-            Ok(Access::Token(hex(&secret.public().0[..16])))
-        }
-        (false, true) => Ok(Access::ThisComputer),
-        (false, false) => Err(Failure::usage(format!(
-            "{address} lets other computers in: add --network, which makes a token that they need"
-        ))),
-    }
 }

@@ -3,11 +3,13 @@
 use std::net::SocketAddr;
 
 use serde_json::json;
-use vergence_panel::{Panel, Serving, Setting};
+use vergence_panel::{Panel, Serving, Setting, listen};
 
-use super::panel::{access, listen};
 use crate::console::Console;
 use crate::failure::Failure;
+
+/// What is said where a page outlasts the work.
+pub const GOES_ON: &str = "the page goes on showing this; Ctrl-C ends it";
 
 /// Whether and where a page is served.
 #[derive(Clone, Copy, Debug, clap::Args)]
@@ -27,7 +29,8 @@ impl PanelOptions {
         let Some(address) = self.panel else { return Ok(None) };
         // Pages see and do not drive: there are no orders to be carried out.
         let (panel, _) = Panel::new(setting);
-        let serving = panel.serve(listen(address)?, access(address, self.network)?)?;
+        let (listener, access) = listen(address, self.network)?;
+        let serving = panel.serve(listener, access)?;
         console.say(format!("the panel is at {}", serving.url()))?;
         console.result(&json!({ "url": serving.url() }))?;
         Ok(Some((panel, serving)))

@@ -8,17 +8,18 @@ use std::path::PathBuf;
 use vergence_calibration::{StageError, StageOptions, calibrate_stage, check_fit, validate_stage};
 use vergence_calibration_input::{InputHash, KnownLenses, RecordedSet, StageViews, TrueError, stage_poses_in_corners};
 use vergence_calibration_report::{ReportAbout, left_out_json, stage_json, stage_lines, stage_report, stage_verdict};
+use vergence_panel::CapturePanel;
 use vergence_rig::Rig;
 use vergence_targets::corners_can_be_held;
 
 use super::options::{LensOptions, ResultOptions, VerdictPlaces};
 use super::print_views;
 use crate::cli::CommonOptions;
-use crate::cmd::capture_panel::CapturePanel;
 use crate::cmd::mask_options::MaskOptions;
+use crate::cmd::panel_options::GOES_ON;
 use crate::cmd::target_options::TargetOptions;
 use crate::console::Console;
-use crate::failure::Failure;
+use crate::failure::{Failure, FailureKind};
 use crate::interrupt::interrupted;
 use crate::rig_file;
 use crate::stopwatch::Stopwatch;
@@ -73,10 +74,18 @@ pub async fn run(args: &Args, common: &CommonOptions, console: Console) -> Resul
     let drawn = rig_file::load(common.rig.as_deref())?;
     let mut panel = args.live.panel(&drawn, args.cameras == ["sim"], console)?;
     let calibrated = calibrate(args, common, panel.as_mut(), console).await;
-    match (panel, calibrated) {
-        (Some(panel), Ok(verdict)) => panel.conclude(verdict, interrupted(), console).await,
-        (_, calibrated) => calibrated.map(drop),
+    let shown = match &calibrated {
+        Ok(verdict) => verdict.clone(),
+        // The views do not calibrate the rig, which who took them wants to know.
+        Err(failure) if failure.kind() == FailureKind::CheckFailed => vec![failure.to_string()],
+        Err(_) => Vec::new(),
+    };
+    if let (Some(panel), false) = (&mut panel, shown.is_empty()) {
+        panel.conclude(shown);
+        console.say(GOES_ON)?;
+        interrupted().await;
     }
+    calibrated.map(drop)
 }
 
 /// Returns the verdict.

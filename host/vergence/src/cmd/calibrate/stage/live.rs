@@ -8,14 +8,13 @@ use vergence_board::{Board, HostClock, Port, fresh_session};
 use vergence_calibration::stage_plan;
 use vergence_calibration_input::{LiveEvent, LiveSet, RigCameras, SimulatedTarget};
 use vergence_camera::CameraError;
-use vergence_panel::Setting;
+use vergence_panel::{CapturePanel, Setting};
 use vergence_rig::Rig;
 use vergence_scene::LensChoice;
 use vergence_targets::TargetKind;
 
 use crate::cli::CommonOptions;
 use crate::cmd::camera_options::CameraOptions;
-use crate::cmd::capture_panel::CapturePanel;
 use crate::cmd::connect::{connect, port};
 use crate::cmd::mask_options::MaskOptions;
 use crate::cmd::panel_options::PanelOptions;
@@ -63,7 +62,9 @@ impl Options {
         }
         let simulated = is_simulated.then(|| format!("mechanics, target and cameras, lenses {}", self.lens));
         let setting = Setting { rig: Arc::new(drawn.clone()), simulated, has_cameras: true, recorded_ms: None };
-        Ok(self.panel.serve(setting, console)?.map(CapturePanel::new))
+        let mut panel = self.panel.serve(setting, console)?.map(CapturePanel::new);
+        panel.iter_mut().for_each(|panel| panel.tell("the rig finds its reference and moves to the first pose: wait"));
+        Ok(panel)
     }
 }
 
