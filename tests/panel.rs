@@ -13,44 +13,12 @@ mod common;
 
 use std::io::{BufRead, BufReader, Write};
 use std::path::{Path, PathBuf};
-use std::process::{Child, ChildStdout, Command, Stdio};
+use std::process::{Command, Stdio};
 
 use common::data::skip;
-use common::{fails_with, signal, small_bench_toml, vergence};
-use serde_json::Value;
-
-/// A panel in its own process; ends with the value.
-struct Served {
-    process: Child,
-    /// Where it goes on to write.
-    _out: BufReader<ChildStdout>,
-    url: String,
-}
-
-impl Served {
-    fn start(arguments: &[&str]) -> Self {
-        let mut process = vergence(arguments).arg("--json").stdout(Stdio::piped()).spawn().expect("the panel starts");
-        let mut out = BufReader::new(process.stdout.take().expect("piped"));
-        let mut line = String::new();
-        out.read_line(&mut line).expect("it says where it is");
-        let said: Value = serde_json::from_str(&line).expect("JSON");
-        Self { process, _out: out, url: said["url"].as_str().expect("an address").to_owned() }
-    }
-
-    /// Ends as by Ctrl-C, in order.
-    fn terminate(&mut self) {
-        signal(self.process.id(), "-TERM");
-        assert!(self.process.wait().expect("it was started").success());
-    }
-}
-
-impl Drop for Served {
-    fn drop(&mut self) {
-        // A process that has ended already is what we want.
-        let _ = self.process.kill();
-        let _ = self.process.wait();
-    }
-}
+use common::served::Served;
+use common::{fails_with, small_bench_toml, text, vergence};
+use vergence_rig::BENCH_TOML;
 
 /// The panel of a simulated rig at `address`, whose cameras are small and slow: the browser needs the computer too.
 fn small(address: &str) -> [&str; 12] {
@@ -99,7 +67,7 @@ fn people_see_and_drive_the_rig_in_a_browser() {
     let mut answer = script.stdin.take().expect("piped");
     for asked in BufReader::new(script.stdout.take().expect("piped")).lines() {
         match asked.expect("text").as_str() {
-            "kill" => served.terminate(),
+            "kill" => drop(served.terminate()),
             "start" => served = Served::start(&small(&address)),
             other => panic!("the script asks for '{other}'"),
         }
@@ -113,8 +81,7 @@ fn people_see_and_drive_the_rig_in_a_browser() {
 
 #[test]
 fn people_watch_in_a_browser_how_a_calibration_fills() {
-    let Some((chromium, folder)) = browser() else { return };
-    let pictures = pictures();
+    let Some(browser) = browser() else { return };
     let set = tempfile::tempdir().expect("a folder");
     let rig = set.path().join("small.toml");
     std::fs::write(&rig, small_bench_toml()).expect("a file");
@@ -122,15 +89,71 @@ fn people_watch_in_a_browser_how_a_calibration_fills() {
     let target = ["--corners", "9x6", "--square", "20mm", "--frames", "120"];
     let capture = ["--rig", rig, "capture", "--cameras", "sim", "--panel", "127.0.0.1:0", "--out"];
     let mut served = Served::start(&[&capture[..], &[out.to_str().expect("a name")], &target].concat());
+    watch("capture.mjs", &browser, &served.url);
+    served.terminate();
+    assert!(out.join("right000.png").exists());
+}
+
+/// Runs the script of a browser on the page of a verb.
+fn watch(script: &str, (chromium, folder): &(String, PathBuf), url: &str) {
     let status = Command::new("node")
-        .arg(folder.join("capture.mjs"))
-        .args([&chromium, &served.url])
-        .arg(&pictures)
+        .arg(folder.join(script))
+        .args([chromium, url])
+        .arg(pictures())
         .status()
         .expect("node starts");
     assert!(status.success(), "the browser found a fault: see above");
-    served.terminate();
-    assert!(out.join("right000.png").exists());
+}
+
+#[test]
+fn people_watch_a_recording_in_a_browser_hold_it_and_play_it_from_elsewhere() {
+    let Some(browser) = browser() else { return };
+    let work = tempfile::tempdir().expect("a folder");
+    let file = |name: &str| work.path().join(name).to_str().expect("a name").to_owned();
+    let (rig, recording) = (file("small.toml"), file("recording"));
+    std::fs::write(&rig, small_bench_toml()).expect("a file");
+    let run =
+        ["--rig", &rig, "--port", "sim", "run", "--cameras", "sim", "--home", "--match-time", "100ms", "--rate", "5"];
+    let moves = ["--mode", "herbivore", "--mode", "human", "--for", "6s", "--record", &recording];
+    let output = vergence(&[&run[..], &moves].concat()).output().expect("it runs");
+    assert!(output.status.success(), "{}", text(&output.stderr));
+    let mut served = Served::start(&["replay", &recording, "--panel", "127.0.0.1:0", "--rate", "3"]);
+    watch("replay.mjs", &browser, &served.url);
+    let said = served.terminate();
+    assert!(said.contains("\"end\""), "{said}");
+}
+
+#[test]
+fn people_watch_in_a_browser_how_a_rig_calibrates_itself() {
+    let Some(browser) = browser() else { return };
+    let work = tempfile::tempdir().expect("a folder");
+    let file = |name: &str| work.path().join(name).to_str().expect("a name").to_owned();
+    let (rig, set, out) = (file("small.toml"), file("set"), file("rig.toml"));
+    let drawing = BENCH_TOML.replace("[1280, 1280]", "[480, 480]").replace("366.0", "137.0").replace("639.5", "239.5");
+    std::fs::write(&rig, drawing).expect("a file");
+    let stage = ["--rig", &rig, "calibrate", "stage", "--corners", "7x5", "--square", "30mm", "--set", &set];
+    let live = [
+        "--port",
+        "sim",
+        "--live",
+        "--cameras",
+        "sim",
+        "--poses",
+        "3",
+        "--views",
+        "4",
+        "--seed",
+        "3",
+        "--lease",
+        "1s",
+        "--out",
+        &out,
+    ];
+    let mut served = Served::start(&[&stage[..], &live, &["--panel", "127.0.0.1:0"]].concat());
+    watch("stage.mjs", &browser, &served.url);
+    let said = served.terminate();
+    assert!(said.contains("\"verdict\"") && Path::new(&out).exists(), "{said}");
+    fails_with(&[&stage[..], &["--out", &out, "--panel"]].concat(), 2, &["--live"]);
 }
 
 #[test]

@@ -218,6 +218,23 @@ fn a_replay_keeps_the_pace_that_it_is_given() {
 }
 
 #[test]
+fn a_replay_on_a_page_gives_the_same_clouds() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let folder = folder.path();
+    let recording = of_four_clouds(folder);
+    let [plain_out, shown_out] = ["plain", "shown"].map(|name| path_of(folder, name));
+    succeeds(&["replay", &recording, "--out", &plain_out, "--keep"]);
+    let plain = clouds(&plain_out);
+    let count = plain.len().to_string();
+    let page = ["--panel", "127.0.0.1:0", "--rate", "1000", "--frames", &count];
+    let said = succeeds(&[&["replay", &recording, "--out", &shown_out, "--keep"], &page[..]].concat());
+    assert!(said.contains("the panel is at http://127.0.0.1:"), "{said}");
+    assert!(plain == clouds(&shown_out), "the page changes the clouds");
+    fails_with(&["replay", &recording, "--panel", "0.0.0.0:0"], 2, &["--network"]);
+    fails_with(&["replay", &recording, "--network"], 2, &["--panel"]);
+}
+
+#[test]
 fn a_looped_replay_gives_the_same_clouds_until_it_is_interrupted() {
     let folder = tempfile::tempdir().expect("a folder");
     let folder = folder.path();

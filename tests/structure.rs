@@ -188,6 +188,9 @@ const ALLOWED: &[(&str, &[&str])] = &[
             "vergence-camera",
             "vergence-board",
             "vergence-live",
+            "vergence-recording",
+            "vergence-calibration",
+            "vergence-calibration-input",
         ],
     ),
     (
@@ -239,6 +242,7 @@ const LICENCES: &[&str] = &[
     "0BSD",
     "ISC",
     "Zlib",
+    "IJG",
     "BSL-1.0",
     "Unicode-3.0",
     "Unlicense",

@@ -9,6 +9,7 @@ pub mod images;
 pub mod pairs;
 pub mod python;
 pub mod rendered;
+pub mod served;
 pub mod servo_line;
 
 use std::io::{BufRead, BufReader};

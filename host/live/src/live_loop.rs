@@ -50,6 +50,10 @@ pub struct Totals {
     pub bearings: u64,
     /// Number of exposures that were skipped, by reason.
     pub skipped: BTreeMap<SkipReason, u64>,
+    /// Number of trigger pulses that the board told of. Each is a result, skipped for a [reason of pulses](SkipReason::is_of_pulse), or open.
+    pub pulses: u64,
+    /// Number of pulses, or of exposures of cameras that run freely, of which nothing is decided yet.
+    pub open: u64,
 }
 
 impl Totals {
@@ -159,6 +163,7 @@ impl LiveLoop {
             if work.is_none() {
                 work = newest.take().map(|exposed| self.start(exposed));
             }
+            let mut is_done = false;
             tokio::select! {
                 Some((side, event)) = self.events.recv() => {
                     self.take_event(side, event);
@@ -166,6 +171,7 @@ impl LiveLoop {
                 mark = next(&mut self.marks) => match mark {
                     Some(mark) => {
                         let base = self.base();
+                        totals.pulses += 1;
                         self.exposures.pulse(&mark, &base);
                     }
                     None => return Err(LiveError::LinkEnded.into()),
@@ -173,17 +179,12 @@ impl LiveLoop {
                 (exposed_at, done) = finished(&mut work) => {
                     work = None;
                     self.conclude(exposed_at, done, totals, &mut publish)?;
-                    if limits.results.is_some_and(|most| totals.clouds + totals.bearings >= most) {
-                        return Ok(Ended::Done);
-                    }
+                    is_done = limits.results.is_some_and(|most| totals.clouds + totals.bearings >= most);
                 }
                 _ = settle.tick() => {
                     let base = self.base();
                     self.exposures.settle(self.clock.now(), &base);
-                    totals.skipped.clone_from(self.exposures.skipped());
-                    if deadline.is_some_and(|deadline| Instant::now() >= deadline) {
-                        return Ok(Ended::Done);
-                    }
+                    is_done = deadline.is_some_and(|deadline| Instant::now() >= deadline);
                 }
             }
             if self.has_ended() != had_ended {
@@ -194,6 +195,11 @@ impl LiveLoop {
                 if newest.replace(exposed).is_some() {
                     self.exposures.skip(SkipReason::NewerCame);
                 }
+            }
+            totals.skipped.clone_from(self.exposures.skipped());
+            totals.open = self.exposures.open() + u64::from(newest.is_some()) + u64::from(work.is_some());
+            if is_done {
+                return Ok(Ended::Done);
             }
             self.exposures.take_ambiguity().map(in_words).into_iter().for_each(&mut warn);
             if blindness.note(self.exposures.gone(), &mut warn) && work.is_none() {

@@ -6,7 +6,7 @@ const CELLS = 3;
 
 export function showCapture(link, pictures) {
   link.on('capture', (progress) => {
-    const { views, wanted, advice, cameras, verdicts, is_still: isStill } = progress;
+    const { views, wanted, advice, cameras, poses, verdicts, is_still: isStill } = progress;
     document.body.classList.add('captures');
     document.body.classList.toggle('mono', cameras.length === 1);
     byId('capture').hidden = false;
@@ -18,10 +18,19 @@ export function showCapture(link, pictures) {
     byId('capture-progress').value = shares.reduce((sum, share) => sum + share, 0);
     const seen = cameras.some(({ corners }) => corners.length > 0);
     const target = isOver ? '' : !seen ? '; no target seen' : isStill ? '; the target is held still' : '; the target moves: hold it still';
-    byId('capture-count').textContent = `${views} views (${wanted} at most)${target}`;
-    const said = advice === null ? 'The set is complete.' : isOver ? 'The views are taken, but not all that are needed.' : advice;
+    // At each pose of a stage there are so many views, whatever they cover.
+    const drives = poses.length > 0;
+    const most = drives ? `${views} of ${wanted} views at this pose` : `${views} views (${wanted} at most)`;
+    byId('capture-count').textContent = cameras.length ? `${most}${target}` : '';
+    const complete = drives ? isOver ? 'The views are taken.' : 'show the target elsewhere, or tilted' : 'The set is complete.';
+    const said = advice === null || (drives && isOver) ? complete : isOver ? 'The views are taken, but not all that are needed.' : advice;
     // Set only when it changes: a screen reader says it again otherwise.
     if (byId('capture-advice').textContent !== said) byId('capture-advice').textContent = said;
+    byId('capture-poses').replaceChildren(...poses.map(({ name, views: taken }) => {
+      const item = document.createElement('li');
+      item.textContent = `${name}: ${taken} of ${wanted} views${taken >= wanted ? ' ✓' : ''}`;
+      return item;
+    }));
     if (byId('capture-verdicts').childElementCount !== verdicts.length) {
       byId('capture-verdicts').replaceChildren(...verdicts.map((verdict) => {
         const item = document.createElement('li');

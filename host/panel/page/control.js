@@ -4,6 +4,7 @@ const byId = (id) => document.getElementById(id);
 export function showControl(link) {
   let control = { driver: null, asking: [], pages: 0 };
   let modes = [];
+  let isRecording = false;
   const stop = () => link.send({ do: 'stop' });
   byId('stop').addEventListener('click', stop);
   // Before anything else that the space bar would do. A key that is held repeats, and one stop is enough.
@@ -20,6 +21,11 @@ export function showControl(link) {
   byId('take').addEventListener('click', () => link.send({ do: link.drives ? 'hand_over' : 'take' }));
 
   const update = () => {
+    for (const button of document.querySelectorAll('#modes button, #home, #clear')) {
+      button.disabled = !link.drives;
+      button.title = isRecording ? 'this is a recording: nothing can be driven' : link.drives ? '' : 'take control first';
+    }
+    if (isRecording) return;
     const { driver, asking, pages } = control;
     const asked = asking.includes(link.you);
     const who = link.drives ? 'you drive' : driver === null ? 'nobody drives' : `page ${driver} drives, you watch`;
@@ -31,10 +37,10 @@ export function showControl(link) {
       : asked ? 'Asked for control' : driver === null ? 'Take control' : 'Ask for control';
     take.disabled = asked;
     take.classList.toggle('asked', link.drives && asking.length > 0);
-    for (const button of document.querySelectorAll('#modes button, #home, #clear')) button.disabled = !link.drives;
   };
   link.on('hello', (hello) => {
     modes = hello.modes;
+    isRecording = hello.recorded_ms !== null;
     byId('modes').replaceChildren(...modes.map(({ name }) => {
       const button = document.createElement('button');
       button.type = 'button';

@@ -11,10 +11,13 @@ import { showTopView } from './top_view.js';
 import { showPlots } from './plots.js';
 import { showPlan } from './plan.js';
 import { showCapture } from './capture.js';
+import { showPlayback } from './playback.js';
 import { showLog } from './log.js';
 
 const link = connect();
 showHealth(link);
+// Before the controls: it takes the space bar where nothing can be stopped.
+showPlayback(link);
 showControl(link);
 showAxes(link);
 const pictures = showPictures(link);

@@ -28,7 +28,7 @@ export function showPictures(link) {
     }
     const zoom = Math.min(canvas.width / image.width, canvas.height / image.height);
     const [left, top] = [(canvas.width - zoom * image.width) / 2, (canvas.height - zoom * image.height) / 2];
-    context.drawImage(image, left, top, zoom * image.width, zoom * image.height);
+    context.drawImage(image.bitmap, left, top, zoom * image.width, zoom * image.height);
     overlay?.(context, index, { zoom, left, top, dots });
     if (!cloud) return;
     const place = (point) => [0, 1].map((axis) => [left, top][axis] + zoom * (cloud.detail(point, 6 + 2 * index + axis) + 0.5));
@@ -51,8 +51,10 @@ export function showPictures(link) {
     }
   }
 
-  link.on('picture', async ({ side, buffer, at }) => {
-    images[side] = await createImageBitmap(new Blob([new Uint8Array(buffer, at)], { type: 'image/jpeg' }));
+  // Width and height are those of the camera's image; the picture may be smaller.
+  link.on('picture', async ({ side, width, height, buffer, at }) => {
+    const bitmap = await createImageBitmap(new Blob([new Uint8Array(buffer, at)], { type: 'image/jpeg' }));
+    images[side] = { bitmap, width, height };
     all();
   });
   link.on('cloud', (message) => {

@@ -17,7 +17,11 @@ export function showPoint(link, cloud, pictures) {
     const context = canvas.getContext('2d');
     context.imageSmoothingEnabled = false;
     const half = PATCH_PX / 2;
-    if (image) context.drawImage(image, u + 0.5 - half, v + 0.5 - half, PATCH_PX, PATCH_PX, 0, 0, PATCH_PX, PATCH_PX);
+    if (image) {
+      const scale = image.bitmap.width / image.width;
+      const [x, y, size] = [u + 0.5 - half, v + 0.5 - half, PATCH_PX].map((pixels) => scale * pixels);
+      context.drawImage(image.bitmap, x, y, size, size, 0, 0, PATCH_PX, PATCH_PX);
+    }
     context.strokeStyle = '#fff';
     context.strokeRect(Math.floor(half) - 2.5, Math.floor(half) - 2.5, 6, 6);
     return canvas;

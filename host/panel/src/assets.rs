@@ -21,6 +21,7 @@ const FILES: &[(&str, &str, &str)] = &[
     ("/top_view.js", JAVASCRIPT, include_str!("../page/top_view.js")),
     ("/plots.js", JAVASCRIPT, include_str!("../page/plots.js")),
     ("/capture.js", JAVASCRIPT, include_str!("../page/capture.js")),
+    ("/playback.js", JAVASCRIPT, include_str!("../page/playback.js")),
     ("/plan.js", JAVASCRIPT, include_str!("../page/plan.js")),
     ("/log.js", JAVASCRIPT, include_str!("../page/log.js")),
 ];

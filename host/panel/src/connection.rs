@@ -9,7 +9,7 @@ use futures_util::{SinkExt, StreamExt};
 use serde_json::json;
 use tokio::sync::mpsc::{Receiver, Sender, channel};
 use tokio::time::{sleep, timeout};
-use vergence_rig::{AxisPosition, rounded};
+use vergence_rig::{AxisPosition, Rig, rounded};
 
 use crate::hub::{Hub, text_message};
 use crate::message::{GoalOrder, PageMessage};
@@ -21,8 +21,9 @@ use crate::view::{PIXEL_SIGMA, sphere_message, view_json};
 const PATIENCE: Duration = Duration::from_secs(30);
 /// Answers that may wait for a page.
 const ANSWERS_KEPT: usize = 8;
-/// Shortest time between two maps of the view.
+/// Shortest time between two views from above, and between two maps of all directions, which cost some milliseconds each.
 const VIEW_PACE: Duration = Duration::from_millis(150);
+const SPHERE_PACE: Duration = Duration::from_millis(500);
 /// The view is computed anew when an axis is this far from where it was, in millimetres or radians.
 const SMALL_STEP: f64 = 1e-3;
 
@@ -101,23 +102,29 @@ fn plan(hub: &Arc<Hub>, order: GoalOrder, answer: &Sender<Outgoing>) -> Result<(
     Ok(())
 }
 
-/// Computes what the cameras see each time that the stages are elsewhere.
+/// Follows the stages with the view from above and with the map of all directions, each at its pace, while pages are open.
 pub async fn follow_view(hub: Arc<Hub>) {
-    let (mut places, mut shown) = (hub.place.subscribe(), None::<Vec<f64>>);
+    tokio::join!(
+        follow_stages(&hub, Stream::View, VIEW_PACE, |rig, values| text_message(&view_json(rig, values))),
+        follow_stages(&hub, Stream::Sphere, SPHERE_PACE, sphere_message),
+    );
+}
+
+/// Makes a message each time that the stages are elsewhere, at most once in `pace`.
+async fn follow_stages(hub: &Hub, stream: Stream, pace: Duration, message: fn(&Rig, &[f64]) -> Outgoing) {
+    let (mut places, mut pages, mut shown) = (hub.place.subscribe(), hub.pages.subscribe(), None::<Vec<f64>>);
     places.mark_changed();
-    while places.changed().await.is_ok() {
+    // The hub keeps both senders: they are not closed.
+    while pages.wait_for(|count| *count > 0).await.is_ok() && places.changed().await.is_ok() {
         let Some(values) = places.borrow_and_update().clone() else { continue };
         let near = |(a, b): (&f64, &f64)| (a - b).abs() < SMALL_STEP;
         if shown.as_ref().is_some_and(|shown| shown.iter().zip(&values).all(near)) {
             continue;
         }
         let (rig, at) = (Arc::clone(&hub.setting.rig), values.clone());
-        let computed =
-            tokio::task::spawn_blocking(move || (text_message(&view_json(&rig, &at)), sphere_message(&rig, &at)));
-        let Ok((view, sphere)) = computed.await else { continue };
-        hub.put(Stream::View, view);
-        hub.put(Stream::Sphere, sphere);
+        let Ok(computed) = tokio::task::spawn_blocking(move || message(&rig, &at)).await else { continue };
+        hub.put(stream, computed);
         shown = Some(values);
-        sleep(VIEW_PACE).await;
+        sleep(pace).await;
     }
 }

@@ -4,6 +4,7 @@ use std::net::SocketAddr;
 
 use vergence_board::BoardError;
 use vergence_live::LiveError;
+use vergence_recording::RecordingError;
 
 /// Why the panel cannot be shown, or ended. The text is a sentence.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
@@ -17,6 +18,9 @@ pub enum PanelError {
         /// What the operating system says.
         why: String,
     },
+    /// The address lets other computers in, and nobody said so.
+    #[error("{0} lets other computers in: add --network, which makes a token that they need")]
+    OtherComputers(SocketAddr),
     /// The server cannot begin.
     #[error("the server of the panel does not start: {0}")]
     Server(String),
@@ -26,4 +30,7 @@ pub enum PanelError {
     /// The live loop failed.
     #[error(transparent)]
     Live(#[from] LiveError),
+    /// The recording failed.
+    #[error(transparent)]
+    Recording(#[from] RecordingError),
 }

@@ -29,6 +29,19 @@ pub struct Setting {
     pub simulated: Option<String>,
     /// Whether cameras deliver images.
     pub has_cameras: bool,
+    /// When a recording was begun that is shown in the place of a rig, in milliseconds since 1970; `None` of a rig that is there.
+    pub recorded_ms: Option<u64>,
+}
+
+/// How a recording shall be played.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Wish {
+    /// Whether it is held.
+    pub is_paused: bool,
+    /// Counts the jumps.
+    pub jumps: u64,
+    /// Where the last jump led, so long after the first event.
+    pub jump_to: Duration,
 }
 
 /// An order, and how often the rig had been halted when it was given: a stop takes back what waits.
@@ -62,6 +75,10 @@ pub struct Hub {
     pub place: watch::Sender<Option<Vec<f64>>>,
     /// The images that were measured last.
     pub images: watch::Sender<Images>,
+    /// Number of open pages: what none would see is not computed.
+    pub pages: watch::Sender<usize>,
+    /// How the pages want a recording to be played.
+    pub wish: watch::Sender<Wish>,
     /// Lets one search for a pose run at a time.
     pub planning: Arc<Semaphore>,
     orders: mpsc::Sender<Given>,
@@ -91,6 +108,8 @@ impl Hub {
             referenced: watch::Sender::new(referenced),
             place: watch::Sender::new(place),
             images: watch::Sender::new([None, None]),
+            pages: watch::Sender::new(0),
+            wish: watch::Sender::new(Wish::default()),
             planning: Arc::new(Semaphore::new(1)),
             orders,
         };
@@ -162,6 +181,7 @@ impl Hub {
             return None;
         }
         let client = shared.operators.join(self.now());
+        self.pages.send_replace(shared.operators.count());
         publish_control(&mut shared);
         drop(shared);
         self.wake();
@@ -172,6 +192,7 @@ impl Hub {
     pub fn leave(&self, client: ClientId) {
         let mut shared = self.lock();
         let drove = shared.operators.leave(client);
+        self.pages.send_replace(shared.operators.count());
         publish_control(&mut shared);
         drop(shared);
         self.wake();
@@ -205,6 +226,10 @@ impl Hub {
         shared.operators.beat(client, self.now());
         let order = match message {
             PageMessage::Beat | PageMessage::Plan(_) => return Ok(()),
+            PageMessage::Pause | PageMessage::Resume | PageMessage::Jump { .. } => return self.play(&message),
+            _ if self.setting.recorded_ms.is_some() => {
+                return Err("this is a recording: there is no rig that could be driven".to_owned());
+            }
             PageMessage::Stop => {
                 drop(shared);
                 self.halt(&format!("asked by page {}", client.0));
@@ -232,6 +257,21 @@ impl Hub {
         };
         drop(shared);
         self.order(order)
+    }
+
+    /// Plays a recording as a page wants it.
+    fn play(&self, message: &PageMessage) -> Result<(), String> {
+        if self.setting.recorded_ms.is_none() {
+            return Err("this is no recording: it cannot be held".to_owned());
+        }
+        match message {
+            PageMessage::Jump { to_s } => {
+                let jump_to = Duration::try_from_secs_f64(*to_s).map_err(|_| format!("{to_s} s is no time"))?;
+                self.wish.send_modify(|wish| *wish = Wish { jumps: wish.jumps + 1, jump_to, ..*wish });
+            }
+            _ => self.wish.send_modify(|wish| wish.is_paused = *message == PageMessage::Pause),
+        }
+        Ok(())
     }
 
     /// Gives an order to the rig.
@@ -266,6 +306,7 @@ impl Hub {
             "rig": rig.name,
             "simulated": self.setting.simulated,
             "has_cameras": self.setting.has_cameras,
+            "recorded_ms": self.setting.recorded_ms,
             "has_trunk": rig.trunk.is_some(),
             "axes": axes.collect::<Vec<_>>(),
             "modes": modes.collect::<Vec<_>>(),

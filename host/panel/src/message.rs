@@ -35,6 +35,15 @@ pub enum PageMessage {
     },
     /// Find the pose that meets a goal; nothing moves.
     Plan(GoalOrder),
+    /// Hold a recording that is played.
+    Pause,
+    /// Play it on.
+    Resume,
+    /// Play it from elsewhere.
+    Jump {
+        /// Seconds after its first event.
+        to_s: f64,
+    },
 }
 
 /// The goal that a page asks for.

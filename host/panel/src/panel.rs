@@ -3,14 +3,13 @@
 use std::net::TcpListener;
 use std::sync::Arc;
 
-use image::RgbImage;
 use tokio::sync::mpsc::{Receiver, channel};
 use vergence_board::Board;
 use vergence_camera::CameraEvent;
 use vergence_live::LiveResult;
+use vergence_recording::Recording;
 use vergence_vision::Side;
 
-use crate::capture::{CaptureProgress, capture_message};
 use crate::cloud::cloud_message;
 use crate::driver::Driver;
 use crate::error::PanelError;
@@ -29,8 +28,8 @@ const EVENTS_KEPT: usize = 16;
 /// Shows a rig to pages. A clone shows the same.
 #[derive(Clone)]
 pub struct Panel {
-    hub: Arc<Hub>,
-    darkroom: Darkroom,
+    pub(crate) hub: Arc<Hub>,
+    pub(crate) darkroom: Darkroom,
 }
 
 impl Panel {
@@ -53,21 +52,31 @@ impl Panel {
     /// The board, whose poses the panel shows from now on.
     #[must_use]
     pub fn watching(&self, board: Board) -> Board {
-        let mut reporter = Reporter::new(Arc::clone(&self.hub), board.client());
-        board.observed(move |rig, pose| reporter.report(rig, pose))
+        let mut reporter = Reporter::new(Arc::clone(&self.hub));
+        let (knowledge, clock) = (board.client().knowledge(), board.client().clock());
+        board.observed(move |rig, pose| reporter.report(rig, pose, &knowledge, clock.now()))
     }
 
-    /// Passes camera events on and keeps each image that is developed. Images from before the axes have their reference are left out:
-    /// nobody knows where they were taken.
+    /// Passes camera events on and keeps each image that is developed for what comes after it. Images from before the axes have their
+    /// reference are left out: nobody knows where they were taken. `recording` has the others first.
     #[must_use]
-    pub fn tap(&self, mut events: Receiver<(Side, CameraEvent)>) -> Receiver<(Side, CameraEvent)> {
+    pub fn tap(
+        &self,
+        mut events: Receiver<(Side, CameraEvent)>,
+        recording: Option<&Recording>,
+    ) -> Receiver<(Side, CameraEvent)> {
         let (sender, out) = channel(EVENTS_KEPT);
         let (darkroom, referenced) = (self.darkroom.clone(), self.hub.referenced.subscribe());
+        let mut recorded = recording.map(Recording::cameras);
         tokio::spawn(async move {
             while let Some((side, event)) = events.recv().await {
                 if matches!(event, CameraEvent::Image(_)) && !*referenced.borrow() {
                     continue;
                 }
+                let event = match &mut recorded {
+                    Some(record) => record(side, event),
+                    None => event,
+                };
                 if sender.send((side, tapped(event, side, &darkroom))).await.is_err() {
                     return;
                 }
@@ -80,12 +89,6 @@ impl Panel {
     pub fn show(&self, result: &LiveResult<'_>) {
         self.hub.put(Stream::Cloud, cloud_message(result));
         self.hub.images.send_replace(self.darkroom.images());
-    }
-
-    /// Shows how far a set of target views has come, with the images of now.
-    pub fn show_capture(&self, progress: &CaptureProgress, images: [Option<Arc<RgbImage>>; 2]) {
-        self.hub.put(Stream::Capture, capture_message(progress));
-        self.hub.images.send_replace(images);
     }
 
     /// Adds a line to the log.

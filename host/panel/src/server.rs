@@ -12,6 +12,7 @@ use axum::response::{IntoResponse, Response};
 use axum::routing::{any, get};
 use tokio::sync::oneshot;
 use tokio::time::{MissedTickBehavior, interval};
+use vergence_board::{fresh_secret, hex};
 
 use crate::assets::{asset, secured};
 use crate::connection::{follow_view, serve_page};
@@ -23,6 +24,8 @@ use crate::streams::{Outgoing, Stream};
 
 /// Largest message of a page, in bytes.
 const LARGEST_MESSAGE: usize = 16 * 1024;
+/// The name of the threads that serve pages, as `/proc/PID/task/TID/comm` tells it.
+const THREADS: &str = "panel";
 /// How often it is checked whether the page that drives is silent.
 const CHECK: Duration = Duration::from_millis(100);
 
@@ -59,6 +62,24 @@ impl Drop for Serving {
     }
 }
 
+/// What accepts connections at `address`, and who may connect: this computer alone, or on a `network` who knows a token that is new each time.
+///
+/// # Errors
+/// [`PanelError::Listen`], [`PanelError::OtherComputers`]
+pub fn listen(address: SocketAddr, network: bool) -> Result<(TcpListener, Access), PanelError> {
+    let access = match (network, address.ip().is_loopback()) {
+        (true, _) => {
+            let secret = fresh_secret().map_err(|error| PanelError::Server(error.to_string()))?;
+            Access::Token(hex(&secret.public().0[..16]))
+        }
+        (false, true) => Access::ThisComputer,
+        (false, false) => return Err(PanelError::OtherComputers(address)),
+    };
+    let listener = TcpListener::bind(address);
+    let listener = listener.map_err(|error| PanelError::Listen { address, why: error.to_string() })?;
+    Ok((listener, access))
+}
+
 /// What every request needs.
 #[derive(Clone)]
 struct Served {
@@ -71,7 +92,9 @@ pub fn serve(hub: Arc<Hub>, listener: TcpListener, access: Access) -> Result<Ser
     let failed = |error: std::io::Error| PanelError::Server(error.to_string());
     let address = listener.local_addr().map_err(failed)?;
     listener.set_nonblocking(true).map_err(failed)?;
-    let runtime = tokio::runtime::Builder::new_current_thread().enable_all().build().map_err(failed)?;
+    // What pages cost is what the threads of this name take.
+    let runtime = tokio::runtime::Builder::new_current_thread().thread_name(THREADS).enable_all().build();
+    let runtime = runtime.map_err(failed)?;
     let (end, ended) = oneshot::channel::<()>();
     let url = match &access {
         Access::Token(token) => format!("http://{address}/?token={token}"),
@@ -83,7 +106,7 @@ pub fn serve(hub: Arc<Hub>, listener: TcpListener, access: Access) -> Result<Ser
         .route("/status", get(status))
         .fallback(get(file))
         .with_state(served);
-    let thread = std::thread::Builder::new().name("panel".to_owned()).spawn(move || {
+    let thread = std::thread::Builder::new().name(THREADS.to_owned()).spawn(move || {
         runtime.block_on(async {
             // Only a listener whose descriptor is closed is refused here, and it is open.
             let Ok(listener) = tokio::net::TcpListener::from_std(listener) else { return };

@@ -5,6 +5,7 @@ use std::future::pending;
 use vergence_board::Board;
 use vergence_live::{Ended, Limits, LiveLoop, LiveResult, Totals};
 use vergence_protocol::{Request, Trigger};
+use vergence_recording::{Recorded, Recording};
 
 use crate::driver::Driver;
 use crate::error::PanelError;
@@ -20,16 +21,30 @@ pub struct Session {
     pub trigger: Option<Trigger>,
     /// What measures; `None` without cameras.
     pub live: Option<LiveLoop>,
+    /// What records the cameras, by [`Panel::tap`], and here pulses and clouds.
+    pub recording: Option<Recording>,
+}
+
+/// What became of a session.
+#[derive(Clone, Debug)]
+pub struct Shown {
+    /// Why it ended.
+    pub ended: Ended,
+    /// Results and what was skipped.
+    pub totals: Totals,
+    /// What was recorded.
+    pub recorded: Option<Recorded>,
 }
 
 impl Session {
     /// Drives and measures until the link ends, the cameras are dead, or `interruption` completes; then the stages brake, the board is
-    /// disarmed, and its trigger is off.
+    /// disarmed, its trigger is off, and the recording is whole.
     ///
     /// # Errors
-    /// Those of the link and of the live loop.
-    pub async fn run(self, panel: &Panel, interruption: impl Future<Output = ()>) -> Result<Ended, PanelError> {
-        let Self { driver, mut board, trigger, live } = self;
+    /// Those of the link, of the live loop and of the recording.
+    pub async fn run(self, panel: &Panel, interruption: impl Future<Output = ()>) -> Result<Shown, PanelError> {
+        let Self { driver, mut board, trigger, live, recording } = self;
+        let mut totals = Totals::default();
         let driving = async {
             match &mut board {
                 Some(board) => Err(driver.drive(board, trigger).await.into()),
@@ -37,7 +52,7 @@ impl Session {
             }
         };
         let ended = tokio::select! {
-            ended = measure(panel, live) => ended,
+            ended = measure(panel, live, recording.as_ref(), &mut totals) => ended,
             error = driving => error,
             () = interruption => Ok(Ended::Done),
         };
@@ -45,10 +60,14 @@ impl Session {
             Some(board) => settle(board, trigger.is_some()).await,
             None => Ok(()),
         };
+        let recorded = match recording {
+            Some(recording) => recording.finish().await.map(Some),
+            None => Ok(None),
+        };
         // The first error names the cause.
         let ended = ended?;
         settled?;
-        Ok(ended)
+        Ok(Shown { ended, totals, recorded: recorded? })
     }
 }
 
@@ -63,11 +82,23 @@ async fn settle(board: &mut Board, fires: bool) -> Result<(), PanelError> {
     Ok(())
 }
 
-async fn measure(panel: &Panel, live: Option<LiveLoop>) -> Result<Ended, PanelError> {
-    let Some(mut live) = live else { return pending().await };
+async fn measure(
+    panel: &Panel,
+    live: Option<LiveLoop>,
+    recording: Option<&Recording>,
+    totals: &mut Totals,
+) -> Result<Ended, PanelError> {
+    let Some(live) = live else { return pending().await };
+    let (mut live, mut results) = match recording {
+        Some(recording) => (recording.marks_of(live), Some(recording.results())),
+        None => (live, None),
+    };
     let show = |result: LiveResult<'_>| {
         panel.show(&result);
+        if let Some(record) = &mut results {
+            record(&result);
+        }
         Ok(())
     };
-    live.run(Limits::default(), &mut Totals::default(), show, |warning| panel.warn(&warning)).await
+    live.run(Limits::default(), totals, show, |warning| panel.warn(&warning)).await
 }

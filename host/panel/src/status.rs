@@ -4,7 +4,7 @@ use std::sync::Arc;
 use std::time::Duration;
 
 use serde_json::{Value, json};
-use vergence_board::{BoardKnowledge, Client, HostClock, pose_json, positions};
+use vergence_board::{BoardKnowledge, pose_json, positions};
 use vergence_protocol::{ControllerState, Microseconds, PoseReport};
 use vergence_rig::{AxisPosition, Rig, rounded};
 
@@ -17,35 +17,41 @@ const PACE: Duration = Duration::from_millis(50);
 /// Tells the pages of every pose, as often as they have use for it.
 pub struct Reporter {
     hub: Arc<Hub>,
-    knowledge: BoardKnowledge,
-    clock: HostClock,
     told: Option<(Microseconds, ControllerState, bool)>,
 }
 
 impl Reporter {
-    /// Reports of the board behind `client`.
-    pub fn new(hub: Arc<Hub>, client: &Client) -> Self {
-        Self { hub, knowledge: client.knowledge(), clock: client.clock(), told: None }
+    /// Reports to the pages of `hub`.
+    pub const fn new(hub: Arc<Hub>) -> Self {
+        Self { hub, told: None }
     }
 
-    /// Tells of a pose.
-    pub fn report(&mut self, rig: &Rig, pose: &PoseReport) {
-        let (now, state) = (self.clock.now(), (pose.state, pose.fault.is_some()));
-        let early = |then: Microseconds| u128::from(now.0.saturating_sub(then.0)) < PACE.as_micros();
+    /// Tells of a pose at `now` on the clock of the link, of which `knowledge` is.
+    pub fn report(&mut self, rig: &Rig, pose: &PoseReport, knowledge: &BoardKnowledge, now: Microseconds) {
+        // Pages have a pace of their own, also where a recording is played faster.
+        let told_at = self.hub.clock.now();
+        let state = (pose.state, pose.fault.is_some());
+        let early = |then: Microseconds| u128::from(told_at.0.saturating_sub(then.0)) < PACE.as_micros();
         if self.told.is_some_and(|(then, before, fault)| early(then) && (before, fault) == state) {
             return;
         }
-        self.told = Some((now, state.0, state.1));
+        self.told = Some((told_at, state.0, state.1));
         let values = positions(rig, pose);
-        self.hub.put(Stream::Status, text_message(&self.json(rig, pose, &values)));
+        self.hub.put(Stream::Status, text_message(&self.json(rig, pose, &values, (knowledge, now))));
         self.hub.place.send_replace(Some(values.iter().map(|position| position.value()).collect()));
     }
 
-    fn json(&self, rig: &Rig, pose: &PoseReport, values: &[AxisPosition]) -> Value {
+    fn json(
+        &self,
+        rig: &Rig,
+        pose: &PoseReport,
+        values: &[AxisPosition],
+        (knowledge, now): (&BoardKnowledge, Microseconds),
+    ) -> Value {
         let Task { text, targets } = self.hub.task();
         let in_units = |all: &[AxisPosition]| -> Vec<f64> { all.iter().map(|at| rounded(at.mm_or_deg())).collect() };
-        let (map, statistics) = (self.knowledge.clock_map(), self.knowledge.statistics());
-        let error = map.board_at(self.clock.now()).map(|now| rounded(now.error_us));
+        let (map, statistics) = (knowledge.clock_map(), knowledge.statistics());
+        let error = map.board_at(now).map(|now| rounded(now.error_us));
         let mut status = pose_json(rig, pose);
         for (name, value) in [
             ("kind", json!("status")),

@@ -22,12 +22,14 @@ pub enum Stream {
     Sphere,
     /// How far a set of target views has come.
     Capture,
+    /// Where a recording stands that is played.
+    Playback,
     /// The last lines of the log.
     Log,
 }
 
 /// Number of streams.
-const COUNT: usize = 9;
+const COUNT: usize = 10;
 
 /// A message to a page; a clone shares its bytes.
 #[derive(Clone, Debug, PartialEq, Eq)]

@@ -54,6 +54,8 @@ topics! {
 /// A bag that is being written. `W` is its MCAP file.
 pub struct Bag<W: Write + Seek = BufWriter<File>> {
     file: PathBuf,
+    /// Where it has its `metadata.yaml`; `None` of a file alone.
+    metadata: Option<PathBuf>,
     writer: Writer<W>,
     channels: BTreeMap<Topic, (u16, u64)>,
     span: Option<(u64, u64)>,
@@ -73,31 +75,11 @@ impl Bag {
         let file = folder.join(FILE);
         let created = File::create(&file).map_err(write)?;
         let mut bag = Self::on(BufWriter::new(created), &file, rig)?;
+        bag.metadata = Some(folder.join("metadata.yaml"));
         bag.describe()?;
         // The rig file is on the disk before the first frame.
         bag.flush()?;
         Ok(bag)
-    }
-
-    /// Ends the bag: writes what is not on the disk yet, and the index.
-    ///
-    /// # Errors
-    /// As [`Bag::create`].
-    pub fn finish(mut self) -> Result<(), RecordingError> {
-        self.writer.finish().map_err(|error| RecordingError::write(&self.file, &error))?;
-        self.describe()
-    }
-
-    /// Writes `metadata.yaml` as it is now.
-    fn describe(&self) -> Result<(), RecordingError> {
-        let topics: Vec<_> = self
-            .channels
-            .iter()
-            .map(|(topic, &(_, count))| TopicCount { name: topic.name, kind: topic.kind, count })
-            .collect();
-        let path = self.file.with_file_name("metadata.yaml");
-        let written = std::fs::write(&path, metadata(FILE, self.span, &topics));
-        written.map_err(|error| RecordingError::write(&path, &error.into()))
     }
 }
 
@@ -123,7 +105,7 @@ impl<W: Write + Seek> Bag<W> {
             data,
         };
         writer.attach(&attachment).map_err(fail)?;
-        Ok(Self { file: file.to_owned(), writer, channels: BTreeMap::new(), span: None })
+        Ok(Self { file: file.to_owned(), metadata: None, writer, channels: BTreeMap::new(), span: None })
     }
 
     /// Appends a message of `topic`, heard at `at_ns` nanoseconds since 1970.
@@ -150,6 +132,27 @@ impl<W: Write + Seek> Bag<W> {
     /// As [`Bag::write`].
     pub fn flush(&mut self) -> Result<(), RecordingError> {
         self.writer.flush().map_err(|error| RecordingError::write(&self.file, &error))
+    }
+
+    /// Ends the bag: writes what is not on the disk yet, and the index.
+    ///
+    /// # Errors
+    /// As [`Bag::create`].
+    pub fn finish(mut self) -> Result<(), RecordingError> {
+        self.writer.finish().map_err(|error| RecordingError::write(&self.file, &error))?;
+        self.describe()
+    }
+
+    /// Writes `metadata.yaml` as it is now.
+    fn describe(&self) -> Result<(), RecordingError> {
+        let Some(path) = &self.metadata else { return Ok(()) };
+        let topics: Vec<_> = self
+            .channels
+            .iter()
+            .map(|(topic, &(_, count))| TopicCount { name: topic.name, kind: topic.kind, count })
+            .collect();
+        let written = std::fs::write(path, metadata(FILE, self.span, &topics));
+        written.map_err(|error| RecordingError::write(path, &error.into()))
     }
 
     fn channel(&mut self, topic: Topic) -> Result<u16, RecordingError> {

@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 use mcap::McapError;
 
 /// Why a recording cannot be written or read. The text is a sentence.
-#[derive(Debug, thiserror::Error)]
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum RecordingError {
     /// The folder holds something already.

@@ -2,11 +2,13 @@
 
 use std::collections::BTreeMap;
 use std::fs::File;
-use std::io::{BufReader, Read};
+use std::io::{BufReader, Read, Seek};
 use std::path::{Path, PathBuf};
+use std::time::Duration;
 
 use image::{ImageFormat, RgbImage};
 use mcap::records::{Record, op};
+use mcap::sans_io::summary_reader::{SummaryReadEvent, SummaryReader};
 use mcap::sans_io::{LinearReadEvent, LinearReader, LinearReaderOptions};
 
 use crate::RecordingError;
@@ -23,6 +25,10 @@ pub struct Reader {
     topics: BTreeMap<u16, String>,
     rig: Option<String>,
     images: [Option<Vec<u8>>; 2],
+    /// Images that were heard before this time are not decoded, in microseconds of the host's clock.
+    decode_from_us: u64,
+    /// Nanoseconds since 1970 at which the first event was heard.
+    begun_ns: Option<u64>,
     is_finished: bool,
 }
 
@@ -33,7 +39,7 @@ pub struct Heard {
     pub host_us: u64,
     /// The event.
     pub event: Event,
-    /// The image of [`Event::Image`].
+    /// The image of [`Event::Image`], unless it is left out.
     pub image: Option<RgbImage>,
 }
 
@@ -49,7 +55,46 @@ impl Reader {
         let options = LinearReaderOptions::default().with_skip_end_magic(true).with_validate_chunk_crcs(true);
         let records = LinearReader::new_with_options(options);
         let bytes = BufReader::new(bytes);
-        Ok(Self { file, bytes, records, topics: BTreeMap::new(), rig: None, images: [None, None], is_finished: false })
+        Ok(Self {
+            file,
+            bytes,
+            records,
+            topics: BTreeMap::new(),
+            rig: None,
+            images: [None, None],
+            decode_from_us: 0,
+            begun_ns: None,
+            is_finished: false,
+        })
+    }
+
+    /// How long the recording is, from its first to its last message; `None` where its end is missing.
+    #[must_use]
+    pub fn length(&self) -> Option<Duration> {
+        let mut file = File::open(&self.file).ok()?;
+        let mut summary = SummaryReader::new();
+        while let Some(event) = summary.next_event() {
+            match event.ok()? {
+                SummaryReadEvent::ReadRequest(count) => {
+                    let read = file.read(summary.insert(count)).ok()?;
+                    summary.notify_read(read);
+                }
+                SummaryReadEvent::SeekRequest(place) => summary.notify_seeked(file.seek(place).ok()?),
+            }
+        }
+        let found = summary.finish()?.stats?;
+        Some(Duration::from_nanos(found.message_end_time.saturating_sub(found.message_start_time)))
+    }
+
+    /// When the first event was heard, in nanoseconds since 1970; `None` before it was read.
+    #[must_use]
+    pub const fn begun_ns(&self) -> Option<u64> {
+        self.begun_ns
+    }
+
+    /// Leaves images out that were heard before `host_us`: their events come without them.
+    pub const fn decode_from(&mut self, host_us: u64) {
+        self.decode_from_us = host_us;
     }
 
     /// The rig file that is attached; it precedes all events.
@@ -115,7 +160,10 @@ impl Reader {
                 self.rig = Some(text.map_err(|_| self.foreign("the attached rig file"))?);
             }
             Record::Message { header, data } => match self.topics.get(&header.channel_id).map(String::as_str) {
-                Some(topic) if topic == EVENTS.name => return self.event(&data).map(Some),
+                Some(topic) if topic == EVENTS.name => {
+                    self.begun_ns.get_or_insert(header.log_time);
+                    return self.event(&data).map(Some);
+                }
                 Some(topic) if topic == LEFT_IMAGE.name => self.images[0] = Some(self.image(&data)?),
                 Some(topic) if topic == RIGHT_IMAGE.name => self.images[1] = Some(self.image(&data)?),
                 _ => {}
@@ -133,7 +181,7 @@ impl Reader {
         let (host_us, postcard) = number_and_bytes(message).ok_or_else(|| self.foreign("an event"))?;
         let event: Event = postcard::from_bytes(postcard).map_err(|_| self.foreign("an event"))?;
         let image = match event {
-            Event::Image(eye, _) => Some(self.decoded(eye)?),
+            Event::Image(eye, _) if host_us >= self.decode_from_us => Some(self.decoded(eye)?),
             _ => None,
         };
         Ok(Heard { host_us, event, image })

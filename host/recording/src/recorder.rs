@@ -1,15 +1,15 @@
-//! What the rig says while it is recorded, turned into messages and written by a thread of its own.
+//! Takes what the rig says while it is recorded; a task writes it to the disk.
 
+use std::io::{Seek, Write};
 use std::path::Path;
-use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Arc, LazyLock};
 
 use image::RgbImage;
-use tokio::sync::mpsc::{Receiver, Sender, channel, error::TrySendError};
 use tokio::task::spawn_blocking;
 use vergence_board::BoardNews;
 use vergence_camera::{CameraError, CameraEvent, Develop, PendingImage};
-use vergence_pipeline::PairCloud;
+use vergence_live::LiveResult;
+use vergence_pipeline::{ColouredPoint, Observation, PairCloud};
 use vergence_protocol::{Microseconds, TriggerMark};
 use vergence_rig::{Rig, RigPose};
 use vergence_vision::Side;
@@ -17,30 +17,64 @@ use vergence_vision::Side;
 use crate::RecordingError;
 use crate::bag::{self, Bag};
 use crate::event::{Beginning, Event, Eye, Stamp};
-use crate::messages;
-use crate::png::Png;
-
-/// Number of entries that may wait for the disk: about a second of a bench with its poses.
-const WAITING: usize = 1024;
-
-/// An image that is made once, by whoever wants it first.
-type Developed = Arc<LazyLock<Result<RgbImage, CameraError>, Develop>>;
+use crate::queue::{LeftOut, MOST_BYTES, Queue, Weighed};
+use crate::scribe::Scribe;
 
 /// An entry on its way to the disk.
-enum Entry {
+pub enum Entry {
+    /// What the live loop heard.
     Event(Microseconds, Event),
+    /// An image, whose event follows it in the recording.
     Image(Microseconds, Eye, Stamp, Developed),
+    /// What was measured of an exposure at this time.
     Cloud(Microseconds, Box<(PairCloud, RigPose)>),
+    /// A sentence for people.
     Warning(Microseconds, String),
-    End,
 }
 
-/// Takes what the live loop hears and finds. Clones write to the same recording. It never waits: what the disk has no time for is counted and
-/// left out.
+/// An image that waits, with the size that it has or will have in memory.
+#[derive(Clone)]
+pub struct Developed {
+    image: Arc<LazyLock<Result<RgbImage, CameraError>, Develop>>,
+    bytes: usize,
+}
+
+impl Developed {
+    /// The image, which is made now if nobody has made it yet.
+    ///
+    /// # Errors
+    /// Those of its camera.
+    pub fn get(&self) -> &Result<RgbImage, CameraError> {
+        &self.image
+    }
+}
+
+impl Weighed for Entry {
+    fn bytes(&self) -> usize {
+        size_of::<Self>()
+            + match self {
+                Self::Image(_, _, _, developed) => developed.bytes,
+                Self::Cloud(_, measured) => measured.0.points.len() * size_of::<ColouredPoint>(),
+                Self::Event(..) | Self::Warning(..) => 0,
+            }
+    }
+
+    fn counter<'a>(&self, left_out: &'a mut LeftOut) -> Option<&'a mut u64> {
+        match self {
+            Self::Image(..) => Some(&mut left_out.images),
+            Self::Cloud(..) => Some(&mut left_out.clouds),
+            Self::Event(..) | Self::Warning(..) => None,
+        }
+    }
+}
+
+/// Takes what the live loop hears and finds. Clones write to the same recording. It never waits: images and clouds for which the disk has no
+/// time are counted and left out; all else is kept.
 #[derive(Clone)]
 pub struct Recorder {
-    entries: Sender<Entry>,
-    left_out: Arc<AtomicU64>,
+    queue: Queue<Entry>,
+    /// Bytes of an image of each camera in memory.
+    image_bytes: [usize; 2],
 }
 
 /// What became of a recording.
@@ -48,8 +82,8 @@ pub struct Recorder {
 pub struct Recorded {
     /// Number of images that were written.
     pub images: u64,
-    /// Number of images, readings and clouds for which the disk had no time.
-    pub left_out: u64,
+    /// For how many images and clouds the disk had no time.
+    pub left_out: LeftOut,
 }
 
 /// The task that writes.
@@ -62,10 +96,23 @@ impl Recorder {
     /// # Errors
     /// A folder that holds something, a file that cannot be written; a rig that no file can hold.
     pub fn start(folder: &Path, rig: &Rig, rig_file: &str, epoch_us: u64) -> Result<(Self, Writing), RecordingError> {
-        let bag = Bag::create(folder, rig_file)?;
-        let (entries, waiting) = channel(WAITING);
-        let task = tokio::spawn(write(Scribe { bag, rig: rig.clone(), epoch_us, images: 0 }, waiting));
-        Ok((Self { entries, left_out: Arc::default() }, Writing(task)))
+        Ok(Self::on(Bag::create(folder, rig_file)?, rig, epoch_us, MOST_BYTES))
+    }
+
+    /// Begins a recording of `rig` in `bag`; images and clouds of `most_bytes` in memory may wait for it.
+    pub(crate) fn on<W: Write + Seek + Send + 'static>(
+        bag: Bag<W>,
+        rig: &Rig,
+        epoch_us: u64,
+        most_bytes: usize,
+    ) -> (Self, Writing) {
+        let queue = Queue::new(most_bytes);
+        let task = tokio::spawn(write(Scribe::new(bag, rig.clone(), epoch_us), queue.clone()));
+        let image_bytes = [&rig.left_camera, &rig.right_camera].map(|lens| {
+            let size = lens.size();
+            3 * size.width as usize * size.height as usize
+        });
+        (Self { queue, image_bytes }, Writing(task))
     }
 
     /// Notes how the recording begins.
@@ -103,17 +150,23 @@ impl Recorder {
                 CameraEvent::Lost(why)
             }
             CameraEvent::Image(PendingImage { seq, middle, develop }) => {
-                let developed: Developed = Arc::new(LazyLock::new(develop));
+                // Developed once, by whoever wants it first.
+                let bytes = self.image_bytes[side.index()];
+                let developed = Developed { image: Arc::new(LazyLock::new(develop)), bytes };
                 let stamp = Stamp { seq, middle_us: middle.us, error_us: middle.error_us };
-                self.put(Entry::Image(now, eye, stamp, Arc::clone(&developed)));
-                CameraEvent::Image(PendingImage { seq, middle, develop: Box::new(move || (**developed).clone()) })
+                self.put(Entry::Image(now, eye, stamp, developed.clone()));
+                CameraEvent::Image(PendingImage { seq, middle, develop: Box::new(move || developed.get().clone()) })
             }
         }
     }
 
-    /// Notes a cloud of the pair that was exposed at `exposed` on the host's clock.
-    pub fn cloud(&self, exposed: Microseconds, cloud: &PairCloud, pose: &RigPose) {
-        self.put(Entry::Cloud(exposed, Box::new((cloud.clone(), pose.clone()))));
+    /// Notes a result of the live loop at `now` on the clock of its exposures: a cloud with its pose. Bearings are in the images.
+    pub fn result(&self, now: Microseconds, result: &LiveResult<'_>) {
+        if let Observation::Points { cloud, pose, .. } = &result.measurement.observation {
+            let latency = u64::try_from(result.latency.as_micros()).unwrap_or(u64::MAX);
+            let exposed = Microseconds(now.0.saturating_sub(latency));
+            self.put(Entry::Cloud(exposed, Box::new((PairCloud::clone(cloud), RigPose::clone(pose)))));
+        }
     }
 
     /// Notes a sentence for people.
@@ -122,9 +175,7 @@ impl Recorder {
     }
 
     fn put(&self, entry: Entry) {
-        if let Err(TrySendError::Full(_)) = self.entries.try_send(entry) {
-            self.left_out.fetch_add(1, Ordering::Relaxed);
-        }
+        self.queue.put(entry);
     }
 }
 
@@ -134,95 +185,145 @@ impl Writing {
     /// # Errors
     /// [`RecordingError::Write`], [`RecordingError::DiskFull`]
     pub async fn finish(self, recorder: Recorder) -> Result<Recorded, RecordingError> {
-        // Nobody listens where writing has failed; its error follows.
-        let _ = recorder.entries.send(Entry::End).await;
+        recorder.queue.close();
         let images = self.0.await.map_err(unwritten)??;
-        Ok(Recorded { images, left_out: recorder.left_out.load(Ordering::Relaxed) })
+        Ok(Recorded { images, left_out: recorder.queue.left_out() })
     }
 }
 
 /// What cannot become bytes, whatever the disk.
-fn unwritten(error: impl std::fmt::Display) -> RecordingError {
+pub fn unwritten(error: impl std::fmt::Display) -> RecordingError {
     RecordingError::Write { file: Path::new(bag::FILE).to_owned(), why: error.to_string() }
 }
 
-/// Writes until the end.
-async fn write(mut scribe: Scribe, mut waiting: Receiver<Entry>) -> Result<u64, RecordingError> {
-    while let Some(entry) = waiting.recv().await.filter(|entry| !matches!(entry, Entry::End)) {
-        // Coding an image takes a while; a simulated clock stands still meanwhile.
-        let (back, outcome) = spawn_blocking(move || {
-            let outcome = scribe.write(entry);
+/// Writes until the queue is closed. After an error, nothing waits for the disk any more.
+async fn write<W: Write + Seek + Send + 'static>(
+    mut scribe: Scribe<W>,
+    queue: Queue<Entry>,
+) -> Result<u64, RecordingError> {
+    while queue.is_filled().await {
+        // One thread writes all that waits. Then it ends: a simulated clock stands still as long as it works.
+        let entries = queue.clone();
+        let written = spawn_blocking(move || {
+            let outcome = std::iter::from_fn(|| entries.take()).try_for_each(|entry| scribe.write(entry));
             (scribe, outcome)
-        })
-        .await
-        .map_err(unwritten)?;
+        });
+        let (back, outcome) = written.await.map_err(unwritten)?;
         scribe = back;
-        outcome?;
+        if let Err(error) = outcome {
+            queue.abandon();
+            return Err(error);
+        }
     }
-    let images = scribe.images;
-    scribe.bag.finish()?;
-    Ok(images)
+    scribe.finish()
 }
 
-/// Turns entries into messages.
-struct Scribe {
-    bag: Bag,
-    rig: Rig,
-    epoch_us: u64,
-    images: u64,
-}
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::expect_used, reason = "a test may fail")]
 
-impl Scribe {
-    fn ns(&self, at: Microseconds) -> u64 {
-        (self.epoch_us + at.0) * 1000
-    }
+    use std::fs::File;
+    use std::io::{self, SeekFrom};
+    use std::sync::{Condvar, Mutex};
 
-    fn write(&mut self, entry: Entry) -> Result<(), RecordingError> {
-        match entry {
-            Entry::Event(now, event) => {
-                if let Event::Pose(pose) = &event {
-                    let at = self.ns(now);
-                    self.bag.write(bag::JOINTS, at, &messages::joint_state(at, &self.rig.axes, pose))?;
-                }
-                self.event(now, &event)
-            }
-            Entry::Image(now, eye, stamp, developed) => match &**developed {
-                Ok(image) => self.image(now, eye, stamp, image),
-                // The live loop names it too.
-                Err(error) => self.warning(now, &error.to_string()),
-            },
-            Entry::Cloud(exposed, measured) => {
-                let ((cloud, pose), at) = (*measured, self.ns(exposed));
-                self.bag.write(bag::TRANSFORMS, at, &messages::transforms(at, &pose))?;
-                self.bag.write(bag::POINTS, at, &messages::cloud(at, &cloud))
-            }
-            Entry::Warning(now, sentence) => self.warning(now, &sentence),
-            Entry::End => Ok(()),
+    use vergence_protocol::{AxisList, Counts};
+    use vergence_rig::{BENCH_TOML, HostInstant};
+
+    use super::*;
+    use crate::Reader;
+
+    /// A disk that writes nothing before it is opened.
+    #[derive(Clone, Default)]
+    struct Gate(Arc<(Mutex<bool>, Condvar)>);
+
+    impl Gate {
+        fn open(&self) {
+            *self.0.0.lock().expect("a lock") = true;
+            self.0.1.notify_all();
+        }
+
+        fn pass(&self) {
+            let is_open = self.0.0.lock().expect("a lock");
+            drop(self.0.1.wait_while(is_open, |is_open| !*is_open).expect("a lock"));
         }
     }
 
-    fn warning(&mut self, now: Microseconds, sentence: &str) -> Result<(), RecordingError> {
-        let at = self.ns(now);
-        self.bag.write(bag::DIAGNOSTICS, at, &messages::diagnostic(at, "vergence", sentence))
+    struct Slow(File, Gate);
+
+    impl Write for Slow {
+        fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
+            self.1.pass();
+            self.0.write(bytes)
+        }
+
+        fn flush(&mut self) -> io::Result<()> {
+            self.0.flush()
+        }
     }
 
-    fn event(&mut self, now: Microseconds, event: &Event) -> Result<(), RecordingError> {
-        // Memory is the only limit of an event's encoding.
-        let postcard = postcard::to_allocvec(event).map_err(unwritten)?;
-        self.bag.write(bag::EVENTS, self.ns(now), &messages::event(now.0, &postcard))
+    impl Seek for Slow {
+        fn seek(&mut self, place: SeekFrom) -> io::Result<u64> {
+            self.0.seek(place)
+        }
     }
 
-    fn image(&mut self, now: Microseconds, eye: Eye, stamp: Stamp, image: &RgbImage) -> Result<(), RecordingError> {
-        let (image_topic, info_topic, lens) = match eye {
-            Eye::Left => (bag::LEFT_IMAGE, bag::LEFT_INFO, &self.rig.left_camera),
-            Eye::Right => (bag::RIGHT_IMAGE, bag::RIGHT_INFO, &self.rig.right_camera),
+    fn small_rig() -> Rig {
+        Rig::from_toml(BENCH_TOML).expect("the bench").with_sensors(320).expect("small cameras")
+    }
+
+    fn image(seq: u32) -> CameraEvent {
+        // Noise, which no compression makes smaller: four images fill a chunk.
+        let noise = |x: u32, y: u32| (x * 7919 + y * 104_729).wrapping_mul(2_654_435_761).to_be_bytes();
+        let pixel = move |x, y| {
+            let [red, green, blue, _] = noise(x, y);
+            image::Rgb([red, green, blue])
         };
-        let at = self.ns(now);
-        let exposed = (self.epoch_us * 1000).saturating_add((stamp.middle_us.max(0.0) * 1000.0) as u64);
-        let info = messages::camera_info(exposed, eye, lens);
-        self.bag.write(info_topic, at, &info)?;
-        self.bag.write(image_topic, at, &messages::image(exposed, eye, &Png::of(image).map_err(unwritten)?))?;
-        self.images += 1;
-        self.event(now, &Event::Image(eye, stamp))
+        let develop = Box::new(move || Ok(RgbImage::from_fn(320, 320, pixel)));
+        CameraEvent::Image(PendingImage { seq, middle: HostInstant { us: 0.0, error_us: 0.0 }, develop })
+    }
+
+    #[tokio::test]
+    async fn a_slow_disk_costs_images_beyond_a_bounded_memory_and_no_pulse() {
+        const PAIRS: u32 = 40;
+        const ROOM: usize = 10 * 3 * 320 * 320;
+        let folder = tempfile::tempdir().expect("a folder");
+        let (file, gate) = (folder.path().join(bag::FILE), Gate::default());
+        let slow = Slow(File::create(&file).expect("a file"), gate.clone());
+        // The beginning of the file needs the disk.
+        gate.open();
+        let bag = Bag::on(slow, &file, BENCH_TOML).expect("a bag");
+        *gate.0.0.lock().expect("a lock") = false;
+        let (recorder, writing) = Recorder::on(bag, &small_rig(), 0, ROOM);
+        for seq in 0..PAIRS {
+            let at = Microseconds(u64::from(seq));
+            let counts: AxisList<Counts> = AxisList::default();
+            recorder.pulse(at, &TriggerMark { seq, at, counts });
+            for side in [Side::Left, Side::Right] {
+                drop(recorder.camera(at, side, image(seq)));
+            }
+            tokio::task::yield_now().await;
+        }
+        let left_out = recorder.queue.left_out().images;
+        gate.open();
+        let recorded = writing.finish(recorder).await.expect("it is written");
+        assert_eq!(recorded.left_out, LeftOut { images: left_out, clouds: 0 });
+        assert_eq!(recorded.images + left_out, u64::from(2 * PAIRS), "every image is written or counted");
+        // Those of the room, and of the chunk that stood before the disk.
+        assert!((8..=15).contains(&recorded.images), "{recorded:?}");
+
+        let (mut reader, mut pulses, mut images) = (Reader::open(&file).expect("a recording"), 0, [0_u32; 2]);
+        while let Some(heard) = reader.next_event().expect("an event") {
+            match heard.event {
+                Event::Pulse(mark) => {
+                    assert_eq!(mark.seq, pulses, "a pulse is missing");
+                    pulses += 1;
+                }
+                Event::Image(eye, _) => images[eye.side().index()] += 1,
+                _ => {}
+            }
+        }
+        assert_eq!((pulses, u64::from(images[0] + images[1])), (PAIRS, recorded.images));
+        assert!(images[0].abs_diff(images[1]) <= 2, "pairs are kept, not images of one camera: {images:?}");
+        assert!(recorded.left_out.in_words().is_some_and(|said| said.contains("readings and pulses are")));
     }
 }

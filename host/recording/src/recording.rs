@@ -3,8 +3,10 @@
 use std::path::Path;
 
 use vergence_board::{BoardKnowledge, HostClock};
-use vergence_live::LiveLoop;
+use vergence_camera::CameraEvent;
+use vergence_live::{LiveLoop, LiveResult};
 use vergence_rig::{Provenance, Rig};
+use vergence_vision::Side;
 
 use crate::RecordingError;
 use crate::event::Beginning;
@@ -58,11 +60,27 @@ impl Recording {
     #[must_use]
     pub fn of(&self, live: LiveLoop) -> LiveLoop {
         let clock = live.clock;
-        LiveLoop {
-            events: recorded_events(live.events, self.recorder.clone(), clock),
-            marks: live.marks.map(|marks| recorded_marks(marks, self.recorder.clone(), clock)),
-            ..live
-        }
+        let live = self.marks_of(live);
+        LiveLoop { events: recorded_events(live.events, self.recorder.clone(), clock), ..live }
+    }
+
+    /// The live loop `live`, whose pulses are recorded; its cameras are by [`Self::cameras`]. Call within a tokio runtime.
+    #[must_use]
+    pub fn marks_of(&self, live: LiveLoop) -> LiveLoop {
+        let clock = live.clock;
+        LiveLoop { marks: live.marks.map(|marks| recorded_marks(marks, self.recorder.clone(), clock)), ..live }
+    }
+
+    /// Records events of the cameras where they pass, and returns the same.
+    pub fn cameras(&self) -> impl FnMut(Side, CameraEvent) -> CameraEvent + Send + 'static {
+        let (recorder, clock) = (self.recorder.clone(), self.clock);
+        move |side, event| recorder.camera(clock.now(), side, event)
+    }
+
+    /// Records results of the live loop.
+    pub fn results(&self) -> impl FnMut(&LiveResult<'_>) + 'static {
+        let (recorder, clock) = (self.recorder.clone(), self.clock);
+        move |result| recorder.result(clock.now(), result)
     }
 
     /// Ends the recording, and says what is in it.

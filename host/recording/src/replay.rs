@@ -4,17 +4,20 @@
 use std::collections::VecDeque;
 
 use vergence_board::{BoardKnowledge, BoardNews};
-use vergence_camera::PendingImage;
-use vergence_live::{Clock, LiveError, Measurement, Posed, READINGS, measure, pose};
+use vergence_camera::{CameraEvent, PendingImage};
+use vergence_live::{Clock, LiveError, Measurement, Posed, READINGS, Totals, measure, pose};
 use vergence_pipeline::{Exposed, Exposures, Method, PoseMemory, SkipReason, TimeBase};
 use vergence_protocol::Microseconds;
 use vergence_rig::Rig;
 
 use crate::event::{Beginning, Event, exchange_of};
+use crate::play::Audience;
 use crate::reader::Heard;
 
 /// A recording that is measured, event by event.
-pub struct Replay<'a> {
+pub struct Replay<'a, A: Audience> {
+    /// Who follows it.
+    pub audience: A,
     rig: &'a Rig,
     method: Method<'a>,
     stopwatch: Clock,
@@ -23,13 +26,15 @@ pub struct Replay<'a> {
     memory: PoseMemory,
     /// Exposures whose encoder readings have not come yet, each with the time at which the wait for them began.
     waiting: VecDeque<(u64, Exposed<PendingImage>)>,
+    pulses: u64,
 }
 
-impl<'a> Replay<'a> {
-    /// A replay on `rig`, whose matches are found by `method`; `stopwatch` says how long measuring takes.
+impl<'a, A: Audience> Replay<'a, A> {
+    /// A replay on `rig`, whose matches are found by `method`, before `audience`; `stopwatch` says how long measuring takes.
     #[must_use]
-    pub fn new(rig: &'a Rig, method: Method<'a>, stopwatch: Clock) -> Self {
+    pub fn new(rig: &'a Rig, method: Method<'a>, stopwatch: Clock, audience: A) -> Self {
         Self {
+            audience,
             rig,
             method,
             stopwatch,
@@ -37,13 +42,17 @@ impl<'a> Replay<'a> {
             exposures: Exposures::new(None),
             memory: PoseMemory::default(),
             waiting: VecDeque::new(),
+            pulses: 0,
         }
     }
 
-    /// Exposures that were not measured so far, by reason.
-    #[must_use]
-    pub const fn skipped(&self) -> &std::collections::BTreeMap<SkipReason, u64> {
-        self.exposures.skipped()
+    /// Adds what was not measured so far, and the pulses, to `totals`.
+    pub fn account(&self, totals: &mut Totals) {
+        for (reason, count) in self.exposures.skipped() {
+            *totals.skipped.entry(*reason).or_default() += count;
+        }
+        totals.pulses += self.pulses;
+        totals.open += self.exposures.open() + self.waiting.len() as u64;
     }
 
     /// Takes the next event, and calls `publish` with each measurement that it completes.
@@ -81,6 +90,7 @@ impl<'a> Replay<'a> {
 
     fn hear(&mut self, heard: Heard) {
         let base = self.base();
+        self.audience.hear(&heard, self.board.as_ref());
         match (heard.event, heard.image) {
             (Event::Begun(Beginning { has_board, baud, period_us }), _) => {
                 self.board = has_board.then(|| BoardKnowledge::new(baud));
@@ -89,7 +99,7 @@ impl<'a> Replay<'a> {
             (Event::Pose(pose), _) => self.note(&BoardNews::Pose(pose)),
             (Event::ProbeSent, _) => self.note(&BoardNews::ProbeSent),
             (Event::Exchange(stamps), _) => self.note(&BoardNews::Exchange(exchange_of(stamps))),
-            (Event::LinkEnded, _) => {
+(Event::LinkEnded, _) => {
                 self.note(&BoardNews::LinkEnded);
                 self.exposures.link_ended();
             }
@@ -97,7 +107,10 @@ impl<'a> Replay<'a> {
                 self.note(&BoardNews::LinkBack);
                 self.exposures.link_back();
             }
-            (Event::Pulse(mark), _) => self.exposures.pulse(&mark, &base),
+            (Event::Pulse(mark), _) => {
+                self.pulses += 1;
+                self.exposures.pulse(&mark, &base);
+            }
             (Event::Attached(eye, timing), _) => self.exposures.camera_ready(eye.side(), timing.into(), &base),
             (Event::Lost(eye, why), _) => self.exposures.camera_failed(eye.side(), why, &base),
             (Event::Image(eye, stamp), Some(image)) => {
@@ -106,9 +119,11 @@ impl<'a> Replay<'a> {
                     middle: vergence_rig::StampedImage::from(stamp).middle,
                     develop: Box::new(move || Ok(image)),
                 };
-                self.exposures.image(eye.side(), stamp.into(), pending, &base);
+                if let CameraEvent::Image(pending) = self.audience.camera(eye.side(), CameraEvent::Image(pending)) {
+                    self.exposures.image(eye.side(), stamp.into(), pending, &base);
+                }
             }
-            // The reader gives each its image.
+            // It is not measured.
             (Event::Image(..), None) => {}
         }
     }

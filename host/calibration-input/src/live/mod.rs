@@ -16,6 +16,7 @@ use vergence_vision::BodyMask;
 pub use self::cameras::{RigCameras, SimulatedTarget, printed};
 
 use crate::InputError;
+use crate::capture::Looked;
 use crate::recorded::{FOLDER, POSES};
 
 /// Number of stage poses that a calibration needs.
@@ -38,10 +39,11 @@ pub struct LiveSet<'a> {
 }
 
 /// What happens while a set is taken; the texts are for people.
-#[derive(Clone, Debug)]
 pub enum LiveEvent<'a> {
     /// The rig stands at a stage pose; the heading says which.
     Begins(&'a str),
+    /// What was seen of the target, and how many views the stage pose will have.
+    Looked(Looked<'a>, usize),
     /// Says how far this stage pose has come, and what to show next.
     Advice(String),
     /// The stage pose has its views; the sentence says how many images that took.

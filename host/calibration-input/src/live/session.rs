@@ -13,6 +13,7 @@ use vergence_vision::{BodyMask, Camera as CameraFrame, Pixel, Right, UnitRay};
 use super::cameras::RigCameras;
 use super::{LiveEvent, LiveSet};
 use crate::InputError;
+use crate::capture::Looked;
 use crate::target_watch::{NAMES, TargetViews, TargetWatch, observe};
 
 /// Largest motion of an axis while views are taken, in encoder steps.
@@ -51,13 +52,16 @@ impl LiveSet<'_> {
                 let (heading, taken) = (heading.to_owned(), watch.taken());
                 return Err(InputError::TooFewViews { heading, taken, wanted, images: images_seen }.into());
             }
-            if watch.observe(views) && (watch.is_news() || watch.is_elsewhere()) {
+            let is_still = watch.observe(views);
+            let is_taken = is_still && (watch.is_news() || watch.is_elsewhere());
+            if is_taken {
                 for (image, side) in images.iter().zip(NAMES) {
                     let path = folder.join(format!("{side}{:03}.png", watch.taken()));
                     write_png(&path, &image.image).map_err(InputError::from)?;
                 }
                 watch.take();
             }
+            tell(LiveEvent::Looked(Looked { images: &images, watch: &watch, is_still, is_taken }, wanted))?;
             let advice = watch.advice().unwrap_or_else(|| "show the target elsewhere, or tilted".into());
             tell(LiveEvent::Advice(format!("{heading}: view {} of {wanted}; {advice}", watch.taken())))?;
         }

@@ -44,8 +44,9 @@ pub struct Bench {
 impl Bench {
     pub fn start(access: Access) -> Self {
         let rig = Arc::new(Rig::from_toml(BENCH_TOML).expect("the bench"));
-        let (panel, driver) =
-            Panel::new(Setting { rig: Arc::clone(&rig), simulated: Some("all".into()), has_cameras: false });
+        let simulated = Some("all".into());
+        let setting = Setting { rig: Arc::clone(&rig), simulated, has_cameras: false, recorded_ms: None };
+        let (panel, driver) = Panel::new(setting);
         let (end, ended) = oneshot::channel();
         let (drawn, shown) = (Rig::clone(&rig), panel.clone());
         std::thread::spawn(move || {
@@ -72,11 +73,7 @@ impl Bench {
             Access::Token(token) => format!("?token={token}"),
             Access::ThisComputer => String::new(),
         };
-        let origin = format!("http://{}", self.address);
-        let socket = open(self.address, &query, Some(&origin)).await.expect("the page is let in");
-        let mut page = Page { socket, id: 0, latest: BTreeMap::new() };
-        page.id = page.next("hello").await["you"].as_u64().expect("a number");
-        page
+        Page::open(self.address, &query).await
     }
 }
 
@@ -100,6 +97,15 @@ pub struct Page {
 }
 
 impl Page {
+    /// A page that was loaded from the panel at this address.
+    pub async fn open(address: SocketAddr, query: &str) -> Self {
+        let origin = format!("http://{address}");
+        let socket = open(address, query, Some(&origin)).await.expect("the page is let in");
+        let mut page = Self { socket, id: 0, latest: BTreeMap::new() };
+        page.id = page.next("hello").await["you"].as_u64().expect("a number");
+        page
+    }
+
     pub async fn send(&mut self, message: Value) {
         self.socket.send(Message::Text(message.to_string().into())).await.expect("the panel listens");
     }

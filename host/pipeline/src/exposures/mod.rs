@@ -115,6 +115,16 @@ impl<T> Exposures<T> {
         &self.results.skipped
     }
 
+    /// Number of pulses, or of exposures that can be measured, of which nothing is decided yet.
+    #[must_use]
+    pub fn open(&self) -> u64 {
+        let pulses = match &self.pairing {
+            Pairing::Triggered(triggered) => triggered.open(),
+            Pairing::FreeRunning(_) => 0,
+        };
+        (pulses + self.results.ready.len()) as u64
+    }
+
     /// Counts an exposure that the caller skips.
     pub fn skip(&mut self, reason: SkipReason) {
         self.results.skip(reason);

@@ -88,6 +88,12 @@ impl SkipReason {
         }
     }
 
+    /// Whether it counts exposures; else it counts images, whose pulses have a count of their own.
+    #[must_use]
+    pub const fn is_of_pulse(self) -> bool {
+        !matches!(self, Self::ImageWithoutPulse | Self::ImageOfEitherPulse)
+    }
+
     /// The reason in snake case, for reports.
     #[must_use]
     pub const fn as_str(self) -> &'static str {

@@ -41,6 +41,11 @@ impl<T> Triggered<T> {
         Self { period_us, pairings: [None, None], pulses: BTreeMap::new() }
     }
 
+    /// Number of pulses whose images are not all known yet.
+    pub(super) fn open(&self) -> usize {
+        self.pulses.len()
+    }
+
     /// The camera missed all pulses before now.
     pub(super) fn camera_ready(&mut self, side: Side, timing: ExposureTiming) {
         self.pairings[side.index()] = Some(ImagePairing::new(timing.after_pulse(), self.period_us));

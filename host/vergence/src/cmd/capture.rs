@@ -1,6 +1,5 @@
 //! `vergence capture`: a set of target views, with advice on what to show.
 
-use std::net::SocketAddr;
 use std::path::PathBuf;
 use std::sync::Arc;
 
@@ -8,7 +7,7 @@ use serde_json::json;
 use vergence_board::HostClock;
 use vergence_calibration_input::{Captured, Looked, TargetCapture, printed};
 use vergence_camera::{Camera, CameraError, CameraSet};
-use vergence_panel::Setting;
+use vergence_panel::{CapturePanel, Setting};
 use vergence_rig::Rig;
 use vergence_scene::LensChoice;
 use vergence_sim::{HeldTarget, TargetCamera};
@@ -16,14 +15,14 @@ use vergence_targets::TargetKind;
 use vergence_vision::Side;
 
 use super::camera_options::CameraOptions;
-use super::capture_panel::CapturePanel;
 use super::mask_options::MaskOptions;
+use super::panel_options::{GOES_ON, PanelOptions};
 use super::target_options::TargetOptions;
 use crate::cli::CommonOptions;
 use crate::cmd::force_option::ForceOption;
 use crate::console::Console;
 use crate::failure::Failure;
-use crate::interrupt::interrupted;
+use crate::interrupt::{interrupted, on_own_thread};
 use crate::rig_file;
 
 /// Watches one camera or a pair, and keeps an image whenever a still target is seen where few views were. Every image is
@@ -57,13 +56,8 @@ pub struct Args {
     /// With simulated cameras: their lenses, ideal, sigma8_f18 or nikkor6_f28.
     #[arg(long, default_value_t)]
     lens: LensChoice,
-    /// Serves a page that shows what the views cover, what to show next, and at the end how well they calibrate each lens; until Ctrl-C.
-    #[arg(long, value_name = "ADDRESS", num_args = 0..=1, default_missing_value = "127.0.0.1:8088")]
-    panel: Option<SocketAddr>,
-    /// Lets other computers see that page, such as the telephone of who holds the target; they need the token in the address that is printed:
-    /// --panel 0.0.0.0:8088 --network.
-    #[arg(long, requires = "panel")]
-    network: bool,
+    #[command(flatten)]
+    panel: PanelOptions,
     #[command(flatten)]
     force: ForceOption,
 }
@@ -77,9 +71,8 @@ pub async fn run(args: &Args, common: &CommonOptions, console: Console) -> Resul
         console.say(format!("simulated cameras, lens: {}", args.lens))?;
     }
     let simulated = is_simulated.then(|| format!("target and cameras, lenses {}", args.lens));
-    let setting = Setting { rig: Arc::clone(&rig), simulated, has_cameras: true };
-    let serve = |address| CapturePanel::serve(setting, (address, args.network), console);
-    let panel = args.panel.map(serve).transpose()?;
+    let setting = Setting { rig: Arc::clone(&rig), simulated, has_cameras: true, recorded_ms: None };
+    let panel = args.panel.serve(setting, console)?.map(CapturePanel::new);
     capture(cameras, target, (args, &rig), panel, interrupted, console).await
 }
 
@@ -99,7 +92,7 @@ async fn capture<I: Future<Output = ()>>(
         progress.set_message(format!("{taken} views; {advice}"));
         progress.tick();
         if let Some(panel) = &mut panel {
-            panel.show(looked, args.views);
+            panel.look(looked, args.views);
         }
         match looked.is_taken {
             true => progress.suspend(|| console.say(format!("view {taken} taken; {advice}"))),
@@ -110,7 +103,14 @@ async fn capture<I: Future<Output = ()>>(
     progress.finish_and_clear();
     report(&captured, args, console)?;
     match panel {
-        Some(panel) if !captured.was_interrupted => panel.conclude(captured, interruption(), console).await,
+        Some(mut panel) if !captured.was_interrupted => {
+            let verdicts = on_own_thread(move || Ok(captured.verdicts())).await?;
+            console.say_lines(verdicts.clone())?;
+            panel.conclude(verdicts);
+            console.say(GOES_ON)?;
+            interruption().await;
+            Ok(())
+        }
         _ => Ok(()),
     }
 }

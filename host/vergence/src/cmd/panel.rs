@@ -1,17 +1,19 @@
 //! `vergence panel`: the page on which people see and drive the rig.
 
-use std::net::{SocketAddr, TcpListener};
+use std::net::SocketAddr;
+use std::path::PathBuf;
 use std::sync::Arc;
 
 use clap::{Args as _, FromArgMatches};
 use serde_json::json;
-use vergence_board::{fresh_secret, hex};
-use vergence_live::{Ended, MatchingTime};
-use vergence_panel::{Access, Panel, PanelError, Session, Setting};
+use vergence_live::MatchingTime;
+use vergence_panel::{Panel, Session, Setting, Shown, listen};
 use vergence_scene::LensChoice;
 
 use super::connect::connect;
 use super::live_options::LiveOptions;
+use super::publish::tell;
+use super::run::{begin_recording, seen_to_the_end, tell_recorded};
 use crate::cli::CommonOptions;
 use crate::console::Console;
 use crate::failure::Failure;
@@ -41,6 +43,10 @@ pub struct Args {
     /// Finds the reference of all axes first.
     #[arg(long)]
     home: bool,
+    /// With cameras: record images, encoders and clouds in this folder from when the axes have their reference, as a ROS 2 bag that
+    /// `vergence replay` measures and shows again.
+    #[arg(long, value_name = "DIR", requires = "cameras")]
+    record: Option<PathBuf>,
     #[command(flatten)]
     live: LiveOptions,
 }
@@ -63,15 +69,14 @@ pub async fn demonstrate(
 }
 
 pub async fn run(args: &Args, common: &CommonOptions, console: Console) -> Result<(), Failure> {
-    let access = access(args.listen, args.network)?;
-    let listener = listen(args.listen)?;
+    let (listener, access) = listen(args.listen, args.network)?;
     let is_simulated = args.cameras == ["sim"];
     let (panel, session) = match args.cameras.as_slice() {
         [] => {
             let rig = Arc::new(rig_file::load(common.rig.as_deref())?);
-            let (panel, driver) = Panel::new(Setting { rig, simulated: None, has_cameras: false });
+            let (panel, driver) = Panel::new(Setting { rig, simulated: None, has_cameras: false, recorded_ms: None });
             let board = Some(panel.watching(connect(common, console, "panel").await?));
-            (panel, Session { driver, board, trigger: None, live: None })
+            (panel, Session { driver, board, trigger: None, live: None, recording: None })
         }
         cameras => {
             let lease = if is_simulated { SIMULATED_LEASE_MS } else { common.lease };
@@ -79,12 +84,13 @@ pub async fn run(args: &Args, common: &CommonOptions, console: Console) -> Resul
                 args.live.connect(cameras, &CommonOptions { lease, ..common.clone() }, None, console).await?;
             let simulated =
                 is_simulated.then(|| format!("mechanics, room and cameras, lenses {}", args.live.taking.lens));
-            let (panel, driver) =
-                Panel::new(Setting { rig: Arc::clone(&method.measuring), simulated, has_cameras: true });
+            let shown = Arc::clone(&method.measuring);
+            let (panel, driver) = Panel::new(Setting { rig: shown, simulated, has_cameras: true, recorded_ms: None });
             rig.board = rig.board.map(|board| panel.watching(board));
-            let events = panel.tap(args.live.taking.start_cameras(cameras, &rig)?);
+            let recording = args.record.as_deref().map(|folder| begin_recording(folder, &rig)).transpose()?;
+            let events = panel.tap(args.live.taking.start_cameras(cameras, &rig)?, recording.as_ref());
             let live = Some(method.live_loop(&mut rig, events, MatchingTime::Real));
-            (panel, Session { driver, board: rig.board, trigger: rig.trigger, live })
+            (panel, Session { driver, board: rig.board, trigger: rig.trigger, live, recording })
         }
     };
     let serving = panel.serve(listener, access)?;
@@ -93,27 +99,12 @@ pub async fn run(args: &Args, common: &CommonOptions, console: Console) -> Resul
     if args.home {
         panel.home();
     }
-    match session.run(&panel, interrupted()).await? {
-        Ended::Done => Ok(()),
-        Ended::Blind => Err(Failure::device("both cameras are dead: the log of the panel said why")),
+    let Shown { ended, totals, recorded } = session.run(&panel, interrupted()).await?;
+    if !args.cameras.is_empty() {
+        tell(&totals, console)?;
     }
-}
-
-/// What accepts connections at `address`.
-pub fn listen(address: SocketAddr) -> Result<TcpListener, PanelError> {
-    TcpListener::bind(address).map_err(|error| PanelError::Listen { address, why: error.to_string() })
-}
-
-/// Who may connect to `address`: on a network, who knows a token that is new each time.
-pub fn access(address: SocketAddr, network: bool) -> Result<Access, Failure> {
-    match (network, address.ip().is_loopback()) {
-        (true, _) => {
-            let secret = fresh_secret().map_err(|error| Failure::device(error.to_string()))?;
-            Ok(Access::Token(hex(&secret.public().0[..16])))
-        }
-        (false, true) => Ok(Access::ThisComputer),
-        (false, false) => Err(Failure::usage(format!(
-            "{address} lets other computers in: add --network, which makes a token that they need"
-        ))),
+    if let (Some(recorded), Some(folder)) = (recorded, &args.record) {
+        tell_recorded(recorded, folder, console)?;
     }
+    seen_to_the_end(Some(ended))
 }

@@ -10,7 +10,6 @@ use vergence_output::{
     live_cloud_json, live_cloud_words, pose_told_words,
 };
 use vergence_pipeline::Observation;
-use vergence_protocol::Microseconds;
 use vergence_recording::Recorder;
 use vergence_rig::{Rig, rounded};
 use vergence_scene::LensChoice;
@@ -48,9 +47,7 @@ impl Publisher {
             Observation::Points { cloud, pose, moving, by_images } => {
                 self.files.write_cloud(self.number, &cloud.points)?;
                 if let Some((recorder, clock)) = &self.recorder {
-                    let exposed =
-                        clock.now().0.saturating_sub(u64::try_from(result.latency.as_micros()).unwrap_or(u64::MAX));
-                    recorder.cloud(Microseconds(exposed), cloud, pose);
+                    recorder.result(clock.now(), result);
                 }
                 let by_axes = axes_by_images_words(&self.rig, by_images).map(|told| format!("pose by images: {told}"));
                 let told = by_axes.or_else(|| pose_told_words(cloud)).map(|told| format!("; {told}"));
@@ -100,14 +97,7 @@ impl Publisher {
     /// # Errors
     /// Where standard output cannot be written.
     pub fn end(&self, totals: &Totals) -> Result<(), Failure> {
-        let skipped = totals.skipped_in_words();
-        self.console.say(format!("{} clouds, {} sets of bearings{skipped}", totals.clouds, totals.bearings))?;
-        self.console.result(&json!({
-            "kind": "end",
-            "clouds": totals.clouds,
-            "bearings": totals.bearings,
-            "skipped": skipped_json(totals),
-        }))
+        tell(totals, self.console)
     }
 
     /// A whole cloud in JSON is only made where somebody reads it.
@@ -155,4 +145,22 @@ fn timing(result: &LiveResult<'_>) -> String {
 
 fn skipped_json(totals: &Totals) -> Value {
     totals.skipped.iter().map(|(reason, count)| (reason.as_str().to_owned(), json!(count))).collect()
+}
+
+/// Prints totals.
+///
+/// # Errors
+/// Where standard output cannot be written.
+pub fn tell(totals: &Totals, console: Console) -> Result<(), Failure> {
+    let Totals { clouds, bearings, pulses, open, .. } = totals;
+    let skipped = totals.skipped_in_words();
+    console.say(format!("{clouds} clouds, {bearings} sets of bearings{skipped}"))?;
+    console.result(&json!({
+        "kind": "end",
+        "clouds": clouds,
+        "bearings": bearings,
+        "skipped": skipped_json(totals),
+        "pulses": pulses,
+        "open": open,
+    }))
 }

@@ -130,7 +130,7 @@ async fn make_ready(rig: &mut LiveRig, tour: &tour::Options, console: Console) -
 }
 
 /// Whether a camera was alive at the end.
-fn seen_to_the_end(ended: Option<Ended>) -> Result<(), Failure> {
+pub fn seen_to_the_end(ended: Option<Ended>) -> Result<(), Failure> {
     match ended {
         Some(Ended::Done) | None => Ok(()),
         Some(Ended::Blind) => Err(Failure::device("both cameras are dead: see what was said of each above")),
@@ -138,7 +138,7 @@ fn seen_to_the_end(ended: Option<Ended>) -> Result<(), Failure> {
 }
 
 /// Begins a recording of `rig` in `folder`.
-fn begin_recording(folder: &Path, rig: &LiveRig) -> Result<Recording, Failure> {
+pub fn begin_recording(folder: &Path, rig: &LiveRig) -> Result<Recording, Failure> {
     let board = rig.board.as_ref().map(|board| board.client().knowledge());
     let (clock, period_us) = (rig.clock, rig.period_us);
     let recordable = Recordable { rig: &rig.known, board, clock, epoch_us: started_us(clock), period_us };
@@ -146,14 +146,9 @@ fn begin_recording(folder: &Path, rig: &LiveRig) -> Result<Recording, Failure> {
 }
 
 /// Says what is in a recording.
-fn tell_recorded(recorded: Recorded, folder: &Path, console: Console) -> Result<(), Failure> {
+pub fn tell_recorded(recorded: Recorded, folder: &Path, console: Console) -> Result<(), Failure> {
     console.say(format!("recorded {} images in {}", recorded.images, folder.display()))?;
-    if recorded.left_out > 0 {
-        console.warn(format!(
-            "the disk had no time for {} images, readings or clouds: record fewer frames (--rate), or on a faster disk",
-            recorded.left_out
-        ));
-    }
+    recorded.left_out.in_words().into_iter().for_each(|said| console.warn(said));
     Ok(())
 }
 

@@ -8,6 +8,7 @@ use std::path::PathBuf;
 use vergence_calibration::{StageError, StageOptions, calibrate_stage, check_fit, validate_stage};
 use vergence_calibration_input::{InputHash, KnownLenses, RecordedSet, StageViews, TrueError, stage_poses_in_corners};
 use vergence_calibration_report::{ReportAbout, left_out_json, stage_json, stage_lines, stage_report, stage_verdict};
+use vergence_panel::CapturePanel;
 use vergence_rig::Rig;
 use vergence_targets::corners_can_be_held;
 
@@ -15,9 +16,11 @@ use super::options::{LensOptions, ResultOptions, VerdictPlaces};
 use super::print_views;
 use crate::cli::CommonOptions;
 use crate::cmd::mask_options::MaskOptions;
+use crate::cmd::panel_options::GOES_ON;
 use crate::cmd::target_options::TargetOptions;
 use crate::console::Console;
-use crate::failure::Failure;
+use crate::failure::{Failure, FailureKind};
+use crate::interrupt::interrupted;
 use crate::rig_file;
 use crate::stopwatch::Stopwatch;
 use vergence_plausibility::pose::{cameras_are_near, right_is_on_the_right};
@@ -68,6 +71,30 @@ pub struct Args {
 }
 
 pub async fn run(args: &Args, common: &CommonOptions, console: Console) -> Result<(), Failure> {
+    let drawn = rig_file::load(common.rig.as_deref())?;
+    let mut panel = args.live.panel(&drawn, args.cameras == ["sim"], console)?;
+    let calibrated = calibrate(args, common, panel.as_mut(), console).await;
+    let shown = match &calibrated {
+        Ok(verdict) => verdict.clone(),
+        // The views do not calibrate the rig, which who took them wants to know.
+        Err(failure) if failure.kind() == FailureKind::CheckFailed => vec![failure.to_string()],
+        Err(_) => Vec::new(),
+    };
+    if let (Some(panel), false) = (&mut panel, shown.is_empty()) {
+        panel.conclude(shown);
+        console.say(GOES_ON)?;
+        interrupted().await;
+    }
+    calibrated.map(drop)
+}
+
+/// Returns the verdict.
+async fn calibrate(
+    args: &Args,
+    common: &CommonOptions,
+    panel: Option<&mut CapturePanel>,
+    console: Console,
+) -> Result<Vec<String>, Failure> {
     args.result.check()?;
     let drawn = rig_file::load(common.rig.as_deref())?;
     if drawn.axes.is_empty() {
@@ -90,7 +117,7 @@ pub async fn run(args: &Args, common: &CommonOptions, console: Console) -> Resul
         }
         None => (drawn, args.lenses.without_files()?),
     };
-    let built = live(args, common, console).await?;
+    let built = live(args, common, (panel, console)).await?;
     let (poses, left_out) = poses(args, &drawn, &mut hash, console)?;
     let force = args.result.force;
     for pose in &poses {
@@ -107,7 +134,8 @@ pub async fn run(args: &Args, common: &CommonOptions, console: Console) -> Resul
             trunk::Input { drawn: &drawn, poses: &poses, left_out, options: &options },
             hash,
             console,
-        );
+        )
+        .map(|()| Vec::new());
     }
     let solving = Stopwatch::start();
     let stage = calibrate_stage(&drawn, &poses, &options).map_err(|error| no_calibration(&error))?;
@@ -144,11 +172,16 @@ pub async fn run(args: &Args, common: &CommonOptions, console: Console) -> Resul
         console.say(truth)?;
         result["truth"] = truth.json();
     }
-    console.result(&result)
+    console.result(&result)?;
+    Ok(verdict.lines())
 }
 
 /// Takes the views of --live; returns the true rig where it is simulated.
-async fn live(args: &Args, common: &CommonOptions, console: Console) -> Result<Option<Rig>, Failure> {
+async fn live(
+    args: &Args,
+    common: &CommonOptions,
+    (panel, console): (Option<&mut CapturePanel>, Console),
+) -> Result<Option<Rig>, Failure> {
     match (&args.set, args.live.live) {
         (Some(set), true) => {
             live::fill(
@@ -157,7 +190,7 @@ async fn live(args: &Args, common: &CommonOptions, console: Console) -> Result<O
                 &args.cameras,
                 args.target.checked_spec(args.result.force, console)?,
                 common,
-                console,
+                (panel, console),
             )
             .await
         }

@@ -57,7 +57,7 @@ pub async fn record(args: &Args, common: &CommonOptions, console: Console) -> Re
     let settled = settle(&mut rig.board, &tour).await;
     let recorded = recording.finish().await?;
     tell_recorded(recorded, &args.out, console)?;
-    console.result(&json!({ "kind": "end", "images": recorded.images, "left_out": recorded.left_out }))?;
+    console.result(&json!({ "kind": "end", "images": recorded.images, "left_out": recorded.left_out.images }))?;
     let ended = ended?;
     settled?;
     seen_to_the_end(ended)

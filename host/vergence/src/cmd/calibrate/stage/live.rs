@@ -1,12 +1,14 @@
 //! `vergence calibrate stage --live`: the rig drives itself through the stage poses while a person holds the target.
 
 use std::path::Path;
+use std::sync::Arc;
 
 use indicatif::ProgressBar;
 use vergence_board::{Board, HostClock, Port, fresh_session};
 use vergence_calibration::stage_plan;
 use vergence_calibration_input::{LiveEvent, LiveSet, RigCameras, SimulatedTarget};
 use vergence_camera::CameraError;
+use vergence_panel::{CapturePanel, Setting};
 use vergence_rig::Rig;
 use vergence_scene::LensChoice;
 use vergence_targets::TargetKind;
@@ -15,6 +17,7 @@ use crate::cli::CommonOptions;
 use crate::cmd::camera_options::CameraOptions;
 use crate::cmd::connect::{connect, port};
 use crate::cmd::mask_options::MaskOptions;
+use crate::cmd::panel_options::PanelOptions;
 use crate::console::Console;
 use crate::failure::Failure;
 use crate::interrupt::interrupted;
@@ -47,6 +50,22 @@ pub struct Options {
     lens: LensChoice,
     #[command(flatten)]
     camera: CameraOptions,
+    #[command(flatten)]
+    panel: PanelOptions,
+}
+
+impl Options {
+    /// The page that shows how the views are taken, if one is wanted.
+    pub fn panel(&self, drawn: &Rig, is_simulated: bool, console: Console) -> Result<Option<CapturePanel>, Failure> {
+        if self.panel.panel.is_some() && !self.live {
+            return Err(Failure::usage("--panel shows how views are taken: add --live"));
+        }
+        let simulated = is_simulated.then(|| format!("mechanics, target and cameras, lenses {}", self.lens));
+        let setting = Setting { rig: Arc::new(drawn.clone()), simulated, has_cameras: true, recorded_ms: None };
+        let mut panel = self.panel.serve(setting, console)?.map(CapturePanel::new);
+        panel.iter_mut().for_each(|panel| panel.tell("the rig finds its reference and moves to the first pose: wait"));
+        Ok(panel)
+    }
 }
 
 /// Takes the views of the set `folder`. Returns the rig as it was really built where it is simulated.
@@ -59,7 +78,7 @@ pub async fn fill(
     cameras: &[String],
     target: TargetKind,
     common: &CommonOptions,
-    console: Console,
+    (panel, console): (Option<&mut CapturePanel>, Console),
 ) -> Result<Option<Rig>, Failure> {
     LiveSet::check_free(folder)?;
     let nominal = rig_file::load(common.rig.as_deref())?;
@@ -67,17 +86,22 @@ pub async fn fill(
     let (mut rig_board, mut rig_cameras) = open(options, cameras, &nominal, target, common, console).await?;
     let set = LiveSet { folder, target, nominal: &nominal, views: options.views.into(), images: options.frames, masks };
     let plan = stage_plan(&nominal.axes, options.poses.into());
-    set.fill(&plan, &mut rig_board, &mut rig_cameras, interrupted(), print_events(console)).await?;
+    set.fill(&plan, &mut rig_board, &mut rig_cameras, interrupted(), print_events(panel, console)).await?;
     Ok(match rig_cameras {
         RigCameras::Simulated(simulated) => Some(simulated.built),
         RigCameras::Attached(_) => None,
     })
 }
 
-fn print_events(console: Console) -> impl FnMut(LiveEvent<'_>) -> Result<(), Failure> {
+fn print_events(
+    mut panel: Option<&mut CapturePanel>,
+    console: Console,
+) -> impl FnMut(LiveEvent<'_>) -> Result<(), Failure> {
     let mut progress: Option<ProgressBar> = None;
     move |event| {
+        panel.iter_mut().for_each(|panel| panel.follow(&event));
         match event {
+            LiveEvent::Looked(..) => {}
             LiveEvent::Begins(heading) => progress = Some(console.progress(heading)),
             LiveEvent::Advice(text) => {
                 if let Some(progress) = &progress {
