@@ -11,7 +11,7 @@ use vergence_board::BoardNews;
 use vergence_camera::{CameraError, CameraEvent, Develop, PendingImage};
 use vergence_pipeline::PairCloud;
 use vergence_protocol::{Microseconds, TriggerMark};
-use vergence_rig::{Rig, RigPose};
+use vergence_rig::{Rig, RigPose, StampedImage};
 use vergence_vision::Side;
 
 use crate::RecordingError;
@@ -19,6 +19,7 @@ use crate::bag::{self, Bag};
 use crate::event::{Beginning, Event, Eye, Stamp};
 use crate::messages;
 use crate::png::Png;
+use crate::reader::stamp_ns;
 
 /// Number of entries that may wait for the disk: about a second of a bench with its poses.
 const WAITING: usize = 1024;
@@ -216,7 +217,7 @@ impl Scribe {
             Eye::Right => (bag::RIGHT_IMAGE, bag::RIGHT_INFO, &self.rig.right_camera),
         };
         let at = self.ns(now);
-        let exposed = (self.epoch_us * 1000).saturating_add((stamp.middle_us.max(0.0) * 1000.0) as u64);
+        let exposed = stamp_ns(self.epoch_us, StampedImage::from(stamp).middle);
         let info = messages::camera_info(exposed, eye, lens);
         self.bag.write(info_topic, at, &info)?;
         self.bag.write(image_topic, at, &messages::image(exposed, eye, &Png::of(image).map_err(unwritten)?))?;

@@ -1,4 +1,4 @@
-//! Clouds as PCD by the command line, read by another project's library, pypcd4 (MAP IV).
+//! Clouds by the command line, read by other projects' libraries: PCD by pypcd4 (MAP IV), LAS by laspy, PLY by plyfile.
 #![allow(clippy::expect_used, clippy::print_stdout, reason = "a test fails loudly and shows its figures")]
 
 mod common;
@@ -11,7 +11,7 @@ use common::{fails_with, python, run_json, small_bench_toml, text};
 use serde_json::Value;
 
 /// Prints a PCD file as JSON: the encoding, the type of each column, and its rows, each with red, green and blue for `rgb`.
-const READ: &str = r#"
+const PCD: &str = r#"
 import json, sys
 from pypcd4 import PointCloud
 cloud = PointCloud.from_path(sys.argv[1])
@@ -26,20 +26,53 @@ print(json.dumps({
 }))
 "#;
 
-/// A cloud as pypcd4 reads it.
+/// The same of a LAS file, whose extra columns have their units too.
+const LAS: &str = r#"
+import json, sys
+import laspy
+cloud = laspy.read(sys.argv[1])
+system, = cloud.vlrs.get("WktCoordinateSystemVlr")
+assert 'UNIT["millimetre",0.001]' in system.string and cloud.header.global_encoding.wkt, system.string
+assert str(cloud.header.version) == "1.4" and cloud.point_format.id == 2
+about, = (bytes(v.record_data) for v in cloud.vlrs if v.user_id == "LASF_Spec" and v.record_id == 3)
+assert about.startswith(b"millimetres in the left camera's frame"), about
+extra = list(cloud.point_format.extra_dimensions)
+colour = [cloud[name] // 256 for name in ["red", "green", "blue"]]
+columns = [cloud.x, cloud.y, cloud.z, *colour, *(cloud[dimension.name] for dimension in extra)]
+print(json.dumps({
+    "encoding": "binary",
+    "fields": [f"{d.name}:{d.dtype}:{d.description}" for d in extra],
+    "rows": list(zip(*(column.tolist() for column in map(__import__("numpy").asarray, columns)))),
+}))
+"#;
+
+/// The same of a PLY file.
+const PLY: &str = r#"
+import json, sys
+from plyfile import PlyData
+cloud = PlyData.read(sys.argv[1])
+vertex = cloud["vertex"].data
+print(json.dumps({
+    "encoding": "ascii" if cloud.text else "binary",
+    "fields": [f"{name}:{vertex.dtype[name].name}" for name in vertex.dtype.names],
+    "rows": [list(map(float, row)) for row in vertex],
+}))
+"#;
+
+/// A cloud as another library reads it.
 struct Read {
     encoding: String,
     fields: String,
     rows: Vec<Vec<f64>>,
 }
 
-/// pypcd4's interpreter; `None` where it is missing.
+/// The interpreter of these libraries; `None` where one is missing.
 fn reader() -> Option<String> {
-    python("import pypcd4", "pypcd4")
+    python("import pypcd4, laspy, plyfile", "pypcd4 laspy plyfile")
 }
 
-fn read(python: &str, file: impl AsRef<Path>) -> Read {
-    let output = Command::new(python).args(["-c", READ]).arg(file.as_ref()).output().expect("python runs");
+fn read(python: &str, script: &str, file: impl AsRef<Path>) -> Read {
+    let output = Command::new(python).args(["-c", script]).arg(file.as_ref()).output().expect("python runs");
     assert!(output.status.success(), "{}", text(&output.stderr));
     let said: Value = serde_json::from_slice(&output.stdout).expect("JSON");
     let words = |name: &str| -> Vec<String> { serde_json::from_value(said[name].clone()).expect("words") };
@@ -98,7 +131,7 @@ fn sparse_clouds_hold_the_numbers_of_the_table_in_both_encodings() {
     let out = work.file("cloud.PCD");
     for (encoding, colour, more) in [("binary", "float32", &[][..]), ("ascii", "uint32", &["--ascii"])] {
         let result = run_json(&with(&arguments, &out, &[&["--also", "csv"], more].concat()));
-        let (cloud, table) = (read(&python, &out), table(&work.file("cloud.csv")));
+        let (cloud, table) = (read(&python, PCD, &out), table(&work.file("cloud.csv")));
         println!("{encoding}: {} points, {}", cloud.rows.len(), cloud.fields);
         assert_eq!(cloud.encoding, encoding);
         assert_eq!(result["points"].as_u64(), Some(cloud.rows.len() as u64));
@@ -110,33 +143,65 @@ fn sparse_clouds_hold_the_numbers_of_the_table_in_both_encodings() {
     }
 }
 
+/// LAS keeps coordinates to a micrometre.
 #[test]
-fn a_dense_cloud_holds_the_numbers_of_the_ply_file() {
+fn a_cloud_as_las_and_as_ply_holds_the_numbers_of_the_table() {
     let Some(python) = reader() else { return };
     let (work, arguments) = pair();
-    let [pcd, ply] = ["dense.pcd", "dense.ply"].map(|name| work.file(name));
-    for out in [&pcd, &ply] {
-        run_json(&with(&arguments, out, &["--dense"]));
+    for (name, script, first, last) in [
+        ("cloud.las", LAS, "u_left:float32:pixels", "own_zz:float32:mm^2 extrapolated:uint8: track:int32:"),
+        ("cloud.ply", PLY, "x:float64 y:float64 z:float64 red:uint8", "own_zz:float32 extrapolated:uint8 track:int32"),
+    ] {
+        run_json(&with(&arguments, &work.file(name), &["--also", "csv"]));
+        let (mut cloud, mut table) = (read(&python, script, work.file(name)), table(&work.file("cloud.csv")));
+        println!("{name}: {} points, {}", cloud.rows.len(), cloud.fields);
+        assert!(cloud.fields.starts_with(first) && cloud.fields.ends_with(last), "{}", cloud.fields);
+        assert!(cloud.rows.len() > 100 && cloud.encoding == "binary");
+        for (row, other) in cloud.rows.iter_mut().zip(&mut table) {
+            let off = (0..3).map(|axis| (row[axis] - other[axis]).abs()).fold(0.0, f64::max);
+            assert!(off < 6e-4, "{row:?} is not {other:?}");
+            // Compared.
+            [&mut *row, other].into_iter().for_each(|row| drop(row.drain(..3)));
+        }
+        assert_same(&cloud.rows, &table);
     }
-    let cloud = read(&python, &pcd);
-    let bytes = std::fs::read(&ply).expect("a cloud");
-    let mark = b"end_header\n";
-    let at = bytes.windows(mark.len()).position(|window| window == mark).expect("a header") + mark.len();
-    let rows: Vec<Vec<f64>> = bytes[at..]
-        .chunks_exact(36)
-        .map(|row| {
-            let float = |at: usize| f64::from(f32::from_le_bytes([row[at], row[at + 1], row[at + 2], row[at + 3]]));
-            let colour = [12, 13, 14].map(|at| f64::from(row[at]));
-            let [point, rest] =
-                [&[0, 4, 8][..], &[15, 19, 23, 27, 31]].map(|places| places.iter().map(|&at| float(at)));
-            point.chain(colour).chain(rest).chain([f64::from(row[35])]).collect()
-        })
-        .collect();
-    println!("{} points, {}", cloud.rows.len(), cloud.fields);
-    assert!(cloud.rows.len() > 10_000 && cloud.encoding == "binary");
+}
+
+#[test]
+fn a_dense_cloud_holds_the_same_numbers_in_every_format() {
+    let Some(python) = reader() else { return };
+    let (work, arguments) = pair();
+    let [pcd, las, ply] = [("dense.pcd", PCD), ("dense.las", LAS), ("dense.ply", PLY)].map(|(name, script)| {
+        let out = work.file(name);
+        run_json(&with(&arguments, &out, &["--dense"]));
+        let cloud = read(&python, script, &out);
+        println!("{name}: {} points, {}", cloud.rows.len(), cloud.fields);
+        cloud
+    });
+    assert!(ply.rows.len() > 10_000 && ply.encoding == "binary");
     // On the way through JSON a number may lose its last bit of double precision.
-    let single = |rows: &[Vec<f64>]| rows.iter().flatten().map(|value| *value as f32).collect::<Vec<_>>();
-    assert!(single(&cloud.rows) == single(&rows), "the files differ");
+    let single = |rows: &[Vec<f64>], from: usize| {
+        rows.iter().flat_map(|row| &row[from..]).map(|value| *value as f32).collect::<Vec<_>>()
+    };
+    assert!(single(&pcd.rows, 0) == single(&ply.rows, 0), "PCD and PLY differ");
+    assert!(single(&las.rows, 3) == single(&ply.rows, 3), "LAS and PLY differ");
+    let off =
+        |(row, other): (&Vec<f64>, &Vec<f64>)| (0..3).map(|axis| (row[axis] - other[axis]).abs()).fold(0.0, f64::max);
+    assert!(las.rows.iter().zip(&ply.rows).map(off).fold(0.0, f64::max) < 6e-4);
+    depth_camera(&python, &work);
+}
+
+/// The image of a depth camera beside the dense cloud, read by OpenCV, makes the points of the cloud.
+fn depth_camera(python: &str, work: &Work) {
+    let script = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../tests/export/depth.py");
+    let output = Command::new(python).arg(script).arg(work.file("dense")).output().expect("python runs");
+    assert!(output.status.success(), "{}", text(&output.stderr));
+    let said: Value = serde_json::from_slice(&output.stdout).expect("JSON");
+    println!("{said}");
+    let number = |name: &str| said[name].as_f64().expect("a number");
+    assert!(number("points") > 10_000.0, "{said}");
+    assert!(number("median_mm") < 1.0 && number("percentile_95_relative") < 0.02, "{said}");
+    assert!(number("grey_off") < 4.0, "{said}");
 }
 
 #[test]
@@ -152,13 +217,13 @@ fn folders_and_the_live_loop_take_the_format_as_an_option() {
     let (rig, left, right, out) = (file("rig.toml"), file("left"), file("right"), file("clouds"));
     let folders = ["depth", "--rig", &rig, "--mode", "human", "--left", &left, "--right", &right, "--out", &out];
     let result = run_json(&[&folders[..], &["--format", "pcd", "--json"]].concat());
-    let cloud = read(&python, Path::new(&out).join("1.pcd"));
+    let cloud = read(&python, PCD, Path::new(&out).join("1.pcd"));
     assert_eq!(result["pairs"][0]["points"].as_u64(), Some(cloud.rows.len() as u64));
 
     // An old cloud in the other format is not left beside the newest one.
     let (small, live) = (file("small.toml"), file("live"));
     std::fs::write(&small, small_bench_toml()).expect("a rig file");
-    for (format, other) in [("ply", "pcd"), ("pcd", "ply")] {
+    for (format, other) in [("ply", "las"), ("las", "pcd"), ("pcd", "ply")] {
         let board = ["--port", "sim", "--rig", &small, "run", "--cameras", "sim", "--home", "--match-time", "100ms"];
         let frames = ["--frames", "1", "--out", &live, "--also", "csv", "--format", format];
         let output = common::run(&[&board[..], &frames].concat());
@@ -166,5 +231,5 @@ fn folders_and_the_live_loop_take_the_format_as_an_option() {
         let cloud = |ending: &str| Path::new(&live).join(format!("cloud.{ending}"));
         assert!(cloud(format).exists() && !cloud(other).exists(), "{format}");
     }
-    assert_same(&read(&python, Path::new(&live).join("cloud.pcd")).rows, &table(&format!("{live}/cloud.csv")));
+    assert_same(&read(&python, PCD, Path::new(&live).join("cloud.pcd")).rows, &table(&format!("{live}/cloud.csv")));
 }
