@@ -1,4 +1,4 @@
-//! Clouds by the command line, read by other projects' libraries: PCD by pypcd4 (MAP IV), LAS by laspy, PLY by plyfile.
+//! Clouds by the command line, read by other projects' libraries: PCD by pypcd4 (MAP IV), LAS by laspy, PLY by plyfile, E57 by pye57 (libE57Format).
 #![allow(clippy::expect_used, clippy::print_stdout, reason = "a test fails loudly and shows its figures")]
 
 mod common;
@@ -59,6 +59,31 @@ print(json.dumps({
 }))
 "#;
 
+/// The same of an E57 file, in millimetres.
+const E57: &str = r#"
+import json, sys
+import numpy as np
+import pye57
+from pye57 import libe57
+# libE57Format reads an extension's columns as those of the standard; pye57 must be told their types.
+image = pye57.E57(sys.argv[1]).image_file
+cloud = libe57.StructureNode(libe57.VectorNode(image.root()["data3D"])[0])
+points = libe57.CompressedVectorNode(cloud["points"])
+fields = libe57.StructureNode(points.prototype())
+names = [fields.get(index).elementName() for index in range(fields.childCount())]
+count = points.childCount()
+columns = {name: np.empty(count, np.float64) for name in names}
+buffers = libe57.VectorSourceDestBuffer()
+for name in names:
+    buffers.append(libe57.SourceDestBuffer(image, name, columns[name], count, True, True))
+assert points.reader(buffers).read() == count
+about = libe57.StringNode(cloud["description"]).value()
+assert about.startswith("the left camera's frame") and "in metres" in about, about
+for name in ["cartesianX", "cartesianY", "cartesianZ"]:
+    columns[name] *= 1000
+print(json.dumps({"encoding": "binary", "fields": names, "rows": list(zip(*(column.tolist() for column in columns.values())))}))
+"#;
+
 /// A cloud as another library reads it.
 struct Read {
     encoding: String,
@@ -68,7 +93,7 @@ struct Read {
 
 /// The interpreter of these libraries; `None` where one is missing.
 fn reader() -> Option<String> {
-    python("import pypcd4, laspy, plyfile", "pypcd4 laspy plyfile")
+    python("import pypcd4, laspy, plyfile, pye57", "pypcd4 laspy plyfile pye57")
 }
 
 fn read(python: &str, script: &str, file: impl AsRef<Path>) -> Read {
@@ -145,11 +170,12 @@ fn sparse_clouds_hold_the_numbers_of_the_table_in_both_encodings() {
 
 /// LAS keeps coordinates to a micrometre.
 #[test]
-fn a_cloud_as_las_and_as_ply_holds_the_numbers_of_the_table() {
+fn a_cloud_as_las_e57_and_ply_holds_the_numbers_of_the_table() {
     let Some(python) = reader() else { return };
     let (work, arguments) = pair();
     for (name, script, first, last) in [
         ("cloud.las", LAS, "u_left:float32:pixels", "own_zz:float32:mm^2 extrapolated:uint8: track:int32:"),
+        ("cloud.e57", E57, "cartesianX cartesianY cartesianZ colorRed", "vergence:extrapolated vergence:track"),
         ("cloud.ply", PLY, "x:float64 y:float64 z:float64 red:uint8", "own_zz:float32 extrapolated:uint8 track:int32"),
     ] {
         run_json(&with(&arguments, &work.file(name), &["--also", "csv"]));
@@ -171,7 +197,8 @@ fn a_cloud_as_las_and_as_ply_holds_the_numbers_of_the_table() {
 fn a_dense_cloud_holds_the_same_numbers_in_every_format() {
     let Some(python) = reader() else { return };
     let (work, arguments) = pair();
-    let [pcd, las, ply] = [("dense.pcd", PCD), ("dense.las", LAS), ("dense.ply", PLY)].map(|(name, script)| {
+    let formats = [("dense.pcd", PCD), ("dense.las", LAS), ("dense.e57", E57), ("dense.ply", PLY)];
+    let [pcd, las, e57, ply] = formats.map(|(name, script)| {
         let out = work.file(name);
         run_json(&with(&arguments, &out, &["--dense"]));
         let cloud = read(&python, script, &out);
@@ -188,6 +215,7 @@ fn a_dense_cloud_holds_the_same_numbers_in_every_format() {
     let off =
         |(row, other): (&Vec<f64>, &Vec<f64>)| (0..3).map(|axis| (row[axis] - other[axis]).abs()).fold(0.0, f64::max);
     assert!(las.rows.iter().zip(&ply.rows).map(off).fold(0.0, f64::max) < 6e-4);
+    assert!(single(&e57.rows, 0) == single(&ply.rows, 0), "E57 and PLY differ");
     depth_camera(&python, &work);
 }
 
@@ -223,7 +251,7 @@ fn folders_and_the_live_loop_take_the_format_as_an_option() {
     // An old cloud in the other format is not left beside the newest one.
     let (small, live) = (file("small.toml"), file("live"));
     std::fs::write(&small, small_bench_toml()).expect("a rig file");
-    for (format, other) in [("ply", "las"), ("las", "pcd"), ("pcd", "ply")] {
+    for (format, other) in [("ply", "las"), ("e57", "ply"), ("las", "e57"), ("pcd", "las")] {
         let board = ["--port", "sim", "--rig", &small, "run", "--cameras", "sim", "--home", "--match-time", "100ms"];
         let frames = ["--frames", "1", "--out", &live, "--also", "csv", "--format", format];
         let output = common::run(&[&board[..], &frames].concat());

@@ -10,7 +10,7 @@ use crate::{CloudEncoding, CloudFormat, OutputError, Table, TableFormat};
 
 /// Where results go as files.
 ///
-/// In a folder, `cloud.ply` (or `.pcd`, `.las`) is always the newest cloud, written whole; it is removed while one camera is dead, so that nobody takes an old cloud for a
+/// In a folder, `cloud.ply` (or `.pcd`, `.las`, `.e57`) is always the newest cloud, written whole; it is removed while one camera is dead, so that nobody takes an old cloud for a
 /// new one, and `bearings.csv` is written instead.
 #[derive(Clone, Debug)]
 pub struct LatestFiles {

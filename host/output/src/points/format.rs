@@ -5,7 +5,8 @@ use std::path::Path;
 use vergence_pipeline::ColouredPoint;
 
 use super::columns::DenseRow;
-use super::las::{dense_las, las};
+use super::e57::{dense_e57, sparse_e57};
+use super::las::{dense_las, sparse_las};
 use super::pcd::{dense_pcd, pcd};
 use super::ply::{dense_ply, ply};
 use crate::endings::check_ending;
@@ -42,12 +43,14 @@ pub enum CloudFormat {
     Pcd,
     /// The format of the American Society for Photogrammetry, version 1.4.
     Las,
+    /// The format of ASTM E2807, in metres.
+    E57,
 }
 
 impl CloudFormat {
     /// The endings of all formats, without the dot.
-    pub const ENDINGS: [&str; 3] = [Self::Ply.ending(), Self::Pcd.ending(), Self::Las.ending()];
-    const ALL: [Self; 3] = [Self::Ply, Self::Pcd, Self::Las];
+    pub const ENDINGS: [&str; 4] = [Self::Ply.ending(), Self::Pcd.ending(), Self::Las.ending(), Self::E57.ending()];
+    const ALL: [Self; 4] = [Self::Ply, Self::Pcd, Self::Las, Self::E57];
 
     /// The format of a file with this ending, in upper or lower case; PLY where it is none of [`Self::ENDINGS`].
     #[must_use]
@@ -77,6 +80,7 @@ impl CloudFormat {
             Self::Ply => "ply",
             Self::Pcd => "pcd",
             Self::Las => "las",
+            Self::E57 => "e57",
         }
     }
 
@@ -88,11 +92,11 @@ impl CloudFormat {
         match (self, is_ascii) {
             (_, false) => Ok(CloudEncoding::Binary),
             (Self::Ply | Self::Pcd, true) => Ok(CloudEncoding::Ascii),
-            (Self::Las, true) => Err(CloudError::NoText(self.ending())),
+            (Self::Las | Self::E57, true) => Err(CloudError::NoText(self.ending())),
         }
     }
 
-    /// The file of a cloud: points in the left camera's frame in millimetres, with colour, pixels, uncertainty and track.
+    /// The file of a cloud: points in the left camera's frame in millimetres (metres in E57), with colour, pixels, uncertainty and track.
     ///
     /// # Errors
     /// [`CloudError`].
@@ -100,8 +104,11 @@ impl CloudFormat {
         match (self, encoding) {
             (Self::Ply, _) => Ok(ply(points, encoding)),
             (Self::Pcd, _) => Ok(pcd(points, encoding)),
-            (Self::Las, CloudEncoding::Binary) => las(points).map_err(|error| CloudError::Encoder(error.to_string())),
-            (Self::Las, CloudEncoding::Ascii) => Err(CloudError::NoText(self.ending())),
+            (Self::Las, CloudEncoding::Binary) => sparse_las(points).map_err(|error| CloudError::Encoder(error.to_string())),
+            (Self::E57, CloudEncoding::Binary) => {
+                sparse_e57(points).map_err(|error| CloudError::Encoder(error.to_string()))
+            }
+            (Self::Las | Self::E57, CloudEncoding::Ascii) => Err(CloudError::NoText(self.ending())),
         }
     }
 
@@ -114,6 +121,7 @@ impl CloudFormat {
             Self::Ply => Ok(dense_ply(rows)),
             Self::Pcd => Ok(dense_pcd(rows)),
             Self::Las => dense_las(rows).map_err(|error| CloudError::Encoder(error.to_string())),
+            Self::E57 => dense_e57(rows).map_err(|error| CloudError::Encoder(error.to_string())),
         }
     }
 }

@@ -25,7 +25,7 @@ const COORDINATE_SYSTEM: u16 = 2112;
 const LOCAL_MM: &str = "LOCAL_CS[\"left camera, x right, y down, z forward\",UNIT[\"millimetre\",0.001]]\0";
 
 /// The columns of a PLY file of these points.
-pub fn las(points: &[ColouredPoint]) -> ::las::Result<Vec<u8>> {
+pub fn sparse_las(points: &[ColouredPoint]) -> ::las::Result<Vec<u8>> {
     let about = [ABOUT_FRAME, ABOUT_SCORE, ABOUT_COVARIANCES].join("; ");
     let rows = points.iter().map(|point| (point.point.point.mm().into(), point.colour, sparse_cells(point)));
     file(&about, &sparse_columns(), rows)

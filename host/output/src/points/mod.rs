@@ -1,7 +1,8 @@
-//! Clouds and bearings as files for other programs: PLY, PCD, LAS and tables.
+//! Clouds and bearings as files for other programs: PLY, PCD, LAS, E57 and tables.
 
 mod cells;
 mod columns;
+mod e57;
 mod format;
 mod las;
 mod pcd;

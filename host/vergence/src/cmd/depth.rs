@@ -40,7 +40,7 @@ use vergence_plausibility::images::{Taken, cloud_is_of_one_pair, images_differ, 
 use vergence_plausibility::pose::cameras_are_near;
 
 /// Matches two photographs (or two folders of them, paired by name, number or time stamp) taken by the cameras of the rig
-/// file, and writes the points as PLY, PCD or LAS in millimetres in the left camera's frame.
+/// file, and writes the points as PLY, PCD, LAS or E57 in the left camera's frame.
 #[derive(Debug, clap::Args)]
 pub struct Args {
     /// The left image, or a folder.
@@ -49,7 +49,7 @@ pub struct Args {
     /// The right image, or a folder.
     #[arg(long, value_name = "IMAGE")]
     right: PathBuf,
-    /// The cloud to write, a name that ends in .ply, .pcd or .las; for folders, the folder for one cloud per pair.
+    /// The cloud to write, a name that ends in .ply, .pcd, .las or .e57; for folders, the folder for one cloud per pair.
     #[arg(long, value_name = "FILE")]
     out: PathBuf,
     /// For folders, the format of the clouds; ply without it.

@@ -11,7 +11,7 @@ use crate::failure::Failure;
 /// Where results go as files.
 #[derive(Debug, clap::Args)]
 pub struct ResultOptions {
-    /// The folder for `cloud.ply` (or `.pcd`, `.las`), always the newest cloud.
+    /// The folder for `cloud.ply` (or `.pcd`, `.las`, `.e57`), always the newest cloud.
     #[arg(long, value_name = "DIR")]
     pub out: Option<PathBuf>,
     /// Keep every cloud, in files with numbers.
