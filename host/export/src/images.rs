@@ -15,7 +15,7 @@ use crate::{ExportError, Exported, Options, make_empty};
 pub fn export(images: [&Path; 2], rig: Option<Rig>, options: &Options) -> Result<Exported, ExportError> {
     let rig = rig.ok_or_else(|| ExportError::NoRig(images[0].to_owned()))?;
     let (mut cameras, unpaired) = FileCamera::open_pair(images[0], images[1])?;
-    let views = views(&rig, faces(options), options)?;
+    let views = views(&rig, &faces(options), options)?;
     make_empty(&options.out)?;
     let mut exported = Exported { out: options.out.clone(), warnings: remarks(&rig), ..Exported::default() };
     for file in unpaired {

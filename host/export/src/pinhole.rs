@@ -21,15 +21,16 @@ pub struct PinholeBag {
 impl PinholeBag {
     /// Begins a bag of views by the cameras of `rig`, whose file is `text`.
     pub fn create(rig: &Rig, text: &str, options: &Options) -> Result<Self, ExportError> {
-        let views = views(rig, faces(options), options)?;
+        let views = views(rig, &faces(options), options)?;
         let bag = ViewsBag::create(&options.out, text)?;
         Ok(Self { bag, views, remarks: remarks(rig), folder: options.out.clone() })
     }
 }
 
-/// The faces that the options name, or all.
-pub fn faces(options: &Options) -> &[Face] {
-    if options.faces.is_empty() { &Face::ALL } else { &options.faces }
+/// The faces that the options name, each once, or all.
+pub fn faces(options: &Options) -> Vec<Face> {
+    let is_named = |face: &Face| options.faces.is_empty() || options.faces.contains(face);
+    Face::ALL.into_iter().filter(is_named).collect()
 }
 
 impl Sink for PinholeBag {
