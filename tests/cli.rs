@@ -37,6 +37,7 @@ const VERBS: &[&str] = &[
     "reproduce",
     "record",
     "replay",
+    "export",
     "run",
     "servo",
     "depth",

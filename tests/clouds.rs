@@ -88,7 +88,8 @@ fn with<'a>(arguments: &'a [String], more: &[&'a str]) -> Vec<&'a str> {
 #[test]
 fn a_name_that_says_another_format_is_refused() {
     let shop = Workshop::new(0.0);
-    fails_with(&with(&shop.depth("cloud.las"), &[]), 2, &["cloud.las", "'.las' is not written", ".ply"]);
+    fails_with(&with(&shop.depth("cloud.xyz"), &[]), 2, &["cloud.xyz", "'.xyz' is not written", ".ply"]);
+    fails_with(&with(&shop.depth("cloud.las"), &["--ascii"]), 2, &[".las has no form as text", "--ascii"]);
     fails_with(&with(&shop.depth("cloud"), &[]), 2, &["has no ending", ".ply"]);
     let matches = shop.file("matches.pdf");
     fails_with(&with(&shop.depth("cloud.ply"), &["--matches", &matches]), 2, &["'.pdf' is not written", ".svg"]);

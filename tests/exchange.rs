@@ -229,11 +229,16 @@ fn a_rig_goes_out_and_comes_back() {
     let truth = bench.pose_at_values(&[145.0, 120_f64.to_radians()]).left_from_right;
     let ray = UnitRay::<Camera>::new(Vector3::new(0.5, -0.4, 0.1)).expect("a direction");
     let expected = bench.right_camera.project(&ray).expect("in the field");
-    for (format, limit_px) in [("opencv", 1e-9), ("kalibr", 1e-9), ("basalt", 1e-9), ("ros", 1e-9), ("mrcal", 0.02)] {
+    let exact = ["opencv", "kalibr", "basalt", "ros", "tum-vi"].map(|format| (format, 1e-9));
+    for (format, limit_px) in exact.into_iter().chain([("mrcal", 0.02)]) {
         let (file, out) = (path(&folder, &format!("{format}.txt")), path(&folder, &format!("{format}.toml")));
         let sent = run_json(&["rig", "export", "--json", "--mode", "herbivore", "--to", format, "--out", &file]);
         let files: Vec<&str> = sent["out"].as_array().expect("files").iter().filter_map(Value::as_str).collect();
-        assert_eq!(files.len(), if matches!(format, "ros" | "mrcal") { 2 } else { 1 }, "{format}: {files:?}");
+        assert_eq!(
+            files.len(),
+            if matches!(format, "ros" | "mrcal" | "tum-vi") { 2 } else { 1 },
+            "{format}: {files:?}"
+        );
         run_json(&[&["rig", "import", "--json", "--out", &out][..], &files].concat());
         let back = read_rig(&out);
         let pose = back.pose_at_values(&[]).left_from_right;

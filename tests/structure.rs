@@ -205,6 +205,20 @@ const ALLOWED: &[(&str, &[&str])] = &[
             "vergence-live",
         ],
     ),
+    (
+        "vergence-export",
+        &[
+            "vergence-vision",
+            "vergence-rig",
+            "vergence-exchange",
+            "vergence-camera",
+            "vergence-pipeline",
+            "vergence-live",
+            "vergence-files",
+            "vergence-output",
+            "vergence-recording",
+        ],
+    ),
     ("vergence-failure", EVERYTHING),
     ("vergence", EVERYTHING),
 ];

@@ -25,7 +25,11 @@ fn model(root: &Node, size: ImageSize) -> Result<Box<dyn CameraModel>, ExchangeE
     let pinhole = root.need(&["intrinsics"])?.array()?;
     let coefficients = root.need(&["distortion_coefficients"])?;
     match (camera.as_str(), distortion.as_str()) {
-        ("pinhole", "equidistant") => place.fisheye(pinhole, coefficients.array()?, size, None),
+        ("pinhole", "equidistant") => {
+            // A key of this program: other files do not say up to which angle the polynomial is good.
+            let limit = root.get(&["theta_max_deg"]).map(|node| node.number()).transpose()?;
+            place.fisheye(pinhole, coefficients.array()?, size, limit)
+        }
         ("pinhole", "radial-tangential" | "radtan") => {
             let distortion = Radtan::new(&coefficients.array::<4>()?).ok_or_else(|| root.wrong("has no distortion"))?;
             place.central(Pinhole { pinhole, distortion })

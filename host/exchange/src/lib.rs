@@ -26,7 +26,9 @@ mod write;
 pub use self::error::ExchangeError;
 pub use self::format::{Format, Recognised};
 pub use self::rig::{ForeignCamera, ForeignPair, ForeignRig};
-pub use self::write::{Cameras, FileName, OursOrTheirs, UnknownFormat, WriteFormat, Written, WrittenFile, write};
+pub use self::write::{
+    Cameras, FileName, OursOrTheirs, Sensor, UnknownFormat, WriteFormat, Written, WrittenFile, write,
+};
 
 /// Reads the cameras of a file of another program.
 ///

@@ -6,6 +6,7 @@ mod board;
 mod calibration;
 mod calibration_input;
 mod camera;
+mod export;
 mod files;
 mod live;
 mod models;

@@ -5,13 +5,12 @@ use std::path::{Path, PathBuf};
 use serde_json::{Map, Value, json};
 use vergence_files::{FileError, write_png, write_whole};
 use vergence_matching::{DenseDepth, DenseSample};
-use vergence_pipeline::limits::MAX_RELATIVE_SIGMA;
 use vergence_pipeline::{DenseRanges, PairImages, StageTimes, colour_at};
 use vergence_rig::{Rig, RigPose, rounded};
 use vergence_vision::{Left, Pixel, Point};
 
 use crate::cloud_report::{drift_json, extrapolated_line};
-use crate::pictures::{confidence_image, dense_svg, range_image, sigma_image, write_drawing};
+use crate::pictures::{DepthView, confidence_image, dense_svg, makes_a_point, range_image, sigma_image, write_drawing};
 use crate::points::{CloudFormat, DenseRow};
 
 /// A range for every pixel of a left image, written as a cloud with images beside it.
@@ -27,7 +26,7 @@ pub struct DenseCloud<'a> {
 
 impl<'a> DenseCloud<'a> {
     /// Writes `ranges`, which were measured in `images` taken at `pose`: the cloud to `out` in the format of its ending, and beside it PNG images of range,
-    /// sigma and confidence, and a preview as SVG.
+    /// sigma and confidence, a preview as SVG, and the image of a depth camera with its K.
     ///
     /// # Errors
     /// [`FileError::Write`].
@@ -40,11 +39,17 @@ impl<'a> DenseCloud<'a> {
     ) -> Result<Self, FileError> {
         let depth = &ranges.depth;
         let rows = rows(depth, images, rig, pose);
-        write_whole(out, &CloudFormat::of_file(out).dense_cloud(&rows))?;
+        let bytes = CloudFormat::of_file(out).dense_cloud(&rows).map_err(|error| FileError::write(out, error))?;
+        write_whole(out, &bytes)?;
         write_png(&beside(out, "range", "png"), &range_image(depth))?;
         write_png(&beside(out, "sigma", "png"), &sigma_image(depth))?;
         write_png(&beside(out, "confidence", "png"), &confidence_image(depth))?;
         write_drawing(&beside(out, "preview", "svg"), dense_svg(images.left, depth))?;
+        let view = DepthView::new(depth, (images.left, &rig.left_camera), &pose.left_from_right)
+            .map_err(|error| FileError::write(&beside(out, "depth", "png"), error))?;
+        write_png(&beside(out, "depth", "png"), &view.depth)?;
+        write_png(&beside(out, "depth-image", "png"), &view.image)?;
+        write_whole(&beside(out, "depth", "yaml"), view.yaml().as_bytes())?;
         let extrapolated = rows.iter().filter(|row| row.extrapolated).count();
         Ok(Self { ranges, times, points: rows.len(), extrapolated, out })
     }
@@ -103,6 +108,9 @@ impl<'a> DenseCloud<'a> {
             "range_png": beside(self.out, "range", "png"),
             "sigma_png": beside(self.out, "sigma", "png"),
             "confidence_png": beside(self.out, "confidence", "png"),
+            "depth_png": beside(self.out, "depth", "png"),
+            "depth_image_png": beside(self.out, "depth-image", "png"),
+            "depth_yaml": beside(self.out, "depth", "yaml"),
             "preview_svg": beside(self.out, "preview", "svg"),
         })
     }
@@ -120,7 +128,7 @@ fn rows(depth: &DenseDepth, images: PairImages<'_>, rig: &Rig, pose: &RigPose) -
     let width = depth.size().width.max(1);
     let row = |(index, sample): (u32, &DenseSample)| {
         let DenseSample::Measured(measured) = sample else { return None };
-        if measured.own_sigma().mm() > MAX_RELATIVE_SIGMA * measured.range().mm() {
+        if !makes_a_point(measured) {
             return None;
         }
         let pixel = Pixel { u: f64::from(index % width), v: f64::from(index / width) };

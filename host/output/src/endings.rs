@@ -27,7 +27,7 @@ pub fn check_ending<'a>(path: &Path, known: &[&'a str]) -> Result<&'a str, Outpu
 /// # Errors
 /// Where the name has the ending of a known file format.
 pub fn check_folder(path: &Path) -> Result<(), OutputError> {
-    const FILES: [&str; 8] = ["ply", "pcd", "xyz", "las", "csv", "json", "svg", "png"];
+    const FILES: [&str; 9] = ["ply", "pcd", "xyz", "las", "e57", "csv", "json", "svg", "png"];
     let ending = path.extension().unwrap_or_default().to_string_lossy().to_lowercase();
     if path.is_dir() || !FILES.contains(&ending.as_str()) {
         return Ok(());

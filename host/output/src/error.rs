@@ -4,6 +4,7 @@ use std::path::PathBuf;
 
 use vergence_files::FileError;
 
+use crate::points::CloudError;
 use crate::target_sheet::Paper;
 
 /// Why an output file cannot be written. The text is a sentence: which file, why, and what to do.
@@ -13,6 +14,9 @@ pub enum OutputError {
     /// A file or folder cannot be written.
     #[error(transparent)]
     File(#[from] FileError),
+    /// A cloud cannot be written so.
+    #[error(transparent)]
+    Cloud(#[from] CloudError),
     /// The ending of a file's name says a format that is not written there.
     #[error("{}: '.{ending}' is not written: choose a name that ends in {known}", path.display())]
     UnknownEnding {

@@ -10,7 +10,7 @@ use crate::{CloudEncoding, CloudFormat, OutputError, Table, TableFormat};
 
 /// Where results go as files.
 ///
-/// In a folder, `cloud.ply` or `cloud.pcd` is always the newest cloud, written whole; it is removed while one camera is dead, so that nobody takes an old cloud for a
+/// In a folder, `cloud.ply` (or `.pcd`, `.las`, `.e57`) is always the newest cloud, written whole; it is removed while one camera is dead, so that nobody takes an old cloud for a
 /// new one, and `bearings.csv` is written instead.
 #[derive(Clone, Debug)]
 pub struct LatestFiles {
@@ -38,7 +38,8 @@ impl LatestFiles {
             CloudFormat::ENDINGS.into_iter().filter(|&ending| ending != self.format.ending()).collect();
         self.withdraw(folder, "cloud", &others)?;
         let file = self.file(folder, ("cloud", number), self.format.ending());
-        write_whole(&file, &self.format.cloud(points, self.encoding))?;
+        let bytes = self.format.cloud(points, self.encoding).map_err(|error| FileError::write(&file, error))?;
+        write_whole(&file, &bytes)?;
         self.write_tables(folder, ("cloud", number), &Table::of_points(points), &self.also)
     }
 

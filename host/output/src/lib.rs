@@ -33,10 +33,11 @@ pub use error::OutputError;
 pub use latest_files::LatestFiles;
 pub use live_report::{live_bearings_json, live_cloud_json, live_cloud_words};
 pub use pictures::{
-    ZonesOf, confidence_image, dense_svg, depth_field_svg, depth_svg, error_svg, match_svg, range_image, seen_by_cones,
-    sigma_image, trunk_strip_svg, write_drawing, write_scored_pair, zones_plot, zones_svg,
+    DepthView, EXACT_AT, ViewMap, ZonesOf, confidence_image, dense_svg, depth_field_svg, depth_svg, error_svg,
+    match_svg, range_image, seen_by_cones, sigma_image, trunk_strip_svg, view_yaml, write_drawing, write_scored_pair,
+    zones_plot, zones_svg,
 };
-pub use points::{CloudEncoding, CloudFormat, DenseRow, Table, TableFormat, write_cloud};
+pub use points::{CloudEncoding, CloudError, CloudFormat, DenseRow, Table, TableFormat, write_cloud};
 pub use published_zones::published_zones;
 pub use target_sheet::{Paper, Sheet};
 pub use trunk_report::{trunk_leg_json, trunk_leg_table, trunk_path_lines};

@@ -39,6 +39,17 @@ pub enum RecordingError {
         /// Which part of it.
         what: String,
     },
+    /// The recording has no rig file.
+    #[error("{}: no rig file is attached; name one with --rig", .0.display())]
+    NoRig(PathBuf),
+    /// The rig file of the recording is wrong.
+    #[error("{}: the attached rig file: {why}", .file.display())]
+    Rig {
+        /// Which recording.
+        file: PathBuf,
+        /// What is wrong with it.
+        why: String,
+    },
     /// The measuring of a recorded pair failed.
     #[error(transparent)]
     Live(#[from] vergence_live::LiveError),

@@ -2,11 +2,12 @@
 //!
 //! Frames: `base` carries `left` and `right`, the optical frames of both cameras (x right, y down, z forward).
 
-use nalgebra::{Matrix3, UnitQuaternion, Vector3};
+use image::RgbImage;
+use nalgebra::{Isometry3, Matrix3};
 use vergence_pipeline::{ColouredPoint, PairCloud};
 use vergence_protocol::PoseReport;
 use vergence_rig::{AxisPosition, RigAxis, RigPose};
-use vergence_vision::{KannalaBrandt, OpenCvFisheye};
+use vergence_vision::{ImageSize, KannalaBrandt, OpenCvFisheye, Pixel, VirtualView};
 
 use crate::cdr::Cdr;
 use crate::event::Eye;
@@ -64,19 +65,43 @@ pub fn image(stamp_ns: u64, eye: Eye, png: &Png) -> Vec<u8> {
 /// A `sensor_msgs/CameraInfo` with the model `equidistant`, which ROS shares with OpenCV's fisheye model and Kalibr: r = f (θ + d1 θ³ + d2 θ⁵ +
 /// d3 θ⁷ + d4 θ⁹). A moving pupil and asymmetry have no place there; the attached rig file has them.
 pub fn camera_info(stamp_ns: u64, eye: Eye, lens: &KannalaBrandt) -> Vec<u8> {
-    let (size, OpenCvFisheye { fx, fy, cx, cy, k }) = (lens.size(), lens.to_opencv());
+    let OpenCvFisheye { fx, fy, cx, cy, k } = lens.to_opencv();
+    lens_info(header(stamp_ns, eye.name()), lens.size(), ("equidistant", &k), [fx, fy, cx, cy])
+}
+
+/// A `sensor_msgs/CameraInfo` of a pinhole view in the frame `frame`, without distortion.
+pub fn view_info(stamp_ns: u64, frame: &str, view: &VirtualView) -> Vec<u8> {
+    let (focal, Pixel { u, v }) = (view.focal(), view.centre());
+    lens_info(header(stamp_ns, frame), view.size(), ("plumb_bob", &[0.0; 5]), [focal, focal, u, v])
+}
+
+fn lens_info(header: Cdr, size: ImageSize, (model, d): (&str, &[f64]), [fx, fy, cx, cy]: [f64; 4]) -> Vec<u8> {
     let identity = Matrix3::<f64>::identity();
-    header(stamp_ns, eye.name())
+    header
         .number(size.height)
         .number(size.width)
-        .text("equidistant")
-        .sequence(&k)
+        .text(model)
+        .sequence(d)
         .array(&[fx, 0.0, cx, 0.0, fy, cy, 0.0, 0.0, 1.0])
         .array(identity.as_slice())
         .array(&[fx, 0.0, cx, 0.0, 0.0, fy, cy, 0.0, 0.0, 0.0, 1.0, 0.0])
         // Neither binned nor cut.
         .array(&[0_u32; 6])
         .number(0_u8)
+        .finish()
+}
+
+/// A `sensor_msgs/Image`: grey where all channels are the same.
+pub fn raw_image(stamp_ns: u64, frame: &str, image: &RgbImage) -> Vec<u8> {
+    let grey = image.pixels().all(|pixel| pixel.0 == [pixel.0[0]; 3]);
+    let grey = grey.then(|| image.pixels().map(|pixel| pixel.0[0]).collect::<Vec<u8>>());
+    let (encoding, channels) = if grey.is_some() { ("mono8", 1) } else { ("rgb8", 3) };
+    header(stamp_ns, frame)
+        .array(&[image.height(), image.width()])
+        .text(encoding)
+        .number(0_u8)
+        .number(image.width() * channels)
+        .bytes(grey.as_deref().unwrap_or(image.as_raw()))
         .finish()
 }
 
@@ -100,19 +125,31 @@ fn si(position: AxisPosition) -> f64 {
 
 /// A `tf2_msgs/TFMessage` with both cameras on the base.
 pub fn transforms(stamp_ns: u64, pose: &RigPose) -> Vec<u8> {
-    let base_from_right = pose.base_from_left * pose.left_from_right;
-    let cameras = [
-        (Eye::Left, pose.base_from_left.origin().mm(), pose.base_from_left.rotation()),
-        (Eye::Right, base_from_right.origin().mm(), base_from_right.rotation()),
-    ];
-    Cdr::default()
-        .parts(&cameras, |cdr, (eye, origin, rotation)| placed(cdr, stamp_ns, *eye, origin, *rotation))
-        .finish()
+    placed(stamp_ns, &cameras(pose))
 }
 
-fn placed(cdr: Cdr, stamp_ns: u64, eye: Eye, origin: &Vector3<f64>, rotation: UnitQuaternion<f64>) -> Cdr {
-    let metres = origin * MM;
-    stamped(cdr, stamp_ns, "base").text(eye.name()).array(metres.as_slice()).array(rotation.coords.as_slice())
+/// A frame that stands in another one.
+pub struct Placed {
+    pub parent: String,
+    pub child: String,
+    /// The child's frame in the parent's, in millimetres.
+    pub pose: Isometry3<f64>,
+}
+
+/// Both cameras on the base.
+pub fn cameras(pose: &RigPose) -> [Placed; 2] {
+    let base_from_right = pose.base_from_left * pose.left_from_right;
+    [(Eye::Left, *pose.base_from_left.isometry()), (Eye::Right, *base_from_right.isometry())]
+        .map(|(eye, pose)| Placed { parent: "base".to_owned(), child: eye.name().to_owned(), pose })
+}
+
+/// A `tf2_msgs/TFMessage` with these frames.
+pub fn placed(stamp_ns: u64, frames: &[Placed]) -> Vec<u8> {
+    let one = |cdr: Cdr, Placed { parent, child, pose }: &Placed| {
+        let metres = pose.translation.vector * MM;
+        stamped(cdr, stamp_ns, parent).text(child).array(metres.as_slice()).array(pose.rotation.coords.as_slice())
+    };
+    Cdr::default().parts(frames, one).finish()
 }
 
 /// A `sensor_msgs/PointCloud2` in the frame of the left camera: metres, covariances in square metres, colour as 0x00RRGGBB in `rgba`.

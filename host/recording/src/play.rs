@@ -56,6 +56,19 @@ pub trait Audience {
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Jump(pub Duration);
 
+/// Nobody follows.
+impl Audience for () {
+    async fn proceed(&mut self, _since_first: Duration) -> Result<(), Jump> {
+        Ok(())
+    }
+
+    fn hear(&mut self, _heard: &Heard, _board: Option<&BoardKnowledge>) {}
+
+    fn camera(&mut self, _side: Side, event: CameraEvent) -> CameraEvent {
+        event
+    }
+}
+
 /// Nobody follows where there is `None`.
 impl<A: Audience> Audience for Option<&mut A> {
     async fn proceed(&mut self, since_first: Duration) -> Result<(), Jump> {
@@ -99,7 +112,7 @@ pub async fn play<E: From<LiveError> + From<RecordingError> + From<Jump>>(
         let since_first_us = heard.host_us.saturating_sub(first_us);
         if since_first_us >= pacing.left_out_us() {
             let held = Instant::now();
-            replay.audience.proceed(Duration::from_micros(since_first_us)).await?;
+            replay.posing.audience.proceed(Duration::from_micros(since_first_us)).await?;
             begun += held.elapsed();
         }
         match pacing.due(since_first_us).and_then(|due| begun.checked_add(due)) {

@@ -10,6 +10,7 @@ use image::{ImageFormat, RgbImage};
 use mcap::records::{Record, op};
 use mcap::sans_io::summary_reader::{SummaryReadEvent, SummaryReader};
 use mcap::sans_io::{LinearReadEvent, LinearReader, LinearReaderOptions};
+use vergence_rig::{HostInstant, Rig};
 
 use crate::RecordingError;
 use crate::bag::{EVENTS, FILE, LEFT_IMAGE, RIG, RIGHT_IMAGE};
@@ -37,10 +38,18 @@ pub struct Reader {
 pub struct Heard {
     /// The time on the host's clock in microseconds.
     pub host_us: u64,
+    /// The time at which that clock started, in microseconds since 1970.
+    pub epoch_us: u64,
     /// The event.
     pub event: Event,
     /// The image of [`Event::Image`], unless it is left out.
     pub image: Option<RgbImage>,
+}
+
+/// An instant of the host's clock, which started at `epoch_us`, in nanoseconds since 1970: the stamp of an image in messages and file names.
+#[must_use]
+pub fn stamp_ns(epoch_us: u64, at: HostInstant) -> u64 {
+    (epoch_us * 1000).saturating_add((at.us.max(0.0) * 1000.0) as u64)
 }
 
 impl Reader {
@@ -103,6 +112,15 @@ impl Reader {
         self.rig.as_deref()
     }
 
+    /// The rig of the attached file; read the first event before.
+    ///
+    /// # Errors
+    /// [`RecordingError::NoRig`], [`RecordingError::Rig`]
+    pub fn attached_rig(&self) -> Result<Rig, RecordingError> {
+        let text = self.rig().ok_or_else(|| RecordingError::NoRig(self.file.clone()))?;
+        Rig::from_toml(text).map_err(|error| RecordingError::Rig { file: self.file.clone(), why: error.to_string() })
+    }
+
     /// Whether the end of the recording was read. That of a program that was killed has none: its last events are lost.
     #[must_use]
     pub const fn is_finished(&self) -> bool {
@@ -162,7 +180,7 @@ impl Reader {
             Record::Message { header, data } => match self.topics.get(&header.channel_id).map(String::as_str) {
                 Some(topic) if topic == EVENTS.name => {
                     self.begun_ns.get_or_insert(header.log_time);
-                    return self.event(&data).map(Some);
+                    return self.event(&data, header.log_time).map(Some);
                 }
                 Some(topic) if topic == LEFT_IMAGE.name => self.images[0] = Some(self.image(&data)?),
                 Some(topic) if topic == RIGHT_IMAGE.name => self.images[1] = Some(self.image(&data)?),
@@ -177,14 +195,14 @@ impl Reader {
         image_bytes(message).map(<[u8]>::to_vec).ok_or_else(|| self.foreign("an image"))
     }
 
-    fn event(&mut self, message: &[u8]) -> Result<Heard, RecordingError> {
+    fn event(&mut self, message: &[u8], at_ns: u64) -> Result<Heard, RecordingError> {
         let (host_us, postcard) = number_and_bytes(message).ok_or_else(|| self.foreign("an event"))?;
         let event: Event = postcard::from_bytes(postcard).map_err(|_| self.foreign("an event"))?;
         let image = match event {
             Event::Image(eye, _) if host_us >= self.decode_from_us => Some(self.decoded(eye)?),
             _ => None,
         };
-        Ok(Heard { host_us, event, image })
+        Ok(Heard { host_us, epoch_us: (at_ns / 1000).saturating_sub(host_us), event, image })
     }
 
     /// The image that was written just before its event.

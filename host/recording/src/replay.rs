@@ -1,58 +1,32 @@
-//! Measures a recording as the live loop measures: the same pairing, the same poses, the same clouds. No exposure is skipped because the matcher is busy, so that
-//! the result depends on the recording alone.
+//! Measures a recording as the live loop measures: the same pairing, the same poses, the same clouds.
 
-use std::collections::VecDeque;
-
-use vergence_board::{BoardKnowledge, BoardNews};
-use vergence_camera::{CameraEvent, PendingImage};
-use vergence_live::{Clock, LiveError, Measurement, Posed, READINGS, Totals, measure, pose};
-use vergence_pipeline::{Exposed, Exposures, Method, PoseMemory, SkipReason, TimeBase};
-use vergence_protocol::Microseconds;
+use vergence_live::{Clock, LiveError, Measurement, PosedExposure, Totals, measure};
+use vergence_pipeline::{Method, PoseMemory, SkipReason};
 use vergence_rig::Rig;
 
-use crate::event::{Beginning, Event, exchange_of};
 use crate::play::Audience;
+use crate::posing::Posing;
 use crate::reader::Heard;
 
 /// A recording that is measured, event by event.
 pub struct Replay<'a, A: Audience> {
-    /// Who follows it.
-    pub audience: A,
     rig: &'a Rig,
     method: Method<'a>,
     stopwatch: Clock,
-    board: Option<BoardKnowledge>,
-    exposures: Exposures<PendingImage>,
+    pub(crate) posing: Posing<'a, A>,
     memory: PoseMemory,
-    /// Exposures whose encoder readings have not come yet, each with the time at which the wait for them began.
-    waiting: VecDeque<(u64, Exposed<PendingImage>)>,
-    pulses: u64,
 }
 
 impl<'a, A: Audience> Replay<'a, A> {
     /// A replay on `rig`, whose matches are found by `method`, before `audience`; `stopwatch` says how long measuring takes.
     #[must_use]
     pub fn new(rig: &'a Rig, method: Method<'a>, stopwatch: Clock, audience: A) -> Self {
-        Self {
-            audience,
-            rig,
-            method,
-            stopwatch,
-            board: None,
-            exposures: Exposures::new(None),
-            memory: PoseMemory::default(),
-            waiting: VecDeque::new(),
-            pulses: 0,
-        }
+        Self { rig, method, stopwatch, posing: Posing::new(rig, audience), memory: PoseMemory::default() }
     }
 
     /// Adds what was not measured so far, and the pulses, to `totals`.
     pub fn account(&self, totals: &mut Totals) {
-        for (reason, count) in self.exposures.skipped() {
-            *totals.skipped.entry(*reason).or_default() += count;
-        }
-        totals.pulses += self.pulses;
-        totals.open += self.exposures.open() + self.waiting.len() as u64;
+        self.posing.account(totals);
     }
 
     /// Takes the next event, and calls `publish` with each measurement that it completes.
@@ -64,13 +38,8 @@ impl<'a, A: Audience> Replay<'a, A> {
         heard: Heard,
         publish: &mut impl FnMut(Measurement) -> Result<(), E>,
     ) -> Result<(), E> {
-        let now = heard.host_us;
-        self.exposures.settle(Microseconds(now), &self.base());
-        self.hear(heard);
-        while let Some(exposed) = self.exposures.take() {
-            self.waiting.push_back((now, exposed));
-        }
-        self.measure_known(now, publish)
+        let exposures = self.posing.take(heard);
+        self.measure(exposures, publish)
     }
 
     /// Measures what can be measured after the last event.
@@ -81,85 +50,19 @@ impl<'a, A: Audience> Replay<'a, A> {
         &mut self,
         publish: &mut impl FnMut(Measurement) -> Result<(), E>,
     ) -> Result<(), E> {
-        self.measure_known(u64::MAX, publish)
+        let exposures = self.posing.finish();
+        self.measure(exposures, publish)
     }
 
-    fn base(&self) -> TimeBase {
-        self.board.as_ref().map_or(TimeBase::Host, |board| TimeBase::Board(board.clock_map()))
-    }
-
-    fn hear(&mut self, heard: Heard) {
-        let base = self.base();
-        self.audience.hear(&heard, self.board.as_ref());
-        match (heard.event, heard.image) {
-            (Event::Begun(Beginning { has_board, baud, period_us }), _) => {
-                self.board = has_board.then(|| BoardKnowledge::new(baud));
-                self.exposures = Exposures::new(period_us);
-            }
-            (Event::Pose(pose), _) => self.note(&BoardNews::Pose(pose)),
-            (Event::ProbeSent, _) => self.note(&BoardNews::ProbeSent),
-            (Event::Exchange(stamps), _) => self.note(&BoardNews::Exchange(exchange_of(stamps))),
-(Event::LinkEnded, _) => {
-                self.note(&BoardNews::LinkEnded);
-                self.exposures.link_ended();
-            }
-            (Event::LinkBack, _) => {
-                self.note(&BoardNews::LinkBack);
-                self.exposures.link_back();
-            }
-            (Event::Pulse(mark), _) => {
-                self.pulses += 1;
-                self.exposures.pulse(&mark, &base);
-            }
-            (Event::Attached(eye, timing), _) => self.exposures.camera_ready(eye.side(), timing.into(), &base),
-            (Event::Lost(eye, why), _) => self.exposures.camera_failed(eye.side(), why, &base),
-            (Event::Image(eye, stamp), Some(image)) => {
-                let pending = PendingImage {
-                    seq: stamp.seq,
-                    middle: vergence_rig::StampedImage::from(stamp).middle,
-                    develop: Box::new(move || Ok(image)),
-                };
-                if let CameraEvent::Image(pending) = self.audience.camera(eye.side(), CameraEvent::Image(pending)) {
-                    self.exposures.image(eye.side(), stamp.into(), pending, &base);
-                }
-            }
-            // It is not measured.
-            (Event::Image(..), None) => {}
-        }
-    }
-
-    fn note(&self, news: &BoardNews) {
-        if let Some(board) = &self.board {
-            board.note(news);
-        }
-    }
-
-    /// Measures exposures in their order, as far as their poses are known at `now`.
-    fn measure_known<E: From<LiveError>>(
+    fn measure<E: From<LiveError>>(
         &mut self,
-        now: u64,
+        exposures: Vec<PosedExposure>,
         publish: &mut impl FnMut(Measurement) -> Result<(), E>,
     ) -> Result<(), E> {
-        let patience = u64::try_from(READINGS.as_micros()).unwrap_or(u64::MAX);
-        while let Some((since, exposed)) = self.waiting.pop_front() {
-            let posed = match pose(exposed, self.rig, self.board.as_ref()) {
-                Posed::Ready(posed) => posed,
-                Posed::Skipped(reason) => {
-                    self.exposures.skip(reason);
-                    continue;
-                }
-                Posed::NotYet(exposed) if now.saturating_sub(since) < patience => {
-                    self.waiting.push_front((since, exposed));
-                    return Ok(());
-                }
-                Posed::NotYet(_) => {
-                    self.exposures.skip(SkipReason::EncodersSilent);
-                    continue;
-                }
-            };
-            match measure(posed, self.rig, self.method, &mut self.memory, self.stopwatch)? {
+        for exposure in exposures {
+            match measure(exposure, self.rig, self.method, &mut self.memory, self.stopwatch)? {
                 Some(measurement) => publish(measurement)?,
-                None => self.exposures.skip(SkipReason::AxesUntold),
+                None => self.posing.skip(SkipReason::AxesUntold),
             }
         }
         Ok(())

@@ -4,13 +4,14 @@ use std::io::{Seek, Write};
 
 use image::RgbImage;
 use vergence_protocol::Microseconds;
-use vergence_rig::Rig;
+use vergence_rig::{Rig, StampedImage};
 
 use crate::RecordingError;
 use crate::bag::{self, Bag};
 use crate::event::{Event, Eye, Stamp};
 use crate::messages;
 use crate::png::Png;
+use crate::reader::stamp_ns;
 use crate::recorder::{Entry, unwritten};
 
 /// Turns entries into messages.
@@ -84,7 +85,7 @@ impl<W: Write + Seek> Scribe<W> {
             Eye::Right => (bag::RIGHT_IMAGE, bag::RIGHT_INFO, &self.rig.right_camera),
         };
         let at = self.ns(now);
-        let exposed = (self.epoch_us * 1000).saturating_add((stamp.middle_us.max(0.0) * 1000.0) as u64);
+        let exposed = stamp_ns(self.epoch_us, StampedImage::from(stamp).middle);
         let info = messages::camera_info(exposed, eye, lens);
         self.bag.write(info_topic, at, &info)?;
         self.bag.write(image_topic, at, &messages::image(exposed, eye, &Png::of(image).map_err(unwritten)?))?;

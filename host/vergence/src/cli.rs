@@ -86,6 +86,8 @@ enum Verb {
     Record(With<BoardOptions, cmd::run::record::Args>),
     /// Measures a recording as `run` measured while it recorded.
     Replay(cmd::replay::Args),
+    /// Writes a recording, or images, for other programs.
+    Export(cmd::export::Args),
     /// Serves a page on which people see and drive the rig.
     Panel(With<BoardOptions, cmd::panel::Args>),
     /// Keeps pre-trained networks for matching.
@@ -112,7 +114,7 @@ pub const TASKS: &[(&str, &[&str])] = &[
     ("Set up a board", &["devices", "doctor", "config", "flash", "image", "servo"]),
     ("Calibrate", &["target", "capture", "calibrate", "camera", "rig"]),
     ("Move", &["home", "mode", "move", "plan", "stop", "arm", "disarm", "clear"]),
-    ("Measure", &["run", "record", "replay", "panel", "depth", "zones", "models"]),
+    ("Measure", &["run", "record", "replay", "export", "panel", "depth", "zones", "models"]),
     ("Watch a board", &["status", "monitor", "trigger", "log", "link-test"]),
     ("Check this program", &["bench", "soak"]),
     ("Shell", &["completions", "help"]),
@@ -276,6 +278,7 @@ fn execute(cli: Cli, virtual_time: bool) -> Result<(), Failure> {
             Verb::Run(verb) => cmd::run::run(&verb.args, &verb.options.chosen()?, console).await,
             Verb::Record(verb) => cmd::run::record::record(&verb.args, &verb.options.chosen()?, console).await,
             Verb::Replay(args) => cmd::replay::run(&args, console).await,
+            Verb::Export(args) => cmd::export::run(args, console),
             Verb::Panel(verb) => cmd::panel::run(&verb.args, &verb.options.chosen()?, console).await,
             Verb::Reproduce(args) => cmd::reproduce::run(&args, console).await,
             Verb::Depth(verb) => cmd::depth::run(verb.args, &verb.options.chosen()?, console).await,

@@ -30,6 +30,8 @@ frames!(
     Base,
     /// The frame of the surroundings.
     World,
+    /// The frame of a virtual camera at the place of a real one.
+    Virtual,
 );
 
 /// A point in frame `F`, in millimetres.

@@ -50,6 +50,7 @@ mod stereo_pair;
 mod triangulation;
 mod uncertainty;
 mod units;
+mod virtual_view;
 mod zones;
 
 pub use asymmetry::Asymmetry;
@@ -65,7 +66,7 @@ pub use foreign::{
     fit_spline, model_of,
 };
 pub use foreign_model::ForeignModel;
-pub use frames::{Base, Camera, Frame, Left, Point, Right, Side, Transform, UnitRay, World};
+pub use frames::{Base, Camera, Frame, Left, Point, Right, Side, Transform, UnitRay, Virtual, World};
 pub use gates::{DropReason, Gates};
 pub use import::{OpenCvFisheye, largest_theta};
 pub use invalid_lens::InvalidLens;
@@ -85,6 +86,7 @@ pub use triangulation::{
 };
 pub use uncertainty::{PointUncertainty, ResidualUncertainty, SHARED_PARAMETERS, SharedCovariance};
 pub use units::{Angle, InvalidQuantity, Length, Time};
+pub use virtual_view::{Face, InvalidView, UnknownFace, VirtualView};
 pub use zones::{
     Arc, BodyMask, Coverage, PAPER_FIELD, PUBLISHED_MODES, PlacedCamera, PlanarCamera, PublishedMode, SolidZones,
     ZoneMap, Zones, ZonesError, circle_zones, paper_eq3, paper_eq3_applies, solid_zones, symmetric_pair, zones_exact,

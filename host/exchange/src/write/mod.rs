@@ -6,12 +6,14 @@ mod kalibr;
 mod mrcal;
 mod opencv;
 mod ros;
+mod sensor;
 
 use std::path::{Path, PathBuf};
 use std::str::FromStr;
 
 use vergence_vision::{KannalaBrandt, Left, Length, NoFit, Right, Transform};
 
+pub use self::sensor::Sensor;
 use crate::ExchangeError;
 
 /// A format that is written.
@@ -29,11 +31,13 @@ pub enum WriteFormat {
     Colmap,
     /// A `.cameramodel` of mrcal for each camera: splined stereographic.
     Mrcal,
+    /// A `sensor.yaml` of TUM-VI for each camera: equidistant.
+    TumVi,
 }
 
 /// A word that names no format.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
-#[error("'{0}' is not written: opencv, kalibr, basalt, ros, colmap or mrcal")]
+#[error("'{0}' is not written: opencv, kalibr, basalt, ros, colmap, mrcal or tum-vi")]
 pub struct UnknownFormat(String);
 
 impl FromStr for WriteFormat {
@@ -47,6 +51,7 @@ impl FromStr for WriteFormat {
             "ros" => Self::Ros,
             "colmap" => Self::Colmap,
             "mrcal" => Self::Mrcal,
+            "tum-vi" => Self::TumVi,
             _ => return Err(UnknownFormat(text.to_owned())),
         })
     }
@@ -138,6 +143,7 @@ pub fn write(format: WriteFormat, cameras: &Cameras) -> Result<Written, Exchange
         WriteFormat::Ros => ros::write(&cameras),
         WriteFormat::Colmap => colmap::write(&cameras, &mut remarks),
         WriteFormat::Mrcal => mrcal::write(&cameras, &mut remarks)?,
+        WriteFormat::TumVi => sensor::write(&cameras),
     };
     if format != WriteFormat::Basalt {
         for file in &mut files {

@@ -3,13 +3,13 @@
 use std::path::Path;
 
 use image::{ImageError, ImageFormat, Rgb, RgbImage};
-use vergence_files::{FileError, write_png, write_whole};
+use vergence_files::{FileError, write_png};
 use vergence_pipeline::{ColouredPoint, PairCloud, PairImages};
 use vergence_vision::{Length, Pixel};
 
 use super::panels::{ColourScale, Panels, light_grey};
 use super::write_drawing;
-use crate::points::{CloudEncoding, CloudFormat};
+use crate::points::write_cloud;
 
 /// Most lines drawn between both images: more would hide each other.
 const MOST_LINES: usize = 150;
@@ -104,7 +104,7 @@ pub fn write_scored_pair(
     truth: TrueRange<'_>,
 ) -> Result<(), FileError> {
     let file = |suffix: &str| folder.join(format!("{name}{suffix}"));
-    write_whole(&file(".ply"), &CloudFormat::Ply.cloud(&cloud.points, CloudEncoding::Binary))?;
+    write_cloud(&file(".ply"), &cloud.points, false, [])?;
     write_png(&file("-left.png"), images.left)?;
     write_png(&file("-right.png"), images.right)?;
     write_drawing(&file("-matches.svg"), match_svg(images, cloud))?;

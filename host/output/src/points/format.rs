@@ -5,8 +5,12 @@ use std::path::Path;
 use vergence_pipeline::ColouredPoint;
 
 use super::columns::DenseRow;
+use super::e57::{dense_e57, sparse_e57};
+use super::las::{dense_las, sparse_las};
 use super::pcd::{dense_pcd, pcd};
 use super::ply::{dense_ply, ply};
+use crate::endings::check_ending;
+use crate::error::OutputError;
 
 /// How the numbers of a cloud are written.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -18,12 +22,15 @@ pub enum CloudEncoding {
     Ascii,
 }
 
-impl CloudEncoding {
-    /// Text where it `is_ascii`.
-    #[must_use]
-    pub const fn of(is_ascii: bool) -> Self {
-        if is_ascii { Self::Ascii } else { Self::Binary }
-    }
+/// Why a cloud is not written.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+pub enum CloudError {
+    /// The format has no text.
+    #[error("a cloud in .{0} has no form as text: leave out --ascii, or name one in .ply or .pcd")]
+    NoText(&'static str),
+    /// The encoder refused it.
+    #[error("the cloud cannot be encoded: {0}")]
+    Encoder(String),
 }
 
 /// The format of a cloud's file.
@@ -34,16 +41,21 @@ pub enum CloudFormat {
     Ply,
     /// The Point Cloud Library's format, version 0.7.
     Pcd,
+    /// The format of the American Society for Photogrammetry, version 1.4.
+    Las,
+    /// The format of ASTM E2807, in metres.
+    E57,
 }
 
 impl CloudFormat {
     /// The endings of all formats, without the dot.
-    pub const ENDINGS: [&str; 2] = [Self::Ply.ending(), Self::Pcd.ending()];
+    pub const ENDINGS: [&str; 4] = [Self::Ply.ending(), Self::Pcd.ending(), Self::Las.ending(), Self::E57.ending()];
+    const ALL: [Self; 4] = [Self::Ply, Self::Pcd, Self::Las, Self::E57];
 
     /// The format of a file with this ending, in upper or lower case; PLY where it is none of [`Self::ENDINGS`].
     #[must_use]
     pub fn of_ending(ending: &str) -> Self {
-        if ending.eq_ignore_ascii_case(Self::Pcd.ending()) { Self::Pcd } else { Self::Ply }
+        Self::ALL.into_iter().find(|format| ending.eq_ignore_ascii_case(format.ending())).unwrap_or_default()
     }
 
     /// The format that the ending of `path` says, as [`Self::of_ending`].
@@ -52,30 +64,66 @@ impl CloudFormat {
         Self::of_ending(&path.extension().unwrap_or_default().to_string_lossy())
     }
 
+    /// Checks that the ending of `path` says a format, and one that has text where the file shall be text.
+    ///
+    /// # Errors
+    /// Names the endings that are known; [`CloudError::NoText`].
+    pub fn check_name(path: &Path, is_ascii: bool) -> Result<(), OutputError> {
+        let ending = check_ending(path, &Self::ENDINGS)?;
+        Ok(Self::of_ending(ending).encoding(is_ascii).map(drop)?)
+    }
+
     /// The ending of a file in this format, without the dot.
     #[must_use]
     pub const fn ending(self) -> &'static str {
         match self {
             Self::Ply => "ply",
             Self::Pcd => "pcd",
+            Self::Las => "las",
+            Self::E57 => "e57",
         }
     }
 
-    /// The file of a cloud: points in the left camera's frame in millimetres, with colour, pixels, uncertainty and track.
-    #[must_use]
-    pub fn cloud(self, points: &[ColouredPoint], encoding: CloudEncoding) -> Vec<u8> {
-        match self {
-            Self::Ply => ply(points, encoding),
-            Self::Pcd => pcd(points, encoding),
+    /// How the numbers are written: as text where it `is_ascii`.
+    ///
+    /// # Errors
+    /// [`CloudError::NoText`].
+    pub fn encoding(self, is_ascii: bool) -> Result<CloudEncoding, CloudError> {
+        match (self, is_ascii) {
+            (_, false) => Ok(CloudEncoding::Binary),
+            (Self::Ply | Self::Pcd, true) => Ok(CloudEncoding::Ascii),
+            (Self::Las | Self::E57, true) => Err(CloudError::NoText(self.ending())),
+        }
+    }
+
+    /// The file of a cloud: points in the left camera's frame in millimetres (metres in E57), with colour, pixels, uncertainty and track.
+    ///
+    /// # Errors
+    /// [`CloudError`].
+    pub fn cloud(self, points: &[ColouredPoint], encoding: CloudEncoding) -> Result<Vec<u8>, CloudError> {
+        match (self, encoding) {
+            (Self::Ply, _) => Ok(ply(points, encoding)),
+            (Self::Pcd, _) => Ok(pcd(points, encoding)),
+            (Self::Las, CloudEncoding::Binary) => {
+                sparse_las(points).map_err(|error| CloudError::Encoder(error.to_string()))
+            }
+            (Self::E57, CloudEncoding::Binary) => {
+                sparse_e57(points).map_err(|error| CloudError::Encoder(error.to_string()))
+            }
+            (Self::Las | Self::E57, CloudEncoding::Ascii) => Err(CloudError::NoText(self.ending())),
         }
     }
 
     /// The file of a dense cloud, binary.
-    #[must_use]
-    pub fn dense_cloud(self, rows: &[DenseRow]) -> Vec<u8> {
+    ///
+    /// # Errors
+    /// [`CloudError::Encoder`].
+    pub fn dense_cloud(self, rows: &[DenseRow]) -> Result<Vec<u8>, CloudError> {
         match self {
-            Self::Ply => dense_ply(rows),
-            Self::Pcd => dense_pcd(rows),
+            Self::Ply => Ok(dense_ply(rows)),
+            Self::Pcd => Ok(dense_pcd(rows)),
+            Self::Las => dense_las(rows).map_err(|error| CloudError::Encoder(error.to_string())),
+            Self::E57 => dense_e57(rows).map_err(|error| CloudError::Encoder(error.to_string())),
         }
     }
 }

@@ -33,7 +33,7 @@ enum Task {
     Convert {
         /// The camera file.
         file: PathBuf,
-        /// The format to write: toml, opencv, kalibr, basalt, ros, colmap or mrcal. mrcal gets a splined model, and a lens with a
+        /// The format to write: toml, opencv, kalibr, basalt, ros, colmap, mrcal or tum-vi. mrcal gets a splined model, and a lens with a
         /// moving pupil a central one for points 500 mm away: how far these are off is said.
         #[arg(long, value_name = "FORMAT")]
         to: OursOrTheirs,

@@ -15,8 +15,8 @@ use vergence_camera::{Camera, CameraImage, FileCamera};
 use vergence_files::make_folder;
 use vergence_matching::{GuidedMatcher, Matcher};
 use vergence_output::{
-    CloudEncoding, CloudFormat, PoseSource, TableFormat, axes_by_images_json, axes_by_images_words, check_ending,
-    check_folder, cloud_json, cloud_lines, drift_warning, match_svg, write_cloud, write_drawing,
+    CloudFormat, PoseSource, TableFormat, axes_by_images_json, axes_by_images_words, check_ending, check_folder,
+    cloud_json, cloud_lines, drift_warning, match_svg, write_cloud, write_drawing,
 };
 use vergence_pipeline::limits::PIXEL_SIGMA;
 use vergence_pipeline::{Method, PairCloud, PairImages, PairPose, cloud_of_pairs, pair_cloud};
@@ -40,7 +40,7 @@ use vergence_plausibility::images::{Taken, cloud_is_of_one_pair, images_differ, 
 use vergence_plausibility::pose::cameras_are_near;
 
 /// Matches two photographs (or two folders of them, paired by name, number or time stamp) taken by the cameras of the rig
-/// file, and writes the points as PLY or PCD in millimetres in the left camera's frame.
+/// file, and writes the points as PLY, PCD, LAS or E57 in the left camera's frame.
 #[derive(Debug, clap::Args)]
 pub struct Args {
     /// The left image, or a folder.
@@ -49,7 +49,7 @@ pub struct Args {
     /// The right image, or a folder.
     #[arg(long, value_name = "IMAGE")]
     right: PathBuf,
-    /// The cloud to write, a name that ends in .ply or .pcd; for folders, the folder for one cloud per pair.
+    /// The cloud to write, a name that ends in .ply, .pcd, .las or .e57; for folders, the folder for one cloud per pair.
     #[arg(long, value_name = "FILE")]
     out: PathBuf,
     /// For folders, the format of the clouds; ply without it.
@@ -66,8 +66,8 @@ pub struct Args {
     /// edges in the left frame.
     #[arg(long, value_name = "METHOD", default_value_t)]
     kernel: Kernel,
-    /// Measures a range for every pixel of the left image instead of matched points: a binary cloud, and beside it PNG images
-    /// of range (mm, 16 bits; 0 none, 65535 too far), sigma (0.1 mm) and confidence (of 255), and a preview as SVG.
+    /// Measures a range for every pixel of the left image instead of matched points: a binary cloud, and beside it PNG images of range
+    /// (mm, 16 bits; 0 none, 65535 too far), sigma (0.1 mm) and confidence (of 255), that of a depth camera (z in mm), a preview as SVG.
     #[arg(long, conflicts_with_all = ["points", "kernel", "matcher"])]
     dense: bool,
     /// Draws both images with the matched points, coloured by range, as SVG; for folders, the folder for one picture per pair.
@@ -292,7 +292,7 @@ fn check_names(args: &Args) -> Result<(), Failure> {
     let several = args.left.is_dir();
     match (several, &args.format) {
         (true, _) => check_folder(&args.out)?,
-        (false, None) => _ = check_ending(&args.out, &CloudFormat::ENDINGS)?,
+        (false, None) => CloudFormat::check_name(&args.out, args.ascii)?,
         _ => return Err(Failure::usage("--format is for folders: of a pair, the ending of --out says it")),
     }
     match &args.matches {
@@ -312,7 +312,7 @@ fn write(
     out: &Path,
     console: Console,
 ) -> Result<Value, Failure> {
-    write_cloud(out, &cloud.points, CloudEncoding::of(args.ascii), args.also.iter().copied().map(TableFormat::from))?;
+    write_cloud(out, &cloud.points, args.ascii, args.also.iter().copied().map(TableFormat::from))?;
     if let Some(matches) = &args.matches {
         let path = if args.left.is_dir() { in_folder(matches, left, "svg")? } else { matches.clone() };
         let images = PairImages { left: &left.image, right: &right.image };

@@ -26,6 +26,7 @@ pub mod demo;
 pub mod depth;
 pub mod devices;
 pub mod doctor;
+pub mod export;
 pub mod flash;
 pub mod image;
 pub mod link_test;

@@ -9,7 +9,6 @@ use vergence_live::{LiveError, LiveResult, Measurement, Pace, Totals};
 use vergence_panel::{Panel, Screen, Setting};
 use vergence_pipeline::Method;
 use vergence_recording::{Jump, Pacing, Reader, RecordingError, Replay, play};
-use vergence_rig::Rig;
 
 use super::model_options::MatcherOptions;
 use super::panel_options::PanelOptions;
@@ -62,7 +61,7 @@ pub async fn run(args: &Args, console: Console) -> Result<(), Failure> {
     let mut reader = Reader::open(&args.recording)?;
     // The rig file precedes the first event.
     let mut next = reader.next_event()?;
-    let rig = args.rig(&reader)?;
+    let rig = args.rig.as_deref().map_or_else(|| Ok(reader.attached_rig()?), |file| rig_file::load(Some(file)))?;
     let search = args.search.search(&rig)?;
     let measuring = Arc::new(args.search.measuring(rig)?);
     let mut publisher = Publisher {
@@ -167,16 +166,4 @@ fn publish(
     publisher.publish(&result).map_err(End::Failed)?;
     panel.into_iter().for_each(|panel| panel.show(&result));
     if most.is_some_and(|most| publisher.number >= most) { Err(End::Enough) } else { Ok(()) }
-}
-
-impl Args {
-    /// The rig that the options name, or the one that is attached.
-    fn rig(&self, reader: &Reader) -> Result<Rig, Failure> {
-        if self.rig.is_some() {
-            return rig_file::load(self.rig.as_deref());
-        }
-        let file = reader.file();
-        let text = reader.rig().ok_or_else(|| Failure::input(file, "no rig file is attached; name one with --rig"))?;
-        Rig::from_toml(text).map_err(|error| Failure::input(file, format!("the attached rig file: {error}")))
-    }
 }

@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 
 use vergence_files::make_folder;
-use vergence_output::{CloudEncoding, CloudFormat, LatestFiles, TableFormat, check_folder};
+use vergence_output::{CloudFormat, LatestFiles, TableFormat, check_folder};
 
 use super::options::TableOption;
 use crate::failure::Failure;
@@ -11,7 +11,7 @@ use crate::failure::Failure;
 /// Where results go as files.
 #[derive(Debug, clap::Args)]
 pub struct ResultOptions {
-    /// The folder for `cloud.ply` or `cloud.pcd`, always the newest cloud.
+    /// The folder for `cloud.ply` (or `.pcd`, `.las`, `.e57`), always the newest cloud.
     #[arg(long, value_name = "DIR")]
     pub out: Option<PathBuf>,
     /// Keep every cloud, in files with numbers.
@@ -43,7 +43,7 @@ impl ResultOptions {
             keep: self.keep,
             also: self.also.iter().copied().map(TableFormat::from).collect(),
             format: CloudFormat::of_ending(&self.format),
-            encoding: CloudEncoding::of(self.ascii),
+            encoding: CloudFormat::of_ending(&self.format).encoding(self.ascii)?,
         })
     }
 }

@@ -46,7 +46,7 @@ struct Import {
 
 #[derive(Debug, clap::Args)]
 struct Export {
-    /// The program to write for: opencv, kalibr, basalt, ros, colmap or mrcal. mrcal gets a splined model, and a lens with a moving pupil a
+    /// The program to write for: opencv, kalibr, basalt, ros, colmap, mrcal or tum-vi. mrcal gets a splined model, and a lens with a moving pupil a
     /// central one for points 500 mm away: how far these are off is said.
     #[arg(long, alias = "format", value_name = "FORMAT")]
     to: WriteFormat,
