@@ -1,11 +1,13 @@
 //! The cameras of the live loop, attached or simulated.
 
+use std::path::{Path, PathBuf};
 use std::sync::Arc;
+use std::time::Duration;
 
 use tokio::sync::mpsc::Sender;
 use tokio::time::{Instant, sleep};
 use vergence_board::{HostClock, Shared};
-use vergence_camera::{Camera, CameraError, CameraEvent, attach};
+use vergence_camera::{Camera, CameraError, CameraEvent, Played, SharedTime, attach};
 use vergence_rig::Shutter;
 use vergence_scene::TrueLens;
 use vergence_sim::{LiveCamera, Rendering, Room, RoomCamera, SimulatedRig, Unplugged};
@@ -31,6 +33,26 @@ where
         attach(side, move || first.take().unwrap_or_else(&open), listener.clone());
     }
     Ok(())
+}
+
+/// Plays two folders or videos, left and right, at the pace at which they were taken; `rate` numbered images make a second. Their events go to
+/// `listener`, which is closed after the last image. Returns the images without a partner, which are left out.
+///
+/// # Errors
+/// As of [`Played::open`].
+pub fn play_both(
+    paths: [&Path; 2],
+    rate: f64,
+    clock: HostClock,
+    listener: &Sender<(Side, CameraEvent)>,
+) -> Result<Vec<PathBuf>, CameraError> {
+    let now: SharedTime = Arc::new(move || Duration::from_micros(clock.now().0));
+    let Played { cameras, alone } = Played::open(&paths, rate, &now)?;
+    for (side, camera) in [Side::Left, Side::Right].into_iter().zip(cameras) {
+        let mut camera = Some(Box::new(camera) as Box<dyn Camera>);
+        attach(side, move || camera.take().ok_or(CameraError::Ended), listener.clone());
+    }
+    Ok(alone)
 }
 
 /// Starts two simulated cameras, left and right with these lenses and shutters, on `mechanics` in the furnished room, and unplugs them as

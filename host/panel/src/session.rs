@@ -69,5 +69,12 @@ async fn measure(panel: &Panel, live: Option<LiveLoop>) -> Result<Ended, PanelEr
         panel.show(&result);
         Ok(())
     };
-    live.run(Limits::default(), &mut Totals::default(), show, |warning| panel.warn(&warning)).await
+    let warn = |warning: String| panel.warn(&warning);
+    match live.run(Limits::default(), &mut Totals::default(), show, warn).await {
+        Ok(Ended::Done) => {
+            panel.warn("the cameras have no more images: the last ones stay");
+            pending().await
+        }
+        ended => ended,
+    }
 }

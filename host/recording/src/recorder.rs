@@ -100,11 +100,16 @@ impl Recorder {
                 self.put(Entry::Event(now, Event::Lost(eye, why.clone())));
                 CameraEvent::Lost(why)
             }
-            CameraEvent::Image(PendingImage { seq, middle, develop }) => {
+            CameraEvent::Image(PendingImage { seq, middle, bytes, develop }) => {
                 let developed: Developed = Arc::new(LazyLock::new(develop));
                 let stamp = Stamp { seq, middle_us: middle.us, error_us: middle.error_us };
                 self.put(Entry::Image(now, eye, stamp, Arc::clone(&developed)));
-                CameraEvent::Image(PendingImage { seq, middle, develop: Box::new(move || (**developed).clone()) })
+                CameraEvent::Image(PendingImage {
+                    seq,
+                    middle,
+                    bytes,
+                    develop: Box::new(move || (**developed).clone()),
+                })
             }
         }
     }

@@ -96,6 +96,7 @@ impl<'a> Replay<'a> {
                 let pending = PendingImage {
                     seq: stamp.seq,
                     middle: vergence_rig::StampedImage::from(stamp).middle,
+                    bytes: None,
                     develop: Box::new(move || Ok(image)),
                 };
                 self.exposures.image(eye.side(), stamp.into(), pending, &base);
