@@ -29,7 +29,7 @@ pub use board::{
     Board, RecordedEvents, Way, check_range, clock_json, describe_clock, describe_fault, describe_pose, event_in_words,
     pose_json, positions, staying, straight_ways,
 };
-pub use checks::{BoardChecks, Finding, Verdict, check_board, check_port, counted, forbidden};
+pub use checks::{BoardChecks, Finding, Verdict, check_board, check_port, forbidden, told};
 pub use error::BoardError;
 pub use firmware::{
     DEVELOPMENT, FlashContents, KeyError, ProbeError, ProbeRs, PublicKey, SecretKey, fresh_secret, header_json, hex,

@@ -64,6 +64,12 @@ pub enum CameraError {
         /// Size of the images of the camera.
         wanted: ImageSize,
     },
+    /// Images of files cannot be measured by a rig with axes.
+    #[error(
+        "images of files were not taken where the axes of rig '{0}' stand now, and nothing says where they stood: name the rig file of a pair without \
+         axes (--rig), 'vergence replay' a recording, which holds the encoders, or measure one pair by 'vergence depth --mode'"
+    )]
+    PoseUnknown(String),
     /// The names of image files do not tell when they were taken.
     #[error(
         "{}: its name tells no time: name images by time stamp or by number, such as 1403636579763555584.png or left000.png",

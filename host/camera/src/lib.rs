@@ -33,7 +33,7 @@ pub use files::{FileCamera, image_files, read_image};
 pub use listing::{ListedCamera, ListedFormat, describe_camera, video_devices};
 pub use mask::{camera_mask, read_mask};
 pub use pairing::{PairedFiles, paired};
-pub use played::{Played, PlayedCamera, SharedTime, is_played};
+pub use played::{PLAYED_HZ, Played, PlayedCamera, SharedTime, is_played, play};
 pub use quality::{Field, ImageQuality};
 pub use set::CameraSet;
 pub use usb::UsbLink;

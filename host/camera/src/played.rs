@@ -19,6 +19,8 @@ use crate::{Camera, CameraError, CameraImage};
 /// Time from opening the cameras to their first images: both are read by then.
 const LEAD: Duration = Duration::from_millis(300);
 
+/// Images of a second, where files are numbered and nobody says it.
+pub const PLAYED_HZ: f64 = 10.0;
 /// Images farther apart than this are not of one film: the unit of their time stamps is another than it seems.
 const LONGEST_STEP: Duration = Duration::from_secs(60);
 
@@ -99,6 +101,16 @@ impl Played {
         let cameras = timed.into_iter().map(|files| camera(Source::Files(files.into_iter()), period)).collect();
         Ok(Self { cameras, alone })
     }
+}
+
+/// The cameras that are played of one folder or video, or of two, as [`Played::open`] opens them.
+///
+/// # Errors
+/// As there.
+pub fn play(names: &[String], rate: f64, now: SharedTime) -> Result<Vec<Box<dyn Camera>>, CameraError> {
+    let paths: Vec<&Path> = names.iter().map(Path::new).collect();
+    let cameras = Played::open(&paths, rate, &now)?.cameras.into_iter();
+    Ok(cameras.map(|camera| Box::new(camera) as Box<dyn Camera>).collect())
 }
 
 /// The files in the order of the times in their names, by time stamp or by number.

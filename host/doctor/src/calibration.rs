@@ -4,7 +4,7 @@ use std::path::Path;
 use std::time::UNIX_EPOCH;
 
 use vergence_board::Finding;
-use vergence_rig::Provenance;
+use vergence_rig::{Provenance, Rig};
 
 use crate::machine::HostTimes;
 
@@ -21,6 +21,24 @@ pub enum Age {
     Written(i64),
     /// Nothing tells it.
     Unknown,
+}
+
+/// What helps where a rig file cannot be read.
+pub const MEND_RIG: &str = "mend the file, which docs/rig-file.md describes, or 'vergence calibrate rollback'";
+
+/// What is said of a rig that was read from a file, which may be that of the active calibration, or is the built-in one.
+#[must_use]
+pub fn check_rig_file(rig: &Rig, file: Option<(&Path, bool)>, now: HostTimes) -> Vec<Finding> {
+    let Some((path, is_active)) = file else {
+        return vec![Finding::warn(
+            "rig",
+            format!("the built-in '{}', which is nobody's real rig; no calibration is active", rig.name),
+            "calibrate, or name your rig file with --rig or VERGENCE_RIG",
+        )];
+    };
+    let active = if is_active { "the active calibration, " } else { "" };
+    let found = Finding::pass("rig", format!("'{}' from {active}{}", rig.name, path.display()));
+    vec![found, check_calibration_age(calibration_age(path), now)]
 }
 
 /// When the calibration in the rig file `path` was made.

@@ -6,9 +6,9 @@ use std::time::Duration;
 use tokio::sync::mpsc::Receiver;
 use tokio::time::sleep;
 use vergence_board::{Board, BoardError, HostClock};
-use vergence_camera::{CameraEvent, Develop, Field, ImageQuality};
+use vergence_camera::{CameraError, CameraEvent, Develop, Field, ImageQuality, camera_mask};
 use vergence_protocol::{Request, Trigger, TriggerMark};
-use vergence_rig::{ExposureTiming, HostInstant};
+use vergence_rig::{ExposureTiming, HostInstant, Rig};
 use vergence_vision::Side;
 
 /// So many images of each camera are looked at: decoding all would slow a small computer down.
@@ -64,7 +64,24 @@ pub struct Heard {
     pub pulses: Vec<(u32, HostInstant)>,
 }
 
-impl CameraTest<'_> {
+impl<'a> CameraTest<'a> {
+    /// The cameras of `rig`, fired by `board` as the trigger says, with the clock of images and pulses.
+    ///
+    /// # Errors
+    /// Those of the rig's masks.
+    pub fn of(
+        rig: &Rig,
+        board: Option<&'a mut Board>,
+        (trigger, clock): (Option<Trigger>, HostClock),
+    ) -> Result<Self, CameraError> {
+        let field = |side: Side| {
+            let lens = rig.camera(side);
+            let mask = rig.masks[side.index()].as_ref().map(|mask| camera_mask(mask, lens.size())).transpose()?;
+            Ok(Field::of(lens, mask.as_ref()))
+        };
+        Ok(Self { fields: [field(Side::Left)?, field(Side::Right)?], board, trigger, clock })
+    }
+
     /// Fires the cameras where the board does so, hears them for `time` or until `interruption`, and looks at some of their images.
     ///
     /// # Errors
@@ -112,7 +129,8 @@ impl CameraTest<'_> {
         self.hear_the_last(taken, &mut heard, &mut marks).await;
         if let Some(board) = &self.board {
             let clock = board.client().clock_map();
-            heard.pulses = marks.iter().filter_map(|mark| Some((mark.seq, clock.host_at(mark.at)?))).collect();
+            // By their order: the board numbers them anew when the trigger is switched off, with the last one on its way.
+            heard.pulses = (0..).zip(marks.iter().filter_map(|mark| clock.host_at(mark.at))).collect();
         }
         for (side, kept) in [Side::Left, Side::Right].into_iter().zip(kept) {
             self.look(side, kept, &mut heard);

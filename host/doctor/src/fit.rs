@@ -4,12 +4,12 @@ use std::sync::{Arc, Mutex};
 use std::time::Duration;
 
 use tokio::sync::mpsc::Receiver;
-use vergence_board::{BoardKnowledge, Finding, HostClock};
+use vergence_board::{Board, Finding, HostClock};
 use vergence_camera::CameraEvent;
 use vergence_live::{Clock, Limits, LiveError, LiveLoop, LiveResult, MatchingTime, Totals};
 use vergence_matching::GuidedMatcher;
 use vergence_pipeline::{Exposures, Observation, PairCloud, Search};
-use vergence_protocol::TriggerMark;
+use vergence_protocol::{Request, Trigger, TriggerMark};
 use vergence_rig::Rig;
 use vergence_vision::Side;
 
@@ -19,15 +19,17 @@ const PATIENCE: Duration = Duration::from_secs(5);
 const FEWEST: usize = 30;
 
 /// A pair of cameras that run, beside their board.
-pub struct Running {
+pub struct Running<'a> {
     /// What is known of the rig.
     pub rig: Arc<Rig>,
     /// Events of both cameras.
     pub events: Receiver<(Side, CameraEvent)>,
     /// Pulses of the trigger.
     pub marks: Option<Receiver<TriggerMark>>,
-    /// What is heard of the board.
-    pub board: Option<BoardKnowledge>,
+    /// The board; `None` of a rig without axes.
+    pub board: Option<&'a Board>,
+    /// How it fires the cameras; `None` where they run freely.
+    pub trigger: Option<Trigger>,
     /// The clock of images and pulses, and the time between pulses in microseconds.
     pub clock: (HostClock, Option<f64>),
     /// Tells how long matching takes.
@@ -35,15 +37,15 @@ pub struct Running {
 }
 
 /// Measures the next pair, and compares it with what the calibration states.
-pub async fn check_fit(running: Running) -> Finding {
-    let Running { rig, events, marks, board, clock: (clock, period_us), stopwatch } = running;
+pub async fn check_fit(running: Running<'_>) -> Finding {
+    let Running { rig, events, marks, board, trigger, clock: (clock, period_us), stopwatch } = running;
     let mut live = LiveLoop {
         rig,
         matcher: Arc::new(GuidedMatcher::default()),
         search: Arc::new(Search::default()),
         events,
         marks,
-        board,
+        board: board.map(|board| board.client().knowledge()),
         clock,
         exposures: Exposures::new(period_us),
         matching_time: MatchingTime::Real,
@@ -63,7 +65,9 @@ pub async fn check_fit(running: Running) -> Finding {
         });
         Ok::<(), LiveError>(())
     };
+    set_trigger(board, trigger).await;
     let ended = live.run(limits, &mut Totals::default(), note, |_| ()).await;
+    set_trigger(board, trigger.map(|_| Trigger::Off)).await;
     match (found, ended) {
         (Some(found), _) => found,
         (None, Err(error)) => Finding::fail("fit", error.to_string(), "see what was said of cameras and rig file"),
@@ -72,6 +76,13 @@ pub async fn check_fit(running: Running) -> Finding {
             "no pair came whose pose is known, so that nothing says whether the calibration fits",
             "give the axes their reference ('vergence home'), and see what was said of trigger and pairing",
         ),
+    }
+}
+
+/// Where the link fails, the loop ends and says so.
+async fn set_trigger(board: Option<&Board>, trigger: Option<Trigger>) {
+    if let (Some(board), Some(trigger)) = (board, trigger) {
+        let _ = board.ask(Request::SetTrigger(trigger)).await;
     }
 }
 

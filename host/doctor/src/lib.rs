@@ -13,14 +13,14 @@ mod models;
 mod report;
 mod verdicts;
 
-pub use calibration::{Age, calibration_age, check_calibration_age};
+pub use calibration::{Age, MEND_RIG, calibration_age, check_calibration_age, check_rig_file};
 pub use camera_test::{CameraTest, Heard, HeardImage, Taken};
 pub use cameras::{CameraEntry, check_cameras, list_cameras};
 pub use figures::{CameraFigures, ImageFigures, Step, TestFigures, TriggerFigures, figures};
 pub use fit::{Running, check_fit, fit};
 pub use machine::{
-    HostTimes, UDEV_RULES, check_disk, check_host_clock, check_rule, free_space, host_times, installed_rule,
-    rule_folders,
+    HostTimes, UDEV_RULES, check_disk, check_host_clock, check_machine, check_rule, free_space, host_times,
+    installed_rule, rule_folders,
 };
 pub use models::check_models;
 pub use report::{test_in_words, test_json};

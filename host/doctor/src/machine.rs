@@ -41,6 +41,18 @@ pub fn installed_rule(folders: &[PathBuf]) -> Option<String> {
     folders.iter().find_map(|folder| read_to_string(folder.join(RULE_FILE)).ok())
 }
 
+/// What is checked of the machine at the end, when `findings` has all else: the udev rule, the disk of the folder `out`, for cameras that send so many megabytes per
+/// second, and how the clocks ran since `before`.
+#[must_use]
+pub fn check_machine(findings: &[Finding], (out, mb_per_s): (&Path, Option<f64>), before: HostTimes) -> [Finding; 3] {
+    let is_needed = findings.iter().any(|finding| finding.reason.starts_with("you may not"));
+    [
+        check_rule(installed_rule(&rule_folders()).as_deref(), is_needed),
+        check_disk(out, free_space(out), mb_per_s),
+        check_host_clock(before, host_times()),
+    ]
+}
+
 /// Whether the udev rule is there and this version's; `is_needed` where this user may not use a device.
 #[must_use]
 pub fn check_rule(installed: Option<&str>, is_needed: bool) -> Finding {

@@ -3,10 +3,14 @@
 use vergence_board::Finding;
 use vergence_models::{ModelStore, intact};
 
-/// Reads every kept model and compares its files with the digests on record.
+/// Reads every model in `store`, where that could be opened, and compares its files with the digests on record.
 #[must_use]
-pub fn check_models(store: &ModelStore) -> Vec<Finding> {
+pub fn check_models(store: Result<ModelStore, String>) -> Vec<Finding> {
     const REMEDY: &str = "'vergence models pull' or 'vergence models add' brings it again";
+    let store = match store {
+        Ok(store) => store,
+        Err(why) => return vec![Finding::warn("models", why, "name their folder: VERGENCE_MODELS")],
+    };
     let names = match store.names() {
         Ok(names) if names.is_empty() => {
             return vec![Finding::pass("models", "no network is kept; the classical matcher needs none")];
@@ -33,7 +37,7 @@ mod tests {
     fn a_file_that_was_changed_is_found() {
         let folder = tempfile::tempdir().expect("a folder");
         let store = ModelStore::open(Some(folder.path().into())).expect("a store");
-        assert_eq!(check_models(&store)[0].verdict, Verdict::Pass);
+        assert_eq!(check_models(Ok(store.clone()))[0].verdict, Verdict::Pass);
         let manifest = vergence_matching::learned::Manifest::xfeat_lighterglue("one.onnx", "two.onnx");
         let source = tempfile::tempdir().expect("a folder");
         for file in ["one.onnx", "two.onnx"] {
@@ -41,13 +45,13 @@ mod tests {
         }
         let name = manifest.name.clone();
         let kept = store.keep(manifest, source.path()).expect("kept");
-        let found = check_models(&store);
+        let found = check_models(Ok(store.clone()));
         assert!(
             found.len() == 1 && found[0].verdict == Verdict::Pass && found[0].reason.contains("2 files"),
             "{found:?}"
         );
         std::fs::write(kept.join("two.onnx"), "cut").expect("written");
-        let found = check_models(&store);
+        let found = check_models(Ok(store.clone()));
         assert!(found[0].verdict == Verdict::Fail && found[0].reason.contains(&name), "{found:?}");
     }
 }

@@ -32,7 +32,7 @@ pub fn forbidden(device: &Path) -> Option<String> {
     access(device, Access::READ_OK | Access::WRITE_OK).err()?;
     let group = fs::metadata(device).ok().and_then(|metadata| group_name(metadata.gid()));
     Some(match group.as_deref() {
-        Some("root") | None => format!("ask for a udev rule that lets you use {}", device.display()),
+        Some("root") | None => "install the udev rule that 'vergence devices --rule' prints".to_owned(),
         Some(group) => format!("sudo usermod -aG {group} $USER, then log out and in again"),
     })
 }

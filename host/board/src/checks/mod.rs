@@ -80,8 +80,15 @@ impl Finding {
     }
 }
 
-/// The number of `findings` with each verdict, the best first.
+/// All `findings` and their counts for people, and for programs as a part of `result`.
 #[must_use]
-pub fn counted(findings: &[Finding]) -> [usize; 3] {
-    Verdict::ALL.map(|verdict| findings.iter().filter(|finding| finding.verdict == verdict).count())
+pub fn told(findings: &[Finding], mut result: Value) -> (Vec<String>, Value) {
+    let counts = Verdict::ALL.map(|verdict| findings.iter().filter(|finding| finding.verdict == verdict).count());
+    let mut lines: Vec<_> = findings.iter().flat_map(Finding::in_words).collect();
+    lines.push(format!("{} passed, {} warned, {} failed", counts[0], counts[1], counts[2]));
+    result["checks"] = findings.iter().map(Finding::json).collect();
+    for (name, count) in ["passed", "warned", "failed"].into_iter().zip(counts) {
+        result[name] = json!(count);
+    }
+    (lines, result)
 }
