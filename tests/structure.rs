@@ -179,6 +179,20 @@ const ALLOWED: &[(&str, &[&str])] = &[
         ],
     ),
     (
+        "vergence-doctor",
+        &[
+            "vergence-protocol",
+            "vergence-vision",
+            "vergence-rig",
+            "vergence-matching",
+            "vergence-pipeline",
+            "vergence-board",
+            "vergence-camera",
+            "vergence-live",
+            "vergence-models",
+        ],
+    ),
+    (
         "vergence-panel",
         &[
             "vergence-protocol",
@@ -232,6 +246,7 @@ const ONLY_FOR: &[(&str, &[&str])] = &[
             "vergence-camera",
             "vergence-live",
             "vergence-calibration-input",
+            "vergence-doctor",
             "vergence-panel",
             "vergence-recording",
             "vergence",

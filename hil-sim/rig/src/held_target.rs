@@ -108,7 +108,13 @@ impl Camera for TargetCamera {
         let seed = self.held.seed.wrapping_mul(4).wrapping_add(self.images * 2 + self.side.index() as u64);
         let image = photograph_target(self.held.target, place.renamed(), &lens, world_from_camera, &optics, seed);
         self.images += 1;
-        Ok(Some(CameraImage { image, name: format!("image{:06}", self.images), seq: None, exposed_at: None }))
+        Ok(Some(CameraImage {
+            image,
+            name: format!("image{:06}", self.images),
+            seq: None,
+            exposed_at: None,
+            bytes: None,
+        }))
     }
 }
 

@@ -115,7 +115,7 @@ impl LiveCamera {
             self.ready_us = pulse.at.0 as f64 + micros(PERIOD);
             let middle = timing.middle(Duration::from_micros(now.0), StampedAt::End).on_host();
             let develop = self.develop(rig, &pulse, &timing);
-            events.push(CameraEvent::Image(PendingImage { seq: self.seq, middle, develop }));
+            events.push(CameraEvent::Image(PendingImage { seq: self.seq, middle, bytes: None, develop }));
             self.seq += 1;
         }
         events

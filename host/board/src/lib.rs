@@ -23,12 +23,13 @@ mod setting_text;
 mod settings_file;
 mod story;
 mod update;
+mod who;
 
 pub use board::{
     Board, RecordedEvents, Way, check_range, clock_json, describe_clock, describe_fault, describe_pose, event_in_words,
     pose_json, positions, staying, straight_ways,
 };
-pub use checks::{BoardChecks, Finding, Verdict, check_board, check_cameras, check_port};
+pub use checks::{BoardChecks, Finding, Verdict, check_board, check_port, forbidden, told};
 pub use error::BoardError;
 pub use firmware::{
     DEVELOPMENT, FlashContents, KeyError, ProbeError, ProbeRs, PublicKey, SecretKey, fresh_secret, header_json, hex,
@@ -52,3 +53,4 @@ pub use update::{
     FirmwareImage, ImageFileError, UpdateError, UpdateEvent, Updated, confirm, hardware_name, restart, roll_back,
     update, version_text,
 };
+pub use who::{ListedPort, WhoAnswers, list_ports, who_answers};

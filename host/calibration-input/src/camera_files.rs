@@ -2,9 +2,10 @@
 
 use std::path::{Path, PathBuf};
 
+use serde_json::{Value, json};
 use vergence_calibration::IntrinsicsCalibration;
 use vergence_exchange::{Cameras, ExchangeError, ForeignCamera, ForeignRig, Format, Recognised};
-use vergence_rig::{CalibrationTable, CameraDocument, CameraTable, Provenance, Shutter};
+use vergence_rig::{CalibrationTable, CameraDocument, CameraTable, Provenance, Shutter, camera_json};
 use vergence_vision::{KannalaBrandt, Side};
 
 use crate::InputError;
@@ -30,6 +31,17 @@ pub struct FileLens {
     pub lens: KannalaBrandt,
     /// How far the lens is off the camera of the file, in words; `None` where it is the same.
     pub remark: Option<String>,
+}
+
+impl FileLens {
+    /// The camera for programs.
+    #[must_use]
+    pub fn json(&self) -> Value {
+        let mut json = camera_json(&self.lens);
+        json["name"] = json!(self.name);
+        json["remark"] = json!(self.remark);
+        json
+    }
 }
 
 impl CameraFile {

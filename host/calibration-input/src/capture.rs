@@ -3,16 +3,20 @@
 use std::path::{Path, PathBuf};
 use std::pin::pin;
 
+use serde_json::{Value, json};
 use tokio::task::spawn_blocking;
 use vergence_calibration::{IntrinsicsOptions, calibrate_intrinsics, check_fit};
 use vergence_calibration_report::intrinsics_verdict;
-use vergence_camera::{CameraError, CameraImage, CameraSet};
+use vergence_camera::{Camera, CameraError, CameraImage, CameraSet};
 use vergence_files::{make_folder, write_png};
+use vergence_rig::Rig;
+use vergence_scene::LensChoice;
+use vergence_sim::{HeldTarget, TargetCamera};
 use vergence_targets::{TargetKind, TargetView};
-use vergence_vision::{BodyMask, ImageSize};
+use vergence_vision::{BodyMask, ImageSize, Side};
 
-use crate::InputError;
 use crate::target_watch::{NAMES, TargetViews, TargetWatch, observe};
+use crate::{InputError, printed};
 
 /// A set of target views that is taken.
 pub struct TargetCapture<'a> {
@@ -79,7 +83,11 @@ impl TargetCapture<'_> {
         while captured.watch.taken() < self.views && captured.images < self.images && !captured.watch.is_complete() {
             let (images, views);
             (cameras, images, views) = tokio::select! {
-                looked = look(cameras, self.target) => looked?,
+                looked = look(cameras, self.target) => match looked {
+                    // A folder or a video that was seen to its end.
+                    Err(InputError::Camera(CameraError::Ended)) if captured.images > 0 => break,
+                    looked => looked?,
+                },
                 () = &mut interruption => {
                     captured.was_interrupted = true;
                     break;
@@ -107,7 +115,55 @@ impl TargetCapture<'_> {
     }
 }
 
+/// Simulated cameras of `rig` in its mode `human`, before which a target is held: `both`, or the left one alone, with these lenses; `seed` is that of
+/// the places and of the noise.
+#[must_use]
+pub fn held_before(
+    rig: &Rig,
+    target: &TargetKind,
+    (both, seed, lens): (bool, u64, LensChoice),
+) -> Vec<Box<dyn Camera>> {
+    let targets = rig.mode("human").map(|mode| mode.targets.iter().map(|target| target.value()).collect::<Vec<_>>());
+    let pose = rig.pose_at_values(&targets.unwrap_or_default());
+    let right = (rig.right_camera, pose.left_from_right);
+    let held = HeldTarget { left: rig.left_camera, right, both, target: printed(target), seed };
+    let sides = if both { &[Side::Left, Side::Right][..] } else { &[Side::Left] };
+    sides.iter().map(|&side| Box::new(TargetCamera::new(held, side).with_lens(lens)) as Box<dyn Camera>).collect()
+}
+
 impl Captured {
+    /// What was captured into `folder`, for people.
+    #[must_use]
+    pub fn in_words(&self, folder: &Path) -> Vec<String> {
+        let Self { watch, alone, missed, was_interrupted, .. } = self;
+        let state = match (watch.is_complete(), was_interrupted) {
+            (true, _) => "the set is complete",
+            (false, true) => "interrupted: they are kept, and the same command adds to them",
+            (false, false) => "the set is not complete",
+        };
+        let mut lines = vec![format!("{} views in {}; {state}", watch.taken(), folder.display())];
+        if *alone > 0 {
+            lines.push(format!("{alone} images had no partner of the other camera taken at the same time"));
+        }
+        if *missed > 0 {
+            lines.push(format!("{missed} images were lost between the cameras and this program"));
+        }
+        lines
+    }
+
+    /// The same for programs.
+    #[must_use]
+    pub fn json(&self) -> Value {
+        json!({
+            "views": self.watch.taken(),
+            "frames": self.images,
+            "frames_alone": self.alone,
+            "frames_missed": self.missed,
+            "complete": self.watch.is_complete(),
+            "interrupted": self.was_interrupted,
+        })
+    }
+
     /// A sentence for each camera: how well the views of this set calibrate its lens, or why they do not.
     #[must_use]
     pub fn verdicts(&self) -> Vec<String> {
@@ -166,14 +222,11 @@ mod tests {
     use std::time::Duration;
 
     use tokio::sync::Notify;
-    use vergence_camera::Camera;
-    use vergence_rig::{BENCH_TOML, Rig};
-    use vergence_sim::{HeldTarget, TargetCamera};
+    use vergence_rig::BENCH_TOML;
     use vergence_targets::TargetSpec;
-    use vergence_vision::{Length, Side};
+    use vergence_vision::Length;
 
     use super::*;
-    use crate::printed;
 
     /// A time in which a camera sends nothing.
     #[derive(Default)]

@@ -11,7 +11,7 @@ use crate::{Camera, CameraError, CameraEvent, PendingImage};
 /// Time between two attempts to open a camera that is gone.
 const RETRY: Duration = Duration::from_secs(1);
 
-/// Watches the camera that `open` opens, until the listener is closed.
+/// Watches the camera that `open` opens, until it has no more images or the listener is closed.
 ///
 /// The camera's events go to `listener` with `side`. An image for which the listener has no room is lost; the gap in the
 /// numbers shows it.
@@ -26,8 +26,12 @@ pub fn attach(
             let why = match open() {
                 Ok(camera) => {
                     reported.clear();
-                    deliver(side, camera, &listener)
+                    match deliver(side, camera, &listener) {
+                        Some(why) => why,
+                        None => return,
+                    }
                 }
+                Err(CameraError::Ended) => return,
                 Err(error) => error.to_string(),
             };
             if why != reported && listener.blocking_send((side, CameraEvent::Lost(why.clone()))).is_err() {
@@ -39,23 +43,23 @@ pub fn attach(
     });
 }
 
-/// Passes images on until the camera fails; returns why it did.
-fn deliver(side: Side, mut camera: Box<dyn Camera>, listener: &Sender<(Side, CameraEvent)>) -> String {
-    let Some(timing) = camera.timing() else { return "the camera does not stamp its images".into() };
+/// Passes images on until the camera fails; returns why it did. `None` where it has no more images, or nobody listens.
+fn deliver(side: Side, mut camera: Box<dyn Camera>, listener: &Sender<(Side, CameraEvent)>) -> Option<String> {
+    let Some(timing) = camera.timing() else { return Some("the camera does not stamp its images".into()) };
     if listener.blocking_send((side, CameraEvent::Attached(timing))).is_err() {
-        return String::new();
+        return None;
     }
     loop {
         let taken = match camera.grab() {
             Ok(Some(taken)) => taken,
-            Ok(None) => return CameraError::Ended.to_string(),
-            Err(error) => return error.to_string(),
+            Ok(None) => return None,
+            Err(error) => return Some(error.to_string()),
         };
         let (Some(seq), Some(middle)) = (taken.seq, taken.exposed_at) else { continue };
-        let image = taken.image;
-        let pending = PendingImage { seq, middle, develop: Box::new(move || Ok(image)) };
+        let (image, bytes) = (taken.image, taken.bytes);
+        let pending = PendingImage { seq, middle, bytes, develop: Box::new(move || Ok(image)) };
         if let Err(TrySendError::Closed(_)) = listener.try_send((side, CameraEvent::Image(pending))) {
-            return String::new();
+            return None;
         }
     }
 }

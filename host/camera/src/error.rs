@@ -64,6 +64,32 @@ pub enum CameraError {
         /// Size of the images of the camera.
         wanted: ImageSize,
     },
+    /// Images of files cannot be measured by a rig with axes.
+    #[error(
+        "images of files were not taken where the axes of rig '{0}' stand now, and nothing says where they stood: name the rig file of a pair without \
+         axes (--rig), 'vergence replay' a recording, which holds the encoders, or measure one pair by 'vergence depth --mode'"
+    )]
+    PoseUnknown(String),
+    /// The names of image files do not tell when they were taken.
+    #[error(
+        "{}: its name tells no time: name images by time stamp or by number, such as 1403636579763555584.png or left000.png",
+        .0.display()
+    )]
+    Untimed(PathBuf),
+    /// Two images of one camera have the same time in their names.
+    #[error("{} and {} have the same time or number in their names: name each image of a camera differently", .0[0].display(), .0[1].display())]
+    SameTime([PathBuf; 2]),
+    /// The videos of both cameras have different rates.
+    #[error(
+        "{} has {} images a second, and {} has {}: record both at one rate, or bring them to one by 'ffmpeg -r'",
+        paths[0].display(), rates[0], paths[1].display(), rates[1]
+    )]
+    Rates {
+        /// The video of the left camera and that of the right one.
+        paths: [PathBuf; 2],
+        /// Images per second of each.
+        rates: [String; 2],
+    },
     /// A folder holds no image.
     #[error("{}: no JPEG or PNG image in this folder", .0.display())]
     NoImages(PathBuf),

@@ -16,6 +16,8 @@ pub struct PendingImage {
     pub seq: u32,
     /// Middle of the exposure of the middle row.
     pub middle: HostInstant,
+    /// Number of bytes that the camera sent for it; `None` where it came over no cable.
+    pub bytes: Option<u32>,
     /// Makes the image.
     pub develop: Develop,
 }

@@ -49,7 +49,7 @@ impl Camera for FileCamera {
     fn grab(&mut self) -> Result<Option<CameraImage>, CameraError> {
         let Some(path) = self.files.pop_front() else { return Ok(None) };
         let name = path.file_stem().unwrap_or_default().to_string_lossy().into_owned();
-        Ok(Some(CameraImage { image: read_image(&path)?, name, seq: None, exposed_at: None }))
+        Ok(Some(CameraImage { image: read_image(&path)?, name, seq: None, exposed_at: None, bytes: None }))
     }
 }
 

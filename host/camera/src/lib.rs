@@ -1,6 +1,6 @@
 //! Cameras of the Linux kernel and image files, behind one trait.
 //!
-//! [`V4lCamera`] is an attached camera, [`FileCamera`] a folder of images. A [`CameraSet`] takes images with one or two of
+//! [`V4lCamera`] is an attached camera, [`FileCamera`] a folder of images, [`Played`] folders and videos at the pace at which they were taken. A [`CameraSet`] takes images with one or two of
 //! them, paired by exposure time where the cameras stamp their images. [`attach`] watches a camera from a thread of its own
 //! and reports what happens as [`CameraEvent`]s. Simulated cameras implement [`Camera`] too, in a crate of their own.
 
@@ -10,11 +10,17 @@ mod error;
 mod event;
 mod files;
 mod jpeg;
+mod listing;
 mod mask;
 mod pairing;
 mod pixel_format;
+mod played;
+mod quality;
 mod set;
+mod usb;
 mod v4l;
+mod v4l_controls;
+mod y4m;
 
 use image::RgbImage;
 use vergence_rig::{ExposureTiming, HostInstant};
@@ -24,9 +30,13 @@ pub use attached::attach;
 pub use error::CameraError;
 pub use event::{CameraEvent, Develop, PendingImage};
 pub use files::{FileCamera, image_files, read_image};
+pub use listing::{ListedCamera, ListedFormat, describe_camera, video_devices};
 pub use mask::{camera_mask, read_mask};
 pub use pairing::{PairedFiles, paired};
+pub use played::{PLAYED_HZ, Played, PlayedCamera, SharedTime, is_played, play};
+pub use quality::{Field, ImageQuality};
 pub use set::CameraSet;
+pub use usb::UsbLink;
 pub use v4l::{HostTime, V4lCamera, V4lSettings};
 
 /// One image and the time of its exposure.
@@ -41,6 +51,8 @@ pub struct CameraImage {
     /// Middle of the exposure of the middle row, on the host's clock, with its largest error; `None` where it is unknown, as
     /// for a file.
     pub exposed_at: Option<HostInstant>,
+    /// Number of bytes that the camera sent for it; `None` where it came over no cable.
+    pub bytes: Option<u32>,
 }
 
 impl CameraImage {

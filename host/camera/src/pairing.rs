@@ -2,6 +2,7 @@
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
+use std::time::Duration;
 
 use crate::CameraError;
 
@@ -85,7 +86,7 @@ fn name_key(file: &Path, word: &str) -> Option<String> {
 }
 
 /// The last number in the file's name.
-fn last_number(file: &Path) -> Option<u64> {
+pub fn last_number(file: &Path) -> Option<u64> {
     let stem = file.file_stem()?.to_string_lossy();
     stem.split(|c: char| !c.is_ascii_digit()).rfind(|digits| !digits.is_empty())?.parse().ok()
 }
@@ -103,6 +104,22 @@ fn time_stamp(file: &Path) -> Option<u128> {
     }
     let digits = stem.split(|c: char| !c.is_ascii_digit()).find(|digits| digits.len() >= TIME_STAMP_DIGITS)?;
     digits.parse::<u128>().ok()?.checked_mul(1_000_000_000)
+}
+
+/// The exposure time in the file's name, from a common start: seconds with decimals, or milliseconds, microseconds or nanoseconds since 1970, which
+/// have 13, 16 and 19 digits from the year 2001 to 2286. `None` where its unit cannot be told.
+pub fn stamp(file: &Path) -> Option<Duration> {
+    let billionths = time_stamp(file)?;
+    let units = billionths / 1_000_000_000;
+    let per_second = match units.checked_ilog10().map_or(0, |last| last as usize + 1) {
+        0..TIME_STAMP_DIGITS => return u64::try_from(billionths).ok().map(Duration::from_nanos),
+        13 => 1_000,
+        16 => 1_000_000,
+        19 => 1_000_000_000,
+        _ => return None,
+    };
+    let nanoseconds = units.checked_mul(1_000_000_000 / per_second)?;
+    u64::try_from(nanoseconds).ok().map(Duration::from_nanos)
 }
 
 /// Files whose time stamps are nearest to each other are a pair, if they differ by much less than the time between two images.

@@ -126,7 +126,7 @@ mod tests {
             let us = (PERIOD * seq + self.late).as_secs_f64() * 1e6;
             let exposed_at = Some(HostInstant { us, error_us: 20_000.0 });
             let image = image::RgbImage::new(1, 1);
-            Ok(Some(CameraImage { image, name: seq.to_string(), seq: Some(seq), exposed_at }))
+            Ok(Some(CameraImage { image, name: seq.to_string(), seq: Some(seq), exposed_at, bytes: None }))
         }
 
         fn timing(&self) -> Option<ExposureTiming> {

@@ -147,6 +147,7 @@ impl V4lCamera {
             image,
             name: format!("image{:06}", meta.sequence),
             seq: Some(meta.sequence),
+            bytes: Some(meta.bytesused),
             exposed_at: Some(self.host_instant(self.timing.middle(meta.timestamp.into(), marks))),
         }))
     }

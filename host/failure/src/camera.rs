@@ -14,6 +14,10 @@ impl From<CameraError> for Failure {
             | CameraError::Shapes(_)
             | CameraError::Unpaired { .. }
             | CameraError::Size { .. }
+            | CameraError::PoseUnknown(_)
+            | CameraError::Untimed(_)
+            | CameraError::SameTime(_)
+            | CameraError::Rates { .. }
             | CameraError::NoImages(_)
             | CameraError::Simulated(_) => Self::usage(message),
             _ => Self::device(message),

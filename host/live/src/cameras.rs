@@ -1,15 +1,17 @@
 //! The cameras of the live loop, attached or simulated.
 
+use std::path::Path;
 use std::sync::Arc;
+use std::time::Duration;
 
 use tokio::sync::mpsc::Sender;
 use tokio::time::{Instant, sleep};
 use vergence_board::{HostClock, Shared};
-use vergence_camera::{Camera, CameraError, CameraEvent, attach};
-use vergence_rig::Shutter;
+use vergence_camera::{Camera, CameraError, CameraEvent, Played, SharedTime, attach};
+use vergence_rig::{Rig, Shutter};
 use vergence_scene::TrueLens;
-use vergence_sim::{LiveCamera, Rendering, Room, RoomCamera, SimulatedRig, Unplugged};
-use vergence_vision::Side;
+use vergence_sim::{LiveCamera, Rendering, Room, RoomCamera, SimulatedRig, Unplug, Unplugged};
+use vergence_vision::{ImageSize, Side};
 
 use crate::LiveError;
 
@@ -29,6 +31,30 @@ where
     for ((side, open), first) in [Side::Left, Side::Right].into_iter().zip(openers).zip(opened) {
         let mut first = Some(first);
         attach(side, move || first.take().unwrap_or_else(&open), listener.clone());
+    }
+    Ok(())
+}
+
+/// Plays two folders or videos, left and right, at the pace at which they were taken; `rate` numbered images make a second. Their events go to
+/// `listener`, which is closed after the last image. `warn` is told of images without a partner, which are left out.
+///
+/// # Errors
+/// As of [`Played::open`].
+pub fn play_both(
+    paths: [&Path; 2],
+    (rate, clock): (f64, HostClock),
+    listener: &Sender<(Side, CameraEvent)>,
+    warn: impl FnOnce(String),
+) -> Result<(), CameraError> {
+    let now: SharedTime = Arc::new(move || Duration::from_micros(clock.now().0));
+    let Played { cameras, alone } = Played::open(&paths, rate, &now)?;
+    for (side, camera) in [Side::Left, Side::Right].into_iter().zip(cameras) {
+        let mut camera = Some(Box::new(camera) as Box<dyn Camera>);
+        attach(side, move || camera.take().ok_or(CameraError::Ended), listener.clone());
+    }
+    if let Some(first) = alone.first() {
+        let first = first.display();
+        warn(format!("{} images have no partner and are left out: {first} is the first", alone.len()));
     }
     Ok(())
 }
@@ -71,4 +97,52 @@ pub async fn drive(
         }
         sleep(LiveCamera::POLL_PERIOD).await;
     }
+}
+
+/// The rig whose simulated cameras take images of `size`: the same lenses before sensors of the same millimetres.
+///
+/// # Errors
+/// [`CameraError::Simulated`] for a size of another shape than the rig file's, and with masks, which are of the file's pixels.
+pub fn sized(rig: Rig, size: ImageSize) -> Result<Rig, CameraError> {
+    if rig.masks.iter().any(Option::is_some) {
+        let why = "--size does not scale masks: leave it out, or take a rig file without them";
+        return Err(CameraError::Simulated(why.into()));
+    }
+    let sized = rig
+        .with_sensors(size.width)
+        .map_err(|error| CameraError::Simulated(format!("no lens has {} columns: {error}", size.width)))?;
+    for side in [Side::Left, Side::Right] {
+        let ImageSize { width, height } = sized.camera(side).size();
+        if height != size.height {
+            return Err(CameraError::Simulated(format!(
+                "--size has another shape than the images of the {side} camera in the rig file: choose {width}x{height}"
+            )));
+        }
+    }
+    Ok(sized)
+}
+
+/// What is unplugged of the cameras; the encoders among `unplug` are unplugged from `mechanics`, which are those of `rig`.
+///
+/// # Errors
+/// [`CameraError::Simulated`] where nothing that can be unplugged has this name.
+pub fn unplugged(
+    unplug: &[Unplug],
+    rig: &Rig,
+    mechanics: &Shared<SimulatedRig>,
+) -> Result<Vec<Unplugged>, CameraError> {
+    let mut cameras = Vec::new();
+    for unplug in unplug {
+        match unplug {
+            Unplug::Camera(camera) => cameras.push(*camera),
+            Unplug::Encoder { axis: name, times } => {
+                let axis = rig.axes.iter().position(|axis| axis.name == *name).filter(|_| rig.trunk.is_none());
+                let no = || CameraError::Simulated(format!("rig '{}' has no stage '{name}' to unplug", rig.name));
+                mechanics.lock().unplug_encoder(axis.ok_or_else(no)?, *times);
+            }
+            // The cable knows it already.
+            Unplug::Link(_) => {}
+        }
+    }
+    Ok(cameras)
 }

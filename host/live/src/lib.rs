@@ -18,7 +18,7 @@ mod tour;
 
 use std::time::Duration;
 
-pub use cameras::{attach_both, drive, simulate_both};
+pub use cameras::{attach_both, drive, play_both, simulate_both, sized, unplugged};
 pub use error::LiveError;
 pub use live_loop::{Ended, Limits, LiveLoop, LiveResult, MatchingTime, Totals};
 pub use measure::{Measurement, PosedExposure, measure};

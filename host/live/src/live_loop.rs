@@ -23,6 +23,9 @@ use crate::{Clock, LiveError};
 /// How often overdue images and pulses are given up.
 const SETTLE: Duration = Duration::from_millis(20);
 
+/// After this time, images whose partner has not come are given up: longer than [`Exposures::settle`] takes.
+const LAST: Duration = Duration::from_millis(600);
+
 /// When the loop ends without being interrupted.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Limits {
@@ -35,7 +38,7 @@ pub struct Limits {
 /// Why the loop ended.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Ended {
-    /// A limit was reached.
+    /// A limit was reached, or the cameras have no more images.
     Done,
     /// Both cameras are dead.
     Blind,
@@ -143,7 +146,7 @@ enum NoResult {
 }
 
 impl LiveLoop {
-    /// Runs until `limits` are reached or both cameras are dead; calls `publish` with each result and `warn` with sentences for
+    /// Runs until `limits` are reached, the cameras have no more images, or both are dead; calls `publish` with each result and `warn` with sentences for
     /// people.
     ///
     /// # Errors
@@ -158,16 +161,17 @@ impl LiveLoop {
         let deadline = limits.time.map(|time| Instant::now() + time);
         let mut settle = interval(SETTLE);
         let (mut work, mut newest): (Option<Work>, Option<Exposed<PendingImage>>) = (None, None);
-        let (mut blindness, mut had_ended) = (Blindness::default(), false);
+        let (mut blindness, mut had_ended, mut over) = (Blindness::default(), false, None::<Instant>);
         loop {
             if work.is_none() {
                 work = newest.take().map(|exposed| self.start(exposed));
             }
             let mut is_done = false;
             tokio::select! {
-                Some((side, event)) = self.events.recv() => {
-                    self.take_event(side, event);
-                }
+                event = self.events.recv(), if over.is_none() => match event {
+                    Some((side, event)) => self.take_event(side, event),
+                    None => over = Some(Instant::now()),
+                },
                 mark = next(&mut self.marks) => match mark {
                     Some(mark) => {
                         let base = self.base();
@@ -184,7 +188,8 @@ impl LiveLoop {
                 _ = settle.tick() => {
                     let base = self.base();
                     self.exposures.settle(self.clock.now(), &base);
-                    is_done = deadline.is_some_and(|deadline| Instant::now() >= deadline);
+                    let is_over = |over: Instant| over.elapsed() > LAST && work.is_none() && newest.is_none();
+                    is_done = deadline.is_some_and(|deadline| Instant::now() >= deadline) || over.is_some_and(is_over);
                 }
             }
             if self.has_ended() != had_ended {

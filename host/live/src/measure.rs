@@ -134,7 +134,7 @@ mod tests {
             });
             let middle = BoardInstant { us: 0.0, error_us: 0.0 };
             let seen = vergence_rig::HostInstant { us: 0.0, error_us: 0.0 };
-            ExposedImage { image: PendingImage { seq: 0, middle: seen, develop }, middle }
+            ExposedImage { image: PendingImage { seq: 0, middle: seen, bytes: None, develop }, middle }
         };
         both([pending(), pending()]).expect("two images");
     }

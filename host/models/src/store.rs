@@ -132,6 +132,15 @@ pub fn load(folder: &Path, runtime: &Runtime) -> Result<Model, ModelsError> {
     runtime.model(manifest, &files).map_err(ModelsError::Load)
 }
 
+/// Checks that the files of the model in `folder` are there, with the digests that are on record. Returns their number.
+///
+/// # Errors
+/// Where the manifest or a file is missing, or a file differs from its digest.
+pub fn intact(folder: &Path) -> Result<usize, ModelsError> {
+    let manifest = read_manifest(folder)?;
+    Ok(read_files(folder, &manifest)?.len())
+}
+
 fn wrong_digest(path: &Path, expected: &str, found: &str) -> ModelsError {
     ModelsError::Digest { path: path.to_owned(), expected: expected.to_owned(), found: found.to_owned() }
 }

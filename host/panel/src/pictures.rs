@@ -41,11 +41,12 @@ impl Darkroom {
 
 /// The event, whose image is kept when it is developed.
 pub fn tapped(event: CameraEvent, side: Side, darkroom: &Darkroom) -> CameraEvent {
-    let CameraEvent::Image(PendingImage { seq, middle, develop }) = event else { return event };
+    let CameraEvent::Image(PendingImage { seq, middle, bytes, develop }) = event else { return event };
     let darkroom = darkroom.clone();
     CameraEvent::Image(PendingImage {
         seq,
         middle,
+        bytes,
         develop: Box::new(move || {
             let image = develop()?;
             darkroom.keep(side, image.clone());
@@ -124,7 +125,8 @@ mod tests {
         let kept = image.clone();
         let develop = Box::new(move || Ok::<_, CameraError>(image));
         let middle = HostInstant { us: 0.0, error_us: 0.0 };
-        let event = tapped(CameraEvent::Image(PendingImage { seq: 7, middle, develop }), Side::Right, &darkroom);
+        let event =
+            tapped(CameraEvent::Image(PendingImage { seq: 7, middle, bytes: None, develop }), Side::Right, &darkroom);
         assert_eq!(darkroom.images(), [None, None], "nothing is developed that nobody wants");
         let CameraEvent::Image(pending) = event else { panic!("an image") };
         assert_eq!((pending.seq, (pending.develop)().expect("an image")), (7, kept.clone()));

@@ -100,5 +100,12 @@ async fn measure(
         }
         Ok(())
     };
-    live.run(Limits::default(), totals, show, |warning| panel.warn(&warning)).await
+    let warn = |warning: String| panel.warn(&warning);
+    match live.run(Limits::default(), totals, show, warn).await {
+        Ok(Ended::Done) => {
+            panel.warn("the cameras have no more images: the last ones stay");
+            pending().await
+        }
+        ended => ended,
+    }
 }

@@ -17,7 +17,7 @@ use crate::recording::Recording;
 
 impl Recording {
     /// Records the events of both cameras and the pulses of the trigger, until each camera that is alive gave as many images as `limits` has results, its time
-    /// is over, or both cameras are dead. Then waits for the readings of the last exposure. `warn` is told when a camera dies.
+    /// is over, the cameras have no more images, or both are dead. Then waits for the readings of the last exposure. `warn` is told when a camera dies.
     ///
     /// # Errors
     /// A link that ended.
@@ -31,7 +31,8 @@ impl Recording {
         let mut cameras = Cameras::default();
         let ended = loop {
             select! {
-                Some((side, event)) = events.recv() => {
+                event = events.recv() => {
+                    let Some((side, event)) = event else { break Ended::Done };
                     cameras.note(side, &event).into_iter().for_each(&mut warn);
                     // The image is made by the task that writes it.
                     drop(self.recorder.camera(self.clock.now(), side, event));

@@ -102,6 +102,7 @@ impl<'a, A: Audience> Posing<'a, A> {
                 let pending = PendingImage {
                     seq: stamp.seq,
                     middle: StampedImage::from(stamp).middle,
+                    bytes: None,
                     develop: Box::new(move || Ok(image)),
                 };
                 if let CameraEvent::Image(pending) = self.audience.camera(eye.side(), CameraEvent::Image(pending)) {

@@ -149,13 +149,14 @@ impl Recorder {
                 self.put(Entry::Event(now, Event::Lost(eye, why.clone())));
                 CameraEvent::Lost(why)
             }
-            CameraEvent::Image(PendingImage { seq, middle, develop }) => {
+            CameraEvent::Image(PendingImage { seq, middle, bytes, develop }) => {
                 // Developed once, by whoever wants it first.
-                let bytes = self.image_bytes[side.index()];
-                let developed = Developed { image: Arc::new(LazyLock::new(develop)), bytes };
+                let (image, size) = (Arc::new(LazyLock::new(develop)), self.image_bytes[side.index()]);
+                let developed = Developed { image, bytes: size };
                 let stamp = Stamp { seq, middle_us: middle.us, error_us: middle.error_us };
                 self.put(Entry::Image(now, eye, stamp, developed.clone()));
-                CameraEvent::Image(PendingImage { seq, middle, develop: Box::new(move || developed.get().clone()) })
+                let develop = Box::new(move || developed.get().clone());
+                CameraEvent::Image(PendingImage { seq, middle, bytes, develop })
             }
         }
     }
@@ -279,7 +280,8 @@ mod tests {
             image::Rgb([red, green, blue])
         };
         let develop = Box::new(move || Ok(RgbImage::from_fn(320, 320, pixel)));
-        CameraEvent::Image(PendingImage { seq, middle: HostInstant { us: 0.0, error_us: 0.0 }, develop })
+        let middle = HostInstant { us: 0.0, error_us: 0.0 };
+        CameraEvent::Image(PendingImage { seq, middle, bytes: None, develop })
     }
 
     #[tokio::test]

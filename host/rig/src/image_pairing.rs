@@ -11,9 +11,6 @@ use std::time::Duration;
 
 use crate::clock::HostInstant;
 
-/// Images of two free-running cameras farther apart than this part of a period may belong to either of two neighbours.
-const FREE_RUNNING_TOLERANCE: f64 = 0.49;
-
 /// A pulse of the trigger, or an image of the other camera.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct TimedEvent {
@@ -89,6 +86,9 @@ pub struct ImagePairing {
 }
 
 impl ImagePairing {
+    /// Images of two free-running cameras farther apart than this part of a period may belong to either of two neighbours.
+    pub const FREE_RUNNING_TOLERANCE: f64 = 0.49;
+
     /// Pairs images that come `delay` after their events. No two events are nearer than `period_us`, and all lie on its
     /// grid; infinite where events come one by one and the caller waits for each.
     #[must_use]
@@ -109,7 +109,7 @@ impl ImagePairing {
     #[must_use]
     pub fn free_running(period: Duration) -> Self {
         let period_us = period.as_secs_f64() * 1e6;
-        let within = FREE_RUNNING_TOLERANCE * period_us;
+        let within = Self::FREE_RUNNING_TOLERANCE * period_us;
         Self::new(ExposureDelay { least_us: -within, most_us: within }, period_us)
     }
 

@@ -30,8 +30,8 @@ struct Cli {
 
 #[derive(Debug, Subcommand)]
 enum Verb {
-    /// Lists the serial ports.
-    Devices(cmd::devices::Args),
+    /// Lists the boards and the cameras of this computer.
+    Devices(With<PortOptions, cmd::devices::Args>),
     /// Prints what the board is doing, and why it stopped.
     Status(With<BoardOptions, cmd::status::Args>),
     /// Checks ports, permissions, link, clock and board, and says what to do.
@@ -98,7 +98,8 @@ enum Verb {
     Capture(With<RigFileOptions, cmd::capture::Args>),
     /// Calibrates cameras, pairs and moving stages from views of a target; compares and keeps calibrations.
     Calibrate(cmd::calibrate::Args),
-    /// Prints and converts camera files, and uses them for single points.
+    /// Tests attached cameras; prints and converts camera files, and uses them for single points.
+    #[command(alias = "cameras")]
     Camera(cmd::camera::Args),
     /// Makes rig files of other programs' cameras, and other programs' files of rigs.
     Rig(cmd::rig::Args),
@@ -216,8 +217,10 @@ fn has_virtual_time(matches: &ArgMatches) -> bool {
     while let Some((_, deeper)) = inner.subcommand() {
         inner = deeper;
     }
-    // People look at a panel, and the clock of people runs.
-    if verb == "panel" || inner.try_contains_id("panel").is_ok_and(|given| given) {
+    // People look at a panel, and the clock of people runs; ports, files and attached cameras keep real time too.
+    let mut cameras = inner.try_get_many::<String>("cameras").ok().flatten().into_iter().flatten();
+    let on_a_page = inner.try_contains_id("panel").is_ok_and(|given| given);
+    if on_a_page || matches!(verb, "panel" | "devices") || cameras.any(|name| name != "sim") {
         return false;
     }
     let port = inner.try_get_one::<String>("port").ok().flatten();
@@ -249,7 +252,7 @@ fn execute(cli: Cli, virtual_time: bool) -> Result<(), Failure> {
         .map_err(|error| Failure::device(format!("the asynchronous runtime does not start: {error}")))?;
     let result = runtime.block_on(async {
         match verb {
-            Verb::Devices(args) => cmd::devices::run(&args, console),
+            Verb::Devices(verb) => cmd::devices::run(&verb.args, &verb.options.given(), console).await,
             Verb::Status(verb) => cmd::status::run(&verb.args, &verb.options.chosen()?, console).await,
             Verb::Doctor(verb) => cmd::doctor::run(&verb.args, &verb.options.given(), console).await,
             Verb::Arm(verb) => cmd::orders::arm(&verb.args, &verb.options.chosen()?, console).await,
@@ -286,7 +289,7 @@ fn execute(cli: Cli, virtual_time: bool) -> Result<(), Failure> {
             Verb::Zones(verb) => cmd::zones::run(&verb.args, &verb.options.chosen()?, console),
             Verb::Capture(verb) => cmd::capture::run(&verb.args, &verb.options.chosen()?, console).await,
             Verb::Calibrate(args) => cmd::calibrate::run(&args, console).await,
-            Verb::Camera(args) => cmd::camera::run(&args, console),
+            Verb::Camera(args) => cmd::camera::run(args, console).await,
             Verb::Rig(args) => cmd::rig::run(&args, console),
             Verb::Target(args) => cmd::target::run(&args, console),
             Verb::Completions(args) => cmd::completions::run(&args, console),

@@ -2,7 +2,7 @@
 
 use std::fs;
 use std::os::unix::fs::MetadataExt;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 use rustix::fs::{Access, access};
 
@@ -26,38 +26,13 @@ pub fn check_port(port: &Port) -> Finding {
     }
 }
 
-/// Checks the cameras that the kernel lists.
-#[must_use]
-pub fn check_cameras() -> Vec<Finding> {
-    let cameras = video_devices();
-    if cameras.is_empty() {
-        let remedy = "connect the cameras; simulated ones need none";
-        return vec![Finding::warn("cameras", "there is no /dev/video device", remedy)];
-    }
-    let check = |path: &PathBuf| match forbidden(path) {
-        Some(remedy) => Finding::fail("cameras", format!("you may not use {}", path.display()), remedy),
-        None => Finding::pass("cameras", format!("{} may be used", path.display())),
-    };
-    cameras.iter().map(check).collect()
-}
-
-fn video_devices() -> Vec<PathBuf> {
-    let Ok(entries) = fs::read_dir("/dev") else { return Vec::new() };
-    let is_camera = |path: &PathBuf| {
-        let name = path.file_name().unwrap_or_default().to_string_lossy();
-        name.strip_prefix("video").is_some_and(|number| number.parse::<u32>().is_ok())
-    };
-    let mut cameras: Vec<_> = entries.flatten().map(|entry| entry.path()).filter(is_camera).collect();
-    cameras.sort();
-    cameras
-}
-
 /// Remedy where this user may not read and write `device`; `None` where that is allowed.
-fn forbidden(device: &Path) -> Option<String> {
+#[must_use]
+pub fn forbidden(device: &Path) -> Option<String> {
     access(device, Access::READ_OK | Access::WRITE_OK).err()?;
     let group = fs::metadata(device).ok().and_then(|metadata| group_name(metadata.gid()));
     Some(match group.as_deref() {
-        Some("root") | None => format!("ask for a udev rule that lets you use {}", device.display()),
+        Some("root") | None => "install the udev rule that 'vergence devices --rule' prints".to_owned(),
         Some(group) => format!("sudo usermod -aG {group} $USER, then log out and in again"),
     })
 }

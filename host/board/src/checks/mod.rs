@@ -6,7 +6,7 @@ mod machine;
 use serde_json::{Value, json};
 
 pub use self::board::{BoardChecks, check_board};
-pub use self::machine::{check_cameras, check_port};
+pub use self::machine::{check_port, forbidden};
 
 /// Result of a check.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -63,6 +63,14 @@ impl Finding {
         Self { check, verdict: Verdict::Fail, reason: reason.into(), remedy: Some(remedy.into()) }
     }
 
+    /// Lines for people: the verdict and its reason, and what to do.
+    #[must_use]
+    pub fn in_words(&self) -> Vec<String> {
+        let Self { check, verdict, reason, remedy } = self;
+        let first = format!("{}  {check:<9} {reason}", verdict.name());
+        [first].into_iter().chain(remedy.iter().map(|remedy| format!("                -> {remedy}"))).collect()
+    }
+
     /// The finding for programs.
     #[must_use]
     pub fn json(&self) -> Value {
@@ -70,4 +78,17 @@ impl Finding {
             "check": self.check, "verdict": self.verdict.name(), "reason": self.reason, "remedy": self.remedy,
         })
     }
+}
+
+/// All `findings` and their counts for people, and for programs as a part of `result`.
+#[must_use]
+pub fn told(findings: &[Finding], mut result: Value) -> (Vec<String>, Value) {
+    let counts = Verdict::ALL.map(|verdict| findings.iter().filter(|finding| finding.verdict == verdict).count());
+    let mut lines: Vec<_> = findings.iter().flat_map(Finding::in_words).collect();
+    lines.push(format!("{} passed, {} warned, {} failed", counts[0], counts[1], counts[2]));
+    result["checks"] = findings.iter().map(Finding::json).collect();
+    for (name, count) in ["passed", "warned", "failed"].into_iter().zip(counts) {
+        result[name] = json!(count);
+    }
+    (lines, result)
 }

@@ -198,6 +198,9 @@ impl<T> Exposures<T> {
     /// freely.
     pub fn link_ended(&mut self) {
         if matches!(self.pairing, Pairing::Triggered(_)) {
+            for _ in 0..self.open() - self.results.ready.len() as u64 {
+                self.results.skip(SkipReason::LinkEnded);
+            }
             self.give_up_waiting();
             let mut free = FreeRunning::default();
             free.set_periods(self.cameras.each_ref().map(|camera| camera.timing.map(|timing| timing.period)));

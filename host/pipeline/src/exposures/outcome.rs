@@ -71,7 +71,8 @@ pub enum SkipReason {
     NewerCame,
     /// The encoder readings for the exposure did not arrive in time.
     EncodersSilent,
-    /// The link to the board ended too long ago, or while the axes moved: nobody knows where they are.
+    /// The link to the board ended: before the images of the pulse were known, too long ago, or while the axes moved, so that nobody knows where they
+    /// are.
     LinkEnded,
     /// The encoder readings do not cover the exposure, or an axis moved that no encoder tells.
     EncodersUnknown,

@@ -4,8 +4,9 @@ use std::time::Duration;
 
 use vergence_board::HostClock;
 use vergence_camera::{Camera, CameraError, V4lCamera, V4lSettings};
+use vergence_live::sized;
 use vergence_rig::Rig;
-use vergence_vision::{ImageSize, Side};
+use vergence_vision::ImageSize;
 
 use crate::failure::Failure;
 
@@ -28,36 +29,16 @@ pub struct CameraOptions {
 }
 
 impl CameraOptions {
-    /// Opens the camera at `device`, such as /dev/video0.
-    ///
-    /// # Errors
-    /// No such camera, or none of its pixel formats is understood.
-    pub fn open(&self, device: &str, clock: HostClock) -> Result<Box<dyn Camera>, CameraError> {
-        self.open_rolling(device, clock, Duration::ZERO)
-    }
-
     /// The rig whose simulated cameras take images of the size that was asked for: the same lenses before sensors of the same millimetres.
     ///
     /// # Errors
     /// Names an option that would do nothing, a size of another shape than the rig file's, and masks, which are of the file's pixels.
     pub fn simulated(&self, rig: Rig) -> Result<Rig, Failure> {
         Self { size: None, ..*self }.none_for_simulated()?;
-        let Some(size) = self.size else { return Ok(rig) };
-        if rig.masks.iter().any(Option::is_some) {
-            return Err(Failure::usage("--size does not scale masks: leave it out, or take a rig file without them"));
+        match self.size {
+            Some(size) => Ok(sized(rig, size)?),
+            None => Ok(rig),
         }
-        let sized = rig
-            .with_sensors(size.width)
-            .map_err(|error| Failure::usage(format!("no lens has {} columns: {error}", size.width)))?;
-        for side in [Side::Left, Side::Right] {
-            let ImageSize { width, height } = sized.camera(side).size();
-            if height != size.height {
-                return Err(Failure::usage(format!(
-                    "--size has another shape than the images of the {side} camera in the rig file: choose {width}x{height}"
-                )));
-            }
-        }
-        Ok(sized)
     }
 
     /// Refuses settings beside simulated cameras, which take the images of the rig file's cameras.
@@ -75,7 +56,7 @@ impl CameraOptions {
         match given.iter().find(|(_, is_given)| *is_given) {
             None => Ok(()),
             Some((name, _)) => Err(Failure::usage(format!(
-                "{name} is for attached cameras: simulated ones take images of the size in the rig file (--rig)"
+                "{name} is for attached cameras: simulated ones take images of the size in the rig file (--rig), and files are as they are"
             ))),
         }
     }
@@ -86,16 +67,11 @@ impl CameraOptions {
         Self { size: self.size.or(Some(size)), ..self }
     }
 
-    /// Opens a camera that exposes its rows one after the other; `rolling` is the time from the first row to the last.
+    /// Opens the camera at `device`, such as /dev/video0; `rolling` is the time from the exposure of its first row to that of the last.
     ///
     /// # Errors
-    /// As of [`Self::open`].
-    pub fn open_rolling(
-        &self,
-        device: &str,
-        clock: HostClock,
-        rolling: Duration,
-    ) -> Result<Box<dyn Camera>, CameraError> {
+    /// No such camera, or none of its pixel formats is understood.
+    pub fn open(&self, device: &str, clock: HostClock, rolling: Duration) -> Result<Box<dyn Camera>, CameraError> {
         let CameraOptions { size, exposure, gain, readout } = *self;
         let settings = V4lSettings { size, exposure, gain, rolling, readout };
         let now = Box::new(move || Duration::from_micros(clock.now().0));

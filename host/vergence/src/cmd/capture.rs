@@ -2,17 +2,16 @@
 
 use std::path::PathBuf;
 use std::sync::Arc;
+use std::time::Duration;
 
 use serde_json::json;
 use vergence_board::HostClock;
-use vergence_calibration_input::{Captured, Looked, TargetCapture, printed};
-use vergence_camera::{Camera, CameraError, CameraSet};
+use vergence_calibration_input::{Captured, Looked, TargetCapture, held_before};
+use vergence_camera::{Camera, CameraError, CameraSet, PLAYED_HZ, is_played, play};
 use vergence_panel::{CapturePanel, Setting};
 use vergence_rig::Rig;
 use vergence_scene::LensChoice;
-use vergence_sim::{HeldTarget, TargetCamera};
 use vergence_targets::TargetKind;
-use vergence_vision::Side;
 
 use super::camera_options::CameraOptions;
 use super::mask_options::MaskOptions;
@@ -31,7 +30,7 @@ use crate::rig_file;
 pub struct Args {
     #[command(flatten)]
     target: TargetOptions,
-    /// The cameras: one device such as /dev/video0, or left and right; or `sim` for simulated ones.
+    /// The cameras: one device such as /dev/video0, or left and right; folders of images or Y4M videos; or `sim` for simulated ones.
     #[arg(long, num_args = 1..=2, required = true, value_name = "DEVICE")]
     cameras: Vec<String>,
     /// The folder for the images: left000.png, right000.png and so on.
@@ -116,51 +115,23 @@ async fn capture<I: Future<Output = ()>>(
 }
 
 fn report(captured: &Captured, args: &Args, console: Console) -> Result<(), Failure> {
-    let Captured { watch, images, alone, missed, was_interrupted, .. } = captured;
-    let complete = watch.is_complete();
-    let state = match (complete, was_interrupted) {
-        (true, _) => "the set is complete",
-        (false, true) => "interrupted: they are kept, and the same command adds to them",
-        (false, false) => "the set is not complete",
-    };
-    console.say(format!("{} views in {}; {state}", watch.taken(), args.out.display()))?;
-    if *alone > 0 {
-        console.say(format!("{alone} images had no partner of the other camera taken at the same time"))?;
-    }
-    if *missed > 0 {
-        console.say(format!("{missed} images were lost between the cameras and this program"))?;
-    }
-    console.result(&json!({
-        "views": watch.taken(),
-        "frames": images,
-        "frames_alone": alone,
-        "frames_missed": missed,
-        "lens": (args.cameras == ["sim"]).then(|| args.lens.to_string()),
-        "complete": complete,
-        "interrupted": was_interrupted,
-        "out": args.out,
-    }))
+    console.say_lines(captured.in_words(&args.out))?;
+    let mut result = captured.json();
+    result["lens"] = json!((args.cameras == ["sim"]).then(|| args.lens.to_string()));
+    result["out"] = json!(args.out);
+    console.result(&result)
 }
 
 fn open(args: &Args, rig: &Rig, target: &TargetKind) -> Result<Vec<Box<dyn Camera>>, Failure> {
     if args.cameras == ["sim"] {
         args.camera.none_for_simulated()?;
-        return Ok(simulated(args, rig, target));
+        return Ok(held_before(rig, target, (!args.mono, args.seed, args.lens)));
     }
     let clock = HostClock::start();
-    Ok(args.cameras.iter().map(|device| args.camera.open(device, clock)).collect::<Result<_, CameraError>>()?)
-}
-
-fn simulated(args: &Args, rig: &Rig, target: &TargetKind) -> Vec<Box<dyn Camera>> {
-    let targets = rig.mode("human").map(|mode| mode.targets.iter().map(|target| target.value()).collect::<Vec<_>>());
-    let pose = rig.pose_at_values(&targets.unwrap_or_default());
-    let held = HeldTarget {
-        left: rig.left_camera,
-        right: (rig.right_camera, pose.left_from_right),
-        both: !args.mono,
-        target: printed(target),
-        seed: args.seed,
-    };
-    let sides = if args.mono { &[Side::Left][..] } else { &[Side::Left, Side::Right] };
-    sides.iter().map(|&side| Box::new(TargetCamera::new(held, side).with_lens(args.lens)) as Box<dyn Camera>).collect()
+    if args.cameras.iter().any(|name| is_played(name)) {
+        args.camera.none_for_simulated()?;
+        return Ok(play(&args.cameras, PLAYED_HZ, Arc::new(move || Duration::from_micros(clock.now().0)))?);
+    }
+    let open = |device: &String| args.camera.open(device, clock, Duration::ZERO);
+    Ok(args.cameras.iter().map(open).collect::<Result<_, CameraError>>()?)
 }

@@ -1,6 +1,7 @@
 //! One module per verb.
 
 mod camera_options;
+mod camera_test;
 mod connect;
 mod force_option;
 mod live_options;

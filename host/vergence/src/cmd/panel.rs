@@ -31,7 +31,7 @@ const SIMULATED_LEASE_MS: u16 = 1000;
 /// nothing is measured. Ctrl-C brakes, disarms and ends.
 #[derive(Debug, clap::Args)]
 pub struct Args {
-    /// The left and the right camera, such as /dev/video0 /dev/video2; or `sim` on a simulated rig.
+    /// The left and the right camera, such as /dev/video0 /dev/video2; two folders of images or Y4M videos; or `sim` on a simulated rig.
     #[arg(long, num_args = 1..=2, value_name = "DEVICE")]
     cameras: Vec<String>,
     /// The address at which the page is served; port 0 takes a free one.

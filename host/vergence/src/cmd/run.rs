@@ -35,7 +35,7 @@ use crate::stopwatch::started_us;
 /// Ctrl-C brakes, disarms and ends.
 #[derive(Debug, clap::Args)]
 pub struct Args {
-    /// The left and the right camera, such as /dev/video0 /dev/video2; or `sim` on a simulated rig.
+    /// The left and the right camera, such as /dev/video0 /dev/video2; two folders of images or Y4M videos; or `sim` on a simulated rig.
     #[arg(long, num_args = 1..=2, required = true, value_name = "DEVICE")]
     cameras: Vec<String>,
     #[command(flatten)]

@@ -4,12 +4,11 @@ use std::path::Path;
 
 use tokio::sync::mpsc::{Receiver, Sender, channel};
 use vergence_board::{Board, Continuity, HostClock, Port};
-use vergence_camera::CameraEvent;
-use vergence_live::{attach_both, simulate_both};
+use vergence_camera::{CameraError, CameraEvent, PLAYED_HZ, is_played};
+use vergence_live::{attach_both, play_both, simulate_both, unplugged};
 use vergence_protocol::{Trigger, TriggerMark};
 use vergence_rig::{Rig, Shutter};
 use vergence_scene::{LensChoice, TrueLens};
-use vergence_sim::Unplug;
 use vergence_vision::{KannalaBrandt, Side};
 
 use super::camera_options::CameraOptions;
@@ -26,8 +25,8 @@ const EVENTS_KEPT: usize = 16;
 /// How images are taken.
 #[derive(Debug, clap::Args)]
 pub struct TakingOptions {
-    /// Pulses of the camera trigger per second, 0.1 to 500.
-    #[arg(long, default_value_t = 10.0, value_name = "HZ", value_parser = super::camera_options::parse_rate)]
+    /// Pulses of the camera trigger per second, 0.1 to 500; of files that are numbered, images per second.
+    #[arg(long, default_value_t = PLAYED_HZ, value_name = "HZ", value_parser = super::camera_options::parse_rate)]
     pub rate: f64,
     /// The cameras are not fired but run freely; images are paired by their time stamps.
     #[arg(long)]
@@ -91,6 +90,12 @@ impl TakingOptions {
         if self.lens != LensChoice::Ideal && !is_simulated {
             return Err(Failure::usage("--lens is for simulated cameras: --port sim --cameras sim"));
         }
+        if cameras.iter().any(|name| is_played(name)) {
+            self.camera.none_for_simulated()?;
+            if !drawn.axes.is_empty() {
+                return Err(CameraError::PoseUnknown(drawn.name).into());
+            }
+        }
         let (known, lenses) = match is_simulated {
             true => {
                 let lensed = lensed(&drawn, (self.lens, self.seed), out, console).await?;
@@ -118,11 +123,15 @@ impl TakingOptions {
         rig.plug.iter().for_each(Plug::begin);
         match (&rig.simulated, cameras) {
             (Some((mechanics, lenses)), _) => self.simulate(rig, mechanics, lenses.clone(), &listener)?,
+            (None, [left, right]) if is_played(left) || is_played(right) => {
+                let warn = |warning: String| Console::new(false).warn(warning);
+                play_both([left.as_ref(), right.as_ref()], (self.rate, rig.clock), &listener, warn)?;
+            }
             (None, [left, right]) => {
                 let opener = |device: &String, lens: KannalaBrandt, shutter: Shutter| {
                     let (device, options, clock) = (device.clone(), self.camera.for_size(lens.size()), rig.clock);
                     let rolling = shutter.span(lens.size().height);
-                    move || options.open_rolling(&device, clock, rolling)
+                    move || options.open(&device, clock, rolling)
                 };
                 let [left_shutter, right_shutter] = rig.known.shutters;
                 let left = opener(left, rig.known.left_camera, left_shutter);
@@ -142,19 +151,7 @@ impl TakingOptions {
         listener: &Sender<(Side, CameraEvent)>,
     ) -> Result<(), Failure> {
         let known = &rig.known;
-        let mut unplugged = Vec::new();
-        for unplug in &self.unplug {
-            match unplug {
-                Unplug::Camera(camera) => unplugged.push(*camera),
-                Unplug::Encoder { axis: name, times } => {
-                    let axis = known.axes.iter().position(|axis| axis.name == *name).filter(|_| known.trunk.is_none());
-                    let no = || Failure::usage(format!("rig '{}' has no stage '{name}' to unplug", known.name));
-                    mechanics.lock().unplug_encoder(axis.ok_or_else(no)?, *times);
-                }
-                // The cable knows it already.
-                Unplug::Link(_) => {}
-            }
-        }
+        let unplugged = unplugged(&self.unplug, known, mechanics)?;
         let [left_shutter, right_shutter] = known.shutters;
         let cameras = [(left, left_shutter), (right, right_shutter)];
         simulate_both(cameras, mechanics, (self.seed, &unplugged), rig.clock, listener);

@@ -20,7 +20,7 @@ use crate::interrupt::interrupted;
 /// The board fires the cameras (--rate); with --mode the stages move meanwhile. Ctrl-C brakes, disarms and ends the recording in order.
 #[derive(Debug, clap::Args)]
 pub struct Args {
-    /// The left and the right camera, such as /dev/video0 /dev/video2; or `sim` on a simulated rig.
+    /// The left and the right camera, such as /dev/video0 /dev/video2; two folders of images or Y4M videos; or `sim` on a simulated rig.
     #[arg(long, num_args = 1..=2, required = true, value_name = "DEVICE")]
     cameras: Vec<String>,
     /// The folder of the recording, which must be empty or not there.

@@ -145,7 +145,7 @@ async fn open(
         }
         (_, [left, right]) => {
             let clock = HostClock::start();
-            let attached = [left, right].map(|device| options.camera.open(device, clock));
+            let attached = [left, right].map(|device| options.camera.open(device, clock, std::time::Duration::ZERO));
             let attached = attached.into_iter().collect::<Result<_, CameraError>>()?;
             Ok((connect(common, console, "homing").await?, RigCameras::Attached(attached)))
         }
