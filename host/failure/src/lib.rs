@@ -11,6 +11,7 @@ mod live;
 mod models;
 mod output;
 mod panel;
+mod peers;
 mod plausibility;
 mod recording;
 mod reproduce;

@@ -7,7 +7,7 @@ use crate::Failure;
 impl From<PanelError> for Failure {
     fn from(error: PanelError) -> Self {
         match error {
-            PanelError::Listen { .. } => Self::usage(error.to_string()),
+            PanelError::Listen { .. } | PanelError::OnlyHere(_) => Self::usage(error.to_string()),
             PanelError::Board(error) => error.into(),
             PanelError::Live(error) => error.into(),
             _ => Self::device(error.to_string()),

@@ -17,6 +17,9 @@ pub enum PanelError {
         /// What the operating system says.
         why: String,
     },
+    /// An address that other computers reach.
+    #[error("{0} is reached from other computers, and the page of the rigs is for this one: choose 127.0.0.1")]
+    OnlyHere(SocketAddr),
     /// The server cannot begin.
     #[error("the server of the panel does not start: {0}")]
     Server(String),

@@ -8,7 +8,7 @@ mod cdr;
 mod error;
 mod event;
 mod keep;
-mod messages;
+pub mod messages;
 mod metadata;
 mod play;
 mod png;
@@ -18,6 +18,8 @@ mod recording;
 mod replay;
 mod tap;
 
+pub use bag::{DIAGNOSTICS, JOINTS, POINTS, TRANSFORMS, Topic};
+pub use cdr::Cdr;
 pub use error::RecordingError;
 pub use event::{Beginning, Event, Eye, Stamp, Timing};
 pub use play::{Pacing, play};

@@ -17,7 +17,7 @@ use vergence_vision::Side;
 use crate::RecordingError;
 use crate::bag::{self, Bag};
 use crate::event::{Beginning, Event, Eye, Stamp};
-use crate::messages;
+use crate::messages::{self, Grade, Health};
 use crate::png::Png;
 
 /// Number of entries that may wait for the disk: about a second of a bench with its poses.
@@ -201,7 +201,9 @@ impl Scribe {
 
     fn warning(&mut self, now: Microseconds, sentence: &str) -> Result<(), RecordingError> {
         let at = self.ns(now);
-        self.bag.write(bag::DIAGNOSTICS, at, &messages::diagnostic(at, "vergence", sentence))
+        let warning =
+            Health { grade: Grade::Warning, name: "vergence", message: sentence.to_owned(), values: Vec::new() };
+        self.bag.write(bag::DIAGNOSTICS, at, &messages::diagnostics(at, &[warning]))
     }
 
     fn event(&mut self, now: Microseconds, event: &Event) -> Result<(), RecordingError> {

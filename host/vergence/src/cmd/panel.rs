@@ -8,15 +8,18 @@ use serde_json::json;
 use vergence_board::{fresh_secret, hex};
 use vergence_live::{Ended, MatchingTime};
 use vergence_panel::{Access, Panel, PanelError, Session, Setting};
+use vergence_peers::Published;
 use vergence_scene::LensChoice;
 
 use super::connect::connect;
 use super::live_options::LiveOptions;
+use super::peer_options::PublishOptions;
 use crate::cli::CommonOptions;
 use crate::console::Console;
 use crate::failure::Failure;
 use crate::interrupt::interrupted;
 use crate::rig_file;
+use crate::stopwatch::started_us;
 
 /// The lease on a simulated board in this process, in milliseconds: a busy computer must not stop it.
 const SIMULATED_LEASE_MS: u16 = 1000;
@@ -43,6 +46,8 @@ pub struct Args {
     home: bool,
     #[command(flatten)]
     live: LiveOptions,
+    #[command(flatten)]
+    publishing: PublishOptions,
 }
 
 /// `vergence demo --panel`: the same as `vergence panel --port sim --cameras sim --home`.
@@ -86,6 +91,12 @@ pub async fn run(args: &Args, common: &CommonOptions, console: Console) -> Resul
             let live = Some(method.live_loop(&mut rig, events, MatchingTime::Real));
             (panel, Session { driver, board: rig.board, trigger: rig.trigger, live })
         }
+    };
+    let panel = match &args.publishing.publish {
+        Some(name) => {
+            Published::of(&panel, &session, started_us).with_panel(panel, name, args.publishing.peers.read()?)?
+        }
+        None => panel,
     };
     let serving = panel.serve(listener, access)?;
     console.say(format!("the panel is at {}; Ctrl-C ends it", serving.url()))?;

@@ -5,6 +5,7 @@ use std::pin::pin;
 use std::sync::Arc;
 use std::time::Duration;
 
+use vergence_board::HostClock;
 use vergence_live::{LiveError, LiveResult, Measurement, Pace, Totals};
 use vergence_pipeline::Method;
 use vergence_recording::{Pacing, Reader, RecordingError, Replay, play};
@@ -65,7 +66,9 @@ pub async fn run(args: &Args, console: Console) -> Result<(), Failure> {
         lens: None,
         files,
         number: 0,
+        clock: HostClock::start(),
         recorder: None,
+        publication: None,
         pace: Pace::default(),
     };
     let (mut totals, pacing) = (Totals::default(), Pacing { from: args.from, rate: args.rate });

@@ -19,6 +19,7 @@ use crate::console::Console;
 use crate::failure::Failure;
 use crate::rig_file;
 use crate::sim::{SharedRig, SimulatedRig, board_of, lensed};
+use crate::stopwatch::started_us;
 
 /// Number of camera events that may wait; images beyond it are lost, which the gap in their numbers shows.
 const EVENTS_KEPT: usize = 16;
@@ -58,6 +59,8 @@ pub struct LiveRig {
     pub trigger: Option<Trigger>,
     /// The clock of images and pulses.
     pub clock: HostClock,
+    /// The time at which that clock started, in microseconds since 1970.
+    pub epoch_us: u64,
     /// Time between pulses of the trigger in microseconds; `None` where the cameras run freely.
     pub period_us: Option<f64>,
 }
@@ -103,7 +106,7 @@ impl TakingOptions {
         let period_us = (board.is_some() && !self.free).then_some(1e6 / self.rate);
         let trigger = period_us.map(|period| Trigger::Every { period_us: period.round() as u32 });
         let simulated = mechanics.zip(lenses);
-        Ok((LiveRig { known, board, simulated, trigger, clock, period_us }, prepared))
+        Ok((LiveRig { known, board, simulated, trigger, clock, epoch_us: started_us(clock), period_us }, prepared))
     }
 
     /// Starts both cameras, and unplugs simulated ones as the options say. Their events arrive at the result.
