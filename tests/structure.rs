@@ -233,6 +233,17 @@ const ALLOWED: &[(&str, &[&str])] = &[
             "vergence-recording",
         ],
     ),
+    (
+        "vergence-peers",
+        &[
+            "vergence-protocol",
+            "vergence-rig",
+            "vergence-pipeline",
+            "vergence-board",
+            "vergence-panel",
+            "vergence-recording",
+        ],
+    ),
     ("vergence-failure", EVERYTHING),
     ("vergence", EVERYTHING),
 ];
@@ -249,9 +260,11 @@ const ONLY_FOR: &[(&str, &[&str])] = &[
             "vergence-doctor",
             "vergence-panel",
             "vergence-recording",
+            "vergence-peers",
             "vergence",
         ],
     ),
+    ("zenoh", &["vergence-peers"]),
     ("tokio-serial", &["vergence-board", "vergence"]),
     ("serialport", &["vergence-board", "vergence"]),
     ("moq-v4l", &["vergence-camera"]),
@@ -282,6 +295,7 @@ const LICENCES: &[&str] = &[
 const EXCEPTIONS: &[(&str, &str, &str)] = &[
     ("serialport", "MPL-2.0", "copyleft by file, used unchanged; the serial port library of the Rust world"),
     ("mio-serial", "MPL-2.0", "the same"),
+    ("option-ext", "MPL-2.0", "the same; only with the feature zenoh"),
 ];
 
 /// The workspaces: what runs on a computer, and what runs on the board, the boot loader included.
@@ -291,7 +305,7 @@ const BOARD: &str = "firmware/nucleo-g474/Cargo.toml";
 fn metadata(workspace: &str) -> Value {
     let manifest = Path::new(env!("CARGO_MANIFEST_DIR")).join("../..").join(workspace);
     let output = Command::new(env!("CARGO"))
-        .args(["metadata", "--format-version", "1", "--locked", "--manifest-path"])
+        .args(["metadata", "--format-version", "1", "--locked", "--all-features", "--manifest-path"])
         .arg(manifest)
         .output()
         .expect("cargo runs");

@@ -27,7 +27,7 @@ mod who;
 
 pub use board::{
     Board, RecordedEvents, Way, check_range, clock_json, describe_clock, describe_fault, describe_pose, event_in_words,
-    pose_json, positions, staying, straight_ways,
+    mark_json, mark_line, pose_json, pose_line, pose_with_times_json, positions, staying, straight_ways,
 };
 pub use checks::{BoardChecks, Finding, Verdict, check_board, check_port, forbidden, told};
 pub use error::BoardError;
@@ -50,7 +50,7 @@ pub use setting_text::{NamedSetting, settings};
 pub use settings_file::{SettingsChanged, SettingsFileError};
 pub use story::Story;
 pub use update::{
-    FirmwareImage, ImageFileError, UpdateError, UpdateEvent, Updated, confirm, hardware_name, restart, roll_back,
-    update, version_text,
+    FirmwareImage, ImageFileError, UpdateError, UpdateEvent, Updated, confirm, hardware_name, identity_json,
+    identity_words, restart, roll_back, update, version_text,
 };
 pub use who::{ListedPort, WhoAnswers, list_ports, who_answers};

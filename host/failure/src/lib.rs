@@ -12,6 +12,7 @@ mod live;
 mod models;
 mod output;
 mod panel;
+mod peers;
 mod plausibility;
 mod recording;
 mod reproduce;

@@ -11,7 +11,7 @@ use vergence_board::{BoardKnowledge, HostClock};
 use vergence_camera::{CameraEvent, PendingImage};
 use vergence_matching::Matcher;
 use vergence_pipeline::{Ambiguity, Exposed, Exposures, Method, Observation, PoseMemory, Search, SkipReason, TimeBase};
-use vergence_protocol::TriggerMark;
+use vergence_protocol::{Microseconds, TriggerMark};
 use vergence_rig::{Rig, StampedImage};
 use vergence_vision::Side;
 
@@ -85,6 +85,14 @@ pub struct LiveResult<'a> {
     pub latency: Duration,
     /// Counts so far, this result included.
     pub totals: &'a Totals,
+}
+
+impl LiveResult<'_> {
+    /// The middle of the exposure on the host's clock, which shows `now`.
+    #[must_use]
+    pub fn exposed(&self, now: Microseconds) -> Microseconds {
+        Microseconds(now.0.saturating_sub(u64::try_from(self.latency.as_micros()).unwrap_or(u64::MAX)))
+    }
 }
 
 /// How long matching takes on the clock of the loop, which may be simulated.

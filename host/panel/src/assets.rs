@@ -6,6 +6,9 @@ use axum::response::{IntoResponse, Response};
 /// Address, kind and text of each file.
 const FILES: &[(&str, &str, &str)] = &[
     ("/", "text/html; charset=utf-8", include_str!("../page/index.html")),
+    ("/rigs.html", "text/html; charset=utf-8", include_str!("../page/rigs.html")),
+    ("/rigs.css", "text/css; charset=utf-8", include_str!("../page/rigs.css")),
+    ("/rigs.js", JAVASCRIPT, include_str!("../page/rigs.js")),
     ("/style.css", "text/css; charset=utf-8", include_str!("../page/style.css")),
     ("/main.js", JAVASCRIPT, include_str!("../page/main.js")),
     ("/link.js", JAVASCRIPT, include_str!("../page/link.js")),

@@ -12,7 +12,7 @@ use vergence_board::{Board, BoardError, describe_fault};
 use vergence_protocol::{Request, Trigger};
 
 use crate::board_log::read_recorder;
-use crate::hub::{Given, Hub, Task};
+use crate::hub::{Given, Hub, Task, Told};
 use crate::log::Level;
 use crate::message::Order;
 
@@ -66,9 +66,11 @@ impl Driver {
     /// Carries out an order, and those that replace it.
     async fn carry_out(&mut self, board: &mut Board, given: Given) -> Result<(), BoardError> {
         let mut next = Some(given);
-        while let Some(Given { order, halts }) = next.take() {
+        while let Some(Given { order, halts, told }) = next.take() {
             if *self.hub.halts.borrow() != halts {
-                self.hub.note(Level::Note, "an order was taken back by the stop that followed it");
+                let said = "an order was taken back by the stop that followed it";
+                self.hub.note(Level::Note, said);
+                tell(told, Err(said.to_owned()));
                 continue;
             }
             let outcome = match order {
@@ -78,12 +80,20 @@ impl Driver {
             };
             self.hub.set_task(Task::default());
             match outcome {
-                Ok(said) => self.hub.note(Level::Note, &said),
+                Ok(said) => {
+                    self.hub.note(Level::Note, &said);
+                    tell(told, Ok(said));
+                }
                 Err(error @ (BoardError::Link(_) | BoardError::Open(_))) => return Err(error),
                 Err(BoardError::Interrupted) => {
-                    self.hub.note(Level::Note, "the stages have braked, and the board is disarmed");
+                    let said = "the stages have braked, and the board is disarmed";
+                    self.hub.note(Level::Note, said);
+                    tell(told, Err(format!("stopped: {said}")));
                 }
-                Err(error) => self.hub.note(Level::Error, &error.to_string()),
+                Err(error) => {
+                    self.hub.note(Level::Error, &error.to_string());
+                    tell(told, Err(error.to_string()));
+                }
             }
         }
         Ok(())
@@ -130,4 +140,10 @@ impl Driver {
             None => "there was nothing to clear".to_owned(),
         })
     }
+}
+
+/// Tells who gave an order what became of it.
+fn tell(told: Option<Told>, outcome: Result<String, String>) {
+    // Whoever is gone does not want to know any more.
+    let _ = told.map(|told| told.send(outcome));
 }

@@ -21,6 +21,9 @@ pub enum PanelError {
     /// The address lets other computers in, and nobody said so.
     #[error("{0} lets other computers in: add --network, which makes a token that they need")]
     OtherComputers(SocketAddr),
+    /// An address that other computers reach.
+    #[error("{0} is reached from other computers, and the page of the rigs is for this one: choose 127.0.0.1")]
+    OnlyHere(SocketAddr),
     /// The server cannot begin.
     #[error("the server of the panel does not start: {0}")]
     Server(String),

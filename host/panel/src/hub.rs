@@ -6,7 +6,7 @@ use std::time::Duration;
 use image::RgbImage;
 use serde_json::{Value, json};
 use tokio::sync::mpsc::error::TrySendError;
-use tokio::sync::{Semaphore, mpsc, watch};
+use tokio::sync::{Semaphore, mpsc, oneshot, watch};
 use vergence_board::HostClock;
 use vergence_rig::{AxisPosition, Rig};
 
@@ -48,7 +48,12 @@ pub struct Wish {
 pub struct Given {
     pub order: Order,
     pub halts: u64,
+    /// Who wants to know what becomes of it.
+    pub told: Option<Told>,
 }
+
+/// Where the outcome of an order goes: a sentence, of success or of what ended it.
+pub type Told = oneshot::Sender<Result<String, String>>;
 
 /// Where the rig is being sent.
 #[derive(Clone, Debug, Default)]
@@ -235,16 +240,18 @@ impl Hub {
                 self.halt(&format!("asked by page {}", client.0));
                 return Ok(());
             }
-            PageMessage::Take | PageMessage::HandOver => {
-                let said = match (message == PageMessage::Take).then(|| shared.operators.take(client)) {
-                    Some(Control::Given) => format!("page {} drives", client.0),
-                    Some(Control::Asked) => format!("page {} asks for control", client.0),
-                    None if shared.operators.hand_over(client) => format!("page {} handed control over", client.0),
-                    None => return Err("this page does not drive".to_owned()),
-                };
+            PageMessage::Take => {
+                drop(shared);
+                self.take_control(client);
+                return Ok(());
+            }
+            PageMessage::HandOver => {
+                if !shared.operators.hand_over(client) {
+                    return Err("this page does not drive".to_owned());
+                }
                 publish_control(&mut shared);
                 drop(shared);
-                self.note(Level::Note, &said);
+                self.note(Level::Note, &format!("page {} handed control over", client.0));
                 return Ok(());
             }
             _ if shared.operators.driver() != Some(client) => {
@@ -274,12 +281,34 @@ impl Hub {
         Ok(())
     }
 
+    /// A page wants to drive.
+    pub fn take_control(&self, client: ClientId) -> Control {
+        let mut shared = self.lock();
+        let control = shared.operators.take(client);
+        publish_control(&mut shared);
+        drop(shared);
+        let said = if control == Control::Given { "drives" } else { "asks for control" };
+        self.note(Level::Note, &format!("page {} {said}", client.0));
+        control
+    }
+
     /// Gives an order to the rig.
     ///
     /// # Errors
     /// A sentence where too many wait, and where nothing carries orders out.
     pub fn order(&self, order: Order) -> Result<(), String> {
-        let given = Given { order, halts: *self.halts.borrow() };
+        self.give(order, None)
+    }
+
+    /// As [`Hub::order`], for one who wants to know what becomes of it.
+    pub fn order_told(&self, order: Order) -> Result<oneshot::Receiver<Result<String, String>>, String> {
+        let (told, outcome) = oneshot::channel();
+        self.give(order, Some(told))?;
+        Ok(outcome)
+    }
+
+    fn give(&self, order: Order, told: Option<Told>) -> Result<(), String> {
+        let given = Given { order, halts: *self.halts.borrow(), told };
         self.orders.try_send(given).map_err(|refused| match refused {
             TrySendError::Full(_) => "the rig is busy with earlier orders: stop it, or wait".to_owned(),
             TrySendError::Closed(_) => "nothing here drives a rig".to_owned(),

@@ -8,6 +8,7 @@ use vergence_board::Board;
 use vergence_camera::CameraEvent;
 use vergence_live::LiveResult;
 use vergence_recording::Recording;
+use vergence_rig::Rig;
 use vergence_vision::Side;
 
 use crate::cloud::cloud_message;
@@ -18,6 +19,7 @@ use crate::hub::{Hub, Setting};
 use crate::log::Level;
 use crate::message::Order;
 use crate::pictures::{Darkroom, tapped};
+use crate::remote::Remotes;
 use crate::server::{Serving, serve};
 use crate::status::Reporter;
 use crate::streams::Stream;
@@ -30,6 +32,8 @@ const EVENTS_KEPT: usize = 16;
 pub struct Panel {
     pub(crate) hub: Arc<Hub>,
     pub(crate) darkroom: Darkroom,
+    /// Who hears of every result besides.
+    beside: Option<Arc<dyn Fn(&LiveResult<'_>) + Send + Sync>>,
 }
 
 impl Panel {
@@ -38,7 +42,7 @@ impl Panel {
     pub fn new(setting: Setting) -> (Self, Driver) {
         let (hub, orders) = Hub::new(setting);
         let hub = Arc::new(hub);
-        (Self { hub: Arc::clone(&hub), darkroom: Darkroom::default() }, Driver::new(hub, orders))
+        (Self { hub: Arc::clone(&hub), darkroom: Darkroom::default(), beside: None }, Driver::new(hub, orders))
     }
 
     /// Serves pages that `listener` accepts, on a thread of its own, until the result is dropped.
@@ -85,8 +89,29 @@ impl Panel {
         out
     }
 
+    /// The panel that tells `listener` of every result that it shows; that must be quick.
+    #[must_use]
+    pub fn beside(self, listener: impl Fn(&LiveResult<'_>) + Send + Sync + 'static) -> Self {
+        Self { beside: Some(Arc::new(listener)), ..self }
+    }
+
+    /// The rig that is shown.
+    #[must_use]
+    pub fn rig(&self) -> &Arc<Rig> {
+        &self.hub.setting.rig
+    }
+
+    /// What lets operators on other machines drive.
+    #[must_use]
+    pub fn remotes(&self) -> Remotes {
+        Remotes(Arc::clone(&self.hub))
+    }
+
     /// Shows a result of the live loop, with the images from which it was measured.
     pub fn show(&self, result: &LiveResult<'_>) {
+        if let Some(listener) = &self.beside {
+            listener(result);
+        }
         self.hub.put(Stream::Cloud, cloud_message(result));
         self.hub.images.send_replace(self.darkroom.images());
     }

@@ -87,8 +87,32 @@ struct Served {
     access: Arc<Access>,
 }
 
-/// Serves until the result is dropped.
+/// Serves the page of a rig until the result is dropped.
 pub fn serve(hub: Arc<Hub>, listener: TcpListener, access: Access) -> Result<Serving, PanelError> {
+    let url = access.clone();
+    let served = Served { hub: Arc::clone(&hub), access: Arc::new(access) };
+    let router = Router::new()
+        .route("/socket", any(socket))
+        .route("/status", get(status))
+        .fallback(get(file))
+        .with_state(served);
+    let beside = async move {
+        tokio::select! {
+            () = show_pictures(Arc::clone(&hub)) => {}
+            () = follow_view(Arc::clone(&hub)) => {}
+            () = watch_driver(&hub) => {}
+        }
+    };
+    serve_router(router, listener, &url, beside)
+}
+
+/// Serves `router` on a thread of its own, with `beside` going on there, until the result is dropped.
+pub fn serve_router(
+    router: Router,
+    listener: TcpListener,
+    access: &Access,
+    beside: impl Future<Output = ()> + Send + 'static,
+) -> Result<Serving, PanelError> {
     let failed = |error: std::io::Error| PanelError::Server(error.to_string());
     let address = listener.local_addr().map_err(failed)?;
     listener.set_nonblocking(true).map_err(failed)?;
@@ -96,25 +120,17 @@ pub fn serve(hub: Arc<Hub>, listener: TcpListener, access: Access) -> Result<Ser
     let runtime = tokio::runtime::Builder::new_current_thread().thread_name(THREADS).enable_all().build();
     let runtime = runtime.map_err(failed)?;
     let (end, ended) = oneshot::channel::<()>();
-    let url = match &access {
+    let url = match access {
         Access::Token(token) => format!("http://{address}/?token={token}"),
         Access::ThisComputer => format!("http://{address}/"),
     };
-    let served = Served { hub: Arc::clone(&hub), access: Arc::new(access) };
-    let router = Router::new()
-        .route("/socket", any(socket))
-        .route("/status", get(status))
-        .fallback(get(file))
-        .with_state(served);
     let thread = std::thread::Builder::new().name(THREADS.to_owned()).spawn(move || {
         runtime.block_on(async {
             // Only a listener whose descriptor is closed is refused here, and it is open.
             let Ok(listener) = tokio::net::TcpListener::from_std(listener) else { return };
             tokio::select! {
                 _ = axum::serve(listener, router) => {}
-                () = show_pictures(Arc::clone(&hub)) => {}
-                () = follow_view(Arc::clone(&hub)) => {}
-                () = watch_driver(&hub) => {}
+                () = beside => {}
                 _ = ended => {}
             }
         });
@@ -134,14 +150,14 @@ async fn watch_driver(hub: &Hub) {
 }
 
 /// What the headers and the address of a request claim. The token is made of letters and digits, so that nothing in it is escaped.
-fn claim<'a>(headers: &'a HeaderMap, uri: &'a Uri) -> Claim<'a> {
+pub fn claim<'a>(headers: &'a HeaderMap, uri: &'a Uri) -> Claim<'a> {
     let text = |name: HeaderName| headers.get(name).and_then(|value| value.to_str().ok());
     let pairs = uri.query().into_iter().flat_map(|query| query.split('&'));
     let token = pairs.filter_map(|pair| pair.strip_prefix("token=")).next();
     Claim { host: text(header::HOST), origin: text(header::ORIGIN), token }
 }
 
-fn refused(why: Refused) -> Response {
+pub fn refused(why: Refused) -> Response {
     (StatusCode::FORBIDDEN, why.to_string()).into_response()
 }
 
@@ -171,7 +187,7 @@ async fn status(State(served): State<Served>, headers: HeaderMap, uri: Uri) -> R
 }
 
 /// The page and its parts, which hold nothing of the rig.
-async fn file(uri: Uri) -> Response {
+pub async fn file(uri: Uri) -> Response {
     match asset(uri.path()) {
         Some((content_type, text)) => secured(content_type, text),
         None => (StatusCode::NOT_FOUND, "the panel has no such file").into_response(),

@@ -8,7 +8,7 @@ mod cdr;
 mod error;
 mod event;
 mod keep;
-mod messages;
+pub mod messages;
 mod metadata;
 mod play;
 mod png;
@@ -22,6 +22,8 @@ mod scribe;
 mod tap;
 mod views_bag;
 
+pub use bag::{DIAGNOSTICS, JOINTS, POINTS, TRANSFORMS, Topic};
+pub use cdr::Cdr;
 pub use error::RecordingError;
 pub use event::{Beginning, Event, Eye, Stamp, Timing};
 pub use play::{Audience, Jump, Pacing, play};

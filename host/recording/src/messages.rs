@@ -188,10 +188,40 @@ fn point(ColouredPoint { point, colour: [red, green, blue], score, .. }: &Colour
     floats.flat_map(|value| (value as f32).to_le_bytes()).chain(colour.to_le_bytes()).collect()
 }
 
-/// A `diagnostic_msgs/DiagnosticArray` with one warning.
-pub fn diagnostic(stamp_ns: u64, name: &str, message: &str) -> Vec<u8> {
-    const WARN: u8 = 1;
-    header(stamp_ns, "")
-        .parts(&[()], |cdr, ()| cdr.number(WARN).text(name).text(message).text("vergence").number(0_u32))
-        .finish()
+/// How a part of the rig is, as `diagnostic_msgs/DiagnosticStatus` grades it.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Grade {
+    /// It works.
+    Ok = 0,
+    /// People should know.
+    Warning = 1,
+    /// It does not work.
+    Error = 2,
+    /// Nothing was heard of it for too long.
+    Stale = 3,
+}
+
+/// One part of a [`diagnostics`] message.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Health {
+    /// How it is.
+    pub grade: Grade,
+    /// What it is, such as `board`.
+    pub name: &'static str,
+    /// A sentence for people.
+    pub message: String,
+    /// Its figures by name.
+    pub values: Vec<(&'static str, String)>,
+}
+
+/// A `diagnostic_msgs/DiagnosticArray`.
+pub fn diagnostics(stamp_ns: u64, parts: &[Health]) -> Vec<u8> {
+    let part = |cdr: Cdr, health: &Health| {
+        cdr.number(health.grade as u8)
+            .text(health.name)
+            .text(&health.message)
+            .text("vergence")
+            .parts(&health.values, |cdr, (key, value)| cdr.text(key).text(value))
+    };
+    header(stamp_ns, "").parts(parts, part).finish()
 }

@@ -9,7 +9,7 @@ use vergence_rig::{Rig, StampedImage};
 use crate::RecordingError;
 use crate::bag::{self, Bag};
 use crate::event::{Event, Eye, Stamp};
-use crate::messages;
+use crate::messages::{self, Grade, Health};
 use crate::png::Png;
 use crate::reader::stamp_ns;
 use crate::recorder::{Entry, unwritten};
@@ -70,7 +70,9 @@ impl<W: Write + Seek> Scribe<W> {
 
     fn warning(&mut self, now: Microseconds, sentence: &str) -> Result<(), RecordingError> {
         let at = self.ns(now);
-        self.bag.write(bag::DIAGNOSTICS, at, &messages::diagnostic(at, "vergence", sentence))
+        let warning =
+            Health { grade: Grade::Warning, name: "vergence", message: sentence.to_owned(), values: Vec::new() };
+        self.bag.write(bag::DIAGNOSTICS, at, &messages::diagnostics(at, &[warning]))
     }
 
     fn event(&mut self, now: Microseconds, event: &Event) -> Result<(), RecordingError> {

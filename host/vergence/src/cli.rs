@@ -90,6 +90,8 @@ enum Verb {
     Export(cmd::export::Args),
     /// Serves a page on which people see and drive the rig.
     Panel(With<BoardOptions, cmd::panel::Args>),
+    /// Watches rigs that other machines publish, and sends them to modes.
+    Peers(cmd::peers::Args),
     /// Keeps pre-trained networks for matching.
     Models(cmd::models::Args),
     /// Computes how much of the surroundings both cameras, one, or none see.
@@ -115,7 +117,7 @@ pub const TASKS: &[(&str, &[&str])] = &[
     ("Set up a board", &["devices", "doctor", "config", "flash", "image", "servo"]),
     ("Calibrate", &["target", "capture", "calibrate", "camera", "rig"]),
     ("Move", &["home", "mode", "move", "plan", "stop", "arm", "disarm", "clear"]),
-    ("Measure", &["run", "record", "replay", "export", "panel", "depth", "zones", "models"]),
+    ("Measure", &["run", "record", "replay", "export", "panel", "peers", "depth", "zones", "models"]),
     ("Watch a board", &["status", "monitor", "trigger", "log", "link-test"]),
     ("Check this program", &["bench", "soak"]),
     ("Shell", &["completions", "help"]),
@@ -283,6 +285,7 @@ fn execute(cli: Cli, virtual_time: bool) -> Result<(), Failure> {
             Verb::Replay(args) => cmd::replay::run(&args, console).await,
             Verb::Export(args) => cmd::export::run(args, console),
             Verb::Panel(verb) => cmd::panel::run(&verb.args, &verb.options.chosen()?, console).await,
+            Verb::Peers(args) => cmd::peers::run(&args, console).await,
             Verb::Reproduce(args) => cmd::reproduce::run(&args, console).await,
             Verb::Depth(verb) => cmd::depth::run(verb.args, &verb.options.chosen()?, console).await,
             Verb::Models(args) => cmd::models::run(&args, console),

@@ -17,7 +17,7 @@ use vergence_protocol::{
 use vergence_rig::{AxisPosition, HostInstant, Rig};
 
 pub use self::questions::RecordedEvents;
-pub use self::report::{clock_json, describe_clock, pose_json};
+pub use self::report::{clock_json, describe_clock, mark_json, mark_line, pose_json, pose_line, pose_with_times_json};
 pub use self::ways::{Way, straight_ways};
 pub use self::words::{check_range, describe_fault, describe_pose, event_in_words, positions, staying};
 

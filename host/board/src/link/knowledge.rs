@@ -15,7 +15,7 @@ const TRACK_LENGTH: usize = 16_000;
 #[derive(Clone)]
 pub struct BoardKnowledge {
     measured: Arc<Mutex<Measured>>,
-    listener: Arc<Mutex<Option<Listener>>>,
+    listeners: Arc<Mutex<Vec<Listener>>>,
     baud: Option<u32>,
 }
 
@@ -75,7 +75,7 @@ impl BoardKnowledge {
     #[must_use]
     pub fn new(baud: Option<u32>) -> Self {
         let measured = Measured::new(baud, LostEncoders::default());
-        Self { measured: Arc::new(Mutex::new(measured)), listener: Arc::default(), baud }
+        Self { measured: Arc::new(Mutex::new(measured)), listeners: Arc::default(), baud }
     }
 
     /// The latest clock map.
@@ -127,7 +127,7 @@ impl BoardKnowledge {
 
     /// Takes what the board said. A replay does it with what was recorded.
     pub fn note(&self, news: &BoardNews) {
-        if let Some(listener) = self.listener.lock().unwrap_or_else(PoisonError::into_inner).as_mut() {
+        for listener in self.listeners.lock().unwrap_or_else(PoisonError::into_inner).iter_mut() {
             listener(news);
         }
         let mut measured = self.lock();
@@ -148,7 +148,7 @@ impl BoardKnowledge {
 
     /// Calls `listener` with all that the board says from now on, on the link's task: it must be quick.
     pub fn listen(&self, listener: impl FnMut(&BoardNews) + Send + 'static) {
-        *self.listener.lock().unwrap_or_else(PoisonError::into_inner) = Some(Box::new(listener));
+        self.listeners.lock().unwrap_or_else(PoisonError::into_inner).push(Box::new(listener));
     }
 
     /// The speed of the wire in bits per second; `None` where bytes take no time.

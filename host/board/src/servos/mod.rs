@@ -7,6 +7,7 @@
 mod error;
 mod examine;
 mod port;
+mod report;
 mod set_up;
 
 pub use error::ServoError;

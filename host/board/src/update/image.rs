@@ -2,9 +2,10 @@
 
 use std::path::Path;
 
+use serde_json::{Value, json};
 use vergence_image::layout::HARDWARE;
 use vergence_image::{ImageFile, Seal};
-use vergence_protocol::management::{ImageHeader, NATIVE_HARDWARE};
+use vergence_protocol::management::{Identity, ImageHeader, NATIVE_HARDWARE};
 
 /// A signed firmware image: header, signature and code.
 #[derive(Clone, Debug, PartialEq)]
@@ -60,4 +61,24 @@ pub fn hardware_name(id: u32) -> String {
 #[must_use]
 pub fn version_text([major, minor, patch]: [u8; 3]) -> String {
     format!("{major}.{minor}.{patch}")
+}
+
+/// What a board runs, as a sentence.
+#[must_use]
+pub fn identity_words(identity: &Identity) -> String {
+    let (hardware, version) = (hardware_name(identity.hardware), version_text(identity.version));
+    format!("{hardware} runs {version} (build {:016x}), {}", identity.build, identity.boot)
+}
+
+/// What a board runs, for programs.
+#[must_use]
+pub fn identity_json(identity: &Identity) -> Value {
+    json!({
+        "hardware": hardware_name(identity.hardware),
+        "version": version_text(identity.version),
+        "oldest": version_text(identity.oldest),
+        "build": format!("{:016x}", identity.build),
+        "boot": format!("{:?}", identity.boot).to_lowercase(),
+        "capacity": identity.capacity,
+    })
 }

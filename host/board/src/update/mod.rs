@@ -11,7 +11,7 @@ use vergence_protocol::management::{BootState, Identity, ImageHeader, Management
 use vergence_protocol::update::{Upload, UploadState};
 
 pub use self::error::UpdateError;
-pub use self::image::{FirmwareImage, ImageFileError, hardware_name, version_text};
+pub use self::image::{FirmwareImage, ImageFileError, hardware_name, identity_json, identity_words, version_text};
 pub use self::restart::{restart, roll_back};
 
 use self::restart::restart_into;

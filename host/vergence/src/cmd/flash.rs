@@ -5,9 +5,8 @@ mod swd;
 
 use std::path::PathBuf;
 
-use serde_json::{Value, json};
-use vergence_board::{ManagementLink, Port, UpdateError, confirm, hardware_name, restart, roll_back, version_text};
-use vergence_protocol::management::Identity;
+use serde_json::json;
+use vergence_board::{ManagementLink, Port, UpdateError, confirm, identity_json, identity_words, restart, roll_back};
 
 use super::connect::port;
 use crate::cli::CommonOptions;
@@ -72,7 +71,7 @@ async fn change(args: &Args, link: &mut ManagementLink, console: Console) -> Res
     } else {
         restart(link).await?
     };
-    print_identity(&after, console)?;
+    console.say(identity_words(&after))?;
     console.result(&json!({ "before": identity_json(&before), "after": identity_json(&after) }))
 }
 
@@ -82,25 +81,4 @@ async fn connect(common: &CommonOptions) -> Result<ManagementLink, Failure> {
         return Err(Failure::usage("a board in this process ends with it: flash one of 'vergence sim --pty'"));
     }
     Ok(ManagementLink::open(port, common.baud).await?)
-}
-
-fn print_identity(identity: &Identity, console: Console) -> Result<(), Failure> {
-    console.say(format!(
-        "{} runs {} (build {:016x}), {}",
-        hardware_name(identity.hardware),
-        version_text(identity.version),
-        identity.build,
-        identity.boot
-    ))
-}
-
-fn identity_json(identity: &Identity) -> Value {
-    json!({
-        "hardware": hardware_name(identity.hardware),
-        "version": version_text(identity.version),
-        "oldest": version_text(identity.oldest),
-        "build": format!("{:016x}", identity.build),
-        "boot": format!("{:?}", identity.boot).to_lowercase(),
-        "capacity": identity.capacity,
-    })
 }

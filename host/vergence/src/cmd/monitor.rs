@@ -2,11 +2,7 @@
 
 mod live;
 
-use serde_json::Value;
-use vergence_board::{
-    Board, Followed, Follower, Source, clock_json, describe_clock, describe_fault, describe_pose, pose_json,
-};
-use vergence_protocol::PoseReport;
+use vergence_board::{Board, Followed, Follower, Source, describe_clock, pose_json, pose_line, pose_with_times_json};
 use vergence_rig::Rig;
 
 use self::live::Live;
@@ -48,10 +44,10 @@ async fn show(board: &mut Board, left: &mut u64, console: Console) -> Result<(),
                 let lost = board.client().statistics().poses_lost;
                 live.draw(board.rig(), board.pose(), format!("{}; {lost} poses lost", describe_clock(board)));
             }
-            None => console.say(line(board.rig(), board.pose()))?,
+            None => console.say(pose_line(board.rig(), board.pose()))?,
         }
         if console.is_json() {
-            console.result(&json_line(board))?;
+            console.result(&pose_with_times_json(board))?;
         }
         *left -= 1;
     }
@@ -65,7 +61,7 @@ async fn show_followed(driver: &mut Follower, rig: &Rig, left: &mut u64, console
         let Followed::Pose(pose) = driver.next().await? else { continue };
         match &mut live {
             Some(live) => live.draw(rig, &pose, "another vergence drives the board".into()),
-            None => console.say(line(rig, &pose))?,
+            None => console.say(pose_line(rig, &pose))?,
         }
         if console.is_json() {
             console.result(&pose_json(rig, &pose))?;
@@ -73,18 +69,4 @@ async fn show_followed(driver: &mut Follower, rig: &Rig, left: &mut u64, console
         *left -= 1;
     }
     Ok(())
-}
-
-fn line(rig: &Rig, pose: &PoseReport) -> String {
-    let fault = pose.fault.map(|fault| format!("  {}", describe_fault(rig, &fault))).unwrap_or_default();
-    format!("{:10.3} s  {}{fault}", pose.at.0 as f64 * 1e-6, describe_pose(rig, pose))
-}
-
-/// The pose, its time on both clocks, and what the link lost.
-fn json_line(board: &Board) -> Value {
-    let mut line = pose_json(board.rig(), board.pose());
-    line["host_us"] = board.pose_on_host_clock().map(|host| host.us.round()).into();
-    line["clock"] = clock_json(board);
-    line["poses_lost"] = board.client().statistics().poses_lost.into();
-    line
 }

@@ -8,10 +8,12 @@ use clap::{Args as _, FromArgMatches};
 use serde_json::json;
 use vergence_live::MatchingTime;
 use vergence_panel::{Panel, Session, Setting, Shown, listen};
+use vergence_peers::Published;
 use vergence_scene::LensChoice;
 
 use super::connect::connect;
 use super::live_options::LiveOptions;
+use super::peer_options::PublishOptions;
 use super::publish::tell;
 use super::run::{begin_recording, seen_to_the_end, tell_recorded};
 use crate::cli::CommonOptions;
@@ -19,6 +21,7 @@ use crate::console::Console;
 use crate::failure::Failure;
 use crate::interrupt::interrupted;
 use crate::rig_file;
+use crate::stopwatch::started_us;
 
 /// The lease on a simulated board in this process, in milliseconds: a busy computer must not stop it.
 const SIMULATED_LEASE_MS: u16 = 1000;
@@ -49,6 +52,8 @@ pub struct Args {
     record: Option<PathBuf>,
     #[command(flatten)]
     live: LiveOptions,
+    #[command(flatten)]
+    publishing: PublishOptions,
 }
 
 /// `vergence demo --panel`: the same as `vergence panel --port sim --cameras sim --home`.
@@ -92,6 +97,12 @@ pub async fn run(args: &Args, common: &CommonOptions, console: Console) -> Resul
             let live = Some(method.live_loop(&mut rig, events, MatchingTime::Real));
             (panel, Session { driver, board: rig.board, trigger: rig.trigger, live, recording })
         }
+    };
+    let panel = match &args.publishing.publish {
+        Some(name) => {
+            Published::of(&panel, &session, started_us).with_panel(panel, name, args.publishing.peers.read()?)?
+        }
+        None => panel,
     };
     let serving = panel.serve(listener, access)?;
     console.say(format!("the panel is at {}; Ctrl-C ends it", serving.url()))?;

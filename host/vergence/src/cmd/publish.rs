@@ -9,6 +9,7 @@ use vergence_output::{
     LatestFiles, PoseSource, axes_by_images_json, axes_by_images_words, drift_warning, live_bearings_json,
     live_cloud_json, live_cloud_words, pose_told_words,
 };
+use vergence_peers::Publication;
 use vergence_pipeline::Observation;
 use vergence_recording::Recorder;
 use vergence_rig::{Rig, rounded};
@@ -29,8 +30,12 @@ pub struct Publisher {
     pub files: LatestFiles,
     /// Number of results so far.
     pub number: u64,
-    /// Where clouds are recorded too, and the clock of their exposures.
-    pub recorder: Option<(Recorder, HostClock)>,
+    /// The clock of exposures.
+    pub clock: HostClock,
+    /// Where clouds are recorded too.
+    pub recorder: Option<Recorder>,
+    /// Where they are published for other machines.
+    pub publication: Option<Publication>,
     /// How often they come.
     pub pace: Pace,
 }
@@ -46,9 +51,9 @@ impl Publisher {
         match &result.measurement.observation {
             Observation::Points { cloud, pose, moving, by_images } => {
                 self.files.write_cloud(self.number, &cloud.points)?;
-                if let Some((recorder, clock)) = &self.recorder {
-                    recorder.result(clock.now(), result);
-                }
+                let exposed = result.exposed(self.clock.now());
+                self.recorder.iter().for_each(|recorder| recorder.result(self.clock.now(), result));
+                self.publication.iter().for_each(|publication| publication.cloud(exposed, cloud, pose));
                 let by_axes = axes_by_images_words(&self.rig, by_images).map(|told| format!("pose by images: {told}"));
                 let told = by_axes.or_else(|| pose_told_words(cloud)).map(|told| format!("; {told}"));
                 let unseen = result.measurement.unseen.map(|time| time.as_secs_f64());
@@ -63,9 +68,7 @@ impl Publisher {
                 let warning = drift_warning(cloud, self.pose_source()).filter(|_| by_images.is_empty());
                 if let Some(warning) = &warning {
                     self.console.warn(format!("cloud {}: {warning}", self.number));
-                    if let Some((recorder, clock)) = &self.recorder {
-                        recorder.warning(clock.now(), warning);
-                    }
+                    self.recorder.iter().for_each(|recorder| recorder.warning(self.clock.now(), warning));
                 }
                 self.print_json(|| {
                     let told = live_cloud_json(&self.rig, cloud, pose, *moving);

@@ -5,6 +5,7 @@ use std::pin::pin;
 use std::sync::Arc;
 use std::time::Duration;
 
+use vergence_board::HostClock;
 use vergence_live::{LiveError, LiveResult, Measurement, Pace, Totals};
 use vergence_panel::{Panel, Screen, Setting};
 use vergence_pipeline::Method;
@@ -70,7 +71,9 @@ pub async fn run(args: &Args, console: Console) -> Result<(), Failure> {
         lens: None,
         files,
         number: 0,
+        clock: HostClock::start(),
         recorder: None,
+        publication: None,
         pace: Pace::default(),
     };
     let recorded_ms = reader.begun_ns().map(|ns| ns / 1_000_000);

@@ -9,6 +9,7 @@ use std::time::Duration;
 
 use vergence_board::Board;
 use vergence_live::{Ended, Limits, LiveLoop, MatchingTime, Pace, Totals, Tour};
+use vergence_peers::Published;
 use vergence_protocol::{Request, Trigger};
 use vergence_recording::{Recordable, Recorded, Recording};
 
@@ -16,13 +17,13 @@ use self::relink::Relink;
 use super::live_options::LiveOptions;
 use super::taking_options::LiveRig;
 use crate::cli::CommonOptions;
+use crate::cmd::peer_options::PublishOptions;
 use crate::cmd::publish::Publisher;
 use crate::cmd::reconnect::Persistence;
 use crate::cmd::result_options::ResultOptions;
 use crate::console::Console;
 use crate::failure::{Failure, FailureKind};
 use crate::interrupt::interrupted;
-use crate::stopwatch::started_us;
 
 /// Pairs the images of both cameras, matches and triangulates them, again and again: a cloud of the newest pair whenever the
 /// matcher is free, in the frame of the left camera. Nothing queues, and no cloud holds anything of an older one; skipped
@@ -55,6 +56,8 @@ pub struct Args {
     live: LiveOptions,
     #[command(flatten)]
     persistence: Persistence,
+    #[command(flatten)]
+    publishing: PublishOptions,
     /// On a simulated rig: how long matching takes on its clock. Without it, as long as it really takes.
     #[arg(long, value_name = "TIME", value_parser = humantime::parse_duration)]
     match_time: Option<Duration>,
@@ -71,6 +74,9 @@ pub async fn run(args: &Args, common: &CommonOptions, console: Console) -> Resul
     let (mut rig, method) = args.live.connect(&args.cameras, common, args.results.out.as_deref(), console).await?;
     let tour = args.tour.tour(&rig.known)?;
     let recording = args.record.as_deref().map(|folder| begin_recording(folder, &rig)).transpose()?;
+    let board = rig.board.as_ref().map(|board| board.client().knowledge());
+    let published = Published { rig: method.measuring.clone(), board, clock: rig.clock, epoch_us: rig.epoch_us };
+    let publication = args.publishing.start(published)?;
     make_ready(&mut rig, &args.tour, console).await?;
     let is_simulated = rig.simulated.is_some();
     let matching_time = match (is_simulated, args.match_time) {
@@ -93,7 +99,9 @@ pub async fn run(args: &Args, common: &CommonOptions, console: Console) -> Resul
         files,
         number: 0,
         pace: Pace::default(),
-        recorder: recording.as_ref().map(|recording| (recording.recorder.clone(), live.clock)),
+        clock: live.clock,
+        recorder: recording.as_ref().map(|recording| recording.recorder.clone()),
+        publication,
     };
     let mut totals = Totals::default();
     if let (Some(board), Some(trigger)) = (&board, trigger) {
@@ -140,8 +148,8 @@ pub fn seen_to_the_end(ended: Option<Ended>) -> Result<(), Failure> {
 /// Begins a recording of `rig` in `folder`.
 pub fn begin_recording(folder: &Path, rig: &LiveRig) -> Result<Recording, Failure> {
     let board = rig.board.as_ref().map(|board| board.client().knowledge());
-    let (clock, period_us) = (rig.clock, rig.period_us);
-    let recordable = Recordable { rig: &rig.known, board, clock, epoch_us: started_us(clock), period_us };
+    let LiveRig { clock, epoch_us, period_us, .. } = *rig;
+    let recordable = Recordable { rig: &rig.known, board, clock, epoch_us, period_us };
     Ok(Recording::start(folder, recordable)?)
 }
 

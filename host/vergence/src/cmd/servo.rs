@@ -1,8 +1,8 @@
 //! `vergence servo`: makes the servos of a robot ready, over a USB adapter on their bus.
 
-use serde_json::{Value, json};
+use serde_json::json;
 use vergence_board::servos::{
-    Examination, FoundServo, ServoError, ServoPort, Swing, examine, model_name, scan, scan_at, set_baud, set_id, swing,
+    FoundServo, ServoError, ServoPort, Swing, examine, scan, scan_at, set_baud, set_id, swing,
 };
 use vergence_dynamixel::Id;
 use vergence_dynamixel::units::Baud;
@@ -143,74 +143,29 @@ fn scan_bus(args: &Scan, console: Console) -> Result<(), Failure> {
         }
     };
     let servos: Vec<FoundServo> = scanned.iter().flat_map(|(_, scanned)| scanned.servos.clone()).collect();
-    console.say("  id        bit/s  kind          firmware")?;
-    servos.iter().try_for_each(|servo| console.say(row(servo)))?;
+    console.say(FoundServo::HEAD)?;
+    console.say_lines(servos.iter().map(FoundServo::row))?;
     console.say(format!("{} servos answer", servos.len()))?;
-    console.result(&json!({ "servos": servos.iter().map(servo_json).collect::<Vec<_>>() }))?;
+    console.result(&json!({ "servos": servos.iter().map(FoundServo::json).collect::<Vec<_>>() }))?;
     match scanned.iter().find(|(_, scanned)| scanned.garbled > 0) {
         Some((baud, _)) => Err(Failure::check(ServoError::Garbled(baud.bits_per_second()).to_string())),
         None => Ok(()),
     }
 }
 
-fn kind(model: u16) -> String {
-    model_name(model).map_or_else(|| format!("model {model}"), str::to_owned)
-}
-
-fn row(servo: &FoundServo) -> String {
-    let alert = if servo.alert { "  has found an error of its hardware" } else { "" };
-    let FoundServo { id, baud, info, .. } = servo;
-    format!("{:>4}  {:>11}  {:<12}  {:>8}{alert}", id.get(), baud.bits_per_second(), kind(info.model), info.firmware)
-}
-
-fn servo_json(servo: &FoundServo) -> Value {
-    json!({
-        "id": servo.id.get(),
-        "baud": servo.baud.bits_per_second(),
-        "model": servo.info.model,
-        "kind": model_name(servo.info.model),
-        "firmware": servo.info.firmware,
-        "hardware_error": servo.alert,
-    })
-}
-
 fn test(args: &Test, console: Console) -> Result<(), Failure> {
     let mut port = open(&args.line)?;
     let found = examine(&mut port, args.id)?;
-    let Examination { info, volts, celsius, errors, degrees, has_torque, round_trip: [median, longest] } = &found;
-    let errors_in_words = if errors.is_empty() { "none".to_owned() } else { format!("{:#04x}", errors.0) };
-    console.say(format!("{}, firmware {}", kind(info.model), info.firmware))?;
-    console.say(format!("supply {volts:.1} V, {celsius} degrees Celsius, hardware errors {errors_in_words}"))?;
-    console.say(format!("at {degrees:.1} degrees, torque {}", if *has_torque { "on" } else { "off" }))?;
-    let [median, longest] = [median, longest].map(|time| time.as_secs_f64() * 1e3);
-    console.say(format!("a ping takes {median:.1} ms, at most {longest:.1} ms, with adapter and system"))?;
+    console.say_lines(found.lines())?;
     let swung = if args.moves { Some(swing(&mut port, args.id)?) } else { None };
-    if let Some(Swing { errors: [there, back], is_good }) = &swung {
-        let verdict = if *is_good { "good" } else { "more than a degree" };
-        console.say(format!("five degrees and back: off by {there:.2} and {back:.2} degrees, {verdict}"))?;
-    }
-    console.result(&json!({
-        "id": args.id.get(),
-        "model": info.model,
-        "firmware": info.firmware,
-        "volts": volts,
-        "celsius": celsius,
-        "hardware_errors": errors.0,
-        "position_deg": degrees,
-        "torque": has_torque,
-        "round_trip_ms": { "median": median, "longest": longest },
-        "swing_error_deg": swung.as_ref().map(|swung| swung.errors),
-    }))?;
-    if !errors.is_empty() {
-        return Err(Failure::check(format!(
-            "servo {} has found errors of its hardware ({errors_in_words}): see its manual, then take its supply away and give it back",
-            args.id.get()
-        )));
-    }
+    console.say_lines(swung.as_ref().map(Swing::in_words))?;
+    console.result(&found.json(args.id, swung.as_ref()))?;
+    let (id, errors) = (args.id.get(), found.errors_in_words());
     match swung {
-        Some(Swing { is_good: false, .. }) => {
-            Err(Failure::check(format!("servo {} did not go where it was sent", args.id.get())))
-        }
+        _ if !found.errors.is_empty() => Err(Failure::check(format!(
+            "servo {id} has found errors of its hardware ({errors}): see its manual, then take its supply away and give it back"
+        ))),
+        Some(Swing { is_good: false, .. }) => Err(Failure::check(format!("servo {id} did not go where it was sent"))),
         _ => Ok(()),
     }
 }

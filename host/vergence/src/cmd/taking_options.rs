@@ -18,6 +18,7 @@ use crate::console::{Console, shown_on};
 use crate::failure::Failure;
 use crate::rig_file;
 use crate::sim::{Plug, SharedRig, SimulatedRig, lensed};
+use crate::stopwatch::started_us;
 
 /// Number of camera events that may wait; images beyond it are lost, which the gap in their numbers shows.
 const EVENTS_KEPT: usize = 16;
@@ -59,6 +60,8 @@ pub struct LiveRig {
     pub trigger: Option<Trigger>,
     /// The clock of images and pulses.
     pub clock: HostClock,
+    /// The time at which that clock started, in microseconds since 1970.
+    pub epoch_us: u64,
     /// Time between pulses of the trigger in microseconds; `None` where the cameras run freely.
     pub period_us: Option<f64>,
 }
@@ -111,7 +114,8 @@ impl TakingOptions {
         let trigger = period_us.map(|period| Trigger::Every { period_us: period.round() as u32 });
         let (mechanics, plug) = mechanics.unzip();
         let simulated = mechanics.zip(lenses);
-        Ok((LiveRig { known, board, plug, simulated, trigger, clock, period_us }, prepared))
+        let epoch_us = started_us(clock);
+        Ok((LiveRig { known, board, plug, simulated, trigger, clock, epoch_us, period_us }, prepared))
     }
 
     /// Starts both cameras, and unplugs simulated ones as the options say. Their events arrive at the result.

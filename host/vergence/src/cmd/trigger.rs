@@ -2,11 +2,9 @@
 
 use std::time::Duration;
 
-use serde_json::json;
 use tokio::time::timeout;
-use vergence_board::Board;
-use vergence_protocol::{Request, Trigger, TriggerMark};
-use vergence_rig::{AxisPosition, axes_json, rounded};
+use vergence_board::{Board, mark_json, mark_line};
+use vergence_protocol::{Request, Trigger};
 
 use super::camera_options::parse_rate;
 use super::connect::connect;
@@ -75,28 +73,8 @@ async fn listen(
         received.lost += u64::from(mark.seq.wrapping_sub(received.next));
         received.marks += 1;
         received.next = mark.seq.wrapping_add(1);
-        print_mark(board, &mark, console)?;
+        console.say(mark_line(board.rig(), &mark))?;
+        console.result(&mark_json(board, &mark))?;
     }
     Ok(())
-}
-
-fn print_mark(board: &Board, mark: &TriggerMark, console: Console) -> Result<(), Failure> {
-    let rig = board.rig();
-    let positions: Vec<AxisPosition> =
-        rig.axes.iter().zip(&mark.counts).map(|(axis, &counts)| axis.position_at(counts)).collect();
-    let axes = rig.axes.iter().zip(&positions).map(|(axis, position)| format!("{} {position}", axis.name));
-    let host = board.client().clock_map().host_at(mark.at);
-    console.say(format!(
-        "pulse {:5}  {:12.6} s  {}",
-        mark.seq,
-        mark.at.0 as f64 * 1e-6,
-        axes.collect::<Vec<_>>().join("  ")
-    ))?;
-    console.result(&json!({
-        "seq": mark.seq,
-        "board_us": mark.at.0,
-        "host_us": host.map(|host| rounded(host.us)),
-        "host_error_us": host.map(|host| rounded(host.error_us)),
-        "axes": axes_json(rig, &positions),
-    }))
 }

@@ -4,9 +4,8 @@ use std::cell::Cell;
 
 use indicatif::ProgressBar;
 use serde_json::json;
-use vergence_board::{FirmwareImage, ManagementLink, UpdateEvent, Updated, update};
+use vergence_board::{FirmwareImage, ManagementLink, UpdateEvent, Updated, identity_json, identity_words, update};
 
-use super::{identity_json, print_identity};
 use crate::console::Console;
 use crate::failure::Failure;
 use crate::firmware::header_json;
@@ -36,7 +35,7 @@ pub async fn run(
     };
     unsaid?;
     let Updated { before, after, sent_from, link_losses, seconds } = updated;
-    print_identity(&after, console)?;
+    console.say(identity_words(&after))?;
     if !confirm {
         console.say("keep it with 'vergence flash --confirm'; the next start goes back otherwise")?;
     }
@@ -61,7 +60,7 @@ enum Stage {
 
 fn show(event: &UpdateEvent, stage: &Cell<Stage>, bar: &ProgressBar, console: Console) -> Result<(), Failure> {
     match event {
-        UpdateEvent::Begins(before) => print_identity(before, console),
+        UpdateEvent::Begins(before) => console.say(identity_words(before)),
         UpdateEvent::Progress { sent, .. } => {
             stage.set(Stage::Sending(*sent));
             bar.set_position((*sent).into());

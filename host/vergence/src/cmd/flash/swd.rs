@@ -4,12 +4,12 @@ use std::path::Path;
 use std::time::Duration;
 
 use serde_json::{Value, json};
-use vergence_board::{FlashContents, ProbeError, ProbeRs, hardware_name};
+use vergence_board::{FlashContents, ProbeError, ProbeRs, hardware_name, identity_json, identity_words};
 use vergence_image::layout::HARDWARE;
 use vergence_protocol::management::Identity;
 use vergence_sim::{check_boot_loader, is_elf};
 
-use super::{connect, identity_json, print_identity};
+use super::connect;
 use crate::cli::CommonOptions;
 use crate::console::Console;
 use crate::failure::Failure;
@@ -24,7 +24,7 @@ pub async fn run(file: &Path, probe: Option<&str>, common: &CommonOptions, conso
         check_boot_loader(&content).map_err(|error| Failure::input(file, error))?;
         write(probe, console, |probe_rs| probe_rs.download_elf(file))?;
         let board = ask(common).await?;
-        print_identity(&board, console)?;
+        console.say(identity_words(&board))?;
         return console.result(&json!({ "image": Value::Null, "after": identity_json(&board) }));
     }
     let image = read_image(file)?;
@@ -38,7 +38,7 @@ pub async fn run(file: &Path, probe: Option<&str>, common: &CommonOptions, conso
     let flash = FlashContents::of(&image).ok_or_else(|| Failure::input(file, "the image is too long"))?;
     write(probe, console, |probe_rs| probe_rs.download_image(&flash))?;
     let board = ask(common).await?;
-    print_identity(&board, console)?;
+    console.say(identity_words(&board))?;
     console.result(&json!({ "image": header_json(image.header()), "after": identity_json(&board) }))?;
     if board.build == image.header().build {
         return Ok(());
