@@ -73,7 +73,16 @@ fn axes_that_moved_when_the_link_ended_are_told_by_the_images() {
     assert!(output.status.success(), "{said}");
     let clouds = clouds(&lines);
     for cloud in &clouds {
-        println!("{} {} {}", cloud["moving"], cloud["axes_by_images"], cloud["axes"]);
+        let told = &cloud["pose_source"];
+        println!(
+            "{} {} {}; {} points, {} of the matches agree, {} pairs",
+            cloud["moving"],
+            cloud["axes_by_images"],
+            cloud["axes"],
+            cloud["points"],
+            told["agreeing_matches"],
+            told["pairs"]
+        );
     }
     let by_images = |cloud: &&&Value| cloud["axes_by_images"]["separation"].is_object();
     let told: Vec<_> = clouds.iter().filter(by_images).collect();

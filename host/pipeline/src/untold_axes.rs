@@ -78,8 +78,10 @@ impl UntoldAxes {
         let readings = self.within(rig, Some(NEAR));
         let near = best_look(images, (rig, search), &readings, matcher)?;
         let is_near = |look: &Look| {
-            let off = |&axis: &usize| (look.joints.counts[axis] - readings.counts[axis]).abs();
-            self.axes.iter().all(|axis| off(axis) <= MOST_OFF * readings.sigma[*axis])
+            let told = axis_estimates(rig, &readings, &look.fused);
+            let is_near =
+                |&axis: &usize| (told[axis].counts - readings.counts[axis]).abs() <= MOST_OFF * readings.sigma[axis];
+            self.axes.iter().all(is_near)
         };
         match near.filter(|look| look.fused.agreeing >= AGREEING && is_near(look)) {
             Some(look) => Ok(Some(look.joints)),
