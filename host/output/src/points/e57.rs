@@ -6,9 +6,7 @@ use ::e57::{E57Writer, Extension, Record, RecordDataType, RecordName, RecordValu
 use sha2::{Digest, Sha256};
 use vergence_pipeline::ColouredPoint;
 
-use super::cells::{
-    Cell, EXTRAPOLATED_COLUMN, TRACK_COLUMN, dense_cells, dense_columns, sparse_cells, sparse_columns,
-};
+use super::cells::{Cell, EXTRAPOLATED_COLUMN, TRACK_COLUMN, dense_cells, dense_columns, sparse_cells, sparse_columns};
 use super::columns::{ABOUT_COVARIANCES, ABOUT_SCORE, DenseRow};
 
 /// Columns before those of the extension: x, y, z and the colour.
@@ -17,7 +15,8 @@ const OWN: usize = 4;
 const MM: f64 = 1e-3;
 /// Prefix and name of the extension.
 const EXTENSION: [&str; 2] = ["vergence", "urn:vergence:cloud:1"];
-const ABOUT: &str = "the left camera's frame: x right, y down, z forward, in metres; in the extension pixels, millimetres and mm^2";
+const ABOUT: &str =
+    "the left camera's frame: x right, y down, z forward, in metres; in the extension pixels, millimetres and mm^2";
 
 /// The columns of a PLY file of these points.
 pub fn sparse_e57(points: &[ColouredPoint]) -> ::e57::Result<Vec<u8>> {
@@ -104,7 +103,8 @@ mod tests {
         assert_eq!(bytes, dense_e57(&[row]).expect("a file"));
         let mut reader = E57Reader::new(Cursor::new(bytes)).expect("it is read");
         let cloud = reader.pointclouds().first().cloned().expect("a cloud");
-        let points: Vec<_> = reader.pointcloud_raw(&cloud).expect("it is read").map(|point| point.expect("a point")).collect();
+        let points: Vec<_> =
+            reader.pointcloud_raw(&cloud).expect("it is read").map(|point| point.expect("a point")).collect();
         assert_eq!(points.len(), 1);
         let expected = [RecordValue::Double(1.25), RecordValue::Double(-0.0025), RecordValue::Double(9000.0)];
         assert_eq!(points[0][..3], expected);

@@ -104,7 +104,9 @@ impl CloudFormat {
         match (self, encoding) {
             (Self::Ply, _) => Ok(ply(points, encoding)),
             (Self::Pcd, _) => Ok(pcd(points, encoding)),
-            (Self::Las, CloudEncoding::Binary) => sparse_las(points).map_err(|error| CloudError::Encoder(error.to_string())),
+            (Self::Las, CloudEncoding::Binary) => {
+                sparse_las(points).map_err(|error| CloudError::Encoder(error.to_string()))
+            }
             (Self::E57, CloudEncoding::Binary) => {
                 sparse_e57(points).map_err(|error| CloudError::Encoder(error.to_string()))
             }
