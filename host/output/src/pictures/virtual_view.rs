@@ -147,7 +147,7 @@ fn weights(t: f32) -> [f32; 4] {
 mod tests {
     #![allow(clippy::expect_used, reason = "a test may fail")]
 
-    use vergence_vision::Face;
+    use vergence_vision::{Face, Pupil};
 
     use super::*;
 
@@ -188,6 +188,20 @@ mod tests {
         assert!(mask.pixels().zip(image.pixels()).all(|(mask, colour)| (mask.0[0] > 0) == (colour.0 == [200; 3])));
         // The half towards the optical axis is the one that is seen.
         assert!(mask.get_pixel(99, 50).0[0] > 0 && mask.get_pixel(0, 50).0[0] == 0);
+    }
+
+    /// Seen from 500 mm, a point is in the view of a lens whose pupil moves where it is in that of a pinhole.
+    #[test]
+    fn a_moving_pupil_is_heeded() {
+        let lens = lens().with_pupil(Pupil::from_mm([3.0, 0.0])).expect("a lens");
+        let view = VirtualView::new(Face::Left.camera_from_view(), Angle::from_deg(90.0), 100).expect("a view");
+        let at = Pixel { u: 70.0, v: 40.0 };
+        let seen = ViewMap::new(&view, &lens).original(70, 40).expect("the camera sees it");
+        let ray = view.ray(at).expect("a ray");
+        let expected = lens.project_point(&ray.at(500.0)).expect("in the field");
+        assert!((seen.u - expected.u).hypot(seen.v - expected.v) < 1e-9);
+        let far = lens.project(&ray).expect("in the field");
+        assert!((seen.u - far.u).hypot(seen.v - far.v) > 0.05, "the pupil moves");
     }
 
     #[test]
