@@ -65,10 +65,11 @@ import json, sys
 import numpy as np
 import pye57
 from pye57 import libe57
-# libE57Format reads an extension's columns as those of the standard; pye57 must be told their types.
-image = pye57.E57(sys.argv[1]).image_file
-cloud = libe57.StructureNode(libe57.VectorNode(image.root()["data3D"])[0])
-points = libe57.CompressedVectorNode(cloud["points"])
+# pye57 itself leaves out columns of extensions; libE57Format, which it wraps, reads them.
+opened = pye57.E57(sys.argv[1])
+image = opened.image_file
+cloud = image.root()["data3D"][0]
+points = cloud["points"]
 fields = libe57.StructureNode(points.prototype())
 names = [fields.get(index).elementName() for index in range(fields.childCount())]
 count = points.childCount()
@@ -77,7 +78,7 @@ buffers = libe57.VectorSourceDestBuffer()
 for name in names:
     buffers.append(libe57.SourceDestBuffer(image, name, columns[name], count, True, True))
 assert points.reader(buffers).read() == count
-about = libe57.StringNode(cloud["description"]).value()
+about = cloud["description"].value()
 assert about.startswith("the left camera's frame") and "in metres" in about, about
 for name in ["cartesianX", "cartesianY", "cartesianZ"]:
     columns[name] *= 1000

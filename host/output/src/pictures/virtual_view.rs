@@ -48,13 +48,13 @@ impl ViewMap {
         seen as f64 / self.positions.len().max(1) as f64
     }
 
-    /// Where the middle of a pixel of the view is in the camera's image; `None` where the camera does not see.
+    /// Where the middle of a pixel of the view is in the camera's image, the mean of its samples; `None` where the camera does not see all of it.
     #[must_use]
     pub fn original(&self, x: u32, y: u32) -> Option<Pixel> {
-        let middle = self.samples / 2;
-        let row = (y * self.samples + middle) as usize * (self.size.width * self.samples) as usize;
-        let [u, v] = *self.positions.get(row + (x * self.samples + middle) as usize)?;
-        (!u.is_nan()).then_some(Pixel { u, v })
+        let count = f64::from(self.samples * self.samples);
+        let mean = |axis: usize| self.samples_of(x, y).map(|at| at[axis]).sum::<f64>() / count;
+        let at = Pixel { u: mean(0), v: mean(1) };
+        (!at.u.is_nan()).then_some(at)
     }
 
     /// White where the camera sees all of a pixel, black elsewhere.
@@ -147,7 +147,7 @@ fn weights(t: f32) -> [f32; 4] {
 mod tests {
     #![allow(clippy::expect_used, reason = "a test may fail")]
 
-    use vergence_vision::Face;
+    use vergence_vision::{Face, Pupil};
 
     use super::*;
 
@@ -188,6 +188,20 @@ mod tests {
         assert!(mask.pixels().zip(image.pixels()).all(|(mask, colour)| (mask.0[0] > 0) == (colour.0 == [200; 3])));
         // The half towards the optical axis is the one that is seen.
         assert!(mask.get_pixel(99, 50).0[0] > 0 && mask.get_pixel(0, 50).0[0] == 0);
+    }
+
+    /// Seen from 500 mm, a point is in the view of a lens whose pupil moves where it is in that of a pinhole.
+    #[test]
+    fn a_moving_pupil_is_heeded() {
+        let lens = lens().with_pupil(Pupil::from_mm([3.0, 0.0])).expect("a lens");
+        let view = VirtualView::new(Face::Left.camera_from_view(), Angle::from_deg(90.0), 183).expect("a view");
+        let at = Pixel { u: 140.0, v: 80.0 };
+        let seen = ViewMap::new(&view, &lens).original(140, 80).expect("the camera sees it");
+        let ray = view.ray(at).expect("a ray");
+        let expected = lens.project_point(&ray.at(500.0)).expect("in the field");
+        assert!((seen.u - expected.u).hypot(seen.v - expected.v) < 1e-9);
+        let far = lens.project(&ray).expect("in the field");
+        assert!((seen.u - far.u).hypot(seen.v - far.v) > 0.05, "the pupil moves");
     }
 
     #[test]
