@@ -16,11 +16,12 @@ use std::process::{Command, Output};
 use common::pairs::{human, write_rig};
 use common::{Simulator, fails_with, run, run_json, small_bench_toml, text, vergence};
 use image::RgbImage;
+use nalgebra::UnitQuaternion;
 use serde_json::{Value, json};
 use tempfile::TempDir;
-use vergence_rig::Rig;
+use vergence_rig::{Rig, RigCalibration};
 use vergence_sim::{Room, RoomCamera};
-use vergence_vision::Side;
+use vergence_vision::{Angle, Left, Length, Right, Side, Transform};
 
 /// A folder with the rig file of a pair without axes, whose cameras have 320 x 320 pixels and stand as in the mode `human`.
 struct Pair {
@@ -32,8 +33,7 @@ impl Pair {
     fn new() -> Self {
         let rig = Rig::from_toml(&small_bench_toml()).expect("the bench");
         let folder = tempfile::tempdir().expect("a folder");
-        let pair = Rig::fixed_pair("pair", (rig.left_camera, rig.right_camera), human(&rig).left_from_right);
-        write_rig(&pair, &folder.path().join("pair.toml"));
+        write_rig(&fixed(&rig, human(&rig).left_from_right), &folder.path().join("pair.toml"));
         Self { folder, rig }
     }
 
@@ -60,6 +60,12 @@ impl Pair {
         }
         folders
     }
+}
+
+/// A calibrated pair without axes, with the lenses of `rig`.
+fn fixed(rig: &Rig, left_from_right: Transform<Left, Right>) -> Rig {
+    let calibration = RigCalibration::Sigmas { rotation: Angle::from_deg(0.05), translation: Length::from_mm(0.2) };
+    Rig { calibration, ..Rig::fixed_pair("pair", (rig.left_camera, rig.right_camera), left_from_right) }
 }
 
 /// The kernel's stand-in, and a folder in the place of /dev.
@@ -222,7 +228,7 @@ fn folders_and_videos_are_played_as_cameras() {
     // A recording of them holds every image of both.
     let out = pair.path("recording");
     let recorded = run_json(&["record", "--cameras", &left, &right, "--rig", &rig, "--out", &out, "--json"]);
-    assert_eq!((&recorded["images"], &recorded["left_out"]), (&json!(16), &json!(0)));
+    assert_eq!((&recorded["images"], &recorded["left_out"]), (&json!(16), &json!(0)), "{recorded}");
     // The same as videos.
     let videos = ["left", "right"].map(|side| pair.path(&format!("{side}.y4m")));
     for (video, image) in videos.iter().zip(pair.photographs()) {
@@ -320,34 +326,62 @@ fn the_udev_rule_is_printed_as_it_is_shipped() {
     assert_eq!(text(&run(&["devices", "--rule"]).stdout), shipped);
 }
 
-/// The calibration that took the pictures fits them; one whose right camera is turned by two degrees does not.
+/// The calibration that took the pictures fits them; one whose right camera is turned by a third of a degree or by two degrees does not.
 #[test]
 fn doctor_says_whether_the_calibration_fits_the_pictures() {
     let pair = Pair::new();
-    let [left, right] = pair.folders(40, |number| format!("{number:03}.png"));
-    let turned = {
-        let by = nalgebra::UnitQuaternion::from_euler_angles(2f64.to_radians(), 0.0, 0.0);
+    let [left, right] = pair.folders(60, |number| format!("{number:03}.png"));
+    let turned = |degrees: f64| {
+        let by = UnitQuaternion::from_euler_angles(degrees.to_radians(), 0.0, 0.0);
         let pose = human(&pair.rig).left_from_right;
-        let pose = vergence_vision::Transform::new(pose.rotation() * by, pose.origin().mm());
-        let rig = Rig::fixed_pair("turned", (pair.rig.left_camera, pair.rig.right_camera), pose);
-        let file = pair.folder.path().join("turned.toml");
-        write_rig(&rig, &file);
+        let file = pair.folder.path().join(format!("turned{degrees}.toml"));
+        write_rig(&fixed(&pair.rig, Transform::new(pose.rotation() * by, pose.origin().mm())), &file);
         file.display().to_string()
     };
     let doctor = |rig: &str| {
         let out = pair.path("");
         let output = run(&["doctor", "--cameras", &left, &right, "--rig", rig, "--out", &out, "--json"]);
-        let result: Value =
-            serde_json::from_slice(&output.stdout).unwrap_or_else(|_| panic!("{}", text(&output.stderr)));
+        let result = serde_json::from_slice(&output.stdout).unwrap_or_else(|_| panic!("{}", text(&output.stderr)));
         (output.status.code(), result)
     };
-    let (_, fits) = doctor(&pair.path("pair.toml"));
-    assert_eq!(verdicts(&fits, "fit"), ["pass"], "{fits:#}");
-    assert_eq!(verdicts(&fits, "age"), ["pass"], "{fits:#}");
+    let (_, fits): (_, Value) = doctor(&pair.path("pair.toml"));
+    println!("{fits:#}");
+    assert_eq!((verdicts(&fits, "fit"), verdicts(&fits, "age")), (vec!["pass".into()], vec!["pass".into()]));
     for check in ["udev", "disk", "host", "models"] {
-        assert_eq!(verdicts(&fits, check).len(), 1, "{check}: {fits:#}");
+        assert_eq!(verdicts(&fits, check).len(), 1, "{check}");
     }
     assert_eq!(verdicts(&fits, "port"), Vec::<String>::new(), "a pair without axes needs no board");
-    let (code, turned) = doctor(&turned);
-    assert_eq!((code, verdicts(&turned, "fit")), (Some(1), vec!["fail".into()]), "{turned:#}");
+    for degrees in [0.33, 2.0] {
+        let (code, result) = doctor(&turned(degrees));
+        assert_eq!((code, verdicts(&result, "fit")), (Some(1), vec!["fail".into()]), "{degrees}: {result:#}");
+    }
+}
+
+/// A target that is shown for half a second in each of three places, in a folder that is played.
+#[test]
+fn a_folder_of_target_images_is_captured_from() {
+    let work = tempfile::tempdir().expect("a folder");
+    let path = |name: &str| work.path().join(name).display().to_string();
+    write_rig(&common::pairs::small_bench(), Path::new(&path("rig.toml")));
+    let rig = path("rig.toml");
+    let line = |cameras: &str, out: &str, views: &str| {
+        let line =
+            ["capture", "--cameras", cameras, "--corners", "9x6", "--square", "20mm", "--rig", &rig, "--out", out];
+        let output =
+            run(&[&line[..], &["--views", views, "--json"], if cameras == "sim" { &["--mono"] } else { &[] }].concat());
+        assert!(output.status.success(), "{}", text(&output.stderr));
+        serde_json::from_slice::<Value>(&output.stdout).expect("JSON")
+    };
+    let (shown, film, out) = (path("shown"), path("film"), path("out"));
+    assert_eq!(line("sim", &shown, "3")["views"], 3);
+    std::fs::create_dir(&film).expect("a folder");
+    for (place, number) in (0..3).flat_map(|place| (0..5).map(move |number| (place, number))) {
+        std::fs::copy(format!("{shown}/left{place:03}.png"), format!("{film}/{}.png", place * 5 + number))
+            .expect("copied");
+    }
+    let captured = line(&film, &out, "9");
+    assert_eq!(
+        (&captured["views"], &captured["complete"], &captured["lens"]),
+        (&json!(3), &json!(false), &Value::Null)
+    );
 }

@@ -19,6 +19,8 @@ use crate::{Camera, CameraError, CameraImage};
 /// Time from opening the cameras to their first images: both are read by then.
 const LEAD: Duration = Duration::from_millis(300);
 
+/// Images that come later than this are skipped, or later than four are taken: so many wait in the buffers of a camera of the kernel.
+const LATEST: Duration = Duration::from_millis(400);
 /// Images of a second, where files are numbered and nobody says it.
 pub const PLAYED_HZ: f64 = 10.0;
 /// Images farther apart than this are not of one film: the unit of their time stamps is another than it seems.
@@ -160,8 +162,9 @@ impl PlayedCamera {
 
 impl Camera for PlayedCamera {
     fn grab(&mut self) -> Result<Option<CameraImage>, CameraError> {
-        let (now, start, period) = (Arc::clone(&self.now), self.start, self.period);
-        let late = |at: Duration| now() > start + at + period;
+        let (now, start) = (Arc::clone(&self.now), self.start);
+        let patience = LATEST.min(4 * self.period);
+        let late = |at: Duration| now() > start + at + patience;
         loop {
             let Some((at, name, image)) = self.next(late)? else { return Ok(None) };
             let seq = self.seq;
@@ -240,13 +243,13 @@ mod tests {
             Arc::new(move || *time.lock().expect("a clock"))
         };
         let mut camera = Played::open(&[&folder], 10.0, &clock).expect("a folder").cameras.remove(0);
-        *time.lock().expect("a clock") = LEAD + Duration::from_millis(250);
+        *time.lock().expect("a clock") = LEAD + Duration::from_millis(590);
         let taken = camera.grab().expect("images").expect("an image");
         let due = (LEAD + Duration::from_millis(200)).as_secs_f64() * 1e6;
         assert_eq!((taken.name.as_str(), taken.seq, camera.missed()), ("2", Some(2), 2));
         assert!((taken.exposed_at.expect("a time").us - due).abs() < 1.0);
         assert_eq!(taken.image.get_pixel(0, 0).0, [2; 3]);
-        *time.lock().expect("a clock") = Duration::from_secs(1);
+        *time.lock().expect("a clock") = Duration::from_secs(2);
         assert!(camera.grab().expect("no error").is_none() && camera.missed() == 3);
         std::fs::remove_dir_all(&folder).expect("removed");
     }
