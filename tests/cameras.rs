@@ -146,7 +146,7 @@ fn devices_lists_what_cameras_can_do() {
         let formats = camera["formats"].as_array().expect("formats");
         formats.iter().find(|format| format["code"] == code).unwrap_or_else(|| panic!("{code}: {camera}"))
     };
-    assert_eq!(format("YUYV")["sizes"][0], "320x320 at 30, 15 Hz");
+    assert_eq!(format("YUYV")["sizes"][0], "320x320 at 10, 5 Hz");
     assert_eq!((&format("GREY")["understood"], &format("BG10")["understood"]), (&json!(true), &json!(false)));
     assert_eq!(camera["trigger_controls"][0], json!({ "control": "Trigger Mode", "value": 0 }));
     let said = text(&kernel.run(&["devices"], &[]).stdout);
@@ -165,14 +165,14 @@ fn a_camera_test_reads_both_cameras_by_the_kernel_s_rules() {
     for side in ["left", "right"] {
         let figures = &result["figures"][side];
         let rate = figures["rate_hz"].as_f64().expect("a rate");
-        assert!((rate - 30.0).abs() < 1.0 && figures["lost"] == 0, "{figures}");
-        // 320 x 320 bytes of grey, 30 times a second.
-        assert!((figures["mb_per_s"].as_f64().expect("bytes") - 3.07).abs() < 0.05, "{figures}");
+        assert!((rate - 10.0).abs() < 0.3 && figures["lost"] == 0, "{figures}");
+        // 320 x 320 bytes of grey, ten times a second.
+        assert!((figures["mb_per_s"].as_f64().expect("bytes") - 1.024).abs() < 0.02, "{figures}");
         assert!((figures["mean_level"].as_f64().expect("a level") - 120.0).abs() < 3.0, "{figures}");
     }
     let difference = result["figures"]["difference"]["median_ms"].as_f64().expect("pairs");
     assert!((difference - 2.0).abs() < 0.2, "the second camera is 2 ms late: {difference}");
-    assert!((result["figures"]["bound_ms"].as_f64().expect("a bound") - 0.49 / 30e-3).abs() < 0.1);
+    assert!((result["figures"]["bound_ms"].as_f64().expect("a bound") - 49.0).abs() < 0.1);
     assert!(result["checks"].as_array().expect("checks").iter().all(|check| check["verdict"] != "fail"));
     let log = kernel.log("video0");
     let at =
@@ -193,7 +193,7 @@ fn a_camera_test_finds_lost_images_and_a_lens_cap() {
     assert_eq!(verdicts(&result, "images"), ["fail", "fail"], "{result:#}");
     assert_eq!(verdicts(&result, "exposure"), ["pass", "fail"], "{result:#}");
     let lost = result["figures"]["left"]["lost"].as_u64().expect("a count");
-    assert!((4..=8).contains(&lost), "{lost}");
+    assert!((1..=3).contains(&lost), "{lost}");
 }
 
 /// What a real rig without axes does: it pairs the images of both cameras by their stamps, and measures; then the cameras are unplugged.
@@ -202,7 +202,7 @@ fn run_measures_with_cameras_of_the_kernel_and_outlives_their_loss() {
     let kernel = Kernel::new("run");
     let rig = kernel.pair.path("pair.toml");
     let line = ["run", "--cameras", "/dev/video0", "/dev/video1", "--rig", &rig, "--for", "20s", "--json"];
-    let output = kernel.run(&line, &[("FAKE_V4L_VANISH", "40")]);
+    let output = kernel.run(&line, &[("FAKE_V4L_VANISH", "25")]);
     let (said, warned) = (text(&output.stdout), text(&output.stderr));
     assert!(warned.contains("the left camera is dead") && warned.contains("No such device"), "{warned}");
     assert_eq!(output.status.code(), Some(3), "both are dead in the end: {warned}");
@@ -357,7 +357,7 @@ fn doctor_says_whether_the_calibration_fits_the_pictures() {
     }
 }
 
-/// A target that is shown for half a second in each of three places, in a folder that is played.
+/// A target that is shown for a second and a half in each of three places, in a folder that is played.
 #[test]
 fn a_folder_of_target_images_is_captured_from() {
     let work = tempfile::tempdir().expect("a folder");
@@ -375,8 +375,8 @@ fn a_folder_of_target_images_is_captured_from() {
     let (shown, film, out) = (path("shown"), path("film"), path("out"));
     assert_eq!(line("sim", &shown, "3")["views"], 3);
     std::fs::create_dir(&film).expect("a folder");
-    for (place, number) in (0..3).flat_map(|place| (0..5).map(move |number| (place, number))) {
-        std::fs::copy(format!("{shown}/left{place:03}.png"), format!("{film}/{}.png", place * 5 + number))
+    for (place, number) in (0..3).flat_map(|place| (0..15).map(move |number| (place, number))) {
+        std::fs::copy(format!("{shown}/left{place:03}.png"), format!("{film}/{}.png", place * 15 + number))
             .expect("copied");
     }
     let captured = line(&film, &out, "9");

@@ -170,3 +170,14 @@ fn verbs_use_no_other_verbs_files() {
     }
     assert!(found.is_empty(), "{found:#?}");
 }
+
+#[test]
+fn every_test_finds_real_data_by_one_function() {
+    let tests =
+        ["host", "hil-sim", "protocol", "firmware", "tests"].map(|folder| sources(&root().join(folder))).concat();
+    let is_test = |path: &Path| path.components().any(|part| part.as_os_str() == "tests");
+    let asks = |text: &str| text.contains(concat!("var", "_os(\"VERGENCE_SHARED"));
+    let asking: Vec<_> =
+        tests.iter().filter(|(path, text)| is_test(path) && asks(text)).map(|(path, _)| path).collect();
+    assert!(asking.len() == 1 && asking[0].ends_with("tests/common/data.rs"), "{asking:?}");
+}

@@ -380,25 +380,3 @@ fn the_boards_files_do_not_import_each_other_in_a_ring() {
     }
     assert!(left.is_empty(), "in or above a ring: {left:?}");
 }
-
-/// The Rust files below `folder`.
-fn sources(folder: &Path) -> Vec<std::path::PathBuf> {
-    let entries = std::fs::read_dir(folder).expect("the folder is there").map(|entry| entry.expect("an entry").path());
-    let nested = entries.flat_map(|path| match path.is_dir() {
-        true if path.ends_with("target") => Vec::new(),
-        true => sources(&path),
-        false => vec![path],
-    });
-    nested.filter(|path| path.extension().is_some_and(|ending| ending == "rs")).collect()
-}
-
-#[test]
-fn every_test_finds_real_data_by_one_function() {
-    let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("../..");
-    let tests = ["host", "hil-sim", "protocol", "firmware", "tests"].map(|folder| sources(&root.join(folder))).concat();
-    let tests: Vec<_> = tests.iter().filter(|path| path.components().any(|part| part.as_os_str() == "tests")).collect();
-    let asks =
-        |path: &Path| std::fs::read_to_string(path).expect("a text").contains(concat!("var", "_os(\"VERGENCE_SHARED"));
-    let asking: Vec<_> = tests.iter().filter(|path| asks(path)).collect();
-    assert!(asking.len() == 1 && asking[0].ends_with("tests/common/data.rs"), "{asking:?}");
-}

@@ -45,6 +45,13 @@ pub struct Running<'a> {
 /// Measures the next pair, and compares it with what the calibration states.
 pub async fn check_fit(running: Running<'_>) -> Finding {
     let Running { rig, timing, events, marks, board, trigger, clock: (clock, period_us), stopwatch } = running;
+    if board.is_some_and(|board| !board.is_referenced()) {
+        return Finding::warn(
+            "fit",
+            "the axes do not know where they are, so that nothing says whether the calibration fits",
+            "vergence home",
+        );
+    }
     let mut live = LiveLoop {
         rig,
         matcher: Arc::new(GuidedMatcher::default()),
