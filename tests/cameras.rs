@@ -5,7 +5,8 @@
     clippy::expect_used,
     clippy::panic,
     clippy::print_stdout,
-    reason = "a test fails loudly and shows its figures"
+    clippy::disallowed_methods,
+    reason = "a test fails loudly, shows its figures, and looks at the clock"
 )]
 
 mod common;

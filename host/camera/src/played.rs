@@ -95,7 +95,7 @@ impl Played {
             }
             paths => (paths.iter().map(|path| image_files(path)).collect::<Result<Vec<_>, _>>()?, Vec::new()),
         };
-        let mut timed = lists.into_iter().map(|files| times(files, rate)).collect::<Result<Vec<_>, _>>()?;
+        let mut timed = lists.iter().map(|files| times(files, rate)).collect::<Result<Vec<_>, _>>()?;
         let first = timed.iter().flatten().map(|(at, _)| *at).min().unwrap_or_default();
         timed.iter_mut().flatten().for_each(|(at, _)| *at -= first);
         let steps = timed.iter().flat_map(|files| files.windows(2).map(|pair| pair[1].0.saturating_sub(pair[0].0)));
@@ -109,14 +109,14 @@ impl Played {
 ///
 /// # Errors
 /// As there.
-pub fn play(names: &[String], rate: f64, now: SharedTime) -> Result<Vec<Box<dyn Camera>>, CameraError> {
+pub fn play(names: &[String], rate: f64, now: &SharedTime) -> Result<Vec<Box<dyn Camera>>, CameraError> {
     let paths: Vec<&Path> = names.iter().map(Path::new).collect();
-    let cameras = Played::open(&paths, rate, &now)?.cameras.into_iter();
+    let cameras = Played::open(&paths, rate, now)?.cameras.into_iter();
     Ok(cameras.map(|camera| Box::new(camera) as Box<dyn Camera>).collect())
 }
 
 /// The files in the order of the times in their names, by time stamp or by number.
-fn times(files: Vec<PathBuf>, rate: f64) -> Result<Vec<(Duration, PathBuf)>, CameraError> {
+fn times(files: &[PathBuf], rate: f64) -> Result<Vec<(Duration, PathBuf)>, CameraError> {
     let by_number = |file: &Path| Duration::try_from_secs_f64(last_number(file)? as f64 / rate).ok();
     let of_all = |time: &dyn Fn(&Path) -> Option<Duration>| {
         files.iter().map(|file| Some((time(file)?, file.clone()))).collect::<Option<Vec<_>>>()
@@ -129,7 +129,7 @@ fn times(files: Vec<PathBuf>, rate: f64) -> Result<Vec<(Duration, PathBuf)>, Cam
     };
     let stamped = of_all(&stamp);
     let timed = if stamped.is_some() { stamped.filter(close) } else { of_all(&by_number).filter(close) };
-    let timed = timed.or_else(|| only(&files));
+    let timed = timed.or_else(|| only(files));
     let mut timed = timed.ok_or_else(|| CameraError::Untimed(files.first().cloned().unwrap_or_default()))?;
     timed.sort();
     match timed.windows(2).find(|pair| pair[0].0 == pair[1].0) {
@@ -198,9 +198,9 @@ mod tests {
     use super::*;
 
     fn named(names: &[&str], rate: f64) -> Result<Vec<(u128, String)>, CameraError> {
-        let files = names.iter().map(PathBuf::from).collect();
+        let files: Vec<_> = names.iter().map(PathBuf::from).collect();
         let plain = |(at, path): (Duration, PathBuf)| (at.as_millis(), path.display().to_string());
-        times(files, rate).map(|timed| timed.into_iter().map(plain).collect())
+        times(&files, rate).map(|timed| timed.into_iter().map(plain).collect())
     }
 
     #[test]

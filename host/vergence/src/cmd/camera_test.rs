@@ -54,10 +54,7 @@ pub async fn test(
     Ok(figures(&heard, [usb(0), usb(1)], rig.period_us))
 }
 
-/// Prints `findings` and, for programs, what else is in `result`.
-///
-/// # Errors
-/// Where one fails.
+/// Prints `findings` and, for programs, what else is in `result`. An error where one fails.
 pub fn tell(findings: &[Finding], result: Value, console: Console) -> Result<(), Failure> {
     let (lines, result) = told(findings, result);
     console.say_lines(lines)?;
