@@ -2,7 +2,7 @@
 // program makes, refuses what the kernel refuses, and logs each. The program, its V4L2 library and its mappings are the real ones.
 //
 // Rules are those of the kernel's documentation (userspace-api/media/v4l: vidioc-qbuf, vidioc-reqbufs, vidioc-g-fmt, vidioc-streamon,
-// vidioc-queryctrl) for a USB camera that does not block. Two cameras of 320 x 320 pixels run in step at 30 Hz, the second 2 ms late; video2
+// vidioc-queryctrl) for a USB camera that does not block. Two cameras of 320 x 320 pixels run in step at 10 Hz, the second 2 ms late; video2
 // gives metadata, as the second device file of UVC cameras does. Frames for which no buffer is queued are lost, and their numbers with them.
 //
 // FAKE_V4L_DIR stands for /dev where that is listed, FAKE_V4L_LOG is appended to, FAKE_V4L_VANISH unplugs the cameras after so many frames,
@@ -27,7 +27,7 @@
 #define SIZE 320
 #define BUFFERS 8
 #define LONGEST (SIZE * SIZE * 2)
-#define RATE 30
+#define RATE 10
 #define TRIGGER_MODE (V4L2_CID_CAMERA_CLASS_BASE + 0x80)
 #define RECT_KIND 0x0107
 
@@ -336,7 +336,7 @@ static int describe(Camera *camera, int number, unsigned long request, void *at)
         if (interval->index > 1 || interval->width != SIZE) return EINVAL;
         interval->type = V4L2_FRMIVAL_TYPE_DISCRETE;
         interval->discrete.numerator = 1;
-        interval->discrete.denominator = interval->index ? 15 : RATE;
+        interval->discrete.denominator = interval->index ? RATE / 2 : RATE;
         return 0;
     }
     case VIDIOC_G_PARM: {

@@ -19,6 +19,8 @@ use crate::{Camera, CameraError, CameraImage};
 /// Time from opening the cameras to their first images: both are read by then.
 const LEAD: Duration = Duration::from_millis(300);
 
+/// Images that come later than this are skipped, or later than four are taken: so many wait in the buffers of a camera of the kernel.
+const LATEST: Duration = Duration::from_millis(400);
 /// Images of a second, where files are numbered and nobody says it.
 pub const PLAYED_HZ: f64 = 10.0;
 /// Images farther apart than this are not of one film: the unit of their time stamps is another than it seems.
@@ -93,7 +95,7 @@ impl Played {
             }
             paths => (paths.iter().map(|path| image_files(path)).collect::<Result<Vec<_>, _>>()?, Vec::new()),
         };
-        let mut timed = lists.into_iter().map(|files| times(files, rate)).collect::<Result<Vec<_>, _>>()?;
+        let mut timed = lists.iter().map(|files| times(files, rate)).collect::<Result<Vec<_>, _>>()?;
         let first = timed.iter().flatten().map(|(at, _)| *at).min().unwrap_or_default();
         timed.iter_mut().flatten().for_each(|(at, _)| *at -= first);
         let steps = timed.iter().flat_map(|files| files.windows(2).map(|pair| pair[1].0.saturating_sub(pair[0].0)));
@@ -107,14 +109,14 @@ impl Played {
 ///
 /// # Errors
 /// As there.
-pub fn play(names: &[String], rate: f64, now: SharedTime) -> Result<Vec<Box<dyn Camera>>, CameraError> {
+pub fn play(names: &[String], rate: f64, now: &SharedTime) -> Result<Vec<Box<dyn Camera>>, CameraError> {
     let paths: Vec<&Path> = names.iter().map(Path::new).collect();
-    let cameras = Played::open(&paths, rate, &now)?.cameras.into_iter();
+    let cameras = Played::open(&paths, rate, now)?.cameras.into_iter();
     Ok(cameras.map(|camera| Box::new(camera) as Box<dyn Camera>).collect())
 }
 
 /// The files in the order of the times in their names, by time stamp or by number.
-fn times(files: Vec<PathBuf>, rate: f64) -> Result<Vec<(Duration, PathBuf)>, CameraError> {
+fn times(files: &[PathBuf], rate: f64) -> Result<Vec<(Duration, PathBuf)>, CameraError> {
     let by_number = |file: &Path| Duration::try_from_secs_f64(last_number(file)? as f64 / rate).ok();
     let of_all = |time: &dyn Fn(&Path) -> Option<Duration>| {
         files.iter().map(|file| Some((time(file)?, file.clone()))).collect::<Option<Vec<_>>>()
@@ -127,7 +129,7 @@ fn times(files: Vec<PathBuf>, rate: f64) -> Result<Vec<(Duration, PathBuf)>, Cam
     };
     let stamped = of_all(&stamp);
     let timed = if stamped.is_some() { stamped.filter(close) } else { of_all(&by_number).filter(close) };
-    let timed = timed.or_else(|| only(&files));
+    let timed = timed.or_else(|| only(files));
     let mut timed = timed.ok_or_else(|| CameraError::Untimed(files.first().cloned().unwrap_or_default()))?;
     timed.sort();
     match timed.windows(2).find(|pair| pair[0].0 == pair[1].0) {
@@ -160,8 +162,9 @@ impl PlayedCamera {
 
 impl Camera for PlayedCamera {
     fn grab(&mut self) -> Result<Option<CameraImage>, CameraError> {
-        let (now, start, period) = (Arc::clone(&self.now), self.start, self.period);
-        let late = |at: Duration| now() > start + at + period;
+        let (now, start) = (Arc::clone(&self.now), self.start);
+        let patience = LATEST.min(4 * self.period);
+        let late = |at: Duration| now() > start + at + patience;
         loop {
             let Some((at, name, image)) = self.next(late)? else { return Ok(None) };
             let seq = self.seq;
@@ -195,9 +198,9 @@ mod tests {
     use super::*;
 
     fn named(names: &[&str], rate: f64) -> Result<Vec<(u128, String)>, CameraError> {
-        let files = names.iter().map(PathBuf::from).collect();
+        let files: Vec<_> = names.iter().map(PathBuf::from).collect();
         let plain = |(at, path): (Duration, PathBuf)| (at.as_millis(), path.display().to_string());
-        times(files, rate).map(|timed| timed.into_iter().map(plain).collect())
+        times(&files, rate).map(|timed| timed.into_iter().map(plain).collect())
     }
 
     #[test]
@@ -240,13 +243,13 @@ mod tests {
             Arc::new(move || *time.lock().expect("a clock"))
         };
         let mut camera = Played::open(&[&folder], 10.0, &clock).expect("a folder").cameras.remove(0);
-        *time.lock().expect("a clock") = LEAD + Duration::from_millis(250);
+        *time.lock().expect("a clock") = LEAD + Duration::from_millis(590);
         let taken = camera.grab().expect("images").expect("an image");
         let due = (LEAD + Duration::from_millis(200)).as_secs_f64() * 1e6;
         assert_eq!((taken.name.as_str(), taken.seq, camera.missed()), ("2", Some(2), 2));
         assert!((taken.exposed_at.expect("a time").us - due).abs() < 1.0);
         assert_eq!(taken.image.get_pixel(0, 0).0, [2; 3]);
-        *time.lock().expect("a clock") = Duration::from_secs(1);
+        *time.lock().expect("a clock") = Duration::from_secs(2);
         assert!(camera.grab().expect("no error").is_none() && camera.missed() == 3);
         std::fs::remove_dir_all(&folder).expect("removed");
     }

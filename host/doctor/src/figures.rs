@@ -64,6 +64,8 @@ pub struct CameraFigures {
 pub struct TestFigures {
     /// The left and the right camera.
     pub cameras: [CameraFigures; 2],
+    /// How each exposes; `None` of one that was never there.
+    pub timing: [Option<ExposureTiming>; 2],
     /// Pairs that were found.
     pub pairs: usize,
     /// Images without a partner, but those at the ends.
@@ -114,6 +116,7 @@ pub fn figures(heard: &Heard, usb: [Option<UsbLink>; 2], period_us: Option<f64>)
     let fewest = heard.images.iter().map(Vec::len).max().unwrap_or_default();
     TestFigures {
         cameras,
+        timing: heard.timing,
         pairs: pairs.len(),
         // Each end of the listening may cut a pair.
         alone: fewest.saturating_sub(pairs.len() + 2),
@@ -235,4 +238,66 @@ fn deviation(values: &[f64]) -> Option<f64> {
     let mean = values.iter().sum::<f64>() / count;
     let squares: f64 = values.iter().map(|value| (value - mean).powi(2)).sum();
     (values.len() > 1).then(|| (squares / (count - 1.0)).sqrt())
+}
+
+#[cfg(test)]
+mod tests {
+    use std::time::Duration;
+
+    use vergence_rig::HostInstant;
+
+    use super::*;
+
+    const TIMING: ExposureTiming = ExposureTiming {
+        period: Duration::from_millis(33),
+        exposure: Some(Duration::from_millis(4)),
+        rolling: Duration::ZERO,
+        readout: Duration::from_millis(6),
+    };
+
+    /// Ten pulses, 100 ms apart; the left image of the third is lost, and the right camera exposes half a millisecond later.
+    fn heard() -> Heard {
+        let at = |us: f64| HostInstant { us, error_us: 100.0 };
+        let image = |number: u32, late_us: f64| HeardImage {
+            seq: number,
+            middle: at(f64::from(number) * 1e5 + 2_500.0 + late_us),
+            arrived_us: f64::from(number) * 1e5 + 12_000.0 + late_us,
+            bytes: Some(100_000),
+        };
+        Heard {
+            timing: [Some(TIMING); 2],
+            images: [
+                (0..10).filter(|number| *number != 2).map(|number| image(number, 0.0)).collect(),
+                (0..10).map(|number| image(number, 500.0)).collect(),
+            ],
+            pulses: (0..10).map(|number| (number, at(f64::from(number) * 1e5))).collect(),
+            ..Heard::default()
+        }
+    }
+
+    #[test]
+    fn lost_images_rates_and_delays_are_what_was_put_in() {
+        let TestFigures { cameras: [left, right], pairs, difference, bound_ms, .. } =
+            figures(&heard(), [None, None], Some(1e5));
+        assert_eq!((left.images, left.lost, right.images, right.lost, pairs), (9, 1, 10, 0, 9));
+        for camera in [&left, &right] {
+            assert!((camera.rate_hz.expect("a rate") - 10.0).abs() < 1e-9, "{camera:?}");
+            assert!(camera.jitter_ms.expect("jitter") < 1e-9 && (camera.mb_per_s().expect("bytes") - 1.0).abs() < 1e-9);
+        }
+        let trigger = |camera: &CameraFigures| camera.trigger.expect("fired");
+        assert_eq!((trigger(&left).pulses, trigger(&left).paired, trigger(&right).paired), (10, 9, 10));
+        assert!((trigger(&left).arrival.expect("a time").median_ms - 12.0).abs() < 1e-9);
+        assert!((trigger(&right).stamp.expect("a time").median_ms - 3.0).abs() < 1e-9);
+        assert!((difference.expect("pairs").most_ms - 0.5).abs() < 1e-9);
+        assert!((bound_ms.expect("a bound") - 1.0).abs() < 1e-9, "by the reaction of a camera to its pulse");
+    }
+
+    #[test]
+    fn cameras_that_run_freely_pair_by_their_stamps_within_half_of_a_period() {
+        let timing = Some(ExposureTiming { period: Duration::from_millis(100), ..TIMING });
+        let free = figures(&Heard { timing: [timing; 2], ..heard() }, [None, None], None);
+        assert_eq!((free.pairs, free.by_trigger, free.cameras[0].trigger), (9, false, None));
+        assert!((free.bound_ms.expect("a bound") - 49.0).abs() < 1e-9);
+        assert!((free.cameras[0].expected_hz.expect("a rate") - 10.0).abs() < 1e-9);
+    }
 }

@@ -8,20 +8,26 @@ use vergence_board::{Board, Finding, HostClock};
 use vergence_camera::CameraEvent;
 use vergence_live::{Clock, Limits, LiveError, LiveLoop, LiveResult, MatchingTime, Totals};
 use vergence_matching::GuidedMatcher;
-use vergence_pipeline::{Exposures, Observation, PairCloud, Search};
+use vergence_pipeline::{Exposures, Observation, PairCloud, Search, TimeBase};
 use vergence_protocol::{Request, Trigger, TriggerMark};
-use vergence_rig::Rig;
+use vergence_rig::{ExposureTiming, Rig};
 use vergence_vision::Side;
 
 /// Longest wait for a pair.
 const PATIENCE: Duration = Duration::from_secs(5);
 /// With fewer points nothing is said.
 const FEWEST: usize = 30;
+/// With fewer keypoints an image has hardly any texture.
+const FEWEST_KEYPOINTS: usize = 50;
+/// Least part of the keypoints that become points where the pose is right: pairs that were taken together have 17 % to 38 % (vergence-plausibility).
+const LEAST_SHARE: f64 = 0.03;
 
 /// A pair of cameras that run, beside their board.
 pub struct Running<'a> {
     /// What is known of the rig.
     pub rig: Arc<Rig>,
+    /// How each camera exposes, where it has said so; it says it once.
+    pub timing: [Option<ExposureTiming>; 2],
     /// Events of both cameras.
     pub events: Receiver<(Side, CameraEvent)>,
     /// Pulses of the trigger.
@@ -38,7 +44,14 @@ pub struct Running<'a> {
 
 /// Measures the next pair, and compares it with what the calibration states.
 pub async fn check_fit(running: Running<'_>) -> Finding {
-    let Running { rig, events, marks, board, trigger, clock: (clock, period_us), stopwatch } = running;
+    let Running { rig, timing, events, marks, board, trigger, clock: (clock, period_us), stopwatch } = running;
+    if board.is_some_and(|board| !board.is_referenced()) {
+        return Finding::warn(
+            "fit",
+            "the axes do not know where they are, so that nothing says whether the calibration fits",
+            "vergence home",
+        );
+    }
     let mut live = LiveLoop {
         rig,
         matcher: Arc::new(GuidedMatcher::default()),
@@ -52,6 +65,12 @@ pub async fn check_fit(running: Running<'_>) -> Finding {
         stopwatch,
         memory: Arc::<Mutex<_>>::default(),
     };
+    let base = live.board.as_ref().map_or(TimeBase::Host, |board| TimeBase::Board(board.clock_map()));
+    for (side, timing) in [Side::Left, Side::Right].into_iter().zip(timing) {
+        if let Some(timing) = timing {
+            live.exposures.camera_ready(side, timing, &base);
+        }
+    }
     let mut found = None;
     let limits = Limits { results: Some(1), time: Some(PATIENCE) };
     let note = |result: LiveResult<'_>| {
@@ -98,14 +117,23 @@ pub fn fit(cloud: &PairCloud) -> Finding {
     // Half of the values of a normal distribution lie within 0.6745 standard deviations.
     let (found, expected) = (median(&mut off), 0.6745 * median(&mut stated));
     let points = cloud.points.len();
-    let remedy =
-        "vergence calibrate stage (or pair) with new views, and check that no lens was turned and no screw is loose";
+    let remedy = "check that left and right are not swapped, that no lens was turned and no screw is loose; then calibrate again";
     if let Some(drift) = cloud.significant_drift() {
         return Finding::fail(
             "fit",
             format!(
                 "the pictures contradict the calibration: they show a pose that is {:.2} off, more than it states to be uncertain",
                 drift.angle
+            ),
+            remedy,
+        );
+    }
+    if cloud.keypoints >= FEWEST_KEYPOINTS && (points as f64) < LEAST_SHARE * cloud.keypoints as f64 {
+        return Finding::fail(
+            "fit",
+            format!(
+                "the pictures contradict the calibration: of {} keypoints only {points} have a partner where it says that one must be",
+                cloud.keypoints
             ),
             remedy,
         );

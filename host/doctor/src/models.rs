@@ -51,7 +51,7 @@ mod tests {
             "{found:?}"
         );
         std::fs::write(kept.join("two.onnx"), "cut").expect("written");
-        let found = check_models(Ok(store.clone()));
+        let found = check_models(Ok(store));
         assert!(found[0].verdict == Verdict::Fail && found[0].reason.contains(&name), "{found:?}");
     }
 }

@@ -281,6 +281,7 @@ mod tests {
         let difference = Some(Step { median_ms: 0.1, most_ms: 0.3 });
         TestFigures {
             cameras: [left, healthy()],
+            timing: [None, None],
             pairs: 30,
             alone: 0,
             difference,

@@ -66,7 +66,7 @@ enum Task {
 
 pub async fn run(args: Args, console: Console) -> Result<(), Failure> {
     match &args.task {
-        Task::Test(test) => camera_test::run(&test.args, &test.options.chosen()?, console).await,
+        Task::Test(test) => camera_test::judge(&test.args, &test.options.chosen()?, console).await,
         Task::Show { file } => {
             let file = read_camera_file(file)?;
             for camera in &file.cameras {

@@ -33,7 +33,7 @@ pub struct Args {
     taking: TakingOptions,
 }
 
-pub async fn run(args: &Args, common: &CommonOptions, console: Console) -> Result<(), Failure> {
+pub async fn judge(args: &Args, common: &CommonOptions, console: Console) -> Result<(), Failure> {
     let (mut rig, ()) = args.taking.connect(&args.cameras, common, None, console, |_| Ok(())).await?;
     let mut heard = (args.taking.start_cameras(&args.cameras, &rig)?, rig.take_marks());
     let test = test(&args.cameras, &mut rig, (&mut heard.0, heard.1.as_mut()), args.duration).await?;
@@ -54,10 +54,7 @@ pub async fn test(
     Ok(figures(&heard, [usb(0), usb(1)], rig.period_us))
 }
 
-/// Prints `findings` and, for programs, what else is in `result`.
-///
-/// # Errors
-/// Where one fails.
+/// Prints `findings` and, for programs, what else is in `result`. An error where one fails.
 pub fn tell(findings: &[Finding], result: Value, console: Console) -> Result<(), Failure> {
     let (lines, result) = told(findings, result);
     console.say_lines(lines)?;

@@ -7,7 +7,7 @@ use std::time::Duration;
 use serde_json::json;
 use vergence_board::HostClock;
 use vergence_calibration_input::{Captured, Looked, TargetCapture, held_before};
-use vergence_camera::{Camera, CameraError, CameraSet, PLAYED_HZ, is_played, play};
+use vergence_camera::{Camera, CameraError, CameraSet, PLAYED_HZ, SharedTime, is_played, play};
 use vergence_panel::{CapturePanel, Setting};
 use vergence_rig::Rig;
 use vergence_scene::LensChoice;
@@ -130,7 +130,8 @@ fn open(args: &Args, rig: &Rig, target: &TargetKind) -> Result<Vec<Box<dyn Camer
     let clock = HostClock::start();
     if args.cameras.iter().any(|name| is_played(name)) {
         args.camera.none_for_simulated()?;
-        return Ok(play(&args.cameras, PLAYED_HZ, Arc::new(move || Duration::from_micros(clock.now().0)))?);
+        let now: SharedTime = Arc::new(move || Duration::from_micros(clock.now().0));
+        return Ok(play(&args.cameras, PLAYED_HZ, &now)?);
     }
     let open = |device: &String| args.camera.open(device, clock, Duration::ZERO);
     Ok(args.cameras.iter().map(open).collect::<Result<_, CameraError>>()?)

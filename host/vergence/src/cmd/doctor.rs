@@ -99,6 +99,7 @@ async fn look(args: &Args, common: &CommonOptions, console: Console) -> Result<(
     let mut findings = check_test(&seen);
     let running = Running {
         rig: Arc::new(rig.known),
+        timing: seen.timing,
         events,
         marks,
         board: rig.board.as_ref(),
