@@ -3,7 +3,12 @@
 //! A minute and a half; `VERGENCE_SOAK_MINUTES=30` for the long run, which needs 5 GB for its recording. Board, stages and cameras are simulated
 //! in the process that is measured, so that its computing time holds the rendering of the images, which a real rig does not do.
 #![cfg(target_os = "linux")]
-#![allow(clippy::expect_used, clippy::panic, clippy::print_stdout, reason = "a test fails loudly and shows its figures")]
+#![allow(
+    clippy::expect_used,
+    clippy::panic,
+    clippy::print_stdout,
+    reason = "a test fails loudly and shows its figures"
+)]
 #![allow(clippy::disallowed_methods, reason = "another process is watched in real time")]
 
 mod common;

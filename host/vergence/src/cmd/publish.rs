@@ -85,14 +85,6 @@ impl Publisher {
         }
     }
 
-    /// Prints the totals.
-    ///
-    /// # Errors
-    /// Where standard output cannot be written.
-    pub fn end(&self, totals: &Totals) -> Result<(), Failure> {
-        tell(totals, self.console)
-    }
-
     /// A whole cloud in JSON is only made where somebody reads it.
     fn print_json(&self, json: impl FnOnce() -> Value) -> Result<(), Failure> {
         if self.console.is_json() { self.console.result(&json()) } else { Ok(()) }

@@ -14,7 +14,7 @@ use vergence_recording::{Recordable, Recorded, Recording};
 use super::live_options::LiveOptions;
 use super::taking_options::LiveRig;
 use crate::cli::CommonOptions;
-use crate::cmd::publish::Publisher;
+use crate::cmd::publish::{Publisher, tell};
 use crate::cmd::result_options::ResultOptions;
 use crate::console::Console;
 use crate::failure::Failure;
@@ -97,7 +97,7 @@ pub async fn run(args: &Args, common: &CommonOptions, console: Console) -> Resul
         (Ok(None), true) => Ok(()),
         _ => settle(&mut board, &tour).await,
     };
-    publisher.end(&totals)?;
+    tell(&totals, console)?;
     if let (Some(recording), Some(folder)) = (recording, &args.record) {
         tell_recorded(recording.finish().await?, folder, console)?;
     }
