@@ -3,23 +3,21 @@
 pub mod record;
 mod tour;
 
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use std::time::Duration;
 
 use vergence_board::Board;
 use vergence_live::{Ended, Limits, LiveLoop, MatchingTime, Pace, Totals, Tour};
 use vergence_protocol::{Request, Trigger};
-use vergence_recording::{Recordable, Recorded, Recording};
 
 use super::live_options::LiveOptions;
 use super::taking_options::LiveRig;
 use crate::cli::CommonOptions;
-use crate::cmd::publish::{Publisher, tell};
+use crate::cmd::publish::{Publisher, seen_to_the_end, tell, tell_recorded};
 use crate::cmd::result_options::ResultOptions;
 use crate::console::Console;
 use crate::failure::Failure;
 use crate::interrupt::interrupted;
-use crate::stopwatch::started_us;
 
 /// Pairs the images of both cameras, matches and triangulates them, again and again: a cloud of the newest pair whenever the
 /// matcher is free, in the frame of the left camera. Nothing queues, and no cloud holds anything of an older one; skipped
@@ -64,7 +62,7 @@ pub async fn run(args: &Args, common: &CommonOptions, console: Console) -> Resul
     let files = args.results.files()?;
     let (mut rig, method) = args.live.connect(&args.cameras, common, args.results.out.as_deref(), console).await?;
     let tour = args.tour.tour(&rig.known)?;
-    let recording = args.record.as_deref().map(|folder| begin_recording(folder, &rig)).transpose()?;
+    let recording = args.record.as_deref().map(|folder| rig.record(folder)).transpose()?;
     make_ready(&mut rig, &args.tour, console).await?;
     let is_simulated = rig.simulated.is_some();
     let matching_time = match (is_simulated, args.match_time) {
@@ -117,29 +115,6 @@ async fn make_ready(rig: &mut LiveRig, tour: &tour::Options, console: Console) -
         ));
     }
     rig.known.extrapolations(&board.positions()).iter().for_each(|sentence| console.warn(sentence));
-    Ok(())
-}
-
-/// Whether a camera was alive at the end.
-pub fn seen_to_the_end(ended: Option<Ended>) -> Result<(), Failure> {
-    match ended {
-        Some(Ended::Done) | None => Ok(()),
-        Some(Ended::Blind) => Err(Failure::device("both cameras are dead: see what was said of each above")),
-    }
-}
-
-/// Begins a recording of `rig` in `folder`.
-pub fn begin_recording(folder: &Path, rig: &LiveRig) -> Result<Recording, Failure> {
-    let board = rig.board.as_ref().map(|board| board.client().knowledge());
-    let (clock, period_us) = (rig.clock, rig.period_us);
-    let recordable = Recordable { rig: &rig.known, board, clock, epoch_us: started_us(clock), period_us };
-    Ok(Recording::start(folder, recordable)?)
-}
-
-/// Says what is in a recording.
-pub fn tell_recorded(recorded: Recorded, folder: &Path, console: Console) -> Result<(), Failure> {
-    console.say(format!("recorded {} images in {}", recorded.images, folder.display()))?;
-    recorded.left_out.in_words().into_iter().for_each(|said| console.warn(said));
     Ok(())
 }
 

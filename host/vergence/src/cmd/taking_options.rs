@@ -7,6 +7,7 @@ use vergence_board::{Board, HostClock, Port, fresh_session};
 use vergence_camera::CameraEvent;
 use vergence_live::{attach_both, simulate_both};
 use vergence_protocol::{Trigger, TriggerMark};
+use vergence_recording::{Recordable, Recording};
 use vergence_rig::{Rig, Shutter};
 use vergence_scene::{LensChoice, TrueLens};
 use vergence_sim::Unplug;
@@ -19,6 +20,7 @@ use crate::console::Console;
 use crate::failure::Failure;
 use crate::rig_file;
 use crate::sim::{SharedRig, SimulatedRig, board_of, lensed};
+use crate::stopwatch::started_us;
 
 /// Number of camera events that may wait; images beyond it are lost, which the gap in their numbers shows.
 const EVENTS_KEPT: usize = 16;
@@ -63,6 +65,13 @@ pub struct LiveRig {
 }
 
 impl LiveRig {
+    /// Begins a recording of it in `folder`.
+    pub fn record(&self, folder: &Path) -> Result<Recording, Failure> {
+        let board = self.board.as_ref().map(|board| board.client().knowledge());
+        let (clock, period_us, epoch_us) = (self.clock, self.period_us, started_us(self.clock));
+        Ok(Recording::start(folder, Recordable { rig: &self.known, board, clock, epoch_us, period_us })?)
+    }
+
     /// The pulses of the camera trigger; `None` where the cameras run freely.
     pub fn take_marks(&mut self) -> Option<Receiver<TriggerMark>> {
         self.period_us.and(self.board.as_mut()).map(|board| board.client_mut().take_marks())
