@@ -14,6 +14,7 @@ use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 use std::time::{Duration, Instant};
 
+use common::data::skip;
 use common::{fails_with, python, run, signal, small_bench_toml, text, vergence};
 use serde_json::Value;
 use vergence_recording::{Event, Reader};
@@ -165,6 +166,40 @@ fn a_recording_that_was_killed_replays_up_to_its_last_whole_chunk() {
     let whole = vergence(&["replay", &recording, "--from", "1h"]).output().expect("it runs");
     assert!(whole.status.success());
     assert!(text(&whole.stderr).contains("was not finished"), "{}", text(&whole.stderr));
+}
+
+/// A disk of three megabytes, where this computer lets one be made; measuring goes on to its end, and what is on the disk replays.
+#[test]
+fn a_full_disk_ends_with_a_message_and_what_is_on_it_replays() {
+    const SCRIPT: &str = r#"
+mount -t tmpfs -o size=3m none "$2" 2>&1 || exit 77
+"$0" --port sim --rig "$1" run --cameras sim --home --match-time 100ms --rate 5 --frames 20 --record "$2/recording" 2>&1
+echo "run ended with $?"
+"$0" replay "$2/recording" --out "$3" --keep 2>&1
+echo "replay ended with $?"
+"#;
+    let folder = tempfile::tempdir().expect("a folder");
+    let folder = folder.path();
+    let rig = small_bench(folder);
+    let [disk, out] = ["disk", "replayed"].map(|name| path_of(folder, name));
+    std::fs::create_dir(&disk).expect("a folder");
+    let program = env!("CARGO_BIN_EXE_vergence");
+    let mut script = Command::new("unshare");
+    script.args(["--map-root-user", "--mount", "sh", "-c", SCRIPT, program]).arg(&rig).args([&disk, &out]);
+    script.env_remove("VERGENCE_PORT").env_remove("VERGENCE_RIG");
+    let Ok(output) = script.output() else { return skip("there is no unshare: install util-linux") };
+    let said = text(&output.stdout);
+    if output.status.code() == Some(77) || said.is_empty() {
+        return skip("this user may not mount a small disk");
+    }
+    let (run, replay) = said.split_once("run ended with ").expect("it runs");
+    assert!(
+        run.contains("20 clouds") && run.contains("the disk is full; what was written until now can be replayed"),
+        "{said}"
+    );
+    assert!(replay.starts_with('3') && replay.contains("replay ended with 0"), "{said}");
+    assert!(!said.contains("panicked"), "{said}");
+    assert!((2..20).contains(&clouds(&out).len()), "{said}");
 }
 
 /// A recording of four clouds in `folder`.

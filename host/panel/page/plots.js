@@ -7,6 +7,8 @@ const SECONDS = 60;
 export function showPlots(link) {
   const canvas = document.getElementById('plots');
   let axes = [];
+  // A recording does not know where the axes were sent.
+  let knowsTargets = true;
   let series = [];
   const now = () => performance.now() / 1000;
   // Of every series: its name, unit, and points of time and value.
@@ -61,14 +63,18 @@ export function showPlots(link) {
     context.stroke();
   }
 
-  link.on('hello', (hello) => { axes = hello.axes; series = []; });
+  link.on('hello', (hello) => {
+    axes = hello.axes;
+    knowsTargets = hello.recorded_ms === null;
+    series = [];
+  });
   let latest = 0;
   link.on('status', ({ values, targets }) => {
     // Five points a second are enough for a minute.
     if (now() - latest < 0.2) return;
     latest = now();
     axes.forEach(({ name, unit }, i) => add(name, unit, values[i]));
-    axes.forEach(({ name, unit }, i) => add(`${name} to its target`, unit, targets ? targets[i] - values[i] : 0));
+    if (knowsTargets) axes.forEach(({ name, unit }, i) => add(`${name} to its target`, unit, targets ? targets[i] - values[i] : 0));
     const text = series.map(({ name, unit, points }) => `${name} ${points.at(-1)[1].toFixed(1)} ${unit}`).join(', ');
     canvas.setAttribute('aria-label', `Plots of the last minute: ${text}`);
     again();

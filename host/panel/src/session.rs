@@ -89,14 +89,15 @@ async fn measure(
     totals: &mut Totals,
 ) -> Result<Ended, PanelError> {
     let Some(live) = live else { return pending().await };
-    let (mut live, mut results) = match recording {
-        Some(recording) => (recording.marks_of(live), Some(recording.results())),
+    let (mut live, mut recorded) = match recording {
+        Some(recording) => (recording.marks_of(live), Some((&recording.recorder, recording.results()))),
         None => (live, None),
     };
     let show = |result: LiveResult<'_>| {
         panel.show(&result);
-        if let Some(record) = &mut results {
+        if let Some((recorder, record)) = &mut recorded {
             record(&result);
+            recorder.take_trouble().into_iter().for_each(|trouble| panel.warn(&trouble));
         }
         Ok(())
     };

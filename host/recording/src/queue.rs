@@ -67,6 +67,7 @@ struct Waiting<T> {
     is_full: bool,
     is_closed: bool,
     left_out: LeftOut,
+    trouble: Option<String>,
 }
 
 impl<T: Weighed> Queue<T> {
@@ -80,6 +81,7 @@ impl<T: Weighed> Queue<T> {
             is_full: false,
             is_closed: false,
             left_out: LeftOut::default(),
+            trouble: None,
         };
         Self { waiting: Arc::new(Mutex::new(waiting)), news: Arc::default() }
     }
@@ -96,11 +98,17 @@ impl<T: Weighed> Queue<T> {
         self.news.notify_one();
     }
 
-    /// Takes no more entries, and forgets those that wait.
-    pub fn abandon(&self) {
+    /// Takes no more entries, and forgets those that wait; `why` is a sentence.
+    pub fn abandon(&self, why: String) {
         let mut waiting = self.lock();
         waiting.is_closed = true;
         waiting.entries.clear();
+        waiting.trouble = Some(why);
+    }
+
+    /// A sentence where the first image or cloud was left out, or nothing is written any more; each once.
+    pub fn take_trouble(&self) -> Option<String> {
+        self.lock().trouble.take()
     }
 
     /// What was left out so far.
@@ -145,9 +153,13 @@ impl<T: Weighed> Waiting<T> {
         self.is_full &= self.bytes > self.most_bytes / 2;
         // An image that is larger than the whole room is kept where nothing else waits.
         let has_room = !self.is_full && (self.bytes == 0 || self.bytes + bytes <= self.most_bytes);
+        let is_first = self.left_out == LeftOut::default();
         if !has_room && let Some(counter) = entry.counter(&mut self.left_out) {
             *counter += 1;
             self.is_full = true;
+            if is_first {
+                self.trouble = Some("the disk is too slow: images and clouds are left out of the recording".to_owned());
+            }
             return;
         }
         self.bytes += bytes;
@@ -236,7 +248,8 @@ mod tests {
         assert!(!queue.is_filled().await);
         let abandoned = Queue::new(100);
         abandoned.put(Sample::Reading);
-        abandoned.abandon();
+        abandoned.abandon("the disk is full".into());
         assert!(!abandoned.is_filled().await);
+        assert_eq!((abandoned.take_trouble().as_deref(), abandoned.take_trouble()), (Some("the disk is full"), None));
     }
 }

@@ -175,6 +175,12 @@ impl Recorder {
         self.put(Entry::Warning(now, sentence.to_owned()));
     }
 
+    /// A sentence where the disk became too slow, or writing failed: each is told once, and again at the end.
+    #[must_use]
+    pub fn take_trouble(&self) -> Option<String> {
+        self.queue.take_trouble()
+    }
+
     fn put(&self, entry: Entry) {
         self.queue.put(entry);
     }
@@ -212,7 +218,7 @@ async fn write<W: Write + Seek + Send + 'static>(
         let (back, outcome) = written.await.map_err(unwritten)?;
         scribe = back;
         if let Err(error) = outcome {
-            queue.abandon();
+            queue.abandon(error.to_string());
             return Err(error);
         }
     }

@@ -14,8 +14,7 @@ use vergence_scene::LensChoice;
 use super::connect::connect;
 use super::live_options::LiveOptions;
 use super::peer_options::PublishOptions;
-use super::publish::tell;
-use super::run::{begin_recording, seen_to_the_end, tell_recorded};
+use super::publish::{seen_to_the_end, tell, tell_recorded};
 use crate::cli::CommonOptions;
 use crate::console::Console;
 use crate::failure::Failure;
@@ -92,7 +91,7 @@ pub async fn run(args: &Args, common: &CommonOptions, console: Console) -> Resul
             let shown = Arc::clone(&method.measuring);
             let (panel, driver) = Panel::new(Setting { rig: shown, simulated, has_cameras: true, recorded_ms: None });
             rig.board = rig.board.map(|board| panel.watching(board));
-            let recording = args.record.as_deref().map(|folder| begin_recording(folder, &rig)).transpose()?;
+            let recording = args.record.as_deref().map(|folder| rig.record(folder)).transpose()?;
             let events = panel.tap(args.live.taking.start_cameras(cameras, &rig)?, recording.as_ref());
             let live = Some(method.live_loop(&mut rig, events, MatchingTime::Real));
             (panel, Session { driver, board: rig.board, trigger: rig.trigger, live, recording })

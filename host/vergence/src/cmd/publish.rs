@@ -1,17 +1,18 @@
 //! The results of the live loop for people, as files and for programs. With `--json` each result is one line of JSON.
 
+use std::path::Path;
 use std::sync::Arc;
 
 use serde_json::{Value, json};
 use vergence_board::HostClock;
-use vergence_live::{Limit, LiveResult, Pace, Totals};
+use vergence_live::{Ended, Limit, LiveResult, Pace, Totals};
 use vergence_output::{
     LatestFiles, PoseSource, axes_by_images_json, axes_by_images_words, drift_warning, live_bearings_json,
     live_cloud_json, live_cloud_words, pose_told_words,
 };
 use vergence_peers::Publication;
 use vergence_pipeline::Observation;
-use vergence_recording::Recorder;
+use vergence_recording::{Recorded, Recorder};
 use vergence_rig::{Rig, rounded};
 use vergence_scene::LensChoice;
 
@@ -95,14 +96,6 @@ impl Publisher {
         }
     }
 
-    /// Prints the totals.
-    ///
-    /// # Errors
-    /// Where standard output cannot be written.
-    pub fn end(&self, totals: &Totals) -> Result<(), Failure> {
-        tell(totals, self.console)
-    }
-
     /// A whole cloud in JSON is only made where somebody reads it.
     fn print_json(&self, json: impl FnOnce() -> Value) -> Result<(), Failure> {
         if self.console.is_json() { self.console.result(&json()) } else { Ok(()) }
@@ -166,4 +159,18 @@ pub fn tell(totals: &Totals, console: Console) -> Result<(), Failure> {
         "pulses": pulses,
         "open": open,
     }))
+}
+
+/// Says what is in a recording, and what is not.
+pub fn tell_recorded(recorded: Recorded, folder: &Path, console: Console) -> Result<(), Failure> {
+    recorded.left_out.in_words().into_iter().for_each(|said| console.warn(said));
+    console.say(format!("recorded {} images in {}", recorded.images, folder.display()))
+}
+
+/// Whether a camera was alive at the end.
+pub fn seen_to_the_end(ended: Option<Ended>) -> Result<(), Failure> {
+    match ended {
+        Some(Ended::Done) | None => Ok(()),
+        Some(Ended::Blind) => Err(Failure::device("both cameras are dead: see what was said of each above")),
+    }
 }

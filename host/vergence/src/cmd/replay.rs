@@ -13,7 +13,7 @@ use vergence_recording::{Jump, Pacing, Reader, RecordingError, Replay, play};
 
 use super::model_options::MatcherOptions;
 use super::panel_options::PanelOptions;
-use super::publish::Publisher;
+use super::publish::{Publisher, tell};
 use super::result_options::ResultOptions;
 use super::search_options::SearchOptions;
 use crate::console::Console;
@@ -120,7 +120,7 @@ pub async fn run(args: &Args, console: Console) -> Result<(), Failure> {
         reader = Reader::open(&args.recording)?;
         next = reader.next_event()?;
     }
-    publisher.end(&totals)
+    tell(&totals, console)
 }
 
 /// Parses how many times as fast as recorded.

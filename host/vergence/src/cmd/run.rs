@@ -4,21 +4,20 @@ pub mod record;
 mod relink;
 mod tour;
 
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use std::time::Duration;
 
 use vergence_board::Board;
 use vergence_live::{Ended, Limits, LiveLoop, MatchingTime, Pace, Totals, Tour};
 use vergence_peers::Published;
 use vergence_protocol::{Request, Trigger};
-use vergence_recording::{Recordable, Recorded, Recording};
 
 use self::relink::Relink;
 use super::live_options::LiveOptions;
 use super::taking_options::LiveRig;
 use crate::cli::CommonOptions;
 use crate::cmd::peer_options::PublishOptions;
-use crate::cmd::publish::Publisher;
+use crate::cmd::publish::{Publisher, seen_to_the_end, tell_recorded};
 use crate::cmd::reconnect::Persistence;
 use crate::cmd::result_options::ResultOptions;
 use crate::console::Console;
@@ -73,7 +72,7 @@ pub async fn run(args: &Args, common: &CommonOptions, console: Console) -> Resul
     let files = args.results.files()?;
     let (mut rig, method) = args.live.connect(&args.cameras, common, args.results.out.as_deref(), console).await?;
     let tour = args.tour.tour(&rig.known)?;
-    let recording = args.record.as_deref().map(|folder| begin_recording(folder, &rig)).transpose()?;
+    let recording = args.record.as_deref().map(|folder| rig.record(folder)).transpose()?;
     let board = rig.board.as_ref().map(|board| board.client().knowledge());
     let published = Published { rig: method.measuring.clone(), board, clock: rig.clock, epoch_us: rig.epoch_us };
     let publication = args.publishing.start(published)?;
@@ -114,7 +113,7 @@ pub async fn run(args: &Args, common: &CommonOptions, console: Console) -> Resul
         (Ok(None), true) => Ok(()),
         _ => settle(&mut board, &tour).await,
     };
-    publisher.end(&totals)?;
+    tell(&totals, console)?;
     if let (Some(recording), Some(folder)) = (recording, &args.record) {
         tell_recorded(recording.finish().await?, folder, console)?;
     }
@@ -134,29 +133,6 @@ async fn make_ready(rig: &mut LiveRig, tour: &tour::Options, console: Console) -
         ));
     }
     rig.known.extrapolations(&board.positions()).iter().for_each(|sentence| console.warn(sentence));
-    Ok(())
-}
-
-/// Whether a camera was alive at the end.
-pub fn seen_to_the_end(ended: Option<Ended>) -> Result<(), Failure> {
-    match ended {
-        Some(Ended::Done) | None => Ok(()),
-        Some(Ended::Blind) => Err(Failure::device("both cameras are dead: see what was said of each above")),
-    }
-}
-
-/// Begins a recording of `rig` in `folder`.
-pub fn begin_recording(folder: &Path, rig: &LiveRig) -> Result<Recording, Failure> {
-    let board = rig.board.as_ref().map(|board| board.client().knowledge());
-    let LiveRig { clock, epoch_us, period_us, .. } = *rig;
-    let recordable = Recordable { rig: &rig.known, board, clock, epoch_us, period_us };
-    Ok(Recording::start(folder, recordable)?)
-}
-
-/// Says what is in a recording.
-pub fn tell_recorded(recorded: Recorded, folder: &Path, console: Console) -> Result<(), Failure> {
-    console.say(format!("recorded {} images in {}", recorded.images, folder.display()))?;
-    recorded.left_out.in_words().into_iter().for_each(|said| console.warn(said));
     Ok(())
 }
 

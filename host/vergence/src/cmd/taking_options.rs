@@ -7,6 +7,7 @@ use vergence_board::{Board, Continuity, HostClock, Port};
 use vergence_camera::{CameraError, CameraEvent, PLAYED_HZ, is_played};
 use vergence_live::{attach_both, play_both, simulate_both, unplugged};
 use vergence_protocol::{Trigger, TriggerMark};
+use vergence_recording::{Recordable, Recording};
 use vergence_rig::{Rig, Shutter};
 use vergence_scene::{LensChoice, TrueLens};
 use vergence_vision::{KannalaBrandt, Side};
@@ -67,6 +68,14 @@ pub struct LiveRig {
 }
 
 impl LiveRig {
+    /// Begins a recording of it in `folder`.
+    pub fn record(&self, folder: &Path) -> Result<Recording, Failure> {
+        let board = self.board.as_ref().map(|board| board.client().knowledge());
+        let Self { known: rig, clock, epoch_us, period_us, .. } = self;
+        let recordable = Recordable { rig, board, clock: *clock, epoch_us: *epoch_us, period_us: *period_us };
+        Ok(Recording::start(folder, recordable)?)
+    }
+
     /// The pulses of the camera trigger; `None` where the cameras run freely.
     pub fn take_marks(&mut self) -> Option<Receiver<TriggerMark>> {
         self.period_us.and(self.board.as_mut()).map(|board| board.client_mut().take_marks())

@@ -7,8 +7,9 @@ use serde_json::json;
 use vergence_live::Limits;
 use vergence_protocol::Request;
 
-use super::{begin_recording, make_ready, parse_time, seen_to_the_end, settle, tell_recorded, tour};
+use super::{make_ready, parse_time, settle, tour};
 use crate::cli::CommonOptions;
+use crate::cmd::publish::{seen_to_the_end, tell_recorded};
 use crate::cmd::taking_options::TakingOptions;
 use crate::console::Console;
 use crate::failure::Failure;
@@ -41,7 +42,7 @@ pub struct Args {
 pub async fn record(args: &Args, common: &CommonOptions, console: Console) -> Result<(), Failure> {
     let (mut rig, ()) = args.taking.connect(&args.cameras, common, None, console, |_| Ok(())).await?;
     let tour = args.tour.tour(&rig.known)?;
-    let recording = begin_recording(&args.out, &rig)?;
+    let recording = rig.record(&args.out)?;
     make_ready(&mut rig, &args.tour, console).await?;
     let heard = (args.taking.start_cameras(&args.cameras, &rig)?, rig.take_marks());
     if let (Some(board), Some(trigger)) = (&rig.board, rig.trigger) {
