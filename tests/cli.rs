@@ -50,6 +50,7 @@ const VERBS: &[&str] = &[
     "soak",
     "completions",
     "panel",
+    "peers",
 ];
 
 fn temporary() -> tempfile::TempDir {
