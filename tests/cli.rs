@@ -51,6 +51,7 @@ const VERBS: &[&str] = &[
     "soak",
     "completions",
     "panel",
+    "peers",
 ];
 
 fn temporary() -> tempfile::TempDir {

@@ -18,6 +18,7 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
+use common::browser::{browser, pictures};
 use common::{fails_with, python, run, signal, small_bench_toml, text, vergence};
 use serde_json::Value;
 
@@ -190,8 +191,9 @@ fn three_rigs_are_watched_from_one_page_and_a_cut_link_stops_nothing_but_an_orde
     let at = free();
     let watcher = Served::start(&["peers", "--page", "127.0.0.1:0", "--peer-listen", &at, "--peer-secret", &known]);
     let way = Way::to(&at);
-    let (ordered_at, peer) = (free(), ["--peer", &at]);
-    let first = Served::rig("first", &["--peer", &way.address, "--peer-listen", &ordered_at, "--peer-secret", &known]);
+    let (ordered_at, peer) = (free(), ["--peer", at.as_str()]);
+    let ways = ["--peer", way.address.as_str(), "--peer-listen", &ordered_at, "--peer-secret", &known];
+    let first = Served::rig("first", &ways);
     let _others = ["second", "third"].map(|name| Served::rig(name, &peer));
 
     let measures = |rig: &Value| rig["health"] == "ok" && rig["points"].as_u64().is_some_and(|points| points > 20);
@@ -209,16 +211,18 @@ fn three_rigs_are_watched_from_one_page_and_a_cut_link_stops_nothing_but_an_orde
     assert_eq!(cloud.len() - 4 - header, told["count"].as_u64().expect("a count") as usize * (16 + 13 * 4));
 
     orders_need_the_secret(&first, &watcher, &ordered_at, [&known, &other]);
+    people_see_them(&watcher);
     a_cut_way_stops_an_order(&first, &watcher, &way);
 }
 
 fn orders_need_the_secret(first: &Served, watcher: &Served, ordered_at: &str, [known, other]: [&str; 2]) {
-    let order = |mode, secret: &[&str]| [&["peers", "first", "--mode", mode, "--peer", ordered_at], secret].concat();
-    fails_with(&order("herbivore", &[]), 3, &["--peer-secret"]);
-    fails_with(&order("herbivore", &["--peer-secret", other]), 3, &["the secret is another one"]);
-    fails_with(&order("owl", &["--peer-secret", known]), 3, &["no mode 'owl'"]);
+    let order = |mode| ["peers", "first", "--peer", ordered_at, "--mode", mode];
+    let by = |mode, secret| [&order(mode)[..], &["--peer-secret", secret]].concat();
+    fails_with(&order("herbivore"), 3, &["--peer-secret"]);
+    fails_with(&by("herbivore", other), 3, &["the secret is another one"]);
+    fails_with(&by("owl", known), 3, &["no mode 'owl'"]);
     first.status("it has not moved", |status| status["doing"].is_null() && status["state"] == "idle");
-    let done = run(&order("human", &["--peer-secret", known]));
+    let done = run(&by("human", known));
     assert!(done.status.success(), "{}", text(&done.stderr));
     first.status("it is where it was sent", rests_in("human"));
     watcher.until("first", "its mode is published", |rig| rig["mode"] == "human");
@@ -229,6 +233,14 @@ fn orders_need_the_secret(first: &Served, watcher: &Served, ordered_at: &str, [k
     assert_eq!(code, 409, "a rig without a secret takes no orders: {}", text(&why));
     assert_eq!(watcher.ask("POST", "/rigs/first/mode/herbivore", &origin), (204, Vec::new()));
     first.status("the page sent it", rests_in("herbivore"));
+}
+
+/// A real browser shows the three, the cloud of one, and sends one to a mode.
+fn people_see_them(watcher: &Served) {
+    let Some((chromium, scripts)) = browser() else { return };
+    let mut script = Command::new("node");
+    script.arg(scripts.join("rigs.mjs")).args([&chromium, &format!("http://{}/", watcher.page)]).arg(pictures());
+    assert!(script.status().expect("node starts").success(), "the browser found a fault: see above");
 }
 
 fn a_cut_way_stops_an_order(first: &Served, watcher: &Served, way: &Way) {
@@ -272,11 +284,12 @@ fn what_is_published_is_what_was_recorded() {
     let at = free();
     let board =
         ["run", "--port", "sim", "--rig", rig, "--cameras", "sim", "--home", "--match-time", "100ms", "--rate", "5"];
-    let published = ["--publish", "bench", "--peer-listen", &at, "--record", recording.to_str().expect("a name")];
+    let published =
+        ["--publish", "bench", "--peer-listen", at.as_str(), "--record", recording.to_str().expect("a name")];
     let mut measuring = vergence(&[&board[..], &published].concat()).stdout(Stdio::null()).spawn().expect("it starts");
     let script = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../tests/peers");
     let heard = folder.path().join("heard.pickle");
-    let hears = Command::new(&python).arg(script.join("hear.py")).args([&at, "bench"]).arg(&heard).output();
+    let hears = Command::new(&python).arg(script.join("hear.py")).args([at.as_str(), "bench"]).arg(&heard).output();
     signal(measuring.id(), "-INT");
     assert!(measuring.wait().expect("it was started").success());
     let hears = hears.expect("python runs");
@@ -299,7 +312,8 @@ fn an_order_that_was_overheard_is_refused() {
         status["referenced"] == serde_json::json!([true, true]) && status["doing"].is_null()
     });
     let script = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../tests/peers/order.py");
-    let output = Command::new(python).arg(script).args([&at, "bench", &known, "human"]).output().expect("python runs");
+    let output =
+        Command::new(python).arg(script).args([at.as_str(), "bench", &known, "human"]).output().expect("python runs");
     assert!(output.status.success(), "{}{}", text(&output.stdout), text(&output.stderr));
     println!("{}", text(&output.stdout).trim());
     rig.status("it is where it was sent", rests_in("human"));
@@ -309,13 +323,14 @@ fn an_order_that_was_overheard_is_refused() {
 fn what_cannot_be_meant_is_refused() {
     let run = ["run", "--port", "sim", "--cameras", "sim", "--home", "--frames", "1", "--publish"];
     fails_with(&[&run[..], &["bench"]].concat(), 2, &["--peer", "--peer-listen"]);
+    fails_with(&[&run[..run.len() - 1], &["--peer", "tcp/127.0.0.1:1"]].concat(), 2, &["--publish NAME"]);
     fails_with(&[&run[..], &["a b", "--peer", "tcp/127.0.0.1:1"]].concat(), 2, &["no name for a rig"]);
     fails_with(&[&run[..], &["bench", "--peer", "udp/127.0.0.1:1"]].concat(), 2, &["tcp/HOST:PORT"]);
     fails_with(&[&run[..], &["bench", "--peer-listen", "tcp/0.0.0.0:0"]].concat(), 2, &["--peer-network"]);
     let folder = tempfile::tempdir().expect("a folder");
     let short = secret(folder.path(), "short", "guess");
     let peers = ["peers", "bench", "--peer", "tcp/127.0.0.1:1", "--peer-secret"];
-    fails_with(&[&peers[..], &[&short]].concat(), 2, &["at least 16"]);
+    fails_with(&[&peers[..], &[short.as_str()]].concat(), 2, &["at least 16"]);
     fails_with(&[&peers[..], &["/nowhere/secret"]].concat(), 2, &["/nowhere/secret"]);
     fails_with(&["peers", "--page", "0.0.0.0:0", "--peer", "tcp/127.0.0.1:1"], 2, &["this one", "127.0.0.1"]);
     fails_with(&["peers", "--mode", "human", "--peer", "tcp/127.0.0.1:1"], 2, &["one rig"]);

@@ -1,6 +1,7 @@
 //! Running the binary and reading what it says.
 #![allow(dead_code, unused_imports, reason = "each test file uses its own part")]
 
+pub mod browser;
 pub mod built_bench;
 pub mod cameras;
 pub mod corner_files;

@@ -97,10 +97,8 @@ pub async fn run(args: &Args, common: &CommonOptions, console: Console) -> Resul
             (panel, Session { driver, board: rig.board, trigger: rig.trigger, live, recording })
         }
     };
-    let panel = match &args.publishing.publish {
-        Some(name) => {
-            Published::of(&panel, &session, started_us).with_panel(panel, name, args.publishing.peers.read()?)?
-        }
+    let panel = match args.publishing.read()? {
+        Some((name, ways)) => Published::of(&panel, &session, started_us).with_panel(panel, name, ways)?,
         None => panel,
     };
     let serving = panel.serve(listener, access)?;

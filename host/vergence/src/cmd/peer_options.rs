@@ -11,13 +11,13 @@ use crate::failure::Failure;
 pub struct PublishOptions {
     /// Publishes clouds, poses and health under this name for other machines.
     #[arg(long, value_name = "NAME", help_heading = "Other machines")]
-    pub publish: Option<String>,
+    publish: Option<String>,
     #[command(flatten)]
-    pub peers: PeerOptions,
+    peers: PeerOptions,
 }
 
 /// The ways to other machines.
-#[derive(Debug, clap::Args)]
+#[derive(Debug, Default, PartialEq, clap::Args)]
 #[command(next_help_heading = "Other machines")]
 pub struct PeerOptions {
     /// Connects to another machine, as soon and as often as it is there; may be given again.
@@ -35,14 +35,23 @@ pub struct PeerOptions {
 }
 
 impl PublishOptions {
+    /// Name, ways and secret, where the rig shall be published.
+    pub fn read(&self) -> Result<Option<(&str, (Network, Option<Secret>))>, Failure> {
+        match &self.publish {
+            Some(name) => Ok(Some((name, self.peers.read()?))),
+            None if self.peers == PeerOptions::default() => Ok(None),
+            None => Err(Failure::usage("--peer and its like need a name for the rig: add --publish NAME")),
+        }
+    }
+
     /// Publishes a rig that takes no orders, where it shall be.
     pub fn start(&self, rig: Published) -> Result<Option<Publication>, Failure> {
-        let Some(name) = &self.publish else { return Ok(None) };
-        match self.peers.read()? {
-            (_, Some(_)) => {
-                Err(Failure::usage("--peer-secret lets others drive, which 'vergence panel' can, not 'run'"))
+        match self.read()? {
+            None => Ok(None),
+            Some((name, (network, None))) => Ok(Some(Publication::start(name, &network, rig, None)?)),
+            Some(_) => {
+                Err(Failure::usage("--peer-secret is for others who drive, and 'run' drives alone: see 'panel'"))
             }
-            (network, None) => Ok(Some(Publication::start(name, &network, rig, None)?)),
         }
     }
 }

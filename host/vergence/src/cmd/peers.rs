@@ -37,27 +37,27 @@ pub async fn run(args: &Args, console: Console) -> Result<(), Failure> {
     if let Some(mode) = args.mode.clone() {
         let [rig] = args.rigs.clone().try_into().map_err(|_| Failure::usage("--mode is for one rig: name it"))?;
         let said = format!("rig '{rig}' is in mode '{mode}'");
-        tokio::select! {
-            done = on_own_thread(move || Ok(watching.mode(&rig, &mode)?)) => done?,
-            () = interrupted() => return Err(Failure::interrupted("interrupted: the rig hears no more of it, and stops within two seconds")),
-        }
-        return console.say(said);
+        return tokio::select! {
+            done = on_own_thread(move || Ok(watching.mode(&rig, &mode)?)) => done.and_then(|()| console.say(said)),
+            () = interrupted() => Err(Failure::interrupted("interrupted: the rig hears no more of it, and stops in 2 s")),
+        };
     }
     let page = args.page.map(|address| serve_rigs(watching.clone(), address)).transpose()?;
     if let Some(serving) = &page {
         console.say(format!("the rigs are at {}; Ctrl-C ends it", serving.url()))?;
         console.result(&json!({ "kind": "page", "url": serving.url() }))?;
     }
-    let (mut every, end) = (interval(Duration::from_secs(1)), sleep(args.duration.unwrap_or(Duration::MAX)));
-    tokio::pin!(end);
-    loop {
-        tokio::select! {
-            _ = every.tick() => {
-                console.say_lines(watching.rigs.lines())?;
-                console.result(&watching.rigs.json())?;
-            }
-            () = &mut end => return Ok(()),
-            () = interrupted() => return Ok(()),
+    let mut every = interval(Duration::from_secs(1));
+    let watch = async {
+        loop {
+            every.tick().await;
+            console.say_lines(watching.rigs.lines())?;
+            console.result(&watching.rigs.json())?;
         }
+    };
+    tokio::select! {
+        failed = watch => failed,
+        () = sleep(args.duration.unwrap_or(Duration::MAX)) => Ok(()),
+        () = interrupted() => Ok(()),
     }
 }

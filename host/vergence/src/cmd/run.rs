@@ -55,11 +55,11 @@ pub struct Args {
     live: LiveOptions,
     #[command(flatten)]
     persistence: Persistence,
-    #[command(flatten)]
-    publishing: PublishOptions,
     /// On a simulated rig: how long matching takes on its clock. Without it, as long as it really takes.
     #[arg(long, value_name = "TIME", value_parser = humantime::parse_duration)]
     match_time: Option<Duration>,
+    #[command(flatten)]
+    publishing: PublishOptions,
 }
 
 /// A time such as `2s` or `90s`; a bare number is seconds.
