@@ -11,7 +11,7 @@ use vergence_protocol::{BoardInfo, Report, Request};
 
 use crate::firmware::hex;
 use crate::link::{
-    Client, HostClock, ManagementLink, OpenError, Port, describe_port, fresh_session, is_candidate, is_held,
+    Client, Continuity, ManagementLink, OpenError, Port, describe_port, fresh_session, is_candidate, is_held,
     is_st_link, open, serial_ports,
 };
 use crate::update::{hardware_name, version_text};
@@ -68,7 +68,8 @@ fn closed(error: OpenError) -> WhoAnswers {
 /// The board's description of itself, through a session that is closed again.
 async fn describe(port: &Port, baud: u32) -> Option<BoardInfo> {
     let wire = open(port, baud, false).await.ok()?;
-    let client = Client::at(port, wire, fresh_session().ok()?, HostClock::start()).await.ok()?;
+    let continuity = Continuity::begin(wire.baud);
+    let client = Client::at(port, wire, fresh_session().ok()?, continuity).await.ok()?;
     let answer = client.ask(Request::GetInfo).await;
     client.close().await;
     match answer.ok()? {
