@@ -1,6 +1,6 @@
 //! A simulated rig in real time with panel, recording and three pages: memory, losses, and what the pages cost.
 //!
-//! A minute and a half; `VERGENCE_SOAK_MINUTES=30` for the long run, which needs 5 GB for its recording. Board, stages and cameras are simulated
+//! A minute; `VERGENCE_SOAK_MINUTES=30` for the long run, which needs 5 GB for its recording. Board, stages and cameras are simulated
 //! in the process that is measured, so that its computing time holds the rendering of the images, which a real rig does not do.
 //!
 //! `VERGENCE_SOAK_SIZE=1280x1280` takes images of this size at 10 Hz and records nothing: what pages cost beside a busy matcher.
@@ -32,7 +32,7 @@ use tungstenite::{Error, Message, WebSocket};
 use vergence_recording::{Event, Reader};
 
 /// Length of the short run.
-const SHORT: Duration = Duration::from_secs(90);
+const SHORT: Duration = Duration::from_secs(60);
 /// Memory is watched after this part of the run: buffers and tracks of the last half minute fill first.
 const WARM: f64 = 0.45;
 /// The most that memory may grow in the watched part, in MB.

@@ -69,7 +69,8 @@ impl LiveRig {
     pub fn record(&self, folder: &Path) -> Result<Recording, Failure> {
         let board = self.board.as_ref().map(|board| board.client().knowledge());
         let (clock, period_us, epoch_us) = (self.clock, self.period_us, started_us(self.clock));
-        Ok(Recording::start(folder, Recordable { rig: &self.known, board, clock, epoch_us, period_us })?)
+        let simulated = self.simulated.as_ref().map(|_| "mechanics, room and cameras");
+        Ok(Recording::start(folder, Recordable { rig: &self.known, simulated, board, clock, epoch_us, period_us })?)
     }
 
     /// The pulses of the camera trigger; `None` where the cameras run freely.
