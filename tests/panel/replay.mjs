@@ -11,6 +11,7 @@ await browse(executablePath, async ({ open, holds, text, shot, passed, serious }
   await holds(page, () => /points of/.test(document.querySelector('#cloud-chip').textContent));
   assert.match(await text(page, '#recorded'), /^A recording of .*20\d\d/);
   assert.match(await text(page, '#who'), /nothing can be driven/);
+  assert.match(await text(page, '#rig-name'), /simulated/);
   assert.ok(!await page.isVisible('#stop') && !await page.isVisible('#take'), 'there is no rig to stop or to drive');
   for (const button of await page.locator('#modes button, #home').all()) {
     assert.ok(await button.isDisabled());

@@ -104,7 +104,9 @@ fn taken(exposure: PosedExposure, rig: &Rig, epoch_us: u64) -> Result<Taken, Exp
         Ok::<_, ExportError>([Some(stamped(Side::Left, left)?), Some(stamped(Side::Right, right)?)])
     };
     Ok(match exposure {
-        PosedExposure::Pair(images, pose) => Taken { images: pair(*images)?, pose: Some(pose.at_middle().clone()) },
+        PosedExposure::Pair(images, pose) | PosedExposure::Unseen(images, pose, _) => {
+            Taken { images: pair(*images)?, pose: Some(pose.at_middle().clone()) }
+        }
         PosedExposure::Untold(images, _) => Taken { images: pair(*images)?, pose: None },
         PosedExposure::One { side, image, .. } => {
             let mut images = [None, None];

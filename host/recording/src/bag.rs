@@ -8,7 +8,7 @@ use std::fs::File;
 use std::io::{BufWriter, Seek, Write};
 use std::path::{Path, PathBuf};
 
-use mcap::records::MessageHeader;
+use mcap::records::{MessageHeader, Metadata};
 use mcap::{Attachment, WriteOptions, Writer};
 
 use crate::RecordingError;
@@ -20,6 +20,10 @@ const CHUNK: u64 = 1 << 20;
 pub const FILE: &str = "recording_0.mcap";
 /// The name of the rig file that is attached.
 pub const RIG: &str = "rig.toml";
+
+/// The name of the metadata that vergence writes, and its entry that says what was simulated.
+pub const PROGRAM: &str = "vergence";
+pub const SIMULATED: &str = "simulated";
 
 /// A topic, and which messages it carries.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
@@ -62,11 +66,11 @@ pub struct Bag<W: Write + Seek = BufWriter<File>> {
 }
 
 impl Bag {
-    /// Begins a bag in `folder`, which must be empty or not there, with the rig file `rig` attached.
+    /// Begins a bag in `folder`, which must be empty or not there, with the rig file `rig` attached; `simulated` says what of the rig is simulated.
     ///
     /// # Errors
     /// [`RecordingError::NotEmpty`], [`RecordingError::Write`], [`RecordingError::DiskFull`]
-    pub fn create(folder: &Path, rig: &str) -> Result<Self, RecordingError> {
+    pub fn create(folder: &Path, rig: &str, simulated: Option<&str>) -> Result<Self, RecordingError> {
         let write = |error: std::io::Error| RecordingError::write(folder, &error.into());
         std::fs::create_dir_all(folder).map_err(write)?;
         if std::fs::read_dir(folder).map_err(write)?.next().is_some() {
@@ -77,6 +81,9 @@ impl Bag {
         let mut bag = Self::on(BufWriter::new(created), &file, rig)?;
         bag.metadata = Some(folder.join("metadata.yaml"));
         bag.describe()?;
+        if let Some(simulated) = simulated {
+            bag.say(SIMULATED, simulated)?;
+        }
         // The rig file is on the disk before the first frame.
         bag.flush()?;
         Ok(bag)
@@ -106,6 +113,13 @@ impl<W: Write + Seek> Bag<W> {
         };
         writer.attach(&attachment).map_err(fail)?;
         Ok(Self { file: file.to_owned(), metadata: None, writer, channels: BTreeMap::new(), span: None })
+    }
+
+    /// Keeps a sentence of this name, which is none of the rig's.
+    fn say(&mut self, name: &str, text: &str) -> Result<(), RecordingError> {
+        let metadata = BTreeMap::from([(name.to_owned(), text.to_owned())]);
+        let written = self.writer.write_metadata(&Metadata { name: PROGRAM.to_owned(), metadata });
+        written.map_err(|error| RecordingError::write(&self.file, &error))
     }
 
     /// Appends a message of `topic`, heard at `at_ns` nanoseconds since 1970.

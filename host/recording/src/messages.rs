@@ -130,7 +130,9 @@ pub fn transforms(stamp_ns: u64, pose: &RigPose) -> Vec<u8> {
 
 /// A frame that stands in another one.
 pub struct Placed {
+    /// Name of the frame in which it stands.
     pub parent: String,
+    /// Its own name.
     pub child: String,
     /// The child's frame in the parent's, in millimetres.
     pub pose: Isometry3<f64>,

@@ -13,7 +13,7 @@ use mcap::sans_io::{LinearReadEvent, LinearReader, LinearReaderOptions};
 use vergence_rig::{HostInstant, Rig};
 
 use crate::RecordingError;
-use crate::bag::{EVENTS, FILE, LEFT_IMAGE, RIG, RIGHT_IMAGE};
+use crate::bag::{EVENTS, FILE, LEFT_IMAGE, PROGRAM, RIG, RIGHT_IMAGE, SIMULATED};
 use crate::cdr::{image_bytes, number_and_bytes};
 use crate::event::{Event, Eye};
 
@@ -25,6 +25,7 @@ pub struct Reader {
     /// Topics by the number of their channel.
     topics: BTreeMap<u16, String>,
     rig: Option<String>,
+    simulated: Option<String>,
     images: [Option<Vec<u8>>; 2],
     /// Images that were heard before this time are not decoded, in microseconds of the host's clock.
     decode_from_us: u64,
@@ -70,6 +71,7 @@ impl Reader {
             records,
             topics: BTreeMap::new(),
             rig: None,
+            simulated: None,
             images: [None, None],
             decode_from_us: 0,
             begun_ns: None,
@@ -121,6 +123,12 @@ impl Reader {
         Rig::from_toml(text).map_err(|error| RecordingError::Rig { file: self.file.clone(), why: error.to_string() })
     }
 
+    /// What of the rig was simulated, in words; it precedes all events.
+    #[must_use]
+    pub fn simulated(&self) -> Option<&str> {
+        self.simulated.as_deref()
+    }
+
     /// Whether the end of the recording was read. That of a program that was killed has none: its last events are lost.
     #[must_use]
     pub const fn is_finished(&self) -> bool {
@@ -168,7 +176,7 @@ impl Reader {
     /// Keeps what a record says; returns its event, if it is one.
     fn understand(&mut self, opcode: u8, body: &[u8]) -> Result<Option<Heard>, RecordingError> {
         self.is_finished |= opcode == op::DATA_END;
-        if !matches!(opcode, op::CHANNEL | op::MESSAGE | op::ATTACHMENT) {
+        if !matches!(opcode, op::CHANNEL | op::MESSAGE | op::ATTACHMENT | op::METADATA) {
             return Ok(None);
         }
         match mcap::parse_record(opcode, body).map_err(|error| RecordingError::read(&self.file, error))? {
@@ -177,6 +185,7 @@ impl Reader {
                 let text = String::from_utf8(data.into_owned());
                 self.rig = Some(text.map_err(|_| self.foreign("the attached rig file"))?);
             }
+            Record::Metadata(mut found) if found.name == PROGRAM => self.simulated = found.metadata.remove(SIMULATED),
             Record::Message { header, data } => match self.topics.get(&header.channel_id).map(String::as_str) {
                 Some(topic) if topic == EVENTS.name => {
                     self.begun_ns.get_or_insert(header.log_time);

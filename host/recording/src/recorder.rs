@@ -90,13 +90,18 @@ pub struct Recorded {
 pub struct Writing(tokio::task::JoinHandle<Result<u64, RecordingError>>);
 
 impl Recorder {
-    /// Begins a recording of `rig` in `folder`; `epoch_us` is the time at which the host's clock started, in microseconds since 1970. Call within a
-    /// tokio runtime.
+    /// Begins a recording of `rig` in `folder`, of which `simulated` is simulated; `epoch_us` is the time at which the host's clock started, in
+    /// microseconds since 1970. Call within a tokio runtime.
     ///
     /// # Errors
     /// A folder that holds something, a file that cannot be written; a rig that no file can hold.
-    pub fn start(folder: &Path, rig: &Rig, rig_file: &str, epoch_us: u64) -> Result<(Self, Writing), RecordingError> {
-        Ok(Self::on(Bag::create(folder, rig_file)?, rig, epoch_us, MOST_BYTES))
+    pub fn start(
+        folder: &Path,
+        (rig, rig_file): (&Rig, &str),
+        simulated: Option<&str>,
+        epoch_us: u64,
+    ) -> Result<(Self, Writing), RecordingError> {
+        Ok(Self::on(Bag::create(folder, rig_file, simulated)?, rig, epoch_us, MOST_BYTES))
     }
 
     /// Begins a recording of `rig` in `bag`; images and clouds of `most_bytes` in memory may wait for it.

@@ -17,6 +17,8 @@ use crate::tap::{recorded_events, recorded_marks};
 pub struct Recordable<'a> {
     /// The rig, whose file is attached.
     pub rig: &'a Rig,
+    /// What of it is simulated, in words; `None` of a real one.
+    pub simulated: Option<&'a str>,
     /// Its board; `None` of a rig without axes.
     pub board: Option<BoardKnowledge>,
     /// The clock of images and pulses.
@@ -41,12 +43,12 @@ impl Recording {
     /// # Errors
     /// A folder that holds something, a file that cannot be written, a rig that no file can hold.
     pub fn start(folder: &Path, recordable: Recordable<'_>) -> Result<Self, RecordingError> {
-        let Recordable { rig, board, clock, epoch_us, period_us } = recordable;
+        let Recordable { rig, simulated, board, clock, epoch_us, period_us } = recordable;
         let program = concat!("vergence ", env!("CARGO_PKG_VERSION")).to_owned();
         let provenance = Provenance { program, inputs_sha256: String::new(), date: None };
         let unwritten = |why| RecordingError::Write { file: folder.to_owned(), why };
         let file = rig.to_toml(&provenance).map_err(unwritten)?;
-        let (recorder, writing) = Recorder::start(folder, rig, &file, epoch_us)?;
+        let (recorder, writing) = Recorder::start(folder, (rig, &file), simulated, epoch_us)?;
         let baud = board.as_ref().and_then(BoardKnowledge::baud);
         recorder.begin(clock.now(), Beginning { has_board: board.is_some(), baud, period_us });
         if let Some(board) = board {

@@ -77,7 +77,8 @@ pub async fn run(args: &Args, console: Console) -> Result<(), Failure> {
         pace: Pace::default(),
     };
     let recorded_ms = reader.begun_ns().map(|ns| ns / 1_000_000);
-    let setting = Setting { rig: Arc::clone(&measuring), simulated: None, has_cameras: true, recorded_ms };
+    let simulated = reader.simulated().map(str::to_owned);
+    let setting = Setting { rig: Arc::clone(&measuring), simulated, has_cameras: true, recorded_ms };
     let (panel, _serving) = args.panel.serve(setting, console)?.unzip();
     let rate = args.rate.or(panel.as_ref().map(|_| 1.0));
     let mut screen = panel.clone().map(|panel| Screen::new(panel, reader.length(), rate));

@@ -71,9 +71,10 @@ impl LiveRig {
     /// Begins a recording of it in `folder`.
     pub fn record(&self, folder: &Path) -> Result<Recording, Failure> {
         let board = self.board.as_ref().map(|board| board.client().knowledge());
+        let simulated = self.simulated.as_ref().map(|_| "mechanics, room and cameras");
         let Self { known: rig, clock, epoch_us, period_us, .. } = self;
-        let recordable = Recordable { rig, board, clock: *clock, epoch_us: *epoch_us, period_us: *period_us };
-        Ok(Recording::start(folder, recordable)?)
+        let (clock, epoch_us, period_us) = (*clock, *epoch_us, *period_us);
+        Ok(Recording::start(folder, Recordable { rig, simulated, board, clock, epoch_us, period_us })?)
     }
 
     /// The pulses of the camera trigger; `None` where the cameras run freely.
