@@ -81,6 +81,8 @@ async function order(rig, mode) {
 function show(name) {
   [shown, clouds] = [name, null];
   byId('shown').textContent = name;
+  byId('modes').replaceChildren();
+  delete byId('modes').dataset.now;
   view.unpick();
 }
 
