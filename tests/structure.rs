@@ -264,7 +264,6 @@ const ONLY_FOR: &[(&str, &[&str])] = &[
             "vergence",
         ],
     ),
-    ("zenoh", &["vergence-peers"]),
     ("tokio-serial", &["vergence-board", "vergence"]),
     ("serialport", &["vergence-board", "vergence"]),
     ("moq-v4l", &["vergence-camera"]),
@@ -273,7 +272,6 @@ const ONLY_FOR: &[(&str, &[&str])] = &[
     ("indicatif", &["vergence"]),
 ];
 
-/// Permissive licences.
 const LICENCES: &[&str] = &[
     "MIT",
     "MIT-0",
@@ -291,7 +289,6 @@ const LICENCES: &[&str] = &[
     "CC0-1.0",
 ];
 
-/// Exceptions, each with its reason.
 const EXCEPTIONS: &[(&str, &str, &str)] = &[
     ("serialport", "MPL-2.0", "copyleft by file, used unchanged; the serial port library of the Rust world"),
     ("mio-serial", "MPL-2.0", "the same"),

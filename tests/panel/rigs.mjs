@@ -19,7 +19,9 @@ await browse(executablePath, async ({ open, holds, text, shot, passed, serious }
     for (let at = 0; at < pixels.length; at += 4) seen.add((pixels[at] << 16) | (pixels[at + 1] << 8) | pixels[at + 2]);
     return seen.size > 20;
   });
-  assert.equal(await page.locator('#modes button').count(), 0, 'a rig without a secret takes no orders');
+  // A rig without a secret takes no orders.
+  await holds(page, () => document.querySelector('#modes').dataset.now === '');
+  assert.equal(await page.locator('#modes button').count(), 0);
   passed(await text(page, '#list'));
   await page.click('#list button:text("first")');
   for (const mode of ['human', 'herbivore']) {

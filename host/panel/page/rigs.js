@@ -46,7 +46,7 @@ function list(rigs) {
     fill(mode, text(rig.mode), rig.state);
     fill(axes, Object.entries(rig.joints ?? {}).map(([axis, at]) => `${axis} ${at}`).join(', ') || '–');
     fill(points, text(rig.points));
-    fill(sigma, text(rig.sigma_mm, ' mm'));
+    fill(sigma, text(rig.sigma_mm?.toFixed(1), ' mm'));
     fill(age, text(rig.cloud_age_s?.toFixed(1), ' s'));
     fill(lost, text(rig.lost));
   }
@@ -81,6 +81,8 @@ async function order(rig, mode) {
 function show(name) {
   [shown, clouds] = [name, null];
   byId('shown').textContent = name;
+  byId('modes').replaceChildren();
+  delete byId('modes').dataset.now;
   view.unpick();
 }
 

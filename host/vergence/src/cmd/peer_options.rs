@@ -21,17 +21,17 @@ pub struct PublishOptions {
 #[command(next_help_heading = "Other machines")]
 pub struct PeerOptions {
     /// Connects to another machine, as soon and as often as it is there; may be given again.
-    #[arg(long = "peer", value_name = "tcp/HOST:PORT")]
-    connect: Vec<String>,
+    #[arg(long, value_name = "tcp/HOST:PORT")]
+    peer: Vec<String>,
     /// Lets other machines connect here, such as at tcp/127.0.0.1:7447.
-    #[arg(long = "peer-listen", value_name = "tcp/HOST:PORT")]
-    listen: Vec<String>,
+    #[arg(long, value_name = "tcp/HOST:PORT")]
+    peer_listen: Vec<String>,
     /// Lets other computers connect too: --peer-listen tcp/0.0.0.0:7447 --peer-network.
-    #[arg(long = "peer-network")]
-    open: bool,
+    #[arg(long)]
+    peer_network: bool,
     /// The file with the secret of those who may send a rig to a mode.
-    #[arg(long = "peer-secret", value_name = "FILE")]
-    secret: Option<PathBuf>,
+    #[arg(long, value_name = "FILE")]
+    peer_secret: Option<PathBuf>,
 }
 
 impl PublishOptions {
@@ -59,7 +59,7 @@ impl PublishOptions {
 impl PeerOptions {
     /// The ways, and the secret.
     pub fn read(&self) -> Result<(Network, Option<Secret>), PeersError> {
-        let secret = self.secret.as_deref().map(Secret::read).transpose()?;
-        Ok((Network::new(&self.connect, &self.listen, self.open)?, secret))
+        let secret = self.peer_secret.as_deref().map(Secret::read).transpose()?;
+        Ok((Network::new(&self.peer, &self.peer_listen, self.peer_network)?, secret))
     }
 }
