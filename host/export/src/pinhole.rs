@@ -19,10 +19,10 @@ pub struct PinholeBag {
 }
 
 impl PinholeBag {
-    /// Begins a bag of views by the cameras of `rig`, whose file is `text`.
-    pub fn create(rig: &Rig, text: &str, options: &Options) -> Result<Self, ExportError> {
+    /// Begins a bag of views by the cameras of `rig`, whose file is `text`; `simulated` says what of it is simulated.
+    pub fn create((rig, text): (&Rig, &str), simulated: Option<&str>, options: &Options) -> Result<Self, ExportError> {
         let views = views(rig, &faces(options), options)?;
-        let bag = ViewsBag::create(&options.out, text)?;
+        let bag = ViewsBag::create(&options.out, text, simulated)?;
         Ok(Self { bag, views, remarks: remarks(rig), folder: options.out.clone() })
     }
 }

@@ -42,7 +42,7 @@ pub fn export(recording: &Path, rig: Option<Rig>, options: &Options) -> Result<E
     let mut next = reader.next_event()?;
     let (rig, text) = rig_of(&reader, rig)?;
     let mut sink: Box<dyn Sink> = match options.to {
-        ExportFormat::Pinhole => Box::new(PinholeBag::create(&rig, &text, options)?),
+        ExportFormat::Pinhole => Box::new(PinholeBag::create((&rig, &text), reader.simulated(), options)?),
         ExportFormat::TumVi | ExportFormat::Euroc => Box::new(Sequence::create(&rig, &text, options)?),
     };
     let mut posing = Posing::new(&rig, ());

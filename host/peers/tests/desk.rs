@@ -16,7 +16,7 @@ fn secret(text: &str) -> Secret {
 /// A desk whose orders wait for a driver that nobody starts.
 fn desk() -> (Desk, Driver) {
     let rig = Arc::new(Rig::from_toml(BENCH_TOML).expect("the bench"));
-    let (panel, driver) = Panel::new(Setting { rig, simulated: None, has_cameras: false });
+    let (panel, driver) = Panel::new(Setting { rig, simulated: None, has_cameras: false, recorded_ms: None });
     (Desk::new("bench", secret("0123456789abcdef"), panel.remotes()), driver)
 }
 

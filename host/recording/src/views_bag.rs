@@ -63,12 +63,13 @@ pub struct Seen<'a> {
 pub struct ViewsBag(Bag);
 
 impl ViewsBag {
-    /// Begins a bag in `folder`, which must be empty or not there, with the rig file `rig` attached.
+    /// Begins a bag in `folder`, which must be empty or not there, with the rig file `rig` attached; `simulated` says what of the rig is
+    /// simulated.
     ///
     /// # Errors
     /// [`RecordingError::NotEmpty`], [`RecordingError::Write`], [`RecordingError::DiskFull`]
-    pub fn create(folder: &Path, rig: &str) -> Result<Self, RecordingError> {
-        Bag::create(folder, rig).map(Self)
+    pub fn create(folder: &Path, rig: &str, simulated: Option<&str>) -> Result<Self, RecordingError> {
+        Bag::create(folder, rig, simulated).map(Self)
     }
 
     /// Appends an image of a view.

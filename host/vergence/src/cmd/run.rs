@@ -17,7 +17,7 @@ use super::live_options::LiveOptions;
 use super::taking_options::LiveRig;
 use crate::cli::CommonOptions;
 use crate::cmd::peer_options::PublishOptions;
-use crate::cmd::publish::{Publisher, seen_to_the_end, tell_recorded};
+use crate::cmd::publish::{Publisher, seen_to_the_end, tell, tell_recorded};
 use crate::cmd::reconnect::Persistence;
 use crate::cmd::result_options::ResultOptions;
 use crate::console::Console;

@@ -10,6 +10,7 @@ use vergence_protocol::{Trigger, TriggerMark};
 use vergence_recording::{Recordable, Recording};
 use vergence_rig::{Rig, Shutter};
 use vergence_scene::{LensChoice, TrueLens};
+use vergence_sim::Unplug;
 use vergence_vision::{KannalaBrandt, Side};
 
 use super::camera_options::CameraOptions;
