@@ -44,7 +44,7 @@ pub use link::{
 pub use link_figures::{LinkFigures, LinkLosses};
 pub use listening::{Listening, Source, reach_again};
 pub use move_plan::{AxisLimits, AxisPlan, Knot, MovePlan, MoveStart};
-pub use serve::{BoardGuard, ListenError, Listener, ServeError, Served, Shared, serve, spawn_in_process, spawn_until};
+pub use serve::{BoardGuard, ListenError, Listener, Plug, ServeError, Served, Shared, serve, spawn_in_process};
 pub use setting_check::why_refused;
 pub use setting_text::{NamedSetting, settings};
 pub use settings_file::{SettingsChanged, SettingsFileError};

@@ -2,6 +2,7 @@
 //! and out.
 
 mod pace;
+mod plug;
 mod served;
 
 use std::future::{pending, poll_fn};
@@ -17,6 +18,7 @@ use tokio::net::TcpListener;
 use tokio::time::{MissedTickBehavior, interval};
 use tokio_serial::SerialStream;
 
+pub use self::plug::Plug;
 pub use self::served::{BoardGuard, Served, Shared};
 
 /// How often the board is run. Its control ticks are exact whatever this is.
@@ -141,8 +143,7 @@ pub fn spawn_in_process<B: Served + Send + 'static>(board: Shared<B>) -> DuplexS
 }
 
 /// As [`spawn_in_process`], on a wire that is pulled out when `pulled` completes. Then nobody runs the board but who else shares it.
-#[must_use]
-pub fn spawn_until<B: Served + Send + 'static>(
+fn spawn_until<B: Served + Send + 'static>(
     board: Shared<B>,
     pulled: impl Future<Output = ()> + Send + 'static,
 ) -> DuplexStream {

@@ -1,7 +1,6 @@
 //! Simulated boards for the command: read from files, served, and driven in this process.
 
 mod files;
-mod plug;
 mod robot;
 
 use std::path::Path;
@@ -19,11 +18,12 @@ use crate::failure::Failure;
 use crate::interrupt::on_own_thread;
 
 pub use files::{KeptRig, simulated_chip};
-pub use plug::Plug;
 pub use robot::SimulatedRobot;
 pub use vergence_board::{Listener, Served, serve, spawn_in_process};
 pub use vergence_sim::{Random, SimulatedChip, SimulatedRig, built};
 
+/// The cable to a simulated rig in this process.
+pub type Plug = vergence_board::Plug<SimulatedRig>;
 /// A simulated rig, shared between the task that serves it and the cameras on it.
 pub type SharedRig = Shared<SimulatedRig>;
 

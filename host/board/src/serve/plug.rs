@@ -6,24 +6,32 @@ use std::time::Duration;
 
 use tokio::sync::watch;
 use tokio::time::{Instant, sleep_until};
-use vergence_board::{Board, BoardError, Client, Continuity, LinkError, OpenWire, fresh_session, spawn_until};
 use vergence_rig::Rig;
 
-use super::SharedRig;
+use super::{Served, Shared, spawn_until};
+use crate::board::Board;
+use crate::error::BoardError;
+use crate::link::{Client, Continuity, LinkError, OpenWire, fresh_session};
 
-/// A simulated board, and when its cable is unplugged.
-#[derive(Clone)]
-pub struct Plug {
-    board: SharedRig,
+/// A simulated board, and when its cable is unplugged. Clones are the same cable.
+pub struct Plug<B> {
+    board: Shared<B>,
     unplugged: Vec<[Duration; 2]>,
     /// From when on the times count; `None` before that.
     begun: Arc<watch::Sender<Option<Instant>>>,
 }
 
-impl Plug {
+impl<B> Clone for Plug<B> {
+    fn clone(&self) -> Self {
+        let Self { board, unplugged, begun } = self;
+        Self { board: board.clone(), unplugged: unplugged.clone(), begun: Arc::clone(begun) }
+    }
+}
+
+impl<B: Served + Send + 'static> Plug<B> {
     /// The cable of `board`, which is unplugged at these times after [`Self::begin`].
     #[must_use]
-    pub fn new(board: SharedRig, unplugged: Vec<[Duration; 2]>) -> Self {
+    pub fn new(board: Shared<B>, unplugged: Vec<[Duration; 2]>) -> Self {
         Self { board, unplugged, begun: Arc::new(watch::Sender::new(None)) }
     }
 
