@@ -27,13 +27,15 @@ use crate::streams::Stream;
 /// Camera events that may wait.
 const EVENTS_KEPT: usize = 16;
 
+type Listener = Arc<dyn Fn(&LiveResult<'_>) + Send + Sync>;
+
 /// Shows a rig to pages. A clone shows the same.
 #[derive(Clone)]
 pub struct Panel {
     pub(crate) hub: Arc<Hub>,
     pub(crate) darkroom: Darkroom,
     /// Who hears of every result besides.
-    beside: Option<Arc<dyn Fn(&LiveResult<'_>) + Send + Sync>>,
+    beside: Option<Listener>,
 }
 
 impl Panel {

@@ -32,6 +32,6 @@ pub use error::PeersError;
 pub use keys::{Attachment, DOMAIN, data_key, is_name, mode_key, token_key};
 pub use network::Network;
 pub use operator::send_to_mode;
-pub use publication::{Publication, Published};
+pub use publication::{Publication, Published, Ways};
 pub use rigs::Rigs;
 pub use watch::{Watching, watch};

@@ -27,6 +27,9 @@ const JOINTS_PACE_US: u64 = 50_000;
 /// How often the rig says how it is, unless that changes.
 const HEALTH_PACE: Duration = Duration::from_secs(1);
 
+/// The ways to other machines, and the secret of those who may give orders.
+pub type Ways = (Network, Option<Secret>);
+
 /// The rig that is published.
 pub struct Published {
     /// The rig.
@@ -54,12 +57,7 @@ impl Published {
     ///
     /// # Errors
     /// As [`Publication::start`].
-    pub fn with_panel(
-        self,
-        panel: Panel,
-        name: &str,
-        (network, secret): (Network, Option<Secret>),
-    ) -> Result<Panel, PeersError> {
+    pub fn with_panel(self, panel: Panel, name: &str, (network, secret): Ways) -> Result<Panel, PeersError> {
         let desk = secret.map(|secret| Desk::new(name, secret, panel.remotes()));
         let clock = self.clock;
         let publication = Publication::start(name, &network, self, desk)?;

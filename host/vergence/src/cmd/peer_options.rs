@@ -2,7 +2,7 @@
 
 use std::path::PathBuf;
 
-use vergence_peers::{Network, PeersError, Publication, Published, Secret};
+use vergence_peers::{Network, PeersError, Publication, Published, Secret, Ways};
 
 use crate::failure::Failure;
 
@@ -36,7 +36,7 @@ pub struct PeerOptions {
 
 impl PublishOptions {
     /// Name, ways and secret, where the rig shall be published.
-    pub fn read(&self) -> Result<Option<(&str, (Network, Option<Secret>))>, Failure> {
+    pub fn read(&self) -> Result<Option<(&str, Ways)>, Failure> {
         match &self.publish {
             Some(name) => Ok(Some((name, self.peers.read()?))),
             None if self.peers == PeerOptions::default() => Ok(None),
@@ -58,7 +58,7 @@ impl PublishOptions {
 
 impl PeerOptions {
     /// The ways, and the secret.
-    pub fn read(&self) -> Result<(Network, Option<Secret>), PeersError> {
+    pub fn read(&self) -> Result<Ways, PeersError> {
         let secret = self.peer_secret.as_deref().map(Secret::read).transpose()?;
         Ok((Network::new(&self.peer, &self.peer_listen, self.peer_network)?, secret))
     }
