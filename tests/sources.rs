@@ -47,7 +47,7 @@ const IMPURE: &[&str] = &[
 const OUTSIDE_THE_PIPELINE: &[&str] = &["vergence_protocol::session", "clap", "indicatif", "Instant"];
 
 /// Largest numbers of lines of a crate's source and of a file.
-const LARGEST_CRATE: usize = 9300;
+const LARGEST_CRATE: usize = 9400;
 const LARGEST_FILE: usize = 400;
 
 fn root() -> PathBuf {
