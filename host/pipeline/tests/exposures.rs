@@ -140,7 +140,8 @@ fn images_are_paired_without_a_link_and_with_it_again() {
     for expected in 1..3 {
         let Some(Exposed::Pair(images)) = exposures.take() else { panic!("pair {expected}") };
         assert_eq!((images[0].image, images[1].image), (expected, expected + 40));
-        assert_eq!(images[0].middle.error_us, 1_000.0, "as well as the stamps are known");
+        // As well as stamps and clock are known.
+        assert!(images[0].middle.error_us > 999.0);
     }
     exposures.settle(Microseconds(2_000_000), &base);
     assert!(matches!(exposures.take(), Some(Exposed::Pair(_))));

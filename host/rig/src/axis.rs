@@ -184,7 +184,7 @@ impl RigAxis {
     }
 
     /// Standard deviation in counts of an axis that stood when it was read, `unseen` ago: nobody tells what has pushed it since. It grows by
-    /// [`CREEP`], which is an assumption.
+    /// a thousandth of the range per second, which is an assumption.
     #[must_use]
     pub fn sigma_unseen(&self, unseen: Duration) -> f64 {
         let [low, high] = self.range.map(AxisPosition::value);
