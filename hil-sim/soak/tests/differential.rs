@@ -15,7 +15,7 @@ use vergence_soak::differential::{Act, Fate, Figures, Mishap, Session, Verdict, 
 use vergence_soak::stages;
 
 /// Sessions to play, unless `VERGENCE_DIFFERENTIAL` names another number; from seed 1 on, or from `VERGENCE_DIFFERENTIAL_FROM`.
-const SESSIONS: u64 = 12;
+const SESSIONS: u64 = 8;
 /// Places of the stages in the session of the planted differences, in micro-units: near home.
 const PLACES: [f64; 2] = [59_000.0, -10_000.0];
 
