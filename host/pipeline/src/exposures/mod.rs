@@ -8,6 +8,7 @@ mod outcome;
 mod triggered;
 
 use std::collections::{BTreeMap, VecDeque};
+use std::time::Duration;
 
 use vergence_protocol::{Microseconds, TriggerMark};
 use vergence_rig::{BoardInstant, ClockMap, ExposureTiming, HostInstant, StampedImage};
@@ -148,9 +149,7 @@ impl<T> Exposures<T> {
         *camera = CameraQueue { timing: Some(timing), gone: None, images: BTreeMap::new() };
         match &mut self.pairing {
             Pairing::Triggered(triggered) => triggered.camera_ready(side, timing),
-            Pairing::FreeRunning(free) => {
-                free.set_periods(self.cameras.each_ref().map(|camera| camera.timing.map(|timing| timing.period)));
-            }
+            Pairing::FreeRunning(free) => free.set_periods(periods(&self.cameras)),
         }
         self.decide(base);
     }
@@ -197,15 +196,14 @@ impl<T> Exposures<T> {
     /// The link to the board ended, so that no pulses are reported: images are paired by their time stamps, like those of cameras that run
     /// freely.
     pub fn link_ended(&mut self) {
-        if matches!(self.pairing, Pairing::Triggered(_)) {
-            for _ in 0..self.open() - self.results.ready.len() as u64 {
-                self.results.skip(SkipReason::LinkEnded);
-            }
-            self.give_up_waiting();
-            let mut free = FreeRunning::default();
-            free.set_periods(self.cameras.each_ref().map(|camera| camera.timing.map(|timing| timing.period)));
-            self.pairing = Pairing::FreeRunning(free);
+        let Pairing::Triggered(triggered) = &self.pairing else { return };
+        for _ in 0..triggered.open() {
+            self.results.skip(SkipReason::LinkEnded);
         }
+        self.give_up_waiting();
+        let mut free = FreeRunning::default();
+        free.set_periods(periods(&self.cameras));
+        self.pairing = Pairing::FreeRunning(free);
     }
 
     /// The link to the board is back, and reports pulses again.
@@ -243,4 +241,9 @@ impl<T> Exposures<T> {
             Pairing::FreeRunning(free) => free.decide(&mut self.cameras, base, &mut self.results),
         }
     }
+}
+
+/// The time from image to image of each camera (left, right) that has been there.
+fn periods<T>(cameras: &[CameraQueue<T>; 2]) -> [Option<Duration>; 2] {
+    cameras.each_ref().map(|camera| camera.timing.map(|timing| timing.period))
 }

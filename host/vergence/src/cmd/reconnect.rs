@@ -90,8 +90,19 @@ impl Listening {
 /// # Errors
 /// A board that came back with another protocol or rig.
 pub async fn reconnect(common: &CommonOptions, console: Console, lost: Failure) -> Result<Board, Failure> {
+    reconnect_by(async || connect_with(common, ProgressBar::hidden()).await, console, lost).await
+}
+
+/// As [`reconnect`], where `connect` connects.
+///
+/// # Errors
+/// As there.
+pub async fn reconnect_by(
+    connect: impl AsyncFnMut() -> Result<Board, Failure>,
+    console: Console,
+    lost: Failure,
+) -> Result<Board, Failure> {
     console.warn(format!("{lost}\ntrying to reach it again; Ctrl-C ends this"));
-    let connect = async || connect_with(common, ProgressBar::hidden()).await;
     let may_pass = |failure: &Failure| matches!(failure.kind(), FailureKind::Device | FailureKind::Link);
     let board = reach_again(lost, connect, may_pass, |failure| console.warn(failure)).await?;
     console.warn(format!("connected again: {}", describe_pose(board.rig(), board.pose())));

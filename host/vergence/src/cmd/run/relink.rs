@@ -1,15 +1,16 @@
 //! What `vergence run` does when the link to the board ends: it goes on with the last pose, and reaches the board again.
 
 use tokio::sync::mpsc::{Receiver, Sender, channel};
-use vergence_board::{Board, Continuity, describe_pose, reach_again};
+use vergence_board::{Board, Continuity};
 use vergence_protocol::{Request, Trigger, TriggerMark};
 use vergence_rig::Rig;
 
 use crate::cli::CommonOptions;
 use crate::cmd::connect::connect_again;
+use crate::cmd::reconnect::reconnect_by;
 use crate::cmd::taking_options::LiveRig;
 use crate::console::{Console, shown_on};
-use crate::failure::{Failure, FailureKind};
+use crate::failure::Failure;
 use crate::sim::Plug;
 
 /// Pulses that may wait; the loop takes them at once.
@@ -44,12 +45,10 @@ impl Relink {
     /// # Errors
     /// A board that came back with another protocol or rig.
     pub async fn reach(&self, lost: Failure, console: Console) -> Result<Board, Failure> {
-        console.warn(format!("{lost}\ntrying to reach it again; Ctrl-C ends this"));
-        let connect = async || self.connect(console).await;
-        let may_pass = |failure: &Failure| matches!(failure.kind(), FailureKind::Device | FailureKind::Link);
-        let board = reach_again(lost, connect, may_pass, |failure| console.warn(failure)).await?;
-        let homes = if board.is_referenced() { "" } else { "; its axes have no reference: a line 'home' homes them" };
-        console.warn(format!("connected again: {}{homes}", describe_pose(board.rig(), board.pose())));
+        let board = reconnect_by(async || self.connect(console).await, console, lost).await?;
+        if !board.is_referenced() {
+            console.warn("its axes have no reference: a line 'home' homes them");
+        }
         Ok(board)
     }
 
