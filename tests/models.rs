@@ -148,9 +148,12 @@ fn the_faster_runtime_is_on_record_and_another_can_be_asked_for() {
     assert!(record.contains("rten_seconds"), "{record}");
     let asked = depth_of_black(folder.path(), &store, &["tiny", "--runtime", "rten"]);
     assert!(text(&asked.stdout).contains("tiny on rten (as asked)"), "{}", text(&asked.stdout));
-    let missing = depth_of_black(folder.path(), &store, &["tiny", "--onnxruntime", "/nonexistent/libonnxruntime.so"]);
-    assert_eq!(missing.status.code(), Some(2));
-    assert!(text(&missing.stderr).contains("ONNX Runtime cannot be used"), "{}", text(&missing.stderr));
+    for runtime in [&[][..], &["--runtime", "cuda"], &["--runtime", "webgpu"]] {
+        let named = ["tiny", "--onnxruntime", "/nonexistent/libonnxruntime.so"];
+        let missing = depth_of_black(folder.path(), &store, &[&named, runtime].concat());
+        assert_eq!(missing.status.code(), Some(2));
+        assert!(text(&missing.stderr).contains("ONNX Runtime cannot be used"), "{}", text(&missing.stderr));
+    }
 }
 
 /// At 120° networks find many times as much in views as in whole images, and nearly all of it is right.

@@ -27,6 +27,7 @@ pub use pull::{Pull, Pulled};
 pub use runtime::{Runtime, RuntimeKind, Runtimes, threads};
 pub use speed::Speed;
 pub use store::{MODEL_FILE, ModelStore, intact, load, read_manifest};
+pub use vergence_networks::Processor;
 pub use verify::{Verdict, verify};
 
 /// Returns the time since some fixed instant. Libraries read no clock of their own.

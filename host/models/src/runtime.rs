@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use vergence_matching::learned::{Manifest, Model, Network, NetworkError};
-use vergence_networks::{OnnxRuntime, load_rten};
+use vergence_networks::{OnnxRuntime, Processor, load_rten};
 
 use crate::error::ModelsError;
 use crate::speed::Speed;
@@ -30,8 +30,8 @@ pub struct Runtimes {
 pub enum RuntimeKind {
     /// rten, in pure Rust.
     Rten,
-    /// Microsoft's ONNX Runtime.
-    OnnxRuntime,
+    /// Microsoft's ONNX Runtime on a processor.
+    OnnxRuntime(Processor),
 }
 
 /// Threads that this machine runs at once.
@@ -50,8 +50,10 @@ impl Runtimes {
         if self.wanted == Some(RuntimeKind::Rten) {
             return Ok((Runtime::Rten, "as asked".into()));
         }
-        match (self.onnx_runtime()?, Speed::read(folder)) {
-            (Err(why), _) if self.wanted == Some(RuntimeKind::OnnxRuntime) => Err(ModelsError::NoOnnxRuntime(why)),
+        let speed = Speed::read(folder);
+        let processor = self.processor().or(speed.as_ref().map(|speed| speed.processor)).unwrap_or_default();
+        match (self.onnx_runtime(processor)?, speed) {
+            (Err(why), _) if self.wanted.is_some() => Err(ModelsError::NoOnnxRuntime(why)),
             (Err(why), _) => Ok((Runtime::Rten, why)),
             (Ok(found), _) if self.wanted.is_some() => Ok((found, "as asked".into())),
             (Ok(found), Some(speed)) => Ok(faster(found, &speed)),
@@ -64,13 +66,22 @@ impl Runtimes {
     /// # Errors
     /// Fails if the named library cannot be loaded.
     pub fn all(&self) -> Result<Vec<Runtime>, ModelsError> {
-        Ok(std::iter::once(Runtime::Rten).chain(self.onnx_runtime()?).collect())
+        Ok(std::iter::once(Runtime::Rten).chain(self.onnx_runtime(self.processor().unwrap_or_default())?).collect())
+    }
+
+    /// The processor that ONNX Runtime must use.
+    fn processor(&self) -> Option<Processor> {
+        match self.wanted {
+            Some(RuntimeKind::OnnxRuntime(processor)) => Some(processor),
+            Some(RuntimeKind::Rten) | None => None,
+        }
     }
 
     /// The named library, which must then load; else one that pip installed, or why none of them loads.
-    fn onnx_runtime(&self) -> Result<Result<Runtime, String>, ModelsError> {
-        let load =
-            |library: PathBuf| OnnxRuntime::load(&library, threads()).map(|found| Runtime::OnnxRuntime(found, library));
+    fn onnx_runtime(&self, processor: Processor) -> Result<Result<Runtime, String>, ModelsError> {
+        let load = |library: PathBuf| {
+            OnnxRuntime::load(&library, threads(), processor).map(|found| Runtime::OnnxRuntime(found, library))
+        };
         match &self.library {
             Some(named) => load(named.clone()).map(Ok).map_err(ModelsError::Load),
             None => Ok(installed_by_pip()
@@ -97,7 +108,7 @@ impl Runtime {
     pub fn name(&self) -> &'static str {
         match self {
             Self::Rten => "rten",
-            Self::OnnxRuntime(..) => "ONNX Runtime",
+            Self::OnnxRuntime(runtime, _) => runtime.processor().runtime_name(),
         }
     }
 

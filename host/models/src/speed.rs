@@ -4,6 +4,7 @@ use std::path::{Path, PathBuf};
 
 use serde::{Deserialize, Serialize};
 use vergence_matching::learned::Model;
+use vergence_networks::Processor;
 
 use crate::Clock;
 use crate::error::ModelsError;
@@ -29,6 +30,9 @@ pub struct Speed {
     pub onnxruntime_seconds: Option<f64>,
     /// The ONNX Runtime library that was timed.
     pub onnxruntime: Option<PathBuf>,
+    /// What computed for ONNX Runtime.
+    #[serde(default)]
+    pub processor: Processor,
 }
 
 impl Speed {
@@ -43,7 +47,8 @@ impl Speed {
             let seconds = load(folder, runtime).ok().and_then(|model| seconds(&model, clock));
             match runtime {
                 Runtime::Rten => speed.rten_seconds = seconds,
-                Runtime::OnnxRuntime(_, library) => {
+                Runtime::OnnxRuntime(onnx, library) => {
+                    speed.processor = onnx.processor();
                     speed.onnxruntime_seconds = seconds;
                     speed.onnxruntime = Some(library.clone());
                 }
@@ -79,4 +84,18 @@ fn seconds(model: &Model, clock: Clock) -> Option<f64> {
     };
     let runs: Option<Vec<f64>> = (0..RUNS).map(run).collect();
     runs?.into_iter().reduce(f64::min)
+}
+
+#[cfg(test)]
+#[allow(clippy::expect_used, reason = "a test fails loudly")]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_record_without_a_processor_is_of_the_machines_own() {
+        let record: Speed = toml::from_str("threads = 2\nonnxruntime_seconds = 0.5\n").expect("an older record");
+        assert_eq!(record.processor, Processor::Cpu);
+        let text = toml::to_string(&Speed { processor: Processor::Cuda, ..record.clone() }).expect("a record");
+        assert_eq!(toml::from_str::<Speed>(&text).expect("as written").processor, Processor::Cuda);
+    }
 }

@@ -8,6 +8,8 @@ use ort::session::{Session, SessionInputValue};
 use ort::value::{DynValue, Outlet as OrtOutlet, TensorElementType, Value, ValueType};
 use vergence_matching::learned::{Elements, Network, NetworkError, Outlet, Signature, Tensor};
 
+use crate::processor::Processor;
+
 const NAME: &str = "ONNX Runtime";
 
 /// The library that this process has loaded with its environment; a process can load only one.
@@ -17,14 +19,16 @@ static LOADED: Mutex<Option<(PathBuf, Environment)>> = Mutex::new(None);
 pub struct OnnxRuntime {
     environment: Environment,
     threads: usize,
+    processor: Processor,
 }
 
 impl OnnxRuntime {
-    /// Loads `library` (`libonnxruntime.so`), unless it is loaded already. Each network will use `threads` threads.
+    /// Loads `library` (`libonnxruntime.so`), unless it is loaded already. Each network will use `threads` threads of the
+    /// machine's own processor for what `processor` does not compute.
     ///
     /// # Errors
     /// [`NetworkError::Runtime`] where the library is missing or too old, or another one is loaded already.
-    pub fn load(library: &Path, threads: usize) -> Result<Self, NetworkError> {
+    pub fn load(library: &Path, threads: usize, processor: Processor) -> Result<Self, NetworkError> {
         let mut loaded = LOADED.lock().unwrap_or_else(PoisonError::into_inner);
         let environment = match &*loaded {
             Some((path, environment)) if path == library => environment.clone(),
@@ -38,18 +42,28 @@ impl OnnxRuntime {
                 environment
             }
         };
-        Ok(Self { environment, threads })
+        Ok(Self { environment, threads, processor })
+    }
+
+    /// What computes.
+    #[must_use]
+    pub fn processor(&self) -> Processor {
+        self.processor
     }
 
     /// Loads a network from the bytes of an ONNX file; `name` appears in messages.
     ///
     /// # Errors
-    /// [`NetworkError::Load`] where the runtime does not support the file.
+    /// [`NetworkError::Load`] where the runtime does not support the file, or cannot use the processor.
     pub fn network(&self, name: &str, bytes: &[u8]) -> Result<Box<dyn Network>, NetworkError> {
         let failed =
             |error: &dyn std::fmt::Display| NetworkError::Load { network: name.into(), reason: error.to_string() };
         let builder = Session::builder(&self.environment).map_err(|error| failed(&error))?;
         let mut builder = builder.with_intra_threads(self.threads).map_err(|error| failed(&error))?;
+        if let Some(provider) = self.processor.provider() {
+            let registered = builder.with_execution_providers([provider]);
+            builder = registered.map_err(|error| failed(&self.processor.unusable(&error.to_string())))?;
+        }
         let session = builder.commit_from_memory(bytes).map_err(|error| failed(&error))?;
         let outlets = |outlets: &[OrtOutlet]| outlets.iter().map(outlet).collect();
         let signature = Signature { inputs: outlets(session.inputs()), outputs: outlets(session.outputs()) };

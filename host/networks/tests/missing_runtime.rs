@@ -4,10 +4,11 @@
 use std::path::Path;
 
 use vergence_matching::learned::NetworkError;
-use vergence_networks::OnnxRuntime;
+use vergence_networks::{OnnxRuntime, Processor};
 
 #[test]
 fn a_missing_runtime_is_an_error() {
-    let error = OnnxRuntime::load(Path::new("/nonexistent/libonnxruntime.so"), 1).err().expect("refused");
+    let error =
+        OnnxRuntime::load(Path::new("/nonexistent/libonnxruntime.so"), 1, Processor::Cpu).err().expect("refused");
     assert!(matches!(error, NetworkError::Runtime { .. }), "{error}");
 }

@@ -15,7 +15,7 @@ use std::path::{Path, PathBuf};
 
 use data::{real_data, say_skipped};
 use vergence_matching::learned::{GreyImage, Manifest, Model, Network, NetworkError};
-use vergence_networks::{OnnxRuntime, load_rten};
+use vergence_networks::{OnnxRuntime, Processor, load_rten};
 
 const KEYPOINTS: usize = 1024;
 const FILES: [&str; 2] = ["xfeat_top4096_f32.onnx", "lighterglue_l6_f32.onnx"];
@@ -60,8 +60,24 @@ fn onnx_runtime_finds_what_python_finds() {
         say_skipped("ORT_DYLIB_PATH names no ONNX Runtime");
         return;
     };
-    let runtime = OnnxRuntime::load(Path::new(&library), 2).expect("a runtime");
+    let runtime = OnnxRuntime::load(Path::new(&library), 2, Processor::Cpu).expect("a runtime");
     let counts = count_matches(&folder, &model(&folder, |name, bytes| runtime.network(name, bytes)));
     println!("ONNX Runtime: {counts:?}");
+    expect_reference(counts);
+}
+
+/// Sums in another order move a score by parts in a million, so that a few matches at the limit come or go.
+#[test]
+fn a_graphics_processor_finds_what_python_finds() {
+    let Some(folder) = models() else { return };
+    let processor = match std::env::var("VERGENCE_GRAPHICS").as_deref() {
+        Ok("cuda") => Processor::Cuda,
+        Ok("webgpu") => Processor::WebGpu,
+        _ => return say_skipped("VERGENCE_GRAPHICS names neither cuda nor webgpu"),
+    };
+    let library = std::env::var_os("ORT_DYLIB_PATH").expect("ORT_DYLIB_PATH names an ONNX Runtime");
+    let runtime = OnnxRuntime::load(Path::new(&library), 2, processor).expect("a runtime");
+    let counts = count_matches(&folder, &model(&folder, |name, bytes| runtime.network(name, bytes)));
+    println!("{}: {counts:?}", processor.runtime_name());
     expect_reference(counts);
 }

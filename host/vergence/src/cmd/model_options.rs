@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use vergence_matching::learned::LearnedMatcher;
 use vergence_matching::{GuidedMatcher, Matcher, TrackingMatcher};
-use vergence_models::{ModelName, ModelStore, ModelsError, Runtime, RuntimeKind, Runtimes, choose};
+use vergence_models::{ModelName, ModelStore, ModelsError, Processor, Runtime, RuntimeKind, Runtimes, choose};
 
 use crate::console::Console;
 use crate::failure::Failure;
@@ -30,8 +30,9 @@ impl StoreOptions {
 /// The program that runs the networks.
 #[derive(Clone, Debug, Default, clap::Args)]
 pub struct RuntimeOptions {
-    /// What runs the networks: `rten` or `onnxruntime`. Without it the one that was faster when the model was added or last
-    /// verified, see `vergence models verify`.
+    /// What runs the networks: `rten` or `onnxruntime`, both on the machine's own processor, or ONNX Runtime on a graphics
+    /// processor: `cuda` or `webgpu`. Without it the one that was faster when the model was added or last verified, see
+    /// `vergence models verify`.
     #[arg(long, value_name = "NAME")]
     runtime: Option<RuntimeName>,
     /// The ONNX Runtime library, such as libonnxruntime.so. Without it one that pip installed.
@@ -44,6 +45,9 @@ enum RuntimeName {
     Rten,
     #[value(name = "onnxruntime")]
     OnnxRuntime,
+    Cuda,
+    #[value(name = "webgpu")]
+    WebGpu,
 }
 
 impl RuntimeOptions {
@@ -58,7 +62,9 @@ impl RuntimeOptions {
     fn runtimes(&self) -> Runtimes {
         let wanted = self.runtime.map(|name| match name {
             RuntimeName::Rten => RuntimeKind::Rten,
-            RuntimeName::OnnxRuntime => RuntimeKind::OnnxRuntime,
+            RuntimeName::OnnxRuntime => RuntimeKind::OnnxRuntime(Processor::Cpu),
+            RuntimeName::Cuda => RuntimeKind::OnnxRuntime(Processor::Cuda),
+            RuntimeName::WebGpu => RuntimeKind::OnnxRuntime(Processor::WebGpu),
         });
         Runtimes { wanted, library: self.onnxruntime.clone() }
     }
