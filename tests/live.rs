@@ -304,7 +304,7 @@ fn a_dead_camera_leaves_bearings_and_its_return_clouds() {
     assert!(kinds[first..=last].iter().all(|kind| *kind == "bearings"), "{kinds:?}");
     let line = &results[first];
     assert_eq!((line["camera"].as_str(), line["dead"]["camera"].as_str()), (Some("right"), Some("left")));
-    assert_eq!(line["without"], serde_json::json!(["camera_lost"]));
+    assert!(line["without"].as_array().is_some_and(|rungs| rungs.contains(&"camera_lost".into())), "{line}");
     assert!(line["dead"]["why"].as_str().is_some_and(|why| why.contains("unplugged")));
     let rows = line["bearings"]["rows"].as_array().expect("rows");
     assert!(rows.len() > 50, "{}", rows.len());

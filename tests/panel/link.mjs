@@ -30,8 +30,10 @@ await browse(executablePath, async ({ open, holds, text, shot, passed, serious }
   const before = await text(page, '#axes .now');
   await page.click('#modes button:has-text("herbivore")');
   await holds(page, () => /the order is refused/.test(document.querySelector('#log').textContent));
+  passed('an order is refused');
   await holds(page, () => /link .* ms/.test(document.querySelector('#link-chip').textContent));
-  await holds(page, () => document.querySelector('#ladder-chip').hidden && document.querySelector('#state').textContent === 'idle');
+  passed(await text(page, '#link-chip'));
+  await holds(page, () => !/link lost/.test(document.querySelector('#ladder-chip').textContent) && document.querySelector('#state').textContent === 'idle');
   await holds(page, () => /back after/.test(document.querySelector('#log').textContent));
   assert.equal(await text(page, '#axes .now'), before);
   passed('the link is back, and nothing moved');
