@@ -87,9 +87,9 @@ struct Seen {
     moves_done: AtomicU64,
     moves_asked: AtomicU64,
     slow_pages: AtomicU64,
-    /// Wrong matches and all: while the stages move, and of clouds of stages that stand in a new mode.
-    moving: [AtomicU64; 2],
-    after: [AtomicU64; 2],
+    /// Wrong matches, those that would be wrong with the next one's partner, and all: while the stages move, and of clouds of stages that stand in a new mode.
+    moving: [AtomicU64; 3],
+    after: [AtomicU64; 3],
     is_over: AtomicBool,
 }
 
@@ -300,10 +300,11 @@ fn memory_stays_flat_nothing_is_lost_matches_are_right_and_pages_cost_little() {
         100.0 * taken
     );
     println!("{done} of {asked} moves done; the page that never reads came {slow} times; {end}");
-    let wrong = |name: &str, counts: &[AtomicU64; 2]| {
-        let [wrong, all] = counts.each_ref().map(|count| count.load(Ordering::Relaxed));
+    let wrong = |name: &str, counts: &[AtomicU64; 3]| {
+        let [wrong, swapped, all] = counts.each_ref().map(|count| count.load(Ordering::Relaxed));
         let share = wrong as f64 / all as f64;
-        println!("{name}: {wrong} of {all} matches are wrong ({:.3} %)", 100.0 * share);
+        println!("{name}: {wrong} of {all} matches are wrong ({:.3} %), {swapped} with other partners", 100.0 * share);
+        assert!(10 * swapped > 9 * all, "the check finds matches that are wrong");
         share
     };
     if large.is_none() {

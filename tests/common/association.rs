@@ -29,21 +29,26 @@ impl Judge {
         Self { rig, left }
     }
 
-    /// How many matches of a cloud are wrong, and how many there are. The encoders tell the pose to a fraction of a pixel.
-    pub fn wrong(&self, header: &Value, payload: &[u8]) -> [u64; 2] {
+    /// How many matches of a cloud are wrong, how many would be if each had the partner of the next, and how many there are. The encoders tell
+    /// the pose to a fraction of a pixel.
+    pub fn wrong(&self, header: &Value, payload: &[u8]) -> [u64; 3] {
         let axes = header["axes"].as_array().expect("axes");
         let [baseline, separation] = [0, 1].map(|axis: usize| axes[axis].as_f64().expect("a position"));
         let pose = self.rig.pose_at_values(&[baseline, separation.to_radians()]);
         let count = header["count"].as_u64().expect("a count");
-        let details = &payload[PLACE * count as usize..];
-        let pixels = details.chunks(DETAILS).map(|detail| {
-            let number = |at: usize| {
-                let bytes = detail[4 * at..4 * at + 4].try_into().expect("four bytes");
-                f64::from(f32::from_le_bytes(bytes))
-            };
-            [Pixel { u: number(6), v: number(7) }, Pixel { u: number(8), v: number(9) }]
-        });
-        [pixels.filter(|pair| !self.is_right(&pose, *pair)).count() as u64, count]
+        let details = payload[PLACE * count as usize..].chunks(DETAILS);
+        let pixels: Vec<[Pixel; 2]> = details
+            .map(|detail| {
+                let number = |at: usize| {
+                    f64::from(f32::from_le_bytes(detail[4 * at..4 * at + 4].try_into().expect("four bytes")))
+                };
+                [Pixel { u: number(6), v: number(7) }, Pixel { u: number(8), v: number(9) }]
+            })
+            .collect();
+        let wrong = pixels.iter().filter(|pair| !self.is_right(&pose, **pair)).count() as u64;
+        let others = pixels.iter().cycle().skip(1);
+        let swapped = pixels.iter().zip(others).filter(|(one, other)| !self.is_right(&pose, [one[0], other[1]]));
+        [wrong, swapped.count() as u64, count]
     }
 
     /// Whether both pixels show the same place.
