@@ -110,7 +110,7 @@ impl Bench {
         };
         let limits = Limits { results: Some(MOST), time: Some(Duration::from_secs(60)) };
         tokio::select! {
-            ended = live.run(limits, &mut totals, seen, warn) => drop(ended),
+            ended = live.run(limits, &mut totals, seen, |notice| warn(notice.to_string())) => drop(ended),
             error = tour.drive(Some(board), pending(), async || order.notified().await, warn) => panic!("{error}"),
         }
         println!("{totals:?}");
@@ -239,15 +239,19 @@ fn run_goes_on_by_images_and_comes_back_when_told_to_home() {
     let mut process = command.spawn().expect("the binary runs");
     let mut orders = process.stdin.take().expect("piped");
     let lines = BufReader::new(process.stdout.take().expect("piped")).lines();
-    let (mut by_images, mut back) = (0, 0);
+    let (mut by_images, mut back, mut steps) = (0, 0, Vec::new());
     for line in lines.map_while(Result::ok) {
         let line: Value = serde_json::from_str(&line).expect("JSON");
+        if line["kind"] == "status" {
+            steps.push((line["rung"].clone(), line["lost"] == true));
+        }
         if line["kind"] != "cloud" {
             continue;
         }
         let told = &line["axes_by_images"]["separation"];
         if told.is_object() {
             by_images += 1;
+            assert_eq!(line["without"], serde_json::json!(["encoder_lost"]));
             println!("{told} {}", line["pose_source"]["pairs"]);
             assert_eq!(
                 (told["unit"].as_str(), line["pose_source"]["from"].as_str()),
@@ -268,4 +272,5 @@ fn run_goes_on_by_images_and_comes_back_when_told_to_home() {
     process.wait().expect("it ends");
     assert!(by_images > 0 && back == 2, "{by_images} {back} {said}");
     assert!(said.contains("separation") && said.contains("home"), "{said}");
+    assert_eq!(steps, [("encoder_lost".into(), true), ("encoder_lost".into(), false)], "{said}");
 }

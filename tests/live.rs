@@ -169,7 +169,9 @@ fn live(folder: &Path, arguments: &[&str]) -> (Vec<Value>, String) {
     let all = ["--port", "sim", "--rig", rig.to_str().expect("a name"), "run", "--cameras", "sim", "--home", "--json"];
     let output = run(&[&all, arguments].concat());
     assert!(output.status.success(), "{}", text(&output.stderr));
-    (lines(&output.stdout), text(&output.stderr))
+    let mut lines = lines(&output.stdout);
+    lines.retain(|line| line["kind"] != "status");
+    (lines, text(&output.stderr))
 }
 
 /// Images smaller than the rig file's: no pixel of a cloud lies beyond them, and the lens shows the same field in them.
@@ -198,7 +200,7 @@ fn run_measures_the_newest_pair_while_the_stages_move() {
     let name = out.to_str().expect("a name");
     let tour = ["--mode", "herbivore", "--mode", "human", "--stay", "100ms"];
     let pace = ["--rate", "20", "--match-time", "700ms", "--frames", "6"];
-    let (lines, _) = live(folder.path(), &[&tour[..], &pace, &["--out", name, "--also", "csv,json"]].concat());
+    let (lines, said) = live(folder.path(), &[&tour[..], &pace, &["--out", name, "--also", "csv,json"]].concat());
     let (end, clouds) = lines.split_last().expect("lines");
     assert_eq!(clouds.len(), 6);
     let separations: Vec<f64> =
@@ -216,7 +218,8 @@ fn run_measures_the_newest_pair_while_the_stages_move() {
     }
     assert!(clouds[0]["rate_hz"].is_null(), "one result has no rate");
     assert!(clouds[5]["rate_hz"].as_f64().is_some_and(|rate| (1.2..1.5).contains(&rate)), "{}", clouds[5]["rate_hz"]);
-    assert_eq!(clouds[5]["limited_by"], "matching");
+    assert_eq!((&clouds[5]["limited_by"], &clouds[5]["without"][0]), (&"matching".into(), &"lower_rate".into()));
+    assert!(said.contains("lower rate"), "{said}");
     // Twenty pairs each second, one of which is measured each 0.7 s: the rest is counted, not queued.
     let newer = end["skipped"]["newer_came"].as_u64().expect("counted");
     assert!((60..=95).contains(&newer), "{}", end["skipped"]);
@@ -301,6 +304,7 @@ fn a_dead_camera_leaves_bearings_and_its_return_clouds() {
     assert!(kinds[first..=last].iter().all(|kind| *kind == "bearings"), "{kinds:?}");
     let line = &results[first];
     assert_eq!((line["camera"].as_str(), line["dead"]["camera"].as_str()), (Some("right"), Some("left")));
+    assert!(line["without"].as_array().is_some_and(|rungs| rungs.contains(&"camera_lost".into())), "{line}");
     assert!(line["dead"]["why"].as_str().is_some_and(|why| why.contains("unplugged")));
     let rows = line["bearings"]["rows"].as_array().expect("rows");
     assert!(rows.len() > 50, "{}", rows.len());

@@ -56,6 +56,17 @@ fn people_see_and_drive_the_rig_in_a_browser() {
     }
 }
 
+/// The cable is pulled for a while: pages say so, orders are refused, and the board is reached again without a restart.
+#[test]
+fn people_see_in_a_browser_that_the_link_is_lost_and_back() {
+    let Some(browser) = browser() else { return };
+    let mut served = Served::start(&[&small("127.0.0.1:0")[..], &["--unplug", "link@25s..33s"]].concat());
+    watch("link.mjs", &browser, &served.url);
+    let said = served.terminate();
+    let end: serde_json::Value = serde_json::from_str(said.lines().last().expect("an end")).expect("JSON");
+    assert!(end["clouds"].as_u64() > Some(5), "{end}");
+}
+
 #[test]
 fn people_watch_in_a_browser_how_a_calibration_fills() {
     let Some(browser) = browser() else { return };

@@ -1,4 +1,5 @@
-//! A simulated rig in real time with panel, recording and three pages: memory, losses, and what the pages cost.
+//! A simulated rig in real time with panel, recording and three pages: memory, losses, what the pages cost, and whether matches are right while
+//! and after the mode changes.
 //!
 //! A minute; `VERGENCE_SOAK_MINUTES=30` for the long run, which needs 5 GB for its recording. Board, stages and cameras are simulated
 //! in the process that is measured, so that its computing time holds the rendering of the images, which a real rig does not do.
@@ -13,6 +14,8 @@
 )]
 #![allow(clippy::disallowed_methods, reason = "another process is watched in real time")]
 
+#[path = "common/association.rs"]
+mod association;
 mod common;
 
 use std::collections::BTreeMap;
@@ -24,12 +27,14 @@ use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::thread::{JoinHandle, sleep, spawn};
 use std::time::{Duration, Instant};
 
+use association::Judge;
 use common::served::Served;
 use serde_json::{Value, json};
 use tungstenite::client::{IntoClientRequest, client};
 use tungstenite::http::HeaderValue;
 use tungstenite::{Error, Message, WebSocket};
 use vergence_recording::{Event, Reader};
+use vergence_rig::{BENCH_TOML, Rig};
 
 /// Length of the short run.
 const SHORT: Duration = Duration::from_secs(60);
@@ -39,6 +44,12 @@ const WARM: f64 = 0.45;
 const GROWTH_MB: f64 = 20.0;
 /// The most that pages may take of the computing time that the cores have: so much less has a pipeline that uses them all.
 const PAGES_SHARE: f64 = 0.03;
+/// Width of small images in pixels.
+const SMALL: u32 = 320;
+/// Time in a mode before the next.
+const STAY: Duration = Duration::from_secs(2);
+/// The largest part of the matches that may be wrong after a change of the mode.
+const WRONG: f64 = 0.01;
 /// Ticks a second in `/proc/PID/stat` (`getconf CLK_TCK`, 100 on every Linux).
 const TICKS: f64 = 100.0;
 
@@ -54,13 +65,13 @@ fn open(address: &str) -> Socket {
     client(request, stream).map(|(socket, _)| socket).expect("the page is let in")
 }
 
-/// A message or its header; `None` where none came in time.
-fn read(socket: &mut Socket) -> Option<Value> {
+/// A message or its header, and what follows that; `None` where none came in time.
+fn read(socket: &mut Socket) -> Option<(Value, Vec<u8>)> {
     match socket.read() {
-        Ok(Message::Text(text)) => serde_json::from_str(&text).ok(),
+        Ok(Message::Text(text)) => Some((serde_json::from_str(&text).ok()?, Vec::new())),
         Ok(Message::Binary(bytes)) => {
             let length = u32::from_le_bytes(bytes[..4].try_into().expect("four bytes")) as usize;
-            serde_json::from_slice(&bytes[4..4 + length]).ok()
+            Some((serde_json::from_slice(&bytes[4..4 + length]).ok()?, bytes[4 + length..].to_vec()))
         }
         Err(Error::Io(error)) if matches!(error.kind(), ErrorKind::WouldBlock | ErrorKind::TimedOut) => None,
         Ok(_) => None,
@@ -76,6 +87,9 @@ struct Seen {
     moves_done: AtomicU64,
     moves_asked: AtomicU64,
     slow_pages: AtomicU64,
+    /// Wrong matches, those that would be wrong with the next one's partner, and all: while the stages move, and of clouds of stages that stand in a new mode.
+    moving: [AtomicU64; 3],
+    after: [AtomicU64; 3],
     is_over: AtomicBool,
 }
 
@@ -93,15 +107,20 @@ fn drive(address: &str, seen: &Seen) {
     };
     say(&mut socket, json!({ "do": "take" }));
     let (mut beat, mut asked, mut modes) = (Instant::now(), None::<&str>, ["human", "herbivore"].iter().cycle());
+    let mut arrived = None::<Instant>;
     while seen.goes_on() {
         if beat.elapsed() > Duration::from_millis(250) {
             say(&mut socket, json!({ "do": "beat" }));
             beat = Instant::now();
         }
-        let Some(message) = read(&mut socket) else { continue };
+        let Some((message, _)) = read(&mut socket) else { continue };
         let is_at_rest = message["kind"] == "status" && message["state"] == "idle" && message["doing"].is_null();
         let is_known = message["referenced"] == json!([true, true]);
         if is_at_rest && is_known && asked.is_none_or(|mode| message["mode"] == mode) {
+            if arrived.get_or_insert_with(Instant::now).elapsed() < STAY {
+                continue;
+            }
+            arrived = None;
             seen.moves_done.fetch_add(u64::from(asked.is_some()), Ordering::Relaxed);
             asked = modes.next().copied();
             seen.moves_asked.fetch_add(1, Ordering::Relaxed);
@@ -111,16 +130,30 @@ fn drive(address: &str, seen: &Seen) {
     }
 }
 
-/// A page that reads all that it gets.
+/// A page that reads all that it gets, and looks at every match where images are small.
 fn watch(address: &str, seen: &Seen) {
     let mut socket = open(address);
+    let bench = Rig::from_toml(BENCH_TOML).expect("the bench").with_sensors(SMALL).expect("small cameras");
+    let judge = size().is_none().then(|| Judge::new(bench));
     while seen.goes_on() {
-        let Some(message) = read(&mut socket) else { continue };
-        if message["kind"] == "cloud" {
-            seen.clouds.fetch_add(1, Ordering::Relaxed);
-            seen.matching_ms.fetch_add(message["work_ms"].as_f64().unwrap_or(0.0) as u64, Ordering::Relaxed);
+        let Some((message, payload)) = read(&mut socket) else { continue };
+        if message["kind"] != "cloud" {
+            continue;
+        }
+        seen.clouds.fetch_add(1, Ordering::Relaxed);
+        seen.matching_ms.fetch_add(message["work_ms"].as_f64().unwrap_or(0.0) as u64, Ordering::Relaxed);
+        if let Some(judge) = judge.as_ref().filter(|_| message["bearings"].is_null()) {
+            let counts = if message["moving"] == true { &seen.moving } else { &seen.after };
+            for (count, more) in counts.iter().zip(judge.wrong(&message, &payload)) {
+                count.fetch_add(more, Ordering::Relaxed);
+            }
         }
     }
+}
+
+/// The size of the images, where it is not the small one.
+fn size() -> Option<String> {
+    std::env::var("VERGENCE_SOAK_SIZE").ok()
 }
 
 /// A page that says it is there and never reads. The panel gives it up after a while; then it comes again.
@@ -207,11 +240,11 @@ fn recorded(folder: &Path) -> (u64, [u64; 2], u64) {
 }
 
 #[test]
-fn memory_stays_flat_nothing_is_lost_and_pages_cost_little() {
+fn memory_stays_flat_nothing_is_lost_matches_are_right_and_pages_cost_little() {
     let folder = tempfile::tempdir().expect("a folder");
     let recording = folder.path().join("recording");
     let name = recording.to_str().expect("a name");
-    let large = std::env::var("VERGENCE_SOAK_SIZE").ok();
+    let large = size();
     let (size, rate) = large.as_deref().map_or(("320x320", "2"), |size| (size, "10"));
     let rig = ["panel", "--port", "sim", "--cameras", "sim", "--home", "--size", size, "--rate", rate];
     let recorded_to: &[&str] = if large.is_none() { &["--record", name] } else { &[] };
@@ -267,6 +300,17 @@ fn memory_stays_flat_nothing_is_lost_and_pages_cost_little() {
         100.0 * taken
     );
     println!("{done} of {asked} moves done; the page that never reads came {slow} times; {end}");
+    let wrong = |name: &str, counts: &[AtomicU64; 3]| {
+        let [wrong, swapped, all] = counts.each_ref().map(|count| count.load(Ordering::Relaxed));
+        let share = wrong as f64 / all as f64;
+        println!("{name}: {wrong} of {all} matches are wrong ({:.3} %), {swapped} with other partners", 100.0 * share);
+        assert!(10 * swapped > 9 * all, "the check finds matches that are wrong");
+        share
+    };
+    if large.is_none() {
+        let shares = [wrong("while the stages move", &seen.moving), wrong("in a new mode", &seen.after)];
+        assert!(shares.iter().all(|share| *share < WRONG), "{shares:?}");
+    }
     assert!(growth < GROWTH_MB || large.is_some(), "memory grows");
     assert!(taken < PAGES_SHARE, "pages cost too much");
     assert!(done + 1 >= asked && done > 2, "an order was lost");

@@ -40,6 +40,8 @@ pub struct LiveCamera {
     shutter: Shutter,
     unplugged: Vec<Unplugged>,
     plugged: Option<bool>,
+    /// Time from a trigger pulse to the start of the exposure.
+    reaction: Duration,
     next_pulse: u32,
     /// Board time in microseconds before which the camera takes no other image.
     ready_us: f64,
@@ -63,6 +65,7 @@ impl LiveCamera {
             shutter,
             unplugged,
             plugged: None,
+            reaction: Duration::ZERO,
             next_pulse: 0,
             ready_us: 0.0,
             seq: 0,
@@ -73,6 +76,12 @@ impl LiveCamera {
     #[must_use]
     pub fn with_rendering(self, rendering: Rendering) -> Self {
         Self { rendering, ..self }
+    }
+
+    /// The same camera, which begins to expose so long after a pulse; without it at once.
+    #[must_use]
+    pub fn reacting_after(self, reaction: Duration) -> Self {
+        Self { reaction, ..self }
     }
 
     /// Side of the camera.
@@ -105,7 +114,7 @@ impl LiveCamera {
             });
         }
         // Images that are in memory by now.
-        let takes = (EXPOSURE + timing.rolling + TRANSFER).as_micros() as u64;
+        let takes = (self.reaction + EXPOSURE + timing.rolling + TRANSFER).as_micros() as u64;
         for pulse in rig.pulses_from(self.next_pulse).filter(|pulse| pulse.at.0 + takes <= rig.now().0) {
             self.next_pulse = pulse.number + 1;
             // A pulse that comes while the last image is taken is missed.
@@ -123,7 +132,7 @@ impl LiveCamera {
 
     /// Renders the image of a pulse when it is wanted, with the motion of the rig as it is remembered now.
     fn develop(&self, rig: &SimulatedRig, pulse: &Pulse, timing: &ExposureTiming) -> Develop {
-        let start = pulse.at.0 as f64;
+        let start = pulse.at.0 as f64 + micros(self.reaction);
         let exposed_us = micros(EXPOSURE + timing.rolling);
         let (motion, built) = (rig.history().between(start, start + exposed_us), rig.rig().clone());
         let middle = start + 0.5 * exposed_us;

@@ -38,8 +38,9 @@ pub use firmware::{
 pub use line_speed::{SpeedChange, change_line_speed};
 pub use link::{
     BoardKnowledge, BoardNews, Client, Continuity, Followed, Follower, HostClock, LastReading, LinkError, LostAxis,
-    ManagementLink, OpenError, OpenWire, Port, PortLock, ReaderMark, RepeatedStop, Told, Wire, describe_port,
-    fresh_session, is_candidate, is_held, is_st_link, is_wanted, open, send_stop, serial_ports, stop_beside,
+    ManagementLink, OpenError, OpenWire, Port, PortLock, PulseChain, ReaderMark, RepeatedStop, Told, Wire,
+    describe_port, fresh_session, is_candidate, is_held, is_st_link, is_wanted, open, send_stop, serial_ports,
+    stop_beside,
 };
 pub use link_figures::{LinkFigures, LinkLosses};
 pub use listening::{Listening, Source, reach_again};

@@ -107,7 +107,7 @@ fn taken(exposure: PosedExposure, rig: &Rig, epoch_us: u64) -> Result<Taken, Exp
         PosedExposure::Pair(images, pose) | PosedExposure::Unseen(images, pose, _) => {
             Taken { images: pair(*images)?, pose: Some(pose.at_middle().clone()) }
         }
-        PosedExposure::Untold(images, _) => Taken { images: pair(*images)?, pose: None },
+        PosedExposure::Untold(images, ..) => Taken { images: pair(*images)?, pose: None },
         PosedExposure::One { side, image, .. } => {
             let mut images = [None, None];
             images[side.index()] = Some(stamped(side, *image)?);

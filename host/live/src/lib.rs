@@ -9,6 +9,7 @@
 mod blindness;
 mod cameras;
 mod error;
+mod ladder;
 mod live_loop;
 mod measure;
 mod orders;
@@ -20,6 +21,7 @@ use std::time::Duration;
 
 pub use cameras::{attach_both, drive, play_both, simulate_both, sized, unplugged};
 pub use error::LiveError;
+pub use ladder::{Notice, Rung, Step};
 pub use live_loop::{Ended, Limits, LiveLoop, LiveResult, MatchingTime, Totals};
 pub use measure::{Measurement, PosedExposure, measure};
 pub use orders::{HOME, homing_orders};

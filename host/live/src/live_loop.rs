@@ -5,6 +5,7 @@ use std::pin::Pin;
 use std::sync::{Arc, Mutex, PoisonError};
 use std::time::Duration;
 
+use serde_json::{Value, json};
 use tokio::sync::mpsc::Receiver;
 use tokio::time::{Instant, interval, sleep, sleep_until};
 use vergence_board::{BoardKnowledge, HostClock};
@@ -16,8 +17,9 @@ use vergence_rig::{Rig, StampedImage};
 use vergence_vision::Side;
 
 use crate::blindness::Blindness;
+use crate::ladder::{Ladder, Notice};
 use crate::measure::{Measurement, PosedExposure, measure};
-use crate::posed::{LONGEST_UNSEEN, Posed, READINGS, pose};
+use crate::posed::{Posed, READINGS, pose};
 use crate::{Clock, LiveError};
 
 /// How often overdue images and pulses are given up.
@@ -66,6 +68,25 @@ impl Totals {
             Observation::Points { .. } => self.clouds += 1,
             Observation::Bearings { .. } => self.bearings += 1,
         }
+    }
+
+    /// All counts for programs, as the last line of a run.
+    #[must_use]
+    pub fn json(&self) -> Value {
+        json!({
+            "kind": "end",
+            "clouds": self.clouds,
+            "bearings": self.bearings,
+            "skipped": self.skipped_json(),
+            "pulses": self.pulses,
+            "open": self.open,
+        })
+    }
+
+    /// What was skipped by reason, for programs.
+    #[must_use]
+    pub fn skipped_json(&self) -> Value {
+        self.skipped.iter().map(|(reason, count)| (reason.as_str().to_owned(), json!(count))).collect()
     }
 
     /// What was skipped, for people; nothing where nothing was.
@@ -164,12 +185,13 @@ impl LiveLoop {
         limits: Limits,
         totals: &mut Totals,
         mut publish: impl FnMut(LiveResult<'_>) -> Result<(), E>,
-        mut warn: impl FnMut(String),
+        mut warn: impl FnMut(Notice),
     ) -> Result<Ended, E> {
         let deadline = limits.time.map(|time| Instant::now() + time);
         let mut settle = interval(SETTLE);
         let (mut work, mut newest): (Option<Work>, Option<Exposed<PendingImage>>) = (None, None);
-        let (mut blindness, mut had_ended, mut over) = (Blindness::default(), false, None::<Instant>);
+        let (mut blindness, mut ladder, mut over) = (Blindness::default(), Ladder::default(), None::<Instant>);
+        let mut had_ended = false;
         loop {
             if work.is_none() {
                 work = newest.take().map(|exposed| self.start(exposed));
@@ -190,7 +212,12 @@ impl LiveLoop {
                 },
                 (exposed_at, done) = finished(&mut work) => {
                     work = None;
-                    self.conclude(exposed_at, done, totals, &mut publish)?;
+                    let result = self.conclude(exposed_at, done, totals)?;
+                    if let Some((measurement, latency)) = &result {
+                        let result = LiveResult { measurement, latency: *latency, totals };
+                        ladder.note_result(&result).into_iter().for_each(&mut warn);
+                        publish(result)?;
+                    }
                     is_done = limits.results.is_some_and(|most| totals.clouds + totals.bearings >= most);
                 }
                 _ = settle.tick() => {
@@ -200,9 +227,12 @@ impl LiveLoop {
                     is_done = deadline.is_some_and(|deadline| Instant::now() >= deadline) || over.is_some_and(is_over);
                 }
             }
+            if let Some(board) = &self.board {
+                ladder.note_board(&self.rig, board, &mut warn);
+            }
             if self.has_ended() != had_ended {
                 had_ended = !had_ended;
-                self.note_link(had_ended, &mut warn);
+                if had_ended { self.exposures.link_ended() } else { self.exposures.link_back() }
             }
             while let Some(exposed) = self.exposures.take() {
                 if newest.replace(exposed).is_some() {
@@ -214,33 +244,32 @@ impl LiveLoop {
             if is_done {
                 return Ok(Ended::Done);
             }
-            self.exposures.take_ambiguity().map(in_words).into_iter().for_each(&mut warn);
+            self.exposures.take_ambiguity().map(in_words).map(Notice::from).into_iter().for_each(&mut warn);
             if blindness.note(self.exposures.gone(), &mut warn) && work.is_none() {
                 return Ok(Ended::Blind);
             }
         }
     }
 
-    /// Counts the outcome of an exposure and publishes its result.
-    fn conclude<E: From<LiveError>>(
+    /// Counts the outcome of an exposure; a measurement comes with the time since its exposure.
+    fn conclude(
         &mut self,
         exposed_at: f64,
         done: Result<Measurement, NoResult>,
         totals: &mut Totals,
-        publish: &mut impl FnMut(LiveResult<'_>) -> Result<(), E>,
-    ) -> Result<(), E> {
+    ) -> Result<Option<(Measurement, Duration)>, LiveError> {
         let measurement = match done {
             Ok(measurement) => measurement,
             Err(NoResult::Skipped(reason)) => {
                 self.exposures.skip(reason);
-                return Ok(());
+                return Ok(None);
             }
-            Err(NoResult::Failed(error)) => return Err(error.into()),
+            Err(NoResult::Failed(error)) => return Err(error),
         };
         totals.count(&measurement.observation);
         totals.skipped.clone_from(self.exposures.skipped());
         let latency = (self.clock.now().0 as f64 - exposed_at).max(0.0);
-        publish(LiveResult { measurement: &measurement, latency: Duration::from_micros(latency as u64), totals })
+        Ok(Some((measurement, Duration::from_micros(latency as u64))))
     }
 
     /// Takes an event of a camera.
@@ -259,20 +288,6 @@ impl LiveLoop {
     /// Whether the link to the board ended.
     fn has_ended(&self) -> bool {
         self.board.as_ref().is_some_and(BoardKnowledge::has_ended)
-    }
-
-    /// Pairs images without pulses as long as nobody reports them.
-    fn note_link(&mut self, has_ended: bool, warn: &mut impl FnMut(String)) {
-        if has_ended {
-            self.exposures.link_ended();
-            warn(format!(
-                "the link to the board ended: for {} s the last pose is used, less and less surely",
-                LONGEST_UNSEEN.as_secs()
-            ));
-        } else {
-            self.exposures.link_back();
-            warn("the link to the board is back: its readings tell the pose again".into());
-        }
     }
 
     fn base(&self) -> TimeBase {

@@ -22,7 +22,8 @@ pub enum PosedExposure {
     /// The images of both cameras of a rig that stood so long ago when its board last told where, because the link ended.
     Unseen(Box<[ExposedImage<PendingImage>; 2]>, Box<PairPose>, Duration),
     /// The images of both cameras of a rig that stands, some of whose axes are told by no encoder.
-    Untold(Box<[ExposedImage<PendingImage>; 2]>, UntoldAxes),
+    /// With the time since the last readings, where the link ended.
+    Untold(Box<[ExposedImage<PendingImage>; 2]>, UntoldAxes, Option<Duration>),
     /// One camera, because the other is gone: its bearings need no pose.
     One {
         /// The camera that delivered.
@@ -90,7 +91,10 @@ pub fn measure(
             unseen = Some(since);
             (images, Ok(pose))
         }
-        PosedExposure::Untold(images, untold) => (images, Err(untold)),
+        PosedExposure::Untold(images, untold, since) => {
+            unseen = since;
+            (images, Err(untold))
+        }
     };
     let (middle, [left, right]) = both(*images)?;
     let (images, decoded) = (PairImages { left: &left, right: &right }, clock());

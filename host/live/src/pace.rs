@@ -34,13 +34,21 @@ impl Limit {
 pub struct Pace {
     /// When each was exposed, in microseconds, and how many exposures had been skipped for newer ones.
     latest: VecDeque<(f64, u64)>,
+    told: Option<(f64, Limit)>,
 }
 
 impl Pace {
     /// Takes one more result. Results per second, and what limits them; `None` with the first one.
     pub fn note(&mut self, result: &LiveResult<'_>) -> Option<(f64, Limit)> {
         let skipped = result.totals.skipped.get(&SkipReason::NewerCame).copied().unwrap_or_default();
-        self.take(result.measurement.middle.us, skipped)
+        self.told = self.take(result.measurement.middle.us, skipped);
+        self.told
+    }
+
+    /// What the last result gave.
+    #[must_use]
+    pub const fn latest(&self) -> Option<(f64, Limit)> {
+        self.told
     }
 
     fn take(&mut self, exposed_us: f64, skipped: u64) -> Option<(f64, Limit)> {

@@ -82,7 +82,7 @@ fn unseen(images: Box<[ExposedImage<PendingImage>; 2]>, rig: &Rig, board: &Board
         let pose = Box::new(PairPose::standing(rig.pose(&joints)));
         return Posed::Ready(PosedExposure::Unseen(images, pose, unseen));
     }
-    Posed::Ready(PosedExposure::Untold(images, UntoldAxes { joints, axes: untold }))
+    Posed::Ready(PosedExposure::Untold(images, UntoldAxes { joints, axes: untold }, Some(unseen)))
 }
 
 /// The exposure of a rig that stands, with the last readings of the axes that no encoder tells.
@@ -104,5 +104,5 @@ fn untold(images: Box<[ExposedImage<PendingImage>; 2]>, track: &JointTrack, lost
     for lost in lost {
         joints.counts.iter_mut().skip(lost.axis).take(1).for_each(|counts| *counts = f64::from(lost.last.0));
     }
-    Posed::Ready(PosedExposure::Untold(images, UntoldAxes { joints, axes }))
+    Posed::Ready(PosedExposure::Untold(images, UntoldAxes { joints, axes }, None))
 }

@@ -4,7 +4,7 @@ const MOVES = ['moving', 'homing', 'stopping'];
 
 export function showHealth(link) {
   let [fault, refusal, closed, extrapolations] = [null, null, true, []];
-  let forget = 0;
+  let [forget, units] = [0, []];
   const banner = () => {
     const text = closed ? 'The panel does not answer: waiting for it to come back. If it was closed, start it again.'
       : fault ? `Fault: ${fault}` : refusal;
@@ -15,6 +15,12 @@ export function showHealth(link) {
     byId('state').textContent = text;
     byId('state').className = `chip strong ${kind}`;
   };
+  // The last pose, and how uncertain it has become.
+  const showLost = ({ lost_s: gone, sigmas, measures }) => {
+    state('no link', 'bad');
+    const known = sigmas ? `last pose ±${sigmas.map((sigma, i) => `${sigma.toFixed(2)} ${units[i] === 'mm' ? 'mm' : '°'}`).join(' ±')}, growing` : 'it moved, and nobody saw where it stopped';
+    byId('link-chip').textContent = `link lost for ${gone.toFixed(0)} s: ${measures ? known : 'nothing is measured until it is back'}`;
+  };
   link.on('open', () => { closed = false; banner(); });
   link.on('closed', () => { closed = true; state('no panel', 'bad'); banner(); });
   link.on('refused', ({ text }) => {
@@ -23,7 +29,8 @@ export function showHealth(link) {
     clearTimeout(forget);
     forget = setTimeout(() => { refusal = null; banner(); }, 6000);
   });
-  link.on('hello', ({ rig, simulated, version }) => {
+  link.on('hello', ({ rig, simulated, version, axes }) => {
+    units = axes.map(({ unit }) => unit);
     byId('rig-name').textContent = `${rig}${simulated ? ' (simulated)' : ''}`;
     byId('rig-name').title = `vergence ${version}${simulated ? `; simulated: ${simulated}` : ''}`;
     document.title = `${rig} · vergence`;
@@ -33,12 +40,20 @@ export function showHealth(link) {
     state(status.state, fault ? 'bad' : MOVES.includes(status.state) ? 'moves' : 'good');
     byId('mode').hidden = !status.mode;
     byId('mode').textContent = status.mode ?? '';
-    const { round_trip_us: trip, poses_lost: lost, retransmitted } = status.link;
+    const { round_trip_us: trip, poses_lost: lost, retransmitted, lost_s: gone } = status.link;
     byId('link-chip').textContent = `link ${trip === null ? 'not measured' : `${(trip / 1000).toFixed(1)} ms`}${lost + retransmitted ? `, lost ${lost}, repeated ${retransmitted}` : ''}`;
     const { error_us: error, lost: clockLost } = status.clock;
     byId('clock-chip').textContent = clockLost ? 'clock lost' : error === null ? 'clock not compared' : `clock ±${error.toFixed(0)} µs`;
     byId('clock-chip').classList.toggle('bad', clockLost);
+    if (gone !== undefined) showLost(status.link);
+    byId('link-chip').classList.toggle('bad', gone !== undefined);
     banner();
+  });
+  // What the live loop does without, in a word each; in whole on the pointer and in the log.
+  link.on('ladder', ({ without }) => {
+    byId('ladder-chip').hidden = without.length === 0;
+    byId('ladder-chip').textContent = without.map(({ rung }) => rung.replaceAll('_', ' ')).join(' · ');
+    byId('ladder-chip').title = without.map(({ text }) => text).join('\n');
   });
   link.on('view', (view) => { extrapolations = view.extrapolations; });
   link.on('cloud', (cloud) => {

@@ -3,6 +3,7 @@
 
 use std::cell::Cell;
 use std::convert::Infallible;
+use std::future::pending;
 use std::sync::Arc;
 use std::time::Duration;
 
@@ -23,11 +24,13 @@ const RECORDER: Duration = Duration::from_secs(1);
 pub struct Driver {
     hub: Arc<Hub>,
     orders: Receiver<Given>,
+    /// The event of the flight recorder that comes next.
+    next_event: u32,
 }
 
 impl Driver {
     pub(crate) fn new(hub: Arc<Hub>, orders: Receiver<Given>) -> Self {
-        Self { hub, orders }
+        Self { hub, orders, next_event: 0 }
     }
 
     /// Follows `board`, and carries orders out until the link ends. Once all axes have their reference, the camera
@@ -35,7 +38,7 @@ impl Driver {
     ///
     /// A stop, an order that replaces another, and a page that drove and is gone or silent end a motion: the stages brake, and the board is
     /// disarmed. A fault ends it too; it stays latched until a page clears it.
-    pub async fn drive(mut self, board: &mut Board, trigger: Option<Trigger>) -> BoardError {
+    pub async fn drive(&mut self, board: &mut Board, trigger: Option<Trigger>) -> BoardError {
         match self.follow(board, trigger).await {
             Ok(never) => match never {},
             Err(error) => error,
@@ -45,7 +48,6 @@ impl Driver {
     async fn follow(&mut self, board: &mut Board, mut trigger: Option<Trigger>) -> Result<Infallible, BoardError> {
         let mut recorder = interval(RECORDER);
         recorder.set_missed_tick_behavior(MissedTickBehavior::Skip);
-        let mut next_event = 0;
         loop {
             if board.is_referenced() {
                 if let Some(trigger) = trigger.take() {
@@ -58,9 +60,18 @@ impl Driver {
                 pose = board.next_pose() => {
                     pose?;
                 }
-                _ = recorder.tick() => read_recorder(&self.hub, board, &mut next_event).await?,
+                _ = recorder.tick() => read_recorder(&self.hub, board, &mut self.next_event).await?,
             }
         }
+    }
+
+    /// Refuses the next order: there is no board, and what is ordered now must not move it when it is back.
+    pub(crate) async fn refuse(&mut self) {
+        // The hub keeps the sender.
+        let Some(Given { told, .. }) = self.orders.recv().await else { return pending().await };
+        let said = "there is no link to the board: the order is refused, and not kept for later";
+        self.hub.note(Level::Warning, said);
+        tell(told, Err(said.to_owned()));
     }
 
     /// Carries out an order, and those that replace it.

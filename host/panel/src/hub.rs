@@ -1,5 +1,6 @@
 //! What rig, server and pages share: the latest of every stream, who drives, the log, and the ways by which orders reach the rig.
 
+use std::collections::BTreeMap;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::Duration;
 
@@ -8,6 +9,7 @@ use serde_json::{Value, json};
 use tokio::sync::mpsc::error::TrySendError;
 use tokio::sync::{Semaphore, mpsc, oneshot, watch};
 use vergence_board::HostClock;
+use vergence_live::{Notice, Rung, Step};
 use vergence_rig::{AxisPosition, Rig};
 
 use crate::log::{Level, Log};
@@ -95,6 +97,8 @@ struct Shared {
     operators: Operators,
     log: Log,
     task: Task,
+    /// What the live loop does without, and what it said of it.
+    without: BTreeMap<Rung, String>,
 }
 
 impl Hub {
@@ -166,6 +170,22 @@ impl Hub {
         shared.log.add(source, seconds, level, text);
         let message = text_message(&shared.log.json());
         shared.streams.put(Stream::Log, message);
+        drop(shared);
+        self.wake();
+    }
+
+    /// Shows what the live loop does without, of which it told.
+    pub fn take_step(&self, Notice { text, step }: &Notice) {
+        let Some(Step { rung, is_down }) = *step else { return };
+        let mut shared = self.lock();
+        if is_down {
+            shared.without.insert(rung, text.clone());
+        } else {
+            shared.without.remove(&rung);
+        }
+        let rungs = shared.without.iter().map(|(rung, text)| json!({ "rung": rung.as_str(), "text": text }));
+        let message = text_message(&json!({ "kind": "ladder", "without": rungs.collect::<Vec<_>>() }));
+        shared.streams.put(Stream::Ladder, message);
         drop(shared);
         self.wake();
     }

@@ -30,6 +30,7 @@ mod session;
 mod status;
 mod streams;
 mod view;
+mod without_link;
 
 pub use capture::{CaptureCamera, CapturePanel, CapturePose, CaptureProgress};
 pub use cloud::cloud_message;

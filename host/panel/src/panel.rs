@@ -6,7 +6,7 @@ use std::sync::Arc;
 use tokio::sync::mpsc::{Receiver, channel};
 use vergence_board::Board;
 use vergence_camera::CameraEvent;
-use vergence_live::LiveResult;
+use vergence_live::{LiveResult, Notice};
 use vergence_recording::Recording;
 use vergence_rig::Rig;
 use vergence_vision::Side;
@@ -126,6 +126,12 @@ impl Panel {
     /// Adds a warning to the log.
     pub fn warn(&self, text: &str) {
         self.hub.note(Level::Warning, text);
+    }
+
+    /// Adds what the live loop tells to the log, and shows what it does without.
+    pub fn notice(&self, notice: &Notice) {
+        self.hub.take_step(notice);
+        self.warn(&notice.text);
     }
 
     /// Orders the axes to be homed, as a page would.

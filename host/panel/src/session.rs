@@ -2,14 +2,15 @@
 
 use std::future::pending;
 
-use vergence_board::Board;
-use vergence_live::{Ended, Limits, LiveLoop, LiveResult, Totals};
+use vergence_board::{Board, BoardError};
+use vergence_live::{Ended, Limits, LiveLoop, LiveResult, Notice, Totals};
 use vergence_protocol::{Request, Trigger};
 use vergence_recording::{Recorded, Recording};
 
 use crate::driver::Driver;
 use crate::error::PanelError;
 use crate::panel::Panel;
+use crate::without_link::without_link;
 
 /// What a panel shows: a board, a live loop, both, or neither.
 pub struct Session {
@@ -37,22 +38,35 @@ pub struct Shown {
 }
 
 impl Session {
-    /// Drives and measures until the link ends, the cameras are dead, or `interruption` completes; then the stages brake, the board is
-    /// disarmed, its trigger is off, and the recording is whole.
+    /// Drives and measures until the cameras are dead, or `interruption` completes; then the stages brake, the board is disarmed, its trigger
+    /// is off, and the recording is whole. When the link ends, `reach` tries to reach the board again and sets its trigger as before; nothing
+    /// that was ordered before moves it then. Without `reach` the session ends with the link.
     ///
     /// # Errors
-    /// Those of the link, of the live loop and of the recording.
-    pub async fn run(self, panel: &Panel, interruption: impl Future<Output = ()>) -> Result<Shown, PanelError> {
-        let Self { driver, mut board, trigger, live, recording } = self;
+    /// Those of the board, of `reach`, of the live loop and of the recording.
+    pub async fn run<E: From<PanelError>>(
+        self,
+        panel: &Panel,
+        interruption: impl Future<Output = ()>,
+        mut reach: Option<impl AsyncFnMut(BoardError) -> Result<Board, E>>,
+    ) -> Result<Shown, E> {
+        let Self { mut driver, mut board, trigger, live, recording } = self;
         let mut totals = Totals::default();
         let driving = async {
-            match &mut board {
-                Some(board) => Err(driver.drive(board, trigger).await.into()),
-                None => pending().await,
+            let mut first = trigger;
+            loop {
+                let Some(driven) = &mut board else { return pending().await };
+                let ended = driver.drive(driven, first.take()).await;
+                let Some(reach) = reach.as_mut().filter(|_| matches!(ended, BoardError::Link(_))) else {
+                    return Err(PanelError::from(ended).into());
+                };
+                // Its port is free only without it.
+                board = None;
+                board = Some(panel.watching(without_link(panel, &mut driver, reach(ended)).await?));
             }
         };
         let ended = tokio::select! {
-            ended = measure(panel, live, recording.as_ref(), &mut totals) => ended,
+            ended = measure(panel, live, recording.as_ref(), &mut totals) => ended.map_err(E::from),
             error = driving => error,
             () = interruption => Ok(Ended::Done),
         };
@@ -67,7 +81,7 @@ impl Session {
         // The first error names the cause.
         let ended = ended?;
         settled?;
-        Ok(Shown { ended, totals, recorded: recorded? })
+        Ok(Shown { ended, totals, recorded: recorded.map_err(PanelError::from)? })
     }
 }
 
@@ -101,7 +115,7 @@ async fn measure(
         }
         Ok(())
     };
-    let warn = |warning: String| panel.warn(&warning);
+    let warn = |notice: Notice| panel.notice(&notice);
     match live.run(Limits::default(), totals, show, warn).await {
         Ok(Ended::Done) => {
             panel.warn("the cameras have no more images: the last ones stay");

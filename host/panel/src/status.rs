@@ -5,11 +5,12 @@ use std::time::Duration;
 
 use serde_json::{Value, json};
 use vergence_board::{BoardKnowledge, pose_json, positions};
-use vergence_protocol::{ControllerState, Microseconds, PoseReport};
-use vergence_rig::{AxisPosition, Rig, rounded};
+use vergence_live::LONGEST_UNSEEN;
+use vergence_protocol::{AxisKind, ControllerState, Microseconds, PoseReport};
+use vergence_rig::{AxisPosition, Rig, RigAxis, rounded};
 
 use crate::hub::{Hub, Task, text_message};
-use crate::streams::Stream;
+use crate::streams::{Outgoing, Stream};
 
 /// Shortest time between two messages, unless the state changes or a fault comes or goes.
 const PACE: Duration = Duration::from_millis(50);
@@ -78,4 +79,23 @@ impl Reporter {
         }
         status
     }
+}
+
+/// Tells the pages that the link has been gone for `gone`: the last status, and how uncertain the positions have become since. Of axes that
+/// moved when the link ended nobody knows where they came to rest.
+pub fn report_lost(hub: &Hub, gone: Duration) {
+    let Some(Outgoing::Text(last)) = hub.latest(Stream::Status) else { return };
+    let Ok(mut status) = serde_json::from_str::<Value>(&last) else { return };
+    let sigma = |axis: &RigAxis| {
+        let sigma = axis.sigma_unseen(gone) * axis.value_per_count();
+        rounded(if axis.kind == AxisKind::Linear { sigma } else { sigma.to_degrees() })
+    };
+    let moved = ["moving", "homing", "stopping"].iter().any(|state| status["state"] == *state);
+    let sigmas: Option<Vec<f64>> = (!moved).then(|| hub.setting.rig.axes.iter().map(sigma).collect());
+    status["doing"] = Value::Null;
+    status["targets"] = Value::Null;
+    status["link"]["lost_s"] = json!(rounded(gone.as_secs_f64()));
+    status["link"]["sigmas"] = json!(sigmas);
+    status["link"]["measures"] = json!(gone < LONGEST_UNSEEN);
+    hub.put(Stream::Status, text_message(&status));
 }

@@ -24,12 +24,14 @@ pub enum Stream {
     Capture,
     /// Where a recording stands that is played.
     Playback,
+    /// What the live loop does without.
+    Ladder,
     /// The last lines of the log.
     Log,
 }
 
 /// Number of streams.
-const COUNT: usize = 10;
+const COUNT: usize = 11;
 
 /// A message to a page; a clone shares its bytes.
 #[derive(Clone, Debug, PartialEq, Eq)]

@@ -8,6 +8,7 @@ mod cdr;
 mod error;
 mod event;
 mod keep;
+mod link_gap;
 pub mod messages;
 mod metadata;
 mod play;

@@ -3,6 +3,7 @@
 use std::io::{Seek, Write};
 use std::path::Path;
 use std::sync::{Arc, LazyLock};
+use std::time::Duration;
 
 use image::RgbImage;
 use tokio::task::spawn_blocking;
@@ -84,6 +85,20 @@ pub struct Recorded {
     pub images: u64,
     /// For how many images and clouds the disk had no time.
     pub left_out: LeftOut,
+    /// For how long there was no link to the board.
+    pub without_link: Duration,
+}
+
+impl Recorded {
+    /// Sentences for people on what is missing.
+    #[must_use]
+    pub fn warnings(&self) -> Vec<String> {
+        let seconds = self.without_link.as_secs_f64();
+        let gap = (seconds > 0.0).then(|| {
+            format!("encoder readings and pulses of {seconds:.1} s are missing: the link to the board was gone")
+        });
+        self.left_out.in_words().into_iter().chain(gap).collect()
+    }
 }
 
 /// The task that writes.
@@ -199,7 +214,7 @@ impl Writing {
     pub async fn finish(self, recorder: Recorder) -> Result<Recorded, RecordingError> {
         recorder.queue.close();
         let images = self.0.await.map_err(unwritten)??;
-        Ok(Recorded { images, left_out: recorder.queue.left_out() })
+        Ok(Recorded { images, left_out: recorder.queue.left_out(), without_link: Duration::ZERO })
     }
 }
 

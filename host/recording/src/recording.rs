@@ -10,6 +10,7 @@ use vergence_vision::Side;
 
 use crate::RecordingError;
 use crate::event::Beginning;
+use crate::link_gap::LinkGap;
 use crate::recorder::{Recorded, Recorder, Writing};
 use crate::tap::{recorded_events, recorded_marks};
 
@@ -35,6 +36,7 @@ pub struct Recording {
     pub recorder: Recorder,
     pub(crate) clock: HostClock,
     writing: Writing,
+    gap: LinkGap,
 }
 
 impl Recording {
@@ -51,11 +53,16 @@ impl Recording {
         let (recorder, writing) = Recorder::start(folder, (rig, &file), simulated, epoch_us)?;
         let baud = board.as_ref().and_then(BoardKnowledge::baud);
         recorder.begin(clock.now(), Beginning { has_board: board.is_some(), baud, period_us });
+        let gap = LinkGap::default();
         if let Some(board) = board {
-            let recorder = recorder.clone();
-            board.listen(move |news| recorder.news(clock.now(), news));
+            let (recorder, gap) = (recorder.clone(), gap.clone());
+            board.listen(move |news| {
+                let now = clock.now();
+                recorder.news(now, news);
+                gap.note(now, news).into_iter().for_each(|sentence| recorder.warning(now, &sentence));
+            });
         }
-        Ok(Self { recorder, clock, writing })
+        Ok(Self { recorder, clock, writing, gap })
     }
 
     /// The live loop `live`, recorded. Call within a tokio runtime.
@@ -90,6 +97,7 @@ impl Recording {
     /// # Errors
     /// As [`Writing::finish`].
     pub async fn finish(self) -> Result<Recorded, RecordingError> {
-        self.writing.finish(self.recorder).await
+        let without_link = self.gap.total(self.clock.now());
+        Ok(Recorded { without_link, ..self.writing.finish(self.recorder).await? })
     }
 }

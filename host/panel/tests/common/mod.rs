@@ -46,7 +46,7 @@ impl Bench {
         let rig = Arc::new(Rig::from_toml(BENCH_TOML).expect("the bench"));
         let simulated = Some("all".into());
         let setting = Setting { rig: Arc::clone(&rig), simulated, has_cameras: false, recorded_ms: None };
-        let (panel, driver) = Panel::new(setting);
+        let (panel, mut driver) = Panel::new(setting);
         let (end, ended) = oneshot::channel();
         let (drawn, shown) = (Rig::clone(&rig), panel.clone());
         std::thread::spawn(move || {

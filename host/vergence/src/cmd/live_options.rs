@@ -8,6 +8,7 @@ use vergence_camera::CameraEvent;
 use vergence_live::{LiveLoop, MatchingTime};
 use vergence_matching::Matcher;
 use vergence_pipeline::{Exposures, Search};
+use vergence_protocol::TriggerMark;
 use vergence_rig::Rig;
 use vergence_vision::Side;
 
@@ -63,14 +64,20 @@ impl LiveOptions {
 }
 
 impl LiveMethod {
-    /// The loop that measures what arrives at `events`; matching takes `time` on its clock.
-    pub fn live_loop(&self, rig: &mut LiveRig, events: Receiver<(Side, CameraEvent)>, time: MatchingTime) -> LiveLoop {
+    /// The loop that measures what arrives at `events`, by these pulses; matching takes `time` on its clock.
+    pub fn live_loop(
+        &self,
+        rig: &LiveRig,
+        events: Receiver<(Side, CameraEvent)>,
+        marks: Option<Receiver<TriggerMark>>,
+        time: MatchingTime,
+    ) -> LiveLoop {
         LiveLoop {
             rig: Arc::clone(&self.measuring),
             matcher: Arc::clone(&self.matcher),
             search: Arc::clone(&self.search),
             events,
-            marks: rig.take_marks(),
+            marks,
             board: rig.board.as_ref().map(|board| board.client().knowledge()),
             clock: rig.clock,
             exposures: Exposures::new(rig.period_us),

@@ -6,6 +6,7 @@ use std::sync::Arc;
 
 use clap::{Args as _, FromArgMatches};
 use serde_json::json;
+use vergence_board::BoardError;
 use vergence_live::MatchingTime;
 use vergence_panel::{Panel, Session, Setting, Shown, listen};
 use vergence_peers::Published;
@@ -15,6 +16,8 @@ use super::connect::connect;
 use super::live_options::LiveOptions;
 use super::peer_options::PublishOptions;
 use super::publish::{seen_to_the_end, tell, tell_recorded};
+use super::reconnect::Persistence;
+use super::run::relink::Relink;
 use crate::cli::CommonOptions;
 use crate::console::Console;
 use crate::failure::Failure;
@@ -30,7 +33,8 @@ const SIMULATED_LEASE_MS: u16 = 1000;
 ///
 /// One page drives, the others watch; every page has the stop, also on the space bar. When the page that drives is closed or silent, the
 /// rig stops. Motion goes the way of the other verbs: armed under a lease, planned by the board, disarmed afterwards. Without cameras
-/// nothing is measured. Ctrl-C brakes, disarms and ends.
+/// nothing is measured. When the link to the board ends, the page shows for how long, the last pose is used for ten seconds, and the board is
+/// reached again; nothing moves then. Ctrl-C brakes, disarms and ends.
 #[derive(Debug, clap::Args)]
 pub struct Args {
     /// The left and the right camera, such as /dev/video0 /dev/video2; two folders of images or Y4M videos; or `sim` on a simulated rig.
@@ -51,6 +55,8 @@ pub struct Args {
     record: Option<PathBuf>,
     #[command(flatten)]
     live: LiveOptions,
+    #[command(flatten)]
+    persistence: Persistence,
     #[command(flatten)]
     publishing: PublishOptions,
 }
@@ -75,17 +81,18 @@ pub async fn demonstrate(
 pub async fn run(args: &Args, common: &CommonOptions, console: Console) -> Result<(), Failure> {
     let (listener, access) = listen(args.listen, args.network)?;
     let is_simulated = args.cameras == ["sim"];
-    let (panel, session) = match args.cameras.as_slice() {
+    let (panel, session, relink) = match args.cameras.as_slice() {
         [] => {
             let rig = Arc::new(rig_file::load(common.rig.as_deref())?);
             let (panel, driver) = Panel::new(Setting { rig, simulated: None, has_cameras: false, recorded_ms: None });
-            let board = Some(panel.watching(connect(common, console, "panel").await?));
-            (panel, Session { driver, board, trigger: None, live: None, recording: None })
+            let board = panel.watching(connect(common, console, "panel").await?);
+            let relink = args.persistence.persists().then(|| Relink::of_board(&board, common));
+            (panel, Session { driver, board: Some(board), trigger: None, live: None, recording: None }, relink)
         }
         cameras => {
             let lease = if is_simulated { SIMULATED_LEASE_MS } else { common.lease };
-            let (mut rig, method) =
-                args.live.connect(cameras, &CommonOptions { lease, ..common.clone() }, None, console).await?;
+            let common = &CommonOptions { lease, ..common.clone() };
+            let (mut rig, method) = args.live.connect(cameras, common, None, console).await?;
             let simulated =
                 is_simulated.then(|| format!("mechanics, room and cameras, lenses {}", args.live.taking.lens));
             let shown = Arc::clone(&method.measuring);
@@ -93,8 +100,9 @@ pub async fn run(args: &Args, common: &CommonOptions, console: Console) -> Resul
             rig.board = rig.board.map(|board| panel.watching(board));
             let recording = args.record.as_deref().map(|folder| rig.record(folder)).transpose()?;
             let events = panel.tap(args.live.taking.start_cameras(cameras, &rig)?, recording.as_ref());
-            let live = Some(method.live_loop(&mut rig, events, MatchingTime::Real));
-            (panel, Session { driver, board: rig.board, trigger: rig.trigger, live, recording })
+            let (relink, marks) = Relink::of(args.persistence, &mut rig, common);
+            let live = Some(method.live_loop(&rig, events, marks, MatchingTime::Real));
+            (panel, Session { driver, board: rig.board, trigger: rig.trigger, live, recording }, relink)
         }
     };
     let panel = match args.publishing.read()? {
@@ -107,7 +115,8 @@ pub async fn run(args: &Args, common: &CommonOptions, console: Console) -> Resul
     if args.home {
         panel.home();
     }
-    let Shown { ended, totals, recorded } = session.run(&panel, interrupted()).await?;
+    let reach = relink.as_ref().map(|relink| async |lost: BoardError| relink.reach(lost.into(), console).await);
+    let Shown { ended, totals, recorded } = session.run(&panel, interrupted(), reach).await?;
     if !args.cameras.is_empty() {
         tell(&totals, console)?;
     }

@@ -5,7 +5,7 @@ use std::sync::Arc;
 
 use serde_json::{Value, json};
 use vergence_board::HostClock;
-use vergence_live::{Ended, Limit, LiveResult, Pace, Totals};
+use vergence_live::{Ended, Limit, LiveResult, Notice, Pace, Rung, Totals};
 use vergence_output::{
     LatestFiles, PoseSource, axes_by_images_json, axes_by_images_words, drift_warning, live_bearings_json,
     live_cloud_json, live_cloud_words, pose_told_words,
@@ -117,6 +117,7 @@ impl Publisher {
     }
 
     fn head_json(&self, kind: &str, result: &LiveResult<'_>) -> Value {
+        let without: Vec<_> = Rung::of(result, self.pace.latest()).into_iter().map(Rung::as_str).collect();
         json!({
             "kind": kind,
             "simulated_lens": self.lens.map(|lens| lens.to_string()),
@@ -125,7 +126,8 @@ impl Publisher {
             "exposed_error_us": rounded(result.measurement.middle.error_us),
             "latency_ms": result.latency.as_micros() as f64 / 1000.0,
             "work_ms": rounded(result.measurement.seconds * 1e3),
-            "skipped": skipped_json(result.totals),
+            "skipped": result.totals.skipped_json(),
+            "without": without,
         })
     }
 
@@ -139,8 +141,11 @@ fn timing(result: &LiveResult<'_>) -> String {
     format!("{} ms after the exposure, {skipped} skipped so far", result.latency.as_millis())
 }
 
-fn skipped_json(totals: &Totals) -> Value {
-    totals.skipped.iter().map(|(reason, count)| (reason.as_str().to_owned(), json!(count))).collect()
+/// Warns people, and tells programs of a step down or up.
+pub fn tell_notice(notice: &Notice, console: Console) {
+    console.warn(notice);
+    // A closed standard output is found by the next result.
+    let _ = notice.json().map(|step| console.result(&step));
 }
 
 /// Prints totals.
@@ -148,22 +153,14 @@ fn skipped_json(totals: &Totals) -> Value {
 /// # Errors
 /// Where standard output cannot be written.
 pub fn tell(totals: &Totals, console: Console) -> Result<(), Failure> {
-    let Totals { clouds, bearings, pulses, open, .. } = totals;
-    let skipped = totals.skipped_in_words();
-    console.say(format!("{clouds} clouds, {bearings} sets of bearings{skipped}"))?;
-    console.result(&json!({
-        "kind": "end",
-        "clouds": clouds,
-        "bearings": bearings,
-        "skipped": skipped_json(totals),
-        "pulses": pulses,
-        "open": open,
-    }))
+    let Totals { clouds, bearings, .. } = totals;
+    console.say(format!("{clouds} clouds, {bearings} sets of bearings{}", totals.skipped_in_words()))?;
+    console.result(&totals.json())
 }
 
 /// Says what is in a recording, and what is not.
 pub fn tell_recorded(recorded: Recorded, folder: &Path, console: Console) -> Result<(), Failure> {
-    recorded.left_out.in_words().into_iter().for_each(|said| console.warn(said));
+    recorded.warnings().into_iter().for_each(|said| console.warn(said));
     console.say(format!("recorded {} images in {}", recorded.images, folder.display()))
 }
 

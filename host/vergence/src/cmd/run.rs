@@ -1,14 +1,14 @@
 //! `vergence run` measures live, while the stages stand still or move; `vergence record` keeps the same without measuring.
 
 pub mod record;
-mod relink;
+pub mod relink;
 mod tour;
 
 use std::path::PathBuf;
 use std::time::Duration;
 
 use vergence_board::Board;
-use vergence_live::{Ended, Limits, LiveLoop, MatchingTime, Pace, Totals, Tour};
+use vergence_live::{Ended, Limits, LiveLoop, MatchingTime, Notice, Pace, Totals, Tour};
 use vergence_peers::Published;
 use vergence_protocol::{Request, Trigger};
 
@@ -17,7 +17,7 @@ use super::live_options::LiveOptions;
 use super::taking_options::LiveRig;
 use crate::cli::CommonOptions;
 use crate::cmd::peer_options::PublishOptions;
-use crate::cmd::publish::{Publisher, seen_to_the_end, tell, tell_recorded};
+use crate::cmd::publish::{Publisher, seen_to_the_end, tell, tell_notice, tell_recorded};
 use crate::cmd::reconnect::Persistence;
 use crate::cmd::result_options::ResultOptions;
 use crate::console::Console;
@@ -84,9 +84,8 @@ pub async fn run(args: &Args, common: &CommonOptions, console: Console) -> Resul
         (true, Some(time)) => MatchingTime::Fixed(time),
     };
     let events = args.live.taking.start_cameras(&args.cameras, &rig)?;
-    let (relink, marks) = if args.persistence.persists() { Relink::of(&mut rig, common) } else { None }.unzip();
-    let mut live = method.live_loop(&mut rig, events, matching_time);
-    live.marks = marks.flatten().or(live.marks);
+    let (relink, marks) = Relink::of(args.persistence, &mut rig, common);
+    let mut live = method.live_loop(&rig, events, marks, matching_time);
     if let Some(recording) = &recording {
         live = recording.of(live);
     }
@@ -146,7 +145,7 @@ async fn both(
 ) -> Result<Option<Ended>, Failure> {
     let console = publisher.console;
     let limits = Limits { results: args.frames, time: args.duration };
-    let warn = |warning: String| console.warn(warning);
+    let warn = |notice: Notice| tell_notice(&notice, console);
     let measuring = live.run(limits, totals, |result| publisher.publish(&result), warn);
     tokio::select! {
         ended = measuring => ended.map(Some),

@@ -1,43 +1,45 @@
-//! What `vergence run` does when the link to the board ends: it goes on with the last pose, and reaches the board again.
+//! What verbs that measure or record do when the link to the board ends: they go on with the last pose, and reach the board again.
 
-use tokio::sync::mpsc::{Receiver, Sender, channel};
-use vergence_board::{Board, Continuity};
+use tokio::sync::mpsc::Receiver;
+use vergence_board::{Board, Continuity, PulseChain};
 use vergence_protocol::{Request, Trigger, TriggerMark};
-use vergence_rig::Rig;
 
 use crate::cli::CommonOptions;
 use crate::cmd::connect::connect_again;
-use crate::cmd::reconnect::reconnect_by;
+use crate::cmd::reconnect::{Persistence, reconnect_by};
 use crate::cmd::taking_options::LiveRig;
 use crate::console::{Console, shown_on};
 use crate::failure::Failure;
 use crate::sim::Plug;
 
-/// Pulses that may wait; the loop takes them at once.
-const MARKS_KEPT: usize = 2_048;
-
-/// How the board of a live rig is reached again.
+/// How a board is reached again.
 pub struct Relink {
     common: CommonOptions,
-    known: Rig,
+    known: vergence_rig::Rig,
     plug: Option<Plug>,
     continuity: Continuity,
     trigger: Option<Trigger>,
-    /// The pulses of each link in turn.
-    marks: Sender<TriggerMark>,
+    pulses: PulseChain,
 }
 
 impl Relink {
-    /// Of the board of `rig`, which is connected; with it the pulses of this link and of all that follow it. `None` of a rig without a board.
-    pub fn of(rig: &mut LiveRig, common: &CommonOptions) -> Option<(Self, Option<Receiver<TriggerMark>>)> {
-        let continuity = rig.board.as_ref()?.client().continuity();
-        let (marks, taken) = channel(MARKS_KEPT);
-        let (common, known, plug, trigger) = (common.clone(), rig.known.clone(), rig.plug.clone(), rig.trigger);
-        let relink = Self { common, known, plug, continuity, trigger, marks };
-        let pulses = rig.take_marks();
-        let are_pulsed = pulses.is_some();
-        pulses.into_iter().for_each(|pulses| relink.forward(pulses));
-        Some((relink, are_pulsed.then_some(taken)))
+    /// Of a `board` that fires no cameras.
+    pub fn of_board(board: &Board, common: &CommonOptions) -> Self {
+        let (continuity, known, pulses) = (board.client().continuity(), board.rig().clone(), PulseChain::begin(None).0);
+        Self { common: common.clone(), known, plug: None, continuity, trigger: None, pulses }
+    }
+
+    /// Of the board of `rig`, where `persistence` wants it; with it the pulses of this link, and of all that follow it.
+    pub fn of(
+        persistence: Persistence,
+        rig: &mut LiveRig,
+        common: &CommonOptions,
+    ) -> (Option<Self>, Option<Receiver<TriggerMark>>) {
+        let first = rig.take_marks();
+        let Some(board) = rig.board.as_ref().filter(|_| persistence.persists()) else { return (None, first) };
+        let (chain, pulses) = PulseChain::begin(first);
+        let (plug, trigger) = (rig.plug.clone(), rig.trigger);
+        (Some(Self { plug, trigger, pulses: chain, ..Self::of_board(board, common) }), pulses)
     }
 
     /// Tries until the board is back, and has it fire the cameras as before. Nothing is armed, and nothing moves.
@@ -47,7 +49,7 @@ impl Relink {
     pub async fn reach(&self, lost: Failure, console: Console) -> Result<Board, Failure> {
         let board = reconnect_by(async || self.connect(console).await, console, lost).await?;
         if !board.is_referenced() {
-            console.warn("its axes have no reference: a line 'home' homes them");
+            console.warn("its axes have no reference: home them, by a line 'home' or on the page");
         }
         Ok(board)
     }
@@ -60,21 +62,9 @@ impl Relink {
         };
         board.compare_clocks().await?;
         if let Some(trigger) = self.trigger {
-            self.forward(board.client_mut().take_marks());
+            self.pulses.add(board.client_mut().take_marks());
             board.ask(Request::SetTrigger(trigger)).await?;
         }
         Ok(board.observed(shown_on(console.progress("live"))))
-    }
-
-    /// Passes the pulses of a link on, until it ends.
-    fn forward(&self, mut pulses: Receiver<TriggerMark>) {
-        let marks = self.marks.clone();
-        tokio::spawn(async move {
-            while let Some(mark) = pulses.recv().await {
-                if marks.send(mark).await.is_err() {
-                    return;
-                }
-            }
-        });
     }
 }
