@@ -83,7 +83,7 @@ pub async fn run(args: &Args, common: &CommonOptions, console: Console) -> Resul
         (true, None) => MatchingTime::Measured,
         (true, Some(time)) => MatchingTime::Fixed(time),
     };
-    let events = args.live.taking.start_cameras(&args.cameras, &rig)?;
+    let events = args.live.taking.start_cameras(&args.cameras, &rig, console)?;
     let (relink, marks) = if args.persistence.persists() { Relink::of(&mut rig, common) } else { None }.unzip();
     let mut live = method.live_loop(&mut rig, events, matching_time);
     live.marks = marks.flatten().or(live.marks);

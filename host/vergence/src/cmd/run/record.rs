@@ -44,7 +44,7 @@ pub async fn record(args: &Args, common: &CommonOptions, console: Console) -> Re
     let tour = args.tour.tour(&rig.known)?;
     let recording = rig.record(&args.out)?;
     make_ready(&mut rig, &args.tour, console).await?;
-    let heard = (args.taking.start_cameras(&args.cameras, &rig)?, rig.take_marks());
+    let heard = (args.taking.start_cameras(&args.cameras, &rig, console)?, rig.take_marks());
     if let (Some(board), Some(trigger)) = (&rig.board, rig.trigger) {
         board.ask(Request::SetTrigger(trigger)).await?;
     }
