@@ -4,10 +4,10 @@
 mod common;
 
 use std::path::Path;
-use std::process::Command;
+use std::process::{Command, Stdio};
 
 use common::pairs::{human, refs, write_rig};
-use common::{fails_with, python, run, run_json, small_bench_toml, text};
+use common::{fails_with, python, run, run_json, signal, small_bench_toml, text, vergence};
 use nalgebra::{UnitQuaternion, Vector3};
 use serde_json::{Value, json};
 use vergence_rig::{BENCH_TOML, Rig};
@@ -71,6 +71,12 @@ fn a_recording_becomes_folders_and_views_that_other_programs_read() {
     }
 
     fails_with(&["export", &recording, "--to", "tum-vi", "--out", &tum_vi], 2, &["there is something already"]);
+    for (bytes, words) in [(&b"no recording"[..], "this is no recording"), (b"\x89MCAP0\r\nno more", "its beginning")] {
+        let junk = work.file("junk.mcap");
+        std::fs::write(&junk, bytes).expect("written");
+        fails_with(&["export", &junk, "--to", "tum-vi", "--out", &work.file("junk")], 2, &["junk.mcap", words]);
+        fails_with(&["replay", &junk], 2, &["junk.mcap", words]);
+    }
     let new = work.file("new");
     let export = |more: &[&str], words: &[&str]| {
         fails_with(&[&["export", &recording, "--out", &new][..], more].concat(), 2, words);
@@ -151,6 +157,36 @@ fn corners_of_targets_are_where_the_files_of_the_views_say() {
     let euroc = ["export", &left, &right, "--to", "euroc", "--out", &work.file("euroc")];
     fails_with(&euroc, 2, &["which image files do not tell"]);
     fails_with(&["export", &left, &right, "--to", "pinhole", "--out", &work.file("new")], 2, &["--rig"]);
+}
+
+/// Ctrl-C amid many images: nothing is left of the folder, and nothing beside it.
+#[test]
+fn an_export_that_is_interrupted_leaves_nothing() {
+    let work = Work::new();
+    let (rig, around, out) = (work.file("small.toml"), work.file("around"), work.file("around/views"));
+    std::fs::write(&rig, small_bench_toml()).expect("a rig file");
+    let grey = image::RgbImage::from_pixel(320, 320, image::Rgb([90; 3]));
+    let folders = ["left", "right"].map(|side| work.file(side));
+    for folder in &folders {
+        std::fs::create_dir_all(folder).expect("a folder");
+        let first = Path::new(folder).join("0000.png");
+        grey.save(&first).expect("written");
+        (1..1000).for_each(|number| {
+            std::fs::hard_link(&first, Path::new(folder).join(format!("{number:04}.png"))).expect("linked");
+        });
+    }
+    let arguments = ["export", &folders[0], &folders[1], "--rig", &rig, "--to", "pinhole", "--out", &out];
+    let mut child = vergence(&arguments).stderr(Stdio::piped()).spawn().expect("it starts");
+    let begun = || std::fs::read_dir(&around).is_ok_and(|mut entries| entries.next().is_some());
+    while !begun() {
+        assert!(child.try_wait().expect("a child").is_none(), "it ended before it was interrupted");
+        std::thread::yield_now();
+    }
+    signal(child.id(), "-INT");
+    let output = child.wait_with_output().expect("it ends");
+    let said = text(&output.stderr);
+    assert!(output.status.code() == Some(3) && said.contains("interrupted: nothing is written to"), "{said}");
+    assert!(!begun(), "something is left");
 }
 
 fn photograph(scene: &Scene, camera: &KannalaBrandt, world_from_camera: Transform<World, Camera>, path: &str) {

@@ -66,7 +66,9 @@ fn no_point_lies_where_a_mask_hides_it() {
     assert_eq!((masked_left.0, masked_right.0), (0, 0));
 
     let dense = |more: &[&str]| {
-        run_json(&refs(&work.depth("left.png", "right.png", &[&["--json", "--dense"], more].concat())));
+        run_json(&refs(&work.depth("left.png", "right.png", &[&["--json", "--dense", "--ascii"], more].concat())));
+        let of_points = pixels(&cloud);
+        assert!(of_points[0].len() > 1000 && (more.is_empty() || hidden(&mask, &of_points[0]) == 0), "points as text");
         let ranges = image::open(work.file("out-range.png")).expect("ranges").into_luma16();
         let measured = ranges.enumerate_pixels().filter(|(_, _, range)| range.0[0] > 0);
         let pixels: Vec<_> = measured.map(|(u, v, _)| Pixel { u: f64::from(u), v: f64::from(v) }).collect();
@@ -121,7 +123,10 @@ fn live_views_are_taken_outside_the_mask() {
     let set = work.file("set");
     let live = ["--rig", &rig, "--port", "sim", "calibrate", "stage", "--live", "--cameras", "sim", "--set", &set];
     let brief = ["--poses", "4", "--views", "4", "--seed", "3", "--left-mask", &shapes];
-    run_json(&[&live[..], &brief, &target].concat());
+    let out = work.file("stage.toml");
+    run_json(&[&live[..], &brief, &target, &["--out", &out]].concat());
+    let written = std::fs::read_to_string(&out).expect("a rig file");
+    assert!(written.contains(&format!("mask = \"{shapes}\"")), "{written}");
     let (views, images) = seen(&Path::new(&set).join("pose01"), "left", None);
     assert!(images == 4 && views.iter().all(|view| hidden(&mask, view) < view.len()), "{images}");
 }

@@ -213,6 +213,8 @@ fn three_rigs_are_watched_from_one_page_and_a_cut_link_stops_nothing_but_an_orde
         assert!(rig["sigma_mm"].as_f64().is_some_and(|sigma| sigma > 0.0 && sigma < 1000.0), "{rig}");
         assert_eq!(rig["cameras"]["left"].as_array().map(Vec::len), Some(12), "{rig}");
         assert_eq!(rig["takes_orders"], name == "first");
+        let axes = rig["axes"].to_string();
+        assert!(axes.contains(" mm") && axes.contains('°'), "{axes}");
     }
     let (code, cloud) = watcher.ask("GET", "/rigs/second/cloud", "");
     let header = u32::from_le_bytes(cloud[..4].try_into().expect("a header")) as usize;

@@ -248,6 +248,7 @@ pub const ONLY_FOR: &[(&str, &[&str])] = &[
             "vergence-doctor",
             "vergence-panel",
             "vergence-recording",
+            "vergence-export",
             "vergence-peers",
             "vergence",
         ],

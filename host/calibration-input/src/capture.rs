@@ -4,7 +4,6 @@ use std::path::{Path, PathBuf};
 use std::pin::pin;
 
 use serde_json::{Value, json};
-use tokio::task::spawn_blocking;
 use vergence_calibration::{IntrinsicsOptions, calibrate_intrinsics, check_fit};
 use vergence_calibration_report::intrinsics_verdict;
 use vergence_camera::{Camera, CameraError, CameraImage, CameraSet};
@@ -15,7 +14,7 @@ use vergence_sim::{HeldTarget, TargetCamera};
 use vergence_targets::{TargetKind, TargetView};
 use vergence_vision::{BodyMask, ImageSize, Side};
 
-use crate::target_watch::{NAMES, TargetViews, TargetWatch, observe};
+use crate::target_watch::{NAMES, TargetWatch, look};
 use crate::{InputError, printed};
 
 /// A set of target views that is taken.
@@ -83,7 +82,7 @@ impl TargetCapture<'_> {
         while captured.watch.taken() < self.views && captured.images < self.images && !captured.watch.is_complete() {
             let (images, views);
             (cameras, images, views) = tokio::select! {
-                looked = look(cameras, self.target) => match looked {
+                looked = look(cameras, CameraSet::grab, self.target) => match looked {
                     // A folder or a video that was seen to its end.
                     Err(InputError::Camera(CameraError::Ended)) if captured.images > 0 => break,
                     looked => looked?,
@@ -188,19 +187,6 @@ fn lens_verdict(views: &[TargetView], size: ImageSize) -> String {
         Ok(()) => intrinsics_verdict(&calibration, views).sentence,
         Err(error) => error.to_string(),
     }
-}
-
-/// Takes one image with each camera and looks for the target in them, on a thread of its own.
-async fn look(
-    mut cameras: CameraSet,
-    target: TargetKind,
-) -> Result<(CameraSet, Vec<CameraImage>, TargetViews), InputError> {
-    let looked = spawn_blocking(move || {
-        let images = cameras.grab()?;
-        let views = observe(&images, &target);
-        Ok::<_, CameraError>((cameras, images, views))
-    });
-    Ok(looked.await.map_err(|error| InputError::Looking(error.to_string()))??)
 }
 
 fn file_of(folder: &Path, camera: &str, number: usize) -> PathBuf {

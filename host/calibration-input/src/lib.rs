@@ -47,7 +47,7 @@ pub use store::{Slot, SlotKind, Slots};
 pub use store_error::StoreError;
 pub use target_file::read_target;
 pub use target_images::{Missed, MissedReason, Sought, TargetImages};
-pub use target_watch::{NAMES, TargetViews, TargetWatch, observe};
+pub use target_watch::{NAMES, TargetViews, TargetWatch};
 pub use truth::TrueError;
 pub use views::{
     PairImages, PairLenses, PairMasks, PairViews, ViewEvent, pairs_in_corners, views_in_corners, views_in_images,

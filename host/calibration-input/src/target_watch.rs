@@ -1,12 +1,15 @@
 //! Watches a target before cameras: whether it is seen, held still, and worth a view.
 
-use crate::target_images::without_hidden;
 use image::imageops::grayscale;
 use rayon::prelude::*;
+use tokio::task::spawn_blocking;
 use vergence_calibration::Coverage;
-use vergence_camera::CameraImage;
+use vergence_camera::{CameraError, CameraImage};
 use vergence_targets::{TargetKind, TargetView, see};
 use vergence_vision::BodyMask;
+
+use crate::InputError;
+use crate::target_images::without_hidden;
 
 /// Largest motion of a corner between two images of a target that is held still, in pixels.
 const STILL_PX: f64 = 1.0;
@@ -20,10 +23,26 @@ pub const NAMES: [&str; 2] = ["left", "right"];
 pub type TargetViews = Vec<TargetView>;
 
 /// Looks for the target in the images of one instant.
-#[must_use]
-pub fn observe(frames: &[CameraImage], target: &TargetKind) -> TargetViews {
+fn observe(frames: &[CameraImage], target: &TargetKind) -> TargetViews {
     let view = |frame: &CameraImage| Some(see(&grayscale(&frame.image), target, None, &frame.name).ok()?.view);
     frames.par_iter().map(view).collect::<Option<_>>().unwrap_or_default()
+}
+
+/// Takes the images of one instant with `grab` and looks for the target in them, on a thread of its own: links and pages must not wait.
+///
+/// # Errors
+/// Those of `grab`; [`InputError::Looking`] where the search was given up.
+pub async fn look<C: Send + 'static>(
+    mut cameras: C,
+    grab: fn(&mut C) -> Result<Vec<CameraImage>, CameraError>,
+    target: TargetKind,
+) -> Result<(C, Vec<CameraImage>, TargetViews), InputError> {
+    let looked = spawn_blocking(move || {
+        let images = grab(&mut cameras)?;
+        let views = observe(&images, &target);
+        Ok((cameras, images, views))
+    });
+    looked.await.map_err(|error| InputError::Looking(error.to_string()))?
 }
 
 /// A set of views being taken: its coverage, its views, and the last observation.

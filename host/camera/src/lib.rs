@@ -31,7 +31,7 @@ pub use error::CameraError;
 pub use event::{CameraEvent, Develop, PendingImage};
 pub use files::{FileCamera, image_files, read_image};
 pub use listing::{ListedCamera, ListedFormat, describe_camera, video_devices};
-pub use mask::{camera_mask, read_mask};
+pub use mask::{camera_mask, read_mask, with_whole_name};
 pub use pairing::{PairedFiles, paired};
 pub use played::{PLAYED_HZ, Played, PlayedCamera, SharedTime, is_played, play};
 pub use quality::{Field, ImageQuality};

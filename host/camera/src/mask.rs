@@ -18,6 +18,16 @@ pub fn camera_mask(mask: &CameraMask, size: ImageSize) -> Result<BodyMask, Camer
     }
 }
 
+/// The mask with the whole name of its file: right in a file that lies elsewhere, too.
+#[must_use]
+pub fn with_whole_name(mask: &CameraMask) -> CameraMask {
+    match mask {
+        // A name cannot be made whole where the current folder is gone.
+        CameraMask::File(path) => CameraMask::File(std::path::absolute(path).unwrap_or_else(|_| path.clone())),
+        shapes @ CameraMask::Shapes(_) => shapes.clone(),
+    }
+}
+
 /// Reads what is left out of the images of a camera, which are of `size`: a TOML file of shapes (see [`mask_of_shapes`]), or a picture of
 /// that size that is black there.
 ///

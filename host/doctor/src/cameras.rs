@@ -76,7 +76,7 @@ pub fn check_cameras() -> Vec<Finding> {
         return vec![Finding::warn("cameras", "there is no /dev/video device", remedy)];
     }
     let check = |path: &PathBuf| match forbidden(path) {
-        Some(remedy) => Finding::fail("cameras", format!("you may not use {}", path.display()), remedy),
+        Some(remedy) => Finding::forbidden("cameras", format!("you may not use {}", path.display()), remedy),
         None => Finding::pass("cameras", format!("{} may be used", path.display())),
     };
     cameras.iter().map(check).collect()

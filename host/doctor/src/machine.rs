@@ -45,7 +45,7 @@ pub fn installed_rule(folders: &[PathBuf]) -> Option<String> {
 /// second, and how the clocks ran since `before`.
 #[must_use]
 pub fn check_machine(findings: &[Finding], (out, mb_per_s): (&Path, Option<f64>), before: HostTimes) -> [Finding; 3] {
-    let is_needed = findings.iter().any(|finding| finding.reason.starts_with("you may not"));
+    let is_needed = findings.iter().any(|finding| finding.is_forbidden);
     [
         check_rule(installed_rule(&rule_folders()).as_deref(), is_needed),
         check_disk(out, free_space(out), mb_per_s),
@@ -176,6 +176,16 @@ mod tests {
         std::fs::write(folder.path().join(RULE_FILE), UDEV_RULES).expect("written");
         assert_eq!(check_rule(installed_rule(&folders).as_deref(), false).verdict, Verdict::Pass);
         assert_eq!(check_rule(installed_rule(&folders).as_deref(), true).verdict, Verdict::Fail);
+    }
+
+    #[test]
+    fn the_rule_is_needed_where_a_device_is_forbidden_whatever_the_words() {
+        let needed = |finding: Finding| check_machine(&[finding], (Path::new("."), None), host_times())[0].verdict;
+        assert_ne!(
+            needed(Finding::forbidden("cameras", "no right to use /dev/video0", "join its group")),
+            Verdict::Pass
+        );
+        assert_ne!(needed(Finding::fail("rig", "you may not", "read it")), Verdict::Fail);
     }
 
     #[test]

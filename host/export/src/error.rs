@@ -27,9 +27,12 @@ pub enum ExportError {
     /// No pinhole camera has such a view.
     #[error(transparent)]
     View(#[from] InvalidView),
-    /// The folder holds something already.
-    #[error("{}: there is something already; name a folder that does not exist or is empty", .0.display())]
-    NotEmpty(PathBuf),
+    /// Who asked for it wants it no more.
+    #[error("interrupted: nothing is written to {}; run the command again", .0.display())]
+    Interrupted(PathBuf),
+    /// The export was not carried to its end.
+    #[error("the export failed: {0}")]
+    GivenUp(String),
     /// Images come without a rig file.
     #[error("{}: images do not say by which cameras they were taken: name the rig file with --rig", .0.display())]
     NoRig(PathBuf),

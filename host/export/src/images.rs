@@ -9,20 +9,20 @@ use vergence_rig::Rig;
 use crate::pinhole::faces;
 use crate::recorded::check_size;
 use crate::views::{describe, remarks, views};
-use crate::{ExportError, Exported, Options, make_empty};
+use crate::{ExportError, Exported, Options, Stop};
 
 /// Writes the views of a pair of images, or of each pair of two folders, as `left/front/NAME.png`.
-pub fn export(images: [&Path; 2], rig: Option<Rig>, options: &Options) -> Result<Exported, ExportError> {
+pub fn export(images: [&Path; 2], rig: Option<Rig>, options: &Options, stop: &Stop) -> Result<Exported, ExportError> {
     let rig = rig.ok_or_else(|| ExportError::NoRig(images[0].to_owned()))?;
     let (mut cameras, unpaired) = FileCamera::open_pair(images[0], images[1])?;
     let views = views(&rig, &faces(options), options)?;
-    make_empty(&options.out)?;
-    let mut exported = Exported { out: options.out.clone(), warnings: remarks(&rig), ..Exported::default() };
+    let mut exported = Exported { warnings: remarks(&rig), ..Exported::default() };
     for file in unpaired {
         let warning = "left out: the other camera has no image of this name, number or time";
         exported.warnings.push(format!("{}: {warning}", file.display()));
     }
     loop {
+        stop.check(options)?;
         let [left, right] = &mut cameras;
         let (Some(left), Some(right)) = (left.grab()?, right.grab()?) else { break };
         let taken = [left, right];

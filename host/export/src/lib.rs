@@ -11,10 +11,16 @@ mod sequence;
 mod stage;
 mod views;
 
+use std::future::poll_fn;
 use std::path::{Path, PathBuf};
+use std::pin::pin;
 use std::str::FromStr;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::task::Poll;
 
-use vergence_files::make_folder;
+use vergence_files::{FileError, WholeFolder};
+use vergence_recording::RecordingError;
 use vergence_rig::Rig;
 use vergence_vision::{Angle, Face};
 
@@ -66,11 +72,46 @@ pub struct Options {
 }
 
 /// Exports `inputs`: a recording, or an image of the left and one of the right camera, or a folder of each. `rig` has their lenses; a recording that has a
-/// rig file needs none.
+/// rig file needs none. The folder gets its name when all is written: an `interruption`, or a failure, leaves nothing.
 ///
 /// # Errors
-/// What cannot be read or written; options that the format has not.
-pub fn export(inputs: &[PathBuf], rig: Option<Rig>, options: &Options) -> Result<Exported, ExportError> {
+/// What cannot be read or written; options that the format has not; [`ExportError::Interrupted`].
+pub async fn export(
+    inputs: Vec<PathBuf>,
+    rig: Option<Rig>,
+    options: Options,
+    interruption: impl Future<Output = ()>,
+) -> Result<Exported, ExportError> {
+    let mut interruption = pin!(interruption);
+    // It is heard from before anything is written.
+    if poll_fn(|context| Poll::Ready(interruption.as_mut().poll(context).is_ready())).await {
+        return Err(ExportError::Interrupted(options.out));
+    }
+    let asked = Arc::new(AtomicBool::new(false));
+    let stop = Stop(Arc::clone(&asked));
+    let mut work = tokio::task::spawn_blocking(move || whole(&inputs, rig, &options, &stop));
+    let done = tokio::select! {
+        done = &mut work => done,
+        () = &mut interruption => {
+            asked.store(true, Ordering::Relaxed);
+            // It ends after the image that it is at, and removes what it has written.
+            work.await
+        }
+    };
+    done.unwrap_or_else(|error| Err(ExportError::GivenUp(error.to_string())))
+}
+
+/// Whether the export shall end before all is written.
+struct Stop(Arc<AtomicBool>);
+
+impl Stop {
+    fn check(&self, options: &Options) -> Result<(), ExportError> {
+        if self.0.load(Ordering::Relaxed) { Err(ExportError::Interrupted(options.out.clone())) } else { Ok(()) }
+    }
+}
+
+/// Exports under a temporary name, which the folder keeps until all is written.
+fn whole(inputs: &[PathBuf], rig: Option<Rig>, options: &Options, stop: &Stop) -> Result<Exported, ExportError> {
     let has_views = !options.faces.is_empty() || options.field.is_some() || options.size.is_some();
     match options.to {
         ExportFormat::TumVi if has_views => return Err(ExportError::NoViews),
@@ -79,16 +120,25 @@ pub fn export(inputs: &[PathBuf], rig: Option<Rig>, options: &Options) -> Result
         }
         _ => {}
     }
-    match (inputs, options.to) {
-        ([recording], _) => recorded::export(recording, rig, options),
-        ([left, right], ExportFormat::Pinhole) => images::export([left.as_path(), right.as_path()], rig, options),
+    let folder = WholeFolder::begin(&options.out)?;
+    let beside = &Options { out: folder.path().to_owned(), ..options.clone() };
+    let exported = match (inputs, options.to) {
+        ([recording], _) => recorded::export(recording, rig, beside, stop),
+        ([left, right], ExportFormat::Pinhole) => images::export([left.as_path(), right.as_path()], rig, beside, stop),
         _ => Err(ExportError::Timeless),
-    }
+    };
+    let exported = exported.map_err(|error| named(error, &options.out))?;
+    folder.finish()?;
+    Ok(Exported { out: options.out.clone(), ..exported })
 }
 
-/// Makes the folder at `path`, unless it holds something.
-fn make_empty(path: &Path) -> Result<(), ExportError> {
-    make_folder(path)?;
-    let mut entries = std::fs::read_dir(path).map_err(|error| vergence_files::FileError::read(path, error))?;
-    if entries.next().is_some() { Err(ExportError::NotEmpty(path.to_owned())) } else { Ok(()) }
+/// The error with the name that the user gave, where it tells of what is removed.
+fn named(error: ExportError, out: &Path) -> ExportError {
+    match error {
+        ExportError::Interrupted(_) => ExportError::Interrupted(out.to_owned()),
+        ExportError::Recording(RecordingError::DiskFull(_)) => {
+            FileError::write(out, "the disk is full; nothing of it is kept").into()
+        }
+        error => error,
+    }
 }

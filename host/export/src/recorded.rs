@@ -12,7 +12,7 @@ use vergence_vision::{ImageSize, Side};
 
 use crate::pinhole::PinholeBag;
 use crate::sequence::Sequence;
-use crate::{ExportError, ExportFormat, Exported, Options};
+use crate::{ExportError, ExportFormat, Exported, Options, Stop};
 
 /// An image of a camera with the middle of its exposure in nanoseconds since 1970.
 pub struct Stamped {
@@ -36,7 +36,7 @@ pub trait Sink {
 }
 
 /// Exports a recording.
-pub fn export(recording: &Path, rig: Option<Rig>, options: &Options) -> Result<Exported, ExportError> {
+pub fn export(recording: &Path, rig: Option<Rig>, options: &Options, stop: &Stop) -> Result<Exported, ExportError> {
     let mut reader = Reader::open(recording)?;
     // The rig file precedes the first event.
     let mut next = reader.next_event()?;
@@ -46,8 +46,9 @@ pub fn export(recording: &Path, rig: Option<Rig>, options: &Options) -> Result<E
         ExportFormat::TumVi | ExportFormat::Euroc => Box::new(Sequence::create(&rig, &text, options)?),
     };
     let mut posing = Posing::new(&rig, ());
-    let mut exported = Exported { out: options.out.clone(), ..Exported::default() };
+    let mut exported = Exported::default();
     while let Some(heard) = next {
+        stop.check(options)?;
         let epoch_us = heard.epoch_us;
         take_all(posing.take(heard), &rig, epoch_us, (&mut exported, sink.as_mut()))?;
         next = reader.next_event()?;

@@ -14,7 +14,7 @@ use vergence_vision::Face;
 use crate::recorded::{Sink, Taken};
 use crate::stage::Stage;
 use crate::views::{CameraView, describe, remarks, views};
-use crate::{ExportError, ExportFormat, Options, make_empty};
+use crate::{ExportError, ExportFormat, Options};
 
 /// The first line of a camera's `data.csv`.
 const IMAGES: &str = "#timestamp [ns],filename\n";
@@ -42,7 +42,6 @@ impl Sequence {
             ExportFormat::TumVi | ExportFormat::Pinhole => Vec::new(),
         };
         let folder = options.out.clone();
-        make_empty(&folder)?;
         for inner in ["mav0/cam0/data", "mav0/cam1/data", "mav0/stage0"] {
             make_folder(&folder.join(inner))?;
         }

@@ -9,6 +9,8 @@ impl From<ExportError> for Failure {
         match error {
             ExportError::Recording(error) => error.into(),
             ExportError::Camera(error) => error.into(),
+            ExportError::Interrupted(_) => Self::interrupted(error.to_string()),
+            ExportError::GivenUp(_) => Self::device(error.to_string()),
             ExportError::Nothing { .. } => Self::check(error.to_string()),
             _ => Self::usage(error.to_string()),
         }

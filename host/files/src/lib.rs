@@ -4,6 +4,7 @@
 //! new one.
 
 mod error;
+mod folder;
 
 use std::fs::Permissions;
 use std::io::{Cursor, Write};
@@ -13,6 +14,7 @@ use std::path::Path;
 use image::{EncodableLayout, ImageBuffer, ImageFormat, PixelWithColorType};
 
 pub use error::FileError;
+pub use folder::WholeFolder;
 
 /// The bytes of the file at `path`.
 ///

@@ -25,8 +25,8 @@ pub struct DenseCloud<'a> {
 }
 
 impl<'a> DenseCloud<'a> {
-    /// Writes `ranges`, which were measured in `images` taken at `pose`: the cloud to `out` in the format of its ending, and beside it PNG images of range,
-    /// sigma and confidence, a preview as SVG, and the image of a depth camera with its K.
+    /// Writes `ranges`, which were measured in `images` taken at `pose`: the cloud to `out` in the format of its ending, as text where it
+    /// `is_ascii`, and beside it PNG images of range, sigma and confidence, a preview as SVG, and the image of a depth camera with its K.
     ///
     /// # Errors
     /// [`FileError::Write`].
@@ -35,11 +35,13 @@ impl<'a> DenseCloud<'a> {
         times: &'a StageTimes,
         images: PairImages<'_>,
         (rig, pose): (&Rig, &RigPose),
-        out: &'a Path,
+        (out, is_ascii): (&'a Path, bool),
     ) -> Result<Self, FileError> {
         let depth = &ranges.depth;
         let rows = rows(depth, images, rig, pose);
-        let bytes = CloudFormat::of_file(out).dense_cloud(&rows).map_err(|error| FileError::write(out, error))?;
+        let format = CloudFormat::of_file(out);
+        let bytes = format.encoding(is_ascii).and_then(|encoding| format.dense_cloud(&rows, encoding));
+        let bytes = bytes.map_err(|error| FileError::write(out, error))?;
         write_whole(out, &bytes)?;
         write_png(&beside(out, "range", "png"), &range_image(depth))?;
         write_png(&beside(out, "sigma", "png"), &sigma_image(depth))?;

@@ -44,7 +44,7 @@ function list(rigs) {
     const [, health, mode, axes, points, sigma, age, lost] = of.cells;
     fill(health, chip(rig.health), rig.message);
     fill(mode, text(rig.mode), rig.state);
-    fill(axes, Object.entries(rig.joints ?? {}).map(([axis, at]) => `${axis} ${at}`).join(', ') || '–');
+    fill(axes, rig.axes?.join(', ') || '–');
     fill(points, text(rig.points));
     fill(sigma, text(rig.sigma_mm?.toFixed(1), ' mm'));
     fill(age, text(rig.cloud_age_s?.toFixed(1), ' s'));

@@ -23,6 +23,7 @@ mod network;
 mod operator;
 mod publication;
 mod rigs;
+mod units;
 mod watch;
 
 pub use authorisation::{Secret, mode_tag};

@@ -19,6 +19,7 @@ use crate::error::PeersError;
 use crate::keys::{Attachment, data_key, is_name, mode_key, token_key};
 use crate::network::Network;
 use crate::transport::{Declared, Session};
+use crate::units::units;
 
 /// The topics of a rig.
 const TOPICS: [Topic; 4] = [POINTS, TRANSFORMS, JOINTS, DIAGNOSTICS];
@@ -264,6 +265,7 @@ impl Sender {
                 ("clouds", self.told.clouds.to_string()),
                 ("left_out", unsent.to_string()),
                 ("takes_orders", self.takes_orders.to_string()),
+                ("units", units(&self.rig.rig)),
                 ("modes", self.rig.rig.modes.iter().map(|mode| mode.name.as_str()).collect::<Vec<_>>().join(",")),
             ],
         };

@@ -13,6 +13,7 @@ use vergence_rig::rounded;
 use crate::decode::{Cloud, CloudFigures, DecodedHealth, diagnostics, joints, transforms};
 use crate::keys::Attachment;
 use crate::transport::Arrived;
+use crate::units::in_words;
 
 /// A rig says how it is every second; after this time it is silent.
 const SILENT: Duration = Duration::from_secs(4);
@@ -167,6 +168,8 @@ impl Seen {
             }
         };
         let figures = self.cloud.as_ref().map(|(_, figures, _)| figures);
+        let units = self.value("units").unwrap_or_default();
+        let axes: Vec<_> = self.joints.iter().map(|(axis, at)| in_words(axis, *at, units)).collect();
         let joints: BTreeMap<_, _> = self.joints.iter().map(|(axis, at)| (axis.as_str(), rounded(*at))).collect();
         json!({
             "name": name,
@@ -178,6 +181,7 @@ impl Seen {
             "modes": self.value("modes").map(|modes| modes.split(',').collect::<Vec<_>>()),
             "takes_orders": self.value("takes_orders") == Some("true"),
             "joints": joints,
+            "axes": axes,
             "cameras": self.frames,
             "clouds": self.clouds,
             "sent": self.value("clouds").and_then(|count| count.parse::<u64>().ok()),

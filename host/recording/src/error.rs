@@ -39,6 +39,9 @@ pub enum RecordingError {
         /// Which part of it.
         what: String,
     },
+    /// It is no MCAP file.
+    #[error("{}: this is no recording: an MCAP file begins otherwise", .0.display())]
+    NoMcap(PathBuf),
     /// The recording has no rig file.
     #[error("{}: no rig file is attached; name one with --rig", .0.display())]
     NoRig(PathBuf),

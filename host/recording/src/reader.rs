@@ -7,6 +7,7 @@ use std::path::{Path, PathBuf};
 use std::time::Duration;
 
 use image::{ImageFormat, RgbImage};
+use mcap::MAGIC;
 use mcap::records::{Record, op};
 use mcap::sans_io::summary_reader::{SummaryReadEvent, SummaryReader};
 use mcap::sans_io::{LinearReadEvent, LinearReader, LinearReaderOptions};
@@ -57,10 +58,15 @@ impl Reader {
     /// Opens the recording in `folder`, or the MCAP file of that name.
     ///
     /// # Errors
-    /// [`RecordingError::Read`]
+    /// [`RecordingError::Read`], [`RecordingError::NoMcap`]
     pub fn open(path: &Path) -> Result<Self, RecordingError> {
         let file = if path.is_dir() { path.join(FILE) } else { path.to_owned() };
-        let bytes = File::open(&file).map_err(|error| RecordingError::read(&file, error))?;
+        let mut bytes = File::open(&file).map_err(|error| RecordingError::read(&file, error))?;
+        let mut begins = vec![0; MAGIC.len()];
+        if bytes.read_exact(&mut begins).is_err() || begins != MAGIC {
+            return Err(RecordingError::NoMcap(file));
+        }
+        bytes.rewind().map_err(|error| RecordingError::read(&file, error))?;
         // The end is missing where the program that wrote it died.
         let options = LinearReaderOptions::default().with_skip_end_magic(true).with_validate_chunk_crcs(true);
         let records = LinearReader::new_with_options(options);
@@ -117,9 +123,12 @@ impl Reader {
     /// The rig of the attached file; read the first event before.
     ///
     /// # Errors
-    /// [`RecordingError::NoRig`], [`RecordingError::Rig`]
+    /// [`RecordingError::NoRig`], [`RecordingError::Foreign`] where nothing could be read, [`RecordingError::Rig`]
     pub fn attached_rig(&self) -> Result<Rig, RecordingError> {
-        let text = self.rig().ok_or_else(|| RecordingError::NoRig(self.file.clone()))?;
+        let text = self.rig().ok_or_else(|| match self.topics.is_empty() {
+            true => self.foreign("its beginning"),
+            false => RecordingError::NoRig(self.file.clone()),
+        })?;
         Rig::from_toml(text).map_err(|error| RecordingError::Rig { file: self.file.clone(), why: error.to_string() })
     }
 

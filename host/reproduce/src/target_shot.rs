@@ -7,7 +7,7 @@ use image::GrayImage;
 use nalgebra::Vector3;
 use vergence_scene::{Lens, Optics, SheetView, Target, TrueLens, photograph_sheet};
 use vergence_sim::Random;
-use vergence_targets::{Corner, Placement, TargetView, detect};
+use vergence_targets::{Corner, Placement, SearchedPatch, TargetView, detect_from};
 use vergence_vision::{Camera, ImageSize, KannalaBrandt, Length, Pixel, Point, Transform};
 
 use crate::bench::{TARGET, scene_target};
@@ -65,7 +65,7 @@ pub struct Photo {
 }
 
 enum Shown {
-    Picture(Window, GrayImage),
+    Picture(Window, GrayImage, SearchedPatch),
     Corners(TargetView),
 }
 
@@ -86,10 +86,10 @@ impl Photo {
     pub fn found(&self, known: Option<&KannalaBrandt>) -> Option<FoundCorners> {
         let (view, labelled) = match &self.shown {
             Shown::Corners(view) => (view.clone(), true),
-            Shown::Picture(window, image) => {
+            Shown::Picture(window, image, patch) => {
                 let hint = known.and_then(|lens| window.part_of(lens));
                 let on_sensor = |at: Pixel| Pixel { u: at.u + f64::from(window.left), v: at.v + f64::from(window.top) };
-                target_in(image, hint.as_ref(), on_sensor)?
+                target_in(image, patch, hint.as_ref(), on_sensor)?
             }
         };
         let errors_px = errors(&view, &self.truth);
@@ -102,11 +102,11 @@ impl Photo {
         let truth = placed(&self.truth, pinhole);
         let (view, labelled) = match &self.shown {
             Shown::Corners(view) => (placed(view, pinhole), true),
-            Shown::Picture(window, image) => {
+            Shown::Picture(window, image, _) => {
                 let places: Vec<Pixel> = truth.corners.iter().map(|corner| corner.pixel).collect();
                 let patch = pinhole.patch(&places)?;
                 let picture = pinhole.picture(&patch, image, [window.left, window.top]);
-                target_in(&picture, None, |at| patch.place(at))?
+                target_in(&picture, &SearchedPatch::of(&picture), None, |at| patch.place(at))?
             }
         };
         let errors_px = errors(&view, &truth);
@@ -122,10 +122,11 @@ impl Photo {
 /// The good corners of the target in a picture, moved by `place`, and whether their labels are certain.
 fn target_in(
     picture: &GrayImage,
+    searched: &SearchedPatch,
     hint: Option<&KannalaBrandt>,
     place: impl Fn(Pixel) -> Pixel,
 ) -> Option<(TargetView, bool)> {
-    let found = detect(picture, &TARGET, hint).ok()?;
+    let found = detect_from(searched, picture, &TARGET, hint).ok()?;
     let mut view = found.view("", &TARGET);
     view.corners.iter_mut().for_each(|corner| corner.pixel = place(corner.pixel));
     Some((view, found.placement == Placement::Unique))
@@ -150,7 +151,8 @@ impl TargetShot<'_> {
             Corners::Rendered => {
                 let window = Window::about(&self.outline(), self.lens.size());
                 let image = self.picture(&window, conditions.noise_px)?;
-                Shown::Picture(window, image)
+                let patch = SearchedPatch::of(&image);
+                Shown::Picture(window, image, patch)
             }
         };
         Some(Photo { truth, shown })

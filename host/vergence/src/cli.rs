@@ -283,7 +283,7 @@ fn execute(cli: Cli, virtual_time: bool) -> Result<(), Failure> {
             Verb::Run(verb) => cmd::run::run(&verb.args, &verb.options.chosen()?, console).await,
             Verb::Record(verb) => cmd::run::record::record(&verb.args, &verb.options.chosen()?, console).await,
             Verb::Replay(args) => cmd::replay::run(&args, console).await,
-            Verb::Export(args) => cmd::export::run(args, console),
+            Verb::Export(args) => cmd::export::run(args, console).await,
             Verb::Panel(verb) => cmd::panel::run(&verb.args, &verb.options.chosen()?, console).await,
             Verb::Peers(args) => cmd::peers::run(&args, console).await,
             Verb::Reproduce(args) => cmd::reproduce::run(&args, console).await,

@@ -19,7 +19,7 @@ pub fn check_port(port: &Port) -> Finding {
             "connect and power the board, and see 'vergence devices' for the ports there are",
         ),
         Port::Serial(path) => match forbidden(path) {
-            Some(remedy) => Finding::fail("port", format!("you may not read and write {port}"), remedy),
+            Some(remedy) => Finding::forbidden("port", format!("you may not read and write {port}"), remedy),
             None => Finding::pass("port", format!("{port} may be read and written")),
         },
         Port::Tcp(_) | Port::Simulated => Finding::pass("port", port.to_string()),

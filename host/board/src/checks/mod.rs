@@ -45,28 +45,35 @@ pub struct Finding {
     pub reason: String,
     /// What to do; `None` where all is well.
     pub remedy: Option<String>,
+    /// Whether this user lacks the right to use a device.
+    pub is_forbidden: bool,
 }
 
 impl Finding {
     /// A check that passes.
     pub fn pass(check: &'static str, reason: impl Into<String>) -> Self {
-        Self { check, verdict: Verdict::Pass, reason: reason.into(), remedy: None }
+        Self { check, verdict: Verdict::Pass, reason: reason.into(), remedy: None, is_forbidden: false }
     }
 
     /// A check that passes with a warning.
     pub fn warn(check: &'static str, reason: impl Into<String>, remedy: impl Into<String>) -> Self {
-        Self { check, verdict: Verdict::Warn, reason: reason.into(), remedy: Some(remedy.into()) }
+        Self { check, verdict: Verdict::Warn, reason: reason.into(), remedy: Some(remedy.into()), is_forbidden: false }
     }
 
     /// A check that fails.
     pub fn fail(check: &'static str, reason: impl Into<String>, remedy: impl Into<String>) -> Self {
-        Self { check, verdict: Verdict::Fail, reason: reason.into(), remedy: Some(remedy.into()) }
+        Self { check, verdict: Verdict::Fail, reason: reason.into(), remedy: Some(remedy.into()), is_forbidden: false }
+    }
+
+    /// A check that fails because this user lacks the right to use a device.
+    pub fn forbidden(check: &'static str, reason: impl Into<String>, remedy: impl Into<String>) -> Self {
+        Self { is_forbidden: true, ..Self::fail(check, reason, remedy) }
     }
 
     /// Lines for people: the verdict and its reason, and what to do.
     #[must_use]
     pub fn in_words(&self) -> Vec<String> {
-        let Self { check, verdict, reason, remedy } = self;
+        let Self { check, verdict, reason, remedy, .. } = self;
         let first = format!("{}  {check:<9} {reason}", verdict.name());
         [first].into_iter().chain(remedy.iter().map(|remedy| format!("                -> {remedy}"))).collect()
     }

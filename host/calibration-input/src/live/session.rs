@@ -1,20 +1,18 @@
 //! The views of one stage pose of a set.
 
 use rayon::prelude::*;
-use tokio::task::spawn_blocking;
 use vergence_board::{Board, BoardError};
 use vergence_calibration::Coverage;
 use vergence_camera::{Camera, CameraError, CameraImage};
 use vergence_files::{make_folder, write_png};
 use vergence_rig::AxisPosition;
-use vergence_targets::TargetKind;
 use vergence_vision::{BodyMask, Camera as CameraFrame, Pixel, Right, UnitRay};
 
 use super::cameras::RigCameras;
 use super::{LiveEvent, LiveSet};
 use crate::InputError;
 use crate::capture::Looked;
-use crate::target_watch::{NAMES, TargetViews, TargetWatch, observe};
+use crate::target_watch::{NAMES, TargetWatch, look};
 
 /// Largest motion of an axis while views are taken, in encoder steps.
 const STILL_STEPS: f64 = 4.0;
@@ -46,7 +44,7 @@ impl LiveSet<'_> {
         let mut images_seen = 0;
         while watch.taken() < wanted {
             let (images, views);
-            (cameras, images, views) = look(cameras, self.target).await?;
+            (cameras, images, views) = look(cameras, grab, self.target).await?;
             images_seen += 1;
             if images_seen > self.images {
                 let (heading, taken) = (heading.to_owned(), watch.taken());
@@ -107,16 +105,7 @@ impl LiveSet<'_> {
     }
 }
 
-/// Takes one image with each camera and looks for the target in them, on a thread of its own: the link must not wait.
-async fn look(
-    mut cameras: Vec<Box<dyn Camera>>,
-    target: TargetKind,
-) -> Result<(Vec<Box<dyn Camera>>, Vec<CameraImage>, TargetViews), InputError> {
-    let looked = spawn_blocking(move || {
-        let grab = |camera: &mut Box<dyn Camera>| camera.grab()?.ok_or(CameraError::Ended);
-        let images: Vec<CameraImage> = cameras.par_iter_mut().map(grab).collect::<Result<_, CameraError>>()?;
-        let views = observe(&images, &target);
-        Ok((cameras, images, views))
-    });
-    looked.await.map_err(|error| InputError::Looking(error.to_string()))?
+/// An image of each camera.
+fn grab(cameras: &mut Vec<Box<dyn Camera>>) -> Result<Vec<CameraImage>, CameraError> {
+    cameras.par_iter_mut().map(|camera| camera.grab()?.ok_or(CameraError::Ended)).collect()
 }

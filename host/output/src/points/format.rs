@@ -114,16 +114,21 @@ impl CloudFormat {
         }
     }
 
-    /// The file of a dense cloud, binary.
+    /// The file of a dense cloud.
     ///
     /// # Errors
-    /// [`CloudError::Encoder`].
-    pub fn dense_cloud(self, rows: &[DenseRow]) -> Result<Vec<u8>, CloudError> {
-        match self {
-            Self::Ply => Ok(dense_ply(rows)),
-            Self::Pcd => Ok(dense_pcd(rows)),
-            Self::Las => dense_las(rows).map_err(|error| CloudError::Encoder(error.to_string())),
-            Self::E57 => dense_e57(rows).map_err(|error| CloudError::Encoder(error.to_string())),
+    /// [`CloudError`].
+    pub fn dense_cloud(self, rows: &[DenseRow], encoding: CloudEncoding) -> Result<Vec<u8>, CloudError> {
+        match (self, encoding) {
+            (Self::Ply, _) => Ok(dense_ply(rows, encoding)),
+            (Self::Pcd, _) => Ok(dense_pcd(rows, encoding)),
+            (Self::Las, CloudEncoding::Binary) => {
+                dense_las(rows).map_err(|error| CloudError::Encoder(error.to_string()))
+            }
+            (Self::E57, CloudEncoding::Binary) => {
+                dense_e57(rows).map_err(|error| CloudError::Encoder(error.to_string()))
+            }
+            (Self::Las | Self::E57, CloudEncoding::Ascii) => Err(CloudError::NoText(self.ending())),
         }
     }
 }

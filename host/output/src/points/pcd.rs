@@ -28,24 +28,27 @@ fn size_and_type(column: &str, encoding: CloudEncoding) -> (&'static str, &'stat
 pub fn pcd(points: &[ColouredPoint], encoding: CloudEncoding) -> Vec<u8> {
     let about = [ABOUT_FRAME, ABOUT_SCORE, ABOUT_COVARIANCES];
     let mut bytes = header(&about, &sparse_columns(), points.len(), encoding);
-    for cells in points.iter().map(sparse_cells) {
-        match encoding {
-            CloudEncoding::Binary => cells.for_each(|cell| cell.binary(&mut bytes)),
-            CloudEncoding::Ascii => {
-                let words: Vec<_> = cells.map(Cell::text).collect();
-                bytes.extend_from_slice((words.join(" ") + "\n").as_bytes());
-            }
-        }
-    }
+    points.iter().for_each(|point| row(sparse_cells(point), encoding, &mut bytes));
     bytes
 }
 
-/// Rows with the columns of the sparse cloud that a dense one has, little-endian.
+/// Rows with the columns of the sparse cloud that a dense one has.
 #[must_use]
-pub fn dense_pcd(rows: &[DenseRow]) -> Vec<u8> {
-    let mut bytes = header(&[ABOUT_FRAME], &dense_columns(), rows.len(), CloudEncoding::Binary);
-    rows.iter().flat_map(dense_cells).for_each(|cell| cell.binary(&mut bytes));
+pub fn dense_pcd(rows: &[DenseRow], encoding: CloudEncoding) -> Vec<u8> {
+    let mut bytes = header(&[ABOUT_FRAME], &dense_columns(), rows.len(), encoding);
+    rows.iter().for_each(|point| row(dense_cells(point), encoding, &mut bytes));
     bytes
+}
+
+/// Appends the cells of a point.
+fn row(cells: impl Iterator<Item = Cell>, encoding: CloudEncoding, bytes: &mut Vec<u8>) {
+    match encoding {
+        CloudEncoding::Binary => cells.for_each(|cell| cell.binary(bytes)),
+        CloudEncoding::Ascii => {
+            let words: Vec<_> = cells.map(Cell::text).collect();
+            bytes.extend_from_slice((words.join(" ") + "\n").as_bytes());
+        }
+    }
 }
 
 fn header(about: &[&str], columns: &[&str], points: usize, encoding: CloudEncoding) -> Vec<u8> {

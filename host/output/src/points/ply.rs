@@ -20,17 +20,14 @@ const TRACK_PROPERTY: &str = "property int track\n";
 /// whether a lens is extrapolated there, and the number of the track.
 #[must_use]
 pub fn ply(points: &[ColouredPoint], encoding: CloudEncoding) -> Vec<u8> {
-    let format = match encoding {
-        CloudEncoding::Binary => "binary_little_endian",
-        CloudEncoding::Ascii => "ascii",
-    };
     let mut bytes = format!(
-        "ply\nformat {format} 1.0\ncomment {ABOUT_FRAME}\ncomment {ABOUT_SCORE}\ncomment {ABOUT_COVARIANCES}\n\
+        "ply\nformat {} 1.0\ncomment {ABOUT_FRAME}\ncomment {ABOUT_SCORE}\ncomment {ABOUT_COVARIANCES}\n\
          element vertex {}\n\
          property double x\nproperty double y\nproperty double z\n\
          property uchar red\nproperty uchar green\nproperty uchar blue\n\
          property double u_left\nproperty double v_left\nproperty double u_right\nproperty double v_right\n\
          property double sigma_range\nproperty float score\n{}{EXTRAPOLATED_PROPERTY}{TRACK_PROPERTY}end_header\n",
+        name(encoding),
         points.len(),
         COVARIANCE_COLUMNS.map(|name| format!("property float {name}\n")).concat()
     )
@@ -66,28 +63,50 @@ fn text_row(ColouredPoint { point, colour: [red, green, blue], score, track }: &
     row
 }
 
-/// Rows with the columns of the sparse cloud, little-endian, in single precision.
+/// Rows with the columns of the sparse cloud, in single precision.
 #[must_use]
-pub fn dense_ply(rows: &[DenseRow]) -> Vec<u8> {
+pub fn dense_ply(rows: &[DenseRow], encoding: CloudEncoding) -> Vec<u8> {
     const ROW_BYTES: usize = 36;
     let header = format!(
-        "ply\nformat binary_little_endian 1.0\ncomment {ABOUT_FRAME}\n\
+        "ply\nformat {} 1.0\ncomment {ABOUT_FRAME}\n\
          element vertex {}\n\
          property float x\nproperty float y\nproperty float z\n\
          property uchar red\nproperty uchar green\nproperty uchar blue\n\
          property float u_left\nproperty float v_left\nproperty float u_right\nproperty float v_right\n\
          property float sigma_range\n{EXTRAPOLATED_PROPERTY}end_header\n",
+        name(encoding),
         rows.len()
     );
     let mut bytes = Vec::with_capacity(header.len() + rows.len() * ROW_BYTES);
     bytes.extend_from_slice(header.as_bytes());
     for row in rows {
+        if encoding == CloudEncoding::Ascii {
+            bytes.extend_from_slice(dense_text_row(row).as_bytes());
+            continue;
+        }
         row.point.iter().for_each(|value| bytes.extend_from_slice(&value.to_le_bytes()));
         bytes.extend_from_slice(&row.colour);
         row.pixels.iter().chain([&row.sigma]).for_each(|value| bytes.extend_from_slice(&value.to_le_bytes()));
         bytes.push(row.extrapolated.into());
     }
     bytes
+}
+
+fn dense_text_row(DenseRow { point, colour: [red, green, blue], pixels, sigma, extrapolated }: &DenseRow) -> String {
+    let [x, y, z] = point;
+    let mut row = format!("{x:.4} {y:.4} {z:.4} {red} {green} {blue}");
+    // Writing to a String does not fail.
+    pixels.iter().chain([sigma]).for_each(|value| _ = write!(row, " {value:.4}"));
+    _ = writeln!(row, " {}", u8::from(*extrapolated));
+    row
+}
+
+/// The name of the encoding in a header.
+const fn name(encoding: CloudEncoding) -> &'static str {
+    match encoding {
+        CloudEncoding::Binary => "binary_little_endian",
+        CloudEncoding::Ascii => "ascii",
+    }
 }
 
 #[cfg(test)]

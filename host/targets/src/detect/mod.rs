@@ -88,6 +88,11 @@ pub enum CornerQuality {
     Blunder,
 }
 
+/// The corners that the search finds in an image and labels. It is the slowest part of [`detect`], and needs neither target nor camera: who looks
+/// twice at an image, the second time with a camera, searches once.
+#[derive(Clone, Debug, Default)]
+pub struct SearchedPatch(Lattice);
+
 /// Why no target was detected.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[non_exhaustive]
@@ -179,13 +184,31 @@ pub enum DetectError {
 ///
 /// # Errors [`DetectError`] if the image shows no such target.
 pub fn detect(image: &GrayImage, target: &TargetSpec, hint: Option<&KannalaBrandt>) -> Result<Detection, DetectError> {
-    let TargetSpec { columns, rows, .. } = *target;
-    let sides = 2..=MOST_ALONG_SIDE;
-    if !sides.contains(&columns) || !sides.contains(&rows) || ((columns * rows) as usize) < FEWEST_CORNERS {
-        return Err(DetectError::UnusableTarget { columns, rows });
+    check_size(target)?;
+    detect_from(&SearchedPatch::of(image), image, target, hint)
+}
+
+impl SearchedPatch {
+    /// Searches an image.
+    #[must_use]
+    pub fn of(image: &GrayImage) -> Self {
+        Self(search::labelled_patches(image).into_iter().next().unwrap_or_default())
     }
+}
+
+/// As [`detect`], in an image that was searched already.
+///
+/// # Errors [`DetectError`] if the image shows no such target.
+pub fn detect_from(
+    patch: &SearchedPatch,
+    image: &GrayImage,
+    target: &TargetSpec,
+    hint: Option<&KannalaBrandt>,
+) -> Result<Detection, DetectError> {
+    check_size(target)?;
+    let TargetSpec { columns, rows, .. } = *target;
     let intensity = Intensity::new(image);
-    let mut lattice = search::labelled_patches(image).into_iter().next().unwrap_or_default();
+    let mut lattice = patch.0.clone();
     saddle::keep_corners(&mut lattice, &intensity, hint);
     refine::refine_all(&mut lattice, &intensity, None);
     grow::grow(&mut lattice, &intensity, hint, [columns, rows]);
@@ -198,6 +221,12 @@ pub fn detect(image: &GrayImage, target: &TargetSpec, hint: Option<&KannalaBrand
     blunders::flag(&mut lattice, hint);
     let placed = placement::place(&lattice, &intensity, hint, [columns, rows])?;
     Ok(Detection::new(placed, target))
+}
+
+fn check_size(&TargetSpec { columns, rows, .. }: &TargetSpec) -> Result<(), DetectError> {
+    let sides = 2..=MOST_ALONG_SIDE;
+    let is_usable = sides.contains(&columns) && sides.contains(&rows) && (columns * rows) as usize >= FEWEST_CORNERS;
+    if is_usable { Ok(()) } else { Err(DetectError::UnusableTarget { columns, rows }) }
 }
 
 /// The good corners of `target` in `image`, which is called `name`, with all labellings that the image allows. `hint` is a

@@ -35,7 +35,7 @@ pub struct Args {
 
 pub async fn judge(args: &Args, common: &CommonOptions, console: Console) -> Result<(), Failure> {
     let (mut rig, ()) = args.taking.connect(&args.cameras, common, None, console, |_| Ok(())).await?;
-    let mut heard = (args.taking.start_cameras(&args.cameras, &rig)?, rig.take_marks());
+    let mut heard = (args.taking.start_cameras(&args.cameras, &rig, console)?, rig.take_marks());
     let test = test(&args.cameras, &mut rig, (&mut heard.0, heard.1.as_mut()), args.duration).await?;
     console.say_lines(test_in_words(&test))?;
     tell(&check_test(&test), json!({ "simulated": rig.simulated.is_some(), "figures": test_json(&test) }), console)

@@ -66,7 +66,7 @@ pub struct Args {
     /// edges in the left frame.
     #[arg(long, value_name = "METHOD", default_value_t)]
     kernel: Kernel,
-    /// Measures a range for every pixel of the left image instead of matched points: a binary cloud, and beside it PNG images of range
+    /// Measures a range for every pixel of the left image instead of matched points: a cloud, and beside it PNG images of range
     /// (mm, 16 bits; 0 none, 65535 too far), sigma (0.1 mm) and confidence (of 255), that of a depth camera (z in mm), a preview as SVG.
     #[arg(long, conflicts_with_all = ["points", "kernel", "matcher"])]
     dense: bool,
@@ -268,7 +268,7 @@ fn written_pair(
     let Taken { rig, pose, search } = *taken;
     let out = out_of(args, images[0])?;
     let Some(matcher) = matcher else {
-        return one_dense_pair(images, *taken, &out, args.force, console);
+        return one_dense_pair(images, *taken, (&out, args.ascii), args.force, console);
     };
     let method = Method { matcher: *matcher, kernel: args.kernel, search };
     let cloud = cloud_of(images, rig, pose, *pairs, method)?;

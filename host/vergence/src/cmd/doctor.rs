@@ -94,7 +94,7 @@ fn check_rig(common: &CommonOptions, now: HostTimes) -> (Option<PathBuf>, Vec<Fi
 /// What the cameras send, and whether the calibration fits it; beside it how many megabytes per second both send.
 async fn look(args: &Args, common: &CommonOptions, console: Console) -> Result<(Vec<Finding>, Option<f64>), Failure> {
     let (mut rig, ()) = args.taking.connect(&args.cameras, common, None, console, |_| Ok(())).await?;
-    let (mut events, mut marks) = (args.taking.start_cameras(&args.cameras, &rig)?, rig.take_marks());
+    let (mut events, mut marks) = (args.taking.start_cameras(&args.cameras, &rig, console)?, rig.take_marks());
     let seen = test(&args.cameras, &mut rig, (&mut events, marks.as_mut()), LOOK).await?;
     let mut findings = check_test(&seen);
     let running = Running {

@@ -7,6 +7,7 @@ use vergence_vision::{Angle, Face};
 
 use crate::console::Console;
 use crate::failure::Failure;
+use crate::interrupt::interrupted;
 use crate::rig_file;
 
 /// Writes a recording, or images, as folders and bags for other programs.
@@ -36,9 +37,9 @@ pub struct Args {
     out: PathBuf,
 }
 
-pub fn run(Args { inputs, to, faces, field, size, rig, out }: Args, console: Console) -> Result<(), Failure> {
+pub async fn run(Args { inputs, to, faces, field, size, rig, out }: Args, console: Console) -> Result<(), Failure> {
     let rig = rig.map(|file| rig_file::load(Some(&file))).transpose()?;
-    let exported = export(&inputs, rig, &Options { to, faces, field, size, out })?;
+    let exported = export(inputs, rig, Options { to, faces, field, size, out }, interrupted()).await?;
     exported.warnings.iter().for_each(|warning| console.warn(warning));
     console.say(exported.in_words())?;
     console.result(&exported.json())

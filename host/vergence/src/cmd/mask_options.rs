@@ -2,7 +2,7 @@
 
 use clap::builder::{PathBufValueParser, TypedValueParser};
 use vergence_calibration_input::PairMasks;
-use vergence_camera::camera_mask;
+use vergence_camera::{camera_mask, with_whole_name};
 use vergence_rig::{CameraMask, Rig};
 use vergence_vision::{BodyMask, ImageSize, Side};
 
@@ -35,6 +35,11 @@ impl MaskOptions {
     pub fn of<'a>(&'a self, rig: &'a Rig) -> PairMasks<'a> {
         let [left, right] = self.given();
         [left.or(rig.masks[0].as_ref()), right.or(rig.masks[1].as_ref())]
+    }
+
+    /// The same as a calibration of `rig` writes them: with whole names.
+    pub fn kept(&self, rig: &Rig) -> [Option<CameraMask>; 2] {
+        self.of(rig).map(|mask| mask.map(with_whole_name))
     }
 
     /// Both masks, for the cameras of `rig`.

@@ -99,7 +99,7 @@ pub async fn run(args: &Args, common: &CommonOptions, console: Console) -> Resul
             let (panel, driver) = Panel::new(Setting { rig: shown, simulated, has_cameras: true, recorded_ms: None });
             rig.board = rig.board.map(|board| panel.watching(board));
             let recording = args.record.as_deref().map(|folder| rig.record(folder)).transpose()?;
-            let events = panel.tap(args.live.taking.start_cameras(cameras, &rig)?, recording.as_ref());
+            let events = panel.tap(args.live.taking.start_cameras(cameras, &rig, console)?, recording.as_ref());
             let (relink, marks) = Relink::of(args.persistence, &mut rig, common);
             let live = Some(method.live_loop(&rig, events, marks, MatchingTime::Real));
             (panel, Session { driver, board: rig.board, trigger: rig.trigger, live, recording }, relink)

@@ -83,7 +83,7 @@ pub async fn run(args: &Args, common: &CommonOptions, console: Console) -> Resul
         (true, None) => MatchingTime::Measured,
         (true, Some(time)) => MatchingTime::Fixed(time),
     };
-    let events = args.live.taking.start_cameras(&args.cameras, &rig)?;
+    let events = args.live.taking.start_cameras(&args.cameras, &rig, console)?;
     let (relink, marks) = Relink::of(args.persistence, &mut rig, common);
     let mut live = method.live_loop(&rig, events, marks, matching_time);
     if let Some(recording) = &recording {

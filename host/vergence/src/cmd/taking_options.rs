@@ -133,14 +133,19 @@ impl TakingOptions {
     ///
     /// # Errors
     /// Where neither camera is there, or nothing that can be unplugged has this name.
-    pub fn start_cameras(&self, cameras: &[String], rig: &LiveRig) -> Result<Receiver<(Side, CameraEvent)>, Failure> {
+    pub fn start_cameras(
+        &self,
+        cameras: &[String],
+        rig: &LiveRig,
+        console: Console,
+    ) -> Result<Receiver<(Side, CameraEvent)>, Failure> {
         let (listener, events) = channel(EVENTS_KEPT);
         rig.plug.iter().for_each(Plug::begin);
         match (&rig.simulated, cameras) {
             (Some((mechanics, lenses)), _) => self.simulate(rig, mechanics, lenses.clone(), &listener)?,
             (None, [left, right]) if is_played(left) || is_played(right) => {
-                let warn = |warning: String| Console::new(false).warn(warning);
-                play_both([left.as_ref(), right.as_ref()], (self.rate, rig.clock), &listener, warn)?;
+                let names = [left.as_ref(), right.as_ref()];
+                play_both(names, (self.rate, rig.clock), &listener, |warning| console.warn(warning))?;
             }
             (None, [left, right]) => {
                 let opener = |device: &String, lens: KannalaBrandt, shutter: Shutter| {

@@ -87,9 +87,8 @@ pub fn run(args: &Args, console: Console) -> Result<(), Failure> {
     held_out.as_ref().map_or(Ok(()), |held_out| held_out.check(calibration.rms_inlier_px))?;
     let verdict = extrinsics_verdict(&calibration, &args.verdict);
     let provenance = args.result.provenance(hash);
-    let rig = Rig { shutters, ..fixed_pair(&calibration, &args.result.name("pair")) }
-        .to_toml(&provenance)
-        .map_err(Failure::check)?;
+    let pair = fixed_pair(&calibration, &args.result.name("pair"));
+    let rig = Rig { shutters, masks: args.masks.kept(&pair), ..pair }.to_toml(&provenance).map_err(Failure::check)?;
     args.result.write(&rig, || {
         let about = ReportAbout::new(args.result.name("Pair"), args.target.spec().ok().as_ref(), &provenance, None);
         extrinsics_report(

@@ -149,7 +149,7 @@ async fn calibrate(
             .map_err(|error| Failure::check(format!("without one stage pose there is no calibration: {error}")))?,
         false => Vec::new(),
     };
-    let rig = Rig { name: args.result.name(&drawn.name), ..stage.rig(&drawn) };
+    let rig = Rig { name: args.result.name(&drawn.name), masks: args.masks.kept(&drawn), ..stage.rig(&drawn) };
     for pose in &poses {
         let values: Vec<f64> = pose.readings.iter().map(|reading| reading.value()).collect();
         let found = rig.pose_at_values(&values).left_from_right;

@@ -21,11 +21,11 @@ use vergence_plausibility::images::{Taken, images_are_one_pair};
 /// Pairs that were taken together have 49 % to 82 % (a photographed pair, two simulated ones), swapped or unrelated ones at most 19 %.
 const SUSPICIOUS_SHARE: f64 = 0.35;
 
-/// Measures one pair and writes the cloud to `out` and images beside it.
+/// Measures one pair and writes the cloud to `out`, as text where that is true, and images beside it.
 pub fn one_dense_pair(
     [left, right]: [&CameraImage; 2],
     taken: Taken<'_>,
-    out: &Path,
+    out: (&Path, bool),
     force: ForceOption,
     console: Console,
 ) -> Result<Measured, Failure> {

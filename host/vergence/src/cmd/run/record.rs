@@ -50,7 +50,7 @@ pub async fn record(args: &Args, common: &CommonOptions, console: Console) -> Re
     let tour = args.tour.tour(&rig.known)?;
     let recording = rig.record(&args.out)?;
     make_ready(&mut rig, &args.tour, console).await?;
-    let events = args.taking.start_cameras(&args.cameras, &rig)?;
+    let events = args.taking.start_cameras(&args.cameras, &rig, console)?;
     let (relink, marks) = Relink::of(args.persistence, &mut rig, common);
     if let (Some(board), Some(trigger)) = (&rig.board, rig.trigger) {
         board.ask(Request::SetTrigger(trigger)).await?;

@@ -39,7 +39,7 @@ pub fn run(args: &Args, input: Input<'_>, hash: InputHash, console: Console) -> 
             .map_err(|error| Failure::check(format!("without one stage pose there is no calibration: {error}")))?,
         false => Vec::new(),
     };
-    let rig = Rig { name: args.result.name(&drawn.name), ..trunk.rig(drawn) };
+    let rig = Rig { name: args.result.name(&drawn.name), masks: args.masks.kept(drawn), ..trunk.rig(drawn) };
     let verdict = trunk_verdict(&rig, &args.verdict);
     let provenance = args.result.provenance(hash);
     args.result.write(&rig.to_toml(&provenance).map_err(Failure::check)?, || {
