@@ -6,7 +6,7 @@
 
 use nalgebra::{DMatrix, Isometry3, SVector};
 
-use crate::extrinsics::fit::{Fit, Task};
+use crate::extrinsics::fit::{Fit, Start, Task};
 use crate::extrinsics::joint::{BOW, Joint, Kinematics, Shared};
 use crate::intrinsics::LEAST_GAIN;
 use crate::reprojection::{POSE, moved};
@@ -15,7 +15,7 @@ use crate::{TargetShape, TargetWarp};
 
 impl<K: Kinematics> Task<'_, K> {
     /// Where a fit with a bow starts; `None` where the views show none.
-    pub(super) fn bowed(&self, flat: &Fit<K::State>) -> Option<(Shared<K::State>, Vec<Isometry3<f64>>)> {
+    pub(super) fn bowed(&self, flat: &Fit<K::State>, usable: &[Vec<bool>]) -> Option<Start<K::State>> {
         let kept: Vec<usize> = (0..self.views.len()).filter(|&view| flat.inliers[view].contains(&true)).collect();
         let corners = self.views.iter().flat_map(|view| view.corners().map(|(_, corner)| corner));
         let shape = TargetShape::over(corners);
@@ -37,7 +37,7 @@ impl<K: Kinematics> Task<'_, K> {
         }
         let mut targets = flat.targets.clone();
         kept.iter().zip(&with.blocks).for_each(|(&view, target)| targets[view] = *target);
-        Some((with.shared, targets))
+        Some(Start { shared: with.shared, targets, usable: usable.to_vec() })
     }
 
     /// The fit to the corners that `flat` used in these views.

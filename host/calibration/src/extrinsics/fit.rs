@@ -92,8 +92,8 @@ impl<K: Kinematics> Task<'_, K> {
     pub fn fit(&self, start: Start<K::State>) -> Result<Fit<K::State>, NoFit> {
         let usable = start.usable.clone();
         let flat = self.fit_shape(start, false)?;
-        match self.bowed(&flat) {
-            Some((shared, targets)) => self.fit_shape(Start { shared, targets, usable }, true),
+        match self.bowed(&flat, &usable) {
+            Some(start) => self.fit_shape(start, true),
             None => Ok(flat),
         }
     }
