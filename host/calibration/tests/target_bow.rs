@@ -109,7 +109,7 @@ fn a_bent_target_is_found_and_held_out_views_are_predicted_with_its_bow() {
     let warp = found.warp.unwrap();
     assert!((warp.shape.along_x_mm - 0.5).abs() < 5.0 * warp.sigma_mm[0] && warp.sigma_mm[0] < 0.05, "{warp:?}");
     assert!(warp.shape.along_y_mm.abs() < 5.0 * warp.sigma_mm[1], "{warp:?}");
-    assert_eq!(warp.shape.half_mm, HALF_MM);
+    assert!((0..2).all(|axis| (warp.shape.half_mm[axis] - HALF_MM[axis]).abs() < 1e-9), "{warp:?}");
     let held_out = validate_intrinsics(&views, SIZE, &options, &found, 5).unwrap();
     // Residuals of noise alone, a little more where the lens is known from fewer views; a flat target leaves 0.3 px.
     assert!(held_out.rms_px < 1.15 * 2.0_f64.sqrt() * NOISE_PX, "{} px", held_out.rms_px);
