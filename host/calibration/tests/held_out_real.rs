@@ -5,7 +5,7 @@
 mod intrinsics_sets;
 
 use intrinsics_sets::{CornerSet, corner_sets, data};
-use nalgebra::{Isometry3, Matrix2x3, Matrix6, SMatrix, Translation3, UnitQuaternion, Vector2, Vector3, Vector6};
+use nalgebra::{Isometry3, Matrix2x3, Matrix6, SMatrix, Translation3, UnitQuaternion, Vector2, Vector6};
 use rayon::prelude::*;
 use vergence_calibration::{
     IntrinsicsOptions, LensModel, LensParameters, TargetShape, TargetWarp, calibrate_intrinsics, reproject, target_pose,
