@@ -14,9 +14,10 @@ use common::built_bench::{Dice, POSES, as_built, stand};
 use common::corner_files::{Lenses, calibrated_as, noisy};
 use common::rendered::{band, seeds};
 use image::RgbImage;
-use nalgebra::Vector3;
+use nalgebra::{UnitQuaternion, Vector3};
 use vergence_lens::Displacement;
 use vergence_pipeline::{PairPose, cloud_of_pairs};
+use vergence_reproduce::own_frame;
 use vergence_rig::Rig;
 use vergence_scene::{Lens, LensChoice, TrueLens};
 use vergence_vision::{Angle, KannalaBrandt, Kernel, Left, Length, Pixel, PixelPair, Point};
@@ -35,10 +36,17 @@ struct Figures {
 }
 
 /// A file's figures at 30 points about 350 mm away, with the axes set anywhere within `separations`.
-fn figures(rig: &Rig, file: &Rig, lenses: [&dyn Lens; 2], separations: [f64; 2], dice: &mut Dice) -> Figures {
+fn figures(
+    [rig, file]: [&Rig; 2],
+    (lenses, is_displaced): ([&dyn Lens; 2], bool),
+    separations: [f64; 2],
+    dice: &mut Dice,
+) -> Figures {
     const POINTS: usize = 30;
     let mut sums = Figures::default();
     let mut points = 0;
+    // A lens without an axis has the frame that its calibration gives it.
+    let turn = if is_displaced { own_frame(&file.left_camera, lenses[0]) } else { UnitQuaternion::identity() };
     while points < POINTS {
         let share = 0.5 + 0.5 * dice.uniform();
         let wished =
@@ -54,7 +62,7 @@ fn figures(rig: &Rig, file: &Rig, lenses: [&dyn Lens; 2], separations: [f64; 2],
         let pose = PairPose::standing(file.pose_read_at(&read));
         let cloud = cloud_of_pairs(&[(seen, MATCH_PX)], &RgbImage::new(1, 1), file, &pose, Kernel::default());
         let Some(found) = cloud.expect("no axis moves").points.first().map(|found| found.point) else { continue };
-        let error = found.point.mm() - truth.mm();
+        let error = found.point.mm() - turn * truth.mm();
         sums.nees += error.dot(&found.covariance.cholesky().expect("a covariance").solve(&error));
         sums.error_mm += (found.point.mm().norm() - 350.0).abs();
         sums.stated_mm += found.sigma_range.mm() * (2.0 / std::f64::consts::PI).sqrt();
@@ -122,7 +130,8 @@ fn trial<const N: usize>(seed: u64, optics: Optics, models: [&str; N]) -> [[Figu
         let work = tempfile::tempdir().expect("a temporary folder");
         let text = calibrated_as(&rig, lenses, work.path(), &["--lens-model", model], &mut dice);
         let written = Rig::from_toml(&text).expect("a rig");
-        MODES.map(|(_, separations)| figures(&rig, &written, [&left, &right], separations, &mut Dice::new(seed + 2000)))
+        let lenses: ([&dyn Lens; 2], bool) = ([&left, &right], optics.mounted.is_some());
+        MODES.map(|(_, separations)| figures([&rig, &written], lenses, separations, &mut Dice::new(seed + 2000)))
     })
 }
 
