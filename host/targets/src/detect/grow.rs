@@ -109,14 +109,18 @@ fn edges_reach(
 /// The place up to `radius` from the prediction, in whole pixels, with the strongest saddle.
 fn strongest_saddle(image: &Intensity<'_>, expected: &Prediction, colour: f64, radius: f64) -> Option<Vector2<f64>> {
     let reach = radius.floor() as i32;
+    let side = (2 * reach + 1).unsigned_abs() as usize;
+    let mut saddles = vec![0.0; side * side];
+    for (offset, part) in Quadrants::close_saddle(&expected.steps) {
+        image.add_around(expected.position + offset, colour * part, reach, &mut saddles);
+    }
     let offsets =
         (-reach..=reach).flat_map(|y| (-reach..=reach).map(move |x| Vector2::new(f64::from(x), f64::from(y))));
     let mut best: Option<(f64, Vector2<f64>)> = None;
-    for place in offsets.filter(|offset| offset.norm() <= radius).map(|offset| expected.position + offset) {
-        let Some(quadrants) = Quadrants::read_close(image, place, &expected.steps) else { continue };
-        let saddle = colour * quadrants.saddle();
-        if best.is_none_or(|(strongest, _)| saddle > strongest) {
-            best = Some((saddle, place));
+    for (saddle, offset) in saddles.into_iter().zip(offsets).filter(|(_, offset)| offset.norm() <= radius) {
+        // Not a number where it needs pixels outside the image.
+        if !saddle.is_nan() && best.is_none_or(|(strongest, _)| saddle > strongest) {
+            best = Some((saddle, expected.position + offset));
         }
     }
     best.map(|(_, place)| place)

@@ -34,6 +34,7 @@ use crate::{Corner, Relabelling, SeenTarget, TargetKind, TargetSpec, TargetView}
 pub use april_grid::detect_april_grid;
 pub use charuco::detect_charuco;
 use intensity::Intensity;
+use lattice::Lattice;
 use placement::Placed;
 pub use placement::Placement;
 pub use tags::{ReadCode, TagFamily};

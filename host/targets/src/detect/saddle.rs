@@ -20,33 +20,34 @@ pub struct Quadrants {
 impl Quadrants {
     /// Means of the four squares that meet at `position`; `None` at the image's border.
     pub fn read(image: &Intensity<'_>, position: Vector2<f64>, steps: &[Vector2<f64>; 2]) -> Option<Self> {
-        Self::sampled(image, position, steps, [0.18, 0.28, 0.38])
-    }
-
-    /// The same closer to the edges, so that the saddle falls off on all sides of a corner.
-    pub fn read_close(image: &Intensity<'_>, position: Vector2<f64>, steps: &[Vector2<f64>; 2]) -> Option<Self> {
-        Self::sampled(image, position, steps, [0.06, 0.14, 0.24])
-    }
-
-    /// Means over the places with the given offsets in cells, each along both axes.
-    fn sampled(
-        image: &Intensity<'_>,
-        position: Vector2<f64>,
-        steps: &[Vector2<f64>; 2],
-        offsets: [f64; 3],
-    ) -> Option<Self> {
+        // Means over the places with these offsets in cells, each along both axes.
+        const OFFSETS: [f64; 3] = [0.18, 0.28, 0.38];
         let cell = cell(steps);
         let mut levels = [[0.0; 2]; 2];
         for (level, along) in levels.iter_mut().zip([-1.0, 1.0]) {
             for (level, across) in level.iter_mut().zip([-1.0, 1.0]) {
-                for x in offsets {
-                    for y in offsets {
+                for x in OFFSETS {
+                    for y in OFFSETS {
                         *level += image.between(position + cell * Vector2::new(along * x, across * y))? / 9.0;
                     }
                 }
             }
         }
         Some(Self { levels })
+    }
+
+    /// The places about a corner whose grey levels, each times its part, sum up to its saddle. They are closer to the edges than those of
+    /// [`Self::read`], so that the saddle falls off on all sides of a corner.
+    pub fn close_saddle(steps: &[Vector2<f64>; 2]) -> impl Iterator<Item = (Vector2<f64>, f64)> {
+        const OFFSETS: [f64; 3] = [0.06, 0.14, 0.24];
+        const SIDES: [f64; 2] = [-1.0, 1.0];
+        let cell = cell(steps);
+        let quadrants = SIDES.into_iter().flat_map(|along| SIDES.map(|across| [along, across]));
+        let places = OFFSETS.into_iter().flat_map(|x| OFFSETS.map(|y| [x, y]));
+        quadrants.flat_map(move |[along, across]| {
+            let place = move |[x, y]: [f64; 2]| (cell * Vector2::new(along * x, across * y), along * across / 18.0);
+            places.clone().map(place)
+        })
     }
 
     /// How much brighter the square ahead along both axes and its opposite are than the other two.
