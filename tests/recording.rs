@@ -252,6 +252,35 @@ fn a_replay_keeps_the_pace_that_it_is_given() {
     }
 }
 
+/// Pairs that come faster than they can be matched have fewer points, down to a floor, before fewer of them are measured. What is not measured in
+/// real time has all points, however fast it is played.
+#[test]
+fn time_limits_the_points_of_a_live_run_and_none_of_a_replay() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let (rig, recording) = (small_bench(folder.path()), of_four_clouds(folder.path()));
+    let live = ["--port", "sim", "--rig", rig.to_str().expect("a name"), "run", "--cameras", "sim", "--home"];
+    let clouds = |verb: &[&str], more: &[&str]| -> Vec<Value> {
+        let said = succeeds(&[verb, more, &["--json"]].concat());
+        let lines = said.lines().map(|line| serde_json::from_str(line).expect("JSON"));
+        lines.filter(|line: &Value| line["kind"] == "cloud").collect()
+    };
+    let fast = ["--rate", "200", "--frames", "18", "--least-points", "120"];
+    let limited = clouds(&live, &fast);
+    let limits: Vec<_> = limited.iter().map(|line| line["points_limit"]["most"].as_u64()).collect();
+    println!("{limits:?}");
+    assert!(limits[..4].iter().all(Option::is_none), "a few pairs tell what a pair costs");
+    assert!(limits[17].is_some_and(|most| (120..350).contains(&most)), "{limits:?}");
+    let smoothly = |two: &[Option<u64>]| two[1].unwrap_or(700) * 10 >= two[0].unwrap_or(700) * 8;
+    assert!(limits.windows(2).all(smoothly), "{limits:?}");
+    assert!(limited[17]["points"].as_u64() < limited[3]["points"].as_u64());
+    let said = succeeds(&[&live[..], &fast].concat());
+    assert!(said.contains("points limited by time: ") && said.contains(" of 700, "), "{said}");
+    let is_free = |line: &Value| line["points_limit"].is_null();
+    assert!(clouds(&live, &["--rate", "1", "--frames", "9"]).iter().all(is_free), "there is time enough");
+    let replayed = clouds(&["replay", &recording], &["--rate", "1000"]);
+    assert!(replayed.len() >= 4 && replayed.iter().all(is_free));
+}
+
 #[test]
 fn a_replay_on_a_page_gives_the_same_clouds() {
     let folder = tempfile::tempdir().expect("a folder");

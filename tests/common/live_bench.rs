@@ -60,6 +60,7 @@ impl LiveBench {
             exposures: Exposures::new(Some(f64::from(period_us))),
             matching_time: MatchingTime::Fixed(matching),
             stopwatch: || Duration::ZERO,
+            budget: None,
         };
         Self { simulated, board, live }
     }

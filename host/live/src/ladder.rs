@@ -5,7 +5,7 @@ use std::fmt;
 use serde_json::{Value, json};
 use tokio::time::Instant;
 use vergence_board::BoardKnowledge;
-use vergence_pipeline::{Observation, SkipReason};
+use vergence_pipeline::{Observation, PointLimit, SkipReason};
 use vergence_rig::Rig;
 
 use crate::live_loop::LiveResult;
@@ -14,11 +14,15 @@ use crate::posed::LONGEST_UNSEEN;
 
 /// The rate is judged from so many results on.
 const RATED: u64 = 4;
+/// A limit below this part of all points is told.
+const TOLD_LIMIT: f64 = 0.9;
 
 /// A rung of the ladder, from the smallest loss to the largest.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 #[non_exhaustive]
 pub enum Rung {
+    /// Fewer points are looked for, so that every exposure is measured.
+    FewerPoints,
     /// Exposures are skipped, because newer ones come while one is measured.
     LowerRate,
     /// No encoder tells an axis: the images do.
@@ -36,6 +40,7 @@ impl Rung {
     #[must_use]
     pub const fn as_str(self) -> &'static str {
         match self {
+            Self::FewerPoints => "fewer_points",
             Self::LowerRate => "lower_rate",
             Self::EncoderLost => "encoder_lost",
             Self::CameraLost => "camera_lost",
@@ -54,6 +59,7 @@ impl Rung {
         };
         let is_slow = pace.is_some_and(|(_, limit)| limit == Limit::Matching);
         let rungs = [
+            (result.limited.is_some(), Self::FewerPoints),
             (is_slow, Self::LowerRate),
             (by_images && !is_unseen, Self::EncoderLost),
             (alone, Self::CameraLost),
@@ -112,6 +118,7 @@ impl fmt::Display for Notice {
 pub(crate) struct Ladder {
     pace: Pace,
     results: u64,
+    has_few: bool,
     is_slow: bool,
     /// Indices of the axes that no encoder tells.
     lost: Vec<usize>,
@@ -120,26 +127,45 @@ pub(crate) struct Ladder {
 }
 
 impl Ladder {
-    /// Takes a result: whether the rate is lower than the cameras give.
-    pub fn note_result(&mut self, result: &LiveResult<'_>) -> Option<Notice> {
+    /// Takes a result: whether it has fewer points, and whether the rate is lower than the cameras give.
+    pub fn note_result(&mut self, result: &LiveResult<'_>, mut tell: impl FnMut(Notice)) {
         self.results += 1;
-        let (rate, limit) = self.pace.note(result).filter(|_| self.results >= RATED)?;
+        self.note_limit(result.limited).into_iter().for_each(&mut tell);
+        if let Some((rate, limit)) = self.pace.note(result).filter(|_| self.results >= RATED) {
+            let skipped = result.totals.skipped.get(&SkipReason::NewerCame).copied().unwrap_or_default();
+            self.note_pace(rate, limit, skipped).into_iter().for_each(tell);
+        }
+    }
+
+    /// A limit that comes and goes near all points is not told each time.
+    fn note_limit(&mut self, limited: Option<PointLimit>) -> Option<Notice> {
+        match limited {
+            Some(PointLimit { most, of }) if !self.has_few && (most as f64) < TOLD_LIMIT * of as f64 => {
+                self.has_few = true;
+                let text =
+                    format!("fewer points: at most {most} of {of} are looked for, so that every exposure is measured");
+                Some(Notice::step(Rung::FewerPoints, true, text))
+            }
+            None if std::mem::take(&mut self.has_few) => {
+                Some(Notice::step(Rung::FewerPoints, false, "there is time for all points again"))
+            }
+            _ => None,
+        }
+    }
+
+    fn note_pace(&mut self, rate: f64, limit: Limit, skipped: u64) -> Option<Notice> {
         let is_slow = limit == Limit::Matching;
         if std::mem::replace(&mut self.is_slow, is_slow) == is_slow {
             return None;
         }
-        let skipped = result.totals.skipped.get(&SkipReason::NewerCame).copied().unwrap_or_default();
-        Some(Notice::step(
-            Rung::LowerRate,
-            is_slow,
-            if is_slow {
-                format!(
-                    "lower rate: {rate:.1} Hz, because matching takes longer than the next exposure; {skipped} skipped so far"
-                )
-            } else {
-                format!("full rate again: {rate:.1} Hz, every exposure is measured")
-            },
-        ))
+        let text = if is_slow {
+            format!(
+                "lower rate: {rate:.1} Hz, because matching takes longer than the next exposure; {skipped} skipped so far"
+            )
+        } else {
+            format!("full rate again: {rate:.1} Hz, every exposure is measured")
+        };
+        Some(Notice::step(Rung::LowerRate, is_slow, text))
     }
 
     /// Looks at what the board tells.

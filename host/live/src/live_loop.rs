@@ -11,7 +11,10 @@ use tokio::time::{Instant, interval, sleep, sleep_until};
 use vergence_board::{BoardKnowledge, HostClock};
 use vergence_camera::{CameraEvent, PendingImage};
 use vergence_matching::Matcher;
-use vergence_pipeline::{Ambiguity, Exposed, Exposures, Method, Observation, PoseMemory, Search, SkipReason, TimeBase};
+use vergence_pipeline::{
+    Ambiguity, Exposed, Exposures, Method, Observation, PointBudget, PointLimit, PoseMemory, Search, SkipReason,
+    TimeBase,
+};
 use vergence_protocol::{Microseconds, TriggerMark};
 use vergence_rig::{Rig, StampedImage};
 use vergence_vision::Side;
@@ -106,6 +109,8 @@ pub struct LiveResult<'a> {
     pub latency: Duration,
     /// Counts so far, this result included.
     pub totals: &'a Totals,
+    /// How many points were looked for because there was no time for more.
+    pub limited: Option<PointLimit>,
 }
 
 impl LiveResult<'_> {
@@ -151,6 +156,8 @@ pub struct LiveLoop {
     pub stopwatch: Clock,
     /// What images told of the pose while the axes stand.
     pub memory: Arc<Mutex<PoseMemory>>,
+    /// How many points the matcher looks for, by what pairs cost; `None` without limit.
+    pub budget: Option<PointBudget>,
 }
 
 impl MatchingTime {
@@ -165,8 +172,17 @@ impl MatchingTime {
     }
 }
 
-/// A measurement under way, which ends with the host's time of the exposure in microseconds.
-type Work = Pin<Box<dyn Future<Output = (f64, Result<Measurement, NoResult>)>>>;
+/// A measurement under way.
+type Work = Pin<Box<dyn Future<Output = (Begun, Result<Measurement, NoResult>)>>>;
+
+/// A measurement that has begun.
+#[derive(Clone, Copy)]
+struct Begun {
+    at: Instant,
+    /// The middle of the exposure on the host's clock, in microseconds.
+    exposed_us: f64,
+    limited: Option<PointLimit>,
+}
 
 /// Why an exposure gave no result.
 enum NoResult {
@@ -192,6 +208,7 @@ impl LiveLoop {
         let (mut work, mut newest): (Option<Work>, Option<Exposed<PendingImage>>) = (None, None);
         let (mut blindness, mut ladder, mut over) = (Blindness::default(), Ladder::default(), None::<Instant>);
         let mut had_ended = false;
+        let mut last_us = None;
         loop {
             if work.is_none() {
                 work = newest.take().map(|exposed| self.start(exposed));
@@ -210,13 +227,14 @@ impl LiveLoop {
                     }
                     None => return Err(LiveError::LinkEnded.into()),
                 },
-                (exposed_at, done) = finished(&mut work) => {
+                (begun, done) = finished(&mut work) => {
                     work = None;
-                    let result = self.conclude(exposed_at, done, totals)?;
-                    if let Some((measurement, latency)) = &result {
-                        let result = LiveResult { measurement, latency: *latency, totals };
-                        ladder.note_result(&result).into_iter().for_each(&mut warn);
+                    if let Some(measurement) = self.conclude(done, totals)? {
+                        let (latency, limited) = (self.since(begun.exposed_us), begun.limited);
+                        let result = LiveResult { measurement: &measurement, latency, totals, limited };
+                        ladder.note_result(&result, &mut warn);
                         publish(result)?;
+                        self.note_cost(&begun, &measurement);
                     }
                     is_done = limits.results.is_some_and(|most| totals.clouds + totals.bearings >= most);
                 }
@@ -235,6 +253,9 @@ impl LiveLoop {
                 if had_ended { self.exposures.link_ended() } else { self.exposures.link_back() }
             }
             while let Some(exposed) = self.exposures.take() {
+                let (exposed_us, budget) = (host_middle(&exposed), self.budget.as_mut());
+                let before_us = last_us.replace(exposed_us);
+                budget.zip(before_us).into_iter().for_each(|(budget, us)| budget.came_after((exposed_us - us) * 1e-6));
                 if newest.replace(exposed).is_some() {
                     self.exposures.skip(SkipReason::NewerCame);
                 }
@@ -251,13 +272,12 @@ impl LiveLoop {
         }
     }
 
-    /// Counts the outcome of an exposure; a measurement comes with the time since its exposure.
+    /// Counts the outcome of an exposure.
     fn conclude(
         &mut self,
-        exposed_at: f64,
         done: Result<Measurement, NoResult>,
         totals: &mut Totals,
-    ) -> Result<Option<(Measurement, Duration)>, LiveError> {
+    ) -> Result<Option<Measurement>, LiveError> {
         let measurement = match done {
             Ok(measurement) => measurement,
             Err(NoResult::Skipped(reason)) => {
@@ -268,8 +288,19 @@ impl LiveLoop {
         };
         totals.count(&measurement.observation);
         totals.skipped.clone_from(self.exposures.skipped());
-        let latency = (self.clock.now().0 as f64 - exposed_at).max(0.0);
-        Ok(Some((measurement, Duration::from_micros(latency as u64))))
+        Ok(Some(measurement))
+    }
+
+    /// Time since the middle of an exposure.
+    fn since(&self, exposed_us: f64) -> Duration {
+        Duration::from_micros((self.clock.now().0 as f64 - exposed_us).max(0.0) as u64)
+    }
+
+    /// Tells the budget what a cloud took until the next pair can begin: what becomes of the result is a part of it.
+    fn note_cost(&mut self, begun: &Begun, measurement: &Measurement) {
+        if let (Some(budget), Observation::Points { .. }) = (&mut self.budget, &measurement.observation) {
+            budget.took(begun.at.elapsed().as_secs_f64());
+        }
     }
 
     /// Takes an event of a camera.
@@ -298,14 +329,17 @@ impl LiveLoop {
     fn start(&self, exposed: Exposed<PendingImage>) -> Work {
         let (rig, matcher, board) = (Arc::clone(&self.rig), Arc::clone(&self.matcher), self.board.clone());
         let (search, memory) = (Arc::clone(&self.search), Arc::clone(&self.memory));
-        let (matching_time, stopwatch, exposed_at) = (self.matching_time, self.stopwatch, host_middle(&exposed));
+        let (matching_time, stopwatch) = (self.matching_time, self.stopwatch);
+        let limited = self.budget.as_ref().and_then(PointBudget::limit);
+        let begun = Begun { at: Instant::now(), exposed_us: host_middle(&exposed), limited };
         Box::pin(async move {
             let posed = match posed(exposed, &rig, board.as_ref()).await {
                 Ok(posed) => posed,
-                Err(why) => return (exposed_at, Err(why)),
+                Err(why) => return (begun, Err(why)),
             };
             let worked = tokio::task::spawn_blocking(move || {
-                let method = Method { search: &search, ..Method::from(matcher.as_ref()) };
+                let points = limited.map(|limited| limited.most);
+                let method = Method { search: &search, points, ..Method::from(matcher.as_ref()) };
                 // A poisoned lock only means that another thread panicked; the memory is replaced whole.
                 let mut memory = memory.lock().unwrap_or_else(PoisonError::into_inner);
                 measure(posed, &rig, method, &mut memory, stopwatch)
@@ -320,7 +354,7 @@ impl LiveLoop {
             if let Ok(measurement) = &outcome {
                 matching_time.pass(measurement).await;
             }
-            (exposed_at, outcome)
+            (begun, outcome)
         })
     }
 }
@@ -342,7 +376,7 @@ async fn next(marks: &mut Option<Receiver<TriggerMark>>) -> Option<TriggerMark> 
     }
 }
 
-async fn finished(work: &mut Option<Work>) -> (f64, Result<Measurement, NoResult>) {
+async fn finished(work: &mut Option<Work>) -> (Begun, Result<Measurement, NoResult>) {
     match work {
         Some(work) => work.await,
         None => std::future::pending().await,

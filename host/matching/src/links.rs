@@ -239,8 +239,11 @@ pub(crate) fn in_originals(
     right_keypoints: usize,
 ) -> Matches {
     let mut matches = Matches { left_keypoints: keypoints.len(), right_keypoints, ..Matches::default() };
-    for (keypoint, link) in keypoints.iter().zip(links) {
-        match link.and_then(|link| original(views, keypoint, &link)) {
+    let converted =
+        |(keypoint, link): (&Keypoint, &Result<Link, _>)| link.and_then(|link| original(views, keypoint, &link));
+    let converted: Vec<_> = keypoints.par_iter().zip(links).map(converted).collect();
+    for link in converted {
+        match link {
             Ok(found) => matches.pairs.push(found),
             Err(reason) => *matches.dropped.entry(reason).or_default() += 1,
         }

@@ -20,6 +20,20 @@ pub trait Matcher: Send + Sync {
     /// # Errors
     /// [`MatchError`] for a pair that cannot be matched, whatever its images show.
     fn find(&self, pair: &ImagePair<'_>) -> Result<Matches, MatchError>;
+
+    /// The number of points that it follows at most, if it can be told to do less; `None` by a matcher that does the whole work for every pair.
+    fn most_points(&self) -> Option<usize> {
+        None
+    }
+
+    /// As [`Self::find`], with no more than about `most` points, for less work, if it can be told so. Those are spread over the views.
+    ///
+    /// # Errors
+    /// As [`Self::find`].
+    fn find_at_most(&self, pair: &ImagePair<'_>, most: Option<usize>) -> Result<Matches, MatchError> {
+        let _ = most;
+        self.find(pair)
+    }
 }
 
 /// Two images exposed together, with their lenses and their relative pose.

@@ -30,9 +30,50 @@ pub(crate) struct PlacedMatch {
     pub sigma: f64,
 }
 
+/// Distance in pixels of the view within which the nearest matches are sought first.
+const REACH: f64 = 40.0;
+
+/// Matches that are found by their rows.
+struct ByRows<'a> {
+    matches: &'a [PlacedMatch],
+    /// Rows and indices, by rows.
+    rows: Vec<(f64, usize)>,
+}
+
+impl<'a> ByRows<'a> {
+    fn of(matches: &'a [PlacedMatch]) -> Self {
+        let mut rows: Vec<(f64, usize)> = matches.iter().enumerate().map(|(j, one)| (one.left.y, j)).collect();
+        rows.sort_by(|p, q| p.0.total_cmp(&q.0));
+        Self { matches, rows }
+    }
+
+    /// All matches within `reach` rows of `y`, and a few more.
+    fn within(&self, y: f64, reach: f64) -> impl Iterator<Item = usize> {
+        let start = self.rows.partition_point(|(row, _)| *row < y - reach - 1.0);
+        let end = self.rows.partition_point(|(row, _)| *row <= y + reach + 1.0);
+        self.rows[start..end.max(start)].iter().map(|(_, j)| *j)
+    }
+
+    /// Squared distances and indices of the matches that `counts` accepts by both: at least the [`NEAREST`] nearest to `one`, or all.
+    fn near(&self, one: &PlacedMatch, counts: impl Fn(f64, usize) -> bool) -> Vec<(f64, usize)> {
+        let mut reach = REACH;
+        loop {
+            let placed = self.within(one.left.y, reach).map(|j| (distance_squared(one, &self.matches[j]), j));
+            let mut near: Vec<(f64, usize)> = placed.filter(|&(squared, j)| counts(squared, j)).collect();
+            let are_all = self.within(one.left.y, reach).count() == self.rows.len();
+            if are_all || near.iter().filter(|(squared, _)| *squared <= reach * reach).count() >= NEAREST {
+                near.retain(|(squared, _)| are_all || *squared <= reach * reach);
+                return near;
+            }
+            reach *= 2.0;
+        }
+    }
+}
+
 /// Whether each match has enough agreeing neighbours.
 pub(crate) fn supported(matches: &[PlacedMatch]) -> Vec<bool> {
-    matches.par_iter().map(|one| support(one, matches) >= SUPPORT).collect()
+    let by_rows = ByRows::of(matches);
+    matches.par_iter().map(|one| support(one, &by_rows) >= SUPPORT).collect()
 }
 
 /// Whether each match is at the position of a better one. Better is the smaller standard deviation, then the higher
@@ -43,24 +84,27 @@ pub(crate) fn duplicated(matches: &[PlacedMatch]) -> Vec<bool> {
         distance_squared(p, q) < SAME_POINT * SAME_POINT
             && p.sigma.total_cmp(&q.sigma).then(q.score.total_cmp(&p.score)).then(i.cmp(&j)).is_gt()
     };
-    (0..matches.len()).into_par_iter().map(|i| (0..matches.len()).any(|j| better(i, j))).collect()
+    let by_rows = ByRows::of(matches);
+    let row = |i: usize| matches[i].left.y;
+    (0..matches.len()).into_par_iter().map(|i| by_rows.within(row(i), SAME_POINT).any(|j| better(i, j))).collect()
 }
 
 /// Distance of the disparity of each match from the plane through those of its nearest matches, in pixels of the view;
 /// infinite with no other matches. Matches of another surface weigh less (P. Holland and R. Welsch, Commun. Stat. A6, 1977).
 pub(crate) fn off_surface(matches: &[PlacedMatch]) -> Vec<f64> {
-    (0..matches.len()).into_par_iter().map(|i| off_plane(i, matches).unwrap_or(f64::INFINITY)).collect()
+    let by_rows = ByRows::of(matches);
+    (0..matches.len()).into_par_iter().map(|i| off_plane(i, &by_rows).unwrap_or(f64::INFINITY)).collect()
 }
 
-fn off_plane(i: usize, matches: &[PlacedMatch]) -> Option<f64> {
+fn off_plane(i: usize, by_rows: &ByRows<'_>) -> Option<f64> {
     const ROUNDS: usize = 3;
     /// Distance from the plane at which the weight is halved, in pixels.
     const SCALE: f64 = 0.5;
     /// Information that keeps the slope of a plane through matches on one line small.
     const FLATNESS: f64 = 1e-3;
+    let matches = by_rows.matches;
     let one = matches.get(i)?;
-    let mut near: Vec<(f64, usize)> =
-        (0..matches.len()).filter(|&j| j != i).map(|j| (distance_squared(one, &matches[j]), j)).collect();
+    let mut near = by_rows.near(one, |_, j| j != i);
     if near.len() > NEAREST {
         near.select_nth_unstable_by(NEAREST, |p, q| p.0.total_cmp(&q.0).then(p.1.cmp(&q.1)));
         near.truncate(NEAREST);
@@ -86,13 +130,11 @@ fn off_plane(i: usize, matches: &[PlacedMatch]) -> Option<f64> {
     Some(plane.x.abs())
 }
 
-fn support(one: &PlacedMatch, matches: &[PlacedMatch]) -> usize {
+fn support(one: &PlacedMatch, by_rows: &ByRows<'_>) -> usize {
     let change = |other: &PlacedMatch| (other.disparity - one.disparity).abs();
-    let mut nearest: Vec<(f64, &PlacedMatch)> = matches
-        .iter()
-        .map(|other| (distance_squared(one, other), other))
-        .filter(|(squared, _)| *squared >= SAME_POINT * SAME_POINT)
-        .collect();
+    let near = by_rows.near(one, |squared, _| squared >= SAME_POINT * SAME_POINT);
+    let mut nearest: Vec<(f64, &PlacedMatch)> =
+        near.into_iter().map(|(squared, j)| (squared, &by_rows.matches[j])).collect();
     if nearest.len() > NEAREST {
         nearest.select_nth_unstable_by(NEAREST, |p, q| p.0.total_cmp(&q.0).then(change(p.1).total_cmp(&change(q.1))));
         nearest.truncate(NEAREST);

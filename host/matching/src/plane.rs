@@ -86,7 +86,11 @@ impl Plane {
             return None;
         }
         // Most calls span few pixels, and the shorter span is faster.
-        if last - x < 27.0 { self.sample_within::<N, 32>(x, step, y) } else { self.sample_within::<N, 48>(x, step, y) }
+        match last - x {
+            ..19.0 => self.sample_within::<N, 24>(x, step, y),
+            ..27.0 => self.sample_within::<N, 32>(x, step, y),
+            _ => self.sample_within::<N, 48>(x, step, y),
+        }
     }
 
     /// The loop of [`Self::sample_row`] within `SPAN` pixels of a row; all positions are inside the plane.
@@ -99,9 +103,10 @@ impl Plane {
         let row = y as usize;
         let line = |j: usize| self.values.get((row - 1 + j) * self.width + first..)?.first_chunk::<SPAN>();
         let (lines, wy) = ([line(0)?, line(1)?, line(2)?, line(3)?], cubic_weights((y - row as f64) as f32));
-        let mut mixed = [0.0_f32; SPAN];
+        let mut mixed = [0.0_f32; MIXED];
+        let inner = mixed[FARTHEST_DRIFT..].first_chunk_mut::<SPAN>()?;
         for i in 0..SPAN {
-            mixed[i] = wy[0] * lines[0][i] + wy[1] * lines[1][i] + wy[2] * lines[2][i] + wy[3] * lines[3][i];
+            inner[i] = wy[0] * lines[0][i] + wy[1] * lines[1][i] + wy[2] * lines[2][i] + wy[3] * lines[3][i];
         }
         // Positions in fixed point, rounded down and so never beyond the last: splitting them needs no saturating
         // conversion.
@@ -119,11 +124,7 @@ impl Plane {
             let found = cubic_weights(past[i]);
             (weights[0][i], weights[1][i], weights[2][i], weights[3][i]) = (found[0], found[1], found[2], found[3]);
         }
-        let mut taps = [[0.0; N]; 4];
-        for i in 0..N {
-            let found = mixed[columns[i] as usize - 1..].first_chunk::<4>()?;
-            (taps[0][i], taps[1][i], taps[2][i], taps[3][i]) = (found[0], found[1], found[2], found[3]);
-        }
+        let taps = taps(&mixed, &columns)?;
         let mut values = [0.0; N];
         for i in 0..N {
             values[i] = weights[0][i] * taps[0][i]
@@ -133,6 +134,45 @@ impl Plane {
         }
         Some(values)
     }
+}
+
+/// Values of a row that are kept, with room on both sides for those that are read and not used.
+const MIXED: usize = 80;
+/// By so many columns the last of some positions may be off where the first and their number put it.
+const FARTHEST_DRIFT: usize = 2;
+
+/// The four pixels around each of `N` positions that lie past `columns`, the first pixels of all, then the second ones, and so on. Column 0 is at
+/// [`FARTHEST_DRIFT`] of `mixed`.
+///
+/// Where positions are nearly a pixel apart, columns follow one another but in one or two places, and are copied as they lie.
+#[inline(always)]
+fn taps<const N: usize>(mixed: &[f32; MIXED], columns: &[u32; N]) -> Option<[[f32; N]; 4]> {
+    let mut taps = [[0.0; N]; 4];
+    let (first, last) = (*columns.first()?, *columns.last()?);
+    let drift = last.wrapping_sub(first).wrapping_sub(N as u32 - 1) as i32;
+    let start = first as usize + FARTHEST_DRIFT - 1;
+    if drift.unsigned_abs() as usize > FARTHEST_DRIFT {
+        for i in 0..N {
+            let found = mixed[columns[i] as usize + FARTHEST_DRIFT - 1..].first_chunk::<4>()?;
+            (taps[0][i], taps[1][i], taps[2][i], taps[3][i]) = (found[0], found[1], found[2], found[3]);
+        }
+        return Some(taps);
+    }
+    for (k, taps) in taps.iter_mut().enumerate() {
+        *taps = *mixed[start + k..].first_chunk::<N>()?;
+    }
+    for by in 1..=drift.abs() {
+        let by = by * drift.signum();
+        let from = start.checked_add_signed(by as isize)?;
+        for (k, taps) in taps.iter_mut().enumerate() {
+            let moved = mixed[from + k..].first_chunk::<N>()?;
+            for i in 0..N {
+                let is_moved = columns[i] == first.wrapping_add(i as u32).wrapping_add_signed(by);
+                taps[i] = if is_moved { moved[i] } else { taps[i] };
+            }
+        }
+    }
+    Some(taps)
 }
 
 /// Smoothed planes of halved resolutions: position x of level l is 2^l x of level 0.

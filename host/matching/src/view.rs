@@ -256,41 +256,54 @@ fn interpolate(knots: &[[f64; 2]], pixels: &mut [[f64; 2]]) {
 }
 
 /// Samples an image at the pixels of a row that are `seen`; what the image's border leaves out is not seen. Unseen pixels are black.
+///
+/// Positions and weights of some pixels are computed at once, then each is weighted down its columns, then all along their rows.
 #[multiversion(targets("x86_64+avx2"))]
 fn sample_line(image: &[u8], width: usize, pixels: &[[f64; 2]], seen: &mut [bool], values: &mut [f32]) {
     const TOGETHER: usize = 32;
     let chunks = pixels.chunks(TOGETHER).zip(seen.chunks_mut(TOGETHER)).zip(values.chunks_mut(TOGETHER));
     for ((pixels, seen), values) in chunks {
-        let (mut firsts, mut across, mut down) =
-            ([0_u32; TOGETHER], [[0.0_f32; 4]; TOGETHER], [[0.0_f32; 4]; TOGETHER]);
+        let (mut firsts, mut past) = ([0_u32; TOGETHER], [[0.0_f32; TOGETHER]; 2]);
         for (i, (&[u, v], seen)) in pixels.iter().zip(seen.iter_mut()).enumerate() {
             // Pixels that are seen are at least one pixel inside the camera's images; this image may be narrower.
             *seen &= u as usize + 3 <= width;
             let (u, v) = if *seen { (u, v) } else { (1.0, 1.0) };
             let (column, row) = (u as u32, v as u32);
-            across[i] = cubic_weights((u - f64::from(column)) as f32);
-            down[i] = cubic_weights((v - f64::from(row)) as f32);
+            (past[0][i], past[1][i]) = ((u - f64::from(column)) as f32, (v - f64::from(row)) as f32);
             firsts[i] = row.saturating_sub(1) * width as u32 + column.saturating_sub(1);
         }
-        for (i, (seen, value)) in seen.iter_mut().zip(values).enumerate() {
-            let sampled =
-                if *seen { sample_image(image, width, firsts[i] as usize, [&across[i], &down[i]]) } else { None };
-            *seen = sampled.is_some();
-            *value = sampled.unwrap_or_default();
+        let (mut across, mut down) = ([[0.0_f32; TOGETHER]; 4], [[0.0_f32; TOGETHER]; 4]);
+        for i in 0..TOGETHER {
+            let (by_column, by_row) = (cubic_weights(past[0][i]), cubic_weights(past[1][i]));
+            for k in 0..4 {
+                (across[k][i], down[k][i]) = (by_column[k], by_row[k]);
+            }
+        }
+        let mut mixed = [[0.0_f32; 4]; TOGETHER];
+        for (i, (seen, mixed)) in seen.iter_mut().zip(&mut mixed).enumerate().filter(|(_, (seen, _))| **seen) {
+            let weights = [down[0][i], down[1][i], down[2][i], down[3][i]];
+            *seen = mix_down(image, width, firsts[i] as usize, weights, mixed).is_some();
+        }
+        for (i, (value, seen)) in values.iter_mut().zip(seen.iter()).enumerate() {
+            let mixed = &mixed[i];
+            let sum =
+                across[0][i] * mixed[0] + across[1][i] * mixed[1] + across[2][i] * mixed[2] + across[3][i] * mixed[3];
+            *value = if *seen { sum } else { 0.0 };
         }
     }
 }
 
-/// Interpolates the brightness of an 8-bit image in the 4 × 4 pixels from `first` on; `None` where they are not all inside.
+/// Weighs the brightness of an 8-bit image in the 4 × 4 pixels from `first` on down their columns; `None` where they are not all inside.
 #[inline(always)]
-fn sample_image(pixels: &[u8], width: usize, first: usize, [across, down]: [&[f32; 4]; 2]) -> Option<f32> {
-    let around = pixels.get(first..first + 3 * width + 4)?;
-    let mut mixed = [0.0_f32; 4];
-    for (j, weight) in down.iter().enumerate() {
-        let taps: &[u8; 4] = around.get(j * width..)?.first_chunk()?;
+fn mix_down(pixels: &[u8], width: usize, first: usize, down: [f32; 4], mixed: &mut [f32; 4]) -> Option<()> {
+    let (one, rest) = pixels.get(first..)?.split_at_checked(width)?;
+    let (two, rest) = rest.split_at_checked(width)?;
+    let (three, four) = rest.split_at_checked(width)?;
+    let taps: [&[u8; 4]; 4] = [one.first_chunk()?, two.first_chunk()?, three.first_chunk()?, four.first_chunk()?];
+    for (taps, weight) in taps.into_iter().zip(down) {
         for (sum, tap) in mixed.iter_mut().zip(taps) {
             *sum += weight * f32::from(*tap);
         }
     }
-    Some(across[0] * mixed[0] + across[1] * mixed[1] + across[2] * mixed[2] + across[3] * mixed[3])
+    Some(())
 }

@@ -31,7 +31,7 @@ pub use dense_cloud::DenseCloud;
 pub use endings::{check_ending, check_folder};
 pub use error::OutputError;
 pub use latest_files::LatestFiles;
-pub use live_report::{live_bearings_json, live_cloud_json, live_cloud_words};
+pub use live_report::{live_bearings_json, live_cloud_json, live_cloud_words, point_limit_json, point_limit_words};
 pub use pictures::{
     DepthView, EXACT_AT, ViewMap, ZonesOf, confidence_image, dense_svg, depth_field_svg, depth_svg, error_svg,
     match_svg, range_image, seen_by_cones, sigma_image, trunk_strip_svg, view_yaml, write_drawing, write_scored_pair,

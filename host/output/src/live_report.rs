@@ -1,7 +1,7 @@
 //! What a cloud of the live loop says, in one line for people and as JSON.
 
 use serde_json::{Value, json};
-use vergence_pipeline::{Bearing, CameraGone, PairCloud};
+use vergence_pipeline::{Bearing, CameraGone, PairCloud, PointLimit};
 use vergence_rig::{Rig, RigPose, axes_json};
 use vergence_vision::{Side, median};
 
@@ -21,6 +21,18 @@ pub fn live_cloud_words(rig: &Rig, cloud: &PairCloud, pose: &RigPose, moving: bo
     let parts = cloud.points.iter().map(|point| point.point.sigma_range.mm() / point.point.point.mm().norm());
     let sigma = median(parts.collect()).map_or_else(String::new, |part| format!(", ranges to {:.1} %", 100.0 * part));
     format!("{} points{extrapolated}{sigma}{place}", cloud.points.len())
+}
+
+/// To how many points time limits a pair, to go on with after a comma.
+#[must_use]
+pub fn point_limit_words(PointLimit { most, of }: PointLimit) -> String {
+    format!("points limited by time: {most} of {of}, ")
+}
+
+/// The same; null where there is time for all.
+#[must_use]
+pub fn point_limit_json(limit: Option<PointLimit>) -> Value {
+    limit.map_or(Value::Null, |PointLimit { most, of }| json!({ "most": most, "of": of }))
 }
 
 /// The points, what became of the other matches, and by which pose of `rig` they were made.

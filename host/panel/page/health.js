@@ -60,7 +60,9 @@ export function showHealth(link) {
     const what = cloud.bearings
       ? `${cloud.bearings.count} bearings of the ${cloud.bearings.camera} camera, no range: ${cloud.bearings.why}`
       : `${cloud.count} points of ${cloud.matches} matches`;
+    const limit = cloud.points_limit;
     const remarks = [
+      limit ? `points limited by time: ${limit.most} of ${limit.of}` : null,
       cloud.drifted ? 'pose drifted' : null,
       cloud.calibration_known === false ? 'calibration unknown' : null,
       extrapolations.length ? 'beyond the calibrated range' : null,

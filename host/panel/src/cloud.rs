@@ -29,6 +29,7 @@ pub fn cloud_message(result: &LiveResult<'_>) -> Outgoing {
         "number": result.totals.clouds + result.totals.bearings,
         "latency_ms": rounded(result.latency.as_secs_f64() * 1e3),
         "work_ms": rounded(measurement.seconds * 1e3),
+        "points_limit": result.limited.map(|limit| json!({ "most": limit.most, "of": limit.of })),
         "skipped": result.totals.skipped.values().sum::<u64>(),
     });
     match &measurement.observation {

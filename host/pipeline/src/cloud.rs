@@ -93,12 +93,14 @@ pub struct Method<'a> {
     pub kernel: Kernel,
     /// Where points are sought.
     pub search: &'a Search,
+    /// Most points that there is time for; `None` for all.
+    pub points: Option<usize>,
 }
 
 impl<'a> From<&'a dyn Matcher> for Method<'a> {
     /// Pseudo-intersection of what `matcher` finds everywhere.
     fn from(matcher: &'a dyn Matcher) -> Self {
-        Self { matcher, kernel: Kernel::default(), search: &EVERYWHERE }
+        Self { matcher, kernel: Kernel::default(), search: &EVERYWHERE, points: None }
     }
 }
 
@@ -166,7 +168,8 @@ pub fn refined_cloud(
     standing.forget_if_moved(rig, pose);
     let matched = |at: &RigPose| -> Result<_, MatchError> {
         let sigma = matching_sigma(at, pose.sweep());
-        let found = images.with_grey((rig, method.search), at, sigma, |pair| method.matcher.find(pair))?;
+        let found = images
+            .with_grey((rig, method.search), at, sigma, |pair| method.matcher.find_at_most(pair, method.points))?;
         let pairs: Vec<_> = found.pairs.iter().map(Match::measured).collect();
         Ok((found, pairs))
     };
@@ -214,12 +217,14 @@ fn cloud_of(
     let gates = cloud_gates(rig, &used, kernel, farthest);
     let by_joints =
         StereoPair { left: &rig.left_camera, right: &rig.right_camera, left_from_right: middle.left_from_right };
-    let Cloud { points, dropped } = match pose.rows().filter(|_| fused.is_none()) {
-        None => cloud_of_each(pairs, &StereoPair { left_from_right: used.left_from_right, ..by_joints }, &gates),
-        Some((motion, exposure)) => moving_cloud(pairs, rig, motion, exposure, &gates)?,
+    let triangulated = || match pose.rows().filter(|_| fused.is_none()) {
+        None => Ok(cloud_of_each(pairs, &StereoPair { left_from_right: used.left_from_right, ..by_joints }, &gates)),
+        Some((motion, exposure)) => moving_cloud(pairs, rig, motion, exposure, &gates),
     };
     // While the pose turns by more than it is uncertain, one correction for all rows means nothing.
-    let drift = pose.is_steady().then(|| pose_drift(pairs, &by_joints, &expected_drift(middle))).flatten();
+    let drifted = || pose.is_steady().then(|| pose_drift(pairs, &by_joints, &expected_drift(middle))).flatten();
+    let (cloud, drift) = rayon::join(triangulated, drifted);
+    let Cloud { points, dropped } = cloud?;
     let coloured = |point: CloudPoint| {
         let colour = colour_at(left, point.pixels.left);
         ColouredPoint { point, colour, score: 1.0, track: None }

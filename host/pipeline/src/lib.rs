@@ -12,6 +12,7 @@
 //! - [`axes_by_images`] finds where axes stand that no encoder tells, [`observe_untold`] measures by them as long as they stand;
 //! - [`dense_ranges`] measures every pixel of the left image;
 //! - [`bearings`] gives the directions that one camera alone can see;
+//! - a [`PointBudget`] says how many points there is time for;
 //! - [`observe_pair`] and [`observe_one`] make an [`Observation`] of what a live rig delivers;
 //! - [`ModeOutlook`] predicts what a mode would offer, for a choice of the mode;
 //! - [`rig_zones`] and [`RigView`] say what the cameras of a rig cover, [`score`] compares ranges with the truth.
@@ -29,6 +30,7 @@ mod memory;
 mod mode_outlook;
 mod observation;
 mod pair;
+mod point_budget;
 mod pose;
 mod pose_source;
 mod score;
@@ -48,6 +50,7 @@ pub use memory::PoseMemory;
 pub use mode_outlook::ModeOutlook;
 pub use observation::{Observation, observe_one, observe_pair};
 pub use pair::{PairImages, colour_at};
+pub use point_budget::{PointBudget, PointLimit};
 pub use pose::{Motion, PairPose, TriggeredImage, UnpairedImage, pair_exposure};
 pub use pose_source::{pose_by_images, with_fused};
 pub use score::{Score, Spread, score};

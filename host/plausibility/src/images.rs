@@ -79,7 +79,7 @@ impl Agreement {
 
     /// Of what the classical matcher finds in two images; `None` where they cannot be matched.
     fn found(images: PairImages<'_>, Taken { rig, pose, search }: Taken<'_>) -> Option<Self> {
-        let method = Method { matcher: &GuidedMatcher::default(), kernel: Kernel::default(), search };
+        let method = Method { matcher: &GuidedMatcher::default(), kernel: Kernel::default(), search, points: None };
         pair_cloud(images, rig, pose, method, &mut |_| ()).ok().as_ref().map(Self::of)
     }
 

@@ -12,7 +12,7 @@ mod report;
 use std::time::Duration;
 
 use vergence_matching::{GuidedMatcher, Matcher, TrackingMatcher};
-use vergence_pipeline::{Method, PairPose, Stage, StageTimes, StandingPose, refined_cloud};
+use vergence_pipeline::{Method, PairPose, PointBudget, Stage, StageTimes, StandingPose, refined_cloud};
 use vergence_rig::Rig;
 use vergence_vision::median;
 
@@ -40,6 +40,8 @@ pub struct LiveFigures {
     pub computed: f64,
     /// Points of each pair that are right, and all.
     pub points: Vec<[usize; 2]>,
+    /// Most points that there was time for, of each measured pair.
+    pub limits: Vec<usize>,
     /// Right points and all of the single-pair matcher on some of the pairs.
     pub single: Vec<[usize; 2]>,
     /// Seconds that the single-pair matcher took for each.
@@ -52,6 +54,8 @@ pub struct LiveFigures {
 pub const STAGES: [Stage; 2] = [Stage::Match, Stage::Triangulate];
 /// How often the single-pair matcher measures: every so many pairs.
 const SINGLE_EVERY: usize = 10;
+/// Fewest points to which time limits a pair, as `run` has it without an option.
+const LEAST_POINTS: usize = 150;
 
 impl LiveFigures {
     /// Measures `count` pairs of `frames`, of which `rate` come in a second.
@@ -61,20 +65,28 @@ impl LiveFigures {
     pub fn of(frames: &LiveFrames, rate: f64, count: usize, clock: Clock) -> Result<Self, BenchError> {
         let (tracking, single) = (TrackingMatcher::default(), GuidedMatcher::default());
         let (mut figures, mut now, mut next) = (Self { came: count, ..Self::default() }, 0.0_f64, 0);
+        let most = tracking.most_points().unwrap_or(usize::MAX);
+        let mut budget = PointBudget::new(LEAST_POINTS, most);
         while next < count {
             // The newest pair that has come, or the next one.
             let newest = ((now * rate) as usize).clamp(next, count - 1);
             let (frame, exposed) = (frames.at(newest), newest as f64 / rate);
             let (before, mut times) = (computed_seconds(), StageTimes::start(clock));
+            let limit = budget.limit().map(|limit| limit.most);
+            let method = Method { points: limit, ..Method::from(&tracking as &dyn Matcher) };
             let (points, seconds) =
-                timed(clock, || points(&frames.rig, frame, &tracking, &mut |stage| times.ended(stage)));
+                timed(clock, || points(&frames.rig, frame, method, &mut |stage| times.ended(stage)));
+            budget.came_after(rate.recip());
+            budget.took(seconds);
+            figures.limits.push(limit.unwrap_or(most));
             figures.computed += computed_seconds() - before;
             now = now.max(exposed) + seconds;
             figures.latency.push(now - exposed);
             figures.stages.iter_mut().zip(STAGES).for_each(|(sum, stage)| *sum += times.of(stage));
             figures.points.push(frames.judge(frame, &points?));
             if figures.measured % SINGLE_EVERY == 0 {
-                let (alone, seconds) = timed(clock, || points_alone(&frames.rig, frame, &single));
+                let (alone, seconds) =
+                    timed(clock, || points(&frames.rig, frame, Method::from(&single as &dyn Matcher), &mut |_| ()));
                 figures.single.push(frames.judge(frame, &alone?));
                 figures.single_seconds.push(seconds);
             }
@@ -88,6 +100,12 @@ impl LiveFigures {
         Ok(figures)
     }
 
+    /// The median of the points that there was time for.
+    #[must_use]
+    pub fn limit(&self) -> usize {
+        median(self.limits.iter().map(|most| *most as f64).collect()).unwrap_or_default() as usize
+    }
+
     /// Median and 99th percentile of the delay.
     #[must_use]
     pub fn delay(&self) -> [Duration; 2] {
@@ -99,22 +117,14 @@ impl LiveFigures {
     }
 }
 
-fn points_alone(
-    rig: &Rig,
-    frame: &LiveFrame,
-    matcher: &dyn Matcher,
-) -> Result<Vec<vergence_vision::CloudPoint>, BenchError> {
-    points(rig, frame, matcher, &mut |_| ())
-}
-
 fn points(
     rig: &Rig,
     frame: &LiveFrame,
-    matcher: &dyn Matcher,
+    method: Method<'_>,
     ended: &mut dyn FnMut(Stage),
 ) -> Result<Vec<vergence_vision::CloudPoint>, BenchError> {
     let (pose, mut standing) = (PairPose::standing(frame.pose.clone()), StandingPose::default());
-    let cloud = refined_cloud(frame.images(), rig, &pose, Method::from(matcher), &mut standing, ended);
+    let cloud = refined_cloud(frame.images(), rig, &pose, method, &mut standing, ended);
     let cloud = cloud.map_err(|error| BenchError::Work(error.to_string()))?;
     Ok(cloud.points.into_iter().map(|point| point.point).collect())
 }

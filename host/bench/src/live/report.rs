@@ -26,7 +26,7 @@ impl LiveFigures {
         vec![
             format!(
                 "{:.1} Hz ({} of {} pairs), {:.0} ms after the exposure (99 %: {:.0} ms; first cloud {first:.0} ms); \
-                 {:.0} ms of one core a pair; {}",
+                 {:.0} ms of one core a pair; {}; time for {} points",
                 self.measured as f64 / self.seconds,
                 self.measured,
                 self.came,
@@ -34,6 +34,7 @@ impl LiveFigures {
                 last.as_secs_f64() * 1e3,
                 1e3 * self.computed / self.measured as f64,
                 stages.collect::<Vec<_>>().join(", "),
+                self.limit(),
             ),
             format!(
                 "{now:.0} right points a pair ({precision:.4}); single pairs {single:.0} ({single_precision:.4}) in {alone:.0} ms; \
@@ -57,6 +58,7 @@ impl LiveFigures {
             "latency_99_ms": rounded(last.as_secs_f64() * 1e3),
             "first_ms": rounded(1e3 * self.latency.first().copied().unwrap_or_default()),
             "computed_ms": rounded(1e3 * self.computed / self.measured as f64),
+            "points_limit": self.limit(),
             "match_s": rounded(self.stages[0]),
             "triangulate_s": rounded(self.stages[1]),
             "right_points": rounded(now),

@@ -11,6 +11,7 @@
 
 mod follow;
 mod search;
+mod spread;
 
 use std::sync::{Mutex, PoisonError};
 
@@ -19,6 +20,7 @@ use vergence_vision::{KannalaBrandt, Left, Right, Transform};
 
 use self::follow::followed;
 use self::search::{Strip, newly_found};
+use self::spread::Cells;
 use crate::corners::Keypoint;
 use crate::epipolar_band::EpipolarBand;
 use crate::guided::{LEVELS, are_suspiciously_few};
@@ -34,11 +36,17 @@ use crate::{Grid, GuidedMatcher, ImagePair, MatchError, Matcher, Matches, Unmatc
 pub struct TrackingMatcher {
     /// Searches whole pairs.
     whole: GuidedMatcher,
+    /// Keypoints of each view that are sought, strip by strip, where points are few.
+    in_strips: usize,
     state: Mutex<State>,
 }
 
 /// Keypoints of each view when a whole pair is searched: about half of them become tracks.
 const KEYPOINTS: usize = 2000;
+/// The same where tracks are few and strips are searched, which takes little time: as many as [`GuidedMatcher`] has of a pair.
+const KEYPOINTS_IN_STRIPS: usize = 4000;
+/// There are few tracks where less than this part of the largest number is left.
+const MANY: f64 = 0.9;
 /// Largest number of tracks.
 const MOST: usize = 700;
 /// Pixels of a view per radian, unless the images have more: in views of less corners of wide axes are no longer alike. Denser views than the images
@@ -53,7 +61,7 @@ const FEWEST: usize = 40;
 
 impl Default for TrackingMatcher {
     fn default() -> Self {
-        Self::with_keypoints(KEYPOINTS)
+        Self { in_strips: KEYPOINTS_IN_STRIPS, ..Self::with_keypoints(KEYPOINTS) }
     }
 }
 
@@ -61,7 +69,7 @@ impl TrackingMatcher {
     /// Searches a whole pair as `whole` does; without its oversampling in views that are as dense as the images, or small images enlarged.
     #[must_use]
     pub fn new(whole: GuidedMatcher) -> Self {
-        Self { whole, state: Mutex::default() }
+        Self { whole, in_strips: whole.keypoints, state: Mutex::default() }
     }
 
     /// The same with so many keypoints of each view when a whole pair is searched.
@@ -78,12 +86,23 @@ impl Matcher for TrackingMatcher {
 
     /// Finds the matches of a pair that was exposed after those before it. A pair of other cameras begins anew.
     fn find(&self, pair: &ImagePair<'_>) -> Result<Matches, MatchError> {
+        self.find_at_most(pair, None)
+    }
+
+    fn most_points(&self) -> Option<usize> {
+        Some(MOST)
+    }
+
+    /// As [`Self::find`]; at most `most` points are followed, and so many fewer corners are sought.
+    fn find_at_most(&self, pair: &ImagePair<'_>, most: Option<usize>) -> Result<Matches, MatchError> {
         pair.check()?;
+        let most = most.unwrap_or(MOST).min(MOST);
         // A poisoned lock only means that another thread panicked; the tracks are replaced whole.
         let mut state = self.state.lock().unwrap_or_else(PoisonError::into_inner);
         let density = pair.left_camera.k()[0].max(pair.right_camera.k()[0]);
         let oversampling = self.whole.oversampling.unwrap_or(DENSITY / density).clamp(1.0, 2.0);
-        state.find(pair, &GuidedMatcher { oversampling: Some(oversampling), ..self.whole })
+        let [keypoints, in_strips] = [self.whole.keypoints, self.in_strips].map(|keypoints| keypoints * most / MOST);
+        state.find(pair, &GuidedMatcher { oversampling: Some(oversampling), keypoints }, [in_strips, most])
     }
 }
 
@@ -133,19 +152,30 @@ struct Seen<'a> {
 }
 
 impl State {
-    fn find(&mut self, pair: &ImagePair<'_>, whole: &GuidedMatcher) -> Result<Matches, MatchError> {
+    /// At most `most` points are followed; where they are few, `in_strips` keypoints are sought in the strips of a whole view.
+    fn find(
+        &mut self,
+        pair: &ImagePair<'_>,
+        whole: &GuidedMatcher,
+        [in_strips, most]: [usize; 2],
+    ) -> Result<Matches, MatchError> {
         let cameras = [*pair.left_camera, *pair.right_camera];
-        let before = self.before.take().filter(|before| before.cameras == cameras);
+        let mut before = self.before.take().filter(|before| before.cameras == cameras);
         let kept = before.as_ref().filter(|before| is_near(&before.pose, &pair.left_from_right));
         let grid = kept.map(|before| before.grid);
         let views = SharedViews::in_buffers(pair, whole.oversampling, grid, &mut self.buffers)?;
         let [left, right] = [&views.left.plane(), &views.right.plane()]
             .map(|plane| Pyramid::in_buffers(plane, LEVELS, &mut self.buffers.values));
         let seen = Seen { band: views.band(), views, left, right };
+        let cells = Cells::for_points(most, seen.views.grid.size());
+        before.iter_mut().for_each(|before| cells.thin(&mut before.tracks, most));
         let tracks = before.as_ref().map_or_else(Vec::new, |before| followed(before, &seen));
-        let are_too_few = (tracks.len() as f64) < (FEW * self.at_first as f64).max(FEWEST as f64);
+        let at_first = self.at_first.min(most) as f64;
+        let are_too_few = (tracks.len() as f64) < (FEW * at_first).max(FEWEST as f64);
         let strip = self.next_strip(&seen.views.grid, are_too_few);
-        let (matches, tracks) = self.matched(&seen, tracks, &strip, whole.keypoints);
+        let are_few = !strip.is_whole && (tracks.len() as f64) < MANY * most as f64;
+        let keypoints = if are_few { in_strips } else { whole.keypoints };
+        let (matches, tracks) = self.matched(&seen, tracks, &strip, [keypoints, most]);
         if strip.is_whole {
             self.at_first = tracks.len();
         }
@@ -176,10 +206,10 @@ impl State {
         seen: &Seen<'_>,
         mut tracks: Vec<Track>,
         strip: &Strip,
-        budget: usize,
+        [keypoints, most]: [usize; 2],
     ) -> (Matches, Vec<Track>) {
         let (new, right_keypoints) =
-            if tracks.len() < MOST { newly_found(seen, &tracks, strip, budget) } else { (Vec::new(), 0) };
+            if tracks.len() < most { newly_found(seen, &tracks, strip, keypoints) } else { (Vec::new(), 0) };
         let known = tracks.len();
         let followed = tracks.iter().map(|track| Keypoint { at: track.at, level: 0 });
         let keypoints: Vec<Keypoint> = followed.chain(new.iter().map(|(keypoint, _)| *keypoint)).collect();
@@ -209,20 +239,37 @@ impl State {
         let ended = |reason: &UnmatchedReason| matches!(reason, UnmatchedReason::Duplicate | UnmatchedReason::Repeated);
         let mut ends = links.iter().map(|link| link.as_ref().err().is_some_and(ended));
         tracks.retain(|track| !ends.next().unwrap_or_default() && track.missed < PATIENCE);
-        self.begin(&mut tracks, &keypoints[known..], &mut links[known..]);
+        let cells = Cells::for_points(most, seen.views.grid.size());
+        self.begin(&mut tracks, &keypoints[known..], &mut links[known..], (cells, most));
         let right_keypoints = right_keypoints + known;
         (in_originals(&links, &seen.views, &keypoints, right_keypoints), tracks)
     }
 
-    /// Begins tracks with the new links, the most probable first, as long as there is room.
-    fn begin(&mut self, tracks: &mut Vec<Track>, keypoints: &[Keypoint], links: &mut [Result<Link, UnmatchedReason>]) {
-        let mut found: Vec<(&Keypoint, &mut Link)> =
-            keypoints.iter().zip(links).filter_map(|(keypoint, link)| Some((keypoint, link.as_mut().ok()?))).collect();
+    /// Begins tracks with the new links, as long as there is room: where there are few, and in each place with the most probable first.
+    fn begin(
+        &mut self,
+        tracks: &mut Vec<Track>,
+        keypoints: &[Keypoint],
+        links: &mut [Result<Link, UnmatchedReason>],
+        (cells, most): (Cells, usize),
+    ) {
+        let mut found: Vec<(ViewPixel, &mut Link)> = keypoints
+            .iter()
+            .zip(links)
+            .filter_map(|(keypoint, link)| Some((keypoint.at, link.as_mut().ok()?)))
+            .collect();
         found.sort_by(|(_, one), (_, other)| other.right_probability.total_cmp(&one.right_probability));
-        for (keypoint, link) in found.into_iter().take(MOST.saturating_sub(tracks.len())) {
-            let moved = [link.right.x - keypoint.at.x, link.right.y - keypoint.at.y];
+        let places: Vec<ViewPixel> = found.iter().map(|(at, _)| *at).collect();
+        let room = most.saturating_sub(tracks.len());
+        for index in cells.choose(&places, tracks.iter().map(|track| track.at), room) {
+            let (at, link) = &mut found[index];
             link.track = Some(self.next);
-            tracks.push(Track { number: self.next, at: keypoint.at, moved, missed: 0 });
+            tracks.push(Track {
+                number: self.next,
+                at: *at,
+                moved: [link.right.x - at.x, link.right.y - at.y],
+                missed: 0,
+            });
             self.next += 1;
         }
     }

@@ -189,5 +189,10 @@ pub fn show_cloud(panel: &Panel, rig: &Rig, number: u64) {
     let middle = BoardInstant { us: 0.0, error_us: 0.0 };
     let measurement = Measurement { observation, middle, unseen: None, decode_seconds: 0.0, seconds: 0.1 };
     let totals = Totals { clouds: number, ..Totals::default() };
-    panel.show(&LiveResult { measurement: &measurement, latency: Duration::from_millis(5), totals: &totals });
+    panel.show(&LiveResult {
+        measurement: &measurement,
+        latency: Duration::from_millis(5),
+        totals: &totals,
+        limited: None,
+    });
 }

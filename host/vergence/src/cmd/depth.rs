@@ -270,7 +270,7 @@ fn written_pair(
     let Some(matcher) = matcher else {
         return one_dense_pair(images, *taken, (&out, args.ascii), args.force, console);
     };
-    let method = Method { matcher: *matcher, kernel: args.kernel, search };
+    let method = Method { matcher: *matcher, kernel: args.kernel, search, points: None };
     let cloud = cloud_of(images, rig, pose, *pairs, method)?;
     if pairs.is_none() {
         args.force.unless_forced(cloud_is_of_one_pair(&cloud, images, *taken), console)?;

@@ -7,7 +7,7 @@ use tokio::sync::mpsc::Receiver;
 use vergence_camera::CameraEvent;
 use vergence_live::{LiveLoop, MatchingTime};
 use vergence_matching::Matcher;
-use vergence_pipeline::{Exposures, Search};
+use vergence_pipeline::{Exposures, PointBudget, Search};
 use vergence_protocol::TriggerMark;
 use vergence_rig::Rig;
 use vergence_vision::Side;
@@ -29,6 +29,10 @@ pub struct LiveOptions {
     matching: MatcherOptions,
     #[command(flatten)]
     search: SearchOptions,
+    /// Fewest points that are looked for where time is short; a lower rate comes only after that. With more than the matcher follows, time
+    /// never limits the points.
+    #[arg(long, default_value_t = 150, value_name = "COUNT", value_parser = clap::value_parser!(u32).range(1..))]
+    least_points: u32,
 }
 
 /// What measures.
@@ -37,6 +41,7 @@ pub struct LiveMethod {
     pub measuring: Arc<Rig>,
     matcher: Arc<dyn Matcher>,
     search: Arc<Search>,
+    least_points: usize,
 }
 
 impl LiveOptions {
@@ -57,6 +62,7 @@ impl LiveOptions {
                 // A simulated camera shows nothing beyond the field in which it is known.
                 measuring: Arc::new(self.search.measuring(known.clone())?),
                 matcher: Arc::from(self.matching.live(console)?),
+                least_points: self.least_points as usize,
             })
         };
         self.taking.connect(cameras, common, out, console, method).await
@@ -72,6 +78,8 @@ impl LiveMethod {
         marks: Option<Receiver<TriggerMark>>,
         time: MatchingTime,
     ) -> LiveLoop {
+        // Where matching takes a fixed time on a simulated clock, fewer points are no quicker.
+        let most = self.matcher.most_points().filter(|_| !matches!(time, MatchingTime::Fixed(_)));
         LiveLoop {
             rig: Arc::clone(&self.measuring),
             matcher: Arc::clone(&self.matcher),
@@ -84,6 +92,7 @@ impl LiveMethod {
             matching_time: time,
             stopwatch,
             memory: Arc::default(),
+            budget: most.map(|most| PointBudget::new(self.least_points, most)),
         }
     }
 }

@@ -8,7 +8,7 @@ use vergence_board::HostClock;
 use vergence_live::{Ended, Limit, LiveResult, Notice, Pace, Rung, Totals};
 use vergence_output::{
     LatestFiles, PoseSource, axes_by_images_json, axes_by_images_words, drift_warning, live_bearings_json,
-    live_cloud_json, live_cloud_words, pose_told_words,
+    live_cloud_json, live_cloud_words, point_limit_json, point_limit_words, pose_told_words,
 };
 use vergence_peers::Publication;
 use vergence_pipeline::Observation;
@@ -75,6 +75,7 @@ impl Publisher {
                     let told = live_cloud_json(&self.rig, cloud, pose, *moving);
                     let mut line = self.result_json("cloud", result, told);
                     line["rate_hz"] = json!(pace.map(|(rate, _)| rounded(rate)));
+                    line["points_limit"] = point_limit_json(result.limited);
                     line["limited_by"] = json!(pace.map(|(_, limit)| limit.as_str()));
                     line["axes_by_images"] = axes_by_images_json(&self.rig, by_images);
                     line["link_lost_s"] = json!(unseen.map(rounded));
@@ -104,7 +105,8 @@ impl Publisher {
     fn points_line(&self, result: &LiveResult<'_>, points: &str, pace: Option<(f64, Limit)>) -> String {
         let pace =
             pace.map(|(rate, limit)| format!("{rate:.1} Hz, limited by {}, ", limit.as_str())).unwrap_or_default();
-        format!("{:5}  {points}; {pace}{}", self.number, timing(result))
+        let few = result.limited.map(point_limit_words).unwrap_or_default();
+        format!("{:5}  {points}; {pace}{few}{}", self.number, timing(result))
     }
 
     /// What all results say, and `more` of this one.

@@ -166,7 +166,7 @@ fn publish(
 ) -> Result<(), End> {
     totals.count(&measurement.observation);
     let latency = Duration::from_secs_f64(measurement.seconds);
-    let result = LiveResult { measurement, latency, totals };
+    let result = LiveResult { measurement, latency, totals, limited: None };
     publisher.publish(&result).map_err(End::Failed)?;
     panel.into_iter().for_each(|panel| panel.show(&result));
     if most.is_some_and(|most| publisher.number >= most) { Err(End::Enough) } else { Ok(()) }

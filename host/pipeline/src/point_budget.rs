@@ -1,0 +1,124 @@
+//! How many points a live matcher looks for, so that pairs keep the rate of the cameras.
+//!
+//! Less time than frames means fewer points first, and a lower rate only where they would become too few. What a pair costs grows with the
+//! points, but never faster than in proportion, so that the budget follows the ratio of the time that there is to the time that was taken.
+
+use std::collections::VecDeque;
+
+/// Part of the period of the cameras that a pair may take: the rest absorbs what single pairs take more.
+const SHARE: f64 = 0.85;
+/// Exponent of the ratio of both times. Costs are told some pairs late; with this gain the budget does not swing.
+const GAIN: f64 = 0.3;
+/// Smallest and largest factor from pair to pair.
+const STEPS: (f64, f64) = (0.85, 1.05);
+/// Costs and periods of which the median counts: a hiccup of the system, or a pair that is searched as a whole, is one of them.
+const KEPT: usize = 5;
+
+/// The points that a pair may have because of time, and those that it would have without.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct PointLimit {
+    /// Most points that are looked for.
+    pub most: usize,
+    /// Most points with time enough.
+    pub of: usize,
+}
+
+/// The points that the pairs of a live rig may have, by what pairs cost. It has no clock: callers measure.
+#[derive(Clone, Debug)]
+pub struct PointBudget {
+    least: f64,
+    of: usize,
+    now: f64,
+    costs: VecDeque<f64>,
+    periods: VecDeque<f64>,
+}
+
+impl PointBudget {
+    /// For a matcher that looks for at most `of` points. Time never limits them to less than `least`.
+    #[must_use]
+    pub fn new(least: usize, of: usize) -> Self {
+        let (costs, periods) = (VecDeque::new(), VecDeque::new());
+        Self { least: least.min(of) as f64, of, now: of as f64, costs, periods }
+    }
+
+    /// The limit of the next pair; `None` where there is time for all points.
+    #[must_use]
+    pub fn limit(&self) -> Option<PointLimit> {
+        let most = self.now.round() as usize;
+        (most < self.of).then_some(PointLimit { most, of: self.of })
+    }
+
+    /// Notes the seconds from one exposure of the cameras to the next, whether it was measured or not.
+    pub fn came_after(&mut self, seconds: f64) {
+        keep(&mut self.periods, seconds);
+    }
+
+    /// Notes the seconds that a pair took until the next one could begin, and changes the limit.
+    pub fn took(&mut self, seconds: f64) {
+        keep(&mut self.costs, seconds);
+        let (Some(period), Some(cost)) = (middle(&self.periods), middle(&self.costs)) else { return };
+        let factor = (SHARE * period / cost).powf(GAIN).clamp(STEPS.0, STEPS.1);
+        self.now = (self.now * factor).clamp(self.least, self.of as f64);
+    }
+}
+
+fn keep(latest: &mut VecDeque<f64>, seconds: f64) {
+    if seconds.is_finite() && seconds > 0.0 {
+        latest.push_back(seconds);
+        latest.drain(..latest.len().saturating_sub(KEPT));
+    }
+}
+
+/// The median; `None` before there are as many values as count.
+fn middle(latest: &VecDeque<f64>) -> Option<f64> {
+    if latest.len() < KEPT { None } else { vergence_vision::median(latest.iter().copied().collect()) }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// The limits while each pair costs `fixed` and `per_point` for each of its points, and pairs come every `period` seconds.
+    fn limits(budget: &mut PointBudget, [fixed, per_point, period]: [f64; 3], pairs: usize) -> Vec<usize> {
+        let one = |_| {
+            let points = budget.limit().map_or(budget.of, |limit| limit.most);
+            budget.came_after(period);
+            budget.took(fixed + per_point * points as f64);
+            points
+        };
+        (0..pairs).map(one).collect()
+    }
+
+    #[test]
+    fn fewer_points_keep_the_rate_of_the_cameras() {
+        let mut budget = PointBudget::new(120, 700);
+        // 10 ms and 0.05 ms for each point: all take 45 ms, and 17 ms have time for 89 of them at 60 Hz, 367 at 30 Hz.
+        assert!(limits(&mut budget, [0.010, 5e-5, 1.0 / 15.0], 40).iter().all(|points| *points == 700));
+        assert_eq!(budget.limit(), None, "there is time for all");
+        let at_30 = limits(&mut budget, [0.010, 5e-5, 1.0 / 30.0], 60);
+        assert!(at_30[30..].iter().all(|points| (340..395).contains(points)), "{at_30:?}");
+        // Smoothly: from pair to pair by no more than a seventh.
+        assert!(at_30.windows(2).all(|two| two[1] * 7 >= two[0] * 6 - 7), "{at_30:?}");
+        let at_60 = limits(&mut budget, [0.010, 5e-5, 1.0 / 60.0], 60);
+        assert_eq!(at_60.last(), Some(&120), "the floor: from here on the rate becomes lower");
+        assert_eq!(budget.limit(), Some(PointLimit { most: 120, of: 700 }));
+        let again = limits(&mut budget, [0.010, 5e-5, 1.0 / 15.0], 100);
+        assert_eq!(again.last(), Some(&700), "all come back with the time");
+    }
+
+    #[test]
+    fn one_pair_that_takes_long_limits_nothing() {
+        let mut budget = PointBudget::new(120, 700);
+        limits(&mut budget, [0.010, 5e-5, 1.0 / 15.0], 10);
+        budget.took(0.4);
+        budget.took(0.4);
+        assert_eq!(budget.limit(), None);
+    }
+
+    #[test]
+    fn a_floor_above_what_the_matcher_looks_for_is_all_of_it() {
+        let mut budget = PointBudget::new(900, 700);
+        limits(&mut budget, [1.0, 1e-3, 0.01], 50);
+        assert_eq!(budget.limit(), None);
+    }
+}
