@@ -270,7 +270,12 @@ fn memory_stays_flat_nothing_is_lost_matches_are_right_and_pages_cost_little() {
     for page in pages {
         page.join().expect("a page that failed says why above");
     }
+    let ending = Instant::now();
     let said = served.terminate();
+    println!(
+        "it ended within {:.1} s: images that wait for the recording are made and written first",
+        ending.elapsed().as_secs_f64()
+    );
     let end: Value = serde_json::from_str(said.lines().last().expect("an end")).expect("JSON");
 
     let memory_at = |part: f64| memory[((memory.len() - 1) as f64 * part) as usize].1;

@@ -12,6 +12,7 @@ mod panel_options;
 mod peer_options;
 mod publish;
 mod reconnect;
+mod relink;
 mod result_options;
 mod search_options;
 mod stage_pose;

@@ -17,7 +17,7 @@ use super::live_options::LiveOptions;
 use super::peer_options::PublishOptions;
 use super::publish::{seen_to_the_end, tell, tell_recorded};
 use super::reconnect::Persistence;
-use super::run::relink::Relink;
+use super::relink::Relink;
 use crate::cli::CommonOptions;
 use crate::console::Console;
 use crate::failure::Failure;

@@ -1,7 +1,6 @@
 //! `vergence run` measures live, while the stages stand still or move; `vergence record` keeps the same without measuring.
 
 pub mod record;
-pub mod relink;
 mod tour;
 
 use std::path::PathBuf;
@@ -12,13 +11,13 @@ use vergence_live::{Ended, Limits, LiveLoop, MatchingTime, Notice, Pace, Totals,
 use vergence_peers::Published;
 use vergence_protocol::{Request, Trigger};
 
-use self::relink::Relink;
 use super::live_options::LiveOptions;
 use super::taking_options::LiveRig;
 use crate::cli::CommonOptions;
 use crate::cmd::peer_options::PublishOptions;
 use crate::cmd::publish::{Publisher, seen_to_the_end, tell, tell_notice, tell_recorded};
 use crate::cmd::reconnect::Persistence;
+use crate::cmd::relink::Relink;
 use crate::cmd::result_options::ResultOptions;
 use crate::console::Console;
 use crate::failure::{Failure, FailureKind};

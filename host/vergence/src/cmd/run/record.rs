@@ -8,11 +8,11 @@ use vergence_live::Limits;
 use vergence_protocol::Request;
 use vergence_rig::rounded;
 
-use super::relink::Relink;
 use super::{drive, make_ready, parse_time, settle, tour};
 use crate::cli::CommonOptions;
 use crate::cmd::publish::{seen_to_the_end, tell_recorded};
 use crate::cmd::reconnect::Persistence;
+use crate::cmd::relink::Relink;
 use crate::cmd::taking_options::TakingOptions;
 use crate::console::Console;
 use crate::failure::Failure;
