@@ -120,6 +120,10 @@ impl PlaneMap for Projection<'_> {
         [0.0; 2]
     }
 
+    fn middle_image(&self) -> [f64; 2] {
+        self.image([0.0; 2]).unwrap_or([f64::NAN; 2])
+    }
+
     fn rim(&self, _: f64) -> Option<f64> {
         Some((0.5 * self.lens.theta_max().rad()).tan())
     }
@@ -158,6 +162,10 @@ impl<'a> Unprojection<'a> {
 impl PlaneMap for Unprojection<'_> {
     fn middle(&self) -> [f64; 2] {
         [self.middle.u, self.middle.v]
+    }
+
+    fn middle_image(&self) -> [f64; 2] {
+        [0.0; 2]
     }
 
     /// The image of the rim is nearly a circle: its direction is nearly that of the ray.

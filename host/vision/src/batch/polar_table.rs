@@ -3,7 +3,8 @@
 //! A place of the plane lies in one of four sectors about the middle, by its slope there, and at a part of the distance to the rim of the field
 //! in its direction. Both numbers are cut into cells, and in each cell the map is a polynomial through Chebyshev's nodes. So no cell sticks out of
 //! the field. The part x of the distance counts by w = √(1 - x), by which an image that comes to a stand at the rim is smooth, as others are; for
-//! one that comes to a stand a little beyond it, cells are the narrower the nearer they are to the rim: some for each octave of w.
+//! one that comes to a stand a little beyond it, cells are the narrower the nearer they are to the rim: some for each octave of w. Tabulated is where
+//! the image is along the direction of the place and across it, which hardly depends on that direction.
 
 use std::f64::consts::{FRAC_PI_2, PI};
 
@@ -20,13 +21,17 @@ const ROW: usize = 2 * TERMS;
 /// Sectors about the middle.
 const SECTORS: usize = 4;
 /// Octaves of w, the logarithm of the number of cells in each, and cells across each sector: fewest first.
-const CELLS: [[usize; 3]; 5] = [[2, 2, 6], [2, 3, 10], [3, 4, 16], [14, 2, 10], [14, 3, 16]];
+const CELLS: [[usize; 3]; 5] = [[3, 3, 2], [4, 4, 4], [4, 5, 12], [12, 4, 12], [12, 5, 12]];
+/// So near to the rim, in w, the map itself is asked where no cell comes near: less than a thousandth of the field.
+const ASKED: f64 = 1.0 / 64.0;
 /// Places computed together.
 const BLOCK: usize = 64;
 /// Nearer to the rim than this part of the distance it is the map itself that says what is inside.
 const RIM: f64 = 1e-8;
 
 type Cell = [f64; TERMS * ROW];
+/// A cell of which the table does not tell.
+const UNTOLD: Cell = [f64::NAN; TERMS * ROW];
 type Nodes = SMatrix<f64, TERMS, TERMS>;
 
 /// A map from places to places, as a table.
@@ -37,6 +42,7 @@ pub(super) struct PolarTable {
     finer: usize,
     across: usize,
     middle: [f64; 2],
+    middle_image: [f64; 2],
     /// The distance of the rim from the middle, for each cell across the sectors.
     rims: Vec<[f64; TERMS]>,
     cells: Vec<Cell>,
@@ -46,6 +52,9 @@ pub(super) struct PolarTable {
 pub(super) trait PlaneMap: Sync {
     /// The middle of the field.
     fn middle(&self) -> [f64; 2];
+
+    /// The image of the middle.
+    fn middle_image(&self) -> [f64; 2];
 
     /// The distance of the rim from the middle in a direction.
     fn rim(&self, direction: f64) -> Option<f64>;
@@ -84,7 +93,15 @@ impl PolarTable {
 
     fn of_cells(map: &impl PlaneMap, [octaves, finer, across]: [usize; 3]) -> Option<Self> {
         let powers = to_powers()?;
-        let mut table = Self { octaves, finer, across, middle: map.middle(), rims: Vec::new(), cells: Vec::new() };
+        let mut table = Self {
+            octaves,
+            finer,
+            across,
+            middle: map.middle(),
+            middle_image: map.middle_image(),
+            rims: Vec::new(),
+            cells: Vec::new(),
+        };
         for column in 0..SECTORS * across {
             let slope = |t: f64| (column % across) as f64 * 2.0 / across as f64 - 1.0 + (t + 1.0) / across as f64;
             let direction = |t: f64| (column / across) as f64 * FRAC_PI_2 + slope(t).atan();
@@ -96,17 +113,21 @@ impl PolarTable {
             table.rims.push(rim);
             for row in 0..table.along() {
                 let [begin, length] = table.cell_along(row);
-                let place = |t_along: f64, t_across: f64| {
+                let image = |t_along: f64, t_across: f64| {
                     let root = begin + 0.5 * (t_along + 1.0) * length;
                     let distance = (1.0 - root * root) * horner::<false>(&rim, t_across);
                     let (sin, cos) = direction(t_across).sin_cos();
-                    [table.middle[0] + distance * cos, table.middle[1] + distance * sin]
+                    let [u, v] = map.image([table.middle[0] + distance * cos, table.middle[1] + distance * sin])?;
+                    let (x, y) = (u - table.middle_image[0], v - table.middle_image[1]);
+                    Some([x * cos + y * sin, y * cos - x * sin])
                 };
-                let cell = cell(&powers, |along, across| map.image(place(along, across)));
-                if cell[0].is_finite() && !is_near(map, &cell, place) {
+                let cell = cell(&powers, image);
+                let tells = cell[0].is_finite();
+                let is_right = !tells || is_near(&cell, image, map.tolerance());
+                if !is_right && begin + length > ASKED {
                     return None;
                 }
-                table.cells.push(cell);
+                table.cells.push(if is_right { cell } else { UNTOLD });
             }
         }
         Some(table)
@@ -136,6 +157,7 @@ impl PolarTable {
     fn block<const FUSED: bool>(&self, at: &[[f64; 2]; BLOCK]) -> [[f64; 2]; BLOCK] {
         let across = self.across as f64;
         let (mut slope, mut distance, mut column) = ([0.0; BLOCK], [0.0; BLOCK], [0.0; BLOCK]);
+        let (mut cos, mut sin) = ([0.0; BLOCK], [0.0; BLOCK]);
         for j in 0..BLOCK {
             let (x, y) = (at[j][0] - self.middle[0], at[j][1] - self.middle[1]);
             let steep = y.abs() > x.abs();
@@ -147,6 +169,8 @@ impl PolarTable {
             slope[j] = 2.0 * (place - cell) - 1.0;
             column[j] = sector * across + cell;
             distance[j] = (x * x + y * y).sqrt();
+            let over_distance = 1.0 / if distance[j] == 0.0 { 1.0 } else { distance[j] };
+            (cos[j], sin[j]) = (x * over_distance, y * over_distance);
         }
         let (mut rim, mut part) = ([0.0; BLOCK], [0.0; BLOCK]);
         for j in 0..BLOCK {
@@ -160,7 +184,8 @@ impl PolarTable {
         for j in 0..BLOCK {
             part[j] = distance[j] / rim[j];
             let left = 1.0 - part[j];
-            let w = if left > 0.0 { left } else { 0.0 }.sqrt();
+            // In the middle itself w would be in the octave after the last.
+            let w = if left > 0.0 { left } else { 0.0 }.sqrt().min(1.0 - f64::EPSILON);
             let bits = w.to_bits();
             let is_inner = w < innermost;
             let begin = f64::from_bits((bits >> shift) << shift);
@@ -170,12 +195,16 @@ impl PolarTable {
             root[j] = 2.0 * (w - if is_inner { 0.0 } else { begin }) / length - 1.0;
             row[j] = if is_inner { 0 } else { (bits >> shift) - first + 1 };
         }
-        let along = self.along();
+        let (along, [u, v]) = (self.along(), self.middle_image);
         let mut images = [[f64::NAN; 2]; BLOCK];
         for j in 0..BLOCK {
             let cell = self.cells.get(column[j] as usize * along + (row[j] as usize).min(along - 1));
             images[j] = match cell {
-                Some(cell) if part[j] < 1.0 - RIM => evaluated::<FUSED>(cell, root[j], slope[j]),
+                Some(cell) if part[j] < 1.0 - RIM => {
+                    let [x, y] = evaluated::<FUSED>(cell, root[j], slope[j]);
+                    let image = [u + x * cos[j] - y * sin[j], v + x * sin[j] + y * cos[j]];
+                    if image[0].is_finite() { image } else { ASK }
+                }
                 _ if part[j] > 1.0 + RIM => [f64::NAN; 2],
                 _ => ASK,
             };
@@ -207,24 +236,24 @@ fn to_powers() -> Option<Nodes> {
     Nodes::from_fn(|node, power| nodes[node].powi(power as i32)).try_inverse()
 }
 
-/// The polynomial of a cell; not numbers where a node has no image.
+/// The polynomial of a cell; [`UNTOLD`] where a node has no image.
 fn cell(powers: &Nodes, image: impl Fn(f64, f64) -> Option<[f64; 2]>) -> Cell {
     let nodes = nodes();
     let mut values = [Nodes::zeros(); 2];
     for (i, j) in (0..TERMS * TERMS).map(|n| (n / TERMS, n % TERMS)) {
-        let Some(at) = image(nodes[i], nodes[j]) else { return [f64::INFINITY; TERMS * ROW] };
+        let Some(at) = image(nodes[i], nodes[j]) else { return UNTOLD };
         (values[0][(i, j)], values[1][(i, j)]) = (at[0], at[1]);
     }
     let coefficients = values.map(|values| powers * values * powers.transpose());
     std::array::from_fn(|n| coefficients[n % 2][(n / ROW, n % ROW / 2)])
 }
 
-/// Whether the polynomial of a cell is near the map where polynomials through the nodes are worst: in the corners, and in the middle.
-fn is_near(map: &impl PlaneMap, cell: &Cell, place: impl Fn(f64, f64) -> [f64; 2]) -> bool {
+/// Whether the polynomial of a cell is near the image where polynomials through the nodes are worst: in the corners, and in the middle.
+fn is_near(cell: &Cell, image: impl Fn(f64, f64) -> Option<[f64; 2]>, tolerance: f64) -> bool {
     const LOOKED_AT: [[f64; 2]; 5] = [[0.999, 0.999], [-0.999, 0.999], [0.999, -0.999], [-0.999, -0.999], [0.0, 0.0]];
     LOOKED_AT.into_iter().all(|[along, across]| {
         let [x, y] = evaluated::<false>(cell, along, across);
-        map.image(place(along, across)).is_none_or(|[u, v]| (x - u).hypot(y - v) <= map.tolerance())
+        image(along, across).is_none_or(|[u, v]| (x - u).hypot(y - v) <= tolerance)
     })
 }
 
