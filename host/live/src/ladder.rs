@@ -199,13 +199,12 @@ impl Ladder {
                     format!("the link to the board ended: for {longest} s the last pose is used, less and less surely");
                 tell(Notice::step(Rung::LinkLost, true, text));
             }
-            Some(since) if has_ended && (self.is_over || since.elapsed() <= LONGEST_UNSEEN) => {}
-            Some(_) if has_ended => {
+            Some(since) if has_ended && !self.is_over && since.elapsed() > LONGEST_UNSEEN => {
                 self.is_over = true;
                 let text = format!("the link has been gone for {longest} s: nothing is measured until it is back");
                 tell(Notice::step(Rung::NothingMeasured, true, text));
             }
-            Some(since) => {
+            Some(since) if !has_ended => {
                 self.unlinked = None;
                 if std::mem::take(&mut self.is_over) {
                     tell(Notice::step(Rung::NothingMeasured, false, "it is measured again"));
@@ -216,7 +215,7 @@ impl Ladder {
                 );
                 tell(Notice::step(Rung::LinkLost, false, text));
             }
-            None => {}
+            _ => {}
         }
     }
 }
