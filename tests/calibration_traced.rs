@@ -182,7 +182,8 @@ fn is_honest(lens: &str, found: &[Figures; 3], [low, high]: [f64; 2]) {
 
 fn check(design: &'static str) {
     let seeds = seeds(3);
-    let found = measured(Optics { design, mounted: None, views: views(20), bow_mm: 0.0 }, ["by-evidence", "central"], seeds);
+    let found =
+        measured(Optics { design, mounted: None, views: views(20), bow_mm: 0.0 }, ["by-evidence", "central"], seeds);
     let [low, high] = band(seeds, 3.0, 1.96);
     is_honest(design, &found[0], [low, high]);
     for ((mode, _), central) in MODES.iter().zip(&found[1]) {
@@ -217,7 +218,8 @@ fn clouds_after_a_bowed_target_are_as_far_off_as_the_rig_file_states() {
 #[test]
 fn clouds_through_ideal_lenses_are_as_far_off_as_the_rig_file_states() {
     let seeds = seeds(3);
-    let found = measured(Optics { design: "ideal", mounted: None, views: views(20), bow_mm: 0.0 }, ["by-evidence"], seeds);
+    let found =
+        measured(Optics { design: "ideal", mounted: None, views: views(20), bow_mm: 0.0 }, ["by-evidence"], seeds);
     is_honest("ideal", &found[0], band(seeds, 3.0, 1.96));
 }
 

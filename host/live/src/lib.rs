@@ -15,6 +15,7 @@ mod measure;
 mod orders;
 mod pace;
 mod posed;
+mod totals;
 mod tour;
 
 use std::time::Duration;
@@ -22,11 +23,12 @@ use std::time::Duration;
 pub use cameras::{attach_both, drive, play_both, simulate_both, sized, unplugged};
 pub use error::LiveError;
 pub use ladder::{Notice, Rung, Step};
-pub use live_loop::{Ended, Limits, LiveLoop, LiveResult, MatchingTime, Totals};
+pub use live_loop::{Ended, Limits, LiveLoop, LiveResult, MatchingTime};
 pub use measure::{Measurement, PosedExposure, measure};
 pub use orders::{HOME, homing_orders};
 pub use pace::{Limit, Pace};
 pub use posed::{AT_REST, LONGEST_UNSEEN, Posed, READINGS, pose};
+pub use totals::Totals;
 pub use tour::Tour;
 
 /// Returns the time since some fixed instant, always the real one: by it the loop tells how long matching takes.
