@@ -219,3 +219,28 @@ impl Ladder {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use vergence_board::BoardNews;
+    use vergence_rig::BENCH_TOML;
+
+    use super::*;
+
+    #[test]
+    fn a_link_that_ends_and_comes_back_is_told_once_each() {
+        let Ok(rig) = Rig::from_toml(BENCH_TOML) else { panic!("the bench is a rig") };
+        let (board, mut ladder) = (BoardKnowledge::new(None), Ladder::default());
+        let mut steps = |board: &BoardKnowledge| {
+            let mut steps = Vec::new();
+            ladder.note_board(&rig, board, |notice| steps.extend(notice.step));
+            steps
+        };
+        assert_eq!(steps(&board), []);
+        let step = |is_down| [Step { rung: Rung::LinkLost, is_down }];
+        board.note(&BoardNews::LinkEnded);
+        assert_eq!((&steps(&board)[..], steps(&board)), (&step(true)[..], Vec::new()));
+        board.note(&BoardNews::LinkBack);
+        assert_eq!((&steps(&board)[..], steps(&board)), (&step(false)[..], Vec::new()));
+    }
+}

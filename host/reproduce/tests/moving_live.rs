@@ -36,8 +36,8 @@ const LINE_TIME: &str = "40us";
 const PERIOD_US: u32 = 100_000;
 /// Both stages go at full speed after this time.
 const TO_SPEED: Duration = Duration::from_millis(600);
-/// Results of a way: both stages are at full speed during all of them.
-const RESULTS: u64 = 4;
+/// Results of a way, in the short run and in the long one: both stages are at full speed during all of them.
+const RESULTS: [u64; 2] = [2, 4];
 /// Longest reaction of a camera to its trigger, as the live loop assumes it.
 const REACTION_US: f64 = 1_000.0;
 /// Largest distance of a right match from the truth, in pixels.
@@ -47,6 +47,10 @@ const EDGE: f64 = 0.03;
 const AROUND_PX: f64 = 1.0;
 /// The square of three standard deviations.
 const FAR: f64 = 9.0;
+
+fn results() -> u64 {
+    RESULTS[usize::from(std::env::var("VERGENCE_SEEDS").is_ok())]
+}
 
 /// The bench with small cameras and rolling shutters.
 fn drawn() -> Rig {
@@ -139,12 +143,12 @@ impl World {
                 self.judge(result.measurement, &simulated, &mut found);
                 Ok::<(), LiveError>(())
             };
-            let limits = Limits { results: Some(RESULTS), time: Some(Duration::from_secs(20)) };
+            let limits = Limits { results: Some(results()), time: Some(Duration::from_secs(20)) };
             live.run(limits, &mut totals, publish, |notice| println!("{notice}")).await.expect("it measures");
             if gone.is_err() { board.stop().await } else { Ok(()) }
         });
         moved.await.expect("it moves");
-        assert_eq!(totals.clouds, RESULTS, "{totals:?}");
+        assert_eq!(totals.clouds, results(), "{totals:?}");
         found
     }
 
@@ -346,37 +350,45 @@ async fn measured(of: fn(u64) -> World) -> [Nees; 2] {
                 found.at_edges
             );
         }
-        assert_eq!(moving.last().expect("a run").moving, RESULTS, "all of them while it moves");
+        assert_eq!(moving.last().expect("a run").moving, results(), "all of them while it moves");
     }
     let freedom = of(1).freedom();
     [tell("standing", &standing, freedom), tell("moving", &moving, freedom)]
 }
 
-/// Whether matches are as right and as uncertain as stated. The bounds are those of one seed; means of many are printed.
+/// Whether matches are right, and ranges as uncertain as stated, of one seed; means of many lie nearer.
 fn check(nees: &Nees) {
     assert!(nees.wrong < 0.01, "{} of the matches are wrong", nees.wrong);
-    for [mean, _] in [nees.range, nees.core, nees.across] {
-        assert!((0.4..1.6).contains(&mean), "{mean} of 1");
-    }
+    assert!((0.4..1.6).contains(&nees.range[0]) && (0.3..1.2).contains(&nees.core[0]), "{:?} of 1", nees.range);
+}
+
+/// Half the band in which the mean of honest poses of this freedom lies in 95 of 100 cases.
+fn band(freedom: f64) -> f64 {
+    1.96 * (2.0 * freedom / f64::from(count("VERGENCE_SEEDS", 1))).sqrt()
 }
 
 #[tokio::test(start_paused = true)]
 async fn points_and_poses_at_full_speed_are_as_uncertain_as_a_calibrated_rig_states() {
     let [standing, moving] = measured(World::calibrated).await;
     [&standing, &moving].into_iter().for_each(check);
-    // Errors of the calibration, which hide those of the motion; 6 ± 4.4 of one seed in 95 of 100 cases.
-    assert!(standing.pose[0] < 15.0 && moving.pose[0] < 15.0, "{:?} {:?}", standing.pose, moving.pose);
+    // Errors of the calibration, which hide those of the motion; of small images they are stated too large.
+    let most = 6.0 + band(6.0);
+    assert!(standing.pose[0] < most && moving.pose[0] < most, "{:?} {:?}", standing.pose, moving.pose);
     assert!((standing.pose[0] - moving.pose[0]).abs() < 1.0, "motion adds what is not stated");
 }
 
 #[tokio::test(start_paused = true)]
 async fn points_and_poses_at_full_speed_are_as_uncertain_as_a_known_rig_states() {
     let [standing, moving] = measured(World::exact).await;
-    [&standing, &moving].into_iter().for_each(check);
-    assert!(standing.pose[0] < 7.4 && moving.pose[0] < 7.4, "{:?} {:?}", standing.pose, moving.pose);
-    // A shutter that the rig file does not tell, or takes for a global one, is noticed.
-    let blind = World { known: Rig { shutters: [Shutter::Global; 2], ..World::exact(1).known }, ..World::exact(1) };
+    for nees in [&standing, &moving] {
+        check(nees);
+        assert!((nees.pose[0] - 2.0).abs() < band(2.0), "{:?} of 2", nees.pose);
+        assert!((0.4..1.3).contains(&nees.across[0]), "{:?} of 1", nees.across);
+    }
+    // A rolling shutter that is taken for a global one is noticed.
+    let exact = World::exact(1);
+    let blind = World { known: Rig { shutters: [Shutter::Global; 2], ..exact.known.clone() }, ..exact };
     let found = blind.measured([pose(90.0, 17.0), pose(200.0, 103.0)]).await;
-    println!("with global shutters: range {:.1} of 1, across {:.1} of 1", mean(&found.ranges), mean(&found.across));
-    assert!(mean(&found.ranges) > 2.0 * moving.range[0] || found.ranges.len() < 100, "{}", mean(&found.ranges));
+    println!("with global shutters: {:.1} of 1", mean(&found.ranges));
+    assert!(mean(&found.ranges) > 3.0 * moving.range[0], "{}", mean(&found.ranges));
 }
