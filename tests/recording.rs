@@ -259,24 +259,28 @@ fn time_limits_the_points_of_a_live_run_and_none_of_a_replay() {
     let folder = tempfile::tempdir().expect("a folder");
     let (rig, recording) = (small_bench(folder.path()), of_four_clouds(folder.path()));
     let live = ["--port", "sim", "--rig", rig.to_str().expect("a name"), "run", "--cameras", "sim", "--home"];
+    // One core, on which no pair of the views of these images is matched in 28 ms.
+    let said = |verb: &[&str], more: &[&str]| {
+        let output = vergence(&[verb, more].concat()).env("RAYON_NUM_THREADS", "1").output().expect("the binary runs");
+        assert!(output.status.success(), "{}", text(&output.stderr));
+        text(&output.stdout)
+    };
     let clouds = |verb: &[&str], more: &[&str]| -> Vec<Value> {
-        let said = succeeds(&[verb, more, &["--json"]].concat());
+        let said = said(verb, &[more, &["--json"]].concat());
         let lines = said.lines().map(|line| serde_json::from_str(line).expect("JSON"));
         lines.filter(|line: &Value| line["kind"] == "cloud").collect()
     };
-    let fast = ["--rate", "200", "--frames", "18", "--least-points", "120"];
-    let limited = clouds(&live, &fast);
+    let fast = ["--rate", "30", "--least-points", "120", "--frames"];
+    let limited = clouds(&live, &[&fast[..], &["16"]].concat());
     let limits: Vec<_> = limited.iter().map(|line| line["points_limit"]["most"].as_u64()).collect();
     println!("{limits:?}");
     assert!(limits[..4].iter().all(Option::is_none), "a few pairs tell what a pair costs");
-    assert!(limits[17].is_some_and(|most| (120..350).contains(&most)), "{limits:?}");
+    assert!(limits[15].is_some_and(|most| (120..700).contains(&most)), "{limits:?}");
     let smoothly = |two: &[Option<u64>]| two[1].unwrap_or(700) * 10 >= two[0].unwrap_or(700) * 8;
     assert!(limits.windows(2).all(smoothly), "{limits:?}");
-    assert!(limited[17]["points"].as_u64() < limited[3]["points"].as_u64());
-    let said = succeeds(&[&live[..], &fast].concat());
-    assert!(said.contains("points limited by time: ") && said.contains(" of 700, "), "{said}");
+    assert!(said(&live, &[&fast[..], &["8"]].concat()).contains(" of 700, "), "people are told too");
     let is_free = |line: &Value| line["points_limit"].is_null();
-    assert!(clouds(&live, &["--rate", "1", "--frames", "9"]).iter().all(is_free), "there is time enough");
+    assert!(clouds(&live, &["--rate", "1", "--frames", "8"]).iter().all(is_free), "there is time enough");
     let replayed = clouds(&["replay", &recording], &["--rate", "1000"]);
     assert!(replayed.len() >= 4 && replayed.iter().all(is_free));
 }

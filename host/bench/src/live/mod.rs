@@ -74,8 +74,7 @@ impl LiveFigures {
             let (before, mut times) = (computed_seconds(), StageTimes::start(clock));
             let limit = budget.limit().map(|limit| limit.most);
             let method = Method { points: limit, ..Method::from(&tracking as &dyn Matcher) };
-            let (points, seconds) =
-                timed(clock, || points(&frames.rig, frame, method, &mut |stage| times.ended(stage)));
+            let (found, seconds) = timed(clock, || points(&frames.rig, frame, method, &mut |stage| times.ended(stage)));
             budget.came_after(rate.recip());
             budget.took(seconds);
             figures.limits.push(limit.unwrap_or(most));
@@ -83,7 +82,7 @@ impl LiveFigures {
             now = now.max(exposed) + seconds;
             figures.latency.push(now - exposed);
             figures.stages.iter_mut().zip(STAGES).for_each(|(sum, stage)| *sum += times.of(stage));
-            figures.points.push(frames.judge(frame, &points?));
+            figures.points.push(frames.judge(frame, &found?));
             if figures.measured % SINGLE_EVERY == 0 {
                 let (alone, seconds) =
                     timed(clock, || points(&frames.rig, frame, Method::from(&single as &dyn Matcher), &mut |_| ()));

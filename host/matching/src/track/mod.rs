@@ -2,7 +2,7 @@
 //!
 //! Of a live rig each pair shows nearly what the one before showed. A track is a matched point that is found again: first in the left view,
 //! by registration of the left view before (`follow`), then in the right view, from where pose and range predict it. Only where tracks are
-//! missing are corners sought and compared (`search`), strip by strip of the views, a strip in each pair; a first pair, or one in which most tracks
+//! missing are corners sought and compared (`search`), strip by strip of the views, a strip or two in each pair; a first pair, or one in which most tracks
 //! are lost, is searched as a whole at once.
 //!
 //! What is found this way passes the same tests as what [`GuidedMatcher`] finds in a single pair, and states its errors by the same rules. A track
@@ -172,9 +172,9 @@ impl State {
         let tracks = before.as_ref().map_or_else(Vec::new, |before| followed(before, &seen));
         let at_first = self.at_first.min(most) as f64;
         let are_too_few = (tracks.len() as f64) < (FEW * at_first).max(FEWEST as f64);
-        let strip = self.next_strip(&seen.views.grid, are_too_few);
-        let are_few = !strip.is_whole && (tracks.len() as f64) < MANY * most as f64;
-        let keypoints = if are_few { in_strips } else { whole.keypoints };
+        let are_few = (tracks.len() as f64) < MANY * most as f64;
+        let strip = self.next_strip(&seen.views.grid, are_too_few, if are_few { 2 } else { 1 });
+        let keypoints = if are_few && !strip.is_whole { in_strips } else { whole.keypoints };
         let (matches, tracks) = self.matched(&seen, tracks, &strip, [keypoints, most]);
         if strip.is_whole {
             self.at_first = tracks.len();
@@ -192,11 +192,11 @@ impl State {
         Ok(matches)
     }
 
-    /// The rows in which new tracks are sought.
-    fn next_strip(&mut self, grid: &Grid, is_whole: bool) -> Strip {
+    /// The rows in which new tracks are sought: all, or those of the next `count` strips.
+    fn next_strip(&mut self, grid: &Grid, is_whole: bool, count: usize) -> Strip {
         let height = grid.size().1;
-        let strip = if is_whole { Strip::whole(height) } else { Strip::new(self.strip, height) };
-        self.strip = if is_whole { 0 } else { (self.strip + 1) % Strip::COUNT };
+        let strip = if is_whole { Strip::whole(height) } else { Strip::new(self.strip..self.strip + count, height) };
+        self.strip = if is_whole || self.strip + count >= Strip::COUNT { 0 } else { self.strip + count };
         strip
     }
 

@@ -24,16 +24,16 @@ pub(super) struct Strip {
 }
 
 impl Strip {
-    /// Number of strips of a view: all of it is searched in so many pairs.
+    /// Number of strips of a view: all of it is searched in so many pairs, or in half as many where tracks are few.
     pub(super) const COUNT: usize = 12;
 
     pub(super) const fn whole(height: usize) -> Self {
         Self { rows: 0..height, height, is_whole: true }
     }
 
-    /// The strip `number` of a view of `height` rows.
-    pub(super) const fn new(number: usize, height: usize) -> Self {
-        let rows = number * height / Self::COUNT..(number + 1) * height / Self::COUNT;
+    /// The strips of these `numbers`, of a view of `height` rows.
+    pub(super) fn new(numbers: Range<usize>, height: usize) -> Self {
+        let rows = numbers.start * height / Self::COUNT..numbers.end.min(Self::COUNT) * height / Self::COUNT;
         Self { rows, height, is_whole: false }
     }
 
