@@ -95,7 +95,7 @@ mod tests {
     fn a_record_without_a_processor_is_of_the_machines_own() {
         let record: Speed = toml::from_str("threads = 2\nonnxruntime_seconds = 0.5\n").expect("an older record");
         assert_eq!(record.processor, Processor::Cpu);
-        let text = toml::to_string(&Speed { processor: Processor::Cuda, ..record.clone() }).expect("a record");
+        let text = toml::to_string(&Speed { processor: Processor::Cuda, ..record }).expect("a record");
         assert_eq!(toml::from_str::<Speed>(&text).expect("as written").processor, Processor::Cuda);
     }
 }

@@ -133,6 +133,7 @@ impl World {
             exposures: Exposures::new(Some(f64::from(PERIOD_US))),
             matching_time: MatchingTime::Fixed(Duration::from_millis(50)),
             stopwatch: || Duration::ZERO,
+            budget: None,
         };
         let (mut found, mut totals) = (Found::default(), Totals::default());
         let moved = board.armed(pending(), async |board| -> Result<(), vergence_board::BoardError> {
