@@ -163,6 +163,35 @@ fn no_track_survives_in_another_scene() {
     assert!(found > 100 && survived * 100 < same.len(), "{survived} of {}", same.len());
 }
 
+/// A limit leaves few points, which are those of before where they were, all over the image; without it the others come back.
+#[test]
+fn fewer_points_are_spread_over_the_image() {
+    let tracking = TrackingMatcher::default();
+    let found = |seed: u64, most: Option<usize>| {
+        let truth = place(0, 40.0).rendered(SIDE, seed);
+        tracking.find_at_most(&pair(&truth), most).unwrap().pairs
+    };
+    let cells = |found: &[Match]| -> usize {
+        let cell = |found: &Match| ((found.left.u / 40.0) as usize, (found.left.v / 40.0) as usize);
+        found.iter().map(cell).collect::<BTreeSet<_>>().len()
+    };
+    let numbers = |found: &[Match]| -> BTreeSet<u64> { found.iter().filter_map(|found| found.track).collect() };
+    found(1, None);
+    let (all, few) = (found(2, None), found(3, Some(120)));
+    let (kept, again) = (numbers(&few).intersection(&numbers(&all)).count(), found(4, None));
+    println!(
+        "{} points in {} cells, {} in {}, {kept} kept, then {}",
+        all.len(),
+        cells(&all),
+        few.len(),
+        cells(&few),
+        again.len()
+    );
+    assert!((80..=135).contains(&few.len()) && kept * 10 > few.len() * 8);
+    assert!(cells(&few) * 10 >= cells(&all) * 6, "{} of {}", cells(&few), cells(&all));
+    assert!(again.len() > few.len());
+}
+
 /// A pair of other cameras has no tracks in common with the pair before; neither has an image of the wrong size, which is refused.
 #[test]
 fn other_cameras_begin_anew() {
