@@ -54,7 +54,10 @@ impl Mismatch {
                 )
             }
             Self::SensorTilt => format!("{:.1}° off square to the axis, another way for each eye", SENSOR_TILT.deg()),
-            Self::BowedTarget => format!("its middle {:.1} mm out of the plane of its ends, which nobody tells the calibration", BOW.mm()),
+            Self::BowedTarget => format!(
+                "its middle {:.1} mm out of the plane of its ends, which nobody tells the calibration",
+                BOW.mm()
+            ),
             Self::ScrewPitch => format!(
                 "{:.1} % too long and ±{:.0} µm within each turn of {TURN_MM:.0} mm, unseen by the encoder",
                 1e2 * PITCH_SCALE,
