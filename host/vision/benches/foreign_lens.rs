@@ -14,7 +14,7 @@ use std::hint::black_box;
 
 use criterion::{Criterion, Throughput, criterion_group, criterion_main};
 use foreign_models::{SIZE, at, kannala_brandt, models};
-use vergence_vision::{BatchLens, ImageSize, KannalaBrandt, SightRegion, fit_lens};
+use vergence_vision::{Asymmetry, BatchLens, ImageSize, KannalaBrandt, SightRegion, fit_lens};
 
 const POINTS: u32 = 4096;
 
@@ -24,7 +24,9 @@ fn lenses() -> Vec<(&'static str, KannalaBrandt)> {
         let polynomial = fit_lens(model.as_ref(), SightRegion { size, outline: &[] }).expect("a lens").lens;
         (name, polynomial.computed_by(model, 1.0))
     });
-    std::iter::once(("polynomial", kannala_brandt())).chain(foreign).collect()
+    let by = Asymmetry { tangential: [4e-4, -3e-4], prism: [5e-4, -1e-4, -4e-4, 2e-4] };
+    let displaced = kannala_brandt().with_asymmetry(by).expect("a lens");
+    [("polynomial", kannala_brandt()), ("polynomial, displaced", displaced)].into_iter().chain(foreign).collect()
 }
 
 fn arrays(criterion: &mut Criterion) {

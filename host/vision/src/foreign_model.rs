@@ -4,8 +4,11 @@
 //! there a calibration that frees the lens goes on, and that is what a program gets that knows no other model. Pixels, rays and the
 //! derivatives of one by the other are the model's own.
 
+use std::sync::OnceLock;
+
 use nalgebra::{Matrix2x3, Matrix3x2, Vector2, Vector3};
 
+use crate::batch::ForeignTables;
 use crate::{Angle, Camera, CameraModel, Frame, KannalaBrandt, ModelParameter, OutsideField, Pixel, UnitRay};
 
 /// The camera model of another program by which a lens is computed.
@@ -14,6 +17,8 @@ use crate::{Angle, Camera, CameraModel, Frame, KannalaBrandt, ModelParameter, Ou
 #[derive(Clone, Copy, Debug)]
 pub struct ForeignModel {
     model: &'static dyn CameraModel,
+    /// For arrays: of the lens that first asked for them, whatever the scale of that.
+    tables: &'static OnceLock<ForeignTables>,
     /// Pixels of the lens for each of the model's.
     scale: f64,
 }
@@ -145,7 +150,14 @@ impl KannalaBrandt {
     /// model's. Its field stays.
     #[must_use]
     pub fn computed_by(self, model: Box<dyn CameraModel>, scale: f64) -> Self {
-        self.made_foreign(Some(ForeignModel { model: Box::leak(model), scale }))
+        let tables = Box::leak(Box::default());
+        self.made_foreign(Some(ForeignModel { model: Box::leak(model), tables, scale }))
+    }
+
+    /// Tables of the model for arrays, made once; `None` of a polynomial lens, and of one with another field than the lens that they are of.
+    pub(crate) fn foreign_tables(&self) -> Option<&'static ForeignTables> {
+        let tables = self.foreign_model()?.tables.get_or_init(|| ForeignTables::new(self));
+        tables.are_of(self).then_some(tables)
     }
 
     /// The ray of `pixel` by `model`, the lens's own.

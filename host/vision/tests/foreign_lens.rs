@@ -14,8 +14,8 @@ use std::sync::LazyLock;
 use foreign_models::*;
 use nalgebra::{UnitQuaternion, Vector2, Vector3};
 use vergence_vision::{
-    BatchLens, Camera, CameraModel, Gates, ImageSize, InvalidLens, KannalaBrandt, Left, Pixel, PixelPair, Point, Right,
-    SightRegion, StereoPair, Transform, cloud, fit_lens, model_of,
+    BatchLens, Camera, CameraModel, Gates, ImageSize, Instructions, InvalidLens, KannalaBrandt, Left, Pixel, PixelPair,
+    Point, Right, SightRegion, StereoPair, Transform, cloud, fit_lens, model_of,
 };
 
 fn values(model: &dyn CameraModel) -> BTreeMap<String, f64> {
@@ -200,4 +200,36 @@ fn symmetric_models_are_tabulated_for_arrays() {
     let tabulated = |example: &&Example| BatchLens::new(&example.lens).is_fitted();
     let names: Vec<_> = EXAMPLES.iter().filter(tabulated).map(|example| example.name).collect();
     assert!(names.len() >= 4, "{names:?}");
+}
+
+/// Arrays of a thousand rows and more are computed by tables where no polynomial does: pixels and rays are the model's, to a billionth of a radian.
+#[test]
+fn large_arrays_are_the_same_as_single_points() {
+    const ROWS: u32 = 6000;
+    for Example { name, lens, .. } in EXAMPLES.iter() {
+        let half = lens.resampled(lens.size().width / 2).expect("a sensor");
+        for (lens, instructions) in
+            [(lens, Instructions::Best), (lens, Instructions::Baseline), (&half, Instructions::Best)]
+        {
+            let field = lens.theta_max().rad();
+            let place = |row: u32| at(1.02 * field * (f64::from(row) / f64::from(ROWS)).sqrt(), 2.4 * f64::from(row));
+            let sent: Vec<_> = (0..ROWS).map(place).chain([at(0.0, 0.0), at(1e-9, 1.0), at(field, 0.5)]).collect();
+            let points: Vec<[f64; 3]> = sent.iter().map(|ray| (ray.vector() * 300.0).into()).collect();
+            let batch = BatchLens::new(lens).with_instructions(instructions);
+            let (pixels, mut worst) = (batch.project(&points), [0.0_f64; 2]);
+            let rays = batch.unproject(&pixels);
+            for ((sent, [u, v]), back) in sent.iter().zip(&pixels).zip(&rays) {
+                let Ok(pixel) = lens.project(sent) else {
+                    assert!(u.is_nan() && back[0].is_nan(), "{name}: {u} at {}", sent.angle_to_axis());
+                    continue;
+                };
+                worst[0] = worst[0].max(apart(pixel, Pixel { u: *u, v: *v }) / lens.k()[0]);
+                // Where the image comes to a stand, a ray is known as badly as its pixel is rounded.
+                let single = lens.unproject::<Camera>(Pixel { u: *u, v: *v });
+                worst[1] = worst[1].max(single.map_or(0.0, |ray| (ray.vector() - Vector3::from(*back)).norm()));
+            }
+            println!("{name}, {instructions:?}: off by {:.1e} and {:.1e} rad", worst[0], worst[1]);
+            assert!(worst[0] < 1e-9 && worst[1] < 2e-9, "{name}, {instructions:?}: {worst:?} rad");
+        }
+    }
 }

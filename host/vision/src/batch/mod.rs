@@ -10,10 +10,13 @@
 mod arc_tangent;
 mod chebyshev;
 mod derivatives;
+mod displaced;
+mod foreign_table;
 mod lanes;
 mod lens;
 mod pair;
 mod pairs;
+mod polar_table;
 mod project;
 mod radial;
 mod shared_errors;
@@ -23,6 +26,7 @@ mod unproject;
 mod vectors;
 
 pub use derivatives::ProjectedPoints;
+pub(crate) use foreign_table::ForeignTables;
 pub use lens::BatchLens;
 pub use pair::{BatchPair, BatchPoints};
 pub use triangulate::{BatchTriangulation, triangulate_batch};

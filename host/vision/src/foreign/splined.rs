@@ -69,22 +69,35 @@ pub struct SplinedStereographic {
 }
 
 impl SplinedStereographic {
-    /// The control points that act at u, by their index, and the weight of each; `None` beyond the edge.
-    pub(super) fn weights(&self, u: [f64; 2]) -> Option<Vec<(usize, f64)>> {
-        let SplineGrid { columns, rows, order, .. } = self.grid;
-        let place = |u: f64, points: usize| u * self.grid.intervals_per_unit() + (points as f64 - 1.0) / 2.0;
+    /// Column and row of the first control point that acts at u, and the weights of it and of those that follow, across and down; `None` beyond
+    /// the edge.
+    fn place(&self, u: [f64; 2]) -> Option<([usize; 2], [[f64; 4]; 2])> {
+        let SplineGrid { columns, rows, .. } = self.grid;
+        let scale = self.grid.intervals_per_unit();
+        let place = |u: f64, points: usize| u * scale + (points as f64 - 1.0) / 2.0;
         let (left, across) = self.grid.weights(place(u[0], columns), columns)?;
         let (top, down) = self.grid.weights(place(u[1], rows), rows)?;
+        Some(([left, top], [across, down]))
+    }
+
+    /// The control points that act at u, by their index, and the weight of each; `None` beyond the edge.
+    pub(super) fn weights(&self, u: [f64; 2]) -> Option<Vec<(usize, f64)>> {
+        let SplineGrid { columns, order, .. } = self.grid;
+        let ([left, top], [across, down]) = self.place(u)?;
         let used = || (0..=order).flat_map(|row| (0..=order).map(move |column| (row, column)));
         Some(used().map(|(row, column)| ((top + row) * columns + left + column, down[row] * across[column])).collect())
     }
 
     /// What the surface adds at u; `None` beyond its edge.
     fn shift(&self, u: [f64; 2]) -> Option<[f64; 2]> {
+        let ([left, top], [across, down]) = self.place(u)?;
         let mut sum = [0.0; 2];
-        for (index, weight) in self.weights(u)? {
-            let [x, y] = self.control.get(index)?;
-            sum = [sum[0] + weight * x, sum[1] + weight * y];
+        for (row, down) in down.iter().enumerate().take(self.grid.order + 1) {
+            let first = (top + row) * self.grid.columns + left;
+            for ([x, y], across) in self.control.get(first..=first + self.grid.order)?.iter().zip(across) {
+                let weight = down * across;
+                sum = [sum[0] + weight * x, sum[1] + weight * y];
+            }
         }
         Some(sum)
     }
