@@ -253,8 +253,8 @@ impl<'a> Report<'a> {
             .map(|(index, ((name, unit), value))| row(name, value, found.covariance[(index, index)].sqrt(), unit))
             .collect();
         if let Some(warp) = &found.warp {
-            rows.push(row("target bow along x", warp.along_x_mm, warp.sigma_mm[0], "mm"));
-            rows.push(row("target bow along y", warp.along_y_mm, warp.sigma_mm[1], "mm"));
+            rows.push(row("target bow along x", warp.shape.along_x_mm, warp.sigma_mm[0], "mm"));
+            rows.push(row("target bow along y", warp.shape.along_y_mm, warp.sigma_mm[1], "mm"));
         }
         let explanation = "r = f·θ·(1 + k1·θ² + k2·θ⁴ + k3·θ⁶ + k4·θ⁸), as cv::fisheye and Kalibr's equidistant model. \
                            σ comes from the noise of the corners, with target poses free. k1 to k4 depend on each \

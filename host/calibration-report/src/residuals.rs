@@ -3,7 +3,9 @@
 use std::collections::BTreeSet;
 
 use nalgebra::{Isometry3, Point3, Vector3};
-use vergence_calibration::{ExtrinsicsCalibration, IntrinsicsCalibration, LensParameters, Side, StereoView, reproject};
+use vergence_calibration::{
+    ExtrinsicsCalibration, IntrinsicsCalibration, LensParameters, Side, StereoView, TargetShape, TargetWarp, reproject,
+};
 use vergence_targets::{Corner, TargetView};
 use vergence_vision::{Camera, KannalaBrandt, OpenCvFisheye, Pixel, Point, UnitRay};
 
@@ -43,17 +45,16 @@ impl Observation {
 /// Every corner of the views that an intrinsics calibration used.
 pub(crate) fn of_intrinsics(calibration: &IntrinsicsCalibration, views: &[TargetView]) -> Vec<Observation> {
     let left_out: BTreeSet<_> = calibration.outliers.iter().map(|o| (o.view, o.corner)).collect();
-    let height = height_mm(calibration, views);
+    let shape = shape(calibration.warp);
     let placed = views.iter().zip(&calibration.views).enumerate();
     placed
         .filter_map(|(index, (view, figures))| {
             Some((index, view, *figures.pose.as_ref()?.camera_from_target.isometry()))
         })
         .flat_map(|(index, view, pose)| {
-            let (height, left_out) = (&height, &left_out);
+            let left_out = &left_out;
             view.corners.iter().enumerate().map(move |(place, corner)| {
-                let [x, y] = corner.target_mm;
-                let point = (pose * Point3::new(x, y, height([x, y]))).coords;
+                let point = (pose * Point3::from(shape.point_mm(corner.target_mm))).coords;
                 let used = !left_out.contains(&(index, place));
                 Observation::new(calibration.lens(), index, corner.pixel, Some(point), used)
             })
@@ -61,21 +62,8 @@ pub(crate) fn of_intrinsics(calibration: &IntrinsicsCalibration, views: &[Target
         .collect()
 }
 
-/// The height of the target over its plane, as in [`vergence_calibration::TargetWarp`].
-fn height_mm(calibration: &IntrinsicsCalibration, views: &[TargetView]) -> impl Fn([f64; 2]) -> f64 + use<> {
-    let range = |axis: usize| {
-        let places = || views.iter().flat_map(|view| &view.corners).map(|corner| corner.target_mm[axis]);
-        (places().fold(f64::INFINITY, f64::min), places().fold(f64::NEG_INFINITY, f64::max))
-    };
-    let ranges = [range(0), range(1)];
-    let warp = calibration.warp.map(|warp| [warp.along_x_mm, warp.along_y_mm]);
-    move |place| {
-        let bow = |axis: usize| {
-            let (low, high) = ranges[axis];
-            1.0 - ((2.0 * place[axis] - low - high) / (high - low)).powi(2)
-        };
-        warp.map_or(0.0, |[along_x, along_y]| along_x * bow(0) + along_y * bow(1))
-    }
+fn shape(warp: Option<TargetWarp>) -> TargetShape {
+    warp.map_or(TargetShape::FLAT, |warp| warp.shape)
 }
 
 /// Every corner of one camera in the views that an extrinsics calibration used.
@@ -92,13 +80,13 @@ pub(crate) fn of_extrinsics(calibration: &ExtrinsicsCalibration, views: &[Stereo
         Side::Left => Isometry3::identity(),
         Side::Right => calibration.joint.left_from_right.isometry().inverse(),
     };
+    let shape = shape(calibration.warp);
     let mut observations = Vec::new();
     for ((index, view), figures) in took_part(calibration, views).zip(&calibration.views) {
         let camera_from_target = camera_from_left * figures.left_from_target.isometry();
         let observed: &[Corner] = if side == Side::Left { &view.left.corners } else { &view.right.corners };
         observations.extend(observed.iter().map(|corner| {
-            let [x, y] = corner.target_mm;
-            let point = (camera_from_target * Point3::new(x, y, 0.0)).coords;
+            let point = (camera_from_target * Point3::from(shape.point_mm(corner.target_mm))).coords;
             let used = !left_out.contains(&key(&view.name, corner.target_mm, corner.pixel));
             Observation::new(lens, index, corner.pixel, Some(point), used)
         }));

@@ -14,6 +14,7 @@ mod robust;
 pub mod schur_lm;
 mod stage;
 mod stage_plan;
+mod target_shape;
 mod trunk;
 mod uncertainty;
 mod validation;
@@ -28,17 +29,18 @@ pub use extrinsics::{
 pub use fit_check::{Unfit, check_fit};
 pub use intrinsics::{
     IntrinsicsCalibration, IntrinsicsError, IntrinsicsOptions, LensModel, LensParameters, LensStep, Outlier,
-    OutlierReason, Parameter, PupilEvidence, Reprojection, StepEvidence, StepVerdict, TargetWarp, UnknownLensModel,
-    ViewFigures, ViewPose, calibrate_intrinsics, refine_intrinsics, reproject,
+    OutlierReason, Parameter, PupilEvidence, Reprojection, StepEvidence, StepVerdict, UnknownLensModel, ViewFigures,
+    ViewPose, calibrate_intrinsics, refine_intrinsics, reproject,
 };
 pub use lens_difference::{LensDifference, LensDifferenceError};
-pub use planar_pose::{PoseError, TargetPose, target_pose};
+pub use planar_pose::{PoseError, TargetPose, target_pose, target_pose_of};
 pub use robust::Loss;
 pub use stage::{
     EncoderScale, FEWEST_STAGE_POSES, FittedScrew, Observability, PredictedPose, StageCalibration, StageError,
     StageOptions, StagePose, StagePoseFigures, Tolerance, WeakDirection, ZeroOffset, calibrate_stage,
 };
 pub use stage_plan::stage_plan;
+pub use target_shape::{TargetShape, TargetWarp};
 pub use trunk::{
     PlayFound, TrunkCalibration, TrunkParameterFigures, TrunkPoseFigures, calibrate_trunk, largest_trunk_sigma,
     validate_trunk,

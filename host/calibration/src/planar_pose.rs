@@ -15,10 +15,10 @@ use nalgebra::{
 use vergence_targets::{Corner, Target, TargetView};
 use vergence_vision::{Camera, KannalaBrandt, Transform};
 
-use crate::Loss;
 use crate::arun::nearest_rotation;
 use crate::reprojection::{Lens, POSE, moved, point_by_move};
 use crate::schur_lm::{self, Equations, SchurOptions, SchurProblem};
+use crate::{Loss, TargetShape};
 
 /// Four points in general position determine the pose.
 const FEWEST_CORNERS: usize = 4;
@@ -65,10 +65,17 @@ struct Observation {
     bearing: Vector3<f64>,
 }
 
-/// Pose of the target from the corners of one image, refined by reprojection.
+/// Pose of a flat target from the corners of one image, refined by reprojection.
 ///
 /// # Errors [`PoseError`] if corners are too few, listed twice, not finite or on a line.
 pub fn target_pose(camera: &KannalaBrandt, view: &TargetView) -> Result<TargetPose, PoseError> {
+    target_pose_of(camera, view, &TargetShape::FLAT)
+}
+
+/// As [`target_pose`], of a target of this shape.
+///
+/// # Errors As [`target_pose`].
+pub fn target_pose_of(camera: &KannalaBrandt, view: &TargetView, shape: &TargetShape) -> Result<TargetPose, PoseError> {
     check(&view.corners)?;
     let (inside, observations): (Vec<Corner>, Vec<Observation>) =
         view.corners.iter().filter_map(|corner| Some((*corner, Observation::through(camera, corner)?))).unzip();
@@ -77,14 +84,14 @@ pub fn target_pose(camera: &KannalaBrandt, view: &TargetView) -> Result<TargetPo
     }
     let start = linear_pose(&observations).ok_or(PoseError::Degenerate)?;
     let lens = Lens::of(camera);
-    let first = refined(&lens, &inside, start, Loss::Squares).ok_or(PoseError::Degenerate)?;
-    let second = refined(&lens, &inside, other_tilt(&first.0, &observations), Loss::Squares);
+    let first = refined(&lens, (&inside, shape), start, Loss::Squares).ok_or(PoseError::Degenerate)?;
+    let second = refined(&lens, (&inside, shape), other_tilt(&first.0, &observations), Loss::Squares);
     let ((pose, _), other) = match second {
         Some(second) if second.1 < first.1 => (second, Some(first)),
         second => (first, second),
     };
     let rms = |pose: &Isometry3<f64>| {
-        let squares = errors_px(&lens, &inside, pose).iter().map(|error| error * error).sum::<f64>();
+        let squares = errors_px(&lens, (&inside, shape), pose).iter().map(|error| error * error).sum::<f64>();
         (squares / inside.len() as f64).sqrt()
     };
     // If both starts end at the same optimum there is no other tilt.
@@ -183,21 +190,25 @@ fn other_tilt(pose: &Isometry3<f64>, observations: &[Observation]) -> Isometry3<
 /// Local optimum of the reprojection near `start`, and its cost. `None` if a corner cannot be projected at the start.
 pub(crate) fn refined(
     lens: &Lens,
-    corners: &[Corner],
+    (corners, shape): (&[Corner], &TargetShape),
     start: Isometry3<f64>,
     loss: Loss,
 ) -> Option<(Isometry3<f64>, f64)> {
     let options = SchurOptions { loss, ..SchurOptions::default() };
-    let solution = schur_lm::solve(&OneTarget { lens, corners }, (), vec![start], &options);
+    let solution = schur_lm::solve(&OneTarget { lens, corners, shape }, (), vec![start], &options);
     let pose = solution.blocks.into_iter().next()?;
     solution.cost.is_finite().then_some((pose, 2.0 * solution.cost))
 }
 
 /// Distance in pixels of each corner from its reprojection with the target at `camera_from_target`; infinite if it
 /// cannot be projected.
-pub(crate) fn errors_px(lens: &Lens, corners: &[Corner], camera_from_target: &Isometry3<f64>) -> Vec<f64> {
+pub(crate) fn errors_px(
+    lens: &Lens,
+    (corners, shape): (&[Corner], &TargetShape),
+    camera_from_target: &Isometry3<f64>,
+) -> Vec<f64> {
     let error = |corner: &Corner| {
-        let point = camera_from_target * Point3::from(Vector2::from(corner.target_mm).push(0.0));
+        let point = camera_from_target * Point3::from(shape.point_mm(corner.target_mm));
         let projection = lens.project(&point.coords)?;
         Some((projection.pixel - Vector2::new(corner.pixel.u, corner.pixel.v)).norm())
     };
@@ -208,6 +219,7 @@ pub(crate) fn errors_px(lens: &Lens, corners: &[Corner], camera_from_target: &Is
 struct OneTarget<'a> {
     lens: &'a Lens,
     corners: &'a [Corner],
+    shape: &'a TargetShape,
 }
 
 impl SchurProblem<POSE> for OneTarget<'_> {
@@ -220,7 +232,7 @@ impl SchurProblem<POSE> for OneTarget<'_> {
 
     fn block_residuals(&self, (): &(), _: usize, pose: &Isometry3<f64>, equations: &mut Equations<POSE>) {
         for corner in self.corners {
-            let turned = pose.rotation * Vector2::from(corner.target_mm).push(0.0);
+            let turned = pose.rotation * self.shape.point_mm(corner.target_mm);
             let Some(projection) = self.lens.project(&(turned + pose.translation.vector)) else {
                 // An infinite cost makes the solver refuse this step.
                 equations.add(&[f64::INFINITY; 2], 1.0, &[], &[[0.0; 2]; POSE]);

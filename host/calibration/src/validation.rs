@@ -2,7 +2,7 @@
 //!
 //! Residuals of the views used for a calibration are too small as a measure of its error; those of held-out views are
 //! not (M. Stone, "Cross-validatory choice and assessment of statistical predictions", J. R. Stat. Soc. B 36(2), 1974).
-//! Only the target's own pose is fitted to a held-out view.
+//! Only the target's own pose is fitted to a held-out view; where the others show the target to bow, it bows there too.
 
 use nalgebra::{Isometry3, SVector};
 use rayon::prelude::*;
@@ -11,12 +11,12 @@ use vergence_targets::TargetView;
 use vergence_vision::{Angle, ImageSize, KannalaBrandt, Length};
 
 use crate::extrinsics::{Lenses, Pair, StereoView, inside, rms};
-use crate::planar_pose::target_pose;
+use crate::planar_pose::{target_pose, target_pose_of};
 use crate::reprojection::{POSE, difference, moved};
 use crate::schur_lm::{self, Equations, SchurOptions, SchurProblem};
 use crate::{
     ExtrinsicsCalibration, ExtrinsicsError, ExtrinsicsOptions, FEWEST_STAGE_POSES, IntrinsicsCalibration,
-    IntrinsicsError, IntrinsicsOptions, Side, StageError, StageOptions, StagePose, calibrate_extrinsics,
+    IntrinsicsError, IntrinsicsOptions, Side, StageError, StageOptions, StagePose, TargetShape, calibrate_extrinsics,
     calibrate_intrinsics, calibrate_stage,
 };
 
@@ -82,11 +82,12 @@ pub fn validate_intrinsics(
         !calibration.outliers.iter().any(|outlier| (outlier.view, outlier.corner) == (view, corner))
     };
     validate(views, folds, |kept, held| {
-        let lens = calibrate_intrinsics(kept, size, options)?.camera;
+        let found = calibrate_intrinsics(kept, size, options)?;
+        let shape = found.warp.map_or(TargetShape::FLAT, |warp| warp.shape);
         let predict = |(index, view): &(usize, &TargetView)| {
             let corners = view.corners.iter().enumerate().filter(|(corner, _)| counts(*index, *corner));
             let clean = TargetView { name: view.name.clone(), corners: corners.map(|(_, corner)| *corner).collect() };
-            let pose = target_pose(&lens, &clean).ok()?;
+            let pose = target_pose_of(&found.camera, &clean, &shape).ok()?;
             Some(HeldOutView { view: clean.name, corners: pose.corners, rms_px: pose.rms_px })
         };
         Ok(held.iter().filter_map(predict).collect())
@@ -174,7 +175,8 @@ fn validate<V: Clone + Sync, E: Send>(
 fn predicted(pair: &ExtrinsicsCalibration, view: &StereoView) -> Option<HeldOutView> {
     let usable = inside(&pair.left, &pair.right, view);
     let left_from_right = *pair.joint.left_from_right.isometry();
-    let known = Pair { left_from_right, lenses: Lenses::of(&pair.left, &pair.right) };
+    let shape = pair.warp.map_or(TargetShape::FLAT, |warp| warp.shape);
+    let known = Pair { left_from_right, lenses: Lenses::of(&pair.left, &pair.right), shape };
     let by_left = target_pose(&pair.left, &view.left).ok().map(|pose| *pose.camera_from_target.isometry());
     let by_right = target_pose(&pair.right, &view.right).ok();
     let by_right = by_right.map(|pose| left_from_right * pose.camera_from_target.isometry());

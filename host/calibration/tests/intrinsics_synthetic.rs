@@ -186,8 +186,8 @@ fn a_bowed_target_is_found_out() {
     let options = IntrinsicsOptions { warp: true, ..IntrinsicsOptions::central() };
     let calibration = calibrate_intrinsics(&warped, SIZE, &options).unwrap();
     let warp = calibration.warp.unwrap();
-    assert!((warp.along_x_mm - 0.8).abs() < 5.0 * warp.sigma_mm[0], "{warp:?}");
-    assert!((warp.along_y_mm + 0.4).abs() < 5.0 * warp.sigma_mm[1], "{warp:?}");
+    assert!((warp.shape.along_x_mm - 0.8).abs() < 5.0 * warp.sigma_mm[0], "{warp:?}");
+    assert!((warp.shape.along_y_mm + 0.4).abs() < 5.0 * warp.sigma_mm[1], "{warp:?}");
     assert!(warp.sigma_mm[0] < 0.05 && warp.sigma_mm[1] < 0.05, "{warp:?}");
     assert!(calibration.rms_inlier_px < 0.5 * flat.rms_inlier_px);
     assert_eq!(flat.warp, None);

@@ -5,6 +5,8 @@ use serde_json::{Value, json};
 use vergence_calibration::{ExtrinsicsCalibration, RelativePose};
 use vergence_rig::{Rig, RigCalibration};
 
+use super::intrinsics::{bow_in_words, bow_json};
+
 /// The rig file's pair, called `name`, of a calibration; its covariance covers the scatter of the views.
 #[must_use]
 pub fn fixed_pair(calibration: &ExtrinsicsCalibration, name: &str) -> Rig {
@@ -40,6 +42,7 @@ pub fn extrinsics_lines(calibration: &ExtrinsicsCalibration) -> Vec<String> {
         "  {} of {} corners, {:.3} px rms without the outliers",
         calibration.corners_inlier, calibration.corners_total, calibration.rms_inlier_px
     ));
+    lines.extend(calibration.warp.map(|warp| format!("  {}", bow_in_words(&warp))));
     for outlier in &calibration.outliers {
         lines.push(format!(
             "  left out: {} camera, {}, corner at {:?} mm, {:.2} px off: {}",
@@ -81,6 +84,7 @@ pub fn extrinsics_json(calibration: &ExtrinsicsCalibration, seconds: f64) -> Val
         "corners_total": calibration.corners_total,
         "corners_inlier": calibration.corners_inlier,
         "views_used": calibration.views.len(),
+        "target_bow": bow_json(calibration.warp),
         "seconds": seconds,
     })
 }

@@ -1,12 +1,33 @@
 //! The result of the calibration of a camera as lines of text and as JSON.
 
 use serde_json::{Value, json};
-use vergence_calibration::{IntrinsicsCalibration, LensStep, PupilEvidence, StepEvidence, StepVerdict};
+use vergence_calibration::{IntrinsicsCalibration, LensStep, PupilEvidence, StepEvidence, StepVerdict, TargetWarp};
 use vergence_targets::TargetView;
 use vergence_vision::{CENTRAL_PARAMETERS, LENS_PARAMETERS};
 
 const NAMES: [&str; LENS_PARAMETERS] =
     ["fx", "fy", "cx", "cy", "k1", "k2", "k3", "k4", "pupil_e0_mm", "pupil_e1_mm", "p1", "p2", "s0", "s1", "s2", "s3"];
+
+/// How the target bows.
+#[must_use]
+pub fn bow_in_words(warp: &TargetWarp) -> String {
+    let TargetWarp { shape, sigma_mm: [x, y] } = warp;
+    format!(
+        "the target bows: its middle is {:.3} ± {x:.3} mm over its left and right edges and {:.3} ± {y:.3} mm over its upper and lower ones, \
+         away from the camera where positive",
+        shape.along_x_mm, shape.along_y_mm
+    )
+}
+
+/// The same for programs.
+#[must_use]
+pub(super) fn bow_json(warp: Option<TargetWarp>) -> Value {
+    let bow = |warp: TargetWarp| {
+        let TargetWarp { shape, sigma_mm } = warp;
+        json!({"along_x_mm": shape.along_x_mm, "along_y_mm": shape.along_y_mm, "sigma_mm": sigma_mm})
+    };
+    warp.map_or(Value::Null, bow)
+}
 
 /// What the views say of the pupil.
 #[must_use]
@@ -49,6 +70,11 @@ pub fn step_in_words(evidence: &StepEvidence) -> String {
     let what = match step {
         LensStep::PupilGrowth => "a pupil with e1",
         LensStep::Asymmetry => "decentring p and thin prism s",
+        LensStep::TargetBow => "a bow",
+    };
+    let (has, like) = match step {
+        LensStep::TargetBow => ("target", "a board that spoils a calibration"),
+        _ => ("lens", "a badly mounted lens"),
     };
     let held_out = held_out_px
         .map(|[without, with]| format!(", those of views held out {with:.4} instead of {without:.4} px"))
@@ -56,14 +82,14 @@ pub fn step_in_words(evidence: &StepEvidence) -> String {
     let figures = format!("residuals are {with:.4} instead of {without:.4} px{held_out}");
     match verdict {
         StepVerdict::Found => {
-            format!("the lens has {what}: chi-squared falls by {gain:.1} (30 are asked for), {figures}")
+            format!("the {has} has {what}: chi-squared falls by {gain:.1} (30 are asked for), {figures}")
         }
         StepVerdict::NotTold => format!(
-            "the views do not tell {what}: chi-squared falls by {gain:.1} (30 are asked for), {figures}. It counts as unknown within what \
-             lenses have, and makes the lens less certain by that"
+            "the views do not tell {what}: chi-squared falls by {gain:.1} (30 are asked for), {figures}. It counts as unknown within \
+             what is usual, and makes the lens less certain by that"
         ),
         StepVerdict::Absent => format!(
-            "the lens has no {what}: chi-squared would fall by {gain:.1} only, and the views would show that of a badly mounted lens"
+            "the {has} does not have {what}: chi-squared would fall by {gain:.1} only, and the views would show that of {like}"
         ),
     }
 }
@@ -73,6 +99,7 @@ fn steps_json(steps: &[StepEvidence]) -> Value {
         let terms = match evidence.step {
             LensStep::PupilGrowth => "pupil_e1",
             LensStep::Asymmetry => "tangential_and_prism",
+            LensStep::TargetBow => "target_bow",
         };
         let [without, with] = evidence.rms_px;
         json!({
@@ -119,6 +146,7 @@ pub fn intrinsics_lines(calibration: &IntrinsicsCalibration, views: &[TargetView
     }
     lines.push(format!("  {}", pupil_in_words(&calibration.pupil)));
     lines.extend(calibration.steps.iter().map(|step| format!("  {}", step_in_words(step))));
+    lines.extend(calibration.warp.map(|warp| format!("  {}", bow_in_words(&warp))));
     for outlier in &calibration.outliers {
         let name = views.get(outlier.view).map_or("", |view| &view.name);
         let residual = outlier.residual_px.map(|px| format!(" ({px:.2} px)")).unwrap_or_default();
@@ -164,6 +192,7 @@ pub fn intrinsics_json(calibration: &IntrinsicsCalibration, seconds: f64) -> Val
         "sigma": named(sigma(calibration)),
         "pupil": pupil_json(&calibration.pupil),
         "steps": steps_json(&calibration.steps),
+        "target_bow": bow_json(calibration.warp),
         "seconds": seconds,
         "views": views,
     })

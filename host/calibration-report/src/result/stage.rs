@@ -4,6 +4,8 @@ use serde_json::{Value, json};
 use vergence_calibration::{HeldOutPose, StageCalibration};
 use vergence_rig::{AxisPosition, Rig, RigAxis, Screw, positions_in_words};
 
+use super::intrinsics::{bow_in_words, bow_json};
+
 /// The result of a stage calibration as lines for people; `held_out` are the stage poses that were left out in turn.
 #[must_use]
 pub fn stage_lines(stage: &StageCalibration, held_out: &[HeldOutPose]) -> Vec<String> {
@@ -40,6 +42,7 @@ pub fn stage_lines(stage: &StageCalibration, held_out: &[HeldOutPose]) -> Vec<St
             "  play of {axis}: {play}. The images put it so far beside its readings: it has play, or its screw or rail is not straight or even"
         ));
     }
+    lines.extend(stage.warp.map(|warp| format!("  {}", bow_in_words(&warp))));
     for skipped in &stage.skipped {
         lines.push(format!("  view not used: {} ({} camera: {})", skipped.view, skipped.side, skipped.reason));
     }
@@ -115,6 +118,7 @@ pub fn stage_json(rig: &Rig, stage: &StageCalibration, held_out: &[HeldOutPose])
     json!({
         "rms_px": stage.rms_px,
         "view_scatter": stage.view_scatter,
+        "target_bow": bow_json(stage.warp),
         "rms_inlier_px": stage.rms_inlier_px,
         "corners_total": stage.corners_total,
         "corners_inlier": stage.corners_inlier,

@@ -4,13 +4,14 @@
 use nalgebra::{DMatrix, Isometry3};
 use vergence_rig::RigNumber;
 
-use crate::Loss;
 use crate::extrinsics::StereoView;
-use crate::extrinsics::joint::{Joint, Kinematics, Shared};
+use crate::extrinsics::bow::{first, marginal, warp_of};
+use crate::extrinsics::joint::{BOW, Joint, Kinematics, Shared};
 use crate::extrinsics::outliers::{OwnPoses, inliers, median_of};
 use crate::extrinsics::report::rms;
 use crate::extrinsics::stereo::{LensKnowledge, LensPrior, Lenses, Pair};
-use crate::schur_lm::{self, Clustered, SchurOptions};
+use crate::schur_lm::{self, Clustered, SchurOptions, SchurProblem};
+use crate::{Loss, TargetWarp};
 
 /// The median length of a two-dimensional Gaussian error of unit standard deviation per coordinate: √(2 ln 2).
 const RAYLEIGH_MEDIAN: f64 = 1.177_410_022_515_474_7;
@@ -37,6 +38,8 @@ pub(crate) struct Fit<S> {
     pub inliers: Vec<Vec<bool>>,
     /// Distance of each corner from its reprojection.
     pub errors_px: Vec<Vec<f64>>,
+    /// Bow of the target, where the views show one.
+    pub warp: Option<TargetWarp>,
     /// Standard deviation of a pixel coordinate in units of the corner's relative sigma.
     pub sigma: f64,
     /// The same, by which what is known besides the corners was weighted.
@@ -85,8 +88,18 @@ pub(crate) struct Task<'a, K: Kinematics> {
 }
 
 impl<K: Kinematics> Task<'_, K> {
-    /// The optimum near `start`.
+    /// The optimum near `start`: of a flat target, or of one that bows where the views show that it does.
     pub fn fit(&self, start: Start<K::State>) -> Result<Fit<K::State>, NoFit> {
+        let usable = start.usable.clone();
+        let flat = self.fit_shape(start, false)?;
+        match self.bowed(&flat, &usable) {
+            Some(start) => self.fit_shape(start, true),
+            None => Ok(flat),
+        }
+    }
+
+    /// The optimum near `start`, where `bows` says whether the bow of the target is unknown.
+    fn fit_shape(&self, start: Start<K::State>, bows: bool) -> Result<Fit<K::State>, NoFit> {
         let Start { mut shared, mut targets, usable } = start;
         if *self.knowledge != LensKnowledge::Exact {
             shared.lenses = shared.lenses.polynomial();
@@ -97,7 +110,7 @@ impl<K: Kinematics> Task<'_, K> {
         loop {
             round += 1;
             let kept: Vec<usize> = (0..inliers.len()).filter(|&view| inliers[view].contains(&true)).collect();
-            let problem = self.problem(self.knowledge, sigma, &kept, &inliers)?;
+            let problem = Joint { bows, ..self.problem(self.knowledge, sigma, &kept, &inliers)? };
             let kept_targets = kept.iter().map(|&view| targets[view]).collect();
             let solution = schur_lm::solve(&problem, shared, kept_targets, &SchurOptions::default());
             if !solution.cost.is_finite() {
@@ -117,7 +130,15 @@ impl<K: Kinematics> Task<'_, K> {
                 let information = solution.normal.shared_information().ok_or(NoFit::NotDetermined)?;
                 let covariance = solution.normal.clustered(sigma * sigma);
                 let noise_covariance = solution.normal.shared_covariance().map(|unit| unit * (sigma * sigma));
+                let warp = covariance.as_ref().filter(|_| bows).map(|all| warp_of(shared.shape, &all.covariance));
+                let others = problem.shared_dimension() - if bows { BOW } else { 0 };
+                let (information, covariance, noise_covariance) = (
+                    marginal(&information, others).ok_or(NoFit::NotDetermined)?,
+                    covariance.map(|all| Clustered { covariance: first(&all.covariance, others), ..all }),
+                    noise_covariance.map(|all| first(&all, others)),
+                );
                 return Ok(Fit {
+                    warp,
                     lens_numbers: problem.lens_prior.numbers(),
                     shared,
                     targets,
@@ -155,7 +176,7 @@ impl<K: Kinematics> Task<'_, K> {
         Ok((scale / RAYLEIGH_MEDIAN).max(FINEST))
     }
 
-    fn problem<'a>(
+    pub(super) fn problem<'a>(
         &'a self,
         knowledge: &LensKnowledge,
         sigma: f64,
@@ -163,7 +184,7 @@ impl<K: Kinematics> Task<'_, K> {
         used: &'a [Vec<bool>],
     ) -> Result<Joint<'a, K>, NoFit> {
         let lens_prior = LensPrior::new(self.lenses, knowledge, sigma).ok_or(NoFit::NotACovariance)?;
-        Ok(Joint { kinematics: self.kinematics, lens_prior, sigma, views: self.views, kept, used })
+        Ok(Joint { kinematics: self.kinematics, lens_prior, bows: false, sigma, views: self.views, kept, used })
     }
 
     fn median_deviation(&self, shared: &Shared<K::State>, targets: &[Isometry3<f64>], usable: &[Vec<bool>]) -> f64 {
@@ -177,14 +198,14 @@ impl<K: Kinematics> Task<'_, K> {
     pub fn errors_px(&self, shared: &Shared<K::State>, targets: &[Isometry3<f64>]) -> Vec<Vec<f64>> {
         let view_errors = |(index, (view, target)): (usize, (&StereoView, &Isometry3<f64>))| {
             let left_from_right = self.kinematics.left_from_right(&shared.state, index);
-            Pair { left_from_right, lenses: shared.lenses }.errors_px(view, target)
+            Pair { left_from_right, lenses: shared.lenses, shape: shared.shape }.errors_px(view, target)
         };
         self.views.iter().zip(targets).enumerate().map(view_errors).collect()
     }
 
     fn inliers(&self, shared: &Shared<K::State>, errors_px: &[Vec<f64>], usable: &[Vec<bool>]) -> Vec<Vec<bool>> {
         if self.robust {
-            inliers(&shared.lenses, self.views, self.own_poses, errors_px, usable)
+            inliers(&shared.lenses, self.views, (self.own_poses, &shared.shape), errors_px, usable)
         } else {
             usable.to_vec()
         }

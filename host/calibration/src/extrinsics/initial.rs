@@ -5,6 +5,7 @@ use nalgebra::{Isometry3, Point3, Vector2};
 use vergence_targets::TargetView;
 use vergence_vision::{Camera, KannalaBrandt, Left, Point, Right};
 
+use crate::TargetShape;
 use crate::arun::fit_rotation_translation;
 use crate::extrinsics::Side;
 use crate::extrinsics::outliers::OwnPoses;
@@ -79,7 +80,7 @@ pub(crate) fn nearer_targets(
     views: &[StereoView],
     placed: &[PlacedView],
 ) -> Vec<Isometry3<f64>> {
-    let pair = Pair { left_from_right: *left_from_right, lenses };
+    let pair = Pair { left_from_right: *left_from_right, lenses, shape: TargetShape::FLAT };
     let choose = |place: &PlacedView| {
         let by_right = left_from_right * place.right_from_target;
         let squares = |pose: &Isometry3<f64>| {

@@ -2,6 +2,7 @@
 
 use nalgebra::{Isometry3, Matrix6xX, SVector};
 
+use crate::TargetShape;
 use crate::extrinsics::Side;
 use crate::extrinsics::StereoView;
 use crate::extrinsics::stereo::{LensPrior, Lenses, Pair};
@@ -53,17 +54,23 @@ impl Kinematics for FixedPose {
     }
 }
 
-/// The shared unknowns: the kinematics' components of a step come first, then the lenses'.
+/// Number of heights of a bow.
+pub(crate) const BOW: usize = 2;
+
+/// The shared unknowns: the kinematics' components of a step come first, then the lenses', then the heights of the target's bow.
 #[derive(Clone, Debug)]
 pub(crate) struct Shared<S> {
     pub state: S,
     pub lenses: Lenses,
+    pub shape: TargetShape,
 }
 
 /// The least-squares problem over the views in `kept`.
 pub(crate) struct Joint<'a, K: Kinematics> {
     pub kinematics: &'a K,
     pub lens_prior: LensPrior,
+    /// Whether the bow of the target is unknown.
+    pub bows: bool,
     pub sigma: f64,
     pub views: &'a [StereoView],
     /// Indices of the views that have a block.
@@ -77,7 +84,7 @@ impl<K: Kinematics> SchurProblem<POSE> for Joint<'_, K> {
     type Block = Isometry3<f64>;
 
     fn shared_dimension(&self) -> usize {
-        self.kinematics.dimension() + self.lens_prior.dimension()
+        self.kinematics.dimension() + self.lens_prior.dimension() + if self.bows { BOW } else { 0 }
     }
 
     fn block_residuals(
@@ -92,8 +99,11 @@ impl<K: Kinematics> SchurProblem<POSE> for Joint<'_, K> {
         else {
             return;
         };
-        let pair =
-            Pair { left_from_right: self.kinematics.left_from_right(&shared.state, view), lenses: shared.lenses };
+        let pair = Pair {
+            left_from_right: self.kinematics.left_from_right(&shared.state, view),
+            lenses: shared.lenses,
+            shape: shared.shape,
+        };
         let by_step = self.kinematics.derivative(&shared.state, view);
         let lens_column = by_step.ncols();
         let mut columns = vec![[0.0; 2]; self.shared_dimension()];
@@ -114,6 +124,11 @@ impl<K: Kinematics> SchurProblem<POSE> for Joint<'_, K> {
             for (slot, &parameter) in columns.iter_mut().skip(own).zip(unknown) {
                 *slot = residual.by_lens.column(parameter).into_owned().into();
             }
+            if self.bows {
+                let first = columns.len() - BOW;
+                let heights = shared.shape.bow(corner.target_mm);
+                columns[first..].copy_from_slice(&heights.map(|height| (residual.by_height * height).into()));
+            }
             equations.add(&residual.error.into(), corner.relative_sigma, &columns, &residual.by_target.into());
         }
     }
@@ -124,8 +139,15 @@ impl<K: Kinematics> SchurProblem<POSE> for Joint<'_, K> {
     }
 
     fn shared_plus(&self, shared: &Self::Shared, step: &[f64]) -> Self::Shared {
-        let (state, lenses) = step.split_at(self.kinematics.dimension().min(step.len()));
+        let (state, others) = step.split_at(self.kinematics.dimension().min(step.len()));
+        let (lenses, heights) = others.split_at(self.lens_prior.dimension().min(others.len()));
+        let [x, y] = shared.shape.heights_mm();
+        let shape = match heights {
+            [by_x, by_y] => shared.shape.bent([x + by_x, y + by_y]),
+            _ => shared.shape,
+        };
         Shared {
+            shape,
             state: self.kinematics.plus(&shared.state, state),
             lenses: self.lens_prior.moved(&shared.lenses, lenses),
         }

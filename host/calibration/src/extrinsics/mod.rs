@@ -4,6 +4,7 @@
 //! other ([`fit_rotation_translation`](crate::fit_rotation_translation)) gives a first relative pose; a joint fit of
 //! all reprojections refines everything. Targets may be near and beyond 90° from the axis.
 
+mod bow;
 mod fit;
 mod initial;
 mod joint;
@@ -20,6 +21,7 @@ use vergence_vision::{InvalidLens, KannalaBrandt, Left, Pixel, Right, Transform}
 use crate::planar_pose::PoseError;
 use crate::reprojection::POSE;
 use crate::schur_lm::Clustered;
+use crate::{TargetShape, TargetWarp};
 
 pub(crate) use fit::{Fit, NoFit, Start, Task};
 pub(crate) use initial::{PlacedView, inside, nearer_targets, place};
@@ -96,6 +98,8 @@ pub struct ExtrinsicsCalibration {
     pub rms_inlier_px: f64,
     /// Standard deviation of one pixel coordinate, root mean square over the corners used.
     pub sigma_px: f64,
+    /// Bow of the target where the views show one; both cameras see it flat otherwise.
+    pub warp: Option<TargetWarp>,
     /// Left lens, refined unless it was held exact.
     pub left: KannalaBrandt,
     /// Right lens, refined unless it was held exact.
@@ -300,8 +304,9 @@ pub fn calibrate_extrinsics(
         knowledge: &options.lenses,
         robust: options.robust,
     };
-    let arun_errors = task.errors_px(&Shared { state: arun, lenses }, &targets);
-    let fit = task.fit(Start { shared: Shared { state: arun, lenses }, targets, usable: usable.clone() })?;
+    let flat = Shared { state: arun, lenses, shape: TargetShape::FLAT };
+    let arun_errors = task.errors_px(&flat, &targets);
+    let fit = task.fit(Start { shared: flat, targets, usable: usable.clone() })?;
 
     let Clustered { covariance, scatter } = fit.covariance.as_ref().ok_or(ExtrinsicsError::NotDetermined)?;
     let noise = fit.noise_covariance.as_ref().ok_or(ExtrinsicsError::NotDetermined)?;
@@ -317,6 +322,7 @@ pub fn calibrate_extrinsics(
         lens_numbers: fit.lens_numbers.clone(),
         rms_inlier_px: rms(&fit.errors_px, &fit.inliers).unwrap_or_default(),
         sigma_px: fit.sigma_px(&views),
+        warp: fit.warp,
         left: refined(&fit.shared.lenses.left, left, Side::Left)?,
         right: refined(&fit.shared.lenses.right, right, Side::Right)?,
         corners_total: usable.iter().map(Vec::len).sum(),

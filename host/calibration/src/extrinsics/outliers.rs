@@ -8,10 +8,10 @@ use nalgebra::Isometry3;
 use vergence_targets::Corner;
 use vergence_vision::median;
 
-use crate::Loss;
 use crate::extrinsics::StereoView;
 use crate::extrinsics::stereo::Lenses;
 use crate::planar_pose::{errors_px, refined};
+use crate::{Loss, TargetShape};
 
 /// A corner further off than this many medians is gross: 7 standard deviations of a Gaussian error.
 const GROSS_CORNER: f64 = 6.0;
@@ -37,7 +37,7 @@ pub(crate) fn median_of(errors: &[Vec<f64>], counted: &[Vec<bool>]) -> f64 {
 pub(crate) fn inliers(
     lenses: &Lenses,
     views: &[StereoView],
-    own_poses: &[OwnPoses],
+    (own_poses, shape): (&[OwnPoses], &TargetShape),
     joint_errors_px: &[Vec<f64>],
     usable: &[Vec<bool>],
 ) -> Vec<Vec<bool>> {
@@ -45,7 +45,7 @@ pub(crate) fn inliers(
         .iter()
         .zip(own_poses)
         .zip(usable)
-        .map(|((view, poses), usable)| own_deviations(lenses, view, poses, usable))
+        .map(|((view, poses), usable)| own_deviations(lenses, view, (poses, shape), usable))
         .collect();
     let corner_limit = (GROSS_CORNER * median_of(&own, usable)).max(NEVER_GROSS);
     let view_limit = (GROSS_VIEW * median_of(joint_errors_px, usable)).max(NEVER_GROSS);
@@ -59,7 +59,12 @@ pub(crate) fn inliers(
 }
 
 /// Distance of each corner from where the rest of its own image places it, in units of its relative sigma.
-fn own_deviations(lenses: &Lenses, view: &StereoView, poses: &OwnPoses, usable: &[bool]) -> Vec<f64> {
+fn own_deviations(
+    lenses: &Lenses,
+    view: &StereoView,
+    (poses, shape): (&OwnPoses, &TargetShape),
+    usable: &[bool],
+) -> Vec<f64> {
     let (left_usable, right_usable) = usable.split_at(view.left.corners.len().min(usable.len()));
     let sides = [
         (&lenses.left, &view.left.corners, &poses[0], left_usable),
@@ -68,11 +73,11 @@ fn own_deviations(lenses: &Lenses, view: &StereoView, poses: &OwnPoses, usable: 
     let errors = sides.into_iter().flat_map(|(lens, corners, start, usable)| {
         let kept: Vec<Corner> = corners.iter().zip(usable).filter(|(_, usable)| **usable).map(|(c, _)| *c).collect();
         let deviations = |corners: &[Corner], pose: &Isometry3<f64>| -> Vec<f64> {
-            let errors = errors_px(lens, corners, pose).into_iter().zip(corners);
+            let errors = errors_px(lens, (corners, shape), pose).into_iter().zip(corners);
             errors.map(|(error, corner)| corner.deviation(error)).collect()
         };
         let scale = median(deviations(&kept, start)).unwrap_or(0.0).max(NEVER_GROSS);
-        let pose = refined(lens, &kept, *start, Loss::Cauchy(scale)).map_or(*start, |(pose, _)| pose);
+        let pose = refined(lens, (&kept, shape), *start, Loss::Cauchy(scale)).map_or(*start, |(pose, _)| pose);
         deviations(corners, &pose)
     });
     errors.collect()

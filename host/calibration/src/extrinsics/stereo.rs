@@ -1,10 +1,11 @@
 //! Residuals of one target seen by two cameras, with derivatives.
 
-use nalgebra::{DMatrix, DVector, Isometry3, Matrix3x6, SMatrix, SVector, Vector2};
+use nalgebra::{DMatrix, DVector, Isometry3, Matrix3x6, SMatrix, SVector, Vector2, Vector3};
 use vergence_rig::RigNumber;
 use vergence_targets::Corner;
 use vergence_vision::{KannalaBrandt, Side};
 
+use crate::TargetShape;
 use crate::extrinsics::StereoView;
 use crate::reprojection::{CENTRAL, LENS, Lens, POSE, point_by_move};
 use crate::schur_lm::Equations;
@@ -58,6 +59,7 @@ pub(crate) struct LensPrior {
 pub(crate) struct Pair {
     pub left_from_right: Isometry3<f64>,
     pub lenses: Lenses,
+    pub shape: TargetShape,
 }
 
 /// Residual of one corner (reprojection less observation, in pixels) and its derivatives.
@@ -66,6 +68,8 @@ pub(crate) struct StereoResidual {
     pub by_relative_pose: SMatrix<f64, 2, POSE>,
     pub by_lens: SMatrix<f64, 2, LENS>,
     pub by_target: SMatrix<f64, 2, POSE>,
+    /// By a move of the corner out of the target's plane.
+    pub by_height: Vector2<f64>,
 }
 
 impl Lenses {
@@ -166,18 +170,20 @@ impl Pair {
     /// The residual of `corner`, seen by the camera on `side`, of the target at `left_from_target`. `None` where the
     /// corner cannot be projected.
     pub fn residual(&self, side: Side, corner: &Corner, left_from_target: &Isometry3<f64>) -> Option<StereoResidual> {
-        let turned = left_from_target.rotation * Vector2::from(corner.target_mm).push(0.0);
+        let turned = left_from_target.rotation * self.shape.point_mm(corner.target_mm);
         let in_left = turned + left_from_target.translation.vector;
         let by_target = point_by_move(&turned);
-        let (projection, by_relative_pose, by_target) = match side {
-            Side::Left => (self.lenses.left.project(&in_left)?, Matrix3x6::zeros(), by_target),
+        let by_height = left_from_target.rotation * Vector3::z();
+        let (projection, by_relative_pose, by_target, by_height) = match side {
+            Side::Left => (self.lenses.left.project(&in_left)?, Matrix3x6::zeros(), by_target, by_height),
             Side::Right => {
                 // Rᵀ(p - t) with R ← exp(ω) R, t ← t + δ.
                 let right_from_left = self.left_from_right.rotation.inverse().to_rotation_matrix();
                 let arm = in_left - self.left_from_right.translation.vector;
                 let in_right = right_from_left * arm;
                 let by_move = -(right_from_left.matrix() * point_by_move(&arm));
-                (self.lenses.right.project(&in_right)?, by_move, right_from_left.matrix() * by_target)
+                let by_height = right_from_left * by_height;
+                (self.lenses.right.project(&in_right)?, by_move, right_from_left.matrix() * by_target, by_height)
             }
         };
         Some(StereoResidual {
@@ -185,6 +191,7 @@ impl Pair {
             by_relative_pose: projection.by_point * by_relative_pose,
             by_lens: projection.by_lens,
             by_target: projection.by_point * by_target,
+            by_height: projection.by_point * by_height,
         })
     }
 
@@ -201,7 +208,7 @@ impl Pair {
 
 #[cfg(test)]
 mod tests {
-    use nalgebra::{UnitQuaternion, Vector3};
+    use nalgebra::UnitQuaternion;
     use vergence_vision::{Angle, ImageSize, Pixel};
 
     use super::*;
@@ -214,7 +221,7 @@ mod tests {
         let lens = Lens::of(&camera.unwrap());
         let rotation = UnitQuaternion::from_scaled_axis(Vector3::new(0.1, 1.9, -0.2));
         let left_from_right = Isometry3::from_parts(Vector3::new(90.0, 4.0, -110.0).into(), rotation);
-        Pair { left_from_right, lenses: Lenses { left: lens, right: lens } }
+        Pair { left_from_right, lenses: Lenses { left: lens, right: lens }, shape: TargetShape::FLAT }
     }
 
     /// By central differences, of a target from in front to beyond 90°.

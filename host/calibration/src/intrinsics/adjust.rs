@@ -42,26 +42,37 @@ pub(super) struct Adjusted {
 const FEW: [usize; 5] = [0, 1, 2, 3, 4];
 const CENTRAL_LENS: [usize; CENTRAL] = [0, 1, 2, 3, 4, 5, 6, 7];
 
-/// What a lens has besides the parameters of a central and symmetric one.
+/// What a lens has besides the parameters of a central and symmetric one, and whether the target bows.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(super) struct Terms {
     pub e0: bool,
     pub e1: bool,
     pub asymmetry: bool,
+    pub bow: bool,
 }
 
 impl Terms {
-    /// A pupil of one coefficient.
-    pub const PUPIL: Self = Self { e0: true, e1: false, asymmetry: false };
-    /// Everything that a lens may have.
-    pub const WHOLE: Self = Self { e0: true, e1: true, asymmetry: true };
+    /// A lens with one centre.
+    pub const fn central(bow: bool) -> Self {
+        Self { e0: false, e1: false, asymmetry: false, bow }
+    }
+
+    /// A lens with a pupil of one coefficient.
+    pub const fn pupil(bow: bool) -> Self {
+        Self { e0: true, e1: false, asymmetry: false, bow }
+    }
+
+    /// A lens with everything that lenses may have.
+    pub const fn whole(bow: bool) -> Self {
+        Self { e0: true, e1: true, asymmetry: true, bow }
+    }
 
     /// The parameters adjusted at the end.
-    pub fn free(self, warp: bool) -> Vec<usize> {
+    pub fn free(self) -> Vec<usize> {
         let has = |parameter: usize| match parameter {
             E0 => self.e0,
             E1 => self.e1,
-            LENS.. => warp,
+            LENS.. => self.bow,
             other => other < CENTRAL || self.asymmetry,
         };
         (0..SHARED).filter(|&parameter| has(parameter)).collect()
@@ -159,9 +170,12 @@ fn mirrored(pose: &Isometry3<f64>, view: &ObservedView) -> Isometry3<f64> {
 }
 
 impl State {
-    /// With zero for what a lens with these terms does not have.
+    /// With zero for what lens and target do not have with these terms.
     pub fn with_only(mut self, terms: Terms) -> Self {
-        let free = terms.free(true);
+        let free = terms.free();
+        if !terms.bow {
+            self.shared.warp_mm = [0.0; 2];
+        }
         let mut lens = self.shared.lens.to_array();
         lens.iter_mut()
             .enumerate()

@@ -113,7 +113,7 @@ impl SchurProblem<POSE> for Bundle<'_> {
 
     fn shared_residuals(&self, shared: &Shared, equations: &mut Equations<POSE>) {
         let Some(strength) = self.prior else { return };
-        let values = shared.lens.to_array();
+        let values: Vec<f64> = shared.lens.to_array().into_iter().chain(shared.warp_mm).collect();
         let place = |parameter: usize| self.free.iter().position(|&free| free == parameter);
         for Known { sum, sigma } in &KNOWN {
             let mut columns = vec![[0.0]; self.free.len()];

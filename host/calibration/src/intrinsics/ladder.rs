@@ -2,7 +2,7 @@
 //!
 //! The richest lens is fitted with what is known of lenses before any view (`prior`), and each group of its parameters is judged by what the fit
 //! loses without it: the pupil's e0, its growth e1, and decentring with thin prism, which go together because one displaced element makes
-//! both. All are judged by the scatter that the richest lens leaves, since what it explains is no scatter.
+//! both; and the bow of the target. All are judged by the scatter that the richest lens leaves, since what it explains is no scatter.
 //!
 //! A group stays out only where the views tell that the lens has none of it. What they leave open stays an unknown with its prior: a lens
 //! that passed as symmetric because few views did not show otherwise would be stated far more certain than it is.
@@ -12,7 +12,7 @@ use vergence_vision::ImageSize;
 use super::adjust::{Adjusted, State, Terms, inlier_fit};
 use super::lens::with_valid_cone;
 use super::observations::ObservedView;
-use super::prior::{Prior, narrowest};
+use super::prior::{BOW, Prior, narrowest};
 use super::pupil;
 use super::report::outermost;
 use super::trial::{Trial, scatter};
@@ -20,17 +20,23 @@ use super::{IntrinsicsError, IntrinsicsOptions, LensModel, PupilEvidence};
 
 /// Chi-squared by which the fit must get worse without parameters that count as found: of one unknown 5.5 standard deviations; of six unknowns
 /// chance gives it once in 25,000 calibrations.
-pub(super) const LEAST_GAIN: f64 = 30.0;
+pub(crate) const LEAST_GAIN: f64 = 30.0;
 /// Chi-squared of the six unknowns of an asymmetry that chance exceeds once in 100 calibrations of a symmetric lens.
-const CHANCE_GAIN: f64 = 16.8;
+const CHANCE_OF_ASYMMETRY: f64 = 16.8;
+/// The same of the two unknowns of a bow.
+const CHANCE_OF_BOW: f64 = 9.2;
+/// A bow of so many millimetres moves corners of a tilted target by a tenth of a pixel at 350 mm.
+const SMALL_BOW_MM: f64 = 0.1;
 
-/// Parameters that a lens gets together.
+/// Parameters of lens or target that are fitted together.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum LensStep {
     /// The second coefficient e1 of the pupil.
     PupilGrowth,
     /// Decentring p1, p2 and thin prism s0 to s3.
     Asymmetry,
+    /// The bow of the target, which a lens that fits it for flat takes into its own parameters.
+    TargetBow,
 }
 
 /// What becomes of parameters.
@@ -72,11 +78,13 @@ pub(super) fn fit(
     size: ImageSize,
     options: &IntrinsicsOptions,
 ) -> Result<(Adjusted, Evidence), IntrinsicsError> {
-    let central = inlier_fit(views, state, Terms::default().free(options.warp), None, options)?;
-    let candidates: &[Terms] = match options.model {
-        LensModel::Central => &[],
-        LensModel::MovingPupil => &[Terms::PUPIL],
-        LensModel::Full | LensModel::ByEvidence => &[Terms::WHOLE, Terms::PUPIL],
+    let central = inlier_fit(views, state, Terms::central(options.warp).free(), None, options)?;
+    let (whole, pupil) = (Terms::whole(options.warp), Terms::pupil(options.warp));
+    let candidates = match options.model {
+        LensModel::Central => Vec::new(),
+        LensModel::MovingPupil => vec![pupil],
+        LensModel::Full => vec![whole, pupil],
+        LensModel::ByEvidence => vec![Terms::whole(true), whole, pupil],
     };
     // The richest lens may be one too many for a handful of corners.
     let richest = candidates.iter().find_map(|terms| Richest::of(&central, *terms, size, options));
@@ -100,9 +108,9 @@ impl<'a> Richest<'a> {
     /// `None` where the corners do not give one.
     fn of(central: &Adjusted, terms: Terms, size: ImageSize, options: &'a IntrinsicsOptions) -> Option<Self> {
         let rough = Prior { scatter: 1.0 };
-        let first = Trial::of(central, terms, rough, options.warp);
+        let first = Trial::of(central, terms, rough);
         let prior = Prior { scatter: scatter(&first.normal, rough)? };
-        let adjusted = inlier_fit(central.views.clone(), first.state, terms.free(options.warp), Some(prior), options);
+        let adjusted = inlier_fit(central.views.clone(), first.state, terms.free(), Some(prior), options);
         let adjusted = adjusted.ok()?.after(central);
         with_valid_cone(adjusted.shared.lens, outermost(&adjusted), size).ok()?;
         let variance = adjusted.normal.variance()? * scatter(&adjusted.normal, prior)?.powi(2);
@@ -111,7 +119,7 @@ impl<'a> Richest<'a> {
 
     /// The fit of a lens to the corners that this one used.
     pub fn trial(&self, terms: Terms) -> Trial {
-        Trial::of(&self.adjusted, terms, self.prior, self.options.warp)
+        Trial::of(&self.adjusted, terms, self.prior)
     }
 
     /// By how much chi-squared falls from one lens to the other.
@@ -138,14 +146,19 @@ impl<'a> Richest<'a> {
             terms.asymmetry = evidence.verdict != StepVerdict::Absent;
             steps.push(evidence);
         }
+        if terms.bow && !self.options.warp {
+            let evidence = self.step(LensStep::TargetBow, Terms { bow: false, ..self.terms });
+            terms.bow = evidence.verdict != StepVerdict::Absent;
+            steps.push(evidence);
+        }
         let adjusted = if terms == self.terms {
             self.adjusted
-        } else if terms == Terms::default() {
+        } else if terms == Terms::central(self.options.warp) {
             central
         } else {
             let start = self.adjusted.state().with_only(terms);
-            let free = terms.free(self.options.warp);
-            inlier_fit(self.adjusted.views.clone(), start, free, Some(self.prior), self.options)?.after(&self.adjusted)
+            inlier_fit(self.adjusted.views.clone(), start, terms.free(), Some(self.prior), self.options)?
+                .after(&self.adjusted)
         };
         Ok((adjusted, Evidence { pupil, steps }))
     }
@@ -156,7 +169,7 @@ impl<'a> Richest<'a> {
         let held_out_px = (gain > LEAST_GAIN).then(|| self.held_out_px(&without, &with));
         let verdict = match held_out_px {
             Some([without, with]) if with <= without => StepVerdict::Found,
-            None if step == LensStep::Asymmetry && self.is_symmetric(gain) => StepVerdict::Absent,
+            None if self.is_absent(step, gain, &with) => StepVerdict::Absent,
             _ => StepVerdict::NotTold,
         };
         StepEvidence {
@@ -168,10 +181,18 @@ impl<'a> Richest<'a> {
         }
     }
 
-    /// Whether the views tell that there is no asymmetry: one as large as badly mounted lenses have would have been found, whatever its
-    /// direction, and no more is there than chance gives.
-    fn is_symmetric(&self, gain: f64) -> bool {
-        let is_told = narrowest(&self.adjusted, self.variance).is_some_and(|left| left * LEAST_GAIN.sqrt() <= 1.0);
-        self.options.model != LensModel::Full && gain <= CHANCE_GAIN && is_told
+    /// Whether the views tell that there is none of it: as much as matters would have been found, whatever its direction, and no more is there
+    /// than chance gives.
+    fn is_absent(&self, step: LensStep, gain: f64, with: &Trial) -> bool {
+        let (chance, left) = match step {
+            LensStep::PupilGrowth => return false,
+            LensStep::Asymmetry => (CHANCE_OF_ASYMMETRY, narrowest(&self.adjusted, self.variance)),
+            LensStep::TargetBow => {
+                let sigma_mm = |parameter| with.sigma(parameter, self.variance);
+                (CHANCE_OF_BOW, sigma_mm(BOW).zip(sigma_mm(BOW + 1)).map(|(x, y)| x.max(y) / SMALL_BOW_MM))
+            }
+        };
+        let is_told = left.is_some_and(|left| left * LEAST_GAIN.sqrt() <= 1.0);
+        self.options.model != LensModel::Full && gain <= chance && is_told
     }
 }

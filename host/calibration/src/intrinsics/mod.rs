@@ -4,7 +4,7 @@
 //! 2. A robust joint adjustment of lens and target poses that finds outliers (`adjust`).
 //! 3. Plain least squares on the remaining corners: the result and its covariance.
 //! 4. The same with all that a lens may have besides, within what is known of lenses (`prior`): a pupil that moves (`pupil`), elements off
-//!    the axis. What the views tell to be absent is left out again (`ladder`).
+//!    the axis, a target that bows. What the views tell to be absent is left out again (`ladder`).
 
 mod adjust;
 mod bundle;
@@ -21,14 +21,13 @@ mod trial;
 
 use vergence_vision::{ImageSize, OpenCvFisheye};
 
+pub(crate) use ladder::LEAST_GAIN;
 pub use ladder::{LensStep, StepEvidence, StepVerdict};
 pub(crate) use lens::{CENTRAL, LENS};
 pub use lens::{LensParameters, Reprojection, reproject};
 pub use model::{LensModel, UnknownLensModel};
 pub use pupil::PupilEvidence;
-pub use result::{
-    IntrinsicsCalibration, IntrinsicsError, Outlier, OutlierReason, Parameter, TargetWarp, ViewFigures, ViewPose,
-};
+pub use result::{IntrinsicsCalibration, IntrinsicsError, Outlier, OutlierReason, Parameter, ViewFigures, ViewPose};
 
 use adjust::robust_fit;
 use observations::{ObservedView, observed_views};
@@ -36,10 +35,11 @@ use report::report;
 use start::{start_from, starts};
 use vergence_targets::TargetView;
 
-/// Options of [`calibrate_intrinsics`]. The default suits every lens and any flat target.
+/// Options of [`calibrate_intrinsics`]. The default suits every lens and any target.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct IntrinsicsOptions {
-    /// Whether to estimate how the target bows out of its plane: two more unknowns.
+    /// Whether to estimate how the target bows out of its plane, whatever the views say: two more unknowns. [`LensModel::ByEvidence`]
+    /// estimates it where the views do not tell that the target is flat.
     pub warp: bool,
     /// A corner farther from its reprojection than this many times the median distance, both in units of their relative
     /// sigmas, is left out. `None` keeps every corner: plain least squares over all.
@@ -49,8 +49,8 @@ pub struct IntrinsicsOptions {
 }
 
 impl Default for IntrinsicsOptions {
-    /// A flat target and 6 median distances: for Gaussian noise of standard deviation σ per axis the median distance is
-    /// 1.18 σ, so the limit is 7 σ and noise is never left out. The views decide on the lens.
+    /// The views decide on lens and target. 6 median distances: for Gaussian noise of standard deviation σ per axis the median distance is
+    /// 1.18 σ, so the limit is 7 σ and noise is never left out.
     fn default() -> Self {
         Self { warp: false, outlier_factor: Some(6.0), model: LensModel::ByEvidence }
     }

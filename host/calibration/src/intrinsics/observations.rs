@@ -4,6 +4,7 @@ use std::cmp::Ordering;
 use vergence_targets::{Corner, TargetView};
 
 use super::{IntrinsicsError, Outlier, OutlierReason};
+use crate::TargetShape;
 
 /// Least number of corners in a view: fewer leave little redundancy over its six unknowns.
 pub(super) const FEWEST_CORNERS: usize = 8;
@@ -56,7 +57,7 @@ pub(super) fn observed_views(views: &[TargetView]) -> Result<(Vec<ObservedView>,
     for (index, view) in views.iter().enumerate() {
         check(index, view)?;
     }
-    let shape = TargetExtent::of(views);
+    let shape = TargetShape::over(views.iter().flat_map(|view| &view.corners));
     let mut kept: Vec<ObservedView> = Vec::new();
     let mut left_out = Vec::new();
     for (index, view) in views.iter().enumerate() {
@@ -72,7 +73,7 @@ pub(super) fn observed_views(views: &[TargetView]) -> Result<(Vec<ObservedView>,
                 residual_px: None,
                 reason,
             })),
-            None => kept.push(ObservedView { index, observations: shape.observations(&view.corners) }),
+            None => kept.push(ObservedView { index, observations: observations(&shape, &view.corners) }),
         }
     }
     if kept.len() < FEWEST_VIEWS {
@@ -135,38 +136,17 @@ fn eigenvalues(a: f64, b: f64, c: f64) -> [f64; 2] {
     [mean - half, mean + half]
 }
 
-/// The rectangle that all corners of all views span on the target.
-struct TargetExtent {
-    centre: [f64; 2],
-    half: [f64; 2],
-}
-
-impl TargetExtent {
-    fn of(views: &[TargetView]) -> Self {
-        let range = |axis: usize| {
-            let coordinates = || views.iter().flat_map(|v| &v.corners).map(|c| c.target_mm[axis]);
-            (coordinates().fold(f64::INFINITY, f64::min), coordinates().fold(f64::NEG_INFINITY, f64::max))
-        };
-        let (x, y) = (range(0), range(1));
-        Self { centre: [0.5 * (x.0 + x.1), 0.5 * (y.0 + y.1)], half: [0.5 * (x.1 - x.0), 0.5 * (y.1 - y.0)] }
-    }
-
-    /// The observations of one view, ordered by position on the target so that the caller's order does not matter.
-    fn observations(&self, corners: &[Corner]) -> Vec<Observation> {
-        let bow = |axis: usize, x: f64| 1.0 - ((x - self.centre[axis]) / self.half[axis]).powi(2);
-        let mut observations: Vec<_> = corners
-            .iter()
-            .enumerate()
-            .map(|(index, corner)| Observation {
-                target: corner.target_mm,
-                bow: [bow(0, corner.target_mm[0]), bow(1, corner.target_mm[1])],
-                pixel: [corner.pixel.u, corner.pixel.v],
-                relative_sigma: corner.relative_sigma,
-                index,
-                used: true,
-            })
-            .collect();
-        observations.sort_by(|a, b| compare(&a.target, &b.target));
-        observations
-    }
+/// The observations of one view of a target, ordered by position on it so that the caller's order does not matter.
+fn observations(shape: &TargetShape, corners: &[Corner]) -> Vec<Observation> {
+    let observation = |(index, corner): (usize, &Corner)| Observation {
+        target: corner.target_mm,
+        bow: shape.bow(corner.target_mm),
+        pixel: [corner.pixel.u, corner.pixel.v],
+        relative_sigma: corner.relative_sigma,
+        index,
+        used: true,
+    };
+    let mut observations: Vec<_> = corners.iter().enumerate().map(observation).collect();
+    observations.sort_by(|a, b| compare(&a.target, &b.target));
+    observations
 }

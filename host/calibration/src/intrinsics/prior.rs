@@ -1,14 +1,17 @@
-//! What is known of a lens before any view: how far the parameters that a lens has besides those of a central and symmetric one are from zero.
+//! What is known of a lens and a target before any view: how far the parameters that a lens has besides those of a central and symmetric one are
+//! from zero, and the bow of the target.
 //!
 //! They are adjusted with this prior, so that what few views do not tell of them stays unknown within what lenses have, and makes the
 //! covariance as large as that ignorance is. Without it a lens that is not of the model's family borrows a pupil of centimetres from views
 //! that hardly determine one.
 
+use std::ops::Range;
+
 use nalgebra::{DMatrix, SymmetricEigen};
 use vergence_vision::median;
 
 use super::adjust::{Adjusted, State};
-use super::lens::{E0, E1};
+use super::lens::{E0, E1, LENS};
 use super::observations::ObservedView;
 
 /// A sum of parameters with weights, the first of them 1, that is zero within a standard deviation.
@@ -18,7 +21,7 @@ pub(super) struct Known {
 }
 
 /// All that is known, each independent of the others.
-pub(super) const KNOWN: [Known; 8] = [
+pub(super) const KNOWN: [Known; 10] = [
     // e0 in millimetres: twice the focal length of common lenses.
     Known { sum: &[(E0, 1.0)], sigma: 3.0 },
     // e1 in millimetres: the traced designs have 0.06 and 0.36 (sigma8_f18, nikkor6_f28).
@@ -29,7 +32,12 @@ pub(super) const KNOWN: [Known; 8] = [
     Known { sum: &[(S2, 1.0), (P2, SQUARE_BY_P)], sigma: SQUARE },
     Known { sum: &[(S1, 1.0), (P1, FOURTH_BY_P), (S0, FOURTH_BY_SQUARE)], sigma: FOURTH },
     Known { sum: &[(S3, 1.0), (P2, FOURTH_BY_P), (S2, FOURTH_BY_SQUARE)], sigma: FOURTH },
+    // The bow of the target in millimetres, as boards of paper have.
+    Known { sum: &[(BOW, 1.0)], sigma: 1.0 },
+    Known { sum: &[(BOW + 1, 1.0)], sigma: 1.0 },
 ];
+/// Which of them are of decentring and thin prism.
+const ASYMMETRY: Range<usize> = 2..8;
 
 // Indices of the parameters, in the order of `LENS_PARAMETERS`.
 const P1: usize = E1 + 1;
@@ -38,6 +46,8 @@ const S0: usize = E1 + 3;
 const S1: usize = E1 + 4;
 const S2: usize = E1 + 5;
 const S3: usize = E1 + 6;
+/// The first of the two parameters of the target.
+pub(super) const BOW: usize = LENS;
 
 // Decentring and thin prism of badly mounted lenses, which go together: `sigma8_f18` traced with every element 10 micrometres off the axis and
 // tilted by 0.05 degrees, and a sensor tilted by 0.4 degrees, has standard deviations of 7e-4 of p, 1.4e-3 of s0 and s2, 7e-4 of s1 and s3, and
@@ -54,7 +64,7 @@ const FOURTH_BY_SQUARE: f64 = -0.589;
 /// deviation that is left, in parts of that before, where the variance of a residual is `variance`. `None` where that is not known.
 pub(super) fn narrowest(adjusted: &Adjusted, variance: f64) -> Option<f64> {
     let covariance = adjusted.normal.shared_covariance()?;
-    let known = KNOWN.get(2..)?;
+    let known = KNOWN.get(ASYMMETRY)?;
     let mut by_free = DMatrix::zeros(known.len(), adjusted.free.len());
     for (row, Known { sum, sigma }) in known.iter().enumerate() {
         for (parameter, weight) in *sum {

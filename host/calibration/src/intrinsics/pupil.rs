@@ -46,8 +46,7 @@ pub enum PupilEvidence {
 /// What the views say of e0. Its growth e1 is left out of both fits: it would make e0 uncertain by as much as it is unknown.
 pub(super) fn evidence(richest: &Richest<'_>) -> PupilEvidence {
     let is_wanted = matches!(richest.options.model, LensModel::MovingPupil | LensModel::Full);
-    let [without, with] =
-        [false, true].map(|e0| richest.trial(Terms { e0, e1: false, asymmetry: richest.terms.asymmetry }));
+    let [without, with] = [false, true].map(|e0| richest.trial(Terms { e0, e1: false, ..richest.terms }));
     let gain = richest.gain(&without, &with);
     // With its prior e0 is always determined.
     let sigma_mm = with.sigma(E0, richest.variance).unwrap_or(f64::INFINITY);

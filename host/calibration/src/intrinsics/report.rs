@@ -8,10 +8,9 @@ use super::adjust::Adjusted;
 use super::ladder::Evidence;
 use super::lens::{LENS, with_valid_cone};
 use super::observations::{Observation, ObservedView};
-use super::{
-    IntrinsicsCalibration, IntrinsicsError, Outlier, OutlierReason, Parameter, TargetWarp, ViewFigures, ViewPose,
-};
+use super::{IntrinsicsCalibration, IntrinsicsError, Outlier, OutlierReason, Parameter, ViewFigures, ViewPose};
 use crate::schur_lm::Clustered;
+use crate::{TargetShape, TargetWarp};
 
 /// Assembles the result; `left_out` are the corners of views that were too poor to use.
 pub(super) fn report(
@@ -53,7 +52,7 @@ pub(super) fn report(
         covariance: lens_part(adjusted, &covariances.shared.covariance),
         noise_covariance: lens_part(adjusted, &covariances.noise),
         view_scatter: covariances.shared.scatter,
-        warp: covariances.warp(adjusted),
+        warp: covariances.warp(adjusted, given),
         rms_px: all.rms(),
         rms_inlier_px: inlier.rms(),
         sigma0_px: covariances.variance.sqrt() * sigmas.sum::<Squares>().rms(),
@@ -147,11 +146,11 @@ impl Covariances {
         }
     }
 
-    fn warp(&self, adjusted: &Adjusted) -> Option<TargetWarp> {
+    fn warp(&self, adjusted: &Adjusted, given: &[TargetView]) -> Option<TargetWarp> {
         let sigma = |i: usize| self.shared.covariance[(i, i)].sqrt();
-        let [along_x_mm, along_y_mm] = adjusted.shared.warp_mm;
+        let shape = TargetShape::over(given.iter().flat_map(|view| &view.corners)).bent(adjusted.shared.warp_mm);
         let first = adjusted.free.iter().position(|&parameter| parameter >= LENS)?;
-        Some(TargetWarp { along_x_mm, along_y_mm, sigma_mm: [sigma(first), sigma(first + 1)] })
+        Some(TargetWarp { shape, sigma_mm: [sigma(first), sigma(first + 1)] })
     }
 }
 

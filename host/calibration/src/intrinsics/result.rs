@@ -8,6 +8,7 @@ use vergence_vision::{Camera, InvalidLens, KannalaBrandt, OpenCvFisheye, Transfo
 
 use super::lens::{LENS, LensParameters};
 use super::{PupilEvidence, StepEvidence};
+use crate::TargetWarp;
 
 /// A calibrated lens.
 #[derive(Clone, Debug, PartialEq)]
@@ -32,7 +33,7 @@ pub struct IntrinsicsCalibration {
     /// How much more the views pull the lens to and fro than independent noise of their corners explains: a ratio of standard
     /// deviations, at least 1.
     pub view_scatter: f64,
-    /// Bow of the target, if [`crate::IntrinsicsOptions::warp`] asked for it.
+    /// Bow of the target, if [`crate::IntrinsicsOptions::warp`] asked for it or the views do not tell that there is none.
     pub warp: Option<TargetWarp>,
     /// Root mean square distance √(mean(dx² + dy²)) between corners and reprojections over all corners of the views
     /// used, in pixels.
@@ -69,18 +70,6 @@ impl IntrinsicsCalibration {
             foreign: None,
         }
     }
-}
-
-/// The target's height over its plane, towards +z of its frame: along_x (1 − x̂²) + along_y (1 − ŷ²) millimetres, with
-/// x̂ and ŷ from −1 to 1 over the corners.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct TargetWarp {
-    /// Height of the middle over the left and right edges, in millimetres.
-    pub along_x_mm: f64,
-    /// Height of the middle over the upper and lower edges, in millimetres.
-    pub along_y_mm: f64,
-    /// Standard deviations of both, in millimetres.
-    pub sigma_mm: [f64; 2],
 }
 
 /// Residuals and pose of one view.

@@ -26,9 +26,9 @@ pub(super) fn scatter(normal: &SchurNormal<POSE>, prior: Prior) -> Option<f64> {
 }
 
 impl Trial {
-    /// The lens with `terms` and no others, from where `adjusted` is.
-    pub fn of(adjusted: &Adjusted, terms: Terms, prior: Prior, warp: bool) -> Self {
-        let (free, start) = (terms.free(warp), adjusted.state().with_only(terms));
+    /// The fit with `terms` and no others, from where `adjusted` is.
+    pub fn of(adjusted: &Adjusted, terms: Terms, prior: Prior) -> Self {
+        let (free, start) = (terms.free(), adjusted.state().with_only(terms));
         let references: Vec<_> = adjusted.views.iter().collect();
         // By the noise of the richer fit, which is nearer to that of the corners.
         let prior = prior.strength(&adjusted.views, &adjusted.state());

@@ -8,6 +8,7 @@ use vergence_vision::{
     Angle, KannalaBrandt, LENS_PARAMETERS, Left, Length, Right, SHARED_PARAMETERS, SharedCovariance, Transform,
 };
 
+use crate::TargetWarp;
 use crate::extrinsics::{
     ExtrinsicsCalibration, Fit, Side, SkippedView, StereoOutlier, StereoView, outliers, refined, rms,
 };
@@ -58,6 +59,8 @@ pub struct StageCalibration {
     pub outliers: Vec<StereoOutlier>,
     /// The views that did not take part.
     pub skipped: Vec<SkippedView>,
+    /// Bow of the target where the views show one.
+    pub warp: Option<TargetWarp>,
     /// The left lens, refined unless it was exact.
     pub left: KannalaBrandt,
     /// The right lens, refined unless it was exact.
@@ -332,6 +335,7 @@ pub(crate) fn calibration(material: Material<'_>) -> Result<StageCalibration, St
         corners_inlier: fit.inliers.iter().flatten().filter(|&&inlier| inlier).count(),
         outliers: outliers(views, usable, &fit),
         skipped: alone.iter().flat_map(|pose| pose.skipped.iter().cloned()).collect(),
+        warp: fit.warp,
         left: refined(&fit.shared.lenses.left, &rig.left_camera, Side::Left).map_err(StageError::Joint)?,
         right: refined(&fit.shared.lenses.right, &rig.right_camera, Side::Right).map_err(StageError::Joint)?,
         axes: rig.axes.clone(),

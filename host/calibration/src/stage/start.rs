@@ -4,6 +4,7 @@ use nalgebra::{Isometry3, Matrix6, SVector};
 use vergence_rig::{AxisPosition, Link, Rig, RigAxis, Screw};
 use vergence_vision::{Frame, Transform};
 
+use crate::TargetShape;
 use crate::extrinsics::{
     ExtrinsicsCalibration, ExtrinsicsOptions, Kinematics, LensKnowledge, Lenses, OwnPoses, PlacedView, Shared, Side,
     StereoView, calibrate_extrinsics, inside, nearer_targets, place,
@@ -183,7 +184,7 @@ pub(crate) fn prepare<S>(
         own_poses: Vec::new(),
         usable: Vec::new(),
         targets: Vec::new(),
-        shared: Shared { state, lenses },
+        shared: Shared { state, lenses, shape: TargetShape::FLAT },
     };
     for (index, pose) in poses.iter().enumerate() {
         let (placed, _) =

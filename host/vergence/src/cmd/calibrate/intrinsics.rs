@@ -43,7 +43,7 @@ pub struct Args {
     /// Size of the images of the CSV file, such as 960x600.
     #[arg(long, requires = "csv")]
     size: Option<ImageSize>,
-    /// Also estimate how the target bows out of its plane.
+    /// Estimate how the target bows out of its plane, whatever the views say. Without this it counts as flat where they tell that it is.
     #[arg(long)]
     warp: bool,
     /// The lens: central, moving-pupil, full (with a pupil of two coefficients, decentring and thin prism), or by-evidence of the views.
