@@ -38,7 +38,8 @@ fn trial(seed: u64, separations: [f64; 2]) -> [f64; 3] {
     let rig = as_built(&mut dice);
     let work = tempfile::tempdir().expect("a temporary folder");
     let [left, right] = [&rig.left_camera, &rig.right_camera].map(projection);
-    let lenses = Lenses { left: &left, right: &right, reach: 1.45, poses: POSES, spread: 0.5, own_views: 20 };
+    let lenses =
+        Lenses { left: &left, right: &right, reach: 1.45, poses: POSES, spread: 0.5, own_views: 20, bow_mm: 0.0 };
     let written = Rig::from_toml(&calibrated(&rig, lenses, work.path(), &mut dice)).expect("a rig");
     assert!(matches!(written.calibration, RigCalibration::Covariance(_)), "the file holds a covariance");
     let unknown = Rig { calibration: RigCalibration::Unknown, ..written.clone() };

@@ -14,9 +14,10 @@ use common::built_bench::{Dice, POSES, as_built, stand};
 use common::corner_files::{Lenses, calibrated_as, noisy};
 use common::rendered::{band, seeds};
 use image::RgbImage;
-use nalgebra::Vector3;
+use nalgebra::{UnitQuaternion, Vector3};
 use vergence_lens::Displacement;
 use vergence_pipeline::{PairPose, cloud_of_pairs};
+use vergence_reproduce::own_frame;
 use vergence_rig::Rig;
 use vergence_scene::{Lens, LensChoice, TrueLens};
 use vergence_vision::{Angle, KannalaBrandt, Kernel, Left, Length, Pixel, PixelPair, Point};
@@ -35,10 +36,17 @@ struct Figures {
 }
 
 /// A file's figures at 30 points about 350 mm away, with the axes set anywhere within `separations`.
-fn figures(rig: &Rig, file: &Rig, lenses: [&dyn Lens; 2], separations: [f64; 2], dice: &mut Dice) -> Figures {
+fn figures(
+    [rig, file]: [&Rig; 2],
+    (lenses, is_displaced): ([&dyn Lens; 2], bool),
+    separations: [f64; 2],
+    dice: &mut Dice,
+) -> Figures {
     const POINTS: usize = 30;
     let mut sums = Figures::default();
     let mut points = 0;
+    // A lens without an axis has the frame that its calibration gives it.
+    let turn = if is_displaced { own_frame(&file.left_camera, lenses[0]) } else { UnitQuaternion::identity() };
     while points < POINTS {
         let share = 0.5 + 0.5 * dice.uniform();
         let wished =
@@ -54,7 +62,7 @@ fn figures(rig: &Rig, file: &Rig, lenses: [&dyn Lens; 2], separations: [f64; 2],
         let pose = PairPose::standing(file.pose_read_at(&read));
         let cloud = cloud_of_pairs(&[(seen, MATCH_PX)], &RgbImage::new(1, 1), file, &pose, Kernel::default());
         let Some(found) = cloud.expect("no axis moves").points.first().map(|found| found.point) else { continue };
-        let error = found.point.mm() - truth.mm();
+        let error = found.point.mm() - turn * truth.mm();
         sums.nees += error.dot(&found.covariance.cholesky().expect("a covariance").solve(&error));
         sums.error_mm += (found.point.mm().norm() - 350.0).abs();
         sums.stated_mm += found.sigma_range.mm() * (2.0 / std::f64::consts::PI).sqrt();
@@ -71,6 +79,8 @@ struct Optics {
     mounted: Option<Mounting>,
     /// Number of views of each lens alone.
     views: usize,
+    /// How far the middle of the target stands out, in millimetres.
+    bow_mm: f64,
 }
 
 /// In micrometres and degrees.
@@ -116,13 +126,15 @@ fn trial<const N: usize>(seed: u64, optics: Optics, models: [&str; N]) -> [[Figu
         poses: POSES,
         spread: 0.5,
         own_views: optics.views,
+        bow_mm: optics.bow_mm,
     };
     models.map(|model| {
         let mut dice = Dice::new(seed + 1000);
         let work = tempfile::tempdir().expect("a temporary folder");
         let text = calibrated_as(&rig, lenses, work.path(), &["--lens-model", model], &mut dice);
         let written = Rig::from_toml(&text).expect("a rig");
-        MODES.map(|(_, separations)| figures(&rig, &written, [&left, &right], separations, &mut Dice::new(seed + 2000)))
+        let lenses: ([&dyn Lens; 2], bool) = ([&left, &right], optics.mounted.is_some());
+        MODES.map(|(_, separations)| figures([&rig, &written], lenses, separations, &mut Dice::new(seed + 2000)))
     })
 }
 
@@ -170,7 +182,8 @@ fn is_honest(lens: &str, found: &[Figures; 3], [low, high]: [f64; 2]) {
 
 fn check(design: &'static str) {
     let seeds = seeds(3);
-    let found = measured(Optics { design, mounted: None, views: views(20) }, ["by-evidence", "central"], seeds);
+    let found =
+        measured(Optics { design, mounted: None, views: views(20), bow_mm: 0.0 }, ["by-evidence", "central"], seeds);
     let [low, high] = band(seeds, 3.0, 1.96);
     is_honest(design, &found[0], [low, high]);
     for ((mode, _), central) in MODES.iter().zip(&found[1]) {
@@ -189,28 +202,38 @@ fn clouds_through_a_nikkor_lens_are_as_far_off_as_the_rig_file_states() {
     check("nikkor6_f28");
 }
 
+/// A board whose middle stands out by half a millimetre, of which no option tells the calibrations.
+#[test]
+fn clouds_after_a_bowed_target_are_as_far_off_as_the_rig_file_states() {
+    let seeds = seeds(2);
+    let optics = Optics { design: "sigma8_f18", mounted: None, views: views(20), bow_mm: 0.5 };
+    let found = measured(optics, ["by-evidence"], seeds);
+    is_honest("after a bowed target", &found[0], band(seeds, 3.0, 1.96));
+}
+
 /// Of the calibration's own family: nothing that a lens may have besides makes its file dishonest.
 #[test]
 fn clouds_through_ideal_lenses_are_as_far_off_as_the_rig_file_states() {
     let seeds = seeds(3);
-    let found = measured(Optics { design: "ideal", mounted: None, views: views(20) }, ["by-evidence"], seeds);
+    let found =
+        measured(Optics { design: "ideal", mounted: None, views: views(20), bow_mm: 0.0 }, ["by-evidence"], seeds);
     is_honest("ideal", &found[0], band(seeds, 3.0, 1.96));
 }
 
 /// Elements 10 micrometres off the axis and tilted, a sensor that is not square to it. Without decentring and thin prism the errors are larger,
-/// and far larger than the file states; with them a few hundredths of a pixel are left that no lens here has, so that the bounds are 1.8 and 4.5
-/// where many seeds would ask for less. 20 views give 6 (docs/measured/lenses.md).
+/// and far larger than the file states (docs/measured/lenses.md).
 #[test]
 fn clouds_through_displaced_lenses_are_as_far_off_as_the_rig_file_states() {
     let seeds = seeds(3);
     let mounted = Some(Mounting { decentre_um: 10.0, tilt_deg: 0.05, sensor_tilt_deg: 0.4 });
-    let optics = Optics { design: "sigma8_f18", mounted, views: views(60) };
+    let optics = Optics { design: "sigma8_f18", mounted, views: views(20), bow_mm: 0.0 };
     let found = measured(optics, ["by-evidence", "moving-pupil", "central"], seeds);
     let [low, high] = band(seeds, 3.0, 1.96);
-    is_honest("displaced", &found[0], [low.min(1.8), high.max(4.5)]);
+    // The turn of the frame, of which the covariance knows, is taken out of the errors.
+    is_honest("displaced", &found[0], [0.3 * low, high]);
     let sum = |model: usize| found[model].iter().map(|found| found.error_mm).sum::<f64>();
     assert!(sum(1) > 1.2 * sum(0), "a symmetric lens is as good: {} and {} mm", sum(1) / 3.0, sum(0) / 3.0);
     for ((mode, _), symmetric) in MODES.iter().zip(&found[1]) {
-        assert!(symmetric.nees > 2.0 * high.max(4.5), "{mode}: a symmetric lens is as honest: {}", symmetric.nees);
+        assert!(symmetric.nees > 1.5 * high, "{mode}: a symmetric lens is as honest: {}", symmetric.nees);
     }
 }

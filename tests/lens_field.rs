@@ -46,7 +46,8 @@ impl Measured {
         let rig = as_built(&mut dice);
         let work = tempfile::tempdir().expect("a temporary folder");
         let [left, right] = [&rig.left_camera, &rig.right_camera].map(|of| move |at: &Vector3<f64>| lens(of, at));
-        let lenses = Lenses { left: &left, right: &right, reach: REACH, poses: POSES, spread: 0.3, own_views: 20 };
+        let lenses =
+            Lenses { left: &left, right: &right, reach: REACH, poses: POSES, spread: 0.3, own_views: 20, bow_mm: 0.0 };
         let text = calibrated(&rig, lenses, work.path(), &mut dice);
         Self { written: Rig::from_toml(&text).expect("a rig"), rig, dice }
     }

@@ -28,6 +28,8 @@ pub struct Lenses<'a> {
     pub spread: f64,
     /// Number of targets held before each camera alone.
     pub own_views: usize,
+    /// How far the middle of the target stands out over its left and right edges, in millimetres.
+    pub bow_mm: f64,
 }
 
 /// The projection of a lens of the model's family onto its sensor.
@@ -54,10 +56,13 @@ pub fn noisy(pixel: Pixel, sigma: f64, dice: &mut Dice) -> Pixel {
 }
 
 /// A target of 9 x 6 corners at `mm` in the direction `towards`, which it faces within some 30 degrees.
-fn target(towards: &Vector3<f64>, mm: f64, dice: &mut Dice) -> Vec<Vector3<f64>> {
+fn target(towards: &Vector3<f64>, mm: f64, bow_mm: f64, dice: &mut Dice) -> Vec<Vector3<f64>> {
     let tilt = UnitQuaternion::from_euler_angles(0.5 * dice.uniform(), 0.5 * dice.uniform(), 3.0 * dice.uniform());
     let facing = UnitQuaternion::rotation_between(&Vector3::z(), towards).unwrap_or_default() * tilt;
-    let corner = |i: u32| Vector3::new(20.0 * f64::from(i % 9) - 80.0, 20.0 * f64::from(i / 9) - 50.0, 0.0);
+    let corner = |i: u32| {
+        let (x, y) = (20.0 * f64::from(i % 9) - 80.0, 20.0 * f64::from(i / 9) - 50.0);
+        Vector3::new(x, y, bow_mm * (1.0 - (x / 80.0).powi(2)))
+    };
     (0..54).map(|i| towards * mm + facing * corner(i)).collect()
 }
 
@@ -75,12 +80,12 @@ fn rows(text: &mut String, (camera, frame): (&str, usize), pixels: &[Pixel], rea
 }
 
 /// Corners of `views` targets all over the field of one lens, or that part of it.
-fn own_corners(lens: Projection<'_>, reach: f64, views: usize, dice: &mut Dice) -> String {
+fn own_corners(lens: Projection<'_>, Lenses { reach, own_views, bow_mm, .. }: Lenses<'_>, dice: &mut Dice) -> String {
     let mut text = String::from("camera,file,frame,idx,x,y,bx_mm,by_mm\n");
     let mut frame = 0;
-    while frame < views {
+    while frame < own_views {
         let towards = direction(reach * (0.5 + 0.5 * dice.uniform()).sqrt(), 3.2 * dice.uniform());
-        let target = target(&towards, 260.0 + 80.0 * dice.uniform(), dice);
+        let target = target(&towards, 260.0 + 80.0 * dice.uniform(), bow_mm, dice);
         let Some(pixels) = seen(lens, &Isometry3::identity(), &target, dice) else { continue };
         rows(&mut text, ("own", frame), &pixels, "");
         frame += 1;
@@ -99,7 +104,7 @@ fn shared_corners(rig: &Rig, lenses: Lenses<'_>, dice: &mut Dice) -> String {
         let mut taken = 0;
         while taken < 4 {
             let towards = (middle + lenses.spread * dice.vector()).normalize();
-            let target = target(&towards, 330.0 + 100.0 * dice.uniform(), dice);
+            let target = target(&towards, 330.0 + 100.0 * dice.uniform(), lenses.bow_mm, dice);
             let left = seen(lenses.left, &Isometry3::identity(), &target, dice);
             let right = seen(lenses.right, left_from_right.inverse().isometry(), &target, dice);
             let (Some(left), Some(right)) = (left, right) else { continue };
@@ -124,7 +129,7 @@ pub fn calibrated_as(rig: &Rig, lenses: Lenses<'_>, work: &Path, options: &[&str
     let size = format!("{}x{}", size.width, size.height);
     for (name, lens) in [("left", lenses.left), ("right", lenses.right)] {
         let (corners, out) = (file(&format!("{name}.csv")), file(&format!("{name}.toml")));
-        std::fs::write(&corners, own_corners(lens, lenses.reach, lenses.own_views, dice)).expect("written");
+        std::fs::write(&corners, own_corners(lens, lenses, dice)).expect("written");
         let command = ["calibrate", "intrinsics", "--json", "--csv", &corners, "--size", &size, "--out", &out];
         run_json(&[&command[..], options].concat());
     }

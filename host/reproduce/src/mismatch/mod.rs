@@ -39,7 +39,7 @@ pub enum Mismatch {
     Decentre,
     /// And a sensor that is not square to the axis.
     SensorTilt,
-    /// And a bent target, which counts as flat.
+    /// And a bent target, of which the calibration is not told.
     BowedTarget,
     /// And a screw that drives its carriage unevenly, with the encoder on the motor.
     ScrewPitch,

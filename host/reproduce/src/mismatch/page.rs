@@ -86,7 +86,8 @@ fn of_mode(findings: &MismatchTable, mode: usize) -> String {
     table(&heads, &rows)
         + &note(
             "Mean absolute error of the depth in millimetres, what the rig files state it to be, which is the bound if nothing but noise is \
-             in it, and the mean square of a point's error in units of its covariance.",
+             in it, and the mean square of a point's error in units of its covariance. Lenses with displaced elements or a tilted sensor have no axis: \
+             their points are compared in the frame that the calibration gives the left lens.",
         )
 }
 

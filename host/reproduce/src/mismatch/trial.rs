@@ -3,7 +3,7 @@
 use std::f64::consts::PI;
 
 use image::RgbImage;
-use nalgebra::Vector3;
+use nalgebra::{UnitQuaternion, Vector3};
 use vergence_calibration::LensModel;
 use vergence_lens::BuiltIn;
 use vergence_output::{PoseSource, drift_warning};
@@ -98,8 +98,9 @@ impl Trial {
             let cloud = world.measured(&standing, &shown, &calibrated.rig)?;
             trial.seen[mode] = shown.len();
             trial.warned[mode] = drift_warning(&cloud, PoseSource::Encoders).is_some();
+            let turn = world.turn_of(&calibrated.rig.left_camera);
             let forward = Axes::of(&world.pose(&standing, 0.0).left_from_right).forward;
-            trial.sightings.extend(sightings(mode, &shown, &cloud, &forward));
+            trial.sightings.extend(sightings(mode, &shown, &cloud, &(turn, turn * forward)));
         }
         Ok(trial)
     }
@@ -170,16 +171,16 @@ impl World {
     }
 }
 
-/// The points of a cloud beside the truth.
+/// The points of a cloud beside the truth, in the calibrated frame of the left lens, which is turned against the true one.
 fn sightings<'a>(
     mode: usize,
     shown: &'a [Shown],
     cloud: &'a PairCloud,
-    forward: &'a Vector3<f64>,
+    (turn, forward): &'a (UnitQuaternion<f64>, Vector3<f64>),
 ) -> impl Iterator<Item = Sighting> + 'a {
     cloud.points.iter().filter_map(move |found| {
         let (found, shown) = (&found.point, shown.get(found.point.pair_index)?);
-        let error = found.point.mm() - shown.truth.mm();
+        let error = found.point.mm() - turn * shown.truth.mm();
         Some(Sighting {
             mode,
             range: shown.range,
