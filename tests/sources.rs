@@ -139,6 +139,28 @@ fn crates_and_files_stay_small() {
     assert!(found.is_empty(), "{found:#?}");
 }
 
+/// A library is compiled once more for the tests in its own files: without any that is time for nothing, and with some they must run.
+#[test]
+fn libraries_are_built_for_tests_where_they_have_some() {
+    // The board's programs have a workspace of their own, the fuzzers no tests.
+    let elsewhere = [
+        "firmware/nucleo-g474",
+        "firmware/nucleo-common",
+        "firmware/bootloader",
+        "hil-sim/cpu/differential",
+        "tests/fuzz",
+    ];
+    let crates = crates(&root()).into_iter().filter(|folder| !elsewhere.iter().any(|other| folder.ends_with(other)));
+    for folder in crates.filter(|folder| folder.join("src/lib.rs").is_file()) {
+        let text = std::fs::read_to_string(folder.join("Cargo.toml")).expect("a manifest");
+        let manifest: toml::Table = text.parse().expect("TOML");
+        let is_built =
+            manifest.get("lib").and_then(|lib| lib.get("test")).and_then(toml::Value::as_bool) != Some(false);
+        let has_tests = sources(&folder.join("src")).iter().any(|(_, text)| text.contains("#[cfg(test)]"));
+        assert_eq!(is_built, has_tests, "{}: whether its library is built for tests", folder.display());
+    }
+}
+
 /// A verb is a module of `cmd` with a function `run` of its own.
 #[test]
 fn verbs_use_no_other_verbs_files() {
