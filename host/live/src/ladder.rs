@@ -9,7 +9,7 @@ use vergence_pipeline::{Observation, PointLimit, SkipReason};
 use vergence_rig::Rig;
 
 use crate::live_loop::LiveResult;
-use crate::pace::{Limit, Pace};
+use crate::pace::Limit;
 use crate::posed::LONGEST_UNSEEN;
 
 /// The rate is judged from so many results on.
@@ -49,15 +49,15 @@ impl Rung {
         }
     }
 
-    /// What a result was made without; `pace` says what limits the results.
+    /// What a result was made without.
     #[must_use]
-    pub fn of(result: &LiveResult<'_>, pace: Option<(f64, Limit)>) -> Vec<Self> {
+    pub fn of(result: &LiveResult<'_>) -> Vec<Self> {
         let (measurement, is_unseen) = (result.measurement, result.measurement.unseen.is_some());
         let (alone, by_images) = match &measurement.observation {
             Observation::Bearings { .. } => (true, false),
             Observation::Points { by_images, .. } => (false, !by_images.is_empty()),
         };
-        let is_slow = pace.is_some_and(|(_, limit)| limit == Limit::Matching);
+        let is_slow = result.pace.is_some_and(|(_, limit)| limit == Limit::Matching);
         let rungs = [
             (result.limited.is_some(), Self::FewerPoints),
             (is_slow, Self::LowerRate),
@@ -116,7 +116,6 @@ impl fmt::Display for Notice {
 /// What was lost so far, of all but the cameras.
 #[derive(Debug, Default)]
 pub(crate) struct Ladder {
-    pace: Pace,
     results: u64,
     has_few: bool,
     is_slow: bool,
@@ -131,7 +130,7 @@ impl Ladder {
     pub fn note_result(&mut self, result: &LiveResult<'_>, mut tell: impl FnMut(Notice)) {
         self.results += 1;
         self.note_limit(result.limited).into_iter().for_each(&mut tell);
-        if let Some((rate, limit)) = self.pace.note(result).filter(|_| self.results >= RATED) {
+        if let Some((rate, limit)) = result.pace.filter(|_| self.results >= RATED) {
             let skipped = result.totals.skipped.get(&SkipReason::NewerCame).copied().unwrap_or_default();
             self.note_pace(rate, limit, skipped).into_iter().for_each(tell);
         }

@@ -20,6 +20,7 @@ use vergence_vision::Side;
 use crate::blindness::Blindness;
 use crate::ladder::{Ladder, Notice};
 use crate::measure::{Measurement, PosedExposure, measure};
+use crate::pace::{Limit, Pace};
 use crate::posed::{Posed, READINGS, pose};
 use crate::totals::Totals;
 use crate::{Clock, LiveError};
@@ -58,6 +59,8 @@ pub struct LiveResult<'a> {
     pub totals: &'a Totals,
     /// How many points were looked for because there was no time for more.
     pub limited: Option<PointLimit>,
+    /// Results per second, and what limits them; `None` with the first one.
+    pub pace: Option<(f64, Limit)>,
 }
 
 impl LiveResult<'_> {
@@ -155,7 +158,7 @@ impl LiveLoop {
         let (mut work, mut newest): (Option<Work>, Option<Exposed<PendingImage>>) = (None, None);
         let (mut blindness, mut ladder, mut over) = (Blindness::default(), Ladder::default(), None::<Instant>);
         let mut had_ended = false;
-        let mut last_us = None;
+        let (mut last_us, mut pace) = (None, Pace::default());
         loop {
             if work.is_none() {
                 work = newest.take().map(|exposed| self.start(exposed));
@@ -178,7 +181,8 @@ impl LiveLoop {
                     work = None;
                     if let Some(measurement) = self.conclude(done, totals)? {
                         let (latency, limited) = (self.since(begun.exposed_us), begun.limited);
-                        let result = LiveResult { measurement: &measurement, latency, totals, limited };
+                        let pace = pace.note(measurement.middle.us, totals);
+                        let result = LiveResult { measurement: &measurement, latency, totals, limited, pace };
                         ladder.note_result(&result, &mut warn);
                         publish(result)?;
                         self.note_cost(&begun, &measurement);

@@ -4,7 +4,7 @@ use std::collections::VecDeque;
 
 use vergence_pipeline::SkipReason;
 
-use crate::live_loop::LiveResult;
+use crate::totals::Totals;
 
 /// Exposures over whose time the rate is taken.
 const KEPT: usize = 16;
@@ -34,21 +34,13 @@ impl Limit {
 pub struct Pace {
     /// When each was exposed, in microseconds, and how many exposures had been skipped for newer ones.
     latest: VecDeque<(f64, u64)>,
-    told: Option<(f64, Limit)>,
 }
 
 impl Pace {
-    /// Takes one more result. Results per second, and what limits them; `None` with the first one.
-    pub fn note(&mut self, result: &LiveResult<'_>) -> Option<(f64, Limit)> {
-        let skipped = result.totals.skipped.get(&SkipReason::NewerCame).copied().unwrap_or_default();
-        self.told = self.take(result.measurement.middle.us, skipped);
-        self.told
-    }
-
-    /// What the last result gave.
-    #[must_use]
-    pub const fn latest(&self) -> Option<(f64, Limit)> {
-        self.told
+    /// Takes one more result, exposed at `exposed_us` microseconds, with the counts so far. Results per second, and what limits them; `None` with the first one.
+    pub fn note(&mut self, exposed_us: f64, totals: &Totals) -> Option<(f64, Limit)> {
+        let skipped = totals.skipped.get(&SkipReason::NewerCame).copied().unwrap_or_default();
+        self.take(exposed_us, skipped)
     }
 
     fn take(&mut self, exposed_us: f64, skipped: u64) -> Option<(f64, Limit)> {

@@ -33,6 +33,12 @@ pub enum CloudError {
     Encoder(String),
 }
 
+impl CloudError {
+    fn encoder(error: impl std::fmt::Display) -> Self {
+        Self::Encoder(error.to_string())
+    }
+}
+
 /// The format of a cloud's file.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum CloudFormat {
@@ -104,12 +110,8 @@ impl CloudFormat {
         match (self, encoding) {
             (Self::Ply, _) => Ok(ply(points, encoding)),
             (Self::Pcd, _) => Ok(pcd(points, encoding)),
-            (Self::Las, CloudEncoding::Binary) => {
-                sparse_las(points).map_err(|error| CloudError::Encoder(error.to_string()))
-            }
-            (Self::E57, CloudEncoding::Binary) => {
-                sparse_e57(points).map_err(|error| CloudError::Encoder(error.to_string()))
-            }
+            (Self::Las, CloudEncoding::Binary) => sparse_las(points).map_err(CloudError::encoder),
+            (Self::E57, CloudEncoding::Binary) => sparse_e57(points).map_err(CloudError::encoder),
             (Self::Las | Self::E57, CloudEncoding::Ascii) => Err(CloudError::NoText(self.ending())),
         }
     }
@@ -122,12 +124,8 @@ impl CloudFormat {
         match (self, encoding) {
             (Self::Ply, _) => Ok(dense_ply(rows, encoding)),
             (Self::Pcd, _) => Ok(dense_pcd(rows, encoding)),
-            (Self::Las, CloudEncoding::Binary) => {
-                dense_las(rows).map_err(|error| CloudError::Encoder(error.to_string()))
-            }
-            (Self::E57, CloudEncoding::Binary) => {
-                dense_e57(rows).map_err(|error| CloudError::Encoder(error.to_string()))
-            }
+            (Self::Las, CloudEncoding::Binary) => dense_las(rows).map_err(CloudError::encoder),
+            (Self::E57, CloudEncoding::Binary) => dense_e57(rows).map_err(CloudError::encoder),
             (Self::Las | Self::E57, CloudEncoding::Ascii) => Err(CloudError::NoText(self.ending())),
         }
     }

@@ -194,5 +194,6 @@ pub fn show_cloud(panel: &Panel, rig: &Rig, number: u64) {
         latency: Duration::from_millis(5),
         totals: &totals,
         limited: None,
+        pace: None,
     });
 }

@@ -5,7 +5,7 @@ use std::sync::Arc;
 
 use serde_json::{Value, json};
 use vergence_board::HostClock;
-use vergence_live::{Ended, Limit, LiveResult, Notice, Pace, Rung, Totals};
+use vergence_live::{Ended, LiveResult, Notice, Rung, Totals};
 use vergence_output::{
     LatestFiles, PoseSource, axes_by_images_json, axes_by_images_words, drift_warning, live_bearings_json,
     live_cloud_json, live_cloud_words, point_limit_json, point_limit_words, pose_told_words,
@@ -37,8 +37,6 @@ pub struct Publisher {
     pub recorder: Option<Recorder>,
     /// Where they are published for other machines.
     pub publication: Option<Publication>,
-    /// How often they come.
-    pub pace: Pace,
 }
 
 impl Publisher {
@@ -48,7 +46,6 @@ impl Publisher {
     /// Where a file or standard output cannot be written.
     pub fn publish(&mut self, result: &LiveResult<'_>) -> Result<(), Failure> {
         self.number += 1;
-        let pace = self.pace.note(result);
         match &result.measurement.observation {
             Observation::Points { cloud, pose, moving, by_images } => {
                 self.files.write_cloud(self.number, &cloud.points)?;
@@ -61,9 +58,7 @@ impl Publisher {
                 let unseen_words = unseen.map(|time| format!("; no link, last readings {time:.1} s before"));
                 let points = live_cloud_words(&self.rig, cloud, pose, *moving);
                 self.console.say(
-                    self.points_line(result, &points, pace)
-                        + &told.unwrap_or_default()
-                        + &unseen_words.unwrap_or_default(),
+                    self.points_line(result, &points) + &told.unwrap_or_default() + &unseen_words.unwrap_or_default(),
                 )?;
                 // Where no encoder tells an axis, nothing is left for the images to disagree with.
                 let warning = drift_warning(cloud, self.pose_source()).filter(|_| by_images.is_empty());
@@ -74,9 +69,9 @@ impl Publisher {
                 self.print_json(|| {
                     let told = live_cloud_json(&self.rig, cloud, pose, *moving);
                     let mut line = self.result_json("cloud", result, told);
-                    line["rate_hz"] = json!(pace.map(|(rate, _)| rounded(rate)));
+                    line["rate_hz"] = json!(result.pace.map(|(rate, _)| rounded(rate)));
                     line["points_limit"] = point_limit_json(result.limited);
-                    line["limited_by"] = json!(pace.map(|(_, limit)| limit.as_str()));
+                    line["limited_by"] = json!(result.pace.map(|(_, limit)| limit.as_str()));
                     line["axes_by_images"] = axes_by_images_json(&self.rig, by_images);
                     line["link_lost_s"] = json!(unseen.map(rounded));
                     line["warning"] = json!(warning);
@@ -102,9 +97,9 @@ impl Publisher {
         if self.console.is_json() { self.console.result(&json()) } else { Ok(()) }
     }
 
-    fn points_line(&self, result: &LiveResult<'_>, points: &str, pace: Option<(f64, Limit)>) -> String {
-        let pace =
-            pace.map(|(rate, limit)| format!("{rate:.1} Hz, limited by {}, ", limit.as_str())).unwrap_or_default();
+    fn points_line(&self, result: &LiveResult<'_>, points: &str) -> String {
+        let pace = result.pace.map(|(rate, limit)| format!("{rate:.1} Hz, limited by {}, ", limit.as_str()));
+        let pace = pace.unwrap_or_default();
         let few = result.limited.map(point_limit_words).unwrap_or_default();
         format!("{:5}  {points}; {pace}{few}{}", self.number, timing(result))
     }
@@ -119,7 +114,7 @@ impl Publisher {
     }
 
     fn head_json(&self, kind: &str, result: &LiveResult<'_>) -> Value {
-        let without: Vec<_> = Rung::of(result, self.pace.latest()).into_iter().map(Rung::as_str).collect();
+        let without: Vec<_> = Rung::of(result).into_iter().map(Rung::as_str).collect();
         json!({
             "kind": kind,
             "simulated_lens": self.lens.map(|lens| lens.to_string()),

@@ -74,7 +74,6 @@ pub async fn run(args: &Args, console: Console) -> Result<(), Failure> {
         clock: HostClock::start(),
         recorder: None,
         publication: None,
-        pace: Pace::default(),
     };
     let recorded_ms = reader.begun_ns().map(|ns| ns / 1_000_000);
     let simulated = reader.simulated().map(str::to_owned);
@@ -82,7 +81,7 @@ pub async fn run(args: &Args, console: Console) -> Result<(), Failure> {
     let (panel, _serving) = args.panel.serve(setting, console)?.unzip();
     let rate = args.rate.or(panel.as_ref().map(|_| 1.0));
     let mut screen = panel.clone().map(|panel| Screen::new(panel, reader.length(), rate));
-    let (mut totals, mut from) = (Totals::default(), args.from);
+    let (mut totals, mut pace, mut from) = (Totals::default(), Pace::default(), args.from);
     let mut interrupted = pin!(interrupted());
     loop {
         let before = publisher.number;
@@ -91,7 +90,7 @@ pub async fn run(args: &Args, console: Console) -> Result<(), Failure> {
         let method = Method { search: &search, ..Method::from(matcher.as_ref()) };
         let mut replay = Replay::new(&measuring, method, clock, screen.as_mut());
         let mut publish = |measurement: Measurement| {
-            publish(&mut publisher, &mut totals, (&measurement, panel.as_ref()), args.frames)
+            publish(&mut publisher, (&mut totals, &mut pace), (&measurement, panel.as_ref()), args.frames)
         };
         let played = tokio::select! {
             played = play(&mut reader, next, &mut replay, Pacing { from, rate }, &mut publish) => played,
@@ -160,13 +159,14 @@ impl From<LiveError> for End {
 /// Publishes a result; the time that measuring took stands for its latency.
 fn publish(
     publisher: &mut Publisher,
-    totals: &mut Totals,
+    (totals, pace): (&mut Totals, &mut Pace),
     (measurement, panel): (&Measurement, Option<&Panel>),
     most: Option<u64>,
 ) -> Result<(), End> {
     totals.count(&measurement.observation);
     let latency = Duration::from_secs_f64(measurement.seconds);
-    let result = LiveResult { measurement, latency, totals, limited: None };
+    let result =
+        LiveResult { measurement, latency, totals, limited: None, pace: pace.note(measurement.middle.us, totals) };
     publisher.publish(&result).map_err(End::Failed)?;
     panel.into_iter().for_each(|panel| panel.show(&result));
     if most.is_some_and(|most| publisher.number >= most) { Err(End::Enough) } else { Ok(()) }

@@ -7,7 +7,7 @@ use std::path::PathBuf;
 use std::time::Duration;
 
 use vergence_board::Board;
-use vergence_live::{Ended, Limits, LiveLoop, MatchingTime, Notice, Pace, Totals, Tour};
+use vergence_live::{Ended, Limits, LiveLoop, MatchingTime, Notice, Totals, Tour};
 use vergence_peers::Published;
 use vergence_protocol::{Request, Trigger};
 
@@ -95,7 +95,6 @@ pub async fn run(args: &Args, common: &CommonOptions, console: Console) -> Resul
         lens: is_simulated.then_some(args.live.taking.lens),
         files,
         number: 0,
-        pace: Pace::default(),
         clock: live.clock,
         recorder: recording.as_ref().map(|recording| recording.recorder.clone()),
         publication,
