@@ -190,7 +190,7 @@ async fn the_images_stand_in_for_an_encoder_that_dies_on_the_way() {
                     of_axis.push((off / sigma).powi(2));
                 }
                 if pairs == last {
-                    simulated.lock().board().plant_mut().axis_mut(SEPARATION).expect("a stage").mend_encoder();
+                    simulated.lock().with_plant(|plant| plant.axis_mut(SEPARATION).expect("a stage").mend_encoder());
                     order.notify_one();
                 }
                 false

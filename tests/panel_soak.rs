@@ -4,6 +4,8 @@
 //! A minute; `VERGENCE_SOAK_MINUTES=30` for the long run, which needs 5 GB for its recording. Board, stages and cameras are simulated
 //! in the process that is measured, so that its computing time holds the rendering of the images, which a real rig does not do.
 //!
+//! `VERGENCE_SOAK_BOARD=firmware` runs the unmodified firmware on a simulated chip in place of the controller core alone.
+//!
 //! `VERGENCE_SOAK_SIZE=1280x1280` takes images of this size at 10 Hz and records nothing: what pages cost beside a busy matcher.
 #![cfg(target_os = "linux")]
 #![allow(
@@ -16,6 +18,8 @@
 
 #[path = "common/association.rs"]
 mod association;
+#[path = "elf_rig/build.rs"]
+mod build;
 mod common;
 
 use std::collections::BTreeMap;
@@ -156,6 +160,15 @@ fn size() -> Option<String> {
     std::env::var("VERGENCE_SOAK_SIZE").ok()
 }
 
+/// The simulated board: without a chip, or with the firmware on one.
+fn port() -> String {
+    match std::env::var("VERGENCE_SOAK_BOARD").as_deref() {
+        Err(_) => "sim".into(),
+        Ok("firmware") => format!("sim:{}", build::build("vergence-nucleo-g474").display()),
+        Ok(other) => panic!("VERGENCE_SOAK_BOARD={other}: it may be firmware"),
+    }
+}
+
 /// A page that says it is there and never reads. The panel gives it up after a while; then it comes again.
 fn neglect(address: &str, seen: &Seen) {
     while seen.goes_on() {
@@ -246,7 +259,8 @@ fn memory_stays_flat_nothing_is_lost_matches_are_right_and_pages_cost_little() {
     let name = recording.to_str().expect("a name");
     let large = size();
     let (size, rate) = large.as_deref().map_or(("320x320", "2"), |size| (size, "10"));
-    let rig = ["panel", "--port", "sim", "--cameras", "sim", "--home", "--size", size, "--rate", rate];
+    let port = port();
+    let rig = ["panel", "--port", &port, "--cameras", "sim", "--home", "--size", size, "--rate", rate];
     let recorded_to: &[&str] = if large.is_none() { &["--record", name] } else { &[] };
     let mut served = Served::start(&[&rig[..], &["--listen", "127.0.0.1:0"], recorded_to].concat());
     let (process, seen) = (served.id(), Arc::new(Seen::default()));

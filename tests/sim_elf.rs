@@ -1,4 +1,4 @@
-//! `vergence sim --elf`: the firmware answers the other verbs like any board.
+//! `vergence sim --elf`, and `--port sim:FIRMWARE`: the firmware answers the other verbs like any board.
 #![allow(
     clippy::expect_used,
     clippy::panic,
@@ -6,13 +6,18 @@
     reason = "a test fails loudly and shows its figures"
 )]
 
+#[path = "common/association.rs"]
+mod association;
 #[path = "elf_rig/build.rs"]
 mod build;
 mod common;
 
+use association::Judge;
 use common::images::Workshop;
-use common::{Simulator, fails_with, run_json};
+use common::{Simulator, fails_with, run, run_json, small_bench_toml, text};
+use serde_json::Value;
 use vergence_mcu::{Firmware, LogDecoder};
+use vergence_rig::Rig;
 
 #[test]
 fn the_firmware_answers_at_a_pseudo_terminal() {
@@ -22,6 +27,40 @@ fn the_firmware_answers_at_a_pseudo_terminal() {
     println!("{status}");
     assert_eq!(status["board"], "nucleo-g474");
     assert_eq!(status["state"], "idle");
+}
+
+/// The eyes on stages that the firmware moves: each pulse of its pin is a pair of images, each pose comes from its encoder counters.
+#[test]
+fn clouds_are_right_while_the_firmware_moves_the_eyes() {
+    let elf = build::build("vergence-nucleo-g474");
+    let folder = tempfile::tempdir().expect("a folder");
+    let rig = folder.path().join("rig.toml");
+    std::fs::write(&rig, small_bench_toml()).expect("written");
+    let [port, rig, out] =
+        [format!("sim:{}", elf.display()), rig.display().to_string(), folder.path().join("out").display().to_string()];
+    let tour =
+        ["--home", "--mode", "herbivore", "--mode", "human", "--stay", "300ms", "--rate", "10", "--frames", "30"];
+    let files = ["--match-time", "100ms", "--out", &out, "--also", "json", "--json"];
+    let said = run(&[&["--port", &port, "--rig", &rig, "run", "--cameras", "sim"][..], &tour, &files].concat());
+    assert!(said.status.success(), "{}", text(&said.stderr));
+    let lines = text(&said.stdout);
+    let lines = lines.lines().map(|line| serde_json::from_str::<Value>(line).expect("JSON Lines"));
+    let clouds: Vec<Value> = lines.filter(|line| line["kind"] == "cloud").collect();
+    assert_eq!(clouds.len(), 30);
+
+    let judge = Judge::new(Rig::from_toml(&small_bench_toml()).expect("the bench with small cameras"));
+    for is_moving in [true, false] {
+        let those = clouds.iter().filter(|line| line["moving"] == is_moving);
+        let counts = those.map(|line| judge.wrong_in_line(line));
+        let [wrong, swapped, all] = counts.fold([0; 3], |sum, more| [0, 1, 2].map(|at| sum[at] + more[at]));
+        println!("moving {is_moving}: {wrong} of {all} matches are wrong, {swapped} with the partner of the next");
+        assert!(all > 300 && 100 * wrong < all, "moving {is_moving}: {wrong} of {all} are wrong");
+        assert!(10 * swapped > 9 * all, "the check finds matches that are wrong");
+    }
+    let angle = |line: &Value| line["axes"]["separation_deg"].as_f64().expect("an angle");
+    let reached =
+        [clouds.iter().map(angle).fold(f64::MAX, f64::min), clouds.iter().map(angle).fold(f64::MIN, f64::max)];
+    assert!(reached[1] - reached[0] > 60.0, "the eyes turned: {reached:?}");
 }
 
 #[test]
@@ -61,9 +100,28 @@ fn what_the_pins_did_is_written_at_the_end() {
     let wires: Vec<&str> = trace.lines().filter(|line| line.starts_with("$var wire 1 ")).collect();
     println!("{}", wires.join("\n"));
     let wire = wires.iter().find(|line| line.contains(" camera_trigger_PB6 ")).expect("the cameras' wire");
-    let rising = format!("1{}", wire.split(' ').nth(3).expect("its sign"));
-    assert!(trace.lines().filter(|line| *line == rising).count() >= 3);
+    let widths_us = high_for_us(&trace, wire.split(' ').nth(3).expect("its sign"));
+    println!("pulses of {widths_us:.3?} us");
+    assert!(
+        widths_us.len() >= 3 && widths_us.iter().all(|us| (us - 100.0).abs() < 0.1),
+        "no other pulse fires the cameras"
+    );
     assert!(wires.iter().any(|line| line.contains(" step_1_")));
+}
+
+/// How long the wire of this sign was high each time, in microseconds of a trace in picoseconds; where it still is, without end.
+fn high_for_us(trace: &str, sign: &str) -> Vec<f64> {
+    let (mut at, mut rose, mut widths) = (0.0, None, Vec::new());
+    for line in trace.lines() {
+        match (line.strip_prefix('#'), line.strip_suffix(sign)) {
+            (Some(time), _) => at = time.parse().expect("a time"),
+            (_, Some("1")) => rose = rose.or(Some(at)),
+            (_, Some("0")) => widths.extend(rose.take().map(|rose: f64| (at - rose) / 1e6)),
+            _ => {}
+        }
+    }
+    widths.extend(rose.map(|_| f64::INFINITY));
+    widths
 }
 
 /// Through all modes and back: the trunk's way out of gecko, a dead centre, is a path of several legs.

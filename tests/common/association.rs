@@ -1,4 +1,6 @@
-//! Whether the matches of a cloud that the panel sends are right, by the room in which the cameras are simulated.
+//! Whether the matches of a live cloud are right, by the room in which the cameras are simulated.
+
+#![allow(dead_code, reason = "each test file uses its own part")]
 
 use std::sync::Arc;
 
@@ -29,12 +31,9 @@ impl Judge {
         Self { rig, left }
     }
 
-    /// How many matches of a cloud are wrong, how many would be if each had the partner of the next, and how many there are. The encoders tell
-    /// the pose to a fraction of a pixel.
+    /// How many matches of a cloud that the panel sends are wrong, how many would be if each had the partner of the next, and how many there are.
     pub fn wrong(&self, header: &Value, payload: &[u8]) -> [u64; 3] {
         let axes = header["axes"].as_array().expect("axes");
-        let [baseline, separation] = [0, 1].map(|axis: usize| axes[axis].as_f64().expect("a position"));
-        let pose = self.rig.pose_at_values(&[baseline, separation.to_radians()]);
         let count = header["count"].as_u64().expect("a count");
         let details = payload[PLACE * count as usize..].chunks(DETAILS);
         let pixels: Vec<[Pixel; 2]> = details
@@ -45,10 +44,25 @@ impl Judge {
                 [Pixel { u: number(6), v: number(7) }, Pixel { u: number(8), v: number(9) }]
             })
             .collect();
+        self.wrong_of([0, 1].map(|axis: usize| axes[axis].as_f64().expect("a position")), &pixels)
+    }
+
+    /// The same of a line of `vergence run --json` with `--also json`.
+    pub fn wrong_in_line(&self, line: &Value) -> [u64; 3] {
+        let number = |value: &Value| value.as_f64().expect("a number");
+        let rows = line["cloud"]["rows"].as_array().expect("rows").iter();
+        let pixel = |row: &Value, at: usize| Pixel { u: number(&row[at]), v: number(&row[at + 1]) };
+        let pixels: Vec<[Pixel; 2]> = rows.map(|row| [pixel(row, 6), pixel(row, 8)]).collect();
+        self.wrong_of(["baseline_mm", "separation_deg"].map(|axis| number(&line["axes"][axis])), &pixels)
+    }
+
+    /// Of the baseline in mm and the separation in degrees: the encoders tell the pose to a fraction of a pixel.
+    fn wrong_of(&self, [baseline, separation]: [f64; 2], pixels: &[[Pixel; 2]]) -> [u64; 3] {
+        let pose = self.rig.pose_at_values(&[baseline, separation.to_radians()]);
         let wrong = pixels.iter().filter(|pair| !self.is_right(&pose, **pair)).count() as u64;
         let others = pixels.iter().cycle().skip(1);
         let swapped = pixels.iter().zip(others).filter(|(one, other)| !self.is_right(&pose, [one[0], other[1]]));
-        [wrong, swapped.count() as u64, count]
+        [wrong, swapped.count() as u64, pixels.len() as u64]
     }
 
     /// Whether both pixels show the same place.

@@ -63,6 +63,9 @@ impl Trigger {
         TIM4.psc().write_value(PRESCALER);
         TIM4.egr().write(|w| w.set_ug(true));
         TIM4.sr().write(|_| {});
+        // In PWM mode 2 the output is high from this count on (RM0440, OC1M of TIMx_CCMR1). With the zero of a reset it would be high at
+        // once, until the first pulse: an edge that fires the cameras at each start.
+        TIM4.ccr(0).write(|w| w.set_ccr(u16::MAX));
         TIM4.ccmr_output(0).write(|w| w.set_ocm(0, Ocm::PWM_MODE2));
         TIM4.ccer().write(|w| w.set_cce(0, true));
         TIM4.dier().write(|w| w.set_ccie(0, true));

@@ -1,6 +1,6 @@
 //! The whole simulated rig in virtual time: board, mechanics, cameras and room.
 //!
-//! - [`SimulatedRig`]: the controller core on simulated mechanics, with the truth beside it
+//! - [`SimulatedRig`]: the controller core or the firmware on simulated mechanics, with the truth beside it
 //! - [`SimulatedChip`]: the unmodified firmware on the simulated microcontroller, wired to the same mechanics
 //! - [`RoomCamera`] and [`LiveCamera`]: cameras on the mechanics, in a furnished [`Room`]
 //! - [`TargetCamera`]: cameras before which a simulated person holds a calibration target ([`HeldTarget`])
@@ -26,6 +26,7 @@ mod application;
 mod bent_rail;
 mod built;
 mod chip;
+mod controller;
 mod error;
 mod firmware_log;
 mod held_target;

@@ -1,4 +1,4 @@
-//! The native board and its mechanics as one simulated rig.
+//! A board and its mechanics as one simulated rig.
 
 use std::collections::VecDeque;
 use std::time::Duration;
@@ -10,9 +10,10 @@ use vergence_plant::{AxisPlant, EncoderFault, NativeBoard, Plant, Stage};
 use vergence_protocol::{AxisKind, Microseconds, ResetCause};
 use vergence_rig::{Rig, RigAxis, RigPose};
 
+use crate::controller::Controller;
 use crate::error::refusal;
 use crate::history::LoadHistory;
-use crate::{BentRail, DrivenTrunk, SimError, Trunk, TrunkMechanics, joint_settings, trunk_servos};
+use crate::{BentRail, DrivenTrunk, SimError, SimulatedChip, Trunk, TrunkMechanics, joint_settings, trunk_servos};
 
 /// The board's clock when the simulation starts, in microseconds.
 const BOARD_START_US: u64 = 3_000_000;
@@ -25,10 +26,11 @@ const OLDEST: [u8; 3] = [0, 1, 0];
 /// Number of pulses remembered for [`SimulatedRig::pulses_from`].
 const PULSES_KEPT: usize = 256;
 
-/// A simulated rig: a board that speaks the protocol, and the truth beside it.
+/// A simulated rig: a board that speaks the protocol, with the controller core alone or with the firmware on a simulated chip, and the truth
+/// beside it.
 #[derive(Debug)]
 pub struct SimulatedRig {
-    board: NativeBoard,
+    controller: Controller,
     rig: Rig,
     /// Elapsed time to which the simulation was last run, in microseconds.
     elapsed_us: u64,
@@ -85,8 +87,18 @@ impl SimulatedRig {
         .map_err(refused)?;
         board.services_mut().oldest = OLDEST;
         board.restart(ResetCause::PowerOn, FIRST_BOOT).map_err(refused)?;
-        Ok(Self {
-            board,
+        Ok(Self::driven_by(Controller::Native(Box::new(board)), rig))
+    }
+
+    /// The rig of `chip`, which was made for the same rig file: the unmodified firmware drives its mechanics.
+    #[must_use]
+    pub fn on_chip(chip: SimulatedChip, rig: &Rig) -> Self {
+        Self::driven_by(Controller::Chip(Box::new(chip), Microseconds(0)), rig)
+    }
+
+    fn driven_by(controller: Controller, rig: &Rig) -> Self {
+        Self {
+            controller,
             rig: rig.clone(),
             elapsed_us: 0,
             began_us: 0,
@@ -97,22 +109,24 @@ impl SimulatedRig {
             history: LoadHistory::default(),
             pulses: VecDeque::new(),
             loose: Vec::new(),
-        })
+        }
     }
 
-    /// Lets the board take firmware that is signed by `key`, an Ed25519 public key.
+    /// Lets a native board take firmware that is signed by `key`, an Ed25519 public key. Firmware on a chip has its own key.
     pub fn trust(&mut self, key: [u8; 32]) {
-        let services = self.board.services_mut();
+        let Some(board) = self.controller.native() else { return };
+        let services = board.services_mut();
         services.key = key;
         services.verifier = |key, signed, signature| is_signed_by(key, signed, signature);
     }
 
-    /// Switches the board on with these bytes in its settings flash; none at all stand for erased flash.
+    /// Switches a native board on with these bytes in its settings flash; none at all stand for erased flash.
     ///
     /// # Errors
-    /// [`SimError::NotFlash`] for bytes of another length, [`SimError::Settings`] where the board refuses the settings.
+    /// [`SimError::NotFlash`] for bytes of another length and for a chip, whose flash holds its program too, [`SimError::Settings`] where the board refuses the settings.
     pub fn power_on_with_flash(&mut self, bytes: &[u8]) -> Result<(), SimError> {
-        let flash = &mut self.board.services_mut().settings;
+        let board = self.controller.native().ok_or(SimError::NotFlash)?;
+        let flash = &mut board.services_mut().settings;
         if !bytes.is_empty() && bytes.len() != flash.bytes().len() {
             return Err(SimError::NotFlash);
         }
@@ -121,15 +135,13 @@ impl SimulatedRig {
         units.filter(|(unit, _)| unit.iter().any(|&b| b != 0xFF)).for_each(|(unit, at)| flash.overwrite(at, unit));
         self.saved_operations = flash.operations();
         self.boot += 1;
-        self.board
-            .restart(ResetCause::PowerOn, self.boot)
-            .map_err(|error| SimError::Settings(refusal(error, &self.rig)))
+        board.restart(ResetCause::PowerOn, self.boot).map_err(|error| SimError::Settings(refusal(error, &self.rig)))
     }
 
-    /// Contents of the settings flash, where they changed since the last call or since
+    /// Contents of the settings flash of a native board, where they changed since the last call or since
     /// [`Self::power_on_with_flash`].
     pub fn changed_flash(&mut self) -> Option<&[u8]> {
-        let flash = &self.board.services_mut().settings;
+        let flash = &self.controller.native()?.services_mut().settings;
         let changed = std::mem::replace(&mut self.saved_operations, flash.operations()) != flash.operations();
         changed.then(|| flash.bytes())
     }
@@ -138,21 +150,26 @@ impl SimulatedRig {
     /// [`Self::take_output`].
     pub fn run_until(&mut self, elapsed_us: u64) {
         self.elapsed_us = elapsed_us;
-        let drifted = elapsed_us.saturating_sub(self.began_us) as f64 * (1.0 + BOARD_DRIFT);
-        let until = self.started_us + drifted as u64;
+        let until = match self.controller {
+            Controller::Native(_) => {
+                let drifted = elapsed_us.saturating_sub(self.began_us) as f64 * (1.0 + BOARD_DRIFT);
+                self.started_us + drifted as u64
+            }
+            Controller::Chip(..) => elapsed_us,
+        };
         // A UART sends while the board runs, not after: a pose must not wait for the next one and be replaced by it.
-        while self.board.now().0 < until {
+        while self.controller.now().0 < until {
             self.pull_plugs();
-            self.board.advance(Microseconds(until.min(self.board.now().0 + TICK_US)));
-            self.output.append(&mut self.board.transmit());
+            self.controller.advance(Microseconds(until.min(self.controller.now().0 + TICK_US)));
+            self.output.append(&mut self.controller.transmit());
             self.remember();
         }
     }
 
     /// Keeps the positions and the trigger pulse of this tick for the cameras.
     fn remember(&mut self) {
-        let plant = self.board.plant();
-        self.history.push(self.board.now(), loads(plant));
+        let plant = self.controller.plant();
+        self.history.push(self.controller.now(), loads(plant));
         let Some((at, _)) = plant.exposed() else { return };
         if self.pulses.back().is_some_and(|last| last.at == at) {
             return;
@@ -175,10 +192,10 @@ impl SimulatedRig {
         &self.history
     }
 
-    /// Time on the board's clock.
+    /// Time on the clock of [`Self::history`] and of the pulses: that of a native board, or the time since power-on of a chip.
     #[must_use]
     pub fn now(&self) -> Microseconds {
-        self.board.now()
+        self.controller.now()
     }
 
     /// The rig that is simulated.
@@ -189,18 +206,24 @@ impl SimulatedRig {
 
     /// Gives bytes of the host to the board, at the time to which it was last run.
     pub fn receive(&mut self, bytes: &[u8]) {
-        self.board.receive(bytes);
-        self.output.append(&mut self.board.transmit());
-        if self.board.take_reboot().is_some() {
-            self.restart();
+        match &mut self.controller {
+            Controller::Native(board) => {
+                board.receive(bytes);
+                self.output.append(&mut board.transmit());
+                if board.take_reboot().is_some() {
+                    self.restart();
+                }
+            }
+            Controller::Chip(chip, _) => chip.send(bytes),
         }
     }
 
-    /// Starts the board's software again. There is no boot loader to stay in.
+    /// Starts the native board's software again. There is no boot loader to stay in.
     fn restart(&mut self) {
         self.boot += 1;
+        let Some(board) = self.controller.native() else { return };
         // It has started with these settings before.
-        if self.board.restart(ResetCause::Software, self.boot).is_ok() {
+        if board.restart(ResetCause::Software, self.boot).is_ok() {
             (self.started_us, self.began_us) = (0, self.elapsed_us);
         }
     }
@@ -210,9 +233,9 @@ impl SimulatedRig {
         std::mem::take(&mut self.output)
     }
 
-    /// The board, to read its state or to harm it.
-    pub fn board(&mut self) -> &mut NativeBoard {
-        &mut self.board
+    /// Does something to the mechanics: harms or mends them.
+    pub fn with_plant<R>(&mut self, act: impl FnOnce(&mut Plant) -> R) -> R {
+        self.controller.with_plant(act)
     }
 
     /// Bends a rail from now on: the cameras move as it takes them, and neither board nor rig file knows.
@@ -222,21 +245,21 @@ impl SimulatedRig {
 
     /// Unplugs the encoder of the stage `axis`, and plugs it in again, at these times from now.
     pub fn unplug_encoder(&mut self, axis: usize, times: [Duration; 2]) {
-        let times = times.map(|time| self.board.now().0 + time.as_micros() as u64);
+        let times = times.map(|time| self.controller.now().0 + time.as_micros() as u64);
         self.loose.push(LoosePlug { axis, times, is_out: false });
     }
 
     fn pull_plugs(&mut self) {
-        let now = self.board.now().0;
+        let now = self.controller.now().0;
         for plug in &mut self.loose {
             let is_out = (plug.times[0]..plug.times[1]).contains(&now);
             if std::mem::replace(&mut plug.is_out, is_out) == is_out {
                 continue;
             }
-            let axis = self.board.plant_mut().axis_mut(plug.axis);
-            axis.into_iter().for_each(|axis| match is_out {
-                true => axis.fail_encoder(Some(EncoderFault::Stuck)),
-                false => AxisPlant::mend_encoder(axis),
+            self.controller.with_plant(|plant| match (plant.axis_mut(plug.axis), is_out) {
+                (Some(axis), true) => axis.fail_encoder(Some(EncoderFault::Stuck)),
+                (Some(axis), false) => AxisPlant::mend_encoder(axis),
+                (None, _) => {}
             });
         }
     }
@@ -244,13 +267,13 @@ impl SimulatedRig {
     /// True pose of the cameras now: from the mechanics, not from the encoders.
     #[must_use]
     pub fn true_pose(&self) -> RigPose {
-        self.history.pose_of(&self.rig, &loads(self.board.plant()))
+        self.history.pose_of(&self.rig, &loads(self.controller.plant()))
     }
 
     /// True pose of the cameras when they were last triggered; `None` before the first pulse.
     #[must_use]
     pub fn exposed_pose(&self) -> Option<RigPose> {
-        let (at, loads) = self.board.plant().exposed()?;
+        let (at, loads) = self.controller.plant().exposed()?;
         match self.rig.trunk {
             Some(_) => self.history.pose_at(&self.rig, at.0 as f64),
             None => Some(self.history.pose_of(&self.rig, loads)),
@@ -260,7 +283,7 @@ impl SimulatedRig {
     /// The trunk of a robot, as it stands.
     #[must_use]
     pub fn trunk(&self) -> Option<&Trunk> {
-        trunk_of(self.board.plant())
+        trunk_of(self.controller.plant())
     }
 }
 
@@ -269,6 +292,12 @@ impl Served for SimulatedRig {
 
     fn run_until(&mut self, elapsed_us: u64) {
         self.run_until(elapsed_us);
+    }
+
+    fn hear_at(&mut self, baud: u32) {
+        if let Controller::Chip(chip, _) = &mut self.controller {
+            chip.hear_at(baud);
+        }
     }
 
     fn receive(&mut self, bytes: &[u8]) {
@@ -280,7 +309,10 @@ impl Served for SimulatedRig {
     }
 
     fn settle(&mut self) -> Result<(), SimError> {
-        Ok(())
+        match &mut self.controller {
+            Controller::Native(_) => Ok(()),
+            Controller::Chip(chip, _) => chip.settle(),
+        }
     }
 }
 

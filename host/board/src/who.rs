@@ -41,7 +41,7 @@ pub enum WhoAnswers {
 /// Asks who is at `port`, whose lines run at `baud` bits per second. A port that another vergence holds is left alone.
 pub async fn who_answers(port: &Port, baud: u32) -> WhoAnswers {
     match port {
-        Port::Simulated => return WhoAnswers::Simulated,
+        Port::Simulated(_) => return WhoAnswers::Simulated,
         Port::Serial(path) if is_held(path) => return WhoAnswers::Busy,
         Port::Serial(_) | Port::Tcp(_) => {}
     }

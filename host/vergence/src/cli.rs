@@ -226,7 +226,7 @@ fn has_virtual_time(matches: &ArgMatches) -> bool {
         return false;
     }
     let port = inner.try_get_one::<String>("port").ok().flatten();
-    matches!(verb, "demo" | "reproduce") || port.is_some_and(|port| port == "sim")
+    matches!(verb, "demo" | "reproduce") || port.is_some_and(|port| port == "sim" || port.starts_with("sim:"))
 }
 
 /// Prints why the command failed on standard error, and returns the exit code.

@@ -22,7 +22,7 @@ pub fn check_port(port: &Port) -> Finding {
             Some(remedy) => Finding::forbidden("port", format!("you may not read and write {port}"), remedy),
             None => Finding::pass("port", format!("{port} may be read and written")),
         },
-        Port::Tcp(_) | Port::Simulated => Finding::pass("port", port.to_string()),
+        Port::Tcp(_) | Port::Simulated(_) => Finding::pass("port", port.to_string()),
     }
 }
 

@@ -20,8 +20,9 @@ pub enum Port {
     Serial(PathBuf),
     /// A TCP address, `tcp:HOST:PORT`.
     Tcp(String),
-    /// A simulated board in this process, `sim`.
-    Simulated,
+    /// A simulated board in this process: `sim` for the controller without a chip, `sim:FIRMWARE` for this firmware, an ELF file or a signed
+    /// image, on a simulated chip.
+    Simulated(Option<PathBuf>),
 }
 
 impl FromStr for Port {
@@ -29,8 +30,11 @@ impl FromStr for Port {
     fn from_str(text: &str) -> Result<Self, Self::Err> {
         Ok(match text.strip_prefix("tcp:") {
             Some(address) => Self::Tcp(address.trim_start_matches("//").to_owned()),
-            None if text == "sim" => Self::Simulated,
-            None => Self::Serial(text.into()),
+            None if text == "sim" => Self::Simulated(None),
+            None => match text.strip_prefix("sim:") {
+                Some(firmware) => Self::Simulated(Some(firmware.into())),
+                None => Self::Serial(text.into()),
+            },
         })
     }
 }
@@ -40,7 +44,8 @@ impl std::fmt::Display for Port {
         match self {
             Self::Serial(path) => write!(f, "{}", path.display()),
             Self::Tcp(address) => write!(f, "tcp:{address}"),
-            Self::Simulated => f.write_str("sim"),
+            Self::Simulated(None) => f.write_str("sim"),
+            Self::Simulated(Some(firmware)) => write!(f, "sim:{}", firmware.display()),
         }
     }
 }
@@ -86,7 +91,7 @@ pub async fn open(port: &Port, baud: u32, share: bool) -> Result<OpenWire, OpenE
                 .map_err(|error| OpenError::TcpOption { address: address.clone(), problem: error.to_string() })?;
             Ok(OpenWire { stream: Box::new(stream), lock: None, baud: None })
         }
-        Port::Simulated => Err(OpenError::Simulated),
+        Port::Simulated(_) => Err(OpenError::Simulated),
     }
 }
 

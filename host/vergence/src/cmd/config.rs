@@ -114,7 +114,7 @@ pub async fn run(args: &Args, common: &CommonOptions, console: Console) -> Resul
 /// Starts the board again, so that it reads its saved settings.
 async fn reload(board: Board, common: &CommonOptions, console: Console) -> Result<(), Failure> {
     let port = port(common)?;
-    if port == Port::Simulated {
+    if matches!(port, Port::Simulated(_)) {
         return Err(Failure::usage("a board in this process ends with it and saves nothing: name one with --port"));
     }
     if board.pose().state != ControllerState::Idle {
@@ -204,7 +204,7 @@ async fn set_one(
 /// Changes the speed of the line to `baud`, where board and adapter can both make it.
 async fn change_baud(board: Board, common: &CommonOptions, baud: u32, save: bool) -> Result<(), Failure> {
     let port = port(common)?;
-    if port == Port::Simulated {
+    if matches!(port, Port::Simulated(_)) {
         return Err(Failure::usage("a board in this process has no line: name one with --port"));
     }
     let key = SettingKey { item: SettingItem::Baud, axis: 0 };

@@ -8,7 +8,7 @@ use crate::cli::CommonOptions;
 use crate::console::{Console, shown_on};
 use crate::failure::Failure;
 use crate::rig_file;
-use crate::sim::{SharedRig, SimulatedRig, spawn_in_process};
+use crate::sim::{SharedRig, simulated_rig, spawn_in_process};
 
 /// Where the stages of an in-process board stand.
 const SIM_SEED: u64 = 1;
@@ -91,8 +91,8 @@ pub fn is_wire(common: &CommonOptions) -> bool {
 }
 
 async fn wire(port: &Port, baud: u32, rig: &Rig) -> Result<OpenWire, Failure> {
-    if *port == Port::Simulated {
-        let simulated = SharedRig::new(SimulatedRig::new(rig, SIM_SEED)?);
+    if let Port::Simulated(firmware) = port {
+        let simulated = SharedRig::new(simulated_rig(firmware.as_deref(), rig, SIM_SEED)?);
         return Ok(OpenWire::in_process(spawn_in_process(simulated)));
     }
     Ok(open(port, baud, false).await?)

@@ -77,7 +77,7 @@ async fn change(args: &Args, link: &mut ManagementLink, console: Console) -> Res
 
 async fn connect(common: &CommonOptions) -> Result<ManagementLink, Failure> {
     let port = port(common)?;
-    if port == Port::Simulated {
+    if matches!(port, Port::Simulated(_)) {
         return Err(Failure::usage("a board in this process ends with it: flash one of 'vergence sim --pty'"));
     }
     Ok(ManagementLink::open(port, common.baud).await?)

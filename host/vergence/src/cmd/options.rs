@@ -55,8 +55,8 @@ pub struct With<O: clap::Args, A: clap::Args> {
 
 #[derive(Clone, Debug, clap::Args)]
 pub struct PortOptions {
-    /// The board: a serial device, tcp:HOST:PORT, or sim for a simulated one in this process. Without it, the only
-    /// serial device there is.
+    /// The board: a serial device, tcp:HOST:PORT, or sim for a simulated one in this process; sim:FIRMWARE runs this ELF file
+    /// or signed image on a simulated chip. Without it, the only serial device there is.
     #[arg(long, global = true, env = "VERGENCE_PORT", value_name = "PORT", help_heading = "Board")]
     port: Option<String>,
     /// Speed of a serial port.

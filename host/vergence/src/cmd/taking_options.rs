@@ -19,7 +19,7 @@ use crate::cli::CommonOptions;
 use crate::console::{Console, shown_on};
 use crate::failure::Failure;
 use crate::rig_file;
-use crate::sim::{Plug, SharedRig, SimulatedRig, lensed};
+use crate::sim::{Plug, SharedRig, lensed, simulated_rig};
 use crate::stopwatch::started_us;
 
 /// Number of camera events that may wait; images beyond it are lost, which the gap in their numbers shows.
@@ -193,8 +193,8 @@ impl TakingOptions {
             };
         }
         match (port(common)?, is_simulated) {
-            (Port::Simulated, true) => {
-                let simulated = SharedRig::new(SimulatedRig::new(drawn, self.seed)?);
+            (Port::Simulated(firmware), true) => {
+                let simulated = SharedRig::new(simulated_rig(firmware.as_deref(), drawn, self.seed)?);
                 let unplugged = self.unplug.iter().filter_map(|unplug| match unplug {
                     Unplug::Link(times) => Some(*times),
                     _ => None,
@@ -203,9 +203,7 @@ impl TakingOptions {
                 let board = plug.connect(rig.clone(), common.lease, Continuity::begin(None)).await?;
                 Ok((Some(board.observed(shown_on(console.progress("live")))), Some((simulated, plug))))
             }
-            (_, false) if common.port.as_deref() != Some("sim") => {
-                Ok((Some(connect(common, console, "live").await?), None))
-            }
+            (Port::Serial(_) | Port::Tcp(_), false) => Ok((Some(connect(common, console, "live").await?), None)),
             _ => Err(Failure::usage("a simulated rig has simulated cameras: --port sim --cameras sim")),
         }
     }

@@ -24,6 +24,17 @@ pub fn simulated_chip(programs: &[impl AsRef<Path>], rig: &Rig, seed: u64) -> Re
     Ok(SimulatedChip::new(&programs, rig, seed)?)
 }
 
+/// A simulated rig, with the controller core alone or with this firmware on a simulated chip. `seed` decides where its stages stand.
+///
+/// # Errors
+/// As of [`simulated_chip`] and [`SimulatedRig::new`].
+pub fn simulated_rig(firmware: Option<&Path>, rig: &Rig, seed: u64) -> Result<SimulatedRig, Failure> {
+    match firmware {
+        None => Ok(SimulatedRig::new(rig, seed)?),
+        Some(path) => Ok(SimulatedRig::on_chip(simulated_chip(&[path], rig, seed)?, rig)),
+    }
+}
+
 /// A simulated rig whose settings flash is kept in a file.
 pub struct KeptRig {
     rig: SimulatedRig,

@@ -17,7 +17,7 @@ use crate::console::{Console, shown_on};
 use crate::failure::Failure;
 use crate::interrupt::on_own_thread;
 
-pub use files::{KeptRig, simulated_chip};
+pub use files::{KeptRig, simulated_chip, simulated_rig};
 pub use robot::SimulatedRobot;
 pub use vergence_board::{Listener, Served, serve, spawn_in_process};
 pub use vergence_sim::{Random, SimulatedChip, SimulatedRig, built};

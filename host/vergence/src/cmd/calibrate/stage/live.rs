@@ -22,7 +22,7 @@ use crate::console::Console;
 use crate::failure::Failure;
 use crate::interrupt::interrupted;
 use crate::rig_file;
-use crate::sim::{SharedRig, SimulatedRig, board_of, built};
+use crate::sim::{SharedRig, board_of, built, simulated_rig};
 
 /// Options of a rig that drives itself.
 #[derive(Debug, clap::Args)]
@@ -131,16 +131,16 @@ async fn open(
     console: Console,
 ) -> Result<(Board, RigCameras), Failure> {
     match (port(common)?, cameras) {
-        (Port::Simulated, [only]) if only == "sim" => {
+        (Port::Simulated(firmware), [only]) if only == "sim" => {
             options.camera.none_for_simulated()?;
             let (seed, built, lens) = (options.seed, built(nominal, options.seed), options.lens);
-            let rig = SharedRig::new(SimulatedRig::new(&built, seed)?);
+            let rig = SharedRig::new(simulated_rig(firmware.as_deref(), &built, seed)?);
             let (session, progress) = (fresh_session()?, console.progress("homing"));
             let board_of_rig = board_of(&rig, nominal.clone(), session, common.lease, progress).await?;
             console.say(format!("simulated cameras, lens: {}", options.lens))?;
             Ok((board_of_rig, RigCameras::Simulated(Box::new(SimulatedTarget { rig, built, target, lens, seed }))))
         }
-        (Port::Simulated, _) => {
+        (Port::Simulated(_), _) => {
             Err(Failure::usage("a simulated rig has simulated cameras: use --port sim with --cameras sim"))
         }
         (_, [left, right]) => {
