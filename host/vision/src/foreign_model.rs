@@ -4,12 +4,11 @@
 //! there a calibration that frees the lens goes on, and that is what a program gets that knows no other model. Pixels, rays and the
 //! derivatives of one by the other are the model's own.
 
-use std::sync::OnceLock;
-
 use nalgebra::{Matrix2x3, Matrix3x2, Vector2, Vector3};
 
-use crate::batch::ForeignTables;
-use crate::{Angle, Camera, CameraModel, Frame, KannalaBrandt, ModelParameter, OutsideField, Pixel, UnitRay};
+use crate::{
+    Angle, Camera, CameraModel, Frame, KannalaBrandt, LensSteps, ModelParameter, OutsideField, Pixel, UnitRay,
+};
 
 /// The camera model of another program by which a lens is computed.
 ///
@@ -17,8 +16,6 @@ use crate::{Angle, Camera, CameraModel, Frame, KannalaBrandt, ModelParameter, Ou
 #[derive(Clone, Copy, Debug)]
 pub struct ForeignModel {
     model: &'static dyn CameraModel,
-    /// For arrays: of the lens that first asked for them, whatever the scale of that.
-    tables: &'static OnceLock<ForeignTables>,
     /// Pixels of the lens for each of the model's.
     scale: f64,
 }
@@ -47,6 +44,11 @@ impl ForeignModel {
     #[must_use]
     pub const fn scale(&self) -> f64 {
         self.scale
+    }
+
+    /// The model as steps to the lens's own pixels, where it has such.
+    pub(crate) fn steps(&self) -> Option<LensSteps> {
+        Some(self.model.steps()?.resampled(self.scale))
     }
 
     pub(crate) const fn scaled(self, scale: f64) -> Self {
@@ -150,14 +152,13 @@ impl KannalaBrandt {
     /// model's. Its field stays.
     #[must_use]
     pub fn computed_by(self, model: Box<dyn CameraModel>, scale: f64) -> Self {
-        let tables = Box::leak(Box::default());
-        self.made_foreign(Some(ForeignModel { model: Box::leak(model), tables, scale }))
+        self.made_foreign(Some(ForeignModel { model: Box::leak(model), scale }))
     }
 
-    /// Tables of the model for arrays, made once; `None` of a polynomial lens, and of one with another field than the lens that they are of.
-    pub(crate) fn foreign_tables(&self) -> Option<&'static ForeignTables> {
-        let tables = self.foreign_model()?.tables.get_or_init(|| ForeignTables::new(self));
-        tables.are_of(self).then_some(tables)
+    /// The angle to the axis at which the field of the lens or of its model ends, in radians.
+    pub(crate) fn foreign_field(&self) -> f64 {
+        let own = self.theta_max().rad();
+        self.foreign_model().map_or(own, |model| own.min(model.model.half_field().rad()))
     }
 
     /// The ray of `pixel` by `model`, the lens's own.

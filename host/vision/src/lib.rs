@@ -61,8 +61,8 @@ pub use cloud::{Cloud, CloudPoint, cloud, cloud_of_each, cloud_point};
 pub use covariance::{covariance, range_sigma};
 pub use epipolar::{dihedral, ray_to_plane};
 pub use foreign::{
-    CameraModel, Central, DoubleSphere, Eucm, Fisheye624, Formula, LensFit, Mei, ModelParameter, NoFit, OCam,
-    ParameterUnit, Pinhole, Radtan, Sight, SightRegion, SplineFit, SplineGrid, SplinedStereographic, fit_lens,
+    CameraModel, Central, DoubleSphere, Eucm, Fisheye624, Formula, LensFit, LensSteps, Mei, ModelParameter, NoFit,
+    OCam, ParameterUnit, Pinhole, Radtan, Sight, SightRegion, SplineFit, SplineGrid, SplinedStereographic, fit_lens,
     fit_spline, model_of,
 };
 pub use foreign_model::ForeignModel;

@@ -1,19 +1,19 @@
 //! A lens prepared for whole arrays of points and pixels.
 
+use super::Instructions;
 use super::derivatives::{Derivatives, ProjectedPoints};
 use super::displaced::Displaced;
+use super::foreign::Foreign;
 use super::project::{Project, project_baseline, project_best};
 use super::radial::{ForeignRadial, ProjectRadial, radial_baseline, radial_best};
 use super::unproject::{Unproject, unproject_baseline, unproject_best};
-use super::{ForeignTables, Instructions};
-use crate::{Asymmetry, Camera, KannalaBrandt, Pixel, UnitRay};
+use crate::{Asymmetry, Camera, KannalaBrandt, Pixel};
 
 /// A [`KannalaBrandt`] lens prepared for whole arrays of points and pixels, about ten times faster.
 ///
-/// Preparation takes about a millisecond, once per lens. Rays agree with the single-point functions to 1e-14 rad. Points stand for
-/// directions: where the pupil moves, a point at a finite distance is seen by [`KannalaBrandt::ray_to`] it. A lens of another program's model
-/// is tabulated: a symmetric one as polynomials to 3e-10 rad, any other one, by the first array of a thousand rows, as polynomials in cells to
-/// 5e-10 rad, which takes up to half a second once per lens.
+/// Preparation takes about a millisecond, once per lens, and some ten for another program's model. Rays agree with the single-point functions
+/// to 1e-14 rad, of another program's model to 8e-10 rad. Points stand for
+/// directions: where the pupil moves, a point at a finite distance is seen by [`KannalaBrandt::ray_to`] it.
 #[derive(Clone, Debug, PartialEq)]
 pub struct BatchLens {
     lens: KannalaBrandt,
@@ -23,6 +23,8 @@ pub struct BatchLens {
     derivatives: Derivatives,
     displaced: Option<Displaced>,
     unproject: Option<Unproject>,
+    /// Of a lens of another model whose symmetric polynomials are not all there.
+    foreign: Option<Foreign>,
     instructions: Instructions,
 }
 
@@ -32,11 +34,13 @@ impl BatchLens {
     pub fn new(lens: &KannalaBrandt) -> Self {
         let radial = ForeignRadial::of(lens);
         let unproject = match lens.foreign_model() {
-            Some(_) => radial.as_ref().and_then(Unproject::new),
+            Some(_) => radial.as_ref().and_then(Unproject::of_growing),
             None => Unproject::new(lens),
         };
+        let foreign = if radial.is_some() && unproject.is_some() { None } else { Foreign::new(lens) };
         Self {
             lens: *lens,
+            foreign,
             project: Project::new(lens),
             radial: radial.as_ref().and_then(ProjectRadial::new),
             derivatives: Derivatives::new(lens),
@@ -64,11 +68,14 @@ impl BatchLens {
     /// Like [`Self::project`], but appends the results to `pixels`.
     pub fn project_into(&self, points: &[[f64; 3]], pixels: &mut Vec<[f64; 2]>) {
         if self.lens.foreign_model().is_some() {
-            return match (&self.radial, self.instructions) {
-                (Some(fit), Instructions::Best) => radial_best(fit, points, pixels),
-                (Some(fit), Instructions::Baseline) => radial_baseline(fit, points, pixels),
-                (None, _) => self.project_foreign(points, pixels),
-            };
+            match (&self.radial, &self.foreign) {
+                (Some(fit), _) if self.is_best() => radial_best(fit, points, pixels),
+                (Some(fit), _) => radial_baseline(fit, points, pixels),
+                (None, Some(foreign)) => foreign.project(points, self.is_best(), pixels),
+                // Never: what is not symmetric is there.
+                (None, None) => {}
+            }
+            return;
         }
         let first = pixels.len();
         match self.instructions {
@@ -129,56 +136,34 @@ impl BatchLens {
     }
 
     fn unproject_symmetric(&self, pixels: &[[f64; 2]], rays: &mut Vec<[f64; 3]>) {
-        match (&self.unproject, self.instructions) {
-            (Some(fit), Instructions::Best) => unproject_best(fit, pixels, rays),
-            (Some(fit), Instructions::Baseline) => unproject_baseline(fit, pixels, rays),
+        match (&self.unproject, &self.foreign) {
+            (Some(fit), _) if self.is_best() => unproject_best(fit, pixels, rays),
+            (Some(fit), _) => unproject_baseline(fit, pixels, rays),
+            (None, Some(foreign)) => foreign.unproject(pixels, self.is_best(), rays),
             // A lens that nearly turns over inside its field has no polynomial: one pixel at a time.
-            (None, _) => {
-                let one = |&[u, v]: &[f64; 2]| self.unproject_one(Pixel { u, v });
-                let tables = self.tables(pixels.len());
-                if !tables.is_some_and(|tables| tables.unproject(&self.lens, pixels, self.is_best(), one, rays)) {
-                    rays.extend(pixels.iter().map(one));
-                }
-            }
+            (None, None) => rays.extend(pixels.iter().map(|&[u, v]| self.unproject_one(Pixel { u, v }))),
         }
-    }
-
-    fn project_foreign(&self, points: &[[f64; 3]], pixels: &mut Vec<[f64; 2]>) {
-        let one = |point: &[f64; 3]| self.project_one(point);
-        let tables = self.tables(points.len());
-        if !tables.is_some_and(|tables| tables.project(&self.lens, points, self.is_best(), one, pixels)) {
-            pixels.extend(points.iter().map(one));
-        }
-    }
-
-    /// Those of a lens of another model, for an array that is worth making them.
-    fn tables(&self, rows: usize) -> Option<&ForeignTables> {
-        const WORTH: usize = 1000;
-        if rows < WORTH { None } else { self.lens.foreign_tables() }
     }
 
     fn is_best(&self) -> bool {
         self.instructions == Instructions::Best
     }
 
-    /// The ray of a pixel of the symmetric lens, or of that of another model.
+    /// The ray of a pixel of the symmetric lens.
     fn unproject_one(&self, pixel: Pixel) -> [f64; 3] {
-        let symmetric = match self.lens.foreign_model() {
-            Some(_) => self.lens,
-            None => self.lens.made_asymmetric(Asymmetry::default()),
-        };
+        let symmetric = self.lens.made_asymmetric(Asymmetry::default());
         symmetric.unproject::<Camera>(pixel).map_or([f64::NAN; 3], |ray| ray.vector().into())
     }
 
-    fn project_one(&self, point: &[f64; 3]) -> [f64; 2] {
-        let ray = UnitRay::<Camera>::new((*point).into());
-        ray.and_then(|ray| self.lens.project(&ray).ok()).map_or([f64::NAN; 2], |pixel| [pixel.u, pixel.v])
+    /// Whether [`Self::unproject`] is in lanes, and not pixel by pixel: not where dr/dθ comes close to zero inside the field.
+    #[must_use]
+    pub fn is_fitted(&self) -> bool {
+        self.unproject.is_some() || self.foreign.as_ref().is_some_and(|foreign| foreign.is_in_lanes()[1])
     }
 
-    /// Whether [`Self::unproject`] is by one polynomial: false where dr/dθ comes close to zero inside the field, and of another program's
-    /// model that is not symmetric about its axis.
+    /// Whether [`Self::project`] is in lanes, and not point by point.
     #[must_use]
-    pub const fn is_fitted(&self) -> bool {
-        self.unproject.is_some()
+    pub fn projects_in_lanes(&self) -> bool {
+        self.radial.is_some() || self.foreign.as_ref().is_none_or(|foreign| foreign.is_in_lanes()[0])
     }
 }

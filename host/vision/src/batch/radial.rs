@@ -6,6 +6,7 @@ use nalgebra::Vector3;
 
 use super::arc_tangent::distance_and_angle;
 use super::chebyshev::fit;
+use super::fold::Fold;
 use super::lanes::{ALWAYS_FUSED, Kernel, for_rows, polynomial};
 use super::project::{pixels, scales};
 use crate::{Camera, ForeignModel, KannalaBrandt, Pixel, UnitRay};
@@ -29,6 +30,15 @@ pub(super) trait Radial {
 
     /// The scale of v over that of u.
     fn stretch(&self) -> f64;
+}
+
+/// A lens whose radii are known by the angle too.
+pub(super) trait Growing: Radial {
+    /// The angle to the axis at the end of the field, in radians.
+    fn theta_max(&self) -> f64;
+
+    /// The radius in pixels at an angle in radians.
+    fn radius(&self, theta: f64) -> Option<f64>;
 }
 
 impl Radial for KannalaBrandt {
@@ -85,6 +95,12 @@ impl<'a> ForeignRadial<'a> {
         };
         (0..RINGS * SPOKES).all(is_symmetric).then_some(found)
     }
+}
+
+impl Growing for ForeignRadial<'_> {
+    fn theta_max(&self) -> f64 {
+        self.lens.theta_max().rad()
+    }
 
     fn radius(&self, theta: f64) -> Option<f64> {
         pixel(self.model, theta, 0.0).map(|seen| seen.u - self.middle.u)
@@ -130,6 +146,8 @@ pub(super) struct ProjectRadial {
     growth: Vec<f64>,
     /// Factor of the map from θ² to t in [-1, 1].
     slope: f64,
+    /// Where it is by the angle itself.
+    by_angle: Option<Fold>,
     stretch: f64,
     middle: [f64; 2],
     theta_max: f64,
@@ -137,26 +155,32 @@ pub(super) struct ProjectRadial {
 
 impl ProjectRadial {
     /// `None` where 48 terms do not suffice.
-    pub(super) fn new(lens: &ForeignRadial<'_>) -> Option<Self> {
-        (6..=48).step_by(3).map(|terms| Self::of_terms(lens, terms)).find(|fit| fit.is_near(lens))
+    pub(super) fn new<L: Growing>(lens: &L) -> Option<Self> {
+        let near = |by_angle| {
+            (6..=48).step_by(3).map(|terms| Self::of_terms(lens, terms, by_angle)).find(|fit| fit.is_near(lens))
+        };
+        near(None).or_else(|| near(Some(Fold::RADIUS)))
     }
 
-    fn of_terms(lens: &ForeignRadial<'_>, terms: usize) -> Self {
-        let theta_max = lens.lens.theta_max().rad();
+    fn of_terms(lens: &impl Growing, terms: usize, by_angle: Option<Fold>) -> Self {
+        let theta_max = lens.theta_max();
         let growth = fit(terms, |t| {
-            let theta = theta_max * (0.5 * (t + 1.0)).sqrt();
+            let theta = theta_max * (0.5 * (by_angle.map_or(t, |fold| fold.t(t)) + 1.0)).sqrt();
             lens.radius(theta).unwrap_or(f64::NAN) / theta
         });
-        let middle = [lens.middle.u, lens.middle.v];
-        Self { growth, slope: 2.0 / (theta_max * theta_max), stretch: lens.stretch, middle, theta_max }
+        let Pixel { u, v } = lens.middle();
+        let slope = 2.0 / (theta_max * theta_max);
+        Self { growth, slope, by_angle, stretch: lens.stretch(), middle: [u, v], theta_max }
     }
 
-    fn is_near(&self, lens: &ForeignRadial<'_>) -> bool {
+    fn is_near<L: Growing>(&self, lens: &L) -> bool {
         const ANGLES: u32 = 500;
-        let limit = ForeignRadial::LARGEST_ERROR * lens.on_axis();
+        let limit = L::LARGEST_ERROR * lens.on_axis();
         (1..ANGLES).all(|step| {
             let theta = self.theta_max * f64::from(step) / f64::from(ANGLES);
-            let [growth] = polynomial::<false, 1>(&self.growth, &[self.slope * theta * theta - 1.0]);
+            let t = self.slope * theta * theta - 1.0;
+            let t = [self.by_angle.map_or(t, |fold| fold.variable(t))];
+            let [growth] = polynomial::<false, 1>(&self.growth, &t);
             lens.radius(theta).is_some_and(|radius| (theta * growth - radius).abs() <= limit)
         })
     }
@@ -165,14 +189,27 @@ impl ProjectRadial {
 impl Kernel<3, 2> for ProjectRadial {
     #[inline(always)]
     fn lanes<const FUSED: bool, const W: usize>(&self, [x, y, z]: [[f64; W]; 3]) -> [[f64; W]; 2] {
-        let (rho, theta) = distance_and_angle::<FUSED, W>(&[x, y, z]);
+        let scale = self.radii_per_distance::<FUSED, W>([x, y, z]);
+        pixels([x, y], scale, self.middle, self.stretch)
+    }
+}
+
+impl ProjectRadial {
+    /// The radius over the distance from the axis.
+    #[inline(always)]
+    pub(super) fn radii_per_distance<const FUSED: bool, const W: usize>(&self, point: [[f64; W]; 3]) -> [f64; W] {
+        let (rho, theta) = distance_and_angle::<FUSED, W>(&point);
         let mut t = [0.0; W];
         for j in 0..W {
             t[j] = self.slope * (theta[j] * theta[j]) - 1.0;
         }
+        if let Some(fold) = &self.by_angle {
+            for t in &mut t {
+                *t = fold.variable(*t);
+            }
+        }
         let growth = polynomial::<FUSED, W>(&self.growth, &t);
-        let scale = scales(&rho, &theta, &growth, self.theta_max);
-        pixels([x, y], scale, self.middle, self.stretch)
+        scales(&rho, &theta, &growth, self.theta_max)
     }
 }
 

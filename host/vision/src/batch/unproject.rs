@@ -7,10 +7,13 @@ use multiversion::multiversion;
 use multiversion::target::target_cfg_f;
 
 use super::chebyshev::fit;
+use super::fold::Fold;
 use super::lanes::{ALWAYS_FUSED, Kernel, for_rows, polynomial};
-use super::radial::Radial;
+use super::radial::{Growing, Radial};
 use crate::Pixel;
 
+/// What rounding adds to t.
+const TINY: f64 = 1e-12;
 /// Rows per step: one vector of eight lanes for each polynomial.
 const LANES: usize = 8;
 /// Numbers of polynomial terms that are tried, fewest first.
@@ -26,17 +29,32 @@ pub(super) struct Unproject {
     /// Factor of the map from r² to t in [-1, 1].
     slope: f64,
     largest_squared: f64,
+    /// Where the image comes to a stand a little beyond the field.
+    fold: Option<Fold>,
 }
 
 impl Unproject {
     /// `None` for a lens that no polynomial of 48 terms approximates closely enough, because dr/dθ comes close to zero.
     pub(super) fn new<L: Radial>(lens: &L) -> Option<Self> {
-        TERMS.map(|terms| Self::of_terms(lens, terms)).find(|fit| fit.error(lens) <= L::LARGEST_ERROR)
+        Self::near(lens, None, 1)
     }
 
-    fn of_terms(lens: &impl Radial, terms: usize) -> Self {
+    /// The same, and by another variable where the image comes to a stand a little beyond the field.
+    pub(super) fn of_growing(lens: &impl Growing) -> Option<Self> {
+        /// Fewer numbers of terms are tried, because rays of models take long.
+        const EVERY: usize = 6;
+        let others = || [Fold::of(lens), Some(Fold::RADIUS)].into_iter().flatten();
+        Self::near(lens, None, EVERY).or_else(|| others().find_map(|fold| Self::near(lens, Some(fold), EVERY)))
+    }
+
+    fn near<L: Radial>(lens: &L, fold: Option<Fold>, every: usize) -> Option<Self> {
+        let of_terms = |terms| Self::of_terms(lens, terms, fold);
+        TERMS.step_by(every).map(of_terms).find(|fit| fit.error(lens) <= L::LARGEST_ERROR)
+    }
+
+    fn of_terms(lens: &impl Radial, terms: usize, fold: Option<Fold>) -> Self {
         let largest = lens.largest_radius();
-        let radius = |t: f64| largest * (0.5 * (t + 1.0)).sqrt();
+        let radius = |t: f64| largest * (0.5 * (fold.map_or(t, |fold| fold.t(t)) + 1.0)).max(0.0).sqrt();
         let sine_over_radius = fit(terms, |t| {
             let r = radius(t);
             if r > 0.0 { lens.angle(r).sin() / r } else { 1.0 / lens.on_axis() }
@@ -50,6 +68,7 @@ impl Unproject {
             per_aspect: 1.0 / lens.stretch(),
             slope: 2.0 / (largest * largest),
             largest_squared: largest * largest,
+            fold,
         }
     }
 
@@ -59,7 +78,8 @@ impl Unproject {
         let error = |i: u32| {
             let r = lens.largest_radius() * f64::from(i) / f64::from(RADII);
             let theta = lens.angle(r);
-            let t = [self.slope * r * r - 1.0];
+            let t = self.slope * r * r - 1.0;
+            let t = [self.fold.map_or(t, |fold| fold.variable(t))];
             let [sine] = polynomial::<false, 1>(&self.sine_over_radius, &t);
             let [cosine] = polynomial::<false, 1>(&self.cosine, &t);
             (sine * r - theta.sin()).abs().max((cosine - theta.cos()).abs())
@@ -77,6 +97,12 @@ impl Kernel<2, 3> for Unproject {
             y[j] = (v[j] - self.centre[1]) * self.per_aspect;
             let squared = x[j] * x[j] + y[j] * y[j];
             t[j] = if squared <= self.largest_squared { self.slope * squared - 1.0 } else { f64::NAN };
+        }
+        if let Some(fold) = self.fold {
+            for t in &mut t {
+                // Not a number stays none.
+                *t = if *t <= 1.0 + TINY { fold.variable(*t) } else { f64::NAN };
+            }
         }
         let sine_over_radius = polynomial::<FUSED, W>(&self.sine_over_radius, &t);
         let cosine = polynomial::<FUSED, W>(&self.cosine, &t);

@@ -4,7 +4,7 @@ use std::fmt::Debug;
 
 use nalgebra::{Matrix2, Matrix2x3, Matrix3x2, Vector2, Vector3};
 
-use super::{CameraModel, ModelParameter, Sight};
+use super::{CameraModel, LensSteps, ModelParameter, Sight};
 use crate::{Angle, Camera, InvalidLens, OutsideField, Pixel, Point, UnitRay};
 
 /// The formula of a central camera model: the pixel of a direction.
@@ -26,6 +26,11 @@ pub trait Formula: Debug + Send + Sync {
 
     /// The pixel of the unit vector `direction`, no farther from the axis than [`Self::ends`]. `None` where the formula says nothing of it.
     fn image(&self, direction: &Vector3<f64>) -> Option<Pixel>;
+
+    /// The formula as steps by which arrays are computed, where it has such.
+    fn steps(&self) -> Option<LensSteps> {
+        None
+    }
 }
 
 /// A central camera: a [`Formula`] within its valid cone.
@@ -119,6 +124,10 @@ impl<F: Formula> CameraModel for Central<F> {
 
     fn half_field(&self) -> Angle {
         Angle::from_rad(self.half_field)
+    }
+
+    fn steps(&self) -> Option<LensSteps> {
+        self.formula.steps()
     }
 
     fn project(&self, ray: &UnitRay<Camera>) -> Result<Pixel, OutsideField> {

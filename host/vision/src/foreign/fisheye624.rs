@@ -5,7 +5,7 @@
 use nalgebra::{Vector2, Vector3};
 
 use super::double_sphere::positive;
-use super::{Formula, ModelParameter, ParameterUnit};
+use super::{AngleLaw, Formula, LensSteps, ModelParameter, OntoPlane, ParameterUnit, Radtan};
 use crate::{Asymmetry, InvalidLens, Pixel};
 
 /// FISHEYE624.
@@ -50,5 +50,14 @@ impl Formula for Fisheye624 {
         let at = displaced.moved(Vector2::new(scale * d.x, scale * d.y));
         let [fx, fy, cx, cy] = self.pinhole;
         Some(Pixel { u: fx * at.x + cx, v: fy * at.y + cy })
+    }
+
+    fn steps(&self) -> Option<LensSteps> {
+        Some(LensSteps::new(
+            OntoPlane::Angle(AngleLaw::Series(self.radial)),
+            Radtan::asymmetric(self.tangential, self.prism),
+            self.pinhole,
+            0.0,
+        ))
     }
 }

@@ -7,7 +7,7 @@ use nalgebra::Vector3;
 
 use super::double_sphere::{must, positive};
 use super::pinhole::Radtan;
-use super::{Formula, ModelParameter, ParameterUnit};
+use super::{Formula, LensSteps, ModelParameter, OntoPlane, ParameterUnit};
 use crate::{InvalidLens, Pixel};
 
 /// The model of Mei.
@@ -52,5 +52,9 @@ impl Formula for Mei {
         let [x, y] = self.distortion.distorted([d.x / depth, d.y / depth]);
         let [fx, fy, cx, cy] = self.pinhole;
         Some(Pixel { u: fx * x + self.skew * y + cx, v: fy * y + cy })
+    }
+
+    fn steps(&self) -> Option<LensSteps> {
+        Some(LensSteps::new(OntoPlane::Sphere(self.xi), self.distortion, self.pinhole, self.skew))
     }
 }

@@ -16,6 +16,7 @@ mod ocam;
 mod pinhole;
 mod splined;
 mod splined_fit;
+mod steps;
 
 use std::fmt::Debug;
 
@@ -32,6 +33,8 @@ pub use self::ocam::OCam;
 pub use self::pinhole::{Pinhole, Radtan};
 pub use self::splined::{SplineGrid, SplinedStereographic};
 pub use self::splined_fit::{SplineFit, fit_spline};
+pub use self::steps::LensSteps;
+pub(crate) use self::steps::{AngleLaw, OntoPlane};
 use crate::{Angle, Camera, KannalaBrandt, OutsideField, Pixel, Point, UnitRay};
 
 /// A parameter of a camera model.
@@ -119,6 +122,11 @@ pub trait CameraModel: Debug + Send + Sync {
     /// # Errors
     /// [`OutsideField`].
     fn pixel_by_ray(&self, ray: &UnitRay<Camera>) -> Result<Matrix2x3<f64>, OutsideField>;
+
+    /// The model as steps by which arrays are computed, where it has such.
+    fn steps(&self) -> Option<LensSteps> {
+        None
+    }
 
     /// The same camera as a [`KannalaBrandt`] lens, where it is one.
     fn as_kannala_brandt(&self) -> Option<KannalaBrandt> {

@@ -6,7 +6,7 @@
 use nalgebra::Vector3;
 
 use super::double_sphere::must;
-use super::{Formula, ModelParameter, ParameterUnit};
+use super::{AngleLaw, Formula, LensSteps, ModelParameter, OntoPlane, ParameterUnit, Radtan};
 use crate::{InvalidLens, Pixel};
 
 /// The model of OCamCalib.
@@ -55,7 +55,7 @@ impl OCam {
     }
 
     /// The angle to the axis at the radius r.
-    fn angle(&self, radius: f64) -> f64 {
+    pub(super) fn angle(&self, radius: f64) -> f64 {
         let backwards = self.polynomial.iter().rev().fold(0.0, |sum, a| sum * radius + a);
         radius.atan2(-backwards)
     }
@@ -68,7 +68,7 @@ impl OCam {
     }
 
     /// The radius at the angle to the axis, by Newton's method kept inside a shrinking bracket.
-    fn radius(&self, angle: f64) -> f64 {
+    pub(super) fn radius(&self, angle: f64) -> f64 {
         const STEPS: usize = 60;
         let [mut low, mut high] = [0.0, self.reach[0]];
         let mut radius = high * (angle / self.reach[1]).clamp(0.0, 1.0);
@@ -121,5 +121,14 @@ impl Formula for OCam {
         let [c, d, e] = self.affine;
         let [row, column] = self.centre;
         Some(Pixel { u: e * down + across + column, v: c * down + d * across + row })
+    }
+
+    fn steps(&self) -> Option<LensSteps> {
+        let ([c, d, e], [row, column]) = (self.affine, self.centre);
+        Some(LensSteps {
+            onto_plane: OntoPlane::Angle(AngleLaw::OCam(self.clone())),
+            distortion: Radtan::default(),
+            affine: [[1.0, e, column], [d, c, row]],
+        })
     }
 }

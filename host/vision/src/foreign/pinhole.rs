@@ -5,16 +5,16 @@
 use nalgebra::{Matrix3, Vector3};
 
 use super::double_sphere::positive;
-use super::{Formula, ModelParameter, ParameterUnit};
+use super::{Formula, LensSteps, ModelParameter, OntoPlane, ParameterUnit};
 use crate::{InvalidLens, Pixel};
 
 /// Distortion on the plane z = 1, with the coefficients of OpenCV in its order:
 /// k1 k2 p1 p2 k3 k4 k5 k6 s1 s2 s3 s4 τx τy. The first 4, 5, 8, 12 or 14 are given, the others are zero.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Radtan {
-    coefficients: [f64; 14],
+    pub(crate) coefficients: [f64; 14],
     /// What the tilt of the sensor does to the plane.
-    tilt: Matrix3<f64>,
+    pub(crate) tilt: Matrix3<f64>,
 }
 
 pub(super) const NAMES: [&str; 14] =
@@ -33,6 +33,11 @@ impl Radtan {
         }
         let [.., tau_x, tau_y] = all;
         Some(Self { coefficients: all, tilt: tilt(tau_x, tau_y) })
+    }
+
+    /// The displacement of [`crate::Asymmetry`] alone, with its tangential and prism terms.
+    pub(super) fn asymmetric([p0, p1]: [f64; 2], [s1, s2, s3, s4]: [f64; 4]) -> Self {
+        Self { coefficients: [0.0, 0.0, p1, p0, 0.0, 0.0, 0.0, 0.0, s1, s2, s3, s4, 0.0, 0.0], ..Self::default() }
     }
 
     /// The coefficients up to the last that is not zero, and k1 k2 p1 p2 always.
@@ -57,6 +62,13 @@ impl Radtan {
         }
         let tilted = self.tilt * Vector3::new(x, y, 1.0);
         [tilted.x / tilted.z, tilted.y / tilted.z]
+    }
+}
+
+impl Default for Radtan {
+    /// No distortion.
+    fn default() -> Self {
+        Self { coefficients: [0.0; 14], tilt: Matrix3::identity() }
     }
 }
 
@@ -99,5 +111,9 @@ impl Formula for Pinhole {
         let [x, y] = self.distortion.distorted([d.x / d.z, d.y / d.z]);
         let [fx, fy, cx, cy] = self.pinhole;
         Some(Pixel { u: fx * x + cx, v: fy * y + cy })
+    }
+
+    fn steps(&self) -> Option<LensSteps> {
+        Some(LensSteps::new(OntoPlane::Sphere(0.0), self.distortion, self.pinhole, 0.0))
     }
 }

@@ -6,7 +6,7 @@
 use nalgebra::Vector3;
 
 use super::double_sphere::{must, positive};
-use super::{Formula, ModelParameter, ParameterUnit};
+use super::{Formula, LensSteps, ModelParameter, OntoPlane, ParameterUnit, Radtan};
 use crate::{InvalidLens, Pixel};
 
 /// The grid of control points.
@@ -149,5 +149,10 @@ impl Formula for SplinedStereographic {
         let shift = self.shift(u)?;
         let [fx, fy, cx, cy] = self.pinhole;
         Some(Pixel { u: fx * (u[0] + shift[0]) + cx, v: fy * (u[1] + shift[1]) + cy })
+    }
+
+    fn steps(&self) -> Option<LensSteps> {
+        let onto_plane = OntoPlane::Stereographic(self.clone());
+        Some(LensSteps::new(onto_plane, Radtan::default(), self.pinhole, 0.0))
     }
 }
