@@ -1,6 +1,6 @@
 //! What the files of a calibration state of clouds, from photographs to files: rendered photographs of a target go through the command line
 //! to camera files and a rig file, and `depth` measures new photographs at new stage poses with that file. The bench, its lenses and the
-//! room are simulated; everything from the image files on is what a user runs.
+//! room are simulated, the lenses as they are made and mounted; everything from the image files on is what a user runs.
 #![allow(
     clippy::expect_used,
     clippy::panic,
@@ -17,7 +17,7 @@ mod live_pair;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-use common::built_bench::{Dice, POSES, as_built, stand};
+use common::built_bench::{Dice, POSES, as_built, mounted, stand};
 use common::rendered::{band, seeds};
 use common::{run, run_json, text};
 use live_pair::live_pair;
@@ -67,6 +67,7 @@ impl Trial {
     fn new(seed: u64) -> Self {
         let mut dice = Dice::new(seed);
         let bench = as_built(&mut dice).with_sensors(WIDTH).expect("a size");
+        let bench = mounted(bench, &mut Dice::new(seed + 77_000));
         let work = tempfile::tempdir().expect("a temporary folder");
         Self { bench, room: Arc::new(Room::with_rig()), dice, work, seed }
     }

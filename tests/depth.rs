@@ -123,6 +123,10 @@ fn depth_of_given_correspondences() {
         }
     }
     fails_with(&[&["depth", "--kernel", "guess"], &options[..]].concat(), 2, &["guess", "midpoint"]);
+    std::fs::write(file("none.csv"), "u_left,v_left,u_right,v_right\n").expect("written");
+    let none =
+        ["--rig", &rig, "--left", &grey, "--right", &grey, "--points", &file("none.csv"), "--out", &file("n.ply")];
+    fails_with(&[&["depth"], &none[..]].concat(), 1, &["no line of --points"]);
     run_json(&[&["depth", "--json", "--also", "csv,json"], &options[..]].concat());
     let csv = std::fs::read_to_string(file("cloud.csv")).expect("a table");
     let row: Vec<f64> =

@@ -3,7 +3,7 @@
 
 use nalgebra::Vector3;
 use vergence_rig::{BENCH_TOML, Rig, RigPose};
-use vergence_vision::{Angle, KannalaBrandt, OpenCvFisheye};
+use vergence_vision::{Angle, Asymmetry, KannalaBrandt, OpenCvFisheye, Pupil};
 
 /// Baseline in millimetres and separation in degrees of the stage poses that calibrate.
 pub const POSES: [[f64; 2]; 6] =
@@ -68,6 +68,26 @@ fn lens(drawn: &KannalaBrandt, dice: &mut Dice) -> KannalaBrandt {
     let k = std::array::from_fn(|index| k[index] + off[index]);
     let lens = OpenCvFisheye { fx, fy: fx, cx: cx + 3.0 * dice.normal(), cy: cy + 3.0 * dice.normal(), k };
     KannalaBrandt::from_opencv(lens, Angle::from_deg(97.0), drawn.size()).expect("a lens")
+}
+
+/// The bench with lenses as they are made and mounted: each with a pupil that moves, and with decentring and thin prism of a share, anywhere between
+/// none and all, of those that traced lenses with displaced elements have (docs/measured/lenses.md, "What lenses have before any view").
+pub fn mounted(rig: Rig, dice: &mut Dice) -> Rig {
+    let mut lens = |lens: KannalaBrandt| {
+        let share = 0.5 + 0.5 * dice.uniform();
+        let mut draw = |sigma: f64| share * sigma * dice.normal();
+        let mut along = || {
+            let p = draw(6.7e-4);
+            let square = -1.7 * p + draw(8.2e-4);
+            [p, square, 0.4 * p + 0.57 * square + draw(3.7e-4)]
+        };
+        let ([p1, s0, s1], [p2, s2, s3]) = (along(), along());
+        let pupil = Pupil::from_mm([1.5 + 1.5 * dice.uniform(), 0.3 * dice.normal()]);
+        let asymmetry = Asymmetry::from_array([p1, p2, s0, s1, s2, s3]);
+        lens.with_pupil(pupil).and_then(|lens| lens.with_asymmetry(asymmetry)).expect("a lens")
+    };
+    let (left_camera, right_camera) = (lens(rig.left_camera), lens(rig.right_camera));
+    Rig { left_camera, right_camera, ..rig }
 }
 
 /// What the encoders read, in millimetres and radians, near a wished pose, and the true pose there: within a count.

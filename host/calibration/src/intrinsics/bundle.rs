@@ -5,7 +5,7 @@ use vergence_vision::Point;
 
 use super::lens::{LENS, LensParameters, reproject};
 use super::observations::{Observation, ObservedView};
-use super::prior::{KNOWN, Known};
+use super::prior::{KNOWN, Known, Strength};
 use crate::reprojection::{POSE, moved};
 use crate::schur_lm::{Equations, SchurProblem};
 
@@ -78,7 +78,7 @@ pub(super) struct Bundle<'a> {
     pub views: &'a [&'a ObservedView],
     pub free: &'a [usize],
     /// How strongly what is known of lenses before any view counts, see [`super::prior::Prior::strength`].
-    pub prior: Option<f64>,
+    pub prior: Option<Strength>,
 }
 
 impl<'a> Bundle<'a> {
@@ -115,12 +115,12 @@ impl SchurProblem<POSE> for Bundle<'_> {
         let Some(strength) = self.prior else { return };
         let values: Vec<f64> = shared.lens.to_array().into_iter().chain(shared.warp_mm).collect();
         let place = |parameter: usize| self.free.iter().position(|&free| free == parameter);
-        for Known { sum, sigma } in &KNOWN {
+        for (nth, Known { sum, sigma }) in KNOWN.iter().enumerate() {
             let mut columns = vec![[0.0]; self.free.len()];
             let mut off = 0.0;
             for &(parameter, weight) in *sum {
                 let Some(column) = place(parameter) else { continue };
-                columns[column] = [strength * weight / sigma];
+                columns[column] = [strength.of(nth) * weight / sigma];
                 off += columns[column][0] * values[parameter];
             }
             if sum.first().is_some_and(|&(own, _)| place(own).is_some()) {

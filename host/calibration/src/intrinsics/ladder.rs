@@ -4,6 +4,9 @@
 //! loses without it: the pupil's e0, its growth e1, and decentring with thin prism, which go together because one displaced element makes
 //! both; and the bow of the target. All are judged by the scatter that the richest lens leaves, since what it explains is no scatter.
 //!
+//! Evidence is weighed for lenses as badly mounted as any; the fit that is left counts how badly this one is, as far as the views tell
+//! (`mounting`).
+//!
 //! A group stays out only where the views tell that the lens has none of it. What they leave open stays an unknown with its prior: a lens
 //! that passed as symmetric because few views did not show otherwise would be stated far more certain than it is.
 
@@ -11,6 +14,7 @@ use vergence_vision::ImageSize;
 
 use super::adjust::{Adjusted, State, Terms, inlier_fit};
 use super::lens::with_valid_cone;
+use super::mounting::mounting;
 use super::observations::ObservedView;
 use super::prior::{BOW, Prior, narrowest};
 use super::pupil;
@@ -107,9 +111,9 @@ pub(super) struct Richest<'a> {
 impl<'a> Richest<'a> {
     /// `None` where the corners do not give one.
     fn of(central: &Adjusted, terms: Terms, size: ImageSize, options: &'a IntrinsicsOptions) -> Option<Self> {
-        let rough = Prior { scatter: 1.0 };
+        let rough = Prior { scatter: 1.0, mounting: 1.0 };
         let first = Trial::of(central, terms, rough);
-        let prior = Prior { scatter: scatter(&first.normal, rough)? };
+        let prior = Prior { scatter: scatter(&first.normal, rough)?, ..rough };
         let adjusted = inlier_fit(central.views.clone(), first.state, terms.free(), Some(prior), options);
         let adjusted = adjusted.ok()?.after(central);
         with_valid_cone(adjusted.shared.lens, outermost(&adjusted), size).ok()?;
@@ -151,13 +155,12 @@ impl<'a> Richest<'a> {
             terms.bow = evidence.verdict != StepVerdict::Absent;
             steps.push(evidence);
         }
-        let adjusted = if terms == self.terms {
-            self.adjusted
-        } else if terms == Terms::central(self.options.warp) {
+        let adjusted = if terms == Terms::central(self.options.warp) {
             central
         } else {
             let start = self.adjusted.state().with_only(terms);
-            inlier_fit(self.adjusted.views.clone(), start, terms.free(), Some(self.prior), self.options)?
+            let prior = Prior { mounting: mounting(&self.adjusted, self.variance).unwrap_or(1.0), ..self.prior };
+            inlier_fit(self.adjusted.views.clone(), start, terms.free(), Some(prior), self.options)?
                 .after(&self.adjusted)
         };
         Ok((adjusted, Evidence { pupil, steps }))

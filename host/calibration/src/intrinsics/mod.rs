@@ -11,6 +11,7 @@ mod bundle;
 mod ladder;
 mod lens;
 mod model;
+mod mounting;
 mod observations;
 mod prior;
 mod pupil;

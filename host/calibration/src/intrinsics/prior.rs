@@ -7,7 +7,7 @@
 
 use std::ops::Range;
 
-use nalgebra::{DMatrix, SymmetricEigen};
+use nalgebra::{DMatrix, DVector, SymmetricEigen};
 use vergence_vision::median;
 
 use super::adjust::{Adjusted, State};
@@ -63,6 +63,13 @@ const FOURTH_BY_SQUARE: f64 = -0.589;
 /// By how much the views narrow what was known of decentring and thin prism, in the direction of them of which they say least: the standard
 /// deviation that is left, in parts of that before, where the variance of a residual is `variance`. `None` where that is not known.
 pub(super) fn narrowest(adjusted: &Adjusted, variance: f64) -> Option<f64> {
+    let (_, left) = asymmetry(adjusted, variance)?;
+    Some(SymmetricEigen::new(left).eigenvalues.max().max(0.0).sqrt())
+}
+
+/// The decentring and thin prism of a lens and their covariance, in standard deviations of what is known before any view, for `variance`, that of
+/// a residual. `None` where they are not adjusted or not determined.
+pub(super) fn asymmetry(adjusted: &Adjusted, variance: f64) -> Option<(DVector<f64>, DMatrix<f64>)> {
     let covariance = adjusted.normal.shared_covariance()?;
     let known = KNOWN.get(ASYMMETRY)?;
     let mut by_free = DMatrix::zeros(known.len(), adjusted.free.len());
@@ -71,8 +78,10 @@ pub(super) fn narrowest(adjusted: &Adjusted, variance: f64) -> Option<f64> {
             by_free[(row, adjusted.free.iter().position(|free| free == parameter)?)] = weight / sigma;
         }
     }
-    let left = &by_free * covariance * by_free.transpose() * variance;
-    Some(SymmetricEigen::new(left).eigenvalues.max().max(0.0).sqrt())
+    let lens = adjusted.shared.lens.to_array();
+    let values = adjusted.free.iter().map(|&parameter| lens.get(parameter).copied().unwrap_or_default());
+    let values = DVector::from_iterator(adjusted.free.len(), values);
+    Some((&by_free * values, &by_free * covariance * by_free.transpose() * variance))
 }
 
 /// How the prior weighs against the views.
@@ -81,6 +90,23 @@ pub(super) struct Prior {
     /// How much more the views pull than the noise of their corners explains, see [`crate::schur_lm::Clustered::scatter`]. A view weighs
     /// less against the prior by that.
     pub scatter: f64,
+    /// How badly the lens is mounted, in parts of the badly mounted ones: see [`super::mounting`].
+    pub mounting: f64,
+}
+
+/// The prior in units of residuals.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Strength {
+    /// Of what is known to one standard deviation.
+    of_one: f64,
+    mounting: f64,
+}
+
+impl Strength {
+    /// By what to multiply the deviation from the `nth` of [`KNOWN`], in its standard deviations.
+    pub fn of(self, nth: usize) -> f64 {
+        if ASYMMETRY.contains(&nth) { self.of_one / self.mounting } else { self.of_one }
+    }
 }
 
 impl Prior {
@@ -89,9 +115,9 @@ impl Prior {
         self.scatter * self.scatter
     }
 
-    /// By what to multiply what is known, in its standard deviations, to have it in units of residuals: these weigh by their scale.
-    pub fn strength(self, views: &[ObservedView], state: &State) -> Option<f64> {
-        Some(self.scatter * noise(views, state)?)
+    /// The prior in units of residuals, which weigh by their scale.
+    pub fn strength(self, views: &[ObservedView], state: &State) -> Option<Strength> {
+        Some(Strength { of_one: self.scatter * noise(views, state)?, mounting: self.mounting })
     }
 }
 

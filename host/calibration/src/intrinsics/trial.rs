@@ -5,7 +5,7 @@ use nalgebra::Isometry3;
 use super::adjust::{Adjusted, State, Terms};
 use super::bundle::{Bundle, Shared};
 use super::observations::ObservedView;
-use super::prior::Prior;
+use super::prior::{Prior, Strength};
 use crate::reprojection::POSE;
 use crate::schur_lm::{SchurNormal, SchurOptions, solve};
 
@@ -14,7 +14,7 @@ pub(super) struct Trial {
     /// The parameters adjusted.
     free: Vec<usize>,
     /// How strongly the prior counts.
-    prior: Option<f64>,
+    prior: Option<Strength>,
     pub state: State,
     pub normal: SchurNormal<POSE>,
 }

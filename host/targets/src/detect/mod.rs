@@ -23,6 +23,7 @@ mod placement;
 mod plane;
 mod predict;
 mod refine;
+mod response;
 mod saddle;
 mod search;
 mod tags;

@@ -3,8 +3,11 @@
 //! S. Bennett and J. Lasenby, "ChESS: quick and robust detection of chess-target features", CVIU 118, 2014.
 
 use calib_targets_chessboard::{
-    ChessCorner, ChessboardDetection, ChessboardDetector, ChessboardParams, GrayImageView, default_chess_config,
-    detect_corners,
+    ChessCorner, ChessboardDetection, ChessboardDetector, ChessboardParams, default_chess_config,
+};
+use chess_corners_core::{
+    CenterOfMassRefiner, CornerDescriptor, CornerRefiner, chess_response_u8, describe_corners,
+    detect_peaks_from_response_with_refine_radius, merge_corners_simple, refine_corners_on_image,
 };
 use image::GrayImage;
 use image::imageops::thumbnail;
@@ -12,6 +15,7 @@ use nalgebra::Vector2;
 
 use super::CornerQuality;
 use super::lattice::{Found, Lattice};
+use super::response::response;
 
 /// Standard deviation of a corner found by the search alone, in pixels.
 const SEARCH_SIGMA_PX: f64 = 1.0;
@@ -23,8 +27,23 @@ pub fn features(image: &GrayImage) -> Vec<ChessCorner> {
     if image.width().min(image.height()) < SMALLEST_PX {
         return Vec::new();
     }
-    let view = GrayImageView { width: image.width() as usize, height: image.height() as usize, data: image.as_raw() };
-    detect_corners(&view, &default_chess_config())
+    let (config, [width, height]) = (default_chess_config(), [image.width() as usize, image.height() as usize]);
+    let params = config.chess_params();
+    let response = response(image).unwrap_or_else(|| chess_response_u8(image.as_raw(), width, height, &params));
+    let mut refiner = CenterOfMassRefiner::new(params.center_of_mass);
+    let peaks = detect_peaks_from_response_with_refine_radius(&response, &params, refiner.radius());
+    let mut corners = refine_corners_on_image(peaks, None, Some(&response), &mut refiner);
+    let merged = merge_corners_simple(&mut corners, config.merge_radius);
+    let method = params.orientation_method;
+    describe_corners(image.as_raw(), width, height, params.ring_radius(), merged, method).iter().map(feature).collect()
+}
+
+fn feature(found: &CornerDescriptor) -> ChessCorner {
+    let mut feature = ChessCorner::new(nalgebra::Point2::new(found.x, found.y), Default::default(), found.response);
+    for (axis, found) in feature.axes.iter_mut().zip(found.axes.iter().flatten()) {
+        (axis.angle, axis.fit_std_error) = (found.angle, found.fit_std_error);
+    }
+    feature
 }
 
 /// The labelled patches in the image, the largest first. The first axis turns clockwise into the second as they are seen, as x
@@ -68,4 +87,28 @@ fn winding(lattice: &Lattice) -> f64 {
         Some(right.perp(&down))
     };
     lattice.iter().filter_map(|(node, found)| area(node, found)).sum()
+}
+
+#[cfg(test)]
+mod tests {
+    use calib_targets_chessboard::{GrayImageView, detect_corners};
+    use image::Luma;
+
+    use super::*;
+
+    /// Squares with noise: hundreds of features, wanted and unwanted.
+    #[test]
+    fn features_are_those_of_the_library() {
+        for [width, height] in [[240, 190], [40, 300]] {
+            let level = |x: u32, y: u32| {
+                let noise = (x * x * 31 + y * 57 + x * y * 13) % 41;
+                if (x / 17 + y / 17).is_multiple_of(2) { 30 + noise } else { 170 + noise }
+            };
+            let image = GrayImage::from_fn(width, height, |x, y| Luma([level(x, y) as u8]));
+            let view = GrayImageView { width: width as usize, height: height as usize, data: image.as_raw() };
+            let (ours, theirs) = (features(&image), detect_corners(&view, &default_chess_config()));
+            assert!(theirs.len() > 20, "{} features", theirs.len());
+            assert_eq!(ours, theirs, "{width} x {height}");
+        }
+    }
 }

@@ -196,10 +196,11 @@ fn every_pair(args: &Args, rig: Option<&Path>, console: Console, progress: &Prog
         return Ok(());
     }
     // Their files are written all the same: no point, or every pixel a gap.
-    Err(Failure::check(format!(
-        "nothing in {} has a range: the images are dark, without texture, or not of this pose",
-        empty.join(", ")
-    )))
+    let why = match args.points {
+        Some(_) => "no line of --points gives a point in this pose",
+        None => "the images are dark, without texture, or not of this pose",
+    };
+    Err(Failure::check(format!("nothing in {} has a range: {why}", empty.join(", "))))
 }
 
 /// What holds for every pair.
