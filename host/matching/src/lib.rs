@@ -25,6 +25,7 @@ mod distinct;
 mod epipolar_band;
 mod grid;
 mod guided;
+mod knots;
 pub mod learned;
 mod links;
 mod match_errors;

@@ -3,9 +3,11 @@
 //! The windows of the search spread a near surface by some pixels over the farther one beside it, above all where the
 //! right camera does not see the latter, and of small steps they make a mixture.
 
+use multiversion::multiversion;
 use rayon::prelude::*;
 
 use super::levels::filled;
+use super::window::BAND;
 
 /// The reach of the windows in pixels.
 const WINDOW: usize = 4;
@@ -18,44 +20,77 @@ const ROUGHNESS: f32 = 0.25;
 /// the height of the step. `disparities` are NaN where there are none; gaps that the left camera sees count as the farther of the surfaces
 /// beside them on their row.
 pub(super) fn steps(disparities: &[f32], seen: &[bool], width: usize) -> Vec<f32> {
-    let mut surfaces = vec![f32::NAN; disparities.len()];
-    surfaces.par_chunks_mut(width).zip(disparities.par_chunks(width)).zip(seen.par_chunks(width)).for_each(
-        |((surfaces, disparities), seen)| {
-            for ((surface, filled), _) in
-                surfaces.iter_mut().zip(filled(disparities)).zip(seen).filter(|(_, seen)| **seen)
-            {
-                *surface = filled;
-            }
-        },
-    );
-    let [least, most] = [f32::min, f32::max].map(|choose| extremes(&surfaces, width, WINDOW, choose));
-    let ends = least.par_iter().zip(&most).zip(disparities);
-    ends.map(|((least, most), own)| {
-        let step = (most - own) - (own - least);
-        step.signum() * (step.abs() - ROUGHNESS).max(0.0)
-    })
-    .collect()
+    let height = disparities.len() / width;
+    let mut steps = vec![0.0; disparities.len()];
+    steps.par_chunks_mut(BAND * width).enumerate().for_each(|(band, steps)| {
+        let top = band * BAND;
+        let rows = top.saturating_sub(WINDOW)..(top + steps.len() / width + WINDOW).min(height);
+        let along: Vec<[Vec<f32>; 2]> = rows
+            .clone()
+            .map(|y| extremes_along(&filled(&disparities[y * width..][..width]), &seen[y * width..][..width]))
+            .collect();
+        for (y, steps) in (top..).zip(steps.chunks_exact_mut(width)) {
+            let window = &along[y.saturating_sub(WINDOW) - rows.start..(y + WINDOW + 1).min(height) - rows.start];
+            steps_of_row(steps, &disparities[y * width..][..width], window);
+        }
+    });
+    steps
 }
 
-/// The least or the largest value, by `choose`, within `reach` pixels in each direction; NaN counts as no value.
-fn extremes(values: &[f32], width: usize, reach: usize, choose: impl Fn(f32, f32) -> f32 + Sync) -> Vec<f32> {
-    let mut along = vec![f32::NAN; values.len()];
-    along.par_chunks_mut(width).zip(values.par_chunks(width)).for_each(|(along, row)| {
-        along.copy_from_slice(row);
-        for step in 1..=reach.min(width - 1) {
-            along.iter_mut().zip(&row[step..]).for_each(|(chosen, other)| *chosen = choose(*chosen, *other));
-            along[step..].iter_mut().zip(row).for_each(|(chosen, other)| *chosen = choose(*chosen, *other));
+/// The least and the largest value of each window along a row; infinite where nothing in it is seen.
+fn extremes_along(values: &[f32], seen: &[bool]) -> [Vec<f32>; 2] {
+    [(f32::INFINITY, smaller as fn(&mut [f32], usize)), (f32::NEG_INFINITY, larger)].map(|(none, spread)| {
+        let mut padded = vec![none; values.len() + 2 * WINDOW];
+        for ((padded, value), _) in padded[WINDOW..].iter_mut().zip(values).zip(seen).filter(|(_, seen)| **seen) {
+            *padded = *value;
         }
-    });
-    let height = values.len() / width;
-    let mut chosen = vec![f32::NAN; values.len()];
-    chosen.par_chunks_mut(width).enumerate().for_each(|(y, chosen)| {
-        for other in y.saturating_sub(reach)..(y + reach + 1).min(height) {
-            let row = &along[other * width..][..width];
-            chosen.iter_mut().zip(row).for_each(|(chosen, other)| *chosen = choose(*chosen, *other));
+        // Of 2, 4, 8 and 9 neighbours.
+        for step in [1, 2, 4, 1] {
+            spread(&mut padded, step);
         }
-    });
-    chosen
+        padded.truncate(values.len());
+        padded
+    })
+}
+
+/// Takes the smaller one of each value and the one that is `step` behind it.
+#[multiversion(targets("x86_64+avx512f+avx512dq+avx512vl+avx2+fma", "x86_64+avx2+fma"))]
+fn smaller(values: &mut [f32], step: usize) {
+    for x in 0..values.len() - step {
+        values[x] = if values[x + step] < values[x] { values[x + step] } else { values[x] };
+    }
+}
+
+/// Takes the larger one of each value and the one that is `step` behind it.
+#[multiversion(targets("x86_64+avx512f+avx512dq+avx512vl+avx2+fma", "x86_64+avx2+fma"))]
+fn larger(values: &mut [f32], step: usize) {
+    for x in 0..values.len() - step {
+        values[x] = if values[x + step] > values[x] { values[x + step] } else { values[x] };
+    }
+}
+
+/// The steps of a row from its own disparities and the extremes along the rows of its windows.
+#[multiversion(targets("x86_64+avx512f+avx512dq+avx512vl+avx2+fma", "x86_64+avx2+fma"))]
+fn steps_of_row(steps: &mut [f32], disparities: &[f32], window: &[[Vec<f32>; 2]]) {
+    let mut extremes = [vec![f32::INFINITY; steps.len()], vec![f32::NEG_INFINITY; steps.len()]];
+    for [least, most] in window {
+        let [lowest, highest] = &mut extremes;
+        lowest
+            .iter_mut()
+            .zip(least)
+            .for_each(|(lowest, least)| *lowest = if *least < *lowest { *least } else { *lowest });
+        highest
+            .iter_mut()
+            .zip(most)
+            .for_each(|(highest, most)| *highest = if *most > *highest { *most } else { *highest });
+    }
+    let [lowest, highest] = &extremes;
+    for (((step, own), least), most) in steps.iter_mut().zip(disparities).zip(lowest).zip(highest) {
+        let height = (most - own) - (own - least);
+        // What is not seen has no disparity, and NaN remains.
+        let beyond = (height.abs() - ROUGHNESS).max(0.0);
+        *step = if height.is_nan() { f32::NAN } else { beyond.copysign(height) };
+    }
 }
 
 #[cfg(test)]

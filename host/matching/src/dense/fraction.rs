@@ -4,9 +4,9 @@ use rayon::prelude::*;
 
 use super::Gap;
 use super::edges::steps;
-use super::register::{Registration, SampledView, register};
+use super::register::{Registration, SampledView};
 use super::support::isolated;
-use super::surface::{SAME_SURFACE, Surface, surface};
+use super::surface::{SAME_SURFACE, Surface};
 
 /// Reach of the windows for smoothing and registration, in pixels of the view.
 const REACH: usize = 4;
@@ -45,23 +45,39 @@ pub struct Disparities {
 /// Smooths and registers twice. The first pass brings slanted surfaces within the reach of the second. `area` is that of
 /// a pixel of the coarsest level of the search.
 pub(super) fn registered(views: [SampledView<'_>; 2], whole: &[f32], area: usize) -> Disparities {
-    let width = views[0].plane.width();
-    let smooth = surface(whole, width, REACH);
-    let moved = moved(&smooth, &register(views, &smooth.disparity, REACH));
-    let smooth = surface(&moved, width, REACH);
-    let registration = register(views, &smooth.disparity, REACH);
-    let disparity = self::moved(&smooth, &registration);
-    let mut doubt: Vec<Option<Gap>> = registration.sigma.iter().zip(&registration.likeness).map(by_window).collect();
-    let small = isolated(&trusted(&disparity, &doubt), width, (SMALLEST * area) as u32);
-    for (doubt, _) in doubt.iter_mut().zip(&small).filter(|(doubt, small)| doubt.is_none() && **small) {
-        *doubt = Some(Gap::Isolated);
-    }
-    let steps = steps(&trusted(&disparity, &doubt), views[0].seen, width);
-    let own = registration.sigma.par_iter().zip(&smooth.roughness).zip(&steps);
-    let sigma = own.map(|((own, roughness), step)| sigma_of(*own, *roughness, *step)).collect();
-    let others = disparity.par_iter().zip(&steps);
-    let other = others.map(|(own, step)| if step.abs() > SAME_SURFACE { own + step } else { f32::NAN }).collect();
-    Disparities { disparity, sigma, likeness: registration.likeness, other, doubt }
+    let (width, count) = (views[0].plane.width(), whole.len());
+    let (mut smooth, mut registration) = (Surface::new(count), Registration::new(count));
+    smooth.fit(whole, width, REACH);
+    registration.run(views, &smooth.disparity, REACH);
+    let mut disparity = vec![0.0; count];
+    moved(&mut disparity, &smooth, &registration);
+    smooth.fit(&disparity, width, REACH);
+    registration.run(views, &smooth.disparity, REACH);
+    moved(&mut disparity, &smooth, &registration);
+    let Surface { disparity: mut trusted, roughness } = smooth;
+    let Registration { sigma: own, likeness, shift: mut other } = registration;
+    let mut doubt: Vec<Option<Gap>> = own.par_iter().zip(&likeness).map(by_window).collect();
+    trusted.par_iter_mut().zip(&disparity).zip(&doubt).for_each(|((trusted, disparity), doubt)| {
+        *trusted = if doubt.is_none() { *disparity } else { f32::NAN };
+    });
+    let small = isolated(&trusted, width, (SMALLEST * area) as u32);
+    doubt
+        .par_iter_mut()
+        .zip(&mut trusted)
+        .zip(&small)
+        .filter(|((doubt, _), small)| doubt.is_none() && **small)
+        .for_each(|((doubt, trusted), _)| {
+            (*doubt, *trusted) = (Some(Gap::Isolated), f32::NAN);
+        });
+    let steps = steps(&trusted, views[0].seen, width);
+    other.par_iter_mut().zip(&disparity).zip(&steps).for_each(|((other, own), step)| {
+        *other = if step.abs() > SAME_SURFACE { own + step } else { f32::NAN };
+    });
+    let mut sigma = own;
+    sigma.par_iter_mut().zip(&roughness).zip(&steps).for_each(|((sigma, roughness), step)| {
+        *sigma = sigma_of(*sigma, *roughness, *step);
+    });
+    Disparities { disparity, sigma, likeness, other, doubt }
 }
 
 /// What the registration of a window says against its result.
@@ -82,14 +98,10 @@ fn sigma_of(own: f32, roughness: f32, step: f32) -> f32 {
     (own * own + rough * rough + INTERPOLATION * INTERPOLATION + mixed * mixed).sqrt()
 }
 
-/// The disparities of which nothing is wrong; NaN elsewhere.
-fn trusted(disparities: &[f32], doubt: &[Option<Gap>]) -> Vec<f32> {
-    let trusted = disparities.par_iter().zip(doubt);
-    trusted.map(|(disparity, doubt)| if doubt.is_none() { *disparity } else { f32::NAN }).collect()
-}
-
 /// The disparities of the surface, shifted where registration converged.
-fn moved(surface: &Surface, registration: &Registration) -> Vec<f32> {
-    let moved = |(&disparity, &shift): (&f32, &f32)| if shift.abs() <= MOST { disparity + shift } else { disparity };
-    surface.disparity.iter().zip(&registration.shift).map(moved).collect()
+fn moved(disparity: &mut [f32], surface: &Surface, registration: &Registration) {
+    let from = disparity.par_iter_mut().zip(&surface.disparity).zip(&registration.shift);
+    from.for_each(|((moved, &disparity), &shift)| {
+        *moved = if shift.abs() <= MOST { disparity + shift } else { disparity };
+    });
 }

@@ -33,9 +33,11 @@ impl Levels {
     pub(super) fn new<L: Frame, R: Frame>(left: &View<L>, right: &View<R>, band: &EpipolarBand) -> Self {
         let width = left.grid().size().0;
         let count = searched(left.plane()) + 1;
+        let (left_seen, right_seen) =
+            rayon::join(|| SeenTable::new(left.seen(), width), || SeenTable::new(right.seen(), width));
         Self {
             planes: [left.plane(), right.plane()].map(|plane| Pyramid::new(plane, count)),
-            seen: [left.seen(), right.seen()].map(|seen| SeenTable::new(seen, width)),
+            seen: [left_seen, right_seen],
             largest: (0..width).map(|x| band.largest_disparity(x as f64)).fold(0.0, f64::max),
         }
     }
@@ -90,7 +92,8 @@ impl Levels {
             let plane: &Plane = &self.planes[side].levels()[level];
             CensusView { words: census(plane), seen: self.seen[side].level(plane, 1 << level) }
         });
-        let sums = gathered(&costs([&left, &right], hypotheses), hypotheses);
+        let spans = left.spans(hypotheses.width);
+        let sums = gathered(&costs([&left, &right], hypotheses, &spans), hypotheses, &spans);
         winners(&sums, [&left.seen, &right.seen], hypotheses)
     }
 }

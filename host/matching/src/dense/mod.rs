@@ -11,6 +11,7 @@
 
 mod census;
 mod depth;
+mod directions;
 mod edges;
 mod fraction;
 mod levels;
@@ -32,6 +33,7 @@ use vergence_vision::{
 };
 
 pub use self::depth::{DenseCounts, DenseDepth, DenseRange, DenseSample, Gap};
+use self::directions::{Direction, RowOfDirections};
 use self::fraction::BETWEEN_SURFACES;
 pub use self::fraction::Disparities;
 use self::levels::Levels;
@@ -161,28 +163,28 @@ impl<'a> DenseViews<'a> {
         let finder = RangeFinder::new(&self.frame, &pair, shared);
         let near = band(self.left.grid(), &self.rows_frame, near(self.rows_frame.baseline()));
         let mut samples = vec![DenseSample::Gap(Gap::OutsideField); size.width as usize * size.height as usize];
-        samples.par_chunks_mut((size.width as usize).max(1)).enumerate().for_each(|(v, samples)| {
-            let pixels: Vec<[f64; 2]> = (0..size.width).map(|u| [f64::from(u), v as f64]).collect();
-            for (sample, ray) in samples.iter_mut().zip(lens.unproject(&pixels)) {
-                let direction = angles(turn * nalgebra::Vector3::from(ray));
-                if direction[0].is_finite() {
-                    *sample = self.sample(direction, disparities, (&finder, restated.as_ref()), &near);
+        let rows = samples.par_chunks_mut((size.width as usize).max(1)).enumerate();
+        rows.for_each_init(RowOfDirections::default, |row, (v, samples)| {
+            let width = samples.len();
+            for (sample, direction) in samples.iter_mut().zip(row.of((&lens, &turn), width, v)) {
+                if direction.a.is_finite() {
+                    *sample = self.sample(&direction, disparities, (&finder, restated.as_ref()), &near);
                 }
             }
         });
         DenseDepth::new(size, samples)
     }
 
-    /// The result in the direction (a, b) from the left camera.
+    /// The result in a direction from the left camera.
     fn sample(
         &self,
-        [a, b]: [f64; 2],
+        seen_at: &Direction,
         disparities: &Disparities,
         (finder, restated): (&RangeFinder, Option<&Restated>),
         near: &EpipolarBand,
     ) -> DenseSample {
         let grid = self.left.grid();
-        let at = grid.position_of(a, b);
+        let at = grid.position_of(seen_at.a, seen_at.b);
         let Some(index) = grid.index_nearest(at) else { return DenseSample::Gap(Gap::NotShared) };
         let disparity = between(&disparities.disparity, grid, at, index);
         let own = disparities.sigma[index];
@@ -194,9 +196,11 @@ impl<'a> DenseViews<'a> {
         }
         let radians = |pixels: f32| f64::from(pixels) / grid.pixels_per_radian();
         let at = |disparity: f32| {
-            let seen = ([a, b], radians(disparity));
-            let (direction, parallax) = restated.map_or(seen, |restated| restated.of(seen));
-            let range = finder.at(direction, parallax, radians(own));
+            let (direction, parallax) = match restated {
+                None => (*seen_at, radians(disparity)),
+                Some(restated) => restated.of([seen_at.a, seen_at.b], radians(disparity)),
+            };
+            let range = finder.at(&direction, parallax, radians(own));
             (range, parallax > SIGNIFICANT * range.disparity_sigma)
         };
         let (range, is_significant) = at(disparity);
@@ -204,11 +208,14 @@ impl<'a> DenseViews<'a> {
             return DenseSample::Far;
         }
         let other = disparities.other[index];
-        let between_surfaces = match at(other) {
-            _ if other.is_nan() => 0.0,
-            (other, true) => f64::from(BETWEEN_SURFACES) * (other.mm - range.mm),
-            // The other surface may be anywhere far away.
-            (_, false) => return DenseSample::Gap(Gap::Edge),
+        let between_surfaces = if other.is_nan() {
+            0.0
+        } else {
+            match at(other) {
+                (other, true) => f64::from(BETWEEN_SURFACES) * (other.mm - range.mm),
+                // The other surface may be anywhere far away.
+                (_, false) => return DenseSample::Gap(Gap::Edge),
+            }
         };
         DenseSample::Measured(DenseRange {
             range_mm: range.mm as f32,
@@ -246,18 +253,12 @@ struct Restated {
 }
 
 impl Restated {
-    /// The left direction and the parallax, both in radians, that the stated pose gives to those of the views.
-    fn of(&self, ([a, b], parallax): ([f64; 2], f64)) -> ([f64; 2], f64) {
+    /// The left direction and the parallax in radians that the stated pose gives to those of the views.
+    fn of(&self, [a, b]: [f64; 2], parallax: f64) -> (Direction, f64) {
         let [left, right] =
-            [(self.left, a), (self.right, a - parallax)].map(|(turn, a)| angles(turn * direction(a, b)));
-        (left, left[0] - right[0])
+            [(self.left, a), (self.right, a - parallax)].map(|(turn, a)| Direction::of(turn * direction(a, b)));
+        (left, left.a - right.a)
     }
-}
-
-/// The angles a and b of a direction.
-fn angles(direction: nalgebra::Vector3<f64>) -> [f64; 2] {
-    let [x, y, z]: [f64; 3] = direction.into();
-    [x.atan2(y.hypot(z)), y.atan2(z)]
 }
 
 fn rotation<T: Frame, F: Frame>(transform: &Transform<T, F>) -> Matrix3<f64> {

@@ -8,58 +8,92 @@
 //!
 //! The sum runs over four paths: along the row and the column, both ways.
 
+use std::ops::Range;
+
 use multiversion::multiversion;
 use rayon::prelude::*;
 
-use super::volume::Hypotheses;
+use super::volume::{Hypotheses, LANES};
 
 /// Penalty of a step by one hypothesis, as on slanted surfaces.
-const P1: u16 = 8;
+const P1: u8 = 8;
 /// Penalty of a larger step, as at edges of objects.
-const P2: u16 = 60;
+const P2: u8 = 60;
 /// Number of columns processed together.
 const STRIP: usize = 32;
-/// Cost of a hypothesis that the neighbour did not try, larger than any true cost. Adding penalties does not overflow.
-const UNTRIED: u16 = u16::MAX / 2;
+/// Number of rows processed together: each pixel of a path waits for the one before, those of other paths do not.
+const ROWS: usize = 4;
+/// Cost of a hypothesis that the neighbour did not try, larger than any true cost: those are at most 62 + P2, and that of a jump 62 + 2 P2.
+const UNTRIED: u8 = u8::MAX;
 
-/// Sums the path costs of every hypothesis, in the layout of `costs`.
-pub(super) fn gathered(costs: &[u8], hypotheses: &Hypotheses) -> Vec<u16> {
+/// Sums the path costs of every hypothesis, in the layout of `costs`. Sums that would be larger are 255: where that is the least one, the
+/// views have nothing in common. Paths begin and end with the `spans` of each row that the left camera sees: beyond them all hypotheses cost
+/// the same, so that a path brings nothing from there.
+pub(super) fn gathered(costs: &[u8], hypotheses: &Hypotheses, spans: &[Range<usize>]) -> Vec<u8> {
     let Hypotheses { width, height, count, ref first } = *hypotheses;
-    let volume = Volume { costs, first, count };
+    let volume = Volume { costs, first, count, width, spans };
     let mut sums = vec![0; costs.len()];
-    sums.par_chunks_mut(width * count).enumerate().for_each(|(y, sums)| {
-        let mut path = Path::new(count);
-        for x in there_and_back(width) {
-            let Some(x) = x else {
-                path.restart();
-                continue;
-            };
-            path.advance(&volume, y * width + x, &mut sums[x * count..(x + 1) * count]);
-        }
+    sums.par_chunks_mut(ROWS * width * count).enumerate().for_each(|(block, sums)| {
+        along_rows(&volume, block * ROWS, sums);
     });
-    let mut strips: Vec<Vec<&mut [u16]>> = (0..width.div_ceil(STRIP)).map(|_| Vec::with_capacity(height)).collect();
+    let mut strips: Vec<Vec<&mut [u8]>> = (0..width.div_ceil(STRIP)).map(|_| Vec::with_capacity(height)).collect();
     for row in sums.chunks_mut(width * count) {
         strips.iter_mut().zip(row.chunks_mut(STRIP * count)).for_each(|(strip, part)| strip.push(part));
     }
-    strips.par_iter_mut().enumerate().for_each(|(strip, rows)| {
-        let left = strip * STRIP;
-        let mut paths: Vec<Path> = (left..width.min(left + STRIP)).map(|_| Path::new(count)).collect();
-        for y in there_and_back(height) {
-            let Some(y) = y else {
-                paths.iter_mut().for_each(Path::restart);
-                continue;
-            };
-            for (i, (path, sums)) in paths.iter_mut().zip(rows[y].chunks_exact_mut(count)).enumerate() {
-                path.advance(&volume, y * width + left + i, sums);
-            }
-        }
-    });
+    strips.par_iter_mut().enumerate().for_each(|(strip, rows)| along_columns(&volume, strip * STRIP, rows));
     sums
 }
 
-/// Counts from 0 to below `end` and, after `None`, back again.
-fn there_and_back(end: usize) -> impl Iterator<Item = Option<usize>> {
-    (0..end).map(Some).chain([None]).chain((0..end).rev().map(Some))
+#[multiversion(targets("x86_64+avx512f+avx512dq+avx512bw+avx512vl+avx2+fma+popcnt", "x86_64+avx2+fma+popcnt"))]
+fn along_rows(volume: &Volume<'_>, top: usize, sums: &mut [u8]) {
+    if volume.count == LANES { rows::<Narrow>(volume, top, sums) } else { rows::<Wide>(volume, top, sums) }
+}
+
+#[multiversion(targets("x86_64+avx512f+avx512dq+avx512bw+avx512vl+avx2+fma+popcnt", "x86_64+avx2+fma+popcnt"))]
+fn along_columns(volume: &Volume<'_>, left: usize, strip: &mut [&mut [u8]]) {
+    if volume.count == LANES { columns::<Narrow>(volume, left, strip) } else { columns::<Wide>(volume, left, strip) }
+}
+
+#[inline(always)]
+fn rows<P: Path>(volume: &Volume<'_>, top: usize, sums: &mut [u8]) {
+    let (width, row) = (volume.width, volume.width * volume.count);
+    let mut paths: Vec<P> = (0..sums.len() / row).map(|_| P::new(volume.count)).collect();
+    let spans = &volume.spans[top..top + paths.len()];
+    let span =
+        spans.iter().filter(|span| !span.is_empty()).cloned().reduce(|p, q| p.start.min(q.start)..p.end.max(q.end));
+    for x in there_and_back(span.unwrap_or_default()) {
+        let Some(x) = x else {
+            paths.iter_mut().for_each(|path| *path = P::new(volume.count));
+            continue;
+        };
+        for (j, path) in paths.iter_mut().enumerate() {
+            let cell = &mut sums[j * row + x * volume.count..][..volume.count];
+            path.advance(volume, (top + j) * width + x, cell);
+        }
+    }
+}
+
+#[inline(always)]
+fn columns<P: Path>(volume: &Volume<'_>, left: usize, strip: &mut [&mut [u8]]) {
+    let columns = strip.first().map_or(0, |row| row.len() / volume.count);
+    let mut paths: Vec<P> = (0..columns).map(|_| P::new(volume.count)).collect();
+    let is_seen = |span: &Range<usize>| span.start < left + columns && span.end > left;
+    let top = volume.spans.iter().position(is_seen).unwrap_or_default();
+    let bottom = volume.spans.iter().rposition(is_seen).map_or(top, |last| last + 1);
+    for y in there_and_back(top..bottom) {
+        let Some(y) = y else {
+            paths.iter_mut().for_each(|path| *path = P::new(volume.count));
+            continue;
+        };
+        for (i, (path, cell)) in paths.iter_mut().zip(strip[y].chunks_exact_mut(volume.count)).enumerate() {
+            path.advance(volume, y * volume.width + left + i, cell);
+        }
+    }
+}
+
+/// Counts through `range` and, after `None`, back again.
+fn there_and_back(range: Range<usize>) -> impl Iterator<Item = Option<usize>> {
+    range.clone().map(Some).chain([None]).chain(range.rev().map(Some))
 }
 
 /// The volume of costs that the paths run through.
@@ -67,57 +101,103 @@ struct Volume<'a> {
     costs: &'a [u8],
     first: &'a [i32],
     count: usize,
+    width: usize,
+    spans: &'a [Range<usize>],
 }
 
-/// The costs at the last pixel of a path, padded on both sides for hypotheses that it did not try.
-struct Path {
+/// The costs at the last pixel of a path.
+trait Path {
+    /// A path before its first pixel, for `count` hypotheses.
+    fn new(count: usize) -> Self;
+    /// Advances the path to a pixel and adds its costs there to `sums`.
+    fn advance(&mut self, volume: &Volume<'_>, pixel: usize, sums: &mut [u8]);
+}
+
+/// Costs of as many hypotheses as a vector has, padded on both sides for those that were not tried.
+struct Narrow {
     first: i32,
-    /// Least cost at the last pixel; `None` before the first pixel.
-    least: Option<u16>,
-    last: Vec<u16>,
-    next: Vec<u16>,
+    /// Least cost at the last pixel, and that of a jump from it.
+    bounds: [u8; 2],
+    last: [u8; LANES + 2 * NARROW],
 }
 
-impl Path {
+/// Padding of [`Narrow`].
+const NARROW: usize = LANES + 2;
+
+impl Path for Narrow {
+    fn new(_: usize) -> Self {
+        // At its first pixel a path has the costs alone.
+        Self { first: 0, bounds: [0; 2], last: [UNTRIED; LANES + 2 * NARROW] }
+    }
+
+    #[inline(always)]
+    fn advance(&mut self, volume: &Volume<'_>, pixel: usize, sums: &mut [u8]) {
+        const MOST: i32 = NARROW as i32 - 1;
+        let first = volume.first[pixel];
+        let from = (MOST + (first - self.first).clamp(-MOST, MOST)) as usize;
+        let (Some(costs), Some(sums)) = (volume.costs[pixel * LANES..].first_chunk(), sums.first_chunk_mut()) else {
+            return;
+        };
+        let here = step(costs, &self.last[from..][..LANES + 2], self.bounds, sums);
+        self.last[NARROW..NARROW + LANES].copy_from_slice(&here);
+        self.bounds = bounds(&here);
+        self.first = first;
+    }
+}
+
+/// Costs of more hypotheses, padded in the same way.
+struct Wide {
+    first: i32,
+    bounds: [u8; 2],
+    last: Vec<u8>,
+    next: Vec<u8>,
+}
+
+impl Path for Wide {
     fn new(count: usize) -> Self {
         let empty = vec![UNTRIED; 3 * count + 4];
-        Self { first: 0, least: None, last: empty.clone(), next: empty }
+        Self { first: 0, bounds: [0; 2], last: empty.clone(), next: empty }
     }
 
-    fn restart(&mut self) {
-        self.last.fill(UNTRIED);
-        self.least = None;
-    }
-
-    /// Advances the path to a pixel and adds its costs there to `sums`.
-    fn advance(&mut self, volume: &Volume<'_>, pixel: usize, sums: &mut [u16]) {
+    #[inline(always)]
+    fn advance(&mut self, volume: &Volume<'_>, pixel: usize, sums: &mut [u8]) {
         let (count, room) = (volume.count, volume.count + 2);
         let first = volume.first[pixel];
         let most = room as i32 - 1;
-        let from = (room as i32 - 1 + (first - self.first).clamp(-most, most)) as usize;
-        // At its first pixel a path has the costs alone.
-        let bounds = self.least.map_or([0, 0], |least| [least, least + P2]);
+        let from = (most + (first - self.first).clamp(-most, most)) as usize;
         let before = &self.last[from..from + count + 2];
-        let costs = &volume.costs[pixel * count..(pixel + 1) * count];
-        self.least = Some(step(costs, before, bounds, &mut self.next[room..room + count], sums));
+        let costs = volume.costs[pixel * count..(pixel + 1) * count].as_chunks::<LANES>().0;
+        let (next, sums) = (self.next[room..room + count].as_chunks_mut().0, sums.as_chunks_mut().0);
+        let mut least = [u8::MAX; LANES];
+        for (block, ((costs, next), sums)) in costs.iter().zip(next).zip(sums).enumerate() {
+            *next = step(costs, &before[block * LANES..][..LANES + 2], self.bounds, sums);
+            least = std::array::from_fn(|i| least[i].min(next[i]));
+        }
+        self.bounds = bounds(&least);
         self.first = first;
         std::mem::swap(&mut self.last, &mut self.next);
     }
 }
 
-/// Computes one pixel of a path; returns its least cost.
-#[multiversion(targets("x86_64+avx512f+avx512dq+avx512bw+avx512vl+avx2+fma+popcnt", "x86_64+avx2+fma+popcnt"))]
-fn step(costs: &[u8], before: &[u16], [least, jump]: [u16; 2], here: &mut [u16], sums: &mut [u16]) -> u16 {
-    let count = costs.len();
-    let (below, same, above) = (&before[..count], &before[1..=count], &before[2..count + 2]);
-    let (here, sums) = (&mut here[..count], &mut sums[..count]);
-    let mut smallest = u16::MAX;
-    for i in 0..count {
+/// The least of some costs, and that of a jump from there.
+#[inline(always)]
+fn bounds(costs: &[u8; LANES]) -> [u8; 2] {
+    let eight: [u8; 8] = std::array::from_fn(|i| costs[i].min(costs[i + 8]));
+    let four: [u8; 4] = std::array::from_fn(|i| eight[i].min(eight[i + 4]));
+    let least = four[0].min(four[2]).min(four[1].min(four[3]));
+    [least, least.wrapping_add(P2)]
+}
+
+/// The costs of a block of hypotheses at the next pixel of a path, which are added to `sums`. `before` are those at the last pixel, from the hypothesis before
+/// the first one on.
+#[inline(always)]
+fn step(costs: &[u8; LANES], before: &[u8], [least, jump]: [u8; 2], sums: &mut [u8; LANES]) -> [u8; LANES] {
+    let of = |from: usize| -> [u8; LANES] { before[from..].first_chunk().copied().unwrap_or([UNTRIED; LANES]) };
+    let (below, same, above) = (of(0), of(1), of(2));
+    let here: [u8; LANES] = std::array::from_fn(|i| {
         let near = below[i].min(above[i]).saturating_add(P1);
-        let cost = u16::from(costs[i]).wrapping_add(same[i].min(near).min(jump).wrapping_sub(least));
-        here[i] = cost;
-        sums[i] = sums[i].wrapping_add(cost);
-        smallest = smallest.min(cost);
-    }
-    smallest
+        costs[i].wrapping_add(same[i].min(near).min(jump).wrapping_sub(least))
+    });
+    *sums = std::array::from_fn(|i| sums[i].saturating_add(here[i]));
+    here
 }

@@ -14,6 +14,7 @@ use vergence_vision::{
     KannalaBrandt, LENS_PARAMETERS, Left, Right, SharedCovariance, StereoPair, Transform, UnitRay, pseudo_intersection,
 };
 
+use super::directions::Direction;
 use super::shared_spread::SharedSpread;
 use crate::SharedFrame;
 use crate::grid::direction;
@@ -63,19 +64,23 @@ impl RangeFinder {
         }
     }
 
-    /// Converts the disparity `d` with standard deviation `sigma` at (a, b) of the left view, all in radians. The
+    /// Converts the disparity `d` with standard deviation `sigma` in a direction of the left view, all in radians. The
     /// range is meaningless or NaN where d is not positive.
-    pub(super) fn at(&self, [a, b]: [f64; 2], d: f64, sigma: f64) -> RangeAt {
-        let (right, sine) = (a - d, d.sin());
-        let from_right = self.baseline_mm * a.cos() / sine;
+    pub(super) fn at(&self, direction: &Direction, d: f64, sigma: f64) -> RangeAt {
+        let ([sin_a, cos_a], (sine, cosine)) = (direction.of_a, d.sin_cos());
+        // Of the angle from the right camera, a - d.
+        let right = [sin_a * cosine - cos_a * sine, cos_a * cosine + sin_a * sine];
+        let from_right = self.baseline_mm * cos_a / sine;
+        let angles = [direction.a, direction.b];
         let of_lenses =
-            self.with_lenses.as_ref().map_or(f64::NAN, |spread| spread.at([a, b], self.baseline_mm / from_right));
-        let of_shared = if of_lenses.is_nan() { self.disparity_variance(b, right, from_right) } else { of_lenses };
+            self.with_lenses.as_ref().map_or(f64::NAN, |spread| spread.at(angles, self.baseline_mm / from_right));
+        let of_shared =
+            if of_lenses.is_nan() { self.disparity_variance(direction.of_b, right, from_right) } else { of_lenses };
         let variance = sigma * sigma + of_shared;
         let per_radian = from_right / sine;
         let mm = match &self.origins {
-            None => self.baseline_mm * right.cos() / sine,
-            Some(origins) => origins.range_mm([a, b], d).unwrap_or(f64::NAN),
+            None => self.baseline_mm * right[1] / sine,
+            Some(origins) => origins.range_mm(angles, d).unwrap_or(f64::NAN),
         };
         RangeAt {
             mm,
@@ -86,10 +91,10 @@ impl RangeFinder {
     }
 
     /// The variance in rad² that the pose adds to a disparity, for a point `from_right` millimetres from the right
-    /// camera.
-    fn disparity_variance(&self, b: f64, right: f64, from_right: f64) -> f64 {
-        let normal = Vector3::new(0.0, -b.cos(), b.sin());
-        let across = Vector3::new(-right.cos(), right.sin() * b.sin(), right.sin() * b.cos()) / from_right;
+    /// camera. Angles are given by their sines and cosines.
+    fn disparity_variance(&self, [sin_b, cos_b]: [f64; 2], [sin_right, cos_right]: [f64; 2], from_right: f64) -> f64 {
+        let normal = Vector3::new(0.0, -cos_b, sin_b);
+        let across = Vector3::new(-cos_right, sin_right * sin_b, sin_right * cos_b) / from_right;
         let by_pose = Vector6::new(normal.x, normal.y, normal.z, across.x, across.y, across.z);
         by_pose.dot(&(self.pose * by_pose)).max(0.0)
     }
@@ -154,7 +159,7 @@ mod tests {
             let in_shared = (frame.shared_from_left() * point).mm();
             let [a, b] = angles(in_shared);
             let [right, _] = angles(in_shared - Vector3::x() * frame.baseline().mm());
-            let found = finder.at([a, b], a - right, 0.0);
+            let found = finder.at(&Direction::at([a, b]), a - right, 0.0);
             assert!((found.mm / point.mm().norm() - 1.0).abs() < 1e-12);
             let along = point.mm().normalize();
             let by_pose = PointUncertainty::of(&point, &pair, 0.0).unwrap().covariance(&shared);
@@ -163,12 +168,12 @@ mod tests {
             // With uncertain lenses, by interpolation.
             let by_all = PointUncertainty::of(&point, &pair, 0.0).unwrap().covariance(&uncertain);
             let (stated, expected) =
-                (with_lenses.at([a, b], a - right, 0.0).sigma_mm, along.dot(&(by_all * along)).sqrt());
+                (with_lenses.at(&Direction::at([a, b]), a - right, 0.0).sigma_mm, along.dot(&(by_all * along)).sqrt());
             assert!((stated / expected - 1.0).abs() < 0.02, "{stated} is not {expected}");
             // The disparity's own share, by difference.
             let step = 1e-6;
-            let moved = finder.at([a, b], a - right + step, 0.0).mm - found.mm;
-            let own = finder.at([a, b], a - right, step).own_sigma_mm;
+            let moved = finder.at(&Direction::at([a, b]), a - right + step, 0.0).mm - found.mm;
+            let own = finder.at(&Direction::at([a, b]), a - right, step).own_sigma_mm;
             assert!((moved.abs() / own - 1.0).abs() < 1e-3);
         }
     }

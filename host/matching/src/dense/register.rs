@@ -6,10 +6,11 @@
 //! follows from the curvature of the sum of squares and from the residuals.
 
 use multiversion::multiversion;
+use multiversion::target::target_cfg_f;
 use rayon::prelude::*;
 
-use super::surface::{SAME_SURFACE, offsets};
-use super::window::{LANES, Lanes, Padded, for_blocks};
+use super::surface::SAME_SURFACE;
+use super::window::{BAND, LANES, Lanes, Padded, multiply_add};
 use crate::plane::{Plane, cubic_weights};
 
 /// Smallest number of pixels of a window.
@@ -37,42 +38,77 @@ pub(super) struct Registration {
     pub likeness: Vec<f32>,
 }
 
-/// Registers the right view to the left one around `disparity` (NaN where there is none). The windows extend `reach`
-/// pixels in each direction and contain the pixels of one surface.
-pub(super) fn register([left, right]: [SampledView<'_>; 2], disparity: &[f32], reach: usize) -> Registration {
-    let (width, count) = (left.plane.width(), disparity.len());
-    let (mut warped, mut slope) = (vec![f32::NAN; count], vec![f32::NAN; count]);
-    warped.par_chunks_mut(width).zip(slope.par_chunks_mut(width)).enumerate().for_each(|(y, (warped, slope))| {
-        let row = y * width..(y + 1) * width;
-        let seen = [&left.seen[row.clone()], &right.seen[row.clone()]];
-        warp([left.plane.row(y), right.plane.row(y)], seen, &disparity[row], [warped, slope]);
-    });
-    let fields = [left.plane.values(), &warped, &slope, disparity].map(|values| Padded::new(values, width, reach));
-    let mut out =
-        Registration { shift: vec![f32::NAN; count], sigma: vec![f32::NAN; count], likeness: vec![0.0; count] };
-    let Registration { shift, sigma, likeness } = &mut out;
-    (shift.par_chunks_mut(width), sigma.par_chunks_mut(width), likeness.par_chunks_mut(width))
-        .into_par_iter()
-        .enumerate()
-        .for_each(|(y, (shift, sigma, likeness))| solve_row(&fields, y, reach, [shift, sigma, likeness]));
-    out
+impl Registration {
+    /// Makes room for `count` pixels.
+    pub(super) fn new(count: usize) -> Self {
+        Self { shift: vec![0.0; count], sigma: vec![0.0; count], likeness: vec![0.0; count] }
+    }
+
+    /// Registers the right view to the left one around `disparity` (NaN where there is none). The windows extend `reach`
+    /// pixels in each direction and contain the pixels of one surface.
+    pub(super) fn run(&mut self, views: [SampledView<'_>; 2], disparity: &[f32], reach: usize) {
+        let width = views[0].plane.width();
+        let Self { shift, sigma, likeness } = self;
+        let [shift, sigma, likeness] = [shift, sigma, likeness].map(|of| of.par_chunks_mut(BAND * width));
+        (shift, sigma, likeness).into_par_iter().enumerate().for_each_init(
+            || Fields::new(width, reach),
+            |fields, (band, (shift, sigma, likeness))| {
+                fields.fill(views, disparity, band * BAND);
+                for (y, shift) in shift.chunks_exact_mut(width).enumerate() {
+                    let row = y * width..(y + 1) * width;
+                    solve_row(fields, y, reach, [shift, &mut sigma[row.clone()], &mut likeness[row]]);
+                }
+            },
+        );
+    }
 }
 
-/// Samples the right row at the partners of the left row's pixels, and the mean derivative of both by the disparity.
+/// What the windows of a band of rows need.
+struct Fields {
+    left: Padded,
+    /// The right view at the partners.
+    warped: Padded,
+    /// The mean derivative of both by the disparity.
+    slope: Padded,
+    /// The disparity; NaN where one of the others is unknown.
+    disparity: Padded,
+}
+
+impl Fields {
+    fn new(width: usize, reach: usize) -> Self {
+        let [left, warped, slope, disparity] = std::array::from_fn(|_| Padded::new(width, reach));
+        Self { left, warped, slope, disparity }
+    }
+
+    fn fill(&mut self, [left, right]: [SampledView<'_>; 2], disparity: &[f32], top: usize) {
+        self.left.fill(left.plane.values(), top);
+        self.disparity.fill(disparity, top);
+        let width = left.plane.width();
+        for (row, y) in self.left.rows(top, left.plane.height()) {
+            let Some(y) = y else { continue };
+            let seen = [left, right].map(|view| &view.seen[y * width..][..width]);
+            let out = [&mut self.warped, &mut self.slope, &mut self.disparity].map(|field| field.row_mut(row));
+            warp([left.plane.row(y), right.plane.row(y)], seen, out);
+        }
+    }
+}
+
+/// Samples the right row at the partners of the left row's pixels, and the mean derivative of both by the disparity; where that is not
+/// possible, there is no disparity.
 fn warp(
     [left, right]: [&[f32]; 2],
     [left_seen, right_seen]: [&[bool]; 2],
-    disparity: &[f32],
-    [warped, slope]: [&mut [f32]; 2],
+    [warped, slope, disparity]: [&mut [f32]; 3],
 ) {
-    for x in 1..left.len().saturating_sub(1) {
+    for x in 0..left.len() {
         let at = x as f32 - disparity[x];
-        let inside = at >= 1.0 && at < right.len() as f32 - 2.0;
+        let inside = x >= 1 && x + 1 < left.len() && at >= 1.0 && at < right.len() as f32 - 2.0;
         let column = at as usize;
-        if !inside || !left_seen[x] || !right_seen[column] {
+        let taps = right.get(column.saturating_sub(1)..).and_then(|right| right.first_chunk::<4>());
+        let Some(taps) = taps.filter(|_| inside && left_seen[x] && right_seen[column]) else {
+            disparity[x] = f32::NAN;
             continue;
-        }
-        let Some(taps) = right[column - 1..].first_chunk::<4>() else { continue };
+        };
         let t = at - column as f32;
         let dot = |weights: [f32; 4]| weights.iter().zip(taps).map(|(weight, tap)| weight * tap).sum::<f32>();
         warped[x] = dot(cubic_weights(t));
@@ -92,42 +128,64 @@ fn cubic_slopes(t: f32) -> [f32; 4] {
 }
 
 #[multiversion(targets("x86_64+avx512f+avx512dq+avx512vl+avx2+fma", "x86_64+avx2+fma"))]
-fn solve_row(fields: &[Padded; 4], y: usize, reach: usize, [shift, sigma, likeness]: [&mut [f32]; 3]) {
-    for_blocks(shift.len(), |x, lanes| {
-        let at = |offset| -> [&Lanes; 4] { std::array::from_fn(|field| fields[field].lanes(x, y, offset)) };
-        let centre = at([0, 0]);
-        let mut sums = [[0.0; LANES]; 10];
-        for offset in offsets(reach) {
-            gather(&mut sums, centre, at(offset));
+fn solve_row(fields: &Fields, y: usize, reach: usize, out: [&mut [f32]; 3]) {
+    if target_cfg_f!(target_feature = "fma") {
+        solve_blocks::<true>(fields, y, reach, out);
+    } else {
+        solve_blocks::<false>(fields, y, reach, out);
+    }
+}
+
+#[inline(always)]
+fn solve_blocks<const FUSED: bool>(
+    Fields { left, warped, slope, disparity }: &Fields,
+    y: usize,
+    reach: usize,
+    [shift, sigma, likeness]: [&mut [f32]; 3],
+) {
+    shift.fill(f32::NAN);
+    sigma.fill(f32::NAN);
+    likeness.fill(0.0);
+    for x in (0..shift.len()).step_by(LANES) {
+        let centre = [left, warped, slope, disparity].map(|field| *field.lanes(x, y, [0, 0]));
+        if centre[3].iter().all(|disparity| disparity.is_nan()) {
+            continue;
         }
-        for k in 0..lanes {
+        let (mut sums, reach) = ([[0.0; LANES]; 10], reach as isize);
+        for j in -reach..=reach {
+            for i in -reach..=reach {
+                let (left, warped) = (left.lanes(x, y, [i, j]), warped.lanes(x, y, [i, j]));
+                let (slope, disparity) = (slope.lanes(x, y, [i, j]), disparity.lanes(x, y, [i, j]));
+                gather::<FUSED>(&mut sums, &centre, [left, warped, slope, disparity]);
+            }
+        }
+        for k in 0..LANES.min(shift.len() - x) {
             let Some(solved) = solve(std::array::from_fn(|sum| sums[sum][k])) else { continue };
             [shift[x + k], sigma[x + k], likeness[x + k]] = solved;
         }
-    });
+    }
 }
 
 /// Adds 1, L, R, g and their products of a neighbour on the same surface. L and R are relative to the centre's values,
 /// so that single precision suffices.
 #[inline(always)]
-fn gather(sums: &mut [Lanes; 10], centre: [&Lanes; 4], near: [&Lanes; 4]) {
+fn gather<const FUSED: bool>(sums: &mut [Lanes; 10], centre: &[Lanes; 4], near: [&Lanes; 4]) {
     let [n, l1, r1, g1, ll, lr, lg, rr, rg, gg] = sums;
     for k in 0..LANES {
         let (l, r, g) = (near[0][k] - centre[0][k], near[1][k] - centre[1][k], near[2][k]);
         let off = near[3][k] - centre[3][k];
-        // Comparisons with NaN fail.
-        let counts = off.abs() <= SAME_SURFACE && r.abs() < f32::INFINITY && g.abs() < f32::INFINITY;
-        let (one, l, r, g) = if counts { (1.0, l, r, g) } else { (0.0, 0.0, 0.0, 0.0) };
+        // Comparisons with NaN fail: where there is a disparity, the others are known too.
+        let (one, l, r, g) = if off.abs() <= SAME_SURFACE { (1.0, l, r, g) } else { (0.0, 0.0, 0.0, 0.0) };
         n[k] += one;
         l1[k] += l;
         r1[k] += r;
         g1[k] += g;
-        ll[k] += l * l;
-        lr[k] += l * r;
-        lg[k] += l * g;
-        rr[k] += r * r;
-        rg[k] += r * g;
-        gg[k] += g * g;
+        ll[k] = multiply_add::<FUSED>(l, l, ll[k]);
+        lr[k] = multiply_add::<FUSED>(l, r, lr[k]);
+        lg[k] = multiply_add::<FUSED>(l, g, lg[k]);
+        rr[k] = multiply_add::<FUSED>(r, r, rr[k]);
+        rg[k] = multiply_add::<FUSED>(r, g, rg[k]);
+        gg[k] = multiply_add::<FUSED>(g, g, gg[k]);
     }
 }
 

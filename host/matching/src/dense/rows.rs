@@ -15,7 +15,7 @@ use crate::wrong_pose::ANY_POSE;
 use crate::{Grid, SharedFrame, ViewPixel};
 
 /// Distance of the places in columns and rows, in pixels of the coarsest level.
-const SPACING: usize = 6;
+const SPACING: usize = 8;
 /// Smallest number of places.
 const LEAST: usize = 30;
 /// Median distance of the partners from their rows, in pixels, that the search bears.

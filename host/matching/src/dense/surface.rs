@@ -1,9 +1,10 @@
 //! Smoothing of disparities by planes through the neighbours on the same surface.
 
 use multiversion::multiversion;
+use multiversion::target::target_cfg_f;
 use rayon::prelude::*;
 
-use super::window::{LANES, Lanes, Padded, for_blocks};
+use super::window::{BAND, LANES, Lanes, Padded, multiply_add};
 
 /// Largest difference in disparity, in pixels, of neighbours on one surface.
 pub(super) const SAME_SURFACE: f32 = 1.5;
@@ -20,61 +21,94 @@ pub(super) struct Surface {
     pub roughness: Vec<f32>,
 }
 
-/// Fits planes in windows that extend `reach` pixels in each direction. `disparities` are NaN where there are none.
-pub(super) fn surface(disparities: &[f32], width: usize, reach: usize) -> Surface {
-    let field = Padded::new(disparities, width, reach);
-    let empty = vec![f32::NAN; disparities.len()];
-    let mut out = Surface { disparity: empty.clone(), roughness: empty };
-    let Surface { disparity, roughness } = &mut out;
-    disparity
-        .par_chunks_mut(width)
-        .zip(roughness.par_chunks_mut(width))
-        .enumerate()
-        .for_each(|(y, (disparity, roughness))| fit_row(&field, y, reach, [disparity, roughness]));
-    out
+impl Surface {
+    /// Makes room for `count` pixels.
+    pub(super) fn new(count: usize) -> Self {
+        Self { disparity: vec![0.0; count], roughness: vec![0.0; count] }
+    }
+
+    /// Fits planes in windows that extend `reach` pixels in each direction. `disparities` are NaN where there are none.
+    pub(super) fn fit(&mut self, disparities: &[f32], width: usize, reach: usize) {
+        let bands = self.disparity.par_chunks_mut(BAND * width).zip(self.roughness.par_chunks_mut(BAND * width));
+        bands.enumerate().for_each_init(
+            || Padded::new(width, reach),
+            |field, (band, (disparity, roughness))| {
+                field.fill(disparities, band * BAND);
+                let rows = disparity.chunks_exact_mut(width).zip(roughness.chunks_exact_mut(width));
+                rows.enumerate()
+                    .for_each(|(y, (disparity, roughness))| fit_row(field, y, reach, [disparity, roughness]));
+            },
+        );
+    }
 }
 
 #[multiversion(targets("x86_64+avx512f+avx512dq+avx512vl+avx2+fma", "x86_64+avx2+fma"))]
-fn fit_row(field: &Padded, y: usize, reach: usize, [disparity, roughness]: [&mut [f32]; 2]) {
-    for_blocks(disparity.len(), |x, lanes| {
-        let centre = field.lanes(x, y, [0, 0]);
-        let mut sums = [[0.0; LANES]; 10];
-        for [i, j] in offsets(reach) {
-            gather(&mut sums, centre, field.lanes(x, y, [i, j]), [i as f32, j as f32]);
+fn fit_row(field: &Padded, y: usize, reach: usize, out: [&mut [f32]; 2]) {
+    if target_cfg_f!(target_feature = "fma") {
+        fit_blocks::<true>(field, y, reach, out);
+    } else {
+        fit_blocks::<false>(field, y, reach, out);
+    }
+}
+
+#[inline(always)]
+fn fit_blocks<const FUSED: bool>(field: &Padded, y: usize, reach: usize, [disparity, roughness]: [&mut [f32]; 2]) {
+    disparity.fill(f32::NAN);
+    roughness.fill(f32::NAN);
+    let reach = reach as isize;
+    for x in (0..disparity.len()).step_by(LANES) {
+        let centre = *field.lanes(x, y, [0, 0]);
+        if centre.iter().all(|disparity| disparity.is_nan()) {
+            continue;
         }
-        for k in 0..lanes {
+        let mut sums = [[0.0; LANES]; 10];
+        for j in -reach..=reach {
+            let mut along = [[0.0; LANES]; 6];
+            for i in -reach..=reach {
+                gather::<FUSED>(&mut along, &centre, field.lanes(x, y, [i, j]), i as f32);
+            }
+            gather_row::<FUSED>(&mut sums, &along, j as f32);
+        }
+        for k in 0..LANES.min(disparity.len() - x) {
             let Some(plane) = solve(std::array::from_fn(|sum| sums[sum][k])) else { continue };
             disparity[x + k] = centre[k] + plane.above_centre;
             roughness[x + k] = plane.roughness;
         }
-    });
+    }
 }
 
-/// The offsets of the pixels of a window, row by row.
+/// Adds a neighbour at i of its row on the same surface: 1, i, i², d, id, d².
 #[inline(always)]
-pub(super) fn offsets(reach: usize) -> impl Iterator<Item = [isize; 2]> {
-    let reach = reach as isize;
-    (-reach..=reach).flat_map(move |j| (-reach..=reach).map(move |i| [i, j]))
-}
-
-/// Adds a neighbour at (i, j) on the same surface: 1, i, j, i², ij, j², d, id, jd, d².
-#[inline(always)]
-fn gather(sums: &mut [Lanes; 10], centre: &Lanes, near: &Lanes, [i, j]: [f32; 2]) {
-    let [n, i1, j1, ii, ij, jj, d1, id, jd, dd] = sums;
+fn gather<const FUSED: bool>(sums: &mut [Lanes; 6], centre: &Lanes, near: &Lanes, i: f32) {
+    let [n, i1, ii, d1, id, dd] = sums;
     for k in 0..LANES {
         let off = near[k] - centre[k];
-        let same = off.abs() <= SAME_SURFACE;
-        let (one, d) = if same { (1.0, off) } else { (0.0, 0.0) };
+        let (one, d) = if off.abs() <= SAME_SURFACE { (1.0, off) } else { (0.0, 0.0) };
         n[k] += one;
-        i1[k] += one * i;
-        j1[k] += one * j;
-        ii[k] += one * i * i;
-        ij[k] += one * i * j;
-        jj[k] += one * j * j;
+        i1[k] = multiply_add::<FUSED>(one, i, i1[k]);
+        ii[k] = multiply_add::<FUSED>(one, i * i, ii[k]);
         d1[k] += d;
-        id[k] += d * i;
-        jd[k] += d * j;
-        dd[k] += d * d;
+        id[k] = multiply_add::<FUSED>(d, i, id[k]);
+        dd[k] = multiply_add::<FUSED>(d, d, dd[k]);
+    }
+}
+
+/// Adds the sums of row j of a window: 1, i, j, i², ij, j², d, id, jd, d².
+#[inline(always)]
+fn gather_row<const FUSED: bool>(sums: &mut [Lanes; 10], of_row: &[Lanes; 6], j: f32) {
+    let [n, i1, j1, ii, ij, jj, d1, id, jd, dd] = sums;
+    for k in 0..LANES {
+        let [one, i, i_i, d, i_d, d_d] = of_row.each_ref().map(|of_row| of_row[k]);
+        n[k] += one;
+        i1[k] += i;
+        j1[k] = multiply_add::<FUSED>(one, j, j1[k]);
+        ii[k] += i_i;
+        ij[k] = multiply_add::<FUSED>(i, j, ij[k]);
+        jj[k] = multiply_add::<FUSED>(one, j * j, jj[k]);
+        d1[k] += d;
+        id[k] += i_d;
+        jd[k] = multiply_add::<FUSED>(d, j, jd[k]);
+        dd[k] += d_d;
     }
 }
 

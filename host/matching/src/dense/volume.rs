@@ -1,5 +1,7 @@
 //! The cost volume: the dissimilarity of both views for every pixel and every hypothesis of its disparity.
 
+use std::ops::Range;
+
 use multiversion::multiversion;
 use rayon::prelude::*;
 
@@ -25,18 +27,25 @@ pub(super) struct CensusView {
     pub seen: Vec<bool>,
 }
 
-/// Computes the costs, by rows, pixels and hypotheses.
-pub(super) fn costs([left, right]: [&CensusView; 2], hypotheses: &Hypotheses) -> Vec<u8> {
+impl CensusView {
+    /// From the first to the last pixel of each row that is seen.
+    pub(super) fn spans(&self, width: usize) -> Vec<Range<usize>> {
+        let span = |row: &[bool]| {
+            let first = row.iter().position(|seen| *seen)?;
+            Some(first..row.iter().rposition(|seen| *seen)? + 1)
+        };
+        self.seen.chunks_exact(width).map(|row| span(row).unwrap_or_default()).collect()
+    }
+}
+
+/// Computes the costs, by rows, pixels and hypotheses. Beyond the `spans` of the left view they are zero.
+pub(super) fn costs([left, right]: [&CensusView; 2], hypotheses: &Hypotheses, spans: &[Range<usize>]) -> Vec<u8> {
     let Hypotheses { width, height, count, ref first } = *hypotheses;
-    let mut costs = vec![UNRELATED; width * height * count];
-    costs.par_chunks_mut(width * count).enumerate().for_each(|(y, out)| {
+    let mut costs = vec![0; width * height * count];
+    costs.par_chunks_mut(width * count).zip(spans).enumerate().for_each(|(y, (out, span))| {
         let row = y * width..(y + 1) * width;
         let reversed = Reversed::of(&right.words[row.clone()], &right.seen[row.clone()], count);
-        let seen = left.seen[row.clone()].iter().enumerate().filter(|(_, seen)| **seen);
-        for (x, _) in seen {
-            let partners = reversed.partners(x, first[row.start + x], count);
-            differences(&mut out[x * count..(x + 1) * count], left.words[row.start + x], partners);
-        }
+        differences((out, span), (&left.words[row.clone()], &left.seen[row.clone()]), &reversed, &first[row]);
     });
     costs
 }
@@ -64,6 +73,7 @@ impl Reversed {
     }
 
     /// The words, and whether they are known, of the partners of the left pixel x from disparity `first` on.
+    #[inline(always)]
     fn partners(&self, x: usize, first: i32, count: usize) -> [&[u64]; 2] {
         let at = (self.margin + self.width) as i64 - 1 - x as i64 + i64::from(first);
         let at = at.clamp(0, (self.width + self.margin) as i64) as usize;
@@ -76,9 +86,27 @@ impl Reversed {
     "x86_64+avx2+fma+popcnt",
     "x86_64+popcnt"
 ))]
-fn differences(cell: &mut [u8], word: u64, [others, known]: [&[u64]; 2]) {
-    for ((cost, other), known) in cell.iter_mut().zip(others).zip(known) {
-        let different = (word ^ other).count_ones() as u8;
-        *cost = if *known == 0 { UNRELATED } else { different };
+fn differences(
+    (costs, span): (&mut [u8], &Range<usize>),
+    (words, seen): (&[u64], &[bool]),
+    right: &Reversed,
+    first: &[i32],
+) {
+    let count = costs.len() / words.len().max(1);
+    for (x, cell) in span.clone().zip(costs[span.start * count..].chunks_exact_mut(count)) {
+        if !seen[x] {
+            cell.fill(UNRELATED);
+            continue;
+        }
+        let [others, known] = right.partners(x, first[x], count);
+        let (cell, _) = cell.as_chunks_mut::<LANES>();
+        for (cell, (others, known)) in
+            cell.iter_mut().zip(others.as_chunks::<LANES>().0.iter().zip(known.as_chunks::<LANES>().0))
+        {
+            *cell = std::array::from_fn(|k| {
+                let different = (words[x] ^ others[k]).count_ones() as u8;
+                if known[k] == 0 { UNRELATED } else { different }
+            });
+        }
     }
 }
