@@ -29,6 +29,9 @@ pub(crate) struct Link {
     pub evidence: Option<Evidence>,
     /// Whether the registration is good to a small part of a pixel.
     pub registered: bool,
+    /// How far the disparities of the windows to the left, to the right, above and below depart from the plane of its own, in pixels of the view;
+    /// infinite where a window cannot be registered. Zero before errors are stated.
+    pub departures: [f64; 4],
     /// Distance from the epipolar plane of the pose on which the matches agree, in standard deviations.
     pub off_plane: f64,
     /// Probability that the link is right.
@@ -46,6 +49,7 @@ impl Link {
             sigma,
             evidence: None,
             registered: false,
+            departures: [0.0; 4],
             off_plane: 0.0,
             right_probability: score,
             track: None,

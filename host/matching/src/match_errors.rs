@@ -118,6 +118,7 @@ pub(crate) fn state_errors(links: &mut Links, compared: &Compared<'_>, band: &Ep
             let evidence = link.evidence;
             let mut departures = evidence
                 .map_or([0.0; 4], |evidence| departures([compared.left, compared.right], keypoint.at, &evidence.warp));
+            link.departures = departures;
             departures.sort_by(f64::total_cmp);
             let Some(evidence) = evidence.filter(|_| link.registered) else {
                 return state_unregistered(link, usual, off, departures[2], band.shortening(keypoint.at));

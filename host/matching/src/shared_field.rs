@@ -16,6 +16,8 @@ const B_LIMIT: Angle = Angle::from_deg(105.0);
 const RIM: Angle = Angle::from_deg(1.5);
 /// A direction is compared if the other camera sees it at infinity or at so many baselines: 1 m for the bench's 145 mm.
 const NEAR_BASELINES: f64 = 1000.0 / 145.0;
+/// Degrees between the directions of a field that are tried first.
+const STRIDE: usize = 5;
 /// Largest widening of the field for an uncertain pose.
 const MOST_SLACK: Angle = Angle::from_deg(10.0);
 
@@ -59,19 +61,32 @@ impl<'a> SharedField<'a> {
         self.right.sees(bearing) && self.parallax_ends(bearing, 1.0).any(|other| self.left.may_see(&other))
     }
 
-    /// Finds the bounds of the field on a grid of one degree, and widens them by one degree.
+    /// Finds the bounds of the field to one degree, and widens them by one degree.
+    ///
+    /// It tries some directions first, and then those beyond the bounds found so far, line by line: each takes time.
     pub(crate) fn extent(&self) -> Option<Extent> {
-        let (a_limit, b_limit) = (A_LIMIT.deg() as i32, B_LIMIT.deg() as i32);
-        let compared = |&(a, b): &(i32, i32)| {
+        let [a_limit, b_limit] = [A_LIMIT, B_LIMIT].map(|limit| limit.deg() as i32);
+        let is_compared = |a: i32, b: i32| {
             let d = direction(f64::from(a).to_radians(), f64::from(b).to_radians());
             UnitRay::new(d).is_some_and(|bearing| self.seen_from_left(&bearing) || self.seen_from_right(&bearing))
         };
-        let bounds = (-a_limit..=a_limit)
-            .into_par_iter()
-            .flat_map_iter(|a| (-b_limit..=b_limit).map(move |b| (a, b)))
-            .filter(compared)
-            .map(|(a, b)| [a, a, b, b])
-            .reduce_with(|m, n| [m[0].min(n[0]), m[1].max(n[1]), m[2].min(n[2]), m[3].max(n[3])])?;
+        let among = |stride: usize| {
+            let all = move |limit: i32| (-limit..=limit).step_by(stride);
+            let found: Vec<_> = all(a_limit).flat_map(|a| all(b_limit).map(move |b| [a, b])).collect();
+            let found = found.into_par_iter().filter(|[a, b]| is_compared(*a, *b)).map(|[a, b]| [a, a, b, b]);
+            found.reduce_with(|m, n| [m[0].min(n[0]), m[1].max(n[1]), m[2].min(n[2]), m[3].max(n[3])])
+        };
+        let mut bounds = among(STRIDE).or_else(|| among(1))?;
+        let shows_a = |a: i32| (-b_limit..=b_limit).any(|b| is_compared(a, b));
+        let shows_b = |b: i32| (-a_limit..=a_limit).any(|a| is_compared(a, b));
+        for (i, bound) in bounds.iter_mut().enumerate() {
+            let beyond = if i % 2 == 0 { -1 } else { 1 };
+            let (limit, shows): (i32, &dyn Fn(i32) -> bool) =
+                if i < 2 { (a_limit, &shows_a) } else { (b_limit, &shows_b) };
+            while (*bound + beyond).abs() <= limit && shows(*bound + beyond) {
+                *bound += beyond;
+            }
+        }
         let within = |degrees: i32, limit: i32| f64::from(degrees.clamp(-limit, limit)).to_radians();
         Some(Extent {
             a_min: within(bounds[0] - 1, a_limit),

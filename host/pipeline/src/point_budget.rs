@@ -13,6 +13,11 @@ const GAIN: f64 = 0.3;
 const STEPS: (f64, f64) = (0.85, 1.05);
 /// Costs and periods of which the median counts: a hiccup of the system, or a pair that is searched as a whole, is one of them.
 const KEPT: usize = 5;
+/// The first pair is searched as a whole, which costs so many times what the others will.
+const FIRST: f64 = 2.0;
+/// So many pairs one after the other that all took longer than a period are no hiccup: others are skipped meanwhile, so that the limit comes down
+/// at once, and costs are counted anew.
+const LATE: usize = 3;
 
 /// The points that a pair may have because of time, and those that it would have without.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -30,6 +35,7 @@ pub struct PointBudget {
     of: usize,
     now: f64,
     costs: VecDeque<f64>,
+    is_first: bool,
     periods: VecDeque<f64>,
 }
 
@@ -38,7 +44,7 @@ impl PointBudget {
     #[must_use]
     pub fn new(least: usize, of: usize) -> Self {
         let (costs, periods) = (VecDeque::new(), VecDeque::new());
-        Self { least: least.min(of) as f64, of, now: of as f64, costs, periods }
+        Self { least: least.min(of) as f64, of, now: of as f64, costs, is_first: true, periods }
     }
 
     /// The limit of the next pair; `None` where there is time for all points.
@@ -55,10 +61,28 @@ impl PointBudget {
 
     /// Notes the seconds that a pair took until the next one could begin, and changes the limit.
     pub fn took(&mut self, seconds: f64) {
-        keep(&mut self.costs, seconds);
-        let (Some(period), Some(cost)) = (middle(&self.periods), middle(&self.costs)) else { return };
-        let factor = (SHARE * period / cost).powf(GAIN).clamp(STEPS.0, STEPS.1);
+        let is_first = std::mem::replace(&mut self.is_first, false);
+        keep(&mut self.costs, if is_first { seconds / FIRST } else { seconds });
+        let Some(period) = vergence_vision::median(self.periods.iter().copied().collect()) else { return };
+        let there_is = SHARE * period;
+        let late = self.late(period).or_else(|| self.costs.back().copied().filter(|cost| is_first && *cost > there_is));
+        let factor = if let Some(cost) = late {
+            self.costs.clear();
+            there_is / cost
+        } else if self.costs.len() == KEPT {
+            let cost = vergence_vision::median(self.costs.iter().copied().collect());
+            cost.map_or(1.0, |cost| (there_is / cost).powf(GAIN).clamp(STEPS.0, STEPS.1))
+        } else {
+            1.0
+        };
         self.now = (self.now * factor).clamp(self.least, self.of as f64);
+    }
+
+    /// The least of the last [`LATE`] costs where all of them exceed the period.
+    fn late(&self, period: f64) -> Option<f64> {
+        let latest = self.costs.iter().rev().take(LATE);
+        let least = latest.copied().fold(f64::INFINITY, f64::min);
+        (self.costs.len() >= LATE && least > period).then_some(least)
     }
 }
 
@@ -67,11 +91,6 @@ fn keep(latest: &mut VecDeque<f64>, seconds: f64) {
         latest.push_back(seconds);
         latest.drain(..latest.len().saturating_sub(KEPT));
     }
-}
-
-/// The median; `None` before there are as many values as count.
-fn middle(latest: &VecDeque<f64>) -> Option<f64> {
-    if latest.len() < KEPT { None } else { vergence_vision::median(latest.iter().copied().collect()) }
 }
 
 #[cfg(test)]
@@ -97,13 +116,32 @@ mod tests {
         assert_eq!(budget.limit(), None, "there is time for all");
         let at_30 = limits(&mut budget, [0.010, 5e-5, 1.0 / 30.0], 60);
         assert!(at_30[30..].iter().all(|points| (340..395).contains(points)), "{at_30:?}");
-        // Smoothly: from pair to pair by no more than a seventh.
-        assert!(at_30.windows(2).all(|two| two[1] * 7 >= two[0] * 6 - 7), "{at_30:?}");
+        // At once where pairs are late, then smoothly: from pair to pair by no more than a seventh.
+        let steps = at_30.windows(2).filter(|two| two[1] * 7 < two[0] * 6 - 7).count();
+        assert!(steps == 1 && at_30[..6].iter().any(|points| *points < 450), "{at_30:?}");
         let at_60 = limits(&mut budget, [0.010, 5e-5, 1.0 / 60.0], 60);
         assert_eq!(at_60.last(), Some(&120), "the floor: from here on the rate becomes lower");
         assert_eq!(budget.limit(), Some(PointLimit { most: 120, of: 700 }));
         let again = limits(&mut budget, [0.010, 5e-5, 1.0 / 15.0], 100);
         assert_eq!(again.last(), Some(&700), "all come back with the time");
+    }
+
+    /// Pairs that take longer than the period are skipped by the next: the limit is there within a few.
+    #[test]
+    fn the_first_pairs_tell_how_many_points_there_is_time_for() {
+        let (period, mut budget) = (1.0 / 60.0, PointBudget::new(150, 700));
+        // 8 ms and 0.05 ms for each point: all take 43 ms, the first pair as a whole 86 ms.
+        budget.came_after(period);
+        budget.took(0.086);
+        let points = limits(&mut budget, [0.008, 5e-5, period], 60);
+        let late = points.iter().filter(|points| 0.008 + 5e-5 * **points as f64 > period).count();
+        assert!(points[0] < 350 && late <= 6, "{points:?}");
+        assert!(points[20..].iter().all(|points| (150..=180).contains(points)), "{points:?}");
+        // A first pair that takes long where there is time for the others limits nothing.
+        let mut budget = PointBudget::new(150, 700);
+        budget.came_after(1.0 / 15.0);
+        budget.took(0.110);
+        assert_eq!(budget.limit(), None);
     }
 
     #[test]
