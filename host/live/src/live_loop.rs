@@ -159,6 +159,10 @@ impl LiveLoop {
         let (mut blindness, mut ladder, mut over) = (Blindness::default(), Ladder::default(), None::<Instant>);
         let mut had_ended = false;
         let (mut last_us, mut pace) = (None, Pace::default());
+        // Cameras that are there already take the first pulse.
+        while let Ok((side, event)) = self.events.try_recv() {
+            self.take_event(side, event);
+        }
         loop {
             if work.is_none() {
                 work = newest.take().map(|exposed| self.start(exposed));
