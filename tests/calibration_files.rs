@@ -117,7 +117,8 @@ fn clouds_are_as_far_off_as_the_rig_file_states() {
         let mean = |which: usize| trials.iter().map(|trial| trial[which]).sum::<f64>() / seeds as f64;
         let (stated, lensless, blind) = (mean(0), mean(1), mean(2));
         println!("{eyes:?} lenses, {name}: {stated:.2}; {lensless:.2}; {blind:.2}");
-        let [low, high] = band(seeds, 3.0, 1.96);
+        // Four means are judged.
+        let [low, high] = band(seeds, 3.0, 2.5);
         let low = if eyes == Eyes::Mounted { low } else { 0.3 * low };
         assert!((low..high).contains(&stated), "{eyes:?}, {name}: {stated} is not within {low} to {high}");
         assert!(blind > 2.0 * stated && blind > high, "{name}: without its covariance a file is as good: {blind}");

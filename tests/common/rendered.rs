@@ -120,7 +120,7 @@ pub fn seeds(few: u64) -> u64 {
 }
 
 /// Bounds of the mean of `trials` sums of `freedom` squared normal errors, at this quantile of the normal distribution: 2.24 where two such
-/// means shall all lie within them in 95 of 100 cases, 2.39 for three (the approximation of E. Wilson and M. Hilferty, PNAS 17, 1931).
+/// means shall all lie within them in 95 of 100 cases, 2.39 for three, 2.5 for four, 2.73 for eight (the approximation of E. Wilson and M. Hilferty, PNAS 17, 1931).
 pub fn band(trials: u64, freedom: f64, quantile: f64) -> [f64; 2] {
     let share = 2.0 / (9.0 * freedom * trials as f64);
     [-quantile, quantile].map(|quantile| freedom * (1.0 - share + quantile * share.sqrt()).powi(3))
