@@ -27,6 +27,7 @@ use crate::guided::{LEVELS, are_suspiciously_few};
 use crate::links::{Compared, Link, Links, agree_on_pose, in_originals, registered, thin};
 use crate::match_errors::state_errors;
 use crate::plane::Pyramid;
+use crate::pool::in_pool;
 use crate::shared_views::SharedViews;
 use crate::view::Buffers;
 use crate::{Grid, GuidedMatcher, ImagePair, MatchError, Matcher, Matches, UnmatchedReason, ViewPixel};
@@ -102,7 +103,9 @@ impl Matcher for TrackingMatcher {
         let density = pair.left_camera.k()[0].max(pair.right_camera.k()[0]);
         let oversampling = self.whole.oversampling.unwrap_or(DENSITY / density).clamp(1.0, 2.0);
         let [keypoints, in_strips] = [self.whole.keypoints, self.in_strips].map(|keypoints| keypoints * most / MOST);
-        state.find(pair, &GuidedMatcher { oversampling: Some(oversampling), keypoints }, [in_strips, most])
+        let (state, whole) = (&mut *state, GuidedMatcher { oversampling: Some(oversampling), keypoints });
+        // The lock is taken outside of the pool, where no thread that waits begins another pair.
+        in_pool(|| state.find(pair, &whole, [in_strips, most]))
     }
 }
 
