@@ -61,6 +61,7 @@ impl LiveBench {
             matching_time: MatchingTime::Fixed(matching),
             stopwatch: || Duration::ZERO,
             budget: None,
+            dense: false,
         };
         Self { simulated, board, live }
     }

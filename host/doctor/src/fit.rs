@@ -65,6 +65,7 @@ pub async fn check_fit(running: Running<'_>) -> Finding {
         stopwatch,
         memory: Arc::<Mutex<_>>::default(),
         budget: None,
+        dense: false,
     };
     let base = live.board.as_ref().map_or(TimeBase::Host, |board| TimeBase::Board(board.clock_map()));
     for (side, timing) in [Side::Left, Side::Right].into_iter().zip(timing) {

@@ -108,6 +108,8 @@ pub struct LiveLoop {
     pub memory: Arc<Mutex<PoseMemory>>,
     /// How many points the matcher looks for, by what pairs cost; `None` without limit.
     pub budget: Option<PointBudget>,
+    /// Whether every pixel of a pair is measured too.
+    pub dense: bool,
 }
 
 impl MatchingTime {
@@ -284,7 +286,7 @@ impl LiveLoop {
     fn start(&self, exposed: Exposed<PendingImage>) -> Work {
         let (rig, matcher, board) = (Arc::clone(&self.rig), Arc::clone(&self.matcher), self.board.clone());
         let (search, memory) = (Arc::clone(&self.search), Arc::clone(&self.memory));
-        let (matching_time, stopwatch) = (self.matching_time, self.stopwatch);
+        let (matching_time, stopwatch, is_dense) = (self.matching_time, self.stopwatch, self.dense);
         let limited = self.budget.as_ref().and_then(PointBudget::limit);
         let begun = Begun { at: Instant::now(), exposed_us: host_middle(&exposed), limited };
         Box::pin(async move {
@@ -297,7 +299,7 @@ impl LiveLoop {
                 let method = Method { search: &search, points, ..Method::from(matcher.as_ref()) };
                 // A poisoned lock only means that another thread panicked; the memory is replaced whole.
                 let mut memory = memory.lock().unwrap_or_else(PoisonError::into_inner);
-                measure(posed, &rig, method, &mut memory, stopwatch)
+                measure(posed, &rig, (method, is_dense), &mut memory, stopwatch)
             });
             let worked = worked.await;
             let outcome = worked.unwrap_or_else(|error| Err(LiveError::Measuring(error.to_string())));

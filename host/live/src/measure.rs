@@ -7,8 +7,8 @@ use std::time::Duration;
 use image::RgbImage;
 use vergence_camera::PendingImage;
 use vergence_pipeline::{
-    CameraGone, ExposedImage, Method, Observation, PairImages, PairPose, PoseMemory, UntoldAxes, observe_one,
-    observe_pair, observe_untold,
+    CameraGone, ExposedImage, LiveDense, Method, Observation, PairImages, PairPose, PoseMemory, UntoldAxes,
+    dense_ranges, observe_one, observe_pair, observe_untold,
 };
 use vergence_rig::{BoardInstant, Rig};
 use vergence_vision::Side;
@@ -45,8 +45,10 @@ pub struct Measurement {
     pub unseen: Option<Duration>,
     /// How long decoding the images took: rendering, where they are simulated.
     pub decode_seconds: f64,
-    /// How long matching and triangulation took.
+    /// How long matching and triangulation took, and measuring every pixel.
     pub seconds: f64,
+    /// A range for every pixel, where that is wanted and both cameras delivered.
+    pub dense: Option<LiveDense>,
 }
 
 impl Measurement {
@@ -59,11 +61,12 @@ impl Measurement {
             unseen: None,
             decode_seconds: seconds(begun, decoded),
             seconds: seconds(decoded, done),
+            dense: None,
         }
     }
 }
 
-/// Decodes and measures `exposure`; `memory` is of the exposures before it, `clock` says how long both take. `None` where neither
+/// Decodes and measures `exposure`, every pixel too where it `is_dense`; `memory` is of the exposures before it, `clock` says how long both take. `None` where neither
 /// encoders nor images tell where the axes are.
 ///
 /// # Errors
@@ -72,7 +75,7 @@ impl Measurement {
 pub fn measure(
     exposure: PosedExposure,
     rig: &Rig,
-    method: Method<'_>,
+    (method, is_dense): (Method<'_>, bool),
     memory: &mut PoseMemory,
     clock: Clock,
 ) -> Result<Option<Measurement>, LiveError> {
@@ -98,13 +101,26 @@ pub fn measure(
     };
     let (middle, [left, right]) = both(*images)?;
     let (images, decoded) = (PairImages { left: &left, right: &right }, clock());
+    // Images tell the pose of a rig that stands.
+    let is_steady = pose.as_ref().map_or(true, |pose| pose.is_steady() && !pose.is_moving());
     let observed = match pose {
         Ok(pose) => observe_pair(images, rig, &pose, method, memory).map(Some),
         Err(untold) => observe_untold(images, rig, &untold, method, memory),
     };
     let observed = observed.map_err(|error| LiveError::Unmeasurable(error.to_string()))?;
-    let measurement = |observation| Measurement::new(observation, middle, [begun, decoded, clock()]);
-    Ok(observed.map(|observation| Measurement { unseen, ..measurement(observation) }))
+    let Some(observation) = observed else { return Ok(None) };
+    let begun_dense = clock();
+    let ranges = match &observation {
+        Observation::Points { pose, .. } if is_dense && is_steady => {
+            let ranges = dense_ranges(images, (rig, method.search), pose, &mut |_| ());
+            Some(ranges.map_err(|error| LiveError::Unmeasurable(error.to_string()))?)
+        }
+        _ => None,
+    };
+    let done = clock();
+    let seconds = done.saturating_sub(begun_dense).as_secs_f64();
+    let dense = is_dense.then_some(LiveDense { ranges, left, seconds });
+    Ok(Some(Measurement { unseen, dense, ..Measurement::new(observation, middle, [begun, decoded, done]) }))
 }
 
 /// Both images, and the middle of the exposure of the left one.

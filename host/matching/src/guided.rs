@@ -10,6 +10,7 @@ use crate::links::{Compared, Link, Links, Rows, agree_on_pose, bearing_pair, in_
 use crate::match_errors::state_errors;
 use crate::matcher::{ImagePair, Match, MatchError, Matcher, Matches, UnmatchedReason};
 use crate::plane::Pyramid;
+use crate::pool::in_pool;
 use crate::shared_views::SharedViews;
 use crate::wrong_pose::{ANY_POSE, pose_instead};
 
@@ -51,6 +52,12 @@ impl Matcher for GuidedMatcher {
 
     fn find(&self, pair: &ImagePair<'_>) -> Result<Matches, MatchError> {
         pair.check()?;
+        in_pool(|| self.found(pair))
+    }
+}
+
+impl GuidedMatcher {
+    fn found(&self, pair: &ImagePair<'_>) -> Result<Matches, MatchError> {
         let views = SharedViews::of(pair, self.oversampling)?;
         let (pyramids, seen) = self.features(&views);
         let matches = matched(&views, &pyramids, &seen, pair.pose_sigma);
@@ -68,9 +75,7 @@ impl Matcher for GuidedMatcher {
         let (pyramids, seen) = self.features(&views);
         Ok(matched(&views, &pyramids, &seen, pair.pose_sigma))
     }
-}
 
-impl GuidedMatcher {
     /// Finds candidates inside the epipolar band by their descriptors, before registration and every other test.
     ///
     /// # Errors

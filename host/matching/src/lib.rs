@@ -32,6 +32,7 @@ mod match_errors;
 mod matcher;
 mod neighbours;
 mod plane;
+mod pool;
 mod propagate;
 mod refine;
 mod shared_field;

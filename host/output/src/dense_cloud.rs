@@ -2,6 +2,8 @@
 
 use std::path::{Path, PathBuf};
 
+use image::RgbImage;
+use rayon::prelude::*;
 use serde_json::{Map, Value, json};
 use vergence_files::{FileError, write_png, write_whole};
 use vergence_matching::{DenseDepth, DenseSample};
@@ -38,20 +40,29 @@ impl<'a> DenseCloud<'a> {
         (out, is_ascii): (&'a Path, bool),
     ) -> Result<Self, FileError> {
         let depth = &ranges.depth;
-        let rows = rows(depth, images, rig, pose);
+        let rows = dense_rows(depth, images.left, (rig, pose));
         let format = CloudFormat::of_file(out);
-        let bytes = format.encoding(is_ascii).and_then(|encoding| format.dense_cloud(&rows, encoding));
-        let bytes = bytes.map_err(|error| FileError::write(out, error))?;
-        write_whole(out, &bytes)?;
-        write_png(&beside(out, "range", "png"), &range_image(depth))?;
-        write_png(&beside(out, "sigma", "png"), &sigma_image(depth))?;
-        write_png(&beside(out, "confidence", "png"), &confidence_image(depth))?;
-        write_drawing(&beside(out, "preview", "svg"), dense_svg(images.left, depth))?;
-        let view = DepthView::new(depth, (images.left, &rig.left_camera), &pose.left_from_right)
-            .map_err(|error| FileError::write(&beside(out, "depth", "png"), error))?;
-        write_png(&beside(out, "depth", "png"), &view.depth)?;
-        write_png(&beside(out, "depth-image", "png"), &view.image)?;
-        write_whole(&beside(out, "depth", "yaml"), view.yaml().as_bytes())?;
+        let cloud = || {
+            let bytes = format.encoding(is_ascii).and_then(|encoding| format.dense_cloud(&rows, encoding));
+            write_whole(out, &bytes.map_err(|error| FileError::write(out, error))?)
+        };
+        let view = || {
+            let view = DepthView::new(depth, (images.left, &rig.left_camera), &pose.left_from_right)
+                .map_err(|error| FileError::write(&beside(out, "depth", "png"), error))?;
+            write_png(&beside(out, "depth", "png"), &view.depth)?;
+            write_png(&beside(out, "depth-image", "png"), &view.image)?;
+            write_whole(&beside(out, "depth", "yaml"), view.yaml().as_bytes())
+        };
+        // Files of some megabytes each, which have nothing to do with each other.
+        let files: [&(dyn Fn() -> Result<(), FileError> + Sync); 6] = [
+            &cloud,
+            &view,
+            &|| write_drawing(&beside(out, "preview", "svg"), dense_svg(images.left, depth)),
+            &|| write_png(&beside(out, "range", "png"), &range_image(depth)),
+            &|| write_png(&beside(out, "sigma", "png"), &sigma_image(depth)),
+            &|| write_png(&beside(out, "confidence", "png"), &confidence_image(depth)),
+        ];
+        files.par_iter().map(|write| write()).collect::<Vec<_>>().into_iter().collect::<Result<(), _>>()?;
         let extrapolated = rows.iter().filter(|row| row.extrapolated).count();
         Ok(Self { ranges, times, points: rows.len(), extrapolated, out })
     }
@@ -125,15 +136,14 @@ fn beside(out: &Path, what: &str, ending: &str) -> PathBuf {
 }
 
 /// A row for each point whose own range is known to a twentieth, as in the sparse cloud.
-fn rows(depth: &DenseDepth, images: PairImages<'_>, rig: &Rig, pose: &RigPose) -> Vec<DenseRow> {
+pub(crate) fn dense_rows(depth: &DenseDepth, left: &RgbImage, (rig, pose): (&Rig, &RigPose)) -> Vec<DenseRow> {
     let right_from_left = pose.right_from_left();
     let width = depth.size().width.max(1);
-    let row = |(index, sample): (u32, &DenseSample)| {
+    let row = |(pixel, sample): (Pixel, &DenseSample)| {
         let DenseSample::Measured(measured) = sample else { return None };
         if !makes_a_point(measured) {
             return None;
         }
-        let pixel = Pixel { u: f64::from(index % width), v: f64::from(index / width) };
         let ray = rig.left_camera.unproject::<Left>(pixel).ok()?;
         let start = rig.left_camera.origin_of(&ray);
         let point = Point::<Left>::from_mm(start.mm() + ray.at(measured.range().mm()).mm());
@@ -141,11 +151,16 @@ fn rows(depth: &DenseDepth, images: PairImages<'_>, rig: &Rig, pose: &RigPose) -
         let in_right = rig.right_camera.project(&right_ray).ok()?;
         Some(DenseRow {
             point: point.mm().map(|mm| mm as f32).into(),
-            colour: colour_at(images.left, pixel),
+            colour: colour_at(left, pixel),
             pixels: [pixel.u, pixel.v, in_right.u, in_right.v].map(|value| value as f32),
             sigma: measured.sigma().mm() as f32,
             extrapolated: !(rig.left_camera.is_measured(&ray) && rig.right_camera.is_measured(&right_ray)),
         })
     };
-    (0..).zip(depth.samples()).filter_map(row).collect()
+    let line = |(v, samples): (usize, &[DenseSample])| {
+        let pixels = (0..width).map(move |u| Pixel { u: f64::from(u), v: v as f64 });
+        pixels.zip(samples).filter_map(row).collect::<Vec<_>>()
+    };
+    let lines: Vec<_> = depth.samples().par_chunks(width as usize).enumerate().map(line).collect();
+    lines.concat()
 }

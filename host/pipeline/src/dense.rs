@@ -1,5 +1,6 @@
 //! From a pair of images and a pose to a range for every pixel.
 
+use image::RgbImage;
 use vergence_matching::{DenseDepth, DenseViews, MatchError};
 use vergence_rig::{Rig, RigPose};
 use vergence_vision::{PoseDrift, StereoPair, pose_drift};
@@ -24,6 +25,17 @@ impl DenseRanges {
     pub fn significant_drift(&self) -> Option<&PoseDrift> {
         self.pose_drift.as_ref().filter(|drift| drift.is_significant())
     }
+}
+
+/// The ranges of a pair that came live, beside its points.
+#[derive(Clone, Debug)]
+pub struct LiveDense {
+    /// A range for every pixel; `None` where the pose changed while the rows were exposed: ranges are by one pose.
+    pub ranges: Option<DenseRanges>,
+    /// The left image, which has the colours of the points.
+    pub left: RgbImage,
+    /// How long measuring took.
+    pub seconds: f64,
 }
 
 /// Measures the range of every pixel of the left image. `ended` hears of the end of each stage.

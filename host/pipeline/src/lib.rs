@@ -44,7 +44,7 @@ mod zones;
 pub use axes_by_images::axes_by_images;
 pub use bearings::{Bearing, bearings};
 pub use cloud::{ColouredPoint, Dropped, Method, PairCloud, PairCloudError, cloud_of_pairs, pair_cloud, refined_cloud};
-pub use dense::{DenseRanges, dense_ranges};
+pub use dense::{DenseRanges, LiveDense, dense_ranges};
 pub use exposures::{Ambiguity, CameraGone, Exposed, ExposedImage, Exposures, SkipReason, TimeBase};
 pub use memory::PoseMemory;
 pub use mode_outlook::ModeOutlook;

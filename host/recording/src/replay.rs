@@ -60,7 +60,7 @@ impl<'a, A: Audience> Replay<'a, A> {
         publish: &mut impl FnMut(Measurement) -> Result<(), E>,
     ) -> Result<(), E> {
         for exposure in exposures {
-            match measure(exposure, self.rig, self.method, &mut self.memory, self.stopwatch)? {
+            match measure(exposure, self.rig, (self.method, false), &mut self.memory, self.stopwatch)? {
                 Some(measurement) => publish(measurement)?,
                 None => self.posing.skip(SkipReason::AxesUntold),
             }

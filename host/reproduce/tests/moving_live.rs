@@ -134,6 +134,7 @@ impl World {
             matching_time: MatchingTime::Fixed(Duration::from_millis(50)),
             stopwatch: || Duration::ZERO,
             budget: None,
+            dense: false,
         };
         let (mut found, mut totals) = (Found::default(), Totals::default());
         let moved = board.armed(pending(), async |board| -> Result<(), vergence_board::BoardError> {

@@ -12,7 +12,9 @@ mod report;
 use std::time::Duration;
 
 use vergence_matching::{GuidedMatcher, Matcher, TrackingMatcher};
-use vergence_pipeline::{Method, PairPose, PointBudget, Stage, StageTimes, StandingPose, refined_cloud};
+use vergence_pipeline::{
+    Method, PairPose, PointBudget, Search, Stage, StageTimes, StandingPose, dense_ranges, refined_cloud,
+};
 use vergence_rig::Rig;
 use vergence_vision::median;
 
@@ -46,6 +48,8 @@ pub struct LiveFigures {
     pub single: Vec<[usize; 2]>,
     /// Seconds that the single-pair matcher took for each.
     pub single_seconds: Vec<f64>,
+    /// Seconds that the ranges of all pixels took for each of them, and the part of the pixels that was measured.
+    pub dense: Vec<[f64; 2]>,
     /// Memory after a quarter of the pairs and at the end.
     pub memory: [Memory; 2],
 }
@@ -88,6 +92,8 @@ impl LiveFigures {
                     timed(clock, || points(&frames.rig, frame, Method::from(&single as &dyn Matcher), &mut |_| ()));
                 figures.single.push(frames.judge(frame, &alone?));
                 figures.single_seconds.push(seconds);
+                let (dense, seconds) = timed(clock, || measured_share(&frames.rig, frame));
+                figures.dense.push([seconds, dense?]);
             }
             if next <= count / 4 {
                 figures.memory = [Memory::now(); 2];
@@ -114,6 +120,13 @@ impl LiveFigures {
         [median(sorted).unwrap_or_default(), last]
             .map(|seconds| Duration::try_from_secs_f64(seconds).unwrap_or_default())
     }
+}
+
+/// The part of the pixels of a pair that has a range.
+fn measured_share(rig: &Rig, frame: &LiveFrame) -> Result<f64, BenchError> {
+    let ranges = dense_ranges(frame.images(), (rig, &Search::default()), &frame.pose, &mut |_| ());
+    let depth = ranges.map_err(|error| BenchError::Work(error.to_string()))?.depth;
+    Ok(depth.counts().measured as f64 / depth.samples().len().max(1) as f64)
 }
 
 fn points(

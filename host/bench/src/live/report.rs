@@ -41,7 +41,13 @@ impl LiveFigures {
                  memory {} MiB, later {} MiB, at most {} MiB",
                 self.memory[0].resident, self.memory[1].resident, self.memory[1].peak
             ),
+            format!("ranges of {:.1} % of the pixels in {:.0} ms", 100.0 * self.dense(1), 1e3 * self.dense(0)),
         ]
+    }
+
+    /// The median of the seconds that all pixels of a pair took (0), or of the part of them that was measured (1).
+    fn dense(&self, which: usize) -> f64 {
+        median(self.dense.iter().map(|dense| dense[which]).collect()).unwrap_or_default()
     }
 
     /// The same for programs.
@@ -65,6 +71,8 @@ impl LiveFigures {
             "precision": rounded(precision),
             "single_right_points": rounded(single),
             "single_precision": rounded(single_precision),
+            "dense_ms": rounded(1e3 * self.dense(0)),
+            "dense_share": rounded(self.dense(1)),
             "single_ms": rounded(1e3 * median(self.single_seconds.clone()).unwrap_or_default()),
             "memory_mib": [self.memory[0].resident, self.memory[1].resident, self.memory[1].peak],
         })

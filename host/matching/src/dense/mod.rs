@@ -44,6 +44,7 @@ use self::surface::SAME_SURFACE;
 use crate::epipolar_band::EpipolarBand;
 use crate::grid::direction;
 use crate::matcher::{ImagePair, MatchError};
+use crate::pool::in_pool;
 use crate::shared_field::near;
 use crate::{Grid, SharedFrame, View, ViewPixel};
 
@@ -93,7 +94,7 @@ impl<'a> DenseViews<'a> {
     pub fn new(pair: &ImagePair<'a>) -> Result<Self, MatchError> {
         pair.check()?;
         let frame = SharedFrame::new(&pair.left_from_right).ok_or(MatchError::NoBaseline)?;
-        Self::turned(pair, frame, pair.left_from_right)
+        in_pool(|| Self::turned(pair, frame, pair.left_from_right))
     }
 
     /// Resamples both images so that the epipolar curves of the pose `rows` are rows.
@@ -112,6 +113,10 @@ impl<'a> DenseViews<'a> {
     /// their error, and the images alone tell it badly.
     #[must_use]
     pub fn aligned(self) -> Self {
+        in_pool(|| self.on_rows())
+    }
+
+    fn on_rows(self) -> Self {
         let mut views = self;
         for _ in 0..ROUNDS {
             let sightings = sightings(&views.levels);
@@ -140,7 +145,7 @@ impl<'a> DenseViews<'a> {
     /// Finds the disparities of the left view on which both views agree.
     #[must_use]
     pub fn sweep(&self) -> WholeDisparities {
-        WholeDisparities(self.levels.swept())
+        WholeDisparities(in_pool(|| self.levels.swept()))
     }
 
     /// Refines disparities to a fraction of a pixel, with their standard deviations.
@@ -148,12 +153,16 @@ impl<'a> DenseViews<'a> {
     pub fn register(&self, swept: &WholeDisparities) -> Disparities {
         let left = SampledView { plane: self.left.plane(), seen: self.left.seen() };
         let right = SampledView { plane: self.right.plane(), seen: self.right.seen() };
-        fraction::registered([left, right], &swept.0, self.levels.coarsest_area())
+        in_pool(|| fraction::registered([left, right], &swept.0, self.levels.coarsest_area()))
     }
 
     /// Converts disparities to ranges of the left image's pixels. The covariance is that of [`dense_depth`].
     #[must_use]
     pub fn ranges(&self, disparities: &Disparities, shared: &SharedCovariance) -> DenseDepth {
+        in_pool(|| self.converted(disparities, shared))
+    }
+
+    fn converted(&self, disparities: &Disparities, shared: &SharedCovariance) -> DenseDepth {
         let size = self.pair.left_camera.size();
         let lens = BatchLens::new(self.pair.left_camera);
         let turn = rotation(&self.rows_frame.shared_from_left());

@@ -29,6 +29,7 @@ use crate::links::{Compared, Link, Links, agree_on_pose, in_originals, registere
 use crate::match_errors::state_errors;
 use crate::neighbours::GRADIENT_LIMIT;
 use crate::plane::Pyramid;
+use crate::pool::in_pool;
 use crate::refine::BESIDE;
 use crate::shared_views::SharedViews;
 use crate::view::Buffers;
@@ -105,7 +106,9 @@ impl Matcher for TrackingMatcher {
         let density = pair.left_camera.k()[0].max(pair.right_camera.k()[0]);
         let oversampling = self.whole.oversampling.unwrap_or(DENSITY / density).clamp(1.0, 2.0);
         let [keypoints, in_strips] = [self.whole.keypoints, self.in_strips].map(|keypoints| keypoints * most / MOST);
-        state.find(pair, &GuidedMatcher { oversampling: Some(oversampling), keypoints }, [in_strips, most])
+        let (state, whole) = (&mut *state, GuidedMatcher { oversampling: Some(oversampling), keypoints });
+        // The lock is taken outside of the pool, where no thread that waits begins another pair.
+        in_pool(|| state.find(pair, &whole, [in_strips, most]))
     }
 }
 

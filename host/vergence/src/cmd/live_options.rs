@@ -93,6 +93,7 @@ impl LiveMethod {
             stopwatch,
             memory: Arc::default(),
             budget: most.map(|most| PointBudget::new(self.least_points, most)),
+            dense: false,
         }
     }
 }

@@ -48,7 +48,8 @@ impl Publisher {
         self.number += 1;
         match &result.measurement.observation {
             Observation::Points { cloud, pose, moving, by_images } => {
-                self.files.write_cloud(self.number, &cloud.points)?;
+                let dense = result.measurement.dense.as_ref();
+                self.files.write_pair(self.number, (&cloud.points, dense), (&self.rig, pose))?;
                 let exposed = result.exposed(self.clock.now());
                 self.recorder.iter().for_each(|recorder| recorder.result(self.clock.now(), result));
                 self.publication.iter().for_each(|publication| publication.cloud(exposed, cloud, pose));
@@ -56,7 +57,7 @@ impl Publisher {
                 let told = by_axes.or_else(|| pose_told_words(cloud)).map(|told| format!("; {told}"));
                 let unseen = result.measurement.unseen.map(|time| time.as_secs_f64());
                 let unseen_words = unseen.map(|time| format!("; no link, last readings {time:.1} s before"));
-                let points = live_cloud_words(&self.rig, cloud, pose, *moving);
+                let points = live_cloud_words(&self.rig, (cloud, dense), pose, *moving);
                 self.console.say(
                     self.points_line(result, &points) + &told.unwrap_or_default() + &unseen_words.unwrap_or_default(),
                 )?;
@@ -67,7 +68,7 @@ impl Publisher {
                     self.recorder.iter().for_each(|recorder| recorder.warning(self.clock.now(), warning));
                 }
                 self.print_json(|| {
-                    let told = live_cloud_json(&self.rig, cloud, pose, *moving);
+                    let told = live_cloud_json(&self.rig, (cloud, dense), pose, *moving);
                     let mut line = self.result_json("cloud", result, told);
                     line["rate_hz"] = json!(result.pace.map(|(rate, _)| rounded(rate)));
                     line["points_limit"] = point_limit_json(result.limited);

@@ -39,6 +39,9 @@ pub struct Args {
     cameras: Vec<String>,
     #[command(flatten)]
     results: ResultOptions,
+    /// Measures every pixel of a pair too, while the cameras stand: `dense.ply` with ranges and their sigma as PNG images in the folder of --out.
+    #[arg(long)]
+    dense: bool,
     /// Record images, encoders, clouds and warnings in this folder, as a ROS 2 bag that `vergence replay` measures again.
     #[arg(long, value_name = "DIR")]
     record: Option<PathBuf>,
@@ -88,6 +91,7 @@ pub async fn run(args: &Args, common: &CommonOptions, console: Console) -> Resul
     if let Some(recording) = &recording {
         live = recording.of(live);
     }
+    live.dense = args.dense;
     let (mut board, trigger) = (rig.board, rig.trigger);
     let mut publisher = Publisher {
         console,
