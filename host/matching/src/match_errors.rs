@@ -67,8 +67,8 @@ const SHORTEST: f64 = 0.2;
 const OFF_SURFACE: (f64, f64) = (0.31, 0.4);
 /// Parts of the departure of the windows beside a match, the third in size of the four, that are errors along the row and across it.
 const BY_DEPARTURE: [f64; 2] = [0.54, 0.15];
-/// The largest departure that counts, in pixels of the view.
-const FARTHEST_DEPARTURE: f64 = 1.0;
+/// The largest departure that counts, in pixels of the view: beyond it, the surface is another one.
+pub(crate) const FARTHEST_DEPARTURE: f64 = 1.0;
 /// Logistic regression of the probability that a registered match is right: constant, logarithm of its residual over the median one,
 /// steepness, squared distance from the epipolar plane in standard deviations, of which up to four count, and logarithm of the sum of the
 /// departures and 0.05.

@@ -15,7 +15,7 @@ const NEAREST: usize = 8;
 /// Number of them that must agree.
 const SUPPORT: usize = 2;
 /// Largest change of disparity per distance in the view.
-pub(crate) const GRADIENT_LIMIT: f64 = 0.3;
+const GRADIENT_LIMIT: f64 = 0.3;
 /// Disparities that differ by up to this many standard deviations agree at any distance.
 const ALWAYS_AGREE_SIGMAS: f64 = 1.65;
 /// Matches within this distance, in pixels of the view, are of one point.

@@ -101,7 +101,7 @@ pub(crate) fn register(
 }
 
 /// Distance of the windows beside a match from its own, in pixels of the view: most of what they show is the same surface.
-pub(crate) const BESIDE: f64 = 7.0;
+const BESIDE: f64 = 7.0;
 /// The departure of a window that cannot be registered.
 const LOST: f64 = f64::INFINITY;
 

@@ -2,7 +2,7 @@
 //!
 //! Of a live rig each pair shows nearly what the one before showed. A track is a matched point that is found again: first in the left view,
 //! by registration of the left view before (`follow`), then in the right view, from where pose and range predict it. Only where tracks are
-//! missing are corners sought and compared (`search`), strip by strip of the views, a strip or two in each pair; a first pair, or one in which most tracks
+//! missing are corners sought and compared (`search`), strip by strip of the views, one to three in each pair; a first pair, or one in which most tracks
 //! are lost, is searched as a whole at once.
 //!
 //! What is found this way passes the same tests as what [`GuidedMatcher`] finds in a single pair, and states its errors by the same rules. A wrong match
@@ -26,11 +26,9 @@ use crate::corners::Keypoint;
 use crate::epipolar_band::EpipolarBand;
 use crate::guided::{LEVELS, are_suspiciously_few};
 use crate::links::{Compared, Link, Links, agree_on_pose, in_originals, registered, thin};
-use crate::match_errors::state_errors;
-use crate::neighbours::GRADIENT_LIMIT;
+use crate::match_errors::{FARTHEST_DEPARTURE, state_errors};
 use crate::plane::Pyramid;
 use crate::pool::in_pool;
-use crate::refine::BESIDE;
 use crate::shared_views::SharedViews;
 use crate::view::Buffers;
 use crate::{Grid, GuidedMatcher, ImagePair, MatchError, Matcher, Matches, UnmatchedReason, ViewPixel};
@@ -51,6 +49,8 @@ const KEYPOINTS: usize = 2000;
 const KEYPOINTS_IN_STRIPS: usize = 4000;
 /// There are few tracks where less than this part of the largest number is left.
 const MANY: f64 = 0.9;
+/// The same for very few.
+const VERY_FEW: f64 = 0.8;
 /// Largest number of tracks.
 const MOST: usize = 700;
 /// Pixels of a view per radian, unless the images have more: in views of less corners of wide axes are no longer alike. Denser views than the images
@@ -180,7 +180,12 @@ impl State {
         let at_first = self.at_first.min(most) as f64;
         let are_too_few = (tracks.len() as f64) < (FEW * at_first).max(FEWEST as f64);
         let are_few = (tracks.len() as f64) < MANY * most as f64;
-        let strip = self.next_strip(&seen.views.grid, are_too_few, if are_few { 2 } else { 1 });
+        let strips = match tracks.len() as f64 / most as f64 {
+            ..VERY_FEW => 3,
+            ..MANY => 2,
+            _ => 1,
+        };
+        let strip = self.next_strip(&seen.views.grid, are_too_few, strips);
         let keypoints = if are_few && !strip.is_whole { in_strips } else { whole.keypoints };
         let (matches, tracks) = self.matched(&seen, tracks, &strip, [keypoints, most]);
         if strip.is_whole {
@@ -290,7 +295,7 @@ impl State {
 /// disparity of the object. Such a match is wrong, and passes the tests of a single pair now and then: a track of it would pass them again and again.
 fn is_on_one_surface(link: &Link) -> bool {
     let [left, right, ..] = link.departures;
-    left.max(right) < GRADIENT_LIMIT * BESIDE
+    left.max(right) < FARTHEST_DEPARTURE
 }
 
 /// The right place of a track, from where it is predicted; where that is too far off, by the coarser levels.
