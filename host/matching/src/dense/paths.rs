@@ -13,7 +13,7 @@ use std::ops::Range;
 use multiversion::multiversion;
 use rayon::prelude::*;
 
-use super::volume::{Hypotheses, LANES};
+use super::volume::{Hypotheses, LANES, memory};
 
 /// Penalty of a step by one hypothesis, as on slanted surfaces.
 const P1: u8 = 8;
@@ -32,8 +32,9 @@ const UNTRIED: u8 = u8::MAX;
 pub(super) fn gathered(costs: &[u8], hypotheses: &Hypotheses, spans: &[Range<usize>]) -> Vec<u8> {
     let Hypotheses { width, height, count, ref first } = *hypotheses;
     let volume = Volume { costs, first, count, width, spans };
-    let mut sums = vec![0; costs.len()];
+    let mut sums = memory(costs.len());
     sums.par_chunks_mut(ROWS * width * count).enumerate().for_each(|(block, sums)| {
+        sums.fill(0);
         along_rows(&volume, block * ROWS, sums);
     });
     let mut strips: Vec<Vec<&mut [u8]>> = (0..width.div_ceil(STRIP)).map(|_| Vec::with_capacity(height)).collect();

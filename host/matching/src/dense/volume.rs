@@ -1,6 +1,7 @@
 //! The cost volume: the dissimilarity of both views for every pixel and every hypothesis of its disparity.
 
 use std::ops::Range;
+use std::sync::{Mutex, PoisonError};
 
 use multiversion::multiversion;
 use rayon::prelude::*;
@@ -38,13 +39,41 @@ impl CensusView {
     }
 }
 
+/// Volumes that were used before. The system clears new memory page by page, which takes longer than the search in it.
+static SPARE: Mutex<Vec<Vec<u8>>> = Mutex::new(Vec::new());
+/// Most volumes that are kept: costs and sums of one pair.
+const KEPT: usize = 2;
+
+/// Memory for a volume, with any values.
+pub(super) fn memory(count: usize) -> Vec<u8> {
+    // A poisoned lock only means that another thread panicked between whole volumes.
+    let spare = SPARE.lock().unwrap_or_else(PoisonError::into_inner).pop();
+    let mut volume = spare.unwrap_or_default();
+    if volume.capacity() < count {
+        return vec![0; count];
+    }
+    volume.resize(count, 0);
+    volume
+}
+
+/// Keeps a volume for the next search.
+pub(super) fn give_back(volume: Vec<u8>) {
+    let mut spare = SPARE.lock().unwrap_or_else(PoisonError::into_inner);
+    spare.push(volume);
+    // The largest are taken first and kept.
+    spare.sort_by_key(Vec::capacity);
+    let surplus = spare.len().saturating_sub(KEPT);
+    spare.drain(..surplus);
+}
+
 /// Computes the costs, by rows, pixels and hypotheses. Beyond the `spans` of the left view they are zero.
 pub(super) fn costs([left, right]: [&CensusView; 2], hypotheses: &Hypotheses, spans: &[Range<usize>]) -> Vec<u8> {
     let Hypotheses { width, height, count, ref first } = *hypotheses;
-    let mut costs = vec![0; width * height * count];
+    let mut costs = memory(width * height * count);
     costs.par_chunks_mut(width * count).zip(spans).enumerate().for_each(|(y, (out, span))| {
         let row = y * width..(y + 1) * width;
         let reversed = Reversed::of(&right.words[row.clone()], &right.seen[row.clone()], count);
+        out.fill(0);
         differences((out, span), (&left.words[row.clone()], &left.seen[row.clone()]), &reversed, &first[row]);
     });
     costs
