@@ -10,7 +10,7 @@
 mod common;
 
 use common::built_bench::{Dice, POSES, as_built, stand};
-use common::corner_files::{Lenses, calibrated, noisy, projection};
+use common::corner_files::{CORNER_PX, Lenses, calibrated, noisy, projection};
 use common::rendered::{band, seeds};
 use image::RgbImage;
 use nalgebra::Vector3;
@@ -38,8 +38,16 @@ fn trial(seed: u64, separations: [f64; 2]) -> [f64; 3] {
     let rig = as_built(&mut dice);
     let work = tempfile::tempdir().expect("a temporary folder");
     let [left, right] = [&rig.left_camera, &rig.right_camera].map(projection);
-    let lenses =
-        Lenses { left: &left, right: &right, reach: 1.45, poses: POSES, spread: 0.5, own_views: 20, bow_mm: 0.0 };
+    let lenses = Lenses {
+        left: &left,
+        right: &right,
+        reach: 1.45,
+        poses: POSES,
+        spread: 0.5,
+        own_views: 20,
+        bow_mm: 0.0,
+        corner_px: CORNER_PX,
+    };
     let written = Rig::from_toml(&calibrated(&rig, lenses, work.path(), &mut dice)).expect("a rig");
     assert!(matches!(written.calibration, RigCalibration::Covariance(_)), "the file holds a covariance");
     let unknown = Rig { calibration: RigCalibration::Unknown, ..written.clone() };
