@@ -10,7 +10,7 @@
 mod common;
 
 use common::built_bench::{Dice, POSES, as_built, mounted, stand};
-use common::corner_files::{Lenses, calibrated, noisy, projection};
+use common::corner_files::{CORNER_PX, Lenses, calibrated, noisy, projection};
 use common::rendered::{band, seeds};
 use image::RgbImage;
 use nalgebra::Vector3;
@@ -59,6 +59,7 @@ fn trial(seed: u64, separations: [f64; 2], eyes: Eyes) -> [f64; 3] {
         spread: 0.5,
         own_views: OWN_VIEWS,
         bow_mm: 0.0,
+        corner_px: CORNER_PX,
     };
     let written = Rig::from_toml(&calibrated(&rig, lenses, work.path(), &mut dice)).expect("a rig");
     assert!(matches!(written.calibration, RigCalibration::Covariance(_)), "the file holds a covariance");

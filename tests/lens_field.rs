@@ -13,7 +13,7 @@ use std::path::Path;
 
 use common::built_bench::{Dice, as_built, stand};
 use common::cameras::camera_files;
-use common::corner_files::{Lenses, Projection, calibrated, direction, noisy, projection};
+use common::corner_files::{CORNER_PX, Lenses, Projection, calibrated, direction, noisy, projection};
 use common::rendered::{band, seeds};
 use common::{fails_with, real_data, run_json};
 use image::RgbImage;
@@ -46,8 +46,16 @@ impl Measured {
         let rig = as_built(&mut dice);
         let work = tempfile::tempdir().expect("a temporary folder");
         let [left, right] = [&rig.left_camera, &rig.right_camera].map(|of| move |at: &Vector3<f64>| lens(of, at));
-        let lenses =
-            Lenses { left: &left, right: &right, reach: REACH, poses: POSES, spread: 0.3, own_views: 20, bow_mm: 0.0 };
+        let lenses = Lenses {
+            left: &left,
+            right: &right,
+            reach: REACH,
+            poses: POSES,
+            spread: 0.3,
+            own_views: 20,
+            bow_mm: 0.0,
+            corner_px: CORNER_PX,
+        };
         let text = calibrated(&rig, lenses, work.path(), &mut dice);
         Self { written: Rig::from_toml(&text).expect("a rig"), rig, dice }
     }

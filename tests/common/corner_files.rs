@@ -10,8 +10,8 @@ use vergence_vision::{KannalaBrandt, Left, Pixel, Point};
 use super::built_bench::{Dice, stand};
 use super::run_json;
 
-/// Standard deviation of the corners that calibrate.
-const CORNER_PX: f64 = 0.1;
+/// Usual standard deviation of the corners that calibrate.
+pub const CORNER_PX: f64 = 0.1;
 
 /// A lens as it truly is: the pixel of a place in the frame of its camera, where it shows it.
 pub type Projection<'a> = &'a dyn Fn(&Vector3<f64>) -> Option<Pixel>;
@@ -30,6 +30,8 @@ pub struct Lenses<'a> {
     pub own_views: usize,
     /// How far the middle of the target stands out over its left and right edges, in millimetres.
     pub bow_mm: f64,
+    /// Standard deviation of the corners.
+    pub corner_px: f64,
 }
 
 /// The projection of a lens of the model's family onto its sensor.
@@ -42,11 +44,12 @@ fn seen(
     lens: Projection<'_>,
     camera_from_left: &Isometry3<f64>,
     target: &[Vector3<f64>],
+    corner_px: f64,
     dice: &mut Dice,
 ) -> Option<Vec<Pixel>> {
     let corner = |at: &Vector3<f64>| {
         let point = camera_from_left * Point3::from(*at);
-        Some(noisy(lens(&point.coords)?, CORNER_PX, dice))
+        Some(noisy(lens(&point.coords)?, corner_px, dice))
     };
     target.iter().map(corner).collect()
 }
@@ -80,13 +83,17 @@ fn rows(text: &mut String, (camera, frame): (&str, usize), pixels: &[Pixel], rea
 }
 
 /// Corners of `views` targets all over the field of one lens, or that part of it.
-fn own_corners(lens: Projection<'_>, Lenses { reach, own_views, bow_mm, .. }: Lenses<'_>, dice: &mut Dice) -> String {
+fn own_corners(
+    lens: Projection<'_>,
+    Lenses { reach, own_views, bow_mm, corner_px, .. }: Lenses<'_>,
+    dice: &mut Dice,
+) -> String {
     let mut text = String::from("camera,file,frame,idx,x,y,bx_mm,by_mm\n");
     let mut frame = 0;
     while frame < own_views {
         let towards = direction(reach * (0.5 + 0.5 * dice.uniform()).sqrt(), 3.2 * dice.uniform());
         let target = target(&towards, 260.0 + 80.0 * dice.uniform(), bow_mm, dice);
-        let Some(pixels) = seen(lens, &Isometry3::identity(), &target, dice) else { continue };
+        let Some(pixels) = seen(lens, &Isometry3::identity(), &target, corner_px, dice) else { continue };
         rows(&mut text, ("own", frame), &pixels, "");
         frame += 1;
     }
@@ -105,8 +112,8 @@ fn shared_corners(rig: &Rig, lenses: Lenses<'_>, dice: &mut Dice) -> String {
         while taken < 4 {
             let towards = (middle + lenses.spread * dice.vector()).normalize();
             let target = target(&towards, 330.0 + 100.0 * dice.uniform(), lenses.bow_mm, dice);
-            let left = seen(lenses.left, &Isometry3::identity(), &target, dice);
-            let right = seen(lenses.right, left_from_right.inverse().isometry(), &target, dice);
+            let left = seen(lenses.left, &Isometry3::identity(), &target, lenses.corner_px, dice);
+            let right = seen(lenses.right, left_from_right.inverse().isometry(), &target, lenses.corner_px, dice);
             let (Some(left), Some(right)) = (left, right) else { continue };
             let readings = format!(",{},{}", read[0], read[1].to_degrees());
             rows(&mut text, ("left", frame), &left, &readings);

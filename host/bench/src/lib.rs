@@ -9,6 +9,7 @@ pub mod busy;
 pub mod calibrate;
 mod error;
 pub mod firmware;
+mod lenses;
 pub mod live;
 pub mod matching;
 pub mod networks;
@@ -21,6 +22,7 @@ mod vision_report;
 use std::time::Duration;
 
 pub use error::BenchError;
+pub use lenses::LensTimes;
 pub use python::ask_python;
 
 /// Returns the time since some fixed instant.

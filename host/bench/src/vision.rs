@@ -10,11 +10,14 @@ use vergence_vision::{
 };
 
 use crate::error::BenchError;
+use crate::lenses::{LensTimes, lenses};
 use crate::python::ask_python;
 use crate::{Clock, timed};
 
 /// OpenCV and this program take turns this often, so that a busy moment of the machine does not fall on one alone.
 const ROUNDS: u32 = 4;
+/// How often each lens is measured for each repeat of the others: its arrays are small.
+const LENS_TURNS: u32 = 4;
 /// Rays are spread over 0° to 99° from the optical axis.
 const FIELD: Angle = Angle::from_deg(99.0);
 const LENS: OpenCvFisheye =
@@ -43,6 +46,8 @@ pub struct VisionBench {
     pub opencv: Result<OpenCvTimes, String>,
     /// Largest error of a ray or pixel over the field against the functions for single points, in radians.
     pub max_ray_error: f64,
+    /// Times by the lenses of other programs' models, a polynomial lens first, with the fastest instructions, of arrays that stay in the cache.
+    pub lenses: Vec<LensTimes>,
     /// Times with the fastest instructions over the count of points.
     pub growth: Vec<(u32, VisionTimes)>,
 }
@@ -114,6 +119,7 @@ pub fn vision(points: u32, repeats: u32, python: &str, clock: Clock) -> Result<V
         baseline,
         opencv: peer,
         max_ray_error: errors[0].max(errors[1]),
+        lenses: lenses(LENS_TURNS * repeats, clock)?,
         growth: sizes.map(|points| (points, times(points, Instructions::Best, Memory::Kept))).into(),
     })
 }

@@ -2,6 +2,7 @@
 
 use serde_json::{Value, json};
 
+use crate::lenses::LensTimes;
 use crate::vision::{OpenCvTimes, VisionBench, VisionTimes};
 
 impl VisionTimes {
@@ -58,6 +59,7 @@ impl VisionBench {
                 "triangulate_full_mpts_per_s": 1e3 / self.baseline.full_ns,
             },
             "opencv": self.opencv.as_ref().map_or(Value::Null, opencv),
+            "lenses": self.lenses.iter().map(LensTimes::json).collect::<Vec<_>>(),
             "growth": self.growth.iter().map(growth).collect::<Vec<_>>(),
         })
     }

@@ -40,6 +40,9 @@ pub fn run(args: &Args, console: Console) -> Result<(), Failure> {
         Err(why) => console.say(format!("OpenCV was not measured: {why}"))?,
     }
     console.say(format!("largest error of a ray over 0° to 99°: {:.1e} rad", bench.max_ray_error))?;
+    for lens in &bench.lenses {
+        console.say(format!("{:>30}: {}", lens.name, lens.in_words()))?;
+    }
     for (points, times) in &bench.growth {
         console.say(format!("{points:>10} points: {}", times.in_words(None)))?;
     }
