@@ -187,7 +187,7 @@ pub fn show_cloud(panel: &Panel, rig: &Rig, number: u64) {
     let pose = Box::new(rig.pose_read_at(&[145.0, 0.0]));
     let observation = Observation::Points { cloud, pose, moving: false, by_images: Vec::new() };
     let middle = BoardInstant { us: 0.0, error_us: 0.0 };
-    let measurement = Measurement { observation, middle, unseen: None, decode_seconds: 0.0, seconds: 0.1 };
+    let measurement = Measurement { observation, middle, unseen: None, dense: None, decode_seconds: 0.0, seconds: 0.1 };
     let totals = Totals { clouds: number, ..Totals::default() };
     panel.show(&LiveResult {
         measurement: &measurement,
