@@ -274,10 +274,8 @@ fn time_limits_the_points_of_a_live_run_and_none_of_a_replay() {
     let limited = clouds(&live, &[&fast[..], &["16"]].concat());
     let limits: Vec<_> = limited.iter().map(|line| line["points_limit"]["most"].as_u64()).collect();
     println!("{limits:?}");
-    assert!(limits[..4].iter().all(Option::is_none), "a few pairs tell what a pair costs");
-    assert!(limits[15].is_some_and(|most| (120..700).contains(&most)), "{limits:?}");
-    let smoothly = |two: &[Option<u64>]| two[1].unwrap_or(700) * 10 >= two[0].unwrap_or(700) * 8;
-    assert!(limits.windows(2).all(smoothly), "{limits:?}");
+    assert!(limits[0].is_none(), "the first pair tells what a pair costs");
+    assert!(limits[6..].iter().all(|most| most.is_some_and(|most| (120..700).contains(&most))), "{limits:?}");
     assert!(said(&live, &[&fast[..], &["8"]].concat()).contains(" of 700, "), "people are told too");
     let is_free = |line: &Value| line["points_limit"].is_null();
     assert!(clouds(&live, &["--rate", "1", "--frames", "8"]).iter().all(is_free), "there is time enough");
