@@ -94,6 +94,13 @@ fn assert_honest(tally: &Tally, seeds: u64) {
     assert!(notices(nees, &band, 1.5), "the band {band:.2?} would not notice sigmas 1.5 times as large or as small");
 }
 
+/// As [`assert_honest`], but errors may be stated too large: these lenses have no decentring and no thin prism, which their views leave open, and
+/// which count as in lenses that have some (`calibration_files` of the whole draws those).
+fn assert_covered(tally: &Tally, seeds: u64) {
+    let (nees, band) = (tally.nees / f64::from(tally.poses), nees_band(6.0, seeds as f64));
+    assert!(nees < band.end, "mean NEES {nees:.2} is above {band:.2?}");
+}
+
 fn summary(what: &str, tally: &Tally) -> (f64, f64) {
     let (rotation, translation) = tally.rms();
     let nees = tally.nees / f64::from(tally.poses);
@@ -105,16 +112,17 @@ fn summary(what: &str, tally: &Tally) -> (f64, f64) {
 fn six_poses_predict_the_whole_range() {
     let seeds = seeds(FEWEST_SEEDS);
     let (central, by_evidence) = (IntrinsicsOptions::central(), IntrinsicsOptions::default());
-    for (what, own, degrees) in [
-        ("exact lenses", None, 0.02),
-        ("lenses of their own calibration, known to be central", Some(&central), 0.02),
+    let honest: fn(&Tally, u64) = assert_honest;
+    for (what, own, degrees, judge) in [
+        ("exact lenses", None, 0.02, honest),
+        ("lenses of their own calibration, known to be central", Some(&central), 0.02, honest),
         // Decentring and thin prism that 30 views leave open turn the optical axes.
-        ("lenses of their own calibration", Some(&by_evidence), 0.08),
+        ("lenses of their own calibration", Some(&by_evidence), 0.03, assert_covered),
     ] {
         let tally = study(&SIX_POSES, own, 100, seeds);
         let (rotation, translation) = summary(what, &tally);
         assert!(rotation <= degrees && translation <= 0.1);
-        assert_honest(&tally, seeds);
+        judge(&tally, seeds);
     }
 }
 
