@@ -48,7 +48,7 @@ pub struct LiveFigures {
     pub single: Vec<[usize; 2]>,
     /// Seconds that the single-pair matcher took for each.
     pub single_seconds: Vec<f64>,
-    /// Seconds that the ranges of all pixels took for each of them, and the part of the pixels that was measured.
+    /// Seconds that the ranges of all pixels of some pairs took afterwards, and the part of the pixels that was measured.
     pub dense: Vec<[f64; 2]>,
     /// Memory after a quarter of the pairs and at the end.
     pub memory: [Memory; 2],
@@ -58,6 +58,8 @@ pub struct LiveFigures {
 pub const STAGES: [Stage; 2] = [Stage::Match, Stage::Triangulate];
 /// How often the single-pair matcher measures: every so many pairs.
 const SINGLE_EVERY: usize = 10;
+/// The most pairs whose pixels all get a range.
+const DENSE: usize = 8;
 /// Fewest points to which time limits a pair, as `run` has it without an option.
 const LEAST_POINTS: usize = 150;
 
@@ -92,8 +94,6 @@ impl LiveFigures {
                     timed(clock, || points(&frames.rig, frame, Method::from(&single as &dyn Matcher), &mut |_| ()));
                 figures.single.push(frames.judge(frame, &alone?));
                 figures.single_seconds.push(seconds);
-                let (dense, seconds) = timed(clock, || measured_share(&frames.rig, frame));
-                figures.dense.push([seconds, dense?]);
             }
             if next <= count / 4 {
                 figures.memory = [Memory::now(); 2];
@@ -102,6 +102,11 @@ impl LiveFigures {
             next = newest + 1;
         }
         (figures.seconds, figures.memory[1]) = (now, Memory::now());
+        // Afterwards: it needs memory and caches that a live matcher has to itself.
+        for pair in (0..count).step_by(count.div_ceil(DENSE).max(1)) {
+            let (share, seconds) = timed(clock, || measured_share(&frames.rig, frames.at(pair)));
+            figures.dense.push([seconds, share?]);
+        }
         Ok(figures)
     }
 
