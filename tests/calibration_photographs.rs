@@ -13,15 +13,18 @@ mod common;
 mod live_bench;
 #[path = "common/live_pair.rs"]
 mod live_pair;
+#[path = "common/photograph_files.rs"]
+mod photograph_files;
 
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use common::built_bench::{Dice, POSES, as_built, mounted, stand};
 use common::rendered::{band, seeds};
-use common::{run, run_json, text};
+use common::run_json;
 use live_pair::live_pair;
 use nalgebra::{Matrix3, UnitQuaternion, Vector3};
+use photograph_files::calibrated;
 use vergence_pipeline::ColouredPoint;
 use vergence_rig::{AxisPosition, CalibratedNumbers, Provenance, Rig, RigCalibration, RigNumber, RigPose};
 use vergence_scene::{Optics, Target};
@@ -82,27 +85,11 @@ impl Trial {
 
     /// Calibrates from photographs by the command line; returns what the rig file says, and `None` where the program wants more views.
     fn calibrate(&mut self) -> Option<Rig> {
-        let printed = ["--corners", "9x6", "--square", "20mm", "--json"];
         for side in [Side::Left, Side::Right] {
-            let (folder, out) = (self.file(&side.to_string()), self.file(&format!("{side}.toml")));
-            self.photograph_own(side, Path::new(&folder));
-            let found =
-                run_json(&[&["calibrate", "intrinsics", "--images", &folder, "--out", &out], &printed[..]].concat());
-            println!("{side} lens: {} px, {} corners", found["rms_inlier_px"], found["corners_total"]);
+            self.photograph_own(side, &self.path(&side.to_string()));
         }
         self.photograph_set();
-        let [set, left, right, out] = ["set", "left.toml", "right.toml", "rig.toml"].map(|name| self.file(name));
-        let stage = ["calibrate", "stage", "--set", &set, "--left", &left, "--right", &right, "--out", &out];
-        let output = run(&[&stage[..], &printed].concat());
-        let said = text(&output.stderr);
-        if said.contains("views in which both cameras see enough of the target; at least 3 are needed") {
-            println!("seed {}: {said}", self.seed);
-            return None;
-        }
-        assert!(output.status.success(), "{said}");
-        let found: serde_json::Value = serde_json::from_slice(&output.stdout).expect("JSON");
-        println!("stage: {} px; {}", found["rms_inlier_px"], found["verdict"]["text"]);
-        Some(Rig::from_toml(&std::fs::read_to_string(&out).expect("a rig file")).expect("a rig"))
+        calibrated(self.work.path(), "20mm", &[])
     }
 
     /// Photographs of the target by one camera, all over its field.

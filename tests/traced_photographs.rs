@@ -9,6 +9,8 @@
 )]
 
 mod common;
+#[path = "common/photograph_files.rs"]
+mod photograph_files;
 #[path = "common/traced_points.rs"]
 mod traced_points;
 
@@ -17,8 +19,8 @@ use std::path::{Path, PathBuf};
 use common::built_bench::{Dice, POSES, as_built, stand};
 use common::corner_files::direction;
 use common::rendered::seeds;
-use common::{run, run_json, text};
 use nalgebra::{UnitQuaternion, Vector3};
+use photograph_files::calibrated;
 use traced_points::{Figures, MATCH_PX, MODES, bounds, figures, is_honest, means};
 use vergence_rig::Rig;
 use vergence_scene::{Lens, LensChoice, Optics, Target, TrueLens};
@@ -58,10 +60,6 @@ impl Trial {
 
     fn path(&self, name: &str) -> PathBuf {
         self.work.path().join(name)
-    }
-
-    fn file(&self, name: &str) -> String {
-        self.path(name).to_string_lossy().into_owned()
     }
 
     /// A place of the target in the direction `towards`, which it faces within some 30 degrees; every third one is near.
@@ -139,27 +137,6 @@ impl Trial {
         }
         std::fs::write(self.path("set").join("poses.csv"), readings).expect("written");
     }
-
-    /// What the rig file says, calibrated from the photographs by the command line; `None` where the program wants more views.
-    fn calibrated(&self, model: &str) -> Option<Rig> {
-        let printed = ["--corners", "9x6", "--square", "25mm", "--json"];
-        for side in [Side::Left, Side::Right] {
-            let (folder, out) = (self.file(&side.to_string()), self.file(&format!("{side}.toml")));
-            let verb = ["calibrate", "intrinsics", "--lens-model", model, "--images", &folder, "--out", &out];
-            let found = run_json(&[&verb[..], &printed].concat());
-            println!("{side} lens, {model}: {} px, {} corners", found["rms_inlier_px"], found["corners_total"]);
-        }
-        let [set, left, right, out] = ["set", "left.toml", "right.toml", "rig.toml"].map(|name| self.file(name));
-        let stage = ["calibrate", "stage", "--set", &set, "--left", &left, "--right", &right, "--out", &out];
-        let output = run(&[&stage[..], &printed].concat());
-        let said = text(&output.stderr);
-        if said.contains("views in which both cameras see enough of the target; at least 3 are needed") {
-            println!("seed {}: {said}", self.seed);
-            return None;
-        }
-        assert!(output.status.success(), "{said}");
-        Some(Rig::from_toml(&std::fs::read_to_string(&out).expect("a rig file")).expect("a rig"))
-    }
 }
 
 fn photograph(lens: &dyn Lens, camera_from_target: &Transform<Camera, Target>, seed: u64, file: &Path) {
@@ -178,7 +155,7 @@ fn trial(design: &str, seed: u64) -> Option<[[Figures; 3]; 2]> {
     trial.photograph_set();
     let mut found = [[Figures::default(); 3]; 2];
     for (model, figures_of) in MODELS.into_iter().zip(&mut found) {
-        let written = trial.calibrated(model)?;
+        let written = calibrated(trial.work.path(), "25mm", &["--lens-model", model])?;
         let lenses: ([&dyn Lens; 2], bool) = ([&trial.lenses[0], &trial.lenses[1]], false);
         *figures_of = MODES.map(|(_, separations)| {
             figures([&trial.bench, &written], lenses, separations, MATCH_PX, &mut Dice::new(seed + 2000))
