@@ -11,6 +11,7 @@ mod common;
 use std::path::Path;
 
 use common::{fails_with, run, run_json, text};
+use serde_json::Value;
 
 const VERBS: &[&str] = &[
     "devices",
@@ -154,8 +155,11 @@ fn a_thousand_poses_each_second_for_ten_minutes_and_none_is_lost() {
 
 #[test]
 fn the_doctor_says_what_is_wrong_and_what_to_do() {
-    let healthy = run_json(&["--port", "sim", "doctor", "--json"]);
-    assert_eq!(healthy["failed"], 0);
+    // Of this machine, whose disk may be full, the test knows nothing.
+    let healthy: Value = serde_json::from_slice(&run(&["--port", "sim", "doctor", "--json"]).stdout).expect("JSON");
+    let failed = healthy["checks"].as_array().into_iter().flatten().filter(|check| check["verdict"] == "fail");
+    assert!(failed.clone().all(|check| check["check"] == "disk"), "{healthy}");
+    assert_eq!(healthy["failed"], failed.count());
     let verdict = |name: &str| {
         let checks = healthy["checks"].as_array().expect("a list");
         let check = checks.iter().find(|check| check["check"] == name).expect("the check was made");

@@ -43,7 +43,7 @@ pub fn run(arguments: &[&str]) -> Output {
 /// Runs it and reads its JSON.
 pub fn run_json(arguments: &[&str]) -> Value {
     let output = run(arguments);
-    assert!(output.status.success(), "{arguments:?} failed: {}", text(&output.stderr));
+    assert!(output.status.success(), "{arguments:?} failed: {} {}", text(&output.stderr), text(&output.stdout));
     serde_json::from_slice(&output.stdout).expect("standard output is JSON")
 }
 
@@ -121,7 +121,7 @@ impl Simulator {
 
     pub fn json(&self, arguments: &[&str]) -> Value {
         let output = self.command(arguments).arg("--json").output().expect("the binary runs");
-        assert!(output.status.success(), "{arguments:?} failed: {}", text(&output.stderr));
+        assert!(output.status.success(), "{arguments:?} failed: {} {}", text(&output.stderr), text(&output.stdout));
         serde_json::from_slice(&output.stdout).expect("JSON")
     }
 
