@@ -8,7 +8,7 @@ use rayon::prelude::*;
 use vergence_calibration_report::ReportImage;
 use vergence_camera::{CameraError, camera_mask, read_image};
 use vergence_rig::CameraMask;
-use vergence_targets::{DetectError, SeenTarget, TargetKind, TargetView, see};
+use vergence_targets::{DetectError, SearchedImage, SeenTarget, TargetKind, TargetView, see_from};
 use vergence_vision::{BodyMask, ImageSize, KannalaBrandt};
 
 use crate::InputError;
@@ -22,6 +22,8 @@ pub struct TargetImages {
     pub views: Vec<Result<SeenTarget, Missed>>,
     /// Every image that can be read, reduced for a report.
     pub images: Vec<ReportImage>,
+    /// What the search found in each image, in their order: who looks again does not search again.
+    searched: Vec<SearchedImage>,
 }
 
 /// An image that gives no view.
@@ -68,11 +70,14 @@ impl TargetImages {
         self.views.iter().flatten().map(|seen| seen.view.clone()).collect()
     }
 
-    /// These views; for images without one, the view of `other`, which is of the same images.
-    #[must_use]
-    pub fn or(self, other: Self) -> Self {
-        let views = self.views.into_iter().zip(other.views).map(|(own, other)| own.or(other)).collect();
-        Self { views, ..self }
+    /// Looks again at `files`, the images that these targets are from. Images in which nothing is found now keep their view.
+    ///
+    /// # Errors
+    /// As [`detect_in`].
+    pub fn again(self, files: &[PathBuf], sought: &Sought<'_>) -> Result<Self, InputError> {
+        let now = look_at(files, self.searched, sought)?;
+        let views = now.views.into_iter().zip(self.views).map(|(now, before)| now.or(before)).collect();
+        Ok(Self { views, ..now })
     }
 
     /// The images without a view.
@@ -99,7 +104,13 @@ pub struct Sought<'a> {
 /// # Errors
 /// A file that cannot be opened, images of different sizes, or only damaged ones.
 pub fn detect_in(files: &[PathBuf], sought: &Sought<'_>) -> Result<TargetImages, InputError> {
-    let looked: Vec<_> = files.par_iter().map(|path| look(path, sought)).collect::<Result<_, InputError>>()?;
+    look_at(files, vec![SearchedImage::default(); files.len()], sought)
+}
+
+/// The same, by what the search found in each of the files before.
+fn look_at(files: &[PathBuf], searched: Vec<SearchedImage>, sought: &Sought<'_>) -> Result<TargetImages, InputError> {
+    let looked = files.par_iter().zip(&searched).map(|(path, searched)| look(path, searched, sought));
+    let looked: Vec<_> = looked.collect::<Result<_, InputError>>()?;
     let Some((width, height)) = looked.iter().find_map(|looked| looked.size) else {
         let first = looked.iter().find_map(|looked| looked.view.as_ref().err()).map(ToString::to_string);
         return Err(InputError::Damaged { images: files.len(), first });
@@ -116,7 +127,12 @@ pub fn detect_in(files: &[PathBuf], sought: &Sought<'_>) -> Result<TargetImages,
         }
     }
     let (views, images): (Vec<_>, Vec<_>) = looked.into_iter().map(|looked| (looked.view, looked.reduced)).unzip();
-    Ok(TargetImages { size: ImageSize { width, height }, views, images: images.into_iter().flatten().collect() })
+    Ok(TargetImages {
+        size: ImageSize { width, height },
+        views,
+        images: images.into_iter().flatten().collect(),
+        searched,
+    })
 }
 
 /// What one file gives.
@@ -128,7 +144,11 @@ struct Looked {
     reduced: Option<ReportImage>,
 }
 
-fn look(path: &Path, Sought { target, hint, placed, mask }: &Sought<'_>) -> Result<Looked, InputError> {
+fn look(
+    path: &Path,
+    searched: &SearchedImage,
+    Sought { target, hint, placed, mask }: &Sought<'_>,
+) -> Result<Looked, InputError> {
     let name = name_of(path);
     let image = match read_image(path) {
         Ok(image) => image,
@@ -142,7 +162,7 @@ fn look(path: &Path, Sought { target, hint, placed, mask }: &Sought<'_>) -> Resu
     let reduced = Some(ReportImage::new(&name, &grey));
     let (width, height) = image.dimensions();
     let mask = mask.map(|mask| camera_mask(mask, ImageSize { width, height })).transpose()?;
-    let view = match see(&grey, target, *hint, &name) {
+    let view = match see_from(searched, &grey, target, *hint, &name) {
         Ok(seen) if *placed && !seen.is_placed(target) => Err(Missed { name, reason: MissedReason::Unplaced }),
         Ok(seen) => unhidden(seen, mask.as_ref()),
         Err(error) => Err(Missed { name, reason: MissedReason::NoTarget(error) }),

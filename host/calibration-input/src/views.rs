@@ -49,7 +49,7 @@ pub fn views_in_images<E: From<InputError>>(
     if sought.hint.is_none() {
         // Where the views give no lens, the calibration that follows says why.
         if let Ok(rough) = calibrate_intrinsics(&targets.found(), targets.size, &IntrinsicsOptions::central()) {
-            targets = detect_in(files, &Sought { hint: Some(&rough.camera), ..sought })?.or(targets);
+            targets = targets.again(files, &Sought { hint: Some(&rough.camera), ..sought })?;
         }
     }
     tell(ViewEvent::Looked)?;

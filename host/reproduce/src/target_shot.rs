@@ -7,7 +7,7 @@ use image::GrayImage;
 use nalgebra::Vector3;
 use vergence_scene::{Lens, Optics, SheetView, Target, TrueLens, photograph_sheet};
 use vergence_sim::Random;
-use vergence_targets::{Corner, Placement, SearchedPatch, TargetView, detect_from};
+use vergence_targets::{Corner, Placement, SearchedImage, TargetView, detect_from};
 use vergence_vision::{Camera, ImageSize, KannalaBrandt, Length, Pixel, Point, Transform};
 
 use crate::bench::{TARGET, scene_target};
@@ -65,7 +65,7 @@ pub struct Photo {
 }
 
 enum Shown {
-    Picture(Window, GrayImage, SearchedPatch),
+    Picture(Window, GrayImage, SearchedImage),
     Corners(TargetView),
 }
 
@@ -86,10 +86,10 @@ impl Photo {
     pub fn found(&self, known: Option<&KannalaBrandt>) -> Option<FoundCorners> {
         let (view, labelled) = match &self.shown {
             Shown::Corners(view) => (view.clone(), true),
-            Shown::Picture(window, image, patch) => {
+            Shown::Picture(window, image, searched) => {
                 let hint = known.and_then(|lens| window.part_of(lens));
                 let on_sensor = |at: Pixel| Pixel { u: at.u + f64::from(window.left), v: at.v + f64::from(window.top) };
-                target_in(image, patch, hint.as_ref(), on_sensor)?
+                target_in(image, searched, hint.as_ref(), on_sensor)?
             }
         };
         let errors_px = errors(&view, &self.truth);
@@ -106,7 +106,7 @@ impl Photo {
                 let places: Vec<Pixel> = truth.corners.iter().map(|corner| corner.pixel).collect();
                 let patch = pinhole.patch(&places)?;
                 let picture = pinhole.picture(&patch, image, [window.left, window.top]);
-                target_in(&picture, &SearchedPatch::of(&picture), None, |at| patch.place(at))?
+                target_in(&picture, &SearchedImage::default(), None, |at| patch.place(at))?
             }
         };
         let errors_px = errors(&view, &truth);
@@ -122,7 +122,7 @@ impl Photo {
 /// The good corners of the target in a picture, moved by `place`, and whether their labels are certain.
 fn target_in(
     picture: &GrayImage,
-    searched: &SearchedPatch,
+    searched: &SearchedImage,
     hint: Option<&KannalaBrandt>,
     place: impl Fn(Pixel) -> Pixel,
 ) -> Option<(TargetView, bool)> {
@@ -151,8 +151,7 @@ impl TargetShot<'_> {
             Corners::Rendered => {
                 let window = Window::about(&self.outline(), self.lens.size());
                 let image = self.picture(&window, conditions.noise_px)?;
-                let patch = SearchedPatch::of(&image);
-                Shown::Picture(window, image, patch)
+                Shown::Picture(window, image, SearchedImage::default())
             }
         };
         Some(Photo { truth, shown })

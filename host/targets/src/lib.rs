@@ -16,8 +16,8 @@ mod target;
 pub use april_grid::{AprilGridSpec, TAG_BORDER};
 pub use charuco::{CharucoSpec, MARKER_BORDER};
 pub use detect::{
-    CornerQuality, DetectError, DetectedCorner, Detection, Placement, ReadCode, SearchedPatch, TagFamily, detect,
-    detect_april_grid, detect_charuco, detect_from, see,
+    CornerQuality, DetectError, DetectedCorner, Detection, Placement, ReadCode, SearchedImage, TagFamily, detect,
+    detect_april_grid, detect_charuco, detect_from, see, see_from,
 };
 pub use labelling::{Relabelling, SeenTarget};
 pub use plausible::{ImplausibleTarget, corners_can_be_held};

@@ -5,10 +5,10 @@ mod rendered;
 mod simulated;
 
 use image::GrayImage;
-use rendered::{ByAngle, Pose, Tally, Truth, fisheye, half_hidden_shots, optics, photograph};
+use rendered::{ByAngle, Pose, Tally, Truth, assert_searched_once, fisheye, half_hidden_shots, optics, photograph};
 use simulated::Dice;
 use vergence_scene::{MarkerBoard, Optics, Scene, Sheet, TagPrint, Target};
-use vergence_targets::{CharucoSpec, DetectError, MARKER_BORDER, TagFamily, detect_charuco};
+use vergence_targets::{CharucoSpec, DetectError, MARKER_BORDER, TagFamily, TargetKind, detect_charuco};
 use vergence_vision::{Camera, KannalaBrandt, Length, Transform};
 
 fn board(name: &str) -> CharucoSpec {
@@ -79,6 +79,7 @@ fn boards_are_found_from_the_axis_to_past_90_degrees() {
 fn a_board_half_hidden_is_found_where_it_is_seen() {
     let (camera, board) = (fisheye(1280), board("DICT_4X4_50"));
     for (theta_deg, place, image) in half_hidden_shots(sheet(&board), &camera) {
+        assert_searched_once(&image, &TargetKind::Charuco(board), &camera);
         for hint in [None, Some(&camera)] {
             let Tally { found, in_sight, rms_px, worst_px, .. } = tally(&board, place, &camera, &image, hint);
             println!(

@@ -8,7 +8,9 @@ use std::collections::BTreeMap;
 use image::{DynamicImage, GrayImage, Luma};
 use nalgebra::{UnitQuaternion, Vector3};
 use vergence_scene::{Optics, Scene, Target, View, render};
-use vergence_targets::{CornerQuality, DetectError, Detection, Placement, TargetSpec, detect};
+use vergence_targets::{
+    CornerQuality, DetectError, Detection, Placement, SearchedImage, TargetSpec, detect, detect_from,
+};
 use vergence_vision::{Angle, Camera, ImageSize, KannalaBrandt, Length, Pixel, Point, Transform, World};
 
 const TARGET: Target = Target { columns: 9, rows: 6, square: Length::from_mm(24.0) };
@@ -166,8 +168,10 @@ fn targets_cut_by_the_field_are_found_past_95_degrees() {
     for (seed, azimuth_deg) in [0.0, 135.0, 250.0].into_iter().enumerate() {
         let pose = Pose { theta_deg: 86.0, azimuth_deg, roll_deg: 15.0, tilt_deg: 0.0, distance_mm: 330.0 };
         let image = photograph_target(TARGET, pose, &camera, &optics(0.5), seed as u64);
+        let searched = SearchedImage::default();
         for hint in [None, Some(&camera)] {
-            let detection = detect(&image, &spec(TARGET), hint).unwrap();
+            let detection = detect_from(&searched, &image, &spec(TARGET), hint).unwrap();
+            assert_eq!(detection, detect(&image, &spec(TARGET), hint).unwrap(), "searched once or twice");
             assert_found(&detection, TARGET, pose, &camera, 0.95);
             assert!(!detection.complete);
             let farthest = found(&detection, TARGET)

@@ -5,10 +5,12 @@ mod rendered;
 mod simulated;
 
 use image::GrayImage;
-use rendered::{ByAngle, Pose, Tally, Truth, fisheye, half_hidden_shots, optics, photograph};
+use rendered::{ByAngle, Pose, Tally, Truth, assert_searched_once, fisheye, half_hidden_shots, optics, photograph};
 use simulated::Dice;
 use vergence_scene::{Optics, Scene, Sheet, TagGrid, TagPrint, Target};
-use vergence_targets::{AprilGridSpec, DetectError, Placement, TAG_BORDER, TargetSpec, detect, detect_april_grid};
+use vergence_targets::{
+    AprilGridSpec, DetectError, Placement, TAG_BORDER, TargetKind, TargetSpec, detect, detect_april_grid,
+};
 use vergence_vision::{Camera, KannalaBrandt, Length, Transform};
 
 const GRID: AprilGridSpec = AprilGridSpec { columns: 6, rows: 6, tag: Length::from_mm(24.0), spacing: 0.3 };
@@ -76,6 +78,7 @@ fn grids_are_found_from_the_axis_to_past_90_degrees() {
 fn a_grid_half_hidden_is_found_where_it_is_seen() {
     let (camera, sheet) = (fisheye(1280), sheet(GRID));
     for (theta_deg, place, image) in half_hidden_shots(sheet, &camera) {
+        assert_searched_once(&image, &TargetKind::AprilGrid(GRID), &camera);
         for hint in [None, Some(&camera)] {
             let corners = detect_april_grid(&image, &GRID, hint).unwrap();
             let Tally { found, in_sight, rms_px, worst_px, .. } = truth(place, &camera).tally(&corners);

@@ -15,8 +15,8 @@ use vergence_vision::KannalaBrandt;
 use super::intensity::Intensity;
 use super::labelled::{Corners, LabelledTarget, Place};
 use super::predict::Prediction;
-use super::tags::{ReadCode, TagFamily, TagPlace, dark_quads, read_tag};
-use super::{DetectError, DetectedCorner, FEWEST_CORNERS};
+use super::tags::{Quad, ReadCode, TagFamily, TagPlace, read_tag};
+use super::{DetectError, DetectedCorner, FEWEST_CORNERS, SearchedImage};
 use crate::AprilGridSpec;
 use crate::april_grid::TAG_BORDER;
 
@@ -33,12 +33,22 @@ pub fn detect_april_grid(
     grid: &AprilGridSpec,
     hint: Option<&KannalaBrandt>,
 ) -> Result<Vec<DetectedCorner>, DetectError> {
+    detect_from(&SearchedImage::default(), image, grid, hint)
+}
+
+/// The same by what the search found in this image before.
+pub fn detect_from(
+    searched: &SearchedImage,
+    image: &GrayImage,
+    grid: &AprilGridSpec,
+    hint: Option<&KannalaBrandt>,
+) -> Result<Vec<DetectedCorner>, DetectError> {
     if !grid.is_usable() {
         return Err(DetectError::UnusableGrid { columns: grid.columns, rows: grid.rows });
     }
     let intensity = Intensity::new(image);
     let search = Search { image: &intensity, grid };
-    let tags = search.beside_neighbours(&search.tags(image));
+    let tags = search.beside_neighbours(&search.tags(searched.quads(image, &intensity)));
     let places = (0..4 * grid.tags()).map(|index| search.place(index)).collect();
     let target = LabelledTarget { image: &intensity, hint, places };
     let corners = target.judged(target.completed(search.measured(&tags, &target)));
@@ -56,12 +66,12 @@ struct Search<'a> {
 
 impl Search<'_> {
     /// Every tag of the grid that is read exactly once, by number.
-    fn tags(&self, image: &GrayImage) -> BTreeMap<u32, Tag> {
+    fn tags(&self, quads: &[Quad]) -> BTreeMap<u32, Tag> {
         const FAMILY: TagFamily = AprilGridSpec::FAMILY;
         let mut seen: BTreeMap<u32, Vec<Tag>> = BTreeMap::new();
-        for quad in dark_quads(image, self.image) {
+        for quad in quads {
             let place = TagPlace { border: TAG_BORDER, margin: 0.0 };
-            if let Some(ReadCode { id, quarters }) = read_tag(self.image, &quad, &FAMILY, place, self.grid.tags()) {
+            if let Some(ReadCode { id, quarters }) = read_tag(self.image, quad, &FAMILY, place, self.grid.tags()) {
                 let mut corners = quad.corners;
                 corners.rotate_left(quarters);
                 seen.entry(id).or_default().push(corners);

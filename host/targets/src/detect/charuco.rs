@@ -14,8 +14,8 @@ use super::intensity::Intensity;
 use super::labelled::{Corners, LabelledTarget, Place};
 use super::lattice::{Found, Lattice};
 use super::saddle::parity;
-use super::{CornerQuality, DetectError, DetectedCorner, FEWEST_CORNERS};
-use super::{blunders, grow, markers, refine, saddle, search};
+use super::{CornerQuality, DetectError, DetectedCorner, FEWEST_CORNERS, SearchedImage};
+use super::{blunders, grow, markers, refine, saddle};
 use crate::CharucoSpec;
 
 /// The corners of the board in `image`, in ascending order of index, as OpenCV counts them. `hint` is a camera calibrated
@@ -24,6 +24,16 @@ use crate::CharucoSpec;
 /// # Errors
 /// [`DetectError`] if the image shows too few corners, or its markers do not tell which they are.
 pub fn detect_charuco(
+    image: &GrayImage,
+    board: &CharucoSpec,
+    hint: Option<&KannalaBrandt>,
+) -> Result<Vec<DetectedCorner>, DetectError> {
+    detect_from(&SearchedImage::default(), image, board, hint)
+}
+
+/// The same by what the search found in this image before.
+pub fn detect_from(
+    searched: &SearchedImage,
     image: &GrayImage,
     board: &CharucoSpec,
     hint: Option<&KannalaBrandt>,
@@ -39,13 +49,13 @@ pub fn detect_charuco(
     let intensity = Intensity::new(image);
     let target = LabelledTarget { image: &intensity, hint, places: places(board) };
     let (mut corners, mut problem) = (Corners::new(), None);
-    for patches_of in [search::labelled_patches, search::labelled_patches_of_half] {
+    for patches_of in [SearchedImage::patches, SearchedImage::patches_of_half] {
         if corners.len() as u32 == board.corners() {
             break;
         }
         // Something before the board may divide it.
-        for patch in patches_of(image) {
-            match labelled(patch, &target, board) {
+        for patch in patches_of(searched, image) {
+            match labelled(patch.clone(), &target, board) {
                 Ok(found) => found.into_iter().for_each(|(index, corner)| {
                     corners.entry(index).or_insert(corner);
                 }),

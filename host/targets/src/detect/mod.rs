@@ -26,6 +26,7 @@ mod refine;
 mod response;
 mod saddle;
 mod search;
+mod searched;
 mod tags;
 
 use image::GrayImage;
@@ -35,9 +36,9 @@ use crate::{Corner, Relabelling, SeenTarget, TargetKind, TargetSpec, TargetView}
 pub use april_grid::detect_april_grid;
 pub use charuco::detect_charuco;
 use intensity::Intensity;
-use lattice::Lattice;
 use placement::Placed;
 pub use placement::Placement;
+pub use searched::SearchedImage;
 pub use tags::{ReadCode, TagFamily};
 
 /// Fewest corners taken for a target. Four determine a pose; a dozen in a grid are no coincidence.
@@ -89,11 +90,6 @@ pub enum CornerQuality {
     /// covered, or at the edge of the lens's field.
     Blunder,
 }
-
-/// The corners that the search finds in an image and labels. It is the slowest part of [`detect`], and needs neither target nor camera: who looks
-/// twice at an image, the second time with a camera, searches once.
-#[derive(Clone, Debug, Default)]
-pub struct SearchedPatch(Lattice);
 
 /// Why no target was detected.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
@@ -186,23 +182,14 @@ pub enum DetectError {
 ///
 /// # Errors [`DetectError`] if the image shows no such target.
 pub fn detect(image: &GrayImage, target: &TargetSpec, hint: Option<&KannalaBrandt>) -> Result<Detection, DetectError> {
-    check_size(target)?;
-    detect_from(&SearchedPatch::of(image), image, target, hint)
+    detect_from(&SearchedImage::default(), image, target, hint)
 }
 
-impl SearchedPatch {
-    /// Searches an image.
-    #[must_use]
-    pub fn of(image: &GrayImage) -> Self {
-        Self(search::labelled_patches(image).into_iter().next().unwrap_or_default())
-    }
-}
-
-/// As [`detect`], in an image that was searched already.
+/// As [`detect`], by what the search found in this image before.
 ///
 /// # Errors [`DetectError`] if the image shows no such target.
 pub fn detect_from(
-    patch: &SearchedPatch,
+    searched: &SearchedImage,
     image: &GrayImage,
     target: &TargetSpec,
     hint: Option<&KannalaBrandt>,
@@ -210,7 +197,7 @@ pub fn detect_from(
     check_size(target)?;
     let TargetSpec { columns, rows, .. } = *target;
     let intensity = Intensity::new(image);
-    let mut lattice = patch.0.clone();
+    let mut lattice = searched.patches(image).first().cloned().unwrap_or_default();
     saddle::keep_corners(&mut lattice, &intensity, hint);
     refine::refine_all(&mut lattice, &intensity, None);
     grow::grow(&mut lattice, &intensity, hint, [columns, rows]);
@@ -241,14 +228,29 @@ pub fn see(
     hint: Option<&KannalaBrandt>,
     name: &str,
 ) -> Result<SeenTarget, DetectError> {
+    see_from(&SearchedImage::default(), image, target, hint, name)
+}
+
+/// As [`see`], by what the search found in this image before.
+///
+/// # Errors [`DetectError`] if the image shows no such target.
+pub fn see_from(
+    searched: &SearchedImage,
+    image: &GrayImage,
+    target: &TargetKind,
+    hint: Option<&KannalaBrandt>,
+    name: &str,
+) -> Result<SeenTarget, DetectError> {
     match target {
-        TargetKind::Chessboard(board) => Ok(detect(image, board, hint)?.seen(name, board)),
+        TargetKind::Chessboard(board) => Ok(detect_from(searched, image, board, hint)?.seen(name, board)),
         TargetKind::AprilGrid(grid) => {
-            let view = labelled_view(name, detect_april_grid(image, grid, hint)?, |index| grid.corner_mm(index));
+            let corners = april_grid::detect_from(searched, image, grid, hint)?;
+            let view = labelled_view(name, corners, |index| grid.corner_mm(index));
             Ok(SeenTarget::certain(view, grid.tag))
         }
         TargetKind::Charuco(board) => {
-            let view = labelled_view(name, detect_charuco(image, board, hint)?, |index| board.corner_mm(index));
+            let corners = charuco::detect_from(searched, image, board, hint)?;
+            let view = labelled_view(name, corners, |index| board.corner_mm(index));
             Ok(SeenTarget::certain(view, board.square))
         }
     }

@@ -4,7 +4,7 @@
 use image::{DynamicImage, GrayImage};
 use nalgebra::{Isometry3, UnitQuaternion, Vector3};
 use vergence_scene::{Optics, Scene, Sheet, Target, View, render};
-use vergence_targets::DetectedCorner;
+use vergence_targets::{DetectedCorner, SearchedImage, TargetKind, see, see_from};
 use vergence_vision::{Angle, Camera, ImageSize, KannalaBrandt, Length, Pixel, Point, Transform, World};
 
 pub fn fisheye(side: u32) -> KannalaBrandt {
@@ -17,6 +17,14 @@ pub fn fisheye(side: u32) -> KannalaBrandt {
 
 pub fn optics(blur_px: f64, noise: f64) -> Optics {
     Optics { samples: 2, edge_samples: 40, blur_px, read_noise: noise, shot_noise: noise, ..Optics::default() }
+}
+
+/// A look by what the search found before, with the lens or without it, gives what a look from nothing gives.
+pub fn assert_searched_once(image: &GrayImage, target: &TargetKind, camera: &KannalaBrandt) {
+    let searched = SearchedImage::default();
+    for hint in [None, Some(camera)] {
+        assert_eq!(see_from(&searched, image, target, hint, ""), see(image, target, hint, ""));
+    }
 }
 
 /// The middle of the sheet, `theta` from the axis towards `azimuth` (0° right, 90° down).
