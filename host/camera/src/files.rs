@@ -43,6 +43,15 @@ impl FileCamera {
         let (left, right) = pairs.into_iter().map(|[left, right]| (left, right)).unzip();
         Ok(([Self { files: left }, Self { files: right }], alone))
     }
+
+    /// The next images of both cameras of a pair, read at the same time; `None` after the last pair.
+    ///
+    /// # Errors
+    /// As [`read_image`].
+    pub fn grab_pair([left, right]: &mut [Self; 2]) -> Result<Option<[CameraImage; 2]>, CameraError> {
+        let (left, right) = rayon::join(|| left.grab(), || right.grab());
+        Ok(left?.zip(right?).map(<[_; 2]>::from))
+    }
 }
 
 impl Camera for FileCamera {

@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use vergence_camera::{Camera, FileCamera};
+use vergence_camera::FileCamera;
 use vergence_files::{make_folder, write_png};
 use vergence_rig::Rig;
 
@@ -23,9 +23,7 @@ pub fn export(images: [&Path; 2], rig: Option<Rig>, options: &Options, stop: &St
     }
     loop {
         stop.check(options)?;
-        let [left, right] = &mut cameras;
-        let (Some(left), Some(right)) = (left.grab()?, right.grab()?) else { break };
-        let taken = [left, right];
+        let Some(taken) = FileCamera::grab_pair(&mut cameras)? else { break };
         for view in &views {
             let image = &taken[view.side.index()];
             check_size(view.side, &image.image, &rig)?;

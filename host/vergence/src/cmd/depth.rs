@@ -11,7 +11,7 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 use indicatif::ProgressBar;
 use serde_json::{Value, json};
 use vergence_board::check_range;
-use vergence_camera::{Camera, CameraImage, FileCamera};
+use vergence_camera::{CameraImage, FileCamera};
 use vergence_files::make_folder;
 use vergence_matching::{GuidedMatcher, Matcher};
 use vergence_output::{
@@ -147,12 +147,12 @@ fn every_pair(args: &Args, rig: Option<&Path>, console: Console, progress: &Prog
             "--nearest, --farthest and masks say where to look: nothing is sought beside --points",
         ));
     }
-    let ([mut left, mut right], alone) = FileCamera::open_pair(&args.left, &args.right)?;
+    let (mut cameras, alone) = FileCamera::open_pair(&args.left, &args.right)?;
     for file in &alone {
         console
             .warn(format!("{}: left out: the other camera has no image of this name, number or time", file.display()));
     }
-    progress.all.store(left.remaining(), Ordering::Relaxed);
+    progress.all.store(cameras[0].remaining(), Ordering::Relaxed);
     let several = args.left.is_dir();
     if !several {
         args.force.unless_forced(names_are_not_swapped(&args.left, &args.right), console)?;
@@ -165,7 +165,7 @@ fn every_pair(args: &Args, rig: Option<&Path>, console: Console, progress: &Prog
         matcher: matcher.as_deref(),
     };
     let (mut results, mut empty, mut refused) = (Vec::new(), Vec::new(), Vec::new());
-    while let (Some(left), Some(right)) = (left.grab()?, right.grab()?) {
+    while let Some([left, right]) = FileCamera::grab_pair(&mut cameras)? {
         let work = console.progress(&format!("{} and {}", left.name, right.name));
         let measured = one_pair(args, [&left, &right], &setting, (&work, console));
         work.finish_and_clear();
