@@ -32,6 +32,7 @@ mod firmware_log;
 mod held_target;
 mod history;
 mod live_camera;
+mod native;
 mod random;
 mod rig;
 mod room;

@@ -4,25 +4,16 @@ use std::collections::VecDeque;
 use std::time::Duration;
 
 use vergence_board::Served;
-use vergence_control::{TICK_US, UNIT};
-use vergence_image::is_signed_by;
-use vergence_plant::{AxisPlant, EncoderFault, NativeBoard, Plant, Stage};
-use vergence_protocol::{AxisKind, Microseconds, ResetCause};
+use vergence_control::TICK_US;
+use vergence_plant::{AxisPlant, EncoderFault, Plant, Stage};
+use vergence_protocol::{AxisKind, Microseconds};
 use vergence_rig::{Rig, RigAxis, RigPose};
 
 use crate::controller::Controller;
-use crate::error::refusal;
 use crate::history::LoadHistory;
-use crate::{BentRail, DrivenTrunk, SimError, SimulatedChip, Trunk, TrunkMechanics, joint_settings, trunk_servos};
+use crate::native::Native;
+use crate::{BentRail, DrivenTrunk, SimError, SimulatedChip, Trunk};
 
-/// The board's clock when the simulation starts, in microseconds.
-const BOARD_START_US: u64 = 3_000_000;
-/// Drift of the board's clock against the host's: no quartz is exact.
-const BOARD_DRIFT: f64 = 40e-6;
-/// Number of the board's first start; later ones count up.
-const FIRST_BOOT: u32 = 1;
-/// Version of the oldest firmware that may replace the board's own.
-const OLDEST: [u8; 3] = [0, 1, 0];
 /// Number of pulses remembered for [`SimulatedRig::pulses_from`].
 const PULSES_KEPT: usize = 256;
 
@@ -32,16 +23,7 @@ const PULSES_KEPT: usize = 256;
 pub struct SimulatedRig {
     controller: Controller,
     rig: Rig,
-    /// Elapsed time to which the simulation was last run, in microseconds.
-    elapsed_us: u64,
-    /// Elapsed time at which the board last started.
-    began_us: u64,
-    /// Time of the board's clock at the start, in microseconds.
-    started_us: u64,
-    boot: u32,
     output: Vec<u8>,
-    /// Number of flash operations up to the last [`Self::changed_flash`].
-    saved_operations: usize,
     history: LoadHistory,
     pulses: VecDeque<Pulse>,
     loose: Vec<LoosePlug>,
@@ -71,23 +53,7 @@ impl SimulatedRig {
     /// # Errors
     /// [`SimError::Axes`] where the rig has no axes, or one that no stage or servo fits.
     pub fn new(rig: &Rig, seed: u64) -> Result<Self, SimError> {
-        let refused = |error| SimError::Axes { rig: rig.name.clone(), why: refusal(error, rig) };
-        let mut board = match &rig.trunk {
-            Some(_) => {
-                let servos = trunk_servos(rig, TrunkMechanics::default(), seed)?;
-                NativeBoard::of_joints(&joint_settings(rig)?, servos, FIRST_BOOT)
-            }
-            None => {
-                let stages: Vec<Stage> = rig.axes.iter().map(stage).collect();
-                let settings: Vec<_> = stages.iter().map(|stage| stage.settings).collect();
-                let mechanics: Vec<_> = stages.iter().map(|stage| stage.mechanics).collect();
-                NativeBoard::new(&settings, &mechanics, seed)
-            }
-        }
-        .map_err(refused)?;
-        board.services_mut().oldest = OLDEST;
-        board.restart(ResetCause::PowerOn, FIRST_BOOT).map_err(refused)?;
-        Ok(Self::driven_by(Controller::Native(Box::new(board)), rig))
+        Ok(Self::driven_by(Controller::Native(Box::new(Native::new(rig, seed)?)), rig))
     }
 
     /// The rig of `chip`, which was made for the same rig file: the unmodified firmware drives its mechanics.
@@ -100,12 +66,7 @@ impl SimulatedRig {
         Self {
             controller,
             rig: rig.clone(),
-            elapsed_us: 0,
-            began_us: 0,
-            started_us: BOARD_START_US,
-            boot: FIRST_BOOT,
             output: Vec::new(),
-            saved_operations: 0,
             history: LoadHistory::default(),
             pulses: VecDeque::new(),
             loose: Vec::new(),
@@ -114,10 +75,9 @@ impl SimulatedRig {
 
     /// Lets a native board take firmware that is signed by `key`, an Ed25519 public key. Firmware on a chip has its own key.
     pub fn trust(&mut self, key: [u8; 32]) {
-        let Some(board) = self.controller.native() else { return };
-        let services = board.services_mut();
-        services.key = key;
-        services.verifier = |key, signed, signature| is_signed_by(key, signed, signature);
+        if let Some(native) = self.controller.native() {
+            native.trust(key);
+        }
     }
 
     /// Switches a native board on with these bytes in its settings flash; none at all stand for erased flash.
@@ -125,38 +85,19 @@ impl SimulatedRig {
     /// # Errors
     /// [`SimError::NotFlash`] for bytes of another length and for a chip, whose flash holds its program too, [`SimError::Settings`] where the board refuses the settings.
     pub fn power_on_with_flash(&mut self, bytes: &[u8]) -> Result<(), SimError> {
-        let board = self.controller.native().ok_or(SimError::NotFlash)?;
-        let flash = &mut board.services_mut().settings;
-        if !bytes.is_empty() && bytes.len() != flash.bytes().len() {
-            return Err(SimError::NotFlash);
-        }
-        // Erased units stay as they are: they may still be programmed.
-        let units = bytes.chunks(UNIT).zip((0..).step_by(UNIT));
-        units.filter(|(unit, _)| unit.iter().any(|&b| b != 0xFF)).for_each(|(unit, at)| flash.overwrite(at, unit));
-        self.saved_operations = flash.operations();
-        self.boot += 1;
-        board.restart(ResetCause::PowerOn, self.boot).map_err(|error| SimError::Settings(refusal(error, &self.rig)))
+        self.controller.native().ok_or(SimError::NotFlash)?.power_on_with_flash(bytes, &self.rig)
     }
 
     /// Contents of the settings flash of a native board, where they changed since the last call or since
     /// [`Self::power_on_with_flash`].
     pub fn changed_flash(&mut self) -> Option<&[u8]> {
-        let flash = &self.controller.native()?.services_mut().settings;
-        let changed = std::mem::replace(&mut self.saved_operations, flash.operations()) != flash.operations();
-        changed.then(|| flash.bytes())
+        self.controller.native()?.changed_flash()
     }
 
     /// Runs until `elapsed_us` microseconds after the simulation began. What the board sends meanwhile is kept until
     /// [`Self::take_output`].
     pub fn run_until(&mut self, elapsed_us: u64) {
-        self.elapsed_us = elapsed_us;
-        let until = match self.controller {
-            Controller::Native(_) => {
-                let drifted = elapsed_us.saturating_sub(self.began_us) as f64 * (1.0 + BOARD_DRIFT);
-                self.started_us + drifted as u64
-            }
-            Controller::Chip(..) => elapsed_us,
-        };
+        let until = self.controller.time_at(elapsed_us).0;
         // A UART sends while the board runs, not after: a pose must not wait for the next one and be replaced by it.
         while self.controller.now().0 < until {
             self.pull_plugs();
@@ -207,24 +148,8 @@ impl SimulatedRig {
     /// Gives bytes of the host to the board, at the time to which it was last run.
     pub fn receive(&mut self, bytes: &[u8]) {
         match &mut self.controller {
-            Controller::Native(board) => {
-                board.receive(bytes);
-                self.output.append(&mut board.transmit());
-                if board.take_reboot().is_some() {
-                    self.restart();
-                }
-            }
+            Controller::Native(native) => self.output.append(&mut native.receive(bytes)),
             Controller::Chip(chip, _) => chip.send(bytes),
-        }
-    }
-
-    /// Starts the native board's software again. There is no boot loader to stay in.
-    fn restart(&mut self) {
-        self.boot += 1;
-        let Some(board) = self.controller.native() else { return };
-        // It has started with these settings before.
-        if board.restart(ResetCause::Software, self.boot).is_ok() {
-            (self.started_us, self.began_us) = (0, self.elapsed_us);
         }
     }
 
