@@ -3,6 +3,8 @@
 //! The same optics and sensor as of [`render`](crate::render). Rays are solved once for a small square of pixels and
 //! developed to the second order about its middle; the rest of a ray's way is one division.
 
+use std::ops::Range;
+
 use image::{GrayImage, Luma};
 use nalgebra::{Matrix3, SVector, Vector3};
 use vergence_vision::{Angle, Camera, Length, Transform};
@@ -42,17 +44,17 @@ pub fn photograph_sheet(view: &SheetView<'_>, seed: u64) -> GrayImage {
     let size = view.camera.size();
     let plane = Plane::of(view);
     let cells = Cells::of(view, &plane);
-    let (width, height) = (size.width as usize, size.height as usize);
+    let width = size.width as usize;
     let tones: Vec<Tone> =
         (0..size.height).flat_map(|y| (0..size.width).map(move |x| [x, y])).map(|at| cells.tone(&plane, at)).collect();
     let places: Vec<[f64; 2]> = Lattice::places(view.optics.edge_samples);
     let mut light: Vec<[f32; 1]> = tones.iter().map(|tone| [tone.light * tone.exposure]).collect();
-    for (y, x) in (0..height).flat_map(|y| (0..width).map(move |x| (y, x))) {
-        let tone = tones[y * width + x];
-        if is_edge(&tones, width, x, y) && tone.exposure > 0.0 {
-            let lattice = Lattice { places: &places, hash: mix64(mix64(seed) ^ (y * width + x) as u64) };
-            let sum = cells.sum(&plane, [x as u32, y as u32], &lattice);
-            light[y * width + x] = [(sum + tone.light) / (places.len() + 1) as f32 * tone.exposure];
+    for index in edges(&tones, width) {
+        let tone = tones[index];
+        if tone.exposure > 0.0 {
+            let lattice = Lattice { places: &places, hash: mix64(mix64(seed) ^ index as u64) };
+            let sum = cells.sum(&plane, [index % width, index / width].map(|at| at as u32), &lattice);
+            light[index] = [(sum + tone.light) / (places.len() + 1) as f32 * tone.exposure];
         }
     }
     let spots: Vec<f32> = tones.iter().map(|tone| tone.spot).collect();
@@ -85,12 +87,27 @@ struct Tone {
     spot: f32,
 }
 
-/// Whether a pixel or a neighbour meets something else than the others.
-fn is_edge(tones: &[Tone], width: usize, x: usize, y: usize) -> bool {
-    let here = tones[y * width + x].light.to_bits();
-    let rows = y.saturating_sub(1)..(y + 2).min(tones.len() / width);
-    let columns = x.saturating_sub(1)..(x + 2).min(width);
-    rows.flat_map(|y| &tones[y * width..][columns.clone()]).any(|tone| tone.light.to_bits() != here)
+/// The pixels that meet something else than one of their eight neighbours, in rising order.
+fn edges(tones: &[Tone], width: usize) -> impl Iterator<Item = usize> {
+    let met: Vec<u32> = tones.iter().map(|tone| tone.light.to_bits()).collect();
+    let mut is_edge = vec![false; met.len()];
+    let mut compare = |pixels: Range<usize>, neighbours: Range<usize>| {
+        for (i, j) in pixels.zip(neighbours) {
+            let differs = met[i] != met[j];
+            is_edge[i] |= differs;
+            is_edge[j] |= differs;
+        }
+    };
+    for row in (0..met.len()).step_by(width) {
+        let below = row + width;
+        compare(row..below - 1, row + 1..below);
+        if below < met.len() {
+            compare(row..below, below..below + width);
+            compare(row..below - 1, below + 1..below + width);
+            compare(row + 1..below, below..below + width - 1);
+        }
+    }
+    is_edge.into_iter().enumerate().filter_map(|(index, is_edge)| is_edge.then_some(index))
 }
 
 /// The sheet as rays in its own frame meet it.
@@ -250,5 +267,27 @@ impl Lattice<'_> {
         let (a, b) = unit_pair(self.hash);
         let within = |place: f64| if place < 1.0 { place - 0.5 } else { place - 1.5 };
         self.places.iter().map(move |[u, v]| [within(u + a), within(v + b)])
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn edges_are_pixels_that_differ_from_a_neighbour() {
+        for (width, height) in [(1, 1), (1, 5), (7, 1), (9, 6)] {
+            let light = |index: usize| if mix64(index as u64).is_multiple_of(5) { 1.0_f32 } else { 0.0 };
+            let tones: Vec<Tone> =
+                (0..width * height).map(|index| Tone { light: light(index), exposure: 1.0, spot: 0.0 }).collect();
+            let near = |at: usize, end: usize| at.saturating_sub(1)..(at + 2).min(end);
+            let differs = |index: &usize| {
+                let (x, y) = (index % width, index / width);
+                let around = near(y, height).flat_map(|y| near(x, width).map(move |x| y * width + x));
+                around.clone().any(|other| light(other).to_bits() != light(*index).to_bits())
+            };
+            let expected: Vec<usize> = (0..tones.len()).filter(differs).collect();
+            assert_eq!(edges(&tones, width).collect::<Vec<_>>(), expected, "{width} x {height}");
+        }
     }
 }
