@@ -30,7 +30,7 @@ use crate::match_errors::{FARTHEST_DEPARTURE, state_errors};
 use crate::plane::Pyramid;
 use crate::pool::in_pool;
 use crate::refine::Scratch;
-use crate::shared_views::SharedViews;
+use crate::shared_views::{DENSITY, Density, SharedViews};
 use crate::view::Buffers;
 use crate::{Grid, GuidedMatcher, ImagePair, MatchError, Matcher, Matches, UnmatchedReason, ViewPixel};
 
@@ -55,8 +55,8 @@ const VERY_FEW: f64 = 0.8;
 /// Largest number of tracks.
 const MOST: usize = 700;
 /// Pixels of a view per radian, unless the images have more: in views of less corners of wide axes are no longer alike. Denser views than the images
-/// cost more than they find.
-const DENSITY: f64 = 183.0;
+/// cost more than they find where the field is whole; where axes are far apart, views of as many pixels are denser.
+const LEAST_DENSITY: f64 = 183.0;
 /// Pairs in which a track may fail a test one after the other before it ends.
 const PATIENCE: u32 = 3;
 /// In every so many pairs the windows beside a track are registered: what they show of its surface, and of its errors, stays until then.
@@ -109,11 +109,13 @@ impl Matcher for TrackingMatcher {
         // A poisoned lock only means that another thread panicked; the tracks are replaced whole.
         let mut state = self.state.lock().unwrap_or_else(PoisonError::into_inner);
         let density = pair.left_camera.k()[0].max(pair.right_camera.k()[0]);
-        let oversampling = self.whole.oversampling.unwrap_or(DENSITY / density).clamp(1.0, 2.0);
+        let oversampling = self.whole.oversampling.unwrap_or(LEAST_DENSITY / density).clamp(1.0, 2.0);
+        let most_dense = if self.whole.oversampling.is_some() { oversampling } else { DENSITY / density };
+        let densities = Density { least: oversampling, most: most_dense.clamp(1.0, 2.0) };
         let [keypoints, in_strips] = [self.whole.keypoints, self.in_strips].map(|keypoints| keypoints * most / MOST);
         let (state, whole) = (&mut *state, GuidedMatcher { oversampling: Some(oversampling), keypoints });
         // The lock is taken outside of the pool, where no thread that waits begins another pair.
-        in_pool(|| state.find(pair, &whole, [in_strips, most]))
+        in_pool(|| state.find(pair, (&whole, densities), [in_strips, most]))
     }
 }
 
@@ -172,7 +174,7 @@ impl State {
     fn find(
         &mut self,
         pair: &ImagePair<'_>,
-        whole: &GuidedMatcher,
+        (whole, density): (&GuidedMatcher, Density),
         [in_strips, most]: [usize; 2],
     ) -> Result<Matches, MatchError> {
         self.pair += 1;
@@ -180,7 +182,7 @@ impl State {
         let mut before = self.before.take().filter(|before| before.cameras == cameras);
         let kept = before.as_ref().filter(|before| is_near(&before.pose, &pair.left_from_right));
         let (grid, pose) = kept.map_or((None, pair.left_from_right), |before| (Some(before.grid), before.pose));
-        let views = SharedViews::in_buffers(pair, whole.oversampling, grid, &mut self.buffers)?;
+        let views = SharedViews::in_buffers(pair, density, grid, &mut self.buffers)?;
         let [left, right] = [&views.left.plane(), &views.right.plane()]
             .map(|plane| Pyramid::in_buffers(plane, LEVELS, &mut self.buffers.values));
         let seen = Seen { band: views.band(), views, left, right };
@@ -385,7 +387,8 @@ mod tests {
                 nearest: Length::from_mm(400.0),
                 masks: [None; 2],
             };
-            state.find(&pair, &GuidedMatcher { keypoints: 1000, oversampling: Some(1.5) }, [1000, 400]).unwrap();
+            let whole = GuidedMatcher { keypoints: 1000, oversampling: Some(1.5) };
+            state.find(&pair, (&whole, Density { least: 1.5, most: 1.5 }), [1000, 400]).unwrap();
             let now = state.before.as_ref().expect("tracks");
             assert!(is_near(&now.pose, &pair.left_from_right), "pair {step}: the grid is of another pose");
             assert!(now.tracks.len() > 40, "{}", now.tracks.len());
