@@ -239,8 +239,8 @@ fn see(inside: &Inside, pixels: &[[f64; 2]], turns: &[(f64, f64)], [by_sine, by_
 
 /// Samples an image at the pixels of a row that are `seen`; what the image's border leaves out is not seen. Unseen pixels are black.
 ///
-/// Positions and weights of some pixels are computed at once, then each is weighted down its columns, then all along their rows. Loops that compute
-/// many at once have no branches, and split positions by a sum that rounds them: only then do compilers turn them into vector instructions.
+/// Positions and weights of some pixels are computed at once, then each finds the pixels around it, and all are weighted down their columns and along
+/// their rows. Loops that compute many at once have no branches, and split positions by a sum that rounds them: only then do compilers turn them into vector instructions.
 #[multiversion(targets("x86_64+avx2"))]
 fn sample_line(image: &[u8], width: usize, pixels: &[[f64; 2]], seen: &mut [bool], values: &mut [f32]) {
     const TOGETHER: usize = 32;
@@ -269,13 +269,23 @@ fn sample_line(image: &[u8], width: usize, pixels: &[[f64; 2]], seen: &mut [bool
                 (by_column[0], by_column[1], by_column[2], by_column[3]);
             (down[0][i], down[1][i], down[2][i], down[3][i]) = (by_row[0], by_row[1], by_row[2], by_row[3]);
         }
-        let mut mixed = [[0.0_f32; TOGETHER]; 4];
+        let mut taps = [[0_u32; TOGETHER]; 4];
         for (i, seen) in seen.iter_mut().enumerate().filter(|(_, seen)| **seen) {
-            let weights = [down[0][i], down[1][i], down[2][i], down[3][i]];
-            let found = mix_down(image, width, firsts[i] as usize, weights);
+            let found = taps_from(image, width, firsts[i] as usize);
             *seen = found.is_some();
             let found = found.unwrap_or_default();
-            (mixed[0][i], mixed[1][i], mixed[2][i], mixed[3][i]) = (found[0], found[1], found[2], found[3]);
+            (taps[0][i], taps[1][i], taps[2][i], taps[3][i]) = (found[0], found[1], found[2], found[3]);
+        }
+        let mut mixed = [[0.0_f32; TOGETHER]; 4];
+        for (k, mixed) in mixed.iter_mut().enumerate() {
+            let shift = 8 * k as u32;
+            for i in 0..TOGETHER {
+                let level = |taps: u32| (taps >> shift & 255) as i32 as f32;
+                mixed[i] = down[0][i] * level(taps[0][i])
+                    + down[1][i] * level(taps[1][i])
+                    + down[2][i] * level(taps[2][i])
+                    + down[3][i] * level(taps[3][i]);
+            }
         }
         let mut sums = [0.0_f32; TOGETHER];
         for i in 0..TOGETHER {
@@ -288,16 +298,12 @@ fn sample_line(image: &[u8], width: usize, pixels: &[[f64; 2]], seen: &mut [bool
     }
 }
 
-/// Weighs the brightness of an 8-bit image in the 4 × 4 pixels from `first` on down their columns; `None` where they are not all inside.
+/// The 4 × 4 pixels of an 8-bit image from `first` on, four of a row in a number; `None` where they are not all inside.
 #[inline(always)]
-fn mix_down(pixels: &[u8], width: usize, first: usize, down: [f32; 4]) -> Option<[f32; 4]> {
-    let taps = |j: usize| pixels.get(first + j * width..)?.first_chunk::<4>();
-    let (one, two, three, four) = (taps(0)?, taps(1)?, taps(2)?, taps(3)?);
-    let mut mixed = [0.0_f32; 4];
-    for (taps, weight) in [one, two, three, four].into_iter().zip(down) {
-        for (sum, tap) in mixed.iter_mut().zip(taps) {
-            *sum += weight * f32::from(*tap);
-        }
-    }
-    Some(mixed)
+fn taps_from(pixels: &[u8], width: usize, first: usize) -> Option<[u32; 4]> {
+    let (one, rest) = pixels.get(first..)?.split_at_checked(width)?;
+    let (two, rest) = rest.split_at_checked(width)?;
+    let (three, four) = rest.split_at_checked(width)?;
+    let taps = [one.first_chunk()?, two.first_chunk()?, three.first_chunk()?, four.first_chunk()?];
+    Some(taps.map(|taps| u32::from_le_bytes(*taps)))
 }
