@@ -23,6 +23,7 @@ const BETWEEN: [[f64; 4]; KNOT] = {
 };
 
 /// Values between the second and the third of four knots.
+#[inline(always)]
 pub(crate) fn interpolate<const N: usize>(knots: &[[f64; N]], values: &mut [[f64; N]]) {
     let &[p, q, r, s] = knots else { return };
     for (value, weights) in values.iter_mut().zip(&BETWEEN) {

@@ -13,7 +13,7 @@ use crate::match_errors::Evidence;
 use crate::matcher::{Match, Matches, UnmatchedReason};
 use crate::neighbours::{self, PlacedMatch};
 use crate::plane::Pyramid;
-use crate::refine::{self, Unregistered};
+use crate::refine::{self, Registered, Scratch, Unregistered};
 use crate::shared_views::SharedViews;
 use crate::{Grid, ViewPixel};
 
@@ -30,8 +30,8 @@ pub(crate) struct Link {
     /// Whether the registration is good to a small part of a pixel.
     pub registered: bool,
     /// How far the disparities of the windows to the left, to the right, above and below depart from the plane of its own, in pixels of the view;
-    /// infinite where a window cannot be registered. Zero before errors are stated.
-    pub departures: [f64; 4],
+    /// infinite where a window cannot be registered. `None` before they are measured.
+    pub departures: Option<[f64; 4]>,
     /// Distance from the epipolar plane of the pose on which the matches agree, in standard deviations.
     pub off_plane: f64,
     /// Probability that the link is right.
@@ -49,7 +49,7 @@ impl Link {
             sigma,
             evidence: None,
             registered: false,
-            departures: [0.0; 4],
+            departures: None,
             off_plane: 0.0,
             right_probability: score,
             track: None,
@@ -83,8 +83,9 @@ const EPIPOLAR_SIGMAS: f64 = 3.0;
 /// A link that cannot be registered is dropped, or with `keep_unregistered` kept if its score is high enough: where its registration ended, or
 /// where it was.
 pub(crate) fn register(links: &mut Links, compared: &Compared<'_>, band: &EpipolarBand, keep_unregistered: bool) {
-    links.par_iter_mut().zip(compared.keypoints).for_each(|(link, keypoint)| {
-        *link = link.and_then(|start| match registered(compared, keypoint.at, start.right, keypoint.level, band) {
+    links.par_iter_mut().zip(compared.keypoints).for_each_init(Scratch::new, |scratch, (link, keypoint)| {
+        let mut from = |start: &Link| registered(scratch, compared, (keypoint.at, keypoint.level), start.right, band);
+        *link = link.and_then(|start| match from(&start) {
             Err(failed) if keep_unregistered => unregistered(&start, keypoint.at, &failed, compared, band),
             outcome => outcome.map_err(|failed| failed.reason),
         });
@@ -96,18 +97,31 @@ pub(crate) fn register(links: &mut Links, compared: &Compared<'_>, band: &Epipol
 /// # Errors
 /// Why the result is not good to a small part of a pixel, with the result where there is one.
 pub(crate) fn registered(
+    scratch: &mut Scratch,
     compared: &Compared<'_>,
-    left: ViewPixel,
+    (left, level): (ViewPixel, usize),
     start: ViewPixel,
-    level: usize,
     band: &EpipolarBand,
 ) -> Result<Link, Unregistered> {
-    let found = refine::register([compared.left, compared.right], left, start, level)?;
+    let found = refine::register(scratch, [compared.left, compared.right], left, start, level)?;
+    in_band(&found, left, compared.oversampling, band)
+}
+
+/// The link of a registration, if its place is in the epipolar band.
+///
+/// # Errors
+/// That it is not.
+pub(crate) fn in_band(
+    found: &Registered,
+    left: ViewPixel,
+    oversampling: f64,
+    band: &EpipolarBand,
+) -> Result<Link, Unregistered> {
     if !band.allows(left, found.right, REGISTERED_TOLERANCE) {
         return Err(UnmatchedReason::Epipolar.into());
     }
     let shortening = band.shortening(left);
-    let [along, across] = found.evidence.sigma(compared.oversampling, shortening);
+    let [along, across] = found.evidence.sigma(oversampling, shortening);
     Ok(Link {
         evidence: Some(found.evidence),
         registered: true,

@@ -12,7 +12,7 @@ use crate::UnmatchedReason;
 use crate::epipolar_band::EpipolarBand;
 use crate::links::{Compared, Link, Links, placed};
 use crate::neighbours::off_surface;
-use crate::refine::{Warp, departures};
+use crate::refine::{Scratch, Warp, departures};
 
 /// What a registration shows of its own error.
 #[derive(Clone, Copy, Debug)]
@@ -103,8 +103,8 @@ const AT_KEYPOINTS: [f64; 2] = [1.2, 0.4];
 /// Less probable unregistered matches are dropped: they are off by so much that no standard deviation for all of them would hold.
 const LEAST_UNREGISTERED_PROBABILITY: f64 = 0.93;
 
-/// Completes the standard deviations and states the probability of each link, from the links and the windows around it. Links
-/// that are too probably wrong are dropped.
+/// Completes the standard deviations and states the probability of each link, from the links and the windows around it, which are registered
+/// unless a link knows its departures already. Links that are too probably wrong are dropped.
 pub(crate) fn state_errors(links: &mut Links, compared: &Compared<'_>, band: &EpipolarBand) {
     let mut off = vec![0.0; links.len()];
     let linked = off.iter_mut().zip(links.iter()).filter(|(_, link)| link.is_ok());
@@ -113,29 +113,33 @@ pub(crate) fn state_errors(links: &mut Links, compared: &Compared<'_>, band: &Ep
     let all: Vec<&Link> = links.iter().flatten().collect();
     let registered: Vec<&Link> = all.iter().copied().filter(|link| link.registered).collect();
     let usual = residuals(&registered).or_else(|| residuals(&all)).unwrap_or_default();
-    links.par_iter_mut().zip(compared.keypoints).zip(off).for_each(|((link, keypoint), off)| {
-        *link = link.and_then(|mut link| {
-            let evidence = link.evidence;
-            let mut departures = evidence
-                .map_or([0.0; 4], |evidence| departures([compared.left, compared.right], keypoint.at, &evidence.warp));
-            link.departures = departures;
-            departures.sort_by(f64::total_cmp);
-            let Some(evidence) = evidence.filter(|_| link.registered) else {
-                return state_unregistered(link, usual, off, departures[2], band.shortening(keypoint.at));
-            };
-            let departures = departures.map(|departure| departure.min(FARTHEST_DEPARTURE));
-            link.right_probability = registered_probability(&link, &evidence, usual, departures.iter().sum());
-            if link.right_probability < LEAST_PROBABILITY {
-                return Err(UnmatchedReason::TwoSurfaces);
-            }
-            let [along, across] = BY_DEPARTURE.map(|part| part * departures[2]);
-            link.sigma[0] = link.sigma[0].hypot(OFF_SURFACE.0 * off.min(OFF_SURFACE.1)).hypot(along);
-            link.sigma[1] = link.sigma[1].hypot(across * band.shortening(keypoint.at));
-            let with_tail = with_tail(link.right_probability);
-            link.sigma = [0, 1].map(|i| CORE[i] * with_tail * link.sigma[i]);
-            Ok(link)
-        });
-    });
+    let views = [compared.left, compared.right];
+    links.par_iter_mut().zip(compared.keypoints).zip(off).for_each_init(
+        Scratch::new,
+        |scratch, ((link, keypoint), off)| {
+            *link = link.and_then(|mut link| {
+                let evidence = link.evidence;
+                let measured = |evidence: Evidence| departures(scratch, views, keypoint.at, &evidence.warp);
+                let mut departures = link.departures.unwrap_or_else(|| evidence.map_or([0.0; 4], measured));
+                link.departures = Some(departures);
+                departures.sort_by(f64::total_cmp);
+                let Some(evidence) = evidence.filter(|_| link.registered) else {
+                    return state_unregistered(link, usual, off, departures[2], band.shortening(keypoint.at));
+                };
+                let departures = departures.map(|departure| departure.min(FARTHEST_DEPARTURE));
+                link.right_probability = registered_probability(&link, &evidence, usual, departures.iter().sum());
+                if link.right_probability < LEAST_PROBABILITY {
+                    return Err(UnmatchedReason::TwoSurfaces);
+                }
+                let [along, across] = BY_DEPARTURE.map(|part| part * departures[2]);
+                link.sigma[0] = link.sigma[0].hypot(OFF_SURFACE.0 * off.min(OFF_SURFACE.1)).hypot(along);
+                link.sigma[1] = link.sigma[1].hypot(across * band.shortening(keypoint.at));
+                let with_tail = with_tail(link.right_probability);
+                link.sigma = [0, 1].map(|i| CORE[i] * with_tail * link.sigma[i]);
+                Ok(link)
+            });
+        },
+    );
 }
 
 /// The standard deviations and the probability of a link without registration, `off` the surface around it, whose windows beside it depart by

@@ -13,6 +13,7 @@ use crate::epipolar_band::EpipolarBand;
 use crate::guided::LEVELS;
 use crate::links::{Compared, Link, Links, Rows, registered};
 use crate::matcher::UnmatchedReason;
+use crate::refine::Scratch;
 
 /// Number of rounds, each of which uses the matches found in the one before.
 const ROUNDS: usize = 3;
@@ -35,11 +36,11 @@ pub(crate) fn propagate(links: &mut Links, compared: &Compared<'_>, rows: &Rows<
     let mut known = Vec::new();
     learn(&mut known, links, compared.keypoints);
     for _ in 0..ROUNDS {
-        let seek = |(link, keypoint): (&Result<Link, UnmatchedReason>, &Keypoint)| match link {
+        let seek = |scratch: &mut Box<Scratch>, (link, keypoint): (&Result<Link, _>, &Keypoint)| match link {
             Ok(_) => Err(UnmatchedReason::Duplicate),
-            Err(_) => partner(keypoint.at, &known, compared, band),
+            Err(_) => partner(scratch, keypoint.at, &known, compared, band),
         };
-        let mut found: Links = links.par_iter().zip(compared.keypoints).map(seek).collect();
+        let mut found: Links = links.par_iter().zip(compared.keypoints).map_init(Scratch::new, seek).collect();
         rows.drop_repeated(&mut found, compared.keypoints, band);
         known.iter_mut().for_each(|known| known.fresh = false);
         learn(&mut known, &found, compared.keypoints);
@@ -59,13 +60,14 @@ fn learn(known: &mut Vec<KnownMatch>, links: &Links, keypoints: &[Keypoint]) {
 
 /// The best partner that the displacements of the nearest fresh matches of `known` lead to.
 fn partner(
+    scratch: &mut Scratch,
     at: ViewPixel,
     known: &[KnownMatch],
     compared: &Compared<'_>,
     band: &EpipolarBand,
 ) -> Result<Link, UnmatchedReason> {
     let tried = guesses(at, known).into_iter().filter_map(|[dx, dy]| {
-        registered(compared, at, ViewPixel { x: at.x + dx, y: at.y + dy }, LEVELS - 1, band).ok()
+        registered(scratch, compared, (at, LEVELS - 1), ViewPixel { x: at.x + dx, y: at.y + dy }, band).ok()
     });
     tried.max_by(|p, q| p.score.total_cmp(&q.score)).ok_or(UnmatchedReason::NotRefined)
 }

@@ -174,8 +174,9 @@ impl Inside {
     }
 
     /// Whether `pixel`, whose unit ray has this `z`, is in the part that is used.
+    #[inline(always)]
     pub(crate) fn contains(&self, z: f64, pixel: &Pixel) -> bool {
-        let within = |x: f64, most: f64| x >= Self::BORDER && x < most;
-        z >= self.least_z && within(pixel.u, self.most_u) && within(pixel.v, self.most_v)
+        let within = |x: f64, most: f64| (x >= Self::BORDER) & (x < most);
+        (z >= self.least_z) & within(pixel.u, self.most_u) & within(pixel.v, self.most_v)
     }
 }

@@ -4,13 +4,32 @@ use vergence_vision::{Angle, Frame, KannalaBrandt, Left, Length, MatchSigma, Pix
 
 use crate::corners::Keypoint;
 use crate::epipolar_band::EpipolarBand;
+use crate::grid::Extent;
 use crate::matcher::{ImagePair, MatchError};
 use crate::shared_field::SharedField;
 use crate::view::Buffers;
 use crate::{Grid, SharedFrame, View, ViewPixel};
 
 /// Default density of a view in pixels per radian: small images are enlarged to it.
-const DENSITY: f64 = 450.0;
+pub(crate) const DENSITY: f64 = 450.0;
+/// The field of cameras with parallel axes, in square radians: 150° by 198°.
+const WHOLE_FIELD: f64 = 9.05;
+
+/// How dense views are, in pixels of the view per pixel of the denser fisheye image.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Density {
+    /// Of the field of parallel axes.
+    pub least: f64,
+    /// Where the field is smaller, views have as many pixels, but are not denser than this.
+    pub most: f64,
+}
+
+impl Density {
+    fn over(self, extent: &Extent) -> f64 {
+        let area = (extent.a_max - extent.a_min) * (extent.b_max - extent.b_min);
+        (self.least * (WHOLE_FIELD / area).sqrt()).clamp(self.least, self.most.max(self.least))
+    }
+}
 
 /// The two views of a pair on one grid, with the field that both cameras share.
 pub(crate) struct SharedViews<'a> {
@@ -29,23 +48,24 @@ impl<'a> SharedViews<'a> {
     /// # Errors
     /// [`MatchError::NoBaseline`] or [`MatchError::NoSharedField`].
     pub(crate) fn of(pair: &'a ImagePair<'a>, oversampling: Option<f64>) -> Result<Self, MatchError> {
-        Self::in_buffers(pair, oversampling, None, &mut Buffers::default())
+        let density = pair.left_camera.k()[0].max(pair.right_camera.k()[0]);
+        let oversampling = oversampling.filter(|o| o.is_finite()).unwrap_or(DENSITY / density).clamp(1.0, 2.0);
+        let density = Density { least: oversampling, most: oversampling };
+        Self::in_buffers(pair, density, None, &mut Buffers::default())
     }
 
     /// The same in memory that is taken from `buffers`, and on the grid of an earlier pair, if its pose was nearly this one.
     pub(crate) fn in_buffers(
         pair: &'a ImagePair<'a>,
-        oversampling: Option<f64>,
+        oversampling: Density,
         kept: Option<Grid>,
         buffers: &mut Buffers,
     ) -> Result<Self, MatchError> {
         let frame = SharedFrame::new(&pair.left_from_right).ok_or(MatchError::NoBaseline)?;
         let density = pair.left_camera.k()[0].max(pair.right_camera.k()[0]);
-        let oversampling = oversampling.filter(|o| o.is_finite()).unwrap_or(DENSITY / density).clamp(1.0, 2.0);
         let field = SharedField::of(&frame, pair);
-        let grid = kept
-            .or_else(|| field.extent().and_then(|extent| Grid::over(&extent, density * oversampling)))
-            .ok_or(MatchError::NoSharedField)?;
+        let over = |extent: Extent| Grid::over(&extent, density * oversampling.over(&extent));
+        let grid = kept.or_else(|| field.extent().and_then(over)).ok_or(MatchError::NoSharedField)?;
         let [left, right] = [(pair.left, pair.masks[0]), (pair.right, pair.masks[1])];
         Ok(Self {
             frame,

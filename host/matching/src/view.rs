@@ -65,10 +65,10 @@ impl<F: Frame> View<F> {
         rows.for_each_init(Line::default, |line, (y, (values, seen))| {
             let from_row = Row::new(&camera_from_shared, grid.b(y as f64).sin_cos());
             line.fill(&lens, &columns, &from_row);
-            let found = seen.iter_mut().zip(&line.pixels).zip(&columns.turns);
-            for ((seen, &[u, v]), turn) in found {
-                let at = Pixel { u, v };
-                *seen = inside.contains(from_row.ray(*turn)[2], &at) && !mask.is_some_and(|mask| mask.hides(at));
+            see(&inside, &line.pixels, &columns.turns, [from_row.by_sine[2], from_row.by_cosine[2]], seen);
+            if let Some(mask) = mask {
+                let seen = seen.iter_mut().zip(&line.pixels).filter(|(seen, _)| **seen);
+                seen.for_each(|(seen, &[u, v])| *seen = !mask.hides(Pixel { u, v }));
             }
             sample_line(image.as_raw(), image.width() as usize, &line.pixels, seen, values);
         });
@@ -207,74 +207,103 @@ impl Line {
         self.rays.extend(columns.knots.iter().map(|turn| row.ray(*turn)));
         lens.project_into(&self.rays, &mut self.knots);
         self.pixels.resize(columns.turns.len(), [f64::NAN; 2]);
-        for ((knots, pixels), turns) in
-            self.knots.windows(4).zip(self.pixels.chunks_mut(KNOT)).zip(columns.turns.chunks(KNOT))
-        {
+        between(&self.knots, &mut self.pixels);
+        let chunks = self.knots.windows(4).zip(self.pixels.chunks_mut(KNOT)).zip(columns.turns.chunks(KNOT));
+        let at_edge = |knots: &[[f64; 2]]| {
             let lost = knots.iter().filter(|knot| knot[0].is_nan()).count();
-            match lost {
-                0 => interpolate(knots, pixels),
-                4 => pixels.fill([f64::NAN; 2]),
-                _ => {
-                    self.rays.clear();
-                    self.exact.clear();
-                    self.rays.extend(turns.iter().map(|turn| row.ray(*turn)));
-                    lens.project_into(&self.rays, &mut self.exact);
-                    pixels.copy_from_slice(&self.exact);
-                }
-            }
+            (1..4).contains(&lost)
+        };
+        for ((_, pixels), turns) in chunks.filter(|((knots, _), _)| at_edge(knots)) {
+            self.rays.clear();
+            self.exact.clear();
+            self.rays.extend(turns.iter().map(|turn| row.ray(*turn)));
+            lens.project_into(&self.rays, &mut self.exact);
+            pixels.copy_from_slice(&self.exact);
         }
+    }
+}
+
+/// Interpolates the pixels of a row between those of its knots; NaN where one of four knots has none.
+#[multiversion(targets("x86_64+avx2"))]
+fn between(knots: &[[f64; 2]], pixels: &mut [[f64; 2]]) {
+    knots.windows(4).zip(pixels.chunks_mut(KNOT)).for_each(|(knots, pixels)| interpolate(knots, pixels));
+}
+
+/// Says which pixels of a row the camera sees, whose rays have the z `by_sine` sin a + `by_cosine` cos a.
+#[multiversion(targets("x86_64+avx2"))]
+fn see(inside: &Inside, pixels: &[[f64; 2]], turns: &[(f64, f64)], [by_sine, by_cosine]: [f64; 2], seen: &mut [bool]) {
+    for ((seen, &[u, v]), (sine, cosine)) in seen.iter_mut().zip(pixels).zip(turns) {
+        *seen = inside.contains(sine * by_sine + cosine * by_cosine, &Pixel { u, v });
     }
 }
 
 /// Samples an image at the pixels of a row that are `seen`; what the image's border leaves out is not seen. Unseen pixels are black.
 ///
-/// Positions and weights of some pixels are computed at once, then each is weighted down its columns, then all along their rows.
+/// Positions and weights of some pixels are computed at once, then each finds the pixels around it, and all are weighted down their columns and along
+/// their rows. Loops that compute many at once have no branches, and split positions by a sum that rounds them: only then do compilers turn them into vector instructions.
 #[multiversion(targets("x86_64+avx2"))]
 fn sample_line(image: &[u8], width: usize, pixels: &[[f64; 2]], seen: &mut [bool], values: &mut [f32]) {
     const TOGETHER: usize = 32;
+    /// A number to which others are added that are less than it, and not negative, has no bits for their fractions: the sum is rounded.
+    const ROUNDING: f64 = (1_u64 << (f64::MANTISSA_DIGITS - 1)) as f64;
+    let (most, stride) = (width as f64 - 2.0, width as f64);
     let chunks = pixels.chunks(TOGETHER).zip(seen.chunks_mut(TOGETHER)).zip(values.chunks_mut(TOGETHER));
     for ((pixels, seen), values) in chunks {
-        let (mut firsts, mut past) = ([0_u32; TOGETHER], [[0.0_f32; TOGETHER]; 2]);
+        let (mut columns, mut rows) = ([1.0_f64; TOGETHER], [1.0_f64; TOGETHER]);
         for (i, (&[u, v], seen)) in pixels.iter().zip(seen.iter_mut()).enumerate() {
             // Pixels that are seen are at least one pixel inside the camera's images; this image may be narrower.
-            *seen &= u as usize + 3 <= width;
-            let (u, v) = if *seen { (u, v) } else { (1.0, 1.0) };
-            let (column, row) = (u as u32, v as u32);
-            (past[0][i], past[1][i]) = ((u - f64::from(column)) as f32, (v - f64::from(row)) as f32);
-            firsts[i] = row.saturating_sub(1) * width as u32 + column.saturating_sub(1);
+            *seen &= u < most;
+            (columns[i], rows[i]) = if *seen { (u, v) } else { (1.0, 1.0) };
+        }
+        let (mut firsts, mut past) = ([0_u32; TOGETHER], [[0.0_f32; TOGETHER]; 2]);
+        for i in 0..TOGETHER {
+            let whole = |place: f64| ((place - 0.5 + ROUNDING) - ROUNDING).max(1.0);
+            let (column, row) = (whole(columns[i]), whole(rows[i]));
+            (past[0][i], past[1][i]) = ((columns[i] - column) as f32, (rows[i] - row) as f32);
+            firsts[i] = ((row - 1.0) * stride + (column - 1.0) + ROUNDING).to_bits() as u32;
         }
         let (mut across, mut down) = ([[0.0_f32; TOGETHER]; 4], [[0.0_f32; TOGETHER]; 4]);
         for i in 0..TOGETHER {
             let (by_column, by_row) = (cubic_weights(past[0][i]), cubic_weights(past[1][i]));
-            for k in 0..4 {
-                (across[k][i], down[k][i]) = (by_column[k], by_row[k]);
+            (across[0][i], across[1][i], across[2][i], across[3][i]) =
+                (by_column[0], by_column[1], by_column[2], by_column[3]);
+            (down[0][i], down[1][i], down[2][i], down[3][i]) = (by_row[0], by_row[1], by_row[2], by_row[3]);
+        }
+        let mut taps = [[0_u32; TOGETHER]; 4];
+        for (i, seen) in seen.iter_mut().enumerate().filter(|(_, seen)| **seen) {
+            let found = taps_from(image, width, firsts[i] as usize);
+            *seen = found.is_some();
+            let found = found.unwrap_or_default();
+            (taps[0][i], taps[1][i], taps[2][i], taps[3][i]) = (found[0], found[1], found[2], found[3]);
+        }
+        let mut mixed = [[0.0_f32; TOGETHER]; 4];
+        for (k, mixed) in mixed.iter_mut().enumerate() {
+            let shift = 8 * k as u32;
+            for i in 0..TOGETHER {
+                let level = |taps: u32| (taps >> shift & 255) as i32 as f32;
+                mixed[i] = down[0][i] * level(taps[0][i])
+                    + down[1][i] * level(taps[1][i])
+                    + down[2][i] * level(taps[2][i])
+                    + down[3][i] * level(taps[3][i]);
             }
         }
-        let mut mixed = [[0.0_f32; 4]; TOGETHER];
-        for (i, (seen, mixed)) in seen.iter_mut().zip(&mut mixed).enumerate().filter(|(_, (seen, _))| **seen) {
-            let weights = [down[0][i], down[1][i], down[2][i], down[3][i]];
-            *seen = mix_down(image, width, firsts[i] as usize, weights, mixed).is_some();
+        let mut sums = [0.0_f32; TOGETHER];
+        for i in 0..TOGETHER {
+            sums[i] = across[0][i] * mixed[0][i]
+                + across[1][i] * mixed[1][i]
+                + across[2][i] * mixed[2][i]
+                + across[3][i] * mixed[3][i];
         }
-        for (i, (value, seen)) in values.iter_mut().zip(seen.iter()).enumerate() {
-            let mixed = &mixed[i];
-            let sum =
-                across[0][i] * mixed[0] + across[1][i] * mixed[1] + across[2][i] * mixed[2] + across[3][i] * mixed[3];
-            *value = if *seen { sum } else { 0.0 };
-        }
+        values.copy_from_slice(&sums[..values.len()]);
     }
 }
 
-/// Weighs the brightness of an 8-bit image in the 4 × 4 pixels from `first` on down their columns; `None` where they are not all inside.
+/// The 4 × 4 pixels of an 8-bit image from `first` on, four of a row in a number; `None` where they are not all inside.
 #[inline(always)]
-fn mix_down(pixels: &[u8], width: usize, first: usize, down: [f32; 4], mixed: &mut [f32; 4]) -> Option<()> {
+fn taps_from(pixels: &[u8], width: usize, first: usize) -> Option<[u32; 4]> {
     let (one, rest) = pixels.get(first..)?.split_at_checked(width)?;
     let (two, rest) = rest.split_at_checked(width)?;
     let (three, four) = rest.split_at_checked(width)?;
-    let taps: [&[u8; 4]; 4] = [one.first_chunk()?, two.first_chunk()?, three.first_chunk()?, four.first_chunk()?];
-    for (taps, weight) in taps.into_iter().zip(down) {
-        for (sum, tap) in mixed.iter_mut().zip(taps) {
-            *sum += weight * f32::from(*tap);
-        }
-    }
-    Some(())
+    let taps = [one.first_chunk()?, two.first_chunk()?, three.first_chunk()?, four.first_chunk()?];
+    Some(taps.map(|taps| u32::from_le_bytes(*taps)))
 }

@@ -10,7 +10,7 @@ use vergence_vision::{Angle, Left, Right, Transform, median};
 
 use super::levels::Levels;
 use crate::consensus::{BearingPair, Consensus};
-use crate::refine;
+use crate::refine::{self, Scratch};
 use crate::wrong_pose::ANY_POSE;
 use crate::{Grid, SharedFrame, ViewPixel};
 
@@ -45,14 +45,14 @@ pub(super) fn sightings(levels: &Levels) -> Vec<Sighting> {
         .flat_map(|y| (SPACING / 2..width).step_by(SPACING).map(move |x| (x, y)))
         .filter(|(x, y)| disparities[y * width + x].is_finite())
         .collect();
-    let sighted = |&(x, y): &(usize, usize)| {
+    let sighted = |scratch: &mut Box<Scratch>, &(x, y): &(usize, usize)| {
         let left = ViewPixel { x: x as f64 * scale, y: y as f64 * scale };
         let start = ViewPixel { x: left.x - f64::from(disparities[y * width + x]) * scale, y: left.y };
-        let found = refine::register(levels.planes(), left, start, level).ok()?;
+        let found = refine::register(scratch, levels.planes(), left, start, level).ok()?;
         let [_, sigma] = found.evidence.sigma(OVERSAMPLING, 1.0);
         Some(Sighting { left, right: found.right, sigma })
     };
-    places.par_iter().filter_map(sighted).collect()
+    places.par_iter().map_init(Scratch::new, sighted).flatten().collect()
 }
 
 /// The pose whose rows are where the images show them, if those of `pose` are too far off for the search.

@@ -14,7 +14,7 @@ const SIDE: usize = 2 * HALF + 1;
 /// Standard deviation of the Gaussian weights of the window, in pixels.
 const WEIGHT_SIGMA: f32 = 4.5;
 /// Number of unknowns: four of the warp, gain, bias, and how the gain grows along and across the row.
-const UNKNOWNS: usize = 8;
+pub(super) const UNKNOWNS: usize = 8;
 /// Grey level below black at which sRGB, 1.055 L^(1/2.4) - 0.055 of the light L, would begin without its straight part (IEC 61966-2-1):
 /// above it levels grow in proportion where the light does.
 const BELOW_BLACK: f32 = 255.0 * 0.055;
@@ -55,7 +55,6 @@ pub(super) struct Window {
 
 impl Window {
     /// A window without content, to be filled in place: it is too large to be moved about.
-    #[inline(always)]
     pub(super) const fn empty() -> Self {
         Self { columns: [EMPTY; UNKNOWNS], weighted: [EMPTY; UNKNOWNS] }
     }
@@ -93,13 +92,17 @@ impl Window {
         }
     }
 
+    /// The lower triangle of the normal matrix and its diagonal, which is all of it that its factors need.
     #[inline(always)]
     pub(super) fn normal_matrix(&self) -> SMatrix<f64, UNKNOWNS, UNKNOWNS> {
         let mut normal = SMatrix::zeros();
-        for (i, column) in self.columns.iter().enumerate() {
-            for (k, product) in self.products(column).into_iter().enumerate() {
-                normal[(i, k)] = product;
-            }
+        for (i, column) in self.columns.iter().enumerate().take(UNKNOWNS / 2) {
+            let products = self.products::<{ UNKNOWNS / 2 }>(column);
+            products.into_iter().enumerate().take(i + 1).for_each(|(k, product)| normal[(i, k)] = product);
+        }
+        for (i, column) in self.columns.iter().enumerate().skip(UNKNOWNS / 2) {
+            let products = self.products::<UNKNOWNS>(column);
+            products.into_iter().enumerate().take(i + 1).for_each(|(k, product)| normal[(i, k)] = product);
         }
         normal
     }
@@ -109,10 +112,10 @@ impl Window {
         SVector::from(self.products(values))
     }
 
-    /// The sums of products of `values` with the weighted columns, all at once.
+    /// The sums of products of `values` with the first weighted columns, all at once.
     #[inline(always)]
-    fn products(&self, values: &Patch) -> [f64; UNKNOWNS] {
-        let mut sums = [[0.0_f32; LANES]; UNKNOWNS];
+    fn products<const N: usize>(&self, values: &Patch) -> [f64; N] {
+        let mut sums = [[0.0_f32; LANES]; N];
         for (c, values) in values.iter().enumerate() {
             for (sums, column) in sums.iter_mut().zip(&self.weighted) {
                 for l in 0..LANES {

@@ -29,7 +29,8 @@ use crate::links::{Compared, Link, Links, agree_on_pose, in_originals, registere
 use crate::match_errors::{FARTHEST_DEPARTURE, state_errors};
 use crate::plane::Pyramid;
 use crate::pool::in_pool;
-use crate::shared_views::SharedViews;
+use crate::refine::Scratch;
+use crate::shared_views::{DENSITY, Density, SharedViews};
 use crate::view::Buffers;
 use crate::{Grid, GuidedMatcher, ImagePair, MatchError, Matcher, Matches, UnmatchedReason, ViewPixel};
 
@@ -54,10 +55,14 @@ const VERY_FEW: f64 = 0.8;
 /// Largest number of tracks.
 const MOST: usize = 700;
 /// Pixels of a view per radian, unless the images have more: in views of less corners of wide axes are no longer alike. Denser views than the images
-/// cost more than they find.
-const DENSITY: f64 = 183.0;
+/// cost more than they find where the field is whole; where axes are far apart, views of as many pixels are denser.
+const LEAST_DENSITY: f64 = 183.0;
 /// Pairs in which a track may fail a test one after the other before it ends.
 const PATIENCE: u32 = 3;
+/// In every so many pairs the windows beside a track are registered: what they show of its surface, and of its errors, stays until then.
+const LOOKED_BESIDE: u64 = 4;
+/// Departures of these windows, in pixels of the view, from which on they are registered in every pair.
+const NEAR_DEPARTURE: f64 = 0.5 * FARTHEST_DEPARTURE;
 /// A pair is searched as a whole where less than this part of the tracks is left that the last such search gave.
 const FEW: f64 = 0.5;
 /// So few tracks are no base for another pair: where a pose was tried that is wrong, the next one may be right.
@@ -104,11 +109,13 @@ impl Matcher for TrackingMatcher {
         // A poisoned lock only means that another thread panicked; the tracks are replaced whole.
         let mut state = self.state.lock().unwrap_or_else(PoisonError::into_inner);
         let density = pair.left_camera.k()[0].max(pair.right_camera.k()[0]);
-        let oversampling = self.whole.oversampling.unwrap_or(DENSITY / density).clamp(1.0, 2.0);
+        let oversampling = self.whole.oversampling.unwrap_or(LEAST_DENSITY / density).clamp(1.0, 2.0);
+        let most_dense = if self.whole.oversampling.is_some() { oversampling } else { DENSITY / density };
+        let densities = Density { least: oversampling, most: most_dense.clamp(1.0, 2.0) };
         let [keypoints, in_strips] = [self.whole.keypoints, self.in_strips].map(|keypoints| keypoints * most / MOST);
         let (state, whole) = (&mut *state, GuidedMatcher { oversampling: Some(oversampling), keypoints });
         // The lock is taken outside of the pool, where no thread that waits begins another pair.
-        in_pool(|| state.find(pair, &whole, [in_strips, most]))
+        in_pool(|| state.find(pair, (&whole, densities), [in_strips, most]))
     }
 }
 
@@ -118,6 +125,8 @@ struct State {
     before: Option<Before>,
     /// Number of the next track.
     next: u64,
+    /// Number of the pair.
+    pair: u64,
     /// Number of the next strip to be searched.
     strip: usize,
     /// Number of tracks that the last search of a whole pair gave.
@@ -148,6 +157,8 @@ struct Track {
     moved: [f64; 2],
     /// Pairs in which it failed a test since it last passed them all.
     missed: u32,
+    /// What the windows beside it showed when they were registered last.
+    departures: Option<[f64; 4]>,
 }
 
 /// The views of a pair, smoothed.
@@ -163,20 +174,21 @@ impl State {
     fn find(
         &mut self,
         pair: &ImagePair<'_>,
-        whole: &GuidedMatcher,
+        (whole, density): (&GuidedMatcher, Density),
         [in_strips, most]: [usize; 2],
     ) -> Result<Matches, MatchError> {
+        self.pair += 1;
         let cameras = [*pair.left_camera, *pair.right_camera];
         let mut before = self.before.take().filter(|before| before.cameras == cameras);
         let kept = before.as_ref().filter(|before| is_near(&before.pose, &pair.left_from_right));
         let (grid, pose) = kept.map_or((None, pair.left_from_right), |before| (Some(before.grid), before.pose));
-        let views = SharedViews::in_buffers(pair, whole.oversampling, grid, &mut self.buffers)?;
+        let views = SharedViews::in_buffers(pair, density, grid, &mut self.buffers)?;
         let [left, right] = [&views.left.plane(), &views.right.plane()]
             .map(|plane| Pyramid::in_buffers(plane, LEVELS, &mut self.buffers.values));
         let seen = Seen { band: views.band(), views, left, right };
         let cells = Cells::for_points(most, seen.views.grid.size());
         before.iter_mut().for_each(|before| cells.thin(&mut before.tracks, most));
-        let tracks = before.as_ref().map_or_else(Vec::new, |before| followed(before, &seen));
+        let (tracks, links) = before.as_ref().map_or_else(Default::default, |before| followed(before, &seen));
         let at_first = self.at_first.min(most) as f64;
         let are_too_few = (tracks.len() as f64) < (FEW * at_first).max(FEWEST as f64);
         let are_few = (tracks.len() as f64) < MANY * most as f64;
@@ -187,7 +199,7 @@ impl State {
         };
         let strip = self.next_strip(&seen.views.grid, are_too_few, strips);
         let keypoints = if are_few && !strip.is_whole { in_strips } else { whole.keypoints };
-        let (matches, tracks) = self.matched(&seen, tracks, &strip, [keypoints, most]);
+        let (matches, tracks) = self.matched(&seen, (tracks, links), &strip, [keypoints, most]);
         if strip.is_whole {
             self.at_first = tracks.len();
         }
@@ -204,6 +216,12 @@ impl State {
         Ok(matches)
     }
 
+    /// Whether the windows beside a track are registered in this pair: in one pair of some, and in each where they departed or a test was failed.
+    fn is_due(&self, track: &Track) -> bool {
+        let are_near = track.departures.is_some_and(|departures| depart(departures) < NEAR_DEPARTURE);
+        !are_near || track.missed > 0 || (self.pair + track.number).is_multiple_of(LOOKED_BESIDE)
+    }
+
     /// The rows in which new tracks are sought: all, or those of the next `count` strips.
     fn next_strip(&mut self, grid: &Grid, is_whole: bool, count: usize) -> Strip {
         let height = grid.size().1;
@@ -212,11 +230,11 @@ impl State {
         strip
     }
 
-    /// Matches what tracks and what is newly found predict, and applies all tests. The tracks that go on are returned too.
+    /// Matches what is newly found, and applies all tests to that and to the links of the tracks. The tracks that go on are returned too.
     fn matched(
         &mut self,
         seen: &Seen<'_>,
-        mut tracks: Vec<Track>,
+        (mut tracks, links): (Vec<Track>, Links),
         strip: &Strip,
         [keypoints, most]: [usize; 2],
     ) -> (Matches, Vec<Track>) {
@@ -231,9 +249,13 @@ impl State {
             keypoints: &keypoints,
             oversampling: seen.views.oversampling(),
         };
-        let of_tracks = tracks.par_iter().map(|track| refound(&compared, track, &seen.band));
-        let of_new = new.par_iter().map(|(keypoint, link)| {
-            let from = |link: Link| registered(&compared, keypoint.at, link.right, keypoint.level, &seen.band);
+        let of_tracks = links.into_par_iter().zip(&tracks).map(|(link, track)| {
+            let departures = track.departures.filter(|_| !self.is_due(track));
+            link.map(|link| Link { departures, ..link })
+        });
+        let of_new = new.par_iter().map_init(Scratch::new, |scratch, (keypoint, link)| {
+            let place = (keypoint.at, keypoint.level);
+            let mut from = |link: Link| registered(scratch, &compared, place, link.right, &seen.band);
             link.and_then(|link| from(link).map_err(|failed| failed.reason))
         });
         let mut links: Links = of_tracks.chain(of_new).collect();
@@ -248,6 +270,7 @@ impl State {
             track.missed = if link.is_ok() { 0 } else { track.missed + 1 };
             if let Ok(link) = link {
                 track.moved = [link.right.x - track.at.x, link.right.y - track.at.y];
+                track.departures = link.departures;
                 link.track = Some(track.number);
             }
         }
@@ -279,11 +302,12 @@ impl State {
         let room = most.saturating_sub(tracks.len());
         let chosen = cells.choose(&places, tracks.iter().map(|track| track.at), room);
         for chosen in chosen {
-            let (index, at, Link { right, .. }) = found[chosen];
+            let (index, at, Link { right, departures, .. }) = found[chosen];
             if let Ok(link) = &mut links[index] {
                 link.track = Some(self.next);
             }
-            tracks.push(Track { number: self.next, at, moved: [right.x - at.x, right.y - at.y], missed: 0 });
+            let moved = [right.x - at.x, right.y - at.y];
+            tracks.push(Track { number: self.next, at, moved, missed: 0, departures });
             self.next += 1;
         }
     }
@@ -294,15 +318,12 @@ impl State {
 /// A corner at the outline of an object is found some pixels beside it as well, where the image shows the background, and its window finds the
 /// disparity of the object. Such a match is wrong, and passes the tests of a single pair now and then: a track of it would pass them again and again.
 fn is_on_one_surface(link: &Link) -> bool {
-    let [left, right, ..] = link.departures;
-    left.max(right) < FARTHEST_DEPARTURE
+    link.departures.is_some_and(|departures| depart(departures) < FARTHEST_DEPARTURE)
 }
 
-/// The right place of a track, from where it is predicted; where that is too far off, by the coarser levels.
-fn refound(compared: &Compared<'_>, track: &Track, band: &EpipolarBand) -> Result<Link, UnmatchedReason> {
-    let start = ViewPixel { x: track.at.x + track.moved[0], y: track.at.y + track.moved[1] };
-    let from = |level: usize| registered(compared, track.at, start, level, band);
-    from(0).or_else(|failed| from(LEVELS - 1).map_err(|_| failed.reason))
+/// The larger departure of the windows to the left and to the right.
+fn depart([left, right, ..]: [f64; 4]) -> f64 {
+    left.max(right)
 }
 
 /// Whether the grid of one pose serves another: it is a degree wider than the field.
@@ -366,7 +387,8 @@ mod tests {
                 nearest: Length::from_mm(400.0),
                 masks: [None; 2],
             };
-            state.find(&pair, &GuidedMatcher { keypoints: 1000, oversampling: Some(1.5) }, [1000, 400]).unwrap();
+            let whole = GuidedMatcher { keypoints: 1000, oversampling: Some(1.5) };
+            state.find(&pair, (&whole, Density { least: 1.5, most: 1.5 }), [1000, 400]).unwrap();
             let now = state.before.as_ref().expect("tracks");
             assert!(is_near(&now.pose, &pair.left_from_right), "pair {step}: the grid is of another pose");
             assert!(now.tracks.len() > 40, "{}", now.tracks.len());

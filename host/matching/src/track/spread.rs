@@ -70,7 +70,7 @@ mod tests {
     use super::*;
 
     fn track(number: u64, x: f64, y: f64) -> Track {
-        Track { number, at: ViewPixel { x, y }, moved: [0.0; 2], missed: 0 }
+        Track { number, at: ViewPixel { x, y }, moved: [0.0; 2], missed: 0, departures: None }
     }
 
     /// One half of the view has nine points for each of the other.
