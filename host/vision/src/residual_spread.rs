@@ -49,6 +49,11 @@ impl Place {
         Self { at, square: cell_of(pixel, width, WINDOWS_ACROSS), cell: cell_of(pixel, width, CELLS_ACROSS) }
     }
 
+    /// The square, as wide as errors are correlated, in which it lies.
+    pub(crate) const fn square(&self) -> [i32; 2] {
+        self.square
+    }
+
     fn is_near(&self, other: &Self) -> bool {
         (self.at[0] - other.at[0]).hypot(self.at[1] - other.at[1]) < 1.0
     }
