@@ -3,9 +3,9 @@
 use std::path::Path;
 
 use serde_json::{Map, Value, json};
+use vergence_alignment::{FusedPose, LensGrowth, PoseDrift};
 use vergence_pipeline::{AxisByImages, DenseRanges, Dropped, PairCloud};
 use vergence_rig::{Rig, RigPose, rounded};
-use vergence_vision::{FusedPose, LensGrowth, PoseDrift};
 
 /// Where a pose comes from.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

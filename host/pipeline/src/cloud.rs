@@ -3,11 +3,11 @@
 use std::collections::BTreeMap;
 
 use image::RgbImage;
+use vergence_alignment::{FusedPose, LensGrowth, PoseDrift, lens_growth, pose_drift};
 use vergence_matching::{Match, MatchError, Matcher, Matches, UnmatchedReason};
 use vergence_rig::{OpenLoop, Rig, RigPose, TrackGap, moving_cloud};
 use vergence_vision::{
-    Cloud, CloudPoint, DropReason, FusedPose, Kernel, Length, LensGrowth, MatchSigma, PixelPair, PoseDrift, StereoPair,
-    cloud_of_each, lens_growth, pose_drift,
+    Cloud, CloudPoint, DropReason, Kernel, Length, MatchSigma, PixelPair, StereoPair, cloud_of_each,
 };
 
 use crate::limits::{cloud_gates, expected_drift, matching_sigma};

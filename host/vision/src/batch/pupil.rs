@@ -6,6 +6,8 @@
 //!
 //! A point lies inside the field, up to θ, where (z - e(θ)) sin θ ≥ ρ cos θ.
 
+use std::f64::consts::PI;
+
 use multiversion::multiversion;
 use multiversion::target::target_cfg_f;
 
@@ -54,7 +56,7 @@ impl ProjectByPupil {
     pub(super) fn new(lens: &KannalaBrandt) -> Option<Self> {
         let [e0, e1] = lens.pupil().mm();
         let (near, theta_max) = (NEAR * (e0.abs() + 2.5 * e1.abs()), lens.theta_max().rad());
-        let (least_cosine, cotangent) = ((theta_max + BEYOND).cos(), theta_max.tan().recip());
+        let (least_cosine, cotangent) = ((theta_max + BEYOND).min(PI).cos(), theta_max.tan().recip());
         let (spread, centre) = (1.0 - least_cosine, lens.centre());
         let mut made = Self {
             powers: Vec::new(),

@@ -12,10 +12,9 @@ use std::collections::BTreeMap;
 
 use nalgebra::{DMatrix, DVector, SMatrix, SVector, Vector6};
 
-use crate::lens_derivatives::LENS_PARAMETERS;
 use crate::pose_equation::{Equation, LENSES, SCALE_SIGMAS, moved};
 use crate::residual_spread::Place;
-use crate::{KannalaBrandt, MatchSigma, Pixel, PixelPair, SharedCovariance, StereoPair};
+use vergence_vision::{KannalaBrandt, LENS_PARAMETERS, MatchSigma, Pixel, PixelPair, SharedCovariance, StereoPair};
 
 /// The unknowns that robust weights depend on: the correction of the pose, and the growth.
 const UNKNOWNS: usize = 7;

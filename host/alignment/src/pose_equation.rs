@@ -2,11 +2,10 @@
 
 use nalgebra::{SVector, UnitQuaternion, Vector3, Vector6};
 
-use crate::epipolar::ray_to_plane;
-use crate::lens_derivatives::LENS_PARAMETERS;
 use crate::residual_spread::Place;
-use crate::uncertainty::ResidualUncertainty;
-use crate::{Left, MatchSigma, PixelPair, Right, StereoPair, Transform};
+use vergence_vision::{
+    LENS_PARAMETERS, Left, MatchSigma, PixelPair, ResidualUncertainty, Right, StereoPair, Transform, ray_to_plane,
+};
 
 /// Parameters of both lenses.
 pub const LENSES: usize = 2 * LENS_PARAMETERS;
@@ -53,7 +52,12 @@ impl Equation {
         let uncertainty = ResidualUncertainty::of(&left, &right, pair, sigma)?;
         let sigma = uncertainty.from_pixels.sqrt();
         let place = Place::of(pixels.left, pair.left.size().width);
-        let equation = Self { offset: offset.rad(), slope: uncertainty.by_pose(), sigma, place };
+        let equation = Self {
+            offset: offset.rad(),
+            slope: uncertainty.by_shared.fixed_columns::<6>(LENSES).transpose(),
+            sigma,
+            place,
+        };
         (sigma > 0.0).then(|| (equation, uncertainty.by_shared.fixed_columns::<LENSES>(0).transpose()))
     }
 

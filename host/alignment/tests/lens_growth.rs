@@ -3,9 +3,10 @@
 #![allow(clippy::unwrap_used, clippy::print_stdout, reason = "a test fails loudly and shows its figures")]
 
 use nalgebra::{Matrix6, SMatrix, UnitQuaternion, Vector3, Vector6};
+use vergence_alignment::{LensGrowth, lens_growth, pose_drift};
 use vergence_vision::{
-    Angle, ImageSize, KannalaBrandt, LENS_PARAMETERS, Left, LensGrowth, Pixel, PixelPair, Point, Right,
-    SharedCovariance, StereoPair, Transform, lens_growth, pose_drift,
+    Angle, ImageSize, KannalaBrandt, LENS_PARAMETERS, Left, Pixel, PixelPair, Point, Right, SharedCovariance,
+    StereoPair, Transform,
 };
 
 const NOISE_PX: f64 = 0.1;

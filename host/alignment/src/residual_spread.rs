@@ -13,8 +13,8 @@ use std::collections::BTreeMap;
 
 use nalgebra::{Matrix6, Vector6};
 
-use crate::Pixel;
 use crate::pose_equation::Equation;
+use vergence_vision::Pixel;
 
 /// Distances within which errors are correlated, across an image: 2 degrees of a lens with 196.
 const WINDOWS_ACROSS: f64 = 98.0;
