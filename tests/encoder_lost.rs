@@ -26,13 +26,14 @@ use serde_json::Value;
 use tokio::sync::Notify;
 use vergence::failure::Failure;
 use vergence::sim::SharedRig;
+use vergence_alignment::FusedPose;
 use vergence_board::{Board, BoardError};
 use vergence_live::{Limits, LiveLoop, LiveResult, Measurement, Totals, Tour};
 use vergence_pipeline::{AxisByImages, Observation, PairCloud};
 use vergence_protocol::{Mode as ModeNumber, Refusal, Request, Trigger};
 use vergence_rig::{AxisPosition, BENCH_TOML, Chain, Mode, Rig, RigCalibration, RigPose};
 use vergence_sim::{Random, Room};
-use vergence_vision::{Angle, FusedPose, Length, Transform};
+use vergence_vision::{Angle, Length, Transform};
 
 /// Width of the images: three eighths of the real ones, where the pose is judged; a quarter of them elsewhere.
 const WIDTH: u32 = 480;

@@ -12,6 +12,7 @@ const PURE: &[&str] = &[
     "firmware/control",
     "firmware/dynamixel",
     "host/vision",
+    "host/alignment",
     "host/rig",
     "host/exchange",
     "host/targets",

@@ -131,6 +131,15 @@ pub fn calibrated(rig: &Rig, lenses: Lenses<'_>, work: &Path, dice: &mut Dice) -
 
 /// As [`calibrated`], with more options for the calibration of the lenses.
 pub fn calibrated_as(rig: &Rig, lenses: Lenses<'_>, work: &Path, options: &[&str], dice: &mut Dice) -> String {
+    calibrated_by("stage", rig, lenses, work, options, dice)
+}
+
+/// The same for the pair alone, whose stage poses are all one: the text of a rig file without axes.
+pub fn pair_calibrated_as(rig: &Rig, lenses: Lenses<'_>, work: &Path, options: &[&str], dice: &mut Dice) -> String {
+    calibrated_by("extrinsics", rig, lenses, work, options, dice)
+}
+
+fn calibrated_by(verb: &str, rig: &Rig, lenses: Lenses<'_>, work: &Path, options: &[&str], dice: &mut Dice) -> String {
     let file = |name: &str| work.join(name).to_string_lossy().into_owned();
     let size = rig.left_camera.size();
     let size = format!("{}x{}", size.width, size.height);
@@ -143,7 +152,7 @@ pub fn calibrated_as(rig: &Rig, lenses: Lenses<'_>, work: &Path, options: &[&str
     let (corners, out) = (file("corners.csv"), file("rig.toml"));
     std::fs::write(&corners, shared_corners(rig, lenses, dice)).expect("written");
     let lenses = ["--left", &file("left.toml"), "--right", &file("right.toml")];
-    let command = ["calibrate", "stage", "--json", "--csv", &corners, "--out", &out];
+    let command = ["calibrate", verb, "--json", "--csv", &corners, "--out", &out];
     run_json(&[&command[..], &lenses].concat());
     std::fs::read_to_string(&out).expect("a rig file")
 }

@@ -4,7 +4,7 @@ use image::RgbImage;
 use nalgebra::{UnitQuaternion, Vector3};
 use vergence_pipeline::{PairPose, cloud_of_pairs};
 use vergence_reproduce::own_frame;
-use vergence_rig::Rig;
+use vergence_rig::{Rig, RigPose};
 use vergence_scene::Lens;
 use vergence_vision::{Kernel, Left, PixelPair, Point};
 
@@ -28,6 +28,18 @@ pub struct Figures {
 /// A file's figures at 30 points about 350 mm away, with the axes set anywhere within `separations`.
 pub fn figures(
     [rig, file]: [&Rig; 2],
+    lenses: ([&dyn Lens; 2], bool),
+    separations: [f64; 2],
+    match_px: f64,
+    dice: &mut Dice,
+) -> Figures {
+    figures_by(&|read| file.pose_read_at(read), [rig, file], lenses, separations, match_px, dice)
+}
+
+/// The same where the pose comes from elsewhere: `stated` gives it by what the encoders read.
+pub fn figures_by(
+    stated: &dyn Fn(&[f64; 2]) -> RigPose,
+    [rig, file]: [&Rig; 2],
     (lenses, is_displaced): ([&dyn Lens; 2], bool),
     separations: [f64; 2],
     match_px: f64,
@@ -50,7 +62,7 @@ pub fn figures(
         let image = |lens: &dyn Lens, at: Vector3<f64>| lens.image_of(&Point::from_mm(at));
         let (Some(left), Some(right)) = (image(lenses[0], truth.mm()), image(lenses[1], in_right)) else { continue };
         let seen = PixelPair { left: noisy(left, match_px, dice), right: noisy(right, match_px, dice) };
-        let pose = PairPose::standing(file.pose_read_at(&read));
+        let pose = PairPose::standing(stated(&read));
         let cloud = cloud_of_pairs(&[(seen, MATCH_PX)], &RgbImage::new(1, 1), file, &pose, Kernel::default());
         let Some(found) = cloud.expect("no axis moves").points.first().map(|found| found.point) else { continue };
         let error = found.point.mm() - turn * truth.mm();

@@ -10,6 +10,7 @@ pub const ALLOWED: &[(&str, &[&str])] = &[
     ("vergence-dynamixel", &[]),
     ("vergence-image", &["vergence-protocol"]),
     ("vergence-vision", &[]),
+    ("vergence-alignment", &["vergence-vision"]),
     ("vergence-rig", &["vergence-protocol", "vergence-vision"]),
     ("vergence-exchange", &["vergence-vision"]),
     ("vergence-page", &[]),
@@ -42,10 +43,14 @@ pub const ALLOWED: &[(&str, &[&str])] = &[
             "vergence-sim",
         ],
     ),
-    ("vergence-pipeline", &["vergence-protocol", "vergence-vision", "vergence-rig", "vergence-matching"]),
+    (
+        "vergence-pipeline",
+        &["vergence-protocol", "vergence-vision", "vergence-alignment", "vergence-rig", "vergence-matching"],
+    ),
     (
         "vergence-output",
         &[
+            "vergence-alignment",
             "vergence-vision",
             "vergence-rig",
             "vergence-matching",
@@ -152,6 +157,7 @@ pub const ALLOWED: &[(&str, &[&str])] = &[
         &[
             "vergence-protocol",
             "vergence-board",
+            "vergence-alignment",
             "vergence-vision",
             "vergence-rig",
             "vergence-targets",

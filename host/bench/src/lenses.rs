@@ -5,7 +5,8 @@ use std::hint::black_box;
 use serde_json::{Value, json};
 use vergence_vision::{
     Angle, Asymmetry, BatchLens, CameraModel, Central, DoubleSphere, Eucm, Fisheye624, Formula, ImageSize,
-    KannalaBrandt, Mei, OCam, Pinhole, Pixel, Radtan, SightRegion, SplineGrid, SplinedStereographic, UnitRay, fit_lens,
+    KannalaBrandt, Mei, OCam, Pinhole, Pixel, Pupil, Radtan, SightRegion, SplineGrid, SplinedStereographic, UnitRay,
+    fit_lens,
 };
 
 use crate::error::BenchError;
@@ -77,8 +78,10 @@ pub(crate) fn lenses(repeats: u32, clock: Clock) -> Result<Vec<LensTimes>, Bench
 struct Array {
     name: &'static str,
     batch: BatchLens,
+    /// Rays of a central lens, and points at 0.2 to 3 m before another.
     rays: Vec<[f64; 3]>,
     pixels: Vec<[f64; 2]>,
+    is_central: bool,
 }
 
 impl Array {
@@ -94,17 +97,27 @@ impl Array {
             ray.and_then(|ray| lens.project(&ray).ok()).is_some_and(|pixel| lens.on_sensor(pixel))
         };
         let seen: Vec<_> = (0..RAYS).map(place).filter(on_sensor).collect();
-        let rays: Vec<_> = seen.iter().cycle().take(RAYS as usize).copied().collect();
+        let mut rays: Vec<_> = seen.iter().cycle().take(RAYS as usize).copied().collect();
         let pixels = batch.project(&rays);
-        Self { name, batch, rays, pixels }
+        let is_central = lens.is_central();
+        if !is_central {
+            let distance = |i: u32| 200.0 * 15f64.powf(f64::from(i % 97) / 96.0);
+            rays.iter_mut().zip(0..).for_each(|(ray, i)| *ray = ray.map(|component| component * distance(i)));
+        }
+        Self { name, batch, rays, pixels, is_central }
     }
 
     /// Seconds of projecting all, and of the way back.
     fn seconds(&self, clock: Clock) -> [f64; 2] {
-        let (mut pixels, mut rays) = (Vec::with_capacity(self.rays.len()), Vec::with_capacity(self.rays.len()));
-        let project = timed(clock, || self.batch.project_into(black_box(&self.rays), &mut pixels)).1;
-        let unproject = timed(clock, || self.batch.unproject_into(black_box(&self.pixels), &mut rays)).1;
-        black_box((pixels, rays));
+        let count = self.rays.len();
+        let (mut pixels, mut rays, mut from) =
+            (Vec::with_capacity(count), Vec::with_capacity(count), Vec::with_capacity(count));
+        let project = timed(clock, || self.batch.project_points_into(black_box(&self.rays), &mut pixels)).1;
+        let unproject = match self.is_central {
+            true => timed(clock, || self.batch.unproject_into(black_box(&self.pixels), &mut rays)).1,
+            false => timed(clock, || self.batch.unproject_with_shifts_into(black_box(&self.pixels), &mut from)).1,
+        };
+        black_box((pixels, rays, from));
         [project, unproject]
     }
 }
@@ -117,7 +130,14 @@ fn all() -> Result<Vec<(&'static str, KannalaBrandt)>, BenchError> {
     let own = KannalaBrandt::new(k, 1.01, centre, Angle::from_deg(98.0), SIZE).map_err(|error| refused(&error))?;
     let by = Asymmetry { tangential: [4e-4, -3e-4], prism: [5e-4, -1e-4, -4e-4, 2e-4] };
     let displaced = own.with_asymmetry(by).map_err(|error| refused(&error))?;
-    let mut all = vec![("polynomial", own), ("polynomial, displaced", displaced)];
+    let pupil = Pupil::from_mm([2.77, 0.056]);
+    let moving = |lens: KannalaBrandt| lens.with_pupil(pupil).map_err(|error| refused(&error));
+    let mut all = vec![
+        ("polynomial", own),
+        ("polynomial, moving pupil", moving(own)?),
+        ("polynomial, displaced", displaced),
+        ("polynomial, displaced, moving pupil", moving(displaced)?),
+    ];
     for (name, model) in models()? {
         let size = if name == "OCamCalib" { SMALL } else { SIZE };
         let fit = fit_lens(model.as_ref(), SightRegion { size, outline: &[] }).map_err(|error| refused(&error))?;

@@ -3,7 +3,7 @@
 //! Views made with a pose wrong by some degrees still look alike, so candidates that were compared in a very wide
 //! epipolar band are still mostly right. Where many more of them agree on another pose than on the stated one, the pair
 //! is matched again with that pose. Matches are pixels and remain valid for any pose; the stated pose itself is not
-//! changed, and [`vergence_vision::pose_drift`] computes from the matches how far it is off.
+//! changed, and `vergence_alignment::pose_drift` computes from the matches how far it is off.
 
 use vergence_vision::{Angle, Left, Right, Transform};
 

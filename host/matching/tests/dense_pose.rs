@@ -16,8 +16,9 @@ use std::sync::LazyLock;
 
 use nalgebra::{Matrix6, UnitQuaternion, Vector3};
 use rendered::{HERBIVORE, HUMAN, Place, Rendered};
+use vergence_alignment::pose_drift;
 use vergence_matching::{DenseDepth, DenseSample, DenseViews, ImagePair, SharedFrame};
-use vergence_vision::{Left, Point, Right, SharedCovariance, StereoPair, Transform, UnitRay, pose_drift};
+use vergence_vision::{Left, Point, Right, SharedCovariance, StereoPair, Transform, UnitRay};
 
 /// Largest error of a parallax, in pixels at the lens's axis, of a pixel whose partner is found.
 const FOUND_PX: f64 = 1.0;

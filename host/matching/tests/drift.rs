@@ -5,8 +5,9 @@ mod common;
 
 use common::Pair;
 use nalgebra::{Matrix6, UnitQuaternion, Vector3, Vector6};
+use vergence_alignment::{PoseDrift, pose_drift};
 use vergence_matching::{GuidedMatcher, ImagePair, Match, Matcher};
-use vergence_vision::{Angle, Left, PoseDrift, Right, StereoPair, Transform, pose_drift};
+use vergence_vision::{Angle, Left, Right, StereoPair, Transform};
 
 /// The pose drift with the pose turned by `off` and a stated sigma of 0.02° and 0.1 mm, and the number of matches.
 fn drift(pair: &Pair, off: Vector3<f64>) -> (PoseDrift, usize) {

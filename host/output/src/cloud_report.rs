@@ -3,9 +3,9 @@
 use std::path::Path;
 
 use serde_json::{Map, Value, json};
+use vergence_alignment::{FusedPose, LensGrowth, PoseDrift};
 use vergence_pipeline::{AxisByImages, DenseRanges, Dropped, PairCloud};
 use vergence_rig::{Rig, RigPose, rounded};
-use vergence_vision::{FusedPose, PoseDrift};
 
 /// Where a pose comes from.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -42,9 +42,16 @@ impl PoseSource {
     }
 }
 
-/// A sentence where the images disagree with the pose by more than its stated uncertainty.
+/// A sentence where the images disagree with the lenses or with the pose by more than their stated uncertainty.
 #[must_use]
 pub fn drift_warning(cloud: &PairCloud, source: PoseSource) -> Option<String> {
+    if let Some(LensGrowth { growth, .. }) = cloud.significant_growth() {
+        let (percent, how) = (1e2 * growth.abs(), if *growth > 0.0 { "longer" } else { "shorter" });
+        return Some(format!(
+            "the lenses look {percent:.2} % {how} than calibrated: temperature, focus, or a calibration that does not fit them; nothing was \
+             corrected; calibrate them again as they are now"
+        ));
+    }
     let PoseDrift { angle, .. } = cloud.significant_drift()?;
     Some(format!("{} and the images disagree by {angle:.2}: nothing was corrected; {}", source.name(), source.remedy()))
 }
@@ -194,6 +201,17 @@ pub(crate) fn drift_json(drift: Option<&PoseDrift>) -> Option<Value> {
     })
 }
 
+/// How much longer than calibrated the images say that the lenses are.
+fn growth_json(growth: Option<&LensGrowth>) -> Option<Value> {
+    growth.map(|growth| {
+        json!({
+            "percent": rounded(1e2 * growth.growth),
+            "sigma_percent": rounded(1e2 * growth.sigma),
+            "significant": growth.is_significant(),
+        })
+    })
+}
+
 /// What is counted of a cloud that was written to `out`, the `pose` by which it was made, and its drift.
 #[must_use]
 pub fn cloud_json(cloud: &PairCloud, pose: &RigPose, out: &Path) -> Value {
@@ -205,6 +223,7 @@ pub fn cloud_json(cloud: &PairCloud, pose: &RigPose, out: &Path) -> Value {
         "dropped": dropped_json(&cloud.dropped),
         "pose": pose_source_json(pose, cloud.fused_pose.as_ref()),
         "pose_drift": drift_json(cloud.pose_drift.as_ref()),
+        "lens_growth": growth_json(cloud.lens_growth.as_ref()),
         "calibration_uncertainty": calibration_json(!cloud.lacks_calibration),
         "out": out,
     })
@@ -260,5 +279,15 @@ mod tests {
         }
         let slight = PairCloud { pose_drift: Some(PoseDrift { chi_squared: 1.0, ..drift }), ..PairCloud::default() };
         assert_eq!(drift_warning(&slight, PoseSource::Encoders), None);
+    }
+
+    #[test]
+    fn lenses_that_grew_are_blamed_and_not_the_pose() {
+        let grown =
+            |growth| PairCloud { lens_growth: Some(LensGrowth { growth, sigma: 1e-4 }), ..PairCloud::default() };
+        let said = |growth| drift_warning(&grown(growth), PoseSource::Encoders);
+        assert!(said(1.2e-3).expect("a warning").starts_with("the lenses look 0.12 % longer"));
+        assert!(said(-3e-3).expect("a warning").starts_with("the lenses look 0.30 % shorter"));
+        assert_eq!(said(4e-4), None);
     }
 }

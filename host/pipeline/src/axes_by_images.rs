@@ -8,9 +8,10 @@
 //! With c the way from the pose by the joints to the one found, whose covariances are P and C, and s the change of the pose with an
 //! axis, off by a standard deviations: a has the mean sᵀ P⁻¹ c and the variance 1 - sᵀ P⁻¹ (P - C) P⁻¹ s.
 
+use vergence_alignment::{FusedPose, MatchErrors, fuse_pose};
 use vergence_matching::{Match, MatchError, Matcher};
 use vergence_rig::{JointsAt, Rig};
-use vergence_vision::{Angle, FusedPose, MatchErrors, StereoPair, fuse_pose};
+use vergence_vision::{Angle, StereoPair};
 
 use crate::limits::matching_sigma;
 use crate::pair::PairImages;

@@ -3,11 +3,11 @@
 use std::collections::BTreeMap;
 
 use image::RgbImage;
+use vergence_alignment::{FusedPose, LensGrowth, PoseDrift, lens_growth, pose_drift};
 use vergence_matching::{Match, MatchError, Matcher, Matches, UnmatchedReason};
 use vergence_rig::{OpenLoop, Rig, RigPose, TrackGap, moving_cloud};
 use vergence_vision::{
-    Cloud, CloudPoint, DropReason, FusedPose, Kernel, Length, MatchSigma, PixelPair, PoseDrift, StereoPair,
-    cloud_of_each, pose_drift,
+    Cloud, CloudPoint, DropReason, Kernel, Length, MatchSigma, PixelPair, StereoPair, cloud_of_each,
 };
 
 use crate::limits::{cloud_gates, expected_drift, matching_sigma};
@@ -54,6 +54,8 @@ pub struct PairCloud {
     pub dropped: Dropped,
     /// The correction of the pose by the joints that the matches ask for, where there are enough of them. It is not applied.
     pub pose_drift: Option<PoseDrift>,
+    /// How much longer both lenses look than at their calibration, where there are enough matches. It is not applied.
+    pub lens_growth: Option<LensGrowth>,
     /// Whether nothing is known of the calibration: the covariances of the points then lack its part.
     pub lacks_calibration: bool,
     /// The pose by which the points were made, where joints and matches told it together; else the joints told it alone.
@@ -69,6 +71,12 @@ impl PairCloud {
     #[must_use]
     pub fn significant_drift(&self) -> Option<&PoseDrift> {
         self.pose_drift.as_ref().filter(|drift| drift.is_significant())
+    }
+
+    /// The growth of the lenses, where the matches show one that their stated uncertainty does not explain.
+    #[must_use]
+    pub fn significant_growth(&self) -> Option<&LensGrowth> {
+        self.lens_growth.as_ref().filter(|growth| growth.is_significant())
     }
 
     /// Number of points where a lens is extrapolated.
@@ -222,8 +230,15 @@ fn cloud_of(
         Some((motion, exposure)) => moving_cloud(pairs, rig, motion, exposure, &gates),
     };
     // While the pose turns by more than it is uncertain, one correction for all rows means nothing.
-    let drifted = || pose.is_steady().then(|| pose_drift(pairs, &by_joints, &expected_drift(middle))).flatten();
-    let (cloud, drift) = rayon::join(triangulated, drifted);
+    let drifted = || {
+        let drift = pose.is_steady().then(|| pose_drift(pairs, &by_joints, &expected_drift(middle))).flatten();
+        // Nothing is too long where nothing is known of how long it is.
+        let is_asked = |_: &PoseDrift| middle.is_calibration_known;
+        let growth =
+            drift.filter(is_asked).and_then(|drift| lens_growth(pairs, &by_joints, &drift.correction, &middle.shared));
+        (drift, growth)
+    };
+    let (cloud, (drift, growth)) = rayon::join(triangulated, drifted);
     let Cloud { points, dropped } = cloud?;
     let coloured = |point: CloudPoint| {
         let colour = colour_at(left, point.pixels.left);
@@ -235,6 +250,7 @@ fn cloud_of(
         matches: pairs.len(),
         dropped: Dropped { matches: dropped, ..Dropped::default() },
         pose_drift: drift,
+        lens_growth: growth,
         lacks_calibration: !middle.is_calibration_known,
         fused_pose: fused,
         told_by_pairs: standing.pairs(),

@@ -1,9 +1,10 @@
 //! From a pair of images and a pose to a range for every pixel.
 
 use image::RgbImage;
+use vergence_alignment::{PoseDrift, pose_drift};
 use vergence_matching::{DenseDepth, DenseViews, MatchError};
 use vergence_rig::{Rig, RigPose};
-use vergence_vision::{PoseDrift, StereoPair, pose_drift};
+use vergence_vision::StereoPair;
 
 use crate::limits::expected_drift;
 use crate::pair::PairImages;

@@ -1,10 +1,9 @@
 //! What a mode of the rig would offer, before it is entered: coverage, and how well walls and a target would be measured.
 
 use nalgebra::Vector3;
+use vergence_alignment::{MatchErrors, fuse_pose};
 use vergence_rig::{DepthField, Mode, ModeFigures, Rig, RigPose, TaskState};
-use vergence_vision::{
-    Angle, Base, Length, MatchErrors, Pixel, PixelPair, PlacedCamera, Point, StereoPair, Zones, ZonesError, fuse_pose,
-};
+use vergence_vision::{Angle, Base, Length, Pixel, PixelPair, PlacedCamera, Point, StereoPair, Zones, ZonesError};
 
 use crate::limits::PIXEL_SIGMA;
 use crate::pose_source::{joints_suffice, with_fused};

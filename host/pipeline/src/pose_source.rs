@@ -1,11 +1,10 @@
 //! Whether the pose of a pair comes from the joints alone, or from joints and images together.
 
 use nalgebra::Matrix6;
+use vergence_alignment::{FusedPose, MatchErrors, fuse_pose};
 use vergence_matching::{Match, MatchError, Matcher};
 use vergence_rig::{Rig, RigPose};
-use vergence_vision::{
-    Angle, FusedPose, Left, Length, MatchErrors, MatchSigma, PixelPair, Right, StereoPair, Transform, fuse_pose,
-};
+use vergence_vision::{Angle, Left, Length, MatchSigma, PixelPair, Right, StereoPair, Transform};
 
 use crate::limits::{JOINTS_SUFFICE, matching_sigma};
 use crate::pair::PairImages;

@@ -3,13 +3,14 @@
 //! Matches of earlier pairs stay true as long as the axes stand, also where the scene moves: a match tells of its epipolar plane alone.
 //! So the pose is found anew from the matches of the latest pairs together, with what was known of it before any image counted once.
 //! Pairs of the same view share their keypoints, and with them errors of registration and of the lens: they are not independent.
-//! [`vergence_vision::fuse_pose`] measures that: it takes the variance from sums over cells of the image, and what is alike in all pairs adds up within a
+//! [`vergence_alignment::fuse_pose`] measures that: it takes the variance from sums over cells of the image, and what is alike in all pairs adds up within a
 //! cell in full, so that it does not vanish by repetition.
 
 use std::collections::VecDeque;
 
+use vergence_alignment::FusedPose;
 use vergence_rig::{Rig, RigAxis, RigPose};
-use vergence_vision::{FusedPose, MatchSigma, PixelPair};
+use vergence_vision::{MatchSigma, PixelPair};
 
 use crate::limits::FLICKER_COUNTS;
 use crate::pose::PairPose;

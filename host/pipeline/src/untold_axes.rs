@@ -3,9 +3,10 @@
 //! The first pair is looked at around the last readings. Where it does not agree with them, somebody has moved the axes, and they are
 //! looked for in all of their ranges. What is found stands for readings as long as the images agree with it.
 
+use vergence_alignment::FusedPose;
 use vergence_matching::{MatchError, Matcher};
 use vergence_rig::{AxisPosition, JointsAt, Rig};
-use vergence_vision::{Angle, FusedPose};
+use vergence_vision::Angle;
 
 use crate::axes_by_images::{Look, axes_by_images, axis_estimates, best_look};
 use crate::cloud::{Method, PairCloudError, refined_cloud};

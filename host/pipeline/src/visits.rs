@@ -13,8 +13,9 @@
 //! linear function of its play, and nothing is kept.
 
 use nalgebra::{Matrix6, Vector3, Vector6};
+use vergence_alignment::{FusedPose, moved_pose};
 use vergence_rig::{AxisPosition, Rig, RigAxis, RigPose};
-use vergence_vision::{Angle, FusedPose, moved_pose};
+use vergence_vision::Angle;
 
 use crate::pose_source::told_otherwise;
 

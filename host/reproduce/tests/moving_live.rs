@@ -19,6 +19,7 @@ use std::time::Duration;
 use common::count;
 use nalgebra::{Matrix6, SymmetricEigen, Vector3, Vector6};
 use tokio::sync::mpsc;
+use vergence_alignment::FusedPose;
 use vergence_board::{Board, Shared};
 use vergence_live::{Limits, LiveError, LiveLoop, LiveResult, MatchingTime, Measurement, Totals, drive};
 use vergence_matching::TrackingMatcher;
@@ -28,7 +29,7 @@ use vergence_reproduce::LensedRig;
 use vergence_rig::{AxisPosition, BENCH_TOML, Rig, RigCalibration, RigPose, Shutter};
 use vergence_scene::{Lens, LensChoice, TrueLens};
 use vergence_sim::{LiveCamera, Random, Room, RoomCamera, SimulatedRig};
-use vergence_vision::{Angle, FusedPose, Length, LensField, Pixel, Side};
+use vergence_vision::{Angle, Length, LensField, Pixel, Side};
 
 const WIDTH: u32 = 480;
 /// From the first to the last row 19.2 ms, as long as 1280 rows of the real camera take.

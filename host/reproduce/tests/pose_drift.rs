@@ -6,9 +6,9 @@ mod common;
 
 use common::{Gaussian, around, left_from_middle, left_from_right, lens, see};
 use nalgebra::{Matrix6, UnitQuaternion, Vector3, Vector6};
+use vergence_alignment::pose_drift;
 use vergence_vision::{
-    KannalaBrandt, LENS_PARAMETERS, Left, Pixel, PixelPair, Point, Right, StereoPair, Transform, UnitRay, pose_drift,
-    ray_to_plane,
+    KannalaBrandt, LENS_PARAMETERS, Left, Pixel, PixelPair, Point, Right, StereoPair, Transform, UnitRay, ray_to_plane,
 };
 
 const PIXEL_SIGMA: f64 = 0.2;

@@ -5,9 +5,10 @@ mod common;
 
 use common::{Gaussian, around, left_from_middle, left_from_right, lens, see};
 use nalgebra::{Matrix3, Matrix6, SMatrix, UnitQuaternion, Vector3, Vector6};
+use vergence_alignment::{FusedPose, MatchErrors, fuse_pose};
 use vergence_vision::{
-    FusedPose, KannalaBrandt, Left, MatchErrors, Pixel, PixelPair, Point, PointUncertainty, Right, SharedCovariance,
-    StereoPair, Transform, fuse_pose, pseudo_intersection,
+    KannalaBrandt, Left, Pixel, PixelPair, Point, PointUncertainty, Right, SharedCovariance, StereoPair, Transform,
+    pseudo_intersection,
 };
 
 const PIXEL_SIGMA: f64 = 0.2;

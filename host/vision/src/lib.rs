@@ -11,7 +11,6 @@
 //! - [`pseudo_intersection`] makes a point of two rays, and [`covariance()`] gives its uncertainty;
 //! - [`PointUncertainty`] adds the uncertainty that all points of a pair share, from lenses and pose;
 //! - [`cloud()`] does all of this for many matches and counts the dropped ones by reason;
-//! - [`pose_drift`] tests the stated pose against the matches, and [`fuse_pose`] takes it from both;
 //! - [`BatchLens`], [`triangulate_batch`] and [`BatchPair`] do the same arithmetic for whole arrays.
 //!
 //! [`zones_exact`] and [`circle_zones`] compute how much of the surroundings both cameras, one, or none see.
@@ -40,11 +39,7 @@ mod lens_field;
 mod lens_step;
 mod match_sigma;
 mod median;
-mod pose_drift;
-mod pose_equation;
-mod pose_fusion;
 mod pupil;
-mod residual_spread;
 mod stand_in;
 mod stereo_pair;
 mod triangulation;
@@ -75,9 +70,6 @@ pub use lens_derivatives::{CENTRAL_PARAMETERS, LENS_PARAMETER_NAMES, LENS_PARAME
 pub use lens_field::{LensField, UnknownField};
 pub use match_sigma::MatchSigma;
 pub use median::median;
-pub use pose_drift::{PoseDrift, pose_drift};
-pub use pose_equation::moved as moved_pose;
-pub use pose_fusion::{FusedPose, MatchErrors, fuse_pose};
 pub use pupil::{Pupil, pupil_shift, pupil_shift_slope};
 pub use stereo_pair::{PixelPair, StereoPair};
 pub use triangulation::{

@@ -31,7 +31,7 @@
 //! the rays meet; where a match slipped by h along the edge, an edge direction wrong by an angle ε moves it by about h
 //! ε.
 
-use nalgebra::{Matrix3, Matrix6, RowSVector, SMatrix, Vector3, Vector6};
+use nalgebra::{Matrix3, Matrix6, RowSVector, SMatrix, Vector3};
 
 use crate::lens_derivatives::{LENS_PARAMETERS, PUPIL};
 use crate::{Angle, Kernel, Left, MatchSigma, Point, Right, StereoPair, UnitRay};
@@ -278,11 +278,6 @@ impl ResidualUncertainty {
     pub fn sigma(&self, shared: &SharedCovariance) -> Angle {
         let from_shared = shared.between(&self.by_shared, &self.by_shared).x.max(0.0);
         Angle::from_rad((self.from_pixels + from_shared).sqrt())
-    }
-
-    /// The derivative of the angle by the pose alone: ω in radians, δ in millimetres.
-    pub(crate) fn by_pose(&self) -> Vector6<f64> {
-        self.by_shared.fixed_columns::<6>(2 * LENS_PARAMETERS).transpose()
     }
 }
 

@@ -5,10 +5,10 @@
 use nalgebra::{SVector, UnitQuaternion, Vector3};
 use proptest::prelude::*;
 use vergence_vision::{
-    Angle, Asymmetry, BatchPair, BatchPoints, Camera, Gates, ImageSize, KannalaBrandt, Kernel, LENS_PARAMETERS, Left,
-    Length, OpenCvFisheye, Pixel, PixelPair, Point, PointUncertainty, Pupil, ResidualUncertainty, Right,
-    SHARED_PARAMETERS, SharedCovariance, StereoPair, Transform, UnitRay, cloud_point, pupil_shift, pupil_shift_slope,
-    ray_to_plane,
+    Angle, Asymmetry, BatchLens, BatchPair, BatchPoints, Camera, Gates, ImageSize, Instructions, KannalaBrandt, Kernel,
+    LENS_PARAMETERS, Left, Length, OpenCvFisheye, Pixel, PixelPair, Point, PointUncertainty, Pupil,
+    ResidualUncertainty, Right, SHARED_PARAMETERS, SharedCovariance, StereoPair, Transform, UnitRay, cloud_point,
+    pupil_shift, pupil_shift_slope, ray_to_plane,
 };
 
 const SIZE: ImageSize = ImageSize { width: 2048, height: 2048 };
@@ -259,4 +259,43 @@ fn batches_take_the_pupil() {
     assert!((Vector3::from(points[0]) - point.mm()).norm() < 1e-6 && points[1][0].is_nan());
     let single = PointUncertainty::of(&point, &pair.stereo(), 0.1).unwrap().covariance(&shared);
     assert!((covariances[0][5] / single.m33 - 1.0).abs() < 1e-6 && covariances[1][5].is_nan());
+}
+
+/// Whole arrays of points at finite distances, and of pixels with the places where their rays begin, by every instructions.
+#[test]
+fn arrays_of_points_and_pixels_take_the_pupil() {
+    for lens in [lens(2.77), lens(-1.0), displaced(lens(2.77)), displaced(lens(0.5)), lens(0.0)] {
+        for instructions in [Instructions::Best, Instructions::Baseline] {
+            let batch = BatchLens::new(&lens).with_instructions(instructions);
+            let (mut points, mut pixels) = (Vec::new(), Vec::new());
+            for i in 0..4000u32 {
+                // From a centimetre to a kilometre, some points so near that no ray reaches them, some beyond the field.
+                let (theta, log) = (1.9 * f64::from(i) / 4000.0, f64::from(i % 101) * 0.05 + 1.0);
+                points.push((direction(theta, 2.4 * f64::from(i)) * 10f64.powf(log)).into());
+                let (u, v) = (f64::from(i % 63) * 33.0 - 10.0, f64::from(i / 63) * 33.0 - 10.0);
+                pixels.push([u, v]);
+            }
+            points.extend([[0.0, 0.0, 500.0], [0.0; 3], [f64::NAN, 1.0, 1.0], [1e120, 0.0, 1e120], [0.0, 0.0, -500.0]]);
+            let mut seen = 0;
+            for (point, [u, v]) in points.iter().zip(batch.project_points(&points)) {
+                match lens.project_point(&Point::<Camera>::from_mm((*point).into())) {
+                    Ok(one) => {
+                        seen += 1;
+                        assert!((one.u - u).hypot(one.v - v) < 6e-7, "{point:?}: {one:?} and {u}, {v}");
+                    }
+                    Err(_) => assert!(u.is_nan(), "{point:?}: {u}, {v}"),
+                }
+            }
+            assert!(seen > 3500, "{seen}");
+            for (&[u, v], [x, y, z, e]) in pixels.iter().zip(batch.unproject_with_shifts(&pixels)) {
+                match lens.unproject::<Camera>(Pixel { u, v }) {
+                    Ok(one) => {
+                        let off = (one.vector() - Vector3::new(x, y, z)).norm();
+                        assert!(off < 2e-14 && (lens.origin_of(&one).mm().z - e).abs() < 1e-9, "{u}, {v}: {off} {e}");
+                    }
+                    Err(_) => assert!(x.is_nan() && e.is_nan(), "{u}, {v}: {x} {e}"),
+                }
+            }
+        }
+    }
 }

@@ -3,11 +3,11 @@
 use std::collections::BTreeMap;
 
 use nalgebra::{Matrix6, UnitQuaternion, Vector3, Vector6};
+use vergence_alignment::{PoseDrift, pose_drift};
 use vergence_matching::learned::{GreyImage, LearnedMatcher};
 use vergence_matching::{GuidedMatcher, ImagePair, Match, MatchError, Matcher, Matches};
 use vergence_vision::{
-    Angle, Gates, Left, Length, Pixel, PoseDrift, Right, SharedCovariance, StereoPair, Transform, cloud_of_each,
-    pose_drift,
+    Angle, Gates, Left, Length, Pixel, Right, SharedCovariance, StereoPair, Transform, cloud_of_each,
 };
 
 use crate::error::BenchError;

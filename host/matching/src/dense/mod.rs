@@ -129,7 +129,7 @@ impl<'a> DenseViews<'a> {
     }
 
     /// The matches by which [`Self::aligned`] found the rows, each with its standard deviation in pixels. They do not
-    /// depend on the stated pose, and tell how far it is off ([`vergence_vision::pose_drift`]).
+    /// depend on the stated pose, and tell how far it is off (`vergence_alignment::pose_drift`).
     #[must_use]
     pub fn row_matches(&self) -> &[(PixelPair, f64)] {
         &self.row_matches

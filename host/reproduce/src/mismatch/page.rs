@@ -110,8 +110,8 @@ fn said(findings: &MismatchTable) -> String {
     ];
     table(&heads, &findings.notes.iter().map(row).collect::<Vec<_>>())
         + &note(&format!(
-            "Corners are off by {NOISE_PX} px: a model that does not fit makes them seem worse. The warning is that images and encoders \
-             disagree."
+            "Corners are off by {NOISE_PX} px: a model that does not fit makes them seem worse. The warning is that images disagree \
+             with lenses or encoders, of a cloud of matches all over the field that both cameras share."
         ))
 }
 

@@ -45,7 +45,7 @@ pub struct RowNote {
     pub model: LensModel,
     /// Standard deviation of corners as calibrations find it, in pixels.
     pub corner_px: f64,
-    /// In how many clouds of how many they warned that images and encoders disagree.
+    /// In how many clouds of how many they warned that images disagree with lenses or encoders.
     pub warned: [usize; 2],
     /// Matches that made no point, of how many.
     pub refused: [usize; 2],
@@ -62,7 +62,7 @@ pub enum Verdict {
     NotCaught {
         /// The places.
         at: Vec<Cell>,
-        /// In how many clouds of how many the rig warned that images and encoders disagree.
+        /// In how many clouds of how many the rig warned that images disagree with lenses or encoders.
         warned: [usize; 2],
     },
 }
@@ -224,7 +224,7 @@ impl Verdict {
                 let places: Vec<_> = (0..MODES.len()).filter_map(of_mode).collect();
                 let warning = match warned {
                     0 => "no cloud comes with a warning".into(),
-                    _ => format!("{warned} of {clouds} clouds warn that images and encoders disagree"),
+                    _ => format!("{warned} of {clouds} clouds warn that the images disagree with lenses or encoders"),
                 };
                 format!("NOT caught {}: the stated covariance is too small; {warning}.", places.join("; "))
             }

@@ -28,6 +28,8 @@ use crate::target_shot::Corners;
 pub const POINTS: usize = 30;
 /// They lie within so much of straight ahead, in parts of their depth, to the side and up or down.
 const ASIDE: f64 = 0.35;
+/// Matches all over the shared field, in the cloud that tells of warnings.
+const MATCHES: usize = 400;
 /// Places tried for each point until both cameras see it.
 const TRIES: usize = 100;
 
@@ -57,7 +59,7 @@ pub struct Trial {
     pub sightings: Vec<Sighting>,
     /// Points that both cameras saw, for each mode.
     pub seen: [usize; MODES.len()],
-    /// Whether the cloud of each mode came with a warning that images and encoders disagree.
+    /// Whether a cloud in each mode of matches all over the shared field came with a warning that images disagree with the lenses or the encoders.
     pub warned: [bool; MODES.len()],
     /// Standard deviation of a corner as the calibration finds it, in pixels.
     pub corner_px: f64,
@@ -77,7 +79,8 @@ impl Trial {
     /// Where the bench cannot be built or calibrated, or the design cannot be traced.
     pub fn of(mismatch: Mismatch, lens: BuiltIn, model: LensModel, seed: u64) -> Result<Self, ReproduceError> {
         let world = World::new(mismatch, lens, seed)?;
-        let [mut random, mut returns, mut matches] = [seed, !seed, seed ^ 0x706f_696e_7473].map(Random::new);
+        let [mut random, mut returns, mut matches, mut all_over] =
+            [seed, !seed, seed ^ 0x706f_696e_7473, seed ^ 0x616c_6c6f].map(Random::new);
         let drive = Drive { calibration: world.calibration_stops(&mut random), modes: Vec::new() };
         // The lenses are the world's own, of whatever kind conditions name.
         let conditions = Conditions { bow: world.bow, ..Conditions::noise(Corners::Projected, NOISE_PX) };
@@ -97,7 +100,8 @@ impl Trial {
             let shown = world.shown(&standing, &mut matches);
             let cloud = world.measured(&standing, &shown, &calibrated.rig)?;
             trial.seen[mode] = shown.len();
-            trial.warned[mode] = drift_warning(&cloud, PoseSource::Encoders).is_some();
+            let wide = world.measured(&standing, &world.all_over(&standing, &mut all_over), &calibrated.rig)?;
+            trial.warned[mode] = drift_warning(&wide, PoseSource::Encoders).is_some();
             let turn = world.turn_of(&calibrated.rig.left_camera);
             let forward = Axes::of(&world.pose(&standing, 0.0).left_from_right).forward;
             trial.sightings.extend(sightings(mode, &shown, &cloud, &(turn, turn * forward)));
@@ -133,6 +137,21 @@ impl World {
             }
         }
         shown
+    }
+
+    /// Points all over the field that both cameras share, at any distance between the nearest and the farthest range, matched with noise.
+    fn all_over(&self, standing: &Standing, random: &mut Random) -> Vec<Shown> {
+        let [nearest, .., farthest] = RANGES_MM;
+        let one = |random: &mut Random| {
+            let towards = Vector3::new(random.normal(), random.normal(), random.normal()).normalize();
+            let truth = Point::<Left>::from_mm(towards * nearest * (farthest / nearest).powf(random.between(0.0, 1.0)));
+            let [left, right] = [Side::Left, Side::Right].map(|side| self.image_of(standing, side, &truth));
+            let mut noisy =
+                |at: Pixel| Pixel { u: at.u + NOISE_PX * random.normal(), v: at.v + NOISE_PX * random.normal() };
+            let pixels = PixelPair { left: noisy(left?), right: noisy(right?) };
+            Some(Shown { range: 0, truth, pixels })
+        };
+        (0..TRIES * MATCHES).filter_map(|_| one(random)).take(MATCHES).collect()
     }
 
     /// Where a camera shows a point of the left frame at the middle row of the left image, at the exposure of the row on which it shows it;

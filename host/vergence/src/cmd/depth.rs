@@ -21,7 +21,7 @@ use vergence_output::{
 use vergence_pipeline::limits::PIXEL_SIGMA;
 use vergence_pipeline::{Method, PairCloud, PairImages, PairPose, cloud_of_pairs, pair_cloud};
 use vergence_rig::{JointsAt, Rig, RigPose, closure_in_words, closure_json};
-use vergence_vision::{FusedPose, Kernel, Pixel, PixelPair, Side};
+use vergence_vision::{Kernel, Pixel, PixelPair, Side};
 
 use self::dense::one_dense_pair;
 use self::motion::StageSpeed;
@@ -218,7 +218,7 @@ struct Setting<'a> {
 struct Measured {
     result: Value,
     /// The pose that joints and images told together.
-    fused: Option<FusedPose>,
+    fused: Option<vergence_alignment::FusedPose>,
     /// Whether nothing in it has a range.
     is_empty: bool,
 }

@@ -10,19 +10,31 @@ use std::f64::consts::PI;
 /// The polynomial is the Chebyshev series from four nodes per term, written in powers of t. This conversion keeps all
 /// significant digits while the series falls by more than (1 + √2) per term. Callers check the error themselves.
 pub(super) fn fit(terms: usize, function: impl Fn(f64) -> f64) -> Vec<f64> {
+    let values: Vec<f64> = nodes(terms).map(function).collect();
+    powers(&series(terms, &values))
+}
+
+fn angles(terms: usize) -> impl Iterator<Item = f64> {
     let count = 4 * terms;
-    let angles: Vec<f64> = (0..count).map(|i| PI * (i as f64 + 0.5) / count as f64).collect();
-    let values: Vec<f64> = angles.iter().map(|angle| function(angle.cos())).collect();
+    (0..count).map(move |i| PI * (i as f64 + 0.5) / count as f64)
+}
+
+/// The nodes of a polynomial of `terms` terms.
+pub(super) fn nodes(terms: usize) -> impl Iterator<Item = f64> {
+    angles(terms).map(f64::cos)
+}
+
+/// The coefficients of Chebyshev polynomials by the values at the nodes.
+pub(super) fn series(terms: usize, values: &[f64]) -> Vec<f64> {
     let coefficient = |n: usize| {
-        let sum: f64 = angles.iter().zip(&values).map(|(angle, value)| value * (n as f64 * angle).cos()).sum();
-        sum * if n == 0 { 1.0 } else { 2.0 } / count as f64
+        let sum: f64 = angles(terms).zip(values).map(|(angle, value)| value * (n as f64 * angle).cos()).sum();
+        sum * if n == 0 { 1.0 } else { 2.0 } / values.len() as f64
     };
-    let series: Vec<f64> = (0..terms).map(coefficient).collect();
-    powers(&series)
+    (0..terms).map(coefficient).collect()
 }
 
 /// Converts Σ cₙ Tₙ(t) to powers of t by Clenshaw's recurrence on coefficients: b ← c + 2 t b' - b''.
-fn powers(series: &[f64]) -> Vec<f64> {
+pub(super) fn powers(series: &[f64]) -> Vec<f64> {
     let terms = series.len();
     let (mut next, mut after) = (vec![0.0; terms + 1], vec![0.0; terms + 1]);
     for (n, c) in series.iter().enumerate().rev() {

@@ -81,7 +81,7 @@ impl Foreign {
 }
 
 /// Appends what `all` appends for some rows at a time, so that they stay in the cache, with what `one` says of those where that asks.
-fn by_chunks<const IN: usize, const OUT: usize>(
+pub(super) fn by_chunks<const IN: usize, const OUT: usize>(
     rows: &[[f64; IN]],
     found: &mut Vec<[f64; OUT]>,
     one: impl Fn(&[f64; IN]) -> [f64; OUT],

@@ -19,6 +19,7 @@ mod pair;
 mod pairs;
 mod plane;
 mod project;
+mod pupil;
 mod radial;
 mod shared_errors;
 mod slope;

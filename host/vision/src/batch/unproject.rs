@@ -54,7 +54,7 @@ impl Unproject {
 
     fn of_terms(lens: &impl Radial, terms: usize, fold: Option<Fold>) -> Self {
         let largest = lens.largest_radius();
-        let radius = |t: f64| largest * (0.5 * (fold.map_or(t, |fold| fold.t(t)) + 1.0)).max(0.0).sqrt();
+        let radius = |t: f64| radius(largest, fold, t);
         let sine_over_radius = fit(terms, |t| {
             let r = radius(t);
             if r > 0.0 { lens.angle(r).sin() / r } else { 1.0 / lens.on_axis() }
@@ -70,6 +70,11 @@ impl Unproject {
             largest_squared: largest * largest,
             fold,
         }
+    }
+
+    /// The radius at which the variable of the polynomials is `t`.
+    pub(super) fn radius(&self, t: f64) -> f64 {
+        radius(self.largest_squared.sqrt(), self.fold, t)
     }
 
     /// The largest error of a component of the ray, on a grid of radii.
@@ -88,9 +93,22 @@ impl Unproject {
     }
 }
 
+/// The radius in pixels at which the variable of polynomials up to the radius `largest` is `t`.
+fn radius(largest: f64, fold: Option<Fold>, t: f64) -> f64 {
+    largest * (0.5 * (fold.map_or(t, |fold| fold.t(t)) + 1.0)).max(0.0).sqrt()
+}
+
 impl Kernel<2, 3> for Unproject {
     #[inline(always)]
-    fn lanes<const FUSED: bool, const W: usize>(&self, [u, v]: [[f64; W]; 2]) -> [[f64; W]; 3] {
+    fn lanes<const FUSED: bool, const W: usize>(&self, pixels: [[f64; W]; 2]) -> [[f64; W]; 3] {
+        self.rays::<FUSED, W>(pixels).0
+    }
+}
+
+impl Unproject {
+    /// The rays, and the variable of the polynomials.
+    #[inline(always)]
+    pub(super) fn rays<const FUSED: bool, const W: usize>(&self, [u, v]: [[f64; W]; 2]) -> ([[f64; W]; 3], [f64; W]) {
         let (mut x, mut y, mut t) = ([0.0; W], [0.0; W], [0.0; W]);
         for j in 0..W {
             x[j] = u[j] - self.centre[0];
@@ -110,7 +128,7 @@ impl Kernel<2, 3> for Unproject {
             x[j] *= sine_over_radius[j];
             y[j] *= sine_over_radius[j];
         }
-        [x, y, cosine]
+        ([x, y, cosine], t)
     }
 }
 

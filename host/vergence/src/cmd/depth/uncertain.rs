@@ -2,11 +2,12 @@
 
 use std::str::FromStr;
 
+use vergence_alignment::FusedPose;
 use vergence_camera::CameraImage;
 use vergence_matching::Matcher;
 use vergence_pipeline::{AxisByImages, PairImages, Search, axes_by_images, axes_told};
 use vergence_rig::{AxisPosition, JointsAt, Rig};
-use vergence_vision::{FusedPose, Length};
+use vergence_vision::Length;
 
 use crate::failure::Failure;
 

@@ -13,7 +13,7 @@
 use nalgebra::{Matrix6, Vector6};
 
 use crate::pose_equation::{Equation, SCALE_SIGMAS, difference, moved};
-use crate::{Angle, MatchSigma, PixelPair, StereoPair};
+use vergence_vision::{Angle, MatchSigma, PixelPair, StereoPair};
 
 /// Smallest number of usable matches.
 const LEAST_PAIRS: usize = 20;
@@ -54,7 +54,7 @@ impl PoseDrift {
 
 /// Compares the pose of `pair` with matches, each given with its standard deviations in pixels (one number, or [`MatchSigma`]); some may be wrong.
 ///
-/// `pose` is the stated covariance of the pose, in the coordinates of [`crate::SharedCovariance`]. Returns `None` with
+/// `pose` is the stated covariance of the pose, in the coordinates of [`vergence_vision::SharedCovariance`]. Returns `None` with
 /// fewer than 20 usable matches.
 #[must_use]
 pub fn pose_drift<S: Copy + Into<MatchSigma>>(

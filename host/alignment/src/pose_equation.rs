@@ -1,12 +1,14 @@
 //! What one match says of the relative pose, to first order.
 
-use nalgebra::{UnitQuaternion, Vector3, Vector6};
+use nalgebra::{SVector, UnitQuaternion, Vector3, Vector6};
 
-use crate::epipolar::ray_to_plane;
 use crate::residual_spread::Place;
-use crate::uncertainty::ResidualUncertainty;
-use crate::{Left, MatchSigma, PixelPair, Right, StereoPair, Transform};
+use vergence_vision::{
+    LENS_PARAMETERS, Left, MatchSigma, PixelPair, ResidualUncertainty, Right, StereoPair, Transform, ray_to_plane,
+};
 
+/// Parameters of both lenses.
+pub const LENSES: usize = 2 * LENS_PARAMETERS;
 /// Residuals beyond this many standard deviations count as wrong matches.
 pub const SCALE_SIGMAS: f64 = 2.5;
 
@@ -34,6 +36,15 @@ pub struct Equation {
 
 impl Equation {
     pub fn of(pixels: &PixelPair, sigma: MatchSigma, pair: &StereoPair<'_>) -> Option<Self> {
+        Self::with_lenses(pixels, sigma, pair).map(|(equation, _)| equation)
+    }
+
+    /// The same, and the slope by the parameters of both lenses.
+    pub fn with_lenses(
+        pixels: &PixelPair,
+        sigma: MatchSigma,
+        pair: &StereoPair<'_>,
+    ) -> Option<(Self, SVector<f64, LENSES>)> {
         let left = pair.left.unproject::<Left>(pixels.left).ok()?;
         let right = pair.right.unproject::<Right>(pixels.right).ok()?;
         let (StereoPair { left_from_right, .. }, _) = pair.at_origins(&left, &right);
@@ -41,7 +52,13 @@ impl Equation {
         let uncertainty = ResidualUncertainty::of(&left, &right, pair, sigma)?;
         let sigma = uncertainty.from_pixels.sqrt();
         let place = Place::of(pixels.left, pair.left.size().width);
-        (sigma > 0.0).then(|| Self { offset: offset.rad(), slope: uncertainty.by_pose(), sigma, place })
+        let equation = Self {
+            offset: offset.rad(),
+            slope: uncertainty.by_shared.fixed_columns::<6>(LENSES).transpose(),
+            sigma,
+            place,
+        };
+        (sigma > 0.0).then(|| (equation, uncertainty.by_shared.fixed_columns::<LENSES>(0).transpose()))
     }
 
     pub fn residual(&self, correction: &Vector6<f64>) -> f64 {

@@ -13,8 +13,8 @@ use std::collections::BTreeMap;
 
 use nalgebra::{Matrix6, Vector6};
 
-use crate::Pixel;
 use crate::pose_equation::Equation;
+use vergence_vision::Pixel;
 
 /// Distances within which errors are correlated, across an image: 2 degrees of a lens with 196.
 const WINDOWS_ACROSS: f64 = 98.0;
@@ -47,6 +47,11 @@ impl Place {
     pub(crate) fn of(pixel: Pixel, width: u32) -> Self {
         let at = [pixel.u, pixel.v].map(|place| place * WINDOWS_ACROSS / f64::from(width));
         Self { at, square: cell_of(pixel, width, WINDOWS_ACROSS), cell: cell_of(pixel, width, CELLS_ACROSS) }
+    }
+
+    /// The square, as wide as errors are correlated, in which it lies.
+    pub(crate) const fn square(&self) -> [i32; 2] {
+        self.square
     }
 
     fn is_near(&self, other: &Self) -> bool {

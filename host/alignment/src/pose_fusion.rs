@@ -20,7 +20,7 @@ use nalgebra::{Matrix6, SymmetricEigen, Vector6};
 
 use crate::pose_equation::{Equation, SCALE_SIGMAS, difference, moved};
 use crate::residual_spread::{shared_covariance, variance_factor};
-use crate::{Angle, Left, MatchSigma, PixelPair, Right, StereoPair, Transform};
+use vergence_vision::{Angle, Left, MatchSigma, PixelPair, Right, StereoPair, Transform};
 
 /// Smallest number of matches that agree with the pose found.
 const LEAST_PAIRS: usize = 20;
@@ -37,7 +37,7 @@ const GROSS: f64 = 0.0524;
 pub struct FusedPose {
     /// The most probable pose of the right camera in the left frame.
     pub left_from_right: Transform<Left, Right>,
-    /// Its covariance, in the coordinates of the pose in [`crate::SharedCovariance`].
+    /// Its covariance, in the coordinates of the pose in [`vergence_vision::SharedCovariance`].
     pub covariance: Matrix6<f64>,
     /// The way from the pose by the joints: a turn in radians, then a shift in millimetres.
     pub correction: Vector6<f64>,
