@@ -6,6 +6,7 @@ pub mod built_bench;
 pub mod cameras;
 pub mod corner_files;
 pub mod data;
+pub mod dense_files;
 pub mod images;
 pub mod pairs;
 pub mod python;

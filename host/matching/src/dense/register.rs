@@ -9,7 +9,7 @@ use multiversion::multiversion;
 use multiversion::target::target_cfg_f;
 use rayon::prelude::*;
 
-use super::surface::SAME_SURFACE;
+use super::surface::SAME_PLANE;
 use super::window::{BAND, LANES, Lanes, Padded, multiply_add};
 use crate::plane::{Plane, cubic_weights};
 
@@ -175,7 +175,7 @@ fn gather<const FUSED: bool>(sums: &mut [Lanes; 10], centre: &[Lanes; 4], near: 
         let (l, r, g) = (near[0][k] - centre[0][k], near[1][k] - centre[1][k], near[2][k]);
         let off = near[3][k] - centre[3][k];
         // Comparisons with NaN fail: where there is a disparity, the others are known too.
-        let (one, l, r, g) = if off.abs() <= SAME_SURFACE { (1.0, l, r, g) } else { (0.0, 0.0, 0.0, 0.0) };
+        let (one, l, r, g) = if off.abs() <= SAME_PLANE { (1.0, l, r, g) } else { (0.0, 0.0, 0.0, 0.0) };
         n[k] += one;
         l1[k] += l;
         r1[k] += r;

@@ -8,6 +8,9 @@ use super::window::{BAND, LANES, Lanes, Padded, multiply_add};
 
 /// Largest difference in disparity, in pixels, of neighbours on one surface.
 pub(super) const SAME_SURFACE: f32 = 1.5;
+/// The same of the pixels of a window that is smoothed or registered as one plane. A window that holds both sides of a small step makes a mixture of
+/// them; one that is much smaller than this cuts slanted surfaces.
+pub(super) const SAME_PLANE: f32 = 1.0;
 /// Smallest number of neighbours for a plane.
 const LEAST: f32 = 8.0;
 /// Smallest relative spread of neighbours across their main direction; nearly collinear ones determine no plane.
@@ -83,7 +86,7 @@ fn gather<const FUSED: bool>(sums: &mut [Lanes; 6], centre: &Lanes, near: &Lanes
     let [n, i1, ii, d1, id, dd] = sums;
     for k in 0..LANES {
         let off = near[k] - centre[k];
-        let (one, d) = if off.abs() <= SAME_SURFACE { (1.0, off) } else { (0.0, 0.0) };
+        let (one, d) = if off.abs() <= SAME_PLANE { (1.0, off) } else { (0.0, 0.0) };
         n[k] += one;
         i1[k] = multiply_add::<FUSED>(one, i, i1[k]);
         ii[k] = multiply_add::<FUSED>(one, i * i, ii[k]);
