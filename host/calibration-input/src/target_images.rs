@@ -73,7 +73,7 @@ impl TargetImages {
     /// Looks again at `files`, the images that these targets are from. Images in which nothing is found now keep their view.
     ///
     /// # Errors
-    /// As [`detect_in`].
+    /// A file that cannot be opened, images of different sizes, or only damaged ones.
     pub fn again(self, files: &[PathBuf], sought: &Sought<'_>) -> Result<Self, InputError> {
         let now = look_at(files, self.searched, sought)?;
         let views = now.views.into_iter().zip(self.views).map(|(now, before)| now.or(before)).collect();
