@@ -60,7 +60,7 @@ fn people_see_and_drive_the_rig_in_a_browser() {
 #[test]
 fn people_see_in_a_browser_that_the_link_is_lost_and_back() {
     let Some(browser) = browser() else { return };
-    let mut served = Served::start(&[&small("127.0.0.1:0")[..], &["--unplug", "link@25s..33s"]].concat());
+    let mut served = Served::start(&[&small("127.0.0.1:0")[..], &["--unplug", "link@25s..40s"]].concat());
     watch("link.mjs", &browser, &served.url);
     let said = served.terminate();
     let end: serde_json::Value = serde_json::from_str(said.lines().last().expect("an end")).expect("JSON");

@@ -23,14 +23,14 @@ await browse(executablePath, async ({ open, holds, text, shot, passed, serious }
   await holds(page, (since) => Number(/link lost for (\d+) s/.exec(document.querySelector('#link-chip').textContent)?.[1]) >= since + 2, since);
   assert.ok(await sigma() > uncertain, 'it grows');
   passed(await text(page, '#link-chip'));
-  await shot(page, 'link-lost');
-  assert.deepEqual(await serious(page), []);
 
   // An order is refused, and nothing moves when the board is back.
   const before = await text(page, '#axes .now');
   await page.click('#modes button:has-text("herbivore")');
   await holds(page, () => /the order is refused/.test(document.querySelector('#log').textContent));
   passed('an order is refused');
+  await shot(page, 'link-lost');
+  assert.deepEqual(await serious(page), []);
   await holds(page, () => /link .* ms/.test(document.querySelector('#link-chip').textContent));
   passed(await text(page, '#link-chip'));
   await holds(page, () => !/link lost/.test(document.querySelector('#ladder-chip').textContent) && document.querySelector('#state').textContent === 'idle');
@@ -39,6 +39,11 @@ await browse(executablePath, async ({ open, holds, text, shot, passed, serious }
   passed('the link is back, and nothing moved');
 
   // It drives again, without a restart.
+  // The search for what is serious keeps a page busy, on a machine with much else to do for so long that the page gives up control.
+  if (!(await text(page, '#who')).startsWith('you drive')) {
+    await page.click('#take');
+    await holds(page, () => document.querySelector('#who').textContent.startsWith('you drive'));
+  }
   await page.click('#modes button:has-text("human")');
   await holds(page, () => document.querySelector('#modes [aria-pressed="true"]')?.textContent === 'human');
   passed('it drives again');
