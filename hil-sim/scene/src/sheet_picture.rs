@@ -98,7 +98,7 @@ fn edges(tones: &[Tone], width: usize) -> impl Iterator<Item = usize> {
             is_edge[j] |= differs;
         }
     };
-    for row in (0..met.len()).step_by(width) {
+    for row in (0..met.len()).step_by(width.max(1)) {
         let below = row + width;
         compare(row..below - 1, row + 1..below);
         if below < met.len() {
@@ -276,7 +276,7 @@ mod tests {
 
     #[test]
     fn edges_are_pixels_that_differ_from_a_neighbour() {
-        for (width, height) in [(1, 1), (1, 5), (7, 1), (9, 6)] {
+        for (width, height) in [(0, 0), (1, 1), (1, 5), (7, 1), (9, 6)] {
             let light = |index: usize| if mix64(index as u64).is_multiple_of(5) { 1.0_f32 } else { 0.0 };
             let tones: Vec<Tone> =
                 (0..width * height).map(|index| Tone { light: light(index), exposure: 1.0, spot: 0.0 }).collect();

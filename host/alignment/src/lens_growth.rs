@@ -12,7 +12,7 @@ use std::collections::BTreeMap;
 
 use nalgebra::{DMatrix, DVector, SMatrix, SVector, Vector6};
 
-use crate::pose_equation::{Equation, LENSES, SCALE_SIGMAS, moved};
+use crate::pose_equation::{Equation, LENSES, SCALE_SIGMAS, moved, robust_weight};
 use crate::residual_spread::Place;
 use vergence_vision::{KannalaBrandt, LENS_PARAMETERS, MatchSigma, Pixel, PixelPair, SharedCovariance, StereoPair};
 
@@ -77,7 +77,7 @@ pub fn lens_growth<S: Copy + Into<MatchSigma>>(
             let scale = SCALE_SIGMAS + (FIRST_SIGMAS - SCALE_SIGMAS) * fade * fade;
             let (mut normal, mut right_side) = (prior, SVector::zeros());
             for row in &rows {
-                let weight = row.weight(&unknowns, scale);
+                let weight = robust_weight(row.residual(&unknowns) / scale);
                 normal += row.slope * row.slope.transpose() * weight;
                 right_side -= row.slope * (weight * row.offset);
             }
@@ -132,12 +132,6 @@ impl Row {
 
     fn residual(&self, unknowns: &SVector<f64, UNKNOWNS>) -> f64 {
         self.offset + self.slope.dot(unknowns)
-    }
-
-    /// (1 + (residual / scale)²)⁻², of S. Geman and D. McClure (1987).
-    fn weight(&self, unknowns: &SVector<f64, UNKNOWNS>, scale: f64) -> f64 {
-        let relative = self.residual(unknowns) / scale;
-        (1.0 + relative * relative).powi(-2)
     }
 }
 

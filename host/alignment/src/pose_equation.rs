@@ -25,6 +25,11 @@ pub fn difference(to: &Transform<Left, Right>, from: &Transform<Left, Right>) ->
     Vector6::new(turn.x, turn.y, turn.z, shift.x, shift.y, shift.z)
 }
 
+/// The weight (1 + r²)⁻² of a residual r relative to its scale, of S. Geman and D. McClure (1987).
+pub fn robust_weight(relative: f64) -> f64 {
+    (1.0 + relative * relative).powi(-2)
+}
+
 /// One match's equation: offset + slope · correction = 0 with standard deviation `sigma`, in radians.
 pub struct Equation {
     pub offset: f64,
@@ -65,10 +70,9 @@ impl Equation {
         self.offset + self.slope.dot(correction)
     }
 
-    /// The weight 1/σ² times (1 + (residual / scale)²)⁻².
+    /// The weight 1/σ² times that of the residual over `scale`.
     pub fn weight(&self, correction: &Vector6<f64>, scale: f64) -> f64 {
-        let relative = self.residual(correction) / scale;
-        (1.0 + relative * relative).powi(-2) / (self.sigma * self.sigma)
+        robust_weight(self.residual(correction) / scale) / (self.sigma * self.sigma)
     }
 
     pub fn agrees(&self, correction: &Vector6<f64>) -> bool {
