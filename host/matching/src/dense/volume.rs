@@ -73,7 +73,8 @@ pub(super) fn costs([left, right]: [&CensusView; 2], hypotheses: &Hypotheses, sp
     costs.par_chunks_mut(width * count).zip(spans).enumerate().for_each(|(y, (out, span))| {
         let row = y * width..(y + 1) * width;
         let reversed = Reversed::of(&right.words[row.clone()], &right.seen[row.clone()], count);
-        out.fill(0);
+        out[..span.start * count].fill(0);
+        out[span.end * count..].fill(0);
         differences((out, span), (&left.words[row.clone()], &left.seen[row.clone()]), &reversed, &first[row]);
     });
     costs
@@ -83,7 +84,7 @@ pub(super) fn costs([left, right]: [&CensusView; 2], hypotheses: &Hypotheses, sp
 struct Reversed {
     words: Vec<u64>,
     /// All bits set where the pixel is seen, no bit elsewhere.
-    known: Vec<u64>,
+    known: Vec<u8>,
     width: usize,
     margin: usize,
 }
@@ -96,17 +97,17 @@ impl Reversed {
         for (x, (&word, &seen)) in words.iter().zip(seen).enumerate() {
             let at = margin + width - 1 - x;
             reversed.words[at] = word;
-            reversed.known[at] = if seen { u64::MAX } else { 0 };
+            reversed.known[at] = if seen { u8::MAX } else { 0 };
         }
         reversed
     }
 
     /// The words, and whether they are known, of the partners of the left pixel x from disparity `first` on.
     #[inline(always)]
-    fn partners(&self, x: usize, first: i32, count: usize) -> [&[u64]; 2] {
+    fn partners(&self, x: usize, first: i32, count: usize) -> (&[u64], &[u8]) {
         let at = (self.margin + self.width) as i64 - 1 - x as i64 + i64::from(first);
         let at = at.clamp(0, (self.width + self.margin) as i64) as usize;
-        [&self.words[at..at + count], &self.known[at..at + count]]
+        (&self.words[at..at + count], &self.known[at..at + count])
     }
 }
 
@@ -127,15 +128,13 @@ fn differences(
             cell.fill(UNRELATED);
             continue;
         }
-        let [others, known] = right.partners(x, first[x], count);
+        let (others, known) = right.partners(x, first[x], count);
         let (cell, _) = cell.as_chunks_mut::<LANES>();
         for (cell, (others, known)) in
             cell.iter_mut().zip(others.as_chunks::<LANES>().0.iter().zip(known.as_chunks::<LANES>().0))
         {
-            *cell = std::array::from_fn(|k| {
-                let different = (words[x] ^ others[k]).count_ones() as u8;
-                if known[k] == 0 { UNRELATED } else { different }
-            });
+            let different: [u8; LANES] = std::array::from_fn(|k| (words[x] ^ others[k]).count_ones() as u8);
+            *cell = std::array::from_fn(|k| if known[k] == 0 { UNRELATED } else { different[k] });
         }
     }
 }
