@@ -1,7 +1,9 @@
 //! The loop itself: listens to cameras and board, keeps the newest exposure, and measures it when the matcher is free.
 
+use std::future::{poll_fn, ready};
 use std::pin::Pin;
 use std::sync::{Arc, Mutex, PoisonError};
+use std::task::Poll;
 use std::time::Duration;
 
 use tokio::sync::mpsc::Receiver;
@@ -188,12 +190,16 @@ impl LiveLoop {
                     if let Some(measurement) = self.conclude(done, totals)? {
                         let (latency, limited) = (self.since(begun.exposed_us), begun.limited);
                         let pace = pace.note(measurement.middle.us, totals);
+                        self.note_cost(&begun, &measurement);
+                        is_done = limits.results.is_some_and(|most| totals.clouds + totals.bearings >= most);
+                        // What becomes of the result takes time too; the next pair is measured meanwhile.
+                        if !is_done && let Some(exposed) = newest.take() {
+                            work = Some(begun_already(self.start(exposed)).await);
+                        }
                         let result = LiveResult { measurement: &measurement, latency, totals, limited, pace };
                         ladder.note_result(&result, &mut warn);
                         publish(result)?;
-                        self.note_cost(&begun, &measurement);
                     }
-                    is_done = limits.results.is_some_and(|most| totals.clouds + totals.bearings >= most);
                 }
                 _ = settle.tick() => {
                     let base = self.base();
@@ -253,7 +259,7 @@ impl LiveLoop {
         Duration::from_micros((self.clock.now().0 as f64 - exposed_us).max(0.0) as u64)
     }
 
-    /// Tells the budget what a cloud took until the next pair can begin: what becomes of the result is a part of it.
+    /// Tells the budget what a cloud took until the next pair could begin.
     fn note_cost(&mut self, begun: &Begun, measurement: &Measurement) {
         if let (Some(budget), Observation::Points { .. }) = (&mut self.budget, &measurement.observation) {
             budget.took(begun.at.elapsed().as_secs_f64());
@@ -330,6 +336,14 @@ async fn next(marks: &mut Option<Receiver<TriggerMark>>) -> Option<TriggerMark> 
     match marks {
         Some(marks) => marks.recv().await,
         None => std::future::pending().await,
+    }
+}
+
+/// The work, whose measuring has begun on its thread if the pose is there.
+async fn begun_already(mut work: Work) -> Work {
+    match poll_fn(|context| Poll::Ready(work.as_mut().poll(context))).await {
+        Poll::Ready(outcome) => Box::pin(ready(outcome)),
+        Poll::Pending => work,
     }
 }
 

@@ -6,7 +6,7 @@ use vergence_vision::Frame;
 
 use super::census::{REACH, census};
 use super::paths::gathered;
-use super::volume::{CensusView, Hypotheses, LANES, costs, give_back};
+use super::volume::{CensusView, Costs, Hypotheses, LANES, give_back};
 use super::winner::winners;
 use crate::View;
 use crate::epipolar_band::EpipolarBand;
@@ -93,10 +93,8 @@ impl Levels {
             CensusView { words: census(plane), seen: self.seen[side].level(plane, 1 << level) }
         });
         let spans = left.spans(hypotheses.width);
-        let costs = costs([&left, &right], hypotheses, &spans);
-        let sums = gathered(&costs, hypotheses, &spans);
+        let sums = gathered(&Costs::new([&left, &right], hypotheses, &spans));
         let winners = winners(&sums, [&left.seen, &right.seen], hypotheses);
-        give_back(costs);
         give_back(sums);
         winners
     }

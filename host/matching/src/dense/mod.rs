@@ -189,7 +189,7 @@ impl<'a> DenseViews<'a> {
         &self,
         seen_at: &Direction,
         disparities: &Disparities,
-        (finder, restated): (&RangeFinder, Option<&Restated>),
+        (finder, restated): (&RangeFinder<'_>, Option<&Restated>),
         near: &EpipolarBand,
     ) -> DenseSample {
         let grid = self.left.grid();

@@ -13,81 +13,101 @@ use std::ops::Range;
 use multiversion::multiversion;
 use rayon::prelude::*;
 
-use super::volume::{Hypotheses, LANES, memory};
+use super::volume::{Costs, Hypotheses, LANES, memory};
 
 /// Penalty of a step by one hypothesis, as on slanted surfaces.
 const P1: u8 = 8;
 /// Penalty of a larger step, as at edges of objects.
 const P2: u8 = 60;
-/// Number of columns processed together.
-const STRIP: usize = 32;
+/// Number of columns processed together: the costs of a strip stay in the cache on the way there and back.
+const STRIP: usize = 16;
 /// Number of rows processed together: each pixel of a path waits for the one before, those of other paths do not.
 const ROWS: usize = 4;
 /// Cost of a hypothesis that the neighbour did not try, larger than any true cost: those are at most 62 + P2, and that of a jump 62 + 2 P2.
 const UNTRIED: u8 = u8::MAX;
 
-/// Sums the path costs of every hypothesis, in the layout of `costs`. Sums that would be larger are 255: where that is the least one, the
-/// views have nothing in common. Paths begin and end with the `spans` of each row that the left camera sees: beyond them all hypotheses cost
+/// Sums the path costs of every hypothesis, by rows, pixels and hypotheses. Sums that would be larger are 255: where that is the least one, the
+/// views have nothing in common. Paths begin and end with the columns of each row that the left camera sees: beyond them all hypotheses cost
 /// the same, so that a path brings nothing from there.
-pub(super) fn gathered(costs: &[u8], hypotheses: &Hypotheses, spans: &[Range<usize>]) -> Vec<u8> {
-    let Hypotheses { width, height, count, ref first } = *hypotheses;
-    let volume = Volume { costs, first, count, width, spans };
-    let mut sums = memory(costs.len());
-    sums.par_chunks_mut(ROWS * width * count).enumerate().for_each(|(block, sums)| {
+pub(super) fn gathered(costs: &Costs<'_>) -> Vec<u8> {
+    let Hypotheses { width, height, count, .. } = *costs.hypotheses();
+    let mut sums = memory(width * height * count);
+    sums.par_chunks_mut(ROWS * width * count).enumerate().for_each_init(Vec::new, |scratch, (block, sums)| {
         sums.fill(0);
-        along_rows(&volume, block * ROWS, sums);
+        scratch.resize(sums.len(), 0);
+        along_rows(costs, block * ROWS, scratch, sums);
     });
     let mut strips: Vec<Vec<&mut [u8]>> = (0..width.div_ceil(STRIP)).map(|_| Vec::with_capacity(height)).collect();
     for row in sums.chunks_mut(width * count) {
         strips.iter_mut().zip(row.chunks_mut(STRIP * count)).for_each(|(strip, part)| strip.push(part));
     }
-    strips.par_iter_mut().enumerate().for_each(|(strip, rows)| along_columns(&volume, strip * STRIP, rows));
+    strips.par_iter_mut().enumerate().for_each_init(Vec::new, |scratch, (strip, rows)| {
+        scratch.resize(height * STRIP * count, 0);
+        along_columns(costs, strip * STRIP, scratch, rows);
+    });
     sums
 }
 
 #[multiversion(targets("x86_64+avx512f+avx512dq+avx512bw+avx512vl+avx2+fma+popcnt", "x86_64+avx2+fma+popcnt"))]
-fn along_rows(volume: &Volume<'_>, top: usize, sums: &mut [u8]) {
-    if volume.count == LANES { rows::<Narrow>(volume, top, sums) } else { rows::<Wide>(volume, top, sums) }
+fn along_rows(costs: &Costs<'_>, top: usize, scratch: &mut [u8], sums: &mut [u8]) {
+    match costs.hypotheses().count {
+        LANES => rows::<Narrow>(costs, top, scratch, sums),
+        _ => rows::<Wide>(costs, top, scratch, sums),
+    }
 }
 
 #[multiversion(targets("x86_64+avx512f+avx512dq+avx512bw+avx512vl+avx2+fma+popcnt", "x86_64+avx2+fma+popcnt"))]
-fn along_columns(volume: &Volume<'_>, left: usize, strip: &mut [&mut [u8]]) {
-    if volume.count == LANES { columns::<Narrow>(volume, left, strip) } else { columns::<Wide>(volume, left, strip) }
+fn along_columns(costs: &Costs<'_>, left: usize, scratch: &mut [u8], strip: &mut [&mut [u8]]) {
+    match costs.hypotheses().count {
+        LANES => columns::<Narrow>(costs, left, scratch, strip),
+        _ => columns::<Wide>(costs, left, scratch, strip),
+    }
 }
 
+/// Advances paths along the rows from `top` on, both ways; their costs go to `scratch`.
 #[inline(always)]
-fn rows<P: Path>(volume: &Volume<'_>, top: usize, sums: &mut [u8]) {
-    let (width, row) = (volume.width, volume.width * volume.count);
-    let mut paths: Vec<P> = (0..sums.len() / row).map(|_| P::new(volume.count)).collect();
-    let spans = &volume.spans[top..top + paths.len()];
+fn rows<P: Path>(costs: &Costs<'_>, top: usize, scratch: &mut [u8], sums: &mut [u8]) {
+    let Hypotheses { width, count, ref first, .. } = *costs.hypotheses();
+    let row = width * count;
+    let mut paths: Vec<P> = (0..sums.len() / row).map(|_| P::new(count)).collect();
+    let spans = &costs.spans()[top..top + paths.len()];
+    scratch.chunks_exact_mut(row).enumerate().for_each(|(j, scratch)| costs.fill(scratch, top + j, 0..width));
     let span =
         spans.iter().filter(|span| !span.is_empty()).cloned().reduce(|p, q| p.start.min(q.start)..p.end.max(q.end));
     for x in there_and_back(span.unwrap_or_default()) {
         let Some(x) = x else {
-            paths.iter_mut().for_each(|path| *path = P::new(volume.count));
+            paths.iter_mut().for_each(|path| *path = P::new(count));
             continue;
         };
         for (j, path) in paths.iter_mut().enumerate() {
-            let cell = &mut sums[j * row + x * volume.count..][..volume.count];
-            path.advance(volume, (top + j) * width + x, cell);
+            let cell = j * row + x * count..j * row + (x + 1) * count;
+            path.advance(first[(top + j) * width + x], &scratch[cell.clone()], &mut sums[cell]);
         }
     }
 }
 
+/// Advances paths along the columns of a strip from `left` on, both ways; their costs go to `scratch`.
 #[inline(always)]
-fn columns<P: Path>(volume: &Volume<'_>, left: usize, strip: &mut [&mut [u8]]) {
-    let columns = strip.first().map_or(0, |row| row.len() / volume.count);
-    let mut paths: Vec<P> = (0..columns).map(|_| P::new(volume.count)).collect();
+fn columns<P: Path>(costs: &Costs<'_>, left: usize, scratch: &mut [u8], strip: &mut [&mut [u8]]) {
+    let Hypotheses { width, count, ref first, .. } = *costs.hypotheses();
+    let columns = strip.first().map_or(0, |row| row.len() / count);
+    let mut paths: Vec<P> = (0..columns).map(|_| P::new(count)).collect();
     let is_seen = |span: &Range<usize>| span.start < left + columns && span.end > left;
-    let top = volume.spans.iter().position(is_seen).unwrap_or_default();
-    let bottom = volume.spans.iter().rposition(is_seen).map_or(top, |last| last + 1);
+    let top = costs.spans().iter().position(is_seen).unwrap_or_default();
+    let bottom = costs.spans().iter().rposition(is_seen).map_or(top, |last| last + 1);
+    let row = columns * count;
+    for y in top..bottom {
+        costs.fill(&mut scratch[y * row..(y + 1) * row], y, left..left + columns);
+    }
     for y in there_and_back(top..bottom) {
         let Some(y) = y else {
-            paths.iter_mut().for_each(|path| *path = P::new(volume.count));
+            paths.iter_mut().for_each(|path| *path = P::new(count));
             continue;
         };
-        for (i, (path, cell)) in paths.iter_mut().zip(strip[y].chunks_exact_mut(volume.count)).enumerate() {
-            path.advance(volume, y * volume.width + left + i, cell);
+        let first = &first[y * width + left..][..columns];
+        let cells = scratch[y * row..].chunks_exact(count).zip(strip[y].chunks_exact_mut(count));
+        for ((path, first), (costs, sums)) in paths.iter_mut().zip(first).zip(cells) {
+            path.advance(*first, costs, sums);
         }
     }
 }
@@ -97,21 +117,12 @@ fn there_and_back(range: Range<usize>) -> impl Iterator<Item = Option<usize>> {
     range.clone().map(Some).chain([None]).chain(range.rev().map(Some))
 }
 
-/// The volume of costs that the paths run through.
-struct Volume<'a> {
-    costs: &'a [u8],
-    first: &'a [i32],
-    count: usize,
-    width: usize,
-    spans: &'a [Range<usize>],
-}
-
 /// The costs at the last pixel of a path.
 trait Path {
     /// A path before its first pixel, for `count` hypotheses.
     fn new(count: usize) -> Self;
-    /// Advances the path to a pixel and adds its costs there to `sums`.
-    fn advance(&mut self, volume: &Volume<'_>, pixel: usize, sums: &mut [u8]);
+    /// Advances the path to a pixel whose hypotheses begin with the disparity `first` and cost `costs`, and adds its costs there to `sums`.
+    fn advance(&mut self, first: i32, costs: &[u8], sums: &mut [u8]);
 }
 
 /// Costs of as many hypotheses as a vector has, padded on both sides for those that were not tried.
@@ -132,13 +143,10 @@ impl Path for Narrow {
     }
 
     #[inline(always)]
-    fn advance(&mut self, volume: &Volume<'_>, pixel: usize, sums: &mut [u8]) {
+    fn advance(&mut self, first: i32, costs: &[u8], sums: &mut [u8]) {
         const MOST: i32 = NARROW as i32 - 1;
-        let first = volume.first[pixel];
         let from = (MOST + (first - self.first).clamp(-MOST, MOST)) as usize;
-        let (Some(costs), Some(sums)) = (volume.costs[pixel * LANES..].first_chunk(), sums.first_chunk_mut()) else {
-            return;
-        };
+        let (Some(costs), Some(sums)) = (costs.first_chunk(), sums.first_chunk_mut()) else { return };
         let here = step(costs, &self.last[from..][..LANES + 2], self.bounds, sums);
         self.last[NARROW..NARROW + LANES].copy_from_slice(&here);
         self.bounds = bounds(&here);
@@ -161,13 +169,12 @@ impl Path for Wide {
     }
 
     #[inline(always)]
-    fn advance(&mut self, volume: &Volume<'_>, pixel: usize, sums: &mut [u8]) {
-        let (count, room) = (volume.count, volume.count + 2);
-        let first = volume.first[pixel];
+    fn advance(&mut self, first: i32, costs: &[u8], sums: &mut [u8]) {
+        let (count, room) = (costs.len(), costs.len() + 2);
         let most = room as i32 - 1;
         let from = (most + (first - self.first).clamp(-most, most)) as usize;
         let before = &self.last[from..from + count + 2];
-        let costs = volume.costs[pixel * count..(pixel + 1) * count].as_chunks::<LANES>().0;
+        let costs = costs.as_chunks::<LANES>().0;
         let (next, sums) = (self.next[room..room + count].as_chunks_mut().0, sums.as_chunks_mut().0);
         let mut least = [u8::MAX; LANES];
         for (block, ((costs, next), sums)) in costs.iter().zip(next).zip(sums).enumerate() {

@@ -20,12 +20,12 @@ use crate::SharedFrame;
 use crate::grid::direction;
 
 /// Converts disparities to ranges, for one pair and one covariance of its lenses and pose.
-pub(super) struct RangeFinder {
+pub(super) struct RangeFinder<'a> {
     baseline_mm: f64,
     /// Covariance of turn and shift of the right camera, in the shared axes.
     pose: Matrix6<f64>,
     /// With the lenses, where these are uncertain.
-    with_lenses: Option<SharedSpread>,
+    with_lenses: Option<SharedSpread<'a>>,
     /// Where the lenses are not central.
     origins: Option<Origins>,
 }
@@ -47,9 +47,9 @@ pub(super) struct RangeAt {
     pub disparity_sigma: f64,
 }
 
-impl RangeFinder {
+impl<'a> RangeFinder<'a> {
     /// `frame` is that of `pair`.
-    pub(super) fn new(frame: &SharedFrame, pair: &StereoPair<'_>, shared: &SharedCovariance) -> Self {
+    pub(super) fn new(frame: &SharedFrame, pair: &StereoPair<'a>, shared: &'a SharedCovariance) -> Self {
         let lenses = 2 * LENS_PARAMETERS;
         let has_lenses = shared.matrix().view((0, 0), (lenses, lenses)).amax() > 0.0;
         let turn = frame.shared_from_left().rotation().to_rotation_matrix();

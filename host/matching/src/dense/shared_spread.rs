@@ -1,7 +1,8 @@
 //! What the uncertainty of lenses and pose does to disparities, on a coarse grid of directions and ranges: it changes slowly over both.
 
+use std::sync::OnceLock;
+
 use nalgebra::Vector3;
-use rayon::prelude::*;
 use vergence_vision::{Left, Point, PointUncertainty, SharedCovariance, StereoPair, Transform};
 
 use crate::shared_frame::{Shared, SharedFrame};
@@ -17,27 +18,37 @@ const LEVELS: usize = 13;
 const FARTHEST: f64 = 1e-3;
 
 /// Variances of disparities in rad², by the errors that all points share.
-pub(super) struct SharedSpread {
-    /// By level, then by b, then by a.
-    variances: Vec<f64>,
+pub(super) struct SharedSpread<'a> {
+    pair: StereoPair<'a>,
+    shared: &'a SharedCovariance,
+    left_from_shared: Transform<Left, Shared>,
+    baseline_mm: f64,
+    /// By level, then by b, then by a. A node is computed when it is first asked for: a pair has points near some of them only.
+    variances: Vec<OnceLock<f64>>,
 }
 
-impl SharedSpread {
-    /// Computes the grid for `pair`, whose shared axes are `frame`'s.
-    pub(super) fn new(frame: &SharedFrame, pair: &StereoPair<'_>, shared: &SharedCovariance) -> Self {
-        let left_from_shared = frame.shared_from_left().inverse();
-        let baseline_mm = frame.baseline().mm();
-        let variances = (0..LEVELS * AROUND * ACROSS)
-            .into_par_iter()
-            .map(|index| {
-                let [level, b, a] = [index / (AROUND * ACROSS), index / ACROSS % AROUND, index % ACROSS];
-                let nearness = if level == 0 { FARTHEST } else { NEARER * level as f64 };
-                let node =
-                    Node { a: angle(a, ACROSS), b: angle(b, AROUND), from_right: baseline_mm / nearness, baseline_mm };
-                node.variance(&left_from_shared, pair, shared).unwrap_or(f64::NAN)
-            })
-            .collect();
-        Self { variances }
+impl<'a> SharedSpread<'a> {
+    /// The grid for `pair`, whose shared axes are `frame`'s.
+    pub(super) fn new(frame: &SharedFrame, pair: &StereoPair<'a>, shared: &'a SharedCovariance) -> Self {
+        Self {
+            pair: *pair,
+            shared,
+            left_from_shared: frame.shared_from_left().inverse(),
+            baseline_mm: frame.baseline().mm(),
+            variances: vec![OnceLock::new(); LEVELS * AROUND * ACROSS],
+        }
+    }
+
+    /// The variance at a node; NaN where no point is there.
+    fn node(&self, [a, b, level]: [usize; 3]) -> f64 {
+        let computed = || {
+            let nearness = if level == 0 { FARTHEST } else { NEARER * level as f64 };
+            let baseline_mm = self.baseline_mm;
+            let node =
+                Node { a: angle(a, ACROSS), b: angle(b, AROUND), from_right: baseline_mm / nearness, baseline_mm };
+            node.variance(&self.left_from_shared, &self.pair, self.shared).unwrap_or(f64::NAN)
+        };
+        *self.variances[(level * AROUND + b) * ACROSS + a].get_or_init(computed)
     }
 
     /// The variance for a point in the direction (a, b) of the left view, whose range from the right camera is the baseline over
@@ -58,8 +69,7 @@ impl SharedSpread {
                         if high[axis] == 1 { part } else { 1.0 - part }
                     })
                     .product();
-                let [a, b, level] = std::array::from_fn(|axis| low[axis] + high[axis]);
-                weight * self.variances[(level * AROUND + b) * ACROSS + a]
+                weight * self.node(std::array::from_fn(|axis| low[axis] + high[axis]))
             })
             .sum()
     }

@@ -1,4 +1,5 @@
-//! The cost volume: the dissimilarity of both views for every pixel and every hypothesis of its disparity.
+//! Costs: the dissimilarity of both views for every pixel and every hypothesis of its disparity. They are computed anew wherever they are
+//! needed, which is faster than to read them from memory; only their sums make a volume.
 
 use std::ops::Range;
 use std::sync::{Mutex, PoisonError};
@@ -39,16 +40,13 @@ impl CensusView {
     }
 }
 
-/// Volumes that were used before. The system clears new memory page by page, which takes longer than the search in it.
-static SPARE: Mutex<Vec<Vec<u8>>> = Mutex::new(Vec::new());
-/// Most volumes that are kept: costs and sums of one pair.
-const KEPT: usize = 2;
+/// The largest volume that was used before. The system clears new memory page by page, which takes longer than the search in it.
+static SPARE: Mutex<Vec<u8>> = Mutex::new(Vec::new());
 
 /// Memory for a volume, with any values.
 pub(super) fn memory(count: usize) -> Vec<u8> {
     // A poisoned lock only means that another thread panicked between whole volumes.
-    let spare = SPARE.lock().unwrap_or_else(PoisonError::into_inner).pop();
-    let mut volume = spare.unwrap_or_default();
+    let mut volume = std::mem::take(&mut *SPARE.lock().unwrap_or_else(PoisonError::into_inner));
     if volume.capacity() < count {
         return vec![0; count];
     }
@@ -59,31 +57,59 @@ pub(super) fn memory(count: usize) -> Vec<u8> {
 /// Keeps a volume for the next search.
 pub(super) fn give_back(volume: Vec<u8>) {
     let mut spare = SPARE.lock().unwrap_or_else(PoisonError::into_inner);
-    spare.push(volume);
-    // The largest are taken first and kept.
-    spare.sort_by_key(Vec::capacity);
-    let surplus = spare.len().saturating_sub(KEPT);
-    spare.drain(..surplus);
+    if volume.capacity() > spare.capacity() {
+        *spare = volume;
+    }
 }
 
-/// Computes the costs, by rows, pixels and hypotheses. Beyond the `spans` of the left view they are zero.
-pub(super) fn costs([left, right]: [&CensusView; 2], hypotheses: &Hypotheses, spans: &[Range<usize>]) -> Vec<u8> {
-    let Hypotheses { width, height, count, ref first } = *hypotheses;
-    let mut costs = memory(width * height * count);
-    costs.par_chunks_mut(width * count).zip(spans).enumerate().for_each(|(y, (out, span))| {
-        let row = y * width..(y + 1) * width;
-        let reversed = Reversed::of(&right.words[row.clone()], &right.seen[row.clone()], count);
-        out.fill(0);
-        differences((out, span), (&left.words[row.clone()], &left.seen[row.clone()]), &reversed, &first[row]);
-    });
-    costs
+/// Both views, ready for comparison.
+pub(super) struct Costs<'a> {
+    left: &'a CensusView,
+    right: Vec<Reversed>,
+    hypotheses: &'a Hypotheses,
+    spans: &'a [Range<usize>],
+}
+
+impl<'a> Costs<'a> {
+    pub(super) fn new(
+        [left, right]: [&'a CensusView; 2],
+        hypotheses: &'a Hypotheses,
+        spans: &'a [Range<usize>],
+    ) -> Self {
+        let rows = right.words.par_chunks(hypotheses.width).zip(right.seen.par_chunks(hypotheses.width));
+        let right = rows.map(|(words, seen)| Reversed::of(words, seen, hypotheses.count)).collect();
+        Self { left, right, hypotheses, spans }
+    }
+
+    /// The hypotheses that are compared.
+    pub(super) const fn hypotheses(&self) -> &'a Hypotheses {
+        self.hypotheses
+    }
+
+    /// The columns of each row that the left camera sees.
+    pub(super) const fn spans(&self) -> &'a [Range<usize>] {
+        self.spans
+    }
+
+    /// Computes the costs of some pixels of row `y`, by pixels and hypotheses. Beyond the columns that the left camera sees they are zero.
+    pub(super) fn fill(&self, out: &mut [u8], y: usize, columns: Range<usize>) {
+        let Hypotheses { width, count, ref first, .. } = *self.hypotheses;
+        let row = y * width + columns.start..y * width + columns.end;
+        let span = &self.spans[y];
+        let within = |x: usize| x.clamp(columns.start, columns.end) - columns.start;
+        let span = within(span.start)..within(span.end);
+        out[..span.start * count].fill(0);
+        out[span.end * count..].fill(0);
+        let left = (&self.left.words[row.clone()], &self.left.seen[row.clone()]);
+        differences((out, span), columns.start, left, &self.right[y], &first[row]);
+    }
 }
 
 /// A right row in reverse order, so that the index grows with the disparity, padded on both sides.
 struct Reversed {
     words: Vec<u64>,
     /// All bits set where the pixel is seen, no bit elsewhere.
-    known: Vec<u64>,
+    known: Vec<u8>,
     width: usize,
     margin: usize,
 }
@@ -96,27 +122,29 @@ impl Reversed {
         for (x, (&word, &seen)) in words.iter().zip(seen).enumerate() {
             let at = margin + width - 1 - x;
             reversed.words[at] = word;
-            reversed.known[at] = if seen { u64::MAX } else { 0 };
+            reversed.known[at] = if seen { u8::MAX } else { 0 };
         }
         reversed
     }
 
     /// The words, and whether they are known, of the partners of the left pixel x from disparity `first` on.
     #[inline(always)]
-    fn partners(&self, x: usize, first: i32, count: usize) -> [&[u64]; 2] {
+    fn partners(&self, x: usize, first: i32, count: usize) -> (&[u64], &[u8]) {
         let at = (self.margin + self.width) as i64 - 1 - x as i64 + i64::from(first);
         let at = at.clamp(0, (self.width + self.margin) as i64) as usize;
-        [&self.words[at..at + count], &self.known[at..at + count]]
+        (&self.words[at..at + count], &self.known[at..at + count])
     }
 }
 
+/// Compares pixels from column `start` of a row on, those in `span` of them.
 #[multiversion(targets(
     "x86_64+avx512f+avx512dq+avx512bw+avx512vl+avx512vpopcntdq+avx2+fma+popcnt",
     "x86_64+avx2+fma+popcnt",
     "x86_64+popcnt"
 ))]
 fn differences(
-    (costs, span): (&mut [u8], &Range<usize>),
+    (costs, span): (&mut [u8], Range<usize>),
+    start: usize,
     (words, seen): (&[u64], &[bool]),
     right: &Reversed,
     first: &[i32],
@@ -127,15 +155,13 @@ fn differences(
             cell.fill(UNRELATED);
             continue;
         }
-        let [others, known] = right.partners(x, first[x], count);
+        let (others, known) = right.partners(start + x, first[x], count);
         let (cell, _) = cell.as_chunks_mut::<LANES>();
         for (cell, (others, known)) in
             cell.iter_mut().zip(others.as_chunks::<LANES>().0.iter().zip(known.as_chunks::<LANES>().0))
         {
-            *cell = std::array::from_fn(|k| {
-                let different = (words[x] ^ others[k]).count_ones() as u8;
-                if known[k] == 0 { UNRELATED } else { different }
-            });
+            let different: [u8; LANES] = std::array::from_fn(|k| (words[x] ^ others[k]).count_ones() as u8);
+            *cell = std::array::from_fn(|k| if known[k] == 0 { UNRELATED } else { different[k] });
         }
     }
 }
