@@ -15,6 +15,9 @@ use crate::{Clock, timed};
 const SIZE: ImageSize = ImageSize { width: 2048, height: 2044 };
 const SMALL: ImageSize = ImageSize { width: 1040, height: 1024 };
 const PINHOLE: [f64; 4] = [600.0, 601.0, 1024.0, 1022.0];
+/// How many times the polynomial's time a lens with one centre may take, and how many times its own with one centre a lens with a moving pupil.
+const LIMIT: f64 = 3.0;
+const PUPIL_LIMIT: f64 = 1.5;
 /// Rays of an array: as many as stay in the cache.
 const RAYS: u32 = 4096;
 
@@ -27,17 +30,30 @@ pub struct LensTimes {
     pub project_ns: f64,
     /// Pixels to rays.
     pub unproject_ns: f64,
-    /// The same over those of a polynomial lens.
+    /// The lens that it is compared with: the polynomial, or of a moving pupil the same lens with one centre.
+    pub beside: &'static str,
+    /// The same over those of that lens.
     pub ratios: [f64; 2],
+    /// What these ratios may be at most.
+    pub limit: f64,
 }
 
 impl LensTimes {
     /// Nanoseconds for people.
     #[must_use]
     pub fn in_words(&self) -> String {
+        let ratio = |ratio: f64| {
+            let over = if ratio > self.limit { ", more than allowed" } else { "" };
+            format!("{ratio:.2}{over}")
+        };
         format!(
-            "project {:.1} ({:.1} times the polynomial), unproject {:.1} ({:.1})",
-            self.project_ns, self.ratios[0], self.unproject_ns, self.ratios[1]
+            "project {:.1} ({}), unproject {:.1} ({}) times {}, {} allowed",
+            self.project_ns,
+            ratio(self.ratios[0]),
+            self.unproject_ns,
+            ratio(self.ratios[1]),
+            self.beside,
+            self.limit
         )
     }
 
@@ -49,6 +65,8 @@ impl LensTimes {
             "unproject_ns": self.unproject_ns,
             "project_ratio": project_ratio,
             "unproject_ratio": unproject_ratio,
+            "beside": self.beside,
+            "largest_ratio": self.limit,
         })
     }
 }
@@ -64,14 +82,19 @@ pub(crate) fn lenses(repeats: u32, clock: Clock) -> Result<Vec<LensTimes>, Bench
         }
     }
     let ns: Vec<_> = least.iter().map(|seconds| seconds.map(|seconds| seconds * 1e9 / f64::from(RAYS))).collect();
-    let own = ns.first().copied().unwrap_or([f64::NAN; 2]);
-    let times = |(array, [project_ns, unproject_ns]): (&Array, &[f64; 2])| LensTimes {
-        name: array.name,
-        project_ns: *project_ns,
-        unproject_ns: *unproject_ns,
-        ratios: [project_ns / own[0], unproject_ns / own[1]],
+    let times = |(index, (array, [project_ns, unproject_ns])): (usize, (&Array, &[f64; 2]))| {
+        // A lens with a moving pupil follows the same one with one centre.
+        let (beside, limit) = if array.is_central { (0, LIMIT) } else { (index - 1, PUPIL_LIMIT) };
+        LensTimes {
+            name: array.name,
+            project_ns: *project_ns,
+            unproject_ns: *unproject_ns,
+            beside: arrays[beside].name,
+            ratios: [project_ns / ns[beside][0], unproject_ns / ns[beside][1]],
+            limit,
+        }
     };
-    Ok(arrays.iter().zip(&ns).map(times).collect())
+    Ok(arrays.iter().zip(&ns).enumerate().map(times).collect())
 }
 
 /// Rays all over the sensor of a lens, and their pixels.
@@ -122,7 +145,7 @@ impl Array {
     }
 }
 
-/// The polynomial lens first, then an example of every model.
+/// The polynomial lens first, a lens with a moving pupil after the same one with one centre, then an example of every model.
 fn all() -> Result<Vec<(&'static str, KannalaBrandt)>, BenchError> {
     let refused = |error: &dyn std::fmt::Display| BenchError::Work(format!("a lens of the measurement: {error}"));
     let k = [599.1, -31.1532, 2.45631, -1.13829, 0.11982];
@@ -167,8 +190,11 @@ fn models() -> Result<Vec<Model>, BenchError> {
         .map_err(|error| BenchError::Work(format!("a lens of the measurement: {error}")))?;
     let rational = [0.2, -0.1, 1e-3, -5e-4, 0.02, 0.5, 0.1, 0.01, 1e-3, -1e-3, 5e-4, 2e-4, 0.02, -0.01];
     let wave = |index: usize| 0.02 * (0.7 * index as f64).sin();
-    let grid = SplineGrid { order: 3, columns: 14, rows: 11, field_deg: 200.0 };
-    let control = (0..14 * 11).map(|index| [wave(index), wave(2 * index + 1)]).collect();
+    let splined = |order: usize| {
+        let grid = SplineGrid { order, columns: 14, rows: 11, field_deg: 200.0 };
+        let control = (0..14 * 11).map(|index| [wave(index), wave(2 * index + 1)]).collect();
+        SplinedStereographic { pinhole: PINHOLE, grid, control }
+    };
     Ok(vec![
         central("double sphere", DoubleSphere { pinhole: PINHOLE, xi: -0.2, alpha: 0.6 })?,
         central("enhanced unified", Eucm { pinhole: PINHOLE, alpha: 0.65, beta: 1.1 })?,
@@ -179,7 +205,8 @@ fn models() -> Result<Vec<Model>, BenchError> {
         central("pinhole", pinhole(&[]))?,
         central("pinhole, radial and tangential", pinhole(&[-0.28, 0.07, 2e-4, 2e-5]))?,
         central("pinhole, rational, tilted", pinhole(&rational))?,
-        central("splined stereographic", SplinedStereographic { pinhole: PINHOLE, grid, control })?,
+        central("splined stereographic", splined(3))?,
+        central("splined, of order 2", splined(2))?,
     ])
 }
 

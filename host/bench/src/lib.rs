@@ -10,6 +10,7 @@ pub mod calibrate;
 mod error;
 pub mod firmware;
 mod lenses;
+mod levels;
 pub mod live;
 pub mod matching;
 pub mod networks;
@@ -23,6 +24,7 @@ use std::time::Duration;
 
 pub use error::BenchError;
 pub use lenses::LensTimes;
+pub use levels::LevelTimes;
 pub use python::ask_python;
 
 /// Returns the time since some fixed instant.

@@ -11,6 +11,7 @@ use vergence_vision::{
 
 use crate::error::BenchError;
 use crate::lenses::{LensTimes, lenses};
+use crate::levels::{LevelTimes, levels};
 use crate::python::ask_python;
 use crate::{Clock, timed};
 
@@ -48,6 +49,8 @@ pub struct VisionBench {
     pub max_ray_error: f64,
     /// Times by the lenses of other programs' models, a polynomial lens first, with the fastest instructions, of arrays that stay in the cache.
     pub lenses: Vec<LensTimes>,
+    /// Times of a whole use by each kind of lens of this program, one centre first.
+    pub levels: Vec<LevelTimes>,
     /// Times with the fastest instructions over the count of points.
     pub growth: Vec<(u32, VisionTimes)>,
 }
@@ -120,6 +123,7 @@ pub fn vision(points: u32, repeats: u32, python: &str, clock: Clock) -> Result<V
         opencv: peer,
         max_ray_error: errors[0].max(errors[1]),
         lenses: lenses(LENS_TURNS * repeats, clock)?,
+        levels: levels(repeats, clock)?,
         growth: sizes.map(|points| (points, times(points, Instructions::Best, Memory::Kept))).into(),
     })
 }

@@ -3,6 +3,7 @@
 use serde_json::{Value, json};
 
 use crate::lenses::LensTimes;
+use crate::levels::LevelTimes;
 use crate::vision::{OpenCvTimes, VisionBench, VisionTimes};
 
 impl VisionTimes {
@@ -60,6 +61,7 @@ impl VisionBench {
             },
             "opencv": self.opencv.as_ref().map_or(Value::Null, opencv),
             "lenses": self.lenses.iter().map(LensTimes::json).collect::<Vec<_>>(),
+            "levels": self.levels.iter().map(LevelTimes::json).collect::<Vec<_>>(),
             "growth": self.growth.iter().map(growth).collect::<Vec<_>>(),
         })
     }

@@ -1,6 +1,9 @@
 //! Lenses of other programs' models that are not symmetric, in whole arrays.
 
-use super::splined::{Splined, SplinedBack, splined_back_baseline, splined_back_best, splined_baseline, splined_best};
+use std::sync::OnceLock;
+
+use super::splined::{Splined, splined_baseline, splined_best};
+use super::splined_back::{SplinedBack, splined_back_baseline, splined_back_best};
 use super::stepwise::{ASK, Stepwise, stepwise_baseline, stepwise_best};
 use super::stepwise_back::{StepwiseBack, stepwise_back_baseline, stepwise_back_best};
 use crate::foreign::OntoPlane;
@@ -11,12 +14,13 @@ use crate::{Camera, KannalaBrandt, Pixel, UnitRay};
 pub(super) struct Foreign {
     lens: KannalaBrandt,
     project: Option<Out>,
-    unproject: Option<Back>,
+    /// Made where it is asked for.
+    unproject: OnceLock<Option<Back>>,
 }
 
 #[derive(Clone, Debug, PartialEq)]
 enum Out {
-    Stepwise(Stepwise),
+    Stepwise(Box<Stepwise>),
     Splined(Splined),
 }
 
@@ -31,23 +35,27 @@ impl Foreign {
     pub(super) fn new(lens: &KannalaBrandt) -> Option<Self> {
         let model = lens.foreign_model()?;
         let field = lens.foreign_field();
-        let ways = model.steps().map(|steps| match &steps.onto_plane {
-            OntoPlane::Stereographic(spline) => {
-                let out = Splined::new(spline, steps.affine, field);
-                (Some(Out::Splined(out.clone())), SplinedBack::new(lens, spline, out).map(Back::Splined))
-            }
-            _ => (
-                Stepwise::new(lens, &steps, field).map(Out::Stepwise),
-                StepwiseBack::new(lens, &steps, field).map(Back::Stepwise),
-            ),
+        let project = model.steps().and_then(|steps| match &steps.onto_plane {
+            OntoPlane::Stereographic(spline) => Some(Out::Splined(Splined::new(spline, steps.affine, field))),
+            _ => Stepwise::new(lens, &steps, field).map(|steps| Out::Stepwise(Box::new(steps))),
         });
-        let (project, unproject) = ways.unwrap_or_default();
-        Some(Self { lens: *lens, project, unproject })
+        Some(Self { lens: *lens, project, unproject: OnceLock::new() })
+    }
+
+    fn back(&self) -> Option<&Back> {
+        let new = || {
+            let (field, steps) = (self.lens.foreign_field(), self.lens.foreign_model()?.steps()?);
+            match &self.project {
+                Some(Out::Splined(out)) => SplinedBack::new(&self.lens, out).map(Back::Splined),
+                _ => StepwiseBack::new(&self.lens, &steps, field).map(Back::Stepwise),
+            }
+        };
+        self.unproject.get_or_init(new).as_ref()
     }
 
     /// Whether arrays are computed in lanes, and not point by point: out, and back.
     pub(super) fn is_in_lanes(&self) -> [bool; 2] {
-        [self.project.is_some(), self.unproject.is_some()]
+        [self.project.is_some(), self.back().is_some()]
     }
 
     /// Appends the pixels of points.
@@ -70,7 +78,7 @@ impl Foreign {
         let one = |&[u, v]: &[f64; 2]| {
             self.lens.unproject::<Camera>(Pixel { u, v }).map_or([f64::NAN; 3], |ray| ray.vector().into())
         };
-        by_chunks(pixels, rays, one, |chunk, rays| match (&self.unproject, best) {
+        by_chunks(pixels, rays, one, |chunk, rays| match (self.back(), best) {
             (Some(Back::Stepwise(steps)), true) => stepwise_back_best(steps, chunk, rays),
             (Some(Back::Stepwise(steps)), false) => stepwise_back_baseline(steps, chunk, rays),
             (Some(Back::Splined(spline)), true) => splined_back_best(spline, chunk, rays),

@@ -24,6 +24,7 @@ mod radial;
 mod shared_errors;
 mod slope;
 mod splined;
+mod splined_back;
 mod stepwise;
 mod stepwise_back;
 mod surface;

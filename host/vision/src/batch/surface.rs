@@ -1,15 +1,14 @@
-//! B-spline surfaces of shifts in a plane, many places at once.
+//! B-spline surfaces with two values, many places at once.
 //!
-//! Each interval of the grid is a polynomial: the four powers along the one axis of the four along the other, both coordinates of the shift in one
-//! vector.
+//! Each interval of the grid is a polynomial: the four powers along the one axis of the four along the other, both values in one vector. Places are
+//! numbers of control points, from 0, along both axes.
 
-use super::lanes::{columns_of, multiply_add};
-use crate::SplineGrid;
+use super::lanes::multiply_add;
 
 /// Powers along an axis.
 const POWERS: usize = 4;
-/// Both coordinates of the powers across.
-const ROW: usize = 2 * POWERS;
+/// Both values of half of the powers across.
+const HALF: usize = POWERS;
 /// Added to a number below 2³², it leaves the number itself in the lowest bits.
 const INTEGER: f64 = 4_503_599_627_370_496.0;
 
@@ -23,49 +22,100 @@ const CUBIC: [[f64; POWERS]; POWERS] = [
 const QUADRATIC: [[f64; POWERS]; POWERS] =
     [[0.125, -0.5, 0.5, 0.0], [0.75, 0.0, -1.0, 0.0], [0.125, 0.5, 0.5, 0.0], [0.0; POWERS]];
 
-type Cell = [[f64; ROW]; POWERS];
+/// Coefficients of an interval, in whole lines of the cache.
+#[derive(Clone, Debug, Default, PartialEq)]
+#[repr(align(64))]
+struct Cell<T>([[[T; HALF]; 2]; POWERS]);
+
+/// The powers across at each place, of both values: the lower, and the higher.
+#[repr(align(64))]
+struct Powers<T, const W: usize>([[[T; HALF]; W]; 2]);
+
+/// What the numbers of a surface are.
+pub(super) trait Number: Copy + Default {
+    fn of(number: f64) -> Self;
+    fn long(self) -> f64;
+    /// Returns a b + c.
+    fn fused<const FUSED: bool>(a: Self, b: Self, c: Self) -> Self;
+}
+
+impl Number for f64 {
+    #[inline(always)]
+    fn of(number: f64) -> Self {
+        number
+    }
+
+    #[inline(always)]
+    fn long(self) -> f64 {
+        self
+    }
+
+    #[inline(always)]
+    fn fused<const FUSED: bool>(a: Self, b: Self, c: Self) -> Self {
+        multiply_add::<FUSED>(a, b, c)
+    }
+}
+
+/// Half the memory and time, for a surface that need not be exact.
+impl Number for f32 {
+    #[inline(always)]
+    fn of(number: f64) -> Self {
+        number as Self
+    }
+
+    #[inline(always)]
+    fn long(self) -> f64 {
+        f64::from(self)
+    }
+
+    #[inline(always)]
+    fn fused<const FUSED: bool>(a: Self, b: Self, c: Self) -> Self {
+        if FUSED { a.mul_add(b, c) } else { a * b + c }
+    }
+}
 
 /// A surface.
 #[derive(Clone, Debug, PartialEq)]
-pub(super) struct Surface {
-    middle: [f64; 2],
-    per_unit: f64,
-    /// Of each axis: what a place is from the middle of the grid, the first and last interval by their numbers, and what is added before a number
-    /// is cut off.
-    half: [f64; 2],
+pub(super) struct Surface<T = f64> {
+    /// Of each axis: the number of the last interval, and the edges.
     last: [f64; 2],
     edges: [[f64; 2]; 2],
+    /// Added before a number is cut off.
     rounding: f64,
-    cells: Vec<Cell>,
+    cells: Vec<Cell<T>>,
 }
 
 /// Where places lie on a surface.
+#[repr(align(64))]
 pub(super) struct OnSurface<const W: usize> {
     cell: [usize; W],
     /// Within the interval.
     at: [[f64; W]; 2],
-    /// Intervals of the grid to the nearest edge; negative outside.
-    pub inside: [f64; W],
 }
 
-/// Shifts, and the derivatives of the first, then of the second coordinate of the shift.
-pub(super) type Shifted<const W: usize> = ([[f64; W]; 2], [[[f64; W]; 2]; 2]);
+/// Values, and their derivatives across and down.
+#[repr(align(64))]
+pub(super) struct Steep<const W: usize> {
+    pub values: [[f64; W]; 2],
+    pub across: [[f64; W]; 2],
+    pub down: [[f64; W]; 2],
+}
 
-impl Surface {
-    /// The surface about `middle` with these control points, row by row.
-    pub(super) fn new(grid: SplineGrid, per_unit: f64, middle: [f64; 2], control: &[[f64; 2]]) -> Self {
-        let SplineGrid { order, columns, rows, .. } = grid;
+impl<T: Number> Surface<T> {
+    /// The surface of this order with so many control points across and down, which `control` has row by row.
+    pub(super) fn new(order: usize, [columns, rows]: [usize; 2], control: &[[f64; 2]]) -> Self {
         let (basis, short) = if order == 3 { (&CUBIC, 3.0) } else { (&QUADRATIC, 2.0) };
         let counts = [columns as f64, rows as f64];
         let cell = |top: usize, left: usize| {
-            let mut cell = Cell::default();
+            let mut cell = [[[0.0; HALF]; 2]; POWERS];
             for (row, column) in (0..=order).flat_map(|row| (0..=order).map(move |column| (row, column))) {
                 let Some(point) = control.get((top + row) * columns + left + column) else { continue };
                 for (down, across, axis) in powers() {
-                    cell[down][2 * across + axis] += basis[row][down] * basis[column][across] * point[axis];
+                    cell[down][across / 2][2 * (across % 2) + axis] +=
+                        basis[row][down] * basis[column][across] * point[axis];
                 }
             }
-            cell
+            Cell(cell.map(|row| row.map(|half| half.map(T::of))))
         };
         let cells = (0..rows.saturating_sub(order))
             .flat_map(|top| (0..columns.saturating_sub(order)).map(move |left| (top, left)))
@@ -73,9 +123,6 @@ impl Surface {
             .collect();
         let low = 0.5 * (short - 1.0);
         Self {
-            middle,
-            per_unit,
-            half: counts.map(|count| 0.5 * (count - 1.0)),
             last: counts.map(|count| count - short),
             edges: counts.map(|count| [low, count - 1.0 - low]),
             rounding: if order == 3 { 0.0 } else { 0.5 },
@@ -83,23 +130,34 @@ impl Surface {
         }
     }
 
-    /// Where places are on the surface; those outside are on the interval at its edge, which goes on.
+    /// Intervals of the grid to the nearest edge; negative outside.
     #[inline(always)]
-    pub(super) fn places<const FUSED: bool, const W: usize>(&self, at: &[[f64; W]; 2]) -> OnSurface<W> {
-        let mut found = OnSurface { cell: [0; W], at: *at, inside: [f64::INFINITY; W] };
-        let mut number = [[0.0; W]; 2];
-        for axis in 0..2 {
-            let ([low, high], last) = (self.edges[axis], self.last[axis]);
+    pub(super) fn inside<const W: usize>(&self, places: &[[f64; W]; 2]) -> [f64; W] {
+        let mut inside = [f64::INFINITY; W];
+        for (places, [low, high]) in places.iter().zip(self.edges) {
             for j in 0..W {
-                let place = multiply_add::<FUSED>(at[axis][j] - self.middle[axis], self.per_unit, self.half[axis]);
+                let place = places[j];
                 let nearer = if place - low < high - place { place - low } else { high - place };
                 // What is no number is outside.
                 let nearer = if place.is_nan() { -1.0 } else { nearer };
-                found.inside[j] = if nearer < found.inside[j] { nearer } else { found.inside[j] };
-                let start = (place + self.rounding).floor();
+                inside[j] = if nearer < inside[j] { nearer } else { inside[j] };
+            }
+        }
+        inside
+    }
+
+    /// The intervals of places; those outside are on the interval at the edge, which goes on.
+    #[inline(always)]
+    pub(super) fn located<const FUSED: bool, const W: usize>(&self, places: &[[f64; W]; 2]) -> OnSurface<W> {
+        let mut found = OnSurface { cell: [0; W], at: *places };
+        let mut number = [[0.0; W]; 2];
+        for axis in 0..2 {
+            let last = self.last[axis];
+            for j in 0..W {
+                let start = (places[axis][j] + self.rounding).floor();
                 let start = if start < last { start } else { last };
                 let start = if start > 1.0 { start } else { 1.0 };
-                found.at[axis][j] = place - start;
+                found.at[axis][j] = places[axis][j] - start;
                 number[axis][j] = start - 1.0;
             }
         }
@@ -110,95 +168,100 @@ impl Surface {
         found
     }
 
-    /// The place itself, or the nearest one on the surface.
-    pub(super) fn kept(&self, at: [f64; 2]) -> [f64; 2] {
+    /// The place itself, or the nearest one that is at most `beyond` intervals outside.
+    pub(super) fn kept(&self, place: [f64; 2], beyond: f64) -> [f64; 2] {
         [0, 1].map(|axis| {
-            let [low, high] = self.edges[axis].map(|edge| (edge - self.half[axis]) / self.per_unit + self.middle[axis]);
-            at[axis].clamp(low, high)
+            let [low, high] = self.edges[axis];
+            place[axis].clamp(low - beyond, high + beyond)
         })
     }
 
-    /// Shifts.
+    /// Values.
     #[inline(always)]
-    pub(super) fn shifts<const FUSED: bool, const W: usize>(&self, at: &OnSurface<W>) -> [[f64; W]; 2] {
-        let mut sums = [[0.0; ROW]; W];
+    pub(super) fn values<const FUSED: bool, const W: usize>(&self, on: &OnSurface<W>) -> [[f64; W]; 2] {
+        let mut sums = Powers::<T, W>::zero();
         // One place at a time: vectors over places would gather the numbers of their cells one by one.
-        for (j, found) in sums.iter_mut().enumerate() {
-            // Never absent: places are kept on the grid.
-            let Some([a, b, c, d]) = self.cells.get(at.cell[j]) else { break };
-            let mut sum = *d;
-            for row in [c, b, a] {
-                for i in 0..ROW {
-                    sum[i] = multiply_add::<FUSED>(sum[i], at.at[1][j], row[i]);
-                }
-            }
-            *found = sum;
-        }
-        across::<FUSED, W>(&columns_of(&sums), &at.at[0])
-    }
-
-    /// Shifts with their derivatives.
-    #[inline(always)]
-    pub(super) fn shifts_with_slopes<const FUSED: bool, const W: usize>(&self, at: &OnSurface<W>) -> Shifted<W> {
-        let (mut sums, mut steeper) = ([[0.0; ROW]; W], [[0.0; ROW]; W]);
         for j in 0..W {
-            let Some([a, b, c, d]) = self.cells.get(at.cell[j]) else { break };
-            let (mut sum, mut slope) = (*d, [0.0; ROW]);
-            for row in [c, b, a] {
-                for i in 0..ROW {
-                    slope[i] = multiply_add::<FUSED>(slope[i], at.at[1][j], sum[i]);
-                    sum[i] = multiply_add::<FUSED>(sum[i], at.at[1][j], row[i]);
+            // Never absent: places are kept on the grid.
+            let Some(Cell([a, b, c, d])) = self.cells.get(on.cell[j]) else { break };
+            let y = T::of(on.at[1][j]);
+            for half in 0..2 {
+                let mut sum = d[half];
+                for row in [c, b, a] {
+                    for i in 0..HALF {
+                        sum[i] = T::fused::<FUSED>(sum[i], y, row[half][i]);
+                    }
                 }
-            }
-            (sums[j], steeper[j]) = (sum, slope);
-        }
-        let (sums, x) = (columns_of(&sums), &at.at[0]);
-        let (shifts, by_y) = (across::<FUSED, W>(&sums, x), across::<FUSED, W>(&columns_of(&steeper), x));
-        let by_x = slopes_across::<FUSED, W>(&sums, x);
-        let mut slopes = [[by_x[0], by_y[0]], [by_x[1], by_y[1]]];
-        for slope in slopes.as_flattened_mut() {
-            for value in slope {
-                *value *= self.per_unit;
+                sums.0[half][j] = sum;
             }
         }
-        (shifts, slopes)
+        across::<T, FUSED, W>(&sums, &on.at[0])
     }
 }
 
-/// All powers along both axes, for both coordinates.
+impl Surface {
+    /// Values with their derivatives.
+    #[inline(always)]
+    pub(super) fn steep<const FUSED: bool, const W: usize>(&self, on: &OnSurface<W>) -> Steep<W> {
+        let (mut sums, mut slopes) = (Powers::<f64, W>::zero(), Powers::<f64, W>::zero());
+        for j in 0..W {
+            let Some(Cell([a, b, c, d])) = self.cells.get(on.cell[j]) else { break };
+            let y = on.at[1][j];
+            for half in 0..2 {
+                let (mut sum, mut slope) = (d[half], [0.0; HALF]);
+                for row in [c, b, a] {
+                    for i in 0..HALF {
+                        slope[i] = multiply_add::<FUSED>(slope[i], y, sum[i]);
+                        sum[i] = multiply_add::<FUSED>(sum[i], y, row[half][i]);
+                    }
+                }
+                (sums.0[half][j], slopes.0[half][j]) = (sum, slope);
+            }
+        }
+        let x = &on.at[0];
+        let (values, down) = (across::<f64, FUSED, W>(&sums, x), across::<f64, FUSED, W>(&slopes, x));
+        Steep { values, across: slopes_across::<FUSED, W>(&sums, x), down }
+    }
+}
+
+impl<T: Number, const W: usize> Powers<T, W> {
+    #[inline(always)]
+    fn zero() -> Self {
+        Self([[[T::default(); HALF]; W]; 2])
+    }
+}
+
+/// All powers along both axes, for both values.
 fn powers() -> impl Iterator<Item = (usize, usize, usize)> {
     (0..POWERS).flat_map(|down| (0..POWERS).flat_map(move |across| [(down, across, 0), (down, across, 1)]))
 }
 
-/// The polynomials across, of both coordinates.
+/// The polynomials across a + b x + c x² + d x³.
 #[inline(always)]
-fn across<const FUSED: bool, const W: usize>(sums: &[[f64; W]; ROW], x: &[f64; W]) -> [[f64; W]; 2] {
-    let [[a, b], [c, d], [e, f], [g, h]] = coordinates(sums);
-    let (mut first, mut second) = ([0.0; W], [0.0; W]);
+fn across<T: Number, const FUSED: bool, const W: usize>(
+    Powers([low, high]): &Powers<T, W>,
+    x: &[f64; W],
+) -> [[f64; W]; 2] {
+    let (fused, mut values) = (T::fused::<FUSED>, [[0.0; W]; 2]);
     for j in 0..W {
-        let x = x[j];
-        let fused = multiply_add::<FUSED>;
-        first[j] = fused(fused(fused(g[j], x, e[j]), x, c[j]), x, a[j]);
-        second[j] = fused(fused(fused(h[j], x, f[j]), x, d[j]), x, b[j]);
+        let ([a, e, b, f], [c, g, d, h], x) = (low[j], high[j], T::of(x[j]));
+        values[0][j] = fused(fused(fused(d, x, c), x, b), x, a).long();
+        values[1][j] = fused(fused(fused(h, x, g), x, f), x, e).long();
     }
-    [first, second]
+    values
 }
 
 /// Their derivatives.
 #[inline(always)]
-fn slopes_across<const FUSED: bool, const W: usize>(sums: &[[f64; W]; ROW], x: &[f64; W]) -> [[f64; W]; 2] {
-    let [_, [c, d], [e, f], [g, h]] = coordinates(sums);
-    let (mut first, mut second) = ([0.0; W], [0.0; W]);
+fn slopes_across<const FUSED: bool, const W: usize>(
+    Powers([low, high]): &Powers<f64, W>,
+    x: &[f64; W],
+) -> [[f64; W]; 2] {
+    let (fused, mut slopes) = (multiply_add::<FUSED>, [[0.0; W]; 2]);
     for j in 0..W {
-        let (x, fused) = (x[j], multiply_add::<FUSED>);
-        first[j] = fused(fused(3.0 * g[j], x, 2.0 * e[j]), x, c[j]);
-        second[j] = fused(fused(3.0 * h[j], x, 2.0 * f[j]), x, d[j]);
+        let ([_, _, b, f], [c, g, d, h], x) = (low[j], high[j], x[j]);
+        slopes[0][j] = fused(fused(3.0 * d, x, 2.0 * c), x, b);
+        slopes[1][j] = fused(fused(3.0 * h, x, 2.0 * g), x, f);
     }
-    [first, second]
-}
-
-/// The coefficients of both coordinates for each power.
-#[inline(always)]
-fn coordinates<const W: usize>([a, b, c, d, e, f, g, h]: &[[f64; W]; ROW]) -> [[&[f64; W]; 2]; POWERS] {
-    [[a, b], [c, d], [e, f], [g, h]]
+    slopes
 }

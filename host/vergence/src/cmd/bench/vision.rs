@@ -43,6 +43,9 @@ pub fn run(args: &Args, console: Console) -> Result<(), Failure> {
     for lens in &bench.lenses {
         console.say(format!("{:>30}: {}", lens.name, lens.in_words()))?;
     }
+    for level in &bench.levels {
+        console.say(format!("{:>30}: {}", level.model.to_string(), level.in_words()))?;
+    }
     for (points, times) in &bench.growth {
         console.say(format!("{points:>10} points: {}", times.in_words(None)))?;
     }
