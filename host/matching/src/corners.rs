@@ -144,18 +144,27 @@ fn maxima(plane: &Plane, rows: Range<usize>, level: usize) -> Vec<Corner> {
     let around = rows.start.saturating_sub(R)..(rows.end + R).min(plane.height());
     let (top, response) = (around.start, response(plane, around));
     let inner = R..response.width().saturating_sub(R);
-    let in_row = |y: usize| {
-        let (above, here, below) = (response.row(y - 1), response.row(y), response.row(y + 1));
-        // Most pixels are no maximum already beside these.
-        let is_candidate = |x: &usize| {
-            let (x, centre) = (*x, here[*x]);
-            let beside = here[x + 1] <= centre && here[x - 1] < centre;
-            beside && centre >= LEAST_STRENGTH && below[x] <= centre && above[x] < centre
-        };
-        let found = inner.clone().filter(is_candidate);
+    let in_row = |highest: &mut Vec<bool>, y: usize| {
+        highest.resize(response.width(), false);
+        are_highest([response.row(y - 1), response.row(y), response.row(y + 1)], highest);
+        let found = inner.clone().filter(|x| highest[*x]);
         found.filter_map(|x| maximum_at(&response, (x, y), level, top)).collect::<Vec<_>>()
     };
-    (R..response.height().saturating_sub(R)).into_par_iter().flat_map_iter(in_row).collect()
+    let rows = (R..response.height().saturating_sub(R)).into_par_iter();
+    rows.map_init(Vec::new, in_row).flatten_iter().collect()
+}
+
+/// Which pixels of a row are high and no lower than those beside, above and below them. Most are no maximum already by that.
+#[multiversion(targets("x86_64+avx2"))]
+fn are_highest([above, row, below]: [&[f32]; 3], highest: &mut [bool]) {
+    let inner = row.len().saturating_sub(2);
+    let (left, here, right) = (&row[..inner], &row[1..][..inner], &row[2..][..inner]);
+    let (above, below, highest) = (&above[1..][..inner], &below[1..][..inner], &mut highest[1..][..inner]);
+    for x in 0..inner {
+        let centre = here[x];
+        let beside = (right[x] <= centre) & (left[x] < centre);
+        highest[x] = beside & (centre >= LEAST_STRENGTH) & (below[x] <= centre) & (above[x] < centre);
+    }
 }
 
 /// The corner at (x, y), if the response is largest there and the quadratic through its neighbours peaks nearby. The first row of the

@@ -33,14 +33,18 @@ impl EpipolarBand {
 
     /// Whether two positions, each known to `tolerance` pixels, may be of one point.
     pub(crate) fn allows(&self, left: ViewPixel, right: ViewPixel, tolerance: f64) -> bool {
-        let slack = tolerance + self.pose_px;
-        let off_row = (left.y - right.y).abs() * self.shortening(left);
-        let disparity = left.x - right.x;
-        let nearness = (disparity / self.largest_disparity(left.x)).clamp(0.0, 1.0);
-        let nearness = if nearness.is_finite() { nearness } else { 1.0 };
-        off_row <= slack + self.pupil_px * nearness
-            && disparity >= -slack
-            && disparity <= self.largest_disparity(left.x) + slack
+        self.of(left, tolerance).holds(right)
+    }
+
+    /// Where partners of `left` may be, each known to `tolerance` pixels.
+    pub(crate) fn of(&self, left: ViewPixel, tolerance: f64) -> Partners {
+        Partners {
+            left,
+            shortening: self.shortening(left),
+            largest_disparity: self.largest_disparity(left.x),
+            slack: tolerance + self.pose_px,
+            pupil_px: self.pupil_px,
+        }
     }
 
     /// Length of the arc of one row at `at`, relative to that on the axis: a row is an angle about the baseline.
@@ -61,5 +65,28 @@ impl EpipolarBand {
         let a = self.grid.a(x);
         let (along, across) = (self.nearest_mm * a.sin() - self.baseline_mm, self.nearest_mm * a.cos());
         (a - along.atan2(across)) * self.grid.pixels_per_radian()
+    }
+}
+
+/// The part of the right view where partners of one position of the left view may be.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Partners {
+    left: ViewPixel,
+    shortening: f64,
+    largest_disparity: f64,
+    slack: f64,
+    pupil_px: f64,
+}
+
+impl Partners {
+    /// Whether a position of the right view is one of them.
+    pub(crate) fn holds(&self, right: ViewPixel) -> bool {
+        let off_row = (self.left.y - right.y).abs() * self.shortening;
+        let disparity = self.left.x - right.x;
+        let nearness = (disparity / self.largest_disparity).clamp(0.0, 1.0);
+        let nearness = if nearness.is_finite() { nearness } else { 1.0 };
+        off_row <= self.slack + self.pupil_px * nearness
+            && disparity >= -self.slack
+            && disparity <= self.largest_disparity + self.slack
     }
 }

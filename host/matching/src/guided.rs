@@ -161,14 +161,14 @@ fn nearest(
     from: &Features,
     to: &Features,
     reach: f64,
-    allowed: impl Fn(&Keypoint, &Keypoint) -> bool + Sync,
+    allowed: impl Fn(usize, usize) -> bool + Sync,
 ) -> Vec<Result<usize, UnmatchedReason>> {
     let partner = |i: usize| {
         let (keypoint, descriptor) = (&from.keypoints[i], &from.descriptors[i]);
         let scale = (1_usize << keypoint.level) as f64;
         let candidates: Vec<(usize, f32)> = to
             .near_row(keypoint.at.y, reach * scale)
-            .filter(|&j| to.keypoints[j].level == keypoint.level && allowed(keypoint, &to.keypoints[j]))
+            .filter(|&j| to.keypoints[j].level == keypoint.level && allowed(i, j))
             .map(|j| (j, descriptor.distance_squared(&to.descriptors[j])))
             .collect();
         let &(best, least) =
@@ -190,10 +190,11 @@ fn nearest(
 /// Links every left keypoint to its most similar right one, if the choice is mutual.
 pub(crate) fn compare(left: &Features, right: &Features, band: &EpipolarBand) -> Links {
     let tolerance = |keypoint: &Keypoint| KEYPOINT_TOLERANCE * (1_usize << keypoint.level) as f64;
-    let allowed = |l: &Keypoint, r: &Keypoint| band.allows(l.at, r.at, tolerance(l));
+    let partners: Vec<_> = left.keypoints.iter().map(|keypoint| band.of(keypoint.at, tolerance(keypoint))).collect();
+    let allowed = |l: usize, r: usize| partners[l].holds(right.keypoints[r].at);
     let reach = band.reach(KEYPOINT_TOLERANCE);
-    let forth = nearest(left, right, reach, allowed);
-    let back = nearest(right, left, reach, |r, l| allowed(l, r));
+    let (forth, back) =
+        rayon::join(|| nearest(left, right, reach, allowed), || nearest(right, left, reach, |r, l| allowed(l, r)));
     let link = |(i, partner): (usize, &Result<usize, UnmatchedReason>)| {
         let j = (*partner)?;
         let (from, to) = (&left.keypoints[i], &right.keypoints[j]);

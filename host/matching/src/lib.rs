@@ -35,12 +35,14 @@ mod plane;
 mod pool;
 mod propagate;
 mod refine;
+mod sampling;
 mod shared_field;
 mod shared_frame;
 mod shared_views;
 mod smoothing;
 mod track;
 mod view;
+mod view_map;
 mod wrong_pose;
 
 pub use corners::image_corners;

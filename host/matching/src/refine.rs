@@ -47,18 +47,18 @@ const LARGEST_SIGMA: f64 = 0.15;
 /// Largest distance in pixels between a keypoint and the result of registering to the right view and back.
 const LARGEST_LOOP: f64 = 0.15;
 
-/// Memory in which windows are prepared: they are too large to be moved about.
+/// Memory in which windows are prepared: they are too large to be moved about, or to be exchanged but by their addresses.
 pub(crate) struct Scratch {
     /// The window of the left view.
-    forth: Template,
+    forth: Box<Template>,
     /// The window of the right view, for the way back.
-    back: Template,
+    back: Box<Template>,
 }
 
 impl Scratch {
     /// Windows without content.
     pub(crate) fn new() -> Box<Self> {
-        Box::new(Self { forth: Template::empty(), back: Template::empty() })
+        Box::new(Self { forth: Box::new(Template::empty()), back: Box::new(Template::empty()) })
     }
 
     /// Makes the window of the way back that of the way forth: a place that was found in one view is registered in the next from the same window.

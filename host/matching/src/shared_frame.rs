@@ -1,7 +1,7 @@
 //! The shared axes of a pair, in which both images are compared.
 
 use nalgebra::{Matrix3, Rotation3, UnitQuaternion, Vector3};
-use vergence_vision::{Frame, Left, Length, Right, Transform};
+use vergence_vision::{Angle, Frame, Left, Length, Right, Transform};
 
 /// The frame of the shared axes of a pair.
 ///
@@ -40,6 +40,13 @@ impl SharedFrame {
             shared_from_right: Transform::new(turn * right, Vector3::zeros()),
             baseline: Length::from_mm(left_from_right.origin().mm().norm()),
         })
+    }
+
+    /// The axes of `before`, if neither camera has turned from them by as much as `most`, or else these: what was made for one serves the other.
+    pub(crate) fn or_nearly(self, before: &Self, most: Angle) -> Self {
+        let left = self.shared_from_left.rotation().angle_to(&before.shared_from_left.rotation());
+        let right = self.shared_from_right.rotation().angle_to(&before.shared_from_right.rotation());
+        if left.max(right) < most.rad() { Self { baseline: self.baseline, ..*before } } else { self }
     }
 
     /// The rotation of the left camera to the shared axes; its translation is zero.

@@ -15,6 +15,9 @@ pub(crate) const DENSITY: f64 = 450.0;
 /// The field of cameras with parallel axes, in square radians: 150° by 198°.
 const WHOLE_FIELD: f64 = 9.05;
 
+/// A turn that moves no pixel of a view by as much as this shows nowhere: registration ends with a step of up to a hundredth of a pixel.
+const KEPT_PX: f64 = 0.005;
+
 /// How dense views are, in pixels of the view per pixel of the denser fisheye image.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Density {
@@ -51,36 +54,38 @@ impl<'a> SharedViews<'a> {
         let density = pair.left_camera.k()[0].max(pair.right_camera.k()[0]);
         let oversampling = oversampling.filter(|o| o.is_finite()).unwrap_or(DENSITY / density).clamp(1.0, 2.0);
         let density = Density { least: oversampling, most: oversampling };
-        Self::in_buffers(pair, density, None, &mut Buffers::default())
+        Self::in_buffers(pair, density, None, &mut Default::default())
     }
 
-    /// The same in memory that is taken from `buffers`, and on the grid of an earlier pair, if its pose was nearly this one.
+    /// The same in memory that is taken from `buffers`, those of the left and of the right camera, and on the grid of an earlier pair, if its pose
+    /// was nearly this one. Where the pose turned by less than shows, the axes are those of the pair before too, and so is where the pixels of the views lie.
     pub(crate) fn in_buffers(
         pair: &'a ImagePair<'a>,
         oversampling: Density,
-        kept: Option<Grid>,
-        buffers: &mut Buffers,
+        kept: Option<(Grid, SharedFrame)>,
+        [of_left, of_right]: &mut [Buffers; 2],
     ) -> Result<Self, MatchError> {
         let frame = SharedFrame::new(&pair.left_from_right).ok_or(MatchError::NoBaseline)?;
         let density = pair.left_camera.k()[0].max(pair.right_camera.k()[0]);
+        let frame = kept.map_or(frame, |(grid, before)| {
+            frame.or_nearly(&before, Angle::from_rad(KEPT_PX / grid.pixels_per_radian()))
+        });
         let field = SharedField::of(&frame, pair);
         let over = |extent: Extent| Grid::over(&extent, density * oversampling.over(&extent));
-        let grid = kept.or_else(|| field.extent().and_then(over)).ok_or(MatchError::NoSharedField)?;
+        let grid = kept.map(|(grid, _)| grid).or_else(|| field.extent().and_then(over));
+        let grid = grid.ok_or(MatchError::NoSharedField)?;
         let [left, right] = [(pair.left, pair.masks[0]), (pair.right, pair.masks[1])];
-        Ok(Self {
-            frame,
-            grid,
-            left: View::in_buffers(left, pair.left_camera, frame.shared_from_left(), grid, buffers),
-            right: View::in_buffers(right, pair.right_camera, frame.shared_from_right(), grid, buffers),
-            field,
-            pair,
-        })
+        let (left, right) = rayon::join(
+            || View::in_buffers(left, pair.left_camera, frame.shared_from_left(), grid, of_left),
+            || View::in_buffers(right, pair.right_camera, frame.shared_from_right(), grid, of_right),
+        );
+        Ok(Self { frame, grid, left, right, field, pair })
     }
 
     /// Gives the memory back.
-    pub(crate) fn recycle(self, buffers: &mut Buffers) {
-        self.left.recycle(buffers);
-        self.right.recycle(buffers);
+    pub(crate) fn recycle(self, [of_left, of_right]: &mut [Buffers; 2]) {
+        self.left.recycle(of_left);
+        self.right.recycle(of_right);
     }
 
     /// The epipolar band for the uncertainty of the pair's pose.

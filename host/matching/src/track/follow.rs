@@ -49,7 +49,7 @@ fn refound(scratch: &mut Scratch, seen: &Seen<'_>, track: &Track) -> Result<Link
 fn moved(before: &Before, seen: &Seen<'_>, track: &Track, at: ViewPixel) -> [f64; 2] {
     let (old, new) = (&before.grid, &seen.views.grid);
     let (left, right) = (old.a(track.at.x), old.a(track.at.x + track.moved[0]));
-    let inverse_range = (left - right).sin() / (before.baseline_mm * right.cos());
+    let inverse_range = (left - right).sin() / (before.frame.baseline().mm() * right.cos());
     let a = new.a(at.x);
     let parallax = seen.views.frame.baseline().mm() * inverse_range;
     let there = (a.sin() - parallax).atan2(a.cos());

@@ -32,7 +32,7 @@ use crate::pool::in_pool;
 use crate::refine::Scratch;
 use crate::shared_views::{DENSITY, Density, SharedViews};
 use crate::view::Buffers;
-use crate::{Grid, GuidedMatcher, ImagePair, MatchError, Matcher, Matches, UnmatchedReason, ViewPixel};
+use crate::{Grid, GuidedMatcher, ImagePair, MatchError, Matcher, Matches, SharedFrame, UnmatchedReason, ViewPixel};
 
 /// A matcher for pairs that follow one another.
 #[derive(Debug)]
@@ -131,7 +131,8 @@ struct State {
     strip: usize,
     /// Number of tracks that the last search of a whole pair gave.
     at_first: usize,
-    buffers: Buffers,
+    /// Of the left and of the right camera.
+    buffers: [Buffers; 2],
 }
 
 /// The pair before.
@@ -141,7 +142,7 @@ struct Before {
     /// For which the grid was made.
     pose: Transform<Left, Right>,
     grid: Grid,
-    baseline_mm: f64,
+    frame: SharedFrame,
     left: Pyramid,
     /// In the order of their numbers.
     tracks: Vec<Track>,
@@ -181,10 +182,14 @@ impl State {
         let cameras = [*pair.left_camera, *pair.right_camera];
         let mut before = self.before.take().filter(|before| before.cameras == cameras);
         let kept = before.as_ref().filter(|before| is_near(&before.pose, &pair.left_from_right));
-        let (grid, pose) = kept.map_or((None, pair.left_from_right), |before| (Some(before.grid), before.pose));
+        let (grid, pose) =
+            kept.map_or((None, pair.left_from_right), |before| (Some((before.grid, before.frame)), before.pose));
         let views = SharedViews::in_buffers(pair, density, grid, &mut self.buffers)?;
-        let [left, right] = [&views.left.plane(), &views.right.plane()]
-            .map(|plane| Pyramid::in_buffers(plane, LEVELS, &mut self.buffers.values));
+        let [of_left, of_right] = &mut self.buffers;
+        let (left, right) = rayon::join(
+            || Pyramid::in_buffers(views.left.plane(), LEVELS, &mut of_left.values),
+            || Pyramid::in_buffers(views.right.plane(), LEVELS, &mut of_right.values),
+        );
         let seen = Seen { band: views.band(), views, left, right };
         let cells = Cells::for_points(most, seen.views.grid.size());
         before.iter_mut().for_each(|before| cells.thin(&mut before.tracks, most));
@@ -203,16 +208,16 @@ impl State {
         if strip.is_whole {
             self.at_first = tracks.len();
         }
-        before.into_iter().for_each(|before| before.left.recycle(&mut self.buffers.values));
+        before.into_iter().for_each(|before| before.left.recycle(&mut self.buffers[0].values));
         let Seen { views, left, right, .. } = seen;
-        let (grid, baseline_mm) = (views.grid, views.frame.baseline().mm());
-        right.recycle(&mut self.buffers.values);
+        let (grid, frame) = (views.grid, views.frame);
+        right.recycle(&mut self.buffers[1].values);
         views.recycle(&mut self.buffers);
         if strip.is_whole && are_suspiciously_few(&matches) {
-            left.recycle(&mut self.buffers.values);
+            left.recycle(&mut self.buffers[0].values);
             return whole.find(pair);
         }
-        self.before = Some(Before { cameras, pose, grid, baseline_mm, left, tracks });
+        self.before = Some(Before { cameras, pose, grid, frame, left, tracks });
         Ok(matches)
     }
 

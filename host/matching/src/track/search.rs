@@ -63,12 +63,21 @@ type Sought = (Keypoint, Result<Link, UnmatchedReason>);
 pub(super) fn newly_found(seen: &Seen<'_>, tracks: &[Track], strip: &Strip, budget: usize) -> (Vec<Sought>, usize) {
     let rows = strip.with_surroundings();
     let share = budget * rows.len() / strip.height.max(1);
-    let left = detect_within(&seen.left, rows.clone(), share, |keypoint| seen.views.shared_from_left(keypoint));
-    let right = detect_within(&seen.right, rows, share, |keypoint| seen.views.shared_from_right(keypoint));
-    let (left, right) = (Features::of(&seen.left, left), Features::of(&seen.right, right));
+    let of_left = || {
+        let found = detect_within(&seen.left, rows.clone(), share, |keypoint| seen.views.shared_from_left(keypoint));
+        Features::of(&seen.left, found)
+    };
+    let of_right = || {
+        let found = detect_within(&seen.right, rows.clone(), share, |keypoint| seen.views.shared_from_right(keypoint));
+        Features::of(&seen.right, found)
+    };
+    let (left, right) = rayon::join(of_left, of_right);
     let links = compare(&left, &right, &seen.band);
     let is_new = |keypoint: &Keypoint| {
-        let near = |track: &Track| (track.at.x - keypoint.at.x).hypot(track.at.y - keypoint.at.y) < SAME_POINT;
+        let near = |track: &Track| {
+            let (dx, dy) = (track.at.x - keypoint.at.x, track.at.y - keypoint.at.y);
+            dx * dx + dy * dy < SAME_POINT * SAME_POINT
+        };
         strip.holds(keypoint) && !tracks.iter().any(near)
     };
     let new = left.keypoints.into_par_iter().zip(links).filter(|(keypoint, _)| is_new(keypoint)).collect();
