@@ -262,7 +262,8 @@ impl LiveLoop {
     /// Tells the budget what a cloud took until the next pair could begin.
     fn note_cost(&mut self, begun: &Begun, measurement: &Measurement) {
         if let (Some(budget), Observation::Points { .. }) = (&mut self.budget, &measurement.observation) {
-            budget.took(begun.at.elapsed().as_secs_f64());
+            let for_pixels = measurement.dense.as_ref().map_or(0.0, |dense| dense.seconds);
+            budget.took(begun.at.elapsed().as_secs_f64() - for_pixels, for_pixels);
         }
     }
 

@@ -75,3 +75,26 @@ fn orthogonal_to(x: &Vector3<f64>, axis: &Vector3<f64>) -> Option<Vector3<f64>> 
     const LEAST: f64 = 0.05;
     (axis - x * axis.dot(x)).try_normalize(LEAST)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn turned(by: f64, baseline_mm: f64) -> SharedFrame {
+        let turn = UnitQuaternion::from_euler_angles(0.0, 1.0 + by, 0.0);
+        SharedFrame::new(&Transform::new(turn, Vector3::new(baseline_mm, 1.0, 3.0))).unwrap()
+    }
+
+    #[test]
+    fn axes_stay_while_no_camera_turns_by_what_shows() {
+        let (first, most) = (turned(0.0, 100.0), Angle::from_rad(1e-5));
+        let near = turned(4e-6, 100.0).or_nearly(&first, most);
+        assert_eq!(near.shared_from_right, first.shared_from_right);
+        // Small turns do not add up: it is the axes that were kept which count.
+        let far = turned(4e-5, 100.0);
+        assert_eq!(far.or_nearly(&near, most), far);
+        // The baseline is always the new one.
+        let longer = SharedFrame { baseline: Length::from_mm(130.0), ..first };
+        assert_eq!(longer.or_nearly(&first, most).baseline(), Length::from_mm(130.0));
+    }
+}

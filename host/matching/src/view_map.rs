@@ -26,7 +26,7 @@ pub(crate) struct Mapped {
 }
 
 /// The places in an image of the pixels of one row of a view.
-#[derive(Clone, Debug, Default)]
+#[derive(Clone, Debug, Default, PartialEq)]
 pub(crate) struct Places {
     /// Index of the first of the 4 x 4 pixels around each place, by rows; [`UNSEEN`] where there is none.
     pub firsts: Vec<u32>,
@@ -208,6 +208,72 @@ fn place((width, height): (u32, u32), pixels: &[[f64; 2]], seen: &mut [bool], pl
         past_v.copy_from_slice(&past[1][..pixels.len()]);
         for ((first, found), seen) in firsts.iter_mut().zip(found).zip(seen) {
             *first = if *seen { found } else { UNSEEN };
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use nalgebra::Rotation3;
+    use vergence_vision::{Angle, ImageSize};
+
+    use super::*;
+    use crate::grid::Extent;
+
+    const SIDE: u32 = 160;
+
+    fn turned(by: f64) -> Mapped {
+        let (size, middle) = (ImageSize { width: SIDE, height: SIDE }, f64::from(SIDE) / 2.0);
+        let centre = Pixel { u: middle - 0.3, v: middle + 1.2 };
+        let camera = KannalaBrandt::new([46.0, 0.7, -0.4, 0.0, 0.0], 1.0, centre, Angle::from_deg(98.0), size).unwrap();
+        // As far as the edge of the field and beyond.
+        let grid = Grid::over(&Extent { a_min: -1.4, a_max: 1.2, b_min: -1.8, b_max: 1.6 }, 45.0).unwrap();
+        let turn = Rotation3::from_euler_angles(0.02, by, -0.05).into_inner();
+        Mapped { camera, turn, grid, image: (SIDE, SIDE - 20), mask: None }
+    }
+
+    /// The places of all rows of a view, computed anew.
+    fn anew(rays: &Rays<'_>) -> Vec<Places> {
+        let row = |y| {
+            let (mut line, mut places) = (Line::default(), Places::default());
+            rays.fill(y, &mut line, &mut places);
+            places
+        };
+        (0..rays.mapped.grid.size().1).map(row).collect()
+    }
+
+    #[test]
+    fn a_map_is_kept_while_views_are_alike_and_is_that_of_the_view() {
+        let mut kept = Kept::default();
+        for (by, has_map) in [(0.3, false), (0.3, true), (0.3, true), (0.4, false), (0.3, false), (0.3, true)] {
+            let (rays, map) = kept.of(turned(by));
+            let (map, new) = (map.map(<[Places]>::to_vec), anew(&rays));
+            let seen = new.iter().flat_map(|places| &places.firsts).filter(|&&first| first != UNSEEN).count();
+            assert!((10_000..18_000).contains(&seen), "{seen} of 18 172 places are seen");
+            assert_eq!(map.is_some(), has_map, "turned by {by}");
+            assert!(map.is_none_or(|map| map == new), "turned by {by}: the kept map is another");
+        }
+    }
+
+    #[test]
+    fn another_lens_image_or_mask_has_another_map() {
+        let size = ImageSize { width: SIDE, height: SIDE };
+        let other_camera = {
+            let lens = turned(0.3).camera;
+            KannalaBrandt::new(lens.k(), lens.aspect(), Pixel { u: 70.0, v: 80.0 }, Angle::from_deg(98.0), size)
+                .unwrap()
+        };
+        for other in [
+            Mapped { camera: other_camera, ..turned(0.3) },
+            Mapped { image: (SIDE, SIDE), ..turned(0.3) },
+            turned(0.3 + 1e-12),
+        ] {
+            let mut kept = Kept::default();
+            (0..3).for_each(|_| drop(kept.of(turned(0.3))));
+            assert!(kept.of(other.clone()).1.is_none());
+            let (rays, map) = kept.of(other);
+            let map = map.map(<[Places]>::to_vec);
+            assert!(map == Some(anew(&rays)));
         }
     }
 }

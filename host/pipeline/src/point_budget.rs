@@ -2,6 +2,8 @@
 //!
 //! Less time than frames means fewer points first, and a lower rate only where they would become too few. What a pair costs grows with the
 //! points, but never faster than in proportion, so that the budget follows the ratio of the time that there is to the time that was taken.
+//! What else a pair takes, as ranges of all its pixels, leaves less time for points. Where not even the least points would keep the rate beside it, they are
+//! as many as there is time for without it: fewer would be lost for nothing.
 
 use std::collections::VecDeque;
 
@@ -59,13 +61,18 @@ impl PointBudget {
         keep(&mut self.periods, seconds);
     }
 
-    /// Notes the seconds that a pair took until the next one could begin, and changes the limit.
-    pub fn took(&mut self, seconds: f64) {
+    /// Notes the seconds that the points of a pair took until the next one could begin, besides `others` for what else was measured of it, and changes
+    /// the limit.
+    pub fn took(&mut self, seconds: f64, others: f64) {
         let is_first = std::mem::replace(&mut self.is_first, false);
         keep(&mut self.costs, if is_first { seconds / FIRST } else { seconds });
         let Some(period) = vergence_vision::median(self.periods.iter().copied().collect()) else { return };
-        let there_is = SHARE * period;
-        let late = self.late(period).or_else(|| self.costs.back().copied().filter(|cost| is_first && *cost > there_is));
+        let at_least = seconds * self.least / self.now;
+        let others = if at_least + others < SHARE * period { others } else { 0.0 };
+        let there_is = SHARE * period - others;
+        let late = self
+            .late(period - others)
+            .or_else(|| self.costs.back().copied().filter(|cost| is_first && *cost > there_is));
         let factor = if let Some(cost) = late {
             self.costs.clear();
             there_is / cost
@@ -102,7 +109,7 @@ mod tests {
         let one = |_| {
             let points = budget.limit().map_or(budget.of, |limit| limit.most);
             budget.came_after(period);
-            budget.took(fixed + per_point * points as f64);
+            budget.took(fixed + per_point * points as f64, 0.0);
             points
         };
         (0..pairs).map(one).collect()
@@ -132,7 +139,7 @@ mod tests {
         let (period, mut budget) = (1.0 / 60.0, PointBudget::new(150, 700));
         // 8 ms and 0.05 ms for each point: all take 43 ms, the first pair as a whole 86 ms.
         budget.came_after(period);
-        budget.took(0.086);
+        budget.took(0.086, 0.0);
         let points = limits(&mut budget, [0.008, 5e-5, period], 60);
         let late = points.iter().filter(|points| 0.008 + 5e-5 * **points as f64 > period).count();
         assert!(points[0] < 350 && late <= 6, "{points:?}");
@@ -140,7 +147,7 @@ mod tests {
         // A first pair that takes long where there is time for the others limits nothing.
         let mut budget = PointBudget::new(150, 700);
         budget.came_after(1.0 / 15.0);
-        budget.took(0.110);
+        budget.took(0.110, 0.0);
         assert_eq!(budget.limit(), None);
     }
 
@@ -148,9 +155,27 @@ mod tests {
     fn one_pair_that_takes_long_limits_nothing() {
         let mut budget = PointBudget::new(120, 700);
         limits(&mut budget, [0.010, 5e-5, 1.0 / 15.0], 10);
-        budget.took(0.4);
-        budget.took(0.4);
+        budget.took(0.4, 0.0);
+        budget.took(0.4, 0.0);
         assert_eq!(budget.limit(), None);
+    }
+
+    #[test]
+    fn what_else_is_measured_costs_points_where_that_keeps_the_rate() {
+        let after = |others: f64| {
+            let mut budget = PointBudget::new(150, 700);
+            for _ in 0..60 {
+                let points = budget.limit().map_or(700, |limit| limit.most);
+                budget.came_after(0.2);
+                budget.took(0.010 + 1e-4 * points as f64, others);
+            }
+            budget.limit().map_or(700, |limit| limit.most)
+        };
+        // All points take 80 ms of 170; 120 ms for others leave 50, enough for 400 of them.
+        assert_eq!(after(0.080), 700);
+        assert!((360..430).contains(&after(0.120)), "{}", after(0.120));
+        // The least points take 25 ms: no number of them keeps the rate beside 160 ms, or beside a second.
+        assert_eq!([after(0.160), after(1.0)], [700, 700]);
     }
 
     #[test]

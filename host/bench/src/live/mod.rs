@@ -82,7 +82,7 @@ impl LiveFigures {
             let method = Method { points: limit, ..Method::from(&tracking as &dyn Matcher) };
             let (found, seconds) = timed(clock, || points(&frames.rig, frame, method, &mut |stage| times.ended(stage)));
             budget.came_after(rate.recip());
-            budget.took(seconds);
+            budget.took(seconds, 0.0);
             figures.limits.push(limit.unwrap_or(most));
             figures.computed += computed_seconds() - before;
             now = now.max(exposed) + seconds;
