@@ -194,16 +194,14 @@ impl State {
         let cells = Cells::for_points(most, seen.views.grid.size());
         before.iter_mut().for_each(|before| cells.thin(&mut before.tracks, most));
         let (tracks, links) = before.as_ref().map_or_else(Default::default, |before| followed(before, &seen));
-        let at_first = self.at_first.min(most) as f64;
-        let are_too_few = (tracks.len() as f64) < (FEW * at_first).max(FEWEST as f64);
-        let are_few = (tracks.len() as f64) < MANY * most as f64;
+        let are_too_few = (tracks.len() as f64) < (FEW * self.at_first.min(most) as f64).max(FEWEST as f64);
         let strips = match tracks.len() as f64 / most as f64 {
             ..VERY_FEW => 3,
             ..MANY => 2,
             _ => 1,
         };
         let strip = self.next_strip(&seen.views.grid, are_too_few, strips);
-        let keypoints = if are_few && !strip.is_whole { in_strips } else { whole.keypoints };
+        let keypoints = if strips > 1 && !strip.is_whole { in_strips } else { whole.keypoints };
         let (matches, tracks) = self.matched(&seen, (tracks, links), &strip, [keypoints, most]);
         if strip.is_whole {
             self.at_first = tracks.len();
