@@ -1,3 +1,5 @@
+//! Tests of `src/batch/arc_tangent.rs`, of what is private there.
+
 use super::*;
 
 #[test]

@@ -1,3 +1,5 @@
+//! Tests of `src/batch/chebyshev.rs`, of what is private there.
+
 use super::*;
 
 #[test]
