@@ -38,14 +38,17 @@ pub struct LensTimes {
     pub limit: f64,
 }
 
+/// A ratio of times for people, which says so where it is more than `limit`.
+pub(crate) fn ratio_in_words(ratio: f64, limit: f64) -> String {
+    let over = if ratio > limit { ", more than allowed" } else { "" };
+    format!("{ratio:.2}{over}")
+}
+
 impl LensTimes {
     /// Nanoseconds for people.
     #[must_use]
     pub fn in_words(&self) -> String {
-        let ratio = |ratio: f64| {
-            let over = if ratio > self.limit { ", more than allowed" } else { "" };
-            format!("{ratio:.2}{over}")
-        };
+        let ratio = |ratio| ratio_in_words(ratio, self.limit);
         format!(
             "project {:.1} ({}), unproject {:.1} ({}) times {}, {} allowed",
             self.project_ns,

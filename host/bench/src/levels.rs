@@ -12,6 +12,7 @@ use vergence_vision::{
 };
 
 use crate::error::BenchError;
+use crate::lenses::ratio_in_words;
 use crate::{Clock, timed};
 
 const SIZE: ImageSize = ImageSize { width: 2048, height: 2048 };
@@ -45,10 +46,7 @@ impl LevelTimes {
     /// Times for people.
     #[must_use]
     pub fn in_words(&self) -> String {
-        let ratio = |ratio: f64| {
-            let over = if ratio > LIMIT { ", more than allowed" } else { "" };
-            format!("{ratio:.2}{over}")
-        };
+        let ratio = |ratio| ratio_in_words(ratio, LIMIT);
         format!(
             "points with covariance {:.0} ns ({}), calibration {:.1} ms ({}) times one centre, {LIMIT} allowed",
             self.point_ns,
