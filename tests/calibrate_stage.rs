@@ -172,6 +172,28 @@ fn three_poses_suffice_and_say_which_would_help() {
 }
 
 #[test]
+fn a_pose_with_too_few_views_is_left_out_and_told() {
+    let work = tempfile::tempdir().expect("a temporary folder");
+    let file = |name: &str| work.path().join(name).to_string_lossy().into_owned();
+    let (corners, out, page) = (file("corners.csv"), file("rig.toml"), file("report.html"));
+    let truth = as_built();
+    // Of the twelve frames of the third pose two are left.
+    let is_there = |row: &&str| {
+        row.split(',').nth(2).and_then(|frame| frame.parse().ok()).is_none_or(|n: u32| !(26..36).contains(&n))
+    };
+    std::fs::write(&corners, csv(&truth, &SIX, 12).lines().filter(is_there).collect::<Vec<_>>().join("\n"))
+        .expect("written");
+    let result = run_json(&["calibrate", "stage", "--json", "--csv", &corners, "--out", &out, "--report", &page]);
+    let reason = "2 views in which both cameras see enough of the target; at least 3 are needed";
+    assert_eq!(result["left_out"], serde_json::json!([{ "view": "stage pose 3", "reason": reason }]));
+    assert_eq!(result["poses"].as_array().map(Vec::len), Some(5));
+    assert!(std::fs::read_to_string(&page).expect("a report").contains("stage pose 3"));
+    let (turn, shift) = off(&Rig::from_toml(&std::fs::read_to_string(&out).expect("a file")).expect("a rig"), &truth);
+    println!("unseen poses: {turn:.4} deg, {shift:.4} mm rms");
+    assert!(turn < 0.02 && shift < 0.1);
+}
+
+#[test]
 fn bad_stage_data_is_told_and_leaves_no_file() {
     let work = tempfile::tempdir().expect("a temporary folder");
     let file = |name: &str| work.path().join(name).to_string_lossy().into_owned();

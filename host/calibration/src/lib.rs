@@ -38,6 +38,7 @@ pub use robust::Loss;
 pub use stage::{
     EncoderScale, FEWEST_STAGE_POSES, FittedScrew, Observability, PredictedPose, StageCalibration, StageError,
     StageOptions, StagePose, StagePoseFigures, Tolerance, WeakDirection, ZeroOffset, calibrate_stage,
+    with_enough_views,
 };
 pub use stage_plan::stage_plan;
 pub use target_shape::{TargetShape, TargetWarp};

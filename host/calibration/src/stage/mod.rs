@@ -11,6 +11,7 @@
 //! zeros are part of the right camera's pose there.
 
 mod covariance;
+mod enough_views;
 mod figures;
 mod mechanism;
 mod model;
@@ -27,6 +28,7 @@ use vergence_vision::{Angle, Length};
 use crate::extrinsics::{ExtrinsicsError, LensKnowledge, Start, StereoView, Task};
 use crate::stage::model::Model;
 
+pub use enough_views::with_enough_views;
 pub use observability::{Observability, WeakDirection};
 pub use result::{EncoderScale, FittedScrew, PredictedPose, StageCalibration, StagePoseFigures, ZeroOffset};
 

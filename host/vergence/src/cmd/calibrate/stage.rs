@@ -5,9 +5,11 @@ mod trunk;
 
 use std::path::PathBuf;
 
-use vergence_calibration::{StageError, StageOptions, calibrate_stage, check_fit, validate_stage};
+use vergence_calibration::{StageError, StageOptions, calibrate_stage, check_fit, validate_stage, with_enough_views};
 use vergence_calibration_input::{InputHash, KnownLenses, RecordedSet, StageViews, TrueError, stage_poses_in_corners};
-use vergence_calibration_report::{ReportAbout, left_out_json, stage_json, stage_lines, stage_report, stage_verdict};
+use vergence_calibration_report::{
+    LeftOut, ReportAbout, left_out_json, stage_json, stage_lines, stage_report, stage_verdict,
+};
 use vergence_panel::CapturePanel;
 use vergence_rig::Rig;
 use vergence_targets::corners_can_be_held;
@@ -118,7 +120,13 @@ async fn calibrate(
         None => (drawn, args.lenses.without_files()?),
     };
     let built = live(args, common, (panel, console)).await?;
-    let (poses, left_out) = poses(args, &drawn, &mut hash, console)?;
+    let (poses, mut left_out) = poses(args, &drawn, &mut hash, console)?;
+    let (poses, unseen) = with_enough_views(&drawn, poses);
+    for (pose, reason) in unseen {
+        let pose = LeftOut { view: format!("stage pose {pose}"), reason: reason.to_string() };
+        console.warn(pose.to_string());
+        left_out.push(pose);
+    }
     let force = args.result.force;
     for pose in &poses {
         force.unless_forced(
