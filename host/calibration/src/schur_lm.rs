@@ -8,6 +8,7 @@
 
 mod clustered;
 mod normal;
+mod products;
 
 use nalgebra::{DVector, SVector};
 use rayon::prelude::*;
@@ -54,12 +55,22 @@ pub struct SchurOptions {
     pub relative_cost: f64,
     /// Stop once the cosine between the residuals and every column of the Jacobian is at most this.
     pub gradient_cosine: f64,
+    /// Damping of the first step, in parts of the normal matrix's diagonal. Where unknowns hardly differ in what they do, such as the
+    /// coefficients of a lens, even a little damping makes many steps of one.
+    pub damping: f64,
+}
+
+impl SchurOptions {
+    /// The default, from a start where the linear model holds.
+    pub(crate) const fn near() -> Self {
+        Self { loss: Loss::Squares, iterations: 100, relative_cost: 1e-12, gradient_cosine: 1e-9, damping: 1e-10 }
+    }
 }
 
 impl Default for SchurOptions {
     /// Plain least squares, iterated until steps are far below the standard deviations of the unknowns.
     fn default() -> Self {
-        Self { loss: Loss::Squares, iterations: 100, relative_cost: 1e-12, gradient_cosine: 1e-9 }
+        Self { loss: Loss::Squares, iterations: 100, relative_cost: 1e-12, gradient_cosine: 1e-9, damping: 1e-4 }
     }
 }
 
@@ -68,7 +79,7 @@ impl Default for SchurOptions {
 pub enum Ending {
     /// The gradient is zero to within [`SchurOptions::gradient_cosine`].
     Gradient,
-    /// The last step lowered the cost by less than [`SchurOptions::relative_cost`].
+    /// The last step lowered the cost by less than [`SchurOptions::relative_cost`], or the next one would.
     Cost,
     /// No step, however short, lowers the cost: an optimum to within rounding, or a wrong Jacobian.
     Stalled,
@@ -104,7 +115,6 @@ pub fn solve<const B: usize, P: SchurProblem<B>>(
     options: &SchurOptions,
 ) -> SchurSolution<P::Shared, P::Block, B> {
     // The gain-ratio strategy of Madsen et al.: start near Gauss-Newton, back off fast after a refused step.
-    const FIRST_DAMPING: f64 = 1e-4;
     const LARGEST_DAMPING: f64 = 1e16;
     let normal = linearise(problem, &shared, &blocks, options.loss);
     let mut now =
@@ -112,16 +122,22 @@ pub fn solve<const B: usize, P: SchurProblem<B>>(
     if !now.cost.is_finite() {
         return now;
     }
-    let (mut damping, mut growth) = (FIRST_DAMPING, 2.0);
+    let (mut damping, mut growth) = (options.damping, 2.0);
     now.ending = Ending::Iterations;
     while now.iterations < options.iterations {
         if now.normal.gradient_cosine() <= options.gradient_cosine {
             now.ending = Ending::Gradient;
             break;
         }
+        let step = now.normal.damped_step(damping);
+        let promised = step.as_ref().map_or(f64::INFINITY, |step| step.predicted);
+        // Steps that were refused before, and so are short, promise little wherever they begin.
+        if damping <= options.damping && promised <= options.relative_cost * now.cost {
+            now.ending = Ending::Cost;
+            break;
+        }
         now.iterations += 1;
-        let gain = try_step(problem, &mut now, damping, options.loss);
-        match gain {
+        match step.and_then(|step| try_step(problem, &mut now, &step, options.loss)) {
             Some(gain) => {
                 damping *= (1.0 - (2.0 * gain.ratio - 1.0).powi(3)).max(1.0 / 3.0);
                 growth = 2.0;
@@ -151,14 +167,13 @@ struct Gain {
     relative: f64,
 }
 
-/// Makes a damped step; returns `None` and leaves `now` unchanged if that does not lower the cost.
+/// Makes a step; returns `None` and leaves `now` unchanged if that does not lower the cost.
 fn try_step<const B: usize, P: SchurProblem<B>>(
     problem: &P,
     now: &mut SchurSolution<P::Shared, P::Block, B>,
-    damping: f64,
+    step: &Step<B>,
     loss: Loss,
 ) -> Option<Gain> {
-    let step = now.normal.damped_step(damping)?;
     let shared = problem.shared_plus(&now.shared, step.shared.as_slice());
     let blocks: Vec<_> = now.blocks.iter().zip(&step.blocks).map(|(b, d)| problem.block_plus(b, d)).collect();
     let normal = linearise(problem, &shared, &blocks, loss);
@@ -182,13 +197,14 @@ pub fn linearise<const B: usize, P: SchurProblem<B>>(
     let n = problem.shared_dimension();
     let mut common = Equations::new(n, loss);
     problem.shared_residuals(shared, &mut common);
+    let common = common.summed();
     let parts: Vec<_> = blocks
         .par_iter()
         .enumerate()
         .map(|(index, block)| {
             let mut equations = Equations::new(n, loss);
             problem.block_residuals(shared, index, block, &mut equations);
-            equations
+            equations.summed()
         })
         .collect();
     SchurNormal::from_parts(n, &common, &parts)

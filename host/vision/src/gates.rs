@@ -3,8 +3,7 @@
 use std::fmt;
 
 use crate::triangulation::Kernel;
-use crate::uncertainty::SharedCovariance;
-use crate::{Angle, Length};
+use crate::{Angle, Length, SharedCovariance};
 
 /// Settings of triangulation: standard deviations, the limits that a match must satisfy, and the method.
 ///

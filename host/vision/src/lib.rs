@@ -40,6 +40,7 @@ mod lens_step;
 mod match_sigma;
 mod median;
 mod pupil;
+mod shared_covariance;
 mod stand_in;
 mod stereo_pair;
 mod triangulation;
@@ -70,13 +71,14 @@ pub use lens_derivatives::{CENTRAL_PARAMETERS, LENS_PARAMETER_NAMES, LENS_PARAME
 pub use lens_field::{LensField, UnknownField};
 pub use match_sigma::MatchSigma;
 pub use median::median;
-pub use pupil::{Pupil, pupil_shift, pupil_shift_slope};
+pub use pupil::{Pupil, SeenPoint, pupil_shift, pupil_shift_by_sine, pupil_shift_slope};
+pub use shared_covariance::{SHARED_PARAMETERS, SharedCovariance};
 pub use stereo_pair::{PixelPair, StereoPair};
 pub use triangulation::{
     AngularNorm, Feet, Kernel, Rejection, Triangulated, UnknownKernel, angular, closest_approach, edge_plane, mid2,
     midpoint, pseudo_intersection, rectified, reprojection,
 };
-pub use uncertainty::{PointUncertainty, ResidualUncertainty, SHARED_PARAMETERS, SharedCovariance};
+pub use uncertainty::{PointUncertainty, ResidualUncertainty};
 pub use units::{Angle, InvalidQuantity, Length, Time};
 pub use virtual_view::{Face, InvalidView, UnknownFace, VirtualView};
 pub use zones::{

@@ -27,8 +27,14 @@ const PARAXIAL: f64 = 1e-3;
 /// The shift θ / sin θ - 1 of the pupil at the angle `theta` in radians, in units of e0.
 #[must_use]
 pub fn pupil_shift(theta: f64) -> f64 {
+    pupil_shift_by_sine(theta, theta.sin())
+}
+
+/// [`pupil_shift`] where the `sine` of the angle is known.
+#[must_use]
+pub fn pupil_shift_by_sine(theta: f64, sine: f64) -> f64 {
     let squared = theta * theta;
-    if theta < PARAXIAL { squared * (1.0 / 6.0 + squared * 7.0 / 360.0) } else { theta / theta.sin() - 1.0 }
+    if theta < PARAXIAL { squared * (1.0 / 6.0 + squared * 7.0 / 360.0) } else { theta / sine - 1.0 }
 }
 
 /// The derivative of [`pupil_shift`] by the angle.
@@ -102,32 +108,76 @@ impl Pupil {
         [shift, shift * theta * theta]
     }
 
-    /// The angle to the axis at which a lens with this pupil sees a point `rho` beside the axis and `z` ahead of the origin, in
-    /// millimetres, and D of the module's head in millimetres.
+    /// How a lens with this pupil sees a point `rho` beside the axis and `z` ahead of the origin, in millimetres.
     ///
     /// `None` for a point at the origin, and for one nearer to its pupil than e' sin θ.
     #[must_use]
-    pub fn angle_of_point(&self, rho: f64, z: f64) -> Option<(f64, f64)> {
+    pub fn seen(&self, rho: f64, z: f64) -> Option<SeenPoint> {
         /// From 50 mm three steps suffice.
         const STEPS: usize = 20;
-        let mut theta = rho.atan2(z);
+        /// What Newton's method leaves of a shorter step is far below the rounding error of the angle.
+        const SHORT: f64 = 1e-9;
+        let range = rho.hypot(z);
+        let mut seen = SeenPoint { theta: rho.atan2(z), sine: rho / range, cosine: z / range, slope: 0.0 };
         for _ in 0..STEPS {
-            let (sine, cosine) = theta.sin_cos();
-            let ahead = z - self.shift_mm(theta);
-            // -dF/dθ: D where F is zero.
-            let slope = rho * sine + ahead * cosine - self.slope_mm(theta) * sine;
-            if slope.is_nan() || slope <= 0.0 {
-                return None;
-            }
-            let step = (rho * cosine - ahead * sine) / slope;
-            theta = (theta + step).clamp(0.0, 3.1);
-            if step.abs() <= 4.0 * f64::EPSILON {
+            let off = self.off(&mut seen, rho, z)?;
+            seen.turn_to((seen.theta + off / seen.slope).clamp(0.0, 3.1));
+            if off.abs() <= SHORT * seen.slope {
                 break;
             }
         }
-        let (sine, ahead) = (theta.sin(), z - self.shift_mm(theta));
-        let slope = rho.hypot(ahead) - self.slope_mm(theta) * sine;
-        (slope > 0.0).then_some((theta, slope))
+        self.off(&mut seen, rho, z)?;
+        Some(seen)
+    }
+
+    /// F of the module's head, and its slope -dF/dθ in `seen`, which is D where F is zero; `None` where there is no way to zero.
+    fn off(&self, seen: &mut SeenPoint, rho: f64, z: f64) -> Option<f64> {
+        let [shift, growth] = self.at(seen);
+        let ahead = z - shift;
+        seen.slope = rho * seen.sine + ahead * seen.cosine - growth * seen.sine;
+        (seen.slope > 0.0).then_some(rho * seen.cosine - ahead * seen.sine)
+    }
+
+    /// e(θ) and de/dθ in millimetres.
+    fn at(&self, SeenPoint { theta, sine, cosine, .. }: &SeenPoint) -> [f64; 2] {
+        let [e0, e1] = self.mm();
+        let shift = pupil_shift_by_sine(*theta, *sine);
+        let is_paraxial = *theta < PARAXIAL;
+        let slope = if is_paraxial { pupil_shift_slope(*theta) } else { (sine - theta * cosine) / (sine * sine) };
+        let growth = e0 + e1 * (theta * theta);
+        [growth * shift, growth * slope + 2.0 * e1 * theta * shift]
+    }
+}
+
+/// How a lens sees a point.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct SeenPoint {
+    /// The angle to the axis in radians, its sine and its cosine.
+    pub theta: f64,
+    /// See [`Self::theta`].
+    pub sine: f64,
+    /// See [`Self::theta`].
+    pub cosine: f64,
+    /// D of the module's head in millimetres.
+    pub slope: f64,
+}
+
+impl SeenPoint {
+    fn turn_to(&mut self, theta: f64) {
+        /// By less, the first terms of the series are exact.
+        const SMALL: f64 = 1e-3;
+        let by = theta - self.theta;
+        self.theta = theta;
+        if by.abs() > SMALL {
+            (self.sine, self.cosine) = theta.sin_cos();
+            return;
+        }
+        let square = by * by;
+        let (sin, versine) = (by * (1.0 - square / 6.0), square * (0.5 - square / 24.0));
+        (self.sine, self.cosine) = (
+            self.sine + (self.cosine * sin - self.sine * versine),
+            self.cosine - (self.sine * sin + self.cosine * versine),
+        );
     }
 }
 
@@ -167,8 +217,7 @@ impl KannalaBrandt {
         }
         let at = point.mm();
         let rho = at.x.hypot(at.y);
-        let (theta, _) = self.pupil().angle_of_point(rho, at.z)?;
-        let (sine, cosine) = theta.sin_cos();
+        let SeenPoint { sine, cosine, .. } = self.pupil().seen(rho, at.z)?;
         // On the axis the sine is zero too.
         let across = if rho > 0.0 { sine / rho } else { 0.0 };
         UnitRay::new(Vector3::new(at.x * across, at.y * across, cosine))

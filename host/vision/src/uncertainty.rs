@@ -31,98 +31,10 @@
 //! the rays meet; where a match slipped by h along the edge, an edge direction wrong by an angle ε moves it by about h
 //! ε.
 
-use nalgebra::{Matrix3, Matrix6, RowSVector, SMatrix, Vector3};
+use nalgebra::{Matrix3, RowSVector, SMatrix, Vector3};
 
 use crate::lens_derivatives::{LENS_PARAMETERS, PUPIL};
-use crate::{Angle, Kernel, Left, MatchSigma, Point, Right, StereoPair, UnitRay};
-
-/// Number of parameters that all points of a pair share: those of both lenses and the six of the pose.
-pub const SHARED_PARAMETERS: usize = 2 * LENS_PARAMETERS + 6;
-
-/// The covariance (38 × 38) of the parameters that all points of a pair share.
-///
-/// Their order is: left lens, right lens (each in the order of [`LENS_PARAMETERS`]), then the relative pose as a turn ω about the left axes
-/// in radians and a shift δ of the right camera in the left frame in millimetres: R ← exp(ω) R, t ← t + δ. Rows and columns of parameters
-/// that are exact, such as those that a lens does not have, are zero.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct SharedCovariance(SMatrix<f64, SHARED_PARAMETERS, SHARED_PARAMETERS>);
-
-impl SharedCovariance {
-    /// The zero covariance, of lenses and pose that are known exactly.
-    #[must_use]
-    pub fn exact() -> Self {
-        Self(SMatrix::zeros())
-    }
-
-    /// The full covariance of lenses and pose that were calibrated together, with all correlations.
-    #[must_use]
-    pub const fn joint(covariance: SMatrix<f64, SHARED_PARAMETERS, SHARED_PARAMETERS>) -> Self {
-        Self(covariance)
-    }
-
-    /// Replaces the covariance of the pose (6 × 6) and removes its correlation with the lenses.
-    #[must_use]
-    pub fn with_pose(mut self, covariance: &Matrix6<f64>) -> Self {
-        const POSE: usize = 2 * LENS_PARAMETERS;
-        self.0.fixed_columns_mut::<6>(POSE).fill(0.0);
-        self.0.fixed_rows_mut::<6>(POSE).fill(0.0);
-        self.0.fixed_view_mut::<6, 6>(POSE, POSE).copy_from(covariance);
-        self
-    }
-
-    /// Adds a covariance (6 × 6) to that of the pose, of errors that are independent of all others.
-    #[must_use]
-    pub fn plus_pose(mut self, covariance: &Matrix6<f64>) -> Self {
-        let mut pose = self.0.fixed_view_mut::<6, 6>(2 * LENS_PARAMETERS, 2 * LENS_PARAMETERS);
-        pose += covariance;
-        self
-    }
-
-    /// The covariance (6 × 6) of the pose: turn ω and shift δ.
-    #[must_use]
-    pub fn pose(&self) -> Matrix6<f64> {
-        self.0.fixed_view::<6, 6>(2 * LENS_PARAMETERS, 2 * LENS_PARAMETERS).into_owned()
-    }
-
-    /// Replaces the covariances of both lenses (16 × 16) and removes their correlation with each other and with the pose.
-    #[must_use]
-    pub fn with_lenses(mut self, lenses: [&SMatrix<f64, LENS_PARAMETERS, LENS_PARAMETERS>; 2]) -> Self {
-        for (lens, first) in lenses.into_iter().zip([0, LENS_PARAMETERS]) {
-            self.0.fixed_columns_mut::<LENS_PARAMETERS>(first).fill(0.0);
-            self.0.fixed_rows_mut::<LENS_PARAMETERS>(first).fill(0.0);
-            self.0.fixed_view_mut::<LENS_PARAMETERS, LENS_PARAMETERS>(first, first).copy_from(lens);
-        }
-        self
-    }
-
-    /// The covariance of numbers (rows) with others (columns), by the derivatives of both. Exact parameters cost nothing.
-    fn between<const N: usize>(
-        &self,
-        by_shared: &SMatrix<f64, N, SHARED_PARAMETERS>,
-        other: &SMatrix<f64, N, SHARED_PARAMETERS>,
-    ) -> SMatrix<f64, N, N> {
-        let (mut unknown, mut count) = ([0; SHARED_PARAMETERS], 0);
-        for parameter in (0..SHARED_PARAMETERS).filter(|&i| self.0[(i, i)] != 0.0) {
-            unknown[count] = parameter;
-            count += 1;
-        }
-        let mut sum = SMatrix::zeros();
-        for &column in &unknown[..count] {
-            let mut with_column = SMatrix::<f64, N, 1>::zeros();
-            for &row in &unknown[..count] {
-                with_column += by_shared.column(row) * self.0[(row, column)];
-            }
-            sum += with_column * other.column(column).transpose();
-        }
-        sum
-    }
-
-    /// The covariance matrix, in the order stated at the type.
-    #[must_use]
-    pub const fn matrix(&self) -> &SMatrix<f64, SHARED_PARAMETERS, SHARED_PARAMETERS> {
-        &self.0
-    }
-}
+use crate::{Angle, Kernel, Left, MatchSigma, Point, Right, SHARED_PARAMETERS, SharedCovariance, StereoPair, UnitRay};
 
 /// The uncertainty of one point, as its covariance from pixel noise and its derivative by the shared parameters.
 #[derive(Clone, Copy, Debug, PartialEq)]

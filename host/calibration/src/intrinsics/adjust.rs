@@ -218,7 +218,7 @@ pub(super) fn inlier_fit(
         }
         drop_views(&mut views, &mut state, &mut left_out)?;
         let references: Vec<_> = views.iter().collect();
-        let arrow = SchurOptions { iterations: 200, ..SchurOptions::default() };
+        let arrow = SchurOptions { iterations: 200, ..SchurOptions::near() };
         let strength = prior.and_then(|prior| prior.strength(&views, &state));
         let problem = Bundle { prior: strength, ..Bundle::of(&references, &free) };
         let solution = solve(&problem, state.shared, state.poses, &arrow);

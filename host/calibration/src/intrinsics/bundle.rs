@@ -3,7 +3,7 @@
 use nalgebra::{Isometry3, Point3, SVector, Vector3};
 use vergence_vision::Point;
 
-use super::lens::{LENS, LensParameters, reproject};
+use super::lens::{LENS, LensParameters, reprojected};
 use super::observations::{Observation, ObservedView};
 use super::prior::{KNOWN, Known, Strength};
 use crate::reprojection::{POSE, moved};
@@ -28,7 +28,7 @@ impl Shared {
     /// Distance in pixels between `observation` and its reprojection; NaN where there is none.
     pub fn residual_px(&self, pose: &Isometry3<f64>, observation: &Observation) -> f64 {
         let point = pose * self.on_target(observation);
-        let Some(projected) = reproject(self.lens, &Point::from_mm(point.coords)) else { return f64::NAN };
+        let Some(projected) = reprojected(&self.lens, &Point::from_mm(point.coords)) else { return f64::NAN };
         let [du, dv] = [projected.pixel[0] - observation.pixel[0], projected.pixel[1] - observation.pixel[1]];
         (du * du + dv * dv).sqrt()
     }
@@ -47,28 +47,33 @@ impl Shared {
 /// Residual of one corner (reprojection less observation, in pixels) and its derivatives, column by column.
 struct Row {
     residual: [f64; 2],
-    by_shared: [[f64; 2]; SHARED],
+    by_lens: [[f64; 2]; LENS],
+    by_warp: [[f64; 2]; SHARED - LENS],
     by_pose: [[f64; 2]; POSE],
 }
 
 impl Row {
+    #[inline(always)]
     fn of(shared: &Shared, pose: &Isometry3<f64>, observation: &Observation) -> Option<Self> {
         let turned = pose.rotation * shared.on_target(observation).coords;
-        let projected = reproject(shared.lens, &Point::from_mm(turned + pose.translation.vector))?;
+        let projected = reprojected(&shared.lens, &Point::from_mm(turned + pose.translation.vector))?;
         let [dx, dy, dz] = projected.by_point;
         let along = |d: &Vector3<f64>| [0, 1].map(|row| dx[row] * d.x + dy[row] * d.y + dz[row] * d.z);
         let by_height = along(&(pose.rotation * Vector3::z()));
-        let mut by_shared = [[0.0; 2]; SHARED];
-        by_shared[..LENS].copy_from_slice(&projected.by_lens);
-        by_shared[LENS..].copy_from_slice(&observation.bow.map(|bow| by_height.map(|d| bow * d)));
         // ∂(exp(ω) p)/∂ωᵢ = eᵢ × p.
         let [turn_x, turn_y, turn_z] =
             [Vector3::x(), Vector3::y(), Vector3::z()].map(|axis: Vector3<f64>| along(&axis.cross(&turned)));
         Some(Self {
             residual: [projected.pixel[0] - observation.pixel[0], projected.pixel[1] - observation.pixel[1]],
-            by_shared,
+            by_lens: projected.by_lens,
+            by_warp: observation.bow.map(|bow| by_height.map(|d| bow * d)),
             by_pose: [turn_x, turn_y, turn_z, dx, dy, dz],
         })
+    }
+
+    /// The derivative by a parameter of [`Shared`].
+    fn by_shared(&self, parameter: usize) -> [f64; 2] {
+        if parameter < LENS { self.by_lens[parameter] } else { self.by_warp[parameter - LENS] }
     }
 }
 
@@ -105,7 +110,7 @@ impl SchurProblem<POSE> for Bundle<'_> {
                 return equations.add(&[f64::NAN; 2], 1.0, &[], &[[0.0; 2]; POSE]);
             };
             for (column, &parameter) in columns.iter_mut().zip(self.free) {
-                *column = row.by_shared[parameter];
+                *column = row.by_shared(parameter);
             }
             equations.add(&row.residual, observation.relative_sigma, &columns[..self.free.len()], &row.by_pose);
         }
@@ -221,7 +226,8 @@ mod tests {
             let row = Row::of(&shared, &pose, &observation).unwrap();
             let values = lens.to_array().into_iter().chain(warp_mm).chain([0.0; POSE]);
             let values: Vec<f64> = values.collect();
-            for (index, column) in row.by_shared.iter().chain(&row.by_pose).enumerate() {
+            let columns = (0..SHARED).map(|parameter| row.by_shared(parameter)).chain(row.by_pose);
+            for (index, column) in columns.enumerate() {
                 let unknowns = std::array::from_fn(|i| Dual64::new(values[i], if i == index { 1.0 } else { 0.0 }));
                 let dual = reprojected(unknowns, &pose, &observation);
                 for i in 0..2 {

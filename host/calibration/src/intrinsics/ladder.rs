@@ -10,6 +10,9 @@
 //! A group stays out only where the views tell that the lens has none of it. What they leave open stays an unknown with its prior: a lens
 //! that passed as symmetric because few views did not show otherwise would be stated far more certain than it is.
 
+use std::cell::RefCell;
+use std::rc::Rc;
+
 use vergence_vision::ImageSize;
 
 use super::adjust::{Adjusted, State, Terms, inlier_fit};
@@ -106,6 +109,8 @@ pub(super) struct Richest<'a> {
     /// Variance of a residual, as the views scatter with this lens.
     pub variance: f64,
     pub options: &'a IntrinsicsOptions,
+    /// The trials made.
+    trials: RefCell<Vec<(Terms, Rc<Trial>)>>,
 }
 
 impl<'a> Richest<'a> {
@@ -118,12 +123,18 @@ impl<'a> Richest<'a> {
         let adjusted = adjusted.ok()?.after(central);
         with_valid_cone(adjusted.shared.lens, outermost(&adjusted), size).ok()?;
         let variance = adjusted.normal.variance()? * scatter(&adjusted.normal, prior)?.powi(2);
-        (variance > 0.0).then_some(Self { adjusted, terms, prior, variance, options })
+        (variance > 0.0).then_some(Self { adjusted, terms, prior, variance, options, trials: RefCell::default() })
     }
 
     /// The fit of a lens to the corners that this one used.
-    pub fn trial(&self, terms: Terms) -> Trial {
-        Trial::of(&self.adjusted, terms, self.prior)
+    pub fn trial(&self, terms: Terms) -> Rc<Trial> {
+        let mut trials = self.trials.borrow_mut();
+        if let Some((_, trial)) = trials.iter().find(|(of, _)| *of == terms) {
+            return Rc::clone(trial);
+        }
+        let trial = Rc::new(Trial::of(&self.adjusted, terms, self.prior));
+        trials.push((terms, Rc::clone(&trial)));
+        trial
     }
 
     /// By how much chi-squared falls from one lens to the other.
@@ -157,6 +168,8 @@ impl<'a> Richest<'a> {
         }
         let adjusted = if terms == Terms::central(self.options.warp) {
             central
+        } else if terms == self.terms && !terms.asymmetry {
+            self.adjusted
         } else {
             let start = self.adjusted.state().with_only(terms);
             let prior = Prior { mounting: mounting(&self.adjusted, self.variance).unwrap_or(1.0), ..self.prior };
@@ -178,7 +191,7 @@ impl<'a> Richest<'a> {
         StepEvidence {
             step,
             gain,
-            rms_px: [without, with].map(|lens| lens.rms_px(&self.adjusted)),
+            rms_px: [&without, &with].map(|lens| lens.rms_px(&self.adjusted)),
             held_out_px,
             verdict,
         }

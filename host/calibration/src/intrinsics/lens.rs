@@ -4,7 +4,7 @@
 use nalgebra::Vector2;
 use vergence_vision::{
     Angle, Asymmetry, CENTRAL_PARAMETERS, Camera, ImageSize, InvalidLens, KannalaBrandt, LENS_PARAMETERS,
-    OpenCvFisheye, Point, Pupil,
+    OpenCvFisheye, Point, Pupil, pupil_shift_by_sine,
 };
 
 /// The parameters of a lens, in the order of [`LENS_PARAMETERS`].
@@ -47,25 +47,35 @@ pub struct Reprojection {
 /// The four free ratios k1 to k4 over fx, fy are the five-coefficient form of [`vergence_vision::KannalaBrandt`]
 /// rescaled: its coefficients in pixels are fx (1, k1, k2, k3, k4), and its aspect is fy / fx. `None` at the optical
 /// centre and straight behind it, where the direction of the image radius is not defined, and for a point nearer to a moving pupil than
-/// [`Pupil::angle_of_point`] allows.
+/// [`Pupil::seen`] allows.
 #[must_use]
 pub fn reproject(lens: impl Into<LensParameters>, point: &Point<Camera>) -> Option<Reprojection> {
-    let LensParameters { central: lens, pupil, asymmetry, foreign } = lens.into();
+    reprojected(&lens.into(), point)
+}
+
+/// [`reproject`], inside of the caller, so that what it does not use is not computed.
+#[inline(always)]
+pub(super) fn reprojected(lens: &LensParameters, point: &Point<Camera>) -> Option<Reprojection> {
+    let LensParameters { central: lens, pupil, asymmetry, foreign } = lens;
     let [x, y, z]: [f64; 3] = point.mm().into();
     let across = x * x + y * y;
     let (rho, square) = (across.sqrt(), across + z * z);
     if !square.is_normal() || (rho == 0.0 && z < 0.0) {
         return None;
     }
-    let seen = if pupil.is_fixed() { None } else { Some(Seen::by_pupil(&pupil, rho, z)?) };
-    let theta = seen.as_ref().map_or_else(|| rho.atan2(z), |seen| seen.theta);
+    let seen = if pupil.is_fixed() { None } else { Some(pupil.seen(rho, z)?) };
+    let theta = seen.map_or_else(|| rho.atan2(z), |seen| seen.theta);
     let [k1, k2, k3, k4] = lens.k;
     let t = theta * theta;
     let slope = 1.0 + t * (3.0 * k1 + t * (5.0 * k2 + t * (7.0 * k3 + t * 9.0 * k4)));
 
+    // ∂θ/∂ρ and -∂θ/∂z / ρ.
     let (outward, along) = match &seen {
-        None => (slope * z / square, slope / square),
-        Some(seen) => (slope * seen.outward, slope * seen.forward),
+        // Near the axis the pupil is at the origin.
+        Some(seen) if theta >= PARAXIAL => {
+            (slope * (seen.cosine / seen.slope), slope * (seen.sine / (rho * seen.slope)))
+        }
+        _ => (slope * z / square, slope / square),
     };
 
     // With r(θ) for fx = 1: scale = r / ρ, ∂scale/∂(x, y) = (x, y) bend, ∂scale/∂z = -along.
@@ -78,7 +88,8 @@ pub fn reproject(lens: impl Into<LensParameters>, point: &Point<Camera>) -> Opti
     };
     let (fx, fy) = (lens.fx, lens.fy);
     // ∂θ/∂ej = Ej sin θ / D.
-    let by_pupil = Pupil::by_coefficients(Angle::from_rad(theta)).map(|by| {
+    let shift = pupil_shift_by_sine(theta, seen.map_or_else(|| rho / square.sqrt(), |seen| seen.sine));
+    let by_pupil = [shift, shift * t].map(|by| {
         let pupil = along * by;
         [fx * x * pupil, fy * y * pupil]
     });
@@ -89,7 +100,7 @@ pub fn reproject(lens: impl Into<LensParameters>, point: &Point<Camera>) -> Opti
     let place = Vector2::new(scale * x, scale * y);
     let by_asymmetry = Asymmetry::by_coefficients(place);
     let [p1, p2, s0, s1, s2, s3] = std::array::from_fn(|i| [fx * by_asymmetry[(0, i)], fy * by_asymmetry[(1, i)]]);
-    let symmetric = Reprojection {
+    let mut seen = Reprojection {
         pixel: [lens.cx + fx * scale * x, lens.cy + fy * scale * y],
         by_lens: [
             [scale * x, 0.0],
@@ -115,8 +126,13 @@ pub fn reproject(lens: impl Into<LensParameters>, point: &Point<Camera>) -> Opti
             [-fx * x * along, -fy * y * along],
         ],
     };
-    let by_polynomial = if asymmetry.is_zero() { symmetric } else { symmetric.displaced(&lens, &asymmetry, place) };
-    Some(foreign.and_then(|camera| by_polynomial.by_model_of(&camera, point)).unwrap_or(by_polynomial))
+    if !asymmetry.is_zero() {
+        seen.displace(lens, asymmetry, place);
+    }
+    match foreign {
+        None => Some(seen),
+        Some(camera) => Some(seen.by_model_of(camera, point).unwrap_or(seen)),
+    }
 }
 
 impl Reprojection {
@@ -128,8 +144,9 @@ impl Reprojection {
         Some(Self { pixel: [pixel.u, pixel.v], by_point: by_point.into(), ..*self })
     }
 
-    /// The reprojection by a symmetric lens, which images the point at `place` in focal lengths, made that of one which is not.
-    fn displaced(mut self, lens: &OpenCvFisheye, asymmetry: &Asymmetry, place: Vector2<f64>) -> Self {
+    /// Makes the reprojection by a symmetric lens, which images the point at `place` in focal lengths, that of one which is not.
+    #[inline(always)]
+    fn displace(&mut self, lens: &OpenCvFisheye, asymmetry: &Asymmetry, place: Vector2<f64>) {
         let OpenCvFisheye { fx, fy, cx, cy, .. } = *lens;
         let (arrived, bend) = (asymmetry.moved(place), asymmetry.by_place(place));
         self.pixel = [cx + fx * arrived.x, cy + fy * arrived.y];
@@ -138,29 +155,6 @@ impl Reprojection {
             let by = bend * Vector2::new(column[0] / fx, column[1] / fy);
             *column = [fx * by.x, fy * by.y];
         }
-        self
-    }
-}
-
-/// How a point is seen by a lens whose pupil moves: the angle θ to the axis and its derivatives.
-struct Seen {
-    theta: f64,
-    /// ∂θ/∂ρ: cos θ / D.
-    outward: f64,
-    /// -∂θ/∂z / ρ: sin θ / (ρ D).
-    forward: f64,
-}
-
-impl Seen {
-    fn by_pupil(pupil: &Pupil, rho: f64, z: f64) -> Option<Self> {
-        let (theta, slope) = pupil.angle_of_point(rho, z)?;
-        if theta < PARAXIAL {
-            // The pupil is at the origin there.
-            let square = rho * rho + z * z;
-            return Some(Self { theta, outward: z / square, forward: 1.0 / square });
-        }
-        let (sine, cosine) = theta.sin_cos();
-        Some(Self { theta, outward: cosine / slope, forward: sine / (rho * slope) })
     }
 }
 

@@ -1,5 +1,7 @@
 //! A lens on trial: the fit of some of its parameters to corners that another fit used.
 
+use std::cell::OnceCell;
+
 use nalgebra::Isometry3;
 
 use super::adjust::{Adjusted, State, Terms};
@@ -9,6 +11,9 @@ use super::prior::{Prior, Strength};
 use crate::reprojection::POSE;
 use crate::schur_lm::{SchurNormal, SchurOptions, solve};
 
+/// Comparisons tell chi-squared to a millionth.
+const COMPARED: SchurOptions = SchurOptions { relative_cost: 1e-6, ..SchurOptions::near() };
+
 /// A fit to the corners that another one used.
 pub(super) struct Trial {
     /// The parameters adjusted.
@@ -17,6 +22,7 @@ pub(super) struct Trial {
     prior: Option<Strength>,
     pub state: State,
     pub normal: SchurNormal<POSE>,
+    held_out_px: OnceCell<f64>,
 }
 
 /// How much more the views pull the lens to and fro than noise explains; `None` where they do not determine it.
@@ -33,9 +39,9 @@ impl Trial {
         // By the noise of the richer fit, which is nearer to that of the corners.
         let prior = prior.strength(&adjusted.views, &adjusted.state());
         let problem = Bundle { prior, ..Bundle::of(&references, &free) };
-        let solution = solve(&problem, start.shared, start.poses, &SchurOptions::default());
+        let solution = solve(&problem, start.shared, start.poses, &COMPARED);
         let state = State { shared: solution.shared, poses: solution.blocks };
-        Self { free, prior, state, normal: solution.normal }
+        Self { free, prior, state, normal: solution.normal, held_out_px: OnceCell::new() }
     }
 
     /// Standard deviation of a parameter where the variance of a residual is `variance`.
@@ -51,8 +57,12 @@ impl Trial {
     }
 
     /// Root mean square residual in pixels of each half of the views, by the lens that the other half gives. The poses of the targets are
-    /// fitted to the half that is judged.
+    /// fitted to the half that is judged. `of` is the fit of [`Self::of`].
     pub fn held_out_px(&self, of: &Adjusted) -> f64 {
+        *self.held_out_px.get_or_init(|| self.fit_halves(of))
+    }
+
+    fn fit_halves(&self, of: &Adjusted) -> f64 {
         let half = |odd: usize| {
             let chosen = of.views.iter().zip(&self.state.poses).enumerate().filter(move |(index, _)| index % 2 == odd);
             chosen.map(|(_, (view, pose))| (view, *pose)).unzip::<_, _, Vec<_>, Vec<_>>()
@@ -62,8 +72,8 @@ impl Trial {
         for (fitted, judged) in [(0, 1), (1, 0)] {
             let [(views, poses), (others, other_poses)] = [&halves[fitted], &halves[judged]];
             let problem = Bundle { prior: self.prior, ..Bundle::of(views, &self.free) };
-            let lens = solve(&problem, self.state.shared, poses.clone(), &SchurOptions::default()).shared;
-            let seen = solve(&Bundle::of(others, &[]), lens, other_poses.clone(), &SchurOptions::default());
+            let lens = solve(&problem, self.state.shared, poses.clone(), &COMPARED).shared;
+            let seen = solve(&Bundle::of(others, &[]), lens, other_poses.clone(), &COMPARED);
             squares += 2.0 * seen.cost;
             count += others.iter().map(|view| view.used().count()).sum::<usize>();
         }

@@ -3,23 +3,22 @@
 use nalgebra::{Cholesky, DMatrix, DVector, Dyn, OMatrix, SMatrix, SVector, U1};
 
 use super::Step;
+use super::products::Products;
 use crate::Loss;
 
 /// Collects the residuals of one small block into JᵀJ, Jᵀr and the cost.
 pub struct Equations<const B: usize> {
     shared_dimension: usize,
     loss: Loss,
-    /// The upper triangle, row by row, of [J r]ᵀ[J r] with the columns shared, block, residual.
-    upper: Vec<f64>,
-    row: Vec<f64>,
+    /// [J r]ᵀ[J r] with the columns shared, block, residual.
+    products: Products,
     cost: f64,
     residuals: usize,
 }
 
 impl<const B: usize> Equations<B> {
     pub(super) fn new(shared_dimension: usize, loss: Loss) -> Self {
-        let width = shared_dimension + B + 1;
-        Self { shared_dimension, loss, upper: vec![0.0; width * width], row: vec![0.0; width], cost: 0.0, residuals: 0 }
+        Self { shared_dimension, loss, products: Products::new(shared_dimension + B + 1), cost: 0.0, residuals: 0 }
     }
 
     /// Adds one residual of `R` components with standard deviation `sigma`; the robust loss takes them together.
@@ -46,25 +45,27 @@ impl<const B: usize> Equations<B> {
         weight: f64,
     ) {
         self.residuals += R;
-        let n = self.shared_dimension;
-        let width = self.row.len();
         for component in 0..R {
-            let columns = shared.iter().take(n).chain(std::iter::repeat_n(&[0.0; R], n.saturating_sub(shared.len())));
-            for (slot, column) in self.row.iter_mut().zip(columns.chain(block).chain([residual])) {
+            let (of_shared, rest) = self.products.row().split_at_mut(self.shared_dimension);
+            let (of_block, of_residual) = rest.split_at_mut(B);
+            for (slot, column) in of_shared.iter_mut().zip(shared) {
                 *slot = weight * column[component];
             }
-            for i in 0..width {
-                let factor = self.row[i];
-                if factor != 0.0 {
-                    let line = &mut self.upper[i * width + i..(i + 1) * width];
-                    line.iter_mut().zip(&self.row[i..]).for_each(|(sum, x)| *sum += factor * x);
-                }
+            for (slot, column) in of_block.iter_mut().zip(block) {
+                *slot = weight * column[component];
             }
+            of_residual[0] = weight * residual[component];
         }
     }
 
+    /// With all residuals counted.
+    pub(super) fn summed(mut self) -> Self {
+        self.products.sum();
+        self
+    }
+
     fn at(&self, i: usize, j: usize) -> f64 {
-        self.upper[i.min(j) * self.row.len() + i.max(j)]
+        self.products.at(i, j)
     }
 }
 

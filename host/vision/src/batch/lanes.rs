@@ -56,6 +56,28 @@ pub(super) fn for_rows<const FUSED: bool, const W: usize, const IN: usize, const
     }
 }
 
+/// Two functions which append a kernel's results for rows: by the instructions that every processor has, and by the best of this one.
+macro_rules! over_rows {
+    ($baseline:ident, $best:ident, $kernel:ty, $lanes:ident, $in:literal => $out:literal) => {
+        pub(super) fn $baseline(kernel: &$kernel, rows: &[[f64; $in]], out: &mut Vec<[f64; $out]>) {
+            $crate::batch::lanes::for_rows::<{ $crate::batch::lanes::ALWAYS_FUSED }, $lanes, $in, $out>(
+                kernel, rows, out,
+            );
+        }
+
+        #[multiversion::multiversion(targets("x86_64+avx512f+avx512dq+avx512vl+avx2+fma", "x86_64+avx2+fma"))]
+        pub(super) fn $best(kernel: &$kernel, rows: &[[f64; $in]], out: &mut Vec<[f64; $out]>) {
+            use $crate::batch::lanes::{ALWAYS_FUSED, for_rows};
+            if multiversion::target::target_cfg_f!(target_feature = "fma") {
+                for_rows::<true, $lanes, $in, $out>(kernel, rows, out);
+            } else {
+                for_rows::<ALWAYS_FUSED, $lanes, $in, $out>(kernel, rows, out);
+            }
+        }
+    };
+}
+pub(super) use over_rows;
+
 /// Fills fewer than `W` rows up with rows of zeros.
 #[inline(always)]
 pub(super) fn padded<const W: usize, const C: usize>(rest: &[[f64; C]]) -> [[f64; C]; W] {

@@ -1,10 +1,7 @@
 //! Projection of whole arrays of points to pixels.
 
-use multiversion::multiversion;
-use multiversion::target::target_cfg_f;
-
 use super::arc_tangent::distance_and_angle;
-use super::lanes::{ALWAYS_FUSED, Kernel, for_rows, polynomial};
+use super::lanes::{Kernel, over_rows, polynomial};
 use crate::KannalaBrandt;
 
 /// Rows per step. Fewer are slower: the three columns of a row-major array are read best in long runs.
@@ -69,15 +66,4 @@ pub(super) fn pixels<const W: usize>(
     [u, v]
 }
 
-pub(super) fn project_baseline(lens: &Project, points: &[[f64; 3]], pixels: &mut Vec<[f64; 2]>) {
-    for_rows::<ALWAYS_FUSED, LANES, 3, 2>(lens, points, pixels);
-}
-
-#[multiversion(targets("x86_64+avx512f+avx512dq+avx512vl+avx2+fma", "x86_64+avx2+fma"))]
-pub(super) fn project_best(lens: &Project, points: &[[f64; 3]], pixels: &mut Vec<[f64; 2]>) {
-    if target_cfg_f!(target_feature = "fma") {
-        for_rows::<true, LANES, 3, 2>(lens, points, pixels);
-    } else {
-        for_rows::<ALWAYS_FUSED, LANES, 3, 2>(lens, points, pixels);
-    }
-}
+over_rows!(project_baseline, project_best, Project, LANES, 3 => 2);

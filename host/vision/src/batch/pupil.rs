@@ -8,11 +8,8 @@
 
 use std::f64::consts::PI;
 
-use multiversion::multiversion;
-use multiversion::target::target_cfg_f;
-
 use super::chebyshev::{fit, nodes, powers, series};
-use super::lanes::{ALWAYS_FUSED, Kernel, for_rows, multiply_add, polynomial, polynomial_at};
+use super::lanes::{Kernel, multiply_add, over_rows, polynomial, polynomial_at};
 use super::radial::Radial;
 use super::stepwise::ASK;
 use super::unproject::Unproject;
@@ -89,8 +86,8 @@ impl ProjectByPupil {
         if sine == 0.0 {
             return lens.k()[0];
         }
-        let seen = lens.pupil().angle_of_point(sine / inverse, cosine / inverse);
-        seen.map_or(f64::NAN, |(theta, _)| lens.radius_at(theta) / sine)
+        let seen = lens.pupil().seen(sine / inverse, cosine / inverse);
+        seen.map_or(f64::NAN, |seen| lens.radius_at(seen.theta) / sine)
     }
 }
 
@@ -177,28 +174,13 @@ impl Kernel<2, 4> for UnprojectByPupil {
     }
 }
 
+over_rows!(project_baseline, project_best, ProjectByPupil, LANES, 3 => 2);
+over_rows!(back_baseline, back_best, UnprojectByPupil, LANES_BACK, 2 => 4);
+
 pub(super) fn project_by_pupil(lens: &ProjectByPupil, best: bool, points: &[[f64; 3]], pixels: &mut Vec<[f64; 2]>) {
-    if best { project_best(lens, points, pixels) } else { for_rows::<ALWAYS_FUSED, LANES, 3, 2>(lens, points, pixels) }
+    if best { project_best(lens, points, pixels) } else { project_baseline(lens, points, pixels) }
 }
 
 pub(super) fn unproject_by_pupil(lens: &UnprojectByPupil, best: bool, pixels: &[[f64; 2]], rays: &mut Vec<[f64; 4]>) {
-    if best { back_best(lens, pixels, rays) } else { for_rows::<ALWAYS_FUSED, LANES_BACK, 2, 4>(lens, pixels, rays) }
-}
-
-#[multiversion(targets("x86_64+avx512f+avx512dq+avx512vl+avx2+fma", "x86_64+avx2+fma"))]
-fn project_best(lens: &ProjectByPupil, points: &[[f64; 3]], pixels: &mut Vec<[f64; 2]>) {
-    if target_cfg_f!(target_feature = "fma") {
-        for_rows::<true, LANES, 3, 2>(lens, points, pixels);
-    } else {
-        for_rows::<ALWAYS_FUSED, LANES, 3, 2>(lens, points, pixels);
-    }
-}
-
-#[multiversion(targets("x86_64+avx512f+avx512dq+avx512vl+avx2+fma", "x86_64+avx2+fma"))]
-fn back_best(lens: &UnprojectByPupil, pixels: &[[f64; 2]], rays: &mut Vec<[f64; 4]>) {
-    if target_cfg_f!(target_feature = "fma") {
-        for_rows::<true, LANES_BACK, 2, 4>(lens, pixels, rays);
-    } else {
-        for_rows::<ALWAYS_FUSED, LANES_BACK, 2, 4>(lens, pixels, rays);
-    }
+    if best { back_best(lens, pixels, rays) } else { back_baseline(lens, pixels, rays) }
 }

@@ -1,13 +1,11 @@
 //! Lenses that are symmetric about their axis, whatever their model: all that batches need of them is how the radius grows with the angle.
 
-use multiversion::multiversion;
-use multiversion::target::target_cfg_f;
 use nalgebra::Vector3;
 
 use super::arc_tangent::distance_and_angle;
 use super::chebyshev::fit;
 use super::fold::Fold;
-use super::lanes::{ALWAYS_FUSED, Kernel, for_rows, polynomial};
+use super::lanes::{Kernel, over_rows, polynomial};
 use super::project::{pixels, scales};
 use crate::{Camera, ForeignModel, KannalaBrandt, Pixel, UnitRay};
 
@@ -216,15 +214,4 @@ impl ProjectRadial {
 /// Rows per step, as of [`super::project`].
 const LANES: usize = 32;
 
-pub(super) fn radial_baseline(lens: &ProjectRadial, points: &[[f64; 3]], pixels: &mut Vec<[f64; 2]>) {
-    for_rows::<ALWAYS_FUSED, LANES, 3, 2>(lens, points, pixels);
-}
-
-#[multiversion(targets("x86_64+avx512f+avx512dq+avx512vl+avx2+fma", "x86_64+avx2+fma"))]
-pub(super) fn radial_best(lens: &ProjectRadial, points: &[[f64; 3]], pixels: &mut Vec<[f64; 2]>) {
-    if target_cfg_f!(target_feature = "fma") {
-        for_rows::<true, LANES, 3, 2>(lens, points, pixels);
-    } else {
-        for_rows::<ALWAYS_FUSED, LANES, 3, 2>(lens, points, pixels);
-    }
-}
+over_rows!(radial_baseline, radial_best, ProjectRadial, LANES, 3 => 2);

@@ -3,10 +3,7 @@
 //! The surface that is prepared has the pixels themselves, not the shifts: a B-spline is every linear function of the place if its control points are,
 //! and so are the stereographic image and the map to pixels.
 
-use multiversion::multiversion;
-use multiversion::target::target_cfg_f;
-
-use super::lanes::{ALWAYS_FUSED, Kernel, for_rows, multiply_add};
+use super::lanes::{Kernel, multiply_add, over_rows};
 use super::stepwise::{ASK, RIM};
 use super::surface::Surface;
 use crate::{SplineGrid, SplinedStereographic};
@@ -82,15 +79,4 @@ impl Kernel<3, 2> for Splined {
     }
 }
 
-pub(super) fn splined_baseline(lens: &Splined, points: &[[f64; 3]], pixels: &mut Vec<[f64; 2]>) {
-    for_rows::<ALWAYS_FUSED, LANES, 3, 2>(lens, points, pixels);
-}
-
-#[multiversion(targets("x86_64+avx512f+avx512dq+avx512vl+avx2+fma", "x86_64+avx2+fma"))]
-pub(super) fn splined_best(lens: &Splined, points: &[[f64; 3]], pixels: &mut Vec<[f64; 2]>) {
-    if target_cfg_f!(target_feature = "fma") {
-        for_rows::<true, LANES, 3, 2>(lens, points, pixels);
-    } else {
-        for_rows::<ALWAYS_FUSED, LANES, 3, 2>(lens, points, pixels);
-    }
-}
+over_rows!(splined_baseline, splined_best, Splined, LANES, 3 => 2);

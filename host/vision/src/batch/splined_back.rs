@@ -3,10 +3,7 @@
 //! A finer surface, made once per lens and only where it is asked for, is so nearly the inverse of the lens's own that one step of Newton's method does.
 //! The inverse itself cannot be tabulated to 1e-9 rad: its third derivatives jump along the curves that the lines of the grid are imaged to.
 
-use multiversion::multiversion;
-use multiversion::target::target_cfg_f;
-
-use super::lanes::{ALWAYS_FUSED, Kernel, for_rows, multiply_add};
+use super::lanes::{Kernel, multiply_add, over_rows};
 use super::splined::{EDGE, Splined};
 use super::stepwise::{ASK, RIM};
 use super::surface::Surface;
@@ -292,15 +289,4 @@ fn before(forward: &Splined, wanted: [f64; 2]) -> [f64; 2] {
     if is_near { found } else { straight }
 }
 
-pub(super) fn splined_back_baseline(lens: &SplinedBack, pixels: &[[f64; 2]], rays: &mut Vec<[f64; 3]>) {
-    for_rows::<ALWAYS_FUSED, LANES, 2, 3>(lens, pixels, rays);
-}
-
-#[multiversion(targets("x86_64+avx512f+avx512dq+avx512vl+avx2+fma", "x86_64+avx2+fma"))]
-pub(super) fn splined_back_best(lens: &SplinedBack, pixels: &[[f64; 2]], rays: &mut Vec<[f64; 3]>) {
-    if target_cfg_f!(target_feature = "fma") {
-        for_rows::<true, LANES, 2, 3>(lens, pixels, rays);
-    } else {
-        for_rows::<ALWAYS_FUSED, LANES, 2, 3>(lens, pixels, rays);
-    }
-}
+over_rows!(splined_back_baseline, splined_back_best, SplinedBack, LANES, 2 => 3);

@@ -1,10 +1,8 @@
 //! Projection of whole arrays by models that are [`LensSteps`]: onto a plane, distortion there, and an affine map to pixels.
 
-use multiversion::multiversion;
-use multiversion::target::target_cfg_f;
 use nalgebra::Matrix3;
 
-use super::lanes::{ALWAYS_FUSED, Kernel, for_rows, multiply_add};
+use super::lanes::{Kernel, multiply_add, over_rows};
 use super::plane::Plane;
 use super::radial::{Growing, ProjectRadial, Radial};
 use crate::foreign::{AngleLaw, OntoPlane};
@@ -169,15 +167,4 @@ impl Kernel<3, 2> for Stepwise {
     }
 }
 
-pub(super) fn stepwise_baseline(lens: &Stepwise, points: &[[f64; 3]], pixels: &mut Vec<[f64; 2]>) {
-    for_rows::<ALWAYS_FUSED, LANES, 3, 2>(lens, points, pixels);
-}
-
-#[multiversion(targets("x86_64+avx512f+avx512dq+avx512vl+avx2+fma", "x86_64+avx2+fma"))]
-pub(super) fn stepwise_best(lens: &Stepwise, points: &[[f64; 3]], pixels: &mut Vec<[f64; 2]>) {
-    if target_cfg_f!(target_feature = "fma") {
-        for_rows::<true, LANES, 3, 2>(lens, points, pixels);
-    } else {
-        for_rows::<ALWAYS_FUSED, LANES, 3, 2>(lens, points, pixels);
-    }
-}
+over_rows!(stepwise_baseline, stepwise_best, Stepwise, LANES, 3 => 2);

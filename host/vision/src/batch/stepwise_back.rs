@@ -3,13 +3,11 @@
 //! Distortion has no inverse in closed form: Newton's method finds the place before it, from a start that undoes the radial part by a polynomial and
 //! then what the other terms add there. All lanes take the same number of steps, until none moves.
 
-use multiversion::multiversion;
-use multiversion::target::target_cfg_f;
 use nalgebra::{Matrix2, Matrix3, Vector2, Vector3};
 
 use super::chebyshev::fit;
 use super::fold::Fold;
-use super::lanes::{ALWAYS_FUSED, Kernel, for_rows, multiply_add, polynomial};
+use super::lanes::{Kernel, multiply_add, over_rows, polynomial};
 use super::plane::Plane;
 use super::radial::{Growing, Radial};
 use super::stepwise::{ASK, LawInField, RIM, at};
@@ -350,15 +348,4 @@ fn inverse([[a, b, c], [d, e, f]]: [[f64; 3]; 2]) -> Option<[[f64; 3]; 2]> {
     Some([[turned[(0, 0)], turned[(0, 1)], shift.x], [turned[(1, 0)], turned[(1, 1)], shift.y]])
 }
 
-pub(super) fn stepwise_back_baseline(lens: &StepwiseBack, pixels: &[[f64; 2]], rays: &mut Vec<[f64; 3]>) {
-    for_rows::<ALWAYS_FUSED, LANES, 2, 3>(lens, pixels, rays);
-}
-
-#[multiversion(targets("x86_64+avx512f+avx512dq+avx512vl+avx2+fma", "x86_64+avx2+fma"))]
-pub(super) fn stepwise_back_best(lens: &StepwiseBack, pixels: &[[f64; 2]], rays: &mut Vec<[f64; 3]>) {
-    if target_cfg_f!(target_feature = "fma") {
-        for_rows::<true, LANES, 2, 3>(lens, pixels, rays);
-    } else {
-        for_rows::<ALWAYS_FUSED, LANES, 2, 3>(lens, pixels, rays);
-    }
-}
+over_rows!(stepwise_back_baseline, stepwise_back_best, StepwiseBack, LANES, 2 => 3);

@@ -3,12 +3,9 @@
 //! With q = r², both sin θ / r and cos θ are smooth functions of q. A ray is (x A(q), y A(q), C(q)) with two
 //! polynomials made once per lens, which needs no root, no iteration and no sine.
 
-use multiversion::multiversion;
-use multiversion::target::target_cfg_f;
-
 use super::chebyshev::fit;
 use super::fold::Fold;
-use super::lanes::{ALWAYS_FUSED, Kernel, for_rows, polynomial};
+use super::lanes::{Kernel, over_rows, polynomial};
 use super::radial::{Growing, Radial};
 use crate::Pixel;
 
@@ -132,15 +129,4 @@ impl Unproject {
     }
 }
 
-pub(super) fn unproject_baseline(lens: &Unproject, pixels: &[[f64; 2]], rays: &mut Vec<[f64; 3]>) {
-    for_rows::<ALWAYS_FUSED, LANES, 2, 3>(lens, pixels, rays);
-}
-
-#[multiversion(targets("x86_64+avx512f+avx512dq+avx512vl+avx2+fma", "x86_64+avx2+fma"))]
-pub(super) fn unproject_best(lens: &Unproject, pixels: &[[f64; 2]], rays: &mut Vec<[f64; 3]>) {
-    if target_cfg_f!(target_feature = "fma") {
-        for_rows::<true, LANES, 2, 3>(lens, pixels, rays);
-    } else {
-        for_rows::<ALWAYS_FUSED, LANES, 2, 3>(lens, pixels, rays);
-    }
-}
+over_rows!(unproject_baseline, unproject_best, Unproject, LANES, 2 => 3);
