@@ -11,8 +11,10 @@ use super::prior::{Prior, Strength};
 use crate::reprojection::POSE;
 use crate::schur_lm::{SchurNormal, SchurOptions, solve};
 
-/// Comparisons tell chi-squared to a millionth.
-const COMPARED: SchurOptions = SchurOptions { relative_cost: 1e-6, ..SchurOptions::near() };
+/// Of fits by which chi-squared is compared, and the scatter of the views estimated.
+const COMPARED: SchurOptions = SchurOptions { relative_cost: 1e-8, ..SchurOptions::near() };
+/// Of fits to halves of the views, of which residuals are told to a millionth.
+const HALVES: SchurOptions = SchurOptions { relative_cost: 1e-6, ..SchurOptions::near() };
 
 /// A fit to the corners that another one used.
 pub(super) struct Trial {
@@ -72,8 +74,8 @@ impl Trial {
         for (fitted, judged) in [(0, 1), (1, 0)] {
             let [(views, poses), (others, other_poses)] = [&halves[fitted], &halves[judged]];
             let problem = Bundle { prior: self.prior, ..Bundle::of(views, &self.free) };
-            let lens = solve(&problem, self.state.shared, poses.clone(), &COMPARED).shared;
-            let seen = solve(&Bundle::of(others, &[]), lens, other_poses.clone(), &COMPARED);
+            let lens = solve(&problem, self.state.shared, poses.clone(), &HALVES).shared;
+            let seen = solve(&Bundle::of(others, &[]), lens, other_poses.clone(), &HALVES);
             squares += 2.0 * seen.cost;
             count += others.iter().map(|view| view.used().count()).sum::<usize>();
         }
