@@ -135,11 +135,11 @@ fn the_room_in_human_mode_is_measured_as_well_as_stated() {
 fn timed(pair: &ImagePair<'_>) -> (DenseDepth, String) {
     let start = std::time::Instant::now();
     let seconds = || start.elapsed().as_secs_f64();
-    let views = DenseViews::new(pair).unwrap().aligned();
+    let mut views = DenseViews::new(pair).unwrap().aligned();
     let turned = seconds();
     let swept = views.sweep();
     let sweep = seconds();
-    let disparities = views.register(&swept);
+    let disparities = views.register(swept);
     let registered = seconds();
     let depth = views.ranges(&disparities, &SharedCovariance::exact());
     let all = seconds();

@@ -67,8 +67,9 @@ fn three_tenths_of_a_degree_cost_less_than_a_tenth_of_the_pixels() {
                 }
                 let off = axis * f64::to_radians(degrees);
                 let pair = rendered.pair(off);
-                let views = DenseViews::new(&pair).unwrap().aligned();
-                let depth = views.ranges(&views.register(&views.sweep()), &SharedCovariance::exact());
+                let mut views = DenseViews::new(&pair).unwrap().aligned();
+                let swept = views.sweep();
+                let depth = views.ranges(&views.register(swept), &SharedCovariance::exact());
                 let (right, measured) = found(rendered, &pair, &depth);
                 let stereo = StereoPair {
                     left: pair.left_camera,

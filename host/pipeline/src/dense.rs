@@ -52,14 +52,14 @@ pub fn dense_ranges(
     images.with_grey((rig, search), pose, pose.rotation_sigma, |pair| {
         let views = DenseViews::new(pair)?;
         ended(Stage::Turn);
-        let views = views.aligned();
+        let mut views = views.aligned();
         let stated =
             StereoPair { left: &rig.left_camera, right: &rig.right_camera, left_from_right: pose.left_from_right };
         let pose_drift = pose_drift(views.row_matches(), &stated, &expected_drift(pose));
         ended(Stage::Align);
         let swept = views.sweep();
         ended(Stage::Sweep);
-        let disparities = views.register(&swept);
+        let disparities = views.register(swept);
         ended(Stage::Register);
         let depth = views.ranges(&disparities, &pose.shared);
         ended(Stage::Range);

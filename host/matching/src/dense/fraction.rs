@@ -44,12 +44,12 @@ pub struct Disparities {
 
 /// Smooths and registers twice. The first pass brings slanted surfaces within the reach of the second. `area` is that of
 /// a pixel of the coarsest level of the search.
-pub(super) fn registered(views: [SampledView<'_>; 2], whole: &[f32], area: usize) -> Disparities {
+pub(super) fn registered(views: [SampledView<'_>; 2], whole: Vec<f32>, area: usize) -> Disparities {
     let (width, count) = (views[0].plane.width(), whole.len());
     let (mut smooth, mut registration) = (Surface::new(count), Registration::new(count));
-    smooth.fit(whole, width, REACH);
+    smooth.fit(&whole, width, REACH);
     registration.run(views, &smooth.disparity, REACH);
-    let mut disparity = vec![0.0; count];
+    let mut disparity = whole;
     moved(&mut disparity, &smooth, &registration);
     smooth.fit(&disparity, width, REACH);
     registration.run(views, &smooth.disparity, REACH);

@@ -66,14 +66,19 @@ pub struct DenseViews<'a> {
     rows_frame: SharedFrame,
     left: View<Left>,
     right: View<Right>,
-    levels: Levels,
+    /// `None` once they are searched: registration needs the memory.
+    levels: Option<Levels>,
     /// The matches that show where the rows lie.
     row_matches: Vec<(PixelPair, f64)>,
 }
 
 /// Disparities of the left view in whole pixels, refined by a parabola through their costs.
 #[derive(Clone, Debug, PartialEq)]
-pub struct WholeDisparities(Vec<f32>);
+pub struct WholeDisparities {
+    disparity: Vec<f32>,
+    /// The number of pixels in one of the coarsest level of the search.
+    coarsest_area: usize,
+}
 
 /// Computes a range for every pixel of the left image of `pair`.
 ///
@@ -82,8 +87,9 @@ pub struct WholeDisparities(Vec<f32>);
 /// # Errors
 /// [`MatchError`] for a pair that cannot be matched, whatever its images show.
 pub fn dense_depth(pair: &ImagePair<'_>, shared: &SharedCovariance) -> Result<DenseDepth, MatchError> {
-    let views = DenseViews::new(pair)?.aligned();
-    Ok(views.ranges(&views.register(&views.sweep()), shared))
+    let mut views = DenseViews::new(pair)?.aligned();
+    let swept = views.sweep();
+    Ok(views.ranges(&views.register(swept), shared))
 }
 
 impl<'a> DenseViews<'a> {
@@ -103,7 +109,7 @@ impl<'a> DenseViews<'a> {
         let grid = Grid::covering(&axes, pair.left_camera, pair.right_camera, 1.0).ok_or(MatchError::NoSharedField)?;
         let left = View::masked((pair.left, pair.masks[0]), pair.left_camera, axes.shared_from_left(), grid);
         let right = View::masked((pair.right, pair.masks[1]), pair.right_camera, axes.shared_from_right(), grid);
-        let levels = Levels::new(&left, &right, &band(&grid, &axes, pair.nearest));
+        let levels = Some(Levels::new(&left, &right, &band(&grid, &axes, pair.nearest)));
         Ok(Self { pair: *pair, frame, rows, rows_frame: axes, left, right, levels, row_matches: Vec::new() })
     }
 
@@ -119,7 +125,8 @@ impl<'a> DenseViews<'a> {
     fn on_rows(self) -> Self {
         let mut views = self;
         for _ in 0..ROUNDS {
-            let sightings = sightings(&views.levels);
+            let Some(levels) = &views.levels else { break };
+            let sightings = sightings(levels);
             views.row_matches = sightings.iter().filter_map(|it| views.in_originals(it)).collect();
             let pose = pose_of_rows(&sightings, views.left.grid(), &views.rows_frame, &views.rows);
             let Some(moved) = pose.and_then(|pose| Self::turned(&views.pair, views.frame, pose).ok()) else { break };
@@ -142,18 +149,24 @@ impl<'a> DenseViews<'a> {
         Some((PixelPair { left, right }, sigma))
     }
 
-    /// Finds the disparities of the left view on which both views agree.
+    /// Finds the disparities of the left view on which both views agree. What only the search needs is given up.
     #[must_use]
-    pub fn sweep(&self) -> WholeDisparities {
-        WholeDisparities(in_pool(|| self.levels.swept()))
+    pub fn sweep(&mut self) -> WholeDisparities {
+        let (left, right) = (&self.left, &self.right);
+        let made = || Levels::new(left, right, &band(left.grid(), &self.rows_frame, self.pair.nearest));
+        let levels = self.levels.take();
+        in_pool(|| {
+            let levels = levels.unwrap_or_else(made);
+            WholeDisparities { disparity: levels.swept(), coarsest_area: levels.coarsest_area() }
+        })
     }
 
     /// Refines disparities to a fraction of a pixel, with their standard deviations.
     #[must_use]
-    pub fn register(&self, swept: &WholeDisparities) -> Disparities {
+    pub fn register(&self, swept: WholeDisparities) -> Disparities {
         let left = SampledView { plane: self.left.plane(), seen: self.left.seen() };
         let right = SampledView { plane: self.right.plane(), seen: self.right.seen() };
-        in_pool(|| fraction::registered([left, right], &swept.0, self.levels.coarsest_area()))
+        in_pool(|| fraction::registered([left, right], swept.disparity, swept.coarsest_area))
     }
 
     /// Converts disparities to ranges of the left image's pixels. The covariance is that of [`dense_depth`].
