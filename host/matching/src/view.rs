@@ -139,6 +139,11 @@ pub(crate) struct Buffers {
 }
 
 impl Buffers {
+    /// The number of views that lay in their images as the ones before.
+    pub(crate) const fn kept_views(&self) -> u64 {
+        self.kept.served()
+    }
+
     fn values(&mut self, count: usize) -> Vec<f32> {
         let mut values = self.values.pop().unwrap_or_default();
         values.resize(count, 0.0);

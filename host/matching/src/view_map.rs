@@ -43,12 +43,19 @@ pub(crate) struct Kept {
     map: Vec<Places>,
     /// Whether `map` is that of the last view. It is made when that came for the second time: a map for one view costs more than it saves.
     is_made: bool,
+    /// The number of views for which it was.
+    served: u64,
 }
 
 impl Kept {
+    /// The number of views that were decided by the same as the ones before.
+    pub(crate) const fn served(&self) -> u64 {
+        self.served
+    }
+
     /// What finds the places of the rows of the view that `mapped` decides, and all of them where the view before was the same.
     pub(crate) fn of(&mut self, mapped: Mapped) -> (Rays<'_>, Option<&[Places]>) {
-        let Self { lens, before, map, is_made } = self;
+        let Self { lens, before, map, is_made, served } = self;
         let known = lens.take().filter(|(of, _)| *of == mapped.camera);
         let (_, lens) = lens.insert(known.unwrap_or_else(|| (mapped.camera, BatchLens::new(&mapped.camera))));
         let is_same = before.as_ref() == Some(&mapped);
@@ -58,6 +65,7 @@ impl Kept {
             map.par_iter_mut().enumerate().for_each_init(Line::default, |line, (y, places)| rays.fill(y, line, places));
         }
         *is_made = is_same;
+        *served += u64::from(is_same);
         (rays, is_same.then_some(map.as_slice()))
     }
 }

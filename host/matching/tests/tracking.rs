@@ -192,6 +192,37 @@ fn fewer_points_are_spread_over_the_image() {
     assert!(again.len() > few.len());
 }
 
+/// Where there is no time for all points, a first pair takes a part of the work of a whole search, and the next pairs find what it left.
+#[test]
+fn the_first_search_is_bounded_where_time_is_short() {
+    let first = |most: Option<usize>| {
+        let truth = place(0, 40.0).rendered(SIDE, 1);
+        TrackingMatcher::default().find_at_most(&pair(&truth), most).unwrap()
+    };
+    let (whole, bounded) = (first(None), first(Some(200)));
+    let tracking = TrackingMatcher::default();
+    let later = (1..=8).map(|seed| {
+        let truth = place(0, 40.0).rendered(SIDE, seed);
+        tracking.find_at_most(&pair(&truth), Some(200)).unwrap().pairs
+    });
+    let later: Vec<Vec<Match>> = later.collect();
+    let high = |found: &[Match]| found.iter().filter(|found| found.left.v < f64::from(SIDE) / 4.0).count();
+    let last = &later[later.len() - 1];
+    println!(
+        "{} of {} keypoints give {} points of {}, {} above; then {}, {} above",
+        bounded.left_keypoints,
+        whole.left_keypoints,
+        bounded.pairs.len(),
+        whole.pairs.len(),
+        high(&bounded.pairs),
+        last.len(),
+        high(last),
+    );
+    assert!(bounded.left_keypoints * 2 < whole.left_keypoints && bounded.pairs.len() >= 60);
+    assert!(last.len() >= 140 && high(last) >= 5 && high(last) > high(&bounded.pairs));
+    assert_eq!(later[0], bounded.pairs, "the same pairs give the same matches");
+}
+
 /// A pair of other cameras has no tracks in common with the pair before; neither has an image of the wrong size, which is refused.
 #[test]
 fn other_cameras_begin_anew() {
