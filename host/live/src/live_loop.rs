@@ -12,8 +12,8 @@ use vergence_board::{BoardKnowledge, HostClock};
 use vergence_camera::{CameraEvent, PendingImage};
 use vergence_matching::Matcher;
 use vergence_pipeline::{
-    Ambiguity, Exposed, Exposures, Method, Observation, PointBudget, PointLimit, PoseMemory, Search, SkipReason,
-    TimeBase,
+    Ambiguity, Exposed, Exposures, Method, Observation, PairCost, PointBudget, PointLimit, PoseMemory, Search,
+    SkipReason, TimeBase,
 };
 use vergence_protocol::{Microseconds, TriggerMark};
 use vergence_rig::{Rig, StampedImage};
@@ -262,8 +262,8 @@ impl LiveLoop {
     /// Tells the budget what a cloud took until the next pair could begin.
     fn note_cost(&mut self, begun: &Begun, measurement: &Measurement) {
         if let (Some(budget), Observation::Points { .. }) = (&mut self.budget, &measurement.observation) {
-            let for_pixels = measurement.dense.as_ref().map_or(0.0, |dense| dense.seconds);
-            budget.took(begun.at.elapsed().as_secs_f64() - for_pixels, for_pixels);
+            let others = measurement.dense.as_ref().map_or(0.0, |dense| dense.seconds);
+            budget.took(PairCost { points: begun.at.elapsed().as_secs_f64() - others, others });
         }
     }
 

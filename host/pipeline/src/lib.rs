@@ -50,7 +50,7 @@ pub use memory::PoseMemory;
 pub use mode_outlook::ModeOutlook;
 pub use observation::{Observation, observe_one, observe_pair};
 pub use pair::{PairImages, colour_at};
-pub use point_budget::{PointBudget, PointLimit};
+pub use point_budget::{PairCost, PointBudget, PointLimit};
 pub use pose::{Motion, PairPose, TriggeredImage, UnpairedImage, pair_exposure};
 pub use pose_source::{pose_by_images, with_fused};
 pub use score::{Score, Spread, score};

@@ -17,9 +17,22 @@ const STEPS: (f64, f64) = (0.85, 1.05);
 const KEPT: usize = 5;
 /// The first pair is searched as a whole, which costs so many times what the others will.
 const FIRST: f64 = 2.0;
+/// Seconds that the first search takes for all points. How fast the computer is shows only then: this is twice what two cores take for 640 x 640 pixels.
+const WHOLE: f64 = 0.1;
+/// While the first pair is searched, another may wait and none be lost: it may take as much as so many periods.
+const FIRST_PERIODS: f64 = 1.5;
 /// So many pairs one after the other that all took longer than a period are no hiccup: others are skipped meanwhile, so that the limit comes down
 /// at once, and costs are counted anew.
 const LATE: usize = 3;
+
+/// What a pair took until the next one could begin, in seconds.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct PairCost {
+    /// Its points.
+    pub points: f64,
+    /// What else was measured of it, as the ranges of all its pixels.
+    pub others: f64,
+}
 
 /// The points that a pair may have because of time, and those that it would have without.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -42,11 +55,14 @@ pub struct PointBudget {
 }
 
 impl PointBudget {
-    /// For a matcher that looks for at most `of` points. Time never limits them to less than `least`.
+    /// For a matcher that looks for at most `of` points. Time never limits them to less than `least`. `period` is that of the cameras in seconds, where it is
+    /// known before they deliver.
     #[must_use]
-    pub fn new(least: usize, of: usize) -> Self {
-        let (costs, periods) = (VecDeque::new(), VecDeque::new());
-        Self { least: least.min(of) as f64, of, now: of as f64, costs, is_first: true, periods }
+    pub fn new(least: usize, of: usize, period: Option<f64>) -> Self {
+        let (costs, periods, most) = (VecDeque::new(), VecDeque::new(), of as f64);
+        let least = most.min(least as f64);
+        let part = period.map_or(1.0, |period| FIRST_PERIODS * period / WHOLE);
+        Self { least, of, now: (most * part).clamp(least, most), costs, is_first: true, periods }
     }
 
     /// The limit of the next pair; `None` where there is time for all points.
@@ -61,9 +77,8 @@ impl PointBudget {
         keep(&mut self.periods, seconds);
     }
 
-    /// Notes the seconds that the points of a pair took until the next one could begin, besides `others` for what else was measured of it, and changes
-    /// the limit.
-    pub fn took(&mut self, seconds: f64, others: f64) {
+    /// Notes what a pair took, and changes the limit.
+    pub fn took(&mut self, PairCost { points: seconds, others }: PairCost) {
         let is_first = std::mem::replace(&mut self.is_first, false);
         keep(&mut self.costs, if is_first { seconds / FIRST } else { seconds });
         let Some(period) = vergence_vision::median(self.periods.iter().copied().collect()) else { return };
@@ -109,7 +124,7 @@ mod tests {
         let one = |_| {
             let points = budget.limit().map_or(budget.of, |limit| limit.most);
             budget.came_after(period);
-            budget.took(fixed + per_point * points as f64, 0.0);
+            budget.took(PairCost { points: fixed + per_point * points as f64, others: 0.0 });
             points
         };
         (0..pairs).map(one).collect()
@@ -117,7 +132,7 @@ mod tests {
 
     #[test]
     fn fewer_points_keep_the_rate_of_the_cameras() {
-        let mut budget = PointBudget::new(120, 700);
+        let mut budget = PointBudget::new(120, 700, None);
         // 10 ms and 0.05 ms for each point: all take 45 ms, and 17 ms have time for 89 of them at 60 Hz, 367 at 30 Hz.
         assert!(limits(&mut budget, [0.010, 5e-5, 1.0 / 15.0], 40).iter().all(|points| *points == 700));
         assert_eq!(budget.limit(), None, "there is time for all");
@@ -136,38 +151,46 @@ mod tests {
     /// Pairs that take longer than the period are skipped by the next: the limit is there within a few.
     #[test]
     fn the_first_pairs_tell_how_many_points_there_is_time_for() {
-        let (period, mut budget) = (1.0 / 60.0, PointBudget::new(150, 700));
+        let (period, mut budget) = (1.0 / 60.0, PointBudget::new(150, 700, None));
         // 8 ms and 0.05 ms for each point: all take 43 ms, the first pair as a whole 86 ms.
         budget.came_after(period);
-        budget.took(0.086, 0.0);
+        budget.took(PairCost { points: 0.086, others: 0.0 });
         let points = limits(&mut budget, [0.008, 5e-5, period], 60);
         let late = points.iter().filter(|points| 0.008 + 5e-5 * **points as f64 > period).count();
         assert!(points[0] < 350 && late <= 6, "{points:?}");
         assert!(points[20..].iter().all(|points| (150..=180).contains(points)), "{points:?}");
         // A first pair that takes long where there is time for the others limits nothing.
-        let mut budget = PointBudget::new(150, 700);
+        let mut budget = PointBudget::new(150, 700, None);
         budget.came_after(1.0 / 15.0);
-        budget.took(0.110, 0.0);
+        budget.took(PairCost { points: 0.110, others: 0.0 });
         assert_eq!(budget.limit(), None);
+    }
+
+    /// How long a pair takes is not known before the first one: it is bounded where its period is short, and nowhere else.
+    #[test]
+    fn the_first_pair_is_bounded_where_pairs_come_fast() {
+        let first = |rate: f64| PointBudget::new(150, 700, Some(1.0 / rate)).limit().map(|limit| limit.most);
+        assert_eq!([first(5.0), first(15.0)], [None, None]);
+        assert_eq!([first(30.0), first(60.0), first(500.0)], [Some(350), Some(175), Some(150)]);
     }
 
     #[test]
     fn one_pair_that_takes_long_limits_nothing() {
-        let mut budget = PointBudget::new(120, 700);
+        let mut budget = PointBudget::new(120, 700, None);
         limits(&mut budget, [0.010, 5e-5, 1.0 / 15.0], 10);
-        budget.took(0.4, 0.0);
-        budget.took(0.4, 0.0);
+        budget.took(PairCost { points: 0.4, others: 0.0 });
+        budget.took(PairCost { points: 0.4, others: 0.0 });
         assert_eq!(budget.limit(), None);
     }
 
     #[test]
     fn what_else_is_measured_costs_points_where_that_keeps_the_rate() {
         let after = |others: f64| {
-            let mut budget = PointBudget::new(150, 700);
+            let mut budget = PointBudget::new(150, 700, None);
             for _ in 0..60 {
                 let points = budget.limit().map_or(700, |limit| limit.most);
                 budget.came_after(0.2);
-                budget.took(0.010 + 1e-4 * points as f64, others);
+                budget.took(PairCost { points: 0.010 + 1e-4 * points as f64, others });
             }
             budget.limit().map_or(700, |limit| limit.most)
         };
@@ -180,7 +203,7 @@ mod tests {
 
     #[test]
     fn a_floor_above_what_the_matcher_looks_for_is_all_of_it() {
-        let mut budget = PointBudget::new(900, 700);
+        let mut budget = PointBudget::new(900, 700, None);
         limits(&mut budget, [1.0, 1e-3, 0.01], 50);
         assert_eq!(budget.limit(), None);
     }

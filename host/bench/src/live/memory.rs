@@ -20,6 +20,11 @@ impl Memory {
         };
         Self { resident: of("VmRSS:"), peak: of("VmHWM:") }
     }
+
+    /// Counts the most from now on (proc_pid_clear_refs(5)). Where the system does not let it, the most stays that of the whole process.
+    pub fn forget_peak() {
+        let _ = std::fs::write("/proc/self/clear_refs", "5");
+    }
 }
 
 /// Seconds that all threads of this process have computed, in steps of 10 ms; zero where the system does not tell.

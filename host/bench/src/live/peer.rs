@@ -1,6 +1,5 @@
 //! OpenCV on the same pairs.
 
-use image::DynamicImage;
 use vergence_vision::{Pixel, median};
 
 use super::rendered::LiveFrames;
@@ -56,9 +55,9 @@ impl PeerMatches {
         let folder = tempfile::tempdir().map_err(BenchError::temporary)?;
         let mut paths = Vec::new();
         for (number, frame) in frames.different().iter().take(PAIRS).enumerate() {
-            for (name, image) in [("left", frame.images().left), ("right", frame.images().right)] {
+            for (name, image) in ["left", "right"].into_iter().zip(frame.images()) {
                 let path = folder.path().join(format!("{number}-{name}.png"));
-                DynamicImage::ImageRgb8(image.clone()).to_luma8().save(&path).map_err(BenchError::temporary)?;
+                image.save(&path).map_err(BenchError::temporary)?;
                 paths.push(path.display().to_string());
             }
         }

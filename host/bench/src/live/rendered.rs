@@ -2,10 +2,10 @@
 
 use std::sync::Arc;
 
-use image::RgbImage;
+use image::{DynamicImage, GrayImage, RgbImage};
 use vergence_pipeline::PairImages;
 use vergence_rig::{Rig, RigPose};
-use vergence_sim::{Room, RoomCamera};
+use vergence_sim::{Random, Room, RoomCamera};
 use vergence_vision::{Angle, CloudPoint, Length, Pixel, Side};
 
 /// Largest distance of a right match from the truth, in pixels.
@@ -15,6 +15,8 @@ const RIGHT_PX: f64 = 2.5;
 const AROUND_PX: f64 = 0.8;
 /// Baseline of all ways, in millimetres.
 const BASELINE_MM: f64 = 145.0;
+/// How far the reading of an encoder that stands departs, in counts: it stands beside the edge of a count.
+const FLICKER_COUNTS: f64 = 1.0;
 /// Different pairs of one way.
 const DIFFERENT: usize = 12;
 
@@ -37,14 +39,33 @@ impl Way {
     }
 }
 
-/// Both images of one exposure, and the true pose.
+/// Both images of one exposure, and where they were taken.
 pub struct LiveFrame {
-    images: [RgbImage; 2],
-    /// The pose, known as a calibrated bench knows it.
-    pub pose: RigPose,
+    /// In grey: matching sees no colours, and three times as much memory would count as the matcher's.
+    images: [GrayImage; 2],
+    /// Baseline in millimetres and separation in radians.
+    axes: [f64; 2],
+    pose: RigPose,
 }
 
 impl LiveFrame {
+    /// Both images, left first.
+    #[must_use]
+    pub const fn images(&self) -> &[GrayImage; 2] {
+        &self.images
+    }
+}
+
+/// A pair as cameras and encoders deliver it.
+pub struct LivePair<'a> {
+    /// What was exposed.
+    pub frame: &'a LiveFrame,
+    /// The pose by the encoders.
+    pub pose: RigPose,
+    images: [RgbImage; 2],
+}
+
+impl LivePair<'_> {
     /// Both images.
     #[must_use]
     pub const fn images(&self) -> PairImages<'_> {
@@ -70,23 +91,32 @@ impl LiveFrames {
         let cameras = [Side::Left, Side::Right].map(camera);
         let tables = cameras.each_ref().map(RoomCamera::ray_table);
         let frame = |number: usize| {
-            let pose = rig.pose_read_at(&[BASELINE_MM, way.separation(number).rad()]);
+            let axes = [BASELINE_MM, way.separation(number).rad()];
+            let pose = rig.pose_read_at(&axes);
             let images = [0, 1].map(|i| {
                 let there = room.world_from_camera(cameras[i].side, &pose);
-                cameras[i].photograph_quick(&tables[i], number as u32, &|_| there)
+                let image = cameras[i].photograph_quick(&tables[i], number as u32, &|_| there);
+                DynamicImage::ImageRgb8(image).to_luma8()
             });
-            LiveFrame { images, pose }
+            LiveFrame { images, axes, pose }
         };
         let [left, _] = cameras.clone();
         Self { rig: rig.clone(), frames: (0..DIFFERENT).map(frame).collect(), left }
     }
 
-    /// The pair `number`: the different ones, to and fro.
+    /// The pair `number`: the different ones, to and fro. Each encoder reads up to [`FLICKER_COUNTS`] beside the true one, each time anew.
     #[must_use]
-    pub fn at(&self, number: usize) -> &LiveFrame {
+    pub fn at(&self, number: usize) -> LivePair<'_> {
         let period = 2 * (DIFFERENT - 1);
         let step = number % period;
-        &self.frames[step.min(period - step)]
+        let frame = &self.frames[step.min(period - step)];
+        let mut random = Random::new(number as u64);
+        let mut read = frame.axes;
+        for (read, axis) in read.iter_mut().zip(&self.rig.axes) {
+            *read += random.between(-FLICKER_COUNTS, FLICKER_COUNTS).round() * axis.value_per_count();
+        }
+        let images = frame.images.each_ref().map(|grey| DynamicImage::ImageLuma8(grey.clone()).to_rgb8());
+        LivePair { frame, pose: self.rig.pose_read_at(&read), images }
     }
 
     /// How many of `points` are right, and how many there are.

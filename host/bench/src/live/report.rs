@@ -4,7 +4,7 @@ use serde_json::{Value, json};
 use vergence_rig::rounded;
 use vergence_vision::median;
 
-use super::{LiveFigures, PeerMatches, PeerMatching, STAGES};
+use super::{DenseFigures, LiveFigures, PeerMatches, PeerMatching, STAGES};
 
 /// Right points of a pair, and the part of all points that is right.
 fn right(points: &[[usize; 2]]) -> [f64; 2] {
@@ -37,17 +37,17 @@ impl LiveFigures {
                 self.limit(),
             ),
             format!(
-                "{now:.0} right points a pair ({precision:.4}); single pairs {single:.0} ({single_precision:.4}) in {alone:.0} ms; \
+                "{now:.0} right points a pair ({precision:.4}), {} in the first; views kept {} times; \
                  memory {} MiB, later {} MiB, at most {} MiB",
-                self.memory[0].resident, self.memory[1].resident, self.memory[1].peak
+                self.points.first().map_or(0, |[right, _]| *right),
+                self.kept_views,
+                self.memory[0].resident,
+                self.memory[1].resident,
+                self.memory[1].peak
             ),
-            format!("ranges of {:.1} % of the pixels in {:.0} ms", 100.0 * self.dense(1), 1e3 * self.dense(0)),
+            self.dense.in_words(),
+            format!("single pairs: {single:.0} right points ({single_precision:.4}) in {alone:.0} ms"),
         ]
-    }
-
-    /// The median of the seconds that all pixels of a pair took (0), or of the part of them that was measured (1).
-    fn dense(&self, which: usize) -> f64 {
-        median(self.dense.iter().map(|dense| dense[which]).collect()).unwrap_or_default()
     }
 
     /// The same for programs.
@@ -71,10 +71,43 @@ impl LiveFigures {
             "precision": rounded(precision),
             "single_right_points": rounded(single),
             "single_precision": rounded(single_precision),
-            "dense_ms": rounded(1e3 * self.dense(0)),
-            "dense_share": rounded(self.dense(1)),
+            "first_right_points": self.points.first().map_or(0, |[right, _]| *right),
+            "kept_views": self.kept_views,
+            "dense": self.dense.json(),
             "single_ms": rounded(1e3 * median(self.single_seconds.clone()).unwrap_or_default()),
             "memory_mib": [self.memory[0].resident, self.memory[1].resident, self.memory[1].peak],
+        })
+    }
+}
+
+impl DenseFigures {
+    fn in_words(&self) -> String {
+        let ([seconds, share], [now, precision]) = (self.usual(), right(&self.points));
+        format!(
+            "ranges of {:.1} % of the pixels in {:.0} ms, and {now:.0} right points ({precision:.4}), at {:.0} Hz: {} of {} pairs skipped, \
+             {:.0} ms after the exposure; memory at most {} MiB",
+            100.0 * share,
+            1e3 * seconds,
+            self.rate,
+            self.skipped(),
+            self.came,
+            1e3 * median(self.latency.clone()).unwrap_or_default(),
+            self.peak
+        )
+    }
+
+    fn json(&self) -> Value {
+        let ([seconds, share], [now, precision]) = (self.usual(), right(&self.points));
+        json!({
+            "rate_hz": rounded(self.rate),
+            "came": self.came,
+            "skipped": self.skipped(),
+            "ms": rounded(1e3 * seconds),
+            "share": rounded(share),
+            "latency_median_ms": rounded(1e3 * median(self.latency.clone()).unwrap_or_default()),
+            "right_points": rounded(now),
+            "precision": rounded(precision),
+            "most_memory_mib": self.peak,
         })
     }
 }

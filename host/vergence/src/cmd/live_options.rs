@@ -92,7 +92,7 @@ impl LiveMethod {
             matching_time: time,
             stopwatch,
             memory: Arc::default(),
-            budget: most.map(|most| PointBudget::new(self.least_points, most)),
+            budget: most.map(|most| PointBudget::new(self.least_points, most, rig.period_us.map(|us| 1e-6 * us))),
             dense: false,
         }
     }

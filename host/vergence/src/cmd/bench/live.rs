@@ -17,6 +17,9 @@ pub struct Args {
     /// Sides of the images in pixels.
     #[arg(long, value_delimiter = ',', default_value = "640,1280", value_name = "PIXELS", value_parser = clap::value_parser!(u32).range(160..=2560))]
     sides: Vec<u32>,
+    /// Cases to measure. The most memory of a case is its own only where it is the first one.
+    #[arg(long, value_delimiter = ',', default_value = "human,herbivore,turning", value_name = "NAMES", value_parser = ["human", "herbivore", "turning"])]
+    cases: Vec<String>,
     /// Pairs in a second; without it 60 of 640 pixels and less, else 15.
     #[arg(long, value_name = "HZ", value_parser = crate::cmd::camera_options::parse_rate)]
     rate: Option<f64>,
@@ -44,7 +47,7 @@ pub fn run(args: &Args, console: Console) -> Result<(), Failure> {
             ("herbivore", Way::Standing(Angle::from_deg(120.0))),
             ("turning", Way::Turning(args.speed * rate.recip())),
         ];
-        for (name, way) in ways {
+        for (name, way) in ways.into_iter().filter(|(name, _)| args.cases.iter().any(|case| case == name)) {
             let progress = console.progress(&format!("{side} pixels, {name}"));
             let frames = LiveFrames::rendered(&rig, way);
             let figures = LiveFigures::of(&frames, rate, args.pairs as usize, clock)?;
