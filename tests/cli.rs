@@ -303,3 +303,20 @@ fn a_failure_is_json_where_results_are() {
         assert!(output.stdout.is_empty());
     }
 }
+
+#[test]
+fn without_cameras_or_reference_nothing_is_measured() {
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    let pair = folder.path().join("pair.toml");
+    let fixed = include_str!("../docs/rig-file.md").split("```").nth(1).expect("the first example");
+    let camera =
+        fixed.split("[right.camera]").next().expect("a camera").split("[left.camera]").nth(1).expect("a camera");
+    let right = fixed.replace("# the same keys", camera);
+    std::fs::write(&pair, right.trim_start_matches("toml")).expect("written");
+    let pair = pair.to_str().expect("a name");
+    let cameras = ["run", "--cameras", "/nowhere/video0", "/nowhere/video1"];
+    fails_with(&[&["--rig", pair], &cameras[..]].concat(), 3, &["there is no camera", "/nowhere/video1"]);
+    fails_with(&["--port", "sim", "run", "--cameras", "sim", "--frames", "1"], 3, &["no reference", "--home"]);
+    fails_with(&["--port", "sim", "run", "--cameras", "/dev/video0", "/dev/video1"], 2, &["--cameras sim"]);
+    fails_with(&["--port", "sim", "run", "--cameras", "sim", "--mode", "cat"], 2, &["herbivore or human"]);
+}

@@ -1,4 +1,4 @@
-//! Zones, poses for a goal, and the speed of the kernels, on the command line.
+//! Zones, poses for a goal, and the speed of kernels and live matching, on the command line.
 #![allow(
     clippy::expect_used,
     clippy::panic,
@@ -94,4 +94,34 @@ fn the_bench_of_the_kernels_does_without_opencv() {
         assert!(figures[figure].as_f64().expect("a number") > 0.0, "{figures}");
     }
     assert!(figures["anew"]["triangulate_full_ns"].as_f64().expect("a number") > 0.0, "{figures}");
+}
+
+#[test]
+fn bench_live_accounts_for_every_pair() {
+    let figures = run_json(&["bench", "live", "--sides", "240", "--pairs", "8", "--rate", "30", "--no-peer", "--json"]);
+    let rows = figures["rows"].as_array().expect("rows");
+    assert_eq!(
+        rows.iter().map(|row| row["way"].as_str()).collect::<Vec<_>>(),
+        [Some("human"), Some("herbivore"), Some("turning")]
+    );
+    for row in rows {
+        let number = |key: &str| row["live"][key].as_f64().expect("a number");
+        assert!((number("measured") + number("skipped") - 8.0).abs() < 0.5 && number("measured") > 0.5, "{row}");
+        assert!(number("precision") > 0.97 && number("right_points") > 20.0, "{row}");
+        assert!(number("latency_99_ms") >= number("latency_median_ms") && number("rate_hz") > 0.0, "{row}");
+        let dense = |key: &str| row["live"]["dense"][key].as_f64().expect("a number");
+        assert!((dense("came") - 8.0).abs() < 0.5 && dense("skipped") < 8.0 && dense("share") > 0.1, "{row}");
+        // An encoder that flickers by a count turns no views; stages that turn do.
+        let is_standing = row["way"] != "turning";
+        assert_eq!(number("kept_views") >= number("measured") - 1.5, is_standing, "{row}");
+    }
+}
+
+#[test]
+fn bench_live_measures_the_cases_that_are_asked_for() {
+    let case = ["bench", "live", "--sides", "160", "--pairs", "1", "--cases", "herbivore", "--no-peer", "--json"];
+    let figures = run_json(&case);
+    assert_eq!(figures["rows"].as_array().map(Vec::len), Some(1));
+    assert_eq!(figures["rows"][0]["way"], "herbivore");
+    fails_with(&["bench", "live", "--cases", "cat"], 2, &["herbivore"]);
 }

@@ -15,7 +15,7 @@ use std::future::pending;
 use std::io::{BufRead, BufReader, Read};
 use std::path::Path;
 use std::process::Stdio;
-use std::sync::Arc;
+use std::sync::{Arc, mpsc};
 use std::time::Duration;
 
 use common::dense_files::within_sigma;
@@ -25,7 +25,8 @@ use serde_json::Value;
 use vergence::failure::Failure;
 use vergence::sim::SharedRig;
 use vergence_board::Board;
-use vergence_live::{Limits, LiveLoop, LiveResult, Measurement, Totals};
+use vergence_live::{Limits, LiveLoop, LiveResult, MatchingTime, Measurement, Totals};
+use vergence_matching::{ImagePair, MatchError, Matcher, Matches};
 use vergence_pipeline::{ColouredPoint, Observation};
 use vergence_protocol::{Mode, Request, Trigger};
 use vergence_rig::{AxisPosition, Rig, Shutter};
@@ -353,37 +354,38 @@ fn places_keep_their_numbers_from_cloud_to_cloud() {
     assert!(kept.iter().all(|(one, other)| (one[0] - other[0]).hypot(one[1] - other[1]) < 0.5));
 }
 
-#[test]
-fn bench_live_accounts_for_every_pair() {
-    let output = run(&["bench", "live", "--sides", "240", "--pairs", "8", "--rate", "30", "--no-peer", "--json"]);
-    assert!(output.status.success(), "{}", text(&output.stderr));
-    let lines = lines(&output.stdout);
-    let rows = lines.last().expect("a result")["rows"].as_array().expect("rows");
-    assert_eq!(
-        rows.iter().map(|row| row["way"].as_str()).collect::<Vec<_>>(),
-        [Some("human"), Some("herbivore"), Some("turning")]
-    );
-    for row in rows {
-        let number = |key: &str| row["live"][key].as_f64().expect("a number");
-        assert!((number("measured") + number("skipped") - 8.0).abs() < 0.5 && number("measured") > 0.5, "{row}");
-        assert!(number("precision") > 0.97 && number("right_points") > 20.0, "{row}");
-        assert!(number("latency_99_ms") >= number("latency_median_ms") && number("rate_hz") > 0.0, "{row}");
+/// A matcher that tells when it begins, and finds nothing.
+struct Telling(mpsc::Sender<()>);
+
+impl Matcher for Telling {
+    fn name(&self) -> &'static str {
+        "telling"
+    }
+
+    fn find(&self, _: &ImagePair<'_>) -> Result<Matches, MatchError> {
+        self.0.send(()).expect("somebody listens");
+        Ok(Matches::default())
     }
 }
 
-#[test]
-fn without_cameras_or_reference_nothing_is_measured() {
-    let folder = tempfile::tempdir().expect("a temporary folder");
-    let pair = folder.path().join("pair.toml");
-    let fixed = include_str!("../docs/rig-file.md").split("```").nth(1).expect("the first example");
-    let camera =
-        fixed.split("[right.camera]").next().expect("a camera").split("[left.camera]").nth(1).expect("a camera");
-    let right = fixed.replace("# the same keys", camera);
-    std::fs::write(&pair, right.trim_start_matches("toml")).expect("written");
-    let pair = pair.to_str().expect("a name");
-    let cameras = ["run", "--cameras", "/nowhere/video0", "/nowhere/video1"];
-    fails_with(&[&["--rig", pair], &cameras[..]].concat(), 3, &["there is no camera", "/nowhere/video1"]);
-    fails_with(&["--port", "sim", "run", "--cameras", "sim", "--frames", "1"], 3, &["no reference", "--home"]);
-    fails_with(&["--port", "sim", "run", "--cameras", "/dev/video0", "/dev/video1"], 2, &["--cameras sim"]);
-    fails_with(&["--port", "sim", "run", "--cameras", "sim", "--mode", "cat"], 2, &["herbivore or human"]);
+/// What becomes of a result, such as files, takes time too. Here each result waits until the matcher has begun with the next pair.
+#[tokio::test(start_paused = true)]
+async fn the_next_pair_is_measured_while_a_result_is_written() {
+    let mut bench = Bench::new(rig().shutters, 1).await;
+    let (tell, begun) = mpsc::channel();
+    bench.live.matcher = Arc::new(Telling(tell));
+    // Longer than the period: when a pair is done, the next one has come.
+    bench.live.matching_time = MatchingTime::Fixed(Duration::from_millis(150));
+    bench.board.ask(Request::SetTrigger(Trigger::Every { period_us: PERIOD_US })).await.expect("it fires");
+    let (mut totals, mut started) = (Totals::default(), 0);
+    let publish = |result: LiveResult<'_>| {
+        while started < (result.totals.clouds + 1).min(4) {
+            begun.recv_timeout(Duration::from_secs(20)).expect("the next pair is measured meanwhile");
+            started += 1;
+        }
+        Ok::<(), Failure>(())
+    };
+    let limits = Limits { results: Some(4), time: Some(Duration::from_secs(20)) };
+    bench.live.run(limits, &mut totals, publish, |warning| println!("{warning}")).await.expect("it measures");
+    assert_eq!((totals.clouds, started), (4, 4));
 }
