@@ -83,8 +83,8 @@ impl PointBudget {
         keep(&mut self.costs, if is_first { seconds / FIRST } else { seconds });
         let Some(period) = vergence_vision::median(self.periods.iter().copied().collect()) else { return };
         let at_least = seconds * self.least / self.now;
-        let others = if at_least + others < SHARE * period { others } else { 0.0 };
-        let there_is = SHARE * period - others;
+        let others = if at_least + others < period { others } else { 0.0 };
+        let there_is = (SHARE * period - others).max(at_least);
         let late = self
             .late(period - others)
             .or_else(|| self.costs.back().copied().filter(|cost| is_first && *cost > there_is));
@@ -197,8 +197,8 @@ mod tests {
         // All points take 80 ms of 170; 120 ms for others leave 50, enough for 400 of them.
         assert_eq!(after(0.080), 700);
         assert!((360..430).contains(&after(0.120)), "{}", after(0.120));
-        // The least points take 25 ms: no number of them keeps the rate beside 160 ms, or beside a second.
-        assert_eq!([after(0.160), after(1.0)], [700, 700]);
+        // The least points take 25 ms: they keep the rate beside 170 ms, and no number of them beside 190 ms or a second.
+        assert_eq!([after(0.160), after(0.170), after(0.190), after(1.0)], [150, 150, 700, 700]);
     }
 
     #[test]
