@@ -1,9 +1,11 @@
 //! A simulated rig whose lenses are not those that its file states, and the file that a calibration of them gives.
 
 use vergence_calibration::{LensModel, stage_plan};
+use vergence_lens::Displacement;
 use vergence_rig::{AxisPosition, Rig};
 use vergence_scene::{LensChoice, TrueLens};
 use vergence_sim::Random;
+use vergence_vision::{Angle, Length};
 
 use crate::bench::Bench;
 use crate::chain::calibrate;
@@ -23,6 +25,27 @@ pub struct LensedRig {
     pub file: Option<String>,
 }
 
+/// How far the elements of a badly mounted lens are off.
+struct Mounting {
+    decentre_mm: f64,
+    tilt_deg: f64,
+    sensor_tilt_deg: f64,
+}
+
+/// The worst on which calibrations count: docs/measured/lenses.md, "What lenses have before any view".
+const BADLY_MOUNTED: Mounting = Mounting { decentre_mm: 0.01, tilt_deg: 0.05, sensor_tilt_deg: 0.4 };
+
+impl Mounting {
+    fn times(&self, share: f64, seed: u64) -> Displacement {
+        Displacement {
+            decentre: Length::from_mm(share * self.decentre_mm),
+            tilt: Angle::from_deg(share * self.tilt_deg),
+            sensor_tilt: Angle::from_deg(share * self.sensor_tilt_deg),
+            seed,
+        }
+    }
+}
+
 impl LensedRig {
     /// The rig `drawn` with such lenses. Traced lenses are calibrated, with the stage, from corners of simulated targets that are projected with
     /// noise: nothing is rendered for it. The mechanics are as drawn. The same seed gives the same file.
@@ -30,9 +53,39 @@ impl LensedRig {
     /// # Errors
     /// Where the axes cannot be calibrated, as those of a trunk.
     pub fn new(drawn: &Rig, lens: LensChoice, seed: u64) -> Result<Self, ReproduceError> {
+        Self::with_eyes(drawn, lens, seed, Ok)
+    }
+
+    /// The same with lenses as they are mounted: their elements are displaced by a share, anywhere between none and all, of the worst on which
+    /// calibrations count before any view.
+    ///
+    /// # Errors
+    /// As [`Self::new`].
+    pub fn mounted(drawn: &Rig, lens: LensChoice, seed: u64) -> Result<Self, ReproduceError> {
+        let mut random = Random::new(seed ^ 0x006d_6f75_6e74_6564);
+        let mut mounted = |lens: TrueLens| match lens {
+            TrueLens::Traced(lens) => {
+                let by = BADLY_MOUNTED.times(random.between(0.0, 1.0), random.seed());
+                lens.displaced(&by).map(TrueLens::Traced)
+            }
+            ideal @ TrueLens::Ideal(_) => Ok(ideal),
+        };
+        Self::with_eyes(drawn, lens, seed, |[left, right]| {
+            let both = mounted(left).and_then(|left| Ok([left, mounted(right)?]));
+            both.map_err(|error| ReproduceError::Rig(format!("{lens}: {error}")))
+        })
+    }
+
+    fn with_eyes(
+        drawn: &Rig,
+        lens: LensChoice,
+        seed: u64,
+        made: impl FnOnce([TrueLens; 2]) -> Result<[TrueLens; 2], ReproduceError>,
+    ) -> Result<Self, ReproduceError> {
         let bench = Bench { drawn: drawn.clone(), built: drawn.clone() };
         let conditions = Conditions { lens, ..Conditions::noise(Corners::Projected, NOISE_PX) };
-        let eyes = Eyes::of(&bench, &conditions)?;
+        let mut eyes = Eyes::of(&bench, &conditions)?;
+        eyes.lenses = made(eyes.lenses)?;
         if lens == LensChoice::Ideal {
             return Ok(Self { lenses: eyes.lenses, known: bench.drawn, file: None });
         }
