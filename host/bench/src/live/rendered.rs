@@ -104,7 +104,7 @@ impl LiveFrames {
         Self { rig: rig.clone(), frames: (0..DIFFERENT).map(frame).collect(), left }
     }
 
-    /// The pair `number`: the different ones, to and fro. Each encoder reads up to [`FLICKER_COUNTS`] beside the true one, each time anew.
+    /// The pair `number`: the different ones, to and fro. Each encoder reads up to `FLICKER_COUNTS` beside the true one, each time anew.
     #[must_use]
     pub fn at(&self, number: usize) -> LivePair<'_> {
         let period = 2 * (DIFFERENT - 1);
