@@ -20,7 +20,7 @@ pub struct Found {
     pub elsewhere: Vec<f64>,
     /// Probability that each match is wrong or off by more than three sigma, by its score.
     pub doubts: Vec<f64>,
-    /// The same across the epipolar plane: of one. The truth is what the left pixel shows, so that nothing is off at right angles to both.
+    /// Squared error of each point across the epipolar plane over its variance: of one. The truth is what the left pixel shows, so that nothing is off at right angles to both.
     pub across: Vec<f64>,
     /// Matches that are not right.
     pub wrong: u64,
